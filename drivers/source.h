@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <stop_token>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <toftwin/frame.h>
+#include <toftwin/result.h>
+
+#include "protocol/settings/settings.h"
+
+namespace toftwin::drivers {
+
+/// What an opened camera is and can do. Constant while it is open.
+struct SourceInfo {
+  std::string driver;  ///< name of the driver's row
+  std::string model;   ///< "Microsoft Kinect v2 (simulated)"
+  std::string serial;
+  FrameKind kind = FrameKind::Real;
+  CameraInfo camera;
+  std::vector<PlaneKind> planes;
+  std::optional<Duration> frame_interval;  ///< nominal; none if it comes as it comes
+  bool can_set_pose = false;
+  bool can_trigger = false;
+  bool can_lockstep = false;            ///< makes a frame only when asked: simulators and recordings
+  std::vector<std::string> parameters;  ///< names that setParameter takes
+};
+
+/// An opened camera. One thread owns it and makes every call but the destructor's stop request.
+class Source {
+ public:
+  virtual ~Source() = default;
+
+  [[nodiscard]] virtual const SourceInfo& info() const = 0;
+
+  /// Starts streaming; called again after stop() it starts anew, with device time still increasing.
+  virtual Result<> start() = 0;
+  virtual void stop() = 0;
+
+  /// Waits for the next frame. The source fills everything but `source`, `sequence`, `dropped_before`
+  /// and `moment.received`, which are the daemon's. Errors: Stopped (soon after the token asks),
+  /// EndOfStream, Disconnected (the daemon reopens it), Timeout (asked again).
+  /// In free run a source paces itself; `lockstep` says that the caller does, so don't wait.
+  virtual Result<Frame> next(std::stop_token stop, bool lockstep) = 0;
+
+  virtual Result<> setPose(const Transform<World, Camera>& world_from_camera);
+  virtual Result<> setParameter(std::string_view name, double value);
+  virtual Result<> trigger();
+};
+
+/// One row of the driver table.
+struct Driver {
+  std::string_view name;
+  std::string_view summary;
+  /// URIs of the cameras that are there now ("pattern:0"); what `toftwin list --drivers` shows.
+  std::vector<std::string> (*list)();
+  /// Opens a camera by the keys of its [[source]] table; the driver reads its own keys and thereby
+  /// ticks them off, so that what is left over is an unknown key.
+  Result<std::unique_ptr<Source>> (*open)(settings::Table& keys);
+  /// The driver's keys as a Markdown table, for the documents.
+  std::string (*document)();
+};
+
+/// All drivers of this build, in the order of the documents.
+std::span<const Driver> allDrivers();
+
+}  // namespace toftwin::drivers

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <toftwin/frame.h>
+#include <toftwin/result.h>
+
+/// Recordings are MCAP files (mcap.dev/spec); every message is a frame exactly as on the wire.
+namespace toftwin::record {
+
+struct WriterOptions {
+  std::uint64_t chunk_bytes = 8ull << 20;  ///< uncompressed; what a killed recorder can lose at most
+  std::chrono::milliseconds chunk_time{1000};
+  int zstd_level = 1;                      ///< 0: not compressed
+};
+
+/// Appends frames. One channel per source. Each finished chunk is written with one call and then
+/// stays; `close` adds the index.
+class Writer {
+ public:
+  static Result<Writer> create(const std::filesystem::path& file, WriterOptions options = {});
+  Writer(Writer&&) noexcept;
+  Writer& operator=(Writer&&) noexcept;
+  /// Closes, if not closed yet; use `close` to learn whether it worked.
+  ~Writer();
+
+  /// Error StorageFull when the disk is full: everything up to the last whole chunk is kept, and
+  /// the file still opens.
+  Result<> write(const Frame& frame);
+  Result<> close();
+  [[nodiscard]] std::uint64_t frames() const;
+
+ private:
+  struct State;
+  explicit Writer(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+/// What is known of a recording without reading its frames.
+struct Summary {
+  std::map<std::string, std::uint64_t> frames_per_source;
+  std::int64_t first_ns = 0, last_ns = 0;  ///< log time: `Moment::received`
+  bool indexed = false;   ///< false: no usable index (killed recorder), found by scanning
+  std::string damage;     ///< what was wrong and how much was lost, or empty
+};
+
+/// Reads frames in file order. Damaged or truncated files give every frame up to the damage.
+class Reader {
+ public:
+  static Result<Reader> open(const std::filesystem::path& file);
+  Reader(Reader&&) noexcept;
+  Reader& operator=(Reader&&) noexcept;
+  ~Reader();
+
+  [[nodiscard]] const Summary& summary() const;
+  /// The next frame of `source` (or of any, if empty). Error EndOfStream after the last.
+  Result<Frame> next(std::string_view source = {});
+  void rewind();
+  /// Goes to the first frame at or after that log time.
+  Result<> seek(std::int64_t log_time_ns);
+
+ private:
+  struct State;
+  explicit Reader(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace toftwin::record

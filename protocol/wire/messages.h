@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include <toftwin/frame.h>
+#include <toftwin/result.h>
+
+/// The messages of the protocol as values; docs/protocol.md says what each means. Every request
+/// carries an `id` that its answer repeats. Frames and pushed messages have none.
+namespace toftwin::wire {
+
+inline constexpr std::uint16_t kVersionMajor = 1;
+inline constexpr std::uint16_t kVersionMinor = 0;
+
+/// The first message of either side.
+struct Hello {
+  std::uint64_t id = 0;
+  std::string software;               ///< "toftwind 0.1.0"
+  std::vector<std::string> features;  ///< optional parts of the protocol that this side speaks
+};
+
+struct ListSources { std::uint64_t id = 0; };
+
+/// One line of the answer to ListSources.
+struct SourceSummary {
+  std::string name;
+  std::string model;
+  std::string serial;
+  FrameKind kind = FrameKind::Real;
+  bool streaming = false;
+};
+struct SourceList { std::uint64_t id = 0; std::vector<SourceSummary> sources; };
+
+struct DescribeSource { std::uint64_t id = 0; std::string source; };
+struct SourceDescription {
+  std::uint64_t id = 0;
+  SourceSummary summary;
+  std::string driver;
+  CameraInfo camera;
+  std::vector<PlaneKind> planes;
+  std::optional<Duration> frame_interval;
+  bool can_set_pose = false;
+  bool can_trigger = false;
+  bool can_lockstep = false;
+  std::vector<std::string> parameters;
+};
+
+/// What happens when a subscriber is slower than the source. On the wire as a byte.
+enum class Policy : std::uint8_t {
+  Latest = 0,    ///< only the newest frame waits; older ones are dropped and counted
+  Queue = 1,     ///< up to `queue` frames wait, then the oldest is dropped and counted
+  Lossless = 2,  ///< every frame, or the subscription ends with Overrun at the daemon's limit
+  Lockstep = 3,  ///< the next frame is made only when all lockstep subscribers acknowledged the last
+};
+
+/// A rectangle of pixels; width 0 stands for the whole image.
+struct Region {
+  std::uint32_t x = 0, y = 0, width = 0, height = 0;
+  bool operator==(const Region&) const = default;
+};
+
+struct Subscribe {
+  std::uint64_t id = 0;
+  std::string source;
+  std::vector<PlaneKind> planes;  ///< empty: all
+  Region region;
+  std::uint32_t decimation = 1;   ///< every n-th pixel in x and y, from the region's top left
+  double max_rate_hz = 0.0;       ///< 0: every frame; frames left out for the rate are not "dropped"
+  Policy policy = Policy::Latest;
+  std::uint32_t queue = 0;        ///< for Policy::Queue
+};
+struct Subscribed { std::uint64_t id = 0; std::uint64_t subscription = 0; };
+struct Unsubscribe { std::uint64_t id = 0; std::uint64_t subscription = 0; };
+
+/// One frame of a subscription.
+struct FrameMessage { std::uint64_t subscription = 0; Frame frame; };
+/// Lockstep: this side has taken the frame with that sequence.
+struct Acknowledge { std::uint64_t subscription = 0; std::uint64_t sequence = 0; };
+/// The daemon ends a subscription, with the reason (EndOfStream, Overrun, Disconnected …).
+struct SubscriptionEnded { std::uint64_t subscription = 0; Error reason; };
+
+struct SetPose { std::uint64_t id = 0; std::string source; Transform<World, Camera> world_from_camera; };
+struct SetParameter { std::uint64_t id = 0; std::string source; std::string name; double value = 0.0; };
+struct Trigger { std::uint64_t id = 0; std::string source; };
+/// Starts (or, with an empty path, stops) recording a source on the daemon's machine, into the
+/// daemon's recording folder: `file` is a bare name, never a path.
+struct Record { std::uint64_t id = 0; std::string source; std::string file; };
+/// The answer to requests that have nothing else to say.
+struct Done { std::uint64_t id = 0; std::string detail; };
+
+struct AskHealth { std::uint64_t id = 0; };
+struct SourceHealth {
+  std::string name;
+  bool streaming = false;
+  std::uint64_t frames = 0;
+  std::uint64_t dropped_by_device = 0;
+  std::uint32_t subscribers = 0;
+  std::uint32_t reconnects = 0;
+  std::string last_error;
+};
+struct Health {
+  std::uint64_t id = 0;
+  Duration uptime;
+  std::uint32_t sessions = 0;
+  std::vector<SourceHealth> sources;
+};
+
+/// A request failed (`id` of the request) or bytes could not be understood (`id` 0; the connection
+/// is closed after it).
+struct Failure { std::uint64_t id = 0; Error error; };
+
+using Message = std::variant<Hello, ListSources, SourceList, DescribeSource, SourceDescription, Subscribe,
+                             Subscribed, Unsubscribe, FrameMessage, Acknowledge, SubscriptionEnded,
+                             SetPose, SetParameter, Trigger, Record, Done, AskHealth, Health, Failure>;
+
+}  // namespace toftwin::wire

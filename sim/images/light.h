@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <complex>
+#include <vector>
+
+#include <toftwin/geometry.h>
+#include <toftwin/image.h>
+#include <toftwin/units.h>
+
+namespace toftwin::sim {
+
+/// What the central ray of each pixel meets first, exact: the ground truth of a simulated frame.
+struct Truth {
+  Image<float> range_m;       ///< NaN where the ray meets nothing
+  Image<Vec3f> normal;        ///< unit, camera frame, towards the camera; zero where nothing
+  Image<float> albedo;        ///< NaN where nothing
+};
+
+/// The light that reaches each pixel from the camera's own emitters, before any electronics.
+///
+/// `phasors[f * harmonics + (n - 1)]` holds, for modulation frequency f and harmonic n = 1 … harmonics,
+///     P(p) = Σ_paths w · exp(−i 2π n f L / c)
+/// with L the optical length from emitter over all surfaces to the pinhole and w the path's radiance
+/// [W m⁻² sr⁻¹]. A single surface at range r beside the emitter has arg P = −4π f r / c.
+/// `steady` is the same sum without the exponential: the emitters' unmodulated radiance.
+/// `ambient` is the radiance of everything else (sun, lamps), unmodulated.
+struct Light {
+  std::vector<Frequency> frequencies;
+  int harmonics = 1;
+  std::vector<Image<std::complex<float>>> phasors;
+  Image<float> steady;
+  Image<float> ambient;
+  /// Variance of the Monte-Carlo mean of the first harmonic's phasor, per frequency: (real variance
+  /// + imaginary variance) / 2. Empty if one sample per pixel was taken.
+  std::vector<Image<float>> variance;
+  Truth truth;
+
+  [[nodiscard]] int width() const { return steady.width(); }
+  [[nodiscard]] int height() const { return steady.height(); }
+  Image<std::complex<float>>& phasor(std::size_t frequency, int harmonic) {
+    return phasors[frequency * static_cast<std::size_t>(harmonics) + static_cast<std::size_t>(harmonic - 1)];
+  }
+  [[nodiscard]] const Image<std::complex<float>>& phasor(std::size_t frequency, int harmonic) const {
+    return phasors[frequency * static_cast<std::size_t>(harmonics) + static_cast<std::size_t>(harmonic - 1)];
+  }
+};
+
+}  // namespace toftwin::sim

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include <toftwin/result.h>
+
+namespace toftwin::sim {
+
+/// A built scene: meshes and primitives with their materials, ready to trace. Cheap to copy; copies
+/// share the geometry, which nobody changes.
+class Scene {
+ public:
+  /// From a scene file (docs/scene.md). Errors name file, line and key; a mesh that is missing, empty
+  /// or holds NaN vertices is an error naming mesh and vertex.
+  static Result<Scene> load(const std::filesystem::path& file);
+  static Result<Scene> parse(std::string_view toml, const std::filesystem::path& name);
+
+  /// Content hash over the scene and the meshes it uses; 32 hex digits.
+  [[nodiscard]] const std::string& id() const;
+
+  struct Impl;
+  [[nodiscard]] const Impl& impl() const { return *impl_; }
+
+ private:
+  explicit Scene(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)) {}
+  std::shared_ptr<const Impl> impl_;  // shared by copies: tracing threads and the driver
+};
+
+}  // namespace toftwin::sim

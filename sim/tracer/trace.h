@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <toftwin/camera_info.h>
+#include <toftwin/geometry.h>
+#include <toftwin/units.h>
+
+#include "sim/images/light.h"
+#include "sim/tracer/scene.h"
+
+namespace toftwin::sim {
+
+/// A light source that moves with the camera. A disc of `radius` (0: a point) at `position` in the
+/// camera frame, facing `axis`. Radiant intensity at angle γ from the axis:
+///   I(γ) = power_w · (m + 1) / 2π · cos^m γ   inside the cone of `half_angle`, 0 outside   [W/sr]
+/// (the power is that of the uncut lobe over the half space); `isotropic` instead radiates
+/// power_w / 4π everywhere.
+struct EmitterSpec {
+  Vec3d position_m{};
+  Vec3d axis{0.0, 0.0, 1.0};
+  Length radius{};
+  double power_w = 1.0;
+  double lobe_exponent = 1.0;  ///< m
+  Angle half_angle = 90.0 * degree;
+  bool isotropic = false;
+};
+
+/// What to trace. The result depends on nothing else, not on the number of threads.
+struct TraceRequest {
+  CameraInfo camera;
+  Transform<World, Camera> world_from_camera;
+  std::vector<EmitterSpec> emitters;
+  std::vector<Frequency> frequencies;
+  int harmonics = 1;
+  int samples_per_pixel = 16;
+  int max_surfaces = 16;       ///< surface hits per path: 1 = direct light only
+  double pixel_extent = 1.0;   ///< side of the pixel's footprint in pixels; 0: its central ray only
+  std::uint64_t seed = 0;
+  /// Only these pixels are traced; the images have this size. Width 0: all.
+  int region_x = 0, region_y = 0, region_width = 0, region_height = 0;
+};
+
+/// Path-traces the scene: unidirectional, next-event estimation to every emitter, cosine- or
+/// BSDF-sampled bounces, one pass for all frequencies and harmonics.
+Light trace(const Scene& scene, const TraceRequest& request);
+
+}  // namespace toftwin::sim
