@@ -14,7 +14,7 @@ function(toftwin_library name)
   set(reachable ${arg_FOLDER})
   foreach(link IN LISTS arg_LINKS)
     get_property(link_layer GLOBAL PROPERTY toftwin_layer_${link})
-    if(link_layer STREQUAL "")
+    if("${link_layer}" STREQUAL "")
       message(FATAL_ERROR "toftwin::${name} links toftwin::${link}, which no lower layer defines. "
                           "A library links only libraries of lower layers (docs/architecture.md).")
     endif()
