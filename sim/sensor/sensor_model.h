@@ -3,7 +3,9 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <toftwin/camera_info.h>
@@ -44,7 +46,7 @@ class SensorModel {
     Samples samples;
     RangeImage range;
   };
-  [[nodiscard]] Exposed expose(Light light, const Moment& moment, std::uint64_t seed,
+  [[nodiscard]] Exposed expose(const Light& light, const Moment& moment, std::uint64_t seed,
                                std::uint64_t frame, int region_x = 0, int region_y = 0) const;
 
   struct Impl;
