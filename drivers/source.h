@@ -45,9 +45,12 @@ class Source {
   virtual void stop() = 0;
 
   /// Waits for the next frame. The source fills everything but `source`, `sequence`, `dropped_before`
-  /// and `moment.received`, which are the daemon's. Errors: Stopped (soon after the token asks),
-  /// EndOfStream, Disconnected (the daemon reopens it), Timeout (asked again).
+  /// and `moment.received`, which are the daemon's (except that a replayed frame keeps the recorded
+  /// `received`). Errors: Stopped (soon after the token asks), EndOfStream, Disconnected (the daemon
+  /// reopens it), Timeout (asked again; to be given after a second without a frame, at the latest).
   /// In free run a source paces itself; `lockstep` says that the caller does, so don't wait.
+  /// The daemon also uses the token to interrupt a wait when it has a command for the source, and then
+  /// calls again: a wait that is cut short loses no frame.
   virtual Result<Frame> next(std::stop_token stop, bool lockstep) = 0;
 
   virtual Result<> setPose(const Transform<World, Camera>& world_from_camera);
@@ -59,7 +62,8 @@ class Source {
 struct Driver {
   std::string_view name;
   std::string_view summary;
-  /// URIs of the cameras that are there now ("pattern:0"); what `toftwin list --drivers` shows.
+  /// URIs of the cameras that are there now ("pattern:0"); what `toftwin list --drivers` shows. A
+  /// driver that lists cameras reads the key `uri`, and opens each with that key alone.
   std::vector<std::string> (*list)();
   /// Opens a camera by the keys of its [[source]] table; the driver reads its own keys and thereby
   /// ticks them off, so that what is left over is an unknown key.

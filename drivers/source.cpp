@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "drivers/source.h"
+
+#include <fmt/format.h>
+
+namespace toftwin::drivers {
+namespace {
+
+Error unsupported(const SourceInfo& info, std::string_view what) {
+  return {Error::Code::Unsupported,
+          fmt::format("{} ({} driver) cannot {}", info.model, info.driver, what)};
+}
+
+}  // namespace
+
+Result<> Source::setPose(const Transform<World, Camera>&) {
+  return unsupported(info(), "be given a pose: its pose is where it stands, or recorded");
+}
+
+Result<> Source::setParameter(std::string_view name, double) {
+  return unsupported(info(), fmt::format("set a parameter \"{}\": it has none", name));
+}
+
+Result<> Source::trigger() { return unsupported(info(), "be triggered: it takes frames by itself"); }
+
+}  // namespace toftwin::drivers

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <array>
+
+#include "drivers/pattern/pattern.h"
+#include "drivers/source.h"
+
+namespace toftwin::drivers {
+
+std::span<const Driver> allDrivers() {
+  // One line per driver, in the order of docs/drivers/README.md.
+  static const std::array rows{
+      pattern::row(),
+  };
+  return rows;
+}
+
+}  // namespace toftwin::drivers
