@@ -4,7 +4,9 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include <toftwin/result.h>
@@ -23,6 +25,14 @@ struct Limits {
   std::uint64_t body_bytes = 256ull << 20;
 };
 
+inline constexpr std::string_view kMagic{"TOFTWIN\0", 8};
+
+/// Where a message's body is. On the wire as four bytes.
+enum class BodyPlace : std::uint32_t {
+  Inline = 0,  ///< right after the header
+  Memfd = 1,   ///< in a sealed memfd that comes with the preamble; Unix sockets only, if agreed on
+};
+
 /// The fixed first 64 bytes of a message, checked.
 struct Preamble {
   std::uint16_t major = kVersionMajor;
@@ -31,7 +41,9 @@ struct Preamble {
   std::uint64_t body_bytes = 0;    ///< planes, each padded to 64
   std::uint32_t header_crc32c = 0;
   std::uint32_t body_crc32c = 0;
+  BodyPlace body_place = BodyPlace::Inline;
 };
+std::array<std::byte, kPreambleSize> encodePreamble(const Preamble& preamble);
 Result<Preamble> decodePreamble(std::span<const std::byte, kPreambleSize> bytes, const Limits& limits);
 
 /// The planes of a frame as they follow the header, with their CRC; encoded once and shared by all
@@ -45,6 +57,7 @@ struct Body {
 Body encodeBody(const std::vector<Plane>& planes);
 
 /// A message ready to be written: `head` (preamble and header), then the body's pieces in order.
+/// Texts longer than the protocol allows are cut (bounds.h).
 struct Encoded {
   std::vector<std::byte> head;
   Body body;
@@ -57,10 +70,24 @@ Encoded encode(const FrameMessage& message, Body body);
 std::vector<std::byte> toBytes(const Encoded& message);
 
 /// A message from its parts. `header` and `body` must have the lengths that the preamble says; both
-/// CRCs are checked, the header is verified, every plane must lie in the body. The frame's planes
-/// refer to `body` without copying.
+/// CRCs are checked (the body's only when it came inline: a sealed memfd cannot have been damaged on
+/// its way), the header is verified, every plane must lie in the body. The frame's planes refer to
+/// `body` without copying, unless `body` is not aligned to 64 bytes. Error Unsupported: well formed,
+/// but of a kind that this side does not know; the stream is intact behind it.
 Result<Message> decode(const Preamble& preamble, std::span<const std::byte> header, Buffer body);
 /// A message from one run of bytes, which must hold exactly one message.
 Result<Message> decode(Buffer bytes, const Limits& limits = {});
+/// The request id in a header whose CRC was checked, to answer a message that `decode` refused; 0 if
+/// the header is damaged too.
+std::uint64_t requestIdOf(std::span<const std::byte> header);
+
+/// Memory that begins at a multiple of 64, not initialised.
+struct AlignedBytes {
+  std::shared_ptr<std::byte[]> bytes;  // shared with the Buffers that refer to it
+  std::size_t size = 0;
+  [[nodiscard]] std::span<std::byte> span() const { return {bytes.get(), size}; }
+  [[nodiscard]] Buffer buffer() const { return {bytes, {bytes.get(), size}}; }
+};
+AlignedBytes allocateAligned(std::size_t size);
 
 }  // namespace toftwin::wire

@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cstring>
+#include <utility>
+
+#include "protocol/wire/codec.h"
+#include "protocol/wire/crc32c.h"
+#include "protocol/wire/header_writer.h"
+
+namespace toftwin::wire {
+namespace {
+
+alignas(kAlignment) constexpr std::array<std::byte, kAlignment> kZeros{};
+
+Offset<fb::Error> writeError(Builder& builder, const Error& error) {
+  const auto message = writeText(builder, error.message, kMaxText);
+  return fb::CreateError(builder, static_cast<std::uint8_t>(error.code), message);
+}
+
+Offset<fb::SourceSummary> writeSummary(Builder& builder, const SourceSummary& summary) {
+  const auto name = writeText(builder, summary.name, kMaxName);
+  const auto model = writeText(builder, summary.model, kMaxName);
+  const auto serial = writeText(builder, summary.serial, kMaxName);
+  return fb::CreateSourceSummary(builder, name, model, serial,
+                                 static_cast<std::uint8_t>(summary.kind), summary.streaming);
+}
+
+Offset<flatbuffers::Vector<std::uint8_t>> writeKinds(Builder& builder,
+                                                     const std::vector<PlaneKind>& kinds) {
+  std::vector<std::uint8_t> bytes;
+  for (const PlaneKind kind : kinds) bytes.push_back(static_cast<std::uint8_t>(kind));
+  return builder.CreateVector(bytes);
+}
+
+// One `write` for each message; the table's name in the schema is the message's.
+
+auto write(Builder& b, const Hello& m) {
+  const auto software = writeText(b, m.software, kMaxName);
+  return fb::CreateHello(b, software, writeNames(b, m.features));
+}
+auto write(Builder& b, const ListSources&) { return fb::CreateListSources(b); }
+auto write(Builder& b, const SourceList& m) {
+  std::vector<Offset<fb::SourceSummary>> sources;
+  for (std::size_t i = 0; i < std::min(m.sources.size(), kMaxSources); ++i) {
+    sources.push_back(writeSummary(b, m.sources[i]));
+  }
+  return fb::CreateSourceList(b, b.CreateVector(sources));
+}
+auto write(Builder& b, const DescribeSource& m) {
+  return fb::CreateDescribeSource(b, writeText(b, m.source, kMaxName));
+}
+auto write(Builder& b, const SourceDescription& m) {
+  const auto summary = writeSummary(b, m.summary);
+  const auto driver = writeText(b, m.driver, kMaxName);
+  const auto camera = writeCamera(b, m.camera);
+  const auto planes = writeKinds(b, m.planes);
+  const auto parameters = writeNames(b, m.parameters);
+  fb::SourceDescriptionBuilder table{b};
+  table.add_summary(summary);
+  table.add_driver(driver);
+  table.add_camera(camera);
+  table.add_planes(planes);
+  if (m.frame_interval) table.add_frame_interval_s(m.frame_interval->in(second));
+  table.add_can_set_pose(m.can_set_pose);
+  table.add_can_trigger(m.can_trigger);
+  table.add_can_lockstep(m.can_lockstep);
+  table.add_parameters(parameters);
+  return table.Finish();
+}
+auto write(Builder& b, const Subscribe& m) {
+  const auto source = writeText(b, m.source, kMaxName);
+  const auto planes = writeKinds(b, m.planes);
+  const fb::Region region{m.region.x, m.region.y, m.region.width, m.region.height};
+  return fb::CreateSubscribe(b, source, planes, &region, m.decimation, m.max_rate_hz,
+                             static_cast<std::uint8_t>(m.policy), m.queue);
+}
+auto write(Builder& b, const Subscribed& m) { return fb::CreateSubscribed(b, m.subscription); }
+auto write(Builder& b, const Unsubscribe& m) { return fb::CreateUnsubscribe(b, m.subscription); }
+auto write(Builder& b, const FrameMessage& m) { return writeFrame(b, m); }
+auto write(Builder& b, const Acknowledge& m) {
+  return fb::CreateAcknowledge(b, m.subscription, m.sequence);
+}
+auto write(Builder& b, const SubscriptionEnded& m) {
+  return fb::CreateSubscriptionEnded(b, m.subscription, writeError(b, m.reason));
+}
+auto write(Builder& b, const SetPose& m) {
+  const auto source = writeText(b, m.source, kMaxName);
+  const fb::Pose pose = toPose(m.world_from_camera);
+  return fb::CreateSetPose(b, source, &pose);
+}
+auto write(Builder& b, const SetParameter& m) {
+  const auto source = writeText(b, m.source, kMaxName);
+  const auto name = writeText(b, m.name, kMaxName);
+  return fb::CreateSetParameter(b, source, name, m.value);
+}
+auto write(Builder& b, const Trigger& m) {
+  return fb::CreateTrigger(b, writeText(b, m.source, kMaxName));
+}
+auto write(Builder& b, const Record& m) {
+  const auto source = writeText(b, m.source, kMaxName);
+  return fb::CreateRecord(b, source, writeText(b, m.file, kMaxName));
+}
+auto write(Builder& b, const Done& m) {
+  return fb::CreateDone(b, writeText(b, m.detail, kMaxText));
+}
+auto write(Builder& b, const AskHealth&) { return fb::CreateAskHealth(b); }
+auto write(Builder& b, const Health& m) {
+  std::vector<Offset<fb::SourceHealth>> sources;
+  for (std::size_t i = 0; i < std::min(m.sources.size(), kMaxSources); ++i) {
+    const SourceHealth& s = m.sources[i];
+    const auto name = writeText(b, s.name, kMaxName);
+    const auto last_error = writeText(b, s.last_error, kMaxText);
+    sources.push_back(fb::CreateSourceHealth(b, name, s.streaming, s.frames, s.dropped_by_device,
+                                             s.subscribers, s.reconnects, last_error));
+  }
+  return fb::CreateHealth(b, m.uptime.in(second), m.sessions, b.CreateVector(sources));
+}
+auto write(Builder& b, const Failure& m) { return fb::CreateFailure(b, writeError(b, m.error)); }
+
+template <class M>
+std::uint64_t idOf(const M& message) {
+  if constexpr (requires { message.id; }) return message.id;
+  return 0;
+}
+
+/// The preamble and the header of a message with the given id (position in the union).
+template <class M>
+Encoded encodeAs(std::uint8_t message_id, const M& message, Body body) {
+  Builder builder{1024};
+  const auto table = write(builder, message);
+  FinishHeaderBuffer(builder, fb::CreateHeader(builder, idOf(message),
+                                               static_cast<fb::Body>(message_id), table.Union()));
+  const std::size_t header_bytes = paddedToAlignment(builder.GetSize());
+  Encoded encoded{std::vector<std::byte>(kPreambleSize + header_bytes), std::move(body)};
+  std::memcpy(encoded.head.data() + kPreambleSize, builder.GetBufferPointer(), builder.GetSize());
+
+  Preamble preamble;
+  preamble.header_bytes = static_cast<std::uint32_t>(header_bytes);
+  preamble.body_bytes = encoded.body.bytes;
+  preamble.header_crc32c = crc32c(std::span{encoded.head}.subspan(kPreambleSize));
+  preamble.body_crc32c = encoded.body.crc32c;
+  std::ranges::copy(encodePreamble(preamble), encoded.head.begin());
+  return encoded;
+}
+
+/// The id of a message on the wire is its place in the variant, counted from 1.
+template <class M, std::size_t I = 0>
+constexpr std::uint8_t messageIdOf() {
+  if constexpr (std::is_same_v<std::variant_alternative_t<I, Message>, M>) return I + 1;
+  else return messageIdOf<M, I + 1>();
+}
+
+}  // namespace
+
+Body encodeBody(const std::vector<Plane>& planes) {
+  Body body;
+  for (const Plane& plane : planes) {
+    const std::uint64_t size = plane.data.size();
+    const std::uint64_t padding = paddedToAlignment(size) - size;
+    body.pieces.push_back(plane.data);
+    body.crc32c = crc32c(plane.data.bytes(), body.crc32c);
+    if (padding > 0) {
+      body.pieces.push_back(Buffer{nullptr, std::span{kZeros}.first(padding)});
+      body.crc32c = crc32c(body.pieces.back().bytes(), body.crc32c);
+    }
+    body.bytes += size + padding;
+  }
+  return body;
+}
+
+Encoded encode(const Message& message) {
+  return std::visit(
+      [](const auto& m) {
+        using M = std::decay_t<decltype(m)>;
+        Body body;
+        if constexpr (std::is_same_v<M, FrameMessage>) body = encodeBody(m.frame.planes);
+        return encodeAs(messageIdOf<M>(), m, std::move(body));
+      },
+      message);
+}
+
+Encoded encode(const FrameMessage& message, Body body) {
+  return encodeAs(messageIdOf<FrameMessage>(), message, std::move(body));
+}
+
+std::vector<std::byte> toBytes(const Encoded& message) {
+  std::vector<std::byte> bytes;
+  bytes.reserve(message.size());
+  bytes.insert(bytes.end(), message.head.begin(), message.head.end());
+  for (const Buffer& piece : message.body.pieces) {
+    bytes.insert(bytes.end(), piece.bytes().begin(), piece.bytes().end());
+  }
+  return bytes;
+}
+
+}  // namespace toftwin::wire
