@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/compare/csv.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cstdlib>
+#include <fstream>
+#include <string>
+
+#include <fmt/format.h>
+
+namespace toftwin::compare {
+namespace {
+
+std::vector<std::string_view> split(std::string_view line) {
+  if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+  std::vector<std::string_view> fields;
+  for (std::size_t start = 0;;) {
+    const std::size_t comma = line.find(',', start);
+    fields.push_back(line.substr(start, comma - start));
+    if (comma == std::string_view::npos) return fields;
+    start = comma + 1;
+  }
+}
+
+std::optional<double> toNumber(std::string_view field) {
+  double number = 0.0;
+  const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), number);
+  if (error != std::errc{} || end != field.data() + field.size()) return std::nullopt;
+  return number;
+}
+
+Error malformed(const std::filesystem::path& file, std::size_t line, std::string_view what) {
+  return {Error::Code::Malformed, fmt::format("{}:{}: {}", file.string(), line, what)};
+}
+
+}  // namespace
+
+Result<std::vector<std::vector<double>>> loadColumns(
+    const std::filesystem::path& file, std::initializer_list<std::string_view> columns) {
+  std::ifstream in{file};
+  std::string line;
+  if (!in || !std::getline(in, line)) {
+    return Error{Error::Code::NotFound, fmt::format("{}: cannot be read or is empty", file.string())};
+  }
+  std::vector<std::size_t> places;
+  const auto header = split(line);
+  for (const std::string_view column : columns) {
+    const auto at = std::find(header.begin(), header.end(), column);
+    if (at == header.end()) {
+      return malformed(file, 1, fmt::format("has no column \"{}\", only: {}", column, line));
+    }
+    places.push_back(static_cast<std::size_t>(at - header.begin()));
+  }
+  std::vector<std::vector<double>> result(columns.size());
+  for (std::size_t number = 2; std::getline(in, line); ++number) {
+    if (line.empty() || line == "\r") continue;
+    const auto fields = split(line);
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      if (places[i] >= fields.size()) return malformed(file, number, "has too few fields");
+      const auto value = toNumber(fields[places[i]]);
+      if (!value) {
+        return malformed(file, number, fmt::format("\"{}\" is not a number", fields[places[i]]));
+      }
+      result[i].push_back(*value);
+    }
+  }
+  if (result.front().empty()) return malformed(file, 2, "has a header but no rows");
+  return result;
+}
+
+std::optional<std::filesystem::path> findThesisData(const std::filesystem::path& given) {
+  namespace fs = std::filesystem;
+  std::error_code ignored;
+  const auto inside = [&](const fs::path& folder) -> std::optional<fs::path> {
+    for (const fs::path& candidate : {folder / "tof-thesis-2018", folder}) {
+      if (fs::is_directory(candidate / "corner", ignored)) return candidate;
+    }
+    return std::nullopt;
+  };
+  if (!given.empty()) return inside(given);
+  if (const char* named = std::getenv("TOFTWIN_DATA"); named != nullptr && *named != '\0') {
+    return inside(named);
+  }
+  for (fs::path folder : {fs::current_path(ignored), fs::read_symlink("/proc/self/exe", ignored).parent_path()}) {
+    for (; folder.has_relative_path(); folder = folder.parent_path()) {
+      if (!fs::exists(folder / ".git", ignored)) continue;
+      if (auto found = inside(folder.parent_path() / "shared" / "data")) return found;
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace toftwin::compare

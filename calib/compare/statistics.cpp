@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/compare/statistics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace toftwin::compare {
+namespace {
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+}
+
+double quantile(std::vector<double> values, double q) {
+  std::erase_if(values, [](double v) { return !std::isfinite(v); });
+  if (values.empty()) return kNaN;
+  const double place = std::clamp(q, 0.0, 1.0) * static_cast<double>(values.size() - 1);
+  const auto below = static_cast<std::size_t>(place);
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(below);
+  std::nth_element(values.begin(), at, values.end());
+  const double low = *at;
+  if (below + 1 >= values.size()) return low;
+  const double high = *std::min_element(at + 1, values.end());
+  return low + (place - static_cast<double>(below)) * (high - low);
+}
+
+Summary summarise(std::span<const double> values) {
+  std::vector<double> kept, magnitudes;
+  Running running;
+  double squares = 0.0;
+  for (const double v : values) {
+    if (!std::isfinite(v)) continue;
+    kept.push_back(v);
+    magnitudes.push_back(std::abs(v));
+    running.add(v);
+    squares += v * v;
+  }
+  Summary s;
+  s.n = kept.size();
+  if (kept.empty()) {
+    s.mean = s.sd = s.standard_error = s.rms = s.median = s.p95_abs = s.min = s.max = kNaN;
+    return s;
+  }
+  const auto n = static_cast<double>(s.n);
+  s.mean = running.mean();
+  s.sd = s.n < 2 ? kNaN : std::sqrt(running.variance());
+  s.standard_error = s.sd / std::sqrt(n);
+  s.rms = std::sqrt(squares / n);
+  const auto [min, max] = std::minmax_element(kept.begin(), kept.end());
+  s.min = *min;
+  s.max = *max;
+  s.median = quantile(std::move(kept), 0.5);
+  s.p95_abs = quantile(std::move(magnitudes), 0.95);
+  return s;
+}
+
+Json toJson(const Summary& s, const char* unit) {
+  Json json = Json::object();
+  json.set("unit", unit).set("n", s.n).set("mean", s.mean).set("standard_error", s.standard_error);
+  json.set("sd", s.sd).set("rms", s.rms).set("median", s.median).set("p95_abs", s.p95_abs);
+  json.set("min", s.min).set("max", s.max);
+  return json;
+}
+
+LineFit fitLine(std::span<const double> x, std::span<const double> y) {
+  Running mean_x, mean_y;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    if (!std::isfinite(x[i]) || !std::isfinite(y[i])) continue;
+    mean_x.add(x[i]);
+    mean_y.add(y[i]);
+  }
+  double sxx = 0.0, sxy = 0.0;
+  const auto each = [&](auto&& visit) {
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      if (std::isfinite(x[i]) && std::isfinite(y[i])) visit(x[i] - mean_x.mean(), y[i] - mean_y.mean());
+    }
+  };
+  each([&](double dx, double dy) { sxx += dx * dx, sxy += dx * dy; });
+  LineFit fit;
+  fit.n = mean_x.n();
+  fit.slope = sxx > 0.0 ? sxy / sxx : 0.0;
+  fit.offset = mean_y.mean() - fit.slope * mean_x.mean();
+  double squares = 0.0;
+  each([&](double dx, double dy) { squares += std::pow(dy - fit.slope * dx, 2); });
+  fit.rms_residual = fit.n > 0 ? std::sqrt(squares / static_cast<double>(fit.n)) : kNaN;
+  return fit;
+}
+
+Explained explain(std::span<const double> measured_error, std::span<const double> predicted_error) {
+  Running measured, residual;
+  double measured_squares = 0.0, residual_squares = 0.0;
+  for (std::size_t i = 0; i < measured_error.size(); ++i) {
+    const double e = measured_error[i], left = e - predicted_error[i];
+    if (!std::isfinite(e) || !std::isfinite(left)) continue;
+    measured.add(e);
+    residual.add(left);
+    measured_squares += e * e;
+    residual_squares += left * left;
+  }
+  Explained result;
+  result.n = measured.n();
+  const auto n = static_cast<double>(result.n);
+  result.measured_rms = std::sqrt(measured_squares / n);
+  result.residual_rms = std::sqrt(residual_squares / n);
+  result.measured_sd = std::sqrt(measured.variance());
+  result.residual_sd = std::sqrt(residual.variance());
+  result.best_offset = residual.mean();
+  result.fraction_raw = 1.0 - residual_squares / measured_squares;
+  result.fraction_centred = 1.0 - residual.variance() / measured.variance();
+  return result;
+}
+
+Json toJson(const Explained& e) {
+  Json json = Json::object();
+  json.set("n", e.n).set("measured_rms_mm", e.measured_rms).set("residual_rms_mm", e.residual_rms);
+  json.set("measured_sd_mm", e.measured_sd).set("residual_sd_mm", e.residual_sd);
+  json.set("best_offset_mm", e.best_offset).set("fraction_raw", e.fraction_raw);
+  json.set("fraction_centred", e.fraction_centred);
+  return json;
+}
+
+}  // namespace toftwin::compare

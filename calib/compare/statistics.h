@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "calib/compare/json.h"
+
+namespace toftwin::compare {
+
+/// What a sample of numbers looks like, in the unit of the numbers. Values that are not finite are
+/// left out and not counted. `mean` is the signed bias where the numbers are errors.
+struct Summary {
+  std::size_t n = 0;
+  double mean = 0.0;
+  double sd = 0.0;              ///< with n − 1; NaN for n < 2
+  double standard_error = 0.0;  ///< of the mean, sd/√n: takes the values as independent
+  double rms = 0.0;             ///< root of the mean square, about zero
+  double median = 0.0;
+  double p95_abs = 0.0;         ///< 95 % of the magnitudes are at most this
+  double min = 0.0;
+  double max = 0.0;
+};
+/// All fields but `n` are NaN when no value is finite.
+Summary summarise(std::span<const double> values);
+Json toJson(const Summary& summary, const char* unit);
+
+/// The q-quantile (0 … 1), linearly interpolated between order statistics; NaN for no values.
+double quantile(std::vector<double> values, double q);
+
+/// y = offset + slope · x, least squares in y, over pairs where both are finite.
+struct LineFit {
+  double offset = 0.0;
+  double slope = 0.0;
+  double rms_residual = 0.0;
+  std::size_t n = 0;
+};
+LineFit fitLine(std::span<const double> x, std::span<const double> y);
+
+/// How much of a measured error e a prediction p explains, over pairs where both are finite.
+///   raw:       1 − Σ(e − p)² / Σe²                     against predicting no error at all
+///   centred:   1 − Var(e − p) / Var(e)                 after the best constant is removed from both
+/// 1 is all of it, 0 nothing; negative when the prediction is worse than none.
+struct Explained {
+  std::size_t n = 0;
+  double measured_rms = 0.0;          ///< √(Σe²/n): the error of "no simulation"
+  double residual_rms = 0.0;          ///< √(Σ(e − p)²/n)
+  double measured_sd = 0.0;           ///< after its mean is removed
+  double residual_sd = 0.0;           ///< after its mean is removed
+  double best_offset = 0.0;           ///< mean of e − p: the constant that the prediction lacks
+  double fraction_raw = 0.0;
+  double fraction_centred = 0.0;
+};
+Explained explain(std::span<const double> measured_error, std::span<const double> predicted_error);
+Json toJson(const Explained& explained);
+
+/// Mean and variance of one pixel over repeated frames, by Welford's updates: exact for any count
+/// without keeping the frames.
+class Running {
+ public:
+  void add(double value) {
+    ++n_;
+    const double step = value - mean_;
+    mean_ += step / static_cast<double>(n_);
+    m2_ += step * (value - mean_);
+  }
+  [[nodiscard]] std::size_t n() const { return n_; }
+  [[nodiscard]] double mean() const { return mean_; }
+  /// With n − 1; 0 for fewer than two values.
+  [[nodiscard]] double variance() const { return n_ < 2 ? 0.0 : m2_ / static_cast<double>(n_ - 1); }
+
+ private:
+  std::size_t n_ = 0;
+  double mean_ = 0.0;
+  double m2_ = 0.0;
+};
+
+}  // namespace toftwin::compare
