@@ -41,7 +41,8 @@ Result<std::vector<std::vector<double>>> loadColumns(
   std::ifstream in{file};
   std::string line;
   if (!in || !std::getline(in, line)) {
-    return Error{Error::Code::NotFound, fmt::format("{}: cannot be read or is empty", file.string())};
+    return Error{Error::Code::NotFound,
+                 fmt::format("{}: cannot be read or is empty", file.string())};
   }
   std::vector<std::size_t> places;
   const auto header = split(line);
@@ -82,7 +83,8 @@ std::optional<std::filesystem::path> findThesisData(const std::filesystem::path&
   if (const char* named = std::getenv("TOFTWIN_DATA"); named != nullptr && *named != '\0') {
     return inside(named);
   }
-  for (fs::path folder : {fs::current_path(ignored), fs::read_symlink("/proc/self/exe", ignored).parent_path()}) {
+  for (fs::path folder :
+       {fs::current_path(ignored), fs::read_symlink("/proc/self/exe", ignored).parent_path()}) {
     for (; folder.has_relative_path(); folder = folder.parent_path()) {
       if (!fs::exists(folder / ".git", ignored)) continue;
       if (auto found = inside(folder.parent_path() / "shared" / "data")) return found;

@@ -15,14 +15,14 @@ namespace toftwin::compare {
 class Json {
  public:
   Json() = default;
-  Json(std::string text) : value_(std::move(text)) {}  // NOLINT(google-explicit-constructor)
+  Json(std::string text) : value_(std::move(text)) {}    // NOLINT(google-explicit-constructor)
   Json(const char* text) : value_(std::string{text}) {}  // NOLINT(google-explicit-constructor)
   Json(std::same_as<bool> auto flag) : value_(flag) {}   // NOLINT(google-explicit-constructor)
   Json(std::floating_point auto number)                  // NOLINT(google-explicit-constructor)
       : value_(static_cast<double>(number)) {}
   template <std::integral Number>
-    requires(!std::same_as<Number, bool>)
-  Json(Number number) : value_(static_cast<long long>(number)) {}  // NOLINT(google-explicit-constructor)
+  requires(!std::same_as<Number, bool>) Json(Number number)
+      : value_(static_cast<long long>(number)) {}  // NOLINT(google-explicit-constructor)
 
   static Json object();
   static Json array();

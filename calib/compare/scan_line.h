@@ -21,7 +21,8 @@ struct ScanLine {
   [[nodiscard]] double z_mm(std::size_t i) const;
 };
 
-/// From points in the camera's frame; points with z ≤ 0 or not finite are left out, the rest sorted.
+/// From points in the camera's frame; points with z ≤ 0 or not finite are left out, the rest
+/// sorted.
 ScanLine toScanLine(std::span<const double> x_mm, std::span<const double> z_mm);
 Result<ScanLine> loadScanLine(const std::filesystem::path& file);
 
@@ -42,8 +43,9 @@ struct PlanarLine {
   /// Where the ray t meets it; NaN if it doesn't.
   [[nodiscard]] double rangeAlong(double t) const;
 };
-/// Total least squares: minimises orthogonal distances. Points farther than `trim` times the
-/// residual's 1.4826 MAD are left out and the fit repeated, so that an object's edge does not tilt it.
+/// Total least squares: minimises orthogonal distances. It starts from the least median of squares
+/// and leaves points out that are farther than `trim` times 1.4826 median distances, so that a box
+/// before the wall does not tilt it.
 PlanarLine fitPlanarLine(std::span<const double> x_mm, std::span<const double> z_mm,
                          double trim = 3.5);
 
@@ -51,14 +53,15 @@ PlanarLine fitPlanarLine(std::span<const double> x_mm, std::span<const double> z
 struct CornerFit {
   PlanarLine left, right;
   double edge_x_mm = 0.0, edge_z_mm = 0.0;
-  double opening_deg = 0.0;        ///< between the walls, inside
-  double left_length_mm = 0.0;     ///< from the edge to the line's outermost point
+  double opening_deg = 0.0;     ///< between the walls, inside
+  double left_length_mm = 0.0;  ///< from the edge to the line's outermost point
   double right_length_mm = 0.0;
   [[nodiscard]] double edge_t() const { return edge_x_mm / edge_z_mm; }
   /// Range to the nearer wall that faces the ray: the noise-free prediction without simulation.
   [[nodiscard]] double rangeAlong(double t) const;
 };
-/// Error where the points do not show two walls of at least ten points that meet in front of the camera.
+/// Error where the points do not show two walls of at least ten points that meet in front of the
+/// camera.
 Result<CornerFit> fitCorner(const ScanLine& line);
 
 }  // namespace toftwin::compare

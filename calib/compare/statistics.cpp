@@ -71,7 +71,8 @@ LineFit fitLine(std::span<const double> x, std::span<const double> y) {
   double sxx = 0.0, sxy = 0.0;
   const auto each = [&](auto&& visit) {
     for (std::size_t i = 0; i < x.size(); ++i) {
-      if (std::isfinite(x[i]) && std::isfinite(y[i])) visit(x[i] - mean_x.mean(), y[i] - mean_y.mean());
+      if (std::isfinite(x[i]) && std::isfinite(y[i]))
+        visit(x[i] - mean_x.mean(), y[i] - mean_y.mean());
     }
   };
   each([&](double dx, double dy) { sxx += dx * dx, sxy += dx * dy; });

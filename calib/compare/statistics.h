@@ -18,7 +18,7 @@ struct Summary {
   double standard_error = 0.0;  ///< of the mean, sd/√n: takes the values as independent
   double rms = 0.0;             ///< root of the mean square, about zero
   double median = 0.0;
-  double p95_abs = 0.0;         ///< 95 % of the magnitudes are at most this
+  double p95_abs = 0.0;  ///< 95 % of the magnitudes are at most this
   double min = 0.0;
   double max = 0.0;
 };
@@ -40,15 +40,16 @@ LineFit fitLine(std::span<const double> x, std::span<const double> y);
 
 /// How much of a measured error e a prediction p explains, over pairs where both are finite.
 ///   raw:       1 − Σ(e − p)² / Σe²                     against predicting no error at all
-///   centred:   1 − Var(e − p) / Var(e)                 after the best constant is removed from both
+///   centred:   1 − Var(e − p) / Var(e)                 after the best constant is removed from
+///   both
 /// 1 is all of it, 0 nothing; negative when the prediction is worse than none.
 struct Explained {
   std::size_t n = 0;
-  double measured_rms = 0.0;          ///< √(Σe²/n): the error of "no simulation"
-  double residual_rms = 0.0;          ///< √(Σ(e − p)²/n)
-  double measured_sd = 0.0;           ///< after its mean is removed
-  double residual_sd = 0.0;           ///< after its mean is removed
-  double best_offset = 0.0;           ///< mean of e − p: the constant that the prediction lacks
+  double measured_rms = 0.0;  ///< √(Σe²/n): the error of "no simulation"
+  double residual_rms = 0.0;  ///< √(Σ(e − p)²/n)
+  double measured_sd = 0.0;   ///< after its mean is removed
+  double residual_sd = 0.0;   ///< after its mean is removed
+  double best_offset = 0.0;   ///< mean of e − p: the constant that the prediction lacks
   double fraction_raw = 0.0;
   double fraction_centred = 0.0;
 };

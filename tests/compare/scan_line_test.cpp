@@ -15,8 +15,10 @@
 namespace toftwin::compare {
 namespace {
 
-/// A corner of `opening` degrees whose edge lies at (ex, ez), turned by `turn` degrees, walls 600 mm.
-ScanLine cornerLine(double ex, double ez, double opening, double turn, double sigma, unsigned seed) {
+/// A corner of `opening` degrees whose edge lies at (ex, ez), turned by `turn` degrees, walls 600
+/// mm.
+ScanLine cornerLine(double ex, double ez, double opening, double turn, double sigma,
+                    unsigned seed) {
   const double half = opening / 2.0 * std::numbers::pi / 180.0;
   const double angle = turn * std::numbers::pi / 180.0;
   std::mt19937_64 random{seed};
@@ -25,7 +27,8 @@ ScanLine cornerLine(double ex, double ez, double opening, double turn, double si
   for (const double side : {-1.0, 1.0}) {
     for (int i = 1; i <= 200; ++i) {
       const double along = 3.0 * i;
-      // Walls open towards the camera, which looks along +z: direction (±sin half, −cos half), turned.
+      // Walls open towards the camera, which looks along +z: direction (±sin half, −cos half),
+      // turned.
       const double dx = side * std::sin(half), dz = -std::cos(half);
       const double px = ex + along * (dx * std::cos(angle) - dz * std::sin(angle));
       const double pz = ez + along * (dx * std::sin(angle) + dz * std::cos(angle));
@@ -84,8 +87,9 @@ TEST(Corner, IsFoundExactlyWhereThereIsNoNoise) {
 }
 
 TEST(Corner, IsFoundWithinItsErrorBarsUnderNoise) {
-  // Range noise 1 mm on 200 points per wall at about 45° to the rays: each wall's offset and angle are
-  // known to σ/√n·2 and √12 σ/(L √n); the edge is an extrapolation by half a length. 0.5 mm is 5 sigma.
+  // Range noise 1 mm on 200 points per wall at about 45° to the rays: each wall's offset and angle
+  // are known to σ/√n·2 and √12 σ/(L √n); the edge is an extrapolation by half a length. 0.5 mm is
+  // 5 sigma.
   constexpr unsigned kSeed = 7;
   const auto fit = fitCorner(cornerLine(40, 1200, 90, -5, 1.0, kSeed));
   ASSERT_TRUE(fit.ok());
@@ -106,8 +110,9 @@ TEST(Corner, IsRefusedOnAFlatWall) {
 class Csv : public testing::Test {
  protected:
   std::filesystem::path write(const std::string& text) {
-    const auto file = std::filesystem::path{testing::TempDir()} /
-                      (std::string{testing::UnitTest::GetInstance()->current_test_info()->name()} + ".csv");
+    const auto file =
+        std::filesystem::path{testing::TempDir()} /
+        (std::string{testing::UnitTest::GetInstance()->current_test_info()->name()} + ".csv");
     std::ofstream{file} << text;
     return file;
   }

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include <toftwin/result.h>
+
+#include "calib/compare/json.h"
+#include "calib/compare/plot.h"
+
+namespace toftwin::compare {
+
+/// Whether something is as it should be; colours the verdict and the cards.
+enum class Tone { Good, Fair, Bad, Neutral };
+
+/// One number of the first screen.
+struct Card {
+  std::string label{};
+  std::string value{};  ///< with its unit
+  std::string note{};
+  Tone tone = Tone::Neutral;
+};
+
+struct Paragraph {
+  std::string text{};
+  bool small = false;
+};
+/// Cells that read as numbers are set right-aligned.
+struct TableBlock {
+  std::string caption{};
+  std::vector<std::string> header{};
+  std::vector<std::vector<std::string>> rows{};
+};
+struct Figure {
+  std::string caption{};
+  std::string svg{};
+};
+/// Figures that stand side by side where there is room.
+struct FigureRow {
+  std::vector<Figure> figures{};
+};
+/// Text that only some readers want; closed until opened.
+struct Details {
+  std::string summary{};
+  std::vector<std::string> paragraphs{};
+};
+using Block = std::variant<Paragraph, TableBlock, Figure, FigureRow, Details>;
+
+struct Section {
+  std::string id{};  ///< anchor
+  std::string title{};
+  std::string verdict{};  ///< one sentence, what came out
+  Tone tone = Tone::Neutral;
+  std::vector<Block> blocks{};
+};
+
+/// All that a comparison says. `data` holds every number that the page shows, and goes to
+/// report.json.
+struct Report {
+  std::string title{};
+  std::string subtitle{};  ///< what was compared
+  std::string verdict{};
+  Tone tone = Tone::Neutral;
+  std::vector<Card> cards{};
+  std::vector<Section> sections{};
+  std::string colophon{};  ///< software, commit, date
+  Json data = Json::object();
+};
+
+/// The page: one HTML text that needs nothing else, no network, no script.
+std::string toHtml(const Report& report);
+
+/// Writes index.html and report.json into `folder`, which is made if need be; gives the page's
+/// path.
+Result<std::filesystem::path> write(const Report& report, const std::filesystem::path& folder);
+
+/// A number for people: fixed decimals, real minus sign; "–" if it is not finite.
+std::string shown(double value, int decimals = 1);
+/// "+1.2 ± 0.3".
+std::string shownWithError(double value, double error, int decimals = 1);
+std::string shownPercent(double share);
+
+}  // namespace toftwin::compare

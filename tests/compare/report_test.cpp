@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/compare/report.h"
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <regex>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace toftwin::compare {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+Report example() {
+  Image<float> map(8, 4, 1.0F);
+  map(3, 2) = std::nanf("");
+  Report report{.title = "A <b> against C & D", .subtitle = "two cameras", .verdict = "they agree"};
+  report.cards = {{.label = "bias", .value = "+1.0 mm", .note = "n = 3", .tone = Tone::Good}};
+  const Plot plot{.title = "t",
+                  .x_label = "x [mm]",
+                  .y_label = "y [mm]",
+                  .curves = {{.name = "measured", .x = {0, 1, 2}, .y = {1, std::nan(""), 3}}}};
+  report.sections.push_back(
+      {.id = "one",
+       .title = "One",
+       .verdict = "fine",
+       .blocks = {
+           Paragraph{"words"}, TableBlock{"numbers", {"what", "mm"}, {{"a", "−1.0"}, {"b", "2.0"}}},
+           Figure{"a plot", toSvg(plot)},
+           FigureRow{{{"a map", toSvg(ImageMap{.title = "m", .label = "mm", .values = map})}}},
+           Details{"more", {"text"}}}});
+  report.data.set("bias_mm", 1.0).set("nothing", std::nan(""));
+  return report;
+}
+
+TEST(Report, NeedsNothingButItself) {
+  const std::string page = toHtml(example());
+  EXPECT_THAT(page, Not(HasSubstr("http")));
+  EXPECT_THAT(page, Not(HasSubstr("src=")));
+  EXPECT_THAT(page, Not(HasSubstr("<script")));
+  EXPECT_THAT(page, Not(HasSubstr("<link")));
+  EXPECT_THAT(page, Not(HasSubstr("@import")));
+  // Every href is an anchor in the page or data in the page; every url() too.
+  const std::regex reference{"(href=|url\\()['\"]?([^'\")]{1,5})"};
+  int seen = 0;
+  for (std::sregex_iterator at{page.begin(), page.end(), reference}, end; at != end; ++at, ++seen) {
+    const std::string target = (*at)[2];
+    EXPECT_TRUE(target.starts_with("#") || target.starts_with("data:")) << target;
+  }
+  EXPECT_GE(seen, 4);
+}
+
+TEST(Report, EscapesWhatItIsGiven) {
+  const std::string page = toHtml(example());
+  EXPECT_THAT(page, HasSubstr("A &lt;b&gt; against C &amp; D"));
+  EXPECT_THAT(page, Not(HasSubstr("<b>")));
+}
+
+TEST(Report, IsWrittenWithItsNumbers) {
+  const auto folder = std::filesystem::path{testing::TempDir()} / "report_test" / "deep";
+  std::filesystem::remove_all(folder);
+  const auto page = write(example(), folder);
+  ASSERT_TRUE(page.ok()) << page.error().message;
+  EXPECT_TRUE(page->is_absolute());
+  std::ifstream in{folder / "report.json"};
+  const std::string json{std::istreambuf_iterator<char>{in}, {}};
+  EXPECT_EQ(json, "{\n  \"bias_mm\": 1,\n  \"nothing\": null\n}\n");
+}
+
+TEST(Report, SaysWhichFolderItCannotWrite) {
+  const auto page = write(example(), "/proc/no/report");
+  ASSERT_FALSE(page.ok());
+  EXPECT_THAT(page.error().message, HasSubstr("/proc/no/report"));
+}
+
+TEST(Numbers, AreShownForPeople) {
+  EXPECT_EQ(shown(-1.25), "−1.2");
+  EXPECT_EQ(shown(-0.01), "0.0");
+  EXPECT_EQ(shown(std::nan("")), "–");
+  EXPECT_EQ(shownWithError(3.14159, 0.1), "+3.1 ± 0.1");
+  EXPECT_EQ(shownPercent(0.426), "43 %");
+}
+
+TEST(Ticks, AreRoundAndInside) {
+  EXPECT_EQ(roundTicks(-1.0, 11.0, 6), (std::vector<double>{0, 2, 4, 6, 8, 10}));
+  EXPECT_TRUE(roundTicks(1.0, 1.0, 5).empty());
+}
+
+TEST(Plot, InterruptsACurveWhereThereIsNoValue) {
+  const Plot plot{.title = "t",
+                  .x_label = "x",
+                  .y_label = "y",
+                  .curves = {{.name = "c", .x = {0, 1, 2, 3}, .y = {1, std::nan(""), 3, 4}}}};
+  const std::string svg = toSvg(plot);
+  const auto d = svg.substr(svg.find("d='M"), 60);
+  EXPECT_EQ(std::count(d.begin(), d.begin() + static_cast<long>(d.find("'/>")), 'M'), 2) << d;
+  EXPECT_THAT(svg, Not(HasSubstr("nan")));
+}
+
+TEST(Histogram, CountsEveryFiniteValueOnce) {
+  const Curve curve = histogram(std::vector<double>{-5, 0.5, 1.5, 1.6, 9, std::nan("")}, 0, 2, 2,
+                                "h", Ink::Measured);
+  EXPECT_EQ(curve.y, (std::vector<double>{0, 2, 3, 0}));
+}
+
+TEST(Base64, IsThatOfRfc4648) {
+  const auto of = [](std::string_view text) {
+    return base64({reinterpret_cast<const unsigned char*>(text.data()), text.size()});
+  };
+  EXPECT_EQ(of(""), "");
+  EXPECT_EQ(of("f"), "Zg==");
+  EXPECT_EQ(of("fo"), "Zm8=");
+  EXPECT_EQ(of("foobar"), "Zm9vYmFy");
+}
+
+TEST(Json, EscapesAndKeepsOrder) {
+  Json json = Json::object();
+  json.set("b", "a\"\\\n").set("a", Json::arrayOf(std::vector<double>{1, 0.5})).set("t", true);
+  EXPECT_EQ(json.text(),
+            "{\n  \"b\": \"a\\\"\\\\\\u000a\",\n  \"a\": [1, 0.5],\n  \"t\": true\n}\n");
+}
+
+}  // namespace
+}  // namespace toftwin::compare
