@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include <toftwin/result.h>
 
@@ -16,9 +17,11 @@ class Scene {
   /// From a scene file (docs/scene.md). Errors name file, line and key; a mesh that is missing, empty
   /// or holds NaN vertices is an error naming mesh and vertex.
   static Result<Scene> load(const std::filesystem::path& file);
+  /// From text; `name` stands for the file in errors, and mesh paths start at its folder.
   static Result<Scene> parse(std::string_view toml, const std::filesystem::path& name);
 
-  /// Content hash over the scene and the meshes it uses; 32 hex digits.
+  /// Content hash over what the scene says and the meshes it uses; 32 hex digits. Comments, order of
+  /// keys and file names do not count.
   [[nodiscard]] const std::string& id() const;
 
   struct Impl;
@@ -26,6 +29,7 @@ class Scene {
 
  private:
   explicit Scene(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)) {}
+  friend struct SceneBuilder;
   std::shared_ptr<const Impl> impl_;  // shared by copies: tracing threads and the driver
 };
 

@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim/tracer/trace.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+#include <xmmintrin.h>
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "sim/tracer/path.h"
+
+namespace toftwin::sim {
+namespace {
+
+/// Denormal numbers count as zero while this lives, on this thread: Embree asks for it.
+class FlushDenormals {
+ public:
+  FlushDenormals() : before_(_mm_getcsr()) { _mm_setcsr(before_ | kFlushToZero | kDenormalsAreZero); }
+  FlushDenormals(const FlushDenormals&) = delete;
+  FlushDenormals& operator=(const FlushDenormals&) = delete;
+  ~FlushDenormals() { _mm_setcsr(before_); }
+
+ private:
+  static constexpr unsigned kFlushToZero = 0x8000, kDenormalsAreZero = 0x0040;
+  unsigned before_;
+};
+
+/// A pixel with very many samples is cut into pieces of this many, so that threads can share it. The
+/// pieces' sums are added in order: the result does not depend on who did which.
+constexpr int kSamplesPerPiece = 4096;
+
+struct Region {
+  int x, y, width, height;
+};
+
+Region regionOf(const TraceRequest& request) {
+  if (request.region_width == 0) return {0, 0, request.camera.width, request.camera.height};
+  return {request.region_x, request.region_y, request.region_width, request.region_height};
+}
+
+/// A request that makes no sense is the calling program's mistake.
+void check(const TraceRequest& request) {
+  const CameraInfo& camera = request.camera;
+  const Region region = regionOf(request);
+  const auto require = [](bool is_met, const char* what) {
+    if (!is_met) throw std::invalid_argument{fmt::format("trace: {}", what)};
+  };
+  require(camera.width > 0 && camera.height > 0, "the camera has no pixels");
+  require(camera.fx > 0.0 && camera.fy > 0.0, "the camera's focal lengths must be positive");
+  require(request.harmonics >= 1, "harmonics must be at least 1");
+  require(request.samples_per_pixel >= 1, "samples_per_pixel must be at least 1");
+  require(request.max_surfaces >= 1, "max_surfaces must be at least 1");
+  require(request.pixel_extent >= 0.0, "pixel_extent must not be negative");
+  require(region.width > 0 && region.height > 0 && region.x >= 0 && region.y >= 0 &&
+              region.width <= camera.width - region.x && region.height <= camera.height - region.y,
+          "the region must lie inside the image");
+}
+
+Light emptyLight(const TraceRequest& request, const Region& region) {
+  const int w = region.width, h = region.height;
+  Light light;
+  light.frequencies = request.frequencies;
+  light.harmonics = request.harmonics;
+  light.phasors.assign(request.frequencies.size() * static_cast<std::size_t>(request.harmonics),
+                       Image<std::complex<float>>(w, h));
+  light.steady = Image<float>(w, h);
+  light.ambient = Image<float>(w, h);
+  if (request.samples_per_pixel > 1) light.variance.assign(request.frequencies.size(), Image<float>(w, h));
+  light.truth = {Image<float>(w, h), Image<Vec3f>(w, h), Image<float>(w, h)};
+  return light;
+}
+
+BlockSums sumBlock(const Tracing& tracing, const BlockShape& shape, int x, int y) {
+  const TraceRequest& request = tracing.request;
+  const auto empty = [&] { return BlockSums{shape.pixels(), request.frequencies.size(), request.harmonics}; };
+  const int pieces = (request.samples_per_pixel + kSamplesPerPiece - 1) / kSamplesPerPiece;
+  std::vector<BlockSums> sums(static_cast<std::size_t>(pieces), empty());
+  const auto sumPiece = [&](int piece) {
+    const FlushDenormals flush;
+    const int first = piece * kSamplesPerPiece;
+    traceBlock(tracing, shape, x, y, first, std::min(request.samples_per_pixel, first + kSamplesPerPiece),
+               sums[static_cast<std::size_t>(piece)]);
+  };
+  if (pieces == 1) {
+    sumPiece(0);
+  } else {
+    tbb::parallel_for(0, pieces, sumPiece);
+  }
+  for (std::size_t piece = 1; piece < sums.size(); ++piece) sums[0] += sums[piece];
+  return std::move(sums[0]);
+}
+
+/// Means and variances of one pixel of a block go to (x, y) of the images.
+void store(const BlockSums& sums, std::size_t pixel, int x, int y, Light& light) {
+  const double n = sums.pixels[pixel].samples;
+  light.steady(x, y) = static_cast<float>(sums.pixels[pixel].steady / n);
+  light.ambient(x, y) = static_cast<float>(sums.pixels[pixel].ambient / n);
+  const std::size_t terms = light.phasors.size(), frequencies = light.frequencies.size();
+  for (std::size_t term = 0; term < terms; ++term) {
+    light.phasors[term](x, y) = std::complex<float>{sums.phasors[pixel * terms + term] / n};
+  }
+  for (std::size_t f = 0; f < light.variance.size(); ++f) {
+    const std::complex<double> sum = sums.phasors[pixel * terms + f * (terms / frequencies)];
+    const double spread = std::max(0.0, sums.squares[pixel * frequencies + f] - std::norm(sum) / n);
+    light.variance[f](x, y) = static_cast<float>(spread / (2.0 * n * (n - 1.0)));
+  }
+}
+
+void traceAt(const Tracing& tracing, const BlockShape& shape, const Region& region, int x, int y, Light& light) {
+  std::vector<TruthPixel> truth(static_cast<std::size_t>(shape.pixels()));
+  {
+    const FlushDenormals flush;
+    traceTruth(tracing, shape, x, y, truth.data());
+  }
+  const BlockSums sums = sumBlock(tracing, shape, x, y);
+  for (int p = 0; p < shape.pixels(); ++p) {
+    const int u = x + p % shape.width - region.x, v = y + p / shape.width - region.y;
+    if (u < 0 || v < 0 || u >= region.width || v >= region.height) continue;
+    const auto pixel = static_cast<std::size_t>(p);
+    store(sums, pixel, u, v, light);
+    light.truth.range_m(u, v) = truth[pixel].range_m;
+    light.truth.albedo(u, v) = truth[pixel].albedo;
+    light.truth.normal(u, v) = truth[pixel].normal;
+  }
+}
+
+}  // namespace
+
+Light traceLogged(const Scene& scene, const TraceRequest& request, RayLog* log) {
+  check(request);
+  const Region region = regionOf(request);
+  const Tracing tracing{scene.impl(), request, log};
+  const BlockShape shape = BlockShape::forSamples(request.samples_per_pixel);
+  Light light = emptyLight(request, region);
+  const int first_column = region.x / shape.width, first_row = region.y / shape.height;
+  const int columns = (region.x + region.width - 1) / shape.width - first_column + 1;
+  const int rows = (region.y + region.height - 1) / shape.height - first_row + 1;
+  tbb::parallel_for(0, columns * rows, [&](int block) {
+    traceAt(tracing, shape, region, (first_column + block % columns) * shape.width,
+            (first_row + block / columns) * shape.height, light);
+  });
+  return light;
+}
+
+Light trace(const Scene& scene, const TraceRequest& request) { return traceLogged(scene, request, nullptr); }
+
+}  // namespace toftwin::sim
