@@ -81,7 +81,8 @@ Subscribe read(Checks& checks, std::uint64_t id, const fb::Subscribe& t) {
               .decimation = t.decimation(),
               .max_rate_hz = checks.finiteFromZero(t.max_rate_hz(), "max_rate_hz"),
               .policy = checks.oneOf(t.policy(), Policy::Lockstep, "policy"),
-              .queue = t.queue()};
+              .queue = t.queue(),
+              .window = t.window()};
   if (const fb::Region* r = t.region()) m.region = {r->x(), r->y(), r->width(), r->height()};
   return m;
 }

@@ -72,7 +72,7 @@ auto write(Builder& b, const Subscribe& m) {
   const auto planes = writeKinds(b, m.planes);
   const fb::Region region{m.region.x, m.region.y, m.region.width, m.region.height};
   return fb::CreateSubscribe(b, source, planes, &region, m.decimation, m.max_rate_hz,
-                             static_cast<std::uint8_t>(m.policy), m.queue);
+                             static_cast<std::uint8_t>(m.policy), m.queue, m.window);
 }
 auto write(Builder& b, const Subscribed& m) { return fb::CreateSubscribed(b, m.subscription); }
 auto write(Builder& b, const Unsubscribe& m) { return fb::CreateUnsubscribe(b, m.subscription); }

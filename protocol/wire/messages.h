@@ -73,13 +73,18 @@ struct Subscribe {
   double max_rate_hz = 0.0;       ///< 0: every frame; frames left out for the rate are not "dropped"
   Policy policy = Policy::Latest;
   std::uint32_t queue = 0;        ///< for Policy::Queue
+  /// How many frames may be sent but not yet acknowledged; what is beyond that waits in the daemon as
+  /// the policy says, not in socket buffers. 0: no limit, and only Lockstep acknowledges. Bodies come
+  /// in shared memory only for subscriptions with a window.
+  std::uint32_t window = 0;
 };
 struct Subscribed { std::uint64_t id = 0; std::uint64_t subscription = 0; };
 struct Unsubscribe { std::uint64_t id = 0; std::uint64_t subscription = 0; };
 
 /// One frame of a subscription.
 struct FrameMessage { std::uint64_t subscription = 0; Frame frame; };
-/// Lockstep: this side has taken the frame with that sequence.
+/// This side has taken the frame with that sequence, and all before it. Sent for every frame of a
+/// subscription that is Lockstep or has a window.
 struct Acknowledge { std::uint64_t subscription = 0; std::uint64_t sequence = 0; };
 /// The daemon ends a subscription, with the reason (EndOfStream, Overrun, Disconnected …).
 struct SubscriptionEnded { std::uint64_t subscription = 0; Error reason; };

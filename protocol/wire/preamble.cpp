@@ -107,4 +107,10 @@ Result<Preamble> decodePreamble(std::span<const std::byte, kPreambleSize> bytes,
   return preamble;
 }
 
+void referToMemfd(Encoded& message) {
+  const std::span<std::byte, kPreambleSize> preamble{message.head.data(), kPreambleSize};
+  store(preamble, kBodyPlaceAt, static_cast<std::uint32_t>(BodyPlace::Memfd));
+  store(preamble, kPreambleCrcAt, crc32c(preamble.first<kPreambleCrcAt>()));
+}
+
 }  // namespace toftwin::wire

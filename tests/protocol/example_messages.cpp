@@ -81,7 +81,8 @@ Subscribe fullSubscribe() {
           .decimation = 2,
           .max_rate_hz = 7.5,
           .policy = Policy::Queue,
-          .queue = 12};
+          .queue = 12,
+          .window = 2};
 }
 
 Health fullHealth() {

@@ -256,6 +256,7 @@ class Renderer {
     field("max_rate_hz", m.max_rate_hz);
     field("policy", static_cast<int>(m.policy));
     field("queue", m.queue);
+    field("window", m.window);
   }
   void fields(const Subscribed& m) { field("subscription", m.subscription); }
   void fields(const Unsubscribe& m) { field("subscription", m.subscription); }

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "protocol/transport/memfd.h"
+
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <sys/uio.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+namespace toftwin::transport {
+namespace {
+
+constexpr int kSeals = F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_WRITE;
+
+Error systemError(const char* what) {
+  return {Error::Code::Internal, std::string{"shared memory: "} + what + " failed: " +
+                                     std::generic_category().message(errno)};
+}
+
+/// Writes all pieces. write(2) fills fresh pages without faulting each of them in, as a mapping would.
+Result<> writePieces(int fd, const std::vector<Buffer>& pieces) {
+  std::vector<iovec> left;
+  for (const Buffer& piece : pieces) {
+    if (piece.size() > 0) left.push_back({const_cast<std::byte*>(piece.bytes().data()), piece.size()});
+  }
+  auto first = left.begin();
+  while (first != left.end()) {
+    const auto count = static_cast<int>(std::min<std::ptrdiff_t>(left.end() - first, IOV_MAX));
+    const ssize_t wrote = ::writev(fd, &*first, count);
+    if (wrote < 0) {
+      if (errno == EINTR) continue;
+      return systemError("writing");
+    }
+    auto done = static_cast<std::size_t>(wrote);
+    while (first != left.end() && done >= first->iov_len) done -= (first++)->iov_len;
+    if (first != left.end()) {
+      first->iov_base = static_cast<std::byte*>(first->iov_base) + done;
+      first->iov_len -= done;
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+FileDescriptor& FileDescriptor::operator=(FileDescriptor&& other) noexcept {
+  if (this != &other) {
+    if (fd_ >= 0) ::close(fd_);
+    fd_ = other.release();
+  }
+  return *this;
+}
+
+FileDescriptor::~FileDescriptor() {
+  if (fd_ >= 0) ::close(fd_);
+}
+
+int FileDescriptor::release() { return std::exchange(fd_, -1); }
+
+Result<std::shared_ptr<const SharedBody>> SharedBody::create(const wire::Body& body) {
+  FileDescriptor fd{::memfd_create("toftwin-body", MFD_CLOEXEC | MFD_ALLOW_SEALING)};
+  if (!fd) return systemError("memfd_create");
+  if (auto wrote = writePieces(fd.get(), body.pieces); !wrote) return wrote.error();
+  if (::fcntl(fd.get(), F_ADD_SEALS, kSeals | F_SEAL_SEAL) != 0) return systemError("sealing");
+  return std::shared_ptr<const SharedBody>{new SharedBody{std::move(fd), body.bytes}};
+}
+
+Result<Buffer> mapSharedBody(const FileDescriptor& memfd, std::uint64_t size) {
+  const int seals = ::fcntl(memfd.get(), F_GET_SEALS);
+  if (seals < 0 || (seals & kSeals) != kSeals) {  // else the peer could pull the memory away
+    return Error{Error::Code::Malformed, "the body's file descriptor is not a sealed memfd"};
+  }
+  struct stat status{};
+  if (::fstat(memfd.get(), &status) != 0) return systemError("fstat");
+  if (status.st_size < 0 || static_cast<std::uint64_t>(status.st_size) != size) {
+    return Error{Error::Code::Malformed, "the body's memfd has " + std::to_string(status.st_size) +
+                                             " bytes, not the announced " + std::to_string(size)};
+  }
+  if (size == 0) return Buffer{};
+  void* const memory =
+      ::mmap(nullptr, size, PROT_READ, MAP_SHARED | MAP_POPULATE, memfd.get(), 0);
+  if (memory == MAP_FAILED) return systemError("mmap");
+  std::shared_ptr<const void> owner{memory, [size](const void* mapped) {
+                                      ::munmap(const_cast<void*>(mapped), size);
+                                    }};
+  return Buffer{std::move(owner), {static_cast<const std::byte*>(memory), size}};
+}
+
+}  // namespace toftwin::transport

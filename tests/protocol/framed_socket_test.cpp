@@ -1,0 +1,227 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "protocol/transport/framed_socket.h"
+
+#include <gmock/gmock.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/local/connect_pair.hpp>
+#include <boost/asio/local/stream_protocol.hpp>
+#include <boost/asio/write.hpp>
+
+#include "example_messages.h"
+#include "message_json.h"
+
+namespace toftwin::transport {
+namespace {
+
+namespace asio = boost::asio;
+using testing::HasSubstr;
+
+class Connection : public testing::TestWithParam<bool> {
+ protected:
+  std::pair<Socket, Socket> connect() {
+    if (GetParam()) return connectLocal();
+    asio::ip::tcp::acceptor acceptor{io_, {asio::ip::address_v4::loopback(), 0}};
+    asio::ip::tcp::socket client{io_};
+    client.connect(acceptor.local_endpoint());
+    return {Socket{std::move(client)}, Socket{acceptor.accept()}};
+  }
+  std::pair<Socket, Socket> connectLocal() {
+    asio::local::stream_protocol::socket a{io_}, b{io_};
+    asio::local::connect_pair(a, b);
+    return {Socket{std::move(a)}, Socket{std::move(b)}};
+  }
+  Result<wire::Message> receive(FramedSocket& socket) {
+    Result<wire::Message> received = Error{Error::Code::Internal, "the handler was not called"};
+    socket.asyncRead([&](Result<wire::Message> message) { received = std::move(message); });
+    io_.restart();
+    io_.run();
+    return received;
+  }
+  static void ignore(const Result<>&) {}
+
+  asio::io_context io_;
+};
+
+INSTANTIATE_TEST_SUITE_P(TcpAndUnix, Connection, testing::Bool(),
+                         [](const auto& test) { return test.param ? "Unix" : "Tcp"; });
+
+TEST_P(Connection, EveryMessageArrivesInOrder) {
+  auto ends = connect();
+  FramedSocket here{std::move(ends.first)}, there{std::move(ends.second)};
+  const auto examples = wire::exampleMessages();
+  std::size_t next = 0;
+  std::function<void(Result<>)> send_next = [&](Result<> result) {
+    ASSERT_TRUE(result);
+    if (next < examples.size()) here.asyncWrite(wire::encode(examples[next++].message), send_next);
+  };
+  send_next({});
+  for (const auto& [name, message] : examples) {
+    const auto received = receive(there);
+    ASSERT_TRUE(received) << name << ": " << received.error().message;
+    EXPECT_EQ(wire::toJson(*received), wire::toJson(message)) << name;
+  }
+}
+
+TEST_P(Connection, AMessageMayArriveByteByByte) {
+  auto ends = connect();
+  Socket here = std::move(ends.first);
+  FramedSocket there{std::move(ends.second)};
+  if (GetParam()) there.acceptSharedBodies();  // the other way of receiving
+  const wire::Message message = wire::FrameMessage{1, wire::exampleFrame(5, 3)};
+  const auto bytes = wire::toBytes(wire::encode(message));
+  std::optional<Result<wire::Message>> received;
+  there.asyncRead([&](Result<wire::Message> read) { received = std::move(read); });
+  for (const std::byte& byte : bytes) {
+    ASSERT_FALSE(received);
+    asio::write(here, asio::buffer(&byte, 1));
+    io_.restart();
+    while (io_.poll() > 0) io_.restart();
+  }
+  io_.restart();
+  io_.run();
+  ASSERT_TRUE(received && *received) << received->error().message;
+  EXPECT_EQ(wire::toJson(**received), wire::toJson(message));
+}
+
+TEST_P(Connection, ALargeFrameCrosses) {
+  auto ends = connect();
+  FramedSocket here{std::move(ends.first)}, there{std::move(ends.second)};
+  const wire::Message message = wire::FrameMessage{1, wire::exampleFrame(512, 424)};
+  here.asyncWrite(wire::encode(message), ignore);
+  const auto received = receive(there);
+  ASSERT_TRUE(received) << received.error().message;
+  EXPECT_EQ(wire::toBytes(wire::encode(*received)), wire::toBytes(wire::encode(message)));
+}
+
+TEST_P(Connection, AClosedPeerIsDisconnected) {
+  auto ends = connect();
+  FramedSocket here{std::move(ends.first)}, there{std::move(ends.second)};
+  here.close();
+  const auto received = receive(there);
+  ASSERT_FALSE(received);
+  EXPECT_EQ(received.error().code, Error::Code::Disconnected);
+}
+
+TEST_P(Connection, AnAnnouncedSizeBeyondTheLimitIsRefusedBeforeItIsAllocated) {
+  auto ends = connect();
+  FramedSocket here{std::move(ends.first)};
+  FramedSocket there{std::move(ends.second), {.header_bytes = 1 << 20, .body_bytes = 1 << 20}};
+  wire::Preamble lie;
+  lie.header_bytes = 64;
+  lie.body_bytes = 1ull << 62;
+  const auto preamble = wire::encodePreamble(lie);
+  here.asyncWrite({{preamble.begin(), preamble.end()}, {}}, ignore);
+  const auto received = receive(there);
+  ASSERT_FALSE(received);
+  EXPECT_EQ(received.error().code, Error::Code::TooLarge);
+}
+
+// ---- bodies in shared memory -----------------------------------------------------------------------
+
+class SharedMemory : public Connection {};
+INSTANTIATE_TEST_SUITE_P(Unix, SharedMemory, testing::Values(true));
+
+TEST_P(SharedMemory, ABodyMadeOnceReachesSeveralPeers) {
+  const Frame frame = wire::exampleFrame(512, 424);
+  const wire::Body body = wire::encodeBody(frame.planes);
+  const auto shared = SharedBody::create(body);
+  ASSERT_TRUE(shared) << shared.error().message;
+  for (const std::uint64_t subscription : {1u, 2u}) {
+    auto ends = connect();
+    FramedSocket here{std::move(ends.first)}, there{std::move(ends.second)};
+    there.acceptSharedBodies();
+    const wire::FrameMessage message{subscription, frame};
+    here.asyncWrite(wire::encode(message, body), *shared, ignore);
+    const auto received = receive(there);
+    ASSERT_TRUE(received) << received.error().message;
+    EXPECT_EQ(wire::toBytes(wire::encode(*received)), wire::toBytes(wire::encode(message)));
+  }
+}
+
+TEST_P(SharedMemory, InlineAndSharedBodiesMayFollowEachOther) {
+  auto ends = connect();
+  FramedSocket here{std::move(ends.first)}, there{std::move(ends.second)};
+  there.acceptSharedBodies();
+  for (std::uint64_t i = 0; i < 6; ++i) {
+    const wire::FrameMessage message{i, wire::exampleFrame(20, 10)};
+    const wire::Body body = wire::encodeBody(message.frame.planes);
+    if (i % 2 == 0) here.asyncWrite(wire::encode(message), ignore);
+    else here.asyncWrite(wire::encode(message, body), *SharedBody::create(body), ignore);
+    io_.restart();
+    io_.run();
+  }
+  for (std::uint64_t i = 0; i < 6; ++i) {
+    const auto received = receive(there);
+    ASSERT_TRUE(received) << received.error().message;
+    EXPECT_EQ(std::get<wire::FrameMessage>(*received).subscription, i);
+  }
+}
+
+TEST_P(SharedMemory, AFrameOutlivesTheConnection) {
+  const wire::FrameMessage message{1, wire::exampleFrame(64, 64)};
+  Frame frame;
+  {
+    auto ends = connect();
+    FramedSocket here{std::move(ends.first)}, there{std::move(ends.second)};
+    there.acceptSharedBodies();
+    const wire::Body body = wire::encodeBody(message.frame.planes);
+    here.asyncWrite(wire::encode(message, body), *SharedBody::create(body), ignore);
+    frame = std::get<wire::FrameMessage>(*receive(there)).frame;
+  }
+  EXPECT_EQ(frame.planes[1].as<float>()[999], 999.0f);
+}
+
+TEST_P(SharedMemory, IsRefusedUnlessAgreedOn) {
+  auto ends = connect();
+  FramedSocket here{std::move(ends.first)}, there{std::move(ends.second)};
+  const wire::FrameMessage message{1, wire::exampleFrame(4, 4)};
+  const wire::Body body = wire::encodeBody(message.frame.planes);
+  here.asyncWrite(wire::encode(message, body), *SharedBody::create(body), ignore);
+  const auto received = receive(there);
+  ASSERT_FALSE(received);
+  EXPECT_EQ(received.error().code, Error::Code::Malformed);
+}
+
+TEST_P(SharedMemory, AMissingFileDescriptorIsMalformed) {
+  auto ends = connect();
+  FramedSocket here{std::move(ends.first)}, there{std::move(ends.second)};
+  there.acceptSharedBodies();
+  wire::Encoded message = wire::encode(wire::FrameMessage{1, wire::exampleFrame(4, 4)});
+  wire::referToMemfd(message);
+  message.body.pieces.clear();
+  here.asyncWrite(std::move(message), ignore);
+  const auto received = receive(there);
+  ASSERT_FALSE(received);
+  EXPECT_THAT(received.error().message, HasSubstr("file descriptor is missing"));
+}
+
+TEST(SharedBodyTest, CannotBeChangedByAnyone) {
+  const auto shared = SharedBody::create(wire::encodeBody(wire::exampleFrame(4, 4).planes));
+  ASSERT_TRUE(shared) << shared.error().message;
+  EXPECT_EQ(::pwrite((*shared)->fd(), "x", 1, 0), -1);
+  EXPECT_EQ(::ftruncate((*shared)->fd(), 0), -1);
+  EXPECT_EQ(::mmap(nullptr, 64, PROT_WRITE, MAP_SHARED, (*shared)->fd(), 0), MAP_FAILED);
+}
+
+TEST(SharedBodyTest, AnUnsealedMemfdIsRefused) {
+  const FileDescriptor memfd{::memfd_create("test", MFD_CLOEXEC | MFD_ALLOW_SEALING)};
+  ASSERT_EQ(::ftruncate(memfd.get(), 64), 0);
+  const auto mapped = mapSharedBody(memfd, 64);
+  ASSERT_FALSE(mapped);
+  EXPECT_THAT(mapped.error().message, HasSubstr("not a sealed memfd"));
+}
+
+TEST(SharedBodyTest, AMemfdOfAnotherSizeThanAnnouncedIsRefused) {
+  const auto shared = SharedBody::create(wire::encodeBody(wire::exampleFrame(4, 4).planes));
+  const FileDescriptor copy{::dup((*shared)->fd())};
+  const auto mapped = mapSharedBody(copy, (*shared)->size() + 64);
+  ASSERT_FALSE(mapped);
+  EXPECT_EQ(mapped.error().code, Error::Code::Malformed);
+}
+
+}  // namespace
+}  // namespace toftwin::transport
