@@ -19,7 +19,8 @@ namespace toftwin::record {
 struct WriterOptions {
   std::uint64_t chunk_bytes = 8ull << 20;  ///< uncompressed; what a killed recorder can lose at most
   std::chrono::milliseconds chunk_time{1000};
-  int zstd_level = 1;                      ///< 0: not compressed
+  int zstd_level = 1;      ///< 0: not compressed
+  bool overwrite = false;  ///< otherwise a file that is there already is an error
 };
 
 /// Appends frames. One channel per source. Each finished chunk is written with one call and then

@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "protocol/record/mcap_writer.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "protocol/record/compression.h"
+
+namespace toftwin::record::mcap {
+
+Result<FileWriter> FileWriter::create(const std::filesystem::path& path, const WriterOptions& options) {
+  auto file = OutputFile::create(path, options.overwrite);
+  if (!file) return file.error();
+  FileWriter writer{std::move(file).value(), options};
+  Bytes start;
+  appendStart(start, "toftwin " TOFTWIN_VERSION);
+  if (auto wrote = writer.append(start); !wrote) return wrote.error();
+  return writer;
+}
+
+Result<> FileWriter::append(std::span<const std::byte> bytes) {
+  if (auto wrote = file_.append(bytes); !wrote) {
+    failed_ = Error{wrote.error().code,
+                    fmt::format("{}. The recording is whole up to there: {} messages", wrote.error().message,
+                                statistics_.messages)};
+    return *failed_;
+  }
+  data_crc_ = crc32(bytes, data_crc_);
+  return {};
+}
+
+Result<std::uint16_t> FileWriter::addSchema(Schema schema) {
+  if (schemas_.size() >= std::numeric_limits<std::uint16_t>::max()) {
+    return Error{Error::Code::TooLarge, path().string() + ": more than 65535 schemas in one recording"};
+  }
+  schema.id = static_cast<std::uint16_t>(schemas_.size() + 1);  // 0 means none
+  mcap::append(open_, schema);
+  schemas_.push_back(std::move(schema));
+  return schemas_.back().id;
+}
+
+Result<std::uint16_t> FileWriter::addChannel(Channel channel) {
+  if (channels_.size() >= std::numeric_limits<std::uint16_t>::max()) {
+    return Error{Error::Code::TooLarge, path().string() + ": more than 65535 channels in one recording"};
+  }
+  channel.id = static_cast<std::uint16_t>(channels_.size());
+  mcap::append(open_, channel);
+  channels_.push_back(std::move(channel));
+  return channels_.back().id;
+}
+
+Result<> FileWriter::write(const Message& head, std::span<const std::span<const std::byte>> pieces) {
+  if (failed_) return *failed_;
+  const bool first = open_messages_ == 0;
+  open_start_ns_ = first ? head.log_time_ns : std::min(open_start_ns_, head.log_time_ns);
+  open_end_ns_ = first ? head.log_time_ns : std::max(open_end_ns_, head.log_time_ns);
+  MessageIndex& index = open_index_[head.channel_id];
+  index.channel_id = head.channel_id;
+  index.entries.push_back({head.log_time_ns, open_.size()});
+  mcap::append(open_, head, pieces);
+  ++open_messages_;
+  const bool due = openChunkIsDue(head.log_time_ns);
+  previous_ns_ = head.log_time_ns;
+  return due ? finishChunk() : Result<>{};
+}
+
+bool FileWriter::openChunkIsDue(std::uint64_t log_time_ns) const {
+  const auto most = static_cast<std::uint64_t>(std::chrono::nanoseconds{options_.chunk_time}.count());
+  // From a source slower than the chunk time every message is written at once: nobody knows when
+  // the next one comes.
+  const bool slow = messages() > 1 && log_time_ns > previous_ns_ && log_time_ns - previous_ns_ >= most;
+  return open_.size() >= options_.chunk_bytes || open_end_ns_ - open_start_ns_ >= most || slow;
+}
+
+Result<> FileWriter::finishChunk() {
+  if (failed_) return *failed_;
+  if (open_.empty()) return {};
+  ChunkHead head{.start_time_ns = open_start_ns_,
+                 .end_time_ns = open_end_ns_,
+                 .uncompressed_size = open_.size(),
+                 .uncompressed_crc = crc32(open_),
+                 .compression = options_.zstd_level > 0 ? "zstd" : ""};
+  Bytes compressed;
+  if (options_.zstd_level > 0) compressed = compressZstd(open_, options_.zstd_level);
+  const std::span<const std::byte> stored = options_.zstd_level > 0 ? compressed : open_;
+
+  ChunkIndex index{.start_time_ns = head.start_time_ns,
+                   .end_time_ns = head.end_time_ns,
+                   .offset = file_.size(),
+                   .length = 0,
+                   .message_index_offsets = {},
+                   .message_index_length = 0,
+                   .compression = head.compression,
+                   .compressed_size = stored.size(),
+                   .uncompressed_size = head.uncompressed_size};
+  Bytes records;
+  records.reserve(stored.size() + 4096);
+  mcap::append(records, head, stored);
+  index.length = records.size();
+  for (const auto& [channel, messages] : open_index_) {
+    index.message_index_offsets[channel] = index.offset + records.size();
+    mcap::append(records, messages);
+  }
+  index.message_index_length = records.size() - index.length;
+
+  const Result<> wrote = append(records);
+  if (wrote) {
+    count(head);
+    chunks_.push_back(std::move(index));
+  }
+  open_.clear();
+  open_index_.clear();
+  open_messages_ = 0;
+  return wrote;
+}
+
+void FileWriter::count(const ChunkHead& chunk) {
+  ++statistics_.chunks;
+  if (open_messages_ == 0) return;
+  const bool first = statistics_.messages == 0;
+  statistics_.start_time_ns = first ? chunk.start_time_ns : std::min(statistics_.start_time_ns, chunk.start_time_ns);
+  statistics_.end_time_ns = std::max(statistics_.end_time_ns, chunk.end_time_ns);
+  statistics_.messages += open_messages_;
+  for (const auto& [channel, index] : open_index_) {
+    statistics_.messages_per_channel[channel] += index.entries.size();
+  }
+}
+
+Result<> FileWriter::close() {
+  if (closed_) return failed_ ? Result<>{*failed_} : Result<>{};
+  closed_ = true;
+  const Result<> finished = finishChunk();
+
+  Bytes end;
+  appendDataEnd(end, data_crc_);
+  const std::uint64_t before = file_.size();
+  const std::size_t summary_at = end.size();
+  statistics_.schemas = static_cast<std::uint16_t>(schemas_.size());
+  statistics_.channels = static_cast<std::uint32_t>(channels_.size());
+  Bytes offsets;
+  const auto addGroup = [&](Opcode group, const auto& records) {
+    const std::size_t start = end.size();
+    for (const auto& record : records) mcap::append(end, record);
+    if (end.size() > start) {
+      mcap::append(offsets, SummaryOffset{group, before + start, end.size() - start});
+    }
+  };
+  addGroup(Opcode::Schema, schemas_);
+  addGroup(Opcode::Channel, channels_);
+  addGroup(Opcode::Statistics, std::span{&statistics_, 1});
+  addGroup(Opcode::ChunkIndex, chunks_);
+  const Footer footer{.summary_start = before + summary_at,
+                      .summary_offset_start = before + end.size(),
+                      .summary_crc = 0};
+  end.insert(end.end(), offsets.begin(), offsets.end());
+  const Bytes summary{end.begin() + static_cast<std::ptrdiff_t>(summary_at), end.end()};
+  appendEnd(end, footer, summary);
+
+  const Result<> appended = append(end);
+  const Result<> closed = file_.close();
+  if (!finished) return finished;
+  return appended ? closed : appended;
+}
+
+}  // namespace toftwin::record::mcap

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <toftwin/result.h>
+
+#include "protocol/record/file.h"
+#include "protocol/record/mcap_records.h"
+#include "protocol/record/recording.h"
+
+namespace toftwin::record::mcap {
+
+/// Writes an MCAP file of chunks, each appended with one call, and their index at the end. Knows
+/// nothing of frames. After an error every call gives that error again, but `close` still adds the
+/// index of what was written, where there is room for it.
+class FileWriter {
+ public:
+  static Result<FileWriter> create(const std::filesystem::path& path, const WriterOptions& options);
+
+  /// Adds a schema or a channel; `id` is set here. Error TooLarge after 65535 of them.
+  Result<std::uint16_t> addSchema(Schema schema);
+  Result<std::uint16_t> addChannel(Channel channel);
+  /// Adds a message of a channel that was added; `head.data` is not looked at, `pieces` are.
+  Result<> write(const Message& head, std::span<const std::span<const std::byte>> pieces);
+  Result<> close();
+  /// Messages in finished chunks and in the open one.
+  [[nodiscard]] std::uint64_t messages() const { return statistics_.messages + open_messages_; }
+  [[nodiscard]] const std::filesystem::path& path() const { return file_.path(); }
+
+ private:
+  FileWriter(OutputFile file, const WriterOptions& options)
+      : file_(std::move(file)), options_(options) {}
+  [[nodiscard]] bool openChunkIsDue(std::uint64_t log_time_ns) const;
+  Result<> append(std::span<const std::byte> bytes);
+  Result<> finishChunk();
+  void count(const ChunkHead& chunk);
+
+  OutputFile file_;
+  WriterOptions options_;
+  std::optional<Error> failed_;
+  bool closed_ = false;
+  std::uint32_t data_crc_ = 0;
+
+  Bytes open_;  // records of the open chunk
+  std::uint64_t open_messages_ = 0;
+  std::uint64_t open_start_ns_ = 0, open_end_ns_ = 0;
+  std::uint64_t previous_ns_ = 0;
+  std::map<std::uint16_t, MessageIndex> open_index_;
+
+  std::vector<Schema> schemas_;
+  std::vector<Channel> channels_;
+  std::vector<ChunkIndex> chunks_;
+  Statistics statistics_;
+};
+
+}  // namespace toftwin::record::mcap
