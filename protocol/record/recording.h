@@ -53,7 +53,8 @@ struct Summary {
   std::string damage;     ///< what was wrong and how much was lost, or empty
 };
 
-/// Reads frames in file order. Damaged or truncated files give every frame up to the damage.
+/// Reads frames in file order. Damaged or truncated files give every frame up to the damage, then one
+/// error Malformed, and after it the frames of the next chunk that is whole.
 class Reader {
  public:
   static Result<Reader> open(const std::filesystem::path& file);

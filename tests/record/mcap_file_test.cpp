@@ -354,5 +354,96 @@ TEST(McapReader, AnIndexThatPointsOutOfTheDataIsNotUsed) {
   }
 }
 
+/// A file whose CRCs all say "not known", so that damage reaches every parser behind them.
+Bytes fileWithoutCrcs() {
+  Bytes bytes;
+  appendStart(bytes, "test");
+  const Channel channel{0, 1, "t", "raw", {{"k", "v"}}};
+  Bytes summary;
+  std::uint64_t messages = 0;
+  for (const char* compression : {"", "zstd", "lz4"}) {
+    Bytes records;
+    append(records, Schema{1, "s", "text", Bytes(3)});
+    append(records, channel);
+    MessageIndex index{0, {}};
+    for (std::uint32_t i = 0; i < 4; ++i, ++messages) {
+      index.entries.push_back({messages, records.size()});
+      append(records, Message{0, i, messages, messages, {}}, {});
+    }
+    Bytes stored = records;
+    if (std::string_view{compression} == "zstd") stored = compressZstd(records, 1);
+    if (std::string_view{compression} == "lz4") {
+      stored.resize(LZ4F_compressFrameBound(records.size(), nullptr));
+      stored.resize(LZ4F_compressFrame(stored.data(), stored.size(), records.data(), records.size(), nullptr));
+    }
+    const std::uint64_t at = bytes.size();
+    append(bytes, ChunkHead{messages - 4, messages - 1, records.size(), 0, compression}, stored);
+    const std::uint64_t length = bytes.size() - at;
+    append(summary, ChunkIndex{messages - 4, messages - 1, at, length, {{0, bytes.size()}}, 0, compression,
+                               stored.size(), records.size()});
+    append(bytes, index);
+  }
+  appendDataEnd(bytes, 0);
+  Bytes all_summary;
+  append(all_summary, channel);
+  append(all_summary, Statistics{messages, 0, 1, 0, 0, 3, 0, messages - 1, {{0, messages}}});
+  all_summary.insert(all_summary.end(), summary.begin(), summary.end());
+  const std::uint64_t start = bytes.size();
+  bytes.insert(bytes.end(), all_summary.begin(), all_summary.end());
+  appendEnd(bytes, {.summary_start = start, .summary_offset_start = 0, .summary_crc = 0}, {});
+  const std::uint32_t unknown = 0;
+  std::memcpy(bytes.data() + bytes.size() - kMagic.size() - 4, &unknown, 4);
+  return bytes;
+}
+
+void mutate(Bytes& bytes, std::mt19937& random) {
+  const std::size_t at = random() % bytes.size();
+  const std::size_t length = std::min<std::size_t>(1 + random() % 9, bytes.size() - at);
+  const auto begin = bytes.begin() + static_cast<std::ptrdiff_t>(at);
+  const auto end = begin + static_cast<std::ptrdiff_t>(length);
+  switch (random() % 6) {
+    case 0: *begin ^= static_cast<std::byte>(1u << random() % 8); break;
+    case 1: std::fill(begin, end, std::byte{0xff}); break;
+    case 2: std::fill(begin, end, std::byte{0}); break;
+    case 3: bytes.erase(begin, end); break;
+    case 4: bytes.insert(begin, length, static_cast<std::byte>(random())); break;
+    default: *begin = static_cast<std::byte>(random());
+  }
+}
+
+TEST(McapReader, NoBytesCrashIt) {
+  Folder folder;
+  const auto file = folder / "a.mcap";
+  const Bytes whole = fileWithoutCrcs();
+  writeBytes(file, whole);
+  ASSERT_TRUE(FileReader::open(file)->indexed());
+  std::mt19937 random{42};
+  int opened = 0, indexed = 0, scanned = 0;
+  for (int round = 0; round < 6000; ++round) {
+    Bytes bytes = whole;
+    for (unsigned i = 0; i <= random() % 4; ++i) mutate(bytes, random);
+    writeBytes(file, bytes);
+    auto reader = FileReader::open(file);
+    if (!reader) continue;
+    ++opened;
+    ++(reader->indexed() ? indexed : scanned);
+    for (const std::uint64_t from : {0, 5}) {
+      reader->seek(from);
+      // Every call moves on: no more messages and errors can come than the file has bytes.
+      std::size_t calls = 0;
+      while (calls <= 2 * bytes.size()) {
+        ++calls;
+        const auto message = reader->next();
+        if (!message && message.error().code == Error::Code::EndOfStream) break;
+      }
+      ASSERT_LE(calls, 2 * bytes.size());
+    }
+  }
+  // The mutations reach both ways of opening, not only the refusal at the door.
+  EXPECT_GT(opened, 5000);
+  EXPECT_GT(indexed, 500);
+  EXPECT_GT(scanned, 500);
+}
+
 }  // namespace
 }  // namespace toftwin::record::mcap

@@ -1,0 +1,318 @@
+// SPDX-License-Identifier: Apache-2.0
+// Recordings of frames: bit for bit, through kill -9 and a full disk.
+#include "protocol/record/recording.h"
+
+#include <gmock/gmock.h>
+#include <sched.h>
+#include <sys/mount.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+
+#include "protocol/record/mcap_reader.h"
+#include "protocol/record/mcap_writer.h"
+#include "protocol/wire/codec.h"
+#include "tests/protocol/example_messages.h"
+#include "tests/record/record_testing.h"
+
+namespace toftwin::record {
+namespace {
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+std::int64_t timeOf(int i) { return 1'760'000'000'000'000'000 + 33'000'000ll * i; }
+
+/// Frame i: 32 × 24 pixels in three planes, every value and every time another than in frame i + 1.
+Frame frameOf(int i, std::string source = "kinect") {
+  Frame frame = wire::exampleFrame(32, 24);
+  frame.source = std::move(source);
+  frame.sequence = static_cast<std::uint64_t>(i);
+  frame.moment.received = {timeOf(i)};
+  frame.moment.exposures[0].start = {1000 + 33'000'000ll * i};
+  frame.moment.clock = {timeOf(0) - 2'000'000, 1500};
+  Image<float> range_m{32, 24};
+  for (std::size_t k = 0; k < range_m.size(); ++k) range_m[k] = static_cast<float>(i) + 0.001f * static_cast<float>(k);
+  frame.planes[0] = toPlane(PlaneKind::Range, std::move(range_m));
+  return frame;
+}
+
+std::vector<std::byte> wireBytes(const Frame& frame) {
+  return wire::toBytes(wire::encode(wire::FrameMessage{0, frame}));
+}
+
+/// Reads frames until the first error, which is returned; each must be frameOf(first + n), bit for bit.
+Error expectFrames(Reader& reader, int first, int& count) {
+  for (count = 0;; ++count) {
+    const auto frame = reader.next();
+    if (!frame) return frame.error();
+    EXPECT_EQ(wireBytes(*frame), wireBytes(frameOf(first + count))) << "frame " << first + count;
+    if (testing::Test::HasFailure()) return {};
+  }
+}
+
+class Recording : public testing::Test {
+ protected:
+  Folder folder_;
+  std::filesystem::path file_ = folder_ / "a.mcap";
+
+  void record(int frames, WriterOptions options = {}) {
+    auto writer = Writer::create(file_, options);
+    ASSERT_TRUE(writer) << writer.error().message;
+    for (int i = 0; i < frames; ++i) ASSERT_TRUE(writer->write(frameOf(i)));
+    EXPECT_EQ(writer->frames(), static_cast<std::uint64_t>(frames));
+    ASSERT_TRUE(writer->close());
+    ASSERT_TRUE(writer->close()) << "closing twice";
+  }
+};
+
+TEST_F(Recording, FramesComeBackBitForBit) {
+  record(100, {.chunk_bytes = 40'000});
+  auto reader = Reader::open(file_);
+  ASSERT_TRUE(reader) << reader.error().message;
+  EXPECT_TRUE(reader->summary().indexed);
+  EXPECT_THAT(reader->summary().damage, IsEmpty());
+  EXPECT_EQ(reader->summary().frames_per_source, (std::map<std::string, std::uint64_t>{{"kinect", 100}}));
+  EXPECT_EQ(reader->summary().first_ns, timeOf(0));
+  EXPECT_EQ(reader->summary().last_ns, timeOf(99));
+  int count = 0;
+  EXPECT_EQ(expectFrames(*reader, 0, count).code, Error::Code::EndOfStream);
+  EXPECT_EQ(count, 100);
+  reader->rewind();
+  expectFrames(*reader, 0, count);
+  EXPECT_EQ(count, 100);
+}
+
+TEST_F(Recording, SeekGoesToTheFirstFrameAtOrAfterATime) {
+  record(100, {.chunk_bytes = 40'000});
+  auto reader = Reader::open(file_);
+  ASSERT_TRUE(reader);
+  int count = 0;
+  for (int i : {50, 99, 3}) {
+    ASSERT_TRUE(reader->seek(timeOf(i) - 10'000'000));
+    expectFrames(*reader, i, count);
+    EXPECT_EQ(count, 100 - i);
+  }
+  ASSERT_TRUE(reader->seek(-1));
+  expectFrames(*reader, 0, count);
+  EXPECT_EQ(count, 100);
+}
+
+TEST_F(Recording, EachSourceCanBeReadAlone) {
+  auto writer = Writer::create(file_);
+  ASSERT_TRUE(writer);
+  for (int i = 0; i < 30; ++i) ASSERT_TRUE(writer->write(frameOf(i, i % 3 == 0 ? "o3d" : "kinect")));
+  ASSERT_TRUE(writer->close());
+  auto reader = Reader::open(file_);
+  ASSERT_TRUE(reader);
+  EXPECT_EQ(reader->summary().frames_per_source.at("kinect"), 20u);
+  EXPECT_EQ(reader->summary().frames_per_source.at("o3d"), 10u);
+  for (std::uint64_t i = 0; i < 10; ++i) {
+    const auto frame = reader->next("o3d");
+    ASSERT_TRUE(frame);
+    EXPECT_EQ(frame->sequence, 3 * i);
+  }
+  EXPECT_EQ(reader->next("o3d").error().code, Error::Code::EndOfStream);
+}
+
+TEST_F(Recording, PlanesThatWereReadAreAligned) {
+  record(3);
+  auto reader = Reader::open(file_);
+  ASSERT_TRUE(reader);
+  for (int i = 0; i < 3; ++i) {
+    const auto frame = reader->next();
+    ASSERT_TRUE(frame);
+    for (const Plane& plane : frame->planes) {
+      EXPECT_EQ(reinterpret_cast<std::uintptr_t>(plane.data.bytes().data()) % 64, 0u);
+    }
+  }
+}
+
+TEST_F(Recording, SaysWhenAFrameWasTakenAndReceived) {
+  auto writer = Writer::create(file_);
+  ASSERT_TRUE(writer);
+  Frame known = frameOf(0), unknown = frameOf(1);
+  unknown.moment.clock.uncertainty_ns = -1;
+  Frame overflowing = frameOf(2);
+  overflowing.moment.exposures[0].start.ns = std::numeric_limits<std::int64_t>::max();
+  Frame before_1970 = frameOf(3);
+  before_1970.moment.received.ns = -5;
+  for (const Frame& frame : {known, unknown, overflowing, before_1970}) ASSERT_TRUE(writer->write(frame));
+  ASSERT_TRUE(writer->close());
+  auto file = mcap::FileReader::open(file_);
+  ASSERT_TRUE(file);
+  auto message = file->next();
+  EXPECT_EQ(message->log_time_ns, static_cast<std::uint64_t>(timeOf(0)));
+  EXPECT_EQ(message->publish_time_ns, static_cast<std::uint64_t>(timeOf(0) - 2'000'000 + 1000));
+  EXPECT_EQ(file->next()->publish_time_ns, static_cast<std::uint64_t>(timeOf(1)));
+  EXPECT_EQ(file->next()->publish_time_ns, static_cast<std::uint64_t>(timeOf(2)));
+  EXPECT_EQ(file->next()->log_time_ns, 0u);
+}
+
+TEST_F(Recording, AChannelNamesTheCameraAndACameraThatChangesGetsItsOwn) {
+  auto writer = Writer::create(file_);
+  ASSERT_TRUE(writer);
+  Frame other = frameOf(1);
+  other.camera.calibration_id = "ffffffffffffffffffffffffffffffff";
+  other.camera.fx = 400.5;
+  ASSERT_TRUE(writer->write(frameOf(0)));
+  ASSERT_TRUE(writer->write(other));
+  ASSERT_TRUE(writer->close());
+  auto file = mcap::FileReader::open(file_);
+  ASSERT_TRUE(file);
+  ASSERT_EQ(file->channels().size(), 2u);
+  const mcap::Channel& channel = file->channels().at(1);
+  EXPECT_EQ(channel.topic, "kinect");
+  EXPECT_EQ(channel.message_encoding, "toftwin");
+  EXPECT_EQ(channel.metadata.at("calibration_id"), other.camera.calibration_id);
+  EXPECT_THAT(channel.metadata.at("camera"), HasSubstr("\"fx\":400.5"));
+  EXPECT_EQ(file->schemas().at(1).encoding, "flatbuffer");
+  EXPECT_EQ(Reader::open(file_)->summary().frames_per_source.at("kinect"), 2u);
+}
+
+TEST_F(Recording, AKilledRecorderLosesAtMostTheOpenChunk) {
+  constexpr std::uint64_t kChunk = 30'000;
+  const std::size_t frame_bytes = wireBytes(frameOf(0)).size();
+  int pipe_ends[2];
+  ASSERT_EQ(::pipe(pipe_ends), 0);
+  const pid_t child = ::fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {  // the recorder: says after each frame that it is written, until it is killed
+    auto writer = Writer::create(file_, {.chunk_bytes = kChunk, .chunk_time = std::chrono::hours{1}});
+    for (int i = 0; writer && writer->write(frameOf(i)) && ::write(pipe_ends[1], "x", 1) == 1; ++i) {
+    }
+    ::_exit(1);
+  }
+  int reported = 0;
+  for (char x = 0; reported < 64 && ::read(pipe_ends[0], &x, 1) == 1;) ++reported;
+  ::kill(child, SIGKILL);
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  ASSERT_TRUE(WIFSIGNALED(status));
+  ::close(pipe_ends[0]);
+  ::close(pipe_ends[1]);
+
+  auto reader = Reader::open(file_);
+  ASSERT_TRUE(reader) << reader.error().message;
+  EXPECT_FALSE(reader->summary().indexed);
+  EXPECT_THAT(reader->summary().damage, HasSubstr("was not closed"));
+  int count = 0;
+  EXPECT_EQ(expectFrames(*reader, 0, count).code, Error::Code::EndOfStream);
+  // A chunk is finished as soon as it holds kChunk bytes, so fewer bytes than that are open.
+  const int open_at_most = static_cast<int>((kChunk + frame_bytes - 1) / frame_bytes);
+  EXPECT_GE(count, reported - open_at_most);
+  EXPECT_GT(count, 0);
+}
+
+/// Records until the first error; how many frames were written until then.
+Error recordUntilError(Writer& writer, int& frames) {
+  for (frames = 0; frames < 10'000; ++frames) {
+    if (auto wrote = writer.write(frameOf(frames)); !wrote) return wrote.error();
+  }
+  return {};
+}
+
+/// The disk is full: the error says so, again and again, and the file opens with all but the last chunk.
+void expectWholeUpToTheLastChunk(Writer& writer, const std::filesystem::path& file) {
+  int written = 0;
+  const Error full = recordUntilError(writer, written);
+  EXPECT_EQ(full.code, Error::Code::StorageFull) << full.message;
+  EXPECT_THAT(full.message, HasSubstr(file.string()));
+  EXPECT_THAT(full.message, HasSubstr("free space"));
+  EXPECT_EQ(writer.write(frameOf(written)).error().code, Error::Code::StorageFull);
+  EXPECT_EQ(writer.close().error().code, Error::Code::StorageFull);
+  auto reader = Reader::open(file);
+  ASSERT_TRUE(reader) << reader.error().message;
+  EXPECT_THAT(reader->summary().damage, testing::Not(HasSubstr("in the middle")));  // taken back
+  int count = 0;
+  EXPECT_EQ(expectFrames(*reader, 0, count).code, Error::Code::EndOfStream);
+  EXPECT_GT(count, 0);
+  EXPECT_GE(count, written - 4);  // the frames of one chunk of 30,000 bytes
+}
+
+TEST_F(Recording, AFileSizeLimitIsAFullDisk) {
+  std::signal(SIGXFSZ, SIG_IGN);  // as every program of ours does; otherwise it kills
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
+  const rlimit small{300'000, before.rlim_max};
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &small), 0);
+  auto writer = Writer::create(file_, {.chunk_bytes = 30'000, .zstd_level = 0});
+  if (writer) expectWholeUpToTheLastChunk(*writer, file_);
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
+  EXPECT_TRUE(writer);
+  std::signal(SIGXFSZ, SIG_DFL);
+}
+
+TEST_F(Recording, AFullFileSystemKeepsAllWholeChunks) {
+  const std::filesystem::path small = folder_ / "small";
+  std::filesystem::create_directory(small);
+  const pid_t child = ::fork();  // in a mount namespace of its own, so nothing stays mounted
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    if (::unshare(CLONE_NEWNS) != 0 || ::mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0 ||
+        ::mount("tmpfs", small.c_str(), "tmpfs", 0, "size=500k") != 0) {
+      ::_exit(77);
+    }
+    auto writer = Writer::create(small / "a.mcap", {.chunk_bytes = 30'000, .zstd_level = 0});
+    if (!writer) ::_exit(1);
+    expectWholeUpToTheLastChunk(*writer, small / "a.mcap");
+    ::_exit(testing::Test::HasFailure() ? 1 : 0);
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  ASSERT_TRUE(WIFEXITED(status));
+  if (WEXITSTATUS(status) == 77) GTEST_SKIP() << "a tmpfs can be mounted here only by root";
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+}
+
+TEST_F(Recording, ADeviceThatIsFullIsNamedAtOnce) {
+  const auto writer = Writer::create("/dev/full", {.overwrite = true});
+  ASSERT_FALSE(writer);
+  EXPECT_EQ(writer.error().code, Error::Code::StorageFull);
+}
+
+TEST_F(Recording, AFolderThatMayNotBeWrittenIsNamed) {
+  if (::geteuid() == 0) {
+    ASSERT_EQ(Writer::create("/proc/a.mcap").error().code, Error::Code::NotFound);
+    GTEST_SKIP() << "root may write everywhere";
+  }
+  const auto writer = Writer::create("/a.mcap");
+  ASSERT_FALSE(writer);
+  EXPECT_EQ(writer.error().code, Error::Code::PermissionDenied);
+}
+
+TEST_F(Recording, AnMcapFileWithoutFramesIsIncompatible) {
+  auto file = mcap::FileWriter::create(file_, {});
+  ASSERT_TRUE(file->addChannel({0, 0, "/chatter", "json", {}}));
+  ASSERT_TRUE(file->close());
+  const auto reader = Reader::open(file_);
+  ASSERT_FALSE(reader);
+  EXPECT_EQ(reader.error().code, Error::Code::Incompatible);
+  EXPECT_THAT(reader.error().message, HasSubstr("\"/chatter\" has the encoding \"json\""));
+}
+
+TEST_F(Recording, AMessageThatIsNoFrameIsOneErrorAndTheNextIsRead) {
+  auto file = mcap::FileWriter::create(file_, {});
+  ASSERT_TRUE(file->addChannel({0, 0, "kinect", "toftwin", {}}));
+  for (int i = 0; i < 3; ++i) {
+    std::vector<std::byte> bytes = wireBytes(frameOf(i));
+    if (i == 1) bytes[bytes.size() / 2] ^= std::byte{1};
+    const std::span<const std::byte> pieces[] = {bytes};
+    ASSERT_TRUE(file->write({0, static_cast<std::uint32_t>(i), 5, 5, {}}, pieces));
+  }
+  ASSERT_TRUE(file->close());
+  auto reader = Reader::open(file_);
+  ASSERT_TRUE(reader);
+  EXPECT_TRUE(reader->next());
+  const auto bad = reader->next();
+  ASSERT_FALSE(bad);
+  EXPECT_EQ(bad.error().code, Error::Code::Malformed);
+  EXPECT_THAT(bad.error().message, HasSubstr("the message with sequence 1"));
+  EXPECT_TRUE(reader->next());
+  EXPECT_EQ(reader->next().error().code, Error::Code::EndOfStream);
+}
+
+}  // namespace
+}  // namespace toftwin::record
