@@ -225,7 +225,8 @@ void expectWholeUpToTheLastChunk(Writer& writer, const std::filesystem::path& fi
   EXPECT_EQ(writer.close().error().code, Error::Code::StorageFull);
   auto reader = Reader::open(file);
   ASSERT_TRUE(reader) << reader.error().message;
-  EXPECT_THAT(reader->summary().damage, testing::Not(HasSubstr("in the middle")));  // taken back
+  // The torn chunk was taken back, which left room for the index (the chunks here are longer than it).
+  EXPECT_TRUE(reader->summary().indexed) << reader->summary().damage;
   int count = 0;
   EXPECT_EQ(expectFrames(*reader, 0, count).code, Error::Code::EndOfStream);
   EXPECT_GT(count, 0);
