@@ -1,0 +1,262 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/compare/characteristics.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numeric>
+
+#include <fmt/format.h>
+
+namespace toftwin::compare {
+namespace {
+
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+
+Image<float> scaled(Image<float> image, float factor) {
+  for (float& v : image.pixels()) v *= factor;
+  return image;
+}
+
+bool isFlying(const Image<float>& range, int x, int y, int dx, int dy, double jump) {
+  const int ax = x - 2 * dx, ay = y - 2 * dy, bx = x + 2 * dx, by = y + 2 * dy;
+  if (ax < 0 || ay < 0 || bx >= range.width() || by >= range.height()) return false;
+  const auto a = static_cast<double>(range(ax, ay)), b = static_cast<double>(range(bx, by));
+  const auto own = static_cast<double>(range(x, y));
+  const double near = std::min(a, b), gap = std::abs(b - a);
+  if (!std::isfinite(own + gap) || gap < jump * near) return false;
+  return std::min(std::abs(own - a), std::abs(own - b)) > 0.15 * gap;
+}
+
+void addRegion(std::vector<Region>& regions, const Pixels& pixels, std::string name,
+               const std::function<bool(std::size_t)>& belongs) {
+  std::vector<double> difference, noise_a, noise_b;
+  for (std::size_t i = 0; i < pixels.difference_mm.size(); ++i) {
+    if (!belongs(i)) continue;
+    difference.push_back(pixels.difference_mm[i]);
+    noise_a.push_back(pixels.noise_a_mm[i]);
+    noise_b.push_back(pixels.noise_b_mm[i]);
+  }
+  if (difference.empty()) return;
+  regions.push_back(
+      {std::move(name), summarise(difference), quantile(noise_a, 0.5), quantile(noise_b, 0.5)});
+}
+
+void addRangeRegions(std::vector<Region>& regions, const Pixels& pixels) {
+  constexpr std::array kEdges_m{0.0, 0.75, 1.0, 1.5, 2.0, 3.0, 4.5, 100.0};
+  for (std::size_t bin = 0; bin + 1 < kEdges_m.size(); ++bin) {
+    const double from = kEdges_m[bin], to = kEdges_m[bin + 1];
+    addRegion(
+        regions, pixels,
+        to > 50.0 ? fmt::format("range over {} m", from) : fmt::format("range {}–{} m", from, to),
+        [&](std::size_t i) {
+          return pixels.range_mm[i] >= 1e3 * from && pixels.range_mm[i] < 1e3 * to;
+        });
+  }
+}
+
+void addAmplitudeRegions(std::vector<Region>& regions, const Pixels& pixels) {
+  const double low = quantile(pixels.amplitude, 1.0 / 3.0),
+               high = quantile(pixels.amplitude, 2.0 / 3.0);
+  if (!std::isfinite(low)) return;
+  addRegion(regions, pixels, "darkest third (amplitude of A)",
+            [&](std::size_t i) { return pixels.amplitude[i] < low; });
+  addRegion(regions, pixels, "middle third", [&](std::size_t i) {
+    return pixels.amplitude[i] >= low && pixels.amplitude[i] < high;
+  });
+  addRegion(regions, pixels, "brightest third",
+            [&](std::size_t i) { return pixels.amplitude[i] >= high; });
+}
+
+}  // namespace
+
+Image<std::uint8_t> edgesOf(const Image<float>& range, double jump, int radius) {
+  Image<std::uint8_t> edge(range.width(), range.height());
+  const auto jumps = [&](int x, int y, int x2, int y2) {
+    const auto a = static_cast<double>(range(x, y)), b = static_cast<double>(range(x2, y2));
+    return std::abs(a - b) > jump * std::min(a, b);  // false where one is NaN
+  };
+  const auto mark = [&](int cx, int cy) {
+    for (int y = std::max(0, cy - radius); y <= std::min(range.height() - 1, cy + radius); ++y) {
+      for (int x = std::max(0, cx - radius); x <= std::min(range.width() - 1, cx + radius); ++x)
+        edge(x, y) = 1;
+    }
+  };
+  for (int y = 0; y < range.height(); ++y) {
+    for (int x = 0; x < range.width(); ++x) {
+      if (x + 1 < range.width() && jumps(x, y, x + 1, y)) mark(x, y), mark(x + 1, y);
+      if (y + 1 < range.height() && jumps(x, y, x, y + 1)) mark(x, y), mark(x, y + 1);
+    }
+  }
+  return edge;
+}
+
+Image<std::uint8_t> flyingPixelsOf(const Image<float>& range, double jump) {
+  Image<std::uint8_t> flying(range.width(), range.height());
+  for (int y = 0; y < range.height(); ++y) {
+    for (int x = 0; x < range.width(); ++x) {
+      flying(x, y) = isFlying(range, x, y, 1, 0, jump) || isFlying(range, x, y, 0, 1, jump) ? 1 : 0;
+    }
+  }
+  return flying;
+}
+
+Result<PoseComparison> comparePose(const Stack& a, const Stack& b) {
+  if (a.pose() && b.pose() && !samePose(*a.pose(), *b.pose())) {
+    const Vec3d shift = b.pose()->translation_m - a.pose()->translation_m;
+    return Error{
+        Error::Code::InvalidArgument,
+        fmt::format(
+            "the cameras did not look from the same pose: B is {:.3f} mm away from A or turned "
+            "against it. Only ranges along the same ray can be compared; set both to one pose.",
+            1e3 * norm(shift))};
+  }
+  PoseComparison result;
+  result.resampled = a.camera().width != b.camera().width ||
+                     a.camera().height != b.camera().height || a.camera().fx != b.camera().fx ||
+                     a.camera().fy != b.camera().fy || a.camera().cx != b.camera().cx ||
+                     a.camera().cy != b.camera().cy ||
+                     a.camera().distortion != b.camera().distortion;
+  Image<float> range_b_mm = scaled(b.meanRange_m(), 1e3F), amplitude_b = b.meanAmplitude();
+  result.noise_b_mm = scaled(b.temporalNoise_m(), 1e3F);
+  result.valid_b = b.validShare();
+  if (result.resampled) {
+    result.flying_b = flyingPixelsOf(range_b_mm);
+    range_b_mm = alongRaysOf(a.camera(), range_b_mm, b.camera());
+    result.noise_b_mm = nearestAlongRaysOf(a.camera(), result.noise_b_mm, b.camera());
+    result.valid_b = nearestAlongRaysOf(a.camera(), result.valid_b, b.camera());
+    if (!amplitude_b.empty()) amplitude_b = nearestAlongRaysOf(a.camera(), amplitude_b, b.camera());
+  } else {
+    result.flying_b = flyingPixelsOf(range_b_mm);
+  }
+  result.range_a_mm = scaled(a.meanRange_m(), 1e3F);
+  result.noise_a_mm = scaled(a.temporalNoise_m(), 1e3F);
+  result.valid_a = a.validShare();
+  result.amplitude_a = a.meanAmplitude();
+  result.edge = edgesOf(result.range_a_mm);
+  result.flying_a = flyingPixelsOf(result.range_a_mm);
+  result.difference_mm = Image<float>(a.camera().width, a.camera().height, kNaN);
+  if (!amplitude_b.empty() && !result.amplitude_a.empty()) {
+    result.amplitude_ratio = Image<float>(a.camera().width, a.camera().height, kNaN);
+  }
+  std::size_t shared = 0;
+  for (std::size_t i = 0; i < result.difference_mm.size(); ++i) {
+    if (std::isfinite(result.valid_b[i])) ++shared;
+    result.difference_mm[i] = range_b_mm[i] - result.range_a_mm[i];
+    if (!result.amplitude_ratio.empty())
+      result.amplitude_ratio[i] = amplitude_b[i] / result.amplitude_a[i];
+  }
+  if (100 * shared < result.difference_mm.size()) {
+    return Error{
+        Error::Code::InvalidArgument,
+        fmt::format(
+            "the cameras share {} of {} rays: too few to compare. Are both camera models right?",
+            shared, result.difference_mm.size())};
+  }
+  return result;
+}
+
+Pixels pixelsOf(const std::vector<PoseComparison>& poses) {
+  Pixels all;
+  for (const PoseComparison& pose : poses) {
+    for (std::size_t i = 0; i < pose.difference_mm.size(); ++i) {
+      if (!std::isfinite(pose.difference_mm[i])) continue;
+      all.difference_mm.push_back(static_cast<double>(pose.difference_mm[i]));
+      all.range_mm.push_back(static_cast<double>(pose.range_a_mm[i]));
+      all.amplitude.push_back(
+          static_cast<double>(pose.amplitude_a.empty() ? kNaN : pose.amplitude_a[i]));
+      all.noise_a_mm.push_back(static_cast<double>(pose.noise_a_mm[i]));
+      all.noise_b_mm.push_back(static_cast<double>(pose.noise_b_mm[i]));
+      all.edge.push_back(pose.edge[i] != 0);
+    }
+  }
+  return all;
+}
+
+Characteristics characterise(const std::vector<PoseComparison>& poses) {
+  const Pixels pixels = pixelsOf(poses);
+  Characteristics result;
+  addRegion(result.regions, pixels, "all pixels", [](std::size_t) { return true; });
+  addRegion(result.regions, pixels, "surfaces (over 2 px from a jump)",
+            [&](std::size_t i) { return !pixels.edge[i]; });
+  addRegion(result.regions, pixels, "edges (within 2 px of a jump)",
+            [&](std::size_t i) { return pixels.edge[i]; });
+  addRangeRegions(result.regions, pixels);
+  addAmplitudeRegions(result.regions, pixels);
+
+  std::vector<double> amplitude_ratio, noise_ratio;
+  std::size_t valid_a = 0, valid_b = 0, both = 0, neither = 0, flying_both = 0;
+  for (const PoseComparison& pose : poses) {
+    for (std::size_t i = 0; i < pose.difference_mm.size(); ++i) {
+      result.edge_pixels += pose.edge[i];
+      result.flying_a += pose.flying_a[i];
+      if (!pose.resampled) flying_both += pose.flying_a[i] & pose.flying_b[i];
+      if (!std::isfinite(pose.valid_b[i])) continue;
+      const bool a = pose.valid_a[i] >= 0.5F, b = pose.valid_b[i] >= 0.5F;
+      ++result.pixels;
+      valid_a += a, valid_b += b, both += a && b, neither += !a && !b;
+      if (!pose.amplitude_ratio.empty())
+        amplitude_ratio.push_back(static_cast<double>(pose.amplitude_ratio[i]));
+      noise_ratio.push_back(static_cast<double>(pose.noise_b_mm[i] / pose.noise_a_mm[i]));
+    }
+    for (const std::uint8_t flying : pose.flying_b.pixels()) result.flying_b += flying;
+  }
+  const bool resampled =
+      std::any_of(poses.begin(), poses.end(), [](const auto& pose) { return pose.resampled; });
+  if (!resampled) result.flying_both = flying_both;
+  const auto n = static_cast<double>(std::max<std::size_t>(1, result.pixels));
+  result.valid_a = static_cast<double>(valid_a) / n;
+  result.valid_b = static_cast<double>(valid_b) / n;
+  result.mask_agreement = static_cast<double>(both + neither) / n;
+  result.mask_overlap = static_cast<double>(both) /
+                        static_cast<double>(std::max<std::size_t>(1, valid_a + valid_b - both));
+  result.amplitude_ratio = summarise(amplitude_ratio);
+  result.noise_ratio = summarise(noise_ratio);
+  return result;
+}
+
+Json toJson(const Characteristics& c) {
+  Json regions = Json::array();
+  for (const Region& region : c.regions) {
+    Json row = Json::object();
+    row.set("region", region.name).set("difference", toJson(region.difference_mm, "mm"));
+    row.set("median_noise_a_mm", region.noise_a_mm).set("median_noise_b_mm", region.noise_b_mm);
+    regions.push(std::move(row));
+  }
+  Json json = Json::object();
+  json.set("regions", std::move(regions)).set("pixels", c.pixels).set("valid_share_a", c.valid_a);
+  json.set("valid_share_b", c.valid_b)
+      .set("mask_agreement", c.mask_agreement)
+      .set("mask_overlap", c.mask_overlap);
+  json.set("edge_pixels", c.edge_pixels)
+      .set("flying_pixels_a", c.flying_a)
+      .set("flying_pixels_b", c.flying_b);
+  json.set("flying_pixels_both", c.flying_both ? Json{*c.flying_both} : Json{})
+      .set("amplitude_ratio", toJson(c.amplitude_ratio, "1"));
+  json.set("noise_ratio", toJson(c.noise_ratio, "1"));
+  return json;
+}
+
+Trend trendOf(const std::vector<double>& x, const std::vector<double>& y, int bins) {
+  std::vector<std::size_t> order;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    if (std::isfinite(x[i]) && std::isfinite(y[i])) order.push_back(i);
+  }
+  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return x[a] < x[b]; });
+  Trend trend;
+  const std::size_t count = std::min<std::size_t>(static_cast<std::size_t>(bins), order.size());
+  for (std::size_t bin = 0; bin < count; ++bin) {
+    Running in_x, in_y;
+    for (std::size_t i = bin * order.size() / count; i < (bin + 1) * order.size() / count; ++i) {
+      in_x.add(x[order[i]]), in_y.add(y[order[i]]);
+    }
+    const double error = std::sqrt(in_y.variance() / static_cast<double>(in_y.n()));
+    trend.x.push_back(in_x.mean()), trend.y.push_back(in_y.mean());
+    trend.low.push_back(in_y.mean() - 2.0 * error), trend.high.push_back(in_y.mean() + 2.0 * error);
+  }
+  return trend;
+}
+
+}  // namespace toftwin::compare

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <toftwin/image.h>
+#include <toftwin/result.h>
+
+#include "calib/compare/json.h"
+#include "calib/compare/stack.h"
+#include "calib/compare/statistics.h"
+
+namespace toftwin::compare {
+
+/// Two stacks of one pose, pixel by pixel in camera A's image. Differences are B − A.
+struct PoseComparison {
+  Image<float> range_a_mm;     ///< mean range of A
+  Image<float> difference_mm;  ///< of the mean ranges; NaN where not both are valid
+  Image<float> noise_a_mm, noise_b_mm;
+  Image<float> valid_a, valid_b;  ///< share of frames; NaN where B does not look
+  Image<float> amplitude_a;       ///< empty if A gives none
+  Image<float> amplitude_ratio;   ///< B / A; empty unless both give amplitude
+  Image<std::uint8_t> edge;       ///< 1 within two pixels of a jump in A's range
+  Image<std::uint8_t> flying_a, flying_b;
+  bool resampled = false;  ///< B had another camera model and was interpolated
+};
+
+/// Error where they cannot be compared: known poses that differ, or fields of view that share less
+/// than one pixel in a hundred.
+Result<PoseComparison> comparePose(const Stack& a, const Stack& b);
+
+/// Pixels beside which the range jumps by more than `jump` of itself between neighbours, widened by
+/// `radius`: 1. Invalid pixels are no jump.
+Image<std::uint8_t> edgesOf(const Image<float>& range, double jump = 0.03, int radius = 2);
+
+/// Valid pixels that hang between a near and a far surface: in the row or the column, the ranges
+/// two pixels to either side differ by more than `jump` of themselves and the pixel lies more than
+/// 15 % of that gap away from both, or beyond them by that much.
+Image<std::uint8_t> flyingPixelsOf(const Image<float>& range, double jump = 0.03);
+
+/// One row of the result: some pixels of all poses together.
+struct Region {
+  std::string name;
+  Summary difference_mm;
+  double noise_a_mm = 0.0, noise_b_mm = 0.0;  ///< medians over pixels
+};
+
+/// All poses together.
+struct Characteristics {
+  std::vector<Region> regions;          ///< the first is "all pixels"
+  double valid_a = 0.0, valid_b = 0.0;  ///< share of pixels valid in at least half of the frames
+  double mask_agreement = 0.0;          ///< share of pixels where both are valid or both are not
+  double mask_overlap = 0.0;            ///< valid in both / valid in either
+  std::size_t pixels = 0;               ///< that both cameras look at, over all poses
+  std::size_t flying_a = 0, flying_b = 0, edge_pixels = 0;
+  std::optional<std::size_t> flying_both;  ///< in the same pixel; none where B was interpolated
+  Summary amplitude_ratio;                 ///< B / A; n = 0 unless both give amplitude
+  Summary noise_ratio;                     ///< B / A per pixel
+};
+Characteristics characterise(const std::vector<PoseComparison>& poses);
+Json toJson(const Characteristics& characteristics);
+
+/// Mean of `y` in equally filled bins of `x`, with its standard error: how a difference goes with a
+/// covariate.
+struct Trend {
+  std::vector<double> x, y, low, high;  ///< low, high: mean ± 2 standard errors
+};
+Trend trendOf(const std::vector<double>& x, const std::vector<double>& y, int bins);
+
+/// The pixels of all poses where the difference is known, as columns.
+struct Pixels {
+  std::vector<double> difference_mm, range_mm, amplitude, noise_a_mm, noise_b_mm;
+  std::vector<bool> edge;
+};
+Pixels pixelsOf(const std::vector<PoseComparison>& poses);
+
+}  // namespace toftwin::compare

@@ -1,0 +1,257 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/compare/characteristics.h"
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <random>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace toftwin::compare {
+namespace {
+
+constexpr int kWidth = 64, kHeight = 48, kFrames = 12;
+constexpr double kSigma_m = 0.004;
+
+CameraInfo camera(int width = kWidth, int height = kHeight, double focal = 60.0) {
+  return {.width = width,
+          .height = height,
+          .fx = focal,
+          .fy = focal,
+          .cx = width / 2.0 - 0.5,
+          .cy = height / 2.0 - 0.5,
+          .distortion = {},
+          .calibration_id = {}};
+}
+
+/// The range along each ray to what stands at depth z(x, y) in the camera's frame, plus noise.
+Frame frame(const CameraInfo& info, const std::function<double(Vec3d)>& range_of_ray, double sigma,
+            std::mt19937_64& random, PlaneKind kind = PlaneKind::Range) {
+  std::normal_distribution<double> noise{0.0, 1.0};
+  Image<float> values(info.width, info.height), amplitude(info.width, info.height);
+  for (int y = 0; y < info.height; ++y) {
+    for (int x = 0; x < info.width; ++x) {
+      const Vec3d ray = rayThroughPixel(info, x, y).v;
+      const double range = range_of_ray(ray) + (sigma > 0.0 ? sigma * noise(random) : 0.0);
+      values(x, y) = static_cast<float>(kind == PlaneKind::Depth ? range * ray.z : range);
+      amplitude(x, y) = static_cast<float>(1000.0 / (range * range));
+    }
+  }
+  Frame result;
+  result.source = "synthetic";
+  result.camera = info;
+  result.moment.world_from_camera = Transform<World, Camera>{};
+  result.planes.push_back(toPlane(kind, std::move(values)));
+  result.planes.push_back(toPlane(PlaneKind::Amplitude, std::move(amplitude)));
+  return result;
+}
+
+double tiltedWall(Vec3d ray) { return 1.5 / (ray.z + 0.3 * ray.x); }
+
+Stack stackOf(const CameraInfo& info, const std::function<double(Vec3d)>& scene, double sigma,
+              unsigned seed) {
+  std::mt19937_64 random{seed};
+  Stack stack;
+  for (int i = 0; i < kFrames; ++i) EXPECT_TRUE(stack.add(frame(info, scene, sigma, random)).ok());
+  return stack;
+}
+
+Characteristics compareScenes(const std::function<double(Vec3d)>& a,
+                              const std::function<double(Vec3d)>& b) {
+  const auto pose =
+      comparePose(stackOf(camera(), a, kSigma_m, 11), stackOf(camera(), b, kSigma_m, 12));
+  EXPECT_TRUE(pose.ok());
+  return characterise({*pose});
+}
+
+TEST(Comparison, OfTwoEqualCamerasFindsNoBias) {
+  const Characteristics c = compareScenes(tiltedWall, tiltedWall);
+  const Summary& all = c.regions.front().difference_mm;
+  EXPECT_EQ(all.n, static_cast<std::size_t>(kWidth * kHeight));
+  // The difference of two means of kFrames readings, averaged over all pixels. 4 sigma: 1 in
+  // 16,000.
+  const double sigma = 1e3 * kSigma_m * std::sqrt(2.0 / kFrames / (kWidth * kHeight));
+  EXPECT_NEAR(all.mean, 0.0, 4.0 * sigma);
+  EXPECT_NEAR(all.standard_error, sigma, 0.1 * sigma);  // sd of 3072 values is known to 1.3 %
+}
+
+TEST(Comparison, FindsAPlantedTenMillimetres) {
+  const Characteristics c =
+      compareScenes(tiltedWall, [](Vec3d ray) { return tiltedWall(ray) + 0.010; });
+  const Summary& all = c.regions.front().difference_mm;
+  EXPECT_NEAR(all.mean, 10.0, 4.0 * 1e3 * kSigma_m * std::sqrt(2.0 / kFrames / (kWidth * kHeight)));
+}
+
+TEST(Comparison, MeasuresTheTemporalNoiseOfEachCamera) {
+  std::mt19937_64 random{5};
+  Stack a, b;
+  for (int i = 0; i < kFrames; ++i) {
+    ASSERT_TRUE(a.add(frame(camera(), tiltedWall, kSigma_m, random)).ok());
+    ASSERT_TRUE(b.add(frame(camera(), tiltedWall, 2.0 * kSigma_m, random)).ok());
+  }
+  const auto pose = comparePose(a, b);
+  ASSERT_TRUE(pose.ok());
+  // The median of a sample standard deviation of 12 values is 0.970 sigma (chi with 11 degrees of
+  // freedom); over 3072 pixels its own error is about 0.5 %. 4 sigma: 2 %.
+  const Region all = characterise({*pose}).regions.front();
+  EXPECT_NEAR(all.noise_a_mm, 0.970 * 4.0, 0.02 * 4.0);
+  EXPECT_NEAR(all.noise_b_mm, 0.970 * 8.0, 0.02 * 8.0);
+}
+
+TEST(Comparison, OfDepthAndRangeIsAlongTheSameRay) {
+  std::mt19937_64 random{1};
+  Stack range, depth;
+  ASSERT_TRUE(range.add(frame(camera(), tiltedWall, 0.0, random)).ok());
+  ASSERT_TRUE(depth.add(frame(camera(), tiltedWall, 0.0, random, PlaneKind::Depth)).ok());
+  const auto pose = comparePose(range, depth);
+  ASSERT_TRUE(pose.ok());
+  // Float32 at 2 m steps by 0.24 µm; two roundings and a product.
+  EXPECT_LT(characterise({*pose}).regions.front().difference_mm.p95_abs, 1e-3);
+}
+
+TEST(Comparison, OfDifferentCamerasInterpolatesAlongTheSameRay) {
+  std::mt19937_64 random{1};
+  Stack a, b;
+  ASSERT_TRUE(a.add(frame(camera(), tiltedWall, 0.0, random)).ok());
+  ASSERT_TRUE(b.add(frame(camera(90, 70, 77.0), tiltedWall, 0.0, random)).ok());
+  const auto pose = comparePose(a, b);
+  ASSERT_TRUE(pose.ok()) << pose.error().message;
+  EXPECT_TRUE(pose->resampled);
+  const Characteristics c = characterise({*pose});
+  EXPECT_GT(c.pixels, static_cast<std::size_t>(kWidth * kHeight) / 2);
+  // Inverse depth is linear on a plane: only float rounding remains.
+  EXPECT_LT(std::max(-c.regions.front().difference_mm.min, c.regions.front().difference_mm.max),
+            2e-3);
+}
+
+TEST(Comparison, DoesNotInterpolateAcrossAJump) {
+  const auto step = [](Vec3d ray) { return (ray.x < 0.0 ? 1.0 : 2.0) / ray.z; };
+  std::mt19937_64 random{1};
+  Stack a, b;
+  ASSERT_TRUE(a.add(frame(camera(), step, 0.0, random)).ok());
+  ASSERT_TRUE(b.add(frame(camera(90, 70, 77.0), step, 0.0, random)).ok());
+  const auto pose = comparePose(a, b);
+  ASSERT_TRUE(pose.ok());
+  for (const float d : pose->difference_mm.pixels()) {
+    if (std::isfinite(d)) {
+      EXPECT_LT(std::abs(d), 0.01F);
+    }
+  }
+}
+
+TEST(Comparison, RefusesDifferentPoses) {
+  std::mt19937_64 random{1};
+  Frame moved = frame(camera(), tiltedWall, 0.0, random);
+  moved.moment.world_from_camera->translation_m.x = 0.002;
+  Stack a = stackOf(camera(), tiltedWall, 0.0, 1), b;
+  ASSERT_TRUE(b.add(moved).ok());
+  const auto pose = comparePose(a, b);
+  ASSERT_FALSE(pose.ok());
+  EXPECT_THAT(pose.error().message, testing::HasSubstr("2.000 mm"));
+}
+
+TEST(Comparison, RefusesCamerasThatShareNoRays) {
+  std::mt19937_64 random{1};
+  CameraInfo aside = camera();
+  aside.cx = 5000.0;  // looks far to the left of everything that A sees
+  Stack a = stackOf(camera(), tiltedWall, 0.0, 1), b;
+  ASSERT_TRUE(b.add(frame(
+                        aside, [](Vec3d) { return 1.0; }, 0.0, random))
+                  .ok());
+  const auto pose = comparePose(a, b);
+  ASSERT_FALSE(pose.ok());
+  EXPECT_THAT(pose.error().message, testing::HasSubstr("too few to compare"));
+}
+
+TEST(Comparison, ComparesValidityMasks) {
+  std::mt19937_64 random{1};
+  const auto half = [](Vec3d ray) {
+    return ray.x < 0.0 ? std::numeric_limits<double>::quiet_NaN() : 1.0;
+  };
+  Stack a = stackOf(camera(), tiltedWall, 0.0, 1), b;
+  ASSERT_TRUE(b.add(frame(camera(), half, 0.0, random)).ok());
+  const auto pose = comparePose(a, b);
+  ASSERT_TRUE(pose.ok());
+  const Characteristics c = characterise({*pose});
+  EXPECT_DOUBLE_EQ(c.valid_a, 1.0);
+  EXPECT_DOUBLE_EQ(c.valid_b, 0.5);
+  EXPECT_DOUBLE_EQ(c.mask_agreement, 0.5);
+  EXPECT_DOUBLE_EQ(c.mask_overlap, 0.5);
+}
+
+TEST(Stack, RefusesFramesOfAnotherPoseOrCamera) {
+  std::mt19937_64 random{1};
+  Stack stack = stackOf(camera(), tiltedWall, 0.0, 1);
+  Frame moved = frame(camera(), tiltedWall, 0.0, random);
+  moved.moment.world_from_camera->translation_m.z = 0.01;
+  EXPECT_FALSE(stack.add(moved).ok());
+  EXPECT_FALSE(stack.add(frame(camera(32, 32), tiltedWall, 0.0, random)).ok());
+}
+
+TEST(Stack, RefusesAFrameWithoutRangeOrDepth) {
+  Frame empty;
+  empty.source = "infrared only";
+  empty.camera = camera();
+  Stack stack;
+  const auto added = stack.add(empty);
+  ASSERT_FALSE(added.ok());
+  EXPECT_THAT(added.error().message, testing::HasSubstr("infrared only"));
+}
+
+TEST(Stack, TreatsFlaggedPixelsAsInvalid) {
+  std::mt19937_64 random{1};
+  Frame flagged = frame(camera(), tiltedWall, 0.0, random);
+  Image<std::uint8_t> flags(kWidth, kHeight);
+  flags(3, 4) = static_cast<std::uint8_t>(PixelFlag::Invalid);
+  flagged.planes.push_back(toPlane(PlaneKind::Flags, flags));
+  Stack stack;
+  ASSERT_TRUE(stack.add(flagged).ok());
+  EXPECT_TRUE(std::isnan(stack.meanRange_m()(3, 4)));
+  EXPECT_FALSE(std::isnan(stack.meanRange_m()(4, 4)));
+}
+
+TEST(Edges, AreFoundWithinTwoPixelsOfAJumpAndNowhereElse) {
+  Image<float> range(20, 5, 1.0F);
+  for (int y = 0; y < 5; ++y) {
+    for (int x = 10; x < 20; ++x) range(x, y) = 2.0F;
+  }
+  const auto edge = edgesOf(range);
+  for (int x = 0; x < 20; ++x) EXPECT_EQ(edge(x, 2), x >= 7 && x <= 12 ? 1 : 0) << x;
+}
+
+TEST(FlyingPixels, HangBetweenSurfacesAndSharpEdgesHaveNone) {
+  Image<float> range(20, 5, 1.0F);
+  for (int y = 0; y < 5; ++y) {
+    for (int x = 10; x < 20; ++x) range(x, y) = 2.0F;
+  }
+  const auto count = [](const Image<std::uint8_t>& image) {
+    int sum = 0;
+    for (const auto v : image.pixels()) sum += v;
+    return sum;
+  };
+  EXPECT_EQ(count(flyingPixelsOf(range)), 0);
+  range(10, 2) = 1.5F;
+  EXPECT_EQ(flyingPixelsOf(range)(10, 2), 1);
+  EXPECT_EQ(count(flyingPixelsOf(range)), 1);
+}
+
+TEST(Trend, GivesTheMeanOfEachEquallyFilledBin) {
+  const Trend trend = trendOf({4, 1, 2, 3}, {40, 10, 20, 30}, 2);
+  EXPECT_EQ(trend.x, (std::vector<double>{1.5, 3.5}));
+  EXPECT_EQ(trend.y, (std::vector<double>{15, 35}));
+}
+
+TEST(SamePose, SeesTenthsOfAMillimetreAndNotRounding) {
+  const Transform<World, Camera> a = rotation<World, Camera>({0, 1, 0}, 0.3);
+  Transform<World, Camera> b = a;
+  for (double& q : b.rotation_wxyz) q = -q;  // the same rotation
+  EXPECT_TRUE(samePose(a, b));
+  b.translation_m.x = 1e-4;
+  EXPECT_FALSE(samePose(a, b));
+  EXPECT_FALSE(samePose(a, rotation<World, Camera>({0, 1, 0}, 0.3001)));
+}
+
+}  // namespace
+}  // namespace toftwin::compare
