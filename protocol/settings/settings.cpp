@@ -98,6 +98,16 @@ bool Table::has(std::string_view key) const { return state_->table->contains(key
 
 void Table::accept(std::string_view key) { state_->read.emplace(key); }
 
+void Table::acceptAll() {
+  for (const auto& [key, node] : *state_->table) state_->read.emplace(key.str());
+}
+
+std::string Table::canonicalText() const {
+  std::ostringstream text;
+  text << toml::json_formatter{*state_->table};
+  return text.str();
+}
+
 std::optional<double> Table::number(std::string_view key, Bounds bounds, std::string_view unit,
                                     bool integral) {
   const toml::node* node = state_->find(key);
