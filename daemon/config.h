@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <toftwin/result.h>
+#include <toftwin/units.h>
+
+#include "drivers/source.h"
+#include "protocol/settings/settings.h"
+
+namespace toftwin::daemon {
+
+/// [listen]
+struct ListenKeys {
+  std::string address = "127.0.0.1";
+  int port = 47800;
+  bool allow_remote = false;
+  std::string socket = "auto";
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.text("address", address, "address of the TCP port, or empty for no TCP");
+    v.number("port", port, {0, 65535}, "TCP port; 0: any free one, which the log tells");
+    v.flag("allow_remote", allow_remote,
+           "allows an address that other machines reach. There is no password and no encryption: "
+           "everyone who reaches the port sees all cameras and can set poses, parameters and recordings. "
+           "Only for a network that you trust whole");
+    v.text("socket", socket,
+           "path of the Unix socket; \"auto\": toftwin.sock in $RUNTIME_DIRECTORY, /run/toftwin or "
+           "$XDG_RUNTIME_DIR; empty: no Unix socket");
+  }
+};
+
+/// [limits]
+struct LimitKeys {
+  int sessions = 64;
+  int subscriptions_per_session = 16;
+  int lossless_mb = 256;
+  int request_kb = 64;
+  Duration handshake = 5_s;
+  Duration source_stuck = 120_s;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.number("sessions", sessions, {1, 10'000}, "clients at once; one more is told Busy");
+    v.number("subscriptions_per_session", subscriptions_per_session, {1, 1000},
+             "streams that one client may have at once");
+    v.number("lossless_mb", lossless_mb, {1, 1'000'000},
+             "what may wait for one lossless subscriber or recording before it ends with Overrun");
+    v.number("request_kb", request_kb, {1, 1024}, "longest request that a client may send");
+    v.quantity("handshake", handshake, second, {0.1, 3600}, "a client that said no Hello by then is cut off");
+    v.quantity("source_stuck", source_stuck, second, {1, 86400},
+               "a driver that does not come back within this counts as stuck: systemd's watchdog is no "
+               "longer told that the daemon is well, and restarts it");
+  }
+};
+
+/// The daemon's own keys, at the top of the file.
+struct DaemonKeys {
+  enum class LogLevel { Debug, Info, Warning, Error };
+  LogLevel log_level = LogLevel::Info;
+  std::string recording_folder;
+  ListenKeys listen;
+  LimitKeys limits;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.choice("log_level", log_level,
+             {{"debug", LogLevel::Debug}, {"info", LogLevel::Info}, {"warning", LogLevel::Warning},
+              {"error", LogLevel::Error}},
+             "what is logged");
+    v.text("recording_folder", recording_folder,
+           "where recordings go that clients ask for, relative to this file; empty: $STATE_DIRECTORY if "
+           "systemd sets it, else clients cannot record");
+    v.group("listen", listen, "where clients connect");
+    v.group("limits", limits, "what one client may take");
+  }
+};
+
+/// What every [[source]] has; the other keys are its driver's.
+struct SourceKeys {
+  enum class Start { OnDemand, Always };
+  std::string name;
+  std::string driver;
+  Start start = Start::OnDemand;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.text("name", name, "by which clients ask for it: letters, digits, '-', '_' and '.', at most 64");
+    v.text("driver", driver, "one of the drivers below");
+    v.choice("start", start, {{"on_demand", Start::OnDemand}, {"always", Start::Always}},
+             "makes frames only while somebody wants them, or from the daemon's start to its end");
+  }
+};
+
+/// A source as configured. `opened` is the result of opening it once, unless it is as before.
+struct ConfiguredSource {
+  SourceKeys keys;
+  const drivers::Driver* driver = nullptr;
+  settings::Table table;
+  std::string fingerprint;  ///< equal for sources that need not be opened anew on a reload
+  bool is_as_before = false;
+  Result<std::unique_ptr<drivers::Source>> opened = Error{};
+};
+
+struct Config {
+  DaemonKeys keys;
+  std::vector<ConfiguredSource> sources;
+  std::filesystem::path recording_folder;  ///< absolute, or empty
+};
+
+/// Reads a configuration and opens its sources, except those whose fingerprint is in `running`. A
+/// camera that is not there is no error: it is tried again while the daemon runs. Error: everything
+/// that is wrong in the file, with file and line.
+Result<Config> loadConfig(const std::filesystem::path& file, std::span<const drivers::Driver> drivers,
+                          const std::vector<std::string>& running = {});
+/// From text, for tests; `name` stands for the file.
+Result<Config> parseConfig(std::string_view toml, const std::filesystem::path& name,
+                           std::span<const drivers::Driver> drivers,
+                           const std::vector<std::string>& running = {});
+
+/// Whether the daemon may listen there: a non-loopback address needs `allow_remote`.
+Result<> checkListen(const ListenKeys& listen);
+
+/// All keys as Markdown: the daemon's, those of a source, those of each driver.
+std::string documentConfig(std::span<const drivers::Driver> drivers);
+
+}  // namespace toftwin::daemon

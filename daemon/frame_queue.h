@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <variant>
+
+#include <toftwin/frame.h>
+#include <toftwin/result.h>
+
+#include "daemon/clock.h"
+#include "protocol/wire/codec.h"
+#include "protocol/wire/messages.h"
+
+namespace toftwin::daemon {
+
+/// A frame as a selection wants it, with its body encoded.
+struct PreparedFrame {
+  Frame frame;
+  wire::Body body;
+};
+/// Shared by the queues and socket writes of all subscriptions with that selection; nobody changes it.
+using PreparedFramePtr = std::shared_ptr<const PreparedFrame>;
+
+/// Between the thread of a source and one subscriber: holds what the subscriber has not taken yet,
+/// by its policy. The source's side never waits.
+class FrameQueue {
+ public:
+  struct Settings {
+    wire::Policy policy = wire::Policy::Latest;
+    std::size_t depth = 1;           ///< for Policy::Queue
+    double max_rate_hz = 0.0;        ///< 0: every frame
+    std::uint64_t byte_limit = 0;    ///< for Policy::Lossless: ends with Overrun rather than hold more
+  };
+  /// A frame to send, with the number of frames dropped since the one before.
+  struct Delivery {
+    PreparedFramePtr frame;
+    std::uint64_t dropped_before = 0;
+  };
+  using Item = std::variant<Delivery, Error>;
+
+  /// `wake` is called, on the source's thread, when there is something to take after there was
+  /// nothing. It must not call back.
+  FrameQueue(Settings settings, std::function<void()> wake);
+
+  /// Whether the subscriber takes the frame that was made now. Asked once for every frame, before it
+  /// is prepared: this is where the rate is limited.
+  bool wants(SteadyTime now);
+  void push(PreparedFramePtr frame);
+  /// No more frames. The reason comes out after the frames that wait.
+  void end(Error reason);
+  [[nodiscard]] bool hasEnded() const;
+
+  /// The next frame, or the reason of the end; once the end came out there is nothing more.
+  std::optional<Item> take();
+
+ private:
+  void dropOldest();
+
+  const Settings settings_;
+  const std::function<void()> wake_;
+  mutable std::mutex mutex_;
+  std::deque<PreparedFramePtr> frames_;
+  std::uint64_t bytes_ = 0;
+  std::uint64_t dropped_ = 0;
+  std::optional<SteadyTime> due_;
+  std::optional<Error> end_;
+  bool end_taken_ = false;
+};
+
+}  // namespace toftwin::daemon

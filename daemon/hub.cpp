@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/hub.h"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+namespace toftwin::daemon {
+
+Hub::~Hub() {
+  // Recordings are closed before their sources go.
+  for (const auto& [name, source] : sources_) source->requestStop();
+  recorders_.clear();
+  sources_.clear();
+}
+
+void Hub::setOptions(Options options) {
+  const std::scoped_lock lock{mutex_};
+  options_ = std::move(options);
+}
+
+Hub::Options Hub::options() const {
+  const std::scoped_lock lock{mutex_};
+  return options_;
+}
+
+void Hub::add(std::shared_ptr<SourceHost> source) {
+  const std::scoped_lock lock{mutex_};
+  const std::string name = source->name();
+  sources_.insert_or_assign(name, std::move(source));
+}
+
+std::vector<std::shared_ptr<void>> Hub::remove(const std::string& name) {
+  std::vector<std::shared_ptr<void>> gone;
+  const std::scoped_lock lock{mutex_};
+  if (auto recorder = recorders_.extract(name)) {
+    recorder.mapped()->stop([](const Result<std::filesystem::path>&) {});
+    gone.push_back(std::move(recorder.mapped()));
+  }
+  if (auto source = sources_.extract(name)) {
+    source.mapped()->requestStop();
+    gone.push_back(std::move(source.mapped()));
+  }
+  return gone;
+}
+
+Result<std::shared_ptr<SourceHost>> Hub::find(const std::string& name) const {
+  const std::scoped_lock lock{mutex_};
+  if (auto found = sources_.find(name); found != sources_.end()) return found->second;
+  std::string known;
+  for (const auto& [other, source] : sources_) known += (known.empty() ? "" : ", ") + other;
+  return Error{Error::Code::NotFound, fmt::format("there is no source \"{}\"; there are: {}", name,
+                                                  known.empty() ? "none" : known)};
+}
+
+std::vector<std::shared_ptr<SourceHost>> Hub::sources() const {
+  const std::scoped_lock lock{mutex_};
+  std::vector<std::shared_ptr<SourceHost>> all;
+  for (const auto& [name, source] : sources_) all.push_back(source);
+  return all;
+}
+
+wire::Health Hub::health() const {
+  wire::Health health;
+  health.uptime = std::chrono::duration<double>{clock_.steady() - began_}.count() * second;
+  health.sessions = sessions;
+  const std::scoped_lock lock{mutex_};
+  for (const auto& [name, source] : sources_) {
+    health.sources.push_back(source->health());
+    const auto recorder = recorders_.find(name);
+    if (recorder == recorders_.end()) continue;
+    if (std::string problem = recorder->second->problem(); !problem.empty()) {
+      health.sources.back().last_error = "recording: " + problem;
+    }
+  }
+  return health;
+}
+
+void Hub::startRecording(const std::string& source, std::string_view file, RecordDone done) {
+  auto host = find(source);
+  if (!host) return done(host.error());
+  const Options now = options();
+  auto path = recordingPath(now.recording_folder, file);
+  if (!path) return done(path.error());
+  std::shared_ptr<Recorder> before;  // destroyed without the lock
+  {
+    const std::scoped_lock lock{mutex_};
+    auto& recorder = recorders_[source];
+    if (!recorder || recorder->isFinished()) {
+      before = std::exchange(
+          recorder, std::make_shared<Recorder>(*host, *path, now.lossless_bytes,
+                                               [done](const Result<std::filesystem::path>& opened) {
+                                                 if (opened) return done(opened->string());
+                                                 done(opened.error());
+                                               }));
+      return;
+    }
+  }
+  done(Error{Error::Code::Busy,
+             fmt::format("the source \"{}\" is being recorded already; stop that first", source)});
+}
+
+void Hub::stopRecording(const std::string& source, RecordDone done) {
+  auto host = find(source);
+  if (!host) return done(host.error());
+  std::shared_ptr<Recorder> recorder;
+  {
+    const std::scoped_lock lock{mutex_};
+    if (auto found = recorders_.find(source); found != recorders_.end()) recorder = found->second;
+  }
+  if (!recorder) {
+    return done(Error{Error::Code::NotFound, fmt::format("the source \"{}\" is not being recorded", source)});
+  }
+  recorder->stop([done](const Result<std::filesystem::path>& closed) {
+    if (closed) return done(closed->string());
+    done(closed.error());
+  });
+}
+
+}  // namespace toftwin::daemon

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "daemon/clock.h"
+#include "daemon/recorder.h"
+#include "daemon/source_host.h"
+#include "protocol/wire/messages.h"
+
+namespace toftwin::daemon {
+
+/// All sources of the daemon and their recordings: what sessions ask. All members may be called from
+/// any thread.
+class Hub {
+ public:
+  struct Options {
+    std::filesystem::path recording_folder;  ///< empty: no recording
+    std::uint64_t lossless_bytes = 256ull << 20;
+  };
+  using RecordDone = std::function<void(Result<std::string>)>;
+
+  Hub(Options options, const Clock& clock) : clock_(clock), options_(std::move(options)), began_(clock.steady()) {}
+  ~Hub();
+  Hub(const Hub&) = delete;
+  Hub& operator=(const Hub&) = delete;
+
+  void setOptions(Options options);
+  [[nodiscard]] Options options() const;
+  void add(std::shared_ptr<SourceHost> source);
+  /// Takes the source (and its recording) out and stops it; it is gone when the result is destroyed.
+  std::vector<std::shared_ptr<void>> remove(const std::string& name);
+
+  /// Error NotFound naming the sources that there are.
+  [[nodiscard]] Result<std::shared_ptr<SourceHost>> find(const std::string& name) const;
+  [[nodiscard]] std::vector<std::shared_ptr<SourceHost>> sources() const;
+  [[nodiscard]] wire::Health health() const;
+
+  /// `done` gets the path of the file; it may be called on another thread.
+  void startRecording(const std::string& source, std::string_view file, RecordDone done);
+  void stopRecording(const std::string& source, RecordDone done);
+
+  std::atomic<std::uint32_t> sessions{0};  ///< for health; counted by the sessions themselves
+
+ private:
+  const Clock& clock_;
+  mutable std::mutex mutex_;
+  Options options_;
+  const SteadyTime began_;
+  std::map<std::string, std::shared_ptr<SourceHost>> sources_;   // shared with calls in progress
+  std::map<std::string, std::shared_ptr<Recorder>> recorders_;   // shared with calls in progress
+};
+
+}  // namespace toftwin::daemon

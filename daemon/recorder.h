@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <condition_variable>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <thread>
+
+#include <toftwin/result.h>
+
+#include "daemon/source_host.h"
+#include "protocol/record/recording.h"
+
+namespace toftwin::daemon {
+
+/// The path of a recording in the folder. Error: the name is not a bare file name, or is taken.
+Result<std::filesystem::path> recordingPath(const std::filesystem::path& folder, std::string_view name);
+
+/// Writes every frame of a source into a file, on a thread of its own. A disk that is slower than the
+/// source ends the recording with Overrun, a full one with StorageFull; what was written before stays.
+class Recorder {
+ public:
+  /// Gets the file's path, or why it could not be opened or finished.
+  using Done = std::function<void(Result<std::filesystem::path>)>;
+
+  /// Starts; `opened` is called once on the recorder's thread.
+  Recorder(std::shared_ptr<SourceHost> source, std::filesystem::path file, std::uint64_t byte_limit,
+           Done opened);
+  /// Stops and waits until the file is closed.
+  ~Recorder();
+  Recorder(const Recorder&) = delete;
+  Recorder& operator=(const Recorder&) = delete;
+
+  /// Writes what waits, closes the file and then calls `closed`, on the recorder's thread, or at once
+  /// if the recording has ended already.
+  void stop(Done closed);
+  [[nodiscard]] bool isFinished() const;
+  /// What went wrong, or empty.
+  [[nodiscard]] std::string problem() const;
+
+ private:
+  void run(const Done& opened);
+  Result<> writeAll(record::Writer& writer, const SubscriberPtr& subscriber);
+  void finish(Result<> outcome);
+
+  const std::shared_ptr<SourceHost> source_;  // shared with the hub and sessions
+  const std::filesystem::path file_;
+  const std::uint64_t byte_limit_;
+
+  mutable std::mutex mutex_;  // guards all below
+  std::condition_variable work_;
+  bool has_items_ = false;
+  bool is_stopping_ = false;
+  std::optional<Result<std::filesystem::path>> outcome_;
+  Done closed_;
+
+  std::jthread thread_;  // last: it uses all of the above
+};
+
+}  // namespace toftwin::daemon

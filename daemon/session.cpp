@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/session.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <utility>
+
+namespace toftwin::daemon {
+namespace {
+
+constexpr std::uint32_t kDeepestQueue = 1024;
+
+wire::Message failure(std::uint64_t id, Error error) { return wire::Failure{id, std::move(error)}; }
+
+/// How a queue serves the policy asked for, or why that policy makes no sense.
+Result<FrameQueue::Settings> queueFor(const wire::Subscribe& request, std::uint64_t lossless_bytes) {
+  const auto invalid = [](std::string why) { return Error{Error::Code::InvalidArgument, std::move(why)}; };
+  if (!std::isfinite(request.max_rate_hz) || request.max_rate_hz < 0.0 ||
+      (request.max_rate_hz > 0.0 && request.max_rate_hz < 1e-3)) {
+    return invalid("max_rate_hz must be 0 (every frame) or at least 0.001");
+  }
+  if (request.policy == wire::Policy::Lockstep && request.max_rate_hz > 0.0) {
+    return invalid("a lockstep subscriber says itself when the next frame is made: max_rate_hz must be 0");
+  }
+  if (request.policy == wire::Policy::Queue && (request.queue < 1 || request.queue > kDeepestQueue)) {
+    return invalid(fmt::format("queue = {} is out of bounds: it must be 1 to {}", request.queue,
+                               kDeepestQueue));
+  }
+  return FrameQueue::Settings{.policy = request.policy,
+                              .depth = request.queue,
+                              .max_rate_hz = request.max_rate_hz,
+                              .byte_limit = lossless_bytes};
+}
+
+}  // namespace
+
+void Outbox::put(wire::Message message) {
+  {
+    const std::scoped_lock lock{mutex_};
+    messages_.push_back(std::move(message));
+  }
+  wake_();
+}
+
+std::optional<wire::Message> Outbox::take() {
+  const std::scoped_lock lock{mutex_};
+  if (messages_.empty()) return std::nullopt;
+  wire::Message message = std::move(messages_.front());
+  messages_.pop_front();
+  return message;
+}
+
+Session::Session(Hub& hub, Options options, std::function<void()> wake)
+    : hub_(hub),
+      options_(std::move(options)),
+      wake_(std::move(wake)),
+      outbox_(std::make_shared<Outbox>(wake_)) {
+  ++hub_.sessions;
+}
+
+Session::~Session() {
+  for (const auto& [id, subscription] : subscriptions_) {
+    subscription.source->unsubscribe(subscription.subscriber);
+  }
+  --hub_.sessions;
+}
+
+std::vector<wire::Message> Session::handle(const wire::Message& message) {
+  if (is_over_) return {};
+  if (!client_ && !std::holds_alternative<wire::Hello>(message)) {
+    return breakOff(0, Error::Code::Malformed, "the first message must be Hello");
+  }
+  return std::visit([this](const auto& request) { return on(request); }, message);
+}
+
+std::optional<Session::Outgoing> Session::next() {
+  if (auto answer = outbox_->take()) return *std::move(answer);
+  // Round robin: the search begins behind the subscription that was served last.
+  const auto first = subscriptions_.upper_bound(last_served_);
+  for (auto at = first; at != subscriptions_.end(); ++at) {
+    if (auto item = nextOf(at)) return item;
+  }
+  for (auto at = subscriptions_.begin(); at != first; ++at) {
+    if (auto item = nextOf(at)) return item;
+  }
+  return std::nullopt;
+}
+
+std::optional<Session::Outgoing> Session::nextOf(std::map<std::uint64_t, Subscription>::iterator at) {
+  auto item = at->second.subscriber->queue.take();
+  if (!item) return std::nullopt;
+  const std::uint64_t id = at->first;
+  if (auto* delivery = std::get_if<FrameQueue::Delivery>(&*item)) {
+    last_served_ = id;
+    return FrameOut{id, std::move(*delivery)};
+  }
+  at->second.source->unsubscribe(at->second.subscriber);
+  subscriptions_.erase(at);
+  return wire::Message{wire::SubscriptionEnded{id, std::get<Error>(std::move(*item))}};
+}
+
+Session::Answers Session::breakOff(std::uint64_t id, Error::Code code, std::string why) {
+  is_over_ = true;
+  return {failure(id, {code, std::move(why)})};
+}
+
+Session::Answers Session::on(const wire::Hello& hello) {
+  if (client_) return breakOff(0, Error::Code::Malformed, "a second Hello");
+  client_ = hello;
+  return {wire::Hello{hello.id, "toftwind " TOFTWIN_VERSION, options_.features}};
+}
+
+Session::Answers Session::on(const wire::ListSources& request) {
+  wire::SourceList list{request.id, {}};
+  for (const auto& source : hub_.sources()) list.sources.push_back(source->summary());
+  return {std::move(list)};
+}
+
+Session::Answers Session::on(const wire::DescribeSource& request) {
+  auto source = hub_.find(request.source);
+  if (!source) return {failure(request.id, source.error())};
+  auto description = (*source)->describe();
+  if (!description) return {failure(request.id, description.error())};
+  description->id = request.id;
+  return {*std::move(description)};
+}
+
+Session::Answers Session::on(const wire::Subscribe& request) {
+  if (subscriptions_.size() >= options_.subscriptions) {
+    return {failure(request.id, {Error::Code::Busy,
+                                 fmt::format("this connection has {} subscriptions already, the most that "
+                                             "limits.subscriptions_per_session allows",
+                                             subscriptions_.size())})};
+  }
+  auto source = hub_.find(request.source);
+  if (!source) return {failure(request.id, source.error())};
+  auto queue = queueFor(request, hub_.options().lossless_bytes);
+  if (!queue) return {failure(request.id, queue.error())};
+  const Wish wish{{request.planes, request.region, request.decimation}, *queue};
+  auto subscriber = (*source)->subscribe(wish, wake_);
+  if (!subscriber) return {failure(request.id, subscriber.error())};
+  const std::uint64_t id = ++last_subscription_;
+  subscriptions_.emplace(id, Subscription{*std::move(source), *std::move(subscriber)});
+  return {wire::Subscribed{request.id, id}};
+}
+
+Session::Answers Session::on(const wire::Unsubscribe& request) {
+  const auto found = subscriptions_.find(request.subscription);
+  if (found == subscriptions_.end()) {
+    return {failure(request.id, {Error::Code::NotFound,
+                                 fmt::format("there is no subscription {}", request.subscription)})};
+  }
+  found->second.source->unsubscribe(found->second.subscriber);
+  subscriptions_.erase(found);
+  return {wire::Done{request.id, {}}};
+}
+
+Session::Answers Session::on(const wire::Acknowledge& request) {
+  // One that is unknown has just ended, which the client learns at the same time.
+  const auto found = subscriptions_.find(request.subscription);
+  if (found != subscriptions_.end()) {
+    found->second.source->acknowledge(found->second.subscriber, request.sequence);
+  }
+  return {};
+}
+
+Session::Answers Session::on(const wire::SetPose& request) {
+  return command(request.id, request.source, [pose = request.world_from_camera](drivers::Source& source) {
+    return source.setPose(pose);
+  });
+}
+
+Session::Answers Session::on(const wire::SetParameter& request) {
+  return command(request.id, request.source,
+                 [name = request.name, value = request.value](drivers::Source& source) {
+                   return source.setParameter(name, value);
+                 });
+}
+
+Session::Answers Session::on(const wire::Trigger& request) {
+  return command(request.id, request.source, [](drivers::Source& source) { return source.trigger(); });
+}
+
+Session::Answers Session::command(std::uint64_t id, const std::string& name, SourceHost::Command command) {
+  auto source = hub_.find(name);
+  if (!source) return {failure(id, source.error())};
+  (*source)->post(std::move(command), [id, outbox = outbox_](const Result<>& result) {
+    outbox->put(result ? wire::Message{wire::Done{id, {}}} : failure(id, result.error()));
+  });
+  return {};
+}
+
+Session::Answers Session::on(const wire::Record& request) {
+  const auto done = [id = request.id, outbox = outbox_](const Result<std::string>& result) {
+    outbox->put(result ? wire::Message{wire::Done{id, *result}} : failure(id, result.error()));
+  };
+  if (request.file.empty()) {
+    hub_.stopRecording(request.source, done);
+  } else {
+    hub_.startRecording(request.source, request.file, done);
+  }
+  return {};
+}
+
+Session::Answers Session::on(const wire::AskHealth& request) {
+  wire::Health health = hub_.health();
+  health.id = request.id;
+  return {std::move(health)};
+}
+
+/// Everything else is what a daemon says, not what a client may say.
+template <class Answer>
+Session::Answers Session::on(const Answer&) {
+  return breakOff(0, Error::Code::Malformed, "a client does not send this kind of message");
+}
+
+}  // namespace toftwin::daemon

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "daemon/hub.h"
+#include "protocol/wire/messages.h"
+
+namespace toftwin::daemon {
+
+/// Answers that come later, from the threads of sources and recorders. Shared by the session and by
+/// those who still owe it an answer, since they may outlive it.
+class Outbox {
+ public:
+  explicit Outbox(std::function<void()> wake) : wake_(std::move(wake)) {}
+  void put(wire::Message message);
+  std::optional<wire::Message> take();
+
+ private:
+  const std::function<void()> wake_;
+  std::mutex mutex_;
+  std::deque<wire::Message> messages_;
+};
+
+/// One client's conversation: messages in, messages out. No socket; used by one thread at a time.
+class Session {
+ public:
+  struct Options {
+    std::size_t subscriptions = 16;  ///< at once
+    std::vector<std::string> features;
+  };
+  /// A frame for one subscription, to be encoded around the shared body.
+  struct FrameOut {
+    std::uint64_t subscription = 0;
+    FrameQueue::Delivery delivery;
+  };
+  using Outgoing = std::variant<wire::Message, FrameOut>;
+
+  /// `wake` is called, on any thread, when `next` has something to give after it had nothing.
+  Session(Hub& hub, Options options, std::function<void()> wake);
+  ~Session();
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
+
+  /// What is to be sent at once. Other answers, and frames, come from `next`.
+  std::vector<wire::Message> handle(const wire::Message& message);
+  /// Takes the next thing to send: late answers first, then frames, one subscription after the other.
+  std::optional<Outgoing> next();
+  /// The client has introduced itself.
+  [[nodiscard]] bool isOpen() const { return client_.has_value(); }
+  /// The client broke the protocol: send what `handle` gave and close.
+  [[nodiscard]] bool isOver() const { return is_over_; }
+  /// The client's Hello.
+  [[nodiscard]] const std::optional<wire::Hello>& client() const { return client_; }
+
+ private:
+  using Answers = std::vector<wire::Message>;
+  struct Subscription {
+    std::shared_ptr<SourceHost> source;  // shared with the hub
+    SubscriberPtr subscriber;
+  };
+
+  Answers on(const wire::Hello& hello);
+  Answers on(const wire::ListSources& request);
+  Answers on(const wire::DescribeSource& request);
+  Answers on(const wire::Subscribe& request);
+  Answers on(const wire::Unsubscribe& request);
+  Answers on(const wire::Acknowledge& request);
+  Answers on(const wire::SetPose& request);
+  Answers on(const wire::SetParameter& request);
+  Answers on(const wire::Trigger& request);
+  Answers on(const wire::Record& request);
+  Answers on(const wire::AskHealth& request);
+  template <class Answer>
+  Answers on(const Answer& answer);
+  Answers breakOff(std::uint64_t id, Error::Code code, std::string why);
+  Answers command(std::uint64_t id, const std::string& source, SourceHost::Command command);
+  std::optional<Outgoing> nextOf(std::map<std::uint64_t, Subscription>::iterator at);
+
+  Hub& hub_;
+  const Options options_;
+  const std::function<void()> wake_;
+  const std::shared_ptr<Outbox> outbox_;
+  std::optional<wire::Hello> client_;
+  bool is_over_ = false;
+  std::map<std::uint64_t, Subscription> subscriptions_;
+  std::uint64_t last_subscription_ = 0;
+  std::uint64_t last_served_ = 0;
+};
+
+}  // namespace toftwin::daemon

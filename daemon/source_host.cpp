@@ -1,0 +1,397 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/source_host.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <exception>
+#include <utility>
+
+namespace toftwin::daemon {
+namespace {
+
+constexpr std::size_t kMostCommands = 256;
+
+std::int64_t nanosecondsOf(SteadyTime time) {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(time.time_since_epoch()).count();
+}
+
+}  // namespace
+
+/// A call of the driver: timed for the watchdog, and no exception leaves it.
+template <class Call>
+auto SourceHost::inDriver(Call call) -> decltype(call()) {
+  in_driver_since_ = nanosecondsOf(clock_.steady());
+  struct Leave {
+    std::atomic<std::int64_t>& since;
+    ~Leave() { since = 0; }
+  } leave{in_driver_since_};
+  try {
+    return call();
+  } catch (const std::exception& e) {
+    return Error{Error::Code::Internal, fmt::format("the driver threw: {}", e.what())};
+  }
+}
+
+SourceHost::SourceHost(std::string name, Open open, Result<std::unique_ptr<drivers::Source>> opened,
+                       Options options, const Clock& clock)
+    : name_(std::move(name)),
+      open_(std::move(open)),
+      options_(options),
+      clock_(clock),
+      retry_after_(options.first_retry) {
+  adopt(std::move(opened));
+  thread_ = std::jthread{[this](const std::stop_token& stop) { run(stop); }};
+}
+
+SourceHost::~SourceHost() {
+  requestStop();
+  thread_.join();
+}
+
+void SourceHost::requestStop() {
+  {
+    const std::scoped_lock lock{mutex_};
+    is_stopping_ = true;
+  }
+  thread_.request_stop();
+}
+
+// ---- asked from other threads ------------------------------------------------------------------
+
+wire::SourceSummary SourceHost::summary() const {
+  const std::scoped_lock lock{mutex_};
+  wire::SourceSummary summary;
+  summary.name = name_;
+  if (info_) {
+    summary.model = info_->model;
+    summary.serial = info_->serial;
+    summary.kind = info_->kind;
+  }
+  summary.streaming = is_streaming_;
+  return summary;
+}
+
+Result<wire::SourceDescription> SourceHost::describe() const {
+  wire::SourceDescription description;
+  description.summary = summary();
+  const std::scoped_lock lock{mutex_};
+  if (!info_) {
+    return Error{Error::Code::Disconnected,
+                 fmt::format("the source \"{}\" is not there: {}; the daemon keeps trying", name_,
+                             last_error_)};
+  }
+  description.driver = info_->driver;
+  description.camera = info_->camera;
+  description.planes = info_->planes;
+  description.frame_interval = info_->frame_interval;
+  description.can_set_pose = info_->can_set_pose;
+  description.can_trigger = info_->can_trigger;
+  description.can_lockstep = info_->can_lockstep;
+  description.parameters = info_->parameters;
+  return description;
+}
+
+wire::SourceHealth SourceHost::health() const {
+  const std::scoped_lock lock{mutex_};
+  return {.name = name_,
+          .streaming = is_streaming_,
+          .frames = frames_,
+          .dropped_by_device = dropped_by_device_,
+          .subscribers = static_cast<std::uint32_t>(subscribers_.size()),
+          .reconnects = reconnects_,
+          .last_error = last_error_};
+}
+
+std::chrono::nanoseconds SourceHost::inDriverFor(SteadyTime now) const {
+  const std::int64_t since = in_driver_since_;
+  return std::chrono::nanoseconds{since == 0 ? 0 : nanosecondsOf(now) - since};
+}
+
+Result<SubscriberPtr> SourceHost::subscribe(Wish wish, std::function<void()> wake) {
+  const auto description = describe();
+  if (!description) return description.error();
+  if (auto fits = checkSelection(wish.selection, description->camera, description->planes); !fits) {
+    return fits.error();
+  }
+  if (wish.queue.policy == wire::Policy::Lockstep && !description->can_lockstep) {
+    return Error{Error::Code::Unsupported,
+                 fmt::format("the source \"{}\" makes frames in its own time; lockstep is for simulators "
+                             "and recordings",
+                             name_)};
+  }
+  auto subscriber = std::make_shared<Subscriber>(std::move(wish), std::move(wake));
+  {
+    const std::scoped_lock lock{mutex_};
+    if (is_stopping_) return Error{Error::Code::Stopped, "the source is being stopped"};
+    subscribers_.push_back(subscriber);
+    has_ended_ = false;
+  }
+  changed();
+  return subscriber;
+}
+
+void SourceHost::unsubscribe(const SubscriberPtr& subscriber) {
+  {
+    const std::scoped_lock lock{mutex_};
+    std::erase(subscribers_, subscriber);
+  }
+  changed();
+}
+
+void SourceHost::acknowledge(const SubscriberPtr& subscriber, std::uint64_t sequence) {
+  {
+    const std::scoped_lock lock{mutex_};
+    if (!subscriber->unacknowledged || sequence < *subscriber->unacknowledged) return;
+    subscriber->unacknowledged.reset();
+  }
+  work_.notify_all();
+}
+
+void SourceHost::post(Command command, Done done) {
+  std::optional<Error> refused;
+  {
+    const std::scoped_lock lock{mutex_};
+    if (is_stopping_) {
+      refused = Error{Error::Code::Stopped, "the source is being stopped"};
+    } else if (commands_.size() >= kMostCommands) {
+      refused = Error{Error::Code::Busy,
+                      fmt::format("{} commands wait for the source \"{}\" already", kMostCommands, name_)};
+    } else {
+      commands_.push_back({std::move(command), std::move(done)});
+    }
+  }
+  if (refused) return done(*refused);
+  changed();
+}
+
+/// Something changed that the thread must look at. A source that may wait for a trigger for ever is
+/// interrupted; any other comes back by itself within a frame or a second.
+void SourceHost::changed() {
+  std::stop_source interrupt{std::nostopstate};
+  {
+    const std::scoped_lock lock{mutex_};
+    if (info_ && info_->can_trigger) interrupt = interrupt_;
+  }
+  interrupt.request_stop();
+  work_.notify_all();
+}
+
+// ---- the thread --------------------------------------------------------------------------------
+
+void SourceHost::run(const std::stop_token& stop) {
+  const std::stop_callback on_stop{stop, [this] {
+    std::stop_source interrupt{std::nostopstate};
+    {
+      const std::scoped_lock lock{mutex_};
+      interrupt = interrupt_;
+    }
+    interrupt.request_stop();
+  }};
+  while (!stop.stop_requested()) {
+    runCommands();
+    if (!source_ && !reopen(stop)) continue;
+    std::unique_lock lock{mutex_};
+    if (mayMakeFrame()) {
+      lock.unlock();
+      if (is_started_ || startSource()) makeFrame(stop);
+    } else if (is_started_ && !isWanted()) {
+      lock.unlock();
+      stopSource();
+    } else {
+      work_.wait(lock, stop, [this] {
+        return !commands_.empty() || mayMakeFrame() || (is_started_ && !isWanted());
+      });
+    }
+  }
+  if (source_) stopSource();
+  source_.reset();
+  runCommands();
+  endAll({Error::Code::Stopped, fmt::format("the daemon closed the source \"{}\"", name_)});
+}
+
+bool SourceHost::isWanted() const {
+  return !has_ended_ && (options_.always || !subscribers_.empty());
+}
+
+bool SourceHost::hasLockstep() const {
+  return std::ranges::any_of(subscribers_, [](const SubscriberPtr& subscriber) {
+    return subscriber->wish.queue.policy == wire::Policy::Lockstep;
+  });
+}
+
+bool SourceHost::mayMakeFrame() const {
+  return isWanted() && std::ranges::none_of(subscribers_, [](const SubscriberPtr& subscriber) {
+    return subscriber->unacknowledged.has_value();
+  });
+}
+
+void SourceHost::runCommands() {
+  while (true) {
+    Waiting next;
+    {
+      const std::scoped_lock lock{mutex_};
+      if (commands_.empty()) return;
+      next = std::move(commands_.front());
+      commands_.pop_front();
+    }
+    if (source_) {
+      next.done(inDriver([&] { return next.command(*source_); }));
+    } else {
+      next.done(Error{Error::Code::Disconnected,
+                      fmt::format("the source \"{}\" is not there at present", name_)});
+    }
+  }
+}
+
+/// Takes an opened source over, or notes why it could not be opened and when to try again.
+void SourceHost::adopt(Result<std::unique_ptr<drivers::Source>> opened) {
+  if (!opened) {
+    noteError(opened.error());
+    return retryLater();
+  }
+  source_ = *std::move(opened);
+  const std::scoped_lock lock{mutex_};
+  info_ = source_->info();
+}
+
+/// Opens the source again when it is time to; else waits for that, for a command, or for the stop.
+bool SourceHost::reopen(const std::stop_token& stop) {
+  const SteadyTime now = clock_.steady();
+  if (now < retry_at_) {
+    std::unique_lock lock{mutex_};
+    work_.wait_for(lock, stop, retry_at_ - now, [this] { return !commands_.empty(); });
+    return false;
+  }
+  adopt(inDriver(open_));
+  if (source_) spdlog::info("{}: opened", name_);
+  return source_ != nullptr;
+}
+
+bool SourceHost::startSource() {
+  const Result<> started = inDriver([this] { return source_->start(); });
+  if (!started) {
+    onError(started.error());
+    return false;
+  }
+  is_started_ = true;
+  const std::scoped_lock lock{mutex_};
+  is_streaming_ = true;
+  return true;
+}
+
+void SourceHost::stopSource() {
+  if (is_started_) {
+    const Result<> stopped = inDriver([this]() -> Result<> { return source_->stop(), Result<>{}; });
+    if (!stopped) noteError(stopped.error());
+  }
+  is_started_ = false;
+  const std::scoped_lock lock{mutex_};
+  is_streaming_ = false;
+}
+
+void SourceHost::makeFrame(const std::stop_token& stop) {
+  std::stop_token interrupt;
+  bool lockstep = false;
+  {
+    const std::scoped_lock lock{mutex_};
+    if (!commands_.empty() || stop.stop_requested()) return;
+    if (interrupt_.stop_requested()) interrupt_ = std::stop_source{};
+    interrupt = interrupt_.get_token();
+    lockstep = hasLockstep();
+  }
+  Result<Frame> frame = inDriver([&] { return source_->next(interrupt, lockstep); });
+  if (frame) {
+    publish(*std::move(frame));
+  } else {
+    onError(frame.error());
+  }
+}
+
+void SourceHost::publish(Frame frame) {
+  retry_after_ = options_.first_retry;
+  if (frame.provenance.kind != FrameKind::Replayed) frame.moment.received = clock_.wall();
+  frame.source = name_;
+  frame.dropped_before = 0;
+  const SteadyTime now = clock_.steady();
+  std::vector<SubscriberPtr> takers;
+  {
+    const std::scoped_lock lock{mutex_};
+    frame.sequence = frames_++;
+    dropped_by_device_ += frame.dropped_by_device;
+    std::erase_if(subscribers_, [](const SubscriberPtr& one) { return one->queue.hasEnded(); });
+    for (const SubscriberPtr& subscriber : subscribers_) {
+      if (!subscriber->queue.wants(now)) continue;
+      if (subscriber->wish.queue.policy == wire::Policy::Lockstep) {
+        subscriber->unacknowledged = frame.sequence;
+      }
+      takers.push_back(subscriber);
+    }
+  }
+  deliver(frame, takers);
+}
+
+/// Prepares the frame once per distinct selection and hands it to everyone who wants that.
+void SourceHost::deliver(const Frame& frame, const std::vector<SubscriberPtr>& takers) const {
+  std::vector<std::pair<const Selection*, Result<PreparedFramePtr>>> prepared;
+  for (const SubscriberPtr& taker : takers) {
+    const Selection& wanted = taker->wish.selection;
+    auto found = std::ranges::find_if(prepared, [&](const auto& p) { return *p.first == wanted; });
+    if (found == prepared.end()) {
+      Result<Frame> selected = select(frame, wanted);
+      Result<PreparedFramePtr> ready = selected ? Error{} : selected.error();
+      if (selected) {
+        wire::Body body = wire::encodeBody(selected->planes);
+        ready = PreparedFramePtr{
+            std::make_shared<PreparedFrame>(PreparedFrame{*std::move(selected), std::move(body)})};
+      }
+      found = prepared.insert(prepared.end(), {&wanted, std::move(ready)});
+    }
+    if (found->second) {
+      taker->queue.push(*found->second);
+    } else {
+      taker->queue.end(found->second.error());
+    }
+  }
+}
+
+void SourceHost::onError(const Error& error) {
+  using Code = Error::Code;
+  if (error.code == Code::Stopped || error.code == Code::Timeout) return;
+  if (error.code == Code::EndOfStream) {
+    spdlog::info("{}: {}", name_, error.message);
+    stopSource();
+    return endAll(error);
+  }
+  // Whatever else it is, opening the camera anew is the best that can be done; subscribers stay.
+  stopSource();
+  source_.reset();
+  retryLater();
+  noteError(error);
+  const std::scoped_lock lock{mutex_};
+  ++reconnects_;
+}
+
+void SourceHost::retryLater() {
+  retry_at_ = clock_.steady() + retry_after_;
+  retry_after_ = std::min(2 * retry_after_, options_.longest_retry);
+}
+
+void SourceHost::endAll(const Error& reason) {
+  std::vector<SubscriberPtr> ended;
+  {
+    const std::scoped_lock lock{mutex_};
+    ended.swap(subscribers_);
+    has_ended_ = true;
+  }
+  for (const SubscriberPtr& subscriber : ended) subscriber->queue.end(reason);
+}
+
+void SourceHost::noteError(const Error& error) {
+  spdlog::warn("{}: {}", name_, error.message);
+  const std::scoped_lock lock{mutex_};
+  last_error_ = error.message;
+}
+
+}  // namespace toftwin::daemon

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "daemon/clock.h"
+#include "daemon/frame_queue.h"
+#include "daemon/selection.h"
+#include "drivers/source.h"
+#include "protocol/wire/messages.h"
+
+namespace toftwin::daemon {
+
+/// What one subscriber wants of a source.
+struct Wish {
+  Selection selection;
+  FrameQueue::Settings queue;
+};
+
+/// One subscriber of a source.
+struct Subscriber {
+  Subscriber(Wish wanted, std::function<void()> wake)
+      : wish(std::move(wanted)), queue(wish.queue, std::move(wake)) {}
+  const Wish wish;
+  FrameQueue queue;
+  std::optional<std::uint64_t> unacknowledged;  ///< lockstep; guarded by the host
+};
+/// Shared by the source's host, which fills the queue, and the session or recorder that empties it.
+using SubscriberPtr = std::shared_ptr<Subscriber>;
+
+/// A source and the thread that owns it: opens it again when it is lost, makes frames while somebody
+/// wants them, numbers them and hands them to the subscribers. All members may be called from any
+/// thread; none waits for the source.
+class SourceHost {
+ public:
+  struct Options {
+    bool always = false;  ///< makes frames even if nobody subscribes
+    std::chrono::milliseconds first_retry{500};
+    std::chrono::milliseconds longest_retry{10'000};
+  };
+  using Open = std::function<Result<std::unique_ptr<drivers::Source>>()>;
+  using Command = std::function<Result<>(drivers::Source&)>;
+  using Done = std::function<void(Result<>)>;
+
+  /// `open` is called on the host's thread whenever the source must be opened (again); `opened` is the
+  /// result of a first call that was already made.
+  SourceHost(std::string name, Open open, Result<std::unique_ptr<drivers::Source>> opened,
+             Options options, const Clock& clock);
+  /// Ends all subscriptions with Stopped and waits for the source to stop.
+  ~SourceHost();
+  SourceHost(const SourceHost&) = delete;
+  SourceHost& operator=(const SourceHost&) = delete;
+
+  [[nodiscard]] const std::string& name() const { return name_; }
+  [[nodiscard]] wire::SourceSummary summary() const;
+  /// Error Disconnected while the source has never been opened.
+  [[nodiscard]] Result<wire::SourceDescription> describe() const;
+  [[nodiscard]] wire::SourceHealth health() const;
+  /// How long the source has been in one call of its driver.
+  [[nodiscard]] std::chrono::nanoseconds inDriverFor(SteadyTime now) const;
+
+  Result<SubscriberPtr> subscribe(Wish wish, std::function<void()> wake);
+  void unsubscribe(const SubscriberPtr& subscriber);
+  void acknowledge(const SubscriberPtr& subscriber, std::uint64_t sequence);
+  /// Runs the command between two frames; `done` is called once, on the host's thread (or at once
+  /// with Busy, when too many commands wait).
+  void post(Command command, Done done);
+  /// Asks the thread to end without waiting for it.
+  void requestStop();
+
+ private:
+  struct Waiting {
+    Command command;
+    Done done;
+  };
+
+  void run(const std::stop_token& stop);
+  void runCommands();
+  bool reopen(const std::stop_token& stop);
+  void adopt(Result<std::unique_ptr<drivers::Source>> opened);
+  bool startSource();
+  void stopSource();
+  void makeFrame(const std::stop_token& stop);
+  void publish(Frame frame);
+  void deliver(const Frame& frame, const std::vector<SubscriberPtr>& takers) const;
+  void onError(const Error& error);
+  void retryLater();
+  void endAll(const Error& reason);
+  void noteError(const Error& error);
+  void changed();
+  [[nodiscard]] bool isWanted() const;        // with the lock held
+  [[nodiscard]] bool mayMakeFrame() const;    // with the lock held
+  [[nodiscard]] bool hasLockstep() const;     // with the lock held
+  template <class Call>
+  auto inDriver(Call call) -> decltype(call());
+
+  const std::string name_;
+  const Open open_;
+  const Options options_;
+  const Clock& clock_;
+
+  // Owned by the thread.
+  std::unique_ptr<drivers::Source> source_;
+  bool is_started_ = false;
+  SteadyTime retry_at_{};
+  std::chrono::milliseconds retry_after_;
+
+  mutable std::mutex mutex_;  // guards all below
+  std::condition_variable_any work_;
+  std::stop_source interrupt_;
+  std::deque<Waiting> commands_;
+  std::vector<SubscriberPtr> subscribers_;
+  std::optional<drivers::SourceInfo> info_;  ///< of the source as last opened
+  bool is_streaming_ = false;
+  bool has_ended_ = false;
+  bool is_stopping_ = false;
+  std::uint64_t frames_ = 0;  ///< made so far: the sequence number of the next
+  std::uint64_t dropped_by_device_ = 0;
+  std::uint32_t reconnects_ = 0;
+  std::string last_error_;
+
+  std::atomic<std::int64_t> in_driver_since_{0};  ///< steady clock, ns; 0: not in the driver
+  std::jthread thread_;  // last: it uses all of the above
+};
+
+}  // namespace toftwin::daemon

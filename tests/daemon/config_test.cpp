@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/config.h"
+
+#include <gtest/gtest.h>
+
+#include "daemon/recorder.h"
+#include "drivers/source.h"
+
+namespace toftwin::daemon {
+namespace {
+
+Result<Config> parse(const std::string& toml, const std::vector<std::string>& running = {}) {
+  return parseConfig(toml, "/etc/toftwin/toftwind.toml", drivers::allDrivers(), running);
+}
+std::string errorOf(const std::string& toml) {
+  const auto config = parse(toml);
+  return config ? "no error" : config.error().message;
+}
+#define EXPECT_SAYS(text, part) EXPECT_NE((text).find(part), std::string::npos) << (text)
+
+TEST(Config, OfAnEmptyFileIsTheDefault) {
+  const auto config = parse("");
+  ASSERT_TRUE(config.ok()) << config.error().message;
+  EXPECT_EQ(config->keys.listen.port, 47800);
+  EXPECT_EQ(config->keys.listen.address, "127.0.0.1");
+  EXPECT_TRUE(config->sources.empty());
+}
+
+TEST(Config, OpensItsSources) {
+  const auto config = parse("[[source]]\nname = 'a'\ndriver = 'pattern'\nwidth = 64\n"
+                            "[[source]]\nname = 'b'\ndriver = 'pattern'\nstart = 'always'");
+  ASSERT_TRUE(config.ok()) << config.error().message;
+  ASSERT_EQ(config->sources.size(), 2u);
+  ASSERT_TRUE(config->sources[0].opened.ok());
+  EXPECT_EQ((*config->sources[0].opened)->info().camera.width, 64);
+  EXPECT_EQ(config->sources[1].keys.start, SourceKeys::Start::Always);
+}
+
+TEST(Config, ErrorsNameFileLineKeyBoundAndUnit) {
+  const std::string error = errorOf("[limits]\nhandshake_s = 0\nsesions = 3");
+  EXPECT_SAYS(error, "/etc/toftwin/toftwind.toml:2: handshake_s = 0 s is out of bounds: it must be 0.1 to 3600 s");
+  EXPECT_SAYS(error, "/etc/toftwin/toftwind.toml:3: unknown key \"sesions\"");
+}
+
+TEST(Config, ADriversUnknownKeyIsAnErrorAtItsLine) {
+  EXPECT_SAYS(errorOf("[[source]]\nname = 'a'\ndriver = 'pattern'\ncolour = 3"),
+              "toftwind.toml:4: unknown key \"colour\"");
+}
+
+TEST(Config, AnUnknownDriverIsNamedWithThoseThatThereAre) {
+  const std::string error = errorOf("[[source]]\nname = 'a'\ndriver = 'patern'\nwidth = 3");
+  EXPECT_SAYS(error, "toftwind.toml:3: driver");
+  EXPECT_SAYS(error, "\"patern\" is not in this build; there are: pattern");
+  EXPECT_EQ(error.find("unknown key"), std::string::npos) << error;
+}
+
+TEST(Config, SourcesNeedNamesOfTheirOwn) {
+  EXPECT_SAYS(errorOf("[[source]]\ndriver = 'pattern'"), "toftwind.toml:1");
+  EXPECT_SAYS(errorOf("[[source]]\nname = 'a/b'\ndriver = 'pattern'"), "toftwind.toml:2");
+  EXPECT_SAYS(errorOf("[[source]]\nname = 'a'\ndriver = 'pattern'\n[[source]]\nname = 'a'\ndriver = 'pattern'"),
+              "toftwind.toml:5: name \"a\" is the name of another source already");
+}
+
+TEST(Config, AnAddressOthersReachNeedsTheWordForIt) {
+  EXPECT_SAYS(errorOf("[listen]\naddress = '0.0.0.0'"), "allow_remote = true");
+  EXPECT_SAYS(errorOf("[listen]\naddress = '::'"), "allow_remote = true");
+  EXPECT_EQ(errorOf("[listen]\naddress = '0.0.0.0'\nallow_remote = true"), "no error");
+  EXPECT_EQ(errorOf("[listen]\naddress = '::1'"), "no error");
+}
+
+TEST(Config, ACameraThatIsNotThereIsNoErrorOfTheFile) {
+  const auto config = parse("[[source]]\nname = 'a'\ndriver = 'pattern'\nuri = 'pattern:9'");
+  ASSERT_TRUE(config.ok());
+  ASSERT_FALSE(config->sources[0].opened.ok());
+  EXPECT_SAYS(config->sources[0].opened.error().message, "pattern:9");
+}
+
+TEST(Config, ARunningSourceIsRecognisedWhateverTheLayoutAndNotOpened) {
+  const auto before = parse("[[source]]\nname = 'a'\ndriver = 'pattern'\nwidth = 64");
+  const std::vector<std::string> running{before->sources[0].fingerprint};
+  const auto same = parse("# comment\n[[source]]\nwidth = 64\n\ndriver = 'pattern'\nname = 'a'", running);
+  ASSERT_TRUE(same.ok()) << same.error().message;
+  EXPECT_TRUE(same->sources[0].is_as_before);
+  const auto other = parse("[[source]]\nname = 'a'\ndriver = 'pattern'\nwidth = 65", running);
+  EXPECT_FALSE(other->sources[0].is_as_before);
+}
+
+TEST(Config, DocumentsEveryKey) {
+  const std::string text = documentConfig(drivers::allDrivers());
+  for (const char* key : {"listen.port", "limits.lossless_mb", "recording_folder", "start", "frame_rate_hz"}) {
+    EXPECT_SAYS(text, key);
+  }
+}
+
+TEST(RecordingPath, TakesOnlyBareNames) {
+  const std::filesystem::path folder = testing::TempDir();
+  EXPECT_EQ(recordingPath(folder, "run-1")->filename(), "run-1.mcap");
+  EXPECT_EQ(recordingPath(folder, "run.mcap")->filename(), "run.mcap");
+  for (const char* bad : {"", "../up", "/abs", "a/b", ".hidden", "..", "a b", "a\nb"}) {
+    EXPECT_FALSE(recordingPath(folder, bad).ok()) << bad;
+  }
+  EXPECT_FALSE(recordingPath(folder, std::string(201, 'a')).ok());
+}
+
+}  // namespace
+}  // namespace toftwin::daemon

@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/session.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "fakes.h"
+
+namespace toftwin::daemon {
+namespace {
+
+using test::Counter;
+using test::FakeClock;
+using test::Remote;
+using wire::Message;
+
+/// A session without a socket on a hub with one fake camera, "cam".
+struct Conversation {
+  FakeClock clock;
+  std::shared_ptr<Remote> remote = std::make_shared<Remote>();
+  Hub hub{{}, clock};
+  Counter woken;
+  std::unique_ptr<Session> session;
+
+  explicit Conversation(Session::Options options = {}) {
+    const auto open = test::opener(remote);
+    hub.add(std::make_shared<SourceHost>("cam", open, open(), SourceHost::Options{}, clock));
+    session = std::make_unique<Session>(hub, options, [this] { woken.add(); });
+  }
+  Message ask(const Message& request) {
+    const auto answers = session->handle(request);
+    EXPECT_EQ(answers.size(), 1u);
+    return answers.empty() ? Message{} : answers.front();
+  }
+  void hello() { ask(wire::Hello{1, "test", {}}); }
+  /// The next thing that the session sends by itself.
+  Session::Outgoing later() {
+    for (int seen = woken.count();; seen = woken.count()) {
+      if (auto next = session->next()) return *std::move(next);
+      if (!woken.reaches(seen + 1)) return Message{};
+    }
+  }
+  Session::FrameOut frame() { return std::get<Session::FrameOut>(later()); }
+  std::uint64_t subscribe(wire::Subscribe request = {}) {
+    request.source = "cam";
+    return std::get<wire::Subscribed>(ask(request)).subscription;
+  }
+};
+
+wire::Subscribe wish(wire::Policy policy, std::uint32_t queue = 0) {
+  wire::Subscribe request;
+  request.policy = policy;
+  request.queue = queue;
+  return request;
+}
+
+Error errorIn(const Message& message) {
+  const auto* failure = std::get_if<wire::Failure>(&message);
+  return failure == nullptr ? Error{Error::Code::Internal, "no failure"} : failure->error;
+}
+
+TEST(Session, MustBeginWithHello) {
+  Conversation talk;
+  EXPECT_EQ(errorIn(talk.ask(wire::ListSources{7})).code, Error::Code::Malformed);
+  EXPECT_TRUE(talk.session->isOver());
+  EXPECT_TRUE(talk.session->handle(wire::Hello{1, "late", {}}).empty());
+}
+
+TEST(Session, AnswersHelloWithItsFeatures) {
+  Conversation talk{{.subscriptions = 16, .features = {"memfd"}}};
+  const auto hello = std::get<wire::Hello>(talk.ask(wire::Hello{5, "test", {"other"}}));
+  EXPECT_EQ(hello.id, 5u);
+  EXPECT_EQ(hello.features, std::vector<std::string>{"memfd"});
+  EXPECT_EQ(talk.session->client()->features, std::vector<std::string>{"other"});
+  EXPECT_EQ(errorIn(talk.ask(wire::Hello{6, "again", {}})).code, Error::Code::Malformed);
+  EXPECT_TRUE(talk.session->isOver());
+}
+
+TEST(Session, ListsAndDescribes) {
+  Conversation talk;
+  talk.hello();
+  const auto list = std::get<wire::SourceList>(talk.ask(wire::ListSources{2}));
+  ASSERT_EQ(list.sources.size(), 1u);
+  EXPECT_EQ(list.sources[0].name, "cam");
+  const auto description = std::get<wire::SourceDescription>(talk.ask(wire::DescribeSource{3, "cam"}));
+  EXPECT_EQ(description.id, 3u);
+  EXPECT_EQ(description.camera, talk.remote->info.camera);
+  EXPECT_TRUE(description.can_lockstep);
+}
+
+TEST(Session, AnUnknownSourceIsNamedWithThoseThatThereAre) {
+  Conversation talk;
+  talk.hello();
+  const Error error = errorIn(talk.ask(wire::DescribeSource{3, "cma"}));
+  EXPECT_EQ(error.code, Error::Code::NotFound);
+  EXPECT_EQ(error.message, "there is no source \"cma\"; there are: cam");
+  EXPECT_FALSE(talk.session->isOver());
+}
+
+TEST(Session, SendsFramesOfItsSubscriptions) {
+  Conversation talk;
+  talk.hello();
+  const auto id = talk.subscribe(wish(wire::Policy::Queue, 8));
+  talk.remote->give(2);
+  for (std::uint64_t i = 0; i < 2; ++i) {
+    const auto out = talk.frame();
+    EXPECT_EQ(out.subscription, id);
+    EXPECT_EQ(out.delivery.frame->frame.sequence, i);
+  }
+}
+
+TEST(Session, ServesItsSubscriptionsInTurn) {
+  Conversation talk;
+  talk.hello();
+  const auto a = talk.subscribe(wish(wire::Policy::Queue, 8));
+  const auto b = talk.subscribe(wish(wire::Policy::Queue, 8));
+  talk.remote->give(4);
+  ASSERT_TRUE(talk.remote->asked.reaches(5));  // all four are in the queues
+  for (int i = 0; i < 4; ++i) {
+    EXPECT_EQ(talk.frame().subscription, a);
+    EXPECT_EQ(talk.frame().subscription, b);
+  }
+}
+
+TEST(Session, AcknowledgingLetsALockstepSourceGoOn) {
+  Conversation talk;
+  talk.hello();
+  const auto id = talk.subscribe(wish(wire::Policy::Lockstep));
+  talk.remote->give(2);
+  EXPECT_EQ(talk.frame().delivery.frame->frame.sequence, 0u);
+  EXPECT_TRUE(talk.session->handle(wire::Acknowledge{id, 0}).empty());
+  EXPECT_EQ(talk.frame().delivery.frame->frame.sequence, 1u);
+}
+
+TEST(Session, CommandsAreAnsweredWhenTheSourceHasDoneThem) {
+  Conversation talk;
+  talk.hello();
+  EXPECT_TRUE(talk.session->handle(wire::SetPose{11, "cam", {}}).empty());
+  EXPECT_EQ(std::get<wire::Done>(std::get<Message>(talk.later())).id, 11u);
+  EXPECT_TRUE(talk.session->handle(wire::SetParameter{12, "cam", "gain", 2.0}).empty());
+  const auto failure = std::get<wire::Failure>(std::get<Message>(talk.later()));
+  EXPECT_EQ(failure.id, 12u);
+  EXPECT_EQ(failure.error.code, Error::Code::Unsupported);
+}
+
+TEST(Session, UnsubscribingStopsTheSource) {
+  Conversation talk;
+  talk.hello();
+  const auto id = talk.subscribe();
+  ASSERT_TRUE(talk.remote->started.reaches(1));
+  EXPECT_EQ(std::get<wire::Done>(talk.ask(wire::Unsubscribe{4, id})).id, 4u);
+  ASSERT_TRUE(talk.remote->stopped.reaches(1));
+  EXPECT_EQ(errorIn(talk.ask(wire::Unsubscribe{5, id})).code, Error::Code::NotFound);
+}
+
+TEST(Session, ThatEndsLeavesNothingBehind) {
+  Conversation talk;
+  talk.hello();
+  talk.subscribe();
+  ASSERT_TRUE(talk.remote->started.reaches(1));
+  EXPECT_EQ(talk.hub.health().sessions, 1u);
+  EXPECT_EQ(talk.hub.health().sources.at(0).subscribers, 1u);
+  talk.session.reset();
+  ASSERT_TRUE(talk.remote->stopped.reaches(1));
+  EXPECT_EQ(talk.hub.health().sessions, 0u);
+  EXPECT_EQ(talk.hub.health().sources.at(0).subscribers, 0u);
+}
+
+TEST(Session, TellsWhyASubscriptionEnded) {
+  Conversation talk;
+  talk.hello();
+  const auto id = talk.subscribe();
+  talk.remote->give({Error::Code::EndOfStream, "no more"});
+  const auto ended = std::get<wire::SubscriptionEnded>(std::get<Message>(talk.later()));
+  EXPECT_EQ(ended.subscription, id);
+  EXPECT_EQ(ended.reason.code, Error::Code::EndOfStream);
+}
+
+TEST(Session, HasABoundOnSubscriptions) {
+  Conversation talk{{.subscriptions = 2, .features = {}}};
+  talk.hello();
+  talk.subscribe();
+  talk.subscribe();
+  wire::Subscribe third;
+  third.source = "cam";
+  EXPECT_EQ(errorIn(talk.ask(third)).code, Error::Code::Busy);
+}
+
+TEST(Session, RefusesWishesThatMakeNoSense) {
+  Conversation talk;
+  talk.hello();
+  const auto refuses = [&](auto change) {
+    wire::Subscribe request;
+    request.source = "cam";
+    change(request);
+    return errorIn(talk.ask(request)).code == Error::Code::InvalidArgument;
+  };
+  EXPECT_TRUE(refuses([](auto& r) { r = wish(wire::Policy::Queue, 0), r.source = "cam"; }));
+  EXPECT_TRUE(refuses([](auto& r) { r = wish(wire::Policy::Queue, 1025), r.source = "cam"; }));
+  EXPECT_TRUE(refuses([](auto& r) { r.max_rate_hz = -1; }));
+  EXPECT_TRUE(refuses([](auto& r) { r.max_rate_hz = std::numeric_limits<double>::quiet_NaN(); }));
+  EXPECT_TRUE(refuses([](auto& r) { r.max_rate_hz = 5, r.policy = wire::Policy::Lockstep; }));
+  EXPECT_TRUE(refuses([](auto& r) { r.region = {3, 0, 2, 2}; }));
+  EXPECT_TRUE(refuses([](auto& r) { r.decimation = 0; }));
+  EXPECT_TRUE(refuses([](auto& r) { r.planes = {PlaneKind::Depth}; }));
+}
+
+TEST(Session, ADaemonsMessageFromAClientBreaksTheProtocol) {
+  Conversation talk;
+  talk.hello();
+  EXPECT_EQ(errorIn(talk.ask(wire::FrameMessage{})).code, Error::Code::Malformed);
+  EXPECT_TRUE(talk.session->isOver());
+}
+
+TEST(Session, RecordingWithoutAFolderIsRefusedWithTheKeyToSet) {
+  Conversation talk;
+  talk.hello();
+  EXPECT_TRUE(talk.session->handle(wire::Record{3, "cam", "a"}).empty());
+  const auto failure = std::get<wire::Failure>(std::get<Message>(talk.later()));
+  EXPECT_NE(failure.error.message.find("recording_folder"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace toftwin::daemon
