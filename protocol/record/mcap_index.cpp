@@ -66,14 +66,15 @@ bool FileReader::readSummary(std::span<const std::byte> summary, std::uint64_t d
   for (std::size_t i = 1; i < places_.size(); ++i) {
     if (places_[i].offset - places_[i - 1].offset < places_[i - 1].length) return false;
   }
-  if (!statistics || statistics->chunks != places_.size()) return false;
+  // A writer may leave out either; then nothing is damaged, but only scanning finds the messages.
+  has_end_ = !statistics || (places_.empty() && statistics->messages != 0);
+  if (has_end_ || statistics->chunks != places_.size()) return false;
   std::uint64_t counted = 0;
   for (const auto& [channel, messages] : statistics->messages_per_channel) {
     if (messages > statistics->messages || !channels_.contains(channel)) return false;
     counted += messages;
   }
-  // Messages outside of chunks have no index; then only scanning finds them.
-  if (counted != statistics->messages || (places_.empty() && counted != 0)) return false;
+  if (counted != statistics->messages) return false;
   statistics_ = *std::move(statistics);
   return true;
 }
