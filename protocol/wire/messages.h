@@ -66,9 +66,9 @@ struct Region {
 
 struct Subscribe {
   std::uint64_t id = 0;
-  std::string source;
-  std::vector<PlaneKind> planes;  ///< empty: all
-  Region region;
+  std::string source{};
+  std::vector<PlaneKind> planes{};  ///< empty: all
+  Region region{};
   std::uint32_t decimation = 1;   ///< every n-th pixel in x and y, from the region's top left
   double max_rate_hz = 0.0;       ///< 0: every frame; frames left out for the rate are not "dropped"
   Policy policy = Policy::Latest;

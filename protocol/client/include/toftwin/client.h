@@ -39,7 +39,7 @@ struct SourceDetails {
 /// What a subscriber wants. The defaults: all planes, whole image, every frame, only the newest kept.
 struct SubscribeOptions {
   enum class Policy : std::uint8_t { Latest = 0, Queue = 1, Lossless = 2, Lockstep = 3 };
-  std::vector<PlaneKind> planes;  ///< empty: all
+  std::vector<PlaneKind> planes{};  ///< empty: all
   std::uint32_t x = 0, y = 0, width = 0, height = 0;  ///< region; width 0: whole image
   std::uint32_t decimation = 1;
   double max_rate_hz = 0.0;  ///< 0: every frame

@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "protocol/client/connection.h"
+
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/post.hpp>
+
+#include <algorithm>
+
+#include "protocol/client/dial.h"
+
+namespace toftwin::client {
+namespace {
+
+namespace asio = boost::asio;
+
+constexpr const char* kSoftware = "toftwin client " TOFTWIN_VERSION;
+
+std::string milliseconds(std::chrono::milliseconds time) {
+  return std::to_string(time.count()) + " ms";
+}
+
+}  // namespace
+
+// ---- any thread ------------------------------------------------------------------------------------
+
+Result<std::shared_ptr<Connection>> Connection::open(const transport::Address& address,
+                                                     const ClientOptions& options) {
+  std::shared_ptr<Connection> connection{new Connection{address, options}};
+  auto socket = dial(connection->io_, address, options.timeout);
+  if (!socket) return socket.error();
+  wire::Limits limits;
+  limits.body_bytes = options.max_message_bytes;
+  connection->socket_.emplace(std::move(*socket), limits);
+  if (auto greeted = connection->greet(); !greeted) return greeted.error();
+  connection->readOn();
+  connection->thread_ = std::thread{[state = connection.get()] {
+    const auto stay = asio::make_work_guard(state->io_);  // until stop(), even when disconnected
+    state->io_.restart();
+    state->io_.run();
+  }};
+  return connection;
+}
+
+Connection::~Connection() { stop(); }
+
+void Connection::stop() {
+  if (!thread_.joinable()) return;
+  asio::post(io_, [this] {
+    fail({Error::Code::Stopped, "the client was closed"});
+    io_.stop();
+  });
+  thread_.join();
+}
+
+/// Says Hello and waits for the daemon's; in the caller's thread, before the own one starts.
+Result<> Connection::greet() {
+  std::vector<std::string> features;
+  if (socket_->isLocal()) {
+    features.emplace_back(transport::kMemfdFeature);
+    socket_->acceptSharedBodies();
+  }
+  std::optional<Result<wire::Message>> answer;
+  enqueue(wire::Hello{next_id_++, kSoftware, features});
+  socket_->asyncRead([&](Result<wire::Message> message) { answer = std::move(message); });
+  const auto deadline = std::chrono::steady_clock::now() + options_.timeout;
+  io_.restart();
+  while (!answer && io_.run_one_until(deadline) > 0) {
+  }
+  const std::string where = transport::toString(address_);
+  if (!answer) {
+    socket_->close();  // ends the read, whose handler refers to `answer`
+    io_.restart();
+    io_.run();
+    return Error{Error::Code::Timeout, "whoever listens at " + where + " says nothing within " +
+                                           milliseconds(options_.timeout) + ". Is it toftwind?"};
+  }
+  if (!*answer) return Error{answer->error().code, where + ": " + answer->error().message};
+  if (const auto* failure = std::get_if<wire::Failure>(&**answer)) return failure->error;
+  const auto* hello = std::get_if<wire::Hello>(&**answer);
+  if (!hello) return Error{Error::Code::Malformed, where + ": the first message was not a Hello"};
+  software_ = hello->software;
+  return {};
+}
+
+Error Connection::unexpectedAnswer() const {
+  return {Error::Code::Malformed,
+          "toftwind at " + transport::toString(address_) + " gave an answer of another kind"};
+}
+
+Result<wire::Message> Connection::exchange(std::uint64_t id, wire::Message request) {
+  const auto answered = std::make_shared<Answered>();
+  auto answer = answered->get_future();
+  asio::post(io_, [this, id, answered, request = std::move(request)] {
+    if (fault_) return answered->set_value(*fault_);
+    waiting_.emplace(id, answered);
+    enqueue(request);
+  });
+  if (answer.wait_for(options_.timeout) == std::future_status::ready) return answer.get();
+  asio::post(io_, [this, id] { waiting_.erase(id); });
+  return Error{Error::Code::Timeout, "toftwind at " + transport::toString(address_) +
+                                         " did not answer within " + milliseconds(options_.timeout)};
+}
+
+Result<Connection::Subscribed> Connection::subscribe(wire::Subscribe request) {
+  request.id = next_id_++;
+  request.window = windowOf(request.policy);
+  const auto frames = std::make_shared<FrameQueue>(request.policy);
+  // Frames may follow the answer at once, so the thread must know the queue before.
+  asio::post(io_, [this, id = request.id, frames] { starting_.emplace(id, frames); });
+  Result<wire::Message> answer = exchange(request.id, request);
+  asio::post(io_, [this, id = request.id] { starting_.erase(id); });
+  if (!answer) return answer.error();
+  if (auto* failure = std::get_if<wire::Failure>(&*answer)) return std::move(failure->error);
+  const auto* subscribed = std::get_if<wire::Subscribed>(&*answer);
+  if (!subscribed) return unexpectedAnswer();
+  return Subscribed{subscribed->subscription, frames};
+}
+
+void Connection::unsubscribe(std::uint64_t subscription) {
+  asio::post(io_, [this, subscription] {
+    if (running_.erase(subscription) == 0) return;  // the daemon ended it already
+    if (!fault_) enqueue(wire::Unsubscribe{next_id_++, subscription});
+  });
+}
+
+void Connection::acknowledge(std::uint64_t subscription, std::uint64_t sequence) {
+  asio::post(io_, [this, subscription, sequence] {
+    if (!fault_) enqueue(wire::Acknowledge{subscription, sequence});
+  });
+}
+
+// ---- the thread ------------------------------------------------------------------------------------
+
+void Connection::enqueue(const wire::Message& message) {
+  output_.push_back(wire::encode(message));
+  if (!writing_) writeNext();
+}
+
+void Connection::writeNext() {
+  writing_ = !output_.empty();
+  if (!writing_) return;
+  wire::Encoded next = std::move(output_.front());
+  output_.pop_front();
+  socket_->asyncWrite(std::move(next), [this](const Result<>& result) {
+    if (!result) return fail(result.error());
+    writeNext();
+  });
+}
+
+void Connection::readOn() {
+  socket_->asyncRead([this](Result<wire::Message> message) {
+    if (message) {
+      take(std::move(*message));
+    } else if (message.error().code != Error::Code::Unsupported) {  // else from a newer daemon: skip
+      return fail(message.error());
+    }
+    if (!fault_) readOn();
+  });
+}
+
+void Connection::take(wire::Message message) {
+  std::visit(
+      [this](auto& m) {
+        using M = std::decay_t<decltype(m)>;
+        if constexpr (std::is_same_v<M, wire::FrameMessage>) {
+          takeFrame(std::move(m));
+        } else if constexpr (std::is_same_v<M, wire::SubscriptionEnded>) {
+          const auto entry = running_.find(m.subscription);
+          if (entry == running_.end()) return;
+          entry->second->end(std::move(m.reason));
+          running_.erase(entry);
+        } else if constexpr (std::is_same_v<M, wire::Failure>) {
+          if (m.id == 0) return fail(m.error);
+          takeAnswer(m.id, std::move(m));
+        } else if constexpr (requires { m.id; }) {
+          takeAnswer(m.id, std::move(m));
+        }
+      },
+      message);
+}
+
+void Connection::takeFrame(wire::FrameMessage message) {
+  const auto entry = running_.find(message.subscription);
+  if (entry == running_.end()) return;  // sent before the daemon read our Unsubscribe
+  FrameQueue& frames = *entry->second;
+  const std::uint64_t sequence = message.frame.sequence;
+  if (auto pushed = frames.push(std::move(message.frame)); !pushed) {
+    frames.end(pushed.error());
+    running_.erase(entry);
+    return enqueue(wire::Unsubscribe{next_id_++, message.subscription});
+  }
+  if (frames.isAcknowledgedOnArrival()) enqueue(wire::Acknowledge{message.subscription, sequence});
+}
+
+void Connection::takeAnswer(std::uint64_t id, wire::Message answer) {
+  const auto entry = waiting_.find(id);
+  const auto* subscribed = std::get_if<wire::Subscribed>(&answer);
+  if (entry == waiting_.end()) {  // too late: nobody waits for it any more
+    if (subscribed) enqueue(wire::Unsubscribe{next_id_++, subscribed->subscription});
+    return;
+  }
+  if (subscribed) {
+    const auto frames = starting_.find(id);
+    if (frames != starting_.end()) running_.emplace(subscribed->subscription, frames->second);
+  }
+  const auto answered = entry->second;
+  waiting_.erase(entry);
+  answered->set_value(std::move(answer));
+}
+
+void Connection::fail(const Error& reason) {
+  if (fault_) return;
+  const bool is_ours = reason.code == Error::Code::Stopped;
+  const std::string where = "connection to toftwind at " + transport::toString(address_) + " lost: ";
+  fault_ = is_ours ? reason
+                   : Error{reason.code, where + reason.message + ". Is it still running? Connect again"};
+  socket_->close();
+  output_.clear();
+  for (const auto& [id, answered] : std::exchange(waiting_, {})) answered->set_value(*fault_);
+  for (const auto& [id, frames] : std::exchange(running_, {})) frames->end(*fault_);
+}
+
+}  // namespace toftwin::client
