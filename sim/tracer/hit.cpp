@@ -15,7 +15,7 @@ constexpr double kSmallestOffset = 1e-18;
 Vec3d absolute(Vec3d v) { return {std::abs(v.x), std::abs(v.y), std::abs(v.z)}; }
 Vec3d largest(Vec3d a, Vec3d b) { return {std::max(a.x, b.x), std::max(a.y, b.y), std::max(a.z, b.z)}; }
 
-/// Distance of the origin's rounding from the surface: at most half a unit in the last place per axis.
+/// How far rounding the position to single precision can move it across the surface.
 double roundingAlong(Vec3d normal, Vec3d position) {
   return kUnitRoundoff * dot(absolute(normal), absolute(position));
 }
@@ -32,6 +32,40 @@ double embreeTriangleError(Vec3d p, Vec3d v0, Vec3d v1, Vec3d v2, Vec3d n, doubl
   return kUnitRoundoff * (168.0 * m.x * m.y * m.z + dot(5.0 * m + absolute(p), absolute(n))) / length;
 }
 
+/// The move along the triangle that keeps a place at least `margin` away from its three edges: a ray
+/// that starts on an edge could start behind the surface that begins there.
+/// `n` is (v1 − v0) × (v2 − v0) and `length` its norm; u and v as Embree counts them.
+Vec3d awayFromEdges(double u, double v, Vec3d v0, Vec3d v1, Vec3d v2, Vec3d n, double length, double margin) {
+  Vec3d move{};
+  const auto edge = [&](double share, Vec3d along) {  // share: of the corner that faces this edge
+    const double edge_length2 = dot(along, along);
+    const double height = share * length;  // distance from the edge × the edge's length
+    if (height > 0.0 && height * height > margin * margin * edge_length2) return;
+    const double edge_length = std::sqrt(edge_length2);
+    const double inward = margin - height / edge_length;
+    move = move + cross(n, along) * (std::min(inward, 2.0 * margin) / (length * edge_length));
+  };
+  edge(1.0 - u - v, v2 - v1);
+  edge(u, v0 - v2);
+  edge(v, v1 - v0);
+  return move;
+}
+
+/// Rounds a place at `offset` from the surface to single precision, away from the surface on every axis.
+Vec3f roundedAway(Vec3d place, Vec3d normal, double offset) {
+  const auto away = [](double value, double direction) {
+    const auto rounded = static_cast<float>(value);
+    return direction > 0.0 ? std::nextafter(rounded, INFINITY)
+                           : direction < 0.0 ? std::nextafter(rounded, -INFINITY) : rounded;
+  };
+  const Vec3d p = place + normal * offset;
+  return {away(p.x, normal.x), away(p.y, normal.y), away(p.z, normal.z)};
+}
+
+void faceTheRay(Hit& hit, Vec3d direction) {
+  if (dot(hit.normal, direction) > 0.0) hit.normal = -hit.normal;
+}
+
 Hit refineTriangle(const BuiltObject& object, std::uint32_t primitive, float u, float v, Vec3d o, Vec3d d) {
   const auto& corners = object.triangles[primitive];
   const Vec3d v0 = object.vertices[corners[0]], v1 = object.vertices[corners[1]], v2 = object.vertices[corners[2]];
@@ -39,15 +73,20 @@ Hit refineTriangle(const BuiltObject& object, std::uint32_t primitive, float u, 
   const double length = norm(n);
   Hit hit;
   hit.normal = n / length;
-  const double slope = dot(hit.normal, d);
-  const double t = dot(hit.normal, v0 - o) / slope;
+  const double t = dot(hit.normal, v0 - o) / dot(hit.normal, d);
   if (std::isfinite(t)) {
     const Vec3d p = o + d * t;
     hit.position = p - hit.normal * dot(hit.normal, p - v0);
   } else {  // the ray lies in the plane
     hit.position = v0 + (v1 - v0) * static_cast<double>(u) + (v2 - v0) * static_cast<double>(v);
   }
-  hit.clearance = embreeTriangleError(hit.position, v0, v1, v2, n, length);
+  const double offset = embreeTriangleError(hit.position, v0, v1, v2, n, length) +
+                        2.0 * roundingAlong(hit.normal, hit.position) + kSmallestOffset;
+  const Vec3d reach = absolute(hit.position);
+  const double margin = 4.0 * (offset + kUnitRoundoff * std::max({reach.x, reach.y, reach.z}));
+  const Vec3d inside = awayFromEdges(static_cast<double>(u), static_cast<double>(v), v0, v1, v2, n, length, margin);
+  faceTheRay(hit, d);
+  hit.start = roundedAway(hit.position + inside, hit.normal, offset);
   return hit;
 }
 
@@ -56,17 +95,19 @@ Hit refineQuadric(const Quadric& quadric, int part, float embree_distance, Vec3d
   const Crossings at = crossings(quadric, part, local_o, local_d);
   // The same crossing as Embree's, whose ray was rounded; if the exact ray just misses, Embree's.
   const auto approximate = static_cast<double>(embree_distance);
-  double t = approximate;
-  if (std::isfinite(at.first)) t = at.first;
-  if (std::isfinite(at.second) && !(std::abs(at.second - approximate) > std::abs(t - approximate) && std::isfinite(at.first))) {
+  double t = std::isfinite(at.first) ? at.first : approximate;
+  if (std::isfinite(at.second) &&
+      (!std::isfinite(at.first) || std::abs(at.second - approximate) < std::abs(t - approximate))) {
     t = at.second;
   }
   const SurfacePoint point = ontoSurface(quadric, part, local_o + local_d * t);
-  return {.position = quadric.centre + quadric.toScene(point.position),
-          .normal = quadric.toScene(point.normal),
-          .distance = t,
-          .clearance = 0.0,  // its intersection is computed in double precision
-          .material = 0};
+  Hit hit;
+  hit.position = quadric.centre + quadric.toScene(point.position);
+  hit.normal = quadric.toScene(point.normal);
+  faceTheRay(hit, d);
+  // Its intersection is computed in double precision: only the start's own rounding counts.
+  hit.start = roundedAway(hit.position, hit.normal, 2.0 * roundingAlong(hit.normal, hit.position) + kSmallestOffset);
+  return hit;
 }
 
 }  // namespace
@@ -77,22 +118,9 @@ Hit refine(const Scene::Impl& scene, std::uint32_t object_id, std::uint32_t prim
   Hit hit = object.triangles.empty()
                 ? refineQuadric(object.quadric, static_cast<int>(u), embree_distance, origin, direction)
                 : refineTriangle(object, primitive, u, v, origin, direction);
-  if (dot(hit.normal, direction) > 0.0) hit.normal = -hit.normal;
   hit.distance = norm(hit.position - origin);
   hit.material = static_cast<std::uint32_t>(object.material);
   return hit;
-}
-
-Vec3f originAbove(const Hit& hit) {
-  const double offset = hit.clearance + 2.0 * roundingAlong(hit.normal, hit.position) + kSmallestOffset;
-  const Vec3d p = hit.position + hit.normal * offset;
-  // Rounding away from the surface on every axis
-  const auto away = [](double value, double normal) {
-    const auto rounded = static_cast<float>(value);
-    return normal > 0.0 ? std::nextafter(rounded, INFINITY)
-                        : normal < 0.0 ? std::nextafter(rounded, -INFINITY) : rounded;
-  };
-  return {away(p.x, hit.normal.x), away(p.y, hit.normal.y), away(p.z, hit.normal.z)};
 }
 
 }  // namespace toftwin::sim

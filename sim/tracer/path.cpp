@@ -158,7 +158,7 @@ void gatherDirectLight(const Tracing& tracing, const Packet& packet, const Hits&
                                reflectionShape(material, direction, -packet.direction[i], hit.normal)) / std::numbers::pi;
       weight[i] = static_cast<float>(static_cast<double>(packet.throughput[i]) * reflected * cosine * intensity / distance2);
       length[i] = packet.length[i] + hit.distance + distance;
-      const Vec3f from = originAbove(hit);
+      const Vec3f from = hit.start;
       const Vec3d way = light - Vec3d{static_cast<double>(from.x), static_cast<double>(from.y), static_cast<double>(from.z)};
       const double way_length = norm(way);
       // Rounding of origin and direction moves the ray's end by less than four units in the last place.
@@ -190,7 +190,7 @@ void bounce(const Tracing& tracing, Packet& packet, std::size_t i, const Hit& hi
   packet.throughput[i] *= material.albedo * reflectionShape(material, direction, -packet.direction[i], hit.normal);
   packet.length[i] += hit.distance;
   packet.origin[i] = hit.position;
-  packet.ray_origin[i] = originAbove(hit);
+  packet.ray_origin[i] = hit.start;
   packet.direction[i] = direction;
   float& throughput = packet.throughput[i];
   if (throughput < kRouletteThreshold) {

@@ -6,6 +6,7 @@
 #include <xmmintrin.h>
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include "sim/tracer/path.h"
@@ -48,6 +49,11 @@ void check(const TraceRequest& request) {
   };
   require(camera.width > 0 && camera.height > 0, "the camera has no pixels");
   require(camera.fx > 0.0 && camera.fy > 0.0, "the camera's focal lengths must be positive");
+  for (const double value : {camera.fx, camera.fy, camera.cx, camera.cy, request.world_from_camera.translation_m.x,
+                             request.world_from_camera.translation_m.y, request.world_from_camera.translation_m.z}) {
+    require(std::isfinite(value), "the camera's lens and place must be finite numbers");
+  }
+  for (const Frequency f : request.frequencies) require(std::isfinite(f.in(hertz)), "frequencies must be finite");
   require(request.harmonics >= 1, "harmonics must be at least 1");
   require(request.samples_per_pixel >= 1, "samples_per_pixel must be at least 1");
   require(request.max_surfaces >= 1, "max_surfaces must be at least 1");

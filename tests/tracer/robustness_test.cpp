@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: Apache-2.0
+// Rays that start on surfaces: nothing leaks out of closed rooms, nothing shadows itself; and the
+// image is the same however the work is divided.
+#include <tbb/global_control.h>
+
+#include <cstring>
+
+#include "tests/tracer/tracing.h"
+
+namespace toftwin::sim::testing {
+namespace {
+
+/// A closed room whose walls shine with Le and reflect ρ: every path of N surfaces brings exactly
+/// Le (1 − ρᴺ)/(1 − ρ), whatever way it takes, as long as it stays inside. One ray in a million that
+/// gets out through an edge or starts behind a wall takes up to 1 of 4.7 from its pixel.
+std::string furnace(Vec3d at, double rotation_deg, double size, const std::string& more) {
+  const auto n = [](double v) { return std::to_string(v); };
+  return "[[material]]\nname = 'm'\nalbedo = 0.8\nemission_w_per_m2_sr = 1\n[[object]]\nshape = 'box'\nsize_m = [" +
+         n(4 * size) + ", " + n(2.5 * size) + ", " + n(5 * size) + "]\nposition_m = [" + n(at.x) + ", " + n(at.y) + ", " +
+         n(at.z) + "]\neuler_deg = [" + n(rotation_deg) + ", " + n(2 * rotation_deg) + ", " + n(3 * rotation_deg) +
+         "]\nmaterial = 'm'\n" + more;
+}
+
+void expectFurnace(const std::string& toml, Vec3d camera_at) {
+  TraceRequest request = requestFor(48, 48, 20.0, {80_MHz});
+  request.world_from_camera.translation_m = camera_at;
+  request.samples_per_pixel = 32;
+  request.pixel_extent = 1.0;
+  request.max_surfaces = 10;  // 0.8⁹ = 0.134: no roulette, so no noise at all
+  const Light light = trace(sceneOf(toml), request);
+  const double exact = (1.0 - std::pow(0.8, 10)) / 0.2;
+  for (std::size_t p = 0; p < light.ambient.size(); ++p) {
+    ASSERT_NEAR(static_cast<double>(light.ambient[p]), exact, 3e-6 * exact) << "pixel " << p;
+  }
+}
+
+TEST(Furnace, KeepsAllItsLight) {
+  expectFurnace(furnace({}, 0.0, 1.0, ""), {0.3, 0.2, -0.4});
+  expectFurnace(furnace({}, 17.0, 1.0, ""), {0.3, 0.2, -0.4});
+}
+TEST(Furnace, KeepsAllItsLightFarFromTheOriginAndWhenVerySmallOrLarge) {
+  const std::string anchor = "[[object]]\nshape = 'sphere'\nradius_m = 0.1\nmaterial = 'm'\n";
+  expectFurnace(furnace({100.0, -50.0, 80.0}, 17.0, 1.0, anchor), {100.3, -49.8, 79.6});
+  expectFurnace(furnace({}, 11.0, 0.01, ""), {0.003, 0.002, -0.004});
+  expectFurnace(furnace({}, 11.0, 100.0, ""), {30.0, 20.0, -40.0});
+}
+TEST(Furnace, KeepsAllItsLightAroundBodies) {
+  expectFurnace(furnace({}, 5.0, 1.0,
+                        "[[object]]\nshape = 'sphere'\nradius_m = 0.4\nposition_m = [0.5, 0, 1]\nmaterial = 'm'\n"
+                        "[[object]]\nshape = 'cylinder'\nradius_m = 0.3\nheight_m = 0.7\nposition_m = [-0.7, 0, 1]\n"
+                        "euler_deg = [70, 20, 0]\nmaterial = 'm'\n"
+                        "[[object]]\nshape = 'disc'\nradius_m = 0.3\nposition_m = [0, -0.5, 1]\neuler_deg = [30, 20, 0]\nmaterial = 'm'\n"),
+                {0.0, 0.2, -0.4});
+}
+
+/// Direct light inside a sphere from its middle is the same everywhere, ρI/πR²: a pixel that shadows
+/// itself is black, one that starts outside too.
+TEST(SelfShadow, NoPixelOfALitSurfaceIsDark) {
+  for (const double at : {0.0, 1000.0}) {
+    const std::string anchor = at == 0.0 ? "" : "[[object]]\nshape = 'disc'\nradius_m = 0.1\nmaterial = 'm'\n";
+    const std::string place = std::to_string(at);
+    const Scene scene = sceneOf("[[material]]\nname = 'm'\nalbedo = 0.5\n[[object]]\nshape = 'sphere'\nradius_m = 2\n"
+                                "position_m = [" + place + ", 0, " + place + "]\nmaterial = 'm'\n" + anchor);
+    TraceRequest request = requestFor(160, 160, 40.0, {80_MHz});
+    request.world_from_camera.translation_m = {at, 0.0, at};
+    const Light light = trace(scene, request);
+    for (const float steady : light.steady.pixels()) ASSERT_NEAR(static_cast<double>(steady), 0.5 / kPi / 4.0, 1e-6);
+  }
+}
+
+Scene busyScene() {
+  return sceneOf(furnace({}, 5.0, 1.0,
+                         "[[object]]\nshape = 'sphere'\nradius_m = 0.4\nposition_m = [0.5, 0, 1]\nmaterial = 'm'\n"
+                         "[[object]]\nshape = 'box'\nsize_m = [0.5, 0.5, 0.5]\nposition_m = [-0.5, 0, 1]\nmaterial = 'm'\n"));
+}
+
+TraceRequest busyRequest(int samples) {
+  TraceRequest request = requestFor(37, 29, 25.0, {80_MHz, 16_MHz});
+  request.camera.distortion = {0.09, -0.27, 1e-4, -2e-4, 0.1};
+  request.emitters[0].radius = 1_cm;
+  request.harmonics = 3;
+  request.samples_per_pixel = samples;
+  request.max_surfaces = 5;
+  request.pixel_extent = 1.0;
+  request.seed = 7;
+  return request;
+}
+
+template <class T>
+void expectSameBytes(const Image<T>& a, const Image<T>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  EXPECT_EQ(std::memcmp(a.pixels().data(), b.pixels().data(), a.size() * sizeof(T)), 0);
+}
+
+void expectSameBytes(const Light& a, const Light& b) {
+  for (std::size_t i = 0; i < a.phasors.size(); ++i) expectSameBytes(a.phasors[i], b.phasors[i]);
+  for (std::size_t i = 0; i < a.variance.size(); ++i) expectSameBytes(a.variance[i], b.variance[i]);
+  expectSameBytes(a.steady, b.steady);
+  expectSameBytes(a.ambient, b.ambient);
+  expectSameBytes(a.truth.range_m, b.truth.range_m);
+  expectSameBytes(a.truth.normal, b.truth.normal);
+}
+
+TEST(Determinism, OneAndFourThreadsGiveTheSameBytes) {
+  const Scene scene = busyScene();
+  for (const int samples : {1, 3, 40, 9000}) {
+    TraceRequest request = busyRequest(samples);
+    if (samples == 9000) request.region_x = 5, request.region_y = 6, request.region_width = request.region_height = 2;
+    const auto traceWith = [&](std::size_t threads) {
+      const tbb::global_control limit{tbb::global_control::max_allowed_parallelism, threads};
+      return trace(scene, request);
+    };
+    expectSameBytes(traceWith(1), traceWith(4));
+  }
+}
+
+template <class T>
+Image<T> crop(const Image<T>& image, const TraceRequest& region) {
+  Image<T> part(region.region_width, region.region_height);
+  for (int y = 0; y < part.height(); ++y) {
+    for (int x = 0; x < part.width(); ++x) part(x, y) = image(x + region.region_x, y + region.region_y);
+  }
+  return part;
+}
+
+TEST(Determinism, ARegionIsACropOfTheWhole) {
+  const Scene scene = busyScene();
+  for (const int samples : {1, 2, 5, 8, 20}) {
+    TraceRequest request = busyRequest(samples);
+    const Light whole = trace(scene, request);
+    request.region_x = 7;
+    request.region_y = 3;
+    request.region_width = 19;
+    request.region_height = 26;
+    const Light part = trace(scene, request);
+    for (std::size_t i = 0; i < whole.phasors.size(); ++i) expectSameBytes(crop(whole.phasors[i], request), part.phasors[i]);
+    expectSameBytes(crop(whole.steady, request), part.steady);
+    expectSameBytes(crop(whole.ambient, request), part.ambient);
+    expectSameBytes(crop(whole.truth.range_m, request), part.truth.range_m);
+  }
+}
+
+TEST(Determinism, AnotherSeedGivesAnotherImage) {
+  const Scene scene = busyScene();
+  TraceRequest request = busyRequest(4);
+  const Light one = trace(scene, request);
+  request.seed = 8;
+  EXPECT_NE(one.steady, trace(scene, request).steady);
+}
+
+/// The estimated variance is that of the means: over 400 seeds their spread agrees. The ratio of a
+/// variance from 400 draws to its true value has a relative standard deviation of √(2/800) (two
+/// components), the mean of the estimates far less: 5 σ.
+TEST(Variance, IsTheSpreadOverSeeds) {
+  const Scene scene = busyScene();
+  TraceRequest request = busyRequest(32);
+  request.region_x = 18;
+  request.region_y = 14;
+  request.region_width = request.region_height = 1;
+  std::vector<Complex> means;
+  Complex mean;
+  double estimated = 0.0;
+  const int seeds = 400;
+  for (int seed = 0; seed < seeds; ++seed) {
+    request.seed = static_cast<std::uint64_t>(seed);
+    const Light light = trace(scene, request);
+    means.push_back(phasorAt(light, 0, 0, 0));
+    mean += means.back() / double(seeds);
+    estimated += static_cast<double>(light.variance[0](0, 0)) / seeds;
+  }
+  double spread = 0.0;
+  for (const Complex& z : means) spread += std::norm(z - mean) / (2.0 * (seeds - 1));
+  EXPECT_NEAR(spread / estimated, 1.0, 5.0 * std::sqrt(2.0 / (2 * seeds)));
+}
+
+/// Requests that no correct program makes are refused before anything is read or written.
+TEST(Request, ThatMakesNoSenseIsRefused) {
+  const Scene scene = busyScene();
+  const auto refused = [&](auto change) {
+    TraceRequest request = busyRequest(1);
+    change(request);
+    EXPECT_THROW(trace(scene, request), std::invalid_argument);
+  };
+  refused([](TraceRequest& r) { r.camera.width = 0; });
+  refused([](TraceRequest& r) { r.camera.fx = 0.0; });
+  refused([](TraceRequest& r) { r.camera.fy = std::nan(""); });
+  refused([](TraceRequest& r) { r.samples_per_pixel = 0; });
+  refused([](TraceRequest& r) { r.max_surfaces = 0; });
+  refused([](TraceRequest& r) { r.harmonics = 0; });
+  refused([](TraceRequest& r) { r.region_width = 1 << 30, r.region_height = 5, r.region_x = 36; });
+  refused([](TraceRequest& r) { r.region_width = 5, r.region_height = 5, r.region_x = -1; });
+  refused([](TraceRequest& r) { r.world_from_camera.translation_m.x = std::nan(""); });
+  refused([](TraceRequest& r) { r.frequencies = {Frequency{std::nan(""), megahertz}}; });
+}
+
+}  // namespace
+}  // namespace toftwin::sim::testing
