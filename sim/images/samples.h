@@ -15,11 +15,11 @@ namespace toftwin::sim {
 /// tap 0 does not; its sample is the difference tap 0 − tap 1. NaN marks a sample that is missing.
 /// `flags` holds what is known before decoding (PixelFlag::Saturated, …) and may be empty: nothing.
 struct Samples {
-  std::vector<Frequency> frequencies;
+  std::vector<Frequency> frequencies{};
   int steps = 4;
   int taps = 1;
-  std::vector<Image<float>> electrons;
-  Image<std::uint8_t> flags;
+  std::vector<Image<float>> electrons{};
+  Image<std::uint8_t> flags{};
 
   [[nodiscard]] int width() const { return electrons.empty() ? 0 : electrons.front().width(); }
   [[nodiscard]] int height() const { return electrons.empty() ? 0 : electrons.front().height(); }

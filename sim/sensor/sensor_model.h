@@ -12,6 +12,7 @@
 #include <toftwin/frame.h>
 #include <toftwin/result.h>
 
+#include "sim/effects/effects.h"
 #include "sim/images/light.h"
 #include "sim/images/range.h"
 #include "sim/images/samples.h"
@@ -21,19 +22,32 @@ namespace toftwin::sim {
 
 /// A camera as data: lens, emitters, modulation, pixel, and the ordered list of its effects. Read from
 /// a camera file (docs/camera-file.md); the presets lie in sim/cameras/. An invariant-free aggregate
-/// is not enough here because the effect list is open; see sensor_model.cpp for the file's schema.
+/// is not enough here because the effect list is open; see camera_file.h for the file's schema.
 class SensorModel {
  public:
   static Result<SensorModel> load(const std::filesystem::path& file);
   static Result<SensorModel> parse(std::string_view toml, const std::filesystem::path& name);
-  /// A preset by its name ("kinect_v2", "o3d303"), from the installed or source camera folder.
+  /// A preset by its name ("kinect_v2", "o3d303"); they are built into the program.
   static Result<SensorModel> preset(std::string_view name);
+  static std::vector<std::string> presetNames();
+  /// A preset's camera file, to start a file of one's own from.
+  static Result<std::string> presetText(std::string_view name);
 
   [[nodiscard]] const std::string& model() const;
   [[nodiscard]] const CameraInfo& camera() const;
   /// Content hash of everything that the camera file says; 32 hex digits.
   [[nodiscard]] const std::string& id() const;
+  [[nodiscard]] const std::vector<AnyEffect>& effects() const;
   [[nodiscard]] std::vector<std::string> effectNames() const;
+  [[nodiscard]] Duration frameInterval() const;
+  /// The raw exposures of a frame that starts at `start`: frequency by frequency, step by step.
+  [[nodiscard]] std::vector<Exposure> exposures(DeviceTime start) const;
+
+  /// Components of each pixel's unit ray, full image.
+  struct Rays {
+    Image<float> x, z;
+  };
+  [[nodiscard]] const Rays& rays() const;
 
   /// What the tracer must give for this camera: lens, emitters, frequencies and harmonics filled in;
   /// pose, sample count, surfaces, region and seed are the caller's.
@@ -49,11 +63,34 @@ class SensorModel {
   [[nodiscard]] Exposed expose(const Light& light, const Moment& moment, std::uint64_t seed,
                                std::uint64_t frame, int region_x = 0, int region_y = 0) const;
 
+  /// expose() in its two halves: expose(light, …) = readOut(collect(light, …), …). What is collected is
+  /// free of noise, and where no effect on the light changes with time it can be read out again and
+  /// again, each time with the noise of another frame.
+  [[nodiscard]] Samples collect(const Light& light, const Moment& moment, std::uint64_t seed,
+                                std::uint64_t frame, int region_x = 0, int region_y = 0) const;
+  [[nodiscard]] Exposed readOut(Samples collected, const Moment& moment, std::uint64_t seed,
+                                std::uint64_t frame, int region_x = 0, int region_y = 0) const;
+  /// Whether collect() gives the same for every frame of one light, exposure and ambient illuminance.
+  [[nodiscard]] bool collectsTheSameEachFrame() const;
+
+  /// Names that with() takes: "exposure_us" (of all raw exposures) and "<effect>.<key>" for every number
+  /// of the model's effects ("lens_scatter.veil").
+  [[nodiscard]] std::vector<std::string> parameterNames() const;
+  /// The same camera with one number changed. An error names an unknown parameter or the bounds.
+  [[nodiscard]] Result<SensorModel> with(std::string_view parameter, double value) const;
+  /// The same camera with other effects, in the order in which they act within each stage.
+  [[nodiscard]] SensorModel withEffects(std::vector<AnyEffect> effects) const;
+
   struct Impl;
 
  private:
   explicit SensorModel(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)) {}
+  static std::shared_ptr<const Impl> build(Impl impl);
   std::shared_ptr<const Impl> impl_;  // shared by copies; nobody changes it
 };
+
+/// All keys of a camera file as Markdown: the camera's table, then one table per effect.
+std::string cameraFileTable();
+std::string effectTables();
 
 }  // namespace toftwin::sim

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim/decode/decode.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include <toftwin/frame.h>
+
+#include "sim/decode/demodulate.h"
+#include "sim/decode/unwrap.h"
+#include "sim/images/rows.h"
+
+namespace toftwin::sim {
+namespace {
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr bool has(std::uint8_t flags, PixelFlag flag) { return (flags & static_cast<unsigned>(flag)) != 0; }
+constexpr void raise(std::uint8_t& flags, PixelFlag flag) {
+  flags = static_cast<std::uint8_t>(flags | static_cast<unsigned>(flag));
+}
+
+constexpr void reject(std::uint8_t& flags, PixelFlag why) {
+  raise(flags, PixelFlag::Invalid);
+  raise(flags, why);
+}
+
+/// Half the length of the light's way → range, for an emitter at distance L along x from the lens. With
+/// s the whole way and u the ray's x component, |r u⃗ − L x⃗| = s − r gives
+///     r = (s² − L²) / (2 (s − L u))
+/// and libfreenect2 drops L² in it.
+double rangeOfWay(double half_way_m, double ray_x, const DecodeSettings& settings) {
+  const double baseline_m = settings.baseline_length.in(metre);
+  if (baseline_m == 0.0) return half_way_m;
+  const double way_m = 2.0 * half_way_m;
+  const double square = settings.baseline == DecodeSettings::Baseline::Exact ? baseline_m * baseline_m : 0.0;
+  return (way_m * way_m - square) / (2.0 * (way_m - baseline_m * ray_x));
+}
+
+/// Decodes row by row; holds what all rows share.
+class Decoder {
+ public:
+  Decoder(const Samples& samples, const DecodeSettings& settings, const Image<float>& ray_x, RangeImage& result)
+      : samples_(samples), settings_(settings), ray_x_(ray_x), result_(result), steps_(samples.steps),
+        unwrap_(samples.frequencies, settings.speed_of_light),
+        zero_cycles_(samples.frequencies.size(), 0.0) {
+    for (std::size_t f = 0; f < std::min(settings.zero_phase.size(), zero_cycles_.size()); ++f) {
+      zero_cycles_[f] = settings.zero_phase[f].in(radian) / (2.0 * std::numbers::pi);
+    }
+    // 80 MHz is three units of 240 MHz.
+    if (isKinect()) unit_m_ = settings.speed_of_light / (6.0 * samples.frequencies[0].in(hertz));
+  }
+
+  void row(int y) const {
+    const std::size_t frequencies = samples_.frequencies.size();
+    for (std::size_t f = 0; f < frequencies; ++f) {
+      demodulateRow(samples_, steps_, f, y, &result_.phasors[f](0, y));
+    }
+    unmodulatedRow(samples_, y, &result_.ambient(0, y));
+    std::vector<float> asymmetry(static_cast<std::size_t>(samples_.width()));
+    asymmetryRow(samples_, y, asymmetry.data());
+    std::vector<double> cycles(frequencies), amplitudes(frequencies);
+    for (int x = 0; x < samples_.width(); ++x) {
+      double mean = 0.0;
+      for (std::size_t f = 0; f < frequencies; ++f) {
+        const std::complex<float> phasor = result_.phasors[f](x, y);
+        amplitudes[f] = std::sqrt(static_cast<double>(std::norm(phasor)));
+        cycles[f] = cyclesOf(phasor, zero_cycles_[f]);
+        mean += amplitudes[f] / static_cast<double>(frequencies);
+      }
+      result_.amplitude(x, y) = static_cast<float>(mean);
+      std::uint8_t flags = samples_.flags.empty() ? std::uint8_t{0} : samples_.flags(x, y);
+      if (static_cast<double>(asymmetry[static_cast<std::size_t>(x)]) > settings_.asymmetry_threshold * mean) {
+        raise(flags, PixelFlag::Asymmetric);
+      }
+      const double range_m = measure(cycles, amplitudes, x, y, flags);
+      if (std::isnan(range_m)) raise(flags, PixelFlag::Invalid);
+      result_.range_m(x, y) = has(flags, PixelFlag::Invalid) ? kNan : static_cast<float>(range_m);
+      result_.flags(x, y) = flags;
+    }
+  }
+
+ private:
+  [[nodiscard]] bool isKinect() const { return settings_.algorithm == DecodeSettings::Algorithm::KinectV2; }
+
+  /// φ / 2π in [0, 1) of p = A e^(−iφ), less the phase at range zero.
+  static double cyclesOf(std::complex<float> phasor, double zero_cycles) {
+    const double cycles =
+        static_cast<double>(std::atan2(-phasor.imag(), phasor.real())) / (2.0 * std::numbers::pi) - zero_cycles;
+    return cycles - std::floor(cycles);
+  }
+
+  /// The range, and the flags that say why it is not to be trusted.
+  [[nodiscard]] double measure(const std::vector<double>& cycles, const std::vector<double>& amplitudes, int x,
+                               int y, std::uint8_t& flags) const {
+    const double weakest = *std::min_element(amplitudes.begin(), amplitudes.end());
+    if (has(flags, PixelFlag::Saturated)) raise(flags, PixelFlag::Invalid);
+    if (!(weakest > 0.0 && weakest >= settings_.minimum_amplitude)) {
+      reject(flags, PixelFlag::LowAmplitude);
+      return static_cast<double>(kNan);
+    }
+    const Unwrapped joined = isKinect() ? unwrapKinectV2(cycles[0], cycles[1], cycles[2], unit_m_)
+                                        : unwrap_(cycles, amplitudes);
+    const double threshold =
+        isKinect() ? kinectV2Threshold(weakest * settings_.counts_per_electron,
+                                       settings_.strong_unwrap_threshold.in(radian),
+                                       settings_.unwrap_threshold.in(radian))
+                   : settings_.unwrap_threshold.in(radian);
+    if (joined.deviation_rad > threshold) reject(flags, PixelFlag::UnwrapUnreliable);
+    const double ray_x = ray_x_.empty() ? 0.0 : static_cast<double>(ray_x_(x, y));
+    const double range_m = rangeOfWay(joined.range_m, ray_x, settings_);
+    if (!(range_m >= settings_.nearest.in(metre) && range_m <= settings_.farthest.in(metre))) {
+      reject(flags, PixelFlag::OutOfRange);
+    }
+    return range_m;
+  }
+
+  const Samples& samples_;
+  const DecodeSettings& settings_;
+  const Image<float>& ray_x_;
+  RangeImage& result_;
+  Steps steps_;
+  Unwrapper unwrap_;
+  std::vector<double> zero_cycles_;
+  double unit_m_ = 0.0;
+};
+
+}  // namespace
+
+double kinectV2Threshold(double counts, double strong_rad, double weak_rad) {
+  // ln threshold = (ln counts · slope · log₁₀2 + offset) · log₂10
+  constexpr double kSlope = -0.5330578, kOffset = 0.7694894;
+  const double exponent = (std::log(counts) * kSlope * 0.301030 + kOffset) * 3.321928;
+  return std::clamp(std::exp(exponent), strong_rad, std::max(strong_rad, weak_rad));
+}
+
+RangeImage decode(const Samples& samples, const DecodeSettings& settings, const Image<float>& ray_x) {
+  const int width = samples.width(), height = samples.height();
+  RangeImage result{.range_m = Image<float>{width, height},
+                    .amplitude = Image<float>{width, height},
+                    .ambient = Image<float>{width, height},
+                    .flags = Image<std::uint8_t>{width, height},
+                    .phasors = std::vector(samples.frequencies.size(), Image<std::complex<float>>{width, height})};
+  const Decoder decoder{samples, settings, ray_x, result};
+  forRows(height, [&](int first_row, int last_row) {
+    for (int y = first_row; y < last_row; ++y) decoder.row(y);
+  });
+  return result;
+}
+
+}  // namespace toftwin::sim

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim/decode/demodulate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace toftwin::sim {
+namespace {
+
+const float* tapRow(const Samples& samples, std::size_t frequency, int step, int tap, int y) {
+  return &samples.tap(frequency, step, tap)(0, y);
+}
+
+/// sum[x] += weight · sample[x] for one step of one frequency.
+void addSample(const Samples& samples, std::size_t frequency, int step, int y, float weight, float* sum) {
+  const int width = samples.width();
+  const float* a = tapRow(samples, frequency, step, 0, y);
+  if (samples.taps == 1) {
+    for (int x = 0; x < width; ++x) sum[x] += weight * a[x];
+    return;
+  }
+  const float* b = tapRow(samples, frequency, step, 1, y);
+  for (int x = 0; x < width; ++x) sum[x] += weight * (a[x] - b[x]);
+}
+
+}  // namespace
+
+Steps::Steps(int count) {
+  for (int k = 0; k < count; ++k) {
+    const double theta = 2.0 * std::numbers::pi * k / count;
+    cosine.push_back(static_cast<float>(std::cos(theta)));
+    sine.push_back(static_cast<float>(std::sin(theta)));
+  }
+}
+
+void demodulateRow(const Samples& samples, const Steps& steps, std::size_t frequency, int y,
+                   std::complex<float>* phasors) {
+  const auto width = static_cast<std::size_t>(samples.width());
+  std::vector<float> real(width), imaginary(width);
+  const float scale = 2.0F / static_cast<float>(samples.steps);
+  for (int k = 0; k < samples.steps; ++k) {
+    const auto at = static_cast<std::size_t>(k);
+    addSample(samples, frequency, k, y, scale * steps.cosine[at], real.data());
+    addSample(samples, frequency, k, y, -scale * steps.sine[at], imaginary.data());
+  }
+  for (std::size_t x = 0; x < width; ++x) phasors[x] = {real[x], imaginary[x]};
+}
+
+void unmodulatedRow(const Samples& samples, int y, float* charge) {
+  const int width = samples.width();
+  std::fill_n(charge, width, 0.0F);
+  const auto exposures = samples.electrons.size() / static_cast<std::size_t>(samples.taps);
+  const float scale = 1.0F / static_cast<float>(exposures);
+  for (const Image<float>& image : samples.electrons) {
+    const float* electrons = &image(0, y);
+    for (int x = 0; x < width; ++x) charge[x] += scale * electrons[x];
+  }
+}
+
+void asymmetryRow(const Samples& samples, int y, float* electrons) {
+  const auto width = static_cast<std::size_t>(samples.width());
+  std::fill_n(electrons, width, 0.0F);
+  std::vector<float> sum(width);
+  const float scale = 2.0F / static_cast<float>(samples.steps);
+  const auto takeLargest = [&] {
+    for (std::size_t x = 0; x < width; ++x) electrons[x] = std::max(electrons[x], std::abs(sum[x]));
+    std::fill(sum.begin(), sum.end(), 0.0F);
+  };
+  for (std::size_t f = 0; f < samples.frequencies.size(); ++f) {
+    if (samples.steps % 2 == 0) {
+      for (int k = 0; k < samples.steps; ++k) {
+        addSample(samples, f, k, y, k % 2 == 0 ? scale : -scale, sum.data());
+      }
+      takeLargest();
+    }
+    if (samples.taps == 2) {
+      for (int k = 0; k < samples.steps; ++k) addSample(samples, f, k, y, scale, sum.data());
+      takeLargest();
+    }
+  }
+}
+
+}  // namespace toftwin::sim

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+#include <tuple>
+#include <type_traits>
+#include <utility>
+#include <variant>
+
+#include <toftwin/frame.h>
+
+#include "sim/effects/covariates.h"
+#include "sim/effects/random.h"
+#include "sim/images/light.h"
+#include "sim/images/range.h"
+#include "sim/images/samples.h"
+
+namespace toftwin::sim {
+
+/// What an effect is, for people and for discovery.
+struct About {
+  std::string_view name;  ///< the word in camera files: "lens_scatter"
+  std::string_view summary;
+  std::string_view reference;
+  Covariates explains;  ///< its output depends on exactly these
+};
+
+/// What an effect may depend on besides the image: when and where it was taken. The image may be a
+/// region of the full one; `left`, `top` say where it lies and `full_width` how wide the full one is.
+struct Conditions {
+  const Moment& moment;
+  int left = 0, top = 0;
+  int full_width = 0;
+
+  /// The number of the pixel (x, y) of the image within the full image: the key of its noise.
+  [[nodiscard]] std::uint32_t pixel(int x, int y) const {
+    return static_cast<std::uint32_t>(top + y) * static_cast<std::uint32_t>(full_width) +
+           static_cast<std::uint32_t>(left + x);
+  }
+};
+
+/// An imperfection of a camera: an aggregate of parameters with unit types. It acts on exactly one of
+/// Light, Samples and RangeImage, by a pure function of the image, the conditions and the keyed random
+/// numbers. See docs/add-an-effect.md.
+template <class E, class On>
+concept ActsOn = requires(const E& effect, On image, const Conditions& now, const Random& random) {
+  { effect.apply(std::move(image), now, random) } -> std::same_as<On>;
+};
+
+template <class E>
+concept Effect = std::is_aggregate_v<E> && requires {
+  { E::about } -> std::convertible_to<About>;
+  { E::none() } -> std::same_as<E>;
+} && ((ActsOn<E, Light> ? 1 : 0) + (ActsOn<E, Samples> ? 1 : 0) + (ActsOn<E, RangeImage> ? 1 : 0) == 1);
+
+/// The image type an effect acts on.
+template <Effect E>
+using ImageOf = std::conditional_t<ActsOn<E, Light>, Light,
+                                   std::conditional_t<ActsOn<E, Samples>, Samples, RangeImage>>;
+
+/// Where in the chain an effect acts, in words.
+template <Effect E>
+constexpr std::string_view stageOf() {
+  if constexpr (ActsOn<E, Light>) return "light";
+  if constexpr (ActsOn<E, Samples>) return "samples";
+  return "range";
+}
+
+/// A closed list of effects.
+template <Effect... Es>
+struct EffectList {
+  using Any = std::variant<Es...>;
+  static constexpr std::size_t kSize = sizeof...(Es);
+
+  /// Calls `visitor.template operator()<E>()` for each effect type, in order.
+  template <class Visitor>
+  static void forEach(Visitor&& visitor) {
+    (visitor.template operator()<Es>(), ...);
+  }
+};
+
+}  // namespace toftwin::sim

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include <toftwin/units.h>
+
+#include "protocol/settings/settings.h"
+#include "sim/decode/decode.h"
+#include "sim/effects/effects.h"
+#include "sim/sensor/waveform.h"
+
+namespace toftwin::sim {
+
+/// The schema of a camera file (docs/camera-file.md), all but its effects.
+struct CameraFile {
+  struct Lens {
+    int width = 320, height = 240;
+    double fx = 300.0, fy = 300.0, cx = 159.5, cy = 119.5;
+    std::array<double, 5> distortion{};
+
+    template <class Visitor>
+    void visit(Visitor& v) {
+      v.number("width", width, {1, 8192}, "pixels");
+      v.number("height", height, {1, 8192}, "pixels");
+      v.number("fx", fx, {1.0, 1e6}, "focal length, pixels");
+      v.number("fy", fy, {1.0, 1e6}, "focal length, pixels");
+      v.number("cx", cx, {-1e5, 1e5}, "principal point; (0, 0) is the centre of the top left pixel");
+      v.number("cy", cy, {-1e5, 1e5}, "principal point");
+      v.numbers("distortion", distortion, {-100.0, 100.0}, "k1 k2 p1 p2 k3 as in OpenCV");
+    }
+  };
+
+  struct Emitter {
+    std::array<double, 3> position_mm{};
+    std::array<double, 3> axis{0.0, 0.0, 1.0};
+    Length radius = 0_mm;
+    double power_w = 1.0;
+    double lobe_exponent = 1.0;
+    Angle half_angle = 90_deg;
+    bool isotropic = false;
+
+    template <class Visitor>
+    void visit(Visitor& v) {
+      v.numbers("position_mm", position_mm, {-1e4, 1e4}, "from the lens: right, down, ahead");
+      v.numbers("axis", axis, {-1.0, 1.0}, "where it points, in the camera's frame; any length but 0");
+      v.quantity("radius", radius, millimetre, {0.0, 1000.0}, "of the shining disc; 0: a point");
+      v.number("power_w", power_w, {0.0, 1e6}, "mean optical power of the uncut lobe over the half space");
+      v.number("lobe_exponent", lobe_exponent, {0.0, 1000.0}, "m of I = power (m + 1) / 2 pi cos^m: 1 is Lambertian");
+      v.quantity("half_angle", half_angle, degree, {0.1, 90.0}, "no light outside this cone");
+      v.flag("isotropic", isotropic, "the same in all directions instead, power / 4 pi");
+    }
+  };
+
+  struct Modulation {
+    Frequency frequency = 20_MHz;
+    double contrast = 0.5;
+    Duration exposure = 1_ms;
+    Waveform emitted, demodulating;
+
+    template <class Visitor>
+    void visit(Visitor& v) {
+      const auto shapes = {std::pair{"sine", Waveform::Shape::Sine}, std::pair{"square", Waveform::Shape::Square},
+                           std::pair{"clipped_sine", Waveform::Shape::ClippedSine},
+                           std::pair{"impulse", Waveform::Shape::Impulse}};
+      v.quantity("frequency", frequency, megahertz, {0.1, 1000.0}, "modulation frequency, whole kilohertz");
+      v.number("contrast", contrast, {1e-4, 1.0},
+               "amplitude of the demodulated fundamental per collected electron, waveforms included");
+      v.quantity("exposure", exposure, microsecond, {1.0, 20'000.0}, "of one raw exposure");
+      v.choice("emitted", emitted.shape, shapes, "the light's waveform");
+      v.number("emitted_duty", emitted.duty, {0.01, 0.99}, "square: share of the period that is on");
+      v.number("emitted_clip", emitted.clip, {0.05, 1.0}, "clipped_sine: cut at this share of the amplitude");
+      v.quantity("rise", emitted.rise, nanosecond, {0.0, 1000.0}, "time constant of the emitter's low pass");
+      v.choice("demodulated", demodulating.shape, shapes,
+               "the pixel's reference; impulse: the correlation function is `emitted` itself");
+      v.number("demodulated_duty", demodulating.duty, {0.01, 0.99}, "square: share of the period that is on");
+    }
+  };
+
+  struct Sampling {
+    int steps = 4;
+    int taps = 2;
+    int harmonics = 1;
+    Duration gap = 500_us;
+    Duration frame_interval = 50_ms;
+    bool factory_calibrated = true;
+
+    template <class Visitor>
+    void visit(Visitor& v) {
+      v.number("steps", steps, {3, 16}, "raw exposures per frequency, the reference shifted by 1/steps each");
+      v.number("taps", taps, {1, 2}, "2: what one tap misses the other collects, and their difference counts");
+      v.number("harmonics", harmonics, {1, 31}, "of the modulation that are traced; a sine needs 1");
+      v.quantity("gap", gap, microsecond, {0.0, 100'000.0}, "between raw exposures, for reading out");
+      v.quantity("frame_interval", frame_interval, millisecond, {1.0, 100'000.0}, "from frame to frame");
+      v.flag("factory_calibrated", factory_calibrated,
+             "the device knows and subtracts the constant delay of its waveforms' fundamental");
+    }
+  };
+
+  struct Pixel {
+    double electrons_per_radiance_s = 5e7;
+
+    template <class Visitor>
+    void visit(Visitor& v) {
+      v.number("electrons_per_radiance_s", electrons_per_radiance_s, {1.0, 1e15},
+               "electrons in both taps per W/(m² sr) at the lens and second: π/4 T A R / (F² q) with lens "
+               "transmission T, F-number F, pixel area A, responsivity R in A/W, q = 1.602e-19 C");
+    }
+  };
+
+  std::string model = "generic";
+  Lens lens;
+  std::vector<Emitter> emitters;
+  std::vector<Modulation> modulations;
+  Sampling sampling;
+  Pixel pixel;
+  DecodeSettings decoder;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.text("model", model, "maker and name, as clients see it");
+    v.group("lens", lens, "");
+    v.group("emitter", emitters, "");
+    v.group("modulation", modulations, "");
+    v.group("sampling", sampling, "");
+    v.group("pixel", pixel, "");
+    v.group("decoder", decoder, "");
+  }
+};
+
+/// Reads the file and its effects, and checks what no single key can say. Errors are left in the table.
+CameraFile readCameraFile(settings::Table& table, std::vector<AnyEffect>& effects);
+
+}  // namespace toftwin::sim

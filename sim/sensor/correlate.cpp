@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim/sensor/correlate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "sim/images/rows.h"
+
+namespace toftwin::sim {
+namespace {
+
+/// ½ g m ĉₙ e^(i n θₖ): what a phasor is multiplied with at one step.
+struct Weight {
+  int harmonic;
+  float real, imaginary;
+};
+
+std::vector<Weight> weightsOf(const Response& response, double theta) {
+  std::vector<Weight> weights;
+  for (std::size_t i = 0; i < response.harmonics.size(); ++i) {
+    const int n = static_cast<int>(i) + 1;
+    const std::complex<double> weight = 0.5 * response.electrons_per_radiance * response.contrast *
+                                        response.harmonics[i] * std::polar(1.0, n * theta);
+    if (std::abs(response.harmonics[i]) < 1e-12) continue;
+    weights.push_back({n, static_cast<float>(weight.real()), static_cast<float>(weight.imag())});
+  }
+  return weights;
+}
+
+}  // namespace
+
+Angle Response::zeroPhase() const {
+  return (harmonics.empty() ? 0.0 : -std::arg(harmonics.front())) * radian;
+}
+
+double Response::leastCharge() const {
+  constexpr int kPhases = 2048;
+  double least = 1.0;
+  for (int i = 0; i < kPhases; ++i) {
+    double modulated = 0.0;
+    for (std::size_t n = 0; n < harmonics.size(); ++n) {
+      const double angle = 2.0 * std::numbers::pi * i / kPhases * static_cast<double>(n + 1);
+      modulated += (harmonics[n] * std::polar(1.0, angle)).real();
+    }
+    least = std::min(least, 1.0 - contrast * std::abs(modulated));
+  }
+  return least;
+}
+
+std::vector<std::complex<double>> relativeHarmonics(const Waveform& emitted, const Waveform& demodulating,
+                                                    Frequency frequency, int count) {
+  std::vector<std::complex<double>> relative;
+  double fundamental = 0.0;
+  for (int n = 1; n <= count; ++n) {
+    const std::complex<double> c =
+        emitted.coefficient(n, frequency) * std::conj(demodulating.coefficient(n, frequency));
+    if (n == 1) fundamental = std::abs(c);
+    if (fundamental < 1e-9) return {};
+    relative.push_back(c / fundamental);
+  }
+  return relative;
+}
+
+Samples correlate(const Light& light, const std::vector<Response>& responses, int steps, int taps) {
+  const int width = light.width(), height = light.height();
+  Samples samples{.steps = steps, .taps = taps};
+  samples.electrons.assign(responses.size() * static_cast<std::size_t>(steps * taps), Image<float>{width, height});
+  std::size_t next_image = 0;
+  for (std::size_t f = 0; f < responses.size(); ++f) {
+    samples.frequencies.push_back(responses[f].frequency);
+    const auto half_gain = static_cast<float>(0.5 * responses[f].electrons_per_radiance);
+    for (int k = 0; k < steps; ++k) {
+      const std::vector<Weight> weights = weightsOf(responses[f], 2.0 * std::numbers::pi * k / steps);
+      Image<float>* taps_of_step = &samples.electrons[next_image];
+      next_image += static_cast<std::size_t>(taps);
+      forRows(height, [&](int first_row, int last_row) {
+        std::vector<float> modulated(static_cast<std::size_t>(width));
+        for (int y = first_row; y < last_row; ++y) {
+          std::fill(modulated.begin(), modulated.end(), 0.0F);
+          for (const Weight& weight : weights) {
+            const std::complex<float>* phasor = &light.phasor(f, weight.harmonic)(0, y);
+            for (int x = 0; x < width; ++x) {
+              modulated[static_cast<std::size_t>(x)] +=
+                  weight.real * phasor[x].real() - weight.imaginary * phasor[x].imag();
+            }
+          }
+          const float* steady = &light.steady(0, y);
+          const float* ambient = &light.ambient(0, y);
+          for (int tap = 0; tap < taps; ++tap) {
+            float* electrons = &taps_of_step[tap](0, y);
+            const float sign = tap == 0 ? 1.0F : -1.0F;
+            for (int x = 0; x < width; ++x) {
+              electrons[x] = half_gain * (steady[x] + ambient[x]) + sign * modulated[static_cast<std::size_t>(x)];
+            }
+          }
+        }
+      });
+    }
+  }
+  return samples;
+}
+
+}  // namespace toftwin::sim

@@ -1,0 +1,292 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim/sensor/sensor_model.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <utility>
+
+#include "sim/decode/decode.h"
+#include "sim/images/content_hash.h"
+#include "sim/sensor/camera_file.h"
+#include "sim/sensor/correlate.h"
+#include "sim/sensor/parameters.h"
+
+namespace toftwin::sim {
+
+struct SensorModel::Impl {
+  CameraFile file;
+  std::vector<AnyEffect> effects;
+  // Derived from the two above by build():
+  CameraInfo camera;
+  std::string id;
+  std::vector<Response> responses;
+  DecodeSettings decoder;
+  Rays rays;
+};
+
+namespace {
+
+std::string canonicalText(CameraFile file, const std::vector<AnyEffect>& effects) {
+  CanonicalText canonical;
+  file.visit(canonical);
+  for (AnyEffect any : effects) {
+    std::visit(
+        [&]<class E>(E& effect) {
+          canonical.written += fmt::format("effect {}\n", E::about.name);
+          effect.visit(canonical);
+        },
+        any);
+  }
+  return canonical.written;
+}
+
+CameraInfo cameraInfo(const CameraFile::Lens& lens) {
+  CameraInfo camera{.width = lens.width, .height = lens.height, .fx = lens.fx, .fy = lens.fy,
+                    .cx = lens.cx, .cy = lens.cy, .distortion = lens.distortion, .calibration_id = {}};
+  CanonicalText canonical;
+  CameraFile::Lens copy = lens;
+  copy.visit(canonical);
+  camera.calibration_id = contentHash(canonical.written);
+  return camera;
+}
+
+SensorModel::Rays raysOf(const CameraInfo& camera) {
+  SensorModel::Rays rays{{camera.width, camera.height}, {camera.width, camera.height}};
+  for (int y = 0; y < camera.height; ++y) {
+    for (int x = 0; x < camera.width; ++x) {
+      const Direction<Camera> ray = rayThroughPixel(camera, x, y);
+      rays.x(x, y) = static_cast<float>(ray.v.x);
+      rays.z(x, y) = static_cast<float>(ray.v.z);
+    }
+  }
+  return rays;
+}
+
+std::vector<Response> responsesOf(const CameraFile& file) {
+  std::vector<Response> responses;
+  for (const auto& modulation : file.modulations) {
+    responses.push_back(
+        {.frequency = modulation.frequency,
+         .contrast = modulation.contrast,
+         .electrons_per_radiance = file.pixel.electrons_per_radiance_s * modulation.exposure.in(second),
+         .harmonics = relativeHarmonics(modulation.emitted, modulation.demodulating, modulation.frequency,
+                                        file.sampling.harmonics)});
+  }
+  return responses;
+}
+
+/// Applies those effects that act on this type of image, in their order.
+template <class Of>
+Of applyAll(Of image, const std::vector<AnyEffect>& effects, const Conditions& now, std::uint64_t seed,
+            std::uint64_t frame) {
+  for (std::size_t place = 0; place < effects.size(); ++place) {
+    std::visit(
+        [&]<class E>(const E& effect) {
+          if constexpr (std::is_same_v<ImageOf<E>, Of>) {
+            image = effect.apply(std::move(image), now, Random{seed, frame, effectKey(E::about.name, place)});
+          }
+        },
+        effects[place]);
+  }
+  return image;
+}
+
+bool anyActsOnLight(const std::vector<AnyEffect>& effects) {
+  for (const AnyEffect& any : effects) {
+    if (std::visit([]<class E>(const E&) { return std::is_same_v<ImageOf<E>, Light>; }, any)) return true;
+  }
+  return false;
+}
+
+Image<float> cropped(const Image<float>& full, int left, int top, int width, int height) {
+  Image<float> part{width, height};
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) part(x, y) = full(left + x, top + y);
+  }
+  return part;
+}
+
+Result<> firstProblem(const NumberSetter& setter, std::string_view parameter, double value) {
+  if (setter.problem.empty()) return {};
+  return Error{Error::Code::InvalidArgument,
+               fmt::format("{} = {:.12g} is out of bounds: it {}", parameter, value, setter.problem)};
+}
+
+}  // namespace
+
+std::shared_ptr<const SensorModel::Impl> SensorModel::build(Impl impl) {
+  impl.camera = cameraInfo(impl.file.lens);
+  impl.id = contentHash(canonicalText(impl.file, impl.effects));
+  impl.responses = responsesOf(impl.file);
+  impl.decoder = impl.file.decoder;
+  if (impl.file.sampling.factory_calibrated) {
+    for (const Response& response : impl.responses) impl.decoder.zero_phase.push_back(response.zeroPhase());
+  }
+  if (impl.rays.x.empty()) impl.rays = raysOf(impl.camera);
+  return std::make_shared<const Impl>(std::move(impl));
+}
+
+Result<SensorModel> SensorModel::load(const std::filesystem::path& file) {
+  auto table = settings::Table::load(file);
+  if (!table) return table.error();
+  Impl impl;
+  impl.file = readCameraFile(*table, impl.effects);
+  if (auto checked = table->check(); !checked) return checked.error();
+  return SensorModel{build(std::move(impl))};
+}
+
+Result<SensorModel> SensorModel::parse(std::string_view toml, const std::filesystem::path& name) {
+  auto table = settings::Table::parse(toml, name);
+  if (!table) return table.error();
+  Impl impl;
+  impl.file = readCameraFile(*table, impl.effects);
+  if (auto checked = table->check(); !checked) return checked.error();
+  return SensorModel{build(std::move(impl))};
+}
+
+const std::string& SensorModel::model() const { return impl_->file.model; }
+const CameraInfo& SensorModel::camera() const { return impl_->camera; }
+const std::string& SensorModel::id() const { return impl_->id; }
+const std::vector<AnyEffect>& SensorModel::effects() const { return impl_->effects; }
+const SensorModel::Rays& SensorModel::rays() const { return impl_->rays; }
+Duration SensorModel::frameInterval() const { return impl_->file.sampling.frame_interval; }
+
+std::vector<std::string> SensorModel::effectNames() const {
+  std::vector<std::string> names;
+  for (const AnyEffect& any : impl_->effects) {
+    names.push_back(std::visit([]<class E>(const E&) { return std::string{E::about.name}; }, any));
+  }
+  return names;
+}
+
+std::vector<Exposure> SensorModel::exposures(DeviceTime start) const {
+  std::vector<Exposure> all;
+  for (const auto& modulation : impl_->file.modulations) {
+    for (int k = 0; k < impl_->file.sampling.steps; ++k) {
+      all.push_back({start, modulation.exposure, modulation.frequency});
+      start.ns += std::llround((modulation.exposure + impl_->file.sampling.gap).in(nanosecond));
+    }
+  }
+  return all;
+}
+
+TraceRequest SensorModel::traceRequest() const {
+  TraceRequest request;
+  request.camera = impl_->camera;
+  request.harmonics = impl_->file.sampling.harmonics;
+  for (const auto& modulation : impl_->file.modulations) request.frequencies.push_back(modulation.frequency);
+  for (const auto& emitter : impl_->file.emitters) {
+    const auto& p = emitter.position_mm;
+    request.emitters.push_back({.position_m = Vec3d{p[0], p[1], p[2]} * 1e-3,
+                                .axis = normalised(Vec3d{emitter.axis[0], emitter.axis[1], emitter.axis[2]}),
+                                .radius = emitter.radius,
+                                .power_w = emitter.power_w,
+                                .lobe_exponent = emitter.lobe_exponent,
+                                .half_angle = emitter.half_angle,
+                                .isotropic = emitter.isotropic});
+  }
+  return request;
+}
+
+SensorModel::Exposed SensorModel::expose(const Light& light, const Moment& moment, std::uint64_t seed,
+                                         std::uint64_t frame, int region_x, int region_y) const {
+  return readOut(collect(light, moment, seed, frame, region_x, region_y), moment, seed, frame, region_x,
+                 region_y);
+}
+
+Samples SensorModel::collect(const Light& light, const Moment& moment, std::uint64_t seed, std::uint64_t frame,
+                             int region_x, int region_y) const {
+  const CameraFile::Sampling& sampling = impl_->file.sampling;
+  if (!anyActsOnLight(impl_->effects)) {
+    return correlate(light, impl_->responses, sampling.steps, sampling.taps);
+  }
+  const Conditions now{moment, region_x, region_y, impl_->camera.width};
+  const Light at_pixel = applyAll(light, impl_->effects, now, seed, frame);
+  return correlate(at_pixel, impl_->responses, sampling.steps, sampling.taps);
+}
+
+SensorModel::Exposed SensorModel::readOut(Samples collected, const Moment& moment, std::uint64_t seed,
+                                          std::uint64_t frame, int region_x, int region_y) const {
+  const Conditions now{moment, region_x, region_y, impl_->camera.width};
+  Samples counted = applyAll(std::move(collected), impl_->effects, now, seed, frame);
+  const bool is_whole =
+      counted.width() == impl_->camera.width && counted.height() == impl_->camera.height;
+  RangeImage range = is_whole ? decode(counted, impl_->decoder, impl_->rays.x)
+                              : decode(counted, impl_->decoder,
+                                       cropped(impl_->rays.x, region_x, region_y, counted.width(), counted.height()));
+  range = applyAll(std::move(range), impl_->effects, now, seed, frame);
+  return {.samples = std::move(counted), .range = std::move(range)};
+}
+
+bool SensorModel::collectsTheSameEachFrame() const {
+  for (const AnyEffect& any : impl_->effects) {
+    const bool changes = std::visit(
+        []<class E>(const E&) {
+          constexpr Covariates on = E::about.explains;
+          return std::is_same_v<ImageOf<E>, Light> &&
+                 (on.contains(Covariate::Frame) || on.contains(Covariate::Time) || on.contains(Covariate::Temperature));
+        },
+        any);
+    if (changes) return false;
+  }
+  return true;
+}
+
+std::vector<std::string> SensorModel::parameterNames() const {
+  std::vector<std::string> names{"exposure_us"};
+  for (AnyEffect any : impl_->effects) {
+    std::visit(
+        [&]<class E>(E& effect) {
+          NumberSetter lister{"", 0.0};
+          effect.visit(lister);
+          for (const std::string& key : lister.names) names.push_back(fmt::format("{}.{}", E::about.name, key));
+        },
+        any);
+  }
+  return names;
+}
+
+Result<SensorModel> SensorModel::with(std::string_view parameter, double value) const {
+  Impl changed = *impl_;
+  changed.decoder = {};
+  bool is_known = false;
+  if (parameter == "exposure_us") {
+    is_known = true;
+    for (auto& modulation : changed.file.modulations) {
+      if (!(value >= 1.0 && value <= 20'000.0)) {
+        return Error{Error::Code::InvalidArgument,
+                     fmt::format("exposure_us = {:.12g} is out of bounds: it must be 1 to 20000 us", value)};
+      }
+      modulation.exposure = value * microsecond;
+    }
+  }
+  for (AnyEffect& any : changed.effects) {
+    const Result<> done = std::visit(
+        [&]<class E>(E& effect) -> Result<> {
+          const std::string prefix = fmt::format("{}.", E::about.name);
+          if (!parameter.starts_with(prefix)) return {};
+          NumberSetter setter{parameter.substr(prefix.size()), value};
+          effect.visit(setter);
+          is_known |= setter.is_set;
+          return firstProblem(setter, parameter, value);
+        },
+        any);
+    if (!done) return done.error();
+  }
+  if (!is_known) {
+    return Error{Error::Code::NotFound,
+                 fmt::format("{} has no parameter \"{}\"; there are: {}", model(), parameter,
+                             fmt::join(parameterNames(), ", "))};
+  }
+  return SensorModel{build(std::move(changed))};
+}
+
+SensorModel SensorModel::withEffects(std::vector<AnyEffect> effects) const {
+  Impl changed = *impl_;
+  changed.decoder = {};
+  changed.effects = std::move(effects);
+  return SensorModel{build(std::move(changed))};
+}
+
+}  // namespace toftwin::sim

@@ -1,0 +1,330 @@
+// SPDX-License-Identifier: Apache-2.0
+// What every effect of the list must obey, whatever it does.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <set>
+
+#include "protocol/settings/describe.h"
+#include "sim/effects/effects.h"
+#include "tests/sim/synthetic_light.h"
+
+namespace toftwin::sim {
+namespace {
+
+constexpr int kWidth = 24, kHeight = 16;
+constexpr int kProbeX = 6, kProbeY = 5;
+constexpr std::uint64_t kSeed = 4711;
+
+/// A small world in which each covariate is one number. The scene is its own mirror image both ways.
+struct Scenario {
+  double time_s = 60.0, temperature_c = 30.0, ambient_klx = 10.0, exposure = 1.0;
+  double amplitude = 1.0;   ///< of the probe alone
+  double range_m = 1.7;     ///< of the probe alone
+  double neighbours = 3.0;  ///< radiance of a bright patch in the middle
+  std::uint64_t frame = 3;
+};
+
+Scenario perturbed(Covariate covariate) {
+  Scenario scenario;
+  switch (covariate) {
+    case Covariate::Time: scenario.time_s = 200.0; break;
+    case Covariate::Temperature: scenario.temperature_c = 45.0; break;
+    case Covariate::Ambient: scenario.ambient_klx = 37.0; break;
+    case Covariate::Exposure: scenario.exposure = 1.37; break;
+    case Covariate::Amplitude: scenario.amplitude = 1.23; break;
+    case Covariate::Range: scenario.range_m = 2.3; break;
+    case Covariate::Neighbours: scenario.neighbours = 5.0; break;
+    case Covariate::Frame: scenario.frame = 4; break;
+    case Covariate::Position: break;  // another probe in the same scenario
+  }
+  return scenario;
+}
+
+bool isProbe(int x, int y) {
+  return (x == kProbeX || x == kWidth - 1 - kProbeX) && (y == kProbeY || y == kHeight - 1 - kProbeY);
+}
+
+Way wayAt(const Scenario& scenario, int x, int y) {
+  if (isProbe(x, y)) return {scenario.amplitude, scenario.range_m};
+  const bool is_patch = x >= 10 && x < kWidth - 10 && y >= 6 && y < kHeight - 6;
+  return is_patch ? Way{scenario.neighbours, 0.9} : Way{0.8, 2.0};
+}
+
+Moment momentOf(const Scenario& scenario) {
+  Moment moment;
+  moment.exposures = {{.start = {}, .duration = scenario.exposure * millisecond, .modulation = 20_MHz}};
+  moment.since_power_on = scenario.time_s * second;
+  moment.temperatures = {{"illumination", scenario.temperature_c * celsius}};
+  moment.ambient = scenario.ambient_klx * kilolux;
+  return moment;
+}
+
+template <class Of>
+Of imageOf(const Scenario& scenario);
+
+template <>
+Light imageOf<Light>(const Scenario& scenario) {
+  return syntheticLight(kWidth, kHeight, {20_MHz}, 2,
+                        [&](int x, int y) { return std::vector<Way>{wayAt(scenario, x, y)}; });
+}
+
+/// Two taps, four steps, contrast one half, and taps full enough for the default well to overflow.
+template <>
+Samples imageOf<Samples>(const Scenario& scenario) {
+  Samples samples;
+  samples.frequencies = {20_MHz};
+  samples.taps = 2;
+  samples.electrons.assign(8, {kWidth, kHeight});
+  for (std::size_t i = 0; i < 8; ++i) {
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < kWidth; ++x) {
+        const Way way = wayAt(scenario, x, y);
+        const double phase = 4.0 * std::numbers::pi * 20e6 * way.range_m / kSpeedOfLight_m_per_s;
+        const double modulated = 0.5 * std::cos(phase - 0.5 * std::numbers::pi * static_cast<double>(i / 2));
+        const double charge = 5e4 * way.radiance * (1.0 + (i % 2 == 0 ? modulated : -modulated));
+        samples.electrons[i](x, y) =
+            static_cast<float>(scenario.exposure * (charge + 103.7 * scenario.ambient_klx));
+      }
+    }
+  }
+  return samples;
+}
+
+template <>
+RangeImage imageOf<RangeImage>(const Scenario& scenario) {
+  RangeImage image{.range_m = {kWidth, kHeight},
+                   .amplitude = {kWidth, kHeight},
+                   .ambient = {kWidth, kHeight, static_cast<float>(scenario.ambient_klx)},
+                   .flags = {kWidth, kHeight},
+                   .phasors = {}};
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      image.range_m(x, y) = static_cast<float>(wayAt(scenario, x, y).range_m);
+      image.amplitude(x, y) = static_cast<float>(scenario.exposure * wayAt(scenario, x, y).radiance);
+    }
+  }
+  return image;
+}
+
+/// All numbers of one pixel, phasors seen from the phase that the pixel's own range gives them.
+std::vector<double> valuesAt(const Light& light, int x, int y) {
+  std::vector<double> values{static_cast<double>(light.steady(x, y)), static_cast<double>(light.ambient(x, y))};
+  for (int n = 1; n <= light.harmonics; ++n) {
+    const double phase = 4.0 * std::numbers::pi * n * light.frequencies[0].in(hertz) *
+                         static_cast<double>(light.truth.range_m(x, y)) / kSpeedOfLight_m_per_s;
+    const std::complex<double> turned = std::complex<double>(light.phasor(0, n)(x, y)) * std::polar(1.0, phase);
+    values.push_back(turned.real());
+    values.push_back(turned.imag());
+  }
+  return values;
+}
+std::vector<double> valuesAt(const Samples& samples, int x, int y) {
+  std::vector<double> values;
+  for (const auto& image : samples.electrons) values.push_back(static_cast<double>(image(x, y)));
+  return values;
+}
+std::vector<double> valuesAt(const RangeImage& image, int x, int y) {
+  return {static_cast<double>(image.range_m(x, y)), static_cast<double>(image.amplitude(x, y)),
+          static_cast<double>(image.ambient(x, y))};
+}
+
+/// What an effect's contribution is measured against: the pixel's own signal, or a metre.
+double scaleOf(const Light&, const Scenario& scenario) { return scenario.amplitude; }
+double scaleOf(const Samples&, const Scenario& scenario) { return 2.5e4 * scenario.exposure * scenario.amplitude; }
+double scaleOf(const RangeImage&, const Scenario&) { return 1.0; }
+
+template <class E>
+auto applied(const E& effect, ImageOf<E> image, const Scenario& scenario) {
+  const Moment moment = momentOf(scenario);
+  return effect.apply(std::move(image), {moment, 0, 0, kWidth}, Random{kSeed, scenario.frame, effectKey(E::about.name, 0)});
+}
+
+/// What the effect added to a pixel, relative to the pixel's own signal.
+template <class E>
+std::vector<double> contribution(const E& effect, const Scenario& scenario, int x, int y) {
+  const auto before = imageOf<ImageOf<E>>(scenario);
+  const auto after = applied(effect, before, scenario);
+  std::vector<double> values = valuesAt(after, x, y), without = valuesAt(before, x, y);
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] = (values[i] - without[i]) / scaleOf(before, scenario);
+  return values;
+}
+
+/// Different by more than rounding to float (a few 1e-7 of values up to 4 times the scale) can do.
+bool differ(const std::vector<double>& a, const std::vector<double>& b) {
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    if (std::abs(a[i] - b[i]) > 4e-6) return true;
+  }
+  return false;
+}
+
+/// Mean and standard deviation of the first contribution over frames, for effects that are noise.
+template <class E>
+std::pair<double, double> overFrames(const E& effect, int x, int y, int frames) {
+  double sum = 0.0, squares = 0.0;
+  for (int frame = 0; frame < frames; ++frame) {
+    Scenario scenario;
+    scenario.frame = static_cast<std::uint64_t>(frame);
+    const double value = contribution(effect, scenario, x, y)[0];
+    sum += value;
+    squares += value * value;
+  }
+  const double mean = sum / frames;
+  return {mean, std::sqrt(squares / frames - mean * mean)};
+}
+
+/// Whether the contribution at mirrored probes differs; of noise, whether its distribution does
+/// (mean and standard deviation over 400 frames, 5 standard errors: 1e-6 false alarms each).
+template <class E>
+bool dependsOnPosition(const E& effect) {
+  const std::pair<int, int> probes[] = {{kWidth - 1 - kProbeX, kProbeY}, {kProbeX, kHeight - 1 - kProbeY}};
+  for (const auto& [x, y] : probes) {
+    if (!E::about.explains.contains(Covariate::Frame)) {
+      if (differ(contribution(effect, {}, kProbeX, kProbeY), contribution(effect, {}, x, y))) return true;
+      continue;
+    }
+    constexpr int kFrames = 400;
+    const auto [mean_a, sigma_a] = overFrames(effect, kProbeX, kProbeY, kFrames);
+    const auto [mean_b, sigma_b] = overFrames(effect, x, y, kFrames);
+    if (std::abs(mean_a - mean_b) > 5.0 * std::hypot(sigma_a, sigma_b) / std::sqrt(kFrames)) return true;
+    if (std::abs(std::log(sigma_a / sigma_b)) > 5.0 / std::sqrt(kFrames)) return true;
+  }
+  return false;
+}
+
+template <class E>
+class EffectLaws : public testing::Test {};
+
+template <class List>
+struct AsTypes;
+template <class... Es>
+struct AsTypes<EffectList<Es...>> {
+  using type = testing::Types<Es...>;
+};
+struct Names {
+  template <class E>
+  static std::string GetName(int) {
+    return std::string{E::about.name};
+  }
+};
+TYPED_TEST_SUITE(EffectLaws, AsTypes<AllEffects>::type, Names);
+
+template <class T>
+bool sameBits(const Image<T>& a, const Image<T>& b) {
+  return a.size() == b.size() && std::memcmp(a.pixels().data(), b.pixels().data(), a.size() * sizeof(T)) == 0;
+}
+template <class T>
+bool sameBits(const std::vector<Image<T>>& a, const std::vector<Image<T>>& b) {
+  if (a.size() != b.size()) return false;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    if (!sameBits(a[i], b[i])) return false;
+  }
+  return true;
+}
+bool sameBits(const Light& a, const Light& b) {
+  return sameBits(a.phasors, b.phasors) && sameBits(a.steady, b.steady) && sameBits(a.ambient, b.ambient);
+}
+bool sameBits(const Samples& a, const Samples& b) {
+  return sameBits(a.electrons, b.electrons) && sameBits(a.flags, b.flags);
+}
+bool sameBits(const RangeImage& a, const RangeImage& b) {
+  return sameBits(a.range_m, b.range_m) && sameBits(a.amplitude, b.amplitude) && sameBits(a.ambient, b.ambient) &&
+         sameBits(a.flags, b.flags);
+}
+
+TYPED_TEST(EffectLaws, NoneChangesNothingBitForBit) {
+  const auto before = imageOf<ImageOf<TypeParam>>({});
+  EXPECT_TRUE(sameBits(applied(TypeParam::none(), before, {}), before));
+}
+
+TYPED_TEST(EffectLaws, DefaultsChangeSomething) {
+  const auto before = imageOf<ImageOf<TypeParam>>({});
+  EXPECT_FALSE(sameBits(applied(TypeParam{}, before, {}), before));
+}
+
+TYPED_TEST(EffectLaws, SameInputSameOutput) {
+  const auto before = imageOf<ImageOf<TypeParam>>({});
+  EXPECT_TRUE(sameBits(applied(TypeParam{}, before, {}), applied(TypeParam{}, before, {})));
+}
+
+TYPED_TEST(EffectLaws, DependsOnExactlyTheCovariatesItSays) {
+  for (const auto& [covariate, name] : kCovariateNames) {
+    const bool depends =
+        covariate == Covariate::Position
+            ? dependsOnPosition(TypeParam{})
+            : differ(contribution(TypeParam{}, {}, kProbeX, kProbeY),
+                     contribution(TypeParam{}, perturbed(covariate), kProbeX, kProbeY));
+    EXPECT_EQ(depends, TypeParam::about.explains.contains(covariate)) << name;
+  }
+}
+
+/// A visitor that checks every number against its bounds.
+struct BoundsCheck {
+  template <class D>
+  void quantity(const char* name, Quantity<D>& value, Unit<D> unit, Bounds bounds, const char* help) {
+    number(name, value.in(unit), bounds, help);
+  }
+  template <class Number>
+  void number(const char* name, Number value, Bounds bounds, const char* help) {
+    ++count;
+    EXPECT_TRUE(bounds.contains(static_cast<double>(value))) << name;
+    EXPECT_LT(bounds.min, bounds.max) << name;
+    EXPECT_GT(std::strlen(help), 3u) << name;
+  }
+  int count = 0;
+};
+
+TYPED_TEST(EffectLaws, DefaultsAndNoneLieInBounds) {
+  for (TypeParam effect : {TypeParam{}, TypeParam::none()}) {
+    BoundsCheck check;
+    effect.visit(check);
+    EXPECT_GT(check.count, 0);
+  }
+}
+
+TYPED_TEST(EffectLaws, SaysWhatItIs) {
+  const About& about = TypeParam::about;
+  EXPECT_FALSE(about.name.empty());
+  EXPECT_EQ(about.name.find_first_not_of("abcdefghijklmnopqrstuvwxyz_0123456789"), std::string_view::npos);
+  EXPECT_GT(about.summary.size(), 10u);
+  EXPECT_FALSE(about.reference.empty());
+}
+
+// Light has no invalid pixels: a ray that meets nothing brings no light, which is a number.
+TYPED_TEST(EffectLaws, InvalidPixelsStayInvalid) {
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  auto image = imageOf<ImageOf<TypeParam>>({});
+  if constexpr (std::is_same_v<ImageOf<TypeParam>, Samples>) {
+    for (auto& electrons : image.electrons) electrons(kProbeX, kProbeY) = kNan;
+    image.flags = {kWidth, kHeight, static_cast<std::uint8_t>(PixelFlag::Saturated)};
+    const Samples after = applied(TypeParam{}, image, {});
+    for (const auto& electrons : after.electrons) EXPECT_TRUE(std::isnan(electrons(kProbeX, kProbeY)));
+    EXPECT_TRUE(after.flags(kProbeX, kProbeY) & static_cast<unsigned>(PixelFlag::Saturated));
+  } else if constexpr (std::is_same_v<ImageOf<TypeParam>, RangeImage>) {
+    image.range_m(kProbeX, kProbeY) = kNan;
+    image.flags(kProbeX, kProbeY) = static_cast<std::uint8_t>(PixelFlag::Invalid);
+    const RangeImage after = applied(TypeParam{}, image, {});
+    EXPECT_TRUE(std::isnan(after.range_m(kProbeX, kProbeY)));
+    EXPECT_EQ(after.flags(kProbeX, kProbeY), static_cast<unsigned>(PixelFlag::Invalid));
+  } else {
+    image.phasor(0, 1)(kProbeX, kProbeY) = 0.0F;
+    const Light after = applied(TypeParam{}, image, {});
+    for (double value : valuesAt(after, kProbeX, kProbeY)) EXPECT_TRUE(std::isfinite(value));
+  }
+}
+
+TEST(EffectList, IsInTheOrderLightMeetsThemAndNamesEachOnce) {
+  std::set<std::string_view> names;
+  int last_stage = 0;
+  AllEffects::forEach([&]<class E>() {
+    EXPECT_TRUE(names.insert(E::about.name).second) << E::about.name;
+    const int stage = stageOf<E>() == "light" ? 0 : stageOf<E>() == "samples" ? 1 : 2;
+    EXPECT_GE(stage, last_stage) << E::about.name;
+    last_stage = stage;
+  });
+  EXPECT_EQ(names.size(), AllEffects::kSize);
+}
+
+}  // namespace
+}  // namespace toftwin::sim
