@@ -2,6 +2,7 @@
 #include <array>
 
 #include "drivers/pattern/pattern.h"
+#include "drivers/sim/simulator.h"
 #include "drivers/source.h"
 
 namespace toftwin::drivers {
@@ -10,6 +11,7 @@ std::span<const Driver> allDrivers() {
   // One line per driver, in the order of docs/drivers/README.md.
   static const std::array rows{
       pattern::row(),
+      simulator::row(),
   };
   return rows;
 }

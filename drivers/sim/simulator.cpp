@@ -1,0 +1,312 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "drivers/sim/simulator.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <utility>
+
+#include <toftwin/names.h>
+
+#include "drivers/pace.h"
+#include "drivers/sim/keys.h"
+#include "drivers/sim/view.h"
+#include "protocol/settings/describe.h"
+#include "sim/sensor/frame_assembly.h"
+#include "sim/sensor/sensor_model.h"
+
+namespace toftwin::drivers::simulator {
+namespace {
+
+/// What is seen without a scene file: a grey box before a white wall, on a grey floor.
+constexpr std::string_view kDefaultScene = R"(
+[[material]]
+name = "white"
+albedo = 0.8
+[[material]]
+name = "grey"
+albedo = 0.3
+[[object]]
+name = "wall"
+shape = "rectangle"
+size_m = [8, 6, 0]
+position_m = [0, 0, 2.5]
+material = "white"
+[[object]]
+name = "floor"
+shape = "rectangle"
+size_m = [8, 6, 0]
+position_m = [0, 0.9, 0]
+euler_deg = [90, 0, 0]
+material = "grey"
+[[object]]
+name = "box"
+shape = "box"
+size_m = [0.4, 0.5, 0.4]
+position_m = [0.1, 0.65, 1.6]
+euler_deg = [0, 30, 0]
+material = "grey"
+)";
+
+constexpr std::string_view kAmbient = "ambient_klx", kSincePowerOn = "since_power_on_s",
+                           kTemperature = "room_temperature_c";
+
+Transform<World, Camera> startPose(const Keys& keys) {
+  constexpr double kToRadian = degree.in_si;
+  const auto& [x, y, z] = keys.euler_deg;
+  Transform<World, Camera> pose = rotation<World, World>({0, 0, 1}, z * kToRadian) *
+                                  (rotation<World, World>({0, 1, 0}, y * kToRadian) *
+                                   rotation<World, Camera>({1, 0, 0}, x * kToRadian));
+  pose.translation_m = {keys.position_m[0], keys.position_m[1], keys.position_m[2]};
+  return pose;
+}
+
+SourceInfo describe(const Keys& keys, const sim::SensorModel& model, std::vector<PlaneKind> planes) {
+  SourceInfo info;
+  info.driver = "sim";
+  info.model = model.model();
+  info.serial = fmt::format("sim-{}-{}", model.id().substr(0, 8), keys.seed);
+  info.kind = FrameKind::Simulated;
+  info.camera = model.camera();
+  info.planes = std::move(planes);
+  info.frame_interval = keys.frame_interval > 0_ms ? keys.frame_interval : model.frameInterval();
+  info.can_set_pose = true;
+  info.can_trigger = keys.pace == Pace::Trigger;
+  info.can_lockstep = true;
+  info.parameters = model.parameterNames();
+  for (std::string_view name : {kAmbient, kSincePowerOn, kTemperature}) info.parameters.emplace_back(name);
+  return info;
+}
+
+/// One thread calls everything here (source.h), so nothing is locked.
+class SimulatedSource final : public Source {
+ public:
+  SimulatedSource(const Keys& keys, sim::SensorModel model, View view, std::vector<PlaneKind> planes)
+      : keys_(keys), model_(std::move(model)), info_(describe(keys, model_, std::move(planes))),
+        view_(std::move(view)), since_power_on_(keys.powered_on_before),
+        room_temperature_(keys.room_temperature), ambient_(keys.ambient) {
+    view_.setPose(startPose(keys));
+  }
+
+  [[nodiscard]] const SourceInfo& info() const override { return info_; }
+
+  Result<> start() override {
+    pacing_since_.reset();
+    triggers_ = 0;
+    made_ = 0;
+    return {};
+  }
+  void stop() override {}
+
+  Result<Frame> next(std::stop_token stop, bool lockstep) override {
+    if (keys_.frames > 0 && made_ == keys_.frames) {
+      return Error{Error::Code::EndOfStream, fmt::format("the simulation ended after {} frames, as configured", made_)};
+    }
+    const Error stopped{Error::Code::Stopped, "asked to stop"};
+    // Light first: after a new pose it takes long, and the pace then counts what a camera would have
+    // delivered meanwhile as lost.
+    if (!view_.complete(stop)) return stopped;
+    Frame frame;
+    if (auto turn = waitForTurn(stop, lockstep, frame.dropped_by_device); !turn) return turn.error();
+    frame.moment = momentOfFrame();
+    frame.provenance = sim::provenanceOf(model_, view_.scene().id(), keys_.seed);
+    frame.camera = info_.camera;
+    frame.planes = expose(frame.moment);
+    ++index_;
+    ++made_;
+    return frame;
+  }
+
+  Result<> setPose(const Transform<World, Camera>& world_from_camera) override {
+    const auto& q = world_from_camera.rotation_wxyz;
+    const Vec3d& t = world_from_camera.translation_m;
+    const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    if (!(std::abs(norm - 1.0) < 1e-6) || !std::isfinite(t.x + t.y + t.z)) {
+      return Error{Error::Code::InvalidArgument,
+                   fmt::format("a pose needs a unit quaternion and finite metres, but was ({}, {}, {}, {}) at "
+                               "({}, {}, {})", q[0], q[1], q[2], q[3], t.x, t.y, t.z)};
+    }
+    if (world_from_camera == view_.pose()) return {};
+    view_.setPose(world_from_camera);
+    collected_.reset();
+    return {};
+  }
+
+  Result<> setParameter(std::string_view name, double value) override {
+    if (name == kAmbient) return set(ambient_, value, {0.0, 200.0}, kilolux, name);
+    if (name == kTemperature) return set(room_temperature_, value, {-40.0, 100.0}, celsius, name);
+    if (name == kSincePowerOn) {
+      Duration now;
+      if (auto done = set(now, value, {0.0, 1e9}, second, name); !done) return done;
+      since_power_on_ = now - deviceDuration();
+      return {};
+    }
+    auto changed = model_.with(name, value);
+    if (!changed) {
+      return changed.error().code != Error::Code::NotFound
+                 ? changed.error()
+                 : Error{Error::Code::NotFound, fmt::format("this camera has no parameter \"{}\"; it has: {}", name,
+                                                            fmt::join(info_.parameters, ", "))};
+    }
+    model_ = *std::move(changed);
+    collected_.reset();
+    return {};
+  }
+
+  Result<> trigger() override {
+    if (!info_.can_trigger) return Source::trigger();
+    ++triggers_;
+    return {};
+  }
+
+ private:
+  template <class D>
+  Result<> set(Quantity<D>& quantity, double value, Bounds bounds, Unit<D> unit, std::string_view name) {
+    if (std::isnan(value) || !bounds.contains(value)) {
+      return Error{Error::Code::InvalidArgument, fmt::format("{} = {} {} is out of bounds: it must be {} {}", name, value,
+                                                             unit.suffix, settings::describe(bounds), unit.suffix)};
+    }
+    quantity = value * unit;
+    collected_.reset();
+    return {};
+  }
+
+  /// Waits as the pace says. A frame that is late by whole intervals is skipped and counted, as a
+  /// camera would have lost it.
+  Result<> waitForTurn(const std::stop_token& stop, bool lockstep, std::uint64_t& lost) {
+    const Error stopped{Error::Code::Stopped, "asked to stop"};
+    if (stop.stop_requested()) return stopped;
+    if (lockstep || keys_.pace == Pace::Fast) {
+      pacing_since_.reset();
+      return {};
+    }
+    const SteadyTime now = std::chrono::steady_clock::now();
+    if (keys_.pace == Pace::Trigger) {
+      if (triggers_ > 0) return --triggers_, Result<>{};
+      if (!sleepUntil(now + kLongestWait, stop)) return stopped;
+      return Error{Error::Code::Timeout, "no trigger within a second"};
+    }
+    if (!pacing_since_) {
+      pacing_since_ = now - std::chrono::nanoseconds{deviceTime().ns};
+      clock_ = relateToHost(deviceTime(), now);
+    }
+    const SteadyTime due = *pacing_since_ + std::chrono::nanoseconds{deviceTime().ns};
+    if (now > due) {
+      lost = static_cast<std::uint64_t>((now - due).count() / intervalNs());
+      index_ += lost;
+      return {};
+    }
+    if (due - now > kLongestWait) {
+      return sleepUntil(now + kLongestWait, stop) ? Error{Error::Code::Timeout, "not yet"} : stopped;
+    }
+    return sleepUntil(due, stop) ? Result<>{} : stopped;
+  }
+
+  /// The planes of the next frame: the light of the pose with this frame's noise.
+  std::vector<Plane> expose(const Moment& moment) {
+    if (!collected_ || !model_.collectsTheSameEachFrame()) {
+      collected_ = model_.collect(view_.light(), moment, keys_.seed, index_);
+    }
+    return sim::planesOf(model_, model_.readOut(*collected_, moment, keys_.seed, index_), view_.light().truth,
+                         info_.planes);
+  }
+
+  [[nodiscard]] std::int64_t intervalNs() const {
+    return std::max<std::int64_t>(1, std::llround(info_.frame_interval->in(nanosecond)));
+  }
+  [[nodiscard]] DeviceTime deviceTime() const { return {static_cast<std::int64_t>(index_) * intervalNs()}; }
+  [[nodiscard]] Duration deviceDuration() const { return static_cast<double>(deviceTime().ns) * nanosecond; }
+
+  [[nodiscard]] Moment momentOfFrame() const {
+    Moment moment;
+    moment.exposures = model_.exposures(deviceTime());
+    moment.clock = clock_;
+    moment.since_power_on = since_power_on_ + deviceDuration();
+    moment.temperatures = {{"room", room_temperature_}};
+    moment.ambient = ambient_;
+    moment.world_from_camera = view_.pose();
+    return moment;
+  }
+
+  Keys keys_;
+  sim::SensorModel model_;
+  SourceInfo info_;
+  View view_;
+  std::optional<sim::Samples> collected_;  ///< of the present pose and parameters, free of noise
+  std::uint64_t index_ = 0;  ///< of the next frame since the camera was opened, lost ones counted; keys its noise
+  std::uint64_t made_ = 0;   ///< since start()
+  std::uint64_t triggers_ = 0;
+  std::optional<SteadyTime> pacing_since_;  ///< when device time 0 was, if paced in real time
+  ClockRelation clock_;
+  Duration since_power_on_;  ///< at device time 0
+  Temperature room_temperature_;
+  Illuminance ambient_;
+};
+
+std::vector<PlaneKind> chosenPlanes(const Keys& keys, settings::Table& table) {
+  const auto all = sim::allPlanes();
+  if (keys.planes.empty()) return {all.begin(), all.begin() + 5};
+  std::vector<PlaneKind> chosen;
+  for (const std::string& name : keys.planes) {
+    const auto kind = planeKindNamed(name);
+    if (!kind || std::ranges::find(all, *kind) == all.end()) {
+      std::string known;
+      for (PlaneKind plane : all) known += (known.empty() ? "" : ", ") + std::string{nameOf(plane)};
+      table.complain("planes", fmt::format("names \"{}\", but a simulated camera has only: {}", name, known));
+    } else if (std::ranges::find(chosen, *kind) == chosen.end()) {
+      chosen.push_back(*kind);
+    }
+  }
+  return chosen;
+}
+
+Result<sim::SensorModel> chosenCamera(const Keys& keys, const settings::Table& table) {
+  if (!keys.camera.empty()) return sim::SensorModel::load(table.resolve(keys.camera));
+  constexpr std::string_view kScheme = "sim:";
+  if (keys.uri.starts_with(kScheme)) {
+    if (auto model = sim::SensorModel::preset(keys.uri.substr(kScheme.size()))) return model;
+  }
+  std::string known;
+  for (const std::string& name : sim::SensorModel::presetNames()) known += (known.empty() ? "sim:" : ", sim:") + name;
+  return Error{Error::Code::NotFound, fmt::format("{}: there is no camera {}; the simulator has {}, and any camera "
+                                                  "file by the key camera", table.place("uri"), keys.uri, known)};
+}
+
+Result<std::unique_ptr<Source>> open(settings::Table& table) {
+  Keys keys;
+  table.read(keys);
+  std::vector<PlaneKind> planes = chosenPlanes(keys, table);
+  if (auto checked = table.check(); !checked) return checked.error();
+  auto model = chosenCamera(keys, table);
+  if (!model) return model.error();
+  auto scene = keys.scene.empty() ? sim::Scene::parse(kDefaultScene, "default scene")
+                                  : sim::Scene::load(table.resolve(keys.scene));
+  if (!scene) return scene.error();
+  sim::TraceRequest request = model->traceRequest();
+  request.samples_per_pixel = keys.samples_per_pixel;
+  request.max_surfaces = keys.max_surfaces;
+  request.pixel_extent = keys.pixel_extent;
+  request.seed = keys.seed;
+  return std::unique_ptr<Source>{std::make_unique<SimulatedSource>(
+      keys, *std::move(model), View{*std::move(scene), std::move(request)}, std::move(planes))};
+}
+
+std::vector<std::string> list() {
+  std::vector<std::string> uris;
+  for (const std::string& name : sim::SensorModel::presetNames()) uris.push_back("sim:" + name);
+  return uris;
+}
+
+}  // namespace
+
+Driver row() {
+  return {.name = "sim",
+          .summary = "a simulated camera in a scene: path-traced light through a sensor model",
+          .list = list,
+          .open = open,
+          .document = [] { return settings::markdownTable(settings::keysOf<Keys>()); }};
+}
+
+}  // namespace toftwin::drivers::simulator
