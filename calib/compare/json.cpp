@@ -64,12 +64,18 @@ Json& Json::push(Json value) {
 
 std::string Json::text() const {
   std::string out;
-  write(out, 0);
+  write(out, 0, true);
   out += '\n';
   return out;
 }
 
-void Json::write(std::string& out, std::size_t level) const {
+std::string Json::line() const {
+  std::string out;
+  write(out, 0, false);
+  return out;
+}
+
+void Json::write(std::string& out, std::size_t level, bool indented) const {
   if (const auto* flag = std::get_if<bool>(&value_)) {
     out += *flag ? "true" : "false";
   } else if (const auto* whole = std::get_if<long long>(&value_)) {
@@ -82,19 +88,19 @@ void Json::write(std::string& out, std::size_t level) const {
     out += '[';
     for (std::size_t i = 0; i < list->size(); ++i) {
       if (i > 0) out += ", ";
-      (*list)[i].write(out, level + 1);
+      (*list)[i].write(out, level + 1, indented);
     }
     out += ']';
   } else if (const auto* members = std::get_if<Object>(&value_)) {
     out += '{';
     for (std::size_t i = 0; i < members->size(); ++i) {
       if (i > 0) out += ',';
-      newLine(out, level + 1);
+      if (indented) newLine(out, level + 1);
       writeText(out, (*members)[i].first);
       out += ": ";
-      (*members)[i].second.write(out, level + 1);
+      (*members)[i].second.write(out, level + 1, indented);
     }
-    if (!members->empty()) newLine(out, level);
+    if (indented && !members->empty()) newLine(out, level);
     out += '}';
   } else {
     out += "null";

@@ -39,11 +39,13 @@ class Json {
   Json& push(Json value);
   /// The text, indented by two spaces a level.
   [[nodiscard]] std::string text() const;
+  /// The text on one line, for logs of one value a line.
+  [[nodiscard]] std::string line() const;
 
  private:
   using Object = std::vector<std::pair<std::string, Json>>;
   using Array = std::vector<Json>;
-  void write(std::string& out, std::size_t level) const;
+  void write(std::string& out, std::size_t level, bool indented) const;
   std::variant<std::monostate, bool, long long, double, std::string, Array, Object> value_;
 };
 

@@ -10,7 +10,7 @@
 namespace toftwin::compare {
 namespace {
 
-constexpr double kWidth = 720, kHeight = 400, kLeft = 74, kRight = 16, kTop = 16, kBottom = 56;
+constexpr double kWidth = 640, kHeight = 360, kLeft = 68, kRight = 14, kTop = 12, kBottom = 54;
 
 /// Style sheet classes; the order is Ink's.
 constexpr std::array kInkClass{"measured", "simulated", "published", "baseline", "extra", "alert"};

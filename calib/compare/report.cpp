@@ -153,6 +153,7 @@ Result<std::filesystem::path> write(const Report& report, const std::filesystem:
         fmt::format("{}: cannot make the report's folder: {}", folder.string(), failed.message())};
   }
   if (auto done = writeFile(folder / "report.json", report.data.text()); !done) return done.error();
+  if (auto done = writeFile(folder / "report.md", toMarkdown(report)); !done) return done.error();
   const auto page = folder / "index.html";
   if (auto done = writeFile(page, toHtml(report)); !done) return done.error();
   return std::filesystem::absolute(page).lexically_normal();

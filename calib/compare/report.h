@@ -73,8 +73,11 @@ struct Report {
 /// The page: one HTML text that needs nothing else, no network, no script.
 std::string toHtml(const Report& report);
 
-/// Writes index.html and report.json into `folder`, which is made if need be; gives the page's
-/// path.
+/// The words and tables of the page as Markdown, without its pictures.
+std::string toMarkdown(const Report& report);
+
+/// Writes index.html, report.json and report.md into `folder`, which is made if need be; gives the
+/// page's path.
 Result<std::filesystem::path> write(const Report& report, const std::filesystem::path& folder);
 
 /// A number for people: fixed decimals, real minus sign; "–" if it is not finite.

@@ -14,7 +14,7 @@ inline constexpr const char* kReportStyle = R"css(
 --good:#4fd1a5;--fair:#e6b04c;--bad:#ff8a80;--neutral:#aab8c6;--hatch:#2a2d31}}
 *{box-sizing:border-box}
 body{margin:0;background:var(--page);color:var(--ink);font:16px/1.5 system-ui,-apple-system,"Segoe UI",Roboto,"DejaVu Sans",sans-serif}
-main{max-width:1080px;margin:0 auto;padding:28px 20px 60px}
+main{max-width:960px;margin:0 auto;padding:28px 20px 60px}
 h1{font-size:1.75rem;line-height:1.2;margin:0 0 4px}
 h2{font-size:1.3rem;margin:0 0 8px;line-height:1.25}
 .subtitle{color:var(--soft);margin:0 0 16px}
@@ -37,12 +37,12 @@ p{max-width:78ch}
 details{margin:10px 0}summary{cursor:pointer;color:var(--soft)}
 figure{margin:14px 0;background:var(--panel);border:1px solid var(--line);border-radius:6px;padding:10px 12px;min-width:0}
 figcaption{font-size:.9rem;color:var(--soft);margin-top:6px;max-width:90ch}
-.row{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,440px),1fr));gap:0 14px}
+.row{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,400px),1fr));gap:0 14px}
 .plot{overflow-x:auto}.plot svg{display:block;width:100%;min-width:430px;height:auto}
 .plot.map svg{min-width:280px}
 .legend{display:flex;flex-wrap:wrap;gap:2px 18px;font-size:.9rem;padding:4px 4px 0}.legend span{display:inline-flex;align-items:center;gap:7px}
 .legend svg{flex:none}
-.tick{font-size:14px;fill:var(--soft);font-variant-numeric:tabular-nums}.label{font-size:15px;fill:var(--ink)}
+.tick{font-size:13px;fill:var(--soft);font-variant-numeric:tabular-nums}.label{font-size:14px;fill:var(--ink)}
 .grid{stroke:var(--line);stroke-width:1}.zero{stroke:var(--soft);stroke-width:1.2}.frame{fill:none;stroke:var(--line)}
 .curve{fill:none;stroke-width:2;stroke-linejoin:round}.dashed{stroke-dasharray:8 5}.dotted{stroke-dasharray:2 4}
 .dots{stroke:none;fill-opacity:.6}.band{stroke:none;fill-opacity:.18}
@@ -56,7 +56,7 @@ figcaption{font-size:.9rem;color:var(--soft);margin-top:6px;max-width:90ch}
 table{border-collapse:collapse;font-size:.92rem;min-width:min(100%,480px);background:var(--panel);border:1px solid var(--line)}
 caption{text-align:left;color:var(--soft);font-size:.9rem;padding:0 0 6px}
 th,td{padding:5px 12px;border-bottom:1px solid var(--line);text-align:left;vertical-align:top}
-th{font-weight:600}th.number,td.number{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
+th{font-weight:600;vertical-align:bottom}td:first-child:not(.number){min-width:13em}th.number,td.number{text-align:right}td.number{font-variant-numeric:tabular-nums;white-space:nowrap}
 footer{margin-top:40px;padding-top:12px;border-top:1px solid var(--line);color:var(--soft);font-size:.85rem}
 @media(max-width:520px){main{padding:18px 12px 40px}.cards{grid-template-columns:1fr 1fr}.card{padding:8px 10px}.value{font-size:1.2rem}h1{font-size:1.4rem}}
 @media print{section{break-inside:avoid-page}nav{display:none}}

@@ -5,6 +5,9 @@
 #include <gtest/gtest.h>
 
 #include "calib/compare/csv.h"
+#include "calib/compare/fits.h"
+#include "calib/compare/real_box.h"
+#include "calib/compare/real_data.h"
 #include "calib/compare/scan_line.h"
 #include "calib/compare/statistics.h"
 
@@ -91,6 +94,70 @@ TEST_F(RealData, KinectReadsFiveToEighteenMillimetresTooFarBelowTwoMetresThirty)
     EXPECT_GE(quantile(too_far, 0.5), 5.0) << from;
     EXPECT_LE(quantile(too_far, 0.5), 18.0) << from;
   }
+}
+
+struct NoiseFact {
+  const char* camera;
+  double a, b, c;
+};
+void PrintTo(const NoiseFact& fact, std::ostream* out) { *out << fact.camera; }
+
+class RealNoise : public RealData, public testing::WithParamInterface<NoiseFact> {};
+
+TEST_P(RealNoise, LawHasTheReadmesConstants) {
+  const auto& fact = GetParam();
+  const auto table =
+      loadColumns(folder / "noise" / (std::string{fact.camera} + "_sigma_vs_intensity.csv"),
+                  {"intensity_counts", "sigma_mm"});
+  ASSERT_TRUE(table.ok());
+  const NoiseLaw law = fitNoiseLaw((*table)[0], (*table)[1]);
+  // The README gives three digits.
+  EXPECT_NEAR(law.a_mm, fact.a, 0.01);
+  EXPECT_NEAR(law.b, fact.b, 0.005 * fact.b);
+  EXPECT_NEAR(law.c, fact.c, 0.001 * fact.c);
+}
+
+INSTANTIATE_TEST_SUITE_P(Cameras, RealNoise,
+                         testing::Values(NoiseFact{"kinect_v2", 1.14, 42.4, 1922},
+                                         NoiseFact{"o3d303", 3.64, 138, 8947}),
+                         testing::PrintToStringParamName());
+
+TEST_F(RealData, BoxLinesShowABoxOfFifteenCentimetres) {
+  const auto with_box = loadScanLine(folder / "box" / "kinect_v2_measured.csv"),
+             wall = loadScanLine(folder / "box" / "kinect_v2_reference.csv");
+  ASSERT_TRUE(with_box.ok() && wall.ok());
+  const auto box = fitBox(*with_box, *wall);
+  ASSERT_TRUE(box.ok()) << box.error().message;
+  // The README says 0.15 m; a pixel is 2.7 mm wide there and each edge is blurred over a few.
+  EXPECT_NEAR(box->depthMm(), 150.0, 3.0);
+  EXPECT_NEAR(box->widthMm(), 150.0, 2 * 2 * 2.7);
+}
+
+/// The whole real-data part with little effort: it must run, and what it says of the Kinect's
+/// corner must hold.
+TEST_F(RealData, SimulatorExplainsMostOfTheKinectsCorner) {
+  RealDataJob job{.folder = folder, .effort = 0.1};
+  RealCamera camera{"kinect_v2", "Kinect v2"};
+  ASSERT_TRUE(judgeDistance(job, camera).ok());
+  EXPECT_NEAR(camera.delay_mm, 11.1,
+              1.0);  // the table's mean error is 11.1 mm; the preset wiggles by ±2 mm around 0
+  const auto corner = judgeCorner(job, camera);
+  ASSERT_TRUE(corner.ok()) << corner.error().message;
+  // Measured 22/48/69 mm. Multipath of two albedo 0.8 boards must explain more than nine tenths of
+  // the mean square once the constant from the other table is added; anything less means that the
+  // simulated corner is wrong.
+  const std::string text = corner->data.text();
+  const auto at = text.find("\"fraction_raw\": ", text.find("simulated_with_constant"));
+  ASSERT_NE(at, std::string::npos);
+  EXPECT_GT(std::stod(text.substr(at + 16)), 0.9) << text;
+}
+
+TEST_F(RealData, AMissingFileIsNamed) {
+  const RealDataJob job{.folder = folder / "nowhere"};
+  RealCamera camera{"kinect_v2", "Kinect v2"};
+  const auto finding = judgeDistance(job, camera);
+  ASSERT_FALSE(finding.ok());
+  EXPECT_NE(finding.error().message.find("distance_error/kinect_v2.csv"), std::string::npos);
 }
 
 }  // namespace

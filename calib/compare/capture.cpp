@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/compare/capture.h"
+
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include <toftwin/names.h>
+
+#include "calib/compare/statistics.h"
+
+namespace toftwin::compare {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+class ClientFeed final : public Feed {
+ public:
+  ClientFeed(Client& client, std::string source, SourceDetails details, Subscription subscription)
+      : client_(client),
+        source_(std::move(source)),
+        details_(std::move(details)),
+        subscription_(std::move(subscription)) {}
+  [[nodiscard]] const SourceDetails& details() const override { return details_; }
+  Result<Frame> next(std::chrono::milliseconds timeout) override {
+    return subscription_.next(timeout);
+  }
+  Result<> setPose(const Transform<World, Camera>& pose) override {
+    return client_.setPose(source_, pose);
+  }
+
+ private:
+  Client& client_;
+  std::string source_;
+  SourceDetails details_;
+  Subscription subscription_;
+};
+
+Error named(const Feed& feed, const Error& error, const std::string& doing) {
+  return {error.code, fmt::format("{}: {}: {}", feed.details().entry.name, doing, error.message)};
+}
+
+Json logEntry(const Frame& frame, const std::string& pose, const char* role) {
+  Json ids = Json::object();
+  ids.set("calibration", frame.provenance.calibration_id).set("scene", frame.provenance.scene_id);
+  ids.set("model", frame.provenance.model_id).set("seed", frame.provenance.seed);
+  Json entry = Json::object();
+  entry.set("pose", pose)
+      .set("role", role)
+      .set("source", frame.source)
+      .set("sequence", frame.sequence);
+  entry.set("kind", std::string{nameOf(frame.provenance.kind)})
+      .set("received_ns", frame.moment.received.ns);
+  entry.set("device_start_ns", frame.moment.exposures.empty()
+                                   ? Json{}
+                                   : Json{frame.moment.exposures.front().start.ns});
+  entry.set("since_power_on_s",
+            frame.moment.since_power_on ? frame.moment.since_power_on->in(second) : kNaN);
+  entry.set("dropped_before", frame.dropped_before)
+      .set("dropped_by_device", frame.dropped_by_device);
+  entry.set("ids", std::move(ids)).set("effects", Json::arrayOf(frame.provenance.effects));
+  Json temperatures = Json::object();
+  for (const auto& t : frame.moment.temperatures) temperatures.set(t.where, t.value.in(celsius));
+  return std::move(entry.set("temperatures_c", std::move(temperatures)));
+}
+
+/// The next frame of that pose; frames of other poses are skipped.
+Result<Frame> nextAt(Feed& feed, const std::optional<Transform<World, Camera>>& pose,
+                     const CaptureOptions& options) {
+  for (int skipped = 0; skipped <= options.most_skipped; ++skipped) {
+    if (options.interrupted && options.interrupted())
+      return Error{Error::Code::Stopped, "interrupted"};
+    auto frame = feed.next(options.timeout);
+    if (!frame) return named(feed, frame.error(), "waiting for a frame");
+    const auto& there = frame->moment.world_from_camera;
+    if (!pose || !there || samePose(*pose, *there)) return frame;
+  }
+  return Error{Error::Code::Timeout,
+               fmt::format("{}: none of {} frames was taken at the pose asked for. A recording "
+                           "must have been made with "
+                           "the same pose file; a camera on a rig must be moved there.",
+                           feed.details().entry.name, options.most_skipped)};
+}
+
+double medianDifference_mm(const Frame& a, const Frame& b) {
+  if (a.camera.width != b.camera.width || a.camera.height != b.camera.height ||
+      a.camera.fx != b.camera.fx || a.camera.fy != b.camera.fy || a.camera.cx != b.camera.cx ||
+      a.camera.cy != b.camera.cy || a.camera.distortion != b.camera.distortion) {
+    return kNaN;
+  }
+  const auto range_a = rangeOf(a), range_b = rangeOf(b);
+  if (!range_a || !range_b) return kNaN;
+  std::vector<double> difference;
+  for (std::size_t i = 0; i < range_a->size(); ++i) {
+    difference.push_back(1e3 *
+                         (static_cast<double>((*range_b)[i]) - static_cast<double>((*range_a)[i])));
+  }
+  return quantile(std::move(difference), 0.5);
+}
+
+double powerOn(const Frame& frame) {
+  return frame.moment.since_power_on ? frame.moment.since_power_on->in(second) : kNaN;
+}
+
+/// N pairs of frames at one pose.
+Result<> capturePose(Feed& a, Feed& b, const std::optional<Transform<World, Camera>>& pose,
+                     const CaptureOptions& options, Progress& progress, CapturedPose& captured,
+                     Capture& result) {
+  for (Feed* feed : {&a, &b}) {
+    if (!pose || !feed->details().can_set_pose) continue;
+    if (auto set = feed->setPose(*pose); !set)
+      return named(*feed, set.error(), fmt::format("setting the pose \"{}\"", captured.name));
+  }
+  for (int i = 0; i < options.frames; ++i) {
+    progress.at(static_cast<double>(i) / options.frames);
+    auto frame_a = nextAt(a, pose, options);
+    if (!frame_a) return frame_a.error();
+    auto frame_b = nextAt(b, pose, options);
+    if (!frame_b) return frame_b.error();
+    if (auto added = captured.a.add(*frame_a); !added) return added;
+    if (auto added = captured.b.add(*frame_b); !added) return added;
+    result.log.push_back(logEntry(*frame_a, captured.name, "A"));
+    result.log.push_back(logEntry(*frame_b, captured.name, "B"));
+    result.pairs.push_back({result.poses.size(), powerOn(*frame_a), powerOn(*frame_b),
+                            medianDifference_mm(*frame_a, *frame_b)});
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Feed>> openFeed(Client& client, const std::string& source) {
+  auto details = client.describe(source);
+  if (!details) return details.error();
+  SubscribeOptions options;
+  options.policy = details->can_lockstep ? SubscribeOptions::Policy::Lockstep
+                                         : SubscribeOptions::Policy::Lossless;
+  // What the comparison reads; raw samples and phasors would only cost bandwidth.
+  for (const PlaneKind kind : details->planes) {
+    if (kind == PlaneKind::Range || kind == PlaneKind::Depth || kind == PlaneKind::Amplitude ||
+        kind == PlaneKind::Flags)
+      options.planes.push_back(kind);
+  }
+  if (options.planes.empty()) {
+    return Error{
+        Error::Code::Unsupported,
+        fmt::format("{}: gives neither range nor depth, so there is nothing to compare", source)};
+  }
+  auto subscription = client.subscribe(source, options);
+  if (!subscription) return subscription.error();
+  return std::unique_ptr<Feed>{
+      std::make_unique<ClientFeed>(client, source, *std::move(details), *std::move(subscription))};
+}
+
+void planCapture(Progress& progress, const CaptureOptions& options) {
+  const double seconds = 0.15 * options.frames;
+  if (options.poses.empty())
+    progress.plan(fmt::format("{} frames of both cameras where they are", options.frames), seconds);
+  for (const PoseSpec& pose : options.poses)
+    progress.plan(fmt::format("{} frames of both cameras at \"{}\"", options.frames, pose.name),
+                  seconds);
+}
+
+Result<Capture> capture(Feed& a, Feed& b, const CaptureOptions& options, Progress& progress) {
+  Capture result{
+      .a = a.details(), .b = b.details(), .poses = {}, .pairs = {}, .log = {}, .warnings = {}};
+  const std::size_t count = std::max<std::size_t>(1, options.poses.size());
+  bool unknown_pose = false;
+  for (std::size_t i = 0; i < count; ++i) {
+    progress.begin();
+    CapturedPose captured{
+        .name = options.poses.empty() ? "where they are" : options.poses[i].name, .a = {}, .b = {}};
+    std::optional<Transform<World, Camera>> pose;
+    if (!options.poses.empty()) pose = options.poses[i].world_from_camera();
+    if (auto done = capturePose(a, b, pose, options, progress, captured, result); !done)
+      return done.error();
+    unknown_pose = unknown_pose || !captured.a.pose() || !captured.b.pose();
+    result.poses.push_back(std::move(captured));
+  }
+  if (unknown_pose) {
+    result.warnings.emplace_back(
+        "At least one camera does not say its pose: that both stood at the same place is taken on "
+        "trust.");
+  }
+  return result;
+}
+
+}  // namespace toftwin::compare

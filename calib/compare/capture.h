@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <toftwin/client.h>
+#include <toftwin/result.h>
+
+#include "calib/compare/json.h"
+#include "calib/compare/poses.h"
+#include "calib/compare/progress.h"
+#include "calib/compare/stack.h"
+
+namespace toftwin::compare {
+
+/// One of the two cameras, as the capture sees it: what it is, its frames, and its pose.
+class Feed {
+ public:
+  virtual ~Feed() = default;
+  [[nodiscard]] virtual const SourceDetails& details() const = 0;
+  virtual Result<Frame> next(std::chrono::milliseconds timeout) = 0;
+  virtual Result<> setPose(const Transform<World, Camera>& world_from_camera) = 0;
+};
+
+/// A source of a daemon: in LOCKSTEP where it can, so that no frame is made or lost without us,
+/// else LOSSLESS. The client must outlive it.
+Result<std::unique_ptr<Feed>> openFeed(Client& client, const std::string& source);
+
+/// What was captured at one pose.
+struct CapturedPose {
+  std::string name;
+  Stack a, b;
+};
+
+/// One pair of frames: the i-th of both cameras at a pose.
+struct FramePair {
+  std::size_t pose = 0;
+  double since_power_on_a_s = 0.0, since_power_on_b_s = 0.0;  ///< NaN where unknown
+  double median_difference_mm =
+      0.0;  ///< of B − A over the pixels valid in both; NaN for different camera models
+};
+
+struct Capture {
+  SourceDetails a, b;
+  std::vector<CapturedPose> poses;
+  std::vector<FramePair> pairs;
+  std::vector<Json> log;  ///< one entry per frame: source, sequence, times, ids, effects
+  std::vector<std::string> warnings;  ///< what a reader must know
+};
+
+struct CaptureOptions {
+  std::vector<PoseSpec> poses;                ///< empty: one capture where the cameras are
+  int frames = 30;                            ///< per pose and camera
+  std::chrono::milliseconds timeout{60'000};  ///< for one frame
+  int most_skipped = 10'000;                  ///< frames of other poses before it is given up
+  std::function<bool()> interrupted;          ///< asked between frames
+};
+
+/// Captures both cameras at the same poses. A pose is set on each camera that can; frames that say
+/// another pose are skipped (they were made before, or a recording has not reached it yet). Errors
+/// say which camera could not follow and why.
+Result<Capture> capture(Feed& a, Feed& b, const CaptureOptions& options, Progress& progress);
+void planCapture(Progress& progress, const CaptureOptions& options);
+
+}  // namespace toftwin::compare

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/compare/compare.h"
+
+#include <ctime>
+#include <fstream>
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include "calib/compare/csv.h"
+#include "calib/compare/live_report.h"
+#include "calib/compare/real_data.h"
+
+namespace toftwin::compare {
+namespace {
+
+void add(Report& report, Finding finding) {
+  for (Card& card : finding.cards) report.cards.push_back(std::move(card));
+  report.data.set(finding.section.id, std::move(finding.data));
+  report.sections.push_back(std::move(finding.section));
+}
+
+Section missingData(const CompareJob& job) {
+  return {.id = "real",
+          .title = "Real measurements",
+          .verdict = "Not compared: the folder tof-thesis-2018 was not found.",
+          .tone = Tone::Neutral,
+          .blocks = {Paragraph{fmt::format(
+              "Looked in {}. Name the folder that holds it with --data or in TOFTWIN_DATA.",
+              job.data->empty() ? "TOFTWIN_DATA and ../shared/data of the repository"
+                                : job.data->string())}}};
+}
+
+Result<> writeLog(const Capture& capture, const std::filesystem::path& folder) {
+  std::ofstream out{folder / "log.jsonl", std::ios::binary | std::ios::trunc};
+  for (const Json& entry : capture.log) out << entry.line() << '\n';
+  out.flush();
+  if (out) return {};
+  return Error{Error::Code::StorageFull,
+               fmt::format("{}: cannot be written (no permission, or the disk is full)",
+                           (folder / "log.jsonl").string())};
+}
+
+Result<> addLive(const CompareJob& job, Progress& progress, Report& report, std::string& verdict) {
+  const auto captured = capture(*job.a, *job.b, job.capture, progress);
+  if (!captured) return captured.error();
+  auto finding = judgeLive(*captured);
+  if (!finding) return finding.error();
+  if (auto written = writeLog(*captured, job.output); !written) return written;
+  report.tone = finding->section.tone;
+  report.subtitle =
+      fmt::format("{} ({}) against {} ({}), {} frames at each of {} poses", captured->b.entry.name,
+                  captured->b.entry.model, captured->a.entry.name, captured->a.entry.model,
+                  job.capture.frames, captured->poses.size());
+  verdict += finding->headline + ". ";
+  add(report, *std::move(finding));
+  return {};
+}
+
+Result<> addReal(const RealDataJob& job, Report& report, std::string& verdict) {
+  auto findings = judgeRealData(job);
+  if (!findings) return findings.error();
+  std::string headlines;
+  for (Finding& finding : *findings) {
+    if (!finding.headline.empty()) headlines += (headlines.empty() ? "" : "; ") + finding.headline;
+    add(report, std::move(finding));
+  }
+  verdict += "Simulator against real measurements: " + headlines + ". ";
+  report.subtitle += std::string{report.subtitle.empty() ? "The" : "; the"} +
+                     " simulator against published measurements of a Kinect v2 and an O3D303";
+  return {};
+}
+
+std::string today() {
+  const std::time_t now = std::time(nullptr);
+  return fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(now));
+}
+
+}  // namespace
+
+Result<std::filesystem::path> compareAndReport(const CompareJob& job, Progress& progress) {
+  std::error_code failed;
+  std::filesystem::create_directories(job.output, failed);
+  if (failed) {
+    return Error{Error::Code::PermissionDenied,
+                 fmt::format("{}: cannot make the report's folder: {}", job.output.string(),
+                             failed.message())};
+  }
+  const auto folder = job.data ? findThesisData(*job.data) : std::nullopt;
+  const bool live = job.a != nullptr && job.b != nullptr;
+  if (!live && !folder) {
+    return Error{Error::Code::NotFound,
+                 "nothing to compare: no two sources are named, and no folder tof-thesis-2018 of "
+                 "real measurements is there (see --data)"};
+  }
+  if (live) planCapture(progress, job.capture);
+  if (folder) planRealData(progress, job.effort);
+
+  Report report{.title = "Comparison of time-of-flight cameras"};
+  std::string verdict;
+  if (live) {
+    if (auto done = addLive(job, progress, report, verdict); !done) return done.error();
+  }
+  if (folder) {
+    if (auto done = addReal({.folder = *folder, .effort = job.effort, .progress = &progress},
+                            report, verdict);
+        !done)
+      return done.error();
+  } else if (job.data) {
+    report.sections.push_back(missingData(job));
+  }
+  progress.end();
+  report.verdict = verdict;
+  report.colophon = fmt::format("toftwin {}, {}{}{}", TOFTWIN_VERSION, today(),
+                                job.note.empty() ? "" : ", ", job.note);
+  report.data.set("software", "toftwin " TOFTWIN_VERSION)
+      .set("date", today())
+      .set("note", job.note)
+      .set("verdict", verdict);
+  return write(report, job.output);
+}
+
+}  // namespace toftwin::compare

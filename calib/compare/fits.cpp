@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/compare/fits.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "calib/compare/statistics.h"
+
+namespace toftwin::compare {
+namespace {
+
+using Vector = std::array<double, 3>;
+using Matrix = std::array<Vector, 3>;
+
+double costOf(const Vector& log_parts, std::span<const double> intensity,
+              std::span<const double> sigma) {
+  double cost = 0.0;
+  for (std::size_t i = 0; i < intensity.size(); ++i) {
+    const double v = std::exp(log_parts[0]) + std::exp(log_parts[1]) / intensity[i] +
+                     std::exp(log_parts[2]) / (intensity[i] * intensity[i]);
+    cost += std::pow(std::log(sigma[i]) - 0.5 * std::log(v), 2);
+  }
+  return cost;
+}
+
+/// JᵀJ and Jᵀr of r = ln σ − ½ ln v, v = Σ e^{p_k} I^{−k}:  ∂(½ ln v)/∂p_k = ½ e^{p_k} I^{−k} / v
+std::pair<Matrix, Vector> normalEquations(const Vector& p, std::span<const double> intensity,
+                                          std::span<const double> sigma) {
+  Matrix jtj{};
+  Vector jtr{};
+  for (std::size_t i = 0; i < intensity.size(); ++i) {
+    Vector part{std::exp(p[0]), std::exp(p[1]) / intensity[i],
+                std::exp(p[2]) / (intensity[i] * intensity[i])};
+    const double v = part[0] + part[1] + part[2];
+    const double residual = std::log(sigma[i]) - 0.5 * std::log(v);
+    for (double& k : part) k *= 0.5 / v;
+    for (std::size_t k = 0; k < 3; ++k) {
+      jtr[k] += part[k] * residual;
+      for (std::size_t l = 0; l < 3; ++l) jtj[k][l] += part[k] * part[l];
+    }
+  }
+  return {jtj, jtr};
+}
+
+/// depth = x₀ + x₁ (−e^{−t/τ₁}) + x₂ (−e^{−t/τ₂}): the effect's own sign.
+WarmUpFit linearFit(std::span<const double> time, std::span<const double> depth, double tau1,
+                    double tau2, int exponentials) {
+  Matrix a{};
+  Vector b{};
+  for (std::size_t i = 0; i < time.size(); ++i) {
+    const Vector basis{1.0, exponentials > 0 ? -std::exp(-time[i] / tau1) : 0.0,
+                       exponentials > 1 ? -std::exp(-time[i] / tau2) : 0.0};
+    for (std::size_t k = 0; k < 3; ++k) {
+      b[k] += basis[k] * depth[i];
+      for (std::size_t l = 0; l < 3; ++l) a[k][l] += basis[k] * basis[l];
+    }
+  }
+  for (int k = exponentials + 1; k < 3; ++k)
+    a[static_cast<std::size_t>(k)][static_cast<std::size_t>(k)] = 1.0;
+  const Vector x = solve3(a, b);
+  WarmUpFit fit{.warm_mm = x[0],
+                .effect = {.fast = x[1] * millimetre,
+                           .fast_time = tau1 * second,
+                           .slow = x[2] * millimetre,
+                           .slow_time = tau2 * second}};
+  double squares = 0.0;
+  for (std::size_t i = 0; i < time.size(); ++i)
+    squares += std::pow(depth[i] - fit.depth_mm(time[i]), 2);
+  fit.rms_mm = std::sqrt(squares / static_cast<double>(time.size()));
+  return fit;
+}
+
+}  // namespace
+
+std::array<double, 3> solve3(Matrix a, Vector b) {
+  for (std::size_t i = 0; i < 3; ++i) {
+    std::size_t pivot = i;
+    for (std::size_t k = i + 1; k < 3; ++k) {
+      if (std::abs(a[k][i]) > std::abs(a[pivot][i])) pivot = k;
+    }
+    if (a[pivot][i] == 0.0) return {};
+    std::swap(a[i], a[pivot]);
+    std::swap(b[i], b[pivot]);
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (k == i) continue;
+      const double factor = a[k][i] / a[i][i];
+      for (std::size_t l = i; l < 3; ++l) a[k][l] -= factor * a[i][l];
+      b[k] -= factor * b[i];
+    }
+  }
+  return {b[0] / a[0][0], b[1] / a[1][1], b[2] / a[2][2]};
+}
+
+double NoiseLaw::sigma_mm(double intensity) const {
+  return std::sqrt(a_mm * a_mm + b * b / intensity + c * c / (intensity * intensity));
+}
+
+namespace {
+
+/// Damped Gauss-Newton from one start; the cost it ends at.
+std::pair<double, Vector> descend(Vector p, std::span<const double> intensity,
+                                  std::span<const double> sigma_mm) {
+  double cost = costOf(p, intensity, sigma_mm), damping = 1e-3;
+  for (int step = 0; step < 100 && damping < 1e9; ++step) {
+    auto [jtj, jtr] = normalEquations(p, intensity, sigma_mm);
+    for (std::size_t k = 0; k < 3; ++k) jtj[k][k] += damping * (jtj[k][k] + 1e-12);
+    const Vector change = solve3(jtj, jtr);
+    Vector next = p;
+    // A part that the data do not need runs to −∞; steps are bounded so that it does not start
+    // there.
+    for (std::size_t k = 0; k < 3; ++k)
+      next[k] = std::clamp(p[k] + std::clamp(change[k], -1.0, 1.0), -60.0, 80.0);
+    const double cost_there = costOf(next, intensity, sigma_mm);
+    if (cost_there < cost) {
+      p = next, cost = cost_there, damping *= 0.3;
+    } else {
+      damping *= 4.0;
+    }
+  }
+  return {cost, p};
+}
+
+}  // namespace
+
+NoiseLaw fitNoiseLaw(std::span<const double> intensity, std::span<const double> sigma_mm) {
+  // The valley is curved: start where each part alone explains the noise at some intensity, for all
+  // combinations of a low, a middle and a high one, and keep the best end.
+  const double low = quantile({intensity.begin(), intensity.end()}, 0.1),
+               high = quantile({intensity.begin(), intensity.end()}, 0.9);
+  const double most = quantile({sigma_mm.begin(), sigma_mm.end()}, 0.9),
+               least = quantile({sigma_mm.begin(), sigma_mm.end()}, 0.1);
+  std::pair<double, Vector> best{std::numeric_limits<double>::infinity(), {}};
+  for (const double floor : {0.3 * least, least}) {
+    for (const double shot : {0.3 * least, least, most}) {
+      for (const double read : {0.3 * most, most}) {
+        const auto end = descend(
+            {2.0 * std::log(floor), 2.0 * std::log(shot) + std::log(shot < most ? high : low),
+             2.0 * std::log(read * low)},
+            intensity, sigma_mm);
+        if (end.first < best.first) best = end;
+      }
+    }
+  }
+  const Vector& p = best.second;
+  return {.a_mm = std::exp(0.5 * p[0]),
+          .b = std::exp(0.5 * p[1]),
+          .c = std::exp(0.5 * p[2]),
+          .rms_log = std::sqrt(best.first / static_cast<double>(intensity.size()))};
+}
+
+double WarmUpFit::depth_mm(double time_s) const {
+  return warm_mm + effect.drift(time_s * second).in(millimetre);
+}
+
+WarmUpFit fitWarmUp(std::span<const double> time_s, std::span<const double> depth_mm,
+                    int exponentials) {
+  std::vector<double> grid;
+  for (double tau = 20.0; tau <= 3000.0; tau *= 1.15) grid.push_back(tau);
+  WarmUpFit best;
+  best.rms_mm = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < grid.size(); ++i) {
+    for (std::size_t j = i + 1; j < grid.size(); ++j) {
+      const WarmUpFit fit = linearFit(time_s, depth_mm, grid[i], grid[j], exponentials);
+      if (fit.rms_mm < best.rms_mm) best = fit;
+      if (exponentials < 2) break;
+    }
+    if (exponentials < 1) break;
+  }
+  return best;
+}
+
+}  // namespace toftwin::compare

@@ -1,0 +1,280 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/compare/live_report.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include <toftwin/names.h>
+
+namespace toftwin::compare {
+namespace {
+
+/// B − A in a word: "reads 3.2 ± 0.1 mm farther".
+std::string inWords(const Summary& difference) {
+  return fmt::format("{} ± {} mm {}", shown(std::abs(difference.mean), 2),
+                     shown(difference.standard_error, 2),
+                     difference.mean >= 0.0 ? "farther" : "nearer");
+}
+
+TableBlock regionTable(const Characteristics& c) {
+  TableBlock table{
+      "B − A by region: pixels of all poses, mean of the frames at each. ± is one standard error "
+      "of the mean, the pixels taken as independent",
+      {"region", "n", "bias [mm]", "RMS [mm]", "95 % within [mm]", "median [mm]", "noise A [mm]",
+       "noise B [mm]"},
+      {}};
+  for (const Region& r : c.regions) {
+    table.rows.push_back({r.name, std::to_string(r.difference_mm.n),
+                          shownWithError(r.difference_mm.mean, r.difference_mm.standard_error, 2),
+                          shown(r.difference_mm.rms, 2), shown(r.difference_mm.p95_abs, 2),
+                          shown(r.difference_mm.median, 2), shown(r.noise_a_mm, 2),
+                          shown(r.noise_b_mm, 2)});
+  }
+  return table;
+}
+
+TableBlock cameraTable(const Capture& capture) {
+  TableBlock table{"The two cameras", {"", "A", "B"}, {}};
+  const auto row = [&](const char* what, auto&& of) {
+    table.rows.push_back(
+        {what, of(capture.a, capture.poses.front().a), of(capture.b, capture.poses.front().b)});
+  };
+  const auto list = [](const std::vector<std::string>& words) {
+    return words.empty() ? std::string{"none stated"} : fmt::format("{}", fmt::join(words, ", "));
+  };
+  row("source", [](const SourceDetails& s, const Stack&) { return s.entry.name; });
+  row("model", [](const SourceDetails& s, const Stack&) { return s.entry.model; });
+  row("driver, kind of frames", [](const SourceDetails& s, const Stack& k) {
+    return fmt::format("{}, {}", s.driver, nameOf(k.provenance().kind));
+  });
+  row("size", [](const SourceDetails&, const Stack& k) {
+    return fmt::format("{} × {} px", k.camera().width, k.camera().height);
+  });
+  row("effects",
+      [&](const SourceDetails&, const Stack& k) { return list(k.provenance().effects); });
+  row("camera model id",
+      [](const SourceDetails&, const Stack& k) { return "id " + k.provenance().model_id; });
+  row("scene id",
+      [](const SourceDetails&, const Stack& k) { return "id " + k.provenance().scene_id; });
+  row("calibration id",
+      [](const SourceDetails&, const Stack& k) { return "id " + k.provenance().calibration_id; });
+  row("pose set by us", [](const SourceDetails& s, const Stack&) {
+    return std::string{s.can_set_pose ? "yes" : "no: its own poses"};
+  });
+  return table;
+}
+
+TableBlock poseTable(const Capture& capture, const std::vector<PoseComparison>& poses) {
+  TableBlock table{
+      "By pose, surfaces and edges together",
+      {"pose", "frames", "valid pixels", "bias [mm]", "RMS [mm]", "noise A [mm]", "noise B [mm]"},
+      {}};
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const auto c = characterise({poses[i]});
+    if (c.regions.empty()) {
+      table.rows.push_back({capture.poses[i].name, std::to_string(capture.poses[i].a.frames()), "0",
+                            "–", "–", "–", "–"});
+      continue;
+    }
+    const Region& all = c.regions.front();
+    table.rows.push_back(
+        {capture.poses[i].name, std::to_string(capture.poses[i].a.frames()),
+         std::to_string(all.difference_mm.n),
+         shownWithError(all.difference_mm.mean, all.difference_mm.standard_error, 2),
+         shown(all.difference_mm.rms, 2), shown(all.noise_a_mm, 2), shown(all.noise_b_mm, 2)});
+  }
+  return table;
+}
+
+TableBlock maskTable(const Characteristics& c) {
+  TableBlock table{"Validity, edges and signal", {"what", "A", "B", "both or ratio"}, {}};
+  table.rows.push_back({"valid pixels (in at least half of the frames)", shownPercent(c.valid_a),
+                        shownPercent(c.valid_b),
+                        fmt::format("{} agree", shown(100.0 * c.mask_agreement, 2) + " %")});
+  table.rows.push_back({"flying pixels", std::to_string(c.flying_a), std::to_string(c.flying_b),
+                        c.flying_both ? fmt::format("{} in the same pixel", *c.flying_both)
+                                      : "– (other pixel grid)"});
+  table.rows.push_back(
+      {"temporal noise B / A", "", "", fmt::format("{} (median)", shown(c.noise_ratio.median, 3))});
+  if (c.amplitude_ratio.n > 0)
+    table.rows.push_back(
+        {"amplitude B / A", "", "",
+         fmt::format("{} ± {} (median, spread)", shown(c.amplitude_ratio.median, 4),
+                     shown(c.amplitude_ratio.sd, 4))});
+  return table;
+}
+
+Figure trendFigure(const std::vector<double>& x, const std::vector<double>& y, std::string x_label,
+                   std::string caption, int bins) {
+  const Trend trend = trendOf(x, y, bins);
+  return {std::move(caption),
+          toSvg(Plot{.title = "B − A",
+                     .x_label = std::move(x_label),
+                     .y_label = "B − A [mm]",
+                     .curves = {{.name = "mean in bins of equally many pixels, ± 2 standard errors",
+                                 .x = trend.x,
+                                 .y = trend.y,
+                                 .ink = Ink::Simulated,
+                                 .low = trend.low,
+                                 .high = trend.high}},
+                     .zero_line = true})};
+}
+
+Figure histogramFigure(const Pixels& pixels) {
+  const double reach = std::max(
+                   1.0, 1.3 * quantile({pixels.difference_mm.begin(), pixels.difference_mm.end()},
+                                       0.99)),
+               low = std::min(
+                   -1.0, 1.3 * quantile({pixels.difference_mm.begin(), pixels.difference_mm.end()},
+                                        0.01));
+  std::vector<double> surface, edge;
+  for (std::size_t i = 0; i < pixels.difference_mm.size(); ++i)
+    (pixels.edge[i] ? edge : surface).push_back(pixels.difference_mm[i]);
+  return {"How often each difference occurs; what lies outside is counted in the outermost bins.",
+          toSvg(Plot{.title = "Histogram of B − A",
+                     .x_label = "B − A [mm]",
+                     .y_label = "pixels",
+                     .curves = {histogram(surface, low, reach, 80, "surfaces", Ink::Simulated),
+                                histogram(edge, low, reach, 80, "edges", Ink::Published)}})};
+}
+
+/// The difference over time since power-on of B, each pose a series of its own.
+std::optional<Figure> timeFigure(const Capture& capture) {
+  Curve curve{.name = "median over the image, one dot a pair of frames",
+              .ink = Ink::Simulated,
+              .stroke = Stroke::Dots};
+  for (const FramePair& pair : capture.pairs) {
+    if (!std::isfinite(pair.since_power_on_b_s) || !std::isfinite(pair.median_difference_mm))
+      continue;
+    curve.x.push_back(pair.since_power_on_b_s), curve.y.push_back(pair.median_difference_mm);
+  }
+  if (curve.x.size() < 2) return std::nullopt;
+  return Figure{
+      "How the difference goes with time since B was switched on: drift, and what the poses do to "
+      "it.",
+      toSvg(Plot{.title = "B − A over time",
+                 .x_label = "time since power-on of B [s]",
+                 .y_label = "B − A, median [mm]",
+                 .curves = {curve}})};
+}
+
+double roundUp(double value) {
+  const double power = std::pow(10.0, std::floor(std::log10(value)));
+  for (const double step : {1.0, 2.0, 5.0, 10.0}) {
+    if (step * power >= value) return step * power;
+  }
+  return value;
+}
+
+FigureRow maps(const CapturedPose& pose, const PoseComparison& comparison, double reach_mm) {
+  std::vector<double> ranges;
+  Image<float> range_m = comparison.range_a_mm;
+  for (float& v : range_m.pixels()) {
+    v *= 1e-3F;
+    ranges.push_back(static_cast<double>(v));
+  }
+  return {{{fmt::format("{}: what A sees.", pose.name),
+            toSvg(ImageMap{.title = "Range",
+                           .label = "range [m]",
+                           .values = range_m,
+                           .low = quantile(ranges, 0.01),
+                           .high = quantile(ranges, 0.99)})},
+           {fmt::format("{}: B − A. Blue: B nearer, red: B farther. Hatched: not valid in both.",
+                        pose.name),
+            toSvg(ImageMap{.title = "Difference",
+                           .label = "B − A [mm]",
+                           .values = comparison.difference_mm,
+                           .low = -reach_mm,
+                           .high = reach_mm,
+                           .diverging = true})}}};
+}
+
+Tone toneOfDifference(const Summary& difference) {
+  if (std::abs(difference.mean) <= 1.0 + 3.0 * difference.standard_error &&
+      difference.p95_abs <= 10.0)
+    return Tone::Good;
+  return std::abs(difference.mean) <= 10.0 ? Tone::Fair : Tone::Bad;
+}
+
+}  // namespace
+
+Result<Finding> judgeLive(const Capture& capture) {
+  std::vector<PoseComparison> poses;
+  for (const CapturedPose& pose : capture.poses) {
+    auto compared = comparePose(pose.a, pose.b);
+    if (!compared)
+      return Error{compared.error().code,
+                   fmt::format("pose \"{}\": {}", pose.name, compared.error().message)};
+    poses.push_back(*std::move(compared));
+  }
+  const Characteristics c = characterise(poses);
+  if (c.regions.empty()) {
+    return Error{Error::Code::InvalidArgument,
+                 "no pixel is valid in both cameras at any pose: there is nothing to compare. Do "
+                 "they look at something within their range?"};
+  }
+  const Pixels pixels = pixelsOf(poses);
+  const Summary& all = c.regions.front().difference_mm;
+  std::vector<double> magnitudes, log_amplitude;
+  for (const double d : pixels.difference_mm) magnitudes.push_back(std::abs(d));
+  for (const double a : pixels.amplitude) log_amplitude.push_back(std::log10(a));
+
+  Finding finding;
+  finding.section = {
+      .id = "live",
+      .title = fmt::format("{} (B) against {} (A)", capture.b.entry.name, capture.a.entry.name)};
+  finding.section.tone = toneOfDifference(all);
+  finding.section.verdict = fmt::format(
+      "B reads {} than A on average over {} pixels at {} poses; 95 % of the pixels agree within {} "
+      "mm. Temporal noise: A {} mm, B {} mm (median). Validity masks agree in {} % of the pixels.",
+      inWords(all), all.n, poses.size(), shown(all.p95_abs), shown(c.regions.front().noise_a_mm, 2),
+      shown(c.regions.front().noise_b_mm, 2), shown(100.0 * c.mask_agreement, 1));
+  auto& blocks = finding.section.blocks;
+  for (const std::string& warning : capture.warnings)
+    blocks.push_back(Paragraph{"Note: " + warning});
+  const double reach = roundUp(std::max(0.5, quantile(magnitudes, 0.97)));
+  for (std::size_t i = 0; i < poses.size() && i < 2; ++i)
+    blocks.push_back(maps(capture.poses[i], poses[i], reach));
+  blocks.push_back(regionTable(c));
+  FigureRow trends{{histogramFigure(pixels),
+                    trendFigure(pixels.range_mm, pixels.difference_mm, "range of A [mm]",
+                                "How the difference goes with range.", 60)}};
+  if (std::isfinite(quantile(log_amplitude, 0.5))) {
+    trends.figures.push_back(trendFigure(
+        log_amplitude, pixels.difference_mm, "log10 of A's amplitude",
+        "How it goes with signal strength: light scattered in the lens pulls dark pixels most.",
+        60));
+  }
+  if (auto over_time = timeFigure(capture)) trends.figures.push_back(*std::move(over_time));
+  blocks.push_back(std::move(trends));
+  blocks.push_back(poseTable(capture, poses));
+  blocks.push_back(maskTable(c));
+  blocks.push_back(cameraTable(capture));
+  blocks.push_back(
+      Paragraph{"Frames are paired by pose and order; each range difference is along the same ray. "
+                "The log of all frames with their ids is log.jsonl beside this page.",
+                true});
+
+  finding.headline = fmt::format("B reads {} than A", inWords(all));
+  finding.data = toJson(c);
+  finding.data.set("a", capture.a.entry.name)
+      .set("b", capture.b.entry.name)
+      .set("poses", poses.size())
+      .set("frames_per_pose", capture.poses.front().a.frames());
+  finding.cards = {{"Bias, B − A", shownWithError(all.mean, all.standard_error, 2) + " mm",
+                    fmt::format("{} pixels, {} poses", all.n, poses.size()), finding.section.tone},
+                   {"95 % agree within", shown(all.p95_abs) + " mm",
+                    fmt::format("RMS {} mm", shown(all.rms)), Tone::Neutral},
+                   {"Noise, A | B",
+                    fmt::format("{} | {} mm", shown(c.regions.front().noise_a_mm, 2),
+                                shown(c.regions.front().noise_b_mm, 2)),
+                    "temporal, median over pixels", Tone::Neutral},
+                   {"Masks agree", shown(100.0 * c.mask_agreement, 1) + " %",
+                    fmt::format("flying pixels {} | {}", c.flying_a, c.flying_b),
+                    c.mask_agreement > 0.98 ? Tone::Good : Tone::Fair}};
+  return finding;
+}
+
+}  // namespace toftwin::compare

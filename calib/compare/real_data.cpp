@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/compare/real_data.h"
+
+namespace toftwin::compare {
+
+std::vector<std::string> explainedRow(const std::string& name, const Explained& e) {
+  return {name,
+          std::to_string(e.n),
+          shown(e.residual_rms),
+          shownPercent(e.fraction_raw),
+          shown(e.best_offset),
+          shown(e.residual_sd),
+          shownPercent(e.fraction_centred)};
+}
+
+Tone toneOf(double explained_fraction) {
+  if (explained_fraction >= 0.8) return Tone::Good;
+  return explained_fraction >= 0.4 ? Tone::Fair : Tone::Bad;
+}
+
+void planRealData(Progress& progress, double effort) {
+  for (const char* camera : {"Kinect v2", "O3D303"}) {
+    progress.plan(std::string{camera} + ": distance error", 4.0 * effort);
+    progress.plan(std::string{camera} + ": corner", 25.0 * effort);
+    progress.plan(std::string{camera} + ": warm-up", 1.0);
+    progress.plan(std::string{camera} + ": noise", 4.0);
+  }
+  progress.plan("Kinect v2: box", 40.0 * effort);
+  progress.plan("published simulation", 40.0 * effort);
+}
+
+Result<std::vector<Finding>> judgeRealData(const RealDataJob& job) {
+  std::vector<Finding> findings;
+  const auto keep = [&](Result<Finding> finding) -> Result<> {
+    if (!finding) return finding.error();
+    findings.push_back(*std::move(finding));
+    return {};
+  };
+  const auto step = [&] {
+    if (job.progress != nullptr) job.progress->begin();
+  };
+  for (RealCamera camera : {RealCamera{"kinect_v2", "Kinect v2"}, RealCamera{"o3d303", "O3D303"}}) {
+    step();
+    if (auto done = keep(judgeDistance(job, camera)); !done) return done.error();
+    step();
+    if (auto done = keep(judgeCorner(job, camera)); !done) return done.error();
+    step();
+    if (auto done = keep(judgeWarmUp(job, camera)); !done) return done.error();
+    step();
+    if (auto done = keep(judgeNoise(job, camera)); !done) return done.error();
+  }
+  step();
+  if (auto done = keep(judgeBox(job)); !done) return done.error();
+  step();
+  if (auto done = keep(judgePublished(job)); !done) return done.error();
+  return findings;
+}
+
+}  // namespace toftwin::compare

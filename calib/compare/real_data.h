@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <toftwin/result.h>
+
+#include "calib/compare/progress.h"
+#include "calib/compare/report.h"
+#include "calib/compare/statistics.h"
+
+/// The simulator against measurements of a Kinect v2 and an O3D303 (docs/compare.md, "Real input").
+/// Every finding says what was assumed; nothing is fitted to the data that it is judged on, unless
+/// the finding says so.
+namespace toftwin::compare {
+
+/// One part of the report with its numbers.
+struct Finding {
+  Section section;
+  std::vector<Card> cards{};
+  std::string headline{};  ///< a clause for the report's verdict, or empty
+  Json data = Json::object();
+};
+
+struct RealDataJob {
+  std::filesystem::path folder;  ///< tof-thesis-2018
+  double effort = 1.0;           ///< factor on the paths that are traced
+  Progress* progress = nullptr;
+};
+
+/// A camera of the set, by its name there, and the preset that simulates it.
+struct RealCamera {
+  std::string name;   ///< "kinect_v2": file names and preset
+  std::string title;  ///< "Kinect v2"
+  /// Mean of measured − simulated range in the distance-error table; used on the other data sets.
+  double delay_mm = 0.0;
+};
+
+Result<Finding> judgeDistance(const RealDataJob& job, RealCamera& camera);  ///< sets delay_mm
+Result<Finding> judgeCorner(const RealDataJob& job, const RealCamera& camera);
+Result<Finding> judgeBox(const RealDataJob& job);
+Result<Finding> judgeWarmUp(const RealDataJob& job, const RealCamera& camera);
+Result<Finding> judgeNoise(const RealDataJob& job, const RealCamera& camera);
+Result<Finding> judgePublished(const RealDataJob& job);
+
+/// All of them, in the report's order. The plan is added to the job's progress by `planRealData`.
+void planRealData(Progress& progress, double effort);
+Result<std::vector<Finding>> judgeRealData(const RealDataJob& job);
+
+/// Rows "prediction, RMS left, shape left, explained" for tables.
+std::vector<std::string> explainedRow(const std::string& name, const Explained& explained);
+inline const std::vector<std::string> kExplainedHeader{"prediction",
+                                                       "n",
+                                                       "RMS left [mm]",
+                                                       "explained",
+                                                       "constant missing [mm]",
+                                                       "spread left [mm]",
+                                                       "spread explained"};
+Tone toneOf(double explained_fraction);
+
+}  // namespace toftwin::compare

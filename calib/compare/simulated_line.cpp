@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/compare/simulated_line.h"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <limits>
+#include <numbers>
+
+#include <fmt/format.h>
+
+#include "calib/compare/statistics.h"
+#include "sim/tracer/trace.h"
+
+namespace toftwin::compare {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+int middleRow(const CameraInfo& camera) {
+  return std::clamp(static_cast<int>(std::lround(camera.cy)), 0, camera.height - 1);
+}
+
+sim::TraceRequest middleRowOnly(sim::TraceRequest request) {
+  request.region_x = 0;
+  request.region_y = middleRow(request.camera);
+  request.region_width = request.camera.width;
+  request.region_height = 1;
+  return request;
+}
+
+/// Per pixel: the mean over one batch's frames, NaN where most frames are invalid.
+std::vector<double> meanRange(const sim::SensorModel& camera, const sim::Light& light,
+                              const LineEffort& effort, int row, std::uint64_t first_frame) {
+  std::vector<Running> mean(static_cast<std::size_t>(light.width()));
+  const sim::Samples collected = camera.collect(light, {}, effort.seed, first_frame, 0, row);
+  for (int frame = 0; frame < effort.frames; ++frame) {
+    const auto exposed = camera.readOut(collected, {}, effort.seed,
+                                        first_frame + static_cast<std::uint64_t>(frame), 0, row);
+    for (std::size_t x = 0; x < mean.size(); ++x) {
+      const auto range = static_cast<double>(exposed.range.range_m[x]);
+      if (std::isfinite(range)) mean[x].add(1e3 * range);
+    }
+  }
+  std::vector<double> result;
+  for (const Running& pixel : mean)
+    result.push_back(2 * pixel.n() >= static_cast<std::size_t>(effort.frames) ? pixel.mean()
+                                                                              : kNaN);
+  return result;
+}
+
+}  // namespace
+
+Result<SimulatedLine> simulateLine(const sim::SensorModel& camera, const sim::Scene& scene,
+                                   const LineEffort& effort,
+                                   const std::function<void(double)>& progress) {
+  sim::TraceRequest request = middleRowOnly(camera.traceRequest());
+  request.samples_per_pixel = effort.samples_per_batch;
+  request.max_surfaces = effort.max_surfaces;
+  const auto width = static_cast<std::size_t>(camera.camera().width);
+  std::vector<Running> across(width);
+  SimulatedLine result;
+  for (int batch = 0; batch < effort.batches; ++batch) {
+    if (progress) progress(static_cast<double>(batch) / effort.batches);
+    request.seed = effort.seed * 1000 + static_cast<std::uint64_t>(batch);
+    const sim::Light light = sim::trace(scene, request);
+    const auto first_frame =
+        static_cast<std::uint64_t>(batch) * static_cast<std::uint64_t>(effort.frames);
+    const auto range = meanRange(camera, light, effort, request.region_y, first_frame);
+    for (std::size_t x = 0; x < width; ++x) {
+      if (std::isfinite(range[x])) across[x].add(range[x]);
+      if (batch == 0) result.truth_mm.push_back(1e3 * static_cast<double>(light.truth.range_m[x]));
+    }
+  }
+  for (std::size_t x = 0; x < width; ++x) {
+    const Vec3d ray = rayThroughPixel(camera.camera(), static_cast<double>(x), request.region_y).v;
+    result.line.t.push_back(ray.x / ray.z);
+    const bool valid =
+        2 * across[x].n() >= static_cast<std::size_t>(effort.batches) && across[x].n() > 0;
+    result.line.range_mm.push_back(valid ? across[x].mean() : kNaN);
+    result.monte_carlo_mm.push_back(
+        across[x].n() > 1 ? std::sqrt(across[x].variance() / static_cast<double>(across[x].n()))
+                          : kNaN);
+  }
+  result.median_error_mm = quantile(result.monte_carlo_mm, 0.5);
+  return result;
+}
+
+Result<std::vector<WallReading>> readWall(const sim::SensorModel& camera, double albedo,
+                                          const std::vector<double>& distances_mm, int frames,
+                                          std::uint64_t seed,
+                                          const std::function<void(double)>& progress) {
+  const auto scene = sim::Scene::parse(
+      materialToml("wall", albedo) + wallToml({-2000, 0, 2000, 0, 4000, "wall"}), "wall.toml");
+  if (!scene) return scene.error();
+  constexpr int kSide = 4;
+  sim::TraceRequest request = camera.traceRequest();
+  request.samples_per_pixel = 64;
+  request.max_surfaces = 1;  // one flat wall: no light comes twice
+  request.seed = seed;
+  request.region_x = std::clamp(static_cast<int>(std::lround(request.camera.cx)) - kSide / 2, 0,
+                                request.camera.width - kSide);
+  request.region_y = std::clamp(static_cast<int>(std::lround(request.camera.cy)) - kSide / 2, 0,
+                                request.camera.height - kSide);
+  request.region_width = request.region_height = kSide;
+  std::vector<WallReading> readings;
+  for (std::size_t i = 0; i < distances_mm.size(); ++i) {
+    if (progress) progress(static_cast<double>(i) / static_cast<double>(distances_mm.size()));
+    request.world_from_camera.translation_m = {0.0, 0.0, -1e-3 * distances_mm[i]};
+    const sim::Light light = sim::trace(*scene, request);
+    const sim::Samples collected =
+        camera.collect(light, {}, seed, 0, request.region_x, request.region_y);
+    std::vector<Running> range(kSide * kSide);
+    Running amplitude, truth;
+    for (const float t : light.truth.range_m.pixels()) truth.add(1e3 * static_cast<double>(t));
+    for (int frame = 0; frame < frames; ++frame) {
+      const auto key = static_cast<std::uint64_t>(i) * static_cast<std::uint64_t>(frames) +
+                       static_cast<std::uint64_t>(frame);
+      const auto exposed =
+          camera.readOut(collected, {}, seed, key, request.region_x, request.region_y);
+      for (std::size_t p = 0; p < range.size(); ++p) {
+        const auto r = static_cast<double>(exposed.range.range_m[p]);
+        if (std::isfinite(r))
+          range[p].add(1e3 * r), amplitude.add(static_cast<double>(exposed.range.amplitude[p]));
+      }
+    }
+    WallReading reading{.truth_mm = truth.mean(), .amplitude = amplitude.mean()};
+    Running mean, variance;
+    for (const Running& pixel : range) {
+      if (pixel.n() > 1) mean.add(pixel.mean()), variance.add(pixel.variance());
+    }
+    reading.range_mm = mean.n() > 0 ? mean.mean() : kNaN;
+    reading.sigma_mm = variance.n() > 0 ? std::sqrt(variance.mean()) : kNaN;
+    reading.valid_share =
+        static_cast<double>(amplitude.n()) / (static_cast<double>(range.size()) * frames);
+    readings.push_back(reading);
+  }
+  return readings;
+}
+
+Result<PhasorLines> tracePhasors(const sim::TraceRequest& whole, const sim::Scene& scene) {
+  const sim::TraceRequest request = middleRowOnly(whole);
+  const sim::Light light = sim::trace(scene, request);
+  PhasorLines result;
+  result.range_mm.resize(request.frequencies.size());
+  for (int x = 0; x < light.width(); ++x) {
+    const Vec3d ray = rayThroughPixel(request.camera, x, request.region_y).v;
+    result.t.push_back(ray.x / ray.z);
+    const double truth = 1e3 * static_cast<double>(light.truth.range_m(x, 0));
+    result.truth_mm.push_back(truth);
+    for (std::size_t f = 0; f < request.frequencies.size(); ++f) {
+      const double period = unambiguousRange(request.frequencies[f]).in(millimetre);
+      const std::complex<double> p = light.phasor(f, 1)(x, 0);
+      const double wrapped = -std::arg(p) / (2.0 * std::numbers::pi) * period;
+      result.range_mm[f].push_back(wrapped + period * std::round((truth - wrapped) / period));
+    }
+  }
+  return result;
+}
+
+std::string materialToml(const std::string& name, double albedo, double oren_nayar_sigma_deg) {
+  std::string text = fmt::format("[[material]]\nname = \"{}\"\nalbedo = {:.6g}\n", name, albedo);
+  if (oren_nayar_sigma_deg > 0.0)
+    text += fmt::format("model = \"oren-nayar\"\nsigma_deg = {:.6g}\n", oren_nayar_sigma_deg);
+  return text;
+}
+
+std::string wallToml(const Wall& wall) {
+  const double dx = wall.x1 - wall.x0, dz = wall.z1 - wall.z0;
+  // A rectangle's own x axis runs along the wall: a turn by α about y takes (1, 0, 0) to (cos α, 0,
+  // −sin α).
+  const double turn_deg = std::atan2(-dz, dx) * 180.0 / std::numbers::pi;
+  return fmt::format(
+      "[[object]]\nshape = \"rectangle\"\nsize_m = [{:.9g}, {:.9g}, 0.0]\nposition_m = [{:.9g}, "
+      "0.0, {:.9g}]\n"
+      "euler_deg = [0.0, {:.12g}, 0.0]\nmaterial = \"{}\"\n",
+      1e-3 * std::hypot(dx, dz), 1e-3 * wall.height_mm, 0.5e-3 * (wall.x0 + wall.x1),
+      0.5e-3 * (wall.z0 + wall.z1), turn_deg, wall.material);
+}
+
+}  // namespace toftwin::compare
