@@ -32,7 +32,8 @@ Result<std::vector<std::byte>> decodeStepwise(std::span<const std::byte> bytes, 
   bool done = false;
   while (!done) {
     if (filled == out.size() && filled < size) {
-      out.resize(static_cast<std::size_t>(std::min<std::uint64_t>(size, 2 * std::uint64_t{filled})));
+      out.resize(
+          static_cast<std::size_t>(std::min<std::uint64_t>(size, 2 * std::uint64_t{filled})));
     }
     const Result<Step> did = step(bytes, std::span{out}.subspan(filled));
     if (!did) return did.error();
@@ -50,18 +51,21 @@ Result<std::vector<std::byte>> decodeStepwise(std::span<const std::byte> bytes, 
   return out;
 }
 
-Result<std::vector<std::byte>> decompressZstd(std::span<const std::byte> bytes, std::uint64_t size) {
-  const std::unique_ptr<ZSTD_DCtx, std::size_t (*)(ZSTD_DCtx*)> context{ZSTD_createDCtx(), &ZSTD_freeDCtx};
+Result<std::vector<std::byte>> decompressZstd(std::span<const std::byte> bytes,
+                                              std::uint64_t size) {
+  const std::unique_ptr<ZSTD_DCtx, std::size_t (*)(ZSTD_DCtx*)> context{ZSTD_createDCtx(),
+                                                                        &ZSTD_freeDCtx};
   if (context == nullptr) return Error{Error::Code::Internal, "out of memory for zstd"};
-  return decodeStepwise(bytes, size,
-                        [&](std::span<const std::byte> in, std::span<std::byte> out) -> Result<Step> {
-    ZSTD_inBuffer from{in.data(), in.size(), 0};
-    ZSTD_outBuffer to{out.data(), out.size(), 0};
-    const std::size_t hint = ZSTD_decompressStream(context.get(), &to, &from);
-    if (ZSTD_isError(hint) != 0) return malformed(fmt::format("zstd: {}", ZSTD_getErrorName(hint)));
-    // More frames may follow in one chunk; the end is where the input ends.
-    return Step{from.pos, to.pos, hint == 0 && from.pos == in.size()};
-  });
+  return decodeStepwise(
+      bytes, size, [&](std::span<const std::byte> in, std::span<std::byte> out) -> Result<Step> {
+        ZSTD_inBuffer from{in.data(), in.size(), 0};
+        ZSTD_outBuffer to{out.data(), out.size(), 0};
+        const std::size_t hint = ZSTD_decompressStream(context.get(), &to, &from);
+        if (ZSTD_isError(hint) != 0)
+          return malformed(fmt::format("zstd: {}", ZSTD_getErrorName(hint)));
+        // More frames may follow in one chunk; the end is where the input ends.
+        return Step{from.pos, to.pos, hint == 0 && from.pos == in.size()};
+      });
 }
 
 Result<std::vector<std::byte>> decompressLz4(std::span<const std::byte> bytes, std::uint64_t size) {
@@ -69,15 +73,17 @@ Result<std::vector<std::byte>> decompressLz4(std::span<const std::byte> bytes, s
   if (LZ4F_isError(LZ4F_createDecompressionContext(&made, LZ4F_VERSION)) != 0) {
     return Error{Error::Code::Internal, "out of memory for lz4"};
   }
-  const std::unique_ptr<LZ4F_dctx, LZ4F_errorCode_t (*)(LZ4F_dctx*)> context{made, &LZ4F_freeDecompressionContext};
-  return decodeStepwise(bytes, size,
-                        [&](std::span<const std::byte> in, std::span<std::byte> out) -> Result<Step> {
-    std::size_t consumed = in.size(), produced = out.size();
-    const std::size_t hint =
-        LZ4F_decompress(context.get(), out.data(), &produced, in.data(), &consumed, nullptr);
-    if (LZ4F_isError(hint) != 0) return malformed(fmt::format("lz4: {}", LZ4F_getErrorName(hint)));
-    return Step{consumed, produced, hint == 0 && consumed == in.size()};
-  });
+  const std::unique_ptr<LZ4F_dctx, LZ4F_errorCode_t (*)(LZ4F_dctx*)> context{
+      made, &LZ4F_freeDecompressionContext};
+  return decodeStepwise(
+      bytes, size, [&](std::span<const std::byte> in, std::span<std::byte> out) -> Result<Step> {
+        std::size_t consumed = in.size(), produced = out.size();
+        const std::size_t hint =
+            LZ4F_decompress(context.get(), out.data(), &produced, in.data(), &consumed, nullptr);
+        if (LZ4F_isError(hint) != 0)
+          return malformed(fmt::format("lz4: {}", LZ4F_getErrorName(hint)));
+        return Step{consumed, produced, hint == 0 && consumed == in.size()};
+      });
 }
 
 }  // namespace
@@ -92,8 +98,9 @@ std::vector<std::byte> compressZstd(std::span<const std::byte> bytes, int level)
 Result<std::vector<std::byte>> decompress(std::string_view compression,
                                           std::span<const std::byte> bytes, std::uint64_t size) {
   if (size > kMaxChunkBytes) {
-    return Error{Error::Code::TooLarge,
-                 fmt::format("says that it holds {} bytes, but {} is the most", size, kMaxChunkBytes)};
+    return Error{
+        Error::Code::TooLarge,
+        fmt::format("says that it holds {} bytes, but {} is the most", size, kMaxChunkBytes)};
   }
   if (compression == "zstd") return decompressZstd(bytes, size);
   if (compression == "lz4") return decompressLz4(bytes, size);

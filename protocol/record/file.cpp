@@ -15,7 +15,8 @@ namespace {
 
 /// What went wrong with a file, and what to do about it.
 Error systemError(const std::filesystem::path& path, const char* doing, int number) {
-  const std::string what = fmt::format("{}: cannot {}: {}", path.string(), doing, std::strerror(number));
+  const std::string what =
+      fmt::format("{}: cannot {}: {}", path.string(), doing, std::strerror(number));
   switch (number) {
     case ENOSPC:
     case EDQUOT:
@@ -28,9 +29,10 @@ Error systemError(const std::filesystem::path& path, const char* doing, int numb
     case EROFS:
       return {Error::Code::PermissionDenied, what + "; choose a place that you may use"};
     case EEXIST:
-      return {Error::Code::InvalidArgument,
-              fmt::format("{}: there is such a file already; choose another name, or remove it first",
-                          path.string())};
+      return {
+          Error::Code::InvalidArgument,
+          fmt::format("{}: there is such a file already; choose another name, or remove it first",
+                      path.string())};
     default:
       return {Error::Code::Internal, what};
   }
@@ -94,9 +96,9 @@ Result<InputFile> InputFile::open(const std::filesystem::path& path) {
   struct stat about {};
   if (::fstat(fd, &about) != 0 || !S_ISREG(about.st_mode)) {
     ::close(fd);
-    return Error{Error::Code::InvalidArgument,
-                 fmt::format("{}: this is not a regular file, so it cannot be a recording",
-                             path.string())};
+    return Error{
+        Error::Code::InvalidArgument,
+        fmt::format("{}: this is not a regular file, so it cannot be a recording", path.string())};
   }
   return InputFile{fd, static_cast<std::uint64_t>(about.st_size), path};
 }

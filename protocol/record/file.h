@@ -23,7 +23,8 @@ class OutputFile {
   OutputFile& operator=(OutputFile&& other) noexcept;
   ~OutputFile();
 
-  /// All of the bytes or none. Error StorageFull where the disk, the quota or a limit is at its end.
+  /// All of the bytes or none. Error StorageFull where the disk, the quota or a limit is at its
+  /// end.
   Result<> append(std::span<const std::byte> bytes);
   /// Waits until the bytes are on the disk, and closes.
   Result<> close();

@@ -5,7 +5,8 @@
 
 namespace toftwin::record {
 
-/// What recordings say that their messages are: a message of the protocol (preamble, header, planes).
+/// What recordings say that their messages are: a message of the protocol (preamble, header,
+/// planes).
 inline constexpr const char* kMessageEncoding = "toftwin";
 
 /// The schema record: the compiled FlatBuffers schema (.bfbs) of the header inside each message.

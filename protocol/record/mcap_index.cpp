@@ -25,7 +25,8 @@ bool FileReader::readIndex() {
   if (!file_.holds(kMagic.size(), tail_bytes)) return false;
   const std::uint64_t footer_at = file_.size() - tail_bytes;
   const auto tail = readRecord(footer_at, tail_bytes);
-  if (!tail || std::memcmp(tail->data() + kFooterBytes, kMagic.data(), kMagic.size()) != 0) return false;
+  if (!tail || std::memcmp(tail->data() + kFooterBytes, kMagic.data(), kMagic.size()) != 0)
+    return false;
   std::span<const std::byte> run{*tail};
   const auto record = takeRecord(run);
   if (!record || record->opcode != Opcode::Footer) return false;
@@ -38,7 +39,8 @@ bool FileReader::readIndex() {
   const auto summary = readRecord(footer->summary_start, footer_at - footer->summary_start);
   if (!summary) return false;
   const auto footer_but_crc = std::span{*tail}.first(kFooterBytes - sizeof footer->summary_crc);
-  if (footer->summary_crc != 0 && crc32(footer_but_crc, crc32(*summary)) != footer->summary_crc) return false;
+  if (footer->summary_crc != 0 && crc32(footer_but_crc, crc32(*summary)) != footer->summary_crc)
+    return false;
   indexed_ = readSummary(*summary, footer->summary_start);
   if (!indexed_) {
     schemas_.clear();
@@ -58,7 +60,8 @@ bool FileReader::readSummary(std::span<const std::byte> summary, std::uint64_t d
       statistics = parseStatistics(record->content);
     } else if (record->opcode == Opcode::ChunkIndex) {
       const auto index = parseChunkIndex(record->content);
-      if (!index || index->offset > data_end || index->length > data_end - index->offset) return false;
+      if (!index || index->offset > data_end || index->length > data_end - index->offset)
+        return false;
       places_.push_back({index->offset, index->length, index->start_time_ns, index->end_time_ns});
     }
   }
@@ -89,8 +92,9 @@ void FileReader::scan() {
     const bool has_head = file_.holds(at, head.size()) && file_.readAt(at, head);
     if (has_head) std::memcpy(&content, head.data() + 1, sizeof content);
     if (!has_head || !file_.holds(at + head.size(), content)) {
-      note(fmt::format("{}: the file ends in the middle of the record at byte {}: its last {} bytes are lost",
-                       path().string(), at, file_.size() - at));
+      note(fmt::format(
+          "{}: the file ends in the middle of the record at byte {}: its last {} bytes are lost",
+          path().string(), at, file_.size() - at));
       break;
     }
     const auto opcode = static_cast<Opcode>(head[0]);
@@ -104,8 +108,9 @@ void FileReader::scan() {
     at += place.length;
   }
   if (!closed) {
-    note(fmt::format("{}: the recording was not closed, so it has no index; scanning found {} messages",
-                     path().string(), statistics_.messages));
+    note(fmt::format(
+        "{}: the recording was not closed, so it has no index; scanning found {} messages",
+        path().string(), statistics_.messages));
   } else if (!has_end_) {
     note(fmt::format("{}: the index at the end is damaged or cut off; scanning found {} messages",
                      path().string(), statistics_.messages));
@@ -132,7 +137,8 @@ bool FileReader::scanRecord(Opcode opcode, const Place& place) {
     case Opcode::Message: {
       Place counted = place;
       if (opcode == Opcode::Chunk) ++statistics_.chunks;
-      const auto records = opcode == Opcode::Chunk ? readPlace(place) : readRecord(place.offset, place.length);
+      const auto records =
+          opcode == Opcode::Chunk ? readPlace(place) : readRecord(place.offset, place.length);
       const Result<> surveyed = records ? survey(*records, counted) : Result<>{records.error()};
       if (!surveyed) note(surveyed.error().message);
       // Records too short to be one hold nothing to come back for.
@@ -149,7 +155,8 @@ Result<> FileReader::survey(std::span<const std::byte> records, Place& place) {
   while (!records.empty()) {
     const auto record = takeRecord(records);
     if (!record) return damaged(place.offset, "holds a damaged record");
-    if (auto learned = learn(*record); !learned) return damaged(place.offset, learned.error().message);
+    if (auto learned = learn(*record); !learned)
+      return damaged(place.offset, learned.error().message);
     if (record->opcode != Opcode::Message) continue;
     const auto message = parseMessage(record->content);
     if (!message) return damaged(place.offset, "holds a damaged message");

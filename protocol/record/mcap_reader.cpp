@@ -33,8 +33,9 @@ Result<FileReader> FileReader::open(const std::filesystem::path& path) {
     if (auto read = reader.file_.readAt(0, magic); !read) return read.error();
   }
   if (!long_enough || std::memcmp(magic.data(), kMagic.data(), 5) != 0) {
-    return Error{Error::Code::Malformed,
-                 fmt::format("{}: this is not an MCAP recording: it does not begin as one", path.string())};
+    return Error{
+        Error::Code::Malformed,
+        fmt::format("{}: this is not an MCAP recording: it does not begin as one", path.string())};
   }
   if (std::memcmp(magic.data(), kMagic.data(), magic.size()) != 0) {
     return Error{Error::Code::Incompatible,
@@ -49,8 +50,8 @@ Result<Bytes> FileReader::readRecord(std::uint64_t offset, std::uint64_t length)
   // The compressed records and the chunk's own fields; the file really has that many bytes.
   if (length > kMaxChunkBytes + (1u << 20)) {
     return Error{Error::Code::TooLarge,
-                 fmt::format("{}: the record at byte {} has {} bytes, but {} is the most", path().string(),
-                             offset, length, kMaxChunkBytes)};
+                 fmt::format("{}: the record at byte {} has {} bytes, but {} is the most",
+                             path().string(), offset, length, kMaxChunkBytes)};
   }
   Bytes bytes(static_cast<std::size_t>(length));
   if (auto read = file_.readAt(offset, bytes); !read) return read.error();
@@ -63,13 +64,15 @@ Result<Bytes> FileReader::readPlace(const Place& place) const {
   if (!bytes) return bytes.error();
   std::span<const std::byte> run = *bytes;
   const auto record = takeRecord(run);
-  if (!record || !run.empty()) return damaged(place.offset, "does not have the length that the index says");
+  if (!record || !run.empty())
+    return damaged(place.offset, "does not have the length that the index says");
   if (record->opcode == Opcode::Message) return bytes;
   const auto chunk = record->opcode == Opcode::Chunk ? parseChunk(record->content) : std::nullopt;
   if (!chunk) return damaged(place.offset, "is not a whole chunk");
   auto records = decompress(chunk->head.compression, chunk->records, chunk->head.uncompressed_size);
   if (!records) {
-    return Error{records.error().code, damaged(place.offset, "(a chunk) " + records.error().message).message};
+    return Error{records.error().code,
+                 damaged(place.offset, "(a chunk) " + records.error().message).message};
   }
   if (chunk->head.uncompressed_crc != 0 && crc32(*records) != chunk->head.uncompressed_crc) {
     return damaged(place.offset, "(a chunk) does not have the CRC that it should have");
@@ -87,7 +90,8 @@ Result<> FileReader::learn(const Record& record) {
     if (!channel) return Error{Error::Code::Malformed, "holds a damaged channel"};
     const auto [known, is_new] = channels_.try_emplace(channel->id, *channel);
     if (!is_new && known->second != *channel) {
-      return Error{Error::Code::Malformed, fmt::format("says otherwise what channel {} is", channel->id)};
+      return Error{Error::Code::Malformed,
+                   fmt::format("says otherwise what channel {} is", channel->id)};
     }
   }
   return {};
@@ -110,8 +114,9 @@ Result<Message> FileReader::next() {
   while (true) {
     while (!rest_.empty()) {
       const auto record = takeRecord(rest_);
-      const auto message =
-          record && record->opcode == Opcode::Message ? parseMessage(record->content) : std::nullopt;
+      const auto message = record && record->opcode == Opcode::Message
+                               ? parseMessage(record->content)
+                               : std::nullopt;
       if (!record || (record->opcode == Opcode::Message && !message)) {
         rest_ = {};
         return damaged(places_[at_ - 1].offset, "(a chunk) holds a damaged record");
@@ -126,12 +131,14 @@ Result<Message> FileReader::next() {
       if (message->log_time_ns < skip_before_ns_) continue;
       if (!channels_.contains(message->channel_id)) {
         return damaged(places_[at_ - 1].offset,
-                       fmt::format("holds a message of channel {}, which nothing defines", message->channel_id));
+                       fmt::format("holds a message of channel {}, which nothing defines",
+                                   message->channel_id));
       }
       skip_before_ns_ = 0;
       return *message;
     }
-    if (at_ == places_.size()) return Error{Error::Code::EndOfStream, path().string() + ": no more frames"};
+    if (at_ == places_.size())
+      return Error{Error::Code::EndOfStream, path().string() + ": no more frames"};
     auto loaded = readPlace(places_[at_++]);
     if (!loaded) return loaded.error();
     loaded_ = std::move(loaded).value();

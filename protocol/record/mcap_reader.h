@@ -18,8 +18,9 @@
 
 namespace toftwin::record::mcap {
 
-/// Reads the messages of any MCAP file in file order, through its index, or by scanning where it has
-/// none that fits. Knows nothing of frames. No length in the file is believed before it is checked.
+/// Reads the messages of any MCAP file in file order, through its index, or by scanning where it
+/// has none that fits. Knows nothing of frames. No length in the file is believed before it is
+/// checked.
 class FileReader {
  public:
   /// Error Malformed only if this is no MCAP file at all.

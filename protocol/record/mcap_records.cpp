@@ -10,8 +10,7 @@ namespace {
 
 template <class Map>
 void appendNumbers(Appender& to, const Map& map) {
-  constexpr auto kEntryBytes =
-      sizeof(typename Map::key_type) + sizeof(typename Map::mapped_type);
+  constexpr auto kEntryBytes = sizeof(typename Map::key_type) + sizeof(typename Map::mapped_type);
   to.number(static_cast<std::uint32_t>(map.size() * kEntryBytes));
   for (const auto& [key, value] : map) {
     to.number(key);

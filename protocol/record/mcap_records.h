@@ -13,11 +13,12 @@
 #include <type_traits>
 #include <vector>
 
-/// The records of an MCAP file (mcap.dev/spec, major version 0) as values, and their bytes: an opcode,
-/// the content's length as 64 bit, the content. All numbers are little-endian.
+/// The records of an MCAP file (mcap.dev/spec, major version 0) as values, and their bytes: an
+/// opcode, the content's length as 64 bit, the content. All numbers are little-endian.
 namespace toftwin::record::mcap {
 
-static_assert(std::endian::native == std::endian::little, "numbers are copied as they lie in memory");
+static_assert(std::endian::native == std::endian::little,
+              "numbers are copied as they lie in memory");
 
 using Bytes = std::vector<std::byte>;
 
@@ -125,11 +126,11 @@ class Appender {
  public:
   explicit Appender(Bytes& out) : out_(out) {}
   template <class Number>
-    requires std::is_integral_v<Number>
-  void number(Number value) {
-    raw(std::as_bytes(std::span{&value, 1}));
+  requires std::is_integral_v<Number>
+  void number(Number value) { raw(std::as_bytes(std::span{&value, 1})); }
+  void raw(std::span<const std::byte> bytes) {
+    out_.insert(out_.end(), bytes.begin(), bytes.end());
   }
-  void raw(std::span<const std::byte> bytes) { out_.insert(out_.end(), bytes.begin(), bytes.end()); }
   void text(std::string_view text);
   /// Starts a record or a part with a length before it; the end sets the length.
   std::size_t begin(Opcode opcode);
@@ -162,8 +163,8 @@ struct Record {
 /// Cuts the first record off `bytes`; nothing if its length is beyond them.
 std::optional<Record> takeRecord(std::span<const std::byte>& bytes);
 
-// Parsers of a record's content; nothing if it is too short or a length in it lies. Bytes beyond the
-// known fields are ignored, as the specification wants it.
+// Parsers of a record's content; nothing if it is too short or a length in it lies. Bytes beyond
+// the known fields are ignored, as the specification wants it.
 std::optional<Schema> parseSchema(std::span<const std::byte> content);
 std::optional<Channel> parseChannel(std::span<const std::byte> content);
 std::optional<Message> parseMessage(std::span<const std::byte> content);

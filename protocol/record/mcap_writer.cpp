@@ -10,7 +10,8 @@
 
 namespace toftwin::record::mcap {
 
-Result<FileWriter> FileWriter::create(const std::filesystem::path& path, const WriterOptions& options) {
+Result<FileWriter> FileWriter::create(const std::filesystem::path& path,
+                                      const WriterOptions& options) {
   auto file = OutputFile::create(path, options.overwrite);
   if (!file) return file.error();
   FileWriter writer{std::move(file).value(), options};
@@ -22,9 +23,9 @@ Result<FileWriter> FileWriter::create(const std::filesystem::path& path, const W
 
 Result<> FileWriter::append(std::span<const std::byte> bytes) {
   if (auto wrote = file_.append(bytes); !wrote) {
-    failed_ = Error{wrote.error().code,
-                    fmt::format("{}. The recording is whole up to there: {} messages", wrote.error().message,
-                                statistics_.messages)};
+    failed_ =
+        Error{wrote.error().code, fmt::format("{}. The recording is whole up to there: {} messages",
+                                              wrote.error().message, statistics_.messages)};
     return *failed_;
   }
   data_crc_ = crc32(bytes, data_crc_);
@@ -33,7 +34,8 @@ Result<> FileWriter::append(std::span<const std::byte> bytes) {
 
 Result<std::uint16_t> FileWriter::addSchema(Schema schema) {
   if (schemas_.size() >= std::numeric_limits<std::uint16_t>::max()) {
-    return Error{Error::Code::TooLarge, path().string() + ": more than 65535 schemas in one recording"};
+    return Error{Error::Code::TooLarge,
+                 path().string() + ": more than 65535 schemas in one recording"};
   }
   schema.id = static_cast<std::uint16_t>(schemas_.size() + 1);  // 0 means none
   mcap::append(open_, schema);
@@ -43,7 +45,8 @@ Result<std::uint16_t> FileWriter::addSchema(Schema schema) {
 
 Result<std::uint16_t> FileWriter::addChannel(Channel channel) {
   if (channels_.size() >= std::numeric_limits<std::uint16_t>::max()) {
-    return Error{Error::Code::TooLarge, path().string() + ": more than 65535 channels in one recording"};
+    return Error{Error::Code::TooLarge,
+                 path().string() + ": more than 65535 channels in one recording"};
   }
   channel.id = static_cast<std::uint16_t>(channels_.size());
   mcap::append(open_, channel);
@@ -51,7 +54,8 @@ Result<std::uint16_t> FileWriter::addChannel(Channel channel) {
   return channels_.back().id;
 }
 
-Result<> FileWriter::write(const Message& head, std::span<const std::span<const std::byte>> pieces) {
+Result<> FileWriter::write(const Message& head,
+                           std::span<const std::span<const std::byte>> pieces) {
   if (failed_) return *failed_;
   const bool first = open_messages_ == 0;
   open_start_ns_ = first ? head.log_time_ns : std::min(open_start_ns_, head.log_time_ns);
@@ -67,10 +71,12 @@ Result<> FileWriter::write(const Message& head, std::span<const std::span<const 
 }
 
 bool FileWriter::openChunkIsDue(std::uint64_t log_time_ns) const {
-  const auto most = static_cast<std::uint64_t>(std::chrono::nanoseconds{options_.chunk_time}.count());
+  const auto most =
+      static_cast<std::uint64_t>(std::chrono::nanoseconds{options_.chunk_time}.count());
   // From a source slower than the chunk time every message is written at once: nobody knows when
   // the next one comes.
-  const bool slow = messages() > 1 && log_time_ns > previous_ns_ && log_time_ns - previous_ns_ >= most;
+  const bool slow =
+      messages() > 1 && log_time_ns > previous_ns_ && log_time_ns - previous_ns_ >= most;
   return open_.size() >= options_.chunk_bytes || open_end_ns_ - open_start_ns_ >= most || slow;
 }
 
@@ -120,7 +126,8 @@ void FileWriter::count(const ChunkHead& chunk) {
   ++statistics_.chunks;
   if (open_messages_ == 0) return;
   const bool first = statistics_.messages == 0;
-  statistics_.start_time_ns = first ? chunk.start_time_ns : std::min(statistics_.start_time_ns, chunk.start_time_ns);
+  statistics_.start_time_ns =
+      first ? chunk.start_time_ns : std::min(statistics_.start_time_ns, chunk.start_time_ns);
   statistics_.end_time_ns = std::max(statistics_.end_time_ns, chunk.end_time_ns);
   statistics_.messages += open_messages_;
   for (const auto& [channel, index] : open_index_) {

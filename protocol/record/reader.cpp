@@ -16,7 +16,9 @@ std::int64_t hostTime(std::uint64_t timestamp_ns) {
   return static_cast<std::int64_t>(std::min(timestamp_ns, kMost));
 }
 
-bool holdsFrames(const mcap::Channel& channel) { return channel.message_encoding == kMessageEncoding; }
+bool holdsFrames(const mcap::Channel& channel) {
+  return channel.message_encoding == kMessageEncoding;
+}
 
 Summary summarise(const mcap::FileReader& file) {
   Summary summary;
@@ -42,9 +44,11 @@ Result<> checkHoldsFrames(const mcap::FileReader& file) {
   });
   if (!foreign) return {};
   const mcap::Channel& first = channels.begin()->second;
-  return Error{Error::Code::Incompatible,
-               fmt::format("{}: this MCAP file holds no frames of toftwin; its topic \"{}\" has the "
-                           "encoding \"{}\"", file.path().string(), first.topic, first.message_encoding)};
+  return Error{
+      Error::Code::Incompatible,
+      fmt::format("{}: this MCAP file holds no frames of toftwin; its topic \"{}\" has the "
+                  "encoding \"{}\"",
+                  file.path().string(), first.topic, first.message_encoding)};
 }
 
 }  // namespace
@@ -60,10 +64,11 @@ struct Reader::State {
     auto decoded = wire::decode(bytes.buffer());
     auto* frame = decoded ? std::get_if<wire::FrameMessage>(&*decoded) : nullptr;
     if (frame != nullptr) return std::move(frame->frame);
-    return Error{Error::Code::Malformed,
-                 fmt::format("{}: the message with sequence {} and log time {} ns is not a frame{}{}",
-                             file.path().string(), message.sequence, message.log_time_ns,
-                             decoded ? "" : ": ", decoded ? "" : decoded.error().message)};
+    return Error{
+        Error::Code::Malformed,
+        fmt::format("{}: the message with sequence {} and log time {} ns is not a frame{}{}",
+                    file.path().string(), message.sequence, message.log_time_ns,
+                    decoded ? "" : ": ", decoded ? "" : decoded.error().message)};
   }
 };
 

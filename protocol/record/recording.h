@@ -17,7 +17,8 @@
 namespace toftwin::record {
 
 struct WriterOptions {
-  std::uint64_t chunk_bytes = 8ull << 20;  ///< uncompressed; what a killed recorder can lose at most
+  std::uint64_t chunk_bytes = 8ull
+                              << 20;  ///< uncompressed; what a killed recorder can lose at most
   std::chrono::milliseconds chunk_time{1000};
   int zstd_level = 1;      ///< 0: not compressed
   bool overwrite = false;  ///< otherwise a file that is there already is an error
@@ -49,12 +50,12 @@ class Writer {
 struct Summary {
   std::map<std::string, std::uint64_t> frames_per_source;
   std::int64_t first_ns = 0, last_ns = 0;  ///< log time: `Moment::received`
-  bool indexed = false;   ///< false: no usable index (killed recorder), found by scanning
-  std::string damage;     ///< what was wrong and how much was lost, or empty
+  bool indexed = false;  ///< false: no usable index (killed recorder), found by scanning
+  std::string damage;    ///< what was wrong and how much was lost, or empty
 };
 
-/// Reads frames in file order. Damaged or truncated files give every frame up to the damage, then one
-/// error Malformed, and after it the frames of the next chunk that is whole.
+/// Reads frames in file order. Damaged or truncated files give every frame up to the damage, then
+/// one error Malformed, and after it the frames of the next chunk that is whole.
 class Reader {
  public:
   static Result<Reader> open(const std::filesystem::path& file);

@@ -16,8 +16,8 @@ namespace {
 /// MCAP's timestamps have no sign; nothing of ours is from before 1970.
 std::uint64_t timestamp(std::int64_t ns) { return ns > 0 ? static_cast<std::uint64_t>(ns) : 0; }
 
-/// When the first exposure began, on the host's clock, where the driver can tell; else the log time,
-/// as the MCAP specification wants it.
+/// When the first exposure began, on the host's clock, where the driver can tell; else the log
+/// time, as the MCAP specification wants it.
 std::uint64_t publishTime(const Moment& moment) {
   std::int64_t host_ns = 0;
   const bool known = !moment.exposures.empty() && moment.clock.uncertainty_ns >= 0 &&
@@ -37,8 +37,8 @@ mcap::Channel channelOf(const Frame& frame, std::uint16_t schema) {
       {"calibration_id", camera.calibration_id},
       {"camera", fmt::format(R"({{"width":{},"height":{},"fx":{},"fy":{},"cx":{},"cy":{},)"
                              R"("distortion_k1_k2_p1_p2_k3":[{}]}})",
-                             camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy,
-                             fmt::join(camera.distortion, ","))}};
+                             camera.width, camera.height, camera.fx, camera.fy, camera.cx,
+                             camera.cy, fmt::join(camera.distortion, ","))}};
   return channel;
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The MCAP layer, which knows nothing of frames: what it writes, it reads, and no damage surprises it.
+// The MCAP layer, which knows nothing of frames: what it writes, it reads, and no damage surprises
+// it.
 #include <gmock/gmock.h>
 #include <lz4frame.h>
 
@@ -28,8 +29,10 @@ std::uint64_t timeOf(int i) { return 1'000'000'000u + 10'000'000u * static_cast<
 void add(FileWriter& writer, int i, std::uint16_t channel) {
   const std::string text = textOf(i);
   const auto bytes = std::as_bytes(std::span{text});
-  const std::span<const std::byte> pieces[] = {bytes.first(text.size() / 2), bytes.subspan(text.size() / 2)};
-  const auto wrote = writer.write({channel, static_cast<std::uint32_t>(i), timeOf(i), timeOf(i) - 5, {}}, pieces);
+  const std::span<const std::byte> pieces[] = {bytes.first(text.size() / 2),
+                                               bytes.subspan(text.size() / 2)};
+  const auto wrote =
+      writer.write({channel, static_cast<std::uint32_t>(i), timeOf(i), timeOf(i) - 5, {}}, pieces);
   ASSERT_TRUE(wrote) << wrote.error().message;
 }
 
@@ -37,7 +40,8 @@ FileWriter begin(const std::filesystem::path& file, WriterOptions options) {
   auto writer = FileWriter::create(file, options);
   EXPECT_TRUE(writer) << writer.error().message;
   const auto schema = writer->addSchema({0, "s", "text", Bytes(5, std::byte{7})});
-  EXPECT_EQ(writer->addChannel({0, *schema, "even", "raw", {{"k", "v"}, {"", "empty key"}}}).value(), 0);
+  EXPECT_EQ(
+      writer->addChannel({0, *schema, "even", "raw", {{"k", "v"}, {"", "empty key"}}}).value(), 0);
   EXPECT_EQ(writer->addChannel({0, 0, "odd", "raw", {}}).value(), 1);
   return std::move(writer).value();
 }
@@ -155,7 +159,8 @@ TEST_P(McapFile, AFlippedByteNeverGivesAWrongMessage) {
       if (!message) continue;
       ASSERT_LT(message->sequence, static_cast<std::uint32_t>(kMessages));
       // A flip in a message index may lose nothing; in a chunk its CRC finds it.
-      ASSERT_EQ(textOf(*message), textOf(static_cast<int>(message->sequence))) << "flipped byte " << at;
+      ASSERT_EQ(textOf(*message), textOf(static_cast<int>(message->sequence)))
+          << "flipped byte " << at;
     }
   }
 }
@@ -185,11 +190,12 @@ TEST_P(McapFile, ADamagedChunkIsOneErrorAndTheOthersAreRead) {
   EXPECT_GT(good, kMessages / 2);
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Compression, McapFile,
-    testing::Values(Case{"Zstd", {.chunk_bytes = 20'000}}, Case{"None", {.chunk_bytes = 20'000, .zstd_level = 0}},
-                    Case{"ByTime", {.chunk_time = std::chrono::milliseconds{55}}}),
-    [](const auto& a_case) { return std::string{a_case.param.name}; });
+INSTANTIATE_TEST_SUITE_P(Compression, McapFile,
+                         testing::Values(Case{"Zstd", {.chunk_bytes = 20'000}},
+                                         Case{"None", {.chunk_bytes = 20'000, .zstd_level = 0}},
+                                         Case{"ByTime",
+                                              {.chunk_time = std::chrono::milliseconds{55}}}),
+                         [](const auto& a_case) { return std::string{a_case.param.name}; });
 
 TEST(McapWriter, AFileThatIsThereIsNotOverwrittenUnlessAsked) {
   Folder folder;
@@ -280,7 +286,8 @@ Bytes oneMessage() {
 TEST(McapReader, ReadsLz4ChunksOfOthers) {
   const Bytes records = oneMessage();
   Bytes stored(LZ4F_compressFrameBound(records.size(), nullptr));
-  stored.resize(LZ4F_compressFrame(stored.data(), stored.size(), records.data(), records.size(), nullptr));
+  stored.resize(
+      LZ4F_compressFrame(stored.data(), stored.size(), records.data(), records.size(), nullptr));
   const auto message = readOneChunk({5, 5, records.size(), crc32(records), "lz4"}, stored);
   ASSERT_TRUE(message) << message.error().message;
   EXPECT_EQ(message->sequence, 42u);
@@ -289,8 +296,9 @@ TEST(McapReader, ReadsLz4ChunksOfOthers) {
 TEST(McapReader, AChunkThatLiesAboutItsSizeIsAnErrorWithoutTheMemory) {
   const Bytes records = oneMessage();
   const Bytes stored = compressZstd(records, 1);
-  for (std::uint64_t lie : {std::uint64_t{records.size()} - 1, std::uint64_t{records.size()} + 1, std::uint64_t{0},
-                            kMaxChunkBytes, kMaxChunkBytes + 1, ~std::uint64_t{0}}) {
+  for (std::uint64_t lie :
+       {std::uint64_t{records.size()} - 1, std::uint64_t{records.size()} + 1, std::uint64_t{0},
+        kMaxChunkBytes, kMaxChunkBytes + 1, ~std::uint64_t{0}}) {
     for (const char* compression : {"zstd", "lz4", ""}) {
       const auto message = readOneChunk({5, 5, lie, 0, compression}, stored);
       ASSERT_FALSE(message) << lie;
@@ -330,7 +338,8 @@ TEST(McapReader, MillionsOfBrokenRecordsNeitherFillMemoryNorTheReport) {
 
 TEST(McapReader, AnIndexThatPointsOutOfTheDataIsNotUsed) {
   Folder folder;
-  for (const auto& [offset, length] : {std::pair<std::uint64_t, std::uint64_t>{~0ull, 50}, {50, ~0ull}, {1 << 20, 9}}) {
+  for (const auto& [offset, length] :
+       {std::pair<std::uint64_t, std::uint64_t>{~0ull, 50}, {50, ~0ull}, {1 << 20, 9}}) {
     Bytes bytes;
     appendStart(bytes, "test");
     append(bytes, Channel{0, 0, "t", "raw", {}});
@@ -374,13 +383,21 @@ Bytes fileWithoutCrcs() {
     if (std::string_view{compression} == "zstd") stored = compressZstd(records, 1);
     if (std::string_view{compression} == "lz4") {
       stored.resize(LZ4F_compressFrameBound(records.size(), nullptr));
-      stored.resize(LZ4F_compressFrame(stored.data(), stored.size(), records.data(), records.size(), nullptr));
+      stored.resize(LZ4F_compressFrame(stored.data(), stored.size(), records.data(), records.size(),
+                                       nullptr));
     }
     const std::uint64_t at = bytes.size();
     append(bytes, ChunkHead{messages - 4, messages - 1, records.size(), 0, compression}, stored);
     const std::uint64_t length = bytes.size() - at;
-    append(summary, ChunkIndex{messages - 4, messages - 1, at, length, {{0, bytes.size()}}, 0, compression,
-                               stored.size(), records.size()});
+    append(summary, ChunkIndex{messages - 4,
+                               messages - 1,
+                               at,
+                               length,
+                               {{0, bytes.size()}},
+                               0,
+                               compression,
+                               stored.size(),
+                               records.size()});
     append(bytes, index);
   }
   appendDataEnd(bytes, 0);
@@ -402,12 +419,23 @@ void mutate(Bytes& bytes, std::mt19937& random) {
   const auto begin = bytes.begin() + static_cast<std::ptrdiff_t>(at);
   const auto end = begin + static_cast<std::ptrdiff_t>(length);
   switch (random() % 6) {
-    case 0: *begin ^= static_cast<std::byte>(1u << random() % 8); break;
-    case 1: std::fill(begin, end, std::byte{0xff}); break;
-    case 2: std::fill(begin, end, std::byte{0}); break;
-    case 3: bytes.erase(begin, end); break;
-    case 4: bytes.insert(begin, length, static_cast<std::byte>(random())); break;
-    default: *begin = static_cast<std::byte>(random());
+    case 0:
+      *begin ^= static_cast<std::byte>(1u << random() % 8);
+      break;
+    case 1:
+      std::fill(begin, end, std::byte{0xff});
+      break;
+    case 2:
+      std::fill(begin, end, std::byte{0});
+      break;
+    case 3:
+      bytes.erase(begin, end);
+      break;
+    case 4:
+      bytes.insert(begin, length, static_cast<std::byte>(random()));
+      break;
+    default:
+      *begin = static_cast<std::byte>(random());
   }
 }
 

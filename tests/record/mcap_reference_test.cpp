@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Against the reference implementation (npm: @mcap/core): it reads what we write, every CRC and index
-// checked, and we read what it writes.
+// Against the reference implementation (npm: @mcap/core): it reads what we write, every CRC and
+// index checked, and we read what it writes.
 #include <gmock/gmock.h>
 
 #include <cstdlib>
@@ -43,14 +43,17 @@ class Reference : public testing::Test {
  protected:
   void SetUp() override {
     if (!std::filesystem::exists(std::filesystem::path{TOFTWIN_MCAP_REFERENCE} / "installed")) {
-      GTEST_SKIP() << "the reference implementation could not be installed (see mcap_reference_install)";
+      GTEST_SKIP()
+          << "the reference implementation could not be installed (see mcap_reference_install)";
     }
     std::filesystem::create_directory(messages_);
   }
   /// Runs reference.mjs; what it printed goes to the test's output.
   static int run(const std::string& arguments) {
     return std::system(("cd '" TOFTWIN_MCAP_REFERENCE "' && node '" TOFTWIN_SOURCE_DIR
-                        "/tests/record/mcap-reference/reference.mjs' " + arguments).c_str());
+                        "/tests/record/mcap-reference/reference.mjs' " +
+                        arguments)
+                           .c_str());
   }
   void expectItReadsOurs(WriterOptions options) {
     auto writer = Writer::create(file_, options);
@@ -96,7 +99,9 @@ class Reference : public testing::Test {
 };
 
 TEST_F(Reference, ItReadsOursCompressed) { expectItReadsOurs({.chunk_bytes = 100'000}); }
-TEST_F(Reference, ItReadsOursNotCompressed) { expectItReadsOurs({.chunk_bytes = 100'000, .zstd_level = 0}); }
+TEST_F(Reference, ItReadsOursNotCompressed) {
+  expectItReadsOurs({.chunk_bytes = 100'000, .zstd_level = 0});
+}
 TEST_F(Reference, WeReadItsZstdChunks) { expectWeReadIts("zstd", true); }
 TEST_F(Reference, WeReadItsLz4Chunks) { expectWeReadIts("lz4", true); }
 TEST_F(Reference, WeReadItsPlainChunks) { expectWeReadIts("none", true); }

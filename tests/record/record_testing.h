@@ -42,7 +42,8 @@ inline std::vector<std::byte> bytesOf(const std::filesystem::path& file) {
 
 inline void writeBytes(const std::filesystem::path& file, std::span<const std::byte> bytes) {
   std::ofstream out{file, std::ios::binary | std::ios::trunc};
-  out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  out.write(reinterpret_cast<const char*>(bytes.data()),
+            static_cast<std::streamsize>(bytes.size()));
   ASSERT_TRUE(out.good());
 }
 

@@ -34,7 +34,8 @@ Frame frameOf(int i, std::string source = "kinect") {
   frame.moment.exposures[0].start = {1000 + 33'000'000ll * i};
   frame.moment.clock = {timeOf(0) - 2'000'000, 1500};
   Image<float> range_m{32, 24};
-  for (std::size_t k = 0; k < range_m.size(); ++k) range_m[k] = static_cast<float>(i) + 0.001f * static_cast<float>(k);
+  for (std::size_t k = 0; k < range_m.size(); ++k)
+    range_m[k] = static_cast<float>(i) + 0.001f * static_cast<float>(k);
   frame.planes[0] = toPlane(PlaneKind::Range, std::move(range_m));
   return frame;
 }
@@ -43,7 +44,8 @@ std::vector<std::byte> wireBytes(const Frame& frame) {
   return wire::toBytes(wire::encode(wire::FrameMessage{0, frame}));
 }
 
-/// Reads frames until the first error, which is returned; each must be frameOf(first + n), bit for bit.
+/// Reads frames until the first error, which is returned; each must be frameOf(first + n), bit for
+/// bit.
 Error expectFrames(Reader& reader, int first, int& count) {
   for (count = 0;; ++count) {
     const auto frame = reader.next();
@@ -74,7 +76,8 @@ TEST_F(Recording, FramesComeBackBitForBit) {
   ASSERT_TRUE(reader) << reader.error().message;
   EXPECT_TRUE(reader->summary().indexed);
   EXPECT_THAT(reader->summary().damage, IsEmpty());
-  EXPECT_EQ(reader->summary().frames_per_source, (std::map<std::string, std::uint64_t>{{"kinect", 100}}));
+  EXPECT_EQ(reader->summary().frames_per_source,
+            (std::map<std::string, std::uint64_t>{{"kinect", 100}}));
   EXPECT_EQ(reader->summary().first_ns, timeOf(0));
   EXPECT_EQ(reader->summary().last_ns, timeOf(99));
   int count = 0;
@@ -103,7 +106,8 @@ TEST_F(Recording, SeekGoesToTheFirstFrameAtOrAfterATime) {
 TEST_F(Recording, EachSourceCanBeReadAlone) {
   auto writer = Writer::create(file_);
   ASSERT_TRUE(writer);
-  for (int i = 0; i < 30; ++i) ASSERT_TRUE(writer->write(frameOf(i, i % 3 == 0 ? "o3d" : "kinect")));
+  for (int i = 0; i < 30; ++i)
+    ASSERT_TRUE(writer->write(frameOf(i, i % 3 == 0 ? "o3d" : "kinect")));
   ASSERT_TRUE(writer->close());
   auto reader = Reader::open(file_);
   ASSERT_TRUE(reader);
@@ -139,7 +143,8 @@ TEST_F(Recording, SaysWhenAFrameWasTakenAndReceived) {
   overflowing.moment.exposures[0].start.ns = std::numeric_limits<std::int64_t>::max();
   Frame before_1970 = frameOf(3);
   before_1970.moment.received.ns = -5;
-  for (const Frame& frame : {known, unknown, overflowing, before_1970}) ASSERT_TRUE(writer->write(frame));
+  for (const Frame& frame : {known, unknown, overflowing, before_1970})
+    ASSERT_TRUE(writer->write(frame));
   ASSERT_TRUE(writer->close());
   auto file = mcap::FileReader::open(file_);
   ASSERT_TRUE(file);
@@ -180,8 +185,10 @@ TEST_F(Recording, AKilledRecorderLosesAtMostTheOpenChunk) {
   const pid_t child = ::fork();
   ASSERT_GE(child, 0);
   if (child == 0) {  // the recorder: says after each frame that it is written, until it is killed
-    auto writer = Writer::create(file_, {.chunk_bytes = kChunk, .chunk_time = std::chrono::hours{1}});
-    for (int i = 0; writer && writer->write(frameOf(i)) && ::write(pipe_ends[1], "x", 1) == 1; ++i) {
+    auto writer =
+        Writer::create(file_, {.chunk_bytes = kChunk, .chunk_time = std::chrono::hours{1}});
+    for (int i = 0; writer && writer->write(frameOf(i)) && ::write(pipe_ends[1], "x", 1) == 1;
+         ++i) {
     }
     ::_exit(1);
   }
@@ -214,7 +221,8 @@ Error recordUntilError(Writer& writer, int& frames) {
   return {};
 }
 
-/// The disk is full: the error says so, again and again, and the file opens with all but the last chunk.
+/// The disk is full: the error says so, again and again, and the file opens with all but the last
+/// chunk.
 void expectWholeUpToTheLastChunk(Writer& writer, const std::filesystem::path& file) {
   int written = 0;
   const Error full = recordUntilError(writer, written);
@@ -225,7 +233,8 @@ void expectWholeUpToTheLastChunk(Writer& writer, const std::filesystem::path& fi
   EXPECT_EQ(writer.close().error().code, Error::Code::StorageFull);
   auto reader = Reader::open(file);
   ASSERT_TRUE(reader) << reader.error().message;
-  // The torn chunk was taken back, which left room for the index (the chunks here are longer than it).
+  // The torn chunk was taken back, which left room for the index (the chunks here are longer than
+  // it).
   EXPECT_TRUE(reader->summary().indexed) << reader->summary().damage;
   int count = 0;
   EXPECT_EQ(expectFrames(*reader, 0, count).code, Error::Code::EndOfStream);
@@ -252,7 +261,8 @@ TEST_F(Recording, AFullFileSystemKeepsAllWholeChunks) {
   const pid_t child = ::fork();  // in a mount namespace of its own, so nothing stays mounted
   ASSERT_GE(child, 0);
   if (child == 0) {
-    if (::unshare(CLONE_NEWNS) != 0 || ::mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0 ||
+    if (::unshare(CLONE_NEWNS) != 0 ||
+        ::mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0 ||
         ::mount("tmpfs", small.c_str(), "tmpfs", 0, "size=500k") != 0) {
       ::_exit(77);
     }

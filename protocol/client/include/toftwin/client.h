@@ -72,8 +72,7 @@ class Subscription {
   ~Subscription();
 
   /// Waits for the next frame. Errors: Timeout (ask again), EndOfStream, Overrun, Disconnected.
-  /// Under Lockstep, asking for the next frame is what lets the daemon make it: a pose that was set
-  /// before is the pose of that frame.
+  /// Under Lockstep, taking a frame is what lets the daemon make the next one.
   Result<Frame> next(std::chrono::milliseconds timeout);
 
  private:

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <array>
+
+#include "tools/cli/command.h"
+
+namespace toftwin::cli {
+
+std::span<const Command> commands() {
+  static const std::array kCommands{
+      listCommand(),   infoCommand(),   grabCommand(),   recordCommand(),
+      replayCommand(), renderCommand(), doctorCommand(), completionCommand(),
+  };
+  return kCommands;
+}
+
+}  // namespace toftwin::cli

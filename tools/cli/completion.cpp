@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+// Shell completion and the manual page, both made from the declared options, so neither can be
+// behind.
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include <array>
+#include <cstdio>
+
+#include "tools/cli/command.h"
+
+namespace toftwin::cli {
+namespace {
+
+std::vector<CLI::App*> subcommandsOf(CLI::App& app) {
+  return app.get_subcommands([](CLI::App* sub) { return !sub->get_group().empty(); });
+}
+
+/// The options with a name, in the order declared; arguments without one are not completed.
+std::vector<const CLI::Option*> optionsOf(const CLI::App& app) {
+  return app.get_options([](const CLI::Option* option) { return option->nonpositional(); });
+}
+
+std::vector<std::string> wordsOf(const CLI::Option& option) {
+  std::vector<std::string> words;
+  for (const std::string& name : option.get_snames()) words.push_back("-" + name);
+  for (const std::string& name : option.get_lnames()) words.push_back("--" + name);
+  return words;
+}
+
+std::string quoted(std::string text) {
+  for (std::size_t at = 0; (at = text.find('\'', at)) != std::string::npos; at += 4)
+    text.replace(at, 1, "'\\''");
+  return "'" + text + "'";
+}
+
+std::string bash(CLI::App& app) {
+  std::string cases, names;
+  for (CLI::App* sub : subcommandsOf(app)) {
+    names += " " + sub->get_name();
+    std::string words;
+    for (const CLI::Option* option : optionsOf(*sub)) {
+      for (const std::string& word : wordsOf(*option)) words += " " + word;
+    }
+    cases += fmt::format("    {}) words={} ;;\n", sub->get_name(), quoted(words.substr(1)));
+  }
+  return fmt::format(
+      "# bash completion for toftwin; made by `toftwin completion bash`\n"
+      "_toftwin() {{\n"
+      "  local current=${{COMP_WORDS[COMP_CWORD]}} command=${{COMP_WORDS[1]}} words\n"
+      "  if [ \"$COMP_CWORD\" -eq 1 ]; then\n"
+      "    COMPREPLY=($(compgen -W '{} --help --version' -- \"$current\"))\n"
+      "    return\n"
+      "  fi\n"
+      "  case \"$command\" in\n{}"
+      "  esac\n"
+      "  case \"$current\" in\n"
+      "    -*) COMPREPLY=($(compgen -W \"$words\" -- \"$current\")) ;;\n"
+      "    *) [ \"$command\" = completion ] && COMPREPLY=($(compgen -W 'bash zsh fish' -- "
+      "\"$current\"))\n"
+      "       [ \"$command\" = grab ] || [ \"$command\" = record ] || [ \"$command\" = info ] &&\n"
+      "         COMPREPLY=($(compgen -W \"$(toftwin list --names 2> /dev/null)\" -- \"$current\")) "
+      ";;\n"
+      "  esac\n"
+      "}}\n"
+      "complete -o bashdefault -o default -F _toftwin toftwin\n",
+      names.substr(1), cases);
+}
+
+std::string zsh(CLI::App& app) {
+  std::string commands, cases;
+  const auto colonFree = [](std::string text) {
+    for (char& c : text) c = c == ':' || c == '[' || c == ']' ? ' ' : c;
+    return text;
+  };
+  for (CLI::App* sub : subcommandsOf(app)) {
+    commands +=
+        fmt::format("    {}\n", quoted(sub->get_name() + ":" + colonFree(sub->get_description())));
+    cases += fmt::format("    {}) _arguments \\\n", sub->get_name());
+    for (const CLI::Option* option : optionsOf(*sub)) {
+      for (const std::string& word : wordsOf(*option)) {
+        const std::string value = option->get_expected_max() == 0 ? "" : ":value:_files";
+        cases +=
+            fmt::format("      {} \\\n",
+                        quoted(word + "[" + colonFree(option->get_description()) + "]" + value));
+      }
+    }
+    cases += "      '*:file:_files' ;;\n";
+  }
+  return fmt::format(
+      "#compdef toftwin\n"
+      "# zsh completion for toftwin; made by `toftwin completion zsh`\n"
+      "_toftwin() {{\n"
+      "  local -a commands\n"
+      "  commands=(\n{}  )\n"
+      "  if (( CURRENT == 2 )); then\n"
+      "    _describe command commands\n"
+      "    return\n"
+      "  fi\n"
+      "  local command=$words[2]\n"
+      "  (( CURRENT-- )); shift words\n"
+      "  case $command in\n{}"
+      "  esac\n"
+      "}}\n"
+      "compdef _toftwin toftwin\n",
+      commands, cases);
+}
+
+std::string fish(CLI::App& app) {
+  std::string script = "# fish completion for toftwin; made by `toftwin completion fish`\n";
+  for (CLI::App* sub : subcommandsOf(app)) {
+    script += fmt::format("complete -c toftwin -n __fish_use_subcommand -f -a {} -d {}\n",
+                          sub->get_name(), quoted(sub->get_description()));
+    for (const CLI::Option* option : optionsOf(*sub)) {
+      script +=
+          fmt::format("complete -c toftwin -n '__fish_seen_subcommand_from {}'", sub->get_name());
+      for (const std::string& name : option->get_snames()) script += " -s " + name;
+      for (const std::string& name : option->get_lnames()) script += " -l " + name;
+      if (option->get_expected_max() != 0) script += " -r";
+      script += " -d " + quoted(option->get_description()) + "\n";
+    }
+  }
+  return script;
+}
+
+}  // namespace
+
+std::string completionScript(CLI::App& app, const std::string& shell) {
+  return shell == "bash" ? bash(app) : shell == "zsh" ? zsh(app) : fish(app);
+}
+
+std::string manual(CLI::App& app) {
+  std::string page =
+      "# Command line\n\n"
+      "`toftwin` is the one tool for people and scripts. This page is made from the program "
+      "itself\n"
+      "(`toftwin completion manual`), and a test keeps it so.\n\n"
+      "```\n" +
+      app.help("toftwin") + "```\n";
+  for (CLI::App* sub : subcommandsOf(app)) {
+    page += fmt::format("\n## toftwin {}\n\n```\n{}```\n", sub->get_name(), sub->help("toftwin"));
+  }
+  return page;
+}
+
+Command completionCommand() {
+  return {
+      "completion", "print the completion script for a shell",
+      "  toftwin completion bash > ~/.local/share/bash-completion/completions/toftwin\n"
+      "  toftwin completion zsh > ~/.zfunc/_toftwin\n"
+      "  toftwin completion fish > ~/.config/fish/completions/toftwin.fish\n",
+      [](CLI::App& app) -> Run {
+        const auto shell = std::make_shared<std::string>();
+        app.add_option("SHELL", *shell, "bash, zsh or fish; manual: the page docs/command-line.md")
+            ->required()
+            ->check(CLI::IsMember({"bash", "zsh", "fish", "manual"}));
+        return [shell]() -> Result<Exit> {
+          CLI::App whole;
+          whole.name("toftwin");
+          static_cast<void>(declare(whole));
+          fmt::print("{}", *shell == "manual" ? manual(whole) : completionScript(whole, *shell));
+          return std::fflush(stdout) == 0 ? Exit::Ok : Exit::CannotWrite;
+        };
+      }};
+}
+
+}  // namespace toftwin::cli

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <toftwin/frame.h>
+#include <toftwin/result.h>
+
+/// Frames as files that other programs read. docs/command-line.md says what each format holds.
+namespace toftwin::cli {
+
+enum class Format { Png, Ply, Npy, Csv };
+
+/// By the file's extension. Error InvalidArgument names the known ones.
+Result<Format> formatOf(const std::filesystem::path& file);
+
+struct ExportOptions {
+  std::vector<PlaneKind> planes{};  ///< empty: range, or depth where there is no range (CSV: all)
+  int channel = 0;                  ///< of planes with several (PNG, CSV)
+  double mm_per_count = 1.0;        ///< PNG of metres
+  bool color = false;  ///< PNG: 8-bit colours between `min` and `max` instead of counts
+  std::optional<double> min{},
+      max{};                 ///< of the colours, in the plane's unit; default: of the image
+  std::optional<int> row{};  ///< CSV: this row only
+  bool world = false;        ///< PLY: world coordinates instead of the camera's
+};
+
+struct Exported {
+  std::vector<std::byte> bytes;
+  std::string note;  ///< what a user should know: the scale, values that did not fit
+};
+
+Result<Exported> toPng(const Frame& frame, const ExportOptions& options);
+Result<Exported> toPly(const Frame& frame, const ExportOptions& options);
+Result<Exported> toNpy(const Frame& frame, const ExportOptions& options);
+Result<Exported> toCsv(const Frame& frame, const ExportOptions& options);
+
+/// Writes the frame in the format of the extension, whole or not at all; gives the note.
+Result<std::string> exportFrame(const Frame& frame, const std::filesystem::path& file,
+                                const ExportOptions& options);
+
+/// One channel of a plane as numbers.
+struct Picture {
+  const Plane* plane = nullptr;
+  std::vector<float> values;
+};
+/// The plane to show: the first that was asked for, else range, else depth. Errors name what there
+/// is.
+Result<const Plane*> choosePlane(const Frame& frame, const std::vector<PlaneKind>& wanted);
+Result<Picture> pictureOf(const Plane& plane, int channel);
+/// "m" for range, depth and true range; "" where it is the device's own.
+std::string_view unitOf(PlaneKind kind);
+
+}  // namespace toftwin::cli

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+// PNG: 16-bit counts with a stated scale (8-bit for flags), or 8-bit colours. The scale stands in
+// the file too, as a tEXt chunk "Description".
+#include <fmt/format.h>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <zlib.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <toftwin/names.h>
+
+#include "tools/cli/export/export.h"
+
+namespace toftwin::cli {
+namespace {
+
+/// Encodes the image and puts `description` behind the IHDR chunk, which is always 25 bytes after
+/// the 8 bytes of the signature.
+Result<std::vector<std::byte>> encode(const cv::Mat& image, const std::string& description) {
+  std::vector<unsigned char> png;
+  try {
+    if (!cv::imencode(".png", image, png))
+      return Error{Error::Code::Internal, "OpenCV cannot encode this PNG"};
+  } catch (const cv::Exception& error) {
+    return Error{Error::Code::Internal,
+                 std::string{"OpenCV cannot encode this PNG: "} + error.what()};
+  }
+  const auto append32 = [](std::string& out, std::size_t value) {
+    for (int shift = 24; shift >= 0; shift -= 8) out += static_cast<char>((value >> shift) & 0xff);
+  };
+  const std::string keyword{"tEXtDescription\0", 16};
+  const std::string body = keyword + description;
+  std::string chunk;
+  append32(chunk, body.size() - 4);
+  chunk += body;
+  append32(chunk, ::crc32_z(0, reinterpret_cast<const Bytef*>(body.data()), body.size()));
+  png.insert(png.begin() + 33, chunk.begin(), chunk.end());
+  const auto bytes = std::as_bytes(std::span{png});
+  return std::vector<std::byte>{bytes.begin(), bytes.end()};
+}
+
+Result<Exported> counts(const Picture& picture, const ExportOptions& options) {
+  const Plane& plane = *picture.plane;
+  const bool is_8bit = plane.type == ElementType::U8;
+  const bool is_metres = unitOf(plane.kind) == "m";
+  const double per_count = is_metres ? options.mm_per_count / 1000.0 : 1.0;
+  constexpr double kMost = std::numeric_limits<std::uint16_t>::max();
+  cv::Mat image(plane.height, plane.width, is_8bit ? CV_8U : CV_16U);  // braces would list elements
+  std::size_t too_large = 0, negative = 0;
+  for (std::size_t i = 0; i < picture.values.size(); ++i) {
+    const double count = std::round(static_cast<double>(picture.values[i]) / per_count);
+    too_large += count > kMost ? 1 : 0;
+    negative += count < 0 ? 1 : 0;
+    const double fits = std::isnan(count) ? 0.0 : std::clamp(count, 0.0, kMost);
+    if (is_8bit)
+      image.data[i] = static_cast<unsigned char>(fits);
+    else
+      image.ptr<std::uint16_t>()[i] = static_cast<std::uint16_t>(fits);
+  }
+  std::string note =
+      fmt::format("{}: 1 count = {}", nameOf(plane.kind),
+                  is_metres ? fmt::format("{:g} mm, 0 = invalid", options.mm_per_count) : "1");
+  if (too_large > 0) {
+    note += fmt::format("; {} pixels are above {:g}{} and became 65535{}", too_large,
+                        kMost * per_count, is_metres ? " m" : "",
+                        is_metres ? " (a larger --scale has room for them)" : "");
+  }
+  if (negative > 0) note += fmt::format("; {} pixels are below 0 and became 0", negative);
+  auto bytes = encode(image, note);
+  if (!bytes) return bytes.error();
+  return Exported{*std::move(bytes), std::move(note)};
+}
+
+/// Least and greatest finite value, or 0 and 1 where there is none.
+std::pair<double, double> extremesOf(const std::vector<float>& values) {
+  double least = std::numeric_limits<double>::infinity(), greatest = -least;
+  for (const float value : values) {
+    if (!std::isfinite(value)) continue;
+    least = std::min(least, static_cast<double>(value));
+    greatest = std::max(greatest, static_cast<double>(value));
+  }
+  return least <= greatest ? std::pair{least, greatest} : std::pair{0.0, 1.0};
+}
+
+Result<Exported> colors(const Picture& picture, const ExportOptions& options) {
+  const Plane& plane = *picture.plane;
+  const auto [least, greatest] = extremesOf(picture.values);
+  const double min = options.min.value_or(least), max = options.max.value_or(greatest);
+  if (!(min <= max)) {
+    return Error{Error::Code::InvalidArgument,
+                 fmt::format("the colours need a --min below --max, not {:g} and {:g}", min, max)};
+  }
+  cv::Mat shades(plane.height, plane.width, CV_8U), invalid(plane.height, plane.width, CV_8U),
+      image;
+  for (std::size_t i = 0; i < picture.values.size(); ++i) {
+    const double value = static_cast<double>(picture.values[i]);
+    const double share = max > min ? std::clamp((value - min) / (max - min), 0.0, 1.0) : 0.0;
+    invalid.data[i] = std::isnan(value) ? 255 : 0;
+    shades.data[i] = std::isnan(value) ? 0 : static_cast<unsigned char>(std::lround(255.0 * share));
+  }
+  cv::applyColorMap(shades, image, cv::COLORMAP_TURBO);
+  image.setTo(cv::Scalar{0, 0, 0}, invalid);
+  std::string note =
+      fmt::format("{}: colours (turbo) from {:g} to {:g}{}{}, black = invalid", nameOf(plane.kind),
+                  min, max, unitOf(plane.kind).empty() ? "" : " ", unitOf(plane.kind));
+  auto bytes = encode(image, note);
+  if (!bytes) return bytes.error();
+  return Exported{*std::move(bytes), std::move(note)};
+}
+
+}  // namespace
+
+Result<Exported> toPng(const Frame& frame, const ExportOptions& options) {
+  const auto plane = choosePlane(frame, options.planes);
+  if (!plane) return plane.error();
+  const auto picture = pictureOf(**plane, options.channel);
+  if (!picture) return picture.error();
+  return options.color ? colors(*picture, options) : counts(*picture, options);
+}
+
+}  // namespace toftwin::cli

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include <toftwin/names.h>
+
+#include "protocol/record/recording.h"
+#include "sim/sensor/sensor_model.h"
+#include "tools/cli/command.h"
+#include "tools/cli/describe.h"
+#include "tools/cli/options.h"
+
+namespace toftwin::cli {
+namespace {
+
+using compare::Json;
+
+struct Options {
+  DaemonOptions daemon;
+  std::string what;
+  bool json = false;
+  bool text = false;
+};
+constexpr std::string_view kPreset = "preset:";
+
+/// The first frame of each source says what the source's camera and planes are.
+std::map<std::string, Frame> firstFrames(record::Reader& reader) {
+  std::map<std::string, Frame> first;
+  for (const auto& [source, frames] : reader.summary().frames_per_source) {
+    reader.rewind();
+    if (auto frame = reader.next(source)) first.emplace(source, std::move(frame).value());
+  }
+  return first;
+}
+
+Result<Exit> describeRecording(const Options& options) {
+  auto reader = record::Reader::open(options.what);
+  if (!reader) return reader.error();
+  const record::Summary& summary = reader->summary();
+  const double seconds = 1e-9 * static_cast<double>(summary.last_ns - summary.first_ns);
+  const auto first = firstFrames(*reader);
+  Json sources = Json::object();
+  std::string text = fmt::format("{}: recording, {:.3f} s from {}\nindex        {}\n", options.what,
+                                 seconds, toText(HostTime{summary.first_ns}),
+                                 summary.indexed ? "whole" : "none; it was scanned");
+  for (const auto& [source, frames] : summary.frames_per_source) {
+    text += fmt::format("\n{}\nframes       {}\n", source, frames);
+    Json about = Json::object().set("frames", frames);
+    if (const auto found = first.find(source); found != first.end()) {
+      const Frame& frame = found->second;
+      text += fmt::format("kind         {}\nplanes       {}\n{}", nameOf(frame.provenance.kind),
+                          planesOf(frame), toText(frame.camera));
+      about.set("kind", std::string{nameOf(frame.provenance.kind)})
+          .set("camera", toJson(frame.camera));
+    }
+    sources.set(source, about);
+  }
+  if (options.json) {
+    fmt::print("{}\n", Json::object()
+                           .set("file", options.what)
+                           .set("first_ns", summary.first_ns)
+                           .set("last_ns", summary.last_ns)
+                           .set("indexed", summary.indexed)
+                           .set("damage", summary.damage)
+                           .set("sources", sources)
+                           .text());
+  } else {
+    fmt::print("{}", text);
+  }
+  if (summary.damage.empty()) return Exit::Ok;
+  fmt::print(stderr, "{}\n", summary.damage);
+  return Exit::Incomplete;
+}
+
+Result<Exit> describeCamera(const Options& options) {
+  const bool is_preset = options.what.starts_with(kPreset);
+  const auto model = is_preset ? sim::SensorModel::preset(options.what.substr(kPreset.size()))
+                               : sim::SensorModel::load(options.what);
+  if (!model) return model.error();
+  const std::vector<std::string> effects = model->effectNames();
+  if (options.json) {
+    fmt::print("{}\n", Json::object()
+                           .set("file", options.what)
+                           .set("model", model->model())
+                           .set("model_id", model->id())
+                           .set("camera", toJson(model->camera()))
+                           .set("effects", Json::arrayOf(effects))
+                           .text());
+    return Exit::Ok;
+  }
+  fmt::print("{}: camera of the simulator\nmodel        {}\nmodel id     {}\n{}effects      {}\n",
+             options.what, model->model(), model->id(), toText(model->camera()),
+             effects.empty() ? "none" : fmt::format("{}", fmt::join(effects, ", ")));
+  return Exit::Ok;
+}
+
+Result<Exit> printPreset(const std::string& what) {
+  if (!what.starts_with(kPreset)) {
+    return Error{Error::Code::InvalidArgument, "--text goes with preset:NAME"};
+  }
+  const auto text = sim::SensorModel::presetText(what.substr(kPreset.size()));
+  if (!text) return text.error();
+  fmt::print("{}", *text);
+  return Exit::Ok;
+}
+
+Result<Exit> describeSource(const Options& options) {
+  auto client = options.daemon.connect();
+  if (!client) return client.error();
+  const auto details = client->describe(options.what);
+  if (!details) return details.error();
+  const SourceEntry& entry = details->entry;
+  const double rate_hz = details->frame_interval ? 1.0 / details->frame_interval->in(second) : 0.0;
+  if (options.json) {
+    Json planes = Json::array();
+    for (const PlaneKind kind : details->planes) planes.push(std::string{nameOf(kind)});
+    fmt::print("{}\n", Json::object()
+                           .set("name", entry.name)
+                           .set("model", entry.model)
+                           .set("serial", entry.serial)
+                           .set("kind", std::string{nameOf(entry.kind)})
+                           .set("driver", details->driver)
+                           .set("streaming", entry.streaming)
+                           .set("frame_rate_hz", rate_hz)
+                           .set("planes", planes)
+                           .set("camera", toJson(details->camera))
+                           .set("can_set_pose", details->can_set_pose)
+                           .set("can_trigger", details->can_trigger)
+                           .set("can_lockstep", details->can_lockstep)
+                           .set("parameters", Json::arrayOf(details->parameters))
+                           .text());
+    return Exit::Ok;
+  }
+  fmt::print(
+      "{}: {}, {}\nmodel        {}\nserial       {}\ndriver       {}\nframe rate   {}\nplanes      "
+      " {}\n{}",
+      entry.name, nameOf(entry.kind), entry.streaming ? "streaming" : "idle", entry.model,
+      entry.serial.empty() ? "unknown" : entry.serial, details->driver,
+      rate_hz > 0 ? fmt::format("{:.6g} Hz", rate_hz) : "as it comes", namesOf(details->planes),
+      toText(details->camera));
+  std::vector<std::string> can;
+  if (details->can_set_pose) can.emplace_back("be moved");
+  if (details->can_trigger) can.emplace_back("be triggered");
+  if (details->can_lockstep) can.emplace_back("run in lockstep");
+  fmt::print("can          {}\nparameters   {}\n",
+             can.empty() ? "only stream" : fmt::format("{}", fmt::join(can, ", ")),
+             details->parameters.empty() ? "none"
+                                         : fmt::format("{}", fmt::join(details->parameters, ", ")));
+  return Exit::Ok;
+}
+
+Result<Exit> run(const Options& options) {
+  const std::filesystem::path path{options.what};
+  if (path.extension() == ".mcap") return describeRecording(options);
+  if (options.text) return printPreset(options.what);
+  if (path.extension() == ".toml" || options.what.starts_with(kPreset))
+    return describeCamera(options);
+  return describeSource(options);
+}
+
+}  // namespace
+
+Command infoCommand() {
+  return {"info", "all that is known of a camera, a recording or a camera file",
+          "  toftwin info kinect\n"
+          "  toftwin info monday.mcap --json\n"
+          "  toftwin info preset:kinect_v2\n"
+          "  toftwin info preset:kinect_v2 --text > my_camera.toml\n"
+          "  toftwin info my_camera.toml\n",
+          [](CLI::App& app) -> Run {
+            const auto options = std::make_shared<Options>();
+            app.add_option(
+                   "WHAT", options->what,
+                   "name of a camera, a recording (.mcap), a camera file (.toml) or preset:NAME")
+                ->required();
+            app.add_flag("--json", options->json, "as JSON");
+            app.add_flag("--text", options->text,
+                         "print the preset's camera file, to start one of your own from");
+            options->daemon.add(app);
+            return [options] { return run(*options); };
+          }};
+}
+
+}  // namespace toftwin::cli

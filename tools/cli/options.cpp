@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/cli/options.h"
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include <toftwin/names.h>
+
+namespace toftwin::cli {
+
+std::string planeNames() {
+  std::string names;
+  for (int i = 0; i <= static_cast<int>(PlaneKind::TruthNormal); ++i) {
+    names += (i == 0 ? "" : ", ") + std::string{nameOf(static_cast<PlaneKind>(i))};
+  }
+  return names;
+}
+
+void DaemonOptions::add(CLI::App& app) {
+  app.add_option(
+         "-a,--address", address,
+         "where the daemon is: HOST:PORT or unix:/PATH; default: its socket on this machine, "
+         "then port 47800 of it")
+      ->envname("TOFTWIN_ADDRESS");
+  app.add_option("--timeout", timeout_s, "seconds to wait for the daemon or for a frame")
+      ->check(CLI::Range(0.001, 86'400.0))
+      ->capture_default_str();
+}
+
+Result<Client> DaemonOptions::connect() const {
+  auto client = Client::connect(address, {.timeout = timeout()});
+  if (client) return client;
+  return Error{
+      Error::Code::Disconnected,
+      fmt::format("{}\nIs a daemon running there? `toftwin doctor` finds out, `toftwind --help` "
+                  "says how to start one.",
+                  client.error().message)};
+}
+
+void OutputOptions::add(CLI::App& app, bool required) {
+  app.add_option(
+         "-o,--output", file,
+         "file to write; its extension says the format: .png .ply .npy .csv. Written whole or "
+         "not at all")
+      ->required(required);
+  app.add_option("-p,--plane", plane_names,
+                 "plane to write: " + planeNames() +
+                     "; default: range, or depth where there is no range; "
+                     "CSV takes several (-p range,flags), and all by default")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  app.add_option("--channel", how.channel, "of a plane with several (PNG, CSV)")
+      ->capture_default_str();
+  app.add_option("--scale", how.mm_per_count, "PNG: millimetres per count")
+      ->check(CLI::Range(1e-3, 1e3))
+      ->capture_default_str();
+  app.add_flag("--color", how.color, "PNG: a picture in colours instead of counts");
+  app.add_option("--min", how.min,
+                 "--color: value of the first colour; default: the least of the image");
+  app.add_option("--max", how.max,
+                 "--color: value of the last colour; default: the greatest of the image");
+  app.add_option("--row", how.row, "CSV: only this row of pixels");
+  app.add_flag("--world", how.world, "PLY: in world coordinates, if the camera knows its pose");
+}
+
+Result<> OutputOptions::check() {
+  if (!file.empty()) {
+    if (const auto format = formatOf(file); !format) return format.error();
+  }
+  how.planes.clear();
+  for (const std::string& name : plane_names) {
+    const auto kind = planeKindNamed(name);
+    if (!kind) {
+      return Error{Error::Code::InvalidArgument,
+                   fmt::format("there is no plane \"{}\"; the planes are: {}", name, planeNames())};
+    }
+    how.planes.push_back(*kind);
+  }
+  return {};
+}
+
+std::string numbered(const std::string& file, std::uint64_t number, bool several) {
+  if (!several) return file;
+  const std::filesystem::path path{file};
+  return (path.parent_path() /
+          fmt::format("{}-{:04}{}", path.stem().string(), number, path.extension().string()))
+      .string();
+}
+
+}  // namespace toftwin::cli

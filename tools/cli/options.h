@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <toftwin/client.h>
+
+#include "tools/cli/export/export.h"
+
+namespace CLI {
+class App;
+}
+
+/// Options that several subcommands have, and what they mean.
+namespace toftwin::cli {
+
+/// --address and --timeout.
+struct DaemonOptions {
+  std::string address;
+  double timeout_s = 5.0;
+  void add(CLI::App& app);
+  /// The connection, or an Error Disconnected (whatever the reason) that says how to start a
+  /// daemon.
+  [[nodiscard]] Result<Client> connect() const;
+  [[nodiscard]] std::chrono::milliseconds timeout() const {
+    return std::chrono::milliseconds{static_cast<std::int64_t>(timeout_s * 1000.0)};
+  }
+};
+
+/// --plane, --color and what else says how a frame becomes a file.
+struct OutputOptions {
+  std::string file;
+  std::vector<std::string> plane_names;
+  ExportOptions how;
+  void add(CLI::App& app, bool required);
+  /// Checks the names and puts them into `how`; an unknown extension is an error before any work.
+  Result<> check();
+};
+
+/// "frame.png", or "frame-0007.png" where there are several.
+std::string numbered(const std::string& file, std::uint64_t number, bool several);
+
+/// A sorted list of the planes' names, for --help.
+std::string planeNames();
+
+}  // namespace toftwin::cli

@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include <atomic>
+#include <mutex>
+#include <optional>
+#include <thread>
+
+#include "protocol/record/recording.h"
+#include "tools/cli/command.h"
+#include "tools/cli/options.h"
+#include "tools/cli/terminal.h"
+
+namespace toftwin::cli {
+namespace {
+
+struct Options {
+  DaemonOptions daemon;
+  std::vector<std::string> sources;
+  std::string file;
+  std::uint64_t count = 0;
+  double duration_s = 0.0;
+  bool drop = false;
+  bool force = false;
+  bool on_daemon = false;
+  bool stop = false;
+};
+
+/// What the threads, one for each source, share.
+struct Recording {
+  std::mutex mutex;  // guards all below
+  record::Writer writer;
+  std::uint64_t dropped = 0;
+  std::optional<Error> error;  // the first
+  std::atomic<bool> ended = false;
+};
+
+void recordSource(Recording& recording, Subscription frames, std::uint64_t count) {
+  const auto fail = [&](const Error& error) {
+    const std::lock_guard lock{recording.mutex};
+    if (!recording.error) recording.error = error;
+    recording.ended = true;
+  };
+  for (std::uint64_t taken = 0;
+       (count == 0 || taken < count) && !recording.ended && !interrupted();) {
+    const auto frame = frames.next(std::chrono::milliseconds{200});
+    if (!frame && frame.error().code == Error::Code::Timeout) continue;
+    if (!frame && frame.error().code == Error::Code::EndOfStream && count == 0) return;
+    if (!frame) return fail(frame.error());
+    const std::lock_guard lock{recording.mutex};
+    recording.dropped += frame->dropped_before + frame->dropped_by_device;
+    if (auto wrote = recording.writer.write(*frame); !wrote) {
+      if (!recording.error) recording.error = wrote.error();
+      recording.ended = true;
+      return;
+    }
+    ++taken;
+  }
+}
+
+/// Starts a thread for each source and waits until all are through, or the time is up.
+Result<> recordAll(const Options& options, Client& client, Recording& recording) {
+  SubscribeOptions wanted;
+  wanted.policy =
+      options.drop ? SubscribeOptions::Policy::Queue : SubscribeOptions::Policy::Lossless;
+  wanted.queue = 64;
+  std::vector<Subscription> subscriptions;
+  for (const std::string& source : options.sources) {
+    auto subscribed = client.subscribe(source, wanted);
+    if (!subscribed) return subscribed.error();
+    subscriptions.push_back(std::move(subscribed).value());
+  }
+  std::atomic<std::size_t> running = subscriptions.size();
+  std::vector<std::jthread> threads;
+  for (Subscription& frames : subscriptions) {
+    threads.emplace_back(
+        [&recording, &running, count = options.count, frames = std::move(frames)]() mutable {
+          recordSource(recording, std::move(frames), count);
+          --running;
+        });
+  }
+  Progress progress{"frames", options.count * options.sources.size()};
+  const auto began = std::chrono::steady_clock::now();
+  while (running > 0) {
+    std::this_thread::sleep_for(std::chrono::milliseconds{20});
+    const double seconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+    if (options.duration_s > 0 && seconds >= options.duration_s) recording.ended = true;
+    const std::lock_guard lock{recording.mutex};
+    progress.show(recording.writer.frames(),
+                  fmt::format("{:.0f} s, {} dropped", seconds, recording.dropped));
+  }
+  return {};
+}
+
+Result<Exit> recordHere(const Options& options) {
+  auto client = options.daemon.connect();
+  if (!client) return client.error();
+  for (const std::string& source : options.sources) {  // before a file is made for nothing
+    if (const auto details = client->describe(source); !details) return details.error();
+  }
+  auto writer = record::Writer::create(options.file, {.overwrite = options.force});
+  if (!writer) return writer.error();
+  catchInterrupts();
+  Recording recording{.mutex = {}, .writer = std::move(writer).value(), .dropped = 0, .error = {}};
+  const auto recorded = recordAll(options, *client, recording);
+  const auto closed = recording.writer.close();
+  fmt::print("{}: {} frames, {} dropped\n", options.file, recording.writer.frames(),
+             recording.dropped);
+  if (!recorded) return recorded.error();
+  if (recording.error) return *recording.error;
+  if (!closed) return closed.error();
+  return Exit::Ok;
+}
+
+Result<Exit> recordOnDaemon(const Options& options) {
+  auto client = options.daemon.connect();
+  if (!client) return client.error();
+  catchInterrupts();
+  for (const std::string& source : options.sources) {
+    const auto answer =
+        options.stop ? client->stopRecording(source) : client->startRecording(source, options.file);
+    if (!answer) return answer.error();
+    fmt::print("{}: {} {} on the daemon's machine\n", source,
+               options.stop ? "recorded" : "recording into", *answer);
+  }
+  if (options.stop || options.duration_s <= 0) return Exit::Ok;
+  Progress progress{"seconds", static_cast<std::uint64_t>(options.duration_s)};
+  const auto end =
+      std::chrono::steady_clock::now() + std::chrono::duration<double>(options.duration_s);
+  while (std::chrono::steady_clock::now() < end && !interrupted()) {
+    std::this_thread::sleep_for(std::chrono::milliseconds{50});
+    const double left =
+        std::chrono::duration<double>(end - std::chrono::steady_clock::now()).count();
+    progress.show(static_cast<std::uint64_t>(std::max(0.0, options.duration_s - left)));
+  }
+  for (const std::string& source : options.sources) {
+    const auto stopped = client->stopRecording(source);
+    if (!stopped) return stopped.error();
+    fmt::print("{}: recorded {} on the daemon's machine\n", source, *stopped);
+  }
+  return Exit::Ok;
+}
+
+Result<Exit> run(const Options& options) {
+  if (options.file.empty() && !options.stop) {
+    return Error{Error::Code::InvalidArgument, "say where to record with -o FILE.mcap"};
+  }
+  if (options.on_daemon && !options.stop && options.sources.size() > 1) {
+    return Error{Error::Code::InvalidArgument,
+                 "on the daemon every source has its own file: record one source at a time"};
+  }
+  return options.on_daemon || options.stop ? recordOnDaemon(options) : recordHere(options);
+}
+
+}  // namespace
+
+Command recordCommand() {
+  return {"record", "record cameras into an MCAP file",
+          "  toftwin record kinect -o monday.mcap            until Ctrl-C; the file is whole at "
+          "any time\n"
+          "  toftwin record kinect o3d -o both.mcap --duration 60\n"
+          "  toftwin record kinect -o a.mcap --count 1000\n"
+          "  toftwin record kinect -o a.mcap --on-daemon     the daemon writes into its recording "
+          "folder\n"
+          "  toftwin record kinect --on-daemon --stop\n",
+          [](CLI::App& app) -> Run {
+            const auto options = std::make_shared<Options>();
+            app.add_option("SOURCE", options->sources, "names of the cameras")->required();
+            app.add_option("-o,--output", options->file,
+                           "file to write; with --on-daemon a name without a folder");
+            app.add_option("-n,--count", options->count,
+                           "end after so many frames of each camera; 0: Ctrl-C ends it")
+                ->capture_default_str();
+            app.add_option("--duration", options->duration_s, "end after so many seconds")
+                ->check(CLI::NonNegativeNumber);
+            app.add_flag("--drop", options->drop,
+                         "when the disk cannot keep up, leave frames out and count them, instead "
+                         "of ending with an error");
+            app.add_flag("--force", options->force, "replace a file that is there already");
+            app.add_flag("--on-daemon", options->on_daemon,
+                         "record on the daemon's machine instead of here");
+            app.add_flag("--stop", options->stop,
+                         "end a recording that was started with --on-daemon");
+            options->daemon.add(app);
+            return [options] { return run(*options); };
+          }};
+}
+
+}  // namespace toftwin::cli

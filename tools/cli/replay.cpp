@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include <toftwin/names.h>
+
+#include "protocol/record/recording.h"
+#include "tools/cli/command.h"
+#include "tools/cli/describe.h"
+#include "tools/cli/options.h"
+#include "tools/cli/serve.h"
+#include "tools/cli/terminal.h"
+
+namespace toftwin::cli {
+namespace {
+
+struct Options {
+  OutputOptions output;
+  ServeOptions serve;
+  std::string file;
+  std::string source;
+  double from_s = 0.0;
+  std::uint64_t count = 0;
+  bool json = false;
+  bool should_serve = false;
+};
+
+void printLine(const Frame& frame, std::int64_t first_ns, bool as_json) {
+  const double seconds = 1e-9 * static_cast<double>(frame.moment.received.ns - first_ns);
+  const std::uint64_t dropped = frame.dropped_before + frame.dropped_by_device;
+  if (as_json) {
+    fmt::print(R"({{"source":{},"sequence":{},"received_ns":{},"dropped":{},"kind":"{}"}})"
+               "\n",
+               compare::Json{frame.source}.text(), frame.sequence, frame.moment.received.ns,
+               dropped, nameOf(frame.provenance.kind));
+  } else {
+    fmt::print("{:>10.6f} s  {:<12} frame {:<8} {}{}\n", seconds, frame.source, frame.sequence,
+               planesOf(frame), dropped > 0 ? fmt::format(", {} dropped before", dropped) : "");
+  }
+}
+
+/// One frame after the other, until `count` or the end; damage is told and counted, not fatal.
+Result<Exit> eachFrame(const Options& options, record::Reader& reader,
+                       const std::function<Result<>(const Frame&, std::uint64_t)>& take) {
+  bool is_whole = reader.summary().damage.empty();
+  if (!is_whole) fmt::print(stderr, "{}\n", reader.summary().damage);
+  for (std::uint64_t taken = 0; options.count == 0 || taken < options.count;) {
+    if (interrupted()) return Exit::Interrupted;
+    const auto frame = reader.next(options.source);
+    if (frame) {
+      if (auto took = take(*frame, taken++); !took) return took.error();
+    } else if (frame.error().code == Error::Code::EndOfStream) {
+      if (options.count > 0)
+        return Error{Error::Code::EndOfStream,
+                     fmt::format("{}: only {} frames there", options.file, taken)};
+      break;
+    } else {
+      fmt::print(stderr, "{}\n", frame.error().message);
+      is_whole = false;
+    }
+  }
+  return is_whole ? Exit::Ok : Exit::Incomplete;
+}
+
+Result<Exit> exportFrames(const Options& options, record::Reader& reader) {
+  std::uint64_t total = 0;
+  for (const auto& [source, frames] : reader.summary().frames_per_source) {
+    if (options.source.empty() || source == options.source) total += frames;
+  }
+  if (options.count > 0) total = std::min(total, options.count);
+  std::string note;
+  std::uint64_t written = 0;
+  Result<Exit> ran = Exit::Ok;
+  {
+    Progress progress{"frames", total};
+    ran = eachFrame(options, reader, [&](const Frame& frame, std::uint64_t index) -> Result<> {
+      auto wrote = exportFrame(frame, numbered(options.output.file, index, options.count != 1),
+                               options.output.how);
+      if (!wrote) return wrote.error();
+      note = *std::move(wrote);
+      progress.show(++written);
+      return {};
+    });
+  }
+  if (written > 0) {
+    const bool several = options.count != 1;
+    fmt::print(
+        "{}: {}\n",
+        several ? fmt::format("{} files like {}", written, numbered(options.output.file, 0, true))
+                : options.output.file,
+        note);
+  }
+  return ran;
+}
+
+Result<Exit> run(Options& options) {
+  if (auto checked = options.output.check(); !checked) return checked.error();
+  auto reader = record::Reader::open(options.file);
+  if (!reader) return reader.error();
+  const record::Summary& summary = reader->summary();
+  if (!options.source.empty() && !summary.frames_per_source.contains(options.source)) {
+    std::string known;
+    for (const auto& [source, frames] : summary.frames_per_source)
+      known += (known.empty() ? "" : ", ") + source;
+    return Error{Error::Code::NotFound,
+                 fmt::format("{}: there is no source \"{}\"; it has: {}", options.file,
+                             options.source, known.empty() ? "none" : known)};
+  }
+  if (options.should_serve) return serve(options.file, options.source, summary, options.serve);
+  if (options.from_s > 0) {
+    if (auto sought = reader->seek(summary.first_ns + std::llround(options.from_s * 1e9)); !sought)
+      return sought.error();
+  }
+  catchInterrupts();
+  if (!options.output.file.empty()) return exportFrames(options, *reader);
+  return eachFrame(options, *reader, [&](const Frame& frame, std::uint64_t) -> Result<> {
+    printLine(frame, summary.first_ns, options.json);
+    return {};
+  });
+}
+
+}  // namespace
+
+Command replayCommand() {
+  return {"replay", "the frames of a recording: list them, export them, or serve them to clients",
+          "  toftwin replay monday.mcap                      a line per frame\n"
+          "  toftwin replay monday.mcap -o frame.npy         every frame: frame-0000.npy, "
+          "frame-0001.npy, …\n"
+          "  toftwin replay monday.mcap -o at.png --from 12.5 --count 1\n"
+          "  toftwin replay monday.mcap --serve              a daemon whose cameras are the "
+          "recorded ones\n",
+          [](CLI::App& app) -> Run {
+            const auto options = std::make_shared<Options>();
+            app.add_option("FILE", options->file, "recording (.mcap)")->required();
+            app.add_option("-s,--source", options->source, "only this camera; default: all");
+            app.add_option("--from", options->from_s,
+                           "begin so many seconds after the recording's start")
+                ->check(CLI::NonNegativeNumber);
+            app.add_option("-n,--count", options->count, "only so many frames; 0: all")
+                ->capture_default_str();
+            options->output.add(app, false);
+            app.add_flag("--json", options->json, "list: one JSON object a line");
+            app.add_flag("--serve", options->should_serve,
+                         "start a daemon that replays the file; Ctrl-C ends it");
+            options->serve.add(app);
+            return [options] { return run(*options); };
+          }};
+}
+
+}  // namespace toftwin::cli
