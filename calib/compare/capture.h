@@ -53,11 +53,11 @@ struct Capture {
 };
 
 struct CaptureOptions {
-  std::vector<PoseSpec> poses;                ///< empty: one capture where the cameras are
+  std::vector<PoseSpec> poses{};              ///< empty: one capture where the cameras are
   int frames = 30;                            ///< per pose and camera
   std::chrono::milliseconds timeout{60'000};  ///< for one frame
   int most_skipped = 10'000;                  ///< frames of other poses before it is given up
-  std::function<bool()> interrupted;          ///< asked between frames
+  std::function<bool()> interrupted{};        ///< asked between frames
 };
 
 /// Captures both cameras at the same poses. A pose is set on each camera that can; frames that say

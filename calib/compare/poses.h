@@ -14,7 +14,7 @@ namespace toftwin::compare {
 
 /// One pose of a pose file, as it is written.
 struct PoseSpec {
-  std::string name;
+  std::string name{};
   std::array<double, 3> position_m{};
   std::array<double, 4> rotation_wxyz{1.0, 0.0, 0.0, 0.0};
   std::array<double, 3> euler_deg{};
