@@ -43,7 +43,7 @@ Result<Exit> run(const Options& options) {
     fmt::print("{:<5}{:<13}{}\n", wordOf(finding.state), finding.check, finding.found);
     if (!finding.mend.empty()) fmt::print("{:<18}mend it: {}\n", "", finding.mend);
   }
-  if (options.json) fmt::print("{}\n", all.text());
+  if (options.json) fmt::print("{}", all.text());
   return is_good ? Exit::Ok : Exit::Incomplete;
 }
 

@@ -56,7 +56,7 @@ Result<Exit> describeRecording(const Options& options) {
     sources.set(source, about);
   }
   if (options.json) {
-    fmt::print("{}\n", Json::object()
+    fmt::print("{}", Json::object()
                            .set("file", options.what)
                            .set("first_ns", summary.first_ns)
                            .set("last_ns", summary.last_ns)
@@ -79,7 +79,7 @@ Result<Exit> describeCamera(const Options& options) {
   if (!model) return model.error();
   const std::vector<std::string> effects = model->effectNames();
   if (options.json) {
-    fmt::print("{}\n", Json::object()
+    fmt::print("{}", Json::object()
                            .set("file", options.what)
                            .set("model", model->model())
                            .set("model_id", model->id())
@@ -114,7 +114,7 @@ Result<Exit> describeSource(const Options& options) {
   if (options.json) {
     Json planes = Json::array();
     for (const PlaneKind kind : details->planes) planes.push(std::string{nameOf(kind)});
-    fmt::print("{}\n", Json::object()
+    fmt::print("{}", Json::object()
                            .set("name", entry.name)
                            .set("model", entry.model)
                            .set("serial", entry.serial)

@@ -33,7 +33,7 @@ Exit listDrivers(bool as_json) {
     fmt::print("{:<10} {}\n", driver.name, driver.summary);
     for (const std::string& camera : cameras) fmt::print("{:<10} {}\n", "", camera);
   }
-  if (as_json) fmt::print("{}\n", all.text());
+  if (as_json) fmt::print("{}", all.text());
   return Exit::Ok;
 }
 
@@ -68,7 +68,7 @@ Result<Exit> run(const Options& options) {
                    .set("kind", std::string{nameOf(source.kind)})
                    .set("streaming", source.streaming));
     }
-    fmt::print("{}\n", all.text());
+    fmt::print("{}", all.text());
   } else if (options.names) {
     for (const SourceEntry& source : *sources) fmt::print("{}\n", source.name);
   } else if (sources->empty()) {

@@ -31,10 +31,12 @@ void printLine(const Frame& frame, std::int64_t first_ns, bool as_json) {
   const double seconds = 1e-9 * static_cast<double>(frame.moment.received.ns - first_ns);
   const std::uint64_t dropped = frame.dropped_before + frame.dropped_by_device;
   if (as_json) {
+    std::string source = compare::Json{frame.source}.text();
+    source.pop_back();  // its line break
     fmt::print(R"({{"source":{},"sequence":{},"received_ns":{},"dropped":{},"kind":"{}"}})"
                "\n",
-               compare::Json{frame.source}.text(), frame.sequence, frame.moment.received.ns,
-               dropped, nameOf(frame.provenance.kind));
+               source, frame.sequence, frame.moment.received.ns, dropped,
+               nameOf(frame.provenance.kind));
   } else {
     fmt::print("{:>10.6f} s  {:<12} frame {:<8} {}{}\n", seconds, frame.source, frame.sequence,
                planesOf(frame), dropped > 0 ? fmt::format(", {} dropped before", dropped) : "");

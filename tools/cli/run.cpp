@@ -2,6 +2,9 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <string_view>
+
 #include "tools/cli/command.h"
 
 namespace toftwin::cli {
@@ -70,7 +73,21 @@ std::vector<Run> declare(CLI::App& app) {
   return runs;
 }
 
+namespace {
+
+/// Whether the first word is one of the commands, or an option.
+bool namesACommand(std::string_view word) {
+  return word.starts_with('-') ||
+         std::ranges::any_of(commands(), [&](const Command& command) { return word == command.name; });
+}
+
+}  // namespace
+
 int run(int argc, char** argv) {
+  if (argc > 1 && !namesACommand(argv[1])) {
+    fmt::print(stderr, "toftwin: there is no command \"{}\"; `toftwin --help` lists them\n", argv[1]);
+    return static_cast<int>(Exit::Usage);
+  }
   CLI::App app;
   app.name("toftwin");
   const std::vector<Run> runs = declare(app);
