@@ -69,7 +69,7 @@ ConfiguredSource readSource(settings::Table table, std::span<const drivers::Driv
 }
 
 std::filesystem::path recordingFolder(const DaemonKeys& keys, const settings::Table& table) {
-  if (!keys.recording_folder.empty()) return table.resolve(keys.recording_folder);
+  if (!keys.recording_folder.empty()) return table.resolve(keys.recording_folder).lexically_normal();
   const char* state = std::getenv("STATE_DIRECTORY");  // NOLINT(concurrency-mt-unsafe): nobody sets it
   return state == nullptr ? "" : state;
 }

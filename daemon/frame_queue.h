@@ -13,6 +13,7 @@
 #include <toftwin/result.h>
 
 #include "daemon/clock.h"
+#include "protocol/transport/memfd.h"
 #include "protocol/wire/codec.h"
 #include "protocol/wire/messages.h"
 
@@ -22,6 +23,7 @@ namespace toftwin::daemon {
 struct PreparedFrame {
   Frame frame;
   wire::Body body;
+  std::shared_ptr<const transport::SharedBody> shared_body;  ///< for clients on this machine, or null
 };
 /// Shared by the queues and socket writes of all subscriptions with that selection; nobody changes it.
 using PreparedFramePtr = std::shared_ptr<const PreparedFrame>;

@@ -74,6 +74,8 @@ std::string Recorder::problem() const {
 }
 
 void Recorder::run(const Done& opened) {
+  std::error_code reported_by_create;
+  std::filesystem::create_directories(file_.parent_path(), reported_by_create);
   auto writer = record::Writer::create(file_);
   if (!writer) {
     finish(writer.error());

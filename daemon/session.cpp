@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -75,7 +76,10 @@ std::vector<wire::Message> Session::handle(const wire::Message& message) {
 }
 
 std::optional<Session::Outgoing> Session::next() {
-  if (auto answer = outbox_->take()) return *std::move(answer);
+  if (auto answer = outbox_->take()) {
+    --owed_;
+    return *std::move(answer);
+  }
   // Round robin: the search begins behind the subscription that was served last.
   const auto first = subscriptions_.upper_bound(last_served_);
   for (auto at = first; at != subscriptions_.end(); ++at) {
@@ -88,16 +92,26 @@ std::optional<Session::Outgoing> Session::next() {
 }
 
 std::optional<Session::Outgoing> Session::nextOf(std::map<std::uint64_t, Subscription>::iterator at) {
-  auto item = at->second.subscriber->queue.take();
+  auto& [source, subscriber, window, on_way] = at->second;
+  if (window > 0 && on_way.size() >= window) return std::nullopt;
+  auto item = subscriber->queue.take();
   if (!item) return std::nullopt;
   const std::uint64_t id = at->first;
   if (auto* delivery = std::get_if<FrameQueue::Delivery>(&*item)) {
     last_served_ = id;
-    return FrameOut{id, std::move(*delivery)};
+    if (window > 0) on_way.push_back(delivery->frame->frame.sequence);
+    return FrameOut{id, std::move(*delivery), subscriber->wish.in_shared_memory};
   }
-  at->second.source->unsubscribe(at->second.subscriber);
+  source->unsubscribe(subscriber);
   subscriptions_.erase(at);
   return wire::Message{wire::SubscriptionEnded{id, std::get<Error>(std::move(*item))}};
+}
+
+bool Session::usesSharedMemory() const {
+  const auto names = [](const std::vector<std::string>& features) {
+    return std::ranges::find(features, transport::kMemfdFeature) != features.end();
+  };
+  return client_ && names(client_->features) && names(options_.features);
 }
 
 Session::Answers Session::breakOff(std::uint64_t id, Error::Code code, std::string why) {
@@ -137,11 +151,15 @@ Session::Answers Session::on(const wire::Subscribe& request) {
   if (!source) return {failure(request.id, source.error())};
   auto queue = queueFor(request, hub_.options().lossless_bytes);
   if (!queue) return {failure(request.id, queue.error())};
-  const Wish wish{{request.planes, request.region, request.decimation}, *queue};
+  const Wish wish{{request.planes, request.region, request.decimation},
+                  *queue,
+                  request.window > 0 && usesSharedMemory()};
   auto subscriber = (*source)->subscribe(wish, wake_);
   if (!subscriber) return {failure(request.id, subscriber.error())};
+  const bool is_lockstep = request.policy == wire::Policy::Lockstep;
   const std::uint64_t id = ++last_subscription_;
-  subscriptions_.emplace(id, Subscription{*std::move(source), *std::move(subscriber)});
+  const std::uint32_t window = is_lockstep ? 1 : request.window;
+  subscriptions_.emplace(id, Subscription{*std::move(source), *std::move(subscriber), window});
   return {wire::Subscribed{request.id, id}};
 }
 
@@ -159,9 +177,10 @@ Session::Answers Session::on(const wire::Unsubscribe& request) {
 Session::Answers Session::on(const wire::Acknowledge& request) {
   // One that is unknown has just ended, which the client learns at the same time.
   const auto found = subscriptions_.find(request.subscription);
-  if (found != subscriptions_.end()) {
-    found->second.source->acknowledge(found->second.subscriber, request.sequence);
-  }
+  if (found == subscriptions_.end()) return {};
+  auto& on_way = found->second.on_way;
+  while (!on_way.empty() && on_way.front() <= request.sequence) on_way.pop_front();
+  found->second.source->acknowledge(found->second.subscriber, request.sequence);
   return {};
 }
 
@@ -185,6 +204,7 @@ Session::Answers Session::on(const wire::Trigger& request) {
 Session::Answers Session::command(std::uint64_t id, const std::string& name, SourceHost::Command command) {
   auto source = hub_.find(name);
   if (!source) return {failure(id, source.error())};
+  ++owed_;
   (*source)->post(std::move(command), [id, outbox = outbox_](const Result<>& result) {
     outbox->put(result ? wire::Message{wire::Done{id, {}}} : failure(id, result.error()));
   });
@@ -195,6 +215,7 @@ Session::Answers Session::on(const wire::Record& request) {
   const auto done = [id = request.id, outbox = outbox_](const Result<std::string>& result) {
     outbox->put(result ? wire::Message{wire::Done{id, *result}} : failure(id, result.error()));
   };
+  ++owed_;
   if (request.file.empty()) {
     hub_.stopRecording(request.source, done);
   } else {

@@ -42,6 +42,7 @@ class Session {
   struct FrameOut {
     std::uint64_t subscription = 0;
     FrameQueue::Delivery delivery;
+    bool in_shared_memory = false;  ///< if it has a shared body
   };
   using Outgoing = std::variant<wire::Message, FrameOut>;
 
@@ -55,6 +56,8 @@ class Session {
   std::vector<wire::Message> handle(const wire::Message& message);
   /// Takes the next thing to send: late answers first, then frames, one subscription after the other.
   std::optional<Outgoing> next();
+  /// Answers that this session still owes, for a client that asks faster than it reads.
+  [[nodiscard]] std::size_t owed() const { return owed_; }
   /// The client has introduced itself.
   [[nodiscard]] bool isOpen() const { return client_.has_value(); }
   /// The client broke the protocol: send what `handle` gave and close.
@@ -67,6 +70,8 @@ class Session {
   struct Subscription {
     std::shared_ptr<SourceHost> source;  // shared with the hub
     SubscriberPtr subscriber;
+    std::uint32_t window = 0;           ///< frames that may be unacknowledged; 0: any number
+    std::deque<std::uint64_t> on_way{};  ///< sequences sent but not acknowledged, if there is a window
   };
 
   Answers on(const wire::Hello& hello);
@@ -82,6 +87,7 @@ class Session {
   Answers on(const wire::AskHealth& request);
   template <class Answer>
   Answers on(const Answer& answer);
+  [[nodiscard]] bool usesSharedMemory() const;
   Answers breakOff(std::uint64_t id, Error::Code code, std::string why);
   Answers command(std::uint64_t id, const std::string& source, SourceHost::Command command);
   std::optional<Outgoing> nextOf(std::map<std::uint64_t, Subscription>::iterator at);
@@ -92,6 +98,7 @@ class Session {
   const std::shared_ptr<Outbox> outbox_;
   std::optional<wire::Hello> client_;
   bool is_over_ = false;
+  std::size_t owed_ = 0;
   std::map<std::uint64_t, Subscription> subscriptions_;
   std::uint64_t last_subscription_ = 0;
   std::uint64_t last_served_ = 0;

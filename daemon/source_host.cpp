@@ -13,6 +13,22 @@ namespace {
 
 constexpr std::size_t kMostCommands = 256;
 
+/// Smaller bodies go through the socket faster than through a file descriptor and a mapping.
+constexpr std::uint64_t kSmallestSharedBody = 64 * 1024;
+
+Result<PreparedFramePtr> prepare(const Frame& frame, const Selection& selection, bool share) {
+  Result<Frame> selected = select(frame, selection);
+  if (!selected) return selected.error();
+  auto prepared = std::make_shared<PreparedFrame>();
+  prepared->frame = *std::move(selected);
+  prepared->body = wire::encodeBody(prepared->frame.planes);
+  if (share && prepared->body.bytes >= kSmallestSharedBody) {
+    // Where there is no shared memory to be had, the body goes through the socket.
+    if (auto shared = transport::SharedBody::create(prepared->body)) prepared->shared_body = *shared;
+  }
+  return PreparedFramePtr{std::move(prepared)};
+}
+
 std::int64_t nanosecondsOf(SteadyTime time) {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(time.time_since_epoch()).count();
 }
@@ -190,25 +206,40 @@ void SourceHost::run(const std::stop_token& stop) {
     interrupt.request_stop();
   }};
   while (!stop.stop_requested()) {
+    if (source_ || reopen(stop)) adjustStreaming();
     runCommands();
-    if (!source_ && !reopen(stop)) continue;
-    std::unique_lock lock{mutex_};
-    if (mayMakeFrame()) {
-      lock.unlock();
-      if (is_started_ || startSource()) makeFrame(stop);
-    } else if (is_started_ && !isWanted()) {
-      lock.unlock();
-      stopSource();
-    } else {
-      work_.wait(lock, stop, [this] {
-        return !commands_.empty() || mayMakeFrame() || (is_started_ && !isWanted());
-      });
+    if (is_started_) {
+      makeFrameOrWait(stop);
+    } else if (source_) {
+      std::unique_lock lock{mutex_};
+      work_.wait(lock, stop, [this] { return !commands_.empty() || isWanted(); });
     }
   }
   if (source_) stopSource();
   source_.reset();
   runCommands();
   endAll({Error::Code::Stopped, fmt::format("the daemon closed the source \"{}\"", name_)});
+}
+
+/// Starts or stops the stream as subscribers come and go. Before commands, so that a trigger that follows
+/// a subscription finds the camera started.
+void SourceHost::adjustStreaming() {
+  bool is_wanted = false;
+  {
+    const std::scoped_lock lock{mutex_};
+    is_wanted = isWanted();
+  }
+  if (is_wanted && !is_started_) startSource();
+  if (!is_wanted && is_started_) stopSource();
+}
+
+void SourceHost::makeFrameOrWait(const std::stop_token& stop) {
+  std::unique_lock lock{mutex_};
+  if (mayMakeFrame()) {
+    lock.unlock();
+    return makeFrame(stop);
+  }
+  work_.wait(lock, stop, [this] { return !commands_.empty() || mayMakeFrame() || !isWanted(); });
 }
 
 bool SourceHost::isWanted() const {
@@ -269,16 +300,12 @@ bool SourceHost::reopen(const std::stop_token& stop) {
   return source_ != nullptr;
 }
 
-bool SourceHost::startSource() {
+void SourceHost::startSource() {
   const Result<> started = inDriver([this] { return source_->start(); });
-  if (!started) {
-    onError(started.error());
-    return false;
-  }
+  if (!started) return onError(started.error());
   is_started_ = true;
   const std::scoped_lock lock{mutex_};
   is_streaming_ = true;
-  return true;
 }
 
 void SourceHost::stopSource() {
@@ -333,25 +360,26 @@ void SourceHost::publish(Frame frame) {
 }
 
 /// Prepares the frame once per distinct selection and hands it to everyone who wants that.
-void SourceHost::deliver(const Frame& frame, const std::vector<SubscriberPtr>& takers) const {
-  std::vector<std::pair<const Selection*, Result<PreparedFramePtr>>> prepared;
-  for (const SubscriberPtr& taker : takers) {
-    const Selection& wanted = taker->wish.selection;
-    auto found = std::ranges::find_if(prepared, [&](const auto& p) { return *p.first == wanted; });
-    if (found == prepared.end()) {
-      Result<Frame> selected = select(frame, wanted);
-      Result<PreparedFramePtr> ready = selected ? Error{} : selected.error();
-      if (selected) {
-        wire::Body body = wire::encodeBody(selected->planes);
-        ready = PreparedFramePtr{
-            std::make_shared<PreparedFrame>(PreparedFrame{*std::move(selected), std::move(body)})};
-      }
-      found = prepared.insert(prepared.end(), {&wanted, std::move(ready)});
+void SourceHost::deliver(const Frame& frame, const std::vector<SubscriberPtr>& takers) {
+  std::vector<bool> is_served(takers.size(), false);
+  for (std::size_t first = 0; first < takers.size(); ++first) {
+    if (is_served[first]) continue;
+    const Selection& wanted = takers[first]->wish.selection;
+    std::vector<SubscriberPtr> equals;
+    for (std::size_t i = first; i < takers.size(); ++i) {
+      if (is_served[i] || takers[i]->wish.selection != wanted) continue;
+      is_served[i] = true;
+      equals.push_back(takers[i]);
     }
-    if (found->second) {
-      taker->queue.push(*found->second);
-    } else {
-      taker->queue.end(found->second.error());
+    const bool share = std::ranges::any_of(
+        equals, [](const SubscriberPtr& taker) { return taker->wish.in_shared_memory; });
+    const Result<PreparedFramePtr> prepared = prepare(frame, wanted, share);
+    for (const SubscriberPtr& taker : equals) {
+      if (prepared) {
+        taker->queue.push(*prepared);
+      } else {
+        taker->queue.end(prepared.error());
+      }
     }
   }
 }

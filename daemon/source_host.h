@@ -27,6 +27,7 @@ namespace toftwin::daemon {
 struct Wish {
   Selection selection;
   FrameQueue::Settings queue;
+  bool in_shared_memory = false;  ///< takes bodies that way, where that is worth while
 };
 
 /// One subscriber of a source.
@@ -90,11 +91,13 @@ class SourceHost {
   void runCommands();
   bool reopen(const std::stop_token& stop);
   void adopt(Result<std::unique_ptr<drivers::Source>> opened);
-  bool startSource();
+  void adjustStreaming();
+  void makeFrameOrWait(const std::stop_token& stop);
+  void startSource();
   void stopSource();
   void makeFrame(const std::stop_token& stop);
   void publish(Frame frame);
-  void deliver(const Frame& frame, const std::vector<SubscriberPtr>& takers) const;
+  static void deliver(const Frame& frame, const std::vector<SubscriberPtr>& takers);
   void onError(const Error& error);
   void retryLater();
   void endAll(const Error& reason);

@@ -2,6 +2,7 @@
 #include <toftwin/client.h>
 
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "protocol/client/connection.h"
@@ -67,6 +68,7 @@ Result<std::shared_ptr<Connection>> connectToDefault(const ClientOptions& option
 struct Subscription::State {
   std::shared_ptr<Connection> connection;  // shared with the Client
   Connection::Subscribed subscribed;
+  std::optional<std::uint64_t> to_acknowledge;  ///< Lockstep: taken, but the next was not asked for
   ~State() { connection->unsubscribe(subscribed.id); }
 };
 
@@ -77,8 +79,16 @@ Subscription::~Subscription() = default;
 
 Result<Frame> Subscription::next(std::chrono::milliseconds timeout) {
   const auto& [id, frames] = state_->subscribed;
+  // Under Lockstep the next frame is made only when it is asked for: what the application says after
+  // it took a frame, such as a new pose, must hold for the next.
+  if (auto last = std::exchange(state_->to_acknowledge, std::nullopt)) {
+    state_->connection->acknowledge(id, *last);
+  }
   Result<Frame> frame = frames->pop(timeout);
-  if (frame && !frames->isAcknowledgedOnArrival()) {
+  if (!frame || frames->isAcknowledgedOnArrival()) return frame;
+  if (frames->isLockstep()) {
+    state_->to_acknowledge = frame->sequence;
+  } else {
     state_->connection->acknowledge(id, frame->sequence);
   }
   return frame;
@@ -139,7 +149,7 @@ Result<Subscription> Client::subscribe(std::string_view source, SubscribeOptions
   auto subscribed = state_->connection->subscribe(toRequest(source, std::move(options)));
   if (!subscribed) return subscribed.error();
   return Subscription{std::unique_ptr<Subscription::State>{
-      new Subscription::State{state_->connection, std::move(*subscribed)}}};
+      new Subscription::State{state_->connection, std::move(*subscribed), std::nullopt}}};
 }
 
 Result<> Client::setPose(std::string_view source, const Transform<World, Camera>& world_from_camera) {

@@ -28,6 +28,8 @@ class FrameQueue {
   /// arrives; else when the application takes it.
   [[nodiscard]] bool isAcknowledgedOnArrival() const { return policy_ == wire::Policy::Latest; }
 
+  [[nodiscard]] bool isLockstep() const { return policy_ == wire::Policy::Lockstep; }
+
   /// Error Overrun if the daemon sends more than the window allows.
   Result<> push(Frame frame);
   /// No more frames; those that wait can still be taken. The first reason counts.

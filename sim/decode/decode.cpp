@@ -45,9 +45,10 @@ class Decoder {
   Decoder(const Samples& samples, const DecodeSettings& settings, const Image<float>& ray_x, RangeImage& result)
       : samples_(samples), settings_(settings), ray_x_(ray_x), result_(result), steps_(samples.steps),
         unwrap_(samples.frequencies, settings.speed_of_light),
-        zero_cycles_(samples.frequencies.size(), 0.0) {
+        zero_cycles_(samples.frequencies.size(), 0.0F) {
     for (std::size_t f = 0; f < std::min(settings.zero_phase.size(), zero_cycles_.size()); ++f) {
-      zero_cycles_[f] = settings.zero_phase[f].in(radian) / (2.0 * std::numbers::pi);
+      const double zero = settings.zero_phase[f].in(radian) / (2.0 * std::numbers::pi);
+      zero_cycles_[f] = static_cast<float>(zero - std::floor(zero));
     }
     // 80 MHz is three units of 240 MHz.
     if (isKinect()) unit_m_ = settings.speed_of_light / (6.0 * samples.frequencies[0].in(hertz));
@@ -55,41 +56,39 @@ class Decoder {
 
   void row(int y) const {
     const std::size_t frequencies = samples_.frequencies.size();
+    const auto width = static_cast<std::size_t>(samples_.width());
+    std::vector<float> cycles(frequencies * width), amplitudes(frequencies * width), asymmetry(width);
     for (std::size_t f = 0; f < frequencies; ++f) {
       demodulateRow(samples_, steps_, f, y, &result_.phasors[f](0, y));
+      polarRow(&result_.phasors[f](0, y), width, zero_cycles_[f], &cycles[f * width], &amplitudes[f * width]);
     }
     unmodulatedRow(samples_, y, &result_.ambient(0, y));
-    std::vector<float> asymmetry(static_cast<std::size_t>(samples_.width()));
     asymmetryRow(samples_, y, asymmetry.data());
-    std::vector<double> cycles(frequencies), amplitudes(frequencies);
-    for (int x = 0; x < samples_.width(); ++x) {
-      double mean = 0.0;
+    std::vector<double> pixel_cycles(frequencies), pixel_amplitudes(frequencies);
+    for (std::size_t x = 0; x < width; ++x) {
+      double sum = 0.0;
       for (std::size_t f = 0; f < frequencies; ++f) {
-        const std::complex<float> phasor = result_.phasors[f](x, y);
-        amplitudes[f] = std::sqrt(static_cast<double>(std::norm(phasor)));
-        cycles[f] = cyclesOf(phasor, zero_cycles_[f]);
-        mean += amplitudes[f] / static_cast<double>(frequencies);
+        pixel_cycles[f] = static_cast<double>(cycles[f * width + x]);
+        pixel_amplitudes[f] = static_cast<double>(amplitudes[f * width + x]);
+        sum += pixel_amplitudes[f];
       }
-      result_.amplitude(x, y) = static_cast<float>(mean);
-      std::uint8_t flags = samples_.flags.empty() ? std::uint8_t{0} : samples_.flags(x, y);
-      if (static_cast<double>(asymmetry[static_cast<std::size_t>(x)]) > settings_.asymmetry_threshold * mean) {
-        raise(flags, PixelFlag::Asymmetric);
-      }
-      const double range_m = measure(cycles, amplitudes, x, y, flags);
-      if (std::isnan(range_m)) raise(flags, PixelFlag::Invalid);
-      result_.range_m(x, y) = has(flags, PixelFlag::Invalid) ? kNan : static_cast<float>(range_m);
-      result_.flags(x, y) = flags;
+      pixel(pixel_cycles, pixel_amplitudes, sum / static_cast<double>(frequencies),
+            static_cast<double>(asymmetry[x]), static_cast<int>(x), y);
     }
   }
 
  private:
   [[nodiscard]] bool isKinect() const { return settings_.algorithm == DecodeSettings::Algorithm::KinectV2; }
 
-  /// φ / 2π in [0, 1) of p = A e^(−iφ), less the phase at range zero.
-  static double cyclesOf(std::complex<float> phasor, double zero_cycles) {
-    const double cycles =
-        static_cast<double>(std::atan2(-phasor.imag(), phasor.real())) / (2.0 * std::numbers::pi) - zero_cycles;
-    return cycles - std::floor(cycles);
+  void pixel(const std::vector<double>& cycles, const std::vector<double>& amplitudes, double mean_amplitude,
+             double asymmetry, int x, int y) const {
+    std::uint8_t flags = samples_.flags.empty() ? std::uint8_t{0} : samples_.flags(x, y);
+    if (asymmetry > settings_.asymmetry_threshold * mean_amplitude) raise(flags, PixelFlag::Asymmetric);
+    const double range_m = measure(cycles, amplitudes, x, y, flags);
+    if (std::isnan(range_m)) raise(flags, PixelFlag::Invalid);
+    result_.range_m(x, y) = has(flags, PixelFlag::Invalid) ? kNan : static_cast<float>(range_m);
+    result_.amplitude(x, y) = static_cast<float>(mean_amplitude);
+    result_.flags(x, y) = flags;
   }
 
   /// The range, and the flags that say why it is not to be trusted.
@@ -103,12 +102,9 @@ class Decoder {
     }
     const Unwrapped joined = isKinect() ? unwrapKinectV2(cycles[0], cycles[1], cycles[2], unit_m_)
                                         : unwrap_(cycles, amplitudes);
-    const double threshold =
-        isKinect() ? kinectV2Threshold(weakest * settings_.counts_per_electron,
-                                       settings_.strong_unwrap_threshold.in(radian),
-                                       settings_.unwrap_threshold.in(radian))
-                   : settings_.unwrap_threshold.in(radian);
-    if (joined.deviation_rad > threshold) reject(flags, PixelFlag::UnwrapUnreliable);
+    if (joined.deviation_rad > allowedDeviation(joined.deviation_rad, weakest)) {
+      reject(flags, PixelFlag::UnwrapUnreliable);
+    }
     const double ray_x = ray_x_.empty() ? 0.0 : static_cast<double>(ray_x_(x, y));
     const double range_m = rangeOfWay(joined.range_m, ray_x, settings_);
     if (!(range_m >= settings_.nearest.in(metre) && range_m <= settings_.farthest.in(metre))) {
@@ -117,13 +113,21 @@ class Decoder {
     return range_m;
   }
 
+  [[nodiscard]] double allowedDeviation(double deviation_rad, double weakest) const {
+    const double weak_rad = settings_.unwrap_threshold.in(radian);
+    const double strong_rad = settings_.strong_unwrap_threshold.in(radian);
+    // The threshold lies between the two; only a deviation that does, too, is worth two transcendental functions.
+    if (!isKinect() || deviation_rad <= strong_rad || deviation_rad > weak_rad) return weak_rad;
+    return kinectV2Threshold(weakest * settings_.counts_per_electron, strong_rad, weak_rad);
+  }
+
   const Samples& samples_;
   const DecodeSettings& settings_;
   const Image<float>& ray_x_;
   RangeImage& result_;
   Steps steps_;
   Unwrapper unwrap_;
-  std::vector<double> zero_cycles_;
+  std::vector<float> zero_cycles_;  ///< in [0, 1)
   double unit_m_ = 0.0;
 };
 

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "sim/images/simd.h"
+
 namespace toftwin::sim {
 namespace {
 
@@ -45,6 +47,33 @@ void demodulateRow(const Samples& samples, const Steps& steps, std::size_t frequ
     addSample(samples, frequency, k, y, -scale * steps.sine[at], imaginary.data());
   }
   for (std::size_t x = 0; x < width; ++x) phasors[x] = {real[x], imaginary[x]};
+}
+
+TOFTWIN_SIMD void polarRow(const std::complex<float>* phasors, std::size_t count, float zero_cycles, float* cycles,
+                           float* amplitudes) {
+  const auto* parts = reinterpret_cast<const float*>(phasors);
+  for (std::size_t x = 0; x < count; ++x) {
+    const float real = parts[2 * x], imaginary = -parts[2 * x + 1];
+    const float across = std::abs(real), up = std::abs(imaginary);
+    const float longer = across > up ? across : up, shorter = across > up ? up : across;
+    const float t = longer > 0.0F ? shorter / longer : 0.0F * longer;  // NaN stays NaN
+    const float t2 = t * t;
+    float series = 0.0028662257F;
+    series = -0.0161657367F + series * t2;
+    series = 0.0429096138F + series * t2;
+    series = -0.0752896400F + series * t2;
+    series = 0.1065626393F + series * t2;
+    series = -0.1420889944F + series * t2;
+    series = 0.1999355085F + series * t2;
+    series = -0.3333314528F + series * t2;
+    const float eighth = (t + t * t2 * series) * 0.159154943F;  // atan(t) / 2π, 0 … 1/8
+    const float quarter = across > up ? eighth : 0.25F - eighth;
+    const float half = real < 0.0F ? 0.5F - quarter : quarter;
+    const float turn = (imaginary < 0.0F ? 1.0F - half : half) - zero_cycles;
+    const float from_zero = turn < 0.0F ? turn + 1.0F : turn;
+    cycles[x] = from_zero >= 1.0F ? from_zero - 1.0F : from_zero;
+    amplitudes[x] = __builtin_sqrtf(real * real + imaginary * imaginary);
+  }
 }
 
 void unmodulatedRow(const Samples& samples, int y, float* charge) {

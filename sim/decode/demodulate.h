@@ -20,6 +20,11 @@ struct Steps {
 void demodulateRow(const Samples& samples, const Steps& steps, std::size_t frequency, int y,
                    std::complex<float>* phasors);
 
+/// φ/2π in [0, 1) and A of phasors A e^(−iφ), `zero_cycles` taken off the former. The arc tangent is Abramowitz
+/// & Stegun's 4.4.49: within 2e-8 rad, so that the error is float's rounding.
+void polarRow(const std::complex<float>* phasors, std::size_t count, float zero_cycles, float* cycles,
+              float* amplitudes);
+
 /// The mean charge of a row's pixels over all frequencies and steps, taps added: the unmodulated part.
 void unmodulatedRow(const Samples& samples, int y, float* charge);
 

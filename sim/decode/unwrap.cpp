@@ -11,7 +11,8 @@
 namespace toftwin::sim {
 namespace {
 
-double nearestWhole(double x) { return std::floor(x + 0.5); }
+/// The nearest whole number, for |x| < 2⁵¹: what 1.5·2⁵² rounds away. Baseline x86 has no instruction for it.
+double nearestWhole(double x) { return (x + 0x1.8p52) - 0x1.8p52; }
 
 /// Distance of the phases (in cycles) from the line through 0 along (10, 2, 15), in radians.
 double distanceFromLine(double k80, double k16, double k120) {
@@ -27,9 +28,8 @@ double distanceFromLine(double k80, double k16, double k120) {
 Unwrapped unwrapKinectV2(double cycles_80, double cycles_16, double cycles_120, double unit_m) {
   double units_80 = 3.0 * (cycles_80 + nearestWhole(5.0 * cycles_16 - cycles_80));
   double full_16 = cycles_16;
-  const double beside_120 = units_80 - 2.0 * cycles_120;
-  const double within_period = beside_120 - 2.0 * std::floor(beside_120 / 2.0);
-  if (within_period > 0.5 && within_period < 1.5) {  // odd: the second half of the 30 units
+  const double periods_beside_120 = units_80 / 2.0 - cycles_120;
+  if (std::abs(periods_beside_120 - nearestWhole(periods_beside_120)) > 0.25) {  // the second 15 units
     units_80 += 15.0;
     full_16 += 1.0;
   }

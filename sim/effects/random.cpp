@@ -2,6 +2,9 @@
 #include "sim/effects/random.h"
 
 #include <algorithm>
+#include <cmath>
+
+#include "sim/images/simd.h"
 
 namespace toftwin::sim {
 namespace {
@@ -20,34 +23,48 @@ float exactPoisson(float mean, double uniform) {
   return static_cast<float>(count);
 }
 
+/// x = λ + √λ z + (z² − 1)/6, rounded to a whole number, into `z`. True if a mean is so small that
+/// it wants exactPoisson().
+TOFTWIN_SIMD bool gaussianPoisson(const float* means, float* z, std::size_t count) {
+  int small = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const float mean = means[i];
+    const float positive = mean > 0.0F ? mean : 0.0F;
+    const float x = mean + __builtin_sqrtf(positive) * z[i] + (z[i] * z[i] - 1.0F) * (1.0F / 6.0F);
+    // Adding and taking away 1.5·2²³ rounds to nearest, up to 2²²; larger x keep their fraction, which
+    // is 1e-3 of the noise there.
+    const float rounded = (x + 12582912.0F) - 12582912.0F;
+    z[i] = x < 4194304.0F ? rounded : x;
+    small |= mean < kPoissonExactBelow ? 1 : 0;
+  }
+  return small != 0;
+}
+
 }  // namespace
 
+TOFTWIN_SIMD void fillNormals(const Random::Draw& draw, std::uint32_t first_pixel, std::span<float> normals) {
+  const Random::Draw copy = draw;  // its keys in registers: no store below can change them
+  float* out = normals.data();
+  const auto count = static_cast<std::uint32_t>(normals.size());
+  for (std::uint32_t i = 0; i < count; ++i) out[i] = copy.normal(first_pixel + i);
+}
+
+
 void poisson(const Random::Draw& draw, std::uint32_t first_pixel, std::span<float> means) {
-  constexpr std::size_t kBlock = 256;
+  constexpr std::size_t kBlock = 512;
   float drawn[kBlock];
   for (std::size_t start = 0; start < means.size(); start += kBlock) {
     const std::span<float> block = means.subspan(start, std::min(kBlock, means.size() - start));
     const auto first = first_pixel + static_cast<std::uint32_t>(start);
-    bool any_small = false;
-    for (std::size_t i = 0; i < block.size(); ++i) {
-      // x = λ + √λ z + (z² − 1)/6
-      const float mean = block[i];
-      const float z = draw.normal(first + static_cast<std::uint32_t>(i));
-      const float positive = mean > 0.0F ? mean : 0.0F;
-      const float x = mean + __builtin_sqrtf(positive) * z + (z * z - 1.0F) * (1.0F / 6.0F);
-      // Round to nearest: adding and taking away 1.5·2²³ does, up to 2²²; larger x keep their
-      // fraction, which is 1e-3 of the noise there.
-      drawn[i] = x < 4194304.0F ? (x + 12582912.0F) - 12582912.0F : x;
-      any_small |= mean < kPoissonExactBelow;
-    }
-    if (any_small) {
+    fillNormals(draw, first, {drawn, block.size()});
+    if (gaussianPoisson(block.data(), drawn, block.size())) {
       for (std::size_t i = 0; i < block.size(); ++i) {
         if (block[i] < kPoissonExactBelow) {
           drawn[i] = exactPoisson(block[i], draw.uniform(first + static_cast<std::uint32_t>(i)));
         }
       }
     }
-    for (std::size_t i = 0; i < block.size(); ++i) block[i] = drawn[i];
+    std::copy_n(drawn, block.size(), block.begin());
   }
 }
 

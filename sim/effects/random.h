@@ -2,7 +2,7 @@
 #pragma once
 
 #include <bit>
-#include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string_view>
@@ -55,8 +55,8 @@ class Random {
     const float u = (static_cast<float>(static_cast<std::int32_t>(bits)) + 0.5F) * 0x1p-31F;
     // 1 − u² loses its digits near ±1, where the tails are: use (1 − |u|)(1 + |u|) with 1 − |u| from
     // the integer itself.
-    const std::uint32_t magnitude = bits ^ (0U - (bits >> 31));  // 0 … 2³¹ − 1, both signs alike
-    const float one_minus = (static_cast<float>(0x7FFFFFFFU - (magnitude & 0x7FFFFFFFU)) + 0.5F) * 0x1p-31F;
+    const auto magnitude = static_cast<std::int32_t>(bits ^ (0U - (bits >> 31)));  // both signs alike
+    const float one_minus = (static_cast<float>(0x7FFFFFFF - magnitude) + 0.5F) * 0x1p-31F;
     const float w = -logarithm(one_minus * (2.0F - one_minus));
     const float c = w - 2.5F;
     float central = 2.81022636e-08F;
@@ -114,6 +114,9 @@ constexpr std::uint64_t effectKey(std::string_view name, std::size_t place) {
   for (char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001B3u;
   return hash + place;
 }
+
+/// Standard normals of the pixels `first_pixel`, `first_pixel` + 1, …
+void fillNormals(const Random::Draw& draw, std::uint32_t first_pixel, std::span<float> normals);
 
 /// Means from which on poisson() uses a Gaussian.
 inline constexpr float kPoissonExactBelow = 32.0F;

@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim/effects/range_noise.h"
 
+#include <vector>
+
 namespace toftwin::sim {
 
 RangeImage RangeNoise::apply(RangeImage image, const Conditions& now, const Random& random) const {
   const auto sigma_m = static_cast<float>(sigma.in(metre));
   if (sigma_m == 0.0F) return image;
   const Random::Draw draw = random.draw(0);
+  std::vector<float> normals(static_cast<std::size_t>(image.range_m.width()));
   for (int y = 0; y < image.range_m.height(); ++y) {
     float* range_m = &image.range_m(0, y);
-    const std::uint32_t first = now.pixel(0, y);
-    for (int x = 0; x < image.range_m.width(); ++x) {
-      range_m[x] += sigma_m * draw.normal(first + static_cast<std::uint32_t>(x));  // NaN stays NaN
-    }
+    fillNormals(draw, now.pixel(0, y), normals);
+    for (std::size_t x = 0; x < normals.size(); ++x) range_m[x] += sigma_m * normals[x];  // NaN stays NaN
   }
   return image;
 }

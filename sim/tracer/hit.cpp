@@ -34,20 +34,22 @@ double embreeTriangleError(Vec3d p, Vec3d v0, Vec3d v1, Vec3d v2, Vec3d n, doubl
 
 /// The move along the triangle that keeps a place at least `margin` away from its three edges: a ray
 /// that starts on an edge could start behind the surface that begins there.
-/// `n` is (v1 − v0) × (v2 − v0) and `length` its norm; u and v as Embree counts them.
-Vec3d awayFromEdges(double u, double v, Vec3d v0, Vec3d v1, Vec3d v2, Vec3d n, double length, double margin) {
+/// `n` is (v1 − v0) × (v2 − v0) and `length` its norm; u and v as Embree counts them, which tell only
+/// roughly whether an edge is near: their errors are a few 1e-7 of the triangle's height.
+Vec3d awayFromEdges(Vec3d p, double u, double v, Vec3d v0, Vec3d v1, Vec3d v2, Vec3d n, double length, double margin) {
   Vec3d move{};
-  const auto edge = [&](double share, Vec3d along) {  // share: of the corner that faces this edge
+  const auto edge = [&](double share, Vec3d from, Vec3d to) {  // share: of the corner that faces this edge
+    const Vec3d along = to - from;
     const double edge_length2 = dot(along, along);
-    const double height = share * length;  // distance from the edge × the edge's length
-    if (height > 0.0 && height * height > margin * margin * edge_length2) return;
-    const double edge_length = std::sqrt(edge_length2);
-    const double inward = margin - height / edge_length;
-    move = move + cross(n, along) * (std::min(inward, 2.0 * margin) / (length * edge_length));
+    const double roughly = (share - 1e-4) * length;  // distance from the edge × the edge's length
+    if (roughly > 0.0 && roughly * roughly > margin * margin * edge_length2) return;
+    const Vec3d inward = cross(n, along) / (length * std::sqrt(edge_length2));
+    const double missing = margin - dot(inward, p - from);
+    if (missing > 0.0) move = move + inward * std::min(missing, 2.0 * margin);
   };
-  edge(1.0 - u - v, v2 - v1);
-  edge(u, v0 - v2);
-  edge(v, v1 - v0);
+  edge(1.0 - u - v, v1, v2);
+  edge(u, v2, v0);
+  edge(v, v0, v1);
   return move;
 }
 
@@ -84,7 +86,7 @@ Hit refineTriangle(const BuiltObject& object, std::uint32_t primitive, float u, 
                         2.0 * roundingAlong(hit.normal, hit.position) + kSmallestOffset;
   const Vec3d reach = absolute(hit.position);
   const double margin = 4.0 * (offset + kUnitRoundoff * std::max({reach.x, reach.y, reach.z}));
-  const Vec3d inside = awayFromEdges(static_cast<double>(u), static_cast<double>(v), v0, v1, v2, n, length, margin);
+  const Vec3d inside = awayFromEdges(hit.position, static_cast<double>(u), static_cast<double>(v), v0, v1, v2, n, length, margin);
   faceTheRay(hit, d);
   hit.start = roundedAway(hit.position + inside, hit.normal, offset);
   return hit;

@@ -58,7 +58,7 @@ struct ObjectSpec {
 
   template <class Visitor>
   void visit(Visitor& v) {
-    v.text("name", name, "for error messages");
+    v.text("name", name, "what people call it; it changes nothing");
     v.choice("shape", shape,
              {{"rectangle", Shape::Rectangle}, {"box", Shape::Box}, {"sphere", Shape::Sphere},
               {"cylinder", Shape::Cylinder}, {"disc", Shape::Disc}, {"mesh", Shape::Mesh}},

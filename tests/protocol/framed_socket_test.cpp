@@ -184,6 +184,7 @@ TEST_P(SharedMemory, IsRefusedUnlessAgreedOn) {
   const auto received = receive(there);
   ASSERT_FALSE(received);
   EXPECT_EQ(received.error().code, Error::Code::Malformed);
+  EXPECT_THAT(received.error().message, HasSubstr("not agreed on"));
 }
 
 TEST_P(SharedMemory, AMissingFileDescriptorIsMalformed) {

@@ -79,7 +79,7 @@ TEST(Mutation, NoBytesBreakTheDecoder) {
   SCOPED_TRACE("seed " + std::to_string(kSeed));
   const auto from = seeds();
   Mutator mutator{kSeed};
-  for (int i = 0; i < 100'000; ++i) fuzzOneInput(mutator.next(from));
+  for (int i = 0; i < 400'000; ++i) fuzzOneInput(mutator.next(from));
 }
 
 /// Whatever comes, the socket says either a message or why there is none, and ends with the stream.

@@ -37,6 +37,14 @@ TEST(Random, NormalReachesFarAndStaysFinite) {
   EXPECT_EQ(Random::normalFromBits(5u), -Random::normalFromBits(~5u));
 }
 
+// The image kernel is compiled for several instruction sets; whichever runs must give the same bits.
+TEST(Random, WholeRowsAreTheSameBitsAsSinglePixels) {
+  const Random::Draw draw = Random{3, 1, 4}.draw(1);
+  std::vector<float> row(1009);
+  fillNormals(draw, 77, row);
+  for (std::uint32_t i = 0; i < row.size(); ++i) ASSERT_EQ(row[i], draw.normal(77 + i)) << i;
+}
+
 // Kolmogorov–Smirnov against the normal distribution, n = 1e6, false alarm 1e-6: √n D < 2.69.
 TEST(Random, NormalsOfAnImagePassKolmogorovSmirnov) {
   for (std::uint64_t seed : {1u, 2u, 3u}) {

@@ -17,13 +17,12 @@ as_time() {
   if [ "$1" -ge 60 ]; then printf '%d min %02d s' $(($1 / 60)) $(($1 % 60)); else printf '%d s' "$1"; fi
 }
 
-# with_progress LOG SCALE COMMAND…: runs the command with its output in LOG. Every few seconds it
-# prints the newest line that holds "n/m" and, from the share done, how long is left; at the latest
-# after 15 seconds it says that it is still at work. SCALE multiplies m (1, or more where each item
-# is counted several times). Prints the end of LOG and returns the exit code if the command fails.
+# with_progress LOG COMMAND…: runs the command with its output in LOG. Every ten seconds it prints how
+# far it is, and how long is left, from the newest "n/m" that a line of LOG begins with. If the command
+# fails, it prints the end of LOG and returns the command's exit code.
 with_progress() {
-  local log=$1 scale=$2 started=$SECONDS said=$SECONDS fraction line n m spent
-  shift 2
+  local log=$1 started=$SECONDS said=$SECONDS fraction n m spent
+  shift
   : > "$log"
   "$@" > "$log" 2>&1 < /dev/null &
   local child=$!
@@ -33,23 +32,22 @@ with_progress() {
     spent=$((SECONDS - started))
     [ $((SECONDS - said)) -ge 10 ] || continue
     said=$SECONDS
-    line=$(grep -oE '[0-9]+/ *[0-9]+[] ][^/]*$' "$log" | tail -n 1)
-    fraction=$(printf '%s' "$line" | grep -oE '^[0-9]+/ *[0-9]+')
+    fraction=$(grep -oE '^ *[0-9]+/ *[0-9]+ ' "$log" | tail -n 1 | tr -d ' ')
     n=${fraction%%/*} m=${fraction##*/}
     if [ -n "$fraction" ] && [ "$n" -gt 0 ] && [ "$m" -ge "$n" ]; then
-      printf '      %d of %d after %s, about %s left\n' "$n" "$((m * scale))" "$(as_time $spent)" \
-        "$(as_time $((spent * (m * scale - n) / n)))"
+      printf '      %d of %d after %s, about %s left\n' "$n" "$m" "$(as_time $spent)" \
+        "$(as_time $((spent * (m - n) / n)))"
     else
       printf '      at work for %s: %s\n' "$(as_time $spent)" "$(tail -n 1 "$log" | cut -c 1-90)"
     fi
   done
   trap - INT TERM
-  if wait "$child"; then
-    printf '      done in %s\n' "$(as_time $((SECONDS - started)))"
-    return 0
+  local code=0
+  wait "$child" || code=$?
+  if [ "$code" -ne 0 ]; then
+    tail -n 40 "$log" >&2
+    printf '\nThat failed (exit code %d). The whole output is in %s\n' "$code" "$log" >&2
+    return "$code"
   fi
-  local code=$?
-  tail -n 40 "$log" >&2
-  printf '\nThat failed (exit code %d). The whole output is in %s\n' "$code" "$log" >&2
-  return "$code"
+  printf '      done in %s\n' "$(as_time $((SECONDS - started)))"
 }

@@ -72,7 +72,8 @@ class Subscription {
   ~Subscription();
 
   /// Waits for the next frame. Errors: Timeout (ask again), EndOfStream, Overrun, Disconnected.
-  /// Under Lockstep, taking a frame is what lets the daemon make the next one.
+  /// Under Lockstep, asking for the next frame is what lets the daemon make it: a pose that was set
+  /// before is the pose of that frame.
   Result<Frame> next(std::chrono::milliseconds timeout);
 
  private:

@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/connection.h"
+
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/post.hpp>
+
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <sys/socket.h>
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+namespace toftwin::daemon {
+namespace {
+
+namespace asio = boost::asio;
+using transport::Socket;
+
+constexpr std::size_t kMostOwed = 64;  // answers; a client that asks on must read some first
+constexpr std::chrono::milliseconds kFarewell{1000};
+
+Session::Options sessionOptions(const Connection::Options& options, bool is_local) {
+  Session::Options session{.subscriptions = options.subscriptions, .features = {}};
+  if (is_local) session.features.emplace_back(transport::kMemfdFeature);
+  return session;
+}
+
+/// A peer whose machine or cable went away says nothing. Without this it would hold up a lockstep
+/// source for ever: after about ten seconds of silence the kernel breaks the connection.
+void noticeVanishedPeers(Socket& socket) {
+  const int fd = socket.native_handle();
+  const auto set = [fd](int level, int option, int value) {
+    ::setsockopt(fd, level, option, &value, sizeof value);  // fails on a Unix socket, which needs none
+  };
+  set(SOL_SOCKET, SO_KEEPALIVE, 1);
+  set(IPPROTO_TCP, TCP_KEEPIDLE, 5);
+  set(IPPROTO_TCP, TCP_KEEPINTVL, 2);
+  set(IPPROTO_TCP, TCP_KEEPCNT, 3);
+}
+
+}  // namespace
+
+Connection::Connection(Socket socket, Hub& hub, Options options, std::string name,
+                       std::function<void()> on_closed)
+    : socket_(std::move(socket), wire::Limits{.header_bytes = options.request_bytes, .body_bytes = 0}),
+      options_(options),
+      name_(std::move(name)),
+      on_closed_(std::move(on_closed)),
+      timer_(socket_.socket().get_executor()),
+      hub_(&hub) {}
+
+void Connection::start() {
+  transport::setNoDelay(socket_.socket());
+  if (!socket_.isLocal()) noticeVanishedPeers(socket_.socket());
+  // Not in the constructor: the waker holds this connection weakly, which needs one that is owned.
+  session_ = std::make_unique<Session>(*hub_, sessionOptions(options_, socket_.isLocal()), waker());
+  giveUpAfter(options_.handshake, [this] {
+    if (session_->isOpen()) return;
+    dismiss({Error::Code::Timeout, fmt::format("no Hello within {} ms", options_.handshake.count())});
+  });
+  read();
+}
+
+/// What sources and recorders call, on their threads, when there is something to send. However often
+/// that is, one visit to the io thread at a time is on its way.
+std::function<void()> Connection::waker() {
+  return [weak = weak_from_this()] {
+    auto self = weak.lock();
+    if (!self || self->is_wake_posted_.exchange(true)) return;
+    auto executor = self->socket_.socket().get_executor();
+    asio::post(executor, [self = std::move(self)] {
+      self->is_wake_posted_ = false;
+      self->pump();
+    });
+  };
+}
+
+void Connection::read() {
+  if (is_reading_ || is_closed_ || is_last_) return;
+  if (answers_.size() + session_->owed() >= kMostOwed) return;  // read again when some were sent
+  is_reading_ = true;
+  socket_.asyncRead([self = shared_from_this()](Result<wire::Message> message) {
+    self->is_reading_ = false;
+    self->take(std::move(message));
+  });
+}
+
+void Connection::take(Result<wire::Message> message) {
+  if (is_closed_) return;
+  if (is_last_) {
+    // Too late for whatever it was; if all is said, only the peer's end is waited for.
+    const bool is_gone = !message && message.error().code == Error::Code::Disconnected;
+    if (is_gone) return close();
+    if (is_hung_up_) drain();
+    return;
+  }
+  if (message) {
+    for (wire::Message& answer : session_->handle(*message)) answers_.push_back(std::move(answer));
+    if (session_->isOver()) is_last_ = true;
+  } else if (message.error().code == Error::Code::Unsupported) {
+    answers_.emplace_back(wire::Failure{socket_.refusedRequest(), message.error()});
+  } else if (message.error().code == Error::Code::Disconnected) {
+    return close();
+  } else {
+    spdlog::warn("{}: {}; closing", name_, message.error().message);
+    return dismiss(message.error());
+  }
+  read();
+  pump();
+}
+
+void Connection::pump() {
+  if (is_writing_ || is_closed_) return;
+  if (!answers_.empty()) {
+    const wire::Message answer = std::move(answers_.front());
+    answers_.pop_front();
+    return send(answer);
+  }
+  if (is_last_) return hangUp();
+  if (auto outgoing = session_->next()) send(*outgoing);
+}
+
+void Connection::send(const Session::Outgoing& outgoing) {
+  is_writing_ = true;
+  const auto sent = [self = shared_from_this()](const Result<>& result) { self->sent(result); };
+  if (const auto* message = std::get_if<wire::Message>(&outgoing)) {
+    return socket_.asyncWrite(wire::encode(*message), sent);
+  }
+  const auto& [subscription, delivery, in_shared_memory] = std::get<Session::FrameOut>(outgoing);
+  wire::FrameMessage message{subscription, delivery.frame->frame};
+  message.frame.dropped_before = delivery.dropped_before;
+  wire::Encoded encoded = wire::encode(message, delivery.frame->body);
+  if (in_shared_memory && delivery.frame->shared_body) {
+    return socket_.asyncWrite(std::move(encoded), delivery.frame->shared_body, sent);
+  }
+  socket_.asyncWrite(std::move(encoded), sent);
+}
+
+void Connection::sent(const Result<>& result) {
+  is_writing_ = false;
+  if (!result) return close();
+  pump();
+  if (!is_closed_) read();
+}
+
+void Connection::dismiss(Error why) {
+  if (is_closed_ || is_last_) return;
+  // What the session has to tell (ends of subscriptions, late answers) goes first; frames do not.
+  while (auto outgoing = session_->next()) {
+    if (auto* message = std::get_if<wire::Message>(&*outgoing)) answers_.push_back(std::move(*message));
+  }
+  answers_.emplace_back(wire::Failure{0, std::move(why)});
+  is_last_ = true;
+  giveUpAfter(kFarewell, [this] { close(); });  // even if the client does not read
+  pump();
+}
+
+/// Ends this side's direction and reads what the peer still sends: closing over unread bytes would
+/// make the kernel throw away the last message on its way.
+void Connection::hangUp() {
+  if (std::exchange(is_hung_up_, true)) return;
+  giveUpAfter(kFarewell, [this] { close(); });
+  boost::system::error_code ignored;
+  socket_.socket().shutdown(Socket::shutdown_send, ignored);
+  if (!is_reading_) drain();
+}
+
+void Connection::drain() {
+  socket_.socket().async_read_some(
+      asio::buffer(scratch_), [self = shared_from_this()](boost::system::error_code fault, std::size_t) {
+        if (fault) return self->close();
+        self->drain();
+      });
+}
+
+void Connection::giveUpAfter(std::chrono::milliseconds timeout, std::function<void()> then) {
+  timer_.expires_after(timeout);
+  timer_.async_wait([self = shared_from_this(), then = std::move(then)](boost::system::error_code fault) {
+    if (!fault && !self->is_closed_) then();
+  });
+}
+
+void Connection::close() {
+  if (is_closed_) return;
+  is_closed_ = true;
+  timer_.cancel();
+  socket_.close();
+  session_.reset();  // its subscriptions end now, not when the last handler has run
+  if (on_closed_) std::exchange(on_closed_, nullptr)();
+}
+
+}  // namespace toftwin::daemon

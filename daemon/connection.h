@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <utility>  // before asio: Boost 1.74 uses std::exchange without it
+
+#include <boost/asio/steady_timer.hpp>
+
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "daemon/session.h"
+#include "protocol/transport/framed_socket.h"
+
+namespace toftwin::daemon {
+
+/// A session on a socket. At most one message is under way in each direction; everything else waits
+/// in the session's queues, where its policies hold. Used on the thread of the io_context only.
+class Connection : public std::enable_shared_from_this<Connection> {
+ public:
+  struct Options {
+    std::size_t subscriptions = 16;
+    std::uint32_t request_bytes = 64 * 1024;
+    std::chrono::milliseconds handshake{5000};
+  };
+
+  Connection(transport::Socket socket, Hub& hub, Options options, std::string name,
+             std::function<void()> on_closed);
+  void start();
+  /// Sends the failure as the last message, after what is owed already, and closes.
+  void dismiss(Error why);
+  void close();
+
+ private:
+  void read();
+  void take(Result<wire::Message> message);
+  void pump();
+  void send(const Session::Outgoing& outgoing);
+  void sent(const Result<>& result);
+  void hangUp();
+  void drain();
+  void giveUpAfter(std::chrono::milliseconds timeout, std::function<void()> then);
+  std::function<void()> waker();
+
+  transport::FramedSocket socket_;
+  const Options options_;
+  const std::string name_;
+  std::function<void()> on_closed_;
+  boost::asio::steady_timer timer_;  ///< of the handshake, then of the farewell
+  std::atomic<bool> is_wake_posted_{false};
+  Hub* hub_;
+  std::unique_ptr<Session> session_;
+  std::deque<wire::Message> answers_;
+  std::array<char, 4096> scratch_{};
+  bool is_reading_ = false;
+  bool is_writing_ = false;
+  bool is_last_ = false;  ///< closes when the answers are sent
+  bool is_hung_up_ = false;
+  bool is_closed_ = false;
+};
+
+}  // namespace toftwin::daemon

@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/daemon.h"
+
+#include <boost/asio/post.hpp>
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <csignal>
+#include <utility>
+
+#include <toftwin/client.h>
+
+#include "daemon/notify.h"
+
+namespace toftwin::daemon {
+namespace {
+
+namespace asio = boost::asio;
+
+Server::Options serverOptions(const LimitKeys& limits) {
+  const auto milliseconds = static_cast<std::int64_t>(limits.handshake.in(millisecond));
+  return {.sessions = static_cast<std::size_t>(limits.sessions),
+          .connection = {.subscriptions = static_cast<std::size_t>(limits.subscriptions_per_session),
+                         .request_bytes = static_cast<std::uint32_t>(limits.request_kb) * 1024,
+                         .handshake = std::chrono::milliseconds{milliseconds}}};
+}
+
+Hub::Options hubOptions(const Config& config) {
+  return {.recording_folder = config.recording_folder,
+          .lossless_bytes = static_cast<std::uint64_t>(config.keys.limits.lossless_mb) << 20};
+}
+
+spdlog::level::level_enum levelOf(DaemonKeys::LogLevel level) {
+  switch (level) {
+    case DaemonKeys::LogLevel::Debug: return spdlog::level::debug;
+    case DaemonKeys::LogLevel::Info: return spdlog::level::info;
+    case DaemonKeys::LogLevel::Warning: return spdlog::level::warn;
+    case DaemonKeys::LogLevel::Error: return spdlog::level::err;
+  }
+  return spdlog::level::info;
+}
+
+bool sameListen(const ListenKeys& a, const ListenKeys& b) {
+  return a.address == b.address && a.port == b.port && a.socket == b.socket;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Daemon>> Daemon::start(Options options) {
+  auto config = loadConfig(options.config, options.drivers);
+  if (!config) return config.error();
+  // Sources run only once it is clear that this daemon may listen: a second one must not touch cameras.
+  std::unique_ptr<Daemon> daemon{new Daemon{std::move(options), *config}};
+  if (auto listening = daemon->listen(config->keys.listen); !listening) return listening.error();
+  daemon->apply(*std::move(config));
+  notify::ready(daemon->statusLine());
+  daemon->watch();
+  return daemon;
+}
+
+Daemon::Daemon(Options options, const Config& config)
+    : options_(std::move(options)),
+      hub_(hubOptions(config), *options_.clock),
+      server_(io_, hub_, serverOptions(config.keys.limits)),
+      signals_(io_),
+      watchdog_(io_),
+      listen_(config.keys.listen) {}
+
+Daemon::~Daemon() {
+  if (reload_.valid()) reload_.wait();
+}
+
+Result<> Daemon::listen(ListenKeys keys) {
+  if (options_.port) keys.port = *options_.port;
+  if (options_.socket) keys.socket = *options_.socket;
+  if (keys.socket == "auto") keys.socket = defaultSocketPath();
+  // The socket first: its lock finds a second daemon, and can name it.
+  if (!keys.socket.empty()) {
+    if (auto done = server_.listenUnix(keys.socket); !done) return done;
+    spdlog::info("listening on {}", keys.socket);
+  }
+  if (!keys.address.empty()) {
+    if (auto done = server_.listenTcp(keys.address, static_cast<std::uint16_t>(keys.port)); !done) return done;
+    spdlog::info("listening on {} port {}", keys.address, server_.port());
+  }
+  if (keys.socket.empty() && keys.address.empty()) {
+    return Error{Error::Code::InvalidArgument,
+                 "neither listen.address nor listen.socket is set: nobody could connect"};
+  }
+  return {};
+}
+
+// ---- configuration -------------------------------------------------------------------------------
+
+std::vector<std::string> Daemon::fingerprints() const {
+  std::vector<std::string> all;
+  for (const Running& running : running_) all.push_back(running.fingerprint);
+  return all;
+}
+
+/// Makes what runs what is configured.
+void Daemon::apply(Config config) {
+  applyKeys(config);
+  std::erase_if(running_, [&](const Running& running) {
+    const bool stays = std::ranges::any_of(config.sources, [&](const ConfiguredSource& source) {
+      return source.is_as_before && source.fingerprint == running.fingerprint;
+    });
+    if (!stays) discard(hub_.remove(running.name));
+    return !stays;
+  });
+  for (ConfiguredSource& source : config.sources) {
+    if (!source.is_as_before) run(std::move(source));
+  }
+}
+
+void Daemon::applyKeys(const Config& config) {
+  spdlog::set_level(levelOf(config.keys.log_level));
+  hub_.setOptions(hubOptions(config));
+  server_.setOptions(serverOptions(config.keys.limits));
+  source_stuck_ = config.keys.limits.source_stuck;
+  if (!sameListen(listen_, config.keys.listen)) {
+    spdlog::warn("[listen] has changed, which takes effect only after a restart");
+  }
+}
+
+void Daemon::run(ConfiguredSource source) {
+  running_.push_back({source.keys.name, source.fingerprint});
+  const auto open = [driver = source.driver, table = source.table]() mutable { return driver->open(table); };
+  const SourceHost::Options options{.always = source.keys.start == SourceKeys::Start::Always};
+  spdlog::info("source {}: driver {}", source.keys.name, source.driver->name);
+  hub_.add(std::make_shared<SourceHost>(source.keys.name, open, std::move(source.opened), options,
+                                        *options_.clock));
+}
+
+void Daemon::reload() {
+  asio::post(io_, [this] { beginReload(); });
+}
+
+void Daemon::beginReload() {
+  if (is_stopping_) return;
+  if (reload_.valid()) {
+    reload_again_ = true;
+    return;
+  }
+  notify::reloading();
+  spdlog::info("reading {} again", options_.config.string());
+  // Opening a source may take its time, during which clients are served.
+  reload_ = std::async(std::launch::async, [this, running = fingerprints()] {
+    loaded_ = loadConfig(options_.config, options_.drivers, running);
+    asio::post(io_, [this] { finishReload(); });
+  });
+}
+
+void Daemon::finishReload() {
+  reload_.get();
+  Result<Config> config = *std::exchange(loaded_, std::nullopt);
+  if (is_stopping_) return;
+  if (config) {
+    apply(*std::move(config));
+    spdlog::info("the new configuration is in force");
+  } else {
+    spdlog::error("the configuration stays as it was, because the new one is wrong:\n{}",
+                  config.error().message);
+  }
+  notify::ready(statusLine());
+  if (std::exchange(reload_again_, false)) beginReload();
+}
+
+/// Destroys what may have to wait for a driver or a disk, without keeping clients waiting.
+void Daemon::discard(std::vector<std::shared_ptr<void>> things) {
+  std::erase_if(discarded_, [](const std::future<void>& one) {
+    return one.wait_for(std::chrono::seconds{0}) == std::future_status::ready;
+  });
+  discarded_.push_back(std::async(std::launch::async, [gone = std::move(things)]() mutable { gone.clear(); }));
+}
+
+// ---- running -------------------------------------------------------------------------------------
+
+void Daemon::handleSignals() {
+  boost::system::error_code ignored;
+  for (const int number : {SIGTERM, SIGINT, SIGHUP}) signals_.add(number, ignored);
+  waitForSignal();
+}
+
+void Daemon::waitForSignal() {
+  signals_.async_wait([this](boost::system::error_code fault, int number) {
+    if (fault) return;
+    if (number == SIGHUP) {
+      beginReload();
+    } else {
+      spdlog::info("stopping on signal {}", number);
+      beginStop();
+    }
+    if (!is_stopping_) waitForSignal();
+  });
+}
+
+void Daemon::run() { io_.run(); }
+
+void Daemon::stop() {
+  asio::post(io_, [this] { beginStop(); });
+}
+
+/// Sources and recordings end first, so that clients are told how; then the clients are let go.
+void Daemon::beginStop() {
+  if (std::exchange(is_stopping_, true)) return;
+  notify::stopping();
+  watchdog_.cancel();
+  signals_.cancel();
+  std::vector<std::shared_ptr<void>> all;
+  for (const Running& running : running_) {
+    for (auto& thing : hub_.remove(running.name)) all.push_back(std::move(thing));
+  }
+  running_.clear();
+  discarded_.push_back(std::async(std::launch::async, [this, gone = std::move(all)]() mutable {
+    gone.clear();
+    asio::post(io_, [this] {
+      server_.shutDown({Error::Code::Stopped, "the daemon is stopping"}, [] {});
+    });
+  }));
+}
+
+/// Tells systemd's watchdog that all is well: this runs, so the io thread does; and no driver has been
+/// in one call for too long.
+void Daemon::watch() {
+  const auto limit = notify::watchdogLimit();
+  if (!limit) return;
+  std::string stuck;
+  for (const auto& source : hub_.sources()) {
+    const std::chrono::duration<double> in_driver = source->inDriverFor(options_.clock->steady());
+    if (in_driver.count() > source_stuck_.in(second)) stuck = source->name();
+  }
+  if (stuck.empty()) {
+    notify::watchdog();
+  } else {
+    spdlog::error("source {} has been in one call of its driver for more than {} s", stuck,
+                  source_stuck_.in(second));
+  }
+  watchdog_.expires_after(*limit / 2);
+  watchdog_.async_wait([this](boost::system::error_code fault) {
+    if (!fault) watch();
+  });
+}
+
+std::string Daemon::statusLine() const { return fmt::format("{} sources", running_.size()); }
+
+}  // namespace toftwin::daemon

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <utility>  // before asio: Boost 1.74 uses std::exchange without it
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/steady_timer.hpp>
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "daemon/connection.h"
+#include "daemon/hub.h"
+#include "daemon/listen.h"
+
+namespace toftwin::daemon {
+
+/// Accepts clients on a TCP port and a Unix socket. Used on the thread of the io_context only.
+class Server {
+ public:
+  struct Options {
+    std::size_t sessions = 64;
+    Connection::Options connection;
+  };
+
+  Server(boost::asio::io_context& io, Hub& hub, Options options);
+  Result<> listenTcp(const std::string& address, std::uint16_t port);
+  Result<> listenUnix(const std::string& path);
+  /// For clients that come from now on.
+  void setOptions(Options options) { options_ = options; }
+
+  /// The TCP port that it listens on, 0 if none.
+  [[nodiscard]] std::uint16_t port() const;
+  /// The path of the Unix socket, empty if none.
+  [[nodiscard]] std::string socketPath() const;
+
+  /// Takes no more clients, tells those that there are why, and closes them; `done` when all are gone.
+  void shutDown(const Error& why, std::function<void()> done);
+
+ private:
+  template <class Acceptor>
+  void accept(Acceptor& acceptor);
+  void adopt(transport::Socket socket);
+  void forget(std::uint64_t id);
+
+  boost::asio::io_context& io_;
+  Hub& hub_;
+  Options options_;
+  std::optional<boost::asio::ip::tcp::acceptor> tcp_;
+  std::optional<UnixListener> unix_;
+  boost::asio::steady_timer pause_;  ///< after accept(2) failed for want of file descriptors
+  std::map<std::uint64_t, std::shared_ptr<Connection>> connections_;  // shared with their handlers
+  std::uint64_t last_id_ = 0;
+  std::function<void()> on_empty_;
+};
+
+}  // namespace toftwin::daemon

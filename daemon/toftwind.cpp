@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <cstdlib>
+#include <exception>
+#include <optional>
+#include <string>
+
+#include "daemon/daemon.h"
+
+namespace {
+
+using namespace toftwin;
+
+/// For scripts and for systemd's RestartPreventExitStatus: trying again does not help with the second.
+enum ExitCode { kOk = 0, kFailed = 1, kWrongConfig = 2 };
+
+struct Arguments {
+  std::string config = TOFTWIN_DEFAULT_CONFIG;
+  std::optional<int> port;
+  std::optional<std::string> socket;
+  bool only_check = false;
+  bool only_document = false;
+};
+
+int fail(const Error& error) {
+  fmt::print(stderr, "toftwind: {}\n", error.message);
+  return error.code == Error::Code::InvalidArgument || error.code == Error::Code::NotFound ? kWrongConfig
+                                                                                         : kFailed;
+}
+
+int check(const Arguments& arguments) {
+  auto config = daemon::loadConfig(arguments.config, drivers::allDrivers());
+  if (!config) return fail(config.error());
+  for (const auto& source : config->sources) {
+    fmt::print("{}: {}\n", source.keys.name,
+               source.opened ? (*source.opened)->info().model
+                             : "not there now: " + source.opened.error().message);
+  }
+  fmt::print("{} is good\n", arguments.config);
+  return kOk;
+}
+
+int serve(const Arguments& arguments) {
+  auto started = daemon::Daemon::start({.config = arguments.config,
+                                        .port = arguments.port,
+                                        .socket = arguments.socket});
+  if (!started) return fail(started.error());
+  (*started)->handleSignals();
+  (*started)->run();
+  spdlog::info("stopped");
+  return kOk;
+}
+
+/// To standard error; without the time where the journal adds it.
+void setUpLog() {
+  auto log = spdlog::stderr_logger_mt("toftwind");
+  const bool is_journal = std::getenv("JOURNAL_STREAM") != nullptr;  // NOLINT(concurrency-mt-unsafe)
+  log->set_pattern(is_journal ? "%l: %v" : "%Y-%m-%d %H:%M:%S.%e %l: %v");
+  log->flush_on(spdlog::level::info);
+  spdlog::set_default_logger(std::move(log));
+}
+
+int run(int argc, char** argv) {
+  Arguments arguments;
+  CLI::App app{"toftwind: time-of-flight cameras, real and simulated, behind one protocol"};
+  app.set_version_flag("--version", "toftwind " TOFTWIN_VERSION);
+  app.add_option("-c,--config", arguments.config, "configuration file (docs/daemon.md)")
+      ->capture_default_str();
+  app.add_option("--port", arguments.port, "TCP port, instead of listen.port; 0: any free one")
+      ->check(CLI::Range(0, 65535));
+  app.add_option("--socket", arguments.socket, "Unix socket, instead of listen.socket; \"\": none");
+  app.add_flag("--check", arguments.only_check, "read the configuration, open its sources, say what is wrong");
+  app.add_flag("--document", arguments.only_document, "print all keys of the configuration as Markdown");
+  app.footer("SIGTERM stops it, SIGHUP makes it read its configuration again.");
+  CLI11_PARSE(app, argc, argv);
+
+  if (arguments.only_document) {
+    fmt::print("{}", daemon::documentConfig(drivers::allDrivers()));
+    return kOk;
+  }
+  setUpLog();
+  return arguments.only_check ? check(arguments) : serve(arguments);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const std::exception& e) {
+    fmt::print(stderr, "toftwind: {}\n", e.what());
+    return kFailed;
+  }
+}
