@@ -53,16 +53,6 @@ struct PlacedEmitter {
     const double r = std::sqrt(u), phi = 2.0 * std::numbers::pi * v;
     return position + across * (r * std::cos(phi)) + along * (r * std::sin(phi));
   }
-
-  /// I(γ) for the unit direction that the light takes, W/sr.
-  [[nodiscard]] double intensity(Vec3d direction) const {
-    if (is_isotropic) return peak;
-    const double cosine = dot(direction, axis);
-    if (cosine < cos_limit || cosine <= 0.0) return 0.0;
-    if (exponent == 1.0) return peak * cosine;
-    if (exponent == 0.0) return peak;
-    return peak * std::pow(cosine, exponent);
-  }
 };
 
 }  // namespace toftwin::sim

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cmath>
 #include <cstdint>
 
 #include <toftwin/geometry.h>
@@ -10,20 +9,21 @@
 
 namespace toftwin::sim {
 
-/// Where a ray meets the scene, in the scene's frame.
-struct Hit {
-  Vec3d position;   ///< on the surface, to double precision
-  Vec3d normal;     ///< geometric, unit, on the side that the ray comes from
-  double distance;  ///< along the ray
-  /// Where rays that leave on the normal's side start in single precision: after rounding on that side
-  /// of this surface and of those that share an edge with it, and no further away from `position` than
-  /// the error bounds of the arithmetic make necessary (docs/tracer.md derives them).
-  Vec3f start;
-  std::uint32_t material;
-};
+/// What the tracer keeps of each triangle: its plane and the error bounds of docs/tracer.md.
+TrianglePlane planeOf(Vec3d v0, Vec3d v1, Vec3d v2);
 
-/// Computes the hit that Embree found in single precision anew: the given primitive with the exact ray.
-Hit refine(const Scene::Impl& scene, std::uint32_t object, std::uint32_t primitive, float u, float v,
-           float embree_distance, Vec3d origin, Vec3d direction);
+/// Where a ray meets the scene, computed anew in double precision from the primitive that Embree found.
+/// The hit is origin + distance · direction, moved onto the plane normal · p = level and by `onto`.
+struct Contact {
+  Vec3d normal;     ///< geometric, unit; of either side
+  double level;
+  double distance;
+  double offset;    ///< how far from the surface rays that leave must start
+  // Not zero only next to an edge of a triangle:
+  Vec3d onto;       ///< from outside onto the edge
+  Vec3d inside;     ///< away from the edge, for rays that leave
+};
+Contact contactOf(const BuiltObject& object, std::uint32_t primitive, float u, float v, float embree_distance,
+                  Vec3d origin, Vec3d direction);
 
 }  // namespace toftwin::sim

@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
-
-#include <toftwin/geometry.h>
-
 #include "sim/tracer/scene_file.h"
 
 namespace toftwin::sim {
@@ -29,16 +25,6 @@ inline Material materialOf(const MaterialSpec& spec) {
     material.b = static_cast<float>(0.45 * sigma2 / (sigma2 + 0.09));
   }
   return material;
-}
-
-/// π f_r / albedo for unit vectors that both point away from the surface, on the normal's side.
-inline float reflectionShape(const Material& material, Vec3d to_light, Vec3d to_viewer, Vec3d normal) {
-  if (material.b == 0.0f) return material.a;
-  const double cos_light = dot(to_light, normal), cos_viewer = dot(to_viewer, normal);
-  // sin α sin β cos Δφ, and sin α tan β = sin α sin β / cos β with cos β the larger cosine
-  const double sines = dot(to_light, to_viewer) - cos_light * cos_viewer;
-  const double largest = std::max(cos_light, cos_viewer);
-  return material.a + material.b * static_cast<float>(std::max(0.0, sines) / std::max(largest, 1e-9));
 }
 
 }  // namespace toftwin::sim

@@ -4,49 +4,26 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cmath>
 #include <limits>
 
 #include "sim/tracer/hit.h"
 #include "sim/tracer/lens.h"
-#include "sim/tracer/phasor.h"
 #include "sim/tracer/random.h"
+#include "sim/tracer/shade.h"
 
 namespace toftwin::sim {
 namespace {
 
 using embree::kLanes;
-constexpr auto kLaneCount = static_cast<std::size_t>(kLanes);
 
 /// Below this throughput a path survives by chance and is weighted up. Unbiased; with it, a path of
 /// albedo 0.8 is followed for ten surfaces before the first draw.
 constexpr float kRouletteThreshold = 0.1f;
 
-/// Sixteen paths on their way; lane i of each array belongs to path i.
-struct Packet {
-  alignas(64) std::array<int, kLaneCount> valid{};  ///< −1 while the path goes on
-  std::array<Vec3d, kLaneCount> origin{};           ///< exact: the pinhole or a place on a surface
-  std::array<Vec3f, kLaneCount> ray_origin{};       ///< what Embree gets
-  std::array<Vec3d, kLaneCount> direction{};
-  std::array<double, kLaneCount> length{};          ///< from the pinhole to `origin`
-  std::array<float, kLaneCount> throughput{};
-  std::array<PathRandom, kLaneCount> random{};
-  std::array<int, kLaneCount> pixel{};              ///< within the block; −1: lane not in use
+/// Which pixel of the block each lane works for; −1: none.
+using LanePixels = std::array<int, kLaneCount>;
 
-  [[nodiscard]] bool isAnyAlive() const {
-    return std::any_of(valid.begin(), valid.end(), [](int v) { return v != 0; });
-  }
-};
-
-/// What one packet of paths brought back, per lane.
-struct LaneSums {
-  explicit LaneSums(std::size_t terms) : re(terms), im(terms) {}
-  using Lanes = std::array<float, kLaneCount>;
-  Lanes steady{}, ambient{};
-  std::vector<Lanes> re, im;  ///< [frequency][harmonic]
-};
-
-/// Numbers of a path's dimensions.
+/// Numbers of a path's random dimensions.
 struct Dimensions {
   std::uint64_t emitters;
   static constexpr std::uint64_t kFootprint = 0;
@@ -60,26 +37,14 @@ struct Dimensions {
   }
 };
 
-void setRay(RTCRay16& ray, std::size_t lane, Vec3f origin, Vec3d direction, float far) {
-  ray.org_x[lane] = origin.x;
-  ray.org_y[lane] = origin.y;
-  ray.org_z[lane] = origin.z;
-  ray.tnear[lane] = 0.0f;
-  ray.dir_x[lane] = static_cast<float>(direction.x);
-  ray.dir_y[lane] = static_cast<float>(direction.y);
-  ray.dir_z[lane] = static_cast<float>(direction.z);
-  ray.time[lane] = 0.0f;
-  ray.tfar[lane] = far;
-  ray.mask[lane] = 0xffffffffu;
-  ray.id[lane] = 0;
-  ray.flags[lane] = 0;
+bool isAny(const Lanes<int>& valid) {
+  return std::any_of(std::begin(valid.v), std::end(valid.v), [](int v) { return v != 0; });
 }
 
-void record(RayLog* log, const std::array<int, kLaneCount>& valid, const RTCRay16& rays, bool coherent,
-            bool shadow) {
+void record(RayLog* log, const Lanes<int>& valid, const RTCRay16& rays, bool coherent, bool shadow) {
   if (log == nullptr) return;
   RayLog::Packet& packet = log->packets.emplace_back();
-  std::copy(valid.begin(), valid.end(), packet.valid);
+  std::copy(std::begin(valid.v), std::end(valid.v), packet.valid);
   packet.rays = rays;
   packet.is_coherent = coherent;
   packet.is_shadow = shadow;
@@ -87,172 +52,137 @@ void record(RayLog* log, const std::array<int, kLaneCount>& valid, const RTCRay1
 
 /// Finds where each living path goes; lanes that meet nothing get no geometry id.
 void intersect(const Tracing& tracing, const Packet& packet, RTCRayHit16& rays, bool coherent) {
-  for (std::size_t i = 0; i < kLaneCount; ++i) {
-    setRay(rays.ray, i, packet.ray_origin[i], packet.direction[i], std::numeric_limits<float>::infinity());
-    rays.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
-    rays.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
-  }
+  setRays(packet, rays);
   record(tracing.log, packet.valid, rays.ray, coherent, false);
-  embree::intersect(packet.valid.data(), tracing.scene.embree, rays, coherent);
+  embree::intersect(packet.valid.v, tracing.scene.embree, rays, coherent);
 }
 
-/// Adds w · exp(−i 2π n f L/c) for every frequency and harmonic, lane by lane.
-void addPhasors(const Tracing& tracing, const std::array<float, kLaneCount>& weight,
-                const std::array<double, kLaneCount>& length, LaneSums& sums) {
-  const int harmonics = tracing.request.harmonics;
-  for (std::size_t i = 0; i < kLaneCount; ++i) sums.steady[i] += weight[i];
-  for (std::size_t f = 0; f < tracing.turns_per_metre.size(); ++f) {
-    const double turns_per_metre = tracing.turns_per_metre[f];
-    LaneSums::Lanes cosine, sine, re, im;
-    for (std::size_t i = 0; i < kLaneCount; ++i) {
-      const CosSin z = cosSinOfTurns(length[i] * turns_per_metre);
-      cosine[i] = z.cos;
-      sine[i] = -z.sin;
-      re[i] = weight[i] * cosine[i];
-      im[i] = weight[i] * sine[i];
+/// Takes what the scene knows of each lane's hit. Paths that meet nothing end, with the surroundings'
+/// light.
+void collectHits(const Tracing& tracing, const RTCRayHit16& rays, Packet& packet, Hits& hits, LaneSums& sums) {
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    const bool is_missed = rays.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID;
+    if (packet.valid[i] != 0 && is_missed) {
+      sums.ambient[i] += packet.throughput[i] * tracing.scene.ambient_radiance;
+      packet.valid[i] = 0;
     }
-    for (int n = 0; n < harmonics; ++n) {
-      const std::size_t term = f * static_cast<std::size_t>(harmonics) + static_cast<std::size_t>(n);
-      for (std::size_t i = 0; i < kLaneCount; ++i) {
-        sums.re[term][i] += re[i];
-        sums.im[term][i] += im[i];
-        const float next = re[i] * cosine[i] - im[i] * sine[i];
-        im[i] = re[i] * sine[i] + im[i] * cosine[i];
-        re[i] = next;
-      }
+    Contact contact{.normal = {0, 0, 1}, .level = 0.0, .distance = 1.0, .offset = 0.0, .onto = {}, .inside = {}};
+    Material material{.albedo = 0.0f};
+    if (packet.valid[i] != 0) {
+      const BuiltObject& object = tracing.scene.objects[rays.hit.geomID[i]];
+      contact = contactOf(object, rays.hit.primID[i], rays.hit.u[i], rays.hit.v[i], rays.ray.tfar[i],
+                          {packet.origin.x[i], packet.origin.y[i], packet.origin.z[i]},
+                          {packet.direction.x[i], packet.direction.y[i], packet.direction.z[i]});
+      material = tracing.scene.materials[object.material];
+      sums.ambient[i] += packet.throughput[i] * material.emission;
     }
+    hits.normal.x[i] = contact.normal.x;
+    hits.normal.y[i] = contact.normal.y;
+    hits.normal.z[i] = contact.normal.z;
+    hits.level[i] = contact.level;
+    hits.distance[i] = contact.distance;
+    hits.offset[i] = contact.offset;
+    hits.onto.x[i] = contact.onto.x;
+    hits.onto.y[i] = contact.onto.y;
+    hits.onto.z[i] = contact.onto.z;
+    hits.inside.x[i] = contact.inside.x;
+    hits.inside.y[i] = contact.inside.y;
+    hits.inside.z[i] = contact.inside.z;
+    hits.albedo[i] = material.albedo;
+    hits.shape_a[i] = material.a;
+    hits.shape_b[i] = material.b;
   }
+  placeHits(packet, hits);
 }
-
-using Hits = std::array<Hit, kLaneCount>;
 
 /// Next-event estimation: from every hit to every emitter.
-///   w = throughput · albedo/π · shape · cos θ · I(γ) / d²
-void gatherDirectLight(const Tracing& tracing, const Packet& packet, const Hits& hits, int surface,
-                       bool coherent, LaneSums& sums) {
+void gatherDirectLight(const Tracing& tracing, const Packet& packet, const Hits& hits, int surface, bool coherent,
+                       LaneSums& sums) {
   const Dimensions dimensions{tracing.emitters.size()};
   for (std::size_t e = 0; e < tracing.emitters.size(); ++e) {
     const PlacedEmitter& emitter = tracing.emitters[e];
-    alignas(64) std::array<int, kLaneCount> valid{};
-    std::array<float, kLaneCount> weight{};
-    std::array<double, kLaneCount> length{};
-    RTCRay16 rays;
-    bool is_any = false;
+    Vec3Lanes places;
     for (std::size_t i = 0; i < kLaneCount; ++i) {
-      setRay(rays, i, {}, {0, 0, 1}, 0.0f);
-      if (packet.valid[i] == 0) continue;
-      const Hit& hit = hits[i];
-      Vec3d light = emitter.position;
+      Vec3d place = emitter.position;
       if (emitter.is_disc) {
-        const auto [u, v] = packet.random[i].pair(dimensions.emitter(surface, e));
-        light = emitter.place(u, v);
+        const RandomPair random = randomPair(packet.key[i], dimensions.emitter(surface, e));
+        place = emitter.place(random.u, random.v);
       }
-      const Vec3d to_light = light - hit.position;
-      const double distance2 = dot(to_light, to_light), distance = std::sqrt(distance2);
-      const Vec3d direction = to_light / distance;
-      const double cosine = dot(direction, hit.normal);
-      const double intensity = emitter.intensity(-direction);
-      if (!(cosine > 0.0 && intensity > 0.0)) continue;  // false for NaN too
-      const Material& material = tracing.scene.materials[hit.material];
-      const double reflected = static_cast<double>(material.albedo *
-                               reflectionShape(material, direction, -packet.direction[i], hit.normal)) / std::numbers::pi;
-      weight[i] = static_cast<float>(static_cast<double>(packet.throughput[i]) * reflected * cosine * intensity / distance2);
-      length[i] = packet.length[i] + hit.distance + distance;
-      const Vec3f from = hit.start;
-      const Vec3d way = light - Vec3d{static_cast<double>(from.x), static_cast<double>(from.y), static_cast<double>(from.z)};
-      const double way_length = norm(way);
-      // Rounding of origin and direction moves the ray's end by less than four units in the last place.
-      setRay(rays, i, from, way / way_length, static_cast<float>(way_length * (1.0 - 0x1p-22)));
-      valid[i] = -1;
-      is_any = true;
+      places.x[i] = place.x;
+      places.y[i] = place.y;
+      places.z[i] = place.z;
     }
-    if (!is_any) continue;
-    record(tracing.log, valid, rays, coherent, true);
-    embree::occluded(valid.data(), tracing.scene.embree, rays, coherent);
+    DirectLight light;
+    RTCRay16 rays;
+    lightHits(packet, hits, emitter, places, light, rays);
+    if (!isAny(light.valid)) continue;
+    record(tracing.log, light.valid, rays, coherent, true);
+    embree::occluded(light.valid.v, tracing.scene.embree, rays, coherent);
     for (std::size_t i = 0; i < kLaneCount; ++i) {
-      if (rays.tfar[i] < 0.0f) weight[i] = 0.0f;
+      if (rays.tfar[i] < 0.0f) light.weight[i] = 0.0f;
     }
-    addPhasors(tracing, weight, length, sums);
+    addPhasors(tracing.turns_per_metre, tracing.request.harmonics, light.weight, light.length, sums);
   }
 }
 
-/// Sends a living path on from its hit: cosine-weighted, so that a Lambertian surface costs its albedo.
-void bounce(const Tracing& tracing, Packet& packet, std::size_t i, const Hit& hit, int surface) {
-  const Dimensions dimensions{tracing.emitters.size()};
-  const auto [u, v] = packet.random[i].pair(dimensions.bounce(surface));
-  const CosSin around = cosSinOfTurns(v);
-  const double r = std::sqrt(u);
-  const double x = r * static_cast<double>(around.cos), y = r * static_cast<double>(around.sin);
-  const double z = std::sqrt(std::max(1e-12, 1.0 - x * x - y * y));
-  const Basis basis = basisAround(hit.normal);
-  const Vec3d direction = basis.x * x + basis.y * y + hit.normal * z;
-  const Material& material = tracing.scene.materials[hit.material];
-  packet.throughput[i] *= material.albedo * reflectionShape(material, direction, -packet.direction[i], hit.normal);
-  packet.length[i] += hit.distance;
-  packet.origin[i] = hit.position;
-  packet.ray_origin[i] = hit.start;
-  packet.direction[i] = direction;
-  float& throughput = packet.throughput[i];
-  if (throughput < kRouletteThreshold) {
-    const float survival = throughput / kRouletteThreshold;
-    const auto [draw, unused] = packet.random[i].pair(dimensions.roulette(surface));
+void playRoulette(std::uint64_t dimension, Packet& packet) {
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    float& throughput = packet.throughput[i];
+    if (packet.valid[i] == 0 || !(throughput < kRouletteThreshold)) continue;
+    const double survival = static_cast<double>(throughput / kRouletteThreshold);
     throughput = kRouletteThreshold;
-    if (!(draw < static_cast<double>(survival))) packet.valid[i] = 0;
+    if (!(randomPair(packet.key[i], dimension).u < survival)) packet.valid[i] = 0;
   }
 }
 
 /// Follows sixteen paths over all their surfaces.
 void followPaths(const Tracing& tracing, Packet& packet, LaneSums& sums) {
+  const Dimensions dimensions{tracing.emitters.size()};
   const int surfaces = tracing.request.max_surfaces;
-  // Where the surroundings shine, the last surface must still look for them.
-  const int segments = surfaces + (tracing.scene.ambient_radiance > 0.0f ? 1 : 0);
-  for (int surface = 0; surface < segments && packet.isAnyAlive(); ++surface) {
+  RTCRayHit16 rays;
+  Hits hits;
+  for (int surface = 0; isAny(packet.valid); ++surface) {
     const bool is_coherent = surface == 0;
-    RTCRayHit16 rays;
     intersect(tracing, packet, rays, is_coherent);
-    Hits hits;
-    for (std::size_t i = 0; i < kLaneCount; ++i) {
-      if (packet.valid[i] == 0) continue;
-      if (rays.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) {
-        sums.ambient[i] += packet.throughput[i] * tracing.scene.ambient_radiance;
-        packet.valid[i] = 0;
-        continue;
-      }
-      if (surface == surfaces) {
-        packet.valid[i] = 0;
-        continue;
-      }
-      hits[i] = refine(tracing.scene, rays.hit.geomID[i], rays.hit.primID[i], rays.hit.u[i], rays.hit.v[i],
-                       rays.ray.tfar[i], packet.origin[i], packet.direction[i]);
-      sums.ambient[i] += packet.throughput[i] * tracing.scene.materials[hits[i].material].emission;
-    }
-    if (surface == surfaces || !packet.isAnyAlive()) break;
+    if (surface == surfaces) break;
+    collectHits(tracing, rays, packet, hits, sums);
+    if (!isAny(packet.valid)) return;
     gatherDirectLight(tracing, packet, hits, surface, is_coherent, sums);
-    if (surface + 1 == segments) break;
-    for (std::size_t i = 0; i < kLaneCount; ++i) {
-      if (packet.valid[i] != 0) bounce(tracing, packet, i, hits[i], surface);
+    // Where the surroundings shine, the last surface must still look for them.
+    if (surface + 1 == surfaces && tracing.scene.ambient_radiance == 0.0f) return;
+    bounce(hits, dimensions.bounce(surface), packet);
+    playRoulette(dimensions.roulette(surface), packet);
+  }
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    if (packet.valid[i] != 0 && rays.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) {
+      sums.ambient[i] += packet.throughput[i] * tracing.scene.ambient_radiance;
     }
   }
 }
 
 /// Puts a path's start into a lane.
 void start(const Tracing& tracing, Packet& packet, std::size_t lane, Vec3d direction_in_camera) {
+  const Vec3d direction = tracing.scene_from_camera.rotate(direction_in_camera);
   packet.valid[lane] = -1;
-  packet.origin[lane] = tracing.pinhole;
-  packet.ray_origin[lane] = {static_cast<float>(tracing.pinhole.x), static_cast<float>(tracing.pinhole.y),
-                             static_cast<float>(tracing.pinhole.z)};
-  packet.direction[lane] = tracing.scene_from_camera.rotate(direction_in_camera);
-  packet.length[lane] = 0.0;
+  packet.origin.x[lane] = tracing.pinhole.x;
+  packet.origin.y[lane] = tracing.pinhole.y;
+  packet.origin.z[lane] = tracing.pinhole.z;
+  packet.start.x[lane] = static_cast<float>(tracing.pinhole.x);
+  packet.start.y[lane] = static_cast<float>(tracing.pinhole.y);
+  packet.start.z[lane] = static_cast<float>(tracing.pinhole.z);
+  packet.direction.x[lane] = direction.x;
+  packet.direction.y[lane] = direction.y;
+  packet.direction.z[lane] = direction.z;
   packet.throughput[lane] = 1.0f;
 }
 
 /// The lanes' sums go to their pixels, and their squares to the variance.
-void fold(const Tracing& tracing, const Packet& packet, const LaneSums& lanes, BlockSums& sums) {
+void fold(const Tracing& tracing, const LanePixels& pixels, const LaneSums& lanes, BlockSums& sums) {
   const auto harmonics = static_cast<std::size_t>(tracing.request.harmonics);
   const std::size_t frequencies = tracing.turns_per_metre.size(), terms = frequencies * harmonics;
   for (std::size_t i = 0; i < kLaneCount; ++i) {
-    if (packet.pixel[i] < 0) continue;
-    const auto p = static_cast<std::size_t>(packet.pixel[i]);
+    if (pixels[i] < 0) continue;
+    const auto p = static_cast<std::size_t>(pixels[i]);
     sums.pixels[p].steady += static_cast<double>(lanes.steady[i]);
     sums.pixels[p].ambient += static_cast<double>(lanes.ambient[i]);
     ++sums.pixels[p].samples;
@@ -306,27 +236,27 @@ void traceBlock(const Tracing& tracing, const BlockShape& shape, int x, int y, i
   for (int p = 0; p < shape.pixels(); ++p) {
     rays[static_cast<std::size_t>(p)] = raysOfPixel(request.camera, x + p % shape.width, y + p / shape.width);
   }
-  const std::size_t terms = tracing.turns_per_metre.size() * static_cast<std::size_t>(request.harmonics);
+  LaneSums lanes{tracing.turns_per_metre.size() * static_cast<std::size_t>(request.harmonics)};
   for (int sample = first; sample < last; sample += shape.samples) {
     Packet packet;
-    LaneSums lanes{terms};
+    LanePixels pixels;
+    lanes.clear();
     for (int lane = 0; lane < kLanes; ++lane) {
       const auto i = static_cast<std::size_t>(lane);
       const int p = lane / shape.samples, index = sample + lane % shape.samples;
       const int u = x + p % shape.width, v = y + p / shape.width;
-      packet.pixel[i] = -1;
+      pixels[i] = -1;
       if (index >= last || u >= request.camera.width || v >= request.camera.height) continue;
-      packet.pixel[i] = p;
-      packet.random[i] = PathRandom{request.seed,
-                                    static_cast<std::uint64_t>(v) << 32 | static_cast<std::uint32_t>(u),
-                                    static_cast<std::uint64_t>(index)};
-      const auto [du, dv] = packet.random[i].pair(Dimensions::kFootprint);
+      pixels[i] = p;
+      packet.key[i] = pathKey(request.seed, static_cast<std::uint64_t>(v) << 32 | static_cast<std::uint32_t>(u),
+                              static_cast<std::uint64_t>(index));
+      const RandomPair at = randomPair(packet.key[i], Dimensions::kFootprint);
       start(tracing, packet, i,
-            rays[static_cast<std::size_t>(p)].direction((du - 0.5) * request.pixel_extent,
-                                                        (dv - 0.5) * request.pixel_extent));
+            rays[static_cast<std::size_t>(p)].direction((at.u - 0.5) * request.pixel_extent,
+                                                        (at.v - 0.5) * request.pixel_extent));
     }
     followPaths(tracing, packet, lanes);
-    fold(tracing, packet, lanes, sums);
+    fold(tracing, pixels, lanes, sums);
   }
 }
 
@@ -339,17 +269,18 @@ void traceTruth(const Tracing& tracing, const BlockShape& shape, int x, int y, T
     start(tracing, packet, static_cast<std::size_t>(p), raysOfPixel(camera, u, v).direction(0.0, 0.0));
   }
   RTCRayHit16 rays;
+  Hits hits;
+  LaneSums unused{0};
   intersect(tracing, packet, rays, true);
+  collectHits(tracing, rays, packet, hits, unused);
   const Transform<Camera, World> camera_from_scene = tracing.scene_from_camera.inverse();
   for (std::size_t i = 0; i < static_cast<std::size_t>(shape.pixels()); ++i) {
     constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
     pixels[i] = {.range_m = kNothing, .albedo = kNothing, .normal = {}};
-    if (packet.valid[i] == 0 || rays.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
-    const Hit hit = refine(tracing.scene, rays.hit.geomID[i], rays.hit.primID[i], rays.hit.u[i], rays.hit.v[i],
-                           rays.ray.tfar[i], packet.origin[i], packet.direction[i]);
-    const Vec3d normal = camera_from_scene.rotate(hit.normal);
-    pixels[i] = {.range_m = static_cast<float>(hit.distance),
-                 .albedo = tracing.scene.materials[hit.material].albedo,
+    if (packet.valid[i] == 0) continue;
+    const Vec3d normal = camera_from_scene.rotate({hits.normal.x[i], hits.normal.y[i], hits.normal.z[i]});
+    pixels[i] = {.range_m = static_cast<float>(hits.distance[i]),
+                 .albedo = hits.albedo[i],
                  .normal = {static_cast<float>(normal.x), static_cast<float>(normal.y), static_cast<float>(normal.z)}};
   }
 }

@@ -10,6 +10,7 @@
 #include <span>
 
 #include "protocol/settings/describe.h"
+#include "sim/tracer/hit.h"
 #include "sim/tracer/mesh.h"
 #include "sim/tracer/quadric_embree.h"
 #include "sim/tracer/scene_file.h"
@@ -162,6 +163,9 @@ struct SceneBuilder {
       object.vertices = std::move(meshes[i].vertices);
       for (Vec3d& v : object.vertices) v = v - scene->origin_in_world;
       object.triangles = std::move(meshes[i].triangles);
+      for (const auto& [a, b, c] : object.triangles) {
+        object.planes.push_back(planeOf(object.vertices[a], object.vertices[b], object.vertices[c]));
+      }
     }
   }
 

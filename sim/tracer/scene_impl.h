@@ -16,12 +16,22 @@
 
 namespace toftwin::sim {
 
+/// A triangle as the tracer uses it; planeOf() makes it.
+struct TrianglePlane {
+  Vec3d normal;        ///< unit
+  double level;        ///< normal · p on the plane
+  float offset;        ///< bound on the error of finding a ray's side of the plane, m
+  float margin;        ///< how far starts of rays keep from its edges, m
+  float margin_share;  ///< the margin as a share of the triangle's smallest height
+};
+
 /// One object as Embree sees it; its index is Embree's geometry id.
 struct BuiltObject {
   std::size_t material = 0;
   /// In the scene's frame; empty for quadrics. Embree gets them rounded to single precision.
   std::vector<Vec3d> vertices;
   std::vector<std::array<std::uint32_t, 3>> triangles;
+  std::vector<TrianglePlane> planes;  ///< of the triangles
   Quadric quadric;
 };
 
