@@ -7,7 +7,6 @@
 #include <limits>
 
 #include "sim/tracer/hit.h"
-#include "sim/tracer/lens.h"
 #include "sim/tracer/random.h"
 #include "sim/tracer/shade.h"
 
@@ -113,9 +112,10 @@ void gatherDirectLight(const Tracing& tracing, const Packet& packet, const Hits&
       places.z[i] = place.z;
     }
     DirectLight light;
-    RTCRay16 rays;
-    lightHits(packet, hits, emitter, places, light, rays);
+    lightHits(packet, hits, emitter, places, light);
     if (!isAny(light.valid)) continue;
+    RTCRay16 rays;
+    setShadowRays(hits, places, rays);
     record(tracing.log, light.valid, rays, coherent, true);
     embree::occluded(light.valid.v, tracing.scene.embree, rays, coherent);
     for (std::size_t i = 0; i < kLaneCount; ++i) {
@@ -162,7 +162,8 @@ void followPaths(const Tracing& tracing, Packet& packet, LaneSums& sums) {
 
 /// Puts a path's start into a lane.
 void start(const Tracing& tracing, Packet& packet, std::size_t lane, Vec3d direction_in_camera) {
-  const Vec3d direction = tracing.scene_from_camera.rotate(direction_in_camera);
+  const auto& axes = tracing.camera_axes;
+  const Vec3d direction = axes[0] * direction_in_camera.x + axes[1] * direction_in_camera.y + axes[2] * direction_in_camera.z;
   packet.valid[lane] = -1;
   packet.origin.x[lane] = tracing.pinhole.x;
   packet.origin.y[lane] = tracing.pinhole.y;
@@ -200,6 +201,7 @@ Tracing::Tracing(const Scene::Impl& s, const TraceRequest& r, RayLog* l)
     : scene(s), request(r), log(l), scene_from_camera(r.world_from_camera) {
   scene_from_camera.translation_m = scene_from_camera.translation_m - scene.origin_in_world;
   pinhole = scene_from_camera.translation_m;
+  camera_axes = {scene_from_camera.rotate({1, 0, 0}), scene_from_camera.rotate({0, 1, 0}), scene_from_camera.rotate({0, 0, 1})};
   for (const EmitterSpec& emitter : request.emitters) emitters.emplace_back(emitter, scene_from_camera);
   for (const Frequency f : request.frequencies) turns_per_metre.push_back(f.in(hertz) / kSpeedOfLight_m_per_s);
 }
@@ -218,6 +220,12 @@ BlockSums::BlockSums(int count, std::size_t frequencies, int harmonics)
       phasors(pixels.size() * frequencies * static_cast<std::size_t>(harmonics)),
       squares(pixels.size() * frequencies) {}
 
+void BlockSums::clear() {
+  std::fill(pixels.begin(), pixels.end(), Pixel{});
+  std::fill(phasors.begin(), phasors.end(), std::complex<double>{});
+  std::fill(squares.begin(), squares.end(), 0.0);
+}
+
 BlockSums& BlockSums::operator+=(const BlockSums& other) {
   for (std::size_t p = 0; p < pixels.size(); ++p) {
     pixels[p].steady += other.pixels[p].steady;
@@ -229,13 +237,15 @@ BlockSums& BlockSums::operator+=(const BlockSums& other) {
   return *this;
 }
 
-void traceBlock(const Tracing& tracing, const BlockShape& shape, int x, int y, int first, int last,
-                BlockSums& sums) {
-  const TraceRequest& request = tracing.request;
-  std::array<PixelRays, kLaneCount> rays;
+Block::Block(const Tracing& tracing, const BlockShape& s, int left, int top) : shape(s), x(left), y(top) {
   for (int p = 0; p < shape.pixels(); ++p) {
-    rays[static_cast<std::size_t>(p)] = raysOfPixel(request.camera, x + p % shape.width, y + p / shape.width);
+    rays[static_cast<std::size_t>(p)] = raysOfPixel(tracing.request.camera, x + p % shape.width, y + p / shape.width);
   }
+}
+
+void traceBlock(const Tracing& tracing, const Block& block, int first, int last, BlockSums& sums) {
+  const TraceRequest& request = tracing.request;
+  const BlockShape& shape = block.shape;
   LaneSums lanes{tracing.turns_per_metre.size() * static_cast<std::size_t>(request.harmonics)};
   for (int sample = first; sample < last; sample += shape.samples) {
     Packet packet;
@@ -244,7 +254,7 @@ void traceBlock(const Tracing& tracing, const BlockShape& shape, int x, int y, i
     for (int lane = 0; lane < kLanes; ++lane) {
       const auto i = static_cast<std::size_t>(lane);
       const int p = lane / shape.samples, index = sample + lane % shape.samples;
-      const int u = x + p % shape.width, v = y + p / shape.width;
+      const int u = block.x + p % shape.width, v = block.y + p / shape.width;
       pixels[i] = -1;
       if (index >= last || u >= request.camera.width || v >= request.camera.height) continue;
       pixels[i] = p;
@@ -252,7 +262,7 @@ void traceBlock(const Tracing& tracing, const BlockShape& shape, int x, int y, i
                               static_cast<std::uint64_t>(index));
       const RandomPair at = randomPair(packet.key[i], Dimensions::kFootprint);
       start(tracing, packet, i,
-            rays[static_cast<std::size_t>(p)].direction((at.u - 0.5) * request.pixel_extent,
+            block.rays[static_cast<std::size_t>(p)].direction((at.u - 0.5) * request.pixel_extent,
                                                         (at.v - 0.5) * request.pixel_extent));
     }
     followPaths(tracing, packet, lanes);
@@ -260,13 +270,16 @@ void traceBlock(const Tracing& tracing, const BlockShape& shape, int x, int y, i
   }
 }
 
-void traceTruth(const Tracing& tracing, const BlockShape& shape, int x, int y, TruthPixel* pixels) {
+std::array<TruthPixel, kLaneCount> traceTruth(const Tracing& tracing, const Block& block) {
   const CameraInfo& camera = tracing.request.camera;
+  const BlockShape& shape = block.shape;
+  std::array<TruthPixel, kLaneCount> pixels;
   Packet packet;
   for (int p = 0; p < shape.pixels(); ++p) {
-    const int u = x + p % shape.width, v = y + p / shape.width;
+    const int u = block.x + p % shape.width, v = block.y + p / shape.width;
     if (u >= camera.width || v >= camera.height) continue;
-    start(tracing, packet, static_cast<std::size_t>(p), raysOfPixel(camera, u, v).direction(0.0, 0.0));
+    const auto i = static_cast<std::size_t>(p);
+    start(tracing, packet, i, block.rays[i].direction(0.0, 0.0));
   }
   RTCRayHit16 rays;
   Hits hits;
@@ -283,6 +296,7 @@ void traceTruth(const Tracing& tracing, const BlockShape& shape, int x, int y, T
                  .albedo = hits.albedo[i],
                  .normal = {static_cast<float>(normal.x), static_cast<float>(normal.y), static_cast<float>(normal.z)}};
   }
+  return pixels;
 }
 
 }  // namespace toftwin::sim

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <complex>
 #include <cstddef>
 #include <cstdint>
@@ -8,6 +9,8 @@
 
 #include "sim/tracer/embree.h"
 #include "sim/tracer/emitter.h"
+#include "sim/tracer/lanes.h"
+#include "sim/tracer/lens.h"
 #include "sim/tracer/scene_impl.h"
 #include "sim/tracer/trace.h"
 
@@ -33,6 +36,7 @@ struct Tracing {
   RayLog* log;
   Transform<World, Camera> scene_from_camera;  ///< "World" moved to the scene's origin
   Vec3d pinhole;
+  std::array<Vec3d, 3> camera_axes;  ///< x, y, z of the camera in the scene
   std::vector<PlacedEmitter> emitters;
   std::vector<double> turns_per_metre;  ///< f / c
 };
@@ -52,6 +56,7 @@ struct BlockShape {
 struct BlockSums {
   BlockSums(int pixels, std::size_t frequencies, int harmonics);
   BlockSums& operator+=(const BlockSums& other);
+  void clear();
 
   struct Pixel {
     double steady = 0.0;
@@ -63,16 +68,24 @@ struct BlockSums {
   std::vector<double> squares;                ///< [pixel][frequency] Σ |first harmonic|²
 };
 
-/// Traces samples [first, last) of every pixel of the block whose top left pixel is (x, y).
-void traceBlock(const Tracing& tracing, const BlockShape& shape, int x, int y, int first, int last,
-                BlockSums& sums);
+/// The block whose top left pixel is (x, y), with the rays of its pixels.
+struct Block {
+  Block(const Tracing& tracing, const BlockShape& shape, int x, int y);
+
+  BlockShape shape;
+  int x, y;
+  std::array<PixelRays, kLaneCount> rays;
+};
+
+/// Traces samples [first, last) of every pixel of the block.
+void traceBlock(const Tracing& tracing, const Block& block, int first, int last, BlockSums& sums);
 
 /// What the central rays of the block's pixels meet.
 struct TruthPixel {
   float range_m, albedo;
   Vec3f normal;
 };
-void traceTruth(const Tracing& tracing, const BlockShape& shape, int x, int y, TruthPixel* pixels);
+std::array<TruthPixel, kLaneCount> traceTruth(const Tracing& tracing, const Block& block);
 
 /// trace() with a record of its rays; only for one thread.
 Light traceLogged(const Scene& scene, const TraceRequest& request, RayLog* log);

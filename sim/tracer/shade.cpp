@@ -20,6 +20,17 @@ inline __attribute__((always_inline)) float roundedAway(double value, double nor
   return static_cast<float>(value + std::copysign(std::abs(value) * 0x1p-23, normal));
 }
 
+/// std::max goes through references, which keeps loops from becoming vector code.
+inline __attribute__((always_inline)) double larger(double a, double b) { return a > b ? a : b; }
+
+/// Reflection relative to a Lambertian surface (material.h): A + B · max(0, cos Δφ) sin α tan β, from
+/// the cosine between both directions and their cosines to the normal. sin α sin β cos Δφ is what the
+/// first has more than the product of the others, and tan β divides by the larger cosine.
+inline __attribute__((always_inline)) double shapeOf(float a, float b, double between, double cosine, double other) {
+  const double sines = larger(0.0, between - cosine * other);
+  return static_cast<double>(a) + static_cast<double>(b) * sines / larger(larger(cosine, other), 1e-9);
+}
+
 }  // namespace
 
 TOFTWIN_VECTOR
@@ -51,57 +62,66 @@ void placeHits(const Packet& packet, Hits& hits) {
 
 TOFTWIN_VECTOR
 void lightHits(const Packet& packet, const Hits& hits, const PlacedEmitter& emitter, const Vec3Lanes& places,
-               DirectLight& light, RTCRay16& rays) {
+               DirectLight& light) {
   const Vec3d axis = emitter.axis;
-  const double limit = emitter.is_isotropic ? -2.0 : std::max(emitter.cos_limit, 1e-300);
-  const double slope = !emitter.is_isotropic && emitter.exponent == 1.0 ? 1.0 : 0.0;
-  Lanes<double> lobe_cosine;
+  // The lobes that need no power function are slope · cos γ + level; the last loop does the others.
+  const double slope = !emitter.is_isotropic && emitter.exponent == 1.0 ? 1.0 : 0.0, level = 1.0 - slope;
+  const double limit = emitter.is_isotropic ? -2.0 : larger(emitter.cos_limit, 1e-300);
+  const double peak = emitter.peak / std::numbers::pi;
+  Lanes<double> cosines, lobe_cosines, weights;
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     const double lx = places.x[i] - hits.position.x[i], ly = places.y[i] - hits.position.y[i],
                  lz = places.z[i] - hits.position.z[i];
-    const double distance2 = lx * lx + ly * ly + lz * lz, distance = std::sqrt(distance2), per_distance = 1.0 / distance;
+    const double distance = std::sqrt(lx * lx + ly * ly + lz * lz), per_distance = 1.0 / distance;
     const double ux = lx * per_distance, uy = ly * per_distance, uz = lz * per_distance;
     const double nx = hits.normal.x[i], ny = hits.normal.y[i], nz = hits.normal.z[i];
     const double cosine = ux * nx + uy * ny + uz * nz;
-    const double gamma_cosine = -(ux * axis.x + uy * axis.y + uz * axis.z);
-    lobe_cosine[i] = gamma_cosine;
-    // The lobes that need no power function; the caller's loop below does the others.
-    const double lobe = slope * gamma_cosine + (1.0 - slope);
+    const double lobe_cosine = -(ux * axis.x + uy * axis.y + uz * axis.z);
     const double vx = -packet.direction.x[i], vy = -packet.direction.y[i], vz = -packet.direction.z[i];
     const double viewer_cosine = vx * nx + vy * ny + vz * nz;
-    // sin α sin β cos Δφ, and sin α tan β = sin α sin β / cos β with cos β the larger cosine (material.h)
-    const double sines = std::max(0.0, ux * vx + uy * vy + uz * vz - cosine * viewer_cosine);
-    const double shape = static_cast<double>(hits.shape_a[i]) +
-                         static_cast<double>(hits.shape_b[i]) * sines / std::max(std::max(cosine, viewer_cosine), 1e-9);
-    const double weight = static_cast<double>(packet.throughput[i] * hits.albedo[i]) * shape * cosine *
-                          (emitter.peak / std::numbers::pi) * lobe * per_distance * per_distance;
-    // Any NaN fails the comparison, too.
-    const bool is_lit = (packet.valid[i] != 0) & (cosine > 0.0) & (gamma_cosine >= limit) & (weight > 0.0);
+    const double shape = shapeOf(hits.shape_a[i], hits.shape_b[i], ux * vx + uy * vy + uz * vz, cosine, viewer_cosine);
+    weights[i] = static_cast<double>(packet.throughput[i] * hits.albedo[i]) * shape * cosine * peak *
+                 (slope * lobe_cosine + level) * per_distance * per_distance;
+    cosines[i] = cosine;
+    lobe_cosines[i] = lobe_cosine;
+    light.length[i] = packet.length[i] + hits.distance[i] + distance;
+  }
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    // Zero where there is no light; NaN fails the comparisons, too.
+    const bool is_lit = (packet.valid[i] != 0) & (cosines[i] > 0.0) & (lobe_cosines[i] >= limit) & (weights[i] > 0.0);
     light.valid[i] = is_lit ? -1 : 0;
-    light.weight[i] = static_cast<float>(is_lit ? weight : 0.0);
-    light.length[i] = is_lit ? packet.length[i] + hits.distance[i] + distance : 0.0;
-    const double sx = static_cast<double>(hits.start.x[i]), sy = static_cast<double>(hits.start.y[i]),
-                 sz = static_cast<double>(hits.start.z[i]);
-    const double wx = places.x[i] - sx, wy = places.y[i] - sy, wz = places.z[i] - sz;
+    light.weight[i] = is_lit ? static_cast<float>(weights[i]) : 0.0f;
+    light.length[i] = is_lit ? light.length[i] : 0.0;
+  }
+  if (emitter.is_isotropic || emitter.exponent == 1.0 || emitter.exponent == 0.0) return;
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    if (light.valid[i] != 0) light.weight[i] *= static_cast<float>(std::pow(lobe_cosines[i], emitter.exponent));
+  }
+}
+
+TOFTWIN_VECTOR
+void setShadowRays(const Hits& hits, const Vec3Lanes& places, RTCRay16& rays) {
+#pragma GCC ivdep
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    const float sx = hits.start.x[i], sy = hits.start.y[i], sz = hits.start.z[i];
+    const double wx = places.x[i] - static_cast<double>(sx), wy = places.y[i] - static_cast<double>(sy),
+                 wz = places.z[i] - static_cast<double>(sz);
     const double way = std::sqrt(wx * wx + wy * wy + wz * wz), per_way = 1.0 / way;
-    rays.org_x[i] = hits.start.x[i];
-    rays.org_y[i] = hits.start.y[i];
-    rays.org_z[i] = hits.start.z[i];
-    rays.tnear[i] = 0.0f;
+    rays.org_x[i] = sx;
+    rays.org_y[i] = sy;
+    rays.org_z[i] = sz;
     rays.dir_x[i] = static_cast<float>(wx * per_way);
     rays.dir_y[i] = static_cast<float>(wy * per_way);
     rays.dir_z[i] = static_cast<float>(wz * per_way);
-    rays.time[i] = 0.0f;
     // Rounding of origin and direction moves the ray's end by less than four units in the last place.
     rays.tfar[i] = static_cast<float>(way * (1.0 - 0x1p-22));
+  }
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    rays.tnear[i] = 0.0f;
+    rays.time[i] = 0.0f;
     rays.mask[i] = 0xffffffffu;
     rays.id[i] = 0;
     rays.flags[i] = 0;
-  }
-  if (!emitter.is_isotropic && emitter.exponent != 1.0 && emitter.exponent != 0.0) {
-    for (std::size_t i = 0; i < kLaneCount; ++i) {
-      if (light.valid[i] != 0) light.weight[i] *= static_cast<float>(std::pow(lobe_cosine[i], emitter.exponent));
-    }
   }
 }
 
@@ -113,7 +133,7 @@ void bounce(const Hits& hits, std::uint64_t dimension, Packet& packet) {
     const double r = std::sqrt(random.u);
     const double x = r * static_cast<double>(around.cos), y = r * static_cast<double>(around.sin);
     // Unit length whatever the sine's error; never quite within the surface.
-    const double z = std::sqrt(std::max(1e-12, 1.0 - x * x - y * y));
+    const double z = std::sqrt(larger(1e-12, 1.0 - x * x - y * y));
     // Two unit vectors that complete the normal to a basis (Duff et al. 2017)
     const double nx = hits.normal.x[i], ny = hits.normal.y[i], nz = hits.normal.z[i];
     const double sign = std::copysign(1.0, nz), a = -1.0 / (sign + nz), b = nx * ny * a;
@@ -122,10 +142,8 @@ void bounce(const Hits& hits, std::uint64_t dimension, Packet& packet) {
     const double dz = -x * sign * nx - y * ny + z * nz;
     const double vx = -packet.direction.x[i], vy = -packet.direction.y[i], vz = -packet.direction.z[i];
     const double viewer_cosine = vx * nx + vy * ny + vz * nz;
-    const double sines = std::max(0.0, dx * vx + dy * vy + dz * vz - z * viewer_cosine);
-    const float shape = hits.shape_a[i] +
-                        hits.shape_b[i] * static_cast<float>(sines / std::max(std::max(z, viewer_cosine), 1e-9));
-    packet.throughput[i] *= hits.albedo[i] * shape;
+    const double shape = shapeOf(hits.shape_a[i], hits.shape_b[i], dx * vx + dy * vy + dz * vz, z, viewer_cosine);
+    packet.throughput[i] *= hits.albedo[i] * static_cast<float>(shape);
     packet.length[i] += hits.distance[i];
     packet.direction.x[i] = dx;
     packet.direction.y[i] = dy;
@@ -172,6 +190,7 @@ void addPhasors(const std::vector<double>& turns_per_metre, int harmonics, const
     for (int n = 0; n < harmonics; ++n) {
       const std::size_t term = f * static_cast<std::size_t>(harmonics) + static_cast<std::size_t>(n);
       Lanes<float>&sum_re = sums.re[term], &sum_im = sums.im[term];
+#pragma GCC ivdep
       for (std::size_t i = 0; i < kLaneCount; ++i) {
         sum_re[i] += re[i];
         sum_im[i] += im[i];

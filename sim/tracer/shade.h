@@ -54,9 +54,10 @@ struct DirectLight {
   Lanes<float> weight;   ///< throughput · albedo/π · shape · cos θ · I(γ) / d²
   Lanes<double> length;  ///< of the whole path
 };
-/// Fills the shadow rays, too.
 void lightHits(const Packet& packet, const Hits& hits, const PlacedEmitter& emitter, const Vec3Lanes& places,
-               DirectLight& light, RTCRay16& shadow_rays);
+               DirectLight& light);
+/// Rays from the hits to the places.
+void setShadowRays(const Hits& hits, const Vec3Lanes& places, RTCRay16& rays);
 
 /// Sends the paths on from their hits: cosine-weighted, so that a Lambertian surface costs its albedo.
 void bounce(const Hits& hits, std::uint64_t dimension, Packet& packet);

@@ -2,10 +2,12 @@
 #include "sim/tracer/trace.h"
 
 #include <fmt/format.h>
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <xmmintrin.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 
@@ -77,24 +79,22 @@ Light emptyLight(const TraceRequest& request, const Region& region) {
   return light;
 }
 
-BlockSums sumBlock(const Tracing& tracing, const BlockShape& shape, int x, int y) {
-  const TraceRequest& request = tracing.request;
-  const auto empty = [&] { return BlockSums{shape.pixels(), request.frequencies.size(), request.harmonics}; };
-  const int pieces = (request.samples_per_pixel + kSamplesPerPiece - 1) / kSamplesPerPiece;
-  std::vector<BlockSums> sums(static_cast<std::size_t>(pieces), empty());
-  const auto sumPiece = [&](int piece) {
+/// Traces all samples of the block's pixels into `sums`.
+void sumBlock(const Tracing& tracing, const Block& block, BlockSums& sums) {
+  const int samples = tracing.request.samples_per_pixel;
+  const int pieces = (samples + kSamplesPerPiece - 1) / kSamplesPerPiece;
+  sums.clear();
+  if (pieces == 1) {
+    traceBlock(tracing, block, 0, samples, sums);
+    return;
+  }
+  std::vector<BlockSums> parts(static_cast<std::size_t>(pieces), sums);
+  tbb::parallel_for(0, pieces, [&](int piece) {
     const FlushDenormals flush;
     const int first = piece * kSamplesPerPiece;
-    traceBlock(tracing, shape, x, y, first, std::min(request.samples_per_pixel, first + kSamplesPerPiece),
-               sums[static_cast<std::size_t>(piece)]);
-  };
-  if (pieces == 1) {
-    sumPiece(0);
-  } else {
-    tbb::parallel_for(0, pieces, sumPiece);
-  }
-  for (std::size_t piece = 1; piece < sums.size(); ++piece) sums[0] += sums[piece];
-  return std::move(sums[0]);
+    traceBlock(tracing, block, first, std::min(samples, first + kSamplesPerPiece), parts[static_cast<std::size_t>(piece)]);
+  });
+  for (const BlockSums& part : parts) sums += part;
 }
 
 /// Means and variances of one pixel of a block go to (x, y) of the images.
@@ -113,15 +113,10 @@ void store(const BlockSums& sums, std::size_t pixel, int x, int y, Light& light)
   }
 }
 
-void traceAt(const Tracing& tracing, const BlockShape& shape, const Region& region, int x, int y, Light& light) {
-  std::vector<TruthPixel> truth(static_cast<std::size_t>(shape.pixels()));
-  {
-    const FlushDenormals flush;
-    traceTruth(tracing, shape, x, y, truth.data());
-  }
-  const BlockSums sums = sumBlock(tracing, shape, x, y);
-  for (int p = 0; p < shape.pixels(); ++p) {
-    const int u = x + p % shape.width - region.x, v = y + p / shape.width - region.y;
+void storeBlock(const Block& block, const BlockSums& sums, const std::array<TruthPixel, kLaneCount>& truth,
+                const Region& region, Light& light) {
+  for (int p = 0; p < block.shape.pixels(); ++p) {
+    const int u = block.x + p % block.shape.width - region.x, v = block.y + p / block.shape.width - region.y;
     if (u < 0 || v < 0 || u >= region.width || v >= region.height) continue;
     const auto pixel = static_cast<std::size_t>(p);
     store(sums, pixel, u, v, light);
@@ -142,9 +137,14 @@ Light traceLogged(const Scene& scene, const TraceRequest& request, RayLog* log) 
   const int first_column = region.x / shape.width, first_row = region.y / shape.height;
   const int columns = (region.x + region.width - 1) / shape.width - first_column + 1;
   const int rows = (region.y + region.height - 1) / shape.height - first_row + 1;
-  tbb::parallel_for(0, columns * rows, [&](int block) {
-    traceAt(tracing, shape, region, (first_column + block % columns) * shape.width,
-            (first_row + block / columns) * shape.height, light);
+  tbb::parallel_for(tbb::blocked_range<int>{0, columns * rows}, [&](const tbb::blocked_range<int>& blocks) {
+    const FlushDenormals flush;
+    BlockSums sums{shape.pixels(), request.frequencies.size(), request.harmonics};
+    for (int i = blocks.begin(); i != blocks.end(); ++i) {
+      const Block block{tracing, shape, (first_column + i % columns) * shape.width, (first_row + i / columns) * shape.height};
+      sumBlock(tracing, block, sums);
+      storeBlock(block, sums, traceTruth(tracing, block), region, light);
+    }
   });
   return light;
 }
