@@ -6,12 +6,13 @@
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/post.hpp>
-#include <boost/asio/read.hpp>
 #include <boost/asio/write.hpp>
 
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+
+#include "protocol/wire/crc32c.h"
 
 namespace toftwin::transport {
 namespace {
@@ -102,7 +103,7 @@ Result<bool> FramedSocket::receiveWithDescriptors() {
   message.msg_iov = &room;
   message.msg_iovlen = 1;
   message.msg_control = control.bytes;
-  message.msg_controllen = sizeof control.bytes;
+  message.msg_controllen = CMSG_LEN(sizeof(int));  // not CMSG_SPACE: its padding would hold a second
   const ssize_t count =
       ::recvmsg(socket_.native_handle(), &message, MSG_DONTWAIT | MSG_CMSG_CLOEXEC);
   if (count < 0) {
@@ -116,6 +117,11 @@ Result<bool> FramedSocket::receiveWithDescriptors() {
     descriptors_.emplace_back(fd);
   }
   if (count == 0) return disconnected(asio::error::eof);
+  if (message.msg_flags & MSG_CTRUNC) {
+    return Error{Error::Code::Malformed,
+                 "file descriptors were lost: the peer sends more than one with a message, or this "
+                 "process has too many files open (ulimit -n)"};
+  }
   if (descriptors_.size() > kMaxDescriptors) {
     return Error{Error::Code::Malformed, "the peer sends file descriptors that no message refers to"};
   }
@@ -144,30 +150,49 @@ void FramedSocket::takeBody(ReadHandler handler) {
     descriptors_.pop_front();
     auto body = mapSharedBody(memfd, preamble_.body_bytes);
     if (!body) return handler(body.error());
-    return finish(std::move(*body), handler);
+    return finish(std::move(*body), preamble_.body_crc32c, handler);  // sealed: nothing to check
   }
-  if (preamble_.body_bytes == 0) return finish({}, handler);
-
-  const wire::AlignedBytes body = pool_.allocate(preamble_.body_bytes);
-  const std::size_t head = wire::kPreambleSize + preamble_.header_bytes;
-  const std::size_t here = std::min<std::size_t>(filled_ - head, body.size);  // came with the header
-  std::memcpy(body.bytes.get(), input_.data() + head, here);
-  std::memmove(input_.data() + head, input_.data() + head + here, filled_ - head - here);
-  filled_ -= here;
-  const auto rest = asio::buffer(body.bytes.get() + here, body.size - here);
-  if (rest.size() == 0) return finish(body.buffer(), handler);
-  asio::async_read(socket_, rest, untilDone,
-                   [this, body, handler = std::move(handler)](error_code fault, std::size_t) {
-                     if (fault) return handler(disconnected(fault));
-                     finish(body.buffer(), handler);
-                   });
+  takeInlineBody(std::move(handler));
 }
 
-void FramedSocket::finish(Buffer body, const ReadHandler& handler) {
+void FramedSocket::takeInlineBody(ReadHandler handler) {
+  Arriving arriving;
+  const std::size_t head = wire::kPreambleSize + preamble_.header_bytes;
+  if (preamble_.body_bytes > 0) {
+    arriving.body = pool_.allocate(preamble_.body_bytes);
+    const std::size_t here = std::min<std::size_t>(filled_ - head, arriving.body.size);
+    const auto came_with_header = std::as_bytes(std::span{input_}).subspan(head, here);
+    std::ranges::copy(came_with_header, arriving.body.bytes.get());
+    arriving.crc32c = wire::crc32c(came_with_header);
+    arriving.filled = here;
+    std::memmove(input_.data() + head, input_.data() + head + here, filled_ - head - here);
+    filled_ -= here;
+  }
+  takeRest(std::move(arriving), std::move(handler));
+}
+
+/// Reads in parts that the CPU's caches hold, so that the checksum finds each where the kernel put it.
+void FramedSocket::takeRest(Arriving arriving, ReadHandler handler) {
+  constexpr std::size_t kPart = 256 << 10;
+  const std::size_t left = arriving.body.size - arriving.filled;
+  if (left == 0) return finish(arriving.body.buffer(), arriving.crc32c, handler);
+  std::byte* const part = arriving.body.bytes.get() + arriving.filled;
+  const auto room = asio::buffer(part, std::min(left, kPart));
+  socket_.async_read_some(
+      room, [this, part, arriving = std::move(arriving), handler = std::move(handler)](
+                error_code fault, std::size_t count) mutable {
+        if (fault) return handler(disconnected(fault));
+        arriving.crc32c = wire::crc32c({part, count}, arriving.crc32c);
+        arriving.filled += count;
+        takeRest(std::move(arriving), std::move(handler));
+      });
+}
+
+void FramedSocket::finish(Buffer body, std::uint32_t body_crc32c, const ReadHandler& handler) {
   const std::size_t head = wire::kPreambleSize + preamble_.header_bytes;
   const auto header = std::as_bytes(std::span{input_}).subspan(wire::kPreambleSize,
                                                                preamble_.header_bytes);
-  auto message = wire::decode(preamble_, header, std::move(body));
+  auto message = wire::decode(preamble_, header, std::move(body), body_crc32c);
   if (!message) refused_request_ = wire::requestIdOf(header);
   std::memmove(input_.data(), input_.data() + head, filled_ - head);
   filled_ -= head;

@@ -66,7 +66,15 @@ class FramedSocket {
   Result<bool> receiveWithDescriptors();
   void takePreamble(ReadHandler handler);
   void takeBody(ReadHandler handler);
-  void finish(Buffer body, const ReadHandler& handler);
+  /// What of a body has arrived, and its checksum so far.
+  struct Arriving {
+    wire::AlignedBytes body;
+    std::size_t filled = 0;
+    std::uint32_t crc32c = 0;
+  };
+  void takeInlineBody(ReadHandler handler);
+  void takeRest(Arriving arriving, ReadHandler handler);
+  void finish(Buffer body, std::uint32_t body_crc32c, const ReadHandler& handler);
 
   void sendDescriptor(WriteHandler handler);
   void writeRest(std::size_t head_sent, WriteHandler handler);

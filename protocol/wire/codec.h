@@ -77,6 +77,10 @@ std::vector<std::byte> toBytes(const Encoded& message);
 /// `body` without copying, unless `body` is not aligned to 64 bytes. Error Unsupported: well formed,
 /// but of a kind that this side does not know; the stream is intact behind it.
 Result<Message> decode(const Preamble& preamble, std::span<const std::byte> header, Buffer body);
+/// The same with the body's CRC as the receiver computed it while the bytes arrived, when they were
+/// still in the CPU's caches.
+Result<Message> decode(const Preamble& preamble, std::span<const std::byte> header, Buffer body,
+                       std::uint32_t body_crc32c);
 /// A message from one run of bytes, which must hold exactly one message.
 Result<Message> decode(Buffer bytes, const Limits& limits = {});
 /// The request id in a header whose CRC was checked, to answer a message that `decode` refused; 0 if

@@ -201,13 +201,18 @@ Result<Message> readMessage(const fb::Header& header, Buffer body) {
 }  // namespace
 
 Result<Message> decode(const Preamble& preamble, std::span<const std::byte> header, Buffer body) {
+  const bool is_inline = preamble.body_place == BodyPlace::Inline;
+  const std::uint32_t sum = is_inline ? crc32c(body.bytes()) : preamble.body_crc32c;
+  return decode(preamble, header, std::move(body), sum);
+}
+
+Result<Message> decode(const Preamble& preamble, std::span<const std::byte> header, Buffer body,
+                       std::uint32_t body_crc32c) {
   if (header.size() != preamble.header_bytes || body.size() != preamble.body_bytes) {
     return malformed("header or body do not have the announced length");
   }
   if (crc32c(header) != preamble.header_crc32c) return malformed("the header's checksum is wrong");
-  if (preamble.body_place == BodyPlace::Inline && crc32c(body.bytes()) != preamble.body_crc32c) {
-    return malformed("the body's checksum is wrong");
-  }
+  if (body_crc32c != preamble.body_crc32c) return malformed("the body's checksum is wrong");
   const AlignedHeader aligned_header{header};
   const fb::Header* root = aligned_header.verified();
   if (!root) return malformed("the header is not what the schema says");

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <sys/mman.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include <boost/asio/io_context.hpp>
@@ -10,6 +11,10 @@
 #include <boost/asio/local/connect_pair.hpp>
 #include <boost/asio/local/stream_protocol.hpp>
 #include <boost/asio/write.hpp>
+
+#include <cstring>
+#include <filesystem>
+#include <iterator>
 
 #include "example_messages.h"
 #include "message_json.h"
@@ -198,6 +203,58 @@ TEST_P(SharedMemory, AMissingFileDescriptorIsMalformed) {
   const auto received = receive(there);
   ASSERT_FALSE(received);
   EXPECT_THAT(received.error().message, HasSubstr("file descriptor is missing"));
+}
+
+/// Sends bytes with so many copies of a file descriptor.
+void sendWithDescriptors(int socket, std::span<const std::byte> bytes, int fd, std::size_t count) {
+  std::vector<int> fds(count, fd);
+  std::vector<char> control(CMSG_SPACE(count * sizeof(int)));
+  iovec part{const_cast<std::byte*>(bytes.data()), bytes.size()};
+  msghdr message{};
+  message.msg_iov = &part;
+  message.msg_iovlen = 1;
+  message.msg_control = control.data();
+  message.msg_controllen = control.size();
+  cmsghdr* item = CMSG_FIRSTHDR(&message);
+  item->cmsg_level = SOL_SOCKET;
+  item->cmsg_type = SCM_RIGHTS;
+  item->cmsg_len = CMSG_LEN(count * sizeof(int));
+  std::memcpy(CMSG_DATA(item), fds.data(), count * sizeof(int));
+  ASSERT_EQ(::sendmsg(socket, &message, 0), static_cast<ssize_t>(bytes.size()));
+}
+
+std::ptrdiff_t openFiles() {
+  const std::filesystem::directory_iterator all{"/proc/self/fd"};
+  return std::distance(begin(all), end(all));
+}
+
+TEST_P(SharedMemory, SeveralFileDescriptorsWithAMessageAreRefusedAndNoneStaysOpen) {
+  { const auto opens_what_asio_needs = connect(); }
+  const auto before = openFiles();
+  for (const std::size_t count : {2u, 3u, 10u}) {
+    auto ends = connect();
+    FramedSocket there{std::move(ends.second)};
+    there.acceptSharedBodies();
+    const auto bytes = wire::toBytes(wire::encode(wire::ListSources{1}));
+    sendWithDescriptors(ends.first.native_handle(), bytes, 0, count);
+    const auto received = receive(there);
+    ASSERT_FALSE(received);
+    EXPECT_EQ(received.error().code, Error::Code::Malformed);
+  }
+  EXPECT_EQ(openFiles(), before);
+}
+
+TEST_P(SharedMemory, FileDescriptorsThatNoMessageNeedsAreRefused) {
+  auto ends = connect();
+  FramedSocket there{std::move(ends.second)};
+  there.acceptSharedBodies();
+  const auto bytes = wire::toBytes(wire::encode(wire::ListSources{1}));
+  for (const std::byte& byte : std::span{bytes}.first(8)) {
+    sendWithDescriptors(ends.first.native_handle(), {&byte, 1}, 0, 1);
+  }
+  const auto received = receive(there);
+  ASSERT_FALSE(received);
+  EXPECT_THAT(received.error().message, HasSubstr("no message refers to"));
 }
 
 TEST(SharedBodyTest, CannotBeChangedByAnyone) {
