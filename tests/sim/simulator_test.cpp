@@ -1,0 +1,237 @@
+// SPDX-License-Identifier: Apache-2.0
+// The simulator as a driver: what only it does; what every camera must do is in the compliance suite.
+#include "drivers/sim/simulator.h"
+
+#include <gmock/gmock.h>
+
+#include <unistd.h>
+
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+
+
+namespace toftwin::drivers::simulator {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr auto kCamera = R"(
+model = "Test camera"
+[lens]
+width = 24
+height = 20
+fx = 30
+fy = 30
+cx = 11.5
+cy = 9.5
+[[emitter]]
+[[modulation]]
+frequency_mhz = 20
+exposure_us = 1000
+[pixel]
+electrons_per_radiance_s = 1e9
+[[effect]]
+type = "shot_noise"
+[[effect]]
+type = "warm_up"
+[[effect]]
+type = "delay"
+offset_mm = 0
+)";
+constexpr auto kWall = R"(
+[[material]]
+name = "white"
+albedo = 0.8
+[[object]]
+shape = "rectangle"
+size_m = [40, 40, 0]
+position_m = [0, 0, 2]
+material = "white"
+)";
+
+/// A folder with a camera and a scene, and sources opened from it.
+class Simulator : public testing::Test {
+ protected:
+  Simulator() : folder_(std::filesystem::temp_directory_path() / ("toftwin-simulator-" + std::to_string(::getpid()))) {
+    std::filesystem::create_directories(folder_);
+    std::ofstream{folder_ / "camera.toml"} << kCamera;
+    std::ofstream{folder_ / "wall.toml"} << kWall;
+  }
+  ~Simulator() override { std::filesystem::remove_all(folder_); }
+
+  Result<std::unique_ptr<Source>> tryOpen(const std::string& keys) {
+    auto table = settings::Table::parse(keys, folder_ / "toftwind.toml");
+    if (!table) return table.error();
+    return row().open(*table);
+  }
+  std::unique_ptr<Source> open(const std::string& more = {}) {
+    auto source = tryOpen("camera = 'camera.toml'\nscene = 'wall.toml'\npace = 'fast'\nmax_surfaces = 1\n" + more);
+    if (!source) throw std::runtime_error{source.error().message};
+    if (auto started = (*source)->start(); !started) throw std::runtime_error{started.error().message};
+    return *std::move(source);
+  }
+  std::string errorOf(const std::string& keys) {
+    const auto source = tryOpen(keys);
+    return source ? "" : source.error().message;
+  }
+  static Frame frameOf(Source& source) {
+    auto frame = source.next({}, true);
+    if (!frame) throw std::runtime_error{frame.error().message};
+    return *std::move(frame);
+  }
+  static double meanRange(const Frame& frame) {
+    double sum = 0.0;
+    const auto range_m = frame.find(PlaneKind::Depth)->as<float>();
+    for (float value : range_m) sum += static_cast<double>(value);
+    return sum / static_cast<double>(range_m.size());
+  }
+  static bool sameBytes(const Frame& a, const Frame& b) {
+    if (a.planes.size() != b.planes.size()) return false;
+    for (std::size_t i = 0; i < a.planes.size(); ++i) {
+      const auto x = a.planes[i].data.bytes(), y = b.planes[i].data.bytes();
+      if (x.size() != y.size() || std::memcmp(x.data(), y.data(), x.size()) != 0) return false;
+    }
+    return true;
+  }
+
+  std::filesystem::path folder_;
+};
+
+TEST_F(Simulator, SeesTheWallWhereItIs) {
+  const auto source = open();
+  EXPECT_NEAR(meanRange(frameOf(*source)), 2.0, 2e-3);  // shot noise: 3 mm / √480
+}
+
+TEST_F(Simulator, SameSeedSameBytes) {
+  const auto one = open("seed = 5\n"), two = open("seed = 5\n"), other = open("seed = 6\n");
+  for (int i = 0; i < 3; ++i) {
+    const Frame frame = frameOf(*one);
+    EXPECT_TRUE(sameBytes(frame, frameOf(*two))) << "frame " << i;
+    EXPECT_FALSE(sameBytes(frame, frameOf(*other))) << "frame " << i;
+  }
+}
+
+TEST_F(Simulator, EveryFrameHasNoiseOfItsOwn) {
+  const auto source = open();
+  const Frame first = frameOf(*source);
+  EXPECT_FALSE(sameBytes(first, frameOf(*source)));
+}
+
+TEST_F(Simulator, SeesTheWallNearerFromAPoseNearerToIt) {
+  const auto source = open();
+  frameOf(*source);
+  ASSERT_TRUE(source->setPose({{1, 0, 0, 0}, {0, 0, 0.5}}));
+  EXPECT_NEAR(meanRange(frameOf(*source)), 1.5, 2e-3);
+}
+
+TEST_F(Simulator, StartsAtThePoseOfItsKeys) {
+  const auto source = open("position_m = [0, 0, 4]\neuler_deg = [0, 180, 0]\n");
+  const Frame frame = frameOf(*source);
+  EXPECT_NEAR(meanRange(frame), 2.0, 2e-3);
+  EXPECT_EQ(frame.moment.world_from_camera->translation_m.z, 4.0);
+}
+
+TEST_F(Simulator, RefusesAPoseThatIsNone) {
+  const auto source = open();
+  EXPECT_THAT(source->setPose({{1, 1, 0, 0}, {}}).error().message, HasSubstr("unit quaternion"));
+  EXPECT_FALSE(source->setPose({{1, 0, 0, 0}, {std::nan(""), 0, 0}}));
+}
+
+TEST_F(Simulator, ParametersActOnTheNextFrameAndOnItsModelId) {
+  const auto source = open();
+  const Frame before = frameOf(*source);
+  ASSERT_TRUE(source->setParameter("delay.offset_mm", 100.0));
+  const Frame after = frameOf(*source);
+  EXPECT_NEAR(meanRange(after) - meanRange(before), 0.093, 4e-3);  // 100 mm along rays is less along z
+  EXPECT_NE(after.provenance.model_id, before.provenance.model_id);
+  EXPECT_THAT(source->setParameter("delay.offset_mm", 1e9).error().message, HasSubstr("out of bounds"));
+  EXPECT_THAT(source->setParameter("ambient_klx", -1.0).error().message, HasSubstr("0 to 200 klx"));
+  EXPECT_THAT(source->setParameter("colour", 1.0).error().message, HasSubstr("it has: exposure_us"));
+}
+
+TEST_F(Simulator, EveryParameterItNamesCanBeSet) {
+  const auto source = open();
+  for (const std::string& name : source->info().parameters) {
+    const auto done = source->setParameter(name, 20.0);
+    EXPECT_TRUE(done || done.error().code == Error::Code::InvalidArgument) << name << ": " << done.error().message;
+  }
+}
+
+TEST_F(Simulator, DriftsAfterPowerOn) {
+  const auto source = open("powered_on_before_s = 0\n");
+  EXPECT_NEAR(frameOf(*source).moment.since_power_on->in(second), 0.0, 1e-9);
+  const double cold_m = meanRange(frameOf(*source));
+  ASSERT_TRUE(source->setParameter("since_power_on_s", 1e6));
+  const Frame warm = frameOf(*source);
+  EXPECT_NEAR(warm.moment.since_power_on->in(second), 1e6, 1e-3);
+  EXPECT_NEAR(meanRange(warm) - cold_m, 0.0075, 1.5e-3);  // 8 mm along rays
+}
+
+TEST_F(Simulator, SaysWhereAFrameComesFrom) {
+  const auto source = open("seed = 9\n");
+  const Frame frame = frameOf(*source);
+  EXPECT_EQ(frame.provenance.kind, FrameKind::Simulated);
+  EXPECT_EQ(frame.provenance.seed, 9u);
+  EXPECT_EQ(frame.provenance.scene_id.size(), 32u);
+  EXPECT_EQ(frame.provenance.model_id.size(), 32u);
+  EXPECT_THAT(frame.provenance.effects, testing::ElementsAre("shot_noise", "warm_up", "delay"));
+  EXPECT_EQ(frame.moment.exposures.size(), 4u);
+  EXPECT_EQ(frame.moment.exposures[0].duration, 1_ms);
+}
+
+TEST_F(Simulator, AnInterruptedTraceGoesOnWhereItWas) {
+  std::ofstream{folder_ / "big.toml"} << [] {
+    std::string text = kCamera;
+    return text.replace(text.find("height = 20"), 11, "height = 90");
+  }();
+  const std::string keys = "camera = 'big.toml'\nscene = 'wall.toml'\npace = 'fast'\n";
+  auto whole = *tryOpen(keys), broken = *tryOpen(keys);
+  std::stop_source stop;
+  stop.request_stop();
+  for (int i = 0; i < 3; ++i) {
+    const auto none = broken->next(stop.get_token(), true);
+    ASSERT_FALSE(none);
+    EXPECT_EQ(none.error().code, Error::Code::Stopped);
+  }
+  EXPECT_TRUE(sameBytes(frameOf(*whole), frameOf(*broken)));
+}
+
+TEST_F(Simulator, EndsAfterTheFramesItWasGiven) {
+  const auto source = open("frames = 2\n");
+  frameOf(*source);
+  frameOf(*source);
+  EXPECT_EQ(source->next({}, true).error().code, Error::Code::EndOfStream);
+}
+
+TEST_F(Simulator, MakesOneFramePerTrigger) {
+  const auto source = open();
+  EXPECT_FALSE(source->trigger());
+  auto triggered = tryOpen("camera = 'camera.toml'\nscene = 'wall.toml'\npace = 'trigger'\n");
+  ASSERT_TRUE(triggered);
+  ASSERT_TRUE((*triggered)->start());
+  ASSERT_TRUE((*triggered)->trigger());
+  EXPECT_TRUE((*triggered)->next({}, false));
+}
+
+TEST_F(Simulator, GivesAllPlanesWhenAsked) {
+  const auto source = open("planes = ['truth_range', 'truth_normal', 'samples', 'phasors', 'range', 'flags']\n");
+  const Frame frame = frameOf(*source);
+  ASSERT_EQ(frame.planes.size(), 6u);
+  EXPECT_NEAR(frame.find(PlaneKind::TruthRange)->as<float>()[0], std::hypot(2.0, std::hypot(11.5, 9.5) / 15.0), 1e-4);
+  EXPECT_EQ(frame.find(PlaneKind::Samples)->channels, 4);
+}
+
+TEST_F(Simulator, ErrorsSayWhatIsWrongAndWhere) {
+  EXPECT_THAT(errorOf("planes = ['colour']\n"), testing::AllOf(HasSubstr("toftwind.toml:1"), HasSubstr("truth_range")));
+  EXPECT_THAT(errorOf("scene = 'nowhere.toml'\n"), HasSubstr("nowhere.toml"));
+  EXPECT_THAT(errorOf("camera = 'nowhere.toml'\n"), HasSubstr("nowhere.toml"));
+  EXPECT_THAT(errorOf("uri = 'sim:kinect_v3'\n"), testing::AllOf(HasSubstr("sim:kinect_v3"), HasSubstr("sim:kinect_v2")));
+  EXPECT_THAT(errorOf("sead = 1\n"), HasSubstr("unknown key \"sead\""));
+  std::ofstream{folder_ / "broken.toml"} << "[lens]\nwidth = -4\n";
+  EXPECT_THAT(errorOf("camera = 'broken.toml'\n"), HasSubstr("broken.toml:2: width"));
+}
+
+}  // namespace
+}  // namespace toftwin::drivers::simulator
