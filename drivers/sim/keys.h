@@ -35,29 +35,37 @@ struct Keys {
   void visit(Visitor& v) {
     v.text("uri", uri, "sim: and the name of a camera preset");
     v.text("camera", camera, "path of a camera file, relative to this file, instead of a preset");
-    v.text("scene", scene, "path of a scene file, relative to this file; empty: a box before a wall");
+    v.text("scene", scene,
+           "path of a scene file, relative to this file; empty: a box before a wall");
     v.number("samples_per_pixel", samples_per_pixel, {1, 65'536}, "paths traced per pixel");
-    v.number("max_surfaces", max_surfaces, {1, 64}, "surfaces a path may touch: 1 is direct light only");
+    v.number("max_surfaces", max_surfaces, {1, 64},
+             "surfaces a path may touch: 1 is direct light only");
     v.number("pixel_extent", pixel_extent, {0.0, 4.0},
              "side of a pixel's footprint in pixels; 0: its central ray, no flying pixels");
-    v.number("seed", seed, {0, 9'007'199'254'740'992.0}, "of all noise, of the tracer and of the sensor");
-    v.choice("pace", pace,
-             {{"real_time", Pace::RealTime}, {"fast", Pace::Fast}, {"trigger", Pace::Trigger}},
-             "when a frame comes: at the frame interval, as soon as possible, or one per trigger; under "
-             "lockstep the clients say when");
+    v.number("seed", seed, {0, 9'007'199'254'740'992.0},
+             "of all noise, of the tracer and of the sensor");
+    v.choice(
+        "pace", pace,
+        {{"real_time", Pace::RealTime}, {"fast", Pace::Fast}, {"trigger", Pace::Trigger}},
+        "when a frame comes: at the frame interval, as soon as possible, or one per trigger; under "
+        "lockstep the clients say when");
     v.quantity("frame_interval", frame_interval, millisecond, {0.0, 1e6},
                "of device time, whatever the pace; 0: the camera's own");
     v.number("frames", frames, {0, 1e15}, "end of the stream after so many frames; 0: never");
-    v.numbers("position_m", position_m, {-1e6, 1e6}, "of the lens in the world, until a client sets a pose");
+    v.numbers("position_m", position_m, {-1e6, 1e6},
+              "of the lens in the world, until a client sets a pose");
     v.numbers("euler_deg", euler_deg, {-360.0, 360.0},
-              "how it is turned: about the fixed world axes x, then y, then z; 0: it looks along z, y down");
+              "how it is turned: about the fixed world axes x, then y, then z; 0: it looks along "
+              "z, y down");
     v.quantity("powered_on_before", powered_on_before, second, {0.0, 1e9},
                "how long before its first frame the camera was switched on; three hours: warm");
-    v.quantity("room_temperature", room_temperature, celsius, {-40.0, 100.0}, "reported with every frame");
+    v.quantity("room_temperature", room_temperature, celsius, {-40.0, 100.0},
+               "reported with every frame");
     v.quantity("ambient", ambient, kilolux, {0.0, 200.0},
                "reported with every frame, and shone on the scene by the effect ambient_light");
     v.texts("planes", planes,
-            "which of range, depth, amplitude, ambient, flags, samples, phasors, truth_range, truth_normal; "
+            "which of range, depth, amplitude, ambient, flags, samples, phasors, truth_range, "
+            "truth_normal; "
             "empty: the first five");
   }
 };

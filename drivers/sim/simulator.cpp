@@ -63,7 +63,8 @@ Transform<World, Camera> startPose(const Keys& keys) {
   return pose;
 }
 
-SourceInfo describe(const Keys& keys, const sim::SensorModel& model, std::vector<PlaneKind> planes) {
+SourceInfo describe(const Keys& keys, const sim::SensorModel& model,
+                    std::vector<PlaneKind> planes) {
   SourceInfo info;
   info.driver = "sim";
   info.model = model.model();
@@ -76,17 +77,23 @@ SourceInfo describe(const Keys& keys, const sim::SensorModel& model, std::vector
   info.can_trigger = keys.pace == Pace::Trigger;
   info.can_lockstep = true;
   info.parameters = model.parameterNames();
-  for (std::string_view name : {kAmbient, kSincePowerOn, kTemperature}) info.parameters.emplace_back(name);
+  for (std::string_view name : {kAmbient, kSincePowerOn, kTemperature})
+    info.parameters.emplace_back(name);
   return info;
 }
 
 /// One thread calls everything here (source.h), so nothing is locked.
 class SimulatedSource final : public Source {
  public:
-  SimulatedSource(const Keys& keys, sim::SensorModel model, View view, std::vector<PlaneKind> planes)
-      : keys_(keys), model_(std::move(model)), info_(describe(keys, model_, std::move(planes))),
-        view_(std::move(view)), since_power_on_(keys.powered_on_before),
-        room_temperature_(keys.room_temperature), ambient_(keys.ambient) {
+  SimulatedSource(const Keys& keys, sim::SensorModel model, View view,
+                  std::vector<PlaneKind> planes)
+      : keys_(keys),
+        model_(std::move(model)),
+        info_(describe(keys, model_, std::move(planes))),
+        view_(std::move(view)),
+        since_power_on_(keys.powered_on_before),
+        room_temperature_(keys.room_temperature),
+        ambient_(keys.ambient) {
     view_.setPose(startPose(keys));
   }
 
@@ -102,14 +109,16 @@ class SimulatedSource final : public Source {
 
   Result<Frame> next(std::stop_token stop, bool lockstep) override {
     if (keys_.frames > 0 && made_ == keys_.frames) {
-      return Error{Error::Code::EndOfStream, fmt::format("the simulation ended after {} frames, as configured", made_)};
+      return Error{Error::Code::EndOfStream,
+                   fmt::format("the simulation ended after {} frames, as configured", made_)};
     }
     const Error stopped{Error::Code::Stopped, "asked to stop"};
-    // Light first: after a new pose it takes long, and the pace then counts what a camera would have
-    // delivered meanwhile as lost.
+    // Light first: after a new pose it takes long, and the pace then counts what a camera would
+    // have delivered meanwhile as lost.
     if (!view_.complete(stop)) return stopped;
     Frame frame;
-    if (auto turn = waitForTurn(stop, lockstep, frame.dropped_by_device); !turn) return turn.error();
+    if (auto turn = waitForTurn(stop, lockstep, frame.dropped_by_device); !turn)
+      return turn.error();
     frame.moment = momentOfFrame();
     frame.provenance = sim::provenanceOf(model_, view_.scene().id(), keys_.seed);
     frame.camera = info_.camera;
@@ -124,9 +133,12 @@ class SimulatedSource final : public Source {
     const Vec3d& t = world_from_camera.translation_m;
     const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
     if (!(std::abs(norm - 1.0) < 1e-6) || !std::isfinite(t.x + t.y + t.z)) {
-      return Error{Error::Code::InvalidArgument,
-                   fmt::format("a pose needs a unit quaternion and finite metres, but was ({}, {}, {}, {}) at "
-                               "({}, {}, {})", q[0], q[1], q[2], q[3], t.x, t.y, t.z)};
+      return Error{
+          Error::Code::InvalidArgument,
+          fmt::format(
+              "a pose needs a unit quaternion and finite metres, but was ({}, {}, {}, {}) at "
+              "({}, {}, {})",
+              q[0], q[1], q[2], q[3], t.x, t.y, t.z)};
     }
     if (world_from_camera == view_.pose()) return {};
     view_.setPose(world_from_camera);
@@ -147,8 +159,9 @@ class SimulatedSource final : public Source {
     if (!changed) {
       return changed.error().code != Error::Code::NotFound
                  ? changed.error()
-                 : Error{Error::Code::NotFound, fmt::format("this camera has no parameter \"{}\"; it has: {}", name,
-                                                            fmt::join(info_.parameters, ", "))};
+                 : Error{Error::Code::NotFound,
+                         fmt::format("this camera has no parameter \"{}\"; it has: {}", name,
+                                     fmt::join(info_.parameters, ", "))};
     }
     model_ = *std::move(changed);
     collected_.reset();
@@ -163,10 +176,12 @@ class SimulatedSource final : public Source {
 
  private:
   template <class D>
-  Result<> set(Quantity<D>& quantity, double value, Bounds bounds, Unit<D> unit, std::string_view name) {
+  Result<> set(Quantity<D>& quantity, double value, Bounds bounds, Unit<D> unit,
+               std::string_view name) {
     if (std::isnan(value) || !bounds.contains(value)) {
-      return Error{Error::Code::InvalidArgument, fmt::format("{} = {} {} is out of bounds: it must be {} {}", name, value,
-                                                             unit.suffix, settings::describe(bounds), unit.suffix)};
+      return Error{Error::Code::InvalidArgument,
+                   fmt::format("{} = {} {} is out of bounds: it must be {} {}", name, value,
+                               unit.suffix, settings::describe(bounds), unit.suffix)};
     }
     quantity = value * unit;
     collected_.reset();
@@ -199,7 +214,8 @@ class SimulatedSource final : public Source {
       return {};
     }
     if (due - now > kLongestWait) {
-      return sleepUntil(now + kLongestWait, stop) ? Error{Error::Code::Timeout, "not yet"} : stopped;
+      return sleepUntil(now + kLongestWait, stop) ? Error{Error::Code::Timeout, "not yet"}
+                                                  : stopped;
     }
     return sleepUntil(due, stop) ? Result<>{} : stopped;
   }
@@ -209,15 +225,19 @@ class SimulatedSource final : public Source {
     if (!collected_ || !model_.collectsTheSameEachFrame()) {
       collected_ = model_.collect(view_.light(), moment, keys_.seed, index_);
     }
-    return sim::planesOf(model_, model_.readOut(*collected_, moment, keys_.seed, index_), view_.light().truth,
-                         info_.planes);
+    return sim::planesOf(model_, model_.readOut(*collected_, moment, keys_.seed, index_),
+                         view_.light().truth, info_.planes);
   }
 
   [[nodiscard]] std::int64_t intervalNs() const {
     return std::max<std::int64_t>(1, std::llround(info_.frame_interval->in(nanosecond)));
   }
-  [[nodiscard]] DeviceTime deviceTime() const { return {static_cast<std::int64_t>(index_) * intervalNs()}; }
-  [[nodiscard]] Duration deviceDuration() const { return static_cast<double>(deviceTime().ns) * nanosecond; }
+  [[nodiscard]] DeviceTime deviceTime() const {
+    return {static_cast<std::int64_t>(index_) * intervalNs()};
+  }
+  [[nodiscard]] Duration deviceDuration() const {
+    return static_cast<double>(deviceTime().ns) * nanosecond;
+  }
 
   [[nodiscard]] Moment momentOfFrame() const {
     Moment moment;
@@ -235,8 +255,9 @@ class SimulatedSource final : public Source {
   SourceInfo info_;
   View view_;
   std::optional<sim::Samples> collected_;  ///< of the present pose and parameters, free of noise
-  std::uint64_t index_ = 0;  ///< of the next frame since the camera was opened, lost ones counted; keys its noise
-  std::uint64_t made_ = 0;   ///< since start()
+  std::uint64_t index_ =
+      0;  ///< of the next frame since the camera was opened, lost ones counted; keys its noise
+  std::uint64_t made_ = 0;  ///< since start()
   std::uint64_t triggers_ = 0;
   std::optional<SteadyTime> pacing_since_;  ///< when device time 0 was, if paced in real time
   ClockRelation clock_;
@@ -254,7 +275,8 @@ std::vector<PlaneKind> chosenPlanes(const Keys& keys, settings::Table& table) {
     if (!kind || std::ranges::find(all, *kind) == all.end()) {
       std::string known;
       for (PlaneKind plane : all) known += (known.empty() ? "" : ", ") + std::string{nameOf(plane)};
-      table.complain("planes", fmt::format("names \"{}\", but a simulated camera has only: {}", name, known));
+      table.complain("planes",
+                     fmt::format("names \"{}\", but a simulated camera has only: {}", name, known));
     } else if (std::ranges::find(chosen, *kind) == chosen.end()) {
       chosen.push_back(*kind);
     }
@@ -269,9 +291,12 @@ Result<sim::SensorModel> chosenCamera(const Keys& keys, const settings::Table& t
     if (auto model = sim::SensorModel::preset(keys.uri.substr(kScheme.size()))) return model;
   }
   std::string known;
-  for (const std::string& name : sim::SensorModel::presetNames()) known += (known.empty() ? "sim:" : ", sim:") + name;
-  return Error{Error::Code::NotFound, fmt::format("{}: there is no camera {}; the simulator has {}, and any camera "
-                                                  "file by the key camera", table.place("uri"), keys.uri, known)};
+  for (const std::string& name : sim::SensorModel::presetNames())
+    known += (known.empty() ? "sim:" : ", sim:") + name;
+  return Error{Error::Code::NotFound,
+               fmt::format("{}: there is no camera {}; the simulator has {}, and any camera "
+                           "file by the key camera",
+                           table.place("uri"), keys.uri, known)};
 }
 
 Result<std::unique_ptr<Source>> open(settings::Table& table) {

@@ -16,7 +16,8 @@ void copyBand(const Image<T>& band, int first_row, Image<T>& whole, int height) 
 }
 
 template <class T>
-void copyBands(const std::vector<Image<T>>& bands, int first_row, std::vector<Image<T>>& whole, int height) {
+void copyBands(const std::vector<Image<T>>& bands, int first_row, std::vector<Image<T>>& whole,
+               int height) {
   whole.resize(bands.size());
   for (std::size_t i = 0; i < bands.size(); ++i) copyBand(bands[i], first_row, whole[i], height);
 }

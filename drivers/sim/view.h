@@ -9,12 +9,14 @@
 
 namespace toftwin::drivers::simulator {
 
-/// What the camera sees from its pose, traced once and kept until the pose changes. Traced in bands of
-/// rows, so that it can be interrupted; the bands done are kept, and the result does not depend on it.
+/// What the camera sees from its pose, traced once and kept until the pose changes. Traced in bands
+/// of rows, so that it can be interrupted; the bands done are kept, and the result does not depend
+/// on it.
 class View {
  public:
   /// `request` with everything filled in but pose and region.
-  View(sim::Scene scene, sim::TraceRequest request) : scene_(std::move(scene)), request_(std::move(request)) {}
+  View(sim::Scene scene, sim::TraceRequest request)
+      : scene_(std::move(scene)), request_(std::move(request)) {}
 
   [[nodiscard]] const sim::Scene& scene() const { return scene_; }
   [[nodiscard]] const Transform<World, Camera>& pose() const { return request_.world_from_camera; }

@@ -17,7 +17,9 @@ namespace toftwin::sim {
 namespace {
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-constexpr bool has(std::uint8_t flags, PixelFlag flag) { return (flags & static_cast<unsigned>(flag)) != 0; }
+constexpr bool has(std::uint8_t flags, PixelFlag flag) {
+  return (flags & static_cast<unsigned>(flag)) != 0;
+}
 constexpr void raise(std::uint8_t& flags, PixelFlag flag) {
   flags = static_cast<std::uint8_t>(flags | static_cast<unsigned>(flag));
 }
@@ -27,23 +29,29 @@ constexpr void reject(std::uint8_t& flags, PixelFlag why) {
   raise(flags, why);
 }
 
-/// Half the length of the light's way → range, for an emitter at distance L along x from the lens. With
-/// s the whole way and u the ray's x component, |r u⃗ − L x⃗| = s − r gives
+/// Half the length of the light's way → range, for an emitter at distance L along x from the lens.
+/// With s the whole way and u the ray's x component, |r u⃗ − L x⃗| = s − r gives
 ///     r = (s² − L²) / (2 (s − L u))
 /// and libfreenect2 drops L² in it.
 double rangeOfWay(double half_way_m, double ray_x, const DecodeSettings& settings) {
   const double baseline_m = settings.baseline_length.in(metre);
   if (baseline_m == 0.0) return half_way_m;
   const double way_m = 2.0 * half_way_m;
-  const double square = settings.baseline == DecodeSettings::Baseline::Exact ? baseline_m * baseline_m : 0.0;
+  const double square =
+      settings.baseline == DecodeSettings::Baseline::Exact ? baseline_m * baseline_m : 0.0;
   return (way_m * way_m - square) / (2.0 * (way_m - baseline_m * ray_x));
 }
 
 /// Decodes row by row; holds what all rows share.
 class Decoder {
  public:
-  Decoder(const Samples& samples, const DecodeSettings& settings, const Image<float>& ray_x, RangeImage& result)
-      : samples_(samples), settings_(settings), ray_x_(ray_x), result_(result), steps_(samples.steps),
+  Decoder(const Samples& samples, const DecodeSettings& settings, const Image<float>& ray_x,
+          RangeImage& result)
+      : samples_(samples),
+        settings_(settings),
+        ray_x_(ray_x),
+        result_(result),
+        steps_(samples.steps),
         unwrap_(samples.frequencies, settings.speed_of_light),
         zero_cycles_(samples.frequencies.size(), 0.0F) {
     for (std::size_t f = 0; f < std::min(settings.zero_phase.size(), zero_cycles_.size()); ++f) {
@@ -57,10 +65,12 @@ class Decoder {
   void row(int y) const {
     const std::size_t frequencies = samples_.frequencies.size();
     const auto width = static_cast<std::size_t>(samples_.width());
-    std::vector<float> cycles(frequencies * width), amplitudes(frequencies * width), asymmetry(width);
+    std::vector<float> cycles(frequencies * width), amplitudes(frequencies * width),
+        asymmetry(width);
     for (std::size_t f = 0; f < frequencies; ++f) {
       demodulateRow(samples_, steps_, f, y, &result_.phasors[f](0, y));
-      polarRow(&result_.phasors[f](0, y), width, zero_cycles_[f], &cycles[f * width], &amplitudes[f * width]);
+      polarRow(&result_.phasors[f](0, y), width, zero_cycles_[f], &cycles[f * width],
+               &amplitudes[f * width]);
     }
     unmodulatedRow(samples_, y, &result_.ambient(0, y));
     asymmetryRow(samples_, y, asymmetry.data());
@@ -78,12 +88,15 @@ class Decoder {
   }
 
  private:
-  [[nodiscard]] bool isKinect() const { return settings_.algorithm == DecodeSettings::Algorithm::KinectV2; }
+  [[nodiscard]] bool isKinect() const {
+    return settings_.algorithm == DecodeSettings::Algorithm::KinectV2;
+  }
 
-  void pixel(const std::vector<double>& cycles, const std::vector<double>& amplitudes, double mean_amplitude,
-             double asymmetry, int x, int y) const {
+  void pixel(const std::vector<double>& cycles, const std::vector<double>& amplitudes,
+             double mean_amplitude, double asymmetry, int x, int y) const {
     std::uint8_t flags = samples_.flags.empty() ? std::uint8_t{0} : samples_.flags(x, y);
-    if (asymmetry > settings_.asymmetry_threshold * mean_amplitude) raise(flags, PixelFlag::Asymmetric);
+    if (asymmetry > settings_.asymmetry_threshold * mean_amplitude)
+      raise(flags, PixelFlag::Asymmetric);
     const double range_m = measure(cycles, amplitudes, x, y, flags);
     if (std::isnan(range_m)) raise(flags, PixelFlag::Invalid);
     result_.range_m(x, y) = has(flags, PixelFlag::Invalid) ? kNan : static_cast<float>(range_m);
@@ -92,8 +105,9 @@ class Decoder {
   }
 
   /// The range, and the flags that say why it is not to be trusted.
-  [[nodiscard]] double measure(const std::vector<double>& cycles, const std::vector<double>& amplitudes, int x,
-                               int y, std::uint8_t& flags) const {
+  [[nodiscard]] double measure(const std::vector<double>& cycles,
+                               const std::vector<double>& amplitudes, int x, int y,
+                               std::uint8_t& flags) const {
     const double weakest = *std::min_element(amplitudes.begin(), amplitudes.end());
     if (has(flags, PixelFlag::Saturated)) raise(flags, PixelFlag::Invalid);
     if (!(weakest > 0.0 && weakest >= settings_.minimum_amplitude)) {
@@ -116,7 +130,8 @@ class Decoder {
   [[nodiscard]] double allowedDeviation(double deviation_rad, double weakest) const {
     const double weak_rad = settings_.unwrap_threshold.in(radian);
     const double strong_rad = settings_.strong_unwrap_threshold.in(radian);
-    // The threshold lies between the two; only a deviation that does, too, is worth two transcendental functions.
+    // The threshold lies between the two; only a deviation that does, too, is worth two
+    // transcendental functions.
     if (!isKinect() || deviation_rad <= strong_rad || deviation_rad > weak_rad) return weak_rad;
     return kinectV2Threshold(weakest * settings_.counts_per_electron, strong_rad, weak_rad);
   }
@@ -140,13 +155,15 @@ double kinectV2Threshold(double counts, double strong_rad, double weak_rad) {
   return std::clamp(std::exp(exponent), strong_rad, std::max(strong_rad, weak_rad));
 }
 
-RangeImage decode(const Samples& samples, const DecodeSettings& settings, const Image<float>& ray_x) {
+RangeImage decode(const Samples& samples, const DecodeSettings& settings,
+                  const Image<float>& ray_x) {
   const int width = samples.width(), height = samples.height();
   RangeImage result{.range_m = Image<float>{width, height},
                     .amplitude = Image<float>{width, height},
                     .ambient = Image<float>{width, height},
                     .flags = Image<std::uint8_t>{width, height},
-                    .phasors = std::vector(samples.frequencies.size(), Image<std::complex<float>>{width, height})};
+                    .phasors = std::vector(samples.frequencies.size(),
+                                           Image<std::complex<float>>{width, height})};
   const Decoder decoder{samples, settings, ray_x, result};
   forRows(height, [&](int first_row, int last_row) {
     for (int y = first_row; y < last_row; ++y) decoder.row(y);

@@ -15,7 +15,8 @@ const float* tapRow(const Samples& samples, std::size_t frequency, int step, int
 }
 
 /// sum[x] += weight · sample[x] for one step of one frequency.
-void addSample(const Samples& samples, std::size_t frequency, int step, int y, float weight, float* sum) {
+void addSample(const Samples& samples, std::size_t frequency, int step, int y, float weight,
+               float* sum) {
   const int width = samples.width();
   const float* a = tapRow(samples, frequency, step, 0, y);
   if (samples.taps == 1) {
@@ -49,8 +50,8 @@ void demodulateRow(const Samples& samples, const Steps& steps, std::size_t frequ
   for (std::size_t x = 0; x < width; ++x) phasors[x] = {real[x], imaginary[x]};
 }
 
-TOFTWIN_SIMD void polarRow(const std::complex<float>* phasors, std::size_t count, float zero_cycles, float* cycles,
-                           float* amplitudes) {
+TOFTWIN_SIMD void polarRow(const std::complex<float>* phasors, std::size_t count, float zero_cycles,
+                           float* cycles, float* amplitudes) {
   const auto* parts = reinterpret_cast<const float*>(phasors);
   for (std::size_t x = 0; x < count; ++x) {
     const float real = parts[2 * x], imaginary = -parts[2 * x + 1];

@@ -11,7 +11,8 @@
 namespace toftwin::sim {
 namespace {
 
-/// The nearest whole number, for |x| < 2⁵¹: what 1.5·2⁵² rounds away. Baseline x86 has no instruction for it.
+/// The nearest whole number, for |x| < 2⁵¹: what 1.5·2⁵² rounds away. Baseline x86 has no
+/// instruction for it.
 double nearestWhole(double x) { return (x + 0x1.8p52) - 0x1.8p52; }
 
 /// Distance of the phases (in cycles) from the line through 0 along (10, 2, 15), in radians.
@@ -29,7 +30,8 @@ Unwrapped unwrapKinectV2(double cycles_80, double cycles_16, double cycles_120, 
   double units_80 = 3.0 * (cycles_80 + nearestWhole(5.0 * cycles_16 - cycles_80));
   double full_16 = cycles_16;
   const double periods_beside_120 = units_80 / 2.0 - cycles_120;
-  if (std::abs(periods_beside_120 - nearestWhole(periods_beside_120)) > 0.25) {  // the second 15 units
+  if (std::abs(periods_beside_120 - nearestWhole(periods_beside_120)) >
+      0.25) {  // the second 15 units
     units_80 += 15.0;
     full_16 += 1.0;
   }
@@ -51,7 +53,8 @@ Unwrapper::Unwrapper(std::span<const Frequency> frequencies, double speed_of_lig
   candidates_ = static_cast<int>(std::lround(unambiguous_range_m_ / period_m_[highest_]));
 }
 
-Unwrapped Unwrapper::operator()(std::span<const double> cycles, std::span<const double> amplitudes) const {
+Unwrapped Unwrapper::operator()(std::span<const double> cycles,
+                                std::span<const double> amplitudes) const {
   Unwrapped best;
   double smallest_spread = std::numeric_limits<double>::infinity();
   for (int n = 0; n < candidates_; ++n) {
@@ -74,8 +77,8 @@ Unwrapped Unwrapper::operator()(std::span<const double> cycles, std::span<const 
       squares += std::pow(off_cycles - nearestWhole(off_cycles), 2);
     }
     best = {.range_m = mean_m,
-            .deviation_rad =
-                2.0 * std::numbers::pi * std::sqrt(squares / static_cast<double>(period_m_.size()))};
+            .deviation_rad = 2.0 * std::numbers::pi *
+                             std::sqrt(squares / static_cast<double>(period_m_.size()))};
   }
   return best;
 }

@@ -9,8 +9,8 @@
 
 namespace toftwin::sim {
 
-/// What an error can go with. An effect says which of them its output depends on; the law tests hold
-/// it to that, and discovery searches along them.
+/// What an error can go with. An effect says which of them its output depends on; the law tests
+/// hold it to that, and discovery searches along them.
 enum class Covariate : std::uint16_t {
   Time = 1 << 0,         ///< since power-on
   Temperature = 1 << 1,  ///< of the device

@@ -6,8 +6,8 @@
 namespace toftwin::sim {
 
 /// Light or reference takes a constant extra way through cables and drivers:  r → r + offset, the
-/// same for every frequency and pixel. Acts after decoding: it does not wrap, and it does not shift the
-/// wiggling. A delay that does both belongs into the waveform (`rise_ns`).
+/// same for every frequency and pixel. Acts after decoding: it does not wrap, and it does not shift
+/// the wiggling. A delay that does both belongs into the waveform (`rise_ns`).
 struct Delay {
   Length offset = 10_mm;
 
@@ -22,7 +22,8 @@ struct Delay {
   void visit(Visitor& v) {
     v.quantity("offset", offset, millimetre, {-10'000.0, 10'000.0}, "added to every range");
   }
-  [[nodiscard]] RangeImage apply(RangeImage image, const Conditions& now, const Random& random) const;
+  [[nodiscard]] RangeImage apply(RangeImage image, const Conditions& now,
+                                 const Random& random) const;
 };
 
 }  // namespace toftwin::sim

@@ -29,7 +29,8 @@ struct About {
 };
 
 /// What an effect may depend on besides the image: when and where it was taken. The image may be a
-/// region of the full one; `left`, `top` say where it lies and `full_width` how wide the full one is.
+/// region of the full one; `left`, `top` say where it lies and `full_width` how wide the full one
+/// is.
 struct Conditions {
   const Moment& moment;
   int left = 0, top = 0;
@@ -42,9 +43,9 @@ struct Conditions {
   }
 };
 
-/// An imperfection of a camera: an aggregate of parameters with unit types. It acts on exactly one of
-/// Light, Samples and RangeImage, by a pure function of the image, the conditions and the keyed random
-/// numbers. See docs/add-an-effect.md.
+/// An imperfection of a camera: an aggregate of parameters with unit types. It acts on exactly one
+/// of Light, Samples and RangeImage, by a pure function of the image, the conditions and the keyed
+/// random numbers. See docs/add-an-effect.md.
 template <class E, class On>
 concept ActsOn = requires(const E& effect, On image, const Conditions& now, const Random& random) {
   { effect.apply(std::move(image), now, random) } -> std::same_as<On>;
@@ -54,7 +55,8 @@ template <class E>
 concept Effect = std::is_aggregate_v<E> && requires {
   { E::about } -> std::convertible_to<About>;
   { E::none() } -> std::same_as<E>;
-} && ((ActsOn<E, Light> ? 1 : 0) + (ActsOn<E, Samples> ? 1 : 0) + (ActsOn<E, RangeImage> ? 1 : 0) == 1);
+} &&((ActsOn<E, Light> ? 1 : 0) + (ActsOn<E, Samples> ? 1 : 0) + (ActsOn<E, RangeImage> ? 1 : 0) ==
+     1);
 
 /// The image type an effect acts on.
 template <Effect E>

@@ -17,7 +17,8 @@ Light FixedPatternPhase::apply(Light light, const Conditions& now, const Random&
       const Random::Draw draw = pattern.draw(f);
       for (int y = first_row; y < last_row; ++y) {
         for (int x = 0; x < light.width(); ++x) {
-          const std::complex<float> turn = std::polar(1.0F, -sigma_rad * draw.normal(now.pixel(x, y)));
+          const std::complex<float> turn =
+              std::polar(1.0F, -sigma_rad * draw.normal(now.pixel(x, y)));
           std::complex<float> nth = turn;
           for (int n = 1; n <= light.harmonics; ++n, nth *= turn) light.phasor(f, n)(x, y) *= nth;
         }

@@ -5,8 +5,8 @@
 
 namespace toftwin::sim {
 
-/// The demodulation signal reaches each pixel a little early or late: a phase offset p₀ per pixel and
-/// frequency that never changes. Harmonic n turns n times as far:
+/// The demodulation signal reaches each pixel a little early or late: a phase offset p₀ per pixel
+/// and frequency that never changes. Harmonic n turns n times as far:
 ///     Pₙ → Pₙ · exp(−i n p₀(x, y, f)),  p₀ normal with standard deviation `sigma`
 /// `device` chooses which of all cameras of this make it is.
 struct FixedPatternPhase {
@@ -23,7 +23,8 @@ struct FixedPatternPhase {
   template <class Visitor>
   void visit(Visitor& v) {
     v.quantity("sigma", sigma, radian, {0.0, 3.2}, "standard deviation over the pixels");
-    v.number("device", device, {0.0, 4294967295.0}, "which camera of this make: another number, another pattern");
+    v.number("device", device, {0.0, 4294967295.0},
+             "which camera of this make: another number, another pattern");
   }
   [[nodiscard]] Light apply(Light light, const Conditions& now, const Random& random) const;
 };

@@ -24,7 +24,8 @@ std::vector<float> halfGaussian(double sigma) {
   return half;
 }
 
-/// G * image, dark outside the image. Rows first, then columns, row by row so that memory is read in order.
+/// G * image, dark outside the image. Rows first, then columns, row by row so that memory is read
+/// in order.
 template <class T>
 Image<T> blur(const Image<T>& image, const std::vector<float>& half) {
   const int width = image.width(), height = image.height();
@@ -58,8 +59,8 @@ Image<T> blur(const Image<T>& image, const std::vector<float>& half) {
 template <class T, class Sum>
 void scatter(Image<T>& image, const LensScatter& lens, const std::vector<float>& half, Sum sum) {
   for (const T& value : image.pixels()) sum += value;
-  const auto veil =
-      static_cast<T>(sum * (lens.veil / static_cast<double>(std::max<std::size_t>(image.size(), 1))));
+  const auto veil = static_cast<T>(
+      sum * (lens.veil / static_cast<double>(std::max<std::size_t>(image.size(), 1))));
   const auto kept = static_cast<float>(1.0 - lens.veil - lens.halo);
   const auto spread = static_cast<float>(lens.halo);
   const Image<T> halo = lens.halo > 0.0 ? blur(image, half) : Image<T>{};

@@ -7,10 +7,11 @@ namespace toftwin::sim {
 
 /// Lens, window and sensor scatter a share of all light over the image, phase and all:
 ///     P̃ = (1 − s − h) P + s ⟨P⟩ + h (G * P)
-/// for each frequency's and harmonic's phasor and for the unmodulated light, with ⟨P⟩ the mean of the
-/// image (the even veil) and G a Gaussian of standard deviation `halo_radius`, cut at four of them
-/// (light that leaves the image is lost). Dark or far pixels are pulled towards the phase of what is
-/// bright. Needs the whole image: on a traced region the veil and the halo see only that region.
+/// for each frequency's and harmonic's phasor and for the unmodulated light, with ⟨P⟩ the mean of
+/// the image (the even veil) and G a Gaussian of standard deviation `halo_radius`, cut at four of
+/// them (light that leaves the image is lost). Dark or far pixels are pulled towards the phase of
+/// what is bright. Needs the whole image: on a traced region the veil and the halo see only that
+/// region.
 struct LensScatter {
   double veil = 0.01;
   double halo = 0.02;
@@ -20,7 +21,8 @@ struct LensScatter {
       .name = "lens_scatter",
       .summary = "a share of all light is spread over the image: an even veil and a Gaussian halo",
       .reference = "H. Schaefer, F. Lenzen, C. S. Garbe 2014 (veil); W. Kavli et al. 2008 (halo)",
-      // Linear in the light: a brighter lamp alone changes nothing, a darker pixel among others does.
+      // Linear in the light: a brighter lamp alone changes nothing, a darker pixel among others
+      // does.
       .explains = {Covariate::Amplitude, Covariate::Range, Covariate::Neighbours}};
   static LensScatter none() { return {.veil = 0.0, .halo = 0.0}; }
 
@@ -28,7 +30,8 @@ struct LensScatter {
   void visit(Visitor& v) {
     v.number("veil", veil, {0.0, 0.5}, "share s of the light that spreads evenly over the image");
     v.number("halo", halo, {0.0, 0.5}, "share h of the light that falls into the Gaussian halo");
-    v.number("halo_radius_px", halo_radius, {0.5, 500.0}, "standard deviation of the halo, in pixels");
+    v.number("halo_radius_px", halo_radius, {0.5, 500.0},
+             "standard deviation of the halo, in pixels");
   }
   [[nodiscard]] Light apply(Light light, const Conditions& now, const Random& random) const;
 };

@@ -13,7 +13,8 @@ struct Quantisation {
       .name = "quantisation",
       .summary = "the converter's whole steps",
       .reference = "EMVA Standard 1288, release 4.0, section 2.3 (variance q²/12)",
-      .explains = {Covariate::Ambient, Covariate::Exposure, Covariate::Amplitude, Covariate::Range}};
+      .explains = {Covariate::Ambient, Covariate::Exposure, Covariate::Amplitude,
+                   Covariate::Range}};
   static Quantisation none() { return {.step_electrons = 0.0}; }
 
   template <class Visitor>

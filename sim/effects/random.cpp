@@ -31,8 +31,8 @@ TOFTWIN_SIMD bool gaussianPoisson(const float* means, float* z, std::size_t coun
     const float mean = means[i];
     const float positive = mean > 0.0F ? mean : 0.0F;
     const float x = mean + __builtin_sqrtf(positive) * z[i] + (z[i] * z[i] - 1.0F) * (1.0F / 6.0F);
-    // Adding and taking away 1.5·2²³ rounds to nearest, up to 2²²; larger x keep their fraction, which
-    // is 1e-3 of the noise there.
+    // Adding and taking away 1.5·2²³ rounds to nearest, up to 2²²; larger x keep their fraction,
+    // which is 1e-3 of the noise there.
     const float rounded = (x + 12582912.0F) - 12582912.0F;
     z[i] = x < 4194304.0F ? rounded : x;
     small |= mean < kPoissonExactBelow ? 1 : 0;
@@ -42,13 +42,13 @@ TOFTWIN_SIMD bool gaussianPoisson(const float* means, float* z, std::size_t coun
 
 }  // namespace
 
-TOFTWIN_SIMD void fillNormals(const Random::Draw& draw, std::uint32_t first_pixel, std::span<float> normals) {
+TOFTWIN_SIMD void fillNormals(const Random::Draw& draw, std::uint32_t first_pixel,
+                              std::span<float> normals) {
   const Random::Draw copy = draw;  // its keys in registers: no store below can change them
   float* out = normals.data();
   const auto count = static_cast<std::uint32_t>(normals.size());
   for (std::uint32_t i = 0; i < count; ++i) out[i] = copy.normal(first_pixel + i);
 }
-
 
 void poisson(const Random::Draw& draw, std::uint32_t first_pixel, std::span<float> means) {
   constexpr std::size_t kBlock = 512;

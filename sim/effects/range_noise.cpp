@@ -13,7 +13,8 @@ RangeImage RangeNoise::apply(RangeImage image, const Conditions& now, const Rand
   for (int y = 0; y < image.range_m.height(); ++y) {
     float* range_m = &image.range_m(0, y);
     fillNormals(draw, now.pixel(0, y), normals);
-    for (std::size_t x = 0; x < normals.size(); ++x) range_m[x] += sigma_m * normals[x];  // NaN stays NaN
+    for (std::size_t x = 0; x < normals.size(); ++x)
+      range_m[x] += sigma_m * normals[x];  // NaN stays NaN
   }
   return image;
 }

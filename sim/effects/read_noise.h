@@ -21,7 +21,8 @@ struct ReadNoise {
 
   template <class Visitor>
   void visit(Visitor& v) {
-    v.number("sigma_electrons", sigma_electrons, {0.0, 1e5}, "standard deviation, per tap and sample");
+    v.number("sigma_electrons", sigma_electrons, {0.0, 1e5},
+             "standard deviation, per tap and sample");
   }
   [[nodiscard]] Samples apply(Samples samples, const Conditions& now, const Random& random) const;
 };

@@ -14,7 +14,8 @@ struct Saturation {
       .name = "saturation",
       .summary = "a tap's well is full: charge above it is lost and the pixel is flagged",
       .reference = "EMVA Standard 1288, release 4.0, section 2 (saturation capacity)",
-      .explains = {Covariate::Ambient, Covariate::Exposure, Covariate::Amplitude, Covariate::Range}};
+      .explains = {Covariate::Ambient, Covariate::Exposure, Covariate::Amplitude,
+                   Covariate::Range}};
   static Saturation none() { return {.full_well_electrons = kNoWell}; }
 
   template <class Visitor>

@@ -5,9 +5,9 @@
 
 namespace toftwin::sim {
 
-/// Each tap counts photo-electrons, which arrive independently: Poisson with the noise-free charge as
-/// its mean, times `fano`. With M signal and A ambient electrons per sample in both taps together and
-/// contrast m the phase of N samples then has
+/// Each tap counts photo-electrons, which arrive independently: Poisson with the noise-free charge
+/// as its mean, times `fano`. With M signal and A ambient electrons per sample in both taps
+/// together and contrast m the phase of N samples then has
 ///     σ = √(2 (M + A) / N) / (m M)                                  for fano = 1
 struct ShotNoise {
   double fano = 1.0;  ///< variance per mean

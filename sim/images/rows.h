@@ -6,8 +6,8 @@
 
 namespace toftwin::sim {
 
-/// Calls `work(first, last)` for ranges of rows that together cover 0 … height−1, on all cores. What
-/// a row becomes must not depend on the other rows of the same call.
+/// Calls `work(first, last)` for ranges of rows that together cover 0 … height−1, on all cores.
+/// What a row becomes must not depend on the other rows of the same call.
 template <class Work>
 void forRows(int height, const Work& work) {
   constexpr int kRowsPerTask = 16;

@@ -23,13 +23,15 @@ void readEffect(settings::Table& table, std::vector<AnyEffect>& effects) {
     E effect{};
     table.read(effect);
     if constexpr (std::is_same_v<E, LensScatter>) {
-      if (effect.veil + effect.halo >= 1.0) table.complain("veil", "and halo together must be less than 1");
+      if (effect.veil + effect.halo >= 1.0)
+        table.complain("veil", "and halo together must be less than 1");
     }
     effects.emplace_back(effect);
   });
   if (!is_known) {
-    table.complain("type", type ? fmt::format("= \"{}\" is no effect; there are: {}", *type, names)
-                                : fmt::format("is missing; it names the effect, one of: {}", names));
+    table.complain("type", type
+                               ? fmt::format("= \"{}\" is no effect; there are: {}", *type, names)
+                               : fmt::format("is missing; it names the effect, one of: {}", names));
   }
 }
 
@@ -38,39 +40,51 @@ void checkFrequencies(settings::Table& table, const CameraFile& file) {
   for (const auto& modulation : file.modulations) {
     const double khz = modulation.frequency.in(hertz) / 1e3;
     if (std::abs(khz - std::round(khz)) > 1e-6) {
-      table.complain("modulation", fmt::format("frequency_mhz = {:.9g} must be whole kilohertz", khz / 1e3));
+      table.complain("modulation",
+                     fmt::format("frequency_mhz = {:.9g} must be whole kilohertz", khz / 1e3));
     }
     common_khz = std::gcd(common_khz, std::llround(khz));
     highest_khz = std::max<std::int64_t>(highest_khz, std::llround(khz));
   }
   constexpr std::int64_t kMostCandidates = 4096;
   if (common_khz > 0 && highest_khz / common_khz > kMostCandidates) {
-    table.complain("modulation",
-                   fmt::format("frequencies have {} kHz in common, so {} cycles would have to be tried; choose "
-                               "frequencies in ratios of small whole numbers (at most {} cycles)",
-                               common_khz, highest_khz / common_khz, kMostCandidates));
+    table.complain(
+        "modulation",
+        fmt::format(
+            "frequencies have {} kHz in common, so {} cycles would have to be tried; choose "
+            "frequencies in ratios of small whole numbers (at most {} cycles)",
+            common_khz, highest_khz / common_khz, kMostCandidates));
   }
   if (file.decoder.algorithm != DecodeSettings::Algorithm::KinectV2) return;
-  const auto ratio = [&](std::size_t i) { return file.modulations[i].frequency / file.modulations[1].frequency; };
-  if (file.modulations.size() != 3 || std::abs(ratio(0) - 5.0) > 1e-9 || std::abs(ratio(2) - 7.5) > 1e-9) {
-    table.complain("modulation", "for the kinect_v2 decoder must be three, in the ratio 10 : 2 : 15 (80, 16, 120 MHz)");
+  const auto ratio = [&](std::size_t i) {
+    return file.modulations[i].frequency / file.modulations[1].frequency;
+  };
+  if (file.modulations.size() != 3 || std::abs(ratio(0) - 5.0) > 1e-9 ||
+      std::abs(ratio(2) - 7.5) > 1e-9) {
+    table.complain(
+        "modulation",
+        "for the kinect_v2 decoder must be three, in the ratio 10 : 2 : 15 (80, 16, 120 MHz)");
   }
 }
 
 void checkWaveforms(settings::Table& table, const CameraFile& file) {
   for (const auto& modulation : file.modulations) {
-    const Response response{.frequency = modulation.frequency,
-                            .contrast = modulation.contrast,
-                            .harmonics = relativeHarmonics(modulation.emitted, modulation.demodulating,
-                                                           modulation.frequency, file.sampling.harmonics)};
+    const Response response{
+        .frequency = modulation.frequency,
+        .contrast = modulation.contrast,
+        .harmonics = relativeHarmonics(modulation.emitted, modulation.demodulating,
+                                       modulation.frequency, file.sampling.harmonics)};
     const double mhz = modulation.frequency.in(megahertz);
     if (response.harmonics.empty()) {
-      table.complain("modulation", fmt::format("at {:.6g} MHz has waveforms without a fundamental", mhz));
-    } else if (response.leastCharge() < 0.0) {
       table.complain("modulation",
-                     fmt::format("at {:.6g} MHz has contrast {:.6g}, which would need negative charge at some "
-                                 "phase with these waveforms; it can be at most {:.4g}",
-                                 mhz, modulation.contrast, modulation.contrast / (1.0 - response.leastCharge())));
+                     fmt::format("at {:.6g} MHz has waveforms without a fundamental", mhz));
+    } else if (response.leastCharge() < 0.0) {
+      table.complain(
+          "modulation",
+          fmt::format("at {:.6g} MHz has contrast {:.6g}, which would need negative charge at some "
+                      "phase with these waveforms; it can be at most {:.4g}",
+                      mhz, modulation.contrast,
+                      modulation.contrast / (1.0 - response.leastCharge())));
     }
   }
 }
@@ -82,14 +96,16 @@ CameraFile readCameraFile(settings::Table& table, std::vector<AnyEffect>& effect
   table.read(file);
   for (settings::Table& effect : table.tables("effect")) readEffect(effect, effects);
   if (file.emitters.empty()) table.complain("", "has no [[emitter]]: a camera needs at least one");
-  if (file.modulations.empty()) table.complain("", "has no [[modulation]]: a camera needs at least one frequency");
+  if (file.modulations.empty())
+    table.complain("", "has no [[modulation]]: a camera needs at least one frequency");
   for (const auto& emitter : file.emitters) {
     if (std::hypot(emitter.axis[0], emitter.axis[1], emitter.axis[2]) < 1e-6) {
       table.complain("emitter", "has an axis of length 0, which points nowhere");
     }
   }
   if (file.decoder.nearest >= file.decoder.farthest) {
-    table.complain("decoder", "has nearest_m not below farthest_m, so every range would be invalid");
+    table.complain("decoder",
+                   "has nearest_m not below farthest_m, so every range would be invalid");
   }
   checkFrequencies(table, file);
   if (!file.modulations.empty()) checkWaveforms(table, file);

@@ -27,7 +27,8 @@ struct CameraFile {
       v.number("height", height, {1, 8192}, "pixels");
       v.number("fx", fx, {1.0, 1e6}, "focal length, pixels");
       v.number("fy", fy, {1.0, 1e6}, "focal length, pixels");
-      v.number("cx", cx, {-1e5, 1e5}, "principal point; (0, 0) is the centre of the top left pixel");
+      v.number("cx", cx, {-1e5, 1e5},
+               "principal point; (0, 0) is the centre of the top left pixel");
       v.number("cy", cy, {-1e5, 1e5}, "principal point");
       v.numbers("distortion", distortion, {-100.0, 100.0}, "k1 k2 p1 p2 k3 as in OpenCV");
     }
@@ -45,10 +46,13 @@ struct CameraFile {
     template <class Visitor>
     void visit(Visitor& v) {
       v.numbers("position_mm", position_mm, {-1e4, 1e4}, "from the lens: right, down, ahead");
-      v.numbers("axis", axis, {-1.0, 1.0}, "where it points, in the camera's frame; any length but 0");
+      v.numbers("axis", axis, {-1.0, 1.0},
+                "where it points, in the camera's frame; any length but 0");
       v.quantity("radius", radius, millimetre, {0.0, 1000.0}, "of the shining disc; 0: a point");
-      v.number("power_w", power_w, {0.0, 1e6}, "mean optical power of the uncut lobe over the half space");
-      v.number("lobe_exponent", lobe_exponent, {0.0, 1000.0}, "m of I = power (m + 1) / 2 pi cos^m: 1 is Lambertian");
+      v.number("power_w", power_w, {0.0, 1e6},
+               "mean optical power of the uncut lobe over the half space");
+      v.number("lobe_exponent", lobe_exponent, {0.0, 1000.0},
+               "m of I = power (m + 1) / 2 pi cos^m: 1 is Lambertian");
       v.quantity("half_angle", half_angle, degree, {0.1, 90.0}, "no light outside this cone");
       v.flag("isotropic", isotropic, "the same in all directions instead, power / 4 pi");
     }
@@ -62,20 +66,27 @@ struct CameraFile {
 
     template <class Visitor>
     void visit(Visitor& v) {
-      const auto shapes = {std::pair{"sine", Waveform::Shape::Sine}, std::pair{"square", Waveform::Shape::Square},
+      const auto shapes = {std::pair{"sine", Waveform::Shape::Sine},
+                           std::pair{"square", Waveform::Shape::Square},
                            std::pair{"clipped_sine", Waveform::Shape::ClippedSine},
                            std::pair{"impulse", Waveform::Shape::Impulse}};
-      v.quantity("frequency", frequency, megahertz, {0.1, 1000.0}, "modulation frequency, whole kilohertz");
-      v.number("contrast", contrast, {1e-4, 1.0},
-               "amplitude of the demodulated fundamental per collected electron, waveforms included");
+      v.quantity("frequency", frequency, megahertz, {0.1, 1000.0},
+                 "modulation frequency, whole kilohertz");
+      v.number(
+          "contrast", contrast, {1e-4, 1.0},
+          "amplitude of the demodulated fundamental per collected electron, waveforms included");
       v.quantity("exposure", exposure, microsecond, {1.0, 20'000.0}, "of one raw exposure");
       v.choice("emitted", emitted.shape, shapes, "the light's waveform");
-      v.number("emitted_duty", emitted.duty, {0.01, 0.99}, "square: share of the period that is on");
-      v.number("emitted_clip", emitted.clip, {0.05, 1.0}, "clipped_sine: cut at this share of the amplitude");
-      v.quantity("rise", emitted.rise, nanosecond, {0.0, 1000.0}, "time constant of the emitter's low pass");
+      v.number("emitted_duty", emitted.duty, {0.01, 0.99},
+               "square: share of the period that is on");
+      v.number("emitted_clip", emitted.clip, {0.05, 1.0},
+               "clipped_sine: cut at this share of the amplitude");
+      v.quantity("rise", emitted.rise, nanosecond, {0.0, 1000.0},
+                 "time constant of the emitter's low pass");
       v.choice("demodulated", demodulating.shape, shapes,
                "the pixel's reference; impulse: the correlation function is `emitted` itself");
-      v.number("demodulated_duty", demodulating.duty, {0.01, 0.99}, "square: share of the period that is on");
+      v.number("demodulated_duty", demodulating.duty, {0.01, 0.99},
+               "square: share of the period that is on");
     }
   };
 
@@ -89,11 +100,16 @@ struct CameraFile {
 
     template <class Visitor>
     void visit(Visitor& v) {
-      v.number("steps", steps, {3, 16}, "raw exposures per frequency, the reference shifted by 1/steps each");
-      v.number("taps", taps, {1, 2}, "2: what one tap misses the other collects, and their difference counts");
-      v.number("harmonics", harmonics, {1, 31}, "of the modulation that are traced; a sine needs 1");
-      v.quantity("gap", gap, microsecond, {0.0, 100'000.0}, "between raw exposures, for reading out");
-      v.quantity("frame_interval", frame_interval, millisecond, {1.0, 100'000.0}, "from frame to frame");
+      v.number("steps", steps, {3, 16},
+               "raw exposures per frequency, the reference shifted by 1/steps each");
+      v.number("taps", taps, {1, 2},
+               "2: what one tap misses the other collects, and their difference counts");
+      v.number("harmonics", harmonics, {1, 31},
+               "of the modulation that are traced; a sine needs 1");
+      v.quantity("gap", gap, microsecond, {0.0, 100'000.0},
+                 "between raw exposures, for reading out");
+      v.quantity("frame_interval", frame_interval, millisecond, {1.0, 100'000.0},
+                 "from frame to frame");
       v.flag("factory_calibrated", factory_calibrated,
              "the device knows and subtracts the constant delay of its waveforms' fundamental");
     }
@@ -105,7 +121,8 @@ struct CameraFile {
     template <class Visitor>
     void visit(Visitor& v) {
       v.number("electrons_per_radiance_s", electrons_per_radiance_s, {1.0, 1e15},
-               "electrons in both taps per W/(m² sr) at the lens and second: π/4 T A R / (F² q) with lens "
+               "electrons in both taps per W/(m² sr) at the lens and second: π/4 T A R / (F² q) "
+               "with lens "
                "transmission T, F-number F, pixel area A, responsivity R in A/W, q = 1.602e-19 C");
     }
   };
@@ -130,7 +147,8 @@ struct CameraFile {
   }
 };
 
-/// Reads the file and its effects, and checks what no single key can say. Errors are left in the table.
+/// Reads the file and its effects, and checks what no single key can say. Errors are left in the
+/// table.
 CameraFile readCameraFile(settings::Table& table, std::vector<AnyEffect>& effects);
 
 }  // namespace toftwin::sim

@@ -48,7 +48,8 @@ double Response::leastCharge() const {
   return least;
 }
 
-std::vector<std::complex<double>> relativeHarmonics(const Waveform& emitted, const Waveform& demodulating,
+std::vector<std::complex<double>> relativeHarmonics(const Waveform& emitted,
+                                                    const Waveform& demodulating,
                                                     Frequency frequency, int count) {
   std::vector<std::complex<double>> relative;
   double fundamental = 0.0;
@@ -65,13 +66,15 @@ std::vector<std::complex<double>> relativeHarmonics(const Waveform& emitted, con
 Samples correlate(const Light& light, const std::vector<Response>& responses, int steps, int taps) {
   const int width = light.width(), height = light.height();
   Samples samples{.steps = steps, .taps = taps};
-  samples.electrons.assign(responses.size() * static_cast<std::size_t>(steps * taps), Image<float>{width, height});
+  samples.electrons.assign(responses.size() * static_cast<std::size_t>(steps * taps),
+                           Image<float>{width, height});
   std::size_t next_image = 0;
   for (std::size_t f = 0; f < responses.size(); ++f) {
     samples.frequencies.push_back(responses[f].frequency);
     const auto half_gain = static_cast<float>(0.5 * responses[f].electrons_per_radiance);
     for (int k = 0; k < steps; ++k) {
-      const std::vector<Weight> weights = weightsOf(responses[f], 2.0 * std::numbers::pi * k / steps);
+      const std::vector<Weight> weights =
+          weightsOf(responses[f], 2.0 * std::numbers::pi * k / steps);
       Image<float>* taps_of_step = &samples.electrons[next_image];
       next_image += static_cast<std::size_t>(taps);
       forRows(height, [&](int first_row, int last_row) {
@@ -91,7 +94,8 @@ Samples correlate(const Light& light, const std::vector<Response>& responses, in
             float* electrons = &taps_of_step[tap](0, y);
             const float sign = tap == 0 ? 1.0F : -1.0F;
             for (int x = 0; x < width; ++x) {
-              electrons[x] = half_gain * (steady[x] + ambient[x]) + sign * modulated[static_cast<std::size_t>(x)];
+              electrons[x] = half_gain * (steady[x] + ambient[x]) +
+                             sign * modulated[static_cast<std::size_t>(x)];
             }
           }
         }

@@ -13,26 +13,29 @@ namespace toftwin::sim {
 /// How a pixel answers to light modulated at one frequency.
 struct Response {
   Frequency frequency{};
-  double contrast = 1.0;            ///< m: amplitude of the fundamental per collected electron
+  double contrast = 1.0;                ///< m: amplitude of the fundamental per collected electron
   double electrons_per_radiance = 1.0;  ///< over one raw exposure, both taps together
   /// ĉₙ = eₙ rₙ* / |e₁ r₁| for n = 1 … harmonics: emitted and demodulating waveform.
   std::vector<std::complex<double>> harmonics{};
 
   /// The fundamental's phase at range zero: −arg ĉ₁.
   [[nodiscard]] Angle zeroPhase() const;
-  /// Least charge of a tap per mean charge, over all phases: negative is impossible for a real pixel.
+  /// Least charge of a tap per mean charge, over all phases: negative is impossible for a real
+  /// pixel.
   [[nodiscard]] double leastCharge() const;
 };
 
 /// ĉₙ of an emitted and a demodulating waveform. Empty if either has no fundamental.
-std::vector<std::complex<double>> relativeHarmonics(const Waveform& emitted, const Waveform& demodulating,
+std::vector<std::complex<double>> relativeHarmonics(const Waveform& emitted,
+                                                    const Waveform& demodulating,
                                                     Frequency frequency, int count);
 
 /// Collects a raw exposure's charge, noise-free: at step k, θₖ = 2πk/steps,
 ///     tap 0, 1 = g/2 · ( L + A ± m Re Σₙ ĉₙ Pₙ e^(i n θₖ) )
-/// with the light's phasors Pₙ, its own unmodulated radiance L, the ambient radiance A, and g electrons per
-/// radiance. Wiggling is born here: harmonics that the steps cannot tell from the fundamental. The light has
-/// the responses' frequencies in their order and at least their harmonics.
+/// with the light's phasors Pₙ, its own unmodulated radiance L, the ambient radiance A, and g
+/// electrons per radiance. Wiggling is born here: harmonics that the steps cannot tell from the
+/// fundamental. The light has the responses' frequencies in their order and at least their
+/// harmonics.
 Samples correlate(const Light& light, const std::vector<Response>& responses, int steps, int taps);
 
 }  // namespace toftwin::sim

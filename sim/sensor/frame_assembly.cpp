@@ -9,8 +9,8 @@
 namespace toftwin::sim {
 namespace {
 
-constexpr std::array kAllPlanes{PlaneKind::Range,   PlaneKind::Depth,   PlaneKind::Amplitude,
-                                PlaneKind::Ambient, PlaneKind::Flags,   PlaneKind::Samples,
+constexpr std::array kAllPlanes{PlaneKind::Range,   PlaneKind::Depth,      PlaneKind::Amplitude,
+                                PlaneKind::Ambient, PlaneKind::Flags,      PlaneKind::Samples,
                                 PlaneKind::Phasors, PlaneKind::TruthRange, PlaneKind::TruthNormal};
 
 void rejectImpossible(RangeImage& range) {
@@ -30,7 +30,8 @@ Plane planar(PlaneKind kind, int width, int height, int channels, std::vector<fl
 Image<float> depthOf(const Image<float>& range_m, const Image<float>& ray_z, int left, int top) {
   Image<float> depth_m{range_m.width(), range_m.height()};
   for (int y = 0; y < range_m.height(); ++y) {
-    for (int x = 0; x < range_m.width(); ++x) depth_m(x, y) = range_m(x, y) * ray_z(left + x, top + y);
+    for (int x = 0; x < range_m.width(); ++x)
+      depth_m(x, y) = range_m(x, y) * ray_z(left + x, top + y);
   }
   return depth_m;
 }
@@ -47,7 +48,8 @@ Plane samplesOf(const Samples& samples) {
     const auto second = samples.electrons[c * taps + 1].pixels();
     for (std::size_t i = 0; i < pixels; ++i) values[c * pixels + i] -= second[i];
   }
-  return planar(PlaneKind::Samples, samples.width(), samples.height(), static_cast<int>(channels), std::move(values));
+  return planar(PlaneKind::Samples, samples.width(), samples.height(), static_cast<int>(channels),
+                std::move(values));
 }
 
 Plane phasorsOf(const RangeImage& range) {
@@ -87,24 +89,41 @@ CameraInfo cameraOfRegion(const CameraInfo& camera, int left, int top, int width
   return region;
 }
 
-std::vector<Plane> planesOf(const SensorModel& model, SensorModel::Exposed exposed, const Truth& truth,
-                            std::span<const PlaneKind> kinds, int left, int top) {
+std::vector<Plane> planesOf(const SensorModel& model, SensorModel::Exposed exposed,
+                            const Truth& truth, std::span<const PlaneKind> kinds, int left,
+                            int top) {
   RangeImage& range = exposed.range;
   rejectImpossible(range);
   std::vector<Plane> planes;
   for (PlaneKind kind : kinds) {
     switch (kind) {
-      case PlaneKind::Range: planes.push_back(toPlane(kind, range.range_m)); break;
+      case PlaneKind::Range:
+        planes.push_back(toPlane(kind, range.range_m));
+        break;
       case PlaneKind::Depth:
         planes.push_back(toPlane(kind, depthOf(range.range_m, model.rays().z, left, top)));
         break;
-      case PlaneKind::Amplitude: planes.push_back(toPlane(kind, range.amplitude)); break;
-      case PlaneKind::Ambient: planes.push_back(toPlane(kind, range.ambient)); break;
-      case PlaneKind::Flags: planes.push_back(toPlane(kind, range.flags)); break;
-      case PlaneKind::Samples: planes.push_back(samplesOf(exposed.samples)); break;
-      case PlaneKind::Phasors: planes.push_back(phasorsOf(range)); break;
-      case PlaneKind::TruthRange: planes.push_back(toPlane(kind, truth.range_m)); break;
-      case PlaneKind::TruthNormal: planes.push_back(normalsOf(truth.normal)); break;
+      case PlaneKind::Amplitude:
+        planes.push_back(toPlane(kind, range.amplitude));
+        break;
+      case PlaneKind::Ambient:
+        planes.push_back(toPlane(kind, range.ambient));
+        break;
+      case PlaneKind::Flags:
+        planes.push_back(toPlane(kind, range.flags));
+        break;
+      case PlaneKind::Samples:
+        planes.push_back(samplesOf(exposed.samples));
+        break;
+      case PlaneKind::Phasors:
+        planes.push_back(phasorsOf(range));
+        break;
+      case PlaneKind::TruthRange:
+        planes.push_back(toPlane(kind, truth.range_m));
+        break;
+      case PlaneKind::TruthNormal:
+        planes.push_back(normalsOf(truth.normal));
+        break;
     }
   }
   return planes;

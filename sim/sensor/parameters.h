@@ -19,8 +19,8 @@
 
 namespace toftwin::sim {
 
-/// Visitor that writes every key and value, members of groups included: equal text, equal aggregate.
-/// Doubles as shortest text that reads back to the same bits.
+/// Visitor that writes every key and value, members of groups included: equal text, equal
+/// aggregate. Doubles as shortest text that reads back to the same bits.
 class CanonicalText {
  public:
   std::string written;
@@ -30,11 +30,12 @@ class CanonicalText {
     line(name, exact(value.in(unit)));
   }
   template <class D>
-  void quantities(const char* name, std::vector<Quantity<D>>& values, Unit<D> unit, Bounds, const char*) {
+  void quantities(const char* name, std::vector<Quantity<D>>& values, Unit<D> unit, Bounds,
+                  const char*) {
     for (auto& value : values) line(name, exact(value.in(unit)));
   }
   template <class Number>
-    requires std::is_arithmetic_v<Number>
+  requires std::is_arithmetic_v<Number>
   void number(const char* name, Number& value, Bounds, const char*) {
     line(name, exact(static_cast<double>(value)));
   }
@@ -43,14 +44,12 @@ class CanonicalText {
     for (double value : values) line(name, exact(value));
   }
   template <class Text>
-    requires std::is_same_v<Text, std::string>
-  void text(const char* name, Text& value, const char*) {
-    line(name, settings::toToml(value));
-  }
+  requires std::is_same_v<Text, std::string>
+  void text(const char* name, Text& value, const char*) { line(name, settings::toToml(value)); }
   void flag(const char* name, bool& value, const char*) { line(name, value ? "true" : "false"); }
   template <class Enum>
-  void choice(const char* name, Enum& value, std::initializer_list<std::pair<const char*, Enum>> options,
-              const char*) {
+  void choice(const char* name, Enum& value,
+              std::initializer_list<std::pair<const char*, Enum>> options, const char*) {
     for (const auto& [word, meaning] : options) {
       if (meaning == value) line(name, word);
     }
@@ -84,14 +83,14 @@ class NumberSetter {
 
   std::vector<std::string> names;  ///< all numbers met
   bool is_set = false;
-  std::string problem;             ///< why the value does not do, or empty
+  std::string problem;  ///< why the value does not do, or empty
 
   template <class D>
   void quantity(const char* name, Quantity<D>& value, Unit<D> unit, Bounds bounds, const char*) {
     if (wants(std::string{name} + "_" + unit.suffix, bounds, false)) value = value_ * unit;
   }
   template <class Number>
-    requires std::is_arithmetic_v<Number>
+  requires std::is_arithmetic_v<Number>
   void number(const char* name, Number& value, Bounds bounds, const char*) {
     if (wants(name, bounds, std::is_integral_v<Number>)) value = static_cast<Number>(value_);
   }
@@ -102,7 +101,8 @@ class NumberSetter {
     names.push_back(std::move(name));
     if (!is_it) return false;
     is_set = true;
-    if (std::isnan(value_) || !bounds.contains(value_)) problem = "must be " + settings::describe(bounds);
+    if (std::isnan(value_) || !bounds.contains(value_))
+      problem = "must be " + settings::describe(bounds);
     if (integral && value_ != std::floor(value_)) problem = "must be a whole number";
     return problem.empty();
   }

@@ -42,8 +42,14 @@ std::string canonicalText(CameraFile file, const std::vector<AnyEffect>& effects
 }
 
 CameraInfo cameraInfo(const CameraFile::Lens& lens) {
-  CameraInfo camera{.width = lens.width, .height = lens.height, .fx = lens.fx, .fy = lens.fy,
-                    .cx = lens.cx, .cy = lens.cy, .distortion = lens.distortion, .calibration_id = {}};
+  CameraInfo camera{.width = lens.width,
+                    .height = lens.height,
+                    .fx = lens.fx,
+                    .fy = lens.fy,
+                    .cx = lens.cx,
+                    .cy = lens.cy,
+                    .distortion = lens.distortion,
+                    .calibration_id = {}};
   CanonicalText canonical;
   CameraFile::Lens copy = lens;
   copy.visit(canonical);
@@ -69,22 +75,24 @@ std::vector<Response> responsesOf(const CameraFile& file) {
     responses.push_back(
         {.frequency = modulation.frequency,
          .contrast = modulation.contrast,
-         .electrons_per_radiance = file.pixel.electrons_per_radiance_s * modulation.exposure.in(second),
-         .harmonics = relativeHarmonics(modulation.emitted, modulation.demodulating, modulation.frequency,
-                                        file.sampling.harmonics)});
+         .electrons_per_radiance =
+             file.pixel.electrons_per_radiance_s * modulation.exposure.in(second),
+         .harmonics = relativeHarmonics(modulation.emitted, modulation.demodulating,
+                                        modulation.frequency, file.sampling.harmonics)});
   }
   return responses;
 }
 
 /// Applies those effects that act on this type of image, in their order.
 template <class Of>
-Of applyAll(Of image, const std::vector<AnyEffect>& effects, const Conditions& now, std::uint64_t seed,
-            std::uint64_t frame) {
+Of applyAll(Of image, const std::vector<AnyEffect>& effects, const Conditions& now,
+            std::uint64_t seed, std::uint64_t frame) {
   for (std::size_t place = 0; place < effects.size(); ++place) {
     std::visit(
         [&]<class E>(const E& effect) {
           if constexpr (std::is_same_v<ImageOf<E>, Of>) {
-            image = effect.apply(std::move(image), now, Random{seed, frame, effectKey(E::about.name, place)});
+            image = effect.apply(std::move(image), now,
+                                 Random{seed, frame, effectKey(E::about.name, place)});
           }
         },
         effects[place]);
@@ -94,7 +102,8 @@ Of applyAll(Of image, const std::vector<AnyEffect>& effects, const Conditions& n
 
 bool anyActsOnLight(const std::vector<AnyEffect>& effects) {
   for (const AnyEffect& any : effects) {
-    if (std::visit([]<class E>(const E&) { return std::is_same_v<ImageOf<E>, Light>; }, any)) return true;
+    if (std::visit([]<class E>(const E&) { return std::is_same_v<ImageOf<E>, Light>; }, any))
+      return true;
   }
   return false;
 }
@@ -109,8 +118,8 @@ Image<float> cropped(const Image<float>& full, int left, int top, int width, int
 
 Result<> firstProblem(const NumberSetter& setter, std::string_view parameter, double value) {
   if (setter.problem.empty()) return {};
-  return Error{Error::Code::InvalidArgument,
-               fmt::format("{} = {:.12g} is out of bounds: it {}", parameter, value, setter.problem)};
+  return Error{Error::Code::InvalidArgument, fmt::format("{} = {:.12g} is out of bounds: it {}",
+                                                         parameter, value, setter.problem)};
 }
 
 }  // namespace
@@ -121,7 +130,8 @@ std::shared_ptr<const SensorModel::Impl> SensorModel::build(Impl impl) {
   impl.responses = responsesOf(impl.file);
   impl.decoder = impl.file.decoder;
   if (impl.file.sampling.factory_calibrated) {
-    for (const Response& response : impl.responses) impl.decoder.zero_phase.push_back(response.zeroPhase());
+    for (const Response& response : impl.responses)
+      impl.decoder.zero_phase.push_back(response.zeroPhase());
   }
   if (impl.rays.x.empty()) impl.rays = raysOf(impl.camera);
   return std::make_shared<const Impl>(std::move(impl));
@@ -175,28 +185,31 @@ TraceRequest SensorModel::traceRequest() const {
   TraceRequest request;
   request.camera = impl_->camera;
   request.harmonics = impl_->file.sampling.harmonics;
-  for (const auto& modulation : impl_->file.modulations) request.frequencies.push_back(modulation.frequency);
+  for (const auto& modulation : impl_->file.modulations)
+    request.frequencies.push_back(modulation.frequency);
   for (const auto& emitter : impl_->file.emitters) {
     const auto& p = emitter.position_mm;
-    request.emitters.push_back({.position_m = Vec3d{p[0], p[1], p[2]} * 1e-3,
-                                .axis = normalised(Vec3d{emitter.axis[0], emitter.axis[1], emitter.axis[2]}),
-                                .radius = emitter.radius,
-                                .power_w = emitter.power_w,
-                                .lobe_exponent = emitter.lobe_exponent,
-                                .half_angle = emitter.half_angle,
-                                .isotropic = emitter.isotropic});
+    request.emitters.push_back(
+        {.position_m = Vec3d{p[0], p[1], p[2]} * 1e-3,
+         .axis = normalised(Vec3d{emitter.axis[0], emitter.axis[1], emitter.axis[2]}),
+         .radius = emitter.radius,
+         .power_w = emitter.power_w,
+         .lobe_exponent = emitter.lobe_exponent,
+         .half_angle = emitter.half_angle,
+         .isotropic = emitter.isotropic});
   }
   return request;
 }
 
-SensorModel::Exposed SensorModel::expose(const Light& light, const Moment& moment, std::uint64_t seed,
-                                         std::uint64_t frame, int region_x, int region_y) const {
-  return readOut(collect(light, moment, seed, frame, region_x, region_y), moment, seed, frame, region_x,
-                 region_y);
+SensorModel::Exposed SensorModel::expose(const Light& light, const Moment& moment,
+                                         std::uint64_t seed, std::uint64_t frame, int region_x,
+                                         int region_y) const {
+  return readOut(collect(light, moment, seed, frame, region_x, region_y), moment, seed, frame,
+                 region_x, region_y);
 }
 
-Samples SensorModel::collect(const Light& light, const Moment& moment, std::uint64_t seed, std::uint64_t frame,
-                             int region_x, int region_y) const {
+Samples SensorModel::collect(const Light& light, const Moment& moment, std::uint64_t seed,
+                             std::uint64_t frame, int region_x, int region_y) const {
   const CameraFile::Sampling& sampling = impl_->file.sampling;
   if (!anyActsOnLight(impl_->effects)) {
     return correlate(light, impl_->responses, sampling.steps, sampling.taps);
@@ -206,15 +219,18 @@ Samples SensorModel::collect(const Light& light, const Moment& moment, std::uint
   return correlate(at_pixel, impl_->responses, sampling.steps, sampling.taps);
 }
 
-SensorModel::Exposed SensorModel::readOut(Samples collected, const Moment& moment, std::uint64_t seed,
-                                          std::uint64_t frame, int region_x, int region_y) const {
+SensorModel::Exposed SensorModel::readOut(Samples collected, const Moment& moment,
+                                          std::uint64_t seed, std::uint64_t frame, int region_x,
+                                          int region_y) const {
   const Conditions now{moment, region_x, region_y, impl_->camera.width};
   Samples counted = applyAll(std::move(collected), impl_->effects, now, seed, frame);
   const bool is_whole =
       counted.width() == impl_->camera.width && counted.height() == impl_->camera.height;
-  RangeImage range = is_whole ? decode(counted, impl_->decoder, impl_->rays.x)
-                              : decode(counted, impl_->decoder,
-                                       cropped(impl_->rays.x, region_x, region_y, counted.width(), counted.height()));
+  RangeImage range =
+      is_whole
+          ? decode(counted, impl_->decoder, impl_->rays.x)
+          : decode(counted, impl_->decoder,
+                   cropped(impl_->rays.x, region_x, region_y, counted.width(), counted.height()));
   range = applyAll(std::move(range), impl_->effects, now, seed, frame);
   return {.samples = std::move(counted), .range = std::move(range)};
 }
@@ -225,7 +241,8 @@ bool SensorModel::collectsTheSameEachFrame() const {
         []<class E>(const E&) {
           constexpr Covariates on = E::about.explains;
           return std::is_same_v<ImageOf<E>, Light> &&
-                 (on.contains(Covariate::Frame) || on.contains(Covariate::Time) || on.contains(Covariate::Temperature));
+                 (on.contains(Covariate::Frame) || on.contains(Covariate::Time) ||
+                  on.contains(Covariate::Temperature));
         },
         any);
     if (changes) return false;
@@ -240,7 +257,8 @@ std::vector<std::string> SensorModel::parameterNames() const {
         [&]<class E>(E& effect) {
           NumberSetter lister{"", 0.0};
           effect.visit(lister);
-          for (const std::string& key : lister.names) names.push_back(fmt::format("{}.{}", E::about.name, key));
+          for (const std::string& key : lister.names)
+            names.push_back(fmt::format("{}.{}", E::about.name, key));
         },
         any);
   }
@@ -255,8 +273,9 @@ Result<SensorModel> SensorModel::with(std::string_view parameter, double value) 
     is_known = true;
     for (auto& modulation : changed.file.modulations) {
       if (!(value >= 1.0 && value <= 20'000.0)) {
-        return Error{Error::Code::InvalidArgument,
-                     fmt::format("exposure_us = {:.12g} is out of bounds: it must be 1 to 20000 us", value)};
+        return Error{
+            Error::Code::InvalidArgument,
+            fmt::format("exposure_us = {:.12g} is out of bounds: it must be 1 to 20000 us", value)};
       }
       modulation.exposure = value * microsecond;
     }

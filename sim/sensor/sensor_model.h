@@ -20,9 +20,10 @@
 
 namespace toftwin::sim {
 
-/// A camera as data: lens, emitters, modulation, pixel, and the ordered list of its effects. Read from
-/// a camera file (docs/camera-file.md); the presets lie in sim/cameras/. An invariant-free aggregate
-/// is not enough here because the effect list is open; see camera_file.h for the file's schema.
+/// A camera as data: lens, emitters, modulation, pixel, and the ordered list of its effects. Read
+/// from a camera file (docs/camera-file.md); the presets lie in sim/cameras/. An invariant-free
+/// aggregate is not enough here because the effect list is open; see camera_file.h for the file's
+/// schema.
 class SensorModel {
  public:
   static Result<SensorModel> load(const std::filesystem::path& file);
@@ -49,8 +50,8 @@ class SensorModel {
   };
   [[nodiscard]] const Rays& rays() const;
 
-  /// What the tracer must give for this camera: lens, emitters, frequencies and harmonics filled in;
-  /// pose, sample count, surfaces, region and seed are the caller's.
+  /// What the tracer must give for this camera: lens, emitters, frequencies and harmonics filled
+  /// in; pose, sample count, surfaces, region and seed are the caller's.
   [[nodiscard]] TraceRequest traceRequest() const;
 
   /// One exposure: light → effects → samples → effects → decoding → range → effects. `moment` gives
@@ -63,18 +64,19 @@ class SensorModel {
   [[nodiscard]] Exposed expose(const Light& light, const Moment& moment, std::uint64_t seed,
                                std::uint64_t frame, int region_x = 0, int region_y = 0) const;
 
-  /// expose() in its two halves: expose(light, …) = readOut(collect(light, …), …). What is collected is
-  /// free of noise, and where no effect on the light changes with time it can be read out again and
-  /// again, each time with the noise of another frame.
+  /// expose() in its two halves: expose(light, …) = readOut(collect(light, …), …). What is
+  /// collected is free of noise, and where no effect on the light changes with time it can be read
+  /// out again and again, each time with the noise of another frame.
   [[nodiscard]] Samples collect(const Light& light, const Moment& moment, std::uint64_t seed,
                                 std::uint64_t frame, int region_x = 0, int region_y = 0) const;
   [[nodiscard]] Exposed readOut(Samples collected, const Moment& moment, std::uint64_t seed,
                                 std::uint64_t frame, int region_x = 0, int region_y = 0) const;
-  /// Whether collect() gives the same for every frame of one light, exposure and ambient illuminance.
+  /// Whether collect() gives the same for every frame of one light, exposure and ambient
+  /// illuminance.
   [[nodiscard]] bool collectsTheSameEachFrame() const;
 
-  /// Names that with() takes: "exposure_us" (of all raw exposures) and "<effect>.<key>" for every number
-  /// of the model's effects ("lens_scatter.veil").
+  /// Names that with() takes: "exposure_us" (of all raw exposures) and "<effect>.<key>" for every
+  /// number of the model's effects ("lens_scatter.veil").
   [[nodiscard]] std::vector<std::string> parameterNames() const;
   /// The same camera with one number changed. An error names an unknown parameter or the bounds.
   [[nodiscard]] Result<SensorModel> with(std::string_view parameter, double value) const;
@@ -89,8 +91,7 @@ class SensorModel {
   std::shared_ptr<const Impl> impl_;  // shared by copies; nobody changes it
 };
 
-/// All keys of a camera file as Markdown: the camera's table, then one table per effect.
+/// All keys of a camera file but its effects' as a Markdown table.
 std::string cameraFileTable();
-std::string effectTables();
 
 }  // namespace toftwin::sim

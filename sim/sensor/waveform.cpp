@@ -17,7 +17,8 @@ double clippedSine(int n, double q) {
   const auto antiderivative = [n](double x) {  // of cos x cos nx
     const double m = n;
     if (n == 1) return x / 2.0 + std::sin(2.0 * x) / 4.0;
-    return std::sin((m - 1.0) * x) / (2.0 * (m - 1.0)) + std::sin((m + 1.0) * x) / (2.0 * (m + 1.0));
+    return std::sin((m - 1.0) * x) / (2.0 * (m - 1.0)) +
+           std::sin((m + 1.0) * x) / (2.0 * (m + 1.0));
   };
   const double flat = q * std::sin(n * alpha) / n;
   return 2.0 / (kPi * q) * (flat + antiderivative(kPi / 2.0) - antiderivative(alpha));
@@ -25,10 +26,14 @@ double clippedSine(int n, double q) {
 
 double realCoefficient(const Waveform& wave, int n) {
   switch (wave.shape) {
-    case Waveform::Shape::Sine: return n == 1 ? 0.5 : 0.0;
-    case Waveform::Shape::Square: return std::sin(n * kPi * wave.duty) / (n * kPi * wave.duty);
-    case Waveform::Shape::ClippedSine: return clippedSine(n, wave.clip);
-    case Waveform::Shape::Impulse: return 1.0;
+    case Waveform::Shape::Sine:
+      return n == 1 ? 0.5 : 0.0;
+    case Waveform::Shape::Square:
+      return std::sin(n * kPi * wave.duty) / (n * kPi * wave.duty);
+    case Waveform::Shape::ClippedSine:
+      return clippedSine(n, wave.clip);
+    case Waveform::Shape::Impulse:
+      return 1.0;
   }
   return 0.0;
 }
@@ -37,7 +42,7 @@ double realCoefficient(const Waveform& wave, int n) {
 
 std::complex<double> Waveform::coefficient(int n, Frequency fundamental) const {
   // RC low pass: 1 / (1 + i n ω τ)
-  const double n_omega_tau = 2.0 * kPi * n * fundamental.in(hertz) * rise.in(second);
+  const double n_omega_tau = 2.0 * kPi * n * fundamental.in(hertz)*rise.in(second);
   return realCoefficient(*this, n) / std::complex<double>{1.0, n_omega_tau};
 }
 

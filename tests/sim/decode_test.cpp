@@ -22,8 +22,9 @@ constexpr double kPi = std::numbers::pi;
 bool has(std::uint8_t flags, PixelFlag flag) { return (flags & static_cast<unsigned>(flag)) != 0; }
 
 /// Sₖ = B + A cos(φ − θₖ) of one pixel per phase, made without the simulator.
-Samples cosineSamples(std::vector<Frequency> frequencies, int steps, const std::vector<std::vector<double>>& phases,
-                      double amplitude, double mean) {
+Samples cosineSamples(std::vector<Frequency> frequencies, int steps,
+                      const std::vector<std::vector<double>>& phases, double amplitude,
+                      double mean) {
   Samples samples;
   samples.steps = steps;
   const int width = static_cast<int>(phases.front().size());
@@ -31,8 +32,9 @@ Samples cosineSamples(std::vector<Frequency> frequencies, int steps, const std::
     for (int k = 0; k < steps; ++k) {
       Image<float> image{width, 1};
       for (int x = 0; x < width; ++x) {
-        image(x, 0) = static_cast<float>(
-            mean + amplitude * std::cos(phases[f][static_cast<std::size_t>(x)] - 2.0 * kPi * k / steps));
+        image(x, 0) =
+            static_cast<float>(mean + amplitude * std::cos(phases[f][static_cast<std::size_t>(x)] -
+                                                           2.0 * kPi * k / steps));
       }
       samples.electrons.push_back(std::move(image));
     }
@@ -47,14 +49,17 @@ TEST(Demodulation, GivesPhaseAmplitudeAndMeanForEveryNumberOfSteps) {
     EXPECT_NEAR(std::arg(image.phasors[0](0, 0)), -1.234, 1e-6) << steps;
     EXPECT_NEAR(image.amplitude(0, 0), 500.0, 1e-3) << steps;
     EXPECT_NEAR(image.ambient(0, 0), 2000.0, 1e-2) << steps;
-    EXPECT_NEAR(image.range_m(0, 0), 1.234 / (4.0 * kPi * 20e6) * kSpeedOfLight_m_per_s, 2e-6) << steps;
+    EXPECT_NEAR(image.range_m(0, 0), 1.234 / (4.0 * kPi * 20e6) * kSpeedOfLight_m_per_s, 2e-6)
+        << steps;
   }
 }
 
 TEST(Demodulation, PolarRowIsTheArcTangentInCycles) {
   std::vector<std::complex<float>> phasors;
-  for (int i = -5000; i < 5000; ++i) phasors.push_back(std::polar(3.0F, static_cast<float>(i) * 6.2831853e-4F));
-  phasors.insert(phasors.end(), {{1, 0}, {0, 1}, {-1, 0}, {0, -1}, {1, 1}, {-1, -1}, {-1, 1}, {1, -1}});
+  for (int i = -5000; i < 5000; ++i)
+    phasors.push_back(std::polar(3.0F, static_cast<float>(i) * 6.2831853e-4F));
+  phasors.insert(phasors.end(),
+                 {{1, 0}, {0, 1}, {-1, 0}, {0, -1}, {1, 1}, {-1, -1}, {-1, 1}, {1, -1}});
   std::vector<float> cycles(phasors.size()), amplitudes(phasors.size());
   polarRow(phasors.data(), phasors.size(), 0.25F, cycles.data(), amplitudes.data());
   for (std::size_t i = 0; i < phasors.size(); ++i) {
@@ -68,11 +73,14 @@ TEST(Demodulation, PolarRowIsTheArcTangentInCycles) {
 }
 
 TEST(Decode, SeesAWallBeyondTheUnambiguousRangeAsNearer) {
-  const struct { Frequency f; double period_m; } table[] = {{16_MHz, 9.3685}, {80_MHz, 1.8737}, {120_MHz, 1.2491}, {30_MHz, 4.9965}};
+  const struct {
+    Frequency f;
+    double period_m;
+  } table[] = {{16_MHz, 9.3685}, {80_MHz, 1.8737}, {120_MHz, 1.2491}, {30_MHz, 4.9965}};
   for (const auto& row : table) {
     EXPECT_NEAR(unambiguousRange(row.f).in(metre), row.period_m, 5e-5);
     const double beyond_m = row.period_m + 0.7;
-    const double phase = 4.0 * kPi * row.f.in(hertz) * beyond_m / kSpeedOfLight_m_per_s;
+    const double phase = 4.0 * kPi * row.f.in(hertz)*beyond_m / kSpeedOfLight_m_per_s;
     const RangeImage image = decode(cosineSamples({row.f}, 4, {{phase}}, 500.0, 2000.0), {});
     EXPECT_NEAR(image.range_m(0, 0), beyond_m - unambiguousRange(row.f).in(metre), 3e-6);
   }
@@ -112,7 +120,8 @@ TEST(Unwrapper, WeighsFrequenciesByWhatTheyAreWorth) {
   std::vector<double> cycles = cyclesOf(frequencies, 2.0);
   cycles[0] += 0.01;
   const double off_m = unwrap(cycles, std::vector<double>{2.0, 1.0}).range_m - 2.0;
-  EXPECT_NEAR(off_m, 0.01 * unambiguousRange(20_MHz).in(metre) * (4.0 * 400.0) / (4.0 * 400.0 + 1e4), 1e-9);
+  EXPECT_NEAR(
+      off_m, 0.01 * unambiguousRange(20_MHz).in(metre) * (4.0 * 400.0) / (4.0 * 400.0 + 1e4), 1e-9);
 }
 
 TEST(KinectV2, UnwrapsExactlyOver18Metres) {
@@ -131,9 +140,12 @@ TEST(KinectV2, MovesBy110MillimetresPerRadianAtAnyFrequency) {
   const auto cycles = cyclesOf({80_MHz, 16_MHz, 120_MHz}, 3.21);
   const double at = unwrapKinectV2(cycles[0], cycles[1], cycles[2], unit_m).range_m;
   const double turn = 0.01 / (2.0 * kPi);  // 10 mrad
-  EXPECT_NEAR(1e5 * (unwrapKinectV2(cycles[0] + turn, cycles[1], cycles[2], unit_m).range_m - at), 110.52, 0.005);
-  EXPECT_NEAR(1e5 * (unwrapKinectV2(cycles[0], cycles[1] + turn, cycles[2], unit_m).range_m - at), 110.52, 0.005);
-  EXPECT_NEAR(1e5 * (unwrapKinectV2(cycles[0], cycles[1], cycles[2] + turn, unit_m).range_m - at), 110.52, 0.005);
+  EXPECT_NEAR(1e5 * (unwrapKinectV2(cycles[0] + turn, cycles[1], cycles[2], unit_m).range_m - at),
+              110.52, 0.005);
+  EXPECT_NEAR(1e5 * (unwrapKinectV2(cycles[0], cycles[1] + turn, cycles[2], unit_m).range_m - at),
+              110.52, 0.005);
+  EXPECT_NEAR(1e5 * (unwrapKinectV2(cycles[0], cycles[1], cycles[2] + turn, unit_m).range_m - at),
+              110.52, 0.005);
 }
 
 TEST(KinectV2, ThresholdFallsFromWeakToStrong) {
@@ -175,15 +187,17 @@ UnwrapStatistics unwrapStatistics(double sigma_rad, std::uint32_t trials) {
   return statistics;
 }
 
-// Table of another implementation of the same algorithm, given to the digits below. Tolerance: half of the last digit
+// Table of another implementation of the same algorithm, given to the digits below. Tolerance: half
+// of the last digit
 // + 3 binomial standard errors of our trials (false alarm 0.3 % each, seed 2026 fixed).
 TEST(KinectV2, FailsToUnwrapAsOftenAsItMust) {
   constexpr std::uint32_t kTrials = 400'000;
-  const struct { double sigma, wrong, wrong_digit, dropped, dropped_digit, kept, kept_digit; } table[] = {
-      {0.1, 0.0, 1e-5, 0.0, 0.02, 0.0, 1e-5},
-      {0.2, 0.002, 1e-3, 0.22, 0.01, 2e-5, 1e-5},
-      {0.3, 0.044, 1e-3, 0.51, 0.01, 1.3e-3, 1e-4},
-      {0.4, 0.15, 0.01, 0.67, 0.01, 1.2e-2, 1e-3}};
+  const struct {
+    double sigma, wrong, wrong_digit, dropped, dropped_digit, kept, kept_digit;
+  } table[] = {{0.1, 0.0, 1e-5, 0.0, 0.02, 0.0, 1e-5},
+               {0.2, 0.002, 1e-3, 0.22, 0.01, 2e-5, 1e-5},
+               {0.3, 0.044, 1e-3, 0.51, 0.01, 1.3e-3, 1e-4},
+               {0.4, 0.15, 0.01, 0.67, 0.01, 1.2e-2, 1e-3}};
   const auto near = [](double seen, double expected, double digit) {
     const double error = 3.0 * std::sqrt(std::max(expected, 1e-6) * (1.0 - expected) / kTrials);
     EXPECT_NEAR(seen, expected, 0.5 * digit + error);
@@ -197,7 +211,8 @@ TEST(KinectV2, FailsToUnwrapAsOftenAsItMust) {
   }
 }
 
-// σ = 110.45 mm · √3 σ_φ with the exact speed of light; standard error of a deviation 1/√2n = 0.11 %, 4 of them.
+// σ = 110.45 mm · √3 σ_φ with the exact speed of light; standard error of a deviation 1/√2n = 0.11
+// %, 4 of them.
 TEST(KinectV2, RangeNoiseIsThatOfTheThreePhases) {
   for (double sigma : {0.02, 0.1}) {
     const double expected_m = 0.110448 * std::sqrt(3.0) * sigma;
@@ -212,25 +227,29 @@ Light lightOfWays(const std::vector<Frequency>& frequencies, const std::vector<W
 std::vector<Response> sines(const std::vector<Frequency>& frequencies) {
   std::vector<Response> responses;
   for (Frequency f : frequencies) {
-    responses.push_back({.frequency = f, .contrast = 0.5, .electrons_per_radiance = 1e5, .harmonics = {1.0}});
+    responses.push_back(
+        {.frequency = f, .contrast = 0.5, .electrons_per_radiance = 1e5, .harmonics = {1.0}});
   }
   return responses;
 }
 
-// r² of the emitter's triangle: half the way there and back is not the range when the emitter stands beside.
+// r² of the emitter's triangle: half the way there and back is not the range when the emitter
+// stands beside.
 TEST(Baseline, ExactCorrectionUndoesAnEmitterBesideTheLens) {
   const double baseline_m = 0.045;
   for (double range_m : {0.5, 1.0, 4.0}) {
     for (double ray_x : {-0.5, 0.0, 0.4}) {
-      const double there_m =
-          std::sqrt(range_m * range_m - 2.0 * range_m * baseline_m * ray_x + baseline_m * baseline_m);
+      const double there_m = std::sqrt(range_m * range_m - 2.0 * range_m * baseline_m * ray_x +
+                                       baseline_m * baseline_m);
       const Light light = lightOfWays({16_MHz}, {{1.0, (there_m + range_m) / 2.0}});
       const Samples samples = correlate(light, sines({16_MHz}), 4, 2);
       const Image<float> rays{1, 1, static_cast<float>(ray_x)};
       EXPECT_NEAR(decode(samples, {.baseline_length = 45_mm}, rays).range_m(0, 0), range_m, 3e-6);
       // Dropping L² reads too far by L² / 2 (s − L u).
-      const DecodeSettings first_order{.baseline_length = 45_mm, .baseline = DecodeSettings::Baseline::FirstOrder};
-      const double too_far_m = baseline_m * baseline_m / (2.0 * (there_m + range_m - baseline_m * ray_x));
+      const DecodeSettings first_order{.baseline_length = 45_mm,
+                                       .baseline = DecodeSettings::Baseline::FirstOrder};
+      const double too_far_m =
+          baseline_m * baseline_m / (2.0 * (there_m + range_m - baseline_m * ray_x));
       EXPECT_NEAR(decode(samples, first_order, rays).range_m(0, 0) - range_m, too_far_m, 3e-6);
     }
   }
@@ -239,7 +258,8 @@ TEST(Baseline, ExactCorrectionUndoesAnEmitterBesideTheLens) {
 TEST(SpeedOfLight, OfLibfreenect2ReadsTooFarBy7In10000) {
   const Light light = lightOfWays({80_MHz, 16_MHz, 120_MHz}, {{1.0, 4.0}});
   const Samples samples = correlate(light, sines(light.frequencies), 3, 2);
-  const DecodeSettings settings{.algorithm = DecodeSettings::Algorithm::KinectV2, .speed_of_light = 3e8};
+  const DecodeSettings settings{.algorithm = DecodeSettings::Algorithm::KinectV2,
+                                .speed_of_light = 3e8};
   EXPECT_NEAR(1e3 * (decode(samples, settings).range_m(0, 0) - 4.0F), 2.77, 0.01);
 }
 
@@ -247,10 +267,12 @@ TEST(SpeedOfLight, OfLibfreenect2ReadsTooFarBy7In10000) {
 TEST(FlyingPixel, IsThePhasorSumOfItsSurfaces) {
   for (Frequency f : {16_MHz, 80_MHz, 120_MHz}) {
     const double k = 2.0 * kPi * f.in(hertz) / kSpeedOfLight_m_per_s;
-    const std::complex<double> sum = std::polar(0.3, -2.0 * k * 1.0) + std::polar(0.2, -2.0 * k * 1.7);
+    const std::complex<double> sum =
+        std::polar(0.3, -2.0 * k * 1.0) + std::polar(0.2, -2.0 * k * 1.7);
     double phase = -std::arg(sum);
     if (phase < 0.0) phase += 2.0 * kPi;
-    const RangeImage image = decode(correlate(lightOfWays({f}, {{0.3, 1.0}, {0.2, 1.7}}), sines({f}), 4, 2), {});
+    const RangeImage image =
+        decode(correlate(lightOfWays({f}, {{0.3, 1.0}, {0.2, 1.7}}), sines({f}), 4, 2), {});
     EXPECT_NEAR(image.range_m(0, 0), phase / (2.0 * k), 3e-6);
   }
 }
@@ -275,7 +297,8 @@ TEST(Flags, SayWhyAPixelIsInvalid) {
 
 TEST(Flags, FrequenciesThatDisagreeAreInvalid) {
   const Samples samples = cosineSamples({100_MHz, 20_MHz}, 4, {{1.0}, {2.5}}, 500.0, 2000.0);
-  EXPECT_TRUE(has(decode(samples, {.unwrap_threshold = 0.1_rad}).flags(0, 0), PixelFlag::UnwrapUnreliable));
+  EXPECT_TRUE(
+      has(decode(samples, {.unwrap_threshold = 0.1_rad}).flags(0, 0), PixelFlag::UnwrapUnreliable));
   EXPECT_FALSE(has(decode(samples, {.unwrap_threshold = 3_rad}).flags(0, 0), PixelFlag::Invalid));
 }
 
@@ -289,15 +312,17 @@ double closure(const Damage& damage, double phase = 0.9) {
   return 2.0 * static_cast<double>(asymmetry) / 1000.0;  // asymmetry = (2/N) |Σ (−1)ᵏ Sₖ|
 }
 
-// What the fourth sample is good for: it is zero for everything outside the pixel, and not for what is wrong in it.
+// What the fourth sample is good for: it is zero for everything outside the pixel, and not for what
+// is wrong in it.
 TEST(Closure, IsZeroForTheSceneAndNotForTheSamples) {
   EXPECT_NEAR(closure([](Samples&) {}), 0.0, 1e-6);
   EXPECT_NEAR(closure([](Samples& s) { s.electrons[0](0, 0) += 20.0F; }), 0.020, 1e-6);
   EXPECT_NEAR(closure([](Samples& s) { s.electrons[0](0, 0) *= 1.01F; }),
               0.030 + 0.010 * std::cos(0.9), 1e-6);
   EXPECT_GT(closure([](Samples& s) {
-    for (auto& image : s.electrons) image(0, 0) -= 1e-5F * image(0, 0) * image(0, 0);
-  }), 0.001);  // quadratic: 0.020 |cos 2φ|
+              for (auto& image : s.electrons) image(0, 0) -= 1e-5F * image(0, 0) * image(0, 0);
+            }),
+            0.001);  // quadratic: 0.020 |cos 2φ|
 }
 
 TEST(Closure, OfAQuadraticPixelIsThereAlthoughItsPhaseIsRight) {
@@ -309,19 +334,25 @@ TEST(Closure, OfAQuadraticPixelIsThereAlthoughItsPhaseIsRight) {
     float asymmetry = 0.0F;
     asymmetryRow(samples, 0, &asymmetry);
     // Σ (−1)ᵏ q A² cos²(φ − θₖ) = 2 q A² cos 2φ
-    EXPECT_NEAR(2.0 * static_cast<double>(asymmetry) / 1000.0, 0.020 * std::abs(std::cos(2.0 * phase)), 2e-6);
+    EXPECT_NEAR(2.0 * static_cast<double>(asymmetry) / 1000.0,
+                0.020 * std::abs(std::cos(2.0 * phase)), 2e-6);
   }
 }
 
 TEST(Closure, IsZeroForTheThirdHarmonicAndNotForTheSecond) {
   const auto asymmetryOf = [](const Waveform& emitted, const Waveform& demodulating) {
-    const Light light = syntheticLight(1, 1, {30_MHz}, 31, [](int, int) { return std::vector<Way>{{1.0, 1.3}}; });
-    const Response response{.frequency = 30_MHz, .contrast = 0.5, .electrons_per_radiance = 1e5,
+    const Light light = syntheticLight(1, 1, {30_MHz}, 31, [](int, int) {
+      return std::vector<Way>{{1.0, 1.3}};
+    });
+    const Response response{.frequency = 30_MHz,
+                            .contrast = 0.5,
+                            .electrons_per_radiance = 1e5,
                             .harmonics = relativeHarmonics(emitted, demodulating, 30_MHz, 31)};
     const Samples samples = correlate(light, {response}, 4, 2);
     float asymmetry = 0.0F;
     asymmetryRow(samples, 0, &asymmetry);
-    return static_cast<double>(asymmetry) / static_cast<double>(decode(samples, {}).amplitude(0, 0));
+    return static_cast<double>(asymmetry) /
+           static_cast<double>(decode(samples, {}).amplitude(0, 0));
   };
   const Waveform square{.shape = Waveform::Shape::Square};
   const Waveform narrow{.shape = Waveform::Shape::Square, .duty = 0.4};

@@ -8,6 +8,7 @@
 
 #include "protocol/settings/describe.h"
 #include "sim/effects/effects.h"
+#include "tests/sim/scale_example.h"
 #include "tests/sim/synthetic_light.h"
 
 namespace toftwin::sim {
@@ -17,7 +18,8 @@ constexpr int kWidth = 24, kHeight = 16;
 constexpr int kProbeX = 6, kProbeY = 5;
 constexpr std::uint64_t kSeed = 4711;
 
-/// A small world in which each covariate is one number. The scene is its own mirror image both ways.
+/// A small world in which each covariate is one number. The scene is its own mirror image both
+/// ways.
 struct Scenario {
   double time_s = 60.0, temperature_c = 30.0, ambient_klx = 10.0, exposure = 1.0;
   double amplitude = 1.0;   ///< of the probe alone
@@ -29,21 +31,39 @@ struct Scenario {
 Scenario perturbed(Covariate covariate) {
   Scenario scenario;
   switch (covariate) {
-    case Covariate::Time: scenario.time_s = 200.0; break;
-    case Covariate::Temperature: scenario.temperature_c = 45.0; break;
-    case Covariate::Ambient: scenario.ambient_klx = 37.0; break;
-    case Covariate::Exposure: scenario.exposure = 1.37; break;
-    case Covariate::Amplitude: scenario.amplitude = 1.23; break;
-    case Covariate::Range: scenario.range_m = 2.3; break;
-    case Covariate::Neighbours: scenario.neighbours = 5.0; break;
-    case Covariate::Frame: scenario.frame = 4; break;
-    case Covariate::Position: break;  // another probe in the same scenario
+    case Covariate::Time:
+      scenario.time_s = 200.0;
+      break;
+    case Covariate::Temperature:
+      scenario.temperature_c = 45.0;
+      break;
+    case Covariate::Ambient:
+      scenario.ambient_klx = 37.0;
+      break;
+    case Covariate::Exposure:
+      scenario.exposure = 1.37;
+      break;
+    case Covariate::Amplitude:
+      scenario.amplitude = 1.23;
+      break;
+    case Covariate::Range:
+      scenario.range_m = 2.3;
+      break;
+    case Covariate::Neighbours:
+      scenario.neighbours = 5.0;
+      break;
+    case Covariate::Frame:
+      scenario.frame = 4;
+      break;
+    case Covariate::Position:
+      break;  // another probe in the same scenario
   }
   return scenario;
 }
 
 bool isProbe(int x, int y) {
-  return (x == kProbeX || x == kWidth - 1 - kProbeX) && (y == kProbeY || y == kHeight - 1 - kProbeY);
+  return (x == kProbeX || x == kWidth - 1 - kProbeX) &&
+         (y == kProbeY || y == kHeight - 1 - kProbeY);
 }
 
 Way wayAt(const Scenario& scenario, int x, int y) {
@@ -54,7 +74,8 @@ Way wayAt(const Scenario& scenario, int x, int y) {
 
 Moment momentOf(const Scenario& scenario) {
   Moment moment;
-  moment.exposures = {{.start = {}, .duration = scenario.exposure * millisecond, .modulation = 20_MHz}};
+  moment.exposures = {
+      {.start = {}, .duration = scenario.exposure * millisecond, .modulation = 20_MHz}};
   moment.since_power_on = scenario.time_s * second;
   moment.temperatures = {{"illumination", scenario.temperature_c * celsius}};
   moment.ambient = scenario.ambient_klx * kilolux;
@@ -82,7 +103,8 @@ Samples imageOf<Samples>(const Scenario& scenario) {
       for (int x = 0; x < kWidth; ++x) {
         const Way way = wayAt(scenario, x, y);
         const double phase = 4.0 * std::numbers::pi * 20e6 * way.range_m / kSpeedOfLight_m_per_s;
-        const double modulated = 0.5 * std::cos(phase - 0.5 * std::numbers::pi * static_cast<double>(i / 2));
+        const double modulated =
+            0.5 * std::cos(phase - 0.5 * std::numbers::pi * static_cast<double>(i / 2));
         const double charge = 5e4 * way.radiance * (1.0 + (i % 2 == 0 ? modulated : -modulated));
         samples.electrons[i](x, y) =
             static_cast<float>(scenario.exposure * (charge + 103.7 * scenario.ambient_klx));
@@ -102,7 +124,8 @@ RangeImage imageOf<RangeImage>(const Scenario& scenario) {
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth; ++x) {
       image.range_m(x, y) = static_cast<float>(wayAt(scenario, x, y).range_m);
-      image.amplitude(x, y) = static_cast<float>(scenario.exposure * wayAt(scenario, x, y).radiance);
+      image.amplitude(x, y) =
+          static_cast<float>(scenario.exposure * wayAt(scenario, x, y).radiance);
     }
   }
   return image;
@@ -110,11 +133,13 @@ RangeImage imageOf<RangeImage>(const Scenario& scenario) {
 
 /// All numbers of one pixel, phasors seen from the phase that the pixel's own range gives them.
 std::vector<double> valuesAt(const Light& light, int x, int y) {
-  std::vector<double> values{static_cast<double>(light.steady(x, y)), static_cast<double>(light.ambient(x, y))};
+  std::vector<double> values{static_cast<double>(light.steady(x, y)),
+                             static_cast<double>(light.ambient(x, y))};
   for (int n = 1; n <= light.harmonics; ++n) {
     const double phase = 4.0 * std::numbers::pi * n * light.frequencies[0].in(hertz) *
                          static_cast<double>(light.truth.range_m(x, y)) / kSpeedOfLight_m_per_s;
-    const std::complex<double> turned = std::complex<double>(light.phasor(0, n)(x, y)) * std::polar(1.0, phase);
+    const std::complex<double> turned =
+        std::complex<double>(light.phasor(0, n)(x, y)) * std::polar(1.0, phase);
     values.push_back(turned.real());
     values.push_back(turned.imag());
   }
@@ -132,13 +157,16 @@ std::vector<double> valuesAt(const RangeImage& image, int x, int y) {
 
 /// What an effect's contribution is measured against: the pixel's own signal, or a metre.
 double scaleOf(const Light&, const Scenario& scenario) { return scenario.amplitude; }
-double scaleOf(const Samples&, const Scenario& scenario) { return 2.5e4 * scenario.exposure * scenario.amplitude; }
+double scaleOf(const Samples&, const Scenario& scenario) {
+  return 2.5e4 * scenario.exposure * scenario.amplitude;
+}
 double scaleOf(const RangeImage&, const Scenario&) { return 1.0; }
 
 template <class E>
 auto applied(const E& effect, ImageOf<E> image, const Scenario& scenario) {
   const Moment moment = momentOf(scenario);
-  return effect.apply(std::move(image), {moment, 0, 0, kWidth}, Random{kSeed, scenario.frame, effectKey(E::about.name, 0)});
+  return effect.apply(std::move(image), {moment, 0, 0, kWidth},
+                      Random{kSeed, scenario.frame, effectKey(E::about.name, 0)});
 }
 
 /// What the effect added to a pixel, relative to the pixel's own signal.
@@ -147,7 +175,8 @@ std::vector<double> contribution(const E& effect, const Scenario& scenario, int 
   const auto before = imageOf<ImageOf<E>>(scenario);
   const auto after = applied(effect, before, scenario);
   std::vector<double> values = valuesAt(after, x, y), without = valuesAt(before, x, y);
-  for (std::size_t i = 0; i < values.size(); ++i) values[i] = (values[i] - without[i]) / scaleOf(before, scenario);
+  for (std::size_t i = 0; i < values.size(); ++i)
+    values[i] = (values[i] - without[i]) / scaleOf(before, scenario);
   return values;
 }
 
@@ -178,16 +207,19 @@ std::pair<double, double> overFrames(const E& effect, int x, int y, int frames) 
 /// (mean and standard deviation over 400 frames, 5 standard errors: 1e-6 false alarms each).
 template <class E>
 bool dependsOnPosition(const E& effect) {
-  const std::pair<int, int> probes[] = {{kWidth - 1 - kProbeX, kProbeY}, {kProbeX, kHeight - 1 - kProbeY}};
+  const std::pair<int, int> probes[] = {{kWidth - 1 - kProbeX, kProbeY},
+                                        {kProbeX, kHeight - 1 - kProbeY}};
   for (const auto& [x, y] : probes) {
     if (!E::about.explains.contains(Covariate::Frame)) {
-      if (differ(contribution(effect, {}, kProbeX, kProbeY), contribution(effect, {}, x, y))) return true;
+      if (differ(contribution(effect, {}, kProbeX, kProbeY), contribution(effect, {}, x, y)))
+        return true;
       continue;
     }
     constexpr int kFrames = 400;
     const auto [mean_a, sigma_a] = overFrames(effect, kProbeX, kProbeY, kFrames);
     const auto [mean_b, sigma_b] = overFrames(effect, x, y, kFrames);
-    if (std::abs(mean_a - mean_b) > 5.0 * std::hypot(sigma_a, sigma_b) / std::sqrt(kFrames)) return true;
+    if (std::abs(mean_a - mean_b) > 5.0 * std::hypot(sigma_a, sigma_b) / std::sqrt(kFrames))
+      return true;
     if (std::abs(std::log(sigma_a / sigma_b)) > 5.0 / std::sqrt(kFrames)) return true;
   }
   return false;
@@ -200,7 +232,7 @@ template <class List>
 struct AsTypes;
 template <class... Es>
 struct AsTypes<EffectList<Es...>> {
-  using type = testing::Types<Es...>;
+  using type = testing::Types<Es..., Scale>;  // and the example of the documents
 };
 struct Names {
   template <class E>
@@ -212,7 +244,8 @@ TYPED_TEST_SUITE(EffectLaws, AsTypes<AllEffects>::type, Names);
 
 template <class T>
 bool sameBits(const Image<T>& a, const Image<T>& b) {
-  return a.size() == b.size() && std::memcmp(a.pixels().data(), b.pixels().data(), a.size() * sizeof(T)) == 0;
+  return a.size() == b.size() &&
+         std::memcmp(a.pixels().data(), b.pixels().data(), a.size() * sizeof(T)) == 0;
 }
 template <class T>
 bool sameBits(const std::vector<Image<T>>& a, const std::vector<Image<T>>& b) {
@@ -223,14 +256,15 @@ bool sameBits(const std::vector<Image<T>>& a, const std::vector<Image<T>>& b) {
   return true;
 }
 bool sameBits(const Light& a, const Light& b) {
-  return sameBits(a.phasors, b.phasors) && sameBits(a.steady, b.steady) && sameBits(a.ambient, b.ambient);
+  return sameBits(a.phasors, b.phasors) && sameBits(a.steady, b.steady) &&
+         sameBits(a.ambient, b.ambient);
 }
 bool sameBits(const Samples& a, const Samples& b) {
   return sameBits(a.electrons, b.electrons) && sameBits(a.flags, b.flags);
 }
 bool sameBits(const RangeImage& a, const RangeImage& b) {
-  return sameBits(a.range_m, b.range_m) && sameBits(a.amplitude, b.amplitude) && sameBits(a.ambient, b.ambient) &&
-         sameBits(a.flags, b.flags);
+  return sameBits(a.range_m, b.range_m) && sameBits(a.amplitude, b.amplitude) &&
+         sameBits(a.ambient, b.ambient) && sameBits(a.flags, b.flags);
 }
 
 TYPED_TEST(EffectLaws, NoneChangesNothingBitForBit) {
@@ -262,7 +296,8 @@ TYPED_TEST(EffectLaws, DependsOnExactlyTheCovariatesItSays) {
 /// A visitor that checks every number against its bounds.
 struct BoundsCheck {
   template <class D>
-  void quantity(const char* name, Quantity<D>& value, Unit<D> unit, Bounds bounds, const char* help) {
+  void quantity(const char* name, Quantity<D>& value, Unit<D> unit, Bounds bounds,
+                const char* help) {
     number(name, value.in(unit), bounds, help);
   }
   template <class Number>
@@ -286,7 +321,8 @@ TYPED_TEST(EffectLaws, DefaultsAndNoneLieInBounds) {
 TYPED_TEST(EffectLaws, SaysWhatItIs) {
   const About& about = TypeParam::about;
   EXPECT_FALSE(about.name.empty());
-  EXPECT_EQ(about.name.find_first_not_of("abcdefghijklmnopqrstuvwxyz_0123456789"), std::string_view::npos);
+  EXPECT_EQ(about.name.find_first_not_of("abcdefghijklmnopqrstuvwxyz_0123456789"),
+            std::string_view::npos);
   EXPECT_GT(about.summary.size(), 10u);
   EXPECT_FALSE(about.reference.empty());
 }
@@ -299,7 +335,8 @@ TYPED_TEST(EffectLaws, InvalidPixelsStayInvalid) {
     for (auto& electrons : image.electrons) electrons(kProbeX, kProbeY) = kNan;
     image.flags = {kWidth, kHeight, static_cast<std::uint8_t>(PixelFlag::Saturated)};
     const Samples after = applied(TypeParam{}, image, {});
-    for (const auto& electrons : after.electrons) EXPECT_TRUE(std::isnan(electrons(kProbeX, kProbeY)));
+    for (const auto& electrons : after.electrons)
+      EXPECT_TRUE(std::isnan(electrons(kProbeX, kProbeY)));
     EXPECT_TRUE(after.flags(kProbeX, kProbeY) & static_cast<unsigned>(PixelFlag::Saturated));
   } else if constexpr (std::is_same_v<ImageOf<TypeParam>, RangeImage>) {
     image.range_m(kProbeX, kProbeY) = kNan;

@@ -59,7 +59,8 @@ SensorModel idealKinect() {
   return model->withEffects({});
 }
 
-Light direct(const SensorModel& model, std::string_view scene, double pixel_extent, int samples, int only_row = -1) {
+Light direct(const SensorModel& model, std::string_view scene, double pixel_extent, int samples,
+             int only_row = -1) {
   TraceRequest request = model.traceRequest();
   request.samples_per_pixel = samples;
   request.max_surfaces = 1;
@@ -72,8 +73,9 @@ Light direct(const SensorModel& model, std::string_view scene, double pixel_exte
   return trace(sceneOf(scene), request);
 }
 
-// Everything that acts on the light and is not an imperfection must cancel: distortion, the emitter 45 mm beside the
-// lens, three frequencies, three steps. What is left is float: 2e-7 of a turn at each frequency, 0.11 m per radian.
+// Everything that acts on the light and is not an imperfection must cancel: distortion, the emitter
+// 45 mm beside the lens, three frequencies, three steps. What is left is float: 2e-7 of a turn at
+// each frequency, 0.11 m per radian.
 TEST(EndToEnd, AnIdealKinectMeasuresASlantedWallExactly) {
   const SensorModel model = idealKinect();
   const Light light = direct(model, kWall, 0.0, 1);
@@ -83,7 +85,8 @@ TEST(EndToEnd, AnIdealKinectMeasuresASlantedWallExactly) {
   for (std::size_t i = 0; i < image.range_m.size(); ++i) {
     if (std::isnan(image.range_m[i])) continue;
     ++valid;
-    worst_m = std::max(worst_m, static_cast<double>(std::abs(image.range_m[i] - light.truth.range_m[i])));
+    worst_m =
+        std::max(worst_m, static_cast<double>(std::abs(image.range_m[i] - light.truth.range_m[i])));
   }
   EXPECT_GT(valid, 200'000);  // the lamp's cone does not reach into the corners
   EXPECT_LT(worst_m, 5e-6);
@@ -97,7 +100,8 @@ TEST(EndToEnd, APresetsWallIsOffByItsWiggleAndItsDroppedSquareOnly) {
     if (std::isnan(image.range_m[i])) continue;
     const double range_m = static_cast<double>(light.truth.range_m[i]);
     const double off_m = static_cast<double>(image.range_m[i]) - range_m;
-    // L² / 4r, up to 10 % more off the axis; the clipped sine 1.4 mm with all harmonics, 1.9 with seven
+    // L² / 4r, up to 10 % more off the axis; the clipped sine 1.4 mm with all harmonics, 1.9 with
+    // seven
     ASSERT_LT(std::abs(off_m - 0.045 * 0.045 / (4.0 * range_m)), 2.0e-3 + 1e-4) << i;
   }
 }

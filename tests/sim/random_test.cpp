@@ -18,7 +18,8 @@ TEST(Random, NormalIsTheInverseDistributionOfItsBits) {
   double worst_centre = 0.0, worst_tail = 0.0;
   for (std::uint64_t i = 0; i < (1u << 20); ++i) {
     const auto bits = static_cast<std::uint32_t>(i * 4093 + 17);
-    const double u = (static_cast<double>(static_cast<std::int32_t>(bits)) + 0.5) * 0x1p-31;  // (−1, 1)
+    const double u =
+        (static_cast<double>(static_cast<std::int32_t>(bits)) + 0.5) * 0x1p-31;  // (−1, 1)
     const auto z = static_cast<double>(Random::normalFromBits(bits));
     worst_centre = std::max(worst_centre, std::abs(2.0 * normalDistribution(z) - 1.0 - u));
     const double beyond = (1.0 - std::abs(u)) / 2.0;
@@ -37,7 +38,8 @@ TEST(Random, NormalReachesFarAndStaysFinite) {
   EXPECT_EQ(Random::normalFromBits(5u), -Random::normalFromBits(~5u));
 }
 
-// The image kernel is compiled for several instruction sets; whichever runs must give the same bits.
+// The image kernel is compiled for several instruction sets; whichever runs must give the same
+// bits.
 TEST(Random, WholeRowsAreTheSameBitsAsSinglePixels) {
   const Random::Draw draw = Random{3, 1, 4}.draw(1);
   std::vector<float> row(1009);
@@ -67,22 +69,30 @@ TEST(Random, NormalsOfAnImagePassKolmogorovSmirnov) {
 template <class First, class Second>
 double correlation(std::uint32_t n, const First& first, const Second& second) {
   double sum = 0.0;
-  for (std::uint32_t i = 0; i < n; ++i) sum += static_cast<double>(first(i)) * static_cast<double>(second(i));
+  for (std::uint32_t i = 0; i < n; ++i)
+    sum += static_cast<double>(first(i)) * static_cast<double>(second(i));
   return sum / n;
 }
 
-// Every part of the key must matter, and neighbours must not be alike: 5 standard errors, 6e-7 each.
+// Every part of the key must matter, and neighbours must not be alike: 5 standard errors, 6e-7
+// each.
 TEST(Random, NeighboursFramesEffectsSeedsAndDrawsAreIndependent) {
   constexpr std::uint32_t kPixels = 400'000;
   const double bound = 5.0 / std::sqrt(static_cast<double>(kPixels));
   const Random::Draw base = Random{1, 1, 1}.draw(0);
-  const auto of = [](const Random::Draw& draw) { return [draw](std::uint32_t i) { return draw.normal(i); }; };
+  const auto of = [](const Random::Draw& draw) {
+    return [draw](std::uint32_t i) { return draw.normal(i); };
+  };
   EXPECT_LT(std::abs(correlation(kPixels, of(base), of(Random{2, 1, 1}.draw(0)))), bound) << "seed";
-  EXPECT_LT(std::abs(correlation(kPixels, of(base), of(Random{1, 2, 1}.draw(0)))), bound) << "frame";
-  EXPECT_LT(std::abs(correlation(kPixels, of(base), of(Random{1, 1, 2}.draw(0)))), bound) << "effect";
+  EXPECT_LT(std::abs(correlation(kPixels, of(base), of(Random{1, 2, 1}.draw(0)))), bound)
+      << "frame";
+  EXPECT_LT(std::abs(correlation(kPixels, of(base), of(Random{1, 1, 2}.draw(0)))), bound)
+      << "effect";
   EXPECT_LT(std::abs(correlation(kPixels, of(base), of(Random{1, 1, 1}.draw(1)))), bound) << "draw";
   for (std::uint32_t step : {1u, 2u, 352u, 512u, 65536u}) {
-    EXPECT_LT(std::abs(correlation(kPixels, of(base), [&](std::uint32_t i) { return base.normal(i + step); })), bound)
+    EXPECT_LT(std::abs(correlation(kPixels, of(base),
+                                   [&](std::uint32_t i) { return base.normal(i + step); })),
+              bound)
         << step << " pixels on";
   }
 }
@@ -106,18 +116,21 @@ Moments poissonMoments(float mean, std::uint32_t count) {
   poisson(Random{11, 0, 0}.draw(0), 0, draws);
   Moments moments;
   for (float draw : draws) moments.mean += static_cast<double>(draw) / count;
-  for (float draw : draws) moments.variance += std::pow(static_cast<double>(draw) - moments.mean, 2) / count;
+  for (float draw : draws)
+    moments.variance += std::pow(static_cast<double>(draw) - moments.mean, 2) / count;
   return moments;
 }
 
-// Mean and variance within 5 standard errors (variance of a Poisson sample variance: (λ + 2λ²)/n), seed 11.
+// Mean and variance within 5 standard errors (variance of a Poisson sample variance: (λ + 2λ²)/n),
+// seed 11.
 TEST(Poisson, HasItsMeanAsVarianceAtEveryMean) {
   constexpr std::uint32_t kCount = 400'000;
   for (float lambda : {0.01F, 0.5F, 3.0F, 31.9F, 32.1F, 500.0F, 1e5F, 1e7F}) {
     const double mean = static_cast<double>(lambda);
     const Moments moments = poissonMoments(lambda, kCount);
     EXPECT_NEAR(moments.mean, mean, 5.0 * std::sqrt(mean / kCount)) << lambda;
-    EXPECT_NEAR(moments.variance, mean, 5.0 * std::sqrt((mean + 2.0 * mean * mean) / kCount) + 0.1) << lambda;
+    EXPECT_NEAR(moments.variance, mean, 5.0 * std::sqrt((mean + 2.0 * mean * mean) / kCount) + 0.1)
+        << lambda;
   }
 }
 
@@ -127,7 +140,8 @@ double distanceFromPoisson(float lambda, std::uint32_t count) {
   poisson(Random{12, 0, 0}.draw(0), 0, draws);
   std::vector<double> histogram(400, 0.0);
   for (float draw : draws) histogram[static_cast<std::size_t>(draw)] += 1.0 / count;
-  double probability = std::exp(-static_cast<double>(lambda)), expected = probability, seen = histogram[0], worst = 0.0;
+  double probability = std::exp(-static_cast<double>(lambda)), expected = probability,
+         seen = histogram[0], worst = 0.0;
   for (std::size_t k = 1;; ++k) {
     worst = std::max(worst, std::abs(seen - expected));
     if (k == histogram.size()) return worst;
@@ -137,7 +151,8 @@ double distanceFromPoisson(float lambda, std::uint32_t count) {
   }
 }
 
-// √n D < 2.69 with n = 1e6 is false in fewer than 1 of 1e6 (less for a discrete distribution). Seed 12.
+// √n D < 2.69 with n = 1e6 is false in fewer than 1 of 1e6 (less for a discrete distribution).
+// Seed 12.
 TEST(Poisson, IsExactBelowTheThreshold) {
   for (float lambda : {0.1F, 1.0F, 8.0F, 31.9F}) {
     EXPECT_LT(1e3 * distanceFromPoisson(lambda, 1'000'000), 2.69) << lambda;
@@ -169,7 +184,8 @@ TEST(Poisson, DoesNotDependOnHowAnImageIsCutIntoPieces) {
   poisson(draw, 0, whole);
   poisson(draw, 0, first);
   poisson(draw, 300, second);
-  for (std::size_t i = 0; i < whole.size(); ++i) EXPECT_EQ(whole[i], i < 300 ? first[i] : second[i - 300]) << i;
+  for (std::size_t i = 0; i < whole.size(); ++i)
+    EXPECT_EQ(whole[i], i < 300 ? first[i] : second[i - 300]) << i;
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The simulator as a driver: what only it does; what every camera must do is in the compliance suite.
+// The simulator as a driver: what only it does; what every camera must do is in the compliance
+// suite.
 #include "drivers/sim/simulator.h"
 
 #include <gmock/gmock.h>
@@ -10,7 +11,6 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-
 
 namespace toftwin::drivers::simulator {
 namespace {
@@ -54,7 +54,9 @@ material = "white"
 /// A folder with a camera and a scene, and sources opened from it.
 class Simulator : public testing::Test {
  protected:
-  Simulator() : folder_(std::filesystem::temp_directory_path() / ("toftwin-simulator-" + std::to_string(::getpid()))) {
+  Simulator()
+      : folder_(std::filesystem::temp_directory_path() /
+                ("toftwin-simulator-" + std::to_string(::getpid()))) {
     std::filesystem::create_directories(folder_);
     std::ofstream{folder_ / "camera.toml"} << kCamera;
     std::ofstream{folder_ / "wall.toml"} << kWall;
@@ -67,9 +69,11 @@ class Simulator : public testing::Test {
     return row().open(*table);
   }
   std::unique_ptr<Source> open(const std::string& more = {}) {
-    auto source = tryOpen("camera = 'camera.toml'\nscene = 'wall.toml'\npace = 'fast'\nmax_surfaces = 1\n" + more);
+    auto source = tryOpen(
+        "camera = 'camera.toml'\nscene = 'wall.toml'\npace = 'fast'\nmax_surfaces = 1\n" + more);
     if (!source) throw std::runtime_error{source.error().message};
-    if (auto started = (*source)->start(); !started) throw std::runtime_error{started.error().message};
+    if (auto started = (*source)->start(); !started)
+      throw std::runtime_error{started.error().message};
     return *std::move(source);
   }
   std::string errorOf(const std::string& keys) {
@@ -144,18 +148,22 @@ TEST_F(Simulator, ParametersActOnTheNextFrameAndOnItsModelId) {
   const Frame before = frameOf(*source);
   ASSERT_TRUE(source->setParameter("delay.offset_mm", 100.0));
   const Frame after = frameOf(*source);
-  EXPECT_NEAR(meanRange(after) - meanRange(before), 0.093, 4e-3);  // 100 mm along rays is less along z
+  EXPECT_NEAR(meanRange(after) - meanRange(before), 0.093,
+              4e-3);  // 100 mm along rays is less along z
   EXPECT_NE(after.provenance.model_id, before.provenance.model_id);
-  EXPECT_THAT(source->setParameter("delay.offset_mm", 1e9).error().message, HasSubstr("out of bounds"));
+  EXPECT_THAT(source->setParameter("delay.offset_mm", 1e9).error().message,
+              HasSubstr("out of bounds"));
   EXPECT_THAT(source->setParameter("ambient_klx", -1.0).error().message, HasSubstr("0 to 200 klx"));
-  EXPECT_THAT(source->setParameter("colour", 1.0).error().message, HasSubstr("it has: exposure_us"));
+  EXPECT_THAT(source->setParameter("colour", 1.0).error().message,
+              HasSubstr("it has: exposure_us"));
 }
 
 TEST_F(Simulator, EveryParameterItNamesCanBeSet) {
   const auto source = open();
   for (const std::string& name : source->info().parameters) {
     const auto done = source->setParameter(name, 20.0);
-    EXPECT_TRUE(done || done.error().code == Error::Code::InvalidArgument) << name << ": " << done.error().message;
+    EXPECT_TRUE(done || done.error().code == Error::Code::InvalidArgument)
+        << name << ": " << done.error().message;
   }
 }
 
@@ -216,18 +224,22 @@ TEST_F(Simulator, MakesOneFramePerTrigger) {
 }
 
 TEST_F(Simulator, GivesAllPlanesWhenAsked) {
-  const auto source = open("planes = ['truth_range', 'truth_normal', 'samples', 'phasors', 'range', 'flags']\n");
+  const auto source =
+      open("planes = ['truth_range', 'truth_normal', 'samples', 'phasors', 'range', 'flags']\n");
   const Frame frame = frameOf(*source);
   ASSERT_EQ(frame.planes.size(), 6u);
-  EXPECT_NEAR(frame.find(PlaneKind::TruthRange)->as<float>()[0], std::hypot(2.0, std::hypot(11.5, 9.5) / 15.0), 1e-4);
+  EXPECT_NEAR(frame.find(PlaneKind::TruthRange)->as<float>()[0],
+              std::hypot(2.0, std::hypot(11.5, 9.5) / 15.0), 1e-4);
   EXPECT_EQ(frame.find(PlaneKind::Samples)->channels, 4);
 }
 
 TEST_F(Simulator, ErrorsSayWhatIsWrongAndWhere) {
-  EXPECT_THAT(errorOf("planes = ['colour']\n"), testing::AllOf(HasSubstr("toftwind.toml:1"), HasSubstr("truth_range")));
+  EXPECT_THAT(errorOf("planes = ['colour']\n"),
+              testing::AllOf(HasSubstr("toftwind.toml:1"), HasSubstr("truth_range")));
   EXPECT_THAT(errorOf("scene = 'nowhere.toml'\n"), HasSubstr("nowhere.toml"));
   EXPECT_THAT(errorOf("camera = 'nowhere.toml'\n"), HasSubstr("nowhere.toml"));
-  EXPECT_THAT(errorOf("uri = 'sim:kinect_v3'\n"), testing::AllOf(HasSubstr("sim:kinect_v3"), HasSubstr("sim:kinect_v2")));
+  EXPECT_THAT(errorOf("uri = 'sim:kinect_v3'\n"),
+              testing::AllOf(HasSubstr("sim:kinect_v3"), HasSubstr("sim:kinect_v2")));
   EXPECT_THAT(errorOf("sead = 1\n"), HasSubstr("unknown key \"sead\""));
   std::ofstream{folder_ / "broken.toml"} << "[lens]\nwidth = -4\n";
   EXPECT_THAT(errorOf("camera = 'broken.toml'\n"), HasSubstr("broken.toml:2: width"));

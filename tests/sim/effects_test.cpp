@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+// What each effect does, through the whole sensor.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/sim/camera_testing.h"
+
+namespace toftwin::sim {
+namespace {
+
+// A background pixel at 2 m gets 5 % of its own amplitude from a foreground at 0.5 m.
+TEST(LensScatter, PullsByTheWorkedExample) {
+  const struct {
+    Frequency f;
+    double error_mm;
+  } table[] = {{16_MHz, -61.30}, {80_MHz, 13.94}, {120_MHz, -9.32}};
+  for (const auto& row : table) {
+    std::string camera =
+        plainCamera(4, 2, 0.5, "[[effect]]\ntype = 'lens_scatter'\nveil = 0.05\nhalo = 0\n");
+    camera.replace(camera.find("frequency_mhz = 80"), 18,
+                   "frequency_mhz = " + std::to_string(row.f.in(megahertz)));
+    const SensorModel model = modelOf(camera);
+    // One foreground pixel so bright that the even veil of 5 % of it over the image of n pixels is
+    // 5 % of what a background pixel keeps; the background's own veil has the background's phase
+    // and no effect on it.
+    const double n = 400.0 * 250.0, others = n - 1.0;
+    const double bright = 0.05 * (0.95 + 0.05 * others / n) / (0.05 / n);
+    Light light = syntheticLight(400, 250, {row.f}, 1, [&](int x, int y) {
+      return std::vector<Way>{x == 7 && y == 9 ? Way{bright, 0.5} : Way{1.0, 2.0}};
+    });
+    const double seen_m =
+        static_cast<double>(model.expose(light, {}, 1, 0).range.range_m(200, 100));
+    const double period_m = unambiguousRange(row.f).in(metre);
+    EXPECT_NEAR(1e3 * std::remainder(seen_m - 2.0, period_m), row.error_mm, 0.01)
+        << row.f.in(megahertz) << " MHz";
+  }
+}
+
+TEST(LensScatter, OfAnEvenImageKeepsAllLightInTheMiddle) {
+  const LensScatter lens{.veil = 0.1, .halo = 0.2, .halo_radius = 5.0};
+  const Light light = syntheticLight(
+      81, 81, {20_MHz}, 1,
+      [](int, int) {
+        return std::vector<Way>{{1.0, 1.5}};
+      },
+      0.5);
+  const Light after = lens.apply(light, {Moment{}, 0, 0, 81}, Random{1, 1, 1});
+  EXPECT_NEAR(std::abs(after.phasor(0, 1)(40, 40)), 1.0, 1e-5);
+  EXPECT_NEAR(after.steady(40, 40), 1.0, 1e-5);
+  EXPECT_NEAR(after.ambient(40, 40), 0.5, 1e-5);
+  EXPECT_NEAR(after.steady(0, 40), 0.7 + 0.1 + 0.2 * 0.5,
+              0.02);  // half of the halo comes from outside: dark
+}
+
+TEST(LensScatter, HaloOfOnePixelIsTheGaussian) {
+  const LensScatter lens{.veil = 0.0, .halo = 0.5, .halo_radius = 3.0};
+  const Light light = syntheticLight(61, 61, {20_MHz}, 1, [](int x, int y) {
+    return std::vector<Way>{{x == 30 && y == 30 ? 1.0 : 0.0, 1.0}};
+  });
+  const Light after = lens.apply(light, {Moment{}, 0, 0, 61}, Random{1, 1, 1});
+  for (int x : {31, 33, 36}) {
+    // The sampled Gaussian cut at four standard deviations misses 6e-5 of its sum per axis.
+    const double expected = 0.5 * std::exp(-0.5 * std::pow((x - 30) / 3.0, 2)) / (2.0 * kPi * 9.0);
+    EXPECT_NEAR(after.steady(x, 30), expected, 3e-4 * expected) << x;
+  }
+}
+
+TEST(WarmUp, EndsAtZeroAndStartsAtTheSumOfBothParts) {
+  const SensorModel model =
+      modelOf(plainCamera(4, 2, 0.5,
+                          "[[effect]]\ntype = 'warm_up'\nfast_mm = 3\nfast_time_s = 60\n"
+                          "slow_mm = 5\nslow_time_s = 600\n"));
+  const Light light = evenLight(model, 1.0, 0.9);
+  const auto errorAt = [&](std::optional<Duration> since) {
+    Moment moment;
+    moment.since_power_on = since;
+    return 1e3 * (rangeStatistics(model.expose(light, moment, 1, 0).range).mean - 0.9);
+  };
+  EXPECT_NEAR(errorAt(0_s), -8.0, 2e-4);
+  EXPECT_NEAR(errorAt(60_s), -3.0 * std::exp(-1.0) - 5.0 * std::exp(-0.1), 2e-4);
+  EXPECT_NEAR(errorAt(100'000_s), 0.0, 2e-4);
+  EXPECT_NEAR(errorAt(std::nullopt), 0.0, 2e-4);
+}
+
+TEST(Saturation, FlagsAndInvalidatesThePixelThatIsTooBright) {
+  const SensorModel model = modelOf(
+      plainCamera(4, 2, 0.5, "[[effect]]\ntype = 'saturation'\nfull_well_electrons = 6000\n"));
+  const auto dark =
+      model.expose(evenLight(model, 0.7, 0.9), {}, 1, 0).range;  // largest tap 0.75 · 7000
+  const auto bright = model.expose(evenLight(model, 0.9, 0.9), {}, 1, 0).range;  // 0.75 · 9000
+  EXPECT_EQ(dark.flags(3, 3), 0);
+  EXPECT_EQ(bright.flags(3, 3), static_cast<unsigned>(PixelFlag::Saturated) |
+                                    static_cast<unsigned>(PixelFlag::Invalid));
+  EXPECT_TRUE(std::isnan(bright.range_m(3, 3)));
+}
+
+TEST(AmbientLight, AddsTheMomentsIlluminanceAndNothingWithoutIt) {
+  const SensorModel model = modelOf(plainCamera(4, 2, 0.5, "[[effect]]\ntype = 'ambient_light'\n"));
+  const Light light = evenLight(model, 1.0, 0.9);  // albedo 0.5
+  Moment moment;
+  const double without = static_cast<double>(model.expose(light, moment, 1, 0).range.ambient(1, 1));
+  moment.ambient = 10_klx;
+  const double with = static_cast<double>(model.expose(light, moment, 1, 0).range.ambient(1, 1));
+  EXPECT_NEAR(with - without, 1e4 * 0.5 * 0.27 * 10.0 / kPi, 0.01);
+}
+
+TEST(FixedPatternPhase, HasItsSpreadIsConstantAndDiffersBetweenDevices) {
+  const std::string effect =
+      "[[effect]]\ntype = 'fixed_pattern_phase'\nsigma_rad = 0.03\ndevice = ";
+  const SensorModel one = modelOf(plainCamera(4, 2, 0.5, effect + "1\n")),
+                    two = modelOf(plainCamera(4, 2, 0.5, effect + "2\n"));
+  const Light light = evenLight(one, 1.0, 0.9);
+  const auto image = one.expose(light, {}, 1, 0).range;
+  const double sigma = rangeStatistics(image).sigma * kSigmaToPhase80MHz;
+  EXPECT_NEAR(sigma, 0.03, 0.01 * 0.03);  // 4.5 standard errors
+  EXPECT_EQ(one.expose(light, {}, 99, 7).range.phasors, image.phasors);
+  EXPECT_NE(two.expose(light, {}, 1, 0).range.phasors, image.phasors);
+}
+
+}  // namespace
+}  // namespace toftwin::sim
