@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/compare/capture.h"
 
+#include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <optional>
 
@@ -10,6 +12,7 @@
 #include <toftwin/names.h>
 
 #include "calib/compare/statistics.h"
+#include "protocol/record/recording.h"
 
 namespace toftwin::compare {
 namespace {
@@ -36,6 +39,23 @@ class ClientFeed final : public Feed {
   std::string source_;
   SourceDetails details_;
   Subscription subscription_;
+};
+
+class RecordingFeed final : public Feed {
+ public:
+  RecordingFeed(record::Reader reader, SourceDetails details)
+      : reader_(std::move(reader)), details_(std::move(details)) {}
+  [[nodiscard]] const SourceDetails& details() const override { return details_; }
+  Result<Frame> next(std::chrono::milliseconds) override {
+    return reader_.next(details_.entry.name);
+  }
+  Result<> setPose(const Transform<World, Camera>&) override {
+    return Error{Error::Code::Unsupported, "a recording cannot be moved"};
+  }
+
+ private:
+  record::Reader reader_;
+  SourceDetails details_;
 };
 
 Error named(const Feed& feed, const Error& error, const std::string& doing) {
@@ -152,6 +172,36 @@ Result<std::unique_ptr<Feed>> openFeed(Client& client, const std::string& source
   if (!subscription) return subscription.error();
   return std::unique_ptr<Feed>{
       std::make_unique<ClientFeed>(client, source, *std::move(details), *std::move(subscription))};
+}
+
+Result<std::unique_ptr<Feed>> openRecording(const std::string& file_and_source) {
+  const std::size_t hash = file_and_source.rfind('#');
+  const std::string file = file_and_source.substr(0, hash);
+  std::string source = hash == std::string::npos ? "" : file_and_source.substr(hash + 1);
+  auto reader = record::Reader::open(file);
+  if (!reader) return reader.error();
+  const auto& sources = reader->summary().frames_per_source;
+  std::string known;
+  for (const auto& [name, frames] : sources) known += (known.empty() ? "" : ", ") + name;
+  if (source.empty() && sources.size() == 1) source = sources.begin()->first;
+  if (!sources.contains(source)) {
+    return Error{Error::Code::InvalidArgument,
+                 fmt::format("{} holds the sources {}; name one as {}#SOURCE", file,
+                             known.empty() ? "(none)" : known, file)};
+  }
+  auto first = reader->next(source);
+  if (!first) return first.error();
+  reader->rewind();
+  SourceDetails details;
+  details.entry = {
+      .name = source,
+      .model = fmt::format("recording {}", std::filesystem::path{file}.filename().string()),
+      .serial = {},
+      .kind = FrameKind::Replayed};
+  details.driver = "recording";
+  details.camera = first->camera;
+  return std::unique_ptr<Feed>{
+      std::make_unique<RecordingFeed>(*std::move(reader), std::move(details))};
 }
 
 void planCapture(Progress& progress, const CaptureOptions& options) {

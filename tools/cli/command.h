@@ -50,6 +50,7 @@ Command grabCommand();
 Command recordCommand();
 Command replayCommand();
 Command renderCommand();
+Command compareCommand();
 Command doctorCommand();
 Command completionCommand();
 

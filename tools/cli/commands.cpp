@@ -8,7 +8,7 @@ namespace toftwin::cli {
 std::span<const Command> commands() {
   static const std::array kCommands{
       listCommand(),   infoCommand(),   grabCommand(),   recordCommand(),
-      replayCommand(), renderCommand(), doctorCommand(), completionCommand(),
+      replayCommand(), renderCommand(), compareCommand(), doctorCommand(), completionCommand(),
   };
   return kCommands;
 }

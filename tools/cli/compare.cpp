@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/compare/compare.h"
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "tools/cli/command.h"
+#include "tools/cli/options.h"
+#include "tools/cli/terminal.h"
+
+namespace toftwin::cli {
+namespace {
+
+constexpr const char* kExamples =
+    "  toftwin compare kinect stand-in --poses poses.toml -o report   two cameras of one daemon\n"
+    "  toftwin compare kinect monday.mcap -o report                   a camera and a recording\n"
+    "  toftwin compare kinect cam --address-b lab:47800 -o report     two daemons\n"
+    "  toftwin compare --data ../shared/data -o report                the simulator and real "
+    "measurements\n";
+
+struct Options {
+  DaemonOptions daemon, daemon_b;
+  std::vector<std::string> sources;
+  std::string poses;
+  std::string data;
+  std::string output = "report";
+  std::string note;
+  int frames = 30;
+  double frame_timeout_s = 120.0;
+  double effort = 1.0;
+  bool no_data = false;
+};
+
+/// A feed and the connection that it lives on; none for a recording.
+struct Opened {
+  std::unique_ptr<Client> client;
+  std::unique_ptr<compare::Feed> feed;
+};
+
+bool isRecording(const std::string& name) { return name.find(".mcap") != std::string::npos; }
+
+Result<Opened> open(const std::string& name, const DaemonOptions& daemon) {
+  Opened opened;
+  if (isRecording(name)) {
+    auto feed = compare::openRecording(name);
+    if (!feed) return feed.error();
+    opened.feed = *std::move(feed);
+    return opened;
+  }
+  auto client = daemon.connect();
+  if (!client) return client.error();
+  opened.client = std::make_unique<Client>(*std::move(client));
+  auto feed = compare::openFeed(*opened.client, name);
+  if (!feed) return feed.error();
+  opened.feed = *std::move(feed);
+  return opened;
+}
+
+Result<compare::CompareJob> jobOf(const Options& options) {
+  compare::CompareJob job;
+  if (!options.poses.empty()) {
+    auto poses = compare::loadPoses(options.poses);
+    if (!poses) return poses.error();
+    job.capture.poses = *std::move(poses);
+  }
+  job.capture.frames = options.frames;
+  job.capture.timeout =
+      std::chrono::milliseconds{static_cast<std::int64_t>(options.frame_timeout_s * 1000.0)};
+  job.capture.interrupted = interrupted;
+  if (!options.no_data) job.data = options.data;
+  job.effort = options.effort;
+  job.output = options.output;
+  job.note = options.note;
+  return job;
+}
+
+Result<Exit> compareThem(const Options& options) {
+  auto job = jobOf(options);
+  if (!job) return job.error();
+  catchInterrupts();
+  Opened a, b;
+  if (!options.sources.empty()) {
+    if (options.sources.size() != 2) {
+      return Error{Error::Code::InvalidArgument,
+                   "name two sources, A and B, or none to judge the simulator only"};
+    }
+    auto opened_a = open(options.sources[0], options.daemon);
+    if (!opened_a) return opened_a.error();
+    auto opened_b = open(options.sources[1],
+                         options.daemon_b.address.empty() ? options.daemon : options.daemon_b);
+    if (!opened_b) return opened_b.error();
+    a = *std::move(opened_a);
+    b = *std::move(opened_b);
+    job->a = a.feed.get();
+    job->b = b.feed.get();
+  }
+  compare::Progress progress{stderr};
+  const auto page = compare::compareAndReport(*job, progress);
+  if (!page) return page.error();
+  fmt::print("{}\n", page->string());
+  return Exit::Ok;
+}
+
+Run add(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  options->daemon.add(app);
+  app.add_option("--address-b", options->daemon_b.address, "daemon of B, if it is another one");
+  app.add_option("sources", options->sources,
+                 "A and B: names of sources, or recordings (FILE.mcap, FILE.mcap#SOURCE if it "
+                 "holds several); none: only the "
+                 "simulator against real measurements")
+      ->expected(0, 2);
+  app.add_option("--poses", options->poses,
+                 "pose file; both cameras are captured at each pose. Without it: where they are")
+      ->check(CLI::ExistingFile);
+  app.add_option("--frames", options->frames, "frames of each camera at each pose")
+      ->check(CLI::Range(2, 100'000))
+      ->capture_default_str();
+  app.add_option("--frame-timeout", options->frame_timeout_s, "seconds to wait for one frame")
+      ->check(CLI::Range(0.1, 86'400.0))
+      ->capture_default_str();
+  app.add_option("--data", options->data,
+                 "folder that holds tof-thesis-2018; default: $TOFTWIN_DATA, else ../shared/data "
+                 "of the repository");
+  app.add_flag("--no-data", options->no_data, "leave the real measurements out");
+  app.add_option("--effort", options->effort,
+                 "factor on the paths traced for the real measurements")
+      ->check(CLI::Range(0.01, 100.0))
+      ->capture_default_str();
+  app.add_option("-o,--output", options->output, "folder of the report")->capture_default_str();
+  app.add_option("--note", options->note, "for the report's foot, such as a commit");
+  return [options] { return compareThem(*options); };
+}
+
+}  // namespace
+
+Command compareCommand() {
+  return {"compare",
+          "compare two cameras, and the simulator with real measurements, and leave a report",
+          kExamples, add};
+}
+
+}  // namespace toftwin::cli
