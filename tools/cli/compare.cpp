@@ -103,6 +103,8 @@ Result<Exit> compareThem(const Options& options) {
 
 Run add(CLI::App& app) {
   auto options = std::make_shared<Options>();
+  // A simulated source answers when the frame that it is tracing is done; at a new pose that can take long.
+  options->daemon.timeout_s = options->daemon_b.timeout_s = 120.0;
   options->daemon.add(app);
   app.add_option("--address-b", options->daemon_b.address, "daemon of B, if it is another one");
   app.add_option("sources", options->sources,
