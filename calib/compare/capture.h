@@ -30,8 +30,8 @@ class Feed {
 /// else LOSSLESS. The client must outlive it.
 Result<std::unique_ptr<Feed>> openFeed(Client& client, const std::string& source);
 
-/// A recording: "file.mcap", or "file.mcap#source" where it holds several sources. It cannot be moved;
-/// its frames are taken at the poses they say.
+/// A recording: "file.mcap", or "file.mcap#source" where it holds several sources. It cannot be
+/// moved; its frames are taken at the poses they say.
 Result<std::unique_ptr<Feed>> openRecording(const std::string& file_and_source);
 
 /// What was captured at one pose.

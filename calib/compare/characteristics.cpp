@@ -21,12 +21,15 @@ Image<float> scaled(Image<float> image, float factor) {
 }
 
 bool isFlying(const Image<float>& range, int x, int y, int dx, int dy, double jump) {
-  const int ax = x - 2 * dx, ay = y - 2 * dy, bx = x + 2 * dx, by = y + 2 * dy;
-  if (ax < 0 || ay < 0 || bx >= range.width() || by >= range.height()) return false;
-  const auto a = static_cast<double>(range(ax, ay)), b = static_cast<double>(range(bx, by));
-  const auto own = static_cast<double>(range(x, y));
-  const double near = std::min(a, b), gap = std::abs(b - a);
-  if (!std::isfinite(own + gap) || gap < jump * near) return false;
+  const auto at = [&](int steps) {
+    const int px = x + steps * dx, py = y + steps * dy;
+    const bool inside = px >= 0 && py >= 0 && px < range.width() && py < range.height();
+    return static_cast<double>(inside ? range(px, py) : kNaN);
+  };
+  const double a = at(-2), b = at(2), own = at(0), gap = std::abs(b - a);
+  if (!(gap >= jump * std::min(a, b))) return false;  // false for NaN as well
+  // A slanted surface climbs everywhere, a step only in the middle.
+  if (!(std::abs(a - at(-3)) < 0.2 * gap && std::abs(b - at(3)) < 0.2 * gap)) return false;
   return std::min(std::abs(own - a), std::abs(own - b)) > 0.15 * gap;
 }
 
@@ -162,7 +165,7 @@ Pixels pixelsOf(const std::vector<PoseComparison>& poses) {
   Pixels all;
   for (const PoseComparison& pose : poses) {
     for (std::size_t i = 0; i < pose.difference_mm.size(); ++i) {
-      if (!std::isfinite(pose.difference_mm[i])) continue;
+      if (!(std::abs(static_cast<double>(pose.difference_mm[i])) <= kGross_mm)) continue;
       all.difference_mm.push_back(static_cast<double>(pose.difference_mm[i]));
       all.range_mm.push_back(static_cast<double>(pose.range_a_mm[i]));
       all.amplitude.push_back(
@@ -196,6 +199,7 @@ Characteristics characterise(const std::vector<PoseComparison>& poses) {
       if (!std::isfinite(pose.valid_b[i])) continue;
       const bool a = pose.valid_a[i] >= 0.5F, b = pose.valid_b[i] >= 0.5F;
       ++result.pixels;
+      result.gross += std::abs(static_cast<double>(pose.difference_mm[i])) > kGross_mm ? 1 : 0;
       valid_a += a, valid_b += b, both += a && b, neither += !a && !b;
       if (!pose.amplitude_ratio.empty())
         amplitude_ratio.push_back(static_cast<double>(pose.amplitude_ratio[i]));
@@ -226,6 +230,7 @@ Json toJson(const Characteristics& c) {
     regions.push(std::move(row));
   }
   Json json = Json::object();
+  json.set("gross_pixels", c.gross).set("gross_limit_mm", kGross_mm);
   json.set("regions", std::move(regions)).set("pixels", c.pixels).set("valid_share_a", c.valid_a);
   json.set("valid_share_b", c.valid_b)
       .set("mask_agreement", c.mask_agreement)

@@ -37,8 +37,13 @@ Image<std::uint8_t> edgesOf(const Image<float>& range, double jump = 0.03, int r
 
 /// Valid pixels that hang between a near and a far surface: in the row or the column, the ranges
 /// two pixels to either side differ by more than `jump` of themselves and the pixel lies more than
-/// 15 % of that gap away from both, or beyond them by that much.
+/// 15 % of that gap away from both, or beyond them by that much. The surfaces must not climb
+/// themselves.
 Image<std::uint8_t> flyingPixelsOf(const Image<float>& range, double jump = 0.03);
+
+/// Larger differences are no measurement error but a wrong one of the phase's periods, or another
+/// surface seen at an edge. They are counted, and left out of bias, spread and trends.
+inline constexpr double kGross_mm = 300.0;
 
 /// One row of the result: some pixels of all poses together.
 struct Region {
@@ -49,6 +54,8 @@ struct Region {
 
 /// All poses together.
 struct Characteristics {
+  /// Pixels that differ by more than kGross_mm: a wrong period of the phase, or another surface.
+  std::size_t gross = 0;
   std::vector<Region> regions;          ///< the first is "all pixels"
   double valid_a = 0.0, valid_b = 0.0;  ///< share of pixels valid in at least half of the frames
   double mask_agreement = 0.0;          ///< share of pixels where both are valid or both are not
@@ -69,7 +76,7 @@ struct Trend {
 };
 Trend trendOf(const std::vector<double>& x, const std::vector<double>& y, int bins);
 
-/// The pixels of all poses where the difference is known, as columns.
+/// The pixels of all poses where the difference is known and not gross, as columns.
 struct Pixels {
   std::vector<double> difference_mm, range_mm, amplitude, noise_a_mm, noise_b_mm;
   std::vector<bool> edge;

@@ -68,11 +68,11 @@ std::string toSvg(const ImageMap& map) {
   }
   cv::Mat bar(128, 1, CV_8UC4);
   for (int y = 0; y < 128; ++y) bar.at<cv::Vec4b>(y, 0) = pixel(colour(map, 1.0 - y / 127.0));
-  constexpr double kWide = 512.0;
+  constexpr double kWide = 340.0;
   const double tall = kWide * height / std::max(1, width), bar_x = kWide + 16;
   std::string svg =
       fmt::format("<div class='plot map'><svg viewBox='0 0 {} {:.1f}' role='img' aria-label='{}'>",
-                  kWide + 120, tall + 12, escaped(map.title));
+                  kWide + 96, tall + 12, escaped(map.title));
   svg += fmt::format("<rect class='nothing' x='0' y='6' width='{}' height='{:.1f}'/>", kWide, tall);
   svg += fmt::format(
       "<image x='0' y='6' width='{}' height='{:.1f}' preserveAspectRatio='none' "
@@ -89,7 +89,7 @@ std::string toSvg(const ImageMap& map) {
   svg += fmt::format(
       "<text class='label' text-anchor='middle' transform='translate({:.1f} {:.1f}) "
       "rotate(-90)'>{}</text>",
-      kWide + 112, tall / 2 + 6, escaped(map.label));
+      kWide + 86, tall / 2 + 6, escaped(map.label));
   return svg + "</svg></div>";
 }
 

@@ -119,7 +119,8 @@ Figure trendFigure(const std::vector<double>& x, const std::vector<double>& y, s
                                  .ink = Ink::Simulated,
                                  .low = trend.low,
                                  .high = trend.high}},
-                     .zero_line = true})};
+                     .zero_line = true,
+                     .compact = true})};
 }
 
 Figure histogramFigure(const Pixels& pixels) {
@@ -137,7 +138,8 @@ Figure histogramFigure(const Pixels& pixels) {
                      .x_label = "B − A [mm]",
                      .y_label = "pixels",
                      .curves = {histogram(surface, low, reach, 80, "surfaces", Ink::Simulated),
-                                histogram(edge, low, reach, 80, "edges", Ink::Published)}})};
+                                histogram(edge, low, reach, 80, "edges", Ink::Published)},
+                     .compact = true})};
 }
 
 /// The difference over time since power-on of B, each pose a series of its own.
@@ -157,7 +159,8 @@ std::optional<Figure> timeFigure(const Capture& capture) {
       toSvg(Plot{.title = "B − A over time",
                  .x_label = "time since power-on of B [s]",
                  .y_label = "B − A, median [mm]",
-                 .curves = {curve}})};
+                 .curves = {curve},
+                 .compact = true})};
 }
 
 double roundUp(double value) {
@@ -216,7 +219,9 @@ Result<Finding> judgeLive(const Capture& capture) {
                  "they look at something within their range?"};
   }
   const Pixels pixels = pixelsOf(poses);
-  const Summary& all = c.regions.front().difference_mm;
+  // Surfaces, where there are any: at edges a pixel's two cameras need not see the same surface.
+  const Region& main = c.regions.size() > 1 ? c.regions[1] : c.regions.front();
+  const Summary& all = main.difference_mm;
   std::vector<double> magnitudes, log_amplitude;
   for (const double d : pixels.difference_mm) magnitudes.push_back(std::abs(d));
   for (const double a : pixels.amplitude) log_amplitude.push_back(std::log10(a));
@@ -227,10 +232,12 @@ Result<Finding> judgeLive(const Capture& capture) {
       .title = fmt::format("{} (B) against {} (A)", capture.b.entry.name, capture.a.entry.name)};
   finding.section.tone = toneOfDifference(all);
   finding.section.verdict = fmt::format(
-      "B reads {} than A on average over {} pixels at {} poses; 95 % of the pixels agree within {} "
-      "mm. Temporal noise: A {} mm, B {} mm (median). Validity masks agree in {} % of the pixels.",
-      inWords(all), all.n, poses.size(), shown(all.p95_abs), shown(c.regions.front().noise_a_mm, 2),
-      shown(c.regions.front().noise_b_mm, 2), shown(100.0 * c.mask_agreement, 1));
+      "On surfaces B reads {} than A, averaged over {} pixels at {} poses; 95 % of them agree "
+      "within {} mm. Temporal noise: A {} mm, B {} mm (median). "
+      "Validity masks agree in {} % of the pixels. {} pixels differ by more than {} mm and are "
+      "counted apart.",
+      inWords(all), all.n, poses.size(), shown(all.p95_abs), shown(main.noise_a_mm, 2),
+      shown(main.noise_b_mm, 2), shown(100.0 * c.mask_agreement, 1), c.gross, shown(kGross_mm, 0));
   auto& blocks = finding.section.blocks;
   for (const std::string& warning : capture.warnings)
     blocks.push_back(Paragraph{"Note: " + warning});
@@ -254,10 +261,17 @@ Result<Finding> judgeLive(const Capture& capture) {
   blocks.push_back(cameraTable(capture));
   blocks.push_back(
       Paragraph{"Frames are paired by pose and order; each range difference is along the same ray. "
+                "Where a camera is simulated, the path tracer's own noise stays "
+                "frozen at a pose: it is part of the differences from pixel to pixel and of no "
+                "temporal noise. "
                 "The log of all frames with their ids is log.jsonl beside this page.",
                 true});
 
-  finding.headline = fmt::format("B reads {} than A", inWords(all));
+  finding.headline = fmt::format(
+      "On surfaces B ({}) reads {} than A ({}); 95 % of the pixels agree within {} mm; B's "
+      "temporal noise is {} times A's",
+      capture.b.entry.name, inWords(all), capture.a.entry.name, shown(all.p95_abs),
+      shown(c.noise_ratio.median, 2));
   finding.data = toJson(c);
   finding.data.set("a", capture.a.entry.name)
       .set("b", capture.b.entry.name)
@@ -268,8 +282,7 @@ Result<Finding> judgeLive(const Capture& capture) {
                    {"95 % agree within", shown(all.p95_abs) + " mm",
                     fmt::format("RMS {} mm", shown(all.rms)), Tone::Neutral},
                    {"Noise, A | B",
-                    fmt::format("{} | {} mm", shown(c.regions.front().noise_a_mm, 2),
-                                shown(c.regions.front().noise_b_mm, 2)),
+                    fmt::format("{} | {} mm", shown(main.noise_a_mm, 2), shown(main.noise_b_mm, 2)),
                     "temporal, median over pixels", Tone::Neutral},
                    {"Masks agree", shown(100.0 * c.mask_agreement, 1) + " %",
                     fmt::format("flying pixels {} | {}", c.flying_a, c.flying_b),

@@ -10,7 +10,7 @@
 namespace toftwin::compare {
 namespace {
 
-constexpr double kWidth = 640, kHeight = 360, kLeft = 68, kRight = 14, kTop = 12, kBottom = 54;
+constexpr double kLeft = 68, kRight = 14, kTop = 12, kBottom = 54;
 
 /// Style sheet classes; the order is Ink's.
 constexpr std::array kInkClass{"measured", "simulated", "published", "baseline", "extra", "alert"};
@@ -61,9 +61,9 @@ std::vector<double> logTicks(double low, double high) {
   return ticks;
 }
 
-std::string grid(const Plot& plot, const Axis& x, const Axis& y) {
+std::string grid(const Plot& plot, const Axis& x, const Axis& y, double height) {
   std::string svg;
-  for (const double v : roundTicks(x.low, x.high, 8)) {
+  for (const double v : roundTicks(x.low, x.high, plot.compact ? 5 : 8)) {
     svg += fmt::format("<line class='grid' x1='{0:.1f}' x2='{0:.1f}' y1='{1:.1f}' y2='{2:.1f}'/>",
                        x.place(v), y.from, y.to);
     svg += fmt::format("<text class='tick' x='{:.1f}' y='{:.1f}' text-anchor='middle'>{}</text>",
@@ -80,7 +80,7 @@ std::string grid(const Plot& plot, const Axis& x, const Axis& y) {
                        y.place(0.0), x.from, x.to);
   }
   svg += fmt::format("<text class='label' x='{:.1f}' y='{:.1f}' text-anchor='middle'>{}</text>",
-                     (x.from + x.to) / 2, kHeight - 10, escaped(plot.x_label));
+                     (x.from + x.to) / 2, height - 10, escaped(plot.x_label));
   svg += fmt::format(
       "<text class='label' x='0' y='0' text-anchor='middle' transform='translate(18 {:.1f}) "
       "rotate(-90)'>{}</text>",
@@ -208,12 +208,13 @@ std::string toSvg(const Plot& plot) {
   }
   const auto [x_low, x_high] = plot.x_range.value_or(padded(ex, 0.02, false));
   const auto [y_low, y_high] = plot.y_range.value_or(padded(ey, 0.06, plot.log_y));
-  const Axis x{x_low, x_high, kLeft, kWidth - kRight},
-      y{y_low, y_high, kHeight - kBottom, kTop, plot.log_y};
+  const double width = plot.compact ? 450.0 : 640.0, height = plot.compact ? 310.0 : 360.0;
+  const Axis x{x_low, x_high, kLeft, width - kRight},
+      y{y_low, y_high, height - kBottom, kTop, plot.log_y};
   std::string svg =
-      fmt::format("<div class='plot'><svg viewBox='0 0 {} {}' role='img' aria-label='{}'>", kWidth,
-                  kHeight, escaped(plot.title));
-  svg += grid(plot, x, y);
+      fmt::format("<div class='plot'><svg viewBox='0 0 {} {}' role='img' aria-label='{}'>", width,
+                  height, escaped(plot.title));
+  svg += grid(plot, x, y, height);
   // An inner svg clips at its box, without an id that other plots of the page could share.
   svg += fmt::format("<svg x='{0}' y='{1}' width='{2}' height='{3}' viewBox='{0} {1} {2} {3}'>",
                      x.from, y.to, x.to - x.from, y.from - y.to);

@@ -37,6 +37,7 @@ struct Plot {
   std::optional<std::pair<double, double>> x_range{}, y_range{};  ///< default: what the curves need
   bool zero_line = false;
   bool log_y = false;
+  bool compact = false;  ///< drawn smaller, for two beside each other
 };
 
 /// The plot as inline SVG that scales to its box and takes its colours from the report's style

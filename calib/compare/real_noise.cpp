@@ -131,12 +131,14 @@ Result<Finding> judgeNoise(const RealDataJob& job, const RealCamera& camera) {
                   .stroke = Stroke::Dots},
                  sorted((*over_distance)[0], distance->predicted, "simulated, albedo 0.8 (white)",
                         Ink::Simulated, Stroke::Line)},
-      .log_y = true};
+      .log_y = true,
+      .compact = true};
   const Plot by_intensity{.title = camera.title + " noise over intensity",
                           .x_label = "log10 of the infrared image's counts",
                           .y_label = "standard deviation [mm]",
                           .curves = {intensity_dots, law_curve, simulated_curve},
-                          .log_y = true};
+                          .log_y = true,
+                          .compact = true};
 
   Finding finding;
   finding.section = {.id = "noise-" + camera.name, .title = camera.title + ": noise"};

@@ -219,7 +219,8 @@ Result<> addDistance(const RealDataJob& job, Finding& finding) {
                          .y = ours,
                          .ink = Ink::Simulated,
                          .stroke = Stroke::Dashed}},
-             .zero_line = true})});
+             .zero_line = true,
+             .compact = true})});
   }
   finding.section.blocks.push_back(figures);
   finding.section.blocks.push_back(table);

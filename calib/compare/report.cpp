@@ -30,6 +30,7 @@ const char* classOf(Tone tone) {
 bool readsAsNumber(std::string_view cell) {
   if (cell.starts_with("−")) cell.remove_prefix(std::string_view{"−"}.size());
   if (cell == "–") return true;
+  if (cell.find(" × ") != std::string_view::npos) return false;  // a size is words
   if (!cell.empty() && (cell.front() == '+' || cell.front() == '-')) cell.remove_prefix(1);
   return !cell.empty() && cell.front() >= '0' && cell.front() <= '9';
 }

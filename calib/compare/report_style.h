@@ -27,7 +27,7 @@ h2{font-size:1.3rem;margin:0 0 8px;line-height:1.25}
 .card{background:var(--panel);border:1px solid var(--line);border-top:4px solid var(--neutral);border-radius:6px;padding:10px 14px}
 .card.good{border-top-color:var(--good)}.card.fair{border-top-color:var(--fair)}.card.bad{border-top-color:var(--bad)}
 .cardlabel{font-size:.86rem;color:var(--soft)}
-.value{font-size:1.5rem;font-weight:650;font-variant-numeric:tabular-nums;line-height:1.3}
+.value{white-space:nowrap;font-size:1.22rem;font-weight:650;font-variant-numeric:tabular-nums;line-height:1.3}
 .note{font-size:.84rem;color:var(--soft)}
 nav{display:flex;flex-wrap:wrap;gap:6px 16px;font-size:.95rem;padding:8px 0 4px;border-bottom:1px solid var(--line)}
 nav a{color:var(--simulated);text-decoration:none;padding:4px 0}nav a:hover,nav a:focus{text-decoration:underline}
@@ -39,7 +39,7 @@ figure{margin:14px 0;background:var(--panel);border:1px solid var(--line);border
 figcaption{font-size:.9rem;color:var(--soft);margin-top:6px;max-width:90ch}
 .row{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,400px),1fr));gap:0 14px}
 .plot{overflow-x:auto}.plot svg{display:block;width:100%;min-width:430px;height:auto}
-.plot.map svg{min-width:280px}
+.plot.map svg{min-width:260px}.row .plot svg{min-width:260px}
 .legend{display:flex;flex-wrap:wrap;gap:2px 18px;font-size:.9rem;padding:4px 4px 0}.legend span{display:inline-flex;align-items:center;gap:7px}
 .legend svg{flex:none}
 .tick{font-size:13px;fill:var(--soft);font-variant-numeric:tabular-nums}.label{font-size:14px;fill:var(--ink)}
@@ -58,7 +58,7 @@ caption{text-align:left;color:var(--soft);font-size:.9rem;padding:0 0 6px}
 th,td{padding:5px 12px;border-bottom:1px solid var(--line);text-align:left;vertical-align:top}
 th{font-weight:600;vertical-align:bottom}td:first-child:not(.number){min-width:13em}th.number,td.number{text-align:right}td.number{font-variant-numeric:tabular-nums;white-space:nowrap}
 footer{margin-top:40px;padding-top:12px;border-top:1px solid var(--line);color:var(--soft);font-size:.85rem}
-@media(max-width:520px){main{padding:18px 12px 40px}.cards{grid-template-columns:1fr 1fr}.card{padding:8px 10px}.value{font-size:1.2rem}h1{font-size:1.4rem}}
+@media(max-width:520px){main{padding:18px 12px 40px}.cards{grid-template-columns:1fr 1fr}.card{padding:8px 10px}.value{font-size:1.02rem}h1{font-size:1.4rem}}
 @media print{section{break-inside:avoid-page}nav{display:none}}
 )css";
 
