@@ -54,6 +54,7 @@ Result<std::unique_ptr<Daemon>> Daemon::start(Options options) {
   // Sources run only once it is clear that this daemon may listen: a second one must not touch cameras.
   std::unique_ptr<Daemon> daemon{new Daemon{std::move(options), *config}};
   if (auto listening = daemon->listen(config->keys.listen); !listening) return listening.error();
+  if (daemon->options_.handle_signals) daemon->handleSignals();  // before anyone is told that it is ready
   daemon->apply(*std::move(config));
   notify::ready(daemon->statusLine());
   daemon->watch();

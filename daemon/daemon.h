@@ -34,6 +34,7 @@ class Daemon {
     std::filesystem::path config;
     std::optional<int> port;            ///< instead of listen.port
     std::optional<std::string> socket;  ///< instead of listen.socket
+    bool handle_signals = false;  ///< SIGTERM and SIGINT stop the daemon, SIGHUP reloads it
     std::span<const drivers::Driver> drivers = drivers::allDrivers();
     const Clock* clock = &systemClock();
   };
@@ -43,8 +44,6 @@ class Daemon {
   Daemon(const Daemon&) = delete;
   Daemon& operator=(const Daemon&) = delete;
 
-  /// Makes SIGTERM and SIGINT stop the daemon and SIGHUP reload it.
-  void handleSignals();
   /// Serves until `stop`, then closes recordings and clients.
   void run();
 
@@ -71,6 +70,7 @@ class Daemon {
   void run(ConfiguredSource source);
   void beginReload();
   void finishReload();
+  void handleSignals();
   void waitForSignal();
   void watch();
   void beginStop();

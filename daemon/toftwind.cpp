@@ -47,9 +47,9 @@ int check(const Arguments& arguments) {
 int serve(const Arguments& arguments) {
   auto started = daemon::Daemon::start({.config = arguments.config,
                                         .port = arguments.port,
-                                        .socket = arguments.socket});
+                                        .socket = arguments.socket,
+                                        .handle_signals = true});
   if (!started) return fail(started.error());
-  (*started)->handleSignals();
   (*started)->run();
   spdlog::info("stopped");
   return kOk;

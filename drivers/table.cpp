@@ -2,6 +2,7 @@
 #include <array>
 
 #include "drivers/pattern/pattern.h"
+#include "drivers/replay/replay.h"
 #include "drivers/sim/simulator.h"
 #include "drivers/source.h"
 
@@ -11,6 +12,7 @@ std::span<const Driver> allDrivers() {
   // One line per driver, in the order of docs/drivers/README.md.
   static const std::array rows{
       pattern::row(),
+      replay::row(),
       simulator::row(),
   };
   return rows;

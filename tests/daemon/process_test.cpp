@@ -1,0 +1,272 @@
+// SPDX-License-Identifier: Apache-2.0
+// toftwind as a process: its exit codes, its messages, its signals.
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <toftwin/client.h>
+
+#include "protocol/record/recording.h"
+
+namespace toftwin {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::HasSubstr;
+using Policy = SubscribeOptions::Policy;
+
+constexpr auto kSoon = 60s;  // for a loaded machine; only a broken daemon needs it
+
+/// A child process whose standard output and error go into a file.
+class Process {
+ public:
+  Process(std::vector<std::string> arguments, std::filesystem::path log,
+          const std::function<void()>& in_child = [] {})
+      : log_(std::move(log)) {
+    arguments.insert(arguments.begin(), TOFTWIND);
+    std::vector<char*> words;
+    for (std::string& argument : arguments) words.push_back(argument.data());
+    words.push_back(nullptr);
+    pid_ = ::fork();
+    if (pid_ != 0) return;
+    const int fd = ::open(log_.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0600);
+    ::dup2(fd, 1);
+    ::dup2(fd, 2);
+    in_child();
+    ::execv(TOFTWIND, words.data());
+    ::_exit(127);
+  }
+  ~Process() {
+    if (pid_ <= 0) return;
+    ::kill(pid_, SIGKILL);
+    ::waitpid(pid_, nullptr, 0);
+  }
+  Process(const Process&) = delete;
+  Process& operator=(const Process&) = delete;
+
+  void signal(int number) const { ::kill(pid_, number); }
+  [[nodiscard]] pid_t pid() const { return pid_; }
+  /// The exit code, or minus the signal that killed it.
+  int wait() {
+    int status = 0;
+    ::waitpid(pid_, &status, 0);
+    pid_ = -1;
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+  }
+  [[nodiscard]] std::string said() const {
+    std::ostringstream text;
+    text << std::ifstream{log_}.rdbuf();
+    return text.str();
+  }
+  [[nodiscard]] bool says(const std::string& part) const {
+    const auto deadline = std::chrono::steady_clock::now() + kSoon;
+    while (said().find(part) == std::string::npos) {
+      if (std::chrono::steady_clock::now() > deadline) return false;
+      std::this_thread::sleep_for(2ms);  // polls a file; nothing depends on how long it takes
+    }
+    return true;
+  }
+
+ private:
+  std::filesystem::path log_;
+  pid_t pid_ = -1;
+};
+
+class Toftwind : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = testing::TempDir() + "toftwindXXXXXX";
+    ASSERT_NE(::mkdtemp(name.data()), nullptr);
+    folder_ = name;
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  void configure(const std::string& toml) const { std::ofstream{folder_ / "d.toml"} << toml; }
+  [[nodiscard]] std::string path(const char* name) const { return (folder_ / name).string(); }
+  [[nodiscard]] std::vector<std::string> arguments() const {
+    return {"--config", path("d.toml"), "--port", "0", "--socket", path("s")};
+  }
+  [[nodiscard]] Result<Client> client() const { return Client::connect("unix:" + path("s")); }
+
+  std::filesystem::path folder_;
+};
+
+const std::string kPattern = "recording_folder = '.'\n[[source]]\nname = 'cam'\ndriver = 'pattern'\n"
+                             "width = 64\nheight = 48\n";
+
+TEST_F(Toftwind, StopsCleanlyOnSigterm) {
+  configure(kPattern);
+  Process daemon{arguments(), path("log")};
+  ASSERT_TRUE(daemon.says("source cam: driver pattern")) << daemon.said();
+  auto client = this->client();
+  ASSERT_TRUE(client.ok()) << client.error().message;
+  const auto recording = client->startRecording("cam", "run");
+  ASSERT_TRUE(recording.ok()) << recording.error().message;
+  auto stream = client->subscribe("cam", {.policy = Policy::Lossless});
+  ASSERT_TRUE(stream->next(kSoon).ok());
+  daemon.signal(SIGTERM);
+  EXPECT_EQ(daemon.wait(), 0) << daemon.said();
+  Result<Frame> last = stream->next(kSoon);
+  while (last) last = stream->next(kSoon);
+  EXPECT_EQ(last.error().code, Error::Code::Stopped) << last.error().message;
+  EXPECT_FALSE(std::filesystem::exists(path("s")));
+  const auto reader = record::Reader::open(*recording);
+  ASSERT_TRUE(reader.ok());
+  EXPECT_TRUE(reader->summary().indexed);
+  EXPECT_GE(reader->summary().frames_per_source.at("cam"), 1u);
+}
+
+TEST_F(Toftwind, ReadsItsConfigurationAgainOnSighup) {
+  configure(kPattern);
+  Process daemon{arguments(), path("log")};
+  ASSERT_TRUE(daemon.says("source cam: driver pattern")) << daemon.said();
+  configure(kPattern + "colour = 1\n");
+  daemon.signal(SIGHUP);
+  ASSERT_TRUE(daemon.says("d.toml:7: unknown key \"colour\"")) << daemon.said();
+  configure(kPattern + "[[source]]\nname = 'second'\ndriver = 'pattern'\n");
+  daemon.signal(SIGHUP);
+  ASSERT_TRUE(daemon.says("the new configuration is in force")) << daemon.said();
+  EXPECT_EQ(client()->sources()->size(), 2u);
+  daemon.signal(SIGINT);
+  EXPECT_EQ(daemon.wait(), 0);
+}
+
+TEST_F(Toftwind, ReplaysARecordingBitForBit) {
+  configure(kPattern);
+  std::vector<Frame> seen;
+  {
+    Process daemon{arguments(), path("log")};
+    ASSERT_TRUE(daemon.says("source cam: driver pattern")) << daemon.said();
+    auto client = this->client();
+    ASSERT_TRUE(client->startRecording("cam", "run").ok());
+    auto stream = client->subscribe("cam", {.policy = Policy::Lossless});
+    for (int i = 0; i < 5; ++i) seen.push_back(*stream->next(kSoon));
+    ASSERT_TRUE(client->stopRecording("cam").ok());
+    daemon.signal(SIGTERM);
+    ASSERT_EQ(daemon.wait(), 0);
+  }
+  configure("[[source]]\nname = 'again'\ndriver = 'replay'\nfile = 'run.mcap'\npace = 'fast'\n");
+  Process daemon{arguments(), path("log")};
+  ASSERT_TRUE(daemon.says("source again: driver replay")) << daemon.said();
+  auto client = this->client();
+  auto stream = client->subscribe("again", {.policy = Policy::Lockstep});
+  std::size_t found = 0;
+  for (Result<Frame> frame = stream->next(kSoon); frame && found < seen.size(); frame = stream->next(kSoon)) {
+    const Frame& original = seen[found];
+    if (frame->moment.exposures != original.moment.exposures) continue;  // recorded before it was seen
+    EXPECT_EQ(frame->moment, original.moment);
+    EXPECT_EQ(frame->camera, original.camera);
+    EXPECT_EQ(frame->provenance.kind, FrameKind::Replayed);
+    ASSERT_EQ(frame->planes.size(), original.planes.size());
+    for (std::size_t i = 0; i < frame->planes.size(); ++i) {
+      EXPECT_TRUE(std::ranges::equal(frame->planes[i].data.bytes(), original.planes[i].data.bytes()));
+    }
+    ++found;
+  }
+  EXPECT_EQ(found, seen.size());
+}
+
+TEST_F(Toftwind, AFullDiskEndsTheRecordingKeepsWhatWasWrittenAndSaysSo) {
+  configure("recording_folder = '.'\n[[source]]\nname = 'cam'\ndriver = 'pattern'\npace = 'fast'\n");
+  // Files of at most 4 MB, so that the disk seems full after that; the signal that comes with it is off.
+  Process daemon{arguments(), path("log"), [] {
+    const rlimit limit{4 << 20, 4 << 20};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+    ::signal(SIGXFSZ, SIG_IGN);
+  }};
+  ASSERT_TRUE(daemon.says("source cam: driver pattern")) << daemon.said();
+  auto client = this->client();
+  const auto recording = client->startRecording("cam", "run");
+  ASSERT_TRUE(recording.ok()) << recording.error().message;
+  ASSERT_TRUE(daemon.says("run.mcap: ")) << daemon.said();
+  const auto health = client->health();
+  ASSERT_TRUE(health.ok());
+  EXPECT_THAT(health->sources.at(0).last_error, HasSubstr("recording: "));
+  const auto stopped = client->stopRecording("cam");
+  ASSERT_FALSE(stopped.ok());
+  EXPECT_EQ(stopped.error().code, Error::Code::StorageFull) << stopped.error().message;
+  EXPECT_TRUE(client->sources().ok()) << "the daemon serves on";
+  const auto reader = record::Reader::open(*recording);
+  ASSERT_TRUE(reader.ok()) << reader.error().message;
+  EXPECT_GE(reader->summary().frames_per_source.at("cam"), 1u);
+}
+
+TEST_F(Toftwind, AWrongConfigurationIsExitCodeTwoWithFileAndLine) {
+  configure("[listen]\nport = 70000\n");
+  Process daemon{{"--config", path("d.toml")}, path("log")};
+  EXPECT_EQ(daemon.wait(), 2);
+  EXPECT_THAT(daemon.said(), HasSubstr("d.toml:2: port = 70000 is out of bounds: it must be 0 to 65535"));
+}
+
+TEST_F(Toftwind, AMissingConfigurationIsNamed) {
+  Process daemon{{"--config", path("none.toml")}, path("log")};
+  EXPECT_EQ(daemon.wait(), 2);
+  EXPECT_THAT(daemon.said(), HasSubstr("none.toml"));
+}
+
+TEST_F(Toftwind, CheckSaysWhetherTheConfigurationIsGood) {
+  configure(kPattern);
+  Process good{{"--check", "--config", path("d.toml")}, path("good")};
+  EXPECT_EQ(good.wait(), 0);
+  EXPECT_THAT(good.said(), HasSubstr("cam: toftwin test pattern"));
+  configure(kPattern + "widht = 3\n");
+  Process bad{{"--check", "--config", path("d.toml")}, path("bad")};
+  EXPECT_EQ(bad.wait(), 2);
+  EXPECT_THAT(bad.said(), HasSubstr("d.toml:7: unknown key \"widht\""));
+}
+
+TEST_F(Toftwind, ASecondOneIsRefusedAndNamesTheFirst) {
+  configure(kPattern);
+  Process first{arguments(), path("first")};
+  ASSERT_TRUE(first.says("source cam: driver pattern")) << first.said();
+  Process second{arguments(), path("second")};
+  EXPECT_EQ(second.wait(), 1);
+  EXPECT_THAT(second.said(), HasSubstr("another daemon (pid " + std::to_string(first.pid()) + ")"));
+  EXPECT_TRUE(client()->health().ok());
+}
+
+TEST_F(Toftwind, ASocketOfAKilledDaemonDoesNotHinderTheNext) {
+  configure(kPattern);
+  {
+    Process first{arguments(), path("first")};
+    ASSERT_TRUE(first.says("source cam: driver pattern")) << first.said();
+    first.signal(SIGKILL);
+    EXPECT_EQ(first.wait(), -SIGKILL);
+  }
+  ASSERT_TRUE(std::filesystem::exists(path("s")));
+  Process second{arguments(), path("second")};
+  ASSERT_TRUE(second.says("source cam: driver pattern")) << second.said();
+  EXPECT_TRUE(client()->health().ok());
+}
+
+TEST_F(Toftwind, NoPermissionForTheSocketsFolderIsSaid) {
+  if (::geteuid() != 0) {
+    std::filesystem::create_directory(folder_ / "locked");
+    std::filesystem::permissions(folder_ / "locked", std::filesystem::perms::none);
+  }
+  configure(kPattern);
+  // Root may write anywhere but into /proc.
+  const std::string socket = ::geteuid() == 0 ? "/proc/toftwin.sock" : path("locked/s");
+  Process daemon{{"--config", path("d.toml"), "--port", "0", "--socket", socket}, path("log")};
+  EXPECT_NE(daemon.wait(), 0);
+  EXPECT_THAT(daemon.said(), HasSubstr(socket + ".lock: cannot be made"));
+  EXPECT_THAT(daemon.said(), HasSubstr("--socket"));
+}
+
+}  // namespace
+}  // namespace toftwin

@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "drivers/replay/replay.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+
+#include "drivers/compliance.h"
+#include "drivers/pattern/pattern.h"
+#include "protocol/record/recording.h"
+
+namespace toftwin::drivers::replay {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr std::int64_t kReceived_ns = 1'700'000'000'000'000'000;
+constexpr std::int64_t kInterval_ns = 5'000'000;
+
+/// A folder with the recording "run.mcap": six frames of the pattern at irregular times.
+class Replay : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = testing::TempDir() + "replayXXXXXX";
+    ASSERT_NE(::mkdtemp(name.data()), nullptr);
+    folder_ = name;
+    auto writer = record::Writer::create(folder_ / "run.mcap");
+    ASSERT_TRUE(writer.ok());
+    auto keys = settings::Table::parse("width = 32\nheight = 16\npace = 'fast'\nframe_rate_hz = 200", "t");
+    auto source = pattern::row().open(*keys);
+    ASSERT_TRUE((*source)->start().ok());
+    for (int i = 0; i < 6; ++i) {
+      Frame frame = *(*source)->next({}, false);
+      frame.source = "cam";
+      frame.sequence = static_cast<std::uint64_t>(i);
+      frame.moment.received.ns = kReceived_ns + i * kInterval_ns + (i == 3 ? 1'000'000 : 0);
+      ASSERT_TRUE(writer->write(frame).ok());
+      frames_.push_back(std::move(frame));
+    }
+    ASSERT_TRUE(writer->close().ok());
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  Result<std::unique_ptr<Source>> open(const std::string& keys) {
+    auto table = settings::Table::parse(keys, folder_ / "d.toml");
+    return row().open(*table);
+  }
+  std::string errorOf(const std::string& keys) {
+    const auto source = open(keys);
+    return source ? "no error" : source.error().message;
+  }
+  static void expectSame(const Frame& played, const Frame& recorded) {
+    EXPECT_EQ(played.moment, recorded.moment);
+    EXPECT_EQ(played.camera, recorded.camera);
+    EXPECT_EQ(played.provenance.kind, FrameKind::Replayed);
+    ASSERT_EQ(played.planes.size(), recorded.planes.size());
+    for (std::size_t i = 0; i < played.planes.size(); ++i) {
+      EXPECT_EQ(played.planes[i].kind, recorded.planes[i].kind);
+      EXPECT_TRUE(std::ranges::equal(played.planes[i].data.bytes(), recorded.planes[i].data.bytes()));
+    }
+  }
+
+  std::filesystem::path folder_;
+  std::vector<Frame> frames_;
+};
+
+TEST_F(Replay, GivesTheRecordedFramesBitForBitWithTheirTimes) {
+  auto source = open("file = 'run.mcap'\npace = 'fast'");
+  ASSERT_TRUE(source.ok()) << source.error().message;
+  ASSERT_TRUE((*source)->start().ok());
+  for (const Frame& recorded : frames_) {
+    const auto played = (*source)->next({}, false);
+    ASSERT_TRUE(played.ok()) << played.error().message;
+    expectSame(*played, recorded);
+  }
+  const auto end = (*source)->next({}, false);
+  EXPECT_EQ(end.error().code, Error::Code::EndOfStream);
+  EXPECT_THAT(end.error().message, HasSubstr("run.mcap ended after 6 frames"));
+}
+
+TEST_F(Replay, ExactlyKeepsTheDistancesInTime) {
+  auto source = open("file = 'run.mcap'");
+  ASSERT_TRUE((*source)->start().ok());
+  const auto begin = std::chrono::steady_clock::now();
+  for (const Frame& recorded : frames_) {
+    ASSERT_TRUE((*source)->next({}, false).ok());
+    // Never early, which needs no tolerance: late is up to the machine.
+    const auto passed = std::chrono::steady_clock::now() - begin;
+    EXPECT_GE(passed.count(), recorded.moment.received.ns - kReceived_ns);
+  }
+}
+
+TEST_F(Replay, InALoopGoesOnWithTimesMovedByTheLength) {
+  auto source = open("file = 'run.mcap'\npace = 'fast'\nloop = true");
+  ASSERT_TRUE((*source)->start().ok());
+  for (std::int64_t round = 0; round < 3; ++round) {
+    for (Frame recorded : frames_) {
+      const std::int64_t shift = round * 6 * kInterval_ns;
+      for (Exposure& exposure : recorded.moment.exposures) exposure.start.ns += shift;
+      recorded.moment.received.ns += shift;
+      const auto played = (*source)->next({}, false);
+      ASSERT_TRUE(played.ok());
+      expectSame(*played, recorded);
+    }
+  }
+}
+
+TEST_F(Replay, AStartBeginsWithTheFirstFrame) {
+  auto source = open("file = 'run.mcap'\npace = 'fast'");
+  ASSERT_TRUE((*source)->start().ok());
+  ASSERT_TRUE((*source)->next({}, false).ok());
+  const auto last = (*source)->next({}, false);
+  (*source)->stop();
+  ASSERT_TRUE((*source)->start().ok());
+  const auto first = (*source)->next({}, false);
+  ASSERT_TRUE(first.ok());
+  EXPECT_TRUE(std::ranges::equal(first->planes[0].data.bytes(), frames_[0].planes[0].data.bytes()));
+  EXPECT_GT(first->moment.exposures[0].start, last->moment.exposures[0].start);
+}
+
+TEST_F(Replay, UnderLockstepDoesNotWaitHoweverFarApartTheFramesAre) {
+  {
+    auto writer = record::Writer::create(folder_ / "slow.mcap");
+    for (std::int64_t i = 0; i < 3; ++i) {
+      Frame frame = frames_[static_cast<std::size_t>(i)];
+      frame.moment.received.ns = kReceived_ns + i * 3'600'000'000'000;  // hours: the test would time out
+      ASSERT_TRUE(writer->write(frame).ok());
+    }
+  }
+  auto source = open("file = 'slow.mcap'");
+  ASSERT_TRUE((*source)->start().ok());
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE((*source)->next({}, true).ok());
+}
+
+TEST_F(Replay, KnowsItsCamera) {
+  auto source = open("file = 'run.mcap'");
+  const SourceInfo& info = (*source)->info();
+  EXPECT_EQ(info.camera, frames_[0].camera);
+  EXPECT_EQ(info.planes.size(), frames_[0].planes.size());
+  EXPECT_EQ(info.kind, FrameKind::Replayed);
+  EXPECT_DOUBLE_EQ(info.frame_interval->in(nanosecond), kInterval_ns);
+  EXPECT_TRUE(info.can_lockstep);
+}
+
+TEST_F(Replay, IsCompliant) {
+  const Driver driver = row();
+  const std::string file = (folder_ / "run.mcap").string();
+  for (const std::string pace : {"fast", "exact"}) {
+    const Candidate candidate{.driver = &driver,
+                              .keys = "file = '" + file + "'\nloop = true\npace = '" + pace + "'",
+                              .absent_keys = "file = '" + (folder_ / "absent.mcap").string() + "'",
+                              .absent_name = "absent.mcap"};
+    for (const Finding& finding : checkCompliance(candidate)) {
+      EXPECT_NE(finding.outcome, Finding::Outcome::Failed)
+          << finding.check << ", because " << finding.because << "\n  " << finding.detail;
+    }
+  }
+}
+
+TEST_F(Replay, AWrongFileIsNamedWithItsPlaceInTheConfiguration) {
+  EXPECT_THAT(errorOf("file = 'absent.mcap'"), HasSubstr("d.toml:1: file \"absent.mcap\""));
+  std::ofstream{folder_ / "text.mcap"} << "this is no recording";
+  EXPECT_THAT(errorOf("file = 'text.mcap'"), HasSubstr("d.toml:1: file \"text.mcap\""));
+  EXPECT_THAT(errorOf("loop = true"), HasSubstr("needs the path of a recording"));
+  EXPECT_THAT(errorOf("file = 'run.mcap'\nrecorded_source = 'mac'"), HasSubstr("it has: cam"));
+  EXPECT_THAT(errorOf("file = 'run.mcap'\npase = 'fast'"), HasSubstr("unknown key \"pase\""));
+}
+
+TEST_F(Replay, OfATruncatedRecordingGivesWhatIsThereAndSaysThatItIsDamaged) {
+  const auto whole = folder_ / "run.mcap";
+  std::filesystem::resize_file(whole, std::filesystem::file_size(whole) - 40);
+  auto source = open("file = 'run.mcap'\npace = 'fast'");
+  ASSERT_TRUE(source.ok()) << source.error().message;
+  ASSERT_TRUE((*source)->start().ok());
+  ASSERT_TRUE((*source)->next({}, false).ok());
+  Result<Frame> next = (*source)->next({}, false);
+  while (next) next = (*source)->next({}, false);
+  EXPECT_EQ(next.error().code, Error::Code::EndOfStream);
+  EXPECT_THAT(next.error().message, HasSubstr("damaged"));
+}
+
+}  // namespace
+}  // namespace toftwin::drivers::replay
