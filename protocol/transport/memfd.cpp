@@ -84,8 +84,9 @@ Result<Buffer> mapSharedBody(const FileDescriptor& memfd, std::uint64_t size) {
                                              " bytes, not the announced " + std::to_string(size)};
   }
   if (size == 0) return Buffer{};
-  void* const memory =
-      ::mmap(nullptr, size, PROT_READ, MAP_SHARED | MAP_POPULATE, memfd.get(), 0);
+  // Not MAP_POPULATE: mapping all pages now costs as much as faulting them in when they are read (the
+  // kernel maps sixteen at a time), but here the reading thread would pay, for all its subscriptions.
+  void* const memory = ::mmap(nullptr, size, PROT_READ, MAP_SHARED, memfd.get(), 0);
   if (memory == MAP_FAILED) return systemError("mmap");
   std::shared_ptr<const void> owner{memory, [size](const void* mapped) {
                                       ::munmap(const_cast<void*>(mapped), size);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The path of a frame from the daemon to the applications, beside a bare TCP sender of the same bytes.
 //   frame_path_bench [SECONDS]       SECONDS per measurement, default 10
-// The daemon's part (hub, sessions, sockets) runs in a process of its own with a source that costs
+// The daemon's part (hub, sessions, sockets) and each client are processes of their own. The source costs
 // nothing: it hands out the same frame of 512 × 424 range, amplitude and flags (1.95 MB). Latency is
 // from `received` (the daemon has the whole frame) to the return of Subscription::next.
 #include <arpa/inet.h>
@@ -13,7 +13,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -21,7 +20,6 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <thread>
 #include <vector>
@@ -210,15 +208,9 @@ int dialLocally(int port) {
 // ---- measuring -------------------------------------------------------------------------------------
 
 struct Latencies {
-  std::mutex mutex;
   std::vector<double> ms;
   std::uint64_t dropped = 0;
 
-  void add(const std::vector<double>& more, std::uint64_t dropped_more) {
-    const std::scoped_lock lock{mutex};
-    ms.insert(ms.end(), more.begin(), more.end());
-    dropped += dropped_more;
-  }
   void print(const char* what) {
     if (ms.empty()) giveUp("no frames");
     std::ranges::sort(ms);
@@ -231,47 +223,70 @@ struct Latencies {
   }
 };
 
-/// Runs `receive` for each client in a thread of its own.
-void forAllClients(const std::function<void()>& receive) {
-  std::vector<std::jthread> threads;
-  for (int i = 0; i < kClients; ++i) threads.emplace_back(receive);
+/// Runs `receive` for each client in a process of its own and gathers what they measured.
+Latencies ofAllClients(const std::function<Latencies()>& receive) {
+  std::vector<int> pipes;
+  for (int i = 0; i < kClients; ++i) {
+    int ends[2];
+    if (::pipe(ends) != 0) giveUp("pipe failed");
+    if (::fork() == 0) {
+      ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+      Latencies mine = receive();
+      mine.ms.push_back(static_cast<double>(mine.dropped));  // last
+      FILE* const out = ::fdopen(ends[1], "wb");
+      std::fwrite(mine.ms.data(), sizeof(double), mine.ms.size(), out);
+      std::fflush(out);
+      ::_exit(0);
+    }
+    ::close(ends[1]);
+    pipes.push_back(ends[0]);
+  }
+  Latencies all;
+  for (const int pipe : pipes) {
+    FILE* const in = ::fdopen(pipe, "rb");
+    double value = 0.0;
+    while (std::fread(&value, sizeof value, 1, in) == 1) all.ms.push_back(value);
+    if (all.ms.empty()) giveUp("a client failed");
+    all.dropped += static_cast<std::uint64_t>(all.ms.back());
+    all.ms.pop_back();
+    std::fclose(in);
+    ::wait(nullptr);
+  }
+  return all;
 }
 
 void measureLatency(const char* what, const std::string& address, Seconds time) {
-  Latencies all;
-  forAllClients([&] {
+  Latencies all = ofAllClients([&] {
     auto client = orGiveUp(Client::connect(address));
     auto subscription = orGiveUp(client.subscribe("cam"));
-    std::vector<double> ms;
-    std::uint64_t dropped = 0;
+    Latencies mine;
     const auto end = std::chrono::steady_clock::now() + time;
     for (int i = 0; std::chrono::steady_clock::now() < end; ++i) {
       const auto frame = subscription.next(2s);
       if (!frame) giveUp(frame.error().message);
       if (i < 10) continue;  // connecting is not the frame path
-      ms.push_back(static_cast<double>(hostNow() - frame->moment.received.ns) * 1e-6);
-      dropped += frame->dropped_before;
+      mine.ms.push_back(static_cast<double>(hostNow() - frame->moment.received.ns) * 1e-6);
+      mine.dropped += frame->dropped_before;
     }
-    all.add(ms, dropped);
+    return mine;
   });
   all.print(what);
 }
 
 void measureBareLatency(int port, std::size_t size, Seconds time) {
-  Latencies all;
-  forAllClients([&] {
+  Latencies all = ofAllClients([&] {
     const int fd = dialLocally(port);
     std::vector<std::byte> bytes(size);
-    std::vector<double> ms;
+    Latencies mine;
     const auto end = std::chrono::steady_clock::now() + time;
     for (int i = 0; std::chrono::steady_clock::now() < end; ++i) {
       if (::recv(fd, bytes.data(), size, MSG_WAITALL) != static_cast<ssize_t>(size)) break;
       std::int64_t sent = 0;
       std::memcpy(&sent, bytes.data(), sizeof sent);
-      if (i >= 10) ms.push_back(static_cast<double>(hostNow() - sent) * 1e-6);
+      if (i >= 10) mine.ms.push_back(static_cast<double>(hostNow() - sent) * 1e-6);
     }
-    all.add(ms, 0);
     ::close(fd);
+    return mine;
   });
   all.print("bare TCP sender");
 }
