@@ -57,13 +57,13 @@ Result<Exit> describeRecording(const Options& options) {
   }
   if (options.json) {
     fmt::print("{}", Json::object()
-                           .set("file", options.what)
-                           .set("first_ns", summary.first_ns)
-                           .set("last_ns", summary.last_ns)
-                           .set("indexed", summary.indexed)
-                           .set("damage", summary.damage)
-                           .set("sources", sources)
-                           .text());
+                         .set("file", options.what)
+                         .set("first_ns", summary.first_ns)
+                         .set("last_ns", summary.last_ns)
+                         .set("indexed", summary.indexed)
+                         .set("damage", summary.damage)
+                         .set("sources", sources)
+                         .text());
   } else {
     fmt::print("{}", text);
   }
@@ -80,12 +80,12 @@ Result<Exit> describeCamera(const Options& options) {
   const std::vector<std::string> effects = model->effectNames();
   if (options.json) {
     fmt::print("{}", Json::object()
-                           .set("file", options.what)
-                           .set("model", model->model())
-                           .set("model_id", model->id())
-                           .set("camera", toJson(model->camera()))
-                           .set("effects", Json::arrayOf(effects))
-                           .text());
+                         .set("file", options.what)
+                         .set("model", model->model())
+                         .set("model_id", model->id())
+                         .set("camera", toJson(model->camera()))
+                         .set("effects", Json::arrayOf(effects))
+                         .text());
     return Exit::Ok;
   }
   fmt::print("{}: camera of the simulator\nmodel        {}\nmodel id     {}\n{}effects      {}\n",
@@ -115,20 +115,20 @@ Result<Exit> describeSource(const Options& options) {
     Json planes = Json::array();
     for (const PlaneKind kind : details->planes) planes.push(std::string{nameOf(kind)});
     fmt::print("{}", Json::object()
-                           .set("name", entry.name)
-                           .set("model", entry.model)
-                           .set("serial", entry.serial)
-                           .set("kind", std::string{nameOf(entry.kind)})
-                           .set("driver", details->driver)
-                           .set("streaming", entry.streaming)
-                           .set("frame_rate_hz", rate_hz)
-                           .set("planes", planes)
-                           .set("camera", toJson(details->camera))
-                           .set("can_set_pose", details->can_set_pose)
-                           .set("can_trigger", details->can_trigger)
-                           .set("can_lockstep", details->can_lockstep)
-                           .set("parameters", Json::arrayOf(details->parameters))
-                           .text());
+                         .set("name", entry.name)
+                         .set("model", entry.model)
+                         .set("serial", entry.serial)
+                         .set("kind", std::string{nameOf(entry.kind)})
+                         .set("driver", details->driver)
+                         .set("streaming", entry.streaming)
+                         .set("frame_rate_hz", rate_hz)
+                         .set("planes", planes)
+                         .set("camera", toJson(details->camera))
+                         .set("can_set_pose", details->can_set_pose)
+                         .set("can_trigger", details->can_trigger)
+                         .set("can_lockstep", details->can_lockstep)
+                         .set("parameters", Json::arrayOf(details->parameters))
+                         .text());
     return Exit::Ok;
   }
   fmt::print(

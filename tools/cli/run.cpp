@@ -77,15 +77,17 @@ namespace {
 
 /// Whether the first word is one of the commands, or an option.
 bool namesACommand(std::string_view word) {
-  return word.starts_with('-') ||
-         std::ranges::any_of(commands(), [&](const Command& command) { return word == command.name; });
+  return word.starts_with('-') || std::ranges::any_of(commands(), [&](const Command& command) {
+           return word == command.name;
+         });
 }
 
 }  // namespace
 
 int run(int argc, char** argv) {
   if (argc > 1 && !namesACommand(argv[1])) {
-    fmt::print(stderr, "toftwin: there is no command \"{}\"; `toftwin --help` lists them\n", argv[1]);
+    fmt::print(stderr, "toftwin: there is no command \"{}\"; `toftwin --help` lists them\n",
+               argv[1]);
     return static_cast<int>(Exit::Usage);
   }
   CLI::App app;

@@ -23,7 +23,8 @@ std::string configFor(const std::string& file, const std::string& source,
   for (const auto& [name, frames] : summary.frames_per_source) {
     if (!source.empty() && name != source) continue;
     toml += fmt::format(
-        "\n[[source]]\nname = {0}\ndriver = \"replay\"\nfile = {1}\nrecorded_source = {0}\npace = {2}\nloop "
+        "\n[[source]]\nname = {0}\ndriver = \"replay\"\nfile = {1}\nrecorded_source = {0}\npace = "
+        "{2}\nloop "
         "= {3}\n",
         settings::toToml(name), settings::toToml(path), settings::toToml(options.pace),
         options.loop);

@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: Apache-2.0
+// The real `toftwin` against a real `toftwind` with the pattern source, whose every value is known.
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <cstring>
+#include <opencv2/imgcodecs.hpp>
+#include <thread>
+
+#include "drivers/pattern/pattern.h"
+#include "program.h"
+#include "protocol/record/recording.h"
+#include "tests/record/record_testing.h"
+
+namespace toftwin::cli {
+namespace {
+
+using record::Folder;
+using testing::HasSubstr;
+
+constexpr int kWidth = 64, kHeight = 48;
+
+/// A program that runs beside the test and is ended with it.
+class Background {
+ public:
+  explicit Background(const std::vector<std::string>& words) {
+    pid_ = ::fork();
+    if (pid_ != 0) return;
+    std::vector<char*> arguments;
+    for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
+    arguments.push_back(nullptr);
+    ::execv(arguments[0], arguments.data());
+    ::_exit(127);
+  }
+  ~Background() { end(SIGTERM); }
+  Background(const Background&) = delete;
+  Background& operator=(const Background&) = delete;
+  /// Its exit status after the signal, or what it had ended with already; -1 if a signal killed it.
+  int end(int signal) {
+    if (pid_ <= 0) return -1;
+    ::kill(pid_, signal);
+    int status = 0;
+    ::waitpid(std::exchange(pid_, -1), &status, 0);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+
+ private:
+  pid_t pid_ = -1;
+};
+
+/// Asks ten times a second, for ten seconds at most.
+bool eventually(const std::function<bool()>& holds) {
+  for (int i = 0; i < 100; ++i) {
+    if (holds()) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds{100});
+  }
+  return false;
+}
+
+class WithDaemon : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::filesystem::create_directory(folder_ / "recordings");
+    std::ofstream{folder_ / "toftwind.toml"}
+        << "recording_folder = 'recordings'\n"
+           "[listen]\naddress = ''\nsocket = '"
+        << socket()
+        << "'\n"
+           "[[source]]\nname = 'pattern'\ndriver = 'pattern'\nwidth = 64\n"
+           "height = 48\nframe_rate_hz = 200\n"
+           "[[source]]\nname = 'short'\ndriver = 'pattern'\nwidth = 64\n"
+           "height = 48\nframe_rate_hz = 200\nframes = 5\n";
+    daemon_.emplace(
+        std::vector<std::string>{TOFTWIN_DAEMON, "--config", (folder_ / "toftwind.toml").string()});
+    ASSERT_TRUE(eventually([&] { return std::filesystem::exists(socket()); }))
+        << "toftwind did not start";
+  }
+  std::string socket() const { return (folder_ / "s").string(); }
+  Ran run(const std::string& arguments) const {
+    return toftwin(arguments + " --address unix:" + socket());
+  }
+  std::string path(const std::string& name) const { return "'" + (folder_ / name).string() + "'"; }
+
+  Folder folder_;
+  std::optional<Background> daemon_;
+};
+
+TEST_F(WithDaemon, ListAndInfoSayWhatTheDaemonHas) {
+  const Ran names = run("list --names");
+  EXPECT_EQ(names.status, 0) << names.err;
+  EXPECT_EQ(names.out, "pattern\nshort\n");
+  EXPECT_THAT(run("list --json").out, HasSubstr("\"kind\": \"simulated\""));
+  EXPECT_THAT(run("info pattern").out, HasSubstr("64 × 48 pixels"));
+  EXPECT_THAT(run("info pattern --json").out, HasSubstr("\"frame_rate_hz\": 200"));
+  const Ran unknown = run("info kinekt");
+  EXPECT_EQ(unknown.status, 4);
+  EXPECT_THAT(unknown.err, HasSubstr("kinekt"));
+}
+
+/// The shift at which the pattern shows these millimetres at its first pixel.
+std::optional<std::uint64_t> shiftOf(const cv::Mat& range_mm) {
+  for (std::uint64_t shift = 0; shift < 256; ++shift) {
+    bool fits = true;
+    for (int y = 0; y < kHeight && fits; ++y) {
+      for (int x = 0; x < kWidth && fits; ++x) {
+        const float range_m = drivers::pattern::pixelAt(kWidth, kHeight, shift, x, y).range_m;
+        const long count =
+            std::isnan(range_m) ? 0 : std::lround(1000.0 * static_cast<double>(range_m));
+        fits = range_mm.at<std::uint16_t>(y, x) == count;
+      }
+    }
+    if (fits) return shift;
+  }
+  return std::nullopt;
+}
+
+TEST_F(WithDaemon, GrabWritesThePatternToTheMillimetre) {
+  const Ran ran = run("grab pattern -o " + path("a.png"));
+  ASSERT_EQ(ran.status, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("1 count = 1 mm"));
+  const cv::Mat image = cv::imread(folder_ / "a.png", cv::IMREAD_UNCHANGED);
+  ASSERT_EQ(image.size(), cv::Size(kWidth, kHeight));
+  EXPECT_TRUE(shiftOf(image)) << "no position of the pattern looks like this";
+}
+
+TEST_F(WithDaemon, GrabOfSeveralFramesLeavesNoneOut) {
+  const Ran ran = run("grab pattern -o " + path("a.png") + " --count 5");
+  ASSERT_EQ(ran.status, 0) << ran.err;
+  std::vector<std::uint64_t> shifts;
+  for (int i = 0; i < 5; ++i) {
+    const auto file = folder_ / ("a-000" + std::to_string(i) + ".png");
+    shifts.push_back(shiftOf(cv::imread(file, cv::IMREAD_UNCHANGED)).value_or(1000));
+  }
+  for (std::size_t i = 1; i < 5; ++i) EXPECT_EQ(shifts[i], (shifts[i - 1] + 1) % 256) << i;
+}
+
+TEST_F(WithDaemon, GrabTakesAPartOfTheImage) {
+  const Ran ran = run("grab pattern -o " + path("a.csv") +
+                      " --region 8,4,16,10 --decimation 2 --plane range,flags");
+  ASSERT_EQ(ran.status, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("4 columns, 40 rows"));
+}
+
+TEST_F(WithDaemon, WhatTheSourceDoesNotHaveIsNamed) {
+  EXPECT_EQ(run("grab kinekt -o " + path("a.png")).status, 4);
+  const Ran plane = run("grab pattern --plane samples -o " + path("a.png"));
+  EXPECT_EQ(plane.status, 4);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "a.png"));
+}
+
+TEST_F(WithDaemon, AStreamThatEndsEarlyIsStatus7) {
+  const Ran ran = run("grab short -o " + path("a.npy") + " --count 50");
+  EXPECT_EQ(ran.status, 7);
+  EXPECT_THAT(ran.err, HasSubstr("of 50 frames written"));
+}
+
+TEST_F(WithDaemon, RecordsEveryFrame) {
+  const Ran ran = run("record pattern -o " + path("a.mcap") + " --count 40");
+  ASSERT_EQ(ran.status, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("40 frames, 0 dropped"));
+  auto reader = record::Reader::open(folder_ / "a.mcap");
+  ASSERT_TRUE(reader) << reader.error().message;
+  EXPECT_TRUE(reader->summary().indexed);
+  EXPECT_EQ(reader->summary().frames_per_source.at("pattern"), 40u);
+  std::uint64_t sequence = 0;
+  for (int i = 0; i < 40; ++i) {
+    const auto frame = reader->next();
+    ASSERT_TRUE(frame);
+    sequence = i == 0 ? frame->sequence : sequence + 1;
+    EXPECT_EQ(frame->sequence, sequence);
+  }
+  const Ran again = run("record pattern -o " + path("a.mcap") + " --count 1");
+  EXPECT_EQ(again.status, 4) << "a recording is not overwritten unless asked to";
+  EXPECT_EQ(run("record pattern -o " + path("a.mcap") + " --count 1 --force").status, 0);
+}
+
+TEST_F(WithDaemon, CtrlCEndsARecordingAndLeavesItWhole) {
+  Background recorder{{TOFTWIN_PROGRAM, "record", "pattern", "-o", (folder_ / "a.mcap").string(),
+                       "--address", "unix:" + socket()}};
+  ASSERT_TRUE(eventually([&] { return std::filesystem::exists(folder_ / "a.mcap"); }));
+  std::this_thread::sleep_for(
+      std::chrono::milliseconds{300});  // for a few frames; none would do as well
+  EXPECT_EQ(recorder.end(SIGINT), 0);
+  auto reader = record::Reader::open(folder_ / "a.mcap");
+  ASSERT_TRUE(reader) << reader.error().message;
+  EXPECT_TRUE(reader->summary().indexed) << reader->summary().damage;
+}
+
+TEST_F(WithDaemon, ADaemonThatDiesWhileRecordingIsStatus3AndTheFileIsWhole) {
+  std::optional<Ran> ran;
+  std::thread recording{[&] { ran = run("record pattern -o " + path("a.mcap")); }};
+  EXPECT_TRUE(eventually([&] { return std::filesystem::exists(folder_ / "a.mcap"); }));
+  daemon_->end(SIGKILL);
+  recording.join();
+  EXPECT_EQ(ran->status, 3) << ran->err;
+  auto reader = record::Reader::open(folder_ / "a.mcap");
+  ASSERT_TRUE(reader) << reader.error().message;
+  EXPECT_TRUE(reader->summary().indexed);
+}
+
+TEST_F(WithDaemon, TheDaemonRecordsWhenAsked) {
+  const Ran started = run("record pattern -o b.mcap --on-daemon");
+  ASSERT_EQ(started.status, 0) << started.err;
+  EXPECT_THAT(started.out, HasSubstr("recordings/b.mcap"));
+  const Ran stopped = run("record pattern --on-daemon --stop");
+  EXPECT_EQ(stopped.status, 0) << stopped.err;
+  auto reader = record::Reader::open(folder_ / "recordings/b.mcap");
+  ASSERT_TRUE(reader) << reader.error().message;
+  EXPECT_TRUE(reader->summary().indexed);
+  const Ran outside = run("record pattern -o ../c.mcap --on-daemon");
+  EXPECT_NE(outside.status, 0);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "c.mcap"));
+}
+
+TEST_F(WithDaemon, ServesARecordingWhoseFramesAreTheRecordedOnes) {
+  if (std::ranges::find(drivers::allDrivers(), "replay", &drivers::Driver::name) ==
+      drivers::allDrivers().end()) {
+    GTEST_SKIP() << "this build has no replay driver";
+  }
+  ASSERT_EQ(run("record pattern -o " + path("a.mcap") + " --count 8").status, 0);
+  const std::string served = (folder_ / "replayed").string();
+  Background server{{TOFTWIN_PROGRAM, "replay", (folder_ / "a.mcap").string(), "--serve", "--port",
+                     "0", "--socket", served, "--pace", "fast", "--loop"}};
+  ASSERT_TRUE(eventually([&] { return std::filesystem::exists(served); }));
+  EXPECT_THAT(toftwin("list --address unix:" + served).out, HasSubstr("replayed"));
+  const Ran grabbed = toftwin("grab pattern -o " + path("r.npy") + " --address unix:" + served);
+  ASSERT_EQ(grabbed.status, 0) << grabbed.err;
+  const auto replayed = record::bytesOf(folder_ / "r.npy");
+  ASSERT_EQ(toftwin("replay " + path("a.mcap") + " -o " + path("f.npy")).status, 0);
+  int same = 0;
+  for (int i = 0; i < 8; ++i)
+    same += record::bytesOf(folder_ / ("f-000" + std::to_string(i) + ".npy")) == replayed;
+  EXPECT_EQ(same, 1) << "the frame is one of the recorded ones, bit for bit";
+}
+
+TEST_F(WithDaemon, DoctorFindsNothing) {
+  const Ran ran = run("doctor --folder " + path("."));
+  EXPECT_EQ(ran.status, 0) << ran.out;
+  EXPECT_THAT(ran.out, HasSubstr("toftwind"));
+  EXPECT_THAT(ran.out, HasSubstr("pattern"));
+}
+
+}  // namespace
+}  // namespace toftwin::cli
