@@ -32,7 +32,8 @@ struct Light {
   Image<float> steady;
   Image<float> ambient;
   /// Variance of the Monte-Carlo mean of the first harmonic's phasor, per frequency: (real variance
-  /// + imaginary variance) / 2. Empty if one sample per pixel was taken.
+  /// + imaginary variance) / 2, as if samples were independent; they are spread evenly, which makes it
+  /// an upper bound. Empty if one sample per pixel was taken.
   std::vector<Image<float>> variance;
   Truth truth;
 

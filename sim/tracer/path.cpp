@@ -19,6 +19,9 @@ using embree::kLanes;
 /// albedo 0.8 is followed for ten surfaces before the first draw.
 constexpr float kRouletteThreshold = 0.1f;
 
+/// So many bounces of a pixel's samples are spread evenly over all directions.
+constexpr int kEvenBounces = 2;
+
 /// Which pixel of the block each lane works for; −1: none.
 using LanePixels = std::array<int, kLaneCount>;
 
@@ -104,7 +107,7 @@ void gatherDirectLight(const Tracing& tracing, const Packet& packet, const Hits&
     for (std::size_t i = 0; i < kLaneCount; ++i) {
       Vec3d place = emitter.position;
       if (emitter.is_disc) {
-        const RandomPair random = randomPair(packet.key[i], dimensions.emitter(surface, e));
+        const RandomPair random = randomPair(packet.key[i], packet.index[i], dimensions.emitter(surface, e));
         place = emitter.place(random.u, random.v);
       }
       places.x[i] = place.x;
@@ -131,7 +134,7 @@ void playRoulette(std::uint64_t dimension, Packet& packet) {
     if (packet.valid[i] == 0 || !(throughput < kRouletteThreshold)) continue;
     const double survival = static_cast<double>(throughput / kRouletteThreshold);
     throughput = kRouletteThreshold;
-    if (!(randomPair(packet.key[i], dimension).u < survival)) packet.valid[i] = 0;
+    if (!(independentPair(packet.key[i], packet.index[i], dimension).u < survival)) packet.valid[i] = 0;
   }
 }
 
@@ -150,7 +153,7 @@ void followPaths(const Tracing& tracing, Packet& packet, LaneSums& sums) {
     gatherDirectLight(tracing, packet, hits, surface, is_coherent, sums);
     // Where the surroundings shine, the last surface must still look for them.
     if (surface + 1 == surfaces && tracing.scene.ambient_radiance == 0.0f) return;
-    bounce(hits, dimensions.bounce(surface), packet);
+    bounce(hits, dimensions.bounce(surface), surface < kEvenBounces, packet);
     playRoulette(dimensions.roulette(surface), packet);
   }
   for (std::size_t i = 0; i < kLaneCount; ++i) {
@@ -258,9 +261,9 @@ void traceBlock(const Tracing& tracing, const Block& block, int first, int last,
       pixels[i] = -1;
       if (index >= last || u >= request.camera.width || v >= request.camera.height) continue;
       pixels[i] = p;
-      packet.key[i] = pathKey(request.seed, static_cast<std::uint64_t>(v) << 32 | static_cast<std::uint32_t>(u),
-                              static_cast<std::uint64_t>(index));
-      const RandomPair at = randomPair(packet.key[i], Dimensions::kFootprint);
+      packet.key[i] = pixelKey(request.seed, static_cast<std::uint64_t>(v) << 32 | static_cast<std::uint32_t>(u));
+      packet.index[i] = static_cast<std::uint32_t>(index);
+      const RandomPair at = randomPair(packet.key[i], packet.index[i], Dimensions::kFootprint);
       start(tracing, packet, i,
             block.rays[static_cast<std::size_t>(p)].direction((at.u - 0.5) * request.pixel_extent,
                                                         (at.v - 0.5) * request.pixel_extent));

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "sim/tracer/random.h"
+
 namespace toftwin::sim {
 
 /// cos and sin of 2π × turns.
@@ -11,7 +13,7 @@ struct CosSin {
 /// Error below 2e-7 for |turns| < 2²⁹: the whole turns are taken off in double precision, the rest is
 /// a polynomial on an eighth of a turn. As a range at 16 MHz that is 0.3 µm. No branches and no
 /// calls, so that loops over it become vector code.
-inline __attribute__((always_inline)) CosSin cosSinOfTurns(double turns) {
+TOFTWIN_INLINE CosSin cosSinOfTurns(double turns) {
   constexpr double kRounder = 0x1.8p52;  // adding it rounds to whole numbers
   const double quarters = (turns * 4.0 + kRounder) - kRounder;
   const auto x = static_cast<float>((turns - quarters * 0.25) * 6.283185307179586);  // in [−π/4, π/4]

@@ -16,17 +16,17 @@ namespace {
 
 /// Rounds to single precision, away from the surface whose normal component is given: moved by one unit
 /// in the last place first, twice what rounding can take back.
-inline __attribute__((always_inline)) float roundedAway(double value, double normal) {
+TOFTWIN_INLINE float roundedAway(double value, double normal) {
   return static_cast<float>(value + std::copysign(std::abs(value) * 0x1p-23, normal));
 }
 
 /// std::max goes through references, which keeps loops from becoming vector code.
-inline __attribute__((always_inline)) double larger(double a, double b) { return a > b ? a : b; }
+TOFTWIN_INLINE double larger(double a, double b) { return a > b ? a : b; }
 
 /// Reflection relative to a Lambertian surface (material.h): A + B · max(0, cos Δφ) sin α tan β, from
 /// the cosine between both directions and their cosines to the normal. sin α sin β cos Δφ is what the
 /// first has more than the product of the others, and tan β divides by the larger cosine.
-inline __attribute__((always_inline)) double shapeOf(float a, float b, double between, double cosine, double other) {
+TOFTWIN_INLINE double shapeOf(float a, float b, double between, double cosine, double other) {
   const double sines = larger(0.0, between - cosine * other);
   return static_cast<double>(a) + static_cast<double>(b) * sines / larger(larger(cosine, other), 1e-9);
 }
@@ -126,11 +126,24 @@ void setShadowRays(const Hits& hits, const Vec3Lanes& places, RTCRay16& rays) {
 }
 
 TOFTWIN_VECTOR
-void bounce(const Hits& hits, std::uint64_t dimension, Packet& packet) {
+void bounce(const Hits& hits, std::uint64_t dimension, bool is_even, Packet& packet) {
+  Lanes<double> draw_u, draw_v;
+  if (is_even) {
+    for (std::size_t i = 0; i < kLaneCount; ++i) {
+      const RandomPair random = randomPair(packet.key[i], packet.index[i], dimension);
+      draw_u[i] = random.u;
+      draw_v[i] = random.v;
+    }
+  } else {
+    for (std::size_t i = 0; i < kLaneCount; ++i) {
+      const RandomPair random = independentPair(packet.key[i], packet.index[i], dimension);
+      draw_u[i] = random.u;
+      draw_v[i] = random.v;
+    }
+  }
   for (std::size_t i = 0; i < kLaneCount; ++i) {
-    const RandomPair random = randomPair(packet.key[i], dimension);
-    const CosSin around = cosSinOfTurns(random.v);
-    const double r = std::sqrt(random.u);
+    const CosSin around = cosSinOfTurns(draw_v[i]);
+    const double r = std::sqrt(draw_u[i]);
     const double x = r * static_cast<double>(around.cos), y = r * static_cast<double>(around.sin);
     // Unit length whatever the sine's error; never quite within the surface.
     const double z = std::sqrt(larger(1e-12, 1.0 - x * x - y * y));

@@ -18,7 +18,8 @@ struct Packet {
   Vec3Lanes direction{};       ///< unit
   Lanes<double> length{};      ///< from the pinhole to `origin`
   Lanes<float> throughput{};
-  Lanes<std::uint64_t> key{};  ///< of the path's random numbers
+  Lanes<std::uint64_t> key{};  ///< of the pixel's random numbers
+  Lanes<std::uint32_t> index{};  ///< of the sample
 };
 
 /// Where sixteen paths met the scene. Lanes that met nothing hold harmless numbers.
@@ -60,7 +61,8 @@ void lightHits(const Packet& packet, const Hits& hits, const PlacedEmitter& emit
 void setShadowRays(const Hits& hits, const Vec3Lanes& places, RTCRay16& rays);
 
 /// Sends the paths on from their hits: cosine-weighted, so that a Lambertian surface costs its albedo.
-void bounce(const Hits& hits, std::uint64_t dimension, Packet& packet);
+/// Even: the directions of a pixel's samples are spread evenly (random.h).
+void bounce(const Hits& hits, std::uint64_t dimension, bool is_even, Packet& packet);
 
 /// Rays of the packet as Embree takes them.
 void setRays(const Packet& packet, RTCRayHit16& rays);

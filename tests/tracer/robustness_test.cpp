@@ -5,6 +5,7 @@
 
 #include <cstring>
 
+#include "sim/tracer/random.h"
 #include "tests/tracer/tracing.h"
 
 namespace toftwin::sim::testing {
@@ -148,29 +149,83 @@ TEST(Determinism, AnotherSeedGivesAnotherImage) {
   EXPECT_NE(one.steady, trace(scene, request).steady);
 }
 
-/// The estimated variance is that of the means: over 400 seeds their spread agrees. The ratio of a
-/// variance from 400 draws to its true value has a relative standard deviation of √(2/800) (two
-/// components), the mean of the estimates far less: 5 σ.
-TEST(Variance, IsTheSpreadOverSeeds) {
+/// Spread of one pixel's phasor over many seeds, and the mean of the variances that the tracer states.
+struct Spread {
+  double actual, stated;
+};
+Spread spreadOverSeeds(TraceRequest request, int seeds) {
   const Scene scene = busyScene();
-  TraceRequest request = busyRequest(32);
   request.region_x = 18;
   request.region_y = 14;
   request.region_width = request.region_height = 1;
   std::vector<Complex> means;
   Complex mean;
-  double estimated = 0.0;
-  const int seeds = 400;
+  Spread spread{};
   for (int seed = 0; seed < seeds; ++seed) {
     request.seed = static_cast<std::uint64_t>(seed);
     const Light light = trace(scene, request);
     means.push_back(phasorAt(light, 0, 0, 0));
     mean += means.back() / double(seeds);
-    estimated += static_cast<double>(light.variance[0](0, 0)) / seeds;
+    spread.stated += static_cast<double>(light.variance[0](0, 0)) / seeds;
   }
-  double spread = 0.0;
-  for (const Complex& z : means) spread += std::norm(z - mean) / (2.0 * (seeds - 1));
-  EXPECT_NEAR(spread / estimated, 1.0, 5.0 * std::sqrt(2.0 / (2 * seeds)));
+  for (const Complex& z : means) spread.actual += std::norm(z - mean) / (2.0 * (seeds - 1));
+  return spread;
+}
+
+/// The stated variance is that of independent samples, and even samples do better: it is an upper
+/// bound. The variance of 400 complex draws has a relative standard deviation of √(2/800): 5 σ.
+TEST(Variance, IsNeverLessThanTheSpreadOverSeeds) {
+  for (const int samples : {2, 32}) {
+    const Spread spread = spreadOverSeeds(busyRequest(samples), 400);
+    EXPECT_LT(spread.actual / spread.stated, 1.0 + 5.0 * std::sqrt(2.0 / 800)) << samples;
+    EXPECT_GT(spread.actual / spread.stated, 0.2) << samples;
+  }
+}
+
+/// With one bounce, 256 even samples are worth more than twice as many independent ones.
+TEST(Variance, EvenSamplesAreWorthMoreThanIndependentOnes) {
+  TraceRequest request = busyRequest(256);
+  request.max_surfaces = 2;
+  const Spread spread = spreadOverSeeds(request, 200);
+  EXPECT_LT(spread.actual / spread.stated, 0.5);
+}
+
+/// A (0,2)-sequence: 2ᵏ samples put exactly one into each of the 2ᵏ boxes of every shape 2⁻ᵃ × 2⁻ᵇ, a + b = k.
+TEST(Sampling, FillsEveryElementaryBoxOnce) {
+  for (std::uint64_t key = 1; key < 20; ++key) {
+    for (const int k : {1, 4, 8}) {
+      for (int a = 0; a <= k; ++a) {
+        std::vector<int> count(std::size_t{1} << k);
+        for (std::uint32_t i = 0; i < count.size(); ++i) {
+          const RandomPair at = randomPair(mixBits(key), i, key);
+          const auto x = static_cast<std::size_t>(std::ldexp(at.u, a)), y = static_cast<std::size_t>(std::ldexp(at.v, k - a));
+          ++count[(y << a) + x];
+        }
+        ASSERT_THAT(count, ::testing::Each(1)) << key << " " << k << " " << a;
+      }
+    }
+  }
+}
+
+/// Over pixels each sample is uniform, and two dimensions of a path know nothing of each other: mean 1/2,
+/// covariance 0, with the standard errors of n draws (1/√12n and 1/12√n): 5 σ.
+TEST(Sampling, IsUniformAndUncorrelatedAcrossDimensions) {
+  const int n = 40'000;
+  for (const std::uint32_t index : {0u, 5u}) {
+    double u = 0.0, v = 0.0, uv = 0.0, between = 0.0;
+    for (int pixel = 0; pixel < n; ++pixel) {
+      const std::uint64_t key = pixelKey(3, static_cast<std::uint64_t>(pixel));
+      const RandomPair a = randomPair(key, index, 1), b = randomPair(key, index, 2);
+      u += a.u / n;
+      v += a.v / n;
+      uv += (a.u - 0.5) * (a.v - 0.5) / n;
+      between += (a.u - 0.5) * (b.u - 0.5) / n;
+    }
+    EXPECT_NEAR(u, 0.5, 5.0 / std::sqrt(12.0 * n));
+    EXPECT_NEAR(v, 0.5, 5.0 / std::sqrt(12.0 * n));
+    EXPECT_NEAR(uv, 0.0, 5.0 / (12.0 * std::sqrt(n)));
+    EXPECT_NEAR(between, 0.0, 5.0 / (12.0 * std::sqrt(n)));
+  }
 }
 
 /// Requests that no correct program makes are refused before anything is read or written.
