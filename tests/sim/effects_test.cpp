@@ -95,6 +95,18 @@ TEST(Saturation, FlagsAndInvalidatesThePixelThatIsTooBright) {
   EXPECT_TRUE(std::isnan(bright.range_m(3, 3)));
 }
 
+TEST(Quantisation, TakesTheNearestStep) {
+  Samples samples;
+  samples.steps = 3;
+  samples.electrons.assign(3, {2, 1});
+  const float values[] = {14.9F, 15.1F, -4.0F, -6.0F, 0.0F, 1e6F};
+  for (std::size_t i = 0; i < 6; ++i) samples.electrons[i / 2][i % 2] = values[i];
+  samples =
+      Quantisation{.step_electrons = 10.0}.apply(samples, {Moment{}, 0, 0, 2}, Random{1, 1, 1});
+  const float steps[] = {10.0F, 20.0F, 0.0F, -10.0F, 0.0F, 1e6F};
+  for (std::size_t i = 0; i < 6; ++i) EXPECT_EQ(samples.electrons[i / 2][i % 2], steps[i]) << i;
+}
+
 TEST(AmbientLight, AddsTheMomentsIlluminanceAndNothingWithoutIt) {
   const SensorModel model = modelOf(plainCamera(4, 2, 0.5, "[[effect]]\ntype = 'ambient_light'\n"));
   const Light light = evenLight(model, 1.0, 0.9);  // albedo 0.5

@@ -228,8 +228,13 @@ TEST_F(Simulator, GivesAllPlanesWhenAsked) {
       open("planes = ['truth_range', 'truth_normal', 'samples', 'phasors', 'range', 'flags']\n");
   const Frame frame = frameOf(*source);
   ASSERT_EQ(frame.planes.size(), 6u);
-  EXPECT_NEAR(frame.find(PlaneKind::TruthRange)->as<float>()[0],
-              std::hypot(2.0, std::hypot(11.5, 9.5) / 15.0), 1e-4);
+  const auto truth_m = frame.find(PlaneKind::TruthRange)->as<float>();
+  for (int y = 0; y < 20; ++y) {
+    for (int x = 0; x < 24; ++x) {
+      const double range_m = 2.0 * std::hypot(1.0, (x - 11.5) / 30.0, (y - 9.5) / 30.0);
+      EXPECT_NEAR(truth_m[static_cast<std::size_t>(24 * y + x)], range_m, 1e-5) << x << ", " << y;
+    }
+  }
   EXPECT_EQ(frame.find(PlaneKind::Samples)->channels, 4);
 }
 
