@@ -82,6 +82,15 @@ SourceInfo describe(const Keys& keys, const sim::SensorModel& model,
   return info;
 }
 
+/// Frames must not overlap: the next begins when the last raw exposure of this one is over.
+Result<> exposuresFit(const sim::SensorModel& model, Duration frame_interval) {
+  if (model.exposureTime() <= frame_interval) return {};
+  return Error{Error::Code::InvalidArgument,
+               fmt::format("the raw exposures of a frame take {:.6g} ms, more than the frame "
+                           "interval of {:.6g} ms",
+                           model.exposureTime().in(millisecond), frame_interval.in(millisecond))};
+}
+
 /// One thread calls everything here (source.h), so nothing is locked.
 class SimulatedSource final : public Source {
  public:
@@ -163,6 +172,7 @@ class SimulatedSource final : public Source {
                          fmt::format("this camera has no parameter \"{}\"; it has: {}", name,
                                      fmt::join(info_.parameters, ", "))};
     }
+    if (auto fits = exposuresFit(*changed, *info_.frame_interval); !fits) return fits;
     model_ = *std::move(changed);
     collected_.reset();
     return {};
@@ -306,6 +316,12 @@ Result<std::unique_ptr<Source>> open(settings::Table& table) {
   if (auto checked = table.check(); !checked) return checked.error();
   auto model = chosenCamera(keys, table);
   if (!model) return model.error();
+  if (keys.frame_interval > 0_ms) {
+    if (auto fits = exposuresFit(*model, keys.frame_interval); !fits) {
+      return Error{fits.error().code,
+                   fmt::format("{}: {}", table.place("frame_interval_ms"), fits.error().message)};
+    }
+  }
   auto scene = keys.scene.empty() ? sim::Scene::parse(kDefaultScene, "default scene")
                                   : sim::Scene::load(table.resolve(keys.scene));
   if (!scene) return scene.error();

@@ -91,6 +91,14 @@ void checkWaveforms(settings::Table& table, const CameraFile& file) {
 
 }  // namespace
 
+Duration CameraFile::exposureTime() const {
+  Duration time = -sampling.gap;
+  for (const Modulation& modulation : modulations) {
+    time += (modulation.exposure + sampling.gap) * sampling.steps;
+  }
+  return time;
+}
+
 CameraFile readCameraFile(settings::Table& table, std::vector<AnyEffect>& effects) {
   CameraFile file;
   table.read(file);
@@ -106,6 +114,13 @@ CameraFile readCameraFile(settings::Table& table, std::vector<AnyEffect>& effect
   if (file.decoder.nearest >= file.decoder.farthest) {
     table.complain("decoder",
                    "has nearest_m not below farthest_m, so every range would be invalid");
+  }
+  if (file.exposureTime() > file.sampling.frame_interval) {
+    table.complain("sampling",
+                   fmt::format("has frame_interval_ms = {:.6g}, but the raw exposures and the gaps "
+                               "between them take {:.6g} ms",
+                               file.sampling.frame_interval.in(millisecond),
+                               file.exposureTime().in(millisecond)));
   }
   checkFrequencies(table, file);
   if (!file.modulations.empty()) checkWaveforms(table, file);

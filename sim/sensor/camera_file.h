@@ -135,6 +135,9 @@ struct CameraFile {
   Pixel pixel;
   DecodeSettings decoder;
 
+  /// From the start of a frame's first raw exposure to the end of its last.
+  [[nodiscard]] Duration exposureTime() const;
+
   template <class Visitor>
   void visit(Visitor& v) {
     v.text("model", model, "maker and name, as clients see it");

@@ -181,6 +181,8 @@ std::vector<Exposure> SensorModel::exposures(DeviceTime start) const {
   return all;
 }
 
+Duration SensorModel::exposureTime() const { return impl_->file.exposureTime(); }
+
 TraceRequest SensorModel::traceRequest() const {
   TraceRequest request;
   request.camera = impl_->camera;

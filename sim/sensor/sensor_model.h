@@ -43,6 +43,8 @@ class SensorModel {
   [[nodiscard]] Duration frameInterval() const;
   /// The raw exposures of a frame that starts at `start`: frequency by frequency, step by step.
   [[nodiscard]] std::vector<Exposure> exposures(DeviceTime start) const;
+  /// From the start of a frame's first raw exposure to the end of its last.
+  [[nodiscard]] Duration exposureTime() const;
 
   /// Components of each pixel's unit ray, full image.
   struct Rays {

@@ -32,7 +32,8 @@ inline std::string errorOf(const std::string& toml) {
   return model ? "" : model.error().message;
 }
 
-inline Light evenLight(const SensorModel& model, double radiance, double range_m, double ambient = 0.0) {
+inline Light evenLight(const SensorModel& model, double radiance, double range_m,
+                       double ambient = 0.0) {
   const TraceRequest request = model.traceRequest();
   Light light = syntheticLight(
       model.camera().width, model.camera().height, request.frequencies, request.harmonics,

@@ -34,6 +34,8 @@ TEST(CameraFile, ErrorsNameFileLineKeyBoundAndUnit) {
 }
 
 TEST(CameraFile, PhysicsThatCannotBeIsAnError) {
+  EXPECT_THAT(errorOf("[[emitter]]\n[[modulation]]\nexposure_us = 20000\n"),
+              HasSubstr("the gaps between them take 81.5 ms"));
   const std::string start =
       "[[emitter]]\n[sampling]\nharmonics = 31\n[[modulation]]\nfrequency_mhz = 30\n";
   EXPECT_THAT(errorOf(start + "contrast = 0.95\nemitted = 'square'\ndemodulated = 'square'\n"),

@@ -154,6 +154,8 @@ TEST_F(Simulator, ParametersActOnTheNextFrameAndOnItsModelId) {
   EXPECT_THAT(source->setParameter("delay.offset_mm", 1e9).error().message,
               HasSubstr("out of bounds"));
   EXPECT_THAT(source->setParameter("ambient_klx", -1.0).error().message, HasSubstr("0 to 200 klx"));
+  EXPECT_THAT(source->setParameter("exposure_us", 20'000.0).error().message,
+              HasSubstr("take 81.5 ms, more than the frame interval of 50 ms"));
   EXPECT_THAT(source->setParameter("colour", 1.0).error().message,
               HasSubstr("it has: exposure_us"));
 }
@@ -245,6 +247,8 @@ TEST_F(Simulator, ErrorsSayWhatIsWrongAndWhere) {
   EXPECT_THAT(errorOf("camera = 'nowhere.toml'\n"), HasSubstr("nowhere.toml"));
   EXPECT_THAT(errorOf("uri = 'sim:kinect_v3'\n"),
               testing::AllOf(HasSubstr("sim:kinect_v3"), HasSubstr("sim:kinect_v2")));
+  EXPECT_THAT(errorOf("camera = 'camera.toml'\nframe_interval_ms = 2\n"),
+              testing::AllOf(HasSubstr("toftwind.toml:2"), HasSubstr("take 5.5 ms")));
   EXPECT_THAT(errorOf("sead = 1\n"), HasSubstr("unknown key \"sead\""));
   std::ofstream{folder_ / "broken.toml"} << "[lens]\nwidth = -4\n";
   EXPECT_THAT(errorOf("camera = 'broken.toml'\n"), HasSubstr("broken.toml:2: width"));
