@@ -22,8 +22,8 @@ Result<> checkName(std::string_view what, std::string_view name) {
 }
 
 SourceEntry toEntry(wire::SourceSummary summary) {
-  return {std::move(summary.name), std::move(summary.model), std::move(summary.serial), summary.kind,
-          summary.streaming};
+  return {std::move(summary.name), std::move(summary.model), std::move(summary.serial),
+          summary.kind, summary.streaming};
 }
 
 wire::Subscribe toRequest(std::string_view source, SubscribeOptions options) {
@@ -63,7 +63,8 @@ Result<std::shared_ptr<Connection>> connectToDefault(const ClientOptions& option
 
 }  // namespace
 
-// ---- Subscription ----------------------------------------------------------------------------------
+// ---- Subscription
+// ----------------------------------------------------------------------------------
 
 struct Subscription::State {
   std::shared_ptr<Connection> connection;  // shared with the Client
@@ -79,8 +80,8 @@ Subscription::~Subscription() = default;
 
 Result<Frame> Subscription::next(std::chrono::milliseconds timeout) {
   const auto& [id, frames] = state_->subscribed;
-  // Under Lockstep the next frame is made only when it is asked for: what the application says after
-  // it took a frame, such as a new pose, must hold for the next.
+  // Under Lockstep the next frame is made only when it is asked for: what the application says
+  // after it took a frame, such as a new pose, must hold for the next.
   if (auto last = std::exchange(state_->to_acknowledge, std::nullopt)) {
     state_->connection->acknowledge(id, *last);
   }
@@ -94,7 +95,8 @@ Result<Frame> Subscription::next(std::chrono::milliseconds timeout) {
   return frame;
 }
 
-// ---- Client ----------------------------------------------------------------------------------------
+// ---- Client
+// ----------------------------------------------------------------------------------------
 
 struct Client::State {
   std::shared_ptr<Connection> connection;  // shared with the subscriptions
@@ -152,7 +154,8 @@ Result<Subscription> Client::subscribe(std::string_view source, SubscribeOptions
       new Subscription::State{state_->connection, std::move(*subscribed), std::nullopt}}};
 }
 
-Result<> Client::setPose(std::string_view source, const Transform<World, Camera>& world_from_camera) {
+Result<> Client::setPose(std::string_view source,
+                         const Transform<World, Camera>& world_from_camera) {
   if (auto checked = checkName("source's name", source); !checked) return checked;
   const auto& [w, x, y, z] = world_from_camera.rotation_wxyz;
   const double length2 = w * w + x * x + y * y + z * z;
@@ -163,8 +166,8 @@ Result<> Client::setPose(std::string_view source, const Transform<World, Camera>
   if (!std::isfinite(norm(world_from_camera.translation_m))) {
     return Error{Error::Code::InvalidArgument, "setPose: the translation is not finite"};
   }
-  auto answer = state_->connection->ask<wire::Done>(
-      wire::SetPose{0, std::string{source}, world_from_camera});
+  auto answer =
+      state_->connection->ask<wire::Done>(wire::SetPose{0, std::string{source}, world_from_camera});
   if (!answer) return answer.error();
   return {};
 }

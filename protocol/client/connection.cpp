@@ -21,7 +21,8 @@ std::string milliseconds(std::chrono::milliseconds time) {
 
 }  // namespace
 
-// ---- any thread ------------------------------------------------------------------------------------
+// ---- any thread
+// ------------------------------------------------------------------------------------
 
 Result<std::shared_ptr<Connection>> Connection::open(const transport::Address& address,
                                                      const ClientOptions& options) {
@@ -98,7 +99,8 @@ Result<wire::Message> Connection::exchange(std::uint64_t id, wire::Message reque
   if (answer.wait_for(options_.timeout) == std::future_status::ready) return answer.get();
   asio::post(io_, [this, id] { waiting_.erase(id); });
   return Error{Error::Code::Timeout, "toftwind at " + transport::toString(address_) +
-                                         " did not answer within " + milliseconds(options_.timeout)};
+                                         " did not answer within " +
+                                         milliseconds(options_.timeout)};
 }
 
 Result<Connection::Subscribed> Connection::subscribe(wire::Subscribe request) {
@@ -129,7 +131,8 @@ void Connection::acknowledge(std::uint64_t subscription, std::uint64_t sequence)
   });
 }
 
-// ---- the thread ------------------------------------------------------------------------------------
+// ---- the thread
+// ------------------------------------------------------------------------------------
 
 void Connection::enqueue(const wire::Message& message) {
   output_.push_back(wire::encode(message));
@@ -151,7 +154,8 @@ void Connection::readOn() {
   socket_->asyncRead([this](Result<wire::Message> message) {
     if (message) {
       take(std::move(*message));
-    } else if (message.error().code != Error::Code::Unsupported) {  // else from a newer daemon: skip
+    } else if (message.error().code !=
+               Error::Code::Unsupported) {  // else from a newer daemon: skip
       return fail(message.error());
     }
     if (!fault_) readOn();
@@ -211,9 +215,11 @@ void Connection::takeAnswer(std::uint64_t id, wire::Message answer) {
 void Connection::fail(const Error& reason) {
   if (fault_) return;
   const bool is_ours = reason.code == Error::Code::Stopped;
-  const std::string where = "connection to toftwind at " + transport::toString(address_) + " lost: ";
-  fault_ = is_ours ? reason
-                   : Error{reason.code, where + reason.message + ". Is it still running? Connect again"};
+  const std::string where =
+      "connection to toftwind at " + transport::toString(address_) + " lost: ";
+  fault_ =
+      is_ours ? reason
+              : Error{reason.code, where + reason.message + ". Is it still running? Connect again"};
   socket_->close();
   output_.clear();
   for (const auto& [id, answered] : std::exchange(waiting_, {})) answered->set_value(*fault_);

@@ -62,8 +62,9 @@ Result<transport::Socket> dialTcp(asio::io_context& io, const transport::TcpAddr
           outcome = fault;
           return;
         }
-        asio::async_connect(socket, endpoints,
-                            [&](error_code result, const asio::ip::tcp::endpoint&) { outcome = result; });
+        asio::async_connect(
+            socket, endpoints,
+            [&](error_code result, const asio::ip::tcp::endpoint&) { outcome = result; });
       });
   const bool in_time = waitFor(io, outcome, timeout);
   if (!in_time) {  // the handlers refer to this function's variables: let them finish
@@ -84,7 +85,8 @@ Result<transport::Socket> dialTcp(asio::io_context& io, const transport::TcpAddr
 
 Result<transport::Socket> dial(asio::io_context& io, const transport::Address& address,
                                std::chrono::milliseconds timeout) {
-  if (const auto* local = std::get_if<transport::UnixAddress>(&address)) return dialUnix(io, *local);
+  if (const auto* local = std::get_if<transport::UnixAddress>(&address))
+    return dialUnix(io, *local);
   return dialTcp(io, std::get<transport::TcpAddress>(address), timeout);
 }
 

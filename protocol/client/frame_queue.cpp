@@ -9,10 +9,13 @@ namespace toftwin::client {
 
 std::uint32_t windowOf(wire::Policy policy) {
   switch (policy) {
-    case wire::Policy::Latest: return 2;    // one on its way while the other is being taken over
-    case wire::Policy::Lockstep: return 1;  // by definition
+    case wire::Policy::Latest:
+      return 2;  // one on its way while the other is being taken over
+    case wire::Policy::Lockstep:
+      return 1;  // by definition
     case wire::Policy::Queue:
-    case wire::Policy::Lossless: break;
+    case wire::Policy::Lossless:
+      break;
   }
   return 4;
 }
@@ -52,7 +55,8 @@ Result<Frame> FrameQueue::pop(std::chrono::milliseconds timeout) {
     return frame;
   }
   if (end_) return *end_;
-  return Error{Error::Code::Timeout, "no frame came within " + std::to_string(timeout.count()) + " ms"};
+  return Error{Error::Code::Timeout,
+               "no frame came within " + std::to_string(timeout.count()) + " ms"};
 }
 
 }  // namespace toftwin::client

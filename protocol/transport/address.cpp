@@ -31,7 +31,8 @@ Result<Address> parseUnix(std::string_view whole, std::string_view path) {
   return Address{UnixAddress{std::string{path}}};
 }
 
-Result<Address> parseTcp(std::string_view whole, std::string_view text, std::uint16_t default_port) {
+Result<Address> parseTcp(std::string_view whole, std::string_view text,
+                         std::uint16_t default_port) {
   std::string_view host = text, digits;
   if (text.starts_with('[')) {  // an IPv6 address has colons of its own
     const auto close = text.find(']');

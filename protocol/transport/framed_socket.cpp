@@ -20,8 +20,8 @@ namespace {
 namespace asio = boost::asio;
 using boost::system::error_code;
 
-constexpr std::size_t kInput = 4096;          // holds preamble and header of a usual frame
-constexpr std::size_t kMaxDescriptors = 4;    // that may wait for the message they belong to
+constexpr std::size_t kInput = 4096;           // holds preamble and header of a usual frame
+constexpr std::size_t kMaxDescriptors = 4;     // that may wait for the message they belong to
 constexpr std::size_t kMaxTransfer = 4 << 20;  // bytes per system call; asio's default is 64 KiB
 
 Error disconnected(const error_code& fault) {
@@ -56,7 +56,8 @@ void FramedSocket::close() {
   socket_.close(ignored);
 }
 
-// ---- reading ---------------------------------------------------------------------------------------
+// ---- reading
+// ---------------------------------------------------------------------------------------
 
 void FramedSocket::asyncRead(ReadHandler handler) {
   refused_request_ = 0;
@@ -70,13 +71,13 @@ void FramedSocket::fill(std::size_t wanted, Step next, ReadHandler handler) {
   if (filled_ >= wanted) return (this->*next)(std::move(handler));
   if (input_.size() < wanted) input_.resize(wanted);
   if (accepts_shared_bodies_) return fillWithDescriptors(wanted, next, std::move(handler));
-  socket_.async_read_some(
-      asio::buffer(input_) + filled_,
-      [this, wanted, next, handler = std::move(handler)](error_code fault, std::size_t count) mutable {
-        if (fault) return handler(disconnected(fault));
-        filled_ += count;
-        fill(wanted, next, std::move(handler));
-      });
+  socket_.async_read_some(asio::buffer(input_) + filled_,
+                          [this, wanted, next, handler = std::move(handler)](
+                              error_code fault, std::size_t count) mutable {
+                            if (fault) return handler(disconnected(fault));
+                            filled_ += count;
+                            fill(wanted, next, std::move(handler));
+                          });
 }
 
 void FramedSocket::fillWithDescriptors(std::size_t wanted, Step next, ReadHandler handler) {
@@ -84,12 +85,11 @@ void FramedSocket::fillWithDescriptors(std::size_t wanted, Step next, ReadHandle
     const Result<bool> received = receiveWithDescriptors();
     if (!received) return handler(received.error());
     if (*received) continue;
-    socket_.async_wait(
-        Socket::wait_read,
-        [this, wanted, next, handler = std::move(handler)](error_code fault) mutable {
-          if (fault) return handler(disconnected(fault));
-          fillWithDescriptors(wanted, next, std::move(handler));
-        });
+    socket_.async_wait(Socket::wait_read, [this, wanted, next,
+                                           handler = std::move(handler)](error_code fault) mutable {
+      if (fault) return handler(disconnected(fault));
+      fillWithDescriptors(wanted, next, std::move(handler));
+    });
     return;
   }
   (this->*next)(std::move(handler));
@@ -103,7 +103,8 @@ Result<bool> FramedSocket::receiveWithDescriptors() {
   message.msg_iov = &room;
   message.msg_iovlen = 1;
   message.msg_control = control.bytes;
-  message.msg_controllen = CMSG_LEN(sizeof(int));  // not CMSG_SPACE: its padding would hold a second
+  message.msg_controllen =
+      CMSG_LEN(sizeof(int));  // not CMSG_SPACE: its padding would hold a second
   const ssize_t count =
       ::recvmsg(socket_.native_handle(), &message, MSG_DONTWAIT | MSG_CMSG_CLOEXEC);
   if (count < 0) {
@@ -123,7 +124,8 @@ Result<bool> FramedSocket::receiveWithDescriptors() {
                  "process has too many files open (ulimit -n)"};
   }
   if (descriptors_.size() > kMaxDescriptors) {
-    return Error{Error::Code::Malformed, "the peer sends file descriptors that no message refers to"};
+    return Error{Error::Code::Malformed,
+                 "the peer sends file descriptors that no message refers to"};
   }
   filled_ += static_cast<std::size_t>(count);
   return true;
@@ -171,7 +173,8 @@ void FramedSocket::takeInlineBody(ReadHandler handler) {
   takeRest(std::move(arriving), std::move(handler));
 }
 
-/// Reads in parts that the CPU's caches hold, so that the checksum finds each where the kernel put it.
+/// Reads in parts that the CPU's caches hold, so that the checksum finds each where the kernel put
+/// it.
 void FramedSocket::takeRest(Arriving arriving, ReadHandler handler) {
   constexpr std::size_t kPart = 256 << 10;
   const std::size_t left = arriving.body.size - arriving.filled;
@@ -190,8 +193,8 @@ void FramedSocket::takeRest(Arriving arriving, ReadHandler handler) {
 
 void FramedSocket::finish(Buffer body, std::uint32_t body_crc32c, const ReadHandler& handler) {
   const std::size_t head = wire::kPreambleSize + preamble_.header_bytes;
-  const auto header = std::as_bytes(std::span{input_}).subspan(wire::kPreambleSize,
-                                                               preamble_.header_bytes);
+  const auto header =
+      std::as_bytes(std::span{input_}).subspan(wire::kPreambleSize, preamble_.header_bytes);
   auto message = wire::decode(preamble_, header, std::move(body), body_crc32c);
   if (!message) refused_request_ = wire::requestIdOf(header);
   std::memmove(input_.data(), input_.data() + head, filled_ - head);
@@ -199,7 +202,8 @@ void FramedSocket::finish(Buffer body, std::uint32_t body_crc32c, const ReadHand
   handler(std::move(message));
 }
 
-// ---- writing ---------------------------------------------------------------------------------------
+// ---- writing
+// ---------------------------------------------------------------------------------------
 
 void FramedSocket::asyncWrite(wire::Encoded message, WriteHandler handler) {
   output_ = std::move(message);
@@ -232,16 +236,16 @@ void FramedSocket::sendDescriptor(WriteHandler handler) {
   item->cmsg_len = CMSG_LEN(sizeof(int));
   const int fd = output_body_->fd();
   std::memcpy(CMSG_DATA(item), &fd, sizeof fd);
-  const ssize_t count =
-      ::sendmsg(socket_.native_handle(), &message, MSG_DONTWAIT | MSG_NOSIGNAL);
+  const ssize_t count = ::sendmsg(socket_.native_handle(), &message, MSG_DONTWAIT | MSG_NOSIGNAL);
   if (count >= 0) return writeRest(static_cast<std::size_t>(count), std::move(handler));
   if (errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR) {
     return wrote(disconnected(error_code{errno, boost::system::system_category()}), handler);
   }
-  socket_.async_wait(Socket::wait_write, [this, handler = std::move(handler)](error_code fault) mutable {
-    if (fault) return wrote(disconnected(fault), handler);
-    sendDescriptor(std::move(handler));
-  });
+  socket_.async_wait(Socket::wait_write,
+                     [this, handler = std::move(handler)](error_code fault) mutable {
+                       if (fault) return wrote(disconnected(fault), handler);
+                       sendDescriptor(std::move(handler));
+                     });
 }
 
 void FramedSocket::writeRest(std::size_t head_sent, WriteHandler handler) {

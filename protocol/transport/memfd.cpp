@@ -20,15 +20,17 @@ namespace {
 constexpr int kSeals = F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_WRITE;
 
 Error systemError(const char* what) {
-  return {Error::Code::Internal, std::string{"shared memory: "} + what + " failed: " +
-                                     std::generic_category().message(errno)};
+  return {Error::Code::Internal, std::string{"shared memory: "} + what +
+                                     " failed: " + std::generic_category().message(errno)};
 }
 
-/// Writes all pieces. write(2) fills fresh pages without faulting each of them in, as a mapping would.
+/// Writes all pieces. write(2) fills fresh pages without faulting each of them in, as a mapping
+/// would.
 Result<> writePieces(int fd, const std::vector<Buffer>& pieces) {
   std::vector<iovec> left;
   for (const Buffer& piece : pieces) {
-    if (piece.size() > 0) left.push_back({const_cast<std::byte*>(piece.bytes().data()), piece.size()});
+    if (piece.size() > 0)
+      left.push_back({const_cast<std::byte*>(piece.bytes().data()), piece.size()});
   }
   auto first = left.begin();
   while (first != left.end()) {
@@ -77,20 +79,20 @@ Result<Buffer> mapSharedBody(const FileDescriptor& memfd, std::uint64_t size) {
   if (seals < 0 || (seals & kSeals) != kSeals) {  // else the peer could pull the memory away
     return Error{Error::Code::Malformed, "the body's file descriptor is not a sealed memfd"};
   }
-  struct stat status{};
+  struct stat status {};
   if (::fstat(memfd.get(), &status) != 0) return systemError("fstat");
   if (status.st_size < 0 || static_cast<std::uint64_t>(status.st_size) != size) {
     return Error{Error::Code::Malformed, "the body's memfd has " + std::to_string(status.st_size) +
                                              " bytes, not the announced " + std::to_string(size)};
   }
   if (size == 0) return Buffer{};
-  // Not MAP_POPULATE: mapping all pages now costs as much as faulting them in when they are read (the
-  // kernel maps sixteen at a time), but here the reading thread would pay, for all its subscriptions.
+  // Not MAP_POPULATE: mapping all pages now costs as much as faulting them in when they are read
+  // (the kernel maps sixteen at a time), but here the reading thread would pay, for all its
+  // subscriptions.
   void* const memory = ::mmap(nullptr, size, PROT_READ, MAP_SHARED, memfd.get(), 0);
   if (memory == MAP_FAILED) return systemError("mmap");
-  std::shared_ptr<const void> owner{memory, [size](const void* mapped) {
-                                      ::munmap(const_cast<void*>(mapped), size);
-                                    }};
+  std::shared_ptr<const void> owner{
+      memory, [size](const void* mapped) { ::munmap(const_cast<void*>(mapped), size); }};
   return Buffer{std::move(owner), {static_cast<const std::byte*>(memory), size}};
 }
 

@@ -24,7 +24,8 @@ std::uint64_t loadWord(const std::byte* at) {
   return word;
 }
 
-// ---- eight bytes per step by table ("slicing by eight") --------------------------------------------
+// ---- eight bytes per step by table ("slicing by eight")
+// --------------------------------------------
 
 using Table = std::array<std::uint32_t, 256>;
 
@@ -60,10 +61,11 @@ std::uint32_t updatePortable(std::uint32_t remainder, const std::byte* at, std::
 }
 
 #if defined(__x86_64__)
-// ---- SSE4.2 ----------------------------------------------------------------------------------------
-// The instruction takes 3 cycles but one can start every cycle, so three neighbouring blocks are
-// summed at once. The remainders are joined by linearity: crc(a b) = advance(crc(a), |b|) ^ crc0(b),
-// where advance(r, n) is the remainder r after n zero bytes, a linear map over GF(2).
+// ---- SSE4.2
+// ---------------------------------------------------------------------------------------- The
+// instruction takes 3 cycles but one can start every cycle, so three neighbouring blocks are summed
+// at once. The remainders are joined by linearity: crc(a b) = advance(crc(a), |b|) ^ crc0(b), where
+// advance(r, n) is the remainder r after n zero bytes, a linear map over GF(2).
 
 using Columns = std::array<std::uint32_t, 32>;  // of a 32 × 32 matrix over GF(2)
 
@@ -75,8 +77,8 @@ constexpr std::uint32_t product(const Columns& matrix, std::uint32_t vector) {
   return sum;
 }
 
-/// The map advance(·, Bytes) as four tables, one per byte of the remainder. Bytes is a power of two,
-/// so the map is the one-bit shift squared log2(8 Bytes) times.
+/// The map advance(·, Bytes) as four tables, one per byte of the remainder. Bytes is a power of
+/// two, so the map is the one-bit shift squared log2(8 Bytes) times.
 template <std::size_t Bytes>
 constexpr std::array<Table, 4> makeAdvance() {
   static_assert(std::has_single_bit(Bytes));
@@ -105,7 +107,8 @@ std::uint32_t advance(std::uint32_t r) {
 
 /// Eats as many runs of three blocks of `Block` bytes as there are.
 template <std::size_t Block>
-__attribute__((target("sse4.2"))) std::uint64_t updateThreefold(std::uint64_t a, const std::byte*& at,
+__attribute__((target("sse4.2"))) std::uint64_t updateThreefold(std::uint64_t a,
+                                                                const std::byte*& at,
                                                                 std::size_t& size) {
   for (; size >= 3 * Block; at += 3 * Block, size -= 3 * Block) {
     std::uint64_t b = 0, c = 0;

@@ -86,7 +86,9 @@ Subscribe read(Checks& checks, std::uint64_t id, const fb::Subscribe& t) {
   if (const fb::Region* r = t.region()) m.region = {r->x(), r->y(), r->width(), r->height()};
   return m;
 }
-Subscribed read(Checks&, std::uint64_t id, const fb::Subscribed& t) { return {id, t.subscription()}; }
+Subscribed read(Checks&, std::uint64_t id, const fb::Subscribed& t) {
+  return {id, t.subscription()};
+}
 Unsubscribe read(Checks&, std::uint64_t id, const fb::Unsubscribe& t) {
   return {id, t.subscription()};
 }
@@ -118,13 +120,14 @@ AskHealth read(Checks&, std::uint64_t id, const fb::AskHealth&) { return {id}; }
 Health read(Checks& checks, std::uint64_t id, const fb::Health& t) {
   Health m{id, checks.finiteFromZero(t.uptime_s(), "uptime_s") * second, t.sessions(), {}};
   for (const auto* s : checks.items(t.sources(), kMaxSources, "sources")) {
-    m.sources.push_back({.name = checks.name(s->name(), "source.name"),
-                         .streaming = s->streaming(),
-                         .frames = s->frames(),
-                         .dropped_by_device = s->dropped_by_device(),
-                         .subscribers = s->subscribers(),
-                         .reconnects = s->reconnects(),
-                         .last_error = checks.text(s->last_error(), kMaxText, "source.last_error")});
+    m.sources.push_back(
+        {.name = checks.name(s->name(), "source.name"),
+         .streaming = s->streaming(),
+         .frames = s->frames(),
+         .dropped_by_device = s->dropped_by_device(),
+         .subscribers = s->subscribers(),
+         .reconnects = s->reconnects(),
+         .last_error = checks.text(s->last_error(), kMaxText, "source.last_error")});
   }
   return m;
 }
@@ -140,12 +143,12 @@ Message readAs(Checks& checks, const fb::Header& header) {
 /// The readers in the order of the union, which is the order of the message ids from 1.
 using ReadMessage = Message (*)(Checks&, const fb::Header&);
 constexpr std::array<ReadMessage, std::variant_size_v<Message>> kReaders{
-    readAs<fb::Hello>,        readAs<fb::ListSources>,       readAs<fb::SourceList>,
+    readAs<fb::Hello>,          readAs<fb::ListSources>,       readAs<fb::SourceList>,
     readAs<fb::DescribeSource>, readAs<fb::SourceDescription>, readAs<fb::Subscribe>,
-    readAs<fb::Subscribed>,   readAs<fb::Unsubscribe>,       nullptr,  // frames need the body
-    readAs<fb::Acknowledge>,  readAs<fb::SubscriptionEnded>, readAs<fb::SetPose>,
-    readAs<fb::SetParameter>, readAs<fb::Trigger>,           readAs<fb::Record>,
-    readAs<fb::Done>,         readAs<fb::AskHealth>,         readAs<fb::Health>,
+    readAs<fb::Subscribed>,     readAs<fb::Unsubscribe>,       nullptr,  // frames need the body
+    readAs<fb::Acknowledge>,    readAs<fb::SubscriptionEnded>, readAs<fb::SetPose>,
+    readAs<fb::SetParameter>,   readAs<fb::Trigger>,           readAs<fb::Record>,
+    readAs<fb::Done>,           readAs<fb::AskHealth>,         readAs<fb::Health>,
     readAs<fb::Failure>};
 static_assert(static_cast<std::size_t>(fb::Body::MAX) == kReaders.size());
 

@@ -50,7 +50,8 @@ Plane readPlane(Checks& checks, const fb::Plane& table, const Buffer& body, std:
   Plane plane;
   plane.kind = checks.oneOf(table.kind(), PlaneKind::TruthNormal, "plane.kind");
   plane.type = checks.oneOf(table.type(), ElementType::F32, "plane.type");
-  checks.require(table.width() >= 1 && table.width() <= kMaxSide, "plane.width", "is not 1 to 65535");
+  checks.require(table.width() >= 1 && table.width() <= kMaxSide, "plane.width",
+                 "is not 1 to 65535");
   checks.require(table.height() >= 1 && table.height() <= kMaxSide, "plane.height",
                  "is not 1 to 65535");
   checks.require(table.channels() >= 1 && table.channels() <= kMaxChannels, "plane.channels",
@@ -99,11 +100,10 @@ CameraInfo readCamera(Checks& checks, const fb::Camera* table) {
 
 Transform<World, Camera> readPose(Checks& checks, const fb::Pose& pose) {
   Transform<World, Camera> world_from_camera;
-  world_from_camera.rotation_wxyz = {
-      checks.finite(pose.rotation_w(), "pose.rotation_w"),
-      checks.finite(pose.rotation_x(), "pose.rotation_x"),
-      checks.finite(pose.rotation_y(), "pose.rotation_y"),
-      checks.finite(pose.rotation_z(), "pose.rotation_z")};
+  world_from_camera.rotation_wxyz = {checks.finite(pose.rotation_w(), "pose.rotation_w"),
+                                     checks.finite(pose.rotation_x(), "pose.rotation_x"),
+                                     checks.finite(pose.rotation_y(), "pose.rotation_y"),
+                                     checks.finite(pose.rotation_z(), "pose.rotation_z")};
   world_from_camera.translation_m = {checks.finite(pose.x_m(), "pose.x_m"),
                                      checks.finite(pose.y_m(), "pose.y_m"),
                                      checks.finite(pose.z_m(), "pose.z_m")};

@@ -146,8 +146,10 @@ Encoded encodeAs(std::uint8_t message_id, const M& message, Body body) {
 /// The id of a message on the wire is its place in the variant, counted from 1.
 template <class M, std::size_t I = 0>
 constexpr std::uint8_t messageIdOf() {
-  if constexpr (std::is_same_v<std::variant_alternative_t<I, Message>, M>) return I + 1;
-  else return messageIdOf<M, I + 1>();
+  if constexpr (std::is_same_v<std::variant_alternative_t<I, Message>, M>)
+    return I + 1;
+  else
+    return messageIdOf<M, I + 1>();
 }
 
 }  // namespace

@@ -103,8 +103,9 @@ Offset<fb::Frame> writeFrame(Builder& builder, const FrameMessage& message) {
   const auto provenance = writeProvenance(builder, frame.provenance);
   const auto camera = writeCamera(builder, frame.camera);
   const auto planes = writePlanes(builder, frame.planes);
-  return fb::CreateFrame(builder, message.subscription, source, frame.sequence, frame.dropped_before,
-                         frame.dropped_by_device, moment, provenance, camera, planes);
+  return fb::CreateFrame(builder, message.subscription, source, frame.sequence,
+                         frame.dropped_before, frame.dropped_by_device, moment, provenance, camera,
+                         planes);
 }
 
 }  // namespace toftwin::wire

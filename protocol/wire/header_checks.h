@@ -19,11 +19,14 @@
 namespace toftwin::wire {
 
 /// Takes values out of a verified header and remembers the first that breaks a rule. Readers go on
-/// after a fault with a harmless value, so that code reads straight down; `failed()` is asked at the end.
+/// after a fault with a harmless value, so that code reads straight down; `failed()` is asked at
+/// the end.
 class Checks {
  public:
   [[nodiscard]] bool failed() const { return !fault_.empty(); }
-  [[nodiscard]] Error error() const { return {Error::Code::Malformed, "malformed message: " + fault_}; }
+  [[nodiscard]] Error error() const {
+    return {Error::Code::Malformed, "malformed message: " + fault_};
+  }
 
   void require(bool holds, std::string_view field, std::string_view rule) {
     if (!holds && fault_.empty()) fault_ = std::string{field} + " " + std::string{rule};
@@ -36,8 +39,9 @@ class Checks {
   std::string name(const flatbuffers::String* text, std::string_view field) {
     return this->text(text, kMaxName, field);
   }
-  std::vector<std::string> names(const flatbuffers::Vector<flatbuffers::Offset<flatbuffers::String>>* texts,
-                                 std::string_view field) {
+  std::vector<std::string> names(
+      const flatbuffers::Vector<flatbuffers::Offset<flatbuffers::String>>* texts,
+      std::string_view field) {
     std::vector<std::string> names;
     for (const auto* text : items(texts, kMaxNames, field)) names.push_back(name(text, field));
     return names;

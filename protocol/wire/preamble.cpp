@@ -38,10 +38,10 @@ Error malformed(std::string what) {
 }
 
 Error tooLarge(const char* part, std::uint64_t announced, std::uint64_t limit) {
-  return {Error::Code::TooLarge, std::string{"the peer announces a "} + part + " of " +
-                                     std::to_string(announced) + " bytes, the limit here is " +
-                                     std::to_string(limit) +
-                                     ": ask for fewer planes or a smaller region, or raise the limit"};
+  return {Error::Code::TooLarge,
+          std::string{"the peer announces a "} + part + " of " + std::to_string(announced) +
+              " bytes, the limit here is " + std::to_string(limit) +
+              ": ask for fewer planes or a smaller region, or raise the limit"};
 }
 
 }  // namespace
@@ -71,8 +71,8 @@ Result<Preamble> decodePreamble(std::span<const std::byte, kPreambleSize> bytes,
   if (preamble.major != kVersionMajor) {  // first: another version may lay out the rest differently
     return Error{Error::Code::Incompatible,
                  "the peer speaks protocol version " + std::to_string(preamble.major) + "." +
-                     std::to_string(preamble.minor) + ", this side " + std::to_string(kVersionMajor) +
-                     ".x: update the older of the two"};
+                     std::to_string(preamble.minor) + ", this side " +
+                     std::to_string(kVersionMajor) + ".x: update the older of the two"};
   }
   if (load<std::uint32_t>(bytes, kPreambleCrcAt) != crc32c(bytes.first<kPreambleCrcAt>())) {
     return malformed("the preamble's checksum is wrong");

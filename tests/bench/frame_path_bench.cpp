@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// The path of a frame from the daemon to the applications, beside a bare TCP sender of the same bytes.
+// The path of a frame from the daemon to the applications, beside a bare TCP sender of the same
+// bytes.
 //   frame_path_bench [SECONDS]       SECONDS per measurement, default 10
-// The daemon's part (hub, sessions, sockets) and each client are processes of their own. The source costs
-// nothing: it hands out the same frame of 512 × 424 range, amplitude and flags (1.95 MB). Latency is
-// from `received` (the daemon has the whole frame) to the return of Subscription::next.
+// The daemon's part (hub, sessions, sockets) and each client are processes of their own. The source
+// costs nothing: it hands out the same frame of 512 × 424 range, amplitude and flags (1.95 MB).
+// Latency is from `received` (the daemon has the whole frame) to the return of Subscription::next.
 #include <arpa/inet.h>
 #include <signal.h>
 #include <sys/prctl.h>
@@ -106,7 +107,8 @@ class ConstantSource final : public drivers::Source {
   drivers::SourceInfo info_;
 };
 
-/// A process that runs `work`, which says through the pipe when it is ready, and is killed at the end.
+/// A process that runs `work`, which says through the pipe when it is ready, and is killed at the
+/// end.
 class Child {
  public:
   explicit Child(const std::function<void(int ready)>& work) {
@@ -146,16 +148,19 @@ void runDaemon(int ready, std::chrono::nanoseconds period, const std::string& so
   const auto open = [period]() -> Result<std::unique_ptr<drivers::Source>> {
     return std::unique_ptr<drivers::Source>{std::make_unique<ConstantSource>(period)};
   };
-  hub.add(std::make_shared<daemon::SourceHost>("cam", open, open(), daemon::SourceHost::Options{}, clock));
+  hub.add(std::make_shared<daemon::SourceHost>("cam", open, open(), daemon::SourceHost::Options{},
+                                               clock));
   boost::asio::io_context io;
   daemon::Server server{io, hub, {}};
-  if (auto listening = server.listenTcp("127.0.0.1", 0); !listening) giveUp(listening.error().message);
+  if (auto listening = server.listenTcp("127.0.0.1", 0); !listening)
+    giveUp(listening.error().message);
   if (auto listening = server.listenUnix(socket); !listening) giveUp(listening.error().message);
   sayReady(ready, server.port());
   io.run();
 }
 
-// ---- the bare sender -------------------------------------------------------------------------------
+// ---- the bare sender
+// -------------------------------------------------------------------------------
 
 int listenLocally(int& port) {
   const int listener = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
@@ -174,7 +179,8 @@ int listenLocally(int& port) {
 
 /// Sends the bytes to each of `count` receivers, every `period` or without pause, with the time of
 /// sending in their first eight.
-void runBareSender(int ready, int count, std::chrono::nanoseconds period, std::vector<std::byte> bytes) {
+void runBareSender(int ready, int count, std::chrono::nanoseconds period,
+                   std::vector<std::byte> bytes) {
   int port = 0;
   const int listener = listenLocally(port);
   sayReady(ready, port);
@@ -187,7 +193,8 @@ void runBareSender(int ready, int count, std::chrono::nanoseconds period, std::v
     std::memcpy(bytes.data(), &now, sizeof now);
     for (const int receiver : receivers) {
       for (std::size_t sent = 0; sent < bytes.size();) {
-        const ssize_t wrote = ::send(receiver, bytes.data() + sent, bytes.size() - sent, MSG_NOSIGNAL);
+        const ssize_t wrote =
+            ::send(receiver, bytes.data() + sent, bytes.size() - sent, MSG_NOSIGNAL);
         if (wrote <= 0) return;
         sent += static_cast<std::size_t>(wrote);
       }
@@ -201,11 +208,13 @@ int dialLocally(int port) {
   address.sin_family = AF_INET;
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
   address.sin_port = htons(static_cast<std::uint16_t>(port));
-  if (::connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof address) != 0) giveUp("cannot connect");
+  if (::connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof address) != 0)
+    giveUp("cannot connect");
   return fd;
 }
 
-// ---- measuring -------------------------------------------------------------------------------------
+// ---- measuring
+// -------------------------------------------------------------------------------------
 
 struct Latencies {
   std::vector<double> ms;
@@ -217,8 +226,8 @@ struct Latencies {
     const auto at = [&](double share) {
       return ms[static_cast<std::size_t>(share * static_cast<double>(ms.size() - 1))];
     };
-    std::printf("%-34s %8zu %8.3f %8.3f %8.3f %8.3f %8llu\n", what, ms.size(), at(0.5), at(0.9), at(0.99),
-                ms.back(), static_cast<unsigned long long>(dropped));
+    std::printf("%-34s %8zu %8.3f %8.3f %8.3f %8.3f %8llu\n", what, ms.size(), at(0.5), at(0.9),
+                at(0.99), ms.back(), static_cast<unsigned long long>(dropped));
     std::fflush(stdout);
   }
 };
@@ -312,7 +321,8 @@ double measureBareThroughput(int port, std::size_t size, Seconds time) {
   const int fd = dialLocally(port);
   std::vector<std::byte> bytes(size);
   const double rate = framesPerSecond(
-      [&] { return ::recv(fd, bytes.data(), size, MSG_WAITALL) == static_cast<ssize_t>(size); }, time);
+      [&] { return ::recv(fd, bytes.data(), size, MSG_WAITALL) == static_cast<ssize_t>(size); },
+      time);
   ::close(fd);
   return rate;
 }
@@ -321,7 +331,8 @@ void run(Seconds time) {
   const auto bytes = wire::toBytes(wire::encode(wire::FrameMessage{1, constantFrame()}));
   const double mb = static_cast<double>(bytes.size()) * 1e-6;
   const std::string socket =
-      (std::filesystem::temp_directory_path() / ("frame_path_bench-" + std::to_string(::getpid()))).string();
+      (std::filesystem::temp_directory_path() / ("frame_path_bench-" + std::to_string(::getpid())))
+          .string();
   const auto daemonWith = [&](std::chrono::nanoseconds period) {
     return [&, period](int ready) { runDaemon(ready, period, socket); };
   };
@@ -331,8 +342,8 @@ void run(Seconds time) {
 
   std::printf("frame: 512 x 424 range + amplitude + flags, %.2f MB; %u CPUs; %.0f s each\n\n", mb,
               std::thread::hardware_concurrency(), time.count());
-  std::printf("latency in ms, %d clients, 30 frames/s\n%-34s %8s %8s %8s %8s %8s %8s\n", kClients, "", "frames",
-              "p50", "p90", "p99", "max", "dropped");
+  std::printf("latency in ms, %d clients, 30 frames/s\n%-34s %8s %8s %8s %8s %8s %8s\n", kClients,
+              "", "frames", "p50", "p90", "p99", "max", "dropped");
   std::fflush(stdout);
   {
     const Child sender{daemonWith(kPeriod)};
@@ -345,8 +356,9 @@ void run(Seconds time) {
     measureBareLatency(sender.port(), bytes.size(), time);
   }
 
-  std::printf("\nthroughput, one client, a source at 110 %% of the bare sender\n%-34s %12s %12s %12s\n", "", "frames/s", "MB/s",
-              "of bare TCP");
+  std::printf(
+      "\nthroughput, one client, a source at 110 %% of the bare sender\n%-34s %12s %12s %12s\n", "",
+      "frames/s", "MB/s", "of bare TCP");
   std::fflush(stdout);
   // Interleaved, so that whatever else the machine does meets all alike.
   double bare = 0, tcp = 0, shared = 0;
@@ -356,10 +368,12 @@ void run(Seconds time) {
       const Child sender{bareWith(1, 0ns)};
       bare += measureBareThroughput(sender.port(), bytes.size(), time / kRounds) / kRounds;
     }
-    // A source a little faster than the bare sender: faster still, it would only make frames to drop.
-    const Child sender{daemonWith(std::chrono::nanoseconds{static_cast<std::int64_t>(
-        1e9 * (round + 1) / (1.1 * bare * kRounds))})};
-    tcp += measureThroughput("tcp:127.0.0.1:" + std::to_string(sender.port()), time / kRounds) / kRounds;
+    // A source a little faster than the bare sender: faster still, it would only make frames to
+    // drop.
+    const Child sender{daemonWith(std::chrono::nanoseconds{
+        static_cast<std::int64_t>(1e9 * (round + 1) / (1.1 * bare * kRounds))})};
+    tcp += measureThroughput("tcp:127.0.0.1:" + std::to_string(sender.port()), time / kRounds) /
+           kRounds;
     shared += measureThroughput("unix:" + socket, time / kRounds) / kRounds;
     std::filesystem::remove(socket);
   }

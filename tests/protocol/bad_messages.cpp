@@ -23,7 +23,8 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// A message with lengths and checksums that fit.
-Bytes sealed(Bytes header, const Bytes& body, std::function<void(Preamble&)> change = [](Preamble&) {}) {
+Bytes sealed(
+    Bytes header, const Bytes& body, std::function<void(Preamble&)> change = [](Preamble&) {}) {
   header.resize(paddedToAlignment(header.size()));
   Preamble preamble;
   preamble.header_bytes = static_cast<std::uint32_t>(header.size());
@@ -47,7 +48,8 @@ Bytes headerOf(fb::Body type, const std::function<Union(Builder&)>& write,
   return {data, data + builder.GetSize()};
 }
 
-Bytes messageOf(fb::Body type, const std::function<Union(Builder&)>& write, const Bytes& body = {}) {
+Bytes messageOf(fb::Body type, const std::function<Union(Builder&)>& write,
+                const Bytes& body = {}) {
   return sealed(headerOf(type, write), body);
 }
 
@@ -74,7 +76,8 @@ Bytes frameWith(const std::vector<PlaneFields>& planes, std::size_t body_bytes) 
   const auto write = [&](Builder& b) {
     std::vector<flatbuffers::Offset<fb::Plane>> tables;
     for (const PlaneFields& p : planes) {
-      tables.push_back(fb::CreatePlane(b, p.kind, p.type, p.width, p.height, p.channels, p.offset, p.bytes));
+      tables.push_back(
+          fb::CreatePlane(b, p.kind, p.type, p.width, p.height, p.channels, p.offset, p.bytes));
     }
     return fb::CreateFrameDirect(b, 7, "k", 1, 0, 0, 0, 0, 0, &tables).Union();
   };
@@ -94,7 +97,8 @@ void addPreambles(std::vector<BadMessage>& all) {
   all.push_back({"body-place", withByte(good, 32, 2), malformed, "the body's place is 2"});
   all.push_back({"body-elsewhere", withByte(good, 32, 1), malformed, "its body is elsewhere"});
   all.push_back({"reserved", withByte(good, 59, 1), malformed, "reserved byte"});
-  all.push_back({"no-header", trigger([](Preamble& p) { p.header_bytes = 0; }), malformed, "a header of 0"});
+  all.push_back(
+      {"no-header", trigger([](Preamble& p) { p.header_bytes = 0; }), malformed, "a header of 0"});
   all.push_back({"header-length", trigger([](Preamble& p) { p.header_bytes -= 1; }), malformed,
                  "not a multiple of 64"});
   all.push_back({"body-length", trigger([](Preamble& p) { p.body_bytes = 63; }), malformed,
@@ -114,60 +118,97 @@ void addPreambles(std::vector<BadMessage>& all) {
 }
 
 void addHeaders(std::vector<BadMessage>& all) {
-  const auto add = [&](const char* name, Bytes bytes, const char* why, Error::Code code = Error::Code::Malformed) {
+  const auto add = [&](const char* name, Bytes bytes, const char* why,
+                       Error::Code code = Error::Code::Malformed) {
     all.push_back({name, std::move(bytes), code, why});
   };
   add("not-a-flatbuffer", sealed(Bytes(64, std::byte{0xA5}), {}), "not what the schema says");
   const auto list = [](Builder& b) { return fb::CreateListSources(b).Union(); };
-  add("identifier", sealed(headerOf(fb::Body::ListSources, list, "ELSE"), {}), "not what the schema says");
-  add("no-message", messageOf(fb::Body::NONE, [](Builder&) { return Union{}; }), "holds no message");
-  add("null-message", messageOf(fb::Body::Hello, [](Builder&) { return Union{}; }), "holds no message");
+  add("identifier", sealed(headerOf(fb::Body::ListSources, list, "ELSE"), {}),
+      "not what the schema says");
+  add("no-message", messageOf(fb::Body::NONE, [](Builder&) { return Union{}; }),
+      "holds no message");
+  add("null-message", messageOf(fb::Body::Hello, [](Builder&) { return Union{}; }),
+      "holds no message");
   add("unknown-message", messageOf(static_cast<fb::Body>(200), list), "message id 200",
       Error::Code::Unsupported);
   add("body-after-request", messageOf(fb::Body::ListSources, list, Bytes(64)), "that has none");
-  add("text-that-leaves-the-header", [&] {
-    // The only text's length, made larger than the header: a verifier must see it.
-    Bytes header = headerOf(fb::Body::Trigger, [](Builder& b) { return fb::CreateTriggerDirect(b, "o3d").Union(); });
-    const auto name = std::search(header.begin(), header.end(), reinterpret_cast<const std::byte*>("o3d"),
-                                  reinterpret_cast<const std::byte*>("o3d") + 3);
-    *(name - 3) = std::byte{0x7F};
-    return sealed(header, {});
-  }(), "not what the schema says");
-  add("long-name", messageOf(fb::Body::Trigger, [](Builder& b) {
-        return fb::CreateTriggerDirect(b, std::string(256, 'k').c_str()).Union();
-      }), "longer than 255 bytes");
-  add("many-names", messageOf(fb::Body::Hello, [](Builder& b) {
-        const std::vector<flatbuffers::Offset<flatbuffers::String>> names(1025, b.CreateString("f"));
-        return fb::CreateHelloDirect(b, "s", &names).Union();
-      }), "more than 1024 items");
-  add("parameter-nan", messageOf(fb::Body::SetParameter, [](Builder& b) {
-        return fb::CreateSetParameterDirect(b, "k", "p", kNaN).Union();
-      }), "not a finite number");
-  add("no-pose", messageOf(fb::Body::SetPose, [](Builder& b) {
-        return fb::CreateSetPoseDirect(b, "k").Union();
-      }), "world_from_camera is missing");
-  add("pose-infinite", messageOf(fb::Body::SetPose, [](Builder& b) {
-        const fb::Pose pose{1, 0, 0, 0, kInfinity, 0, 0};
-        return fb::CreateSetPoseDirect(b, "k", &pose).Union();
-      }), "pose.x_m is not a finite number");
-  add("rate-negative", messageOf(fb::Body::Subscribe, [](Builder& b) {
-        return fb::CreateSubscribeDirect(b, "k", nullptr, nullptr, 1, -1.0).Union();
-      }), "max_rate_hz");
-  add("policy", messageOf(fb::Body::Subscribe, [](Builder& b) {
-        return fb::CreateSubscribeDirect(b, "k", nullptr, nullptr, 1, 0.0, 4).Union();
-      }), "policy has a value that is not known");
-  add("kind-in-list", messageOf(fb::Body::Subscribe, [](Builder& b) {
-        const std::vector<std::uint8_t> kinds{0, 9};
-        return fb::CreateSubscribeDirect(b, "k", &kinds).Union();
-      }), "planes has a value that is not known");
-  add("clock-uncertainty", messageOf(fb::Body::Frame, [](Builder& b) {
-        const auto moment = fb::CreateMomentDirect(b, nullptr, 0, 0, -2);
-        return fb::CreateFrameDirect(b, 7, "k", 1, 0, 0, moment).Union();
-      }), "is below -1");
-  add("camera-width", messageOf(fb::Body::Frame, [](Builder& b) {
-        const auto camera = fb::CreateCamera(b, 0x80000000u, 1);
-        return fb::CreateFrameDirect(b, 7, "k", 1, 0, 0, 0, 0, camera).Union();
-      }), "camera.width is more than 65535");
+  add(
+      "text-that-leaves-the-header",
+      [&] {
+        // The only text's length, made larger than the header: a verifier must see it.
+        Bytes header = headerOf(fb::Body::Trigger, [](Builder& b) {
+          return fb::CreateTriggerDirect(b, "o3d").Union();
+        });
+        const auto name =
+            std::search(header.begin(), header.end(), reinterpret_cast<const std::byte*>("o3d"),
+                        reinterpret_cast<const std::byte*>("o3d") + 3);
+        *(name - 3) = std::byte{0x7F};
+        return sealed(header, {});
+      }(),
+      "not what the schema says");
+  add("long-name",
+      messageOf(fb::Body::Trigger,
+                [](Builder& b) {
+                  return fb::CreateTriggerDirect(b, std::string(256, 'k').c_str()).Union();
+                }),
+      "longer than 255 bytes");
+  add("many-names",
+      messageOf(fb::Body::Hello,
+                [](Builder& b) {
+                  const std::vector<flatbuffers::Offset<flatbuffers::String>> names(
+                      1025, b.CreateString("f"));
+                  return fb::CreateHelloDirect(b, "s", &names).Union();
+                }),
+      "more than 1024 items");
+  add("parameter-nan",
+      messageOf(fb::Body::SetParameter,
+                [](Builder& b) { return fb::CreateSetParameterDirect(b, "k", "p", kNaN).Union(); }),
+      "not a finite number");
+  add("no-pose",
+      messageOf(fb::Body::SetPose,
+                [](Builder& b) { return fb::CreateSetPoseDirect(b, "k").Union(); }),
+      "world_from_camera is missing");
+  add("pose-infinite",
+      messageOf(fb::Body::SetPose,
+                [](Builder& b) {
+                  const fb::Pose pose{1, 0, 0, 0, kInfinity, 0, 0};
+                  return fb::CreateSetPoseDirect(b, "k", &pose).Union();
+                }),
+      "pose.x_m is not a finite number");
+  add("rate-negative",
+      messageOf(fb::Body::Subscribe,
+                [](Builder& b) {
+                  return fb::CreateSubscribeDirect(b, "k", nullptr, nullptr, 1, -1.0).Union();
+                }),
+      "max_rate_hz");
+  add("policy",
+      messageOf(fb::Body::Subscribe,
+                [](Builder& b) {
+                  return fb::CreateSubscribeDirect(b, "k", nullptr, nullptr, 1, 0.0, 4).Union();
+                }),
+      "policy has a value that is not known");
+  add("kind-in-list",
+      messageOf(fb::Body::Subscribe,
+                [](Builder& b) {
+                  const std::vector<std::uint8_t> kinds{0, 9};
+                  return fb::CreateSubscribeDirect(b, "k", &kinds).Union();
+                }),
+      "planes has a value that is not known");
+  add("clock-uncertainty",
+      messageOf(fb::Body::Frame,
+                [](Builder& b) {
+                  const auto moment = fb::CreateMomentDirect(b, nullptr, 0, 0, -2);
+                  return fb::CreateFrameDirect(b, 7, "k", 1, 0, 0, moment).Union();
+                }),
+      "is below -1");
+  add("camera-width",
+      messageOf(fb::Body::Frame,
+                [](Builder& b) {
+                  const auto camera = fb::CreateCamera(b, 0x80000000u, 1);
+                  return fb::CreateFrameDirect(b, 7, "k", 1, 0, 0, 0, 0, camera).Union();
+                }),
+      "camera.width is more than 65535");
 }
 
 void addPlanes(std::vector<BadMessage>& all) {
@@ -184,7 +225,10 @@ void addPlanes(std::vector<BadMessage>& all) {
   add("plane-channels-many", {{.channels = 1025}}, 64, "plane.channels");
   add("plane-bytes", {{.bytes = 63}}, 64, "plane.bytes is not type");
   add("plane-bytes-wrapped",  // 4 · 65535 · 65535 · 1024 in 32 bits is small; in 64 it is not
-      {{.type = 2, .width = 65535, .height = 65535, .channels = 1024,
+      {{.type = 2,
+        .width = 65535,
+        .height = 65535,
+        .channels = 1024,
         .bytes = static_cast<std::uint32_t>(4ull * 65535 * 65535 * 1024)}},
       64, "plane.bytes is not type");
   add("plane-larger-than-body", {{.width = 16, .bytes = 128}}, 64, "beyond the body's end");

@@ -9,8 +9,8 @@
 
 namespace toftwin::wire {
 
-/// Bytes that a decoder must refuse, each breaking one rule of docs/protocol.md, with checksums that
-/// are right where they are not the point.
+/// Bytes that a decoder must refuse, each breaking one rule of docs/protocol.md, with checksums
+/// that are right where they are not the point.
 struct BadMessage {
   std::string name;
   std::vector<std::byte> bytes;

@@ -45,31 +45,35 @@ INSTANTIATE_TEST_SUITE_P(TcpAndUnix, ClientOn,
                          });
 
 TEST_P(ClientOn, EveryRequestGetsItsAnswer) {
-  FakeDaemon daemon{GetParam(), FakeDaemon::polite([](Session& session, const wire::Message& message) {
-    const auto done = [&](std::uint64_t id, std::string detail) { session.send(wire::Done{id, detail}); };
-    if (auto* list = std::get_if<wire::ListSources>(&message)) {
-      session.send(wire::SourceList{list->id, {{"kinect", "K", "1", FrameKind::Simulated, true}}});
-    } else if (auto* describe = std::get_if<wire::DescribeSource>(&message)) {
-      wire::SourceDescription answer;
-      answer.id = describe->id;
-      answer.driver = "sim";
-      answer.summary.name = describe->source;
-      answer.planes = {PlaneKind::Range};
-      answer.frame_interval = 33_ms;
-      answer.can_lockstep = true;
-      session.send(answer);
-    } else if (auto* pose = std::get_if<wire::SetPose>(&message)) {
-      done(pose->id, "");
-    } else if (auto* parameter = std::get_if<wire::SetParameter>(&message)) {
-      done(parameter->id, "");
-    } else if (auto* trigger = std::get_if<wire::Trigger>(&message)) {
-      done(trigger->id, "");
-    } else if (auto* record = std::get_if<wire::Record>(&message)) {
-      done(record->id, record->file.empty() ? "/rec/stopped" : "/rec/" + record->file);
-    } else if (auto* health = std::get_if<wire::AskHealth>(&message)) {
-      session.send(wire::Health{health->id, 12_s, 1, {{"kinect", true, 5, 0, 0, 0, ""}}});
-    }
-  })};
+  FakeDaemon daemon{
+      GetParam(), FakeDaemon::polite([](Session& session, const wire::Message& message) {
+        const auto done = [&](std::uint64_t id, std::string detail) {
+          session.send(wire::Done{id, detail});
+        };
+        if (auto* list = std::get_if<wire::ListSources>(&message)) {
+          session.send(
+              wire::SourceList{list->id, {{"kinect", "K", "1", FrameKind::Simulated, true}}});
+        } else if (auto* describe = std::get_if<wire::DescribeSource>(&message)) {
+          wire::SourceDescription answer;
+          answer.id = describe->id;
+          answer.driver = "sim";
+          answer.summary.name = describe->source;
+          answer.planes = {PlaneKind::Range};
+          answer.frame_interval = 33_ms;
+          answer.can_lockstep = true;
+          session.send(answer);
+        } else if (auto* pose = std::get_if<wire::SetPose>(&message)) {
+          done(pose->id, "");
+        } else if (auto* parameter = std::get_if<wire::SetParameter>(&message)) {
+          done(parameter->id, "");
+        } else if (auto* trigger = std::get_if<wire::Trigger>(&message)) {
+          done(trigger->id, "");
+        } else if (auto* record = std::get_if<wire::Record>(&message)) {
+          done(record->id, record->file.empty() ? "/rec/stopped" : "/rec/" + record->file);
+        } else if (auto* health = std::get_if<wire::AskHealth>(&message)) {
+          session.send(wire::Health{health->id, 12_s, 1, {{"kinect", true, 5, 0, 0, 0, ""}}});
+        }
+      })};
   auto client = Client::connect(daemon.address());
   ASSERT_TRUE(client) << client.error().message;
   EXPECT_EQ(client->sources()->at(0).name, "kinect");
@@ -92,26 +96,34 @@ TEST_P(ClientOn, EveryRequestGetsItsAnswer) {
 
 TEST_P(ClientOn, AFrameArrivesAsItWasSent) {
   const wire::Message sent = wire::FrameMessage{7, wire::exampleFrame(512, 424)};
-  FakeDaemon daemon{GetParam(), FakeDaemon::polite([&](Session& session, const wire::Message& message) {
-    if (std::holds_alternative<wire::Subscribe>(message)) session.send(sent);
-  })};
+  FakeDaemon daemon{GetParam(),
+                    FakeDaemon::polite([&](Session& session, const wire::Message& message) {
+                      if (std::holds_alternative<wire::Subscribe>(message)) session.send(sent);
+                    })};
   auto client = Client::connect(daemon.address());
   auto subscription = client->subscribe("kinect");
   ASSERT_TRUE(subscription) << subscription.error().message;
   auto frame = subscription->next(kSoon);
   ASSERT_TRUE(frame) << frame.error().message;
-  EXPECT_EQ(wire::toBytes(wire::encode(wire::FrameMessage{7, *frame})), wire::toBytes(wire::encode(sent)));
+  EXPECT_EQ(wire::toBytes(wire::encode(wire::FrameMessage{7, *frame})),
+            wire::toBytes(wire::encode(sent)));
 }
 
 TEST_P(ClientOn, SubscribeSaysAllThatTheOptionsSay) {
   std::promise<wire::Subscribe> received;
   FakeDaemon daemon{GetParam(), FakeDaemon::polite([&](Session&, const wire::Message& message) {
-    if (auto* m = std::get_if<wire::Subscribe>(&message)) received.set_value(*m);
-  })};
+                      if (auto* m = std::get_if<wire::Subscribe>(&message)) received.set_value(*m);
+                    })};
   auto client = Client::connect(daemon.address());
-  auto subscription = client->subscribe("o3d", {.planes = {PlaneKind::Depth}, .x = 1, .y = 2,
-                                                .width = 3, .height = 4, .decimation = 5,
-                                                .max_rate_hz = 6.0, .policy = Policy::Queue, .queue = 7});
+  auto subscription = client->subscribe("o3d", {.planes = {PlaneKind::Depth},
+                                                .x = 1,
+                                                .y = 2,
+                                                .width = 3,
+                                                .height = 4,
+                                                .decimation = 5,
+                                                .max_rate_hz = 6.0,
+                                                .policy = Policy::Queue,
+                                                .queue = 7});
   const wire::Subscribe request = received.get_future().get();
   EXPECT_EQ(request.source, "o3d");
   EXPECT_EQ(request.planes, std::vector{PlaneKind::Depth});
@@ -124,11 +136,12 @@ TEST_P(ClientOn, SubscribeSaysAllThatTheOptionsSay) {
 }
 
 TEST_P(ClientOn, AFailureIsTheDaemonsError) {
-  FakeDaemon daemon{GetParam(), FakeDaemon::polite([](Session& session, const wire::Message& message) {
-    if (auto* m = std::get_if<wire::Trigger>(&message)) {
-      session.send(wire::Failure{m->id, {Error::Code::Unsupported, "kinect has no trigger"}});
-    }
-  })};
+  FakeDaemon daemon{
+      GetParam(), FakeDaemon::polite([](Session& session, const wire::Message& message) {
+        if (auto* m = std::get_if<wire::Trigger>(&message)) {
+          session.send(wire::Failure{m->id, {Error::Code::Unsupported, "kinect has no trigger"}});
+        }
+      })};
   auto client = Client::connect(daemon.address());
   const auto result = client->trigger("kinect");
   ASSERT_FALSE(result);
@@ -137,9 +150,11 @@ TEST_P(ClientOn, AFailureIsTheDaemonsError) {
 }
 
 TEST_P(ClientOn, AnAnswerThatDoesNotComeIsATimeoutAndTheConnectionGoesOn) {
-  FakeDaemon daemon{GetParam(), FakeDaemon::polite([](Session& session, const wire::Message& message) {
-    if (auto* m = std::get_if<wire::AskHealth>(&message)) session.send(wire::Health{m->id, 1_s, 1, {}});
-  })};
+  FakeDaemon daemon{GetParam(),
+                    FakeDaemon::polite([](Session& session, const wire::Message& message) {
+                      if (auto* m = std::get_if<wire::AskHealth>(&message))
+                        session.send(wire::Health{m->id, 1_s, 1, {}});
+                    })};
   auto client = Client::connect(daemon.address(), {.timeout = 50ms});
   const auto result = client->trigger("kinect");
   ASSERT_FALSE(result);
@@ -149,9 +164,10 @@ TEST_P(ClientOn, AnAnswerThatDoesNotComeIsATimeoutAndTheConnectionGoesOn) {
 }
 
 TEST_P(ClientOn, LosingTheDaemonEndsRequestsAndSubscriptionsWithAReason) {
-  FakeDaemon daemon{GetParam(), FakeDaemon::polite([](Session& session, const wire::Message& message) {
-    if (std::holds_alternative<wire::Trigger>(message)) session.close();
-  })};
+  FakeDaemon daemon{GetParam(),
+                    FakeDaemon::polite([](Session& session, const wire::Message& message) {
+                      if (std::holds_alternative<wire::Trigger>(message)) session.close();
+                    })};
   auto client = Client::connect(daemon.address());
   auto subscription = client->subscribe("kinect");
   for (const auto& result : {client->trigger("kinect"), client->trigger("again")}) {
@@ -165,11 +181,12 @@ TEST_P(ClientOn, LosingTheDaemonEndsRequestsAndSubscriptionsWithAReason) {
 }
 
 TEST_P(ClientOn, MalformedBytesEndTheConnectionWithAReason) {
-  FakeDaemon daemon{GetParam(), FakeDaemon::polite([](Session& session, const wire::Message& message) {
-    if (std::holds_alternative<wire::Trigger>(message)) {
-      session.sendBytes(std::vector<std::byte>(64, std::byte{'x'}));
-    }
-  })};
+  FakeDaemon daemon{GetParam(),
+                    FakeDaemon::polite([](Session& session, const wire::Message& message) {
+                      if (std::holds_alternative<wire::Trigger>(message)) {
+                        session.sendBytes(std::vector<std::byte>(64, std::byte{'x'}));
+                      }
+                    })};
   auto client = Client::connect(daemon.address());
   const auto result = client->trigger("kinect");
   ASSERT_FALSE(result);
@@ -177,11 +194,12 @@ TEST_P(ClientOn, MalformedBytesEndTheConnectionWithAReason) {
 }
 
 TEST_P(ClientOn, AFrameLargerThanAllowedIsRefused) {
-  FakeDaemon daemon{GetParam(), FakeDaemon::polite([](Session& session, const wire::Message& message) {
-    if (std::holds_alternative<wire::Subscribe>(message)) {
-      session.send(wire::FrameMessage{7, wire::exampleFrame(512, 424)});
-    }
-  })};
+  FakeDaemon daemon{GetParam(),
+                    FakeDaemon::polite([](Session& session, const wire::Message& message) {
+                      if (std::holds_alternative<wire::Subscribe>(message)) {
+                        session.send(wire::FrameMessage{7, wire::exampleFrame(512, 424)});
+                      }
+                    })};
   auto client = Client::connect(daemon.address(), {.max_message_bytes = 1 << 20});
   auto subscription = client->subscribe("kinect");
   const auto frame = subscription->next(kSoon);
@@ -191,11 +209,11 @@ TEST_P(ClientOn, AFrameLargerThanAllowedIsRefused) {
 
 TEST_P(ClientOn, AnotherProtocolIsRecognised) {
   FakeDaemon daemon{GetParam(), [](Session& session, const wire::Message&) {
-    std::vector<std::byte> page(100, std::byte{' '});
-    const std::string_view text = "HTTP/1.1 400 Bad Request";
-    std::ranges::copy(std::as_bytes(std::span{text}), page.begin());
-    session.sendBytes(std::move(page));
-  }};
+                      std::vector<std::byte> page(100, std::byte{' '});
+                      const std::string_view text = "HTTP/1.1 400 Bad Request";
+                      std::ranges::copy(std::as_bytes(std::span{text}), page.begin());
+                      session.sendBytes(std::move(page));
+                    }};
   const auto client = Client::connect(daemon.address());
   ASSERT_FALSE(client);
   EXPECT_THAT(client.error().message, HasSubstr("is the other side a toftwin program?"));
@@ -208,20 +226,22 @@ TEST_P(ClientOn, ASilentPeerIsATimeout) {
   EXPECT_EQ(client.error().code, Error::Code::Timeout);
 }
 
-// ---- policies --------------------------------------------------------------------------------------
+// ---- policies
+// --------------------------------------------------------------------------------------
 
 TEST_P(ClientOn, LatestGivesTheNewestAndCountsTheOthersAsDropped) {
-  FakeDaemon daemon{GetParam(), FakeDaemon::polite([](Session& session, const wire::Message& message) {
-    if (std::holds_alternative<wire::Subscribe>(message)) {
-      for (std::uint64_t i = 1; i <= 3; ++i) {
-        Frame frame = numbered(2 * i);
-        frame.dropped_before = 1;  // the daemon left out every other
-        session.send(wire::FrameMessage{7, frame});
-      }
-    } else if (auto* m = std::get_if<wire::AskHealth>(&message)) {
-      session.send(wire::Health{m->id, 1_s, 1, {}});
-    }
-  })};
+  FakeDaemon daemon{GetParam(),
+                    FakeDaemon::polite([](Session& session, const wire::Message& message) {
+                      if (std::holds_alternative<wire::Subscribe>(message)) {
+                        for (std::uint64_t i = 1; i <= 3; ++i) {
+                          Frame frame = numbered(2 * i);
+                          frame.dropped_before = 1;  // the daemon left out every other
+                          session.send(wire::FrameMessage{7, frame});
+                        }
+                      } else if (auto* m = std::get_if<wire::AskHealth>(&message)) {
+                        session.send(wire::Health{m->id, 1_s, 1, {}});
+                      }
+                    })};
   auto client = Client::connect(daemon.address());
   auto subscription = client->subscribe("kinect");
   ASSERT_TRUE(client->health());  // behind the frames: now all three have arrived
@@ -249,20 +269,22 @@ struct Acknowledged {
 };
 
 class Acknowledging : public testing::TestWithParam<Policy> {};
-INSTANTIATE_TEST_SUITE_P(Policies, Acknowledging,
-                         testing::Values(Policy::Queue, Policy::Lossless));
+INSTANTIATE_TEST_SUITE_P(Policies, Acknowledging, testing::Values(Policy::Queue, Policy::Lossless));
 
 TEST_P(Acknowledging, HappensWhenTheApplicationTakesTheFrame) {
   Acknowledged acknowledged;
   FakeDaemon daemon{FakeDaemon::On::Unix,
                     FakeDaemon::polite([&](Session& session, const wire::Message& message) {
-    acknowledged.add(message);
-    if (std::holds_alternative<wire::Subscribe>(message)) session.send(wire::FrameMessage{7, numbered(1)});
-    if (auto* m = std::get_if<wire::AskHealth>(&message)) session.send(wire::Health{m->id, 1_s, 1, {}});
-  })};
+                      acknowledged.add(message);
+                      if (std::holds_alternative<wire::Subscribe>(message))
+                        session.send(wire::FrameMessage{7, numbered(1)});
+                      if (auto* m = std::get_if<wire::AskHealth>(&message))
+                        session.send(wire::Health{m->id, 1_s, 1, {}});
+                    })};
   auto client = Client::connect(daemon.address());
   auto subscription = client->subscribe("kinect", {.policy = GetParam()});
-  ASSERT_TRUE(client->health());  // there and back: an acknowledgement would have been seen
+  ASSERT_TRUE(client->health());  // comes behind the frame
+  ASSERT_TRUE(client->health());  // goes behind an acknowledgement, if there were one
   EXPECT_TRUE(acknowledged.get().empty());
   ASSERT_TRUE(subscription->next(kSoon));
   ASSERT_TRUE(client->health());
@@ -273,10 +295,12 @@ TEST(Client, AcknowledgesALockstepFrameWhenTheNextIsAskedFor) {
   Acknowledged acknowledged;
   FakeDaemon daemon{FakeDaemon::On::Unix,
                     FakeDaemon::polite([&](Session& session, const wire::Message& message) {
-    acknowledged.add(message);
-    if (std::holds_alternative<wire::Subscribe>(message)) session.send(wire::FrameMessage{7, numbered(1)});
-    if (auto* m = std::get_if<wire::AskHealth>(&message)) session.send(wire::Health{m->id, 1_s, 1, {}});
-  })};
+                      acknowledged.add(message);
+                      if (std::holds_alternative<wire::Subscribe>(message))
+                        session.send(wire::FrameMessage{7, numbered(1)});
+                      if (auto* m = std::get_if<wire::AskHealth>(&message))
+                        session.send(wire::Health{m->id, 1_s, 1, {}});
+                    })};
   auto client = Client::connect(daemon.address());
   auto subscription = client->subscribe("kinect", {.policy = Policy::Lockstep});
   ASSERT_TRUE(subscription->next(kSoon));
@@ -292,15 +316,18 @@ TEST(Client, AcknowledgesLatestFramesWhenTheyArrive) {
   Acknowledged acknowledged;
   FakeDaemon daemon{FakeDaemon::On::Unix,
                     FakeDaemon::polite([&](Session& session, const wire::Message& message) {
-    acknowledged.add(message);
-    if (std::holds_alternative<wire::Subscribe>(message)) {
-      for (std::uint64_t i = 1; i <= 2; ++i) session.send(wire::FrameMessage{7, numbered(i)});
-    }
-    if (auto* m = std::get_if<wire::AskHealth>(&message)) session.send(wire::Health{m->id, 1_s, 1, {}});
-  })};
+                      acknowledged.add(message);
+                      if (std::holds_alternative<wire::Subscribe>(message)) {
+                        for (std::uint64_t i = 1; i <= 2; ++i)
+                          session.send(wire::FrameMessage{7, numbered(i)});
+                      }
+                      if (auto* m = std::get_if<wire::AskHealth>(&message))
+                        session.send(wire::Health{m->id, 1_s, 1, {}});
+                    })};
   auto client = Client::connect(daemon.address());
   auto subscription = client->subscribe("kinect");
-  ASSERT_TRUE(client->health());
+  ASSERT_TRUE(client->health());  // comes behind the frames
+  ASSERT_TRUE(client->health());  // goes behind their acknowledgements
   EXPECT_EQ(acknowledged.get(), (std::vector<std::uint64_t>{1, 2}));
 }
 
@@ -325,25 +352,26 @@ TEST(Client, ADaemonThatIgnoresTheWindowEndsTheSubscription) {
 TEST(Client, AnswersComeWhileASubscriptionIsNotRead) {
   FakeDaemon daemon{FakeDaemon::On::Tcp,
                     FakeDaemon::polite([](Session& session, const wire::Message& message) {
-    if (std::holds_alternative<wire::Subscribe>(message)) {
-      for (std::uint64_t i = 1; i <= 4; ++i) {
-        session.send(wire::FrameMessage{7, wire::exampleFrame(512, 424)});
-      }
-    }
-    if (auto* m = std::get_if<wire::AskHealth>(&message)) session.send(wire::Health{m->id, 1_s, 1, {}});
-  })};
+                      if (std::holds_alternative<wire::Subscribe>(message)) {
+                        for (std::uint64_t i = 1; i <= 4; ++i) {
+                          session.send(wire::FrameMessage{7, wire::exampleFrame(512, 424)});
+                        }
+                      }
+                      if (auto* m = std::get_if<wire::AskHealth>(&message))
+                        session.send(wire::Health{m->id, 1_s, 1, {}});
+                    })};
   auto client = Client::connect(daemon.address());
   auto subscription = client->subscribe("kinect", {.policy = Policy::Lossless});
   EXPECT_TRUE(client->health());
 }
 
 TEST(Client, TheEndOfASubscriptionComesAfterItsFrames) {
-  FakeDaemon daemon{FakeDaemon::On::Unix,
-                    FakeDaemon::polite([](Session& session, const wire::Message& message) {
-    if (!std::holds_alternative<wire::Subscribe>(message)) return;
-    session.send(wire::FrameMessage{7, numbered(1)});
-    session.send(wire::SubscriptionEnded{7, {Error::Code::EndOfStream, "the recording ended"}});
-  })};
+  FakeDaemon daemon{
+      FakeDaemon::On::Unix, FakeDaemon::polite([](Session& session, const wire::Message& message) {
+        if (!std::holds_alternative<wire::Subscribe>(message)) return;
+        session.send(wire::FrameMessage{7, numbered(1)});
+        session.send(wire::SubscriptionEnded{7, {Error::Code::EndOfStream, "the recording ended"}});
+      })};
   auto client = Client::connect(daemon.address());
   auto subscription = client->subscribe("kinect", {.policy = Policy::Lossless});
   EXPECT_TRUE(subscription->next(kSoon));
@@ -356,20 +384,23 @@ TEST(Client, DroppingASubscriptionTellsTheDaemon) {
   std::promise<std::uint64_t> unsubscribed;
   FakeDaemon daemon{FakeDaemon::On::Unix,
                     FakeDaemon::polite([&](Session&, const wire::Message& message) {
-    if (auto* m = std::get_if<wire::Unsubscribe>(&message)) unsubscribed.set_value(m->subscription);
-  })};
+                      if (auto* m = std::get_if<wire::Unsubscribe>(&message))
+                        unsubscribed.set_value(m->subscription);
+                    })};
   auto client = Client::connect(daemon.address());
   { auto subscription = client->subscribe("kinect"); }
   EXPECT_EQ(unsubscribed.get_future().get(), 7u);
 }
 
-// ---- shared memory ---------------------------------------------------------------------------------
+// ---- shared memory
+// ---------------------------------------------------------------------------------
 
 TEST(Client, TakesBodiesFromSharedMemoryAndKeepsThemAfterItIsGone) {
   FakeDaemon daemon{FakeDaemon::On::Unix,
                     FakeDaemon::polite([](Session& session, const wire::Message& message) {
-    if (std::holds_alternative<wire::Subscribe>(message)) session.sendShared({7, wire::exampleFrame(512, 424)});
-  })};
+                      if (std::holds_alternative<wire::Subscribe>(message))
+                        session.sendShared({7, wire::exampleFrame(512, 424)});
+                    })};
   Result<Frame> frame = Error{};
   {
     auto client = Client::connect(daemon.address());
@@ -386,17 +417,18 @@ TEST(Client, TakesBodiesFromSharedMemoryAndKeepsThemAfterItIsGone) {
 TEST_P(ClientOn, OffersSharedMemoryOnlyOnTheSameMachine) {
   std::promise<std::vector<std::string>> features;
   FakeDaemon daemon{GetParam(), [&](Session& session, const wire::Message& message) {
-    if (auto* m = std::get_if<wire::Hello>(&message)) {
-      features.set_value(m->features);
-      session.send(wire::Hello{m->id, "fake", {}});
-    }
-  }};
+                      if (auto* m = std::get_if<wire::Hello>(&message)) {
+                        features.set_value(m->features);
+                        session.send(wire::Hello{m->id, "fake", {}});
+                      }
+                    }};
   const auto client = Client::connect(daemon.address());
   const bool offered = !features.get_future().get().empty();
   EXPECT_EQ(offered, GetParam() == FakeDaemon::On::Unix);
 }
 
-// ---- bad input of the application ------------------------------------------------------------------
+// ---- bad input of the application
+// ------------------------------------------------------------------
 
 TEST(Client, ArgumentsThatCannotBeRightAreRefusedAtOnce) {
   FakeDaemon daemon{FakeDaemon::On::Unix, FakeDaemon::polite()};
@@ -417,7 +449,10 @@ TEST(Client, ArgumentsThatCannotBeRightAreRefusedAtOnce) {
 
 TEST(Client, NobodyListeningSaysWhatToDo) {
   std::string address;
-  { FakeDaemon gone{FakeDaemon::On::Tcp, FakeDaemon::polite()}; address = gone.address(); }
+  {
+    FakeDaemon gone{FakeDaemon::On::Tcp, FakeDaemon::polite()};
+    address = gone.address();
+  }
   for (const std::string& where : {address, std::string{"unix:/nowhere/toftwin.sock"}}) {
     const auto client = Client::connect(where);
     ASSERT_FALSE(client);

@@ -78,7 +78,8 @@ TEST(Refusal, EveryRuleHasItsError) {
 TEST(Refusal, EveryPrefixOfAMessageIsRefused) {
   const auto bytes = toBytes(encode(FrameMessage{1, exampleFrame(5, 3)}));
   for (std::size_t length = 0; length < bytes.size(); ++length) {
-    const auto message = decode(Buffer::adopt(std::vector(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(length))));
+    const auto message = decode(Buffer::adopt(
+        std::vector(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(length))));
     EXPECT_FALSE(message) << length;
   }
 }

@@ -7,7 +7,13 @@ namespace toftwin::wire {
 namespace {
 
 CameraInfo kinect() {
-  return {512, 424, 365.456, 365.25, 254.88, 205.40, {0.0905, -0.268, 0.001, -0.002, 0.0951},
+  return {512,
+          424,
+          365.456,
+          365.25,
+          254.88,
+          205.40,
+          {0.0905, -0.268, 0.001, -0.002, 0.0951},
           "0123456789abcdef0123456789abcdef"};
 }
 
@@ -48,8 +54,8 @@ Frame richFrame() {
   frame.planes.push_back(toPlane(PlaneKind::Ambient, Image<std::uint16_t>{3, 2, 513}));
   std::vector<float> normals(18);
   for (std::size_t i = 0; i < normals.size(); ++i) normals[i] = 0.5f * static_cast<float>(i);
-  frame.planes.push_back({PlaneKind::TruthNormal, ElementType::F32, 3, 2, 3,
-                          Buffer::adopt(std::move(normals))});
+  frame.planes.push_back(
+      {PlaneKind::TruthNormal, ElementType::F32, 3, 2, 3, Buffer::adopt(std::move(normals))});
   return frame;
 }
 
@@ -122,7 +128,8 @@ std::vector<ExampleMessage> exampleMessages() {
       {"hello", Hello{1, "toftwind 0.1.0", {"memfd"}}},
       {"hello-bare", Hello{}},
       {"list-sources", ListSources{2}},
-      {"source-list", SourceList{2, {summary(), {"o3d", "O3D303", "", FrameKind::Replayed, false}}}},
+      {"source-list",
+       SourceList{2, {summary(), {"o3d", "O3D303", "", FrameKind::Replayed, false}}}},
       {"source-list-empty", SourceList{2, {}}},
       {"describe-source", DescribeSource{4, "kinect"}},
       {"source-description", fullDescription()},
@@ -134,7 +141,8 @@ std::vector<ExampleMessage> exampleMessages() {
       {"frame", FrameMessage{77, richFrame()}},
       {"frame-bare", FrameMessage{78, bareFrame()}},
       {"acknowledge", Acknowledge{77, 41}},
-      {"subscription-ended", SubscriptionEnded{77, {Error::Code::EndOfStream, "the recording ended"}}},
+      {"subscription-ended",
+       SubscriptionEnded{77, {Error::Code::EndOfStream, "the recording ended"}}},
       {"set-pose", SetPose{8, "kinect", pose()}},
       {"set-parameter", SetParameter{9, "kinect", "ambient_klx", 0.1}},
       {"trigger", Trigger{10, "o3d"}},

@@ -33,14 +33,15 @@ Output runExample(const std::string& arguments) {
 }
 
 TEST(MinimalClient, PrintsTheRangeInTheMiddle) {
-  FakeDaemon daemon{FakeDaemon::On::Unix,
-                    FakeDaemon::polite([](FakeDaemon::Session& session, const wire::Message& message) {
-    if (auto* list = std::get_if<wire::ListSources>(&message)) {
-      session.send(wire::SourceList{list->id, {{"kinect", "", "", FrameKind::Simulated, true}}});
-    } else if (std::holds_alternative<wire::Subscribe>(message)) {
-      session.send(wire::FrameMessage{7, wire::exampleFrame(8, 6)});
-    }
-  })};
+  FakeDaemon daemon{FakeDaemon::On::Unix, FakeDaemon::polite([](FakeDaemon::Session& session,
+                                                                const wire::Message& message) {
+                      if (auto* list = std::get_if<wire::ListSources>(&message)) {
+                        session.send(wire::SourceList{
+                            list->id, {{"kinect", "", "", FrameKind::Simulated, true}}});
+                      } else if (std::holds_alternative<wire::Subscribe>(message)) {
+                        session.send(wire::FrameMessage{7, wire::exampleFrame(8, 6)});
+                      }
+                    })};
   const Output output = runExample("'' " + daemon.address());
   // Pixel (4, 3) of 8 × 6 is number 28, and the example's range is 1 m + 1 mm per pixel.
   EXPECT_EQ(output.text, "kinect, frame 41: range at pixel (4, 3) is 1.028 m\n");

@@ -55,7 +55,9 @@ void FakeDaemon::Session::sendShared(const wire::FrameMessage& message) {
   write({wire::encode(message, std::move(body)), std::move(*shared)});
 }
 
-void FakeDaemon::Session::sendBytes(std::vector<std::byte> bytes) { write({{std::move(bytes), {}}, {}}); }
+void FakeDaemon::Session::sendBytes(std::vector<std::byte> bytes) {
+  write({{std::move(bytes), {}}, {}});
+}
 
 void FakeDaemon::Session::write(Output output) {
   output_.push_back(std::move(output));
@@ -70,8 +72,10 @@ void FakeDaemon::Session::writeNext() {
   const auto wrote = [self = shared_from_this()](const Result<>& result) {
     if (result) self->writeNext();
   };
-  if (next.body) socket_.asyncWrite(std::move(next.message), std::move(next.body), wrote);
-  else socket_.asyncWrite(std::move(next.message), wrote);
+  if (next.body)
+    socket_.asyncWrite(std::move(next.message), std::move(next.body), wrote);
+  else
+    socket_.asyncWrite(std::move(next.message), wrote);
 }
 
 FakeDaemon::FakeDaemon(On where, Script script) : script_(std::move(script)) {
@@ -83,8 +87,7 @@ FakeDaemon::FakeDaemon(On where, Script script) : script_(std::move(script)) {
     address_ = "unix:" + path;
     accept_next_ = acceptOnce(acceptorOf<asio::local::stream_protocol>(io_, {path}));
   } else {
-    const auto acceptor =
-        acceptorOf<asio::ip::tcp>(io_, {asio::ip::address_v4::loopback(), 0});
+    const auto acceptor = acceptorOf<asio::ip::tcp>(io_, {asio::ip::address_v4::loopback(), 0});
     address_ = "tcp:127.0.0.1:" + std::to_string(acceptor->local_endpoint().port());
     accept_next_ = acceptOnce(acceptor);
   }

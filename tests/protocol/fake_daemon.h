@@ -17,8 +17,8 @@
 
 namespace toftwin {
 
-/// The other end of a client under test: one thread, real sockets, and a script that says what comes
-/// back for each message. The script runs in the daemon's thread.
+/// The other end of a client under test: one thread, real sockets, and a script that says what
+/// comes back for each message. The script runs in the daemon's thread.
 class FakeDaemon {
  public:
   class Session : public std::enable_shared_from_this<Session> {

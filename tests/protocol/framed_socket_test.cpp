@@ -125,7 +125,8 @@ TEST_P(Connection, AnAnnouncedSizeBeyondTheLimitIsRefusedBeforeItIsAllocated) {
   EXPECT_EQ(received.error().code, Error::Code::TooLarge);
 }
 
-// ---- bodies in shared memory -----------------------------------------------------------------------
+// ---- bodies in shared memory
+// -----------------------------------------------------------------------
 
 class SharedMemory : public Connection {};
 INSTANTIATE_TEST_SUITE_P(Unix, SharedMemory, testing::Values(true));
@@ -154,8 +155,10 @@ TEST_P(SharedMemory, InlineAndSharedBodiesMayFollowEachOther) {
   for (std::uint64_t i = 0; i < 6; ++i) {
     const wire::FrameMessage message{i, wire::exampleFrame(20, 10)};
     const wire::Body body = wire::encodeBody(message.frame.planes);
-    if (i % 2 == 0) here.asyncWrite(wire::encode(message), ignore);
-    else here.asyncWrite(wire::encode(message, body), *SharedBody::create(body), ignore);
+    if (i % 2 == 0)
+      here.asyncWrite(wire::encode(message), ignore);
+    else
+      here.asyncWrite(wire::encode(message, body), *SharedBody::create(body), ignore);
     io_.restart();
     io_.run();
   }

@@ -42,13 +42,14 @@ void tryDecoding(std::vector<std::byte> bytes) {
   demand(toBytes(encode(*again)) == once, "what was decoded changes when encoded again");
 }
 
-/// The same bytes as a message whose lengths and checksums fit; the header is as long as the preamble
-/// says if that is possible, else all the rest.
+/// The same bytes as a message whose lengths and checksums fit; the header is as long as the
+/// preamble says if that is possible, else all the rest.
 std::vector<std::byte> mended(std::span<const std::byte> bytes) {
   const std::size_t rest = (bytes.size() - kPreambleSize) / kAlignment * kAlignment;
   std::uint32_t header = 0;
   std::memcpy(&header, bytes.data() + 12, sizeof header);
-  if (header == 0 || header % kAlignment != 0 || header > rest) header = static_cast<std::uint32_t>(rest);
+  if (header == 0 || header % kAlignment != 0 || header > rest)
+    header = static_cast<std::uint32_t>(rest);
   std::vector<std::byte> result(bytes.begin(),
                                 bytes.begin() + static_cast<std::ptrdiff_t>(kPreambleSize + rest));
   const auto behind = std::span{result}.subspan(kPreambleSize);

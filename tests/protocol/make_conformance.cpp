@@ -15,7 +15,8 @@ namespace {
 
 void write(const std::filesystem::path& file, std::span<const std::byte> bytes) {
   std::ofstream out{file, std::ios::binary};
-  out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  out.write(reinterpret_cast<const char*>(bytes.data()),
+            static_cast<std::streamsize>(bytes.size()));
   if (!out.flush()) throw std::runtime_error{"cannot write " + file.string()};
 }
 

@@ -130,7 +130,7 @@ class Renderer {
     json_.array(v, [&](const T& item) { value(item); });
   }
   template <class T>
-    requires std::is_class_v<T>
+  requires std::is_class_v<T>
   void value(const T& v) {
     json_.object([&] { fields(v); });
   }

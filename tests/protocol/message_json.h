@@ -10,7 +10,8 @@
 namespace toftwin::wire {
 
 /// A decoded message as the JSON of the conformance pairs (docs/protocol.md, "Conformance"): the
-/// message's name in the schema and its fields. 64-bit integers are strings, a plane's bytes are hex.
+/// message's name in the schema and its fields. 64-bit integers are strings, a plane's bytes are
+/// hex.
 std::string toJson(const Message& message);
 /// What a decoder must say of bytes that are not a message.
 std::string toJson(Error::Code code);

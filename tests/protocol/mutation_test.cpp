@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The poor man's fuzzer: always runs, with any compiler, the same way each time. Worth most under the
-// sanitizers.
+// The poor man's fuzzer: always runs, with any compiler, the same way each time. Worth most under
+// the sanitizers.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -51,20 +51,32 @@ class Mutator {
     if (bytes.empty()) return;
     const std::size_t at = below(bytes.size());
     switch (below(6)) {
-      case 0: bytes[at] ^= std::byte{1} << below(8); break;
-      case 1: bytes[at] = static_cast<std::byte>(random_()); break;
-      case 2: overwrite(bytes, at); break;
-      case 3: bytes.resize(at); break;
-      case 4: bytes.insert(bytes.begin() + static_cast<std::ptrdiff_t>(at), below(130), std::byte{}); break;
-      default: splice(bytes, at, from[below(from.size())]);
+      case 0:
+        bytes[at] ^= std::byte{1} << below(8);
+        break;
+      case 1:
+        bytes[at] = static_cast<std::byte>(random_());
+        break;
+      case 2:
+        overwrite(bytes, at);
+        break;
+      case 3:
+        bytes.resize(at);
+        break;
+      case 4:
+        bytes.insert(bytes.begin() + static_cast<std::ptrdiff_t>(at), below(130), std::byte{});
+        break;
+      default:
+        splice(bytes, at, from[below(from.size())]);
     }
   }
   /// A number that lengths and offsets have trouble with.
   void overwrite(Bytes& bytes, std::size_t at) {
-    constexpr std::array<std::uint32_t, 8> values{0u, 1u, 0x7FFFFFFFu, 0x80000000u, 0xFFFFFFFFu, 64u,
-                                                  0xFFFFFFC0u, 0x10000u};
+    constexpr std::array<std::uint32_t, 8> values{0u,          1u,  0x7FFFFFFFu, 0x80000000u,
+                                                  0xFFFFFFFFu, 64u, 0xFFFFFFC0u, 0x10000u};
     std::uint32_t value = values[below(values.size())];
-    for (std::size_t i = at & ~std::size_t{3}; i < bytes.size() && i < (at & ~std::size_t{3}) + 4; ++i) {
+    for (std::size_t i = at & ~std::size_t{3}; i < bytes.size() && i < (at & ~std::size_t{3}) + 4;
+         ++i) {
       bytes[i] = static_cast<std::byte>(value);
       value >>= 8;
     }

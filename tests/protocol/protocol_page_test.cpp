@@ -47,8 +47,8 @@ std::string row(auto first, auto second) {
 }
 
 TEST(ProtocolPage, NamesTheVersion) {
-  EXPECT_THAT(page(), HasSubstr("# The toftwin protocol, version " + std::to_string(kVersionMajor) + "." +
-                                std::to_string(kVersionMinor) + "\n"));
+  EXPECT_THAT(page(), HasSubstr("# The toftwin protocol, version " + std::to_string(kVersionMajor) +
+                                "." + std::to_string(kVersionMinor) + "\n"));
 }
 
 TEST(ProtocolPage, EveryFieldOfThePreambleIsWhereItSays) {
@@ -59,15 +59,14 @@ TEST(ProtocolPage, EveryFieldOfThePreambleIsWhereItSays) {
                           .header_crc32c = 0x13121110,
                           .body_crc32c = 0x17161514,
                           .body_place = BodyPlace::Memfd};
-  const std::map<std::string, std::uint64_t> values{
-      {"major", preamble.major},
-      {"minor", preamble.minor},
-      {"header_bytes", preamble.header_bytes},
-      {"body_bytes", preamble.body_bytes},
-      {"header_crc32c", preamble.header_crc32c},
-      {"body_crc32c", preamble.body_crc32c},
-      {"body_place", 1},
-      {"reserved", 0}};
+  const std::map<std::string, std::uint64_t> values{{"major", preamble.major},
+                                                    {"minor", preamble.minor},
+                                                    {"header_bytes", preamble.header_bytes},
+                                                    {"body_bytes", preamble.body_bytes},
+                                                    {"header_crc32c", preamble.header_crc32c},
+                                                    {"body_crc32c", preamble.body_crc32c},
+                                                    {"body_place", 1},
+                                                    {"reserved", 0}};
   const auto bytes = encodePreamble(preamble);
   const std::string text = section("### 1.1 Preamble");
   const std::regex line{"\\| (\\d+) \\| (\\d+) \\| `(\\w+)` \\|"};
@@ -100,10 +99,12 @@ TEST(ProtocolPage, ListsEveryMessageWithItsId) {
 }
 
 TEST(ProtocolPage, ExplainsEveryFieldOfTheSchema) {
-  const std::string schema = std::regex_replace(read("protocol/wire/toftwin.fbs"), std::regex{"//.*"}, "");
+  const std::string schema =
+      std::regex_replace(read("protocol/wire/toftwin.fbs"), std::regex{"//.*"}, "");
   const std::regex field{"(\\w+):\\s*\\[?\\w+"};
   int fields = 0;
-  for (std::sregex_iterator at{schema.begin(), schema.end(), field}, last; at != last; ++at, ++fields) {
+  for (std::sregex_iterator at{schema.begin(), schema.end(), field}, last; at != last;
+       ++at, ++fields) {
     EXPECT_THAT(page(), HasSubstr("`" + (*at)[1].str() + "`"));
   }
   EXPECT_GT(fields, 100);
@@ -112,13 +113,20 @@ TEST(ProtocolPage, ExplainsEveryFieldOfTheSchema) {
 TEST(ProtocolPage, ListsEveryErrorCode) {
   using Code = Error::Code;
   const std::array<std::pair<Code, const char*>, 15> codes{{
-      {Code::Internal, "Internal"},         {Code::InvalidArgument, "InvalidArgument"},
-      {Code::NotFound, "NotFound"},         {Code::Unsupported, "Unsupported"},
-      {Code::Malformed, "Malformed"},       {Code::TooLarge, "TooLarge"},
-      {Code::Timeout, "Timeout"},           {Code::Disconnected, "Disconnected"},
-      {Code::Busy, "Busy"},                 {Code::PermissionDenied, "PermissionDenied"},
-      {Code::StorageFull, "StorageFull"},   {Code::EndOfStream, "EndOfStream"},
-      {Code::Stopped, "Stopped"},           {Code::Overrun, "Overrun"},
+      {Code::Internal, "Internal"},
+      {Code::InvalidArgument, "InvalidArgument"},
+      {Code::NotFound, "NotFound"},
+      {Code::Unsupported, "Unsupported"},
+      {Code::Malformed, "Malformed"},
+      {Code::TooLarge, "TooLarge"},
+      {Code::Timeout, "Timeout"},
+      {Code::Disconnected, "Disconnected"},
+      {Code::Busy, "Busy"},
+      {Code::PermissionDenied, "PermissionDenied"},
+      {Code::StorageFull, "StorageFull"},
+      {Code::EndOfStream, "EndOfStream"},
+      {Code::Stopped, "Stopped"},
+      {Code::Overrun, "Overrun"},
       {Code::Incompatible, "Incompatible"},
   }};
   const std::string text = section("## 8 Error codes");
@@ -132,10 +140,12 @@ TEST(ProtocolPage, ListsEveryPlaneKindFrameKindFlagAndPolicy) {
     EXPECT_THAT(section("### 4.4 Planes"), HasSubstr(row(i, nameOf(static_cast<PlaneKind>(i)))));
   }
   for (int i = 0; i <= static_cast<int>(FrameKind::Faulted); ++i) {
-    EXPECT_THAT(section("### 4.3 Kinds of frames"), HasSubstr(row(i, nameOf(static_cast<FrameKind>(i)))));
+    EXPECT_THAT(section("### 4.3 Kinds of frames"),
+                HasSubstr(row(i, nameOf(static_cast<FrameKind>(i)))));
   }
   for (int bit = 1; bit < 256; bit *= 2) {
-    EXPECT_THAT(section("### 4.4 Planes"), HasSubstr(row(bit, nameOf(static_cast<PixelFlag>(bit)))));
+    EXPECT_THAT(section("### 4.4 Planes"),
+                HasSubstr(row(bit, nameOf(static_cast<PixelFlag>(bit)))));
   }
   const std::array<std::pair<Policy, const char*>, 4> policies{{{Policy::Latest, "LATEST"},
                                                                 {Policy::Queue, "QUEUE"},
@@ -149,14 +159,20 @@ TEST(ProtocolPage, ListsEveryPlaneKindFrameKindFlagAndPolicy) {
 TEST(ProtocolPage, ListsEveryLimit) {
   const std::string text = section("## 10 Limits");
   const Limits limits;
-  for (const auto& [name, value] : std::map<std::string, std::uint64_t>{
-           {"header", limits.header_bytes}, {"body", limits.body_bytes},
-           {"name", kMaxName},              {"text", kMaxText},
-           {"planes", kMaxPlanes},          {"exposures", kMaxExposures},
-           {"temperatures", kMaxTemperatures}, {"names", kMaxNames},
-           {"sources", kMaxSources},        {"side", kMaxSide},
-           {"channels", kMaxChannels},      {"tables", kMaxTables},
-           {"depth", kMaxTableDepth}}) {
+  for (const auto& [name, value] :
+       std::map<std::string, std::uint64_t>{{"header", limits.header_bytes},
+                                            {"body", limits.body_bytes},
+                                            {"name", kMaxName},
+                                            {"text", kMaxText},
+                                            {"planes", kMaxPlanes},
+                                            {"exposures", kMaxExposures},
+                                            {"temperatures", kMaxTemperatures},
+                                            {"names", kMaxNames},
+                                            {"sources", kMaxSources},
+                                            {"side", kMaxSide},
+                                            {"channels", kMaxChannels},
+                                            {"tables", kMaxTables},
+                                            {"depth", kMaxTableDepth}}) {
     EXPECT_THAT(text, HasSubstr(row(name, value)));
   }
 }
