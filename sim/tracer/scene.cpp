@@ -170,7 +170,11 @@ struct SceneBuilder {
   }
 
   Result<> buildEmbree() {
+#if defined(__SANITIZE_THREAD__)
+    scene->device = rtcNewDevice("threads=1");  // it cannot see how Embree's threads synchronise
+#else
     scene->device = rtcNewDevice(nullptr);
+#endif
     if (scene->device == nullptr) {
       return Error{Error::Code::Internal, fmt::format("Embree refused to start (error {})",
                                                       static_cast<int>(rtcGetDeviceError(nullptr)))};
