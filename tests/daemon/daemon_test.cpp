@@ -103,6 +103,7 @@ class RunningDaemon : public testing::Test {
     return *std::move(connected);
   }
 
+  test::FakeClock clock_;  // for the test that wants it; outlives the daemon
   std::shared_ptr<Log> log_ = std::make_shared<Log>();  // shared with spdlog
   std::filesystem::path folder_;
   std::unique_ptr<Daemon> daemon_;
@@ -568,17 +569,16 @@ constexpr drivers::Driver kStuckDriver{
 TEST_F(RunningDaemon, FeedsTheWatchdogUnlessADriverIsStuck) {
   FakeSystemd systemd{folder_ / "notify"};
   ::setenv("WATCHDOG_USEC", "20000", 1);
-  test::FakeClock clock;
   configure("[limits]\nsource_stuck_s = 5\n[[source]]\nname = 'cam'\ndriver = 'stuck'\nstart = 'always'\n");
   Daemon::Options watched = options();
-  watched.clock = &clock;
+  watched.clock = &clock_;
   watched.drivers = {&kStuckDriver, 1};
   start(watched);
   EXPECT_THAT(systemd.next(), HasSubstr("READY=1\n"));
   ASSERT_TRUE(stuckCamera()->asked.reaches(1));
   EXPECT_EQ(systemd.next(), "WATCHDOG=1");
   EXPECT_EQ(systemd.next(), "WATCHDOG=1");
-  clock.advance(6s);
+  clock_.advance(6s);
   ASSERT_TRUE(log_->waitFor("source cam has been in one call of its driver", 1));
   while (!systemd.isSilent()) EXPECT_EQ(systemd.next(), "WATCHDOG=1");  // from before
   ASSERT_TRUE(log_->waitFor("source cam has been in one call of its driver", 3));
