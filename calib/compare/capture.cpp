@@ -205,7 +205,8 @@ Result<std::unique_ptr<Feed>> openRecording(const std::string& file_and_source) 
 }
 
 void planCapture(Progress& progress, const CaptureOptions& options) {
-  const double seconds = 0.15 * options.frames;
+  // A simulated camera traces two new views first, then reads them out again and again.
+  const double seconds = 12.0 + 0.1 * options.frames;
   if (options.poses.empty())
     progress.plan(fmt::format("{} frames of both cameras where they are", options.frames), seconds);
   for (const PoseSpec& pose : options.poses)

@@ -26,8 +26,9 @@ double Progress::left(double share) const {
     if (i + 1 == next_) done += share * steps_[i].second;
   }
   const double passed = std::chrono::duration<double>(Clock::now() - started_).count();
-  // Trust the plan at first, and the clock the more of the plan is done.
-  const double pace = done > 0.05 * all ? passed / done : 1.0;
+  // Trust the plan at first and the clock more and more: as if half a minute had gone as planned.
+  constexpr double kPlanned = 30.0;
+  const double pace = (passed + kPlanned) / (done + kPlanned);
   return pace * (all - done);
 }
 

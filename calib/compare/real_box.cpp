@@ -256,8 +256,8 @@ Result<Finding> judgeBox(const RealDataJob& job) {
   finding.data.set("flying_pixels_measured", flying_measured)
       .set("flying_pixels_simulated", flying_simulated)
       .set("monte_carlo_mm", monte_carlo_mm);
-  finding.headline = fmt::format("Kinect v2 box {} of {} mm ({})", shown(sim.residual_rms),
-                                 shown(none.residual_rms), shownPercent(sim.fraction_raw));
+  finding.headline = fmt::format("Kinect v2 box: {} mm RMS, {} mm left", shown(none.residual_rms),
+                                 shown(sim.residual_rms));
   finding.cards.push_back(
       {"Kinect v2 box", shown(sim.residual_rms) + " mm",
        fmt::format("RMS left of {} mm on the wall beside it", shown(none.residual_rms)),

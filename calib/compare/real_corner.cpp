@@ -216,9 +216,9 @@ Result<Finding> judgeCorner(const RealDataJob& job, const RealCamera& camera) {
       {camera.title + " corner", shown(delayed.residual_rms) + " mm",
        fmt::format("RMS left of {} mm, constant from the distance table", shown(none.residual_rms)),
        finding.section.tone});
-  finding.headline = fmt::format("{} corner {} of {} mm RMS left ({} explained)", camera.title,
-                                 shown(delayed.residual_rms), shown(delayed.measured_rms),
-                                 shownPercent(delayed.fraction_raw));
+  finding.headline = fmt::format(
+      "{} corner: {} mm RMS, {} mm left as is, {} mm with the constant of the distance table",
+      camera.title, shown(none.residual_rms), shown(raw.residual_rms), shown(delayed.residual_rms));
   return finding;
 }
 

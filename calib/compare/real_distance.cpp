@@ -144,8 +144,8 @@ Result<Finding> judgeDistance(const RealDataJob& job, RealCamera& camera) {
       .set("simulated", toJson(sim))
       .set("rows_of_another_session", other.error_mm.size())
       .set("constant_mm", sim.best_offset);
-  finding.headline = fmt::format("{} distance error {} of {} mm spread left", camera.title,
-                                 shown(sim.residual_sd), shown(none.residual_sd));
+  finding.headline = fmt::format("{} distance error: {} mm spread, {} mm left", camera.title,
+                                 shown(none.residual_sd), shown(sim.residual_sd));
   finding.cards.push_back({camera.title + " distance", shown(sim.residual_sd) + " mm",
                            fmt::format("spread left, of {} mm; constant {} mm",
                                        shown(none.residual_sd), shown(sim.best_offset)),

@@ -11,6 +11,7 @@
 #include "calib/compare/compare.h"
 #include "calib/compare/live_report.h"
 #include "drivers/source.h"
+#include "protocol/settings/describe.h"
 #include "protocol/settings/settings.h"
 
 namespace toftwin::compare {
@@ -194,6 +195,13 @@ TEST(Poses, OfTheDemoCanBeRead) {
   ASSERT_TRUE(poses.ok()) << poses.error().message;
   EXPECT_EQ(poses->size(), 4U);
   EXPECT_TRUE(samePose(poses->front().world_from_camera(), poses->back().world_from_camera()));
+}
+
+TEST(Documents, PagesTableOfAPoseFilesKeysIsTheCodes) {
+  std::ifstream in{std::filesystem::path{TOFTWIN_SOURCE_DIR} / "docs/compare.md"};
+  const std::string page{std::istreambuf_iterator<char>{in}, {}};
+  const std::string table = settings::markdownTable(settings::keysOf<PoseFile>());
+  EXPECT_NE(page.find("<!-- poses: generated -->\n" + table), std::string::npos) << table;
 }
 
 TEST_F(Live, PoseFilesAreChecked) {
