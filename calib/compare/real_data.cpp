@@ -21,12 +21,12 @@ Tone toneOf(double explained_fraction) {
 void planRealData(Progress& progress, double effort) {
   for (const char* camera : {"Kinect v2", "O3D303"}) {
     progress.plan(std::string{camera} + ": distance error", 4.0 * effort);
-    progress.plan(std::string{camera} + ": corner", 25.0 * effort);
+    progress.plan(std::string{camera} + ": corner", 8.0 * effort);
     progress.plan(std::string{camera} + ": warm-up", 1.0);
     progress.plan(std::string{camera} + ": noise", 4.0);
   }
-  progress.plan("Kinect v2: box", 40.0 * effort);
-  progress.plan("published simulation", 40.0 * effort);
+  progress.plan("Kinect v2: box", 14.0 * effort);
+  progress.plan("published simulation", 14.0 * effort);
 }
 
 Result<std::vector<Finding>> judgeRealData(const RealDataJob& job) {
