@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <span>
 
 #include <toftwin/frame.h>
 
@@ -42,6 +43,19 @@ double rangeOfWay(double half_way_m, double ray_x, const DecodeSettings& setting
   return (way_m * way_m - square) / (2.0 * (way_m - baseline_m * ray_x));
 }
 
+/// The cycles, in [0, 1), that the factory's table gives for those seen.
+void linearise(const std::vector<float>& true_cycles, std::span<float> cycles) {
+  const auto last = static_cast<float>(true_cycles.size() - 1);
+  for (float& seen : cycles) {
+    if (std::isnan(seen)) continue;
+    const float at = std::clamp(seen, 0.0F, 1.0F) * last;
+    const float below = std::min(std::floor(at), last - 1.0F);
+    const auto i = static_cast<std::size_t>(below);
+    const float true_value = std::lerp(true_cycles[i], true_cycles[i + 1], at - below);
+    seen = true_value - std::floor(true_value);
+  }
+}
+
 /// Decodes row by row; holds what all rows share.
 class Decoder {
  public:
@@ -71,6 +85,9 @@ class Decoder {
       demodulateRow(samples_, steps_, f, y, &result_.phasors[f](0, y));
       polarRow(&result_.phasors[f](0, y), width, zero_cycles_[f], &cycles[f * width],
                &amplitudes[f * width]);
+      if (f < settings_.true_cycles.size() && settings_.true_cycles[f].size() > 1) {
+        linearise(settings_.true_cycles[f], {&cycles[f * width], width});
+      }
     }
     unmodulatedRow(samples_, y, &result_.ambient(0, y));
     asymmetryRow(samples_, y, asymmetry.data());

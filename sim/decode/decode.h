@@ -31,6 +31,9 @@ struct DecodeSettings {
   /// What the factory measured: the phase that each frequency shows at range 0, subtracted before
   /// unwrapping. Empty: all zero. Not from the file: the sensor model knows it from its waveforms.
   std::vector<Angle> zero_phase{};
+  /// Also from the factory: for each frequency the true cycles of a single return, at seen cycles
+  /// i/(size − 1) from 0 to 1 after subtracting the zero phase; in between linear. Empty: as seen.
+  std::vector<std::vector<float>> true_cycles{};
 
   template <class Visitor>
   void visit(Visitor& v) {

@@ -90,13 +90,15 @@ struct CameraFile {
     }
   };
 
+  enum class FactoryCalibration { None, Delay, Waveform };
+
   struct Sampling {
     int steps = 4;
     int taps = 2;
     int harmonics = 1;
     Duration gap = 500_us;
     Duration frame_interval = 50_ms;
-    bool factory_calibrated = true;
+    FactoryCalibration factory_calibration = FactoryCalibration::Delay;
 
     template <class Visitor>
     void visit(Visitor& v) {
@@ -110,8 +112,12 @@ struct CameraFile {
                  "between raw exposures, for reading out");
       v.quantity("frame_interval", frame_interval, millisecond, {1.0, 100'000.0},
                  "from frame to frame");
-      v.flag("factory_calibrated", factory_calibrated,
-             "the device knows and subtracts the constant delay of its waveforms' fundamental");
+      v.choice("factory_calibration", factory_calibration,
+               {{"none", FactoryCalibration::None},
+                {"delay", FactoryCalibration::Delay},
+                {"waveform", FactoryCalibration::Waveform}},
+               "what the device takes off by itself: delay: its waveforms' constant delay; waveform: also "
+               "the cyclic error that a single return has, by a table");
     }
   };
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim/sensor/sensor_model.h"
 
+#include "sim/sensor/factory_calibration.h"
+
 #include <fmt/format.h>
 
 #include <cmath>
@@ -129,9 +131,12 @@ std::shared_ptr<const SensorModel::Impl> SensorModel::build(Impl impl) {
   impl.id = contentHash(canonicalText(impl.file, impl.effects));
   impl.responses = responsesOf(impl.file);
   impl.decoder = impl.file.decoder;
-  if (impl.file.sampling.factory_calibrated) {
-    for (const Response& response : impl.responses)
-      impl.decoder.zero_phase.push_back(response.zeroPhase());
+  const auto& sampling = impl.file.sampling;
+  for (const Response& response : impl.responses) {
+    if (sampling.factory_calibration == CameraFile::FactoryCalibration::None) break;
+    impl.decoder.zero_phase.push_back(response.zeroPhase());
+    if (sampling.factory_calibration != CameraFile::FactoryCalibration::Waveform) continue;
+    impl.decoder.true_cycles.push_back(trueCyclesOf(response, sampling.steps));
   }
   if (impl.rays.x.empty()) impl.rays = raysOf(impl.camera);
   return std::make_shared<const Impl>(std::move(impl));

@@ -2,6 +2,10 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <fstream>
+#include <iterator>
+#include <numbers>
+#include <string>
 
 #include "tests/sim/camera_testing.h"
 
@@ -72,9 +76,9 @@ TEST(Presets, KinectV2HasTheNoiseItWasFittedTo) {
 }
 
 TEST(Presets, O3d303HasTheNoiseItWasFittedTo) {
-  // Its square wave stretches and squeezes the phase by up to dφ̂/dφ = 1 ± 0.36, and the noise with
-  // it: look where the wiggle is flat, or at the mean over a turn. Here: root mean square over 16
-  // ranges of one 4-cycle around d.
+  // The square wave stretches and squeezes the phase by up to dφ̂/dφ = 1 ± 0.36, and taking the cyclic
+  // error off undoes that for the noise, too; what is left of it varies with the range. Here: root mean
+  // square over 16 ranges of one 4-cycle around d.
   const SensorModel model = *SensorModel::preset("o3d303");
   for (double d : {1.0, 2.0, 3.0}) {
     double variance = 0.0;
@@ -90,8 +94,8 @@ TEST(Presets, O3d303HasTheNoiseItWasFittedTo) {
   }
 }
 
-TEST(Presets, O3d303WigglesAsASquareWaveDoes) {
-  const SensorModel model = SensorModel::preset("o3d303")->withEffects({});
+/// The largest error of a single return over 3.5 m, without noise.
+double peakError(const SensorModel& model) {
   const Light light =
       syntheticLight(350, 1, {30_MHz}, model.traceRequest().harmonics, [](int x, int) {
         return std::vector<Way>{{1e-3, 0.5 + 0.01 * x}};
@@ -100,9 +104,39 @@ TEST(Presets, O3d303WigglesAsASquareWaveDoes) {
   double peak_m = 0.0;
   for (int x = 0; x < 350; ++x)
     peak_m = std::max(peak_m, std::abs(static_cast<double>(image.range_m(x, 0)) - 0.5 - 0.01 * x));
+  return peak_m;
+}
+
+/// The preset as if its factory had left the cyclic error in.
+SensorModel o3d303WithCyclicError() {
+  std::ifstream file{TOFTWIN_SOURCE_DIR "/sim/cameras/o3d303.toml"};
+  std::string text{std::istreambuf_iterator<char>{file}, {}};
+  const std::string_view with = "factory_calibration = \"waveform\"";
+  text.replace(text.find(with), with.size(), "factory_calibration = \"delay\"");
+  return *SensorModel::parse(text, "o3d303.toml");
+}
+
+TEST(Presets, O3d303WouldWiggleAsASquareWaveDoes) {
+  const double peak_m = peakError(o3d303WithCyclicError().withEffects({}));
   // Seven of the triangle's harmonics; the eighth that leaks is the 9th: (1/81 + 1/121) of 795 mm
   // at most missing.
   EXPECT_NEAR(1e3 * peak_m, 56.55, 795.2 * (1.0 / 81.0 + 1.0 / 121.0) / 2.0);
+}
+
+TEST(Presets, O3d303TakesItsCyclicErrorOff) {
+  // What is left is the table's linear interpolation, h²/8 · max |d²φ/dφ̂²| with h = 2π/4096. φ̂ has a 4-cycle of
+  // 0.072 rad and, of the 7th harmonic, an 8-cycle of 1/49; φ̂' is 2/π at least:
+  // (16 · 0.072 + 64 / 49) / (2/π)³ = 9.5, so 2.8e-6 rad of 795 mm. Float's rounding of phase and range: 1 µm.
+  const double interpolation_rad = std::pow(2.0 * std::numbers::pi / 4096.0, 2) / 8.0 * 9.5;
+  EXPECT_LT(1e3 * peakError(SensorModel::preset("o3d303")->withEffects({})), 795.2 * interpolation_rad + 0.001);
+}
+
+TEST(Presets, O3d303LeavesTheErrorOfTwoReturnsIn) {
+  const SensorModel model = SensorModel::preset("o3d303")->withEffects({});
+  const Light light = syntheticLight(1, 1, {30_MHz}, model.traceRequest().harmonics, [](int, int) {
+    return std::vector<Way>{{1e-3, 1.0}, {0.3e-3, 2.0}};
+  });
+  EXPECT_GT(model.expose(light, {}, 1, 0).range.range_m(0, 0), 1.05F);
 }
 
 }  // namespace
