@@ -22,7 +22,8 @@ bool isName(std::string_view name) {
 
 std::string namesOf(std::span<const drivers::Driver> drivers) {
   std::string names;
-  for (const auto& driver : drivers) names += (names.empty() ? "" : ", ") + std::string{driver.name};
+  for (const auto& driver : drivers)
+    names += (names.empty() ? "" : ", ") + std::string{driver.name};
   return names;
 }
 
@@ -69,8 +70,10 @@ ConfiguredSource readSource(settings::Table table, std::span<const drivers::Driv
 }
 
 std::filesystem::path recordingFolder(const DaemonKeys& keys, const settings::Table& table) {
-  if (!keys.recording_folder.empty()) return table.resolve(keys.recording_folder).lexically_normal();
-  const char* state = std::getenv("STATE_DIRECTORY");  // NOLINT(concurrency-mt-unsafe): nobody sets it
+  if (!keys.recording_folder.empty())
+    return table.resolve(keys.recording_folder).lexically_normal();
+  const char* state =
+      std::getenv("STATE_DIRECTORY");  // NOLINT(concurrency-mt-unsafe): nobody sets it
   return state == nullptr ? "" : state;
 }
 
@@ -78,7 +81,8 @@ Result<Config> readConfig(settings::Table& table, std::span<const drivers::Drive
                           const std::vector<std::string>& running) {
   Config config;
   table.read(config.keys);
-  if (auto listen = checkListen(config.keys.listen); !listen) table.complain("listen", listen.error().message);
+  if (auto listen = checkListen(config.keys.listen); !listen)
+    table.complain("listen", listen.error().message);
   std::set<std::string> names;
   for (settings::Table& below : table.tables("source")) {
     config.sources.push_back(readSource(below, drivers, running, names));
@@ -94,7 +98,8 @@ Result<Config> readConfig(settings::Table& table, std::span<const drivers::Drive
 
 }  // namespace
 
-Result<Config> loadConfig(const std::filesystem::path& file, std::span<const drivers::Driver> drivers,
+Result<Config> loadConfig(const std::filesystem::path& file,
+                          std::span<const drivers::Driver> drivers,
                           const std::vector<std::string>& running) {
   auto table = settings::Table::load(file);
   if (!table) return table.error();
@@ -111,14 +116,15 @@ Result<Config> parseConfig(std::string_view toml, const std::filesystem::path& n
 
 Result<> checkListen(const ListenKeys& listen) {
   const std::string& address = listen.address;
-  const bool is_loopback = address.empty() || address == "localhost" || address == "::1" ||
-                           address.starts_with("127.");
+  const bool is_loopback =
+      address.empty() || address == "localhost" || address == "::1" || address.starts_with("127.");
   if (is_loopback || listen.allow_remote) return {};
-  return Error{Error::Code::InvalidArgument,
-               fmt::format("address = \"{}\" can be reached from other machines, and there is no password: "
-                           "everyone there could see all cameras and steer them. Set allow_remote = true "
-                           "if you trust that whole network, or use 127.0.0.1",
-                           address)};
+  return Error{
+      Error::Code::InvalidArgument,
+      fmt::format("address = \"{}\" can be reached from other machines, and there is no password: "
+                  "everyone there could see all cameras and steer them. Set allow_remote = true "
+                  "if you trust that whole network, or use 127.0.0.1",
+                  address)};
 }
 
 std::string documentConfig(std::span<const drivers::Driver> drivers) {
@@ -127,7 +133,8 @@ std::string documentConfig(std::span<const drivers::Driver> drivers) {
   std::string text = "### The daemon\n\n" + markdownTable(keysOf<DaemonKeys>()) +
                      "\n### Every `[[source]]`\n\n" + markdownTable(keysOf<SourceKeys>());
   for (const auto& driver : drivers) {
-    text += fmt::format("\n### A `[[source]]` with `driver = \"{}\"`: {}\n\n", driver.name, driver.summary);
+    text += fmt::format("\n### A `[[source]]` with `driver = \"{}\"`: {}\n\n", driver.name,
+                        driver.summary);
     text += driver.document();
   }
   return text;

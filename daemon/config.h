@@ -29,7 +29,8 @@ struct ListenKeys {
     v.number("port", port, {0, 65535}, "TCP port; 0: any free one, which the log tells");
     v.flag("allow_remote", allow_remote,
            "allows an address that other machines reach. There is no password and no encryption: "
-           "everyone who reaches the port sees all cameras and can set poses, parameters and recordings. "
+           "everyone who reaches the port sees all cameras and can set poses, parameters and "
+           "recordings. "
            "Only for a network that you trust whole");
     v.text("socket", socket,
            "path of the Unix socket; \"auto\": toftwin.sock in $RUNTIME_DIRECTORY, /run/toftwin or "
@@ -54,10 +55,12 @@ struct LimitKeys {
     v.number("lossless_mb", lossless_mb, {1, 1'000'000},
              "what may wait for one lossless subscriber or recording before it ends with Overrun");
     v.number("request_kb", request_kb, {1, 1024}, "longest request that a client may send");
-    v.quantity("handshake", handshake, second, {0.1, 3600}, "a client that said no Hello by then is cut off");
-    v.quantity("source_stuck", source_stuck, second, {1, 86400},
-               "a driver that does not come back within this counts as stuck: systemd's watchdog is no "
-               "longer told that the daemon is well, and restarts it");
+    v.quantity("handshake", handshake, second, {0.1, 3600},
+               "a client that said no Hello by then is cut off");
+    v.quantity(
+        "source_stuck", source_stuck, second, {1, 86400},
+        "a driver that does not come back within this counts as stuck: systemd's watchdog is no "
+        "longer told that the daemon is well, and restarts it");
   }
 };
 
@@ -72,11 +75,14 @@ struct DaemonKeys {
   template <class Visitor>
   void visit(Visitor& v) {
     v.choice("log_level", log_level,
-             {{"debug", LogLevel::Debug}, {"info", LogLevel::Info}, {"warning", LogLevel::Warning},
+             {{"debug", LogLevel::Debug},
+              {"info", LogLevel::Info},
+              {"warning", LogLevel::Warning},
               {"error", LogLevel::Error}},
              "what is logged");
     v.text("recording_folder", recording_folder,
-           "where recordings go that clients ask for, relative to this file; empty: $STATE_DIRECTORY if "
+           "where recordings go that clients ask for, relative to this file; empty: "
+           "$STATE_DIRECTORY if "
            "systemd sets it, else clients cannot record");
     v.group("listen", listen, "where clients connect");
     v.group("limits", limits, "what one client may take");
@@ -92,7 +98,8 @@ struct SourceKeys {
 
   template <class Visitor>
   void visit(Visitor& v) {
-    v.text("name", name, "by which clients ask for it: letters, digits, '-', '_' and '.', at most 64");
+    v.text("name", name,
+           "by which clients ask for it: letters, digits, '-', '_' and '.', at most 64");
     v.text("driver", driver, "one of the drivers below");
     v.choice("start", start, {{"on_demand", Start::OnDemand}, {"always", Start::Always}},
              "makes frames only while somebody wants them, or from the daemon's start to its end");
@@ -118,7 +125,8 @@ struct Config {
 /// Reads a configuration and opens its sources, except those whose fingerprint is in `running`. A
 /// camera that is not there is no error: it is tried again while the daemon runs. Error: everything
 /// that is wrong in the file, with file and line.
-Result<Config> loadConfig(const std::filesystem::path& file, std::span<const drivers::Driver> drivers,
+Result<Config> loadConfig(const std::filesystem::path& file,
+                          std::span<const drivers::Driver> drivers,
                           const std::vector<std::string>& running = {});
 /// From text, for tests; `name` stands for the file.
 Result<Config> parseConfig(std::string_view toml, const std::filesystem::path& name,

@@ -31,7 +31,8 @@ Session::Options sessionOptions(const Connection::Options& options, bool is_loca
 void noticeVanishedPeers(Socket& socket) {
   const int fd = socket.native_handle();
   const auto set = [fd](int level, int option, int value) {
-    ::setsockopt(fd, level, option, &value, sizeof value);  // fails on a Unix socket, which needs none
+    ::setsockopt(fd, level, option, &value,
+                 sizeof value);  // fails on a Unix socket, which needs none
   };
   set(SOL_SOCKET, SO_KEEPALIVE, 1);
   set(IPPROTO_TCP, TCP_KEEPIDLE, 5);
@@ -43,7 +44,8 @@ void noticeVanishedPeers(Socket& socket) {
 
 Connection::Connection(Socket socket, Hub& hub, Options options, std::string name,
                        std::function<void()> on_closed)
-    : socket_(std::move(socket), wire::Limits{.header_bytes = options.request_bytes, .body_bytes = 0}),
+    : socket_(std::move(socket),
+              wire::Limits{.header_bytes = options.request_bytes, .body_bytes = 0}),
       options_(options),
       name_(std::move(name)),
       on_closed_(std::move(on_closed)),
@@ -57,13 +59,14 @@ void Connection::start() {
   session_ = std::make_unique<Session>(*hub_, sessionOptions(options_, socket_.isLocal()), waker());
   giveUpAfter(options_.handshake, [this] {
     if (session_->isOpen()) return;
-    dismiss({Error::Code::Timeout, fmt::format("no Hello within {} ms", options_.handshake.count())});
+    dismiss(
+        {Error::Code::Timeout, fmt::format("no Hello within {} ms", options_.handshake.count())});
   });
   read();
 }
 
-/// What sources and recorders call, on their threads, when there is something to send. However often
-/// that is, one visit to the io thread at a time is on its way.
+/// What sources and recorders call, on their threads, when there is something to send. However
+/// often that is, one visit to the io thread at a time is on its way.
 std::function<void()> Connection::waker() {
   return [weak = weak_from_this()] {
     auto self = weak.lock();
@@ -148,7 +151,8 @@ void Connection::dismiss(Error why) {
   if (is_closed_ || is_last_) return;
   // What the session has to tell (ends of subscriptions, late answers) goes first; frames do not.
   while (auto outgoing = session_->next()) {
-    if (auto* message = std::get_if<wire::Message>(&*outgoing)) answers_.push_back(std::move(*message));
+    if (auto* message = std::get_if<wire::Message>(&*outgoing))
+      answers_.push_back(std::move(*message));
   }
   answers_.emplace_back(wire::Failure{0, std::move(why)});
   is_last_ = true;
@@ -168,7 +172,8 @@ void Connection::hangUp() {
 
 void Connection::drain() {
   socket_.socket().async_read_some(
-      asio::buffer(scratch_), [self = shared_from_this()](boost::system::error_code fault, std::size_t) {
+      asio::buffer(scratch_),
+      [self = shared_from_this()](boost::system::error_code fault, std::size_t) {
         if (fault) return self->close();
         self->drain();
       });
@@ -176,9 +181,10 @@ void Connection::drain() {
 
 void Connection::giveUpAfter(std::chrono::milliseconds timeout, std::function<void()> then) {
   timer_.expires_after(timeout);
-  timer_.async_wait([self = shared_from_this(), then = std::move(then)](boost::system::error_code fault) {
-    if (!fault && !self->is_closed_) then();
-  });
+  timer_.async_wait(
+      [self = shared_from_this(), then = std::move(then)](boost::system::error_code fault) {
+        if (!fault && !self->is_closed_) then();
+      });
 }
 
 void Connection::close() {

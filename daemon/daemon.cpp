@@ -21,10 +21,11 @@ namespace asio = boost::asio;
 
 Server::Options serverOptions(const LimitKeys& limits) {
   const auto milliseconds = static_cast<std::int64_t>(limits.handshake.in(millisecond));
-  return {.sessions = static_cast<std::size_t>(limits.sessions),
-          .connection = {.subscriptions = static_cast<std::size_t>(limits.subscriptions_per_session),
-                         .request_bytes = static_cast<std::uint32_t>(limits.request_kb) * 1024,
-                         .handshake = std::chrono::milliseconds{milliseconds}}};
+  return {
+      .sessions = static_cast<std::size_t>(limits.sessions),
+      .connection = {.subscriptions = static_cast<std::size_t>(limits.subscriptions_per_session),
+                     .request_bytes = static_cast<std::uint32_t>(limits.request_kb) * 1024,
+                     .handshake = std::chrono::milliseconds{milliseconds}}};
 }
 
 Hub::Options hubOptions(const Config& config) {
@@ -34,10 +35,14 @@ Hub::Options hubOptions(const Config& config) {
 
 spdlog::level::level_enum levelOf(DaemonKeys::LogLevel level) {
   switch (level) {
-    case DaemonKeys::LogLevel::Debug: return spdlog::level::debug;
-    case DaemonKeys::LogLevel::Info: return spdlog::level::info;
-    case DaemonKeys::LogLevel::Warning: return spdlog::level::warn;
-    case DaemonKeys::LogLevel::Error: return spdlog::level::err;
+    case DaemonKeys::LogLevel::Debug:
+      return spdlog::level::debug;
+    case DaemonKeys::LogLevel::Info:
+      return spdlog::level::info;
+    case DaemonKeys::LogLevel::Warning:
+      return spdlog::level::warn;
+    case DaemonKeys::LogLevel::Error:
+      return spdlog::level::err;
   }
   return spdlog::level::info;
 }
@@ -51,10 +56,12 @@ bool sameListen(const ListenKeys& a, const ListenKeys& b) {
 Result<std::unique_ptr<Daemon>> Daemon::start(Options options) {
   auto config = loadConfig(options.config, options.drivers);
   if (!config) return config.error();
-  // Sources run only once it is clear that this daemon may listen: a second one must not touch cameras.
+  // Sources run only once it is clear that this daemon may listen: a second one must not touch
+  // cameras.
   std::unique_ptr<Daemon> daemon{new Daemon{std::move(options), *config}};
   if (auto listening = daemon->listen(config->keys.listen); !listening) return listening.error();
-  if (daemon->options_.handle_signals) daemon->handleSignals();  // before anyone is told that it is ready
+  if (daemon->options_.handle_signals)
+    daemon->handleSignals();  // before anyone is told that it is ready
   daemon->apply(*std::move(config));
   notify::ready(daemon->statusLine());
   daemon->watch();
@@ -83,7 +90,8 @@ Result<> Daemon::listen(ListenKeys keys) {
     spdlog::info("listening on {}", keys.socket);
   }
   if (!keys.address.empty()) {
-    if (auto done = server_.listenTcp(keys.address, static_cast<std::uint16_t>(keys.port)); !done) return done;
+    if (auto done = server_.listenTcp(keys.address, static_cast<std::uint16_t>(keys.port)); !done)
+      return done;
     spdlog::info("listening on {} port {}", keys.address, server_.port());
   }
   if (keys.socket.empty() && keys.address.empty()) {
@@ -93,7 +101,8 @@ Result<> Daemon::listen(ListenKeys keys) {
   return {};
 }
 
-// ---- configuration -------------------------------------------------------------------------------
+// ---- configuration
+// -------------------------------------------------------------------------------
 
 std::vector<std::string> Daemon::fingerprints() const {
   std::vector<std::string> all;
@@ -128,7 +137,9 @@ void Daemon::applyKeys(const Config& config) {
 
 void Daemon::run(ConfiguredSource source) {
   running_.push_back({source.keys.name, source.fingerprint});
-  const auto open = [driver = source.driver, table = source.table]() mutable { return driver->open(table); };
+  const auto open = [driver = source.driver, table = source.table]() mutable {
+    return driver->open(table);
+  };
   const SourceHost::Options options{.always = source.keys.start == SourceKeys::Start::Always};
   spdlog::info("source {}: driver {}", source.keys.name, source.driver->name);
   hub_.add(std::make_shared<SourceHost>(source.keys.name, open, std::move(source.opened), options,
@@ -174,10 +185,12 @@ void Daemon::discard(std::vector<std::shared_ptr<void>> things) {
   std::erase_if(discarded_, [](const std::future<void>& one) {
     return one.wait_for(std::chrono::seconds{0}) == std::future_status::ready;
   });
-  discarded_.push_back(std::async(std::launch::async, [gone = std::move(things)]() mutable { gone.clear(); }));
+  discarded_.push_back(
+      std::async(std::launch::async, [gone = std::move(things)]() mutable { gone.clear(); }));
 }
 
-// ---- running -------------------------------------------------------------------------------------
+// ---- running
+// -------------------------------------------------------------------------------------
 
 void Daemon::handleSignals() {
   boost::system::error_code ignored;
@@ -223,8 +236,8 @@ void Daemon::beginStop() {
   }));
 }
 
-/// Tells systemd's watchdog that all is well: this runs, so the io thread does; and no driver has been
-/// in one call for too long.
+/// Tells systemd's watchdog that all is well: this runs, so the io thread does; and no driver has
+/// been in one call for too long.
 void Daemon::watch() {
   const auto limit = notify::watchdogLimit();
   if (!limit) return;

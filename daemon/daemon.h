@@ -34,7 +34,7 @@ class Daemon {
     std::filesystem::path config;
     std::optional<int> port;            ///< instead of listen.port
     std::optional<std::string> socket;  ///< instead of listen.socket
-    bool handle_signals = false;  ///< SIGTERM and SIGINT stop the daemon, SIGHUP reloads it
+    bool handle_signals = false;        ///< SIGTERM and SIGINT stop the daemon, SIGHUP reloads it
     std::span<const drivers::Driver> drivers = drivers::allDrivers();
     const Clock* clock = &systemClock();
   };

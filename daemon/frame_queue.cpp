@@ -14,9 +14,9 @@ bool FrameQueue::wants(SteadyTime now) {
   const std::scoped_lock lock{mutex_};
   if (end_) return false;
   if (settings_.max_rate_hz <= 0.0) return true;
-  // Frames are due at a fixed rate, so that the mean is kept however the source's frames lie between.
-  // A tenth of the period of grace keeps a source with a multiple of the rate and some jitter from
-  // missing its turn by a hair and losing a whole interval.
+  // Frames are due at a fixed rate, so that the mean is kept however the source's frames lie
+  // between. A tenth of the period of grace keeps a source with a multiple of the rate and some
+  // jitter from missing its turn by a hair and losing a whole interval.
   using std::chrono::duration_cast;
   const auto period = duration_cast<SteadyTime::duration>(
       std::chrono::duration<double>{1.0 / settings_.max_rate_hz});
@@ -32,11 +32,12 @@ void FrameQueue::push(PreparedFramePtr frame) {
     const bool was_empty = frames_.empty();
     if (settings_.policy == wire::Policy::Lossless &&
         bytes_ + frame->body.bytes > settings_.byte_limit) {
-      end_ = Error{Error::Code::Overrun,
-                   fmt::format("{} frames ({} MB) wait for this lossless subscriber, which is the "
-                               "daemon's limit (limits.lossless_mb): read faster, ask for less, or raise "
-                               "the limit",
-                               frames_.size(), bytes_ >> 20)};
+      end_ = Error{
+          Error::Code::Overrun,
+          fmt::format("{} frames ({} MB) wait for this lossless subscriber, which is the "
+                      "daemon's limit (limits.lossless_mb): read faster, ask for less, or raise "
+                      "the limit",
+                      frames_.size(), bytes_ >> 20)};
     } else {
       bytes_ += frame->body.bytes;
       frames_.push_back(std::move(frame));

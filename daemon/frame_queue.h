@@ -23,9 +23,11 @@ namespace toftwin::daemon {
 struct PreparedFrame {
   Frame frame;
   wire::Body body;
-  std::shared_ptr<const transport::SharedBody> shared_body;  ///< for clients on this machine, or null
+  std::shared_ptr<const transport::SharedBody>
+      shared_body;  ///< for clients on this machine, or null
 };
-/// Shared by the queues and socket writes of all subscriptions with that selection; nobody changes it.
+/// Shared by the queues and socket writes of all subscriptions with that selection; nobody changes
+/// it.
 using PreparedFramePtr = std::shared_ptr<const PreparedFrame>;
 
 /// Between the thread of a source and one subscriber: holds what the subscriber has not taken yet,
@@ -34,9 +36,10 @@ class FrameQueue {
  public:
   struct Settings {
     wire::Policy policy = wire::Policy::Latest;
-    std::size_t depth = 1;           ///< for Policy::Queue
-    double max_rate_hz = 0.0;        ///< 0: every frame
-    std::uint64_t byte_limit = 0;    ///< for Policy::Lossless: ends with Overrun rather than hold more
+    std::size_t depth = 1;     ///< for Policy::Queue
+    double max_rate_hz = 0.0;  ///< 0: every frame
+    std::uint64_t byte_limit =
+        0;  ///< for Policy::Lossless: ends with Overrun rather than hold more
   };
   /// A frame to send, with the number of frames dropped since the one before.
   struct Delivery {
@@ -49,8 +52,8 @@ class FrameQueue {
   /// nothing. It must not call back.
   FrameQueue(Settings settings, std::function<void()> wake);
 
-  /// Whether the subscriber takes the frame that was made now. Asked once for every frame, before it
-  /// is prepared: this is where the rate is limited.
+  /// Whether the subscriber takes the frame that was made now. Asked once for every frame, before
+  /// it is prepared: this is where the rate is limited.
   bool wants(SteadyTime now);
   void push(PreparedFramePtr frame);
   /// No more frames. The reason comes out after the frames that wait.

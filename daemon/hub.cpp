@@ -109,7 +109,8 @@ void Hub::stopRecording(const std::string& source, RecordDone done) {
     if (auto found = recorders_.find(source); found != recorders_.end()) recorder = found->second;
   }
   if (!recorder) {
-    return done(Error{Error::Code::NotFound, fmt::format("the source \"{}\" is not being recorded", source)});
+    return done(Error{Error::Code::NotFound,
+                      fmt::format("the source \"{}\" is not being recorded", source)});
   }
   recorder->stop([done](const Result<std::filesystem::path>& closed) {
     if (closed) return done(closed->string());

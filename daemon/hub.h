@@ -18,8 +18,8 @@
 
 namespace toftwin::daemon {
 
-/// All sources of the daemon and their recordings: what sessions ask. All members may be called from
-/// any thread.
+/// All sources of the daemon and their recordings: what sessions ask. All members may be called
+/// from any thread.
 class Hub {
  public:
   struct Options {
@@ -28,7 +28,8 @@ class Hub {
   };
   using RecordDone = std::function<void(Result<std::string>)>;
 
-  Hub(Options options, const Clock& clock) : clock_(clock), options_(std::move(options)), began_(clock.steady()) {}
+  Hub(Options options, const Clock& clock)
+      : clock_(clock), options_(std::move(options)), began_(clock.steady()) {}
   ~Hub();
   Hub(const Hub&) = delete;
   Hub& operator=(const Hub&) = delete;
@@ -36,7 +37,8 @@ class Hub {
   void setOptions(Options options);
   [[nodiscard]] Options options() const;
   void add(std::shared_ptr<SourceHost> source);
-  /// Takes the source (and its recording) out and stops it; it is gone when the result is destroyed.
+  /// Takes the source (and its recording) out and stops it; it is gone when the result is
+  /// destroyed.
   std::vector<std::shared_ptr<void>> remove(const std::string& name);
 
   /// Error NotFound naming the sources that there are.
@@ -55,8 +57,8 @@ class Hub {
   mutable std::mutex mutex_;
   Options options_;
   const SteadyTime began_;
-  std::map<std::string, std::shared_ptr<SourceHost>> sources_;   // shared with calls in progress
-  std::map<std::string, std::shared_ptr<Recorder>> recorders_;   // shared with calls in progress
+  std::map<std::string, std::shared_ptr<SourceHost>> sources_;  // shared with calls in progress
+  std::map<std::string, std::shared_ptr<Recorder>> recorders_;  // shared with calls in progress
 };
 
 }  // namespace toftwin::daemon

@@ -34,9 +34,10 @@ Error cannotListen(const std::string& where, const error_code& fault, const std:
                                     where, holder)};
   }
   if (number == EACCES) {
-    return {Code::PermissionDenied, fmt::format("{} may not be used by this user: ports below 1024 are "
-                                                "for root; choose a higher one with listen.port or --port",
-                                                where)};
+    return {Code::PermissionDenied,
+            fmt::format("{} may not be used by this user: ports below 1024 are "
+                        "for root; choose a higher one with listen.port or --port",
+                        where)};
   }
   if (number == EADDRNOTAVAIL) {
     return {Code::InvalidArgument,
@@ -79,21 +80,24 @@ bool isOpenIn(const fs::path& process, const std::string& link) {
 /// another file of the same name.
 Result<transport::FileDescriptor> takeLock(const fs::path& socket) {
   const fs::path file = socket.string() + ".lock";
-  transport::FileDescriptor lock{::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600)};
+  transport::FileDescriptor lock{
+      ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600)};
   if (!lock) {
     const bool is_denied = errno == EACCES || errno == EROFS || errno == EPERM;
-    return Error{is_denied ? Error::Code::PermissionDenied : Error::Code::NotFound,
-                 fmt::format("{}: cannot be made: {}; the folder must exist and be writable for this "
-                             "user, or choose another socket with listen.socket or --socket",
-                             file.string(), std::generic_category().message(errno))};
+    return Error{
+        is_denied ? Error::Code::PermissionDenied : Error::Code::NotFound,
+        fmt::format("{}: cannot be made: {}; the folder must exist and be writable for this "
+                    "user, or choose another socket with listen.socket or --socket",
+                    file.string(), std::generic_category().message(errno))};
   }
   if (::flock(lock.get(), LOCK_EX | LOCK_NB) != 0) {
     std::array<char, 16> pid{};
     const auto count = ::pread(lock.get(), pid.data(), pid.size() - 1, 0);
-    return Error{Error::Code::Busy,
-                 fmt::format("another daemon (pid {}) serves {} already: stop it, or choose another "
-                             "socket with listen.socket or --socket",
-                             count > 0 ? pid.data() : "unknown", socket.string())};
+    return Error{
+        Error::Code::Busy,
+        fmt::format("another daemon (pid {}) serves {} already: stop it, or choose another "
+                    "socket with listen.socket or --socket",
+                    count > 0 ? pid.data() : "unknown", socket.string())};
   }
   const std::string pid = std::to_string(::getpid());
   if (::ftruncate(lock.get(), 0) != 0 ||
@@ -109,10 +113,11 @@ Result<> clearPath(asio::io_context& io, const fs::path& path) {
   const auto type = fs::symlink_status(path, fault).type();
   if (type == fs::file_type::not_found) return {};
   if (type != fs::file_type::socket) {
-    return Error{Error::Code::InvalidArgument,
-                 fmt::format("{} exists and is not a socket; it is left alone. Remove it, or choose "
-                             "another socket with listen.socket or --socket",
-                             path.string())};
+    return Error{
+        Error::Code::InvalidArgument,
+        fmt::format("{} exists and is not a socket; it is left alone. Remove it, or choose "
+                    "another socket with listen.socket or --socket",
+                    path.string())};
   }
   Local::socket probe{io};
   error_code refused;
@@ -124,8 +129,9 @@ Result<> clearPath(asio::io_context& io, const fs::path& path) {
   }
   fs::remove(path, fault);
   if (fault) {
-    return Error{Error::Code::PermissionDenied,
-                 fmt::format("{} is left over and cannot be removed: {}", path.string(), fault.message())};
+    return Error{
+        Error::Code::PermissionDenied,
+        fmt::format("{} is left over and cannot be removed: {}", path.string(), fault.message())};
   }
   return {};
 }
@@ -141,20 +147,23 @@ std::string whoListensOn(std::uint16_t port) {
   for (fs::directory_iterator process{"/proc", fault}, end; !fault && process != end;
        process.increment(fault)) {
     const std::string pid = process->path().filename();
-    if (pid.find_first_not_of("0123456789") == std::string::npos && isOpenIn(process->path(), link)) {
+    if (pid.find_first_not_of("0123456789") == std::string::npos &&
+        isOpenIn(process->path(), link)) {
       return nameOfProcess(pid);
     }
   }
   return "another user's process";
 }
 
-Result<tcp::acceptor> listenTcp(asio::io_context& io, const std::string& address, std::uint16_t port) {
+Result<tcp::acceptor> listenTcp(asio::io_context& io, const std::string& address,
+                                std::uint16_t port) {
   const std::string where = fmt::format("TCP port {} of {}", port, address);
   error_code fault;
   const auto ip = asio::ip::make_address(address == "localhost" ? "127.0.0.1" : address, fault);
   if (fault) {
-    return Error{Error::Code::InvalidArgument,
-                 fmt::format("listen.address = \"{}\" is no IP address, such as 127.0.0.1 or ::1", address)};
+    return Error{
+        Error::Code::InvalidArgument,
+        fmt::format("listen.address = \"{}\" is no IP address, such as 127.0.0.1 or ::1", address)};
   }
   tcp::acceptor acceptor{io};
   const tcp::endpoint endpoint{ip, port};
@@ -170,8 +179,8 @@ Result<UnixListener> UnixListener::open(asio::io_context& io, const fs::path& pa
   constexpr std::size_t kLongest = 107;  // sockaddr_un::sun_path with its terminating zero
   if (path.string().size() > kLongest) {
     return Error{Error::Code::InvalidArgument,
-                 fmt::format("the socket's path has {} bytes, the system allows {}: {}", path.string().size(),
-                             kLongest, path.string())};
+                 fmt::format("the socket's path has {} bytes, the system allows {}: {}",
+                             path.string().size(), kLongest, path.string())};
   }
   auto lock = takeLock(path);
   if (!lock) return lock.error();
@@ -181,8 +190,8 @@ Result<UnixListener> UnixListener::open(asio::io_context& io, const fs::path& pa
   acceptor.open(Local{}, fault);
   if (!fault) acceptor.bind(Local::endpoint{path.string()}, fault);
   if (!fault) acceptor.listen(asio::socket_base::max_listen_connections, fault);
-  // As open as the loopback port beside it, which every user of this machine can reach, too. Who wants
-  // less closes the folder.
+  // As open as the loopback port beside it, which every user of this machine can reach, too. Who
+  // wants less closes the folder.
   if (!fault && ::chmod(path.c_str(), 0666) != 0) fault = {errno, boost::system::system_category()};
   if (fault) return cannotListen(path.string(), fault, "another process");
   return UnixListener{path, *std::move(lock), std::move(acceptor)};

@@ -18,8 +18,8 @@
 namespace toftwin::daemon {
 
 /// Listens on a TCP port; port 0 is any free one. An error names who holds the port and what to do.
-Result<boost::asio::ip::tcp::acceptor> listenTcp(boost::asio::io_context& io, const std::string& address,
-                                                 std::uint16_t port);
+Result<boost::asio::ip::tcp::acceptor> listenTcp(boost::asio::io_context& io,
+                                                 const std::string& address, std::uint16_t port);
 
 /// A Unix socket that this process alone listens on. A lock file beside it tells a second daemon,
 /// whose pid it names; a socket that a killed daemon left behind is replaced.
@@ -43,8 +43,8 @@ class UnixListener {
   boost::asio::local::stream_protocol::acceptor acceptor_;
 };
 
-/// "toftwind (pid 123)": the process that listens on a TCP port of this machine, or "another process"
-/// if it is not ours to look at.
+/// "toftwind (pid 123)": the process that listens on a TCP port of this machine, or "another
+/// process" if it is not ours to look at.
 std::string whoListensOn(std::uint16_t port);
 
 }  // namespace toftwin::daemon

@@ -11,18 +11,20 @@
 
 namespace toftwin::daemon {
 
-Result<std::filesystem::path> recordingPath(const std::filesystem::path& folder, std::string_view name) {
+Result<std::filesystem::path> recordingPath(const std::filesystem::path& folder,
+                                            std::string_view name) {
   constexpr std::size_t kLongest = 200;
   const bool is_bare = !name.empty() && name.size() <= kLongest && name.front() != '.' &&
                        std::ranges::all_of(name, [](unsigned char c) {
                          return std::isalnum(c) != 0 || c == '-' || c == '_' || c == '.';
                        });
   if (!is_bare) {
-    return Error{Error::Code::InvalidArgument,
-                 fmt::format("a recording is named by a bare file name of letters, digits, '-', '_' and "
-                             "'.', at most {} long, not beginning with '.'; it lies in the daemon's "
-                             "recording folder",
-                             kLongest)};
+    return Error{
+        Error::Code::InvalidArgument,
+        fmt::format("a recording is named by a bare file name of letters, digits, '-', '_' and "
+                    "'.', at most {} long, not beginning with '.'; it lies in the daemon's "
+                    "recording folder",
+                    kLongest)};
   }
   if (folder.empty()) {
     return Error{Error::Code::Unsupported,

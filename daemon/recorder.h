@@ -19,10 +19,12 @@
 namespace toftwin::daemon {
 
 /// The path of a recording in the folder. Error: the name is not a bare file name, or is taken.
-Result<std::filesystem::path> recordingPath(const std::filesystem::path& folder, std::string_view name);
+Result<std::filesystem::path> recordingPath(const std::filesystem::path& folder,
+                                            std::string_view name);
 
-/// Writes every frame of a source into a file, on a thread of its own. A disk that is slower than the
-/// source ends the recording with Overrun, a full one with StorageFull; what was written before stays.
+/// Writes every frame of a source into a file, on a thread of its own. A disk that is slower than
+/// the source ends the recording with Overrun, a full one with StorageFull; what was written before
+/// stays.
 class Recorder {
  public:
   /// Gets the file's path, or why it could not be opened or finished.
@@ -36,8 +38,8 @@ class Recorder {
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 
-  /// Writes what waits, closes the file and then calls `closed`, on the recorder's thread, or at once
-  /// if the recording has ended already.
+  /// Writes what waits, closes the file and then calls `closed`, on the recorder's thread, or at
+  /// once if the recording has ended already.
   void stop(Done closed);
   [[nodiscard]] bool isFinished() const;
   /// What went wrong, or empty.

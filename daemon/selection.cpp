@@ -20,10 +20,11 @@ Result<Rectangle> rectangleIn(const wire::Region& region, int width, int height)
   if (region.width == 0) return Rectangle{0, 0, w, h};
   if (region.height == 0 || std::uint64_t{region.x} + region.width > w ||
       std::uint64_t{region.y} + region.height > h) {
-    return Error{Error::Code::InvalidArgument,
-                 fmt::format("the region {} x {} at ({}, {}) is empty or does not lie in the image of "
-                             "{} x {} pixels",
-                             region.width, region.height, region.x, region.y, width, height)};
+    return Error{
+        Error::Code::InvalidArgument,
+        fmt::format("the region {} x {} at ({}, {}) is empty or does not lie in the image of "
+                    "{} x {} pixels",
+                    region.width, region.height, region.x, region.y, width, height)};
   }
   return Rectangle{region.x, region.y, region.width, region.height};
 }
@@ -51,7 +52,11 @@ Plane cut(const Plane& plane, const Rectangle& part, std::size_t step) {
       }
     }
   }
-  return {plane.kind, plane.type, static_cast<int>(width), static_cast<int>(height), plane.channels,
+  return {plane.kind,
+          plane.type,
+          static_cast<int>(width),
+          static_cast<int>(height),
+          plane.channels,
           Buffer::adopt(std::move(bytes))};
 }
 
@@ -112,8 +117,9 @@ Result<Frame> select(const Frame& frame, const Selection& selection) {
   for (Plane& plane : selected.planes) {
     // Defensive only against a driver that breaks its contract: the rectangle is the camera's.
     if (plane.width != frame.camera.width || plane.height != frame.camera.height) {
-      return Error{Error::Code::Internal,
-                   fmt::format("the plane \"{}\" has another size than the camera", nameOf(plane.kind))};
+      return Error{
+          Error::Code::Internal,
+          fmt::format("the plane \"{}\" has another size than the camera", nameOf(plane.kind))};
     }
     if (!isWhole(*part, plane, step)) plane = cut(plane, *part, step);
   }

@@ -11,7 +11,8 @@
 
 namespace toftwin::daemon {
 
-/// Which part of a frame a subscription gets. Subscriptions with equal selections share one encoding.
+/// Which part of a frame a subscription gets. Subscriptions with equal selections share one
+/// encoding.
 struct Selection {
   std::vector<PlaneKind> planes;  ///< in the order wanted; empty: all
   wire::Region region;            ///< width 0: the whole image
@@ -23,8 +24,9 @@ struct Selection {
 Result<> checkSelection(const Selection& selection, const CameraInfo& camera,
                         const std::vector<PlaneKind>& planes);
 
-/// The selected part of a frame. Whole planes are shared, not copied; a region or a decimation copies.
-/// Pixel (u, v) of the result is pixel (x + n u, y + n v) of the frame, and the camera follows:
+/// The selected part of a frame. Whole planes are shared, not copied; a region or a decimation
+/// copies. Pixel (u, v) of the result is pixel (x + n u, y + n v) of the frame, and the camera
+/// follows:
 ///   fx' = fx / n,  cx' = (cx - x) / n
 /// A plane that this frame lacks is left out. Error: the region lies outside the frame.
 Result<Frame> select(const Frame& frame, const Selection& selection);

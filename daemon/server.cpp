@@ -62,16 +62,18 @@ void Server::accept(Acceptor& acceptor) {
 void Server::adopt(transport::Socket socket) {
   const std::uint64_t id = ++last_id_;
   const bool is_full = connections_.size() >= options_.sessions;
-  auto connection = std::make_shared<Connection>(std::move(socket), hub_, options_.connection,
-                                                 fmt::format("client {}", id), [this, id] { forget(id); });
+  auto connection =
+      std::make_shared<Connection>(std::move(socket), hub_, options_.connection,
+                                   fmt::format("client {}", id), [this, id] { forget(id); });
   connections_.emplace(id, connection);
   connection->start();
   if (!is_full) return spdlog::debug("client {}: connected", id);
   spdlog::warn("client {}: turned away, limits.sessions = {} is reached", id, options_.sessions);
-  connection->dismiss({Error::Code::Busy,
-                       fmt::format("this daemon has {} clients already, the most that limits.sessions "
-                                   "allows: close one, or raise the limit",
-                                   options_.sessions)});
+  connection->dismiss(
+      {Error::Code::Busy,
+       fmt::format("this daemon has {} clients already, the most that limits.sessions "
+                   "allows: close one, or raise the limit",
+                   options_.sessions)});
 }
 
 void Server::forget(std::uint64_t id) {

@@ -37,7 +37,8 @@ class Server {
   /// The path of the Unix socket, empty if none.
   [[nodiscard]] std::string socketPath() const;
 
-  /// Takes no more clients, tells those that there are why, and closes them; `done` when all are gone.
+  /// Takes no more clients, tells those that there are why, and closes them; `done` when all are
+  /// gone.
   void shutDown(const Error& why, std::function<void()> done);
 
  private:

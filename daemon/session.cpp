@@ -15,16 +15,21 @@ constexpr std::uint32_t kDeepestQueue = 1024;
 wire::Message failure(std::uint64_t id, Error error) { return wire::Failure{id, std::move(error)}; }
 
 /// How a queue serves the policy asked for, or why that policy makes no sense.
-Result<FrameQueue::Settings> queueFor(const wire::Subscribe& request, std::uint64_t lossless_bytes) {
-  const auto invalid = [](std::string why) { return Error{Error::Code::InvalidArgument, std::move(why)}; };
+Result<FrameQueue::Settings> queueFor(const wire::Subscribe& request,
+                                      std::uint64_t lossless_bytes) {
+  const auto invalid = [](std::string why) {
+    return Error{Error::Code::InvalidArgument, std::move(why)};
+  };
   if (!std::isfinite(request.max_rate_hz) || request.max_rate_hz < 0.0 ||
       (request.max_rate_hz > 0.0 && request.max_rate_hz < 1e-3)) {
     return invalid("max_rate_hz must be 0 (every frame) or at least 0.001");
   }
   if (request.policy == wire::Policy::Lockstep && request.max_rate_hz > 0.0) {
-    return invalid("a lockstep subscriber says itself when the next frame is made: max_rate_hz must be 0");
+    return invalid(
+        "a lockstep subscriber says itself when the next frame is made: max_rate_hz must be 0");
   }
-  if (request.policy == wire::Policy::Queue && (request.queue < 1 || request.queue > kDeepestQueue)) {
+  if (request.policy == wire::Policy::Queue &&
+      (request.queue < 1 || request.queue > kDeepestQueue)) {
     return invalid(fmt::format("queue = {} is out of bounds: it must be 1 to {}", request.queue,
                                kDeepestQueue));
   }
@@ -91,7 +96,8 @@ std::optional<Session::Outgoing> Session::next() {
   return std::nullopt;
 }
 
-std::optional<Session::Outgoing> Session::nextOf(std::map<std::uint64_t, Subscription>::iterator at) {
+std::optional<Session::Outgoing> Session::nextOf(
+    std::map<std::uint64_t, Subscription>::iterator at) {
   auto& [source, subscriber, window, on_way] = at->second;
   if (window > 0 && on_way.size() >= window) return std::nullopt;
   auto item = subscriber->queue.take();
@@ -142,10 +148,11 @@ Session::Answers Session::on(const wire::DescribeSource& request) {
 
 Session::Answers Session::on(const wire::Subscribe& request) {
   if (subscriptions_.size() >= options_.subscriptions) {
-    return {failure(request.id, {Error::Code::Busy,
-                                 fmt::format("this connection has {} subscriptions already, the most that "
-                                             "limits.subscriptions_per_session allows",
-                                             subscriptions_.size())})};
+    return {failure(request.id,
+                    {Error::Code::Busy,
+                     fmt::format("this connection has {} subscriptions already, the most that "
+                                 "limits.subscriptions_per_session allows",
+                                 subscriptions_.size())})};
   }
   auto source = hub_.find(request.source);
   if (!source) return {failure(request.id, source.error())};
@@ -166,8 +173,8 @@ Session::Answers Session::on(const wire::Subscribe& request) {
 Session::Answers Session::on(const wire::Unsubscribe& request) {
   const auto found = subscriptions_.find(request.subscription);
   if (found == subscriptions_.end()) {
-    return {failure(request.id, {Error::Code::NotFound,
-                                 fmt::format("there is no subscription {}", request.subscription)})};
+    return {failure(request.id, {Error::Code::NotFound, fmt::format("there is no subscription {}",
+                                                                    request.subscription)})};
   }
   found->second.source->unsubscribe(found->second.subscriber);
   subscriptions_.erase(found);
@@ -185,9 +192,9 @@ Session::Answers Session::on(const wire::Acknowledge& request) {
 }
 
 Session::Answers Session::on(const wire::SetPose& request) {
-  return command(request.id, request.source, [pose = request.world_from_camera](drivers::Source& source) {
-    return source.setPose(pose);
-  });
+  return command(
+      request.id, request.source,
+      [pose = request.world_from_camera](drivers::Source& source) { return source.setPose(pose); });
 }
 
 Session::Answers Session::on(const wire::SetParameter& request) {
@@ -198,10 +205,12 @@ Session::Answers Session::on(const wire::SetParameter& request) {
 }
 
 Session::Answers Session::on(const wire::Trigger& request) {
-  return command(request.id, request.source, [](drivers::Source& source) { return source.trigger(); });
+  return command(request.id, request.source,
+                 [](drivers::Source& source) { return source.trigger(); });
 }
 
-Session::Answers Session::command(std::uint64_t id, const std::string& name, SourceHost::Command command) {
+Session::Answers Session::command(std::uint64_t id, const std::string& name,
+                                  SourceHost::Command command) {
   auto source = hub_.find(name);
   if (!source) return {failure(id, source.error())};
   ++owed_;

@@ -54,7 +54,8 @@ class Session {
 
   /// What is to be sent at once. Other answers, and frames, come from `next`.
   std::vector<wire::Message> handle(const wire::Message& message);
-  /// Takes the next thing to send: late answers first, then frames, one subscription after the other.
+  /// Takes the next thing to send: late answers first, then frames, one subscription after the
+  /// other.
   std::optional<Outgoing> next();
   /// Answers that this session still owes, for a client that asks faster than it reads.
   [[nodiscard]] std::size_t owed() const { return owed_; }
@@ -70,8 +71,9 @@ class Session {
   struct Subscription {
     std::shared_ptr<SourceHost> source;  // shared with the hub
     SubscriberPtr subscriber;
-    std::uint32_t window = 0;           ///< frames that may be unacknowledged; 0: any number
-    std::deque<std::uint64_t> on_way{};  ///< sequences sent but not acknowledged, if there is a window
+    std::uint32_t window = 0;  ///< frames that may be unacknowledged; 0: any number
+    std::deque<std::uint64_t>
+        on_way{};  ///< sequences sent but not acknowledged, if there is a window
   };
 
   Answers on(const wire::Hello& hello);

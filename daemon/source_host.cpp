@@ -13,22 +13,6 @@ namespace {
 
 constexpr std::size_t kMostCommands = 256;
 
-/// Smaller bodies go through the socket faster than through a file descriptor and a mapping.
-constexpr std::uint64_t kSmallestSharedBody = 64 * 1024;
-
-Result<PreparedFramePtr> prepare(const Frame& frame, const Selection& selection, bool share) {
-  Result<Frame> selected = select(frame, selection);
-  if (!selected) return selected.error();
-  auto prepared = std::make_shared<PreparedFrame>();
-  prepared->frame = *std::move(selected);
-  prepared->body = wire::encodeBody(prepared->frame.planes);
-  if (share && prepared->body.bytes >= kSmallestSharedBody) {
-    // Where there is no shared memory to be had, the body goes through the socket.
-    if (auto shared = transport::SharedBody::create(prepared->body)) prepared->shared_body = *shared;
-  }
-  return PreparedFramePtr{std::move(prepared)};
-}
-
 std::int64_t nanosecondsOf(SteadyTime time) {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(time.time_since_epoch()).count();
 }
@@ -132,10 +116,11 @@ Result<SubscriberPtr> SourceHost::subscribe(Wish wish, std::function<void()> wak
     return fits.error();
   }
   if (wish.queue.policy == wire::Policy::Lockstep && !description->can_lockstep) {
-    return Error{Error::Code::Unsupported,
-                 fmt::format("the source \"{}\" makes frames in its own time; lockstep is for simulators "
-                             "and recordings",
-                             name_)};
+    return Error{
+        Error::Code::Unsupported,
+        fmt::format("the source \"{}\" makes frames in its own time; lockstep is for simulators "
+                    "and recordings",
+                    name_)};
   }
   auto subscriber = std::make_shared<Subscriber>(std::move(wish), std::move(wake));
   {
@@ -172,8 +157,9 @@ void SourceHost::post(Command command, Done done) {
     if (is_stopping_) {
       refused = Error{Error::Code::Stopped, "the source is being stopped"};
     } else if (commands_.size() >= kMostCommands) {
-      refused = Error{Error::Code::Busy,
-                      fmt::format("{} commands wait for the source \"{}\" already", kMostCommands, name_)};
+      refused = Error{
+          Error::Code::Busy,
+          fmt::format("{} commands wait for the source \"{}\" already", kMostCommands, name_)};
     } else {
       commands_.push_back({std::move(command), std::move(done)});
     }
@@ -198,13 +184,13 @@ void SourceHost::changed() {
 
 void SourceHost::run(const std::stop_token& stop) {
   const std::stop_callback on_stop{stop, [this] {
-    std::stop_source interrupt{std::nostopstate};
-    {
-      const std::scoped_lock lock{mutex_};
-      interrupt = interrupt_;
-    }
-    interrupt.request_stop();
-  }};
+                                     std::stop_source interrupt{std::nostopstate};
+                                     {
+                                       const std::scoped_lock lock{mutex_};
+                                       interrupt = interrupt_;
+                                     }
+                                     interrupt.request_stop();
+                                   }};
   while (!stop.stop_requested()) {
     if (source_ || reopen(stop)) adjustStreaming();
     runCommands();
@@ -221,8 +207,8 @@ void SourceHost::run(const std::stop_token& stop) {
   endAll({Error::Code::Stopped, fmt::format("the daemon closed the source \"{}\"", name_)});
 }
 
-/// Starts or stops the stream as subscribers come and go. Before commands, so that a trigger that follows
-/// a subscription finds the camera started.
+/// Starts or stops the stream as subscribers come and go. Before commands, so that a trigger that
+/// follows a subscription finds the camera started.
 void SourceHost::adjustStreaming() {
   bool is_wanted = false;
   {
@@ -254,8 +240,8 @@ bool SourceHost::hasLockstep() const {
 
 bool SourceHost::mayMakeFrame() const {
   return isWanted() && std::ranges::none_of(subscribers_, [](const SubscriberPtr& subscriber) {
-    return subscriber->unacknowledged.has_value();
-  });
+           return subscriber->unacknowledged.has_value();
+         });
 }
 
 void SourceHost::runCommands() {
@@ -356,32 +342,7 @@ void SourceHost::publish(Frame frame) {
       takers.push_back(subscriber);
     }
   }
-  deliver(frame, takers);
-}
-
-/// Prepares the frame once per distinct selection and hands it to everyone who wants that.
-void SourceHost::deliver(const Frame& frame, const std::vector<SubscriberPtr>& takers) {
-  std::vector<bool> is_served(takers.size(), false);
-  for (std::size_t first = 0; first < takers.size(); ++first) {
-    if (is_served[first]) continue;
-    const Selection& wanted = takers[first]->wish.selection;
-    std::vector<SubscriberPtr> equals;
-    for (std::size_t i = first; i < takers.size(); ++i) {
-      if (is_served[i] || takers[i]->wish.selection != wanted) continue;
-      is_served[i] = true;
-      equals.push_back(takers[i]);
-    }
-    const bool share = std::ranges::any_of(
-        equals, [](const SubscriberPtr& taker) { return taker->wish.in_shared_memory; });
-    const Result<PreparedFramePtr> prepared = prepare(frame, wanted, share);
-    for (const SubscriberPtr& taker : equals) {
-      if (prepared) {
-        taker->queue.push(*prepared);
-      } else {
-        taker->queue.end(prepared.error());
-      }
-    }
-  }
+  fanOut(frame, takers);
 }
 
 void SourceHost::onError(const Error& error) {

@@ -16,34 +16,15 @@
 #include <vector>
 
 #include "daemon/clock.h"
-#include "daemon/frame_queue.h"
-#include "daemon/selection.h"
+#include "daemon/subscriber.h"
 #include "drivers/source.h"
 #include "protocol/wire/messages.h"
 
 namespace toftwin::daemon {
 
-/// What one subscriber wants of a source.
-struct Wish {
-  Selection selection;
-  FrameQueue::Settings queue;
-  bool in_shared_memory = false;  ///< takes bodies that way, where that is worth while
-};
-
-/// One subscriber of a source.
-struct Subscriber {
-  Subscriber(Wish wanted, std::function<void()> wake)
-      : wish(std::move(wanted)), queue(wish.queue, std::move(wake)) {}
-  const Wish wish;
-  FrameQueue queue;
-  std::optional<std::uint64_t> unacknowledged;  ///< lockstep; guarded by the host
-};
-/// Shared by the source's host, which fills the queue, and the session or recorder that empties it.
-using SubscriberPtr = std::shared_ptr<Subscriber>;
-
-/// A source and the thread that owns it: opens it again when it is lost, makes frames while somebody
-/// wants them, numbers them and hands them to the subscribers. All members may be called from any
-/// thread; none waits for the source.
+/// A source and the thread that owns it: opens it again when it is lost, makes frames while
+/// somebody wants them, numbers them and hands them to the subscribers. All members may be called
+/// from any thread; none waits for the source.
 class SourceHost {
  public:
   struct Options {
@@ -55,8 +36,8 @@ class SourceHost {
   using Command = std::function<Result<>(drivers::Source&)>;
   using Done = std::function<void(Result<>)>;
 
-  /// `open` is called on the host's thread whenever the source must be opened (again); `opened` is the
-  /// result of a first call that was already made.
+  /// `open` is called on the host's thread whenever the source must be opened (again); `opened` is
+  /// the result of a first call that was already made.
   SourceHost(std::string name, Open open, Result<std::unique_ptr<drivers::Source>> opened,
              Options options, const Clock& clock);
   /// Ends all subscriptions with Stopped and waits for the source to stop.
@@ -97,15 +78,14 @@ class SourceHost {
   void stopSource();
   void makeFrame(const std::stop_token& stop);
   void publish(Frame frame);
-  static void deliver(const Frame& frame, const std::vector<SubscriberPtr>& takers);
   void onError(const Error& error);
   void retryLater();
   void endAll(const Error& reason);
   void noteError(const Error& error);
   void changed();
-  [[nodiscard]] bool isWanted() const;        // with the lock held
-  [[nodiscard]] bool mayMakeFrame() const;    // with the lock held
-  [[nodiscard]] bool hasLockstep() const;     // with the lock held
+  [[nodiscard]] bool isWanted() const;      // with the lock held
+  [[nodiscard]] bool mayMakeFrame() const;  // with the lock held
+  [[nodiscard]] bool hasLockstep() const;   // with the lock held
   template <class Call>
   auto inDriver(Call call) -> decltype(call());
 
@@ -135,7 +115,7 @@ class SourceHost {
   std::string last_error_;
 
   std::atomic<std::int64_t> in_driver_since_{0};  ///< steady clock, ns; 0: not in the driver
-  std::jthread thread_;  // last: it uses all of the above
+  std::jthread thread_;                           // last: it uses all of the above
 };
 
 }  // namespace toftwin::daemon

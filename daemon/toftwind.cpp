@@ -15,7 +15,8 @@ namespace {
 
 using namespace toftwin;
 
-/// For scripts and for systemd's RestartPreventExitStatus: trying again does not help with the second.
+/// For scripts and for systemd's RestartPreventExitStatus: trying again does not help with the
+/// second.
 enum ExitCode { kOk = 0, kFailed = 1, kWrongConfig = 2 };
 
 struct Arguments {
@@ -28,8 +29,9 @@ struct Arguments {
 
 int fail(const Error& error) {
   fmt::print(stderr, "toftwind: {}\n", error.message);
-  return error.code == Error::Code::InvalidArgument || error.code == Error::Code::NotFound ? kWrongConfig
-                                                                                         : kFailed;
+  return error.code == Error::Code::InvalidArgument || error.code == Error::Code::NotFound
+             ? kWrongConfig
+             : kFailed;
 }
 
 int check(const Arguments& arguments) {
@@ -58,7 +60,8 @@ int serve(const Arguments& arguments) {
 /// To standard error; without the time where the journal adds it.
 void setUpLog() {
   auto log = spdlog::stderr_logger_mt("toftwind");
-  const bool is_journal = std::getenv("JOURNAL_STREAM") != nullptr;  // NOLINT(concurrency-mt-unsafe)
+  const bool is_journal =
+      std::getenv("JOURNAL_STREAM") != nullptr;  // NOLINT(concurrency-mt-unsafe)
   log->set_pattern(is_journal ? "%l: %v" : "%Y-%m-%d %H:%M:%S.%e %l: %v");
   log->flush_on(spdlog::level::info);
   spdlog::set_default_logger(std::move(log));
@@ -73,8 +76,10 @@ int run(int argc, char** argv) {
   app.add_option("--port", arguments.port, "TCP port, instead of listen.port; 0: any free one")
       ->check(CLI::Range(0, 65535));
   app.add_option("--socket", arguments.socket, "Unix socket, instead of listen.socket; \"\": none");
-  app.add_flag("--check", arguments.only_check, "read the configuration, open its sources, say what is wrong");
-  app.add_flag("--document", arguments.only_document, "print all keys of the configuration as Markdown");
+  app.add_flag("--check", arguments.only_check,
+               "read the configuration, open its sources, say what is wrong");
+  app.add_flag("--document", arguments.only_document,
+               "print all keys of the configuration as Markdown");
   app.footer("SIGTERM stops it, SIGHUP makes it read its configuration again.");
   CLI11_PARSE(app, argc, argv);
 

@@ -44,7 +44,8 @@ struct Bench {
     while (true) {
       Result<Frame> next = source->next({}, lockstep);
       if (next || next.error().code != Error::Code::Timeout) return next;
-      if (Clock::now() > deadline) return broken("no frame within {} ms", options.frame_timeout.count());
+      if (Clock::now() > deadline)
+        return broken("no frame within {} ms", options.frame_timeout.count());
     }
   }
 
@@ -93,7 +94,8 @@ Result<> infoIsConstant(Bench& bench) {
     }
     if (frame.camera != before.camera) return broken("its CameraInfo is not that of info()");
     if (frame.provenance.kind != before.kind) {
-      return broken("it is {}, but info() says {}", nameOf(frame.provenance.kind), nameOf(before.kind));
+      return broken("it is {}, but info() says {}", nameOf(frame.provenance.kind),
+                    nameOf(before.kind));
     }
     return {};
   });
@@ -108,7 +110,8 @@ Result<> planesAreAsAnnounced(Bench& bench) {
     for (std::size_t i = 0; i < announced.size(); ++i) {
       const Plane& plane = frame.planes[i];
       if (plane.kind != announced[i]) {
-        return broken("plane {} is {}, announced was {}", i, nameOf(plane.kind), nameOf(announced[i]));
+        return broken("plane {} is {}, announced was {}", i, nameOf(plane.kind),
+                      nameOf(announced[i]));
       }
       if (plane.width != frame.camera.width || plane.height != frame.camera.height ||
           plane.channels < 1 || plane.data.size() != plane.byteSize()) {
@@ -135,8 +138,8 @@ Result<> invalidPixelsAreNaN(Bench& bench) {
                         values[i]);
         }
         if (flags == nullptr) continue;
-        const bool invalid = (flags->as<std::uint8_t>()[i] &
-                              static_cast<std::uint8_t>(PixelFlag::Invalid)) != 0;
+        const bool invalid =
+            (flags->as<std::uint8_t>()[i] & static_cast<std::uint8_t>(PixelFlag::Invalid)) != 0;
         if (invalid == has_value) {
           return broken("{} of pixel {} is {}, but its flags say {}", nameOf(kind), i, values[i],
                         invalid ? "invalid" : "valid");
@@ -237,24 +240,26 @@ struct Check {
   Result<> (*run)(Bench&);
 };
 constexpr std::array kChecks{
-    Check{"an absent camera is named", "\"open failed\" leaves the user guessing which cable to look at",
-          absentCameraIsNamed},
-    Check{"it describes itself", "a client cannot choose among cameras that do not say what they are",
-          describesItself},
+    Check{"an absent camera is named",
+          "\"open failed\" leaves the user guessing which cable to look at", absentCameraIsNamed},
+    Check{"it describes itself",
+          "a client cannot choose among cameras that do not say what they are", describesItself},
     Check{"what it says of itself is constant", "clients read the calibration once and trust it",
           infoIsConstant},
-    Check{"planes are as announced", "clients size their buffers by the announcement", planesAreAsAnnounced},
+    Check{"planes are as announced", "clients size their buffers by the announcement",
+          planesAreAsAnnounced},
     Check{"invalid pixels are NaN", "a zero for \"no value\" looks like a wall at the lens",
           invalidPixelsAreNaN},
-    Check{"device time strictly increases", "two frames with one time cannot be told apart or paired",
-          deviceTimeStrictlyIncreases},
-    Check{"it starts and stops three times", "handles that stop() forgets fail the second or third start",
-          startsThreeTimes},
-    Check{"it stops when asked", "a daemon that cannot end a wait cannot end at all", stopsWhenAsked},
-    Check{"it refuses what it cannot do", "a command that does nothing and says \"done\" hides mistakes",
-          refusesWhatItCannot},
-    Check{"a pose is that of the next frame", "a robot that moved must not get the view from before",
-          poseIsThatOfTheNextFrame},
+    Check{"device time strictly increases",
+          "two frames with one time cannot be told apart or paired", deviceTimeStrictlyIncreases},
+    Check{"it starts and stops three times",
+          "handles that stop() forgets fail the second or third start", startsThreeTimes},
+    Check{"it stops when asked", "a daemon that cannot end a wait cannot end at all",
+          stopsWhenAsked},
+    Check{"it refuses what it cannot do",
+          "a command that does nothing and says \"done\" hides mistakes", refusesWhatItCannot},
+    Check{"a pose is that of the next frame",
+          "a robot that moved must not get the view from before", poseIsThatOfTheNextFrame},
     Check{"lockstep does not wait", "a paced source that also waits makes every simulation slow",
           lockstepDoesNotWait},
 };
@@ -270,8 +275,9 @@ Finding runOne(const Check& check, const Candidate& candidate, const ComplianceO
   if (outcome) outcome = check.run(bench);
   bench.source->stop();
   if (outcome) return finding;
-  finding.outcome = outcome.error().code == Error::Code::Unsupported ? Finding::Outcome::DoesNotApply
-                                                                     : Finding::Outcome::Failed;
+  finding.outcome = outcome.error().code == Error::Code::Unsupported
+                        ? Finding::Outcome::DoesNotApply
+                        : Finding::Outcome::Failed;
   finding.detail = outcome.error().message;
   return finding;
 }

@@ -8,8 +8,8 @@
 
 #include "drivers/source.h"
 
-/// What every camera must do, whatever its driver. One suite for all: the tests run it on every camera
-/// that a driver of this build lists, and a new driver is done when it passes.
+/// What every camera must do, whatever its driver. One suite for all: the tests run it on every
+/// camera that a driver of this build lists, and a new driver is done when it passes.
 namespace toftwin::drivers {
 
 /// A camera to be checked: the keys of its [[source]] table as TOML, and those of one that is not
@@ -24,9 +24,9 @@ struct Candidate {
 Candidate listedCamera(const Driver& driver, const std::string& uri);
 
 struct ComplianceOptions {
-  int frames = 5;                                 ///< looked at per check
-  std::chrono::milliseconds frame_timeout{10000}; ///< a frame must come within this
-  std::chrono::milliseconds stop_timeout{1000};   ///< a wait must end within this when asked
+  int frames = 5;                                  ///< looked at per check
+  std::chrono::milliseconds frame_timeout{10000};  ///< a frame must come within this
+  std::chrono::milliseconds stop_timeout{1000};    ///< a wait must end within this when asked
 };
 
 struct Finding {
@@ -38,6 +38,7 @@ struct Finding {
 };
 
 /// Runs all checks, each on a camera opened for it.
-std::vector<Finding> checkCompliance(const Candidate& camera, const ComplianceOptions& options = {});
+std::vector<Finding> checkCompliance(const Candidate& camera,
+                                     const ComplianceOptions& options = {});
 
 }  // namespace toftwin::drivers

@@ -17,9 +17,9 @@ inline constexpr std::chrono::seconds kLongestWait{1};
 /// Sleeps until that time. False if asked to stop before.
 bool sleepUntil(SteadyTime time, const std::stop_token& stop);
 
-/// How a device clock that runs with the host's steady clock relates to the host's wall clock, where
-/// `device` is the device's time at the steady time `at`. Reads the wall clock between two readings
-/// of the steady clock; half of their distance bounds the error of the relation.
+/// How a device clock that runs with the host's steady clock relates to the host's wall clock,
+/// where `device` is the device's time at the steady time `at`. Reads the wall clock between two
+/// readings of the steady clock; half of their distance bounds the error of the relation.
 ClockRelation relateToHost(DeviceTime device, SteadyTime at);
 
 }  // namespace toftwin::drivers

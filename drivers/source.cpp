@@ -21,6 +21,8 @@ Result<> Source::setParameter(std::string_view name, double) {
   return unsupported(info(), fmt::format("set a parameter \"{}\": it has none", name));
 }
 
-Result<> Source::trigger() { return unsupported(info(), "be triggered: it takes frames by itself"); }
+Result<> Source::trigger() {
+  return unsupported(info(), "be triggered: it takes frames by itself");
+}
 
 }  // namespace toftwin::drivers

@@ -29,7 +29,7 @@ struct SourceInfo {
   std::optional<Duration> frame_interval;  ///< nominal; none if it comes as it comes
   bool can_set_pose = false;
   bool can_trigger = false;
-  bool can_lockstep = false;            ///< makes a frame only when asked: simulators and recordings
+  bool can_lockstep = false;  ///< makes a frame only when asked: simulators and recordings
   std::vector<std::string> parameters;  ///< names that setParameter takes
 };
 
@@ -44,13 +44,13 @@ class Source {
   virtual Result<> start() = 0;
   virtual void stop() = 0;
 
-  /// Waits for the next frame. The source fills everything but `source`, `sequence`, `dropped_before`
-  /// and `moment.received`, which are the daemon's (except that a replayed frame keeps the recorded
-  /// `received`). Errors: Stopped (soon after the token asks), EndOfStream, Disconnected (the daemon
-  /// reopens it), Timeout (asked again; to be given after a second without a frame, at the latest).
-  /// In free run a source paces itself; `lockstep` says that the caller does, so don't wait.
-  /// The daemon also uses the token to interrupt a wait when it has a command for the source, and then
-  /// calls again: a wait that is cut short loses no frame.
+  /// Waits for the next frame. The source fills everything but `source`, `sequence`,
+  /// `dropped_before` and `moment.received`, which are the daemon's (except that a replayed frame
+  /// keeps the recorded `received`). Errors: Stopped (soon after the token asks), EndOfStream,
+  /// Disconnected (the daemon reopens it), Timeout (asked again; to be given after a second without
+  /// a frame, at the latest). In free run a source paces itself; `lockstep` says that the caller
+  /// does, so don't wait. The daemon also uses the token to interrupt a wait when it has a command
+  /// for the source, and then calls again: a wait that is cut short loses no frame.
   virtual Result<Frame> next(std::stop_token stop, bool lockstep) = 0;
 
   virtual Result<> setPose(const Transform<World, Camera>& world_from_camera);

@@ -53,7 +53,8 @@ std::vector<PlaneKind> chosenPlanes(const Keys& keys, settings::Table& table) {
     const auto kind = planeKindNamed(name);
     if (!kind || std::ranges::find(kAllPlanes, *kind) == kAllPlanes.end()) {
       table.complain("planes", fmt::format("names \"{}\", but the pattern has only range, depth, "
-                                           "amplitude, ambient and flags", name));
+                                           "amplitude, ambient and flags",
+                                           name));
     } else if (std::ranges::find(chosen, *kind) == chosen.end()) {
       chosen.push_back(*kind);
     }
@@ -88,7 +89,9 @@ SourceInfo describe(const Keys& keys, std::vector<PlaneKind> planes) {
 class PatternSource final : public Source {
  public:
   PatternSource(const Keys& keys, std::vector<PlaneKind> planes)
-      : keys_(keys), info_(describe(keys, std::move(planes))), depth_per_range_(makeDepthPerRange()) {}
+      : keys_(keys),
+        info_(describe(keys, std::move(planes))),
+        depth_per_range_(makeDepthPerRange()) {}
 
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
 
@@ -108,7 +111,8 @@ class PatternSource final : public Source {
                    fmt::format("the pattern ended after {} frames, as configured", made_)};
     }
     Frame frame;
-    if (auto turn = waitForTurn(stop, lockstep, frame.dropped_by_device); !turn) return turn.error();
+    if (auto turn = waitForTurn(stop, lockstep, frame.dropped_by_device); !turn)
+      return turn.error();
     frame.moment = momentOfFrame();
     frame.provenance.kind = info_.kind;
     frame.camera = info_.camera;
@@ -130,9 +134,10 @@ class PatternSource final : public Source {
                    fmt::format("the pattern has no parameter \"{}\"; it has: speed_px", name)};
     }
     if (!(value >= 0 && value <= kMostSpeed_px) || value != std::floor(value)) {
-      return Error{Error::Code::InvalidArgument,
-                   fmt::format("speed_px = {} is out of bounds: it must be a whole number from 0 to {}",
-                               value, kMostSpeed_px)};
+      return Error{
+          Error::Code::InvalidArgument,
+          fmt::format("speed_px = {} is out of bounds: it must be a whole number from 0 to {}",
+                      value, kMostSpeed_px)};
     }
     speed_px_ = static_cast<std::uint64_t>(value);
     return {};
@@ -145,8 +150,8 @@ class PatternSource final : public Source {
   }
 
  private:
-  // Waits as long as the pace says. In real time a frame that is late by whole intervals is one that a
-  // camera would have lost: it is skipped and counted.
+  // Waits as long as the pace says. In real time a frame that is late by whole intervals is one
+  // that a camera would have lost: it is skipped and counted.
   Result<> waitForTurn(const std::stop_token& stop, bool lockstep, std::uint64_t& lost) {
     const Error stopped{Error::Code::Stopped, "asked to stop"};
     if (stop.stop_requested()) return stopped;
@@ -171,7 +176,8 @@ class PatternSource final : public Source {
       return {};
     }
     if (due - now > kLongestWait) {
-      return sleepUntil(now + kLongestWait, stop) ? Error{Error::Code::Timeout, "not yet"} : stopped;
+      return sleepUntil(now + kLongestWait, stop) ? Error{Error::Code::Timeout, "not yet"}
+                                                  : stopped;
     }
     return sleepUntil(due, stop) ? Result<>{} : stopped;
   }

@@ -32,10 +32,11 @@ struct Keys {
     v.number("height", height, {8, 4096}, "rows");
     v.quantity("frame_rate", frame_rate, hertz, {0.01, 10'000},
                "frames per second of device time, whatever the pace");
-    v.choice("pace", pace,
-             {{"real_time", Pace::RealTime}, {"fast", Pace::Fast}, {"trigger", Pace::Trigger}},
-             "when a frame comes: at the frame rate, as soon as possible, or one per trigger; under "
-             "lockstep the clients say when");
+    v.choice(
+        "pace", pace,
+        {{"real_time", Pace::RealTime}, {"fast", Pace::Fast}, {"trigger", Pace::Trigger}},
+        "when a frame comes: at the frame rate, as soon as possible, or one per trigger; under "
+        "lockstep the clients say when");
     v.texts("planes", planes, "which of range, depth, amplitude, ambient, flags; empty: all");
     v.number("frames", frames, {0, 1e15}, "end of the stream after so many frames; 0: never");
   }
@@ -52,8 +53,8 @@ struct Pixel {
 /// The definition of the pattern, one pixel at a time; all numbers are exact in binary.
 ///   range = 1 m + ((x + y + shift) mod 256) / 64 m
 ///   amplitude = 256 + ((x + 3 y) mod 128),   ambient = 64 + (y mod 32)
-///   invalid: a square with a side of an eighth of the shorter side of the image, whose top left pixel
-///   is (4 shift mod width, 2 shift mod height) and which the image's edges cut off
+///   invalid: a square with a side of an eighth of the shorter side of the image, whose top left
+///   pixel is (4 shift mod width, 2 shift mod height) and which the image's edges cut off
 Pixel pixelAt(int width, int height, std::uint64_t shift, int x, int y);
 
 Driver row();

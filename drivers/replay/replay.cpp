@@ -28,7 +28,8 @@ SourceInfo describe(const std::string& file, const Frame& first, const Frame* se
   info.camera = first.camera;
   for (const Plane& plane : first.planes) info.planes.push_back(plane.kind);
   if (second != nullptr) {
-    info.frame_interval = static_cast<double>(deviceTime_ns(*second) - deviceTime_ns(first)) * nanosecond;
+    info.frame_interval =
+        static_cast<double>(deviceTime_ns(*second) - deviceTime_ns(first)) * nanosecond;
   }
   info.can_lockstep = true;
   return info;
@@ -37,12 +38,15 @@ SourceInfo describe(const std::string& file, const Frame& first, const Frame* se
 class ReplaySource final : public Source {
  public:
   ReplaySource(const Keys& keys, std::string source, record::Reader reader, SourceInfo info)
-      : keys_(keys), source_(std::move(source)), reader_(std::move(reader)), info_(std::move(info)) {}
+      : keys_(keys),
+        source_(std::move(source)),
+        reader_(std::move(reader)),
+        info_(std::move(info)) {}
 
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
 
-  /// Begins with the first frame. What was played before stays before: the recording's whole time is
-  /// moved on, so that device time never goes back. The first time nothing is moved.
+  /// Begins with the first frame. What was played before stays before: the recording's whole time
+  /// is moved on, so that device time never goes back. The first time nothing is moved.
   Result<> start() override {
     rewind();
     paced_.reset();
@@ -80,9 +84,10 @@ class ReplaySource final : public Source {
     }
     if (!frame) return endOf(frame.error());
     if (frame->camera != info_.camera) {
-      return Error{Error::Code::EndOfStream,
-                   fmt::format("{}: after {} frames the camera is another one; what follows is left out",
-                               info_.serial, played_)};
+      return Error{
+          Error::Code::EndOfStream,
+          fmt::format("{}: after {} frames the camera is another one; what follows is left out",
+                      info_.serial, played_)};
     }
     frame->provenance.kind = FrameKind::Replayed;
     if (!first_device_ns_) first_device_ns_ = deviceTime_ns(*frame);
@@ -95,8 +100,9 @@ class ReplaySource final : public Source {
   Error endOf(const Error& error) const {
     if (error.code != Error::Code::EndOfStream) return error;
     const std::string& damage = reader_.summary().damage;
-    return {Error::Code::EndOfStream, fmt::format("{} ended after {} frames{}", info_.serial, played_,
-                                                  damage.empty() ? "" : "; it is damaged: " + damage)};
+    return {Error::Code::EndOfStream,
+            fmt::format("{} ended after {} frames{}", info_.serial, played_,
+                        damage.empty() ? "" : "; it is damaged: " + damage)};
   }
 
   void rewind() {
@@ -114,11 +120,13 @@ class ReplaySource final : public Source {
     const SteadyTime now = std::chrono::steady_clock::now();
     const std::int64_t received_ns = waiting_->moment.received.ns;
     if (!paced_) paced_ = Paced{now, received_ns};
-    const SteadyTime due = paced_->since + std::chrono::nanoseconds{received_ns - paced_->received_ns};
+    const SteadyTime due =
+        paced_->since + std::chrono::nanoseconds{received_ns - paced_->received_ns};
     if (!sleepUntil(std::min(due, now + kLongestWait), stop)) {
       return Error{Error::Code::Stopped, "asked to stop"};
     }
-    if (due > now + kLongestWait) return Error{Error::Code::Timeout, "the next frame is not due yet"};
+    if (due > now + kLongestWait)
+      return Error{Error::Code::Timeout, "the next frame is not due yet"};
     return {};
   }
 
@@ -137,18 +145,22 @@ class ReplaySource final : public Source {
 /// The name of the recorded source that is meant, or empty after complaining.
 std::string chooseSource(const Keys& keys, const record::Summary& summary, settings::Table& table) {
   std::string names;
-  for (const auto& [name, frames] : summary.frames_per_source) names += (names.empty() ? "" : ", ") + name;
+  for (const auto& [name, frames] : summary.frames_per_source)
+    names += (names.empty() ? "" : ", ") + name;
   if (names.empty()) {
     table.complain("file", fmt::format("\"{}\" has no frames{}", keys.file,
                                        summary.damage.empty() ? "" : ": " + summary.damage));
   } else if (keys.recorded_source.empty() && summary.frames_per_source.size() > 1) {
-    table.complain("file", fmt::format("\"{}\" has several sources: set recorded_source to one of {}",
-                                       keys.file, names));
-  } else if (!keys.recorded_source.empty() && !summary.frames_per_source.contains(keys.recorded_source)) {
+    table.complain("file",
+                   fmt::format("\"{}\" has several sources: set recorded_source to one of {}",
+                               keys.file, names));
+  } else if (!keys.recorded_source.empty() &&
+             !summary.frames_per_source.contains(keys.recorded_source)) {
     table.complain("recorded_source", fmt::format("\"{}\" is not in that recording; it has: {}",
                                                   keys.recorded_source, names));
   } else {
-    return keys.recorded_source.empty() ? summary.frames_per_source.begin()->first : keys.recorded_source;
+    return keys.recorded_source.empty() ? summary.frames_per_source.begin()->first
+                                        : keys.recorded_source;
   }
   return {};
 }

@@ -23,7 +23,8 @@ struct Keys {
     v.text("recorded_source", recorded_source,
            "which source of the recording, by the name it had; empty: the only one");
     v.choice("pace", pace, {{"exact", Pace::Exact}, {"fast", Pace::Fast}},
-             "when a frame comes: at the distance in time at which it was received when it was recorded, "
+             "when a frame comes: at the distance in time at which it was received when it was "
+             "recorded, "
              "or as soon as possible; under lockstep the clients say when");
     v.flag("loop", loop, "begins again after the last frame instead of ending the stream");
   }

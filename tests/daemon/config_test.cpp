@@ -27,8 +27,9 @@ TEST(Config, OfAnEmptyFileIsTheDefault) {
 }
 
 TEST(Config, OpensItsSources) {
-  const auto config = parse("[[source]]\nname = 'a'\ndriver = 'pattern'\nwidth = 64\n"
-                            "[[source]]\nname = 'b'\ndriver = 'pattern'\nstart = 'always'");
+  const auto config = parse(
+      "[[source]]\nname = 'a'\ndriver = 'pattern'\nwidth = 64\n"
+      "[[source]]\nname = 'b'\ndriver = 'pattern'\nstart = 'always'");
   ASSERT_TRUE(config.ok()) << config.error().message;
   ASSERT_EQ(config->sources.size(), 2u);
   ASSERT_TRUE(config->sources[0].opened.ok());
@@ -38,7 +39,9 @@ TEST(Config, OpensItsSources) {
 
 TEST(Config, ErrorsNameFileLineKeyBoundAndUnit) {
   const std::string error = errorOf("[limits]\nhandshake_s = 0\nsesions = 3");
-  EXPECT_SAYS(error, "/etc/toftwin/toftwind.toml:2: handshake_s = 0 s is out of bounds: it must be 0.1 to 3600 s");
+  EXPECT_SAYS(
+      error,
+      "/etc/toftwin/toftwind.toml:2: handshake_s = 0 s is out of bounds: it must be 0.1 to 3600 s");
   EXPECT_SAYS(error, "/etc/toftwin/toftwind.toml:3: unknown key \"sesions\"");
 }
 
@@ -57,8 +60,10 @@ TEST(Config, AnUnknownDriverIsNamedWithThoseThatThereAre) {
 TEST(Config, SourcesNeedNamesOfTheirOwn) {
   EXPECT_SAYS(errorOf("[[source]]\ndriver = 'pattern'"), "toftwind.toml:1");
   EXPECT_SAYS(errorOf("[[source]]\nname = 'a/b'\ndriver = 'pattern'"), "toftwind.toml:2");
-  EXPECT_SAYS(errorOf("[[source]]\nname = 'a'\ndriver = 'pattern'\n[[source]]\nname = 'a'\ndriver = 'pattern'"),
-              "toftwind.toml:5: name \"a\" is the name of another source already");
+  EXPECT_SAYS(
+      errorOf(
+          "[[source]]\nname = 'a'\ndriver = 'pattern'\n[[source]]\nname = 'a'\ndriver = 'pattern'"),
+      "toftwind.toml:5: name \"a\" is the name of another source already");
 }
 
 TEST(Config, AnAddressOthersReachNeedsTheWordForIt) {
@@ -78,7 +83,8 @@ TEST(Config, ACameraThatIsNotThereIsNoErrorOfTheFile) {
 TEST(Config, ARunningSourceIsRecognisedWhateverTheLayoutAndNotOpened) {
   const auto before = parse("[[source]]\nname = 'a'\ndriver = 'pattern'\nwidth = 64");
   const std::vector<std::string> running{before->sources[0].fingerprint};
-  const auto same = parse("# comment\n[[source]]\nwidth = 64\n\ndriver = 'pattern'\nname = 'a'", running);
+  const auto same =
+      parse("# comment\n[[source]]\nwidth = 64\n\ndriver = 'pattern'\nname = 'a'", running);
   ASSERT_TRUE(same.ok()) << same.error().message;
   EXPECT_TRUE(same->sources[0].is_as_before);
   const auto other = parse("[[source]]\nname = 'a'\ndriver = 'pattern'\nwidth = 65", running);
@@ -87,7 +93,8 @@ TEST(Config, ARunningSourceIsRecognisedWhateverTheLayoutAndNotOpened) {
 
 TEST(Config, DocumentsEveryKey) {
   const std::string text = documentConfig(drivers::allDrivers());
-  for (const char* key : {"listen.port", "limits.lossless_mb", "recording_folder", "start", "frame_rate_hz"}) {
+  for (const char* key :
+       {"listen.port", "limits.lossless_mb", "recording_folder", "start", "frame_rate_hz"}) {
     EXPECT_SAYS(text, key);
   }
 }

@@ -22,7 +22,8 @@ std::string page(const std::string& name) {
 
 void expectIn(const std::string& name, const std::string& text) {
   EXPECT_NE(page(name).find(text), std::string::npos)
-      << "docs/" << name << " must contain (see toftwind --document):\n" << text;
+      << "docs/" << name << " must contain (see toftwind --document):\n"
+      << text;
 }
 
 TEST(Docs, OfTheDaemonHaveAllItsKeys) {
@@ -33,7 +34,8 @@ TEST(Docs, OfTheDaemonHaveAllItsKeys) {
 TEST(Docs, OfEveryDriverHaveAllItsKeysAndARowInTheTable) {
   for (const drivers::Driver& driver : drivers::allDrivers()) {
     expectIn(fmt::format("drivers/{}.md", driver.name), driver.document());
-    expectIn("drivers/README.md", fmt::format("| [{0}]({0}.md) | {1} |\n", driver.name, driver.summary));
+    expectIn("drivers/README.md",
+             fmt::format("| [{0}]({0}.md) | {1} |\n", driver.name, driver.summary));
   }
 }
 

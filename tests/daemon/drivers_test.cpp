@@ -36,11 +36,13 @@ TEST_P(EveryCamera, IsCompliant) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Listed, EveryCamera, testing::ValuesIn(everyCamera()), [](const auto& test) {
-  std::string name = test.param.uri;
-  for (char& c : name) c = std::isalnum(static_cast<unsigned char>(c)) != 0 ? c : '_';
-  return name;
-});
+INSTANTIATE_TEST_SUITE_P(Listed, EveryCamera, testing::ValuesIn(everyCamera()),
+                         [](const auto& test) {
+                           std::string name = test.param.uri;
+                           for (char& c : name)
+                             c = std::isalnum(static_cast<unsigned char>(c)) != 0 ? c : '_';
+                           return name;
+                         });
 
 TEST(DriverTable, NamesAreUniqueAndEveryRowIsDocumented) {
   std::vector<std::string_view> names;

@@ -20,7 +20,9 @@ namespace toftwin::daemon::test {
 /// A clock that stands still until the test moves it.
 class FakeClock final : public Clock {
  public:
-  [[nodiscard]] HostTime wall() const override { return {1'700'000'000'000'000'000 + offset().count()}; }
+  [[nodiscard]] HostTime wall() const override {
+    return {1'700'000'000'000'000'000 + offset().count()};
+  }
   [[nodiscard]] SteadyTime steady() const override {
     return SteadyTime{} + std::chrono::hours{1} + offset();
   }
@@ -73,7 +75,13 @@ class Remote {
   Remote() {
     info.driver = "fake";
     info.model = "fake camera";
-    info.camera = {.width = 4, .height = 2, .fx = 4, .fy = 4, .cx = 1.5, .cy = 0.5, .distortion = {},
+    info.camera = {.width = 4,
+                   .height = 2,
+                   .fx = 4,
+                   .fy = 4,
+                   .cx = 1.5,
+                   .cy = 0.5,
+                   .distortion = {},
                    .calibration_id = {}};
     info.planes = {PlaneKind::Range, PlaneKind::Flags};
     info.can_set_pose = info.can_lockstep = info.can_trigger = true;
@@ -112,7 +120,9 @@ class Remote {
 
 class FakeSource final : public drivers::Source {
  public:
-  explicit FakeSource(std::shared_ptr<Remote> remote) : remote_(std::move(remote)) { remote_->opened.add(); }
+  explicit FakeSource(std::shared_ptr<Remote> remote) : remote_(std::move(remote)) {
+    remote_->opened.add();
+  }
   [[nodiscard]] const drivers::SourceInfo& info() const override { return remote_->info; }
   Result<> start() override { return remote_->started.add(), Result<>{}; }
   void stop() override { remote_->stopped.add(); }
@@ -127,7 +137,9 @@ class FakeSource final : public drivers::Source {
                     toPlane(PlaneKind::Flags, Image<std::uint8_t>{4, 2, 0})};
     return next;
   }
-  Result<> setPose(const Transform<World, Camera>& pose) override { return pose_ = pose, Result<>{}; }
+  Result<> setPose(const Transform<World, Camera>& pose) override {
+    return pose_ = pose, Result<>{};
+  }
   Result<> trigger() override { return remote_->give(), Result<>{}; }
 
  private:

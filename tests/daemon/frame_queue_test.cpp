@@ -96,7 +96,8 @@ int takenInTenSeconds(double hz, double source_hz, std::chrono::nanoseconds jitt
   int taken = 0;
   for (int i = 0; i < static_cast<int>(10 * source_hz); ++i) {
     const auto at = std::chrono::nanoseconds{static_cast<std::int64_t>(1e9 * i / source_hz)};
-    if (queue.wants(SteadyTime{} + std::chrono::seconds{1} + at + (i % 2 == 0 ? jitter : -jitter))) ++taken;
+    if (queue.wants(SteadyTime{} + std::chrono::seconds{1} + at + (i % 2 == 0 ? jitter : -jitter)))
+      ++taken;
   }
   return taken;
 }

@@ -122,7 +122,8 @@ TEST(Pattern, CountsWhatItLostInRealTime) {
 }
 
 TEST(Pattern, HasOnlyThePlanesThatAreAskedFor) {
-  const auto source = openPattern("width = 16\nheight = 8\npace = 'fast'\nplanes = ['flags', 'range']");
+  const auto source =
+      openPattern("width = 16\nheight = 8\npace = 'fast'\nplanes = ['flags', 'range']");
   ASSERT_TRUE(source->start().ok());
   const auto frame = source->next({}, false);
   ASSERT_EQ(frame->planes.size(), 2u);
@@ -131,8 +132,7 @@ TEST(Pattern, HasOnlyThePlanesThatAreAskedFor) {
 }
 
 TEST(Pattern, WrongKeysAreNamedWithPlaceAndBound) {
-  EXPECT_EQ(errorOf("width = 7"),
-            "test.toml:1: width = 7 is out of bounds: it must be 8 to 4096");
+  EXPECT_EQ(errorOf("width = 7"), "test.toml:1: width = 7 is out of bounds: it must be 8 to 4096");
   EXPECT_NE(errorOf("\nplanes = ['colour']").find("test.toml:2: planes names \"colour\""),
             std::string::npos);
   EXPECT_NE(errorOf("colour = 1").find("unknown key \"colour\""), std::string::npos);

@@ -35,8 +35,9 @@ constexpr auto kSoon = 60s;  // for a loaded machine; only a broken daemon needs
 /// A child process whose standard output and error go into a file.
 class Process {
  public:
-  Process(std::vector<std::string> arguments, std::filesystem::path log,
-          const std::function<void()>& in_child = [] {})
+  Process(
+      std::vector<std::string> arguments, std::filesystem::path log,
+      const std::function<void()>& in_child = [] {})
       : log_(std::move(log)) {
     arguments.insert(arguments.begin(), TOFTWIND);
     std::vector<char*> words;
@@ -106,8 +107,9 @@ class Toftwind : public testing::Test {
   std::filesystem::path folder_;
 };
 
-const std::string kPattern = "recording_folder = '.'\n[[source]]\nname = 'cam'\ndriver = 'pattern'\n"
-                             "width = 64\nheight = 48\n";
+const std::string kPattern =
+    "recording_folder = '.'\n[[source]]\nname = 'cam'\ndriver = 'pattern'\n"
+    "width = 64\nheight = 48\n";
 
 TEST_F(Toftwind, StopsCleanlyOnSigterm) {
   configure(kPattern);
@@ -166,15 +168,18 @@ TEST_F(Toftwind, ReplaysARecordingBitForBit) {
   auto client = this->client();
   auto stream = client->subscribe("again", {.policy = Policy::Lockstep});
   std::size_t found = 0;
-  for (Result<Frame> frame = stream->next(kSoon); frame && found < seen.size(); frame = stream->next(kSoon)) {
+  for (Result<Frame> frame = stream->next(kSoon); frame && found < seen.size();
+       frame = stream->next(kSoon)) {
     const Frame& original = seen[found];
-    if (frame->moment.exposures != original.moment.exposures) continue;  // recorded before it was seen
+    if (frame->moment.exposures != original.moment.exposures)
+      continue;  // recorded before it was seen
     EXPECT_EQ(frame->moment, original.moment);
     EXPECT_EQ(frame->camera, original.camera);
     EXPECT_EQ(frame->provenance.kind, FrameKind::Replayed);
     ASSERT_EQ(frame->planes.size(), original.planes.size());
     for (std::size_t i = 0; i < frame->planes.size(); ++i) {
-      EXPECT_TRUE(std::ranges::equal(frame->planes[i].data.bytes(), original.planes[i].data.bytes()));
+      EXPECT_TRUE(
+          std::ranges::equal(frame->planes[i].data.bytes(), original.planes[i].data.bytes()));
     }
     ++found;
   }
@@ -182,13 +187,15 @@ TEST_F(Toftwind, ReplaysARecordingBitForBit) {
 }
 
 TEST_F(Toftwind, AFullDiskEndsTheRecordingKeepsWhatWasWrittenAndSaysSo) {
-  configure("recording_folder = '.'\n[[source]]\nname = 'cam'\ndriver = 'pattern'\npace = 'fast'\n");
-  // Files of at most 4 MB, so that the disk seems full after that; the signal that comes with it is off.
+  configure(
+      "recording_folder = '.'\n[[source]]\nname = 'cam'\ndriver = 'pattern'\npace = 'fast'\n");
+  // Files of at most 4 MB, so that the disk seems full after that; the signal that comes with it is
+  // off.
   Process daemon{arguments(), path("log"), [] {
-    const rlimit limit{4 << 20, 4 << 20};
-    ::setrlimit(RLIMIT_FSIZE, &limit);
-    ::signal(SIGXFSZ, SIG_IGN);
-  }};
+                   const rlimit limit{4 << 20, 4 << 20};
+                   ::setrlimit(RLIMIT_FSIZE, &limit);
+                   ::signal(SIGXFSZ, SIG_IGN);
+                 }};
   ASSERT_TRUE(daemon.says("source cam: driver pattern")) << daemon.said();
   auto client = this->client();
   const auto recording = client->startRecording("cam", "run");
@@ -210,7 +217,8 @@ TEST_F(Toftwind, AWrongConfigurationIsExitCodeTwoWithFileAndLine) {
   configure("[listen]\nport = 70000\n");
   Process daemon{{"--config", path("d.toml")}, path("log")};
   EXPECT_EQ(daemon.wait(), 2);
-  EXPECT_THAT(daemon.said(), HasSubstr("d.toml:2: port = 70000 is out of bounds: it must be 0 to 65535"));
+  EXPECT_THAT(daemon.said(),
+              HasSubstr("d.toml:2: port = 70000 is out of bounds: it must be 0 to 65535"));
 }
 
 TEST_F(Toftwind, AMissingConfigurationIsNamed) {

@@ -30,7 +30,8 @@ class Replay : public testing::Test {
     folder_ = name;
     auto writer = record::Writer::create(folder_ / "run.mcap");
     ASSERT_TRUE(writer.ok());
-    auto keys = settings::Table::parse("width = 32\nheight = 16\npace = 'fast'\nframe_rate_hz = 200", "t");
+    auto keys =
+        settings::Table::parse("width = 32\nheight = 16\npace = 'fast'\nframe_rate_hz = 200", "t");
     auto source = pattern::row().open(*keys);
     ASSERT_TRUE((*source)->start().ok());
     for (int i = 0; i < 6; ++i) {
@@ -60,7 +61,8 @@ class Replay : public testing::Test {
     ASSERT_EQ(played.planes.size(), recorded.planes.size());
     for (std::size_t i = 0; i < played.planes.size(); ++i) {
       EXPECT_EQ(played.planes[i].kind, recorded.planes[i].kind);
-      EXPECT_TRUE(std::ranges::equal(played.planes[i].data.bytes(), recorded.planes[i].data.bytes()));
+      EXPECT_TRUE(
+          std::ranges::equal(played.planes[i].data.bytes(), recorded.planes[i].data.bytes()));
     }
   }
 
@@ -127,7 +129,8 @@ TEST_F(Replay, UnderLockstepDoesNotWaitHoweverFarApartTheFramesAre) {
     auto writer = record::Writer::create(folder_ / "slow.mcap");
     for (std::int64_t i = 0; i < 3; ++i) {
       Frame frame = frames_[static_cast<std::size_t>(i)];
-      frame.moment.received.ns = kReceived_ns + i * 3'600'000'000'000;  // hours: the test would time out
+      frame.moment.received.ns =
+          kReceived_ns + i * 3'600'000'000'000;  // hours: the test would time out
       ASSERT_TRUE(writer->write(frame).ok());
     }
   }

@@ -9,8 +9,14 @@ namespace {
 /// 5 × 4 pixels; range = 10 y + x; samples with two channels, the second 100 more.
 Frame numbered() {
   Frame frame;
-  frame.camera = {.width = 5, .height = 4, .fx = 6, .fy = 8, .cx = 2, .cy = 1.5,
-                  .distortion = {0.1, 0, 0, 0, 0}, .calibration_id = "c"};
+  frame.camera = {.width = 5,
+                  .height = 4,
+                  .fx = 6,
+                  .fy = 8,
+                  .cx = 2,
+                  .cy = 1.5,
+                  .distortion = {0.1, 0, 0, 0, 0},
+                  .calibration_id = "c"};
   Image<float> range{5, 4};
   std::vector<std::uint16_t> samples;
   for (int channel = 0; channel < 2; ++channel) {
@@ -36,7 +42,8 @@ TEST(Selection, OfEverythingSharesTheBytes) {
 }
 
 TEST(Selection, OfPlanesKeepsTheOrderAskedFor) {
-  const auto some = select(numbered(), {.planes = {PlaneKind::Samples, PlaneKind::Range}, .region = {}});
+  const auto some =
+      select(numbered(), {.planes = {PlaneKind::Samples, PlaneKind::Range}, .region = {}});
   ASSERT_EQ(some->planes.size(), 2u);
   EXPECT_EQ(some->planes[0].kind, PlaneKind::Samples);
 }
@@ -70,7 +77,9 @@ TEST(Selection, MovesTheCameraWithThePixels) {
 TEST(Selection, RefusesWhatIsNotThere) {
   const Frame frame = numbered();
   const std::vector<PlaneKind> planes{PlaneKind::Range, PlaneKind::Samples};
-  const auto check = [&](const Selection& s) { return checkSelection(s, frame.camera, planes).ok(); };
+  const auto check = [&](const Selection& s) {
+    return checkSelection(s, frame.camera, planes).ok();
+  };
   EXPECT_TRUE(check({.planes = {}, .region = {0, 0, 5, 4}}));
   EXPECT_FALSE(check({.planes = {}, .region = {1, 0, 5, 4}}));
   EXPECT_FALSE(check({.planes = {}, .region = {0, 1, 5, 4}}));

@@ -83,7 +83,8 @@ TEST(Session, ListsAndDescribes) {
   const auto list = std::get<wire::SourceList>(talk.ask(wire::ListSources{2}));
   ASSERT_EQ(list.sources.size(), 1u);
   EXPECT_EQ(list.sources[0].name, "cam");
-  const auto description = std::get<wire::SourceDescription>(talk.ask(wire::DescribeSource{3, "cam"}));
+  const auto description =
+      std::get<wire::SourceDescription>(talk.ask(wire::DescribeSource{3, "cam"}));
   EXPECT_EQ(description.id, 3u);
   EXPECT_EQ(description.camera, talk.remote->info.camera);
   EXPECT_TRUE(description.can_lockstep);

@@ -27,7 +27,8 @@ struct Rig {
     const auto open = test::opener(remote);
     host = std::make_unique<SourceHost>("cam", open, open(), options, clock);
   }
-  SubscriberPtr subscribe(Taker& taker, FrameQueue::Settings queue = {.policy = Policy::Queue, .depth = 100}) {
+  SubscriberPtr subscribe(Taker& taker,
+                          FrameQueue::Settings queue = {.policy = Policy::Queue, .depth = 100}) {
     auto subscribed = host->subscribe({{}, queue}, taker.wake());
     EXPECT_TRUE(subscribed.ok()) << subscribed.error().message;
     return *subscribed;
@@ -182,7 +183,8 @@ TEST(SourceHost, EndsItsSubscriptionsWithTheStreamAndStartsAnewForTheNext) {
 TEST(SourceHost, ADriverThatThrowsIsOpenedAgain) {
   Rig rig;
   rig.start();
-  const auto thrown = rig.command([](drivers::Source&) -> Result<> { throw std::runtime_error{"oops"}; });
+  const auto thrown =
+      rig.command([](drivers::Source&) -> Result<> { throw std::runtime_error{"oops"}; });
   ASSERT_FALSE(thrown.ok());
   EXPECT_NE(thrown.error().message.find("oops"), std::string::npos);
 }
@@ -190,8 +192,8 @@ TEST(SourceHost, ADriverThatThrowsIsOpenedAgain) {
 TEST(SourceHost, AnAbsentCameraIsTriedAgainAndSaysSoMeanwhile) {
   Rig rig;
   rig.host = std::make_unique<SourceHost>("cam", test::opener(rig.remote),
-                                          Error{Error::Code::NotFound, "no camera there"}, rig.options,
-                                          rig.clock);
+                                          Error{Error::Code::NotFound, "no camera there"},
+                                          rig.options, rig.clock);
   Taker taker;
   const auto refused = rig.host->subscribe({{}, {}}, taker.wake());
   ASSERT_FALSE(refused.ok());

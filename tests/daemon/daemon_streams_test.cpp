@@ -1,0 +1,275 @@
+// SPDX-License-Identifier: Apache-2.0
+// What clients of the whole daemon get.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <optional>
+#include <thread>
+
+#include "drivers/pattern/pattern.h"
+#include "protocol/record/recording.h"
+#include "running_daemon.h"
+
+namespace toftwin::daemon {
+namespace {
+
+using namespace std::chrono_literals;
+using namespace test;
+using testing::HasSubstr;
+using Policy = SubscribeOptions::Policy;
+
+class OnEachTransport : public RunningDaemon, public testing::WithParamInterface<bool> {};
+INSTANTIATE_TEST_SUITE_P(Transports, OnEachTransport, testing::Bool(),
+                         [](const auto& test) { return test.param ? "Tcp" : "Unix"; });
+
+TEST_P(OnEachTransport, FramesArriveAsTheSourceMadeThem) {
+  // Large enough for shared memory on the Unix socket.
+  start(
+      "[[source]]\nname = 'cam'\ndriver = 'pattern'\npace = 'trigger'\nwidth = 160\nheight = "
+      "120\n");
+  auto client = this->client(GetParam());
+  auto stream = client.subscribe("cam", {.policy = Policy::Queue, .queue = 8});
+  ASSERT_TRUE(stream.ok()) << stream.error().message;
+  for (std::uint64_t shift = 0; shift < 3; ++shift) {
+    ASSERT_TRUE(client.trigger("cam").ok());
+    const auto frame = stream->next(kSoon);
+    ASSERT_TRUE(frame.ok()) << frame.error().message;
+    EXPECT_EQ(frame->source, "cam");
+    EXPECT_EQ(frame->sequence, shift);
+    EXPECT_EQ(frame->dropped_before, 0u);
+    ASSERT_NE(frame->find(PlaneKind::Range), nullptr);
+    const auto range = frame->find(PlaneKind::Range)->as<float>();
+    const auto flags = frame->find(PlaneKind::Flags)->as<std::uint8_t>();
+    for (int y = 0; y < 120; ++y) {
+      for (int x = 0; x < 160; ++x) {
+        const auto i = static_cast<std::size_t>(160 * y + x);
+        const auto expected = drivers::pattern::pixelAt(160, 120, shift, x, y);
+        ASSERT_EQ(flags[i], expected.flags);
+        ASSERT_TRUE(std::isnan(expected.range_m) ? std::isnan(range[i])
+                                                 : range[i] == expected.range_m);
+      }
+    }
+  }
+}
+
+TEST_P(OnEachTransport, AStalledClientDelaysNobodyAndIsToldWhatItMissed) {
+  start(kTriggered);
+  auto stalled = client(GetParam()), lively = client(GetParam());
+  auto slow = stalled.subscribe("cam", {.policy = Policy::Queue, .queue = 4});
+  auto quick = lively.subscribe("cam", {.policy = Policy::Queue, .queue = 4});
+  ASSERT_TRUE(slow.ok() && quick.ok());
+  constexpr std::uint64_t kFrames = 200;
+  for (std::uint64_t i = 0; i < kFrames; ++i) {
+    ASSERT_TRUE(lively.trigger("cam").ok());
+    const auto frame = quick->next(kSoon);
+    ASSERT_TRUE(frame.ok()) << frame.error().message;
+    ASSERT_EQ(frame->sequence, i);
+    ASSERT_EQ(frame->dropped_before, 0u);
+  }
+  // The window of four was sent, four wait in the daemon, the others were dropped and counted.
+  std::uint64_t got = 0, dropped = 0, last = 0;
+  while (got + dropped < kFrames) {
+    const auto frame = slow->next(kSoon);
+    ASSERT_TRUE(frame.ok()) << frame.error().message;
+    if (got > 0) {
+      EXPECT_EQ(frame->sequence, last + 1 + frame->dropped_before);
+    }
+    last = frame->sequence;
+    dropped += frame->dropped_before;
+    ++got;
+  }
+  EXPECT_EQ(got, 8u);
+  EXPECT_EQ(dropped, kFrames - 8);
+}
+
+TEST_P(OnEachTransport, LockstepMakesTheNextFrameWhenBothClientsAskedForIt) {
+  start(kFast);
+  auto one = client(GetParam()), two = client(GetParam());
+  auto first = one.subscribe("cam", {.policy = Policy::Lockstep});
+  auto a = first->next(kSoon);  // alone; the next is made when both ask
+  ASSERT_TRUE(a.ok());
+  auto second = two.subscribe("cam", {.policy = Policy::Lockstep});
+  auto b = a;
+  for (int i = 0; i < 20; ++i) {
+    ASSERT_TRUE(a.ok() && b.ok());
+    ASSERT_EQ(a->sequence, b->sequence);
+    const std::uint64_t made = daemon_->hub().health().sources.at(0).frames;
+    EXPECT_EQ(made, a->sequence + 1) << "a frame was made that nobody asked for";
+    const Transform<World, Camera> pose{{1, 0, 0, 0}, {0, 0, static_cast<double>(i)}};
+    ASSERT_TRUE(one.setPose("cam", pose).ok());
+    std::thread other{[&] { b = second->next(kSoon); }};
+    a = first->next(kSoon);
+    other.join();
+    ASSERT_TRUE(a.ok());
+    EXPECT_EQ(a->moment.world_from_camera, pose);
+  }
+}
+
+TEST_F(RunningDaemon, AVanishedLockstepClientHoldsNobodyUp) {
+  start(kFast);
+  auto one = client();
+  std::optional<Client> two = client();
+  auto second = two->subscribe("cam", {.policy = Policy::Lockstep});
+  ASSERT_TRUE(second->next(kSoon).ok());  // and never asks for another
+  auto first = one.subscribe("cam", {.policy = Policy::Lockstep});
+  EXPECT_EQ(first->next(50ms).error().code, Error::Code::Timeout);
+  second = Error{};
+  two.reset();
+  for (int i = 0; i < 5; ++i) ASSERT_TRUE(first->next(kSoon).ok());
+}
+
+TEST_F(RunningDaemon, AClientKilledInTheMiddleOfAFrameHarmsNobody) {
+  // Two megabytes a frame: more than the socket's buffers, so that it is cut in the middle.
+  start("[[source]]\nname = 'cam'\ndriver = 'pattern'\npace = 'trigger'\n");
+  auto client = this->client();
+  auto stream = client.subscribe("cam", {.policy = Policy::Queue, .queue = 4});
+  for (std::uint64_t i = 0; i < 5; ++i) {
+    RawClient victim{daemon_->socketPath()};
+    victim.send(wire::Hello{1, "victim", {}});
+    wire::Subscribe subscribe;
+    subscribe.source = "cam";
+    victim.send(subscribe);
+    ASSERT_TRUE(victim.message() && victim.message());  // Hello, Subscribed
+    ASSERT_TRUE(client.trigger("cam").ok());
+    ASSERT_GT(victim.receive(1000), 0u);
+    const auto frame = stream->next(kSoon);
+    ASSERT_TRUE(frame.ok()) << frame.error().message;
+    EXPECT_EQ(frame->sequence, i);
+  }
+  EXPECT_TRUE(eventually([&] { return daemon_->hub().health().sessions == 1; }));
+}
+
+TEST_F(RunningDaemon, AClientThatNeverReadsDelaysNobody) {
+  start("[[source]]\nname = 'cam'\ndriver = 'pattern'\npace = 'trigger'\n");
+  RawClient stalled{daemon_->socketPath()};
+  stalled.send(wire::Hello{1, "stalled", {}});
+  wire::Subscribe subscribe;
+  subscribe.source = "cam";
+  stalled.send(subscribe);
+  auto client = this->client();
+  auto stream = client.subscribe("cam", {.policy = Policy::Queue, .queue = 4});
+  for (std::uint64_t i = 0; i < 20; ++i) {
+    ASSERT_TRUE(client.trigger("cam").ok());
+    const auto frame = stream->next(kSoon);
+    ASSERT_TRUE(frame.ok());
+    EXPECT_EQ(frame->sequence, i);
+  }
+}
+
+TEST_F(RunningDaemon, ALosslessClientGetsEveryFrameOrIsToldThatItCannot) {
+  configure("[limits]\nlossless_mb = 1\n" + kFast);  // 1 MB are some hundred of these frames
+  start(options());
+  auto client = this->client();
+  auto stream = client.subscribe("cam", {.policy = Policy::Lossless});
+  auto health = this->client();
+  ASSERT_TRUE(eventually([&] { return health.health()->sources.at(0).subscribers == 0; }));
+  std::uint64_t expected = 0;
+  while (true) {
+    const auto frame = stream->next(kSoon);
+    if (!frame) {
+      EXPECT_EQ(frame.error().code, Error::Code::Overrun);
+      EXPECT_THAT(frame.error().message, HasSubstr("limits.lossless_mb"));
+      break;
+    }
+    if (expected == 0) expected = frame->sequence;
+    ASSERT_EQ(frame->sequence, expected++);
+    ASSERT_EQ(frame->dropped_before, 0u);
+  }
+  EXPECT_GT(expected, 100u);
+}
+
+TEST_F(RunningDaemon, BytesThatAreNoMessageGetAFailureAndAClosedConnection) {
+  start(kTriggered);
+  RawClient stranger{daemon_->socketPath()};
+  stranger.sendBytes(std::vector<std::byte>(200, std::byte{'G'}));
+  const auto answer = stranger.message();
+  ASSERT_TRUE(answer.has_value());
+  EXPECT_EQ(std::get<wire::Failure>(*answer).id, 0u);
+  EXPECT_FALSE(stranger.message().has_value());
+}
+
+TEST_F(RunningDaemon, AFrameFromAClientIsTooLargeToBeARequest) {
+  start(kTriggered);
+  RawClient stranger{daemon_->socketPath()};
+  stranger.send(wire::Hello{1, "stranger", {}});
+  ASSERT_TRUE(stranger.message().has_value());
+  Frame frame;
+  frame.planes = {toPlane(PlaneKind::Range, Image<float>{8, 8})};
+  stranger.send(wire::FrameMessage{1, frame});
+  const auto answer = stranger.message();
+  ASSERT_TRUE(answer.has_value());
+  EXPECT_EQ(std::get<wire::Failure>(*answer).error.code, Error::Code::TooLarge);
+  EXPECT_FALSE(stranger.message().has_value());
+}
+
+TEST_F(RunningDaemon, AClientWithoutHelloIsCutOff) {
+  configure("[limits]\nhandshake_s = 0.1\n" + kTriggered);
+  start(options());
+  RawClient silent{daemon_->socketPath()};
+  const auto answer = silent.message();
+  ASSERT_TRUE(answer.has_value());
+  EXPECT_EQ(std::get<wire::Failure>(*answer).error.code, Error::Code::Timeout);
+  EXPECT_FALSE(silent.message().has_value());
+}
+
+TEST_F(RunningDaemon, OneClientTooManyIsTold) {
+  configure("[limits]\nsessions = 2\n" + kTriggered);
+  start(options());
+  auto one = client(), two = client();
+  const auto three = Client::connect("unix:" + daemon_->socketPath());
+  ASSERT_FALSE(three.ok());
+  EXPECT_THAT(three.error().message, HasSubstr("limits.sessions"));
+  EXPECT_TRUE(one.health().ok());
+}
+
+TEST_F(RunningDaemon, RecordsIntoItsFolderEveryFrameAsItWas) {
+  start(kTriggered);
+  auto client = this->client();
+  const auto path = client.startRecording("cam", "run");
+  ASSERT_TRUE(path.ok()) << path.error().message;
+  EXPECT_EQ(*path, (folder_ / "recordings" / "run.mcap").string());
+  EXPECT_FALSE(client.startRecording("cam", "other").ok()) << "two recordings of one source";
+  auto stream = client.subscribe("cam", {.policy = Policy::Queue, .queue = 8});
+  for (int i = 0; i < 5; ++i) {
+    ASSERT_TRUE(client.trigger("cam").ok());
+    ASSERT_TRUE(stream->next(kSoon).ok());
+  }
+  const auto closed = client.stopRecording("cam");
+  ASSERT_TRUE(closed.ok()) << closed.error().message;
+  EXPECT_THAT(client.startRecording("cam", "run").error().message, HasSubstr("exists already"));
+  EXPECT_FALSE(client.startRecording("cam", "../run").ok());
+
+  auto reader = record::Reader::open(*path);
+  ASSERT_TRUE(reader.ok()) << reader.error().message;
+  EXPECT_TRUE(reader->summary().indexed);
+  for (std::uint64_t i = 0; i < 5; ++i) {
+    const auto frame = reader->next("cam");
+    ASSERT_TRUE(frame.ok()) << frame.error().message;
+    EXPECT_EQ(frame->sequence, i);
+    EXPECT_EQ(frame->planes.size(), 5u);
+  }
+  EXPECT_EQ(reader->next("cam").error().code, Error::Code::EndOfStream);
+}
+
+TEST_F(RunningDaemon, StoppingClosesRecordingsAndTellsClients) {
+  start(kTriggered);
+  auto client = this->client();
+  const auto path = client.startRecording("cam", "run");
+  auto stream = client.subscribe("cam", {.policy = Policy::Queue, .queue = 8});
+  ASSERT_TRUE(client.trigger("cam").ok());
+  ASSERT_TRUE(stream->next(kSoon).ok());
+  const std::string socket = daemon_->socketPath();
+  stop();
+  const auto end = stream->next(kSoon);
+  ASSERT_FALSE(end.ok());
+  EXPECT_EQ(end.error().code, Error::Code::Stopped) << end.error().message;
+  EXPECT_FALSE(std::filesystem::exists(socket));
+  const auto reader = record::Reader::open(*path);
+  ASSERT_TRUE(reader.ok());
+  EXPECT_TRUE(reader->summary().indexed);
+  EXPECT_EQ(reader->summary().frames_per_source.at("cam"), 1u);
+}
+
+}  // namespace
+}  // namespace toftwin::daemon
