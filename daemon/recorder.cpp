@@ -56,11 +56,14 @@ void Recorder::stop(Done closed) {
   std::optional<Result<std::filesystem::path>> outcome;
   {
     const std::scoped_lock lock{mutex_};
-    is_stopping_ = true;
     outcome = outcome_;
     if (!outcome && !closed_) closed_ = std::exchange(closed, nullptr);
   }
-  work_.notify_all();
+  {
+    const std::scoped_lock lock{work_->mutex};
+    work_->is_stopping = true;
+  }
+  work_->changed.notify_all();
   if (closed == nullptr) return;
   closed(outcome ? *outcome : Error{Error::Code::Busy, "the recording is being closed already"});
 }
@@ -84,12 +87,12 @@ void Recorder::run(const Done& opened) {
     return opened(writer.error());
   }
   const Wish everything{{}, {.policy = wire::Policy::Lossless, .byte_limit = byte_limit_}};
-  auto subscribed = source_->subscribe(everything, [this] {
+  auto subscribed = source_->subscribe(everything, [work = work_] {
     {
-      const std::scoped_lock lock{mutex_};
-      has_items_ = true;
+      const std::scoped_lock lock{work->mutex};
+      work->has_items = true;
     }
-    work_.notify_all();
+    work->changed.notify_all();
   });
   if (!subscribed) {
     finish(subscribed.error());
@@ -115,17 +118,18 @@ Result<> Recorder::writeAll(record::Writer& writer, const SubscriberPtr& subscri
       const Frame& frame = std::get<FrameQueue::Delivery>(*item).frame->frame;
       if (auto written = writer.write(frame); !written) return written;
     }
-    std::unique_lock lock{mutex_};
-    if (is_stopping_ && is_unsubscribed) return {};
-    if (is_stopping_) {
-      // Nothing comes after this, so what waits then is all.
+    std::unique_lock lock{work_->mutex};
+    if (work_->is_stopping && is_unsubscribed) return {};
+    if (work_->is_stopping) {
+      // Nothing comes after this, so what waits then is all: every frame that a client has seen.
       lock.unlock();
       source_->unsubscribe(subscriber);
+      source_->waitForDelivery();
       is_unsubscribed = true;
       continue;
     }
-    work_.wait(lock, [this] { return has_items_ || is_stopping_; });
-    has_items_ = false;
+    work_->changed.wait(lock, [this] { return work_->has_items || work_->is_stopping; });
+    work_->has_items = false;
   }
 }
 

@@ -54,10 +54,16 @@ class Recorder {
   const std::filesystem::path file_;
   const std::uint64_t byte_limit_;
 
-  mutable std::mutex mutex_;  // guards all below
-  std::condition_variable work_;
-  bool has_items_ = false;
-  bool is_stopping_ = false;
+  /// Shared with the subscription, since the source's thread may be waking while the recorder goes.
+  struct Work {
+    std::mutex mutex;
+    std::condition_variable changed;
+    bool has_items = false;
+    bool is_stopping = false;
+  };
+  const std::shared_ptr<Work> work_ = std::make_shared<Work>();
+
+  mutable std::mutex mutex_;  // guards the next two
   std::optional<Result<std::filesystem::path>> outcome_;
   Done closed_;
 

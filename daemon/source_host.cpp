@@ -141,6 +141,8 @@ void SourceHost::unsubscribe(const SubscriberPtr& subscriber) {
   changed();
 }
 
+void SourceHost::waitForDelivery() { const std::scoped_lock lock{delivering_}; }
+
 void SourceHost::acknowledge(const SubscriberPtr& subscriber, std::uint64_t sequence) {
   {
     const std::scoped_lock lock{mutex_};
@@ -329,6 +331,7 @@ void SourceHost::publish(Frame frame) {
   frame.dropped_before = 0;
   const SteadyTime now = clock_.steady();
   std::vector<SubscriberPtr> takers;
+  const std::scoped_lock delivering{delivering_};
   {
     const std::scoped_lock lock{mutex_};
     frame.sequence = frames_++;

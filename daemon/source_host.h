@@ -55,6 +55,9 @@ class SourceHost {
 
   Result<SubscriberPtr> subscribe(Wish wish, std::function<void()> wake);
   void unsubscribe(const SubscriberPtr& subscriber);
+  /// Waits until a frame that is just being handed out has reached everyone (microseconds, not a
+  /// frame time): after `unsubscribe` and this, nothing more comes.
+  void waitForDelivery();
   void acknowledge(const SubscriberPtr& subscriber, std::uint64_t sequence);
   /// Runs the command between two frames; `done` is called once, on the host's thread (or at once
   /// with Busy, when too many commands wait).
@@ -100,6 +103,7 @@ class SourceHost {
   SteadyTime retry_at_{};
   std::chrono::milliseconds retry_after_;
 
+  std::mutex delivering_;     // held from the choice of a frame's takers until all have it
   mutable std::mutex mutex_;  // guards all below
   std::condition_variable_any work_;
   std::stop_source interrupt_;

@@ -226,11 +226,12 @@ TEST_F(RunningDaemon, OneClientTooManyIsTold) {
 TEST_F(RunningDaemon, RecordsIntoItsFolderEveryFrameAsItWas) {
   start(kTriggered);
   auto client = this->client();
+  // Served before the recorder: what it has seen must be in the recording all the same.
+  auto stream = client.subscribe("cam", {.policy = Policy::Queue, .queue = 8});
   const auto path = client.startRecording("cam", "run");
   ASSERT_TRUE(path.ok()) << path.error().message;
   EXPECT_EQ(*path, (folder_ / "recordings" / "run.mcap").string());
   EXPECT_FALSE(client.startRecording("cam", "other").ok()) << "two recordings of one source";
-  auto stream = client.subscribe("cam", {.policy = Policy::Queue, .queue = 8});
   for (int i = 0; i < 5; ++i) {
     ASSERT_TRUE(client.trigger("cam").ok());
     ASSERT_TRUE(stream->next(kSoon).ok());

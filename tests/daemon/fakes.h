@@ -158,13 +158,13 @@ inline SourceHost::Open opener(const std::shared_ptr<Remote>& remote) {
 class Taker {
  public:
   [[nodiscard]] std::function<void()> wake() {
-    return [this] { woken_.add(); };
+    return [woken = woken_] { woken->add(); };
   }
   /// The next item; fails the wait after half a minute.
   std::optional<FrameQueue::Item> next(FrameQueue& queue) {
-    for (int seen = woken_.count();; seen = woken_.count()) {
+    for (int seen = woken_->count();; seen = woken_->count()) {
       if (auto item = queue.take()) return item;
-      if (!woken_.reaches(seen + 1)) return std::nullopt;
+      if (!woken_->reaches(seen + 1)) return std::nullopt;
     }
   }
   /// The sequence number of the next frame, or -1 if there is none.
@@ -175,7 +175,8 @@ class Taker {
   }
 
  private:
-  Counter woken_;
+  // Shared with the source's thread, which may be waking while the test ends.
+  std::shared_ptr<Counter> woken_ = std::make_shared<Counter>();
 };
 
 }  // namespace toftwin::daemon::test

@@ -19,8 +19,8 @@ using wire::Message;
 struct Conversation {
   FakeClock clock;
   std::shared_ptr<Remote> remote = std::make_shared<Remote>();
+  Counter woken;  // outlives the hub's threads, which count
   Hub hub{{}, clock};
-  Counter woken;
   std::unique_ptr<Session> session;
 
   explicit Conversation(Session::Options options = {}) {
