@@ -2,9 +2,13 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
+#include <optional>
 #include <stop_token>
 
 #include <toftwin/clock.h>
+#include <toftwin/result.h>
+#include <toftwin/units.h>
 
 namespace toftwin::drivers {
 
@@ -21,5 +25,41 @@ bool sleepUntil(SteadyTime time, const std::stop_token& stop);
 /// where `device` is the device's time at the steady time `at`. Reads the wall clock between two
 /// readings of the steady clock; half of their distance bounds the error of the relation.
 ClockRelation relateToHost(DeviceTime device, SteadyTime at);
+
+/// What sets the pace of a source that makes its frames itself.
+enum class Pace { RealTime, Fast, Trigger };
+
+/// Counts the frames of such a source and waits for the turn of the next. Device time is derived from
+/// the count, which is never set back, so it goes on increasing over a stop and a start.
+class Pacer {
+ public:
+  Pacer(Pace pace, Duration frame_interval);
+
+  /// For Source::start().
+  void restart();
+  /// Waits until the next frame is due: in real time until its device time, or for a trigger, or not at
+  /// all (Fast, lockstep). Gives how many frames were due meanwhile and are lost, as a camera would have
+  /// lost them; they are counted already. Errors: Stopped, Timeout.
+  Result<std::uint64_t> waitForTurn(const std::stop_token& stop, bool lockstep);
+  /// The frame was made.
+  void advance() { ++index_; }
+  void trigger() { ++triggers_; }
+
+  /// Of the next frame since the source was opened, lost ones counted.
+  [[nodiscard]] std::uint64_t index() const { return index_; }
+  [[nodiscard]] DeviceTime deviceTime() const {
+    return {static_cast<std::int64_t>(index_) * interval_ns_};
+  }
+  /// Unknown until paced in real time.
+  [[nodiscard]] const ClockRelation& clock() const { return clock_; }
+
+ private:
+  Pace pace_;
+  std::int64_t interval_ns_;
+  std::uint64_t index_ = 0;
+  std::uint64_t triggers_ = 0;
+  std::optional<SteadyTime> since_;  ///< when device time 0 was, if paced in real time
+  ClockRelation clock_;
+};
 
 }  // namespace toftwin::drivers

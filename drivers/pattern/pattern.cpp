@@ -11,7 +11,6 @@
 #include <toftwin/image.h>
 #include <toftwin/names.h>
 
-#include "drivers/pace.h"
 #include "protocol/settings/describe.h"
 
 namespace toftwin::drivers::pattern {
@@ -91,15 +90,15 @@ class PatternSource final : public Source {
   PatternSource(const Keys& keys, std::vector<PlaneKind> planes)
       : keys_(keys),
         info_(describe(keys, std::move(planes))),
-        depth_per_range_(makeDepthPerRange()) {}
+        depth_per_range_(makeDepthPerRange()),
+        pacer_(keys.pace, *info_.frame_interval) {}
 
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
 
-  // A source may be started again after stop(). Device time must go on increasing, so it is derived
-  // from `index_`, which is never set back.
+  // A source may be started again after stop(); device time must go on increasing, which is the
+  // pacer's business.
   Result<> start() override {
-    pacing_since_.reset();
-    triggers_ = 0;
+    pacer_.restart();
     made_ = 0;
     return {};
   }
@@ -111,13 +110,16 @@ class PatternSource final : public Source {
                    fmt::format("the pattern ended after {} frames, as configured", made_)};
     }
     Frame frame;
-    if (auto turn = waitForTurn(stop, lockstep, frame.dropped_by_device); !turn)
-      return turn.error();
+    const auto lost = pacer_.waitForTurn(stop, lockstep);
+    if (!lost) return lost.error();
+    frame.dropped_by_device = *lost;
+    shift_ += *lost * speed_px_;
     frame.moment = momentOfFrame();
     frame.provenance.kind = info_.kind;
     frame.camera = info_.camera;
     frame.planes = draw();
-    advance(1);
+    pacer_.advance();
+    shift_ += speed_px_;
     ++made_;
     return frame;
   }
@@ -145,60 +147,16 @@ class PatternSource final : public Source {
 
   Result<> trigger() override {
     if (!info_.can_trigger) return Source::trigger();
-    ++triggers_;
+    pacer_.trigger();
     return {};
   }
 
  private:
-  // Waits as long as the pace says. In real time a frame that is late by whole intervals is one
-  // that a camera would have lost: it is skipped and counted.
-  Result<> waitForTurn(const std::stop_token& stop, bool lockstep, std::uint64_t& lost) {
-    const Error stopped{Error::Code::Stopped, "asked to stop"};
-    if (stop.stop_requested()) return stopped;
-    if (lockstep || keys_.pace == Pace::Fast) {
-      pacing_since_.reset();
-      return {};
-    }
-    const SteadyTime now = std::chrono::steady_clock::now();
-    if (keys_.pace == Pace::Trigger) {
-      if (triggers_ > 0) return --triggers_, Result<>{};
-      if (!sleepUntil(now + kLongestWait, stop)) return stopped;
-      return Error{Error::Code::Timeout, "no trigger within a second"};
-    }
-    if (!pacing_since_) {
-      pacing_since_ = now - std::chrono::nanoseconds{deviceTime().ns};
-      clock_ = relateToHost(deviceTime(), now);
-    }
-    const SteadyTime due = *pacing_since_ + std::chrono::nanoseconds{deviceTime().ns};
-    if (now > due) {
-      lost = static_cast<std::uint64_t>((now - due).count() / intervalNs());
-      advance(lost);
-      return {};
-    }
-    if (due - now > kLongestWait) {
-      return sleepUntil(now + kLongestWait, stop) ? Error{Error::Code::Timeout, "not yet"}
-                                                  : stopped;
-    }
-    return sleepUntil(due, stop) ? Result<>{} : stopped;
-  }
-
-  void advance(std::uint64_t frames) {
-    index_ += frames;
-    shift_ += frames * speed_px_;
-  }
-
-  [[nodiscard]] std::int64_t intervalNs() const {
-    return static_cast<std::int64_t>(info_.frame_interval->in(nanosecond));
-  }
-  [[nodiscard]] DeviceTime deviceTime() const {
-    return {static_cast<std::int64_t>(index_) * intervalNs()};
-  }
-
   [[nodiscard]] Moment momentOfFrame() const {
     Moment moment;
-    moment.exposures = {{deviceTime(), *info_.frame_interval / 2.0, 30_MHz}};
-    moment.clock = clock_;
-    moment.since_power_on = static_cast<double>(deviceTime().ns) * nanosecond;
+    moment.exposures = {{pacer_.deviceTime(), *info_.frame_interval / 2.0, 30_MHz}};
+    moment.clock = pacer_.clock();
+    moment.since_power_on = static_cast<double>(pacer_.deviceTime().ns) * nanosecond;
     moment.temperatures = {{"sensor", 30_degC}};
     moment.ambient = 0.5_klx;
     moment.world_from_camera = world_from_camera_;
@@ -260,13 +218,10 @@ class PatternSource final : public Source {
   Keys keys_;
   SourceInfo info_;
   Image<float> depth_per_range_;
-  std::uint64_t index_ = 0;  ///< of the next frame since the camera was opened, lost ones counted
+  Pacer pacer_;
   std::uint64_t made_ = 0;   ///< since start()
   std::uint64_t shift_ = 0;
   std::uint64_t speed_px_ = 1;
-  std::uint64_t triggers_ = 0;
-  std::optional<SteadyTime> pacing_since_;  ///< when device time 0 was, if paced in real time
-  ClockRelation clock_;                     ///< unknown until paced in real time
   Transform<World, Camera> world_from_camera_;
 };
 

@@ -7,13 +7,12 @@
 
 #include <toftwin/units.h>
 
+#include "drivers/pace.h"
 #include "drivers/source.h"
 
 /// A camera that is not there: a moving picture whose every value is known. It is also the template
 /// for new drivers (docs/add-a-driver.md): read pattern.cpp from top to bottom.
 namespace toftwin::drivers::pattern {
-
-enum class Pace { RealTime, Fast, Trigger };
 
 /// The keys of a [[source]] table with driver = "pattern".
 struct Keys {

@@ -8,9 +8,9 @@
 
 #include <toftwin/units.h>
 
-namespace toftwin::drivers::simulator {
+#include "drivers/pace.h"
 
-enum class Pace { RealTime, Fast, Trigger };
+namespace toftwin::drivers::simulator {
 
 /// The keys of a [[source]] table with driver = "sim".
 struct Keys {

@@ -10,7 +10,6 @@
 
 #include <toftwin/names.h>
 
-#include "drivers/pace.h"
 #include "drivers/sim/keys.h"
 #include "drivers/sim/view.h"
 #include "protocol/settings/describe.h"
@@ -100,6 +99,7 @@ class SimulatedSource final : public Source {
         model_(std::move(model)),
         info_(describe(keys, model_, std::move(planes))),
         view_(std::move(view)),
+        pacer_(keys.pace, *info_.frame_interval),
         since_power_on_(keys.powered_on_before),
         room_temperature_(keys.room_temperature),
         ambient_(keys.ambient) {
@@ -109,8 +109,7 @@ class SimulatedSource final : public Source {
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
 
   Result<> start() override {
-    pacing_since_.reset();
-    triggers_ = 0;
+    pacer_.restart();
     made_ = 0;
     return {};
   }
@@ -126,13 +125,14 @@ class SimulatedSource final : public Source {
     // have delivered meanwhile as lost.
     if (!view_.complete(stop)) return stopped;
     Frame frame;
-    if (auto turn = waitForTurn(stop, lockstep, frame.dropped_by_device); !turn)
-      return turn.error();
+    const auto lost = pacer_.waitForTurn(stop, lockstep);
+    if (!lost) return lost.error();
+    frame.dropped_by_device = *lost;
     frame.moment = momentOfFrame();
     frame.provenance = sim::provenanceOf(model_, view_.scene().id(), keys_.seed);
     frame.camera = info_.camera;
     frame.planes = expose(frame.moment);
-    ++index_;
+    pacer_.advance();
     ++made_;
     return frame;
   }
@@ -180,7 +180,7 @@ class SimulatedSource final : public Source {
 
   Result<> trigger() override {
     if (!info_.can_trigger) return Source::trigger();
-    ++triggers_;
+    pacer_.trigger();
     return {};
   }
 
@@ -198,61 +198,23 @@ class SimulatedSource final : public Source {
     return {};
   }
 
-  /// Waits as the pace says. A frame that is late by whole intervals is skipped and counted, as a
-  /// camera would have lost it.
-  Result<> waitForTurn(const std::stop_token& stop, bool lockstep, std::uint64_t& lost) {
-    const Error stopped{Error::Code::Stopped, "asked to stop"};
-    if (stop.stop_requested()) return stopped;
-    if (lockstep || keys_.pace == Pace::Fast) {
-      pacing_since_.reset();
-      return {};
-    }
-    const SteadyTime now = std::chrono::steady_clock::now();
-    if (keys_.pace == Pace::Trigger) {
-      if (triggers_ > 0) return --triggers_, Result<>{};
-      if (!sleepUntil(now + kLongestWait, stop)) return stopped;
-      return Error{Error::Code::Timeout, "no trigger within a second"};
-    }
-    if (!pacing_since_) {
-      pacing_since_ = now - std::chrono::nanoseconds{deviceTime().ns};
-      clock_ = relateToHost(deviceTime(), now);
-    }
-    const SteadyTime due = *pacing_since_ + std::chrono::nanoseconds{deviceTime().ns};
-    if (now > due) {
-      lost = static_cast<std::uint64_t>((now - due).count() / intervalNs());
-      index_ += lost;
-      return {};
-    }
-    if (due - now > kLongestWait) {
-      return sleepUntil(now + kLongestWait, stop) ? Error{Error::Code::Timeout, "not yet"}
-                                                  : stopped;
-    }
-    return sleepUntil(due, stop) ? Result<>{} : stopped;
-  }
-
   /// The planes of the next frame: the light of the pose with this frame's noise.
   std::vector<Plane> expose(const Moment& moment) {
     if (!collected_ || !model_.collectsTheSameEachFrame()) {
-      collected_ = model_.collect(view_.light(), moment, keys_.seed, index_);
+      collected_ = model_.collect(view_.light(), moment, keys_.seed, pacer_.index());
     }
-    return sim::planesOf(model_, model_.readOut(*collected_, moment, keys_.seed, index_),
+    return sim::planesOf(model_, model_.readOut(*collected_, moment, keys_.seed, pacer_.index()),
                          view_.light().truth, info_.planes);
   }
 
-  [[nodiscard]] std::int64_t intervalNs() const {
-    return std::max<std::int64_t>(1, std::llround(info_.frame_interval->in(nanosecond)));
-  }
-  [[nodiscard]] DeviceTime deviceTime() const {
-    return {static_cast<std::int64_t>(index_) * intervalNs()};
-  }
   [[nodiscard]] Duration deviceDuration() const {
-    return static_cast<double>(deviceTime().ns) * nanosecond;
+    return static_cast<double>(pacer_.deviceTime().ns) * nanosecond;
   }
 
   [[nodiscard]] Moment momentOfFrame() const {
     Moment moment;
-    moment.exposures = model_.exposures(deviceTime());
-    moment.clock = clock_;
+    moment.exposures = model_.exposures(pacer_.deviceTime());
+    moment.clock = pacer_.clock();
     moment.since_power_on = since_power_on_ + deviceDuration();
     moment.temperatures = {{"room", room_temperature_}};
     moment.ambient = ambient_;
@@ -265,12 +227,8 @@ class SimulatedSource final : public Source {
   SourceInfo info_;
   View view_;
   std::optional<sim::Samples> collected_;  ///< of the present pose and parameters, free of noise
-  std::uint64_t index_ =
-      0;  ///< of the next frame since the camera was opened, lost ones counted; keys its noise
+  Pacer pacer_;  ///< its frame index keys the noise
   std::uint64_t made_ = 0;  ///< since start()
-  std::uint64_t triggers_ = 0;
-  std::optional<SteadyTime> pacing_since_;  ///< when device time 0 was, if paced in real time
-  ClockRelation clock_;
   Duration since_power_on_;  ///< at device time 0
   Temperature room_temperature_;
   Illuminance ambient_;
