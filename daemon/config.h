@@ -53,7 +53,8 @@ struct LimitKeys {
     v.number("subscriptions_per_session", subscriptions_per_session, {1, 1000},
              "streams that one client may have at once");
     v.number("lossless_mb", lossless_mb, {1, 1'000'000},
-             "what may wait for one lossless subscriber or recording before it ends with Overrun");
+             "what may wait for one subscriber or recording; beyond it a lossless one ends with "
+             "Overrun, others lose their oldest frames");
     v.number("request_kb", request_kb, {1, 1024}, "longest request that a client may send");
     v.quantity("handshake", handshake, second, {0.1, 3600},
                "a client that said no Hello by then is cut off");

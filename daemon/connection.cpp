@@ -134,8 +134,8 @@ void Connection::send(const Session::Outgoing& outgoing) {
   wire::FrameMessage message{subscription, delivery.frame->frame};
   message.frame.dropped_before = delivery.dropped_before;
   wire::Encoded encoded = wire::encode(message, delivery.frame->body);
-  if (in_shared_memory && delivery.frame->shared_body) {
-    return socket_.asyncWrite(std::move(encoded), delivery.frame->shared_body, sent);
+  if (auto shared = in_shared_memory ? delivery.frame->sharedBody() : nullptr) {
+    return socket_.asyncWrite(std::move(encoded), std::move(shared), sent);
   }
   socket_.asyncWrite(std::move(encoded), sent);
 }

@@ -6,6 +6,26 @@
 #include <utility>
 
 namespace toftwin::daemon {
+namespace {
+
+/// Smaller bodies go through the socket faster than through a file descriptor and a mapping.
+constexpr std::uint64_t kSmallestSharedBody = 64 * 1024;
+/// Of a frame beside its planes: its tables, exposures and allocations, rounded up.
+constexpr std::uint64_t kFrameOverhead = 4096;
+
+}  // namespace
+
+std::shared_ptr<const transport::SharedBody> PreparedFrame::sharedBody() const {
+  if (body.bytes < kSmallestSharedBody) return nullptr;
+  const std::scoped_lock lock{mutex_};
+  if (auto shared = shared_.lock()) return shared;
+  const auto made = transport::SharedBody::create(body);
+  if (!made) return nullptr;
+  shared_ = *made;
+  return *made;
+}
+
+std::uint64_t PreparedFrame::heldBytes() const { return body.bytes + kFrameOverhead; }
 
 FrameQueue::FrameQueue(Settings settings, std::function<void()> wake)
     : settings_(settings), wake_(std::move(wake)) {}
@@ -31,7 +51,7 @@ void FrameQueue::push(PreparedFramePtr frame) {
     if (end_) return;
     const bool was_empty = frames_.empty();
     if (settings_.policy == wire::Policy::Lossless &&
-        bytes_ + frame->body.bytes > settings_.byte_limit) {
+        bytes_ + frame->heldBytes() > settings_.byte_limit) {
       end_ = Error{
           Error::Code::Overrun,
           fmt::format("{} frames ({} MB) wait for this lossless subscriber, which is the "
@@ -39,18 +59,30 @@ void FrameQueue::push(PreparedFramePtr frame) {
                       "the limit",
                       frames_.size(), bytes_ >> 20)};
     } else {
-      bytes_ += frame->body.bytes;
+      bytes_ += frame->heldBytes();
       frames_.push_back(std::move(frame));
-      if (settings_.policy == wire::Policy::Latest && frames_.size() > 1) dropOldest();
-      if (settings_.policy == wire::Policy::Queue && frames_.size() > settings_.depth) dropOldest();
+      while (frames_.size() > 1 && isTooMuch()) dropOldest();
     }
     if (!was_empty) return;
   }
   wake_();
 }
 
+bool FrameQueue::isTooMuch() const {
+  switch (settings_.policy) {
+    case wire::Policy::Lossless:
+      return false;  // it has ended with Overrun before
+    case wire::Policy::Queue:
+      return frames_.size() > settings_.depth || bytes_ > settings_.byte_limit;
+    case wire::Policy::Latest:
+    case wire::Policy::Lockstep:  // whose source waits for it, so that there is never a second
+      break;
+  }
+  return frames_.size() > 1;
+}
+
 void FrameQueue::dropOldest() {
-  bytes_ -= frames_.front()->body.bytes;
+  bytes_ -= frames_.front()->heldBytes();
   frames_.pop_front();
   ++dropped_;
 }
@@ -70,12 +102,17 @@ bool FrameQueue::hasEnded() const {
   return end_.has_value();
 }
 
+std::uint64_t FrameQueue::heldBytes() const {
+  const std::scoped_lock lock{mutex_};
+  return bytes_;
+}
+
 std::optional<FrameQueue::Item> FrameQueue::take() {
   const std::scoped_lock lock{mutex_};
   if (!frames_.empty()) {
     Delivery delivery{std::move(frames_.front()), std::exchange(dropped_, 0)};
     frames_.pop_front();
-    bytes_ -= delivery.frame->body.bytes;
+    bytes_ -= delivery.frame->heldBytes();
     return delivery;
   }
   if (!end_ || end_taken_) return std::nullopt;

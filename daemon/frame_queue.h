@@ -23,8 +23,17 @@ namespace toftwin::daemon {
 struct PreparedFrame {
   Frame frame;
   wire::Body body;
-  std::shared_ptr<const transport::SharedBody>
-      shared_body;  ///< for clients on this machine, or null
+
+  /// The body in shared memory, for clients on this machine; null if it is small or if there is no
+  /// shared memory to be had. Made when it is first sent and gone when the writes that it was given
+  /// to are done, so that frames that wait hold no file descriptor. May be called on any thread.
+  [[nodiscard]] std::shared_ptr<const transport::SharedBody> sharedBody() const;
+  /// What a queue holds in memory with this frame.
+  [[nodiscard]] std::uint64_t heldBytes() const;
+
+ private:
+  mutable std::mutex mutex_;
+  mutable std::weak_ptr<const transport::SharedBody> shared_;
 };
 /// Shared by the queues and socket writes of all subscriptions with that selection; nobody changes
 /// it.
@@ -38,8 +47,9 @@ class FrameQueue {
     wire::Policy policy = wire::Policy::Latest;
     std::size_t depth = 1;     ///< for Policy::Queue
     double max_rate_hz = 0.0;  ///< 0: every frame
-    std::uint64_t byte_limit =
-        0;  ///< for Policy::Lossless: ends with Overrun rather than hold more
+    /// What may wait, whatever the policy: Lossless ends with Overrun rather than hold more, the
+    /// others drop their oldest, but never their only frame.
+    std::uint64_t byte_limit = 256ull << 20;
   };
   /// A frame to send, with the number of frames dropped since the one before.
   struct Delivery {
@@ -59,11 +69,14 @@ class FrameQueue {
   /// No more frames. The reason comes out after the frames that wait.
   void end(Error reason);
   [[nodiscard]] bool hasEnded() const;
+  /// What waits.
+  [[nodiscard]] std::uint64_t heldBytes() const;
 
   /// The next frame, or the reason of the end; once the end came out there is nothing more.
   std::optional<Item> take();
 
  private:
+  [[nodiscard]] bool isTooMuch() const;
   void dropOldest();
 
   const Settings settings_;

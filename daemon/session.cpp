@@ -185,8 +185,11 @@ Session::Answers Session::on(const wire::Acknowledge& request) {
   // One that is unknown has just ended, which the client learns at the same time.
   const auto found = subscriptions_.find(request.subscription);
   if (found == subscriptions_.end()) return {};
+  // A client cannot have what was not sent: believing it would let it run a lockstep source ahead.
   auto& on_way = found->second.on_way;
-  while (!on_way.empty() && on_way.front() <= request.sequence) on_way.pop_front();
+  const auto acknowledged = std::ranges::find(on_way, request.sequence);
+  if (acknowledged == on_way.end()) return {};
+  on_way.erase(on_way.begin(), acknowledged + 1);
   found->second.source->acknowledge(found->second.subscriber, request.sequence);
   return {};
 }

@@ -146,7 +146,7 @@ void SourceHost::waitForDelivery() { const std::scoped_lock lock{delivering_}; }
 void SourceHost::acknowledge(const SubscriberPtr& subscriber, std::uint64_t sequence) {
   {
     const std::scoped_lock lock{mutex_};
-    if (!subscriber->unacknowledged || sequence < *subscriber->unacknowledged) return;
+    if (subscriber->unacknowledged != sequence) return;
     subscriber->unacknowledged.reset();
   }
   work_.notify_all();

@@ -1,28 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/subscriber.h"
 
-#include <algorithm>
 #include <cstddef>
-
-#include "protocol/transport/memfd.h"
 
 namespace toftwin::daemon {
 namespace {
 
-/// Smaller bodies go through the socket faster than through a file descriptor and a mapping.
-constexpr std::uint64_t kSmallestSharedBody = 64 * 1024;
-
-Result<PreparedFramePtr> prepare(const Frame& frame, const Selection& selection, bool share) {
+Result<PreparedFramePtr> prepare(const Frame& frame, const Selection& selection) {
   Result<Frame> selected = select(frame, selection);
   if (!selected) return selected.error();
   auto prepared = std::make_shared<PreparedFrame>();
   prepared->frame = *std::move(selected);
   prepared->body = wire::encodeBody(prepared->frame.planes);
-  if (share && prepared->body.bytes >= kSmallestSharedBody) {
-    // Where there is no shared memory to be had, the body goes through the socket.
-    if (auto shared = transport::SharedBody::create(prepared->body))
-      prepared->shared_body = *shared;
-  }
   return PreparedFramePtr{std::move(prepared)};
 }
 
@@ -39,9 +28,7 @@ void fanOut(const Frame& frame, const std::vector<SubscriberPtr>& takers) {
       is_served[i] = true;
       equals.push_back(takers[i]);
     }
-    const bool share = std::ranges::any_of(
-        equals, [](const SubscriberPtr& taker) { return taker->wish.in_shared_memory; });
-    const Result<PreparedFramePtr> prepared = prepare(frame, wanted, share);
+    const Result<PreparedFramePtr> prepared = prepare(frame, wanted);
     for (const SubscriberPtr& taker : equals) {
       if (prepared) {
         taker->queue.push(*prepared);

@@ -33,8 +33,8 @@ struct Subscriber {
 /// Shared by the source's host, which fills the queue, and the session or recorder that empties it.
 using SubscriberPtr = std::shared_ptr<Subscriber>;
 
-/// Hands a frame to everyone who takes it. It is selected and encoded once per distinct selection,
-/// and put into shared memory once, if somebody takes it from there.
+/// Hands a frame to everyone who takes it. It is selected and encoded once per distinct
+/// selection.
 void fanOut(const Frame& frame, const std::vector<SubscriberPtr>& takers);
 
 }  // namespace toftwin::daemon

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
+#include <sys/resource.h>
 
 #include <cstdlib>
 #include <exception>
@@ -57,6 +58,15 @@ int serve(const Arguments& arguments) {
   return kOk;
 }
 
+/// As many files as the administrator allows: each client is one, and frames in shared memory are, on
+/// their way. The soft limit is low by default for the sake of programs that use select(2).
+void raiseFileLimit() {
+  rlimit files{};
+  if (::getrlimit(RLIMIT_NOFILE, &files) != 0 || files.rlim_cur == files.rlim_max) return;
+  files.rlim_cur = files.rlim_max;
+  if (::setrlimit(RLIMIT_NOFILE, &files) != 0) spdlog::debug("the limit of open files stays");
+}
+
 /// To standard error; without the time where the journal adds it.
 void setUpLog() {
   auto log = spdlog::stderr_logger_mt("toftwind");
@@ -88,6 +98,7 @@ int run(int argc, char** argv) {
     return kOk;
   }
   setUpLog();
+  raiseFileLimit();
   return arguments.only_check ? check(arguments) : serve(arguments);
 }
 

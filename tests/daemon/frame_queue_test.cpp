@@ -16,6 +16,7 @@ PreparedFramePtr frameNumber(std::uint64_t sequence, std::uint64_t bytes = 64) {
   frame->body.bytes = bytes;
   return frame;
 }
+const std::uint64_t kHeld = frameNumber(0)->heldBytes();
 FrameQueue queueWith(FrameQueue::Settings settings) {
   return {settings, [] {}};
 }
@@ -48,7 +49,7 @@ TEST(FrameQueue, QueueDropsTheOldestAndCountsThemOnce) {
 }
 
 TEST(FrameQueue, LosslessEndsWithOverrunAfterAllThatWaited) {
-  FrameQueue queue = queueWith({.policy = Policy::Lossless, .byte_limit = 3 * 64});
+  FrameQueue queue = queueWith({.policy = Policy::Lossless, .byte_limit = 3 * kHeld});
   for (std::uint64_t i = 0; i < 10; ++i) queue.push(frameNumber(i));
   for (std::uint64_t i = 0; i < 3; ++i) {
     const auto next = delivered(queue);
@@ -61,12 +62,55 @@ TEST(FrameQueue, LosslessEndsWithOverrunAfterAllThatWaited) {
 }
 
 TEST(FrameQueue, TakingMakesRoomForALosslessSubscriber) {
-  FrameQueue queue = queueWith({.policy = Policy::Lossless, .byte_limit = 2 * 64});
+  FrameQueue queue = queueWith({.policy = Policy::Lossless, .byte_limit = 2 * kHeld});
   for (std::uint64_t i = 0; i < 100; ++i) {
     queue.push(frameNumber(i));
     EXPECT_EQ(delivered(queue).frame->frame.sequence, i);
   }
   EXPECT_FALSE(queue.hasEnded());
+}
+
+TEST(FrameQueue, QueueDropsTheOldestRatherThanHoldMoreThanItsBytes) {
+  FrameQueue queue = queueWith({.policy = Policy::Queue, .depth = 1024, .byte_limit = 3 * kHeld});
+  for (std::uint64_t i = 0; i < 10; ++i) {
+    queue.push(frameNumber(i));
+    ASSERT_LE(queue.heldBytes(), 3 * kHeld);
+  }
+  const auto next = delivered(queue);
+  EXPECT_EQ(next.frame->frame.sequence, 7u);
+  EXPECT_EQ(next.dropped_before, 7u);
+}
+
+TEST(FrameQueue, AFrameThatIsTooLargeByItselfIsKeptUntilTheNext) {
+  FrameQueue queue = queueWith({.policy = Policy::Queue, .depth = 1024, .byte_limit = kHeld});
+  queue.push(frameNumber(0, 1000));
+  queue.push(frameNumber(1, 1000));
+  EXPECT_EQ(delivered(queue).frame->frame.sequence, 1u);
+  EXPECT_EQ(queue.heldBytes(), 0u);
+}
+
+TEST(FrameQueue, NeverHoldsMoreThanOneFrameUnderLockstep) {
+  FrameQueue queue = queueWith({.policy = Policy::Lockstep});
+  for (std::uint64_t i = 0; i < 3; ++i) queue.push(frameNumber(i));
+  EXPECT_EQ(queue.heldBytes(), kHeld);
+  EXPECT_EQ(delivered(queue).frame->frame.sequence, 2u);
+}
+
+TEST(FrameQueue, EmptyFramesCountToo) {
+  EXPECT_GT(frameNumber(0, 0)->heldBytes(), sizeof(PreparedFrame));
+}
+
+TEST(PreparedFrame, IsInSharedMemoryOnlyWhileItIsBeingSent) {
+  PreparedFrame frame;
+  const std::vector<std::byte> bytes(100'000, std::byte{7});
+  frame.body = {.pieces = {Buffer::adopt(bytes)}, .bytes = bytes.size(), .crc32c = 0};
+  auto one = frame.sharedBody();
+  ASSERT_NE(one, nullptr);
+  EXPECT_EQ(frame.sharedBody(), one) << "subscribers that are sent it together share it";
+  const std::weak_ptr<const transport::SharedBody> gone = one;
+  one.reset();
+  EXPECT_TRUE(gone.expired());
+  EXPECT_NE(frame.sharedBody(), nullptr);
 }
 
 TEST(FrameQueue, TheFirstReasonOfAnEndCounts) {

@@ -134,6 +134,27 @@ TEST(Session, AcknowledgingLetsALockstepSourceGoOn) {
   EXPECT_EQ(talk.frame().delivery.frame->frame.sequence, 1u);
 }
 
+TEST(Session, AcknowledgingWhatWasNotSentDoesNotMakeALockstepSourceGoOn) {
+  Conversation talk;
+  talk.hello();
+  const auto id = talk.subscribe(wish(wire::Policy::Lockstep));
+  talk.remote->give(3);
+  constexpr auto kLast = std::numeric_limits<std::uint64_t>::max();
+  ASSERT_TRUE(talk.remote->asked.reaches(1));
+  EXPECT_TRUE(talk.session->handle(wire::Acknowledge{id, 0}).empty());  // made, perhaps; not sent
+  EXPECT_EQ(talk.frame().delivery.frame->frame.sequence, 0u);
+  EXPECT_TRUE(talk.session->handle(wire::Acknowledge{id, 1}).empty());
+  EXPECT_TRUE(talk.session->handle(wire::Acknowledge{id, kLast}).empty());
+  // A command is done between frames: after it, a frame that was due would have been made.
+  for (std::uint64_t i = 0; i < 3; ++i) {
+    talk.session->handle(wire::SetPose{i, "cam", {}});
+    EXPECT_EQ(std::get<wire::Done>(std::get<Message>(talk.later())).id, i);
+  }
+  EXPECT_EQ(talk.hub.health().sources.at(0).frames, 1u);
+  EXPECT_TRUE(talk.session->handle(wire::Acknowledge{id, 0}).empty());
+  EXPECT_EQ(talk.frame().delivery.frame->frame.sequence, 1u);
+}
+
 TEST(Session, CommandsAreAnsweredWhenTheSourceHasDoneThem) {
   Conversation talk;
   talk.hello();
