@@ -3,6 +3,7 @@
 #include "protocol/record/recording.h"
 
 #include <gmock/gmock.h>
+#include <grp.h>
 #include <sched.h>
 #include <sys/mount.h>
 #include <sys/resource.h>
@@ -10,6 +11,7 @@
 #include <unistd.h>
 
 #include <csignal>
+#include <fstream>
 
 #include "protocol/record/mcap_reader.h"
 #include "protocol/record/mcap_writer.h"
@@ -255,27 +257,50 @@ TEST_F(Recording, AFileSizeLimitIsAFullDisk) {
   std::signal(SIGXFSZ, SIG_DFL);
 }
 
-TEST_F(Recording, AFullFileSystemKeepsAllWholeChunks) {
-  const std::filesystem::path small = folder_ / "small";
-  std::filesystem::create_directory(small);
-  const pid_t child = ::fork();  // in a mount namespace of its own, so nothing stays mounted
-  ASSERT_GE(child, 0);
+constexpr int kImpossibleHere = 77;
+
+/// The exit status of a child process that runs `body`; −1 if it did not exit by itself.
+template <class Body>
+int inAChild(Body body) {
+  const pid_t child = ::fork();
   if (child == 0) {
-    if (::unshare(CLONE_NEWNS) != 0 ||
-        ::mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0 ||
-        ::mount("tmpfs", small.c_str(), "tmpfs", 0, "size=500k") != 0) {
-      ::_exit(77);
-    }
-    auto writer = Writer::create(small / "a.mcap", {.chunk_bytes = 30'000, .zstd_level = 0});
-    if (!writer) ::_exit(1);
-    expectWholeUpToTheLastChunk(*writer, small / "a.mcap");
+    body();
     ::_exit(testing::Test::HasFailure() ? 1 : 0);
   }
   int status = 0;
-  ::waitpid(child, &status, 0);
-  ASSERT_TRUE(WIFEXITED(status));
-  if (WEXITSTATUS(status) == 77) GTEST_SKIP() << "a tmpfs can be mounted here only by root";
-  EXPECT_EQ(WEXITSTATUS(status), 0);
+  if (child < 0 || ::waitpid(child, &status, 0) != child || !WIFEXITED(status)) return -1;
+  return WEXITSTATUS(status);
+}
+
+/// Enters a mount namespace of its own, so nothing stays mounted; whoever may not, in a user
+/// namespace in which they are root.
+bool enterMountNamespace() {
+  const auto uid = ::geteuid();
+  const auto gid = ::getegid();
+  if (::unshare(CLONE_NEWNS) != 0) {
+    if (::unshare(CLONE_NEWUSER | CLONE_NEWNS) != 0) return false;
+    std::ofstream{"/proc/self/setgroups"} << "deny";
+    std::ofstream{"/proc/self/uid_map"} << "0 " << uid << " 1";
+    std::ofstream{"/proc/self/gid_map"} << "0 " << gid << " 1";
+  }
+  return ::mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) == 0;
+}
+
+TEST_F(Recording, AFullFileSystemKeepsAllWholeChunks) {
+  const std::filesystem::path small = folder_ / "small";
+  std::filesystem::create_directory(small);
+  const int status = inAChild([&] {
+    if (!enterMountNamespace() || ::mount("tmpfs", small.c_str(), "tmpfs", 0, "size=500k") != 0) {
+      ::_exit(kImpossibleHere);
+    }
+    auto writer = Writer::create(small / "a.mcap", {.chunk_bytes = 30'000, .zstd_level = 0});
+    ASSERT_TRUE(writer) << writer.error().message;
+    expectWholeUpToTheLastChunk(*writer, small / "a.mcap");
+  });
+  if (status == kImpossibleHere)
+    GTEST_SKIP()
+        << "this system lets this user mount a tmpfs neither as is nor in a user namespace";
+  EXPECT_EQ(status, 0);
 }
 
 TEST_F(Recording, ADeviceThatIsFullIsNamedAtOnce) {
@@ -285,13 +310,25 @@ TEST_F(Recording, ADeviceThatIsFullIsNamedAtOnce) {
 }
 
 TEST_F(Recording, AFolderThatMayNotBeWrittenIsNamed) {
-  if (::geteuid() == 0) {
-    ASSERT_EQ(Writer::create("/proc/a.mcap").error().code, Error::Code::NotFound);
-    GTEST_SKIP() << "root may write everywhere";
-  }
-  const auto writer = Writer::create("/a.mcap");
-  ASSERT_FALSE(writer);
-  EXPECT_EQ(writer.error().code, Error::Code::PermissionDenied);
+  constexpr unsigned kNobody = 65534;
+  using std::filesystem::perms;
+  const std::filesystem::path closed = folder_ / "closed";
+  std::filesystem::create_directory(closed);
+  std::filesystem::permissions(closed, perms::owner_read | perms::owner_exec);
+  const int status = inAChild([&] {
+    // Root may write everywhere, so it first becomes somebody who may not.
+    if (::geteuid() == 0 &&
+        (::setgroups(0, nullptr) != 0 || ::setgid(kNobody) != 0 || ::setuid(kNobody) != 0)) {
+      ::_exit(kImpossibleHere);
+    }
+    const auto writer = Writer::create(closed / "a.mcap");
+    ASSERT_FALSE(writer);
+    EXPECT_EQ(writer.error().code, Error::Code::PermissionDenied);
+    EXPECT_THAT(writer.error().message, HasSubstr(closed.string()));
+  });
+  if (status == kImpossibleHere)
+    GTEST_SKIP() << "root may write everywhere, and here it cannot become another user";
+  EXPECT_EQ(status, 0);
 }
 
 TEST_F(Recording, AnMcapFileWithoutFramesIsIncompatible) {
