@@ -2,8 +2,10 @@
 #include "drivers/replay/replay.h"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -18,6 +20,52 @@ std::int64_t deviceTime_ns(const Frame& frame) {
   return frame.moment.exposures.empty() ? 0 : frame.moment.exposures.front().start.ns;
 }
 
+constexpr std::int64_t kMost_ns = std::numeric_limits<std::int64_t>::max();
+constexpr std::int64_t kLeast_ns = std::numeric_limits<std::int64_t>::min();
+
+// A file may hold any times: sums and differences stop at the ends of what can be expressed.
+std::int64_t plus(std::int64_t a, std::int64_t b) {
+  std::int64_t sum = 0;
+  return __builtin_add_overflow(a, b, &sum) ? (b < 0 ? kLeast_ns : kMost_ns) : sum;
+}
+std::int64_t minus(std::int64_t a, std::int64_t b) {
+  std::int64_t difference = 0;
+  return __builtin_sub_overflow(a, b, &difference) ? (b < 0 ? kMost_ns : kLeast_ns) : difference;
+}
+
+/// The time between the first two frames if it can be one between frames.
+std::optional<std::int64_t> intervalOf_ns(const Frame& first, const Frame& second) {
+  const std::int64_t interval_ns = minus(deviceTime_ns(second), deviceTime_ns(first));
+  if (interval_ns <= 0 || interval_ns == kMost_ns) return std::nullopt;
+  return interval_ns;
+}
+
+/// The places of a recording that could not be read.
+struct Damage {
+  std::uint64_t places = 0;
+  std::string first;
+
+  void add(const Error& error) {
+    if (++places == 1) first = error.message;
+  }
+  [[nodiscard]] std::string text() const {
+    if (places == 0) return {};
+    return fmt::format("; {} damaged place{} left out{}: {}", places,
+                       places == 1 ? " was" : "s were", places == 1 ? "" : ", the first", first);
+  }
+};
+
+/// The next frame that is whole. The reader goes on behind what it cannot read, so this ends.
+Result<Frame> nextWhole(record::Reader& reader, const std::string& source, Damage& damage,
+                        const std::stop_token& stop) {
+  while (true) {
+    Result<Frame> frame = reader.next(source);
+    if (frame || frame.error().code == Error::Code::EndOfStream) return frame;
+    damage.add(frame.error());
+    if (stop.stop_requested()) return Error{Error::Code::Stopped, "asked to stop"};
+  }
+}
+
 /// What the recording's first two frames tell of the camera.
 SourceInfo describe(const std::string& file, const Frame& first, const Frame* second) {
   SourceInfo info;
@@ -28,8 +76,8 @@ SourceInfo describe(const std::string& file, const Frame& first, const Frame* se
   info.camera = first.camera;
   for (const Plane& plane : first.planes) info.planes.push_back(plane.kind);
   if (second != nullptr) {
-    info.frame_interval =
-        static_cast<double>(deviceTime_ns(*second) - deviceTime_ns(first)) * nanosecond;
+    if (const auto interval_ns = intervalOf_ns(first, *second))
+      info.frame_interval = static_cast<double>(*interval_ns) * nanosecond;
   }
   info.can_lockstep = true;
   return info;
@@ -37,11 +85,13 @@ SourceInfo describe(const std::string& file, const Frame& first, const Frame* se
 
 class ReplaySource final : public Source {
  public:
-  ReplaySource(const Keys& keys, std::string source, record::Reader reader, SourceInfo info)
+  ReplaySource(const Keys& keys, std::string source, record::Reader reader, SourceInfo info,
+               std::optional<std::int64_t> interval_ns)
       : keys_(keys),
         source_(std::move(source)),
         reader_(std::move(reader)),
-        info_(std::move(info)) {}
+        info_(std::move(info)),
+        interval_ns_(interval_ns.value_or(1'000'000)) {}
 
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
 
@@ -56,7 +106,7 @@ class ReplaySource final : public Source {
 
   Result<Frame> next(std::stop_token stop, bool lockstep) override {
     if (stop.stop_requested()) return Error{Error::Code::Stopped, "asked to stop"};
-    if (auto fetched = fetch(); !fetched) return fetched.error();
+    if (auto fetched = fetch(stop); !fetched) return fetched.error();
     if (lockstep || keys_.pace == Pace::Fast) {
       paced_.reset();
     } else if (auto turn = waitForTurn(stop); !turn) {
@@ -75,12 +125,12 @@ class ReplaySource final : public Source {
   };
 
   /// Reads the next frame ahead, unless one waits already.
-  Result<> fetch() {
+  Result<> fetch(const std::stop_token& stop) {
     if (waiting_) return {};
-    Result<Frame> frame = reader_.next(source_);
+    Result<Frame> frame = read(stop);
     if (!frame && frame.error().code == Error::Code::EndOfStream && keys_.loop && played_ > 0) {
       rewind();
-      frame = reader_.next(source_);
+      frame = read(stop);
     }
     if (!frame) return endOf(frame.error());
     if (frame->camera != info_.camera) {
@@ -91,18 +141,38 @@ class ReplaySource final : public Source {
     }
     frame->provenance.kind = FrameKind::Replayed;
     if (!first_device_ns_) first_device_ns_ = deviceTime_ns(*frame);
-    for (Exposure& exposure : frame->moment.exposures) exposure.start.ns += shift_ns_;
-    frame->moment.received.ns += shift_ns_;
+    for (Exposure& exposure : frame->moment.exposures) exposure.start.ns = moved(exposure.start.ns);
+    frame->moment.received.ns = moved(frame->moment.received.ns);
     waiting_ = *std::move(frame);
     return {};
+  }
+
+  /// The next whole frame. What damage took away counts as lost: as many frames as the recorded
+  /// sequence numbers leave out there.
+  Result<Frame> read(const std::stop_token& stop) {
+    const std::uint64_t places_before = damage_.places;
+    Result<Frame> frame = nextWhole(reader_, source_, damage_, stop);
+    damage_before_next_ |= damage_.places > places_before;
+    if (damage_before_next_ && !warned_ &&
+        (frame || frame.error().code == Error::Code::EndOfStream)) {
+      spdlog::warn("replay of {}, after {} frames{}", info_.serial, played_, damage_.text());
+      warned_ = true;  // once; a loop would say it for ever
+    }
+    if (!frame) return frame;
+    if (std::exchange(damage_before_next_, false) && last_sequence_ &&
+        frame->sequence > *last_sequence_) {
+      frame->dropped_by_device += frame->sequence - *last_sequence_ - 1;
+    }
+    last_sequence_ = frame->sequence;
+    return frame;
   }
 
   Error endOf(const Error& error) const {
     if (error.code != Error::Code::EndOfStream) return error;
     const std::string& damage = reader_.summary().damage;
     return {Error::Code::EndOfStream,
-            fmt::format("{} ended after {} frames{}", info_.serial, played_,
-                        damage.empty() ? "" : "; it is damaged: " + damage)};
+            fmt::format("{} ended after {} frames{}{}", info_.serial, played_,
+                        damage.empty() ? "" : "; it is damaged: " + damage, damage_.text())};
   }
 
   void rewind() {
@@ -110,18 +180,27 @@ class ReplaySource final : public Source {
     waiting_.reset();
     paced_.reset();
     played_ = 0;
+    damage_ = {};
+    damage_before_next_ = false;
+    last_sequence_.reset();
     if (!last_device_ns_ || !first_device_ns_) return;
-    const auto interval = info_.frame_interval.value_or(1_ms).in(nanosecond);
-    shift_ns_ = *last_device_ns_ + std::max<std::int64_t>(1, static_cast<std::int64_t>(interval)) -
-                *first_device_ns_;
+    round_begins_ns_ = plus(*last_device_ns_, interval_ns_);
+  }
+
+  /// A recorded time as it is given out. The difference comes first: if the sum cannot be
+  /// expressed, device time stands still, but does not go back.
+  [[nodiscard]] std::int64_t moved(std::int64_t time_ns) const {
+    return round_begins_ns_ ? plus(*round_begins_ns_, minus(time_ns, *first_device_ns_)) : time_ns;
   }
 
   Result<> waitForTurn(const std::stop_token& stop) {
     const SteadyTime now = std::chrono::steady_clock::now();
     const std::int64_t received_ns = waiting_->moment.received.ns;
     if (!paced_) paced_ = Paced{now, received_ns};
-    const SteadyTime due =
-        paced_->since + std::chrono::nanoseconds{received_ns - paced_->received_ns};
+    // Half of what can be expressed leaves room for the steady clock's own time.
+    const std::int64_t after_ns =
+        std::clamp(minus(received_ns, paced_->received_ns), kLeast_ns / 2, kMost_ns / 2);
+    const SteadyTime due = paced_->since + std::chrono::nanoseconds{after_ns};
     if (!sleepUntil(std::min(due, now + kLongestWait), stop)) {
       return Error{Error::Code::Stopped, "asked to stop"};
     }
@@ -134,10 +213,15 @@ class ReplaySource final : public Source {
   const std::string source_;
   record::Reader reader_;
   const SourceInfo info_;
-  std::optional<Frame> waiting_;  ///< read, and due later
+  const std::int64_t interval_ns_;  ///< from the last frame to the first of the next round
+  std::optional<Frame> waiting_;    ///< read, and due later
   std::optional<Paced> paced_;
-  std::uint64_t played_ = 0;  ///< since the beginning of the recording
-  std::int64_t shift_ns_ = 0;
+  std::uint64_t played_ = 0;         ///< since the beginning of the recording
+  Damage damage_;                    ///< since the beginning of the recording
+  bool damage_before_next_ = false;  ///< since the last frame that was read
+  bool warned_ = false;
+  std::optional<std::uint64_t> last_sequence_;   ///< as recorded, of the last frame that was read
+  std::optional<std::int64_t> round_begins_ns_;  ///< device time, if times are moved
   std::optional<std::int64_t> first_device_ns_;  ///< as recorded
   std::optional<std::int64_t> last_device_ns_;   ///< as given out
 };
@@ -179,12 +263,18 @@ Result<std::unique_ptr<Source>> open(settings::Table& table) {
   }
   const std::string source = chooseSource(keys, reader->summary(), table);
   if (auto checked = table.check(); !checked) return checked.error();
-  const Result<Frame> first = reader->next(source);
-  if (!first) return first.error();
-  const Result<Frame> second = reader->next(source);
+  Damage damage;
+  const Result<Frame> first = nextWhole(*reader, source, damage, {});
+  if (!first) {
+    table.complain("file", fmt::format("\"{}\" has no frame of \"{}\" that can be read{}",
+                                       keys.file, source, damage.text()));
+    return table.check().error();
+  }
+  const Result<Frame> second = reader->next(source);  // behind damage it would not be the second
   SourceInfo info = describe(keys.file, *first, second ? &second.value() : nullptr);
-  return std::unique_ptr<Source>{
-      std::make_unique<ReplaySource>(keys, source, *std::move(reader), std::move(info))};
+  const auto interval_ns = second ? intervalOf_ns(*first, *second) : std::nullopt;
+  return std::unique_ptr<Source>{std::make_unique<ReplaySource>(keys, source, *std::move(reader),
+                                                                std::move(info), interval_ns)};
 }
 
 }  // namespace
