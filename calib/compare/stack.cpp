@@ -101,7 +101,6 @@ Result<> Stack::begin(const Frame& frame) {
   camera_ = frame.camera;
   pose_ = frame.moment.world_from_camera;
   provenance_ = frame.provenance;
-  first_sequence_ = frame.sequence;
   if (frame.find(PlaneKind::Range) == nullptr) range_per_z_ = rangePerDepth(camera_);
   range_m_ = Image<Running>(camera_.width, camera_.height);
   if (floats(frame, PlaneKind::Amplitude) != nullptr)
@@ -136,9 +135,6 @@ Result<> Stack::add(const Frame& frame) {
   }
   ++frames_;
   last_sequence_ = frame.sequence;
-  const auto& on = frame.moment.since_power_on;
-  instants_.push_back(
-      {on ? on->in(second) : std::numeric_limits<double>::quiet_NaN(), frame.sequence});
   return {};
 }
 

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include <toftwin/frame.h>
 #include <toftwin/image.h>
@@ -29,8 +28,6 @@ class Stack {
   [[nodiscard]] const std::optional<Transform<World, Camera>>& pose() const { return pose_; }
   /// The frames' provenance and moments, for the log; the first frame's.
   [[nodiscard]] const Provenance& provenance() const { return provenance_; }
-  [[nodiscard]] std::uint64_t firstSequence() const { return first_sequence_; }
-  [[nodiscard]] std::uint64_t lastSequence() const { return last_sequence_; }
 
   /// Mean range; NaN where less than half of the frames are valid.
   [[nodiscard]] Image<float> meanRange_m() const;
@@ -42,25 +39,17 @@ class Stack {
   /// if the source gives no amplitude.
   [[nodiscard]] Image<float> meanAmplitude() const;
 
-  /// One number per frame, for what changes during the capture.
-  struct Instant {
-    double since_power_on_s = 0.0;  ///< NaN where unknown
-    std::uint64_t sequence = 0;
-  };
-  [[nodiscard]] const std::vector<Instant>& instants() const { return instants_; }
-
  private:
   Result<> begin(const Frame& frame);
 
   CameraInfo camera_;
   std::optional<Transform<World, Camera>> pose_;
   Provenance provenance_;
-  std::uint64_t first_sequence_ = 0, last_sequence_ = 0;
+  std::uint64_t last_sequence_ = 0;
   std::size_t frames_ = 0;
   Image<float> range_per_z_;  ///< |ray| / z of each pixel, for depth planes
   Image<Running> range_m_;
   Image<Running> amplitude_;
-  std::vector<Instant> instants_;
 };
 
 /// The range of a frame along each pixel's ray in metres, NaN where invalid.

@@ -61,31 +61,6 @@ Json toJson(const Summary& s, const char* unit) {
   return json;
 }
 
-LineFit fitLine(std::span<const double> x, std::span<const double> y) {
-  Running mean_x, mean_y;
-  for (std::size_t i = 0; i < x.size(); ++i) {
-    if (!std::isfinite(x[i]) || !std::isfinite(y[i])) continue;
-    mean_x.add(x[i]);
-    mean_y.add(y[i]);
-  }
-  double sxx = 0.0, sxy = 0.0;
-  const auto each = [&](auto&& visit) {
-    for (std::size_t i = 0; i < x.size(); ++i) {
-      if (std::isfinite(x[i]) && std::isfinite(y[i]))
-        visit(x[i] - mean_x.mean(), y[i] - mean_y.mean());
-    }
-  };
-  each([&](double dx, double dy) { sxx += dx * dx, sxy += dx * dy; });
-  LineFit fit;
-  fit.n = mean_x.n();
-  fit.slope = sxx > 0.0 ? sxy / sxx : 0.0;
-  fit.offset = mean_y.mean() - fit.slope * mean_x.mean();
-  double squares = 0.0;
-  each([&](double dx, double dy) { squares += std::pow(dy - fit.slope * dx, 2); });
-  fit.rms_residual = fit.n > 0 ? std::sqrt(squares / static_cast<double>(fit.n)) : kNaN;
-  return fit;
-}
-
 Explained explain(std::span<const double> measured_error, std::span<const double> predicted_error) {
   Running measured, residual;
   double measured_squares = 0.0, residual_squares = 0.0;

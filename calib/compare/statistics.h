@@ -29,15 +29,6 @@ Json toJson(const Summary& summary, const char* unit);
 /// The q-quantile (0 … 1), linearly interpolated between order statistics; NaN for no values.
 double quantile(std::vector<double> values, double q);
 
-/// y = offset + slope · x, least squares in y, over pairs where both are finite.
-struct LineFit {
-  double offset = 0.0;
-  double slope = 0.0;
-  double rms_residual = 0.0;
-  std::size_t n = 0;
-};
-LineFit fitLine(std::span<const double> x, std::span<const double> y);
-
 /// How much of a measured error e a prediction p explains, over pairs where both are finite.
 ///   raw:       1 − Σ(e − p)² / Σe²                     against predicting no error at all
 ///   centred:   1 − Var(e − p) / Var(e)                 after the best constant is removed from

@@ -93,7 +93,4 @@ class SensorModel {
   std::shared_ptr<const Impl> impl_;  // shared by copies; nobody changes it
 };
 
-/// All keys of a camera file but its effects' as a Markdown table.
-std::string cameraFileTable();
-
 }  // namespace toftwin::sim

@@ -69,15 +69,6 @@ TEST(Running, KeepsSmallVarianceOnALargeMean) {
   EXPECT_DOUBLE_EQ(running.variance(), 1.0);
 }
 
-TEST(Line, IsFoundExactlyWhereThereIsNoNoise) {
-  const std::vector<double> x{0, 1, 2, kNaN, 4}, y{1, 3, 5, 7, 9};
-  const LineFit fit = fitLine(x, y);
-  EXPECT_EQ(fit.n, 4U);
-  EXPECT_NEAR(fit.offset, 1.0, 1e-12);
-  EXPECT_NEAR(fit.slope, 2.0, 1e-12);
-  EXPECT_NEAR(fit.rms_residual, 0.0, 1e-12);
-}
-
 TEST(Explained, IsAllForThePerfectPredictionAndNothingForZero) {
   const std::vector<double> error{1, 2, 3}, zero{0, 0, 0};
   EXPECT_DOUBLE_EQ(explain(error, error).fraction_raw, 1.0);

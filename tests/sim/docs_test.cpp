@@ -9,6 +9,7 @@
 #include "drivers/sim/simulator.h"
 #include "protocol/settings/describe.h"
 #include "sim/effects/effects.h"
+#include "sim/sensor/camera_file.h"
 #include "sim/sensor/sensor_model.h"
 
 namespace toftwin::sim {
@@ -58,7 +59,8 @@ TEST(Docs, NoEffectHasAPageWithoutBeing) {
 }
 
 TEST(Docs, CameraFileHasAllKeys) {
-  EXPECT_THAT(textOf("docs/camera-file.md"), HasSubstr("\n" + cameraFileTable()));
+  EXPECT_THAT(textOf("docs/camera-file.md"),
+              HasSubstr("\n" + settings::markdownTable(settings::keysOf<CameraFile>())));
 }
 
 TEST(Docs, CameraFileNamesThePresets) {
