@@ -21,6 +21,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <numeric>
 #include <string>
 #include <thread>
 #include <vector>
@@ -233,9 +234,9 @@ struct Latencies {
 };
 
 /// Runs `receive` for each client in a process of its own and gathers what they measured.
-Latencies ofAllClients(const std::function<Latencies()>& receive) {
+Latencies ofAllClients(int clients, const std::function<Latencies()>& receive) {
   std::vector<int> pipes;
-  for (int i = 0; i < kClients; ++i) {
+  for (int i = 0; i < clients; ++i) {
     int ends[2];
     if (::pipe(ends) != 0) giveUp("pipe failed");
     if (::fork() == 0) {
@@ -265,7 +266,7 @@ Latencies ofAllClients(const std::function<Latencies()>& receive) {
 }
 
 void measureLatency(const char* what, const std::string& address, Seconds time) {
-  Latencies all = ofAllClients([&] {
+  Latencies all = ofAllClients(kClients, [&] {
     auto client = orGiveUp(Client::connect(address));
     auto subscription = orGiveUp(client.subscribe("cam"));
     Latencies mine;
@@ -283,7 +284,7 @@ void measureLatency(const char* what, const std::string& address, Seconds time) 
 }
 
 void measureBareLatency(int port, std::size_t size, Seconds time) {
-  Latencies all = ofAllClients([&] {
+  Latencies all = ofAllClients(kClients, [&] {
     const int fd = dialLocally(port);
     std::vector<std::byte> bytes(size);
     Latencies mine;
@@ -310,21 +311,72 @@ double framesPerSecond(const std::function<bool()>& next, Seconds time) {
   return frames / Seconds{std::chrono::steady_clock::now() - start}.count();
 }
 
-double measureThroughput(const std::string& address, Seconds time) {
-  auto client = orGiveUp(Client::connect(address));
-  auto subscription =
-      orGiveUp(client.subscribe("cam", {.policy = SubscribeOptions::Policy::Queue, .queue = 4}));
-  return framesPerSecond([&] { return subscription.next(2s).ok(); }, time);
+/// Frames per second of all clients together, each a process of its own.
+double together(int clients, const std::function<double()>& framesOfOne) {
+  const Latencies rates =
+      ofAllClients(clients, [&] { return Latencies{.ms = {framesOfOne()}, .dropped = 0}; });
+  return std::accumulate(rates.ms.begin(), rates.ms.end(), 0.0);
 }
 
-double measureBareThroughput(int port, std::size_t size, Seconds time) {
-  const int fd = dialLocally(port);
-  std::vector<std::byte> bytes(size);
-  const double rate = framesPerSecond(
-      [&] { return ::recv(fd, bytes.data(), size, MSG_WAITALL) == static_cast<ssize_t>(size); },
-      time);
-  ::close(fd);
-  return rate;
+double measureThroughput(int clients, const std::string& address, Seconds time) {
+  return together(clients, [&] {
+    auto client = orGiveUp(Client::connect(address));
+    auto subscription = orGiveUp(
+        client.subscribe("cam", {.policy = SubscribeOptions::Policy::Queue, .queue = 4}));
+    return framesPerSecond([&] { return subscription.next(2s).ok(); }, time);
+  });
+}
+
+double measureBareThroughput(int clients, int port, std::size_t size, Seconds time) {
+  return together(clients, [&] {
+    const int fd = dialLocally(port);
+    std::vector<std::byte> bytes(size);
+    return framesPerSecond(
+        [&] { return ::recv(fd, bytes.data(), size, MSG_WAITALL) == static_cast<ssize_t>(size); },
+        time);
+  });
+}
+
+double median(std::vector<double> values) {
+  std::ranges::sort(values);
+  return values[values.size() / 2];
+}
+
+/// Rounds of bare sender, TCP, shared memory, one after the other, so that whatever else the machine does
+/// meets all alike; the shares are medians over the rounds.
+void compareThroughput(int clients, const std::vector<std::byte>& bytes, const std::string& socket,
+                       Seconds time) {
+  constexpr int kRounds = 7;
+  std::vector<double> bare, tcp, shared, tcp_share, shared_share;
+  for (int round = 0; round < kRounds; ++round) {
+    {
+      const Child sender{
+          [&](int ready) { runBareSender(ready, clients, std::chrono::nanoseconds{0}, bytes); }};
+      bare.push_back(measureBareThroughput(clients, sender.port(), bytes.size(), time / kRounds));
+    }
+    // A source a little faster than the bare sender: faster still, it would only make frames to drop.
+    const std::chrono::nanoseconds period{
+        static_cast<std::int64_t>(1e9 * clients / (1.1 * bare.back()))};
+    const Child sender{[&](int ready) { runDaemon(ready, period, socket); }};
+    tcp.push_back(measureThroughput(clients, "tcp:127.0.0.1:" + std::to_string(sender.port()),
+                                    time / kRounds));
+    shared.push_back(measureThroughput(clients, "unix:" + socket, time / kRounds));
+    tcp_share.push_back(tcp.back() / bare.back());
+    shared_share.push_back(shared.back() / bare.back());
+    std::filesystem::remove(socket);
+  }
+  std::printf(
+      "\nthroughput, %d client%s, a source at 110 %% of the bare sender; medians of %d rounds\n"
+      "%-34s %12s %12s %12s\n",
+      clients, clients == 1 ? "" : "s", kRounds, "", "frames/s", "MB/s", "of bare TCP");
+  const double mb = static_cast<double>(bytes.size()) * 1e-6;
+  const auto print = [&](const char* what, double rate, double share) {
+    std::printf("%-34s %12.0f %12.0f %11.0f%%\n", what, rate, rate * mb, 100.0 * share);
+  };
+  print("bare TCP sender", median(bare), 1.0);
+  print("toftwind, TCP", median(tcp), median(tcp_share));
+  print("toftwind, Unix socket and memfd", median(shared), median(shared_share));
+  std::fflush(stdout);
 }
 
 void run(Seconds time) {
@@ -356,33 +408,7 @@ void run(Seconds time) {
     measureBareLatency(sender.port(), bytes.size(), time);
   }
 
-  std::printf(
-      "\nthroughput, one client, a source at 110 %% of the bare sender\n%-34s %12s %12s %12s\n", "",
-      "frames/s", "MB/s", "of bare TCP");
-  std::fflush(stdout);
-  // Interleaved, so that whatever else the machine does meets all alike.
-  double bare = 0, tcp = 0, shared = 0;
-  constexpr int kRounds = 3;
-  for (int round = 0; round < kRounds; ++round) {
-    {
-      const Child sender{bareWith(1, 0ns)};
-      bare += measureBareThroughput(sender.port(), bytes.size(), time / kRounds) / kRounds;
-    }
-    // A source a little faster than the bare sender: faster still, it would only make frames to
-    // drop.
-    const Child sender{daemonWith(std::chrono::nanoseconds{
-        static_cast<std::int64_t>(1e9 * (round + 1) / (1.1 * bare * kRounds))})};
-    tcp += measureThroughput("tcp:127.0.0.1:" + std::to_string(sender.port()), time / kRounds) /
-           kRounds;
-    shared += measureThroughput("unix:" + socket, time / kRounds) / kRounds;
-    std::filesystem::remove(socket);
-  }
-  const auto print = [&](const char* what, double rate) {
-    std::printf("%-34s %12.0f %12.0f %11.0f%%\n", what, rate, rate * mb, 100.0 * rate / bare);
-  };
-  print("bare TCP sender", bare);
-  print("toftwind, TCP", tcp);
-  print("toftwind, Unix socket and memfd", shared);
+  for (const int clients : {1, kClients}) compareThroughput(clients, bytes, socket, time);
 }
 
 }  // namespace
