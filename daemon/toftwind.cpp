@@ -81,7 +81,7 @@ int run(int argc, char** argv) {
   Arguments arguments;
   CLI::App app{"toftwind: time-of-flight cameras, real and simulated, behind one protocol"};
   app.set_version_flag("--version", "toftwind " TOFTWIN_VERSION);
-  app.add_option("-c,--config", arguments.config, "configuration file (docs/daemon.md)")
+  app.add_option("-c,--config,config", arguments.config, "configuration file (docs/daemon.md)")
       ->capture_default_str();
   app.add_option("--port", arguments.port, "TCP port, instead of listen.port; 0: any free one")
       ->check(CLI::Range(0, 65535));
@@ -91,7 +91,11 @@ int run(int argc, char** argv) {
   app.add_flag("--document", arguments.only_document,
                "print all keys of the configuration as Markdown");
   app.footer("SIGTERM stops it, SIGHUP makes it read its configuration again.");
-  CLI11_PARSE(app, argc, argv);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kOk : kWrongConfig;  // 0: --help, --version
+  }
 
   if (arguments.only_document) {
     fmt::print("{}", daemon::documentConfig(drivers::allDrivers()));

@@ -253,7 +253,11 @@ std::vector<PlaneKind> chosenPlanes(const Keys& keys, settings::Table& table) {
 }
 
 Result<sim::SensorModel> chosenCamera(const Keys& keys, const settings::Table& table) {
-  if (!keys.camera.empty()) return sim::SensorModel::load(table.resolve(keys.camera));
+  if (!keys.camera.empty()) {
+    auto model = sim::SensorModel::load(table.resolve(keys.camera));
+    if (!model) return Error{Error::Code::InvalidArgument, model.error().message};
+    return model;
+  }
   constexpr std::string_view kScheme = "sim:";
   if (keys.uri.starts_with(kScheme)) {
     if (auto model = sim::SensorModel::preset(keys.uri.substr(kScheme.size()))) return model;
@@ -282,7 +286,8 @@ Result<std::unique_ptr<Source>> open(settings::Table& table) {
   }
   auto scene = keys.scene.empty() ? sim::Scene::parse(kDefaultScene, "default scene")
                                   : sim::Scene::load(table.resolve(keys.scene));
-  if (!scene) return scene.error();
+  // A file that is missing will not come back by itself as a camera may: a mistake in the configuration.
+  if (!scene) return Error{Error::Code::InvalidArgument, scene.error().message};
   sim::TraceRequest request = model->traceRequest();
   request.samples_per_pixel = keys.samples_per_pixel;
   request.max_surfaces = keys.max_surfaces;

@@ -6,8 +6,8 @@
 
 #include <cmath>
 #include <fstream>
+#include <iterator>
 #include <set>
-#include <sstream>
 
 #include "protocol/settings/describe.h"
 
@@ -70,13 +70,13 @@ std::string whyNot(const toml::node& node, Bounds bounds, std::string_view unit,
 
 Result<Table> Table::load(const std::filesystem::path& file) {
   std::ifstream stream{file, std::ios::binary};
-  std::ostringstream text;
-  if (!stream || !(text << stream.rdbuf())) {
+  const std::string text{std::istreambuf_iterator<char>{stream}, {}};
+  if (!stream || std::filesystem::is_directory(file)) {
     return Error{Error::Code::NotFound,
                  fmt::format("{}: cannot read this file; is the path right and may you read it?",
                              file.string())};
   }
-  return parse(text.str(), file);
+  return parse(text, file);
 }
 
 Result<Table> Table::parse(std::string_view text, const std::filesystem::path& name) {

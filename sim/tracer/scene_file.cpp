@@ -102,7 +102,7 @@ PlacedObject readObject(Table& table, const SceneSpec& scene) {
   if (table.has("mesh") && !table.has("shape")) spec.shape = Shape::Mesh;
   table.read(spec);
   if (!table.has("mesh") && !table.has("shape")) {
-    table.complain("", "object has neither \"shape\" nor \"mesh\"");
+    table.complain("", "this object has neither \"shape\" nor \"mesh\"");
   } else {
     checkSizes(table, spec);
     checkKeysFitShape(table, spec);

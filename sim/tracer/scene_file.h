@@ -62,7 +62,7 @@ struct ObjectSpec {
     v.choice("shape", shape,
              {{"rectangle", Shape::Rectangle}, {"box", Shape::Box}, {"sphere", Shape::Sphere},
               {"cylinder", Shape::Cylinder}, {"disc", Shape::Disc}, {"mesh", Shape::Mesh}},
-             "what it is");
+             "what it is; to be said, unless `mesh` names a file");
     v.text("mesh", file, "mesh: OBJ, PLY, glTF or GLB file in metres, relative to the scene file");
     v.numbers("size_m", size_m, {0.0, 1e5},
               "box: edges along x, y, z; rectangle: edges along x and y (its normal is z), the third is not used");

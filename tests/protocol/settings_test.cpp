@@ -3,6 +3,8 @@
 
 #include <gmock/gmock.h>
 
+#include <fstream>
+
 #include "protocol/settings/describe.h"
 
 namespace toftwin::settings {
@@ -94,6 +96,20 @@ TEST(Settings, WrongTypesAreErrors) {
 
 TEST(Settings, BrokenTomlNamesTheLine) {
   EXPECT_THAT(errorOf("taps = 4\nexposure_us = = 3\n"), HasSubstr("example.toml:2:"));
+}
+
+TEST(Settings, AnEmptyFileIsAFileWithAllDefaults) {
+  const auto file = std::filesystem::path{testing::TempDir()} / "empty.toml";
+  std::ofstream{file};
+  const auto example = loadFile<Example>(file);
+  ASSERT_TRUE(example) << example.error().message;
+  EXPECT_EQ(example->taps, 4);
+}
+
+TEST(Settings, AFolderIsNotAFile) {
+  const auto table = Table::load(testing::TempDir());
+  ASSERT_FALSE(table);
+  EXPECT_THAT(table.error().message, HasSubstr("cannot read this file"));
 }
 
 TEST(Settings, AFileThatIsNotThereIsNamed) {

@@ -136,7 +136,7 @@ std::string manual(CLI::App& app) {
       "itself\n"
       "(`toftwin completion manual`), and a test keeps it so.\n\n"
       "```\n" +
-      app.help("toftwin") + "```\n";
+      app.help() + "```\n";
   for (CLI::App* sub : subcommandsOf(app)) {
     page += fmt::format("\n## toftwin {}\n\n```\n{}```\n", sub->get_name(), sub->help("toftwin"));
   }

@@ -151,6 +151,10 @@ Result<Exit> run(const Options& options) {
     return Error{Error::Code::InvalidArgument,
                  "on the daemon every source has its own file: record one source at a time"};
   }
+  if (options.on_daemon && (options.count > 0 || options.duration_s > 0.0)) {
+    return Error{Error::Code::InvalidArgument,
+                 "a recording on the daemon runs until `--on-daemon --stop`: leave -n and --duration out"};
+  }
   return options.on_daemon || options.stop ? recordOnDaemon(options) : recordHere(options);
 }
 
