@@ -6,8 +6,8 @@
 
 #include <cmath>
 #include <fstream>
-#include <iterator>
 #include <set>
+#include <sstream>
 
 #include "protocol/settings/describe.h"
 
@@ -70,13 +70,15 @@ std::string whyNot(const toml::node& node, Bounds bounds, std::string_view unit,
 
 Result<Table> Table::load(const std::filesystem::path& file) {
   std::ifstream stream{file, std::ios::binary};
-  const std::string text{std::istreambuf_iterator<char>{stream}, {}};
-  if (!stream || std::filesystem::is_directory(file)) {
+  std::ostringstream text;
+  // Copying nothing counts as a failure, so an empty file must be told apart from one that cannot be read.
+  const bool is_empty = stream.peek() == std::ifstream::traits_type::eof() && stream.eof();
+  if (!is_empty && !(stream && text << stream.rdbuf())) {
     return Error{Error::Code::NotFound,
                  fmt::format("{}: cannot read this file; is the path right and may you read it?",
                              file.string())};
   }
-  return parse(text, file);
+  return parse(text.str(), file);
 }
 
 Result<Table> Table::parse(std::string_view text, const std::filesystem::path& name) {

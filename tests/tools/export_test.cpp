@@ -122,6 +122,17 @@ TEST_F(Export, PngInColoursIsBlackWhereInvalidAndSaysItsScale) {
   EXPECT_NE(read.at<cv::Vec3b>(0, 4), read.at<cv::Vec3b>(3, 0));
 }
 
+TEST(PngColors, AFewWildPixelsDoNotTakeAllTheColours) {
+  Image<float> range{100, 10, 2.0F};
+  for (int x = 0; x < 100; ++x) range(x, 0) = 3.0F;
+  range(0, 5) = 15.0F;  // one in a thousand
+  Frame frame;
+  frame.planes = {toPlane(PlaneKind::Range, std::move(range))};
+  const auto png = toPng(frame, {.color = true});
+  ASSERT_TRUE(png) << png.error().message;
+  EXPECT_THAT(png->note, HasSubstr("from 2 to 3 m"));
+}
+
 struct Cloud {
   std::string header;
   std::vector<float> values;

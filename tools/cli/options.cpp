@@ -56,9 +56,9 @@ void OutputOptions::add(CLI::App& app, bool required) {
       ->capture_default_str();
   app.add_flag("--color", how.color, "PNG: a picture in colours instead of counts");
   app.add_option("--min", how.min,
-                 "--color: value of the first colour; default: the least of the image");
+                 "--color: value of the first colour; default: 1 % of the pixels lie below");
   app.add_option("--max", how.max,
-                 "--color: value of the last colour; default: the greatest of the image");
+                 "--color: value of the last colour; default: 1 % of the pixels lie above");
   app.add_option("--row", how.row, "CSV: only this row of pixels");
   app.add_flag("--world", how.world, "PLY: in world coordinates, if the camera knows its pose");
 }

@@ -8,7 +8,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <iterator>
+#include <utility>
+#include <vector>
 
 #include <toftwin/names.h>
 
@@ -74,20 +76,24 @@ Result<Exported> counts(const Picture& picture, const ExportOptions& options) {
   return Exported{*std::move(bytes), std::move(note)};
 }
 
-/// Least and greatest finite value, or 0 and 1 where there is none.
-std::pair<double, double> extremesOf(const std::vector<float>& values) {
-  double least = std::numeric_limits<double>::infinity(), greatest = -least;
-  for (const float value : values) {
-    if (!std::isfinite(value)) continue;
-    least = std::min(least, static_cast<double>(value));
-    greatest = std::max(greatest, static_cast<double>(value));
-  }
-  return least <= greatest ? std::pair{least, greatest} : std::pair{0.0, 1.0};
+/// Values that 1 % of the finite ones lie below and above, or 0 and 1 where there is none: a few pixels
+/// that unwrapped wrongly would otherwise take all the colours.
+std::pair<double, double> extentOf(const std::vector<float>& values) {
+  std::vector<float> finite;
+  std::ranges::copy_if(values, std::back_inserter(finite), [](float v) { return std::isfinite(v); });
+  if (finite.empty()) return {0.0, 1.0};
+  const std::size_t hundredth = (finite.size() - 1) / 100;
+  const auto at = [&](std::size_t rank) {
+    const auto place = finite.begin() + static_cast<std::ptrdiff_t>(rank);
+    std::ranges::nth_element(finite, place);
+    return static_cast<double>(*place);
+  };
+  return {at(hundredth), at(finite.size() - 1 - hundredth)};
 }
 
 Result<Exported> colors(const Picture& picture, const ExportOptions& options) {
   const Plane& plane = *picture.plane;
-  const auto [least, greatest] = extremesOf(picture.values);
+  const auto [least, greatest] = extentOf(picture.values);
   const double min = options.min.value_or(least), max = options.max.value_or(greatest);
   if (!(min <= max)) {
     return Error{Error::Code::InvalidArgument,
