@@ -35,6 +35,8 @@ int flyingPixels(const std::vector<double>& place, const std::vector<double>& ch
   return count;
 }
 
+double centreMm(const BoxScene& box) { return 0.5 * (box.t_left + box.t_right) * box.front_z_mm; }
+
 }  // namespace
 
 Result<BoxScene> fitBox(const ScanLine& with_box, const ScanLine& wall_alone) {
@@ -91,6 +93,38 @@ double BoxScene::beside(double t) const {
   return 0.0;
 }
 
+double BoxScene::placeOnWall(double t) const {
+  return t * wall.rangeAlong(t) / std::sqrt(1.0 + t * t);
+}
+
+Result<PublishedBox> loadPublishedBox(const std::filesystem::path& data_folder,
+                                      const BoxScene& other) {
+  const auto folder = data_folder / "published_simulation";
+  const auto with_box = loadScanLine(folder / "box_simulated.csv");
+  if (!with_box) return with_box.error();
+  const auto wall = loadScanLine(folder / "box_reference.csv");
+  if (!wall) return wall.error();
+  const auto box = fitBox(*with_box, *wall);
+  if (!box) return box.error();
+  PublishedBox result{.box = *box, .x_mm = {}, .change_mm = {}};
+  const double left = other.placeOnWall(other.t_left), right = other.placeOnWall(other.t_right);
+  for (std::size_t i = 0; i < with_box->size(); ++i) {
+    const double t = with_box->t[i], beside = box->beside(t);
+    const double share = std::clamp((t - box->t_left) / (box->t_right - box->t_left), 0.0, 1.0);
+    result.x_mm.push_back(left + share * (right - left) + beside);
+    result.change_mm.push_back(with_box->range_mm[i] - rangeAlong(*wall, t));
+  }
+  return result;
+}
+
+double PublishedBox::changeAt(double x) const {
+  const auto above = std::lower_bound(x_mm.begin(), x_mm.end(), x);
+  if (above == x_mm.begin() || above == x_mm.end()) return std::nan("");
+  const auto i = static_cast<std::size_t>(above - x_mm.begin());
+  const double share = (x - x_mm[i - 1]) / (x_mm[i] - x_mm[i - 1]);
+  return change_mm[i - 1] + share * (change_mm[i] - change_mm[i - 1]);
+}
+
 Result<sim::Scene> BoxScene::build(bool with_box, bool mirror) const {
   const double sign = mirror ? -1.0 : 1.0;
   const auto at = [&](double x) { return (wall.distance_mm - wall.normal_x * x) / wall.normal_z; };
@@ -140,23 +174,29 @@ Result<Finding> judgeBox(const RealDataJob& job) {
   const auto box = fitBox(*measured, *reference);
   if (!box) return box.error();
   double monte_carlo_mm = 0.0;
+  const auto published = loadPublishedBox(job.folder, *box);
+  if (!published) return published.error();
   const auto preset = simulatedChange(job, *box, measured->t, false, monte_carlo_mm);
   if (!preset) return preset.error();
   const auto other_side = simulatedChange(job, *box, measured->t, true, monte_carlo_mm);
   if (!other_side) return other_side.error();
 
-  std::vector<double> change, place, on_wall, on_wall_preset, on_wall_other;
+  std::vector<double> x, change, theirs, place;
+  std::vector<double> on_wall, on_wall_preset, on_wall_other, on_wall_theirs;
   for (std::size_t i = 0; i < measured->size(); ++i) {
     const double t = measured->t[i];
     change.push_back(measured->range_mm[i] - rangeAlong(*reference, t));
     place.push_back(box->beside(t));
+    x.push_back(box->placeOnWall(t));
+    theirs.push_back(published->changeAt(x[i]));
     if (std::abs(place[i]) < 15.0 || place[i] == 0.0 || std::abs(place[i]) > 250.0) continue;
     on_wall.push_back(change[i]), on_wall_preset.push_back((*preset)[i]),
-        on_wall_other.push_back((*other_side)[i]);
+        on_wall_other.push_back((*other_side)[i]), on_wall_theirs.push_back(theirs[i]);
   }
   const std::vector<double> nothing(on_wall.size(), 0.0);
   const Explained none = explain(on_wall, nothing), sim = explain(on_wall, on_wall_preset),
-                  other = explain(on_wall, on_wall_other);
+                  other = explain(on_wall, on_wall_other),
+                  by_them = explain(on_wall, on_wall_theirs);
 
   Finding finding;
   finding.section = {.id = "box-kinect_v2", .title = "Kinect v2: box before a wall"};
@@ -172,31 +212,32 @@ Result<Finding> judgeBox(const RealDataJob& job) {
                              {"wall right, 100–250 mm", 100, 250}};
   TableBlock regions{
       "Change that the box makes, mean per region, mm",
-      {"region", "n", "measured", "simulated, preset", "difference", "emitter on the other side"},
+      {"region", "n", "measured", "simulated, preset", "difference", "emitter on the other side",
+       "published simulator", "measured − published"},
       {}};
   Json json = Json::array();
   for (const Part& part : kParts) {
-    std::vector<double> m, s, o;
+    std::vector<double> m, s, o, p;
     for (std::size_t i = 0; i < place.size(); ++i) {
       if (place[i] < part.from || place[i] >= part.to || place[i] == 0.0) continue;
       m.push_back(change[i]), s.push_back((*preset)[i]), o.push_back((*other_side)[i]);
+      p.push_back(theirs[i]);
     }
-    const Summary sm = summarise(m), ss = summarise(s), so = summarise(o);
+    const Summary sm = summarise(m), ss = summarise(s), so = summarise(o), sp = summarise(p);
     if (sm.n == 0) continue;
     regions.rows.push_back({part.name, std::to_string(sm.n),
                             shownWithError(sm.mean, sm.standard_error), shown(ss.mean),
-                            shown(sm.mean - ss.mean), shown(so.mean)});
+                            shown(sm.mean - ss.mean), shown(so.mean), shown(sp.mean),
+                            shown(sm.mean - sp.mean)});
     Json row = Json::object();
     row.set("region", part.name)
         .set("n", sm.n)
         .set("measured_mm", sm.mean)
         .set("simulated_mm", ss.mean)
-        .set("other_side_mm", so.mean);
+        .set("other_side_mm", so.mean)
+        .set("published_mm", sp.mean);
     json.push(std::move(row));
   }
-  std::vector<double> x;
-  for (const double t : measured->t)
-    x.push_back(t * box->wall.rangeAlong(t) / std::sqrt(1.0 + t * t));
   const auto plot = [&](std::pair<double, double> x_range, std::pair<double, double> y_range) {
     return toSvg(Plot{.title = "Change that a box makes",
                       .x_label = "place on the wall, x [mm]",
@@ -210,7 +251,11 @@ Result<Finding> judgeBox(const RealDataJob& job) {
                                   .x = x,
                                   .y = *other_side,
                                   .ink = Ink::Extra,
-                                  .stroke = Stroke::Dashed}},
+                                  .stroke = Stroke::Dashed},
+                                 {.name = "published simulator",
+                                  .x = published->x_mm,
+                                  .y = published->change_mm,
+                                  .ink = Ink::Published}},
                       .x_range = x_range,
                       .y_range = y_range,
                       .zero_line = true});
@@ -220,23 +265,31 @@ Result<Finding> judgeBox(const RealDataJob& job) {
             flying_simulated = flyingPixels(place, *preset, step);
   finding.section.verdict = fmt::format(
       "Beside the box the wall reads {} mm too far on average (15–250 mm from it); the simulator "
-      "says {} mm. {} of {} mm RMS remain, {} of the mean square explained. "
+      "says {} mm. {} of {} mm RMS remain, {} of the mean square explained; the published simulator "
+      "leaves {} mm ({}). "
       "{} pixels hang between box and wall in the measurement, {} in the simulation.",
       shown(summarise(on_wall).mean), shown(summarise(on_wall_preset).mean),
       shown(sim.residual_rms), shown(none.residual_rms), shownPercent(sim.fraction_raw),
-      flying_measured, flying_simulated);
+      shown(by_them.residual_rms), shownPercent(by_them.fraction_raw), flying_measured, flying_simulated);
   finding.section.tone = toneOf(sim.fraction_raw);
   finding.section.blocks = {
-      Figure{"How the box changes the reading along each ray. The box itself (−149 mm) is cut off; "
-             "the file named reference is the same camera's reading of the wall without the box, "
-             "so camera constants cancel.",
+      Figure{fmt::format("How the box changes the reading along each ray. The box itself (−{} mm) is "
+                         "cut off; the file named reference is the same camera's reading of the "
+                         "wall without the box, so camera constants cancel. The published "
+                         "simulator's curve (with its box − its wall alone) is of a nearly equal "
+                         "geometry, wall at {} mm, box {} mm wide and {} mm deep, its centre {} mm "
+                         "beside the measured one's; it is drawn at its distance beside the box.",
+                         shown(step, 0), shown(published->box.wall.distance_mm, 0),
+                         shown(published->box.widthMm(), 0), shown(published->box.depthMm(), 0),
+                         shown(std::abs(centreMm(published->box) - centreMm(*box)), 0)),
              plot({-300, 300}, {-8, 24})},
       Figure{"The edges: where pixels see box and wall at once.", plot({-140, 140}, {-165, 40})},
       TableBlock{"What is left of the measured change on the wall, 15–250 mm beside the box",
                  kExplainedHeader,
                  {explainedRow("no simulation (the box changes nothing)", none),
                   explainedRow("simulated, preset", sim),
-                  explainedRow("simulated, emitter on the other side", other)}},
+                  explainedRow("simulated, emitter on the other side", other),
+                  explainedRow("published simulator, same distance beside its box", by_them)}},
       regions,
       Paragraph{fmt::format("Geometry from the two lines: wall at {} mm, box {} mm wide, front {} "
                             "mm before the wall. Assumed: box 150 mm tall, albedo {}; wall albedo "
@@ -252,7 +305,15 @@ Result<Finding> judgeBox(const RealDataJob& job) {
   finding.data.set("no_simulation", toJson(none))
       .set("simulated", toJson(sim))
       .set("simulated_emitter_other_side", toJson(other))
+      .set("published_simulator", toJson(by_them))
       .set("regions", json);
+  Json curves = Json::object();
+  curves.set("x_mm", Json::arrayOf(x))
+      .set("measured_mm", Json::arrayOf(change))
+      .set("simulated_mm", Json::arrayOf(*preset))
+      .set("other_side_mm", Json::arrayOf(*other_side))
+      .set("published_mm", Json::arrayOf(theirs));
+  finding.data.set("curves", curves);
   finding.data.set("flying_pixels_measured", flying_measured)
       .set("flying_pixels_simulated", flying_simulated)
       .set("monte_carlo_mm", monte_carlo_mm);

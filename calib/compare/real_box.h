@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <filesystem>
 #include <span>
 #include <vector>
 
@@ -23,9 +24,24 @@ struct BoxScene {
   /// Where the ray t meets the wall, in mm beside the nearer edge of what the box hides; negative
   /// left of it, 0 where the ray meets the box.
   [[nodiscard]] double beside(double t) const;
+  /// Where the ray t meets the wall, or would if the box were not there: x in mm.
+  [[nodiscard]] double placeOnWall(double t) const;
   /// The scene in the camera's frame; `mirror` swaps left and right.
   [[nodiscard]] Result<sim::Scene> build(bool with_box, bool mirror) const;
 };
 Result<BoxScene> fitBox(const ScanLine& with_box, const ScanLine& wall_alone);
+
+/// The change that a box makes in the published simulator, with − without along the ray, moved to
+/// another line of a box of nearly the same geometry: on the wall by the distance beside the box,
+/// on the box by the share of its width.
+struct PublishedBox {
+  BoxScene box;                    ///< its own geometry
+  std::vector<double> x_mm;        ///< of its rays, moved to the other line's places on the wall
+  std::vector<double> change_mm;
+  /// The change at a place on the other line's wall, linear between rays; NaN outside of them.
+  [[nodiscard]] double changeAt(double x_mm) const;
+};
+Result<PublishedBox> loadPublishedBox(const std::filesystem::path& data_folder,
+                                      const BoxScene& other);
 
 }  // namespace toftwin::compare

@@ -96,6 +96,8 @@ Result<Finding> judgeCorner(const RealDataJob& job, const RealCamera& camera) {
   if (!reference) return reference.error();
   const auto corner = fitCorner(*reference);
   if (!corner) return corner.error();
+  const auto published = publishedCorner(job.folder);
+  if (!published) return published.error();
   const auto model = sim::SensorModel::preset(camera.name);
   if (!model) return model.error();
   const auto t_left = std::min(measured->t.front(), reference->t.front()),
@@ -192,6 +194,13 @@ Result<Finding> judgeCorner(const RealDataJob& job, const RealCamera& camera) {
           "By region, mean errors in mm",
           {"region", "n", "measured", "simulated", "difference", "… after the constant", "… RMS"},
           region_table},
+      Paragraph{fmt::format("The published simulator's output is of another corner (edge {} mm before "
+                            "its camera and {} mm beside the axis, here {} and {} mm), and multipath "
+                            "depends on both, so it is not a third curve of this figure but has its "
+                            "own section beside our simulation of that corner:",
+                            shown(published->edge_z_mm, 0), shown(std::abs(published->edge_x_mm), 0),
+                            shown(corner->edge_z_mm, 0), shown(std::abs(corner->edge_x_mm), 0)),
+                false, kPublishedSection, kPublishedTitle},
       Figure{"The same from above.", toSvg(plan)},
       Paragraph{
           fmt::format(

@@ -10,6 +10,7 @@
 
 #include "calib/compare/progress.h"
 #include "calib/compare/report.h"
+#include "calib/compare/scan_line.h"
 #include "calib/compare/statistics.h"
 
 /// The simulator against measurements of a Kinect v2 and an O3D303 (docs/compare.md, "Real input").
@@ -45,6 +46,11 @@ Result<Finding> judgeBox(const RealDataJob& job);
 Result<Finding> judgeWarmUp(const RealDataJob& job, const RealCamera& camera);
 Result<Finding> judgeNoise(const RealDataJob& job, const RealCamera& camera);
 Result<Finding> judgePublished(const RealDataJob& job);
+/// That section's id and title, for links to it.
+inline constexpr const char* kPublishedSection = "published";
+inline constexpr const char* kPublishedTitle = "Against the published simulator";
+/// The geometry of the published simulator's corner.
+Result<CornerFit> publishedCorner(const std::filesystem::path& data_folder);
 
 /// All of them, in the report's order. The plan is added to the job's progress by `planRealData`.
 void planRealData(Progress& progress, double effort);

@@ -107,10 +107,7 @@ double rmsDifference(const std::vector<double>& a, const std::vector<double>& b)
 
 /// Corner variants: a table of all, a plot of the longest paths.
 Result<> addCorner(const RealDataJob& job, Finding& finding, double& best_rms) {
-  const auto reference =
-      loadScanLine(job.folder / "published_simulation" / "corner_path_length_16_reference.csv");
-  if (!reference) return reference.error();
-  const auto corner = fitCorner(*reference);
+  const auto corner = publishedCorner(job.folder);
   if (!corner) return corner.error();
   TableBlock table{
       "Corner, error along the ray, mean over the line in mm (Lambertian or Oren–Nayar, albedo "
@@ -292,9 +289,16 @@ Result<> addBox(const RealDataJob& job, Finding& finding) {
 
 }  // namespace
 
+Result<CornerFit> publishedCorner(const std::filesystem::path& data_folder) {
+  const auto reference =
+      loadScanLine(data_folder / "published_simulation" / "corner_path_length_16_reference.csv");
+  if (!reference) return reference.error();
+  return fitCorner(*reference);
+}
+
 Result<Finding> judgePublished(const RealDataJob& job) {
   Finding finding;
-  finding.section = {.id = "published", .title = "Against the published simulator"};
+  finding.section = {.id = kPublishedSection, .title = kPublishedTitle};
   double corner_rms = 0.0;
   if (auto done = addCorner(job, finding, corner_rms); !done) return done.error();
   if (auto done = addDistance(job, finding); !done) return done.error();

@@ -36,7 +36,13 @@ bool readsAsNumber(std::string_view cell) {
 }
 
 std::string html(const Paragraph& block) {
-  return fmt::format("<p{}>{}</p>", block.small ? " class='small'" : "", escaped(block.text));
+  std::string link;
+  if (!block.section.empty()) {
+    link =
+        fmt::format(" <a href='#{}'>{}</a>", escaped(block.section), escaped(block.section_title));
+  }
+  return fmt::format("<p{}>{}{}</p>", block.small ? " class='small'" : "", escaped(block.text),
+                     link);
 }
 
 std::string html(const TableBlock& table) {

@@ -27,6 +27,8 @@ struct Card {
 struct Paragraph {
   std::string text{};
   bool small = false;
+  std::string section{};        ///< id of a section to link to after the text, or empty
+  std::string section_title{};  ///< what the link says
 };
 /// Cells that read as numbers are set right-aligned.
 struct TableBlock {

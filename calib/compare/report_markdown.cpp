@@ -8,6 +8,12 @@
 namespace toftwin::compare {
 namespace {
 
+std::string markdown(const Paragraph& words) {
+  // Renderers disagree on a heading's anchor; its title is enough to find it.
+  const std::string link = words.section.empty() ? "" : fmt::format(" “{}”", words.section_title);
+  return words.text + link + "\n\n";
+}
+
 std::string cell(std::string text) {
   for (std::size_t at = 0; (at = text.find('|', at)) != std::string::npos; at += 2)
     text.replace(at, 1, "\\|");
@@ -37,7 +43,7 @@ std::string toMarkdown(const Report& report) {
     if (!section.verdict.empty()) out += section.verdict + "\n\n";
     for (const Block& block : section.blocks) {
       if (const auto* table = std::get_if<TableBlock>(&block)) out += markdown(*table);
-      if (const auto* words = std::get_if<Paragraph>(&block)) out += words->text + "\n\n";
+      if (const auto* words = std::get_if<Paragraph>(&block)) out += markdown(*words);
     }
   }
   return out + report.colophon + "\n";

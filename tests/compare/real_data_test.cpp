@@ -133,6 +133,60 @@ TEST_F(RealData, BoxLinesShowABoxOfFifteenCentimetres) {
   EXPECT_NEAR(box->widthMm(), 150.0, 2 * 2 * 2.7);
 }
 
+Report reportOf(const Finding& finding) {
+  Report report;
+  report.sections = {finding.section};
+  return report;
+}
+
+/// The published simulator's box is aligned with the measured one: what it changes on the wall, and
+/// the step at the box, must stay at the same distance beside the box.
+TEST_F(RealData, PublishedBoxIsDrawnBesideTheMeasuredOne) {
+  const auto line = loadScanLine(folder / "box" / "kinect_v2_measured.csv"),
+             wall = loadScanLine(folder / "box" / "kinect_v2_reference.csv");
+  ASSERT_TRUE(line.ok() && wall.ok());
+  const auto box = fitBox(*line, *wall);
+  ASSERT_TRUE(box.ok());
+  const auto published = loadPublishedBox(folder, *box);
+  ASSERT_TRUE(published.ok()) << published.error().message;
+  EXPECT_TRUE(std::is_sorted(published->x_mm.begin(), published->x_mm.end()));
+  const double left = box->placeOnWall(box->t_left), right = box->placeOnWall(box->t_right);
+  EXPECT_NEAR(published->changeAt(0.5 * (left + right)), -150.0, 5.0);
+  EXPECT_GT(published->changeAt(left - 10.0), 0.0);   // multipath: the wall reads too far
+  EXPECT_GT(published->changeAt(right + 10.0), 0.0);
+  EXPECT_NEAR(published->changeAt(left - 500.0), 0.0, 2.0);
+  EXPECT_NEAR(published->changeAt(right + 500.0), 0.0, 2.0);
+  // The file's wall just right of its box: at x 36.8 mm it reads 1168.6 mm instead of 1153.8 mm.
+  EXPECT_GT(published->changeAt(right + 8.0), 10.0);
+}
+
+TEST_F(RealData, BoxReportHoldsThePublishedSimulatorAsThirdCurve) {
+  const auto finding = judgeBox({.folder = folder, .effort = 0.02});
+  ASSERT_TRUE(finding.ok()) << finding.error().message;
+  const std::string data = finding->data.text();
+  const auto count = [&data](const std::string& key) {
+    int n = 0;
+    for (std::size_t at = 0; (at = data.find(key, at)) != std::string::npos; ++at) ++n;
+    return n;
+  };
+  EXPECT_EQ(count("\"published_mm\": "), 6 + 1) << "six regions and the curve";
+  EXPECT_EQ(count("\"published_mm\": null"), 0);
+  EXPECT_EQ(count("\"published_simulator\": "), 1);
+  const std::string page = toHtml(reportOf(*finding)), words = toMarkdown(reportOf(*finding));
+  // In the legends of both figures, and as columns of the table.
+  const auto legend = page.find(">published simulator</span>");
+  ASSERT_NE(legend, std::string::npos);
+  EXPECT_NE(page.find(">published simulator</span>", legend + 1), std::string::npos);
+  EXPECT_NE(words.find("| published simulator | measured − published |"), std::string::npos) << words;
+}
+
+TEST_F(RealData, CornerReportLinksToThePublishedCorner) {
+  const auto finding = judgeCorner({.folder = folder, .effort = 0.02}, {"kinect_v2", "Kinect v2"});
+  ASSERT_TRUE(finding.ok()) << finding.error().message;
+  EXPECT_NE(toHtml(reportOf(*finding)).find("<a href='#published'>Against the published simulator</a>"),
+            std::string::npos);
+}
+
 /// The whole real-data part with little effort: it must run, and what it says of the Kinect's
 /// corner must hold.
 TEST_F(RealData, SimulatorExplainsMostOfTheKinectsCorner) {
