@@ -222,7 +222,10 @@ void Daemon::beginStop() {
   if (std::exchange(is_stopping_, true)) return;
   notify::stopping();
   watchdog_.cancel();
-  signals_.cancel();
+  // A second SIGTERM or SIGINT ends the process, should a driver be stuck; SIGHUP means nothing now.
+  boost::system::error_code ignored;
+  for (const int number : {SIGTERM, SIGINT}) signals_.remove(number, ignored);
+  signals_.cancel(ignored);
   std::vector<std::shared_ptr<void>> all;
   for (const Running& running : running_) {
     for (auto& thing : hub_.remove(running.name)) all.push_back(std::move(thing));

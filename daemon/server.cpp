@@ -17,13 +17,13 @@ constexpr std::chrono::milliseconds kPause{100};
 }  // namespace
 
 Server::Server(asio::io_context& io, Hub& hub, Options options)
-    : io_(io), hub_(hub), options_(options), pause_(io) {}
+    : io_(io), hub_(hub), options_(options), tcp_pause_(io), unix_pause_(io) {}
 
 Result<> Server::listenTcp(const std::string& address, std::uint16_t port) {
   auto acceptor = daemon::listenTcp(io_, address, port);
   if (!acceptor) return acceptor.error();
   tcp_.emplace(*std::move(acceptor));
-  accept(*tcp_);
+  accept(*tcp_, tcp_pause_);
   return {};
 }
 
@@ -31,7 +31,7 @@ Result<> Server::listenUnix(const std::string& path) {
   auto listener = UnixListener::open(io_, path);
   if (!listener) return listener.error();
   unix_.emplace(*std::move(listener));
-  accept(unix_->acceptor());
+  accept(unix_->acceptor(), unix_pause_);
   return {};
 }
 
@@ -43,19 +43,20 @@ std::uint16_t Server::port() const {
 std::string Server::socketPath() const { return unix_ ? unix_->path().string() : std::string{}; }
 
 template <class Acceptor>
-void Server::accept(Acceptor& acceptor) {
-  acceptor.async_accept([this, &acceptor](boost::system::error_code fault, auto socket) {
-    if (fault == asio::error::operation_aborted) return;
+void Server::accept(Acceptor& acceptor, asio::steady_timer& pause) {
+  acceptor.async_accept([this, &acceptor, &pause](boost::system::error_code fault, auto socket) {
+    // This may have been queued before the acceptor went.
+    if (is_shut_ || fault == asio::error::operation_aborted) return;
     if (fault) {
       spdlog::warn("cannot accept a client: {}; trying again", fault.message());
-      pause_.expires_after(kPause);
-      pause_.async_wait([this, &acceptor](boost::system::error_code stopped) {
-        if (!stopped) accept(acceptor);
+      pause.expires_after(kPause);
+      pause.async_wait([this, &acceptor, &pause](boost::system::error_code stopped) {
+        if (!is_shut_ && !stopped) accept(acceptor, pause);
       });
       return;
     }
     adopt(transport::Socket{std::move(socket)});
-    accept(acceptor);
+    accept(acceptor, pause);
   });
 }
 
@@ -83,7 +84,9 @@ void Server::forget(std::uint64_t id) {
 }
 
 void Server::shutDown(const Error& why, std::function<void()> done) {
-  pause_.cancel();
+  is_shut_ = true;
+  tcp_pause_.cancel();
+  unix_pause_.cancel();
   boost::system::error_code ignored;
   if (tcp_) tcp_->close(ignored);
   if (unix_) unix_->acceptor().close(ignored);

@@ -43,7 +43,7 @@ class Server {
 
  private:
   template <class Acceptor>
-  void accept(Acceptor& acceptor);
+  void accept(Acceptor& acceptor, boost::asio::steady_timer& pause);
   void adopt(transport::Socket socket);
   void forget(std::uint64_t id);
 
@@ -52,7 +52,10 @@ class Server {
   Options options_;
   std::optional<boost::asio::ip::tcp::acceptor> tcp_;
   std::optional<UnixListener> unix_;
-  boost::asio::steady_timer pause_;  ///< after accept(2) failed for want of file descriptors
+  // One for each listener, for when accept(2) fails for want of file descriptors.
+  boost::asio::steady_timer tcp_pause_;
+  boost::asio::steady_timer unix_pause_;
+  bool is_shut_ = false;
   std::map<std::uint64_t, std::shared_ptr<Connection>> connections_;  // shared with their handlers
   std::uint64_t last_id_ = 0;
   std::function<void()> on_empty_;

@@ -11,6 +11,8 @@ namespace toftwin::daemon {
 namespace {
 
 constexpr std::uint32_t kDeepestQueue = 1024;
+/// Frames on their way are in the kernel's memory, each perhaps with a memfd, which nobody counts.
+constexpr std::uint32_t kWidestWindow = 64;
 
 wire::Message failure(std::uint64_t id, Error error) { return wire::Failure{id, std::move(error)}; }
 
@@ -23,6 +25,12 @@ Result<FrameQueue::Settings> queueFor(const wire::Subscribe& request,
   if (!std::isfinite(request.max_rate_hz) || request.max_rate_hz < 0.0 ||
       (request.max_rate_hz > 0.0 && request.max_rate_hz < 1e-3)) {
     return invalid("max_rate_hz must be 0 (every frame) or at least 0.001");
+  }
+  if (request.window > kWidestWindow) {
+    return invalid(
+        fmt::format("window = {} is out of bounds: it must be 0 (no limit, and no shared memory) "
+                    "to {}",
+                    request.window, kWidestWindow));
   }
   if (request.policy == wire::Policy::Lockstep && request.max_rate_hz > 0.0) {
     return invalid(

@@ -46,6 +46,7 @@ Result<std::uint64_t> Pacer::waitForTurn(const std::stop_token& stop, bool locks
   if (stop.stop_requested()) return stopped;
   if (lockstep || pace_ == Pace::Fast) {
     since_.reset();
+    clock_ = {};  // device time no longer runs with the host's
     return std::uint64_t{0};
   }
   const SteadyTime now = std::chrono::steady_clock::now();

@@ -50,7 +50,7 @@ class Pacer {
   [[nodiscard]] DeviceTime deviceTime() const {
     return {static_cast<std::int64_t>(index_) * interval_ns_};
   }
-  /// Unknown until paced in real time.
+  /// Unknown unless the last turn was paced in real time.
   [[nodiscard]] const ClockRelation& clock() const { return clock_; }
 
  private:

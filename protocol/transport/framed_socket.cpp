@@ -214,7 +214,7 @@ void FramedSocket::asyncWrite(wire::Encoded message, std::shared_ptr<const Share
                               WriteHandler handler) {
   output_ = std::move(message);
   output_body_ = std::move(body);
-  wire::referToMemfd(output_);
+  wire::setBodyPlace(output_, wire::BodyPlace::Memfd);
   asio::post(socket_.get_executor(), [this, handler = std::move(handler)]() mutable {
     sendDescriptor(std::move(handler));
   });
@@ -238,6 +238,11 @@ void FramedSocket::sendDescriptor(WriteHandler handler) {
   std::memcpy(CMSG_DATA(item), &fd, sizeof fd);
   const ssize_t count = ::sendmsg(socket_.native_handle(), &message, MSG_DONTWAIT | MSG_NOSIGNAL);
   if (count >= 0) return writeRest(static_cast<std::size_t>(count), std::move(handler));
+  if (errno == ETOOMANYREFS) {  // more descriptors on their way than this user may have files open
+    output_body_ = {};
+    wire::setBodyPlace(output_, wire::BodyPlace::Inline);
+    return writeRest(0, std::move(handler));
+  }
   if (errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR) {
     return wrote(disconnected(error_code{errno, boost::system::system_category()}), handler);
   }

@@ -67,7 +67,7 @@ Encoded encode(const Message& message);
 /// A frame whose body was encoded before with `encodeBody(frame.planes)`.
 Encoded encode(const FrameMessage& message, Body body);
 /// Says in the preamble that the body does not follow but lies in a memfd.
-void referToMemfd(Encoded& message);
+void setBodyPlace(Encoded& message, BodyPlace place);
 /// The message as one run of bytes: for recordings and tests.
 std::vector<std::byte> toBytes(const Encoded& message);
 

@@ -107,9 +107,9 @@ Result<Preamble> decodePreamble(std::span<const std::byte, kPreambleSize> bytes,
   return preamble;
 }
 
-void referToMemfd(Encoded& message) {
+void setBodyPlace(Encoded& message, BodyPlace place) {
   const std::span<std::byte, kPreambleSize> preamble{message.head.data(), kPreambleSize};
-  store(preamble, kBodyPlaceAt, static_cast<std::uint32_t>(BodyPlace::Memfd));
+  store(preamble, kBodyPlaceAt, static_cast<std::uint32_t>(place));
   store(preamble, kPreambleCrcAt, crc32c(preamble.first<kPreambleCrcAt>()));
 }
 

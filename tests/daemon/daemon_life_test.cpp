@@ -2,6 +2,9 @@
 // The daemon's life: listening, reloading, systemd.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <signal.h>
+#include <sys/resource.h>
 #include <sys/time.h>
 #include <unistd.h>
 
@@ -9,6 +12,7 @@
 #include <cstdlib>
 #include <fstream>
 
+#include "daemon/server.h"
 #include "running_daemon.h"
 
 namespace toftwin::daemon {
@@ -38,6 +42,89 @@ TEST_F(RunningDaemon, AReloadKeepsWhatIsAsBeforeAndChangesTheRest) {
   EXPECT_EQ(client.describe("other")->camera.width, 64);
   ASSERT_TRUE(client.trigger("cam").ok());
   EXPECT_EQ(kept->next(kSoon)->sequence, 1u) << "the source that was kept began anew";
+}
+
+TEST_F(RunningDaemon, ASecondSignalIsNotCaughtWhileItStops) {
+  configure(kTriggered);
+  auto with_signals = options();
+  with_signals.handle_signals = true;
+  start(with_signals);
+  daemon_->stop();
+  thread_.join();
+  for (const int number : {SIGTERM, SIGINT}) {
+    struct sigaction now {};
+    ASSERT_EQ(::sigaction(number, nullptr, &now), 0);
+    EXPECT_EQ(now.sa_handler, SIG_DFL) << number;
+  }
+  daemon_.reset();
+}
+
+/// A stream socket to a TCP port of this machine, not connected yet.
+struct TcpSocket {
+  transport::FileDescriptor fd{::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)};
+  int connect(std::uint16_t port) const {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(port);
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    return ::connect(fd.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address);
+  }
+};
+/// Connects without needing a file descriptor, which RawClient does.
+int connectUnix(const transport::FileDescriptor& fd, const std::string& path) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  path.copy(address.sun_path, sizeof address.sun_path - 1);
+  return ::connect(fd.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address);
+}
+/// Whether the daemon answers a Hello.
+bool isServed(const transport::FileDescriptor& fd) {
+  const auto hello = wire::toBytes(wire::encode(wire::Hello{1, "test", {}}));
+  timeval patience{.tv_sec = kSoon.count(), .tv_usec = 0};
+  ::setsockopt(fd.get(), SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+  char byte = 0;
+  return ::send(fd.get(), hello.data(), hello.size(), MSG_NOSIGNAL) > 0 &&
+         ::recv(fd.get(), &byte, 1, 0) == 1;
+}
+
+TEST_F(RunningDaemon, BothListenersGoOnWhenFilesRanOut) {
+  start(kTriggered);
+  const TcpSocket tcp;
+  const transport::FileDescriptor local{::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0)};
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &before), 0);
+  const int free = ::dup(local.get());
+  ::close(free);
+  const rlimit none{.rlim_cur = static_cast<rlim_t>(free), .rlim_max = before.rlim_max};
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &none), 0);
+  EXPECT_EQ(tcp.connect(daemon_->port()), 0);
+  EXPECT_EQ(connectUnix(local, daemon_->socketPath()), 0);
+  // Each tries again after 100 ms: both have failed when there are more lines than one can write.
+  const bool failed = log_->waitFor("cannot accept a client", 4);
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &before), 0);
+  ASSERT_TRUE(failed);
+  EXPECT_TRUE(isServed(tcp.fd));
+  EXPECT_TRUE(isServed(local));
+}
+
+TEST_F(RunningDaemon, AClientWhoseAcceptIsQueuedWhenItShutsDownIsNotServed) {
+  boost::asio::io_context io{1};
+  Hub hub{{}, clock_};
+  Server server{io, hub, {}};
+  const std::string path = (folder_ / "s").string();
+  ASSERT_TRUE(server.listenUnix(path).ok());
+  const transport::FileDescriptor first{::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0)};
+  const transport::FileDescriptor second{::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0)};
+  ASSERT_EQ(connectUnix(first, path), 0);
+  ASSERT_EQ(connectUnix(second, path), 0);
+  io.run_one();  // takes the first, and the second at once, whose handler is queued
+  bool is_done = false;
+  server.shutDown({Error::Code::Stopped, "over"}, [&] { is_done = true; });
+  ::shutdown(first.get(), SHUT_RDWR);
+  io.run();
+  EXPECT_TRUE(is_done);
+  char byte = 0;
+  EXPECT_EQ(::recv(second.get(), &byte, 1, 0), 0) << "it was served after the end";
 }
 
 TEST_F(RunningDaemon, AReloadOfAWrongFileChangesNothing) {

@@ -121,6 +121,14 @@ TEST(Pattern, CountsWhatItLostInRealTime) {
   EXPECT_GE(lost, 19u);
 }
 
+TEST(Pattern, KnowsTheHostsTimeOnlyWhileItKeepsRealTime) {
+  const auto source = openPattern("width = 16\nheight = 8\nframe_rate_hz = 10000");
+  ASSERT_TRUE(source->start().ok());
+  EXPECT_GE(source->next({}, false)->moment.clock.uncertainty_ns, 0);
+  EXPECT_EQ(source->next({}, true)->moment.clock, ClockRelation{});
+  EXPECT_GE(source->next({}, false)->moment.clock.uncertainty_ns, 0);
+}
+
 TEST(Pattern, HasOnlyThePlanesThatAreAskedFor) {
   const auto source =
       openPattern("width = 16\nheight = 8\npace = 'fast'\nplanes = ['flags', 'range']");

@@ -220,6 +220,8 @@ TEST(Session, RefusesWishesThatMakeNoSense) {
   };
   EXPECT_TRUE(refuses([](auto& r) { r = wish(wire::Policy::Queue, 0), r.source = "cam"; }));
   EXPECT_TRUE(refuses([](auto& r) { r = wish(wire::Policy::Queue, 1025), r.source = "cam"; }));
+  EXPECT_TRUE(refuses([](auto& r) { r.window = 65; }));
+  EXPECT_FALSE(refuses([](auto& r) { r.window = 64; }));
   EXPECT_TRUE(refuses([](auto& r) { r.max_rate_hz = -1; }));
   EXPECT_TRUE(refuses([](auto& r) { r.max_rate_hz = std::numeric_limits<double>::quiet_NaN(); }));
   EXPECT_TRUE(refuses([](auto& r) { r.max_rate_hz = 5, r.policy = wire::Policy::Lockstep; }));

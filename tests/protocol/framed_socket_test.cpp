@@ -200,7 +200,7 @@ TEST_P(SharedMemory, AMissingFileDescriptorIsMalformed) {
   FramedSocket here{std::move(ends.first)}, there{std::move(ends.second)};
   there.acceptSharedBodies();
   wire::Encoded message = wire::encode(wire::FrameMessage{1, wire::exampleFrame(4, 4)});
-  wire::referToMemfd(message);
+  wire::setBodyPlace(message, wire::BodyPlace::Memfd);
   message.body.pieces.clear();
   here.asyncWrite(std::move(message), ignore);
   const auto received = receive(there);
