@@ -39,7 +39,12 @@ std::vector<std::shared_ptr<void>> Hub::remove(const std::string& name) {
   }
   if (auto source = sources_.extract(name)) {
     source.mapped()->requestStop();
-    gone.push_back(std::move(source.mapped()));
+    SourceHost* const host = source.mapped().get();
+    gone.push_back(std::shared_ptr<void>{
+        host, [kept = std::move(source.mapped())](void*) mutable {
+          kept->waitForEnd();
+          kept.reset();
+        }});
   }
   return gone;
 }

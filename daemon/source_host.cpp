@@ -47,7 +47,11 @@ SourceHost::SourceHost(std::string name, Open open, Result<std::unique_ptr<drive
 
 SourceHost::~SourceHost() {
   requestStop();
-  thread_.join();
+  waitForEnd();
+}
+
+void SourceHost::waitForEnd() {
+  if (thread_.joinable()) thread_.join();
 }
 
 void SourceHost::requestStop() {
@@ -126,6 +130,7 @@ Result<SubscriberPtr> SourceHost::subscribe(Wish wish, std::function<void()> wak
   {
     const std::scoped_lock lock{mutex_};
     if (is_stopping_) return Error{Error::Code::Stopped, "the source is being stopped"};
+    subscriber->number = next_subscriber_++;
     subscribers_.push_back(subscriber);
     has_ended_ = false;
   }
@@ -167,16 +172,18 @@ void SourceHost::post(Command command, Done done) {
     }
   }
   if (refused) return done(*refused);
-  changed();
+  changed(true);
 }
 
 /// Something changed that the thread must look at. A source that may wait for a trigger for ever is
-/// interrupted; any other comes back by itself within a frame or a second.
-void SourceHost::changed() {
+/// interrupted; any other comes back by itself within a frame or a second, but a frame may take a
+/// simulator longer than a client waits for an answer, so that a command interrupts it too; but not
+/// twice in a row, or a client that sends commands all the time would keep it from making any.
+void SourceHost::changed(bool is_command) {
   std::stop_source interrupt{std::nostopstate};
   {
     const std::scoped_lock lock{mutex_};
-    if (info_ && info_->can_trigger) interrupt = interrupt_;
+    if (info_ && (info_->can_trigger || (is_command && !is_spared_))) interrupt = interrupt_;
   }
   interrupt.request_stop();
   work_.notify_all();
@@ -289,8 +296,13 @@ bool SourceHost::reopen(const std::stop_token& stop) {
 }
 
 void SourceHost::startSource() {
+  std::uint64_t next_subscriber = 0;
+  {
+    const std::scoped_lock lock{mutex_};
+    next_subscriber = next_subscriber_;
+  }
   const Result<> started = inDriver([this] { return source_->start(); });
-  if (!started) return onError(started.error());
+  if (!started) return onError(started.error(), next_subscriber);
   is_started_ = true;
   const std::scoped_lock lock{mutex_};
   is_streaming_ = true;
@@ -309,19 +321,22 @@ void SourceHost::stopSource() {
 void SourceHost::makeFrame(const std::stop_token& stop) {
   std::stop_token interrupt;
   bool lockstep = false;
+  std::uint64_t next_subscriber = 0;
   {
     const std::scoped_lock lock{mutex_};
     if (!commands_.empty() || stop.stop_requested()) return;
     if (interrupt_.stop_requested()) interrupt_ = std::stop_source{};
     interrupt = interrupt_.get_token();
     lockstep = hasLockstep();
+    next_subscriber = next_subscriber_;
   }
   Result<Frame> frame = inDriver([&] { return source_->next(interrupt, lockstep); });
-  if (frame) {
-    publish(*std::move(frame));
-  } else {
-    onError(frame.error());
+  {
+    const std::scoped_lock lock{mutex_};
+    is_spared_ = !frame && frame.error().code == Error::Code::Stopped;
   }
+  if (!frame) return onError(frame.error(), next_subscriber);
+  publish(*std::move(frame));
 }
 
 void SourceHost::publish(Frame frame) {
@@ -348,13 +363,15 @@ void SourceHost::publish(Frame frame) {
   fanOut(frame, takers);
 }
 
-void SourceHost::onError(const Error& error) {
+/// `next_subscriber` is the number of whoever came first after the call that failed was made: an end
+/// of the stream is not theirs.
+void SourceHost::onError(const Error& error, std::uint64_t next_subscriber) {
   using Code = Error::Code;
   if (error.code == Code::Stopped || error.code == Code::Timeout) return;
   if (error.code == Code::EndOfStream) {
     spdlog::info("{}: {}", name_, error.message);
     stopSource();
-    return endAll(error);
+    return endAll(error, next_subscriber);
   }
   // Whatever else it is, opening the camera anew is the best that can be done; subscribers stay.
   stopSource();
@@ -370,12 +387,16 @@ void SourceHost::retryLater() {
   retry_after_ = std::min(2 * retry_after_, options_.longest_retry);
 }
 
-void SourceHost::endAll(const Error& reason) {
+/// Ends the subscriptions with smaller numbers; for others the stream begins anew.
+void SourceHost::endAll(const Error& reason, std::uint64_t before) {
   std::vector<SubscriberPtr> ended;
   {
     const std::scoped_lock lock{mutex_};
-    ended.swap(subscribers_);
-    has_ended_ = true;
+    for (const SubscriberPtr& one : subscribers_) {
+      if (one->number < before) ended.push_back(one);
+    }
+    std::erase_if(subscribers_, [&](const SubscriberPtr& one) { return one->number < before; });
+    has_ended_ = subscribers_.empty();
   }
   for (const SubscriberPtr& subscriber : ended) subscriber->queue.end(reason);
 }

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -64,6 +65,9 @@ class SourceHost {
   void post(Command command, Done done);
   /// Asks the thread to end without waiting for it.
   void requestStop();
+  /// After requestStop(), on one thread: waits until the source is closed, so that whoever lets go of
+  /// the host last, perhaps the thread that serves clients, need not.
+  void waitForEnd();
 
  private:
   struct Waiting {
@@ -81,11 +85,12 @@ class SourceHost {
   void stopSource();
   void makeFrame(const std::stop_token& stop);
   void publish(Frame frame);
-  void onError(const Error& error);
+  void onError(const Error& error, std::uint64_t next_subscriber);
   void retryLater();
-  void endAll(const Error& reason);
+  void endAll(const Error& reason,
+              std::uint64_t before = std::numeric_limits<std::uint64_t>::max());
   void noteError(const Error& error);
-  void changed();
+  void changed(bool is_command = false);
   [[nodiscard]] bool isWanted() const;      // with the lock held
   [[nodiscard]] bool mayMakeFrame() const;  // with the lock held
   [[nodiscard]] bool hasLockstep() const;   // with the lock held
@@ -107,8 +112,10 @@ class SourceHost {
   mutable std::mutex mutex_;  // guards all below
   std::condition_variable_any work_;
   std::stop_source interrupt_;
+  bool is_spared_ = false;  ///< the frame in the making was begun anew after an interruption
   std::deque<Waiting> commands_;
   std::vector<SubscriberPtr> subscribers_;
+  std::uint64_t next_subscriber_ = 0;
   std::optional<drivers::SourceInfo> info_;  ///< of the source as last opened
   bool is_streaming_ = false;
   bool has_ended_ = false;

@@ -2,6 +2,7 @@
 #include "daemon/subscriber.h"
 
 #include <cstddef>
+#include <exception>
 
 namespace toftwin::daemon {
 namespace {
@@ -13,6 +14,28 @@ Result<PreparedFramePtr> prepare(const Frame& frame, const Selection& selection)
   prepared->frame = *std::move(selected);
   prepared->body = wire::encodeBody(prepared->frame.planes);
   return PreparedFramePtr{std::move(prepared)};
+}
+
+/// Whatever goes wrong with one subscriber is not to end the others, let alone the daemon.
+void give(Subscriber& taker, const Result<PreparedFramePtr>& prepared) noexcept {
+  try {
+    if (prepared) return taker.queue.push(*prepared);
+    taker.queue.end(prepared.error());
+  } catch (const std::exception& e) {
+    try {
+      taker.queue.end({Error::Code::Internal, e.what()});
+    } catch (const std::exception&) {
+      return;  // it has ended, but could not be woken
+    }
+  }
+}
+
+Result<PreparedFramePtr> tryToPrepare(const Frame& frame, const Selection& selection) {
+  try {
+    return prepare(frame, selection);
+  } catch (const std::exception& e) {
+    return Error{Error::Code::Internal, e.what()};
+  }
 }
 
 }  // namespace
@@ -28,14 +51,8 @@ void fanOut(const Frame& frame, const std::vector<SubscriberPtr>& takers) {
       is_served[i] = true;
       equals.push_back(takers[i]);
     }
-    const Result<PreparedFramePtr> prepared = prepare(frame, wanted);
-    for (const SubscriberPtr& taker : equals) {
-      if (prepared) {
-        taker->queue.push(*prepared);
-      } else {
-        taker->queue.end(prepared.error());
-      }
-    }
+    const Result<PreparedFramePtr> prepared = tryToPrepare(frame, wanted);
+    for (const SubscriberPtr& taker : equals) give(*taker, prepared);
   }
 }
 

@@ -28,6 +28,7 @@ struct Subscriber {
       : wish(std::move(wanted)), queue(wish.queue, std::move(wake)) {}
   const Wish wish;
   FrameQueue queue;
+  std::uint64_t number = 0;  ///< in the order in which they came; guarded by the host
   std::optional<std::uint64_t> unacknowledged;  ///< lockstep; guarded by the host
 };
 /// Shared by the source's host, which fills the queue, and the session or recorder that empties it.

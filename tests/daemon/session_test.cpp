@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <limits>
+#include <thread>
 
 #include "fakes.h"
 
@@ -187,6 +189,24 @@ TEST(Session, ThatEndsLeavesNothingBehind) {
   ASSERT_TRUE(talk.remote->stopped.reaches(1));
   EXPECT_EQ(talk.hub.health().sessions, 0u);
   EXPECT_EQ(talk.hub.health().sources.at(0).subscribers, 0u);
+}
+
+TEST(Session, ASourceThatWasTakenOutIsClosedByWhoeverTookItOut) {
+  Conversation talk;
+  const auto held = *talk.hub.find("cam");  // as a session's subscription does
+  std::atomic<bool> is_over = false;
+  Counter in_driver;
+  held->post(
+      [&](auto&) {
+        in_driver.add();
+        std::this_thread::sleep_for(std::chrono::milliseconds{50});
+        is_over = true;
+        return Result<>{};
+      },
+      [](const Result<>&) {});
+  ASSERT_TRUE(in_driver.reaches(1));
+  talk.hub.remove("cam").clear();
+  EXPECT_TRUE(is_over) << "the last to let go would have to wait for the driver";
 }
 
 TEST(Session, TellsWhyASubscriptionEnded) {

@@ -180,6 +180,54 @@ TEST(SourceHost, EndsItsSubscriptionsWithTheStreamAndStartsAnewForTheNext) {
   EXPECT_EQ(taker.nextSequence(again->queue), 1);
 }
 
+TEST(SourceHost, WhoeverSubscribesWhileTheStreamEndsGetsTheNextOne) {
+  Rig rig;
+  rig.remote->info.can_trigger = false;  // so that a subscription does not interrupt next()
+  rig.start();
+  Taker early, late;
+  const auto first = rig.subscribe(early);
+  ASSERT_TRUE(rig.remote->asked.reaches(1));
+  const auto second = rig.subscribe(late);
+  rig.remote->give({Error::Code::EndOfStream, "the end"});
+  const auto end = early.next(first->queue);
+  ASSERT_TRUE(end.has_value());
+  EXPECT_EQ(std::get<Error>(*end).code, Error::Code::EndOfStream);
+  ASSERT_TRUE(rig.remote->started.reaches(2));
+  rig.remote->give();
+  EXPECT_EQ(late.nextSequence(second->queue), 0);
+}
+
+TEST(SourceHost, ACommandInterruptsAFrameInTheMaking) {
+  Rig rig;
+  rig.remote->info.can_trigger = false;
+  rig.start();
+  Taker taker;
+  const auto subscriber = rig.subscribe(taker);
+  ASSERT_TRUE(rig.remote->asked.reaches(1));
+  std::promise<void> done;
+  rig.host->post([](auto&) { return Result<>{}; }, [&](const Result<>&) { done.set_value(); });
+  auto future = done.get_future();
+  const bool came = future.wait_for(std::chrono::seconds{30}) == std::future_status::ready;
+  rig.remote->give();
+  EXPECT_TRUE(came) << "it waited for the frame";
+  future.wait();
+  EXPECT_EQ(taker.nextSequence(subscriber->queue), 0);
+  EXPECT_EQ(rig.host->health().reconnects, 0u);
+}
+
+TEST(SourceHost, WhatGoesWrongWithOneSubscriberIsNobodyElsesMatter) {
+  Rig rig;
+  rig.start();
+  Taker taker;
+  auto broken = rig.host->subscribe({{}, {}}, [] { throw std::bad_alloc{}; });
+  ASSERT_TRUE(broken.ok());
+  const auto other = rig.subscribe(taker);
+  rig.remote->give(2);
+  EXPECT_EQ(taker.nextSequence(other->queue), 0);
+  EXPECT_EQ(taker.nextSequence(other->queue), 1);
+  EXPECT_TRUE((*broken)->queue.hasEnded());
+}
+
 TEST(SourceHost, ADriverThatThrowsIsOpenedAgain) {
   Rig rig;
   rig.start();
