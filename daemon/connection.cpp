@@ -40,6 +40,14 @@ void noticeVanishedPeers(Socket& socket) {
   set(IPPROTO_TCP, TCP_KEEPCNT, 3);
 }
 
+/// Keep-alives are not sent while a frame waits to be acknowledged by the peer's kernel, which would be
+/// sent again for a quarter of an hour. A lockstep source would wait as long.
+void noticeVanishedPeersWhileSending(Socket& socket) {
+  constexpr unsigned kMilliseconds = 10'000;
+  ::setsockopt(socket.native_handle(), IPPROTO_TCP, TCP_USER_TIMEOUT, &kMilliseconds,
+               sizeof kMilliseconds);  // fails on a Unix socket, which needs none
+}
+
 }  // namespace
 
 Connection::Connection(Socket socket, Hub& hub, Options options, std::string name,
@@ -99,6 +107,10 @@ void Connection::take(Result<wire::Message> message) {
     return;
   }
   if (message) {
+    const auto* subscribe = std::get_if<wire::Subscribe>(&*message);
+    if (subscribe != nullptr && subscribe->policy == wire::Policy::Lockstep) {
+      noticeVanishedPeersWhileSending(socket_.socket());
+    }
     for (wire::Message& answer : session_->handle(*message)) answers_.push_back(std::move(answer));
     if (session_->isOver()) is_last_ = true;
   } else if (message.error().code == Error::Code::Unsupported) {

@@ -2,6 +2,8 @@
 // What clients of the whole daemon get.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
 
 #include <cmath>
 #include <optional>
@@ -118,6 +120,28 @@ TEST_F(RunningDaemon, FramesThatWaitForAStalledClientHoldNoFileDescriptors) {
   }
   // At most one frame is being written to each, and one being read.
   EXPECT_LE(openSharedBodies(), 3);
+}
+
+TEST_F(RunningDaemon, ALockstepClientOverTcpMayVanishWhileAFrameIsSent) {
+  start(kFast);
+  const auto limited = [] {  // sockets of this process that give up after ten seconds
+    int count = 0;
+    for (int fd = 0; fd < 256; ++fd) {
+      unsigned timeout = 0;
+      socklen_t size = sizeof timeout;
+      if (::getsockopt(fd, IPPROTO_TCP, TCP_USER_TIMEOUT, &timeout, &size) == 0 &&
+          timeout == 10'000) {
+        ++count;
+      }
+    }
+    return count;
+  };
+  auto client = this->client(true);
+  ASSERT_TRUE(client.subscribe("cam", {.policy = Policy::Latest}).ok());
+  EXPECT_EQ(limited(), 0);
+  auto stream = client.subscribe("cam", {.policy = Policy::Lockstep});
+  ASSERT_TRUE(stream.ok());
+  EXPECT_EQ(limited(), 1);
 }
 
 TEST_P(OnEachTransport, LockstepMakesTheNextFrameWhenBothClientsAskedForIt) {
