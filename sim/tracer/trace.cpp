@@ -2,8 +2,6 @@
 #include "sim/tracer/trace.h"
 
 #include <fmt/format.h>
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 #include <xmmintrin.h>
 
 #include <algorithm>
@@ -11,6 +9,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "sim/images/rows.h"
 #include "sim/tracer/path.h"
 
 namespace toftwin::sim {
@@ -28,18 +27,6 @@ class FlushDenormals {
   static constexpr unsigned kFlushToZero = 0x8000, kDenormalsAreZero = 0x0040;
   unsigned before_;
 };
-
-/// Calls work(first, last) for parts of [0, count), on all threads. ThreadSanitizer cannot see how the
-/// TBB library hands work over and would report each hand-over as a race: under it, one after the other.
-template <class Work>
-void inParallel(int count, const Work& work) {
-#if defined(__SANITIZE_THREAD__)
-  work(0, count);
-#else
-  tbb::parallel_for(tbb::blocked_range<int>{0, count},
-                    [&](const tbb::blocked_range<int>& part) { work(part.begin(), part.end()); });
-#endif
-}
 
 /// A pixel with very many samples is cut into pieces of this many, so that threads can share it. The
 /// pieces' sums are added in order: the result does not depend on who did which.
@@ -101,7 +88,7 @@ void sumBlock(const Tracing& tracing, const Block& block, BlockSums& sums) {
     return;
   }
   std::vector<BlockSums> parts(static_cast<std::size_t>(pieces), sums);
-  inParallel(pieces, [&](int begin, int end) {
+  inParallel(pieces, 1, [&](int begin, int end) {
     const FlushDenormals flush;
     for (int piece = begin; piece != end; ++piece) {
       const int first = piece * kSamplesPerPiece;
@@ -151,7 +138,7 @@ Light traceLogged(const Scene& scene, const TraceRequest& request, RayLog* log) 
   const int first_column = region.x / shape.width, first_row = region.y / shape.height;
   const int columns = (region.x + region.width - 1) / shape.width - first_column + 1;
   const int rows = (region.y + region.height - 1) / shape.height - first_row + 1;
-  inParallel(columns * rows, [&](int begin, int end) {
+  inParallel(columns * rows, 1, [&](int begin, int end) {
     const FlushDenormals flush;
     BlockSums sums{shape.pixels(), request.frequencies.size(), request.harmonics};
     for (int i = begin; i != end; ++i) {
