@@ -74,6 +74,7 @@ wire::SourceSummary SourceHost::summary() const {
     summary.kind = info_->kind;
   }
   summary.streaming = is_streaming_;
+  if (!is_there_) summary.problem = last_error_.empty() ? "it is being opened" : last_error_;
   return summary;
 }
 
@@ -93,7 +94,8 @@ Result<wire::SourceDescription> SourceHost::describe() const {
   description.can_set_pose = info_->can_set_pose;
   description.can_trigger = info_->can_trigger;
   description.can_lockstep = info_->can_lockstep;
-  description.parameters = info_->parameters;
+  description.parameters = state_.parameters;
+  description.world_from_camera = state_.world_from_camera;
   return description;
 }
 
@@ -263,7 +265,9 @@ void SourceHost::runCommands() {
       commands_.pop_front();
     }
     if (source_) {
-      next.done(inDriver([&] { return next.command(*source_); }));
+      const Result<> done = inDriver([&] { return next.command(*source_); });
+      noteState();  // before the answer, so that whoever asks after it sees the change
+      next.done(done);
     } else {
       next.done(Error{Error::Code::Disconnected,
                       fmt::format("the source \"{}\" is not there at present", name_)});
@@ -278,8 +282,17 @@ void SourceHost::adopt(Result<std::unique_ptr<drivers::Source>> opened) {
     return retryLater();
   }
   source_ = *std::move(opened);
+  noteState();
   const std::scoped_lock lock{mutex_};
   info_ = source_->info();
+  is_there_ = true;
+}
+
+void SourceHost::noteState() {
+  auto state = inDriver([&]() -> Result<drivers::SourceState> { return source_->state(); });
+  if (!state) return noteError(state.error());
+  const std::scoped_lock lock{mutex_};
+  state_ = *std::move(state);
 }
 
 /// Opens the source again when it is time to; else waits for that, for a command, or for the stop.
@@ -379,6 +392,7 @@ void SourceHost::onError(const Error& error, std::uint64_t next_subscriber) {
   retryLater();
   noteError(error);
   const std::scoped_lock lock{mutex_};
+  is_there_ = false;
   ++reconnects_;
 }
 

@@ -79,6 +79,7 @@ class SourceHost {
   void runCommands();
   bool reopen(const std::stop_token& stop);
   void adopt(Result<std::unique_ptr<drivers::Source>> opened);
+  void noteState();
   void adjustStreaming();
   void makeFrameOrWait(const std::stop_token& stop);
   void startSource();
@@ -117,6 +118,8 @@ class SourceHost {
   std::vector<SubscriberPtr> subscribers_;
   std::uint64_t next_subscriber_ = 0;
   std::optional<drivers::SourceInfo> info_;  ///< of the source as last opened
+  drivers::SourceState state_;               ///< likewise, since the last command
+  bool is_there_ = false;
   bool is_streaming_ = false;
   bool has_ended_ = false;
   bool is_stopping_ = false;

@@ -225,6 +225,34 @@ Result<> poseIsThatOfTheNextFrame(Bench& bench) {
   return {};
 }
 
+Result<> stateIsWhatWasSet(Bench& bench) {
+  Source& source = *bench.source;
+  const std::vector<Parameter> before = source.state().parameters;
+  std::vector<std::string> names;
+  for (const Parameter& parameter : before) names.push_back(parameter.name);
+  if (names != source.info().parameters)
+    return broken("state() names other parameters than info()");
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    const auto& [name, value, bounds] = before[i];
+    if (!value) continue;
+    if (!bounds.contains(*value))
+      return broken("{} = {} is outside of the bounds that state() gives", name, *value);
+    const bool has_low = std::isfinite(bounds.min);
+    const double wanted = has_low ? bounds.min : *value;
+    if (auto done = source.setParameter(name, wanted); !done)
+      return broken("{} = {}: {}", name, wanted, done.error().message);
+    if (source.state().parameters.at(i).value != wanted)
+      return broken("{} was set to {}, but state() says otherwise", name, wanted);
+    if (auto done = source.setParameter(name, *value); !done)
+      return broken("{} = {} again: {}", name, *value, done.error().message);
+  }
+  if (!source.info().can_set_pose) return {};
+  const Transform<World, Camera> pose{{1.0, 0.0, 0.0, 0.0}, {0.0, 0.0, -0.015625}};
+  if (auto done = source.setPose(pose); !done) return done;
+  if (source.state().world_from_camera != pose) return broken("state() has another pose than set");
+  return {};
+}
+
 Result<> lockstepDoesNotWait(Bench& bench) {
   if (!bench.source->info().can_lockstep) return doesNotApply("it cannot be paced");
   for (int i = 0; i < bench.options.frames; ++i) {
@@ -260,6 +288,9 @@ constexpr std::array kChecks{
           "a command that does nothing and says \"done\" hides mistakes", refusesWhatItCannot},
     Check{"a pose is that of the next frame",
           "a robot that moved must not get the view from before", poseIsThatOfTheNextFrame},
+    Check{"it says what was set",
+          "people who cannot see a parameter's value set it blindly, and cannot put it back",
+          stateIsWhatWasSet},
     Check{"lockstep does not wait", "a paced source that also waits makes every simulation slow",
           lockstepDoesNotWait},
 };
@@ -294,7 +325,11 @@ Candidate listedCamera(const Driver& driver, const std::string& uri) {
 
 std::vector<Finding> checkCompliance(const Candidate& camera, const ComplianceOptions& options) {
   std::vector<Finding> findings;
-  for (const Check& check : kChecks) findings.push_back(runOne(check, camera, options));
+  for (const Check& check : kChecks) {
+    if (options.interrupted && options.interrupted()) break;
+    findings.push_back(runOne(check, camera, options));
+    if (options.report) options.report(findings.back());
+  }
   return findings;
 }
 

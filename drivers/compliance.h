@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -23,18 +24,20 @@ struct Candidate {
 /// The candidate for a camera that the driver lists.
 Candidate listedCamera(const Driver& driver, const std::string& uri);
 
-struct ComplianceOptions {
-  int frames = 5;                                  ///< looked at per check
-  std::chrono::milliseconds frame_timeout{10000};  ///< a frame must come within this
-  std::chrono::milliseconds stop_timeout{1000};    ///< a wait must end within this when asked
-};
-
 struct Finding {
   enum class Outcome { Passed, Failed, DoesNotApply };
   std::string_view check;    ///< the fact, in words
   std::string_view because;  ///< the failure that the check exists for
   Outcome outcome = Outcome::Passed;
   std::string detail;
+};
+
+struct ComplianceOptions {
+  int frames = 5;                                  ///< looked at per check
+  std::chrono::milliseconds frame_timeout{10000};  ///< a frame must come within this
+  std::chrono::milliseconds stop_timeout{1000};    ///< a wait must end within this when asked
+  std::function<void(const Finding&)> report{};    ///< told of each check when it is through
+  std::function<bool()> interrupted{};             ///< asked between checks: whether to leave out the rest
 };
 
 /// Runs all checks, each on a camera opened for it.

@@ -13,6 +13,12 @@ Error unsupported(const SourceInfo& info, std::string_view what) {
 
 }  // namespace
 
+SourceState Source::state() const {
+  SourceState state;
+  for (const std::string& name : info().parameters) state.parameters.push_back({.name = name});
+  return state;
+}
+
 Result<> Source::setPose(const Transform<World, Camera>&) {
   return unsupported(info(), "be given a pose: its pose is where it stands, or recorded");
 }

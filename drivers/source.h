@@ -12,6 +12,7 @@
 #include <vector>
 
 #include <toftwin/frame.h>
+#include <toftwin/parameter.h>
 #include <toftwin/result.h>
 
 #include "protocol/settings/settings.h"
@@ -33,6 +34,12 @@ struct SourceInfo {
   std::vector<std::string> parameters;  ///< names that setParameter takes
 };
 
+/// What can be set, as it is set now.
+struct SourceState {
+  std::vector<Parameter> parameters;  ///< those of info(), in that order
+  std::optional<Transform<World, Camera>> world_from_camera;  ///< of the next frame
+};
+
 /// An opened camera. One thread owns it and makes every call but the destructor's stop request.
 class Source {
  public:
@@ -52,6 +59,9 @@ class Source {
   /// does, so don't wait. The daemon also uses the token to interrupt a wait when it has a command
   /// for the source, and then calls again: a wait that is cut short loses no frame.
   virtual Result<Frame> next(std::stop_token stop, bool lockstep) = 0;
+
+  /// Asked after every change by one of the following. By default the names alone.
+  [[nodiscard]] virtual SourceState state() const;
 
   virtual Result<> setPose(const Transform<World, Camera>& world_from_camera);
   virtual Result<> setParameter(std::string_view name, double value);

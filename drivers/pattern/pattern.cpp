@@ -124,6 +124,11 @@ class PatternSource final : public Source {
     return frame;
   }
 
+  [[nodiscard]] SourceState state() const override {
+    return {{{"speed_px", static_cast<double>(speed_px_), {0.0, kMostSpeed_px}}},
+            world_from_camera_};
+  }
+
   // Commands come on the thread that calls next(), between two calls, so no lock is needed.
   Result<> setPose(const Transform<World, Camera>& world_from_camera) override {
     world_from_camera_ = world_from_camera;

@@ -51,6 +51,8 @@ material = "grey"
 
 constexpr std::string_view kAmbient = "ambient_klx", kSincePowerOn = "since_power_on_s",
                            kTemperature = "room_temperature_c";
+constexpr Bounds kAmbientBounds_klx{0.0, 200.0}, kSincePowerOnBounds_s{0.0, 1e9},
+    kTemperatureBounds_c{-40.0, 100.0};
 
 Transform<World, Camera> startPose(const Keys& keys) {
   constexpr double kToRadian = degree.in_si;
@@ -137,6 +139,16 @@ class SimulatedSource final : public Source {
     return frame;
   }
 
+  [[nodiscard]] SourceState state() const override {
+    SourceState state{model_.parameters(), view_.pose()};
+    state.parameters.push_back({std::string{kAmbient}, ambient_.in(kilolux), kAmbientBounds_klx});
+    // Goes on by itself; every frame says it.
+    state.parameters.push_back({std::string{kSincePowerOn}, {}, kSincePowerOnBounds_s});
+    state.parameters.push_back(
+        {std::string{kTemperature}, room_temperature_.in(celsius), kTemperatureBounds_c});
+    return state;
+  }
+
   Result<> setPose(const Transform<World, Camera>& world_from_camera) override {
     const auto& q = world_from_camera.rotation_wxyz;
     const Vec3d& t = world_from_camera.translation_m;
@@ -156,11 +168,12 @@ class SimulatedSource final : public Source {
   }
 
   Result<> setParameter(std::string_view name, double value) override {
-    if (name == kAmbient) return set(ambient_, value, {0.0, 200.0}, kilolux, name);
-    if (name == kTemperature) return set(room_temperature_, value, {-40.0, 100.0}, celsius, name);
+    if (name == kAmbient) return set(ambient_, value, kAmbientBounds_klx, kilolux, name);
+    if (name == kTemperature)
+      return set(room_temperature_, value, kTemperatureBounds_c, celsius, name);
     if (name == kSincePowerOn) {
       Duration now;
-      if (auto done = set(now, value, {0.0, 1e9}, second, name); !done) return done;
+      if (auto done = set(now, value, kSincePowerOnBounds_s, second, name); !done) return done;
       since_power_on_ = now - deviceDuration();
       return {};
     }

@@ -23,7 +23,7 @@ Result<> checkName(std::string_view what, std::string_view name) {
 
 SourceEntry toEntry(wire::SourceSummary summary) {
   return {std::move(summary.name), std::move(summary.model), std::move(summary.serial),
-          summary.kind, summary.streaming};
+          summary.kind, summary.streaming, std::move(summary.problem)};
 }
 
 wire::Subscribe toRequest(std::string_view source, SubscribeOptions options) {
@@ -142,7 +142,8 @@ Result<SourceDetails> Client::describe(std::string_view source) {
                        .can_set_pose = answer->can_set_pose,
                        .can_trigger = answer->can_trigger,
                        .can_lockstep = answer->can_lockstep,
-                       .parameters = std::move(answer->parameters)};
+                       .parameters = std::move(answer->parameters),
+                       .world_from_camera = answer->world_from_camera};
 }
 
 Result<Subscription> Client::subscribe(std::string_view source, SubscribeOptions options) {

@@ -27,7 +27,8 @@ SourceSummary readSummary(Checks& checks, const fb::SourceSummary* table) {
           .model = checks.name(table->model(), "source.model"),
           .serial = checks.name(table->serial(), "source.serial"),
           .kind = checks.oneOf(table->kind(), FrameKind::Faulted, "source.kind"),
-          .streaming = table->streaming()};
+          .streaming = table->streaming(),
+          .problem = checks.text(table->problem(), kMaxText, "source.problem")};
 }
 
 std::vector<PlaneKind> readKinds(Checks& checks, const flatbuffers::Vector<std::uint8_t>* bytes) {
@@ -39,6 +40,22 @@ std::vector<PlaneKind> readKinds(Checks& checks, const flatbuffers::Vector<std::
     kinds.push_back(checks.oneOf(byte, PlaneKind::TruthNormal, "planes"));
   }
   return kinds;
+}
+
+std::vector<Parameter> readParameters(
+    Checks& checks, const flatbuffers::Vector<flatbuffers::Offset<fb::Parameter>>* tables) {
+  std::vector<Parameter> parameters;
+  for (const auto* table : checks.items(tables, kMaxNames, "parameters")) {
+    Parameter& parameter = parameters.emplace_back();
+    parameter.name = checks.name(table->name(), "parameter.name");
+    if (const auto value = table->value())
+      parameter.value = checks.finite(*value, "parameter.value");
+    if (const auto lowest = table->lowest())
+      parameter.bounds.min = checks.finite(*lowest, "parameter.lowest");
+    if (const auto highest = table->highest())
+      parameter.bounds.max = checks.finite(*highest, "parameter.highest");
+  }
+  return parameters;
 }
 
 // One `read` for each message.
@@ -67,7 +84,9 @@ SourceDescription read(Checks& checks, std::uint64_t id, const fb::SourceDescrip
                       .can_set_pose = t.can_set_pose(),
                       .can_trigger = t.can_trigger(),
                       .can_lockstep = t.can_lockstep(),
-                      .parameters = checks.names(t.parameters(), "parameters")};
+                      .parameters = readParameters(checks, t.parameters()),
+                      .world_from_camera = {}};
+  if (const fb::Pose* pose = t.world_from_camera()) m.world_from_camera = readPose(checks, *pose);
   if (const auto interval_s = t.frame_interval_s()) {
     m.frame_interval = checks.finiteFromZero(*interval_s, "frame_interval_s") * second;
   }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <utility>
 
@@ -21,8 +22,31 @@ Offset<fb::SourceSummary> writeSummary(Builder& builder, const SourceSummary& su
   const auto name = writeText(builder, summary.name, kMaxName);
   const auto model = writeText(builder, summary.model, kMaxName);
   const auto serial = writeText(builder, summary.serial, kMaxName);
+  const auto problem = writeText(builder, summary.problem, kMaxText);
   return fb::CreateSourceSummary(builder, name, model, serial,
-                                 static_cast<std::uint8_t>(summary.kind), summary.streaming);
+                                 static_cast<std::uint8_t>(summary.kind), summary.streaming,
+                                 problem);
+}
+
+/// An end of the bounds, absent where there is none.
+flatbuffers::Optional<double> endOf(double bound) {
+  if (!std::isfinite(bound)) return flatbuffers::nullopt;
+  return bound;
+}
+
+Offset<flatbuffers::Vector<Offset<fb::Parameter>>> writeParameters(
+    Builder& builder, const std::vector<Parameter>& parameters) {
+  if (parameters.empty()) return {};
+  std::vector<Offset<fb::Parameter>> tables;
+  for (std::size_t i = 0; i < std::min(parameters.size(), kMaxNames); ++i) {
+    const Parameter& parameter = parameters[i];
+    const auto name = writeText(builder, parameter.name, kMaxName);
+    flatbuffers::Optional<double> value = flatbuffers::nullopt;
+    if (parameter.value && std::isfinite(*parameter.value)) value = *parameter.value;
+    tables.push_back(fb::CreateParameter(builder, name, value, endOf(parameter.bounds.min),
+                                         endOf(parameter.bounds.max)));
+  }
+  return builder.CreateVector(tables);
 }
 
 Offset<flatbuffers::Vector<std::uint8_t>> writeKinds(Builder& builder,
@@ -54,7 +78,7 @@ auto write(Builder& b, const SourceDescription& m) {
   const auto driver = writeText(b, m.driver, kMaxName);
   const auto camera = writeCamera(b, m.camera);
   const auto planes = writeKinds(b, m.planes);
-  const auto parameters = writeNames(b, m.parameters);
+  const auto parameters = writeParameters(b, m.parameters);
   fb::SourceDescriptionBuilder table{b};
   table.add_summary(summary);
   table.add_driver(driver);
@@ -65,6 +89,11 @@ auto write(Builder& b, const SourceDescription& m) {
   table.add_can_trigger(m.can_trigger);
   table.add_can_lockstep(m.can_lockstep);
   table.add_parameters(parameters);
+  fb::Pose pose;
+  if (m.world_from_camera) {
+    pose = toPose(*m.world_from_camera);
+    table.add_world_from_camera(&pose);
+  }
   return table.Finish();
 }
 auto write(Builder& b, const Subscribe& m) {

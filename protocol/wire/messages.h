@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <toftwin/frame.h>
+#include <toftwin/parameter.h>
 #include <toftwin/result.h>
 
 /// The messages of the protocol as values; docs/protocol.md says what each means. Every request
@@ -33,6 +34,7 @@ struct SourceSummary {
   std::string serial;
   FrameKind kind = FrameKind::Real;
   bool streaming = false;
+  std::string problem{};  ///< why the camera is not there now; empty: it is
 };
 struct SourceList { std::uint64_t id = 0; std::vector<SourceSummary> sources; };
 
@@ -47,7 +49,8 @@ struct SourceDescription {
   bool can_set_pose = false;
   bool can_trigger = false;
   bool can_lockstep = false;
-  std::vector<std::string> parameters;
+  std::vector<Parameter> parameters;
+  std::optional<Transform<World, Camera>> world_from_camera;  ///< that was set, if it can be set
 };
 
 /// What happens when a subscriber is slower than the source. On the wire as a byte.

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include <toftwin/fields.h>
+#include <toftwin/parameter.h>
 #include <toftwin/result.h>
 #include <toftwin/units.h>
 
@@ -81,24 +82,27 @@ class NumberSetter {
  public:
   NumberSetter(std::string_view key, double value) : key_(key), value_(value) {}
 
-  std::vector<std::string> names;  ///< all numbers met
+  std::vector<Parameter> met;  ///< all numbers, with what they were before
   bool is_set = false;
   std::string problem;  ///< why the value does not do, or empty
 
   template <class D>
   void quantity(const char* name, Quantity<D>& value, Unit<D> unit, Bounds bounds, const char*) {
-    if (wants(std::string{name} + "_" + unit.suffix, bounds, false)) value = value_ * unit;
+    if (wants({std::string{name} + "_" + unit.suffix, value.in(unit), bounds}, false))
+      value = value_ * unit;
   }
   template <class Number>
   requires std::is_arithmetic_v<Number>
   void number(const char* name, Number& value, Bounds bounds, const char*) {
-    if (wants(name, bounds, std::is_integral_v<Number>)) value = static_cast<Number>(value_);
+    if (wants({name, static_cast<double>(value), bounds}, std::is_integral_v<Number>))
+      value = static_cast<Number>(value_);
   }
 
  private:
-  bool wants(std::string name, Bounds bounds, bool integral) {
-    const bool is_it = name == key_;
-    names.push_back(std::move(name));
+  bool wants(Parameter parameter, bool integral) {
+    const bool is_it = parameter.name == key_;
+    const Bounds bounds = parameter.bounds;
+    met.push_back(std::move(parameter));
     if (!is_it) return false;
     is_set = true;
     if (std::isnan(value_) || !bounds.contains(value_))

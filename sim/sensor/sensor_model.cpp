@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -28,6 +29,8 @@ struct SensorModel::Impl {
 };
 
 namespace {
+
+constexpr Bounds kExposureBounds_us{1.0, 20'000.0};
 
 std::string canonicalText(CameraFile file, const std::vector<AnyEffect>& effects) {
   CanonicalText canonical;
@@ -257,18 +260,33 @@ bool SensorModel::collectsTheSameEachFrame() const {
   return true;
 }
 
-std::vector<std::string> SensorModel::parameterNames() const {
-  std::vector<std::string> names{"exposure_us"};
+std::vector<Parameter> SensorModel::parameters() const {
+  const auto& modulations = impl_->file.modulations;
+  Parameter exposure{"exposure_us", {}, kExposureBounds_us};
+  if (!modulations.empty() && std::ranges::all_of(modulations, [&](const auto& modulation) {
+        return modulation.exposure == modulations.front().exposure;
+      })) {
+    exposure.value = modulations.front().exposure.in(microsecond);
+  }
+  std::vector<Parameter> all{std::move(exposure)};
   for (AnyEffect any : impl_->effects) {
     std::visit(
         [&]<class E>(E& effect) {
           NumberSetter lister{"", 0.0};
           effect.visit(lister);
-          for (const std::string& key : lister.names)
-            names.push_back(fmt::format("{}.{}", E::about.name, key));
+          for (Parameter& parameter : lister.met) {
+            parameter.name = fmt::format("{}.{}", E::about.name, parameter.name);
+            all.push_back(std::move(parameter));
+          }
         },
         any);
   }
+  return all;
+}
+
+std::vector<std::string> SensorModel::parameterNames() const {
+  std::vector<std::string> names;
+  for (Parameter& parameter : parameters()) names.push_back(std::move(parameter.name));
   return names;
 }
 
@@ -279,10 +297,11 @@ Result<SensorModel> SensorModel::with(std::string_view parameter, double value) 
   if (parameter == "exposure_us") {
     is_known = true;
     for (auto& modulation : changed.file.modulations) {
-      if (!(value >= 1.0 && value <= 20'000.0)) {
+      if (std::isnan(value) || !kExposureBounds_us.contains(value)) {
         return Error{
             Error::Code::InvalidArgument,
-            fmt::format("exposure_us = {:.12g} is out of bounds: it must be 1 to 20000 us", value)};
+            fmt::format("exposure_us = {:.12g} is out of bounds: it must be {} us", value,
+                        settings::describe(kExposureBounds_us))};
       }
       modulation.exposure = value * microsecond;
     }

@@ -10,6 +10,7 @@
 
 #include <toftwin/camera_info.h>
 #include <toftwin/frame.h>
+#include <toftwin/parameter.h>
 #include <toftwin/result.h>
 
 #include "sim/effects/effects.h"
@@ -77,8 +78,9 @@ class SensorModel {
   /// illuminance.
   [[nodiscard]] bool collectsTheSameEachFrame() const;
 
-  /// Names that with() takes: "exposure_us" (of all raw exposures) and "<effect>.<key>" for every
-  /// number of the model's effects ("lens_scatter.veil").
+  /// What with() takes: "exposure_us" (of all raw exposures; no value where they differ) and
+  /// "<effect>.<key>" for every number of the model's effects ("lens_scatter.veil").
+  [[nodiscard]] std::vector<Parameter> parameters() const;
   [[nodiscard]] std::vector<std::string> parameterNames() const;
   /// The same camera with one number changed. An error names an unknown parameter or the bounds.
   [[nodiscard]] Result<SensorModel> with(std::string_view parameter, double value) const;

@@ -76,7 +76,11 @@ SourceDescription fullDescription() {
           .can_set_pose = true,
           .can_trigger = true,
           .can_lockstep = true,
-          .parameters = {"exposure_us", "ambient_klx"}};
+          .parameters = {{"exposure_us", 500.0, {1.0, 20'000.0}},
+                         {"ambient_klx", 0.0, {0.0, 200.0}},
+                         {"since_power_on_s", {}, {}}},
+          .world_from_camera =
+              Transform<World, Camera>{{0.5, -0.5, 0.5, 0.5}, {1.0, -2.0, 0.25}}};
 }
 
 Subscribe fullSubscribe() {
@@ -129,7 +133,8 @@ std::vector<ExampleMessage> exampleMessages() {
       {"hello-bare", Hello{}},
       {"list-sources", ListSources{2}},
       {"source-list",
-       SourceList{2, {summary(), {"o3d", "O3D303", "", FrameKind::Replayed, false}}}},
+       SourceList{2, {summary(), {"o3d", "O3D303", "", FrameKind::Replayed, false},
+                      {"xtion", "", "", FrameKind::Real, false, "no camera at usb:1-4"}}}},
       {"source-list-empty", SourceList{2, {}}},
       {"describe-source", DescribeSource{4, "kinect"}},
       {"source-description", fullDescription()},

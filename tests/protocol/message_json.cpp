@@ -5,6 +5,7 @@
 
 #include <array>
 #include <charconv>
+#include <cmath>
 #include <type_traits>
 
 namespace toftwin::wire {
@@ -147,6 +148,13 @@ class Renderer {
     field("serial", m.serial);
     field("kind", m.kind);
     field("streaming", m.streaming);
+    field("problem", m.problem);
+  }
+  void fields(const Parameter& m) {
+    field("name", m.name);
+    if (m.value) field("value", *m.value);
+    if (std::isfinite(m.bounds.min)) field("lowest", m.bounds.min);
+    if (std::isfinite(m.bounds.max)) field("highest", m.bounds.max);
   }
   void fields(const CameraInfo& m) {
     const auto& [k1, k2, p1, p2, k3] = m.distortion;
@@ -247,6 +255,7 @@ class Renderer {
     field("can_trigger", m.can_trigger);
     field("can_lockstep", m.can_lockstep);
     field("parameters", m.parameters);
+    if (m.world_from_camera) field("world_from_camera", *m.world_from_camera);
   }
   void fields(const Subscribe& m) {
     field("source", m.source);

@@ -167,6 +167,16 @@ TEST_F(Recorded, ACutRecordingIsReadAsFarAsItGoesAndSaysSo) {
   EXPECT_EQ(toftwin("info " + path("a.mcap")).status, 7);
 }
 
+TEST_F(Recorded, ACameraThatBreaksAPromiseIsStatus7) {
+  // Its first pixel has a range although its flags say invalid, and its device time stands still.
+  const Ran ran = toftwin("compliance " + path("a.mcap") +
+                          " --keys 'recorded_source = \"kinect\"\npace = \"fast\"'");
+  EXPECT_EQ(ran.status, 7) << ran.out << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("FAIL invalid pixels are NaN"));
+  EXPECT_THAT(ran.out, HasSubstr("FAIL device time strictly increases"));
+  EXPECT_THAT(ran.out, HasSubstr("why it matters"));
+}
+
 TEST_F(Recorded, AnOutputThatCannotBeWrittenIsStatus6AndLeavesNothing) {
   std::filesystem::create_directory(folder_ / "out");
   const std::string command =

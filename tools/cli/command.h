@@ -20,14 +20,20 @@ enum class Exit : int {
   Ok = 0,
   Internal = 1,     ///< a bug of ours
   Usage = 2,        ///< the command line is wrong
-  Unreachable = 3,  ///< no daemon there, or the connection to it was lost
+  Unreachable = 3,  ///< no daemon there, it ended, or the camera is not there now
   BadInput = 4,     ///< a file, source or value is not there, damaged or wrong
   Refused = 5,      ///< not permitted, busy, or this source cannot do that
   CannotWrite = 6,  ///< disk full, or the place of the output may not be written to
   Incomplete = 7,   ///< it ended before all that was asked for; doctor: a check failed
-  Interrupted = 130
+  Interrupted = 130  ///< by Ctrl-C or SIGTERM
 };
 Exit exitOf(Error::Code code);
+/// Each status with what it means, in one line: for --help and the manual.
+struct ExitMeaning {
+  Exit status;
+  const char* meaning;
+};
+std::span<const ExitMeaning> exitMeanings();
 
 /// What a subcommand does when its options are parsed. An Error is shown to the user, and its code
 /// gives the exit status.
@@ -51,7 +57,11 @@ Command recordCommand();
 Command replayCommand();
 Command renderCommand();
 Command compareCommand();
+Command poseCommand();
+Command setCommand();
+Command triggerCommand();
 Command doctorCommand();
+Command complianceCommand();
 Command completionCommand();
 
 /// Fills `app` with all subcommands; the result has one Run for each row of `commands()`.

@@ -4,12 +4,22 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <ctime>
+#include <limits>
 
 #include <toftwin/names.h>
 
+#include "protocol/settings/describe.h"
+
 namespace toftwin::cli {
+
+std::string_view stateOf(const SourceEntry& source) {
+  if (!source.problem.empty()) return "absent";
+  return source.streaming ? "streaming" : "idle";
+}
 
 compare::Json toJson(const CameraInfo& camera) {
   return compare::Json::object()
@@ -38,6 +48,52 @@ std::string toText(const CameraInfo& camera) {
       camera.fy, camera.cx, camera.cy, camera.distortion[0], camera.distortion[1],
       camera.distortion[2], camera.distortion[3], camera.distortion[4],
       camera.calibration_id.empty() ? "unknown" : camera.calibration_id);
+}
+
+compare::Json toJson(const Transform<World, Camera>& world_from_camera) {
+  const Vec3d& t = world_from_camera.translation_m;
+  return compare::Json::object()
+      .set("position_m", compare::Json::arrayOf(std::array{t.x, t.y, t.z}))
+      .set("rotation_wxyz", compare::Json::arrayOf(world_from_camera.rotation_wxyz));
+}
+
+std::string toText(const Transform<World, Camera>& world_from_camera) {
+  const Vec3d& t = world_from_camera.translation_m;
+  const auto& [w, x, y, z] = world_from_camera.rotation_wxyz;
+  const Direction<World> axis = world_from_camera * Direction<Camera>{{0.0, 0.0, 1.0}};
+  // + 0.0 makes the zero of a product with a negative number positive.
+  return fmt::format(
+      "position     {:.6g}, {:.6g}, {:.6g} m\n"
+      "rotation     {:.9g}, {:.9g}, {:.9g}, {:.9g} (quaternion w, x, y, z)\n"
+      "looks along  {:.6g}, {:.6g}, {:.6g}\n",
+      t.x, t.y, t.z, w, x, y, z, axis.v.x + 0.0, axis.v.y + 0.0, axis.v.z + 0.0);
+}
+
+compare::Json toJson(const std::vector<Parameter>& parameters) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();  // null
+  compare::Json all = compare::Json::array();
+  for (const Parameter& parameter : parameters) {
+    all.push(compare::Json::object()
+                 .set("name", parameter.name)
+                 .set("value", parameter.value.value_or(kNone))
+                 .set("lowest", parameter.bounds.min)
+                 .set("highest", parameter.bounds.max));
+  }
+  return all;
+}
+
+std::string toText(const std::vector<Parameter>& parameters) {
+  std::size_t width = 0;
+  for (const Parameter& parameter : parameters) width = std::max(width, parameter.name.size());
+  std::string text;
+  for (const Parameter& parameter : parameters) {
+    const std::string bounds = settings::describe(parameter.bounds);
+    const std::string value = parameter.value ? fmt::format("{:.9g}", *parameter.value) : "-";
+    text += bounds.empty() ? fmt::format("  {:<{}}  {}\n", parameter.name, width, value)
+                           : fmt::format("  {:<{}}  {:<12} {}\n", parameter.name, width, value,
+                                         bounds);
+  }
+  return text;
 }
 
 std::string toText(HostTime time) {

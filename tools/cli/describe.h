@@ -6,15 +6,25 @@
 #include <vector>
 
 #include <toftwin/camera_info.h>
+#include <toftwin/client.h>
 #include <toftwin/frame.h>
+#include <toftwin/parameter.h>
 
 #include "calib/compare/json.h"
 
 /// Cameras and recordings in words and as JSON, for `toftwin info` and `toftwin replay`.
 namespace toftwin::cli {
 
+/// "streaming", "idle" or "absent".
+std::string_view stateOf(const SourceEntry& source);
 compare::Json toJson(const CameraInfo& camera);
 std::string toText(const CameraInfo& camera);
+compare::Json toJson(const Transform<World, Camera>& world_from_camera);
+/// Place, rotation and axis, one a line.
+std::string toText(const Transform<World, Camera>& world_from_camera);
+compare::Json toJson(const std::vector<Parameter>& parameters);
+/// A line for each: name, value, bounds.
+std::string toText(const std::vector<Parameter>& parameters);
 /// Nanoseconds since 1970 as "2026-11-21 08:15:00.123 UTC"; "unknown" for 0.
 std::string toText(HostTime time);
 std::string namesOf(const std::vector<PlaneKind>& planes);

@@ -127,14 +127,18 @@ Result<Exit> describeSource(const Options& options) {
                          .set("can_set_pose", details->can_set_pose)
                          .set("can_trigger", details->can_trigger)
                          .set("can_lockstep", details->can_lockstep)
-                         .set("parameters", Json::arrayOf(details->parameters))
+                         .set("world_from_camera", details->world_from_camera
+                                                       ? toJson(*details->world_from_camera)
+                                                       : Json{})
+                         .set("parameters", toJson(details->parameters))
+                         .set("problem", entry.problem)
                          .text());
     return Exit::Ok;
   }
   fmt::print(
       "{}: {}, {}\nmodel        {}\nserial       {}\ndriver       {}\nframe rate   {}\nplanes      "
       " {}\n{}",
-      entry.name, nameOf(entry.kind), entry.streaming ? "streaming" : "idle", entry.model,
+      entry.name, nameOf(entry.kind), stateOf(entry), entry.model,
       entry.serial.empty() ? "unknown" : entry.serial, details->driver,
       rate_hz > 0 ? fmt::format("{:.6g} Hz", rate_hz) : "as it comes", namesOf(details->planes),
       toText(details->camera));
@@ -142,10 +146,12 @@ Result<Exit> describeSource(const Options& options) {
   if (details->can_set_pose) can.emplace_back("be moved");
   if (details->can_trigger) can.emplace_back("be triggered");
   if (details->can_lockstep) can.emplace_back("run in lockstep");
-  fmt::print("can          {}\nparameters   {}\n",
-             can.empty() ? "only stream" : fmt::format("{}", fmt::join(can, ", ")),
-             details->parameters.empty() ? "none"
-                                         : fmt::format("{}", fmt::join(details->parameters, ", ")));
+  fmt::print("can          {}\n",
+             can.empty() ? "only stream" : fmt::format("{}", fmt::join(can, ", ")));
+  if (details->world_from_camera) fmt::print("{}", toText(*details->world_from_camera));
+  fmt::print("parameters   {}\n{}", details->parameters.empty() ? "none" : "value, bounds",
+             toText(details->parameters));
+  if (!entry.problem.empty()) fmt::print("not there    {}\n", entry.problem);
   return Exit::Ok;
 }
 

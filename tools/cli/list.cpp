@@ -7,6 +7,7 @@
 #include "calib/compare/json.h"
 #include "drivers/source.h"
 #include "tools/cli/command.h"
+#include "tools/cli/describe.h"
 #include "tools/cli/options.h"
 
 namespace toftwin::cli {
@@ -47,8 +48,11 @@ void printTable(const std::vector<SourceEntry>& sources) {
              "KIND", "STATE", "SERIAL");
   for (const SourceEntry& source : sources) {
     fmt::print("{:<{}}  {:<{}}  {:<10} {:<10} {}\n", source.name, name_width, source.model,
-               model_width, nameOf(source.kind), source.streaming ? "streaming" : "idle",
+               model_width, source.model.empty() ? "-" : nameOf(source.kind), stateOf(source),
                source.serial);
+  }
+  for (const SourceEntry& source : sources) {
+    if (!source.problem.empty()) fmt::print("{} is absent: {}\n", source.name, source.problem);
   }
 }
 
@@ -66,7 +70,8 @@ Result<Exit> run(const Options& options) {
                    .set("model", source.model)
                    .set("serial", source.serial)
                    .set("kind", std::string{nameOf(source.kind)})
-                   .set("streaming", source.streaming));
+                   .set("streaming", source.streaming)
+                   .set("problem", source.problem));
     }
     fmt::print("{}", all.text());
   } else if (options.names) {

@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/cli/pose.h"
 
+#include <CLI/CLI.hpp>
+
 #include <algorithm>
 #include <cmath>
+
+#include "calib/compare/poses.h"
 
 namespace toftwin::cli {
 namespace {
@@ -46,6 +50,56 @@ Result<Transform<World, Camera>> lookFrom(const std::vector<double>& position_m,
   const Vec3d z = normalised(towards), x = normalised(sideways);
   world_from_camera.rotation_wxyz = quaternionOf(x, cross(z, x), z);
   return world_from_camera;
+}
+
+void PoseOptions::add(CLI::App& app) {
+  const auto numbers = [&app](const char* name, std::vector<double>& values, int count,
+                              const char* help) {
+    return app.add_option(name, values, help)->delimiter(',')->expected(count);
+  };
+  numbers("--position", position_m, 3, "place of the camera in the world: X,Y,Z in metres");
+  auto* look_at = numbers("--look-at", look_at_m, 3,
+                          "a point on the camera's axis: X,Y,Z in metres; default: along the "
+                          "world's z");
+  numbers("--up", up, 3, "what is up in the world, for --look-at; default: 0,-1,0")
+      ->needs(look_at);
+  auto* euler = numbers("--euler-deg", euler_deg, 3,
+                        "how it is turned, instead of --look-at: X,Y,Z in degrees about the fixed "
+                        "world axes x, then y, then z")
+                    ->excludes(look_at);
+  numbers("--rotation-wxyz", rotation_wxyz, 4,
+          "how it is turned, instead of --look-at: a quaternion W,X,Y,Z")
+      ->excludes(look_at)
+      ->excludes(euler);
+}
+
+bool PoseOptions::isTurned() const {
+  return !look_at_m.empty() || !euler_deg.empty() || !rotation_wxyz.empty();
+}
+
+bool PoseOptions::isGiven() const { return !position_m.empty() || isTurned(); }
+
+Result<Transform<World, Camera>> PoseOptions::pose() const {
+  const auto isFinite = [](const std::vector<double>& values) {
+    return std::ranges::all_of(values, [](double value) { return std::isfinite(value); });
+  };
+  for (const auto* values : {&position_m, &look_at_m, &up, &euler_deg, &rotation_wxyz}) {
+    if (!isFinite(*values))
+      return Error{Error::Code::InvalidArgument, "a pose is given in finite numbers"};
+  }
+  const std::vector<double> place = position_m.empty() ? std::vector<double>(3, 0.0) : position_m;
+  if (!look_at_m.empty()) return lookFrom(place, look_at_m, up);
+  compare::PoseSpec spec;
+  std::ranges::copy(place, spec.position_m.begin());
+  std::ranges::copy(euler_deg, spec.euler_deg.begin());
+  if (!rotation_wxyz.empty()) {
+    std::ranges::copy(rotation_wxyz, spec.rotation_wxyz.begin());
+    if (std::ranges::all_of(rotation_wxyz, [](double value) { return std::abs(value) < 1e-6; })) {
+      return Error{Error::Code::InvalidArgument,
+                   "--rotation-wxyz is all zeros, which is no rotation; 1,0,0,0 is none at all"};
+    }
+  }
+  return spec.world_from_camera();
 }
 
 }  // namespace toftwin::cli

@@ -10,55 +10,28 @@
 namespace toftwin::cli {
 namespace {
 
-constexpr const char* kExitStatus =
-    "Exit status: 0 done; 1 a bug; 2 wrong command line; 3 no daemon there, or the connection was "
-    "lost;\n"
-    "4 a file, source or value is missing, damaged or wrong; 5 not permitted, busy or not possible "
-    "here;\n"
-    "6 the output cannot be written; 7 ended before all was done, or a check failed; 130 "
-    "interrupted.";
-
 constexpr const char* kRootExamples =
     "Examples:\n"
     "  toftwin list                               what cameras the daemon has\n"
     "  toftwin grab kinect -o frame.ply           one frame as a point cloud\n"
     "  toftwin record kinect -o monday.mcap       until Ctrl-C\n"
+    "  toftwin pose kinect --position 0,0,-1      puts a simulated camera somewhere else\n"
     "  toftwin render --camera kinect_v2 --scene room.toml -o range.png\n"
     "\n";
 
-}  // namespace
-
-Exit exitOf(Error::Code code) {
-  switch (code) {
-    case Error::Code::Internal:
-      return Exit::Internal;
-    case Error::Code::InvalidArgument:
-    case Error::Code::NotFound:
-    case Error::Code::Malformed:
-    case Error::Code::TooLarge:
-    case Error::Code::Incompatible:
-      return Exit::BadInput;
-    case Error::Code::Unsupported:
-    case Error::Code::Busy:
-    case Error::Code::PermissionDenied:
-      return Exit::Refused;
-    case Error::Code::Disconnected:
-      return Exit::Unreachable;
-    case Error::Code::StorageFull:
-      return Exit::CannotWrite;
-    case Error::Code::Timeout:
-    case Error::Code::EndOfStream:
-    case Error::Code::Overrun:
-      return Exit::Incomplete;
-    case Error::Code::Stopped:
-      return Exit::Interrupted;
-  }
-  return Exit::Internal;
+std::string exitTable() {
+  std::string table = "Exit status:\n";
+  for (const ExitMeaning& one : exitMeanings())
+    table += fmt::format("  {:>3}  {}\n", static_cast<int>(one.status), one.meaning);
+  table.pop_back();
+  return table;
 }
+
+}  // namespace
 
 std::vector<Run> declare(CLI::App& app) {
   app.description("Time-of-flight cameras, real and simulated, behind one protocol.");
-  app.footer(std::string{kRootExamples} + kExitStatus);
+  app.footer(kRootExamples + exitTable());
   app.set_version_flag("--version", "toftwin " TOFTWIN_VERSION, "show the version");
   app.set_help_flag("-h,--help",
                     "show this text; `toftwin COMMAND --help` shows that of a command");

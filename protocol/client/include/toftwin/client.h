@@ -10,6 +10,7 @@
 #include <vector>
 
 #include <toftwin/frame.h>
+#include <toftwin/parameter.h>
 #include <toftwin/result.h>
 
 namespace toftwin {
@@ -21,6 +22,7 @@ struct SourceEntry {
   std::string serial;
   FrameKind kind = FrameKind::Real;
   bool streaming = false;
+  std::string problem{};  ///< why the camera is not there now; empty: it is
 };
 
 /// All that a daemon says of one source.
@@ -33,7 +35,8 @@ struct SourceDetails {
   bool can_set_pose = false;
   bool can_trigger = false;
   bool can_lockstep = false;
-  std::vector<std::string> parameters;
+  std::vector<Parameter> parameters;  ///< what setParameter takes, as it is now
+  std::optional<Transform<World, Camera>> world_from_camera;  ///< that setPose sets, if it can
 };
 
 /// What a subscriber wants. The defaults: all planes, whole image, every frame, only the newest kept.

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+// `toftwin pose`, `set`, `trigger`, `compliance`, and what `list` says of a camera that is not there.
+#include "with_daemon.h"
+
+namespace toftwin::cli {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+class Steered : public WithDaemon {
+ protected:
+  std::string moreSources() const override {
+    return "[[source]]\nname = 'asked'\ndriver = 'pattern'\npace = 'trigger'\n"
+           "[[source]]\nname = 'absent'\ndriver = 'pattern'\nuri = 'pattern:9'\n";
+  }
+};
+
+TEST_F(Steered, APoseIsSetAndShown) {
+  const Ran before = run("pose pattern");
+  EXPECT_EQ(before.status, 0) << before.err;
+  EXPECT_THAT(before.out, HasSubstr("position     0, 0, 0 m"));
+  const Ran set = run("pose pattern --position -0.5,0.25,-1 --look-at -0.5,0.25,3");
+  EXPECT_EQ(set.status, 0) << set.err;
+  EXPECT_THAT(run("info pattern").out, HasSubstr("position     -0.5, 0.25, -1 m"));
+  EXPECT_THAT(run("pose pattern --json").out, HasSubstr("\"position_m\": [-0.5, 0.25, -1]"));
+}
+
+TEST_F(Steered, WhatAPoseDoesNotSayStaysAsItIs) {
+  // A quarter turn about y: the axis, z before, is x.
+  ASSERT_EQ(run("pose pattern --position 1,2,3 --euler-deg 0,90,0").status, 0);
+  EXPECT_THAT(run("pose pattern --position 4,5,6").out, HasSubstr("looks along  1, 0, "));
+  EXPECT_THAT(run("pose pattern --rotation-wxyz 1,0,0,0").out, HasSubstr("position     4, 5, 6 m"));
+}
+
+TEST_F(Steered, APoseThatIsNoneIsRefused) {
+  EXPECT_EQ(run("pose pattern --look-at 0,0,0").status, 4) << "the camera is there already";
+  EXPECT_EQ(run("pose pattern --rotation-wxyz 0,0,0,0").status, 4);
+  EXPECT_EQ(run("pose pattern --position nan,0,0").status, 4);
+  EXPECT_EQ(run("pose pattern --look-at 0,0,1 --euler-deg 0,1,0").status, 2);
+  EXPECT_THAT(run("pose pattern").out, HasSubstr("position     0, 0, 0 m"));
+}
+
+TEST_F(Steered, ParametersAreShownWithTheirBoundsAndSet) {
+  EXPECT_THAT(run("set pattern").out, HasSubstr("speed_px  1            0 to 64"));
+  EXPECT_EQ(run("set pattern speed_px 3").status, 0);
+  EXPECT_THAT(run("set pattern speed_px").out, HasSubstr("speed_px  3 "));
+  EXPECT_THAT(run("info pattern --json").out, HasSubstr("\"value\": 3"));
+  const Ran outside = run("set pattern speed_px 65");
+  EXPECT_EQ(outside.status, 4);
+  EXPECT_THAT(outside.err, HasSubstr("0 to 64"));
+  const Ran unknown = run("set pattern speed");
+  EXPECT_EQ(unknown.status, 4);
+  EXPECT_THAT(unknown.err, HasSubstr("it has: speed_px"));
+  EXPECT_EQ(run("set pattern speed_px fast").status, 2);
+}
+
+TEST_F(Steered, ATriggerMakesOneFrame) {
+  std::optional<Ran> grabbed;
+  std::thread grabbing{[&] { grabbed = run("grab asked --timeout 30 -o " + path("a.png")); }};
+  EXPECT_TRUE(eventually([&] { return run("list").out.find("streaming") != std::string::npos; }));
+  EXPECT_EQ(run("trigger asked").status, 0);
+  grabbing.join();
+  EXPECT_EQ(grabbed->status, 0) << grabbed->err;
+  const Ran refused = run("trigger pattern");
+  EXPECT_EQ(refused.status, 5);
+  EXPECT_THAT(refused.err, HasSubstr("cannot be triggered"));
+}
+
+TEST_F(Steered, AnAbsentCameraIsListedAsAbsentWithTheReason) {
+  const Ran list = run("list");
+  EXPECT_THAT(list.out, HasSubstr("absent"));
+  EXPECT_THAT(list.out, HasSubstr("there is no camera pattern:9"));
+  EXPECT_THAT(list.out, Not(HasSubstr("real")));
+  EXPECT_THAT(run("list --json").out, HasSubstr("\"problem\": \"" + (folder_ / "toftwind").string()));
+  EXPECT_EQ(run("grab absent -o " + path("a.png")).status, 3);
+}
+
+TEST(ComplianceCommand, SaysWhatWasChecked) {
+  const Ran good = toftwin("compliance pattern:0 --keys 'width = 32\nheight = 24'");
+  EXPECT_EQ(good.status, 0) << good.out << good.err;
+  EXPECT_THAT(good.out, HasSubstr("ok   device time strictly increases"));
+  EXPECT_THAT(good.out, HasSubstr("pattern:0: 0 of"));
+  EXPECT_THAT(toftwin("compliance pattern:0 --json").out, HasSubstr("\"outcome\": \"passed\""));
+}
+
+TEST(ComplianceCommand, ACameraThatIsNotThereOrAWrongKeyIsStatus4) {
+  EXPECT_EQ(toftwin("compliance kinect").status, 4);
+  EXPECT_THAT(toftwin("compliance sim:kinect_v3").err, HasSubstr("sim:kinect_v2"));
+  EXPECT_THAT(toftwin("compliance pattern:0 --keys 'colour = 1'").err, HasSubstr("unknown key"));
+  EXPECT_EQ(toftwin("compliance /no/such.mcap").status, 4);
+}
+
+}  // namespace
+}  // namespace toftwin::cli

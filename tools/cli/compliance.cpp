@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "drivers/compliance.h"
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdio>
+
+#include "calib/compare/json.h"
+#include "protocol/settings/describe.h"
+#include "tools/cli/command.h"
+#include "tools/cli/options.h"
+#include "tools/cli/terminal.h"
+
+namespace toftwin::cli {
+namespace {
+
+using Outcome = drivers::Finding::Outcome;
+
+struct Options {
+  std::string camera;
+  std::string keys;
+  double frame_timeout_s = 60.0;
+  bool json = false;
+};
+
+const drivers::Driver* driverNamed(std::string_view name) {
+  const auto all = drivers::allDrivers();
+  const auto found = std::ranges::find(all, name, &drivers::Driver::name);
+  return found == all.end() ? nullptr : &*found;
+}
+
+/// The camera that the user names, to be opened here and not through a daemon.
+Result<drivers::Candidate> candidateFor(const Options& options) {
+  if (options.camera.ends_with(".mcap")) {
+    const std::string file = settings::toToml(options.camera);
+    return drivers::Candidate{.driver = driverNamed("replay"),
+                              .keys = "file = " + file + "\n" + options.keys,
+                              .absent_keys = "file = 'there-is-no-such.mcap'",
+                              .absent_name = "there-is-no-such.mcap"};
+  }
+  const std::string scheme = options.camera.substr(0, options.camera.find(':'));
+  const drivers::Driver* driver = driverNamed(scheme);
+  if (driver == nullptr || scheme == options.camera) {
+    return Error{Error::Code::NotFound,
+                 fmt::format("{}: name a camera as `toftwin list --drivers` does, or a recording "
+                             "(.mcap). It is opened here, so a camera of a running daemon must be "
+                             "free: stop the daemon first",
+                             options.camera)};
+  }
+  drivers::Candidate candidate = drivers::listedCamera(*driver, options.camera);
+  candidate.keys += "\n" + options.keys;
+  return candidate;
+}
+
+const char* wordOf(Outcome outcome) {
+  switch (outcome) {
+    case Outcome::Passed:
+      return "ok";
+    case Outcome::Failed:
+      return "FAIL";
+    case Outcome::DoesNotApply:
+      return "-";
+  }
+  return "";
+}
+
+void print(const drivers::Finding& finding) {
+  fmt::print("{:<5}{}\n", wordOf(finding.outcome), finding.check);
+  if (!finding.detail.empty()) fmt::print("     {}\n", finding.detail);
+  if (finding.outcome == Outcome::Failed) fmt::print("     why it matters: {}\n", finding.because);
+  std::fflush(stdout);
+}
+
+/// Whether the camera can be opened at all: if not, every check would say the same.
+Result<> opens(const drivers::Candidate& candidate) {
+  auto table = settings::Table::parse(candidate.keys, "--keys");
+  if (!table) return table.error();
+  const auto opened = candidate.driver->open(*table);
+  if (!opened) return opened.error();
+  return table->check();
+}
+
+Result<Exit> run(const Options& options) {
+  const auto candidate = candidateFor(options);
+  if (!candidate) return candidate.error();
+  if (auto opened = opens(*candidate); !opened) return opened.error();
+  drivers::ComplianceOptions how;
+  how.frame_timeout =
+      std::chrono::milliseconds{static_cast<std::int64_t>(options.frame_timeout_s * 1000.0)};
+  if (!options.json) how.report = print;
+  how.interrupted = interrupted;
+  catchInterrupts();
+  compare::Json all = compare::Json::array();
+  int failed = 0;
+  const std::vector<drivers::Finding> findings = drivers::checkCompliance(*candidate, how);
+  if (interrupted()) return Exit::Interrupted;
+  for (const drivers::Finding& finding : findings) {
+    failed += finding.outcome == Outcome::Failed ? 1 : 0;
+    all.push(compare::Json::object()
+                 .set("check", std::string{finding.check})
+                 .set("outcome", finding.outcome == Outcome::Passed   ? "passed"
+                                 : finding.outcome == Outcome::Failed ? "failed"
+                                                                      : "does not apply")
+                 .set("detail", finding.detail)
+                 .set("because", std::string{finding.because}));
+  }
+  if (options.json) {
+    fmt::print("{}", all.text());
+  } else {
+    fmt::print("{}: {} of {} checks failed\n", options.camera, failed, findings.size());
+  }
+  return failed == 0 ? Exit::Ok : Exit::Incomplete;
+}
+
+}  // namespace
+
+Command complianceCommand() {
+  return {"compliance", "check that a camera keeps what every driver promises; no daemon needed",
+          "  toftwin compliance sim:kinect_v2\n"
+          "  toftwin compliance sim:o3d303 --keys 'samples_per_pixel = 1'\n"
+          "  toftwin compliance monday.mcap\n",
+          [](CLI::App& app) -> Run {
+            const auto options = std::make_shared<Options>();
+            app.add_option("CAMERA", options->camera,
+                           "as `toftwin list --drivers` names it, or a recording (.mcap); it is "
+                           "opened here, so no daemon may hold it")
+                ->required();
+            app.add_option("--keys", options->keys,
+                           "more keys of its [[source]] table, as TOML (docs/drivers)");
+            app.add_option("--frame-timeout", options->frame_timeout_s,
+                           "seconds within which a frame must come")
+                ->check(CLI::Range(0.1, 86'400.0))
+                ->capture_default_str();
+            app.add_flag("--json", options->json, "as JSON");
+            return [options] { return run(*options); };
+          }};
+}
+
+}  // namespace toftwin::cli

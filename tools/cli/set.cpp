@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "tools/cli/command.h"
+#include "tools/cli/describe.h"
+#include "tools/cli/options.h"
+
+namespace toftwin::cli {
+namespace {
+
+struct Options {
+  DaemonOptions daemon;
+  std::string source;
+  std::string key;
+  std::optional<double> value;
+  bool json = false;
+};
+
+/// All parameters of the source, or the one that is asked for.
+Result<std::vector<Parameter>> parametersOf(Client& client, const Options& options) {
+  auto details = client.describe(options.source);
+  if (!details) return details.error();
+  std::vector<Parameter>& all = details->parameters;
+  if (options.key.empty()) return std::move(all);
+  const auto found = std::ranges::find(all, options.key, &Parameter::name);
+  if (found != all.end()) return std::vector{*found};
+  std::string known;
+  for (const Parameter& parameter : all) known += (known.empty() ? "" : ", ") + parameter.name;
+  return Error{Error::Code::NotFound,
+               fmt::format("{} has no parameter \"{}\"; it has: {}", options.source, options.key,
+                           known.empty() ? "none" : known)};
+}
+
+Result<Exit> run(const Options& options) {
+  auto client = options.daemon.connect();
+  if (!client) return client.error();
+  if (options.value) {
+    auto set = client->setParameter(options.source, options.key, *options.value);
+    if (!set) return set.error();
+  }
+  const auto parameters = parametersOf(*client, options);
+  if (!parameters) return parameters.error();
+  if (parameters->empty()) fmt::print(stderr, "{} has no parameters\n", options.source);
+  fmt::print("{}", options.json ? toJson(*parameters).text() : toText(*parameters));
+  return Exit::Ok;
+}
+
+}  // namespace
+
+Command setCommand() {
+  return {"set", "show or set a camera's parameters while it runs",
+          "  toftwin set kinect                             all, with their values and bounds\n"
+          "  toftwin set kinect ambient_klx 20\n"
+          "  toftwin set kinect exposure_us                 shows this one\n",
+          [](CLI::App& app) -> Run {
+            const auto options = std::make_shared<Options>();
+            app.add_option("SOURCE", options->source, "name of the camera")->required();
+            app.add_option("KEY", options->key, "the parameter; its name ends in its unit");
+            app.add_option("VALUE", options->value, "a number; without it the present one is shown");
+            app.add_flag("--json", options->json, "as JSON");
+            options->daemon.add(app);
+            return [options] { return run(*options); };
+          }};
+}
+
+}  // namespace toftwin::cli
