@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Multipath in a corner against independent quadrature and published tables of this project's own
-// reference computations. Tolerance: 0.2 mm + 3σ, σ from the tracer's own variance, and nothing more for
-// the infinite corner; for the finite one what its reference states about itself is added. 3σ alone is
-// exceeded by 0.27 % of correct results; 0.2 mm makes that far less. All seeds are fixed.
+// Multipath in a corner against independent quadrature, phasor radiosity and published tables of this
+// project's own reference computations. Tolerance: 0.2 mm + 3σ, σ from the tracer's own variance, and
+// nothing more. 3σ alone is exceeded by 0.27 % of correct results; 0.2 mm makes that far less. All seeds are
+// fixed.
 //
 // Every table is also asked whether it can fail: direct light alone has error 0 in all of these scenes,
 // and each row that expects more than 3 mm must be at least two tolerances away from that.
 #include "tests/tracer/corner.h"
+#include "tests/tracer/corner_radiosity.h"
 
 #include <algorithm>
 #include <iostream>
@@ -93,15 +94,13 @@ class Judge {
   Judge& operator=(const Judge&) = delete;
   ~Judge() {
     std::cout << table_ << ": " << rows_ << " rows; " << powerful_
-              << " are two tolerances or more away from direct light alone; " << strict_
-              << " agree within 0.2 mm + 3 sigma without the reference's own uncertainty (worst: " << worst_share_
-              << " of that); largest deviation " << worst_m_ * 1e3 << " mm; largest tolerance " << largest_m_ * 1e3
-              << " mm\n";
+              << " are two tolerances or more away from direct light alone; worst: " << worst_share_
+              << " of 0.2 mm + 3 sigma; largest deviation " << worst_m_ * 1e3 << " mm; largest tolerance "
+              << largest_m_ * 1e3 << " mm\n";
   }
 
-  /// `oracle_m` is what the reference states about its own error, rounding included.
-  void check(const Seen& seen, double expected_m, double oracle_m, const std::string& where) {
-    const double strict_m = kTolerance + 3.0 * seen.sigma_m, allowed_m = strict_m + oracle_m;
+  void check(const Seen& seen, double expected_m, const std::string& where) {
+    const double allowed_m = kTolerance + 3.0 * seen.sigma_m;
     const double deviation_m = std::abs(seen.error_m - expected_m);
     EXPECT_LE(deviation_m, allowed_m) << where << ": " << seen.error_m * 1e3 << " mm seen, " << expected_m * 1e3
                                       << " mm expected, sigma " << seen.sigma_m * 1e3 << " mm";
@@ -113,14 +112,13 @@ class Judge {
     }
     ++rows_;
     powerful_ += rejects_direct_light ? 1 : 0;
-    strict_ += deviation_m <= strict_m ? 1 : 0;
     worst_m_ = std::max(worst_m_, deviation_m);
-    worst_share_ = std::max(worst_share_, deviation_m / strict_m);
+    worst_share_ = std::max(worst_share_, deviation_m / allowed_m);
     largest_m_ = std::max(largest_m_, allowed_m);
   }
  private:
   std::string table_;
-  int rows_ = 0, powerful_ = 0, strict_ = 0;
+  int rows_ = 0, powerful_ = 0;
   double worst_m_ = 0.0, worst_share_ = 0.0, largest_m_ = 0.0;
 };
 
@@ -161,7 +159,7 @@ TEST(Corner, TwoBouncesAgreeWithQuadrature) {
       for (const Frequency f : frequencies) expected.push_back(twoBounceError(corner, s, f));
       const auto seen = traceError(corner, scene, s, frequencies, 2, expected);
       for (std::size_t f = 0; f < 3; ++f) {
-        judge.check(seen[f], expected[f], 0.0,
+        judge.check(seen[f], expected[f],
                     "albedo " + std::to_string(albedo) + ", s " + std::to_string(s) + ", frequency " + std::to_string(f));
       }
     }
@@ -190,7 +188,7 @@ TEST(Corner, SixteenSurfacesAgreeWithTheTable) {
     for (std::size_t i = 0; i < places.size(); ++i) {
       const double expected = row.error_mm[i] * 1e-3;
       const auto seen = traceError(corner, scene, places[i], {row.f}, 16, {expected});
-      judge.check(seen[0], expected, 0.0,
+      judge.check(seen[0], expected,
                   "albedo " + std::to_string(row.albedo) + ", f " + std::to_string(row.f.in(megahertz)) + ", s " +
                       std::to_string(places[i]));
     }
@@ -212,40 +210,60 @@ TEST(Corner, KeepsItsValueNextToTheEdgeFarFromTheOrigin) {
     const std::vector<std::pair<double, double>> rows{{0.001, 4.92}, {0.005, 12.90}, {0.02, 28.67}};
     for (const auto& [s, error_mm] : rows) {
       const double expected = error_mm * 1e-3;
-      judge.check(traceError(corner, scene, s, {80_MHz}, 16, {expected})[0], expected, 0.0,
+      judge.check(traceError(corner, scene, s, {80_MHz}, 16, {expected})[0], expected,
                   "s " + std::to_string(s) + (more.empty() ? "" : " with anchor"));
     }
   }
 }
 
-/// Two walls of 1 × 1 m by phasor radiosity, at 30 and 120 MHz; all bounces. The reference states
-/// 0.1 mm for u ≥ 5 cm and 0.4 mm at 2 cm, and gives one decimal (0.05 mm); both are added.
-TEST(FiniteCorner, AgreesWithTheRadiosityTable) {
-  const std::vector<double> places{0.02, 0.10, 0.30, 0.60, 0.90};
-  struct Row {
-    double distance, albedo;
-    std::vector<double> at_30_mm, at_120_mm;
-  };
-  const std::vector<Row> table{{1.5, 0.1, {1.9, 6.1, 8.3, 5.8, 3.5}, {1.8, 5.3, 5.7, 1.7, -0.1}},
-                               {1.5, 0.3, {6.9, 19.4, 25.8, 17.9, 10.7}, {6.1, 16.4, 17.3, 5.2, -0.3}},
-                               {1.5, 0.5, {13.5, 34.4, 44.4, 30.9, 18.5}, {11.5, 28.0, 29.2, 8.5, -0.6}},
-                               {1.5, 0.8, {27.5, 60.8, 74.9, 52.3, 31.3}, {21.7, 46.9, 47.6, 13.3, -1.2}},
-                               {1.5, 0.9, {33.5, 70.8, 86.0, 60.0, 35.9}, {25.8, 53.7, 54.0, 14.9, -1.5}},
-                               {1.0, 0.5, {14.9, 36.7, 42.0, 26.4, 19.5}, {12.3, 29.0, 25.9, 7.0, 0.8}},
-                               {2.5, 0.5, {12.0, 30.9, 42.7, 33.5, 20.8}, {10.5, 25.9, 29.4, 9.8, -1.4}}};
+/// Two walls of 1 × 1 m, all bounces, at places u from the edge.
+struct FiniteRow {
+  double distance, albedo;
+  std::vector<double> at_30_mm, at_120_mm;  ///< published, from 40 patches a side, one decimal
+};
+const std::vector<double> kPlaces{0.02, 0.10, 0.30, 0.60, 0.90};
+const std::vector<FiniteRow> kFiniteCorner{
+    {1.5, 0.1, {1.9, 6.1, 8.3, 5.8, 3.5}, {1.8, 5.3, 5.7, 1.7, -0.1}},
+    {1.5, 0.3, {6.9, 19.4, 25.8, 17.9, 10.7}, {6.1, 16.4, 17.3, 5.2, -0.3}},
+    {1.5, 0.5, {13.5, 34.4, 44.4, 30.9, 18.5}, {11.5, 28.0, 29.2, 8.5, -0.6}},
+    {1.5, 0.8, {27.5, 60.8, 74.9, 52.3, 31.3}, {21.7, 46.9, 47.6, 13.3, -1.2}},
+    {1.5, 0.9, {33.5, 70.8, 86.0, 60.0, 35.9}, {25.8, 53.7, 54.0, 14.9, -1.5}},
+    {1.0, 0.5, {14.9, 36.7, 42.0, 26.4, 19.5}, {12.3, 29.0, 25.9, 7.0, 0.8}},
+    {2.5, 0.5, {12.0, 30.9, 42.7, 33.5, 20.8}, {10.5, 25.9, 29.4, 9.8, -1.4}}};
+constexpr CornerRadiosity::Grid kGrid{};
+
+/// From 10 cm on the published table has the error that it states, 0.1 mm and half of its last digit.
+/// At 2 cm its patches of 2.5 cm are too coarse, by up to 0.9 mm with albedo 0.9: there our own finer
+/// and coarser grids are the witnesses.
+TEST(CornerRadiosityTable, AgreesWithACoarserGridAndWithThePublishedTable) {
+  for (const Frequency f : {30_MHz, 120_MHz}) {
+    const CornerRadiosity radiosity{wavenumber(f), kGrid}, coarser{wavenumber(f), {.along = 48, .across = 9, .angles = 16}};
+    for (const FiniteRow& row : kFiniteCorner) {
+      for (std::size_t i = 0; i < kPlaces.size(); ++i) {
+        const double error_mm = radiosity.error(row.distance, row.albedo, kPlaces[i]) * 1e3;
+        const double published_mm = f == 30_MHz ? row.at_30_mm[i] : row.at_120_mm[i];
+        EXPECT_NEAR(error_mm, coarser.error(row.distance, row.albedo, kPlaces[i]) * 1e3, 0.01);
+        EXPECT_NEAR(error_mm, published_mm, kPlaces[i] < 0.05 ? 1.0 : 0.15);
+      }
+    }
+  }
+}
+
+TEST(FiniteCorner, AgreesWithRadiosity) {
+  const CornerRadiosity at_30{wavenumber(30_MHz), kGrid}, at_120{wavenumber(120_MHz), kGrid};
   Judge judge{"finite corner"};
-  for (const Row& row : table) {
+  for (const FiniteRow& row : kFiniteCorner) {
     Corner corner{.distance = row.distance, .wall_length = 1.0, .wall_height = 1.0, .albedo = row.albedo,
                   .shift = {}, .more = {}};
     const Scene scene = corner.scene();
-    for (std::size_t i = 0; i < places.size(); ++i) {
-      const std::vector<double> expected{row.at_30_mm[i] * 1e-3, row.at_120_mm[i] * 1e-3};
-      const auto seen = traceError(corner, scene, places[i], {30_MHz, 120_MHz}, 100, expected);
-      const double oracle = (places[i] < 0.05 ? 0.4e-3 : 0.1e-3) + 0.05e-3;
+    for (const double u : kPlaces) {
+      const std::vector<double> expected{at_30.error(row.distance, row.albedo, u),
+                                         at_120.error(row.distance, row.albedo, u)};
+      const auto seen = traceError(corner, scene, u, {30_MHz, 120_MHz}, 100, expected);
       const std::string where = "D " + std::to_string(row.distance) + ", albedo " + std::to_string(row.albedo) +
-                                ", u " + std::to_string(places[i]);
-      judge.check(seen[0], expected[0], oracle, where + ", 30 MHz");
-      judge.check(seen[1], expected[1], oracle, where + ", 120 MHz");
+                                ", u " + std::to_string(u);
+      judge.check(seen[0], expected[0], where + ", 30 MHz");
+      judge.check(seen[1], expected[1], where + ", 120 MHz");
     }
   }
 }
