@@ -113,6 +113,8 @@ class SimulatedSource final : public Source {
   Result<> start() override {
     pacer_.restart();
     made_ = 0;
+    last_collected_.reset();
+    last_range_.reset();
     return {};
   }
   void stop() override {}
@@ -216,8 +218,15 @@ class SimulatedSource final : public Source {
     if (!collected_ || !model_.collectsTheSameEachFrame()) {
       collected_ = model_.collect(view_.light(), moment, keys_.seed, pacer_.index());
     }
-    return sim::planesOf(model_, model_.readOut(*collected_, moment, keys_.seed, pacer_.index()),
-                         view_.light().truth, info_.planes);
+    const sim::History before{last_collected_ ? &*last_collected_ : nullptr,
+                              last_range_ ? &*last_range_ : nullptr};
+    auto exposed =
+        model_.readOut(*collected_, moment, keys_.seed, pacer_.index(), 0, 0, before);
+    if (model_.remembers()) {
+      last_collected_ = *collected_;
+      last_range_ = exposed.range;
+    }
+    return sim::planesOf(model_, std::move(exposed), view_.light().truth, info_.planes);
   }
 
   [[nodiscard]] Duration deviceDuration() const {
@@ -240,6 +249,9 @@ class SimulatedSource final : public Source {
   SourceInfo info_;
   View view_;
   std::optional<sim::Samples> collected_;  ///< of the present pose and parameters, free of noise
+  /// Of the frame before, where an effect remembers it.
+  std::optional<sim::Samples> last_collected_;
+  std::optional<sim::RangeImage> last_range_;
   Pacer pacer_;  ///< its frame index keys the noise
   std::uint64_t made_ = 0;  ///< since start()
   Duration since_power_on_;  ///< at device time 0

@@ -21,6 +21,7 @@ enum class Covariate : std::uint16_t {
   Position = 1 << 6,    ///< of the pixel in the image; for noise: of its distribution
   Neighbours = 1 << 7,  ///< what other pixels see
   Frame = 1 << 8,       ///< changes from frame to frame: temporal noise
+  History = 1 << 9,     ///< what the pixel saw in the frame before
 };
 
 inline constexpr std::array kCovariateNames{
@@ -33,6 +34,7 @@ inline constexpr std::array kCovariateNames{
     std::pair{Covariate::Position, std::string_view{"position"}},
     std::pair{Covariate::Neighbours, std::string_view{"neighbours"}},
     std::pair{Covariate::Frame, std::string_view{"frame"}},
+    std::pair{Covariate::History, std::string_view{"history"}},
 };
 
 /// A set of covariates.

@@ -10,6 +10,7 @@
 #include <utility>
 #include <variant>
 
+#include <toftwin/camera_info.h>
 #include <toftwin/frame.h>
 
 #include "sim/effects/covariates.h"
@@ -28,17 +29,24 @@ struct About {
   Covariates explains;  ///< its output depends on exactly these
 };
 
-/// What an effect may depend on besides the image: when and where it was taken. The image may be a
-/// region of the full one; `left`, `top` say where it lies and `full_width` how wide the full one
-/// is.
+/// What the camera knew one frame ago, for effects that remember. Null: nothing, as in a first frame
+/// or one with another region.
+struct History {
+  const Samples* collected = nullptr;  ///< what the pixels collected, free of noise
+  const RangeImage* range = nullptr;   ///< what the camera gave
+};
+
+/// What an effect may depend on besides the image: when, where and with what it was taken. The image
+/// may be a region of `camera`'s; `left`, `top` say where it lies.
 struct Conditions {
   const Moment& moment;
+  const CameraInfo& camera;
   int left = 0, top = 0;
-  int full_width = 0;
+  History before{};
 
   /// The number of the pixel (x, y) of the image within the full image: the key of its noise.
   [[nodiscard]] std::uint32_t pixel(int x, int y) const {
-    return static_cast<std::uint32_t>(top + y) * static_cast<std::uint32_t>(full_width) +
+    return static_cast<std::uint32_t>(top + y) * static_cast<std::uint32_t>(camera.width) +
            static_cast<std::uint32_t>(left + x);
   }
 };

@@ -72,6 +72,10 @@ void scatter(Image<T>& image, const LensScatter& lens, const std::vector<float>&
 
 }  // namespace
 
+std::string LensScatter::problem() const {
+  return veil + halo < 1.0 ? "" : "scatters all light: veil and halo together must be less than 1";
+}
+
 Light LensScatter::apply(Light light, const Conditions&, const Random&) const {
   if (veil == 0.0 && halo == 0.0) return light;
   const std::vector<float> half = halfGaussian(halo_radius);

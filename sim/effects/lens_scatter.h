@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <string>
+
 #include "sim/effects/effect.h"
 
 namespace toftwin::sim {
@@ -33,6 +35,8 @@ struct LensScatter {
     v.number("halo_radius_px", halo_radius, {0.5, 500.0},
              "standard deviation of the halo, in pixels");
   }
+  /// What no single key can say of what is wrong, or nothing.
+  [[nodiscard]] std::string problem() const;
   [[nodiscard]] Light apply(Light light, const Conditions& now, const Random& random) const;
 };
 

@@ -17,6 +17,14 @@ struct Truth {
   Image<float> albedo;        ///< NaN where nothing
 };
 
+/// How modulation and demodulation differ from what the camera file says of them; correlate() heeds it.
+struct ModulationError {
+  /// Added to the correlation's relative content ĉₙ, in the order of Light::phasors; empty: nothing.
+  std::vector<std::complex<float>> content;
+  /// By how much step k is late, of every frequency; steps beyond the last are exact.
+  std::vector<float> step_rad;
+};
+
 /// The light that reaches each pixel from the camera's own emitters, before any electronics.
 ///
 /// `phasors[f * harmonics + (n - 1)]` holds, for modulation frequency f and harmonic n = 1 … harmonics,
@@ -36,6 +44,7 @@ struct Light {
   /// an upper bound. Empty if one sample per pixel was taken.
   std::vector<Image<float>> variance;
   Truth truth;
+  ModulationError error;
 
   [[nodiscard]] int width() const { return steady.width(); }
   [[nodiscard]] int height() const { return steady.height(); }

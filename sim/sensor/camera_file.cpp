@@ -22,9 +22,8 @@ void readEffect(settings::Table& table, std::vector<AnyEffect>& effects) {
     is_known = true;
     E effect{};
     table.read(effect);
-    if constexpr (std::is_same_v<E, LensScatter>) {
-      if (effect.veil + effect.halo >= 1.0)
-        table.complain("veil", "and halo together must be less than 1");
+    if constexpr (requires { effect.problem(); }) {
+      if (const std::string problem = effect.problem(); !problem.empty()) table.complain("", problem);
     }
     effects.emplace_back(effect);
   });
@@ -64,6 +63,19 @@ void checkFrequencies(settings::Table& table, const CameraFile& file) {
     table.complain(
         "modulation",
         "for the kinect_v2 decoder must be three, in the ratio 10 : 2 : 15 (80, 16, 120 MHz)");
+  }
+}
+
+/// Harmonics that are not traced could not be changed.
+void checkHarmonics(settings::Table& table, const CameraFile& file,
+                    const std::vector<AnyEffect>& effects) {
+  for (const AnyEffect& any : effects) {
+    const auto* harmonics = std::get_if<Harmonics>(&any);
+    if (!harmonics || harmonics->highest() <= file.sampling.harmonics) continue;
+    table.complain("sampling",
+                   fmt::format("has harmonics = {}, but the effect \"harmonics\" changes harmonic {}: "
+                               "set sampling.harmonics to at least that",
+                               file.sampling.harmonics, harmonics->highest()));
   }
 }
 
@@ -123,6 +135,7 @@ CameraFile readCameraFile(settings::Table& table, std::vector<AnyEffect>& effect
                                file.exposureTime().in(millisecond)));
   }
   checkFrequencies(table, file);
+  checkHarmonics(table, file, effects);
   if (!file.modulations.empty()) checkWaveforms(table, file);
   return file;
 }

@@ -16,13 +16,21 @@ struct Weight {
   float real, imaginary;
 };
 
-std::vector<Weight> weightsOf(const Response& response, double theta) {
+/// The weights of frequency `f` at step `k` of `steps`.
+std::vector<Weight> weightsOf(const Response& response, const Light& light, std::size_t f, int k,
+                              int steps) {
+  double theta = 2.0 * std::numbers::pi * k / steps;
+  const auto step = static_cast<std::size_t>(k);
+  if (step < light.error.step_rad.size()) theta += static_cast<double>(light.error.step_rad[step]);
   std::vector<Weight> weights;
   for (std::size_t i = 0; i < response.harmonics.size(); ++i) {
     const int n = static_cast<int>(i) + 1;
+    std::complex<double> content = response.harmonics[i];
+    const std::size_t at = f * static_cast<std::size_t>(light.harmonics) + i;
+    if (at < light.error.content.size()) content += std::complex<double>{light.error.content[at]};
+    if (std::abs(content) < 1e-12) continue;
     const std::complex<double> weight = 0.5 * response.electrons_per_radiance * response.contrast *
-                                        response.harmonics[i] * std::polar(1.0, n * theta);
-    if (std::abs(response.harmonics[i]) < 1e-12) continue;
+                                        content * std::polar(1.0, n * theta);
     weights.push_back({n, static_cast<float>(weight.real()), static_cast<float>(weight.imag())});
   }
   return weights;
@@ -73,8 +81,7 @@ Samples correlate(const Light& light, const std::vector<Response>& responses, in
     samples.frequencies.push_back(responses[f].frequency);
     const auto half_gain = static_cast<float>(0.5 * responses[f].electrons_per_radiance);
     for (int k = 0; k < steps; ++k) {
-      const std::vector<Weight> weights =
-          weightsOf(responses[f], 2.0 * std::numbers::pi * k / steps);
+      const std::vector<Weight> weights = weightsOf(responses[f], light, f, k, steps);
       Image<float>* taps_of_step = &samples.electrons[next_image];
       next_image += static_cast<std::size_t>(taps);
       forRows(height, [&](int first_row, int last_row) {

@@ -33,8 +33,8 @@ std::vector<std::complex<double>> relativeHarmonics(const Waveform& emitted,
 /// Collects a raw exposure's charge, noise-free: at step k, θₖ = 2πk/steps,
 ///     tap 0, 1 = g/2 · ( L + A ± m Re Σₙ ĉₙ Pₙ e^(i n θₖ) )
 /// with the light's phasors Pₙ, its own unmodulated radiance L, the ambient radiance A, and g
-/// electrons per radiance. Wiggling is born here: harmonics that the steps cannot tell from the
-/// fundamental. The light has the responses' frequencies in their order and at least their
+/// electrons per radiance. The light's modulation error adds to ĉₙ and θₖ. Wiggling is born here:
+/// harmonics that the steps cannot tell from the fundamental. The light has the responses' frequencies in their order and at least their
 /// harmonics.
 Samples correlate(const Light& light, const std::vector<Response>& responses, int steps, int taps);
 

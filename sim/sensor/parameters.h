@@ -97,6 +97,8 @@ class NumberSetter {
     if (wants({name, static_cast<double>(value), bounds}, std::is_integral_v<Number>))
       value = static_cast<Number>(value_);
   }
+  template <class Values>
+  void numbers(const char*, Values&, Bounds, const char*) {}  // a list is no number
 
  private:
   bool wants(Parameter parameter, bool integral) {

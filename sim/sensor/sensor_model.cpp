@@ -213,9 +213,9 @@ TraceRequest SensorModel::traceRequest() const {
 
 SensorModel::Exposed SensorModel::expose(const Light& light, const Moment& moment,
                                          std::uint64_t seed, std::uint64_t frame, int region_x,
-                                         int region_y) const {
+                                         int region_y, History before) const {
   return readOut(collect(light, moment, seed, frame, region_x, region_y), moment, seed, frame,
-                 region_x, region_y);
+                 region_x, region_y, before);
 }
 
 Samples SensorModel::collect(const Light& light, const Moment& moment, std::uint64_t seed,
@@ -224,15 +224,15 @@ Samples SensorModel::collect(const Light& light, const Moment& moment, std::uint
   if (!anyActsOnLight(impl_->effects)) {
     return correlate(light, impl_->responses, sampling.steps, sampling.taps);
   }
-  const Conditions now{moment, region_x, region_y, impl_->camera.width};
+  const Conditions now{moment, impl_->camera, region_x, region_y};
   const Light at_pixel = applyAll(light, impl_->effects, now, seed, frame);
   return correlate(at_pixel, impl_->responses, sampling.steps, sampling.taps);
 }
 
 SensorModel::Exposed SensorModel::readOut(Samples collected, const Moment& moment,
                                           std::uint64_t seed, std::uint64_t frame, int region_x,
-                                          int region_y) const {
-  const Conditions now{moment, region_x, region_y, impl_->camera.width};
+                                          int region_y, History before) const {
+  const Conditions now{moment, impl_->camera, region_x, region_y, before};
   Samples counted = applyAll(std::move(collected), impl_->effects, now, seed, frame);
   const bool is_whole =
       counted.width() == impl_->camera.width && counted.height() == impl_->camera.height;
@@ -258,6 +258,13 @@ bool SensorModel::collectsTheSameEachFrame() const {
     if (changes) return false;
   }
   return true;
+}
+
+bool SensorModel::remembers() const {
+  return std::ranges::any_of(impl_->effects, [](const AnyEffect& any) {
+    return std::visit(
+        []<class E>(const E&) { return E::about.explains.contains(Covariate::History); }, any);
+  });
 }
 
 std::vector<Parameter> SensorModel::parameters() const {
@@ -314,7 +321,15 @@ Result<SensorModel> SensorModel::with(std::string_view parameter, double value) 
           NumberSetter setter{parameter.substr(prefix.size()), value};
           effect.visit(setter);
           is_known |= setter.is_set;
-          return firstProblem(setter, parameter, value);
+          if (auto within = firstProblem(setter, parameter, value); !within) return within;
+          if constexpr (requires { effect.problem(); }) {
+            if (const std::string problem = effect.problem(); setter.is_set && !problem.empty()) {
+              return Error{Error::Code::InvalidArgument,
+                           fmt::format("with {} = {:.12g}, {} {}", parameter, value, E::about.name,
+                                       problem)};
+            }
+          }
+          return {};
         },
         any);
     if (!done) return done.error();

@@ -59,13 +59,15 @@ class SensorModel {
 
   /// One exposure: light → effects → samples → effects → decoding → range → effects. `moment` gives
   /// the covariates (time since power-on, temperatures, ambient); `seed` and `frame` key all noise.
-  /// `region_x`, `region_y` say where the light's top left pixel lies in the full image.
+  /// `region_x`, `region_y` say where the light's top left pixel lies in the full image, `before` what
+  /// the frame before was, for effects that remember.
   struct Exposed {
     Samples samples;
     RangeImage range;
   };
   [[nodiscard]] Exposed expose(const Light& light, const Moment& moment, std::uint64_t seed,
-                               std::uint64_t frame, int region_x = 0, int region_y = 0) const;
+                               std::uint64_t frame, int region_x = 0, int region_y = 0,
+                               History before = {}) const;
 
   /// expose() in its two halves: expose(light, …) = readOut(collect(light, …), …). What is
   /// collected is free of noise, and where no effect on the light changes with time it can be read
@@ -73,10 +75,13 @@ class SensorModel {
   [[nodiscard]] Samples collect(const Light& light, const Moment& moment, std::uint64_t seed,
                                 std::uint64_t frame, int region_x = 0, int region_y = 0) const;
   [[nodiscard]] Exposed readOut(Samples collected, const Moment& moment, std::uint64_t seed,
-                                std::uint64_t frame, int region_x = 0, int region_y = 0) const;
+                                std::uint64_t frame, int region_x = 0, int region_y = 0,
+                                History before = {}) const;
   /// Whether collect() gives the same for every frame of one light, exposure and ambient
   /// illuminance.
   [[nodiscard]] bool collectsTheSameEachFrame() const;
+  /// Whether readOut() looks at the frame before.
+  [[nodiscard]] bool remembers() const;
 
   /// What with() takes: "exposure_us" (of all raw exposures; no value where they differ) and
   /// "<effect>.<key>" for every number of the model's effects ("lens_scatter.veil").

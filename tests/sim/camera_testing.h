@@ -32,6 +32,13 @@ inline std::string errorOf(const std::string& toml) {
   return model ? "" : model.error().message;
 }
 
+/// For effects that only ask for the image's size.
+inline CameraInfo cameraOfSize(int width, int height) {
+  CameraInfo camera;
+  camera.width = width, camera.height = height;
+  return camera;
+}
+
 inline Light evenLight(const SensorModel& model, double radiance, double range_m,
                        double ambient = 0.0) {
   const TraceRequest request = model.traceRequest();

@@ -45,7 +45,7 @@ TEST(LensScatter, OfAnEvenImageKeepsAllLightInTheMiddle) {
         return std::vector<Way>{{1.0, 1.5}};
       },
       0.5);
-  const Light after = lens.apply(light, {Moment{}, 0, 0, 81}, Random{1, 1, 1});
+  const Light after = lens.apply(light, {Moment{}, cameraOfSize(81, 81)}, Random{1, 1, 1});
   EXPECT_NEAR(std::abs(after.phasor(0, 1)(40, 40)), 1.0, 1e-5);
   EXPECT_NEAR(after.steady(40, 40), 1.0, 1e-5);
   EXPECT_NEAR(after.ambient(40, 40), 0.5, 1e-5);
@@ -58,7 +58,7 @@ TEST(LensScatter, HaloOfOnePixelIsTheGaussian) {
   const Light light = syntheticLight(61, 61, {20_MHz}, 1, [](int x, int y) {
     return std::vector<Way>{{x == 30 && y == 30 ? 1.0 : 0.0, 1.0}};
   });
-  const Light after = lens.apply(light, {Moment{}, 0, 0, 61}, Random{1, 1, 1});
+  const Light after = lens.apply(light, {Moment{}, cameraOfSize(61, 61)}, Random{1, 1, 1});
   for (int x : {31, 33, 36}) {
     // The sampled Gaussian cut at four standard deviations misses 6e-5 of its sum per axis.
     const double expected = 0.5 * std::exp(-0.5 * std::pow((x - 30) / 3.0, 2)) / (2.0 * kPi * 9.0);
@@ -102,7 +102,7 @@ TEST(Quantisation, TakesTheNearestStep) {
   const float values[] = {14.9F, 15.1F, -4.0F, -6.0F, 0.0F, 1e6F};
   for (std::size_t i = 0; i < 6; ++i) samples.electrons[i / 2][i % 2] = values[i];
   samples =
-      Quantisation{.step_electrons = 10.0}.apply(samples, {Moment{}, 0, 0, 2}, Random{1, 1, 1});
+      Quantisation{.step_electrons = 10.0}.apply(samples, {Moment{}, cameraOfSize(2, 1)}, Random{1, 1, 1});
   const float steps[] = {10.0F, 20.0F, 0.0F, -10.0F, 0.0F, 1e6F};
   for (std::size_t i = 0; i < 6; ++i) EXPECT_EQ(samples.electrons[i / 2][i % 2], steps[i]) << i;
 }
