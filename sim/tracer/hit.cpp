@@ -14,11 +14,23 @@ constexpr double kSmallestOffset = 1e-18;
 /// How far a start keeps from edges, in units of the error bound.
 constexpr double kEdgeMargin = 4.0;
 /// Embree's u and v are wrong by a few 1e-7: this near to an edge they are computed anew.
-constexpr double kNearEdge = 1e-4;
+constexpr float kNearEdge = 1e-4f;
 
 Vec3d absolute(Vec3d v) { return {std::abs(v.x), std::abs(v.y), std::abs(v.z)}; }
 Vec3d largest(Vec3d a, Vec3d b) { return {std::max(a.x, b.x), std::max(a.y, b.y), std::max(a.z, b.z)}; }
 double largest(Vec3d v) { return std::max({v.x, v.y, v.z}); }
+
+/// Where a ray meets a primitive. The hit is origin + distance · direction, moved onto the plane
+/// normal · p = level and by `onto`.
+struct Contact {
+  Vec3d normal;     ///< geometric, unit; of either side
+  double level;
+  double distance;
+  double offset;    ///< how far from the surface rays that leave must start
+  // Not zero only next to an edge of a triangle:
+  Vec3d onto;       ///< from outside onto the edge
+  Vec3d inside;     ///< away from the edge, for rays that leave
+};
 
 /// Moves along a triangle: `onto` takes a place outside it to its edge, `inside` then keeps it at least
 /// `margin` away from its three edges: a ray that starts on an edge could start behind the surface that
@@ -52,6 +64,106 @@ Contact contactOfQuadric(const Quadric& quadric, int part, double embree_distanc
   return contact;
 }
 
+/// A triangle that the ray meets next to an edge.
+Contact contactAtEdge(const BuiltObject& object, std::uint32_t primitive, double distance, Vec3d o, Vec3d d) {
+  const TrianglePlane& plane = object.planes[primitive];
+  Contact contact{.normal = plane.normal, .level = plane.level, .distance = distance,
+                  .offset = static_cast<double>(plane.offset), .onto = {}, .inside = {}};
+  keepInside(object, primitive, o + d * distance, static_cast<double>(plane.margin), contact);
+  return contact;
+}
+
+/// Rounds to single precision, away from the surface whose normal component is given: moved by one unit
+/// in the last place first, twice what rounding can take back.
+TOFTWIN_INLINE float roundedAway(double value, double normal) {
+  return static_cast<float>(value + std::copysign(std::abs(value) * 0x1p-23, normal));
+}
+
+/// Puts a contact into a lane. `placeOnPlanes` does the same, but for the moves at edges.
+void place(const Contact& contact, Vec3d o, Vec3d d, std::size_t i, Hits& hits) {
+  const Vec3d beside = o + d * contact.distance;
+  const Vec3d p = beside - contact.normal * (dot(contact.normal, beside) - contact.level) + contact.onto;
+  const Vec3d n = dot(contact.normal, d) > 0.0 ? -contact.normal : contact.normal;
+  const Vec3d away = p + contact.inside + n * contact.offset;
+  hits.normal.x[i] = n.x;
+  hits.normal.y[i] = n.y;
+  hits.normal.z[i] = n.z;
+  hits.position.x[i] = p.x;
+  hits.position.y[i] = p.y;
+  hits.position.z[i] = p.z;
+  hits.distance[i] = contact.distance;
+  hits.start.x[i] = roundedAway(away.x, n.x);
+  hits.start.y[i] = roundedAway(away.y, n.y);
+  hits.start.z[i] = roundedAway(away.z, n.z);
+}
+
+/// The planes of the triangles that sixteen rays met, and how near to an edge a ray counts as next to it.
+struct PlaneLanes {
+  Vec3Lanes normal;
+  Lanes<double> level;
+  Lanes<float> offset, margin_share;
+};
+
+bool isMissed(const RTCRayHit16& rays, std::size_t i) { return rays.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID; }
+
+void gather(const Scene::Impl& scene, const RTCRayHit16& rays, PlaneLanes& planes, Hits& hits) {
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    const bool is_missed = isMissed(rays, i);
+    const ObjectRow& row = is_missed ? scene.rows.back() : scene.rows[rays.hit.geomID[i]];
+    const TrianglePlane& plane = row.planes[is_missed ? 0 : rays.hit.primID[i]];
+    planes.normal.x[i] = plane.normal.x;
+    planes.normal.y[i] = plane.normal.y;
+    planes.normal.z[i] = plane.normal.z;
+    planes.level[i] = plane.level;
+    planes.offset[i] = plane.offset;
+    planes.margin_share[i] = plane.margin_share;
+    hits.albedo[i] = row.material.albedo;
+    hits.emission[i] = row.material.emission;
+    hits.shape_a[i] = row.material.a;
+    hits.shape_b[i] = row.material.b;
+  }
+}
+
+/// Meets each ray with its plane. Which lanes are next to an edge, or on no triangle at all, goes to
+/// `by_hand`.
+TOFTWIN_VECTOR
+bool placeOnPlanes(const Packet& packet, const RTCRayHit16& rays, const PlaneLanes& planes, Hits& hits, Lanes<int>& by_hand) {
+  int any = 0;
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    const double dx = packet.direction.x[i], dy = packet.direction.y[i], dz = packet.direction.z[i];
+    const double ox = packet.origin.x[i], oy = packet.origin.y[i], oz = packet.origin.z[i];
+    const double nx = planes.normal.x[i], ny = planes.normal.y[i], nz = planes.normal.z[i], level = planes.level[i];
+    const double slope = nx * dx + ny * dy + nz * dz, per_slope = 1.0 / slope;
+    const double exact = (level - (nx * ox + ny * oy + nz * oz)) * per_slope;
+    // A ray within the plane has no crossing; Embree's distance is then as good as any.
+    const double t = std::abs(exact) < 1e300 ? exact : static_cast<double>(rays.ray.tfar[i]);
+    // Embree's ray starts up to about a margin beside the exact one, and meets the plane beside it by
+    // that over the sine of the angle between ray and plane.
+    const float u = rays.hit.u[i], v = rays.hit.v[i], w = 1.0f - u - v, least = u < v ? u : v;
+    const float near_edge = kNearEdge + planes.margin_share[i] * (1.0f + static_cast<float>(std::abs(per_slope)));
+    by_hand[i] = ((least < w ? least : w) < near_edge) & (packet.valid[i] != 0) ? -1 : 0;
+    any |= by_hand[i];
+    double px = ox + t * dx, py = oy + t * dy, pz = oz + t * dz;
+    const double above = nx * px + ny * py + nz * pz - level;
+    px -= above * nx;
+    py -= above * ny;
+    pz -= above * nz;
+    const double side = slope > 0.0 ? -1.0 : 1.0, offset = static_cast<double>(planes.offset[i]);
+    const double sx = nx * side, sy = ny * side, sz = nz * side;
+    hits.distance[i] = t;
+    hits.position.x[i] = px;
+    hits.position.y[i] = py;
+    hits.position.z[i] = pz;
+    hits.normal.x[i] = sx;
+    hits.normal.y[i] = sy;
+    hits.normal.z[i] = sz;
+    hits.start.x[i] = roundedAway(px + offset * sx, sx);
+    hits.start.y[i] = roundedAway(py + offset * sy, sy);
+    hits.start.z[i] = roundedAway(pz + offset * sz, sz);
+  }
+  return any != 0;
+}
+
 }  // namespace
 
 /// The offset bounds the error of Embree's robust triangle test, as a distance from the triangle's
@@ -78,25 +190,23 @@ TrianglePlane planeOf(Vec3d v0, Vec3d v1, Vec3d v2) {
   return plane;
 }
 
-Contact contactOf(const BuiltObject& object, std::uint32_t primitive, float u, float v, float embree_distance, Vec3d o,
-                  Vec3d d) {
-  if (object.planes.empty()) {
-    return contactOfQuadric(object.quadric, static_cast<int>(u), static_cast<double>(embree_distance), o, d);
+void findHits(const Scene::Impl& scene, const Packet& packet, const RTCRayHit16& rays, Hits& hits) {
+  PlaneLanes planes;
+  Lanes<int> by_hand;
+  gather(scene, rays, planes, hits);
+  if (!placeOnPlanes(packet, rays, planes, hits, by_hand)) return;
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    if (by_hand[i] == 0 || isMissed(rays, i)) continue;
+    const BuiltObject& object = scene.objects[rays.hit.geomID[i]];
+    const Vec3d o{packet.origin.x[i], packet.origin.y[i], packet.origin.z[i]};
+    const Vec3d d{packet.direction.x[i], packet.direction.y[i], packet.direction.z[i]};
+    if (object.planes.empty()) {
+      const auto part = static_cast<int>(rays.hit.u[i]);
+      place(contactOfQuadric(object.quadric, part, static_cast<double>(rays.ray.tfar[i]), o, d), o, d, i, hits);
+    } else {
+      place(contactAtEdge(object, rays.hit.primID[i], hits.distance[i], o, d), o, d, i, hits);
+    }
   }
-  const TrianglePlane& plane = object.planes[primitive];
-  Contact contact{.normal = plane.normal, .level = plane.level, .distance = 0.0,
-                  .offset = static_cast<double>(plane.offset), .onto = {}, .inside = {}};
-  const double per_slope = 1.0 / dot(plane.normal, d);
-  contact.distance = (plane.level - dot(plane.normal, o)) * per_slope;
-  // A ray within the plane has no crossing; Embree's distance is then as good as any.
-  if (!std::isfinite(contact.distance)) contact.distance = static_cast<double>(embree_distance);
-  // Embree's ray starts up to about a margin beside the exact one, and meets the plane beside it by
-  // that over the sine of the angle between ray and plane.
-  const double near_edge = kNearEdge + static_cast<double>(plane.margin_share) * (1.0 + std::abs(per_slope));
-  if (static_cast<double>(std::min({u, v, 1.0f - u - v})) < near_edge) {
-    keepInside(object, primitive, o + d * contact.distance, static_cast<double>(plane.margin), contact);
-  }
-  return contact;
 }
 
 }  // namespace toftwin::sim

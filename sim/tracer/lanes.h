@@ -10,7 +10,7 @@
 // without: their runtimes are not ready when the loader asks, respectively their syntax differs.
 #if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && !defined(__SANITIZE_ADDRESS__) && \
     !defined(__SANITIZE_THREAD__)
-#define TOFTWIN_VECTOR __attribute__((target_clones("arch=skylake-avx512", "arch=haswell", "default")))
+#define TOFTWIN_VECTOR __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
 #else
 #define TOFTWIN_VECTOR
 #endif

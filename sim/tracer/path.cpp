@@ -4,10 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <limits>
 
 #include "sim/tracer/hit.h"
-#include "sim/tracer/random.h"
+#include "sim/tracer/packet.h"
 #include "sim/tracer/shade.h"
 
 namespace toftwin::sim {
@@ -22,26 +23,21 @@ constexpr float kRouletteThreshold = 0.1f;
 /// So many bounces of a pixel's samples are spread evenly over all directions.
 constexpr int kEvenBounces = 2;
 
-/// Which pixel of the block each lane works for; −1: none.
-using LanePixels = std::array<int, kLaneCount>;
-
 /// Numbers of a path's random dimensions.
 struct Dimensions {
-  std::uint64_t emitters;
-  static constexpr std::uint64_t kFootprint = 0;
-  [[nodiscard]] std::uint64_t bounce(int surface) const { return first(surface); }
-  [[nodiscard]] std::uint64_t roulette(int surface) const { return first(surface) + 1; }
-  [[nodiscard]] std::uint64_t emitter(int surface, std::size_t e) const { return first(surface) + 2 + e; }
+  std::uint32_t emitters;
+  static constexpr std::uint32_t kFootprint = 0;
+  [[nodiscard]] std::uint32_t bounce(int surface) const { return first(surface); }
+  [[nodiscard]] std::uint32_t roulette(int surface) const { return first(surface) + 1; }
+  [[nodiscard]] std::uint32_t emitter(int surface, std::size_t e) const {
+    return first(surface) + 2 + static_cast<std::uint32_t>(e);
+  }
 
  private:
-  [[nodiscard]] std::uint64_t first(int surface) const {
-    return 1 + static_cast<std::uint64_t>(surface) * (2 + emitters);
-  }
+  [[nodiscard]] std::uint32_t first(int surface) const { return 1 + static_cast<std::uint32_t>(surface) * (2 + emitters); }
 };
 
-bool isAny(const Lanes<int>& valid) {
-  return std::any_of(std::begin(valid.v), std::end(valid.v), [](int v) { return v != 0; });
-}
+Dimensions dimensionsOf(const Tracing& tracing) { return {static_cast<std::uint32_t>(tracing.emitters.size())}; }
 
 void record(RayLog* log, const Lanes<int>& valid, const RTCRay16& rays, bool coherent, bool shadow) {
   if (log == nullptr) return;
@@ -59,61 +55,31 @@ void intersect(const Tracing& tracing, const Packet& packet, RTCRayHit16& rays, 
   embree::intersect(packet.valid.v, tracing.scene.embree, rays, coherent);
 }
 
-/// Takes what the scene knows of each lane's hit. Paths that meet nothing end, with the surroundings'
-/// light.
-void collectHits(const Tracing& tracing, const RTCRayHit16& rays, Packet& packet, Hits& hits, LaneSums& sums) {
+/// Paths that met nothing end, with the surroundings' light.
+TOFTWIN_VECTOR
+void endMissed(float ambient_radiance, const RTCRayHit16& rays, Packet& packet, Lanes<float>& ambient) {
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     const bool is_missed = rays.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID;
-    if (packet.valid[i] != 0 && is_missed) {
-      sums.ambient[i] += packet.throughput[i] * tracing.scene.ambient_radiance;
-      packet.valid[i] = 0;
-    }
-    Contact contact{.normal = {0, 0, 1}, .level = 0.0, .distance = 1.0, .offset = 0.0, .onto = {}, .inside = {}};
-    Material material{.albedo = 0.0f};
-    if (packet.valid[i] != 0) {
-      const BuiltObject& object = tracing.scene.objects[rays.hit.geomID[i]];
-      contact = contactOf(object, rays.hit.primID[i], rays.hit.u[i], rays.hit.v[i], rays.ray.tfar[i],
-                          {packet.origin.x[i], packet.origin.y[i], packet.origin.z[i]},
-                          {packet.direction.x[i], packet.direction.y[i], packet.direction.z[i]});
-      material = tracing.scene.materials[object.material];
-      sums.ambient[i] += packet.throughput[i] * material.emission;
-    }
-    hits.normal.x[i] = contact.normal.x;
-    hits.normal.y[i] = contact.normal.y;
-    hits.normal.z[i] = contact.normal.z;
-    hits.level[i] = contact.level;
-    hits.distance[i] = contact.distance;
-    hits.offset[i] = contact.offset;
-    hits.onto.x[i] = contact.onto.x;
-    hits.onto.y[i] = contact.onto.y;
-    hits.onto.z[i] = contact.onto.z;
-    hits.inside.x[i] = contact.inside.x;
-    hits.inside.y[i] = contact.inside.y;
-    hits.inside.z[i] = contact.inside.z;
-    hits.albedo[i] = material.albedo;
-    hits.shape_a[i] = material.a;
-    hits.shape_b[i] = material.b;
+    ambient[i] += is_missed & (packet.valid[i] != 0) ? packet.throughput[i] * ambient_radiance : 0.0f;
+    packet.valid[i] = is_missed ? 0 : packet.valid[i];
   }
-  placeHits(packet, hits);
+}
+
+/// Light of the surfaces themselves.
+TOFTWIN_VECTOR
+void addEmission(const Packet& packet, const Hits& hits, Lanes<float>& ambient) {
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    ambient[i] += packet.valid[i] != 0 ? packet.throughput[i] * hits.emission[i] : 0.0f;
+  }
 }
 
 /// Next-event estimation: from every hit to every emitter.
 void gatherDirectLight(const Tracing& tracing, const Packet& packet, const Hits& hits, int surface, bool coherent,
                        LaneSums& sums) {
-  const Dimensions dimensions{tracing.emitters.size()};
   for (std::size_t e = 0; e < tracing.emitters.size(); ++e) {
     const PlacedEmitter& emitter = tracing.emitters[e];
     Vec3Lanes places;
-    for (std::size_t i = 0; i < kLaneCount; ++i) {
-      Vec3d place = emitter.position;
-      if (emitter.is_disc) {
-        const RandomPair random = randomPair(packet.key[i], packet.index[i], dimensions.emitter(surface, e));
-        place = emitter.place(random.u, random.v);
-      }
-      places.x[i] = place.x;
-      places.y[i] = place.y;
-      places.z[i] = place.z;
-    }
+    drawPlaces(packet, emitter, dimensionsOf(tracing).emitter(surface, e), places);
     DirectLight light;
     lightHits(packet, hits, emitter, places, light);
     if (!isAny(light.valid)) continue;
@@ -121,87 +87,106 @@ void gatherDirectLight(const Tracing& tracing, const Packet& packet, const Hits&
     setShadowRays(hits, places, rays);
     record(tracing.log, light.valid, rays, coherent, true);
     embree::occluded(light.valid.v, tracing.scene.embree, rays, coherent);
-    for (std::size_t i = 0; i < kLaneCount; ++i) {
-      if (rays.tfar[i] < 0.0f) light.weight[i] = 0.0f;
-    }
+    for (std::size_t i = 0; i < kLaneCount; ++i) light.weight[i] = rays.tfar[i] < 0.0f ? 0.0f : light.weight[i];
     addPhasors(tracing.turns_per_metre, tracing.request.harmonics, light.weight, light.length, sums);
-  }
-}
-
-void playRoulette(std::uint64_t dimension, Packet& packet) {
-  for (std::size_t i = 0; i < kLaneCount; ++i) {
-    float& throughput = packet.throughput[i];
-    if (packet.valid[i] == 0 || !(throughput < kRouletteThreshold)) continue;
-    const double survival = static_cast<double>(throughput / kRouletteThreshold);
-    throughput = kRouletteThreshold;
-    if (!(independentPair(packet.key[i], packet.index[i], dimension).u < survival)) packet.valid[i] = 0;
   }
 }
 
 /// Follows sixteen paths over all their surfaces.
 void followPaths(const Tracing& tracing, Packet& packet, LaneSums& sums) {
-  const Dimensions dimensions{tracing.emitters.size()};
+  const Dimensions dimensions = dimensionsOf(tracing);
   const int surfaces = tracing.request.max_surfaces;
   RTCRayHit16 rays;
   Hits hits;
-  for (int surface = 0; isAny(packet.valid); ++surface) {
+  for (int surface = 0;; ++surface) {
     const bool is_coherent = surface == 0;
     intersect(tracing, packet, rays, is_coherent);
-    if (surface == surfaces) break;
-    collectHits(tracing, rays, packet, hits, sums);
-    if (!isAny(packet.valid)) return;
+    endMissed(tracing.scene.ambient_radiance, rays, packet, sums.ambient);
+    if (surface == surfaces || !isAny(packet.valid)) return;
+    findHits(tracing.scene, packet, rays, hits);
+    addEmission(packet, hits, sums.ambient);
     gatherDirectLight(tracing, packet, hits, surface, is_coherent, sums);
     // Where the surroundings shine, the last surface must still look for them.
     if (surface + 1 == surfaces && tracing.scene.ambient_radiance == 0.0f) return;
     bounce(hits, dimensions.bounce(surface), surface < kEvenBounces, packet);
-    playRoulette(dimensions.roulette(surface), packet);
+    playRoulette(dimensions.roulette(surface), kRouletteThreshold, packet);
+    if (!isAny(packet.valid)) return;
+  }
+}
+
+/// Starts the paths of the samples from `sample` on, each at its place on its pixel; `extent` 0: in the
+/// middle.
+TOFTWIN_VECTOR
+void startPaths(const Tracing& tracing, const Block& block, int sample, int last, double extent, Packet& packet) {
+  const auto [ax, ay, az] = tracing.camera_axes;
+  const Vec3d pinhole = tracing.pinhole;
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    const int index = sample + block.first_sample[i];
+    packet.valid[i] = (block.is_inside[i] != 0) & (index < last) ? -1 : 0;
+    packet.index[i] = static_cast<std::uint32_t>(index);
+    const RandomPair at = randomPair({block.key_a[i], block.key_b[i]}, packet.index[i], Dimensions::kFootprint);
+    const double du = (static_cast<double>(at.u) - 0.5) * extent, dv = (static_cast<double>(at.v) - 0.5) * extent;
+    const double x = block.rays.x[i] + block.rays.x_by_u[i] * du + block.rays.x_by_v[i] * dv;
+    const double y = block.rays.y[i] + block.rays.y_by_u[i] * du + block.rays.y_by_v[i] * dv;
+    const double per_length = 1.0 / std::sqrt(x * x + y * y + 1.0);
+    packet.direction.x[i] = (ax.x * x + ay.x * y + az.x) * per_length;
+    packet.direction.y[i] = (ax.y * x + ay.y * y + az.y) * per_length;
+    packet.direction.z[i] = (ax.z * x + ay.z * y + az.z) * per_length;
   }
   for (std::size_t i = 0; i < kLaneCount; ++i) {
-    if (packet.valid[i] != 0 && rays.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) {
-      sums.ambient[i] += packet.throughput[i] * tracing.scene.ambient_radiance;
+    packet.origin.x[i] = pinhole.x;
+    packet.origin.y[i] = pinhole.y;
+    packet.origin.z[i] = pinhole.z;
+    packet.start.x[i] = static_cast<float>(pinhole.x);
+    packet.start.y[i] = static_cast<float>(pinhole.y);
+    packet.start.z[i] = static_cast<float>(pinhole.z);
+    packet.length[i] = 0.0;
+    packet.throughput[i] = 1.0f;
+  }
+  packet.key_a = block.key_a;
+  packet.key_b = block.key_b;
+}
+
+/// The lanes' sums of one packet go to those of all, and their squares to the variance.
+TOFTWIN_VECTOR
+void fold(std::size_t harmonics, const Lanes<int>& started, BlockSums& sums) {
+  const LaneSums& lanes = sums.of_packet;
+#pragma GCC ivdep
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    sums.steady[i] += static_cast<double>(lanes.steady[i]);
+    sums.ambient[i] += static_cast<double>(lanes.ambient[i]);
+    sums.samples[i] += started[i] != 0 ? 1.0 : 0.0;
+  }
+  for (std::size_t term = 0; term < lanes.re.size(); ++term) {
+    const Lanes<float>&re = lanes.re[term], &im = lanes.im[term];
+    Lanes<double>&sum_re = sums.re[term], &sum_im = sums.im[term];
+#pragma GCC ivdep
+    for (std::size_t i = 0; i < kLaneCount; ++i) {
+      sum_re[i] += static_cast<double>(re[i]);
+      sum_im[i] += static_cast<double>(im[i]);
+    }
+    if (term % harmonics != 0) continue;
+    Lanes<double>& squares = sums.squares[term / harmonics];
+#pragma GCC ivdep
+    for (std::size_t i = 0; i < kLaneCount; ++i) {
+      const auto a = static_cast<double>(re[i]), b = static_cast<double>(im[i]);
+      squares[i] += a * a + b * b;
     }
   }
 }
 
-/// Puts a path's start into a lane.
-void start(const Tracing& tracing, Packet& packet, std::size_t lane, Vec3d direction_in_camera) {
-  const auto& axes = tracing.camera_axes;
-  const Vec3d direction = axes[0] * direction_in_camera.x + axes[1] * direction_in_camera.y + axes[2] * direction_in_camera.z;
-  packet.valid[lane] = -1;
-  packet.origin.x[lane] = tracing.pinhole.x;
-  packet.origin.y[lane] = tracing.pinhole.y;
-  packet.origin.z[lane] = tracing.pinhole.z;
-  packet.start.x[lane] = static_cast<float>(tracing.pinhole.x);
-  packet.start.y[lane] = static_cast<float>(tracing.pinhole.y);
-  packet.start.z[lane] = static_cast<float>(tracing.pinhole.z);
-  packet.direction.x[lane] = direction.x;
-  packet.direction.y[lane] = direction.y;
-  packet.direction.z[lane] = direction.z;
-  packet.throughput[lane] = 1.0f;
-}
-
-/// The lanes' sums go to their pixels, and their squares to the variance.
-void fold(const Tracing& tracing, const LanePixels& pixels, const LaneSums& lanes, BlockSums& sums) {
-  const auto harmonics = static_cast<std::size_t>(tracing.request.harmonics);
-  const std::size_t frequencies = tracing.turns_per_metre.size(), terms = frequencies * harmonics;
-  for (std::size_t i = 0; i < kLaneCount; ++i) {
-    if (pixels[i] < 0) continue;
-    const auto p = static_cast<std::size_t>(pixels[i]);
-    sums.pixels[p].steady += static_cast<double>(lanes.steady[i]);
-    sums.pixels[p].ambient += static_cast<double>(lanes.ambient[i]);
-    ++sums.pixels[p].samples;
-    for (std::size_t term = 0; term < terms; ++term) {
-      const std::complex<double> z{static_cast<double>(lanes.re[term][i]), static_cast<double>(lanes.im[term][i])};
-      sums.phasors[p * terms + term] += z;
-      if (term % harmonics == 0) sums.squares[p * frequencies + term / harmonics] += std::norm(z);
-    }
-  }
+template <class Change>
+void forEachLanes(BlockSums& sums, const Change& change) {
+  change(sums.steady);
+  change(sums.ambient);
+  change(sums.samples);
+  for (auto* terms : {&sums.re, &sums.im, &sums.squares}) std::for_each(terms->begin(), terms->end(), change);
 }
 
 }  // namespace
 
 Tracing::Tracing(const Scene::Impl& s, const TraceRequest& r, RayLog* l)
-    : scene(s), request(r), log(l), scene_from_camera(r.world_from_camera) {
+    : scene(s), request(r), log(l), scene_from_camera(r.world_from_camera), seed(seedKey(r.seed)) {
   scene_from_camera.translation_m = scene_from_camera.translation_m - scene.origin_in_world;
   pinhole = scene_from_camera.translation_m;
   camera_axes = {scene_from_camera.rotate({1, 0, 0}), scene_from_camera.rotate({0, 1, 0}), scene_from_camera.rotate({0, 0, 1})};
@@ -218,88 +203,98 @@ BlockShape BlockShape::forSamples(int samples_per_pixel) {
   return shape;
 }
 
-BlockSums::BlockSums(int count, std::size_t frequencies, int harmonics)
-    : pixels(static_cast<std::size_t>(count)),
-      phasors(pixels.size() * frequencies * static_cast<std::size_t>(harmonics)),
-      squares(pixels.size() * frequencies) {}
+TOFTWIN_VECTOR
+void prepareBlock(const Tracing& tracing, const BlockShape& shape, int left, int top, Block& block) {
+  block.shape = shape;
+  block.x = left;
+  block.y = top;
+  const CameraInfo& camera = tracing.request.camera;
+  const auto log2 = [](int n) { return std::countr_zero(static_cast<unsigned>(n)); };
+  const int samples_bits = log2(shape.samples), width_bits = log2(shape.width);
+  const int last_column = camera.width - 1, last_row = camera.height - 1;
+  const PixelKey seed = tracing.seed;
+  Lanes<int> columns, rows;
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    const int lane = static_cast<int>(i), pixel = lane >> samples_bits;
+    const int u = left + (pixel & (shape.width - 1)), v = top + (pixel >> width_bits);
+    block.is_inside[i] = (u <= last_column) & (v <= last_row) ? -1 : 0;
+    block.first_sample[i] = lane & (shape.samples - 1);
+    const PixelKey key = pixelKey(seed, static_cast<std::uint32_t>(u), static_cast<std::uint32_t>(v));
+    block.key_a[i] = key.a;
+    block.key_b[i] = key.b;
+    columns[i] = u;
+    rows[i] = v;
+  }
+  raysOfPixels(camera, columns, rows, block.rays);
+}
+
+BlockSums::BlockSums(const TraceRequest& request)
+    : re(request.frequencies.size() * static_cast<std::size_t>(request.harmonics)),
+      im(re.size()),
+      squares(request.frequencies.size()),
+      of_packet(re.size()) {
+  clear();
+}
 
 void BlockSums::clear() {
-  std::fill(pixels.begin(), pixels.end(), Pixel{});
-  std::fill(phasors.begin(), phasors.end(), std::complex<double>{});
-  std::fill(squares.begin(), squares.end(), 0.0);
+  forEachLanes(*this, [](Lanes<double>& lanes) { lanes = {}; });
 }
 
 BlockSums& BlockSums::operator+=(const BlockSums& other) {
-  for (std::size_t p = 0; p < pixels.size(); ++p) {
-    pixels[p].steady += other.pixels[p].steady;
-    pixels[p].ambient += other.pixels[p].ambient;
-    pixels[p].samples += other.pixels[p].samples;
-  }
-  for (std::size_t i = 0; i < phasors.size(); ++i) phasors[i] += other.phasors[i];
-  for (std::size_t i = 0; i < squares.size(); ++i) squares[i] += other.squares[i];
+  const auto add = [](Lanes<double>& to, const Lanes<double>& from) {
+    for (std::size_t i = 0; i < kLaneCount; ++i) to[i] += from[i];
+  };
+  add(steady, other.steady);
+  add(ambient, other.ambient);
+  add(samples, other.samples);
+  for (std::size_t i = 0; i < re.size(); ++i) add(re[i], other.re[i]);
+  for (std::size_t i = 0; i < im.size(); ++i) add(im[i], other.im[i]);
+  for (std::size_t i = 0; i < squares.size(); ++i) add(squares[i], other.squares[i]);
   return *this;
 }
 
-Block::Block(const Tracing& tracing, const BlockShape& s, int left, int top) : shape(s), x(left), y(top) {
-  for (int p = 0; p < shape.pixels(); ++p) {
-    rays[static_cast<std::size_t>(p)] = raysOfPixel(tracing.request.camera, x + p % shape.width, y + p / shape.width);
-  }
+void BlockSums::gather(const BlockShape& shape) {
+  forEachLanes(*this, [step = static_cast<std::size_t>(shape.samples)](Lanes<double>& lanes) {
+    for (std::size_t width = 1; width < step; width *= 2) {
+      for (std::size_t i = 0; i < kLaneCount; i += 2 * width) lanes[i] += lanes[i + width];
+    }
+  });
 }
 
 void traceBlock(const Tracing& tracing, const Block& block, int first, int last, BlockSums& sums) {
   const TraceRequest& request = tracing.request;
-  const BlockShape& shape = block.shape;
-  LaneSums lanes{tracing.turns_per_metre.size() * static_cast<std::size_t>(request.harmonics)};
-  for (int sample = first; sample < last; sample += shape.samples) {
-    Packet packet;
-    LanePixels pixels;
+  const auto harmonics = static_cast<std::size_t>(request.harmonics);
+  LaneSums& lanes = sums.of_packet;
+  Packet packet;
+  for (int sample = first; sample < last; sample += block.shape.samples) {
+    startPaths(tracing, block, sample, last, request.pixel_extent, packet);
+    const Lanes<int> started = packet.valid;
     lanes.clear();
-    for (int lane = 0; lane < kLanes; ++lane) {
-      const auto i = static_cast<std::size_t>(lane);
-      const int p = lane / shape.samples, index = sample + lane % shape.samples;
-      const int u = block.x + p % shape.width, v = block.y + p / shape.width;
-      pixels[i] = -1;
-      if (index >= last || u >= request.camera.width || v >= request.camera.height) continue;
-      pixels[i] = p;
-      packet.key[i] = pixelKey(request.seed, static_cast<std::uint64_t>(v) << 32 | static_cast<std::uint32_t>(u));
-      packet.index[i] = static_cast<std::uint32_t>(index);
-      const RandomPair at = randomPair(packet.key[i], packet.index[i], Dimensions::kFootprint);
-      start(tracing, packet, i,
-            block.rays[static_cast<std::size_t>(p)].direction((at.u - 0.5) * request.pixel_extent,
-                                                        (at.v - 0.5) * request.pixel_extent));
-    }
     followPaths(tracing, packet, lanes);
-    fold(tracing, pixels, lanes, sums);
+    fold(harmonics, started, sums);
   }
 }
 
-std::array<TruthPixel, kLaneCount> traceTruth(const Tracing& tracing, const Block& block) {
-  const CameraInfo& camera = tracing.request.camera;
-  const BlockShape& shape = block.shape;
-  std::array<TruthPixel, kLaneCount> pixels;
+void traceTruth(const Tracing& tracing, const Block& block, TruthLanes& truth) {
   Packet packet;
-  for (int p = 0; p < shape.pixels(); ++p) {
-    const int u = block.x + p % shape.width, v = block.y + p / shape.width;
-    if (u >= camera.width || v >= camera.height) continue;
-    const auto i = static_cast<std::size_t>(p);
-    start(tracing, packet, i, block.rays[i].direction(0.0, 0.0));
-  }
+  startPaths(tracing, block, 0, 1, 0.0, packet);
   RTCRayHit16 rays;
   Hits hits;
-  LaneSums unused{0};
   intersect(tracing, packet, rays, true);
-  collectHits(tracing, rays, packet, hits, unused);
-  const Transform<Camera, World> camera_from_scene = tracing.scene_from_camera.inverse();
-  for (std::size_t i = 0; i < static_cast<std::size_t>(shape.pixels()); ++i) {
+  Lanes<float> unused{};
+  endMissed(0.0f, rays, packet, unused);
+  findHits(tracing.scene, packet, rays, hits);
+  const auto [ax, ay, az] = tracing.camera_axes;
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
     constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
-    pixels[i] = {.range_m = kNothing, .albedo = kNothing, .normal = {}};
-    if (packet.valid[i] == 0) continue;
-    const Vec3d normal = camera_from_scene.rotate({hits.normal.x[i], hits.normal.y[i], hits.normal.z[i]});
-    pixels[i] = {.range_m = static_cast<float>(hits.distance[i]),
-                 .albedo = hits.albedo[i],
-                 .normal = {static_cast<float>(normal.x), static_cast<float>(normal.y), static_cast<float>(normal.z)}};
+    const bool is_hit = packet.valid[i] != 0;
+    const double nx = hits.normal.x[i], ny = hits.normal.y[i], nz = hits.normal.z[i];
+    truth.range_m[i] = is_hit ? static_cast<float>(hits.distance[i]) : kNothing;
+    truth.albedo[i] = is_hit ? hits.albedo[i] : kNothing;
+    truth.normal.x[i] = is_hit ? static_cast<float>(ax.x * nx + ax.y * ny + ax.z * nz) : 0.0f;
+    truth.normal.y[i] = is_hit ? static_cast<float>(ay.x * nx + ay.y * ny + ay.z * nz) : 0.0f;
+    truth.normal.z[i] = is_hit ? static_cast<float>(az.x * nx + az.y * ny + az.z * nz) : 0.0f;
   }
-  return pixels;
 }
 
 }  // namespace toftwin::sim

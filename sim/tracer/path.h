@@ -2,8 +2,6 @@
 #pragma once
 
 #include <array>
-#include <complex>
-#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -11,6 +9,7 @@
 #include "sim/tracer/emitter.h"
 #include "sim/tracer/lanes.h"
 #include "sim/tracer/lens.h"
+#include "sim/tracer/packet.h"
 #include "sim/tracer/scene_impl.h"
 #include "sim/tracer/trace.h"
 
@@ -39,6 +38,7 @@ struct Tracing {
   std::array<Vec3d, 3> camera_axes;  ///< x, y, z of the camera in the scene
   std::vector<PlacedEmitter> emitters;
   std::vector<double> turns_per_metre;  ///< f / c
+  PixelKey seed;
 };
 
 /// A block of neighbouring pixels whose paths are traced together, sixteen at a time: the more
@@ -52,40 +52,42 @@ struct BlockShape {
   [[nodiscard]] int pixels() const { return width * height; }
 };
 
-/// Sums over the samples of the pixels of one block; `pixel` counts within the block.
-struct BlockSums {
-  BlockSums(int pixels, std::size_t frequencies, int harmonics);
-  BlockSums& operator+=(const BlockSums& other);
-  void clear();
-
-  struct Pixel {
-    double steady = 0.0;
-    double ambient = 0.0;
-    int samples = 0;
-  };
-  std::vector<Pixel> pixels;
-  std::vector<std::complex<double>> phasors;  ///< [pixel][frequency][harmonic]
-  std::vector<double> squares;                ///< [pixel][frequency] Σ |first harmonic|²
-};
-
-/// The block whose top left pixel is (x, y), with the rays of its pixels.
+/// The block whose top left pixel is (x, y). Lane i works for pixel i / shape.samples of the block, row by
+/// row, and there for the samples i % shape.samples, that plus shape.samples, and so on.
 struct Block {
-  Block(const Tracing& tracing, const BlockShape& shape, int x, int y);
-
   BlockShape shape;
   int x, y;
-  std::array<PixelRays, kLaneCount> rays;
+  Lanes<int> is_inside;  ///< −1 where the lane's pixel is one of the image
+  Lanes<int> first_sample;
+  Lanes<std::uint32_t> key_a, key_b;
+  PixelRays rays;
+};
+
+void prepareBlock(const Tracing& tracing, const BlockShape& shape, int x, int y, Block& block);
+
+/// Sums over the samples that each lane worked for.
+struct BlockSums {
+  explicit BlockSums(const TraceRequest& request);
+  BlockSums& operator+=(const BlockSums& other);
+  void clear();
+  /// Adds up the lanes of each pixel into its first lane.
+  void gather(const BlockShape& shape);
+
+  Lanes<double> steady, ambient, samples;
+  std::vector<Lanes<double>> re, im;   ///< [frequency][harmonic]
+  std::vector<Lanes<double>> squares;  ///< [frequency] Σ |first harmonic|²
+  LaneSums of_packet;                  ///< the packet being traced
 };
 
 /// Traces samples [first, last) of every pixel of the block.
 void traceBlock(const Tracing& tracing, const Block& block, int first, int last, BlockSums& sums);
 
-/// What the central rays of the block's pixels meet.
-struct TruthPixel {
-  float range_m, albedo;
-  Vec3f normal;
+/// What the central rays of the block's pixels meet; in each pixel's first lane.
+struct TruthLanes {
+  Lanes<float> range_m, albedo;
+  Vec3fLanes normal;
 };
-std::array<TruthPixel, kLaneCount> traceTruth(const Tracing& tracing, const Block& block);
+void traceTruth(const Tracing& tracing, const Block& block, TruthLanes& truth);
 
 /// trace() with a record of its rays; only for one thread.
 Light traceLogged(const Scene& scene, const TraceRequest& request, RayLog* log);

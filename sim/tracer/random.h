@@ -8,19 +8,37 @@
 
 namespace toftwin::sim {
 
-/// Finaliser of SplitMix64 (Steele, Lea & Flood 2014): a bijection that decorrelates all bits.
-TOFTWIN_INLINE std::uint64_t mixBits(std::uint64_t x) {
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
-  return x ^ (x >> 31);
-}
+inline constexpr std::uint32_t kGolden = 0x9e3779b9u;  // 2³² / golden ratio
 
-inline constexpr std::uint64_t kGolden = 0x9e3779b97f4a7c15u;  // 2⁶⁴ / golden ratio
+/// A bijection of 32 bits (Wellons' "lowbias32"). No wider multiplications: those have no vector form
+/// on most processors.
+TOFTWIN_INLINE std::uint32_t mixBits(std::uint32_t x) {
+  x = (x ^ (x >> 16)) * 0x7feb352du;
+  x = (x ^ (x >> 15)) * 0x846ca68bu;
+  return x ^ (x >> 16);
+}
 
 /// Names the random numbers of one pixel. Counter-based: a number depends on seed, pixel, sample and
 /// dimension alone, so neither threads nor tiles nor the traced region change it.
-inline std::uint64_t pixelKey(std::uint64_t seed, std::uint64_t pixel) {
-  return mixBits(mixBits(seed + kGolden) + pixel);
+struct PixelKey {
+  std::uint32_t a, b;
+};
+
+/// The same of a request: its seed, mixed.
+inline PixelKey seedKey(std::uint64_t seed) {
+  const auto low = static_cast<std::uint32_t>(seed), high = static_cast<std::uint32_t>(seed >> 32);
+  const std::uint32_t a = mixBits(mixBits(low + kGolden) + high);
+  return {a, mixBits(mixBits(high ^ 0x5851f42du) + low + a)};
+}
+
+TOFTWIN_INLINE PixelKey pixelKey(PixelKey seed, std::uint32_t u, std::uint32_t v) {
+  const std::uint32_t row = mixBits(v + seed.a);
+  return {mixBits(row + u), mixBits((row ^ seed.b) + u * kGolden)};
+}
+
+/// 32 bits of a pixel's dimension.
+TOFTWIN_INLINE std::uint32_t dimensionBits(PixelKey key, std::uint32_t dimension) {
+  return mixBits(mixBits(dimension * kGolden ^ key.a) + key.b);
 }
 
 TOFTWIN_INLINE std::uint32_t reverseBits(std::uint32_t x) {
@@ -41,18 +59,22 @@ TOFTWIN_INLINE std::uint32_t scrambleUpwards(std::uint32_t x, std::uint32_t seed
   return x ^ (x * 0x8d22f6e6u);
 }
 
-/// Two numbers in [0, 1), multiples of 2⁻³¹.
+/// Two numbers in [0, 1), multiples of 2⁻²⁴.
 struct RandomPair {
-  double u, v;
+  float u, v;
 };
+
+/// The upper 24 bits, which single precision holds exactly.
+TOFTWIN_INLINE float unitInterval(std::uint32_t bits) {
+  return static_cast<float>(static_cast<std::int32_t>(bits >> 8)) * 0x1p-24f;
+}
 
 /// Sample `index` of a pixel in a pair of dimensions: the first two dimensions of Sobol's sequence, its
 /// order shuffled and its digits scrambled after Owen (Burley 2020). The first 2ᵏ samples of a pixel
 /// fill the square evenly, each by itself is uniform, and different pairs and pixels are independent.
-TOFTWIN_INLINE RandomPair randomPair(std::uint64_t key, std::uint32_t index, std::uint64_t dimension) {
-  const std::uint64_t seeds = mixBits(key + (2 * dimension + 1) * kGolden);
-  const std::uint64_t more = mixBits(key + (2 * dimension + 2) * kGolden);
-  const std::uint32_t first = scrambleUpwards(reverseBits(index), static_cast<std::uint32_t>(seeds));
+TOFTWIN_INLINE RandomPair randomPair(PixelKey key, std::uint32_t index, std::uint32_t dimension) {
+  const std::uint32_t seed = dimensionBits(key, dimension);
+  const std::uint32_t first = scrambleUpwards(reverseBits(index), seed);
   // `first` is the shuffled index reversed, which is its radical inverse. The second dimension's
   // generator is Pascal's triangle modulo 2: digit r is the parity of the index bits at supersets of r.
   const std::uint32_t shuffled = reverseBits(first);
@@ -62,17 +84,15 @@ TOFTWIN_INLINE RandomPair randomPair(std::uint64_t key, std::uint32_t index, std
   y ^= (y >> 4) & 0x0f0f0f0fu;
   y ^= (y >> 8) & 0x00ff00ffu;
   y ^= (y >> 16) & 0x0000ffffu;
-  const std::uint32_t u = reverseBits(scrambleUpwards(shuffled, static_cast<std::uint32_t>(seeds >> 32)));
-  const std::uint32_t v = reverseBits(scrambleUpwards(y, static_cast<std::uint32_t>(more)));
-  return {static_cast<double>(static_cast<std::int32_t>(u >> 1)) * 0x1p-31,
-          static_cast<double>(static_cast<std::int32_t>(v >> 1)) * 0x1p-31};
+  return {unitInterval(reverseBits(scrambleUpwards(shuffled, mixBits(seed ^ 0x68e31da4u)))),
+          unitInterval(reverseBits(scrambleUpwards(y, mixBits(seed ^ 0xb5297a4du))))};
 }
 
 /// The same without the evenness, for less work: dimensions deep in a path gain nothing from it.
-TOFTWIN_INLINE RandomPair independentPair(std::uint64_t key, std::uint32_t index, std::uint64_t dimension) {
-  const std::uint64_t bits = mixBits(mixBits(key + (2 * dimension + 1) * kGolden) + index);
-  return {static_cast<double>(static_cast<std::int32_t>(bits >> 33)) * 0x1p-31,
-          static_cast<double>(static_cast<std::int32_t>(bits & 0x7fffffffu)) * 0x1p-31};
+TOFTWIN_INLINE RandomPair independentPair(PixelKey key, std::uint32_t index, std::uint32_t dimension) {
+  const std::uint32_t seed = dimensionBits(key, dimension) + index * kGolden;
+  const std::uint32_t u = mixBits(seed ^ 0x68e31da4u);
+  return {unitInterval(u), unitInterval(mixBits(seed + 0xb5297a4du))};
 }
 
 }  // namespace toftwin::sim

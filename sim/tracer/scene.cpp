@@ -66,6 +66,10 @@ Quadric quadricOf(const PlacedObject& object, Vec3d origin_in_world) {
   return quadric;
 }
 
+/// Stands for a quadric among the triangles: every ray counts as next to its edge, where the tracer
+/// looks more closely.
+constexpr TrianglePlane kNoTriangle{.normal = {0, 0, 1}, .level = 0.0, .offset = 0.0f, .margin = 0.0f, .margin_share = INFINITY};
+
 struct Box {
   Vec3d lower{INFINITY, INFINITY, INFINITY};
   Vec3d upper{-INFINITY, -INFINITY, -INFINITY};
@@ -167,6 +171,11 @@ struct SceneBuilder {
         object.planes.push_back(planeOf(object.vertices[a], object.vertices[b], object.vertices[c]));
       }
     }
+    for (const BuiltObject& object : scene->objects) {
+      scene->rows.push_back({.planes = object.planes.empty() ? &kNoTriangle : object.planes.data(),
+                             .material = scene->materials[object.material]});
+    }
+    scene->rows.push_back({.planes = &kNoTriangle, .material = {.albedo = 0.0f}});
   }
 
   Result<> buildEmbree() {

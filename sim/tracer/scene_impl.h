@@ -35,6 +35,12 @@ struct BuiltObject {
   Quadric quadric;
 };
 
+/// What the tracer reads of an object at each hit.
+struct ObjectRow {
+  const TrianglePlane* planes;  ///< of a quadric: one that makes every hit one to compute by hand
+  Material material;
+};
+
 struct Scene::Impl {
   Impl() = default;
   Impl(const Impl&) = delete;
@@ -44,6 +50,7 @@ struct Scene::Impl {
   std::string id;
   std::vector<Material> materials;
   std::vector<BuiltObject> objects;  ///< Embree points into them
+  std::vector<ObjectRow> rows;       ///< of `objects`, which they point into; the last one is that of nothing
   float ambient_radiance = 0.0f;
 
   /// The scene's frame is the world's, moved here: the middle of everything. Single-precision

@@ -14,12 +14,6 @@
 namespace toftwin::sim {
 namespace {
 
-/// Rounds to single precision, away from the surface whose normal component is given: moved by one unit
-/// in the last place first, twice what rounding can take back.
-TOFTWIN_INLINE float roundedAway(double value, double normal) {
-  return static_cast<float>(value + std::copysign(std::abs(value) * 0x1p-23, normal));
-}
-
 /// std::max goes through references, which keeps loops from becoming vector code.
 TOFTWIN_INLINE double larger(double a, double b) { return a > b ? a : b; }
 
@@ -34,29 +28,26 @@ TOFTWIN_INLINE double shapeOf(float a, float b, double between, double cosine, d
 }  // namespace
 
 TOFTWIN_VECTOR
-void placeHits(const Packet& packet, Hits& hits) {
+void drawPlaces(const Packet& packet, const PlacedEmitter& emitter, std::uint32_t dimension, Vec3Lanes& places) {
+  const Vec3d at = emitter.position, across = emitter.across, along = emitter.along;
+  if (!emitter.is_disc) {
+    for (std::size_t i = 0; i < kLaneCount; ++i) {
+      places.x[i] = at.x;
+      places.y[i] = at.y;
+      places.z[i] = at.z;
+    }
+    return;
+  }
   for (std::size_t i = 0; i < kLaneCount; ++i) {
-    const double dx = packet.direction.x[i], dy = packet.direction.y[i], dz = packet.direction.z[i];
-    double nx = hits.normal.x[i], ny = hits.normal.y[i], nz = hits.normal.z[i];
-    const double t = hits.distance[i];
-    double px = packet.origin.x[i] + t * dx, py = packet.origin.y[i] + t * dy, pz = packet.origin.z[i] + t * dz;
-    const double above = nx * px + ny * py + nz * pz - hits.level[i];
-    px += hits.onto.x[i] - above * nx;
-    py += hits.onto.y[i] - above * ny;
-    pz += hits.onto.z[i] - above * nz;
-    hits.position.x[i] = px;
-    hits.position.y[i] = py;
-    hits.position.z[i] = pz;
-    const double side = nx * dx + ny * dy + nz * dz > 0.0 ? -1.0 : 1.0;
-    nx *= side;
-    ny *= side;
-    nz *= side;
-    hits.normal.x[i] = nx;
-    hits.normal.y[i] = ny;
-    hits.normal.z[i] = nz;
-    hits.start.x[i] = roundedAway(px + hits.inside.x[i] + hits.offset[i] * nx, nx);
-    hits.start.y[i] = roundedAway(py + hits.inside.y[i] + hits.offset[i] * ny, ny);
-    hits.start.z[i] = roundedAway(pz + hits.inside.z[i] + hits.offset[i] * nz, nz);
+    const RandomPair random = randomPair(packet.key(i), packet.index[i], dimension);
+    // Uniform by area. Seen from one direction each place of the disc has the same share of I(γ), so
+    // the estimate needs no further weight.
+    const CosSin around = cosSinOfTurns(static_cast<double>(random.v));
+    const float r = __builtin_sqrtf(random.u);
+    const auto a = static_cast<double>(r * around.cos), b = static_cast<double>(r * around.sin);
+    places.x[i] = at.x + across.x * a + along.x * b;
+    places.y[i] = at.y + across.y * a + along.y * b;
+    places.z[i] = at.z + across.z * a + along.z * b;
   }
 }
 
@@ -126,25 +117,25 @@ void setShadowRays(const Hits& hits, const Vec3Lanes& places, RTCRay16& rays) {
 }
 
 TOFTWIN_VECTOR
-void bounce(const Hits& hits, std::uint64_t dimension, bool is_even, Packet& packet) {
-  Lanes<double> draw_u, draw_v;
+void bounce(const Hits& hits, std::uint32_t dimension, bool is_even, Packet& packet) {
+  Lanes<float> draw_u, draw_v;
   if (is_even) {
     for (std::size_t i = 0; i < kLaneCount; ++i) {
-      const RandomPair random = randomPair(packet.key[i], packet.index[i], dimension);
+      const RandomPair random = randomPair(packet.key(i), packet.index[i], dimension);
       draw_u[i] = random.u;
       draw_v[i] = random.v;
     }
   } else {
     for (std::size_t i = 0; i < kLaneCount; ++i) {
-      const RandomPair random = independentPair(packet.key[i], packet.index[i], dimension);
+      const RandomPair random = independentPair(packet.key(i), packet.index[i], dimension);
       draw_u[i] = random.u;
       draw_v[i] = random.v;
     }
   }
   for (std::size_t i = 0; i < kLaneCount; ++i) {
-    const CosSin around = cosSinOfTurns(draw_v[i]);
-    const double r = std::sqrt(draw_u[i]);
-    const double x = r * static_cast<double>(around.cos), y = r * static_cast<double>(around.sin);
+    const CosSin around = cosSinOfTurns(static_cast<double>(draw_v[i]));
+    const float r = __builtin_sqrtf(draw_u[i]);
+    const auto x = static_cast<double>(r * around.cos), y = static_cast<double>(r * around.sin);
     // Unit length whatever the sine's error; never quite within the surface.
     const double z = std::sqrt(larger(1e-12, 1.0 - x * x - y * y));
     // Two unit vectors that complete the normal to a basis (Duff et al. 2017)
@@ -164,6 +155,20 @@ void bounce(const Hits& hits, std::uint64_t dimension, bool is_even, Packet& pac
   }
   packet.origin = hits.position;
   packet.start = hits.start;
+}
+
+TOFTWIN_VECTOR
+void playRoulette(std::uint32_t dimension, float threshold, Packet& packet) {
+  int any = 0;
+  for (std::size_t i = 0; i < kLaneCount; ++i) any |= packet.valid[i] & (packet.throughput[i] < threshold ? 1 : 0);
+  if (any == 0) return;
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    const float throughput = packet.throughput[i];
+    const float draw = independentPair(packet.key(i), packet.index[i], dimension).u * threshold;
+    const bool is_weak = throughput < threshold;
+    packet.valid[i] = is_weak & !(draw < throughput) ? 0 : packet.valid[i];
+    packet.throughput[i] = is_weak ? threshold : throughput;
+  }
 }
 
 TOFTWIN_VECTOR

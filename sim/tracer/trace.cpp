@@ -85,46 +85,67 @@ void sumBlock(const Tracing& tracing, const Block& block, BlockSums& sums) {
   sums.clear();
   if (pieces == 1) {
     traceBlock(tracing, block, 0, samples, sums);
-    return;
+  } else {
+    std::vector<BlockSums> parts(static_cast<std::size_t>(pieces), sums);
+    inParallel(pieces, 1, [&](int begin, int end) {
+      const FlushDenormals flush;
+      for (int piece = begin; piece != end; ++piece) {
+        const int first = piece * kSamplesPerPiece;
+        traceBlock(tracing, block, first, std::min(samples, first + kSamplesPerPiece), parts[static_cast<std::size_t>(piece)]);
+      }
+    });
+    for (const BlockSums& part : parts) sums += part;
   }
-  std::vector<BlockSums> parts(static_cast<std::size_t>(pieces), sums);
-  inParallel(pieces, 1, [&](int begin, int end) {
-    const FlushDenormals flush;
-    for (int piece = begin; piece != end; ++piece) {
-      const int first = piece * kSamplesPerPiece;
-      traceBlock(tracing, block, first, std::min(samples, first + kSamplesPerPiece), parts[static_cast<std::size_t>(piece)]);
-    }
-  });
-  for (const BlockSums& part : parts) sums += part;
+  sums.gather(block.shape);
 }
 
-/// Means and variances of one pixel of a block go to (x, y) of the images.
-void store(const BlockSums& sums, std::size_t pixel, int x, int y, Light& light) {
-  const double n = sums.pixels[pixel].samples;
-  light.steady(x, y) = static_cast<float>(sums.pixels[pixel].steady / n);
-  light.ambient(x, y) = static_cast<float>(sums.pixels[pixel].ambient / n);
-  const std::size_t terms = light.phasors.size(), frequencies = light.frequencies.size();
-  for (std::size_t term = 0; term < terms; ++term) {
-    light.phasors[term](x, y) = std::complex<float>{sums.phasors[pixel * terms + term] / n};
+/// Where the pixels of a block go in an image of the region.
+struct Placement {
+  Placement(const Block& block, const Region& region)
+      : shape(block.shape),
+        u(block.x - region.x),
+        v(block.y - region.y),
+        first_column(std::max(0, -u)),
+        last_column(std::min(shape.width, region.width - u)),
+        first_row(std::max(0, -v)),
+        last_row(std::min(shape.height, region.height - v)) {}
+
+  /// Calls `value(lane)` for the first lane of each pixel within the region and stores what it returns.
+  template <class T, class Value>
+  void store(Image<T>& image, const Value& value) const {
+    for (int row = first_row; row < last_row; ++row) {
+      T* to = &image(u + first_column, v + row);
+      for (int column = first_column; column < last_column; ++column) {
+        *to++ = value(static_cast<std::size_t>((row * shape.width + column) * shape.samples));
+      }
+    }
+  }
+
+  BlockShape shape;
+  int u, v;
+  int first_column, last_column, first_row, last_row;
+};
+
+/// Means and variances of the block's pixels go to the images.
+void storeBlock(const Placement& at, const BlockSums& sums, const TruthLanes& truth, Light& light) {
+  const auto mean = [&](const Lanes<double>& sum, std::size_t i) { return static_cast<float>(sum[i] / sums.samples[i]); };
+  at.store(light.steady, [&](std::size_t i) { return mean(sums.steady, i); });
+  at.store(light.ambient, [&](std::size_t i) { return mean(sums.ambient, i); });
+  for (std::size_t term = 0; term < light.phasors.size(); ++term) {
+    const Lanes<double>&re = sums.re[term], &im = sums.im[term];
+    at.store(light.phasors[term], [&](std::size_t i) { return std::complex<float>{mean(re, i), mean(im, i)}; });
   }
   for (std::size_t f = 0; f < light.variance.size(); ++f) {
-    const std::complex<double> sum = sums.phasors[pixel * terms + f * (terms / frequencies)];
-    const double spread = std::max(0.0, sums.squares[pixel * frequencies + f] - std::norm(sum) / n);
-    light.variance[f](x, y) = static_cast<float>(spread / (2.0 * n * (n - 1.0)));
+    const std::size_t term = f * static_cast<std::size_t>(light.harmonics);
+    at.store(light.variance[f], [&](std::size_t i) {
+      const double n = sums.samples[i], re = sums.re[term][i], im = sums.im[term][i];
+      const double spread = std::max(0.0, sums.squares[f][i] - (re * re + im * im) / n);
+      return static_cast<float>(spread / (2.0 * n * (n - 1.0)));
+    });
   }
-}
-
-void storeBlock(const Block& block, const BlockSums& sums, const std::array<TruthPixel, kLaneCount>& truth,
-                const Region& region, Light& light) {
-  for (int p = 0; p < block.shape.pixels(); ++p) {
-    const int u = block.x + p % block.shape.width - region.x, v = block.y + p / block.shape.width - region.y;
-    if (u < 0 || v < 0 || u >= region.width || v >= region.height) continue;
-    const auto pixel = static_cast<std::size_t>(p);
-    store(sums, pixel, u, v, light);
-    light.truth.range_m(u, v) = truth[pixel].range_m;
-    light.truth.albedo(u, v) = truth[pixel].albedo;
-    light.truth.normal(u, v) = truth[pixel].normal;
-  }
+  at.store(light.truth.range_m, [&](std::size_t i) { return truth.range_m[i]; });
+  at.store(light.truth.albedo, [&](std::size_t i) { return truth.albedo[i]; });
+  at.store(light.truth.normal, [&](std::size_t i) { return Vec3f{truth.normal.x[i], truth.normal.y[i], truth.normal.z[i]}; });
 }
 
 }  // namespace
@@ -140,11 +161,14 @@ Light traceLogged(const Scene& scene, const TraceRequest& request, RayLog* log) 
   const int rows = (region.y + region.height - 1) / shape.height - first_row + 1;
   inParallel(columns * rows, 1, [&](int begin, int end) {
     const FlushDenormals flush;
-    BlockSums sums{shape.pixels(), request.frequencies.size(), request.harmonics};
+    BlockSums sums{request};
+    Block block;
+    TruthLanes truth;
     for (int i = begin; i != end; ++i) {
-      const Block block{tracing, shape, (first_column + i % columns) * shape.width, (first_row + i / columns) * shape.height};
+      prepareBlock(tracing, shape, (first_column + i % columns) * shape.width, (first_row + i / columns) * shape.height, block);
       sumBlock(tracing, block, sums);
-      storeBlock(block, sums, traceTruth(tracing, block), region, light);
+      traceTruth(tracing, block, truth);
+      storeBlock({block, region}, sums, truth, light);
     }
   });
   return light;

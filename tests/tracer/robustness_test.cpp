@@ -192,12 +192,12 @@ TEST(Variance, EvenSamplesAreWorthMoreThanIndependentOnes) {
 
 /// A (0,2)-sequence: 2ᵏ samples put exactly one into each of the 2ᵏ boxes of every shape 2⁻ᵃ × 2⁻ᵇ, a + b = k.
 TEST(Sampling, FillsEveryElementaryBoxOnce) {
-  for (std::uint64_t key = 1; key < 20; ++key) {
+  for (std::uint32_t key = 1; key < 20; ++key) {
     for (const int k : {1, 4, 8}) {
       for (int a = 0; a <= k; ++a) {
         std::vector<int> count(std::size_t{1} << k);
         for (std::uint32_t i = 0; i < count.size(); ++i) {
-          const RandomPair at = randomPair(mixBits(key), i, key);
+          const RandomPair at = randomPair(pixelKey(seedKey(1), key, 0), i, key);
           const auto x = static_cast<std::size_t>(std::ldexp(at.u, a)), y = static_cast<std::size_t>(std::ldexp(at.v, k - a));
           ++count[(y << a) + x];
         }
@@ -214,12 +214,13 @@ TEST(Sampling, IsUniformAndUncorrelatedAcrossDimensions) {
   for (const std::uint32_t index : {0u, 5u}) {
     double u = 0.0, v = 0.0, uv = 0.0, between = 0.0;
     for (int pixel = 0; pixel < n; ++pixel) {
-      const std::uint64_t key = pixelKey(3, static_cast<std::uint64_t>(pixel));
+      const PixelKey key = pixelKey(seedKey(3), static_cast<std::uint32_t>(pixel % 512), static_cast<std::uint32_t>(pixel / 512));
       const RandomPair a = randomPair(key, index, 1), b = randomPair(key, index, 2);
-      u += a.u / n;
-      v += a.v / n;
-      uv += (a.u - 0.5) * (a.v - 0.5) / n;
-      between += (a.u - 0.5) * (b.u - 0.5) / n;
+      const auto a_u = static_cast<double>(a.u), a_v = static_cast<double>(a.v), b_u = static_cast<double>(b.u);
+      u += a_u / n;
+      v += a_v / n;
+      uv += (a_u - 0.5) * (a_v - 0.5) / n;
+      between += (a_u - 0.5) * (b_u - 0.5) / n;
     }
     EXPECT_NEAR(u, 0.5, 5.0 / std::sqrt(12.0 * n));
     EXPECT_NEAR(v, 0.5, 5.0 / std::sqrt(12.0 * n));
