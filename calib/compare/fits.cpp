@@ -93,6 +93,27 @@ std::array<double, 3> solve3(Matrix a, Vector b) {
   return {b[0] / a[0][0], b[1] / a[1][1], b[2] / a[2][2]};
 }
 
+double minimum1d(const std::function<double(double)>& f, double low, double high) {
+  constexpr int kCoarse = 24;
+  double best = low, best_value = f(low);
+  const double step = (high - low) / kCoarse;
+  for (int i = 1; i <= kCoarse; ++i) {
+    const double x = low + step * i, value = f(x);
+    if (value < best_value) best = x, best_value = value;
+  }
+  double a = std::max(low, best - step), b = std::min(high, best + step);
+  const double ratio = (std::sqrt(5.0) - 1.0) / 2.0;
+  double x1 = b - ratio * (b - a), x2 = a + ratio * (b - a), f1 = f(x1), f2 = f(x2);
+  while (b - a > 1e-6 * (high - low)) {
+    if (f1 < f2) {
+      b = x2, x2 = x1, f2 = f1, x1 = b - ratio * (b - a), f1 = f(x1);
+    } else {
+      a = x1, x1 = x2, f1 = f2, x2 = a + ratio * (b - a), f2 = f(x2);
+    }
+  }
+  return 0.5 * (a + b);
+}
+
 double NoiseLaw::sigma_mm(double intensity) const {
   return std::sqrt(a_mm * a_mm + b * b / intensity + c * c / (intensity * intensity));
 }

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <functional>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -12,6 +13,10 @@ namespace toftwin::compare {
 
 /// Solves the 3 × 3 system a x = b by elimination with pivoting; zeros if it is singular.
 std::array<double, 3> solve3(std::array<std::array<double, 3>, 3> a, std::array<double, 3> b);
+
+/// Where a function of one variable is smallest between two bounds: a coarse search and then the
+/// golden section, to a millionth of the span.
+double minimum1d(const std::function<double(double)>& f, double low, double high);
 
 /// σ(I) = √(a² + b²/I + c²/I²): a floor, shot noise and read noise over the signal I.
 struct NoiseLaw {

@@ -10,7 +10,7 @@
 namespace toftwin::compare {
 namespace {
 
-constexpr double kAlbedoWall = 0.8, kAlbedoBox = 0.5, kWallHeight_mm = 1200.0;
+constexpr BoxMaterials kAssumed;
 
 std::vector<double> minus(std::vector<double> a, const std::vector<double>& b) {
   for (std::size_t i = 0; i < a.size(); ++i) a[i] -= b[i];
@@ -125,19 +125,21 @@ double PublishedBox::changeAt(double x) const {
   return change_mm[i - 1] + share * (change_mm[i] - change_mm[i - 1]);
 }
 
-Result<sim::Scene> BoxScene::build(bool with_box, bool mirror) const {
-  const double sign = mirror ? -1.0 : 1.0;
+Result<sim::Scene> BoxScene::build(bool with_box, const BoxMaterials& m, bool mirror) const {
+  const double sign = mirror ? -1.0 : 1.0, reach = 0.5 * m.wall_size_mm;
   const auto at = [&](double x) { return (wall.distance_mm - wall.normal_x * x) / wall.normal_z; };
-  std::string text = materialToml("wall", kAlbedoWall) + materialToml("cardboard", kAlbedoBox);
-  text +=
-      wallToml({sign * -1000.0, at(-1000.0), sign * 1000.0, at(1000.0), kWallHeight_mm, "wall"});
+  std::string text = materialToml("wall", m.wall_albedo, m.sigma_deg) +
+                     materialToml("cardboard", m.box_albedo, m.sigma_deg);
+  text += wallToml({sign * -reach, at(-reach), sign * reach, at(reach), m.wall_height_mm, "wall"});
   if (with_box) {
     const double centre = 0.5 * (t_left + t_right) * front_z_mm,
                  depth = depthMm() - 1.0;  // 1 mm free of the wall
     text += fmt::format(
-        "[[object]]\nshape = \"box\"\nsize_m = [{:.9g}, 0.15, {:.9g}]\nposition_m = [{:.9g}, 0.0, "
+        "[[object]]\nshape = \"box\"\nsize_m = [{:.9g}, {:.9g}, {:.9g}]\nposition_m = [{:.9g}, "
+        "{:.9g}, "
         "{:.9g}]\nmaterial = \"cardboard\"\n",
-        1e-3 * widthMm(), 1e-3 * depth, sign * 1e-3 * centre, 1e-3 * (front_z_mm + 0.5 * depth));
+        1e-3 * widthMm(), 1e-3 * m.box_height_mm, 1e-3 * depth, sign * 1e-3 * centre,
+        1e-3 * m.box_below_axis_mm, 1e-3 * (front_z_mm + 0.5 * depth));
   }
   return sim::Scene::parse(text, "box.toml");
 }
@@ -153,7 +155,7 @@ Result<std::vector<double>> simulatedChange(const RealDataJob& job, const BoxSce
                           .seed = 51};
   std::vector<double> range[2];
   for (const bool with_box : {false, true}) {
-    const auto scene = box.build(with_box, mirror);
+    const auto scene = box.build(with_box, {}, mirror);
     if (!scene) return scene.error();
     const auto line = simulateLine(*model, *scene, effort, [&](double share) {
       if (job.progress != nullptr)
@@ -210,11 +212,10 @@ Result<Finding> judgeBox(const RealDataJob& job) {
                              {"wall right, 15–40 mm", 15, 40},
                              {"wall right, 40–100 mm", 40, 100},
                              {"wall right, 100–250 mm", 100, 250}};
-  TableBlock regions{
-      "Change that the box makes, mean per region, mm",
-      {"region", "n", "measured", "simulated, preset", "difference", "emitter on the other side",
-       "published simulator", "measured − published"},
-      {}};
+  TableBlock regions{"Change that the box makes, mean per region, mm",
+                     {"region", "n", "measured", "simulated, preset", "difference",
+                      "emitter on the other side", "published simulator", "measured − published"},
+                     {}};
   Json json = Json::array();
   for (const Part& part : kParts) {
     std::vector<double> m, s, o, p;
@@ -265,24 +266,27 @@ Result<Finding> judgeBox(const RealDataJob& job) {
             flying_simulated = flyingPixels(place, *preset, step);
   finding.section.verdict = fmt::format(
       "Beside the box the wall reads {} mm too far on average (15–250 mm from it); the simulator "
-      "says {} mm. {} of {} mm RMS remain, {} of the mean square explained; the published simulator "
+      "says {} mm. {} of {} mm RMS remain, {} of the mean square explained; the published "
+      "simulator "
       "leaves {} mm ({}). "
       "{} pixels hang between box and wall in the measurement, {} in the simulation.",
       shown(summarise(on_wall).mean), shown(summarise(on_wall_preset).mean),
       shown(sim.residual_rms), shown(none.residual_rms), shownPercent(sim.fraction_raw),
-      shown(by_them.residual_rms), shownPercent(by_them.fraction_raw), flying_measured, flying_simulated);
+      shown(by_them.residual_rms), shownPercent(by_them.fraction_raw), flying_measured,
+      flying_simulated);
   finding.section.tone = toneOf(sim.fraction_raw);
   finding.section.blocks = {
-      Figure{fmt::format("How the box changes the reading along each ray. The box itself (−{} mm) is "
-                         "cut off; the file named reference is the same camera's reading of the "
-                         "wall without the box, so camera constants cancel. The published "
-                         "simulator's curve (with its box − its wall alone) is of a nearly equal "
-                         "geometry, wall at {} mm, box {} mm wide and {} mm deep, its centre {} mm "
-                         "beside the measured one's; it is drawn at its distance beside the box.",
-                         shown(step, 0), shown(published->box.wall.distance_mm, 0),
-                         shown(published->box.widthMm(), 0), shown(published->box.depthMm(), 0),
-                         shown(std::abs(centreMm(published->box) - centreMm(*box)), 0)),
-             plot({-300, 300}, {-8, 24})},
+      Figure{
+          fmt::format("How the box changes the reading along each ray. The box itself (−{} mm) is "
+                      "cut off; the file named reference is the same camera's reading of the "
+                      "wall without the box, so camera constants cancel. The published "
+                      "simulator's curve (with its box − its wall alone) is of a nearly equal "
+                      "geometry, wall at {} mm, box {} mm wide and {} mm deep, its centre {} mm "
+                      "beside the measured one's; it is drawn at its distance beside the box.",
+                      shown(step, 0), shown(published->box.wall.distance_mm, 0),
+                      shown(published->box.widthMm(), 0), shown(published->box.depthMm(), 0),
+                      shown(std::abs(centreMm(published->box) - centreMm(*box)), 0)),
+          plot({-300, 300}, {-8, 24})},
       Figure{"The edges: where pixels see box and wall at once.", plot({-140, 140}, {-165, 40})},
       TableBlock{"What is left of the measured change on the wall, 15–250 mm beside the box",
                  kExplainedHeader,
@@ -300,7 +304,8 @@ Result<Finding> judgeBox(const RealDataJob& job) {
                             "Both are simulated. Monte-Carlo and sensor noise: {} mm (median "
                             "standard error of a line).",
                             shown(box->wall.distance_mm), shown(box->widthMm()), shown(step),
-                            kAlbedoBox, kAlbedoWall, kWallHeight_mm, shown(monte_carlo_mm, 2)),
+                            kAssumed.box_albedo, kAssumed.wall_albedo, kAssumed.wall_height_mm,
+                            shown(monte_carlo_mm, 2)),
                 true}};
   finding.data.set("no_simulation", toJson(none))
       .set("simulated", toJson(sim))

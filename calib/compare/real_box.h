@@ -13,6 +13,14 @@
 
 namespace toftwin::compare {
 
+/// What a scan line does not show of the scene. Defaults: the real box.
+struct BoxMaterials {
+  double wall_albedo = 0.8, box_albedo = 0.5;
+  double sigma_deg = 0.0;  ///< Oren–Nayar roughness of both
+  double wall_size_mm = 2000.0, wall_height_mm = 1200.0;
+  double box_height_mm = 150.0, box_below_axis_mm = 0.0;  ///< its middle below the optical axis
+};
+
 /// A box before a wall as two scan lines show it: one with the box, one of the wall alone.
 struct BoxScene {
   PlanarLine wall;
@@ -27,7 +35,8 @@ struct BoxScene {
   /// Where the ray t meets the wall, or would if the box were not there: x in mm.
   [[nodiscard]] double placeOnWall(double t) const;
   /// The scene in the camera's frame; `mirror` swaps left and right.
-  [[nodiscard]] Result<sim::Scene> build(bool with_box, bool mirror) const;
+  [[nodiscard]] Result<sim::Scene> build(bool with_box, const BoxMaterials& materials = {},
+                                         bool mirror = false) const;
 };
 Result<BoxScene> fitBox(const ScanLine& with_box, const ScanLine& wall_alone);
 
@@ -35,8 +44,8 @@ Result<BoxScene> fitBox(const ScanLine& with_box, const ScanLine& wall_alone);
 /// another line of a box of nearly the same geometry: on the wall by the distance beside the box,
 /// on the box by the share of its width.
 struct PublishedBox {
-  BoxScene box;                    ///< its own geometry
-  std::vector<double> x_mm;        ///< of its rays, moved to the other line's places on the wall
+  BoxScene box;              ///< its own geometry
+  std::vector<double> x_mm;  ///< of its rays, moved to the other line's places on the wall
   std::vector<double> change_mm;
   /// The change at a place on the other line's wall, linear between rays; NaN outside of them.
   [[nodiscard]] double changeAt(double x_mm) const;
