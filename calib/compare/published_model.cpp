@@ -9,7 +9,6 @@
 #include <optional>
 
 #include "sim/images/rows.h"
-#include "sim/tracer/random.h"
 
 namespace toftwin::compare {
 namespace {
@@ -102,12 +101,37 @@ std::optional<Vec3d> meets(const Face& board, Vec3d from, Vec3d direction) {
   return p;
 }
 
+/// SplitMix64's finaliser: 53 random bits of a counter as a number in [0, 1).
+double randomNumber(std::uint64_t counter) {
+  std::uint64_t x = counter * 0x9e3779b97f4a7c15u;
+  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+  return static_cast<double>((x ^ (x >> 31)) >> 11) * 0x1p-53;
+}
+
+/// The two numbers that choose a bounce's direction. The first three bounces take them from a
+/// Kronecker lattice in six dimensions (multiples of powers of 1/g, g⁷ = g + 1) with a random shift
+/// for each ray, the later ones are plain random numbers.
+std::array<double, 2> randomPair(std::uint64_t ray_key, std::uint64_t path, int bounce) {
+  constexpr double kG = 1.1127756842787055;
+  std::array<double, 2> pair{};
+  for (int i = 0; i < 2; ++i) {
+    const int dimension = 2 * bounce + i;
+    const std::uint64_t key = ray_key + static_cast<std::uint64_t>(dimension);
+    const double x =
+        bounce < 3 ? randomNumber(key) + static_cast<double>(path) * std::pow(kG, -(dimension + 1))
+                   : randomNumber(key ^ ((path + 1) << 40));
+    pair[static_cast<std::size_t>(i)] = x - std::floor(x);
+  }
+  return pair;
+}
+
 /// A direction with density cos θ / π about n.
-Vec3d cosineDirection(Vec3d n, sim::RandomPair random) {
-  const double radius = std::sqrt(random.u), azimuth = 2.0 * pi * random.v;
+Vec3d cosineDirection(Vec3d n, std::array<double, 2> random) {
+  const double radius = std::sqrt(random[0]), azimuth = 2.0 * pi * random[1];
   const Vec3d across{n.z, 0.0, -n.x};  // the boards' normals are horizontal
   const double up = radius * std::sin(azimuth);
-  return radius * std::cos(azimuth) * across + Vec3d{0.0, up, 0.0} + std::sqrt(1.0 - random.u) * n;
+  return radius * std::cos(azimuth) * across + Vec3d{0.0, up, 0.0} + std::sqrt(1.0 - random[0]) * n;
 }
 
 /// Phasors of one path, direct light and all light, added up.
@@ -120,17 +144,14 @@ class CornerPath {
   }
 
   /// The light of one path, phases counted from the first surface's range there and back.
-  void trace(std::uint64_t key, std::uint32_t index, std::vector<Phasor>& all) const {
+  void trace(std::uint64_t key, std::uint64_t index, std::vector<Phasor>& all) const {
     const double range = norm(first_);
     Vec3d at = first_, view = (-1.0 / range) * first_;
     std::size_t board = board_;
     double throughput = 1.0, travelled = range;
     for (int surface = 0; surface < what_.max_surfaces; ++surface) {
-      const auto dimension = static_cast<std::uint64_t>(surface);
       const Vec3d n = boards_[board].normal;
-      const Vec3d next =
-          cosineDirection(n, surface < 3 ? sim::randomPair(key, index, dimension)
-                                         : sim::independentPair(key, index, dimension));
+      const Vec3d next = cosineDirection(n, randomPair(key, index, surface));
       addEmitters(at, n, view, throughput, travelled - 2.0 * range, all);
       throughput *= pi * reflectance(what_.material, n, view, next);
       const auto hit = meets(boards_[1 - board], at, next);
@@ -204,10 +225,10 @@ CornerErrors traceCorner(const CornerTrace& what, std::span<const double> t) {
       const std::vector<Phasor> direct = path.direct();
       std::vector<Phasor> sum(direct.size());
       double across = 0.0;  // Σ (component of the first frequency across its direct light)²
-      const std::uint64_t key = sim::pixelKey(what.seed, static_cast<std::uint64_t>(ray));
+      const std::uint64_t key = (what.seed << 24) + (static_cast<std::uint64_t>(ray) << 8);
       for (int n = 0; n < what.paths; ++n) {
         std::vector<Phasor> one(direct.size());
-        path.trace(key, static_cast<std::uint32_t>(n), one);
+        path.trace(key, static_cast<std::uint64_t>(n), one);
         for (std::size_t f = 0; f < sum.size(); ++f) sum[f] += one[f];
         const double c = (one[0] * std::conj(direct[0])).imag() / std::abs(direct[0]);
         across += c * c;
