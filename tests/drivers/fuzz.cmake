@@ -1,0 +1,11 @@
+# SPDX-License-Identifier: Apache-2.0
+# Like tests/protocol/fuzz.cmake, for what cameras and their clients send.
+set(folder ${PROJECT_SOURCE_DIR}/tests/drivers)
+add_executable(fuzz_o3d303 ${folder}/fuzz_o3d303.cpp ${folder}/o3d303_fuzz_one_input.cpp)
+target_link_libraries(fuzz_o3d303 PRIVATE toftwin::o3d303_wire)
+target_link_options(fuzz_o3d303 PRIVATE -fsanitize=fuzzer)
+file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/fuzz_o3d303_corpus)
+add_test(NAME fuzz_o3d303
+         COMMAND fuzz_o3d303 -max_total_time=10 -max_len=4096 -print_final_stats=1
+                 ${CMAKE_BINARY_DIR}/fuzz_o3d303_corpus ${folder}/o3d303_corpus)
+set_tests_properties(fuzz_o3d303 PROPERTIES TIMEOUT 120)
