@@ -22,6 +22,7 @@ using boost::system::error_code;
 
 constexpr std::size_t kInput = 4096;           // holds preamble and header of a usual frame
 constexpr std::size_t kMaxDescriptors = 4;     // that may wait for the message they belong to
+constexpr std::size_t kPart = 256 << 10;        // of a body: received and summed while in the CPU's caches
 constexpr std::size_t kMaxTransfer = 4 << 20;  // bytes per system call; asio's default is 64 KiB
 
 Error disconnected(const error_code& fault) {
@@ -176,8 +177,8 @@ void FramedSocket::takeInlineBody(ReadHandler handler) {
 /// Reads in parts that the CPU's caches hold, so that the checksum finds each where the kernel put
 /// it.
 void FramedSocket::takeRest(Arriving arriving, ReadHandler handler) {
-  constexpr std::size_t kPart = 256 << 10;
   const std::size_t left = arriving.body.size - arriving.filled;
+  wakeWith(std::clamp<std::size_t>(left, 1, kPart));
   if (left == 0) return finish(arriving.body.buffer(), arriving.crc32c, handler);
   std::byte* const part = arriving.body.bytes.get() + arriving.filled;
   const auto room = asio::buffer(part, std::min(left, kPart));
@@ -189,6 +190,16 @@ void FramedSocket::takeRest(Arriving arriving, ReadHandler handler) {
         arriving.filled += count;
         takeRest(std::move(arriving), std::move(handler));
       });
+}
+
+/// Has the kernel wake this thread when so many bytes are there, not at each segment: a sender on the same
+/// machine spends as much time with waking its receivers as with copying. At the stream's end, and when
+/// the receive window is full, it wakes in any case.
+void FramedSocket::wakeWith(std::size_t bytes) {
+  if (bytes == wakes_with_) return;
+  wakes_with_ = bytes;
+  error_code ignored;
+  socket_.set_option(asio::socket_base::receive_low_watermark{static_cast<int>(bytes)}, ignored);
 }
 
 void FramedSocket::finish(Buffer body, std::uint32_t body_crc32c, const ReadHandler& handler) {

@@ -74,6 +74,7 @@ class FramedSocket {
   };
   void takeInlineBody(ReadHandler handler);
   void takeRest(Arriving arriving, ReadHandler handler);
+  void wakeWith(std::size_t bytes);
   void finish(Buffer body, std::uint32_t body_crc32c, const ReadHandler& handler);
 
   void sendDescriptor(WriteHandler handler);
@@ -90,6 +91,7 @@ class FramedSocket {
   std::deque<FileDescriptor> descriptors_;  ///< in the order in which they came
   BufferPool pool_;
   std::uint64_t refused_request_ = 0;
+  std::size_t wakes_with_ = 1;  ///< the socket's low watermark
 
   wire::Encoded output_;
   std::shared_ptr<const SharedBody> output_body_;  // shared with the other subscribers' writes

@@ -346,7 +346,7 @@ double median(std::vector<double> values) {
 /// meets all alike; the shares are medians over the rounds.
 void compareThroughput(int clients, const std::vector<std::byte>& bytes, const std::string& socket,
                        Seconds time) {
-  constexpr int kRounds = 7;
+  constexpr int kRounds = 15;
   std::vector<double> bare, tcp, shared, tcp_share, shared_share;
   for (int round = 0; round < kRounds; ++round) {
     {

@@ -12,6 +12,8 @@
 #include <boost/asio/local/stream_protocol.hpp>
 #include <boost/asio/write.hpp>
 
+#include <array>
+#include <chrono>
 #include <cstring>
 #include <filesystem>
 #include <iterator>
@@ -100,6 +102,49 @@ TEST_P(Connection, ALargeFrameCrosses) {
   const auto received = receive(there);
   ASSERT_TRUE(received) << received.error().message;
   EXPECT_EQ(wire::toBytes(wire::encode(*received)), wire::toBytes(wire::encode(message)));
+}
+
+TEST_P(Connection, ASmallMessageBehindALargeFrameIsNotWaitedForLonger) {
+  auto ends = connect();
+  Socket here = std::move(ends.first);
+  FramedSocket there{std::move(ends.second)};
+  const auto frame = wire::toBytes(wire::encode(wire::FrameMessage{1, wire::exampleFrame(512, 424)}));
+  const auto small = wire::toBytes(wire::encode(wire::Subscribed{2, 3}));
+  // All but the last few bytes, which come when the receiver waits for them, and then the small message.
+  const std::array<std::size_t, 3> parts{frame.size() - 1000, 999, 1};
+  std::optional<Result<wire::Message>> received;
+  there.asyncRead([&](Result<wire::Message> read) { received = std::move(read); });
+  auto at = frame.data();
+  for (const std::size_t part : parts) {
+    ASSERT_FALSE(received);
+    asio::async_write(here, asio::buffer(at, part), [](auto, auto) {});
+    at += part;
+    io_.restart();
+    while (io_.run_one_for(std::chrono::milliseconds{50}) > 0) {
+    }
+  }
+  ASSERT_TRUE(received && *received);
+  received.reset();
+  there.asyncRead([&](Result<wire::Message> read) { received = std::move(read); });
+  io_.restart();
+  while (io_.poll() > 0) io_.restart();  // now it waits
+  asio::write(here, asio::buffer(small));
+  io_.restart();
+  io_.run_for(std::chrono::seconds{10});
+  ASSERT_TRUE(received && *received) << "the socket still waits for as much as of a body";
+  EXPECT_EQ(std::get<wire::Subscribed>(**received).subscription, 3u);
+}
+
+TEST_P(Connection, APeerThatEndsWithinABodyIsDisconnected) {
+  auto ends = connect();
+  Socket here = std::move(ends.first);
+  FramedSocket there{std::move(ends.second)};
+  const auto frame = wire::toBytes(wire::encode(wire::FrameMessage{1, wire::exampleFrame(512, 424)}));
+  asio::async_write(here, asio::buffer(frame.data(), frame.size() - 1000),
+                    [&](auto, auto) { here.close(); });
+  const auto received = receive(there);
+  ASSERT_FALSE(received);
+  EXPECT_EQ(received.error().code, Error::Code::Disconnected);
 }
 
 TEST_P(Connection, AClosedPeerIsDisconnected) {
