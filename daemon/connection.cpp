@@ -26,6 +26,20 @@ Session::Options sessionOptions(const Connection::Options& options, bool is_loca
   return session;
 }
 
+/// An answer that the protocol cannot carry (a driver's name that is too long, an interval that is not a
+/// number) becomes a Failure that says so.
+wire::Encoded encodeOrFailure(const wire::Message& answer) {
+  auto encoded = wire::encode(answer);
+  if (encoded) return *std::move(encoded);
+  const std::uint64_t id = std::visit(
+      [](const auto& m) -> std::uint64_t {
+        if constexpr (requires { m.id; }) return m.id;
+        return 0;
+      },
+      answer);
+  return *wire::encode(wire::Failure{id, {Error::Code::Internal, encoded.error().message}});
+}
+
 /// A peer whose machine or cable went away says nothing. Without this it would hold up a lockstep
 /// source for ever: after about ten seconds of silence the kernel breaks the connection.
 void noticeVanishedPeers(Socket& socket) {
@@ -140,16 +154,20 @@ void Connection::send(const Session::Outgoing& outgoing) {
   is_writing_ = true;
   const auto sent = [self = shared_from_this()](const Result<>& result) { self->sent(result); };
   if (const auto* message = std::get_if<wire::Message>(&outgoing)) {
-    return socket_.asyncWrite(wire::encode(*message), sent);
+    return socket_.asyncWrite(encodeOrFailure(*message), sent);
   }
   const auto& [subscription, delivery, in_shared_memory] = std::get<Session::FrameOut>(outgoing);
   wire::FrameMessage message{subscription, delivery.frame->frame};
   message.frame.dropped_before = delivery.dropped_before;
-  wire::Encoded encoded = wire::encode(message, delivery.frame->body);
-  if (auto shared = in_shared_memory ? delivery.frame->sharedBody() : nullptr) {
-    return socket_.asyncWrite(std::move(encoded), std::move(shared), sent);
+  auto encoded = wire::encode(message, delivery.frame->body);
+  if (!encoded) {  // it could be encoded when it was prepared, so this is a mistake in this program
+    is_writing_ = false;
+    return dismiss(encoded.error());
   }
-  socket_.asyncWrite(std::move(encoded), sent);
+  if (auto shared = in_shared_memory ? delivery.frame->sharedBody() : nullptr) {
+    return socket_.asyncWrite(*std::move(encoded), std::move(shared), sent);
+  }
+  socket_.asyncWrite(*std::move(encoded), sent);
 }
 
 void Connection::sent(const Result<>& result) {

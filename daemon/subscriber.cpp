@@ -13,6 +13,9 @@ Result<PreparedFramePtr> prepare(const Frame& frame, const Selection& selection)
   auto prepared = std::make_shared<PreparedFrame>();
   prepared->frame = *std::move(selected);
   prepared->body = wire::encodeBody(prepared->frame.planes);
+  // Once here, so that a frame that cannot be sent says why to its subscribers and costs no connection.
+  const auto sendable = wire::encode(wire::FrameMessage{0, prepared->frame}, prepared->body);
+  if (!sendable) return Error{Error::Code::Internal, sendable.error().message};
   return PreparedFramePtr{std::move(prepared)};
 }
 

@@ -61,7 +61,7 @@ Result<> Connection::greet() {
     socket_->acceptSharedBodies();
   }
   std::optional<Result<wire::Message>> answer;
-  enqueue(wire::Hello{next_id_++, kSoftware, features});
+  enqueue(*wire::encode(wire::Hello{next_id_++, kSoftware, features}));
   socket_->asyncRead([&](Result<wire::Message> message) { answer = std::move(message); });
   const auto deadline = std::chrono::steady_clock::now() + options_.timeout;
   io_.restart();
@@ -89,12 +89,14 @@ Error Connection::unexpectedAnswer() const {
 }
 
 Result<wire::Message> Connection::exchange(std::uint64_t id, wire::Message request) {
+  auto encoded = wire::encode(request);
+  if (!encoded) return encoded.error();
   const auto answered = std::make_shared<Answered>();
   auto answer = answered->get_future();
-  asio::post(io_, [this, id, answered, request = std::move(request)] {
+  asio::post(io_, [this, id, answered, encoded = *std::move(encoded)]() mutable {
     if (fault_) return answered->set_value(*fault_);
     waiting_.emplace(id, answered);
-    enqueue(request);
+    enqueue(std::move(encoded));
   });
   if (answer.wait_for(options_.timeout) == std::future_status::ready) return answer.get();
   asio::post(io_, [this, id] { waiting_.erase(id); });
@@ -121,21 +123,21 @@ Result<Connection::Subscribed> Connection::subscribe(wire::Subscribe request) {
 void Connection::unsubscribe(std::uint64_t subscription) {
   asio::post(io_, [this, subscription] {
     if (running_.erase(subscription) == 0) return;  // the daemon ended it already
-    if (!fault_) enqueue(wire::Unsubscribe{next_id_++, subscription});
+    if (!fault_) enqueue(*wire::encode(wire::Unsubscribe{next_id_++, subscription}));
   });
 }
 
 void Connection::acknowledge(std::uint64_t subscription, std::uint64_t sequence) {
   asio::post(io_, [this, subscription, sequence] {
-    if (!fault_) enqueue(wire::Acknowledge{subscription, sequence});
+    if (!fault_) enqueue(*wire::encode(wire::Acknowledge{subscription, sequence}));
   });
 }
 
 // ---- the thread
 // ------------------------------------------------------------------------------------
 
-void Connection::enqueue(const wire::Message& message) {
-  output_.push_back(wire::encode(message));
+void Connection::enqueue(wire::Encoded message) {
+  output_.push_back(std::move(message));
   if (!writing_) writeNext();
 }
 
@@ -191,16 +193,20 @@ void Connection::takeFrame(wire::FrameMessage message) {
   if (auto pushed = frames.push(std::move(message.frame)); !pushed) {
     frames.end(pushed.error());
     running_.erase(entry);
-    return enqueue(wire::Unsubscribe{next_id_++, message.subscription});
+    return enqueue(*wire::encode(wire::Unsubscribe{next_id_++, message.subscription}));
   }
-  if (frames.isAcknowledgedOnArrival()) enqueue(wire::Acknowledge{message.subscription, sequence});
+  if (frames.isAcknowledgedOnArrival()) {
+    enqueue(*wire::encode(wire::Acknowledge{message.subscription, sequence}));
+  }
 }
 
 void Connection::takeAnswer(std::uint64_t id, wire::Message answer) {
   const auto entry = waiting_.find(id);
   const auto* subscribed = std::get_if<wire::Subscribed>(&answer);
   if (entry == waiting_.end()) {  // too late: nobody waits for it any more
-    if (subscribed) enqueue(wire::Unsubscribe{next_id_++, subscribed->subscription});
+    if (subscribed) {
+      enqueue(*wire::encode(wire::Unsubscribe{next_id_++, subscribed->subscription}));
+    }
     return;
   }
   if (subscribed) {

@@ -76,7 +76,7 @@ class Connection {
   void send(wire::Message message);
 
   // The rest runs in the thread (in the caller's until it is started).
-  void enqueue(const wire::Message& message);
+  void enqueue(wire::Encoded message);
   void writeNext();
   void readOn();
   void take(wire::Message message);

@@ -85,9 +85,10 @@ Result<Writer> Writer::create(const std::filesystem::path& file, WriterOptions o
 Result<> Writer::write(const Frame& frame) {
   const auto channel = state_->channelFor(frame);
   if (!channel) return channel.error();
-  const wire::Encoded message = wire::encode(wire::FrameMessage{0, frame});
-  std::vector<std::span<const std::byte>> pieces{message.head};
-  for (const Buffer& piece : message.body.pieces) pieces.push_back(piece.bytes());
+  const auto message = wire::encode(wire::FrameMessage{0, frame});
+  if (!message) return message.error();
+  std::vector<std::span<const std::byte>> pieces{message->head};
+  for (const Buffer& piece : message->body.pieces) pieces.push_back(piece.bytes());
   const mcap::Message head{.channel_id = *channel,
                            .sequence = static_cast<std::uint32_t>(frame.sequence),  // its low half
                            .log_time_ns = timestamp(frame.moment.received.ns),

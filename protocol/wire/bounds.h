@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 
-/// How much one message may hold; docs/protocol.md lists them. A decoder refuses more, and an encoder
-/// cuts texts to fit.
+/// How much one message may hold; docs/protocol.md lists them. A decoder refuses more; so does an encoder,
+/// but for texts for people, which it cuts.
 namespace toftwin::wire {
 
 inline constexpr std::size_t kMaxName = 255;   ///< bytes of a name, an id, a file name

@@ -57,15 +57,17 @@ struct Body {
 Body encodeBody(const std::vector<Plane>& planes);
 
 /// A message ready to be written: `head` (preamble and header), then the body's pieces in order.
-/// Texts longer than the protocol allows are cut (bounds.h).
 struct Encoded {
   std::vector<std::byte> head;
   Body body;
   [[nodiscard]] std::uint64_t size() const { return head.size() + body.bytes; }
 };
-Encoded encode(const Message& message);
+/// Error, naming the field: a value that `decode` would refuse (not finite, out of bounds, a plane whose
+/// bytes are not its pixels), or TooLarge. So a peer that allows the body's size can decode whatever was
+/// encoded. Only texts for people (an error's message, a detail) are cut to what the protocol allows.
+Result<Encoded> encode(const Message& message);
 /// A frame whose body was encoded before with `encodeBody(frame.planes)`.
-Encoded encode(const FrameMessage& message, Body body);
+Result<Encoded> encode(const FrameMessage& message, Body body);
 /// Says in the preamble that the body does not follow but lies in a memfd.
 void setBodyPlace(Encoded& message, BodyPlace place);
 /// The message as one run of bytes: for recordings and tests.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cstring>
 #include <new>
+#include <string>
 #include <utility>
 
 #include "protocol/wire/crc32c.h"
@@ -201,22 +202,29 @@ Buffer aligned(Buffer body) {
   return copy.buffer();
 }
 
-Result<Message> readMessage(const fb::Header& header, Buffer body) {
+/// What the header says, with a frame's planes without their data.
+Result<Message> readHeader(Checks& checks, const fb::Header& header, std::uint64_t body_bytes) {
   const auto message_id = static_cast<std::size_t>(header.message_type());
   if (message_id == 0 || header.message() == nullptr) return malformed("it holds no message");
   if (message_id > kReaders.size()) {
     return Error{Error::Code::Unsupported,
                  "message id " + std::to_string(message_id) + " is not known to this side"};
   }
-  Checks checks;
-  if (header.message_type() == fb::Body::Frame) {
-    Message message = readFrame(checks, *header.message_as_Frame(), aligned(std::move(body)));
-    if (checks.failed()) return checks.error();
-    return message;
-  }
-  if (body.size() != 0) return malformed("a body follows a message that has none");
-  Message message = kReaders[message_id - 1](checks, header);
+  const bool is_frame = header.message_type() == fb::Body::Frame;
+  if (!is_frame && body_bytes != 0) return malformed("a body follows a message that has none");
+  Message message = is_frame ? readFrame(checks, *header.message_as_Frame(), body_bytes)
+                             : kReaders[message_id - 1](checks, header);
   if (checks.failed()) return checks.error();
+  return message;
+}
+
+Result<Message> readMessage(const fb::Header& header, Buffer body) {
+  Checks checks;
+  auto message = readHeader(checks, header, body.size());
+  if (!message) return message;
+  if (auto* frame = std::get_if<FrameMessage>(&*message)) {
+    attachPlanes(*frame, *header.message_as_Frame(), aligned(std::move(body)));
+  }
   return message;
 }
 
@@ -253,6 +261,16 @@ Result<Message> decode(Buffer bytes, const Limits& limits) {
   }
   return decode(*preamble, bytes.bytes().subspan(kPreambleSize, preamble->header_bytes),
                 bytes.part(kPreambleSize + preamble->header_bytes, preamble->body_bytes));
+}
+
+std::string faultIn(std::span<const std::byte> header, std::uint64_t body_bytes) {
+  const AlignedHeader aligned_header{header};
+  const fb::Header* root = aligned_header.verified();
+  if (!root) return "the header is not what the schema says";
+  Checks checks;
+  const auto message = readHeader(checks, *root, body_bytes);
+  if (message) return {};
+  return checks.failed() ? checks.fault() : message.error().message;
 }
 
 std::uint64_t requestIdOf(std::span<const std::byte> header) {

@@ -46,7 +46,7 @@ Provenance readProvenance(Checks& checks, const fb::Provenance* table) {
 }
 
 /// A plane that lies in the body behind `end`, where the last one ended; moves `end` on.
-Plane readPlane(Checks& checks, const fb::Plane& table, const Buffer& body, std::uint64_t& end) {
+Plane readPlane(Checks& checks, const fb::Plane& table, std::uint64_t body_bytes, std::uint64_t& end) {
   Plane plane;
   plane.kind = checks.oneOf(table.kind(), PlaneKind::TruthNormal, "plane.kind");
   plane.type = checks.oneOf(table.type(), ElementType::F32, "plane.type");
@@ -64,14 +64,13 @@ Plane readPlane(Checks& checks, const fb::Plane& table, const Buffer& body, std:
   checks.require(table.bytes() == bytes, "plane.bytes", "is not type × width × height × channels");
   checks.require(offset % kAlignment == 0, "plane.offset", "is not a multiple of 64");
   checks.require(offset >= end, "plane.offset", "lies before the end of the plane before it");
-  checks.require(bytes <= body.size() && offset <= body.size() - bytes, "plane.offset",
+  checks.require(bytes <= body_bytes && offset <= body_bytes - bytes, "plane.offset",
                  "puts the plane beyond the body's end");
   if (checks.failed()) return plane;
   end = offset + bytes;
   plane.width = static_cast<int>(table.width());
   plane.height = static_cast<int>(table.height());
   plane.channels = static_cast<int>(table.channels());
-  plane.data = body.part(offset, bytes);
   return plane;
 }
 
@@ -110,7 +109,7 @@ Transform<World, Camera> readPose(Checks& checks, const fb::Pose& pose) {
   return world_from_camera;
 }
 
-FrameMessage readFrame(Checks& checks, const fb::Frame& table, const Buffer& body) {
+FrameMessage readFrame(Checks& checks, const fb::Frame& table, std::uint64_t body_bytes) {
   FrameMessage message;
   message.subscription = table.subscription();
   Frame& frame = message.frame;
@@ -123,10 +122,18 @@ FrameMessage readFrame(Checks& checks, const fb::Frame& table, const Buffer& bod
   frame.camera = readCamera(checks, table.camera());
   std::uint64_t end = 0;
   for (const auto* plane : checks.items(table.planes(), kMaxPlanes, "frame.planes")) {
-    frame.planes.push_back(readPlane(checks, *plane, body, end));
+    frame.planes.push_back(readPlane(checks, *plane, body_bytes, end));
   }
-  checks.require(body.size() == paddedToAlignment(end), "body", "goes on behind the last plane");
+  checks.require(body_bytes == paddedToAlignment(end), "body", "goes on behind the last plane");
   return message;
+}
+
+void attachPlanes(FrameMessage& message, const fb::Frame& table, const Buffer& body) {
+  std::vector<Plane>& planes = message.frame.planes;
+  for (std::size_t i = 0; i < planes.size(); ++i) {
+    const fb::Plane& entry = *table.planes()->Get(static_cast<flatbuffers::uoffset_t>(i));
+    planes[i].data = body.part(entry.offset(), entry.bytes());
+  }
 }
 
 }  // namespace toftwin::wire

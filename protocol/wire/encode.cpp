@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <cmath>
 #include <cstring>
+#include <limits>
+#include <string>
 #include <utility>
 
 #include "protocol/wire/codec.h"
 #include "protocol/wire/crc32c.h"
+#include "protocol/wire/header_checks.h"
 #include "protocol/wire/header_writer.h"
 
 namespace toftwin::wire {
@@ -14,23 +16,25 @@ namespace {
 alignas(kAlignment) constexpr std::array<std::byte, kAlignment> kZeros{};
 
 Offset<fb::Error> writeError(Builder& builder, const Error& error) {
-  const auto message = writeText(builder, error.message, kMaxText);
+  const auto message = writeText(builder, error.message);
   return fb::CreateError(builder, static_cast<std::uint8_t>(error.code), message);
 }
 
 Offset<fb::SourceSummary> writeSummary(Builder& builder, const SourceSummary& summary) {
-  const auto name = writeText(builder, summary.name, kMaxName);
-  const auto model = writeText(builder, summary.model, kMaxName);
-  const auto serial = writeText(builder, summary.serial, kMaxName);
-  const auto problem = writeText(builder, summary.problem, kMaxText);
+  const auto name = writeName(builder, summary.name);
+  const auto model = writeName(builder, summary.model);
+  const auto serial = writeName(builder, summary.serial);
+  const auto problem = writeText(builder, summary.problem);
   return fb::CreateSourceSummary(builder, name, model, serial,
                                  static_cast<std::uint8_t>(summary.kind), summary.streaming,
                                  problem);
 }
 
-/// An end of the bounds, absent where there is none.
-flatbuffers::Optional<double> endOf(double bound) {
-  if (!std::isfinite(bound)) return flatbuffers::nullopt;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// An end of the bounds, absent where it is `none`.
+flatbuffers::Optional<double> endOf(double bound, double none) {
+  if (bound == none) return flatbuffers::nullopt;
   return bound;
 }
 
@@ -38,13 +42,13 @@ Offset<flatbuffers::Vector<Offset<fb::Parameter>>> writeParameters(
     Builder& builder, const std::vector<Parameter>& parameters) {
   if (parameters.empty()) return {};
   std::vector<Offset<fb::Parameter>> tables;
-  for (std::size_t i = 0; i < std::min(parameters.size(), kMaxNames); ++i) {
+  for (std::size_t i = 0; i < countOf(parameters, kMaxNames); ++i) {
     const Parameter& parameter = parameters[i];
-    const auto name = writeText(builder, parameter.name, kMaxName);
+    const auto name = writeName(builder, parameter.name);
     flatbuffers::Optional<double> value = flatbuffers::nullopt;
-    if (parameter.value && std::isfinite(*parameter.value)) value = *parameter.value;
-    tables.push_back(fb::CreateParameter(builder, name, value, endOf(parameter.bounds.min),
-                                         endOf(parameter.bounds.max)));
+    if (parameter.value) value = *parameter.value;
+    tables.push_back(fb::CreateParameter(builder, name, value, endOf(parameter.bounds.min, -kInfinity),
+                                         endOf(parameter.bounds.max, kInfinity)));
   }
   return builder.CreateVector(tables);
 }
@@ -52,30 +56,32 @@ Offset<flatbuffers::Vector<Offset<fb::Parameter>>> writeParameters(
 Offset<flatbuffers::Vector<std::uint8_t>> writeKinds(Builder& builder,
                                                      const std::vector<PlaneKind>& kinds) {
   std::vector<std::uint8_t> bytes;
-  for (const PlaneKind kind : kinds) bytes.push_back(static_cast<std::uint8_t>(kind));
+  for (std::size_t i = 0; i < countOf(kinds, kMaxPlanes); ++i) {
+    bytes.push_back(static_cast<std::uint8_t>(kinds[i]));
+  }
   return builder.CreateVector(bytes);
 }
 
 // One `write` for each message; the table's name in the schema is the message's.
 
 auto write(Builder& b, const Hello& m) {
-  const auto software = writeText(b, m.software, kMaxName);
+  const auto software = writeName(b, m.software);
   return fb::CreateHello(b, software, writeNames(b, m.features));
 }
 auto write(Builder& b, const ListSources&) { return fb::CreateListSources(b); }
 auto write(Builder& b, const SourceList& m) {
   std::vector<Offset<fb::SourceSummary>> sources;
-  for (std::size_t i = 0; i < std::min(m.sources.size(), kMaxSources); ++i) {
+  for (std::size_t i = 0; i < countOf(m.sources, kMaxSources); ++i) {
     sources.push_back(writeSummary(b, m.sources[i]));
   }
   return fb::CreateSourceList(b, b.CreateVector(sources));
 }
 auto write(Builder& b, const DescribeSource& m) {
-  return fb::CreateDescribeSource(b, writeText(b, m.source, kMaxName));
+  return fb::CreateDescribeSource(b, writeName(b, m.source));
 }
 auto write(Builder& b, const SourceDescription& m) {
   const auto summary = writeSummary(b, m.summary);
-  const auto driver = writeText(b, m.driver, kMaxName);
+  const auto driver = writeName(b, m.driver);
   const auto camera = writeCamera(b, m.camera);
   const auto planes = writeKinds(b, m.planes);
   const auto parameters = writeParameters(b, m.parameters);
@@ -97,7 +103,7 @@ auto write(Builder& b, const SourceDescription& m) {
   return table.Finish();
 }
 auto write(Builder& b, const Subscribe& m) {
-  const auto source = writeText(b, m.source, kMaxName);
+  const auto source = writeName(b, m.source);
   const auto planes = writeKinds(b, m.planes);
   const fb::Region region{m.region.x, m.region.y, m.region.width, m.region.height};
   return fb::CreateSubscribe(b, source, planes, &region, m.decimation, m.max_rate_hz,
@@ -113,32 +119,32 @@ auto write(Builder& b, const SubscriptionEnded& m) {
   return fb::CreateSubscriptionEnded(b, m.subscription, writeError(b, m.reason));
 }
 auto write(Builder& b, const SetPose& m) {
-  const auto source = writeText(b, m.source, kMaxName);
+  const auto source = writeName(b, m.source);
   const fb::Pose pose = toPose(m.world_from_camera);
   return fb::CreateSetPose(b, source, &pose);
 }
 auto write(Builder& b, const SetParameter& m) {
-  const auto source = writeText(b, m.source, kMaxName);
-  const auto name = writeText(b, m.name, kMaxName);
+  const auto source = writeName(b, m.source);
+  const auto name = writeName(b, m.name);
   return fb::CreateSetParameter(b, source, name, m.value);
 }
 auto write(Builder& b, const Trigger& m) {
-  return fb::CreateTrigger(b, writeText(b, m.source, kMaxName));
+  return fb::CreateTrigger(b, writeName(b, m.source));
 }
 auto write(Builder& b, const Record& m) {
-  const auto source = writeText(b, m.source, kMaxName);
-  return fb::CreateRecord(b, source, writeText(b, m.file, kMaxName));
+  const auto source = writeName(b, m.source);
+  return fb::CreateRecord(b, source, writeName(b, m.file));
 }
 auto write(Builder& b, const Done& m) {
-  return fb::CreateDone(b, writeText(b, m.detail, kMaxText));
+  return fb::CreateDone(b, writeText(b, m.detail));
 }
 auto write(Builder& b, const AskHealth&) { return fb::CreateAskHealth(b); }
 auto write(Builder& b, const Health& m) {
   std::vector<Offset<fb::SourceHealth>> sources;
-  for (std::size_t i = 0; i < std::min(m.sources.size(), kMaxSources); ++i) {
+  for (std::size_t i = 0; i < countOf(m.sources, kMaxSources); ++i) {
     const SourceHealth& s = m.sources[i];
-    const auto name = writeText(b, s.name, kMaxName);
-    const auto last_error = writeText(b, s.last_error, kMaxText);
+    const auto name = writeName(b, s.name);
+    const auto last_error = writeText(b, s.last_error);
     sources.push_back(fb::CreateSourceHealth(b, name, s.streaming, s.frames, s.dropped_by_device,
                                              s.subscribers, s.reconnects, last_error));
   }
@@ -152,21 +158,32 @@ std::uint64_t idOf(const M& message) {
   return 0;
 }
 
+Error tooLarge(std::size_t header_bytes) {
+  return {Error::Code::TooLarge, "this message cannot be sent: its header has " +
+                                     std::to_string(header_bytes) + " bytes, the limit is " +
+                                     std::to_string(Limits{}.header_bytes)};
+}
+
 /// The preamble and the header of a message with the given id (position in the union).
 template <class M>
-Encoded encodeAs(std::uint8_t message_id, const M& message, Body body) {
+Result<Encoded> encodeAs(std::uint8_t message_id, const M& message, Body body) {
   Builder builder{1024};
   const auto table = write(builder, message);
   FinishHeaderBuffer(builder, fb::CreateHeader(builder, idOf(message),
                                                static_cast<fb::Body>(message_id), table.Union()));
   const std::size_t header_bytes = paddedToAlignment(builder.GetSize());
+  if (header_bytes > Limits{}.header_bytes) return tooLarge(header_bytes);
   Encoded encoded{std::vector<std::byte>(kPreambleSize + header_bytes), std::move(body)};
   std::memcpy(encoded.head.data() + kPreambleSize, builder.GetBufferPointer(), builder.GetSize());
+  const auto header = std::span{encoded.head}.subspan(kPreambleSize);
+  if (const std::string fault = faultIn(header, encoded.body.bytes); !fault.empty()) {
+    return Error{Error::Code::InvalidArgument, "this message cannot be sent: " + fault};
+  }
 
   Preamble preamble;
   preamble.header_bytes = static_cast<std::uint32_t>(header_bytes);
   preamble.body_bytes = encoded.body.bytes;
-  preamble.header_crc32c = crc32c(std::span{encoded.head}.subspan(kPreambleSize));
+  preamble.header_crc32c = crc32c(header);
   preamble.body_crc32c = encoded.body.crc32c;
   std::ranges::copy(encodePreamble(preamble), encoded.head.begin());
   return encoded;
@@ -199,7 +216,7 @@ Body encodeBody(const std::vector<Plane>& planes) {
   return body;
 }
 
-Encoded encode(const Message& message) {
+Result<Encoded> encode(const Message& message) {
   return std::visit(
       [](const auto& m) {
         using M = std::decay_t<decltype(m)>;
@@ -210,7 +227,7 @@ Encoded encode(const Message& message) {
       message);
 }
 
-Encoded encode(const FrameMessage& message, Body body) {
+Result<Encoded> encode(const FrameMessage& message, Body body) {
   return encodeAs(messageIdOf<FrameMessage>(), message, std::move(body));
 }
 

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
-
 #include "protocol/wire/header_writer.h"
 
 namespace toftwin::wire {
@@ -8,13 +6,15 @@ namespace {
 
 Offset<fb::Moment> writeMoment(Builder& builder, const Moment& moment) {
   std::vector<Offset<fb::Exposure>> exposures;
-  for (const Exposure& exposure : moment.exposures) {
+  for (std::size_t i = 0; i < countOf(moment.exposures, kMaxExposures); ++i) {
+    const Exposure& exposure = moment.exposures[i];
     exposures.push_back(fb::CreateExposure(builder, exposure.start.ns, exposure.duration.in(second),
                                            exposure.modulation.in(hertz)));
   }
   std::vector<Offset<fb::Temperature>> temperatures;
-  for (const NamedTemperature& temperature : moment.temperatures) {
-    const auto where = writeText(builder, temperature.where, kMaxName);
+  for (std::size_t i = 0; i < countOf(moment.temperatures, kMaxTemperatures); ++i) {
+    const NamedTemperature& temperature = moment.temperatures[i];
+    const auto where = writeName(builder, temperature.where);
     temperatures.push_back(fb::CreateTemperature(builder, where, temperature.value.in(celsius)));
   }
   const auto exposure_list = builder.CreateVector(exposures);
@@ -37,9 +37,9 @@ Offset<fb::Moment> writeMoment(Builder& builder, const Moment& moment) {
 }
 
 Offset<fb::Provenance> writeProvenance(Builder& builder, const Provenance& provenance) {
-  const auto calibration_id = writeText(builder, provenance.calibration_id, kMaxName);
-  const auto scene_id = writeText(builder, provenance.scene_id, kMaxName);
-  const auto model_id = writeText(builder, provenance.model_id, kMaxName);
+  const auto calibration_id = writeName(builder, provenance.calibration_id);
+  const auto scene_id = writeName(builder, provenance.scene_id);
+  const auto model_id = writeName(builder, provenance.model_id);
   const auto effects = writeNames(builder, provenance.effects);
   return fb::CreateProvenance(builder, static_cast<std::uint8_t>(provenance.kind), calibration_id,
                               scene_id, model_id, provenance.seed, effects);
@@ -50,7 +50,8 @@ Offset<flatbuffers::Vector<Offset<fb::Plane>>> writePlanes(Builder& builder,
                                                            const std::vector<Plane>& planes) {
   std::vector<Offset<fb::Plane>> tables;
   std::uint64_t offset = 0;
-  for (const Plane& plane : planes) {
+  for (std::size_t i = 0; i < countOf(planes, kMaxPlanes); ++i) {
+    const Plane& plane = planes[i];
     tables.push_back(fb::CreatePlane(
         builder, static_cast<std::uint8_t>(plane.kind), static_cast<std::uint8_t>(plane.type),
         static_cast<std::uint32_t>(plane.width), static_cast<std::uint32_t>(plane.height),
@@ -62,10 +63,15 @@ Offset<flatbuffers::Vector<Offset<fb::Plane>>> writePlanes(Builder& builder,
 
 }  // namespace
 
-Offset<flatbuffers::String> writeText(Builder& builder, std::string_view text, std::size_t limit) {
+Offset<flatbuffers::String> writeName(Builder& builder, std::string_view name) {
+  if (name.empty()) return {};
+  return builder.CreateString(name.data(), countOf(name, kMaxName));
+}
+
+Offset<flatbuffers::String> writeText(Builder& builder, std::string_view text) {
   if (text.empty()) return {};
-  if (text.size() > limit) {
-    std::size_t end = limit;
+  if (text.size() > kMaxText) {
+    std::size_t end = kMaxText;
     while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0u) == 0x80u) --end;
     text = text.substr(0, end);
   }
@@ -75,15 +81,15 @@ Offset<flatbuffers::String> writeText(Builder& builder, std::string_view text, s
 Offset<Texts> writeNames(Builder& builder, const std::vector<std::string>& names) {
   if (names.empty()) return {};
   std::vector<Offset<flatbuffers::String>> texts;
-  for (std::size_t i = 0; i < std::min(names.size(), kMaxNames); ++i) {
-    const auto text = writeText(builder, names[i], kMaxName);
+  for (std::size_t i = 0; i < countOf(names, kMaxNames); ++i) {
+    const auto text = writeName(builder, names[i]);
     texts.push_back(text.IsNull() ? builder.CreateString("") : text);  // a list has no absent items
   }
   return builder.CreateVector(texts);
 }
 
 Offset<fb::Camera> writeCamera(Builder& builder, const CameraInfo& camera) {
-  const auto calibration_id = writeText(builder, camera.calibration_id, kMaxName);
+  const auto calibration_id = writeName(builder, camera.calibration_id);
   const auto& [k1, k2, p1, p2, k3] = camera.distortion;
   const fb::Intrinsics intrinsics{camera.fx, camera.fy, camera.cx, camera.cy, k1, k2, p1, p2, k3};
   return fb::CreateCamera(builder, static_cast<std::uint32_t>(camera.width),
@@ -98,7 +104,7 @@ fb::Pose toPose(const Transform<World, Camera>& world_from_camera) {
 
 Offset<fb::Frame> writeFrame(Builder& builder, const FrameMessage& message) {
   const Frame& frame = message.frame;
-  const auto source = writeText(builder, frame.source, kMaxName);
+  const auto source = writeName(builder, frame.source);
   const auto moment = writeMoment(builder, frame.moment);
   const auto provenance = writeProvenance(builder, frame.provenance);
   const auto camera = writeCamera(builder, frame.camera);

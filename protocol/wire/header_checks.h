@@ -2,7 +2,9 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -15,7 +17,8 @@
 #include "protocol/wire/codec.h"
 #include "protocol/wire/messages.h"
 
-/// What decode.cpp and decode_frame.cpp share: parts of a verified header → checked values.
+/// What the decoder's files share: parts of a verified header → checked values. The encoder asks them too,
+/// so that neither can know a rule that the other does not.
 namespace toftwin::wire {
 
 /// Takes values out of a verified header and remembers the first that breaks a rule. Readers go on
@@ -27,6 +30,8 @@ class Checks {
   [[nodiscard]] Error error() const {
     return {Error::Code::Malformed, "malformed message: " + fault_};
   }
+  /// The first rule that was broken: the field, then what is wrong with it.
+  [[nodiscard]] const std::string& fault() const { return fault_; }
 
   void require(bool holds, std::string_view field, std::string_view rule) {
     if (!holds && fault_.empty()) fault_ = std::string{field} + " " + std::string{rule};
@@ -78,7 +83,12 @@ class Checks {
 
 CameraInfo readCamera(Checks& checks, const fb::Camera* camera);
 Transform<World, Camera> readPose(Checks& checks, const fb::Pose& pose);
-/// The planes refer to `body`.
-FrameMessage readFrame(Checks& checks, const fb::Frame& table, const Buffer& body);
+/// A frame before a body of `body_bytes`, its planes without their data.
+FrameMessage readFrame(Checks& checks, const fb::Frame& table, std::uint64_t body_bytes);
+/// Gives the planes of a frame that was read without a fault their data in `body`.
+void attachPlanes(FrameMessage& message, const fb::Frame& table, const Buffer& body);
+
+/// What `decode` would find wrong with a header before a body of `body_bytes`; empty if nothing.
+std::string faultIn(std::span<const std::byte> header, std::uint64_t body_bytes);
 
 }  // namespace toftwin::wire

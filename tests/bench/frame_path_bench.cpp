@@ -380,7 +380,7 @@ void compareThroughput(int clients, const std::vector<std::byte>& bytes, const s
 }
 
 void run(Seconds time) {
-  const auto bytes = wire::toBytes(wire::encode(wire::FrameMessage{1, constantFrame()}));
+  const auto bytes = wire::toBytes(*wire::encode(wire::FrameMessage{1, constantFrame()}));
   const double mb = static_cast<double>(bytes.size()) * 1e-6;
   const std::string socket =
       (std::filesystem::temp_directory_path() / ("frame_path_bench-" + std::to_string(::getpid())))

@@ -79,7 +79,7 @@ int connectUnix(const transport::FileDescriptor& fd, const std::string& path) {
 }
 /// Whether the daemon answers a Hello.
 bool isServed(const transport::FileDescriptor& fd) {
-  const auto hello = wire::toBytes(wire::encode(wire::Hello{1, "test", {}}));
+  const auto hello = wire::toBytes(*wire::encode(wire::Hello{1, "test", {}}));
   timeval patience{.tv_sec = kSoon.count(), .tv_usec = 0};
   ::setsockopt(fd.get(), SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
   char byte = 0;

@@ -134,7 +134,7 @@ class RawClient {
     path.copy(address.sun_path, sizeof address.sun_path - 1);
     EXPECT_EQ(::connect(fd_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
   }
-  void send(const wire::Message& message) { sendBytes(wire::toBytes(wire::encode(message))); }
+  void send(const wire::Message& message) { sendBytes(wire::toBytes(*wire::encode(message))); }
   void sendBytes(const std::vector<std::byte>& bytes) {
     EXPECT_EQ(::send(fd_.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL),
               static_cast<ssize_t>(bytes.size()));

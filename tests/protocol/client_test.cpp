@@ -109,8 +109,8 @@ TEST_P(ClientOn, AFrameArrivesAsItWasSent) {
   ASSERT_TRUE(subscription) << subscription.error().message;
   auto frame = subscription->next(kSoon);
   ASSERT_TRUE(frame) << frame.error().message;
-  EXPECT_EQ(wire::toBytes(wire::encode(wire::FrameMessage{7, *frame})),
-            wire::toBytes(wire::encode(sent)));
+  EXPECT_EQ(wire::toBytes(*wire::encode(wire::FrameMessage{7, *frame})),
+            wire::toBytes(*wire::encode(sent)));
 }
 
 TEST_P(ClientOn, SubscribeSaysAllThatTheOptionsSay) {

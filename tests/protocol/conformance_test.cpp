@@ -52,7 +52,7 @@ TEST(Conformance, ThePairsAreTheOnesThatTheEncoderMakes) {
   std::set<std::string> expected;
   for (const auto& [name, message] : exampleMessages()) {
     expected.insert(name);
-    EXPECT_EQ(toBytes(encode(message)), readBytes(kFolder / (name + ".bin"))) << name;
+    EXPECT_EQ(toBytes(*encode(message)), readBytes(kFolder / (name + ".bin"))) << name;
     EXPECT_EQ(toJson(message), readText(kFolder / (name + ".json"))) << name;
   }
   for (const BadMessage& bad : badMessages()) {
@@ -76,7 +76,7 @@ TEST(Refusal, EveryRuleHasItsError) {
 }
 
 TEST(Refusal, EveryPrefixOfAMessageIsRefused) {
-  const auto bytes = toBytes(encode(FrameMessage{1, exampleFrame(5, 3)}));
+  const auto bytes = toBytes(*encode(FrameMessage{1, exampleFrame(5, 3)}));
   for (std::size_t length = 0; length < bytes.size(); ++length) {
     const auto message = decode(Buffer::adopt(
         std::vector(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(length))));
@@ -86,7 +86,7 @@ TEST(Refusal, EveryPrefixOfAMessageIsRefused) {
 
 // CRC-32C finds every error of up to 32 neighbouring bits, so every changed byte.
 TEST(Refusal, EveryChangedByteIsFound) {
-  const auto bytes = toBytes(encode(FrameMessage{1, exampleFrame(5, 3)}));
+  const auto bytes = toBytes(*encode(FrameMessage{1, exampleFrame(5, 3)}));
   for (std::size_t at = 0; at < bytes.size(); ++at) {
     auto changed = bytes;
     changed[at] ^= std::byte{0x10};

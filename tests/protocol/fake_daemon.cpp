@@ -46,13 +46,13 @@ void FakeDaemon::Session::read() {
   });
 }
 
-void FakeDaemon::Session::send(const wire::Message& message) { write({wire::encode(message), {}}); }
+void FakeDaemon::Session::send(const wire::Message& message) { write({*wire::encode(message), {}}); }
 
 void FakeDaemon::Session::sendShared(const wire::FrameMessage& message) {
   wire::Body body = wire::encodeBody(message.frame.planes);
   auto shared = transport::SharedBody::create(body);
   if (!shared) throw std::runtime_error{shared.error().message};
-  write({wire::encode(message, std::move(body)), std::move(*shared)});
+  write({*wire::encode(message, std::move(body)), std::move(*shared)});
 }
 
 void FakeDaemon::Session::sendBytes(std::vector<std::byte> bytes) {

@@ -63,7 +63,7 @@ TEST_P(Connection, EveryMessageArrivesInOrder) {
   std::size_t next = 0;
   std::function<void(Result<>)> send_next = [&](Result<> result) {
     ASSERT_TRUE(result);
-    if (next < examples.size()) here.asyncWrite(wire::encode(examples[next++].message), send_next);
+    if (next < examples.size()) here.asyncWrite(*wire::encode(examples[next++].message), send_next);
   };
   send_next({});
   for (const auto& [name, message] : examples) {
@@ -79,7 +79,7 @@ TEST_P(Connection, AMessageMayArriveByteByByte) {
   FramedSocket there{std::move(ends.second)};
   if (GetParam()) there.acceptSharedBodies();  // the other way of receiving
   const wire::Message message = wire::FrameMessage{1, wire::exampleFrame(5, 3)};
-  const auto bytes = wire::toBytes(wire::encode(message));
+  const auto bytes = wire::toBytes(*wire::encode(message));
   std::optional<Result<wire::Message>> received;
   there.asyncRead([&](Result<wire::Message> read) { received = std::move(read); });
   for (const std::byte& byte : bytes) {
@@ -98,18 +98,18 @@ TEST_P(Connection, ALargeFrameCrosses) {
   auto ends = connect();
   FramedSocket here{std::move(ends.first)}, there{std::move(ends.second)};
   const wire::Message message = wire::FrameMessage{1, wire::exampleFrame(512, 424)};
-  here.asyncWrite(wire::encode(message), ignore);
+  here.asyncWrite(*wire::encode(message), ignore);
   const auto received = receive(there);
   ASSERT_TRUE(received) << received.error().message;
-  EXPECT_EQ(wire::toBytes(wire::encode(*received)), wire::toBytes(wire::encode(message)));
+  EXPECT_EQ(wire::toBytes(*wire::encode(*received)), wire::toBytes(*wire::encode(message)));
 }
 
 TEST_P(Connection, ASmallMessageBehindALargeFrameIsNotWaitedForLonger) {
   auto ends = connect();
   Socket here = std::move(ends.first);
   FramedSocket there{std::move(ends.second)};
-  const auto frame = wire::toBytes(wire::encode(wire::FrameMessage{1, wire::exampleFrame(512, 424)}));
-  const auto small = wire::toBytes(wire::encode(wire::Subscribed{2, 3}));
+  const auto frame = wire::toBytes(*wire::encode(wire::FrameMessage{1, wire::exampleFrame(512, 424)}));
+  const auto small = wire::toBytes(*wire::encode(wire::Subscribed{2, 3}));
   // All but the last few bytes, which come when the receiver waits for them, and then the small message.
   const std::array<std::size_t, 3> parts{frame.size() - 1000, 999, 1};
   std::optional<Result<wire::Message>> received;
@@ -139,7 +139,7 @@ TEST_P(Connection, APeerThatEndsWithinABodyIsDisconnected) {
   auto ends = connect();
   Socket here = std::move(ends.first);
   FramedSocket there{std::move(ends.second)};
-  const auto frame = wire::toBytes(wire::encode(wire::FrameMessage{1, wire::exampleFrame(512, 424)}));
+  const auto frame = wire::toBytes(*wire::encode(wire::FrameMessage{1, wire::exampleFrame(512, 424)}));
   asio::async_write(here, asio::buffer(frame.data(), frame.size() - 1000),
                     [&](auto, auto) { here.close(); });
   const auto received = receive(there);
@@ -186,10 +186,10 @@ TEST_P(SharedMemory, ABodyMadeOnceReachesSeveralPeers) {
     FramedSocket here{std::move(ends.first)}, there{std::move(ends.second)};
     there.acceptSharedBodies();
     const wire::FrameMessage message{subscription, frame};
-    here.asyncWrite(wire::encode(message, body), *shared, ignore);
+    here.asyncWrite(*wire::encode(message, body), *shared, ignore);
     const auto received = receive(there);
     ASSERT_TRUE(received) << received.error().message;
-    EXPECT_EQ(wire::toBytes(wire::encode(*received)), wire::toBytes(wire::encode(message)));
+    EXPECT_EQ(wire::toBytes(*wire::encode(*received)), wire::toBytes(*wire::encode(message)));
   }
 }
 
@@ -201,9 +201,9 @@ TEST_P(SharedMemory, InlineAndSharedBodiesMayFollowEachOther) {
     const wire::FrameMessage message{i, wire::exampleFrame(20, 10)};
     const wire::Body body = wire::encodeBody(message.frame.planes);
     if (i % 2 == 0)
-      here.asyncWrite(wire::encode(message), ignore);
+      here.asyncWrite(*wire::encode(message), ignore);
     else
-      here.asyncWrite(wire::encode(message, body), *SharedBody::create(body), ignore);
+      here.asyncWrite(*wire::encode(message, body), *SharedBody::create(body), ignore);
     io_.restart();
     io_.run();
   }
@@ -222,7 +222,7 @@ TEST_P(SharedMemory, AFrameOutlivesTheConnection) {
     FramedSocket here{std::move(ends.first)}, there{std::move(ends.second)};
     there.acceptSharedBodies();
     const wire::Body body = wire::encodeBody(message.frame.planes);
-    here.asyncWrite(wire::encode(message, body), *SharedBody::create(body), ignore);
+    here.asyncWrite(*wire::encode(message, body), *SharedBody::create(body), ignore);
     frame = std::get<wire::FrameMessage>(*receive(there)).frame;
   }
   EXPECT_EQ(frame.planes[1].as<float>()[999], 999.0f);
@@ -233,7 +233,7 @@ TEST_P(SharedMemory, IsRefusedUnlessAgreedOn) {
   FramedSocket here{std::move(ends.first)}, there{std::move(ends.second)};
   const wire::FrameMessage message{1, wire::exampleFrame(4, 4)};
   const wire::Body body = wire::encodeBody(message.frame.planes);
-  here.asyncWrite(wire::encode(message, body), *SharedBody::create(body), ignore);
+  here.asyncWrite(*wire::encode(message, body), *SharedBody::create(body), ignore);
   const auto received = receive(there);
   ASSERT_FALSE(received);
   EXPECT_EQ(received.error().code, Error::Code::Malformed);
@@ -244,7 +244,7 @@ TEST_P(SharedMemory, AMissingFileDescriptorIsMalformed) {
   auto ends = connect();
   FramedSocket here{std::move(ends.first)}, there{std::move(ends.second)};
   there.acceptSharedBodies();
-  wire::Encoded message = wire::encode(wire::FrameMessage{1, wire::exampleFrame(4, 4)});
+  wire::Encoded message = *wire::encode(wire::FrameMessage{1, wire::exampleFrame(4, 4)});
   wire::setBodyPlace(message, wire::BodyPlace::Memfd);
   message.body.pieces.clear();
   here.asyncWrite(std::move(message), ignore);
@@ -283,7 +283,7 @@ TEST_P(SharedMemory, SeveralFileDescriptorsWithAMessageAreRefusedAndNoneStaysOpe
     auto ends = connect();
     FramedSocket there{std::move(ends.second)};
     there.acceptSharedBodies();
-    const auto bytes = wire::toBytes(wire::encode(wire::ListSources{1}));
+    const auto bytes = wire::toBytes(*wire::encode(wire::ListSources{1}));
     sendWithDescriptors(ends.first.native_handle(), bytes, 0, count);
     const auto received = receive(there);
     ASSERT_FALSE(received);
@@ -296,7 +296,7 @@ TEST_P(SharedMemory, FileDescriptorsThatNoMessageNeedsAreRefused) {
   auto ends = connect();
   FramedSocket there{std::move(ends.second)};
   there.acceptSharedBodies();
-  const auto bytes = wire::toBytes(wire::encode(wire::ListSources{1}));
+  const auto bytes = wire::toBytes(*wire::encode(wire::ListSources{1}));
   for (const std::byte& byte : std::span{bytes}.first(8)) {
     sendWithDescriptors(ends.first.native_handle(), {&byte, 1}, 0, 1);
   }

@@ -32,7 +32,7 @@ int main(int count, char** arguments) try {
     write(folder / (name + ".json"), std::as_bytes(std::span{json}));
   };
   for (const auto& [name, message] : exampleMessages()) {
-    pair(name, toBytes(encode(message)), toJson(message));
+    pair(name, toBytes(*encode(message)), toJson(message));
   }
   for (const BadMessage& bad : badMessages()) pair(bad.name, bad.bytes, toJson(bad.code));
 } catch (const std::exception& fault) {

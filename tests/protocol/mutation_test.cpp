@@ -28,7 +28,7 @@ constexpr std::uint64_t kSeed = 20'261;
 
 std::vector<Bytes> seeds() {
   std::vector<Bytes> all;
-  for (const auto& example : exampleMessages()) all.push_back(toBytes(encode(example.message)));
+  for (const auto& example : exampleMessages()) all.push_back(toBytes(*encode(example.message)));
   for (const auto& bad : badMessages()) all.push_back(bad.bytes);
   return all;
 }

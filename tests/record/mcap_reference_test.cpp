@@ -30,7 +30,7 @@ Frame frameOf(int i) {
   return frame;
 }
 std::vector<std::byte> wireBytes(const Frame& frame) {
-  return wire::toBytes(wire::encode(wire::FrameMessage{0, frame}));
+  return wire::toBytes(*wire::encode(wire::FrameMessage{0, frame}));
 }
 std::string lineOf(const Frame& frame) {
   std::ostringstream line;

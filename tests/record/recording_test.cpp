@@ -43,7 +43,7 @@ Frame frameOf(int i, std::string source = "kinect") {
 }
 
 std::vector<std::byte> wireBytes(const Frame& frame) {
-  return wire::toBytes(wire::encode(wire::FrameMessage{0, frame}));
+  return wire::toBytes(*wire::encode(wire::FrameMessage{0, frame}));
 }
 
 /// Reads frames until the first error, which is returned; each must be frameOf(first + n), bit for
