@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/config.h"
 
+#include <boost/asio/ip/address.hpp>
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -38,26 +40,57 @@ SourceKeys readSourceKeys(settings::Table& table, std::span<const drivers::Drive
   SourceKeys keys;
   table.read(keys);
   if (!isName(keys.name)) {
-    table.complain(table.has("name") ? "name" : "",
-                   "name: a source needs a name of letters, digits, '-', '_' and '.', at most 64");
+    constexpr std::string_view kRule =
+        "a source needs a name of letters, digits, '-', '_' and '.', at most 64";
+    if (table.has("name")) {
+      table.complain("name", fmt::format("= \"{}\" is no name: {}", keys.name, kRule));
+    } else {
+      table.complain("", fmt::format("name is missing: {}", kRule));
+    }
   } else if (!names.insert(keys.name).second) {
-    table.complain("name", fmt::format("\"{}\" is the name of another source already", keys.name));
+    table.complain("name",
+                   fmt::format("= \"{}\" is the name of another source already", keys.name));
   }
   if (findDriver(drivers, keys.driver) == nullptr) {
-    table.complain(table.has("driver") ? "driver" : "",
-                   fmt::format("driver \"{}\" is not in this build; there are: {}", keys.driver,
-                               namesOf(drivers)));
+    const std::string known = namesOf(drivers);
+    table.complain(
+        table.has("driver") ? "driver" : "",
+        table.has("driver")
+            ? fmt::format("= \"{}\" is not in this build; there are: {}", keys.driver, known)
+            : fmt::format("driver is missing: it must be one of {}", known));
     table.acceptAll();  // whose keys the others are cannot be told
   }
   return keys;
+}
+
+/// A line for each file that the table names, and that a TOML file among them names in turn (a
+/// scene its meshes): path, size and time of change. Equal text: nobody changed them.
+std::string stampsOf(const settings::Table& table) {
+  std::vector<std::filesystem::path> files = table.files();
+  for (std::size_t i = 0, named_here = files.size(); i < named_here; ++i) {
+    if (files[i].extension() != ".toml") continue;
+    if (const auto below = settings::Table::load(files[i])) {
+      for (std::filesystem::path& file : below->files()) files.push_back(std::move(file));
+    }
+  }
+  std::string stamps;
+  for (const std::filesystem::path& file : files) {
+    std::error_code vanished;
+    const auto size = std::filesystem::file_size(file, vanished);
+    const auto changed = std::filesystem::last_write_time(file, vanished).time_since_epoch();
+    stamps += fmt::format("{} {} {}\n", file.string(), size, changed.count());
+  }
+  return stamps;
 }
 
 ConfiguredSource readSource(settings::Table table, std::span<const drivers::Driver> drivers,
                             const std::vector<std::string>& running, std::set<std::string>& names) {
   SourceKeys keys = readSourceKeys(table, drivers, names);
   const drivers::Driver* driver = findDriver(drivers, keys.driver);
-  // Relative paths in the table start at its file's folder, which therefore counts too.
-  std::string fingerprint = table.resolve("").string() + "\n" + table.canonicalText();
+  // Relative paths in the table start at its file's folder, which therefore counts too. The stamps
+  // come before the opening: a file that changes in between is opened again rather than missed.
+  std::string fingerprint =
+      table.resolve("").string() + "\n" + table.canonicalText() + "\n" + stampsOf(table);
   const bool is_as_before = std::ranges::find(running, fingerprint) != running.end();
   ConfiguredSource source{std::move(keys), driver, table, std::move(fingerprint), is_as_before};
   if (driver == nullptr) return source;
@@ -65,6 +98,10 @@ ConfiguredSource readSource(settings::Table table, std::span<const drivers::Driv
     table.acceptAll();
   } else {
     source.opened = driver->open(source.table);
+    // What is wrong in another file is told at the source that names it.
+    if (!source.opened && source.opened.error().code == Error::Code::InvalidArgument &&
+        source.table.check())
+      source.table.complain("", source.opened.error().message);
   }
   return source;
 }
@@ -81,17 +118,20 @@ Result<Config> readConfig(settings::Table& table, std::span<const drivers::Drive
                           const std::vector<std::string>& running) {
   Config config;
   table.read(config.keys);
-  if (auto listen = checkListen(config.keys.listen); !listen)
-    table.complain("listen", listen.error().message);
+  if (auto listen = table.table("listen")) {
+    listen->acceptAll();  // read above
+    if (auto checked = checkListen(config.keys.listen); !checked)
+      listen->complain("address", checked.error().message);
+  }
+  // As all paths in the file; --socket is the shell's, and stays.
+  std::string& socket = config.keys.listen.socket;
+  if (!socket.empty() && socket != "auto")
+    socket = table.resolve(socket).lexically_normal().string();
   std::set<std::string> names;
   for (settings::Table& below : table.tables("source")) {
     config.sources.push_back(readSource(below, drivers, running, names));
   }
   if (auto checked = table.check(); !checked) return checked.error();
-  for (const ConfiguredSource& source : config.sources) {
-    if (source.is_as_before || source.opened) continue;
-    if (source.opened.error().code == Error::Code::InvalidArgument) return source.opened.error();
-  }
   config.recording_folder = recordingFolder(config.keys, table);
   return config;
 }
@@ -116,12 +156,21 @@ Result<Config> parseConfig(std::string_view toml, const std::filesystem::path& n
 
 Result<> checkListen(const ListenKeys& listen) {
   const std::string& address = listen.address;
-  const bool is_loopback =
-      address.empty() || address == "localhost" || address == "::1" || address.starts_with("127.");
-  if (is_loopback || listen.allow_remote) return {};
+  boost::system::error_code is_none;
+  const auto parsed =
+      boost::asio::ip::make_address(address == "localhost" ? "127.0.0.1" : address, is_none);
+  if (address.empty()) return {};
+  if (is_none) {
+    return Error{
+        Error::Code::InvalidArgument,
+        fmt::format("= \"{}\" is no IP address: use 127.0.0.1 or ::1 (this machine only), one of "
+                    "those that `ip address` shows, or \"\" for no TCP",
+                    address)};
+  }
+  if (parsed.is_loopback() || listen.allow_remote) return {};
   return Error{
       Error::Code::InvalidArgument,
-      fmt::format("address = \"{}\" can be reached from other machines, and there is no password: "
+      fmt::format("= \"{}\" can be reached from other machines, and there is no password: "
                   "everyone there could see all cameras and steer them. Set allow_remote = true "
                   "if you trust that whole network, or use 127.0.0.1",
                   address)};

@@ -33,7 +33,7 @@ struct ListenKeys {
            "recordings. "
            "Only for a network that you trust whole");
     v.text("socket", socket,
-           "path of the Unix socket; \"auto\": toftwin.sock in $RUNTIME_DIRECTORY, /run/toftwin or "
+           "path of the Unix socket, relative to this file; \"auto\": toftwin.sock in $RUNTIME_DIRECTORY, /run/toftwin or "
            "$XDG_RUNTIME_DIR; empty: no Unix socket");
   }
 };

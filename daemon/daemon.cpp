@@ -137,8 +137,11 @@ void Daemon::applyKeys(const Config& config) {
 
 void Daemon::run(ConfiguredSource source) {
   running_.push_back({source.keys.name, source.fingerprint});
-  const auto open = [driver = source.driver, table = source.table]() mutable {
-    return driver->open(table);
+  const auto open = [driver = source.driver, table = source.table] {
+    settings::Table again = table.anew();
+    SourceKeys known;  // ticked off, so that what the driver leaves over is unknown to both
+    again.read(known);
+    return driver->open(again);
   };
   const SourceHost::Options options{.always = source.keys.start == SourceKeys::Start::Always};
   spdlog::info("source {}: driver {}", source.keys.name, source.driver->name);

@@ -40,11 +40,10 @@ std::vector<std::shared_ptr<void>> Hub::remove(const std::string& name) {
   if (auto source = sources_.extract(name)) {
     source.mapped()->requestStop();
     SourceHost* const host = source.mapped().get();
-    gone.push_back(std::shared_ptr<void>{
-        host, [kept = std::move(source.mapped())](void*) mutable {
-          kept->waitForEnd();
-          kept.reset();
-        }});
+    gone.push_back(std::shared_ptr<void>{host, [kept = std::move(source.mapped())](void*) mutable {
+                                           kept->waitForEnd();
+                                           kept.reset();
+                                         }});
   }
   return gone;
 }
@@ -113,9 +112,11 @@ void Hub::stopRecording(const std::string& source, RecordDone done) {
     const std::scoped_lock lock{mutex_};
     if (auto found = recorders_.find(source); found != recorders_.end()) recorder = found->second;
   }
-  if (!recorder) {
-    return done(Error{Error::Code::NotFound,
-                      fmt::format("the source \"{}\" is not being recorded", source)});
+  if (!recorder || recorder->isSettled()) {
+    return done(
+        Error{Error::Code::NotFound,
+              fmt::format("the source \"{}\" is not being recorded, so there is nothing to stop",
+                          source)});
   }
   recorder->stop([done](const Result<std::filesystem::path>& closed) {
     if (closed) return done(closed->string());

@@ -57,6 +57,7 @@ void Recorder::stop(Done closed) {
   {
     const std::scoped_lock lock{mutex_};
     outcome = outcome_;
+    is_told_ = is_told_ || outcome_.has_value();
     if (!outcome && !closed_) closed_ = std::exchange(closed, nullptr);
   }
   {
@@ -71,6 +72,11 @@ void Recorder::stop(Done closed) {
 bool Recorder::isFinished() const {
   const std::scoped_lock lock{mutex_};
   return outcome_.has_value();
+}
+
+bool Recorder::isSettled() const {
+  const std::scoped_lock lock{mutex_};
+  return outcome_.has_value() && is_told_;
 }
 
 std::string Recorder::problem() const {
@@ -144,6 +150,7 @@ void Recorder::finish(Result<> outcome) {
     const std::scoped_lock lock{mutex_};
     outcome_ = result;
     closed = std::move(closed_);
+    is_told_ = closed != nullptr;
   }
   if (closed) closed(result);
 }

@@ -42,6 +42,8 @@ class Recorder {
   /// once if the recording has ended already.
   void stop(Done closed);
   [[nodiscard]] bool isFinished() const;
+  /// Whether it has ended and somebody who stopped it was told how: there is nothing left to stop.
+  [[nodiscard]] bool isSettled() const;
   /// What went wrong, or empty.
   [[nodiscard]] std::string problem() const;
 
@@ -63,9 +65,10 @@ class Recorder {
   };
   const std::shared_ptr<Work> work_ = std::make_shared<Work>();
 
-  mutable std::mutex mutex_;  // guards the next two
+  mutable std::mutex mutex_;  // guards the next three
   std::optional<Result<std::filesystem::path>> outcome_;
   Done closed_;
+  bool is_told_ = false;
 
   std::jthread thread_;  // last: it uses all of the above
 };

@@ -86,13 +86,25 @@ Json logEntry(const Frame& frame, const std::string& pose, const char* role) {
   return std::move(entry.set("temperatures_c", std::move(temperatures)));
 }
 
+/// The next frame, or Stopped soon after the user wants to end.
+Result<Frame> nextFrame(Feed& feed, const CaptureOptions& options) {
+  constexpr std::chrono::milliseconds kPatience{200};
+  const auto end = std::chrono::steady_clock::now() + options.timeout;
+  while (true) {
+    if (options.interrupted && options.interrupted())
+      return Error{Error::Code::Stopped, "interrupted"};
+    const auto left =
+        std::chrono::ceil<std::chrono::milliseconds>(end - std::chrono::steady_clock::now());
+    auto frame = feed.next(std::clamp(left, std::chrono::milliseconds{0}, kPatience));
+    if (frame || frame.error().code != Error::Code::Timeout || left <= kPatience) return frame;
+  }
+}
+
 /// The next frame of that pose; frames of other poses are skipped.
 Result<Frame> nextAt(Feed& feed, const std::optional<Transform<World, Camera>>& pose,
                      const CaptureOptions& options) {
   for (int skipped = 0; skipped <= options.most_skipped; ++skipped) {
-    if (options.interrupted && options.interrupted())
-      return Error{Error::Code::Stopped, "interrupted"};
-    auto frame = feed.next(options.timeout);
+    auto frame = nextFrame(feed, options);
     if (!frame) return named(feed, frame.error(), "waiting for a frame");
     const auto& there = frame->moment.world_from_camera;
     if (!pose || !there || samePose(*pose, *there)) return frame;
@@ -214,7 +226,9 @@ void planCapture(Progress& progress, const CaptureOptions& options) {
                   seconds);
 }
 
-Result<Capture> capture(Feed& a, Feed& b, const CaptureOptions& options, Progress& progress) {
+namespace {
+
+Result<Capture> captureAll(Feed& a, Feed& b, const CaptureOptions& options, Progress& progress) {
   Capture result{
       .a = a.details(), .b = b.details(), .poses = {}, .pairs = {}, .log = {}, .warnings = {}};
   const std::size_t count = std::max<std::size_t>(1, options.poses.size());
@@ -234,6 +248,33 @@ Result<Capture> capture(Feed& a, Feed& b, const CaptureOptions& options, Progres
     result.warnings.emplace_back(
         "At least one camera does not say its pose: that both stood at the same place is taken on "
         "trust.");
+  }
+  return result;
+}
+
+/// Puts the camera where it stood before; otherwise says why it did not work.
+std::string putBack(Feed& feed) {
+  const SourceDetails& before = feed.details();
+  if (!before.can_set_pose) return {};
+  if (!before.world_from_camera) {
+    return fmt::format("{} was left at the last pose, because where it stood before is not known.",
+                       before.entry.name);
+  }
+  if (auto set = feed.setPose(*before.world_from_camera); !set) {
+    return fmt::format("{} was left at the last pose: it could not be put back: {}.",
+                       before.entry.name, set.error().message);
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<Capture> capture(Feed& a, Feed& b, const CaptureOptions& options, Progress& progress) {
+  auto result = captureAll(a, b, options, progress);
+  if (options.poses.empty()) return result;
+  for (Feed* feed : {&a, &b}) {
+    if (std::string why = putBack(*feed); !why.empty() && result)
+      result->warnings.push_back(std::move(why));
   }
   return result;
 }

@@ -66,7 +66,7 @@ struct CaptureOptions {
 
 /// Captures both cameras at the same poses. A pose is set on each camera that can; frames that say
 /// another pose are skipped (they were made before, or a recording has not reached it yet). Errors
-/// say which camera could not follow and why.
+/// say which camera could not follow and why. At the end each camera is put back to where it stood.
 Result<Capture> capture(Feed& a, Feed& b, const CaptureOptions& options, Progress& progress);
 void planCapture(Progress& progress, const CaptureOptions& options);
 

@@ -82,7 +82,7 @@ Result<std::filesystem::path> compareAndReport(const CompareJob& job, Progress& 
   std::error_code failed;
   std::filesystem::create_directories(job.output, failed);
   if (failed) {
-    return Error{Error::Code::PermissionDenied,
+    return Error{Error::Code::StorageFull,
                  fmt::format("{}: cannot make the report's folder: {}", job.output.string(),
                              failed.message())};
   }

@@ -43,9 +43,9 @@ std::pair<double, double> padded(Extent e, double share, bool log) {
   return {e.low - pad, e.high + pad};
 }
 
-std::string number(double v) {
+std::string number(double v, int digits = 6) {
   if (std::abs(v) < 1e-12) return "0";
-  const std::string text = fmt::format("{:.6g}", v);
+  const std::string text = fmt::format("{:.{}g}", v, digits);
   return text.front() == '-' ? "−" + text.substr(1) : text;
 }
 
@@ -61,19 +61,28 @@ std::vector<double> logTicks(double low, double high) {
   return ticks;
 }
 
+/// A text and a line for each tick of an axis.
+std::vector<std::pair<double, std::string>> labelled(const std::vector<double>& ticks) {
+  const std::vector<std::string> labels = tickLabels(ticks);
+  std::vector<std::pair<double, std::string>> all;
+  for (std::size_t i = 0; i < ticks.size(); ++i) all.emplace_back(ticks[i], labels[i]);
+  return all;
+}
+
 std::string grid(const Plot& plot, const Axis& x, const Axis& y, double height) {
   std::string svg;
-  for (const double v : roundTicks(x.low, x.high, plot.compact ? 5 : 8)) {
+  for (const auto& [v, label] : labelled(roundTicks(x.low, x.high, plot.compact ? 5 : 8))) {
     svg += fmt::format("<line class='grid' x1='{0:.1f}' x2='{0:.1f}' y1='{1:.1f}' y2='{2:.1f}'/>",
                        x.place(v), y.from, y.to);
     svg += fmt::format("<text class='tick' x='{:.1f}' y='{:.1f}' text-anchor='middle'>{}</text>",
-                       x.place(v), y.from + 20, number(v));
+                       x.place(v), y.from + 20, label);
   }
-  for (const double v : y.log ? logTicks(y.low, y.high) : roundTicks(y.low, y.high, 6)) {
+  for (const auto& [v, label] :
+       labelled(y.log ? logTicks(y.low, y.high) : roundTicks(y.low, y.high, 6))) {
     svg += fmt::format("<line class='grid' x1='{1:.1f}' x2='{2:.1f}' y1='{0:.1f}' y2='{0:.1f}'/>",
                        y.place(v), x.from, x.to);
     svg += fmt::format("<text class='tick' x='{:.1f}' y='{:.1f}' text-anchor='end'>{}</text>",
-                       x.from - 8, y.place(v) + 5, number(v));
+                       x.from - 8, y.place(v) + 5, label);
   }
   if (plot.zero_line && y.low < 0.0 && y.high > 0.0) {
     svg += fmt::format("<line class='zero' x1='{1:.1f}' x2='{2:.1f}' y1='{0:.1f}' y2='{0:.1f}'/>",
@@ -196,6 +205,24 @@ std::vector<double> roundTicks(double low, double high, int count) {
   const double first = std::ceil(low / step - 1e-9), last = std::floor(high / step + 1e-9);
   for (double i = first; i <= last; i += 1.0) ticks.push_back(i * step);
   return ticks;
+}
+
+std::vector<std::string> tickLabels(const std::vector<double>& ticks) {
+  double largest = 0.0, closest = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < ticks.size(); ++i) {
+    largest = std::max(largest, std::abs(ticks[i]));
+    if (i > 0) closest = std::min(closest, ticks[i] - ticks[i - 1]);
+  }
+  // As many digits as tell neighbours apart: 10800.1 needs seven if the next is 10800.12.
+  int digits = 6;
+  if (largest > 0.0 && std::isfinite(closest) && closest > 0.0) {
+    const double needed =
+        std::floor(std::log10(largest) + 1e-9) - std::floor(std::log10(closest) + 1e-9) + 1.0;
+    digits = static_cast<int>(std::clamp(needed, 6.0, 15.0));
+  }
+  std::vector<std::string> labels;
+  for (const double tick : ticks) labels.push_back(number(tick, digits));
+  return labels;
 }
 
 std::string toSvg(const Plot& plot) {

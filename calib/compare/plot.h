@@ -63,6 +63,8 @@ std::string toSvg(const ImageMap& map);
 
 /// At most about `count` round numbers (1, 2, 5 times a power of ten) inside [low, high].
 std::vector<double> roundTicks(double low, double high, int count);
+/// What stands at increasing ticks: six digits, or as many as tell neighbours apart.
+std::vector<std::string> tickLabels(const std::vector<double>& ticks);
 
 /// Bytes as base64, for data URIs.
 std::string base64(std::span<const unsigned char> bytes);

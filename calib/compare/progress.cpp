@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include <fmt/format.h>
 
@@ -18,18 +19,30 @@ std::string duration(double seconds) {
 
 }  // namespace
 
-double Progress::left(double share) const {
+void Pace::at(double seconds, double done) {
+  const double passed_s = std::max(0.0, seconds - last_s_);
+  const double kept = std::exp(-passed_s / std::max(5.0, 0.5 * seconds));
+  done_ = kept * done_ + std::max(0.0, done - last_done_);
+  seconds_ = kept * seconds_ + passed_s;
+  last_s_ = std::max(last_s_, seconds);
+  last_done_ = std::max(last_done_, done);
+}
+
+std::optional<double> Pace::left(double work) const {
+  if (work <= 0.0) return 0.0;
+  if (!(done_ > 0.0) || !(seconds_ > 0.0)) return std::nullopt;
+  return work * seconds_ / done_;
+}
+
+double Progress::left(double share) {
   double done = 0.0, all = 0.0;
   for (std::size_t i = 0; i < steps_.size(); ++i) {
     all += steps_[i].second;
     if (i + 1 < next_) done += steps_[i].second;
     if (i + 1 == next_) done += share * steps_[i].second;
   }
-  const double passed = std::chrono::duration<double>(Clock::now() - started_).count();
-  // Trust the plan at first and the clock more and more: as if half a minute had gone as planned.
-  constexpr double kPlanned = 30.0;
-  const double pace = (passed + kPlanned) / (done + kPlanned);
-  return pace * (all - done);
+  pace_.at(std::chrono::duration<double>(Clock::now() - started_).count(), done);
+  return pace_.left(all - done).value_or(all - done);
 }
 
 void Progress::line(double share) {

@@ -156,7 +156,7 @@ Result<std::filesystem::path> write(const Report& report, const std::filesystem:
   std::filesystem::create_directories(folder, failed);
   if (failed) {
     return Error{
-        Error::Code::PermissionDenied,
+        Error::Code::StorageFull,
         fmt::format("{}: cannot make the report's folder: {}", folder.string(), failed.message())};
   }
   if (auto done = writeFile(folder / "report.json", report.data.text()); !done) return done.error();

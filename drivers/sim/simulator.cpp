@@ -10,6 +10,7 @@
 
 #include <toftwin/names.h>
 
+#include "drivers/sim/default_scene.h"
 #include "drivers/sim/keys.h"
 #include "drivers/sim/view.h"
 #include "protocol/settings/describe.h"
@@ -18,36 +19,6 @@
 
 namespace toftwin::drivers::simulator {
 namespace {
-
-/// What is seen without a scene file: a grey box before a white wall, on a grey floor.
-constexpr std::string_view kDefaultScene = R"(
-[[material]]
-name = "white"
-albedo = 0.8
-[[material]]
-name = "grey"
-albedo = 0.3
-[[object]]
-name = "wall"
-shape = "rectangle"
-size_m = [8, 6, 0]
-position_m = [0, 0, 2.5]
-material = "white"
-[[object]]
-name = "floor"
-shape = "rectangle"
-size_m = [8, 6, 0]
-position_m = [0, 0.9, 0]
-euler_deg = [90, 0, 0]
-material = "grey"
-[[object]]
-name = "box"
-shape = "box"
-size_m = [0.4, 0.5, 0.4]
-position_m = [0.1, 0.65, 1.6]
-euler_deg = [0, 30, 0]
-material = "grey"
-)";
 
 constexpr std::string_view kAmbient = "ambient_klx", kSincePowerOn = "since_power_on_s",
                            kTemperature = "room_temperature_c";
@@ -261,7 +232,7 @@ class SimulatedSource final : public Source {
 
 std::vector<PlaneKind> chosenPlanes(const Keys& keys, settings::Table& table) {
   const auto all = sim::allPlanes();
-  if (keys.planes.empty()) return {all.begin(), all.begin() + 5};
+  if (keys.planes.empty()) return {all.begin(), all.begin() + kDefaultPlanes};
   std::vector<PlaneKind> chosen;
   for (const std::string& name : keys.planes) {
     const auto kind = planeKindNamed(name);
@@ -277,42 +248,48 @@ std::vector<PlaneKind> chosenPlanes(const Keys& keys, settings::Table& table) {
   return chosen;
 }
 
-Result<sim::SensorModel> chosenCamera(const Keys& keys, const settings::Table& table) {
+/// Nothing after complaining: a preset or a file that is missing will not come by itself, as a camera
+/// may, so it is a mistake in the configuration.
+std::optional<sim::SensorModel> chosenCamera(const Keys& keys, settings::Table& table) {
   if (!keys.camera.empty()) {
     auto model = sim::SensorModel::load(table.resolve(keys.camera));
-    if (!model) return Error{Error::Code::InvalidArgument, model.error().message};
-    return model;
+    if (model) return *std::move(model);
+    table.complain("camera", fmt::format("= \"{}\": {}", keys.camera, model.error().message));
+    return std::nullopt;
   }
   constexpr std::string_view kScheme = "sim:";
   if (keys.uri.starts_with(kScheme)) {
-    if (auto model = sim::SensorModel::preset(keys.uri.substr(kScheme.size()))) return model;
+    if (auto model = sim::SensorModel::preset(keys.uri.substr(kScheme.size())))
+      return *std::move(model);
   }
   std::string known;
   for (const std::string& name : sim::SensorModel::presetNames())
     known += (known.empty() ? "sim:" : ", sim:") + name;
-  return Error{Error::Code::NotFound,
-               fmt::format("{}: there is no camera {}; the simulator has {}, and any camera "
-                           "file by the key camera",
-                           table.place("uri"), keys.uri, known)};
+  table.complain("uri", fmt::format("= \"{}\": there is no such preset; there are {}, and any "
+                                    "camera file by the key camera",
+                                    keys.uri, known));
+  return std::nullopt;
+}
+
+std::optional<sim::Scene> chosenScene(const Keys& keys, settings::Table& table) {
+  auto scene = keys.scene.empty() ? sim::Scene::parse(kDefaultScene, "default scene")
+                                  : sim::Scene::load(table.resolve(keys.scene));
+  if (scene) return *std::move(scene);
+  table.complain("scene", fmt::format("= \"{}\": {}", keys.scene, scene.error().message));
+  return std::nullopt;
 }
 
 Result<std::unique_ptr<Source>> open(settings::Table& table) {
   Keys keys;
   table.read(keys);
   std::vector<PlaneKind> planes = chosenPlanes(keys, table);
-  if (auto checked = table.check(); !checked) return checked.error();
   auto model = chosenCamera(keys, table);
-  if (!model) return model.error();
-  if (keys.frame_interval > 0_ms) {
-    if (auto fits = exposuresFit(*model, keys.frame_interval); !fits) {
-      return Error{fits.error().code,
-                   fmt::format("{}: {}", table.place("frame_interval_ms"), fits.error().message)};
-    }
+  auto scene = chosenScene(keys, table);
+  if (model && keys.frame_interval > 0_ms) {
+    if (auto fits = exposuresFit(*model, keys.frame_interval); !fits)
+      table.complain("frame_interval_ms", fmt::format("is too short: {}", fits.error().message));
   }
-  auto scene = keys.scene.empty() ? sim::Scene::parse(kDefaultScene, "default scene")
-                                  : sim::Scene::load(table.resolve(keys.scene));
-  // A file that is missing will not come back by itself as a camera may: a mistake in the configuration.
-  if (!scene) return Error{Error::Code::InvalidArgument, scene.error().message};
+  if (auto checked = table.check(); !checked) return checked.error();
   sim::TraceRequest request = model->traceRequest();
   request.samples_per_pixel = keys.samples_per_pixel;
   request.max_surfaces = keys.max_surfaces;

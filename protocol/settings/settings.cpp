@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <toml++/toml.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <set>
@@ -18,14 +19,20 @@ struct Table::State {
   const toml::table* table = nullptr;
   std::filesystem::path file;
   std::set<std::string, std::less<>> read;
-  std::vector<std::string> errors;
+  struct Fault {
+    toml::source_index line;
+    std::string text;
+    bool operator==(const Fault&) const = default;
+  };
+  std::vector<Fault> errors;
   std::vector<std::shared_ptr<State>> below;
 
   std::string place(const toml::node& node) const {
     return fmt::format("{}:{}", file.string(), node.source().begin.line);
   }
   void error(const toml::node& node, std::string_view key, std::string_view what) {
-    errors.push_back(fmt::format("{}: {} {}", place(node), key, what));
+    errors.push_back({node.source().begin.line,
+                      fmt::format("{}: {}{}{}", place(node), key, key.empty() ? "" : " ", what)});
   }
   const toml::node* find(std::string_view key) {
     const toml::node* node = table->get(key);
@@ -40,11 +47,12 @@ struct Table::State {
     below.push_back(state);
     return state;
   }
-  void gather(std::vector<std::string>& all) const {
+  void gather(std::vector<Fault>& all) const {
     all.insert(all.end(), errors.begin(), errors.end());
     for (const auto& [key, node] : *table) {
       if (!read.contains(key.str())) {
-        all.push_back(fmt::format("{}: unknown key \"{}\"", place(node), key.str()));
+        all.push_back({node.source().begin.line,
+                       fmt::format("{}: unknown key \"{}\"", place(node), key.str())});
       }
     }
     for (const auto& child : below) child->gather(all);
@@ -99,6 +107,14 @@ Result<Table> Table::parse(std::string_view text, const std::filesystem::path& n
 bool Table::has(std::string_view key) const { return state_->table->contains(key); }
 
 void Table::accept(std::string_view key) { state_->read.emplace(key); }
+
+Table Table::anew() const {
+  auto state = std::make_shared<State>();
+  state->root = state_->root;
+  state->table = state_->table;
+  state->file = state_->file;
+  return Table{std::move(state)};
+}
 
 void Table::acceptAll() {
   for (const auto& [key, node] : *state_->table) state_->read.emplace(key.str());
@@ -214,14 +230,39 @@ void Table::complain(std::string_view key, std::string_view what) {
 }
 
 Result<> Table::check() const {
-  std::vector<std::string> all;
+  std::vector<State::Fault> all;
   state_->gather(all);
   if (all.empty()) return {};
-  return Error{Error::Code::InvalidArgument, fmt::format("{}", fmt::join(all, "\n"))};
+  std::ranges::stable_sort(all, {}, &State::Fault::line);  // as a reader of the file meets them
+  std::string text;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (std::find(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(i), all[i]) !=
+        all.begin() + static_cast<std::ptrdiff_t>(i))
+      continue;
+    text += (text.empty() ? "" : "\n") + all[i].text;
+  }
+  return Error{Error::Code::InvalidArgument, text};
 }
 
 std::filesystem::path Table::resolve(const std::filesystem::path& path) const {
   return path.is_absolute() ? path : state_->file.parent_path() / path;
+}
+
+std::vector<std::filesystem::path> Table::files() const {
+  std::vector<std::filesystem::path> found;
+  const auto look = [&](const auto& self, const toml::node& node) -> void {
+    if (const auto* table = node.as_table()) {
+      for (const auto& [key, below] : *table) self(self, below);
+    } else if (const auto* array = node.as_array()) {
+      for (const toml::node& below : *array) self(self, below);
+    } else if (const auto* text = node.as_string(); text != nullptr && !text->get().empty()) {
+      std::error_code not_there;
+      const std::filesystem::path path = resolve(text->get());
+      if (std::filesystem::is_regular_file(path, not_there)) found.push_back(path);
+    }
+  };
+  look(look, *state_->table);
+  return found;
 }
 
 std::string Table::place(std::string_view key) const {

@@ -35,10 +35,14 @@ class Table {
   [[nodiscard]] bool has(std::string_view key) const;
   /// Ticks a key off without reading it.
   void accept(std::string_view key);
+  /// The same table with no key ticked off and nothing complained about.
+  [[nodiscard]] Table anew() const;
   /// Ticks all keys off, for a table that is known to be good.
   void acceptAll();
   /// All keys and values in one form: equal for two tables that say the same, whatever their layout.
   [[nodiscard]] std::string canonicalText() const;
+  /// The files that texts of this table, at any depth, name: those that are there.
+  [[nodiscard]] std::vector<std::filesystem::path> files() const;
   std::optional<double> number(std::string_view key, Bounds bounds, std::string_view unit,
                                bool integral);
   std::optional<std::vector<double>> numbers(std::string_view key, Bounds bounds,

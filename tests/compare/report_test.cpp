@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "calib/compare/progress.h"
 #include "calib/compare/report.h"
 
 #include <cmath>
@@ -88,6 +89,28 @@ TEST(Numbers, AreShownForPeople) {
 TEST(Ticks, AreRoundAndInside) {
   EXPECT_EQ(roundTicks(-1.0, 11.0, 6), (std::vector<double>{0, 2, 4, 6, 8, 10}));
   EXPECT_TRUE(roundTicks(1.0, 1.0, 5).empty());
+  EXPECT_EQ(tickLabels(roundTicks(10800.09, 10800.17, 4)),
+            (std::vector<std::string>{"10800.1", "10800.12", "10800.14", "10800.16"}));
+  EXPECT_EQ(tickLabels({-0.5, 0.0, 0.5}), (std::vector<std::string>{"−0.5", "0", "0.5"}));
+}
+
+TEST(Pace, FollowsAJobThatBecomesSlower) {
+  Pace pace;
+  EXPECT_FALSE(pace.left(10.0)) << "nothing is known yet";
+  double seconds = 0.0, done = 0.0;
+  for (; done < 100.0; done += 1.0) pace.at(seconds += 0.1, done);
+  EXPECT_NEAR(*pace.left(100.0), 10.0, 0.5);
+  // Ten times slower from here on: what began fast counts for less and less.
+  for (int i = 0; i < 60; ++i) pace.at(seconds += 1.0, done += 1.0);
+  EXPECT_GT(*pace.left(100.0), 85.0) << "the mean of all the job would say 44 s";
+  EXPECT_EQ(*pace.left(0.0), 0.0);
+}
+
+TEST(Pace, TrustsThePlanAtFirst) {
+  Pace pace{1.0, 10.0};
+  EXPECT_DOUBLE_EQ(*pace.left(30.0), 30.0);
+  for (int i = 1; i <= 200; ++i) pace.at(0.1 * i, 0.01 * i);  // ten times slower than planned
+  EXPECT_GT(*pace.left(30.0), 150.0);
 }
 
 TEST(Plot, InterruptsACurveWhereThereIsNoValue) {

@@ -58,12 +58,13 @@ TEST(Config, AnUnknownDriverIsNamedWithThoseThatThereAre) {
 }
 
 TEST(Config, SourcesNeedNamesOfTheirOwn) {
-  EXPECT_SAYS(errorOf("[[source]]\ndriver = 'pattern'"), "toftwind.toml:1");
-  EXPECT_SAYS(errorOf("[[source]]\nname = 'a/b'\ndriver = 'pattern'"), "toftwind.toml:2");
+  EXPECT_SAYS(errorOf("[[source]]\ndriver = 'pattern'"), "toftwind.toml:1: name is missing: ");
+  EXPECT_SAYS(errorOf("[[source]]\nname = 'a/b'\ndriver = 'pattern'"),
+              "toftwind.toml:2: name = \"a/b\" is no name: ");
   EXPECT_SAYS(
       errorOf(
           "[[source]]\nname = 'a'\ndriver = 'pattern'\n[[source]]\nname = 'a'\ndriver = 'pattern'"),
-      "toftwind.toml:5: name \"a\" is the name of another source already");
+      "toftwind.toml:5: name = \"a\" is the name of another source already");
 }
 
 TEST(Config, AnAddressOthersReachNeedsTheWordForIt) {
@@ -71,6 +72,43 @@ TEST(Config, AnAddressOthersReachNeedsTheWordForIt) {
   EXPECT_SAYS(errorOf("[listen]\naddress = '::'"), "allow_remote = true");
   EXPECT_EQ(errorOf("[listen]\naddress = '0.0.0.0'\nallow_remote = true"), "no error");
   EXPECT_EQ(errorOf("[listen]\naddress = '::1'"), "no error");
+  EXPECT_SAYS(errorOf("[listen]\nport = 1\naddress = '0.0.0.0'"), "toftwind.toml:3: address = ");
+}
+
+TEST(Config, AnAddressThatIsNoneIsCalledThat) {
+  const std::string error = errorOf("[listen]\naddress = 'fish'");
+  EXPECT_SAYS(error, "toftwind.toml:2: address = \"fish\" is no IP address: use 127.0.0.1");
+  EXPECT_EQ(error.find("allow_remote"), std::string::npos) << error;
+}
+
+TEST(Config, ErrorsComeOnceEachInTheOrderOfTheLines) {
+  const std::string error = errorOf(
+      "[[source]]\nname = 'a'\ndriver = 'sim'\nuri = 'sim:kinect_v3'\nscene = 'none.toml'\n"
+      "[[source]]\nname = 'b'\ndriver = 'pattern'\nwidth = 1\n[limits]\nsessions = 0");
+  std::size_t at = 0;
+  for (const char* line : {"toml:4: uri = \"sim:kinect_v3\"", "toml:5: scene = \"none.toml\"",
+                           "toml:9: width = 1", "toml:11: sessions = 0"}) {
+    const std::size_t found = error.find(line);
+    ASSERT_NE(found, std::string::npos) << line << " is not in\n" << error;
+    EXPECT_GE(found, at) << line << " comes too early in\n" << error;
+    EXPECT_EQ(error.find(line, found + 1), std::string::npos) << line << " comes twice in\n" << error;
+    at = found;
+  }
+}
+
+TEST(Config, AMissingPresetOrFileIsAnErrorOfTheFile) {
+  EXPECT_SAYS(errorOf("[[source]]\nname = 'a'\ndriver = 'sim'\nuri = 'sim:kinect_v3'"),
+              "sim:kinect_v2");
+  EXPECT_SAYS(errorOf("[[source]]\nname = 'a'\ndriver = 'sim'\ncamera = 'none.toml'"),
+              "toml:4: camera = \"none.toml\"");
+  EXPECT_SAYS(errorOf("[[source]]\nname = 'a'\ndriver = 'replay'\nfile = 'none.mcap'"),
+              "toml:4: file \"none.mcap\"");
+}
+
+TEST(Config, ARelativeSocketLiesBesideTheFile) {
+  EXPECT_EQ(parse("[listen]\nsocket = 'run/s'")->keys.listen.socket, "/etc/toftwin/run/s");
+  EXPECT_EQ(parse("[listen]\nsocket = 'auto'")->keys.listen.socket, "auto");
+  EXPECT_EQ(parse("[listen]\nsocket = ''")->keys.listen.socket, "");
 }
 
 TEST(Config, ACameraThatIsNotThereIsNoErrorOfTheFile) {

@@ -142,6 +142,37 @@ TEST_F(RunningDaemon, AReloadOfAWrongFileChangesNothing) {
   EXPECT_EQ(client.describe("cam")->camera.width, 32);
 }
 
+TEST_F(RunningDaemon, AReloadOpensASourceAnewWhoseSceneOrItsMeshChanged) {
+  const auto write = [&](const std::string& name, const std::string& text) {
+    std::ofstream{folder_ / name} << text;
+  };
+  const std::string scene = "[[material]]\nname = 'm'\n[[object]]\nmaterial = 'm'\nmesh = 'o.obj'\n";
+  write("scene.toml", scene);
+  write("o.obj", "v -9 -9 2\nv 9 -9 2\nv 0 9 2\nf 1 2 3\n");
+  const std::string camera = " driver = 'sim'\nsamples_per_pixel = 1\nmax_surfaces = 1\n";
+  start("[[source]]\nname = 'seen'\nscene = 'scene.toml'\n" + camera +
+        "[[source]]\nname = 'other'\n" + camera);
+  EXPECT_EQ(log_->count("source seen: "), 1);
+  int reloads = 0;
+  const auto reload = [&] {
+    daemon_->reload();
+    return log_->waitFor("the new configuration is in force", ++reloads);
+  };
+  ASSERT_TRUE(reload());
+  EXPECT_EQ(log_->count("source seen: "), 1) << "nothing changed";
+  write("scene.toml", "# longer\n" + scene);
+  ASSERT_TRUE(reload());
+  EXPECT_EQ(log_->count("source seen: "), 2);
+  write("o.obj", "v -9 -9 2.5\nv 9 -9 2\nv 0 9 2\nf 1 2 3\n");
+  ASSERT_TRUE(reload());
+  EXPECT_EQ(log_->count("source seen: "), 3);
+  EXPECT_EQ(log_->count("source other: "), 1);
+  write("o.obj", "this is no mesh\n");
+  daemon_->reload();
+  ASSERT_TRUE(log_->waitFor("stays as it was", 1));
+  EXPECT_EQ(client().sources()->size(), 2u) << "the source runs on with what it has";
+}
+
 TEST_F(RunningDaemon, ASecondDaemonIsRefusedWithThePidOfTheFirst) {
   start(kTriggered);
   const auto second = Daemon::start(options());

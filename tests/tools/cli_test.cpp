@@ -40,7 +40,22 @@ TEST(Toftwin, AWrongCommandLineIsStatus2AndSaysWhatIsWrong) {
            {"grab kinect -o a.png --count none", "--count"},
            {"grab kinect -o a.png --count 0", "--count"},
            {"grab kinect -o a.png --region 1,2", "--region"},
-           {"completion tcsh", "tcsh"}}) {
+           {"completion tcsh", "tcsh"},
+           {"grab kinect -o a.jpeg", ".png, .ply, .npy, .csv"},
+           {"grab kinect -o a.png --plane distance", "the planes are: range, "},
+           {"grab kinect -o a.png --row 3", "--row has a meaning for .csv only"},
+           {"grab kinect -o a.csv --world", "--world has a meaning for .ply only"},
+           {"grab kinect -o a.png --min 1", "--min has a meaning for .png with --color only"},
+           {"grab kinect -o a.png --color --min 2 --max 1", "--min 2 must be less than --max 1"},
+           {"record kinect -o m3.txt", "FILE.mcap"},
+           {"record kinect", "-o FILE.mcap"},
+           {"record kinect -o a.mcap --on-daemon --duration 3", "--on-daemon --stop"},
+           {"replay a.mcap --serve -o a.png", "choose one"},
+           {"replay a.mcap --serve --from 3", "plays the whole recording"},
+           {"replay a.mcap --pace fast", "--pace requires --serve"},
+           {"compare kinect", "name two sources"},
+           {"set kinect ambient_klx bright", "bright"},
+           {"pose kinect --position 1,2", "--position"}}) {
     const Ran ran = toftwin(arguments);
     EXPECT_EQ(ran.status, 2) << arguments;
     EXPECT_THAT(ran.out + ran.err, HasSubstr(what)) << arguments;
@@ -51,7 +66,8 @@ TEST(Toftwin, HelpAndVersionAreStatus0) {
   EXPECT_THAT(toftwin("--version").out, HasSubstr("toftwin " TOFTWIN_VERSION));
   EXPECT_EQ(toftwin("--help").status, 0);
   for (const char* command :
-       {"list", "info", "grab", "record", "replay", "render", "doctor", "completion"}) {
+       {"list", "info", "grab", "record", "replay", "pose", "set", "trigger", "render", "compare", "doctor",
+        "compliance", "completion"}) {
     const Ran ran = toftwin(std::string{command} + " --help");
     EXPECT_EQ(ran.status, 0) << command;
     EXPECT_THAT(ran.out, HasSubstr("Examples:")) << command;
@@ -74,8 +90,7 @@ TEST(Toftwin, WhatIsNotThereIsStatus4) {
   EXPECT_EQ(toftwin("info /no/such/file.mcap").status, 4);
   EXPECT_EQ(toftwin("info /no/such/file.toml").status, 4);
   EXPECT_EQ(toftwin("replay /no/such/file.mcap").status, 4);
-  EXPECT_EQ(toftwin("grab kinect -o a.jpeg").status, 4);
-  EXPECT_EQ(toftwin("grab kinect -o a.png --plane distance").status, 4);
+  EXPECT_EQ(toftwin("compare a b --poses /no/such/poses.toml").status, 4);
   EXPECT_THAT(toftwin("info preset:kinekt").err, HasSubstr("kinect_v2"));
 }
 
@@ -143,6 +158,12 @@ TEST_F(Recorded, ReplayExportsFrames) {
   EXPECT_TRUE(std::filesystem::exists(folder_ / "f-0004.npy"));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "f-0005.npy"));
   EXPECT_EQ(all.err, "") << "no progress bar where standard error is no terminal";
+}
+
+TEST_F(Recorded, AStartPastTheEndIsStatus4AndTellsTheLength) {
+  const Ran ran = toftwin("replay " + path("a.mcap") + " --from 2");
+  EXPECT_EQ(ran.status, 4);
+  EXPECT_THAT(ran.err, HasSubstr("--from 2 is past its end: it is 1.900000 s long"));
 }
 
 TEST_F(Recorded, FewerFramesThanAskedForIsStatus7) {
@@ -221,6 +242,30 @@ TEST_F(Render, SameSeedSameBytesAndAnotherSeedOthers) {
   EXPECT_NE(bytesOf(folder_ / "a.npy"), bytesOf(folder_ / "c.npy"));
 }
 
+TEST_F(Render, HasThePlanesThatASourceHas) {
+  const auto file = [&](const char* name) { return (folder_ / name).string(); };
+  ASSERT_EQ(render("-o " + file("depth.csv") + " --plane depth,range").status, 0);
+  std::ifstream lines{folder_ / "depth.csv"};
+  std::string heading;
+  while (std::getline(lines, heading) && heading.starts_with('#')) {
+  }
+  EXPECT_THAT(heading, HasSubstr("depth"));
+  // Two frequencies: four samples, or a complex number, for each.
+  EXPECT_THAT(render("-o " + file("s.npy") + " --plane samples").out, HasSubstr("shape (8, 240, 320)"));
+  EXPECT_THAT(render("-o " + file("p.npy") + " --plane phasors").out, HasSubstr("shape (4, 240, 320)"));
+}
+
+TEST(RenderDefaults, AreThoseOfASimulatedSource) {
+  const Folder folder;
+  const auto out = [&](const char* name) { return "'" + (folder / name).string() + "'"; };
+  ASSERT_EQ(toftwin("render --camera generic_cw -o " + out("r.npy")).status, 0);
+  ASSERT_EQ(toftwin("render --camera generic_cw -o " + out("s.npy") +
+                    " --samples 4 --surfaces 4 --seed 1 --since-power-on 10800")
+                .status,
+            0);
+  EXPECT_EQ(record::bytesOf(folder / "r.npy"), record::bytesOf(folder / "s.npy"));
+}
+
 TEST_F(Render, ASceneThatIsWrongNamesFileAndLine) {
   std::ofstream{folder_ / "wall.toml"} << "[[object]]\nshape = 'triangle'\n";
   const Ran ran = render("-o /tmp/never.png");
@@ -259,6 +304,12 @@ TEST(Completion, TheBashScriptCompletesCommandsAndOptions) {
   EXPECT_EQ(complete("toftwin re", 1), "record replay render\n");
   EXPECT_EQ(complete("toftwin grab --pl", 2), "--plane\n");
   EXPECT_EQ(complete("toftwin completion z", 2), "zsh\n");
+  EXPECT_EQ(complete("toftwin completion m", 2), "manual\n");
+  EXPECT_EQ(complete("toftwin grab kinect --plane truth_r", 4), "truth_range\n");
+  EXPECT_EQ(complete("toftwin render --camera kin", 3), "kinect_v2\n");
+  EXPECT_EQ(complete("toftwin replay --pace f", 3), "fast\n");
+  EXPECT_EQ(complete("toftwin render --scene " + (folder / "tof").string(), 3),
+            (folder / "toftwin").string() + "\n");
 }
 
 TEST(Completion, TheScriptsOfTheOtherShellsNameEveryOption) {

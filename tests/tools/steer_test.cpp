@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// `toftwin pose`, `set`, `trigger`, `compliance`, and what `list` says of a camera that is not there.
+// `toftwin pose`, `set`, `trigger`, `compliance`, and what `list` says of a camera that is not
+// there.
 #include "with_daemon.h"
 
 namespace toftwin::cli {
@@ -72,7 +73,8 @@ TEST_F(Steered, AnAbsentCameraIsListedAsAbsentWithTheReason) {
   EXPECT_THAT(list.out, HasSubstr("absent"));
   EXPECT_THAT(list.out, HasSubstr("there is no camera pattern:9"));
   EXPECT_THAT(list.out, Not(HasSubstr("real")));
-  EXPECT_THAT(run("list --json").out, HasSubstr("\"problem\": \"" + (folder_ / "toftwind").string()));
+  EXPECT_THAT(run("list --json").out,
+              HasSubstr("\"problem\": \"" + (folder_ / "toftwind").string()));
   EXPECT_EQ(run("grab absent -o " + path("a.png")).status, 3);
 }
 

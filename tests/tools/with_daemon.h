@@ -43,6 +43,10 @@ class Background {
   int end(int signal) {
     if (pid_ <= 0) return -1;
     ::kill(pid_, signal);
+    return wait();
+  }
+  /// Its exit status when it ends by itself; -1 if a signal killed it.
+  int wait() {
     int status = 0;
     ::waitpid(std::exchange(pid_, -1), &status, 0);
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;

@@ -7,8 +7,8 @@ namespace toftwin::cli {
 
 std::span<const Command> commands() {
   static const std::array kCommands{
-      listCommand(),   infoCommand(),    grabCommand(),   recordCommand(),     replayCommand(),
-      poseCommand(),   setCommand(),     triggerCommand(), renderCommand(),    compareCommand(),
+      listCommand(),   infoCommand(),       grabCommand(),       recordCommand(), replayCommand(),
+      poseCommand(),   setCommand(),        triggerCommand(),    renderCommand(), compareCommand(),
       doctorCommand(), complianceCommand(), completionCommand(),
   };
   return kCommands;

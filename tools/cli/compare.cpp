@@ -80,10 +80,6 @@ Result<Exit> compareThem(const Options& options) {
   catchInterrupts();
   Opened a, b;
   if (!options.sources.empty()) {
-    if (options.sources.size() != 2) {
-      return Error{Error::Code::InvalidArgument,
-                   "name two sources, A and B, or none to judge the simulator only"};
-    }
     auto opened_a = open(options.sources[0], options.daemon);
     if (!opened_a) return opened_a.error();
     auto opened_b = open(options.sources[1],
@@ -113,8 +109,8 @@ Run add(CLI::App& app) {
                  "simulator against real measurements")
       ->expected(0, 2);
   app.add_option("--poses", options->poses,
-                 "pose file; both cameras are captured at each pose. Without it: where they are")
-      ->check(CLI::ExistingFile);
+                 "pose file; both cameras are captured at each pose, and then put back. Without it: where "
+                 "they are");
   app.add_option("--frames", options->frames, "frames of each camera at each pose")
       ->check(CLI::Range(2, 100'000))
       ->capture_default_str();
@@ -131,6 +127,11 @@ Run add(CLI::App& app) {
       ->capture_default_str();
   app.add_option("-o,--output", options->output, "folder of the report")->capture_default_str();
   app.add_option("--note", options->note, "for the report's foot, such as a commit");
+  checkUsage(app, [options]() -> Result<> {
+    if (options->sources.size() != 1) return {};
+    return Error{Error::Code::InvalidArgument,
+                 "name two sources, A and B, or none to judge the simulator only"};
+  });
   return [options] { return compareThem(*options); };
 }
 

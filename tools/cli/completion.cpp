@@ -4,10 +4,13 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 
+#include "sim/sensor/sensor_model.h"
 #include "tools/cli/command.h"
+#include "tools/cli/options.h"
 
 namespace toftwin::cli {
 namespace {
@@ -34,37 +37,91 @@ std::string quoted(std::string text) {
   return "'" + text + "'";
 }
 
+/// What bash offers in the place of the value of an option: words, files, or nothing that is known.
+std::string valueCase(const CLI::Option& option) {
+  std::string pattern, action;
+  for (const std::string& word : wordsOf(option)) pattern += (pattern.empty() ? "" : "|") + word;
+  const auto& names = option.get_lnames();
+  const auto is = [&](std::string_view name) {
+    return std::ranges::find(names, name) != names.end();
+  };
+  std::string words;
+  if (is("plane")) words = planeNames();
+  if (is("camera")) words = fmt::format("{}", fmt::join(sim::SensorModel::presetNames(), " "));
+  if (is("pace")) words = "exact fast";
+  if (is("source"))
+    return fmt::format("      {}) offer \"$(toftwin list --names 2> /dev/null)\"; return ;;\n",
+                       pattern);
+  std::ranges::replace(words, ',', ' ');
+  if (!words.empty())
+    return fmt::format("      {}) offer {}; files; return ;;\n", pattern, quoted(words));
+  return fmt::format("      {}) files; return ;;\n", pattern);
+}
+
+constexpr const char* kBashPositional = R"bash(  local -a given=()
+  local word
+  for word in "${COMP_WORDS[@]:2:$((COMP_CWORD - 2))}"; do
+    [[ $word == -* ]] || given+=("$word")
+  done
+  case "$command" in
+    grab|record|pose|trigger) offer "$(toftwin list --names 2> /dev/null)" ;;
+    info|compare) offer "$(toftwin list --names 2> /dev/null)"; files ;;
+    set)
+      if [ ${#given[@]} -eq 0 ]; then
+        offer "$(toftwin list --names 2> /dev/null)"
+      elif [ ${#given[@]} -eq 1 ]; then
+        offer "$(toftwin set "${given[0]}" 2> /dev/null | while read -r word _; do echo "$word"; done)"
+      fi ;;
+    compliance)
+      offer "$(toftwin list --drivers 2> /dev/null | while read -r word _; do [[ $word == *:* ]] && echo "$word"; done)"
+      files
+      declare -F __ltrim_colon_completions > /dev/null && __ltrim_colon_completions "$current" ;;
+    completion) offer 'bash zsh fish manual' ;;
+    *) files ;;
+  esac
+)bash";
+
 std::string bash(CLI::App& app) {
-  std::string cases, names;
+  std::string names, options, values;
   for (CLI::App* sub : subcommandsOf(app)) {
     names += " " + sub->get_name();
-    std::string words;
+    std::string words, cases;
     for (const CLI::Option* option : optionsOf(*sub)) {
       for (const std::string& word : wordsOf(*option)) words += " " + word;
+      if (option->get_expected_max() != 0) cases += valueCase(*option);
     }
-    cases += fmt::format("    {}) words={} ;;\n", sub->get_name(), quoted(words.substr(1)));
+    options += fmt::format("    {}) options={} ;;\n", sub->get_name(), quoted(words.substr(1)));
+    if (!cases.empty())
+      values +=
+          fmt::format("    {}) case \"$before\" in\n{}      esac ;;\n", sub->get_name(), cases);
   }
-  return fmt::format(
-      "# bash completion for toftwin; made by `toftwin completion bash`\n"
-      "_toftwin() {{\n"
-      "  local current=${{COMP_WORDS[COMP_CWORD]}} command=${{COMP_WORDS[1]}} words\n"
-      "  if [ \"$COMP_CWORD\" -eq 1 ]; then\n"
-      "    COMPREPLY=($(compgen -W '{} --help --version' -- \"$current\"))\n"
-      "    return\n"
-      "  fi\n"
-      "  case \"$command\" in\n{}"
-      "  esac\n"
-      "  case \"$current\" in\n"
-      "    -*) COMPREPLY=($(compgen -W \"$words\" -- \"$current\")) ;;\n"
-      "    *) [ \"$command\" = completion ] && COMPREPLY=($(compgen -W 'bash zsh fish' -- "
-      "\"$current\"))\n"
-      "       [ \"$command\" = grab ] || [ \"$command\" = record ] || [ \"$command\" = info ] &&\n"
-      "         COMPREPLY=($(compgen -W \"$(toftwin list --names 2> /dev/null)\" -- \"$current\")) "
-      ";;\n"
-      "  esac\n"
-      "}}\n"
-      "complete -o bashdefault -o default -F _toftwin toftwin\n",
-      names.substr(1), cases);
+  return "# bash completion for toftwin; made by `toftwin completion bash`\n"
+         "_toftwin() {\n"
+         "  local current=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD-1]}\n"
+         "  local command=${COMP_WORDS[1]} options=''\n"
+         "  offer() { COMPREPLY+=($(compgen -W \"$1\" -- \"$current\")); }\n"
+         "  files() { local IFS=$'\\n'; compopt -o filenames 2> /dev/null;\n"
+         "            COMPREPLY+=($(compgen -f -- \"$current\")); }\n"
+         "  COMPREPLY=()\n"
+         "  if [ \"$COMP_CWORD\" -eq 1 ]; then\n"
+         "    offer '" +
+         names.substr(1) +
+         " --help --version'\n"
+         "    return\n"
+         "  fi\n"
+         "  case \"$command\" in\n" +
+         options +
+         "  esac\n"
+         "  case \"$command\" in\n" +
+         values +
+         "  esac\n"
+         "  if [[ $current == -* ]]; then\n"
+         "    offer \"$options\"\n"
+         "    return\n"
+         "  fi\n" +
+         kBashPositional +
+         "}\n"
+         "complete -F _toftwin toftwin\n";
 }
 
 std::string zsh(CLI::App& app) {

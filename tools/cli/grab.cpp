@@ -33,10 +33,32 @@ SubscribeOptions subscriptionFor(const Options& options) {
   return wanted;
 }
 
+/// Why no frame came in time, and what to do.
+std::string whyNone(const SourceDetails& details, double timeout_s) {
+  const std::string name = details.entry.name;
+  const std::string longer = fmt::format("--timeout {:.6g} waits longer", 20.0 * timeout_s);
+  if (details.can_trigger) {
+    return fmt::format(
+        "no frame came within {:.6g} s. {} takes one when it is triggered (toftwin "
+        "trigger {}); {}",
+        timeout_s, name, name, longer);
+  }
+  if (details.entry.kind == FrameKind::Simulated) {
+    return fmt::format(
+        "no frame came within {:.6g} s. The simulator may still be tracing the first "
+        "view from this pose; {}, fewer samples_per_pixel in its [[source]] are "
+        "faster",
+        timeout_s, longer);
+  }
+  return fmt::format("no frame came within {:.6g} s; `toftwin doctor` says how {} is, {}",
+                     timeout_s, name, longer);
+}
+
 Result<Exit> run(Options& options) {
-  if (auto checked = options.output.check(); !checked) return checked.error();
   auto client = options.daemon.connect();
   if (!client) return client.error();
+  const auto details = client->describe(options.source);
+  if (!details) return details.error();
   auto frames = client->subscribe(options.source, subscriptionFor(options));
   if (!frames) return frames.error();
   catchInterrupts();
@@ -45,11 +67,13 @@ Result<Exit> run(Options& options) {
   {
     Progress progress{"frames", options.count};
     for (std::uint64_t i = 0; i < options.skip + options.count; ++i) {
-      if (interrupted()) return Exit::Interrupted;
-      const auto frame = frames->next(options.daemon.timeout());
+      const auto frame = waitForFrame(*frames, options.daemon.timeout());
       if (!frame) {
-        return Error{frame.error().code, fmt::format("{} of {} frames written: {}", written,
-                                                     options.count, frame.error().message)};
+        const bool is_late = frame.error().code == Error::Code::Timeout;
+        return Error{frame.error().code,
+                     fmt::format("{} of {} frames written: {}", written, options.count,
+                                 is_late ? whyNone(*details, options.daemon.timeout_s)
+                                         : frame.error().message)};
       }
       if (i < options.skip) continue;
       const std::string file = numbered(options.output.file, written, options.count > 1);
@@ -94,6 +118,7 @@ Command grabCommand() {
             ->check(CLI::Range(1, 64))
             ->capture_default_str();
         options->daemon.add(app);
+        checkUsage(app, [options] { return options->output.check(); });
         return [options] { return run(*options); };
       }};
 }

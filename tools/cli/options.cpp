@@ -4,7 +4,12 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+
 #include <toftwin/names.h>
+
+#include "tools/cli/terminal.h"
 
 namespace toftwin::cli {
 
@@ -63,9 +68,48 @@ void OutputOptions::add(CLI::App& app, bool required) {
   app.add_flag("--world", how.world, "PLY: in world coordinates, if the camera knows its pose");
 }
 
+namespace {
+
+/// What was given although it means nothing for this kind of file.
+Result<> fits(Format format, const ExportOptions& how) {
+  struct Rule {
+    const char* option;
+    bool is_given;
+    bool has_meaning;
+    const char* meant_for;
+  };
+  const ExportOptions none;
+  const bool is_png = format == Format::Png, is_csv = format == Format::Csv;
+  const std::array rules{
+      Rule{"--row", how.row.has_value(), is_csv, ".csv"},
+      Rule{"--world", how.world, format == Format::Ply, ".ply"},
+      Rule{"--color", how.color, is_png, ".png"},
+      Rule{"--scale", how.mm_per_count != none.mm_per_count, is_png && !how.color,
+           ".png without --color"},
+      Rule{"--channel", how.channel != none.channel, is_png || is_csv, ".png and .csv"},
+      Rule{"--min", how.min.has_value(), is_png && how.color, ".png with --color"},
+      Rule{"--max", how.max.has_value(), is_png && how.color, ".png with --color"},
+  };
+  for (const Rule& rule : rules) {
+    if (rule.is_given && !rule.has_meaning) {
+      return Error{Error::Code::InvalidArgument,
+                   fmt::format("{} has a meaning for {} only", rule.option, rule.meant_for)};
+    }
+  }
+  if (how.min && how.max && !(*how.min < *how.max)) {
+    return Error{Error::Code::InvalidArgument,
+                 fmt::format("--min {} must be less than --max {}", *how.min, *how.max)};
+  }
+  return {};
+}
+
+}  // namespace
+
 Result<> OutputOptions::check() {
   if (!file.empty()) {
-    if (const auto format = formatOf(file); !format) return format.error();
+    const auto format = formatOf(file);
+    if (!format) return format.error();
+    if (auto fitting = fits(*format, how); !fitting) return fitting;
   }
   how.planes.clear();
   for (const std::string& name : plane_names) {
@@ -77,6 +121,24 @@ Result<> OutputOptions::check() {
     how.planes.push_back(*kind);
   }
   return {};
+}
+
+void checkUsage(CLI::App& app, std::function<Result<>()> check) {
+  app.callback([check = std::move(check)] {
+    if (const auto checked = check(); !checked) throw CLI::ValidationError{checked.error().message};
+  });
+}
+
+Result<Frame> waitForFrame(Subscription& frames, std::chrono::milliseconds timeout) {
+  constexpr std::chrono::milliseconds kPatience{200};  // until Ctrl-C is looked for again
+  const auto end = std::chrono::steady_clock::now() + timeout;
+  while (true) {
+    if (interrupted()) return Error{Error::Code::Stopped, "interrupted"};
+    const auto left =
+        std::chrono::ceil<std::chrono::milliseconds>(end - std::chrono::steady_clock::now());
+    auto frame = frames.next(std::clamp(left, std::chrono::milliseconds{0}, kPatience));
+    if (frame || frame.error().code != Error::Code::Timeout || left <= kPatience) return frame;
+  }
 }
 
 std::string numbered(const std::string& file, std::uint64_t number, bool several) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -36,9 +37,16 @@ struct OutputOptions {
   std::vector<std::string> plane_names;
   ExportOptions how;
   void add(CLI::App& app, bool required);
-  /// Checks the names and puts them into `how`; an unknown extension is an error before any work.
+  /// Puts the names into `how`. An unknown extension or plane, and an option that means nothing for
+  /// this kind of file, are errors of the command line, before any work.
   Result<> check();
 };
+
+/// Has `check` called when the command line is read; its error is one of usage (Exit::Usage).
+void checkUsage(CLI::App& app, std::function<Result<>()> check);
+
+/// The next frame, or Stopped soon after Ctrl-C.
+Result<Frame> waitForFrame(Subscription& frames, std::chrono::milliseconds timeout);
 
 /// "frame.png", or "frame-0007.png" where there are several.
 std::string numbered(const std::string& file, std::uint64_t number, bool several);

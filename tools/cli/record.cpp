@@ -101,7 +101,12 @@ Result<Exit> recordHere(const Options& options) {
     if (const auto details = client->describe(source); !details) return details.error();
   }
   auto writer = record::Writer::create(options.file, {.overwrite = options.force});
-  if (!writer) return writer.error();
+  if (!writer) {
+    using Code = Error::Code;
+    const Code code = writer.error().code;
+    const bool is_place = code == Code::NotFound || code == Code::PermissionDenied;
+    return Error{is_place ? Code::StorageFull : code, writer.error().message};
+  }
   catchInterrupts();
   Recording recording{.mutex = {}, .writer = std::move(writer).value(), .dropped = 0, .error = {}};
   const auto recorded = recordAll(options, *client, recording);
@@ -117,7 +122,6 @@ Result<Exit> recordHere(const Options& options) {
 Result<Exit> recordOnDaemon(const Options& options) {
   auto client = options.daemon.connect();
   if (!client) return client.error();
-  catchInterrupts();
   for (const std::string& source : options.sources) {
     const auto answer =
         options.stop ? client->stopRecording(source) : client->startRecording(source, options.file);
@@ -125,27 +129,20 @@ Result<Exit> recordOnDaemon(const Options& options) {
     fmt::print("{}: {} {} on the daemon's machine\n", source,
                options.stop ? "recorded" : "recording into", *answer);
   }
-  if (options.stop || options.duration_s <= 0) return Exit::Ok;
-  Progress progress{"seconds", static_cast<std::uint64_t>(options.duration_s)};
-  const auto end =
-      std::chrono::steady_clock::now() + std::chrono::duration<double>(options.duration_s);
-  while (std::chrono::steady_clock::now() < end && !interrupted()) {
-    std::this_thread::sleep_for(std::chrono::milliseconds{50});
-    const double left =
-        std::chrono::duration<double>(end - std::chrono::steady_clock::now()).count();
-    progress.show(static_cast<std::uint64_t>(std::max(0.0, options.duration_s - left)));
-  }
-  for (const std::string& source : options.sources) {
-    const auto stopped = client->stopRecording(source);
-    if (!stopped) return stopped.error();
-    fmt::print("{}: recorded {} on the daemon's machine\n", source, *stopped);
-  }
   return Exit::Ok;
 }
 
-Result<Exit> run(const Options& options) {
+Result<> checkOptions(const Options& options) {
   if (options.file.empty() && !options.stop) {
     return Error{Error::Code::InvalidArgument, "say where to record with -o FILE.mcap"};
+  }
+  if (!options.file.empty() && std::filesystem::path{options.file}.extension() != ".mcap") {
+    return Error{Error::Code::InvalidArgument,
+                 fmt::format("-o {}: a recording is an MCAP file: name it FILE.mcap", options.file)};
+  }
+  if (options.stop && !options.file.empty()) {
+    return Error{Error::Code::InvalidArgument,
+                 "--stop ends the recording that there is: leave -o out"};
   }
   if (options.on_daemon && !options.stop && options.sources.size() > 1) {
     return Error{Error::Code::InvalidArgument,
@@ -153,8 +150,13 @@ Result<Exit> run(const Options& options) {
   }
   if (options.on_daemon && (options.count > 0 || options.duration_s > 0.0)) {
     return Error{Error::Code::InvalidArgument,
-                 "a recording on the daemon runs until `--on-daemon --stop`: leave -n and --duration out"};
+                 "a recording on the daemon runs until `--on-daemon --stop`: leave -n and --duration "
+                 "out"};
   }
+  return {};
+}
+
+Result<Exit> run(const Options& options) {
   return options.on_daemon || options.stop ? recordOnDaemon(options) : recordHere(options);
 }
 
@@ -188,6 +190,7 @@ Command recordCommand() {
             app.add_flag("--stop", options->stop,
                          "end a recording that was started with --on-daemon");
             options->daemon.add(app);
+            checkUsage(app, [options] { return checkOptions(*options); });
             return [options] { return run(*options); };
           }};
 }

@@ -2,6 +2,11 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include <algorithm>
+
+#include "drivers/sim/default_scene.h"
+#include "drivers/sim/keys.h"
+#include "sim/sensor/frame_assembly.h"
 #include "sim/sensor/sensor_model.h"
 #include "sim/tracer/scene.h"
 #include "sim/tracer/trace.h"
@@ -14,19 +19,17 @@
 namespace toftwin::cli {
 namespace {
 
+/// As a [[source]] with driver = "sim", whose defaults these are.
 struct Options {
   OutputOptions output;
-  std::string camera;
+  PoseOptions pose;
   std::string scene;
-  std::vector<double> position_m{0.0, 0.0, 0.0};
-  std::vector<double> look_at_m;
-  std::vector<double> up{0.0, -1.0, 0.0};
-  int samples = 16;
-  int surfaces = 16;
-  std::uint64_t seed = 0;
+  std::string camera;
+  drivers::simulator::Keys keys;
+  double since_power_on_s = drivers::simulator::Keys{}.powered_on_before.in(second);
+  double ambient_klx = drivers::simulator::Keys{}.ambient.in(kilolux);
+  double room_temperature_c = drivers::simulator::Keys{}.room_temperature.in(celsius);
   std::uint64_t frame = 0;
-  double since_power_on_s = 3600.0;
-  std::optional<double> ambient_klx;
 };
 
 Result<sim::SensorModel> loadCamera(const std::string& camera) {
@@ -39,61 +42,63 @@ std::string presetHelp() {
                      fmt::join(sim::SensorModel::presetNames(), ", "));
 }
 
-Plane normalsOf(const Image<Vec3f>& normal) {
-  std::vector<float> planar(3 * normal.size());
-  for (std::size_t i = 0; i < normal.size(); ++i) {
-    planar[i] = normal[i].x;
-    planar[normal.size() + i] = normal[i].y;
-    planar[2 * normal.size() + i] = normal[i].z;
-  }
-  return {PlaneKind::TruthNormal,          ElementType::F32, normal.width(), normal.height(), 3,
-          Buffer::adopt(std::move(planar))};
+Result<sim::Scene> loadScene(const std::string& scene) {
+  return scene.empty() ? sim::Scene::parse(drivers::simulator::kDefaultScene, "default scene")
+                       : sim::Scene::load(scene);
 }
 
-Frame frameOf(const sim::SensorModel& model, const sim::Scene& scene, const Moment& moment,
-              std::uint64_t seed, sim::SensorModel::Exposed exposed, sim::Truth truth) {
-  Frame frame;
-  frame.source = model.model();
-  frame.moment = moment;
-  frame.camera = model.camera();
-  frame.provenance = {
-      FrameKind::Simulated, model.camera().calibration_id, scene.id(), model.id(), seed,
-      model.effectNames()};
-  frame.planes = {toPlane(PlaneKind::Range, std::move(exposed.range.range_m)),
-                  toPlane(PlaneKind::Amplitude, std::move(exposed.range.amplitude)),
-                  toPlane(PlaneKind::Ambient, std::move(exposed.range.ambient)),
-                  toPlane(PlaneKind::Flags, std::move(exposed.range.flags)),
-                  toPlane(PlaneKind::TruthRange, std::move(truth.range_m)),
-                  normalsOf(truth.normal)};
-  return frame;
+/// Those of a simulated source, and what was asked for besides.
+std::vector<PlaneKind> planesFor(const std::vector<PlaneKind>& wanted) {
+  const auto all = sim::allPlanes();
+  std::vector<PlaneKind> kinds{all.begin(), all.begin() + drivers::simulator::kDefaultPlanes};
+  for (const PlaneKind kind : wanted) {
+    const bool is_new = std::ranges::find(kinds, kind) == kinds.end();
+    if (is_new && std::ranges::find(all, kind) != all.end()) kinds.push_back(kind);
+  }
+  return kinds;
+}
+
+sim::TraceRequest requestFor(const Options& options, const sim::SensorModel& model,
+                             const Transform<World, Camera>& pose) {
+  sim::TraceRequest request = model.traceRequest();
+  request.world_from_camera = pose;
+  request.samples_per_pixel = options.keys.samples_per_pixel;
+  request.max_surfaces = options.keys.max_surfaces;
+  request.pixel_extent = options.keys.pixel_extent;
+  request.seed = options.keys.seed;
+  return request;
+}
+
+Moment momentFor(const Options& options, const sim::SensorModel& model,
+                 const Transform<World, Camera>& pose) {
+  Moment moment;
+  moment.exposures = model.exposures({});
+  moment.since_power_on = options.since_power_on_s * second;
+  moment.temperatures = {{"room", options.room_temperature_c * celsius}};
+  moment.ambient = options.ambient_klx * kilolux;
+  moment.world_from_camera = pose;
+  return moment;
 }
 
 Result<Exit> run(Options& options) {
-  if (auto checked = options.output.check(); !checked) return checked.error();
   const auto model = loadCamera(options.camera);
   if (!model) return model.error();
-  const auto scene = sim::Scene::load(options.scene);
+  const auto scene = loadScene(options.scene);
   if (!scene) return scene.error();
-  const auto pose = lookFrom(options.position_m, options.look_at_m, options.up);
+  const auto pose = options.pose.pose();
   if (!pose) return pose.error();
-
-  sim::TraceRequest request = model->traceRequest();
-  request.world_from_camera = *pose;
-  request.samples_per_pixel = options.samples;
-  request.max_surfaces = options.surfaces;
-  request.seed = options.seed;
   catchInterrupts();
-  auto light = traceInBands(*scene, request);
+  const auto light = traceInBands(*scene, requestFor(options, *model, *pose));
   if (!light) return light.error();
 
-  Moment moment;
-  moment.exposures = model->exposures({});
-  if (options.ambient_klx) moment.ambient = *options.ambient_klx * kilolux;
-  moment.since_power_on = options.since_power_on_s * second;
-  moment.world_from_camera = *pose;
-  auto exposed = model->expose(*light, moment, options.seed, options.frame);
-  const Frame frame =
-      frameOf(*model, *scene, moment, options.seed, std::move(exposed), std::move(light->truth));
+  Frame frame;
+  frame.source = model->model();
+  frame.moment = momentFor(options, *model, *pose);
+  frame.camera = model->camera();
+  frame.provenance = sim::provenanceOf(*model, scene->id(), options.keys.seed);
+  frame.planes =
+      sim::planesOf(*model, model->expose(*light, frame.moment, options.keys.seed, options.frame),
+                    light->truth, planesFor(options.output.how.planes));
   const auto note = exportFrame(frame, options.output.file, options.output.how);
   if (!note) return note.error();
   fmt::print("{}: {}\n", options.output.file, *note);
@@ -104,37 +109,32 @@ Result<Exit> run(Options& options) {
 
 Command renderCommand() {
   return {
-      "render", "one frame of the simulator, without a daemon",
-      "  toftwin render --camera kinect_v2 --scene room.toml -o range.png\n"
+      "render", "one frame of the simulator, without a daemon; defaults as of a simulated source",
+      "  toftwin render --camera kinect_v2 -o range.png\n"
       "  toftwin render --camera my_camera.toml --scene room.toml -o cloud.ply --position 0,0,-1 "
       "--look-at 0,0,2\n"
-      "  toftwin render --camera kinect_v2 --scene room.toml -o truth.npy --plane truth_range\n",
+      "  toftwin render --camera kinect_v2 --scene room.toml -o truth.npy --plane truth_range\n"
+      "  toftwin render --camera kinect_v2 --samples 64 -o raw.npy --plane samples\n",
       [](CLI::App& app) -> Run {
         const auto options = std::make_shared<Options>();
         app.add_option("--camera", options->camera, presetHelp())->required();
-        app.add_option("--scene", options->scene, "scene file (.toml)")->required();
+        app.add_option("--scene", options->scene,
+                       "scene file (.toml); default: a box before a wall");
         options->output.add(app, true);
-        app.add_option("--position", options->position_m,
-                       "place of the camera in the world: X,Y,Z in metres")
-            ->delimiter(',')
-            ->expected(3);
-        app.add_option(
-               "--look-at", options->look_at_m,
-               "a point on the camera's axis: X,Y,Z in metres; default: along the world's z")
-            ->delimiter(',')
-            ->expected(3);
-        app.add_option("--up", options->up,
-                       "what is up in the world, for --look-at; default: 0,-1,0")
-            ->delimiter(',')
-            ->expected(3);
-        app.add_option("--samples", options->samples, "light paths per pixel")
-            ->check(CLI::Range(1, 1'000'000))
+        options->pose.add(app);
+        app.add_option("--samples", options->keys.samples_per_pixel, "light paths per pixel")
+            ->check(CLI::Range(1, 65'536))
             ->capture_default_str();
-        app.add_option("--surfaces", options->surfaces,
+        app.add_option("--surfaces", options->keys.max_surfaces,
                        "surfaces that a path may meet; 1: direct light only")
-            ->check(CLI::Range(1, 1000))
+            ->check(CLI::Range(1, 64))
             ->capture_default_str();
-        app.add_option("--seed", options->seed, "of the light paths and the noise")
+        app.add_option(
+               "--pixel-extent", options->keys.pixel_extent,
+               "side of a pixel's footprint in pixels; 0: its central ray, no flying pixels")
+            ->check(CLI::Range(0.0, 4.0))
+            ->capture_default_str();
+        app.add_option("--seed", options->keys.seed, "of the light paths and the noise")
             ->capture_default_str();
         app.add_option("--frame", options->frame,
                        "number of the frame: another one has other noise")
@@ -145,7 +145,12 @@ Command renderCommand() {
             ->capture_default_str();
         app.add_option("--ambient-klx", options->ambient_klx,
                        "ambient light at the scene, in kilolux")
-            ->check(CLI::NonNegativeNumber);
+            ->check(CLI::Range(0.0, 200.0))
+            ->capture_default_str();
+        app.add_option("--room-temperature-c", options->room_temperature_c, "in degrees Celsius")
+            ->check(CLI::Range(-40.0, 100.0))
+            ->capture_default_str();
+        checkUsage(app, [options] { return options->output.check(); });
         return [options] { return run(*options); };
       }};
 }

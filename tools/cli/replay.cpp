@@ -97,8 +97,31 @@ Result<Exit> exportFrames(const Options& options, record::Reader& reader) {
   return ran;
 }
 
+Result<> checkOptions(Options& options) {
+  if (options.should_serve && !options.output.file.empty()) {
+    return Error{Error::Code::InvalidArgument,
+                 "--serve hands the frames to clients, -o writes them to files: choose one"};
+  }
+  if (options.should_serve && (options.from_s > 0 || options.count > 0)) {
+    return Error{Error::Code::InvalidArgument,
+                 "--serve plays the whole recording: leave --from and -n out"};
+  }
+  return options.output.check();
+}
+
+/// Goes to --from, which must lie in the recording.
+Result<> seek(record::Reader& reader, double from_s, const std::string& file) {
+  const record::Summary& summary = reader.summary();
+  const double length_s = 1e-9 * static_cast<double>(summary.last_ns - summary.first_ns);
+  if (from_s > length_s) {
+    return Error{Error::Code::InvalidArgument,
+                 fmt::format("{}: --from {:.6g} is past its end: it is {:.6f} s long", file, from_s,
+                             length_s)};
+  }
+  return reader.seek(summary.first_ns + std::llround(from_s * 1e9));
+}
+
 Result<Exit> run(Options& options) {
-  if (auto checked = options.output.check(); !checked) return checked.error();
   auto reader = record::Reader::open(options.file);
   if (!reader) return reader.error();
   const record::Summary& summary = reader->summary();
@@ -112,8 +135,7 @@ Result<Exit> run(Options& options) {
   }
   if (options.should_serve) return serve(options.file, options.source, summary, options.serve);
   if (options.from_s > 0) {
-    if (auto sought = reader->seek(summary.first_ns + std::llround(options.from_s * 1e9)); !sought)
-      return sought.error();
+    if (auto sought = seek(*reader, options.from_s, options.file); !sought) return sought.error();
   }
   catchInterrupts();
   if (!options.output.file.empty()) return exportFrames(options, *reader);
@@ -146,7 +168,8 @@ Command replayCommand() {
             app.add_flag("--json", options->json, "list: one JSON object a line");
             app.add_flag("--serve", options->should_serve,
                          "start a daemon that replays the file; Ctrl-C ends it");
-            options->serve.add(app);
+            options->serve.add(app, app.get_option("--serve"));
+            checkUsage(app, [options] { return checkOptions(*options); });
             return [options] { return run(*options); };
           }};
 }

@@ -18,8 +18,10 @@ namespace {
 std::string configFor(const std::string& file, const std::string& source,
                       const record::Summary& summary, const ServeOptions& options) {
   const std::string path = std::filesystem::absolute(file).string();
-  std::string toml = fmt::format("[listen]\nport = {}\nsocket = {}\n", options.port,
-                                 settings::toToml(options.socket));
+  const std::string socket =
+      options.socket.empty() ? "" : std::filesystem::absolute(options.socket).string();
+  std::string toml =
+      fmt::format("[listen]\nport = {}\nsocket = {}\n", options.port, settings::toToml(socket));
   for (const auto& [name, frames] : summary.frames_per_source) {
     if (!source.empty() && name != source) continue;
     toml += fmt::format(
@@ -44,15 +46,17 @@ std::string daemonProgram() {
 
 }  // namespace
 
-void ServeOptions::add(CLI::App& app) {
+void ServeOptions::add(CLI::App& app, CLI::Option* serve) {
   app.add_option("--port", port, "--serve: TCP port on loopback; 0: any free one")
       ->check(CLI::Range(0, 65535))
-      ->capture_default_str();
-  app.add_option("--socket", socket, "--serve: path of a Unix socket; default: none");
+      ->capture_default_str()
+      ->needs(serve);
+  app.add_option("--socket", socket, "--serve: path of a Unix socket; default: none")->needs(serve);
   app.add_option("--pace", pace, "--serve: exact: at the recorded times; fast: as fast as possible")
       ->check(CLI::IsMember({"exact", "fast"}))
-      ->capture_default_str();
-  app.add_flag("--loop", loop, "--serve: begin again at the end");
+      ->capture_default_str()
+      ->needs(serve);
+  app.add_flag("--loop", loop, "--serve: begin again at the end")->needs(serve);
 }
 
 Result<Exit> serve(const std::string& file, const std::string& source,

@@ -6,6 +6,11 @@
 #include "protocol/record/recording.h"
 #include "tools/cli/command.h"
 
+namespace CLI {
+class App;
+class Option;
+}  // namespace CLI
+
 namespace toftwin::cli {
 
 /// Options of `toftwin replay --serve`.
@@ -14,7 +19,7 @@ struct ServeOptions {
   std::string socket;
   std::string pace = "exact";
   bool loop = false;
-  void add(CLI::App& app);
+  void add(CLI::App& app, CLI::Option* serve);  ///< which each of them needs
 };
 
 /// Becomes a `toftwind` (the one beside this program, else the one in PATH) whose sources are those

@@ -4,7 +4,9 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 
@@ -37,11 +39,11 @@ void Progress::show(std::uint64_t done, std::string_view extra) {
   const double seconds = std::chrono::duration<double>(now - began_).count();
   std::string line = fmt::format("{} {}", what_, done);
   if (total_ > 0) {
-    const auto filled = static_cast<int>(kBarWidth * done / total_);
-    const double left =
-        done > 0 ? seconds * static_cast<double>(total_ - done) / static_cast<double>(done) : 0.0;
-    line = fmt::format("{} [{:#<{}}{:.<{}}] {}/{}, {:.0f} s left", what_, "", filled, "",
-                       kBarWidth - filled, done, total_, left);
+    const auto filled = static_cast<int>(kBarWidth * std::min(done, total_) / total_);
+    pace_.at(seconds, static_cast<double>(done));
+    const auto left = pace_.left(static_cast<double>(total_ - std::min(done, total_)));
+    line = fmt::format("{} [{:#<{}}{:.<{}}] {}/{}{}", what_, "", filled, "", kBarWidth - filled,
+                       done, total_, left ? fmt::format(", {:.0f} s left", std::ceil(*left)) : "");
   }
   fmt::print(stderr, "\r\033[K{}{}{}", line, extra.empty() ? "" : ", ", extra);
   std::fflush(stderr);

@@ -6,6 +6,8 @@
 #include <string>
 #include <string_view>
 
+#include "calib/compare/progress.h"
+
 namespace toftwin::cli {
 
 /// A progress bar on standard error, where that is a terminal; otherwise nothing. Redrawn at most
@@ -24,6 +26,7 @@ class Progress {
   std::uint64_t total_;
   bool is_terminal_;
   bool drawn_ = false;
+  compare::Pace pace_;
   std::chrono::steady_clock::time_point began_, drawn_at_;
 };
 

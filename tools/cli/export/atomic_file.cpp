@@ -19,7 +19,7 @@ Error cannotWrite(const std::filesystem::path& file, int number) {
                            : is_forbidden     ? "choose a folder that you may write to"
                                               : "choose another place";
   return {
-      is_forbidden ? Error::Code::PermissionDenied : Error::Code::StorageFull,
+      Error::Code::StorageFull,  // whatever keeps it from being written
       fmt::format("{}: cannot write: {}; {}", file.string(), std::strerror(number), what_to_do)};
 }
 
