@@ -31,6 +31,14 @@ void multiplyPhasors(Light& light, const Factor& factor) {
   }
 }
 
+/// Calls work(image) for every image that light consists of: the phasors, steady and ambient.
+template <class Work>
+void forEachImage(Light& light, const Work& work) {
+  for (auto& phasors : light.phasors) work(phasors);
+  work(light.steady);
+  work(light.ambient);
+}
+
 /// Phase of light that is modulated at `modulation` and takes `range` there and back: 4π f r / c.
 inline double phaseOfRange(Length range, Frequency modulation) {
   return 2.0 * std::numbers::pi * (range / unambiguousRange(modulation));

@@ -25,10 +25,17 @@ struct Samples {
   [[nodiscard]] int width() const { return electrons.empty() ? 0 : electrons.front().width(); }
   [[nodiscard]] int height() const { return electrons.empty() ? 0 : electrons.front().height(); }
   [[nodiscard]] const Image<float>& tap(std::size_t frequency, int step, int tap_index) const {
-    return electrons[(frequency * static_cast<std::size_t>(steps) +
-                      static_cast<std::size_t>(step)) *
-                         static_cast<std::size_t>(taps) +
-                     static_cast<std::size_t>(tap_index)];
+    return electrons[index(frequency, step, tap_index)];
+  }
+  [[nodiscard]] Image<float>& tap(std::size_t frequency, int step, int tap_index) {
+    return electrons[index(frequency, step, tap_index)];
+  }
+
+  /// Where in `electrons` a frequency's step and tap are.
+  [[nodiscard]] std::size_t index(std::size_t frequency, int step, int tap_index) const {
+    return (frequency * static_cast<std::size_t>(steps) + static_cast<std::size_t>(step)) *
+               static_cast<std::size_t>(taps) +
+           static_cast<std::size_t>(tap_index);
   }
 };
 

@@ -79,6 +79,20 @@ void checkHarmonics(settings::Table& table, const CameraFile& file,
   }
 }
 
+/// The temporal filter mixes in what left the camera: an effect after it would act on that again.
+void checkTemporalFilter(settings::Table& table, const std::vector<AnyEffect>& effects) {
+  bool is_there = false;
+  for (const AnyEffect& any : effects) {
+    const bool acts_on_range = std::visit(
+        []<class E>(const E&) { return std::is_same_v<ImageOf<E>, RangeImage>; }, any);
+    if (is_there && acts_on_range) {
+      table.complain("effect", "temporal_filter must be the last effect on ranges");
+      return;
+    }
+    is_there = is_there || std::holds_alternative<TemporalFilter>(any);
+  }
+}
+
 void checkWaveforms(settings::Table& table, const CameraFile& file) {
   for (const auto& modulation : file.modulations) {
     const Response response{
@@ -136,6 +150,7 @@ CameraFile readCameraFile(settings::Table& table, std::vector<AnyEffect>& effect
   }
   checkFrequencies(table, file);
   checkHarmonics(table, file, effects);
+  checkTemporalFilter(table, effects);
   if (!file.modulations.empty()) checkWaveforms(table, file);
   return file;
 }

@@ -42,6 +42,7 @@ TEST(Docs, EveryEffectHasAPageWithItsTruth) {
     EXPECT_THAT(page, HasSubstr("`" + name + "`, on " + std::string{stageOf<E>()} +
                                 ". Depends on: " + covariatesOf(E::about) + "."));
     EXPECT_THAT(page, HasSubstr("\n" + settings::markdownTable(settings::keysOf<E>())));
+    EXPECT_THAT(page, HasSubstr("](figures/" + name + ".svg)"));
     EXPECT_THAT(index,
                 HasSubstr("| [`" + name + "`](" + name + ".md) | " + std::string{stageOf<E>()} +
                           " | " + covariatesOf(E::about) + " |"));
@@ -51,6 +52,7 @@ TEST(Docs, EveryEffectHasAPageWithItsTruth) {
 TEST(Docs, NoEffectHasAPageWithoutBeing) {
   for (const auto& entry :
        std::filesystem::directory_iterator{std::string{TOFTWIN_SOURCE_DIR} + "/docs/effects"}) {
+    if (entry.is_directory()) continue;  // figures: effect_figures checks them
     const std::string page = entry.path().stem().string();
     bool is_effect = page == "README";
     AllEffects::forEach([&]<class E>() { is_effect |= page == E::about.name; });

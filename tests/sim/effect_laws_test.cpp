@@ -25,7 +25,7 @@ struct Scenario {
   double amplitude = 1.0;   ///< of the probe alone
   double range_m = 1.7;     ///< of the probe alone
   double neighbours = 3.0;  ///< radiance of a bright patch in the middle, and the background's range
-  double history = 0.7;     ///< radiance and range of the probe in the frame before, both
+  double history = 1.69;    ///< radiance and range of the probe in the frame before, both
   std::uint64_t frame = 3;
 };
 
@@ -74,7 +74,7 @@ bool isProbe(int x, int y) {
 
 Way wayAt(const Scenario& scenario, int x, int y) {
   if (isProbe(x, y)) return {scenario.amplitude, scenario.range_m};
-  if ((x == 1 || x == kWidth - 2) && (y == 1 || y == kHeight - 2)) return {0.001, 2.0};
+  if ((x == 1 || x == kWidth - 2) && (y == 1 || y == kHeight - 2)) return {0.001, 2.02};
   const bool is_patch = x >= 10 && x < kWidth - 10 && y >= 6 && y < kHeight - 6;
   return is_patch ? Way{scenario.neighbours, 0.9} : Way{0.8, 2.0 + 0.1 * (scenario.neighbours - 3.0)};
 }
