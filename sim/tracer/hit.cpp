@@ -106,21 +106,38 @@ struct PlaneLanes {
 
 bool isMissed(const RTCRayHit16& rays, std::size_t i) { return rays.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID; }
 
+TOFTWIN_INLINE void takeLane(const ObjectRow& row, const TrianglePlane& plane, std::size_t i, PlaneLanes& planes, Hits& hits) {
+  planes.normal.x[i] = plane.normal.x;
+  planes.normal.y[i] = plane.normal.y;
+  planes.normal.z[i] = plane.normal.z;
+  planes.level[i] = plane.level;
+  planes.offset[i] = plane.offset;
+  planes.margin_share[i] = plane.margin_share;
+  hits.albedo[i] = row.material.albedo;
+  hits.emission[i] = row.material.emission;
+  hits.shape_a[i] = row.material.a;
+  hits.shape_b[i] = row.material.b;
+}
+
+/// The same triangle for all lanes: what the rays of neighbouring pixels mostly meet on walls.
+TOFTWIN_VECTOR
+bool meetOneTriangle(const Scene::Impl& scene, const RTCRayHit16& rays, PlaneLanes& planes, Hits& hits) {
+  const unsigned object = rays.hit.geomID[0], primitive = rays.hit.primID[0];
+  unsigned differ = 0;
+  for (std::size_t i = 0; i < kLaneCount; ++i) differ |= (rays.hit.geomID[i] ^ object) | (rays.hit.primID[i] ^ primitive);
+  if (differ != 0 || object == RTC_INVALID_GEOMETRY_ID) return false;
+  const ObjectRow row = scene.rows[object];
+  const TrianglePlane plane = row.planes[primitive];
+  for (std::size_t i = 0; i < kLaneCount; ++i) takeLane(row, plane, i, planes, hits);
+  return true;
+}
+
 void gather(const Scene::Impl& scene, const RTCRayHit16& rays, PlaneLanes& planes, Hits& hits) {
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     const bool is_missed = isMissed(rays, i);
     const ObjectRow& row = is_missed ? scene.rows.back() : scene.rows[rays.hit.geomID[i]];
     const TrianglePlane& plane = row.planes[is_missed ? 0 : rays.hit.primID[i]];
-    planes.normal.x[i] = plane.normal.x;
-    planes.normal.y[i] = plane.normal.y;
-    planes.normal.z[i] = plane.normal.z;
-    planes.level[i] = plane.level;
-    planes.offset[i] = plane.offset;
-    planes.margin_share[i] = plane.margin_share;
-    hits.albedo[i] = row.material.albedo;
-    hits.emission[i] = row.material.emission;
-    hits.shape_a[i] = row.material.a;
-    hits.shape_b[i] = row.material.b;
+    takeLane(row, plane, i, planes, hits);
   }
 }
 
@@ -133,7 +150,7 @@ bool placeOnPlanes(const Packet& packet, const RTCRayHit16& rays, const PlaneLan
     const double dx = packet.direction.x[i], dy = packet.direction.y[i], dz = packet.direction.z[i];
     const double ox = packet.origin.x[i], oy = packet.origin.y[i], oz = packet.origin.z[i];
     const double nx = planes.normal.x[i], ny = planes.normal.y[i], nz = planes.normal.z[i], level = planes.level[i];
-    const double slope = nx * dx + ny * dy + nz * dz, per_slope = 1.0 / slope;
+    const double slope = nx * dx + ny * dy + nz * dz, per_slope = perNumber(slope);
     const double exact = (level - (nx * ox + ny * oy + nz * oz)) * per_slope;
     // A ray within the plane has no crossing; Embree's distance is then as good as any.
     const double t = std::abs(exact) < 1e300 ? exact : static_cast<double>(rays.ray.tfar[i]);
@@ -193,7 +210,7 @@ TrianglePlane planeOf(Vec3d v0, Vec3d v1, Vec3d v2) {
 void findHits(const Scene::Impl& scene, const Packet& packet, const RTCRayHit16& rays, Hits& hits) {
   PlaneLanes planes;
   Lanes<int> by_hand;
-  gather(scene, rays, planes, hits);
+  if (!meetOneTriangle(scene, rays, planes, hits)) gather(scene, rays, planes, hits);
   if (!placeOnPlanes(packet, rays, planes, hits, by_hand)) return;
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     if (by_hand[i] == 0 || isMissed(rays, i)) continue;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
+
 #include <toftwin/camera_info.h>
 #include <toftwin/geometry.h>
 
@@ -21,7 +23,23 @@ struct PixelRays {
   }
 };
 
-/// Of the pixels (u, v).
-void raysOfPixels(const CameraInfo& camera, const Lanes<int>& u, const Lanes<int>& v, PixelRays& rays);
+/// A camera's lens, ready to invert its distortion.
+class Lens {
+ public:
+  explicit Lens(const CameraInfo& camera);
+
+  /// The rays of the pixels (u, v).
+  void raysOf(const Lanes<int>& u, const Lanes<int>& v, PixelRays& rays) const;
+
+  static constexpr int kStartTerms = 8;
+  struct Start {
+    std::array<double, kStartTerms> terms;
+    double end;
+  };
+
+ private:
+  CameraInfo camera_;
+  Start start_;
+};
 
 }  // namespace toftwin::sim

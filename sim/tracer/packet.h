@@ -1,25 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
 #include <vector>
 
-#include "sim/tracer/lanes.h"
 #include "sim/tracer/random.h"
 
 namespace toftwin::sim {
 
 /// Sixteen paths on their way; lane i of each member belongs to path i.
 struct Packet {
-  Lanes<int> valid{};          ///< −1 while the path goes on
-  Vec3Lanes origin{};          ///< exact: the pinhole or a place on a surface
-  Vec3fLanes start{};          ///< what Embree gets as origin
-  Vec3Lanes direction{};       ///< unit
-  Lanes<double> length{};      ///< from the pinhole to `origin`
-  Lanes<float> throughput{};
-  Lanes<std::uint32_t> key_a{}, key_b{};  ///< of the pixel's random numbers
-  Lanes<std::uint32_t> index{};           ///< of the sample
+  Lanes<int> valid;          ///< −1 while the path goes on
+  Vec3Lanes origin;          ///< exact: the pinhole or a place on a surface
+  Vec3fLanes start;          ///< what Embree gets as origin
+  Vec3Lanes direction;       ///< unit
+  Lanes<double> length;      ///< from the pinhole to `origin`
+  Lanes<float> throughput;
+  Lanes<std::uint32_t> key_a, key_b;  ///< of the pixel's random numbers
+  Lanes<std::uint32_t> index;         ///< of the sample
 
   [[nodiscard]] PixelKey key(std::size_t lane) const { return {key_a[lane], key_b[lane]}; }
 };
@@ -36,11 +34,6 @@ struct Hits {
 /// What one packet of paths brought back, per lane.
 struct LaneSums {
   explicit LaneSums(std::size_t terms) : re(terms), im(terms) {}
-  void clear() {
-    steady = ambient = {};
-    std::fill(re.begin(), re.end(), Lanes<float>{});
-    std::fill(im.begin(), im.end(), Lanes<float>{});
-  }
   Lanes<float> steady{}, ambient{};
   std::vector<Lanes<float>> re, im;  ///< [frequency][harmonic]
 };

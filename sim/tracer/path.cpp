@@ -92,6 +92,12 @@ void gatherDirectLight(const Tracing& tracing, const Packet& packet, const Hits&
   }
 }
 
+TOFTWIN_VECTOR
+void clearSums(LaneSums& sums) {
+  sums.steady = sums.ambient = {};
+  for (auto* terms : {&sums.re, &sums.im}) std::fill(terms->begin(), terms->end(), Lanes<float>{});
+}
+
 /// Follows sixteen paths over all their surfaces.
 void followPaths(const Tracing& tracing, Packet& packet, LaneSums& sums) {
   const Dimensions dimensions = dimensionsOf(tracing);
@@ -114,79 +120,109 @@ void followPaths(const Tracing& tracing, Packet& packet, LaneSums& sums) {
   }
 }
 
-/// Starts the paths of the samples from `sample` on, each at its place on its pixel; `extent` 0: in the
-/// middle.
+/// What the starts of all paths have in common.
 TOFTWIN_VECTOR
-void startPaths(const Tracing& tracing, const Block& block, int sample, int last, double extent, Packet& packet) {
-  const auto [ax, ay, az] = tracing.camera_axes;
+void preparePacket(const Tracing& tracing, const Block& block, Packet& packet) {
   const Vec3d pinhole = tracing.pinhole;
-  for (std::size_t i = 0; i < kLaneCount; ++i) {
-    const int index = sample + block.first_sample[i];
-    packet.valid[i] = (block.is_inside[i] != 0) & (index < last) ? -1 : 0;
-    packet.index[i] = static_cast<std::uint32_t>(index);
-    const RandomPair at = randomPair({block.key_a[i], block.key_b[i]}, packet.index[i], Dimensions::kFootprint);
-    const double du = (static_cast<double>(at.u) - 0.5) * extent, dv = (static_cast<double>(at.v) - 0.5) * extent;
-    const double x = block.rays.x[i] + block.rays.x_by_u[i] * du + block.rays.x_by_v[i] * dv;
-    const double y = block.rays.y[i] + block.rays.y_by_u[i] * du + block.rays.y_by_v[i] * dv;
-    const double per_length = 1.0 / std::sqrt(x * x + y * y + 1.0);
-    packet.direction.x[i] = (ax.x * x + ay.x * y + az.x) * per_length;
-    packet.direction.y[i] = (ax.y * x + ay.y * y + az.y) * per_length;
-    packet.direction.z[i] = (ax.z * x + ay.z * y + az.z) * per_length;
-  }
+  const Vec3f start{static_cast<float>(pinhole.x), static_cast<float>(pinhole.y), static_cast<float>(pinhole.z)};
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     packet.origin.x[i] = pinhole.x;
     packet.origin.y[i] = pinhole.y;
     packet.origin.z[i] = pinhole.z;
-    packet.start.x[i] = static_cast<float>(pinhole.x);
-    packet.start.y[i] = static_cast<float>(pinhole.y);
-    packet.start.z[i] = static_cast<float>(pinhole.z);
     packet.length[i] = 0.0;
+  }
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    packet.start.x[i] = start.x;
+    packet.start.y[i] = start.y;
+    packet.start.z[i] = start.z;
     packet.throughput[i] = 1.0f;
   }
   packet.key_a = block.key_a;
   packet.key_b = block.key_b;
 }
 
+enum class Footprint { Middle, OnePlace, EvenPlaces };
+
+/// Starts the paths of the samples from `sample` on, each at its place on its pixel or in its middle.
+template <Footprint kFootprint>
+TOFTWIN_INLINE void direct(const Tracing& tracing, const Block& block, int sample, int last, Packet& packet) {
+  const auto [ax, ay, az] = tracing.camera_axes;
+  const double extent = tracing.request.pixel_extent;
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    const int index = sample + block.first_sample[i];
+    packet.valid[i] = (block.is_inside[i] != 0) & (index < last) ? -1 : 0;
+    packet.index[i] = static_cast<std::uint32_t>(index);
+    double x = block.rays.x[i], y = block.rays.y[i];
+    if constexpr (kFootprint != Footprint::Middle) {
+      const PixelKey key{block.key_a[i], block.key_b[i]};
+      const RandomPair at = kFootprint == Footprint::OnePlace ? independentPair(key, packet.index[i], Dimensions::kFootprint)
+                                                              : randomPair(key, packet.index[i], Dimensions::kFootprint);
+      const double du = (static_cast<double>(at.u) - 0.5) * extent, dv = (static_cast<double>(at.v) - 0.5) * extent;
+      x += block.rays.x_by_u[i] * du + block.rays.x_by_v[i] * dv;
+      y += block.rays.y_by_u[i] * du + block.rays.y_by_v[i] * dv;
+    }
+    const double per_length = perRoot(x * x + y * y + 1.0);
+    packet.direction.x[i] = (ax.x * x + ay.x * y + az.x) * per_length;
+    packet.direction.y[i] = (ax.y * x + ay.y * y + az.y) * per_length;
+    packet.direction.z[i] = (ax.z * x + ay.z * y + az.z) * per_length;
+  }
+}
+
+TOFTWIN_VECTOR
+void startInTheMiddle(const Tracing& tracing, const Block& block, Packet& packet) {
+  direct<Footprint::Middle>(tracing, block, 0, 1, packet);
+}
+TOFTWIN_VECTOR
+void startAtOnePlace(const Tracing& tracing, const Block& block, Packet& packet) {
+  direct<Footprint::OnePlace>(tracing, block, 0, 1, packet);
+}
+TOFTWIN_VECTOR
+void startAtEvenPlaces(const Tracing& tracing, const Block& block, int sample, int last, Packet& packet) {
+  direct<Footprint::EvenPlaces>(tracing, block, sample, last, packet);
+}
+
+TOFTWIN_INLINE void addLanes(const float* __restrict from, double* __restrict to) {
+  for (std::size_t i = 0; i < kLaneCount; ++i) to[i] += static_cast<double>(from[i]);
+}
+
 /// The lanes' sums of one packet go to those of all, and their squares to the variance.
 TOFTWIN_VECTOR
 void fold(std::size_t harmonics, const Lanes<int>& started, BlockSums& sums) {
   const LaneSums& lanes = sums.of_packet;
-#pragma GCC ivdep
-  for (std::size_t i = 0; i < kLaneCount; ++i) {
-    sums.steady[i] += static_cast<double>(lanes.steady[i]);
-    sums.ambient[i] += static_cast<double>(lanes.ambient[i]);
-    sums.samples[i] += started[i] != 0 ? 1.0 : 0.0;
-  }
+  addLanes(lanes.steady.v, sums.steady.v);
+  addLanes(lanes.ambient.v, sums.ambient.v);
+  for (std::size_t i = 0; i < kLaneCount; ++i) sums.samples[i] += started[i] != 0 ? 1.0 : 0.0;
   for (std::size_t term = 0; term < lanes.re.size(); ++term) {
     const Lanes<float>&re = lanes.re[term], &im = lanes.im[term];
-    Lanes<double>&sum_re = sums.re[term], &sum_im = sums.im[term];
-#pragma GCC ivdep
-    for (std::size_t i = 0; i < kLaneCount; ++i) {
-      sum_re[i] += static_cast<double>(re[i]);
-      sum_im[i] += static_cast<double>(im[i]);
-    }
+    addLanes(re.v, sums.re[term].v);
+    addLanes(im.v, sums.im[term].v);
     if (term % harmonics != 0) continue;
-    Lanes<double>& squares = sums.squares[term / harmonics];
-#pragma GCC ivdep
-    for (std::size_t i = 0; i < kLaneCount; ++i) {
-      const auto a = static_cast<double>(re[i]), b = static_cast<double>(im[i]);
-      squares[i] += a * a + b * b;
-    }
+    Lanes<float> squares;
+    for (std::size_t i = 0; i < kLaneCount; ++i) squares[i] = re[i] * re[i] + im[i] * im[i];
+    addLanes(squares.v, sums.squares[term / harmonics].v);
   }
 }
 
-template <class Change>
-void forEachLanes(BlockSums& sums, const Change& change) {
-  change(sums.steady);
-  change(sums.ambient);
-  change(sums.samples);
-  for (auto* terms : {&sums.re, &sums.im, &sums.squares}) std::for_each(terms->begin(), terms->end(), change);
+/// Where central rays came from, in the camera's frame; NaN where from nowhere.
+TOFTWIN_VECTOR
+void keepTruth(const Tracing& tracing, const Packet& packet, const Hits& hits, TruthLanes& truth) {
+  const auto [ax, ay, az] = tracing.camera_axes;
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
+    const bool is_hit = packet.valid[i] != 0;
+    const double nx = hits.normal.x[i], ny = hits.normal.y[i], nz = hits.normal.z[i];
+    truth.range_m[i] = is_hit ? static_cast<float>(hits.distance[i]) : kNothing;
+    truth.albedo[i] = is_hit ? hits.albedo[i] : kNothing;
+    truth.normal[i].x = is_hit ? static_cast<float>(ax.x * nx + ax.y * ny + ax.z * nz) : 0.0f;
+    truth.normal[i].y = is_hit ? static_cast<float>(ay.x * nx + ay.y * ny + ay.z * nz) : 0.0f;
+    truth.normal[i].z = is_hit ? static_cast<float>(az.x * nx + az.y * ny + az.z * nz) : 0.0f;
+  }
 }
 
 }  // namespace
 
 Tracing::Tracing(const Scene::Impl& s, const TraceRequest& r, RayLog* l)
-    : scene(s), request(r), log(l), scene_from_camera(r.world_from_camera), seed(seedKey(r.seed)) {
+    : scene(s), request(r), log(l), lens(r.camera), scene_from_camera(r.world_from_camera), seed(seedKey(r.seed)) {
   scene_from_camera.translation_m = scene_from_camera.translation_m - scene.origin_in_world;
   pinhole = scene_from_camera.translation_m;
   camera_axes = {scene_from_camera.rotate({1, 0, 0}), scene_from_camera.rotate({0, 1, 0}), scene_from_camera.rotate({0, 0, 1})};
@@ -208,24 +244,29 @@ void prepareBlock(const Tracing& tracing, const BlockShape& shape, int left, int
   block.shape = shape;
   block.x = left;
   block.y = top;
-  const CameraInfo& camera = tracing.request.camera;
-  const auto log2 = [](int n) { return std::countr_zero(static_cast<unsigned>(n)); };
-  const int samples_bits = log2(shape.samples), width_bits = log2(shape.width);
-  const int last_column = camera.width - 1, last_row = camera.height - 1;
+  const int samples_bits = std::countr_zero(static_cast<unsigned>(shape.samples)), samples_mask = shape.samples - 1;
+  const int width_bits = std::countr_zero(static_cast<unsigned>(shape.width)), width_mask = shape.width - 1;
+  const int last_column = tracing.request.camera.width - 1, last_row = tracing.request.camera.height - 1;
   const PixelKey seed = tracing.seed;
-  Lanes<int> columns, rows;
+  Lanes<int> columns, rows, is_inside, first_sample;
+  Lanes<std::uint32_t> key_a, key_b;
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     const int lane = static_cast<int>(i), pixel = lane >> samples_bits;
-    const int u = left + (pixel & (shape.width - 1)), v = top + (pixel >> width_bits);
-    block.is_inside[i] = (u <= last_column) & (v <= last_row) ? -1 : 0;
-    block.first_sample[i] = lane & (shape.samples - 1);
-    const PixelKey key = pixelKey(seed, static_cast<std::uint32_t>(u), static_cast<std::uint32_t>(v));
-    block.key_a[i] = key.a;
-    block.key_b[i] = key.b;
-    columns[i] = u;
-    rows[i] = v;
+    columns[i] = left + (pixel & width_mask);
+    rows[i] = top + (pixel >> width_bits);
+    is_inside[i] = (columns[i] <= last_column) & (rows[i] <= last_row) ? -1 : 0;
+    first_sample[i] = lane & samples_mask;
   }
-  raysOfPixels(camera, columns, rows, block.rays);
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    const PixelKey key = pixelKey(seed, static_cast<std::uint32_t>(columns[i]), static_cast<std::uint32_t>(rows[i]));
+    key_a[i] = key.a;
+    key_b[i] = key.b;
+  }
+  block.is_inside = is_inside;
+  block.first_sample = first_sample;
+  block.key_a = key_a;
+  block.key_b = key_b;
+  tracing.lens.raysOf(columns, rows, block.rays);
 }
 
 BlockSums::BlockSums(const TraceRequest& request)
@@ -233,67 +274,66 @@ BlockSums::BlockSums(const TraceRequest& request)
       im(re.size()),
       squares(request.frequencies.size()),
       of_packet(re.size()) {
-  clear();
+  clearSums(*this);
 }
 
-void BlockSums::clear() {
-  forEachLanes(*this, [](Lanes<double>& lanes) { lanes = {}; });
+TOFTWIN_VECTOR
+void clearSums(BlockSums& sums) {
+  sums.steady = sums.ambient = sums.samples = {};
+  for (auto* terms : {&sums.re, &sums.im, &sums.squares}) std::fill(terms->begin(), terms->end(), Lanes<double>{});
 }
 
-BlockSums& BlockSums::operator+=(const BlockSums& other) {
-  const auto add = [](Lanes<double>& to, const Lanes<double>& from) {
-    for (std::size_t i = 0; i < kLaneCount; ++i) to[i] += from[i];
+TOFTWIN_VECTOR
+void addSums(const BlockSums& from, BlockSums& to) {
+  const auto add = [](const Lanes<double>& part, Lanes<double>& sum) {
+    for (std::size_t i = 0; i < kLaneCount; ++i) sum[i] += part[i];
   };
-  add(steady, other.steady);
-  add(ambient, other.ambient);
-  add(samples, other.samples);
-  for (std::size_t i = 0; i < re.size(); ++i) add(re[i], other.re[i]);
-  for (std::size_t i = 0; i < im.size(); ++i) add(im[i], other.im[i]);
-  for (std::size_t i = 0; i < squares.size(); ++i) add(squares[i], other.squares[i]);
-  return *this;
-}
-
-void BlockSums::gather(const BlockShape& shape) {
-  forEachLanes(*this, [step = static_cast<std::size_t>(shape.samples)](Lanes<double>& lanes) {
-    for (std::size_t width = 1; width < step; width *= 2) {
-      for (std::size_t i = 0; i < kLaneCount; i += 2 * width) lanes[i] += lanes[i + width];
-    }
-  });
+  add(from.steady, to.steady);
+  add(from.ambient, to.ambient);
+  add(from.samples, to.samples);
+  for (std::size_t i = 0; i < to.re.size(); ++i) add(from.re[i], to.re[i]);
+  for (std::size_t i = 0; i < to.im.size(); ++i) add(from.im[i], to.im[i]);
+  for (std::size_t i = 0; i < to.squares.size(); ++i) add(from.squares[i], to.squares[i]);
 }
 
 void traceBlock(const Tracing& tracing, const Block& block, int first, int last, BlockSums& sums) {
-  const TraceRequest& request = tracing.request;
-  const auto harmonics = static_cast<std::size_t>(request.harmonics);
+  const auto harmonics = static_cast<std::size_t>(tracing.request.harmonics);
   LaneSums& lanes = sums.of_packet;
   Packet packet;
   for (int sample = first; sample < last; sample += block.shape.samples) {
-    startPaths(tracing, block, sample, last, request.pixel_extent, packet);
+    preparePacket(tracing, block, packet);
+    startAtEvenPlaces(tracing, block, sample, last, packet);
     const Lanes<int> started = packet.valid;
-    lanes.clear();
+    clearSums(lanes);
     followPaths(tracing, packet, lanes);
     fold(harmonics, started, sums);
   }
 }
 
+void traceOnce(const Tracing& tracing, const Block& block, LaneSums& lanes) {
+  Packet packet;
+  preparePacket(tracing, block, packet);
+  startAtOnePlace(tracing, block, packet);
+  clearSums(lanes);
+  followPaths(tracing, packet, lanes);
+}
+
 void traceTruth(const Tracing& tracing, const Block& block, TruthLanes& truth) {
   Packet packet;
-  startPaths(tracing, block, 0, 1, 0.0, packet);
+  preparePacket(tracing, block, packet);
+  startInTheMiddle(tracing, block, packet);
   RTCRayHit16 rays;
   Hits hits;
   intersect(tracing, packet, rays, true);
   Lanes<float> unused{};
   endMissed(0.0f, rays, packet, unused);
   findHits(tracing.scene, packet, rays, hits);
-  const auto [ax, ay, az] = tracing.camera_axes;
-  for (std::size_t i = 0; i < kLaneCount; ++i) {
-    constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
-    const bool is_hit = packet.valid[i] != 0;
-    const double nx = hits.normal.x[i], ny = hits.normal.y[i], nz = hits.normal.z[i];
-    truth.range_m[i] = is_hit ? static_cast<float>(hits.distance[i]) : kNothing;
-    truth.albedo[i] = is_hit ? hits.albedo[i] : kNothing;
-    truth.normal.x[i] = is_hit ? static_cast<float>(ax.x * nx + ax.y * ny + ax.z * nz) : 0.0f;
-    truth.normal.y[i] = is_hit ? static_cast<float>(ay.x * nx + ay.y * ny + ay.z * nz) : 0.0f;
-    truth.normal.z[i] = is_hit ? static_cast<float>(az.x * nx + az.y * ny + az.z * nz) : 0.0f;
+  keepTruth(tracing, packet, hits, truth);
+  const auto step = static_cast<std::size_t>(block.shape.samples);
+  for (std::size_t pixel = 1; step > 1 && pixel < kLaneCount / step; ++pixel) {
+    truth.range_m[pixel] = truth.range_m[pixel * step];
+    truth.albedo[pixel] = truth.albedo[pixel * step];
+    truth.normal[pixel] = truth.normal[pixel * step];
   }
 }
 

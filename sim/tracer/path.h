@@ -33,6 +33,7 @@ struct Tracing {
   const Scene::Impl& scene;
   const TraceRequest& request;
   RayLog* log;
+  Lens lens;
   Transform<World, Camera> scene_from_camera;  ///< "World" moved to the scene's origin
   Vec3d pinhole;
   std::array<Vec3d, 3> camera_axes;  ///< x, y, z of the camera in the scene
@@ -68,10 +69,6 @@ void prepareBlock(const Tracing& tracing, const BlockShape& shape, int x, int y,
 /// Sums over the samples that each lane worked for.
 struct BlockSums {
   explicit BlockSums(const TraceRequest& request);
-  BlockSums& operator+=(const BlockSums& other);
-  void clear();
-  /// Adds up the lanes of each pixel into its first lane.
-  void gather(const BlockShape& shape);
 
   Lanes<double> steady, ambient, samples;
   std::vector<Lanes<double>> re, im;   ///< [frequency][harmonic]
@@ -79,17 +76,22 @@ struct BlockSums {
   LaneSums of_packet;                  ///< the packet being traced
 };
 
+void clearSums(BlockSums& sums);
+void addSums(const BlockSums& from, BlockSums& to);
+
 /// Traces samples [first, last) of every pixel of the block.
 void traceBlock(const Tracing& tracing, const Block& block, int first, int last, BlockSums& sums);
+/// The only sample of every pixel: lane i is pixel i of the block.
+void traceOnce(const Tracing& tracing, const Block& block, LaneSums& lanes);
 
-/// What the central rays of the block's pixels meet; in each pixel's first lane.
+/// What the central rays of the block's pixels meet, pixel by pixel.
 struct TruthLanes {
   Lanes<float> range_m, albedo;
-  Vec3fLanes normal;
+  Lanes<Vec3f> normal;
 };
 void traceTruth(const Tracing& tracing, const Block& block, TruthLanes& truth);
 
 /// trace() with a record of its rays; only for one thread.
-Light traceLogged(const Scene& scene, const TraceRequest& request, RayLog* log);
+Light traceLogged(const Scene& scene, const TraceRequest& request, RayLog* log, Light recycled = {});
 
 }  // namespace toftwin::sim

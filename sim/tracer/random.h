@@ -3,8 +3,7 @@
 
 #include <cstdint>
 
-// Inlined wherever it is called: loops over lanes become vector code only then.
-#define TOFTWIN_INLINE inline __attribute__((always_inline))
+#include "sim/tracer/lanes.h"
 
 namespace toftwin::sim {
 

@@ -20,9 +20,13 @@ TOFTWIN_INLINE double larger(double a, double b) { return a > b ? a : b; }
 /// Reflection relative to a Lambertian surface (material.h): A + B · max(0, cos Δφ) sin α tan β, from
 /// the cosine between both directions and their cosines to the normal. sin α sin β cos Δφ is what the
 /// first has more than the product of the others, and tan β divides by the larger cosine.
-TOFTWIN_INLINE double shapeOf(float a, float b, double between, double cosine, double other) {
-  const double sines = larger(0.0, between - cosine * other);
-  return static_cast<double>(a) + static_cast<double>(b) * sines / larger(larger(cosine, other), 1e-9);
+TOFTWIN_INLINE float shapeOf(float a, float b, double between, double cosine, double other) {
+  const auto sines = static_cast<float>(larger(0.0, between - cosine * other));
+  return a + b * sines / static_cast<float>(larger(larger(cosine, other), 1e-9));
+}
+
+TOFTWIN_INLINE void addLanes(const float* __restrict from, float* __restrict to) {
+  for (std::size_t i = 0; i < kLaneCount; ++i) to[i] += from[i];
 }
 
 }  // namespace
@@ -63,15 +67,15 @@ void lightHits(const Packet& packet, const Hits& hits, const PlacedEmitter& emit
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     const double lx = places.x[i] - hits.position.x[i], ly = places.y[i] - hits.position.y[i],
                  lz = places.z[i] - hits.position.z[i];
-    const double distance = std::sqrt(lx * lx + ly * ly + lz * lz), per_distance = 1.0 / distance;
+    const double squared = lx * lx + ly * ly + lz * lz, per_distance = perRoot(squared), distance = squared * per_distance;
     const double ux = lx * per_distance, uy = ly * per_distance, uz = lz * per_distance;
     const double nx = hits.normal.x[i], ny = hits.normal.y[i], nz = hits.normal.z[i];
     const double cosine = ux * nx + uy * ny + uz * nz;
     const double lobe_cosine = -(ux * axis.x + uy * axis.y + uz * axis.z);
     const double vx = -packet.direction.x[i], vy = -packet.direction.y[i], vz = -packet.direction.z[i];
     const double viewer_cosine = vx * nx + vy * ny + vz * nz;
-    const double shape = shapeOf(hits.shape_a[i], hits.shape_b[i], ux * vx + uy * vy + uz * vz, cosine, viewer_cosine);
-    weights[i] = static_cast<double>(packet.throughput[i] * hits.albedo[i]) * shape * cosine * peak *
+    const float shape = shapeOf(hits.shape_a[i], hits.shape_b[i], ux * vx + uy * vy + uz * vz, cosine, viewer_cosine);
+    weights[i] = static_cast<double>(packet.throughput[i] * hits.albedo[i] * shape) * cosine * peak *
                  (slope * lobe_cosine + level) * per_distance * per_distance;
     cosines[i] = cosine;
     lobe_cosines[i] = lobe_cosine;
@@ -97,7 +101,7 @@ void setShadowRays(const Hits& hits, const Vec3Lanes& places, RTCRay16& rays) {
     const float sx = hits.start.x[i], sy = hits.start.y[i], sz = hits.start.z[i];
     const double wx = places.x[i] - static_cast<double>(sx), wy = places.y[i] - static_cast<double>(sy),
                  wz = places.z[i] - static_cast<double>(sz);
-    const double way = std::sqrt(wx * wx + wy * wy + wz * wz), per_way = 1.0 / way;
+    const double squared = wx * wx + wy * wy + wz * wz, per_way = perRoot(squared), way = squared * per_way;
     rays.org_x[i] = sx;
     rays.org_y[i] = sy;
     rays.org_z[i] = sz;
@@ -146,8 +150,8 @@ void bounce(const Hits& hits, std::uint32_t dimension, bool is_even, Packet& pac
     const double dz = -x * sign * nx - y * ny + z * nz;
     const double vx = -packet.direction.x[i], vy = -packet.direction.y[i], vz = -packet.direction.z[i];
     const double viewer_cosine = vx * nx + vy * ny + vz * nz;
-    const double shape = shapeOf(hits.shape_a[i], hits.shape_b[i], dx * vx + dy * vy + dz * vz, z, viewer_cosine);
-    packet.throughput[i] *= hits.albedo[i] * static_cast<float>(shape);
+    const float shape = shapeOf(hits.shape_a[i], hits.shape_b[i], dx * vx + dy * vy + dz * vz, z, viewer_cosine);
+    packet.throughput[i] *= hits.albedo[i] * shape;
     packet.length[i] += hits.distance[i];
     packet.direction.x[i] = dx;
     packet.direction.y[i] = dy;
@@ -194,10 +198,10 @@ void setRays(const Packet& packet, RTCRayHit16& rays) {
 TOFTWIN_VECTOR
 void addPhasors(const std::vector<double>& turns_per_metre, int harmonics, const Lanes<float>& weight,
                 const Lanes<double>& length, LaneSums& sums) {
-  for (std::size_t i = 0; i < kLaneCount; ++i) sums.steady[i] += weight[i];
+  addLanes(weight.v, sums.steady.v);
   for (std::size_t f = 0; f < turns_per_metre.size(); ++f) {
     const double turns = turns_per_metre[f];
-    Lanes<float> cosine, sine, re, im;
+    Lanes<float> cosine, sine, re, im, next;
     for (std::size_t i = 0; i < kLaneCount; ++i) {
       const CosSin z = cosSinOfTurns(length[i] * turns);
       cosine[i] = z.cos;
@@ -205,17 +209,14 @@ void addPhasors(const std::vector<double>& turns_per_metre, int harmonics, const
       re[i] = weight[i] * z.cos;
       im[i] = weight[i] * -z.sin;
     }
-    for (int n = 0; n < harmonics; ++n) {
+    for (int n = 0;; ++n) {
       const std::size_t term = f * static_cast<std::size_t>(harmonics) + static_cast<std::size_t>(n);
-      Lanes<float>&sum_re = sums.re[term], &sum_im = sums.im[term];
-#pragma GCC ivdep
-      for (std::size_t i = 0; i < kLaneCount; ++i) {
-        sum_re[i] += re[i];
-        sum_im[i] += im[i];
-        const float next = re[i] * cosine[i] - im[i] * sine[i];
-        im[i] = re[i] * sine[i] + im[i] * cosine[i];
-        re[i] = next;
-      }
+      addLanes(re.v, sums.re[term].v);
+      addLanes(im.v, sums.im[term].v);
+      if (n + 1 == harmonics) break;
+      for (std::size_t i = 0; i < kLaneCount; ++i) next[i] = re[i] * cosine[i] - im[i] * sine[i];
+      for (std::size_t i = 0; i < kLaneCount; ++i) im[i] = re[i] * sine[i] + im[i] * cosine[i];
+      re = next;
     }
   }
 }

@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include "sim/images/rows.h"
 #include "sim/tracer/path.h"
@@ -64,17 +65,27 @@ void check(const TraceRequest& request) {
           "the region must lie inside the image");
 }
 
-Light emptyLight(const TraceRequest& request, const Region& region) {
-  const int w = region.width, h = region.height;
-  Light light;
+/// The image if it has this size already, with whatever it holds; else a new one.
+template <class T>
+void resize(Image<T>& image, int width, int height) {
+  if (image.width() != width || image.height() != height) image = Image<T>(width, height);
+}
+
+/// Images for all of the request's light, every pixel of which is going to be written.
+Light lightFor(const TraceRequest& request, const Region& region, Light recycled) {
+  Light light = std::move(recycled);
+  const auto resizeTo = [&](auto& image) { resize(image, region.width, region.height); };
   light.frequencies = request.frequencies;
   light.harmonics = request.harmonics;
-  light.phasors.assign(request.frequencies.size() * static_cast<std::size_t>(request.harmonics),
-                       Image<std::complex<float>>(w, h));
-  light.steady = Image<float>(w, h);
-  light.ambient = Image<float>(w, h);
-  if (request.samples_per_pixel > 1) light.variance.assign(request.frequencies.size(), Image<float>(w, h));
-  light.truth = {Image<float>(w, h), Image<Vec3f>(w, h), Image<float>(w, h)};
+  light.phasors.resize(request.frequencies.size() * static_cast<std::size_t>(request.harmonics));
+  light.variance.resize(request.samples_per_pixel > 1 ? request.frequencies.size() : 0);
+  std::for_each(light.phasors.begin(), light.phasors.end(), resizeTo);
+  std::for_each(light.variance.begin(), light.variance.end(), resizeTo);
+  resizeTo(light.steady);
+  resizeTo(light.ambient);
+  resizeTo(light.truth.range_m);
+  resizeTo(light.truth.normal);
+  resizeTo(light.truth.albedo);
   return light;
 }
 
@@ -82,7 +93,7 @@ Light emptyLight(const TraceRequest& request, const Region& region) {
 void sumBlock(const Tracing& tracing, const Block& block, BlockSums& sums) {
   const int samples = tracing.request.samples_per_pixel;
   const int pieces = (samples + kSamplesPerPiece - 1) / kSamplesPerPiece;
-  sums.clear();
+  clearSums(sums);
   if (pieces == 1) {
     traceBlock(tracing, block, 0, samples, sums);
   } else {
@@ -94,68 +105,136 @@ void sumBlock(const Tracing& tracing, const Block& block, BlockSums& sums) {
         traceBlock(tracing, block, first, std::min(samples, first + kSamplesPerPiece), parts[static_cast<std::size_t>(piece)]);
       }
     });
-    for (const BlockSums& part : parts) sums += part;
+    for (const BlockSums& part : parts) addSums(part, sums);
   }
-  sums.gather(block.shape);
+}
+
+/// Means of a block's pixels as the images hold them, pixel by pixel.
+struct BlockMeans {
+  explicit BlockMeans(const Light& light) : phasors(light.phasors.size()), variance(light.variance.size()) {}
+
+  Lanes<float> steady, ambient;
+  std::vector<Lanes<std::complex<float>>> phasors;
+  std::vector<Lanes<float>> variance;
+};
+
+/// Adds up the lanes of each pixel and moves the sum to the lane of the pixel's number.
+void addUpPixels(int samples, Lanes<double>& lanes) {
+  const auto step = static_cast<std::size_t>(samples);
+  for (std::size_t width = 1; width < step; width *= 2) {
+    for (std::size_t i = 0; i < kLaneCount; i += 2 * width) lanes[i] += lanes[i + width];
+  }
+  for (std::size_t pixel = 1; pixel < kLaneCount / step; ++pixel) lanes[pixel] = lanes[pixel * step];
+}
+
+void addUpPixels(const BlockShape& shape, BlockSums& sums) {
+  if (shape.samples == 1) return;
+  for (Lanes<double>* lanes : {&sums.steady, &sums.ambient, &sums.samples}) addUpPixels(shape.samples, *lanes);
+  for (auto* terms : {&sums.re, &sums.im, &sums.squares}) {
+    for (Lanes<double>& lanes : *terms) addUpPixels(shape.samples, lanes);
+  }
+}
+
+TOFTWIN_VECTOR
+void takeMeans(const BlockSums& sums, int harmonics, BlockMeans& means) {
+  Lanes<double> per_sample;
+  for (std::size_t i = 0; i < kLaneCount; ++i) per_sample[i] = 1.0 / sums.samples[i];
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    means.steady[i] = static_cast<float>(sums.steady[i] * per_sample[i]);
+    means.ambient[i] = static_cast<float>(sums.ambient[i] * per_sample[i]);
+  }
+  for (std::size_t term = 0; term < means.phasors.size(); ++term) {
+    const Lanes<double>&re = sums.re[term], &im = sums.im[term];
+    float* out = reinterpret_cast<float*>(means.phasors[term].v);  // a complex number is an array of two
+    for (std::size_t i = 0; i < kLaneCount; ++i) {
+      out[2 * i] = static_cast<float>(re[i] * per_sample[i]);
+      out[2 * i + 1] = static_cast<float>(im[i] * per_sample[i]);
+    }
+  }
+  for (std::size_t f = 0; f < means.variance.size(); ++f) {
+    const std::size_t term = f * static_cast<std::size_t>(harmonics);
+    const Lanes<double>&re = sums.re[term], &im = sums.im[term], &squares = sums.squares[f];
+    for (std::size_t i = 0; i < kLaneCount; ++i) {
+      const double n = sums.samples[i], spread = squares[i] - (re[i] * re[i] + im[i] * im[i]) * per_sample[i];
+      means.variance[f][i] = static_cast<float>((spread > 0.0 ? spread : 0.0) / (2.0 * n * (n - 1.0)));
+    }
+  }
+}
+
+/// The same of the only samples.
+TOFTWIN_VECTOR
+void takeMeans(const LaneSums& lanes, BlockMeans& means) {
+  means.steady = lanes.steady;
+  means.ambient = lanes.ambient;
+  for (std::size_t term = 0; term < means.phasors.size(); ++term) {
+    const Lanes<float>&re = lanes.re[term], &im = lanes.im[term];
+    float* out = reinterpret_cast<float*>(means.phasors[term].v);
+    for (std::size_t i = 0; i < kLaneCount; ++i) {
+      out[2 * i] = re[i];
+      out[2 * i + 1] = im[i];
+    }
+  }
+}
+
+/// Traces the block and takes the means of its pixels.
+void traceMeans(const Tracing& tracing, const Block& block, BlockSums& sums, BlockMeans& means) {
+  if (tracing.request.samples_per_pixel == 1) {
+    traceOnce(tracing, block, sums.of_packet);
+    takeMeans(sums.of_packet, means);
+    return;
+  }
+  sumBlock(tracing, block, sums);
+  addUpPixels(block.shape, sums);
+  takeMeans(sums, tracing.request.harmonics, means);
 }
 
 /// Where the pixels of a block go in an image of the region.
 struct Placement {
   Placement(const Block& block, const Region& region)
-      : shape(block.shape),
+      : width(block.shape.width),
         u(block.x - region.x),
         v(block.y - region.y),
         first_column(std::max(0, -u)),
-        last_column(std::min(shape.width, region.width - u)),
+        columns(std::min(width, region.width - u) - first_column),
         first_row(std::max(0, -v)),
-        last_row(std::min(shape.height, region.height - v)) {}
+        last_row(std::min(block.shape.height, region.height - v)) {}
 
-  /// Calls `value(lane)` for the first lane of each pixel within the region and stores what it returns.
-  template <class T, class Value>
-  void store(Image<T>& image, const Value& value) const {
+  template <class T>
+  void store(const T* values, Image<T>& image) const {
     for (int row = first_row; row < last_row; ++row) {
+      const T* from = values + row * width + first_column;
       T* to = &image(u + first_column, v + row);
-      for (int column = first_column; column < last_column; ++column) {
-        *to++ = value(static_cast<std::size_t>((row * shape.width + column) * shape.samples));
+      if (columns == 4) {  // mostly, and then without a loop
+        for (int column = 0; column < 4; ++column) to[column] = from[column];
+      } else {
+        std::copy_n(from, columns, to);
       }
     }
   }
 
-  BlockShape shape;
+  int width;
   int u, v;
-  int first_column, last_column, first_row, last_row;
+  int first_column, columns, first_row, last_row;
 };
 
-/// Means and variances of the block's pixels go to the images.
-void storeBlock(const Placement& at, const BlockSums& sums, const TruthLanes& truth, Light& light) {
-  const auto mean = [&](const Lanes<double>& sum, std::size_t i) { return static_cast<float>(sum[i] / sums.samples[i]); };
-  at.store(light.steady, [&](std::size_t i) { return mean(sums.steady, i); });
-  at.store(light.ambient, [&](std::size_t i) { return mean(sums.ambient, i); });
-  for (std::size_t term = 0; term < light.phasors.size(); ++term) {
-    const Lanes<double>&re = sums.re[term], &im = sums.im[term];
-    at.store(light.phasors[term], [&](std::size_t i) { return std::complex<float>{mean(re, i), mean(im, i)}; });
-  }
-  for (std::size_t f = 0; f < light.variance.size(); ++f) {
-    const std::size_t term = f * static_cast<std::size_t>(light.harmonics);
-    at.store(light.variance[f], [&](std::size_t i) {
-      const double n = sums.samples[i], re = sums.re[term][i], im = sums.im[term][i];
-      const double spread = std::max(0.0, sums.squares[f][i] - (re * re + im * im) / n);
-      return static_cast<float>(spread / (2.0 * n * (n - 1.0)));
-    });
-  }
-  at.store(light.truth.range_m, [&](std::size_t i) { return truth.range_m[i]; });
-  at.store(light.truth.albedo, [&](std::size_t i) { return truth.albedo[i]; });
-  at.store(light.truth.normal, [&](std::size_t i) { return Vec3f{truth.normal.x[i], truth.normal.y[i], truth.normal.z[i]}; });
+void storeBlock(const Placement& at, const BlockMeans& means, const TruthLanes& truth, Light& light) {
+  at.store(means.steady.v, light.steady);
+  at.store(means.ambient.v, light.ambient);
+  for (std::size_t term = 0; term < light.phasors.size(); ++term) at.store(means.phasors[term].v, light.phasors[term]);
+  for (std::size_t f = 0; f < light.variance.size(); ++f) at.store(means.variance[f].v, light.variance[f]);
+  at.store(truth.range_m.v, light.truth.range_m);
+  at.store(truth.albedo.v, light.truth.albedo);
+  at.store(truth.normal.v, light.truth.normal);
 }
 
 }  // namespace
 
-Light traceLogged(const Scene& scene, const TraceRequest& request, RayLog* log) {
+Light traceLogged(const Scene& scene, const TraceRequest& request, RayLog* log, Light recycled) {
   check(request);
   const Region region = regionOf(request);
   const Tracing tracing{scene.impl(), request, log};
   const BlockShape shape = BlockShape::forSamples(request.samples_per_pixel);
-  Light light = emptyLight(request, region);
+  Light light = lightFor(request, region, std::move(recycled));
   const int first_column = region.x / shape.width, first_row = region.y / shape.height;
   const int columns = (region.x + region.width - 1) / shape.width - first_column + 1;
   const int rows = (region.y + region.height - 1) / shape.height - first_row + 1;
@@ -164,16 +243,19 @@ Light traceLogged(const Scene& scene, const TraceRequest& request, RayLog* log) 
     BlockSums sums{request};
     Block block;
     TruthLanes truth;
+    BlockMeans means{light};
     for (int i = begin; i != end; ++i) {
       prepareBlock(tracing, shape, (first_column + i % columns) * shape.width, (first_row + i / columns) * shape.height, block);
-      sumBlock(tracing, block, sums);
+      traceMeans(tracing, block, sums, means);
       traceTruth(tracing, block, truth);
-      storeBlock({block, region}, sums, truth, light);
+      storeBlock({block, region}, means, truth, light);
     }
   });
   return light;
 }
 
-Light trace(const Scene& scene, const TraceRequest& request) { return traceLogged(scene, request, nullptr); }
+Light trace(const Scene& scene, const TraceRequest& request, Light recycled) {
+  return traceLogged(scene, request, nullptr, std::move(recycled));
+}
 
 }  // namespace toftwin::sim

@@ -44,7 +44,8 @@ struct TraceRequest {
 };
 
 /// Path-traces the scene: unidirectional, next-event estimation to every emitter, cosine- or
-/// BSDF-sampled bounces, one pass for all frequencies and harmonics.
-Light trace(const Scene& scene, const TraceRequest& request);
+/// BSDF-sampled bounces, one pass for all frequencies and harmonics. `recycled` may be an earlier frame's
+/// light, whose memory is then used again.
+Light trace(const Scene& scene, const TraceRequest& request, Light recycled = {});
 
 }  // namespace toftwin::sim

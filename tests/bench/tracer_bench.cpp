@@ -39,11 +39,9 @@ double secondsOf(const std::function<void()>& work) {
   return now() - start;
 }
 
-/// The fastest of several runs: what else runs on the machine only ever slows down.
-double best(int runs, const std::function<void()>& work) {
-  double least = INFINITY;
-  for (int i = 0; i < runs; ++i) least = std::min(least, secondsOf(work));
-  return least;
+double median(std::vector<double> values) {
+  std::ranges::sort(values);
+  return values[values.size() / 2];
 }
 
 /// A sphere of radius 0.6 m with bumps, 2 × 224 × 224 ≈ 100,000 triangles, as an OBJ file.
@@ -146,25 +144,50 @@ void replayOneByOne(const RayLog& log, RTCScene scene) {
   }
 }
 
-}  // namespace
+struct Rates {
+  std::vector<double> single, packets, ours;  ///< Mrays/s of each run
+};
 
-int main(int argc, char** argv) {
-  _mm_setcsr(_mm_getcsr() | 0x8040);  // denormals count as zero, as in the tracer
-  const int runs = argc > 1 ? std::max(1, std::atoi(argv[1])) : 5;
-  const Scene scene = roomScene();
-  fmt::print("One thread, processor time, the fastest of {} runs; Mrays/s\n", runs);
+Rates measure(const Scene& scene, const TraceRequest& what, const RayLog& log, int runs) {
+  const double rays = static_cast<double>(raysOf(log)) * 1e-6;
+  const RTCScene embree = scene.impl().embree;
+  Rates rates;
+  Light light;  // its memory is used again, as when frame follows frame
+  for (int i = 0; i < runs; ++i) {
+    rates.single.push_back(rays / secondsOf([&] { replayOneByOne(log, embree); }));
+    rates.packets.push_back(rays / secondsOf([&] { replayInPackets(log, embree); }));
+    rates.ours.push_back(rays / secondsOf([&] { light = trace(scene, what, std::move(light)); }));
+  }
+  return rates;
+}
+
+/// In percent: the median of the runs' ratios.
+double share(const std::vector<double>& part, const std::vector<double>& whole) {
+  std::vector<double> ratios;
+  for (std::size_t i = 0; i < part.size(); ++i) ratios.push_back(100.0 * part[i] / whole[i]);
+  return median(std::move(ratios));
+}
+
+void compareWithEmbree(const Scene& scene, int runs) {
+  fmt::print("One thread, processor time, medians of {} runs; Mrays/s\n", runs);
   fmt::print("| surfaces | rays | tracer | Embree, one by one | share | Embree, packets of 16 | share |\n");
   fmt::print("| --- | --- | --- | --- | --- | --- | --- |\n");
-  const tbb::global_control one_thread{tbb::global_control::max_allowed_parallelism, 1};
   for (const int surfaces : {1, 2, 4, 16}) {
     const TraceRequest what = request(surfaces);
     RayLog log;
     traceLogged(scene, what, &log);
-    const auto rays = static_cast<double>(raysOf(log)) * 1e-6;
-    const double single = rays / best(runs, [&] { replayOneByOne(log, scene.impl().embree); });
-    const double packets = rays / best(runs, [&] { replayInPackets(log, scene.impl().embree); });
-    const double ours = rays / best(runs, [&] { trace(scene, what); });
-    fmt::print("| {} | {:.2f} M | {:.2f} | {:.2f} | {:.0f} % | {:.2f} | {:.0f} % |\n", surfaces, rays, ours, single,
-               100.0 * ours / single, packets, 100.0 * ours / packets);
+    const Rates rates = measure(scene, what, log, runs);
+    fmt::print("| {} | {:.2f} M | {:.2f} | {:.2f} | {:.0f} % | {:.2f} | {:.0f} % |\n", surfaces,
+               static_cast<double>(raysOf(log)) * 1e-6, median(rates.ours), median(rates.single),
+               share(rates.ours, rates.single), median(rates.packets), share(rates.ours, rates.packets));
   }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  _mm_setcsr(_mm_getcsr() | 0x8040);  // denormals count as zero, as in the tracer
+  const int runs = argc > 1 ? std::max(1, std::atoi(argv[1])) : 9;
+  const tbb::global_control one_thread{tbb::global_control::max_allowed_parallelism, 1};
+  compareWithEmbree(roomScene(), runs);
 }
