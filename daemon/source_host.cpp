@@ -215,7 +215,10 @@ void SourceHost::run(const std::stop_token& stop) {
   if (source_) stopSource();
   source_.reset();
   runCommands();
-  endAll({Error::Code::Stopped, fmt::format("the daemon closed the source \"{}\"", name_)});
+  endAll({Error::Code::Stopped,
+          fmt::format(
+              "the daemon closed the source \"{}\": it is stopping, or its configuration changed",
+              name_)});
 }
 
 /// Starts or stops the stream as subscribers come and go. Before commands, so that a trigger that
