@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <vector>
 
 #include <toftwin/geometry.h>
 
@@ -29,7 +30,11 @@ struct PlacedEmitter {
   Vec3d across, along;  ///< span the disc, each of the disc's radius long; zero for a point
   double peak = 0.0;    ///< I(0) in W/sr
   double exponent = 1.0;
-  double cos_limit = 0.0;  ///< dark where cos γ is below it
+  double cos_limit = 0.0;       ///< dark where cos γ is below it
+  double area = 0.0;            ///< of the disc, m²
+  double delay_m = 0.0;         ///< its light is late by that length
+  std::vector<double> pattern;  ///< I(γ)/I_peak at equal steps of γ from 0 to pattern_limit; empty: the lobe
+  double pattern_limit = 0.0;   ///< rad
   bool is_disc = false;
   bool is_isotropic = false;
 
@@ -42,9 +47,28 @@ struct PlacedEmitter {
         is_isotropic(spec.isotropic) {
     const double pi = std::numbers::pi;
     peak = is_isotropic ? spec.power_w / (4.0 * pi) : spec.power_w * (exponent + 1.0) / (2.0 * pi);
+    area = pi * spec.radius.in(metre)*spec.radius.in(metre);
+    delay_m = spec.delay.in(second)*kSpeedOfLight_m_per_s;
+    if (!spec.pattern.empty()) tabulate(spec);
     const Basis basis = basisAround(axis);
     across = basis.x * spec.radius.in(metre);
     along = basis.y * spec.radius.in(metre);
+  }
+
+  /// I at cos γ, W/sr.
+  [[nodiscard]] double intensity(double cosine) const {
+    if (is_isotropic) return peak;
+    if (!(cosine >= std::max(cos_limit, 1e-300))) return 0.0;
+    return peak * (pattern.empty() ? std::pow(cosine, exponent) : patternAt(cosine));
+  }
+  /// The table at cos γ, linear in γ; 0 beyond its end.
+  [[nodiscard]] double patternAt(double cosine) const {
+    const double step =
+        std::acos(std::clamp(cosine, -1.0, 1.0)) / pattern_limit * static_cast<double>(pattern.size() - 1);
+    const auto i = static_cast<std::size_t>(step);
+    if (i + 1 >= pattern.size()) return step > static_cast<double>(pattern.size() - 1) ? 0.0 : pattern.back();
+    const double share = step - static_cast<double>(i);
+    return pattern[i] + share * (pattern[i + 1] - pattern[i]);
   }
 
   /// A place on the disc, uniform by area, from two random numbers. Seen from one direction each
@@ -52,6 +76,28 @@ struct PlacedEmitter {
   [[nodiscard]] Vec3d place(double u, double v) const {
     const double r = std::sqrt(u), phi = 2.0 * std::numbers::pi * v;
     return position + across * (r * std::cos(phi)) + along * (r * std::sin(phi));
+  }
+
+ private:
+  /// From the spec's table to one in equal steps, with power Φ = 2π ∫ I sin γ dγ.
+  void tabulate(const EmitterSpec& spec) {
+    constexpr std::size_t kSteps = 1024;
+    exponent = 0.0;
+    pattern_limit = std::min(spec.pattern_deg.back() * degree.in_si, std::numbers::pi / 2.0);
+    double integral = 0.0;
+    std::size_t row = 0;
+    for (std::size_t i = 0; i <= kSteps; ++i) {
+      const double angle = pattern_limit * static_cast<double>(i) / kSteps, at_deg = angle / degree.in_si;
+      while (row + 2 < spec.pattern_deg.size() && spec.pattern_deg[row + 1] < at_deg) ++row;
+      const double from = spec.pattern_deg[row], to = spec.pattern_deg[row + 1];
+      const double share = std::clamp((at_deg - from) / (to - from), 0.0, 1.0);
+      pattern.push_back(spec.pattern[row] + share * (spec.pattern[row + 1] - spec.pattern[row]));
+      if (i == 0) continue;
+      const double before = pattern_limit * static_cast<double>(i - 1) / kSteps;
+      integral += std::numbers::pi * (pattern[i - 1] * std::sin(before) + pattern[i] * std::sin(angle)) *
+                  (angle - before);
+    }
+    peak = spec.power_w / integral;
   }
 };
 

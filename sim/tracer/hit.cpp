@@ -60,7 +60,7 @@ Contact contactOfQuadric(const Quadric& quadric, int part, double embree_distanc
   Contact contact{.normal = quadric.toScene(point.normal), .level = 0.0, .distance = t, .offset = 0.0, .onto = {}, .inside = {}};
   contact.level = dot(contact.normal, position);
   // Its intersection is computed in double precision: only the start's own rounding counts.
-  contact.offset = 2.0 * kUnitRoundoff * dot(absolute(contact.normal), absolute(position)) + kSmallestOffset;
+  contact.offset = 2.0 * kUnitRoundoff * dot(absolute(contact.normal), absolute(position)) + quadric.blur + kSmallestOffset;
   return contact;
 }
 
@@ -182,6 +182,24 @@ bool placeOnPlanes(const Packet& packet, const RTCRayHit16& rays, const PlaneLan
 }
 
 }  // namespace
+
+Vec3f startOnOtherSide(const Hits& hits, std::size_t i) {
+  const Vec3d n{hits.normal.x[i], hits.normal.y[i], hits.normal.z[i]};
+  const Vec3d start{static_cast<double>(hits.start.x[i]), static_cast<double>(hits.start.y[i]), static_cast<double>(hits.start.z[i])};
+  const Vec3d position{hits.position.x[i], hits.position.y[i], hits.position.z[i]};
+  const Vec3d other = start - n * (2.0 * dot(n, start - position));
+  return {roundedAway(other.x, -n.x), roundedAway(other.y, -n.y), roundedAway(other.z, -n.z)};
+}
+
+void turnToOtherSide(Hits& hits, std::size_t i) {
+  const Vec3f start = startOnOtherSide(hits, i);
+  hits.start.x[i] = start.x;
+  hits.start.y[i] = start.y;
+  hits.start.z[i] = start.z;
+  hits.normal.x[i] = -hits.normal.x[i];
+  hits.normal.y[i] = -hits.normal.y[i];
+  hits.normal.z[i] = -hits.normal.z[i];
+}
 
 /// The offset bounds the error of Embree's robust triangle test, as a distance from the triangle's
 /// plane, for a ray that starts on the triangle. Let m be the triangle's extent per axis. v_i − O is

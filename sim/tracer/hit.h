@@ -17,4 +17,9 @@ TrianglePlane planeOf(Vec3d v0, Vec3d v1, Vec3d v2);
 /// found. Lanes that met nothing hold harmless numbers.
 void findHits(const Scene::Impl& scene, const Packet& packet, const RTCRayHit16& rays, Hits& hits);
 
+/// Where rays start that leave a hit on the other side, for light that goes through.
+Vec3f startOnOtherSide(const Hits& hits, std::size_t lane);
+/// Makes the other side the one from which light leaves.
+void turnToOtherSide(Hits& hits, std::size_t lane);
+
 }  // namespace toftwin::sim

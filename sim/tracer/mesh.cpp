@@ -39,6 +39,12 @@ Result<> append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& wor
         }
       }
       mesh.triangles.push_back({first + face.mIndices[0], first + face.mIndices[1], first + face.mIndices[2]});
+      if (!part.HasTextureCoords(0)) continue;
+      auto& places = mesh.places.emplace_back();
+      for (unsigned k = 0; k < 3; ++k) {
+        const aiVector3D at = part.mTextureCoords[0][face.mIndices[k]];  // from the picture's bottom up
+        places[k] = {at.x, 1.0f - at.y};
+      }
     }
   }
   for (unsigned c = 0; c < node.mNumChildren; ++c) {
@@ -62,6 +68,7 @@ Result<TriangleMesh> loadMesh(const std::filesystem::path& file) {
   }
   TriangleMesh mesh;
   if (auto read = append(*scene, *scene->mRootNode, aiMatrix4x4{}, file, mesh); !read) return read.error();
+  if (mesh.places.size() != mesh.triangles.size()) mesh.places.clear();
   if (mesh.triangles.empty()) {
     return Error{Error::Code::InvalidArgument, fmt::format("mesh {}: it has no triangles", file.string())};
   }
@@ -70,7 +77,10 @@ Result<TriangleMesh> loadMesh(const std::filesystem::path& file) {
 
 TriangleMesh rectangleMesh(double size_x, double size_y) {
   const double x = size_x / 2.0, y = size_y / 2.0;
-  return {{{-x, -y, 0.0}, {x, -y, 0.0}, {x, y, 0.0}, {-x, y, 0.0}}, {{0, 1, 2}, {0, 2, 3}}};
+  constexpr TexturePlace kTopLeft{0.0f, 0.0f}, kTopRight{1.0f, 0.0f}, kBottomRight{1.0f, 1.0f}, kBottomLeft{0.0f, 1.0f};
+  return {{{-x, -y, 0.0}, {x, -y, 0.0}, {x, y, 0.0}, {-x, y, 0.0}},
+          {{0, 1, 2}, {0, 2, 3}},
+          {{kTopLeft, kTopRight, kBottomRight}, {kTopLeft, kBottomRight, kBottomLeft}}};
 }
 
 TriangleMesh boxMesh(double size_x, double size_y, double size_z) {
@@ -85,6 +95,8 @@ TriangleMesh boxMesh(double size_x, double size_y, double size_z) {
   for (const auto& side : kSides) {
     mesh.triangles.push_back({side[0], side[1], side[2]});
     mesh.triangles.push_back({side[0], side[2], side[3]});
+    mesh.places.push_back({TexturePlace{0.0f, 0.0f}, {1.0f, 0.0f}, {1.0f, 1.0f}});
+    mesh.places.push_back({TexturePlace{0.0f, 0.0f}, {1.0f, 1.0f}, {0.0f, 1.0f}});
   }
   return mesh;
 }

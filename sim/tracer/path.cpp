@@ -10,6 +10,7 @@
 #include "sim/tracer/hit.h"
 #include "sim/tracer/packet.h"
 #include "sim/tracer/shade.h"
+#include "sim/tracer/special.h"
 
 namespace toftwin::sim {
 namespace {
@@ -88,7 +89,7 @@ void gatherDirectLight(const Tracing& tracing, const Packet& packet, const Hits&
     record(tracing.log, light.valid, rays, coherent, true);
     embree::occluded(light.valid.v, tracing.scene.embree, rays, coherent);
     for (std::size_t i = 0; i < kLaneCount; ++i) light.weight[i] = rays.tfar[i] < 0.0f ? 0.0f : light.weight[i];
-    addPhasors(tracing.turns_per_metre, tracing.request.harmonics, light.weight, light.length, sums);
+    addLight(tracing, light, sums);
   }
 }
 
@@ -105,7 +106,7 @@ void followPaths(const Tracing& tracing, Packet& packet, LaneSums& sums) {
   RTCRayHit16 rays;
   Hits hits;
   for (int surface = 0;; ++surface) {
-    const bool is_coherent = surface == 0;
+    const bool is_coherent = surface == 0 && !tracing.scene.hasInstances();
     intersect(tracing, packet, rays, is_coherent);
     endMissed(tracing.scene.ambient_radiance, rays, packet, sums.ambient);
     if (surface == surfaces || !isAny(packet.valid)) return;
@@ -221,6 +222,10 @@ void keepTruth(const Tracing& tracing, const Packet& packet, const Hits& hits, T
 
 }  // namespace
 
+void addLight(const Tracing& tracing, const DirectLight& light, LaneSums& sums) {
+  addPhasors(tracing.turns_per_metre, tracing.request.harmonics, light.weight, light.length, sums);
+}
+
 Tracing::Tracing(const Scene::Impl& s, const TraceRequest& r, RayLog* l)
     : scene(s), request(r), log(l), lens(r.camera), scene_from_camera(r.world_from_camera), seed(seedKey(r.seed)) {
   scene_from_camera.translation_m = scene_from_camera.translation_m - scene.origin_in_world;
@@ -299,13 +304,14 @@ void addSums(const BlockSums& from, BlockSums& to) {
 void traceBlock(const Tracing& tracing, const Block& block, int first, int last, BlockSums& sums) {
   const auto harmonics = static_cast<std::size_t>(tracing.request.harmonics);
   LaneSums& lanes = sums.of_packet;
+  const auto follow = tracing.scene.is_matt ? followPaths : followSpecialPaths;
   Packet packet;
   for (int sample = first; sample < last; sample += block.shape.samples) {
     preparePacket(tracing, block, packet);
     startAtEvenPlaces(tracing, block, sample, last, packet);
     const Lanes<int> started = packet.valid;
     clearSums(lanes);
-    followPaths(tracing, packet, lanes);
+    follow(tracing, packet, lanes);
     fold(harmonics, started, sums);
   }
 }
@@ -315,7 +321,7 @@ void traceOnce(const Tracing& tracing, const Block& block, LaneSums& lanes) {
   preparePacket(tracing, block, packet);
   startAtOnePlace(tracing, block, packet);
   clearSums(lanes);
-  followPaths(tracing, packet, lanes);
+  (tracing.scene.is_matt ? followPaths : followSpecialPaths)(tracing, packet, lanes);
 }
 
 void traceTruth(const Tracing& tracing, const Block& block, TruthLanes& truth) {
@@ -324,10 +330,11 @@ void traceTruth(const Tracing& tracing, const Block& block, TruthLanes& truth) {
   startInTheMiddle(tracing, block, packet);
   RTCRayHit16 rays;
   Hits hits;
-  intersect(tracing, packet, rays, true);
+  intersect(tracing, packet, rays, !tracing.scene.hasInstances());
   Lanes<float> unused{};
   endMissed(0.0f, rays, packet, unused);
   findHits(tracing.scene, packet, rays, hits);
+  applyTextures(tracing.scene, rays, packet, hits);
   keepTruth(tracing, packet, hits, truth);
   const auto step = static_cast<std::size_t>(block.shape.samples);
   for (std::size_t pixel = 1; step > 1 && pixel < kLaneCount / step; ++pixel) {

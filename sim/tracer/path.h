@@ -15,6 +15,8 @@
 
 namespace toftwin::sim {
 
+struct DirectLight;
+
 /// The rays that the tracer cast, for replaying them through Embree alone. Not for several threads.
 struct RayLog {
   struct Packet {
@@ -78,6 +80,9 @@ struct BlockSums {
 
 void clearSums(BlockSums& sums);
 void addSums(const BlockSums& from, BlockSums& to);
+
+/// Adds light that arrived, in the basis that the request asks for.
+void addLight(const Tracing& tracing, const DirectLight& light, LaneSums& sums);
 
 /// Traces samples [first, last) of every pixel of the block.
 void traceBlock(const Tracing& tracing, const Block& block, int first, int last, BlockSums& sums);

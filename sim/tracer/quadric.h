@@ -7,6 +7,8 @@
 
 #include <toftwin/geometry.h>
 
+#include "sim/tracer/texture.h"
+
 namespace toftwin::sim {
 
 /// A sphere, a disc or a closed cylinder, intersected in double precision: the surface is exact, not
@@ -21,6 +23,7 @@ struct Quadric {
   double half_height = 0.0;
   Vec3d centre;               ///< in the scene's frame
   std::array<Vec3d, 3> axes;  ///< x, y, z of its own frame in the scene's frame
+  double blur = 0.0;          ///< bound on the error of taking rays to a moving one's frame, m
 
   [[nodiscard]] Vec3d toLocal(Vec3d v) const { return {dot(v, axes[0]), dot(v, axes[1]), dot(v, axes[2])}; }
   [[nodiscard]] Vec3d toScene(Vec3d v) const { return axes[0] * v.x + axes[1] * v.y + axes[2] * v.z; }
@@ -77,6 +80,19 @@ inline SurfacePoint ontoSurface(const Quadric& quadric, int part, Vec3d p) {
   if (part == Quadric::kBottom) return {{p.x, p.y, -quadric.half_height}, {0.0, 0.0, -1.0}};
   const Vec3d n = normalised(Vec3d{p.x, p.y, 0.0});
   return {{n.x * quadric.radius, n.y * quadric.radius, p.z}, n};
+}
+
+/// Where a place on the part lies on a picture. Spheres and cylinders: once round from −y over −x, upright with z
+/// up; discs and ends: the square around them.
+inline TexturePlace texturePlaceOn(const Quadric& quadric, int part, Vec3d p) {
+  constexpr double kTurn = 6.283185307179586;
+  const double r = quadric.radius;
+  const double round = 0.5 + std::atan2(p.x, p.y) / kTurn;
+  const auto placed = [](double u, double v) { return TexturePlace{static_cast<float>(u), static_cast<float>(v)}; };
+  if (quadric.kind == Quadric::Kind::Sphere) return placed(round, 2.0 * std::acos(std::fmax(-1.0, std::fmin(1.0, p.z / r))) / kTurn);
+  const bool is_side = quadric.kind == Quadric::Kind::Cylinder && part == Quadric::kSide;
+  if (is_side) return placed(round, 0.5 - p.z / (2.0 * quadric.half_height));
+  return placed(0.5 + p.x / (2.0 * r), 0.5 + p.y / (2.0 * r));
 }
 
 }  // namespace toftwin::sim

@@ -3,10 +3,13 @@
 
 #include <cmath>
 
+#include "sim/tracer/glass.h"
+
 namespace toftwin::sim {
 namespace {
 
-const Quadric& quadricOf(void* pointer) { return *static_cast<const Quadric*>(pointer); }
+const BuiltObject& objectOf(void* pointer) { return *static_cast<const BuiltObject*>(pointer); }
+const Quadric& quadricOf(void* pointer) { return objectOf(pointer).quadric; }
 
 float below(double v) { return std::nextafter(static_cast<float>(v), -INFINITY); }
 float above(double v) { return std::nextafter(static_cast<float>(v), INFINITY); }
@@ -77,26 +80,50 @@ void intersect(const RTCIntersectFunctionNArguments* arguments) {
     RTCHitN_v(hits, n, i) = 0.0f;
     RTCHitN_geomID(hits, n, i) = arguments->geomID;
     RTCHitN_primID(hits, n, i) = arguments->primID;
-    RTCHitN_instID(hits, n, i, 0) = RTC_INVALID_GEOMETRY_ID;
+    RTCHitN_instID(hits, n, i, 0) = arguments->context->instID[0];
+  }
+}
+
+/// A shadow ray goes through every wall of thin glass and pays for each.
+void crossEachWall(const Quadric& quadric, const bsdf::ThinGlass& glass, const RTCOccludedFunctionNArguments* arguments,
+                   unsigned i) {
+  const unsigned n = arguments->N;
+  const Vec3d o = quadric.toLocal(originOf(arguments->ray, n, i) - quadric.centre);
+  const Vec3d d = quadric.toLocal(directionOf(arguments->ray, n, i));
+  const auto near = static_cast<double>(RTCRayN_tnear(arguments->ray, n, i));
+  const auto far = static_cast<double>(RTCRayN_tfar(arguments->ray, n, i));
+  const int parts = quadric.kind == Quadric::Kind::Cylinder ? 3 : 1;
+  for (int part = 0; part < parts; ++part) {
+    const Crossings at = crossings(quadric, part, o, d);
+    for (const double t : {at.first, at.second}) {
+      if (!(t > near && t < far)) continue;
+      const Vec3d normal = ontoSurface(quadric, part, o + d * t).normal;
+      crossGlass(arguments->context, RTCRayN_id(arguments->ray, n, i), glass, dot(normal, d) / norm(d));
+    }
   }
 }
 
 void occluded(const RTCOccludedFunctionNArguments* arguments) {
-  const Quadric& quadric = quadricOf(arguments->geometryUserPtr);
+  const BuiltObject& object = objectOf(arguments->geometryUserPtr);
+  const Quadric& quadric = object.quadric;
   const unsigned n = arguments->N;
   for (unsigned i = 0; i < n; ++i) {
     if (arguments->valid[i] != -1) continue;
+    if (object.glass != nullptr) {
+      crossEachWall(quadric, *object.glass, arguments, i);
+      continue;
+    }
     if (nearestOf(quadric, arguments->ray, n, i).is_hit) RTCRayN_tfar(arguments->ray, n, i) = -INFINITY;
   }
 }
 
 }  // namespace
 
-RTCGeometry makeQuadricGeometry(RTCDevice device, const Quadric& quadric) {
+RTCGeometry makeQuadricGeometry(RTCDevice device, const BuiltObject& object) {
   RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
   rtcSetGeometryUserPrimitiveCount(geometry, 1);
   // Embree hands the pointer back as it got it; the callbacks only read through it.
-  rtcSetGeometryUserData(geometry, const_cast<Quadric*>(&quadric));
+  rtcSetGeometryUserData(geometry, const_cast<BuiltObject*>(&object));
   rtcSetGeometryBoundsFunction(geometry, bounds, nullptr);
   rtcSetGeometryIntersectFunction(geometry, intersect);
   rtcSetGeometryOccludedFunction(geometry, occluded);

@@ -2,11 +2,11 @@
 #pragma once
 
 #include "sim/tracer/embree.h"
-#include "sim/tracer/quadric.h"
+#include "sim/tracer/scene_impl.h"
 
 namespace toftwin::sim {
 
-/// A user geometry that intersects the quadric, which must outlive it. A hit's `u` holds the part.
-RTCGeometry makeQuadricGeometry(RTCDevice device, const Quadric& quadric);
+/// A user geometry that intersects the object's quadric; the object must outlive it. A hit's `u` holds the part.
+RTCGeometry makeQuadricGeometry(RTCDevice device, const BuiltObject& object);
 
 }  // namespace toftwin::sim

@@ -5,14 +5,16 @@
 #include <openssl/evp.h>
 
 #include <algorithm>
-#include <bit>
+#include <array>
+#include <cmath>
 #include <limits>
-#include <span>
 
 #include "protocol/settings/describe.h"
 #include "sim/tracer/hit.h"
+#include "sim/tracer/image_file.h"
 #include "sim/tracer/mesh.h"
-#include "sim/tracer/quadric_embree.h"
+#include "sim/tracer/pose.h"
+#include "sim/tracer/scene_embree.h"
 #include "sim/tracer/scene_file.h"
 #include "sim/tracer/scene_impl.h"
 
@@ -52,23 +54,17 @@ bool isQuadric(Shape shape) {
   return shape == Shape::Sphere || shape == Shape::Disc || shape == Shape::Cylinder;
 }
 
-Quadric quadricOf(const PlacedObject& object, Vec3d origin_in_world) {
-  const ObjectSpec& spec = object.spec;
+/// In its own frame, scaled.
+Quadric quadricOf(const ObjectSpec& spec) {
   Quadric quadric;
   quadric.kind = spec.shape == Shape::Sphere ? Quadric::Kind::Sphere
                  : spec.shape == Shape::Disc ? Quadric::Kind::Disc
                                              : Quadric::Kind::Cylinder;
-  quadric.radius = spec.radius.in(metre) * spec.scale;
-  quadric.centre = object.world_from_object.translation_m - origin_in_world;
-  if (spec.shape == Shape::Cylinder) quadric.half_height = spec.height.in(metre) * spec.scale / 2.0;
-  quadric.axes = {object.world_from_object.rotate({1, 0, 0}), object.world_from_object.rotate({0, 1, 0}),
-                  object.world_from_object.rotate({0, 0, 1})};
+  quadric.radius = spec.radius.in(metre)*spec.scale;
+  if (spec.shape == Shape::Cylinder) quadric.half_height = spec.height.in(metre)*spec.scale / 2.0;
+  quadric.axes = {Vec3d{1, 0, 0}, Vec3d{0, 1, 0}, Vec3d{0, 0, 1}};
   return quadric;
 }
-
-/// Stands for a quadric among the triangles: every ray counts as next to its edge, where the tracer
-/// looks more closely.
-constexpr TrianglePlane kNoTriangle{.normal = {0, 0, 1}, .level = 0.0, .offset = 0.0f, .margin = 0.0f, .margin_share = INFINITY};
 
 struct Box {
   Vec3d lower{INFINITY, INFINITY, INFINITY};
@@ -88,24 +84,24 @@ Result<TriangleMesh> meshOf(const PlacedObject& object) {
   return mesh;
 }
 
-RTCGeometry makeTriangleGeometry(RTCDevice device, const BuiltObject& object) {
-  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-  // Embree owns its copy: a shared buffer would need 16 bytes of padding behind the last vertex.
-  auto* vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                           3 * sizeof(float), object.vertices.size());
-  std::ranges::transform(object.vertices, static_cast<std::array<float, 3>*>(vertices), [](const Vec3d& v) {
-    return std::array{static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
-  });
-  auto* triangles = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                            3 * sizeof(std::uint32_t), object.triangles.size());
-  std::ranges::copy(object.triangles, static_cast<std::array<std::uint32_t, 3>*>(triangles));
-  return geometry;
+Result<Image<float>> pictureOf(const NamedFile& file) {
+  auto picture = loadGrey(file.path);
+  if (!picture)
+    return Error{picture.error().code, fmt::format("{}: {}", file.place, picture.error().message)};
+  return picture;
 }
+
+Vec3d vectorOf(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
 
 }  // namespace
 
 Scene::Impl::~Impl() {
-  if (embree != nullptr) rtcReleaseScene(embree);
+  if (embree != nullptr && embree != still) rtcReleaseScene(embree);
+  if (loaded != nullptr) return;  // the rest is that one's
+  for (const Mover& mover : movers) {
+    if (mover.embree != nullptr) rtcReleaseScene(mover.embree);
+  }
+  if (still != nullptr) rtcReleaseScene(still);
   if (device != nullptr) rtcReleaseDevice(device);
 }
 
@@ -116,66 +112,128 @@ struct SceneBuilder {
   explicit SceneBuilder(const SceneFile& f) : file(f) {}
 
   const SceneFile& file;
-  std::vector<TriangleMesh> meshes;  ///< in the world; empty for quadrics
+  std::vector<TriangleMesh> meshes;  ///< in their own frames, scaled; empty for quadrics
+  Hash hash;
   std::shared_ptr<Scene::Impl> scene = std::make_shared<Scene::Impl>();
 
   Result<> loadMeshes() {
     for (const PlacedObject& object : file.objects) {
-      TriangleMesh& placed = meshes.emplace_back();
+      TriangleMesh& mesh = meshes.emplace_back();
+      hash.addSettings(object.spec, {"name", "mesh"});
+      for (const KeyframeSpec& frame : object.spec.keyframes) hash.addSettings(frame);
       if (isQuadric(object.spec.shape)) continue;
-      auto mesh = meshOf(object);
-      if (!mesh) return mesh.error();
-      placed = *std::move(mesh);
-      for (Vec3d& v : placed.vertices) {
-        v = (object.world_from_object * Point<Object>{v * object.spec.scale}).m;
+      auto loaded = meshOf(object);
+      if (!loaded) return loaded.error();
+      mesh = *std::move(loaded);
+      hash.add(mesh.vertices.data(), mesh.vertices.size() * sizeof(mesh.vertices[0]));
+      hash.add(mesh.triangles.data(), mesh.triangles.size() * sizeof(mesh.triangles[0]));
+      for (Vec3d& v : mesh.vertices) v = v * object.spec.scale;
+      if (file.textures[object.material].path.empty()) {
+        mesh.places.clear();
+        continue;
+      }
+      hash.add(mesh.places.data(), mesh.places.size() * sizeof(mesh.places[0]));
+      if (mesh.places.empty()) {
+        return Error{Error::Code::InvalidArgument,
+                     fmt::format("{}: material \"{}\" has a texture, but mesh {} has no texture coordinates",
+                                 object.place, object.spec.material, object.mesh.string())};
       }
     }
     return {};
   }
 
-  void hash() {
-    Hash all;
-    for (const MaterialSpec& material : file.spec.materials) all.addSettings(material);
-    for (std::size_t i = 0; i < file.objects.size(); ++i) {
-      all.addSettings(file.objects[i].spec, {"name", "mesh"});
-      const TriangleMesh& mesh = meshes[i];
-      all.add(mesh.vertices.data(), mesh.vertices.size() * sizeof(mesh.vertices[0]));
-      all.add(mesh.triangles.data(), mesh.triangles.size() * sizeof(mesh.triangles[0]));
+  Result<> loadMaterials() {
+    for (std::size_t i = 0; i < file.spec.materials.size(); ++i) {
+      const MaterialSpec& spec = file.spec.materials[i];
+      hash.addSettings(spec, {"texture"});
+      Material material = materialOf(spec);
+      if (!isMatt(spec.model)) {
+        scene->models.push_back(bsdfOf(spec));
+        material.special = static_cast<std::uint16_t>(scene->models.size());
+        scene->has_glass |= spec.model == Reflection::ThinGlass;
+      }
+      if (!file.textures[i].path.empty()) {
+        auto picture = pictureOf(file.textures[i]);
+        if (!picture) return picture.error();
+        for (float& value : picture->pixels()) {
+          value = std::min(1.0f, spec.texture_coding == TextureCoding::Srgb ? linearOfSrgb(value) : value);
+        }
+        hash.add(picture->pixels().data(), picture->size() * sizeof(float));
+        scene->textures.push_back(std::make_shared<const Texture>(*std::move(picture)));
+        material.texture = static_cast<std::uint16_t>(scene->textures.size());
+      }
+      scene->materials.push_back(material);
     }
-    all.addSettings(file.spec.ambient);
-    scene->id = all.hex();
+    return {};
+  }
+
+  Result<> loadSurroundings() {
+    const AmbientSpec& ambient = file.spec.ambient;
+    hash.addSettings(ambient, {"map"});
+    for (const ForeignEmitterSpec& emitter : file.spec.foreign_emitters) hash.addSettings(emitter, {"name"});
+    scene->foreign_emitters = file.spec.foreign_emitters;
+    scene->ambient_radiance = static_cast<float>(ambient.radiance);
+    Image<float> map;
+    if (!file.map.path.empty()) {
+      auto picture = pictureOf(file.map);
+      if (!picture) return picture.error();
+      map = *std::move(picture);
+      for (float& value : map.pixels()) value *= static_cast<float>(ambient.map_radiance);
+      hash.add(map.pixels().data(), map.size() * sizeof(float));
+    }
+    const Vec3d up = normalised(vectorOf(ambient.up)), ahead = vectorOf(ambient.ahead);
+    Environment environment{
+        std::move(map),
+        up,
+        normalised(ahead - up * dot(up, ahead)),
+        {normalised(vectorOf(ambient.sun_towards)), ambient.sun.in(kilolux)*ambient.sun_irradiance_per_klx}};
+    if (!environment.isDark())
+      scene->environment = std::make_shared<const Environment>(std::move(environment));
+    scene->is_matt = scene->models.empty() && scene->textures.empty() && scene->environment == nullptr;
+    return {};
   }
 
   void chooseOrigin() {
     Box box;
     for (std::size_t i = 0; i < file.objects.size(); ++i) {
-      for (const Vec3d& v : meshes[i].vertices) box.include(v);
-      if (isQuadric(file.objects[i].spec.shape)) box.include(file.objects[i].world_from_object.translation_m);
+      const Transform<World, Object>& pose = file.objects[i].world_from_object;
+      for (const Vec3d& v : meshes[i].vertices) box.include((pose * Point<Object>{v}).m);
+      if (isQuadric(file.objects[i].spec.shape)) box.include(pose.translation_m);
     }
     scene->origin_in_world = (box.lower + box.upper) / 2.0;
   }
 
+  /// An object in its own frame, without planes.
+  BuiltObject ownOf(std::size_t i) {
+    BuiltObject object;
+    object.material = file.objects[i].material;
+    if (isQuadric(file.objects[i].spec.shape)) object.quadric = quadricOf(file.objects[i].spec);
+    object.vertices = std::move(meshes[i].vertices);
+    object.triangles = std::move(meshes[i].triangles);
+    object.places = std::move(meshes[i].places);
+    if (const auto special = scene->materials[object.material].special; special != 0) {
+      object.glass = std::get_if<bsdf::ThinGlass>(&scene->models[special - 1]);
+    }
+    return object;
+  }
+
   void placeObjects() {
-    for (const MaterialSpec& material : file.spec.materials) scene->materials.push_back(materialOf(material));
-    scene->ambient_radiance = static_cast<float>(file.spec.ambient.radiance);
     for (std::size_t i = 0; i < file.objects.size(); ++i) {
-      BuiltObject& object = scene->objects.emplace_back();
-      object.material = file.objects[i].material;
-      if (isQuadric(file.objects[i].spec.shape)) {
-        object.quadric = quadricOf(file.objects[i], scene->origin_in_world);
+      BuiltObject& object = scene->owned.emplace_back(ownOf(i));
+      scene->objects.emplace_back(object);
+      Transform<World, Object> pose = file.objects[i].world_from_object;
+      pose.translation_m = pose.translation_m - scene->origin_in_world;
+      if (!file.objects[i].motion.isStill()) {
+        addPlanes(object);
+        scene->movers.push_back(
+            {i, file.objects[i].motion, file.objects[i].world_from_object, object, nullptr});
+        object = posedCopy(scene->movers.back().own, pose);
+        continue;
       }
-      object.vertices = std::move(meshes[i].vertices);
-      for (Vec3d& v : object.vertices) v = v - scene->origin_in_world;
-      object.triangles = std::move(meshes[i].triangles);
-      for (const auto& [a, b, c] : object.triangles) {
-        object.planes.push_back(planeOf(object.vertices[a], object.vertices[b], object.vertices[c]));
-      }
+      moveInto(object, pose);
+      addPlanes(object);
     }
-    for (const BuiltObject& object : scene->objects) {
-      scene->rows.push_back({.planes = object.planes.empty() ? &kNoTriangle : object.planes.data(),
-                             .material = scene->materials[object.material]});
-    }
-    scene->rows.push_back({.planes = &kNoTriangle, .material = {.albedo = 0.0f}});
+    fillRows(*scene);
   }
 
   Result<> buildEmbree() {
@@ -188,19 +246,19 @@ struct SceneBuilder {
       return Error{Error::Code::Internal, fmt::format("Embree refused to start (error {})",
                                                       static_cast<int>(rtcGetDeviceError(nullptr)))};
     }
-    scene->embree = rtcNewScene(scene->device);
-    // Robust: rays through a shared edge or a rectangle's diagonal meet one of the two triangles.
-    rtcSetSceneFlags(scene->embree, RTC_SCENE_FLAG_ROBUST);
-    rtcSetSceneBuildQuality(scene->embree, RTC_BUILD_QUALITY_MEDIUM);
+    std::vector<NumberedObject> still;
+    std::vector<Transform<World, Object>> poses;
     for (std::size_t i = 0; i < scene->objects.size(); ++i) {
-      const BuiltObject& object = scene->objects[i];
-      RTCGeometry geometry = object.triangles.empty() ? makeQuadricGeometry(scene->device, object.quadric)
-                                                      : makeTriangleGeometry(scene->device, object);
-      rtcCommitGeometry(geometry);
-      rtcAttachGeometryByID(scene->embree, geometry, static_cast<unsigned>(i));
-      rtcReleaseGeometry(geometry);
+      if (file.objects[i].motion.isStill())
+        still.push_back({static_cast<unsigned>(i), &scene->objects[i].get()});
     }
-    rtcCommitScene(scene->embree);
+    scene->still = makeEmbreeScene(scene->device, still);
+    for (Mover& mover : scene->movers) {
+      mover.embree = makeEmbreeScene(scene->device, {{static_cast<unsigned>(mover.object), &mover.own}});
+      poses.push_back(mover.start);
+      poses.back().translation_m = poses.back().translation_m - scene->origin_in_world;
+    }
+    scene->embree = scene->movers.empty() ? scene->still : makeInstances(*scene, poses);
     if (const RTCError error = rtcGetDeviceError(scene->device); error != RTC_ERROR_NONE) {
       return Error{Error::Code::Internal,
                    fmt::format("Embree could not build the scene (error {})", static_cast<int>(error))};
@@ -211,8 +269,10 @@ struct SceneBuilder {
   static Result<Scene> build(const Result<SceneFile>& file) {
     if (!file) return file.error();
     SceneBuilder builder{*file};
+    if (auto loaded = builder.loadMaterials(); !loaded) return loaded.error();
     if (auto loaded = builder.loadMeshes(); !loaded) return loaded.error();
-    builder.hash();
+    if (auto loaded = builder.loadSurroundings(); !loaded) return loaded.error();
+    builder.scene->id = builder.hash.hex();
     builder.chooseOrigin();
     builder.placeObjects();
     if (auto built = builder.buildEmbree(); !built) return built.error();
@@ -220,7 +280,9 @@ struct SceneBuilder {
   }
 };
 
-Result<Scene> Scene::load(const std::filesystem::path& file) { return SceneBuilder::build(loadSceneFile(file)); }
+Result<Scene> Scene::load(const std::filesystem::path& file) {
+  return SceneBuilder::build(loadSceneFile(file));
+}
 
 Result<Scene> Scene::parse(std::string_view toml, const std::filesystem::path& name) {
   return SceneBuilder::build(parseSceneFile(toml, name));

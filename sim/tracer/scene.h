@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include <toftwin/result.h>
+#include <toftwin/units.h>
 
 namespace toftwin::sim {
 
@@ -23,6 +24,12 @@ class Scene {
   /// Content hash over what the scene says and the meshes it uses; 32 hex digits. Comments, order of
   /// keys and file names do not count.
   [[nodiscard]] const std::string& id() const;
+
+  /// Whether anything in it moves by itself.
+  [[nodiscard]] bool moves() const;
+  /// The scene as it stands at a time after its start, with the same id. Still geometry is shared; what
+  /// moves is placed anew, which takes microseconds and some nanoseconds for each of its triangles.
+  [[nodiscard]] Scene at(Duration time) const;
 
   struct Impl;
   [[nodiscard]] const Impl& impl() const { return *impl_; }

@@ -13,7 +13,9 @@ namespace {
 
 using settings::Table;
 
-Transform<World, Object> poseOf(const ObjectSpec& object, bool from_euler) {
+/// The pose that an object or a keyframe gives.
+template <class Spec>
+Transform<World, Object> poseOf(const Spec& object, bool from_euler) {
   Transform<World, Object> pose;
   if (from_euler) {
     const auto turn = [&](Vec3d axis, double angle_deg) {
@@ -31,6 +33,21 @@ Transform<World, Object> poseOf(const ObjectSpec& object, bool from_euler) {
   const auto& p = object.position_m;
   pose.translation_m = {p[0], p[1], p[2]};
   return pose;
+}
+
+Vec3d vectorOf(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
+
+void checkDirection(Table& table, const char* key, const std::array<double, 3>& direction) {
+  if (norm(vectorOf(direction)) < 1e-6) table.complain(key, "is zero, which is no direction");
+}
+
+void checkOrientation(Table& table, const std::array<double, 4>& q) {
+  if (table.has("euler_deg") && table.has("rotation_wxyz")) {
+    table.complain("euler_deg", "and rotation_wxyz both give the orientation; keep one");
+  }
+  if (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3] < 1e-6) {
+    table.complain("rotation_wxyz", "is zero, which is no orientation");
+  }
 }
 
 /// Complains about a size that the shape needs and that is zero.
@@ -68,16 +85,33 @@ void checkKeysFitShape(Table& table, const ObjectSpec& object) {
   only("size_m", shape == Shape::Box || shape == Shape::Rectangle);
   only("radius_m", shape == Shape::Sphere || shape == Shape::Cylinder || shape == Shape::Disc);
   only("height_m", shape == Shape::Cylinder);
-  if (table.has("euler_deg") && table.has("rotation_wxyz")) {
-    table.complain("euler_deg", "and rotation_wxyz both give the orientation; keep one");
-  }
-  const auto& q = object.rotation_wxyz;
-  if (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3] < 1e-6) {
-    table.complain("rotation_wxyz", "is zero, which is no orientation");
-  }
+  checkOrientation(table, object.rotation_wxyz);
 }
 
-void readMaterials(Table& root, SceneSpec& scene) {
+/// Keys that the material's model does not use are mistakes: a mirror's roughness, a wall's index.
+void checkKeysFitModel(Table& table, Reflection model) {
+  const auto only = [&](const char* key, std::initializer_list<Reflection> users, const char* needed) {
+    if (table.has(key) && std::find(users.begin(), users.end(), model) == users.end()) {
+      table.complain(key, fmt::format("needs model = {}", needed));
+    }
+  };
+  using enum Reflection;
+  only("sigma_deg", {OrenNayar}, "\"oren-nayar\"");
+  only("roughness", {RoughDielectric, RoughMetal}, "\"rough-dielectric\" or \"rough-metal\"");
+  only("index", {RoughDielectric, ThinGlass}, "\"rough-dielectric\" or \"thin-glass\"");
+  for (const char* key : {"lobe_deg", "lobe_share"}) only(key, {Retroreflector}, "\"retroreflector\"");
+  for (const char* key : {"through", "delay_ns"}) only(key, {Translucent}, "\"translucent\"");
+  for (const char* key : {"clarity", "thickness_mm"}) only(key, {ThinGlass}, "\"thin-glass\"");
+  for (const char* key : {"albedo", "texture"}) {
+    if (table.has(key) && model == ThinGlass)
+      table.complain(key, "has no meaning for thin-glass; see index and clarity");
+  }
+  if (table.has("texture_coding") && !table.has("texture"))
+    table.complain("texture_coding", "needs a texture");
+}
+
+void readMaterials(Table& root, SceneFile& file) {
+  SceneSpec& scene = file.spec;
   for (Table& table : root.tables("material")) {
     MaterialSpec material;
     table.read(material);
@@ -87,10 +121,66 @@ void readMaterials(Table& root, SceneSpec& scene) {
     if (is_known) {
       table.complain("name", fmt::format("\"{}\" is taken by an earlier material", material.name));
     }
-    if (table.has("sigma_deg") && material.model != Reflection::OrenNayar) {
-      table.complain("sigma_deg", "needs model = \"oren-nayar\"");
-    }
+    checkKeysFitModel(table, material.model);
+    NamedFile& texture = file.textures.emplace_back();
+    if (!material.texture.empty()) texture = {table.resolve(material.texture), table.place("texture")};
     scene.materials.push_back(std::move(material));
+  }
+}
+
+/// How the object moves, by its steady rates or by its keyframes.
+Motion readMotion(Table& table, const ObjectSpec& object) {
+  Motion motion{.velocity_m_per_s = vectorOf(object.velocity_m_per_s),
+                .rotation_rad_per_s = vectorOf(object.rotation_rate_deg_per_s) * degree.in_si,
+                .keys = {},
+                .period_s = object.period.in(second)};
+  if (!table.has("keyframe")) {
+    if (table.has("period_s")) table.complain("period_s", "needs keyframes");
+    return motion;
+  }
+  for (const char* key :
+       {"velocity_m_per_s", "rotation_rate_deg_per_s", "position_m", "rotation_wxyz", "euler_deg"}) {
+    if (table.has(key))
+      table.complain(key, "has no meaning beside keyframes, which say where the object is; remove it");
+  }
+  std::size_t i = 0;
+  for (Table& frame : table.tables("keyframe")) {
+    frame.acceptAll();  // they were read with the object
+    const KeyframeSpec& spec = object.keyframes[i++];
+    checkOrientation(frame, spec.rotation_wxyz);
+    const Transform<World, Object> pose = poseOf(spec, frame.has("euler_deg"));
+    const double time = spec.time.in(second);
+    if (!motion.keys.empty() && time <= motion.keys.back().time_s) {
+      frame.complain("time_s", "is not later than that of the keyframe before");
+    }
+    motion.keys.push_back({time, pose.rotation_wxyz, pose.translation_m});
+  }
+  return motion;
+}
+
+void readAmbient(Table& root, SceneFile& file) {
+  auto table = root.table("ambient");
+  if (!table) return;
+  AmbientSpec& ambient = file.spec.ambient;
+  table->read(ambient);
+  if (!ambient.map.empty()) file.map = {table->resolve(ambient.map), table->place("map")};
+  checkDirection(*table, "up", ambient.up);
+  checkDirection(*table, "ahead", ambient.ahead);
+  checkDirection(*table, "sun_towards", ambient.sun_towards);
+  const Vec3d across = cross(vectorOf(ambient.up), vectorOf(ambient.ahead));
+  if (norm(across) < 1e-3 * norm(vectorOf(ambient.up)) * norm(vectorOf(ambient.ahead))) {
+    table->complain("ahead", "points along `up`: the map would have no direction");
+  }
+  for (const char* key : {"map_radiance_w_per_m2_sr", "up", "ahead"}) {
+    if (table->has(key) && ambient.map.empty()) table->complain(key, "needs a map");
+  }
+}
+
+void readForeignEmitters(Table& root, SceneSpec& scene) {
+  for (Table& table : root.tables("foreign_emitter")) {
+    ForeignEmitterSpec& emitter = scene.foreign_emitters.emplace_back();
+    table.read(emitter);
+    checkDirection(table, "axis", emitter.axis);
   }
 }
 
@@ -112,8 +202,8 @@ PlacedObject readObject(Table& table, const SceneSpec& scene) {
   if (material == scene.materials.end()) {
     std::string known;
     for (const auto& m : scene.materials) known += (known.empty() ? "" : ", ") + m.name;
-    table.complain("material", fmt::format("\"{}\" is no material of this scene; it has: {}",
-                                           spec.material, known.empty() ? "none" : known));
+    table.complain("material", fmt::format("\"{}\" is no material of this scene; it has: {}", spec.material,
+                                           known.empty() ? "none" : known));
   } else {
     object.material = static_cast<std::size_t>(material - scene.materials.begin());
   }
@@ -121,18 +211,20 @@ PlacedObject readObject(Table& table, const SceneSpec& scene) {
     if (spec.file.empty()) table.complain("mesh", "is missing: name the mesh's file");
     object.mesh = table.resolve(spec.file);
   }
-  object.world_from_object = poseOf(spec, table.has("euler_deg"));
+  object.motion = readMotion(table, spec);
+  object.world_from_object = poseAt(object.motion, poseOf(spec, table.has("euler_deg")), 0_s);
   return object;
 }
 
 Result<SceneFile> read(Table root) {
   SceneFile file;
-  readMaterials(root, file.spec);
+  readMaterials(root, file);
   for (Table& table : root.tables("object")) {
     file.objects.push_back(readObject(table, file.spec));
     file.spec.objects.push_back(file.objects.back().spec);
   }
-  if (auto ambient = root.table("ambient")) ambient->read(file.spec.ambient);
+  readAmbient(root, file);
+  readForeignEmitters(root, file.spec);
   if (file.objects.empty()) root.complain("", "the scene has no [[object]]");
   if (auto checked = root.check(); !checked) return checked.error();
   return file;

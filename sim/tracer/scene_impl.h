@@ -3,16 +3,22 @@
 
 #include <array>
 #include <cstdint>
+#include <deque>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include <toftwin/geometry.h>
 
+#include "sim/tracer/bsdf/any.h"
 #include "sim/tracer/embree.h"
+#include "sim/tracer/environment.h"
 #include "sim/tracer/material.h"
+#include "sim/tracer/motion.h"
 #include "sim/tracer/quadric.h"
 #include "sim/tracer/scene.h"
+#include "sim/tracer/texture.h"
 
 namespace toftwin::sim {
 
@@ -32,7 +38,10 @@ struct BuiltObject {
   std::vector<Vec3d> vertices;
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::vector<TrianglePlane> planes;  ///< of the triangles
+  std::vector<std::array<TexturePlace, 3>>
+      places;  ///< of the triangles' corners, if the material has a texture
   Quadric quadric;
+  const bsdf::ThinGlass* glass = nullptr;  ///< if it is one: shadow rays go through
 };
 
 /// What the tracer reads of an object at each hit.
@@ -41,6 +50,17 @@ struct ObjectRow {
   Material material;
 };
 
+/// A moving object in its own frame, scaled, and the Embree scene that instances of it show.
+struct Mover {
+  std::size_t object = 0;
+  Motion motion;
+  Transform<World, Object> start;
+  BuiltObject own;
+  RTCScene embree = nullptr;
+};
+
+/// A scene as it was loaded, or as it stands at another time. The latter owns no more than its moving
+/// objects and a small Embree scene of instances, and keeps what was loaded alive.
 struct Scene::Impl {
   Impl() = default;
   Impl(const Impl&) = delete;
@@ -49,16 +69,33 @@ struct Scene::Impl {
 
   std::string id;
   std::vector<Material> materials;
-  std::vector<BuiltObject> objects;  ///< Embree points into them
-  std::vector<ObjectRow> rows;       ///< of `objects`, which they point into; the last one is that of nothing
+  std::vector<bsdf::Any> models;  ///< of the materials; `Material::special` points here
+  std::vector<std::shared_ptr<const Texture>> textures;  // shared by a scene's poses
+  std::shared_ptr<const Environment> environment;        // likewise; null if it is dark
+  std::deque<BuiltObject> owned;                         ///< Embree points into them
+  std::vector<std::reference_wrapper<const BuiltObject>> objects;
+  std::vector<ObjectRow> rows;  ///< of `objects`, which they point into; the last one is that of nothing
+  std::vector<Mover> movers;    ///< of the loaded scene
+  std::vector<ForeignEmitterSpec> foreign_emitters;
   float ambient_radiance = 0.0f;
+  bool is_matt = true;  ///< neither special models, textures nor surroundings but even ones: the fast path
+  bool has_glass = false;
 
   /// The scene's frame is the world's, moved here: the middle of everything. Single-precision
   /// coordinates are then as fine as the scene is small, wherever in the world it stands.
   Vec3d origin_in_world;
 
   RTCDevice device = nullptr;
-  RTCScene embree = nullptr;
+  RTCScene still = nullptr;   ///< what does not move
+  RTCScene embree = nullptr;  ///< everything: `still` itself, or instances of it and of the movers
+
+  /// Embree 3.13 may search coherent packets in instances without end.
+  [[nodiscard]] bool hasInstances() const { return embree != still; }
+
+  std::shared_ptr<const Impl> loaded;  ///< of a scene at another time: what it was made from
 };
+
+/// Rows for the objects, once they stand in their places.
+void fillRows(Scene::Impl& scene);
 
 }  // namespace toftwin::sim

@@ -62,7 +62,7 @@ void lightHits(const Packet& packet, const Hits& hits, const PlacedEmitter& emit
   // The lobes that need no power function are slope · cos γ + level; the last loop does the others.
   const double slope = !emitter.is_isotropic && emitter.exponent == 1.0 ? 1.0 : 0.0, level = 1.0 - slope;
   const double limit = emitter.is_isotropic ? -2.0 : larger(emitter.cos_limit, 1e-300);
-  const double peak = emitter.peak / std::numbers::pi;
+  const double peak = emitter.peak / std::numbers::pi, delay = emitter.delay_m;
   Lanes<double> cosines, lobe_cosines, weights;
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     const double lx = places.x[i] - hits.position.x[i], ly = places.y[i] - hits.position.y[i],
@@ -79,7 +79,7 @@ void lightHits(const Packet& packet, const Hits& hits, const PlacedEmitter& emit
                  (slope * lobe_cosine + level) * per_distance * per_distance;
     cosines[i] = cosine;
     lobe_cosines[i] = lobe_cosine;
-    light.length[i] = packet.length[i] + hits.distance[i] + distance;
+    light.length[i] = packet.length[i] + hits.distance[i] + distance + delay;
   }
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     // Zero where there is no light; NaN fails the comparisons, too.
@@ -87,6 +87,12 @@ void lightHits(const Packet& packet, const Hits& hits, const PlacedEmitter& emit
     light.valid[i] = is_lit ? -1 : 0;
     light.weight[i] = is_lit ? static_cast<float>(weights[i]) : 0.0f;
     light.length[i] = is_lit ? light.length[i] : 0.0;
+  }
+  if (!emitter.pattern.empty()) {
+    for (std::size_t i = 0; i < kLaneCount; ++i) {
+      if (light.valid[i] != 0) light.weight[i] *= static_cast<float>(emitter.patternAt(lobe_cosines[i]));
+    }
+    return;
   }
   if (emitter.is_isotropic || emitter.exponent == 1.0 || emitter.exponent == 0.0) return;
   for (std::size_t i = 0; i < kLaneCount; ++i) {

@@ -26,6 +26,10 @@ struct EmitterSpec {
   double lobe_exponent = 1.0;  ///< m
   Angle half_angle = 90.0 * degree;
   bool isotropic = false;
+  /// A radiation pattern instead of the lobe: relative intensities at these angles from the axis, ascending from
+  /// 0, at least two; linear between, dark beyond the last. The power is that of the whole pattern.
+  std::vector<double> pattern_deg{}, pattern{};
+  Duration delay{};  ///< its light is late by this: cables, drivers
 };
 
 /// What to trace. The result depends on nothing else, not on the number of threads.

@@ -41,7 +41,8 @@ Vec3d direction(double cosine, double phi) {
   return {sine * std::cos(phi), sine * std::sin(phi), cosine};
 }
 const std::vector<Vec3d>& viewers() {
-  static const std::vector<Vec3d> all{direction(1.0, 0.0), direction(0.8, 0.3), direction(0.4, 2.0), direction(0.1, -1.0)};
+  static const std::vector<Vec3d> all{direction(1.0, 0.0), direction(0.8, 0.3), direction(0.4, 2.0),
+                                      direction(0.1, -1.0)};
   return all;
 }
 
@@ -59,14 +60,18 @@ Scattered sampleOf(const Case& c, Vec3d from, Draw draw) {
 struct Polar {
   Vec3d x, y, axis;
   explicit Polar(const Case& c, Vec3d from) {
-    const bool is_facet = std::holds_alternative<RoughMetal>(c.model) || std::holds_alternative<RoughDielectric>(c.model);
-    axis = is_facet ? Vec3d{-from.x, -from.y, from.z} : std::holds_alternative<Retroreflector>(c.model) ? from : Vec3d{0, 0, 1};
+    const bool is_facet =
+        std::holds_alternative<RoughMetal>(c.model) || std::holds_alternative<RoughDielectric>(c.model);
+    axis = is_facet                                          ? Vec3d{-from.x, -from.y, from.z}
+           : std::holds_alternative<Retroreflector>(c.model) ? from
+                                                             : Vec3d{0, 0, 1};
     x = normalised(cross(axis, std::abs(axis.x) < 0.6 ? Vec3d{1, 0, 0} : Vec3d{0, 1, 0}));
     y = cross(axis, x);
   }
   [[nodiscard]] Vec3d at(double s, double t) const {
     const double theta = kPi * s * s * s, phi = 2.0 * kPi * t;
-    return axis * std::cos(theta) + x * (std::sin(theta) * std::cos(phi)) + y * (std::sin(theta) * std::sin(phi));
+    return axis * std::cos(theta) + x * (std::sin(theta) * std::cos(phi)) +
+           y * (std::sin(theta) * std::sin(phi));
   }
   [[nodiscard]] static double solidAngle(double s) {  // per ds dt
     return 2.0 * kPi * std::sin(kPi * s * s * s) * kPi * 3.0 * s * s;
@@ -96,7 +101,8 @@ constexpr double kQuadrature = 1e-3;
 TEST(Bsdf, NoModelGivesBackMoreThanItGot) {
   for (const Case& c : spreadCases()) {
     for (const Vec3d from : viewers()) {
-      const double seen = integral(Polar{c, from}, [&](Vec3d to) { return valueOf(c, from, to) * std::abs(to.z); });
+      const double seen =
+          integral(Polar{c, from}, [&](Vec3d to) { return valueOf(c, from, to) * std::abs(to.z); });
       // The tables of 1 − E are linear between 65 cosines: 0.002.
       EXPECT_LT(seen, 1.0 + kQuadrature + 0.002) << c.name << " cosine " << from.z;
       EXPECT_GE(seen, 0.0);
@@ -110,7 +116,8 @@ TEST(Bsdf, MicrofacetsOfAlbedoOneLoseNothing) {
     for (const Case& c : {Case{"metal", RoughMetal::ofRoughness(roughness), 1.0},
                           Case{"dielectric", RoughDielectric::of(roughness, 1.5), 1.0}}) {
       for (const Vec3d from : viewers()) {
-        const double seen = integral(Polar{c, from}, [&](Vec3d to) { return valueOf(c, from, to) * std::abs(to.z); });
+        const double seen =
+            integral(Polar{c, from}, [&](Vec3d to) { return valueOf(c, from, to) * std::abs(to.z); });
         EXPECT_NEAR(seen, 1.0, kQuadrature + 0.003) << c.name << " " << roughness << " cosine " << from.z;
       }
     }
@@ -125,7 +132,8 @@ TEST(Bsdf, LightGoesBothWaysAlike) {
       const Vec3d a = direction(0.02 + 0.98 * uniform(generator), 6.3 * uniform(generator));
       // Half of the pairs lie close together, where a retroreflector's lobe is.
       const Vec3d near = normalised(a + 0.01 * direction(uniform(generator), 6.3 * uniform(generator)));
-      const Vec3d b = i % 2 == 0 ? near : direction(0.02 + 0.98 * uniform(generator), 6.3 * uniform(generator));
+      const Vec3d b =
+          i % 2 == 0 ? near : direction(0.02 + 0.98 * uniform(generator), 6.3 * uniform(generator));
       const double there = valueOf(c, a, b), back = valueOf(c, b, a);
       EXPECT_NEAR(there, back, 1e-9 * (there + back) + 1e-12) << c.name;
     }
@@ -152,18 +160,21 @@ TEST(Bsdf, SamplesFollowTheirDensity) {
         }
         EXPECT_NEAR(norm(s.to), 1.0, 1e-9);
         const auto [a, b] = polar.of(s.to);
-        const int row = std::min(kCells - 1, static_cast<int>(a * kCells)), column = std::min(kCells - 1, static_cast<int>(b * kCells));
+        const int row = std::min(kCells - 1, static_cast<int>(a * kCells)),
+                  column = std::min(kCells - 1, static_cast<int>(b * kCells));
         ++counted[static_cast<std::size_t>(row * kCells + column)];
       }
       for (int i = 0; i < kCells * kFine; ++i) {
-        const double s = (i + 0.5) / (kCells * kFine), weight = Polar::solidAngle(s) / (kCells * kFine * kCells * kFine);
+        const double s = (i + 0.5) / (kCells * kFine),
+                     weight = Polar::solidAngle(s) / (kCells * kFine * kCells * kFine);
         for (int j = 0; j < kCells * kFine; ++j) {
           const double p = weight * densityOf(c, from, polar.at(s, (j + 0.5) / (kCells * kFine)));
           expected[static_cast<std::size_t>(i / kFine * kCells + j / kFine)] += p * kSamples;
           all += p;
         }
       }
-      EXPECT_NEAR(all + absorbed / kSamples, 1.0, 2e-3 + 5.0 * std::sqrt(0.25 / kSamples)) << c.name << " cosine " << from.z;
+      EXPECT_NEAR(all + absorbed / kSamples, 1.0, 2e-3 + 5.0 * std::sqrt(0.25 / kSamples))
+          << c.name << " cosine " << from.z;
       double chi2 = 0.0, pooled_expected = (1.0 - all) * kSamples, pooled_counted = absorbed;
       int cells = 0;
       for (std::size_t i = 0; i < expected.size(); ++i) {
@@ -181,7 +192,8 @@ TEST(Bsdf, SamplesFollowTheirDensity) {
       }
       const double n = cells - 1.0, spread = 2.0 / (9.0 * n);
       const double z = (std::cbrt(chi2 / n) - (1.0 - spread)) / std::sqrt(spread);
-      EXPECT_LT(z, 4.2) << c.name << " cosine " << from.z << " chi2 " << chi2 << " of " << cells << " cells, seed " << kSeed;
+      EXPECT_LT(z, 4.2) << c.name << " cosine " << from.z << " chi2 " << chi2 << " of " << cells
+                        << " cells, seed " << kSeed;
     }
   }
 }
@@ -196,7 +208,9 @@ TEST(Bsdf, WeightsAreValueOverDensity) {
         const Scattered s = sampleOf(c, from, {uniform(generator), uniform(generator), uniform(generator)});
         if (s.density <= 0.0) continue;
         EXPECT_NEAR(s.density, densityOf(c, from, s.to), 1e-9 * s.density) << c.name;
-        EXPECT_NEAR(s.weight * s.density, valueOf(c, from, s.to) * std::abs(s.to.z), 1e-9 * s.weight * s.density) << c.name;
+        EXPECT_NEAR(s.weight * s.density, valueOf(c, from, s.to) * std::abs(s.to.z),
+                    1e-9 * s.weight * s.density)
+            << c.name;
       }
     }
   }
@@ -208,7 +222,8 @@ TEST(Fresnel, HasItsKnownValues) {
   EXPECT_NEAR(dielectricFresnel(1e-9, 1.5), 1.0, 1e-6);
   const double brewster = std::atan(1.5), c = std::cos(brewster), s = std::sin(brewster);
   const double inner = std::sqrt(1.0 - s * s / 2.25), across = (c - 1.5 * inner) / (c + 1.5 * inner);
-  EXPECT_NEAR(dielectricFresnel(c, 1.5), 0.5 * across * across, 1e-12) << "no light polarised along the plane";
+  EXPECT_NEAR(dielectricFresnel(c, 1.5), 0.5 * across * across, 1e-12)
+      << "no light polarised along the plane";
   EXPECT_NEAR(RoughDielectric::of(0.1, 1.5).boundary.at(1.0), 0.04, 1e-3);
 }
 

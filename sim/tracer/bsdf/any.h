@@ -12,6 +12,7 @@
 namespace toftwin::sim::bsdf {
 
 /// Every reflection model. Adding one: its file, its place here, its keys in scene_file.h.
-using Any = std::variant<Diffuse, RoughDielectric, RoughMetal, Mirror, Retroreflector, Translucent, ThinGlass>;
+using Any =
+    std::variant<Diffuse, RoughDielectric, RoughMetal, Mirror, Retroreflector, Translucent, ThinGlass>;
 
 }  // namespace toftwin::sim::bsdf

@@ -22,8 +22,8 @@ namespace toftwin::sim::bsdf {
 
 /// Random numbers in [0, 1) for one scattering.
 struct Draw {
-  double u, v;     ///< the direction
-  double choice;   ///< which of several ways
+  double u, v;    ///< the direction
+  double choice;  ///< which of several ways
 };
 
 struct Scattered {

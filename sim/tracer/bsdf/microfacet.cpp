@@ -4,8 +4,8 @@
 namespace toftwin::sim::bsdf {
 namespace {
 
-/// E(cos θ) = ∫ f cos of a facet lobe: the mean of F G₂/G₁ over visible normals, on a grid of strata. Those in
-/// u are finer towards 1, u = 1 − (1 − t)⁴, where the distribution's long tail of steep facets is.
+/// E(cos θ) = ∫ f cos of a facet lobe: the mean of F G₂/G₁ over visible normals, on a grid of strata. Those
+/// in u are finer towards 1, u = 1 − (1 − t)⁴, where the distribution's long tail of steep facets is.
 template <class Fresnel>
 Reflectance reflectanceOf(const Facets& facets, const Fresnel& fresnel) {
   constexpr int kStrata = 64;
@@ -64,7 +64,8 @@ double Facets::density(Vec3d from, Vec3d to) const {
 Vec3d Facets::visibleNormal(Vec3d from, double u, double v) const {
   const Vec3d stretched = normalised(Vec3d{alpha * from.x, alpha * from.y, from.z});
   const double length2 = stretched.x * stretched.x + stretched.y * stretched.y;
-  const Vec3d x = length2 > 0.0 ? Vec3d{-stretched.y, stretched.x, 0.0} / std::sqrt(length2) : Vec3d{1.0, 0.0, 0.0};
+  const Vec3d x =
+      length2 > 0.0 ? Vec3d{-stretched.y, stretched.x, 0.0} / std::sqrt(length2) : Vec3d{1.0, 0.0, 0.0};
   const Vec3d y = cross(stretched, x);
   const double r = std::sqrt(u), phi = 2.0 * std::numbers::pi * v;
   const double p = r * std::cos(phi), s = 0.5 * (1.0 + stretched.z);
@@ -97,7 +98,8 @@ Scattered RoughMetal::sample(double albedo, Vec3d from, Draw draw) const {
 
 RoughDielectric RoughDielectric::of(double roughness, double index) {
   const Facets facets{roughness * roughness};
-  return {facets, index, reflectanceOf(facets, [=](double cosine) { return dielectricFresnel(cosine, index); })};
+  return {facets, index,
+          reflectanceOf(facets, [=](double cosine) { return dielectricFresnel(cosine, index); })};
 }
 
 double RoughDielectric::value(double albedo, Vec3d from, Vec3d to) const {

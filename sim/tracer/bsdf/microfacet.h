@@ -25,7 +25,9 @@ struct Facets {
   }
   /// Share of the facets that are seen from one direction, and from both.
   [[nodiscard]] double seen(double cosine) const { return 1.0 / (1.0 + lambda(cosine)); }
-  [[nodiscard]] double seen(double cosine, double other) const { return 1.0 / (1.0 + lambda(cosine) + lambda(other)); }
+  [[nodiscard]] double seen(double cosine, double other) const {
+    return 1.0 / (1.0 + lambda(cosine) + lambda(other));
+  }
   /// Density of the reflected direction when the normal is drawn as visible: D G₁ / (4 cos θ).
   [[nodiscard]] double density(Vec3d from, Vec3d to) const;
   [[nodiscard]] Vec3d visibleNormal(Vec3d from, double u, double v) const;

@@ -16,7 +16,9 @@ struct Retroreflector {
   double share = 1.0;
   static constexpr bool kIsDelta = false;
 
-  static Retroreflector withLobe(double sigma_rad, double share) { return {1.0 / (sigma_rad * sigma_rad), share}; }
+  static Retroreflector withLobe(double sigma_rad, double share) {
+    return {1.0 / (sigma_rad * sigma_rad), share};
+  }
 
   [[nodiscard]] double value(double albedo, Vec3d from, Vec3d to) const {
     if (from.z <= 0.0 || to.z <= 0.0) return 0.0;
@@ -36,14 +38,16 @@ struct Retroreflector {
  private:
   [[nodiscard]] double lobe(Vec3d from, Vec3d to) const {
     const Vec3d apart = from - to;  // 1 − cos ψ = |from − to|²/2, without cancellation
-    return kappa / (2.0 * std::numbers::pi * -std::expm1(-2.0 * kappa)) * std::exp(-0.5 * kappa * dot(apart, apart));
+    return kappa / (2.0 * std::numbers::pi * -std::expm1(-2.0 * kappa)) *
+           std::exp(-0.5 * kappa * dot(apart, apart));
   }
   [[nodiscard]] Vec3d nearTo(Vec3d axis, Draw draw) const {
     // 1 − cos ψ from its inverse distribution
     const double w = -std::log1p(draw.u * std::expm1(-2.0 * kappa)) / kappa;
     const double sine = std::sqrt(std::max(0.0, w * (2.0 - w))), phi = 2.0 * std::numbers::pi * draw.v;
     const double sign = std::copysign(1.0, axis.z), a = -1.0 / (sign + axis.z), b = axis.x * axis.y * a;
-    const Vec3d x{1.0 + sign * axis.x * axis.x * a, sign * b, -sign * axis.x}, y{b, sign + axis.y * axis.y * a, -axis.y};
+    const Vec3d x{1.0 + sign * axis.x * axis.x * a, sign * b, -sign * axis.x},
+        y{b, sign + axis.y * axis.y * a, -axis.y};
     return x * (sine * std::cos(phi)) + y * (sine * std::sin(phi)) + axis * (1.0 - w);
   }
 };

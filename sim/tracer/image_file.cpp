@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim/tracer/image_file.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+namespace toftwin::sim {
+namespace {
+
+double scaleOf(int depth) {
+  if (depth == CV_8U) return 1.0 / 255.0;
+  return depth == CV_16U ? 1.0 / 65535.0 : 1.0;
+}
+
+/// imread throws where a picture is larger than OpenCV's limit, and returns nothing for other mistakes.
+cv::Mat decoded(const std::filesystem::path& file) {
+  try {
+    return cv::imread(file.string(), cv::IMREAD_UNCHANGED);
+  } catch (const cv::Exception&) {
+    return {};
+  }
+}
+
+}  // namespace
+
+Result<Image<float>> loadGrey(const std::filesystem::path& file) {
+  if (!std::filesystem::is_regular_file(file)) {
+    return Error{
+        Error::Code::NotFound,
+        fmt::format("picture {}: no such file; paths are relative to the scene file", file.string())};
+  }
+  cv::Mat picture = decoded(file);
+  const int depth = picture.depth();
+  if (picture.empty() || (depth != CV_8U && depth != CV_16U && depth != CV_32F)) {
+    return Error{
+        Error::Code::Malformed,
+        fmt::format("picture {}: not a PNG, JPEG, TIFF or HDR file of 8, 16 or 32 bits", file.string())};
+  }
+  picture.convertTo(picture, CV_32F, scaleOf(depth));
+  const int channels = picture.channels(), colours = channels == 2 || channels == 4 ? channels - 1 : channels;
+  Image<float> grey{picture.cols, picture.rows};
+  for (int y = 0; y < grey.height(); ++y) {
+    const float* row = picture.ptr<float>(y);
+    for (int x = 0; x < grey.width(); ++x) {
+      float sum = 0.0f;
+      for (int c = 0; c < colours; ++c) sum += row[x * channels + c];
+      if (!std::isfinite(sum) || sum < 0.0f) {
+        return Error{Error::Code::InvalidArgument,
+                     fmt::format("picture {}: the value at column {}, row {} is negative or not a number",
+                                 file.string(), x, y)};
+      }
+      grey(x, y) = sum / static_cast<float>(colours);
+    }
+  }
+  return grey;
+}
+
+}  // namespace toftwin::sim
