@@ -17,8 +17,12 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
+/// So many rows above and below its own does a camera's decoder look at: its filters and their edge test.
+constexpr int kRowsBeside = 2;
+
 int middleRow(const CameraInfo& camera) {
-  return std::clamp(static_cast<int>(std::lround(camera.cy)), 0, camera.height - 1);
+  return std::clamp(static_cast<int>(std::lround(camera.cy)), kRowsBeside,
+                    camera.height - 1 - kRowsBeside);
 }
 
 sim::TraceRequest middleRowOnly(sim::TraceRequest request) {
@@ -29,16 +33,32 @@ sim::TraceRequest middleRowOnly(sim::TraceRequest request) {
   return request;
 }
 
+/// The one row of samples between copies of itself, for decoders that look at neighbours: the scenes of
+/// the measured lines are the same above and below. The noise, which comes later, is not copied.
+sim::Samples amongItsLike(const sim::Samples& row) {
+  sim::Samples rows = row;
+  for (std::size_t i = 0; i < row.electrons.size(); ++i) {
+    rows.electrons[i] = Image<float>{row.width(), 2 * kRowsBeside + 1};
+    for (int y = 0; y <= 2 * kRowsBeside; ++y) {
+      std::ranges::copy(row.electrons[i].pixels(), &rows.electrons[i](0, y));
+    }
+  }
+  return rows;
+}
+
 /// Per pixel: the mean over one batch's frames, NaN where most frames are invalid.
 std::vector<double> meanRange(const sim::SensorModel& camera, const sim::Light& light,
                               const LineEffort& effort, int row, std::uint64_t first_frame) {
   std::vector<Running> mean(static_cast<std::size_t>(light.width()));
-  const sim::Samples collected = camera.collect(light, {}, effort.seed, first_frame, 0, row);
+  const sim::Samples collected =
+      amongItsLike(camera.collect(light, {}, effort.seed, first_frame, 0, row));
   for (int frame = 0; frame < effort.frames; ++frame) {
     const auto exposed = camera.readOut(collected, {}, effort.seed,
-                                        first_frame + static_cast<std::uint64_t>(frame), 0, row);
+                                        first_frame + static_cast<std::uint64_t>(frame), 0,
+                                        row - kRowsBeside);
     for (std::size_t x = 0; x < mean.size(); ++x) {
-      const auto range = static_cast<double>(exposed.range.range_m[x]);
+      const auto range =
+          static_cast<double>(exposed.range.range_m(static_cast<int>(x), kRowsBeside));
       if (std::isfinite(range)) mean[x].add(1e3 * range);
     }
   }
@@ -93,7 +113,7 @@ Result<std::vector<WallReading>> readWall(const sim::SensorModel& camera, double
   const auto scene = sim::Scene::parse(
       materialToml("wall", albedo) + wallToml({-2000, 0, 2000, 0, 4000, "wall"}), "wall.toml");
   if (!scene) return scene.error();
-  constexpr int kSide = 4;
+  constexpr int kInner = 4, kSide = kInner + 2;  // filters leave the outermost pixels as they are
   sim::TraceRequest request = camera.traceRequest();
   request.samples_per_pixel = 64;
   request.max_surfaces = 1;  // one flat wall: no light comes twice
@@ -110,7 +130,7 @@ Result<std::vector<WallReading>> readWall(const sim::SensorModel& camera, double
     const sim::Light light = sim::trace(*scene, request);
     const sim::Samples collected =
         camera.collect(light, {}, seed, 0, request.region_x, request.region_y);
-    std::vector<Running> range(kSide * kSide);
+    std::vector<Running> range(kInner * kInner);
     Running amplitude, truth;
     for (const float t : light.truth.range_m.pixels()) truth.add(1e3 * static_cast<double>(t));
     for (int frame = 0; frame < frames; ++frame) {
@@ -119,9 +139,10 @@ Result<std::vector<WallReading>> readWall(const sim::SensorModel& camera, double
       const auto exposed =
           camera.readOut(collected, {}, seed, key, request.region_x, request.region_y);
       for (std::size_t p = 0; p < range.size(); ++p) {
-        const auto r = static_cast<double>(exposed.range.range_m[p]);
+        const int x = 1 + static_cast<int>(p) % kInner, y = 1 + static_cast<int>(p) / kInner;
+        const auto r = static_cast<double>(exposed.range.range_m(x, y));
         if (std::isfinite(r))
-          range[p].add(1e3 * r), amplitude.add(static_cast<double>(exposed.range.amplitude[p]));
+          range[p].add(1e3 * r), amplitude.add(static_cast<double>(exposed.range.amplitude(x, y)));
       }
     }
     WallReading reading{.truth_mm = truth.mean(), .amplitude = amplitude.mean()};

@@ -7,6 +7,7 @@
 #include "sim/effects/calibration_table.h"
 #include "sim/effects/clock_scale.h"
 #include "sim/effects/column_comb.h"
+#include "sim/effects/companding.h"
 #include "sim/effects/defocus.h"
 #include "sim/effects/delay.h"
 #include "sim/effects/distortion_misfit.h"
@@ -51,7 +52,7 @@ using AllEffects = EffectList<
     DistortionMisfit, Defocus, Vignetting, LensScatter, LensGhost, InternalReflection,  // optics
     PropagationDelay, FixedPatternPhase, StepPhase,                                  // demodulation
     Lag, ShotNoise, AmbientSuppression, Saturation,                                  // samples: the pixel
-    Nonlinearity, SampleGain, SampleOffset, ColumnComb, ReadNoise, Quantisation,     // the converter
+    Nonlinearity, SampleGain, SampleOffset, ColumnComb, ReadNoise, Quantisation, Companding,  // the converter
     RangeNoise, WarmUp, TimeWalk, ClockScale, ResidualDrift, Delay, CalibrationTable,  // range: decoding
     LowAmplitudeFilter, FlyingPixelFilter, EdgeFilter, MedianFilter, BilateralFilter,
     TemporalFilter>;                                                                 // filters

@@ -99,6 +99,7 @@ struct CameraFile {
     Duration gap = 500_us;
     Duration frame_interval = 50_ms;
     FactoryCalibration factory_calibration = FactoryCalibration::Delay;
+    bool phase_tables = false;
 
     template <class Visitor>
     void visit(Visitor& v) {
@@ -118,6 +119,9 @@ struct CameraFile {
                 {"waveform", FactoryCalibration::Waveform}},
                "what the device takes off by itself: delay: its waveforms' constant delay; waveform: also "
                "the cyclic error that a single return has, by a table");
+      v.flag("phase_tables", phase_tables,
+             "the device also takes off each pixel's own phase, as effects on light that depend on nothing "
+             "but the pixel's position add it, in the Kinect v2's steps of 0.000031 pi");
     }
   };
 

@@ -52,4 +52,40 @@ std::vector<float> trueCyclesOf(const Response& response, int steps) {
   return table;
 }
 
+std::vector<Image<std::complex<float>>> pixelTurnsOf(const std::vector<AnyEffect>& effects,
+                                                     const std::vector<Response>& responses,
+                                                     int width, int height) {
+  Light light;
+  for (const Response& response : responses) {
+    light.frequencies.push_back(response.frequency);
+    light.phasors.emplace_back(width, height, std::complex<float>{1.0F});
+  }
+  light.steady = light.ambient = Image<float>{width, height};
+  const Moment moment;
+  const Conditions now{moment, 0, 0, width};
+  bool is_any = false;
+  for (std::size_t place = 0; place < effects.size(); ++place) {
+    std::visit(
+        [&]<class E>(const E& effect) {
+          if constexpr (std::is_same_v<ImageOf<E>, Light>) {
+            constexpr Covariates on = E::about.explains;
+            if (on == Covariates{Covariate::Position}) {
+              light = effect.apply(std::move(light), now, Random{0, 0, effectKey(E::about.name, place)});
+              is_any = true;
+            }
+          }
+        },
+        effects[place]);
+  }
+  if (!is_any) return {};
+  constexpr double kStep_rad = 0.000031 * std::numbers::pi;
+  for (Image<std::complex<float>>& phasor : light.phasors) {
+    for (std::complex<float>& p : phasor.pixels()) {
+      const double table = std::round(-static_cast<double>(std::arg(p)) / kStep_rad) * kStep_rad;
+      p = std::complex<float>{std::polar(1.0, table)};
+    }
+  }
+  return std::move(light.phasors);
+}
+
 }  // namespace toftwin::sim

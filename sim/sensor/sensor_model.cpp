@@ -113,12 +113,25 @@ bool anyActsOnLight(const std::vector<AnyEffect>& effects) {
   return false;
 }
 
-Image<float> cropped(const Image<float>& full, int left, int top, int width, int height) {
-  Image<float> part{width, height};
+template <class T>
+Image<T> cropped(const Image<T>& full, int left, int top, int width, int height) {
+  Image<T> part{width, height};
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) part(x, y) = full(left + x, top + y);
   }
   return part;
+}
+
+DecodeRays cropped(const DecodeRays& full, int left, int top, int width, int height) {
+  return {cropped(full.x, left, top, width, height), cropped(full.z, left, top, width, height)};
+}
+
+RangeImage decodeRegion(const SensorModel::Impl& impl, const Samples& samples, int left, int top) {
+  const int width = samples.width(), height = samples.height();
+  DecodeSettings settings = impl.decoder;
+  for (Image<std::complex<float>>& turns : settings.pixel_turns)
+    turns = cropped(turns, left, top, width, height);
+  return decode(samples, settings, cropped(impl.rays, left, top, width, height));
 }
 
 Result<> firstProblem(const NumberSetter& setter, std::string_view parameter, double value) {
@@ -140,6 +153,10 @@ std::shared_ptr<const SensorModel::Impl> SensorModel::build(Impl impl) {
     impl.decoder.zero_phase.push_back(response.zeroPhase());
     if (sampling.factory_calibration != CameraFile::FactoryCalibration::Waveform) continue;
     impl.decoder.true_cycles.push_back(trueCyclesOf(response, sampling.steps));
+  }
+  if (sampling.phase_tables) {
+    impl.decoder.pixel_turns =
+        pixelTurnsOf(impl.effects, impl.responses, impl.camera.width, impl.camera.height);
   }
   if (impl.rays.x.empty()) impl.rays = raysOf(impl.camera);
   return std::make_shared<const Impl>(std::move(impl));
@@ -236,11 +253,8 @@ SensorModel::Exposed SensorModel::readOut(Samples collected, const Moment& momen
   Samples counted = applyAll(std::move(collected), impl_->effects, now, seed, frame);
   const bool is_whole =
       counted.width() == impl_->camera.width && counted.height() == impl_->camera.height;
-  RangeImage range =
-      is_whole
-          ? decode(counted, impl_->decoder, impl_->rays.x)
-          : decode(counted, impl_->decoder,
-                   cropped(impl_->rays.x, region_x, region_y, counted.width(), counted.height()));
+  RangeImage range = is_whole ? decode(counted, impl_->decoder, impl_->rays)
+                              : decodeRegion(*impl_, counted, region_x, region_y);
   range = applyAll(std::move(range), impl_->effects, now, seed, frame);
   return {.samples = std::move(counted), .range = std::move(range)};
 }

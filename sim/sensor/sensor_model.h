@@ -13,6 +13,7 @@
 #include <toftwin/parameter.h>
 #include <toftwin/result.h>
 
+#include "sim/decode/decode.h"
 #include "sim/effects/effects.h"
 #include "sim/images/light.h"
 #include "sim/images/range.h"
@@ -48,9 +49,7 @@ class SensorModel {
   [[nodiscard]] Duration exposureTime() const;
 
   /// Components of each pixel's unit ray, full image.
-  struct Rays {
-    Image<float> x, z;
-  };
+  using Rays = DecodeRays;
   [[nodiscard]] const Rays& rays() const;
 
   /// What the tracer must give for this camera: lens, emitters, frequencies and harmonics filled

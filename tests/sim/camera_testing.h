@@ -54,18 +54,23 @@ inline Light evenLight(const SensorModel& model, double radiance, double range_m
 struct Statistics {
   double mean = 0.0, sigma = 0.0, valid = 0.0;
 };
-inline Statistics rangeStatistics(const RangeImage& image) {
+/// Of the pixels that are at least `margin` from the border.
+inline Statistics rangeStatistics(const RangeImage& image, int margin = 0) {
   Statistics s;
-  double sum = 0.0, squares = 0.0, n = 0.0;
-  for (float range_m : image.range_m.pixels()) {
-    if (std::isnan(range_m)) continue;
-    sum += static_cast<double>(range_m);
-    squares += static_cast<double>(range_m) * static_cast<double>(range_m);
-    n += 1.0;
+  double sum = 0.0, squares = 0.0, n = 0.0, all = 0.0;
+  for (int y = margin; y < image.range_m.height() - margin; ++y) {
+    for (int x = margin; x < image.range_m.width() - margin; ++x) {
+      const auto range_m = static_cast<double>(image.range_m(x, y));
+      all += 1.0;
+      if (std::isnan(range_m)) continue;
+      sum += range_m;
+      squares += range_m * range_m;
+      n += 1.0;
+    }
   }
   s.mean = sum / n;
   s.sigma = std::sqrt(squares / n - s.mean * s.mean);
-  s.valid = n / static_cast<double>(image.range_m.size());
+  s.valid = n / all;
   return s;
 }
 inline constexpr double kSigmaToPhase80MHz = 4.0 * kPi * 80e6 / kSpeedOfLight_m_per_s;

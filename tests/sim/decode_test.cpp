@@ -243,7 +243,7 @@ TEST(Baseline, ExactCorrectionUndoesAnEmitterBesideTheLens) {
                                        baseline_m * baseline_m);
       const Light light = lightOfWays({16_MHz}, {{1.0, (there_m + range_m) / 2.0}});
       const Samples samples = correlate(light, sines({16_MHz}), 4, 2);
-      const Image<float> rays{1, 1, static_cast<float>(ray_x)};
+      const DecodeRays rays{Image<float>{1, 1, static_cast<float>(ray_x)}, {}};
       EXPECT_NEAR(decode(samples, {.baseline_length = 45_mm}, rays).range_m(0, 0), range_m, 3e-6);
       // Dropping L² reads too far by L² / 2 (s − L u).
       const DecodeSettings first_order{.baseline_length = 45_mm,

@@ -48,27 +48,29 @@ Statistics whitePaper(const SensorModel& model, double distance_m) {
   const TraceRequest request = model.traceRequest();
   // A small image in the middle, every pixel at the same range: L² + r² − 2 r L u is the square of
   // the way there.
-  const int left = static_cast<int>(model.camera().cx) - 50,
-            top = static_cast<int>(model.camera().cy) - 50;
+  constexpr int kMargin = 1;  // the Kinect's filter leaves the border as it is
+  const int left = static_cast<int>(model.camera().cx) - 51,
+            top = static_cast<int>(model.camera().cy) - 51;
   const Light light =
-      syntheticLight(100, 100, request.frequencies, request.harmonics, [&](int x, int y) {
+      syntheticLight(102, 102, request.frequencies, request.harmonics, [&](int x, int y) {
         const double u = static_cast<double>(model.rays().x(left + x, top + y));
         const double there_m = std::sqrt(distance_m * distance_m + baseline_m * baseline_m -
                                          2.0 * distance_m * baseline_m * u);
         return std::vector<Way>{{radiance, (distance_m + there_m) / 2.0}};
       });
-  return rangeStatistics(model.expose(light, {}, 1, 0, left, top).range);
+  return rangeStatistics(model.expose(light, {}, 1, 0, left, top).range, kMargin);
 }
 
-// σ² = a² + (b d)² + (c d²)²: what the presets' photon budgets were fitted to. 10,000 pixels:
-// standard error of a deviation 0.7 %; the budget's numbers are rounded to 0.3 %.
+// σ² = a² + (b d)² + (c d²)²: what the presets' photon budgets were fitted to. 10,000 pixels,
+// nine of which share their noise: standard error of a deviation 2.1 % where there is no floor of
+// independent noise; the budget's numbers are rounded to 0.3 %, and the converter's steps add 2 % at 4 m.
 TEST(Presets, KinectV2HasTheNoiseItWasFittedTo) {
   const SensorModel model = *SensorModel::preset("kinect_v2");
   for (double d : {0.6, 1.0, 2.0, 4.0}) {
     const double expected_mm =
         std::sqrt(std::pow(1.148, 2) + std::pow(0.1745 * d, 2) + std::pow(0.1537 * d * d, 2));
     const Statistics seen = whitePaper(model, d);
-    EXPECT_NEAR(1e3 * seen.sigma, expected_mm, 0.035 * expected_mm) << d << " m";
+    EXPECT_NEAR(1e3 * seen.sigma, expected_mm, 0.065 * expected_mm) << d << " m";
     EXPECT_EQ(seen.valid, 1.0) << d << " m";
     // The dropped square of its baseline, and the wiggle of the clipped 16 MHz (1.4 mm).
     EXPECT_NEAR(1e3 * (seen.mean - d), 1e3 * 0.045 * 0.045 / (4.0 * d), 1.5) << d << " m";

@@ -200,7 +200,8 @@ TEST(Wiggling, OfAKinectIsTheSumOfItsThreePhaseErrors) {
     }
     const RangeImage image =
         decode(correlate(light, responses, 3, 2),
-               {.algorithm = DecodeSettings::Algorithm::KinectV2, .counts_per_electron = 0.01});
+               {.algorithm = DecodeSettings::Algorithm::KinectV2,
+                .kinect = {.counts_per_electron = 0.01}});
     // A clipped sine's harmonics are below 1/n² of the fundamental, too.
     const double tail_m = 0.11045 * 2.0 / (3 * kHarmonics);
     double peak_mm = 0.0;
