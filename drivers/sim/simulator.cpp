@@ -289,6 +289,9 @@ Result<std::unique_ptr<Source>> open(settings::Table& table) {
     if (auto fits = exposuresFit(*model, keys.frame_interval); !fits)
       table.complain("frame_interval_ms", fmt::format("is too short: {}", fits.error().message));
   }
+  if (model && !model->hasPhasors() && std::ranges::count(planes, PlaneKind::Phasors) > 0) {
+    table.complain("planes", fmt::format("names \"phasors\", but {} is pulsed and has none", model->model()));
+  }
   if (auto checked = table.check(); !checked) return checked.error();
   sim::TraceRequest request = model->traceRequest();
   request.samples_per_pixel = keys.samples_per_pixel;

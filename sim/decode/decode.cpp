@@ -10,6 +10,7 @@
 #include "sim/decode/decode_steps.h"
 #include "sim/decode/demodulate.h"
 #include "sim/decode/kinect_v2.h"
+#include "sim/decode/pulsed.h"
 #include "sim/decode/unwrap.h"
 #include "sim/images/rows.h"
 
@@ -110,6 +111,8 @@ RangeImage decode(const Samples& samples, const DecodeSettings& settings,
   if (settings.algorithm == DecodeSettings::Algorithm::KinectV2) {
     return decodeKinectV2(samples, settings, rays);
   }
+  if (settings.algorithm == DecodeSettings::Algorithm::Pulsed)
+    return decodePulsed(samples, settings, rays);
   const int width = samples.width(), height = samples.height();
   RangeImage result{.range_m = Image<float>{width, height},
                     .amplitude = Image<float>{width, height},

@@ -13,10 +13,13 @@
 
 namespace toftwin::sim {
 
+/// How a pulsed camera's gates lie (pulsed.h).
+enum class PulseScheme { ShortLong, TwoGate };
+
 /// How a camera makes ranges of its samples. Serves the simulator and drivers of cameras that give
 /// raw samples alike; it knows nothing of either.
 struct DecodeSettings {
-  enum class Algorithm { NPhase, KinectV2 };
+  enum class Algorithm { NPhase, KinectV2, Pulsed };
   enum class Baseline { FirstOrder, Exact };
 
   /// What only the Kinect v2's decoder asks for. Defaults: libfreenect2's parameters.
@@ -72,14 +75,20 @@ struct DecodeSettings {
   /// Also from the factory: for each frequency an image of e^(iφ₀), φ₀ being the phase that the pixel
   /// itself adds (the Kinect v2's p0 tables). Empty, or an empty image: none.
   std::vector<Image<std::complex<float>>> pixel_turns{};
+  /// pulsed: the scheme, the pulse's width, and the factory's range at ratio i/(size − 1); empty: c T / 2 × ratio.
+  PulseScheme pulse_scheme = PulseScheme::ShortLong;
+  Duration pulse_width{};
+  std::vector<double> pulse_ranges_m{};
 
   template <class Visitor>
   void visit(Visitor& v) {
     v.choice("algorithm", algorithm,
-             {{"n_phase", Algorithm::NPhase}, {"kinect_v2", Algorithm::KinectV2}},
+             {{"n_phase", Algorithm::NPhase},
+              {"kinect_v2", Algorithm::KinectV2},
+              {"pulsed", Algorithm::Pulsed}},
              "n_phase: any number of frequencies in whole-number ratios; kinect_v2: the Kinect "
              "v2's own, "
-             "for 80, 16 and 120 MHz in this order");
+             "for 80, 16 and 120 MHz in this order; pulsed: the gates of [pulse]");
     v.number(
         "speed_of_light_m_per_s", speed_of_light, {2.9e8, 3.1e8},
         "what the device's decoder assumes; libfreenect2 takes 3e8, which reads 0.07 % too far");
@@ -92,7 +101,7 @@ struct DecodeSettings {
         "first_order drops the square of the baseline as libfreenect2 does (1 mm too far at 0.5 m "
         "for 45 mm)");
     v.number("minimum_amplitude_electrons", minimum_amplitude, {0.0, 1e9},
-             "n_phase: a pixel with less at any frequency is invalid");
+             "n_phase: a pixel with less at any frequency is invalid; pulsed: of returned charge");
     v.quantity("unwrap_threshold", unwrap_threshold, radian, {0.0, 10.0},
                "a pixel whose frequencies disagree by more is invalid");
     v.number("asymmetry_threshold", asymmetry_threshold, {0.0, 1e9},

@@ -115,10 +115,26 @@ void checkWaveforms(settings::Table& table, const CameraFile& file) {
   }
 }
 
+/// Continuous wave or pulsed, and a decoder for it.
+void checkKind(settings::Table& table, const CameraFile& file) {
+  if (file.modulations.empty() && file.pulses.empty()) {
+    table.complain("", "has no [[modulation]] and no [pulse]: a camera needs a frequency or a pulse");
+  }
+  if (!file.modulations.empty() && !file.pulses.empty())
+    table.complain("pulse", "stands beside [[modulation]]: a camera is pulsed or it is not");
+  if (file.pulses.size() > 1) table.complain("pulse", "stands there twice");
+  const bool decodes_pulses = file.decoder.algorithm == DecodeSettings::Algorithm::Pulsed;
+  if (decodes_pulses != file.isPulsed()) {
+    table.complain("decoder", decodes_pulses ? "has algorithm = \"pulsed\", but there is no [pulse]"
+                                             : "needs algorithm = \"pulsed\" for a [pulse]");
+  }
+}
+
 }  // namespace
 
 Duration CameraFile::exposureTime() const {
   Duration time = -sampling.gap;
+  for (const PulseKeys& keys : pulses) time += (keys.exposure + sampling.gap) * keys.pulse.gates();
   for (const Modulation& modulation : modulations) {
     time += (modulation.exposure + sampling.gap) * sampling.steps;
   }
@@ -130,8 +146,7 @@ CameraFile readCameraFile(settings::Table& table, std::vector<AnyEffect>& effect
   table.read(file);
   for (settings::Table& effect : table.tables("effect")) readEffect(effect, effects);
   if (file.emitters.empty()) table.complain("", "has no [[emitter]]: a camera needs at least one");
-  if (file.modulations.empty())
-    table.complain("", "has no [[modulation]]: a camera needs at least one frequency");
+  checkKind(table, file);
   for (const auto& emitter : file.emitters) {
     if (std::hypot(emitter.axis[0], emitter.axis[1], emitter.axis[2]) < 1e-6) {
       table.complain("emitter", "has an axis of length 0, which points nowhere");

@@ -10,6 +10,7 @@
 #include "protocol/settings/settings.h"
 #include "sim/decode/decode.h"
 #include "sim/effects/effects.h"
+#include "sim/sensor/pulse.h"
 #include "sim/sensor/waveform.h"
 
 namespace toftwin::sim {
@@ -90,6 +91,32 @@ struct CameraFile {
     }
   };
 
+  /// Instead of modulations: a pulsed camera.
+  struct PulseKeys {
+    Pulse pulse;
+    Duration exposure = 1_ms;
+    double open_share = 0.01;
+    int knots = 49;
+
+    template <class Visitor>
+    void visit(Visitor& v) {
+      v.choice("scheme", pulse.scheme,
+               {{"short_long", PulseScheme::ShortLong}, {"two_gate", PulseScheme::TwoGate}},
+               "short_long: gates [0, T] and [0, 2T]; two_gate: [0, T] and [T, 2T]; T is the width");
+      v.quantity("width", pulse.width, nanosecond, {0.1, 1000.0}, "T of the pulse; its range is c T / 2");
+      v.quantity("rise", pulse.rise, nanosecond, {0.0, 1000.0},
+                 "time constant of the emitter's low pass: soft knees at both ends of the range");
+      v.flag("ambient_gate", pulse.has_ambient_gate,
+             "a third raw exposure without light, taken off the others");
+      v.quantity("exposure", exposure, microsecond, {1.0, 20'000.0},
+                 "of one raw exposure: a train of pulses for one gate");
+      v.number("open_share", open_share, {1e-6, 0.5},
+               "of the exposure, for which a gate as wide as the pulse is open: how much ambient light counts");
+      v.number("knots", knots, {2, 4096},
+               "of the factory's table of ranges, with factory_calibration = \"waveform\"; linear between");
+    }
+  };
+
   enum class FactoryCalibration { None, Delay, Waveform };
 
   struct Sampling {
@@ -141,10 +168,12 @@ struct CameraFile {
   Lens lens;
   std::vector<Emitter> emitters;
   std::vector<Modulation> modulations;
+  std::vector<PulseKeys> pulses;  ///< at most one
   Sampling sampling;
   Pixel pixel;
   DecodeSettings decoder;
 
+  [[nodiscard]] bool isPulsed() const { return !pulses.empty(); }
   /// From the start of a frame's first raw exposure to the end of its last.
   [[nodiscard]] Duration exposureTime() const;
 
@@ -154,6 +183,7 @@ struct CameraFile {
     v.group("lens", lens, "");
     v.group("emitter", emitters, "");
     v.group("modulation", modulations, "");
+    v.group("pulse", pulses, "");
     v.group("sampling", sampling, "");
     v.group("pixel", pixel, "");
     v.group("decoder", decoder, "");

@@ -54,15 +54,15 @@ std::vector<float> trueCyclesOf(const Response& response, int steps) {
 
 std::vector<Image<std::complex<float>>> pixelTurnsOf(const std::vector<AnyEffect>& effects,
                                                      const std::vector<Response>& responses,
-                                                     int width, int height) {
+                                                     const CameraInfo& camera) {
   Light light;
   for (const Response& response : responses) {
     light.frequencies.push_back(response.frequency);
-    light.phasors.emplace_back(width, height, std::complex<float>{1.0F});
+    light.phasors.emplace_back(camera.width, camera.height, std::complex<float>{1.0F});
   }
-  light.steady = light.ambient = Image<float>{width, height};
+  light.steady = light.ambient = Image<float>{camera.width, camera.height};
   const Moment moment;
-  const Conditions now{moment, 0, 0, width};
+  const Conditions now{moment, camera};
   bool is_any = false;
   for (std::size_t place = 0; place < effects.size(); ++place) {
     std::visit(

@@ -18,6 +18,6 @@ std::vector<float> trueCyclesOf(const Response& response, int steps);
 /// v2's p0 tables (libfreenect2).
 std::vector<Image<std::complex<float>>> pixelTurnsOf(const std::vector<AnyEffect>& effects,
                                                      const std::vector<Response>& responses,
-                                                     int width, int height);
+                                                     const CameraInfo& camera);
 
 }  // namespace toftwin::sim

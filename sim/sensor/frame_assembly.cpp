@@ -80,6 +80,14 @@ Plane normalsOf(const Image<Vec3f>& normal) {
 
 std::span<const PlaneKind> allPlanes() { return kAllPlanes; }
 
+std::vector<PlaneKind> planesOfCamera(const SensorModel& model) {
+  std::vector<PlaneKind> kinds;
+  for (PlaneKind kind : kAllPlanes) {
+    if (kind != PlaneKind::Phasors || model.hasPhasors()) kinds.push_back(kind);
+  }
+  return kinds;
+}
+
 CameraInfo cameraOfRegion(const CameraInfo& camera, int left, int top, int width, int height) {
   CameraInfo region = camera;
   region.width = width;

@@ -12,8 +12,10 @@
 
 namespace toftwin::sim {
 
-/// The planes that a simulated camera can give, in the order in which it gives them.
+/// The planes that simulated cameras can give, in the order in which they give them.
 std::span<const PlaneKind> allPlanes();
+/// Those that this one can give.
+std::vector<PlaneKind> planesOfCamera(const SensorModel& model);
 
 /// The camera of a region of the image: the same rays, counted from the region's top left pixel.
 CameraInfo cameraOfRegion(const CameraInfo& camera, int left, int top, int width, int height);

@@ -126,6 +126,17 @@ DecodeRays cropped(const DecodeRays& full, int left, int top, int width, int hei
   return {cropped(full.x, left, top, width, height), cropped(full.z, left, top, width, height)};
 }
 
+/// The charge that the light makes, free of noise.
+Samples samplesOf(const SensorModel::Impl& impl, const Light& light) {
+  if (impl.file.isPulsed()) {
+    const CameraFile::PulseKeys& keys = impl.file.pulses.front();
+    return collectGates(light, keys.pulse,
+                        impl.file.pixel.electrons_per_radiance_s * keys.exposure.in(second),
+                        keys.open_share);
+  }
+  return correlate(light, impl.responses, impl.file.sampling.steps, impl.file.sampling.taps);
+}
+
 RangeImage decodeRegion(const SensorModel::Impl& impl, const Samples& samples, int left, int top) {
   const int width = samples.width(), height = samples.height();
   DecodeSettings settings = impl.decoder;
@@ -154,9 +165,15 @@ std::shared_ptr<const SensorModel::Impl> SensorModel::build(Impl impl) {
     if (sampling.factory_calibration != CameraFile::FactoryCalibration::Waveform) continue;
     impl.decoder.true_cycles.push_back(trueCyclesOf(response, sampling.steps));
   }
+  for (const CameraFile::PulseKeys& keys : impl.file.pulses) {
+    impl.decoder.pulse_scheme = keys.pulse.scheme;
+    impl.decoder.pulse_width = keys.pulse.width;
+    if (sampling.factory_calibration == CameraFile::FactoryCalibration::Waveform)
+      impl.decoder.pulse_ranges_m = rangesOfRatios(keys.pulse, keys.knots);
+  }
   if (sampling.phase_tables) {
     impl.decoder.pixel_turns =
-        pixelTurnsOf(impl.effects, impl.responses, impl.camera.width, impl.camera.height);
+        pixelTurnsOf(impl.effects, impl.responses, impl.camera);
   }
   if (impl.rays.x.empty()) impl.rays = raysOf(impl.camera);
   return std::make_shared<const Impl>(std::move(impl));
@@ -187,6 +204,8 @@ const std::vector<AnyEffect>& SensorModel::effects() const { return impl_->effec
 const SensorModel::Rays& SensorModel::rays() const { return impl_->rays; }
 Duration SensorModel::frameInterval() const { return impl_->file.sampling.frame_interval; }
 
+bool SensorModel::hasPhasors() const { return !impl_->file.isPulsed(); }
+
 std::vector<std::string> SensorModel::effectNames() const {
   std::vector<std::string> names;
   for (const AnyEffect& any : impl_->effects) {
@@ -197,6 +216,12 @@ std::vector<std::string> SensorModel::effectNames() const {
 
 std::vector<Exposure> SensorModel::exposures(DeviceTime start) const {
   std::vector<Exposure> all;
+  for (const auto& keys : impl_->file.pulses) {
+    for (int gate = 0; gate < keys.pulse.gates(); ++gate) {
+      all.push_back({start, keys.exposure, 0_MHz});
+      start.ns += std::llround((keys.exposure + impl_->file.sampling.gap).in(nanosecond));
+    }
+  }
   for (const auto& modulation : impl_->file.modulations) {
     for (int k = 0; k < impl_->file.sampling.steps; ++k) {
       all.push_back({start, modulation.exposure, modulation.frequency});
@@ -211,7 +236,8 @@ Duration SensorModel::exposureTime() const { return impl_->file.exposureTime(); 
 TraceRequest SensorModel::traceRequest() const {
   TraceRequest request;
   request.camera = impl_->camera;
-  request.harmonics = impl_->file.sampling.harmonics;
+  request.harmonics = impl_->file.isPulsed() ? 1 : impl_->file.sampling.harmonics;
+  for (const auto& keys : impl_->file.pulses) request.gates.push_back(gateFunctionsOf(keys.pulse));
   for (const auto& modulation : impl_->file.modulations)
     request.frequencies.push_back(modulation.frequency);
   for (const auto& emitter : impl_->file.emitters) {
@@ -237,13 +263,9 @@ SensorModel::Exposed SensorModel::expose(const Light& light, const Moment& momen
 
 Samples SensorModel::collect(const Light& light, const Moment& moment, std::uint64_t seed,
                              std::uint64_t frame, int region_x, int region_y) const {
-  const CameraFile::Sampling& sampling = impl_->file.sampling;
-  if (!anyActsOnLight(impl_->effects)) {
-    return correlate(light, impl_->responses, sampling.steps, sampling.taps);
-  }
+  if (!anyActsOnLight(impl_->effects)) return samplesOf(*impl_, light);
   const Conditions now{moment, impl_->camera, region_x, region_y};
-  const Light at_pixel = applyAll(light, impl_->effects, now, seed, frame);
-  return correlate(at_pixel, impl_->responses, sampling.steps, sampling.taps);
+  return samplesOf(*impl_, applyAll(light, impl_->effects, now, seed, frame));
 }
 
 SensorModel::Exposed SensorModel::readOut(Samples collected, const Moment& moment,
@@ -282,12 +304,12 @@ bool SensorModel::remembers() const {
 }
 
 std::vector<Parameter> SensorModel::parameters() const {
-  const auto& modulations = impl_->file.modulations;
+  const std::vector<Exposure> exposures = this->exposures({});
   Parameter exposure{"exposure_us", {}, kExposureBounds_us};
-  if (!modulations.empty() && std::ranges::all_of(modulations, [&](const auto& modulation) {
-        return modulation.exposure == modulations.front().exposure;
+  if (std::ranges::all_of(exposures, [&](const Exposure& raw) {
+        return raw.duration == exposures.front().duration;
       })) {
-    exposure.value = modulations.front().exposure.in(microsecond);
+    exposure.value = exposures.front().duration.in(microsecond);
   }
   std::vector<Parameter> all{std::move(exposure)};
   for (AnyEffect any : impl_->effects) {
@@ -317,15 +339,13 @@ Result<SensorModel> SensorModel::with(std::string_view parameter, double value) 
   bool is_known = false;
   if (parameter == "exposure_us") {
     is_known = true;
-    for (auto& modulation : changed.file.modulations) {
-      if (std::isnan(value) || !kExposureBounds_us.contains(value)) {
-        return Error{
-            Error::Code::InvalidArgument,
-            fmt::format("exposure_us = {:.12g} is out of bounds: it must be {} us", value,
-                        settings::describe(kExposureBounds_us))};
-      }
-      modulation.exposure = value * microsecond;
+    if (std::isnan(value) || !kExposureBounds_us.contains(value)) {
+      return Error{Error::Code::InvalidArgument,
+                   fmt::format("exposure_us = {:.12g} is out of bounds: it must be {} us", value,
+                               settings::describe(kExposureBounds_us))};
     }
+    for (auto& modulation : changed.file.modulations) modulation.exposure = value * microsecond;
+    for (auto& keys : changed.file.pulses) keys.exposure = value * microsecond;
   }
   for (AnyEffect& any : changed.effects) {
     const Result<> done = std::visit(

@@ -22,7 +22,7 @@
 
 namespace toftwin::sim {
 
-/// A camera as data: lens, emitters, modulation, pixel, and the ordered list of its effects. Read
+/// A camera as data: lens, emitters, modulation or pulse, pixel, and the ordered list of its effects. Read
 /// from a camera file (docs/camera-file.md); the presets lie in sim/cameras/. An invariant-free
 /// aggregate is not enough here because the effect list is open; see camera_file.h for the file's
 /// schema.
@@ -43,6 +43,8 @@ class SensorModel {
   [[nodiscard]] const std::vector<AnyEffect>& effects() const;
   [[nodiscard]] std::vector<std::string> effectNames() const;
   [[nodiscard]] Duration frameInterval() const;
+  /// Whether it demodulates; a pulsed camera has no phasors.
+  [[nodiscard]] bool hasPhasors() const;
   /// The raw exposures of a frame that starts at `start`: frequency by frequency, step by step.
   [[nodiscard]] std::vector<Exposure> exposures(DeviceTime start) const;
   /// From the start of a frame's first raw exposure to the end of its last.

@@ -224,6 +224,9 @@ void keepTruth(const Tracing& tracing, const Packet& packet, const Hits& hits, T
 
 void addLight(const Tracing& tracing, const DirectLight& light, LaneSums& sums) {
   addPhasors(tracing.turns_per_metre, tracing.request.harmonics, light.weight, light.length, sums);
+  for (std::size_t g = 0; g < tracing.request.gates.size(); ++g) {
+    addGates(tracing.request.gates[g], light.weight, light.length, sums.re[g], sums.im[g]);
+  }
 }
 
 Tracing::Tracing(const Scene::Impl& s, const TraceRequest& r, RayLog* l)
@@ -275,9 +278,9 @@ void prepareBlock(const Tracing& tracing, const BlockShape& shape, int left, int
 }
 
 BlockSums::BlockSums(const TraceRequest& request)
-    : re(request.frequencies.size() * static_cast<std::size_t>(request.harmonics)),
+    : re(request.frequencies.size() * static_cast<std::size_t>(request.harmonics) + request.gates.size()),
       im(re.size()),
-      squares(request.frequencies.size()),
+      squares(request.frequencies.size() + request.gates.size()),
       of_packet(re.size()) {
   clearSums(*this);
 }

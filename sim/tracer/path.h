@@ -73,7 +73,7 @@ struct BlockSums {
   explicit BlockSums(const TraceRequest& request);
 
   Lanes<double> steady, ambient, samples;
-  std::vector<Lanes<double>> re, im;   ///< [frequency][harmonic]
+  std::vector<Lanes<double>> re, im;   ///< [frequency][harmonic], or gates
   std::vector<Lanes<double>> squares;  ///< [frequency] Σ |first harmonic|²
   LaneSums of_packet;                  ///< the packet being traced
 };

@@ -227,4 +227,22 @@ void addPhasors(const std::vector<double>& turns_per_metre, int harmonics, const
   }
 }
 
+TOFTWIN_VECTOR
+void addGates(const PathFunctions& gates, const Lanes<float>& weight, const Lanes<double>& length, Lanes<float>& first,
+              Lanes<float>& second) {
+  const double per_step = 1.0 / gates.step.in(metre);
+  const auto last = static_cast<double>(gates.first.size() - 1);
+  const float *g1 = gates.first.data(), *g2 = gates.second.data();
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    const double at = length[i] * per_step;
+    const bool is_within = at < last;
+    const double inside = is_within ? at : 0.0;
+    const auto below = static_cast<std::size_t>(inside);
+    const auto share = static_cast<float>(inside - static_cast<double>(below));
+    const float w = is_within ? weight[i] : 0.0f;
+    first[i] += w * (g1[below] + share * (g1[below + 1] - g1[below]));
+    second[i] += w * (g2[below] + share * (g2[below + 1] - g2[below]));
+  }
+}
+
 }  // namespace toftwin::sim

@@ -37,4 +37,8 @@ void setRays(const Packet& packet, RTCRayHit16& rays);
 void addPhasors(const std::vector<double>& turns_per_metre, int harmonics, const Lanes<float>& weight,
                 const Lanes<double>& length, LaneSums& sums);
 
+/// Adds w · g(L) of both functions, lane by lane.
+void addGates(const PathFunctions& gates, const Lanes<float>& weight, const Lanes<double>& length, Lanes<float>& first,
+              Lanes<float>& second);
+
 }  // namespace toftwin::sim

@@ -57,6 +57,12 @@ void check(const TraceRequest& request) {
   }
   for (const Frequency f : request.frequencies) require(std::isfinite(f.in(hertz)), "frequencies must be finite");
   require(request.harmonics >= 1, "harmonics must be at least 1");
+  require(request.gates.empty() || (request.frequencies.empty() && request.harmonics == 1),
+          "gates stand instead of frequencies, with harmonics = 1");
+  for (const PathFunctions& gate : request.gates) {
+    require(gate.step.in(metre) > 0.0 && gate.first.size() == gate.second.size() && gate.first.size() >= 2,
+            "a gate needs a positive step and two functions of at least two knots, as many in both");
+  }
   require(request.samples_per_pixel >= 1, "samples_per_pixel must be at least 1");
   require(request.max_surfaces >= 1, "max_surfaces must be at least 1");
   require(request.pixel_extent >= 0.0, "pixel_extent must not be negative");
@@ -77,7 +83,8 @@ Light lightFor(const TraceRequest& request, const Region& region, Light recycled
   const auto resizeTo = [&](auto& image) { resize(image, region.width, region.height); };
   light.frequencies = request.frequencies;
   light.harmonics = request.harmonics;
-  light.phasors.resize(request.frequencies.size() * static_cast<std::size_t>(request.harmonics));
+  light.phasors.resize(request.frequencies.size() * static_cast<std::size_t>(request.harmonics) +
+                       request.gates.size());
   light.variance.resize(request.samples_per_pixel > 1 ? request.frequencies.size() : 0);
   std::for_each(light.phasors.begin(), light.phasors.end(), resizeTo);
   std::for_each(light.variance.begin(), light.variance.end(), resizeTo);

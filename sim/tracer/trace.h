@@ -32,6 +32,13 @@ struct EmitterSpec {
   Duration delay{};  ///< its light is late by this: cables, drivers
 };
 
+/// Two functions of the light's whole way, as pulsed cameras need them: what a gate collects of a pulse that
+/// took this way. Linear between the knots at 0, `step`, 2 `step`, …; zero beyond the last.
+struct PathFunctions {
+  Length step = 1 * millimetre;
+  std::vector<float> first, second;  ///< of equal length
+};
+
 /// What to trace. The result depends on nothing else, not on the number of threads.
 struct TraceRequest {
   CameraInfo camera;
@@ -39,6 +46,7 @@ struct TraceRequest {
   std::vector<EmitterSpec> emitters;
   std::vector<Frequency> frequencies;
   int harmonics = 1;
+  std::vector<PathFunctions> gates;  ///< instead of frequencies (Light::phasors)
   int samples_per_pixel = 16;
   int max_surfaces = 16;       ///< surface hits per path: 1 = direct light only
   double pixel_extent = 1.0;   ///< side of the pixel's footprint in pixels; 0: its central ray only
@@ -48,7 +56,7 @@ struct TraceRequest {
 };
 
 /// Path-traces the scene: unidirectional, next-event estimation to every emitter, cosine- or
-/// BSDF-sampled bounces, one pass for all frequencies and harmonics. `recycled` may be an earlier frame's
+/// BSDF-sampled bounces, one pass for all frequencies and harmonics or gates. `recycled` may be an earlier frame's
 /// light, whose memory is then used again.
 Light trace(const Scene& scene, const TraceRequest& request, Light recycled = {});
 

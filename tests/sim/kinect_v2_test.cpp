@@ -257,7 +257,9 @@ Samples twoTaps(double first, double second) {
 
 TEST(Companding, KnowsExactlyTheCodesOfTheDevice) {
   const Moment moment;
-  const Conditions now{moment, 0, 0, 1};
+  CameraInfo camera;
+  camera.width = camera.height = 1;
+  const Conditions now{moment, camera};
   for (int code = 0; code < 1024; ++code) {
     const double here = countsOfCode(code), next = code < 1023 ? countsOfCode(code + 1) : here;
     for (double sign : {1.0, -1.0}) {
@@ -279,7 +281,7 @@ TEST(Companding, KnowsExactlyTheCodesOfTheDevice) {
 TEST(Companding, FlagsWhatIsBeyondItsLastCode) {
   const Moment moment;
   const Samples seen = Companding{.counts_per_electron = 1.0}.apply(
-      twoTaps(30'000.0, 13'640.0), {moment, 0, 0, 1}, Random{1, 0, 0});
+      twoTaps(30'000.0, 13'640.0), {moment, CameraInfo{}}, Random{1, 0, 0});
   EXPECT_TRUE(has(seen.flags(0, 0), PixelFlag::Saturated));
   EXPECT_NEAR(seen.tap(0, 0, 0)(0, 0) - seen.tap(0, 0, 1)(0, 0), 16'320.0, 0.01);
 }
