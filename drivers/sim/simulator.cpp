@@ -209,7 +209,8 @@ class SimulatedSource final : public Source {
     moment.exposures = model_.exposures(pacer_.deviceTime());
     moment.clock = pacer_.clock();
     moment.since_power_on = since_power_on_ + deviceDuration();
-    moment.temperatures = {{"room", room_temperature_}};
+    moment.temperatures = model_.temperatures(room_temperature_, *moment.since_power_on);
+    moment.temperatures.push_back({"room", room_temperature_});
     moment.ambient = ambient_;
     moment.world_from_camera = view_.pose();
     return moment;
@@ -289,8 +290,9 @@ Result<std::unique_ptr<Source>> open(settings::Table& table) {
     if (auto fits = exposuresFit(*model, keys.frame_interval); !fits)
       table.complain("frame_interval_ms", fmt::format("is too short: {}", fits.error().message));
   }
-  if (model && !model->hasPhasors() && std::ranges::count(planes, PlaneKind::Phasors) > 0) {
-    table.complain("planes", fmt::format("names \"phasors\", but {} is pulsed and has none", model->model()));
+  for (PlaneKind kind : planes) {
+    if (!model || std::ranges::count(sim::planesOfCamera(*model), kind) > 0) continue;
+    table.complain("planes", fmt::format("names \"{}\", which {} does not have", nameOf(kind), model->model()));
   }
   if (auto checked = table.check(); !checked) return checked.error();
   sim::TraceRequest request = model->traceRequest();

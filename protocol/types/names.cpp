@@ -17,6 +17,8 @@ constexpr std::array kPlaneNames{
     std::pair{PlaneKind::Phasors, "phasors"},
     std::pair{PlaneKind::TruthRange, "truth_range"},
     std::pair{PlaneKind::TruthNormal, "truth_normal"},
+    std::pair{PlaneKind::Exposure, "exposure"},
+    std::pair{PlaneKind::Color, "color"},
 };
 
 constexpr std::array kFrameNames{

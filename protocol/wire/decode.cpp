@@ -38,7 +38,7 @@ std::vector<PlaneKind> readKinds(Checks& checks, const flatbuffers::Vector<std::
   checks.require(bytes->size() <= kMaxPlanes, "planes", "has more than 64 items");
   if (checks.failed()) return kinds;
   for (const std::uint8_t byte : *bytes) {
-    kinds.push_back(checks.oneOf(byte, PlaneKind::TruthNormal, "planes"));
+    kinds.push_back(checks.oneOf(byte, PlaneKind::Color, "planes"));
   }
   return kinds;
 }

@@ -17,6 +17,8 @@ struct RangeImage {
   Image<float> ambient;
   Image<std::uint8_t> flags;
   std::vector<Image<std::complex<float>>> phasors;
+  /// Which of several exposures a pixel is of, counted from 0; empty where there is one.
+  Image<std::uint8_t> exposure{};
 };
 
 }  // namespace toftwin::sim

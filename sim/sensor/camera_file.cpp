@@ -130,13 +130,27 @@ void checkKind(settings::Table& table, const CameraFile& file) {
   }
 }
 
+void checkExposures(settings::Table& table, const CameraFile& file) {
+  const auto& factors = file.sampling.exposure_factors;
+  if (factors.empty() || factors.size() > 3)
+    table.complain("sampling", "must have one to three exposure_factors");
+  for (std::size_t i = 1; i < factors.size(); ++i) {
+    if (!(factors[i] < factors[i - 1])) {
+      table.complain("sampling", "must have exposure_factors each shorter than the one before");
+      return;
+    }
+  }
+}
+
 }  // namespace
 
 Duration CameraFile::exposureTime() const {
   Duration time = -sampling.gap;
-  for (const PulseKeys& keys : pulses) time += (keys.exposure + sampling.gap) * keys.pulse.gates();
-  for (const Modulation& modulation : modulations) {
-    time += (modulation.exposure + sampling.gap) * sampling.steps;
+  for (const double factor : sampling.exposure_factors) {
+    for (const PulseKeys& keys : pulses)
+      time += (factor * keys.exposure + sampling.gap) * keys.pulse.gates();
+    for (const Modulation& modulation : modulations)
+      time += (factor * modulation.exposure + sampling.gap) * sampling.steps;
   }
   return time;
 }
@@ -163,6 +177,7 @@ CameraFile readCameraFile(settings::Table& table, std::vector<AnyEffect>& effect
                                file.sampling.frame_interval.in(millisecond),
                                file.exposureTime().in(millisecond)));
   }
+  checkExposures(table, file);
   checkFrequencies(table, file);
   checkHarmonics(table, file, effects);
   checkTemporalFilter(table, effects);

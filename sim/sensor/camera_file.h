@@ -127,6 +127,7 @@ struct CameraFile {
     Duration frame_interval = 50_ms;
     FactoryCalibration factory_calibration = FactoryCalibration::Delay;
     bool phase_tables = false;
+    std::vector<double> exposure_factors{1.0};
 
     template <class Visitor>
     void visit(Visitor& v) {
@@ -149,6 +150,9 @@ struct CameraFile {
       v.flag("phase_tables", phase_tables,
              "the device also takes off each pixel's own phase, as effects on light that depend on nothing "
              "but the pixel's position add it, in the Kinect v2's steps of 0.000031 pi");
+      v.numbers("exposure_factors", exposure_factors, {1e-4, 1.0},
+                "one to three exposures per frame, as shares of the raw exposures' time, each shorter than the one before; "
+                "each pixel is of the longest that does not saturate it");
     }
   };
 
@@ -164,6 +168,20 @@ struct CameraFile {
     }
   };
 
+  struct Thermal {
+    double illumination_rise = 0.0, sensor_rise = 0.0;
+    Duration illumination_time = 300_s, sensor_time = 900_s;
+
+    template <class Visitor>
+    void visit(Visitor& v) {
+      v.number("illumination_rise_c", illumination_rise, {0.0, 150.0},
+               "how much warmer than the room the illumination gets; 0: the camera does not tell its temperatures");
+      v.quantity("illumination_time", illumination_time, second, {0.001, 1e6}, "time constant of that");
+      v.number("sensor_rise_c", sensor_rise, {0.0, 150.0}, "how much warmer than the room the sensor gets");
+      v.quantity("sensor_time", sensor_time, second, {0.001, 1e6}, "time constant of that");
+    }
+  };
+
   std::string model = "generic";
   Lens lens;
   std::vector<Emitter> emitters;
@@ -171,6 +189,7 @@ struct CameraFile {
   std::vector<PulseKeys> pulses;  ///< at most one
   Sampling sampling;
   Pixel pixel;
+  Thermal thermal;
   DecodeSettings decoder;
 
   [[nodiscard]] bool isPulsed() const { return !pulses.empty(); }
@@ -186,6 +205,7 @@ struct CameraFile {
     v.group("pulse", pulses, "");
     v.group("sampling", sampling, "");
     v.group("pixel", pixel, "");
+    v.group("thermal", thermal, "");
     v.group("decoder", decoder, "");
   }
 };

@@ -11,7 +11,8 @@ namespace {
 
 constexpr std::array kAllPlanes{PlaneKind::Range,   PlaneKind::Depth,      PlaneKind::Amplitude,
                                 PlaneKind::Ambient, PlaneKind::Flags,      PlaneKind::Samples,
-                                PlaneKind::Phasors, PlaneKind::TruthRange, PlaneKind::TruthNormal};
+                                PlaneKind::Phasors, PlaneKind::TruthRange, PlaneKind::TruthNormal,
+                                PlaneKind::Exposure};
 
 void rejectImpossible(RangeImage& range) {
   for (std::size_t i = 0; i < range.range_m.size(); ++i) {
@@ -83,7 +84,9 @@ std::span<const PlaneKind> allPlanes() { return kAllPlanes; }
 std::vector<PlaneKind> planesOfCamera(const SensorModel& model) {
   std::vector<PlaneKind> kinds;
   for (PlaneKind kind : kAllPlanes) {
-    if (kind != PlaneKind::Phasors || model.hasPhasors()) kinds.push_back(kind);
+    if (kind == PlaneKind::Phasors && !model.hasPhasors()) continue;
+    if (kind == PlaneKind::Exposure && model.exposureCount() == 1) continue;
+    kinds.push_back(kind);
   }
   return kinds;
 }
@@ -132,6 +135,11 @@ std::vector<Plane> planesOf(const SensorModel& model, SensorModel::Exposed expos
       case PlaneKind::TruthNormal:
         planes.push_back(normalsOf(truth.normal));
         break;
+      case PlaneKind::Exposure:
+        planes.push_back(toPlane(kind, range.exposure));
+        break;
+      case PlaneKind::Color:
+        break;  // of another lens, so not of this exposure
     }
   }
   return planes;

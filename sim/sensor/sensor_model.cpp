@@ -13,6 +13,7 @@
 #include "sim/images/content_hash.h"
 #include "sim/sensor/camera_file.h"
 #include "sim/sensor/correlate.h"
+#include "sim/sensor/exposures.h"
 #include "sim/sensor/parameters.h"
 
 namespace toftwin::sim {
@@ -88,16 +89,18 @@ std::vector<Response> responsesOf(const CameraFile& file) {
   return responses;
 }
 
-/// Applies those effects that act on this type of image, in their order.
+/// Applies those effects that act on this type of image, in their order. Each of several exposures has noise of
+/// its own.
 template <class Of>
 Of applyAll(Of image, const std::vector<AnyEffect>& effects, const Conditions& now,
-            std::uint64_t seed, std::uint64_t frame) {
+            std::uint64_t seed, std::uint64_t frame, std::size_t exposure = 0) {
+  constexpr std::size_t kMostEffects = 1000;
   for (std::size_t place = 0; place < effects.size(); ++place) {
     std::visit(
         [&]<class E>(const E& effect) {
           if constexpr (std::is_same_v<ImageOf<E>, Of>) {
             image = effect.apply(std::move(image), now,
-                                 Random{seed, frame, effectKey(E::about.name, place)});
+                                 Random{seed, frame, effectKey(E::about.name, place + kMostEffects * exposure)});
           }
         },
         effects[place]);
@@ -126,15 +129,25 @@ DecodeRays cropped(const DecodeRays& full, int left, int top, int width, int hei
   return {cropped(full.x, left, top, width, height), cropped(full.z, left, top, width, height)};
 }
 
-/// The charge that the light makes, free of noise.
-Samples samplesOf(const SensorModel::Impl& impl, const Light& light) {
+/// The charge that the light makes in one exposure, free of noise.
+Samples samplesOf(const SensorModel::Impl& impl, const Light& light, double exposure_factor) {
   if (impl.file.isPulsed()) {
     const CameraFile::PulseKeys& keys = impl.file.pulses.front();
-    return collectGates(light, keys.pulse,
-                        impl.file.pixel.electrons_per_radiance_s * keys.exposure.in(second),
+    const double seconds = exposure_factor * keys.exposure.in(second);
+    return collectGates(light, keys.pulse, impl.file.pixel.electrons_per_radiance_s * seconds,
                         keys.open_share);
   }
-  return correlate(light, impl.responses, impl.file.sampling.steps, impl.file.sampling.taps);
+  std::vector<Response> responses = impl.responses;
+  for (Response& response : responses) response.electrons_per_radiance *= exposure_factor;
+  return correlate(light, responses, impl.file.sampling.steps, impl.file.sampling.taps);
+}
+
+Samples samplesOf(const SensorModel::Impl& impl, const Light& light) {
+  const auto& factors = impl.file.sampling.exposure_factors;
+  if (factors.size() == 1) return samplesOf(impl, light, factors.front());
+  std::vector<Samples> parts;
+  for (const double factor : factors) parts.push_back(samplesOf(impl, light, factor));
+  return joinExposures(parts);
 }
 
 RangeImage decodeRegion(const SensorModel::Impl& impl, const Samples& samples, int left, int top) {
@@ -204,6 +217,21 @@ const std::vector<AnyEffect>& SensorModel::effects() const { return impl_->effec
 const SensorModel::Rays& SensorModel::rays() const { return impl_->rays; }
 Duration SensorModel::frameInterval() const { return impl_->file.sampling.frame_interval; }
 
+std::size_t SensorModel::exposureCount() const {
+  return impl_->file.sampling.exposure_factors.size();
+}
+
+std::vector<NamedTemperature> SensorModel::temperatures(Temperature room,
+                                                        Duration since_power_on) const {
+  const CameraFile::Thermal& thermal = impl_->file.thermal;
+  if (thermal.illumination_rise == 0.0) return {};
+  const auto warm = [&](double rise, Duration time) {
+    return (room.in(celsius) + rise * (1.0 - std::exp(-(since_power_on / time)))) * celsius;
+  };
+  return {{"illumination", warm(thermal.illumination_rise, thermal.illumination_time)},
+          {"sensor", warm(thermal.sensor_rise, thermal.sensor_time)}};
+}
+
 bool SensorModel::hasPhasors() const { return !impl_->file.isPulsed(); }
 
 std::vector<std::string> SensorModel::effectNames() const {
@@ -215,17 +243,18 @@ std::vector<std::string> SensorModel::effectNames() const {
 }
 
 std::vector<Exposure> SensorModel::exposures(DeviceTime start) const {
+  const CameraFile& file = impl_->file;
   std::vector<Exposure> all;
-  for (const auto& keys : impl_->file.pulses) {
-    for (int gate = 0; gate < keys.pulse.gates(); ++gate) {
-      all.push_back({start, keys.exposure, 0_MHz});
-      start.ns += std::llround((keys.exposure + impl_->file.sampling.gap).in(nanosecond));
+  const auto add = [&](Duration exposure, Frequency modulation) {
+    all.push_back({start, exposure, modulation});
+    start.ns += std::llround((exposure + file.sampling.gap).in(nanosecond));
+  };
+  for (const double factor : file.sampling.exposure_factors) {
+    for (const auto& keys : file.pulses) {
+      for (int gate = 0; gate < keys.pulse.gates(); ++gate) add(factor * keys.exposure, 0_MHz);
     }
-  }
-  for (const auto& modulation : impl_->file.modulations) {
-    for (int k = 0; k < impl_->file.sampling.steps; ++k) {
-      all.push_back({start, modulation.exposure, modulation.frequency});
-      start.ns += std::llround((modulation.exposure + impl_->file.sampling.gap).in(nanosecond));
+    for (const auto& modulation : file.modulations) {
+      for (int k = 0; k < file.sampling.steps; ++k) add(factor * modulation.exposure, modulation.frequency);
     }
   }
   return all;
@@ -272,13 +301,39 @@ SensorModel::Exposed SensorModel::readOut(Samples collected, const Moment& momen
                                           std::uint64_t seed, std::uint64_t frame, int region_x,
                                           int region_y, History before) const {
   const Conditions now{moment, impl_->camera, region_x, region_y, before};
-  Samples counted = applyAll(std::move(collected), impl_->effects, now, seed, frame);
+  const std::size_t count = exposureCount();
+  Exposed exposed;
+  if (count == 1) {
+    exposed = readOutOne(std::move(collected), 0, now, seed, frame);
+  } else {
+    std::vector<Samples> samples;
+    std::vector<RangeImage> ranges;
+    for (std::size_t e = 0; e < count; ++e) {
+      Conditions then = now;
+      Samples earlier;
+      if (before.collected != nullptr) {
+        earlier = samplesOfExposure(*before.collected, e, count);
+        then.before.collected = &earlier;
+      }
+      Exposed one = readOutOne(samplesOfExposure(collected, e, count), e, then, seed, frame);
+      samples.push_back(std::move(one.samples));
+      ranges.push_back(std::move(one.range));
+    }
+    exposed = {joinExposures(samples), mergeExposures(ranges)};
+  }
+  exposed.range = applyAll(std::move(exposed.range), impl_->effects, now, seed, frame);
+  return exposed;
+}
+
+SensorModel::Exposed SensorModel::readOutOne(Samples collected, std::size_t exposure,
+                                             const Conditions& now, std::uint64_t seed,
+                                             std::uint64_t frame) const {
+  Samples counted = applyAll(std::move(collected), impl_->effects, now, seed, frame, exposure);
   const bool is_whole =
       counted.width() == impl_->camera.width && counted.height() == impl_->camera.height;
   RangeImage range = is_whole ? decode(counted, impl_->decoder, impl_->rays)
-                              : decodeRegion(*impl_, counted, region_x, region_y);
-  range = applyAll(std::move(range), impl_->effects, now, seed, frame);
-  return {.samples = std::move(counted), .range = std::move(range)};
+                              : decodeRegion(*impl_, counted, now.left, now.top);
+  return {std::move(counted), std::move(range)};
 }
 
 bool SensorModel::collectsTheSameEachFrame() const {

@@ -43,6 +43,12 @@ class SensorModel {
   [[nodiscard]] const std::vector<AnyEffect>& effects() const;
   [[nodiscard]] std::vector<std::string> effectNames() const;
   [[nodiscard]] Duration frameInterval() const;
+  /// How many exposures a frame takes, of which each pixel gets one.
+  [[nodiscard]] std::size_t exposureCount() const;
+  /// What the camera tells of its temperatures: "illumination" and "sensor", or nothing.
+  ///     T(t) = room + rise (1 − e^(−t/τ))
+  [[nodiscard]] std::vector<NamedTemperature> temperatures(Temperature room,
+                                                           Duration since_power_on) const;
   /// Whether it demodulates; a pulsed camera has no phasors.
   [[nodiscard]] bool hasPhasors() const;
   /// The raw exposures of a frame that starts at `start`: frequency by frequency, step by step.
@@ -96,6 +102,9 @@ class SensorModel {
   struct Impl;
 
  private:
+  /// The samples of one of several exposures, as they leave the pixel, and what decoding makes of them.
+  [[nodiscard]] Exposed readOutOne(Samples collected, std::size_t exposure, const Conditions& now,
+                                   std::uint64_t seed, std::uint64_t frame) const;
   explicit SensorModel(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)) {}
   static std::shared_ptr<const Impl> build(Impl impl);
   std::shared_ptr<const Impl> impl_;  // shared by copies; nobody changes it

@@ -191,7 +191,7 @@ void addHeaders(std::vector<BadMessage>& all) {
   add("kind-in-list",
       messageOf(fb::Body::Subscribe,
                 [](Builder& b) {
-                  const std::vector<std::uint8_t> kinds{0, 9};
+                  const std::vector<std::uint8_t> kinds{0, 200};
                   return fb::CreateSubscribeDirect(b, "k", &kinds).Union();
                 }),
       "planes has a value that is not known");
@@ -217,7 +217,7 @@ void addPlanes(std::vector<BadMessage>& all) {
     all.push_back({name, frameWith(planes, body), Error::Code::Malformed, why});
   };
   constexpr std::uint64_t huge = 0xFFFFFFFFFFFFFFC0u;  // plus 64 is 0 in 64 bits
-  add("plane-kind", {{.kind = 9}}, 64, "plane.kind");
+  add("plane-kind", {{.kind = 200}}, 64, "plane.kind");
   add("plane-type", {{.type = 3}}, 64, "plane.type");
   add("plane-width-0", {{.width = 0, .bytes = 0}}, 0, "plane.width");
   add("plane-height-large", {{.height = 65536, .bytes = 8 * 65536}}, 64, "plane.height");

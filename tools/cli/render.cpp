@@ -48,8 +48,9 @@ Result<sim::Scene> loadScene(const std::string& scene) {
 }
 
 /// Those of a simulated source, and what was asked for besides.
-std::vector<PlaneKind> planesFor(const std::vector<PlaneKind>& wanted) {
-  const auto all = sim::allPlanes();
+std::vector<PlaneKind> planesFor(const sim::SensorModel& model,
+                                 const std::vector<PlaneKind>& wanted) {
+  const auto all = sim::planesOfCamera(model);
   std::vector<PlaneKind> kinds{all.begin(), all.begin() + drivers::simulator::kDefaultPlanes};
   for (const PlaneKind kind : wanted) {
     const bool is_new = std::ranges::find(kinds, kind) == kinds.end();
@@ -74,7 +75,9 @@ Moment momentFor(const Options& options, const sim::SensorModel& model,
   Moment moment;
   moment.exposures = model.exposures({});
   moment.since_power_on = options.since_power_on_s * second;
-  moment.temperatures = {{"room", options.room_temperature_c * celsius}};
+  const Temperature room = options.room_temperature_c * celsius;
+  moment.temperatures = model.temperatures(room, *moment.since_power_on);
+  moment.temperatures.push_back({"room", room});
   moment.ambient = options.ambient_klx * kilolux;
   moment.world_from_camera = pose;
   return moment;
@@ -98,7 +101,7 @@ Result<Exit> run(Options& options) {
   frame.provenance = sim::provenanceOf(*model, scene->id(), options.keys.seed);
   frame.planes =
       sim::planesOf(*model, model->expose(*light, frame.moment, options.keys.seed, options.frame),
-                    light->truth, planesFor(options.output.how.planes));
+                    light->truth, planesFor(*model, options.output.how.planes));
   const auto note = exportFrame(frame, options.output.file, options.output.how);
   if (!note) return note.error();
   fmt::print("{}: {}\n", options.output.file, *note);

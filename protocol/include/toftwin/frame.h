@@ -54,6 +54,8 @@ enum class PlaneKind : std::uint8_t {
   Phasors = 6,      ///< demodulated; channel = 2 × frequency (real) and 2 × frequency + 1 (imaginary)
   TruthRange = 7,   ///< of the first surface on the central ray, metres, NaN where none
   TruthNormal = 8,  ///< unit normal in the camera frame, three channels
+  Exposure = 9,     ///< which of several exposures a pixel is of, counted from 0, U8
+  Color = 10,       ///< what a colour camera sees there: red, green, blue (sRGB), three channels of U8
 };
 
 enum class ElementType : std::uint8_t { U8 = 0, U16 = 1, F32 = 2 };
