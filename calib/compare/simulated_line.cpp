@@ -20,9 +20,13 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 /// So many rows above and below its own does a camera's decoder look at: its filters and their edge test.
 constexpr int kRowsBeside = 2;
 
+int rowsBeside(const CameraInfo& camera) {
+  return camera.height > 2 * kRowsBeside ? kRowsBeside : 0;
+}
+
 int middleRow(const CameraInfo& camera) {
-  return std::clamp(static_cast<int>(std::lround(camera.cy)), kRowsBeside,
-                    camera.height - 1 - kRowsBeside);
+  return std::clamp(static_cast<int>(std::lround(camera.cy)), rowsBeside(camera),
+                    camera.height - 1 - rowsBeside(camera));
 }
 
 sim::TraceRequest middleRowOnly(sim::TraceRequest request) {
@@ -35,11 +39,11 @@ sim::TraceRequest middleRowOnly(sim::TraceRequest request) {
 
 /// The one row of samples between copies of itself, for decoders that look at neighbours: the scenes of
 /// the measured lines are the same above and below. The noise, which comes later, is not copied.
-sim::Samples amongItsLike(const sim::Samples& row) {
+sim::Samples amongItsLike(const sim::Samples& row, int beside) {
   sim::Samples rows = row;
   for (std::size_t i = 0; i < row.electrons.size(); ++i) {
-    rows.electrons[i] = Image<float>{row.width(), 2 * kRowsBeside + 1};
-    for (int y = 0; y <= 2 * kRowsBeside; ++y) {
+    rows.electrons[i] = Image<float>{row.width(), 2 * beside + 1};
+    for (int y = 0; y <= 2 * beside; ++y) {
       std::ranges::copy(row.electrons[i].pixels(), &rows.electrons[i](0, y));
     }
   }
@@ -50,15 +54,16 @@ sim::Samples amongItsLike(const sim::Samples& row) {
 std::vector<double> meanRange(const sim::SensorModel& camera, const sim::Light& light,
                               const LineEffort& effort, int row, std::uint64_t first_frame) {
   std::vector<Running> mean(static_cast<std::size_t>(light.width()));
+  const int beside = rowsBeside(camera.camera());
   const sim::Samples collected =
-      amongItsLike(camera.collect(light, {}, effort.seed, first_frame, 0, row));
+      amongItsLike(camera.collect(light, {}, effort.seed, first_frame, 0, row), beside);
   for (int frame = 0; frame < effort.frames; ++frame) {
     const auto exposed = camera.readOut(collected, {}, effort.seed,
                                         first_frame + static_cast<std::uint64_t>(frame), 0,
-                                        row - kRowsBeside);
+                                        row - beside);
     for (std::size_t x = 0; x < mean.size(); ++x) {
       const auto range =
-          static_cast<double>(exposed.range.range_m(static_cast<int>(x), kRowsBeside));
+          static_cast<double>(exposed.range.range_m(static_cast<int>(x), beside));
       if (std::isfinite(range)) mean[x].add(1e3 * range);
     }
   }

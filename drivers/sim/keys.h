@@ -64,9 +64,8 @@ struct Keys {
     v.quantity("ambient", ambient, kilolux, {0.0, 200.0},
                "reported with every frame, and shone on the scene by the effect ambient_light");
     v.texts("planes", planes,
-            "which of range, depth, amplitude, ambient, flags, samples, phasors, truth_range, "
-            "truth_normal; "
-            "empty: the first five");
+            "which of range, depth, amplitude, ambient, flags, samples, phasors (not of pulsed cameras), "
+            "truth_range, truth_normal, exposure (of cameras with several); empty: the first five");
   }
 };
 

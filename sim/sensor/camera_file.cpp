@@ -130,6 +130,10 @@ void checkKind(settings::Table& table, const CameraFile& file) {
   }
 }
 
+void checkColor(settings::Table& table, const CameraFile& file) {
+  if (file.colors.size() > 1) table.complain("color", "stands there twice");
+}
+
 void checkExposures(settings::Table& table, const CameraFile& file) {
   const auto& factors = file.sampling.exposure_factors;
   if (factors.empty() || factors.size() > 3)
@@ -177,6 +181,7 @@ CameraFile readCameraFile(settings::Table& table, std::vector<AnyEffect>& effect
                                file.sampling.frame_interval.in(millisecond),
                                file.exposureTime().in(millisecond)));
   }
+  checkColor(table, file);
   checkExposures(table, file);
   checkFrequencies(table, file);
   checkHarmonics(table, file, effects);

@@ -168,6 +168,24 @@ struct CameraFile {
     }
   };
 
+  /// The lens of an RGB-D camera's colour images.
+  struct Color {
+    Lens lens;
+    std::array<double, 3> position_mm{};
+    std::array<double, 3> euler_deg{};
+    double scale = 1.0;
+
+    template <class Visitor>
+    void visit(Visitor& v) {
+      v.group("lens", lens, "");
+      v.numbers("position_mm", position_mm, {-1e4, 1e4}, "from the depth lens: right, down, ahead");
+      v.numbers("euler_deg", euler_deg, {-180.0, 180.0},
+                "how it is turned in the depth lens's frame: about x, then y, then z");
+      v.number("scale", scale, {0.01, 1.0},
+               "share of its width and height at which images are made, to save time");
+    }
+  };
+
   struct Thermal {
     double illumination_rise = 0.0, sensor_rise = 0.0;
     Duration illumination_time = 300_s, sensor_time = 900_s;
@@ -191,6 +209,7 @@ struct CameraFile {
   Pixel pixel;
   Thermal thermal;
   DecodeSettings decoder;
+  std::vector<Color> colors;  ///< at most one
 
   [[nodiscard]] bool isPulsed() const { return !pulses.empty(); }
   /// From the start of a frame's first raw exposure to the end of its last.
@@ -207,6 +226,7 @@ struct CameraFile {
     v.group("pixel", pixel, "");
     v.group("thermal", thermal, "");
     v.group("decoder", decoder, "");
+    v.group("color", colors, "");
   }
 };
 

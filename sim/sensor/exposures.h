@@ -8,8 +8,8 @@
 
 namespace toftwin::sim {
 
-// Cameras that take each frame with several exposures. Until they are read out, their samples stand together
-// in one Samples: all frequencies of the first exposure, then all of the second, …
+// Cameras that take each frame with several exposures. Until they are read out, their samples stand
+// together in one Samples: all frequencies of the first exposure, then all of the second, …
 
 /// The samples of one exposure out of `count`.
 Samples samplesOfExposure(const Samples& all, std::size_t exposure, std::size_t count);
@@ -17,8 +17,9 @@ Samples samplesOfExposure(const Samples& all, std::size_t exposure, std::size_t 
 /// Back together; a pixel has the flags of all.
 Samples joinExposures(std::span<const Samples> parts);
 
-/// One image of several exposures, pixel by pixel: of those in which it is valid the one with the most
-/// signal, and where it is in none the one with the most signal. `exposure` says which was taken, counted from 0.
+/// One image of several exposures, pixel by pixel: of those in which it is valid the one with the
+/// most signal, and where it is in none the one with the most signal. `exposure` says which was
+/// taken, counted from 0.
 RangeImage mergeExposures(std::span<const RangeImage> parts);
 
 }  // namespace toftwin::sim

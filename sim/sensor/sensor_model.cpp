@@ -12,6 +12,7 @@
 #include "sim/decode/decode.h"
 #include "sim/images/content_hash.h"
 #include "sim/sensor/camera_file.h"
+#include "sim/sensor/color.h"
 #include "sim/sensor/correlate.h"
 #include "sim/sensor/exposures.h"
 #include "sim/sensor/parameters.h"
@@ -230,6 +231,18 @@ std::vector<NamedTemperature> SensorModel::temperatures(Temperature room,
   };
   return {{"illumination", warm(thermal.illumination_rise, thermal.illumination_time)},
           {"sensor", warm(thermal.sensor_rise, thermal.sensor_time)}};
+}
+
+std::optional<LensPair> SensorModel::colorLens() const {
+  if (impl_->file.colors.empty()) return std::nullopt;
+  const CameraFile::Color& color = impl_->file.colors.front();
+  const auto turn = [&](Vec3d axis, std::size_t i) {
+    return rotation<Camera, Camera>(axis, color.euler_deg[i] * degree.in_si);
+  };
+  const Transform<Camera, Camera> turned = turn({0, 0, 1}, 2) * (turn({0, 1, 0}, 1) * turn({1, 0, 0}, 0));
+  const auto& p = color.position_mm;
+  const Transform<Camera, ColorLens> camera_from_color{turned.rotation_wxyz, Vec3d{p[0], p[1], p[2]} * 1e-3};
+  return LensPair{impl_->camera, scaled(cameraInfo(color.lens), color.scale), camera_from_color.inverse()};
 }
 
 bool SensorModel::hasPhasors() const { return !impl_->file.isPulsed(); }

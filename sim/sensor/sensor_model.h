@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -18,6 +19,7 @@
 #include "sim/images/light.h"
 #include "sim/images/range.h"
 #include "sim/images/samples.h"
+#include "sim/sensor/registration.h"
 #include "sim/tracer/trace.h"
 
 namespace toftwin::sim {
@@ -49,6 +51,9 @@ class SensorModel {
   ///     T(t) = room + rise (1 − e^(−t/τ))
   [[nodiscard]] std::vector<NamedTemperature> temperatures(Temperature room,
                                                            Duration since_power_on) const;
+  /// Depth and colour lens of an RGB-D camera, the latter at the size at which images are made; nothing where
+  /// there is no colour lens.
+  [[nodiscard]] std::optional<LensPair> colorLens() const;
   /// Whether it demodulates; a pulsed camera has no phasors.
   [[nodiscard]] bool hasPhasors() const;
   /// The raw exposures of a frame that starts at `start`: frequency by frequency, step by step.

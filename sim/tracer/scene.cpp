@@ -280,12 +280,26 @@ struct SceneBuilder {
   }
 };
 
-Result<Scene> Scene::load(const std::filesystem::path& file) {
-  return SceneBuilder::build(loadSceneFile(file));
+namespace {
+
+/// The scene with the materials' colours instead of their infrared albedo.
+Result<SceneFile> inBand(Result<SceneFile> file, Band band) {
+  if (!file || band == Band::Infrared) return file;
+  const std::size_t channel = band == Band::Red ? 0 : band == Band::Green ? 1 : 2;
+  for (MaterialSpec& material : file->spec.materials) {
+    if (!material.color.empty()) material.albedo = material.color[channel];
+  }
+  return file;
 }
 
-Result<Scene> Scene::parse(std::string_view toml, const std::filesystem::path& name) {
-  return SceneBuilder::build(parseSceneFile(toml, name));
+}  // namespace
+
+Result<Scene> Scene::load(const std::filesystem::path& file, Band band) {
+  return SceneBuilder::build(inBand(loadSceneFile(file), band));
+}
+
+Result<Scene> Scene::parse(std::string_view toml, const std::filesystem::path& name, Band band) {
+  return SceneBuilder::build(inBand(parseSceneFile(toml, name), band));
 }
 
 }  // namespace toftwin::sim

@@ -11,15 +11,19 @@
 
 namespace toftwin::sim {
 
+/// In which light a scene is seen: the cameras' own, or what a colour camera's filters let through.
+enum class Band { Infrared, Red, Green, Blue };
+
 /// A built scene: meshes and primitives with their materials, ready to trace. Cheap to copy; copies
 /// share the geometry, which nobody changes.
 class Scene {
  public:
   /// From a scene file (docs/scene.md). Errors name file, line and key; a mesh that is missing, empty
   /// or holds NaN vertices is an error naming mesh and vertex.
-  static Result<Scene> load(const std::filesystem::path& file);
+  static Result<Scene> load(const std::filesystem::path& file, Band band = Band::Infrared);
   /// From text; `name` stands for the file in errors, and mesh paths start at its folder.
-  static Result<Scene> parse(std::string_view toml, const std::filesystem::path& name);
+  static Result<Scene> parse(std::string_view toml, const std::filesystem::path& name,
+                             Band band = Band::Infrared);
 
   /// Content hash over what the scene says and the meshes it uses; 32 hex digits. Comments, order of
   /// keys and file names do not count.

@@ -124,6 +124,8 @@ void readMaterials(Table& root, SceneFile& file) {
     checkKeysFitModel(table, material.model);
     NamedFile& texture = file.textures.emplace_back();
     if (!material.texture.empty()) texture = {table.resolve(material.texture), table.place("texture")};
+    if (!material.color.empty() && material.color.size() != 3)
+      table.complain("color", "must be three numbers: red, green, blue");
     scene.materials.push_back(std::move(material));
   }
 }

@@ -46,6 +46,7 @@ struct MaterialSpec {
   double clarity = 1.0;
   Length thickness{};
   double emission = 0.0;
+  std::vector<double> color;  ///< red, green, blue; empty: as the albedo
 
   bool operator==(const MaterialSpec&) const = default;
 
@@ -90,6 +91,8 @@ struct MaterialSpec {
                "thin-glass: delays the light that goes through");
     v.number("emission_w_per_m2_sr", emission, {0.0, 1e9},
              "own radiance, not modulated: a lamp, a window; it counts as ambient light");
+    v.numbers("color", color, {0.0, 1.0},
+              "share of the visible light that is reflected: red, green, blue, for colour cameras; left out: as the albedo");
   }
 };
 

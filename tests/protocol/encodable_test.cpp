@@ -58,7 +58,7 @@ std::vector<Refused> refusedFrames() {
       {with([](Frame& f) { f.provenance.effects.resize(kMaxNames + 1); }), "provenance.effects"},
       {with([&](Frame& f) { f.provenance.scene_id = long_name; }), "provenance.scene_id"},
       {with([&](Frame& f) { f.source = long_name; }), "frame.source"},
-      {with([](Frame& f) { f.planes[0].kind = static_cast<PlaneKind>(9); }), "plane.kind"},
+      {with([](Frame& f) { f.planes[0].kind = static_cast<PlaneKind>(11); }), "plane.kind"},
       {with([](Frame& f) { f.planes[0].type = static_cast<ElementType>(3); }), "plane.type"},
       {with([](Frame& f) { f.planes[1].width = 0; }), "plane.width"},
       {with([](Frame& f) { f.planes[1].height = -4; }), "plane.height"},
@@ -75,7 +75,7 @@ std::vector<Refused> refusedRequests() {
   Subscribe bad_rate = subscribe, bad_policy = subscribe, bad_plane = subscribe, many_planes = subscribe;
   bad_rate.max_rate_hz = kNaN;
   bad_policy.policy = static_cast<Policy>(4);
-  bad_plane.planes = {static_cast<PlaneKind>(9)};
+  bad_plane.planes = {static_cast<PlaneKind>(11)};
   many_planes.planes.resize(kMaxPlanes + 1);
   SourceDescription bad_interval, bad_value, bad_bound, long_parameter, many_parameters, bad_pose;
   bad_interval.frame_interval = -1_ms;
@@ -195,7 +195,7 @@ class Random {
   }
   std::vector<PlaneKind> kinds() {
     std::vector<PlaneKind> all(rarely(kMaxPlanes + below(2), below(4)));
-    for (auto& one : all) one = static_cast<PlaneKind>(rarely<std::size_t>(9, below(9)));
+    for (auto& one : all) one = static_cast<PlaneKind>(rarely<std::size_t>(11, below(11)));
     return all;
   }
   Transform<World, Camera> pose() {
@@ -231,7 +231,7 @@ class Random {
     Plane& plane = f.planes[below(3)];
     plane.width = rarely(static_cast<int>(below(70'000)), plane.width);
     plane.channels = rarely(static_cast<int>(below(3)), plane.channels);
-    plane.kind = static_cast<PlaneKind>(rarely<std::size_t>(9, below(9)));
+    plane.kind = static_cast<PlaneKind>(rarely<std::size_t>(11, below(11)));
     plane.type = static_cast<ElementType>(rarely<std::size_t>(3, static_cast<std::size_t>(plane.type)));
     return f;
   }

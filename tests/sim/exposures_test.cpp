@@ -27,9 +27,10 @@ SensorModel threeExposures(const std::string& effects) {
 /// Radiance 1, 100 and 1000: enough in the first exposure, in the second, in the third.
 Light brightAndDark(const SensorModel& model) {
   const TraceRequest request = model.traceRequest();
-  return syntheticLight(model.camera().width, model.camera().height, request.frequencies, 1, [](int x, int) {
-    return std::vector<Way>{{x < 100 ? 1.0 : x < 200 ? 60.0 : 600.0, 1.1}};
-  });
+  return syntheticLight(model.camera().width, model.camera().height, request.frequencies, 1,
+                        [](int x, int) {
+                          return std::vector<Way>{{x < 100 ? 1.0 : x < 200 ? 60.0 : 600.0, 1.1}};
+                        });
 }
 
 TEST(Exposures, EachPixelIsOfTheLongestThatDoesNotSaturate) {
@@ -42,8 +43,8 @@ TEST(Exposures, EachPixelIsOfTheLongestThatDoesNotSaturate) {
     EXPECT_NEAR(image.range_m(x, 10), 1.1, 1e-5) << x;
     EXPECT_EQ(image.flags(x, 10), 0) << x;
   }
-  EXPECT_NEAR(image.amplitude(50, 10), 5e3, 1.0);    // m N
-  EXPECT_NEAR(image.amplitude(150, 10), 3e4, 1.0);   // a tenth of 60 times as much
+  EXPECT_NEAR(image.amplitude(50, 10), 5e3, 1.0);   // m N
+  EXPECT_NEAR(image.amplitude(150, 10), 3e4, 1.0);  // a tenth of 60 times as much
 }
 
 TEST(Exposures, OneAloneLosesTheBrightPixels) {
@@ -64,11 +65,11 @@ TEST(Exposures, AreTakenOneAfterTheOther) {
 }
 
 TEST(Exposures, HaveNoiseOfTheirOwn) {
-  const SensorModel model = threeExposures("[[effect]]\ntype = 'read_noise'\nsigma_electrons = 100\n");
+  const SensorModel model =
+      threeExposures("[[effect]]\ntype = 'read_noise'\nsigma_electrons = 100\n");
   const Samples samples = model.expose(evenLight(model, 1.0, 1.1), {}, 1, 0).samples;
   ASSERT_EQ(samples.electrons.size(), 24u);
   double product = 0.0, squares = 0.0;
-  const double first_mean = 5e3, second_mean = 5e2;
   const Samples clean = model.collect(evenLight(model, 1.0, 1.1), {}, 1, 0);
   for (std::size_t i = 0; i < samples.electrons[0].size(); ++i) {
     const auto a = static_cast<double>(samples.electrons[0][i] - clean.electrons[0][i]);
@@ -76,7 +77,6 @@ TEST(Exposures, HaveNoiseOfTheirOwn) {
     product += a * b;
     squares += a * a;
   }
-  EXPECT_GT(first_mean, second_mean);
   // 100,000 pixels: standard error of a correlation 0.3 %
   EXPECT_LT(std::abs(product / squares), 0.015);
 }
@@ -90,19 +90,23 @@ TEST(Exposures, ThePlaneSaysWhichWasTaken) {
   EXPECT_EQ(planes[0].type, ElementType::U8);
   EXPECT_EQ(planes[0].as<std::uint8_t>()[300], 2);
   EXPECT_THAT(planesOfCamera(model), testing::Contains(PlaneKind::Exposure));
-  EXPECT_THAT(planesOfCamera(modelOf(plainCamera(4, 2, 0.5))), testing::Not(testing::Contains(PlaneKind::Exposure)));
+  EXPECT_THAT(planesOfCamera(modelOf(plainCamera(4, 2, 0.5))),
+              testing::Not(testing::Contains(PlaneKind::Exposure)));
 }
 
 TEST(Exposures, MustGetShorter) {
   EXPECT_THAT(errorOf("[[emitter]]\n[[modulation]]\n[sampling]\nexposure_factors = [1.0, 1.0]\n"),
               HasSubstr("each shorter than the one before"));
-  EXPECT_THAT(errorOf("[[emitter]]\n[[modulation]]\n[sampling]\nexposure_factors = [1, 0.5, 0.2, 0.1]\n"),
-              HasSubstr("one to three"));
+  EXPECT_THAT(
+      errorOf("[[emitter]]\n[[modulation]]\n[sampling]\nexposure_factors = [1, 0.5, 0.2, 0.1]\n"),
+      HasSubstr("one to three"));
 }
 
 TEST(Temperatures, RiseWithTheTimeSincePowerOn) {
-  const SensorModel model = modelOf(plainCamera(
-      4, 2, 0.5, "[thermal]\nillumination_rise_c = 27.2\nillumination_time_s = 300\nsensor_rise_c = 10\nsensor_time_s = 600\n"));
+  const SensorModel model =
+      modelOf(plainCamera(4, 2, 0.5,
+                          "[thermal]\nillumination_rise_c = 27.2\nillumination_time_s = "
+                          "300\nsensor_rise_c = 10\nsensor_time_s = 600\n"));
   const auto at = [&](double seconds) { return model.temperatures(23_degC, seconds * second); };
   ASSERT_EQ(at(0.0).size(), 2u);
   EXPECT_EQ(at(0.0)[0].where, "illumination");

@@ -14,6 +14,7 @@
 #include "tools/cli/options.h"
 #include "tools/cli/pose.h"
 #include "tools/cli/render_bands.h"
+#include "tools/cli/render_images.h"
 #include "tools/cli/terminal.h"
 
 namespace toftwin::cli {
@@ -30,6 +31,7 @@ struct Options {
   double ambient_klx = drivers::simulator::Keys{}.ambient.in(kilolux);
   double room_temperature_c = drivers::simulator::Keys{}.room_temperature.in(celsius);
   std::uint64_t frame = 0;
+  bool images = false;
 };
 
 Result<sim::SensorModel> loadCamera(const std::string& camera) {
@@ -105,6 +107,7 @@ Result<Exit> run(Options& options) {
   const auto note = exportFrame(frame, options.output.file, options.output.how);
   if (!note) return note.error();
   fmt::print("{}: {}\n", options.output.file, *note);
+  if (options.images) return renderImages(frame, *model, options.scene, options.output.file, options.keys);
   return Exit::Ok;
 }
 
@@ -117,7 +120,8 @@ Command renderCommand() {
       "  toftwin render --camera my_camera.toml --scene room.toml -o cloud.ply --position 0,0,-1 "
       "--look-at 0,0,2\n"
       "  toftwin render --camera kinect_v2 --scene room.toml -o truth.npy --plane truth_range\n"
-      "  toftwin render --camera kinect_v2 --samples 64 -o raw.npy --plane samples\n",
+      "  toftwin render --camera kinect_v2 --samples 64 -o raw.npy --plane samples\n"
+      "  toftwin render --camera kinect_v2 --scene desk.toml --samples 64 --images -o desk.png\n",
       [](CLI::App& app) -> Run {
         const auto options = std::make_shared<Options>();
         app.add_option("--camera", options->camera, presetHelp())->required();
@@ -153,6 +157,10 @@ Command renderCommand() {
         app.add_option("--room-temperature-c", options->room_temperature_c, "in degrees Celsius")
             ->check(CLI::Range(-40.0, 100.0))
             ->capture_default_str();
+        app.add_flag("--images", options->images,
+                     "also FILE-infrared.png and FILE-depth.png as pictures to look at, and, for a camera with a "
+                     "colour lens, FILE-color.png from its place, FILE-color-in-depth.png and "
+                     "FILE-depth-in-color.png");
         checkUsage(app, [options] { return options->output.check(); });
         return [options] { return run(*options); };
       }};

@@ -107,6 +107,12 @@ void addPhaseFigures(std::map<std::string, Draw>& figures) {
                  {{"amplitude 100", {.amplitude = 100.0, .mean = 300.0, .effects = steps}},
                   {"amplitude 1000", {.effects = steps}}});
   };
+  figures["companding"] = [] {
+    const std::string codes = effect("companding", "counts_per_electron = 0.5");
+    return turns("codes of half a count per electron",
+                 {{"amplitude 100: steps of 1 count", {.amplitude = 100.0, .mean = 300.0, .effects = codes}},
+                  {"amplitude 4000: steps up to 16", {.amplitude = 4000.0, .mean = 6000.0, .effects = codes}}});
+  };
 }
 
 }  // namespace toftwin::sim::figures

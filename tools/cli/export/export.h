@@ -25,6 +25,7 @@ struct ExportOptions {
   int channel = 0;                  ///< of planes with several (PNG, CSV)
   double mm_per_count = 1.0;        ///< PNG of metres
   bool color = false;  ///< PNG: 8-bit colours between `min` and `max` instead of counts
+  bool grey = false;   ///< PNG: 8-bit grey as the square root, white where 1 % of the pixels are above
   std::optional<double> min{},
       max{};                 ///< of the colours, in the plane's unit; default: of the image
   std::optional<int> row{};  ///< CSV: this row only

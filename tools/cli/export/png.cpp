@@ -117,13 +117,49 @@ Result<Exported> colors(const Picture& picture, const ExportOptions& options) {
   return Exported{*std::move(bytes), std::move(note)};
 }
 
+/// Infrared as people look at it: the square root, since returned light falls with the square of the range.
+Result<Exported> greys(const Picture& picture) {
+  const Plane& plane = *picture.plane;
+  const double white = std::max(extentOf(picture.values).second, 1e-30);
+  cv::Mat image(plane.height, plane.width, CV_8U);
+  for (std::size_t i = 0; i < picture.values.size(); ++i) {
+    const double share = std::clamp(static_cast<double>(picture.values[i]) / white, 0.0, 1.0);
+    image.data[i] = static_cast<unsigned char>(std::lround(255.0 * std::sqrt(share)));
+  }
+  std::string note = fmt::format("{}: square root, white = {:g}", nameOf(plane.kind), white);
+  auto bytes = encode(image, note);
+  if (!bytes) return bytes.error();
+  return Exported{*std::move(bytes), std::move(note)};
+}
+
+/// A plane that holds red, green and blue.
+Result<Exported> photograph(const Plane& plane) {
+  if (plane.channels != 3 || plane.type != ElementType::U8 || plane.data.size() != plane.byteSize()) {
+    return Error{Error::Code::Malformed,
+                 fmt::format("plane {} does not hold red, green and blue", nameOf(plane.kind))};
+  }
+  cv::Mat image(plane.height, plane.width, CV_8UC3);
+  const std::span<const std::uint8_t> values = plane.as<std::uint8_t>();
+  const std::size_t pixels = values.size() / 3;
+  for (std::size_t i = 0; i < pixels; ++i) {
+    for (std::size_t channel = 0; channel < 3; ++channel)
+      image.data[3 * i + 2 - channel] = values[channel * pixels + i];  // OpenCV: blue first
+  }
+  std::string note = fmt::format("{}: sRGB", nameOf(plane.kind));
+  auto bytes = encode(image, note);
+  if (!bytes) return bytes.error();
+  return Exported{*std::move(bytes), std::move(note)};
+}
+
 }  // namespace
 
 Result<Exported> toPng(const Frame& frame, const ExportOptions& options) {
   const auto plane = choosePlane(frame, options.planes);
   if (!plane) return plane.error();
+  if ((*plane)->kind == PlaneKind::Color) return photograph(**plane);
   const auto picture = pictureOf(**plane, options.channel);
   if (!picture) return picture.error();
+  if (options.grey) return greys(*picture);
   return options.color ? colors(*picture, options) : counts(*picture, options);
 }
 
