@@ -110,12 +110,11 @@ std::optional<ClockFit::Estimate> ClockFit::estimate() const {
   const double s = noiseOf(line, x, y);
   for (int i = 0; i < kRounds; ++i) line = reweighted(line, s, x, y);
   const Spread spread = spreadOf(line, s, x, y);
-  return Estimate{
-      .host_minus_device_ns = newest.host_minus_device_ns + std::llround(line.a),
-      .offset_sd_ns = spread.a,
-      .drift = line.b * 1e-9,
-      .drift_sd = spread.b * 1e-9,
-      .noise_ns = s};
+  return Estimate{.host_minus_device_ns = newest.host_minus_device_ns + std::llround(line.a),
+                  .offset_sd_ns = spread.a,
+                  .drift = line.b * 1e-9,
+                  .drift_sd = spread.b * 1e-9,
+                  .noise_ns = s};
 }
 
 DeviceTime DeviceClock::read(std::int64_t stamp_ns, SteadyTime arrived) {
@@ -180,9 +179,8 @@ ClockRelation DeviceClock::relation(Duration delay, Duration delay_sd) const {
   if (!fitted) return {};
   // The relation of the host's two clocks, now: device + offset is steady time.
   const ClockRelation steady_to_wall = relateToHost({0}, SteadyTime{});
-  const double sd =
-      std::hypot(fitted->offset_sd_ns, delay_sd.in(nanosecond),
-                 static_cast<double>(steady_to_wall.uncertainty_ns));
+  const double sd = std::hypot(fitted->offset_sd_ns, delay_sd.in(nanosecond),
+                               static_cast<double>(steady_to_wall.uncertainty_ns));
   return {.host_minus_device_ns = fitted->host_minus_device_ns +
                                   steady_to_wall.host_minus_device_ns -
                                   std::llround(delay.in(nanosecond)),

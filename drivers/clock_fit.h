@@ -27,7 +27,7 @@ class ClockFit {
   struct Estimate {
     std::int64_t host_minus_device_ns = 0;  ///< at the newest point
     double offset_sd_ns = 0.0;
-    double drift = 0.0;     ///< host seconds gained per device second; 1e-6 is 1 ppm
+    double drift = 0.0;  ///< host seconds gained per device second; 1e-6 is 1 ppm
     double drift_sd = 0.0;
     double noise_ns = 0.0;  ///< s: how much single arrivals scatter
   };
@@ -79,10 +79,10 @@ class DeviceClock {
 
   Options options_;
   std::int64_t tolerance_ns_;
-  ClockFit fit_;                 // of continuous device time and the steady clock
+  ClockFit fit_;  // of continuous device time and the steady clock
   std::optional<DeviceTime> last_;
   std::int64_t last_arrived_ns_ = 0;
-  std::int64_t shift_ns_ = 0;    // continuous device time − stamp
+  std::int64_t shift_ns_ = 0;  // continuous device time − stamp
   std::uint64_t steps_ = 0;
   // Frames in a row that came late, or whose clock was set back by less than the pause before them.
   int behind_ = 0;

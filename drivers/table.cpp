@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <array>
 
+#include "drivers/o3d303/o3d303.h"
 #include "drivers/pattern/pattern.h"
 #include "drivers/replay/replay.h"
 #include "drivers/sim/simulator.h"
@@ -14,6 +15,7 @@ std::span<const Driver> allDrivers() {
       pattern::row(),
       replay::row(),
       simulator::row(),
+      o3d303::row(),
   };
   return rows;
 }

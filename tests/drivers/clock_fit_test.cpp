@@ -51,8 +51,8 @@ Errors errorsOfTrials(int trials, int frames, double late_share) {
     }
     device_ns -= kInterval_ns;
     const auto fitted = fit.estimate().value();
-    const auto truth = static_cast<double>(Arrivals::hostOf(device_ns) - device_ns -
-                                           fitted.host_minus_device_ns);
+    const auto truth =
+        static_cast<double>(Arrivals::hostOf(device_ns) - device_ns - fitted.host_minus_device_ns);
     errors.offset.push_back(truth / fitted.offset_sd_ns);
     errors.drift.push_back((fitted.drift - kDrift) / fitted.drift_sd);
   }
@@ -64,9 +64,9 @@ double meanSquare(const std::vector<double>& values) {
   return sum / static_cast<double>(values.size());
 }
 
-// The mean square of n standard normal numbers is 1 ± sqrt(2/n). The sd is itself estimated from 256
-// points: a t distribution with 254 degrees of freedom, variance 254/252 = 1.008. At 5 sigma each of the two
-// is wrong once in 1.7 million.
+// The mean square of n standard normal numbers is 1 ± sqrt(2/n). The sd is itself estimated from
+// 256 points: a t distribution with 254 degrees of freedom, variance 254/252 = 1.008. At 5 sigma
+// each of the two is wrong once in 1.7 million.
 TEST(ClockFit, KnowsHowWellItKnows) {
   RecordProperty("seed", std::to_string(kSeed));
   constexpr int kTrials = 400;
@@ -89,7 +89,8 @@ TEST(ClockFit, LateFramesDoNotMoveIt) {
 
 TEST(ClockFit, IsSilentUntilItCanTell) {
   ClockFit fit;
-  for (std::size_t i = 0; i + 1 < ClockFit::kFewest; ++i) fit.add({static_cast<std::int64_t>(i)}, 5);
+  for (std::size_t i = 0; i + 1 < ClockFit::kFewest; ++i)
+    fit.add({static_cast<std::int64_t>(i)}, 5);
   EXPECT_FALSE(fit.estimate().has_value());
   fit.clear();
   for (std::size_t i = 0; i < ClockFit::kFewest; ++i) fit.add({7}, 5);
@@ -159,8 +160,8 @@ TEST(DeviceClock, AClockThatIsSetKeepsItsPaceAndItsRelation) {
     const std::int64_t before = camera.last->ns - camera.true_ns;
     camera.set_by_ns += by_s * 1'000'000'000;
     camera.frames(20);
-    // What was set is taken off again up to the scatter of the one arrival that it was seen at (6 sigma)
-    // and what the fit knew (6 x 2 x 0.5 ms/sqrt(200), of the order of 0.4 ms).
+    // What was set is taken off again up to the scatter of the one arrival that it was seen at (6
+    // sigma) and what the fit knew (6 x 2 x 0.5 ms/sqrt(200), of the order of 0.4 ms).
     EXPECT_NEAR(static_cast<double>(camera.last->ns - camera.true_ns - before), 0.0, 3.5e6) << by_s;
     EXPECT_EQ(camera.clock.steps(), 1u) << by_s;
   }
@@ -198,7 +199,8 @@ TEST(DeviceClock, TheRelationTakesTheKnownDelayOffAndSaysItsUncertainty) {
   camera.frames(100);
   const auto plain = camera.clock.relation(0_ms, 0_ms);
   const auto delayed = camera.clock.relation(20_ms, 3_ms);
-  // The two readings of the host's clocks may differ by as much as a wall clock is slewed meanwhile.
+  // The two readings of the host's clocks may differ by as much as a wall clock is slewed
+  // meanwhile.
   EXPECT_NEAR(static_cast<double>(plain.host_minus_device_ns - delayed.host_minus_device_ns), 20e6,
               1e5);
   EXPECT_GE(delayed.uncertainty_ns, 3'000'000);

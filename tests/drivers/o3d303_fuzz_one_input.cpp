@@ -68,7 +68,8 @@ void readTexts(std::string_view text) {
     const auto again = readXmlRpcCall(encodeXmlRpc(*call));
     demand(again && again->params.size() == call->params.size());
   }
-  if (const auto answer = readXmlRpcAnswer(text)) demand(readXmlRpcAnswer(encodeXmlRpc(*answer)).ok());
+  if (const auto answer = readXmlRpcAnswer(text))
+    demand(readXmlRpcAnswer(encodeXmlRpc(*answer)).ok());
 }
 
 }  // namespace

@@ -41,8 +41,7 @@ TEST(Pcic, MessagesComeOutHoweverTheBytesAreCut) {
   for (std::size_t cut = 0; cut <= stream.size(); ++cut) {
     PcicReader reader{1024};
     std::vector<PcicMessage> messages;
-    for (const auto piece :
-         {std::span{stream}.first(cut), std::span{stream}.subspan(cut)}) {
+    for (const auto piece : {std::span{stream}.first(cut), std::span{stream}.subspan(cut)}) {
       reader.feed(piece);
       while (true) {
         auto next = reader.next();
@@ -109,7 +108,8 @@ TEST(Chunk, IsAsTheWireFactsSayToTheByte) {
               std::as_bytes(std::span{pixels}));
   ASSERT_EQ(bytes.size(), 52u);
   const std::uint32_t expected[] = {100, 52, 48, 2, 2, 1, 2, 7, 8, 9, 10, 11};
-  for (std::size_t i = 0; i < 12; ++i) EXPECT_EQ(numberAt<std::uint32_t>(bytes, 4 * i), expected[i]);
+  for (std::size_t i = 0; i < 12; ++i)
+    EXPECT_EQ(numberAt<std::uint32_t>(bytes, 4 * i), expected[i]);
   const auto read = readChunk(bytes);
   ASSERT_TRUE(read.ok()) << read.error().message;
   const auto range_m = rangeOf(read->chunk);
@@ -150,7 +150,8 @@ std::optional<Bytes> realFrame() {
   const char* named = std::getenv("TOFTWIN_DATA");
   const std::filesystem::path data =
       named != nullptr ? named : std::string{TOFTWIN_SOURCE_DIR} + "/../shared/data";
-  for (const auto& folder : {data, std::filesystem::path{TOFTWIN_SOURCE_DIR} / "../../shared/data"}) {
+  for (const auto& folder :
+       {data, std::filesystem::path{TOFTWIN_SOURCE_DIR} / "../../shared/data"}) {
     std::ifstream file{folder / "ifm-o3r-frame/O3RBuffer.data", std::ios::binary};
     if (!file) continue;
     std::string text{std::istreambuf_iterator<char>{file}, {}};
@@ -177,7 +178,8 @@ TEST(RealFrame, OfANewerCameraIsDecodedInMetres) {
   ASSERT_TRUE(range_m.ok() && bits.ok());
   ASSERT_EQ(range_m->width(), 224);
   ASSERT_EQ(range_m->height(), 172);
-  // What whoever prepared the data counted with another program: 9962 valid pixels from 0 to 1.97 m.
+  // What whoever prepared the data counted with another program: 9962 valid pixels from 0 to 1.97
+  // m.
   int valid = 0;
   float farthest_m = 0.0F;
   for (std::size_t i = 0; i < bits->size(); ++i) {
@@ -201,8 +203,9 @@ TEST(XmlRpc, CallsComeBack) {
 }
 
 TEST(XmlRpc, AnswersAndFaultsComeBack) {
-  for (const XmlRpcAnswer& answer : {XmlRpcAnswer{XmlRpcValue{"O3D303"}}, XmlRpcAnswer{XmlRpcValue{""}},
-                                     XmlRpcAnswer{XmlRpcFault{101'004, "there is a session"}}}) {
+  for (const XmlRpcAnswer& answer :
+       {XmlRpcAnswer{XmlRpcValue{"O3D303"}}, XmlRpcAnswer{XmlRpcValue{""}},
+        XmlRpcAnswer{XmlRpcFault{101'004, "there is a session"}}}) {
     const auto back = readXmlRpcAnswer(encodeXmlRpc(answer));
     ASSERT_TRUE(back.ok()) << back.error().message;
     EXPECT_EQ(*back, answer);
@@ -234,14 +237,18 @@ TEST(XmlRpc, WhatIsNoMessageIsToldApart) {
 
 Bytes exampleFrame() {
   Bytes content = bytesOf("star");
-  for (const ChunkType type : {ChunkType::RadialDistance, ChunkType::Amplitude, ChunkType::Confidence}) {
+  for (const ChunkType type :
+       {ChunkType::RadialDistance, ChunkType::Amplitude, ChunkType::Confidence}) {
     const bool is_byte = type == ChunkType::Confidence;
-    appendChunk(content,
-                {.type = type, .width = 4, .height = 3,
-                 .format = is_byte ? ElementFormat::U8 : ElementFormat::U16,
-                 .time = ChunkHeader::Time{1, 2},
-                 .attributes = type == ChunkType::Amplitude ? R"({"AmplitudeResolution":0.5})" : ""},
-                Bytes(is_byte ? 12 : 24, std::byte{1}));
+    appendChunk(
+        content,
+        {.type = type,
+         .width = 4,
+         .height = 3,
+         .format = is_byte ? ElementFormat::U8 : ElementFormat::U16,
+         .time = ChunkHeader::Time{1, 2},
+         .attributes = type == ChunkType::Amplitude ? R"({"AmplitudeResolution":0.5})" : ""},
+        Bytes(is_byte ? 12 : 24, std::byte{1}));
   }
   appendText(content, "temp_illu");
   appendNumber(content, 40.0F);
@@ -253,7 +260,8 @@ TEST(HostileBytes, NeverBringTheReadersDown) {
   constexpr std::uint64_t kSeed = 20'263;
   RecordProperty("seed", fmt::format("{}", kSeed));
   const std::vector<Bytes> seeds{
-      encodePcic(kFrameTicket, exampleFrame()), exampleFrame(),
+      encodePcic(kFrameTicket, exampleFrame()),
+      exampleFrame(),
       encodePcic("1000", schemaCommand(toJson(schemaOf({kDistanceBlob})))),
       bytesOf(toJson(schemaOf({kDistanceBlob}))),
       bytesOf(encodeXmlRpc(XmlRpcCall{"getParameter", {"x", XmlRpcValue::Array{1, 2.0}}})),
@@ -267,9 +275,15 @@ TEST(HostileBytes, NeverBringTheReadersDown) {
     for (std::size_t left = 1 + below(5); left > 0 && !bytes.empty(); --left) {
       const std::size_t at = below(bytes.size());
       switch (below(4)) {
-        case 0: bytes[at] ^= std::byte{1} << below(8); break;
-        case 1: bytes[at] = static_cast<std::byte>(random()); break;
-        case 2: bytes.resize(at); break;
+        case 0:
+          bytes[at] ^= std::byte{1} << below(8);
+          break;
+        case 1:
+          bytes[at] = static_cast<std::byte>(random());
+          break;
+        case 2:
+          bytes.resize(at);
+          break;
         default: {
           const Bytes tail{bytes.begin() + static_cast<std::ptrdiff_t>(at), bytes.end()};
           bytes.insert(bytes.end(), tail.begin(), tail.end());

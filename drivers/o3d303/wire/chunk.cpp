@@ -17,9 +17,7 @@ constexpr std::size_t kHeaderSizeV1 = 40, kHeaderSizeV2 = 48;
 constexpr std::uint32_t kMostPixelsPerSide = 8192;
 constexpr std::size_t kMostHeader = 65'536;
 
-Error malformed(std::string what) {
-  return {Error::Code::Malformed, "chunk: " + std::move(what)};
-}
+Error malformed(std::string what) { return {Error::Code::Malformed, "chunk: " + std::move(what)}; }
 
 ChunkHeader readHeader(std::span<const std::byte> bytes, std::size_t header_size) {
   const auto at = [&](std::size_t place) { return numberAt<std::uint32_t>(bytes, place); };
@@ -54,8 +52,9 @@ Result<ChunkInBytes> readChunk(std::span<const std::byte> bytes) {
   const std::size_t least = version >= 2 ? kHeaderSizeV2 : kHeaderSizeV1;
   if (version < 1 || header_size < least || header_size > kMostHeader || header_size > chunk_size ||
       chunk_size > bytes.size()) {
-    return malformed(fmt::format("a header of version {} and {} bytes in a chunk of {}, of which {} are there",
-                                 version, header_size, chunk_size, bytes.size()));
+    return malformed(
+        fmt::format("a header of version {} and {} bytes in a chunk of {}, of which {} are there",
+                    version, header_size, chunk_size, bytes.size()));
   }
   Chunk chunk{.header = readHeader(bytes, header_size),
               .data = bytes.subspan(header_size, chunk_size - header_size)};
@@ -69,7 +68,8 @@ Result<ChunkInBytes> readChunk(std::span<const std::byte> bytes) {
     return malformed(fmt::format("an image of {} x {}", header.width, header.height));
   }
   // The newest firmware gives its info chunk the image's width and height although it is no image;
-  // so whether the data holds as many elements is checked where it is read as an image (frame_content.cpp).
+  // so whether the data holds as many elements is checked where it is read as an image
+  // (frame_content.cpp).
   return ChunkInBytes{std::move(chunk), chunk_size};
 }
 

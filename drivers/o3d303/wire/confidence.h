@@ -10,11 +10,11 @@ namespace toftwin::o3d303 {
 enum class Confidence : std::uint8_t {
   Invalid = 1 << 0,
   Saturated = 1 << 1,
-  Asymmetric = 1 << 2,    ///< the two taps contradict each other: motion
+  Asymmetric = 1 << 2,  ///< the two taps contradict each other: motion
   LowAmplitude = 1 << 3,
-  Exposure = 3 << 4,      ///< which of the exposures was used: a number, no flag
-  Clipped = 1 << 6,       ///< outside of the box or the region that the user set
-  Suspect = 1 << 7,       ///< the camera does not say why
+  Exposure = 3 << 4,  ///< which of the exposures was used: a number, no flag
+  Clipped = 1 << 6,   ///< outside of the box or the region that the user set
+  Suspect = 1 << 7,   ///< the camera does not say why
 };
 
 /// PixelFlag bits. Clipped becomes OutOfRange and Suspect UnwrapUnreliable: what most often makes a

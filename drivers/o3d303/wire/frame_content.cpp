@@ -13,9 +13,7 @@ namespace {
 constexpr std::size_t kMostChunks = 64;
 constexpr float kMetresPerMillimetre = 1e-3F;
 
-Error malformed(std::string what) {
-  return {Error::Code::Malformed, "frame: " + std::move(what)};
-}
+Error malformed(std::string what) { return {Error::Code::Malformed, "frame: " + std::move(what)}; }
 
 /// Width times height, if the image has pixels and the data has as many elements.
 Result<std::size_t> pixelsOf(const Chunk& chunk) {
@@ -65,7 +63,8 @@ const Chunk* FrameContent::find(ChunkType type) const {
 
 Result<FrameContent> readFrameContent(std::span<const std::byte> content) {
   FrameContent frame;
-  if (!textOf(content).starts_with(kFrameBegin)) return malformed("it does not begin with \"star\"");
+  if (!textOf(content).starts_with(kFrameBegin))
+    return malformed("it does not begin with \"star\"");
   auto rest = content.subspan(kFrameBegin.size());
   while (textOf(rest) != kFrameEnd) {
     const auto exposures = readMarked(kExposuresMarker, rest, frame.exposures_us);
@@ -86,9 +85,10 @@ Result<Image<float>> rangeOf(const Chunk& chunk) {
   auto image = numbersOf(chunk);
   if (!image) return image;
   const bool is_metres = chunk.header.format == ElementFormat::F32;
-  const float unit_m = is_metres ? 1.0F
-                                 : static_cast<float>(distanceResolution(chunk.header)
-                                                          .value_or(kMetresPerMillimetre));
+  const float unit_m =
+      is_metres
+          ? 1.0F
+          : static_cast<float>(distanceResolution(chunk.header).value_or(kMetresPerMillimetre));
   for (float& range_m : image->pixels()) {
     const bool has_value = std::isfinite(range_m) && range_m > 0.0F;
     range_m = has_value ? range_m * unit_m : std::numeric_limits<float>::quiet_NaN();
@@ -100,12 +100,23 @@ Result<Image<float>> numbersOf(const Chunk& chunk) {
   if (const auto pixels = pixelsOf(chunk); !pixels) return pixels.error();
   Image<float> image{static_cast<int>(chunk.header.width), static_cast<int>(chunk.header.height)};
   switch (chunk.header.format) {
-    case ElementFormat::U8: copyNumbers<std::uint8_t>(chunk, image); break;
-    case ElementFormat::U16: copyNumbers<std::uint16_t>(chunk, image); break;
-    case ElementFormat::S16: copyNumbers<std::int16_t>(chunk, image); break;
-    case ElementFormat::U32: copyNumbers<std::uint32_t>(chunk, image); break;
-    case ElementFormat::F32: copyNumbers<float>(chunk, image); break;
-    default: return unexpectedFormat(chunk);
+    case ElementFormat::U8:
+      copyNumbers<std::uint8_t>(chunk, image);
+      break;
+    case ElementFormat::U16:
+      copyNumbers<std::uint16_t>(chunk, image);
+      break;
+    case ElementFormat::S16:
+      copyNumbers<std::int16_t>(chunk, image);
+      break;
+    case ElementFormat::U32:
+      copyNumbers<std::uint32_t>(chunk, image);
+      break;
+    case ElementFormat::F32:
+      copyNumbers<float>(chunk, image);
+      break;
+    default:
+      return unexpectedFormat(chunk);
   }
   return image;
 }

@@ -18,8 +18,10 @@ using Type = SchemaElement::Type;
 
 constexpr std::size_t kLongest = 65'536;
 constexpr int kDeepest = 8;  // the JSON reader recurses: deeper texts would end on the stack
-constexpr std::array<std::pair<Type, std::string_view>, 4> kTypes{
-    {{Type::Text, "string"}, {Type::Blob, "blob"}, {Type::UInt32, "uint32"}, {Type::Float32, "float32"}}};
+constexpr std::array<std::pair<Type, std::string_view>, 4> kTypes{{{Type::Text, "string"},
+                                                                   {Type::Blob, "blob"},
+                                                                   {Type::UInt32, "uint32"},
+                                                                   {Type::Float32, "float32"}}};
 
 std::string_view nameOf(Type type) {
   for (const auto& [known, name] : kTypes) {
@@ -71,7 +73,8 @@ Schema schemaOf(const std::vector<std::string_view>& blobs) {
   schema.push_back({Type::Text, "temp_illu_marker", std::string{kIlluminationMarker}});
   schema.push_back({Type::Float32, "temp_illu", {}});
   schema.push_back({Type::Text, "exposure_times", std::string{kExposuresMarker}});
-  for (int i = 1; i <= 3; ++i) schema.push_back({Type::UInt32, fmt::format("exposure_time_{}", i), {}});
+  for (int i = 1; i <= 3; ++i)
+    schema.push_back({Type::UInt32, fmt::format("exposure_time_{}", i), {}});
   schema.push_back({Type::Text, "end_string", std::string{kFrameEnd}});
   return schema;
 }
@@ -87,7 +90,8 @@ std::string toJson(const Schema& schema) {
     }
     elements += '}';
   }
-  return R"({"layouter":"flexible","format":{"dataencoding":"ascii"},"elements":[)" + elements + "]}";
+  return R"({"layouter":"flexible","format":{"dataencoding":"ascii"},"elements":[)" + elements +
+         "]}";
 }
 
 Result<Schema> readSchema(std::string_view json) {

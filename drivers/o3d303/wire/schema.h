@@ -22,8 +22,8 @@ using Schema = std::vector<SchemaElement>;
 /// Blobs that a camera can be asked for.
 inline constexpr std::string_view kDistanceBlob = "distance_image",
                                   kAmplitudeBlob = "normalized_amplitude_image",
-                                  kRawAmplitudeBlob = "amplitude_image",
-                                  kXBlob = "x_image", kYBlob = "y_image", kZBlob = "z_image",
+                                  kRawAmplitudeBlob = "amplitude_image", kXBlob = "x_image",
+                                  kYBlob = "y_image", kZBlob = "z_image",
                                   kConfidenceBlob = "confidence_image",
                                   kDiagnosticBlob = "diagnostic_data",
                                   kUnitVectorsBlob = "all_unit_vector_matrices",

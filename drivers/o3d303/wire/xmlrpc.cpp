@@ -62,7 +62,8 @@ Error malformed(std::string what) {
   return {Error::Code::Malformed, "XML-RPC: " + std::move(what)};
 }
 
-Result<pugi::xml_node> rootOf(pugi::xml_document& document, std::string_view xml, const char* name) {
+Result<pugi::xml_node> rootOf(pugi::xml_document& document, std::string_view xml,
+                              const char* name) {
   // Text of white space alone is a value, too; entities of the document's own are never resolved.
   const auto parsed = document.load_buffer(xml.data(), xml.size(),
                                            pugi::parse_default | pugi::parse_ws_pcdata_single);
@@ -125,12 +126,12 @@ Result<XmlRpcValue> readValue(const pugi::xml_node& value, int depth) {
 }  // namespace
 
 std::string XmlRpcValue::text() const {
-  return std::visit(Overloaded{[](const std::string& s) { return s; },
-                               [](int i) { return std::to_string(i); },
-                               [](bool b) { return std::string{b ? "true" : "false"}; },
-                               [](double d) { return fmt::format("{}", d); },
-                               [](const auto&) { return std::string{}; }},
-                    value);
+  return std::visit(
+      Overloaded{[](const std::string& s) { return s; }, [](int i) { return std::to_string(i); },
+                 [](bool b) { return std::string{b ? "true" : "false"}; },
+                 [](double d) { return fmt::format("{}", d); },
+                 [](const auto&) { return std::string{}; }},
+      value);
 }
 
 std::string XmlRpcValue::textAt(std::string_view member) const {
@@ -155,8 +156,8 @@ std::string encodeXmlRpc(const XmlRpcAnswer& answer) {
   pugi::xml_document document;
   pugi::xml_node root = document.append_child("methodResponse");
   if (const auto* fault = std::get_if<XmlRpcFault>(&answer)) {
-    write(root.append_child("fault"), XmlRpcValue::Struct{{"faultCode", fault->code},
-                                                          {"faultString", fault->text}});
+    write(root.append_child("fault"),
+          XmlRpcValue::Struct{{"faultCode", fault->code}, {"faultString", fault->text}});
   } else {
     write(root.append_child("params").append_child("param"), std::get<XmlRpcValue>(answer));
   }
@@ -182,9 +183,8 @@ Result<XmlRpcAnswer> readXmlRpcAnswer(std::string_view xml) {
   const auto root = rootOf(document, xml, "methodResponse");
   if (!root) return root.error();
   const pugi::xml_node fault = root->child("fault");
-  auto value = readValue(fault ? fault.child("value")
-                               : root->child("params").child("param").child("value"),
-                         0);
+  auto value = readValue(
+      fault ? fault.child("value") : root->child("params").child("param").child("value"), 0);
   if (!value) return value.error();
   if (!fault) return XmlRpcAnswer{*std::move(value)};
   const auto code = readNumber<int>(value->textAt("faultCode"));

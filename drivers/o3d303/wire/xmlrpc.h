@@ -21,10 +21,12 @@ struct XmlRpcValue {
 
   XmlRpcValue() = default;
   template <class T>
-    requires(std::same_as<T, std::string> || std::same_as<T, int> || std::same_as<T, bool> ||
-             std::same_as<T, double> || std::same_as<T, Array> || std::same_as<T, Struct>)
-  XmlRpcValue(T held) : value(std::move(held)) {}  // NOLINT(google-explicit-constructor)
-  XmlRpcValue(const char* text) : value(std::string{text}) {}  // NOLINT(google-explicit-constructor)
+  requires(std::same_as<T, std::string> || std::same_as<T, int> || std::same_as<T, bool> ||
+           std::same_as<T, double> || std::same_as<T, Array> || std::same_as<T, Struct>)
+      XmlRpcValue(T held)
+      : value(std::move(held)) {}  // NOLINT(google-explicit-constructor)
+  XmlRpcValue(const char* text)
+      : value(std::string{text}) {}  // NOLINT(google-explicit-constructor)
 
   bool operator==(const XmlRpcValue&) const = default;
   /// The member of that name as text (numbers too), empty if there is none.

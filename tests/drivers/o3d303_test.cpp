@@ -1,0 +1,371 @@
+// SPDX-License-Identifier: Apache-2.0
+// The driver against the emulated camera, over real sockets.
+#include "drivers/o3d303/o3d303.h"
+
+#include <gtest/gtest.h>
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <filesystem>
+#include <future>
+#include <thread>
+
+#include "drivers/compliance.h"
+#include "drivers/o3d303/wire/confidence.h"
+#include "emulated_o3d303.h"
+
+namespace toftwin::drivers::o3d303 {
+namespace {
+
+using std::chrono::milliseconds;
+using test::EmulatedO3d303;
+using test::O3d303Device;
+
+Result<std::unique_ptr<Source>> openWith(const EmulatedO3d303& camera,
+                                         const std::string& keys = {}) {
+  auto table =
+      settings::Table::parse(fmt::format("uri = '{}'\n{}", camera.uri(), keys), "o3d303.toml");
+  return row().open(*table);
+}
+
+/// The camera opened and started, or the test has failed.
+std::unique_ptr<Source> started(const EmulatedO3d303& camera, const std::string& keys = {}) {
+  auto opened = openWith(camera, keys);
+  EXPECT_TRUE(opened.ok()) << opened.error().message;
+  if (!opened) return nullptr;
+  const auto begun = (*opened)->start();
+  EXPECT_TRUE(begun.ok()) << begun.error().message;
+  return begun ? *std::move(opened) : nullptr;
+}
+
+/// The next frame or error; a Timeout or an unreadable frame is asked again.
+Result<Frame> nextFrame(Source& source) {
+  for (int i = 0; i < 100; ++i) {
+    Result<Frame> frame = source.next({}, false);
+    const bool is_passing = !frame && (frame.error().code == Error::Code::Timeout ||
+                                       frame.error().code == Error::Code::Malformed);
+    if (!is_passing) return frame;
+  }
+  return Error{Error::Code::Timeout, "no frame for long"};
+}
+
+EmulatedO3d303::Options fast() { return {.schedule = test::FrameSchedule{milliseconds{5}}}; }
+
+TEST(O3d303, AFrameIsWhatTheCameraSentInOurUnits) {
+  EmulatedO3d303 camera{fast()};
+  const auto source = started(camera);
+  ASSERT_NE(source, nullptr);
+  const auto frame = nextFrame(*source);
+  ASSERT_TRUE(frame.ok()) << frame.error().message;
+  const auto range_m = frame->find(PlaneKind::Range)->as<float>();
+  const auto depth_m = frame->find(PlaneKind::Depth)->as<float>();
+  const auto amplitude = frame->find(PlaneKind::Amplitude)->as<float>();
+  const auto flags = frame->find(PlaneKind::Flags)->as<std::uint8_t>();
+  // Which frame it is stands in any pixel with a value.
+  const std::size_t far = EmulatedO3d303::kWidth * EmulatedO3d303::kHeight - 1;
+  const auto last = static_cast<unsigned>(std::lround(range_m[far] * 1000.0F));
+  const unsigned shift =
+      ((last - 1000) / 10 + 512 - (EmulatedO3d303::kWidth + EmulatedO3d303::kHeight - 2)) % 256;
+  std::size_t i = 0;
+  for (std::uint32_t y = 0; y < EmulatedO3d303::kHeight; ++y) {
+    for (std::uint32_t x = 0; x < EmulatedO3d303::kWidth; ++x, ++i) {
+      const auto sent = EmulatedO3d303::pixelAt(shift, x, y);
+      const bool has_value = sent.distance_mm > 0 && (sent.confidence & 1U) == 0;
+      ASSERT_EQ(amplitude[i], static_cast<float>(sent.amplitude));
+      ASSERT_EQ(flags[i], toftwin::o3d303::flagsOf(sent.confidence) | (has_value ? 0U : 1U));
+      if (!has_value) {
+        ASSERT_TRUE(std::isnan(range_m[i]) && std::isnan(depth_m[i]));
+        continue;
+      }
+      ASSERT_EQ(range_m[i], static_cast<float>(sent.distance_mm) * 1e-3F);
+      const Vec3d ray = rayThroughPixel(frame->camera, x, y).v;
+      ASSERT_NEAR(depth_m[i], range_m[i] * ray.z, 1e-5);
+    }
+  }
+  EXPECT_EQ(frame->moment.temperatures.at(0), (NamedTemperature{"illumination", 42.5_degC}));
+  EXPECT_EQ(frame->moment.temperatures.at(1).where, "processor");
+  EXPECT_EQ(frame->moment.temperatures.size(), 2u) << "3276.7 is no temperature";
+  EXPECT_NEAR(frame->moment.since_power_on->in(second), 1800.0, 30.0);
+  EXPECT_EQ(frame->moment.exposures.at(0).duration, 1000_us);
+  EXPECT_EQ(frame->moment.exposures.at(0).modulation, 30_MHz);
+}
+
+// The rays come as floats: 6e-8 of at most 1, on 153 pixels, is 1e-5 pixels per ray.
+TEST(O3d303, TheLensIsFoundFromTheUnitVectors) {
+  EmulatedO3d303 camera{fast()};
+  const auto opened = openWith(camera);
+  ASSERT_TRUE(opened.ok()) << opened.error().message;
+  const CameraInfo& lens = (*opened)->info().camera;
+  EXPECT_NEAR(lens.fx, EmulatedO3d303::kFocalLength_px, 1e-4);
+  EXPECT_NEAR(lens.fy, EmulatedO3d303::kFocalLength_px, 1e-4);
+  EXPECT_NEAR(lens.cx, (EmulatedO3d303::kWidth - 1) / 2.0, 1e-4);
+  EXPECT_NEAR(lens.cy, (EmulatedO3d303::kHeight - 1) / 2.0, 1e-4);
+  EXPECT_EQ(lens.calibration_id.size(), 32u);
+}
+
+void expectCompliant(const EmulatedO3d303& camera, const std::string& keys) {
+  const Driver driver = row();
+  const Candidate candidate{.driver = &driver,
+                            .keys = fmt::format("uri = '{}'\n{}", camera.uri(), keys),
+                            .absent_keys = "uri = 'o3d303:127.0.0.1:1'",
+                            .absent_name = "127.0.0.1:1"};
+  for (const Finding& finding : checkCompliance(candidate)) {
+    EXPECT_NE(finding.outcome, Finding::Outcome::Failed)
+        << finding.check << ", because " << finding.because << "\n  " << finding.detail;
+  }
+}
+
+TEST(O3d303, IsCompliantInFreeRun) {
+  EmulatedO3d303 camera;
+  expectCompliant(camera, "trigger = 'free_run'");
+}
+
+TEST(O3d303, IsCompliantWhenTriggered) {
+  EmulatedO3d303 camera;
+  expectCompliant(camera, "trigger = 'software'");
+}
+
+TEST(O3d303, KeysAreWrittenToTheCameraOnceAndReadBack) {
+  EmulatedO3d303 camera{fast()};
+  const std::string keys =
+      "trigger = 'software'\nexposure_us = 1234\nmeasuring_range = 'up_to_30m'\n"
+      "exposures = 'moderate'\nframe_rate_hz = 12.5\nchannel = 2";
+  for (int round = 0; round < 2; ++round) {
+    auto opened = openWith(camera, keys);
+    ASSERT_TRUE(opened.ok()) << opened.error().message;
+    EXPECT_TRUE((*opened)->info().can_trigger);
+    EXPECT_EQ((*opened)->state().parameters.at(0).value, 1234.0);
+    camera.withDevice([](O3d303Device& device) {
+      EXPECT_EQ(device.imager("ExposureTime"), 1234.0);
+      EXPECT_EQ(device.imager("FrameRate"), 12.5);
+      EXPECT_EQ(device.imager("Channel"), 2.0);
+      EXPECT_FALSE(device.isFreeRunning());
+      EXPECT_FALSE(device.isEditing());
+      EXPECT_EQ(device.saves(), 1) << "the second time all is as wanted";
+    });
+  }
+}
+
+TEST(O3d303, AParameterIsSetWhileItStreams) {
+  EmulatedO3d303 camera{fast()};
+  const auto source = started(camera);
+  ASSERT_NE(source, nullptr);
+  ASSERT_TRUE(nextFrame(*source).ok());
+  ASSERT_TRUE(source->setParameter("exposure_us", 321).ok());
+  Result<Frame> frame = nextFrame(*source);
+  for (int i = 0; i < 50 && frame && frame->moment.exposures[0].duration != 321_us; ++i) {
+    frame = nextFrame(*source);
+  }
+  ASSERT_TRUE(frame.ok()) << frame.error().message;
+  EXPECT_EQ(frame->moment.exposures[0].duration, 321_us);
+  EXPECT_FALSE(source->setParameter("exposure_us", 0).ok());
+  EXPECT_FALSE(source->setParameter("exposure_us", 1.5).ok());
+}
+
+TEST(O3d303, WhoeverConfiguresTheCameraIsNamedAsTheReason) {
+  EmulatedO3d303 camera{fast()};
+  camera.withDevice([](O3d303Device& device) {
+    device.answer("/api/rpc/v1/com.ifm.efector/", {"requestSession", {"", "somebody"}});
+  });
+  const auto opened = openWith(camera);
+  ASSERT_FALSE(opened.ok());
+  EXPECT_EQ(opened.error().code, Error::Code::Busy);
+  EXPECT_NE(opened.error().message.find("another program"), std::string::npos);
+}
+
+TEST(O3d303, LostFramesAreCountedByTheCamerasCount) {
+  EmulatedO3d303 camera;
+  const auto source = started(camera);
+  ASSERT_NE(source, nullptr);
+  ASSERT_TRUE(nextFrame(*source).ok());
+  camera.loseFrames(3);
+  std::uint64_t lost = 0;
+  for (int i = 0; i < 8; ++i) {
+    const auto frame = nextFrame(*source);
+    ASSERT_TRUE(frame.ok()) << frame.error().message;
+    lost += frame->dropped_by_device;
+  }
+  EXPECT_EQ(lost, 3u);
+}
+
+TEST(O3d303, FramesThatCannotBeReadAreCountedAndTheStreamGoesOn) {
+  EmulatedO3d303 camera;
+  const auto source = started(camera);
+  ASSERT_NE(source, nullptr);
+  ASSERT_TRUE(nextFrame(*source).ok());
+  camera.corrupt(3);
+  std::uint64_t lost = 0;
+  for (int i = 0; i < 8; ++i) {
+    const auto frame = nextFrame(*source);
+    ASSERT_TRUE(frame.ok()) << frame.error().message;
+    lost += frame->dropped_by_device;
+  }
+  EXPECT_EQ(lost, 3u);
+}
+
+TEST(O3d303, AStreamThatLostItsFramingIsDisconnected) {
+  EmulatedO3d303 camera{fast()};
+  const auto source = started(camera);
+  ASSERT_NE(source, nullptr);
+  camera.corrupt(1, true);
+  Result<Frame> frame = nextFrame(*source);
+  for (int i = 0; i < 100 && frame; ++i) frame = nextFrame(*source);
+  ASSERT_FALSE(frame.ok());
+  EXPECT_EQ(frame.error().code, Error::Code::Disconnected);
+}
+
+TEST(O3d303, ACameraThatHangsIsDisconnected) {
+  for (const char* trigger : {"free_run", "software"}) {
+    EmulatedO3d303 camera;
+    const auto source = started(camera, fmt::format("trigger = '{}'", trigger));
+    ASSERT_NE(source, nullptr);
+    camera.hang();
+    Result<Frame> frame = nextFrame(*source);
+    for (int i = 0; i < 100 && frame; ++i) frame = nextFrame(*source);
+    ASSERT_FALSE(frame.ok());
+    EXPECT_EQ(frame.error().code, Error::Code::Disconnected) << frame.error().message;
+  }
+}
+
+TEST(O3d303, ACableThatIsPulledIsDisconnected) {
+  EmulatedO3d303 camera;
+  const auto source = started(camera);
+  ASSERT_NE(source, nullptr);
+  camera.unplug();
+  Result<Frame> frame = nextFrame(*source);
+  for (int i = 0; i < 100 && frame; ++i) frame = nextFrame(*source);
+  ASSERT_FALSE(frame.ok());
+  EXPECT_EQ(frame.error().code, Error::Code::Disconnected);
+  EXPECT_EQ(openWith(camera).error().code, Error::Code::Disconnected);
+  camera.plugIn();
+  EXPECT_TRUE(openWith(camera).ok());
+}
+
+TEST(O3d303, ATriggeredFrameComesToEveryTrigger) {
+  EmulatedO3d303 camera;
+  const auto source = started(camera, "trigger = 'software'");
+  ASSERT_NE(source, nullptr);
+  for (int i = 0; i < 5; ++i) {
+    ASSERT_TRUE(source->trigger().ok());
+    const auto frame = nextFrame(*source);
+    ASSERT_TRUE(frame.ok()) << frame.error().message;
+    EXPECT_EQ(frame->dropped_by_device, 0u);
+  }
+}
+
+TEST(O3d303, AnAddressThatIsNoneIsComplainedAboutBeforeAnythingIsOpened) {
+  for (const char* uri :
+       {"o3d303:", "o3d303:camera", "192.168.0.69", "o3d303:1.2.3.4:x", "o3d303:1.2.3.4:0"}) {
+    auto table = settings::Table::parse(fmt::format("uri = '{}'", uri), "o3d303.toml");
+    const auto opened = row().open(*table);
+    ASSERT_FALSE(opened.ok()) << uri;
+    EXPECT_NE(opened.error().message.find(uri), std::string::npos);
+  }
+}
+
+// ---- clocks ------------------------------------------------------------------------------------
+
+TEST(O3d303, ItsClocksOffsetIsFoundAndASetClockDoesNotShow) {
+  EmulatedO3d303 camera{{.schedule = test::FrameSchedule{milliseconds{10}}, .clock_skew = 50e-6}};
+  const auto source = started(camera, "delay_ms = 0.001");
+  ASSERT_NE(source, nullptr);
+  const auto hostMinusStamp = [&](const Frame& frame) {
+    // Frames leave the emulator when they are stamped: host time of the stamp is now, or a bit
+    // before.
+    const auto now = std::chrono::system_clock::now().time_since_epoch();
+    return std::chrono::duration_cast<std::chrono::nanoseconds>(now).count() -
+           frame.moment.exposures[0].start.ns;
+  };
+  std::optional<std::int64_t> least;
+  Result<Frame> frame = nextFrame(*source);
+  std::int64_t last = 0;
+  for (int i = 0; i < 60 && frame; ++i, frame = nextFrame(*source)) {
+    if (i == 40) camera.setClock(std::chrono::hours{-1});
+    EXPECT_GT(frame->moment.exposures[0].start.ns, last);
+    last = frame->moment.exposures[0].start.ns;
+    least = std::min(least.value_or(hostMinusStamp(*frame)), hostMinusStamp(*frame));
+    if (i < 7) {
+      EXPECT_EQ(frame->moment.clock.uncertainty_ns, -1) << i;
+    } else {
+      EXPECT_GT(frame->moment.clock.uncertainty_ns, 0);
+    }
+  }
+  ASSERT_TRUE(frame.ok()) << frame.error().message;
+  // The least difference seen is the true offset plus the shortest way here, which is some
+  // milliseconds on a busy machine; an error of the arithmetic would be hours.
+  EXPECT_NEAR(static_cast<double>(frame->moment.clock.host_minus_device_ns - *least), 0.0, 100e6);
+}
+
+// ---- leaks -------------------------------------------------------------------------------------
+
+std::ptrdiff_t entriesOf(const char* folder) {
+  return std::distance(std::filesystem::directory_iterator{folder}, {});
+}
+
+/// The emulator closes its ends when it gets to it.
+void waitForConnections(EmulatedO3d303& camera, int wanted) {
+  for (int i = 0; i < 10'000 && camera.connections() > wanted; ++i) std::this_thread::yield();
+}
+
+TEST(O3d303, TenThousandStartsAndStopsLeakNeitherFilesNorThreads) {
+  EmulatedO3d303 camera;
+  const auto opened = openWith(camera);
+  ASSERT_TRUE(opened.ok()) << opened.error().message;
+  Source& source = **opened;
+  ASSERT_TRUE(source.start().ok());
+  waitForConnections(camera, 1);
+  const auto files = entriesOf("/proc/self/fd"), threads = entriesOf("/proc/self/task");
+  for (int i = 0; i < 10'000; ++i) {
+    source.stop();
+    const auto begun = source.start();
+    ASSERT_TRUE(begun.ok()) << "start " << i << ": " << begun.error().message;
+  }
+  EXPECT_TRUE(nextFrame(source).ok());
+  waitForConnections(camera, 1);
+  EXPECT_EQ(entriesOf("/proc/self/fd"), files);
+  EXPECT_EQ(entriesOf("/proc/self/task"), threads);
+}
+
+TEST(O3d303, OpeningAndClosingLeaksNeitherFilesNorThreads) {
+  EmulatedO3d303 camera{fast()};
+  const auto files = entriesOf("/proc/self/fd"), threads = entriesOf("/proc/self/task");
+  for (int i = 0; i < 50; ++i) ASSERT_NE(started(camera), nullptr);
+  waitForConnections(camera, 0);
+  EXPECT_EQ(entriesOf("/proc/self/fd"), files);
+  EXPECT_EQ(entriesOf("/proc/self/task"), threads);
+}
+
+// ---- the emulator ------------------------------------------------------------------------------
+
+TEST(FrameSchedule, RepeatsMeasuredIntervalsAndStampsEvenly) {
+  const std::filesystem::path data = std::getenv("TOFTWIN_DATA") != nullptr
+                                         ? std::getenv("TOFTWIN_DATA")
+                                         : std::string{TOFTWIN_SOURCE_DIR} + "/../shared/data";
+  auto schedule =
+      test::FrameSchedule::fromFile(data / "ifm-frame-timing/libo3d3xx_jitter-5000-20-8.txt");
+  if (!schedule) {
+    schedule = test::FrameSchedule::fromFile(
+        std::string{TOFTWIN_SOURCE_DIR} +
+        "/../../shared/data/ifm-frame-timing/libo3d3xx_jitter-5000-20-8.txt");
+  }
+  if (!schedule) GTEST_SKIP() << "no ifm-frame-timing in $TOFTWIN_DATA or ../shared/data";
+  // Mean and standard deviation as whoever prepared the data says: 50.0 and 0.5 ms.
+  double sum_ms = 0.0, squares = 0.0;
+  for (std::uint64_t i = 0; i < 1000; ++i) {
+    const std::chrono::duration<double, std::milli> interval =
+        schedule->leaves(i + 1) - schedule->leaves(i);
+    sum_ms += interval.count();
+    squares += interval.count() * interval.count();
+    EXPECT_LE(schedule->stamped(i), schedule->leaves(i));
+    const std::chrono::duration<double, std::milli> even =
+        schedule->stamped(i + 1) - schedule->stamped(i);
+    EXPECT_NEAR(even.count(), 49.989, 0.001);
+  }
+  const double mean_ms = sum_ms / 1000.0;
+  EXPECT_NEAR(mean_ms, 50.0, 0.05);
+  EXPECT_NEAR(std::sqrt(squares / 1000.0 - mean_ms * mean_ms), 0.5, 0.05);
+}
+
+}  // namespace
+}  // namespace toftwin::drivers::o3d303
