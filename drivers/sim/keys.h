@@ -26,6 +26,8 @@ struct Keys {
   std::uint64_t frames = 0;
   std::array<double, 3> position_m{};
   std::array<double, 3> euler_deg{};
+  std::array<double, 3> velocity_m_per_s{};
+  std::array<double, 3> rotation_rate_deg_per_s{};
   Duration powered_on_before = 10'800_s;
   Temperature room_temperature = 23_degC;
   Illuminance ambient = 0_klx;
@@ -57,6 +59,10 @@ struct Keys {
     v.numbers("euler_deg", euler_deg, {-360.0, 360.0},
               "how it is turned: about the fixed world axes x, then y, then z; 0: it looks along "
               "z, y down");
+    v.numbers("velocity_m_per_s", velocity_m_per_s, {-1e4, 1e4},
+              "how fast the camera moves in the world; its pose is that at device time 0");
+    v.numbers("rotation_rate_deg_per_s", rotation_rate_deg_per_s, {-36000.0, 36000.0},
+              "how fast it turns about its lens: a vector along the axis, in the world");
     v.quantity("powered_on_before", powered_on_before, second, {0.0, 1e9},
                "how long before its first frame the camera was switched on; three hours: warm");
     v.quantity("room_temperature", room_temperature, celsius, {-40.0, 100.0},

@@ -14,6 +14,7 @@
 #include "drivers/sim/keys.h"
 #include "drivers/sim/view.h"
 #include "protocol/settings/describe.h"
+#include "sim/sensor/collect_moving.h"
 #include "sim/sensor/frame_assembly.h"
 #include "sim/sensor/sensor_model.h"
 
@@ -33,6 +34,15 @@ Transform<World, Camera> startPose(const Keys& keys) {
                                    rotation<World, Camera>({1, 0, 0}, x * kToRadian));
   pose.translation_m = {keys.position_m[0], keys.position_m[1], keys.position_m[2]};
   return pose;
+}
+
+sim::Motion motionOf(const Keys& keys) {
+  const auto& [vx, vy, vz] = keys.velocity_m_per_s;
+  const auto& [x, y, z] = keys.rotation_rate_deg_per_s;
+  sim::Motion motion;
+  motion.velocity_m_per_s = {vx, vy, vz};
+  motion.rotation_rad_per_s = Vec3d{x, y, z} * degree.in_si;
+  return motion;
 }
 
 SourceInfo describe(const Keys& keys, const sim::SensorModel& model,
@@ -98,12 +108,13 @@ class SimulatedSource final : public Source {
     const Error stopped{Error::Code::Stopped, "asked to stop"};
     // Light first: after a new pose it takes long, and the pace then counts what a camera would
     // have delivered meanwhile as lost.
-    if (!view_.complete(stop)) return stopped;
+    if (!view_.changesWithTime() && !view_.complete(stop)) return stopped;
     Frame frame;
     const auto lost = pacer_.waitForTurn(stop, lockstep);
     if (!lost) return lost.error();
     frame.dropped_by_device = *lost;
     frame.moment = momentOfFrame();
+    if (view_.changesWithTime() && !gatherMoving(frame.moment, stop)) return stopped;
     frame.provenance = sim::provenanceOf(model_, view_.scene().id(), keys_.seed);
     frame.camera = info_.camera;
     frame.planes = expose(frame.moment);
@@ -184,9 +195,21 @@ class SimulatedSource final : public Source {
     return {};
   }
 
+  /// Where things move or other cameras shine: light for each raw exposure at its own time. False if asked to stop before the end.
+  bool gatherMoving(const Moment& moment, const std::stop_token& stop) {
+    const std::size_t count = moment.exposures.size();
+    collected_ = sim::collectMoving(model_, moment, keys_.seed, pacer_.index(), [&](std::size_t e) -> const sim::Light* {
+      view_.moveTo(sim::middleOf(moment.exposures[e]), pacer_.index() * count + e);
+      if (!view_.complete(stop)) return nullptr;
+      if (e == count / 2) truth_of_middle_ = view_.light().truth;
+      return &view_.lightFor(moment.exposures[e]);
+    });
+    return collected_.has_value();
+  }
+
   /// The planes of the next frame: the light of the pose with this frame's noise.
   std::vector<Plane> expose(const Moment& moment) {
-    if (!collected_ || !model_.collectsTheSameEachFrame()) {
+    if (!view_.changesWithTime() && (!collected_ || !model_.collectsTheSameEachFrame())) {
       collected_ = model_.collect(view_.light(), moment, keys_.seed, pacer_.index());
     }
     const sim::History before{last_collected_ ? &*last_collected_ : nullptr,
@@ -197,7 +220,8 @@ class SimulatedSource final : public Source {
       last_collected_ = *collected_;
       last_range_ = exposed.range;
     }
-    return sim::planesOf(model_, std::move(exposed), view_.light().truth, info_.planes);
+    return sim::planesOf(model_, std::move(exposed), view_.changesWithTime() ? truth_of_middle_ : view_.light().truth,
+                         info_.planes);
   }
 
   [[nodiscard]] Duration deviceDuration() const {
@@ -212,7 +236,7 @@ class SimulatedSource final : public Source {
     moment.temperatures = model_.temperatures(room_temperature_, *moment.since_power_on);
     moment.temperatures.push_back({"room", room_temperature_});
     moment.ambient = ambient_;
-    moment.world_from_camera = view_.pose();
+    moment.world_from_camera = view_.poseAt(deviceDuration());
     return moment;
   }
 
@@ -221,6 +245,7 @@ class SimulatedSource final : public Source {
   SourceInfo info_;
   View view_;
   std::optional<sim::Samples> collected_;  ///< of the present pose and parameters, free of noise
+  sim::Truth truth_of_middle_;  ///< where things move: at the middle raw exposure
   /// Of the frame before, where an effect remembers it.
   std::optional<sim::Samples> last_collected_;
   std::optional<sim::RangeImage> last_range_;
@@ -301,7 +326,7 @@ Result<std::unique_ptr<Source>> open(settings::Table& table) {
   request.pixel_extent = keys.pixel_extent;
   request.seed = keys.seed;
   return std::unique_ptr<Source>{std::make_unique<SimulatedSource>(
-      keys, *std::move(model), View{*std::move(scene), std::move(request)}, std::move(planes))};
+      keys, *std::move(model), View{*std::move(scene), std::move(request), motionOf(keys)}, std::move(planes))};
 }
 
 std::vector<std::string> list() {

@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <utility>
 
+#include "sim/sensor/collect_moving.h"
+#include "sim/tracer/foreign.h"
+
 namespace toftwin::drivers::simulator {
 namespace {
 
@@ -16,8 +19,7 @@ void copyBand(const Image<T>& band, int first_row, Image<T>& whole, int height) 
 }
 
 template <class T>
-void copyBands(const std::vector<Image<T>>& bands, int first_row, std::vector<Image<T>>& whole,
-               int height) {
+void copyBands(const std::vector<Image<T>>& bands, int first_row, std::vector<Image<T>>& whole, int height) {
   whole.resize(bands.size());
   for (std::size_t i = 0; i < bands.size(); ++i) copyBand(bands[i], first_row, whole[i], height);
 }
@@ -36,24 +38,57 @@ void copyBand(const sim::Light& band, int first_row, sim::Light& whole, int heig
 
 }  // namespace
 
+void View::forget() {
+  own_.rows_done = 0;
+  for (Pass& pass : foreign_) pass.rows_done = 0;
+}
+
 void View::setPose(const Transform<World, Camera>& world_from_camera) {
-  if (world_from_camera == request_.world_from_camera) return;
-  request_.world_from_camera = world_from_camera;
-  rows_done_ = 0;
+  if (world_from_camera == pose_) return;
+  pose_ = request_.world_from_camera = world_from_camera;
+  forget();
+}
+
+void View::moveTo(Duration time, std::uint64_t number) {
+  if (!moves()) return;
+  constexpr std::uint64_t kGolden = 0x9e3779b97f4a7c15u;  // 2⁶⁴ / golden ratio
+  request_.world_from_camera = poseAt(time);
+  request_.seed = seed_ + (number + 1) * kGolden;
+  posed_ = scene_.at(time);
+  forget();
+}
+
+bool View::complete(const sim::TraceRequest& request, Pass& pass, const std::stop_token& stop) const {
+  const int height = request.camera.height;
+  while (pass.rows_done < height) {
+    if (stop.stop_requested()) return false;
+    sim::TraceRequest band = request;
+    band.region_y = pass.rows_done;
+    band.region_width = request.camera.width;
+    band.region_height = std::min(kRowsPerBand, height - pass.rows_done);
+    copyBand(sim::trace(posed_, band), pass.rows_done, pass.light, height);
+    pass.rows_done += band.region_height;
+  }
+  return true;
 }
 
 bool View::complete(const std::stop_token& stop) {
-  const int height = request_.camera.height;
-  while (rows_done_ < height) {
-    if (stop.stop_requested()) return false;
-    sim::TraceRequest band = request_;
-    band.region_y = rows_done_;
-    band.region_width = request_.camera.width;
-    band.region_height = std::min(kRowsPerBand, height - rows_done_);
-    copyBand(sim::trace(scene_, band), rows_done_, light_, height);
-    rows_done_ += band.region_height;
+  if (!complete(request_, own_, stop)) return false;
+  for (std::size_t i = 0; i < foreign_.size(); ++i) {
+    if (!complete(sim::foreignRequest(scene_.foreignEmitters()[i], request_), foreign_[i], stop))
+      return false;
   }
   return true;
+}
+
+const sim::Light& View::lightFor(const Exposure& exposure) {
+  if (foreign_.empty()) return own_.light;
+  mixed_ = own_.light;
+  for (std::size_t i = 0; i < foreign_.size(); ++i) {
+    sim::addForeignLight(scene_.foreignEmitters()[i], foreign_[i].light, exposure.modulation,
+                         sim::middleOf(exposure), exposure.duration, mixed_);
+  }
+  return mixed_;
 }
 
 }  // namespace toftwin::drivers::simulator

@@ -1,37 +1,67 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <stop_token>
+#include <vector>
+
+#include <toftwin/frame.h>
 
 #include "sim/images/light.h"
+#include "sim/tracer/motion.h"
 #include "sim/tracer/trace.h"
 
 namespace toftwin::drivers::simulator {
 
-/// What the camera sees from its pose, traced once and kept until the pose changes. Traced in bands
-/// of rows, so that it can be interrupted; the bands done are kept, and the result does not depend
-/// on it.
+/// What the camera sees from its pose, traced once and kept until the pose changes or time passes over things
+/// that move. Traced in bands of rows, so that it can be interrupted; the bands done are kept, and the result
+/// does not depend on it.
 class View {
  public:
   /// `request` with everything filled in but pose and region.
-  View(sim::Scene scene, sim::TraceRequest request)
-      : scene_(std::move(scene)), request_(std::move(request)) {}
+  View(sim::Scene scene, sim::TraceRequest request, sim::Motion camera = {})
+      : scene_(std::move(scene)), posed_(scene_), camera_(std::move(camera)), request_(std::move(request)) {}
 
   [[nodiscard]] const sim::Scene& scene() const { return scene_; }
-  [[nodiscard]] const Transform<World, Camera>& pose() const { return request_.world_from_camera; }
+  /// At time 0.
+  [[nodiscard]] const Transform<World, Camera>& pose() const { return pose_; }
+  [[nodiscard]] Transform<World, Camera> poseAt(Duration time) const {
+    return sim::poseAt(camera_, pose_, time);
+  }
   void setPose(const Transform<World, Camera>& world_from_camera);
+
+  /// Whether raw exposures see different light: scene or camera move, or another camera's light beats.
+  [[nodiscard]] bool changesWithTime() const { return moves() || !scene_.foreignEmitters().empty(); }
+  /// Makes complete() trace what is seen at a time since device time 0, if anything moves. The tracer's own
+  /// noise is independent for each `number`.
+  void moveTo(Duration time, std::uint64_t number);
 
   /// Traces what is not traced yet. False if asked to stop before the end.
   bool complete(const std::stop_token& stop);
   /// The light of the whole image, once complete() said so.
-  [[nodiscard]] const sim::Light& light() const { return light_; }
+  [[nodiscard]] const sim::Light& light() const { return own_.light; }
+  /// The same with what other cameras add to a raw exposure.
+  [[nodiscard]] const sim::Light& lightFor(const Exposure& exposure);
 
  private:
   sim::Scene scene_;
+  sim::Scene posed_;  ///< as it stands at the time of moveTo()
+  sim::Motion camera_;
+  Transform<World, Camera> pose_;
   sim::TraceRequest request_;
-  sim::Light light_;
-  int rows_done_ = 0;
+  std::uint64_t seed_ = request_.seed;
+  /// One emitter's or camera's light, as far as it is traced.
+  struct Pass {
+    sim::Light light;
+    int rows_done = 0;
+  };
+  [[nodiscard]] bool moves() const { return scene_.moves() || !camera_.isStill(); }
+  bool complete(const sim::TraceRequest& request, Pass& pass, const std::stop_token& stop) const;
+  void forget();
+  Pass own_;
+  std::vector<Pass> foreign_{scene_.foreignEmitters().size()};
+  sim::Light mixed_;  ///< what lightFor() gave last
 };
 
 }  // namespace toftwin::drivers::simulator

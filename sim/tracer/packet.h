@@ -36,6 +36,7 @@ struct LaneSums {
   explicit LaneSums(std::size_t terms) : re(terms), im(terms) {}
   Lanes<float> steady{}, ambient{};
   std::vector<Lanes<float>> re, im;  ///< [frequency][harmonic]
+  std::vector<Lanes<double>> bins;   ///< by path length, if the light is wanted so (transient.h); kept between packets
 };
 
 inline bool isAny(const Lanes<int>& valid) {

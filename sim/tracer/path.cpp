@@ -227,6 +227,7 @@ void addLight(const Tracing& tracing, const DirectLight& light, LaneSums& sums) 
   for (std::size_t g = 0; g < tracing.request.gates.size(); ++g) {
     addGates(tracing.request.gates[g], light.weight, light.length, sums.re[g], sums.im[g]);
   }
+  if (!sums.bins.empty()) addToBins(tracing.bins, light, sums);
 }
 
 Tracing::Tracing(const Scene::Impl& s, const TraceRequest& r, RayLog* l)

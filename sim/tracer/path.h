@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <xmmintrin.h>
+
 #include <array>
 #include <cstdint>
 #include <vector>
@@ -12,6 +14,7 @@
 #include "sim/tracer/packet.h"
 #include "sim/tracer/scene_impl.h"
 #include "sim/tracer/trace.h"
+#include "sim/tracer/transient.h"
 
 namespace toftwin::sim {
 
@@ -41,6 +44,7 @@ struct Tracing {
   std::array<Vec3d, 3> camera_axes;  ///< x, y, z of the camera in the scene
   std::vector<PlacedEmitter> emitters;
   std::vector<double> turns_per_metre;  ///< f / c
+  TransientBins bins;                   ///< none but in transient.cpp
   PixelKey seed;
 };
 
@@ -81,7 +85,7 @@ struct BlockSums {
 void clearSums(BlockSums& sums);
 void addSums(const BlockSums& from, BlockSums& to);
 
-/// Adds light that arrived, in the basis that the request asks for.
+/// Adds light that arrived: to the phasors, and to the bins if there are any.
 void addLight(const Tracing& tracing, const DirectLight& light, LaneSums& sums);
 
 /// Traces samples [first, last) of every pixel of the block.
@@ -95,6 +99,22 @@ struct TruthLanes {
   Lanes<Vec3f> normal;
 };
 void traceTruth(const Tracing& tracing, const Block& block, TruthLanes& truth);
+
+/// A request that makes no sense is the calling program's mistake: std::invalid_argument.
+void checkRequest(const TraceRequest& request);
+
+/// Denormal numbers count as zero while this lives, on this thread: Embree asks for it.
+class FlushDenormals {
+ public:
+  FlushDenormals() : before_(_mm_getcsr()) { _mm_setcsr(before_ | kFlushToZero | kDenormalsAreZero); }
+  FlushDenormals(const FlushDenormals&) = delete;
+  FlushDenormals& operator=(const FlushDenormals&) = delete;
+  ~FlushDenormals() { _mm_setcsr(before_); }
+
+ private:
+  static constexpr unsigned kFlushToZero = 0x8000, kDenormalsAreZero = 0x0040;
+  unsigned before_;
+};
 
 /// trace() with a record of its rays; only for one thread.
 Light traceLogged(const Scene& scene, const TraceRequest& request, RayLog* log, Light recycled = {});

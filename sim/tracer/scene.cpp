@@ -106,6 +106,7 @@ Scene::Impl::~Impl() {
 }
 
 const std::string& Scene::id() const { return impl_->id; }
+const std::vector<ForeignEmitterSpec>& Scene::foreignEmitters() const { return impl_->foreign_emitters; }
 
 /// The steps from a checked file to a built scene.
 struct SceneBuilder {

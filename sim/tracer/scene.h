@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <toftwin/result.h>
 #include <toftwin/units.h>
@@ -13,6 +14,8 @@ namespace toftwin::sim {
 
 /// In which light a scene is seen: the cameras' own, or what a colour camera's filters let through.
 enum class Band { Infrared, Red, Green, Blue };
+
+struct ForeignEmitterSpec;
 
 /// A built scene: meshes and primitives with their materials, ready to trace. Cheap to copy; copies
 /// share the geometry, which nobody changes.
@@ -34,6 +37,9 @@ class Scene {
   /// The scene as it stands at a time after its start, with the same id. Still geometry is shared; what
   /// moves is placed anew, which takes microseconds and some nanoseconds for each of its triangles.
   [[nodiscard]] Scene at(Duration time) const;
+
+  /// Light of other cameras, which trace() leaves out; foreign.h adds it.
+  [[nodiscard]] const std::vector<ForeignEmitterSpec>& foreignEmitters() const;
 
   struct Impl;
   [[nodiscard]] const Impl& impl() const { return *impl_; }

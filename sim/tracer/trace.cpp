@@ -2,7 +2,6 @@
 #include "sim/tracer/trace.h"
 
 #include <fmt/format.h>
-#include <xmmintrin.h>
 
 #include <algorithm>
 #include <array>
@@ -15,19 +14,6 @@
 
 namespace toftwin::sim {
 namespace {
-
-/// Denormal numbers count as zero while this lives, on this thread: Embree asks for it.
-class FlushDenormals {
- public:
-  FlushDenormals() : before_(_mm_getcsr()) { _mm_setcsr(before_ | kFlushToZero | kDenormalsAreZero); }
-  FlushDenormals(const FlushDenormals&) = delete;
-  FlushDenormals& operator=(const FlushDenormals&) = delete;
-  ~FlushDenormals() { _mm_setcsr(before_); }
-
- private:
-  static constexpr unsigned kFlushToZero = 0x8000, kDenormalsAreZero = 0x0040;
-  unsigned before_;
-};
 
 /// A pixel with very many samples is cut into pieces of this many, so that threads can share it. The
 /// pieces' sums are added in order: the result does not depend on who did which.
@@ -42,8 +28,9 @@ Region regionOf(const TraceRequest& request) {
   return {request.region_x, request.region_y, request.region_width, request.region_height};
 }
 
-/// A request that makes no sense is the calling program's mistake.
-void check(const TraceRequest& request) {
+}  // namespace
+
+void checkRequest(const TraceRequest& request) {
   const CameraInfo& camera = request.camera;
   const Region region = regionOf(request);
   const auto require = [](bool is_met, const char* what) {
@@ -70,6 +57,8 @@ void check(const TraceRequest& request) {
               region.width <= camera.width - region.x && region.height <= camera.height - region.y,
           "the region must lie inside the image");
 }
+
+namespace {
 
 /// The image if it has this size already, with whatever it holds; else a new one.
 template <class T>
@@ -237,7 +226,7 @@ void storeBlock(const Placement& at, const BlockMeans& means, const TruthLanes& 
 }  // namespace
 
 Light traceLogged(const Scene& scene, const TraceRequest& request, RayLog* log, Light recycled) {
-  check(request);
+  checkRequest(request);
   const Region region = regionOf(request);
   const Tracing tracing{scene.impl(), request, log};
   const BlockShape shape = BlockShape::forSamples(request.samples_per_pixel);

@@ -10,6 +10,7 @@
 
 #include "sim/images/light.h"
 #include "sim/tracer/scene.h"
+#include "sim/tracer/scene_file.h"
 
 namespace toftwin::sim {
 
