@@ -2,10 +2,13 @@
 #include "sim/effects/lens_scatter.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <type_traits>
 #include <vector>
 
-#include "sim/images/rows.h"
+#include "sim/effects/phasors.h"
+#include "sim/images/simd.h"
 
 namespace toftwin::sim {
 namespace {
@@ -56,14 +59,115 @@ Image<T> blur(const Image<T>& image, const std::vector<float>& half) {
   return result;
 }
 
+/// A wide Gaussian by recursion, at the same cost for any width: out to infinity in place of four σ, and
+/// its form right within 1e-3 of its peak (tested). R. Deriche 1993: for n ≥ 0
+///     h(n) = Re Σᵢ Aᵢ λᵢⁿ,   λᵢ = exp((−bᵢ + j wᵢ) / σ)
+/// forwards, and for n > 0 backwards: two complex one-pole filters each way.
+struct Recursion {
+  std::array<std::complex<float>, 2> pole, gain;
+
+  explicit Recursion(double sigma) {
+    const std::complex<double> exponent[] = {{-1.783, 0.6318}, {-1.723, 1.997}};
+    const std::complex<double> amplitude[] = {{1.680, -3.735}, {-0.6803, 0.2598}};
+    double sum = 0.0;  // Σ over all n of h: Re A (1 + λ) / (1 − λ)
+    for (std::size_t i = 0; i < 2; ++i) {
+      const std::complex<double> lambda = std::exp(exponent[i] / sigma);
+      sum += (amplitude[i] * (1.0 + lambda) / (1.0 - lambda)).real();
+      pole[i] = std::complex<float>{lambda};
+    }
+    for (std::size_t i = 0; i < 2; ++i) gain[i] = std::complex<float>{amplitude[i] / sum};
+  }
+};
+
+constexpr int kLanes = 32;  ///< columns that go down together, in registers and the nearest cache
+
+/// One step of both filters for some columns: state = pole · state + in;  out += Re(gain · before or after).
+TOFTWIN_SIMD void stepDown(const Recursion& filter, float* state, const float* in, float* out, int lanes,
+                           bool with_itself) {
+  for (std::size_t i = 0; i < 2; ++i) {
+    const float pr = filter.pole[i].real(), pi = filter.pole[i].imag();
+    const float gr = filter.gain[i].real(), gi = filter.gain[i].imag();
+    float *real = state + 2 * i * kLanes, *imaginary = real + kLanes;
+    for (int x = 0; x < lanes; ++x) {
+      const float decayed_real = pr * real[x] - pi * imaginary[x];
+      const float decayed_imaginary = pr * imaginary[x] + pi * real[x];
+      const float now_real = decayed_real + in[x];
+      // Backwards the pixel itself does not count again: what it adds is only passed on.
+      out[x] += gr * (with_itself ? now_real : decayed_real) - gi * decayed_imaginary;
+      real[x] = now_real;
+      imaginary[x] = decayed_imaginary;
+    }
+  }
+}
+
+/// The filter down all columns of `height` rows of `width` floats.
+std::vector<float> filteredDown(const std::vector<float>& in, int width, int height,
+                                const Recursion& filter) {
+  std::vector<float> out(in.size(), 0.0F);
+  inParallel((width + kLanes - 1) / kLanes, 1, [&](int first, int last) {
+    for (int strip = first; strip < last; ++strip) {
+      const int left = strip * kLanes, lanes = std::min(kLanes, width - left);
+      const auto at = [&](int y) { return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+                                          static_cast<std::size_t>(left); };
+      std::array<float, 4 * kLanes> state{};
+      for (int y = 0; y < height; ++y) stepDown(filter, state.data(), &in[at(y)], &out[at(y)], lanes, true);
+      state = {};
+      for (int y = height - 1; y >= 0; --y)
+        stepDown(filter, state.data(), &in[at(y)], &out[at(y)], lanes, false);
+    }
+  });
+  return out;
+}
+
+/// Rows become columns.
+template <class T>
+std::vector<T> transposed(const T* in, int width, int height) {
+  constexpr int kBlock = 16;
+  std::vector<T> out(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  forRows(width, [&](int first, int last) {
+    for (int top = 0; top < height; top += kBlock) {
+      for (int x = first; x < last; ++x) {
+        for (int y = top; y < std::min(top + kBlock, height); ++y)
+          out[static_cast<std::size_t>(x) * static_cast<std::size_t>(height) + static_cast<std::size_t>(y)] =
+              in[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)];
+      }
+    }
+  });
+  return out;
+}
+
+/// G * image by recursion down the columns, then along the rows. Complex pixels are two columns.
+template <class T>
+Image<T> wideBlur(const Image<T>& image, const Recursion& filter) {
+  constexpr int kParts = sizeof(T) / sizeof(float);
+  const int width = image.width(), height = image.height();
+  const auto* parts = reinterpret_cast<const float*>(image.pixels().data());
+  std::vector<float> floats(parts, parts + image.size() * kParts);
+  floats = filteredDown(floats, width * kParts, height, filter);
+  const std::vector<T> turned = transposed(reinterpret_cast<const T*>(floats.data()), width, height);
+  parts = reinterpret_cast<const float*>(turned.data());
+  floats.assign(parts, parts + image.size() * kParts);
+  floats = filteredDown(floats, height * kParts, width, filter);
+  const std::vector<T> upright = transposed(reinterpret_cast<const T*>(floats.data()), height, width);
+  Image<T> blurred{width, height};
+  std::copy(upright.begin(), upright.end(), blurred.pixels().begin());
+  return blurred;
+}
+
+constexpr double kWideFrom = 6.0;  ///< standard deviation, pixels; the recursion's error grows below
+
 template <class T, class Sum>
-void scatter(Image<T>& image, const LensScatter& lens, const std::vector<float>& half, Sum sum) {
+void scatter(Image<T>& image, const LensScatter& lens, Sum sum) {
   for (const T& value : image.pixels()) sum += value;
   const auto veil = static_cast<T>(
       sum * (lens.veil / static_cast<double>(std::max<std::size_t>(image.size(), 1))));
   const auto kept = static_cast<float>(1.0 - lens.veil - lens.halo);
   const auto spread = static_cast<float>(lens.halo);
-  const Image<T> halo = lens.halo > 0.0 ? blur(image, half) : Image<T>{};
+  Image<T> halo;
+  if (lens.halo > 0.0) {
+    halo = lens.halo_radius < kWideFrom ? blur(image, halfGaussian(lens.halo_radius))
+                                        : wideBlur(image, Recursion{lens.halo_radius});
+  }
   for (std::size_t i = 0; i < image.size(); ++i) {
     image[i] = kept * image[i] + veil;
     if (!halo.empty()) image[i] += spread * halo[i];
@@ -78,10 +182,13 @@ std::string LensScatter::problem() const {
 
 Light LensScatter::apply(Light light, const Conditions&, const Random&) const {
   if (veil == 0.0 && halo == 0.0) return light;
-  const std::vector<float> half = halfGaussian(halo_radius);
-  for (auto& phasor : light.phasors) scatter(phasor, *this, half, std::complex<double>{});
-  scatter(light.steady, *this, half, 0.0);
-  scatter(light.ambient, *this, half, 0.0);
+  forEachImage(light, [&]<class T>(Image<T>& image) {
+    if constexpr (std::is_same_v<T, float>) {
+      scatter(image, *this, 0.0);
+    } else {
+      scatter(image, *this, std::complex<double>{});
+    }
+  });
   return light;
 }
 

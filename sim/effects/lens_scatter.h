@@ -10,8 +10,8 @@ namespace toftwin::sim {
 /// Lens, window and sensor scatter a share of all light over the image, phase and all:
 ///     P̃ = (1 − s − h) P + s ⟨P⟩ + h (G * P)
 /// for each frequency's and harmonic's phasor and for the unmodulated light, with ⟨P⟩ the mean of
-/// the image (the even veil) and G a Gaussian of standard deviation `halo_radius`, cut at four of
-/// them (light that leaves the image is lost). Dark or far pixels are pulled towards the phase of
+/// the image (the even veil) and G a Gaussian of standard deviation `halo_radius` (light that leaves
+/// the image is lost). Dark or far pixels are pulled towards the phase of
 /// what is bright. Needs the whole image: on a traced region the veil and the halo see only that
 /// region.
 struct LensScatter {

@@ -15,8 +15,9 @@ template <class Factor>
 void multiplyPhasors(Light& light, const Factor& factor) {
   for (std::size_t f = 0; f < light.frequencies.size(); ++f) {
     for (int n = 1; n <= light.harmonics; ++n) {
-      const std::complex<float> by{std::complex<double>{factor(f, n)}};
       auto& phasors = light.phasor(f, n);
+      if (phasors.empty()) continue;  // nobody looks at this harmonic
+      const std::complex<float> by{std::complex<double>{factor(f, n)}};
       forRows(light.height(), [&](int first_row, int last_row) {
         for (int y = first_row; y < last_row; ++y) {
           std::complex<float>* row = &phasors(0, y);
@@ -31,10 +32,13 @@ void multiplyPhasors(Light& light, const Factor& factor) {
   }
 }
 
-/// Calls work(image) for every image that light consists of: the phasors, steady and ambient.
+/// Calls work(image) for every image that light consists of: the phasors, steady and ambient. Harmonics
+/// that nobody looks at are empty and left out.
 template <class Work>
 void forEachImage(Light& light, const Work& work) {
-  for (auto& phasors : light.phasors) work(phasors);
+  for (auto& phasors : light.phasors) {
+    if (!phasors.empty()) work(phasors);
+  }
   work(light.steady);
   work(light.ambient);
 }

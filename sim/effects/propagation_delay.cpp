@@ -13,6 +13,8 @@ Light PropagationDelay::apply(Light light, const Conditions& now, const Random&)
   const double middle_x = 0.5 * (now.camera.width - 1), middle_y = 0.5 * (now.camera.height - 1);
   for (std::size_t f = 0; f < light.frequencies.size(); ++f) {
     for (int n = 1; n <= light.harmonics; ++n) {
+      auto& phasors = light.phasor(f, n);
+      if (phasors.empty()) continue;
       const auto turnOf = [&](Length delay) {
         return std::complex<float>{std::polar(1.0, -n * phaseOfRange(delay, light.frequencies[f]))};
       };
@@ -20,7 +22,6 @@ Light PropagationDelay::apply(Light light, const Conditions& now, const Random&)
       std::vector<std::complex<float>> of_column;
       for (int x = 0; x < light.width(); ++x)
         of_column.push_back(turnOf(per_column * (now.left + x - middle_x)));
-      auto& phasors = light.phasor(f, n);
       forRows(light.height(), [&](int first_row, int last_row) {
         for (int y = first_row; y < last_row; ++y) {
           const double below = now.top + y - middle_y;

@@ -1,11 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim/effects/quantisation.h"
 
-#include <cmath>
-
 #include "sim/images/rows.h"
+#include "sim/images/simd.h"
 
 namespace toftwin::sim {
+namespace {
+
+TOFTWIN_SIMD void toSteps(float* electrons, int count, float step) {
+  for (int x = 0; x < count; ++x) electrons[x] = step * __builtin_rintf(electrons[x] / step);
+}
+
+}  // namespace
 
 Samples Quantisation::apply(Samples samples, const Conditions&, const Random&) const {
   if (step_electrons <= 0.0) return samples;
@@ -13,10 +19,7 @@ Samples Quantisation::apply(Samples samples, const Conditions&, const Random&) c
   const int width = samples.width();
   forRows(samples.height(), [&](int first_row, int last_row) {
     for (Image<float>& image : samples.electrons) {
-      for (int y = first_row; y < last_row; ++y) {
-        float* electrons = &image(0, y);
-        for (int x = 0; x < width; ++x) electrons[x] = step * std::nearbyint(electrons[x] / step);
-      }
+      for (int y = first_row; y < last_row; ++y) toSteps(&image(0, y), width, step);
     }
   });
   return samples;

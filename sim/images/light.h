@@ -31,6 +31,7 @@ struct ModulationError {
 ///     P(p) = Σ_paths w · exp(−i 2π n f L / c)
 /// with L the optical length from emitter over all surfaces to the pinhole and w the path's radiance
 /// [W m⁻² sr⁻¹]. A single surface at range r beside the emitter has arg P = −4π f r / c.
+/// A harmonic that the camera does not correlate may be an empty image.
 /// Without frequencies (a pulsed camera), `phasors[i]` holds gate charges, g₁ in the real part and g₂ in the
 /// imaginary one, g the i-th PathFunctions of the request:
 ///     Σ_paths w · g(L)

@@ -10,6 +10,9 @@
 namespace toftwin::sim {
 namespace {
 
+/// A harmonic whose relative content is smaller is not there.
+constexpr double kNoContent = 1e-12;
+
 /// ½ g m ĉₙ e^(i n θₖ): what a phasor is multiplied with at one step.
 struct Weight {
   int harmonic;
@@ -28,7 +31,7 @@ std::vector<Weight> weightsOf(const Response& response, const Light& light, std:
     std::complex<double> content = response.harmonics[i];
     const std::size_t at = f * static_cast<std::size_t>(light.harmonics) + i;
     if (at < light.error.content.size()) content += std::complex<double>{light.error.content[at]};
-    if (std::abs(content) < 1e-12) continue;
+    if (std::abs(content) < kNoContent || light.phasor(f, n).empty()) continue;
     const std::complex<double> weight = 0.5 * response.electrons_per_radiance * response.contrast *
                                         content * std::polar(1.0, n * theta);
     weights.push_back({n, static_cast<float>(weight.real()), static_cast<float>(weight.imag())});
@@ -69,6 +72,30 @@ std::vector<std::complex<double>> relativeHarmonics(const Waveform& emitted,
     relative.push_back(c / fundamental);
   }
   return relative;
+}
+
+Light correlatedPart(const Light& light, const std::vector<Response>& responses, bool all_harmonics) {
+  Light part;
+  part.frequencies = light.frequencies;
+  part.harmonics = light.harmonics;
+  if (all_harmonics) {
+    part.phasors = light.phasors;
+  } else {
+    part.phasors.resize(light.phasors.size());
+    for (std::size_t f = 0; f < responses.size(); ++f) {
+      const auto& content = responses[f].harmonics;
+      for (int n = 1; n <= light.harmonics; ++n) {
+        const auto i = static_cast<std::size_t>(n - 1);
+        const bool is_seen = i < content.size() && std::abs(content[i]) >= kNoContent;
+        if (is_seen) part.phasor(f, n) = light.phasor(f, n);
+      }
+    }
+  }
+  part.steady = light.steady;
+  part.ambient = light.ambient;
+  part.truth.albedo = light.truth.albedo;  // ambient light asks for it
+  part.error = light.error;
+  return part;
 }
 
 Samples correlate(const Light& light, const std::vector<Response>& responses, int steps, int taps) {

@@ -30,12 +30,16 @@ std::vector<std::complex<double>> relativeHarmonics(const Waveform& emitted,
                                                     const Waveform& demodulating,
                                                     Frequency frequency, int count);
 
+/// A copy of the light to be changed by effects, without what correlate() would not look at: harmonics that
+/// no response holds are empty images, unless `all_harmonics` are asked for.
+Light correlatedPart(const Light& light, const std::vector<Response>& responses, bool all_harmonics);
+
 /// Collects a raw exposure's charge, noise-free: at step k, θₖ = 2πk/steps,
 ///     tap 0, 1 = g/2 · ( L + A ± m Re Σₙ ĉₙ Pₙ e^(i n θₖ) )
 /// with the light's phasors Pₙ, its own unmodulated radiance L, the ambient radiance A, and g
 /// electrons per radiance. The light's modulation error adds to ĉₙ and θₖ. Wiggling is born here:
-/// harmonics that the steps cannot tell from the fundamental. The light has the responses' frequencies in their order and at least their
-/// harmonics.
+/// harmonics that the steps cannot tell from the fundamental. The light has the responses' frequencies in
+/// their order and at least their harmonics; a harmonic that is an empty image is taken as dark.
 Samples correlate(const Light& light, const std::vector<Response>& responses, int steps, int taps);
 
 }  // namespace toftwin::sim

@@ -307,7 +307,12 @@ Samples SensorModel::collect(const Light& light, const Moment& moment, std::uint
                              std::uint64_t frame, int region_x, int region_y) const {
   if (!anyActsOnLight(impl_->effects)) return samplesOf(*impl_, light);
   const Conditions now{moment, impl_->camera, region_x, region_y};
-  return samplesOf(*impl_, applyAll(light, impl_->effects, now, seed, frame));
+  const bool wants_all = light.frequencies.empty() ||
+                         std::ranges::any_of(impl_->effects, [](const AnyEffect& effect) {
+                           return std::holds_alternative<Harmonics>(effect);
+                         });
+  Light seen = correlatedPart(light, impl_->responses, wants_all);
+  return samplesOf(*impl_, applyAll(std::move(seen), impl_->effects, now, seed, frame));
 }
 
 SensorModel::Exposed SensorModel::readOut(Samples collected, const Moment& moment,

@@ -130,5 +130,24 @@ TEST(FixedPatternPhase, HasItsSpreadIsConstantAndDiffersBetweenDevices) {
   EXPECT_NE(two.expose(light, {}, 1, 0).range.phasors, image.phasors);
 }
 
+// The turn itself: its cosine and sine against the library's, harmonic by harmonic.
+TEST(FixedPatternPhase, TurnsEachHarmonicByItsMultipleOfThePattern) {
+  const FixedPatternPhase effect{.sigma = 1.1_rad, .device = 5};
+  const Light light = syntheticLight(
+      300, 4, {20_MHz, 60_MHz}, 3, [](int, int) { return std::vector<Way>{{1.0, 0.0}}; });
+  const Light seen = effect.apply(light, {Moment{}, cameraOfSize(300, 4)}, Random{1, 1, 1});
+  const Random pattern{5, 0, effectKey("fixed_pattern_phase", 0)};
+  for (std::size_t f : {0U, 1U}) {
+    for (std::uint32_t i = 0; i < 1200; ++i) {
+      const double angle = -1.1 * static_cast<double>(pattern.draw(f).normal(i));
+      for (int n : {1, 3}) {
+        const std::complex<double> turned{seen.phasor(f, n)[i]};
+        // The angle is a float of up to 6: 5e-7 of rounding, three times that for the third.
+        EXPECT_LT(std::abs(turned - std::polar(1.0, n * angle)), 1e-6 * n) << i;
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace toftwin::sim

@@ -58,6 +58,38 @@ TEST(LensScatter, ComesFromOverexposedLightUnclipped) {
   EXPECT_LT(twice / once, 2.2);
 }
 
+// The wide halo is recursive; the exact one is the sum over all pixels of the Gaussian. A bright box, and
+// the image's border, beyond which it is dark.
+TEST(LensScatter, WideHaloIsTheGaussianWithinAThousandthOfItsPeak) {
+  for (double sigma : {6.0, 9.0, 15.0, 33.0}) {
+    const auto boxAt = [](int x, int y) { return x >= 41 && x < 52 && y >= 23 && y < 30 ? 1.0 : 0.0; };
+    const Light light = syntheticLight(150, 100, {20_MHz}, 1, [&](int x, int y) {
+      return std::vector<Way>{{boxAt(x, y), 1.0}};
+    });
+    const Light seen = applied(LensScatter{.veil = 0.0, .halo = 0.5, .halo_radius = sigma}, light,
+                               cameraOfSize(150, 100));
+    std::vector<double> gaussian;
+    double sum = 0.0;
+    const int reach = static_cast<int>(std::ceil(7.0 * sigma));
+    for (int i = -reach; i <= reach; ++i) {
+      gaussian.push_back(std::exp(-0.5 * i * i / (sigma * sigma)));
+      sum += gaussian.back();
+    }
+    const auto at = [&](int i) {
+      return std::abs(i) > reach ? 0.0 : gaussian[static_cast<std::size_t>(i + reach)] / sum;
+    };
+    const double peak = 0.5 * 77.0 / (2.0 * kPi * sigma * sigma);  // of 77 pixels in one point
+    for (const auto& [x, y] : {std::pair{46, 26}, {60, 26}, {41, 50}, {0, 0}, {75, 3}, {149, 99}}) {
+      double expected = 0.0;
+      for (int v = 23; v < 30; ++v) {
+        for (int u = 41; u < 52; ++u) expected += 0.5 * at(x - u) * at(y - v);
+      }
+      expected += 0.5 * boxAt(x, y);
+      EXPECT_NEAR(seen.steady(x, y), expected, 1e-3 * peak) << sigma << ": " << x << ' ' << y;
+    }
+  }
+}
+
 TEST(LensGhost, PutsTheMirroredPixelsShareIntoEachPixelAndKeepsAllLight) {
   CameraInfo camera = cameraOfSize(41, 31);
   camera.cx = 20.0, camera.cy = 15.0;

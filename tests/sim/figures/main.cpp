@@ -30,17 +30,22 @@ struct Figure {
 
   explicit Figure(const std::string& svg) {
     static const std::regex runs{R"(<path stroke='(#[0-9a-f]+)' d='([^']*)'/>)"};
-    static const std::regex run{R"(M(\d+) (\d+)\.5h(\d+))"};
+    static const std::regex run{R"((?:M(\d+) (\d+)\.5|m(\d+) 0)h(\d+))"};  // to a place, or on in its row
     auto rest = svg.cbegin();
     for (std::sregex_iterator at{svg.begin(), svg.end(), runs}, end; at != end; ++at) {
       text.append(rest, (*at)[0].first);
       rest = (*at)[0].second;
       const std::string path = (*at)[2].str();
+      int x = 0, y = 0;  // the pen, after a run at its end
       for (std::sregex_iterator cell{path.begin(), path.end(), run}; cell != end; ++cell) {
-        const int x = std::stoi((*cell)[1].str()), y = std::stoi((*cell)[2].str());
+        if ((*cell)[1].matched) {
+          x = std::stoi((*cell)[1].str()), y = std::stoi((*cell)[2].str());
+        } else {
+          x += std::stoi((*cell)[3].str());
+        }
         // Several maps in one figure share places: the text before tells them apart.
         const int map = static_cast<int>(text.size());
-        for (int i = 0; i < std::stoi((*cell)[3].str()); ++i) cells[{map, y * 4096 + x + i}] = (*at)[1].str();
+        for (const int end = x + std::stoi((*cell)[4].str()); x < end; ++x) cells[{map, y * 4096 + x}] = (*at)[1].str();
       }
     }
     text.append(rest, svg.cend());
