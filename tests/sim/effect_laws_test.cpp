@@ -341,6 +341,51 @@ TYPED_TEST(EffectLaws, SameInputSameOutput) {
   EXPECT_TRUE(sameBits(applied(TypeParam{}, before, {}), applied(TypeParam{}, before, {})));
 }
 
+template <class T>
+Image<T> cut(const Image<T>& image, int left, int top, int width, int height) {
+  if (image.empty()) return {};
+  Image<T> part{width, height};
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) part(x, y) = image(left + x, top + y);
+  }
+  return part;
+}
+template <class T>
+std::vector<Image<T>> cut(const std::vector<Image<T>>& images, int left, int top, int width, int height) {
+  std::vector<Image<T>> parts;
+  for (const auto& image : images) parts.push_back(cut(image, left, top, width, height));
+  return parts;
+}
+Light cut(Light light, int left, int top, int width, int height) {
+  light.phasors = cut(light.phasors, left, top, width, height);
+  light.steady = cut(light.steady, left, top, width, height);
+  light.ambient = cut(light.ambient, left, top, width, height);
+  light.truth.albedo = cut(light.truth.albedo, left, top, width, height);
+  return light;
+}
+Samples cut(Samples samples, int left, int top, int width, int height) {
+  samples.electrons = cut(samples.electrons, left, top, width, height);
+  samples.flags = cut(samples.flags, left, top, width, height);
+  return samples;
+}
+RangeImage cut(RangeImage image, int left, int top, int width, int height) {
+  image.range_m = cut(image.range_m, left, top, width, height);
+  image.amplitude = cut(image.amplitude, left, top, width, height);
+  image.ambient = cut(image.ambient, left, top, width, height);
+  image.flags = cut(image.flags, left, top, width, height);
+  return image;
+}
+
+// What a pixel becomes does not depend on which region of the image is made, unless neighbours count.
+TYPED_TEST(EffectLaws, OfARegionIsTheRegionOfTheWhole) {
+  constexpr Covariates on = TypeParam::about.explains;
+  if (on.contains(Covariate::Neighbours)) GTEST_SKIP() << "neighbours beyond the region count";
+  if (on.contains(Covariate::History)) GTEST_SKIP() << "a region has no frame before";
+  const auto whole = imageOf<ImageOf<TypeParam>>({});
+  const auto expected = cut(applied(TypeParam{}, whole, {}), 5, 4, 9, 7);
+  EXPECT_TRUE(sameBits(applied(TypeParam{}, cut(whole, 5, 4, 9, 7), {}, {5, 4}), expected));
+}
+
 TYPED_TEST(EffectLaws, DependsOnExactlyTheCovariatesItSays) {
   for (const auto& [covariate, name] : kCovariateNames) {
     EXPECT_EQ(dependsOn(TypeParam{}, covariate), TypeParam::about.explains.contains(covariate)) << name;

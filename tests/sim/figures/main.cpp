@@ -29,7 +29,7 @@ struct Figure {
   std::string text;
 
   explicit Figure(const std::string& svg) {
-    static const std::regex runs{R"(<path stroke='(#[0-9a-f]+)' d='([^']*)'/>)"};
+    static const std::regex runs{R"(<path stroke='(#[0-9a-f]+)' d='([^']*)'/>\n?)"};
     static const std::regex run{R"((?:M(\d+) (\d+)\.5|m(\d+) 0)h(\d+))"};  // to a place, or on in its row
     auto rest = svg.cbegin();
     for (std::sregex_iterator at{svg.begin(), svg.end(), runs}, end; at != end; ++at) {
@@ -45,7 +45,7 @@ struct Figure {
         }
         // Several maps in one figure share places: the text before tells them apart.
         const int map = static_cast<int>(text.size());
-        for (const int end = x + std::stoi((*cell)[4].str()); x < end; ++x) cells[{map, y * 4096 + x}] = (*at)[1].str();
+        for (const int past = x + std::stoi((*cell)[4].str()); x < past; ++x) cells[{map, y * 4096 + x}] = (*at)[1].str();
       }
     }
     text.append(rest, svg.cend());
