@@ -60,6 +60,7 @@ Result<> addLive(const CompareJob& job, Progress& progress, Report& report, std:
 Result<> addReal(const RealDataJob& job, Report& report, std::string& verdict) {
   auto findings = judgeRealData(job);
   if (!findings) return findings.error();
+  report.sections.push_back(summarySection(*findings));
   std::string headlines;
   for (Finding& finding : *findings) {
     if (!finding.headline.empty()) headlines += (headlines.empty() ? "" : "; ") + finding.headline;

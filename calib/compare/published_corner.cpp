@@ -13,7 +13,7 @@ namespace toftwin::compare {
 namespace {
 
 constexpr double kAlbedo = 0.9;
-constexpr int kEveryRay = 8;
+constexpr std::size_t kEveryRay = 8;
 
 struct Variant {
   std::string file, name;
@@ -30,31 +30,6 @@ std::vector<Variant> variants() {
     all.push_back({fmt::format("corner_roughness_{:.1f}.csv", sigma),
                    fmt::format("path length up to 16, roughness {:.1f}", sigma), 16, sigma});
   return all;
-}
-
-/// A published curve: errors along each ray.
-struct PublishedLine {
-  std::vector<double> t, error_mm;
-  double noise_mm = 0.0;  ///< from ray to ray: second differences / √6
-};
-
-Result<PublishedLine> loadLine(const std::filesystem::path& file) {
-  const auto columns = loadColumns(file, {"x_mm", "z_mm", "reference_z_mm"});
-  if (!columns) return columns.error();
-  PublishedLine all, some;
-  for (std::size_t i = 0; i < (*columns)[0].size(); ++i) {
-    const double reference_z = (*columns)[2][i];
-    all.t.push_back((*columns)[0][i] / reference_z);  // x belongs to the reference point
-    all.error_mm.push_back(((*columns)[1][i] - reference_z) * std::sqrt(1.0 + all.t[i] * all.t[i]));
-  }
-  std::vector<double> bends;
-  for (std::size_t i = 1; i + 1 < all.t.size(); ++i)
-    bends.push_back((all.error_mm[i - 1] - 2.0 * all.error_mm[i] + all.error_mm[i + 1]) /
-                    std::sqrt(6.0));
-  some.noise_mm = summarise(bends).sd;
-  for (std::size_t i = kEveryRay / 2; i < all.t.size(); i += kEveryRay)
-    some.t.push_back(all.t[i]), some.error_mm.push_back(all.error_mm[i]);
-  return some;
 }
 
 Summary difference(const std::vector<double>& a, const std::vector<double>& b) {
@@ -139,6 +114,25 @@ Result<TableBlock> ownCheck(const RealDataJob& job, PublishedCorner& result) {
 
 }  // namespace
 
+Result<PublishedLine> loadPublishedCorner(const std::filesystem::path& file, std::size_t every) {
+  const auto columns = loadColumns(file, {"x_mm", "z_mm", "reference_z_mm"});
+  if (!columns) return columns.error();
+  PublishedLine all, some;
+  for (std::size_t i = 0; i < (*columns)[0].size(); ++i) {
+    const double reference_z = (*columns)[2][i];
+    all.t.push_back((*columns)[0][i] / reference_z);  // x belongs to the reference point
+    all.error_mm.push_back(((*columns)[1][i] - reference_z) * std::sqrt(1.0 + all.t[i] * all.t[i]));
+  }
+  std::vector<double> bends;
+  for (std::size_t i = 1; i + 1 < all.t.size(); ++i)
+    bends.push_back((all.error_mm[i - 1] - 2.0 * all.error_mm[i] + all.error_mm[i + 1]) /
+                    std::sqrt(6.0));
+  some.noise_mm = summarise(bends).sd;
+  for (std::size_t i = every / 2; i < all.t.size(); i += every)
+    some.t.push_back(all.t[i]), some.error_mm.push_back(all.error_mm[i]);
+  return some;
+}
+
 Result<PublishedCorner> addPublishedCorner(const RealDataJob& job, Finding& finding) {
   TableBlock table{
       "Corner, what multipath adds along the ray, mm",
@@ -154,7 +148,8 @@ Result<PublishedCorner> addPublishedCorner(const RealDataJob& job, Finding& find
     const Variant& variant = all[i];
     if (job.progress != nullptr)
       job.progress->at(0.5 * static_cast<double>(i) / static_cast<double>(all.size()));
-    const auto line = loadLine(job.folder / "published_simulation" / variant.file);
+    const auto line =
+        loadPublishedCorner(job.folder / "published_simulation" / variant.file, kEveryRay);
     if (!line) return line.error();
     CornerTrace trace = traceOf(variant, job.effort);
     const CornerErrors exact = traceCorner(trace, line->t);

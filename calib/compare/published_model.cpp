@@ -90,11 +90,11 @@ std::array<Face, 2> boardsOf(const SymmetricCorner& corner) {
 }
 
 /// Where a ray from `from` meets the board's front, if it does.
-std::optional<Vec3d> meets(const Face& board, Vec3d from, Vec3d direction) {
+std::optional<Vec3d> meets(const Face& board, Vec3d from, Vec3d direction, double nearest) {
   const double toward = -dot(direction, board.normal);
   if (toward <= 1e-12) return {};
   const double distance = dot(from - board.edge, board.normal) / toward;
-  if (distance <= 1e-12) return {};
+  if (distance <= std::max(1e-12, nearest)) return {};
   const Vec3d p = from + distance * direction;
   const double q = dot(p - board.edge, board.along);
   if (q < 0.0 || q > board.length || std::abs(p.y) > board.half_height) return {};
@@ -154,7 +154,7 @@ class CornerPath {
       const Vec3d next = cosineDirection(n, randomPair(key, index, surface));
       addEmitters(at, n, view, throughput, travelled - 2.0 * range, all);
       throughput *= pi * reflectance(what_.material, n, view, next);
-      const auto hit = meets(boards_[1 - board], at, next);
+      const auto hit = meets(boards_[1 - board], at, next, what_.minimum_ray_m);
       if (!hit) return;
       travelled += norm(*hit - at);
       at = *hit, view = -1.0 * next, board = 1 - board;

@@ -46,6 +46,9 @@ struct CornerTrace {
   std::vector<Vec3d> emitters_m{{-0.020, 0, 0}, {-0.025, 0, 0}, {-0.030, 0, 0}};
   std::vector<Frequency> frequencies{30_MHz};
   int max_surfaces = 2;
+  /// Hits nearer than this are not seen, as with a ray offset of that size; 0: none, as it should
+  /// be. Only for docs/edge-of-the-corner.md.
+  double minimum_ray_m = 0.0;
   int paths = 4096;
   std::uint64_t seed = 1;
 };

@@ -21,11 +21,14 @@ Tone toneOf(double explained_fraction) {
 void planRealData(Progress& progress, double effort) {
   for (const char* camera : {"Kinect v2", "O3D303"}) {
     progress.plan(std::string{camera} + ": distance error", 4.0 * effort);
-    progress.plan(std::string{camera} + ": corner", 8.0 * effort);
+    progress.plan(std::string{camera} + ": corner", 16.0 * effort);
     progress.plan(std::string{camera} + ": warm-up", 1.0);
     progress.plan(std::string{camera} + ": noise", 4.0);
   }
-  progress.plan("Kinect v2: box", 14.0 * effort);
+  progress.plan("Kinect v2: box", 28.0 * effort);
+  progress.plan("lens scatter", 0.2);
+  progress.plan("mixed pixels", 0.2);
+  progress.plan("edge of the corner", 10.0 * effort);
   progress.plan("published simulation", 14.0 * effort);
 }
 
@@ -51,6 +54,12 @@ Result<std::vector<Finding>> judgeRealData(const RealDataJob& job) {
   }
   step();
   if (auto done = keep(judgeBox(job)); !done) return done.error();
+  step();
+  if (auto done = keep(judgeScatter(job)); !done) return done.error();
+  step();
+  if (auto done = keep(judgeMixedPixels(job)); !done) return done.error();
+  step();
+  if (auto done = keep(judgeEdge(job)); !done) return done.error();
   step();
   if (auto done = keep(judgePublished(job)); !done) return done.error();
   return findings;

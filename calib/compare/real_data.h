@@ -18,12 +18,30 @@
 /// the finding says so.
 namespace toftwin::compare {
 
+/// One line of the summary, RMS over the judged half of a data set, mm. NaN: there is none.
+struct Outcome {
+  std::string data{};
+  std::size_t judged = 0;     ///< rows
+  double ideal_mm = 0.0;      ///< a camera without error
+  double constant_mm = 0.0;   ///< that and the best constant of the fitted half
+  double published_mm = 0.0;  ///< the published simulator
+  double as_is_mm = 0.0;      ///< ours, preset
+  double fitted_mm = 0.0;     ///< ours, fitted on the other half
+};
+/// An effect left out of the fitted model, the rest fitted again; RMS over the judged half.
+struct Ablation {
+  std::string effect{}, data{};
+  double with = 0.0, without = 0.0;
+};
+
 /// One part of the report with its numbers.
 struct Finding {
   Section section;
   std::vector<Card> cards{};
   std::string headline{};  ///< a clause for the report's verdict, or empty
   Json data = Json::object();
+  std::vector<Outcome> outcomes{};
+  std::vector<Ablation> ablations{};
 };
 
 struct RealDataJob {
@@ -45,12 +63,19 @@ Result<Finding> judgeCorner(const RealDataJob& job, const RealCamera& camera);
 Result<Finding> judgeBox(const RealDataJob& job);
 Result<Finding> judgeWarmUp(const RealDataJob& job, const RealCamera& camera);
 Result<Finding> judgeNoise(const RealDataJob& job, const RealCamera& camera);
+Result<Finding> judgeScatter(const RealDataJob& job);
+/// The edge of the corner: ray offset, physics, halo (docs/edge-of-the-corner.md).
+Result<Finding> judgeEdge(const RealDataJob& job);
+Result<Finding> judgeMixedPixels(const RealDataJob& job);
 Result<Finding> judgePublished(const RealDataJob& job);
 /// That section's id and title, for links to it.
 inline constexpr const char* kPublishedSection = "published";
 inline constexpr const char* kPublishedTitle = "Against the published simulator";
 /// The geometry of the published simulator's corner.
 Result<CornerFit> publishedCorner(const std::filesystem::path& data_folder);
+
+/// The two tables over all findings: what is left, and what each effect is worth.
+Section summarySection(const std::vector<Finding>& findings);
 
 /// All of them, in the report's order. The plan is added to the job's progress by `planRealData`.
 void planRealData(Progress& progress, double effort);

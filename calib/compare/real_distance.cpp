@@ -6,6 +6,7 @@
 
 #include "calib/compare/csv.h"
 #include "calib/compare/real_data.h"
+#include "calib/compare/real_fits.h"
 #include "calib/compare/simulated_line.h"
 
 namespace toftwin::compare {
@@ -144,6 +145,7 @@ Result<Finding> judgeDistance(const RealDataJob& job, RealCamera& camera) {
       .set("simulated", toJson(sim))
       .set("rows_of_another_session", other.error_mm.size())
       .set("constant_mm", sim.best_offset);
+  addDistanceFit(camera, table.reference_mm, table.error_mm, simulated, finding);
   finding.headline = fmt::format("{} distance error: {} mm spread, {} mm left", camera.title,
                                  shown(none.residual_sd), shown(sim.residual_sd));
   finding.cards.push_back({camera.title + " distance", shown(sim.residual_sd) + " mm",

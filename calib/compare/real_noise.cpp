@@ -55,6 +55,19 @@ Result<Against> againstDistance(const sim::SensorModel& model, const Columns& ta
   return result;
 }
 
+/// RMS of ln(measured / simulated) over the odd rows, in per cent; the gain is fitted on the even
+/// ones.
+double heldOutPercent(const Columns& table, const NoiseLaw& simulated) {
+  Columns fitted(2), judged(2);
+  for (std::size_t i = 0; i < table[0].size(); ++i)
+    for (const std::size_t column : {0u, 1u})
+      (i % 2 == 0 ? fitted : judged)[column].push_back(table[column][i]);
+  const double gain = bestGain(fitted, simulated);
+  std::vector<double> predicted;
+  for (const double counts : judged[0]) predicted.push_back(simulated.sigma_mm(counts / gain));
+  return 100.0 * rmsLogRatio(judged[1], predicted);
+}
+
 /// The simulated law over amplitude: white, grey and black paper at many distances.
 Result<NoiseLaw> lawOf(const sim::SensorModel& model) {
   std::vector<double> distances, amplitude, sigma;
@@ -98,6 +111,18 @@ Result<Finding> judgeNoise(const RealDataJob& job, const RealCamera& camera) {
   if (!distance) return distance.error();
   const auto simulated = lawOf(*model);
   if (!simulated) return simulated.error();
+  Finding finding;
+  const double with_all = heldOutPercent(*over_intensity, *simulated);
+  for (std::size_t i = 0; i < model->effects().size(); ++i) {
+    const std::string name = model->effectNames()[i];
+    if (name != "shot_noise" && name != "read_noise" && name != "range_noise") continue;
+    std::vector<sim::AnyEffect> others = model->effects();
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
+    const auto without = lawOf(model->withEffects(std::move(others)));
+    if (!without) return without.error();
+    finding.ablations.push_back({name, camera.title + ", noise over intensity [%]", with_all,
+                                 heldOutPercent(*over_intensity, *without)});
+  }
   const NoiseLaw measured = fitNoiseLaw((*over_intensity)[0], (*over_intensity)[1]);
   const double gain = bestGain(*over_intensity, *simulated);
   std::vector<double> from_simulation;
@@ -140,7 +165,6 @@ Result<Finding> judgeNoise(const RealDataJob& job, const RealCamera& camera) {
                           .log_y = true,
                           .compact = true};
 
-  Finding finding;
   finding.section = {.id = "noise-" + camera.name, .title = camera.title + ": noise"};
   finding.section.verdict = fmt::format(
       "Over the infrared image's counts the simulated noise follows the measured one within {} "

@@ -23,6 +23,13 @@ struct PublishedCorner {
   double noise_ours_mm = 0.0;  ///< what the noise of both makes of that
 };
 Result<PublishedCorner> addPublishedCorner(const RealDataJob& job, Finding& finding);
+/// A published corner curve: errors along each ray, and how it scatters from ray to ray (second
+/// differences / √6).
+struct PublishedLine {
+  std::vector<double> t, error_mm;
+  double noise_mm = 0.0;
+};
+Result<PublishedLine> loadPublishedCorner(const std::filesystem::path& file, std::size_t every = 1);
 Result<> addPublishedDistance(const RealDataJob& job, Finding& finding);
 Result<> addPublishedBox(const RealDataJob& job, Finding& finding);
 

@@ -94,7 +94,8 @@ Result<Finding> judgeWarmUp(const RealDataJob& job, const RealCamera& camera) {
   TableBlock table{"Root mean square error of the depth reading, mm",
                    {"part", "model", "fitted part [mm]", "held-out part [mm]"},
                    {}};
-  double flat_rms = 0.0, drift_rms = 0.0;
+  double flat_rms = 0.0, drift_rms = 0.0, flat_ahead = 0.0, drift_ahead = 0.0;
+  std::size_t judged_ahead = 0;
   for (const Split& split : splits) {
     Json data = Json::object();
     for (const auto& [name, key, exponentials] :
@@ -106,6 +107,8 @@ Result<Finding> judgeWarmUp(const RealDataJob& job, const RealCamera& camera) {
       data.set(std::string{key} + "_fitted_rms_mm", fit.rms_mm)
           .set(std::string{key} + "_held_out_rms_mm", held_out);
       if (split.name == splits[0].name) (exponentials == 0 ? flat_rms : drift_rms) = held_out;
+      if (split.name == splits[1].name) (exponentials == 0 ? flat_ahead : drift_ahead) = held_out;
+      judged_ahead = split.judged.time_s.size();
     }
     finding.data.set(split.name, data);
   }
@@ -163,6 +166,10 @@ Result<Finding> judgeWarmUp(const RealDataJob& job, const RealCamera& camera) {
                                    : "The preset of this camera has no warm-up effect."),
                 true}};
   finding.data.set("drift_mm", drift).set("jitter_mm", floor).set("samples", all.time_s.size());
+  const std::string ahead = camera.title + ", warm-up, second half from the first";
+  finding.outcomes.push_back(
+      {ahead, judged_ahead, flat_ahead, flat_ahead, std::nan(""), std::nan(""), drift_ahead});
+  finding.ablations.push_back({"warm_up", ahead, drift_ahead, flat_ahead});
   finding.cards.push_back({camera.title + " warm-up", shown(drift_rms, 2) + " mm",
                            fmt::format("held-out RMS; flat model {} mm", shown(flat_rms, 2)),
                            finding.section.tone});
