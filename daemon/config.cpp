@@ -11,6 +11,7 @@
 #include <set>
 #include <utility>
 
+#include "daemon/thrown.h"
 #include "protocol/settings/describe.h"
 
 namespace toftwin::daemon {
@@ -83,6 +84,16 @@ std::string stampsOf(const settings::Table& table) {
   return stamps;
 }
 
+/// No exception of a driver ends the daemon: it counts as a camera that could not be opened.
+Result<std::unique_ptr<drivers::Source>> openGuarded(const drivers::Driver& driver,
+                                                     settings::Table& table) {
+  try {
+    return driver.open(table);
+  } catch (...) {
+    return thrownError("the driver");
+  }
+}
+
 ConfiguredSource readSource(settings::Table table, std::span<const drivers::Driver> drivers,
                             const std::vector<std::string>& running, std::set<std::string>& names) {
   SourceKeys keys = readSourceKeys(table, drivers, names);
@@ -97,7 +108,7 @@ ConfiguredSource readSource(settings::Table table, std::span<const drivers::Driv
   if (is_as_before) {
     table.acceptAll();
   } else {
-    source.opened = driver->open(source.table);
+    source.opened = openGuarded(*driver, source.table);
     // What is wrong in another file is told at the source that names it.
     if (!source.opened && source.opened.error().code == Error::Code::InvalidArgument &&
         source.table.check())

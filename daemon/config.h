@@ -42,7 +42,7 @@ struct ListenKeys {
 struct LimitKeys {
   int sessions = 64;
   int subscriptions_per_session = 16;
-  int lossless_mb = 256;
+  int subscription_backlog_mb = 256;
   int request_kb = 64;
   Duration handshake = 5_s;
   Duration source_stuck = 120_s;
@@ -52,9 +52,9 @@ struct LimitKeys {
     v.number("sessions", sessions, {1, 10'000}, "clients at once; one more is told Busy");
     v.number("subscriptions_per_session", subscriptions_per_session, {1, 1000},
              "streams that one client may have at once");
-    v.number("lossless_mb", lossless_mb, {1, 1'000'000},
-             "what may wait for one subscriber or recording; beyond it a lossless one ends with "
-             "Overrun, others lose their oldest frames");
+    v.number("subscription_backlog_mb", subscription_backlog_mb, {1, 1'000'000},
+             "what may wait for one subscription or recording, whatever its policy; beyond it a "
+             "lossless one ends with Overrun, others lose their oldest frames");
     v.number("request_kb", request_kb, {1, 1024}, "longest request that a client may send");
     v.quantity("handshake", handshake, second, {0.1, 3600},
                "a client that said no Hello by then is cut off");
@@ -65,11 +65,28 @@ struct LimitKeys {
   }
 };
 
+/// [recording]
+struct RecordingKeys {
+  int max_mb = 0;
+  int keep_free_mb = 512;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.number("max_mb", max_mb, {0, 100'000'000},
+             "how large one recording may become; before it would be larger, it ends with "
+             "StorageFull. 0: no bound");
+    v.number("keep_free_mb", keep_free_mb, {0, 100'000'000},
+             "what recordings leave free on their disk; before less would be left, they end with "
+             "StorageFull. 0: they may fill it");
+  }
+};
+
 /// The daemon's own keys, at the top of the file.
 struct DaemonKeys {
   enum class LogLevel { Debug, Info, Warning, Error };
   LogLevel log_level = LogLevel::Info;
   std::string recording_folder;
+  RecordingKeys recording;
   ListenKeys listen;
   LimitKeys limits;
 
@@ -85,6 +102,7 @@ struct DaemonKeys {
            "where recordings go that clients ask for, relative to this file; empty: "
            "$STATE_DIRECTORY if "
            "systemd sets it, else clients cannot record");
+    v.group("recording", recording, "what recordings may take of the disk");
     v.group("listen", listen, "where clients connect");
     v.group("limits", limits, "what one client may take");
   }

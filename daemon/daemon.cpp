@@ -13,6 +13,7 @@
 #include <toftwin/client.h>
 
 #include "daemon/notify.h"
+#include "daemon/thrown.h"
 
 namespace toftwin::daemon {
 namespace {
@@ -29,8 +30,12 @@ Server::Options serverOptions(const LimitKeys& limits) {
 }
 
 Hub::Options hubOptions(const Config& config) {
+  const auto bytes = [](int megabytes) { return static_cast<std::uint64_t>(megabytes) << 20; };
+  const RecordingKeys& recording = config.keys.recording;
   return {.recording_folder = config.recording_folder,
-          .lossless_bytes = static_cast<std::uint64_t>(config.keys.limits.lossless_mb) << 20};
+          .recording = {.most_bytes = bytes(recording.max_mb),
+                        .keep_free_bytes = bytes(recording.keep_free_mb)},
+          .backlog_bytes = bytes(config.keys.limits.subscription_backlog_mb)};
 }
 
 spdlog::level::level_enum levelOf(DaemonKeys::LogLevel level) {
@@ -163,7 +168,11 @@ void Daemon::beginReload() {
   spdlog::info("reading {} again", options_.config.string());
   // Opening a source may take its time, during which clients are served.
   reload_ = std::async(std::launch::async, [this, running = fingerprints()] {
-    loaded_ = loadConfig(options_.config, options_.drivers, running);
+    try {
+      loaded_ = loadConfig(options_.config, options_.drivers, running);
+    } catch (...) {
+      loaded_ = thrownError("reading it");
+    }
     asio::post(io_, [this] { finishReload(); });
   });
 }

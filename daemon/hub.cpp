@@ -92,11 +92,13 @@ void Hub::startRecording(const std::string& source, std::string_view file, Recor
     auto& recorder = recorders_[source];
     if (!recorder || recorder->isFinished()) {
       before = std::exchange(
-          recorder, std::make_shared<Recorder>(*host, *path, now.lossless_bytes,
-                                               [done](const Result<std::filesystem::path>& opened) {
-                                                 if (opened) return done(opened->string());
-                                                 done(opened.error());
-                                               }));
+          recorder,
+          std::make_shared<Recorder>(
+              *host, *path, Recorder::Options{now.recording, now.backlog_bytes},
+              [done](const Result<std::filesystem::path>& opened) {
+                if (opened) return done(opened->string());
+                done(opened.error());
+              }));
       return;
     }
   }

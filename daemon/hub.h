@@ -24,7 +24,8 @@ class Hub {
  public:
   struct Options {
     std::filesystem::path recording_folder;  ///< empty: no recording
-    std::uint64_t lossless_bytes = 256ull << 20;
+    record::WriterOptions recording;
+    std::uint64_t backlog_bytes = 256ull << 20;
   };
   using RecordDone = std::function<void(Result<std::string>)>;
 

@@ -9,6 +9,8 @@
 #include <system_error>
 #include <utility>
 
+#include "daemon/thrown.h"
+
 namespace toftwin::daemon {
 
 Result<std::filesystem::path> recordingPath(const std::filesystem::path& folder,
@@ -42,8 +44,8 @@ Result<std::filesystem::path> recordingPath(const std::filesystem::path& folder,
 }
 
 Recorder::Recorder(std::shared_ptr<SourceHost> source, std::filesystem::path file,
-                   std::uint64_t byte_limit, Done opened)
-    : source_(std::move(source)), file_(std::move(file)), byte_limit_(byte_limit) {
+                   Options options, Done opened)
+    : source_(std::move(source)), file_(std::move(file)), options_(options) {
   thread_ = std::jthread{[this, done = std::move(opened)] { run(done); }};
 }
 
@@ -84,15 +86,25 @@ std::string Recorder::problem() const {
   return outcome_ && !*outcome_ ? outcome_->error().message : std::string{};
 }
 
+/// Nothing that is thrown leaves the thread: the recording ends with it, the daemon does not.
 void Recorder::run(const Done& opened) {
+  try {
+    finish(recordUntilEnd(opened));
+  } catch (...) {
+    finish(thrownError("recording"));
+  }
+}
+
+Result<> Recorder::recordUntilEnd(const Done& opened) {
   std::error_code reported_by_create;
   std::filesystem::create_directories(file_.parent_path(), reported_by_create);
-  auto writer = record::Writer::create(file_);
+  auto writer = record::Writer::create(file_, options_.file);
   if (!writer) {
     finish(writer.error());
-    return opened(writer.error());
+    opened(writer.error());
+    return writer.error();
   }
-  const Wish everything{{}, {.policy = wire::Policy::Lossless, .byte_limit = byte_limit_}};
+  const Wish everything{{}, {.policy = wire::Policy::Lossless, .byte_limit = options_.backlog_bytes}};
   auto subscribed = source_->subscribe(everything, [work = work_] {
     {
       const std::scoped_lock lock{work->mutex};
@@ -102,26 +114,37 @@ void Recorder::run(const Done& opened) {
   });
   if (!subscribed) {
     finish(subscribed.error());
-    return opened(subscribed.error());
+    opened(subscribed.error());
+    return subscribed.error();
   }
+  struct Unsubscribe {
+    SourceHost& source;
+    const SubscriberPtr& subscriber;
+    ~Unsubscribe() { source.unsubscribe(subscriber); }
+  } const at_the_end{*source_, *subscribed};
   opened(file_);
   Result<> written = writeAll(*writer, *subscribed);
-  source_->unsubscribe(*subscribed);
   const Result<> closed = writer->close();
   spdlog::info("{}: recorded {} frames into {}", source_->name(), writer->frames(), file_.string());
-  finish(written ? closed : written);
+  if (!written && written.error().code == Error::Code::StorageFull) {
+    return Error{Error::Code::StorageFull,
+                 fmt::format("{} (recording.max_mb = {}, recording.keep_free_mb = {})",
+                             written.error().message, options_.file.most_bytes >> 20,
+                             options_.file.keep_free_bytes >> 20)};
+  }
+  return written ? closed : written;
 }
 
 Result<> Recorder::writeAll(record::Writer& writer, const SubscriberPtr& subscriber) {
   bool is_unsubscribed = false;
   while (true) {
-    while (auto item = subscriber->queue.take()) {
+    while (auto item = subscriber->backlog.take()) {
       if (const Error* end = std::get_if<Error>(&*item)) {
         const bool is_natural =
             end->code == Error::Code::EndOfStream || end->code == Error::Code::Stopped;
         return is_natural ? Result<>{} : *end;
       }
-      const Frame& frame = std::get<FrameQueue::Delivery>(*item).frame->frame;
+      const Frame& frame = std::get<Backlog::Delivery>(*item).frame->frame;
       if (auto written = writer.write(frame); !written) return written;
     }
     std::unique_lock lock{work_->mutex};
@@ -140,6 +163,7 @@ Result<> Recorder::writeAll(record::Writer& writer, const SubscriberPtr& subscri
 }
 
 void Recorder::finish(Result<> outcome) {
+  if (isFinished()) return;  // before `opened`, so that whoever is told may start another
   if (!outcome) {
     spdlog::error("{}: recording {}: {}", source_->name(), file_.string(), outcome.error().message);
   }

@@ -23,15 +23,19 @@ Result<std::filesystem::path> recordingPath(const std::filesystem::path& folder,
                                             std::string_view name);
 
 /// Writes every frame of a source into a file, on a thread of its own. A disk that is slower than
-/// the source ends the recording with Overrun, a full one with StorageFull; what was written before
-/// stays.
+/// the source ends the recording with Overrun; a full one, or a bound on the file or on the free
+/// space, with StorageFull. What was written before stays.
 class Recorder {
  public:
+  struct Options {
+    record::WriterOptions file;
+    std::uint64_t backlog_bytes = 256ull << 20;  ///< what may wait to be written
+  };
   /// Gets the file's path, or why it could not be opened or finished.
   using Done = std::function<void(Result<std::filesystem::path>)>;
 
   /// Starts; `opened` is called once on the recorder's thread.
-  Recorder(std::shared_ptr<SourceHost> source, std::filesystem::path file, std::uint64_t byte_limit,
+  Recorder(std::shared_ptr<SourceHost> source, std::filesystem::path file, Options options,
            Done opened);
   /// Stops and waits until the file is closed.
   ~Recorder();
@@ -49,12 +53,13 @@ class Recorder {
 
  private:
   void run(const Done& opened);
+  Result<> recordUntilEnd(const Done& opened);
   Result<> writeAll(record::Writer& writer, const SubscriberPtr& subscriber);
   void finish(Result<> outcome);
 
   const std::shared_ptr<SourceHost> source_;  // shared with the hub and sessions
   const std::filesystem::path file_;
-  const std::uint64_t byte_limit_;
+  const Options options_;
 
   /// Shared with the subscription, since the source's thread may be waking while the recorder goes.
   struct Work {

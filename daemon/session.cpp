@@ -16,9 +16,8 @@ constexpr std::uint32_t kWidestWindow = 64;
 
 wire::Message failure(std::uint64_t id, Error error) { return wire::Failure{id, std::move(error)}; }
 
-/// How a queue serves the policy asked for, or why that policy makes no sense.
-Result<FrameQueue::Settings> queueFor(const wire::Subscribe& request,
-                                      std::uint64_t lossless_bytes) {
+/// How a backlog serves the policy asked for, or why that policy makes no sense.
+Result<Backlog::Settings> backlogFor(const wire::Subscribe& request, std::uint64_t byte_limit) {
   const auto invalid = [](std::string why) {
     return Error{Error::Code::InvalidArgument, std::move(why)};
   };
@@ -41,10 +40,10 @@ Result<FrameQueue::Settings> queueFor(const wire::Subscribe& request,
     return invalid(fmt::format("queue = {} is out of bounds: it must be 1 to {}", request.queue,
                                kDeepestQueue));
   }
-  return FrameQueue::Settings{.policy = request.policy,
-                              .depth = request.queue,
-                              .max_rate_hz = request.max_rate_hz,
-                              .byte_limit = lossless_bytes};
+  return Backlog::Settings{.policy = request.policy,
+                           .depth = request.queue,
+                           .max_rate_hz = request.max_rate_hz,
+                           .byte_limit = byte_limit};
 }
 
 }  // namespace
@@ -108,10 +107,10 @@ std::optional<Session::Outgoing> Session::nextOf(
     std::map<std::uint64_t, Subscription>::iterator at) {
   auto& [source, subscriber, window, on_way] = at->second;
   if (window > 0 && on_way.size() >= window) return std::nullopt;
-  auto item = subscriber->queue.take();
+  auto item = subscriber->backlog.take();
   if (!item) return std::nullopt;
   const std::uint64_t id = at->first;
-  if (auto* delivery = std::get_if<FrameQueue::Delivery>(&*item)) {
+  if (auto* delivery = std::get_if<Backlog::Delivery>(&*item)) {
     last_served_ = id;
     if (window > 0) on_way.push_back(delivery->frame->frame.sequence);
     return FrameOut{id, std::move(*delivery), subscriber->wish.in_shared_memory};
@@ -164,10 +163,10 @@ Session::Answers Session::on(const wire::Subscribe& request) {
   }
   auto source = hub_.find(request.source);
   if (!source) return {failure(request.id, source.error())};
-  auto queue = queueFor(request, hub_.options().lossless_bytes);
-  if (!queue) return {failure(request.id, queue.error())};
+  auto backlog = backlogFor(request, hub_.options().backlog_bytes);
+  if (!backlog) return {failure(request.id, backlog.error())};
   const Wish wish{{request.planes, request.region, request.decimation},
-                  *queue,
+                  *backlog,
                   request.window > 0 && usesSharedMemory()};
   auto subscriber = (*source)->subscribe(wish, wake_);
   if (!subscriber) return {failure(request.id, subscriber.error())};

@@ -41,7 +41,7 @@ class Session {
   /// A frame for one subscription, to be encoded around the shared body.
   struct FrameOut {
     std::uint64_t subscription = 0;
-    FrameQueue::Delivery delivery;
+    Backlog::Delivery delivery;
     bool in_shared_memory = false;  ///< if it has a shared body
   };
   using Outgoing = std::variant<wire::Message, FrameOut>;

@@ -5,8 +5,9 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <exception>
 #include <utility>
+
+#include "daemon/thrown.h"
 
 namespace toftwin::daemon {
 namespace {
@@ -29,8 +30,8 @@ auto SourceHost::inDriver(Call call) -> decltype(call()) {
   } leave{in_driver_since_};
   try {
     return call();
-  } catch (const std::exception& e) {
-    return Error{Error::Code::Internal, fmt::format("the driver threw: {}", e.what())};
+  } catch (...) {
+    return thrownError("the driver");
   }
 }
 
@@ -121,7 +122,7 @@ Result<SubscriberPtr> SourceHost::subscribe(Wish wish, std::function<void()> wak
   if (auto fits = checkSelection(wish.selection, description->camera, description->planes); !fits) {
     return fits.error();
   }
-  if (wish.queue.policy == wire::Policy::Lockstep && !description->can_lockstep) {
+  if (wish.backlog.policy == wire::Policy::Lockstep && !description->can_lockstep) {
     return Error{
         Error::Code::Unsupported,
         fmt::format("the source \"{}\" makes frames in its own time; lockstep is for simulators "
@@ -202,23 +203,44 @@ void SourceHost::run(const std::stop_token& stop) {
                                      }
                                      interrupt.request_stop();
                                    }};
-  while (!stop.stop_requested()) {
-    if (source_ || reopen(stop)) adjustStreaming();
-    runCommands();
-    if (is_started_) {
-      makeFrameOrWait(stop);
-    } else if (source_) {
-      std::unique_lock lock{mutex_};
-      work_.wait(lock, stop, [this] { return !commands_.empty() || isWanted(); });
+  while (!stop.stop_requested()) guarded([&] { turn(stop); });
+  guarded([&] {
+    if (source_) stopSource();
+  });
+  source_.reset();
+  guarded([&] { runCommands(); });
+  guarded([&] {
+    endAll({Error::Code::Stopped,
+            fmt::format("the daemon closed the source \"{}\": it is stopping, or its "
+                        "configuration changed",
+                        name_)});
+  });
+}
+
+/// What the driver throws is caught at its call. Whatever else is thrown, for want of memory, takes the
+/// same way as a lost camera: opened anew after a pause, which is also the time for memory to come back.
+template <class Work>
+void SourceHost::guarded(Work work) {
+  try {
+    work();
+  } catch (...) {
+    try {
+      onError(thrownError("the daemon"), std::numeric_limits<std::uint64_t>::max());
+    } catch (...) {  // closed and due for another try already; only telling it did not work
+      return;
     }
   }
-  if (source_) stopSource();
-  source_.reset();
+}
+
+void SourceHost::turn(const std::stop_token& stop) {
+  if (source_ || reopen(stop)) adjustStreaming();
   runCommands();
-  endAll({Error::Code::Stopped,
-          fmt::format(
-              "the daemon closed the source \"{}\": it is stopping, or its configuration changed",
-              name_)});
+  if (is_started_) {
+    makeFrameOrWait(stop);
+  } else if (source_) {
+    std::unique_lock lock{mutex_};
+    work_.wait(lock, stop, [this] { return !commands_.empty() || isWanted(); });
+  }
 }
 
 /// Starts or stops the stream as subscribers come and go. Before commands, so that a trigger that
@@ -248,7 +270,7 @@ bool SourceHost::isWanted() const {
 
 bool SourceHost::hasLockstep() const {
   return std::ranges::any_of(subscribers_, [](const SubscriberPtr& subscriber) {
-    return subscriber->wish.queue.policy == wire::Policy::Lockstep;
+    return subscriber->wish.backlog.policy == wire::Policy::Lockstep;
   });
 }
 
@@ -270,24 +292,37 @@ void SourceHost::runCommands() {
     if (source_) {
       const Result<> done = inDriver([&] { return next.command(*source_); });
       noteState();  // before the answer, so that whoever asks after it sees the change
-      next.done(done);
+      tell(next.done, done);
     } else {
-      next.done(Error{Error::Code::Disconnected,
-                      fmt::format("the source \"{}\" is not there at present", name_)});
+      tell(next.done,
+           Error{Error::Code::Disconnected,
+                 fmt::format("the source \"{}\" is not there at present", name_)});
     }
+  }
+}
+
+/// Whoever asked may be unable to take the answer; that is its own matter.
+void SourceHost::tell(const Done& done, const Result<>& result) {
+  try {
+    done(result);
+  } catch (...) {
+    noteError(thrownError("whoever was to be answered"));
   }
 }
 
 /// Takes an opened source over, or notes why it could not be opened and when to try again.
 void SourceHost::adopt(Result<std::unique_ptr<drivers::Source>> opened) {
-  if (!opened) {
-    noteError(opened.error());
+  if (opened && *opened == nullptr) opened = Error{Error::Code::Internal, "the driver opened nothing"};
+  auto info = opened ? inDriver([&]() -> Result<drivers::SourceInfo> { return (*opened)->info(); })
+                     : opened.error();
+  if (!info) {
+    noteError(info.error());
     return retryLater();
   }
   source_ = *std::move(opened);
   noteState();
   const std::scoped_lock lock{mutex_};
-  info_ = source_->info();
+  info_ = *std::move(info);
   is_there_ = true;
 }
 
@@ -365,12 +400,15 @@ void SourceHost::publish(Frame frame) {
   const std::scoped_lock delivering{delivering_};
   {
     const std::scoped_lock lock{mutex_};
+    // Before anything changes: behind this nothing throws, so that no lockstep subscriber is waited for
+    // to acknowledge a frame that it never got.
+    takers.reserve(subscribers_.size());
     frame.sequence = frames_++;
     dropped_by_device_ += frame.dropped_by_device;
-    std::erase_if(subscribers_, [](const SubscriberPtr& one) { return one->queue.hasEnded(); });
+    std::erase_if(subscribers_, [](const SubscriberPtr& one) { return one->backlog.hasEnded(); });
     for (const SubscriberPtr& subscriber : subscribers_) {
-      if (!subscriber->queue.wants(now)) continue;
-      if (subscriber->wish.queue.policy == wire::Policy::Lockstep) {
+      if (!subscriber->backlog.wants(now)) continue;
+      if (subscriber->wish.backlog.policy == wire::Policy::Lockstep) {
         subscriber->unacknowledged = frame.sequence;
       }
       takers.push_back(subscriber);
@@ -390,13 +428,15 @@ void SourceHost::onError(const Error& error, std::uint64_t next_subscriber) {
     return endAll(error, next_subscriber);
   }
   // Whatever else it is, opening the camera anew is the best that can be done; subscribers stay.
+  retryLater();
   stopSource();
   source_.reset();
-  retryLater();
+  {
+    const std::scoped_lock lock{mutex_};
+    is_there_ = false;
+    ++reconnects_;
+  }
   noteError(error);
-  const std::scoped_lock lock{mutex_};
-  is_there_ = false;
-  ++reconnects_;
 }
 
 void SourceHost::retryLater() {
@@ -406,16 +446,21 @@ void SourceHost::retryLater() {
 
 /// Ends the subscriptions with smaller numbers; for others the stream begins anew.
 void SourceHost::endAll(const Error& reason, std::uint64_t before) {
-  std::vector<SubscriberPtr> ended;
-  {
-    const std::scoped_lock lock{mutex_};
-    for (const SubscriberPtr& one : subscribers_) {
-      if (one->number < before) ended.push_back(one);
+  while (true) {  // one after the other, which needs no memory
+    SubscriberPtr ended;
+    {
+      const std::scoped_lock lock{mutex_};
+      const auto found = std::ranges::find_if(
+          subscribers_, [&](const SubscriberPtr& one) { return one->number < before; });
+      if (found == subscribers_.end()) {
+        has_ended_ = subscribers_.empty();
+        return;
+      }
+      ended = std::move(*found);
+      subscribers_.erase(found);
     }
-    std::erase_if(subscribers_, [&](const SubscriberPtr& one) { return one->number < before; });
-    has_ended_ = subscribers_.empty();
+    end(*ended, reason);
   }
-  for (const SubscriberPtr& subscriber : ended) subscriber->queue.end(reason);
 }
 
 void SourceHost::noteError(const Error& error) {

@@ -76,7 +76,11 @@ class SourceHost {
   };
 
   void run(const std::stop_token& stop);
+  void turn(const std::stop_token& stop);
+  template <class Work>
+  void guarded(Work work);
   void runCommands();
+  void tell(const Done& done, const Result<>& result);
   bool reopen(const std::stop_token& stop);
   void adopt(Result<std::unique_ptr<drivers::Source>> opened);
   void noteState();

@@ -2,7 +2,8 @@
 #include "daemon/subscriber.h"
 
 #include <cstddef>
-#include <exception>
+
+#include "daemon/thrown.h"
 
 namespace toftwin::daemon {
 namespace {
@@ -22,12 +23,12 @@ Result<PreparedFramePtr> prepare(const Frame& frame, const Selection& selection)
 /// Whatever goes wrong with one subscriber is not to end the others, let alone the daemon.
 void give(Subscriber& taker, const Result<PreparedFramePtr>& prepared) noexcept {
   try {
-    if (prepared) return taker.queue.push(*prepared);
-    taker.queue.end(prepared.error());
-  } catch (const std::exception& e) {
+    if (prepared) return taker.backlog.push(*prepared);
+    taker.backlog.end(prepared.error());
+  } catch (...) {
     try {
-      taker.queue.end({Error::Code::Internal, e.what()});
-    } catch (const std::exception&) {
+      taker.backlog.end(thrownError("the subscription"));
+    } catch (...) {
       return;  // it has ended, but could not be woken
     }
   }
@@ -36,12 +37,14 @@ void give(Subscriber& taker, const Result<PreparedFramePtr>& prepared) noexcept 
 Result<PreparedFramePtr> tryToPrepare(const Frame& frame, const Selection& selection) {
   try {
     return prepare(frame, selection);
-  } catch (const std::exception& e) {
-    return Error{Error::Code::Internal, e.what()};
+  } catch (...) {
+    return thrownError("preparing the frame");
   }
 }
 
 }  // namespace
+
+void end(Subscriber& subscriber, const Error& reason) noexcept { give(subscriber, reason); }
 
 void fanOut(const Frame& frame, const std::vector<SubscriberPtr>& takers) {
   std::vector<bool> is_served(takers.size(), false);

@@ -10,7 +10,7 @@
 
 #include <toftwin/frame.h>
 
-#include "daemon/frame_queue.h"
+#include "daemon/backlog.h"
 #include "daemon/selection.h"
 
 namespace toftwin::daemon {
@@ -18,21 +18,24 @@ namespace toftwin::daemon {
 /// What one subscriber wants of a source.
 struct Wish {
   Selection selection;
-  FrameQueue::Settings queue;
+  Backlog::Settings backlog;
   bool in_shared_memory = false;  ///< takes bodies that way, where that is worth while
 };
 
 /// One subscriber of a source.
 struct Subscriber {
   Subscriber(Wish wanted, std::function<void()> wake)
-      : wish(std::move(wanted)), queue(wish.queue, std::move(wake)) {}
+      : wish(std::move(wanted)), backlog(wish.backlog, std::move(wake)) {}
   const Wish wish;
-  FrameQueue queue;
+  Backlog backlog;
   std::uint64_t number = 0;  ///< in the order in which they came; guarded by the host
   std::optional<std::uint64_t> unacknowledged;  ///< lockstep; guarded by the host
 };
-/// Shared by the source's host, which fills the queue, and the session or recorder that empties it.
+/// Shared by the source's host, which fills the backlog, and the session or recorder that empties it.
 using SubscriberPtr = std::shared_ptr<Subscriber>;
+
+/// Ends the subscription; if it cannot be woken to learn it, it finds out when it looks.
+void end(Subscriber& subscriber, const Error& reason) noexcept;
 
 /// Hands a frame to everyone who takes it. It is selected and encoded once per distinct
 /// selection.

@@ -108,7 +108,7 @@ Result<wire::Message> Connection::exchange(std::uint64_t id, wire::Message reque
 Result<Connection::Subscribed> Connection::subscribe(wire::Subscribe request) {
   request.id = next_id_++;
   request.window = windowOf(request.policy);
-  const auto frames = std::make_shared<FrameQueue>(request.policy);
+  const auto frames = std::make_shared<Inbox>(request.policy);
   // Frames may follow the answer at once, so the thread must know the queue before.
   asio::post(io_, [this, id = request.id, frames] { starting_.emplace(id, frames); });
   Result<wire::Message> answer = exchange(request.id, request);
@@ -188,7 +188,7 @@ void Connection::take(wire::Message message) {
 void Connection::takeFrame(wire::FrameMessage message) {
   const auto entry = running_.find(message.subscription);
   if (entry == running_.end()) return;  // sent before the daemon read our Unsubscribe
-  FrameQueue& frames = *entry->second;
+  Inbox& frames = *entry->second;
   const std::uint64_t sequence = message.frame.sequence;
   if (auto pushed = frames.push(std::move(message.frame)); !pushed) {
     frames.end(pushed.error());

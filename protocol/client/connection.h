@@ -19,7 +19,7 @@
 
 #include <toftwin/client.h>
 
-#include "protocol/client/frame_queue.h"
+#include "protocol/client/inbox.h"
 #include "protocol/transport/address.h"
 #include "protocol/transport/framed_socket.h"
 
@@ -54,7 +54,7 @@ class Connection {
 
   struct Subscribed {
     std::uint64_t id = 0;
-    std::shared_ptr<FrameQueue> frames;  // shared with the reading thread
+    std::shared_ptr<Inbox> frames;  // shared with the reading thread
   };
   Result<Subscribed> subscribe(wire::Subscribe request);
   void unsubscribe(std::uint64_t subscription);
@@ -95,8 +95,8 @@ class Connection {
   bool writing_ = false;
   std::optional<Error> fault_;
   std::map<std::uint64_t, std::shared_ptr<Answered>> waiting_;  // shared with the waiting caller
-  std::map<std::uint64_t, std::shared_ptr<FrameQueue>> starting_;  ///< by request id
-  std::map<std::uint64_t, std::shared_ptr<FrameQueue>> running_;   ///< by subscription id
+  std::map<std::uint64_t, std::shared_ptr<Inbox>> starting_;  ///< by request id
+  std::map<std::uint64_t, std::shared_ptr<Inbox>> running_;   ///< by subscription id
   std::thread thread_;
 };
 

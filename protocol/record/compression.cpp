@@ -88,6 +88,8 @@ Result<std::vector<std::byte>> decompressLz4(std::span<const std::byte> bytes, s
 
 }  // namespace
 
+std::uint64_t mostZstdBytes(std::uint64_t bytes) { return ZSTD_compressBound(bytes); }
+
 std::vector<std::byte> compressZstd(std::span<const std::byte> bytes, int level) {
   std::vector<std::byte> out(ZSTD_compressBound(bytes.size()));
   const std::size_t size = ZSTD_compress(out.data(), out.size(), bytes.data(), bytes.size(), level);

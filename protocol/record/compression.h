@@ -15,6 +15,8 @@ namespace toftwin::record {
 /// The most that a chunk may hold, compressed or not; a longer one is an error, not an allocation.
 inline constexpr std::uint64_t kMaxChunkBytes = 1ull << 30;
 
+/// The most that compressZstd can make of so many bytes.
+std::uint64_t mostZstdBytes(std::uint64_t bytes);
 /// One zstd frame.
 std::vector<std::byte> compressZstd(std::span<const std::byte> bytes, int level);
 

@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/stat.h>
+#include <sys/statvfs.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -78,6 +79,12 @@ Result<> OutputFile::append(std::span<const std::byte> bytes) {
   }
   size_ = at;
   return {};
+}
+
+Result<std::uint64_t> OutputFile::freeBytes() const {
+  struct statvfs disk {};
+  if (::fstatvfs(fd_, &disk) != 0) return systemError(path_, "ask for the free space", errno);
+  return std::uint64_t{disk.f_bavail} * disk.f_frsize;
 }
 
 Result<> OutputFile::close() {

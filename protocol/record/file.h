@@ -29,6 +29,8 @@ class OutputFile {
   /// Waits until the bytes are on the disk, and closes.
   Result<> close();
   [[nodiscard]] std::uint64_t size() const { return size_; }
+  /// What this user could still write onto the file's disk.
+  [[nodiscard]] Result<std::uint64_t> freeBytes() const;
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
  private:

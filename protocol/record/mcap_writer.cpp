@@ -38,7 +38,9 @@ Result<std::uint16_t> FileWriter::addSchema(Schema schema) {
                  path().string() + ": more than 65535 schemas in one recording"};
   }
   schema.id = static_cast<std::uint16_t>(schemas_.size() + 1);  // 0 means none
+  const std::size_t before = open_.size();
   mcap::append(open_, schema);
+  repeated_bytes_ += open_.size() - before;
   schemas_.push_back(std::move(schema));
   return schemas_.back().id;
 }
@@ -49,7 +51,9 @@ Result<std::uint16_t> FileWriter::addChannel(Channel channel) {
                  path().string() + ": more than 65535 channels in one recording"};
   }
   channel.id = static_cast<std::uint16_t>(channels_.size());
+  const std::size_t before = open_.size();
   mcap::append(open_, channel);
+  repeated_bytes_ += open_.size() - before;
   channels_.push_back(std::move(channel));
   return channels_.back().id;
 }
@@ -78,6 +82,21 @@ bool FileWriter::openChunkIsDue(std::uint64_t log_time_ns) const {
   const bool slow =
       messages() > 1 && log_time_ns > previous_ns_ && log_time_ns - previous_ns_ >= most;
   return open_.size() >= options_.chunk_bytes || open_end_ns_ - open_start_ns_ >= most || slow;
+}
+
+/// Upper bounds of the records' sizes (opcode and length included), by mcap.dev/spec.
+std::uint64_t FileWriter::closedSize(std::uint64_t message_bytes, std::uint64_t channel_bytes) const {
+  constexpr std::uint64_t kMessageHead = 31, kChunkHead = 64, kMessageIndexHead = 15;
+  constexpr std::uint64_t kIndexEntry = 16, kChunkIndex = 96, kMapEntry = 10;
+  constexpr std::uint64_t kEnds = 512;  // data end, statistics, summary offsets, footer, magic
+  const std::uint64_t channels = channels_.size() + 1;
+  const std::uint64_t open = open_.size() + channel_bytes + kMessageHead + message_bytes;
+  const std::uint64_t chunk = kChunkHead + (options_.zstd_level > 0 ? mostZstdBytes(open) : open) +
+                              kMessageIndexHead * channels + kIndexEntry * (open_messages_ + 1);
+  const std::uint64_t summary = repeated_bytes_ + channel_bytes +
+                                (chunks_.size() + 1) * (kChunkIndex + kMapEntry * channels) +
+                                kMapEntry * channels + kEnds;
+  return file_.size() + chunk + summary;
 }
 
 Result<> FileWriter::finishChunk() {

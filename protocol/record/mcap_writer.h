@@ -32,6 +32,11 @@ class FileWriter {
   Result<> close();
   /// Messages in finished chunks and in the open one.
   [[nodiscard]] std::uint64_t messages() const { return statistics_.messages + open_messages_; }
+  /// What the file would have at most if it were closed after another message of that size, on one
+  /// more channel whose record has at most `channel_bytes`.
+  [[nodiscard]] std::uint64_t closedSize(std::uint64_t message_bytes,
+                                         std::uint64_t channel_bytes) const;
+  [[nodiscard]] const OutputFile& file() const { return file_; }
   [[nodiscard]] const std::filesystem::path& path() const { return file_.path(); }
 
  private:
@@ -56,6 +61,7 @@ class FileWriter {
 
   std::vector<Schema> schemas_;
   std::vector<Channel> channels_;
+  std::uint64_t repeated_bytes_ = 0;  ///< of their records, which the index repeats
   std::vector<ChunkIndex> chunks_;
   Statistics statistics_;
 };

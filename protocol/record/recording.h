@@ -21,6 +21,11 @@ struct WriterOptions {
                               << 20;  ///< uncompressed; what a killed recorder can lose at most
   std::chrono::milliseconds chunk_time{1000};
   int zstd_level = 1;      ///< 0: not compressed
+  /// The closed file has at most so many bytes; 0: no bound.
+  std::uint64_t most_bytes = 0;
+  /// What writing and closing leave free on the file's disk, as far as others leave it; 0: it may be
+  /// filled.
+  std::uint64_t keep_free_bytes = 0;
   bool overwrite = false;  ///< otherwise a file that is there already is an error
 };
 
@@ -35,7 +40,8 @@ class Writer {
   ~Writer();
 
   /// Error StorageFull when the disk is full: everything up to the last whole chunk is kept, and
-  /// the file still opens.
+  /// the file still opens. The same when the frame would break a bound of the options: everything
+  /// before it is kept.
   Result<> write(const Frame& frame);
   Result<> close();
   [[nodiscard]] std::uint64_t frames() const;

@@ -49,8 +49,10 @@ struct Writer::State {
   std::uint16_t schema = 0;
   /// One channel for each source; one more when its camera changes, because a channel says which.
   std::map<std::string, std::pair<CameraInfo, std::uint16_t>> channels;
+  WriterOptions options;
   std::uint64_t frames = 0;
 
+  Result<> checkRoomFor(std::uint64_t message_bytes) const;
   Result<std::uint16_t> channelFor(const Frame& frame) {
     const auto known = channels.find(frame.source);
     if (known != channels.end() && known->second.first == frame.camera) return known->second.second;
@@ -75,18 +77,45 @@ Writer::~Writer() {
 Result<Writer> Writer::create(const std::filesystem::path& file, WriterOptions options) {
   auto made = mcap::FileWriter::create(file, options);
   if (!made) return made.error();
-  auto state = std::make_unique<State>(State{std::move(made).value(), 0, {}, 0});
+  auto state = std::make_unique<State>(State{std::move(made).value(), 0, {}, options});
   const auto schema = state->file.addSchema(frameSchema());
   if (!schema) return schema.error();
   state->schema = *schema;
   return Writer{std::move(state)};
 }
 
+/// Before each frame what closing would write then is set against the bounds, so that they hold for the
+/// closed file; uncompressed, which ends it at most about a chunk too early.
+Result<> Writer::State::checkRoomFor(std::uint64_t message_bytes) const {
+  if (options.most_bytes == 0 && options.keep_free_bytes == 0) return {};
+  // Two names of at most 255 bytes, the lens as JSON and the keys: well below.
+  constexpr std::uint64_t kMostChannelBytes = 2048;
+  const std::uint64_t closed = file.closedSize(message_bytes, kMostChannelBytes);
+  if (options.most_bytes > 0 && closed > options.most_bytes) {
+    return Error{Error::Code::StorageFull,
+                 fmt::format("{}: with another frame it could be larger than the {} MB that it may "
+                             "have. The recording is whole up to there: {} frames",
+                             file.path().string(), options.most_bytes >> 20, frames)};
+  }
+  if (options.keep_free_bytes == 0) return {};
+  const auto free = file.file().freeBytes();
+  if (!free) return free.error();
+  if (*free >= closed - file.file().size() &&
+      *free - (closed - file.file().size()) >= options.keep_free_bytes)
+    return {};
+  return Error{Error::Code::StorageFull,
+               fmt::format("{}: with another frame less than {} MB could stay free on its disk, which "
+                           "has {} MB; free space there or record somewhere else. The recording is "
+                           "whole up to there: {} frames",
+                           file.path().string(), options.keep_free_bytes >> 20, *free >> 20, frames)};
+}
+
 Result<> Writer::write(const Frame& frame) {
-  const auto channel = state_->channelFor(frame);
-  if (!channel) return channel.error();
   const auto message = wire::encode(wire::FrameMessage{0, frame});
   if (!message) return message.error();
+  if (auto room = state_->checkRoomFor(message->size()); !room) return room;
+  const auto channel = state_->channelFor(frame);
+  if (!channel) return channel.error();
   std::vector<std::span<const std::byte>> pieces{message->head};
   for (const Buffer& piece : message->body.pieces) pieces.push_back(piece.bytes());
   const mcap::Message head{.channel_id = *channel,

@@ -37,6 +37,20 @@ TEST(Config, OpensItsSources) {
   EXPECT_EQ(config->sources[1].keys.start, SourceKeys::Start::Always);
 }
 
+TEST(Config, ADriverThatThrowsWhenOpenedIsACameraThatIsNotThere) {
+  const drivers::Driver throwing{
+      .name = "throwing",
+      .summary = "",
+      .list = [] { return std::vector<std::string>{}; },
+      .open = [](settings::Table&) -> Result<std::unique_ptr<drivers::Source>> { throw 42; },
+      .document = [] { return std::string{}; }};
+  const auto config = parseConfig("[[source]]\nname = 'a'\ndriver = 'throwing'\n", "d.toml",
+                                  {&throwing, 1});
+  ASSERT_TRUE(config.ok()) << config.error().message;
+  ASSERT_FALSE(config->sources.at(0).opened.ok());
+  EXPECT_SAYS(config->sources[0].opened.error().message, "the driver threw something");
+}
+
 TEST(Config, ErrorsNameFileLineKeyBoundAndUnit) {
   const std::string error = errorOf("[limits]\nhandshake_s = 0\nsesions = 3");
   EXPECT_SAYS(
@@ -132,7 +146,8 @@ TEST(Config, ARunningSourceIsRecognisedWhateverTheLayoutAndNotOpened) {
 TEST(Config, DocumentsEveryKey) {
   const std::string text = documentConfig(drivers::allDrivers());
   for (const char* key :
-       {"listen.port", "limits.lossless_mb", "recording_folder", "start", "frame_rate_hz"}) {
+       {"listen.port", "limits.subscription_backlog_mb", "recording_folder", "recording.max_mb",
+        "recording.keep_free_mb", "start", "frame_rate_hz"}) {
     EXPECT_SAYS(text, key);
   }
 }

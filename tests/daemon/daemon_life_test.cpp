@@ -109,6 +109,28 @@ TEST_F(RunningDaemon, BothListenersGoOnWhenFilesRanOut) {
   EXPECT_TRUE(isServed(local));
 }
 
+TEST_F(RunningDaemon, FramesComeInlineWhenFilesRanOut) {
+  start("[[source]]\nname = 'cam'\ndriver = 'pattern'\npace = 'trigger'\nwidth = 160\n"
+        "height = 120\n");  // large enough for shared memory
+  auto client = this->client(), inline_from_the_start = this->client(true);
+  auto stream = client.subscribe("cam", {.policy = Policy::Queue, .queue = 4});
+  // UBSan looks at a type it meets for the first time through a pipe, and there will be none.
+  auto other = inline_from_the_start.subscribe("cam", {.policy = Policy::Queue, .queue = 4});
+  ASSERT_TRUE(client.trigger("cam").ok());
+  ASSERT_TRUE(stream->next(kSoon).ok());
+  ASSERT_TRUE(other->next(kSoon).ok());
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &before), 0);
+  const rlimit none{.rlim_cur = 0, .rlim_max = before.rlim_max};
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &none), 0);
+  const bool is_triggered = client.trigger("cam").ok();
+  const auto frame = stream->next(kSoon);
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &before), 0);
+  ASSERT_TRUE(is_triggered);
+  ASSERT_TRUE(frame.ok()) << frame.error().message;
+  EXPECT_EQ(frame->sequence, 1u);
+}
+
 TEST_F(RunningDaemon, AClientWhoseAcceptIsQueuedWhenItShutsDownIsNotServed) {
   boost::asio::io_context io{1};
   Hub hub{{}, clock_};

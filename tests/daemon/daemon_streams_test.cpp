@@ -144,6 +144,27 @@ TEST_F(RunningDaemon, ALockstepClientOverTcpMayVanishWhileAFrameIsSent) {
   EXPECT_EQ(limited(), 1);
 }
 
+TEST_F(RunningDaemon, AClientOverTcpMayVanishWhileNothingIsSent) {
+  start(kTriggered);
+  const auto watched = [] {  // sockets of this process whose silent peers are asked after five seconds
+    int count = 0;
+    for (int fd = 0; fd < 256; ++fd) {
+      int is_asked = 0, idle = 0, interval = 0, times = 0;
+      socklen_t size = sizeof(int);
+      const bool is_tcp = ::getsockopt(fd, IPPROTO_TCP, TCP_KEEPIDLE, &idle, &size) == 0 &&
+                          ::getsockopt(fd, IPPROTO_TCP, TCP_KEEPINTVL, &interval, &size) == 0 &&
+                          ::getsockopt(fd, IPPROTO_TCP, TCP_KEEPCNT, &times, &size) == 0;
+      if (!is_tcp || ::getsockopt(fd, SOL_SOCKET, SO_KEEPALIVE, &is_asked, &size) != 0) continue;
+      if (is_asked != 0 && idle + times * interval <= 12) ++count;
+    }
+    return count;
+  };
+  EXPECT_EQ(watched(), 0);
+  auto client = this->client(true);
+  ASSERT_TRUE(client.health().ok());
+  EXPECT_EQ(watched(), 1);
+}
+
 TEST_P(OnEachTransport, LockstepMakesTheNextFrameWhenBothClientsAskedForIt) {
   start(kFast);
   auto one = client(GetParam()), two = client(GetParam());
@@ -219,7 +240,7 @@ TEST_F(RunningDaemon, AClientThatNeverReadsDelaysNobody) {
 }
 
 TEST_F(RunningDaemon, ALosslessClientGetsEveryFrameOrIsToldThatItCannot) {
-  configure("[limits]\nlossless_mb = 1\n" + kFast);  // 1 MB are about a hundred of these frames
+  configure("[limits]\nsubscription_backlog_mb = 1\n" + kFast);  // 1 MB are about a hundred of these frames
   start(options());
   auto client = this->client();
   auto stream = client.subscribe("cam", {.policy = Policy::Lossless});
@@ -230,7 +251,7 @@ TEST_F(RunningDaemon, ALosslessClientGetsEveryFrameOrIsToldThatItCannot) {
     const auto frame = stream->next(kSoon);
     if (!frame) {
       EXPECT_EQ(frame.error().code, Error::Code::Overrun);
-      EXPECT_THAT(frame.error().message, HasSubstr("limits.lossless_mb"));
+      EXPECT_THAT(frame.error().message, HasSubstr("limits.subscription_backlog_mb"));
       break;
     }
     if (expected == 0) expected = frame->sequence;
@@ -312,6 +333,33 @@ TEST_F(RunningDaemon, RecordsIntoItsFolderEveryFrameAsItWas) {
     EXPECT_EQ(frame->planes.size(), 5u);
   }
   EXPECT_EQ(reader->next("cam").error().code, Error::Code::EndOfStream);
+}
+
+TEST_F(RunningDaemon, ARecordingEndsAtItsBoundsAndSaysWhich) {
+  for (const std::string bound : {"max_mb = 1", "keep_free_mb = 100000000"}) {
+    configure("recording_folder = 'recordings'\n[recording]\n" + bound + "\n" +
+              "[[source]]\nname = 'cam'\ndriver = 'pattern'\npace = 'trigger'\n"
+              "width = 160\nheight = 120\n");
+    start(options());
+    auto client = this->client();
+    const auto path = client.startRecording("cam", bound.substr(0, 3));
+    ASSERT_TRUE(path.ok()) << path.error().message;
+    const auto isOver = [&] { return !client.health()->sources.at(0).last_error.empty(); };
+    for (int i = 0; i < 100 && !isOver(); ++i) static_cast<void>(client.trigger("cam"));
+    ASSERT_TRUE(eventually(isOver));
+    EXPECT_THAT(client.health()->sources[0].last_error, HasSubstr("recording." + bound));
+    const auto stopped = client.stopRecording("cam");
+    ASSERT_FALSE(stopped.ok());
+    EXPECT_EQ(stopped.error().code, Error::Code::StorageFull);
+    const auto reader = record::Reader::open(*path);
+    ASSERT_TRUE(reader.ok()) << reader.error().message;
+    EXPECT_TRUE(reader->summary().indexed);
+    EXPECT_LE(std::filesystem::file_size(*path), 1u << 20);
+    if (bound == "max_mb = 1") {
+      EXPECT_GE(reader->summary().frames_per_source.at("cam"), 1u);
+    }
+    stop();
+  }
 }
 
 TEST_F(RunningDaemon, StoppingClosesRecordingsAndTellsClients) {

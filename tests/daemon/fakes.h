@@ -154,24 +154,24 @@ inline SourceHost::Open opener(const std::shared_ptr<Remote>& remote) {
   };
 }
 
-/// A queue's user: keeps what comes, and lets the test wait for it.
+/// A backlog's user: keeps what comes, and lets the test wait for it.
 class Taker {
  public:
   [[nodiscard]] std::function<void()> wake() {
     return [woken = woken_] { woken->add(); };
   }
   /// The next item; fails the wait after half a minute.
-  std::optional<FrameQueue::Item> next(FrameQueue& queue) {
+  std::optional<Backlog::Item> next(Backlog& backlog) {
     for (int seen = woken_->count();; seen = woken_->count()) {
-      if (auto item = queue.take()) return item;
+      if (auto item = backlog.take()) return item;
       if (!woken_->reaches(seen + 1)) return std::nullopt;
     }
   }
   /// The sequence number of the next frame, or -1 if there is none.
-  std::int64_t nextSequence(FrameQueue& queue) {
-    const auto item = next(queue);
+  std::int64_t nextSequence(Backlog& backlog) {
+    const auto item = next(backlog);
     if (!item || std::holds_alternative<Error>(*item)) return -1;
-    return static_cast<std::int64_t>(std::get<FrameQueue::Delivery>(*item).frame->frame.sequence);
+    return static_cast<std::int64_t>(std::get<Backlog::Delivery>(*item).frame->frame.sequence);
   }
 
  private:

@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <future>
+#include <tuple>
 
 #include "fakes.h"
 
@@ -28,8 +30,8 @@ struct Rig {
     host = std::make_unique<SourceHost>("cam", open, open(), options, clock);
   }
   SubscriberPtr subscribe(Taker& taker,
-                          FrameQueue::Settings queue = {.policy = Policy::Queue, .depth = 100}) {
-    auto subscribed = host->subscribe({{}, queue}, taker.wake());
+                          Backlog::Settings backlog = {.policy = Policy::Queue, .depth = 100}) {
+    auto subscribed = host->subscribe({{}, backlog}, taker.wake());
     EXPECT_TRUE(subscribed.ok()) << subscribed.error().message;
     return *subscribed;
   }
@@ -47,9 +49,9 @@ TEST(SourceHost, NumbersFramesWithoutGapsAndStampsThem) {
   const auto subscriber = rig.subscribe(taker);
   rig.remote->give(3);
   for (std::int64_t i = 0; i < 3; ++i) {
-    const auto item = taker.next(subscriber->queue);
+    const auto item = taker.next(subscriber->backlog);
     ASSERT_TRUE(item.has_value());
-    const Frame& frame = std::get<FrameQueue::Delivery>(*item).frame->frame;
+    const Frame& frame = std::get<Backlog::Delivery>(*item).frame->frame;
     EXPECT_EQ(frame.sequence, static_cast<std::uint64_t>(i));
     EXPECT_EQ(frame.source, "cam");
     EXPECT_EQ(frame.moment.received, rig.clock.wall());
@@ -87,9 +89,9 @@ TEST(SourceHost, EqualSelectionsShareOneEncoding) {
   auto c = rig.host->subscribe({{.planes = {PlaneKind::Flags}, .region = {}}, {}}, taker.wake());
   ASSERT_TRUE(c.ok());
   rig.remote->give();
-  const auto of_a = std::get<FrameQueue::Delivery>(*taker.next(a->queue)).frame;
-  const auto of_b = std::get<FrameQueue::Delivery>(*taker.next(b->queue)).frame;
-  const auto of_c = std::get<FrameQueue::Delivery>(*taker.next((*c)->queue)).frame;
+  const auto of_a = std::get<Backlog::Delivery>(*taker.next(a->backlog)).frame;
+  const auto of_b = std::get<Backlog::Delivery>(*taker.next(b->backlog)).frame;
+  const auto of_c = std::get<Backlog::Delivery>(*taker.next((*c)->backlog)).frame;
   EXPECT_EQ(of_a, of_b);
   EXPECT_NE(of_a, of_c);
   EXPECT_EQ(of_c->frame.planes.size(), 1u);
@@ -103,18 +105,18 @@ TEST(SourceHost, LockstepWaitsForEveryLockstepSubscriberAndForNobodyElse) {
   const auto second = rig.subscribe(two, {.policy = Policy::Lockstep});
   const auto other = rig.subscribe(free);
   rig.remote->give(3);
-  ASSERT_EQ(one.nextSequence(first->queue), 0);
-  ASSERT_EQ(free.nextSequence(other->queue), 0);
-  ASSERT_EQ(two.nextSequence(second->queue), 0);
+  ASSERT_EQ(one.nextSequence(first->backlog), 0);
+  ASSERT_EQ(free.nextSequence(other->backlog), 0);
+  ASSERT_EQ(two.nextSequence(second->backlog), 0);
   rig.host->acknowledge(first, 0);
   rig.host->acknowledge(first, 0);  // saying it twice is not both of them
   // A command is done between frames: after it, a frame that was due would have been made.
   for (int i = 0; i < 3; ++i) ASSERT_TRUE(rig.command([](auto&) { return Result<>{}; }).ok());
-  EXPECT_FALSE(first->queue.take().has_value()) << "a frame was made before all acknowledged";
+  EXPECT_FALSE(first->backlog.take().has_value()) << "a frame was made before all acknowledged";
   rig.host->acknowledge(second, 0);
-  EXPECT_EQ(one.nextSequence(first->queue), 1);
-  EXPECT_EQ(two.nextSequence(second->queue), 1);
-  EXPECT_EQ(free.nextSequence(other->queue), 1);
+  EXPECT_EQ(one.nextSequence(first->backlog), 1);
+  EXPECT_EQ(two.nextSequence(second->backlog), 1);
+  EXPECT_EQ(free.nextSequence(other->backlog), 1);
 }
 
 TEST(SourceHost, ALockstepSubscriberThatVanishesHoldsNobodyUp) {
@@ -124,10 +126,10 @@ TEST(SourceHost, ALockstepSubscriberThatVanishesHoldsNobodyUp) {
   const auto first = rig.subscribe(one, {.policy = Policy::Lockstep});
   const auto second = rig.subscribe(two, {.policy = Policy::Lockstep});
   rig.remote->give(2);
-  ASSERT_EQ(one.nextSequence(first->queue), 0);
+  ASSERT_EQ(one.nextSequence(first->backlog), 0);
   rig.host->acknowledge(first, 0);
   rig.host->unsubscribe(second);
-  EXPECT_EQ(one.nextSequence(first->queue), 1);
+  EXPECT_EQ(one.nextSequence(first->backlog), 1);
 }
 
 TEST(SourceHost, APoseUnderLockstepIsThatOfTheNextFrame) {
@@ -136,13 +138,13 @@ TEST(SourceHost, APoseUnderLockstepIsThatOfTheNextFrame) {
   Taker taker;
   const auto subscriber = rig.subscribe(taker, {.policy = Policy::Lockstep});
   rig.remote->give(2);
-  ASSERT_EQ(taker.nextSequence(subscriber->queue), 0);
+  ASSERT_EQ(taker.nextSequence(subscriber->backlog), 0);
   const Transform<World, Camera> pose{{1, 0, 0, 0}, {0, 0, 3}};
   ASSERT_TRUE(rig.command([&](drivers::Source& source) { return source.setPose(pose); }).ok());
   rig.host->acknowledge(subscriber, 0);
-  const auto item = taker.next(subscriber->queue);
+  const auto item = taker.next(subscriber->backlog);
   ASSERT_TRUE(item.has_value());
-  EXPECT_EQ(std::get<FrameQueue::Delivery>(*item).frame->frame.moment.world_from_camera, pose);
+  EXPECT_EQ(std::get<Backlog::Delivery>(*item).frame->frame.moment.world_from_camera, pose);
 }
 
 TEST(SourceHost, OpensALostCameraAgainAndKeepsItsSubscribers) {
@@ -151,7 +153,7 @@ TEST(SourceHost, OpensALostCameraAgainAndKeepsItsSubscribers) {
   Taker taker;
   const auto subscriber = rig.subscribe(taker);
   rig.remote->give();
-  ASSERT_EQ(taker.nextSequence(subscriber->queue), 0);
+  ASSERT_EQ(taker.nextSequence(subscriber->backlog), 0);
   rig.remote->give({Error::Code::Disconnected, "unplugged"});
   // The clock stands still, so the back-off is not over until the test says so.
   while (rig.host->health().reconnects == 0) std::this_thread::yield();
@@ -160,7 +162,7 @@ TEST(SourceHost, OpensALostCameraAgainAndKeepsItsSubscribers) {
   rig.clock.advance(std::chrono::milliseconds{2});
   ASSERT_TRUE(rig.remote->opened.reaches(2));
   rig.remote->give();
-  EXPECT_EQ(taker.nextSequence(subscriber->queue), 1);
+  EXPECT_EQ(taker.nextSequence(subscriber->backlog), 1);
   EXPECT_EQ(rig.host->health().reconnects, 1u);
 }
 
@@ -172,12 +174,12 @@ TEST(SourceHost, EndsItsSubscriptionsWithTheStreamAndStartsAnewForTheNext) {
   const auto subscriber = rig.subscribe(taker);
   rig.remote->give();
   rig.remote->give({Error::Code::EndOfStream, "the end"});
-  ASSERT_EQ(taker.nextSequence(subscriber->queue), 0);
-  const auto end = taker.next(subscriber->queue);
+  ASSERT_EQ(taker.nextSequence(subscriber->backlog), 0);
+  const auto end = taker.next(subscriber->backlog);
   EXPECT_EQ(std::get<Error>(end.value()).code, Error::Code::EndOfStream);
   const auto again = rig.subscribe(taker);
   rig.remote->give();
-  EXPECT_EQ(taker.nextSequence(again->queue), 1);
+  EXPECT_EQ(taker.nextSequence(again->backlog), 1);
 }
 
 TEST(SourceHost, WhoeverSubscribesWhileTheStreamEndsGetsTheNextOne) {
@@ -189,12 +191,12 @@ TEST(SourceHost, WhoeverSubscribesWhileTheStreamEndsGetsTheNextOne) {
   ASSERT_TRUE(rig.remote->asked.reaches(1));
   const auto second = rig.subscribe(late);
   rig.remote->give({Error::Code::EndOfStream, "the end"});
-  const auto end = early.next(first->queue);
+  const auto end = early.next(first->backlog);
   ASSERT_TRUE(end.has_value());
   EXPECT_EQ(std::get<Error>(*end).code, Error::Code::EndOfStream);
   ASSERT_TRUE(rig.remote->started.reaches(2));
   rig.remote->give();
-  EXPECT_EQ(late.nextSequence(second->queue), 0);
+  EXPECT_EQ(late.nextSequence(second->backlog), 0);
 }
 
 TEST(SourceHost, ACommandInterruptsAFrameInTheMaking) {
@@ -211,7 +213,7 @@ TEST(SourceHost, ACommandInterruptsAFrameInTheMaking) {
   rig.remote->give();
   EXPECT_TRUE(came) << "it waited for the frame";
   future.wait();
-  EXPECT_EQ(taker.nextSequence(subscriber->queue), 0);
+  EXPECT_EQ(taker.nextSequence(subscriber->backlog), 0);
   EXPECT_EQ(rig.host->health().reconnects, 0u);
 }
 
@@ -223,18 +225,25 @@ TEST(SourceHost, WhatGoesWrongWithOneSubscriberIsNobodyElsesMatter) {
   ASSERT_TRUE(broken.ok());
   const auto other = rig.subscribe(taker);
   rig.remote->give(2);
-  EXPECT_EQ(taker.nextSequence(other->queue), 0);
-  EXPECT_EQ(taker.nextSequence(other->queue), 1);
-  EXPECT_TRUE((*broken)->queue.hasEnded());
+  EXPECT_EQ(taker.nextSequence(other->backlog), 0);
+  EXPECT_EQ(taker.nextSequence(other->backlog), 1);
+  EXPECT_TRUE((*broken)->backlog.hasEnded());
 }
 
-TEST(SourceHost, ADriverThatThrowsIsOpenedAgain) {
+TEST(SourceHost, WhoeverCannotBeToldKeepsNothingFromTheOthers) {
   Rig rig;
   rig.start();
-  const auto thrown =
-      rig.command([](drivers::Source&) -> Result<> { throw std::runtime_error{"oops"}; });
-  ASSERT_FALSE(thrown.ok());
-  EXPECT_NE(thrown.error().message.find("oops"), std::string::npos);
+  Taker taker;
+  auto broken = rig.host->subscribe({{}, {}}, [] { throw 42; });
+  ASSERT_TRUE(broken.ok());
+  const auto other = rig.subscribe(taker);
+  rig.host->post([](auto&) { return Result<>{}; }, [](const Result<>&) { throw 42; });
+  EXPECT_TRUE(rig.command([](auto&) { return Result<>{}; }).ok());
+  rig.remote->give({Error::Code::EndOfStream, "the end"});
+  const auto end = taker.next(other->backlog);
+  ASSERT_TRUE(end.has_value());
+  EXPECT_EQ(std::get<Error>(*end).code, Error::Code::EndOfStream);
+  EXPECT_TRUE((*broken)->backlog.hasEnded());
 }
 
 TEST(SourceHost, AnAbsentCameraIsTriedAgainAndSaysSoMeanwhile) {
@@ -271,7 +280,7 @@ TEST(SourceHost, TellsItsSubscribersWhenItIsClosed) {
   const auto subscriber = rig.subscribe(taker);
   ASSERT_TRUE(rig.remote->asked.reaches(1));
   rig.host.reset();
-  EXPECT_EQ(std::get<Error>(taker.next(subscriber->queue).value()).code, Error::Code::Stopped);
+  EXPECT_EQ(std::get<Error>(taker.next(subscriber->backlog).value()).code, Error::Code::Stopped);
   EXPECT_EQ(rig.remote->stopped.count(), 1);
 }
 
@@ -283,6 +292,98 @@ TEST(SourceHost, RefusesLockstepFromACameraThatPacesItself) {
   const auto refused = rig.host->subscribe({{}, {.policy = Policy::Lockstep}}, taker.wake());
   ASSERT_FALSE(refused.ok());
   EXPECT_EQ(refused.error().code, Error::Code::Unsupported);
+}
+
+/// Throws once, in the call of that name.
+struct Fault {
+  std::string where;
+  bool is_standard = true;
+  std::atomic<bool> is_due{true};
+
+  void at(std::string_view call) {
+    if (call != where || !is_due.exchange(false)) return;
+    if (is_standard) throw std::runtime_error{"oops"};
+    throw 42;
+  }
+};
+
+/// A fake camera whose driver has a fault.
+class FaultySource final : public drivers::Source {
+ public:
+  FaultySource(std::shared_ptr<Remote> remote, std::shared_ptr<Fault> fault)
+      : source_(std::move(remote)), fault_(std::move(fault)) {}
+  [[nodiscard]] const drivers::SourceInfo& info() const override {
+    return fault_->at("info"), source_.info();
+  }
+  [[nodiscard]] drivers::SourceState state() const override {
+    return fault_->at("state"), drivers::SourceState{};
+  }
+  Result<> start() override { return fault_->at("start"), source_.start(); }
+  void stop() override { return fault_->at("stop"), source_.stop(); }
+  Result<Frame> next(std::stop_token stop, bool lockstep) override {
+    return fault_->at("next"), source_.next(std::move(stop), lockstep);
+  }
+  Result<> setParameter(std::string_view, double) override {
+    return fault_->at("setParameter"), Result<>{};
+  }
+
+ private:
+  test::FakeSource source_;
+  std::shared_ptr<Fault> fault_;  // shared with the test, and with the source that is opened next
+};
+
+class AFaultyDriver : public testing::TestWithParam<std::tuple<const char*, bool>> {};
+INSTANTIATE_TEST_SUITE_P(
+    Throws, AFaultyDriver,
+    testing::Combine(testing::Values("open", "info", "state", "start", "next", "stop", "setParameter"),
+                     testing::Bool()),
+    [](const auto& test) {
+      return std::string{std::get<0>(test.param)} + (std::get<1>(test.param) ? "Std" : "NonStd");
+    });
+
+TEST_P(AFaultyDriver, NeitherKillsNorWedgesItsSource) {
+  Rig rig;
+  auto fault = std::make_shared<Fault>();
+  fault->where = std::get<0>(GetParam());
+  fault->is_standard = std::get<1>(GetParam());
+  const auto open = [&]() -> Result<std::unique_ptr<drivers::Source>> {
+    fault->at("open");
+    return std::unique_ptr<drivers::Source>{std::make_unique<FaultySource>(rig.remote, fault)};
+  };
+  // As if it had not been there at first, so that each opening is the host's.
+  rig.host = std::make_unique<SourceHost>("cam", open, Error{Error::Code::NotFound, "not there"},
+                                          rig.options, rig.clock);
+  const auto pass = [&] {  // the pause before the camera is opened again
+    rig.clock.advance(std::chrono::milliseconds{2});
+    std::this_thread::sleep_for(std::chrono::milliseconds{1});
+  };
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds{30};
+  const auto isLate = [&] { return std::chrono::steady_clock::now() > deadline; };
+  while (!rig.host->describe().ok() && !isLate()) pass();
+  const Result<> set =
+      rig.command([](drivers::Source& source) { return source.setParameter("gain", 1); });
+  EXPECT_EQ(set.ok(), fault->where != "setParameter");
+  Taker taker;
+  rig.host->unsubscribe(rig.subscribe(taker));  // starts and stops it, perhaps
+  const auto subscriber = rig.subscribe(taker);
+  rig.remote->give(2);
+  int frames = 0;
+  while (frames < 2 && !isLate()) {
+    if (const auto item = subscriber->backlog.take()) {
+      ASSERT_TRUE(std::holds_alternative<Backlog::Delivery>(*item)) << std::get<Error>(*item).message;
+      ++frames;
+    }
+    pass();
+  }
+  EXPECT_EQ(frames, 2);
+  rig.host->unsubscribe(subscriber);
+  while (fault->is_due && !isLate()) pass();
+  rig.host->requestStop();
+  rig.host->waitForEnd();
+  EXPECT_FALSE(fault->is_due) << "it never threw";
+  const std::string error = set ? rig.host->health().last_error : set.error().message;
+  EXPECT_NE(error.find("the driver threw "), std::string::npos) << error;
+  EXPECT_EQ(error.find("oops") != std::string::npos, fault->is_standard) << error;
 }
 
 }  // namespace

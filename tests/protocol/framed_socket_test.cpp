@@ -3,7 +3,9 @@
 
 #include <gmock/gmock.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <boost/asio/io_context.hpp>
@@ -13,6 +15,7 @@
 #include <boost/asio/write.hpp>
 
 #include <array>
+#include <cerrno>
 #include <chrono>
 #include <cstring>
 #include <filesystem>
@@ -253,8 +256,8 @@ TEST_P(SharedMemory, AMissingFileDescriptorIsMalformed) {
   EXPECT_THAT(received.error().message, HasSubstr("file descriptor is missing"));
 }
 
-/// Sends bytes with so many copies of a file descriptor.
-void sendWithDescriptors(int socket, std::span<const std::byte> bytes, int fd, std::size_t count) {
+/// Sends bytes with so many copies of a file descriptor; the result of sendmsg(2).
+ssize_t trySendWithDescriptors(int socket, std::span<const std::byte> bytes, int fd, std::size_t count) {
   std::vector<int> fds(count, fd);
   std::vector<char> control(CMSG_SPACE(count * sizeof(int)));
   iovec part{const_cast<std::byte*>(bytes.data()), bytes.size()};
@@ -268,7 +271,10 @@ void sendWithDescriptors(int socket, std::span<const std::byte> bytes, int fd, s
   item->cmsg_type = SCM_RIGHTS;
   item->cmsg_len = CMSG_LEN(count * sizeof(int));
   std::memcpy(CMSG_DATA(item), fds.data(), count * sizeof(int));
-  ASSERT_EQ(::sendmsg(socket, &message, 0), static_cast<ssize_t>(bytes.size()));
+  return ::sendmsg(socket, &message, 0);
+}
+void sendWithDescriptors(int socket, std::span<const std::byte> bytes, int fd, std::size_t count) {
+  ASSERT_EQ(trySendWithDescriptors(socket, bytes, fd, count), static_cast<ssize_t>(bytes.size()));
 }
 
 std::ptrdiff_t openFiles() {
@@ -303,6 +309,41 @@ TEST_P(SharedMemory, FileDescriptorsThatNoMessageNeedsAreRefused) {
   const auto received = receive(there);
   ASSERT_FALSE(received);
   EXPECT_THAT(received.error().message, HasSubstr("no message refers to"));
+}
+
+TEST_P(SharedMemory, ABodyComesInlineWhileTooManyDescriptorsAreOnTheirWay) {
+  constexpr int kImpossibleHere = 77;
+  auto ends = connect(), full = connect();
+  const pid_t child = ::fork();  // what it gives up, this process keeps
+  if (child == 0) {
+    constexpr uid_t kNobody = 65534;  // root may have any number on their way
+    const rlimit few{32, 32};
+    const std::byte byte{};
+    if ((::geteuid() == 0 && ::setresuid(kNobody, kNobody, kNobody) != 0) ||
+        ::setrlimit(RLIMIT_NOFILE, &few) != 0 ||
+        trySendWithDescriptors(full.first.native_handle(), {&byte, 1}, 0, 100) != 1 ||
+        trySendWithDescriptors(full.first.native_handle(), {&byte, 1}, 0, 1) >= 0 ||
+        errno != ETOOMANYREFS) {
+      ::_exit(kImpossibleHere);
+    }
+    FramedSocket here{std::move(ends.first)}, there{std::move(ends.second)};
+    there.acceptSharedBodies();
+    const wire::FrameMessage message{1, wire::exampleFrame(20, 10)};
+    const wire::Body body = wire::encodeBody(message.frame.planes);
+    const auto shared = SharedBody::create(body);
+    if (!shared) ::_exit(2);
+    here.asyncWrite(*wire::encode(message, body), *shared, ignore);
+    const auto received = receive(there);
+    const bool is_same = received && wire::toBytes(*wire::encode(*received)) ==
+                                         wire::toBytes(*wire::encode(message));
+    ::_exit(is_same ? 0 : 1);
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  if (WIFEXITED(status) && WEXITSTATUS(status) == kImpossibleHere) {
+    GTEST_SKIP() << "this process cannot make the kernel say ETOOMANYREFS";
+  }
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << status;
 }
 
 TEST(SharedBodyTest, CannotBeChangedByAnyone) {

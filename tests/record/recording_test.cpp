@@ -303,6 +303,72 @@ TEST_F(Recording, AFullFileSystemKeepsAllWholeChunks) {
   EXPECT_EQ(status, 0);
 }
 
+/// Writes frames until a bound ends it, closes, and reads all of them back; gives how many.
+int writeUpToTheBound(Writer writer, const std::filesystem::path& file, const char* reason) {
+  Result<> wrote;
+  int written = 0;
+  while ((wrote = writer.write(frameOf(written))) && written < 10'000) ++written;
+  EXPECT_FALSE(wrote) << "the bound did not end it";
+  if (wrote) return written;
+  EXPECT_EQ(wrote.error().code, Error::Code::StorageFull);
+  EXPECT_THAT(wrote.error().message, HasSubstr(reason));
+  EXPECT_TRUE(writer.close()) << "a bound is no failure of the file";
+  auto reader = Reader::open(file);
+  EXPECT_TRUE(reader) << reader.error().message;
+  if (!reader) return written;
+  EXPECT_TRUE(reader->summary().indexed) << reader->summary().damage;
+  int count = 0;
+  EXPECT_EQ(expectFrames(*reader, 0, count).code, Error::Code::EndOfStream);
+  EXPECT_EQ(count, written);
+  return written;
+}
+
+TEST_F(Recording, ABoundOnTheFileHoldsWhenItIsClosed) {
+  for (const std::uint64_t chunk : {1ull, 30'000ull, 1ull << 30}) {
+    for (const int level : {0, 1}) {
+      const WriterOptions options{.chunk_bytes = chunk, .zstd_level = level, .most_bytes = 300'000};
+      const auto file = folder_ / (std::to_string(chunk) + "-" + std::to_string(level));
+      auto writer = Writer::create(file, options);
+      ASSERT_TRUE(writer) << writer.error().message;
+      const int written = writeUpToTheBound(*std::move(writer), file, "than the 0 MB that it may");
+      EXPECT_LE(std::filesystem::file_size(file), 300'000u) << file;
+      // Not compressed, it is too early by what is reserved for one more channel (twice 2048 bytes) and for
+      // the ends (512), and by at most 40 bytes for the index of each chunk.
+      const std::uint64_t reserved = 2 * 2048 + 512 + 40ull * static_cast<unsigned>(written);
+      const std::uint64_t one_more = wireBytes(frameOf(0)).size() + 200;
+      if (level == 0) {
+        EXPECT_GT(std::filesystem::file_size(file) + reserved + one_more, 300'000u) << file;
+      }
+    }
+  }
+}
+
+TEST_F(Recording, ABoundOnFreeSpaceIsKeptFromTheFirstFrameOn) {
+  auto writer = Writer::create(file_, {.keep_free_bytes = 1ull << 62});
+  ASSERT_TRUE(writer);
+  EXPECT_EQ(writeUpToTheBound(*std::move(writer), file_, "free on its disk"), 0);
+}
+
+TEST_F(Recording, LeavesTheSpaceFreeThatItIsToldTo) {
+  const std::filesystem::path small = folder_ / "small";
+  std::filesystem::create_directory(small);
+  const int status = inAChild([&] {
+    if (!enterMountNamespace() || ::mount("tmpfs", small.c_str(), "tmpfs", 0, "size=1m") != 0) {
+      ::_exit(kImpossibleHere);
+    }
+    const std::filesystem::path file = small / "a.mcap";
+    auto writer = Writer::create(
+        file, {.chunk_bytes = 30'000, .zstd_level = 0, .keep_free_bytes = 600'000});
+    ASSERT_TRUE(writer) << writer.error().message;
+    EXPECT_GT(writeUpToTheBound(*std::move(writer), file, "free on its disk"), 10);
+    EXPECT_GE(std::filesystem::space(small).available, 600'000u);
+  });
+  if (status == kImpossibleHere)
+    GTEST_SKIP()
+        << "this system lets this user mount a tmpfs neither as is nor in a user namespace";
+  EXPECT_EQ(status, 0);
+}
+
 TEST_F(Recording, ADeviceThatIsFullIsNamedAtOnce) {
   const auto writer = Writer::create("/dev/full", {.overwrite = true});
   ASSERT_FALSE(writer);

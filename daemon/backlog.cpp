@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/frame_queue.h"
+#include "daemon/backlog.h"
 
 #include <fmt/format.h>
 
@@ -27,10 +27,10 @@ std::shared_ptr<const transport::SharedBody> PreparedFrame::sharedBody() const {
 
 std::uint64_t PreparedFrame::heldBytes() const { return body.bytes + kFrameOverhead; }
 
-FrameQueue::FrameQueue(Settings settings, std::function<void()> wake)
+Backlog::Backlog(Settings settings, std::function<void()> wake)
     : settings_(settings), wake_(std::move(wake)) {}
 
-bool FrameQueue::wants(SteadyTime now) {
+bool Backlog::wants(SteadyTime now) {
   const std::scoped_lock lock{mutex_};
   if (end_) return false;
   if (settings_.max_rate_hz <= 0.0) return true;
@@ -45,7 +45,7 @@ bool FrameQueue::wants(SteadyTime now) {
   return true;
 }
 
-void FrameQueue::push(PreparedFramePtr frame) {
+void Backlog::push(PreparedFramePtr frame) {
   {
     const std::scoped_lock lock{mutex_};
     if (end_) return;
@@ -55,8 +55,8 @@ void FrameQueue::push(PreparedFramePtr frame) {
       end_ = Error{
           Error::Code::Overrun,
           fmt::format("{} frames ({} MB) wait for this lossless subscriber, which is the "
-                      "daemon's limit (limits.lossless_mb): read faster, ask for less, or raise "
-                      "the limit",
+                      "daemon's limit (limits.subscription_backlog_mb): read faster, ask for less, "
+                      "or raise the limit",
                       frames_.size(), bytes_ >> 20)};
     } else {
       bytes_ += frame->heldBytes();
@@ -68,7 +68,7 @@ void FrameQueue::push(PreparedFramePtr frame) {
   wake_();
 }
 
-bool FrameQueue::isTooMuch() const {
+bool Backlog::isTooMuch() const {
   switch (settings_.policy) {
     case wire::Policy::Lossless:
       return false;  // it has ended with Overrun before
@@ -81,13 +81,13 @@ bool FrameQueue::isTooMuch() const {
   return frames_.size() > 1;
 }
 
-void FrameQueue::dropOldest() {
+void Backlog::dropOldest() {
   bytes_ -= frames_.front()->heldBytes();
   frames_.pop_front();
   ++dropped_;
 }
 
-void FrameQueue::end(Error reason) {
+void Backlog::end(Error reason) {
   {
     const std::scoped_lock lock{mutex_};
     if (end_) return;
@@ -97,17 +97,17 @@ void FrameQueue::end(Error reason) {
   wake_();
 }
 
-bool FrameQueue::hasEnded() const {
+bool Backlog::hasEnded() const {
   const std::scoped_lock lock{mutex_};
   return end_.has_value();
 }
 
-std::uint64_t FrameQueue::heldBytes() const {
+std::uint64_t Backlog::heldBytes() const {
   const std::scoped_lock lock{mutex_};
   return bytes_;
 }
 
-std::optional<FrameQueue::Item> FrameQueue::take() {
+std::optional<Backlog::Item> Backlog::take() {
   const std::scoped_lock lock{mutex_};
   if (!frames_.empty()) {
     Delivery delivery{std::move(frames_.front()), std::exchange(dropped_, 0)};

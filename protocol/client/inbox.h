@@ -19,10 +19,11 @@ namespace toftwin::client {
 /// memory that a slow application costs here, and keeps the reading thread free for the others.
 std::uint32_t windowOf(wire::Policy policy);
 
-/// Frames between the reading thread and the application's.
-class FrameQueue {
+/// Frames of one subscription that arrived, between the reading thread and the application's, which
+/// waits here. What was not sent yet waits in the daemon, in its Backlog.
+class Inbox {
  public:
-  explicit FrameQueue(wire::Policy policy) : policy_(policy) {}
+  explicit Inbox(wire::Policy policy) : policy_(policy) {}
 
   /// Under Latest the newer frame replaces the one that waits, so a frame is acknowledged when it
   /// arrives; else when the application takes it.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "protocol/client/frame_queue.h"
+#include "protocol/client/inbox.h"
 
 #include <algorithm>
 #include <string>
@@ -20,7 +20,7 @@ std::uint32_t windowOf(wire::Policy policy) {
   return 4;
 }
 
-Result<> FrameQueue::push(Frame frame) {
+Result<> Inbox::push(Frame frame) {
   const std::scoped_lock lock{mutex_};
   if (policy_ == wire::Policy::Latest) {
     for (const Frame& missed : frames_) frame.dropped_before += missed.dropped_before + 1;
@@ -35,13 +35,13 @@ Result<> FrameQueue::push(Frame frame) {
   return {};
 }
 
-void FrameQueue::end(Error reason) {
+void Inbox::end(Error reason) {
   const std::scoped_lock lock{mutex_};
   if (!end_) end_ = std::move(reason);
   changed_.notify_all();
 }
 
-Result<Frame> FrameQueue::pop(std::chrono::milliseconds timeout) {
+Result<Frame> Inbox::pop(std::chrono::milliseconds timeout) {
   using std::chrono::steady_clock;
   // A year is as good as for ever, and can be added to a time point without overflow.
   const auto longest = std::chrono::hours{24 * 365};

@@ -28,20 +28,21 @@ struct PreparedFrame {
   /// shared memory to be had. Made when it is first sent and gone when the writes that it was given
   /// to are done, so that frames that wait hold no file descriptor. May be called on any thread.
   [[nodiscard]] std::shared_ptr<const transport::SharedBody> sharedBody() const;
-  /// What a queue holds in memory with this frame.
+  /// What a backlog holds in memory with this frame.
   [[nodiscard]] std::uint64_t heldBytes() const;
 
  private:
   mutable std::mutex mutex_;
   mutable std::weak_ptr<const transport::SharedBody> shared_;
 };
-/// Shared by the queues and socket writes of all subscriptions with that selection; nobody changes
+/// Shared by the backlogs and socket writes of all subscriptions with that selection; nobody changes
 /// it.
 using PreparedFramePtr = std::shared_ptr<const PreparedFrame>;
 
 /// Between the thread of a source and one subscriber: holds what the subscriber has not taken yet,
-/// by its policy. The source's side never waits.
-class FrameQueue {
+/// by its policy. The source's side never waits, and neither does the other (the client's Inbox, where
+/// the application does wait, is the far end of it).
+class Backlog {
  public:
   struct Settings {
     wire::Policy policy = wire::Policy::Latest;
@@ -60,7 +61,7 @@ class FrameQueue {
 
   /// `wake` is called, on the source's thread, when there is something to take after there was
   /// nothing. It must not call back.
-  FrameQueue(Settings settings, std::function<void()> wake);
+  Backlog(Settings settings, std::function<void()> wake);
 
   /// Whether the subscriber takes the frame that was made now. Asked once for every frame, before
   /// it is prepared: this is where the rate is limited.

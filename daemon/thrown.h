@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <exception>
+#include <string>
+#include <string_view>
+
+#include <toftwin/result.h>
+
+namespace toftwin::daemon {
+
+/// In a catch (...): what was thrown, whatever it was, as an Error that says who threw it.
+inline Error thrownError(std::string_view who) {
+  const std::string threw = std::string{who} + " threw ";
+  try {
+    throw;
+  } catch (const std::exception& e) {
+    return {Error::Code::Internal, threw + "an exception: " + e.what()};
+  } catch (...) {
+    return {Error::Code::Internal, threw + "something that is no exception of the standard library"};
+  }
+}
+
+}  // namespace toftwin::daemon

@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/backlog.h"
+
+#include <gtest/gtest.h>
+
+#include "daemon/subscriber.h"
+#include "fakes.h"
+
+namespace toftwin::daemon {
+namespace {
+
+using wire::Policy;
+
+PreparedFramePtr frameNumber(std::uint64_t sequence, std::uint64_t bytes = 64) {
+  auto frame = std::make_shared<PreparedFrame>();
+  frame->frame.sequence = sequence;
+  frame->body.bytes = bytes;
+  return frame;
+}
+const std::uint64_t kHeld = frameNumber(0)->heldBytes();
+Backlog backlogWith(Backlog::Settings settings) {
+  return {settings, [] {}};
+}
+Backlog::Delivery delivered(Backlog& backlog) {
+  return std::get<Backlog::Delivery>(backlog.take().value());
+}
+
+TEST(Backlog, LatestKeepsTheNewestAndCountsTheRest) {
+  Backlog backlog = backlogWith({.policy = Policy::Latest});
+  for (std::uint64_t i = 0; i < 5; ++i) backlog.push(frameNumber(i));
+  const auto first = delivered(backlog);
+  EXPECT_EQ(first.frame->frame.sequence, 4u);
+  EXPECT_EQ(first.dropped_before, 4u);
+  EXPECT_FALSE(backlog.take().has_value());
+  backlog.push(frameNumber(5));
+  EXPECT_EQ(delivered(backlog).dropped_before, 0u);
+}
+
+TEST(Backlog, QueueDropsTheOldestAndCountsThemOnce) {
+  Backlog backlog = backlogWith({.policy = Policy::Queue, .depth = 3});
+  for (std::uint64_t i = 0; i < 5; ++i) backlog.push(frameNumber(i));
+  auto next = delivered(backlog);
+  EXPECT_EQ(next.frame->frame.sequence, 2u);
+  EXPECT_EQ(next.dropped_before, 2u);
+  for (std::uint64_t i = 5; i < 7; ++i) backlog.push(frameNumber(i));  // 3 4 5, then 6 drops 3
+  next = delivered(backlog);
+  EXPECT_EQ(next.frame->frame.sequence, 4u);
+  EXPECT_EQ(next.dropped_before, 1u);
+  EXPECT_EQ(delivered(backlog).dropped_before, 0u);
+}
+
+TEST(Backlog, LosslessEndsWithOverrunAfterAllThatWaited) {
+  Backlog backlog = backlogWith({.policy = Policy::Lossless, .byte_limit = 3 * kHeld});
+  for (std::uint64_t i = 0; i < 10; ++i) backlog.push(frameNumber(i));
+  for (std::uint64_t i = 0; i < 3; ++i) {
+    const auto next = delivered(backlog);
+    EXPECT_EQ(next.frame->frame.sequence, i);
+    EXPECT_EQ(next.dropped_before, 0u);
+  }
+  EXPECT_EQ(std::get<Error>(backlog.take().value()).code, Error::Code::Overrun);
+  EXPECT_FALSE(backlog.take().has_value());
+  EXPECT_FALSE(backlog.wants({}));
+}
+
+TEST(Backlog, TakingMakesRoomForALosslessSubscriber) {
+  Backlog backlog = backlogWith({.policy = Policy::Lossless, .byte_limit = 2 * kHeld});
+  for (std::uint64_t i = 0; i < 100; ++i) {
+    backlog.push(frameNumber(i));
+    EXPECT_EQ(delivered(backlog).frame->frame.sequence, i);
+  }
+  EXPECT_FALSE(backlog.hasEnded());
+}
+
+TEST(Backlog, QueueDropsTheOldestRatherThanHoldMoreThanItsBytes) {
+  Backlog backlog = backlogWith({.policy = Policy::Queue, .depth = 1024, .byte_limit = 3 * kHeld});
+  for (std::uint64_t i = 0; i < 10; ++i) {
+    backlog.push(frameNumber(i));
+    ASSERT_LE(backlog.heldBytes(), 3 * kHeld);
+  }
+  const auto next = delivered(backlog);
+  EXPECT_EQ(next.frame->frame.sequence, 7u);
+  EXPECT_EQ(next.dropped_before, 7u);
+}
+
+TEST(Backlog, AFrameThatIsTooLargeByItselfIsKeptUntilTheNext) {
+  Backlog backlog = backlogWith({.policy = Policy::Queue, .depth = 1024, .byte_limit = kHeld});
+  backlog.push(frameNumber(0, 1000));
+  backlog.push(frameNumber(1, 1000));
+  EXPECT_EQ(delivered(backlog).frame->frame.sequence, 1u);
+  EXPECT_EQ(backlog.heldBytes(), 0u);
+}
+
+TEST(Backlog, NeverHoldsMoreThanOneFrameUnderLockstep) {
+  Backlog backlog = backlogWith({.policy = Policy::Lockstep});
+  for (std::uint64_t i = 0; i < 3; ++i) backlog.push(frameNumber(i));
+  EXPECT_EQ(backlog.heldBytes(), kHeld);
+  EXPECT_EQ(delivered(backlog).frame->frame.sequence, 2u);
+}
+
+TEST(FanOut, WhatOneSelectionCannotHaveReachesTheOthers) {
+  Frame frame;
+  frame.camera.width = 4;
+  frame.camera.height = 2;
+  frame.camera.fx = frame.camera.fy = 4;
+  frame.moment.exposures = {{{1}, 1_ms, 80_MHz}};
+  frame.planes = {toPlane(PlaneKind::Flags, Image<std::uint8_t>{3, 2}),  // not the camera's size
+                  toPlane(PlaneKind::Range, Image<float>{4, 2})};
+  test::Taker taker;
+  const auto wanting = [&](PlaneKind kind) {
+    return std::make_shared<Subscriber>(Wish{{.planes = {kind}, .region = {}}, {}}, taker.wake());
+  };
+  const auto broken = wanting(PlaneKind::Flags), whole = wanting(PlaneKind::Range);
+  fanOut(frame, {broken, whole});
+  EXPECT_EQ(std::get<Error>(broken->backlog.take().value()).code, Error::Code::Internal);
+  EXPECT_EQ(delivered(whole->backlog).frame->frame.planes.size(), 1u);
+}
+
+TEST(Backlog, EmptyFramesCountToo) {
+  EXPECT_GT(frameNumber(0, 0)->heldBytes(), sizeof(PreparedFrame));
+}
+
+TEST(PreparedFrame, IsInSharedMemoryOnlyWhileItIsBeingSent) {
+  PreparedFrame frame;
+  const std::vector<std::byte> bytes(100'000, std::byte{7});
+  frame.body = {.pieces = {Buffer::adopt(bytes)}, .bytes = bytes.size(), .crc32c = 0};
+  auto one = frame.sharedBody();
+  ASSERT_NE(one, nullptr);
+  EXPECT_EQ(frame.sharedBody(), one) << "subscribers that are sent it together share it";
+  const std::weak_ptr<const transport::SharedBody> gone = one;
+  one.reset();
+  EXPECT_TRUE(gone.expired());
+  EXPECT_NE(frame.sharedBody(), nullptr);
+}
+
+TEST(Backlog, TheFirstReasonOfAnEndCounts) {
+  Backlog backlog = backlogWith({});
+  backlog.end({Error::Code::EndOfStream, "first"});
+  backlog.end({Error::Code::Stopped, "second"});
+  backlog.push(frameNumber(0));
+  EXPECT_EQ(std::get<Error>(backlog.take().value()).message, "first");
+  EXPECT_FALSE(backlog.take().has_value());
+}
+
+TEST(Backlog, WakesOnlyWhenThereWasNothing) {
+  int woken = 0;
+  Backlog backlog{{.policy = Policy::Queue, .depth = 3}, [&] { ++woken; }};
+  backlog.push(frameNumber(0));
+  backlog.push(frameNumber(1));
+  EXPECT_EQ(woken, 1);
+  delivered(backlog);
+  delivered(backlog);
+  backlog.push(frameNumber(2));
+  EXPECT_EQ(woken, 2);
+}
+
+/// Takes `hz` of a source with `source_hz` for ten seconds; gives how many it took.
+int takenInTenSeconds(double hz, double source_hz, std::chrono::nanoseconds jitter) {
+  Backlog backlog = backlogWith({.max_rate_hz = hz});
+  int taken = 0;
+  for (int i = 0; i < static_cast<int>(10 * source_hz); ++i) {
+    const auto at = std::chrono::nanoseconds{static_cast<std::int64_t>(1e9 * i / source_hz)};
+    if (backlog.wants(SteadyTime{} + std::chrono::seconds{1} + at + (i % 2 == 0 ? jitter : -jitter)))
+      ++taken;
+  }
+  return taken;
+}
+
+TEST(Backlog, RateIsKeptOnTheMeanAndUnderJitter) {
+  using std::chrono::milliseconds;
+  EXPECT_EQ(takenInTenSeconds(10, 30, milliseconds{0}), 100);
+  EXPECT_EQ(takenInTenSeconds(10, 30, milliseconds{2}), 100);
+  EXPECT_EQ(takenInTenSeconds(7, 30, milliseconds{0}), 70);
+  EXPECT_EQ(takenInTenSeconds(100, 30, milliseconds{0}), 300);
+  EXPECT_EQ(takenInTenSeconds(0, 30, milliseconds{0}), 300);
+}
+
+TEST(Backlog, ARateIsNotCaughtUpAfterAPause) {
+  Backlog backlog = backlogWith({.max_rate_hz = 10});
+  const SteadyTime start{};
+  EXPECT_TRUE(backlog.wants(start));
+  EXPECT_TRUE(backlog.wants(start + std::chrono::seconds{5}));
+  EXPECT_FALSE(backlog.wants(start + std::chrono::seconds{5} + std::chrono::milliseconds{50}));
+}
+
+}  // namespace
+}  // namespace toftwin::daemon
