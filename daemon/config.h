@@ -34,7 +34,8 @@ struct ListenKeys {
            "Only for a network that you trust whole");
     v.text("socket", socket,
            "path of the Unix socket, relative to this file; \"auto\": toftwin.sock in $RUNTIME_DIRECTORY, /run/toftwin or "
-           "$XDG_RUNTIME_DIR; empty: no Unix socket");
+           "$XDG_RUNTIME_DIR, and no socket where none of them is there or may be written to; empty: no "
+           "Unix socket");
   }
 };
 

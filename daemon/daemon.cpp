@@ -88,21 +88,34 @@ Daemon::~Daemon() {
 Result<> Daemon::listen(ListenKeys keys) {
   if (options_.port) keys.port = *options_.port;
   if (options_.socket) keys.socket = *options_.socket;
-  if (keys.socket == "auto") keys.socket = defaultSocketPath();
-  // The socket first: its lock finds a second daemon, and can name it.
-  if (!keys.socket.empty()) {
-    if (auto done = server_.listenUnix(keys.socket); !done) return done;
-    spdlog::info("listening on {}", keys.socket);
-  }
-  if (!keys.address.empty()) {
-    if (auto done = server_.listenTcp(keys.address, static_cast<std::uint16_t>(keys.port)); !done)
-      return done;
-    spdlog::info("listening on {} port {}", keys.address, server_.port());
-  }
   if (keys.socket.empty() && keys.address.empty()) {
     return Error{Error::Code::InvalidArgument,
                  "neither listen.address nor listen.socket is set: nobody could connect"};
   }
+  // The socket first: its lock finds a second daemon, and can name it.
+  if (auto done = listenUnix(keys); !done) return done;
+  if (!keys.address.empty()) {
+    if (auto done = server_.listenTcp(keys.address, static_cast<std::uint16_t>(keys.port)); !done)
+      return done;
+  }
+  // Only now: a daemon that cannot have its port does not listen.
+  if (const std::string path = server_.socketPath(); !path.empty())
+    spdlog::info("listening on {}", path);
+  if (!keys.address.empty()) spdlog::info("listening on {} port {}", keys.address, server_.port());
+  return {};
+}
+
+/// A machine without a folder for "auto" (a container, su, cron) has TCP all the same; a path that
+/// somebody wrote down must work.
+Result<> Daemon::listenUnix(const ListenKeys& keys) {
+  if (keys.socket.empty()) return {};
+  const bool is_auto = keys.socket == "auto";
+  auto done = server_.listenUnix(is_auto ? defaultSocketPath() : keys.socket);
+  if (done || !is_auto || keys.address.empty()) return done;
+  using Code = Error::Code;
+  const Code code = done.error().code;
+  if (code != Code::StorageFull && code != Code::PermissionDenied) return done;
+  spdlog::warn("no Unix socket, TCP only: {}", done.error().message);
   return {};
 }
 

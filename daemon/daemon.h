@@ -65,6 +65,7 @@ class Daemon {
 
   Daemon(Options options, const Config& config);
   Result<> listen(ListenKeys keys);
+  Result<> listenUnix(const ListenKeys& keys);
   void apply(Config config);
   void applyKeys(const Config& config);
   void run(ConfiguredSource source);

@@ -85,7 +85,7 @@ Result<transport::FileDescriptor> takeLock(const fs::path& socket) {
   if (!lock) {
     const bool is_denied = errno == EACCES || errno == EROFS || errno == EPERM;
     return Error{
-        is_denied ? Error::Code::PermissionDenied : Error::Code::NotFound,
+        is_denied ? Error::Code::PermissionDenied : Error::Code::StorageFull,
         fmt::format("{}: cannot be made: {}; the folder must exist and be writable for this "
                     "user, or choose another socket with listen.socket or --socket",
                     file.string(), std::generic_category().message(errno))};

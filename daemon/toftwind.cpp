@@ -43,7 +43,12 @@ int check(const Arguments& arguments) {
                source.opened ? (*source.opened)->info().model
                              : "not there now: " + source.opened.error().message);
   }
-  fmt::print("{} is good\n", arguments.config);
+  if (config->sources.empty()) {
+    fmt::print("{} is good, but has no [[source]]: clients would see nothing\n", arguments.config);
+    return kOk;
+  }
+  fmt::print("{} is good: {} source{}\n", arguments.config, config->sources.size(),
+             config->sources.size() == 1 ? "" : "s");
   return kOk;
 }
 

@@ -96,7 +96,12 @@ Result<Frame> nextFrame(Feed& feed, const CaptureOptions& options) {
     const auto left =
         std::chrono::ceil<std::chrono::milliseconds>(end - std::chrono::steady_clock::now());
     auto frame = feed.next(std::clamp(left, std::chrono::milliseconds{0}, kPatience));
-    if (frame || frame.error().code != Error::Code::Timeout || left <= kPatience) return frame;
+    if (frame || frame.error().code != Error::Code::Timeout) return frame;
+    if (left > kPatience) continue;
+    return Error{Error::Code::Timeout,
+                 fmt::format("none came within {:.6g} s. Another client may hold the camera in "
+                             "lockstep until it asks for the next frame",
+                             std::chrono::duration<double>(options.timeout).count())};
   }
 }
 

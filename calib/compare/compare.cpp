@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/compare/compare.h"
 
+#include <cerrno>
 #include <ctime>
 #include <fstream>
+#include <system_error>
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
@@ -32,13 +34,15 @@ Section missingData(const CompareJob& job) {
 }
 
 Result<> writeLog(const Capture& capture, const std::filesystem::path& folder) {
+  errno = 0;
   std::ofstream out{folder / "log.jsonl", std::ios::binary | std::ios::trunc};
   for (const Json& entry : capture.log) out << entry.line() << '\n';
   out.flush();
   if (out) return {};
+  const int why = errno;
   return Error{Error::Code::StorageFull,
-               fmt::format("{}: cannot be written (no permission, or the disk is full)",
-                           (folder / "log.jsonl").string())};
+               fmt::format("{}: cannot be written: {}", (folder / "log.jsonl").string(),
+                           std::generic_category().message(why))};
 }
 
 Result<> addLive(const CompareJob& job, Progress& progress, Report& report, std::string& verdict) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <fmt/format.h>
 
@@ -11,11 +12,35 @@
 namespace toftwin::compare {
 namespace {
 
-/// B − A in a word: "reads 3.2 ± 0.1 mm farther".
-std::string inWords(const Summary& difference) {
-  return fmt::format("{} ± {} mm {}", shown(std::abs(difference.mean), 2),
-                     shown(difference.standard_error, 2),
-                     difference.mean >= 0.0 ? "farther" : "nearer");
+/// B − A, and the standard error of its mean over the poses; none at one pose. Not over the pixels:
+/// those of one pose see the same errors, and the path tracer's own noise is frozen there.
+struct Bias {
+  double mean_mm = 0.0;
+  double error_mm = std::numeric_limits<double>::quiet_NaN();
+};
+
+/// Surfaces, where there are any: at edges a pixel's two cameras need not see the same surface.
+const Region& mainOf(const Characteristics& c) {
+  return c.regions.size() > 1 ? c.regions[1] : c.regions.front();
+}
+
+Bias biasOf(const std::vector<PoseComparison>& poses, const Region& all) {
+  std::vector<double> means;
+  for (const PoseComparison& pose : poses) {
+    const Characteristics c = characterise({pose});
+    if (!c.regions.empty()) means.push_back(mainOf(c).difference_mm.mean);
+  }
+  Bias bias{.mean_mm = all.difference_mm.mean};
+  if (means.size() > 1) bias.error_mm = summarise(means).standard_error;
+  return bias;
+}
+
+/// B − A in a word: "3.2 ± 0.1 mm farther".
+std::string inWords(const Bias& bias) {
+  const std::string magnitude = shown(std::abs(bias.mean_mm), 2);
+  const std::string error =
+      std::isfinite(bias.error_mm) ? fmt::format(" ± {}", shown(bias.error_mm, 2)) : "";
+  return fmt::format("{}{} mm {}", magnitude, error, bias.mean_mm >= 0.0 ? "farther" : "nearer");
 }
 
 TableBlock regionTable(const Characteristics& c) {
@@ -219,8 +244,8 @@ Result<Finding> judgeLive(const Capture& capture) {
                  "they look at something within their range?"};
   }
   const Pixels pixels = pixelsOf(poses);
-  // Surfaces, where there are any: at edges a pixel's two cameras need not see the same surface.
-  const Region& main = c.regions.size() > 1 ? c.regions[1] : c.regions.front();
+  const Region& main = mainOf(c);
+  const Bias bias = biasOf(poses, main);
   const Summary& all = main.difference_mm;
   std::vector<double> magnitudes, log_amplitude;
   for (const double d : pixels.difference_mm) magnitudes.push_back(std::abs(d));
@@ -236,7 +261,7 @@ Result<Finding> judgeLive(const Capture& capture) {
       "within {} mm. Temporal noise: A {} mm, B {} mm (median). "
       "Validity masks agree in {} % of the pixels. {} pixels differ by more than {} mm and are "
       "counted apart.",
-      inWords(all), all.n, poses.size(), shown(all.p95_abs), shown(main.noise_a_mm, 2),
+      inWords(bias), all.n, poses.size(), shown(all.p95_abs), shown(main.noise_a_mm, 2),
       shown(main.noise_b_mm, 2), shown(100.0 * c.mask_agreement, 1), c.gross, shown(kGross_mm, 0));
   auto& blocks = finding.section.blocks;
   for (const std::string& warning : capture.warnings)
@@ -251,8 +276,7 @@ Result<Finding> judgeLive(const Capture& capture) {
   if (std::isfinite(quantile(log_amplitude, 0.5))) {
     trends.figures.push_back(trendFigure(
         log_amplitude, pixels.difference_mm, "log10 of A's amplitude",
-        "How it goes with signal strength: light scattered in the lens pulls dark pixels most.",
-        60));
+        "How the difference goes with signal strength.", 60));
   }
   if (auto over_time = timeFigure(capture)) trends.figures.push_back(*std::move(over_time));
   blocks.push_back(std::move(trends));
@@ -270,15 +294,20 @@ Result<Finding> judgeLive(const Capture& capture) {
   finding.headline = fmt::format(
       "On surfaces B ({}) reads {} than A ({}); 95 % of the pixels agree within {} mm; B's "
       "temporal noise is {} times A's",
-      capture.b.entry.name, inWords(all), capture.a.entry.name, shown(all.p95_abs),
+      capture.b.entry.name, inWords(bias), capture.a.entry.name, shown(all.p95_abs),
       shown(c.noise_ratio.median, 2));
   finding.data = toJson(c);
   finding.data.set("a", capture.a.entry.name)
       .set("b", capture.b.entry.name)
       .set("poses", poses.size())
       .set("frames_per_pose", capture.poses.front().a.frames());
-  finding.cards = {{"Bias, B − A", shownWithError(all.mean, all.standard_error, 2) + " mm",
-                    fmt::format("{} pixels, {} poses", all.n, poses.size()), finding.section.tone},
+  finding.cards = {{"Bias, B − A",
+                    (std::isfinite(bias.error_mm) ? shownWithError(bias.mean_mm, bias.error_mm, 2)
+                                                  : shown(bias.mean_mm, 2)) +
+                        " mm",
+                    poses.size() > 1 ? fmt::format("± standard error over {} poses", poses.size())
+                                     : fmt::format("{} pixels, one pose", all.n),
+                    finding.section.tone},
                    {"95 % agree within", shown(all.p95_abs) + " mm",
                     fmt::format("RMS {} mm", shown(all.rms)), Tone::Neutral},
                    {"Noise, A | B",

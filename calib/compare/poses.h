@@ -22,7 +22,7 @@ struct PoseSpec {
   template <class Visitor>
   void visit(Visitor& v) {
     v.text("name", name, "how the report calls it");
-    v.numbers("position_m", position_m, {-1e4, 1e4}, "of the camera's pinhole in the world");
+    v.numbers("position_m", position_m, {-1e6, 1e6}, "of the camera's pinhole in the world");
     v.numbers("rotation_wxyz", rotation_wxyz, {-1.0, 1.0},
               "how the camera is turned, a quaternion w, x, y, z; it is normalised");
     v.numbers("euler_deg", euler_deg, {-360.0, 360.0},

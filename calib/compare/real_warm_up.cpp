@@ -170,9 +170,15 @@ Result<Finding> judgeWarmUp(const RealDataJob& job, const RealCamera& camera) {
   finding.outcomes.push_back(
       {ahead, judged_ahead, flat_ahead, flat_ahead, std::nan(""), std::nan(""), drift_ahead});
   finding.ablations.push_back({"warm_up", ahead, drift_ahead, flat_ahead});
-  finding.cards.push_back({camera.title + " warm-up", shown(drift_rms, 2) + " mm",
-                           fmt::format("held-out RMS; flat model {} mm", shown(flat_rms, 2)),
-                           finding.section.tone});
+  // A flat model at the jitter leaves nothing that the effect could be good at.
+  const bool is_flat = flat_ahead < 1.3 * floor;
+  finding.cards.push_back(
+      {camera.title + " warm-up", shown(drift_ahead, 2) + " mm",
+       is_flat ? fmt::format("second half, RMS; no drift to find: flat model {} mm, jitter {} mm",
+                             shown(flat_ahead, 2), shown(floor, 2))
+               : fmt::format("RMS of the second half, fitted on the first; flat model {} mm",
+                             shown(flat_ahead, 2)),
+       is_flat ? Tone::Neutral : finding.section.tone});
   return finding;
 }
 

@@ -3,7 +3,9 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <cerrno>
 #include <fstream>
+#include <system_error>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -96,13 +98,16 @@ std::string html(const Section& section) {
 }
 
 Result<> writeFile(const std::filesystem::path& file, const std::string& text) {
+  errno = 0;
   std::ofstream out{file, std::ios::binary | std::ios::trunc};
   out << text;
   out.flush();
   if (out) return {};
+  const int why = errno;
   return Error{
       Error::Code::StorageFull,
-      fmt::format("{}: cannot be written (no permission, or the disk is full)", file.string())};
+      fmt::format("{}: cannot be written: {}", file.string(),
+                  std::generic_category().message(why))};
 }
 
 }  // namespace

@@ -12,6 +12,9 @@
 
 namespace toftwin::drivers::simulator {
 
+/// Of the camera from the world's origin, set by the configuration or by a client.
+constexpr double kMostPosition_m = 1e6;
+
 /// The keys of a [[source]] table with driver = "sim".
 struct Keys {
   std::string uri = "sim:generic_cw";
@@ -54,7 +57,7 @@ struct Keys {
     v.quantity("frame_interval", frame_interval, millisecond, {0.0, 1e6},
                "of device time, whatever the pace; 0: the camera's own");
     v.number("frames", frames, {0, 1e15}, "end of the stream after so many frames; 0: never");
-    v.numbers("position_m", position_m, {-1e6, 1e6},
+    v.numbers("position_m", position_m, {-kMostPosition_m, kMostPosition_m},
               "of the lens in the world, until a client sets a pose");
     v.numbers("euler_deg", euler_deg, {-360.0, 360.0},
               "how it is turned: about the fixed world axes x, then y, then z; 0: it looks along "

@@ -145,6 +145,12 @@ class SimulatedSource final : public Source {
               "({}, {}, {})",
               q[0], q[1], q[2], q[3], t.x, t.y, t.z)};
     }
+    if (std::abs(t.x) > kMostPosition_m || std::abs(t.y) > kMostPosition_m ||
+        std::abs(t.z) > kMostPosition_m) {
+      return Error{Error::Code::InvalidArgument,
+                   fmt::format("a position of ({}, {}, {}) m is out of bounds: each must be {} to {}",
+                               t.x, t.y, t.z, -kMostPosition_m, kMostPosition_m)};
+    }
     if (world_from_camera == view_.pose()) return {};
     view_.setPose(world_from_camera);
     collected_.reset();
@@ -278,6 +284,11 @@ std::vector<PlaneKind> chosenPlanes(const Keys& keys, settings::Table& table) {
 /// may, so it is a mistake in the configuration.
 std::optional<sim::SensorModel> chosenCamera(const Keys& keys, settings::Table& table) {
   if (!keys.camera.empty()) {
+    if (table.has("uri")) {
+      table.complain("uri", fmt::format("= \"{}\" has no meaning beside camera = \"{}\": remove one of "
+                                        "the two",
+                                        keys.uri, keys.camera));
+    }
     auto model = sim::SensorModel::load(table.resolve(keys.camera));
     if (model) return *std::move(model);
     table.complain("camera", fmt::format("= \"{}\": {}", keys.camera, model.error().message));

@@ -178,7 +178,7 @@ Result<> Client::setParameter(std::string_view source, std::string_view name, do
   if (auto checked = checkName("parameter's name", name); !checked) return checked;
   if (!std::isfinite(value)) {
     return Error{Error::Code::InvalidArgument,
-                 "setParameter: the value of \"" + std::string{name} + "\" is not a finite number"};
+                 "the value of \"" + std::string{name} + "\" is not a finite number"};
   }
   auto answer = state_->connection->ask<wire::Done>(
       wire::SetParameter{0, std::string{source}, std::string{name}, value});

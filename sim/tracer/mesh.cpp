@@ -56,15 +56,27 @@ Result<> append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& wor
 }  // namespace
 
 Result<TriangleMesh> loadMesh(const std::filesystem::path& file) {
-  if (!std::filesystem::is_regular_file(file)) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(file, ignored)) {
+    return Error{Error::Code::InvalidArgument,
+                 fmt::format("mesh {}: it is a folder; name the file in it", file.string())};
+  }
+  if (!std::filesystem::is_regular_file(file, ignored)) {
     return Error{Error::Code::NotFound,
                  fmt::format("mesh {}: no such file; paths are relative to the scene file", file.string())};
   }
   Assimp::Importer importer;
   const aiScene* scene = importer.ReadFile(file.string(), aiProcess_Triangulate);
   if (scene == nullptr || scene->mRootNode == nullptr) {
+    const std::string kind = file.extension().string();
+    const bool is_known = !kind.empty() && importer.IsExtensionSupported(kind);
     return Error{Error::Code::Malformed,
-                 fmt::format("mesh {}: {}", file.string(), importer.GetErrorString())};
+                 fmt::format("mesh {}: {}", file.string(),
+                             is_known ? fmt::format("it cannot be read as {}: damaged, cut off, or "
+                                                    "another format (Assimp: {})",
+                                                    kind, importer.GetErrorString())
+                                      : std::string{"its extension is of no format that can be read; "
+                                                    "OBJ, PLY, glTF and GLB can"})};
   }
   TriangleMesh mesh;
   if (auto read = append(*scene, *scene->mRootNode, aiMatrix4x4{}, file, mesh); !read) return read.error();

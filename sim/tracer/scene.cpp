@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "protocol/settings/describe.h"
 #include "sim/tracer/hit.h"
@@ -118,13 +119,20 @@ struct SceneBuilder {
   std::shared_ptr<Scene::Impl> scene = std::make_shared<Scene::Impl>();
 
   Result<> loadMeshes() {
+    std::optional<Error> wrong;  // all meshes that are, one a line
     for (const PlacedObject& object : file.objects) {
       TriangleMesh& mesh = meshes.emplace_back();
       hash.addSettings(object.spec, {"name", "mesh"});
       for (const KeyframeSpec& frame : object.spec.keyframes) hash.addSettings(frame);
       if (isQuadric(object.spec.shape)) continue;
       auto loaded = meshOf(object);
-      if (!loaded) return loaded.error();
+      if (!loaded) {
+        if (wrong)
+          wrong->message += "\n" + loaded.error().message;
+        else
+          wrong = loaded.error();
+        continue;
+      }
       mesh = *std::move(loaded);
       hash.add(mesh.vertices.data(), mesh.vertices.size() * sizeof(mesh.vertices[0]));
       hash.add(mesh.triangles.data(), mesh.triangles.size() * sizeof(mesh.triangles[0]));
@@ -140,6 +148,7 @@ struct SceneBuilder {
                                  object.place, object.spec.material, object.mesh.string())};
       }
     }
+    if (wrong) return *std::move(wrong);
     return {};
   }
 

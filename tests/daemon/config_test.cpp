@@ -111,6 +111,8 @@ TEST(Config, ErrorsComeOnceEachInTheOrderOfTheLines) {
 }
 
 TEST(Config, AMissingPresetOrFileIsAnErrorOfTheFile) {
+  EXPECT_SAYS(errorOf("[[source]]\nname = 'a'\ndriver = 'sim'\nuri = 'sim:kinect_v2'\ncamera = 'c.toml'"),
+              "has no meaning beside camera = \"c.toml\"");
   EXPECT_SAYS(errorOf("[[source]]\nname = 'a'\ndriver = 'sim'\nuri = 'sim:kinect_v3'"),
               "sim:kinect_v2");
   EXPECT_SAYS(errorOf("[[source]]\nname = 'a'\ndriver = 'sim'\ncamera = 'none.toml'"),

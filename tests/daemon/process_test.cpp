@@ -232,6 +232,11 @@ TEST_F(Toftwind, CheckSaysWhetherTheConfigurationIsGood) {
   Process good{{"--check", "--config", path("d.toml")}, path("good")};
   EXPECT_EQ(good.wait(), 0);
   EXPECT_THAT(good.said(), HasSubstr("cam: toftwin test pattern"));
+  EXPECT_THAT(good.said(), HasSubstr("is good: 1 source\n"));
+  configure("");
+  Process empty{{"--check", "--config", path("d.toml")}, path("empty")};
+  EXPECT_EQ(empty.wait(), 0);
+  EXPECT_THAT(empty.said(), HasSubstr("has no [[source]]"));
   configure(kPattern + "widht = 3\n");
   Process bad{{"--check", "--config", path("d.toml")}, path("bad")};
   EXPECT_EQ(bad.wait(), 2);
@@ -260,6 +265,24 @@ TEST_F(Toftwind, ASocketOfAKilledDaemonDoesNotHinderTheNext) {
   Process second{arguments(), path("second")};
   ASSERT_TRUE(second.says("source cam: driver pattern")) << second.said();
   EXPECT_TRUE(client()->health().ok());
+}
+
+TEST_F(Toftwind, WhereNoFolderIsForTheSocketItServesTcp) {
+  configure(kPattern);
+  const std::string nowhere = path("no/folder");
+  Process daemon{{"--config", path("d.toml"), "--port", "0"}, path("log"), [&] {
+                   ::setenv("RUNTIME_DIRECTORY", nowhere.c_str(), 1);
+                 }};
+  ASSERT_TRUE(daemon.says("listening on 127.0.0.1 port ")) << daemon.said();
+  EXPECT_TRUE(daemon.says("no Unix socket, TCP only: " + nowhere)) << daemon.said();
+  const std::string log = daemon.said();
+  const std::string port = log.substr(log.find(" port ") + 6, 5);
+  EXPECT_TRUE(Client::connect("localhost:" + std::to_string(std::stoi(port))).ok()) << log;
+  daemon.signal(SIGTERM);
+  EXPECT_EQ(daemon.wait(), 0);
+  // A path that somebody wrote down must work.
+  Process strict{{"--config", path("d.toml"), "--port", "0", "--socket", nowhere + "/s"}, path("l2")};
+  EXPECT_EQ(strict.wait(), 1);
 }
 
 TEST_F(Toftwind, NoPermissionForTheSocketsFolderIsSaid) {

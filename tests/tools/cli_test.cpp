@@ -53,6 +53,19 @@ TEST(Toftwin, AWrongCommandLineIsStatus2AndSaysWhatIsWrong) {
            {"replay a.mcap --serve -o a.png", "choose one"},
            {"replay a.mcap --serve --from 3", "plays the whole recording"},
            {"replay a.mcap --pace fast", "--pace requires --serve"},
+           {"grab kinect -o a.png --skip -1", "-1 not in range"},
+           {"record kinect -o a.mcap -n -1", "-1 is negative"},
+           {"replay a.mcap -n -1", "-1 is negative"},
+           {"render --camera kinect_v2 -o a.png --seed -3", "-3 is negative"},
+           {"render --camera kinect_v2 -o a.png --frame -1", "-1 is negative"},
+           {"grab kinect -o a.png --region 0,0,0,0", "0 × 0 pixels are none"},
+           {"grab kinect -o a.png -p range,flags", "takes one plane"},
+           {"replay a.mcap -o a.ply -p range,flags", "takes one plane"},
+           {"record kinect o3d kinect -o a.mcap", "kinect is named twice"},
+           {"list -a localhost:99999", "99999"},
+           {"info kinect --text", "--text goes with preset:NAME"},
+           {"compare kinect kinect", "the same source"},
+           {"compare --data /no/such", "/no/such"},
            {"compare kinect", "name two sources"},
            {"set kinect ambient_klx bright", "bright"},
            {"pose kinect --position 1,2", "--position"}}) {
@@ -186,6 +199,44 @@ TEST_F(Recorded, ACutRecordingIsReadAsFarAsItGoesAndSaysSo) {
   EXPECT_THAT(ran.err, HasSubstr("was not closed"));
   EXPECT_GT(std::ranges::count(ran.out, '\n'), 0);
   EXPECT_EQ(toftwin("info " + path("a.mcap")).status, 7);
+}
+
+TEST_F(Recorded, ADamagedChunkIsFoundAlthoughTheIndexIsWhole) {
+  auto bytes = bytesOf(file_);
+  for (std::size_t i = 0; i < 4; ++i) bytes[bytes.size() / 2 + i] ^= std::byte{0x55};
+  record::writeBytes(file_, bytes);
+  const Ran info = toftwin("info " + path("a.mcap"));
+  EXPECT_EQ(info.status, 7);
+  EXPECT_THAT(info.out, HasSubstr("index        whole"));
+  EXPECT_THAT(info.err, HasSubstr("CRC"));
+  EXPECT_THAT(info.err, HasSubstr("of the 15 frames of kinect cannot be read"));
+  const Ran replay = toftwin("replay " + path("a.mcap"));
+  EXPECT_EQ(replay.status, 7);
+  EXPECT_THAT(replay.err, HasSubstr("is followed by frame"));
+  EXPECT_THAT(replay.err, HasSubstr("of the 15 frames of kinect cannot be read"));
+}
+
+TEST_F(Recorded, AComparisonThatNeedsMoreFramesSaysSoFirst) {
+  const Ran ran = toftwin("compare kinect " + path("a.mcap") + "#kinect --frames 500 --no-data");
+  EXPECT_EQ(ran.status, 4);
+  EXPECT_THAT(ran.err, HasSubstr("has 15 frames, but 500 are needed"));
+}
+
+TEST_F(Recorded, ServingOnATakenPortIsStatus5) {
+  const int fd = ::socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof address;
+  ASSERT_EQ(::bind(fd, reinterpret_cast<sockaddr*>(&address), size), 0);
+  ASSERT_EQ(::listen(fd, 1), 0);
+  ASSERT_EQ(::getsockname(fd, reinterpret_cast<sockaddr*>(&address), &size), 0);
+  const Ran ran = toftwin("replay " + path("a.mcap") + " --serve --port " +
+                          std::to_string(ntohs(address.sin_port)));
+  ::close(fd);
+  EXPECT_EQ(ran.status, 5) << ran.err;
+  EXPECT_THAT(ran.err, HasSubstr("in use"));
+  EXPECT_THAT(ran.err, Not(HasSubstr("listening on")));
 }
 
 TEST_F(Recorded, ACameraThatBreaksAPromiseIsStatus7) {

@@ -110,6 +110,7 @@ TEST_F(WithDaemon, RecordsEveryFrame) {
   }
   const Ran again = run("record pattern -o " + path("a.mcap") + " --count 1");
   EXPECT_EQ(again.status, 4) << "a recording is not overwritten unless asked to";
+  EXPECT_THAT(again.err, HasSubstr("--force"));
   EXPECT_EQ(run("record pattern -o " + path("a.mcap") + " --count 1 --force").status, 0);
 }
 
@@ -123,6 +124,23 @@ TEST_F(WithDaemon, CtrlCEndsARecordingAndLeavesItWhole) {
   auto reader = record::Reader::open(folder_ / "a.mcap");
   ASSERT_TRUE(reader) << reader.error().message;
   EXPECT_TRUE(reader->summary().indexed) << reader->summary().damage;
+}
+
+TEST_F(WithDaemon, CtrlCBeforeAllFramesAreThereIsStatus130) {
+  Background recorder{{TOFTWIN_PROGRAM, "record", "pattern", "-o", (folder_ / "a.mcap").string(),
+                       "-n", "1000000", "--address", "unix:" + socket()}};
+  ASSERT_TRUE(eventually([&] { return std::filesystem::exists(folder_ / "a.mcap"); }));
+  std::this_thread::sleep_for(
+      std::chrono::milliseconds{300});  // as above
+  EXPECT_EQ(recorder.end(SIGINT), 130);
+}
+
+TEST_F(WithDaemon, OneSourceUnderTwoAddressesIsNotCompared) {
+  const std::string link = (folder_ / "link").string();
+  std::filesystem::create_symlink(socket(), link);
+  const Ran ran = run("compare pattern pattern --no-data -o " + path("r") + " --address-b unix:" + link);
+  EXPECT_EQ(ran.status, 4) << ran.out;
+  EXPECT_THAT(ran.err, HasSubstr("the same source"));
 }
 
 TEST_F(WithDaemon, ADaemonThatDiesWhileRecordingIsStatus3AndTheFileIsWhole) {
@@ -165,7 +183,7 @@ TEST_F(WithDaemon, ARecordingThatTheDaemonEndsIsWholeAndStatus3) {
 TEST_F(WithDaemon, APlaceThatCannotBeWrittenToIsStatus6) {
   EXPECT_EQ(run("record pattern -n 1 -o " + path("none/a.mcap")).status, 6);
   EXPECT_EQ(run("grab pattern -o " + path("none/a.png")).status, 6);
-  EXPECT_EQ(run("compare pattern pattern --frames 2 --no-data -o /dev/null/report").status, 6);
+  EXPECT_EQ(run("compare pattern short --frames 2 --no-data -o /dev/null/report").status, 6);
 }
 
 TEST_F(WithDaemon, AComparisonPutsTheCamerasBack) {

@@ -68,6 +68,19 @@ TEST_F(Steered, ATriggerMakesOneFrame) {
   EXPECT_THAT(refused.err, HasSubstr("cannot be triggered"));
 }
 
+TEST_F(Steered, GrabTriggersItsOwnFrames) {
+  const Ran ran = run("grab asked --trigger --count 3 -o " + path("a.png"));
+  EXPECT_EQ(ran.status, 0) << ran.err;
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "a-0002.png"));
+}
+
+TEST_F(Steered, ATriggerForNobodyIsStatus7) {
+  const Ran ran = run("trigger asked --timeout 0.2");
+  EXPECT_EQ(ran.status, 7);
+  EXPECT_THAT(ran.err, HasSubstr("nobody took frames of asked"));
+  EXPECT_THAT(ran.err, HasSubstr("--trigger"));
+}
+
 TEST_F(Steered, AnAbsentCameraIsListedAsAbsentWithTheReason) {
   const Ran list = run("list");
   EXPECT_THAT(list.out, HasSubstr("absent"));
@@ -91,6 +104,8 @@ TEST(ComplianceCommand, ACameraThatIsNotThereOrAWrongKeyIsStatus4) {
   EXPECT_THAT(toftwin("compliance sim:kinect_v3").err, HasSubstr("sim:kinect_v2"));
   EXPECT_THAT(toftwin("compliance pattern:0 --keys 'colour = 1'").err, HasSubstr("unknown key"));
   EXPECT_EQ(toftwin("compliance /no/such.mcap").status, 4);
+  EXPECT_THAT(toftwin("compliance pattern:0 --keys 'widht = 1'").err, HasSubstr("--keys:1"));
+  EXPECT_THAT(toftwin("compliance sim:kinect_v3").err, Not(HasSubstr("--keys")));
 }
 
 }  // namespace

@@ -72,6 +72,15 @@ TEST(SceneFile, RefusesWhatHasNoMeaning) {
 
 TEST_F(SceneFiles, AMissingOrEmptyOrBrokenMeshIsNamed) {
   EXPECT_THAT(errorOfMesh("none.obj"), AllOf(HasSubstr("scene.toml:3"), HasSubstr("none.obj: no such file")));
+  std::filesystem::create_directory(folder_ / "dir.ply");
+  EXPECT_THAT(errorOfMesh("dir.ply"), HasSubstr("it is a folder"));
+  write("mesh.xyzw", "x");
+  EXPECT_THAT(errorOfMesh("mesh.xyzw"), HasSubstr("OBJ, PLY, glTF and GLB can"));
+  const std::string two = kMaterial + std::string{"[[object]]\nmesh = 'a.obj'\nmaterial = 'm'\n"
+                                                  "[[object]]\nmesh = 'b.obj'\nmaterial = 'm'\n"};
+  const auto both = load(two);
+  ASSERT_FALSE(both);
+  EXPECT_THAT(both.error().message, AllOf(HasSubstr("a.obj: no such"), HasSubstr("b.obj: no such")));
   write("empty.obj", "# nothing\n");
   EXPECT_THAT(errorOfMesh("empty.obj"), HasSubstr("empty.obj"));
   write("points.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n");

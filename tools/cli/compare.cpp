@@ -4,6 +4,13 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <chrono>
+#include <optional>
+
+#include "calib/compare/csv.h"
+#include "calib/compare/real_data.h"
+#include "protocol/record/recording.h"
 #include "tools/cli/command.h"
 #include "tools/cli/options.h"
 #include "tools/cli/terminal.h"
@@ -56,6 +63,81 @@ Result<Opened> open(const std::string& name, const DaemonOptions& daemon) {
   return opened;
 }
 
+bool isRefused(const Options& options) {
+  const bool is_elsewhere =
+      !options.daemon_b.address.empty() && options.daemon_b.address != options.daemon.address;
+  return options.sources.size() == 2 && options.sources[0] == options.sources[1] &&
+         !isRecording(options.sources[0]) && !is_elsewhere;
+}
+
+Error sameTwice(const std::string& name) {
+  return {Error::Code::InvalidArgument,
+          fmt::format("A and B are the same source, \"{}\": name two, or a source and a recording",
+                      name)};
+}
+
+struct Sighting {
+  std::chrono::steady_clock::time_point started;  ///< the daemon, in this clock
+  std::uint32_t subscribers = 0;
+};
+
+std::optional<Sighting> sightingOf(const std::string& name, const DaemonOptions& daemon) {
+  auto client = daemon.connect();
+  if (!client) return std::nullopt;
+  const auto health = client->health();
+  if (!health) return std::nullopt;
+  const std::chrono::duration<double> uptime{health->uptime.in(second)};
+  const auto now = std::chrono::steady_clock::now();
+  for (const SourceHealthEntry& source : health->sources) {
+    if (source.name != name) continue;
+    return Sighting{now - std::chrono::duration_cast<std::chrono::nanoseconds>(uptime),
+                    source.subscribers};
+  }
+  return std::nullopt;
+}
+
+/// Whether two addresses lead to one daemon, so that A waits in lockstep for B and B for A: it began
+/// at the same moment, and has one subscriber more since A was opened.
+bool isOneDaemon(const std::optional<Sighting>& before, const std::optional<Sighting>& after,
+                 const std::optional<Sighting>& at_a) {
+  if (!before || !after || !at_a) return false;
+  const auto apart = std::chrono::abs(after->started - at_a->started);
+  return apart < std::chrono::milliseconds{500} && after->subscribers > before->subscribers;
+}
+
+/// Whether a recording has frames enough, before anything is captured for nothing.
+Result<> checkLength(const std::string& name, std::uint64_t needed) {
+  const std::size_t hash = name.rfind('#');
+  const auto reader = record::Reader::open(name.substr(0, hash));
+  if (!reader) return reader.error();
+  const auto& sources = reader->summary().frames_per_source;
+  const auto found = hash == std::string::npos ? sources.begin() : sources.find(name.substr(hash + 1));
+  if (found == sources.end() || found->second >= needed) return {};  // unknown: opening says so
+  return Error{Error::Code::InvalidArgument,
+               fmt::format("{} has {} frames, but {} are needed: --frames at each pose; ask for fewer",
+                           name, found->second, needed)};
+}
+
+/// Opens A and B, of which each frame of the one is awaited together with one of the other.
+Result<> openBoth(const Options& options, Opened& a, Opened& b) {
+  const std::string &name_a = options.sources[0], &name_b = options.sources[1];
+  const bool has_b = !options.daemon_b.address.empty();
+  const DaemonOptions& daemon_b = has_b ? options.daemon_b : options.daemon;
+  const bool is_doubtful = has_b && name_a == name_b && !isRecording(name_a);
+  const auto before = is_doubtful ? sightingOf(name_b, daemon_b) : std::nullopt;
+  auto opened_a = open(name_a, options.daemon);
+  if (!opened_a) return opened_a.error();
+  if (is_doubtful && isOneDaemon(before, sightingOf(name_b, daemon_b),
+                                 sightingOf(name_a, options.daemon))) {
+    return sameTwice(name_a);
+  }
+  auto opened_b = open(name_b, daemon_b);
+  if (!opened_b) return opened_b.error();
+  a = *std::move(opened_a);
+  b = *std::move(opened_b);
+  return {};
+}
+
 Result<compare::CompareJob> jobOf(const Options& options) {
   compare::CompareJob job;
   if (!options.poses.empty()) {
@@ -80,19 +162,24 @@ Result<Exit> compareThem(const Options& options) {
   catchInterrupts();
   Opened a, b;
   if (!options.sources.empty()) {
-    auto opened_a = open(options.sources[0], options.daemon);
-    if (!opened_a) return opened_a.error();
-    auto opened_b = open(options.sources[1],
-                         options.daemon_b.address.empty() ? options.daemon : options.daemon_b);
-    if (!opened_b) return opened_b.error();
-    a = *std::move(opened_a);
-    b = *std::move(opened_b);
+    const auto needed = static_cast<std::uint64_t>(options.frames) *
+                        std::max<std::uint64_t>(1, job->capture.poses.size());
+    for (const std::string& name : options.sources) {
+      if (!isRecording(name)) continue;
+      if (auto checked = checkLength(name, needed); !checked) return checked.error();
+    }
+    if (auto opened = openBoth(options, a, b); !opened) return opened.error();
     job->a = a.feed.get();
     job->b = b.feed.get();
   }
   compare::Progress progress{stderr};
   const auto page = compare::compareAndReport(*job, progress);
   if (!page) return page.error();
+  if (job->data && !compare::findThesisData(*job->data)) {
+    fmt::print(stderr,
+               "The real measurements were left out: there is no tof-thesis-2018 in $TOFTWIN_DATA "
+               "nor in ../shared/data; see --data.\n");
+  }
   fmt::print("{}\n", page->string());
   return Exit::Ok;
 }
@@ -102,7 +189,8 @@ Run add(CLI::App& app) {
   // A simulated source answers when the frame that it is tracing is done; at a new pose that can take long.
   options->daemon.timeout_s = options->daemon_b.timeout_s = 120.0;
   options->daemon.add(app);
-  app.add_option("--address-b", options->daemon_b.address, "daemon of B, if it is another one");
+  app.add_option("--address-b", options->daemon_b.address, "daemon of B, if it is another one")
+      ->check(isAddress);
   app.add_option("sources", options->sources,
                  "A and B: names of sources, or recordings (FILE.mcap, FILE.mcap#SOURCE if it "
                  "holds several); none: only the "
@@ -128,6 +216,12 @@ Run add(CLI::App& app) {
   app.add_option("-o,--output", options->output, "folder of the report")->capture_default_str();
   app.add_option("--note", options->note, "for the report's foot, such as a commit");
   checkUsage(app, [options]() -> Result<> {
+    if (!options->data.empty() && !options->no_data && !compare::findThesisData(options->data)) {
+      return Error{Error::Code::InvalidArgument,
+                   fmt::format("--data {}: there is no folder tof-thesis-2018 in it, nor is it one",
+                               options->data)};
+    }
+    if (isRefused(*options)) return sameTwice(options->sources[0]);
     if (options->sources.size() != 1) return {};
     return Error{Error::Code::InvalidArgument,
                  "name two sources, A and B, or none to judge the simulator only"};

@@ -31,12 +31,18 @@ const drivers::Driver* driverNamed(std::string_view name) {
   return found == all.end() ? nullptr : &*found;
 }
 
+/// The user's keys first, unless they hold a table, which would swallow what comes after it.
+std::string withUsersKeys(const std::string& keys, const Options& options) {
+  const bool has_table = options.keys.starts_with('[') || options.keys.find("\n[") != std::string::npos;
+  return has_table ? keys + "\n" + options.keys : options.keys + "\n" + keys;
+}
+
 /// The camera that the user names, to be opened here and not through a daemon.
 Result<drivers::Candidate> candidateFor(const Options& options) {
   if (options.camera.ends_with(".mcap")) {
     const std::string file = settings::toToml(options.camera);
     return drivers::Candidate{.driver = driverNamed("replay"),
-                              .keys = "file = " + file + "\n" + options.keys,
+                              .keys = withUsersKeys("file = " + file, options),
                               .absent_keys = "file = 'there-is-no-such.mcap'",
                               .absent_name = "there-is-no-such.mcap"};
   }
@@ -50,7 +56,7 @@ Result<drivers::Candidate> candidateFor(const Options& options) {
                              options.camera)};
   }
   drivers::Candidate candidate = drivers::listedCamera(*driver, options.camera);
-  candidate.keys += "\n" + options.keys;
+  candidate.keys = withUsersKeys(candidate.keys, options);
   return candidate;
 }
 
@@ -74,8 +80,9 @@ void print(const drivers::Finding& finding) {
 }
 
 /// Whether the camera can be opened at all: if not, every check would say the same.
-Result<> opens(const drivers::Candidate& candidate) {
-  auto table = settings::Table::parse(candidate.keys, "--keys");
+Result<> opens(const Options& options, const drivers::Candidate& candidate) {
+  // Keys that the user gave are the first lines, so that the lines in errors are theirs.
+  auto table = settings::Table::parse(candidate.keys, options.keys.empty() ? options.camera : "--keys");
   if (!table) return table.error();
   const auto opened = candidate.driver->open(*table);
   if (!opened) return opened.error();
@@ -85,7 +92,7 @@ Result<> opens(const drivers::Candidate& candidate) {
 Result<Exit> run(const Options& options) {
   const auto candidate = candidateFor(options);
   if (!candidate) return candidate.error();
-  if (auto opened = opens(*candidate); !opened) return opened.error();
+  if (auto opened = opens(options, *candidate); !opened) return opened.error();
   drivers::ComplianceOptions how;
   how.frame_timeout =
       std::chrono::milliseconds{static_cast<std::int64_t>(options.frame_timeout_s * 1000.0)};

@@ -68,7 +68,15 @@ Finding checkSocket(const std::string& path) {
   if (::stat(path.c_str(), &about) != 0) {
     if (errno == EACCES) {
       return {State::Bad, "socket", fmt::format("{}: its folder may not be entered", path),
-              "sudo usermod -aG toftwin \"$USER\", then log in again"};
+              "--address localhost, if that daemon has TCP; else let its owner open the folder"};
+    }
+    const std::string folder = std::filesystem::path{path}.parent_path().string();
+    if (std::error_code ignored; !std::filesystem::is_directory(folder, ignored)) {
+      return {State::Warning, "socket",
+              fmt::format("{}: there is no folder {}; a daemon started here has TCP only", path,
+                          folder),
+              "nothing, if TCP will do; else set XDG_RUNTIME_DIR to a folder of yours, or "
+              "listen.socket to a path"};
     }
     return {State::Warning, "socket", fmt::format("{} is not there: no daemon made it", path),
             "sudo systemctl start toftwind, or toftwind --config FILE.toml"};
@@ -79,7 +87,7 @@ Finding checkSocket(const std::string& path) {
   }
   if (::access(path.c_str(), W_OK) != 0) {
     return {State::Bad, "socket", fmt::format("{}: you may not connect to it", path),
-            "sudo usermod -aG toftwin \"$USER\", then log in again"};
+            "--address localhost, if that daemon has TCP; else let its owner open the socket"};
   }
   return {State::Good, "socket", path, ""};
 }

@@ -2,6 +2,8 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "tools/cli/command.h"
 #include "tools/cli/options.h"
 #include "tools/cli/terminal.h"
@@ -17,6 +19,7 @@ struct Options {
   std::uint64_t skip = 0;
   std::vector<std::uint32_t> region;
   std::uint32_t decimation = 1;
+  bool trigger = false;
 };
 
 SubscribeOptions subscriptionFor(const Options& options) {
@@ -33,14 +36,30 @@ SubscribeOptions subscriptionFor(const Options& options) {
   return wanted;
 }
 
+/// How many besides this one take the source's frames.
+std::uint32_t otherSubscribers(Client& client, const std::string& name) {
+  const auto health = client.health();
+  if (!health) return 0;
+  const auto& all = health->sources;
+  const auto found = std::ranges::find(all, name, &SourceHealthEntry::name);
+  return found == all.end() || found->subscribers == 0 ? 0 : found->subscribers - 1;
+}
+
 /// Why no frame came in time, and what to do.
-std::string whyNone(const SourceDetails& details, double timeout_s) {
+std::string whyNone(Client& client, const SourceDetails& details, double timeout_s) {
   const std::string name = details.entry.name;
+  if (const std::uint32_t others = otherSubscribers(client, name);
+      others > 0 && details.can_lockstep && !details.can_trigger) {
+    return fmt::format(
+        "no frame came within {:.6g} s. {} takes frames of {} as well: in lockstep, as `toftwin "
+        "compare` does, it holds the camera until it asks for the next one",
+        timeout_s, others == 1 ? "Another client" : fmt::format("{} other clients", others), name);
+  }
   const std::string longer = fmt::format("--timeout {:.6g} waits longer", 20.0 * timeout_s);
   if (details.can_trigger) {
     return fmt::format(
-        "no frame came within {:.6g} s. {} takes one when it is triggered (toftwin "
-        "trigger {}); {}",
+        "no frame came within {:.6g} s. {} takes one when it is triggered (--trigger, or "
+        "toftwin trigger {}); {}",
         timeout_s, name, name, longer);
   }
   if (details.entry.kind == FrameKind::Simulated) {
@@ -52,6 +71,16 @@ std::string whyNone(const SourceDetails& details, double timeout_s) {
   }
   return fmt::format("no frame came within {:.6g} s; `toftwin doctor` says how {} is, {}",
                      timeout_s, name, longer);
+}
+
+Result<> checkOptions(Options& options) {
+  const std::vector<std::uint32_t>& region = options.region;
+  if (region.size() == 4 && (region[2] == 0 || region[3] == 0)) {
+    return Error{Error::Code::InvalidArgument,
+                 fmt::format("--region {}: it is X,Y,WIDTH,HEIGHT, and {} × {} pixels are none",
+                             fmt::join(region, ","), region[2], region[3])};
+  }
+  return options.output.check();
 }
 
 Result<Exit> run(Options& options) {
@@ -67,12 +96,15 @@ Result<Exit> run(Options& options) {
   {
     Progress progress{"frames", options.count};
     for (std::uint64_t i = 0; i < options.skip + options.count; ++i) {
+      if (options.trigger) {
+        if (auto done = client->trigger(options.source); !done) return done.error();
+      }
       const auto frame = waitForFrame(*frames, options.daemon.timeout());
       if (!frame) {
         const bool is_late = frame.error().code == Error::Code::Timeout;
         return Error{frame.error().code,
                      fmt::format("{} of {} frames written: {}", written, options.count,
-                                 is_late ? whyNone(*details, options.daemon.timeout_s)
+                                 is_late ? whyNone(*client, *details, options.daemon.timeout_s)
                                          : frame.error().message)};
       }
       if (i < options.skip) continue;
@@ -110,15 +142,19 @@ Command grabCommand() {
         app.add_option("-n,--count", options->count, "how many frames")
             ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1'000'000}))
             ->capture_default_str();
-        app.add_option("--skip", options->skip, "frames to let pass first")->capture_default_str();
+        app.add_option("--skip", options->skip, "frames to let pass first")
+            ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1'000'000'000}))
+            ->capture_default_str();
         app.add_option("--region", options->region, "only these pixels: X,Y,WIDTH,HEIGHT")
             ->delimiter(',')
             ->expected(4);
         app.add_option("--decimation", options->decimation, "every n-th pixel in both directions")
             ->check(CLI::Range(1, 64))
             ->capture_default_str();
+        app.add_flag("--trigger", options->trigger,
+                     "trigger each frame, for a camera whose pace is \"trigger\"");
         options->daemon.add(app);
-        checkUsage(app, [options] { return options->output.check(); });
+        checkUsage(app, [options] { return checkOptions(*options); });
         return [options] { return run(*options); };
       }};
 }

@@ -9,6 +9,7 @@
 #include "tools/cli/command.h"
 #include "tools/cli/describe.h"
 #include "tools/cli/options.h"
+#include "tools/cli/terminal.h"
 
 namespace toftwin::cli {
 namespace {
@@ -23,14 +24,45 @@ struct Options {
 };
 constexpr std::string_view kPreset = "preset:";
 
-/// The first frame of each source says what the source's camera and planes are.
-std::map<std::string, Frame> firstFrames(record::Reader& reader) {
-  std::map<std::string, Frame> first;
-  for (const auto& [source, frames] : reader.summary().frames_per_source) {
-    reader.rewind();
-    if (auto frame = reader.next(source)) first.emplace(source, std::move(frame).value());
+/// What reading a recording once tells: an index can be whole although a chunk is not.
+struct Survey {
+  std::map<std::string, Frame> first;  ///< says what the source's camera and planes are
+  std::map<std::string, std::uint64_t> readable;
+  std::string damage;
+  bool is_whole_file = true;  ///< not cut short by Ctrl-C
+};
+
+Survey survey(record::Reader& reader, const std::string& file) {
+  Survey found{.first = {}, .readable = {}, .damage = reader.summary().damage};
+  const auto add = [&](const std::string& line) {
+    found.damage += (found.damage.empty() ? "" : "\n") + line;
+  };
+  std::uint64_t total = 0, read = 0;
+  for (const auto& [source, frames] : reader.summary().frames_per_source) total += frames;
+  {
+    Progress progress{"reading all frames", total};
+    while (!interrupted()) {
+      auto frame = reader.next();
+      if (frame) {
+        ++found.readable[frame->source];
+        found.first.try_emplace(frame->source, *std::move(frame));
+        progress.show(++read);
+      } else if (frame.error().code == Error::Code::EndOfStream) {
+        break;
+      } else if (found.damage.find(frame.error().message) == std::string::npos) {
+        add(frame.error().message);  // else opening it, which scanned, found the same
+      }
+    }
   }
-  return first;
+  found.is_whole_file = !interrupted();
+  for (const auto& [source, frames] : reader.summary().frames_per_source) {
+    const std::uint64_t there = found.readable[source];
+    if (found.is_whole_file && there < frames) {
+      add(fmt::format("{}: {} of the {} frames of {} cannot be read", file, frames - there, frames,
+                      source));
+    }
+  }
+  return found;
 }
 
 Result<Exit> describeRecording(const Options& options) {
@@ -38,16 +70,20 @@ Result<Exit> describeRecording(const Options& options) {
   if (!reader) return reader.error();
   const record::Summary& summary = reader->summary();
   const double seconds = 1e-9 * static_cast<double>(summary.last_ns - summary.first_ns);
-  const auto first = firstFrames(*reader);
+  catchInterrupts();
+  const Survey found = survey(*reader, options.what);
+  if (!found.is_whole_file) return Exit::Interrupted;
   Json sources = Json::object();
   std::string text = fmt::format("{}: recording, {:.3f} s from {}\nindex        {}\n", options.what,
                                  seconds, toText(HostTime{summary.first_ns}),
                                  summary.indexed ? "whole" : "none; it was scanned");
   for (const auto& [source, frames] : summary.frames_per_source) {
     text += fmt::format("\n{}\nframes       {}\n", source, frames);
-    Json about = Json::object().set("frames", frames);
-    if (const auto found = first.find(source); found != first.end()) {
-      const Frame& frame = found->second;
+    const auto readable = found.readable.find(source);
+    Json about = Json::object().set("frames", frames).set(
+        "readable_frames", readable == found.readable.end() ? std::uint64_t{0} : readable->second);
+    if (const auto first = found.first.find(source); first != found.first.end()) {
+      const Frame& frame = first->second;
       text += fmt::format("kind         {}\nplanes       {}\n{}", nameOf(frame.provenance.kind),
                           planesOf(frame), toText(frame.camera));
       about.set("kind", std::string{nameOf(frame.provenance.kind)})
@@ -61,14 +97,14 @@ Result<Exit> describeRecording(const Options& options) {
                          .set("first_ns", summary.first_ns)
                          .set("last_ns", summary.last_ns)
                          .set("indexed", summary.indexed)
-                         .set("damage", summary.damage)
+                         .set("damage", found.damage)
                          .set("sources", sources)
                          .text());
   } else {
     fmt::print("{}", text);
   }
-  if (summary.damage.empty()) return Exit::Ok;
-  fmt::print(stderr, "{}\n", summary.damage);
+  if (found.damage.empty()) return Exit::Ok;
+  fmt::print(stderr, "{}\n", found.damage);
   return Exit::Incomplete;
 }
 
@@ -95,9 +131,6 @@ Result<Exit> describeCamera(const Options& options) {
 }
 
 Result<Exit> printPreset(const std::string& what) {
-  if (!what.starts_with(kPreset)) {
-    return Error{Error::Code::InvalidArgument, "--text goes with preset:NAME"};
-  }
   const auto text = sim::SensorModel::presetText(what.substr(kPreset.size()));
   if (!text) return text.error();
   fmt::print("{}", *text);
@@ -183,6 +216,10 @@ Command infoCommand() {
             app.add_flag("--text", options->text,
                          "print the preset's camera file, to start one of your own from");
             options->daemon.add(app);
+            checkUsage(app, [options]() -> Result<> {
+              if (!options->text || options->what.starts_with(kPreset)) return {};
+              return Error{Error::Code::InvalidArgument, "--text goes with preset:NAME"};
+            });
             return [options] { return run(*options); };
           }};
 }

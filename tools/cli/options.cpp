@@ -9,6 +9,7 @@
 
 #include <toftwin/names.h>
 
+#include "protocol/transport/address.h"
 #include "tools/cli/terminal.h"
 
 namespace toftwin::cli {
@@ -21,11 +22,18 @@ std::string planeNames() {
   return names;
 }
 
+std::string isAddress(const std::string& text) {
+  if (text.empty()) return {};  // an empty variable of the environment, as one that is not set
+  const auto parsed = transport::parseAddress(text, kDefaultPort);
+  return parsed ? std::string{} : parsed.error().message;
+}
+
 void DaemonOptions::add(CLI::App& app) {
   app.add_option(
          "-a,--address", address,
          "where the daemon is: HOST:PORT or unix:/PATH; default: its socket on this machine, "
          "then port 47800 of it")
+      ->check(isAddress)
       ->envname("TOFTWIN_ADDRESS");
   app.add_option("--timeout", timeout_s, "seconds to wait for the daemon or for a frame")
       ->check(CLI::Range(0.001, 86'400.0))
@@ -119,6 +127,13 @@ Result<> OutputOptions::check() {
                    fmt::format("there is no plane \"{}\"; the planes are: {}", name, planeNames())};
     }
     how.planes.push_back(*kind);
+  }
+  const bool is_csv = !file.empty() && std::filesystem::path{file}.extension() == ".csv";
+  if (!file.empty() && !is_csv && how.planes.size() > 1) {
+    return Error{Error::Code::InvalidArgument,
+                 fmt::format("-o {} takes one plane, not {}: name one with -p, or write .csv, which "
+                             "takes several",
+                             file, how.planes.size())};
   }
   return {};
 }

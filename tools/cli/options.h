@@ -42,6 +42,9 @@ struct OutputOptions {
   Result<> check();
 };
 
+/// For CLI11's check: what is wrong with an address, or nothing.
+std::string isAddress(const std::string& text);
+
 /// Has `check` called when the command line is read; its error is one of usage (Exit::Usage).
 void checkUsage(CLI::App& app, std::function<Result<>()> check);
 

@@ -2,7 +2,9 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <atomic>
+#include <filesystem>
 #include <mutex>
 #include <optional>
 #include <thread>
@@ -31,7 +33,8 @@ struct Options {
 struct Recording {
   std::mutex mutex;  // guards all below
   record::Writer writer;
-  std::uint64_t dropped = 0;
+  std::uint64_t dropped = 0;    // between the camera and this file
+  std::uint64_t lost = 0;       // by the device
   std::optional<Error> error;  // the first
   std::atomic<bool> ended = false;
 };
@@ -49,7 +52,8 @@ void recordSource(Recording& recording, Subscription frames, std::uint64_t count
     if (!frame && frame.error().code == Error::Code::EndOfStream && count == 0) return;
     if (!frame) return fail(frame.error());
     const std::lock_guard lock{recording.mutex};
-    recording.dropped += frame->dropped_before + frame->dropped_by_device;
+    recording.dropped += frame->dropped_before;
+    recording.lost += frame->dropped_by_device;
     if (auto wrote = recording.writer.write(*frame); !wrote) {
       if (!recording.error) recording.error = wrote.error();
       recording.ended = true;
@@ -104,19 +108,26 @@ Result<Exit> recordHere(const Options& options) {
   if (!writer) {
     using Code = Error::Code;
     const Code code = writer.error().code;
+    if (std::error_code ignored; !options.force && std::filesystem::exists(options.file, ignored)) {
+      return Error{code, fmt::format("{}: there is such a file already; --force replaces it",
+                                     options.file)};
+    }
     const bool is_place = code == Code::NotFound || code == Code::PermissionDenied;
     return Error{is_place ? Code::StorageFull : code, writer.error().message};
   }
   catchInterrupts();
-  Recording recording{.mutex = {}, .writer = std::move(writer).value(), .dropped = 0, .error = {}};
+  Recording recording{.mutex = {}, .writer = std::move(writer).value(), .dropped = 0, .lost = 0, .error = {}};
   const auto recorded = recordAll(options, *client, recording);
   const auto closed = recording.writer.close();
-  fmt::print("{}: {} frames, {} dropped\n", options.file, recording.writer.frames(),
-             recording.dropped);
+  fmt::print("{}: {} frames, {} dropped{}\n", options.file, recording.writer.frames(),
+             recording.dropped,
+             recording.lost > 0 ? fmt::format(", {} lost by the device", recording.lost) : "");
   if (!recorded) return recorded.error();
   if (recording.error) return *recording.error;
   if (!closed) return closed.error();
-  return Exit::Ok;
+  // Without a goal Ctrl-C is how a recording ends.
+  const bool has_goal = options.count > 0 || options.duration_s > 0.0;
+  return has_goal && interrupted() ? Exit::Interrupted : Exit::Ok;
 }
 
 Result<Exit> recordOnDaemon(const Options& options) {
@@ -139,6 +150,11 @@ Result<> checkOptions(const Options& options) {
   if (!options.file.empty() && std::filesystem::path{options.file}.extension() != ".mcap") {
     return Error{Error::Code::InvalidArgument,
                  fmt::format("-o {}: a recording is an MCAP file: name it FILE.mcap", options.file)};
+  }
+  for (auto source = options.sources.begin(); source != options.sources.end(); ++source) {
+    if (std::find(options.sources.begin(), source, *source) == source) continue;
+    return Error{Error::Code::InvalidArgument,
+                 fmt::format("{} is named twice; a recording holds each frame once", *source)};
   }
   if (options.stop && !options.file.empty()) {
     return Error{Error::Code::InvalidArgument,

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <map>
 
 #include <toftwin/names.h>
 
@@ -43,27 +44,69 @@ void printLine(const Frame& frame, std::int64_t first_ns, bool as_json) {
   }
 }
 
+/// Tells which frames damage took: they lie between the last before it and the first after it.
+class Losses {
+ public:
+  explicit Losses(const Options& options) : options_(options) {}
+  void damaged() {
+    is_whole_ = false;
+    before_ = last_;
+  }
+  void read(const Frame& frame) {
+    ++read_[frame.source];
+    last_[frame.source] = frame.sequence;
+    const auto before = before_.find(frame.source);
+    if (before == before_.end()) return;
+    if (frame.sequence > before->second + 1) {
+      fmt::print(stderr, "{}: {}: frame {} is followed by frame {}\n", options_.file, frame.source,
+                 before->second, frame.sequence);
+    }
+    before_.erase(before);
+  }
+  /// At the end of the file: how many of those that the index lists did not come.
+  void sum(const record::Summary& summary) const {
+    if (is_whole_ || options_.from_s > 0.0) return;
+    for (const auto& [source, frames] : summary.frames_per_source) {
+      const auto found = read_.find(source);
+      const std::uint64_t read = found == read_.end() ? 0 : found->second;
+      const bool is_wanted = options_.source.empty() || options_.source == source;
+      if (!is_wanted || read >= frames) continue;
+      fmt::print(stderr, "{}: {} of the {} frames of {} cannot be read\n", options_.file,
+                 frames - read, frames, source);
+    }
+  }
+  [[nodiscard]] bool isWhole() const { return is_whole_; }
+
+ private:
+  const Options& options_;
+  std::map<std::string, std::uint64_t> read_, last_, before_;
+  bool is_whole_ = true;
+};
+
 /// One frame after the other, until `count` or the end; damage is told and counted, not fatal.
 Result<Exit> eachFrame(const Options& options, record::Reader& reader,
                        const std::function<Result<>(const Frame&, std::uint64_t)>& take) {
-  bool is_whole = reader.summary().damage.empty();
-  if (!is_whole) fmt::print(stderr, "{}\n", reader.summary().damage);
+  const bool is_clean = reader.summary().damage.empty();
+  if (!is_clean) fmt::print(stderr, "{}\n", reader.summary().damage);
+  Losses losses{options};
   for (std::uint64_t taken = 0; options.count == 0 || taken < options.count;) {
     if (interrupted()) return Exit::Interrupted;
     const auto frame = reader.next(options.source);
     if (frame) {
+      losses.read(*frame);
       if (auto took = take(*frame, taken++); !took) return took.error();
     } else if (frame.error().code == Error::Code::EndOfStream) {
+      losses.sum(reader.summary());
       if (options.count > 0)
         return Error{Error::Code::EndOfStream,
                      fmt::format("{}: only {} frames there", options.file, taken)};
       break;
     } else {
       fmt::print(stderr, "{}\n", frame.error().message);
-      is_whole = false;
+      losses.damaged();
     }
   }
-  return is_whole ? Exit::Ok : Exit::Incomplete;
+  return is_clean && losses.isWhole() ? Exit::Ok : Exit::Incomplete;
 }
 
 Result<Exit> exportFrames(const Options& options, record::Reader& reader) {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <string>
 #include <string_view>
 
 #include "tools/cli/command.h"
@@ -27,6 +28,15 @@ std::string exitTable() {
   return table;
 }
 
+/// CLI11 takes "-1" for an unsigned number and makes 2⁶⁴ - 1 of it.
+void refuseNegativeCounts(CLI::Option& option) {
+  if (!option.get_type_name().starts_with("UINT")) return;
+  option.check([](const std::string& text) {
+    return text.starts_with('-') ? fmt::format("{} is negative; it must be 0 or more", text)
+                                 : std::string{};
+  });
+}
+
 }  // namespace
 
 std::vector<Run> declare(CLI::App& app) {
@@ -42,6 +52,7 @@ std::vector<Run> declare(CLI::App& app) {
     sub->set_help_flag("-h,--help", "show this text");
     if (command.examples[0] != '\0') sub->footer(std::string{"Examples:\n"} + command.examples);
     runs.push_back(command.add(*sub));
+    for (CLI::Option* option : sub->get_options()) refuseNegativeCounts(*option);
   }
   return runs;
 }
@@ -69,9 +80,15 @@ int run(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    const bool is_request = error.get_exit_code() == 0;  // --help, --version
-    app.exit(error);
-    return static_cast<int>(is_request ? Exit::Ok : Exit::Usage);
+    if (error.get_exit_code() == 0) {  // --help, --version
+      app.exit(error);
+      return static_cast<int>(Exit::Ok);
+    }
+    const std::string command = argc > 1 && argv[1][0] != '-' ? std::string{" "} + argv[1] : "";
+    const bool is_count = dynamic_cast<const CLI::ArgumentMismatch*>(&error) != nullptr;
+    fmt::print(stderr, "toftwin{}: {}{}\nRun `toftwin{} --help` for more information.\n", command,
+               error.what(), is_count ? " (values, separated by commas)" : "", command);
+    return static_cast<int>(Exit::Usage);
   }
   for (std::size_t i = 0; i < runs.size(); ++i) {
     const Command& command = commands()[i];

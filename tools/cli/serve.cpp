@@ -4,9 +4,12 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <csignal>
 #include <cstring>
 #include <filesystem>
 
@@ -44,6 +47,63 @@ std::string daemonProgram() {
   return "toftwind";
 }
 
+/// The signals that end the daemon, and the one that says that it ended.
+sigset_t signalsToWaitFor() {
+  sigset_t signals{};
+  for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGCHLD}) ::sigaddset(&signals, number);
+  return signals;
+}
+
+/// toftwind's own statuses (docs/daemon.md) as this tool's.
+Result<Exit> exitOfDaemon(int status) {
+  constexpr int kCouldNotRun = 1, kWrongConfig = 2, kNotFound = 127;
+  if (WIFSIGNALED(status)) {
+    return Error{Error::Code::Internal,
+                 fmt::format("toftwind was killed by signal {}", WTERMSIG(status))};
+  }
+  switch (WEXITSTATUS(status)) {
+    case 0:
+      return Exit::Ok;
+    case kCouldNotRun:
+      return Exit::Refused;
+    case kWrongConfig:
+    case kNotFound:
+      return Exit::BadInput;
+    default:
+      return Exit::Internal;
+  }
+}
+
+/// Runs the daemon to its end, with SIGINT and SIGTERM handed on. In a process group of its own:
+/// Ctrl-C must not reach it twice, since a second one ends it at once.
+Result<Exit> runDaemon(const std::string& program, const std::string& config) {
+  const sigset_t signals = signalsToWaitFor();
+  sigset_t before{};
+  ::sigprocmask(SIG_BLOCK, &signals, &before);
+  const pid_t child = ::fork();
+  if (child == 0) {
+    ::setpgid(0, 0);
+    ::prctl(PR_SET_PDEATHSIG, SIGTERM);  // whatever becomes of this program
+    ::sigprocmask(SIG_SETMASK, &before, nullptr);
+    ::execlp(program.c_str(), program.c_str(), "--config", config.c_str(),
+             static_cast<char*>(nullptr));
+    fmt::print(stderr, "toftwin replay: cannot start {}: {}; is the daemon installed?\n", program,
+               std::strerror(errno));
+    ::_exit(127);
+  }
+  if (child < 0) {
+    return Error{Error::Code::Internal,
+                 fmt::format("cannot start a process: {}", std::strerror(errno))};
+  }
+  int status = 0;
+  while (::waitpid(child, &status, WNOHANG) == 0) {
+    int number = 0;
+    ::sigwait(&signals, &number);
+    if (number != SIGCHLD) ::kill(child, number == SIGHUP ? SIGTERM : number);
+  }
+  return exitOfDaemon(status);
+}
+
 }  // namespace
 
 void ServeOptions::add(CLI::App& app, CLI::Option* serve) {
@@ -70,10 +130,7 @@ Result<Exit> serve(const std::string& file, const std::string& source,
   }
   const std::string config = fmt::format("/proc/self/fd/{}", fd);
   const std::string program = daemonProgram();
-  ::execlp(program.c_str(), program.c_str(), "--config", config.c_str(),
-           static_cast<char*>(nullptr));
-  return Error{Error::Code::NotFound, fmt::format("cannot start {}: {}; is the daemon installed?",
-                                                  program, std::strerror(errno))};
+  return runDaemon(program, config);
 }
 
 }  // namespace toftwin::cli

@@ -44,6 +44,14 @@ Result<std::vector<std::byte>> encode(const cv::Mat& image, const std::string& d
   return std::vector<std::byte>{bytes.begin(), bytes.end()};
 }
 
+/// A picture that is nearly all invalid looks like a mistake of this program; it seldom is.
+std::string fewValid(const std::vector<float>& values) {
+  const auto valid = std::ranges::count_if(values, [](float v) { return !std::isnan(v); });
+  if (100 * valid >= static_cast<std::ptrdiff_t>(values.size())) return {};
+  return fmt::format("; {} of {} pixels are valid: does the camera look at something in its range?",
+                     valid, values.size());
+}
+
 Result<Exported> counts(const Picture& picture, const ExportOptions& options) {
   const Plane& plane = *picture.plane;
   const bool is_8bit = plane.type == ElementType::U8;
@@ -71,6 +79,7 @@ Result<Exported> counts(const Picture& picture, const ExportOptions& options) {
                         is_metres ? " (a larger --scale has room for them)" : "");
   }
   if (negative > 0) note += fmt::format("; {} pixels are below 0 and became 0", negative);
+  note += fewValid(picture.values);
   auto bytes = encode(image, note);
   if (!bytes) return bytes.error();
   return Exported{*std::move(bytes), std::move(note)};
@@ -112,6 +121,7 @@ Result<Exported> colors(const Picture& picture, const ExportOptions& options) {
   std::string note =
       fmt::format("{}: colours (turbo) from {:g} to {:g}{}{}, black = invalid", nameOf(plane.kind),
                   min, max, unitOf(plane.kind).empty() ? "" : " ", unitOf(plane.kind));
+  note += fewValid(picture.values);
   auto bytes = encode(image, note);
   if (!bytes) return bytes.error();
   return Exported{*std::move(bytes), std::move(note)};
