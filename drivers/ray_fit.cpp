@@ -18,6 +18,7 @@ using Vector = std::array<double, kUnknowns>;
 using Matrix = std::array<Vector, kUnknowns>;
 constexpr int kRounds = 20;
 constexpr std::size_t kFewest = 64;
+constexpr double kMost = 4000.0;  // rays, evenly over the image: more tell nothing new
 
 struct Observation {
   double x, y, u, v;
@@ -65,8 +66,9 @@ Linearised project(const Vector& p, double x, double y) {
 
 std::vector<Observation> observationsOf(int width, int height, std::span<const float> rays) {
   std::vector<Observation> seen;
-  for (int v = 0; v < height; ++v) {
-    for (int u = 0; u < width; ++u) {
+  const int step = std::max(1, static_cast<int>(std::sqrt(width * height / kMost)));
+  for (int v = 0; v < height; v += step) {
+    for (int u = 0; u < width; u += step) {
       const auto at = 3 * (static_cast<std::size_t>(v) * static_cast<std::size_t>(width) +
                            static_cast<std::size_t>(u));
       const double x = rays[at], y = rays[at + 1], z = rays[at + 2];
@@ -122,10 +124,14 @@ Result<FittedCamera> fitCamera(int width, int height, std::span<const float> ray
   const auto seen = observationsOf(width, height, rays);
   if (seen.size() < kFewest) return no_camera;
   Vector p = firstGuess(width, height, seen);
+  double last = std::numeric_limits<double>::infinity();
   for (int i = 0; i < kRounds; ++i) {
     const Round round = improve(p, seen);
     if (!round.is_solvable || !std::isfinite(round.improved[0])) return no_camera;
     p = round.improved;
+    // Quadratic convergence: when a round gains nothing any more, the one before was the last.
+    if (i > 2 && !(round.sum_of_squares < 0.999 * last)) break;
+    last = round.sum_of_squares;
   }
   const double rms_px =
       std::sqrt(improve(p, seen).sum_of_squares / (2.0 * static_cast<double>(seen.size())));
