@@ -41,7 +41,7 @@ SourceHost::SourceHost(std::string name, Open open, Result<std::unique_ptr<drive
       open_(std::move(open)),
       options_(options),
       clock_(clock),
-      retry_after_(options.first_retry) {
+      recovery_(options.recovery) {
   adopt(std::move(opened));
   thread_ = std::jthread{[this](const std::stop_token& stop) { run(stop); }};
 }
@@ -252,7 +252,9 @@ void SourceHost::adjustStreaming() {
     is_wanted = isWanted();
   }
   if (is_wanted && !is_started_) startSource();
-  if (!is_wanted && is_started_) stopSource();
+  if (is_wanted) return;
+  stopSource();
+  recovery_.unwanted();
 }
 
 void SourceHost::makeFrameOrWait(const std::stop_token& stop) {
@@ -293,6 +295,7 @@ void SourceHost::runCommands() {
       const Result<> done = inDriver([&] { return next.command(*source_); });
       noteState();  // before the answer, so that whoever asks after it sees the change
       tell(next.done, done);
+      recovery_.changed(state_);
     } else {
       tell(next.done,
            Error{Error::Code::Disconnected,
@@ -316,14 +319,41 @@ void SourceHost::adopt(Result<std::unique_ptr<drivers::Source>> opened) {
   auto info = opened ? inDriver([&]() -> Result<drivers::SourceInfo> { return (*opened)->info(); })
                      : opened.error();
   if (!info) {
-    noteError(info.error());
-    return retryLater();
+    recovery_.openFailed(clock_.steady());
+    return noteError(info.error());
   }
   source_ = *std::move(opened);
   noteState();
+  recovery_.opened(*info, state_);
+  if (!restoreSettings()) return;
   const std::scoped_lock lock{mutex_};
   info_ = *std::move(info);
   is_there_ = true;
+}
+
+/// Sets again what clients had set before the camera was lost. False if it was lost once more; a
+/// setting that it refuses does not keep its frames from anybody.
+bool SourceHost::restoreSettings() {
+  const drivers::Recovery::Restore settings = recovery_.settings();
+  std::vector<Command> commands;
+  for (const Parameter& one : settings.parameters) {
+    commands.emplace_back(
+        [one](drivers::Source& source) { return source.setParameter(one.name, *one.value); });
+  }
+  if (const auto& pose = settings.world_from_camera) {
+    commands.emplace_back([pose](drivers::Source& source) { return source.setPose(*pose); });
+  }
+  for (const Command& command : commands) {
+    const Result<> done = inDriver([&] { return command(*source_); });
+    if (done) continue;
+    noteError({done.error().code, "a setting could not be restored: " + done.error().message});
+    if (done.error().code != Error::Code::Disconnected) continue;
+    source_.reset();
+    recovery_.openFailed(clock_.steady());
+    return false;
+  }
+  if (!commands.empty()) noteState();
+  return true;
 }
 
 void SourceHost::noteState() {
@@ -336,9 +366,9 @@ void SourceHost::noteState() {
 /// Opens the source again when it is time to; else waits for that, for a command, or for the stop.
 bool SourceHost::reopen(const std::stop_token& stop) {
   const SteadyTime now = clock_.steady();
-  if (now < retry_at_) {
+  if (now < recovery_.retryAt()) {
     std::unique_lock lock{mutex_};
-    work_.wait_for(lock, stop, retry_at_ - now, [this] { return !commands_.empty(); });
+    work_.wait_for(lock, stop, recovery_.retryAt() - now, [this] { return !commands_.empty(); });
     return false;
   }
   adopt(inDriver(open_));
@@ -354,6 +384,7 @@ void SourceHost::startSource() {
   }
   const Result<> started = inDriver([this] { return source_->start(); });
   if (!started) return onError(started.error(), next_subscriber);
+  recovery_.started(clock_.steady());
   is_started_ = true;
   const std::scoped_lock lock{mutex_};
   is_streaming_ = true;
@@ -391,11 +422,11 @@ void SourceHost::makeFrame(const std::stop_token& stop) {
 }
 
 void SourceHost::publish(Frame frame) {
-  retry_after_ = options_.first_retry;
+  const SteadyTime now = clock_.steady();
+  recovery_.frame(frame, now);
   if (frame.provenance.kind != FrameKind::Replayed) frame.moment.received = clock_.wall();
   frame.source = name_;
   frame.dropped_before = 0;
-  const SteadyTime now = clock_.steady();
   std::vector<SubscriberPtr> takers;
   const std::scoped_lock delivering{delivering_};
   {
@@ -421,14 +452,22 @@ void SourceHost::publish(Frame frame) {
 /// of the stream is not theirs.
 void SourceHost::onError(const Error& error, std::uint64_t next_subscriber) {
   using Code = Error::Code;
-  if (error.code == Code::Stopped || error.code == Code::Timeout) return;
+  if (error.code == Code::Stopped) return;
+  if (error.code == Code::Timeout) {
+    if (const auto hung = recovery_.timedOut(clock_.steady())) lose(*hung);
+    return;
+  }
   if (error.code == Code::EndOfStream) {
     spdlog::info("{}: {}", name_, error.message);
     stopSource();
     return endAll(error, next_subscriber);
   }
-  // Whatever else it is, opening the camera anew is the best that can be done; subscribers stay.
-  retryLater();
+  lose(error);
+}
+
+/// Opening the camera anew is the best that can be done, whatever went wrong; subscribers stay.
+void SourceHost::lose(const Error& error) {
+  recovery_.lost(clock_.steady());
   stopSource();
   source_.reset();
   {
@@ -436,12 +475,7 @@ void SourceHost::onError(const Error& error, std::uint64_t next_subscriber) {
     is_there_ = false;
     ++reconnects_;
   }
-  noteError(error);
-}
-
-void SourceHost::retryLater() {
-  retry_at_ = clock_.steady() + retry_after_;
-  retry_after_ = std::min(2 * retry_after_, options_.longest_retry);
+  noteError(error, true);
 }
 
 /// Ends the subscriptions with smaller numbers; for others the stream begins anew.
@@ -463,9 +497,10 @@ void SourceHost::endAll(const Error& reason, std::uint64_t before) {
   }
 }
 
-void SourceHost::noteError(const Error& error) {
-  spdlog::warn("{}: {}", name_, error.message);
+void SourceHost::noteError(const Error& error, bool is_loss) {
   const std::scoped_lock lock{mutex_};
+  // A camera that is away is tried several times a second: said once, it is enough.
+  if (is_loss || is_there_ || error.message != last_error_) spdlog::warn("{}: {}", name_, error.message);
   last_error_ = error.message;
 }
 

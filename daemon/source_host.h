@@ -18,6 +18,7 @@
 
 #include "daemon/clock.h"
 #include "daemon/subscriber.h"
+#include "drivers/recovery.h"
 #include "drivers/source.h"
 #include "protocol/wire/messages.h"
 
@@ -30,8 +31,7 @@ class SourceHost {
  public:
   struct Options {
     bool always = false;  ///< makes frames even if nobody subscribes
-    std::chrono::milliseconds first_retry{500};
-    std::chrono::milliseconds longest_retry{10'000};
+    drivers::Recovery::Options recovery{};
   };
   using Open = std::function<Result<std::unique_ptr<drivers::Source>>()>;
   using Command = std::function<Result<>(drivers::Source&)>;
@@ -84,6 +84,7 @@ class SourceHost {
   bool reopen(const std::stop_token& stop);
   void adopt(Result<std::unique_ptr<drivers::Source>> opened);
   void noteState();
+  bool restoreSettings();
   void adjustStreaming();
   void makeFrameOrWait(const std::stop_token& stop);
   void startSource();
@@ -91,10 +92,10 @@ class SourceHost {
   void makeFrame(const std::stop_token& stop);
   void publish(Frame frame);
   void onError(const Error& error, std::uint64_t next_subscriber);
-  void retryLater();
+  void lose(const Error& error);
   void endAll(const Error& reason,
               std::uint64_t before = std::numeric_limits<std::uint64_t>::max());
-  void noteError(const Error& error);
+  void noteError(const Error& error, bool is_loss = false);
   void changed(bool is_command = false);
   [[nodiscard]] bool isWanted() const;      // with the lock held
   [[nodiscard]] bool mayMakeFrame() const;  // with the lock held
@@ -110,8 +111,7 @@ class SourceHost {
   // Owned by the thread.
   std::unique_ptr<drivers::Source> source_;
   bool is_started_ = false;
-  SteadyTime retry_at_{};
-  std::chrono::milliseconds retry_after_;
+  drivers::Recovery recovery_;
 
   std::mutex delivering_;     // held from the choice of a frame's takers until all have it
   mutable std::mutex mutex_;  // guards all below

@@ -327,6 +327,9 @@ Result<Endpoint> endpointOf(const Keys& keys, settings::Table& table) {
 }
 
 Result<Identity> identify(Rpc& rpc, const Endpoint& xmlrpc) {
+  if (auto alive = rpc.call("", "getParameter", {"DeviceType"}, {}, kFirstAnswerTime); !alive) {
+    return alive.error();
+  }
   const auto device = rpc.call("", "getAllParameters", {});
   if (!device) return device.error();
   if (!device->textAt("DeviceType").starts_with("1:")) {

@@ -17,6 +17,7 @@ namespace {
 namespace http = boost::beast::http;
 using boost::system::error_code;
 using Clock = std::chrono::steady_clock;
+using std::chrono::milliseconds;
 
 constexpr std::uint64_t kLongestAnswer = 4 << 20;
 // Faults of the camera that are not a mistake in what was asked for.
@@ -72,9 +73,11 @@ Result<> connect(EventLoop& loop, boost::asio::ip::tcp::socket& socket, const En
 }
 
 Result<XmlRpcValue> Rpc::call(std::string_view object, std::string method,
-                              std::vector<XmlRpcValue> params, const std::stop_token& stop) {
+                              std::vector<XmlRpcValue> params, const std::stop_token& stop,
+                              milliseconds within) {
   const toftwin::o3d303::XmlRpcCall call{std::move(method), std::move(params)};
-  const auto body = exchange(std::string{kMain} + std::string{object}, encodeXmlRpc(call), stop);
+  const auto body =
+      exchange(std::string{kMain} + std::string{object}, encodeXmlRpc(call), stop, within);
   if (!body) return body.error();
   auto answer = toftwin::o3d303::readXmlRpcAnswer(*body);
   if (!answer) return disconnected(camera_, answer.error().message);
@@ -91,7 +94,7 @@ Result<std::string> Rpc::parameter(const std::string& name, const std::stop_toke
 }
 
 Result<std::string> Rpc::exchange(const std::string& path, std::string body,
-                                  const std::stop_token& stop) {
+                                  const std::stop_token& stop, milliseconds within) {
   boost::asio::ip::tcp::socket socket{loop_.io()};
   if (auto connected = connect(loop_, socket, camera_, stop); !connected) return connected.error();
   http::request<http::string_body> request{http::verb::post, path, 11};
@@ -102,8 +105,7 @@ Result<std::string> Rpc::exchange(const std::string& path, std::string body,
   request.prepare_payload();
   std::optional<error_code> done;
   http::async_write(socket, request, [&](error_code error, std::size_t) { done = error; });
-  if (auto sent = finish(loop_, socket, camera_, done, kAnswerTime, "sending a call", stop);
-      !sent) {
+  if (auto sent = finish(loop_, socket, camera_, done, within, "sending a call", stop); !sent) {
     return sent.error();
   }
   boost::beast::flat_buffer buffer;
@@ -111,8 +113,7 @@ Result<std::string> Rpc::exchange(const std::string& path, std::string body,
   parser.body_limit(kLongestAnswer);
   done.reset();
   http::async_read(socket, buffer, parser, [&](error_code error, std::size_t) { done = error; });
-  if (auto got = finish(loop_, socket, camera_, done, kAnswerTime, "its answer to a call", stop);
-      !got) {
+  if (auto got = finish(loop_, socket, camera_, done, within, "its answer to a call", stop); !got) {
     return got.error();
   }
   if (parser.get().result() != http::status::ok) {

@@ -22,6 +22,9 @@ using Endpoint = boost::asio::ip::tcp::endpoint;
 /// after which TCP asks again, so that a camera that comes back is found by our next attempt.
 inline constexpr std::chrono::milliseconds kConnectTime{300};
 inline constexpr std::chrono::milliseconds kAnswerTime{2000};
+/// The same for the first question, which costs the camera nothing: one that accepts connections
+/// but still starts, or hangs, is asked anew soon.
+inline constexpr std::chrono::milliseconds kFirstAnswerTime{400};
 
 /// Connects within kConnectTime. Error Disconnected, with the address and what to do.
 Result<> connect(EventLoop& loop, boost::asio::ip::tcp::socket& socket, const Endpoint& to,
@@ -38,13 +41,14 @@ class Rpc {
   /// refuses is Busy (somebody else configures it), PermissionDenied or InvalidArgument. `object`
   /// is the path below kMain.
   Result<XmlRpcValue> call(std::string_view object, std::string method,
-                           std::vector<XmlRpcValue> params, const std::stop_token& stop = {});
+                           std::vector<XmlRpcValue> params, const std::stop_token& stop = {},
+                           std::chrono::milliseconds within = kAnswerTime);
   /// A parameter of the device.
   Result<std::string> parameter(const std::string& name, const std::stop_token& stop = {});
 
  private:
   Result<std::string> exchange(const std::string& path, std::string body,
-                               const std::stop_token& stop);
+                               const std::stop_token& stop, std::chrono::milliseconds within);
 
   EventLoop& loop_;
   Endpoint camera_;

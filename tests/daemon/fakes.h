@@ -137,6 +137,9 @@ class FakeSource final : public drivers::Source {
                     toPlane(PlaneKind::Flags, Image<std::uint8_t>{4, 2, 0})};
     return next;
   }
+  [[nodiscard]] drivers::SourceState state() const override {
+    return {.parameters = {}, .world_from_camera = pose_};
+  }
   Result<> setPose(const Transform<World, Camera>& pose) override {
     return pose_ = pose, Result<>{};
   }

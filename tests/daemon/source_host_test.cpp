@@ -22,8 +22,8 @@ struct Rig {
   std::shared_ptr<Remote> remote = std::make_shared<Remote>();
   std::unique_ptr<SourceHost> host;
   SourceHost::Options options{.always = false,
-                              .first_retry = std::chrono::milliseconds{1},
-                              .longest_retry = std::chrono::milliseconds{1}};
+                              .recovery = {.first_retry = std::chrono::milliseconds{1},
+                                           .longest_retry = std::chrono::milliseconds{1}}};
 
   void start() {
     const auto open = test::opener(remote);
@@ -164,6 +164,34 @@ TEST(SourceHost, OpensALostCameraAgainAndKeepsItsSubscribers) {
   rig.remote->give();
   EXPECT_EQ(taker.nextSequence(subscriber->backlog), 1);
   EXPECT_EQ(rig.host->health().reconnects, 1u);
+}
+
+TEST(SourceHost, ALostCameraGetsItsPoseBackAndTheNextFrameSaysWhatHappened) {
+  Rig rig;
+  rig.remote->info.kind = FrameKind::Real;
+  rig.remote->info.can_trigger = rig.remote->info.can_lockstep = false;
+  rig.remote->info.frame_interval = 10_ms;
+  rig.start();
+  Taker taker;
+  const auto subscriber = rig.subscribe(taker);
+  rig.remote->give();
+  ASSERT_EQ(taker.nextSequence(subscriber->backlog), 0);
+  const Transform<World, Camera> pose{{1, 0, 0, 0}, {0, 0, 3}};
+  ASSERT_TRUE(rig.command([&](drivers::Source& source) { return source.setPose(pose); }).ok());
+  rig.remote->give({Error::Code::Disconnected, "unplugged"});
+  while (rig.host->health().reconnects == 0) std::this_thread::yield();
+  rig.clock.advance(std::chrono::milliseconds{100});
+  ASSERT_TRUE(rig.remote->opened.reaches(2));
+  rig.remote->give(2);
+  const auto item = taker.next(subscriber->backlog);
+  ASSERT_TRUE(item.has_value());
+  const Frame& frame = std::get<Backlog::Delivery>(*item).frame->frame;
+  EXPECT_EQ(frame.moment.world_from_camera, pose);
+  EXPECT_EQ(frame.dropped_by_device, 9u);
+  EXPECT_EQ(rig.host->health().last_error, "unplugged");
+  const auto next = taker.next(subscriber->backlog);
+  ASSERT_TRUE(next.has_value());
+  EXPECT_EQ(std::get<Backlog::Delivery>(*next).frame->frame.dropped_by_device, 0u);
 }
 
 TEST(SourceHost, EndsItsSubscriptionsWithTheStreamAndStartsAnewForTheNext) {

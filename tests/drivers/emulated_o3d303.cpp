@@ -86,8 +86,7 @@ class EmulatedO3d303::Impl {
   ~Impl() {
     run([this] {
       closeAll();
-      timer_.cancel();
-      stay_.reset();
+      io_.stop();  // whatever is under way: a timer whose handler is due cannot be cancelled
     });
     thread_.join();
   }

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+// The emulated camera is lost in every way and comes back, while a subscriber stays.
+#include <gtest/gtest.h>
+
+#include <fmt/format.h>
+
+#include <functional>
+
+#include "drivers/o3d303/o3d303.h"
+#include "emulated_o3d303.h"
+#include "recovery_rig.h"
+
+namespace toftwin::test {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr double kInterval_ms = 50.0;
+
+struct Loss {
+  const char* name;
+  std::function<void(EmulatedO3d303&)> happen, end;
+  // Long enough for the daemon to ask as rarely as it ever does; 0: nothing keeps it from
+  // returning.
+  milliseconds away{700};
+};
+void PrintTo(const Loss& loss, std::ostream* out) { *out << loss.name; }
+
+class O3d303Recovery : public testing::TestWithParam<Loss> {};
+
+TEST_P(O3d303Recovery, IsWithinASecondOfTheCamerasReturnWithTheGapCountedAndSettingsRestored) {
+  EmulatedO3d303 camera;
+  RecoveryRig rig{[uri = camera.uri()]() -> Result<std::unique_ptr<drivers::Source>> {
+    auto table =
+        settings::Table::parse(fmt::format("uri = '{}'\nexposure_us = 500", uri), "t.toml");
+    return drivers::o3d303::row().open(*table);
+  }};
+  ASSERT_TRUE(rig.isSubscribed());
+  const Result<> set =
+      rig.command([](drivers::Source& source) { return source.setParameter("exposure_us", 321); });
+  ASSERT_TRUE(set.ok()) << set.error().message;
+  auto frame = rig.next();
+  for (int i = 0; i < 100 && frame && frame->moment.exposures[0].duration != 321_us; ++i) {
+    frame = rig.next();
+  }
+  ASSERT_TRUE(frame.has_value());
+
+  const auto outcome = rig.loseAndFind(
+      GetParam().name, GetParam().away, [&] { GetParam().happen(camera); },
+      [&] { GetParam().end(camera); });
+  ASSERT_TRUE(outcome.has_value());
+  const auto& [last, first, took] = *outcome;
+  EXPECT_LT(took, milliseconds{1000});
+  EXPECT_EQ(first.sequence, last.sequence + 1) << "the subscription went on";
+  EXPECT_FALSE(rig.host().health().last_error.empty()) << "the reason";
+  const double gap_ms =
+      static_cast<double>(first.moment.received.ns - last.moment.received.ns) * 1e-6;
+  // An interval of rounding, and one because a frame may have come up to an interval late.
+  EXPECT_NEAR(static_cast<double>(first.dropped_by_device + 1), gap_ms / kInterval_ms, 2.0);
+  EXPECT_GT(first.moment.exposures[0].start, last.moment.exposures[0].start);
+  EXPECT_EQ(first.moment.exposures[0].duration, 321_us);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Every, O3d303Recovery,
+    testing::Values(
+        Loss{"Unplugged", [](auto& c) { c.unplug(); }, [](auto& c) { c.plugIn(); }},
+        Loss{"Rebooted", [](auto& c) { c.reboot(); }, [](auto& c) { c.plugIn(); }},
+        Loss{"Replaced", [](auto& c) { c.reboot(true); }, [](auto& c) { c.plugIn(); }},
+        Loss{"Hung", [](auto& c) { c.hang(); }, [](auto& c) { c.recover(); }},
+        Loss{"LineDropped", [](auto& c) { c.dropLine(); }, [](auto&) {}, milliseconds{0}},
+        Loss{"Corrupted", [](auto& c) { c.corrupt(1, true); }, [](auto&) {}, milliseconds{0}}),
+    [](const auto& test) { return std::string{test.param.name}; });
+
+}  // namespace
+}  // namespace toftwin::test
