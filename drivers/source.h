@@ -80,6 +80,8 @@ struct Driver {
   Result<std::unique_ptr<Source>> (*open)(settings::Table& keys);
   /// The driver's keys as a Markdown table, for the documents.
   std::string (*document)();
+  /// Empty, or why this build lacks it and what to do: "not built: install libopenni2-dev and …".
+  std::string_view not_built = {};
 };
 
 /// All drivers of this build, in the order of the documents.

@@ -29,9 +29,11 @@ Exit listDrivers(bool as_json) {
     all.push(Json::object()
                  .set("name", std::string{driver.name})
                  .set("summary", std::string{driver.summary})
-                 .set("cameras", Json::arrayOf(cameras)));
+                 .set("cameras", Json::arrayOf(cameras))
+                 .set("not_built", std::string{driver.not_built}));
     if (as_json) continue;
     fmt::print("{:<10} {}\n", driver.name, driver.summary);
+    if (!driver.not_built.empty()) fmt::print("{:<10} {}\n", "", driver.not_built);
     for (const std::string& camera : cameras) fmt::print("{:<10} {}\n", "", camera);
   }
   if (as_json) fmt::print("{}", all.text());

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <fmt/format.h>
+
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "drivers/source.h"
+#include "protocol/settings/describe.h"
+
+namespace toftwin::drivers {
+
+/// The row of a driver that this build lacks: its keys are documented as ever, it lists no camera,
+/// and whoever opens one reads how to get it. `What` has name, summary, remedy ("install
+/// libopenni2-dev and configure again") and Keys.
+template <class What>
+Driver notBuilt() {
+  static const std::string why = fmt::format("not built: {}", What::remedy);
+  return {.name = What::name,
+          .summary = What::summary,
+          .list = [] { return std::vector<std::string>{}; },
+          .open = [](settings::Table& table) -> Result<std::unique_ptr<Source>> {
+            table.acceptAll();
+            table.complain(table.has("driver") ? "driver" : "",
+                           fmt::format("= \"{}\" was {}", What::name, why));
+            return table.check().error();
+          },
+          .document = [] { return settings::markdownTable(settings::keysOf<typename What::Keys>()); },
+          .not_built = why};
+}
+
+}  // namespace toftwin::drivers
