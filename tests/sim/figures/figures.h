@@ -14,5 +14,6 @@ using Draw = std::function<std::string()>;
 void addPhaseFigures(std::map<std::string, Draw>& figures);  ///< errors over one turn of the phase
 void addCurveFigures(std::map<std::string, Draw>& figures);  ///< errors over range, time, light
 void addImageFigures(std::map<std::string, Draw>& figures);  ///< pictures of a scene
+void addConsequenceFigures(std::map<std::string, Draw>& figures);  ///< what no effect makes
 
 }  // namespace toftwin::sim::figures

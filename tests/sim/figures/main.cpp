@@ -98,6 +98,7 @@ int run(bool write, const std::filesystem::path& folder) {
   toftwin::sim::figures::addPhaseFigures(figures);
   toftwin::sim::figures::addCurveFigures(figures);
   toftwin::sim::figures::addImageFigures(figures);
+  toftwin::sim::figures::addConsequenceFigures(figures);
   int wrong = 0;
   toftwin::sim::AllEffects::forEach([&]<class E>() {
     if (figures.contains(std::string{E::about.name})) return;
