@@ -163,6 +163,7 @@ class EmulatedO3d303::Impl {
              : o3d303::XmlRpcAnswer{o3d303::XmlRpcFault{1, read.error().message}};
     call->response.result(http::status::ok);
     call->response.body() = encodeXmlRpc(answer);
+    maybeGarble(call->response.body(), 20);
     call->response.prepare_payload();
     http::async_write(*call->socket, call->response, [this, call](error_code, std::size_t) {
       error_code ignored;
@@ -289,7 +290,42 @@ class EmulatedO3d303::Impl {
     }
     Bytes message = o3d303::encodePcic(o3d303::kFrameTicket, content);
     if (is_bad && corrupt_framing) message[4] = std::byte{'?'};
+    maybeGarble(message, 2);
     return message;
+  }
+  /// One in so many.
+  template <class Message>
+  void maybeGarble(Message& message, std::uint64_t one_in) {
+    if (garble == 0 || random_() % one_in != 0) return;
+    --garble;
+    damage(message);
+  }
+  /// The first bytes, which say what the others are, are hit as often as all others together.
+  template <class Message>
+  void damage(Message& message) {
+    const auto below = [&](std::size_t limit) {
+      return std::uniform_int_distribution<std::size_t>{0, limit - 1}(random_);
+    };
+    for (std::size_t left = 1 + below(4); left > 0 && !message.empty(); --left) {
+      const std::size_t size = message.size();
+      const std::size_t at = below(below(2) == 0 ? std::min<std::size_t>(size, 64) : size);
+      const std::size_t length = std::min(size - at, 1 + below(32));
+      const auto begin = message.begin() + static_cast<std::ptrdiff_t>(at);
+      const auto end = begin + static_cast<std::ptrdiff_t>(length);
+      const Message piece{begin, end};
+      switch (below(3)) {
+        case 0:
+          for (auto byte = begin; byte != end; ++byte) {
+            *byte = static_cast<typename Message::value_type>(random_());
+          }
+          break;
+        case 1:
+          message.erase(begin, end);
+          break;
+        default:
+          message.insert(end, piece.begin(), piece.end());
+      }
+    }
   }
 
   Options options_;
@@ -310,7 +346,7 @@ class EmulatedO3d303::Impl {
   std::uint32_t count_ = 0;
 
   bool is_hanging = false, corrupt_framing = false;
-  int corrupt = 0, lose = 0, frames_made = 0;
+  int corrupt = 0, garble = 0, lose = 0, frames_made = 0;
   std::chrono::nanoseconds clock_begin = std::chrono::seconds{1'524'235'000};
   std::thread thread_;
 };
@@ -354,6 +390,12 @@ void EmulatedO3d303::corrupt(int frames, bool framing) {
     impl_->corrupt = frames;
     impl_->corrupt_framing = framing;
   });
+}
+void EmulatedO3d303::garble(int messages) {
+  impl_->run([&] { impl_->garble = messages; });
+}
+int EmulatedO3d303::toGarble() {
+  return impl_->run([this] { return impl_->garble; });
 }
 void EmulatedO3d303::loseFrames(int frames) {
   impl_->run([&] { impl_->lose = frames; });

@@ -40,6 +40,10 @@ class EmulatedO3d303 {
   /// The next so many frames have bytes flipped within their chunks (or in the message's first
   /// line).
   void corrupt(int frames, bool framing = false);
+  /// So many messages, one in two frames and one in twenty answers to calls, come with random bytes
+  /// overwritten, left out or repeated anywhere.
+  void garble(int messages);
+  [[nodiscard]] int toGarble();
   /// The next so many frames are taken and counted, but not sent.
   void loseFrames(int frames);
   /// Somebody sets the camera's clock.

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # Like tests/protocol/fuzz.cmake, for what cameras and their clients send.
 set(folder ${PROJECT_SOURCE_DIR}/tests/drivers)
-add_executable(fuzz_o3d303 ${folder}/fuzz_o3d303.cpp ${folder}/o3d303_fuzz_one_input.cpp)
+add_executable(fuzz_o3d303 ${folder}/fuzz_o3d303.cpp ${folder}/o3d303_fuzz_one_input.cpp
+               ${PROJECT_SOURCE_DIR}/drivers/o3d303/frame_images.cpp)
 target_link_libraries(fuzz_o3d303 PRIVATE toftwin::o3d303_wire)
 target_link_options(fuzz_o3d303 PRIVATE -fsanitize=fuzzer)
 file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/fuzz_o3d303_corpus)

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include "drivers/o3d303/frame_images.h"
 #include "drivers/o3d303/wire/frame_content.h"
 #include "drivers/o3d303/wire/pcic.h"
 #include "drivers/o3d303/wire/schema.h"
@@ -19,6 +20,10 @@ void demand(bool holds) {
 void readFrame(std::span<const std::byte> content) {
   const auto frame = readFrameContent(content);
   if (!frame) return;
+  static const Image<float> depth_per_range{4, 3, 1.0F};  // that of the corpus' frames
+  if (const auto planes = drivers::o3d303::planesOf(*frame, depth_per_range)) {
+    demand(planes->size() == 4);
+  }
   for (const Chunk& chunk : frame->chunks) {
     demand(chunk.data.data() >= content.data() &&
            chunk.data.data() + chunk.data.size() <= content.data() + content.size());

@@ -72,5 +72,29 @@ INSTANTIATE_TEST_SUITE_P(
         Loss{"Corrupted", [](auto& c) { c.corrupt(1, true); }, [](auto&) {}, milliseconds{0}}),
     [](const auto& test) { return std::string{test.param.name}; });
 
+// Frames, unit vectors, identities and configurations, whichever is under way: the daemon opens the
+// camera as often as it takes, and goes on when it talks sense again.
+TEST(O3d303Garbled, AThousandDamagedMessagesKeepNobodyFromTheNextGoodFrame) {
+  EmulatedO3d303 camera{{.schedule = FrameSchedule{milliseconds{2}}}};
+  RecoveryRig rig{[uri = camera.uri()]() -> Result<std::unique_ptr<drivers::Source>> {
+                    auto table = settings::Table::parse(fmt::format("uri = '{}'", uri), "t.toml");
+                    return drivers::o3d303::row().open(*table);
+                  },
+                  {.first_retry = milliseconds{1}, .longest_retry = milliseconds{1}}};
+  ASSERT_TRUE(rig.isSubscribed());
+  ASSERT_TRUE(rig.next().has_value());
+  camera.garble(1000);
+  for (int i = 0; i < 60'000 && camera.toGarble() > 0; ++i) {
+    std::this_thread::sleep_for(milliseconds{1});
+    rig.drain();
+  }
+  ASSERT_EQ(camera.toGarble(), 0);
+  for (int i = 0; i < 100; ++i) ASSERT_TRUE(rig.next().has_value()) << i;
+  const auto health = rig.host().health();
+  fmt::print("opened again {} times, {} frames lost\n", health.reconnects,
+             health.dropped_by_device);
+  EXPECT_GT(health.reconnects, 10u);
+}
+
 }  // namespace
 }  // namespace toftwin::test

@@ -25,8 +25,8 @@ namespace toftwin::test {
 /// camera is lost, and how soon it has frames again.
 class RecoveryRig {
  public:
-  explicit RecoveryRig(daemon::SourceHost::Open open)
-      : host_("camera", open, open(), daemon::SourceHost::Options{}, daemon::systemClock()) {
+  explicit RecoveryRig(daemon::SourceHost::Open open, drivers::Recovery::Options options = {})
+      : host_("camera", open, open(), {.recovery = options}, daemon::systemClock()) {
     auto subscribed =
         host_.subscribe({{}, {.policy = wire::Policy::Queue, .depth = 1000}}, taker_.wake());
     EXPECT_TRUE(subscribed.ok()) << subscribed.error().message;
@@ -40,6 +40,15 @@ class RecoveryRig {
     auto item = taker_.next(subscriber_->backlog);
     if (!item || std::holds_alternative<Error>(*item)) return std::nullopt;
     return std::get<daemon::Backlog::Delivery>(*item).frame->frame;
+  }
+  /// Takes what is there; the last of it.
+  std::optional<Frame> drain() {
+    std::optional<Frame> last;
+    while (auto item = subscriber_->backlog.take()) {
+      if (std::holds_alternative<Error>(*item)) return last;
+      last = std::get<daemon::Backlog::Delivery>(*item).frame->frame;
+    }
+    return last;
   }
   Result<> command(daemon::SourceHost::Command command) {
     std::promise<Result<>> done;
@@ -63,10 +72,7 @@ class RecoveryRig {
     lose();
     while (host_.health().reconnects == 0)
       std::this_thread::sleep_for(std::chrono::milliseconds{1});
-    while (auto item = subscriber_->backlog.take()) {  // what was under way
-      if (std::holds_alternative<Error>(*item)) return std::nullopt;
-      outcome.last = std::get<daemon::Backlog::Delivery>(*item).frame->frame;
-    }
+    if (auto late = drain()) outcome.last = *std::move(late);
     std::this_thread::sleep_for(away);
     const auto returned = std::chrono::steady_clock::now();
     giveBack();
