@@ -336,8 +336,9 @@ Result<std::unique_ptr<Source>> open(settings::Table& table) {
   request.max_surfaces = keys.max_surfaces;
   request.pixel_extent = keys.pixel_extent;
   request.seed = keys.seed;
-  return std::unique_ptr<Source>{std::make_unique<SimulatedSource>(
-      keys, *std::move(model), View{*std::move(scene), std::move(request), motionOf(keys)}, std::move(planes))};
+  View view{*std::move(scene), std::move(request), motionOf(keys), model->rowDelay()};
+  return std::unique_ptr<Source>{
+      std::make_unique<SimulatedSource>(keys, *std::move(model), std::move(view), std::move(planes))};
 }
 
 std::vector<std::string> list() {

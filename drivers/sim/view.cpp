@@ -11,6 +11,7 @@ namespace toftwin::drivers::simulator {
 namespace {
 
 constexpr int kRowsPerBand = 16;
+constexpr int kRowsPerRollingBand = 4;  // which see the same time
 
 template <class T>
 void copyBand(const Image<T>& band, int first_row, Image<T>& whole, int height) {
@@ -52,31 +53,35 @@ void View::setPose(const Transform<World, Camera>& world_from_camera) {
 void View::moveTo(Duration time, std::uint64_t number) {
   if (!moves()) return;
   constexpr std::uint64_t kGolden = 0x9e3779b97f4a7c15u;  // 2⁶⁴ / golden ratio
-  request_.world_from_camera = poseAt(time);
+  time_ = time;
   request_.seed = seed_ + (number + 1) * kGolden;
-  posed_ = scene_.at(time);
   forget();
 }
 
-bool View::complete(const sim::TraceRequest& request, Pass& pass, const std::stop_token& stop) const {
-  const int height = request.camera.height;
+bool View::complete(const sim::ForeignEmitterSpec* foreign, Pass& pass, const std::stop_token& stop) const {
+  const int height = request_.camera.height;
+  const bool is_rolling = moves() && row_delay_ > Duration{};
+  sim::Scene posed = moves() ? scene_.at(time_) : scene_;
   while (pass.rows_done < height) {
     if (stop.stop_requested()) return false;
-    sim::TraceRequest band = request;
+    sim::TraceRequest band = request_;
     band.region_y = pass.rows_done;
-    band.region_width = request.camera.width;
-    band.region_height = std::min(kRowsPerBand, height - pass.rows_done);
-    copyBand(sim::trace(posed_, band), pass.rows_done, pass.light, height);
+    band.region_width = request_.camera.width;
+    band.region_height = std::min(is_rolling ? kRowsPerRollingBand : kRowsPerBand, height - pass.rows_done);
+    const Duration time = time_ + (band.region_y + 0.5 * (band.region_height - 1)) * row_delay_;
+    if (is_rolling) posed = scene_.at(time);
+    if (moves()) band.world_from_camera = poseAt(is_rolling ? time : time_);
+    if (foreign != nullptr) band = sim::foreignRequest(*foreign, band);
+    copyBand(sim::trace(posed, band), pass.rows_done, pass.light, height);
     pass.rows_done += band.region_height;
   }
   return true;
 }
 
 bool View::complete(const std::stop_token& stop) {
-  if (!complete(request_, own_, stop)) return false;
+  if (!complete(nullptr, own_, stop)) return false;
   for (std::size_t i = 0; i < foreign_.size(); ++i) {
-    if (!complete(sim::foreignRequest(scene_.foreignEmitters()[i], request_), foreign_[i], stop))
-      return false;
+    if (!complete(&scene_.foreignEmitters()[i], foreign_[i], stop)) return false;
   }
   return true;
 }
@@ -86,7 +91,7 @@ const sim::Light& View::lightFor(const Exposure& exposure) {
   mixed_ = own_.light;
   for (std::size_t i = 0; i < foreign_.size(); ++i) {
     sim::addForeignLight(scene_.foreignEmitters()[i], foreign_[i].light, exposure.modulation,
-                         sim::middleOf(exposure), exposure.duration, mixed_);
+                         sim::middleOf(exposure), exposure.duration, row_delay_, mixed_);
   }
   return mixed_;
 }

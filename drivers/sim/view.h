@@ -20,8 +20,8 @@ namespace toftwin::drivers::simulator {
 class View {
  public:
   /// `request` with everything filled in but pose and region.
-  View(sim::Scene scene, sim::TraceRequest request, sim::Motion camera = {})
-      : scene_(std::move(scene)), posed_(scene_), camera_(std::move(camera)), request_(std::move(request)) {}
+  View(sim::Scene scene, sim::TraceRequest request, sim::Motion camera = {}, Duration row_delay = {})
+      : scene_(std::move(scene)), camera_(std::move(camera)), row_delay_(row_delay), request_(std::move(request)) {}
 
   [[nodiscard]] const sim::Scene& scene() const { return scene_; }
   /// At time 0.
@@ -33,8 +33,8 @@ class View {
 
   /// Whether raw exposures see different light: scene or camera move, or another camera's light beats.
   [[nodiscard]] bool changesWithTime() const { return moves() || !scene_.foreignEmitters().empty(); }
-  /// Makes complete() trace what is seen at a time since device time 0, if anything moves. The tracer's own
-  /// noise is independent for each `number`.
+  /// Makes complete() trace what is seen at a time since device time 0, if anything moves; with a rolling shutter
+  /// the first row's time, and each band of four rows sees its own. The tracer's own noise is independent for each `number`.
   void moveTo(Duration time, std::uint64_t number);
 
   /// Traces what is not traced yet. False if asked to stop before the end.
@@ -46,8 +46,9 @@ class View {
 
  private:
   sim::Scene scene_;
-  sim::Scene posed_;  ///< as it stands at the time of moveTo()
   sim::Motion camera_;
+  Duration row_delay_;
+  Duration time_{};  ///< of moveTo()
   Transform<World, Camera> pose_;
   sim::TraceRequest request_;
   std::uint64_t seed_ = request_.seed;
@@ -57,7 +58,7 @@ class View {
     int rows_done = 0;
   };
   [[nodiscard]] bool moves() const { return scene_.moves() || !camera_.isStill(); }
-  bool complete(const sim::TraceRequest& request, Pass& pass, const std::stop_token& stop) const;
+  bool complete(const sim::ForeignEmitterSpec* foreign, Pass& pass, const std::stop_token& stop) const;
   void forget();
   Pass own_;
   std::vector<Pass> foreign_{scene_.foreignEmitters().size()};

@@ -125,6 +125,7 @@ struct CameraFile {
     int harmonics = 1;
     Duration gap = 500_us;
     Duration frame_interval = 50_ms;
+    Duration row_delay{};
     FactoryCalibration factory_calibration = FactoryCalibration::Delay;
     bool phase_tables = false;
     std::vector<double> exposure_factors{1.0};
@@ -141,6 +142,9 @@ struct CameraFile {
                  "between raw exposures, for reading out");
       v.quantity("frame_interval", frame_interval, millisecond, {1.0, 100'000.0},
                  "from frame to frame");
+      v.quantity("row_delay", row_delay, microsecond, {0.0, 1'000.0},
+                 "rolling shutter: each row is exposed by this much later than the one above it; 0: global "
+                 "shutter");
       v.choice("factory_calibration", factory_calibration,
                {{"none", FactoryCalibration::None},
                 {"delay", FactoryCalibration::Delay},

@@ -13,8 +13,8 @@ namespace toftwin::sim {
 Duration middleOf(const Exposure& exposure);
 
 /// SensorModel::collect() where things move: each raw exposure collects the light of its own time. `light_at`
-/// gives the light of the raw exposure with that index in moment.exposures, or nothing to give up. Global
-/// shutter: all pixels of a raw exposure see the same time. Motion within a raw exposure is not blurred.
+/// gives the light of the raw exposure with that index in moment.exposures, or nothing to give up; with a
+/// rolling shutter its rows are of their own times. Motion within a raw exposure is not blurred.
 std::optional<Samples> collectMoving(const SensorModel& model, const Moment& moment, std::uint64_t seed,
                                      std::uint64_t frame,
                                      const std::function<const Light*(std::size_t)>& light_at);

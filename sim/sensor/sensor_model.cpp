@@ -217,6 +217,7 @@ const std::string& SensorModel::id() const { return impl_->id; }
 const std::vector<AnyEffect>& SensorModel::effects() const { return impl_->effects; }
 const SensorModel::Rays& SensorModel::rays() const { return impl_->rays; }
 Duration SensorModel::frameInterval() const { return impl_->file.sampling.frame_interval; }
+Duration SensorModel::rowDelay() const { return impl_->file.sampling.row_delay; }
 
 std::size_t SensorModel::exposureCount() const {
   return impl_->file.sampling.exposure_factors.size();

@@ -45,6 +45,9 @@ class SensorModel {
   [[nodiscard]] const std::vector<AnyEffect>& effects() const;
   [[nodiscard]] std::vector<std::string> effectNames() const;
   [[nodiscard]] Duration frameInterval() const;
+  /// Rolling shutter: how much later each row is exposed than the one above it. Times of exposures are those of
+  /// the first row.
+  [[nodiscard]] Duration rowDelay() const;
   /// How many exposures a frame takes, of which each pixel gets one.
   [[nodiscard]] std::size_t exposureCount() const;
   /// What the camera tells of its temperatures: "illumination" and "sensor", or nothing.

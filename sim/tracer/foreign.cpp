@@ -27,20 +27,24 @@ TraceRequest foreignRequest(const ForeignEmitterSpec& emitter, const TraceReques
 }
 
 void addForeignLight(const ForeignEmitterSpec& emitter, const Light& foreign, Frequency f, Duration middle,
-                     Duration exposure, Light& light) {
+                     Duration exposure, Duration row_delay, Light& light) {
   const double beat = emitter.frequency.in(hertz)-f.in(hertz);
   const double half_turns = std::numbers::pi * beat * exposure.in(second);
   const double left = std::abs(half_turns) < 1e-8 ? 1.0 : std::sin(half_turns) / half_turns;
-  const double turns = std::remainder(beat * middle.in(second), 1.0);
-  const std::complex<float> factor{
-      std::polar(1.0, 2.0 * std::numbers::pi * turns + emitter.phase.in(radian)) *
-      (emitter.modulation * left)};
+  const auto factorOf = [&](int row) {
+    const double turns = std::remainder(beat * (middle + row * row_delay).in(second), 1.0);
+    return std::complex<float>{
+        std::polar(emitter.modulation * left, 2.0 * std::numbers::pi * turns + emitter.phase.in(radian))};
+  };
   for (std::size_t i = 0; i < light.ambient.size(); ++i) light.ambient[i] += foreign.steady[i];
   for (std::size_t of = 0; of < light.frequencies.size(); ++of) {
     if (light.frequencies[of] != f) continue;
     Image<std::complex<float>>& sum = light.phasor(of, 1);
     const Image<std::complex<float>>& added = foreign.phasor(0, 1);
-    for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += factor * added[i];
+    for (int y = 0; y < sum.height(); ++y) {
+      const std::complex<float> factor = factorOf(y);
+      for (int x = 0; x < sum.width(); ++x) sum(x, y) += factor * added(x, y);
+    }
   }
 }
 

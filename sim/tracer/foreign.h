@@ -15,8 +15,9 @@ TraceRequest foreignRequest(const ForeignEmitterSpec& emitter, const TraceReques
 /// phasor:
 ///     P += q P' exp(i (2π Δf t + φ)) sinc(π Δf T),    sinc x = sin x / x
 /// with P' its phasor over the way to the pixel, q its modulation and φ its phase at device time 0. Only the
-/// fundamental is counted, and its waveform taken for the camera's own.
+/// fundamental is counted, and its waveform taken for the camera's own. `middle` is that of the first row; each
+/// further one is exposed by `row_delay` later.
 void addForeignLight(const ForeignEmitterSpec& emitter, const Light& foreign, Frequency f, Duration middle,
-                     Duration exposure, Light& light);
+                     Duration exposure, Duration row_delay, Light& light);
 
 }  // namespace toftwin::sim

@@ -225,6 +225,34 @@ TEST_F(Simulator, MakesOneFramePerTrigger) {
   EXPECT_TRUE((*triggered)->next({}, false));
 }
 
+/// A plate before the wall, 2 m away, whose right edge passes the axis at device time 0 with 20 m/s. The truth
+/// of a frame is that of raw exposure 2 of four, of 1 ms each and without gaps: it begins after 2 ms.
+TEST_F(Simulator, ARollingShutterSeesEachBandOfRowsAtItsOwnTime) {
+  std::ofstream{folder_ / "plate.toml"}
+      << std::string{kWall}.replace(std::string{kWall}.find("0, 0, 2]"), 8, "0, 0, 4]")
+      << "[[object]]\nshape = 'rectangle'\nsize_m = [10, 40, 0]\nposition_m = [-5, 0, 2]\nmaterial = 'white'\n"
+         "velocity_m_per_s = [20, 0, 0]\n";
+  for (const double row_delay_ms : {0.0, 0.5, 1.0}) {
+    std::ofstream{folder_ / "rolling.toml"}
+        << kCamera << "[sampling]\ngap_us = 0\nrow_delay_us = " << 1e3 * row_delay_ms << "\n";
+    auto source = tryOpen("camera = 'rolling.toml'\nscene = 'plate.toml'\npace = 'fast'\nmax_surfaces = 1\n"
+                          "planes = ['truth_range']\n");
+    ASSERT_TRUE(source) << source.error().message;
+    ASSERT_TRUE((*source)->start());
+    const Frame frame = frameOf(**source);
+    const auto truth_m = frame.find(PlaneKind::TruthRange)->as<float>();
+    for (int y = 0; y < 20; ++y) {
+      const double time_s = 2.5e-3 + 1e-3 * row_delay_ms * (4 * (y / 4) + 1.5);
+      const double edge_px = 11.5 + 30.0 * (20.0 * time_s) / 2.0;
+      for (int x = 0; x < 24; ++x) {
+        if (std::abs(x - edge_px) < 1e-3) continue;
+        EXPECT_EQ(truth_m[static_cast<std::size_t>(24 * y + x)] < 3.0f, x < edge_px)
+            << "row delay " << row_delay_ms << " ms, " << x << ", " << y;
+      }
+    }
+  }
+}
+
 TEST_F(Simulator, GivesAllPlanesWhenAsked) {
   const auto source =
       open("planes = ['truth_range', 'truth_normal', 'samples', 'phasors', 'range', 'flags']\n");

@@ -77,7 +77,7 @@ TEST(ForeignLight, BeatsWithTheCamerasOwn) {
   const Light own = trace(scene, request);
   for (const double t : {0.0, 0.3e-3, 1.77e-3}) {
     Light light = own;
-    addForeignLight(emitter, foreign, 80_MHz, t * 1_s, 200_us, light);
+    addForeignLight(emitter, foreign, 80_MHz, t * 1_s, 200_us, 0_s, light);
     const double x = kPi * 1000.0 * 200e-6, turns = 1000.0 * t;
     const Complex added = 0.8 * way * std::polar(std::sin(x) / x, 2.0 * kPi * turns + kPi / 6.0);
     expectNear(phasorAt(light, 0, 0, 0) - phasorAt(own, 0, 0, 0), added);
@@ -85,7 +85,7 @@ TEST(ForeignLight, BeatsWithTheCamerasOwn) {
   }
   // A whole number of beats within the exposure leaves charge alone.
   Light light = own;
-  addForeignLight(emitter, foreign, 80_MHz, 0_s, 1_ms, light);
+  addForeignLight(emitter, foreign, 80_MHz, 0_s, 1_ms, 0_s, light);
   EXPECT_LT(std::abs(phasorAt(light, 0, 0, 0) - phasorAt(own, 0, 0, 0)), 1e-7);
 }
 
