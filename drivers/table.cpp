@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <array>
 
+#include "drivers/not_built.h"
 #include "drivers/o3d303/o3d303.h"
 #include "drivers/pattern/pattern.h"
 #include "drivers/replay/replay.h"
 #include "drivers/sim/simulator.h"
 #include "drivers/source.h"
+#include "drivers/v4l2/v4l2.h"
 
 namespace toftwin::drivers {
 
@@ -16,6 +18,11 @@ std::span<const Driver> allDrivers() {
       replay::row(),
       simulator::row(),
       o3d303::row(),
+#ifdef TOFTWIN_HAS_V4L2
+      v4l2::row(),
+#else
+      notBuilt<v4l2::About>(),
+#endif
   };
   return rows;
 }
