@@ -49,14 +49,14 @@ void record(RayLog* log, const Lanes<int>& valid, const RTCRay16& rays, bool coh
   packet.is_shadow = shadow;
 }
 
-/// Finds where each living path goes; lanes that meet nothing get no geometry id.
+}  // namespace
+
 void intersect(const Tracing& tracing, const Packet& packet, RTCRayHit16& rays, bool coherent) {
   setRays(packet, rays);
   record(tracing.log, packet.valid, rays.ray, coherent, false);
   embree::intersect(packet.valid.v, tracing.scene.embree, rays, coherent);
 }
 
-/// Paths that met nothing end, with the surroundings' light.
 TOFTWIN_VECTOR
 void endMissed(float ambient_radiance, const RTCRayHit16& rays, Packet& packet, Lanes<float>& ambient) {
   for (std::size_t i = 0; i < kLaneCount; ++i) {
@@ -66,7 +66,6 @@ void endMissed(float ambient_radiance, const RTCRayHit16& rays, Packet& packet, 
   }
 }
 
-/// Light of the surfaces themselves.
 TOFTWIN_VECTOR
 void addEmission(const Packet& packet, const Hits& hits, Lanes<float>& ambient) {
   for (std::size_t i = 0; i < kLaneCount; ++i) {
@@ -74,7 +73,6 @@ void addEmission(const Packet& packet, const Hits& hits, Lanes<float>& ambient) 
   }
 }
 
-/// Next-event estimation: from every hit to every emitter.
 void gatherDirectLight(const Tracing& tracing, const Packet& packet, const Hits& hits, int surface, bool coherent,
                        LaneSums& sums) {
   for (std::size_t e = 0; e < tracing.emitters.size(); ++e) {
@@ -99,6 +97,8 @@ void clearSums(LaneSums& sums) {
   for (auto* terms : {&sums.re, &sums.im}) std::fill(terms->begin(), terms->end(), Lanes<float>{});
 }
 
+namespace {
+
 /// Follows sixteen paths over all their surfaces.
 void followPaths(const Tracing& tracing, Packet& packet, LaneSums& sums) {
   const Dimensions dimensions = dimensionsOf(tracing);
@@ -121,7 +121,12 @@ void followPaths(const Tracing& tracing, Packet& packet, LaneSums& sums) {
   }
 }
 
-/// What the starts of all paths have in common.
+}  // namespace
+
+void followAll(const Tracing& tracing, Packet& packet, LaneSums& sums) {
+  (tracing.scene.is_matt ? followPaths : followSpecialPaths)(tracing, packet, sums);
+}
+
 TOFTWIN_VECTOR
 void preparePacket(const Tracing& tracing, const Block& block, Packet& packet) {
   const Vec3d pinhole = tracing.pinhole;
@@ -141,6 +146,8 @@ void preparePacket(const Tracing& tracing, const Block& block, Packet& packet) {
   packet.key_a = block.key_a;
   packet.key_b = block.key_b;
 }
+
+namespace {
 
 enum class Footprint { Middle, OnePlace, EvenPlaces };
 
@@ -169,10 +176,15 @@ TOFTWIN_INLINE void direct(const Tracing& tracing, const Block& block, int sampl
   }
 }
 
+}  // namespace
+
 TOFTWIN_VECTOR
 void startInTheMiddle(const Tracing& tracing, const Block& block, Packet& packet) {
   direct<Footprint::Middle>(tracing, block, 0, 1, packet);
 }
+
+namespace {
+
 TOFTWIN_VECTOR
 void startAtOnePlace(const Tracing& tracing, const Block& block, Packet& packet) {
   direct<Footprint::OnePlace>(tracing, block, 0, 1, packet);
@@ -204,7 +216,8 @@ void fold(std::size_t harmonics, const Lanes<int>& started, BlockSums& sums) {
   }
 }
 
-/// Where central rays came from, in the camera's frame; NaN where from nowhere.
+}  // namespace
+
 TOFTWIN_VECTOR
 void keepTruth(const Tracing& tracing, const Packet& packet, const Hits& hits, TruthLanes& truth) {
   const auto [ax, ay, az] = tracing.camera_axes;
@@ -219,8 +232,6 @@ void keepTruth(const Tracing& tracing, const Packet& packet, const Hits& hits, T
     truth.normal[i].z = is_hit ? static_cast<float>(az.x * nx + az.y * ny + az.z * nz) : 0.0f;
   }
 }
-
-}  // namespace
 
 void addLight(const Tracing& tracing, const DirectLight& light, LaneSums& sums) {
   addPhasors(tracing.turns_per_metre, tracing.request.harmonics, light.weight, light.length, sums);
@@ -308,14 +319,13 @@ void addSums(const BlockSums& from, BlockSums& to) {
 void traceBlock(const Tracing& tracing, const Block& block, int first, int last, BlockSums& sums) {
   const auto harmonics = static_cast<std::size_t>(tracing.request.harmonics);
   LaneSums& lanes = sums.of_packet;
-  const auto follow = tracing.scene.is_matt ? followPaths : followSpecialPaths;
   Packet packet;
   for (int sample = first; sample < last; sample += block.shape.samples) {
     preparePacket(tracing, block, packet);
     startAtEvenPlaces(tracing, block, sample, last, packet);
     const Lanes<int> started = packet.valid;
     clearSums(lanes);
-    follow(tracing, packet, lanes);
+    followAll(tracing, packet, lanes);
     fold(harmonics, started, sums);
   }
 }
@@ -325,7 +335,7 @@ void traceOnce(const Tracing& tracing, const Block& block, LaneSums& lanes) {
   preparePacket(tracing, block, packet);
   startAtOnePlace(tracing, block, packet);
   clearSums(lanes);
-  (tracing.scene.is_matt ? followPaths : followSpecialPaths)(tracing, packet, lanes);
+  followAll(tracing, packet, lanes);
 }
 
 void traceTruth(const Tracing& tracing, const Block& block, TruthLanes& truth) {

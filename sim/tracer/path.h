@@ -116,6 +116,27 @@ class FlushDenormals {
   unsigned before_;
 };
 
+// The steps of a path, for those who put them together otherwise:
+
+/// The parts of a packet that do not depend on the sample: starts in the pinhole, full throughput.
+void preparePacket(const Tracing& tracing, const Block& block, Packet& packet);
+/// Directions of the central rays; for the first sample of each pixel.
+void startInTheMiddle(const Tracing& tracing, const Block& block, Packet& packet);
+/// Finds where each living path goes; lanes that meet nothing get no geometry id.
+void intersect(const Tracing& tracing, const Packet& packet, RTCRayHit16& rays, bool coherent);
+/// Paths that met nothing end, with the surroundings' light.
+void endMissed(float ambient_radiance, const RTCRayHit16& rays, Packet& packet, Lanes<float>& ambient);
+/// Light of the surfaces themselves.
+void addEmission(const Packet& packet, const Hits& hits, Lanes<float>& ambient);
+/// Next-event estimation: from every hit to every emitter.
+void gatherDirectLight(const Tracing& tracing, const Packet& packet, const Hits& hits, int surface, bool coherent,
+                       LaneSums& sums);
+/// Where central rays came from, in the camera's frame; NaN where from nowhere.
+void keepTruth(const Tracing& tracing, const Packet& packet, const Hits& hits, TruthLanes& truth);
+void clearSums(LaneSums& sums);
+/// Follows sixteen paths over all their surfaces, whatever those are.
+void followAll(const Tracing& tracing, Packet& packet, LaneSums& sums);
+
 /// trace() with a record of its rays; only for one thread.
 Light traceLogged(const Scene& scene, const TraceRequest& request, RayLog* log, Light recycled = {});
 

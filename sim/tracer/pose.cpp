@@ -91,6 +91,7 @@ Scene Scene::at(Duration time) const {
   posed->is_matt = loaded->is_matt;
   posed->has_glass = loaded->has_glass;
   posed->origin_in_world = loaded->origin_in_world;
+  posed->diagonal_m = loaded->diagonal_m;
   posed->device = loaded->device;
   posed->still = loaded->still;
   std::vector<Transform<World, Object>> poses;

@@ -211,6 +211,7 @@ struct SceneBuilder {
       if (isQuadric(file.objects[i].spec.shape)) box.include(pose.translation_m);
     }
     scene->origin_in_world = (box.lower + box.upper) / 2.0;
+    if (const double diagonal = norm(box.upper - box.lower); diagonal > 0.0) scene->diagonal_m = diagonal;
   }
 
   /// An object in its own frame, without planes.

@@ -84,6 +84,7 @@ struct Scene::Impl {
   /// The scene's frame is the world's, moved here: the middle of everything. Single-precision
   /// coordinates are then as fine as the scene is small, wherever in the world it stands.
   Vec3d origin_in_world;
+  double diagonal_m = 1.0;  ///< of the box around everything
 
   RTCDevice device = nullptr;
   RTCScene still = nullptr;   ///< what does not move

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <toftwin/image.h>
+
+#include "sim/tracer/irradiance_cells.h"
+#include "sim/tracer/path.h"
+
+namespace toftwin::sim {
+
+/// Numbers on the coarse grid, one image each. Point (i, j) is what the central ray of pixel
+/// (kStep i, kStep j) meets; the last row and column lie on the image's last pixels.
+struct CoarseGrid {
+  static constexpr int kStep = 4;
+
+  void resize(int width, int height, std::size_t channels, std::size_t frequencies);
+
+  int width = 0, height = 0;
+  Image<float> x, y, z;  ///< place, in the camera's frame
+  Image<float> normal_x, normal_y, normal_z;
+  Image<float> samples;        ///< how many count in the means; 0 where there is no surface
+  Image<float> variance_left;  ///< the means' variance as a share of a single sample's
+  std::vector<Image<float>> means;  ///< of the light that falls in, by channel (Channels)
+  std::vector<Image<float>> squares;  ///< by frequency: mean |first harmonic|² of single samples
+};
+
+/// The numbers that are kept of light: steady, ambient, and both parts of each phasor that is wanted. Of
+/// every frequency the first harmonic is.
+class Channels {
+ public:
+  /// `wanted` by term of the request (Light::phasors); empty: all.
+  explicit Channels(const TraceRequest& request = {}, std::span<const std::uint8_t> wanted = {});
+  bool operator==(const Channels&) const = default;
+
+  static constexpr std::size_t kSteady = 0, kAmbient = 1;
+  static constexpr std::size_t re(std::size_t phasor) { return 2 + 2 * phasor; }
+  static constexpr std::size_t im(std::size_t phasor) { return 3 + 2 * phasor; }
+  [[nodiscard]] std::size_t count() const { return 2 + 2 * terms_.size(); }
+  /// Which terms are wanted, ascending; phasor k is that of terms()[k].
+  [[nodiscard]] const std::vector<std::size_t>& terms() const { return terms_; }
+  /// The phasor of a frequency's first harmonic.
+  [[nodiscard]] std::size_t first(std::size_t frequency) const { return firsts_[frequency]; }
+
+ private:
+  std::vector<std::size_t> terms_, firsts_;
+};
+
+/// Adds weight · light · exp(−i 2π n f L/c), channel by channel, to the sums' terms.
+void addTurned(const Tracing& tracing, const Channels& channels, const Lanes<float>& weight,
+               const Lanes<double>& length, const std::vector<Lanes<float>>& light, LaneSums& sums);
+
+/// What the full image's pixels of one 4 × 4 block are, for spreading coarse light onto them.
+struct BlockGeometry {
+  Lanes<float> x, y, z, normal_x, normal_y, normal_z;  ///< camera's frame; zero where nothing
+  Lanes<float> albedo;
+  Lanes<double> range_m;
+};
+
+/// Light that reaches surfaces over other surfaces, kept over frames. Means are of incoming radiance,
+/// weighted with the cosine and without the way to the camera: neither albedo nor place of the camera
+/// is in them, so they are as smooth as the light is.
+class IndirectLight {
+ public:
+  /// Takes `samples` more for each coarse point.
+  void gather(const Tracing& tracing, const Channels& channels, int samples);
+  /// Share of coarse points on a surface that had nothing to go on from earlier calls.
+  [[nodiscard]] double shareOfNew() const { return share_of_new_; }
+  /// Smoothes along surfaces; before spread().
+  void smooth();
+
+  /// What spread() writes, and room for it to work.
+  struct Spread {
+    Spread(const Channels& channels, const TraceRequest& request);
+    LaneSums sums;
+    std::vector<Lanes<float>> variance;  ///< by frequency
+    std::vector<Lanes<float>> light;
+  };
+  /// The light that the pixels of the block at (left, top) send to the camera.
+  void spread(const Tracing& tracing, int left, int top, const BlockGeometry& pixels, Spread& out) const;
+
+ private:
+  /// How many samples count in means at most.
+  struct Memory {
+    float points;
+    int cells;
+  };
+  [[nodiscard]] Memory memoryFor(const Tracing& tracing, int samples) const;
+  void takeHistory(const CoarseGrid& before, const Transform<World, Camera>& world_from_camera,
+                   const CameraInfo& camera, float memory);
+
+  std::string scene_id_;
+  Channels channels_;
+  CoarseGrid grid_, before_;
+  CoarseGrid smooth_;  ///< `squares` holds variances of the means
+  Transform<World, Camera> pose_;
+  std::unique_ptr<IrradianceCells> cells_;
+  std::uint32_t samples_done_ = 0;
+  double share_of_new_ = 1.0;
+};
+
+}  // namespace toftwin::sim

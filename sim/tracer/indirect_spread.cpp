@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: Apache-2.0
+// From coarse points to smooth light, and from there to pixels: means whose weights fall where the surface
+// bends or another begins (a joint bilateral filter).
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "sim/images/rows.h"
+#include "sim/tracer/indirect.h"
+
+namespace toftwin::sim {
+namespace {
+
+constexpr int kStep = CoarseGrid::kStep;
+constexpr int kRadius = 3;       // of the smoothing, in coarse points
+constexpr float kSigma = 2.5f;   // of its Gaussian
+/// So far off a plane, and so far away at all, as shares of the range, weights are a quarter. The latter
+/// where many samples are known; where n are, √(1 + kFewSamples/n) times as far.
+constexpr float kPlaneShare = 0.015f, kNearShare = 0.035f, kFewSamples = 64.0f;
+
+/// A place and the way it faces.
+struct Facet {
+  float x, y, z, normal_x, normal_y, normal_z;
+};
+
+/// Falls from 1 as q leaves p's plane and turns away.
+TOFTWIN_INLINE float alike(const Facet& p, const Facet& q, float range2) {
+  const float off =
+      p.normal_x * (q.x - p.x) + p.normal_y * (q.y - p.y) + p.normal_z * (q.z - p.z);
+  const float fall = 1.0f + off * off / (range2 * (kPlaneShare * kPlaneShare));
+  const float cosine =
+      p.normal_x * q.normal_x + p.normal_y * q.normal_y + p.normal_z * q.normal_z;
+  const float facing = cosine > 0.0f ? cosine * cosine : 0.0f;
+  return facing * facing / (fall * fall);
+}
+
+TOFTWIN_INLINE float rangeSquared(const Facet& p) { return p.x * p.x + p.y * p.y + p.z * p.z + 1e-12f; }
+
+/// One row of a coarse grid from some column on.
+struct Row {
+  const float *x, *y, *z, *normal_x, *normal_y, *normal_z, *samples;
+  Row(const CoarseGrid& grid, int u, int v)
+      : x(&grid.x(0, v) + u),
+        y(&grid.y(0, v) + u),
+        z(&grid.z(0, v) + u),
+        normal_x(&grid.normal_x(0, v) + u),
+        normal_y(&grid.normal_y(0, v) + u),
+        normal_z(&grid.normal_z(0, v) + u),
+        samples(&grid.samples(0, v) + u) {}
+};
+
+/// Weights of the points of `there` for those of `here`.
+TOFTWIN_VECTOR
+void weigh(const Row& here, const Row& there, int first, int last, float spatial, float* __restrict weight) {
+  for (int u = first; u < last; ++u) {
+    const Facet p{here.x[u], here.y[u], here.z[u], here.normal_x[u], here.normal_y[u], here.normal_z[u]};
+    const Facet q{there.x[u],        there.y[u],        there.z[u],
+                  there.normal_x[u], there.normal_y[u], there.normal_z[u]};
+    const float dx = q.x - p.x, dy = q.y - p.y, dz = q.z - p.z, range2 = rangeSquared(p);
+    const float reach2 = range2 * (kNearShare * kNearShare) * (1.0f + kFewSamples / (here.samples[u] + 1.0f));
+    const float near = 1.0f + (dx * dx + dy * dy + dz * dz) / reach2;
+    weight[u] = spatial * there.samples[u] * alike(p, q, range2) / (near * near);
+  }
+}
+
+TOFTWIN_VECTOR
+void addWeighted(const float* __restrict weight, const float* __restrict value, int first, int last,
+                 float* __restrict sum) {
+  for (int u = first; u < last; ++u) sum[u] += weight[u] * value[u];
+}
+
+/// Variance of a mean, per component: Σ w² (⟨|z|²⟩ − |⟨z⟩|²) s / 2, with s the share of it that averaging
+/// over samples left.
+TOFTWIN_VECTOR
+void addVariance(const float* __restrict weight, const float* __restrict squares, const float* __restrict re,
+                 const float* __restrict im, const float* __restrict left, int first, int last,
+                 float* __restrict sum) {
+  for (int u = first; u < last; ++u) {
+    const float spread = squares[u] - re[u] * re[u] - im[u] * im[u];
+    sum[u] += weight[u] * weight[u] * (spread > 0.0f ? spread : 0.0f) * left[u] * 0.5f;
+  }
+}
+
+/// A neighbour of all points of a row, and its weights for them.
+struct Neighbour {
+  int dx, dy, first, last;
+  std::vector<float> weight;
+
+  const float* of(const Image<float>& image, int v) const { return &image(0, v + dy) + dx; }
+};
+
+std::vector<Neighbour> neighboursOf(const CoarseGrid& grid, int v) {
+  std::vector<Neighbour> neighbours;
+  for (int dy = std::max(-kRadius, -v); dy <= std::min(kRadius, grid.height - 1 - v); ++dy) {
+    for (int dx = -kRadius; dx <= kRadius; ++dx) {
+      const float spatial = std::exp(-static_cast<float>(dx * dx + dy * dy) / (2.0f * kSigma * kSigma));
+      const int first = std::max(0, -dx), last = std::max(first, std::min(grid.width, grid.width - dx));
+      Neighbour& n = neighbours.emplace_back(
+          Neighbour{dx, dy, first, last, std::vector<float>(static_cast<std::size_t>(grid.width))});
+      weigh(Row{grid, 0, v}, Row{grid, dx, v + dy}, first, last, spatial, n.weight.data());
+    }
+  }
+  return neighbours;
+}
+
+/// One row of the smooth grid. The weights of all neighbours come first, then every channel with them.
+void smoothRow(const CoarseGrid& grid, const Channels& channels, int v, CoarseGrid& out) {
+  const auto width = static_cast<std::size_t>(grid.width);
+  const std::vector<Neighbour> neighbours = neighboursOf(grid, v);
+  std::vector<float> per_total(width, 1e-20f);
+  for (const Neighbour& n : neighbours) {
+    for (int u = n.first; u < n.last; ++u) {
+      const auto i = static_cast<std::size_t>(u);
+      per_total[i] += n.weight[i];
+    }
+  }
+  for (float& total : per_total) total = 1.0f / total;
+  for (std::size_t c = 0; c < grid.means.size(); ++c) {
+    float* to = &out.means[c](0, v);
+    std::fill_n(to, width, 0.0f);
+    for (const Neighbour& n : neighbours)
+      addWeighted(n.weight.data(), n.of(grid.means[c], v), n.first, n.last, to);
+    for (std::size_t u = 0; u < width; ++u) to[u] *= per_total[u];
+  }
+  for (std::size_t f = 0; f < grid.squares.size(); ++f) {
+    const std::size_t phasor = channels.first(f);
+    float* to = &out.squares[f](0, v);
+    std::fill_n(to, width, 0.0f);
+    for (const Neighbour& n : neighbours) {
+      addVariance(n.weight.data(), n.of(grid.squares[f], v), n.of(grid.means[Channels::re(phasor)], v),
+                  n.of(grid.means[Channels::im(phasor)], v), n.of(grid.variance_left, v), n.first, n.last, to);
+    }
+    for (std::size_t u = 0; u < width; ++u) to[u] *= per_total[u] * per_total[u];
+  }
+}
+
+/// A coarse point next to a block, as its pixels see it.
+struct Corner {
+  std::size_t point;  ///< its index in the grid's images
+  Lanes<float> weight;
+};
+
+TOFTWIN_VECTOR
+void weighCorner(const CoarseGrid& grid, const BlockGeometry& pixels, int right, int below, Corner& corner,
+                 Lanes<float>& total) {
+  const std::size_t at = corner.point;
+  const Facet q{grid.x[at],        grid.y[at],        grid.z[at],
+                grid.normal_x[at], grid.normal_y[at], grid.normal_z[at]};
+  const float known = grid.samples[at] > 0.0f ? 1.0f : 0.0f;
+  Lanes<float> weight;
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    const auto lane = static_cast<int>(i);
+    const float across = static_cast<float>(lane & 3) * (1.0f / kStep);
+    const float down = static_cast<float>(lane >> 2) * (1.0f / kStep);
+    const float linear = (right != 0 ? across : 1.0f - across) * (below != 0 ? down : 1.0f - down);
+    const Facet p{pixels.x[i],        pixels.y[i],        pixels.z[i],
+                  pixels.normal_x[i], pixels.normal_y[i], pixels.normal_z[i]};
+    // Next to things that no coarse point lies on, others are better than none.
+    weight[i] = known * (linear + 0.01f) * (alike(p, q, rangeSquared(p)) + 1e-4f);
+  }
+  corner.weight = weight;
+  for (std::size_t i = 0; i < kLaneCount; ++i) total[i] += weight[i];
+}
+
+TOFTWIN_VECTOR
+void mix(const std::array<Corner, 4>& corners, const Image<float>& values, const Lanes<float>& scale,
+         Lanes<float>& out) {
+  const float a = values[corners[0].point], b = values[corners[1].point];
+  const float c = values[corners[2].point], d = values[corners[3].point];
+  const Lanes<float>&wa = corners[0].weight, &wb = corners[1].weight;
+  const Lanes<float>&wc = corners[2].weight, &wd = corners[3].weight;
+  Lanes<float> mixed;
+  for (std::size_t i = 0; i < kLaneCount; ++i)
+    mixed[i] = (wa[i] * a + wb[i] * b + wc[i] * c + wd[i] * d) * scale[i];
+  out = mixed;
+}
+
+}  // namespace
+
+void IndirectLight::smooth() {
+  smooth_.resize(grid_.width, grid_.height, grid_.means.size(), grid_.squares.size());
+  for (auto image : {&CoarseGrid::x, &CoarseGrid::y, &CoarseGrid::z, &CoarseGrid::normal_x, &CoarseGrid::normal_y,
+                     &CoarseGrid::normal_z, &CoarseGrid::samples}) {
+    smooth_.*image = grid_.*image;
+  }
+  inParallel(grid_.height, 4, [&](int first, int last) {
+    for (int v = first; v < last; ++v) smoothRow(grid_, channels_, v, smooth_);
+  });
+}
+
+IndirectLight::Spread::Spread(const Channels& channels, const TraceRequest& request)
+    : sums(request.frequencies.size() * static_cast<std::size_t>(request.harmonics)),
+      variance(request.frequencies.size()),
+      light(channels.count()) {}
+
+void IndirectLight::spread(const Tracing& tracing, int left, int top, const BlockGeometry& pixels,
+                           Spread& out) const {
+  const int u = left / kStep, v = top / kStep;
+  const int right = std::min(u + 1, smooth_.width - 1), below = std::min(v + 1, smooth_.height - 1);
+  std::array<Corner, 4> corners;
+  Lanes<float> total, scale, scale2, one;
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    total[i] = 1e-20f;
+    one[i] = 1.0f;
+  }
+  for (int corner = 0; corner < 4; ++corner) {
+    const int is_right = corner & 1, is_below = corner >> 1;
+    Corner& at = corners[static_cast<std::size_t>(corner)];
+    at.point = static_cast<std::size_t>(is_below != 0 ? below : v) * static_cast<std::size_t>(smooth_.width) +
+               static_cast<std::size_t>(is_right != 0 ? right : u);
+    weighCorner(smooth_, pixels, is_right, is_below, at, total);
+  }
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    scale[i] = pixels.albedo[i] / total[i];
+    scale2[i] = pixels.albedo[i] * scale[i];
+  }
+  for (std::size_t c = 0; c < out.light.size(); ++c) mix(corners, smooth_.means[c], scale, out.light[c]);
+  clearSums(out.sums);
+  addTurned(tracing, channels_, one, pixels.range_m, out.light, out.sums);
+  for (std::size_t f = 0; f < out.variance.size(); ++f) mix(corners, smooth_.squares[f], scale2, out.variance[f]);
+}
+
+}  // namespace toftwin::sim

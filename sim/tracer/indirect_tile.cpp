@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim/tracer/indirect_tile.h"
+
+#include <algorithm>
+
+#include "sim/tracer/hit.h"
+#include "sim/tracer/phasor.h"
+#include "sim/tracer/shade.h"
+#include "sim/tracer/special.h"
+
+namespace toftwin::sim {
+namespace {
+
+constexpr int kStep = CoarseGrid::kStep;
+/// Random dimensions of their own, beyond those of trace().
+constexpr std::uint32_t kBounce = 0x10000;
+
+void prepareTile(const Tracing& tracing, int i, int j, Block& block) {
+  const CameraInfo& camera = tracing.request.camera;
+  block.shape = BlockShape::forSamples(1);
+  Lanes<int> columns, rows;
+  for (std::size_t lane = 0; lane < kLaneCount; ++lane) {
+    const int l = static_cast<int>(lane);
+    columns[lane] = std::min((i + l % 4) * kStep, camera.width - 1);
+    rows[lane] = std::min((j + l / 4) * kStep, camera.height - 1);
+    block.is_inside[lane] = -1;
+    block.first_sample[lane] = 0;
+    const PixelKey key = pixelKey(tracing.seed, static_cast<std::uint32_t>(columns[lane]),
+                                  static_cast<std::uint32_t>(rows[lane]));
+    block.key_a[lane] = key.a;
+    block.key_b[lane] = key.b;
+  }
+  tracing.lens.raysOf(columns, rows, block.rays);
+}
+
+/// Light now is counted from these hits on: as if they were white and matt, and the way to them nothing.
+void startAnew(Packet& packet, Hits& hits) {
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    packet.throughput[i] = 1.0f;
+    packet.length[i] = 0.0;
+    hits.distance[i] = 0.0;
+    hits.albedo[i] = hits.shape_a[i] = 1.0f;
+    hits.shape_b[i] = 0.0f;
+  }
+}
+
+}  // namespace
+
+TOFTWIN_VECTOR
+void addTurned(const Tracing& tracing, const Channels& channels, const Lanes<float>& weight,
+               const Lanes<double>& length, const std::vector<Lanes<float>>& light, LaneSums& sums) {
+  const auto harmonics = static_cast<std::size_t>(tracing.request.harmonics);
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    sums.steady[i] += weight[i] * light[Channels::kSteady][i];
+    sums.ambient[i] += weight[i] * light[Channels::kAmbient][i];
+  }
+  std::size_t phasor = 0;
+  for (std::size_t f = 0; f < tracing.turns_per_metre.size(); ++f) {
+    Lanes<float> cosine, sine, turn_re, turn_im, next;
+    for (std::size_t i = 0; i < kLaneCount; ++i) {
+      const CosSin z = cosSinOfTurns(length[i] * tracing.turns_per_metre[f]);
+      cosine[i] = turn_re[i] = z.cos;
+      sine[i] = turn_im[i] = -z.sin;
+    }
+    for (std::size_t term = f * harmonics; term < (f + 1) * harmonics; ++term) {
+      if (phasor == channels.terms().size()) return;
+      if (channels.terms()[phasor] == term) {
+        const Lanes<float>&re = light[Channels::re(phasor)], &im = light[Channels::im(phasor)];
+        Lanes<float> sum_re = sums.re[term], sum_im = sums.im[term];
+        for (std::size_t i = 0; i < kLaneCount; ++i) {
+          sum_re[i] += weight[i] * (re[i] * turn_re[i] - im[i] * turn_im[i]);
+          sum_im[i] += weight[i] * (re[i] * turn_im[i] + im[i] * turn_re[i]);
+        }
+        sums.re[term] = sum_re;
+        sums.im[term] = sum_im;
+        ++phasor;
+      }
+      for (std::size_t i = 0; i < kLaneCount; ++i) next[i] = turn_re[i] * cosine[i] - turn_im[i] * sine[i];
+      for (std::size_t i = 0; i < kLaneCount; ++i) turn_im[i] = turn_re[i] * sine[i] + turn_im[i] * cosine[i];
+      turn_re = next;
+    }
+  }
+}
+
+TileGatherer::TileGatherer(const Tracing& tracing, const IrradianceCells& cells, const Channels& channels)
+    : tracing_(tracing),
+      cells_(cells),
+      channels_(channels),
+      sums_(tracing.turns_per_metre.size() * static_cast<std::size_t>(tracing.request.harmonics)),
+      further_(sums_.re.size()),
+      found_(channels.count()) {
+  tile_.sums.resize(channels.count());
+  tile_.squares.resize(tracing.turns_per_metre.size());
+}
+
+void TileGatherer::gather(int i, int j, std::uint32_t first_sample, int samples, CellUpdate& update) {
+  Packet camera_rays;
+  lookFromCamera(i, j, camera_rays);
+  std::fill(tile_.sums.begin(), tile_.sums.end(), Lanes<double>{});
+  std::fill(tile_.squares.begin(), tile_.squares.end(), Lanes<double>{});
+  update.keys = {};
+  update.values.resize(channels_.count());
+  if (!isAny(camera_rays.valid)) return;
+  const Hits seen = hits_;
+  for (int s = 0; s < samples; ++s) {
+    Packet packet = camera_rays;
+    for (std::size_t lane = 0; lane < kLaneCount; ++lane) {
+      packet.index[lane] = first_sample + static_cast<std::uint32_t>(s);
+    }
+    hits_ = seen;
+    clearSums(sums_);
+    follow(packet, s == 0 ? &update : nullptr);
+    keepSums(camera_rays.valid);
+  }
+}
+
+/// Finds the coarse points themselves.
+void TileGatherer::lookFromCamera(int i, int j, Packet& camera_rays) {
+  Block block;
+  prepareTile(tracing_, i, j, block);
+  preparePacket(tracing_, block, camera_rays);
+  startInTheMiddle(tracing_, block, camera_rays);
+  RTCRayHit16 rays;
+  intersect(tracing_, camera_rays, rays, !tracing_.scene.hasInstances());
+  Lanes<float> unused{};
+  endMissed(0.0f, rays, camera_rays, unused);
+  findHits(tracing_.scene, camera_rays, rays, hits_);
+  keepGeometry(camera_rays);
+}
+
+/// One sample of the light that falls onto the hits: from the surface there lit directly, and from what
+/// the cells know of the other light on it. With `update` a further surface is looked at, for the cells.
+void TileGatherer::follow(Packet& packet, CellUpdate* update) {
+  startAnew(packet, hits_);
+  bounce(hits_, kBounce, true, packet);
+  if (!meet(packet, 1, sums_) || tracing_.request.max_surfaces == 2) return;
+  Lanes<IrradianceCells::Key> keys;
+  const Lanes<int> is_known = addFromCells(packet, keys, sums_);
+  if (update == nullptr) return;
+  Lanes<float> weight;
+  Lanes<double> length;
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    // Where the cells know too little, the sample itself is the best guess.
+    weight[i] = keys[i] != 0 && is_known[i] == 0 ? packet.throughput[i] * hits_.albedo[i] : 0.0f;
+    length[i] = packet.length[i] + hits_.distance[i];
+  }
+  lookFurther(packet);
+  update->keys = keys;
+  update->values[Channels::kSteady] = further_.steady;
+  update->values[Channels::kAmbient] = further_.ambient;
+  for (std::size_t phasor = 0; phasor < channels_.terms().size(); ++phasor) {
+    update->values[Channels::re(phasor)] = further_.re[channels_.terms()[phasor]];
+    update->values[Channels::im(phasor)] = further_.im[channels_.terms()[phasor]];
+  }
+  addTurned(tracing_, channels_, weight, length, update->values, sums_);
+}
+
+/// Goes on to the next surface and adds its own and its direct light. False if all lanes ended.
+bool TileGatherer::meet(Packet& packet, int surface, LaneSums& sums) {
+  RTCRayHit16 rays;
+  intersect(tracing_, packet, rays, false);
+  endMissed(tracing_.scene.ambient_radiance, rays, packet, sums.ambient);
+  if (!isAny(packet.valid)) return false;
+  findHits(tracing_.scene, packet, rays, hits_);
+  applyTextures(tracing_.scene, rays, packet, hits_);
+  addEmission(packet, hits_, sums.ambient);
+  gatherDirectLight(tracing_, packet, hits_, surface, false, sums);
+  return true;
+}
+
+/// One sample of the light that falls onto the present hits, into `further_`.
+void TileGatherer::lookFurther(const Packet& at) {
+  Packet packet = at;
+  clearSums(further_);
+  startAnew(packet, hits_);
+  bounce(hits_, kBounce + 1, true, packet);
+  if (!meet(packet, 2, further_)) return;
+  Lanes<IrradianceCells::Key> keys;
+  addFromCells(packet, keys, further_);
+}
+
+/// Adds what the cells know of the light on the present hits; says where they know enough, and which
+/// cells they are.
+Lanes<int> TileGatherer::addFromCells(const Packet& packet, Lanes<IrradianceCells::Key>& keys,
+                                      LaneSums& sums) {
+  Lanes<int> is_known{};
+  Lanes<float> weight{};
+  Lanes<double> length;
+  keys = {};
+  for (Lanes<float>& lanes : found_) lanes = {};
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    length[i] = packet.length[i] + hits_.distance[i];
+    if (packet.valid[i] == 0) continue;
+    keys[i] = cells_.keyOf({hits_.position.x[i], hits_.position.y[i], hits_.position.z[i]},
+                           {hits_.normal.x[i], hits_.normal.y[i], hits_.normal.z[i]});
+    weight[i] = packet.throughput[i] * hits_.albedo[i];
+    if (!(weight[i] > 0.0f)) continue;
+    const auto means = cells_.find(keys[i]);
+    if (means.empty()) continue;
+    is_known[i] = -1;
+    for (std::size_t c = 0; c < means.size(); ++c) found_[c][i] = means[c];
+  }
+  addTurned(tracing_, channels_, weight, length, found_, sums);
+  return is_known;
+}
+
+void TileGatherer::keepGeometry(const Packet& camera_rays) {
+  const auto& [ax, ay, az] = tracing_.camera_axes;
+  tile_.valid = camera_rays.valid;
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    const bool is_hit = camera_rays.valid[i] != 0;
+    const Vec3d p = is_hit ? Vec3d{hits_.position.x[i], hits_.position.y[i], hits_.position.z[i]} -
+                                 tracing_.pinhole
+                           : Vec3d{};
+    const Vec3d n = is_hit ? Vec3d{hits_.normal.x[i], hits_.normal.y[i], hits_.normal.z[i]} : Vec3d{};
+    tile_.x[i] = static_cast<float>(dot(ax, p));
+    tile_.y[i] = static_cast<float>(dot(ay, p));
+    tile_.z[i] = static_cast<float>(dot(az, p));
+    tile_.normal_x[i] = static_cast<float>(dot(ax, n));
+    tile_.normal_y[i] = static_cast<float>(dot(ay, n));
+    tile_.normal_z[i] = static_cast<float>(dot(az, n));
+  }
+}
+
+void TileGatherer::keepSums(const Lanes<int>& valid) {
+  const auto add = [&](std::size_t channel, const Lanes<float>& lanes) {
+    for (std::size_t i = 0; i < kLaneCount; ++i) {
+      tile_.sums[channel][i] += valid[i] != 0 ? static_cast<double>(lanes[i]) : 0.0;
+    }
+  };
+  add(Channels::kSteady, sums_.steady);
+  add(Channels::kAmbient, sums_.ambient);
+  for (std::size_t phasor = 0; phasor < channels_.terms().size(); ++phasor) {
+    add(Channels::re(phasor), sums_.re[channels_.terms()[phasor]]);
+    add(Channels::im(phasor), sums_.im[channels_.terms()[phasor]]);
+  }
+  const auto harmonics = static_cast<std::size_t>(tracing_.request.harmonics);
+  for (std::size_t f = 0; f < tile_.squares.size(); ++f) {
+    const Lanes<float>&re = sums_.re[f * harmonics], &im = sums_.im[f * harmonics];
+    for (std::size_t i = 0; i < kLaneCount; ++i) {
+      tile_.squares[f][i] += valid[i] != 0 ? static_cast<double>(re[i] * re[i] + im[i] * im[i]) : 0.0;
+    }
+  }
+}
+
+}  // namespace toftwin::sim

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "sim/tracer/indirect.h"
+
+namespace toftwin::sim {
+
+/// One packet's worth of light over two surfaces for the cells.
+struct CellUpdate {
+  Lanes<IrradianceCells::Key> keys{};  ///< 0: none
+  std::vector<Lanes<float>> values;    ///< by channel
+};
+
+/// Sixteen coarse points, 4 × 4.
+struct Tile {
+  Lanes<int> valid;
+  Lanes<float> x, y, z, normal_x, normal_y, normal_z;
+  std::vector<Lanes<double>> sums;     ///< by channel
+  std::vector<Lanes<double>> squares;  ///< by frequency
+};
+
+/// Samples the light that falls onto coarse points, tile by tile. One for each thread.
+class TileGatherer {
+ public:
+  TileGatherer(const Tracing& tracing, const IrradianceCells& cells, const Channels& channels);
+
+  /// The tile whose first point is (i, j): `samples` of each point, numbered from `first_sample` on; the
+  /// first of them also looks further, for the cells.
+  void gather(int i, int j, std::uint32_t first_sample, int samples, CellUpdate& update);
+  [[nodiscard]] const Tile& tile() const { return tile_; }
+
+ private:
+  void lookFromCamera(int i, int j, Packet& camera_rays);
+  void follow(Packet& packet, CellUpdate* update);
+  bool meet(Packet& packet, int surface, LaneSums& sums);
+  void lookFurther(const Packet& at);
+  Lanes<int> addFromCells(const Packet& packet, Lanes<IrradianceCells::Key>& keys, LaneSums& sums);
+  void keepGeometry(const Packet& camera_rays);
+  void keepSums(const Lanes<int>& valid);
+
+  const Tracing& tracing_;
+  const IrradianceCells& cells_;
+  const Channels& channels_;
+  Tile tile_;
+  LaneSums sums_, further_;
+  std::vector<Lanes<float>> found_;
+  Hits hits_;
+};
+
+}  // namespace toftwin::sim

@@ -1,0 +1,339 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim/tracer/realtime.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "sim/images/rows.h"
+#include "sim/tracer/hit.h"
+#include "sim/tracer/indirect.h"
+#include "sim/tracer/path.h"
+
+namespace toftwin::sim {
+namespace {
+
+constexpr int kSize = 4;  // of a block of pixels, both ways
+static_assert(kSize == CoarseGrid::kStep && kSize * kSize == embree::kLanes);
+
+/// Samples of indirect light for each coarse point: of a frame, and of the first one.
+constexpr int kSamples = 2, kFirstPasses = 8;
+/// A cut to another view needs them as well.
+constexpr double kMuchIsNew = 0.5;
+/// Depth jumps where the inverse range bends by more than this share of itself.
+constexpr float kJump = 0.02f;
+/// So many samples in the whole image look into the pixels where depth jumps, at most 16 in each.
+constexpr int kFootprintSamples = 24'000;
+
+TraceRequest directOnly(const TraceRequest& request, int samples) {
+  TraceRequest direct = request;
+  direct.max_surfaces = 1;
+  direct.samples_per_pixel = samples;
+  return direct;
+}
+
+/// The geometry of a block's pixels in the camera's frame.
+TOFTWIN_VECTOR
+void keepGeometry(const Block& block, const TruthLanes& truth, BlockGeometry& pixels) {
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    const bool is_hit = truth.range_m[i] > 0.0f;  // not NaN
+    const double x = block.rays.x[i], y = block.rays.y[i], per_length = perRoot(x * x + y * y + 1.0);
+    const float range = is_hit ? truth.range_m[i] : 0.0f, along = range * static_cast<float>(per_length);
+    pixels.x[i] = along * static_cast<float>(x);
+    pixels.y[i] = along * static_cast<float>(y);
+    pixels.z[i] = along;
+    pixels.range_m[i] = static_cast<double>(range);
+    pixels.albedo[i] = is_hit ? truth.albedo[i] : 0.0f;
+  }
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    pixels.normal_x[i] = truth.normal[i].x;
+    pixels.normal_y[i] = truth.normal[i].y;
+    pixels.normal_z[i] = truth.normal[i].z;
+  }
+}
+
+/// The part of an image that a block covers.
+struct Part {
+  int x, y, width, height;
+
+  Part(const Block& block, const CameraInfo& camera)
+      : x(block.x),
+        y(block.y),
+        width(std::min(kSize, camera.width - x)),
+        height(std::min(kSize, camera.height - y)) {}
+
+  /// Each pixel becomes value(lane, what it was).
+  template <class T, class Value>
+  void store(Image<T>& image, const Value& value) const {
+    for (int row = 0; row < height; ++row) {
+      T* to = &image(x, y + row);
+      const auto lane = [&](int column) { return static_cast<std::size_t>(row * kSize + column); };
+      if (width == kSize) {  // mostly, and then without a loop
+        for (int column = 0; column < kSize; ++column) to[column] = value(lane(column), to[column]);
+      } else {
+        for (int column = 0; column < width; ++column) to[column] = value(lane(column), to[column]);
+      }
+    }
+  }
+};
+
+/// Pixels of one row at which depth jumps.
+TOFTWIN_VECTOR
+void markJumps(const float* above, const float* here, const float* below, int width, unsigned char* jumps) {
+  const auto inverse = [](float range) { return range > 0.0f ? 1.0f / range : 0.0f; };  // 0 for NaN
+  for (int x = 1; x < width - 1; ++x) {
+    const float middle = inverse(here[x]), l = inverse(here[x - 1]), r = inverse(here[x + 1]);
+    const float a = inverse(above[x]), b = inverse(below[x]);
+    const float across = std::abs(l + r - 2.0f * middle), down = std::abs(a + b - 2.0f * middle);
+    const float most = middle > l ? (middle > r ? middle : r) : (l > r ? l : r);
+    jumps[x] = (across > kJump * most) | (down > kJump * most) ? 1 : 0;
+  }
+}
+
+std::vector<std::array<int, 2>> pixelsWithJumps(const Image<float>& range) {
+  const int width = range.width(), height = range.height();
+  std::vector<std::vector<std::array<int, 2>>> rows(static_cast<std::size_t>(height));
+  forRows(height, [&](int first, int last) {
+    std::vector<unsigned char> jumps(static_cast<std::size_t>(width));
+    for (int y = std::max(1, first); y < std::min(last, height - 1); ++y) {
+      markJumps(&range(0, y - 1), &range(0, y), &range(0, y + 1), width, jumps.data());
+      for (int x = 1; x < width - 1; ++x) {
+        if (jumps[static_cast<std::size_t>(x)] != 0) rows[static_cast<std::size_t>(y)].push_back({x, y});
+      }
+    }
+  });
+  std::vector<std::array<int, 2>> pixels;
+  for (const auto& row : rows) pixels.insert(pixels.end(), row.begin(), row.end());
+  return pixels;
+}
+
+}  // namespace
+
+struct RealtimeTracer::Impl {
+  Light light;
+  Channels channels;
+  IndirectLight indirect;
+  std::vector<BlockGeometry> geometry;
+
+  void resize(const TraceRequest& request);
+  template <class Work>
+  void forBlocks(const CameraInfo& camera, const Work& work) const;
+  void traceDirect(const Tracing& tracing);
+  void storeDirect(const Part& at, const LaneSums& sums, const TruthLanes& truth);
+  void refineJumps(const Scene& scene, const TraceRequest& request);
+  void storeMeans(const BlockSums& sums, int x, int y);
+  void addIndirect(const Tracing& tracing);
+  void addSpread(const Part& at, const IndirectLight::Spread& spread);
+  void makeFrame(const Scene& scene, const TraceRequest& request);
+};
+
+void RealtimeTracer::Impl::resize(const TraceRequest& request) {
+  const int w = request.camera.width, h = request.camera.height;
+  const auto fit = [&](auto& image) {
+    if (image.width() != w || image.height() != h) image = std::remove_reference_t<decltype(image)>(w, h);
+  };
+  light.frequencies = request.frequencies;
+  light.harmonics = request.harmonics;
+  light.phasors.resize(request.frequencies.size() * static_cast<std::size_t>(request.harmonics));
+  light.variance.resize(request.frequencies.size());
+  for (std::size_t term = 0; term < light.phasors.size(); ++term) {
+    if (std::ranges::find(channels.terms(), term) != channels.terms().end()) {
+      fit(light.phasors[term]);
+    } else {
+      light.phasors[term] = {};
+    }
+  }
+  std::for_each(light.variance.begin(), light.variance.end(), fit);
+  fit(light.steady);
+  fit(light.ambient);
+  fit(light.truth.range_m);
+  fit(light.truth.normal);
+  fit(light.truth.albedo);
+  geometry.resize(static_cast<std::size_t>(((w + kSize - 1) / kSize) * ((h + kSize - 1) / kSize)));
+}
+
+template <class Work>
+void RealtimeTracer::Impl::forBlocks(const CameraInfo& camera, const Work& work) const {
+  const int columns = (camera.width + kSize - 1) / kSize, rows = (camera.height + kSize - 1) / kSize;
+  inParallel(columns * rows, 8, [&](int begin, int end) {
+    const FlushDenormals flush;
+    work(begin, end, columns);
+  });
+}
+
+/// Traces direct light and truth of a block's central rays.
+class DirectTracer {
+ public:
+  explicit DirectTracer(const Tracing& tracing)
+      : tracing_(tracing),
+        sums(tracing.turns_per_metre.size() * static_cast<std::size_t>(tracing.request.harmonics)) {}
+
+  void trace(const Block& block) {
+    clearSums(sums);
+    preparePacket(tracing_, block, packet_);
+    startInTheMiddle(tracing_, block, packet_);
+    if (!tracing_.scene.is_matt) {
+      followAll(tracing_, packet_, sums);
+      traceTruth(tracing_, block, truth);
+      return;
+    }
+    const bool is_coherent = !tracing_.scene.hasInstances();
+    intersect(tracing_, packet_, rays_, is_coherent);
+    endMissed(tracing_.scene.ambient_radiance, rays_, packet_, sums.ambient);
+    findHits(tracing_.scene, packet_, rays_, hits_);
+    addEmission(packet_, hits_, sums.ambient);
+    gatherDirectLight(tracing_, packet_, hits_, 0, is_coherent, sums);
+    keepTruth(tracing_, packet_, hits_, truth);
+  }
+
+ private:
+  const Tracing& tracing_;
+  Packet packet_;
+  RTCRayHit16 rays_;
+  Hits hits_;
+
+ public:
+  LaneSums sums;
+  TruthLanes truth;
+};
+
+void RealtimeTracer::Impl::traceDirect(const Tracing& tracing) {
+  const BlockShape shape = BlockShape::forSamples(1);
+  forBlocks(tracing.request.camera, [&](int begin, int end, int columns) {
+    Block block;
+    DirectTracer direct{tracing};
+    for (int i = begin; i != end; ++i) {
+      prepareBlock(tracing, shape, i % columns * kSize, i / columns * kSize, block);
+      direct.trace(block);
+      keepGeometry(block, direct.truth, geometry[static_cast<std::size_t>(i)]);
+      storeDirect({block, tracing.request.camera}, direct.sums, direct.truth);
+    }
+  });
+}
+
+void RealtimeTracer::Impl::storeDirect(const Part& at, const LaneSums& sums, const TruthLanes& truth) {
+  at.store(light.steady, [&](std::size_t i, float) { return sums.steady[i]; });
+  at.store(light.ambient, [&](std::size_t i, float) { return sums.ambient[i]; });
+  for (const std::size_t term : channels.terms()) {
+    const Lanes<float>&re = sums.re[term], &im = sums.im[term];
+    at.store(light.phasors[term],
+             [&](std::size_t i, std::complex<float>) { return std::complex<float>{re[i], im[i]}; });
+  }
+  for (Image<float>& variance : light.variance) at.store(variance, [](std::size_t, float) { return 0.0f; });
+  at.store(light.truth.range_m, [&](std::size_t i, float) { return truth.range_m[i]; });
+  at.store(light.truth.albedo, [&](std::size_t i, float) { return truth.albedo[i]; });
+  at.store(light.truth.normal, [&](std::size_t i, Vec3f) { return truth.normal[i]; });
+}
+
+/// Where depth jumps the pixel's centre says too little: direct light over its footprint.
+void RealtimeTracer::Impl::refineJumps(const Scene& scene, const TraceRequest& request) {
+  if (request.pixel_extent == 0.0) return;
+  const auto pixels = pixelsWithJumps(light.truth.range_m);
+  if (pixels.empty()) return;
+  const int share = std::clamp(kFootprintSamples / static_cast<int>(pixels.size()), 2, 16);
+  const TraceRequest what = directOnly(request, static_cast<int>(std::bit_floor(static_cast<unsigned>(share))));
+  const Tracing tracing{scene.impl(), what, nullptr};
+  const BlockShape shape;  // the pixel itself, with all lanes
+  inParallel(static_cast<int>(pixels.size()), 16, [&](int begin, int end) {
+    const FlushDenormals flush;
+    Block block;
+    BlockSums sums{what};
+    for (int i = begin; i != end; ++i) {
+      const auto [x, y] = pixels[static_cast<std::size_t>(i)];
+      prepareBlock(tracing, shape, x, y, block);
+      clearSums(sums);
+      traceBlock(tracing, block, 0, what.samples_per_pixel, sums);
+      storeMeans(sums, x, y);
+    }
+  });
+}
+
+void RealtimeTracer::Impl::storeMeans(const BlockSums& sums, int x, int y) {
+  const auto total = [](const Lanes<double>& lanes) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < kLaneCount; ++i) sum += lanes[i];
+    return sum;
+  };
+  const double n = total(sums.samples);
+  light.steady(x, y) = static_cast<float>(total(sums.steady) / n);
+  light.ambient(x, y) = static_cast<float>(total(sums.ambient) / n);
+  for (const std::size_t term : channels.terms()) {
+    light.phasors[term](x, y) =
+        std::complex<float>{std::complex<double>{total(sums.re[term]) / n, total(sums.im[term]) / n}};
+  }
+  for (std::size_t f = 0; f < light.variance.size(); ++f) {
+    const std::complex<double> mean{light.phasors[f * static_cast<std::size_t>(light.harmonics)](x, y)};
+    const double spread = std::max(0.0, total(sums.squares[f]) / n - std::norm(mean));
+    light.variance[f](x, y) = static_cast<float>(spread / (2.0 * (n - 1.0)));
+  }
+}
+
+void RealtimeTracer::Impl::addIndirect(const Tracing& tracing) {
+  const CameraInfo& camera = tracing.request.camera;
+  forBlocks(camera, [&](int begin, int end, int columns) {
+    Block block;
+    IndirectLight::Spread spread{channels, tracing.request};
+    for (int i = begin; i != end; ++i) {
+      block.x = i % columns * kSize;
+      block.y = i / columns * kSize;
+      indirect.spread(tracing, block.x, block.y, geometry[static_cast<std::size_t>(i)], spread);
+      addSpread({block, camera}, spread);
+    }
+  });
+}
+
+void RealtimeTracer::Impl::addSpread(const Part& at, const IndirectLight::Spread& spread) {
+  const LaneSums& sums = spread.sums;
+  at.store(light.steady, [&](std::size_t i, float before) { return before + sums.steady[i]; });
+  at.store(light.ambient, [&](std::size_t i, float before) { return before + sums.ambient[i]; });
+  for (const std::size_t term : channels.terms()) {
+    const Lanes<float>&re = sums.re[term], &im = sums.im[term];
+    at.store(light.phasors[term], [&](std::size_t i, std::complex<float> before) {
+      return std::complex<float>{before.real() + re[i], before.imag() + im[i]};
+    });
+  }
+  for (std::size_t f = 0; f < spread.variance.size(); ++f) {
+    at.store(light.variance[f], [&](std::size_t i, float before) { return before + spread.variance[f][i]; });
+  }
+}
+
+void RealtimeTracer::Impl::makeFrame(const Scene& scene, const TraceRequest& request) {
+  resize(request);
+  const TraceRequest direct = directOnly(request, 1);
+  traceDirect(Tracing{scene.impl(), direct, nullptr});
+  refineJumps(scene, request);
+  if (request.max_surfaces == 1) return;
+  const Tracing tracing{scene.impl(), request, nullptr};
+  indirect.gather(tracing, channels, kSamples);
+  if (indirect.shareOfNew() > kMuchIsNew) {
+    for (int pass = 1; pass < kFirstPasses; ++pass) indirect.gather(tracing, channels, kSamples);
+  }
+  indirect.smooth();
+  addIndirect(tracing);
+}
+
+RealtimeTracer::RealtimeTracer() : impl_(std::make_unique<Impl>()) {}
+RealtimeTracer::RealtimeTracer(RealtimeTracer&&) noexcept = default;
+RealtimeTracer& RealtimeTracer::operator=(RealtimeTracer&&) noexcept = default;
+RealtimeTracer::~RealtimeTracer() = default;
+
+const Light& RealtimeTracer::next(const Scene& scene, const TraceRequest& request,
+                                  std::span<const std::uint8_t> wanted) {
+  checkRequest(request);
+  const auto require = [](bool is_met, const char* what) {
+    if (!is_met) throw std::invalid_argument{fmt::format("trace: {}", what)};
+  };
+  require(request.region_width == 0, "in real time the region must be the whole image");
+  require(request.gates.empty(), "gates need mode unbiased: their light cannot be kept from frame to frame");
+  require(wanted.empty() || wanted.size() == request.frequencies.size() * static_cast<std::size_t>(request.harmonics),
+          "wanted must name every frequency's harmonics");
+  impl_->channels = Channels{request, wanted};
+  impl_->makeFrame(scene, request);
+  return impl_->light;
+}
+
+}  // namespace toftwin::sim

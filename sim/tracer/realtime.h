@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "sim/images/light.h"
+#include "sim/tracer/trace.h"
+
+namespace toftwin::sim {
+
+/// Light frame after frame, at a camera's own pace (docs/realtime.md).
+///
+/// Direct light is traced through every pixel's centre and, where depth jumps, over the pixel's
+/// footprint. Light over several surfaces is gathered at every fourth pixel of every fourth row, few
+/// samples a frame, kept over frames while the surface stays, smoothed along surfaces and spread to
+/// all pixels. Every surface counts as diffuse there. trace() is its judge: what this mode leaves out or
+/// blurs is a bias of some millimetres, what is left of noise is in Light::variance.
+///
+/// Not for several threads; uses all of them itself. The result depends on the requests and scenes of
+/// all frames so far and on nothing else.
+class RealtimeTracer {
+ public:
+  RealtimeTracer();
+  RealtimeTracer(RealtimeTracer&&) noexcept;
+  RealtimeTracer& operator=(RealtimeTracer&&) noexcept;
+  ~RealtimeTracer();
+
+  /// The next frame's light; it stays valid until the next call. Of the request, `samples_per_pixel` is
+  /// not used, `max_surfaces` only counts as 1 (direct light alone), 2 or any number, gates are not
+  /// possible, and the region must be the whole image; otherwise throws as trace() does. The seed should
+  /// stay the same. Phasors (in the order of Light::phasors) for which `wanted` is 0 are left out, their
+  /// images empty, except first harmonics.
+  const Light& next(const Scene& scene, const TraceRequest& request, std::span<const std::uint8_t> wanted = {});
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace toftwin::sim
