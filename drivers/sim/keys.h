@@ -15,11 +15,15 @@ namespace toftwin::drivers::simulator {
 /// Of the camera from the world's origin, set by the configuration or by a client.
 constexpr double kMostPosition_m = 1e6;
 
+/// How light is traced: docs/realtime.md.
+enum class Mode { Unbiased, RealTime };
+
 /// The keys of a [[source]] table with driver = "sim".
 struct Keys {
   std::string uri = "sim:generic_cw";
   std::string camera;
   std::string scene;
+  Mode mode = Mode::Unbiased;
   int samples_per_pixel = 4;
   int max_surfaces = 4;
   double pixel_extent = 1.0;
@@ -42,7 +46,11 @@ struct Keys {
     v.text("camera", camera, "path of a camera file, relative to this file, instead of a preset");
     v.text("scene", scene,
            "path of a scene file, relative to this file; empty: a box before a wall");
-    v.number("samples_per_pixel", samples_per_pixel, {1, 65'536}, "paths traced per pixel");
+    v.choice("mode", mode, {{"unbiased", Mode::Unbiased}, {"realtime", Mode::RealTime}},
+             "how light is traced: exactly but for noise, or frame after frame at the camera's pace, with "
+             "light over several surfaces kept, smoothed and some millimetres wrong");
+    v.number("samples_per_pixel", samples_per_pixel, {1, 65'536},
+             "paths traced per pixel; realtime has its own");
     v.number("max_surfaces", max_surfaces, {1, 64},
              "surfaces a path may touch: 1 is direct light only");
     v.number("pixel_extent", pixel_extent, {0.0, 4.0},

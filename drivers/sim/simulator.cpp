@@ -108,13 +108,17 @@ class SimulatedSource final : public Source {
     const Error stopped{Error::Code::Stopped, "asked to stop"};
     // Light first: after a new pose it takes long, and the pace then counts what a camera would
     // have delivered meanwhile as lost.
-    if (!view_.changesWithTime() && !view_.complete(stop)) return stopped;
+    if (!view_.isRealtime() && !view_.changesWithTime() && !view_.complete(stop)) return stopped;
     Frame frame;
     const auto lost = pacer_.waitForTurn(stop, lockstep);
     if (!lost) return lost.error();
     frame.dropped_by_device = *lost;
     frame.moment = momentOfFrame();
-    if (view_.changesWithTime() && !gatherMoving(frame.moment, stop)) return stopped;
+    if (view_.isRealtime()) {
+      gatherInRealtime(frame.moment);
+    } else if (view_.changesWithTime() && !gatherMoving(frame.moment, stop)) {
+      return stopped;
+    }
     frame.provenance = sim::provenanceOf(model_, view_.scene().id(), keys_.seed);
     frame.camera = info_.camera;
     frame.planes = expose(frame.moment);
@@ -201,6 +205,12 @@ class SimulatedSource final : public Source {
     return {};
   }
 
+  /// One light for all raw exposures, of the time of the middle one.
+  void gatherInRealtime(const Moment& moment) {
+    view_.traceFrame(sim::middleOf(moment.exposures[moment.exposures.size() / 2]));
+    collected_ = model_.collect(view_.light(), moment, keys_.seed, pacer_.index());
+  }
+
   /// Where things move or other cameras shine: light for each raw exposure at its own time. False if asked to stop before the end.
   bool gatherMoving(const Moment& moment, const std::stop_token& stop) {
     const std::size_t count = moment.exposures.size();
@@ -215,7 +225,7 @@ class SimulatedSource final : public Source {
 
   /// The planes of the next frame: the light of the pose with this frame's noise.
   std::vector<Plane> expose(const Moment& moment) {
-    if (!view_.changesWithTime() && (!collected_ || !model_.collectsTheSameEachFrame())) {
+    if (!view_.isRealtime() && !view_.changesWithTime() && (!collected_ || !model_.collectsTheSameEachFrame())) {
       collected_ = model_.collect(view_.light(), moment, keys_.seed, pacer_.index());
     }
     const sim::History before{last_collected_ ? &*last_collected_ : nullptr,
@@ -226,7 +236,8 @@ class SimulatedSource final : public Source {
       last_collected_ = *collected_;
       last_range_ = exposed.range;
     }
-    return sim::planesOf(model_, std::move(exposed), view_.changesWithTime() ? truth_of_middle_ : view_.light().truth,
+    const bool is_of_middle = !view_.isRealtime() && view_.changesWithTime();
+    return sim::planesOf(model_, std::move(exposed), is_of_middle ? truth_of_middle_ : view_.light().truth,
                          info_.planes);
   }
 
@@ -316,6 +327,17 @@ std::optional<sim::Scene> chosenScene(const Keys& keys, settings::Table& table) 
   return std::nullopt;
 }
 
+void complainOfMode(const Keys& keys, const std::optional<sim::SensorModel>& model,
+                    const std::optional<sim::Scene>& scene, settings::Table& table) {
+  if (keys.mode != Mode::RealTime) return;
+  const auto complain = [&](std::string_view why) {
+    table.complain("mode", fmt::format("= \"realtime\" cannot have {}: leave it out for \"unbiased\"", why));
+  };
+  if (model && !model->hasPhasors()) complain(fmt::format("a pulsed camera, as {} is", model->model()));
+  if (model && model->rowDelay() > 0_ms) complain("a rolling shutter");
+  if (scene && !scene->foreignEmitters().empty()) complain("other cameras' light, as the scene has");
+}
+
 Result<std::unique_ptr<Source>> open(settings::Table& table) {
   Keys keys;
   table.read(keys);
@@ -330,6 +352,7 @@ Result<std::unique_ptr<Source>> open(settings::Table& table) {
     if (!model || std::ranges::count(sim::planesOfCamera(*model), kind) > 0) continue;
     table.complain("planes", fmt::format("names \"{}\", which {} does not have", nameOf(kind), model->model()));
   }
+  complainOfMode(keys, model, scene, table);
   if (auto checked = table.check(); !checked) return checked.error();
   sim::TraceRequest request = model->traceRequest();
   request.samples_per_pixel = keys.samples_per_pixel;
@@ -337,6 +360,7 @@ Result<std::unique_ptr<Source>> open(settings::Table& table) {
   request.pixel_extent = keys.pixel_extent;
   request.seed = keys.seed;
   View view{*std::move(scene), std::move(request), motionOf(keys), model->rowDelay()};
+  if (keys.mode == Mode::RealTime) view.goRealtime(model->correlatedTerms());
   return std::unique_ptr<Source>{
       std::make_unique<SimulatedSource>(keys, *std::move(model), std::move(view), std::move(planes))};
 }

@@ -58,6 +58,17 @@ void View::moveTo(Duration time, std::uint64_t number) {
   forget();
 }
 
+void View::goRealtime(std::vector<std::uint8_t> wanted) {
+  realtime_.emplace();
+  wanted_ = std::move(wanted);
+}
+
+void View::traceFrame(Duration time) {
+  sim::TraceRequest request = request_;
+  request.world_from_camera = poseAt(time);
+  realtime_light_ = &realtime_->next(scene_.moves() ? scene_.at(time) : scene_, request, wanted_);
+}
+
 bool View::complete(const sim::ForeignEmitterSpec* foreign, Pass& pass, const std::stop_token& stop) const {
   const int height = request_.camera.height;
   const bool is_rolling = moves() && row_delay_ > Duration{};

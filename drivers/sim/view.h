@@ -10,6 +10,7 @@
 
 #include "sim/images/light.h"
 #include "sim/tracer/motion.h"
+#include "sim/tracer/realtime.h"
 #include "sim/tracer/trace.h"
 
 namespace toftwin::drivers::simulator {
@@ -39,8 +40,14 @@ class View {
 
   /// Traces what is not traced yet. False if asked to stop before the end.
   bool complete(const std::stop_token& stop);
-  /// The light of the whole image, once complete() said so.
-  [[nodiscard]] const sim::Light& light() const { return own_.light; }
+  /// The light of the whole image, once complete() said so; in real time that of the last frame.
+  [[nodiscard]] const sim::Light& light() const { return realtime_light_ != nullptr ? *realtime_light_ : own_.light; }
+
+  /// From now on light is traced frame by frame, those of its phasors that are wanted.
+  void goRealtime(std::vector<std::uint8_t> wanted);
+  [[nodiscard]] bool isRealtime() const { return realtime_.has_value(); }
+  /// Traces the light of one frame, as it is at a time since device time 0.
+  void traceFrame(Duration time);
   /// The same with what other cameras add to a raw exposure.
   [[nodiscard]] const sim::Light& lightFor(const Exposure& exposure);
 
@@ -60,6 +67,9 @@ class View {
   [[nodiscard]] bool moves() const { return scene_.moves() || !camera_.isStill(); }
   bool complete(const sim::ForeignEmitterSpec* foreign, Pass& pass, const std::stop_token& stop) const;
   void forget();
+  std::optional<sim::RealtimeTracer> realtime_;
+  std::vector<std::uint8_t> wanted_;                ///< in real time
+  const sim::Light* realtime_light_ = nullptr;      ///< the tracer's
   Pass own_;
   std::vector<Pass> foreign_{scene_.foreignEmitters().size()};
   sim::Light mixed_;  ///< what lightFor() gave last

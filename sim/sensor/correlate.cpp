@@ -74,6 +74,15 @@ std::vector<std::complex<double>> relativeHarmonics(const Waveform& emitted,
   return relative;
 }
 
+std::vector<std::uint8_t> correlatedTerms(const std::vector<Response>& responses, int harmonics) {
+  std::vector<std::uint8_t> seen;
+  for (const Response& response : responses) {
+    for (std::size_t i = 0; i < static_cast<std::size_t>(harmonics); ++i)
+      seen.push_back(i < response.harmonics.size() && std::abs(response.harmonics[i]) >= kNoContent ? 1 : 0);
+  }
+  return seen;
+}
+
 Light correlatedPart(const Light& light, const std::vector<Response>& responses, bool all_harmonics) {
   Light part;
   part.frequencies = light.frequencies;
@@ -82,13 +91,9 @@ Light correlatedPart(const Light& light, const std::vector<Response>& responses,
     part.phasors = light.phasors;
   } else {
     part.phasors.resize(light.phasors.size());
-    for (std::size_t f = 0; f < responses.size(); ++f) {
-      const auto& content = responses[f].harmonics;
-      for (int n = 1; n <= light.harmonics; ++n) {
-        const auto i = static_cast<std::size_t>(n - 1);
-        const bool is_seen = i < content.size() && std::abs(content[i]) >= kNoContent;
-        if (is_seen) part.phasor(f, n) = light.phasor(f, n);
-      }
+    const std::vector<std::uint8_t> seen = correlatedTerms(responses, light.harmonics);
+    for (std::size_t term = 0; term < seen.size(); ++term) {
+      if (seen[term] != 0) part.phasors[term] = light.phasors[term];
     }
   }
   part.steady = light.steady;

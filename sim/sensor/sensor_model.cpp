@@ -109,6 +109,10 @@ Of applyAll(Of image, const std::vector<AnyEffect>& effects, const Conditions& n
   return image;
 }
 
+bool anyAddsHarmonics(const std::vector<AnyEffect>& effects) {
+  return std::ranges::any_of(effects, [](const AnyEffect& effect) { return std::holds_alternative<Harmonics>(effect); });
+}
+
 bool anyActsOnLight(const std::vector<AnyEffect>& effects) {
   for (const AnyEffect& any : effects) {
     if (std::visit([]<class E>(const E&) { return std::is_same_v<ImageOf<E>, Light>; }, any))
@@ -248,6 +252,12 @@ std::optional<LensPair> SensorModel::colorLens() const {
 
 bool SensorModel::hasPhasors() const { return !impl_->file.isPulsed(); }
 
+std::vector<std::uint8_t> SensorModel::correlatedTerms() const {
+  const auto harmonics = static_cast<std::size_t>(impl_->file.sampling.harmonics);
+  if (anyAddsHarmonics(impl_->effects)) return std::vector<std::uint8_t>(impl_->responses.size() * harmonics, 1);
+  return sim::correlatedTerms(impl_->responses, impl_->file.sampling.harmonics);
+}
+
 std::vector<std::string> SensorModel::effectNames() const {
   std::vector<std::string> names;
   for (const AnyEffect& any : impl_->effects) {
@@ -308,10 +318,7 @@ Samples SensorModel::collect(const Light& light, const Moment& moment, std::uint
                              std::uint64_t frame, int region_x, int region_y) const {
   if (!anyActsOnLight(impl_->effects)) return samplesOf(*impl_, light);
   const Conditions now{moment, impl_->camera, region_x, region_y};
-  const bool wants_all = light.frequencies.empty() ||
-                         std::ranges::any_of(impl_->effects, [](const AnyEffect& effect) {
-                           return std::holds_alternative<Harmonics>(effect);
-                         });
+  const bool wants_all = light.frequencies.empty() || anyAddsHarmonics(impl_->effects);
   Light seen = correlatedPart(light, impl_->responses, wants_all);
   return samplesOf(*impl_, applyAll(std::move(seen), impl_->effects, now, seed, frame));
 }

@@ -253,6 +253,55 @@ TEST_F(Simulator, ARollingShutterSeesEachBandOfRowsAtItsOwnTime) {
   }
 }
 
+/// A corner, whose light over both walls makes it seem 16 mm further. An image so small has a coarse grid of 7 × 6
+/// points, over which light is blurred: 4 mm.
+TEST_F(Simulator, InRealtimeSeesWhatTheUnbiasedModeSees) {
+  std::ofstream{folder_ / "corner.toml"}
+      << kWall << "[[object]]\nshape = 'rectangle'\nsize_m = [40, 40, 0]\nposition_m = [0, 0.4, 0]\n"
+      << "euler_deg = [90, 0, 0]\nmaterial = 'white'\n";
+  const auto meanOf = [&](const std::string& keys) {
+    auto source = tryOpen("camera = 'camera.toml'\nscene = 'corner.toml'\npace = 'fast'\n" + keys);
+    if (!source) throw std::runtime_error{source.error().message};
+    EXPECT_TRUE((*source)->start());
+    for (int i = 0; i < 40; ++i) frameOf(**source);
+    return meanRange(frameOf(**source));
+  };
+  const double exact = meanOf("max_surfaces = 4\nsamples_per_pixel = 1024\n");
+  EXPECT_NEAR(meanOf("max_surfaces = 4\nmode = 'realtime'\n"), exact, 6e-3);
+  EXPECT_LT(meanOf("max_surfaces = 1\nmode = 'realtime'\n"), exact - 1e-2);
+}
+
+/// As above, without rows of their own times: a frame sees one time, that of raw exposure 2 of four, which begins
+/// after 3 ms.
+TEST_F(Simulator, InRealtimeThingsMoveFromFrameToFrame) {
+  std::ofstream{folder_ / "plate.toml"}
+      << std::string{kWall}.replace(std::string{kWall}.find("0, 0, 2]"), 8, "0, 0, 4]")
+      << "[[object]]\nshape = 'rectangle'\nsize_m = [10, 40, 0]\nposition_m = [-5, 0, 2]\nmaterial = 'white'\n"
+         "velocity_m_per_s = [2, 0, 0]\n";
+  auto source = tryOpen("camera = 'camera.toml'\nscene = 'plate.toml'\npace = 'fast'\nmode = 'realtime'\n"
+                        "frame_interval_ms = 20\nplanes = ['truth_range']\n");
+  ASSERT_TRUE(source) << source.error().message;
+  ASSERT_TRUE((*source)->start());
+  for (int i = 0; i < 5; ++i) {
+    const Frame frame = frameOf(**source);
+    const DeviceTime start = frame.moment.exposures[2].start;
+    const double edge_px = 11.5 + 30.0 * 2.0 * (static_cast<double>(start.ns) * 1e-9 + 0.5e-3) / 2.0;
+    for (int x = 0; x < 24; ++x) {
+      EXPECT_EQ(frame.find(PlaneKind::TruthRange)->as<float>()[static_cast<std::size_t>(24 * 10 + x)] < 3.0f, x < edge_px)
+          << "frame " << i << ", " << x << ", edge " << edge_px;
+    }
+  }
+}
+
+TEST_F(Simulator, SaysWhatRealtimeCannotHave) {
+  const std::string realtime = "mode = 'realtime'\n";
+  EXPECT_THAT(errorOf("uri = 'sim:xtion_2'\n" + realtime),
+              testing::AllOf(HasSubstr("toftwind.toml:2: mode = \"realtime\""), HasSubstr("pulsed")));
+  std::ofstream{folder_ / "rolling.toml"} << kCamera << "[sampling]\ngap_us = 0\nrow_delay_us = 5\n";
+  EXPECT_THAT(errorOf("camera = 'rolling.toml'\n" + realtime), HasSubstr("rolling shutter"));
+  EXPECT_THAT(errorOf("mode = 'quick'\n"), testing::AllOf(HasSubstr("quick"), HasSubstr("unbiased")));
+}
+
 TEST_F(Simulator, GivesAllPlanesWhenAsked) {
   const auto source =
       open("planes = ['truth_range', 'truth_normal', 'samples', 'phasors', 'range', 'flags']\n");
