@@ -6,11 +6,13 @@
 #include <filesystem>
 #include <limits>
 #include <optional>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include <toftwin/names.h>
 
+#include "calib/compare/characteristics.h"
 #include "calib/compare/statistics.h"
 #include "protocol/record/recording.h"
 
@@ -121,6 +123,21 @@ Result<Frame> nextAt(Feed& feed, const std::optional<Transform<World, Camera>>& 
                            feed.details().entry.name, options.most_skipped)};
 }
 
+/// The next frame of both, at almost the same time: a camera that makes its frames when asked, such
+/// as a simulator that traces a new pose, is asked first. The other one goes on meanwhile and
+/// then gives its newest frame (openFeed), not one from before.
+Result<std::pair<Frame, Frame>> nextPair(Feed& a, Feed& b,
+                                         const std::optional<Transform<World, Camera>>& pose,
+                                         const CaptureOptions& options) {
+  const bool is_b_first = b.details().can_lockstep && !a.details().can_lockstep;
+  auto first = nextAt(is_b_first ? b : a, pose, options);
+  if (!first) return first.error();
+  auto second = nextAt(is_b_first ? a : b, pose, options);
+  if (!second) return second.error();
+  if (is_b_first) std::swap(*first, *second);
+  return std::pair{*std::move(first), *std::move(second)};
+}
+
 double medianDifference_mm(const Frame& a, const Frame& b) {
   if (a.camera.width != b.camera.width || a.camera.height != b.camera.height ||
       a.camera.fx != b.camera.fx || a.camera.fy != b.camera.fy || a.camera.cx != b.camera.cx ||
@@ -131,8 +148,9 @@ double medianDifference_mm(const Frame& a, const Frame& b) {
   if (!range_a || !range_b) return kNaN;
   std::vector<double> difference;
   for (std::size_t i = 0; i < range_a->size(); ++i) {
-    difference.push_back(1e3 *
-                         (static_cast<double>((*range_b)[i]) - static_cast<double>((*range_a)[i])));
+    const double d =
+        1e3 * (static_cast<double>((*range_b)[i]) - static_cast<double>((*range_a)[i]));
+    if (!isGross(d)) difference.push_back(d);
   }
   return quantile(std::move(difference), 0.5);
 }
@@ -142,9 +160,9 @@ double powerOn(const Frame& frame) {
 }
 
 /// N pairs of frames at one pose.
-Result<> capturePose(Feed& a, Feed& b, const std::optional<Transform<World, Camera>>& pose,
-                     const CaptureOptions& options, Progress& progress, CapturedPose& captured,
-                     Capture& result) {
+Result<> capturePose(Feed& a, Feed& b, const CaptureOptions& options, Progress& progress,
+                     CapturedPose& captured, Capture& result) {
+  const auto& pose = captured.asked;
   for (Feed* feed : {&a, &b}) {
     if (!pose || !feed->details().can_set_pose) continue;
     if (auto set = feed->setPose(*pose); !set)
@@ -152,16 +170,15 @@ Result<> capturePose(Feed& a, Feed& b, const std::optional<Transform<World, Came
   }
   for (int i = 0; i < options.frames; ++i) {
     progress.at(static_cast<double>(i) / options.frames);
-    auto frame_a = nextAt(a, pose, options);
-    if (!frame_a) return frame_a.error();
-    auto frame_b = nextAt(b, pose, options);
-    if (!frame_b) return frame_b.error();
-    if (auto added = captured.a.add(*frame_a); !added) return added;
-    if (auto added = captured.b.add(*frame_b); !added) return added;
-    result.log.push_back(logEntry(*frame_a, captured.name, "A"));
-    result.log.push_back(logEntry(*frame_b, captured.name, "B"));
-    result.pairs.push_back({result.poses.size(), powerOn(*frame_a), powerOn(*frame_b),
-                            medianDifference_mm(*frame_a, *frame_b)});
+    auto pair = nextPair(a, b, pose, options);
+    if (!pair) return pair.error();
+    const auto& [frame_a, frame_b] = *pair;
+    if (auto added = captured.a.add(frame_a); !added) return added;
+    if (auto added = captured.b.add(frame_b); !added) return added;
+    result.log.push_back(logEntry(frame_a, captured.name, "A"));
+    result.log.push_back(logEntry(frame_b, captured.name, "B"));
+    result.pairs.push_back({result.poses.size(), powerOn(frame_a), powerOn(frame_b),
+                            medianDifference_mm(frame_a, frame_b)});
   }
   return {};
 }
@@ -172,8 +189,10 @@ Result<std::unique_ptr<Feed>> openFeed(Client& client, const std::string& source
   auto details = client.describe(source);
   if (!details) return details.error();
   SubscribeOptions options;
+  // Not Lossless: a fast camera's frames would pile up while the other one traces a pose, end with
+  // Overrun at the daemon's memory limit, and before that be seconds old when they are paired.
   options.policy = details->can_lockstep ? SubscribeOptions::Policy::Lockstep
-                                         : SubscribeOptions::Policy::Lossless;
+                                         : SubscribeOptions::Policy::Latest;
   // What the comparison reads; raw samples and phasors would only cost bandwidth.
   for (const PlaneKind kind : details->planes) {
     if (kind == PlaneKind::Range || kind == PlaneKind::Depth || kind == PlaneKind::Amplitude ||
@@ -241,10 +260,12 @@ Result<Capture> captureAll(Feed& a, Feed& b, const CaptureOptions& options, Prog
   for (std::size_t i = 0; i < count; ++i) {
     progress.begin();
     CapturedPose captured{
-        .name = options.poses.empty() ? "where they are" : options.poses[i].name, .a = {}, .b = {}};
-    std::optional<Transform<World, Camera>> pose;
-    if (!options.poses.empty()) pose = options.poses[i].world_from_camera();
-    if (auto done = capturePose(a, b, pose, options, progress, captured, result); !done)
+        .name = options.poses.empty() ? "where they are" : options.poses[i].name,
+        .asked = {},
+        .a = {},
+        .b = {}};
+    if (!options.poses.empty()) captured.asked = options.poses[i].world_from_camera();
+    if (auto done = capturePose(a, b, options, progress, captured, result); !done)
       return done.error();
     unknown_pose = unknown_pose || !captured.a.pose() || !captured.b.pose();
     result.poses.push_back(std::move(captured));

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,12 +23,13 @@ class Feed {
  public:
   virtual ~Feed() = default;
   [[nodiscard]] virtual const SourceDetails& details() const = 0;
+  /// From a camera that cannot lockstep, the newest frame.
   virtual Result<Frame> next(std::chrono::milliseconds timeout) = 0;
   virtual Result<> setPose(const Transform<World, Camera>& world_from_camera) = 0;
 };
 
 /// A source of a daemon: in LOCKSTEP where it can, so that no frame is made or lost without us,
-/// else LOSSLESS. The client must outlive it.
+/// else LATEST: the newest frame whenever we are ready for one. The client must outlive it.
 Result<std::unique_ptr<Feed>> openFeed(Client& client, const std::string& source);
 
 /// A recording: "file.mcap", or "file.mcap#source" where it holds several sources. It cannot be
@@ -37,6 +39,7 @@ Result<std::unique_ptr<Feed>> openRecording(const std::string& file_and_source);
 /// What was captured at one pose.
 struct CapturedPose {
   std::string name;
+  std::optional<Transform<World, Camera>> asked;  ///< of the cameras, whether or not they say it
   Stack a, b;
 };
 
@@ -45,7 +48,7 @@ struct FramePair {
   std::size_t pose = 0;
   double since_power_on_a_s = 0.0, since_power_on_b_s = 0.0;  ///< NaN where unknown
   double median_difference_mm =
-      0.0;  ///< of B − A over the pixels valid in both; NaN for different camera models
+      0.0;  ///< of B − A over the pixels valid in both and not gross; NaN for different camera models
 };
 
 struct Capture {

@@ -15,6 +15,10 @@ namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
+bool isValidInBoth(const PoseComparison& pose, std::size_t pixel) {
+  return pose.valid_a[pixel] >= 0.5F && pose.valid_b[pixel] >= 0.5F;  // false for NaN
+}
+
 Image<float> scaled(Image<float> image, float factor) {
   for (float& v : image.pixels()) v *= factor;
   return image;
@@ -33,18 +37,27 @@ bool isFlying(const Image<float>& range, int x, int y, int dx, int dy, double ju
   return std::min(std::abs(own - a), std::abs(own - b)) > 0.15 * gap;
 }
 
+/// With the standard error over places: the pixels of one place see the same errors.
+Summary summariseOverPlaces(std::span<const double> values, std::span<const std::uint32_t> place) {
+  Summary summary = summarise(values);
+  summary.standard_error = clusteredError(values, place);
+  return summary;
+}
+
 void addRegion(std::vector<Region>& regions, const Pixels& pixels, std::string name,
                const std::function<bool(std::size_t)>& belongs) {
   std::vector<double> difference, noise_a, noise_b;
+  std::vector<std::uint32_t> place;
   for (std::size_t i = 0; i < pixels.difference_mm.size(); ++i) {
     if (!belongs(i)) continue;
     difference.push_back(pixels.difference_mm[i]);
     noise_a.push_back(pixels.noise_a_mm[i]);
     noise_b.push_back(pixels.noise_b_mm[i]);
+    place.push_back(pixels.place[i]);
   }
   if (difference.empty()) return;
-  regions.push_back(
-      {std::move(name), summarise(difference), quantile(noise_a, 0.5), quantile(noise_b, 0.5)});
+  regions.push_back({std::move(name), summariseOverPlaces(difference, place),
+                     quantile(noise_a, 0.5), quantile(noise_b, 0.5)});
 }
 
 void addRangeRegions(std::vector<Region>& regions, const Pixels& pixels) {
@@ -73,7 +86,45 @@ void addAmplitudeRegions(std::vector<Region>& regions, const Pixels& pixels) {
             [&](std::size_t i) { return pixels.amplitude[i] >= high; });
 }
 
+/// Flying pixels of `from`, found in its own image, at the rays of `to`.
+Image<std::uint8_t> flyingAlongRaysOf(const CameraInfo& to, const Image<float>& range,
+                                      const CameraInfo& from) {
+  const Image<std::uint8_t> own = flyingPixelsOf(range);
+  Image<float> there(own.width(), own.height());
+  for (std::size_t i = 0; i < own.size(); ++i) there[i] = own[i];
+  there = nearestAlongRaysOf(to, there, from);
+  Image<std::uint8_t> flying(to.width, to.height);
+  for (std::size_t i = 0; i < flying.size(); ++i) flying[i] = there[i] > 0.5F ? 1 : 0;
+  return flying;
+}
+
 }  // namespace
+
+bool isCompared(const PoseComparison& pose, std::size_t pixel) {
+  return isValidInBoth(pose, pixel) && !isGross(static_cast<double>(pose.difference_mm[pixel]));
+}
+
+Image<float> comparedDifference_mm(const PoseComparison& pose) {
+  Image<float> difference = pose.difference_mm;
+  for (std::size_t i = 0; i < difference.size(); ++i) {
+    if (!isCompared(pose, i)) difference[i] = kNaN;
+  }
+  return difference;
+}
+
+std::vector<std::uint32_t> placesOf(const std::vector<PoseComparison>& poses) {
+  std::vector<std::uint32_t> place(poses.size());
+  std::uint32_t places = 0;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    place[i] = places;
+    for (std::size_t k = 0; k < i && place[i] == places; ++k) {
+      if (poses[i].pose && poses[k].pose && samePose(*poses[i].pose, *poses[k].pose))
+        place[i] = place[k];
+    }
+    if (place[i] == places) ++places;
+  }
+  return place;
+}
 
 Image<std::uint8_t> edgesOf(const Image<float>& range, double jump, int radius) {
   Image<std::uint8_t> edge(range.width(), range.height());
@@ -117,6 +168,7 @@ Result<PoseComparison> comparePose(const Stack& a, const Stack& b) {
             1e3 * norm(shift))};
   }
   PoseComparison result;
+  result.pose = a.pose() ? a.pose() : b.pose();
   result.resampled = a.camera().width != b.camera().width ||
                      a.camera().height != b.camera().height || a.camera().fx != b.camera().fx ||
                      a.camera().fy != b.camera().fy || a.camera().cx != b.camera().cx ||
@@ -126,7 +178,7 @@ Result<PoseComparison> comparePose(const Stack& a, const Stack& b) {
   result.noise_b_mm = scaled(b.temporalNoise_m(), 1e3F);
   result.valid_b = b.validShare();
   if (result.resampled) {
-    result.flying_b = flyingPixelsOf(range_b_mm);
+    result.flying_b = flyingAlongRaysOf(a.camera(), range_b_mm, b.camera());
     range_b_mm = alongRaysOf(a.camera(), range_b_mm, b.camera());
     result.noise_b_mm = nearestAlongRaysOf(a.camera(), result.noise_b_mm, b.camera());
     result.valid_b = nearestAlongRaysOf(a.camera(), result.valid_b, b.camera());
@@ -163,13 +215,18 @@ Result<PoseComparison> comparePose(const Stack& a, const Stack& b) {
 
 Pixels pixelsOf(const std::vector<PoseComparison>& poses) {
   Pixels all;
-  for (const PoseComparison& pose : poses) {
+  const std::vector<std::uint32_t> places = placesOf(poses);
+  for (std::size_t p = 0; p < poses.size(); ++p) {
+    const PoseComparison& pose = poses[p];
     for (std::size_t i = 0; i < pose.difference_mm.size(); ++i) {
-      if (!(std::abs(static_cast<double>(pose.difference_mm[i])) <= kGross_mm)) continue;
+      if (!isCompared(pose, i) || !std::isfinite(pose.difference_mm[i])) continue;
+      all.place.push_back(places[p]);
       all.difference_mm.push_back(static_cast<double>(pose.difference_mm[i]));
       all.range_mm.push_back(static_cast<double>(pose.range_a_mm[i]));
       all.amplitude.push_back(
           static_cast<double>(pose.amplitude_a.empty() ? kNaN : pose.amplitude_a[i]));
+      all.amplitude_ratio.push_back(
+          static_cast<double>(pose.amplitude_ratio.empty() ? kNaN : pose.amplitude_ratio[i]));
       all.noise_a_mm.push_back(static_cast<double>(pose.noise_a_mm[i]));
       all.noise_b_mm.push_back(static_cast<double>(pose.noise_b_mm[i]));
       all.edge.push_back(pose.edge[i] != 0);
@@ -178,9 +235,43 @@ Pixels pixelsOf(const std::vector<PoseComparison>& poses) {
   return all;
 }
 
+namespace {
+
+/// What is counted: masks over the pixels that both look at, the rest over the compared ones.
+void countPixels(const std::vector<PoseComparison>& poses, Characteristics& result) {
+  std::size_t valid_a = 0, valid_b = 0, both = 0, neither = 0, flying_both = 0;
+  bool is_resampled = false;
+  for (const PoseComparison& pose : poses) {
+    is_resampled = is_resampled || pose.resampled;
+    for (std::size_t i = 0; i < pose.difference_mm.size(); ++i) {
+      if (!std::isfinite(pose.valid_b[i])) continue;
+      const bool a = pose.valid_a[i] >= 0.5F, b = pose.valid_b[i] >= 0.5F;
+      ++result.pixels;
+      valid_a += a, valid_b += b, both += a && b, neither += !a && !b;
+      result.gross += a && b && !isCompared(pose, i);
+      if (!isCompared(pose, i)) continue;
+      ++result.compared;
+      result.edge_pixels += pose.edge[i];
+      result.flying_a += pose.flying_a[i], result.flying_b += pose.flying_b[i];
+      flying_both += pose.flying_a[i] & pose.flying_b[i];
+    }
+  }
+  if (!is_resampled) result.flying_both = flying_both;
+  const auto n = static_cast<double>(std::max<std::size_t>(1, result.pixels));
+  result.valid_a = static_cast<double>(valid_a) / n;
+  result.valid_b = static_cast<double>(valid_b) / n;
+  result.mask_agreement = static_cast<double>(both + neither) / n;
+  result.mask_overlap = static_cast<double>(both) /
+                        static_cast<double>(std::max<std::size_t>(1, valid_a + valid_b - both));
+}
+
+}  // namespace
+
 Characteristics characterise(const std::vector<PoseComparison>& poses) {
   const Pixels pixels = pixelsOf(poses);
   Characteristics result;
+  for (const std::uint32_t place : placesOf(poses))
+    result.places = std::max<std::size_t>(result.places, place + std::size_t{1});
   addRegion(result.regions, pixels, "all pixels", [](std::size_t) { return true; });
   addRegion(result.regions, pixels, "surfaces (over 2 px from a jump)",
             [&](std::size_t i) { return !pixels.edge[i]; });
@@ -189,35 +280,12 @@ Characteristics characterise(const std::vector<PoseComparison>& poses) {
   addRangeRegions(result.regions, pixels);
   addAmplitudeRegions(result.regions, pixels);
 
-  std::vector<double> amplitude_ratio, noise_ratio;
-  std::size_t valid_a = 0, valid_b = 0, both = 0, neither = 0, flying_both = 0;
-  for (const PoseComparison& pose : poses) {
-    for (std::size_t i = 0; i < pose.difference_mm.size(); ++i) {
-      result.edge_pixels += pose.edge[i];
-      result.flying_a += pose.flying_a[i];
-      if (!pose.resampled) flying_both += pose.flying_a[i] & pose.flying_b[i];
-      if (!std::isfinite(pose.valid_b[i])) continue;
-      const bool a = pose.valid_a[i] >= 0.5F, b = pose.valid_b[i] >= 0.5F;
-      ++result.pixels;
-      result.gross += std::abs(static_cast<double>(pose.difference_mm[i])) > kGross_mm ? 1 : 0;
-      valid_a += a, valid_b += b, both += a && b, neither += !a && !b;
-      if (!pose.amplitude_ratio.empty())
-        amplitude_ratio.push_back(static_cast<double>(pose.amplitude_ratio[i]));
-      noise_ratio.push_back(static_cast<double>(pose.noise_b_mm[i] / pose.noise_a_mm[i]));
-    }
-    for (const std::uint8_t flying : pose.flying_b.pixels()) result.flying_b += flying;
-  }
-  const bool resampled =
-      std::any_of(poses.begin(), poses.end(), [](const auto& pose) { return pose.resampled; });
-  if (!resampled) result.flying_both = flying_both;
-  const auto n = static_cast<double>(std::max<std::size_t>(1, result.pixels));
-  result.valid_a = static_cast<double>(valid_a) / n;
-  result.valid_b = static_cast<double>(valid_b) / n;
-  result.mask_agreement = static_cast<double>(both + neither) / n;
-  result.mask_overlap = static_cast<double>(both) /
-                        static_cast<double>(std::max<std::size_t>(1, valid_a + valid_b - both));
-  result.amplitude_ratio = summarise(amplitude_ratio);
-  result.noise_ratio = summarise(noise_ratio);
+  countPixels(poses, result);
+  std::vector<double> noise_ratio;
+  for (std::size_t i = 0; i < pixels.difference_mm.size(); ++i)
+    noise_ratio.push_back(pixels.noise_b_mm[i] / pixels.noise_a_mm[i]);
+  result.amplitude_ratio = summariseOverPlaces(pixels.amplitude_ratio, pixels.place);
+  result.noise_ratio = summariseOverPlaces(noise_ratio, pixels.place);
   return result;
 }
 
@@ -231,6 +299,7 @@ Json toJson(const Characteristics& c) {
   }
   Json json = Json::object();
   json.set("gross_pixels", c.gross).set("gross_limit_mm", kGross_mm);
+  json.set("compared_pixels", c.compared).set("places", c.places);
   json.set("regions", std::move(regions)).set("pixels", c.pixels).set("valid_share_a", c.valid_a);
   json.set("valid_share_b", c.valid_b)
       .set("mask_agreement", c.mask_agreement)
@@ -244,7 +313,8 @@ Json toJson(const Characteristics& c) {
   return json;
 }
 
-Trend trendOf(const std::vector<double>& x, const std::vector<double>& y, int bins) {
+Trend trendOf(const std::vector<double>& x, const std::vector<double>& y,
+              const std::vector<std::uint32_t>& place, int bins) {
   std::vector<std::size_t> order;
   for (std::size_t i = 0; i < x.size(); ++i) {
     if (std::isfinite(x[i]) && std::isfinite(y[i])) order.push_back(i);
@@ -254,10 +324,13 @@ Trend trendOf(const std::vector<double>& x, const std::vector<double>& y, int bi
   const std::size_t count = std::min<std::size_t>(static_cast<std::size_t>(bins), order.size());
   for (std::size_t bin = 0; bin < count; ++bin) {
     Running in_x, in_y;
+    std::vector<double> values;
+    std::vector<std::uint32_t> places;
     for (std::size_t i = bin * order.size() / count; i < (bin + 1) * order.size() / count; ++i) {
       in_x.add(x[order[i]]), in_y.add(y[order[i]]);
+      values.push_back(y[order[i]]), places.push_back(place[order[i]]);
     }
-    const double error = std::sqrt(in_y.variance() / static_cast<double>(in_y.n()));
+    const double error = clusteredError(values, places);
     trend.x.push_back(in_x.mean()), trend.y.push_back(in_y.mean());
     trend.low.push_back(in_y.mean() - 2.0 * error), trend.high.push_back(in_y.mean() + 2.0 * error);
   }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cmath>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -23,8 +25,10 @@ struct PoseComparison {
   Image<float> amplitude_a;       ///< empty if A gives none
   Image<float> amplitude_ratio;   ///< B / A; empty unless both give amplitude
   Image<std::uint8_t> edge;       ///< 1 within two pixels of a jump in A's range
-  Image<std::uint8_t> flying_a, flying_b;
-  bool resampled = false;  ///< B had another camera model and was interpolated
+  Image<std::uint8_t> flying_a, flying_b;  ///< B's along A's rays
+  bool resampled = false;         ///< B had another camera model and was interpolated
+  /// Where the cameras stood; nothing if neither says it.
+  std::optional<Transform<World, Camera>> pose;
 };
 
 /// Error where they cannot be compared: known poses that differ, or fields of view that share less
@@ -42,13 +46,25 @@ Image<std::uint8_t> edgesOf(const Image<float>& range, double jump = 0.03, int r
 Image<std::uint8_t> flyingPixelsOf(const Image<float>& range, double jump = 0.03);
 
 /// Larger differences are no measurement error but a wrong one of the phase's periods, or another
-/// surface seen at an edge. They are counted, and left out of bias, spread and trends.
+/// surface seen at an edge. They are counted, and left out of all but the masks.
 inline constexpr double kGross_mm = 300.0;
+inline bool isGross(double difference_mm) { return std::abs(difference_mm) > kGross_mm; }
+
+/// The one rule of which pixels are compared: valid in at least half of the frames of either camera,
+/// and not gross. Where B was interpolated the difference can be unknown all the same, beside a jump.
+bool isCompared(const PoseComparison& pose, std::size_t pixel);
+
+/// B − A of the compared pixels, NaN elsewhere.
+Image<float> comparedDifference_mm(const PoseComparison& pose);
+
+/// For each pose the number of its place: equal for equal poses, so that a pose visited again is no
+/// second place. A pose that is not known is a place of its own.
+std::vector<std::uint32_t> placesOf(const std::vector<PoseComparison>& poses);
 
 /// One row of the result: some pixels of all poses together.
 struct Region {
   std::string name;
-  Summary difference_mm;
+  Summary difference_mm;  ///< its standard error is over places
   double noise_a_mm = 0.0, noise_b_mm = 0.0;  ///< medians over pixels
 };
 
@@ -61,25 +77,31 @@ struct Characteristics {
   double mask_agreement = 0.0;          ///< share of pixels where both are valid or both are not
   double mask_overlap = 0.0;            ///< valid in both / valid in either
   std::size_t pixels = 0;               ///< that both cameras look at, over all poses
-  std::size_t flying_a = 0, flying_b = 0, edge_pixels = 0;
+  std::size_t compared = 0;             ///< of these, valid in both and not gross
+  std::size_t places = 0;               ///< different poses
+  std::size_t flying_a = 0, flying_b = 0;  ///< of the compared pixels
+  std::size_t edge_pixels = 0;             ///< of them too
   std::optional<std::size_t> flying_both;  ///< in the same pixel; none where B was interpolated
-  Summary amplitude_ratio;                 ///< B / A; n = 0 unless both give amplitude
-  Summary noise_ratio;                     ///< B / A per pixel
+  Summary amplitude_ratio;  ///< B / A; n = 0 unless both give amplitude; error over places
+  Summary noise_ratio;      ///< B / A per pixel; error over places
 };
 Characteristics characterise(const std::vector<PoseComparison>& poses);
 Json toJson(const Characteristics& characteristics);
 
-/// Mean of `y` in equally filled bins of `x`, with its standard error: how a difference goes with a
-/// covariate.
+/// Mean of `y` in equally filled bins of `x`, with its standard error over places: how a difference
+/// goes with a covariate.
 struct Trend {
-  std::vector<double> x, y, low, high;  ///< low, high: mean ± 2 standard errors
+  std::vector<double> x, y;
+  std::vector<double> low, high;  ///< mean ± 2 standard errors; NaN in a bin of one place
 };
-Trend trendOf(const std::vector<double>& x, const std::vector<double>& y, int bins);
+Trend trendOf(const std::vector<double>& x, const std::vector<double>& y,
+              const std::vector<std::uint32_t>& place, int bins);
 
-/// The pixels of all poses where the difference is known and not gross, as columns.
+/// The compared pixels of all poses whose difference is known, as columns.
 struct Pixels {
-  std::vector<double> difference_mm, range_mm, amplitude, noise_a_mm, noise_b_mm;
+  std::vector<double> difference_mm, range_mm, amplitude, amplitude_ratio, noise_a_mm, noise_b_mm;
   std::vector<bool> edge;
+  std::vector<std::uint32_t> place;
 };
 Pixels pixelsOf(const std::vector<PoseComparison>& poses);
 

@@ -9,44 +9,38 @@
 
 #include <toftwin/names.h>
 
+#include "calib/compare/drift.h"
+
 namespace toftwin::compare {
 namespace {
-
-/// B − A, and the standard error of its mean over the poses; none at one pose. Not over the pixels:
-/// those of one pose see the same errors, and the path tracer's own noise is frozen there.
-struct Bias {
-  double mean_mm = 0.0;
-  double error_mm = std::numeric_limits<double>::quiet_NaN();
-};
 
 /// Surfaces, where there are any: at edges a pixel's two cameras need not see the same surface.
 const Region& mainOf(const Characteristics& c) {
   return c.regions.size() > 1 ? c.regions[1] : c.regions.front();
 }
 
-Bias biasOf(const std::vector<PoseComparison>& poses, const Region& all) {
-  std::vector<double> means;
-  for (const PoseComparison& pose : poses) {
-    const Characteristics c = characterise({pose});
-    if (!c.regions.empty()) means.push_back(mainOf(c).difference_mm.mean);
-  }
-  Bias bias{.mean_mm = all.difference_mm.mean};
-  if (means.size() > 1) bias.error_mm = summarise(means).standard_error;
-  return bias;
+/// B − A in words: "3.2 ± 0.1 mm farther"; no error where there is none to tell, at one place.
+std::string inWords(const Summary& difference) {
+  const std::string magnitude = shown(std::abs(difference.mean), 2);
+  const std::string error = std::isfinite(difference.standard_error)
+                                ? fmt::format(" ± {}", shown(difference.standard_error, 2))
+                                : "";
+  return fmt::format("{}{} mm {}", magnitude, error, difference.mean >= 0.0 ? "farther" : "nearer");
 }
 
-/// B − A in a word: "3.2 ± 0.1 mm farther".
-std::string inWords(const Bias& bias) {
-  const std::string magnitude = shown(std::abs(bias.mean_mm), 2);
-  const std::string error =
-      std::isfinite(bias.error_mm) ? fmt::format(" ± {}", shown(bias.error_mm, 2)) : "";
-  return fmt::format("{}{} mm {}", magnitude, error, bias.mean_mm >= 0.0 ? "farther" : "nearer");
+/// "4 poses", "4 poses, 3 of them different".
+std::string posesInWords(std::size_t poses, std::size_t places) {
+  if (poses == 1) return "1 pose";
+  if (places == poses) return fmt::format("{} poses", poses);
+  return fmt::format("{} poses, {} of them different", poses, places);
 }
 
 TableBlock regionTable(const Characteristics& c) {
   TableBlock table{
-      "B − A by region: pixels of all poses, mean of the frames at each. ± is one standard error "
-      "of the mean, the pixels taken as independent",
+      fmt::format("B − A by region: pixels of all poses, mean of the frames at each. ± is one "
+                  "standard error of the mean over {} different poses, the pixels of one taken as "
+                  "one; – where only one pose sees the region",
+                  c.places),
       {"region", "n", "bias [mm]", "RMS [mm]", "95 % within [mm]", "median [mm]", "noise A [mm]",
        "noise B [mm]"},
       {}};
@@ -91,9 +85,42 @@ TableBlock cameraTable(const Capture& capture) {
   return table;
 }
 
+/// Time since B was switched on, mean of the frames at a pose; NaN where unknown.
+double poweredOnFor_s(const Capture& capture, std::size_t pose) {
+  Running time;
+  for (const FramePair& pair : capture.pairs) {
+    if (pair.pose == pose) time.add(pair.since_power_on_b_s);
+  }
+  return time.n() == 0 ? std::numeric_limits<double>::quiet_NaN() : time.mean();
+}
+
+TableBlock driftTable(const Capture& capture, const std::vector<Drift>& drifts) {
+  TableBlock table{
+      "Drift: the same pose visited again, last visit minus first, over the pixels compared at "
+      "both. ± is one standard error by blocks, as above",
+      {"first visit", "last visit", "B's time between [s]", "pixels", "A [mm]", "B [mm]",
+       "B − A [mm]"},
+      {}};
+  for (const Drift& d : drifts) {
+    table.rows.push_back(
+        {capture.poses[d.first].name, capture.poses[d.last].name,
+         shown(poweredOnFor_s(capture, d.last) - poweredOnFor_s(capture, d.first), 0),
+         std::to_string(d.pixels), shown(d.a_mm, 2), shown(d.b_mm, 2),
+         shownWithError(d.difference_mm, d.error_mm, 2)});
+  }
+  return table;
+}
+
+std::string inWords(const Drift& drift, const Capture& capture) {
+  return fmt::format("From the first to the last visit of \"{}\" B − A changed by {} mm: drift.",
+                     capture.poses[drift.first].name,
+                     shownWithError(drift.difference_mm, drift.error_mm, 2));
+}
+
 TableBlock poseTable(const Capture& capture, const std::vector<PoseComparison>& poses) {
   TableBlock table{
-      "By pose, surfaces and edges together",
+      "By pose, surfaces and edges together. ± is one standard error of the mean over the image, "
+      "by blocks larger than the differences' correlation",
       {"pose", "frames", "valid pixels", "bias [mm]", "RMS [mm]", "noise A [mm]", "noise B [mm]"},
       {}};
   for (std::size_t i = 0; i < poses.size(); ++i) {
@@ -107,10 +134,14 @@ TableBlock poseTable(const Capture& capture, const std::vector<PoseComparison>& 
     table.rows.push_back(
         {capture.poses[i].name, std::to_string(capture.poses[i].a.frames()),
          std::to_string(all.difference_mm.n),
-         shownWithError(all.difference_mm.mean, all.difference_mm.standard_error, 2),
+         shownWithError(all.difference_mm.mean, blockedError(comparedDifference_mm(poses[i])), 2),
          shown(all.difference_mm.rms, 2), shown(all.noise_a_mm, 2), shown(all.noise_b_mm, 2)});
   }
   return table;
+}
+
+double flyingPercent(const Characteristics& c, std::size_t count) {
+  return 100.0 * static_cast<double>(count) / static_cast<double>(c.compared);
 }
 
 TableBlock maskTable(const Characteristics& c) {
@@ -118,7 +149,11 @@ TableBlock maskTable(const Characteristics& c) {
   table.rows.push_back({"valid pixels (in at least half of the frames)", shownPercent(c.valid_a),
                         shownPercent(c.valid_b),
                         fmt::format("{} agree", shown(100.0 * c.mask_agreement, 2) + " %")});
-  table.rows.push_back({"flying pixels", std::to_string(c.flying_a), std::to_string(c.flying_b),
+  const auto flying = [&](std::size_t count) {
+    return shown(flyingPercent(c, count), 2) + fmt::format(" % ({})", count);
+  };
+  table.rows.push_back({fmt::format("flying, of the {} pixels compared", c.compared),
+                        flying(c.flying_a), flying(c.flying_b),
                         c.flying_both ? fmt::format("{} in the same pixel", *c.flying_both)
                                       : "– (other pixel grid)"});
   table.rows.push_back(
@@ -131,14 +166,15 @@ TableBlock maskTable(const Characteristics& c) {
   return table;
 }
 
-Figure trendFigure(const std::vector<double>& x, const std::vector<double>& y, std::string x_label,
+Figure trendFigure(const std::vector<double>& x, const Pixels& pixels, std::string x_label,
                    std::string caption, int bins) {
-  const Trend trend = trendOf(x, y, bins);
+  const Trend trend = trendOf(x, pixels.difference_mm, pixels.place, bins);
   return {std::move(caption),
           toSvg(Plot{.title = "B − A",
                      .x_label = std::move(x_label),
                      .y_label = "B − A [mm]",
-                     .curves = {{.name = "mean in bins of equally many pixels, ± 2 standard errors",
+                     .curves = {{.name = "mean in bins of equally many pixels, ± 2 standard errors "
+                                         "over poses",
                                  .x = trend.x,
                                  .y = trend.y,
                                  .ink = Ink::Simulated,
@@ -219,10 +255,9 @@ FigureRow maps(const CapturedPose& pose, const PoseComparison& comparison, doubl
                            .diverging = true})}}};
 }
 
+/// By size alone: a difference that is not significant is not small for that.
 Tone toneOfDifference(const Summary& difference) {
-  if (std::abs(difference.mean) <= 1.0 + 3.0 * difference.standard_error &&
-      difference.p95_abs <= 10.0)
-    return Tone::Good;
+  if (std::abs(difference.mean) <= 1.0 && difference.p95_abs <= 10.0) return Tone::Good;
   return std::abs(difference.mean) <= 10.0 ? Tone::Fair : Tone::Bad;
 }
 
@@ -235,6 +270,7 @@ Result<Finding> judgeLive(const Capture& capture) {
     if (!compared)
       return Error{compared.error().code,
                    fmt::format("pose \"{}\": {}", pose.name, compared.error().message)};
+    if (!compared->pose) compared->pose = pose.asked;
     poses.push_back(*std::move(compared));
   }
   const Characteristics c = characterise(poses);
@@ -245,7 +281,7 @@ Result<Finding> judgeLive(const Capture& capture) {
   }
   const Pixels pixels = pixelsOf(poses);
   const Region& main = mainOf(c);
-  const Bias bias = biasOf(poses, main);
+  const std::vector<Drift> drifts = driftsOf(poses);
   const Summary& all = main.difference_mm;
   std::vector<double> magnitudes, log_amplitude;
   for (const double d : pixels.difference_mm) magnitudes.push_back(std::abs(d));
@@ -257,12 +293,13 @@ Result<Finding> judgeLive(const Capture& capture) {
       .title = fmt::format("{} (B) against {} (A)", capture.b.entry.name, capture.a.entry.name)};
   finding.section.tone = toneOfDifference(all);
   finding.section.verdict = fmt::format(
-      "On surfaces B reads {} than A, averaged over {} pixels at {} poses; 95 % of them agree "
+      "On surfaces B reads {} than A, averaged over {} pixels at {}; 95 % of them agree "
       "within {} mm. Temporal noise: A {} mm, B {} mm (median). "
       "Validity masks agree in {} % of the pixels. {} pixels differ by more than {} mm and are "
       "counted apart.",
-      inWords(bias), all.n, poses.size(), shown(all.p95_abs), shown(main.noise_a_mm, 2),
+      inWords(all), all.n, posesInWords(poses.size(), c.places), shown(all.p95_abs), shown(main.noise_a_mm, 2),
       shown(main.noise_b_mm, 2), shown(100.0 * c.mask_agreement, 1), c.gross, shown(kGross_mm, 0));
+  for (const Drift& drift : drifts) finding.section.verdict += " " + inWords(drift, capture);
   auto& blocks = finding.section.blocks;
   for (const std::string& warning : capture.warnings)
     blocks.push_back(Paragraph{"Note: " + warning});
@@ -271,16 +308,17 @@ Result<Finding> judgeLive(const Capture& capture) {
     blocks.push_back(maps(capture.poses[i], poses[i], reach));
   blocks.push_back(regionTable(c));
   FigureRow trends{{histogramFigure(pixels),
-                    trendFigure(pixels.range_mm, pixels.difference_mm, "range of A [mm]",
+                    trendFigure(pixels.range_mm, pixels, "range of A [mm]",
                                 "How the difference goes with range.", 60)}};
   if (std::isfinite(quantile(log_amplitude, 0.5))) {
     trends.figures.push_back(trendFigure(
-        log_amplitude, pixels.difference_mm, "log10 of A's amplitude",
+        log_amplitude, pixels, "log10 of A's amplitude",
         "How the difference goes with signal strength.", 60));
   }
   if (auto over_time = timeFigure(capture)) trends.figures.push_back(*std::move(over_time));
   blocks.push_back(std::move(trends));
   blocks.push_back(poseTable(capture, poses));
+  if (!drifts.empty()) blocks.push_back(driftTable(capture, drifts));
   blocks.push_back(maskTable(c));
   blocks.push_back(cameraTable(capture));
   blocks.push_back(
@@ -294,19 +332,21 @@ Result<Finding> judgeLive(const Capture& capture) {
   finding.headline = fmt::format(
       "On surfaces B ({}) reads {} than A ({}); 95 % of the pixels agree within {} mm; B's "
       "temporal noise is {} times A's",
-      capture.b.entry.name, inWords(bias), capture.a.entry.name, shown(all.p95_abs),
+      capture.b.entry.name, inWords(all), capture.a.entry.name, shown(all.p95_abs),
       shown(c.noise_ratio.median, 2));
   finding.data = toJson(c);
   finding.data.set("a", capture.a.entry.name)
       .set("b", capture.b.entry.name)
       .set("poses", poses.size())
+      .set("drift", toJson(drifts))
       .set("frames_per_pose", capture.poses.front().a.frames());
   finding.cards = {{"Bias, B − A",
-                    (std::isfinite(bias.error_mm) ? shownWithError(bias.mean_mm, bias.error_mm, 2)
-                                                  : shown(bias.mean_mm, 2)) +
+                    (std::isfinite(all.standard_error)
+                         ? shownWithError(all.mean, all.standard_error, 2)
+                         : shown(all.mean, 2)) +
                         " mm",
-                    poses.size() > 1 ? fmt::format("± standard error over {} poses", poses.size())
-                                     : fmt::format("{} pixels, one pose", all.n),
+                    c.places > 1 ? fmt::format("± standard error over {} different poses", c.places)
+                                 : fmt::format("{} pixels, one pose", all.n),
                     finding.section.tone},
                    {"95 % agree within", shown(all.p95_abs) + " mm",
                     fmt::format("RMS {} mm", shown(all.rms)), Tone::Neutral},
@@ -314,7 +354,8 @@ Result<Finding> judgeLive(const Capture& capture) {
                     fmt::format("{} | {} mm", shown(main.noise_a_mm, 2), shown(main.noise_b_mm, 2)),
                     "temporal, median over pixels", Tone::Neutral},
                    {"Masks agree", shown(100.0 * c.mask_agreement, 1) + " %",
-                    fmt::format("flying pixels {} | {}", c.flying_a, c.flying_b),
+                    fmt::format("flying pixels {} | {} %", shown(flyingPercent(c, c.flying_a), 2),
+                                shown(flyingPercent(c, c.flying_b), 2)),
                     c.mask_agreement > 0.98 ? Tone::Good : Tone::Fair}};
   return finding;
 }

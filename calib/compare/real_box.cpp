@@ -275,7 +275,8 @@ Result<Finding> judgeBox(const RealDataJob& job) {
                              {"wall right, 15–40 mm", 15, 40},
                              {"wall right, 40–100 mm", 40, 100},
                              {"wall right, 100–250 mm", 100, 250}};
-  TableBlock regions{"Change that the box makes, mean per region, mm",
+  TableBlock regions{"Change that the box makes, mean per region, mm. ± is one standard error by blocks of "
+                     "neighbouring rays, – below 16 rays",
                      {"region", "n", "measured", "simulated, preset", "difference",
                       "emitter on the other side", "published simulator", "measured − published"},
                      {}};
@@ -290,7 +291,7 @@ Result<Finding> judgeBox(const RealDataJob& job) {
     const Summary sm = summarise(m), ss = summarise(s), so = summarise(o), sp = summarise(p);
     if (sm.n == 0) continue;
     regions.rows.push_back({part.name, std::to_string(sm.n),
-                            shownWithError(sm.mean, sm.standard_error), shown(ss.mean),
+                            shownWithError(sm.mean, blockedError(m)), shown(ss.mean),
                             shown(sm.mean - ss.mean), shown(so.mean), shown(sp.mean),
                             shown(sm.mean - sp.mean)});
     Json row = Json::object();

@@ -45,15 +45,22 @@ std::vector<std::vector<std::string>> bins(const ErrorTable& table,
                                            const std::vector<double>& simulated) {
   std::vector<std::vector<std::string>> rows;
   for (double from = 500.0; from < 4000.0; from += 250.0) {
-    std::vector<double> measured, predicted;
+    std::vector<std::size_t> rows_of_bin;
     for (std::size_t i = 0; i < table.reference_mm.size(); ++i) {
-      if (table.reference_mm[i] < from || table.reference_mm[i] >= from + 250.0) continue;
-      measured.push_back(table.error_mm[i]), predicted.push_back(simulated[i]);
+      if (table.reference_mm[i] >= from && table.reference_mm[i] < from + 250.0)
+        rows_of_bin.push_back(i);
     }
-    if (measured.size() < 10) continue;
+    if (rows_of_bin.size() < 10) continue;
+    // Rows at nearly one distance err alike, so they must be neighbours in the blocks of the error.
+    std::stable_sort(rows_of_bin.begin(), rows_of_bin.end(), [&](std::size_t a, std::size_t b) {
+      return table.reference_mm[a] < table.reference_mm[b];
+    });
+    std::vector<double> measured, predicted;
+    for (const std::size_t i : rows_of_bin)
+      measured.push_back(table.error_mm[i]), predicted.push_back(simulated[i]);
     const Summary m = summarise(measured), p = summarise(predicted);
     rows.push_back({fmt::format("{:.0f}–{:.0f} mm", from, from + 250.0), std::to_string(m.n),
-                    shownWithError(m.mean, m.standard_error), shown(p.mean),
+                    shownWithError(m.mean, blockedError(measured)), shown(p.mean),
                     shown(m.mean - p.mean)});
   }
   return rows;
@@ -128,7 +135,8 @@ Result<Finding> judgeDistance(const RealDataJob& job, RealCamera& camera) {
                  kExplainedHeader,
                  {explainedRow("no simulation (the reference itself)", none),
                   explainedRow("simulated, preset", sim)}},
-      TableBlock{"By distance; ± is the standard error of the mean over the rows",
+      TableBlock{"By distance. ± is one standard error of the mean, by blocks of rows at neighbouring "
+                 "distances",
                  {"distance", "n", "measured [mm]", "simulated [mm]", "difference [mm]"},
                  bins(table, simulated)},
       Paragraph{fmt::format(

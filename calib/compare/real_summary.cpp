@@ -1,20 +1,53 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
 #include "calib/compare/real_data.h"
 
 namespace toftwin::compare {
+namespace {
+
+/// The effects without which a fit gets much worse, each with the data that show it.
+std::string whatCounts(const std::vector<Finding>& findings) {
+  constexpr double kMuch = 1.5;
+  std::vector<std::pair<std::string, std::string>> effects;  // and where, in the order of the table
+  for (const Finding& finding : findings) {
+    for (const Ablation& a : finding.ablations) {
+      if (!(a.without >= kMuch * a.with)) continue;
+      const std::string where = fmt::format("{} {}", a.data, shown(a.without / a.with));
+      const auto known = std::find_if(effects.begin(), effects.end(),
+                                      [&](const auto& effect) { return effect.first == a.effect; });
+      if (known == effects.end()) {
+        effects.emplace_back(a.effect, where);
+      } else {
+        known->second += "; " + where;
+      }
+    }
+  }
+  std::string words;
+  for (const auto& [effect, where] : effects)
+    words += fmt::format("{}{} ({})", words.empty() ? "" : ", ", effect, where);
+  return words.empty() ? fmt::format("No effect left out makes a fit {} times worse.", kMuch)
+                       : fmt::format("One effect left out, the rest fitted again, so many times "
+                                     "worse (from {} on): {}.",
+                                     kMuch, words);
+}
+
+}  // namespace
 
 Section summarySection(const std::vector<Finding>& findings) {
   Section section{.id = "summary",
                   .title = "The simulator against real data: what is left",
                   .verdict = {},
                   .blocks = {}};
-  TableBlock left{"RMS over the judged half of each data set; fitted on the other half",
-                  {"data", "n judged", "unit", "ideal camera", "… with the best constant",
-                   "published simulator", "ours, preset", "ours, fitted"},
+  TableBlock left{"RMS in mm over the judged half of each data set; fitted on the other half",
+                  {"real data", "n judged", "ideal camera", "ideal + best constant",
+                   "published simulator", "ours, preset as is", "ours, fitted"},
                   {}};
   TableBlock worth{
       "Each effect left out of the fitted model once, the rest fitted again; RMS over the judged "
@@ -25,9 +58,8 @@ Section summarySection(const std::vector<Finding>& findings) {
   int better = 0, all = 0;
   for (const Finding& finding : findings) {
     for (const Outcome& o : finding.outcomes) {
-      left.rows.push_back({o.data, std::to_string(o.judged), "mm", cell(o.ideal_mm),
-                           cell(o.constant_mm), cell(o.published_mm), cell(o.as_is_mm),
-                           cell(o.fitted_mm)});
+      left.rows.push_back({o.data, std::to_string(o.judged), cell(o.ideal_mm), cell(o.constant_mm),
+                           cell(o.published_mm), cell(o.as_is_mm), cell(o.fitted_mm)});
       ++all, better += o.fitted_mm < 0.8 * o.constant_mm ? 1 : 0;
     }
     for (const Ablation& a : finding.ablations)
@@ -39,7 +71,7 @@ Section summarySection(const std::vector<Finding>& findings) {
       "does, on "
       "the half that it was not fitted to.",
       better, all);
-  section.blocks = {left, worth};
+  section.blocks = {left, Paragraph{whatCounts(findings)}, worth};
   return section;
 }
 

@@ -37,7 +37,9 @@ std::string markdown(const TableBlock& table) {
 
 std::string toMarkdown(const Report& report) {
   std::string out =
-      fmt::format("# {}\n\n{}\n\n{}\n\n", report.title, report.subtitle, report.verdict);
+      fmt::format("# {}\n\n{}. Written by `toftwin compare`; how each number is made: "
+                  "docs/compare.md.\n\n{}\n\n{}\n\n",
+                  report.title, report.colophon, report.subtitle, report.verdict);
   for (const Section& section : report.sections) {
     out += fmt::format("## {}\n\n", section.title);
     if (!section.verdict.empty()) out += section.verdict + "\n\n";
@@ -46,7 +48,8 @@ std::string toMarkdown(const Report& report) {
       if (const auto* words = std::get_if<Paragraph>(&block)) out += markdown(*words);
     }
   }
-  return out + report.colophon + "\n";
+  out.pop_back();  // one line's end is enough at the end of a file
+  return out;
 }
 
 }  // namespace toftwin::compare

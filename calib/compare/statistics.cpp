@@ -8,7 +8,56 @@
 namespace toftwin::compare {
 namespace {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+/// The largest clusteredError over blocks of 1, 2, 4, … in each direction of an image of that width.
+double blockedError(std::span<const double> values, std::size_t width) {
+  constexpr std::ptrdiff_t kFewestBlocks = 8, kFewestValues = 16;
+  if (std::count_if(values.begin(), values.end(), [](double v) { return std::isfinite(v); }) <
+      kFewestValues)
+    return kNaN;
+  const std::size_t height = width == 0 ? 0 : values.size() / width;
+  double largest = kNaN;
+  std::vector<std::uint32_t> block(values.size());
+  for (std::size_t side = 1; side <= std::max(width, height); side *= 2) {
+    const std::size_t across = (width + side - 1) / side;
+    std::vector<bool> is_used(across * ((height + side - 1) / side));
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      const std::size_t at = i / width / side * across + i % width / side;
+      block[i] = static_cast<std::uint32_t>(at);
+      if (std::isfinite(values[i])) is_used[at] = true;
+    }
+    if (std::count(is_used.begin(), is_used.end(), true) < kFewestBlocks) break;
+    largest = std::fmax(largest, clusteredError(values, block));  // fmax: NaN gives way
+  }
+  return largest;
 }
+
+}  // namespace
+
+double clusteredError(std::span<const double> values, std::span<const std::uint32_t> cluster) {
+  std::vector<Running> clusters;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (!std::isfinite(values[i])) continue;
+    if (cluster[i] >= clusters.size()) clusters.resize(cluster[i] + std::size_t{1});
+    clusters[cluster[i]].add(values[i]);
+  }
+  Running means;
+  double n = 0.0, squares = 0.0;
+  for (const Running& c : clusters) {
+    if (c.n() == 0) continue;
+    const auto size = static_cast<double>(c.n());
+    means.add(c.mean()), n += size, squares += size * size;
+  }
+  if (means.n() < 2) return kNaN;
+  return std::sqrt(means.variance() * squares) / n;
+}
+
+double blockedError(const Image<float>& field) {
+  const std::vector<double> values(field.pixels().begin(), field.pixels().end());
+  return blockedError(values, static_cast<std::size_t>(field.width()));
+}
+
+double blockedError(std::span<const double> series) { return blockedError(series, series.size()); }
 
 double quantile(std::vector<double> values, double q) {
   std::erase_if(values, [](double v) { return !std::isfinite(v); });

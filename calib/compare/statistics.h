@@ -2,8 +2,11 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <vector>
+
+#include <toftwin/image.h>
 
 #include "calib/compare/json.h"
 
@@ -15,7 +18,9 @@ struct Summary {
   std::size_t n = 0;
   double mean = 0.0;
   double sd = 0.0;              ///< with n − 1; NaN for n < 2
-  double standard_error = 0.0;  ///< of the mean, sd/√n: takes the values as independent
+  /// Of the mean: sd/√n, which takes the values as independent. Where they are not, clusteredError
+  /// or blockedError stands here instead.
+  double standard_error = 0.0;
   double rms = 0.0;             ///< root of the mean square, about zero
   double median = 0.0;
   double p95_abs = 0.0;  ///< 95 % of the magnitudes are at most this
@@ -25,6 +30,23 @@ struct Summary {
 /// All fields but `n` are NaN when no value is finite.
 Summary summarise(std::span<const double> values);
 Json toJson(const Summary& summary, const char* unit);
+
+/// Standard error of the mean of values that err alike within a cluster, such as the pixels of one
+/// pose. With the clusters' sizes n_c, means m_c, their mean m̄, and G clusters:
+///   s² = Σ (m_c − m̄)² / (G − 1)      error = s √(Σ n_c²) / Σ n_c
+/// It is the error of a mean weighted by n_c whose clusters vary by s (one-way random effects): s/√G
+/// for equal clusters, s itself where one holds nearly all values. NaN for fewer than two clusters.
+/// `cluster` holds small numbers, one for each value; values that are not finite are left out.
+double clusteredError(std::span<const double> values, std::span<const std::uint32_t> cluster);
+
+/// Standard error of the mean of a field whose neighbours err alike, however far: clusteredError for
+/// square blocks of 1, 2, 4, … pixels as long as there are 8 of them, and the largest of these.
+/// It stops growing when the blocks are larger than the correlation length (H. Flyvbjerg,
+/// H. G. Petersen, J. Chem. Phys. 91 (1989) 461); where it never stops, it is a lower bound. Eight
+/// blocks know it to 1/√(2·7) = 27 %. NaN for fewer than 16 values, which leave nothing to block.
+double blockedError(const Image<float>& field);
+/// The same for a series in its order.
+double blockedError(std::span<const double> series);
 
 /// The q-quantile (0 … 1), linearly interpolated between order statistics; NaN for no values.
 double quantile(std::vector<double> values, double q);

@@ -9,6 +9,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "calib/compare/drift.h"
+
 namespace toftwin::compare {
 namespace {
 
@@ -74,7 +76,7 @@ TEST(Comparison, OfTwoEqualCamerasFindsNoBias) {
   // 16,000.
   const double sigma = 1e3 * kSigma_m * std::sqrt(2.0 / kFrames / (kWidth * kHeight));
   EXPECT_NEAR(all.mean, 0.0, 4.0 * sigma);
-  EXPECT_NEAR(all.standard_error, sigma, 0.1 * sigma);  // sd of 3072 values is known to 1.3 %
+  EXPECT_TRUE(std::isnan(all.standard_error));  // one pose says nothing of how poses differ
 }
 
 TEST(Comparison, FindsAPlantedTenMillimetres) {
@@ -261,8 +263,168 @@ TEST(Comparison, CountsWrongPeriodsApartFromTheBias) {
   EXPECT_NEAR(c.regions.front().difference_mm.mean, 0.0, 1e-6);
 }
 
+TEST(Comparison, LeavesAGrossPixelOutOfAllButTheMasks) {
+  // One pixel of B a period of 625 mm off, beside a step, and five times as bright and noisy there as
+  // anywhere else: all of that belongs to another surface.
+  const auto step = [](Vec3d ray) { return ray.x < 0.0 ? 1.0 : 2.0; };
+  std::mt19937_64 random{1};
+  Stack a, b;
+  const auto add = [&](Stack& stack, double noise_m, bool is_off) {
+    Frame f = frame(camera(), step, 0.0, random);
+    Image<float> range(kWidth, kHeight), amplitude(kWidth, kHeight, 10.0F);
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < kWidth; ++x)
+        range(x, y) = static_cast<float>((x < kWidth / 2 ? 1.0 : 2.0) + noise_m);
+    }
+    if (is_off) range(kWidth / 2, 20) += static_cast<float>(0.625 + 4.0 * noise_m);
+    if (is_off) amplitude(kWidth / 2, 20) = 50.0F;
+    f.planes = {toPlane(PlaneKind::Range, range), toPlane(PlaneKind::Amplitude, amplitude)};
+    ASSERT_TRUE(stack.add(f).ok());
+  };
+  for (const double noise_m : {-0.001, 0.001}) add(a, noise_m, false), add(b, noise_m, true);
+  const Characteristics c = characterise({*comparePose(a, b)});
+  constexpr std::size_t kPixels = std::size_t{kWidth} * kHeight;
+  EXPECT_EQ(c.gross, 1U);
+  EXPECT_EQ(c.pixels, kPixels);
+  EXPECT_DOUBLE_EQ(c.mask_agreement, 1.0);
+  EXPECT_EQ(c.compared, kPixels - 1);
+  EXPECT_EQ(c.regions.front().difference_mm.n, kPixels - 1);
+  EXPECT_EQ(c.amplitude_ratio.n, kPixels - 1);
+  EXPECT_DOUBLE_EQ(c.amplitude_ratio.max, 1.0);
+  EXPECT_EQ(c.noise_ratio.n, kPixels - 1);
+  EXPECT_NEAR(c.noise_ratio.max, 1.0, 1e-3);  // float32 at 2 m: 0.24 µm of 1 mm
+  EXPECT_EQ(c.flying_b, 0U);
+}
+
+TEST(Comparison, TakesNoiseOnlyWhereHalfOfTheFramesAreValid) {
+  // B sees one pixel in two of twelve frames.
+  std::mt19937_64 random{3};
+  Stack a = stackOf(camera(), tiltedWall, kSigma_m, 11), b;
+  for (int i = 0; i < kFrames; ++i) {
+    Frame f = frame(camera(), tiltedWall, kSigma_m, random);
+    Image<std::uint8_t> flags(kWidth, kHeight);
+    if (i >= 2) flags(5, 5) = static_cast<std::uint8_t>(PixelFlag::Invalid);
+    f.planes.push_back(toPlane(PlaneKind::Flags, flags));
+    ASSERT_TRUE(b.add(f).ok());
+  }
+  const Characteristics c = characterise({*comparePose(a, b)});
+  EXPECT_EQ(c.noise_ratio.n, static_cast<std::size_t>(kWidth * kHeight - 1));
+  EXPECT_EQ(c.amplitude_ratio.n, static_cast<std::size_t>(kWidth * kHeight - 1));
+}
+
+/// A step between two walls whose first column behind the step hangs half way, in every row.
+double mixedAtStep(Vec3d ray) {
+  constexpr double kHalf = 0.5 / 60.0;  // half a pixel of camera()
+  const double x = ray.x / ray.z;
+  return std::abs(x - kHalf) < 0.5 * kHalf ? 1.12 : x < 0.0 ? 1.0 : 1.25;
+}
+
+TEST(FlyingPixels, AreCountedAmongThePixelsThatBothSee) {
+  // A hangs in every row; B sees the upper half of the image only.
+  const auto upper = [](Vec3d ray) {
+    return ray.y < 0.0 ? mixedAtStep(ray) : std::numeric_limits<double>::quiet_NaN();
+  };
+  const auto pose =
+      comparePose(stackOf(camera(), mixedAtStep, 0.0, 1), stackOf(camera(), upper, 0.0, 2));
+  ASSERT_TRUE(pose.ok());
+  const Characteristics c = characterise({*pose});
+  EXPECT_EQ(c.compared, static_cast<std::size_t>(kWidth * kHeight / 2));
+  EXPECT_EQ(c.flying_a, static_cast<std::size_t>(kHeight / 2));
+  EXPECT_EQ(c.flying_b, static_cast<std::size_t>(kHeight / 2));
+  EXPECT_EQ(c.flying_both, static_cast<std::size_t>(kHeight / 2));
+}
+
+TEST(FlyingPixels, OfAFinerCameraAreCountedAlongTheRaysOfTheOther) {
+  // B: the same view with twice the pixels in both directions, its hanging column two pixels wide.
+  // On its own grid it has twice the rows; along A's rays as many as A.
+  const CameraInfo fine = camera(2 * kWidth, 2 * kHeight, 120.0);
+  const auto pose =
+      comparePose(stackOf(camera(), mixedAtStep, 0.0, 1), stackOf(fine, mixedAtStep, 0.0, 2));
+  ASSERT_TRUE(pose.ok());
+  const Characteristics c = characterise({*pose});
+  EXPECT_EQ(c.flying_a, static_cast<std::size_t>(kHeight));
+  EXPECT_GT(c.flying_b, 0U);
+  EXPECT_LE(c.flying_b, static_cast<std::size_t>(kHeight));
+  EXPECT_FALSE(c.flying_both.has_value());
+}
+
+/// Two cameras at a pose, the second one off by so much.
+PoseComparison poseOffBy(double bias_m, double x_m, unsigned seed) {
+  Stack a, b;
+  std::mt19937_64 random{seed};
+  for (int i = 0; i < kFrames; ++i) {
+    Frame fa = frame(camera(), tiltedWall, kSigma_m, random);
+    Frame fb = frame(
+        camera(), [&](Vec3d ray) { return tiltedWall(ray) + bias_m; }, kSigma_m, random);
+    fa.moment.world_from_camera->translation_m.x = x_m;
+    fb.moment.world_from_camera->translation_m.x = x_m;
+    EXPECT_TRUE(a.add(fa).ok() && b.add(fb).ok());
+  }
+  return *comparePose(a, b);
+}
+
+/// Of one pose's mean: the noise of all its pixels, in mm.
+const double kMeanError_mm = 1e3 * kSigma_m * std::sqrt(2.0 / kFrames / (kWidth * kHeight));
+
+TEST(Places, OfAPoseVisitedTwiceAreOne) {
+  const std::vector<PoseComparison> poses{poseOffBy(0.0, 0.0, 1), poseOffBy(0.0, 0.1, 2),
+                                          poseOffBy(0.0, 0.0, 3)};
+  EXPECT_EQ(placesOf(poses), (std::vector<std::uint32_t>{0, 1, 0}));
+  EXPECT_EQ(characterise(poses).places, 2U);
+}
+
+TEST(Places, OfUnknownPosesAreEachTheirOwn) {
+  std::vector<PoseComparison> poses(2);
+  EXPECT_EQ(placesOf(poses), (std::vector<std::uint32_t>{0, 1}));
+}
+
+TEST(Comparison, TellsTheErrorOverPosesAndNotOverPixels) {
+  // 0, 3 and 6 mm at three poses: s = 3 mm, so 3/√3, to the noise of the poses' means. 4 σ.
+  const Characteristics c =
+      characterise({poseOffBy(0.0, 0.0, 1), poseOffBy(0.003, 0.1, 2), poseOffBy(0.006, 0.2, 3)});
+  EXPECT_NEAR(c.regions.front().difference_mm.standard_error, std::sqrt(3.0), 4.0 * kMeanError_mm);
+  EXPECT_TRUE(std::isfinite(c.noise_ratio.standard_error));
+}
+
+TEST(Comparison, DoesNotTakeAPoseVisitedAgainAsAnother) {
+  // Means 0, 3 and again 0 mm: the places' means are 0 and 3, s = 3/√2, weights 2/3 and 1/3:
+  // error = 3/√2 · √5/3. Three independent poses would give √3/√3 = 1.
+  const Characteristics c =
+      characterise({poseOffBy(0.0, 0.0, 1), poseOffBy(0.003, 0.1, 2), poseOffBy(0.0, 0.0, 3)});
+  EXPECT_NEAR(c.regions.front().difference_mm.standard_error, std::sqrt(2.5), 4.0 * kMeanError_mm);
+}
+
+TEST(Drift, IsWhatChangedBetweenTwoVisitsOfOnePose) {
+  const std::vector<PoseComparison> poses{poseOffBy(0.001, 0.0, 1), poseOffBy(0.009, 0.1, 2),
+                                          poseOffBy(0.003, 0.0, 3)};
+  const auto drifts = driftsOf(poses);
+  ASSERT_EQ(drifts.size(), 1U);
+  EXPECT_EQ(drifts[0].first, 0U);
+  EXPECT_EQ(drifts[0].last, 2U);
+  EXPECT_EQ(drifts[0].pixels, static_cast<std::size_t>(kWidth * kHeight));
+  // A difference of two means, each of the noise above: 4 σ is 1 in 16,000 for other seeds.
+  EXPECT_NEAR(drifts[0].difference_mm, 2.0, 4.0 * std::sqrt(2.0) * kMeanError_mm);
+  EXPECT_NEAR(drifts[0].b_mm - drifts[0].a_mm, drifts[0].difference_mm, 1e-9);
+  EXPECT_NEAR(drifts[0].a_mm, 0.0, 4.0 * kMeanError_mm);
+  // Independent pixels: at least sd/√n (known to 1.3 %), and at most 4 times 27 % of 8 blocks over it.
+  EXPECT_GT(drifts[0].error_mm, 0.94 * std::sqrt(2.0) * kMeanError_mm);
+  EXPECT_LT(drifts[0].error_mm, 2.1 * std::sqrt(2.0) * kMeanError_mm);
+}
+
+TEST(Drift, IsNotToldWhereNoPoseComesAgain) {
+  EXPECT_TRUE(driftsOf({poseOffBy(0.001, 0.0, 1), poseOffBy(0.009, 0.1, 2)}).empty());
+}
+
+TEST(Trend, HasNoErrorWhereOnlyOnePlaceIsSeen) {
+  const Trend trend = trendOf({1, 2, 3, 4}, {10, 14, 20, 30}, {0, 1, 1, 1}, 2);
+  // Two places with one value each: s = 4/√2, error = s/√2 = 2.
+  EXPECT_DOUBLE_EQ(trend.low[0], 12.0 - 4.0);
+  EXPECT_DOUBLE_EQ(trend.high[0], 12.0 + 4.0);
+  EXPECT_TRUE(std::isnan(trend.low[1]));
+}
+
 TEST(Trend, GivesTheMeanOfEachEquallyFilledBin) {
-  const Trend trend = trendOf({4, 1, 2, 3}, {40, 10, 20, 30}, 2);
+  const Trend trend = trendOf({4, 1, 2, 3}, {40, 10, 20, 30}, {0, 0, 1, 1}, 2);
   EXPECT_EQ(trend.x, (std::vector<double>{1.5, 3.5}));
   EXPECT_EQ(trend.y, (std::vector<double>{15, 35}));
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/compare/progress.h"
+#include "calib/compare/real_data.h"
 #include "calib/compare/report.h"
 
 #include <cmath>
@@ -145,6 +146,15 @@ TEST(Json, EscapesAndKeepsOrder) {
   json.set("b", "a\"\\\n").set("a", Json::arrayOf(std::vector<double>{1, 0.5})).set("t", true);
   EXPECT_EQ(json.text(),
             "{\n  \"b\": \"a\\\"\\\\\\u000a\",\n  \"a\": [1, 0.5],\n  \"t\": true\n}\n");
+}
+
+TEST(Summary, NamesTheEffectsThatCount) {
+  Finding a, b;
+  a.ablations = {{"multipath", "corner", 4.0, 10.0}, {"delay", "corner", 4.0, 5.9}};
+  b.ablations = {{"multipath", "box", 2.0, 3.0}, {"scatter", "plate", 1.0, 5.0}};
+  const Section section = summarySection({a, b});
+  EXPECT_THAT(std::get<Paragraph>(section.blocks.at(1)).text,
+              HasSubstr("(from 1.5 on): multipath (corner 2.5; box 1.5), scatter (plate 5.0)."));
 }
 
 }  // namespace
