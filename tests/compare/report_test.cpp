@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <regex>
+#include <sstream>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -146,6 +147,41 @@ TEST(Json, EscapesAndKeepsOrder) {
   json.set("b", "a\"\\\n").set("a", Json::arrayOf(std::vector<double>{1, 0.5})).set("t", true);
   EXPECT_EQ(json.text(),
             "{\n  \"b\": \"a\\\"\\\\\\u000a\",\n  \"a\": [1, 0.5],\n  \"t\": true\n}\n");
+}
+
+std::string textOf(const std::filesystem::path& file) {
+  std::ifstream in{std::filesystem::path{TOFTWIN_SOURCE_DIR} / file};
+  EXPECT_TRUE(in) << file;
+  return {std::istreambuf_iterator<char>{in}, {}};
+}
+
+TEST(Documents, ReadmesResultsAreThoseOfTheReportThatIsCommitted) {
+  const std::string readme = textOf("README.md"), results = textOf("docs/results.md");
+  const std::string from = "<!-- results: copied from docs/results.md -->\n", to = "<!-- end -->";
+  const std::size_t begin = readme.find(from);
+  ASSERT_NE(begin, std::string::npos) << from;
+  const std::size_t end = readme.find(to, begin);
+  ASSERT_NE(end, std::string::npos) << to;
+  const std::string copy = readme.substr(begin + from.size(), end - begin - from.size());
+  EXPECT_THAT(copy, HasSubstr("| Kinect v2, corner |"));
+  EXPECT_NE(results.find(copy), std::string::npos)
+      << "README.md holds other results than docs/results.md:\n"
+      << copy;
+}
+
+TEST(Documents, ResultsAreAReportOfThisProgramsForm) {
+  // Tables that this program would write, without their rows: none may be missing or have other columns.
+  const std::string results = textOf("docs/results.md");
+  const Report empty{.title = "Comparison of time-of-flight cameras", .sections = {summarySection({})}};
+  std::istringstream lines{toMarkdown(empty)};
+  int headers = 0;
+  for (std::string line; std::getline(lines, line);) {
+    if (!line.starts_with("| ") || line.starts_with("| ---")) continue;
+    EXPECT_THAT(results, HasSubstr(line + "\n"));
+    ++headers;
+  }
+  EXPECT_EQ(headers, 2);
+  EXPECT_TRUE(results.starts_with("# " + empty.title + "\n\ntoftwin "));
 }
 
 TEST(Summary, NamesTheEffectsThatCount) {
