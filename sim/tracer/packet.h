@@ -18,6 +18,7 @@ struct Packet {
   Lanes<float> throughput;
   Lanes<std::uint32_t> key_a, key_b;  ///< of the pixel's random numbers
   Lanes<std::uint32_t> index;         ///< of the sample
+  bool is_even = true;                ///< whether random numbers are spread evenly over the samples
 
   [[nodiscard]] PixelKey key(std::size_t lane) const { return {key_a[lane], key_b[lane]}; }
 };

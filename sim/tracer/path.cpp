@@ -17,28 +17,9 @@ namespace {
 
 using embree::kLanes;
 
-/// Below this throughput a path survives by chance and is weighted up. Unbiased; with it, a path of
-/// albedo 0.8 is followed for ten surfaces before the first draw.
-constexpr float kRouletteThreshold = 0.1f;
-
-/// So many bounces of a pixel's samples are spread evenly over all directions.
-constexpr int kEvenBounces = 2;
-
-/// Numbers of a path's random dimensions.
-struct Dimensions {
-  std::uint32_t emitters;
-  static constexpr std::uint32_t kFootprint = 0;
-  [[nodiscard]] std::uint32_t bounce(int surface) const { return first(surface); }
-  [[nodiscard]] std::uint32_t roulette(int surface) const { return first(surface) + 1; }
-  [[nodiscard]] std::uint32_t emitter(int surface, std::size_t e) const {
-    return first(surface) + 2 + static_cast<std::uint32_t>(e);
-  }
-
- private:
-  [[nodiscard]] std::uint32_t first(int surface) const { return 1 + static_cast<std::uint32_t>(surface) * (2 + emitters); }
-};
-
 Dimensions dimensionsOf(const Tracing& tracing) { return {static_cast<std::uint32_t>(tracing.emitters.size())}; }
+
+}  // namespace
 
 void record(RayLog* log, const Lanes<int>& valid, const RTCRay16& rays, bool coherent, bool shadow) {
   if (log == nullptr) return;
@@ -48,8 +29,6 @@ void record(RayLog* log, const Lanes<int>& valid, const RTCRay16& rays, bool coh
   packet.is_coherent = coherent;
   packet.is_shadow = shadow;
 }
-
-}  // namespace
 
 void intersect(const Tracing& tracing, const Packet& packet, RTCRayHit16& rays, bool coherent) {
   setRays(packet, rays);
@@ -73,21 +52,26 @@ void addEmission(const Packet& packet, const Hits& hits, Lanes<float>& ambient) 
   }
 }
 
+void gatherLightOf(const Tracing& tracing, std::size_t e, const Packet& packet, const Hits& hits, int surface, bool coherent,
+                   Vec3Lanes& places, LaneSums& sums) {
+  const PlacedEmitter& emitter = tracing.emitters[e];
+  drawPlaces(packet, emitter, dimensionsOf(tracing).emitter(surface, e), places);
+  DirectLight light;
+  lightHits(packet, hits, emitter, places, light);
+  if (!isAny(light.valid)) return;
+  RTCRay16 rays;
+  setShadowRays(hits, places, rays);
+  record(tracing.log, light.valid, rays, coherent, true);
+  embree::occluded(light.valid.v, tracing.scene.embree, rays, coherent);
+  for (std::size_t i = 0; i < kLaneCount; ++i) light.weight[i] = rays.tfar[i] < 0.0f ? 0.0f : light.weight[i];
+  addLight(tracing, light, sums);
+}
+
 void gatherDirectLight(const Tracing& tracing, const Packet& packet, const Hits& hits, int surface, bool coherent,
                        LaneSums& sums) {
+  Vec3Lanes places;
   for (std::size_t e = 0; e < tracing.emitters.size(); ++e) {
-    const PlacedEmitter& emitter = tracing.emitters[e];
-    Vec3Lanes places;
-    drawPlaces(packet, emitter, dimensionsOf(tracing).emitter(surface, e), places);
-    DirectLight light;
-    lightHits(packet, hits, emitter, places, light);
-    if (!isAny(light.valid)) continue;
-    RTCRay16 rays;
-    setShadowRays(hits, places, rays);
-    record(tracing.log, light.valid, rays, coherent, true);
-    embree::occluded(light.valid.v, tracing.scene.embree, rays, coherent);
-    for (std::size_t i = 0; i < kLaneCount; ++i) light.weight[i] = rays.tfar[i] < 0.0f ? 0.0f : light.weight[i];
-    addLight(tracing, light, sums);
+    gatherLightOf(tracing, e, packet, hits, surface, coherent, places, sums);
   }
 }
 
@@ -97,20 +81,11 @@ void clearSums(LaneSums& sums) {
   for (auto* terms : {&sums.re, &sums.im}) std::fill(terms->begin(), terms->end(), Lanes<float>{});
 }
 
-namespace {
-
-/// Follows sixteen paths over all their surfaces.
-void followPaths(const Tracing& tracing, Packet& packet, LaneSums& sums) {
+void followFrom(const Tracing& tracing, int surface, Packet& packet, RTCRayHit16& rays, Hits& hits, LaneSums& sums) {
   const Dimensions dimensions = dimensionsOf(tracing);
   const int surfaces = tracing.request.max_surfaces;
-  RTCRayHit16 rays;
-  Hits hits;
-  for (int surface = 0;; ++surface) {
+  for (;; ++surface) {
     const bool is_coherent = surface == 0 && !tracing.scene.hasInstances();
-    intersect(tracing, packet, rays, is_coherent);
-    endMissed(tracing.scene.ambient_radiance, rays, packet, sums.ambient);
-    if (surface == surfaces || !isAny(packet.valid)) return;
-    findHits(tracing.scene, packet, rays, hits);
     addEmission(packet, hits, sums.ambient);
     gatherDirectLight(tracing, packet, hits, surface, is_coherent, sums);
     // Where the surroundings shine, the last surface must still look for them.
@@ -118,7 +93,24 @@ void followPaths(const Tracing& tracing, Packet& packet, LaneSums& sums) {
     bounce(hits, dimensions.bounce(surface), surface < kEvenBounces, packet);
     playRoulette(dimensions.roulette(surface), kRouletteThreshold, packet);
     if (!isAny(packet.valid)) return;
+    intersect(tracing, packet, rays, false);
+    endMissed(tracing.scene.ambient_radiance, rays, packet, sums.ambient);
+    if (surface + 1 == surfaces || !isAny(packet.valid)) return;
+    findHits(tracing.scene, packet, rays, hits);
   }
+}
+
+namespace {
+
+/// Follows sixteen paths over all their surfaces.
+void followPaths(const Tracing& tracing, Packet& packet, LaneSums& sums) {
+  RTCRayHit16 rays;
+  Hits hits;
+  intersect(tracing, packet, rays, !tracing.scene.hasInstances());
+  endMissed(tracing.scene.ambient_radiance, rays, packet, sums.ambient);
+  if (!isAny(packet.valid)) return;
+  findHits(tracing.scene, packet, rays, hits);
+  followFrom(tracing, 0, packet, rays, hits, sums);
 }
 
 }  // namespace
@@ -145,11 +137,12 @@ void preparePacket(const Tracing& tracing, const Block& block, Packet& packet) {
   }
   packet.key_a = block.key_a;
   packet.key_b = block.key_b;
+  packet.is_even = tracing.request.sampler != Sampler::Plain;
 }
 
 namespace {
 
-enum class Footprint { Middle, OnePlace, EvenPlaces };
+enum class Footprint { Middle, PlainPlaces, EvenPlaces };
 
 /// Starts the paths of the samples from `sample` on, each at its place on its pixel or in its middle.
 template <Footprint kFootprint>
@@ -163,8 +156,9 @@ TOFTWIN_INLINE void direct(const Tracing& tracing, const Block& block, int sampl
     double x = block.rays.x[i], y = block.rays.y[i];
     if constexpr (kFootprint != Footprint::Middle) {
       const PixelKey key{block.key_a[i], block.key_b[i]};
-      const RandomPair at = kFootprint == Footprint::OnePlace ? independentPair(key, packet.index[i], Dimensions::kFootprint)
-                                                              : randomPair(key, packet.index[i], Dimensions::kFootprint);
+      const RandomPair at = kFootprint == Footprint::PlainPlaces
+                                ? independentPair(key, packet.index[i], Dimensions::kFootprint)
+                                : randomPair(key, packet.index[i], Dimensions::kFootprint);
       const double du = (static_cast<double>(at.u) - 0.5) * extent, dv = (static_cast<double>(at.v) - 0.5) * extent;
       x += block.rays.x_by_u[i] * du + block.rays.x_by_v[i] * dv;
       y += block.rays.y_by_u[i] * du + block.rays.y_by_v[i] * dv;
@@ -182,41 +176,47 @@ TOFTWIN_VECTOR
 void startInTheMiddle(const Tracing& tracing, const Block& block, Packet& packet) {
   direct<Footprint::Middle>(tracing, block, 0, 1, packet);
 }
-
 namespace {
 
 TOFTWIN_VECTOR
-void startAtOnePlace(const Tracing& tracing, const Block& block, Packet& packet) {
-  direct<Footprint::OnePlace>(tracing, block, 0, 1, packet);
-}
-TOFTWIN_VECTOR
 void startAtEvenPlaces(const Tracing& tracing, const Block& block, int sample, int last, Packet& packet) {
   direct<Footprint::EvenPlaces>(tracing, block, sample, last, packet);
+}
+TOFTWIN_VECTOR
+void startAtPlainPlaces(const Tracing& tracing, const Block& block, int sample, int last, Packet& packet) {
+  direct<Footprint::PlainPlaces>(tracing, block, sample, last, packet);
 }
 
 TOFTWIN_INLINE void addLanes(const float* __restrict from, double* __restrict to) {
   for (std::size_t i = 0; i < kLaneCount; ++i) to[i] += static_cast<double>(from[i]);
 }
 
-/// The lanes' sums of one packet go to those of all, and their squares to the variance.
+}  // namespace
+
+void startAtPlaces(const Tracing& tracing, const Block& block, int sample, int last, Packet& packet) {
+  const auto start = packet.is_even ? startAtEvenPlaces : startAtPlainPlaces;
+  start(tracing, block, sample, last, packet);
+}
+
 TOFTWIN_VECTOR
-void fold(std::size_t harmonics, const Lanes<int>& started, BlockSums& sums) {
+void fold(std::size_t harmonics, const Lanes<int>& started, int samples, BlockSums& sums) {
   const LaneSums& lanes = sums.of_packet;
+  const double count = samples;
+  const float per_count = 1.0f / static_cast<float>(samples);
   addLanes(lanes.steady.v, sums.steady.v);
   addLanes(lanes.ambient.v, sums.ambient.v);
-  for (std::size_t i = 0; i < kLaneCount; ++i) sums.samples[i] += started[i] != 0 ? 1.0 : 0.0;
+  for (std::size_t i = 0; i < kLaneCount; ++i) sums.samples[i] += started[i] != 0 ? count : 0.0;
+  for (std::size_t i = 0; i < kLaneCount; ++i) sums.batches[i] += started[i] != 0 ? 1.0 : 0.0;
   for (std::size_t term = 0; term < lanes.re.size(); ++term) {
     const Lanes<float>&re = lanes.re[term], &im = lanes.im[term];
     addLanes(re.v, sums.re[term].v);
     addLanes(im.v, sums.im[term].v);
     if (term % harmonics != 0) continue;
     Lanes<float> squares;
-    for (std::size_t i = 0; i < kLaneCount; ++i) squares[i] = re[i] * re[i] + im[i] * im[i];
+    for (std::size_t i = 0; i < kLaneCount; ++i) squares[i] = (re[i] * re[i] + im[i] * im[i]) * per_count;
     addLanes(squares.v, sums.squares[term / harmonics].v);
   }
 }
-
-}  // namespace
 
 TOFTWIN_VECTOR
 void keepTruth(const Tracing& tracing, const Packet& packet, const Hits& hits, TruthLanes& truth) {
@@ -299,7 +299,7 @@ BlockSums::BlockSums(const TraceRequest& request)
 
 TOFTWIN_VECTOR
 void clearSums(BlockSums& sums) {
-  sums.steady = sums.ambient = sums.samples = {};
+  sums.steady = sums.ambient = sums.samples = sums.batches = {};
   for (auto* terms : {&sums.re, &sums.im, &sums.squares}) std::fill(terms->begin(), terms->end(), Lanes<double>{});
 }
 
@@ -311,6 +311,7 @@ void addSums(const BlockSums& from, BlockSums& to) {
   add(from.steady, to.steady);
   add(from.ambient, to.ambient);
   add(from.samples, to.samples);
+  add(from.batches, to.batches);
   for (std::size_t i = 0; i < to.re.size(); ++i) add(from.re[i], to.re[i]);
   for (std::size_t i = 0; i < to.im.size(); ++i) add(from.im[i], to.im[i]);
   for (std::size_t i = 0; i < to.squares.size(); ++i) add(from.squares[i], to.squares[i]);
@@ -322,18 +323,18 @@ void traceBlock(const Tracing& tracing, const Block& block, int first, int last,
   Packet packet;
   for (int sample = first; sample < last; sample += block.shape.samples) {
     preparePacket(tracing, block, packet);
-    startAtEvenPlaces(tracing, block, sample, last, packet);
+    startAtPlaces(tracing, block, sample, last, packet);
     const Lanes<int> started = packet.valid;
     clearSums(lanes);
     followAll(tracing, packet, lanes);
-    fold(harmonics, started, sums);
+    fold(harmonics, started, 1, sums);
   }
 }
 
 void traceOnce(const Tracing& tracing, const Block& block, LaneSums& lanes) {
   Packet packet;
   preparePacket(tracing, block, packet);
-  startAtOnePlace(tracing, block, packet);
+  startAtPlainPlaces(tracing, block, 0, 1, packet);
   clearSums(lanes);
   followAll(tracing, packet, lanes);
 }

@@ -20,6 +20,27 @@ namespace toftwin::sim {
 
 struct DirectLight;
 
+/// Below this throughput a path survives by chance and is weighted up. Unbiased; with it, a path of
+/// albedo 0.8 is followed for ten surfaces before the first draw.
+inline constexpr float kRouletteThreshold = 0.1f;
+
+/// So many bounces of a pixel's samples are spread evenly over all directions.
+inline constexpr int kEvenBounces = 2;
+
+/// Numbers of a path's random dimensions.
+struct Dimensions {
+  std::uint32_t emitters;
+  static constexpr std::uint32_t kFootprint = 0;
+  [[nodiscard]] std::uint32_t bounce(int surface) const { return first(surface); }
+  [[nodiscard]] std::uint32_t roulette(int surface) const { return first(surface) + 1; }
+  [[nodiscard]] std::uint32_t emitter(int surface, std::size_t e) const {
+    return first(surface) + 2 + static_cast<std::uint32_t>(e);
+  }
+
+ private:
+  [[nodiscard]] std::uint32_t first(int surface) const { return 1 + static_cast<std::uint32_t>(surface) * (2 + emitters); }
+};
+
 /// The rays that the tracer cast, for replaying them through Embree alone. Not for several threads.
 struct RayLog {
   struct Packet {
@@ -77,8 +98,9 @@ struct BlockSums {
   explicit BlockSums(const TraceRequest& request);
 
   Lanes<double> steady, ambient, samples;
+  Lanes<double> batches;               ///< of one or several samples, whose spread is the variance
   std::vector<Lanes<double>> re, im;   ///< [frequency][harmonic], or gates
-  std::vector<Lanes<double>> squares;  ///< [frequency] Σ |first harmonic|²
+  std::vector<Lanes<double>> squares;  ///< [frequency] Σ |first harmonic of a batch|² / its samples
   LaneSums of_packet;                  ///< the packet being traced
 };
 
@@ -131,9 +153,19 @@ void addEmission(const Packet& packet, const Hits& hits, Lanes<float>& ambient);
 /// Next-event estimation: from every hit to every emitter.
 void gatherDirectLight(const Tracing& tracing, const Packet& packet, const Hits& hits, int surface, bool coherent,
                        LaneSums& sums);
+/// The same to emitter `e` alone; `places` are those on it.
+void gatherLightOf(const Tracing& tracing, std::size_t e, const Packet& packet, const Hits& hits, int surface, bool coherent,
+                   Vec3Lanes& places, LaneSums& sums);
 /// Where central rays came from, in the camera's frame; NaN where from nowhere.
 void keepTruth(const Tracing& tracing, const Packet& packet, const Hits& hits, TruthLanes& truth);
 void clearSums(LaneSums& sums);
+/// Places of the samples [sample, last) on their pixels.
+void startAtPlaces(const Tracing& tracing, const Block& block, int sample, int last, Packet& packet);
+/// Follows sixteen paths from their hits on surface number `surface` to their ends.
+void followFrom(const Tracing& tracing, int surface, Packet& packet, RTCRayHit16& rays, Hits& hits, LaneSums& sums);
+/// The lanes' sums of one packet, or of a batch of so many samples, go to those of all, and their squares to the variance.
+void fold(std::size_t harmonics, const Lanes<int>& started, int samples, BlockSums& sums);
+void record(RayLog* log, const Lanes<int>& valid, const RTCRay16& rays, bool coherent, bool shadow);
 /// Follows sixteen paths over all their surfaces, whatever those are.
 void followAll(const Tracing& tracing, Packet& packet, LaneSums& sums);
 

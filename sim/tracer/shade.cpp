@@ -14,19 +14,25 @@
 namespace toftwin::sim {
 namespace {
 
-/// std::max goes through references, which keeps loops from becoming vector code.
-TOFTWIN_INLINE double larger(double a, double b) { return a > b ? a : b; }
-
-/// Reflection relative to a Lambertian surface (material.h): A + B · max(0, cos Δφ) sin α tan β, from
-/// the cosine between both directions and their cosines to the normal. sin α sin β cos Δφ is what the
-/// first has more than the product of the others, and tan β divides by the larger cosine.
-TOFTWIN_INLINE float shapeOf(float a, float b, double between, double cosine, double other) {
-  const auto sines = static_cast<float>(larger(0.0, between - cosine * other));
-  return a + b * sines / static_cast<float>(larger(larger(cosine, other), 1e-9));
-}
-
 TOFTWIN_INLINE void addLanes(const float* __restrict from, float* __restrict to) {
   for (std::size_t i = 0; i < kLaneCount; ++i) to[i] += from[i];
+}
+
+TOFTWIN_INLINE void drawPairs(const Packet& packet, std::uint32_t dimension, bool is_even, Lanes<float>& u,
+                              Lanes<float>& v) {
+  if (is_even) {
+    for (std::size_t i = 0; i < kLaneCount; ++i) {
+      const RandomPair random = randomPair(packet.key(i), packet.index[i], dimension);
+      u[i] = random.u;
+      v[i] = random.v;
+    }
+  } else {
+    for (std::size_t i = 0; i < kLaneCount; ++i) {
+      const RandomPair random = independentPair(packet.key(i), packet.index[i], dimension);
+      u[i] = random.u;
+      v[i] = random.v;
+    }
+  }
 }
 
 }  // namespace
@@ -42,12 +48,13 @@ void drawPlaces(const Packet& packet, const PlacedEmitter& emitter, std::uint32_
     }
     return;
   }
+  Lanes<float> draw_u, draw_v;
+  drawPairs(packet, dimension, packet.is_even, draw_u, draw_v);
   for (std::size_t i = 0; i < kLaneCount; ++i) {
-    const RandomPair random = randomPair(packet.key(i), packet.index[i], dimension);
     // Uniform by area. Seen from one direction each place of the disc has the same share of I(γ), so
     // the estimate needs no further weight.
-    const CosSin around = cosSinOfTurns(static_cast<double>(random.v));
-    const float r = __builtin_sqrtf(random.u);
+    const CosSin around = cosSinOfTurns(static_cast<double>(draw_v[i]));
+    const float r = __builtin_sqrtf(draw_u[i]);
     const auto a = static_cast<double>(r * around.cos), b = static_cast<double>(r * around.sin);
     places.x[i] = at.x + across.x * a + along.x * b;
     places.y[i] = at.y + across.y * a + along.y * b;
@@ -129,19 +136,7 @@ void setShadowRays(const Hits& hits, const Vec3Lanes& places, RTCRay16& rays) {
 TOFTWIN_VECTOR
 void bounce(const Hits& hits, std::uint32_t dimension, bool is_even, Packet& packet) {
   Lanes<float> draw_u, draw_v;
-  if (is_even) {
-    for (std::size_t i = 0; i < kLaneCount; ++i) {
-      const RandomPair random = randomPair(packet.key(i), packet.index[i], dimension);
-      draw_u[i] = random.u;
-      draw_v[i] = random.v;
-    }
-  } else {
-    for (std::size_t i = 0; i < kLaneCount; ++i) {
-      const RandomPair random = independentPair(packet.key(i), packet.index[i], dimension);
-      draw_u[i] = random.u;
-      draw_v[i] = random.v;
-    }
-  }
+  drawPairs(packet, dimension, is_even & packet.is_even, draw_u, draw_v);
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     const CosSin around = cosSinOfTurns(static_cast<double>(draw_v[i]));
     const float r = __builtin_sqrtf(draw_u[i]);

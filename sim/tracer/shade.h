@@ -9,6 +9,17 @@
 
 namespace toftwin::sim {
 
+/// std::max goes through references, which keeps loops from becoming vector code.
+TOFTWIN_INLINE double larger(double a, double b) { return a > b ? a : b; }
+
+/// Reflection relative to a Lambertian surface (material.h): A + B · max(0, cos Δφ) sin α tan β, from
+/// the cosine between both directions and their cosines to the normal. sin α sin β cos Δφ is what the
+/// first has more than the product of the others, and tan β divides by the larger cosine.
+TOFTWIN_INLINE float shapeOf(float a, float b, double between, double cosine, double other) {
+  const auto sines = static_cast<float>(larger(0.0, between - cosine * other));
+  return a + b * sines / static_cast<float>(larger(larger(cosine, other), 1e-9));
+}
+
 /// Light from places on one emitter straight to the hits, before anything is in its way.
 struct DirectLight {
   Lanes<int> valid;      ///< −1 where there is any

@@ -7,6 +7,7 @@
 
 #include "sim/tracer/glass.h"
 #include "sim/tracer/hit.h"
+#include "sim/tracer/path.h"
 #include "sim/tracer/shade.h"
 
 namespace toftwin::sim {
@@ -15,10 +16,6 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 /// Further than any scene reaches: where shadow rays to the surroundings end.
 constexpr double kFarAway = 1e6;
-/// As in path.cpp.
-constexpr float kRouletteThreshold = 0.1f;
-constexpr int kEvenBounces = 2;
-
 /// What the paths carry besides a Packet.
 struct Course {
   Lanes<int> model{};          ///< of the surface met: one more than its index in the scene's models; 0: matt
@@ -30,7 +27,7 @@ struct Course {
 
 /// Numbers of a path's random dimensions: after those of the emitters, one for the model's choices, one for
 /// the surroundings' picture, one for the sun.
-struct Dimensions {
+struct SpecialDimensions {
   std::uint32_t emitters;
   [[nodiscard]] std::uint32_t bounce(int surface) const { return first(surface); }
   [[nodiscard]] std::uint32_t roulette(int surface) const { return first(surface) + 1; }
@@ -48,7 +45,7 @@ struct Dimensions {
 };
 
 RandomPair drawn(const Packet& packet, std::size_t i, std::uint32_t dimension, bool is_even) {
-  return is_even ? randomPair(packet.key(i), packet.index[i], dimension)
+  return is_even & packet.is_even ? randomPair(packet.key(i), packet.index[i], dimension)
                  : independentPair(packet.key(i), packet.index[i], dimension);
 }
 
@@ -173,7 +170,7 @@ void endMissed(const Tracing& tracing, const RTCRayHit16& rays, const Course& co
 void meetSurfaces(const Tracing& tracing, const RTCRayHit16& rays, int surface, Packet& packet, Hits& hits,
                   Course& course, LaneSums& sums) {
   const Scene::Impl& scene = tracing.scene;
-  const Dimensions dimensions{static_cast<std::uint32_t>(tracing.emitters.size())};
+  const SpecialDimensions dimensions{static_cast<std::uint32_t>(tracing.emitters.size())};
   applyTextures(scene, rays, packet, hits);
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     course.model[i] = 0;
@@ -199,7 +196,7 @@ void meetSurfaces(const Tracing& tracing, const RTCRayHit16& rays, int surface, 
 /// Next-event estimation: from every hit to every emitter, with what the surface's model does with it.
 void gatherDirectLight(const Tracing& tracing, const Packet& packet, const Hits& hits, const Course& course,
                        int surface, bool coherent, LaneSums& sums) {
-  const Dimensions dimensions{static_cast<std::uint32_t>(tracing.emitters.size())};
+  const SpecialDimensions dimensions{static_cast<std::uint32_t>(tracing.emitters.size())};
   for (std::size_t e = 0; e < tracing.emitters.size(); ++e) {
     const PlacedEmitter& emitter = tracing.emitters[e];
     Vec3Lanes places;
@@ -233,7 +230,7 @@ void gatherDirectLight(const Tracing& tracing, const Packet& packet, const Hits&
 void gatherSurroundings(const Tracing& tracing, const Packet& packet, const Hits& hits, const Course& course,
                         int surface, bool is_sun, LaneSums& sums) {
   const Environment& environment = *tracing.scene.environment;
-  const Dimensions dimensions{static_cast<std::uint32_t>(tracing.emitters.size())};
+  const SpecialDimensions dimensions{static_cast<std::uint32_t>(tracing.emitters.size())};
   const std::uint32_t dimension = is_sun ? dimensions.sun(surface) : dimensions.picture(surface);
   DirectLight light{};
   Vec3Lanes places;
@@ -267,7 +264,7 @@ struct Onward {
 };
 Onward scatter(const Tracing& tracing, const Packet& packet, const Hits& hits, int surface, std::size_t i,
                Course& course) {
-  const Dimensions dimensions{static_cast<std::uint32_t>(tracing.emitters.size())};
+  const SpecialDimensions dimensions{static_cast<std::uint32_t>(tracing.emitters.size())};
   const bool is_even = surface < kEvenBounces;
   const Local local{packet, hits, i};
   const RandomPair place = drawn(packet, i, dimensions.bounce(surface), is_even);
@@ -295,7 +292,7 @@ Onward scatter(const Tracing& tracing, const Packet& packet, const Hits& hits, i
 
 /// Sends all paths on: matt ones as ever, the others by their models.
 void bounceAll(const Tracing& tracing, const Hits& hits, int surface, Packet& packet, Course& course) {
-  const Dimensions dimensions{static_cast<std::uint32_t>(tracing.emitters.size())};
+  const SpecialDimensions dimensions{static_cast<std::uint32_t>(tracing.emitters.size())};
   Lanes<int> is_special{};
   std::array<Onward, kLaneCount> onward;
   for (std::size_t i = 0; i < kLaneCount; ++i) {
@@ -348,7 +345,7 @@ void applyTextures(const Scene::Impl& scene, const RTCRayHit16& rays, const Pack
 
 void followSpecialPaths(const Tracing& tracing, Packet& packet, LaneSums& sums) {
   const int surfaces = tracing.request.max_surfaces;
-  const Dimensions dimensions{static_cast<std::uint32_t>(tracing.emitters.size())};
+  const SpecialDimensions dimensions{static_cast<std::uint32_t>(tracing.emitters.size())};
   const Environment* environment = tracing.scene.environment.get();
   Course course;
   for (double& density : course.density.v) density = bsdf::kDelta;

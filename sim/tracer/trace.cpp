@@ -10,25 +10,12 @@
 #include <utility>
 
 #include "sim/images/rows.h"
+#include "sim/tracer/block_means.h"
 #include "sim/tracer/path.h"
+#include "sim/tracer/shared_paths.h"
+#include "sim/tracer/trace_tiles.h"
 
 namespace toftwin::sim {
-namespace {
-
-/// A pixel with very many samples is cut into pieces of this many, so that threads can share it. The
-/// pieces' sums are added in order: the result does not depend on who did which.
-constexpr int kSamplesPerPiece = 4096;
-
-struct Region {
-  int x, y, width, height;
-};
-
-Region regionOf(const TraceRequest& request) {
-  if (request.region_width == 0) return {0, 0, request.camera.width, request.camera.height};
-  return {request.region_x, request.region_y, request.region_width, request.region_height};
-}
-
-}  // namespace
 
 void checkRequest(const TraceRequest& request) {
   const CameraInfo& camera = request.camera;
@@ -53,6 +40,8 @@ void checkRequest(const TraceRequest& request) {
   require(request.samples_per_pixel >= 1, "samples_per_pixel must be at least 1");
   require(request.max_surfaces >= 1, "max_surfaces must be at least 1");
   require(request.pixel_extent >= 0.0, "pixel_extent must not be negative");
+  require(request.wanted_noise >= Length{}, "wanted_noise must not be negative");
+  require(request.wanted_noise == Length{} || !request.frequencies.empty(), "wanted_noise needs frequencies: gates have no range");
   require(region.width > 0 && region.height > 0 && region.x >= 0 && region.y >= 0 &&
               region.width <= camera.width - region.x && region.height <= camera.height - region.y,
           "the region must lie inside the image");
@@ -85,9 +74,8 @@ Light lightFor(const TraceRequest& request, const Region& region, Light recycled
   return light;
 }
 
-/// Traces all samples of the block's pixels into `sums`.
-void sumBlock(const Tracing& tracing, const Block& block, BlockSums& sums) {
-  const int samples = tracing.request.samples_per_pixel;
+/// Traces so many samples of the block's pixels into `sums`.
+void sumBlock(const Tracing& tracing, const Block& block, int samples, BlockSums& sums) {
   const int pieces = (samples + kSamplesPerPiece - 1) / kSamplesPerPiece;
   clearSums(sums);
   if (pieces == 1) {
@@ -105,71 +93,18 @@ void sumBlock(const Tracing& tracing, const Block& block, BlockSums& sums) {
   }
 }
 
-/// Means of a block's pixels as the images hold them, pixel by pixel.
-struct BlockMeans {
-  explicit BlockMeans(const Light& light) : phasors(light.phasors.size()), variance(light.variance.size()) {}
-
-  Lanes<float> steady, ambient;
-  std::vector<Lanes<std::complex<float>>> phasors;
-  std::vector<Lanes<float>> variance;
-};
-
-/// Adds up the lanes of each pixel and moves the sum to the lane of the pixel's number.
-void addUpPixels(int samples, Lanes<double>& lanes) {
-  const auto step = static_cast<std::size_t>(samples);
-  for (std::size_t width = 1; width < step; width *= 2) {
-    for (std::size_t i = 0; i < kLaneCount; i += 2 * width) lanes[i] += lanes[i + width];
-  }
-  for (std::size_t pixel = 1; pixel < kLaneCount / step; ++pixel) lanes[pixel] = lanes[pixel * step];
-}
-
-void addUpPixels(const BlockShape& shape, BlockSums& sums) {
-  if (shape.samples == 1) return;
-  for (Lanes<double>* lanes : {&sums.steady, &sums.ambient, &sums.samples}) addUpPixels(shape.samples, *lanes);
-  for (auto* terms : {&sums.re, &sums.im, &sums.squares}) {
-    for (Lanes<double>& lanes : *terms) addUpPixels(shape.samples, lanes);
-  }
-}
-
-TOFTWIN_VECTOR
-void takeMeans(const BlockSums& sums, int harmonics, BlockMeans& means) {
-  Lanes<double> per_sample;
-  for (std::size_t i = 0; i < kLaneCount; ++i) per_sample[i] = 1.0 / sums.samples[i];
-  for (std::size_t i = 0; i < kLaneCount; ++i) {
-    means.steady[i] = static_cast<float>(sums.steady[i] * per_sample[i]);
-    means.ambient[i] = static_cast<float>(sums.ambient[i] * per_sample[i]);
-  }
-  for (std::size_t term = 0; term < means.phasors.size(); ++term) {
-    const Lanes<double>&re = sums.re[term], &im = sums.im[term];
-    float* out = reinterpret_cast<float*>(means.phasors[term].v);  // a complex number is an array of two
-    for (std::size_t i = 0; i < kLaneCount; ++i) {
-      out[2 * i] = static_cast<float>(re[i] * per_sample[i]);
-      out[2 * i + 1] = static_cast<float>(im[i] * per_sample[i]);
-    }
-  }
-  for (std::size_t f = 0; f < means.variance.size(); ++f) {
-    const std::size_t term = f * static_cast<std::size_t>(harmonics);
-    const Lanes<double>&re = sums.re[term], &im = sums.im[term], &squares = sums.squares[f];
-    for (std::size_t i = 0; i < kLaneCount; ++i) {
-      const double n = sums.samples[i], spread = squares[i] - (re[i] * re[i] + im[i] * im[i]) * per_sample[i];
-      means.variance[f][i] = static_cast<float>((spread > 0.0 ? spread : 0.0) / (2.0 * n * (n - 1.0)));
-    }
-  }
-}
-
-/// The same of the only samples.
-TOFTWIN_VECTOR
-void takeMeans(const LaneSums& lanes, BlockMeans& means) {
-  means.steady = lanes.steady;
-  means.ambient = lanes.ambient;
-  for (std::size_t term = 0; term < means.phasors.size(); ++term) {
-    const Lanes<float>&re = lanes.re[term], &im = lanes.im[term];
-    float* out = reinterpret_cast<float*>(means.phasors[term].v);
-    for (std::size_t i = 0; i < kLaneCount; ++i) {
-      out[2 * i] = re[i];
-      out[2 * i + 1] = im[i];
-    }
-  }
+/// How many samples the block's pixels take: all that the request allows, or what a pilot says the wanted
+/// noise takes. The pilot's samples are not used again: the mean of those that follow has no bias.
+int samplesFor(const Tracing& tracing, const Block& block, BlockSums& sums, BlockMeans& means) {
+  constexpr int kPilot = 64;
+  const int most = tracing.request.samples_per_pixel;
+  if (!(tracing.request.wanted_noise > Length{}) || most <= kPilot) return most;
+  sumBlock(tracing, pilotOf(block), kPilot, sums);
+  addUpPixels(block.shape, sums);
+  takeMeans(sums, tracing.request.harmonics, means);
+  NoiseCount noise;
+  countNoise(tracing, block.shape, sums, means, noise);
+  return samplesFor(tracing.request, noise, kPilot);
 }
 
 /// Traces the block and takes the means of its pixels.
@@ -179,48 +114,10 @@ void traceMeans(const Tracing& tracing, const Block& block, BlockSums& sums, Blo
     takeMeans(sums.of_packet, means);
     return;
   }
-  sumBlock(tracing, block, sums);
+  const int samples = samplesFor(tracing, block, sums, means);
+  sumBlock(tracing, block, samples, sums);
   addUpPixels(block.shape, sums);
   takeMeans(sums, tracing.request.harmonics, means);
-}
-
-/// Where the pixels of a block go in an image of the region.
-struct Placement {
-  Placement(const Block& block, const Region& region)
-      : width(block.shape.width),
-        u(block.x - region.x),
-        v(block.y - region.y),
-        first_column(std::max(0, -u)),
-        columns(std::min(width, region.width - u) - first_column),
-        first_row(std::max(0, -v)),
-        last_row(std::min(block.shape.height, region.height - v)) {}
-
-  template <class T>
-  void store(const T* values, Image<T>& image) const {
-    for (int row = first_row; row < last_row; ++row) {
-      const T* from = values + row * width + first_column;
-      T* to = &image(u + first_column, v + row);
-      if (columns == 4) {  // mostly, and then without a loop
-        for (int column = 0; column < 4; ++column) to[column] = from[column];
-      } else {
-        std::copy_n(from, columns, to);
-      }
-    }
-  }
-
-  int width;
-  int u, v;
-  int first_column, columns, first_row, last_row;
-};
-
-void storeBlock(const Placement& at, const BlockMeans& means, const TruthLanes& truth, Light& light) {
-  at.store(means.steady.v, light.steady);
-  at.store(means.ambient.v, light.ambient);
-  for (std::size_t term = 0; term < light.phasors.size(); ++term) at.store(means.phasors[term].v, light.phasors[term]);
-  for (std::size_t f = 0; f < light.variance.size(); ++f) at.store(means.variance[f].v, light.variance[f]);
-  at.store(truth.range_m.v, light.truth.range_m);
-  at.store(truth.albedo.v, light.truth.albedo);
-  at.store(truth.normal.v, light.truth.normal);
 }
 
 }  // namespace
@@ -231,6 +128,10 @@ Light traceLogged(const Scene& scene, const TraceRequest& request, RayLog* log, 
   const Tracing tracing{scene.impl(), request, log};
   const BlockShape shape = BlockShape::forSamples(request.samples_per_pixel);
   Light light = lightFor(request, region, std::move(recycled));
+  if (request.sampler == Sampler::Shared && canShare(tracing.scene, request)) {
+    traceTiles(tracing, region, light);
+    return light;
+  }
   const int first_column = region.x / shape.width, first_row = region.y / shape.height;
   const int columns = (region.x + region.width - 1) / shape.width - first_column + 1;
   const int rows = (region.y + region.height - 1) / shape.height - first_row + 1;
@@ -244,7 +145,7 @@ Light traceLogged(const Scene& scene, const TraceRequest& request, RayLog* log, 
       prepareBlock(tracing, shape, (first_column + i % columns) * shape.width, (first_row + i / columns) * shape.height, block);
       traceMeans(tracing, block, sums, means);
       traceTruth(tracing, block, truth);
-      storeBlock({block, region}, means, truth, light);
+      storeBlock(block, region, means, truth, light);
     }
   });
   return light;

@@ -40,6 +40,13 @@ struct PathFunctions {
   std::vector<float> first, second;  ///< of equal length
 };
 
+/// How the paths of a pixel are drawn; all three have the same mean (docs/tracer.md).
+enum class Sampler {
+  Plain,   ///< every random number by itself: what the others are measured against
+  Even,    ///< a pixel's samples are spread evenly over its footprint, emitters and the first two bounces
+  Shared,  ///< the same over tiles of 8 × 8 pixels, which use each other's paths
+};
+
 /// What to trace. The result depends on nothing else, not on the number of threads.
 struct TraceRequest {
   CameraInfo camera;
@@ -49,8 +56,12 @@ struct TraceRequest {
   int harmonics = 1;
   std::vector<PathFunctions> gates;  ///< instead of frequencies (Light::phasors)
   int samples_per_pixel = 16;
+  /// Positive: only as many samples as leave this noise of the range at the highest frequency, as the root mean
+  /// square over a tile of 8 × 8 pixels (Shared) or of the pixel; `samples_per_pixel` is then the most.
+  Length wanted_noise{};
   int max_surfaces = 16;       ///< surface hits per path: 1 = direct light only
   double pixel_extent = 1.0;   ///< side of the pixel's footprint in pixels; 0: its central ray only
+  Sampler sampler = Sampler::Even;
   std::uint64_t seed = 0;
   /// Only these pixels are traced; the images have this size. Width 0: all.
   int region_x = 0, region_y = 0, region_width = 0, region_height = 0;

@@ -20,6 +20,7 @@
 #include <numbers>
 
 #include "sim/tracer/path.h"
+#include "tests/bench/sampler_efficiency.h"
 
 namespace {
 
@@ -187,7 +188,9 @@ void compareWithEmbree(const Scene& scene, int runs) {
 
 int main(int argc, char** argv) {
   _mm_setcsr(_mm_getcsr() | 0x8040);  // denormals count as zero, as in the tracer
-  const int runs = argc > 1 ? std::max(1, std::atoi(argv[1])) : 9;
+  const int runs = argc > 1 ? std::max(0, std::atoi(argv[1])) : 9;
   const tbb::global_control one_thread{tbb::global_control::max_allowed_parallelism, 1};
-  compareWithEmbree(roomScene(), runs);
+  const Scene room = roomScene();
+  if (runs > 0) compareWithEmbree(room, runs);
+  toftwin::bench::compareSamplers(room);
 }

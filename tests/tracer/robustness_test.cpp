@@ -102,11 +102,27 @@ void expectSameBytes(const Light& a, const Light& b) {
   expectSameBytes(a.truth.normal, b.truth.normal);
 }
 
+/// Samples enough for several pieces, of one pixel or tile; and where a pilot says how many.
+std::vector<TraceRequest> requestsOfAllKinds() {
+  std::vector<TraceRequest> requests;
+  for (const int samples : {1, 3, 40, 9000}) requests.push_back(busyRequest(samples));
+  for (const int samples : {1, 3, 40, 200}) {
+    requests.push_back(busyRequest(samples));
+    requests.back().sampler = Sampler::Shared;
+  }
+  for (const std::size_t most : {3, 7}) {
+    TraceRequest& large = requests[most];
+    large.region_x = 5, large.region_y = 6, large.region_width = large.region_height = 2;
+    requests.push_back(busyRequest(200));
+    requests.back().sampler = large.sampler;
+    requests.back().wanted_noise = 30_mm;
+  }
+  return requests;
+}
+
 TEST(Determinism, OneAndFourThreadsGiveTheSameBytes) {
   const Scene scene = busyScene();
-  for (const int samples : {1, 3, 40, 9000}) {
-    TraceRequest request = busyRequest(samples);
-    if (samples == 9000) request.region_x = 5, request.region_y = 6, request.region_width = request.region_height = 2;
+  for (const TraceRequest& request : requestsOfAllKinds()) {
     const auto traceWith = [&](std::size_t threads) {
       const tbb::global_control limit{tbb::global_control::max_allowed_parallelism, threads};
       return trace(scene, request);
@@ -126,8 +142,10 @@ Image<T> crop(const Image<T>& image, const TraceRequest& region) {
 
 TEST(Determinism, ARegionIsACropOfTheWhole) {
   const Scene scene = busyScene();
-  for (const int samples : {1, 2, 5, 8, 20}) {
-    TraceRequest request = busyRequest(samples);
+  std::vector<TraceRequest> requests = requestsOfAllKinds();
+  for (const int samples : {2, 5, 8}) requests.push_back(busyRequest(samples));
+  for (TraceRequest request : requests) {
+    if (request.region_width != 0) continue;
     const Light whole = trace(scene, request);
     request.region_x = 7;
     request.region_y = 3;

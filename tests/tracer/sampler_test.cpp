@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: Apache-2.0
+// The samplers: all have the same mean, the shared one among them whatever its pixels see; the noise that
+// they state is the noise that they have; other frames have other noise.
+#include <array>
+#include <numeric>
+
+#include "tests/tracer/corner.h"
+#include "tests/tracer/tracing.h"
+
+namespace toftwin::sim::testing {
+namespace {
+
+/// Matt and rough surfaces, some of which shine, under an even sky; edges, a sphere, and a wall with a slot.
+Scene variedScene() {
+  return sceneOf(R"(
+    [ambient]
+    radiance_w_per_m2_sr = 0.05
+    [[material]]
+    name = "white"
+    albedo = 0.8
+    [[material]]
+    name = "rough"
+    model = "oren-nayar"
+    albedo = 0.7
+    sigma_deg = 35
+    [[material]]
+    name = "lamp"
+    albedo = 0.3
+    emission_w_per_m2_sr = 0.2
+    [[object]]
+    shape = "rectangle"
+    size_m = [3, 2, 0]
+    position_m = [0, 0, 1.6]
+    material = "rough"
+    [[object]]
+    shape = "rectangle"
+    size_m = [3, 2, 0]
+    position_m = [0, 0.5, 1]
+    euler_deg = [90, 0, 0]
+    material = "white"
+    [[object]]
+    shape = "box"
+    size_m = [0.3, 0.5, 0.3]
+    position_m = [-0.2, 0.2, 1.2]
+    euler_deg = [0, 30, 0]
+    material = "rough"
+    [[object]]
+    shape = "sphere"
+    radius_m = 0.2
+    position_m = [0.3, 0.25, 1.1]
+    material = "lamp"
+  )");
+}
+
+TraceRequest variedRequest() {
+  TraceRequest request = requestFor(24, 16, 18.0, {80_MHz, 20_MHz});
+  request.emitters = {
+      EmitterSpec{.position_m = {0.05, 0.0, 0.0}, .power_w = 2.0, .half_angle = 60.0 * degree},
+      EmitterSpec{.position_m = {-0.3, -0.2, 0.1}, .radius = 2_cm, .power_w = 1.0}};
+  request.harmonics = 2;
+  request.pixel_extent = 1.0;
+  request.max_surfaces = 5;
+  return request;
+}
+
+/// What one frame of an image amounts to, as numbers to compare: phasors, steady and ambient light of each
+/// tile.
+std::vector<double> summary(const Light& light) {
+  std::vector<double> values;
+  const auto add = [&](const auto& pixelOf) {
+    for (int top = 0; top < light.height(); top += 4) {
+      for (int left = 0; left < light.width(); left += 4) {
+        double sum = 0.0;
+        for (int p = 0; p < 16; ++p) sum += static_cast<double>(pixelOf(left + p % 4, top + p / 4));
+        values.push_back(sum / 16.0);
+      }
+    }
+  };
+  for (const auto& phasor : light.phasors) {
+    add([&](int x, int y) { return phasor(x, y).real(); });
+    add([&](int x, int y) { return phasor(x, y).imag(); });
+  }
+  add([&](int x, int y) { return light.steady(x, y); });
+  add([&](int x, int y) { return light.ambient(x, y); });
+  return values;
+}
+
+struct Spread {
+  std::vector<double> mean, variance;  ///< of the mean
+};
+Spread spreadOver(const Scene& scene, TraceRequest request, int seeds) {
+  Spread spread;
+  std::vector<double> squares;
+  for (int seed = 0; seed < seeds; ++seed) {
+    request.seed = static_cast<std::uint64_t>(seed) + 1000;
+    const std::vector<double> values = summary(trace(scene, request));
+    spread.mean.resize(values.size());
+    squares.resize(values.size());
+    for (std::size_t i = 0; i < values.size(); ++i)
+      spread.mean[i] += values[i], squares[i] += values[i] * values[i];
+  }
+  for (std::size_t i = 0; i < squares.size(); ++i) {
+    spread.mean[i] /= seeds;
+    spread.variance.push_back((squares[i] / seeds - spread.mean[i] * spread.mean[i]) / (seeds - 1));
+  }
+  return spread;
+}
+
+/// Each of 24 parts of the image in each of its ten quantities, by the spread over seeds. Two means of 40
+/// each differ by t with about 60 degrees of freedom; of 240 values one beyond 5.5 comes by chance in 5000
+/// such tests.
+TEST(Sampler, AllHaveTheSameMean) {
+  const Scene scene = variedScene();
+  TraceRequest request = variedRequest();
+  for (const int surfaces : {2, 5}) {
+    request.max_surfaces = surfaces;
+    request.sampler = Sampler::Even;
+    request.samples_per_pixel = 96;
+    const Spread even = spreadOver(scene, request, 40);
+    for (const Sampler sampler : {Sampler::Plain, Sampler::Shared}) {
+      request.sampler = sampler;
+      request.samples_per_pixel = sampler == Sampler::Plain ? 96 : 16;
+      const Spread other = spreadOver(scene, request, 40);
+      double worst = 0.0, square = 0.0;
+      for (std::size_t i = 0; i < even.mean.size(); ++i) {
+        const double z = (other.mean[i] - even.mean[i]) / std::sqrt(even.variance[i] + other.variance[i]);
+        worst = std::max(worst, std::abs(z));
+        square += z * z / static_cast<double>(even.mean.size());
+      }
+      EXPECT_LT(worst, 5.5) << surfaces << " surfaces, sampler " << static_cast<int>(sampler);
+      std::cout << surfaces << " surfaces, sampler " << static_cast<int>(sampler) << ": worst " << worst
+                << ", mean square " << square << "\n";
+    }
+  }
+}
+
+/// How far ranges at 80 MHz lie from their mean over seeds, pixel by pixel, and what the tracer said of that.
+struct Noise {
+  double actual_m2 = 0.0, stated_m2 = 0.0;  ///< means over pixels
+  double covered = 0.0,
+         covered_error = 0.0;  ///< share within two stated standard deviations, its standard error
+};
+Noise noiseOf(const Scene& scene, TraceRequest request, int seeds) {
+  std::vector<Light> lights;
+  for (int seed = 0; seed < seeds; ++seed) {
+    request.seed = static_cast<std::uint64_t>(seed) + 5000;
+    lights.push_back(trace(scene, request));
+  }
+  const auto pixels = lights[0].steady.size();
+  const double k2 = 2.0 * wavenumber(80_MHz);
+  Noise noise;
+  std::vector<double> covered(lights.size());
+  for (std::size_t p = 0; p < pixels; ++p) {
+    Complex mean;
+    for (const Light& light : lights) mean += Complex{light.phasors[0][p]} / double(seeds);
+    for (std::size_t s = 0; s < lights.size(); ++s) {
+      const Complex z{lights[s].phasors[0][p]};
+      const double error = std::arg(z * std::conj(mean)) / k2;
+      const double stated = static_cast<double>(lights[s].variance[0][p]) / std::norm(z) / (k2 * k2);
+      noise.actual_m2 += error * error / (seeds - 1) / static_cast<double>(pixels);
+      noise.stated_m2 += stated / seeds / static_cast<double>(pixels);
+      covered[s] += (error * error < 4.0 * stated ? 1.0 : 0.0) / static_cast<double>(pixels);
+    }
+  }
+  for (const double share : covered) noise.covered += share / seeds;
+  for (const double share : covered) noise.covered_error += std::pow(share - noise.covered, 2);
+  noise.covered_error = std::sqrt(noise.covered_error / seeds / (seeds - 1));
+  return noise;
+}
+
+TraceRequest noisyRequest(int samples) {
+  TraceRequest request = variedRequest();
+  request.frequencies = {80_MHz};
+  request.harmonics = 1;
+  request.sampler = Sampler::Shared;
+  request.samples_per_pixel = samples;
+  return request;
+}
+
+/// The spread of sixteen batches says how far the mean may be off: within two standard deviations of that
+/// kind lie 93.6 % (Student's distribution, 15 degrees of freedom), and as batches together are more even
+/// than apart, it is rather more. But a statement that covers everything says nothing.
+TEST(SharedSampler, StatesItsNoise) {
+  const int seeds = 60;
+  const Noise noise = noiseOf(variedScene(), noisyRequest(48), seeds);
+  EXPECT_GT(noise.covered, 0.936 - 3.0 * noise.covered_error);
+  EXPECT_LT(noise.covered, 0.98);
+  EXPECT_LT(noise.actual_m2, noise.stated_m2);
+  std::cout << "stated " << std::sqrt(noise.stated_m2) * 1e3 << " mm, actual "
+            << std::sqrt(noise.actual_m2) * 1e3 << " mm; within two: " << noise.covered << " +- "
+            << noise.covered_error << "\n";
+}
+
+/// Where 10 mm are wanted, there are less than 10, but not as little as the most samples leave, and what is
+/// stated then is true again: the pilot's samples don't count.
+TEST(WantedNoise, IsReachedWithoutTakingAllSamples) {
+  const Scene scene = variedScene();
+  TraceRequest request = noisyRequest(256);
+  const Noise least = noiseOf(scene, request, 12);
+  request.wanted_noise = 10_mm;
+  const Noise noise = noiseOf(scene, request, 40);
+  EXPECT_LT(std::sqrt(noise.actual_m2), 10e-3);
+  EXPECT_GT(noise.actual_m2, 2.0 * least.actual_m2);
+  EXPECT_GT(noise.covered, 0.936 - 3.0 * noise.covered_error);
+  request.wanted_noise = 1_um;  // out of reach: as many as there may be
+  request.samples_per_pixel = 64;
+  Light all = trace(scene, request);
+  request.wanted_noise = {};
+  EXPECT_EQ(all.phasors[0], trace(scene, request).phasors[0]);
+}
+
+/// One pixel alone knows its noise less well: from a pilot of 64 samples.
+TEST(WantedNoise, WorksWithoutSharing) {
+  const Scene scene = variedScene();
+  TraceRequest request = noisyRequest(1024);
+  request.sampler = Sampler::Even;
+  request.wanted_noise = 10_mm;
+  const Noise noise = noiseOf(scene, request, 12);
+  EXPECT_LT(std::sqrt(noise.actual_m2), 10e-3);
+  EXPECT_GT(std::sqrt(noise.actual_m2), 2e-3);
+}
+
+/// What frames have in common in their noise. Each frame's error is that of one sample, from the mean of all;
+/// over n independent tiles the correlation of independent errors has the standard deviation 1/√n, less if
+/// pixels of a tile differ: n = 200 · 256 pairs of tiles and five standard deviations.
+TEST(Frames, HaveNoiseOfTheirOwn) {
+  TraceRequest request = requestFor(128, 128, 110.0, {80_MHz});
+  request.max_surfaces = 2;
+  request.pixel_extent = 1.0;
+  const Scene scene = variedScene();
+  for (const Sampler sampler : {Sampler::Even, Sampler::Shared}) {
+    request.sampler = sampler;
+    const int frames = sampler == Sampler::Shared ? 201 : 21;
+    std::vector<Image<std::complex<float>>> light;
+    for (int frame = 0; frame < frames; ++frame) {
+      // As View numbers the frames of a simulated camera and its exposures.
+      request.seed = 1 + static_cast<std::uint64_t>(frame + 1) * 0x9e3779b97f4a7c15u;
+      light.push_back(trace(scene, request).phasors[0]);
+    }
+    double products = 0.0, squares = 0.0;
+    for (std::size_t p = 0; p < light[0].size(); ++p) {
+      Complex mean;
+      for (const auto& frame : light) mean += Complex{frame[p]} / double(frames);
+      double variance = 0.0, product = 0.0;
+      for (std::size_t f = 0; f < light.size(); ++f) variance += std::norm(Complex{light[f][p]} - mean);
+      if (!(variance > 1e-8 * std::norm(mean))) continue;  // no multipath there
+      for (std::size_t f = 1; f < light.size(); ++f) {
+        product += (std::conj(Complex{light[f - 1][p]} - mean) * (Complex{light[f][p]} - mean)).real();
+      }
+      // Both relative to the pixel's variance; a mean of n frames takes 1/n off the products.
+      products += product / variance + 1.0 / frames;
+      squares += 1.0;
+    }
+    const double pairs = (frames - 1.0) * (sampler == Sampler::Shared ? 256 : squares),
+                 correlation = products / squares;
+    std::cout << "sampler " << static_cast<int>(sampler) << ": correlation " << correlation
+              << " of successive frames\n";
+    EXPECT_LT(std::abs(correlation), std::min(0.01, 5.0 / std::sqrt(pairs)));
+  }
+}
+
+}  // namespace
+}  // namespace toftwin::sim::testing
