@@ -98,7 +98,8 @@ std::vector<Control> controlsOf(const Device& device) {
       }
       const bool is_new =
           std::ranges::find(controls, control.name, &Control::name) == controls.end();
-      if (is_new && !control.name.empty() && control.min <= control.max) {
+      const bool has_values = control.is_menu ? !control.menu.empty() : control.min <= control.max;
+      if (is_new && has_values && !control.name.empty()) {
         controls.push_back(std::move(control));
       }
     }

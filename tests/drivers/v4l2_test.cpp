@@ -290,16 +290,18 @@ TEST(V4l2, ErrorsSayWhatToDo) {
 
 TEST(V4l2, WhatTheCameraLacksIsSaidTogetherWithWhatItHas) {
   EmulatedV4l2 system{{{.formats = {V4L2_PIX_FMT_Y16, V4L2_PIX_FMT_GREY}}}};
-  const DescriptionFile z16{"[depth]\nformat = 'Z16'\n"}, y16{"[depth]\nformat = 'Y16'\n"};
+  const DescriptionFile z16{"[depth]\nformat = 'Z16'\n"},
+      z16_there{"[depth]\nnode = 0\nformat = 'Z16'\n"}, y16{"[depth]\nformat = 'Y16'\n"};
   struct Case {
     std::string keys;
     const char* says;
   };
-  for (const Case& one : {Case{"", "description"}, Case{z16.key(), "Y16"},
-                          Case{y16.key() + "width = 640\nheight = 480", "16 x 8"},
-                          Case{y16.key() + "frame_rate_hz = 17", "200"},
-                          Case{y16.key() + "set = ['shine = 1']", "no parameter"},
-                          Case{"camera = 'nobody'", "xtion_2"}}) {
+  for (const Case& one :
+       {Case{"", "description"}, Case{z16.key(), "Y16"}, Case{z16_there.key(), "has no format Z16"},
+        Case{y16.key() + "width = 640\nheight = 480", "16 x 8"},
+        Case{y16.key() + "frame_rate_hz = 17", "200"},
+        Case{y16.key() + "set = ['shine = 1']", "no parameter"},
+        Case{"camera = 'nobody'", "xtion_2"}}) {
     const auto opened = openWith(system, one.keys);
     ASSERT_FALSE(opened.ok()) << one.keys;
     EXPECT_NE(opened.error().message.find(one.says), std::string::npos) << opened.error().message;

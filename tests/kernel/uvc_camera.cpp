@@ -12,13 +12,14 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// Ids of the entities within the camera; its outputs follow, one for each stream.
+// Ids of the entities within the camera; its outputs follow, one for each
+// stream.
 constexpr unsigned kSensor = 1, kProcessing = 2, kFirstOutput = 3;
 constexpr unsigned kClassInterface = USB_DT_CS_INTERFACE;
 constexpr std::uint32_t kPictureBytes = UvcCamera::kWidth * UvcCamera::kHeight * 2;
 constexpr std::uint32_t kPayload = 16384;  // of a bulk transfer, header included
 constexpr std::uint32_t kHeaderBytes = 2;
-constexpr unsigned kBulkPacket = 512, kIsochronousPacket = 1024;
+constexpr unsigned kBulkPacket = 512, kSuperBulkPacket = 1024, kIsochronousPacket = 1024;
 constexpr std::chrono::microseconds kMicroframe{125};
 constexpr unsigned kProbeBytes = 26;
 constexpr std::uint32_t kIntervalUnits = 10;  // of 100 ns in a microsecond
@@ -56,15 +57,15 @@ Bytes interface(unsigned number, unsigned alternate, unsigned endpoints, unsigne
       .done();
 }
 
-Bytes endpoint(int stream, unsigned kind, unsigned packet) {
-  return Writer{}
-      .u8(7)
-      .u8(USB_DT_ENDPOINT)
-      .u8(endpointOf(stream))
-      .u8(kind)
-      .u16(packet)
-      .u8(1)
-      .done();
+/// With its companion, which says the same once more to SuperSpeed hosts.
+Bytes endpoint(int stream, unsigned kind, unsigned packet, UsbSpeed speed) {
+  Writer writer;
+  writer.u8(7).u8(USB_DT_ENDPOINT).u8(endpointOf(stream)).u8(kind).u16(packet).u8(1);
+  if (speed == UsbSpeed::Super) {
+    const bool is_periodic = (kind & USB_ENDPOINT_XFERTYPE_MASK) == USB_ENDPOINT_XFER_ISOC;
+    writer.u8(6).u8(USB_DT_SS_ENDPOINT_COMP).u8(0).u8(0).u16(is_periodic ? packet : 0);
+  }
+  return writer.done();
 }
 
 /// The control interface: sensor → processing → outputs.
@@ -149,18 +150,21 @@ std::uint16_t UvcCamera::codeAt(std::uint32_t frame, int stream, std::uint32_t x
   return static_cast<std::uint16_t>((x + y) % 7 == 0 ? 0 : 1000 + (x + 3 * y + frame) % 500);
 }
 
-// ---- descriptors -------------------------------------------------------------------------------
+// ---- descriptors
+// -------------------------------------------------------------------------------
 
 Bytes UvcCamera::deviceDescriptor() const {
-  // 1209:0001 is for tests (pid.codes).
+  // 1209:0001 is for tests (pid.codes). SuperSpeed tells the packets of
+  // endpoint 0 as a power of two.
+  const bool is_super = options_.speed == UsbSpeed::Super;
   return Writer{}
       .u8(18)
       .u8(USB_DT_DEVICE)
-      .u16(0x0200)
+      .u16(is_super ? 0x0300 : 0x0200)
       .u8(USB_CLASS_MISC)
       .u8(2)
       .u8(1)
-      .u8(64)
+      .u8(is_super ? 9 : 64)
       .u16(0x1209)
       .u16(0x0001)
       .u16(0x0100)
@@ -177,6 +181,7 @@ std::string UvcCamera::text(int index) const {
 
 Bytes UvcCamera::configurationDescriptor() const {
   const auto streams = static_cast<unsigned>(streams_.size());
+  const bool is_super = options_.speed == UsbSpeed::Super;
   Writer body;
   body.u8(8)
       .u8(USB_DT_INTERFACE_ASSOCIATION)
@@ -195,10 +200,12 @@ Bytes UvcCamera::configurationDescriptor() const {
     body.bytes(interface(number, 0, is_bulk ? 1 : 0, UVC_SC_VIDEOSTREAMING));
     body.bytes(streamFormats(i, interval_100ns));
     if (is_bulk) {
-      body.bytes(endpoint(i, USB_ENDPOINT_XFER_BULK, kBulkPacket));
+      body.bytes(endpoint(i, USB_ENDPOINT_XFER_BULK, is_super ? kSuperBulkPacket : kBulkPacket,
+                          options_.speed));
     } else {
       body.bytes(interface(number, 1, 1, UVC_SC_VIDEOSTREAMING));
-      body.bytes(endpoint(i, USB_ENDPOINT_XFER_ISOC | USB_ENDPOINT_SYNC_ASYNC, kIsochronousPacket));
+      body.bytes(endpoint(i, USB_ENDPOINT_XFER_ISOC | USB_ENDPOINT_SYNC_ASYNC, kIsochronousPacket,
+                          options_.speed));
     }
   }
   const Bytes all = body.done();
@@ -210,12 +217,13 @@ Bytes UvcCamera::configurationDescriptor() const {
       .u8(1)
       .u8(0)
       .u8(0x80)
-      .u8(250)
+      .u8(50)
       .bytes(all)
       .done();
 }
 
-// ---- requests ----------------------------------------------------------------------------------
+// ---- requests
+// ----------------------------------------------------------------------------------
 
 Answer UvcCamera::control(const Setup& setup, std::span<const std::byte> out) {
   const unsigned where = setup.index & 0xFFU, entity = setup.index >> 8U,
@@ -269,10 +277,11 @@ Answer UvcCamera::gainControl(const Setup& setup, std::span<const std::byte> out
   });
 }
 
-// ---- pictures ----------------------------------------------------------------------------------
+// ---- pictures
+// ----------------------------------------------------------------------------------
 
-/// Isochronous streams stop by alternate setting 0, bulk streams when the endpoint's halt is
-/// cleared.
+/// Isochronous streams stop by alternate setting 0, bulk streams when the
+/// endpoint's halt is cleared.
 void UvcCamera::onInterface(int number, int) {
   if (number < 1 || number > static_cast<int>(streams_.size())) return;
   Stream& stream = streams_[static_cast<std::size_t>(number - 1)];
@@ -346,7 +355,8 @@ bool UvcCamera::serve(Transfer& transfer, SteadyTime now) {
   return true;
 }
 
-/// A transfer takes as long as its packets have microframes, whether there is a picture or not.
+/// A transfer takes as long as its packets have microframes, whether there is a
+/// picture or not.
 bool UvcCamera::serveIsochronous(Stream& stream, int index, Transfer& transfer, SteadyTime now) {
   const auto lasts = kMicroframe * static_cast<int>(transfer.packets.size());
   if (!stream.next_transfer) stream.next_transfer = now + lasts;

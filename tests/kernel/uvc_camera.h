@@ -8,13 +8,14 @@
 
 namespace toftwin::kernel_test {
 
-/// A USB depth camera as uvcvideo knows them: Z16 in one or two streams (the second is Y16
-/// infrared), a gain and an exposure time. [USB Video Class 1.0]
+/// A USB depth camera as uvcvideo knows them: Z16 in one or two streams (the
+/// second is Y16 infrared), a gain and an exposure time. [USB Video Class 1.0]
 class UvcCamera final : public UsbDevice {
  public:
   enum class Endpoint { Bulk, Isochronous };
   struct Options {
     Endpoint endpoint = Endpoint::Bulk;
+    UsbSpeed speed = UsbSpeed::High;
     bool has_infrared = false;
     std::chrono::microseconds interval{33'333};
   };
@@ -26,8 +27,8 @@ class UvcCamera final : public UsbDevice {
 
   explicit UvcCamera(Options options);
 
-  /// The code at a pixel of picture number `frame` of a stream (0: depth). Pixel (0, 0) tells the
-  /// number.
+  /// The code at a pixel of picture number `frame` of a stream (0: depth).
+  /// Pixel (0, 0) tells the number.
   static std::uint16_t codeAt(std::uint32_t frame, int stream, std::uint32_t x, std::uint32_t y);
   static std::uint32_t frameOf(std::uint16_t first_code) { return first_code - 1U; }
 
@@ -38,6 +39,7 @@ class UvcCamera final : public UsbDevice {
   [[nodiscard]] std::uint16_t gain() const { return gain_; }
   [[nodiscard]] std::uint32_t exposure_100us() const { return exposure_; }
 
+  [[nodiscard]] UsbSpeed speed() const override { return options_.speed; }
   [[nodiscard]] Bytes deviceDescriptor() const override;
   [[nodiscard]] Bytes configurationDescriptor() const override;
   [[nodiscard]] std::string text(int index) const override;
@@ -53,7 +55,8 @@ class UvcCamera final : public UsbDevice {
     Bytes picture;  ///< being sent
     std::size_t sent = 0;
     bool is_toggled = false, is_damaged = false;
-    std::optional<SteadyTime> next_picture, next_transfer;  ///< none: not streaming
+    std::optional<SteadyTime> next_picture,
+        next_transfer;  ///< none: not streaming
   };
   [[nodiscard]] Answer probe(const Setup& setup, std::span<const std::byte> out);
   [[nodiscard]] Answer exposureControl(const Setup& setup, std::span<const std::byte> out);

@@ -99,6 +99,15 @@ TEST_F(Vivid, EveryFormatShowsTheSamePicture) {
   EXPECT_GT(*std::ranges::max_element(grey), 100.0F) << "a picture of bars, not black";
 }
 
+// The kernel sets another format than it was asked for, and calls it success.
+TEST_F(Vivid, AFormatThatItLacksIsNotTakenForAnother) {
+  std::ofstream{"/tmp/z16.toml"} << "[depth]\nnode = 0\nformat = 'Z16'\n";
+  const auto opened = open(fmt::format("uri = '{}'\ncamera = '/tmp/z16.toml'", kUri));
+  ASSERT_FALSE(opened.ok());
+  EXPECT_NE(opened.error().message.find("has no format Z16"), std::string::npos)
+      << opened.error().message;
+}
+
 TEST_F(Vivid, WhatTheKernelDropsIsCountedAlsoWhereItsCountWrapsAround) {
   auto opened = open(keysFor("Y16", "frame_rate_hz = 60"));
   ASSERT_TRUE(opened.ok()) << opened.error().message;
