@@ -85,6 +85,7 @@ bool View::complete(const sim::ForeignEmitterSpec* foreign, Pass& pass, const st
     if (foreign != nullptr) band = sim::foreignRequest(*foreign, band);
     copyBand(sim::trace(posed, band), pass.rows_done, pass.light, height);
     pass.rows_done += band.region_height;
+    if (tell_) tell_(band.region_height);
   }
   return true;
 }

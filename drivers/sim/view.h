@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <stop_token>
 #include <vector>
@@ -40,6 +41,9 @@ class View {
 
   /// Traces what is not traced yet. False if asked to stop before the end.
   bool complete(const std::stop_token& stop);
+  /// Called with the number of rows when complete() has traced so many; `rows` of them make a whole image.
+  void whenRowsAreTraced(std::function<void(int)> tell) { tell_ = std::move(tell); }
+  [[nodiscard]] int rows() const { return request_.camera.height * static_cast<int>(1 + foreign_.size()); }
   /// The light of the whole image, once complete() said so; in real time that of the last frame.
   [[nodiscard]] const sim::Light& light() const { return realtime_light_ != nullptr ? *realtime_light_ : own_.light; }
 
@@ -73,6 +77,7 @@ class View {
   Pass own_;
   std::vector<Pass> foreign_{scene_.foreignEmitters().size()};
   sim::Light mixed_;  ///< what lightFor() gave last
+  std::function<void(int)> tell_;
 };
 
 }  // namespace toftwin::drivers::simulator

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "tools/cli/command.h"
+#include "tools/cli/frame_files.h"
 #include "tools/cli/options.h"
 #include "tools/cli/terminal.h"
 
@@ -83,6 +84,28 @@ Result<> checkOptions(Options& options) {
   return options.output.check();
 }
 
+Result<> grabAll(const Options& options, Client& client, const SourceDetails& details, Subscription& frames,
+                 FrameFiles& files) {
+  Progress progress{"frames", options.count};
+  for (std::uint64_t i = 0; i < options.skip + options.count; ++i) {
+    if (options.trigger) {
+      if (auto done = client.trigger(options.source); !done) return done;
+    }
+    const auto frame = waitForFrame(frames, options.daemon.timeout());
+    if (!frame) {
+      const bool is_late = frame.error().code == Error::Code::Timeout;
+      return Error{frame.error().code,
+                   fmt::format("{} of {} frames written: {}", files.written(), options.count,
+                               is_late ? whyNone(client, details, options.daemon.timeout_s)
+                                       : frame.error().message)};
+    }
+    if (i < options.skip) continue;
+    if (auto added = files.add(*frame, files.written()); !added) return added;
+    progress.show(files.written());
+  }
+  return {};
+}
+
 Result<Exit> run(Options& options) {
   auto client = options.daemon.connect();
   if (!client) return client.error();
@@ -91,35 +114,12 @@ Result<Exit> run(Options& options) {
   auto frames = client->subscribe(options.source, subscriptionFor(options));
   if (!frames) return frames.error();
   catchInterrupts();
-  std::string note;
-  std::uint64_t written = 0;
-  {
-    Progress progress{"frames", options.count};
-    for (std::uint64_t i = 0; i < options.skip + options.count; ++i) {
-      if (options.trigger) {
-        if (auto done = client->trigger(options.source); !done) return done.error();
-      }
-      const auto frame = waitForFrame(*frames, options.daemon.timeout());
-      if (!frame) {
-        const bool is_late = frame.error().code == Error::Code::Timeout;
-        return Error{frame.error().code,
-                     fmt::format("{} of {} frames written: {}", written, options.count,
-                                 is_late ? whyNone(*client, *details, options.daemon.timeout_s)
-                                         : frame.error().message)};
-      }
-      if (i < options.skip) continue;
-      const std::string file = numbered(options.output.file, written, options.count > 1);
-      auto wrote = exportFrame(*frame, file, options.output.how);
-      if (!wrote) return wrote.error();
-      note = *std::move(wrote);
-      progress.show(++written);
-    }
-  }
-  fmt::print("{}: {}\n",
-             options.count > 1
-                 ? fmt::format("{} files like {}", written, numbered(options.output.file, 0, true))
-                 : options.output.file,
-             note);
+  FrameFiles files{options.output, options.count > 1};
+  const auto grabbed = grabAll(options, *client, *details, *frames, files);
+  const auto finished = files.finish();
+  if (!grabbed) return grabbed.error();
+  if (!finished) return finished.error();
+  fmt::print("{}\n", files.summary());
   return Exit::Ok;
 }
 
@@ -127,12 +127,13 @@ Result<Exit> run(Options& options) {
 
 Command grabCommand() {
   return {
-      "grab", "frames of a camera as PNG, PLY, NPY or CSV",
+      "grab", "frames of a camera as PNG, PLY, NPY, CSV or HDF5",
       "  toftwin grab kinect -o range.png                16-bit, 1 count = 1 mm, 0 = invalid\n"
       "  toftwin grab kinect -o look.png --color --plane amplitude\n"
       "  toftwin grab kinect -o cloud.ply\n"
       "  toftwin grab kinect -o frame.npy --count 100    frame-0000.npy to frame-0099.npy, "
       "consecutive\n"
+      "  toftwin grab kinect -o frames.h5 --count 100    all planes of all frames in one file\n"
       "  toftwin grab kinect -o line.csv --row 212       a scan line, all planes\n",
       [](CLI::App& app) -> Run {
         const auto options = std::make_shared<Options>();

@@ -53,13 +53,13 @@ Result<Client> DaemonOptions::connect() const {
 void OutputOptions::add(CLI::App& app, bool required) {
   app.add_option(
          "-o,--output", file,
-         "file to write; its extension says the format: .png .ply .npy .csv. Written whole or "
+         "file to write; its extension says the format: .png .ply .npy .csv .h5. Written whole or "
          "not at all")
       ->required(required);
   app.add_option("-p,--plane", plane_names,
                  "plane to write: " + planeNames() +
                      "; default: range, or depth where there is no range; "
-                     "CSV takes several (-p range,flags), and all by default")
+                     "CSV and HDF5 take several (-p range,flags), and all by default")
       ->delimiter(',')
       ->allow_extra_args(false);
   app.add_option("--channel", how.channel, "of a plane with several (PNG, CSV)")
@@ -79,7 +79,7 @@ void OutputOptions::add(CLI::App& app, bool required) {
 namespace {
 
 /// What was given although it means nothing for this kind of file.
-Result<> fits(Format format, const ExportOptions& how) {
+Result<> fits(const std::vector<Format>& formats, const ExportOptions& how) {
   struct Rule {
     const char* option;
     bool is_given;
@@ -87,10 +87,11 @@ Result<> fits(Format format, const ExportOptions& how) {
     const char* meant_for;
   };
   const ExportOptions none;
-  const bool is_png = format == Format::Png, is_csv = format == Format::Csv;
+  const auto among = [&](Format format) { return std::ranges::find(formats, format) != formats.end(); };
+  const bool is_png = among(Format::Png), is_csv = among(Format::Csv);
   const std::array rules{
       Rule{"--row", how.row.has_value(), is_csv, ".csv"},
-      Rule{"--world", how.world, format == Format::Ply, ".ply"},
+      Rule{"--world", how.world, among(Format::Ply), ".ply"},
       Rule{"--color", how.color, is_png, ".png"},
       Rule{"--scale", how.mm_per_count != none.mm_per_count, is_png && !how.color,
            ".png without --color"},
@@ -114,10 +115,25 @@ Result<> fits(Format format, const ExportOptions& how) {
 }  // namespace
 
 Result<> OutputOptions::check() {
+  std::vector<Format> formats;
   if (!file.empty()) {
     const auto format = formatOf(file);
     if (!format) return format.error();
-    if (auto fitting = fits(*format, how); !fitting) return fitting;
+    formats.push_back(*format);
+  }
+  if (auto checked = check(formats); !checked) return checked;
+  const bool takes_several =
+      file.empty() || formats.front() == Format::Csv || formats.front() == Format::Hdf5;
+  if (takes_several || how.planes.size() <= 1) return {};
+  return Error{Error::Code::InvalidArgument,
+               fmt::format("-o {} takes one plane, not {}: name one with -p, or write .csv or .h5, which "
+                           "take several",
+                           file, how.planes.size())};
+}
+
+Result<> OutputOptions::check(const std::vector<Format>& formats) {
+  if (!file.empty()) {
+    if (auto fitting = fits(formats, how); !fitting) return fitting;
   }
   how.planes.clear();
   for (const std::string& name : plane_names) {
@@ -127,13 +143,6 @@ Result<> OutputOptions::check() {
                    fmt::format("there is no plane \"{}\"; the planes are: {}", name, planeNames())};
     }
     how.planes.push_back(*kind);
-  }
-  const bool is_csv = !file.empty() && std::filesystem::path{file}.extension() == ".csv";
-  if (!file.empty() && !is_csv && how.planes.size() > 1) {
-    return Error{Error::Code::InvalidArgument,
-                 fmt::format("-o {} takes one plane, not {}: name one with -p, or write .csv, which "
-                             "takes several",
-                             file, how.planes.size())};
   }
   return {};
 }

@@ -40,6 +40,8 @@ struct OutputOptions {
   /// Puts the names into `how`. An unknown extension or plane, and an option that means nothing for
   /// this kind of file, are errors of the command line, before any work.
   Result<> check();
+  /// The same for these formats instead of the file's; an option must mean something for one of them.
+  Result<> check(const std::vector<Format>& formats);
 };
 
 /// For CLI11's check: what is wrong with an address, or nothing.

@@ -13,7 +13,6 @@
 #include "tools/cli/render_bands.h"
 
 namespace toftwin::cli {
-namespace {
 
 Plane planeOf(const sim::ColorImage& color) {
   const int width = color[0].width(), height = color[0].height();
@@ -22,6 +21,8 @@ Plane planeOf(const sim::ColorImage& color) {
     planar.insert(planar.end(), channel.pixels().begin(), channel.pixels().end());
   return {PlaneKind::Color, ElementType::U8, width, height, 3, Buffer::adopt(std::move(planar))};
 }
+
+namespace {
 
 /// The pictures of one camera, named after one file.
 class Pictures {

@@ -7,10 +7,14 @@
 #include <toftwin/result.h>
 
 #include "drivers/sim/keys.h"
+#include "sim/sensor/color.h"
 #include "sim/sensor/sensor_model.h"
 #include "tools/cli/command.h"
 
 namespace toftwin::cli {
+
+/// A colour image as a plane.
+Plane planeOf(const sim::ColorImage& color);
 
 /// Writes what the camera's lenses give as pictures to look at, beside `file`: infrared and depth
 /// of the frame and, where the camera has a colour lens, colour from its own place, and each

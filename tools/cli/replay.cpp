@@ -10,6 +10,7 @@
 #include "protocol/record/recording.h"
 #include "tools/cli/command.h"
 #include "tools/cli/describe.h"
+#include "tools/cli/frame_files.h"
 #include "tools/cli/options.h"
 #include "tools/cli/serve.h"
 #include "tools/cli/terminal.h"
@@ -115,28 +116,18 @@ Result<Exit> exportFrames(const Options& options, record::Reader& reader) {
     if (options.source.empty() || source == options.source) total += frames;
   }
   if (options.count > 0) total = std::min(total, options.count);
-  std::string note;
-  std::uint64_t written = 0;
+  FrameFiles files{options.output, options.count != 1};
   Result<Exit> ran = Exit::Ok;
   {
     Progress progress{"frames", total};
     ran = eachFrame(options, reader, [&](const Frame& frame, std::uint64_t index) -> Result<> {
-      auto wrote = exportFrame(frame, numbered(options.output.file, index, options.count != 1),
-                               options.output.how);
-      if (!wrote) return wrote.error();
-      note = *std::move(wrote);
-      progress.show(++written);
+      if (auto added = files.add(frame, index); !added) return added;
+      progress.show(files.written());
       return {};
     });
   }
-  if (written > 0) {
-    const bool several = options.count != 1;
-    fmt::print(
-        "{}: {}\n",
-        several ? fmt::format("{} files like {}", written, numbered(options.output.file, 0, true))
-                : options.output.file,
-        note);
-  }
+  if (auto finished = files.finish(); !finished && ran) return finished.error();
+  if (files.written() > 0) fmt::print("{}\n", files.summary());
   return ran;
 }
 

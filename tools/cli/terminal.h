@@ -10,20 +10,28 @@
 
 namespace toftwin::cli {
 
-/// A progress bar on standard error, where that is a terminal; otherwise nothing. Redrawn at most
-/// ten times a second, gone when it is destroyed.
+/// "50 s", "12 min", "3 h 20 min".
+std::string timeLeft(double seconds);
+
+/// A progress bar on standard error, where that is a terminal; otherwise nothing, or a line now and then. Redrawn
+/// at most ten times a second, gone when it is destroyed.
 class Progress {
  public:
-  /// `total` 0: not known, so it counts only.
-  Progress(std::string what, std::uint64_t total);
+  /// `total` 0: not known, so it counts only. `log_every` 0: nothing where there is no terminal.
+  Progress(std::string what, std::uint64_t total, std::chrono::seconds log_every = {});
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
-  void show(std::uint64_t done, std::string_view extra = {});
+  void show(std::uint64_t done, std::string_view extra = {}) { show(done, 0.0, extra); }
+  /// So many are done, and that share of the next.
+  void show(std::uint64_t done, double share_of_next, std::string_view extra);
 
  private:
+  [[nodiscard]] std::string line(double done, std::string_view extra);
+
   std::string what_;
   std::uint64_t total_;
+  std::chrono::seconds log_every_;
   bool is_terminal_;
   bool drawn_ = false;
   compare::Pace pace_;

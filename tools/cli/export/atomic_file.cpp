@@ -11,18 +11,6 @@
 namespace toftwin::cli {
 namespace {
 
-Error cannotWrite(const std::filesystem::path& file, int number) {
-  const bool is_full = number == ENOSPC || number == EDQUOT || number == EFBIG;
-  const bool is_forbidden = number == EACCES || number == EPERM || number == EROFS;
-  const char* what_to_do = is_full            ? "free space there"
-                           : number == ENOENT ? "is there such a folder?"
-                           : is_forbidden     ? "choose a folder that you may write to"
-                                              : "choose another place";
-  return {
-      Error::Code::StorageFull,  // whatever keeps it from being written
-      fmt::format("{}: cannot write: {}; {}", file.string(), std::strerror(number), what_to_do)};
-}
-
 /// 0, or the number of the error.
 int writeAll(int fd, std::span<const std::byte> bytes) {
   while (!bytes.empty()) {
@@ -34,6 +22,18 @@ int writeAll(int fd, std::span<const std::byte> bytes) {
 }
 
 }  // namespace
+
+Error cannotWrite(const std::filesystem::path& file, int number) {
+  const bool is_full = number == ENOSPC || number == EDQUOT || number == EFBIG;
+  const bool is_forbidden = number == EACCES || number == EPERM || number == EROFS;
+  const char* what_to_do = is_full            ? "free space there"
+                           : number == ENOENT ? "is there such a folder?"
+                           : is_forbidden     ? "choose a folder that you may write to"
+                                              : "choose another place";
+  return {
+      Error::Code::StorageFull,  // whatever keeps it from being written
+      fmt::format("{}: cannot write: {}; {}", file.string(), std::strerror(number), what_to_do)};
+}
 
 Result<> writeWhole(const std::filesystem::path& file, std::span<const std::byte> bytes) {
   std::error_code ignored;

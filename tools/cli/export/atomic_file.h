@@ -15,4 +15,7 @@ namespace toftwin::cli {
 Result<> writeWhole(const std::filesystem::path& file, std::span<const std::byte> bytes);
 Result<> writeWhole(const std::filesystem::path& file, std::string_view text);
 
+/// What keeps a file from being written, and what to do: `number` is the system's (errno).
+Error cannotWrite(const std::filesystem::path& file, int number);
+
 }  // namespace toftwin::cli

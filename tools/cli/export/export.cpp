@@ -9,6 +9,7 @@
 #include <toftwin/names.h>
 
 #include "tools/cli/export/atomic_file.h"
+#include "tools/cli/export/hdf5.h"
 
 namespace toftwin::cli {
 namespace {
@@ -18,11 +19,16 @@ struct FormatRow {
   Format format;
   Result<Exported> (*make)(const Frame&, const ExportOptions&);
 };
+Result<Exported> noBytes(const Frame&, const ExportOptions&) {
+  return Error{Error::Code::Unsupported, "HDF5 is written into files only"};
+}
+
 constexpr std::array kFormats{
     FormatRow{".png", Format::Png, &toPng},
     FormatRow{".ply", Format::Ply, &toPly},
     FormatRow{".npy", Format::Npy, &toNpy},
     FormatRow{".csv", Format::Csv, &toCsv},
+    FormatRow{".h5", Format::Hdf5, &noBytes},
 };
 
 std::string namesOf(const std::vector<Plane>& planes) {
@@ -97,12 +103,24 @@ Result<Picture> pictureOf(const Plane& plane, int channel) {
   return picture;
 }
 
-Result<std::string> exportFrame(const Frame& frame, const std::filesystem::path& file,
-                                const ExportOptions& options) {
+Result<Exported> exportBytes(const Frame& frame, const std::filesystem::path& file,
+                             const ExportOptions& options) {
   const auto format = formatOf(file);
   if (!format) return format.error();
-  const auto row = std::ranges::find(kFormats, *format, &FormatRow::format);
-  auto exported = row->make(frame, options);
+  return std::ranges::find(kFormats, *format, &FormatRow::format)->make(frame, options);
+}
+
+Result<std::string> exportFrame(const Frame& frame, const std::filesystem::path& file,
+                                const ExportOptions& options) {
+  if (const auto format = formatOf(file); format && *format == Format::Hdf5) {
+    auto hdf5 = Hdf5File::create(file, frame, {.planes = options.planes, .about = {}});
+    if (!hdf5) return hdf5.error();
+    if (auto wrote = hdf5->append(frame); !wrote) return wrote.error();
+    if (auto closed = hdf5->close(); !closed) return closed.error();
+    if (auto published = hdf5->publish(); !published) return published.error();
+    return hdf5->note();
+  }
+  auto exported = exportBytes(frame, file, options);
   if (!exported) return exported.error();
   if (auto wrote = writeWhole(file, exported->bytes); !wrote) return wrote.error();
   return std::move(exported->note);

@@ -15,13 +15,13 @@
 /// Frames as files that other programs read. docs/command-line.md says what each format holds.
 namespace toftwin::cli {
 
-enum class Format { Png, Ply, Npy, Csv };
+enum class Format { Png, Ply, Npy, Csv, Hdf5 };
 
 /// By the file's extension. Error InvalidArgument names the known ones.
 Result<Format> formatOf(const std::filesystem::path& file);
 
 struct ExportOptions {
-  std::vector<PlaneKind> planes{};  ///< empty: range, or depth where there is no range (CSV: all)
+  std::vector<PlaneKind> planes{};  ///< empty: range, or depth where there is no range (CSV, HDF5: all)
   int channel = 0;                  ///< of planes with several (PNG, CSV)
   double mm_per_count = 1.0;        ///< PNG of metres
   bool color = false;  ///< PNG: 8-bit colours between `min` and `max` instead of counts
@@ -42,6 +42,9 @@ Result<Exported> toPly(const Frame& frame, const ExportOptions& options);
 Result<Exported> toNpy(const Frame& frame, const ExportOptions& options);
 Result<Exported> toCsv(const Frame& frame, const ExportOptions& options);
 
+/// The frame in the format of the extension. Unsupported for HDF5, which is no stream of bytes.
+Result<Exported> exportBytes(const Frame& frame, const std::filesystem::path& file,
+                             const ExportOptions& options);
 /// Writes the frame in the format of the extension, whole or not at all; gives the note.
 Result<std::string> exportFrame(const Frame& frame, const std::filesystem::path& file,
                                 const ExportOptions& options);
