@@ -169,6 +169,7 @@ CameraFile readCameraFile(settings::Table& table, std::vector<AnyEffect>& effect
     if (std::hypot(emitter.axis[0], emitter.axis[1], emitter.axis[2]) < 1e-6) {
       table.complain("emitter", "has an axis of length 0, which points nowhere");
     }
+    if (emitter.power_w == 0.0) table.complain("emitter", "has power_w = 0 and gives no light; remove it");
   }
   if (file.decoder.nearest >= file.decoder.farthest) {
     table.complain("decoder",

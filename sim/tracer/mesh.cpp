@@ -7,6 +7,7 @@
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace toftwin::sim {
@@ -83,6 +84,14 @@ Result<TriangleMesh> loadMesh(const std::filesystem::path& file) {
   if (mesh.places.size() != mesh.triangles.size()) mesh.places.clear();
   if (mesh.triangles.empty()) {
     return Error{Error::Code::InvalidArgument, fmt::format("mesh {}: it has no triangles", file.string())};
+  }
+  const bool has_area = std::ranges::any_of(mesh.triangles, [&](const auto& corners) {
+    const auto& [a, b, c] = corners;
+    return norm(cross(mesh.vertices[b] - mesh.vertices[a], mesh.vertices[c] - mesh.vertices[a])) > 0.0;
+  });
+  if (!has_area) {
+    return Error{Error::Code::InvalidArgument,
+                 fmt::format("mesh {}: none of its {} triangles has an area", file.string(), mesh.triangles.size())};
   }
   return mesh;
 }

@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
+#include "protocol/settings/describe.h"
 #include "protocol/settings/settings.h"
 
 namespace toftwin::sim {
@@ -152,6 +154,9 @@ Motion readMotion(Table& table, const ObjectSpec& object) {
     checkOrientation(frame, spec.rotation_wxyz);
     const Transform<World, Object> pose = poseOf(spec, frame.has("euler_deg"));
     const double time = spec.time.in(second);
+    if (motion.period_s > 0.0 && time > motion.period_s) {
+      frame.complain("time_s", fmt::format("= {} is beyond period_s = {}, so it is never reached", time, motion.period_s));
+    }
     if (!motion.keys.empty() && time <= motion.keys.back().time_s) {
       frame.complain("time_s", "is not later than that of the keyframe before");
     }
@@ -183,6 +188,7 @@ void readForeignEmitters(Table& root, SceneSpec& scene) {
     ForeignEmitterSpec& emitter = scene.foreign_emitters.emplace_back();
     table.read(emitter);
     checkDirection(table, "axis", emitter.axis);
+    if (emitter.power_w == 0.0) table.complain("power_w", "= 0 gives no light; remove this emitter");
   }
 }
 
@@ -204,7 +210,8 @@ PlacedObject readObject(Table& table, const SceneSpec& scene) {
   if (material == scene.materials.end()) {
     std::string known;
     for (const auto& m : scene.materials) known += (known.empty() ? "" : ", ") + m.name;
-    table.complain("material", fmt::format("\"{}\" is no material of this scene; it has: {}", spec.material,
+    if (spec.material.empty()) table.complain("", "this object has no material");
+    else table.complain("material", fmt::format("\"{}\" is no material of this scene; it has: {}", spec.material,
                                            known.empty() ? "none" : known));
   } else {
     object.material = static_cast<std::size_t>(material - scene.materials.begin());
@@ -218,11 +225,29 @@ PlacedObject readObject(Table& table, const SceneSpec& scene) {
   return object;
 }
 
+/// Two surfaces in one place: rounding would decide which of them light meets.
+void checkAlone(Table& table, const SceneFile& file, std::map<std::string, std::size_t>& earlier) {
+  const PlacedObject& object = file.objects.back();
+  std::string where;
+  for (const settings::Key& key : settings::keysOf(object.spec)) {
+    if (key.name != "name" && key.name != "material") where += key.name + key.value + "\n";
+  }
+  for (const KeyframeSpec& frame : object.spec.keyframes) {
+    for (const settings::Key& key : settings::keysOf(frame)) where += key.name + key.value + "\n";
+  }
+  const auto [same, is_new] = earlier.emplace(std::move(where), file.objects.size() - 1);
+  if (is_new) return;
+  table.complain("", fmt::format("this object is in the same place as that of {}, with the same shape and size; remove one",
+                                 file.objects[same->second].place));
+}
+
 Result<SceneFile> read(Table root) {
   SceneFile file;
+  std::map<std::string, std::size_t> places;
   readMaterials(root, file);
   for (Table& table : root.tables("object")) {
     file.objects.push_back(readObject(table, file.spec));
+    checkAlone(table, file, places);
     file.spec.objects.push_back(file.objects.back().spec);
   }
   readAmbient(root, file);

@@ -27,6 +27,7 @@ TEST(CameraFile, ErrorsNameFileLineKeyBoundAndUnit) {
               HasSubstr("unknown key \"offset_m\""));
   EXPECT_THAT(errorOf("model = 'x'\n"),
               testing::AllOf(HasSubstr("no [[emitter]]"), HasSubstr("no [[modulation]]")));
+  EXPECT_THAT(errorOf("[[emitter]]\npower_w = 0\n[[modulation]]\n"), HasSubstr("power_w = 0 and gives no light"));
   EXPECT_THAT(errorOf("[[emitter]]\naxis = [0, 0, 0]\n[[modulation]]\n"),
               HasSubstr("axis of length 0"));
   EXPECT_THAT(errorOf("[[emitter]]\n[[modulation]]\n[decoder]\nnearest_m = 3\nfarthest_m = 2\n"),

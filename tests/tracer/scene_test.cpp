@@ -70,6 +70,17 @@ TEST(SceneFile, RefusesWhatHasNoMeaning) {
   EXPECT_THAT(errorOf("[[material]]\nalbedo = 1.5\n"), AllOf(HasSubstr("albedo = 1.5 is out of bounds"), HasSubstr("every material needs one")));
 }
 
+TEST(SceneFile, RefusesWhatCannotBeSeen) {
+  const std::string box = std::string{kMaterial} + "[[object]]\nmaterial = 'm'\nshape = 'box'\n";
+  EXPECT_THAT(errorOf(box + "[[object]]\nname = 'twin'\nmaterial = 'm'\nshape = 'box'\n"),
+              HasSubstr("this object is in the same place as that of scene.toml:3"));
+  EXPECT_EQ(errorOf(box + "[[object]]\nmaterial = 'm'\nshape = 'box'\nposition_m = [1, 0, 0]\n"), "no error");
+  EXPECT_THAT(errorOf(box + "[[foreign_emitter]]\npower_w = 0\n"), HasSubstr("scene.toml:7: power_w = 0 gives no light"));
+  EXPECT_THAT(errorOf(box + "period_s = 1\n[[object.keyframe]]\n[[object.keyframe]]\ntime_s = 2\n"),
+              HasSubstr("time_s = 2 is beyond period_s = 1"));
+  EXPECT_THAT(errorOf(std::string{kMaterial} + "[[object]]\nshape = 'box'\n"), HasSubstr("this object has no material"));
+}
+
 TEST_F(SceneFiles, AMissingOrEmptyOrBrokenMeshIsNamed) {
   EXPECT_THAT(errorOfMesh("none.obj"), AllOf(HasSubstr("scene.toml:3"), HasSubstr("none.obj: no such file")));
   std::filesystem::create_directory(folder_ / "dir.ply");
@@ -85,6 +96,8 @@ TEST_F(SceneFiles, AMissingOrEmptyOrBrokenMeshIsNamed) {
   EXPECT_THAT(errorOfMesh("empty.obj"), HasSubstr("empty.obj"));
   write("points.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n");
   EXPECT_THAT(errorOfMesh("points.obj"), HasSubstr("points.obj"));
+  write("flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n");
+  EXPECT_THAT(errorOfMesh("flat.obj"), AllOf(HasSubstr("scene.toml:3"), HasSubstr("none of its 1 triangles has an area")));
   write("noise.ply", std::string(1000, '\xa7'));
   EXPECT_THAT(errorOfMesh("noise.ply"), HasSubstr("noise.ply"));
   write("cut.glb", std::string("glTF\2\0\0\0\xff\xff\0\0", 12));

@@ -43,7 +43,8 @@ FrameMaker::FrameMaker(sim::SensorModel model, sim::Scene scene, Trajectory traj
       settings_(std::move(settings)),
       planes_(std::move(planes)),
       source_(std::move(source)),
-      view_(std::move(scene), requestFor(model_, settings_.keys), motion()) {}
+      view_(std::move(scene), requestFor(model_, settings_.keys), motion(),
+            settings_.freeze ? Duration{} : model_.rowDelay()) {}
 
 sim::Motion FrameMaker::motion() const {
   sim::Motion motion;
@@ -109,14 +110,15 @@ Result<Frame> FrameMaker::make(std::uint64_t number, const Watch& watch) {
   place(number);
   const Moment moment = momentOf(number);
   const bool each = view_.changesWithTime() && !settings_.freeze;
-  const double bands = view_.bands() * (each ? static_cast<double>(moment.exposures.size()) : 1.0);
+  const double rows = view_.rows() * (each ? static_cast<double>(moment.exposures.size()) : 1.0);
   double done = 0.0;
   stop_ = {};
-  view_.whenBandIsTraced([&] {
-    if (!watch(std::min(1.0, ++done / bands))) stop_.request_stop();
+  view_.whenRowsAreTraced([&](int traced) {
+    done += traced;
+    if (!watch(std::min(1.0, done / rows))) stop_.request_stop();
   });
   auto collected = gather(number, moment);
-  view_.whenBandIsTraced({});
+  view_.whenRowsAreTraced({});
   if (!collected) return Error{Error::Code::Stopped, "interrupted"};
   const sim::History before{memory_.collected ? &*memory_.collected : nullptr,
                             memory_.range ? &*memory_.range : nullptr};
