@@ -65,7 +65,7 @@ bool isParameter(const v4l2_queryctrl& control) {
 std::vector<std::int64_t> menuOf(const Device& device, const v4l2_queryctrl& control) {
   std::vector<std::int64_t> choices;
   const std::int64_t last = std::min<std::int64_t>(control.maximum, kLongestMenu);
-  for (std::int64_t i = control.minimum; i <= last; ++i) {
+  for (std::int64_t i = std::max(0, control.minimum); i <= last; ++i) {
     v4l2_querymenu choice{};
     choice.id = control.id;
     choice.index = static_cast<std::uint32_t>(i);

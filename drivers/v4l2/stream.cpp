@@ -24,6 +24,14 @@ v4l2_buffer bufferAt(std::uint32_t index) {
   return buffer;
 }
 
+/// Within ±126 years, so that no difference of two stamps overflows, whatever the driver says.
+std::int64_t nanosecondsOf(const v4l2_buffer& buffer) {
+  constexpr std::int64_t kPerSecond = 1'000'000'000, kPerMicrosecond = 1000;
+  constexpr std::int64_t kMost_s = 4'000'000'000, kMost_us = 1'000'000;
+  return std::clamp<std::int64_t>(buffer.timestamp.tv_sec, -kMost_s, kMost_s) * kPerSecond +
+         std::clamp<std::int64_t>(buffer.timestamp.tv_usec, 0, kMost_us) * kPerMicrosecond;
+}
+
 int request(const Device& device, std::uint32_t& count) {
   v4l2_requestbuffers wish{};
   wish.count = count;
@@ -133,7 +141,6 @@ void Stream::sync(const Mapping& mapping, std::uint64_t flags) const {
 }
 
 Result<std::optional<Stream::Picture>> Stream::take() {
-  constexpr std::int64_t kPerSecond = 1'000'000'000, kPerMicrosecond = 1000;
   v4l2_buffer buffer = bufferAt(0);
   const int error = device_->control(VIDIOC_DQBUF, &buffer);
   if (error == -EAGAIN) return std::optional<Picture>{};
@@ -154,7 +161,7 @@ Result<std::optional<Stream::Picture>> Stream::take() {
   return std::optional{Picture{
       .index = buffer.index,
       .sequence = buffer.sequence,
-      .stamp_ns = buffer.timestamp.tv_sec * kPerSecond + buffer.timestamp.tv_usec * kPerMicrosecond,
+      .stamp_ns = nanosecondsOf(buffer),
       .is_host_clock =
           (buffer.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC,
       .is_whole = (buffer.flags & V4L2_BUF_FLAG_ERROR) == 0 && used >= least,

@@ -155,11 +155,13 @@ void EmulatedV4l2::close(int file) {
 
 std::span<std::byte> EmulatedV4l2::map(int file, std::size_t length, std::int64_t offset) {
   const std::scoped_lock lock{mutex_};
-  const File& opened = files_.at(file);
-  const auto index = opened.exported_buffer >= 0 ? static_cast<std::size_t>(opened.exported_buffer)
-                                                 : static_cast<std::size_t>(offset) / 4096;
-  auto& buffer = opened.node->buffers.at(index);
-  if (length != buffer.size()) return {};
+  const auto opened = files_.find(file);
+  if (opened == files_.end()) return {};
+  const auto& [node, exported] = opened->second;
+  const auto index =
+      exported >= 0 ? static_cast<std::size_t>(exported) : static_cast<std::size_t>(offset) / 4096;
+  if (index >= node->buffers.size() || length != node->buffers[index].size()) return {};
+  auto& buffer = node->buffers[index];
   ++mappings_;
   return buffer;
 }
