@@ -3,6 +3,7 @@
 
 #include "drivers/not_built.h"
 #include "drivers/o3d303/o3d303.h"
+#include "drivers/openni2/openni2.h"
 #include "drivers/pattern/pattern.h"
 #include "drivers/replay/replay.h"
 #include "drivers/sim/simulator.h"
@@ -22,6 +23,11 @@ std::span<const Driver> allDrivers() {
       v4l2::row(),
 #else
       notBuilt<v4l2::About>(),
+#endif
+#ifdef TOFTWIN_HAS_OPENNI2
+      openni2::row(),
+#else
+      notBuilt<openni2::About>(),
 #endif
   };
   return rows;
