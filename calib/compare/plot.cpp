@@ -130,15 +130,24 @@ std::string path(const Curve& curve, const Axis& x, const Axis& y) {
   return fmt::format("<path class='curve {}{}' d='{}'/>", classOf(curve.ink), dash, d);
 }
 
+/// One closed path for each run of bins whose band is known: none is drawn across a gap.
 std::string band(const Curve& curve, const Axis& x, const Axis& y) {
-  std::string there, back;
+  std::string d, there, back;
+  const auto close = [&] {
+    if (!there.empty()) d += there + back + "Z";
+    there.clear(), back.clear();
+  };
   for (std::size_t i = 0; i < curve.low.size(); ++i) {
-    if (!std::isfinite(curve.low[i]) || !std::isfinite(curve.high[i])) continue;
+    if (!std::isfinite(curve.low[i]) || !std::isfinite(curve.high[i])) {
+      close();
+      continue;
+    }
     there += fmt::format("{}{:.1f} {:.1f}", there.empty() ? "M" : "L", x.place(curve.x[i]),
                          y.place(curve.high[i]));
     back.insert(0, fmt::format("L{:.1f} {:.1f}", x.place(curve.x[i]), y.place(curve.low[i])));
   }
-  return fmt::format("<path class='band {}' d='{}{}Z'/>", classOf(curve.ink), there, back);
+  close();
+  return fmt::format("<path class='band {}' d='{}'/>", classOf(curve.ink), d);
 }
 
 /// HTML beside the SVG: wraps at any width and stays readable on a phone.

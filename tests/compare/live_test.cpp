@@ -47,15 +47,18 @@ class SourceFeed final : public Feed {
     if (!frame) return frame;
     frame->source = details_.entry.name;
     frame->sequence = sequence_++;
+    if (!says_its_pose_) frame->moment.world_from_camera.reset();
     return frame;
   }
   Result<> setPose(const Transform<World, Camera>& pose) override { return source_->setPose(pose); }
   void pretendItCannotMove() { details_.can_set_pose = false; }
+  void keepItsPoseToItself() { says_its_pose_ = false; }
 
  private:
   std::unique_ptr<drivers::Source> source_;
   SourceDetails details_;
   std::uint64_t sequence_ = 0;
+  bool says_its_pose_ = true;
 };
 
 /// A small camera: fast, and noisy enough for statistics. One wall, so no light comes twice.
@@ -150,6 +153,30 @@ TEST_F(Live, LeavesAPageItsNumbersAndALogWithIds) {
   EXPECT_EQ(std::count(log.begin(), log.end(), '\n'), 8);  // 2 poses, 2 frames, 2 cameras
   EXPECT_THAT(log, HasSubstr("\"effects\": [\"shot_noise\", \"delay\"]"));
   EXPECT_THAT(log, HasSubstr("\"model\": \""));
+}
+
+TEST_F(Live, APoseVisitedAgainIsKnownAlsoWhereNoCameraSaysIt) {
+  SourceFeed a{"a", sourceToml(1, 0.0)}, b{"b", sourceToml(2, 10.0)};
+  a.keepItsPoseToItself(), b.keepItsPoseToItself();
+  std::vector<PoseSpec> poses = twoPoses();
+  poses.push_back(poses.front());
+  const auto captured = capture(a, b, {.poses = poses, .frames = 2}, silent);
+  ASSERT_TRUE(captured.ok()) << captured.error().message;
+  const auto finding = judgeLive(*captured);
+  ASSERT_TRUE(finding.ok()) << finding.error().message;
+  EXPECT_THAT(finding->section.verdict, HasSubstr("3 poses, 2 of them different"));
+  EXPECT_THAT(finding->section.verdict, HasSubstr("last visit of \"one\" B − A changed by"));
+  EXPECT_THAT(finding->data.text(), HasSubstr("\"places\": 2"));
+}
+
+TEST_F(Live, OnePoseHasNoErrorInTheHeadline) {
+  SourceFeed a{"a", sourceToml(1, 0.0)}, b{"b", sourceToml(2, 10.0)};
+  const auto captured = capture(a, b, {.poses = {twoPoses()[1]}, .frames = 2}, silent);
+  ASSERT_TRUE(captured.ok()) << captured.error().message;
+  const auto finding = judgeLive(*captured);
+  ASSERT_TRUE(finding.ok()) << finding.error().message;
+  EXPECT_THAT(finding->headline, testing::Not(HasSubstr("±")));
+  EXPECT_THAT(finding->section.verdict, HasSubstr("at 1 pose;"));
 }
 
 TEST_F(Live, ACameraThatNeverReachesThePoseIsNamed) {

@@ -126,6 +126,23 @@ TEST(Plot, InterruptsACurveWhereThereIsNoValue) {
   EXPECT_THAT(svg, Not(HasSubstr("nan")));
 }
 
+TEST(Plot, DrawsNoBandWhereTheErrorIsUnknown) {
+  const double unknown = std::nan("");
+  const Plot plot{.title = "t",
+                  .x_label = "x",
+                  .y_label = "y",
+                  .curves = {{.name = "c",
+                              .x = {0, 1, 2, 3, 4},
+                              .y = {1, 2, 3, 4, 5},
+                              .low = {0, 1, unknown, 3, 4},
+                              .high = {2, 3, unknown, 5, 6}}}};
+  const std::string svg = toSvg(plot);
+  const std::size_t begin = svg.find("d='", svg.find("class='band"));
+  const std::string d = svg.substr(begin, svg.find("'/>", begin) - begin);
+  EXPECT_EQ(std::count(d.begin(), d.end(), 'M'), 2) << d;
+  EXPECT_EQ(std::count(d.begin(), d.end(), 'Z'), 2) << d;
+}
+
 TEST(Histogram, CountsEveryFiniteValueOnce) {
   const Curve curve = histogram(std::vector<double>{-5, 0.5, 1.5, 1.6, 9, std::nan("")}, 0, 2, 2,
                                 "h", Ink::Measured);
