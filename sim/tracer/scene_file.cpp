@@ -155,7 +155,8 @@ Motion readMotion(Table& table, const ObjectSpec& object) {
     const Transform<World, Object> pose = poseOf(spec, frame.has("euler_deg"));
     const double time = spec.time.in(second);
     if (motion.period_s > 0.0 && time > motion.period_s) {
-      frame.complain("time_s", fmt::format("= {} is beyond period_s = {}, so it is never reached", time, motion.period_s));
+      frame.complain("time_s", fmt::format("= {} is beyond period_s = {}, so it is never reached", time,
+                                           motion.period_s));
     }
     if (!motion.keys.empty() && time <= motion.keys.back().time_s) {
       frame.complain("time_s", "is not later than that of the keyframe before");
@@ -210,9 +211,11 @@ PlacedObject readObject(Table& table, const SceneSpec& scene) {
   if (material == scene.materials.end()) {
     std::string known;
     for (const auto& m : scene.materials) known += (known.empty() ? "" : ", ") + m.name;
-    if (spec.material.empty()) table.complain("", "this object has no material");
-    else table.complain("material", fmt::format("\"{}\" is no material of this scene; it has: {}", spec.material,
-                                           known.empty() ? "none" : known));
+    if (spec.material.empty())
+      table.complain("", "this object has no material");
+    else
+      table.complain("material", fmt::format("\"{}\" is no material of this scene; it has: {}", spec.material,
+                                             known.empty() ? "none" : known));
   } else {
     object.material = static_cast<std::size_t>(material - scene.materials.begin());
   }
@@ -237,7 +240,8 @@ void checkAlone(Table& table, const SceneFile& file, std::map<std::string, std::
   }
   const auto [same, is_new] = earlier.emplace(std::move(where), file.objects.size() - 1);
   if (is_new) return;
-  table.complain("", fmt::format("this object is in the same place as that of {}, with the same shape and size; remove one",
+  table.complain("", fmt::format("this object is in the same place as that of {}, with the same shape and size; "
+                                 "remove one",
                                  file.objects[same->second].place));
 }
 

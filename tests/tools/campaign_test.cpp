@@ -37,9 +37,20 @@ class Campaign : public testing::Test {
     writeText(folder_ / "walk.csv", kRightwards);
   }
   std::string path(const std::string& name) const { return (folder_ / name).string(); }
-  std::vector<std::string> arguments(const std::string& output, const std::vector<std::string>& more = {}) const {
-    std::vector<std::string> all{"render", path("tiny.toml"), "--scene", path("scene.toml"), "--trajectory", path("walk.csv"),
-                                 "--frames", "40", "--frame-interval-ms", "25", "-o", path(output)};
+  std::vector<std::string> arguments(const std::string& output,
+                                     const std::vector<std::string>& more = {}) const {
+    std::vector<std::string> all{"render",
+                                 path("tiny.toml"),
+                                 "--scene",
+                                 path("scene.toml"),
+                                 "--trajectory",
+                                 path("walk.csv"),
+                                 "--frames",
+                                 "40",
+                                 "--frame-interval-ms",
+                                 "25",
+                                 "-o",
+                                 path(output)};
     all.insert(all.end(), more.begin(), more.end());
     return all;
   }
@@ -58,7 +69,8 @@ class Campaign : public testing::Test {
     posix_spawn_file_actions_t quiet;
     ::posix_spawn_file_actions_init(&quiet);
     ::posix_spawn_file_actions_addopen(&quiet, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
-    ::posix_spawn_file_actions_addopen(&quiet, STDERR_FILENO, path("err").c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0666);
+    ::posix_spawn_file_actions_addopen(&quiet, STDERR_FILENO, path("err").c_str(),
+                                       O_WRONLY | O_CREAT | O_TRUNC, 0666);
     pid_t child = -1;
     EXPECT_EQ(::posix_spawn(&child, TOFTWIN_PROGRAM, &quiet, nullptr, argv.data(), environ), 0);
     ::posix_spawn_file_actions_destroy(&quiet);
@@ -171,7 +183,10 @@ TEST_F(Campaign, ASceneOrCameraThatSaysSomethingElseIsAnotherOne) {
 
 TEST_F(Campaign, FilesOfSomebodyElseAreNotReplaced) {
   std::filesystem::create_directory(folder_ / "a");
-  for (const auto& [file, output] : {std::pair{"a/frame-000039-depth.npy", "a/"}, {"b.mcap", "b.mcap"}, {"c.h5", "c.h5"}, {"d-0003.png", "d.png"}}) {
+  for (const auto& [file, output] : {std::pair{"a/frame-000039-depth.npy", "a/"},
+                                     {"b.mcap", "b.mcap"},
+                                     {"c.h5", "c.h5"},
+                                     {"d-0003.png", "d.png"}}) {
     writeText(folder_ / file, "precious");
     const Ran ran = render(output);
     EXPECT_EQ(ran.status, 4) << output;
@@ -195,7 +210,8 @@ TEST_F(Campaign, TwoAtOnceDoNotMix) {
 TEST_F(Campaign, AFullDiskIsSaidAndGoneOnFrom) {
   for (const char* output : {"a/", "a.mcap", "a.h5", "a.png"}) {
     SCOPED_TRACE(output);
-    // The largest file may have 40 kB: of the one-file formats some frames fit, of the others not even the memory.
+    // The largest file may have 40 kB: of the one-file formats some frames fit, of the others not even the
+    // memory.
     std::string line;
     for (const std::string& argument : arguments(output)) line += " '" + argument + "'";
     const Ran full = runShell("trap '' XFSZ; ulimit -f 40; '" TOFTWIN_PROGRAM "'" + line);
@@ -210,9 +226,11 @@ TEST_F(Campaign, AFullDiskIsSaidAndGoneOnFrom) {
 }
 
 TEST_F(Campaign, WhatIsWrongIsSaidBeforeAnythingIsWritten) {
-  writeText(folder_ / "unsorted.csv", "time_s,x_m,y_m,z_m,q_w,q_x,q_y,q_z\n1,0,0,0,1,0,0,0\n0,0,0,0,1,0,0,0\n");
+  writeText(folder_ / "unsorted.csv",
+            "time_s,x_m,y_m,z_m,q_w,q_x,q_y,q_z\n1,0,0,0,1,0,0,0\n0,0,0,0,1,0,0,0\n");
   const auto with = [&](const std::string& trajectory, const std::string& output) {
-    return toftwin("render generic_cw --samples 1 --trajectory '" + path(trajectory) + "' -o '" + path(output) + "'");
+    return toftwin("render generic_cw --samples 1 --trajectory '" + path(trajectory) + "' -o '" +
+                   path(output) + "'");
   };
   EXPECT_THAT(with("unsorted.csv", "a/").err, HasSubstr("unsorted.csv:3: time_s = 0 is not later"));
   EXPECT_EQ(with("missing.csv", "a/").status, 4);
@@ -241,12 +259,14 @@ TEST_F(Campaign, WhatIsWrongIsSaidBeforeAnythingIsWritten) {
   }
   EXPECT_THAT(toftwin("render generic_cw --frames 2 --frame-interval-ms 1 -o '" + path("a/") + "'").err,
               HasSubstr("the raw exposures of a frame take 11.5 ms"));
-  EXPECT_THAT(toftwin("render generic_cw --frames 2 -p color -o '" + path("a/") + "'").err, HasSubstr("have no plane color"));
+  EXPECT_THAT(toftwin("render generic_cw --frames 2 -p color -o '" + path("a/") + "'").err,
+              HasSubstr("have no plane color"));
 }
 
 TEST_F(Campaign, CtrlCLeavesWhatIsDone) {
   std::string line;
-  for (const std::string& argument : arguments("a.mcap", {"--samples", "4096"})) line += " '" + argument + "'";
+  for (const std::string& argument : arguments("a.mcap", {"--samples", "4096"}))
+    line += " '" + argument + "'";
   const Ran ran = runShell("'" TOFTWIN_PROGRAM "'" + line + " &\nwhile [ ! -e '" + path("a.mcap") +
                            "' ]; do sleep 0.01; done; kill -INT $!; wait $!");
   EXPECT_EQ(ran.status, 130);

@@ -41,10 +41,12 @@ Frame frameAt(std::uint64_t number) {
   frame.moment.exposures = {{{start}, 1_ms, 80_MHz}, {{start + 2'000'000}, 2_ms, 16_MHz}};
   frame.moment.received.ns = start + 5'000'000;
   frame.moment.temperatures = {{"sensor", 40_degC}, {"room", 23_degC}};
-  if (number % 2 == 0) frame.moment.world_from_camera = {{0.6, 0.0, 0.8, 0.0}, {1.0, 2.0, 3.0 + static_cast<double>(number)}};
-  frame.planes = {toPlane(PlaneKind::Range, std::move(range_m)),
-                  toPlane(PlaneKind::Flags, Image<std::uint8_t>{kWidth, kHeight, static_cast<std::uint8_t>(number)}),
-                  {PlaneKind::TruthNormal, ElementType::F32, kWidth, kHeight, 3, Buffer::adopt(std::move(normals))}};
+  if (number % 2 == 0)
+    frame.moment.world_from_camera = {{0.6, 0.0, 0.8, 0.0}, {1.0, 2.0, 3.0 + static_cast<double>(number)}};
+  frame.planes = {
+      toPlane(PlaneKind::Range, std::move(range_m)),
+      toPlane(PlaneKind::Flags, Image<std::uint8_t>{kWidth, kHeight, static_cast<std::uint8_t>(number)}),
+      {PlaneKind::TruthNormal, ElementType::F32, kWidth, kHeight, 3, Buffer::adopt(std::move(normals))}};
   return frame;
 }
 
@@ -60,7 +62,8 @@ Hdf5File written(const std::filesystem::path& file, std::uint64_t frames) {
 template <class T>
 std::vector<T> read(const std::filesystem::path& file, const char* dataset, hid_t type) {
   const Hdf5Id opened{H5Fopen(file.c_str(), H5F_ACC_RDONLY | H5F_ACC_SWMR_READ, H5P_DEFAULT), H5Fclose};
-  const Hdf5Id set{H5Dopen2(opened.get(), dataset, H5P_DEFAULT), H5Dclose}, space{H5Dget_space(set.get()), H5Sclose};
+  const Hdf5Id set{H5Dopen2(opened.get(), dataset, H5P_DEFAULT), H5Dclose},
+      space{H5Dget_space(set.get()), H5Sclose};
   std::vector<T> values(static_cast<std::size_t>(H5Sget_simple_extent_npoints(space.get())));
   EXPECT_GE(H5Dread(set.get(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()), 0) << dataset;
   return values;
@@ -88,13 +91,16 @@ class Hdf5 : public testing::Test {
 TEST_F(Hdf5, HoldsEveryPlaneAndWhatIsSaidAboutEachFrame) {
   ASSERT_TRUE(written(file_, 3).close());
   expectFrames(file_, 3);
-  EXPECT_THAT(read<std::uint64_t>(file_, "/frames/sequence", H5T_NATIVE_UINT64), testing::ElementsAre(0, 1, 2));
-  EXPECT_THAT(read<std::uint64_t>(file_, "/frames/dropped", H5T_NATIVE_UINT64), testing::ElementsAre(0, 1, 2));
+  EXPECT_THAT(read<std::uint64_t>(file_, "/frames/sequence", H5T_NATIVE_UINT64),
+              testing::ElementsAre(0, 1, 2));
+  EXPECT_THAT(read<std::uint64_t>(file_, "/frames/dropped", H5T_NATIVE_UINT64),
+              testing::ElementsAre(0, 1, 2));
   EXPECT_THAT(read<std::int64_t>(file_, "/frames/exposure_start_ns", H5T_NATIVE_INT64),
               testing::ElementsAre(0, 2'000'000, 33'000'000, 35'000'000, 66'000'000, 68'000'000));
   EXPECT_THAT(read<double>(file_, "/frames/exposure_modulation_hz", H5T_NATIVE_DOUBLE),
               testing::ElementsAre(80e6, 16e6, 80e6, 16e6, 80e6, 16e6));
-  EXPECT_THAT(read<double>(file_, "/frames/temperature_c", H5T_NATIVE_DOUBLE), testing::ElementsAre(40, 23, 40, 23, 40, 23));
+  EXPECT_THAT(read<double>(file_, "/frames/temperature_c", H5T_NATIVE_DOUBLE),
+              testing::ElementsAre(40, 23, 40, 23, 40, 23));
   const auto position = read<double>(file_, "/frames/position_m", H5T_NATIVE_DOUBLE);
   EXPECT_EQ(position[2], 3.0);
   EXPECT_TRUE(std::isnan(position[3])) << "not known";
@@ -107,10 +113,12 @@ TEST_F(Hdf5, IsReadByH5dump) {
   ASSERT_TRUE(written(file_, 2).close());
   const Ran dumped = runShell("h5dump -d /planes/range -H -p '" + file_.string() + "'");
   EXPECT_EQ(dumped.status, 0) << dumped.err;
-  for (const char* what : {"H5T_IEEE_F32LE", "( 2, 12, 20 ) / ( H5S_UNLIMITED, 12, 20 )", "CHUNKED ( 1, 12, 20 )", "DEFLATE"})
+  for (const char* what :
+       {"H5T_IEEE_F32LE", "( 2, 12, 20 ) / ( H5S_UNLIMITED, 12, 20 )", "CHUNKED ( 1, 12, 20 )", "DEFLATE"})
     EXPECT_THAT(dumped.out, HasSubstr(what));
   const Ran attributes = runShell("h5dump -A '" + file_.string() + "'");
-  for (const char* what : {"\"kinect\"", "\"m\"", "camera: x right, y down", "world_from_camera", "\"NaN\"", "\"1 invalid, 2 saturated"})
+  for (const char* what : {"\"kinect\"", "\"m\"", "camera: x right, y down", "world_from_camera", "\"NaN\"",
+                           "\"1 invalid, 2 saturated"})
     EXPECT_THAT(attributes.out, HasSubstr(what));
 }
 
@@ -118,9 +126,10 @@ TEST_F(Hdf5, IsReadByH5py) {
   const std::string python = "/usr/bin/python3";
   if (runShell(python + " -c 'import h5py'").status != 0) GTEST_SKIP() << "there is no h5py (python3-h5py)";
   ASSERT_TRUE(written(file_, 2).close());
-  const Ran ran = runShell(python + " -c \"import h5py; f = h5py.File('" + file_.string() +
-                           "'); print(f['planes/range'].shape, f['planes/range'][1, 1, 0], f['planes/range'].attrs['unit'], "
-                           "f.attrs['distortion'][1], f['frames/temperature_c'].attrs['sensors'])\"");
+  const Ran ran = runShell(
+      python + " -c \"import h5py; f = h5py.File('" + file_.string() +
+      "'); print(f['planes/range'].shape, f['planes/range'][1, 1, 0], f['planes/range'].attrs['unit'], "
+      "f.attrs['distortion'][1], f['frames/temperature_c'].attrs['sensors'])\"");
   EXPECT_EQ(ran.out, "(2, 12, 20) 1.996 b'm' -0.27 b'sensor, room'\n") << ran.err;
 }
 
@@ -161,8 +170,11 @@ TEST_F(Hdf5, DamagedFilesAreRefusedOrTakenOverInPart) {
   std::uint64_t state = 20'261'121;
   for (int trial = 0; trial < 60; ++trial) {
     auto bytes = whole;
-    const auto random = [&] { return state = state * 6'364'136'223'846'793'005u + 1'442'695'040'888'963'407u; };
-    for (int i = 0; i < 1 + trial % 4; ++i) bytes[(random() >> 20) % bytes.size()] ^= static_cast<std::byte>(1 + (random() >> 40) % 255);
+    const auto random = [&] {
+      return state = state * 6'364'136'223'846'793'005u + 1'442'695'040'888'963'407u;
+    };
+    for (int i = 0; i < 1 + trial % 4; ++i)
+      bytes[(random() >> 20) % bytes.size()] ^= static_cast<std::byte>(1 + (random() >> 40) % 255);
     if (trial % 5 == 0) bytes.resize((random() >> 20) % bytes.size());
     record::writeBytes(folder_ / "damaged.h5", bytes);
     auto next = Hdf5File::create(folder_ / "b.h5", frameAt(0), {});
@@ -183,7 +195,8 @@ TEST_F(Hdf5, FramesThatDoNotFitAreRefusedByName) {
   Hdf5File file = written(file_, 1);
   Frame other = frameAt(1);
   other.planes[0] = toPlane(PlaneKind::Range, Image<float>{4, 4});
-  EXPECT_THAT(file.append(other).error().message, HasSubstr("frame 1 of kinect has a plane range of another size"));
+  EXPECT_THAT(file.append(other).error().message,
+              HasSubstr("frame 1 of kinect has a plane range of another size"));
   other = frameAt(1);
   other.planes.erase(other.planes.begin() + 1);
   EXPECT_THAT(file.append(other).error().message, HasSubstr("has no plane flags"));
@@ -194,7 +207,8 @@ TEST_F(Hdf5, FramesThatDoNotFitAreRefusedByName) {
   ASSERT_TRUE(file.close());
   expectFrames(file_, 2);
   other.planes[0].width = 1000;  // says more than it holds
-  EXPECT_THAT(Hdf5File::create(folder_ / "b.h5", other, {}).error().message, HasSubstr("does not hold its pixels"));
+  EXPECT_THAT(Hdf5File::create(folder_ / "b.h5", other, {}).error().message,
+              HasSubstr("does not hold its pixels"));
   EXPECT_THAT(Hdf5File::create(folder_ / "b.h5", frameAt(0), {.planes = {PlaneKind::Depth}}).error().message,
               HasSubstr("no plane depth; they have: range, flags, truth_normal"));
 }
@@ -232,7 +246,8 @@ TEST_F(Hdf5, AFullDiskKeepsTheFramesBefore) {
 TEST_F(Hdf5, WithoutItsNameNothingIsLeft) {
   { const auto file = Hdf5File::create(file_, frameAt(0), {}); }
   EXPECT_TRUE(std::filesystem::is_empty(file_.parent_path()));
-  EXPECT_THAT(Hdf5File::create("/no/such/folder/a.h5", frameAt(0), {}).error().message, HasSubstr("is there such a folder"));
+  EXPECT_THAT(Hdf5File::create("/no/such/folder/a.h5", frameAt(0), {}).error().message,
+              HasSubstr("is there such a folder"));
 }
 
 }  // namespace

@@ -55,15 +55,16 @@ TEST(RenderingPage, ItsLinesRun) {
     std::istringstream lines{block};
     for (std::string line; std::getline(lines, line); ++run) {
       ASSERT_TRUE(line.starts_with("toftwin ")) << line;
-      const Ran ran = runShell(fmt::format("cd '{}' && '{}' {} --samples 1 --surfaces 1", (folder / "").string(),
-                                           TOFTWIN_PROGRAM, line.substr(8)));
+      const Ran ran = runShell(fmt::format("cd '{}' && '{}' {} --samples 1 --surfaces 1",
+                                           (folder / "").string(), TOFTWIN_PROGRAM, line.substr(8)));
       EXPECT_EQ(ran.status, 0) << line << "\n" << ran.err;
     }
   }
   EXPECT_EQ(run, 10);
-  for (const char* file : {"range.png", "cloud.ply", "raw.npy", "frame.h5", "desk-color.png", "desk-infrared.png", "desk-depth.png",
-                           "walk/frame-000003-flags.npy", "walk/frame-000003-range.png", "walk/frames.csv", "walk.h5",
-                           "walk.mcap", "rgbd/frame-000001-color.png", "noise.h5"})
+  for (const char* file :
+       {"range.png", "cloud.ply", "raw.npy", "frame.h5", "desk-color.png", "desk-infrared.png",
+        "desk-depth.png", "walk/frame-000003-flags.npy", "walk/frame-000003-range.png", "walk/frames.csv",
+        "walk.h5", "walk.mcap", "rgbd/frame-000001-color.png", "noise.h5"})
     EXPECT_TRUE(std::filesystem::exists(folder / file)) << file;
 }
 

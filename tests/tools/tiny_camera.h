@@ -38,7 +38,8 @@ algorithm = "n_phase"
 [[effect]]
 type = "shot_noise"
 )";
-inline constexpr const char* kRemembers = "[[effect]]\ntype = \"temporal_filter\"\n[[effect]]\ntype = \"lag\"\n";
+inline constexpr const char* kRemembers =
+    "[[effect]]\ntype = \"temporal_filter\"\n[[effect]]\ntype = \"lag\"\n";
 
 /// A box that moves before a wall.
 inline constexpr const char* kMovingScene = R"([[material]]

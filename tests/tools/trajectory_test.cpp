@@ -49,7 +49,8 @@ TEST_F(TrajectoryFile, TomlAndCsvSayTheSame) {
 }
 
 TEST_F(TrajectoryFile, APoseFileOfCompareIsOneWithoutTimes) {
-  const Trajectory trajectory = load("a.toml", "[[pose]]\neuler_deg = [0, 90, 0]\n[[pose]]\nposition_m = [0, 0, 1]\n");
+  const Trajectory trajectory =
+      load("a.toml", "[[pose]]\neuler_deg = [0, 90, 0]\n[[pose]]\nposition_m = [0, 0, 1]\n");
   EXPECT_FALSE(trajectory.has_times);
   EXPECT_EQ(scheduleOf(trajectory, 0, 50_ms)->frames, 2u);
   EXPECT_EQ(scheduleOf(trajectory, 1, 50_ms)->frames, 1u);
@@ -76,7 +77,8 @@ TEST_F(TrajectoryFile, MistakesHaveFileAndLine) {
       {head + "0,0,0,0,1,0,0\n", "a.csv:2: there are 7 fields, so q_z is missing"},
       {head + "0,0,zero,0,1,0,0,0\n", "a.csv:2: y_m = \"zero\" is not a number"},
       {head + "0,0,0,0,0,0,0,0\n", "a.csv:2: q_w, q_x, q_y, q_z are all zero"},
-      {head + "1,0,0,0,1,0,0,0\n0.5,0,0,0,1,0,0,0\n", "a.csv:3: time_s = 0.5 is not later than that of the pose before, 1"},
+      {head + "1,0,0,0,1,0,0,0\n0.5,0,0,0,1,0,0,0\n",
+       "a.csv:3: time_s = 0.5 is not later than that of the pose before, 1"},
       {head + "-1,0,0,0,1,0,0,0\n", "a.csv:2: time_s = -1 must be 0 or more"}};
   for (const auto& [text, what] : csv) EXPECT_THAT(errorOf("a.csv", text), HasSubstr(what)) << text;
   const std::pair<std::string, std::string> toml[]{
@@ -84,13 +86,15 @@ TEST_F(TrajectoryFile, MistakesHaveFileAndLine) {
       {"[[pose]]\nposition_m = [nan, 0, 0]\n", "a.toml:2: position_m"},
       {"[[pose]]\ntime_s = nan\n", "a.toml:2: time_s"},
       {"[[pose]]\nrotation_wxyz = [0, 0, 0, 0]\n", "a.toml:2: rotation_wxyz is all zeros"},
-      {"[[pose]]\nrotation_wxyz = [1, 0, 0, 0]\neuler_deg = [1, 0, 0]\n", "a.toml:3: euler_deg and rotation_wxyz"},
+      {"[[pose]]\nrotation_wxyz = [1, 0, 0, 0]\neuler_deg = [1, 0, 0]\n",
+       "a.toml:3: euler_deg and rotation_wxyz"},
       {"[[pose]]\ntime_s = 1\n[[pose]]\ntime_s = 1\n", "a.toml:4: time_s = 1 is not later"},
       {"[[pose]]\ntime_s = 1\n[[pose]]\nposition_m = [0, 0, 0]\n", "a.toml:3: this pose has no time_s"},
       {"[[pose]]\n[[pose]]\ntime_s = 1\n", "this pose has a time_s, but those before it have none"},
       {"[[pose]]\ntime = 1\n", "a.toml:2: unknown key \"time\""}};
   for (const auto& [text, what] : toml) EXPECT_THAT(errorOf("a.toml", text), HasSubstr(what)) << text;
-  EXPECT_THAT(loadTrajectory("/no/such/file.csv").error().message, HasSubstr("/no/such/file.csv: there is no such file"));
+  EXPECT_THAT(loadTrajectory("/no/such/file.csv").error().message,
+              HasSubstr("/no/such/file.csv: there is no such file"));
   EXPECT_THAT(errorOf("a.txt", "x"), HasSubstr("read from .toml or .csv"));
 }
 
@@ -102,12 +106,19 @@ FrameMaker makerOf(const std::string& camera, const Trajectory& trajectory, std:
   EXPECT_TRUE(scene) << scene.error().message;
   RenderSettings settings{.since_power_on_s = 10'800, .room_temperature_c = 23};
   settings.keys.seed = 1;
-  return {*model, *scene, trajectory, {}, *scheduleOf(trajectory, frames, model->frameInterval()), settings,
-          {PlaneKind::Range, PlaneKind::Flags, PlaneKind::TruthRange}, "tiny"};
+  return {*model,
+          *scene,
+          trajectory,
+          {},
+          *scheduleOf(trajectory, frames, model->frameInterval()),
+          settings,
+          {PlaneKind::Range, PlaneKind::Flags, PlaneKind::TruthRange},
+          "tiny"};
 }
 
 bool sameBytes(const Plane& a, const Plane& b) {
-  return a.data.size() == b.data.size() && std::memcmp(a.data.bytes().data(), b.data.bytes().data(), a.data.size()) == 0;
+  return a.data.size() == b.data.size() &&
+         std::memcmp(a.data.bytes().data(), b.data.bytes().data(), a.data.size()) == 0;
 }
 
 const FrameMaker::Watch kPatient = [](double) { return true; };
@@ -134,7 +145,8 @@ TEST_F(TrajectoryFile, FramesAreThoseOfASimulatedSourceThatMovesSo) {
     ASSERT_TRUE(ours) << ours.error().message;
     ASSERT_TRUE(theirs) << theirs.error().message;
     EXPECT_EQ(ours->moment.exposures, theirs->moment.exposures);
-    for (std::size_t i = 0; i < 3; ++i) EXPECT_TRUE(sameBytes(ours->planes[i], theirs->planes[i])) << number << " " << i;
+    for (std::size_t i = 0; i < 3; ++i)
+      EXPECT_TRUE(sameBytes(ours->planes[i], theirs->planes[i])) << number << " " << i;
   }
 }
 
@@ -148,7 +160,8 @@ TEST_F(TrajectoryFile, AFramesPoseIsThatInTheMiddleOfItsExposures) {
 }
 
 TEST_F(TrajectoryFile, BetweenPosesTheCameraTurnsSteadily) {
-  FrameMaker maker = makerOf(kTinyCamera, load("a.toml", "[[pose]]\ntime_s = 0\n"
+  FrameMaker maker = makerOf(kTinyCamera, load("a.toml",
+                                               "[[pose]]\ntime_s = 0\n"
                                                "[[pose]]\ntime_s = 1\neuler_deg = [0, 90, 0]\n"));
   const auto frame = maker.make(3, kPatient);
   ASSERT_TRUE(frame);
@@ -213,7 +226,9 @@ Frame plainFrame(const std::string& scene_text, bool freeze) {
   RenderSettings settings{.freeze = freeze};
   settings.keys.pixel_extent = 0.0;
   settings.keys.max_surfaces = 1;
-  FrameMaker maker{*model, *scene, {}, {}, *scheduleOf({}, 1, model->frameInterval()), settings, {PlaneKind::Range}, "tiny"};
+  FrameMaker maker{
+      *model, *scene, {}, {}, *scheduleOf({}, 1, model->frameInterval()), settings, {PlaneKind::Range},
+      "tiny"};
   return *maker.make(0, kPatient);
 }
 
@@ -227,7 +242,8 @@ TEST_F(TrajectoryFile, AFrozenFrameIsThatOfAWorldThatStandsStill) {
     double largest = 0.0;
     for (std::size_t i = 0; i < a.planes[0].as<float>().size(); ++i) {
       const float x = a.planes[0].as<float>()[i], y = b.planes[0].as<float>()[i];
-      largest = std::isnan(x) && std::isnan(y) ? largest : std::max(largest, static_cast<double>(std::abs(x - y)));
+      largest =
+          std::isnan(x) && std::isnan(y) ? largest : std::max(largest, static_cast<double>(std::abs(x - y)));
     }
     return largest;
   };

@@ -41,8 +41,8 @@ Result<> FrameFiles::finish() {
 }
 
 std::string FrameFiles::summary() const {
-  const std::string name = is_one_ ? output_.file
-                                   : fmt::format("{} files like {}", written_, numbered(output_.file, 0, true));
+  const std::string name =
+      is_one_ ? output_.file : fmt::format("{} files like {}", written_, numbered(output_.file, 0, true));
   return fmt::format("{}: {}", name, note_);
 }
 

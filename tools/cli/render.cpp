@@ -33,10 +33,11 @@ Result<> checkOptions(RenderOptions& options) {
   const Target target = targetOf(options);
   const bool is_folder = target.kind == TargetKind::Folder;
   if (!options.format_names.empty() && !is_folder) {
-    return Error{Error::Code::InvalidArgument,
-                 fmt::format("--format has a meaning for a folder only (-o frames/), not for -o {}, whose extension "
-                             "says it",
-                             options.output.file)};
+    return Error{
+        Error::Code::InvalidArgument,
+        fmt::format("--format has a meaning for a folder only (-o frames/), not for -o {}, whose extension "
+                    "says it",
+                    options.output.file)};
   }
   options.formats.clear();
   for (const std::string& name : options.format_names) {
@@ -49,17 +50,20 @@ Result<> checkOptions(RenderOptions& options) {
   }
   if (is_folder && options.formats.empty()) options.formats = {Format::Npy};
   if (options.images && target.kind != TargetKind::Frame) {
-    return Error{Error::Code::InvalidArgument,
-                 "--images has a meaning for one frame only; of several, -p range,amplitude,color writes the colour "
-                 "image of each"};
+    return Error{
+        Error::Code::InvalidArgument,
+        "--images has a meaning for one frame only; of several, -p range,amplitude,color writes the colour "
+        "image of each"};
   }
   if (options.overwrite && target.kind == TargetKind::Frame) {
-    return Error{Error::Code::InvalidArgument, "--overwrite has a meaning for campaigns only: one frame always "
-                                               "replaces what is there"};
+    return Error{Error::Code::InvalidArgument,
+                 "--overwrite has a meaning for campaigns only: one frame always "
+                 "replaces what is there"};
   }
   const bool stands = options.trajectory.empty();
   if (!stands && options.pose.isGiven())
-    return Error{Error::Code::InvalidArgument, "--trajectory says where the camera is; leave the options of a pose out"};
+    return Error{Error::Code::InvalidArgument,
+                 "--trajectory says where the camera is; leave the options of a pose out"};
   if (is_folder) return options.output.check(options.formats);
   if (target.kind == TargetKind::Recording) return options.output.check(std::vector<Format>{});
   return options.output.check();
@@ -99,30 +103,29 @@ void addSettings(CLI::App& app, RenderSettings& settings) {
                  "side of a pixel's footprint in pixels; 0: its central ray, no flying pixels")
       ->check(CLI::Range(0.0, 4.0))
       ->capture_default_str();
-  app.add_option("--seed", settings.keys.seed, "of the light paths and the noise")
-      ->capture_default_str();
-  app.add_option("--frame", settings.first_noise,
-                 "number of the (first) frame: another one has other noise")
+  app.add_option("--seed", settings.keys.seed, "of the light paths and the noise")->capture_default_str();
+  app.add_option("--frame", settings.first_noise, "number of the (first) frame: another one has other noise")
       ->capture_default_str();
   app.add_option("--since-power-on", settings.since_power_on_s,
                  "seconds that the camera has been on at device time 0")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  app.add_option("--ambient-klx", settings.ambient_klx,
-                 "ambient light at the scene, in kilolux")
+  app.add_option("--ambient-klx", settings.ambient_klx, "ambient light at the scene, in kilolux")
       ->check(CLI::Range(0.0, 200.0))
       ->capture_default_str();
   app.add_option("--room-temperature-c", settings.room_temperature_c, "in degrees Celsius")
       ->check(CLI::Range(-40.0, 100.0))
       ->capture_default_str();
-  app.add_flag("--freeze", settings.freeze,
-               "within a frame nothing moves: all raw exposures get the light of the middle one. As many times "
-               "faster as there are raw exposures");
+  app.add_flag(
+      "--freeze", settings.freeze,
+      "within a frame nothing moves: all raw exposures get the light of the middle one. As many times "
+      "faster as there are raw exposures");
 }
 
 void addCampaign(CLI::App& app, RenderOptions& options) {
-  app.add_option("--trajectory", options.trajectory,
-                 "poses of the camera (.toml or .csv): between times it moves, without times each pose gives a frame");
+  app.add_option(
+      "--trajectory", options.trajectory,
+      "poses of the camera (.toml or .csv): between times it moves, without times each pose gives a frame");
   app.add_option("--frames", options.frames,
                  "how many; default: from the first pose of the trajectory to the last, or 1")
       ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{100'000'000}));
@@ -139,35 +142,36 @@ void addCampaign(CLI::App& app, RenderOptions& options) {
 }  // namespace
 
 Command renderCommand() {
-  return {
-      "render", "frames of the simulator, without a daemon; defaults as of a simulated source",
-      "  toftwin render kinect_v2 -o range.png\n"
-      "  toftwin render my_camera.toml --scene room.toml -o cloud.ply --position 0,0,-1 --look-at 0,0,2\n"
-      "  toftwin render kinect_v2 --scene room.toml -o truth.npy --plane truth_range\n"
-      "  toftwin render kinect_v2 --samples 64 -o raw.npy --plane samples\n"
-      "  toftwin render kinect_v2 --scene desk.toml --samples 64 --images -o desk.png\n"
-      "  toftwin render o3d303 --scene room.toml --trajectory walk.csv -o walk/ --format png,ply\n"
-      "  toftwin render o3d303 --scene room.toml --trajectory walk.csv -o walk.h5      resumes when it was killed\n"
-      "  toftwin render o3d303 --scene room.toml --frames 1000 -o noise.mcap\n",
-      [](CLI::App& app) -> Run {
-        const auto options = std::make_shared<RenderOptions>();
-        app.add_option("CAMERA,--camera", options->camera, presetHelp())->required();
-        app.add_option("--scene", options->scene,
-                       "scene file (.toml); default: a box before a wall");
-        options->output.add(app, true);
-        app.get_option("--output")
-            ->description("file of one frame (.png .ply .npy .csv .h5), of all frames (.h5 .mcap), or a folder "
-                          "(frames/) for a file of each; several frames in .png .ply .npy .csv are numbered");
-        options->pose.add(app);
-        addCampaign(app, *options);
-        addSettings(app, options->settings);
-        app.add_flag("--images", options->images,
-                     "also FILE-infrared.png and FILE-depth.png as pictures to look at, and, for a camera with a "
-                     "colour lens, FILE-color.png from its place, FILE-color-in-depth.png and "
-                     "FILE-depth-in-color.png");
-        checkUsage(app, [options] { return checkOptions(*options); });
-        return [options] { return run(*options); };
-      }};
+  return {"render", "frames of the simulator, without a daemon; defaults as of a simulated source",
+          "  toftwin render kinect_v2 -o range.png\n"
+          "  toftwin render my_camera.toml --scene room.toml -o cloud.ply --position 0,0,-1 --look-at 0,0,2\n"
+          "  toftwin render kinect_v2 --scene room.toml -o truth.npy --plane truth_range\n"
+          "  toftwin render kinect_v2 --samples 64 -o raw.npy --plane samples\n"
+          "  toftwin render kinect_v2 --scene desk.toml --samples 64 --images -o desk.png\n"
+          "  toftwin render o3d303 --scene room.toml --trajectory walk.csv -o walk/ --format png,ply\n"
+          "  toftwin render o3d303 --scene room.toml --trajectory walk.csv -o walk.h5      resumes when it "
+          "was killed\n"
+          "  toftwin render o3d303 --scene room.toml --frames 1000 -o noise.mcap\n",
+          [](CLI::App& app) -> Run {
+            const auto options = std::make_shared<RenderOptions>();
+            app.add_option("CAMERA,--camera", options->camera, presetHelp())->required();
+            app.add_option("--scene", options->scene, "scene file (.toml); default: a box before a wall");
+            options->output.add(app, true);
+            app.get_option("--output")
+                ->description(
+                    "file of one frame (.png .ply .npy .csv .h5), of all frames (.h5 .mcap), or a folder "
+                    "(frames/) for a file of each; several frames in .png .ply .npy .csv are numbered");
+            options->pose.add(app);
+            addCampaign(app, *options);
+            addSettings(app, options->settings);
+            app.add_flag(
+                "--images", options->images,
+                "also FILE-infrared.png and FILE-depth.png as pictures to look at, and, for a camera with a "
+                "colour lens, FILE-color.png from its place, FILE-color-in-depth.png and "
+                "FILE-depth-in-color.png");
+            checkUsage(app, [options] { return checkOptions(*options); });
+            return [options] { return run(*options); };
+          }};
 }
 
 }  // namespace toftwin::cli

@@ -32,7 +32,9 @@ Result<sim::VisibleScene> loadVisibleScene(const std::string& scene) {
   return scene.empty() ? sim::parseVisible(kDefaultScene, kDefaultSceneName) : sim::loadVisible(scene);
 }
 
-bool isIn(PlaneKind kind, const std::vector<PlaneKind>& kinds) { return std::ranges::find(kinds, kind) != kinds.end(); }
+bool isIn(PlaneKind kind, const std::vector<PlaneKind>& kinds) {
+  return std::ranges::find(kinds, kind) != kinds.end();
+}
 
 /// Those of a simulated source and what was asked for besides; of a campaign exactly what was asked for.
 Result<std::vector<PlaneKind>> planesFor(const sim::SensorModel& model, const RenderOptions& options) {
@@ -46,8 +48,8 @@ Result<std::vector<PlaneKind>> planesFor(const sim::SensorModel& model, const Re
   for (const PlaneKind kind : all) names += (names.empty() ? "" : ", ") + std::string{nameOf(kind)};
   for (const PlaneKind kind : wanted) {
     if (!isIn(kind, all)) {
-      return Error{Error::Code::NotFound,
-                   fmt::format("frames of {} have no plane {}; they have: {}", model.model(), nameOf(kind), names)};
+      return Error{Error::Code::NotFound, fmt::format("frames of {} have no plane {}; they have: {}",
+                                                      model.model(), nameOf(kind), names)};
     }
     if (!isIn(kind, kinds)) kinds.push_back(kind);
   }
@@ -74,7 +76,9 @@ Result<Duration> intervalOf(const sim::SensorModel& model, double wanted_ms) {
                            model.exposureTime().in(millisecond))};
 }
 
-std::string nameOfCamera(const RenderOptions& options) { return std::filesystem::path{options.camera}.stem().string(); }
+std::string nameOfCamera(const RenderOptions& options) {
+  return std::filesystem::path{options.camera}.stem().string();
+}
 
 /// Every bit of the numbers.
 std::string hashOfPoses(const Trajectory& trajectory) {
@@ -88,7 +92,8 @@ std::string hashOfPoses(const Trajectory& trajectory) {
 
 std::string textOf(const Transform<World, Camera>& pose) {
   const Vec3d& p = pose.translation_m;
-  return fmt::format("at {}, {}, {} m, turned by {} (w, x, y, z)", p.x, p.y, p.z, fmt::join(pose.rotation_wxyz, ", "));
+  return fmt::format("at {}, {}, {} m, turned by {} (w, x, y, z)", p.x, p.y, p.z,
+                     fmt::join(pose.rotation_wxyz, ", "));
 }
 
 std::string namesOf(const std::vector<PlaneKind>& planes) {
@@ -98,8 +103,9 @@ std::string namesOf(const std::vector<PlaneKind>& planes) {
 }
 
 /// Everything that the bytes of the output depend on.
-std::vector<Input> inputsOf(const RenderOptions& options, const FrameMaker& maker, const std::string& scene_id,
-                            const Trajectory& trajectory, const std::vector<PlaneKind>& planes) {
+std::vector<Input> inputsOf(const RenderOptions& options, const FrameMaker& maker,
+                            const std::string& scene_id, const Trajectory& trajectory,
+                            const std::vector<PlaneKind>& planes) {
   const RenderSettings& settings = options.settings;
   const ExportOptions& how = options.output.how;
   const auto number = [](auto value) { return fmt::format("{}", value); };
@@ -127,9 +133,10 @@ std::vector<Input> inputsOf(const RenderOptions& options, const FrameMaker& make
   std::string formats;
   for (const std::string& name : options.format_names) formats += (formats.empty() ? "" : ", ") + name;
   const auto maybe = [](const auto& value) { return value ? fmt::format("{}", *value) : "none"; };
-  inputs.push_back({"files", fmt::format("formats {}; channel {}, scale {} mm, colours {} from {} to {}, row {}, world {}",
-                                         formats.empty() ? "default" : formats, how.channel, how.mm_per_count, how.color,
-                                         maybe(how.min), maybe(how.max), maybe(how.row), how.world)});
+  inputs.push_back(
+      {"files", fmt::format("formats {}; channel {}, scale {} mm, colours {} from {} to {}, row {}, world {}",
+                            formats.empty() ? "default" : formats, how.channel, how.mm_per_count, how.color,
+                            maybe(how.min), maybe(how.max), maybe(how.row), how.world)});
   return inputs;
 }
 
@@ -148,7 +155,8 @@ Result<Job> jobOf(const RenderOptions& options) {
   if (!scene) return scene.error();
   const auto pose = options.pose.pose();
   if (!pose) return pose.error();
-  auto trajectory = options.trajectory.empty() ? Result<Trajectory>{Trajectory{}} : loadTrajectory(options.trajectory);
+  auto trajectory =
+      options.trajectory.empty() ? Result<Trajectory>{Trajectory{}} : loadTrajectory(options.trajectory);
   if (!trajectory) return trajectory.error();
   const auto interval = intervalOf(*model, options.frame_interval_ms);
   if (!interval) return interval.error();
@@ -158,8 +166,14 @@ Result<Job> jobOf(const RenderOptions& options) {
   if (!planes) return planes.error();
   const std::string scene_id = scene->id();
   const bool is_frame = targetOf(options).kind == TargetKind::Frame;
-  FrameMaker maker{*model, *std::move(scene), *trajectory, *pose, *schedule, options.settings,
-                   tracedPlanes(*planes, options), is_frame ? model->model() : nameOfCamera(options)};
+  FrameMaker maker{*model,
+                   *std::move(scene),
+                   *trajectory,
+                   *pose,
+                   *schedule,
+                   options.settings,
+                   tracedPlanes(*planes, options),
+                   is_frame ? model->model() : nameOfCamera(options)};
   if (isIn(PlaneKind::Color, *planes)) {
     auto visible = loadVisibleScene(options.scene);
     if (!visible) return visible.error();
@@ -185,16 +199,19 @@ Result<Exit> renderCampaign(const RenderOptions& options) {
   if (!job) return job.error();
   const Target target = targetOf(options);
   if (auto made = makeFolder(target); !made) return made.error();
-  const std::vector<Input> inputs = inputsOf(options, job->maker, job->scene_id, job->trajectory, job->planes);
+  const std::vector<Input> inputs =
+      inputsOf(options, job->maker, job->scene_id, job->trajectory, job->planes);
   std::vector<std::pair<std::string, std::string>> about{{"model", job->maker.model().model()}};
   for (const Input& input : inputs) about.emplace_back("input_" + input.name, input.value);
-  const auto sink = sinkOf(target, options.formats, job->planes, options.output.how, job->maker.schedule().frames, about);
+  const auto sink =
+      sinkOf(target, options.formats, job->planes, options.output.how, job->maker.schedule().frames, about);
   const auto report = runCampaign(job->maker, *sink, inputs, filesOf(target, options.overwrite));
   if (!report) return report.error();
   const std::uint64_t all = report->rendered + report->there_already;
-  fmt::print("{}: {} frame{}{}; {}\n", options.output.file, all, all == 1 ? "" : "s",
-             report->there_already > 0 ? fmt::format(", {} of them there already", report->there_already) : "",
-             sink->note());
+  fmt::print(
+      "{}: {} frame{}{}; {}\n", options.output.file, all, all == 1 ? "" : "s",
+      report->there_already > 0 ? fmt::format(", {} of them there already", report->there_already) : "",
+      sink->note());
   return Exit::Ok;
 }
 

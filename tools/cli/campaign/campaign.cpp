@@ -89,8 +89,8 @@ class Run {
   }
 
   [[nodiscard]] Error left(const Error& error) const {
-    return {error.code, fmt::format("{}; {} of {} frames are there, and the same command goes on from there", error.message,
-                                    done_.size() - missing_ + rendered_, done_.size())};
+    return {error.code, fmt::format("{}; {} of {} frames are there, and the same command goes on from there",
+                                    error.message, done_.size() - missing_ + rendered_, done_.size())};
   }
 
   FrameMaker& maker_;
@@ -119,7 +119,8 @@ void removeLeftovers(const CampaignFiles& files) {
     std::string name = entry.path().filename().string();
     if (!name.starts_with('.') || !name.ends_with(".part") || !isOrphaned(name)) continue;
     name.erase(0, name.find_first_not_of('.'));
-    const bool is_ours = std::ranges::any_of(files.names, [&](const auto& start) { return name.starts_with(start); });
+    const bool is_ours =
+        std::ranges::any_of(files.names, [&](const auto& start) { return name.starts_with(start); });
     if (is_ours) std::filesystem::remove(entry.path(), ignored);
   }
 }

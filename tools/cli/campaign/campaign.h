@@ -20,7 +20,7 @@ struct CampaignFiles {
   std::filesystem::path manifest;
   MemoryFiles memory;
   std::vector<std::string> names;  ///< how names of files begin that are written beside the manifest
-  bool overwrite = false;  ///< replace what another campaign left there
+  bool overwrite = false;          ///< replace what another campaign left there
 };
 
 struct CampaignReport {
@@ -28,8 +28,8 @@ struct CampaignReport {
   std::uint64_t there_already = 0;
 };
 
-/// Renders the frames that are not there yet. Errors: Stopped after Ctrl-C, StorageFull, InvalidArgument where
-/// another campaign is there; what is finished stays, and the same call goes on.
+/// Renders the frames that are not there yet. Errors: Stopped after Ctrl-C, StorageFull, InvalidArgument
+/// where another campaign is there; what is finished stays, and the same call goes on.
 Result<CampaignReport> runCampaign(FrameMaker& maker, Sink& sink, const std::vector<Input>& inputs,
                                    const CampaignFiles& files);
 

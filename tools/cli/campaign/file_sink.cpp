@@ -37,8 +37,9 @@ std::string lineOf(std::uint64_t number, const Frame& frame, const std::string& 
   const Moment& moment = frame.moment;
   const Transform<World, Camera> pose = moment.world_from_camera.value_or(Transform<World, Camera>{});
   const Vec3d& t = pose.translation_m;
-  return fmt::format("{},{},{},{},{},{},{},{}\n", number, static_cast<double>(moment.exposures.front().start.ns) * 1e-9,
-                     poseTimeOf(moment).in(second), t.x, t.y, t.z, fmt::join(pose.rotation_wxyz, ","), content);
+  return fmt::format(
+      "{},{},{},{},{},{},{},{}\n", number, static_cast<double>(moment.exposures.front().start.ns) * 1e-9,
+      poseTimeOf(moment).in(second), t.x, t.y, t.z, fmt::join(pose.rotation_wxyz, ","), content);
 }
 
 /// The lines of an index, a torn last one left out.
@@ -66,7 +67,8 @@ class FileSink final : public Sink {
   Result<std::vector<bool>> open(const Frame&) override {
     lines_ = linesOf(index_);
     std::vector<bool> done(frames_, false);
-    std::erase_if(lines_, [&](const auto& line) { return line.first >= frames_ || !isWhole(line.first, line.second); });
+    std::erase_if(
+        lines_, [&](const auto& line) { return line.first >= frames_ || !isWhole(line.first, line.second); });
     for (const auto& [number, line] : lines_) done[number] = true;
     if (auto wrote = openIndex(); !wrote) return wrote.error();
     return done;
@@ -77,10 +79,11 @@ class FileSink final : public Sink {
     for (std::uint64_t number = 0; number < frames_; ++number) {
       for (const Product& product : products_) {
         if (!std::filesystem::exists(product.fileOf(number), ignored)) continue;
-        return Error{Error::Code::InvalidArgument,
-                     fmt::format("{}: there is such a file already, and no campaign that it belongs to; write "
-                                 "somewhere else, or replace it with --overwrite",
-                                 product.fileOf(number).string())};
+        return Error{
+            Error::Code::InvalidArgument,
+            fmt::format("{}: there is such a file already, and no campaign that it belongs to; write "
+                        "somewhere else, or replace it with --overwrite",
+                        product.fileOf(number).string())};
       }
     }
     return {};
@@ -157,7 +160,8 @@ std::filesystem::path Product::fileOf(std::uint64_t number) const {
   return fmt::format("{}{:0{}}{}", pattern, number, digits, suffix);
 }
 
-std::unique_ptr<Sink> fileSink(std::filesystem::path index, std::vector<Product> products, std::uint64_t frames) {
+std::unique_ptr<Sink> fileSink(std::filesystem::path index, std::vector<Product> products,
+                               std::uint64_t frames) {
   return std::make_unique<FileSink>(std::move(index), std::move(products), frames);
 }
 

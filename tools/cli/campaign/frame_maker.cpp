@@ -161,7 +161,8 @@ Frame FrameMaker::example() {
   quick.world_from_camera = *moment.world_from_camera;
   const sim::Light light = sim::trace(view_.scene(), quick);
   Frame frame = frameOf(0, moment);
-  frame.planes = sim::planesOf(model_, model_.expose(light, moment, 0, 0), light.truth, withoutColor(planes_));
+  frame.planes =
+      sim::planesOf(model_, model_.expose(light, moment, 0, 0), light.truth, withoutColor(planes_));
   if (visible_) {
     const CameraInfo lens = model_.colorLens()->color;
     const Image<std::uint8_t> black{lens.width, lens.height};

@@ -25,7 +25,7 @@ struct RenderSettings {
   double ambient_klx = 0.0;
   double room_temperature_c = 0.0;
   std::uint64_t first_noise = 0;  ///< number of the first frame, which keys its noise
-  bool freeze = false;  ///< all raw exposures of a frame see the world as it is at the middle one
+  bool freeze = false;            ///< all raw exposures of a frame see the world as it is at the middle one
 };
 
 /// What effects remember of the frame before.

@@ -41,8 +41,9 @@ std::string differences(const std::map<std::string, std::string>& there, const s
     const auto found = there.find(input.name);
     const std::string old = found == there.end() ? "(not said)" : found->second;
     if (old == input.value) continue;
-    lines += input.shown.empty() ? fmt::format("\n  {}: {} there, {} here", input.name, old, input.value)
-                                 : fmt::format("\n  {}: {} says something else than it did", input.name, input.shown);
+    lines += input.shown.empty()
+                 ? fmt::format("\n  {}: {} there, {} here", input.name, old, input.value)
+                 : fmt::format("\n  {}: {} says something else than it did", input.name, input.shown);
   }
   return lines;
 }
@@ -73,15 +74,17 @@ Manifest::~Manifest() {
   if (fd_ >= 0) ::close(fd_);
 }
 
-Result<Manifest> Manifest::open(const std::filesystem::path& file, std::vector<Input> inputs, bool overwrite) {
+Result<Manifest> Manifest::open(const std::filesystem::path& file, std::vector<Input> inputs,
+                                bool overwrite) {
   Manifest manifest{file, std::move(inputs)};
   manifest.fd_ = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
   if (manifest.fd_ < 0) return cannotWrite(file, errno);
   if (::flock(manifest.fd_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
-    return Error{Error::Code::Busy,
-                 fmt::format("{}: another `toftwin render` is writing this campaign; wait until it is through, or "
-                             "write somewhere else",
-                             file.string())};
+    return Error{
+        Error::Code::Busy,
+        fmt::format("{}: another `toftwin render` is writing this campaign; wait until it is through, or "
+                    "write somewhere else",
+                    file.string())};
   }
   std::ifstream in{file};
   std::stringstream text;
@@ -94,14 +97,16 @@ Result<Manifest> Manifest::open(const std::filesystem::path& file, std::vector<I
     return manifest;
   }
   if (overwrite) return manifest;
-  return Error{Error::Code::InvalidArgument,
-               fmt::format("{} is of another campaign:{}\nWrite somewhere else, or replace what is there with "
-                           "--overwrite",
-                           file.string(), differences(there, manifest.inputs_))};
+  return Error{
+      Error::Code::InvalidArgument,
+      fmt::format("{} is of another campaign:{}\nWrite somewhere else, or replace what is there with "
+                  "--overwrite",
+                  file.string(), differences(there, manifest.inputs_))};
 }
 
 Result<> Manifest::write() {
-  std::string text = "# What `toftwin render` made the frames here from. The same command continues where it was stopped.\n";
+  std::string text =
+      "# What `toftwin render` made the frames here from. The same command continues where it was stopped.\n";
   for (const Input& input : inputs_) {
     if (!input.shown.empty()) text += fmt::format("# {}: {}\n", input.name, input.shown);
     text += fmt::format("{} = \"{}\"\n", input.name, input.value);

@@ -12,8 +12,8 @@ namespace toftwin::cli {
 
 /// One of the things that a campaign's frames depend on.
 struct Input {
-  std::string name;   ///< "samples_per_pixel"
-  std::string value;  ///< "4", or a content hash
+  std::string name;     ///< "samples_per_pixel"
+  std::string value;    ///< "4", or a content hash
   std::string shown{};  ///< instead of a hash, for people: the file's name
 };
 

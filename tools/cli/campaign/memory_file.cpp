@@ -53,7 +53,8 @@ struct Unpacker {
     number(width);
     number(height);
     image = Image<T>{width, height};
-    if (image.size() > 0) std::memcpy(image.pixels().data(), take(image.size() * sizeof(T)), image.size() * sizeof(T));
+    if (image.size() > 0)
+      std::memcpy(image.pixels().data(), take(image.size() * sizeof(T)), image.size() * sizeof(T));
   }
   template <class T>
   void images(std::vector<Image<T>>& all) {

@@ -25,10 +25,11 @@ std::vector<bool> firstOnes(std::uint64_t whole, std::uint64_t frames) {
 Result<> checkNothingThere(const std::filesystem::path& file) {
   std::error_code ignored;
   if (!std::filesystem::exists(file, ignored)) return {};
-  return Error{Error::Code::InvalidArgument,
-               fmt::format("{}: there is such a file already, and no campaign that it belongs to; write somewhere "
-                           "else, or replace it with --overwrite",
-                           file.string())};
+  return Error{
+      Error::Code::InvalidArgument,
+      fmt::format("{}: there is such a file already, and no campaign that it belongs to; write somewhere "
+                  "else, or replace it with --overwrite",
+                  file.string())};
 }
 
 class RecordingSink final : public Sink {
@@ -62,7 +63,9 @@ class RecordingSink final : public Sink {
     std::filesystem::remove(file_, ignored);
     return {};
   }
-  [[nodiscard]] std::string note() const override { return "a recording; `toftwin info` and `replay` read it"; }
+  [[nodiscard]] std::string note() const override {
+    return "a recording; `toftwin info` and `replay` read it";
+  }
 
  private:
   /// The writer knows the file by the name that it had at first.
@@ -77,7 +80,8 @@ class RecordingSink final : public Sink {
   Result<> create() {
     beside_ = file_.parent_path() / fmt::format(".{}.{}.part", file_.filename().string(), ::getpid());
     // Each frame is a chunk of its own, which is written at once.
-    auto created = record::Writer::create(beside_, {.chunk_time = std::chrono::milliseconds{0}, .overwrite = true});
+    auto created =
+        record::Writer::create(beside_, {.chunk_time = std::chrono::milliseconds{0}, .overwrite = true});
     if (!created) {
       return Error{Error::Code::StorageFull, named(created.error()).error().message};
     }
@@ -88,8 +92,9 @@ class RecordingSink final : public Sink {
   Result<std::uint64_t> copyWhole() {
     auto reader = record::Reader::open(file_);
     if (!reader) {
-      return Error{reader.error().code, fmt::format("{}; none of its frames can be kept: --overwrite begins anew",
-                                                    reader.error().message)};
+      return Error{
+          reader.error().code,
+          fmt::format("{}; none of its frames can be kept: --overwrite begins anew", reader.error().message)};
     }
     std::uint64_t whole = 0;
     while (whole < frames_) {
@@ -115,7 +120,8 @@ class RecordingSink final : public Sink {
 
 class Hdf5Sink final : public Sink {
  public:
-  Hdf5Sink(std::filesystem::path file, std::uint64_t frames, std::vector<std::pair<std::string, std::string>> about)
+  Hdf5Sink(std::filesystem::path file, std::uint64_t frames,
+           std::vector<std::pair<std::string, std::string>> about)
       : file_(std::move(file)), frames_(frames), about_(std::move(about)) {}
 
   Result<std::vector<bool>> open(const Frame& like) override {

@@ -20,7 +20,8 @@ class Sink {
   virtual ~Sink() = default;
   /// Error InvalidArgument where files are there that a new campaign would replace.
   [[nodiscard]] virtual Result<> checkFree() const = 0;
-  /// Which frames of this campaign are there and whole; those and no others are kept. `like` is a frame of it.
+  /// Which frames of this campaign are there and whole; those and no others are kept. `like` is a frame of
+  /// it.
   virtual Result<std::vector<bool>> open(const Frame& like) = 0;
   virtual Result<> put(std::uint64_t number, const Frame& frame) = 0;
   virtual Result<> finish() = 0;
@@ -41,7 +42,8 @@ struct Product {
 };
 
 /// Files for each frame, and a table of frames (`index`) with their times, poses and checksums.
-std::unique_ptr<Sink> fileSink(std::filesystem::path index, std::vector<Product> products, std::uint64_t frames);
+std::unique_ptr<Sink> fileSink(std::filesystem::path index, std::vector<Product> products,
+                               std::uint64_t frames);
 /// One recording of all frames with these planes.
 std::unique_ptr<Sink> recordingSink(std::filesystem::path file, std::uint64_t frames);
 /// One HDF5 file.

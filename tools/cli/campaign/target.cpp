@@ -14,11 +14,16 @@ constexpr int kDigits = 4;  // of numbered files, as `grab` numbers them
 
 const char* extensionOf(Format format) {
   switch (format) {
-    case Format::Png: return ".png";
-    case Format::Ply: return ".ply";
-    case Format::Npy: return ".npy";
-    case Format::Csv: return ".csv";
-    case Format::Hdf5: return ".h5";
+    case Format::Png:
+      return ".png";
+    case Format::Ply:
+      return ".ply";
+    case Format::Npy:
+      return ".npy";
+    case Format::Csv:
+      return ".csv";
+    case Format::Hdf5:
+      return ".h5";
   }
   return "";
 }
@@ -78,8 +83,8 @@ Result<> makeFolder(const Target& target) {
 }
 
 std::unique_ptr<Sink> sinkOf(const Target& target, const std::vector<Format>& formats,
-                             const std::vector<PlaneKind>& planes, const ExportOptions& how, std::uint64_t frames,
-                             std::vector<std::pair<std::string, std::string>> about) {
+                             const std::vector<PlaneKind>& planes, const ExportOptions& how,
+                             std::uint64_t frames, std::vector<std::pair<std::string, std::string>> about) {
   const std::filesystem::path& path = target.path;
   if (target.kind == TargetKind::Recording) return recordingSink(path, frames);
   if (target.kind == TargetKind::Hdf5) return hdf5Sink(path, frames, std::move(about));

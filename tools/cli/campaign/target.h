@@ -36,7 +36,7 @@ CampaignFiles filesOf(const Target& target, bool overwrite);
 Result<> makeFolder(const Target& target);
 
 std::unique_ptr<Sink> sinkOf(const Target& target, const std::vector<Format>& formats,
-                             const std::vector<PlaneKind>& planes, const ExportOptions& how, std::uint64_t frames,
-                             std::vector<std::pair<std::string, std::string>> about);
+                             const std::vector<PlaneKind>& planes, const ExportOptions& how,
+                             std::uint64_t frames, std::vector<std::pair<std::string, std::string>> about);
 
 }  // namespace toftwin::cli

@@ -25,8 +25,9 @@ void checkTimes(settings::Table& table, bool first, const Trajectory& before, do
     table.complain("", before.has_times ? "this pose has no time_s, but those before it have"
                                         : "this pose has a time_s, but those before it have none");
   } else if (!first && before.has_times && !(time_s > before.poses.back().time_s)) {
-    table.complain("time_s", fmt::format("= {} is not later than that of the pose before, {}; sort the poses by time",
-                                         time_s, before.poses.back().time_s));
+    table.complain("time_s",
+                   fmt::format("= {} is not later than that of the pose before, {}; sort the poses by time",
+                               time_s, before.poses.back().time_s));
   }
 }
 
@@ -61,16 +62,18 @@ Result<Trajectory> loadTrajectory(const std::filesystem::path& file) {
 }
 
 Result<Schedule> scheduleOf(const Trajectory& trajectory, std::uint64_t frames, Duration frame_interval) {
-  Schedule schedule{.frames = frames, .start = {}, .interval_ns = std::llround(frame_interval.in(nanosecond))};
+  Schedule schedule{
+      .frames = frames, .start = {}, .interval_ns = std::llround(frame_interval.in(nanosecond))};
   if (trajectory.poses.empty()) {
     schedule.frames = std::max<std::uint64_t>(frames, 1);
     return schedule;
   }
   if (!trajectory.has_times) {
     if (frames > trajectory.poses.size()) {
-      return Error{Error::Code::InvalidArgument,
-                   fmt::format("--frames {}: the trajectory has {} poses without time_s, and each gives one frame",
-                               frames, trajectory.poses.size())};
+      return Error{
+          Error::Code::InvalidArgument,
+          fmt::format("--frames {}: the trajectory has {} poses without time_s, and each gives one frame",
+                      frames, trajectory.poses.size())};
     }
     if (frames == 0) schedule.frames = trajectory.poses.size();
     return schedule;

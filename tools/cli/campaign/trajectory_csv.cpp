@@ -68,9 +68,10 @@ Result<Places> placesIn(const std::vector<std::string_view>& header, const Lines
     if (at != header.end()) {
       places[i] = static_cast<std::size_t>(at - header.begin());
     } else if (i > 0) {
-      return lines.error(fmt::format("the first line must name the columns; there is no {}, only: {}. Needed: {}; "
-                                     "time_s may be left out",
-                                     kColumns[i], fmt::join(header, ", "), fmt::join(kColumns, ", ")));
+      return lines.error(
+          fmt::format("the first line must name the columns; there is no {}, only: {}. Needed: {}; "
+                      "time_s may be left out",
+                      kColumns[i], fmt::join(header, ", "), fmt::join(kColumns, ", ")));
     }
   }
   return places;
@@ -81,25 +82,31 @@ Result<double> numberOf(std::string_view field, std::string_view column, double 
   const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), number);
   if (error != std::errc{} || end != field.data() + field.size())
     return lines.error(fmt::format("{} = \"{}\" is not a number", column, field));
-  if (!std::isfinite(number)) return lines.error(fmt::format("{} = {} is not a finite number", column, field));
-  if (std::abs(number) > most) return lines.error(fmt::format("{} = {} must be within ±{}", column, field, most));
+  if (!std::isfinite(number))
+    return lines.error(fmt::format("{} = {} is not a finite number", column, field));
+  if (std::abs(number) > most)
+    return lines.error(fmt::format("{} = {} must be within ±{}", column, field, most));
   return number;
 }
 
-Result<sim::Motion::Key> poseOf(const std::vector<std::string_view>& fields, const Places& places, const Lines& lines) {
+Result<sim::Motion::Key> poseOf(const std::vector<std::string_view>& fields, const Places& places,
+                                const Lines& lines) {
   std::array<double, kColumns.size()> v{};
   for (std::size_t i = 0; i < v.size(); ++i) {
     if (!places[i]) continue;
     if (*places[i] >= fields.size())
       return lines.error(fmt::format("there are {} fields, so {} is missing", fields.size(), kColumns[i]));
-    const auto number = numberOf(fields[*places[i]], kColumns[i], i == 0 ? kMostTime_s : kMostPosition_m, lines);
+    const auto number =
+        numberOf(fields[*places[i]], kColumns[i], i == 0 ? kMostTime_s : kMostPosition_m, lines);
     if (!number) return number.error();
     v[i] = *number;
   }
-  if (v[0] < 0.0) return lines.error(fmt::format("time_s = {} must be 0 or more: it counts from device time 0", v[0]));
+  if (v[0] < 0.0)
+    return lines.error(fmt::format("time_s = {} must be 0 or more: it counts from device time 0", v[0]));
   const double length = std::sqrt(v[4] * v[4] + v[5] * v[5] + v[6] * v[6] + v[7] * v[7]);
   if (!(length > 1e-6)) return lines.error("q_w, q_x, q_y, q_z are all zero, which is no rotation");
-  return sim::Motion::Key{v[0], {v[4] / length, v[5] / length, v[6] / length, v[7] / length}, {v[1], v[2], v[3]}};
+  return sim::Motion::Key{
+      v[0], {v[4] / length, v[5] / length, v[6] / length, v[7] / length}, {v[1], v[2], v[3]}};
 }
 
 }  // namespace
@@ -118,9 +125,11 @@ Result<Trajectory> loadTrajectoryCsv(const std::filesystem::path& file) {
   while (lines.next(fields)) {
     const auto pose = poseOf(fields, *places, lines);
     if (!pose) return pose.error();
-    if (trajectory.has_times && !trajectory.poses.empty() && !(pose->time_s > trajectory.poses.back().time_s)) {
-      return lines.error(fmt::format("time_s = {} is not later than that of the pose before, {}; sort the lines by time",
-                                     pose->time_s, trajectory.poses.back().time_s));
+    if (trajectory.has_times && !trajectory.poses.empty() &&
+        !(pose->time_s > trajectory.poses.back().time_s)) {
+      return lines.error(
+          fmt::format("time_s = {} is not later than that of the pose before, {}; sort the lines by time",
+                      pose->time_s, trajectory.poses.back().time_s));
     }
     trajectory.poses.push_back(*pose);
   }

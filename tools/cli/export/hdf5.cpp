@@ -35,13 +35,20 @@ void prepareLibrary() {
 
 hid_t typeOf(CellType type) {
   switch (type) {
-    case CellType::U8: return H5T_STD_U8LE;
-    case CellType::U16: return H5T_STD_U16LE;
-    case CellType::U32: return H5T_STD_U32LE;
-    case CellType::U64: return H5T_STD_U64LE;
-    case CellType::I64: return H5T_STD_I64LE;
-    case CellType::F32: return H5T_IEEE_F32LE;
-    case CellType::F64: return H5T_IEEE_F64LE;
+    case CellType::U8:
+      return H5T_STD_U8LE;
+    case CellType::U16:
+      return H5T_STD_U16LE;
+    case CellType::U32:
+      return H5T_STD_U32LE;
+    case CellType::U64:
+      return H5T_STD_U64LE;
+    case CellType::I64:
+      return H5T_STD_I64LE;
+    case CellType::F32:
+      return H5T_IEEE_F32LE;
+    case CellType::F64:
+      return H5T_IEEE_F64LE;
   }
   return H5I_INVALID_HID;
 }
@@ -76,15 +83,16 @@ bool setText(hid_t of, const std::string& name, const std::string& text) {
   const Hdf5Id type{H5Tcopy(H5T_C_S1), H5Tclose}, space{H5Screate(H5S_SCALAR), H5Sclose};
   H5Tset_cset(type.get(), H5T_CSET_UTF8);
   H5Tset_size(type.get(), text.size() + 1);  // an empty text takes one byte
-  const Hdf5Id attribute{H5Acreate2(of, name.c_str(), type.get(), space.get(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose};
+  const Hdf5Id attribute{H5Acreate2(of, name.c_str(), type.get(), space.get(), H5P_DEFAULT, H5P_DEFAULT),
+                         H5Aclose};
   return attribute && H5Awrite(attribute.get(), type.get(), text.c_str()) >= 0;
 }
 
 bool setNumbers(hid_t of, const std::string& name, const std::vector<double>& numbers) {
   const hsize_t count = numbers.size();
   const Hdf5Id space{count == 1 ? H5Screate(H5S_SCALAR) : H5Screate_simple(1, &count, nullptr), H5Sclose};
-  const Hdf5Id attribute{
-      H5Acreate2(of, name.c_str(), H5T_IEEE_F64LE, space.get(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose};
+  const Hdf5Id attribute{H5Acreate2(of, name.c_str(), H5T_IEEE_F64LE, space.get(), H5P_DEFAULT, H5P_DEFAULT),
+                         H5Aclose};
   return attribute && H5Awrite(attribute.get(), H5T_NATIVE_DOUBLE, numbers.data()) >= 0;
 }
 
@@ -134,7 +142,8 @@ Hdf5Id placeOf(hid_t set, const Column& column, std::uint64_t frame) {
   const std::vector<hsize_t> size = oneRow(column);
   std::vector<hsize_t> start(size.size(), 0);
   start[0] = frame;
-  if (!space || H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, start.data(), nullptr, size.data(), nullptr) < 0)
+  if (!space ||
+      H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, start.data(), nullptr, size.data(), nullptr) < 0)
     return {};
   return space;
 }
@@ -189,7 +198,8 @@ Result<Old> openOld(const std::filesystem::path& file, const std::vector<Column>
   Old old{{H5Fopen(file.c_str(), H5F_ACC_RDONLY | H5F_ACC_SWMR_READ, access.get()), H5Fclose}, {}, 0};
   const auto damaged = [&](const std::string& what) {
     return Error{Error::Code::Malformed,
-                 fmt::format("{}: {}, so none of its frames can be kept; --overwrite begins anew", file.string(), what)};
+                 fmt::format("{}: {}, so none of its frames can be kept; --overwrite begins anew",
+                             file.string(), what)};
   };
   if (!old.file) return damaged(fmt::format("damaged, or no HDF5 file ({})", libraryError().text));
   std::uint64_t fewest = UINT64_MAX;
@@ -261,8 +271,12 @@ Result<Hdf5File> Hdf5File::create(const std::filesystem::path& file, const Frame
   prepareLibrary();
   auto columns = columnsFor(like, options.planes);
   if (!columns) return columns.error();
-  columns->push_back({kChecksum, CellType::U32, {}, {{"meaning", "CRC-32 of the frame's cells in all other datasets, in the order "
-                                                      "of a resumed campaign's check"}}});
+  columns->push_back({kChecksum,
+                      CellType::U32,
+                      {},
+                      {{"meaning",
+                        "CRC-32 of the frame's cells in all other datasets, in the order "
+                        "of a resumed campaign's check"}}});
   auto state = std::make_unique<State>();
   state->path = file;
   state->beside = file.parent_path() / fmt::format(".{}.{}.part", file.filename().string(), ::getpid());
@@ -293,7 +307,8 @@ Result<std::uint64_t> Hdf5File::takeOver(const std::filesystem::path& from, std:
 
 Result<> Hdf5File::publish() {
   const bool is_open{state_->file};
-  if (is_open && (H5Fstart_swmr_write(state_->file.get()) < 0 || H5Fflush(state_->file.get(), H5F_SCOPE_GLOBAL) < 0))
+  if (is_open &&
+      (H5Fstart_swmr_write(state_->file.get()) < 0 || H5Fflush(state_->file.get(), H5F_SCOPE_GLOBAL) < 0))
     return state_->failed("write the file");
   if (::rename(state_->beside.c_str(), state_->path.c_str()) != 0) return cannotWrite(state_->path, errno);
   state_->is_published = true;
@@ -301,7 +316,8 @@ Result<> Hdf5File::publish() {
 }
 
 Result<> Hdf5File::append(const Frame& frame) {
-  if (!state_->file) return Error{Error::Code::StorageFull, state_->path.string() + ": writing failed before"};
+  if (!state_->file)
+    return Error{Error::Code::StorageFull, state_->path.string() + ": writing failed before"};
   const std::span<const Column> all{state_->columns};
   auto row = rowOf(frame, {all.begin(), all.end() - 1});
   if (!row) return row.error();
@@ -326,7 +342,8 @@ Result<> Hdf5File::close() {
 std::string Hdf5File::note() const {
   std::string planes;
   for (const Column& column : state_->columns) {
-    if (isPlane(column)) planes += (planes.empty() ? "" : ", ") + column.path.substr(column.path.rfind('/') + 1);
+    if (isPlane(column))
+      planes += (planes.empty() ? "" : ", ") + column.path.substr(column.path.rfind('/') + 1);
   }
   return fmt::format("HDF5, {} frame{}: {}", frames(), frames() == 1 ? "" : "s", planes);
 }

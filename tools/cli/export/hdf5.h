@@ -26,7 +26,8 @@ struct Hdf5Options {
 class Hdf5File {
  public:
   /// An empty file for frames like this one. Nothing is at `file` before publish().
-  static Result<Hdf5File> create(const std::filesystem::path& file, const Frame& like, const Hdf5Options& options);
+  static Result<Hdf5File> create(const std::filesystem::path& file, const Frame& like,
+                                 const Hdf5Options& options);
   Hdf5File(Hdf5File&&) noexcept;
   Hdf5File& operator=(Hdf5File&&) noexcept;
   /// Without publish() nothing is left of it.

@@ -45,10 +45,14 @@ std::vector<T> ofExposures(const Frame& frame, const std::function<T(const Expos
 
 const std::vector<Said<std::uint64_t>>& counts() {
   static const std::vector<Said<std::uint64_t>> kCounts{
-      {"/frames/sequence", CellType::U64, false,
+      {"/frames/sequence",
+       CellType::U64,
+       false,
        {{"meaning", "number of the frame; it counts up by one per source"}},
        [](const Frame& frame) { return std::vector{frame.sequence}; }},
-      {"/frames/dropped", CellType::U64, false,
+      {"/frames/dropped",
+       CellType::U64,
+       false,
        {{"meaning", "frames that were lost since the one before"}},
        [](const Frame& frame) { return std::vector{frame.dropped_before + frame.dropped_by_device}; }},
   };
@@ -57,12 +61,19 @@ const std::vector<Said<std::uint64_t>>& counts() {
 
 const std::vector<Said<std::int64_t>>& times() {
   static const std::vector<Said<std::int64_t>> kTimes{
-      {"/frames/received_ns", CellType::I64, false,
-       {{"unit", "ns"}, {"meaning", "when the whole frame was there, since 1970-01-01 UTC; of a rendered frame: "
-                                    "the end of its last raw exposure, on its own clock"}},
+      {"/frames/received_ns",
+       CellType::I64,
+       false,
+       {{"unit", "ns"},
+        {"meaning",
+         "when the whole frame was there, since 1970-01-01 UTC; of a rendered frame: "
+         "the end of its last raw exposure, on its own clock"}},
        [](const Frame& frame) { return std::vector{frame.moment.received.ns}; }},
-      {"/frames/exposure_start_ns", CellType::I64, true,
-       {{"unit", "ns"}, {"axes", "frame, raw exposure"},
+      {"/frames/exposure_start_ns",
+       CellType::I64,
+       true,
+       {{"unit", "ns"},
+        {"axes", "frame, raw exposure"},
         {"meaning", "when each raw exposure began, on the camera's own clock"}},
        [](const Frame& frame) {
          return ofExposures<std::int64_t>(frame, [](const Exposure& e) { return e.start.ns; });
@@ -85,35 +96,61 @@ std::vector<double> rotationOf(const Frame& frame) {
 
 const std::vector<Said<double>>& numbers() {
   static const std::vector<Said<double>> kNumbers{
-      {"/frames/exposure_duration_s", CellType::F64, true, {{"unit", "s"}, {"axes", "frame, raw exposure"}},
+      {"/frames/exposure_duration_s",
+       CellType::F64,
+       true,
+       {{"unit", "s"}, {"axes", "frame, raw exposure"}},
        [](const Frame& frame) {
          return ofExposures<double>(frame, [](const Exposure& e) { return e.duration.in(second); });
        }},
-      {"/frames/exposure_modulation_hz", CellType::F64, true,
-       {{"unit", "Hz"}, {"axes", "frame, raw exposure"}, {"meaning", "0: not modulated (gates, or ambient light)"}},
+      {"/frames/exposure_modulation_hz",
+       CellType::F64,
+       true,
+       {{"unit", "Hz"},
+        {"axes", "frame, raw exposure"},
+        {"meaning", "0: not modulated (gates, or ambient light)"}},
        [](const Frame& frame) {
          return ofExposures<double>(frame, [](const Exposure& e) { return e.modulation.in(hertz); });
        }},
-      {"/frames/position_m", CellType::F64, false,
-       {{"unit", "m"}, {"axes", "frame, xyz"}, {"frame_of_reference", "world"}, {"invalid", "NaN: not known"},
+      {"/frames/position_m",
+       CellType::F64,
+       false,
+       {{"unit", "m"},
+        {"axes", "frame, xyz"},
+        {"frame_of_reference", "world"},
+        {"invalid", "NaN: not known"},
         {"meaning", "translation of world_from_camera: where the camera's pinhole is"}},
        positionOf},
-      {"/frames/rotation_wxyz", CellType::F64, false,
-       {{"axes", "frame, wxyz"}, {"frame_of_reference", "world"}, {"invalid", "NaN: not known"},
-        {"meaning", "rotation of world_from_camera, a unit quaternion: it takes the camera's axes (x right, y "
-                    "down, z ahead) to the world's"}},
+      {"/frames/rotation_wxyz",
+       CellType::F64,
+       false,
+       {{"axes", "frame, wxyz"},
+        {"frame_of_reference", "world"},
+        {"invalid", "NaN: not known"},
+        {"meaning",
+         "rotation of world_from_camera, a unit quaternion: it takes the camera's axes (x right, y "
+         "down, z ahead) to the world's"}},
        rotationOf},
-      {"/frames/since_power_on_s", CellType::F64, false, {{"unit", "s"}, {"invalid", "NaN: not known"}},
+      {"/frames/since_power_on_s",
+       CellType::F64,
+       false,
+       {{"unit", "s"}, {"invalid", "NaN: not known"}},
        [](const Frame& frame) {
          const auto& time = frame.moment.since_power_on;
          return std::vector{time ? time->in(second) : kUnknown};
        }},
-      {"/frames/ambient_klx", CellType::F64, false, {{"unit", "klx"}, {"invalid", "NaN: not known"}},
+      {"/frames/ambient_klx",
+       CellType::F64,
+       false,
+       {{"unit", "klx"}, {"invalid", "NaN: not known"}},
        [](const Frame& frame) {
          const auto& ambient = frame.moment.ambient;
          return std::vector{ambient ? ambient->in(kilolux) : kUnknown};
        }},
-      {"/frames/temperature_c", CellType::F64, true, {{"unit", "degC"}, {"axes", "frame, sensor"}},
+      {"/frames/temperature_c",
+       CellType::F64,
+       true,
+       {{"unit", "degC"}, {"axes", "frame, sensor"}},
        [](const Frame& frame) {
          std::vector<double> all;
          for (const NamedTemperature& t : frame.moment.temperatures) all.push_back(t.value.in(celsius));
@@ -138,17 +175,28 @@ struct About {
 
 About aboutOf(PlaneKind kind) {
   switch (kind) {
-    case PlaneKind::Range: return {"distance along the pixel's ray, as measured", "NaN"};
-    case PlaneKind::Depth: return {"distance along the optical axis (z), as measured", "NaN"};
-    case PlaneKind::Amplitude: return {"of the modulated signal; electrons if simulated, else the device's unit", ""};
-    case PlaneKind::Ambient: return {"part that is not modulated, in the amplitude's unit", ""};
-    case PlaneKind::Flags: return {"bits that say why a pixel is not to be trusted", ""};
-    case PlaneKind::Samples: return {"raw correlation samples or gate charges; channel = frequency * steps + step", "NaN"};
-    case PlaneKind::Phasors: return {"demodulated; channel 2 f is the real, 2 f + 1 the imaginary part of frequency f", "NaN"};
-    case PlaneKind::TruthRange: return {"true distance along the pixel's central ray to the first surface", "NaN: none"};
-    case PlaneKind::TruthNormal: return {"true unit normal of that surface; channels x, y, z", "NaN: none"};
-    case PlaneKind::Exposure: return {"which of several exposures the pixel is of, counted from 0", ""};
-    case PlaneKind::Color: return {"sRGB; channels red, green, blue", ""};
+    case PlaneKind::Range:
+      return {"distance along the pixel's ray, as measured", "NaN"};
+    case PlaneKind::Depth:
+      return {"distance along the optical axis (z), as measured", "NaN"};
+    case PlaneKind::Amplitude:
+      return {"of the modulated signal; electrons if simulated, else the device's unit", ""};
+    case PlaneKind::Ambient:
+      return {"part that is not modulated, in the amplitude's unit", ""};
+    case PlaneKind::Flags:
+      return {"bits that say why a pixel is not to be trusted", ""};
+    case PlaneKind::Samples:
+      return {"raw correlation samples or gate charges; channel = frequency * steps + step", "NaN"};
+    case PlaneKind::Phasors:
+      return {"demodulated; channel 2 f is the real, 2 f + 1 the imaginary part of frequency f", "NaN"};
+    case PlaneKind::TruthRange:
+      return {"true distance along the pixel's central ray to the first surface", "NaN: none"};
+    case PlaneKind::TruthNormal:
+      return {"true unit normal of that surface; channels x, y, z", "NaN: none"};
+    case PlaneKind::Exposure:
+      return {"which of several exposures the pixel is of, counted from 0", ""};
+    case PlaneKind::Color:
+      return {"sRGB; channels red, green, blue", ""};
   }
   return {"", ""};
 }
@@ -166,7 +214,10 @@ Column columnOf(const Plane& plane) {
   const CellType type = plane.type == ElementType::U8    ? CellType::U8
                         : plane.type == ElementType::U16 ? CellType::U16
                                                          : CellType::F32;
-  Column column{std::string{kPlanes} + std::string{nameOf(plane.kind)}, type, {size(plane.height), size(plane.width)}, {}};
+  Column column{std::string{kPlanes} + std::string{nameOf(plane.kind)},
+                type,
+                {size(plane.height), size(plane.width)},
+                {}};
   const bool has_channels = plane.channels > 1;
   if (has_channels) column.shape.insert(column.shape.begin(), size(plane.channels));
   const About about = aboutOf(plane.kind);
@@ -180,9 +231,10 @@ Column columnOf(const Plane& plane) {
 }
 
 Error doesNotFit(const Frame& frame, const std::string& what) {
-  return {Error::Code::Incompatible,
-          fmt::format("frame {} of {} {}, unlike the first frame in this file; a recording (.mcap) can hold both",
-                      frame.sequence, frame.source, what)};
+  return {
+      Error::Code::Incompatible,
+      fmt::format("frame {} of {} {}, unlike the first frame in this file; a recording (.mcap) can hold both",
+                  frame.sequence, frame.source, what)};
 }
 
 template <class T>
@@ -195,7 +247,8 @@ Result<std::vector<std::byte>> cellOf(const Said<T>& said, const Frame& frame, c
 Result<std::vector<std::byte>> cellOf(const Frame& frame, const Column& column) {
   const auto kind = planeKindNamed(std::string_view{column.path}.substr(kPlanes.size()));
   const Plane* plane = kind ? frame.find(*kind) : nullptr;
-  if (plane == nullptr) return doesNotFit(frame, fmt::format("has no plane {}", column.path.substr(kPlanes.size())));
+  if (plane == nullptr)
+    return doesNotFit(frame, fmt::format("has no plane {}", column.path.substr(kPlanes.size())));
   if (columnOf(*plane).shape != column.shape || columnOf(*plane).type != column.type ||
       plane->data.size() != column.rowSize()) {
     return doesNotFit(frame, fmt::format("has a plane {} of another size", nameOf(*kind)));
@@ -216,11 +269,15 @@ void forAllSaid(Take take) {
 
 std::size_t sizeOf(CellType type) {
   switch (type) {
-    case CellType::U8: return 1;
-    case CellType::U16: return 2;
+    case CellType::U8:
+      return 1;
+    case CellType::U16:
+      return 2;
     case CellType::U32:
-    case CellType::F32: return 4;
-    default: return 8;
+    case CellType::F32:
+      return 4;
+    default:
+      return 8;
   }
 }
 
@@ -232,7 +289,8 @@ Result<std::vector<Column>> columnsFor(const Frame& frame, const std::vector<Pla
   std::vector<Column> columns;
   for (const Plane& plane : frame.planes) {
     if (plane.width < 1 || plane.height < 1 || plane.channels < 1 || plane.data.size() != plane.byteSize()) {
-      return Error{Error::Code::Malformed, fmt::format("plane {} does not hold its pixels", nameOf(plane.kind))};
+      return Error{Error::Code::Malformed,
+                   fmt::format("plane {} does not hold its pixels", nameOf(plane.kind))};
     }
     const bool is_wanted = planes.empty() || std::ranges::find(planes, plane.kind) != planes.end();
     if (is_wanted && frame.find(plane.kind) == &plane) columns.push_back(columnOf(plane));
@@ -247,7 +305,8 @@ Result<std::vector<Column>> columnsFor(const Frame& frame, const std::vector<Pla
     if (column.rowSize() == 0) return;
     if (column.path == "/frames/temperature_c") {
       std::string names;
-      for (const NamedTemperature& t : frame.moment.temperatures) names += (names.empty() ? "" : ", ") + t.where;
+      for (const NamedTemperature& t : frame.moment.temperatures)
+        names += (names.empty() ? "" : ", ") + t.where;
       column.attributes.emplace_back("sensors", names);
     }
     columns.push_back(std::move(column));
@@ -280,7 +339,8 @@ std::vector<std::pair<std::string, std::string>> textsOf(const Frame& frame) {
           {"kind", std::string{nameOf(from.kind)}},
           {"camera_frame", "x right, y down, z along the optical axis; metres"},
           {"pixels", "pixel (0, 0) is the centre of the top left pixel; x = column, y = row"},
-          {"lens", "pinhole fx, fy, cx, cy in pixels with the distortion k1 k2 p1 p2 k3 (Brown-Conrady, as OpenCV)"},
+          {"lens",
+           "pinhole fx, fy, cx, cy in pixels with the distortion k1 k2 p1 p2 k3 (Brown-Conrady, as OpenCV)"},
           {"calibration_id", frame.camera.calibration_id},
           {"model_id", from.model_id},
           {"scene_id", from.scene_id},
