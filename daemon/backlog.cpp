@@ -13,6 +13,16 @@ constexpr std::uint64_t kSmallestSharedBody = 64 * 1024;
 /// Of a frame beside its planes: its tables, exposures and allocations, rounded up.
 constexpr std::uint64_t kFrameOverhead = 4096;
 
+/// Why a lossless subscription cannot have even one frame.
+Error neverFits(std::uint64_t bytes, std::uint64_t byte_limit) {
+  const auto megabytes = [](std::uint64_t of) { return (of + (1u << 20) - 1) >> 20; };
+  return {Error::Code::TooLarge,
+          fmt::format("one frame takes {} MB, and a lossless subscription or recording may hold {} "
+                      "(limits.subscription_backlog_mb): ask for fewer planes, a region or a decimation, or "
+                      "raise the limit",
+                      megabytes(bytes), byte_limit >> 20)};
+}
+
 }  // namespace
 
 std::shared_ptr<const transport::SharedBody> PreparedFrame::sharedBody() const {
@@ -27,8 +37,31 @@ std::shared_ptr<const transport::SharedBody> PreparedFrame::sharedBody() const {
 
 std::uint64_t PreparedFrame::heldBytes() const { return body.bytes + kFrameOverhead; }
 
+Result<> Backlog::checkHolds(const Settings& settings, std::uint64_t plane_bytes) {
+  const std::uint64_t held = plane_bytes + kFrameOverhead;
+  const bool fits = settings.policy != wire::Policy::Lossless || held <= settings.byte_limit;
+  return fits ? Result<>{} : neverFits(held, settings.byte_limit);
+}
+
+Result<Share> Backlog::reserve(const Settings& settings, std::uint64_t plane_bytes) {
+  const std::uint64_t bytes = 2 * (plane_bytes + kFrameOverhead);
+  if (auto share = Share::of(settings.budget, bytes)) return *std::move(share);
+  return Error{Error::Code::Busy,
+               fmt::format("all subscriptions and recordings together may hold {} MB (limits.backlog_mb), of "
+                           "which {} are taken, and this one needs {} at least: end others, ask for less, or "
+                           "raise the limit",
+                           settings.budget->limit() >> 20, settings.budget->used() >> 20,
+                           (bytes + (1u << 20) - 1) >> 20)};
+}
+
+std::optional<Share> Backlog::another(std::uint64_t plane_bytes) const {
+  return Share::of(settings_.budget, plane_bytes + kFrameOverhead);
+}
+
 Backlog::Backlog(Settings settings, std::function<void()> wake)
-    : settings_(settings), wake_(std::move(wake)) {}
+    : settings_(std::move(settings)),
+      wake_(std::move(wake)),
+      counted_(*Share::of(settings_.budget, 0)) {}
 
 bool Backlog::wants(SteadyTime now) {
   const std::scoped_lock lock{mutex_};
@@ -52,20 +85,41 @@ void Backlog::push(PreparedFramePtr frame) {
     const bool was_empty = frames_.empty();
     if (settings_.policy == wire::Policy::Lossless &&
         bytes_ + frame->heldBytes() > settings_.byte_limit) {
-      end_ = Error{
-          Error::Code::Overrun,
-          fmt::format("{} frames ({} MB) wait for this lossless subscriber, which is the "
-                      "daemon's limit (limits.subscription_backlog_mb): read faster, ask for less, "
-                      "or raise the limit",
-                      frames_.size(), bytes_ >> 20)};
+      end_ = frames_.empty() ? neverFits(frame->heldBytes(), settings_.byte_limit) : overrun();
     } else {
       bytes_ += frame->heldBytes();
       frames_.push_back(std::move(frame));
       while (frames_.size() > 1 && isTooMuch()) dropOldest();
+      while (!account()) makeRoom();
     }
     if (!was_empty) return;
   }
   wake_();
+}
+
+Error Backlog::overrun() const {
+  return {Error::Code::Overrun,
+          fmt::format("{} frames ({} MB) wait for this lossless subscriber, which is the daemon's limit "
+                      "(limits.subscription_backlog_mb): read faster, ask for less, or raise the limit",
+                      frames_.size(), bytes_ >> 20)};
+}
+
+/// Counts all that waits but the oldest against the budget; false if that is too much for it.
+bool Backlog::account() {
+  const std::uint64_t oldest = frames_.empty() ? 0 : frames_.front()->heldBytes();
+  return counted_.resize(bytes_ - oldest);
+}
+
+/// The daemon holds as much as it may.
+void Backlog::makeRoom() {
+  if (settings_.policy != wire::Policy::Lossless) return dropOldest();
+  bytes_ -= frames_.back()->heldBytes();
+  frames_.pop_back();
+  end_ = Error{Error::Code::Overrun,
+               fmt::format("{} frames ({} MB) wait for this lossless subscriber, and all that wait in "
+                           "the daemon may have {} MB (limits.backlog_mb): read faster, ask for less, or "
+                           "raise the limit",
+                           frames_.size(), bytes_ >> 20, settings_.budget->limit() >> 20)};
 }
 
 bool Backlog::isTooMuch() const {
@@ -113,6 +167,7 @@ std::optional<Backlog::Item> Backlog::take() {
     Delivery delivery{std::move(frames_.front()), std::exchange(dropped_, 0)};
     frames_.pop_front();
     bytes_ -= delivery.frame->heldBytes();
+    static_cast<void>(account());  // less than before
     return delivery;
   }
   if (!end_ || end_taken_) return std::nullopt;

@@ -12,6 +12,7 @@
 #include <toftwin/frame.h>
 #include <toftwin/result.h>
 
+#include "daemon/budget.h"
 #include "daemon/clock.h"
 #include "protocol/transport/memfd.h"
 #include "protocol/wire/codec.h"
@@ -51,7 +52,16 @@ class Backlog {
     /// What may wait, whatever the policy: Lossless ends with Overrun rather than hold more, the
     /// others drop their oldest, but never their only frame.
     std::uint64_t byte_limit = 256ull << 20;
+    /// What all subscriptions together may hold; null: no bound. A subscription reserves room for one frame
+    /// that waits and one on its way; the others that wait are counted one by one, likewise.
+    std::shared_ptr<Budget> budget{};
   };
+  /// Error TooLarge: a lossless backlog with these settings would end with the first such frame.
+  static Result<> checkHolds(const Settings& settings, std::uint64_t plane_bytes);
+  /// Room in the budget for one such frame that waits and one on its way. Error Busy.
+  static Result<Share> reserve(const Settings& settings, std::uint64_t plane_bytes);
+  /// Room for one more on its way; nothing if there is too little.
+  [[nodiscard]] std::optional<Share> another(std::uint64_t plane_bytes) const;
   /// A frame to send, with the number of frames dropped since the one before.
   struct Delivery {
     PreparedFramePtr frame;
@@ -77,14 +87,18 @@ class Backlog {
   std::optional<Item> take();
 
  private:
+  [[nodiscard]] Error overrun() const;
+  [[nodiscard]] bool account();
   [[nodiscard]] bool isTooMuch() const;
   void dropOldest();
+  void makeRoom();
 
   const Settings settings_;
   const std::function<void()> wake_;
   mutable std::mutex mutex_;
   std::deque<PreparedFramePtr> frames_;
   std::uint64_t bytes_ = 0;
+  Share counted_;  ///< of the budget: all that waits but the oldest
   std::uint64_t dropped_ = 0;
   std::optional<SteadyTime> due_;
   std::optional<Error> end_;

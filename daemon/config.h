@@ -44,6 +44,7 @@ struct LimitKeys {
   int sessions = 64;
   int subscriptions_per_session = 16;
   int subscription_backlog_mb = 256;
+  int backlog_mb = 2048;
   int request_kb = 64;
   Duration handshake = 5_s;
   Duration source_stuck = 120_s;
@@ -56,6 +57,10 @@ struct LimitKeys {
     v.number("subscription_backlog_mb", subscription_backlog_mb, {1, 1'000'000},
              "what may wait for one subscription or recording, whatever its policy; beyond it a "
              "lossless one ends with Overrun, others lose their oldest frames");
+    v.number("backlog_mb", backlog_mb, {1, 1'000'000},
+             "what all subscriptions and recordings together may hold, frames on their way included. Each "
+             "reserves two of its frames and is refused with Busy if there is no room for them; when it is "
+             "used up, each keeps its newest frame only, and a lossless one ends with Overrun");
     v.number("request_kb", request_kb, {1, 1024}, "longest request that a client may send");
     v.quantity("handshake", handshake, second, {0.1, 3600},
                "a client that said no Hello by then is cut off");

@@ -11,6 +11,10 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+
+#include "daemon/thrown.h"
+
 namespace toftwin::daemon {
 namespace {
 
@@ -40,29 +44,53 @@ wire::Encoded encodeOrFailure(const wire::Message& answer) {
   return *wire::encode(wire::Failure{id, {Error::Code::Internal, encoded.error().message}});
 }
 
-/// A peer whose machine or cable went away says nothing. Without this it would hold up a lockstep
-/// source for ever: after about ten seconds of silence the kernel breaks the connection.
-void noticeVanishedPeers(Socket& socket) {
+/// A peer whose machine or cable went away says nothing. The kernel asks it while nothing is sent, and breaks
+/// the connection after so long without an answer, be it to that or to what was sent. Without the second a
+/// frame on its way would be sent again for a quarter of an hour.
+void noticeVanishedPeer(Socket& socket, std::chrono::milliseconds patience) {
   const int fd = socket.native_handle();
   const auto set = [fd](int level, int option, int value) {
     ::setsockopt(fd, level, option, &value,
                  sizeof value);  // fails on a Unix socket, which needs none
   };
+  const auto seconds = static_cast<int>(std::max<std::int64_t>(patience.count() / 1000, 1));
   set(SOL_SOCKET, SO_KEEPALIVE, 1);
-  set(IPPROTO_TCP, TCP_KEEPIDLE, 5);
-  set(IPPROTO_TCP, TCP_KEEPINTVL, 2);
-  set(IPPROTO_TCP, TCP_KEEPCNT, 3);
-}
-
-/// Keep-alives are not sent while a frame waits to be acknowledged by the peer's kernel, which would be
-/// sent again for a quarter of an hour. A lockstep source would wait as long.
-void noticeVanishedPeersWhileSending(Socket& socket) {
-  constexpr unsigned kMilliseconds = 10'000;
-  ::setsockopt(socket.native_handle(), IPPROTO_TCP, TCP_USER_TIMEOUT, &kMilliseconds,
-               sizeof kMilliseconds);  // fails on a Unix socket, which needs none
+  set(IPPROTO_TCP, TCP_KEEPIDLE, std::min(seconds, 5));
+  set(IPPROTO_TCP, TCP_KEEPINTVL, std::min(seconds, 2));
+  set(IPPROTO_TCP, TCP_USER_TIMEOUT, static_cast<int>(patience.count()));  // instead of TCP_KEEPCNT
 }
 
 }  // namespace
+
+/// Held by what a read or a write calls in the end. Should something be thrown on the way there, then
+/// nobody calls, and the connection is closed.
+struct Connection::UnderWay {
+  explicit UnderWay(std::shared_ptr<Connection> of) : connection(std::move(of)) {}
+  ~UnderWay() {
+    if (!is_over) connection->close();
+  }
+  UnderWay(const UnderWay&) = delete;
+  UnderWay& operator=(const UnderWay&) = delete;
+  const std::shared_ptr<Connection> connection;  // shared with the server and other handlers
+  bool is_over = false;
+};
+
+/// Whatever is thrown while this client is served, for want of memory or of threads, ends this client's
+/// connection and nothing else; it is told why if that is still possible.
+template <class Work>
+void Connection::guarded(Work work) noexcept {
+  try {
+    return work();
+  } catch (...) {
+    try {
+      const Error why = thrownError("serving this client");
+      spdlog::error("{}: {}; closing", name_, why.message);
+      return dismiss(why);
+    } catch (...) {
+      close();
+    }
+  }
+}
 
 Connection::Connection(Socket socket, Hub& hub, Options options, std::string name,
                        std::function<void()> on_closed)
@@ -76,7 +104,7 @@ Connection::Connection(Socket socket, Hub& hub, Options options, std::string nam
 
 void Connection::start() {
   transport::setNoDelay(socket_.socket());
-  if (!socket_.isLocal()) noticeVanishedPeers(socket_.socket());
+  if (!socket_.isLocal()) noticeVanishedPeer(socket_.socket(), options_.patience);
   // Not in the constructor: the waker holds this connection weakly, which needs one that is owned.
   session_ = std::make_unique<Session>(*hub_, sessionOptions(options_, socket_.isLocal()), waker());
   giveUpAfter(options_.handshake, [this] {
@@ -94,20 +122,27 @@ std::function<void()> Connection::waker() {
     auto self = weak.lock();
     if (!self || self->is_wake_posted_.exchange(true)) return;
     auto executor = self->socket_.socket().get_executor();
-    asio::post(executor, [self = std::move(self)] {
+    try {
+      asio::post(executor, [self] {
+        self->is_wake_posted_ = false;
+        self->guarded([&] { self->pump(); });
+      });
+    } catch (...) {
       self->is_wake_posted_ = false;
-      self->pump();
-    });
+      throw;
+    }
   };
 }
 
 void Connection::read() {
   if (is_reading_ || is_closed_ || is_last_) return;
   if (answers_.size() + session_->owed() >= kMostOwed) return;  // read again when some were sent
+  auto under_way = std::make_shared<UnderWay>(shared_from_this());
   is_reading_ = true;
-  socket_.asyncRead([self = shared_from_this()](Result<wire::Message> message) {
-    self->is_reading_ = false;
-    self->take(std::move(message));
+  socket_.asyncRead([this, under_way](Result<wire::Message> message) {
+    under_way->is_over = true;
+    is_reading_ = false;
+    guarded([&] { take(std::move(message)); });
   });
 }
 
@@ -123,7 +158,7 @@ void Connection::take(Result<wire::Message> message) {
   if (message) {
     const auto* subscribe = std::get_if<wire::Subscribe>(&*message);
     if (subscribe != nullptr && subscribe->policy == wire::Policy::Lockstep) {
-      noticeVanishedPeersWhileSending(socket_.socket());
+      noticeVanishedPeer(socket_.socket(), options_.lockstep_patience);  // it holds others up
     }
     for (wire::Message& answer : session_->handle(*message)) answers_.push_back(std::move(answer));
     if (session_->isOver()) is_last_ = true;
@@ -151,8 +186,12 @@ void Connection::pump() {
 }
 
 void Connection::send(const Session::Outgoing& outgoing) {
+  auto under_way = std::make_shared<UnderWay>(shared_from_this());
+  const auto sent = [this, under_way = std::move(under_way)](const Result<>& result) {
+    under_way->is_over = true;
+    guarded([&] { this->sent(result); });
+  };
   is_writing_ = true;
-  const auto sent = [self = shared_from_this()](const Result<>& result) { self->sent(result); };
   if (const auto* message = std::get_if<wire::Message>(&outgoing)) {
     return socket_.asyncWrite(encodeOrFailure(*message), sent);
   }
@@ -161,8 +200,8 @@ void Connection::send(const Session::Outgoing& outgoing) {
   message.frame.dropped_before = delivery.dropped_before;
   auto encoded = wire::encode(message, delivery.frame->body);
   if (!encoded) {  // it could be encoded when it was prepared, so this is a mistake in this program
-    is_writing_ = false;
-    return dismiss(encoded.error());
+    spdlog::error("{}: {}; closing", name_, encoded.error().message);
+    return close();
   }
   if (auto shared = in_shared_memory ? delivery.frame->sharedBody() : nullptr) {
     return socket_.asyncWrite(*std::move(encoded), std::move(shared), sent);
@@ -213,14 +252,16 @@ void Connection::giveUpAfter(std::chrono::milliseconds timeout, std::function<vo
   timer_.expires_after(timeout);
   timer_.async_wait(
       [self = shared_from_this(), then = std::move(then)](boost::system::error_code fault) {
-        if (!fault && !self->is_closed_) then();
+        if (!fault && !self->is_closed_) self->guarded([&] { then(); });
       });
 }
 
-void Connection::close() {
+void Connection::close() noexcept {
   if (is_closed_) return;
+  const auto kept = weak_from_this().lock();  // the server lets go of it below
   is_closed_ = true;
-  timer_.cancel();
+  boost::system::error_code ignored;
+  timer_.cancel(ignored);
   socket_.close();
   session_.reset();  // its subscriptions end now, not when the last handler has run
   if (on_closed_) std::exchange(on_closed_, nullptr)();

@@ -26,6 +26,9 @@ class Connection : public std::enable_shared_from_this<Connection> {
     std::size_t subscriptions = 16;
     std::uint32_t request_bytes = 64 * 1024;
     std::chrono::milliseconds handshake{5000};
+    /// With a peer over TCP that does not answer, or takes nothing while something is to be sent.
+    std::chrono::milliseconds patience{60'000};
+    std::chrono::milliseconds lockstep_patience{10'000};  ///< likewise, if a source waits for it
   };
 
   Connection(transport::Socket socket, Hub& hub, Options options, std::string name,
@@ -33,9 +36,13 @@ class Connection : public std::enable_shared_from_this<Connection> {
   void start();
   /// Sends the failure as the last message, after what is owed already, and closes.
   void dismiss(Error why);
-  void close();
+  void close() noexcept;
 
  private:
+  struct UnderWay;
+
+  template <class Work>
+  void guarded(Work work) noexcept;
   void read();
   void take(Result<wire::Message> message);
   void pump();

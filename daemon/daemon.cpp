@@ -8,11 +8,14 @@
 
 #include <algorithm>
 #include <csignal>
+#include <string_view>
+#include <thread>
 #include <utility>
 
 #include <toftwin/client.h>
 
 #include "daemon/notify.h"
+#include "daemon/start_signals.h"
 #include "daemon/thrown.h"
 
 namespace toftwin::daemon {
@@ -35,7 +38,8 @@ Hub::Options hubOptions(const Config& config) {
   return {.recording_folder = config.recording_folder,
           .recording = {.most_bytes = bytes(recording.max_mb),
                         .keep_free_bytes = bytes(recording.keep_free_mb)},
-          .backlog_bytes = bytes(config.keys.limits.subscription_backlog_mb)};
+          .backlog_bytes = bytes(config.keys.limits.subscription_backlog_mb),
+          .total_bytes = bytes(config.keys.limits.backlog_mb)};
 }
 
 spdlog::level::level_enum levelOf(DaemonKeys::LogLevel level) {
@@ -52,6 +56,8 @@ spdlog::level::level_enum levelOf(DaemonKeys::LogLevel level) {
   return spdlog::level::info;
 }
 
+constexpr std::chrono::milliseconds kBreath{20};
+
 bool sameListen(const ListenKeys& a, const ListenKeys& b) {
   return a.address == b.address && a.port == b.port && a.socket == b.socket;
 }
@@ -59,6 +65,8 @@ bool sameListen(const ListenKeys& a, const ListenKeys& b) {
 }  // namespace
 
 Result<std::unique_ptr<Daemon>> Daemon::start(Options options) {
+  std::optional<StartSignals> early;
+  if (options.handle_signals) early.emplace();
   auto config = loadConfig(options.config, options.drivers);
   if (!config) return config.error();
   // Sources run only once it is clear that this daemon may listen: a second one must not touch
@@ -70,6 +78,8 @@ Result<std::unique_ptr<Daemon>> Daemon::start(Options options) {
   daemon->apply(*std::move(config));
   notify::ready(daemon->statusLine());
   daemon->watch();
+  if (early && early->isReloadWanted()) daemon->reload();
+  if (early && early->isStopWanted()) daemon->stop();
   return daemon;
 }
 
@@ -139,7 +149,14 @@ void Daemon::apply(Config config) {
     return !stays;
   });
   for (ConfiguredSource& source : config.sources) {
-    if (!source.is_as_before) run(std::move(source));
+    if (source.is_as_before) continue;
+    const std::string name = source.keys.name;
+    try {
+      run(std::move(source));
+    } catch (...) {  // not among those that run, so that the next reload tries again
+      logThrown("source " + name);
+      std::erase_if(running_, [&](const Running& running) { return running.name == name; });
+    }
   }
 }
 
@@ -180,14 +197,19 @@ void Daemon::beginReload() {
   notify::reloading();
   spdlog::info("reading {} again", options_.config.string());
   // Opening a source may take its time, during which clients are served.
-  reload_ = std::async(std::launch::async, [this, running = fingerprints()] {
-    try {
-      loaded_ = loadConfig(options_.config, options_.drivers, running);
-    } catch (...) {
-      loaded_ = thrownError("reading it");
-    }
-    asio::post(io_, [this] { finishReload(); });
-  });
+  try {
+    reload_ = std::async(std::launch::async, [this, running = fingerprints()] {
+      try {
+        loaded_ = loadConfig(options_.config, options_.drivers, running);
+      } catch (...) {
+        loaded_ = thrownError("reading it");
+      }
+      asio::post(io_, [this] { finishReload(); });
+    });
+  } catch (...) {
+    logThrown("reading the configuration again");
+    notify::ready(statusLine());
+  }
 }
 
 void Daemon::finishReload() {
@@ -210,8 +232,17 @@ void Daemon::discard(std::vector<std::shared_ptr<void>> things) {
   std::erase_if(discarded_, [](const std::future<void>& one) {
     return one.wait_for(std::chrono::seconds{0}) == std::future_status::ready;
   });
-  discarded_.push_back(
-      std::async(std::launch::async, [gone = std::move(things)]() mutable { gone.clear(); }));
+  aside([gone = std::make_shared<std::vector<std::shared_ptr<void>>>(std::move(things))] { gone->clear(); });
+}
+
+/// Does it on a thread of its own; where there is none to be had, here, which keeps clients waiting.
+void Daemon::aside(std::function<void()> work) {
+  try {
+    discarded_.push_back(std::async(std::launch::async, work));
+  } catch (...) {
+    logThrown("starting a thread");
+    work();
+  }
 }
 
 // ---- running
@@ -225,6 +256,7 @@ void Daemon::handleSignals() {
 
 void Daemon::waitForSignal() {
   signals_.async_wait([this](boost::system::error_code fault, int number) {
+    is_waiting_for_signal_ = false;
     if (fault) return;
     if (number == SIGHUP) {
       beginReload();
@@ -234,9 +266,30 @@ void Daemon::waitForSignal() {
     }
     if (!is_stopping_) waitForSignal();
   });
+  is_waiting_for_signal_ = true;
 }
 
-void Daemon::run() { io_.run(); }
+/// Whatever is thrown for want of memory or threads is the matter of whom it was done for, and ends no one
+/// else's service: what listens, watches and waits for signals goes on.
+void Daemon::run() {
+  while (true) {
+    try {
+      keepGoing();
+      io_.run();
+      return;
+    } catch (...) {
+      logThrown("a handler");
+      std::this_thread::sleep_for(kBreath);  // memory may come back; and no loop at full speed
+    }
+  }
+}
+
+/// Arms again what a throw may have left unarmed.
+void Daemon::keepGoing() {
+  server_.keepAccepting();
+  if (options_.handle_signals && !is_waiting_for_signal_ && !is_stopping_) waitForSignal();
+  if (!is_watching_ && !is_stopping_) watch();
+}
 
 void Daemon::stop() {
   asio::post(io_, [this] { beginStop(); });
@@ -256,12 +309,12 @@ void Daemon::beginStop() {
     for (auto& thing : hub_.remove(running.name)) all.push_back(std::move(thing));
   }
   running_.clear();
-  discarded_.push_back(std::async(std::launch::async, [this, gone = std::move(all)]() mutable {
-    gone.clear();
+  aside([this, gone = std::make_shared<std::vector<std::shared_ptr<void>>>(std::move(all))] {
+    gone->clear();
     asio::post(io_, [this] {
       server_.shutDown({Error::Code::Stopped, "the daemon is stopping"}, [] {});
     });
-  }));
+  });
 }
 
 /// Tells systemd's watchdog that all is well: this runs, so the io thread does; and no driver has
@@ -282,8 +335,10 @@ void Daemon::watch() {
   }
   watchdog_.expires_after(*limit / 2);
   watchdog_.async_wait([this](boost::system::error_code fault) {
+    is_watching_ = false;
     if (!fault) watch();
   });
+  is_watching_ = true;
 }
 
 std::string Daemon::statusLine() const { return fmt::format("{} sources", running_.size()); }

@@ -9,6 +9,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <future>
 #include <memory>
 #include <optional>
@@ -75,6 +76,8 @@ class Daemon {
   void waitForSignal();
   void watch();
   void beginStop();
+  void keepGoing();
+  void aside(std::function<void()> work);
   void discard(std::vector<std::shared_ptr<void>> things);
   [[nodiscard]] std::vector<std::string> fingerprints() const;
   [[nodiscard]] std::string statusLine() const;
@@ -92,6 +95,8 @@ class Daemon {
   std::future<void> reload_;
   bool reload_again_ = false;
   bool is_stopping_ = false;
+  bool is_waiting_for_signal_ = false;
+  bool is_watching_ = false;
   std::vector<std::future<void>> discarded_;
 };
 

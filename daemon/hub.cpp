@@ -17,6 +17,7 @@ Hub::~Hub() {
 void Hub::setOptions(Options options) {
   const std::scoped_lock lock{mutex_};
   options_ = std::move(options);
+  budget_->setLimit(options_.total_bytes);
 }
 
 Hub::Options Hub::options() const {
@@ -86,24 +87,22 @@ void Hub::startRecording(const std::string& source, std::string_view file, Recor
   const Options now = options();
   auto path = recordingPath(now.recording_folder, file);
   if (!path) return done(path.error());
+  auto recorder = std::make_shared<Recorder>(
+      *host, *path, Recorder::Options{now.recording, now.backlog_bytes, budget_});
   std::shared_ptr<Recorder> before;  // destroyed without the lock
   {
     const std::scoped_lock lock{mutex_};
-    auto& recorder = recorders_[source];
-    if (!recorder || recorder->isFinished()) {
-      before = std::exchange(
-          recorder,
-          std::make_shared<Recorder>(
-              *host, *path, Recorder::Options{now.recording, now.backlog_bytes},
-              [done](const Result<std::filesystem::path>& opened) {
-                if (opened) return done(opened->string());
-                done(opened.error());
-              }));
-      return;
+    const auto [at, is_first] = recorders_.try_emplace(source, recorder);
+    if (!is_first && !at->second->isFinished()) {
+      return done(Error{Error::Code::Busy,
+                        fmt::format("the source \"{}\" is being recorded already; stop that first", source)});
     }
+    if (!is_first) before = std::exchange(at->second, recorder);
   }
-  done(Error{Error::Code::Busy,
-             fmt::format("the source \"{}\" is being recorded already; stop that first", source)});
+  recorder->start([done](const Result<std::filesystem::path>& opened) {
+    if (opened) return done(opened->string());
+    done(opened.error());
+  });
 }
 
 void Hub::stopRecording(const std::string& source, RecordDone done) {

@@ -25,18 +25,23 @@ class Hub {
   struct Options {
     std::filesystem::path recording_folder;  ///< empty: no recording
     record::WriterOptions recording;
-    std::uint64_t backlog_bytes = 256ull << 20;
+    std::uint64_t backlog_bytes = 256ull << 20;   ///< of one subscription or recording
+    std::uint64_t total_bytes = 2048ull << 20;    ///< of all together
   };
   using RecordDone = std::function<void(Result<std::string>)>;
 
   Hub(Options options, const Clock& clock)
-      : clock_(clock), options_(std::move(options)), began_(clock.steady()) {}
+      : clock_(clock),
+        options_(std::move(options)),
+        budget_(std::make_shared<Budget>(options_.total_bytes)),
+        began_(clock.steady()) {}
   ~Hub();
   Hub(const Hub&) = delete;
   Hub& operator=(const Hub&) = delete;
 
   void setOptions(Options options);
   [[nodiscard]] Options options() const;
+  [[nodiscard]] const std::shared_ptr<Budget>& budget() const { return budget_; }
   void add(std::shared_ptr<SourceHost> source);
   /// Takes the source (and its recording) out and stops it; it is gone when the result is
   /// destroyed.
@@ -57,6 +62,7 @@ class Hub {
   const Clock& clock_;
   mutable std::mutex mutex_;
   Options options_;
+  const std::shared_ptr<Budget> budget_;  // shared with subscriptions, which may outlive this
   const SteadyTime began_;
   std::map<std::string, std::shared_ptr<SourceHost>> sources_;  // shared with calls in progress
   std::map<std::string, std::shared_ptr<Recorder>> recorders_;  // shared with calls in progress

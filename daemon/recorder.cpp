@@ -34,24 +34,25 @@ Result<std::filesystem::path> recordingPath(const std::filesystem::path& folder,
   }
   std::filesystem::path file = folder / name;
   if (file.extension() != ".mcap") file += ".mcap";
-  std::error_code ignored;
-  if (std::filesystem::exists(file, ignored)) {
-    return Error{Error::Code::InvalidArgument,
-                 fmt::format("{} exists already and is not overwritten; choose another name",
-                             file.string())};
-  }
   return file;
 }
 
 Recorder::Recorder(std::shared_ptr<SourceHost> source, std::filesystem::path file,
-                   Options options, Done opened)
-    : source_(std::move(source)), file_(std::move(file)), options_(options) {
-  thread_ = std::jthread{[this, done = std::move(opened)] { run(done); }};
+                   Options options)
+    : source_(std::move(source)), file_(std::move(file)), options_(std::move(options)) {}
+
+void Recorder::start(Done opened) {
+  const auto shared = std::make_shared<const Done>(std::move(opened));  // with the thread
+  try {
+    thread_ = std::jthread{[this, shared] { run(*shared); }};
+  } catch (...) {
+    finish(notOpened(*shared, thrownError("starting to record")));
+  }
 }
 
 Recorder::~Recorder() {
   stop([](const Result<std::filesystem::path>&) {});
-  thread_.join();
+  if (thread_.joinable()) thread_.join();
 }
 
 void Recorder::stop(Done closed) {
@@ -83,28 +84,51 @@ bool Recorder::isSettled() const {
 
 std::string Recorder::problem() const {
   const std::scoped_lock lock{mutex_};
-  return outcome_ && !*outcome_ ? outcome_->error().message : std::string{};
+  return outcome_ && !*outcome_ && !is_told_ ? outcome_->error().message : std::string{};
 }
 
 /// Nothing that is thrown leaves the thread: the recording ends with it, the daemon does not.
-void Recorder::run(const Done& opened) {
+void Recorder::run(const Done& opened) noexcept {
+  bool is_answered = false;
+  const Done answer = [&](Result<std::filesystem::path> result) {
+    is_answered = true;
+    opened(std::move(result));
+  };
   try {
-    finish(recordUntilEnd(opened));
+    finish(recordUntilEnd(answer));
   } catch (...) {
-    finish(thrownError("recording"));
+    try {
+      const Error why = thrownError("recording");
+      finish(is_answered ? why : notOpened(answer, why));
+    } catch (...) {  // whoever waits for an answer learns it when the connection closes
+      const std::scoped_lock lock{mutex_};
+      if (!outcome_) outcome_ = Error{};
+    }
   }
 }
 
+/// Tells whoever wanted the recording why there is none, which settles it: they may start another.
+Error Recorder::notOpened(const Done& opened, Error why) {
+  {
+    const std::scoped_lock lock{mutex_};
+    outcome_ = why;
+    is_told_ = true;
+  }
+  opened(why);
+  return why;
+}
+
 Result<> Recorder::recordUntilEnd(const Done& opened) {
+  const Wish everything{{},
+                        {.policy = wire::Policy::Lossless,
+                         .byte_limit = options_.backlog_bytes,
+                         .budget = options_.budget}};
+  // Before a file is made for nothing.
+  if (auto possible = source_->check(everything); !possible) return notOpened(opened, possible.error());
   std::error_code reported_by_create;
   std::filesystem::create_directories(file_.parent_path(), reported_by_create);
   auto writer = record::Writer::create(file_, options_.file);
-  if (!writer) {
-    finish(writer.error());
-    opened(writer.error());
-    return writer.error();
-  }
-  const Wish everything{{}, {.policy = wire::Policy::Lossless, .byte_limit = options_.backlog_bytes}};
+  if (!writer) return notOpened(opened, writer.error());
   auto subscribed = source_->subscribe(everything, [work = work_] {
     {
       const std::scoped_lock lock{work->mutex};
@@ -112,11 +136,7 @@ Result<> Recorder::recordUntilEnd(const Done& opened) {
     }
     work->changed.notify_all();
   });
-  if (!subscribed) {
-    finish(subscribed.error());
-    opened(subscribed.error());
-    return subscribed.error();
-  }
+  if (!subscribed) return notOpened(opened, subscribed.error());
   struct Unsubscribe {
     SourceHost& source;
     const SubscriberPtr& subscriber;
@@ -125,7 +145,8 @@ Result<> Recorder::recordUntilEnd(const Done& opened) {
   opened(file_);
   Result<> written = writeAll(*writer, *subscribed);
   const Result<> closed = writer->close();
-  spdlog::info("{}: recorded {} frames into {}", source_->name(), writer->frames(), file_.string());
+  spdlog::info("{}: recorded {} frames into {}{}", source_->name(), writer->frames(), file_.string(),
+               writer->lost() > 0 ? fmt::format("; {} more did not fit", writer->lost()) : "");
   if (!written && written.error().code == Error::Code::StorageFull) {
     return Error{Error::Code::StorageFull,
                  fmt::format("{} (recording.max_mb = {}, recording.keep_free_mb = {})",
@@ -163,7 +184,6 @@ Result<> Recorder::writeAll(record::Writer& writer, const SubscriberPtr& subscri
 }
 
 void Recorder::finish(Result<> outcome) {
-  if (isFinished()) return;  // before `opened`, so that whoever is told may start another
   if (!outcome) {
     spdlog::error("{}: recording {}: {}", source_->name(), file_.string(), outcome.error().message);
   }
@@ -172,9 +192,9 @@ void Recorder::finish(Result<> outcome) {
   if (!outcome) result = outcome.error();
   {
     const std::scoped_lock lock{mutex_};
-    outcome_ = result;
+    if (!outcome_) outcome_ = result;
     closed = std::move(closed_);
-    is_told_ = closed != nullptr;
+    is_told_ = is_told_ || closed != nullptr;
   }
   if (closed) closed(result);
 }

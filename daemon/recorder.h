@@ -18,7 +18,7 @@
 
 namespace toftwin::daemon {
 
-/// The path of a recording in the folder. Error: the name is not a bare file name, or is taken.
+/// The path of a recording in the folder; does not look at the disk. Error: no bare file name.
 Result<std::filesystem::path> recordingPath(const std::filesystem::path& folder,
                                             std::string_view name);
 
@@ -30,13 +30,14 @@ class Recorder {
   struct Options {
     record::WriterOptions file;
     std::uint64_t backlog_bytes = 256ull << 20;  ///< what may wait to be written
+    std::shared_ptr<Budget> budget;
   };
   /// Gets the file's path, or why it could not be opened or finished.
   using Done = std::function<void(Result<std::filesystem::path>)>;
 
-  /// Starts; `opened` is called once on the recorder's thread.
-  Recorder(std::shared_ptr<SourceHost> source, std::filesystem::path file, Options options,
-           Done opened);
+  Recorder(std::shared_ptr<SourceHost> source, std::filesystem::path file, Options options);
+  /// `opened` is called once, on the recorder's thread, or at once where there is no thread to be had.
+  void start(Done opened);
   /// Stops and waits until the file is closed.
   ~Recorder();
   Recorder(const Recorder&) = delete;
@@ -48,11 +49,12 @@ class Recorder {
   [[nodiscard]] bool isFinished() const;
   /// Whether it has ended and somebody who stopped it was told how: there is nothing left to stop.
   [[nodiscard]] bool isSettled() const;
-  /// What went wrong, or empty.
+  /// What went wrong, as long as nobody was told, or empty.
   [[nodiscard]] std::string problem() const;
 
  private:
-  void run(const Done& opened);
+  void run(const Done& opened) noexcept;
+  Error notOpened(const Done& opened, Error why);
   Result<> recordUntilEnd(const Done& opened);
   Result<> writeAll(record::Writer& writer, const SubscriberPtr& subscriber);
   void finish(Result<> outcome);

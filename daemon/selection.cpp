@@ -8,6 +8,8 @@
 
 #include <toftwin/names.h>
 
+#include "protocol/wire/codec.h"
+
 namespace toftwin::daemon {
 namespace {
 
@@ -30,6 +32,29 @@ Result<Rectangle> rectangleIn(const wire::Region& region, int width, int height)
 }
 
 std::size_t countOf(std::size_t length, std::size_t step) { return (length + step - 1) / step; }
+
+std::uint64_t fewestPixelBytes(PlaneKind kind) {
+  switch (kind) {
+    case PlaneKind::Flags:
+    case PlaneKind::Exposure:
+      return sizeof(std::uint8_t);
+    case PlaneKind::Color:
+      return 3 * sizeof(std::uint8_t);
+    case PlaneKind::Samples:
+      return sizeof(std::uint16_t);
+    case PlaneKind::Phasors:
+      return 2 * sizeof(float);
+    case PlaneKind::TruthNormal:
+      return 3 * sizeof(float);
+    case PlaneKind::Range:
+    case PlaneKind::Depth:
+    case PlaneKind::Amplitude:
+    case PlaneKind::Ambient:
+    case PlaneKind::TruthRange:
+      return sizeof(float);
+  }
+  return 0;
+}
 
 Plane cut(const Plane& plane, const Rectangle& part, std::size_t step) {
   const std::size_t element = sizeOf(plane.type);
@@ -77,6 +102,28 @@ bool isWhole(const Rectangle& part, const Plane& plane, std::size_t step) {
 }
 
 }  // namespace
+
+std::uint64_t bytesOf(const Selection& selection, const CameraInfo& camera,
+                      const std::vector<PlaneKind>& planes, const PixelBytes& known) {
+  const auto part = rectangleIn(selection.region, camera.width, camera.height);
+  if (!part || selection.decimation == 0) return 0;
+  std::uint64_t of_pixel = 0;
+  for (const PlaneKind kind : selection.planes.empty() ? planes : selection.planes) {
+    const auto found = known.find(kind);
+    of_pixel += found == known.end() ? fewestPixelBytes(kind) : found->second;
+  }
+  const std::uint32_t step = selection.decimation;
+  return countOf(part->width, step) * countOf(part->height, step) * of_pixel;
+}
+
+Result<> checkFrameBytes(std::uint64_t bytes) {
+  constexpr std::uint64_t kMost = wire::Limits{}.body_bytes;
+  if (bytes <= kMost) return {};
+  return Error{Error::Code::TooLarge,
+               fmt::format("one frame has {} MiB, and a message at most {}: ask for fewer planes, a region or "
+                           "a decimation",
+                           (bytes + (1u << 20) - 1) >> 20, kMost >> 20)};
+}
 
 Result<> checkSelection(const Selection& selection, const CameraInfo& camera,
                         const std::vector<PlaneKind>& planes) {

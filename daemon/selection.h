@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <vector>
 
 #include <toftwin/frame.h>
@@ -19,6 +20,17 @@ struct Selection {
   std::uint32_t decimation = 1;
   bool operator==(const Selection&) const = default;
 };
+
+/// Bytes of each kind of plane for one pixel, as its source's last frame had them.
+using PixelBytes = std::map<PlaneKind, std::uint64_t>;
+
+/// What the planes of one frame have in all. Of a kind that is not among the known ones: by its element
+/// type and the fewest channels that it can have, which is exact for all but samples and phasors.
+std::uint64_t bytesOf(const Selection& selection, const CameraInfo& camera,
+                      const std::vector<PlaneKind>& planes, const PixelBytes& known);
+
+/// Why a frame with so many bytes in its planes cannot be sent (TooLarge), if that is so.
+Result<> checkFrameBytes(std::uint64_t bytes);
 
 /// Whether a camera with these planes can give that selection, and if not, why.
 Result<> checkSelection(const Selection& selection, const CameraInfo& camera,

@@ -6,7 +6,10 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <utility>
 #include <vector>
+
+#include "daemon/thrown.h"
 
 namespace toftwin::daemon {
 namespace {
@@ -17,13 +20,17 @@ constexpr std::chrono::milliseconds kPause{100};
 }  // namespace
 
 Server::Server(asio::io_context& io, Hub& hub, Options options)
-    : io_(io), hub_(hub), options_(options), tcp_pause_(io), unix_pause_(io) {}
+    : io_(io),
+      hub_(hub),
+      options_(options),
+      tcp_accepting_{asio::steady_timer{io}},
+      unix_accepting_{asio::steady_timer{io}} {}
 
 Result<> Server::listenTcp(const std::string& address, std::uint16_t port) {
   auto acceptor = daemon::listenTcp(io_, address, port);
   if (!acceptor) return acceptor.error();
   tcp_.emplace(*std::move(acceptor));
-  accept(*tcp_, tcp_pause_);
+  accept(*tcp_, tcp_accepting_);
   return {};
 }
 
@@ -31,7 +38,7 @@ Result<> Server::listenUnix(const std::string& path) {
   auto listener = UnixListener::open(io_, path);
   if (!listener) return listener.error();
   unix_.emplace(*std::move(listener));
-  accept(unix_->acceptor(), unix_pause_);
+  accept(unix_->acceptor(), unix_accepting_);
   return {};
 }
 
@@ -42,22 +49,57 @@ std::uint16_t Server::port() const {
 
 std::string Server::socketPath() const { return unix_ ? unix_->path().string() : std::string{}; }
 
+void Server::keepAccepting() {
+  if (is_shut_) return;
+  if (tcp_ && !*tcp_accepting_.is_under_way) accept(*tcp_, tcp_accepting_);
+  if (unix_ && !*unix_accepting_.is_under_way) accept(unix_->acceptor(), unix_accepting_);
+}
+
+/// In a handler: while it waits to be called, its listener is under way.
+class Server::UnderWay {
+ public:
+  explicit UnderWay(const Accepting& of) : flag_(of.is_under_way) { *flag_ = true; }
+  UnderWay(UnderWay&&) noexcept = default;
+  UnderWay& operator=(UnderWay&&) = delete;
+  ~UnderWay() { end(); }
+  void end() {
+    if (flag_) *std::exchange(flag_, nullptr) = false;
+  }
+
+ private:
+  std::shared_ptr<bool> flag_;
+};
+
 template <class Acceptor>
-void Server::accept(Acceptor& acceptor, asio::steady_timer& pause) {
-  acceptor.async_accept([this, &acceptor, &pause](boost::system::error_code fault, auto socket) {
+void Server::accept(Acceptor& acceptor, Accepting& accepting) {
+  acceptor.async_accept([this, &acceptor, &accepting, under_way = UnderWay{accepting}](
+                            boost::system::error_code fault, auto socket) mutable {
+    under_way.end();
     // This may have been queued before the acceptor went.
     if (is_shut_ || fault == asio::error::operation_aborted) return;
     if (fault) {
       spdlog::warn("cannot accept a client: {}; trying again", fault.message());
-      pause.expires_after(kPause);
-      pause.async_wait([this, &acceptor, &pause](boost::system::error_code stopped) {
-        if (!is_shut_ && !stopped) accept(acceptor, pause);
+      accepting.pause.expires_after(kPause);
+      accepting.pause.async_wait([this, &acceptor, &accepting, pausing = UnderWay{accepting}](
+                                     boost::system::error_code stopped) mutable {
+        pausing.end();
+        if (!is_shut_ && !stopped) accept(acceptor, accepting);
       });
       return;
     }
-    adopt(transport::Socket{std::move(socket)});
-    accept(acceptor, pause);
+    tryToAdopt(transport::Socket{std::move(socket)});
+    accept(acceptor, accepting);
   });
+}
+
+/// A client that there is no memory for is closed.
+void Server::tryToAdopt(transport::Socket socket) {
+  try {
+    adopt(std::move(socket));
+  } catch (...) {
+    logThrown("a new client");
+    if (const auto half = connections_.find(last_id_); half != connections_.end()) half->second->close();
+  }
 }
 
 void Server::adopt(transport::Socket socket) {
@@ -85,8 +127,8 @@ void Server::forget(std::uint64_t id) {
 
 void Server::shutDown(const Error& why, std::function<void()> done) {
   is_shut_ = true;
-  tcp_pause_.cancel();
-  unix_pause_.cancel();
+  tcp_accepting_.pause.cancel();
+  unix_accepting_.pause.cancel();
   boost::system::error_code ignored;
   if (tcp_) tcp_->close(ignored);
   if (unix_) unix_->acceptor().close(ignored);

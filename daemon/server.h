@@ -29,6 +29,8 @@ class Server {
   Server(boost::asio::io_context& io, Hub& hub, Options options);
   Result<> listenTcp(const std::string& address, std::uint16_t port);
   Result<> listenUnix(const std::string& path);
+  /// Accepts again where something thrown kept it from that.
+  void keepAccepting();
   /// For clients that come from now on.
   void setOptions(Options options) { options_ = options; }
 
@@ -42,8 +44,17 @@ class Server {
   void shutDown(const Error& why, std::function<void()> done);
 
  private:
+  /// Beside a listener.
+  struct Accepting {
+    boost::asio::steady_timer pause;  ///< for when accept(2) fails for want of file descriptors
+    /// Accepting or pausing. Shared with the handler, which may go without having been called.
+    std::shared_ptr<bool> is_under_way = std::make_shared<bool>(false);
+  };
+  class UnderWay;
+
   template <class Acceptor>
-  void accept(Acceptor& acceptor, boost::asio::steady_timer& pause);
+  void accept(Acceptor& acceptor, Accepting& accepting);
+  void tryToAdopt(transport::Socket socket);
   void adopt(transport::Socket socket);
   void forget(std::uint64_t id);
 
@@ -52,9 +63,8 @@ class Server {
   Options options_;
   std::optional<boost::asio::ip::tcp::acceptor> tcp_;
   std::optional<UnixListener> unix_;
-  // One for each listener, for when accept(2) fails for want of file descriptors.
-  boost::asio::steady_timer tcp_pause_;
-  boost::asio::steady_timer unix_pause_;
+  Accepting tcp_accepting_;
+  Accepting unix_accepting_;
   bool is_shut_ = false;
   std::map<std::uint64_t, std::shared_ptr<Connection>> connections_;  // shared with their handlers
   std::uint64_t last_id_ = 0;

@@ -17,7 +17,8 @@ constexpr std::uint32_t kWidestWindow = 64;
 wire::Message failure(std::uint64_t id, Error error) { return wire::Failure{id, std::move(error)}; }
 
 /// How a backlog serves the policy asked for, or why that policy makes no sense.
-Result<Backlog::Settings> backlogFor(const wire::Subscribe& request, std::uint64_t byte_limit) {
+Result<Backlog::Settings> backlogFor(const wire::Subscribe& request, std::uint64_t byte_limit,
+                                     const std::shared_ptr<Budget>& budget) {
   const auto invalid = [](std::string why) {
     return Error{Error::Code::InvalidArgument, std::move(why)};
   };
@@ -43,7 +44,8 @@ Result<Backlog::Settings> backlogFor(const wire::Subscribe& request, std::uint64
   return Backlog::Settings{.policy = request.policy,
                            .depth = request.queue,
                            .max_rate_hz = request.max_rate_hz,
-                           .byte_limit = byte_limit};
+                           .byte_limit = byte_limit,
+                           .budget = budget};
 }
 
 }  // namespace
@@ -103,16 +105,22 @@ std::optional<Session::Outgoing> Session::next() {
   return std::nullopt;
 }
 
-std::optional<Session::Outgoing> Session::nextOf(
-    std::map<std::uint64_t, Subscription>::iterator at) {
+std::optional<Session::Outgoing> Session::nextOf(Subscriptions::iterator at) {
   auto& [source, subscriber, window, on_way] = at->second;
   if (window > 0 && on_way.size() >= window) return std::nullopt;
+  // Room for the first was reserved. Without any for another, the next acknowledgement is waited for.
+  Share share;
+  if (window > 0 && !on_way.empty()) {
+    auto another = subscriber->backlog.another(subscriber->frame_bytes);
+    if (!another) return std::nullopt;
+    share = *std::move(another);
+  }
   auto item = subscriber->backlog.take();
   if (!item) return std::nullopt;
   const std::uint64_t id = at->first;
   if (auto* delivery = std::get_if<Backlog::Delivery>(&*item)) {
     last_served_ = id;
-    if (window > 0) on_way.push_back(delivery->frame->frame.sequence);
+    if (window > 0) on_way.push_back({delivery->frame->frame.sequence, std::move(share)});
     return FrameOut{id, std::move(*delivery), subscriber->wish.in_shared_memory};
   }
   source->unsubscribe(subscriber);
@@ -163,18 +171,21 @@ Session::Answers Session::on(const wire::Subscribe& request) {
   }
   auto source = hub_.find(request.source);
   if (!source) return {failure(request.id, source.error())};
-  auto backlog = backlogFor(request, hub_.options().backlog_bytes);
+  auto backlog = backlogFor(request, hub_.options().backlog_bytes, hub_.budget());
   if (!backlog) return {failure(request.id, backlog.error())};
   const Wish wish{{request.planes, request.region, request.decimation},
                   *backlog,
                   request.window > 0 && usesSharedMemory()};
-  auto subscriber = (*source)->subscribe(wish, wake_);
-  if (!subscriber) return {failure(request.id, subscriber.error())};
   const bool is_lockstep = request.policy == wire::Policy::Lockstep;
   const std::uint64_t id = ++last_subscription_;
-  const std::uint32_t window = is_lockstep ? 1 : request.window;
-  subscriptions_.emplace(id, Subscription{*std::move(source), *std::move(subscriber), window});
-  return {wire::Subscribed{request.id, id}};
+  Answers answer{wire::Subscribed{request.id, id}};
+  Subscriptions made;  // all memory first: a source must not feed a subscriber that nobody knows
+  made.emplace(id, Subscription{*source, nullptr, is_lockstep ? 1 : request.window});
+  auto subscriber = (*source)->subscribe(wish, wake_);
+  if (!subscriber) return {failure(request.id, subscriber.error())};
+  made.begin()->second.subscriber = *std::move(subscriber);
+  subscriptions_.merge(made);
+  return answer;
 }
 
 Session::Answers Session::on(const wire::Unsubscribe& request) {
@@ -194,7 +205,7 @@ Session::Answers Session::on(const wire::Acknowledge& request) {
   if (found == subscriptions_.end()) return {};
   // A client cannot have what was not sent: believing it would let it run a lockstep source ahead.
   auto& on_way = found->second.on_way;
-  const auto acknowledged = std::ranges::find(on_way, request.sequence);
+  const auto acknowledged = std::ranges::find(on_way, request.sequence, &Subscription::OnWay::sequence);
   if (acknowledged == on_way.end()) return {};
   on_way.erase(on_way.begin(), acknowledged + 1);
   found->second.source->acknowledge(found->second.subscriber, request.sequence);
@@ -215,19 +226,25 @@ Session::Answers Session::on(const wire::SetParameter& request) {
 }
 
 Session::Answers Session::on(const wire::Trigger& request) {
-  return command(request.id, request.source,
-                 [](drivers::Source& source) { return source.trigger(); });
+  auto source = hub_.find(request.source);
+  if (!source) return {failure(request.id, source.error())};
+  (*source)->trigger(owing(request.id));
+  return {};
 }
 
 Session::Answers Session::command(std::uint64_t id, const std::string& name,
                                   SourceHost::Command command) {
   auto source = hub_.find(name);
   if (!source) return {failure(id, source.error())};
-  ++owed_;
-  (*source)->post(std::move(command), [id, outbox = outbox_](const Result<>& result) {
-    outbox->put(result ? wire::Message{wire::Done{id, {}}} : failure(id, result.error()));
-  });
+  (*source)->post(std::move(command), owing(id));
   return {};
+}
+
+SourceHost::Done Session::owing(std::uint64_t id) {
+  ++owed_;
+  return [id, outbox = outbox_](const Result<>& result) {
+    outbox->put(result ? wire::Message{wire::Done{id, {}}} : failure(id, result.error()));
+  };
 }
 
 Session::Answers Session::on(const wire::Record& request) {

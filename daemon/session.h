@@ -72,9 +72,14 @@ class Session {
     std::shared_ptr<SourceHost> source;  // shared with the hub
     SubscriberPtr subscriber;
     std::uint32_t window = 0;  ///< frames that may be unacknowledged; 0: any number
-    std::deque<std::uint64_t>
-        on_way{};  ///< sequences sent but not acknowledged, if there is a window
+    struct OnWay {
+      std::uint64_t sequence = 0;
+      Share share;  ///< of the budget
+    };
+    std::deque<OnWay> on_way{};  ///< sent but not acknowledged, if there is a window
   };
+
+  using Subscriptions = std::map<std::uint64_t, Subscription>;
 
   Answers on(const wire::Hello& hello);
   Answers on(const wire::ListSources& request);
@@ -92,7 +97,9 @@ class Session {
   [[nodiscard]] bool usesSharedMemory() const;
   Answers breakOff(std::uint64_t id, Error::Code code, std::string why);
   Answers command(std::uint64_t id, const std::string& source, SourceHost::Command command);
-  std::optional<Outgoing> nextOf(std::map<std::uint64_t, Subscription>::iterator at);
+  /// What puts the answer to that request into the outbox.
+  SourceHost::Done owing(std::uint64_t id);
+  std::optional<Outgoing> nextOf(Subscriptions::iterator at);
 
   Hub& hub_;
   const Options options_;
@@ -101,7 +108,7 @@ class Session {
   std::optional<wire::Hello> client_;
   bool is_over_ = false;
   std::size_t owed_ = 0;
-  std::map<std::uint64_t, Subscription> subscriptions_;
+  Subscriptions subscriptions_;
   std::uint64_t last_subscription_ = 0;
   std::uint64_t last_served_ = 0;
 };

@@ -116,12 +116,15 @@ std::chrono::nanoseconds SourceHost::inDriverFor(SteadyTime now) const {
   return std::chrono::nanoseconds{since == 0 ? 0 : nanosecondsOf(now) - since};
 }
 
-Result<SubscriberPtr> SourceHost::subscribe(Wish wish, std::function<void()> wake) {
+Result<> SourceHost::check(const Wish& wish) const {
   const auto description = describe();
   if (!description) return description.error();
   if (auto fits = checkSelection(wish.selection, description->camera, description->planes); !fits) {
     return fits.error();
   }
+  const std::uint64_t bytes = frameBytes(wish.selection);
+  if (auto fits = checkFrameBytes(bytes); !fits) return fits.error();
+  if (auto fits = Backlog::checkHolds(wish.backlog, bytes); !fits) return fits.error();
   if (wish.backlog.policy == wire::Policy::Lockstep && !description->can_lockstep) {
     return Error{
         Error::Code::Unsupported,
@@ -129,7 +132,22 @@ Result<SubscriberPtr> SourceHost::subscribe(Wish wish, std::function<void()> wak
                     "and recordings",
                     name_)};
   }
+  return {};
+}
+
+std::uint64_t SourceHost::frameBytes(const Selection& selection) const {
+  const std::scoped_lock lock{mutex_};
+  return info_ ? bytesOf(selection, info_->camera, info_->planes, pixel_bytes_) : 0;
+}
+
+Result<SubscriberPtr> SourceHost::subscribe(Wish wish, std::function<void()> wake) {
+  if (auto possible = check(wish); !possible) return possible.error();
+  const std::uint64_t bytes = frameBytes(wish.selection);
+  auto reserved = Backlog::reserve(wish.backlog, bytes);
+  if (!reserved) return reserved.error();
   auto subscriber = std::make_shared<Subscriber>(std::move(wish), std::move(wake));
+  subscriber->frame_bytes = bytes;
+  subscriber->reserved = *std::move(reserved);
   {
     const std::scoped_lock lock{mutex_};
     if (is_stopping_) return Error{Error::Code::Stopped, "the source is being stopped"};
@@ -160,7 +178,13 @@ void SourceHost::acknowledge(const SubscriberPtr& subscriber, std::uint64_t sequ
   work_.notify_all();
 }
 
-void SourceHost::post(Command command, Done done) {
+void SourceHost::post(Command command, Done done) { post({std::move(command), std::move(done)}); }
+
+void SourceHost::trigger(Done done) {
+  post({[](drivers::Source& source) { return source.trigger(); }, std::move(done), true});
+}
+
+void SourceHost::post(Waiting waiting) {
   std::optional<Error> refused;
   {
     const std::scoped_lock lock{mutex_};
@@ -171,22 +195,25 @@ void SourceHost::post(Command command, Done done) {
           Error::Code::Busy,
           fmt::format("{} commands wait for the source \"{}\" already", kMostCommands, name_)};
     } else {
-      commands_.push_back({std::move(command), std::move(done)});
+      commands_.push_back(std::move(waiting));
     }
   }
-  if (refused) return done(*refused);
+  if (refused) return waiting.done(*refused);
   changed(true);
 }
 
-/// Something changed that the thread must look at. A source that may wait for a trigger for ever is
-/// interrupted; any other comes back by itself within a frame or a second, but a frame may take a
-/// simulator longer than a client waits for an answer, so that a command interrupts it too; but not
-/// twice in a row, or a client that sends commands all the time would keep it from making any.
+/// Something changed that the thread must look at. A source that waits for a trigger, perhaps for ever, is
+/// interrupted. Any other comes back by itself within a frame or a second; but a frame may take a simulator
+/// longer than a client waits for an answer, so that a command interrupts it too, and so does whatever
+/// changes at a triggered one. But not twice in a row, or clients that do so all the time would keep it from
+/// making any.
 void SourceHost::changed(bool is_command) {
   std::stop_source interrupt{std::nostopstate};
   {
     const std::scoped_lock lock{mutex_};
-    if (info_ && (info_->can_trigger || (is_command && !is_spared_))) interrupt = interrupt_;
+    const bool can_wait = info_ && info_->can_trigger;
+    const bool is_idle = can_wait && triggered_ == 0;
+    if (info_ && (is_idle || (!is_spared_ && (can_wait || is_command)))) interrupt = interrupt_;
   }
   interrupt.request_stop();
   work_.notify_all();
@@ -293,6 +320,7 @@ void SourceHost::runCommands() {
     }
     if (source_) {
       const Result<> done = inDriver([&] { return next.command(*source_); });
+      if (next.is_trigger && done) noteTriggered();
       noteState();  // before the answer, so that whoever asks after it sees the change
       tell(next.done, done);
       recovery_.changed(state_);
@@ -302,6 +330,11 @@ void SourceHost::runCommands() {
                  fmt::format("the source \"{}\" is not there at present", name_)});
     }
   }
+}
+
+void SourceHost::noteTriggered() {
+  const std::scoped_lock lock{mutex_};
+  ++triggered_;
 }
 
 /// Whoever asked may be unable to take the answer; that is its own matter.
@@ -395,8 +428,9 @@ void SourceHost::stopSource() {
     const Result<> stopped = inDriver([this]() -> Result<> { return source_->stop(), Result<>{}; });
     if (!stopped) noteError(stopped.error());
   }
-  is_started_ = false;
   const std::scoped_lock lock{mutex_};
+  if (is_started_) triggered_ = 0;
+  is_started_ = false;
   is_streaming_ = false;
 }
 
@@ -416,6 +450,9 @@ void SourceHost::makeFrame(const std::stop_token& stop) {
   {
     const std::scoped_lock lock{mutex_};
     is_spared_ = !frame && frame.error().code == Error::Code::Stopped;
+    // After a time without a frame, or a failure, none is in the making.
+    if (frame && triggered_ > 0) --triggered_;
+    if (!frame && !is_spared_) triggered_ = 0;
   }
   if (!frame) return onError(frame.error(), next_subscriber);
   publish(*std::move(frame));
@@ -434,6 +471,9 @@ void SourceHost::publish(Frame frame) {
     // Before anything changes: behind this nothing throws, so that no lockstep subscriber is waited for
     // to acknowledge a frame that it never got.
     takers.reserve(subscribers_.size());
+    for (const Plane& plane : frame.planes) {
+      pixel_bytes_[plane.kind] = sizeOf(plane.type) * static_cast<std::uint64_t>(plane.channels);
+    }
     frame.sequence = frames_++;
     dropped_by_device_ += frame.dropped_by_device;
     std::erase_if(subscribers_, [](const SubscriberPtr& one) { return one->backlog.hasEnded(); });

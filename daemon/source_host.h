@@ -54,6 +54,8 @@ class SourceHost {
   /// How long the source has been in one call of its driver.
   [[nodiscard]] std::chrono::nanoseconds inDriverFor(SteadyTime now) const;
 
+  /// Whether `subscribe` would take that wish, and if not, why.
+  [[nodiscard]] Result<> check(const Wish& wish) const;
   Result<SubscriberPtr> subscribe(Wish wish, std::function<void()> wake);
   void unsubscribe(const SubscriberPtr& subscriber);
   /// Waits until a frame that is just being handed out has reached everyone (microseconds, not a
@@ -63,6 +65,8 @@ class SourceHost {
   /// Runs the command between two frames; `done` is called once, on the host's thread (or at once
   /// with Busy, when too many commands wait).
   void post(Command command, Done done);
+  /// The command that asks for a frame.
+  void trigger(Done done);
   /// Asks the thread to end without waiting for it.
   void requestStop();
   /// After requestStop(), on one thread: waits until the source is closed, so that whoever lets go of
@@ -73,6 +77,7 @@ class SourceHost {
   struct Waiting {
     Command command;
     Done done;
+    bool is_trigger = false;
   };
 
   void run(const std::stop_token& stop);
@@ -84,6 +89,7 @@ class SourceHost {
   bool reopen(const std::stop_token& stop);
   void adopt(Result<std::unique_ptr<drivers::Source>> opened);
   void noteState();
+  void noteTriggered();
   bool restoreSettings();
   void adjustStreaming();
   void makeFrameOrWait(const std::stop_token& stop);
@@ -96,7 +102,9 @@ class SourceHost {
   void endAll(const Error& reason,
               std::uint64_t before = std::numeric_limits<std::uint64_t>::max());
   void noteError(const Error& error, bool is_loss = false);
+  void post(Waiting waiting);
   void changed(bool is_command = false);
+  [[nodiscard]] std::uint64_t frameBytes(const Selection& selection) const;
   [[nodiscard]] bool isWanted() const;      // with the lock held
   [[nodiscard]] bool mayMakeFrame() const;  // with the lock held
   [[nodiscard]] bool hasLockstep() const;   // with the lock held
@@ -118,10 +126,12 @@ class SourceHost {
   std::condition_variable_any work_;
   std::stop_source interrupt_;
   bool is_spared_ = false;  ///< the frame in the making was begun anew after an interruption
+  std::uint64_t triggered_ = 0;  ///< frames that were asked for and have not come yet
   std::deque<Waiting> commands_;
   std::vector<SubscriberPtr> subscribers_;
   std::uint64_t next_subscriber_ = 0;
   std::optional<drivers::SourceInfo> info_;  ///< of the source as last opened
+  PixelBytes pixel_bytes_;                   ///< of its last frame
   drivers::SourceState state_;               ///< likewise, since the last command
   bool is_there_ = false;
   bool is_streaming_ = false;

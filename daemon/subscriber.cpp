@@ -13,6 +13,9 @@ Result<PreparedFramePtr> prepare(const Frame& frame, const Selection& selection)
   if (!selected) return selected.error();
   auto prepared = std::make_shared<PreparedFrame>();
   prepared->frame = *std::move(selected);
+  std::uint64_t bytes = 0;
+  for (const Plane& plane : prepared->frame.planes) bytes += plane.data.size();
+  if (auto fits = checkFrameBytes(bytes); !fits) return fits.error();
   prepared->body = wire::encodeBody(prepared->frame.planes);
   // Once here, so that a frame that cannot be sent says why to its subscribers and costs no connection.
   const auto sendable = wire::encode(wire::FrameMessage{0, prepared->frame}, prepared->body);

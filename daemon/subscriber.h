@@ -28,6 +28,8 @@ struct Subscriber {
       : wish(std::move(wanted)), backlog(wish.backlog, std::move(wake)) {}
   const Wish wish;
   Backlog backlog;
+  std::uint64_t frame_bytes = 0;  ///< of a frame's planes, as far as it was known; set once
+  Share reserved;                 ///< of the budget; set once
   std::uint64_t number = 0;  ///< in the order in which they came; guarded by the host
   std::optional<std::uint64_t> unacknowledged;  ///< lockstep; guarded by the host
 };

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <spdlog/spdlog.h>
+
 #include <exception>
 #include <string>
 #include <string_view>
@@ -18,6 +20,15 @@ inline Error thrownError(std::string_view who) {
     return {Error::Code::Internal, threw + "an exception: " + e.what()};
   } catch (...) {
     return {Error::Code::Internal, threw + "something that is no exception of the standard library"};
+  }
+}
+
+/// In a catch (...) behind which all goes on: tells the log, if there is memory for that.
+inline void logThrown(std::string_view who) noexcept {
+  try {
+    spdlog::error("{}", thrownError(who).message);
+  } catch (...) {
+    return;
   }
 }
 

@@ -134,6 +134,8 @@ Result<> FileWriter::finishChunk() {
   if (wrote) {
     count(head);
     chunks_.push_back(std::move(index));
+  } else {
+    lost_ += open_messages_;
   }
   open_.clear();
   open_index_.clear();

@@ -30,8 +30,10 @@ class FileWriter {
   /// Adds a message of a channel that was added; `head.data` is not looked at, `pieces` are.
   Result<> write(const Message& head, std::span<const std::span<const std::byte>> pieces);
   Result<> close();
-  /// Messages in finished chunks and in the open one.
+  /// Messages in finished chunks, which are in the file, and in the open one.
   [[nodiscard]] std::uint64_t messages() const { return statistics_.messages + open_messages_; }
+  /// Messages that were taken but did not come into the file, with their chunk.
+  [[nodiscard]] std::uint64_t lost() const { return lost_; }
   /// What the file would have at most if it were closed after another message of that size, on one
   /// more channel whose record has at most `channel_bytes`.
   [[nodiscard]] std::uint64_t closedSize(std::uint64_t message_bytes,
@@ -54,7 +56,7 @@ class FileWriter {
   std::uint32_t data_crc_ = 0;
 
   Bytes open_;  // records of the open chunk
-  std::uint64_t open_messages_ = 0;
+  std::uint64_t open_messages_ = 0, lost_ = 0;
   std::uint64_t open_start_ns_ = 0, open_end_ns_ = 0;
   std::uint64_t previous_ns_ = 0;
   std::map<std::uint16_t, MessageIndex> open_index_;

@@ -44,7 +44,10 @@ class Writer {
   /// before it is kept.
   Result<> write(const Frame& frame);
   Result<> close();
+  /// Frames that are in the file, or will be once their chunk is finished.
   [[nodiscard]] std::uint64_t frames() const;
+  /// Frames that were given but are not in the file, because the chunk they were in could not be written.
+  [[nodiscard]] std::uint64_t lost() const;
 
  private:
   struct State;

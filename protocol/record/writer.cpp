@@ -50,7 +50,6 @@ struct Writer::State {
   /// One channel for each source; one more when its camera changes, because a channel says which.
   std::map<std::string, std::pair<CameraInfo, std::uint16_t>> channels;
   WriterOptions options;
-  std::uint64_t frames = 0;
 
   Result<> checkRoomFor(std::uint64_t message_bytes) const;
   Result<std::uint16_t> channelFor(const Frame& frame) {
@@ -95,7 +94,8 @@ Result<> Writer::State::checkRoomFor(std::uint64_t message_bytes) const {
     return Error{Error::Code::StorageFull,
                  fmt::format("{}: with another frame it could be larger than the {} MB that it may "
                              "have. The recording is whole up to there: {} frames",
-                             file.path().string(), options.most_bytes >> 20, frames)};
+                             file.path().string(), options.most_bytes >> 20,
+                             file.messages())};
   }
   if (options.keep_free_bytes == 0) return {};
   const auto free = file.file().freeBytes();
@@ -107,7 +107,8 @@ Result<> Writer::State::checkRoomFor(std::uint64_t message_bytes) const {
                fmt::format("{}: with another frame less than {} MB could stay free on its disk, which "
                            "has {} MB; free space there or record somewhere else. The recording is "
                            "whole up to there: {} frames",
-                           file.path().string(), options.keep_free_bytes >> 20, *free >> 20, frames)};
+                           file.path().string(), options.keep_free_bytes >> 20, *free >> 20,
+                           file.messages())};
 }
 
 Result<> Writer::write(const Frame& frame) {
@@ -123,12 +124,11 @@ Result<> Writer::write(const Frame& frame) {
                            .log_time_ns = timestamp(frame.moment.received.ns),
                            .publish_time_ns = publishTime(frame.moment),
                            .data = {}};
-  if (auto wrote = state_->file.write(head, pieces); !wrote) return wrote;
-  ++state_->frames;
-  return {};
+  return state_->file.write(head, pieces);
 }
 
 Result<> Writer::close() { return state_->file.close(); }
-std::uint64_t Writer::frames() const { return state_->frames; }
+std::uint64_t Writer::frames() const { return state_->file.messages(); }
+std::uint64_t Writer::lost() const { return state_->file.lost(); }
 
 }  // namespace toftwin::record

@@ -63,8 +63,8 @@ struct Encoded {
   [[nodiscard]] std::uint64_t size() const { return head.size() + body.bytes; }
 };
 /// Error, naming the field: a value that `decode` would refuse (not finite, out of bounds, a plane whose
-/// bytes are not its pixels), or TooLarge. So a peer that allows the body's size can decode whatever was
-/// encoded. Only texts for people (an error's message, a detail) are cut to what the protocol allows.
+/// bytes are not its pixels), or TooLarge: beyond the default Limits, under which a peer can decode whatever
+/// was encoded. Only texts for people (an error's message, a detail) are cut to what the protocol allows.
 Result<Encoded> encode(const Message& message);
 /// A frame whose body was encoded before with `encodeBody(frame.planes)`.
 Result<Encoded> encode(const FrameMessage& message, Body body);

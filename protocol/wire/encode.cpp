@@ -158,21 +158,23 @@ std::uint64_t idOf(const M& message) {
   return 0;
 }
 
-Error tooLarge(std::size_t header_bytes) {
-  return {Error::Code::TooLarge, "this message cannot be sent: its header has " +
-                                     std::to_string(header_bytes) + " bytes, the limit is " +
-                                     std::to_string(Limits{}.header_bytes)};
+Error tooLarge(const std::string& part, std::uint64_t bytes, std::uint64_t limit) {
+  return {Error::Code::TooLarge, "this message cannot be sent: its " + part + " has " +
+                                     std::to_string(bytes) + " bytes, the limit is " +
+                                     std::to_string(limit)};
 }
 
 /// The preamble and the header of a message with the given id (position in the union).
 template <class M>
 Result<Encoded> encodeAs(std::uint8_t message_id, const M& message, Body body) {
+  constexpr Limits kLimits;
+  if (body.bytes > kLimits.body_bytes) return tooLarge("body", body.bytes, kLimits.body_bytes);
   Builder builder{1024};
   const auto table = write(builder, message);
   FinishHeaderBuffer(builder, fb::CreateHeader(builder, idOf(message),
                                                static_cast<fb::Body>(message_id), table.Union()));
   const std::size_t header_bytes = paddedToAlignment(builder.GetSize());
-  if (header_bytes > Limits{}.header_bytes) return tooLarge(header_bytes);
+  if (header_bytes > kLimits.header_bytes) return tooLarge("header", header_bytes, kLimits.header_bytes);
   Encoded encoded{std::vector<std::byte>(kPreambleSize + header_bytes), std::move(body)};
   std::memcpy(encoded.head.data() + kPreambleSize, builder.GetBufferPointer(), builder.GetSize());
   const auto header = std::span{encoded.head}.subspan(kPreambleSize);

@@ -5,6 +5,7 @@
 
 #include "daemon/subscriber.h"
 #include "fakes.h"
+#include "tests/protocol/example_messages.h"
 
 namespace toftwin::daemon {
 namespace {
@@ -90,6 +91,56 @@ TEST(Backlog, AFrameThatIsTooLargeByItselfIsKeptUntilTheNext) {
   EXPECT_EQ(backlog.heldBytes(), 0u);
 }
 
+TEST(Backlog, AFrameThatALosslessSubscriberCanNeverHoldEndsItAndSaysSo) {
+  const Backlog::Settings settings{.policy = Policy::Lossless, .byte_limit = 3ull << 20};
+  EXPECT_TRUE(Backlog::checkHolds(settings, (3ull << 20) - 4096).ok());
+  EXPECT_FALSE(Backlog::checkHolds(settings, 3ull << 20).ok());
+  EXPECT_TRUE(Backlog::checkHolds({.policy = Policy::Queue, .byte_limit = 1}, 3ull << 20).ok());
+  Backlog backlog = backlogWith(settings);
+  backlog.push(frameNumber(0, 3ull << 20));
+  const Error end = std::get<Error>(backlog.take().value());
+  EXPECT_EQ(end.code, Error::Code::TooLarge);
+  EXPECT_EQ(end.message.find("one frame takes 4 MB, and a lossless subscription or recording may hold 3"), 0u)
+      << end.message;
+}
+
+TEST(Backlog, AllTogetherHoldNoMoreThanTheBudget) {
+  const auto budget = std::make_shared<Budget>(4 * kHeld);
+  const Backlog::Settings queue{.policy = Policy::Queue, .depth = 100, .budget = budget};
+  const Backlog::Settings lossless{.policy = Policy::Lossless, .budget = budget};
+  auto reserved = Backlog::reserve(queue, frameNumber(0)->body.bytes);
+  ASSERT_TRUE(reserved.ok());
+  EXPECT_EQ(budget->used(), 2 * kHeld);
+  Backlog greedy = backlogWith(queue), other = backlogWith(queue), all = backlogWith(lossless);
+  for (std::uint64_t i = 0; i < 10; ++i) greedy.push(frameNumber(i));
+  EXPECT_EQ(budget->used(), 4 * kHeld);
+  EXPECT_EQ(greedy.heldBytes(), 3 * kHeld) << "its reserved one and the two that were left";
+  const auto refused = Backlog::reserve(queue, 64);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_EQ(refused.error().code, Error::Code::Busy);
+  EXPECT_NE(refused.error().message.find("limits.backlog_mb"), std::string::npos);
+  EXPECT_FALSE(greedy.another(64).has_value());
+  // Whoever takes what comes is served all the same.
+  for (std::uint64_t i = 0; i < 3; ++i) {
+    other.push(frameNumber(i));
+    EXPECT_EQ(delivered(other).dropped_before, 0u);
+    all.push(frameNumber(i));
+    EXPECT_EQ(delivered(all).frame->frame.sequence, i);
+  }
+  all.push(frameNumber(3));
+  all.push(frameNumber(4));
+  EXPECT_EQ(delivered(all).frame->frame.sequence, 3u);
+  const Error end = std::get<Error>(all.take().value());
+  EXPECT_EQ(end.code, Error::Code::Overrun);
+  EXPECT_NE(end.message.find("limits.backlog_mb"), std::string::npos) << end.message;
+  EXPECT_EQ(delivered(greedy).dropped_before, 7u);
+  EXPECT_EQ(budget->used(), 3 * kHeld);
+  while (greedy.take()) continue;
+  EXPECT_EQ(budget->used(), 2 * kHeld);
+  *reserved = Share{};
+  EXPECT_EQ(budget->used(), 0u);
+}
+
 TEST(Backlog, NeverHoldsMoreThanOneFrameUnderLockstep) {
   Backlog backlog = backlogWith({.policy = Policy::Lockstep});
   for (std::uint64_t i = 0; i < 3; ++i) backlog.push(frameNumber(i));
@@ -113,6 +164,24 @@ TEST(FanOut, WhatOneSelectionCannotHaveReachesTheOthers) {
   fanOut(frame, {broken, whole});
   EXPECT_EQ(std::get<Error>(broken->backlog.take().value()).code, Error::Code::Internal);
   EXPECT_EQ(delivered(whole->backlog).frame->frame.planes.size(), 1u);
+}
+
+TEST(FanOut, AFrameThatNoMessageCanHoldEndsItsSubscriptionsAndSaysWhy) {
+  Frame frame;
+  frame.camera.width = frame.camera.height = 8192;
+  frame.camera.fx = frame.camera.fy = 4;
+  const Plane range{PlaneKind::Range, ElementType::F32, 8192, 8192, 1, wire::zeros(4ull * 8192 * 8192)};
+  const Plane flags{PlaneKind::Flags, ElementType::U8, 8192, 8192, 1, wire::zeros(8192ull * 8192)};
+  frame.planes = {range, flags};
+  test::Taker taker;
+  const auto all = std::make_shared<Subscriber>(Wish{}, taker.wake());
+  const auto few = std::make_shared<Subscriber>(Wish{{.planes = {PlaneKind::Flags}, .region = {}}, {}},
+                                                taker.wake());
+  fanOut(frame, {all, few});
+  const Error end = std::get<Error>(all->backlog.take().value());
+  EXPECT_EQ(end.code, Error::Code::TooLarge);
+  EXPECT_NE(end.message.find("one frame has 320 MiB"), std::string::npos) << end.message;
+  EXPECT_EQ(delivered(few->backlog).frame->frame.planes.size(), 1u);
 }
 
 TEST(Backlog, EmptyFramesCountToo) {

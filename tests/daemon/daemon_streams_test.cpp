@@ -122,47 +122,32 @@ TEST_F(RunningDaemon, FramesThatWaitForAStalledClientHoldNoFileDescriptors) {
   EXPECT_LE(openSharedBodies(), 3);
 }
 
-TEST_F(RunningDaemon, ALockstepClientOverTcpMayVanishWhileAFrameIsSent) {
-  start(kFast);
-  const auto limited = [] {  // sockets of this process that give up after ten seconds
-    int count = 0;
-    for (int fd = 0; fd < 256; ++fd) {
-      unsigned timeout = 0;
-      socklen_t size = sizeof timeout;
-      if (::getsockopt(fd, IPPROTO_TCP, TCP_USER_TIMEOUT, &timeout, &size) == 0 &&
-          timeout == 10'000) {
-        ++count;
-      }
+/// The patience of the kernel with silent peers, one entry for each TCP socket of this process that has one.
+std::vector<unsigned> patienceOfSockets() {
+  std::vector<unsigned> all;
+  for (int fd = 0; fd < 256; ++fd) {
+    unsigned milliseconds = 0;
+    int is_asked = 0;
+    socklen_t size = sizeof milliseconds, other = sizeof is_asked;
+    const int asked = ::getsockopt(fd, IPPROTO_TCP, TCP_USER_TIMEOUT, &milliseconds, &size);
+    if (asked != 0 || milliseconds == 0) continue;
+    if (::getsockopt(fd, SOL_SOCKET, SO_KEEPALIVE, &is_asked, &other) == 0 && is_asked != 0) {
+      all.push_back(milliseconds);
     }
-    return count;
-  };
-  auto client = this->client(true);
-  ASSERT_TRUE(client.subscribe("cam", {.policy = Policy::Latest}).ok());
-  EXPECT_EQ(limited(), 0);
-  auto stream = client.subscribe("cam", {.policy = Policy::Lockstep});
-  ASSERT_TRUE(stream.ok());
-  EXPECT_EQ(limited(), 1);
+  }
+  return all;
 }
 
-TEST_F(RunningDaemon, AClientOverTcpMayVanishWhileNothingIsSent) {
-  start(kTriggered);
-  const auto watched = [] {  // sockets of this process whose silent peers are asked after five seconds
-    int count = 0;
-    for (int fd = 0; fd < 256; ++fd) {
-      int is_asked = 0, idle = 0, interval = 0, times = 0;
-      socklen_t size = sizeof(int);
-      const bool is_tcp = ::getsockopt(fd, IPPROTO_TCP, TCP_KEEPIDLE, &idle, &size) == 0 &&
-                          ::getsockopt(fd, IPPROTO_TCP, TCP_KEEPINTVL, &interval, &size) == 0 &&
-                          ::getsockopt(fd, IPPROTO_TCP, TCP_KEEPCNT, &times, &size) == 0;
-      if (!is_tcp || ::getsockopt(fd, SOL_SOCKET, SO_KEEPALIVE, &is_asked, &size) != 0) continue;
-      if (is_asked != 0 && idle + times * interval <= 12) ++count;
-    }
-    return count;
-  };
-  EXPECT_EQ(watched(), 0);
+// That vanished peers are noticed is tested in vanished_client_test.cpp.
+TEST_F(RunningDaemon, SilentPeersOverTcpHaveAMinuteAndTenSecondsInLockstep) {
+  start(kFast);
+  EXPECT_THAT(patienceOfSockets(), testing::IsEmpty());
   auto client = this->client(true);
-  ASSERT_TRUE(client.health().ok());
-  EXPECT_EQ(watched(), 1);
+  ASSERT_TRUE(client.subscribe("cam", {.policy = Policy::Latest}).ok());
+  EXPECT_THAT(patienceOfSockets(), testing::ElementsAre(60'000u));
+  auto stream = client.subscribe("cam", {.policy = Policy::Lockstep});
+  ASSERT_TRUE(stream.ok());
+  EXPECT_THAT(patienceOfSockets(), testing::ElementsAre(10'000u));
 }
 
 TEST_P(OnEachTransport, LockstepMakesTheNextFrameWhenBothClientsAskedForIt) {
@@ -320,7 +305,7 @@ TEST_F(RunningDaemon, RecordsIntoItsFolderEveryFrameAsItWas) {
   }
   const auto closed = client.stopRecording("cam");
   ASSERT_TRUE(closed.ok()) << closed.error().message;
-  EXPECT_THAT(client.startRecording("cam", "run").error().message, HasSubstr("exists already"));
+  EXPECT_THAT(client.startRecording("cam", "run").error().message, HasSubstr("there is such a file already"));
   EXPECT_FALSE(client.startRecording("cam", "../run").ok());
 
   auto reader = record::Reader::open(*path);
@@ -333,6 +318,25 @@ TEST_F(RunningDaemon, RecordsIntoItsFolderEveryFrameAsItWas) {
     EXPECT_EQ(frame->planes.size(), 5u);
   }
   EXPECT_EQ(reader->next("cam").error().code, Error::Code::EndOfStream);
+}
+
+TEST_F(RunningDaemon, AFrameThatIsTooLargeIsRefusedBeforeItIsMadeAndHarmsNoOther) {
+  configure("recording_folder = 'recordings'\n[limits]\nsubscription_backlog_mb = 2000\n" + kTriggered +
+            "[[source]]\nname = 'large'\ndriver = 'pattern'\nwidth = 4096\nheight = 4096\n");
+  start(options());
+  auto client = this->client();
+  auto stream = client.subscribe("cam", {.policy = Policy::Queue, .queue = 8});
+  ASSERT_TRUE(stream.ok());
+  const auto refused = client.subscribe("large", {});
+  ASSERT_FALSE(refused.ok());
+  EXPECT_EQ(refused.error().code, Error::Code::TooLarge);
+  EXPECT_THAT(refused.error().message, HasSubstr("one frame has 272 MiB"));
+  const auto recording = client.startRecording("large", "run");
+  ASSERT_FALSE(recording.ok());
+  EXPECT_THAT(recording.error().message, HasSubstr("one frame has 272 MiB"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "recordings" / "run.mcap"));
+  ASSERT_TRUE(client.trigger("cam").ok());
+  EXPECT_TRUE(stream->next(kSoon).ok()) << "the connection was broken";
 }
 
 TEST_F(RunningDaemon, ARecordingEndsAtItsBoundsAndSaysWhich) {

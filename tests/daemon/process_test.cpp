@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -17,6 +18,7 @@
 #include <sstream>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <toftwin/client.h>
@@ -148,6 +150,97 @@ TEST_F(Toftwind, ReadsItsConfigurationAgainOnSighup) {
   EXPECT_EQ(daemon.wait(), 0);
 }
 
+/// A configuration that the daemon reads when the test gives it.
+class Pipe {
+ public:
+  explicit Pipe(std::string path) : path_(std::move(path)) { EXPECT_EQ(::mkfifo(path_.c_str(), 0600), 0); }
+  /// Waits until the daemon has begun to read.
+  void open() { fd_ = ::open(path_.c_str(), O_WRONLY | O_CLOEXEC); }
+  void give(const std::string& text) {
+    EXPECT_EQ(::write(fd_, text.data(), text.size()), static_cast<ssize_t>(text.size()));
+    ::close(std::exchange(fd_, -1));
+  }
+
+ private:
+  std::string path_;
+  int fd_ = -1;
+};
+
+TEST_F(Toftwind, ASighupWhileItStartsIsAReloadAfterwards) {
+  Pipe config{path("d.toml")};
+  Process daemon{arguments(), path("log")};
+  config.open();
+  daemon.signal(SIGHUP);
+  daemon.signal(SIGHUP);
+  config.give(kPattern);
+  ASSERT_TRUE(daemon.says("source cam: driver pattern")) << daemon.said();
+  config.open();  // it reads again
+  config.give(kPattern + "[[source]]\nname = 'second'\ndriver = 'pattern'\n");
+  ASSERT_TRUE(daemon.says("the new configuration is in force")) << daemon.said();
+  EXPECT_EQ(client()->sources()->size(), 2u);
+  daemon.signal(SIGTERM);
+  EXPECT_EQ(daemon.wait(), 0);
+}
+
+TEST_F(Toftwind, ASigtermWhileItStartsIsACleanStopAndASecondOneIsNotWaitedFor) {
+  Pipe config{path("d.toml")};
+  {
+    Process daemon{arguments(), path("log")};
+    config.open();
+    daemon.signal(SIGTERM);
+    config.give(kPattern);
+    EXPECT_EQ(daemon.wait(), 0) << daemon.said();
+    EXPECT_FALSE(std::filesystem::exists(path("s")));
+  }
+  Process stuck{arguments(), path("log2")};
+  config.open();
+  stuck.signal(SIGTERM);
+  // The first one must have been taken before the second comes, or both are one.
+  const auto pending = [&] {
+    std::ifstream status{"/proc/" + std::to_string(stuck.pid()) + "/status"};
+    for (std::string line; std::getline(status, line);) {
+      if (line.starts_with("ShdPnd:")) return line.find_first_not_of("0\t", 7) != std::string::npos;
+    }
+    return false;
+  };
+  while (pending()) std::this_thread::yield();
+  std::this_thread::sleep_for(10ms);  // from "no longer pending" to "the handler was entered"
+  stuck.signal(SIGTERM);
+  EXPECT_EQ(stuck.wait(), -SIGTERM);
+}
+
+TEST_F(Toftwind, WithoutAThreadForItARecordingIsRefusedAndTheDaemonServesOn) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "sanitizers need address space of their own";
+#endif
+  configure(kPattern);
+  Process daemon{arguments(), path("log")};
+  ASSERT_TRUE(daemon.says("source cam: driver pattern")) << daemon.said();
+  auto client = this->client();
+  ASSERT_TRUE(client.ok()) << client.error().message;
+  ASSERT_TRUE(client->health().ok());
+  std::ifstream status{"/proc/" + std::to_string(daemon.pid()) + "/status"};
+  rlim_t used = 0;
+  for (std::string line; std::getline(status, line);) {
+    if (line.starts_with("VmSize:")) used = std::stoull(line.substr(7)) * 1024;
+  }
+  rlimit before{};
+  const rlimit little{used + (2 << 20), RLIM_INFINITY};  // no room for a thread's stack
+  ASSERT_EQ(::prlimit(daemon.pid(), RLIMIT_AS, &little, &before), 0);
+  const auto refused = client->startRecording("cam", "run");
+  ASSERT_FALSE(refused.ok());
+  EXPECT_THAT(refused.error().message, HasSubstr("starting to record threw"));
+  ASSERT_EQ(::prlimit(daemon.pid(), RLIMIT_AS, &before, nullptr), 0);
+  auto again = this->client();
+  ASSERT_TRUE(again.ok()) << again.error().message << daemon.said();
+  const auto recording = again->startRecording("cam", "run");
+  ASSERT_TRUE(recording.ok()) << recording.error().message;
+  EXPECT_TRUE(again->stopRecording("cam").ok());
+  EXPECT_EQ(again->health()->sources.at(0).last_error, "");
+  daemon.signal(SIGTERM);
+  EXPECT_EQ(daemon.wait(), 0);
+}
+
 TEST_F(Toftwind, ReplaysARecordingBitForBit) {
   configure(kPattern);
   std::vector<Frame> seen;
@@ -210,7 +303,10 @@ TEST_F(Toftwind, AFullDiskEndsTheRecordingKeepsWhatWasWrittenAndSaysSo) {
   EXPECT_TRUE(client->sources().ok()) << "the daemon serves on";
   const auto reader = record::Reader::open(*recording);
   ASSERT_TRUE(reader.ok()) << reader.error().message;
-  EXPECT_GE(reader->summary().frames_per_source.at("cam"), 1u);
+  const std::uint64_t frames = reader->summary().frames_per_source.at("cam");
+  EXPECT_GE(frames, 1u);
+  EXPECT_THAT(daemon.said(), HasSubstr("cam: recorded " + std::to_string(frames) + " frames into "));
+  EXPECT_THAT(daemon.said(), HasSubstr(" more did not fit"));
 }
 
 TEST_F(Toftwind, AWrongConfigurationIsExitCodeTwoWithFileAndLine) {

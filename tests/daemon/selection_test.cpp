@@ -90,6 +90,30 @@ TEST(Selection, RefusesWhatIsNotThere) {
   EXPECT_FALSE(check({.planes = {}, .region = {}, .decimation = 0}));
 }
 
+TEST(Selection, KnowsHowLargeAFrameIs) {
+  CameraInfo camera;
+  camera.width = camera.height = 4096;
+  const std::vector<PlaneKind> all{PlaneKind::Range, PlaneKind::Depth, PlaneKind::Amplitude,
+                                   PlaneKind::Ambient, PlaneKind::Flags};
+  EXPECT_EQ(bytesOf({}, camera, all, {}), 4096u * 4096 * 17);
+  EXPECT_EQ(bytesOf({.planes = {PlaneKind::Flags}, .region = {}}, camera, all, {}), 4096u * 4096);
+  EXPECT_EQ(bytesOf({.planes = {}, .region = {10, 10, 100, 50}, .decimation = 3}, camera, all, {}),
+            34u * 17 * 17);
+  EXPECT_EQ(bytesOf({.planes = {}, .region = {}}, camera, {PlaneKind::Samples},
+                    {{PlaneKind::Samples, 48}}),
+            4096u * 4096 * 48);
+}
+
+TEST(Selection, SaysWhatToDoAboutAFrameThatIsTooLarge) {
+  EXPECT_TRUE(checkFrameBytes(256ull << 20).ok());
+  const auto refused = checkFrameBytes((256ull << 20) + 1);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_EQ(refused.error().code, Error::Code::TooLarge);
+  EXPECT_EQ(refused.error().message,
+            "one frame has 257 MiB, and a message at most 256: ask for fewer planes, a region or a "
+            "decimation");
+}
+
 TEST(Selection, ADecimationBeyondTheImageLeavesOnePixel) {
   const auto part = select(numbered(), {.planes = {}, .region = {}, .decimation = 0xffffffff});
   ASSERT_TRUE(part.ok());

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <functional>
 #include <limits>
 #include <thread>
 
@@ -22,10 +23,13 @@ struct Conversation {
   FakeClock clock;
   std::shared_ptr<Remote> remote = std::make_shared<Remote>();
   Counter woken;  // outlives the hub's threads, which count
-  Hub hub{{}, clock};
+  Hub hub;
   std::unique_ptr<Session> session;
 
-  explicit Conversation(Session::Options options = {}) {
+  explicit Conversation(Session::Options options = {}, Hub::Options of_hub = {},
+                        const std::function<void(Remote&)>& change = [](Remote&) {})
+      : hub(std::move(of_hub), clock) {
+    change(*remote);
     const auto open = test::opener(remote);
     hub.add(std::make_shared<SourceHost>("cam", open, open(), SourceHost::Options{}, clock));
     session = std::make_unique<Session>(hub, options, [this] { woken.add(); });
@@ -60,6 +64,14 @@ wire::Subscribe wish(wire::Policy policy, std::uint32_t queue = 0) {
 Error errorIn(const Message& message) {
   const auto* failure = std::get_if<wire::Failure>(&message);
   return failure == nullptr ? Error{Error::Code::Internal, "no failure"} : failure->error;
+}
+
+/// Waits until the source's thread has let go of its subscribers, too.
+bool eventuallyUnused(const Budget& budget) {
+  for (int i = 0; i < 30'000 && budget.used() > 0; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds{1});
+  }
+  return budget.used() == 0;
 }
 
 TEST(Session, MustBeginWithHello) {
@@ -99,6 +111,49 @@ TEST(Session, AnUnknownSourceIsNamedWithThoseThatThereAre) {
   EXPECT_EQ(error.code, Error::Code::NotFound);
   EXPECT_EQ(error.message, "there is no source \"cma\"; there are: cam");
   EXPECT_FALSE(talk.session->isOver());
+}
+
+TEST(Session, RefusesAFrameThatIsTooLargeToSendOrToHold) {
+  const Hub::Options of_hub{.recording_folder = {}, .recording = {}, .backlog_bytes = 100ull << 20};
+  Conversation talk{{}, of_hub, [](Remote& remote) {
+                      remote.info.camera.width = remote.info.camera.height = 8192;  // 5 bytes a pixel
+                    }};
+  talk.hello();
+  wire::Subscribe request = wish(wire::Policy::Latest);
+  request.source = "cam";
+  const Error too_large = errorIn(talk.ask(request));
+  EXPECT_EQ(too_large.code, Error::Code::TooLarge);
+  EXPECT_EQ(too_large.message.find("one frame has 320 MiB"), 0u) << too_large.message;
+  request.region = {0, 0, 8192, 4096};  // 160 MiB
+  EXPECT_TRUE(std::holds_alternative<wire::Subscribed>(talk.ask(request)));
+  request.policy = wire::Policy::Lossless;
+  const Error too_much = errorIn(talk.ask(request));
+  EXPECT_EQ(too_much.code, Error::Code::TooLarge);
+  EXPECT_NE(too_much.message.find("limits.subscription_backlog_mb"), std::string::npos) << too_much.message;
+  request.decimation = 2;
+  EXPECT_TRUE(std::holds_alternative<wire::Subscribed>(talk.ask(request)));
+}
+
+TEST(Session, WhatIsOnItsWayCountsAgainstTheDaemonsBudget) {
+  // A frame of the fake camera has 40 bytes, and every frame 4096 beside: six fit.
+  Conversation talk{{}, {.recording_folder = {}, .recording = {}, .total_bytes = 6 * 4200}};
+  talk.hello();
+  wire::Subscribe request = wish(wire::Policy::Queue, 100);
+  request.window = 64;
+  const auto id = talk.subscribe(request);
+  talk.remote->give(20);
+  ASSERT_TRUE(talk.remote->asked.reaches(21));
+  int sent = 0;
+  while (talk.session->next()) ++sent;
+  EXPECT_GE(sent, 1);
+  EXPECT_LT(sent, 6);
+  EXPECT_LE(talk.hub.budget()->used(), talk.hub.budget()->limit());
+  request.source = "cam";
+  const Error full = errorIn(talk.ask(request));
+  EXPECT_EQ(full.code, Error::Code::Busy);
+  EXPECT_NE(full.message.find("limits.backlog_mb"), std::string::npos) << full.message;
+  talk.ask(wire::Unsubscribe{9, id});
+  EXPECT_TRUE(eventuallyUnused(*talk.hub.budget()));
 }
 
 TEST(Session, SendsFramesOfItsSubscriptions) {

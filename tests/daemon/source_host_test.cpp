@@ -245,6 +245,47 @@ TEST(SourceHost, ACommandInterruptsAFrameInTheMaking) {
   EXPECT_EQ(rig.host->health().reconnects, 0u);
 }
 
+/// A triggered camera whose frame takes until the test gives it.
+class SlowSource final : public drivers::Source {
+ public:
+  explicit SlowSource(std::shared_ptr<Remote> remote) : source_(std::move(remote)) {}
+  [[nodiscard]] const drivers::SourceInfo& info() const override { return source_.info(); }
+  Result<> start() override { return source_.start(); }
+  void stop() override { source_.stop(); }
+  Result<Frame> next(std::stop_token stop, bool lockstep) override {
+    return source_.next(std::move(stop), lockstep);
+  }
+  Result<> trigger() override { return {}; }
+
+ private:
+  test::FakeSource source_;
+};
+
+TEST(SourceHost, ATriggeredFrameIsBegunAnewOnceAtMostHoweverManySubscribersComeAndGo) {
+  Rig rig;
+  const auto open = [&]() -> Result<std::unique_ptr<drivers::Source>> {
+    return std::unique_ptr<drivers::Source>{std::make_unique<SlowSource>(rig.remote)};
+  };
+  rig.host = std::make_unique<SourceHost>("cam", open, open(), rig.options, rig.clock);
+  Taker taker, other;
+  const auto subscriber = rig.subscribe(taker);
+  ASSERT_TRUE(rig.remote->asked.reaches(1));
+  // While it waits for a trigger it is interrupted as often as anybody likes.
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(rig.command([](auto&) { return Result<>{}; }).ok());
+  std::promise<void> triggered;
+  rig.host->trigger([&](const Result<>&) { triggered.set_value(); });
+  triggered.get_future().wait();
+  const int before = rig.remote->asked.count();
+  for (int i = 0; i < 100; ++i) {
+    rig.host->unsubscribe(rig.subscribe(other));
+    std::this_thread::sleep_for(std::chrono::microseconds{200});  // for an interruption to be noticed
+  }
+  // The frame's own call, perhaps begun after `before`, and one anew.
+  EXPECT_LE(rig.remote->asked.count(), before + 2);
+  rig.remote->give();
+  EXPECT_EQ(taker.nextSequence(subscriber->backlog), 0);
+}
+
 TEST(SourceHost, WhatGoesWrongWithOneSubscriberIsNobodyElsesMatter) {
   Rig rig;
   rig.start();

@@ -135,6 +135,26 @@ TEST(Encodable, AHeaderBeyondTheLimitIsRefused) {
   EXPECT_THAT(encoded.error().message, HasSubstr("the limit is 1048576"));
 }
 
+TEST(Encodable, ABodyBeyondTheLimitIsRefusedAndOneAtTheLimitDecodes) {
+  // 8192 x 8192 floats are the limit, 256 MiB, to the byte.
+  FrameMessage message = frameWith([](Frame& f) {
+    f.camera.width = f.camera.height = 8192;
+    f.planes = {{PlaneKind::Range, ElementType::F32, 8192, 8192, 1, zeros(Limits{}.body_bytes)}};
+  });
+  const auto largest = encode(message);
+  ASSERT_TRUE(largest) << largest.error().message;
+  const auto preamble =
+      decodePreamble(std::span{largest->head}.first<kPreambleSize>(), Limits{});
+  ASSERT_TRUE(preamble) << preamble.error().message;
+  EXPECT_TRUE(decode(*preamble, std::span{largest->head}.subspan(kPreambleSize),
+                     message.frame.planes[0].data));
+  message.frame.planes.push_back({PlaneKind::Flags, ElementType::U8, 8192, 8192, 1, zeros(8192 * 8192)});
+  const auto larger = encode(message);
+  ASSERT_FALSE(larger);
+  EXPECT_EQ(larger.error().code, Error::Code::TooLarge);
+  EXPECT_THAT(larger.error().message, HasSubstr("its body has 335544320 bytes, the limit is 268435456"));
+}
+
 TEST(Encodable, ABodyThatIsNotTheFramesIsRefused) {
   const Frame frame = exampleFrame(8, 4);
   const auto encoded = encode(FrameMessage{1, frame}, encodeBody({frame.planes[0]}));

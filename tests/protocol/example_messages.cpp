@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "example_messages.h"
 
+#include <sys/mman.h>
+
 #include <limits>
+#include <new>
 
 namespace toftwin::wire {
 namespace {
@@ -157,6 +160,13 @@ std::vector<ExampleMessage> exampleMessages() {
       {"health", fullHealth()},
       {"failure", Failure{13, {Error::Code::NotFound, "no source is named \"kinekt\""}}},
   };
+}
+
+Buffer zeros(std::size_t bytes) {
+  void* const pages = ::mmap(nullptr, bytes, PROT_READ, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  if (pages == MAP_FAILED) throw std::bad_alloc{};
+  const std::shared_ptr<const void> owner{pages, [bytes](void* all) { ::munmap(all, bytes); }};
+  return {owner, {static_cast<const std::byte*>(pages), bytes}};
 }
 
 }  // namespace toftwin::wire

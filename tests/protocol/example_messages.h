@@ -20,4 +20,7 @@ std::vector<ExampleMessage> exampleMessages();
 /// A frame of width × height with range (F32), amplitude (F32) and flags (U8).
 Frame exampleFrame(int width, int height);
 
+/// So many zeros, aligned, which take no memory as long as they are only read.
+Buffer zeros(std::size_t bytes);
+
 }  // namespace toftwin::wire

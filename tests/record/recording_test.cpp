@@ -90,6 +90,32 @@ TEST_F(Recording, FramesComeBackBitForBit) {
   EXPECT_EQ(count, 100);
 }
 
+TEST_F(Recording, WhatCanBeWrittenCanBeReadAndAFrameThatIsTooLargeIsRefused) {
+  auto writer = Writer::create(file_);
+  ASSERT_TRUE(writer);
+  Frame large = frameOf(0);
+  large.camera.width = large.camera.height = 8192;
+  constexpr std::uint64_t kMost = wire::Limits{}.body_bytes;  // 8192 x 8192 floats, to the byte
+  large.planes = {{PlaneKind::Range, ElementType::F32, 8192, 8192, 1, wire::zeros(kMost)}};
+  ASSERT_TRUE(writer->write(large));
+  large.planes.push_back({PlaneKind::Flags, ElementType::U8, 8192, 8192, 1, wire::zeros(kMost / 4)});
+  const auto refused = writer->write(large);
+  ASSERT_FALSE(refused) << "a frame that nobody can read";
+  EXPECT_EQ(refused.error().code, Error::Code::TooLarge);
+  ASSERT_TRUE(writer->write(frameOf(1))) << "the recording goes on";
+  EXPECT_EQ(writer->frames(), 2u);
+  ASSERT_TRUE(writer->close());
+  auto reader = Reader::open(file_);
+  ASSERT_TRUE(reader) << reader.error().message;
+  const auto first = reader->next();
+  ASSERT_TRUE(first) << first.error().message;
+  EXPECT_EQ(first->planes.at(0).data.size(), kMost);
+  const auto second = reader->next();
+  ASSERT_TRUE(second) << second.error().message;
+  EXPECT_EQ(wireBytes(*second), wireBytes(frameOf(1)));
+  EXPECT_EQ(reader->next().error().code, Error::Code::EndOfStream);
+}
+
 TEST_F(Recording, SeekGoesToTheFirstFrameAtOrAfterATime) {
   record(100, {.chunk_bytes = 40'000});
   auto reader = Reader::open(file_);
@@ -242,6 +268,9 @@ void expectWholeUpToTheLastChunk(Writer& writer, const std::filesystem::path& fi
   EXPECT_EQ(expectFrames(*reader, 0, count).code, Error::Code::EndOfStream);
   EXPECT_GT(count, 0);
   EXPECT_GE(count, written - 4);  // the frames of one chunk of 30,000 bytes
+  EXPECT_EQ(writer.frames(), static_cast<std::uint64_t>(count)) << "counts what is not in the file";
+  // With the one whose writing failed; the one after it was refused.
+  EXPECT_EQ(writer.lost(), static_cast<std::uint64_t>(written + 1 - count));
 }
 
 TEST_F(Recording, AFileSizeLimitIsAFullDisk) {

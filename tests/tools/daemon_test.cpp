@@ -231,6 +231,34 @@ TEST_F(WithDaemon, ServesARecordingWhoseFramesAreTheRecordedOnes) {
   EXPECT_EQ(same, 1) << "the frame is one of the recorded ones, bit for bit";
 }
 
+TEST_F(WithDaemon, CountsTheFramesThatAreInTheFileWhenTheDiskIsFull) {
+  const Ran ran = runShell("trap '' XFSZ; ulimit -f 200; exec " + std::string{TOFTWIN_PROGRAM} +
+                           " record pattern -o " + path("a.mcap") + " --address unix:" + socket());
+  EXPECT_EQ(ran.status, 6) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr(" that could not be written"));
+  auto reader = record::Reader::open(folder_ / "a.mcap");
+  ASSERT_TRUE(reader) << reader.error().message;
+  int frames = 0;
+  while (reader->next()) ++frames;
+  EXPECT_THAT(ran.out, HasSubstr("a.mcap: " + std::to_string(frames) + " frames, "));
+}
+
+class WithLittleRoom : public WithDaemon {
+ protected:
+  std::string moreSources() const override { return "[recording]\nmax_mb = 1\n"; }
+};
+
+TEST_F(WithLittleRoom, DoctorFindsARecordingThatEndedUntilSomebodyWasTold) {
+  ASSERT_EQ(run("record pattern -o b.mcap --on-daemon").status, 0);
+  Ran ran;
+  ASSERT_TRUE(eventually([&] { return (ran = run("doctor --folder " + path("."))).status == 7; }));
+  EXPECT_THAT(ran.out, HasSubstr("BAD  pattern"));
+  EXPECT_THAT(ran.out, HasSubstr("toftwin record pattern --on-daemon --stop"));
+  EXPECT_THAT(ran.out, testing::Not(HasSubstr("tries again by itself")));
+  EXPECT_EQ(run("record pattern --on-daemon --stop").status, 6);
+  EXPECT_EQ(run("doctor --folder " + path(".")).status, 0);
+}
+
 TEST_F(WithDaemon, DoctorFindsNothing) {
   const Ran ran = run("doctor --folder " + path("."));
   EXPECT_EQ(ran.status, 0) << ran.out;

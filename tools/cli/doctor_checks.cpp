@@ -47,6 +47,15 @@ Finding checkProcessor() {
   return {State::Good, "processor", found, ""};
 }
 
+std::string mendSource(const SourceHealthEntry& source) {
+  if (source.last_error.empty()) return "";
+  if (!source.last_error.starts_with("recording: "))
+    return "see the last error; the daemon tries again by itself";
+  return fmt::format("it has ended, and what was written stays: mend what the error says, confirm it with "
+                     "`toftwin record {} --on-daemon --stop`, then record anew",
+                     source.name);
+}
+
 }  // namespace
 
 Finding checkLocale(const char* locale) {
@@ -161,12 +170,13 @@ std::vector<Finding> checkDaemon(const DaemonOptions& daemon) {
   }
   for (const SourceHealthEntry& source : health->sources) {
     const bool is_well = source.last_error.empty();
-    findings.push_back({is_well ? State::Good : State::Warning, source.name,
+    const bool is_recording = source.last_error.starts_with("recording: ");
+    findings.push_back({is_well ? State::Good : is_recording ? State::Bad : State::Warning, source.name,
                         fmt::format("{}, {} frames, {} lost by the device, {} reconnects{}{}",
                                     source.streaming ? "streaming" : "idle", source.frames,
                                     source.dropped_by_device, source.reconnects,
                                     is_well ? "" : ": ", source.last_error),
-                        is_well ? "" : "see the last error; the daemon tries again by itself"});
+                        mendSource(source)});
   }
   return findings;
 }

@@ -119,9 +119,11 @@ Result<Exit> recordHere(const Options& options) {
   Recording recording{.mutex = {}, .writer = std::move(writer).value(), .dropped = 0, .lost = 0, .error = {}};
   const auto recorded = recordAll(options, *client, recording);
   const auto closed = recording.writer.close();
-  fmt::print("{}: {} frames, {} dropped{}\n", options.file, recording.writer.frames(),
+  const std::uint64_t unwritten = recording.writer.lost();
+  fmt::print("{}: {} frames, {} dropped{}{}\n", options.file, recording.writer.frames(),
              recording.dropped,
-             recording.lost > 0 ? fmt::format(", {} lost by the device", recording.lost) : "");
+             recording.lost > 0 ? fmt::format(", {} lost by the device", recording.lost) : "",
+             unwritten > 0 ? fmt::format(", {} that could not be written", unwritten) : "");
   if (!recorded) return recorded.error();
   if (recording.error) return *recording.error;
   if (!closed) return closed.error();

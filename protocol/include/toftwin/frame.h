@@ -118,7 +118,7 @@ struct NamedTemperature {
 
 /// The state of the world and of the device when a frame was taken, as far as it is known.
 struct Moment {
-  std::vector<Exposure> exposures;  ///< in the order taken; at least one
+  std::vector<Exposure> exposures;  ///< in the order taken; empty where unknown
   HostTime received;                ///< when the daemon had the whole frame
   ClockRelation clock;
   std::optional<Duration> since_power_on;
