@@ -8,12 +8,10 @@
 
 #include "drivers/v4l2/pixel_format.h"
 #include "protocol/settings/settings.h"
-#include "sim/images/content_hash.h"
 
 namespace toftwin::drivers::v4l2 {
 namespace {
 
-constexpr Angle kStandInFieldOfView = 60_deg;
 constexpr std::string_view kUsb = "usb:", kCard = "card:";
 
 void checkFormat(settings::Table& table, const char* group, const ImageKeys& image) {
@@ -57,24 +55,6 @@ Result<Description> read(settings::Table table) {
   return description;
 }
 
-std::string idOf(const CameraInfo& c) {
-  const auto& d = c.distortion;
-  return sim::contentHash(fmt::format("v4l2 {} {} {} {} {} {} {} {} {} {} {}", c.width, c.height,
-                                      c.fx, c.fy, c.cx, c.cy, d[0], d[1], d[2], d[3], d[4]));
-}
-
-CameraInfo fromFieldOfView(Angle horizontal, int width, int height) {
-  const double fx = width / (2.0 * std::tan(horizontal.in(radian) / 2.0));
-  return {.width = width,
-          .height = height,
-          .fx = fx,
-          .fy = fx,
-          .cx = (width - 1) / 2.0,
-          .cy = (height - 1) / 2.0,
-          .distortion = {},
-          .calibration_id = {}};
-}
-
 }  // namespace
 
 Result<Description> loadDescription(const std::filesystem::path& file) {
@@ -94,35 +74,6 @@ bool matches(const Description& description, const std::string& usb_ids, const s
     return (!usb_ids.empty() && one == std::string{kUsb} + usb_ids) ||
            one == std::string{kCard} + card;
   });
-}
-
-Result<Lens> lensFor(const LensKeys& keys, int width, int height) {
-  const bool has_size = keys.width > 0;
-  const double scale = has_size ? static_cast<double>(width) / keys.width : 1.0;
-  if (has_size && std::lround(scale * keys.height) != height) {
-    return Error{Error::Code::InvalidArgument,
-                 fmt::format("v4l2: the description's lens is for {} x {} pixels, which is not the "
-                             "shape of the depth image, {} x {}",
-                             keys.width, keys.height, width, height)};
-  }
-  Lens lens;
-  lens.is_known = keys.fx > 0.0 || keys.field_of_view > 0_deg;
-  if (keys.fx > 0.0) {
-    // Pixels are binned: their outer edges, half a pixel from the centres, stay where they are.
-    lens.camera = {.width = width,
-                   .height = height,
-                   .fx = scale * keys.fx,
-                   .fy = scale * (keys.fy > 0.0 ? keys.fy : keys.fx),
-                   .cx = scale * (keys.cx + 0.5) - 0.5,
-                   .cy = scale * (keys.cy + 0.5) - 0.5,
-                   .distortion = keys.distortion,
-                   .calibration_id = {}};
-  } else {
-    lens.camera =
-        fromFieldOfView(lens.is_known ? keys.field_of_view : kStandInFieldOfView, width, height);
-  }
-  if (lens.is_known) lens.camera.calibration_id = idOf(lens.camera);
-  return lens;
 }
 
 }  // namespace toftwin::drivers::v4l2

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <filesystem>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include <toftwin/camera_info.h>
 #include <toftwin/result.h>
 #include <toftwin/units.h>
+
+#include "drivers/lens.h"
 
 /// What V4L2 does not say of a camera: what its codes mean and where its pixels look.
 namespace toftwin::drivers::v4l2 {
@@ -58,28 +58,6 @@ struct DepthKeys : ImageKeys {
   }
 };
 
-struct LensKeys {
-  int width = 0;
-  int height = 0;
-  double fx = 0.0, fy = 0.0, cx = 0.0, cy = 0.0;
-  std::array<double, 5> distortion{};
-  Angle field_of_view = 0_deg;
-
-  template <class Visitor>
-  void visit(Visitor& v) {
-    v.number("width", width, {0, 16384},
-             "pixels per row that the numbers below are for; 0: those of the depth image");
-    v.number("height", height, {0, 16384}, "likewise, rows");
-    v.number("fx", fx, {0, 1e6}, "focal length in pixels; 0: not known");
-    v.number("fy", fy, {0, 1e6}, "likewise, vertical; 0: as fx");
-    v.number("cx", cx, {0, 16384}, "principal point; (0, 0) is the centre of the first pixel");
-    v.number("cy", cy, {0, 16384}, "likewise");
-    v.numbers("distortion", distortion, {-100, 100}, "k1 k2 p1 p2 k3");
-    v.quantity("field_of_view", field_of_view, degree, {0, 179},
-               "horizontal, for a lens without distortion if fx is 0; 0: not known");
-  }
-};
-
 struct Description {
   std::string name;
   std::vector<std::string> match;
@@ -111,12 +89,5 @@ std::vector<Preset> presets();
 
 /// Whether it says that it is for such a camera. `usb_ids`: "1d27:0601", or empty.
 bool matches(const Description& description, const std::string& usb_ids, const std::string& card);
-
-/// The lens for an image of that size, if its numbers are known.
-struct Lens {
-  CameraInfo camera;
-  bool is_known = false;  ///< if not, a field of view of 60 degrees stands in
-};
-Result<Lens> lensFor(const LensKeys& keys, int width, int height);
 
 }  // namespace toftwin::drivers::v4l2

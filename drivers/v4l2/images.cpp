@@ -26,7 +26,7 @@ ImageMaker::ImageMaker(const DepthKeys& keys, Lens lens, bool has_infrared)
       has_infrared_(has_infrared),
       length_m_(kCodes),
       flags_(kCodes),
-      depth_per_range_(lens_.camera.width, lens_.camera.height) {
+      depth_per_range_(depthPerRange(lens_.camera)) {
   mark(flags_, keys.invalid, bit(PixelFlag::Invalid));
   mark(flags_, keys.saturated, bit(PixelFlag::Invalid) | bit(PixelFlag::Saturated));
   for (std::size_t code = 0; code < kCodes; ++code) {
@@ -40,11 +40,6 @@ ImageMaker::ImageMaker(const DepthKeys& keys, Lens lens, bool has_infrared)
     length_m_[code] = (flag & bit(PixelFlag::Invalid)) != 0
                           ? std::numeric_limits<float>::quiet_NaN()
                           : static_cast<float>(length.in(metre));
-  }
-  for (int y = 0; y < lens_.camera.height; ++y) {
-    for (int x = 0; x < lens_.camera.width; ++x) {
-      depth_per_range_(x, y) = static_cast<float>(rayThroughPixel(lens_.camera, x, y).v.z);
-    }
   }
 }
 

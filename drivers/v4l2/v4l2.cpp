@@ -97,7 +97,7 @@ Result<std::unique_ptr<Source>> assemble(System& system, const Keys& keys,
   const Size size{depth->layout.width, depth->layout.height};
   auto infrared = openInfrared(system, choice, size, keys);
   if (!infrared) return infrared.error();
-  const auto lens = lensFor(description.lens, size.width, size.height);
+  const auto lens = lensFor(description.lens, size.width, size.height, About::name);
   if (!lens) return lens.error();
   if (!lens->is_known) {
     spdlog::warn(

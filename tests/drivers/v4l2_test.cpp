@@ -135,12 +135,12 @@ TEST(V4l2, WithoutALensNoRangeIsMadeUp) {
 
 TEST(V4l2, ALensForAnotherSizeIsScaledAroundPixelEdges) {
   const LensKeys keys{.width = 32, .height = 16, .fx = 40, .cx = 15.5, .cy = 7.5};
-  const auto lens = lensFor(keys, 16, 8);
+  const auto lens = lensFor(keys, 16, 8, "v4l2");
   ASSERT_TRUE(lens.ok());
   EXPECT_EQ(lens->camera.fx, 20.0);
   EXPECT_EQ(lens->camera.cx, 7.5) << "the centre stays the centre";
   EXPECT_EQ(lens->camera.cy, 3.5);
-  EXPECT_FALSE(lensFor(keys, 16, 9).ok()) << "another shape is another lens";
+  EXPECT_FALSE(lensFor(keys, 16, 9, "v4l2").ok()) << "another shape is another lens";
 }
 
 // ---- compliance --------------------------------------------------------------------------------
