@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "sim/images/rows.h"
+#include "sim/images/simd.h"
 
 namespace toftwin::sim {
 namespace {
@@ -37,6 +38,18 @@ std::vector<Weight> weightsOf(const Response& response, const Light& light, std:
     weights.push_back({n, static_cast<float>(weight.real()), static_cast<float>(weight.imag())});
   }
   return weights;
+}
+
+/// modulated += Re(weight · phasors), whose parts alternate.
+TOFTWIN_SIMD void addModulated(const float* __restrict phasors, float real, float imaginary, int width,
+                               float* __restrict modulated) {
+  for (int x = 0; x < width; ++x) modulated[x] += real * phasors[2 * x] - imaginary * phasors[2 * x + 1];
+}
+
+TOFTWIN_SIMD void fillTap(const float* __restrict steady, const float* __restrict ambient,
+                          const float* __restrict modulated, float half_gain, float sign, int width,
+                          float* __restrict electrons) {
+  for (int x = 0; x < width; ++x) electrons[x] = half_gain * (steady[x] + ambient[x]) + sign * modulated[x];
 }
 
 }  // namespace
@@ -121,21 +134,13 @@ Samples correlate(const Light& light, const std::vector<Response>& responses, in
         for (int y = first_row; y < last_row; ++y) {
           std::fill(modulated.begin(), modulated.end(), 0.0F);
           for (const Weight& weight : weights) {
-            const std::complex<float>* phasor = &light.phasor(f, weight.harmonic)(0, y);
-            for (int x = 0; x < width; ++x) {
-              modulated[static_cast<std::size_t>(x)] +=
-                  weight.real * phasor[x].real() - weight.imaginary * phasor[x].imag();
-            }
+            // A complex number is an array of two.
+            addModulated(reinterpret_cast<const float*>(&light.phasor(f, weight.harmonic)(0, y)), weight.real,
+                         weight.imaginary, width, modulated.data());
           }
-          const float* steady = &light.steady(0, y);
-          const float* ambient = &light.ambient(0, y);
           for (int tap = 0; tap < taps; ++tap) {
-            float* electrons = &taps_of_step[tap](0, y);
-            const float sign = tap == 0 ? 1.0F : -1.0F;
-            for (int x = 0; x < width; ++x) {
-              electrons[x] = half_gain * (steady[x] + ambient[x]) +
-                             sign * modulated[static_cast<std::size_t>(x)];
-            }
+            fillTap(&light.steady(0, y), &light.ambient(0, y), modulated.data(), half_gain, tap == 0 ? 1.0F : -1.0F,
+                    width, &taps_of_step[tap](0, y));
           }
         }
       });
