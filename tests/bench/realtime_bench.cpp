@@ -422,7 +422,7 @@ void costs(const Files& files) {
              std::ranges::count_if(kinect.light->phasors, [](const auto& image) { return !image.empty(); }));
   int posed = 0;
   const double nine = medianOf(20, [&] {
-    for (int exposure = 0; exposure < 9; ++exposure) kinect.scene.at(++posed * 3.7_ms);
+    for (int exposure = 0; exposure < 9; ++exposure) static_cast<void>(kinect.scene.at(++posed * 3.7_ms));
   });
   TraceRequest direct = kinect.request;
   direct.harmonics = 1;
