@@ -18,8 +18,8 @@ inline float powerBelow(float m) {
 
 /// Converts one row; `second` is null where there is one tap. What conversion takes off the
 /// difference goes to both taps alike, so that their sum stays.
-TOFTWIN_SIMD void convert(float* __restrict first, float* __restrict second, std::uint8_t* __restrict flags, int width,
-                          float counts_per_electron) {
+TOFTWIN_SIMD void convert(float* __restrict first, float* __restrict second, std::uint8_t* __restrict flags,
+                          int width, float counts_per_electron) {
   constexpr auto kSaturated = static_cast<std::uint8_t>(PixelFlag::Saturated);
   const float electrons_per_count = 1.0F / counts_per_electron;
   for (int x = 0; x < width; ++x) {

@@ -135,12 +135,13 @@ Samples correlate(const Light& light, const std::vector<Response>& responses, in
           std::fill(modulated.begin(), modulated.end(), 0.0F);
           for (const Weight& weight : weights) {
             // A complex number is an array of two.
-            addModulated(reinterpret_cast<const float*>(&light.phasor(f, weight.harmonic)(0, y)), weight.real,
-                         weight.imaginary, width, modulated.data());
+            const auto* parts = reinterpret_cast<const float*>(&light.phasor(f, weight.harmonic)(0, y));
+            addModulated(parts, weight.real, weight.imaginary, width, modulated.data());
           }
           for (int tap = 0; tap < taps; ++tap) {
-            fillTap(&light.steady(0, y), &light.ambient(0, y), modulated.data(), half_gain, tap == 0 ? 1.0F : -1.0F,
-                    width, &taps_of_step[tap](0, y));
+            const float sign = tap == 0 ? 1.0F : -1.0F;
+            fillTap(&light.steady(0, y), &light.ambient(0, y), modulated.data(), half_gain, sign, width,
+                    &taps_of_step[tap](0, y));
           }
         }
       });

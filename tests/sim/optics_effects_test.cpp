@@ -61,7 +61,7 @@ TEST(LensScatter, ComesFromOverexposedLightUnclipped) {
 // The wide halo is recursive; the exact one is the sum over all pixels of the Gaussian. A bright box, and
 // the image's border, beyond which it is dark.
 TEST(LensScatter, WideHaloIsTheGaussianWithinAThousandthOfItsPeak) {
-  for (double sigma : {6.0, 9.0, 15.0, 33.0}) {
+  for (double sigma : {6.0, 9.0, 12.0, 15.0, 33.0}) {
     const auto boxAt = [](int x, int y) { return x >= 41 && x < 52 && y >= 23 && y < 30 ? 1.0 : 0.0; };
     const Light light = syntheticLight(150, 100, {20_MHz}, 1, [&](int x, int y) {
       return std::vector<Way>{{boxAt(x, y), 1.0}};
