@@ -60,6 +60,7 @@ Command compareCommand();
 Command poseCommand();
 Command setCommand();
 Command triggerCommand();
+Command usbCommand();
 Command doctorCommand();
 Command complianceCommand();
 Command completionCommand();

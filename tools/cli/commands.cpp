@@ -7,9 +7,9 @@ namespace toftwin::cli {
 
 std::span<const Command> commands() {
   static const std::array kCommands{
-      listCommand(),   infoCommand(),       grabCommand(),       recordCommand(), replayCommand(),
-      poseCommand(),   setCommand(),        triggerCommand(),    renderCommand(), compareCommand(),
-      doctorCommand(), complianceCommand(), completionCommand(),
+      listCommand(),    infoCommand(), grabCommand(),   recordCommand(),     replayCommand(),
+      poseCommand(),    setCommand(),    triggerCommand(),    renderCommand(),
+      compareCommand(), usbCommand(),  doctorCommand(), complianceCommand(), completionCommand(),
   };
   return kCommands;
 }

@@ -14,6 +14,9 @@
 #include <clocale>
 #include <cstring>
 #include <thread>
+#include <utility>
+
+#include "tools/cli/doctor_system.h"
 
 namespace toftwin::cli {
 namespace {
@@ -193,6 +196,7 @@ std::vector<Finding> examine(const DaemonOptions& daemon, const std::filesystem:
   }
   findings.insert(findings.end(), of_daemon.begin(), of_daemon.end());
   findings.push_back(checkFolder(folder));
+  for (Finding& finding : checkSystem()) findings.push_back(std::move(finding));
   return findings;
 }
 

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+/// Depth cameras on USB: which are there, what drives them, and what is wrong with how they are
+/// connected. Reads /sys, opens no device.
+namespace toftwin::usb {
+
+/// A camera by its USB identity.
+struct KnownCamera {
+  std::uint16_t vendor = 0, product = 0;
+  std::string_view name;
+  std::string_view driver;      ///< of ours that fits; empty: none yet
+  double least_mbit_s = 480.0;  ///< of the link that it needs for its full frame rate
+};
+std::span<const KnownCamera> knownCameras();
+/// Null if nobody knows it.
+const KnownCamera* find(std::uint16_t vendor, std::uint16_t product);
+
+struct Device {
+  const KnownCamera* camera = nullptr;
+  std::string port;     ///< where it is plugged in: "2-1.4" is bus 2, port 1, port 4 of a hub there
+  double mbit_s = 0.0;  ///< of the link, as negotiated
+  std::string serial;
+  std::filesystem::path node;  ///< "/dev/bus/usb/002/005"
+};
+
+/// The known cameras that are plugged in, by port. `root` stands for "/" in the tests.
+std::vector<Device> list(const std::filesystem::path& root = "/");
+
+/// What is wrong with the link and what to do, or nothing: a USB 3 camera on USB 2.
+std::string warningOf(const Device& device);
+/// "Microsoft Kinect v2 at 2-1.4, 5000 Mbit/s, serial 123, for driver kinect_v2"
+std::string describe(const Device& device);
+
+}  // namespace toftwin::usb

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "drivers/usb/cameras.h"
+
+#include <gtest/gtest.h>
+
+#include <fmt/format.h>
+
+#include <sstream>
+
+#include "fake_root.h"
+
+namespace toftwin::usb {
+namespace {
+
+TEST(UsbCameras, AreFoundWithPortSpeedSerialAndDriver) {
+  const test::FakeRoot root;
+  root.plugIn("2-1.4", "045e", "02c4", "5000");
+  root.plugIn("1-2", "1d27", "0601", "480");
+  root.plugIn("1-3", "046d", "c077", "1.5");  // a mouse
+  root.write("sys/bus/usb/devices/1-0:1.0/bInterfaceClass", "09");
+  const auto devices = list(root.path());
+  ASSERT_EQ(devices.size(), 2u);
+  EXPECT_EQ(devices[0].camera->driver, "openni2");
+  EXPECT_EQ(devices[1].port, "2-1.4");
+  EXPECT_EQ(devices[1].mbit_s, 5000.0);
+  EXPECT_EQ(devices[1].node, "/dev/bus/usb/002/005");
+  EXPECT_EQ(describe(devices[1]),
+            "Microsoft Kinect v2 (for Windows) at 2-1.4, 5000 Mbit/s, serial A02-1.4, for driver "
+            "kinect_v2");
+  EXPECT_TRUE(list(root.path() / "nowhere").empty());
+}
+
+TEST(UsbCameras, AUsb3CameraOnUsb2IsWarnedOfAndAUsb2CameraIsNot) {
+  const test::FakeRoot root;
+  root.plugIn("1-1", "045e", "02c4", "480");
+  root.plugIn("1-2", "1d27", "0601", "480");
+  root.plugIn("2-1", "045e", "02c4", "10000");
+  const auto devices = list(root.path());
+  ASSERT_EQ(devices.size(), 3u);
+  EXPECT_NE(warningOf(devices[0]).find("link of 480 Mbit/s: it needs 5000"), std::string::npos);
+  EXPECT_EQ(warningOf(devices[1]), "");
+  EXPECT_EQ(warningOf(devices[2]), "");
+}
+
+TEST(UsbCameras, EachHasItsUdevRule) {
+  std::ostringstream rules;
+  rules << std::ifstream{std::string{TOFTWIN_SOURCE_DIR} + "/systemd/60-toftwin.rules"}.rdbuf();
+  for (const KnownCamera& camera : knownCameras()) {
+    const std::string rule = fmt::format(
+        "# {}\nATTR{{idVendor}}==\"{:04x}\", ATTR{{idProduct}}==\"{:04x}\", MODE=\"0660\", "
+        "GROUP=\"video\", TAG+=\"uaccess\"\n",
+        camera.name, camera.vendor, camera.product);
+    EXPECT_NE(rules.str().find(rule), std::string::npos) << "systemd/60-toftwin.rules must have\n"
+                                                         << rule;
+  }
+}
+
+}  // namespace
+}  // namespace toftwin::usb
