@@ -23,14 +23,27 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 class ClientFeed final : public Feed {
  public:
-  ClientFeed(Client& client, std::string source, SourceDetails details, Subscription subscription)
+  ClientFeed(Client& client, std::string source, SourceDetails details, SubscribeOptions options,
+             Subscription subscription)
       : client_(client),
         source_(std::move(source)),
         details_(std::move(details)),
+        options_(std::move(options)),
         subscription_(std::move(subscription)) {}
   [[nodiscard]] const SourceDetails& details() const override { return details_; }
   Result<Frame> next(std::chrono::milliseconds timeout) override {
-    return subscription_.next(timeout);
+    auto frame = subscription_.next(timeout);
+    // It may have been in the making when the subscription began.
+    if (frame && std::exchange(is_first_dubious_, false)) frame = subscription_.next(timeout);
+    return frame;
+  }
+  Result<> beginAnew() override {
+    if (details_.can_lockstep) return {};  // makes a frame when we ask, and not before
+    auto again = client_.subscribe(source_, options_);
+    if (!again) return again.error();
+    subscription_ = *std::move(again);
+    is_first_dubious_ = true;
+    return {};
   }
   Result<> setPose(const Transform<World, Camera>& pose) override {
     return client_.setPose(source_, pose);
@@ -40,7 +53,9 @@ class ClientFeed final : public Feed {
   Client& client_;
   std::string source_;
   SourceDetails details_;
+  SubscribeOptions options_;
   Subscription subscription_;
+  bool is_first_dubious_ = false;
 };
 
 class RecordingFeed final : public Feed {
@@ -113,7 +128,8 @@ Result<Frame> nextAt(Feed& feed, const std::optional<Transform<World, Camera>>& 
   for (int skipped = 0; skipped <= options.most_skipped; ++skipped) {
     auto frame = nextFrame(feed, options);
     if (!frame) return named(feed, frame.error(), "waiting for a frame");
-    const auto& there = frame->moment.world_from_camera;
+    auto& there = frame->moment.world_from_camera;
+    if (pose && !there && options.carrier != nullptr) there = pose;  // the rig knows
     if (!pose || !there || samePose(*pose, *there)) return frame;
   }
   return Error{Error::Code::Timeout,
@@ -164,7 +180,12 @@ Result<> capturePose(Feed& a, Feed& b, const CaptureOptions& options, Progress& 
                      CapturedPose& captured, Capture& result) {
   const auto& pose = captured.asked;
   for (Feed* feed : {&a, &b}) {
-    if (!pose || !feed->details().can_set_pose) continue;
+    if (!pose) continue;
+    if (!feed->details().can_set_pose) {
+      if (options.carrier == nullptr) continue;
+      if (auto begun = feed->beginAnew(); !begun) return named(*feed, begun.error(), "subscribing");
+      continue;
+    }
     if (auto set = feed->setPose(*pose); !set)
       return named(*feed, set.error(), fmt::format("setting the pose \"{}\"", captured.name));
   }
@@ -180,7 +201,9 @@ Result<> capturePose(Feed& a, Feed& b, const CaptureOptions& options, Progress& 
     result.pairs.push_back({result.poses.size(), powerOn(frame_a), powerOn(frame_b),
                             medianDifference_mm(frame_a, frame_b)});
   }
-  return {};
+  if (!pose || options.carrier == nullptr) return {};
+  result.log.push_back(std::move(options.carrier->log().set("pose", captured.name).set("role", "rig")));
+  return options.carrier->stillThere();
 }
 
 }  // namespace
@@ -207,7 +230,7 @@ Result<std::unique_ptr<Feed>> openFeed(Client& client, const std::string& source
   auto subscription = client.subscribe(source, options);
   if (!subscription) return subscription.error();
   return std::unique_ptr<Feed>{
-      std::make_unique<ClientFeed>(client, source, *std::move(details), *std::move(subscription))};
+      std::make_unique<ClientFeed>(client, source, *std::move(details), std::move(options), *std::move(subscription))};
 }
 
 Result<std::unique_ptr<Feed>> openRecording(const std::string& file_and_source) {
@@ -252,6 +275,16 @@ void planCapture(Progress& progress, const CaptureOptions& options) {
 
 namespace {
 
+/// The pose at which the cameras are to be captured: where they are to be put, or where the carrier
+/// has really taken them.
+Result<Transform<World, Camera>> reach(const PoseSpec& pose, const CaptureOptions& options) {
+  if (options.carrier == nullptr) return pose.world_from_camera();
+  auto reached = options.carrier->go(pose);
+  if (reached) return reached;
+  return Error{reached.error().code, fmt::format("nothing was captured at \"{}\": {}", pose.name,
+                                                 reached.error().message)};
+}
+
 Result<Capture> captureAll(Feed& a, Feed& b, const CaptureOptions& options, Progress& progress) {
   Capture result{
       .a = a.details(), .b = b.details(), .poses = {}, .pairs = {}, .log = {}, .warnings = {}};
@@ -264,7 +297,11 @@ Result<Capture> captureAll(Feed& a, Feed& b, const CaptureOptions& options, Prog
         .asked = {},
         .a = {},
         .b = {}};
-    if (!options.poses.empty()) captured.asked = options.poses[i].world_from_camera();
+    if (!options.poses.empty()) {
+      auto reached = reach(options.poses[i], options);
+      if (!reached) return reached.error();
+      captured.asked = *reached;
+    }
     if (auto done = capturePose(a, b, options, progress, captured, result); !done)
       return done.error();
     unknown_pose = unknown_pose || !captured.a.pose() || !captured.b.pose();

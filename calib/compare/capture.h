@@ -26,6 +26,20 @@ class Feed {
   /// From a camera that cannot lockstep, the newest frame.
   virtual Result<Frame> next(std::chrono::milliseconds timeout) = 0;
   virtual Result<> setPose(const Transform<World, Camera>& world_from_camera) = 0;
+  /// Forgets frames that are under way: the next one is taken from now on.
+  virtual Result<> beginAnew() { return {}; }
+};
+
+/// What takes the cameras from pose to pose, where they cannot be put there by a command.
+class Carrier {
+ public:
+  virtual ~Carrier() = default;
+  /// Where they really stand, when they have come to rest; an Error if it is not where they should.
+  virtual Result<Transform<World, Camera>> go(const PoseSpec& pose) = 0;
+  /// Asked when the frames of a pose are there: an Error if they did not stand still meanwhile.
+  virtual Result<> stillThere() = 0;
+  /// What the log says of the pose, such as axes and temperatures.
+  [[nodiscard]] virtual Json log() const = 0;
 };
 
 /// A source of a daemon: in LOCKSTEP where it can, so that no frame is made or lost without us,
@@ -65,6 +79,7 @@ struct CaptureOptions {
   std::chrono::milliseconds timeout{60'000};  ///< for one frame
   int most_skipped = 10'000;                  ///< frames of other poses before it is given up
   std::function<bool()> interrupted{};        ///< asked between frames
+  Carrier* carrier = nullptr;                 ///< moves the cameras, if they cannot move themselves
 };
 
 /// Captures both cameras at the same poses. A pose is set on each camera that can; frames that say

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "daemon/config.h"
+#include "drivers/rig/rig_file.h"
 #include "drivers/source.h"
 #include "protocol/settings/describe.h"
 
@@ -37,6 +38,10 @@ TEST(Docs, OfEveryDriverHaveAllItsKeysAndARowInTheTable) {
     expectIn("drivers/README.md",
              fmt::format("| [{0}]({0}.md) | {1} |\n", driver.name, driver.summary));
   }
+}
+
+TEST(Docs, OfTheRigHaveAllItsKeys) {
+  expectIn("rig.md", rig::documentRig());
 }
 
 }  // namespace

@@ -79,7 +79,7 @@ TEST(Toftwin, HelpAndVersionAreStatus0) {
   EXPECT_THAT(toftwin("--version").out, HasSubstr("toftwin " TOFTWIN_VERSION));
   EXPECT_EQ(toftwin("--help").status, 0);
   for (const char* command :
-       {"list", "info", "grab", "record", "replay", "pose", "set", "trigger", "render", "compare", "usb", "doctor",
+       {"list", "info", "grab", "record", "replay", "pose", "rig", "set", "trigger", "render", "compare", "usb", "doctor",
         "compliance", "completion"}) {
     const Ran ran = toftwin(std::string{command} + " --help");
     EXPECT_EQ(ran.status, 0) << command;

@@ -58,6 +58,7 @@ Command replayCommand();
 Command renderCommand();
 Command compareCommand();
 Command poseCommand();
+Command rigCommand();
 Command setCommand();
 Command triggerCommand();
 Command usbCommand();

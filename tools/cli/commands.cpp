@@ -8,7 +8,7 @@ namespace toftwin::cli {
 std::span<const Command> commands() {
   static const std::array kCommands{
       listCommand(),    infoCommand(), grabCommand(),   recordCommand(),     replayCommand(),
-      poseCommand(),    setCommand(),    triggerCommand(),    renderCommand(),
+      poseCommand(),    rigCommand(),  setCommand(),    triggerCommand(),    renderCommand(),
       compareCommand(), usbCommand(),  doctorCommand(), complianceCommand(), completionCommand(),
   };
   return kCommands;

@@ -13,6 +13,7 @@
 #include "protocol/record/recording.h"
 #include "tools/cli/command.h"
 #include "tools/cli/options.h"
+#include "tools/cli/rig_carrier.h"
 #include "tools/cli/terminal.h"
 
 namespace toftwin::cli {
@@ -22,6 +23,7 @@ constexpr const char* kExamples =
     "  toftwin compare kinect stand-in --poses poses.toml -o report   two cameras of one daemon\n"
     "  toftwin compare kinect monday.mcap -o report                   a camera and a recording\n"
     "  toftwin compare kinect cam --address-b lab:47800 -o report     two daemons\n"
+    "  toftwin compare kinect twin --poses poses.toml --rig rig.toml  a rig moves the real one\n"
     "  toftwin compare --data ../shared/data -o report                the simulator and real "
     "measurements\n";
 
@@ -29,6 +31,7 @@ struct Options {
   DaemonOptions daemon, daemon_b;
   std::vector<std::string> sources;
   std::string poses;
+  std::string rig;
   std::string data;
   std::string output = "report";
   std::string note;
@@ -161,6 +164,13 @@ Result<Exit> compareThem(const Options& options) {
   if (!job) return job.error();
   catchInterrupts();
   Opened a, b;
+  std::unique_ptr<compare::Carrier> carrier;
+  if (!options.rig.empty()) {
+    auto opened = openCarrier(options.rig);
+    if (!opened) return opened.error();
+    carrier = *std::move(opened);
+    job->capture.carrier = carrier.get();
+  }
   if (!options.sources.empty()) {
     const auto needed = static_cast<std::uint64_t>(options.frames) *
                         std::max<std::uint64_t>(1, job->capture.poses.size());
@@ -199,6 +209,9 @@ Run add(CLI::App& app) {
   app.add_option("--poses", options->poses,
                  "pose file; both cameras are captured at each pose, and then put back. Without it: where "
                  "they are");
+  app.add_option("--rig", options->rig,
+                 "rig file; the rig takes the cameras to each pose, and nothing is captured at one that it "
+                 "did not reach");
   app.add_option("--frames", options->frames, "frames of each camera at each pose")
       ->check(CLI::Range(2, 100'000))
       ->capture_default_str();
@@ -222,6 +235,9 @@ Run add(CLI::App& app) {
                                options->data)};
     }
     if (isRefused(*options)) return sameTwice(options->sources[0]);
+    if (!options->rig.empty() && (options->poses.empty() || options->sources.size() != 2)) {
+      return Error{Error::Code::InvalidArgument, "--rig is for two sources and --poses"};
+    }
     if (options->sources.size() != 1) return {};
     return Error{Error::Code::InvalidArgument,
                  "name two sources, A and B, or none to judge the simulator only"};
