@@ -3,12 +3,14 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
 #include <toftwin/units.h>
 
 #include "drivers/pace.h"
+#include "sim/tracer/trace.h"
 
 namespace toftwin::drivers::simulator {
 
@@ -18,13 +20,28 @@ constexpr double kMostPosition_m = 1e6;
 /// How light is traced: docs/realtime.md.
 enum class Mode { Unbiased, RealTime };
 
+/// By name, for the command line.
+inline const std::map<std::string, sim::Sampler>& samplers() {
+  static const std::map<std::string, sim::Sampler> kSamplers{
+      {"shared", sim::Sampler::Shared}, {"even", sim::Sampler::Even}, {"plain", sim::Sampler::Plain}};
+  return kSamplers;
+}
+inline std::string nameOf(sim::Sampler sampler) {
+  for (const auto& [name, value] : samplers()) {
+    if (value == sampler) return name;
+  }
+  return {};
+}
+
 /// The keys of a [[source]] table with driver = "sim".
 struct Keys {
   std::string uri = "sim:generic_cw";
   std::string camera;
   std::string scene;
   Mode mode = Mode::Unbiased;
+  sim::Sampler sampler = sim::Sampler::Shared;
   int samples_per_pixel = 4;
+  Length light_noise = 0_mm;
   int max_surfaces = 4;
   double pixel_extent = 1.0;
   std::uint64_t seed = 1;
@@ -51,6 +68,13 @@ struct Keys {
              "light over several surfaces kept, smoothed and some millimetres wrong");
     v.number("samples_per_pixel", samples_per_pixel, {1, 65'536},
              "paths traced per pixel; realtime has its own");
+    v.choice("sampler", sampler,
+             {{"shared", sim::Sampler::Shared}, {"even", sim::Sampler::Even}, {"plain", sim::Sampler::Plain}},
+             "how paths are drawn: evenly, and shared by tiles of 8 x 8 pixels; evenly by each pixel for itself; or "
+             "by plain random numbers, for comparison");
+    v.quantity("light_noise", light_noise, millimetre, {0.0, 1000.0},
+               "take only as many paths as leave this noise of the light in the range at the highest frequency, at "
+               "most samples_per_pixel; 0: always that many");
     v.number("max_surfaces", max_surfaces, {1, 64},
              "surfaces a path may touch: 1 is direct light only");
     v.number("pixel_extent", pixel_extent, {0.0, 4.0},
@@ -83,6 +107,16 @@ struct Keys {
     v.texts("planes", planes,
             "which of range, depth, amplitude, ambient, flags, samples, phasors (not of pulsed cameras), "
             "truth_range, truth_normal, exposure (of cameras with several); empty: the first five");
+  }
+
+  /// What the keys say of the light, into a camera's request.
+  void applyTo(sim::TraceRequest& request) const {
+    request.sampler = sampler;
+    request.samples_per_pixel = samples_per_pixel;
+    request.wanted_noise = light_noise;
+    request.max_surfaces = max_surfaces;
+    request.pixel_extent = pixel_extent;
+    request.seed = seed;
   }
 };
 

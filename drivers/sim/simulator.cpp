@@ -353,12 +353,12 @@ Result<std::unique_ptr<Source>> open(settings::Table& table) {
     table.complain("planes", fmt::format("names \"{}\", which {} does not have", nameOf(kind), model->model()));
   }
   complainOfMode(keys, model, scene, table);
+  if (model && keys.light_noise > 0_mm && !model->hasPhasors()) {
+    table.complain("light_noise_mm", fmt::format("cannot be had of a pulsed camera, as {} is: leave it out", model->model()));
+  }
   if (auto checked = table.check(); !checked) return checked.error();
   sim::TraceRequest request = model->traceRequest();
-  request.samples_per_pixel = keys.samples_per_pixel;
-  request.max_surfaces = keys.max_surfaces;
-  request.pixel_extent = keys.pixel_extent;
-  request.seed = keys.seed;
+  keys.applyTo(request);
   View view{*std::move(scene), std::move(request), motionOf(keys), model->rowDelay()};
   if (keys.mode == Mode::RealTime) view.goRealtime(model->correlatedTerms());
   return std::unique_ptr<Source>{

@@ -82,6 +82,8 @@ bool View::complete(const sim::ForeignEmitterSpec* foreign, Pass& pass, const st
     const Duration time = time_ + (band.region_y + 0.5 * (band.region_height - 1)) * row_delay_;
     if (is_rolling) posed = scene_.at(time);
     if (moves()) band.world_from_camera = poseAt(is_rolling ? time : time_);
+    // A tile of pixels that share their paths would be traced for each of its bands anew.
+    if (is_rolling && band.sampler == sim::Sampler::Shared) band.sampler = sim::Sampler::Even;
     if (foreign != nullptr) band = sim::foreignRequest(*foreign, band);
     copyBand(sim::trace(posed, band), pass.rows_done, pass.light, height);
     pass.rows_done += band.region_height;

@@ -95,6 +95,16 @@ void addSettings(CLI::App& app, RenderSettings& settings) {
   app.add_option("--samples", settings.keys.samples_per_pixel, "light paths per pixel")
       ->check(CLI::Range(1, 65'536))
       ->capture_default_str();
+  app.add_option_function<std::string>(
+         "--sampler",
+         [&settings](const std::string& name) { settings.keys.sampler = drivers::simulator::samplers().at(name); },
+         "how light paths are drawn: shared by tiles of pixels (as if not given), even in each pixel, or plain")
+      ->check(CLI::IsMember(drivers::simulator::samplers()));
+  app.add_option_function<double>(
+         "--light-noise-mm", [&settings](double mm) { settings.keys.light_noise = mm * millimetre; },
+         "only as many paths as leave this noise of the light in the range at the highest frequency, at most "
+         "--samples; 0: always that many")
+      ->check(CLI::Range(0.0, 1000.0));
   app.add_option("--surfaces", settings.keys.max_surfaces,
                  "surfaces that a path may meet; 1: direct light only")
       ->check(CLI::Range(1, 64))

@@ -117,6 +117,8 @@ std::vector<Input> inputsOf(const RenderOptions& options, const FrameMaker& make
                             {"first_frame_at_ns", number(maker.schedule().start.ns)},
                             {"frame_interval_ns", number(maker.schedule().interval_ns)},
                             {"samples_per_pixel", number(settings.keys.samples_per_pixel)},
+                            {"sampler", drivers::simulator::nameOf(settings.keys.sampler)},
+                            {"light_noise_mm", number(settings.keys.light_noise.in(millimetre))},
                             {"max_surfaces", number(settings.keys.max_surfaces)},
                             {"pixel_extent", number(settings.keys.pixel_extent)},
                             {"seed", number(settings.keys.seed)},
@@ -151,6 +153,10 @@ struct Job {
 Result<Job> jobOf(const RenderOptions& options) {
   auto model = loadCamera(options.camera);
   if (!model) return model.error();
+  if (options.settings.keys.light_noise > Length{} && !model->hasPhasors()) {
+    return Error{Error::Code::InvalidArgument,
+                 fmt::format("--light-noise-mm cannot be had of a pulsed camera, as {} is: leave it out", model->model())};
+  }
   auto scene = loadScene(options.scene);
   if (!scene) return scene.error();
   const auto pose = options.pose.pose();

@@ -13,10 +13,7 @@ namespace {
 
 sim::TraceRequest requestFor(const sim::SensorModel& model, const drivers::simulator::Keys& keys) {
   sim::TraceRequest request = model.traceRequest();
-  request.samples_per_pixel = keys.samples_per_pixel;
-  request.max_surfaces = keys.max_surfaces;
-  request.pixel_extent = keys.pixel_extent;
-  request.seed = keys.seed;
+  keys.applyTo(request);
   return request;
 }
 
