@@ -159,6 +159,13 @@ TEST_F(Recorded, ReplayListsOneLinePerFrame) {
               HasSubstr(R"({"source":"kinect","sequence":0,"received_ns":1760000000000000000,)"));
 }
 
+TEST_F(Recorded, ReplayMakesOneHdf5FileOfARecording) {
+  const Ran ran = toftwin("replay " + path("a.mcap") + " --source kinect -o " + path("a.h5"));
+  EXPECT_EQ(ran.status, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("a.h5: HDF5, 15 frames: range, amplitude, flags"));
+  EXPECT_GT(std::filesystem::file_size(folder_ / "a.h5"), 15u * 16 * 8 * 4);
+}
+
 TEST_F(Recorded, ReplayExportsFrames) {
   const Ran one =
       toftwin("replay " + path("a.mcap") + " -o " + path("at.png") + " --from 1.25 --count 1");

@@ -61,6 +61,13 @@ TEST_F(WithDaemon, GrabWritesThePatternToTheMillimetre) {
   EXPECT_TRUE(shiftOf(image)) << "no position of the pattern looks like this";
 }
 
+TEST_F(WithDaemon, GrabPutsSeveralFramesIntoOneHdf5File) {
+  const Ran ran = run("grab pattern -o " + path("a.h5") + " --count 3 -p range,flags");
+  ASSERT_EQ(ran.status, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("a.h5: HDF5, 3 frames: range, flags"));
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "a.h5"));
+}
+
 TEST_F(WithDaemon, GrabOfSeveralFramesLeavesNoneOut) {
   const Ran ran = run("grab pattern -o " + path("a.png") + " --count 5");
   ASSERT_EQ(ran.status, 0) << ran.err;
