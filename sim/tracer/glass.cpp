@@ -44,17 +44,20 @@ void letShadowRaysThrough(RTCGeometry geometry, const bsdf::ThinGlass& glass) {
   rtcSetGeometryOccludedFilterFunction(geometry, filter);
 }
 
+void startThroughGlass(RTCRay16& rays, ThroughGlass& through) {
+  for (unsigned i = 0; i < kLaneCount; ++i) {
+    rays.id[i] = i;
+    through.share[i] = 1.0f;
+    through.extra_m[i] = 0.0;
+  }
+}
+
 void occludedThroughGlass(const int* valid, RTCScene scene, RTCRay16& rays, bool coherent,
                           ThroughGlass& through) {
   Context context;
   rtcInitIntersectContext(&context.embree);
   if (coherent) context.embree.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   context.through = &through;
-  for (unsigned i = 0; i < kLaneCount; ++i) {
-    rays.id[i] = i;
-    through.share[i] = 1.0f;
-    through.extra_m[i] = 0.0;
-  }
   rtcOccluded16(valid, scene, &context.embree, &rays);
 }
 

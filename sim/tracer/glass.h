@@ -18,7 +18,9 @@ void letShadowRaysThrough(RTCGeometry geometry, const bsdf::ThinGlass& glass);
 /// The same for one crossing of a shape that finds its crossings itself.
 void crossGlass(RTCIntersectContext* context, unsigned lane, const bsdf::ThinGlass& glass, double cosine);
 
-/// embree::occluded() for scenes with glass. The rays' ids become their lanes.
+/// Nothing is crossed yet. The rays' ids become their lanes.
+void startThroughGlass(RTCRay16& rays, ThroughGlass& through);
+/// embree::occluded() for scenes with glass; adds to what was crossed.
 void occludedThroughGlass(const int* valid, RTCScene scene, RTCRay16& rays, bool coherent,
                           ThroughGlass& through);
 

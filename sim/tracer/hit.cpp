@@ -46,7 +46,7 @@ void keepInside(const BuiltObject& object, std::uint32_t primitive, Vec3d p, dou
   }
 }
 
-Contact contactOfQuadric(const Quadric& quadric, int part, double embree_distance, Vec3d o, Vec3d d) {
+Contact contactOfQuadric(const Quadric& quadric, double blur, int part, double embree_distance, Vec3d o, Vec3d d) {
   const Vec3d local_o = quadric.toLocal(o - quadric.centre), local_d = quadric.toLocal(d);
   const Crossings at = crossings(quadric, part, local_o, local_d);
   // The same crossing as Embree's, whose ray was rounded; if the exact ray just misses, Embree's.
@@ -60,16 +60,39 @@ Contact contactOfQuadric(const Quadric& quadric, int part, double embree_distanc
   Contact contact{.normal = quadric.toScene(point.normal), .level = 0.0, .distance = t, .offset = 0.0, .onto = {}, .inside = {}};
   contact.level = dot(contact.normal, position);
   // Its intersection is computed in double precision: only the start's own rounding counts.
-  contact.offset = 2.0 * kUnitRoundoff * dot(absolute(contact.normal), absolute(position)) + quadric.blur + kSmallestOffset;
+  contact.offset = 2.0 * kUnitRoundoff * dot(absolute(contact.normal), absolute(position)) + blur + kSmallestOffset;
   return contact;
 }
 
 /// A triangle that the ray meets next to an edge.
-Contact contactAtEdge(const BuiltObject& object, std::uint32_t primitive, double distance, Vec3d o, Vec3d d) {
+Contact contactAtEdge(const BuiltObject& object, double blur, std::uint32_t primitive, double distance, Vec3d o,
+                      Vec3d d) {
   const TrianglePlane& plane = object.planes[primitive];
   Contact contact{.normal = plane.normal, .level = plane.level, .distance = distance,
-                  .offset = static_cast<double>(plane.offset), .onto = {}, .inside = {}};
-  keepInside(object, primitive, o + d * distance, static_cast<double>(plane.margin), contact);
+                  .offset = static_cast<double>(plane.offset) + blur, .onto = {}, .inside = {}};
+  const double margin = static_cast<double>(plane.margin) + kEdgeMargin * blur;
+  keepInside(object, primitive, o + d * distance, margin, contact);
+  return contact;
+}
+
+/// A plane of a moving object, in the scene; its bounds count what taking rays to the object rounds.
+TrianglePlane placed(const TrianglePlane& own, const Standing& standing) {
+  TrianglePlane plane = own;
+  plane.normal = standing.scene_from_object.rotate(own.normal);
+  plane.level = own.level + dot(plane.normal, standing.scene_from_object.translation_m);
+  plane.offset += static_cast<float>(standing.blur);
+  plane.margin += static_cast<float>(kEdgeMargin * standing.blur);
+  plane.margin_share = own.margin_share / own.margin * plane.margin;
+  return plane;
+}
+
+/// The same for a contact that was found in the object's frame.
+Contact placed(Contact contact, const Standing& standing) {
+  const Transform<World, Object>& pose = standing.scene_from_object;
+  contact.normal = pose.rotate(contact.normal);
+  contact.level += dot(contact.normal, pose.translation_m);
+  contact.onto = pose.rotate(contact.onto);
+  contact.inside = pose.rotate(contact.inside);
   return contact;
 }
 
@@ -106,6 +129,10 @@ struct PlaneLanes {
 
 bool isMissed(const RTCRayHit16& rays, std::size_t i) { return rays.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID; }
 
+TrianglePlane planeIn(const ObjectRow& row, unsigned primitive) {
+  return row.standing == nullptr ? row.planes[primitive] : placed(row.planes[primitive], *row.standing);
+}
+
 TOFTWIN_INLINE void takeLane(const ObjectRow& row, const TrianglePlane& plane, std::size_t i, PlaneLanes& planes, Hits& hits) {
   planes.normal.x[i] = plane.normal.x;
   planes.normal.y[i] = plane.normal.y;
@@ -127,7 +154,7 @@ bool meetOneTriangle(const Scene::Impl& scene, const RTCRayHit16& rays, PlaneLan
   for (std::size_t i = 0; i < kLaneCount; ++i) differ |= (rays.hit.geomID[i] ^ object) | (rays.hit.primID[i] ^ primitive);
   if (differ != 0 || object == RTC_INVALID_GEOMETRY_ID) return false;
   const ObjectRow row = scene.rows[object];
-  const TrianglePlane plane = row.planes[primitive];
+  const TrianglePlane plane = planeIn(row, primitive);
   for (std::size_t i = 0; i < kLaneCount; ++i) takeLane(row, plane, i, planes, hits);
   return true;
 }
@@ -136,7 +163,7 @@ void gather(const Scene::Impl& scene, const RTCRayHit16& rays, PlaneLanes& plane
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     const bool is_missed = isMissed(rays, i);
     const ObjectRow& row = is_missed ? scene.rows.back() : scene.rows[rays.hit.geomID[i]];
-    const TrianglePlane& plane = row.planes[is_missed ? 0 : rays.hit.primID[i]];
+    const TrianglePlane plane = planeIn(row, is_missed ? 0 : rays.hit.primID[i]);
     takeLane(row, plane, i, planes, hits);
   }
 }
@@ -225,6 +252,32 @@ TrianglePlane planeOf(Vec3d v0, Vec3d v1, Vec3d v2) {
   return plane;
 }
 
+namespace {
+
+Vec3d at(const Vec3Lanes& lanes, std::size_t i) { return {lanes.x[i], lanes.y[i], lanes.z[i]}; }
+
+/// Quadrics, and triangles next to their edges; in the object's frame if it moves.
+Contact contactByHand(const Scene::Impl& scene, const Packet& packet, const RTCRayHit16& rays, double distance,
+                      std::size_t i) {
+  const BuiltObject& object = scene.objects[rays.hit.geomID[i]];
+  const Standing* standing = scene.rows[rays.hit.geomID[i]].standing;
+  Vec3d o = at(packet.origin, i), d = at(packet.direction, i);
+  if (standing != nullptr) {
+    const Transform<Object, World> object_from_scene = standing->scene_from_object.inverse();
+    o = (object_from_scene * Point<World>{o}).m;
+    d = object_from_scene.rotate(d);
+  }
+  const double blur = standing != nullptr ? standing->blur : 0.0;
+  const Contact contact =
+      object.planes.empty()
+          ? contactOfQuadric(object.quadric, blur, static_cast<int>(rays.hit.u[i]),
+                             static_cast<double>(rays.ray.tfar[i]), o, d)
+          : contactAtEdge(object, blur, rays.hit.primID[i], distance, o, d);
+  return standing != nullptr ? placed(contact, *standing) : contact;
+}
+
+}  // namespace
+
 void findHits(const Scene::Impl& scene, const Packet& packet, const RTCRayHit16& rays, Hits& hits) {
   PlaneLanes planes;
   Lanes<int> by_hand;
@@ -232,15 +285,7 @@ void findHits(const Scene::Impl& scene, const Packet& packet, const RTCRayHit16&
   if (!placeOnPlanes(packet, rays, planes, hits, by_hand)) return;
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     if (by_hand[i] == 0 || isMissed(rays, i)) continue;
-    const BuiltObject& object = scene.objects[rays.hit.geomID[i]];
-    const Vec3d o{packet.origin.x[i], packet.origin.y[i], packet.origin.z[i]};
-    const Vec3d d{packet.direction.x[i], packet.direction.y[i], packet.direction.z[i]};
-    if (object.planes.empty()) {
-      const auto part = static_cast<int>(rays.hit.u[i]);
-      place(contactOfQuadric(object.quadric, part, static_cast<double>(rays.ray.tfar[i]), o, d), o, d, i, hits);
-    } else {
-      place(contactAtEdge(object, rays.hit.primID[i], hits.distance[i], o, d), o, d, i, hits);
-    }
+    place(contactByHand(scene, packet, rays, hits.distance[i], i), at(packet.origin, i), at(packet.direction, i), i, hits);
   }
 }
 

@@ -157,7 +157,7 @@ IndirectLight::Memory IndirectLight::memoryFor(const Tracing& tracing, int sampl
     way = std::max(way, norm(to - from) + kMetresPerRadian * std::acos(std::clamp(cosine, -1.0, 1.0)));
   }
   const double allowed = kMemory_m * samples;  // samples · way
-  const float most = tracing.scene.hasInstances() ? kMostWhereThingsMove : kMostSamples;
+  const float most = !tracing.scene.poses.empty() ? kMostWhereThingsMove : kMostSamples;
   const auto points = way * static_cast<double>(most) > allowed
                           ? std::max(kFewestSamples, static_cast<float>(allowed / way))
                           : most;

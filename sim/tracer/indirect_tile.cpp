@@ -121,7 +121,7 @@ void TileGatherer::lookFromCamera(int i, int j, Packet& camera_rays) {
   preparePacket(tracing_, block, camera_rays);
   startInTheMiddle(tracing_, block, camera_rays);
   RTCRayHit16 rays;
-  intersect(tracing_, camera_rays, rays, !tracing_.scene.hasInstances());
+  intersect(tracing_, camera_rays, rays, true);
   Lanes<float> unused{};
   endMissed(0.0f, rays, camera_rays, unused);
   findHits(tracing_.scene, camera_rays, rays, hits_);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "sim/tracer/cast.h"
 #include "sim/tracer/hit.h"
 #include "sim/tracer/packet.h"
 #include "sim/tracer/shade.h"
@@ -33,7 +34,7 @@ void record(RayLog* log, const Lanes<int>& valid, const RTCRay16& rays, bool coh
 void intersect(const Tracing& tracing, const Packet& packet, RTCRayHit16& rays, bool coherent) {
   setRays(packet, rays);
   record(tracing.log, packet.valid, rays.ray, coherent, false);
-  embree::intersect(packet.valid.v, tracing.scene.embree, rays, coherent);
+  castRays(tracing.scene, packet.valid.v, rays, coherent);
 }
 
 TOFTWIN_VECTOR
@@ -62,7 +63,7 @@ void gatherLightOf(const Tracing& tracing, std::size_t e, const Packet& packet, 
   RTCRay16 rays;
   setShadowRays(hits, places, rays);
   record(tracing.log, light.valid, rays, coherent, true);
-  embree::occluded(light.valid.v, tracing.scene.embree, rays, coherent);
+  castShadowRays(tracing.scene, light.valid.v, rays, coherent);
   for (std::size_t i = 0; i < kLaneCount; ++i) light.weight[i] = rays.tfar[i] < 0.0f ? 0.0f : light.weight[i];
   addLight(tracing, light, sums);
 }
@@ -85,7 +86,7 @@ void followFrom(const Tracing& tracing, int surface, Packet& packet, RTCRayHit16
   const Dimensions dimensions = dimensionsOf(tracing);
   const int surfaces = tracing.request.max_surfaces;
   for (;; ++surface) {
-    const bool is_coherent = surface == 0 && !tracing.scene.hasInstances();
+    const bool is_coherent = surface == 0;
     addEmission(packet, hits, sums.ambient);
     gatherDirectLight(tracing, packet, hits, surface, is_coherent, sums);
     // Where the surroundings shine, the last surface must still look for them.
@@ -106,7 +107,7 @@ namespace {
 void followPaths(const Tracing& tracing, Packet& packet, LaneSums& sums) {
   RTCRayHit16 rays;
   Hits hits;
-  intersect(tracing, packet, rays, !tracing.scene.hasInstances());
+  intersect(tracing, packet, rays, true);
   endMissed(tracing.scene.ambient_radiance, rays, packet, sums.ambient);
   if (!isAny(packet.valid)) return;
   findHits(tracing.scene, packet, rays, hits);
@@ -345,7 +346,7 @@ void traceTruth(const Tracing& tracing, const Block& block, TruthLanes& truth) {
   startInTheMiddle(tracing, block, packet);
   RTCRayHit16 rays;
   Hits hits;
-  intersect(tracing, packet, rays, !tracing.scene.hasInstances());
+  intersect(tracing, packet, rays, true);
   Lanes<float> unused{};
   endMissed(0.0f, rays, packet, unused);
   findHits(tracing.scene, packet, rays, hits);

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "sim/tracer/hit.h"
-#include "sim/tracer/scene_embree.h"
 
 namespace toftwin::sim {
 namespace {
@@ -19,24 +18,15 @@ constexpr TrianglePlane kNoTriangle{
 
 double largest(Vec3d v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); }
 
-/// Embree takes a ray into an instance's frame with M⁻¹ p − M⁻¹ t, in single precision. M's entries are
-/// rounded (u), its inverse is made of products of two of them over a determinant near 1 (8u), and a
-/// component of the result sums three products and one more term (4u): per component below
-/// 16 u (|p|₁ + |t|₁), thus below 48 u (|p|∞ + |t|∞) √3 as a distance, p on the object and t its place.
+/// cast.cpp takes a ray that starts at p into an object's frame with Rᵀ (p − t), in single precision. Let
+/// D ≥ |p − t| for p on the object. t is rounded and the difference again: u (|t|∞ + D) per component. R's
+/// entries are rounded, and a component of the result sums three products: 4 u D more. As a distance:
+///   √3 (√3 u (|t|∞ + D) + 4 u D) < 10 u D + 3 u |t|∞,    here with a fifth more.
 double blurOf(double reach, Vec3d translation) {
-  return 48.0 * std::sqrt(3.0) * kUnitRoundoff * (reach + 2.0 * largest(translation));
+  return kUnitRoundoff * (12.0 * std::sqrt(3.0) * reach + 4.0 * largest(translation));
 }
 
 }  // namespace
-
-void fillRows(Scene::Impl& scene) {
-  scene.rows.clear();
-  for (const BuiltObject& object : scene.objects) {
-    scene.rows.push_back({.planes = object.planes.empty() ? &kNoTriangle : object.planes.data(),
-                          .material = scene.materials[object.material]});
-  }
-  scene.rows.push_back({.planes = &kNoTriangle, .material = {.albedo = 0.0f}});
-}
 
 void moveInto(BuiltObject& object, const Transform<World, Object>& scene_from_object) {
   for (Vec3d& v : object.vertices) v = (scene_from_object * Point<Object>{v}).m;
@@ -53,24 +43,33 @@ void addPlanes(BuiltObject& object) {
   }
 }
 
-BuiltObject posedCopy(const BuiltObject& own, const Transform<World, Object>& scene_from_object) {
-  BuiltObject posed = own;
+double reachOf(const BuiltObject& own) {
   double reach = own.quadric.radius + own.quadric.half_height;
   for (const Vec3d& v : own.vertices) reach = std::max(reach, largest(v));
-  const double blur = blurOf(reach, scene_from_object.translation_m);
-  moveInto(posed, scene_from_object);
-  posed.quadric.blur = blur;
-  for (std::size_t i = 0; i < posed.planes.size(); ++i) {
-    TrianglePlane& plane = posed.planes[i];
-    plane.normal = normalised(scene_from_object.rotate(plane.normal));
-    plane.level = dot(plane.normal, posed.vertices[posed.triangles[i][0]]);
-    const double share_of_margin =
-        static_cast<double>(plane.margin_share) / static_cast<double>(plane.margin);
-    plane.offset += static_cast<float>(blur);
-    plane.margin += static_cast<float>(4.0 * blur);
-    plane.margin_share = static_cast<float>(share_of_margin * static_cast<double>(plane.margin));
+  return reach;
+}
+
+void placeMovers(Scene::Impl& scene, const Scene::Impl& loaded, Duration time) {
+  scene.rows.clear();
+  for (const BuiltObject& object : scene.objects) {
+    scene.rows.push_back({.planes = object.planes.empty() ? &kNoTriangle : object.planes.data(),
+                          .material = scene.materials[object.material]});
   }
-  return posed;
+  scene.rows.push_back({.planes = &kNoTriangle, .material = {.albedo = 0.0f}});
+  scene.poses.reserve(loaded.movers.size());  // rows point to them
+  for (const Mover& mover : loaded.movers) {
+    Standing& standing = scene.poses.emplace_back();
+    standing.embree = mover.embree;
+    Transform<World, Object>& pose = standing.scene_from_object = poseAt(mover.motion, mover.start, time);
+    pose.translation_m = pose.translation_m - loaded.origin_in_world;
+    standing.axes = {pose.rotate({1, 0, 0}), pose.rotate({0, 1, 0}), pose.rotate({0, 0, 1})};
+    standing.blur = blurOf(mover.reach, pose.translation_m);
+    RTCBounds box;
+    rtcGetSceneBounds(mover.embree, &box);
+    standing.lower = {box.lower_x, box.lower_y, box.lower_z};
+    standing.upper = {box.upper_x, box.upper_y, box.upper_z};
+    scene.rows[mover.object].standing = &standing;
+  }
 }
 
 bool Scene::moves() const { return !impl_->movers.empty() || impl_->loaded != nullptr; }
@@ -94,14 +93,7 @@ Scene Scene::at(Duration time) const {
   posed->diagonal_m = loaded->diagonal_m;
   posed->device = loaded->device;
   posed->still = loaded->still;
-  std::vector<Transform<World, Object>> poses;
-  for (const Mover& mover : loaded->movers) {
-    Transform<World, Object>& pose = poses.emplace_back(poseAt(mover.motion, mover.start, time));
-    pose.translation_m = pose.translation_m - loaded->origin_in_world;
-    posed->objects[mover.object] = std::cref(posed->owned.emplace_back(posedCopy(mover.own, pose)));
-  }
-  fillRows(*posed);
-  posed->embree = makeInstances(*loaded, poses);
+  placeMovers(*posed, *loaded, time);
   return Scene{std::move(posed)};
 }
 

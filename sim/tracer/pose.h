@@ -7,10 +7,9 @@ namespace toftwin::sim {
 
 /// Takes an object from its own frame to that of the scene.
 void moveInto(BuiltObject& object, const Transform<World, Object>& scene_from_object);
-/// Planes of its triangles where it stands.
+/// Planes of its triangles, in the frame that it is in.
 void addPlanes(BuiltObject& object);
-/// An object that Embree sees through an instance, as it stands there: with error bounds that count what
-/// the instance's transform rounds. `own` has planes.
-BuiltObject posedCopy(const BuiltObject& own, const Transform<World, Object>& scene_from_object);
+/// The largest coordinate of anything on it, in its own frame.
+double reachOf(const BuiltObject& own);
 
 }  // namespace toftwin::sim

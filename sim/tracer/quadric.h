@@ -23,7 +23,6 @@ struct Quadric {
   double half_height = 0.0;
   Vec3d centre;               ///< in the scene's frame
   std::array<Vec3d, 3> axes;  ///< x, y, z of its own frame in the scene's frame
-  double blur = 0.0;          ///< bound on the error of taking rays to a moving one's frame, m
 
   [[nodiscard]] Vec3d toLocal(Vec3d v) const { return {dot(v, axes[0]), dot(v, axes[1]), dot(v, axes[2])}; }
   [[nodiscard]] Vec3d toScene(Vec3d v) const { return axes[0] * v.x + axes[1] * v.y + axes[2] * v.z; }

@@ -181,12 +181,11 @@ class DirectTracer {
       traceTruth(tracing_, block, truth);
       return;
     }
-    const bool is_coherent = !tracing_.scene.hasInstances();
-    intersect(tracing_, packet_, rays_, is_coherent);
+    intersect(tracing_, packet_, rays_, true);
     endMissed(tracing_.scene.ambient_radiance, rays_, packet_, sums.ambient);
     findHits(tracing_.scene, packet_, rays_, hits_);
     addEmission(packet_, hits_, sums.ambient);
-    gatherDirectLight(tracing_, packet_, hits_, 0, is_coherent, sums);
+    gatherDirectLight(tracing_, packet_, hits_, 0, true, sums);
     keepTruth(tracing_, packet_, hits_, truth);
   }
 

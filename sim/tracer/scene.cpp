@@ -97,7 +97,6 @@ Vec3d vectorOf(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
 }  // namespace
 
 Scene::Impl::~Impl() {
-  if (embree != nullptr && embree != still) rtcReleaseScene(embree);
   if (loaded != nullptr) return;  // the rest is that one's
   for (const Mover& mover : movers) {
     if (mover.embree != nullptr) rtcReleaseScene(mover.embree);
@@ -236,15 +235,12 @@ struct SceneBuilder {
       pose.translation_m = pose.translation_m - scene->origin_in_world;
       if (!file.objects[i].motion.isStill()) {
         addPlanes(object);
-        scene->movers.push_back(
-            {i, file.objects[i].motion, file.objects[i].world_from_object, object, nullptr});
-        object = posedCopy(scene->movers.back().own, pose);
+        scene->movers.push_back({i, file.objects[i].motion, file.objects[i].world_from_object, reachOf(object)});
         continue;
       }
       moveInto(object, pose);
       addPlanes(object);
     }
-    fillRows(*scene);
   }
 
   Result<> buildEmbree() {
@@ -258,18 +254,16 @@ struct SceneBuilder {
                                                       static_cast<int>(rtcGetDeviceError(nullptr)))};
     }
     std::vector<NumberedObject> still;
-    std::vector<Transform<World, Object>> poses;
     for (std::size_t i = 0; i < scene->objects.size(); ++i) {
       if (file.objects[i].motion.isStill())
         still.push_back({static_cast<unsigned>(i), &scene->objects[i].get()});
     }
     scene->still = makeEmbreeScene(scene->device, still);
     for (Mover& mover : scene->movers) {
-      mover.embree = makeEmbreeScene(scene->device, {{static_cast<unsigned>(mover.object), &mover.own}});
-      poses.push_back(mover.start);
-      poses.back().translation_m = poses.back().translation_m - scene->origin_in_world;
+      const BuiltObject& object = scene->objects[mover.object];
+      mover.embree = makeEmbreeScene(scene->device, {{static_cast<unsigned>(mover.object), &object}});
     }
-    scene->embree = scene->movers.empty() ? scene->still : makeInstances(*scene, poses);
+    placeMovers(*scene, *scene, {});
     if (const RTCError error = rtcGetDeviceError(scene->device); error != RTC_ERROR_NONE) {
       return Error{Error::Code::Internal,
                    fmt::format("Embree could not build the scene (error {})", static_cast<int>(error))};

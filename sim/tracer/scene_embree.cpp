@@ -32,27 +32,6 @@ RTCScene newScene(RTCDevice device) {
   return scene;
 }
 
-void attachInstance(RTCDevice device, RTCScene scene, RTCScene shown, const std::array<float, 12>& columns) {
-  RTCGeometry instance = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_INSTANCE);
-  rtcSetGeometryInstancedScene(instance, shown);
-  rtcSetGeometryTransform(instance, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns.data());
-  rtcCommitGeometry(instance);
-  rtcAttachGeometry(scene, instance);
-  rtcReleaseGeometry(instance);
-}
-
-std::array<float, 12> columnsOf(const Transform<World, Object>& pose) {
-  std::array<float, 12> columns{};
-  const Vec3d all[4] = {pose.rotate({1, 0, 0}), pose.rotate({0, 1, 0}), pose.rotate({0, 0, 1}),
-                        pose.translation_m};
-  for (std::size_t i = 0; i < 4; ++i) {
-    columns[3 * i] = static_cast<float>(all[i].x);
-    columns[3 * i + 1] = static_cast<float>(all[i].y);
-    columns[3 * i + 2] = static_cast<float>(all[i].z);
-  }
-  return columns;
-}
-
 }  // namespace
 
 RTCScene makeEmbreeScene(RTCDevice device, const std::vector<NumberedObject>& objects) {
@@ -63,20 +42,6 @@ RTCScene makeEmbreeScene(RTCDevice device, const std::vector<NumberedObject>& ob
     rtcCommitGeometry(geometry);
     rtcAttachGeometryByID(scene, geometry, id);
     rtcReleaseGeometry(geometry);
-  }
-  rtcCommitScene(scene);
-  return scene;
-}
-
-/// Only the boxes of the instances are sorted anew: microseconds, whatever they show.
-RTCScene makeInstances(const Scene::Impl& loaded, const std::vector<Transform<World, Object>>& poses) {
-  RTCScene scene = newScene(loaded.device);
-  // The identity takes no rounding: what stands still is met exactly as without instances.
-  if (loaded.movers.size() < loaded.objects.size()) {
-    attachInstance(loaded.device, scene, loaded.still, columnsOf(Transform<World, Object>{}));
-  }
-  for (std::size_t i = 0; i < loaded.movers.size(); ++i) {
-    attachInstance(loaded.device, scene, loaded.movers[i].embree, columnsOf(poses[i]));
   }
   rtcCommitScene(scene);
   return scene;

@@ -13,10 +13,7 @@ struct NumberedObject {
   const BuiltObject* object;
 };
 
-/// An Embree scene of these objects, ready to be traced or shown by instances. They must outlive it.
+/// An Embree scene of these objects, ready to be traced. They must outlive it.
 RTCScene makeEmbreeScene(RTCDevice device, const std::vector<NumberedObject>& objects);
-
-/// An Embree scene that shows the still part and each mover at its pose (scene frame).
-RTCScene makeInstances(const Scene::Impl& loaded, const std::vector<Transform<World, Object>>& poses);
 
 }  // namespace toftwin::sim

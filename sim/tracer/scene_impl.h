@@ -34,7 +34,8 @@ struct TrianglePlane {
 /// One object as Embree sees it; its index is Embree's geometry id.
 struct BuiltObject {
   std::size_t material = 0;
-  /// In the scene's frame; empty for quadrics. Embree gets them rounded to single precision.
+  /// In the scene's frame, or in its own if it moves; empty for quadrics. Embree gets them rounded to
+  /// single precision.
   std::vector<Vec3d> vertices;
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::vector<TrianglePlane> planes;  ///< of the triangles
@@ -44,23 +45,34 @@ struct BuiltObject {
   const bsdf::ThinGlass* glass = nullptr;  ///< if it is one: shadow rays go through
 };
 
+/// Where a moving object stands. Its geometry stays in its own frame: rays are taken there, and what they
+/// meet is taken back.
+struct Standing {
+  RTCScene embree = nullptr;
+  Transform<World, Object> scene_from_object;
+  std::array<Vec3d, 3> axes;  ///< of the object, in the scene
+  Vec3f lower, upper;         ///< the box around it, in its own frame
+  double blur = 0.0;          ///< bound on what rounding moves rays by that are taken there, m
+};
+
 /// What the tracer reads of an object at each hit.
 struct ObjectRow {
   const TrianglePlane* planes;  ///< of a quadric: one that makes every hit one to compute by hand
   Material material;
+  const Standing* standing = nullptr;  ///< of a moving object
 };
 
-/// A moving object in its own frame, scaled, and the Embree scene that instances of it show.
+/// A moving object, scaled, and an Embree scene of it alone.
 struct Mover {
   std::size_t object = 0;
   Motion motion;
   Transform<World, Object> start;
-  BuiltObject own;
+  double reach = 0.0;  ///< largest |coordinate| in its own frame
   RTCScene embree = nullptr;
 };
 
-/// A scene as it was loaded, or as it stands at another time. The latter owns no more than its moving
-/// objects and a small Embree scene of instances, and keeps what was loaded alive.
+/// A scene as it was loaded, or as it stands at another time. The latter owns no more than the places of
+/// its moving objects, and keeps what was loaded alive.
 struct Scene::Impl {
   Impl() = default;
   Impl(const Impl&) = delete;
@@ -76,6 +88,7 @@ struct Scene::Impl {
   std::vector<std::reference_wrapper<const BuiltObject>> objects;
   std::vector<ObjectRow> rows;  ///< of `objects`, which they point into; the last one is that of nothing
   std::vector<Mover> movers;    ///< of the loaded scene
+  std::vector<Standing> poses;  ///< of the movers
   std::vector<ForeignEmitterSpec> foreign_emitters;
   float ambient_radiance = 0.0f;
   bool is_matt = true;  ///< neither special models, textures nor surroundings but even ones: the fast path
@@ -87,16 +100,12 @@ struct Scene::Impl {
   double diagonal_m = 1.0;  ///< of the box around everything
 
   RTCDevice device = nullptr;
-  RTCScene still = nullptr;   ///< what does not move
-  RTCScene embree = nullptr;  ///< everything: `still` itself, or instances of it and of the movers
-
-  /// Embree 3.13 may search coherent packets in instances without end.
-  [[nodiscard]] bool hasInstances() const { return embree != still; }
+  RTCScene still = nullptr;  ///< what does not move
 
   std::shared_ptr<const Impl> loaded;  ///< of a scene at another time: what it was made from
 };
 
-/// Rows for the objects, once they stand in their places.
-void fillRows(Scene::Impl& scene);
+/// Puts the movers into their places at a time, and makes rows for all objects.
+void placeMovers(Scene::Impl& scene, const Scene::Impl& loaded, Duration time);
 
 }  // namespace toftwin::sim

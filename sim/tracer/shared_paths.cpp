@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sim/tracer/cast.h"
 #include "sim/tracer/hit.h"
 #include "sim/tracer/phasor.h"
 #include "sim/tracer/shade.h"
@@ -172,7 +173,7 @@ bool isDark(const Ends& ends, std::size_t lane) {
 /// The first surfaces of the block's sample: their own light, and who goes on from there.
 bool start(const Tracing& tracing, const Block& block, int sample, int last, Packet& packet,
            Lanes<int>& started, Starts& starts, LaneSums& sums) {
-  const bool is_coherent = !tracing.scene.hasInstances();
+  constexpr bool is_coherent = true;
   preparePacket(tracing, block, packet);
   startAtPlaces(tracing, block, sample, last, packet);
   started = packet.valid;
@@ -271,7 +272,7 @@ using Tiles = std::array<Starts, Tile::kBlocks>;
 /// p_k.
 double connectAll(const Tracing& tracing, const Tiles& starts, const End& end, std::size_t own,
                   std::array<Connections, Tile::kBlocks>& to) {
-  const bool is_coherent = !tracing.scene.hasInstances();
+  constexpr bool is_coherent = true;
   double density = 0.0;
   for (std::size_t b = 0; b < to.size(); ++b) {
     connect(starts[b], end, to[b]);
@@ -279,7 +280,7 @@ double connectAll(const Tracing& tracing, const Tiles& starts, const End& end, s
     if (b == own) to[b].valid[end.lane] = 0;
     if (isAny(to[b].valid)) {
       record(tracing.log, to[b].valid, to[b].rays, is_coherent, true);
-      embree::occluded(to[b].valid.v, tracing.scene.embree, to[b].rays, is_coherent);
+      castShadowRays(tracing.scene, to[b].valid.v, to[b].rays, is_coherent);
       for (std::size_t i = 0; i < kLaneCount; ++i) {
         const bool is_hidden = (to[b].valid[i] != 0) & (to[b].rays.tfar[i] < 0.0f);
         to[b].density[i] = is_hidden ? 0.0 : to[b].density[i];

@@ -5,7 +5,7 @@
 #include <limits>
 #include <numbers>
 
-#include "sim/tracer/glass.h"
+#include "sim/tracer/cast.h"
 #include "sim/tracer/hit.h"
 #include "sim/tracer/path.h"
 #include "sim/tracer/shade.h"
@@ -106,10 +106,10 @@ void shadow(const Tracing& tracing, const Hits& hits, const Vec3Lanes& places, D
   RTCRay16 rays;
   setShadowRays(hits, places, rays);
   if (!tracing.scene.has_glass) {
-    embree::occluded(light.valid.v, tracing.scene.embree, rays, coherent);
+    castShadowRays(tracing.scene, light.valid.v, rays, coherent);
   } else {
     ThroughGlass through;
-    occludedThroughGlass(light.valid.v, tracing.scene.embree, rays, coherent, through);
+    castShadowRays(tracing.scene, light.valid.v, rays, coherent, through);
     for (std::size_t i = 0; i < kLaneCount; ++i) {
       light.weight[i] *= through.share[i];
       light.length[i] += through.extra_m[i];
@@ -319,14 +319,17 @@ void bounceAll(const Tracing& tracing, const Hits& hits, int surface, Packet& pa
 }
 
 /// Where on the picture of its material a ray met an object.
-TexturePlace placeOf(const BuiltObject& object, const RTCRayHit16& rays, const Hits& hits, std::size_t i) {
+TexturePlace placeOf(const BuiltObject& object, const Standing* standing, const RTCRayHit16& rays, const Hits& hits,
+                     std::size_t i) {
   if (!object.places.empty()) {
     const auto& [a, b, c] = object.places[rays.hit.primID[i]];
     const float u = rays.hit.u[i], v = rays.hit.v[i], w = 1.0f - u - v;
     return {w * a.u + u * b.u + v * c.u, w * a.v + u * b.v + v * c.v};
   }
+  Vec3d p = at(hits.position, i);
+  if (standing != nullptr) p = (standing->scene_from_object.inverse() * Point<World>{p}).m;
   return texturePlaceOn(object.quadric, static_cast<int>(rays.hit.u[i]),
-                        object.quadric.toLocal(at(hits.position, i) - object.quadric.centre));
+                        object.quadric.toLocal(p - object.quadric.centre));
 }
 
 }  // namespace
@@ -335,11 +338,12 @@ void applyTextures(const Scene::Impl& scene, const RTCRayHit16& rays, const Pack
   if (scene.textures.empty()) return;
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     if (packet.valid[i] == 0) continue;
-    const int texture = scene.rows[rays.hit.geomID[i]].material.texture;
+    const ObjectRow& row = scene.rows[rays.hit.geomID[i]];
+    const int texture = row.material.texture;
     if (texture == 0) continue;
     const BuiltObject& object = scene.objects[rays.hit.geomID[i]];
-    hits.albedo[i] *=
-        scene.textures[static_cast<std::size_t>(texture - 1)]->at(placeOf(object, rays, hits, i));
+    hits.albedo[i] *= scene.textures[static_cast<std::size_t>(texture - 1)]->at(
+        placeOf(object, row.standing, rays, hits, i));
   }
 }
 
@@ -353,8 +357,8 @@ void followSpecialPaths(const Tracing& tracing, Packet& packet, LaneSums& sums) 
   Hits hits;
   for (int surface = 0;; ++surface) {
     setRays(packet, rays);
-    const bool is_coherent = surface == 0 && !tracing.scene.hasInstances();
-    embree::intersect(packet.valid.v, tracing.scene.embree, rays, is_coherent);
+    const bool is_coherent = surface == 0;
+    castRays(tracing.scene, packet.valid.v, rays, is_coherent);
     addSeenEmitters(tracing, packet, rays, course, sums);
     endMissed(tracing, rays, course, packet, sums);
     if (surface == surfaces || !isAny(packet.valid)) return;

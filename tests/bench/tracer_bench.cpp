@@ -151,7 +151,7 @@ struct Rates {
 
 Rates measure(const Scene& scene, const TraceRequest& what, const RayLog& log, int runs) {
   const double rays = static_cast<double>(raysOf(log)) * 1e-6;
-  const RTCScene embree = scene.impl().embree;
+  const RTCScene embree = scene.impl().still;
   Rates rates;
   Light light;  // its memory is used again, as when frame follows frame
   for (int i = 0; i < runs; ++i) {
