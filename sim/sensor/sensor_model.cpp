@@ -1,38 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "sim/sensor/sensor_model.h"
-
-#include "sim/sensor/factory_calibration.h"
-
+// What a camera file makes: its rays, responses, decoder and light. Frames are made in sensor_expose.cpp.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-#include "sim/decode/decode.h"
 #include "sim/images/content_hash.h"
-#include "sim/sensor/camera_file.h"
 #include "sim/sensor/color.h"
-#include "sim/sensor/correlate.h"
-#include "sim/sensor/exposures.h"
+#include "sim/sensor/factory_calibration.h"
 #include "sim/sensor/parameters.h"
+#include "sim/sensor/sensor_model_impl.h"
 
 namespace toftwin::sim {
-
-struct SensorModel::Impl {
-  CameraFile file;
-  std::vector<AnyEffect> effects;
-  // Derived from the two above by build():
-  CameraInfo camera;
-  std::string id;
-  std::vector<Response> responses;
-  DecodeSettings decoder;
-  Rays rays;
-};
-
 namespace {
-
-constexpr Bounds kExposureBounds_us{1.0, 20'000.0};
 
 std::string canonicalText(CameraFile file, const std::vector<AnyEffect>& effects) {
   CanonicalText canonical;
@@ -88,85 +69,6 @@ std::vector<Response> responsesOf(const CameraFile& file) {
                                         modulation.frequency, file.sampling.harmonics)});
   }
   return responses;
-}
-
-/// Applies those effects that act on this type of image, in their order. Each of several exposures has noise of
-/// its own.
-template <class Of>
-Of applyAll(Of image, const std::vector<AnyEffect>& effects, const Conditions& now,
-            std::uint64_t seed, std::uint64_t frame, std::size_t exposure = 0) {
-  constexpr std::size_t kMostEffects = 1000;
-  for (std::size_t place = 0; place < effects.size(); ++place) {
-    std::visit(
-        [&]<class E>(const E& effect) {
-          if constexpr (std::is_same_v<ImageOf<E>, Of>) {
-            image = effect.apply(std::move(image), now,
-                                 Random{seed, frame, effectKey(E::about.name, place + kMostEffects * exposure)});
-          }
-        },
-        effects[place]);
-  }
-  return image;
-}
-
-bool anyAddsHarmonics(const std::vector<AnyEffect>& effects) {
-  return std::ranges::any_of(effects, [](const AnyEffect& effect) { return std::holds_alternative<Harmonics>(effect); });
-}
-
-bool anyActsOnLight(const std::vector<AnyEffect>& effects) {
-  for (const AnyEffect& any : effects) {
-    if (std::visit([]<class E>(const E&) { return std::is_same_v<ImageOf<E>, Light>; }, any))
-      return true;
-  }
-  return false;
-}
-
-template <class T>
-Image<T> cropped(const Image<T>& full, int left, int top, int width, int height) {
-  Image<T> part{width, height};
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) part(x, y) = full(left + x, top + y);
-  }
-  return part;
-}
-
-DecodeRays cropped(const DecodeRays& full, int left, int top, int width, int height) {
-  return {cropped(full.x, left, top, width, height), cropped(full.z, left, top, width, height)};
-}
-
-/// The charge that the light makes in one exposure, free of noise.
-Samples samplesOf(const SensorModel::Impl& impl, const Light& light, double exposure_factor) {
-  if (impl.file.isPulsed()) {
-    const CameraFile::PulseKeys& keys = impl.file.pulses.front();
-    const double seconds = exposure_factor * keys.exposure.in(second);
-    return collectGates(light, keys.pulse, impl.file.pixel.electrons_per_radiance_s * seconds,
-                        keys.open_share);
-  }
-  std::vector<Response> responses = impl.responses;
-  for (Response& response : responses) response.electrons_per_radiance *= exposure_factor;
-  return correlate(light, responses, impl.file.sampling.steps, impl.file.sampling.taps);
-}
-
-Samples samplesOf(const SensorModel::Impl& impl, const Light& light) {
-  const auto& factors = impl.file.sampling.exposure_factors;
-  if (factors.size() == 1) return samplesOf(impl, light, factors.front());
-  std::vector<Samples> parts;
-  for (const double factor : factors) parts.push_back(samplesOf(impl, light, factor));
-  return joinExposures(parts);
-}
-
-RangeImage decodeRegion(const SensorModel::Impl& impl, const Samples& samples, int left, int top) {
-  const int width = samples.width(), height = samples.height();
-  DecodeSettings settings = impl.decoder;
-  for (Image<std::complex<float>>& turns : settings.pixel_turns)
-    turns = cropped(turns, left, top, width, height);
-  return decode(samples, settings, cropped(impl.rays, left, top, width, height));
-}
-
-Result<> firstProblem(const NumberSetter& setter, std::string_view parameter, double value) {
-  if (setter.problem.empty()) return {};
-  return Error{Error::Code::InvalidArgument, fmt::format("{} = {:.12g} is out of bounds: it {}",
-                                                         parameter, value, setter.problem)};
 }
 
 }  // namespace
@@ -254,7 +156,7 @@ bool SensorModel::hasPhasors() const { return !impl_->file.isPulsed(); }
 
 std::vector<std::uint8_t> SensorModel::correlatedTerms() const {
   const auto harmonics = static_cast<std::size_t>(impl_->file.sampling.harmonics);
-  if (anyAddsHarmonics(impl_->effects)) return std::vector<std::uint8_t>(impl_->responses.size() * harmonics, 1);
+  if (impl_->addsHarmonics()) return std::vector<std::uint8_t>(impl_->responses.size() * harmonics, 1);
   return sim::correlatedTerms(impl_->responses, impl_->file.sampling.harmonics);
 }
 
@@ -307,61 +209,6 @@ TraceRequest SensorModel::traceRequest() const {
   return request;
 }
 
-SensorModel::Exposed SensorModel::expose(const Light& light, const Moment& moment,
-                                         std::uint64_t seed, std::uint64_t frame, int region_x,
-                                         int region_y, History before) const {
-  return readOut(collect(light, moment, seed, frame, region_x, region_y), moment, seed, frame,
-                 region_x, region_y, before);
-}
-
-Samples SensorModel::collect(const Light& light, const Moment& moment, std::uint64_t seed,
-                             std::uint64_t frame, int region_x, int region_y) const {
-  if (!anyActsOnLight(impl_->effects)) return samplesOf(*impl_, light);
-  const Conditions now{moment, impl_->camera, region_x, region_y};
-  const bool wants_all = light.frequencies.empty() || anyAddsHarmonics(impl_->effects);
-  Light seen = correlatedPart(light, impl_->responses, wants_all);
-  return samplesOf(*impl_, applyAll(std::move(seen), impl_->effects, now, seed, frame));
-}
-
-SensorModel::Exposed SensorModel::readOut(Samples collected, const Moment& moment,
-                                          std::uint64_t seed, std::uint64_t frame, int region_x,
-                                          int region_y, History before) const {
-  const Conditions now{moment, impl_->camera, region_x, region_y, before};
-  const std::size_t count = exposureCount();
-  Exposed exposed;
-  if (count == 1) {
-    exposed = readOutOne(std::move(collected), 0, now, seed, frame);
-  } else {
-    std::vector<Samples> samples;
-    std::vector<RangeImage> ranges;
-    for (std::size_t e = 0; e < count; ++e) {
-      Conditions then = now;
-      Samples earlier;
-      if (before.collected != nullptr) {
-        earlier = samplesOfExposure(*before.collected, e, count);
-        then.before.collected = &earlier;
-      }
-      Exposed one = readOutOne(samplesOfExposure(collected, e, count), e, then, seed, frame);
-      samples.push_back(std::move(one.samples));
-      ranges.push_back(std::move(one.range));
-    }
-    exposed = {joinExposures(samples), mergeExposures(ranges)};
-  }
-  exposed.range = applyAll(std::move(exposed.range), impl_->effects, now, seed, frame);
-  return exposed;
-}
-
-SensorModel::Exposed SensorModel::readOutOne(Samples collected, std::size_t exposure,
-                                             const Conditions& now, std::uint64_t seed,
-                                             std::uint64_t frame) const {
-  Samples counted = applyAll(std::move(collected), impl_->effects, now, seed, frame, exposure);
-  const bool is_whole =
-      counted.width() == impl_->camera.width && counted.height() == impl_->camera.height;
-  RangeImage range = is_whole ? decode(counted, impl_->decoder, impl_->rays)
-                              : decodeRegion(*impl_, counted, now.left, now.top);
-  return {std::move(counted), std::move(range)};
-}
-
 bool SensorModel::collectsTheSameEachFrame() const {
   for (const AnyEffect& any : impl_->effects) {
     const bool changes = std::visit(
@@ -382,79 +229,6 @@ bool SensorModel::remembers() const {
     return std::visit(
         []<class E>(const E&) { return E::about.explains.contains(Covariate::History); }, any);
   });
-}
-
-std::vector<Parameter> SensorModel::parameters() const {
-  const std::vector<Exposure> exposures = this->exposures({});
-  Parameter exposure{"exposure_us", {}, kExposureBounds_us};
-  if (std::ranges::all_of(exposures, [&](const Exposure& raw) {
-        return raw.duration == exposures.front().duration;
-      })) {
-    exposure.value = exposures.front().duration.in(microsecond);
-  }
-  std::vector<Parameter> all{std::move(exposure)};
-  for (AnyEffect any : impl_->effects) {
-    std::visit(
-        [&]<class E>(E& effect) {
-          NumberSetter lister{"", 0.0};
-          effect.visit(lister);
-          for (Parameter& parameter : lister.met) {
-            parameter.name = fmt::format("{}.{}", E::about.name, parameter.name);
-            all.push_back(std::move(parameter));
-          }
-        },
-        any);
-  }
-  return all;
-}
-
-std::vector<std::string> SensorModel::parameterNames() const {
-  std::vector<std::string> names;
-  for (Parameter& parameter : parameters()) names.push_back(std::move(parameter.name));
-  return names;
-}
-
-Result<SensorModel> SensorModel::with(std::string_view parameter, double value) const {
-  Impl changed = *impl_;
-  changed.decoder = {};
-  bool is_known = false;
-  if (parameter == "exposure_us") {
-    is_known = true;
-    if (std::isnan(value) || !kExposureBounds_us.contains(value)) {
-      return Error{Error::Code::InvalidArgument,
-                   fmt::format("exposure_us = {:.12g} is out of bounds: it must be {} us", value,
-                               settings::describe(kExposureBounds_us))};
-    }
-    for (auto& modulation : changed.file.modulations) modulation.exposure = value * microsecond;
-    for (auto& keys : changed.file.pulses) keys.exposure = value * microsecond;
-  }
-  for (AnyEffect& any : changed.effects) {
-    const Result<> done = std::visit(
-        [&]<class E>(E& effect) -> Result<> {
-          const std::string prefix = fmt::format("{}.", E::about.name);
-          if (!parameter.starts_with(prefix)) return {};
-          NumberSetter setter{parameter.substr(prefix.size()), value};
-          effect.visit(setter);
-          is_known |= setter.is_set;
-          if (auto within = firstProblem(setter, parameter, value); !within) return within;
-          if constexpr (requires { effect.problem(); }) {
-            if (const std::string problem = effect.problem(); setter.is_set && !problem.empty()) {
-              return Error{Error::Code::InvalidArgument,
-                           fmt::format("with {} = {:.12g}, {} {}", parameter, value, E::about.name,
-                                       problem)};
-            }
-          }
-          return {};
-        },
-        any);
-    if (!done) return done.error();
-  }
-  if (!is_known) {
-    return Error{Error::Code::NotFound,
-                 fmt::format("{} has no parameter \"{}\"; there are: {}", model(), parameter,
-                             fmt::join(parameterNames(), ", "))};
-  }
-  return SensorModel{build(std::move(changed))};
 }
 
 SensorModel SensorModel::withEffects(std::vector<AnyEffect> effects) const {
