@@ -5,20 +5,23 @@ add_executable(fuzz_o3d303 ${folder}/fuzz_o3d303.cpp ${folder}/o3d303_fuzz_one_i
                ${PROJECT_SOURCE_DIR}/drivers/o3d303/frame_images.cpp)
 target_link_libraries(fuzz_o3d303 PRIVATE toftwin::o3d303_wire)
 target_link_options(fuzz_o3d303 PRIVATE -fsanitize=fuzzer)
+add_dependencies(fuzzers fuzz_o3d303)
 file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/fuzz_o3d303_corpus)
 add_test(NAME fuzz_o3d303
          COMMAND fuzz_o3d303 -max_total_time=10 -max_len=4096 -print_final_stats=1
                  ${CMAKE_BINARY_DIR}/fuzz_o3d303_corpus ${folder}/o3d303_corpus)
 set_tests_properties(fuzz_o3d303 PROPERTIES TIMEOUT 120)
 
-if(TOFTWIN_HAS_KINECT2)
-  add_executable(fuzz_kinect2 ${folder}/fuzz_kinect2.cpp ${folder}/kinect2_fuzz_one_input.cpp
-                 ${folder}/emulated_kinect2.cpp)
-  target_link_libraries(fuzz_kinect2 PRIVATE toftwin::drivers)
-  target_link_options(fuzz_kinect2 PRIVATE -fsanitize=fuzzer)
-  file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/fuzz_kinect2_corpus)
-  add_test(NAME fuzz_kinect2
-           COMMAND fuzz_kinect2 -max_total_time=10 -max_len=512 -print_final_stats=1
-                   ${CMAKE_BINARY_DIR}/fuzz_kinect2_corpus)
-  set_tests_properties(fuzz_kinect2 PROPERTIES TIMEOUT 120)
-endif()
+
+set(kinect2 ${PROJECT_SOURCE_DIR}/drivers/kinect2)
+add_executable(fuzz_kinect2 ${folder}/fuzz_kinect2.cpp ${folder}/kinect2_fuzz_one_input.cpp
+               ${folder}/emulated_kinect2.cpp ${kinect2}/assembly.cpp ${kinect2}/commands.cpp
+               ${kinect2}/samples.cpp)
+target_link_libraries(fuzz_kinect2 PRIVATE toftwin::decode toftwin::effects fmt::fmt)
+target_link_options(fuzz_kinect2 PRIVATE -fsanitize=fuzzer)
+add_dependencies(fuzzers fuzz_kinect2)
+file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/fuzz_kinect2_corpus)
+add_test(NAME fuzz_kinect2
+         COMMAND fuzz_kinect2 -max_total_time=10 -max_len=512 -print_final_stats=1
+                 ${CMAKE_BINARY_DIR}/fuzz_kinect2_corpus)
+set_tests_properties(fuzz_kinect2 PROPERTIES TIMEOUT 120)
