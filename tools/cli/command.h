@@ -56,6 +56,7 @@ Command grabCommand();
 Command recordCommand();
 Command replayCommand();
 Command renderCommand();
+Command calibrateCommand();
 Command compareCommand();
 Command poseCommand();
 Command rigCommand();

@@ -9,7 +9,8 @@ std::span<const Command> commands() {
   static const std::array kCommands{
       listCommand(),    infoCommand(), grabCommand(),   recordCommand(),     replayCommand(),
       poseCommand(),    rigCommand(),  setCommand(),    triggerCommand(),    renderCommand(),
-      compareCommand(), usbCommand(),  doctorCommand(), complianceCommand(), completionCommand(),
+      calibrateCommand(), compareCommand(), usbCommand(), doctorCommand(), complianceCommand(),
+      completionCommand(),
   };
   return kCommands;
 }

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include <toftwin/image.h>
+
+#include "calib/intrinsics/target.h"
+
+namespace toftwin::intrinsics {
+
+/// Where a corner of four squares is about, and how its neighbours lie.
+struct CornerGuess {
+  Pixel at{};
+  std::array<double, 2> along{};   ///< from here to the next corner in the row, pixels
+  std::array<double, 2> across{};  ///< to the next corner in the column
+};
+
+struct FittedCorner {
+  Pixel at{};
+  double error_px = 0.0;  ///< standard error of `at`, either direction, from what the fit leaves
+  double blur_px = 0.0;   ///< standard deviation of the edges' blur
+  double contrast = 0.0;  ///< half of bright minus dark; negative: the first quadrant is dark
+};
+
+/// Fits the meeting of four squares, blurred, unevenly lit and perhaps cut at `saturation`, to the pixels
+/// within half a square around (see the source for the formula). Nothing if that does not converge near
+/// the guess.
+std::optional<FittedCorner> fitCorner(const Image<float>& image, const CornerGuess& guess,
+                                      float saturation);
+
+}  // namespace toftwin::intrinsics

@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/intrinsics/detect.h"
+
+#include <fmt/format.h>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <span>
+
+namespace toftwin::intrinsics {
+namespace {
+
+using Pixels = std::vector<Pixel>;
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// How an image is shown to the search: brightness to the power `gamma`, enlarged.
+struct Look {
+  double gamma;
+  int scale;
+  bool evened;  ///< contrast evened out locally (CLAHE)
+};
+// Ordered by how often each finds what those before it did not.
+constexpr Look kLooks[] = {{1.0, 1, false}, {0.5, 2, false}, {1.0, 2, true},  {0.5, 1, true},
+                           {0.25, 2, true}, {1.0, 3, false}, {0.5, 3, true}, {2.0, 2, false}};
+constexpr std::size_t kQuickLooks = 2;
+
+/// Brightness between which an image's pixels lie, but for a few; black borders are left out.
+struct Span {
+  float low = 0.0F, high = 1.0F;
+};
+Span spanOf(const Image<float>& image) {
+  std::vector<float> values;
+  for (const float value : image.pixels()) {
+    if (std::isfinite(value) && value > 0.0F) values.push_back(value);
+  }
+  if (values.size() < 16) return {};
+  std::ranges::sort(values);
+  const auto at = [&](double share) { return values[static_cast<std::size_t>(share * double(values.size() - 1))]; };
+  return {at(0.005), at(0.995)};
+}
+
+/// Pixels without a value (0 or NaN) among pixels with one get their neighbours' median.
+Image<float> mended(const Image<float>& image) {
+  constexpr std::size_t kMost = 6;  // of eight neighbours
+  Image<float> result = image;
+  for (int v = 1; v + 1 < image.height(); ++v) {
+    for (int u = 1; u + 1 < image.width(); ++u) {
+      if (image(u, v) > 0.0F) continue;
+      std::vector<double> around;
+      for (int k = 0; k < 9; ++k) {
+        const float value = image(u - 1 + k % 3, v - 1 + k / 3);
+        if (value > 0.0F) around.push_back(value);
+      }
+      if (around.size() >= kMost) result(u, v) = static_cast<float>(median(std::move(around)));
+    }
+  }
+  return result;
+}
+
+cv::Mat show(const Image<float>& image, const Span& span, const Look& look) {
+  cv::Mat shown(image.height(), image.width(), CV_8U);
+  const double width = std::max(1e-12F, span.high - span.low);
+  for (int v = 0; v < image.height(); ++v) {
+    for (int u = 0; u < image.width(); ++u) {
+      const float value = image(u, v);
+      const double share = std::isfinite(value) ? std::clamp((value - span.low) / width, 0.0, 1.0) : 0.0;
+      shown.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(std::lround(255.0 * std::pow(share, look.gamma)));
+    }
+  }
+  if (look.evened) cv::createCLAHE(4.0, {8, 8})->apply(shown, shown);
+  if (look.scale > 1) cv::resize(shown, shown, {}, look.scale, look.scale, cv::INTER_CUBIC);
+  return shown;
+}
+
+/// Pixel centres of an enlarged copy in the original's coordinates.
+Pixels shrunk(const std::vector<cv::Point2f>& points, int scale) {
+  Pixels result;
+  for (const cv::Point2f& point : points) {
+    result.push_back({(point.x + 0.5) / scale - 0.5, (point.y + 0.5) / scale - 0.5});
+  }
+  return result;
+}
+
+std::optional<Pixels> search(const Image<float>& image, const Target& target, bool is_thorough) {
+  const Span span = spanOf(image);
+  const cv::Size size{target.columns, target.rows};
+  constexpr int kQuick = cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_ACCURACY;
+  constexpr int kClassic = cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_ADAPTIVE_THRESH;
+  std::vector<cv::Point2f> found;
+  const std::span looks{kLooks, is_thorough ? std::size(kLooks) : kQuickLooks};
+  for (const int flags : {kQuick, kQuick | cv::CALIB_CB_EXHAUSTIVE}) {
+    for (const Look& look : looks) {
+      const cv::Mat shown = show(image, span, look);
+      if (cv::findChessboardCornersSB(shown, size, found, flags)) return shrunk(found, look.scale);
+    }
+    if (!is_thorough) return std::nullopt;
+  }
+  for (const Look& look : looks) {
+    const cv::Mat shown = show(image, span, look);
+    if (cv::findChessboardCorners(shown, size, found, kClassic)) return shrunk(found, look.scale);
+  }
+  return std::nullopt;
+}
+
+/// Of a grid of corners: where the neighbours lie.
+CornerGuess guessAt(const Pixels& grid, const Target& target, int column, int row) {
+  const auto at = [&](int c, int r) {
+    return grid[static_cast<std::size_t>(r) * static_cast<std::size_t>(target.columns) +
+                static_cast<std::size_t>(c)];
+  };
+  const int left = std::max(0, column - 1), right = std::min(target.columns - 1, column + 1);
+  const int top = std::max(0, row - 1), bottom = std::min(target.rows - 1, row + 1);
+  const Pixel l = at(left, row), r = at(right, row), t = at(column, top), b = at(column, bottom);
+  return {.at = at(column, row),
+          .along = {(r.u - l.u) / (right - left), (r.v - l.v) / (right - left)},
+          .across = {(b.u - t.u) / (bottom - top), (b.v - t.v) / (bottom - top)}};
+}
+
+/// Turned so that columns and rows are as on the board seen from its front, and, where turning by 180°
+/// swaps black and white, so that the squares before the first corner are what they are on any image.
+Pixels inOrder(Pixels grid, const Target& target, bool first_is_bright) {
+  const CornerGuess first = guessAt(grid, target, 0, 0);
+  if (first.along[0] * first.across[1] - first.along[1] * first.across[0] < 0.0) {
+    for (int row = 0; row < target.rows; ++row) {
+      const auto begin = grid.begin() + static_cast<std::ptrdiff_t>(row) * target.columns;
+      std::reverse(begin, begin + target.columns);
+    }
+    first_is_bright = (target.columns % 2 == 0) == first_is_bright;
+  }
+  if ((target.columns + target.rows) % 2 == 1 && first_is_bright) std::ranges::reverse(grid);
+  return grid;
+}
+
+struct Fitted {
+  std::vector<Corner> corners;
+  std::vector<double> blurs;
+  double least_square_px = std::numeric_limits<double>::infinity();
+  double flattest = 1.0;  ///< least sine between along and across, times the ratio of their lengths
+};
+
+Fitted fitAll(const Image<float>& image, const Target& target, const Pixels& grid, float saturation) {
+  Fitted fitted;
+  for (int row = 0; row < target.rows; ++row) {
+    for (int column = 0; column < target.columns; ++column) {
+      const CornerGuess guess = guessAt(grid, target, column, row);
+      const double along = std::hypot(guess.along[0], guess.along[1]);
+      const double across = std::hypot(guess.across[0], guess.across[1]);
+      const double area = std::abs(guess.along[0] * guess.across[1] - guess.along[1] * guess.across[0]);
+      fitted.least_square_px = std::min(fitted.least_square_px, area / std::max(along, across));
+      fitted.flattest = std::min(fitted.flattest, area / std::pow(std::max(along, across), 2));
+      const auto corner = fitCorner(image, guess, saturation);
+      if (!corner) continue;
+      const auto index = static_cast<std::size_t>(row * target.columns + column);
+      fitted.corners.push_back({index, corner->at, corner->error_px});
+      fitted.blurs.push_back(corner->blur_px);
+    }
+  }
+  return fitted;
+}
+
+void judge(Sighting& sighting, const Target& target, const DetectOptions& options) {
+  const auto reject = [&](Rejection reason, std::string detail) {
+    sighting.rejection = reason;
+    sighting.detail = std::move(detail);
+  };
+  const double lost = 1.0 - static_cast<double>(sighting.corners.size()) / static_cast<double>(target.corners());
+  if (sighting.square_px < options.least_square_px) {
+    reject(Rejection::TooSmall, fmt::format("squares of {:.1f} px, {:g} are needed", sighting.square_px,
+                                            options.least_square_px));
+  } else if (sighting.tilt_deg > options.most_tilt_deg) {
+    reject(Rejection::TooOblique, fmt::format("tilted by {:.0f} degrees, at most {:g}", sighting.tilt_deg,
+                                              options.most_tilt_deg));
+  } else if (lost > options.most_lost) {
+    reject(Rejection::CornerOutliers, fmt::format("{} of {} corners could be fitted", sighting.corners.size(),
+                                                  target.corners()));
+  } else if (sighting.blur_px > options.most_blur * sighting.square_px) {
+    reject(Rejection::Blurred, fmt::format("edges are blurred by {:.2f} px (standard deviation) with squares of "
+                                           "{:.1f} px",
+                                           sighting.blur_px, sighting.square_px));
+  }
+}
+
+}  // namespace
+
+std::string_view nameOf(Rejection reason) {
+  switch (reason) {
+    case Rejection::None: return "used";
+    case Rejection::NotFound: return "board not found";
+    case Rejection::CornerOutliers: return "corner outliers";
+    case Rejection::Blurred: return "blurred";
+    case Rejection::TooOblique: return "too oblique";
+    case Rejection::TooSmall: return "too small";
+    case Rejection::LikeAnother: return "like another view";
+    case Rejection::ReprojectionOutlier: return "reprojection outlier";
+  }
+  return "unknown";
+}
+
+std::optional<float> saturationOf(const Image<float>& image) {
+  constexpr double kNotable = 0.002;
+  float largest = 0.0F;
+  for (const float value : image.pixels()) {
+    if (std::isfinite(value)) largest = std::max(largest, value);
+  }
+  const auto there = std::ranges::count(image.pixels(), largest);
+  if (largest <= 0.0F || static_cast<double>(there) < kNotable * static_cast<double>(image.size())) {
+    return std::nullopt;
+  }
+  return largest;
+}
+
+Sighting findBoard(const Image<float>& image, const Target& target, const DetectOptions& options) {
+  Sighting sighting;
+  const auto found = search(mended(image), target, options.is_thorough);
+  if (!found) {
+    sighting.rejection = Rejection::NotFound;
+    sighting.detail = fmt::format("no {} x {} inner corners", target.columns, target.rows);
+    return sighting;
+  }
+  const float saturation = saturationOf(image).value_or(std::numeric_limits<float>::infinity());
+  Fitted fitted = fitAll(image, target, *found, saturation);
+  // The fit starts from the fitted corners once more: better neighbours make better windows.
+  Pixels grid = *found;
+  for (const Corner& corner : fitted.corners) grid[corner.index] = corner.at;
+  const auto first = fitCorner(image, guessAt(grid, target, 0, 0), saturation);
+  grid = inOrder(std::move(grid), target, first && first->contrast > 0.0);
+  fitted = fitAll(image, target, grid, saturation);
+
+  sighting.corners = std::move(fitted.corners);
+  sighting.blur_px = median(std::move(fitted.blurs));
+  sighting.square_px = fitted.least_square_px;
+  sighting.tilt_deg = std::acos(std::clamp(fitted.flattest, 0.0, 1.0)) * 180.0 / M_PI;
+  judge(sighting, target, options);
+  return sighting;
+}
+
+}  // namespace toftwin::intrinsics

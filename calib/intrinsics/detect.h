@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <toftwin/image.h>
+
+#include "calib/intrinsics/target.h"
+#include "calib/intrinsics/corner_fit.h"
+
+namespace toftwin::intrinsics {
+
+/// Why a view does not count. docs/calibrate.md says what to do about each.
+enum class Rejection {
+  None,
+  NotFound,
+  CornerOutliers,
+  Blurred,
+  TooOblique,
+  TooSmall,
+  LikeAnother,
+  ReprojectionOutlier
+};
+inline constexpr std::array kRejections{Rejection::NotFound,    Rejection::CornerOutliers,
+                                        Rejection::Blurred,     Rejection::TooOblique,
+                                        Rejection::TooSmall,    Rejection::LikeAnother,
+                                        Rejection::ReprojectionOutlier};
+std::string_view nameOf(Rejection reason);
+
+/// One corner of the board where it was seen.
+struct Corner {
+  std::size_t index = 0;  ///< on the board
+  Pixel at{};
+  double error_px = 0.0;  ///< that the fit to the pixels states
+};
+
+/// The board in one image, or why it is of no use.
+struct Sighting {
+  std::string name{};           ///< of the image
+  std::vector<Corner> corners{};
+  double blur_px = 0.0;         ///< median over the corners
+  double square_px = 0.0;       ///< the least side of a square, over the image of the board
+  double tilt_deg = 0.0;        ///< of the board against the image, about; from its outline
+  Rejection rejection = Rejection::None;
+  std::string detail{};         ///< of the rejection: the number that decided
+
+  [[nodiscard]] bool isUsed() const { return rejection == Rejection::None; }
+};
+
+struct DetectOptions {
+  double most_blur = 0.30;          ///< of the least side of a square
+  double most_lost = 0.25;          ///< share of corners
+  double least_square_px = 4.0;
+  double most_tilt_deg = 75.0;
+  bool is_thorough = true;  ///< false: fewer copies are searched, for live images
+};
+
+/// Finds the board in an image of brightness, however dim: several stretched, enlarged copies are
+/// searched, then each corner is fitted to the image as it is.
+Sighting findBoard(const Image<float>& image, const Target& target, const DetectOptions& options = {});
+
+/// The value at which an image was cut, if a notable share of its pixels has the largest one.
+std::optional<float> saturationOf(const Image<float>& image);
+
+}  // namespace toftwin::intrinsics

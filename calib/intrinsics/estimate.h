@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <toftwin/result.h>
+
+#include "calib/intrinsics/bundle.h"
+#include "calib/intrinsics/seed.h"
+#include "calib/intrinsics/uncertainty.h"
+
+namespace toftwin::intrinsics {
+
+/// How a lens model and a surface do on views that it has not seen, beside how it does on those that it was fitted to.
+struct ModelScore {
+  LensModel model = LensModel::Pinhole;
+  int degree = 0;  ///< of the board's surface
+  double fitted_rms_px = 0.0;
+  double held_out_rms_px = 0.0;
+  std::vector<double> held_out_by_view{};  ///< mean square of each view, px²; its pose is fitted, the lens is not
+};
+/// Relative gain of `richer` over `simpler` on held-out views: mean over views of ln(rms / rms'), with its
+/// standard error. Views of all sizes of error count alike.
+struct Gain {
+  double mean = 0.0, error = 0.0;
+  [[nodiscard]] bool isReal() const { return mean > 2.5 * error; }
+};
+Gain gainOf(const ModelScore& simpler, const ModelScore& richer);
+
+struct EstimateOptions {
+  std::optional<LensModel> model{};  ///< none: chosen by held-out views
+  std::optional<int> degree{};       ///< of the board's surface, 0: flat; none: chosen by held-out views
+  int folds = 10;                    ///< 0: nothing is held out, so nothing is chosen
+  double most_lost = 0.25;           ///< share of a view's corners, as DetectOptions
+};
+
+struct Estimate {
+  Bundle bundle{};
+  LensUncertainty uncertainty{};
+  std::vector<std::size_t> used{};     ///< of the sightings given, in the bundle's order
+  std::vector<Observed> views{};       ///< those, with their weights
+  std::vector<double> rms_px{};        ///< of each
+  std::vector<std::size_t> dropped{};  ///< corners left out of each
+  double rms_px_all = 0.0;
+  std::vector<ModelScore> scores{};    ///< of all models that the views can tell, with the surface used
+  std::vector<ModelScore> surfaces{};  ///< of the surfaces that were tried
+  [[nodiscard]] const ModelScore* scoreOf(LensModel model) const;
+};
+
+/// Fewest views with which a lens is estimated.
+inline constexpr std::size_t kFewestViews = 3;
+
+/// Estimates a lens from what was seen. Views that turn out to be outliers are marked as rejected in
+/// `sightings`. Errors: too few views, or views that do not tell the focal length.
+Result<Estimate> estimate(const Target& target, std::vector<Sighting>& sightings, ImageSize size,
+                          const EstimateOptions& options = {});
+
+}  // namespace toftwin::intrinsics

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/intrinsics/uncertainty.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+namespace toftwin::intrinsics {
+namespace {
+
+constexpr double kNormal95 = 1.959964;  // 97.5 % of a normal distribution lie below
+
+/// 97.5 % of Student's t lie below: the Cornish-Fisher expansion, right to 0.5 % from 4 degrees on.
+double studentQuantile(double degrees) {
+  const double z = kNormal95, z3 = z * z * z, z5 = z3 * z * z;
+  return z + (z3 + z) / (4.0 * degrees) + (5.0 * z5 + 16.0 * z3 + 3.0 * z) / (96.0 * degrees * degrees);
+}
+
+/// The views' gradients, made as large as their errors are. At the best lens a view's gradient is smaller
+/// than its error, because the lens has bent towards it. With S = Σ S_v = L Lᵀ and M_v = L⁻¹ S_v L⁻ᵀ,
+///   g̃_v = L (1 − M_v)^(−1/2) L⁻¹ g_v
+/// has the covariance σ² S_v if all corners err alike ("CR2" of R. M. Bell and D. F. McCaffrey, Survey
+/// Methodology 28 (2002) 169).
+std::vector<Eigen::VectorXd> unbent(const std::vector<SharedInformation>& views, const Eigen::MatrixXd& total) {
+  const Eigen::LLT<Eigen::MatrixXd> root{total};
+  const Eigen::MatrixXd lower = root.matrixL();
+  std::vector<Eigen::VectorXd> gradients;
+  for (const SharedInformation& view : views) {
+    const Eigen::MatrixXd half = lower.triangularView<Eigen::Lower>().solve(view.information);
+    const Eigen::MatrixXd share =
+        lower.triangularView<Eigen::Lower>().solve(half.transpose()).transpose();
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen{0.5 * (share + share.transpose())};
+    constexpr double kMostShare = 0.95;  // a view that alone knows a parameter cannot be checked by others
+    const Eigen::VectorXd stretch =
+        (1.0 - eigen.eigenvalues().array().min(kMostShare)).sqrt().inverse().matrix();
+    const Eigen::VectorXd plain = lower.triangularView<Eigen::Lower>().solve(view.gradient);
+    gradients.emplace_back(lower * (eigen.eigenvectors() * stretch.asDiagonal() *
+                                    (eigen.eigenvectors().transpose() * plain)));
+  }
+  return gradients;
+}
+
+/// Standard errors from how much the views disagree: √ diag(S⁻¹ (Σ g̃_v g̃_vᵀ) S⁻¹).
+Eigen::VectorXd fromViews(const std::vector<Eigen::VectorXd>& gradients, const Eigen::MatrixXd& inverse) {
+  Eigen::VectorXd variance = Eigen::VectorXd::Zero(inverse.rows());
+  for (const Eigen::VectorXd& gradient : gradients) variance += (inverse * gradient).cwiseAbs2();
+  return variance.cwiseSqrt();
+}
+
+/// Standard errors over resampled sets of views: one Gauss-Newton step from the best lens for each set.
+Eigen::VectorXd resampled(const std::vector<SharedInformation>& views,
+                          const std::vector<Eigen::VectorXd>& gradients, int resamples, std::uint64_t seed) {
+  const Eigen::Index n = gradients.front().size();
+  std::mt19937_64 random{seed};
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(n), squares = sum;
+  int counted = 0;
+  for (int i = 0; i < resamples; ++i) {
+    Eigen::MatrixXd information = Eigen::MatrixXd::Zero(n, n);
+    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(n);
+    for (std::size_t k = 0; k < views.size(); ++k) {
+      const std::size_t view = random() % views.size();
+      information += views[view].information;
+      gradient += gradients[view];
+    }
+    const Eigen::VectorXd step = information.ldlt().solve(gradient);
+    if (!step.allFinite()) continue;
+    sum += step;
+    squares += step.cwiseAbs2();
+    ++counted;
+  }
+  const double count = std::max(counted, 2);
+  return ((squares - sum.cwiseAbs2() / count) / (count - 1.0)).cwiseMax(0.0).cwiseSqrt();
+}
+
+}  // namespace
+
+LensUncertainty uncertaintyOf(const std::vector<Observed>& views, const Bundle& bundle, int resamples,
+                              std::uint64_t seed) {
+  const auto information = sharedInformation(views, bundle);
+  const auto n = static_cast<Eigen::Index>(parametersOf(bundle.model));
+  Eigen::MatrixXd total = Eigen::MatrixXd::Zero(bundle.shared(), bundle.shared());
+  for (const SharedInformation& view : information) total += view.information;
+
+  LensUncertainty result;
+  result.sigma_px = coordinateError(views, bundle);
+  const Eigen::MatrixXd inverse = total.inverse();
+  const auto gradients = unbent(information, total);
+  const Eigen::MatrixXd covariance = result.sigma_px * result.sigma_px * inverse.topLeftCorner(n, n);
+  result.from_corners = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+  result.from_views = fromViews(gradients, inverse).head(n);
+  result.from_resampling = resampled(information, gradients, resamples, seed).head(n);
+  const Eigen::VectorXd ratio = result.from_views.cwiseQuotient(result.from_corners);
+  result.clustering = std::sqrt(ratio.cwiseAbs2().mean());
+
+  const double degrees = std::max(1.0, static_cast<double>(views.size()) - 1.0);
+  const bool is_clustered = result.clustering > kClustered;
+  const double pooled = std::max(1.0, result.clustering);
+  const Eigen::VectorXd grown = is_clustered ? ratio : Eigen::VectorXd::Constant(n, pooled);
+  result.covariance = grown.asDiagonal() * covariance * grown.asDiagonal();
+  const double quantile = is_clustered ? studentQuantile(degrees) : kNormal95;
+  result.half_width = quantile * result.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+  return result;
+}
+
+namespace {
+
+/// How a pixel moves by the lens's parameters and by turning the camera, at the ray that it sees.
+Projection slopesAt(const LensParameters& lens, double u, double v) {
+  // The ray by fixed-point steps; near enough for an error that is known to a few per cent.
+  double x = (u - lens[2]) / lens[0], y = (v - lens[3]) / lens[1];
+  const double x0 = x, y0 = y;
+  for (int i = 0; i < 30; ++i) {
+    const Eigen::Vector2d seen = project(lens, {x, y, 1.0});
+    x += 0.7 * (x0 - (seen.x() - lens[2]) / lens[0]);
+    y += 0.7 * (y0 - (seen.y() - lens[3]) / lens[1]);
+    x = std::clamp(x, x0 - 1.0, x0 + 1.0);
+    y = std::clamp(y, y0 - 1.0, y0 + 1.0);
+  }
+  return projectWithSlopes(lens, {}, {x, y, 1.0});
+}
+
+}  // namespace
+
+MappingError::MappingError(const Bundle& bundle, const LensUncertainty& uncertainty, int width, int height)
+    : lens_(bundle.lens), count_(static_cast<Eigen::Index>(parametersOf(bundle.model))) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen{uncertainty.covariance};
+  root_ = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  Eigen::Matrix3d turn_by_turn = Eigen::Matrix3d::Zero();
+  Eigen::MatrixXd turn_by_lens = Eigen::MatrixXd::Zero(3, count_);
+  constexpr int kAcross = 12;
+  for (int i = 0; i <= kAcross; ++i) {
+    for (int j = 0; j <= kAcross; ++j) {
+      const Projection at = slopesAt(lens_, width * double(i) / kAcross, height * double(j) / kAcross);
+      const Eigen::Matrix<double, 2, 3> by_turn = at.by_pose.leftCols<3>();
+      turn_by_turn += by_turn.transpose() * by_turn;
+      turn_by_lens += by_turn.transpose() * at.by_lens.leftCols(count_);
+    }
+  }
+  turn_ = -turn_by_turn.ldlt().solve(turn_by_lens);
+}
+
+double MappingError::at(double u, double v) const {
+  const Projection slopes = slopesAt(lens_, u, v);
+  const Eigen::MatrixXd moved =
+      slopes.by_lens.leftCols(count_) + slopes.by_pose.leftCols<3>() * turn_;
+  return (moved * root_).norm() / std::sqrt(2.0);
+}
+
+}  // namespace toftwin::intrinsics

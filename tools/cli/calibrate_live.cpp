@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/cli/calibrate.h"
+
+#include <fmt/format.h>
+
+#include <optional>
+
+#include "calib/intrinsics/brightness.h"
+#include "tools/cli/terminal.h"
+
+namespace toftwin::cli {
+namespace {
+
+using namespace intrinsics;
+
+/// What a person who holds the board is told. Said again only when it changes.
+class Prompter {
+ public:
+  void say(const Guidance& guidance) {
+    std::string text = fmt::format("{} views, {:.0f} % of the image", guidance.views, 100.0 * guidance.covered);
+    if (guidance.worst_error_px) text += fmt::format(", lens known to {:.2f} px", *guidance.worst_error_px);
+    text += guidance.isEnough() ? "\n  enough: Ctrl-C, or wait\n" : "\n";
+    for (const std::string& missing : guidance.missing) text += "  " + missing + "\n";
+    sayOnce(text);
+  }
+  void sayOnce(const std::string& text) {
+    if (text == said_) return;
+    fmt::print(stderr, "{}", text);
+    said_ = text;
+  }
+
+ private:
+  std::string said_;
+};
+
+/// The views so far as a lens, once there are a few; nothing while they do not tell it.
+std::optional<Estimate> soFar(const Collector& collector) {
+  constexpr std::ptrdiff_t kFew = 6;
+  auto sightings = collector.sightings();
+  if (std::ranges::count_if(sightings, &Sighting::isUsed) < kFew) return std::nullopt;
+  auto result = estimate(collector.target(), sightings, collector.size(),
+                         {.model = LensModel::K1K2, .degree = 0, .folds = 0});
+  return result ? std::optional{*std::move(result)} : std::nullopt;
+}
+
+Guidance guidanceFor(const Collector& collector) {
+  const auto lens = soFar(collector);
+  return guide(collector.target(), collector.sightings(), collector.size(), lens ? &*lens : nullptr);
+}
+
+}  // namespace
+
+Result<> collectLive(const DaemonOptions& daemon, const LiveOptions& live, Collector& collector,
+                     const OnView& on_view) {
+  auto client = daemon.connect();
+  if (!client) return client.error();
+  auto frames = client->subscribe(live.source, {.planes = {PlaneKind::Amplitude, PlaneKind::Ambient}});
+  if (!frames) return frames.error();
+  Prompter prompter;
+  prompter.sayOnce("show the board and hold it still; Ctrl-C ends\n");
+  std::optional<Sighting> before;
+  int views = 0;
+  while (!interrupted() && views < live.most_views) {
+    const auto frame = waitForFrame(*frames, daemon.timeout());
+    if (!frame && frame.error().code == Error::Code::Stopped) break;
+    if (!frame) return frame.error();
+    auto brightness = brightnessOf(*frame);
+    if (!brightness) return brightness.error();
+    const NamedImage image{fmt::format("{} frame {}", live.source, frame->sequence), *std::move(brightness)};
+    DetectOptions quick = collector.options();
+    quick.is_thorough = false;
+    Sighting sighting = findBoard(image.brightness, collector.target(), quick);
+    sighting.name = image.name;
+    // Two frames that agree: the board is held still, so the exposures of one frame agree as well.
+    const bool is_still = before && sighting.isUsed() && movedBy(*before, sighting) < live.still_px;
+    before = sighting.isUsed() ? std::optional{sighting} : std::nullopt;
+    if (!is_still || collector.isLikeAnother(sighting)) continue;
+    const ImageSize size{image.brightness.width(), image.brightness.height()};
+    if (auto added = collector.add(std::move(sighting), size); !added) return added;
+    on_view(image);
+    ++views;
+    const Guidance guidance = guidanceFor(collector);
+    prompter.say(guidance);
+    if (guidance.isEnough() && live.until_enough) break;
+  }
+  return {};
+}
+
+}  // namespace toftwin::cli
