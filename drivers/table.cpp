@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <array>
 
+#include "drivers/aravis/aravis.h"
 #include "drivers/not_built.h"
 #include "drivers/o3d303/o3d303.h"
 #include "drivers/openni2/openni2.h"
@@ -28,6 +29,11 @@ std::span<const Driver> allDrivers() {
       openni2::row(),
 #else
       notBuilt<openni2::About>(),
+#endif
+#ifdef TOFTWIN_HAS_ARAVIS
+      aravis::row(),
+#else
+      notBuilt<aravis::About>(),
 #endif
   };
   return rows;

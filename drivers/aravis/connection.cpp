@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "drivers/aravis/connection.h"
+
+#include <arpa/inet.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <charconv>
+#include <filesystem>
+#include <mutex>
+#include <utility>
+
+#include "drivers/aravis/discovery.h"
+
+namespace toftwin::drivers::aravis {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr milliseconds kAnswer{300};         // of one camera; a GigE camera answers within a few
+constexpr milliseconds kDiscoveryWait{400};  // open() of an absent camera may take half a second
+constexpr std::uint32_t kHasController = 0x3;
+
+std::mutex library_mutex;
+
+/// USB3 Vision cameras by the library's names for them.
+std::vector<std::string> usbCameras() {
+  const auto lock = lockLibrary();
+  ArvInterface* usb = arv_uv_interface_get_instance();
+  arv_interface_update_device_list(usb);
+  std::vector<std::string> names;
+  for (unsigned i = 0; i < arv_interface_get_n_devices(usb); ++i) {
+    const char* name = arv_interface_get_device_id(usb, i);
+    if (name != nullptr) names.emplace_back(name);
+  }
+  return names;
+}
+
+/// A USB camera that a user means by that: its name, or the serial number at its end.
+std::optional<std::string> usbCameraCalled(const std::string& called) {
+  for (std::string& name : usbCameras()) {
+    if (called == "any" || name == called || name.ends_with("-" + called)) return std::move(name);
+  }
+  return std::nullopt;
+}
+
+Object<GInetAddress> inetAddress(std::uint32_t address) {
+  return Object<GInetAddress>{g_inet_address_new_from_string(textOf(address).c_str())};
+}
+
+/// The port of a UDP socket that is bound to that address.
+std::optional<std::uint16_t> portOf(int file, std::uint32_t address) {
+  int type = 0;
+  sockaddr_in own{};
+  socklen_t size = sizeof own, type_size = sizeof type;
+  const bool is_it = ::getsockopt(file, SOL_SOCKET, SO_TYPE, &type, &type_size) == 0 &&
+                     type == SOCK_DGRAM &&
+                     ::getsockname(file, reinterpret_cast<sockaddr*>(&own), &size) == 0 &&
+                     own.sin_family == AF_INET && ntohl(own.sin_addr.s_addr) == address;
+  if (!is_it) return std::nullopt;
+  return ntohs(own.sin_port);
+}
+
+void noteLoss(ArvDevice*, std::atomic<bool>* is_lost) { *is_lost = true; }
+
+}  // namespace
+
+std::unique_lock<std::mutex> lockLibrary() { return std::unique_lock{library_mutex}; }
+
+std::vector<std::string> listCameras() {
+  std::vector<std::string> names;
+  for (const GigeCamera& one : discover({.wait = kDiscoveryWait})) names.push_back(one.name());
+  for (std::string& one : usbCameras()) names.push_back(std::move(one));
+  std::ranges::sort(names);
+  return names;
+}
+
+Connection::Connection(Object<ArvCamera> camera, std::optional<std::uint32_t> address)
+    : camera_(std::move(camera)), address_(address) {
+  lost_signal_ = g_signal_connect(device(), "control-lost", G_CALLBACK(noteLoss), is_lost_.get());
+}
+
+Connection::~Connection() {
+  if (camera_ == nullptr) return;
+  g_signal_handler_disconnect(device(), lost_signal_);
+}
+
+/// This process' UDP sockets that are bound to that address.
+std::vector<Connection::ControlSocket> Connection::socketsOn(std::uint32_t address) {
+  std::vector<ControlSocket> sockets;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator{"/proc/self/fd", error}) {
+    const std::string text = entry.path().filename().string();
+    int file = -1;
+    std::from_chars(text.data(), text.data() + text.size(), file);
+    if (const auto port = portOf(file, address)) sockets.push_back({file, *port});
+  }
+  return sockets;
+}
+
+Result<Connection> Connection::open(const std::string& name) {
+  if (const auto address = addressOf(name)) return openGige(*address);
+  const bool is_any = name == "any" || name.empty();
+  std::vector<std::string> there;
+  const auto is_it = [&](const GigeCamera& one) { return is_any || one.isCalled(name); };
+  for (const GigeCamera& one :
+       discover({.wait = kDiscoveryWait, .on_this_host = true, .enough = is_it})) {
+    if (is_it(one)) return openGige(one.address);
+    there.push_back(one.name());
+  }
+  if (const auto usb = usbCameraCalled(is_any ? "any" : name)) return openUsb(*usb);
+  for (std::string& one : usbCameras()) there.push_back(std::move(one));
+  return Error{Error::Code::NotFound,
+               fmt::format("there is no camera aravis:{}; {}", name,
+                           there.empty() ? "none answers. Is it on, and in this computer's subnet? "
+                                           "(toftwin doctor knows what keeps answers away)"
+                                         : fmt::format("there is: {}", fmt::join(there, ", ")))};
+}
+
+Result<Connection> Connection::openGige(std::uint32_t address) {
+  const std::string name = textOf(address);
+  const auto interface = interfaceTowards(address);
+  if (!interface || !discoverAt(address, kAnswer)) {
+    return Error{Error::Code::NotFound,
+                 fmt::format("no camera answers at aravis:{}; is it on, and in this computer's "
+                             "subnet? (toftwin doctor knows what keeps answers away)",
+                             name)};
+  }
+  const auto lock = lockLibrary();
+  const auto before = socketsOn(*interface);
+  Failure failure;
+  Object<ArvDevice> device{
+      arv_gv_device_new(inetAddress(*interface).get(), inetAddress(address).get(), failure.slot())};
+  if (failure || device == nullptr)
+    return failure.toError(fmt::format("{} cannot be opened", name));
+  if (arv_gv_device_is_controller(ARV_GV_DEVICE(device.get())) == FALSE) {
+    return Error{Error::Code::Busy,
+                 fmt::format("aravis: {} is controlled by another program, or was until a moment "
+                             "ago: it waits for that one's heartbeat; close the other program",
+                             name)};
+  }
+  auto since = socketsOn(*interface);
+  std::erase_if(since, [&](const ControlSocket& one) {
+    return std::ranges::find(before, one.port, &ControlSocket::port) != before.end();
+  });
+  Object<ArvCamera> camera{arv_camera_new_with_device(device.get(), failure.slot())};
+  if (failure || camera == nullptr)
+    return failure.toError(fmt::format("{} cannot be opened", name));
+  Connection connection{std::move(camera), address};
+  if (since.size() == 1) connection.control_ = since.front();
+  connection.interface_ = *interface;
+  return connection;
+}
+
+Result<Connection> Connection::openUsb(const std::string& id) {
+  const auto lock = lockLibrary();
+  Failure failure;
+  const Object<ArvDevice> device{
+      arv_interface_open_device(arv_uv_interface_get_instance(), id.c_str(), failure.slot())};
+  if (failure || device == nullptr) {
+    Error error = failure.toError(fmt::format("{} cannot be opened", id));
+    error.message += "; may this user open it (udev rules), and does no other program?";
+    return error;
+  }
+  Object<ArvCamera> camera{arv_camera_new_with_device(device.get(), failure.slot())};
+  if (failure || camera == nullptr) return failure.toError(fmt::format("{} cannot be opened", id));
+  return Connection{std::move(camera), std::nullopt};
+}
+
+Result<> Connection::check(milliseconds wait) {
+  const auto gone = [this](std::string_view why) {
+    return Error{Error::Code::Disconnected,
+                 fmt::format("aravis: {}: {}", address_ ? textOf(*address_) : "the camera", why)};
+  };
+  if (isLost()) return gone("the control of the camera is lost");
+  if (!address_) {
+    Failure failure;
+    std::uint32_t ignored = 0;
+    arv_device_read_register(device(), 0, &ignored, failure.slot());
+    if (failure && failure.toError("").code == Error::Code::Disconnected)
+      return gone("it does not answer any more");
+    return {};
+  }
+  const auto controller = readRegister(*address_, kControlPrivilege, wait);
+  if (!controller) return gone("it does not answer any more");
+  if ((*controller & kHasController) == 0)
+    return gone("it has forgotten us: it was restarted, or the line was cut for too long");
+  return {};
+}
+
+/// The library asks a camera that is gone five times, half a second each, whatever the question; a
+/// closing asks twice. A socket that cannot send fails at once instead. Where the socket is not
+/// known, closing takes a few seconds, and all is well otherwise.
+void Connection::giveUp() {
+  const auto control = std::exchange(control_, std::nullopt);
+  if (control && portOf(control->file, interface_) == control->port)
+    ::shutdown(control->file, SHUT_WR);
+}
+
+}  // namespace toftwin::drivers::aravis

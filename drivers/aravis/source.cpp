@@ -1,0 +1,284 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "drivers/aravis/source.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <map>
+#include <stop_token>
+#include <utility>
+
+#include "drivers/aravis/configuration.h"
+#include "drivers/aravis/features.h"
+#include "drivers/aravis/frame_ids.h"
+#include "drivers/aravis/stream.h"
+#include "drivers/clock_fit.h"
+
+namespace toftwin::drivers::aravis {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using std::chrono::milliseconds;
+
+constexpr milliseconds kSlice{10};    ///< the library's wait cannot be interrupted
+constexpr milliseconds kAnswer{300};  ///< a camera that does not answer so soon is gone
+constexpr milliseconds kLeastSilence{
+    400};                                 ///< until a camera that streams is asked whether it lives
+constexpr int kMostBadFrames = 10;        ///< in a row, until the camera is opened anew
+constexpr double kSdPerWidth = 0.288675;  ///< of a uniform distribution: 1/√12
+constexpr Duration kUnknownInterval = 100_ms;
+constexpr std::chrono::seconds kReportEvery{10};       ///< losses, in the log
+constexpr std::chrono::seconds kTemperatureEvery{10};  ///< asked for
+
+class AravisSource final : public Source {
+ public:
+  explicit AravisSource(OpenCamera camera)
+      : keys_(std::move(camera.keys)),
+        info_(std::move(camera.info)),
+        connection_(std::move(camera.connection)),
+        images_(std::move(camera.images)),
+        is_triggered_(camera.is_triggered),
+        interval_(info_.frame_interval.value_or(kUnknownInterval)),
+        stream_(keys_),
+        clock_(DeviceClock::Options{}) {
+    if (keys_.chunks) chunks_.reset(arv_camera_create_chunk_parser(connection_.camera()));
+  }
+  ~AravisSource() override { stop(); }
+
+  [[nodiscard]] const SourceInfo& info() const override { return info_; }
+
+  Result<> start() override {
+    stop();
+    last_id_.reset();
+    triggered_at_.reset();
+    bad_ = bad_in_a_row_ = 0;
+    reported_ = {};
+    exposure_ = exposureNow();
+    auto started = stream_.start(connection_);
+    if (!started) return lost(started.error());
+    heard_at_ = asked_at_ = Clock::now();
+    return {};
+  }
+
+  void stop() override {
+    reportLosses(true);
+    if (is_gone_ || connection_.isLost()) {
+      connection_.giveUp();
+      stream_.abandon();
+    }
+    stream_.stop(connection_);
+  }
+
+  Result<Frame> next(std::stop_token stop, bool) override {
+    const SteadyTime until = Clock::now() + kLongestWait;
+    while (!stop.stop_requested()) {
+      if (connection_.isLost()) return lost(*whatIsWrong());
+      auto filled = stream_.take(kSlice);
+      if (filled) {
+        auto frame = toFrame(*filled);
+        stream_.giveBack(*std::move(filled));
+        if (frame || frame.error().code == Error::Code::Disconnected) return frame;
+        if (Clock::now() < until) continue;
+        return frame;
+      }
+      if (const auto wrong = whatIsWrong()) return lost(*wrong);
+      if (Clock::now() >= until) return Error{Error::Code::Timeout, "no frame within a second"};
+    }
+    return Error{Error::Code::Stopped, "asked to stop"};
+  }
+
+  [[nodiscard]] SourceState state() const override {
+    SourceState state;
+    const Features features{connection_.device()};
+    for (const std::string& name : info_.parameters) {
+      if (is_gone_) {
+        state.parameters.push_back({.name = name});
+      } else {
+        state.parameters.push_back(features.parameter(name));
+      }
+    }
+    return state;
+  }
+
+  Result<> setParameter(std::string_view name, double value) override {
+    if (std::ranges::find(info_.parameters, name) == info_.parameters.end()) {
+      return Error{Error::Code::NotFound,
+                   fmt::format("{} has no parameter \"{}\"; it has: {} (the key parameters adds "
+                               "others of the camera's features)",
+                               info_.model, name, fmt::join(info_.parameters, ", "))};
+    }
+    auto set = Features{connection_.device()}.setNumber(std::string{name}, value);
+    if (!set) return lost(set.error());
+    exposure_ = exposureNow();
+    return {};
+  }
+
+  Result<> trigger() override {
+    if (!info_.can_trigger) return Source::trigger();
+    triggered_at_ = Clock::now();
+    Failure failure;
+    arv_camera_software_trigger(connection_.camera(), failure.slot());
+    if (failure) return lost(failure.toError("the trigger is refused"));
+    return {};
+  }
+
+ private:
+  /// Notes that the camera is gone, if that is what the error says.
+  Error lost(Error error) {
+    if (error.code == Error::Code::Disconnected && !std::exchange(is_gone_, true))
+      connection_.giveUp();
+    return error;
+  }
+
+  // ---- frames ----------------------------------------------------------------------------------
+
+  /// A frame that cannot be used is counted as lost: Malformed. Many in a row: Disconnected, so
+  /// that the camera is opened anew.
+  Result<Frame> toFrame(const Stream::Filled& filled) {
+    heard_at_ = asked_at_ = Clock::now();
+    if (!filled.why_not_whole.empty()) return badFrame(filled.why_not_whole);
+    auto planes = images_.planes(filled.parts);
+    if (!planes) return badFrame(planes.error().message);
+    Frame frame;
+    frame.planes = *std::move(planes);
+    frame.camera = info_.camera;
+    frame.provenance.kind = info_.kind;
+    frame.provenance.calibration_id = info_.camera.calibration_id;
+    const auto bad = static_cast<std::uint64_t>(std::exchange(bad_, 0));
+    const auto last = std::exchange(last_id_, filled.frame_id);
+    frame.dropped_by_device = last ? lostBetween(*last, filled.frame_id, bad) : bad;
+    lost_frames_ += frame.dropped_by_device;
+    frame.moment = momentOf(filled);
+    bad_in_a_row_ = 0;
+    triggered_at_.reset();
+    reportLosses(false);
+    return frame;
+  }
+
+  Error badFrame(const std::string& why) {
+    constexpr std::size_t kMostReasons = 10;
+    const bool is_known = reasons_.contains(why) || reasons_.size() < kMostReasons;
+    ++reasons_[is_known ? why : "something else"];
+    ++bad_;
+    if (++bad_in_a_row_ < kMostBadFrames) return {Error::Code::Malformed, "aravis: " + why};
+    return {Error::Code::Disconnected, fmt::format("aravis: {}: {} frames in a row are lost: {}",
+                                                   info_.serial, bad_in_a_row_, why)};
+  }
+
+  /// What was lost, and why, at most every ten seconds.
+  void reportLosses(bool at_end) {
+    const PacketCounts now = stream_.counts();
+    const bool is_new = lost_frames_ > 0 || now.missing > reported_.missing ||
+                        now.asked_again > reported_.asked_again;
+    if (!is_new || (!at_end && Clock::now() - reported_at_ < kReportEvery)) return;
+    std::string why;
+    for (const auto& [reason, count] : reasons_) why += fmt::format("; {} times {}", count, reason);
+    spdlog::warn(
+        "{}: {} frames lost{}; of their packets {} were asked for again, {} of these came, "
+        "{} never did; {} frames found no buffer",
+        info_.serial, lost_frames_, why, now.asked_again - reported_.asked_again,
+        now.resent - reported_.resent, now.missing - reported_.missing,
+        now.underruns - reported_.underruns);
+    reported_ = now;
+    reported_at_ = Clock::now();
+    lost_frames_ = 0;
+    reasons_.clear();
+  }
+
+  // ---- time ------------------------------------------------------------------------------------
+
+  Moment momentOf(const Stream::Filled& filled) {
+    Moment moment;
+    const DeviceTime time = clock_.read(filled.stamp_ns, filled.arrived);
+    moment.exposures = {{time, chunkExposure(filled).value_or(exposure_), 0_Hz}};
+    moment.clock = relation(filled.arrived);
+    if (filled.arrived - temperature_at_ > kTemperatureEvery) {
+      temperature_at_ = filled.arrived;
+      temperature_c_ = Features{connection_.device()}.number("DeviceTemperature");
+    }
+    if (temperature_c_) moment.temperatures.push_back({"device", *temperature_c_ * celsius});
+    return moment;
+  }
+
+  [[nodiscard]] std::optional<Duration> chunkExposure(const Stream::Filled& filled) const {
+    if (chunks_ == nullptr || arv_buffer_has_chunks(filled.buffer.get()) == FALSE)
+      return std::nullopt;
+    Failure failure;
+    const double exposure_us = arv_chunk_parser_get_float_value(
+        chunks_.get(), filled.buffer.get(), "ChunkExposureTime", failure.slot());
+    constexpr double kLongest_us = 1e9;
+    if (failure || !(exposure_us >= 0.0 && exposure_us <= kLongest_us)) return std::nullopt;
+    return exposure_us * microsecond;
+  }
+
+  /// As the camera is set; 0 where it does not say.
+  [[nodiscard]] Duration exposureNow() const {
+    const Features features{connection_.device()};
+    for (const char* name : {"ExposureTime", "ExposureTimeAbs"}) {
+      const auto exposure_us = features.number(name);
+      if (exposure_us && *exposure_us >= 0.0) return *exposure_us * microsecond;
+    }
+    return 0_s;
+  }
+
+  /// How long a frame was under way cannot be seen from here; unless the user measured it, all that
+  /// is known is that it is more than nothing and less than a frame interval, or than the time
+  /// since the trigger.
+  [[nodiscard]] ClockRelation relation(SteadyTime arrived) const {
+    if (keys_.delay > 0_ms) return clock_.relation(keys_.delay, 0_ms);
+    Duration most = interval_;
+    if (triggered_at_) {
+      const std::chrono::duration<double> since = arrived - *triggered_at_;
+      most = std::max(0.0, since.count()) * second;
+    }
+    return clock_.relation(most / 2.0, kSdPerWidth * most);
+  }
+
+  // ---- losing it -------------------------------------------------------------------------------
+
+  /// A camera that says nothing for a while is asked whether it lives, and again after a while. One
+  /// that lives and streams nothing is for whoever called, who knows when that is a standstill.
+  [[nodiscard]] std::optional<Error> whatIsWrong() {
+    const SteadyTime now = Clock::now();
+    const std::chrono::duration<double> interval{interval_.in(second)};
+    const auto silence = std::max<std::chrono::duration<double>>(kLeastSilence, 4.0 * interval);
+    if (!connection_.isLost() && now - asked_at_ < silence) return std::nullopt;
+    asked_at_ = now;
+    auto alive = connection_.check(kAnswer);
+    if (!alive) return alive.error();
+    return std::nullopt;
+  }
+
+  Keys keys_;
+  SourceInfo info_;
+  Connection connection_;
+  ImageMaker images_;
+  bool is_triggered_;
+  Duration interval_;
+  Object<ArvChunkParser> chunks_;
+  Stream stream_;
+  DeviceClock clock_;
+  Duration exposure_ = 0_s;
+  std::optional<double> temperature_c_;
+  SteadyTime temperature_at_{};
+  SteadyTime heard_at_{}, asked_at_{};
+  std::optional<SteadyTime> triggered_at_;
+  std::optional<std::uint64_t> last_id_;
+  int bad_ = 0, bad_in_a_row_ = 0;  // since the last good frame
+  bool is_gone_ = false;
+  // Since the last report:
+  std::uint64_t lost_frames_ = 0;
+  std::map<std::string, std::uint64_t> reasons_;
+  PacketCounts reported_;
+  SteadyTime reported_at_{};
+};
+
+}  // namespace
+
+std::unique_ptr<Source> makeSource(OpenCamera camera) {
+  return std::make_unique<AravisSource>(std::move(camera));
+}
+
+}  // namespace toftwin::drivers::aravis

@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: Apache-2.0
+// What networks and cameras lose, and that nothing is kept.
+#include <malloc.h>
+
+#include <filesystem>
+#include <random>
+#include <thread>
+
+#include "aravis_testing.h"
+#include "drivers/aravis/frame_ids.h"
+
+namespace toftwin::drivers::aravis {
+namespace {
+
+using Emulated = toftwin::test::EmulatedGige;
+using std::chrono::milliseconds;
+
+class AravisLosses : public test::Aravis {};
+
+TEST(AravisLost, FramesAreCountedByTheirIds) {
+  EXPECT_EQ(lostBetween(10, 11, 0), 0u);
+  EXPECT_EQ(lostBetween(10, 14, 0), 3u);
+  EXPECT_EQ(lostBetween(10, 11, 2), 2u) << "what came and could not be used";
+  EXPECT_EQ(lostBetween(65'535, 1, 0), 0u) << "0 is no id";
+  EXPECT_EQ(lostBetween(65'534, 2, 0), 2u);
+  EXPECT_EQ(lostBetween(500, 3, 1), 1u) << "the camera began anew";
+  EXPECT_EQ(lostBetween(1ULL << 40, (1ULL << 40) + 2, 0), 1u);
+  EXPECT_EQ(lostBetween(5, 1ULL << 40, 0), 0u) << "no such gap is believed";
+}
+
+TEST_F(AravisLosses, LostPacketsAreAskedForAgainAndNoFrameIsLost) {
+  const auto source = started("packet_size = 576");
+  ASSERT_NE(source, nullptr);
+  ASSERT_TRUE(nextFrame(*source).ok());
+  camera_.drop_every = 9;
+  std::uint64_t lost = 0;
+  for (int i = 0; i < 20; ++i) {
+    const auto frame = nextFrame(*source);
+    ASSERT_TRUE(frame.ok()) << frame.error().message;
+    lost += frame->dropped_by_device;
+  }
+  EXPECT_EQ(lost, 0u);
+  EXPECT_GT(camera_.resent, 20);
+}
+
+TEST_F(AravisLosses, WithoutResendingTheyAreLostFramesAndCounted) {
+  const auto source = started("packet_size = 576\nresend = false");
+  ASSERT_NE(source, nullptr);
+  ASSERT_TRUE(nextFrame(*source).ok());
+  camera_.drop_every = 45;  // a frame has about 20 packets
+  std::uint64_t lost = 0;
+  for (int i = 0; i < 10; ++i) {
+    const auto frame = nextFrame(*source);
+    ASSERT_TRUE(frame.ok()) << frame.error().message;
+    lost += frame->dropped_by_device;
+  }
+  EXPECT_GT(lost, 2u);
+  EXPECT_EQ(camera_.resent, 0);
+}
+
+TEST_F(AravisLosses, FramesThatTheCameraLeftOutAreCounted) {
+  const auto source = started();
+  ASSERT_NE(source, nullptr);
+  ASSERT_TRUE(nextFrame(*source).ok());
+  camera_.skip_frames = 3;
+  std::uint64_t lost = 0;
+  for (int i = 0; i < 20 && lost == 0; ++i) {
+    const auto frame = nextFrame(*source);
+    ASSERT_TRUE(frame.ok()) << frame.error().message;
+    lost = frame->dropped_by_device;
+  }
+  EXPECT_EQ(lost, 3u);
+}
+
+TEST_F(AravisLosses, ThePacketSizeIsTheLargestThatComesThrough) {
+  {
+    const auto source = started();
+    ASSERT_NE(source, nullptr);
+    ASSERT_TRUE(nextFrame(*source).ok());
+    EXPECT_GT(camera_.largest_packet, 3000) << "jumbo packets";
+  }
+  camera_.largest_packet = 0;
+  camera_.is_full_size_lost = true;
+  const auto source = started();
+  ASSERT_NE(source, nullptr);
+  for (int i = 0; i < 5; ++i) ASSERT_TRUE(nextFrame(*source).ok());
+  EXPECT_LE(camera_.largest_packet, 1500);
+  EXPECT_GT(camera_.largest_packet, 1400);
+}
+
+TEST_F(AravisLosses, ALineThatIsCutIsDisconnectedAndClosingIsSoon) {
+  auto source = started();
+  ASSERT_NE(source, nullptr);
+  ASSERT_TRUE(nextFrame(*source).ok());
+  camera_.is_cut = true;
+  const auto cut_at = std::chrono::steady_clock::now();
+  Result<Frame> frame = nextFrame(*source);
+  for (int i = 0; i < 10 && frame; ++i) frame = nextFrame(*source);
+  ASSERT_FALSE(frame.ok());
+  EXPECT_EQ(frame.error().code, Error::Code::Disconnected) << frame.error().message;
+  EXPECT_FALSE(source->setParameter("Gain", 1).ok());
+  source->stop();
+  source.reset();
+  const auto took = std::chrono::steady_clock::now() - cut_at;
+  EXPECT_LT(took, milliseconds{4000}) << "the library alone takes five seconds for the closing";
+  const auto absent = open();
+  ASSERT_FALSE(absent.ok());
+  EXPECT_EQ(absent.error().code, Error::Code::NotFound) << absent.error().message;
+}
+
+TEST_F(AravisLosses, ACameraThatWasRestartedIsDisconnectedEvenIfItAnswers) {
+  const auto source = started();
+  ASSERT_NE(source, nullptr);
+  ASSERT_TRUE(nextFrame(*source).ok());
+  camera_.reboot();
+  Result<Frame> frame = nextFrame(*source);
+  for (int i = 0; i < 10 && frame; ++i) frame = nextFrame(*source);
+  ASSERT_FALSE(frame.ok());
+  EXPECT_EQ(frame.error().code, Error::Code::Disconnected);
+  EXPECT_NE(frame.error().message.find("forgotten"), std::string::npos) << frame.error().message;
+}
+
+TEST_F(AravisLosses, AHungCameraIsATimeoutAndGoesOnWhereItStopped) {
+  const auto source = started();
+  ASSERT_NE(source, nullptr);
+  ASSERT_TRUE(nextFrame(*source).ok());
+  camera_.is_hung = true;
+  Result<Frame> frame = source->next({}, false);
+  for (int i = 0; i < 10 && frame; ++i) frame = source->next({}, false);
+  ASSERT_FALSE(frame.ok());
+  EXPECT_EQ(frame.error().code, Error::Code::Timeout) << frame.error().message;
+  camera_.is_hung = false;
+  EXPECT_TRUE(nextFrame(*source).ok());
+}
+
+/// Whatever is done to the stream's packets, the driver gives frames, says that some are damaged,
+/// or that the camera is to be opened anew.
+TEST_F(AravisLosses, DamagedPacketsDoNoHarm) {
+  constexpr unsigned kSeed = 7;
+  std::mt19937 random{kSeed};
+  const auto damage = [&random](std::vector<std::byte>& packet) {
+    if (random() % 4 != 0) return;
+    const bool is_payload = packet.size() > 100;
+    for (int i = 0; i < 3 && is_payload; ++i)
+      packet[28 + random() % (packet.size() - 28)] = static_cast<std::byte>(random());
+  };
+  for (const char* keys : {"", "components = ['Range']", "components = ['Range']\nchunks = true"}) {
+    camera_.damage = nullptr;
+    auto source = started(keys);
+    ASSERT_NE(source, nullptr) << keys;
+    int good = 0, damaged = 0;
+    source->stop();
+    camera_.damage = damage;
+    ASSERT_TRUE(source->start().ok());
+    for (int i = 0; i < 60; ++i) {
+      const auto frame = source->next({}, false);
+      (frame.ok() ? good : damaged) += 1;
+      if (frame) {
+        EXPECT_EQ(frame->planes.size(), source->info().planes.size());
+        continue;
+      }
+      if (frame.error().code == Error::Code::Disconnected) {
+        source->stop();
+        ASSERT_TRUE(source->start().ok());
+      }
+    }
+    source->stop();
+    source.reset();
+    EXPECT_GT(good, 0) << keys << ", seed " << kSeed;
+  }
+  camera_.damage = nullptr;
+}
+
+// ---- nothing is kept ---------------------------------------------------------------------------
+
+std::ptrdiff_t entriesOf(const char* folder) {
+  return std::distance(std::filesystem::directory_iterator{folder}, {});
+}
+
+TEST_F(AravisLosses, OpeningAndClosingLeavesNothingBehind) {
+  { ASSERT_NE(started(), nullptr); }
+  const auto threads = entriesOf("/proc/self/task"), files = entriesOf("/proc/self/fd");
+  for (int i = 0; i < 10; ++i) {
+    const auto source = started();
+    ASSERT_NE(source, nullptr);
+    ASSERT_TRUE(nextFrame(*source).ok());
+  }
+  EXPECT_EQ(entriesOf("/proc/self/task"), threads) << "no thread outlives its source";
+  EXPECT_EQ(entriesOf("/proc/self/fd"), files);
+}
+
+TEST_F(AravisLosses, StartsAndStopsKeepNothing) {
+  constexpr int kWarmUp = 50, kCycles = 1000;
+  const auto source = open("packet_size = 1500");
+  ASSERT_TRUE(source.ok());
+  const auto cycle = [&](int count) {
+    for (int i = 0; i < count; ++i) {
+      ASSERT_TRUE((*source)->start().ok());
+      if (i % 100 == 0) {
+        ASSERT_TRUE(nextFrame(**source).ok());
+      }
+      (*source)->stop();
+    }
+  };
+  cycle(kWarmUp);
+  const auto threads = entriesOf("/proc/self/task"), files = entriesOf("/proc/self/fd");
+  const auto heap = static_cast<std::int64_t>(::mallinfo2().uordblks);  // 0 under ASan
+  cycle(kCycles);
+  const std::int64_t kept = static_cast<std::int64_t>(::mallinfo2().uordblks) - heap;
+  fmt::print("{} bytes more on the heap after {} starts and stops\n", kept, kCycles);
+  EXPECT_EQ(entriesOf("/proc/self/task"), threads);
+  EXPECT_EQ(entriesOf("/proc/self/fd"), files);
+  EXPECT_LT(kept, 8 * kCycles) << "a leak is a block of 16 bytes per cycle at least";
+}
+
+}  // namespace
+}  // namespace toftwin::drivers::aravis

@@ -1,0 +1,390 @@
+// SPDX-License-Identifier: Apache-2.0
+// The driver with the real library: what it makes of an emulated camera's frames and features.
+#include <cmath>
+#include <filesystem>
+#include <map>
+
+#include "aravis_testing.h"
+#include "drivers/compliance.h"
+
+namespace toftwin::drivers::aravis {
+namespace {
+
+using Emulated = toftwin::test::EmulatedGige;
+using std::chrono::milliseconds;
+using test::openWith;
+
+class AravisDriver : public test::Aravis {
+ protected:
+  /// Which frame it is, by its first pixel with a value: (1, 0).
+  static std::uint64_t countIn(const Frame& frame) {
+    const float depth_mm = 1000.0F * frame.find(PlaneKind::Depth)->as<float>()[1];
+    const auto code =
+        std::lround((static_cast<double>(depth_mm) - Emulated::kOffset_mm) / Emulated::kScale_mm);
+    return static_cast<std::uint64_t>(code - Emulated::rangeCode(0, 1, 0));
+  }
+  static void expectWhatWasSent(const Frame& frame) {
+    const std::uint64_t n = countIn(frame);
+    const auto range_m = frame.find(PlaneKind::Range)->as<float>();
+    const auto depth_m = frame.find(PlaneKind::Depth)->as<float>();
+    const auto amplitude = frame.find(PlaneKind::Amplitude)->as<float>();
+    const auto flags = frame.find(PlaneKind::Flags)->as<std::uint8_t>();
+    std::size_t i = 0;
+    for (int y = 0; y < Emulated::kHeight; ++y) {
+      for (int x = 0; x < Emulated::kWidth; ++x, ++i) {
+        const std::uint16_t code = Emulated::rangeCode(n, x, y);
+        const bool is_confident = Emulated::confidence(x, y) != 0;
+        ASSERT_EQ(amplitude[i], static_cast<float>(Emulated::intensity(x, y)));
+        ASSERT_EQ(flags[i], (code != 0 && is_confident ? 0 : 1) | (is_confident ? 0 : 8));
+        if (flags[i] != 0) {
+          ASSERT_TRUE(std::isnan(range_m[i]) && std::isnan(depth_m[i]));
+          continue;
+        }
+        const double expected_m = 1e-3 * (Emulated::kScale_mm * code + Emulated::kOffset_mm);
+        const double a = (x - Emulated::kU_px) / Emulated::kFocal_px,
+                     b = (y - Emulated::kV_px) / Emulated::kFocal_px;
+        ASSERT_NEAR(depth_m[i], expected_m, 1e-6);  // a float's rounding at 1.3 m
+        ASSERT_NEAR(range_m[i], expected_m * std::sqrt(1.0 + a * a + b * b), 1e-6);
+      }
+    }
+  }
+};
+
+// ---- frames ------------------------------------------------------------------------------------
+
+TEST_F(AravisDriver, AFrameIsWhatTheCameraSentInOurUnits) {
+  const auto source = started();
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(source->info().model, "toftwin Emulated ToF");
+  EXPECT_EQ(source->info().serial, "EMU-1");
+  EXPECT_EQ(source->info().planes, (std::vector{PlaneKind::Range, PlaneKind::Depth,
+                                                PlaneKind::Amplitude, PlaneKind::Flags}));
+  EXPECT_NEAR(source->info().frame_interval->in(millisecond), 20.0, 1e-9);
+  EXPECT_EQ(source->info().camera.fx, Emulated::kFocal_px);
+  EXPECT_EQ(source->info().camera.calibration_id.size(), 32u);
+  for (int i = 0; i < 5; ++i) {
+    const auto frame = nextFrame(*source);
+    ASSERT_TRUE(frame.ok()) << frame.error().message;
+    expectWhatWasSent(*frame);
+    EXPECT_EQ(frame->provenance.calibration_id, source->info().camera.calibration_id);
+    EXPECT_NEAR(frame->moment.exposures.at(0).duration.in(microsecond), 1000.0, 1e-9);
+    EXPECT_EQ(frame->moment.temperatures.at(0).value.in(celsius), 41.5);
+  }
+}
+
+TEST_F(AravisDriver, ASingleImageWithIdsThatWrapAroundLosesNothing) {
+  const auto source = started("components = ['Range']");
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(source->info().planes,
+            (std::vector{PlaneKind::Range, PlaneKind::Depth, PlaneKind::Flags}));
+  std::uint64_t last = 0;
+  for (int i = 0; i < 12; ++i) {  // ids begin six before 65536, and 0 is none
+    const auto frame = nextFrame(*source);
+    ASSERT_TRUE(frame.ok()) << frame.error().message;
+    if (i > 0) {
+      EXPECT_EQ(frame->dropped_by_device + 1, (countIn(*frame) + 64 - last) % 64) << i;
+    }
+    last = countIn(*frame);
+  }
+}
+
+TEST_F(AravisDriver, PointsSayRangeDepthAndTheLens) {
+  camera_.setFloatReg(Emulated::kFocal, 0.0);
+  for (std::uint32_t axis = 0; axis < 3; ++axis) {
+    camera_.setFloatReg(0x10200 + 8 * axis, 1.0);
+    camera_.setFloatReg(0x10220 + 8 * axis, 0.0);
+  }
+  for (const char* format : {"Coord3D_ABC32f", "Coord3D_ABC32f_Planar"}) {
+    const auto source = started(fmt::format("components = ['Range']\npixel_format = '{}'", format));
+    ASSERT_NE(source, nullptr);
+    // Points of exactly such a camera in floats: the fit is as exact as they are.
+    EXPECT_NEAR(source->info().camera.fx, Emulated::kFocal_px, 1e-2);
+    EXPECT_NEAR(source->info().camera.cx, Emulated::kU_px, 1e-2);
+    const auto frame = nextFrame(*source);
+    ASSERT_TRUE(frame.ok()) << frame.error().message;
+    const auto range_m = frame->find(PlaneKind::Range)->as<float>();
+    const auto depth_m = frame->find(PlaneKind::Depth)->as<float>();
+    const auto n = static_cast<std::uint64_t>(std::lround(1000.0F * depth_m[1])) -
+                   Emulated::rangeCode(0, 1, 0);
+    const std::size_t at = 20 * Emulated::kWidth + 40;
+    const double z_m = 1e-3 * Emulated::rangeCode(n, 40, 20);
+    EXPECT_NEAR(depth_m[at], z_m, 1e-6);
+    EXPECT_NEAR(range_m[at], z_m * std::hypot(1.0, 17.0 / 40.0, 4.0 / 40.0), 1e-6);
+  }
+}
+
+TEST_F(AravisDriver, FloatCoordinatesAndSphericalOnesAreRead) {
+  camera_.setReg(Emulated::kSystem, 1);
+  const auto source = started("components = ['Range']\npixel_format = 'Coord3D_C32f'");
+  ASSERT_NE(source, nullptr);
+  const auto frame = nextFrame(*source);
+  ASSERT_TRUE(frame.ok()) << frame.error().message;
+  const std::size_t at = 20 * Emulated::kWidth + 40;
+  const float range_m = frame->find(PlaneKind::Range)->as<float>()[at],
+              depth_m = frame->find(PlaneKind::Depth)->as<float>()[at];
+  EXPECT_NEAR(range_m, depth_m * std::hypot(1.0, 17.0 / 40.0, 4.0 / 40.0), 1e-6);
+  const double code =
+      (1000.0 * static_cast<double>(range_m) - Emulated::kOffset_mm) / Emulated::kScale_mm;
+  EXPECT_NEAR(code, Emulated::rangeCode(0, 40, 20) + 32, 32) << "along the ray";
+}
+
+TEST_F(AravisDriver, TheUnitIsTheCamerasOrTheUsers) {
+  camera_.setReg(Emulated::kDistanceUnit, 1);
+  auto inches = started("components = ['Range']");
+  ASSERT_NE(inches, nullptr);
+  const auto frame = nextFrame(*inches);
+  ASSERT_TRUE(frame.ok());
+  const double depth_in =
+      static_cast<double>(frame->find(PlaneKind::Depth)->as<float>()[1]) / 0.0254;
+  EXPECT_NEAR(depth_in, Emulated::kScale_mm * (4007 + 32) + Emulated::kOffset_mm, 8.01);
+  inches.reset();
+  camera_.setReg(Emulated::kDistanceUnit, 2);
+  expectRefused("", "units of \"Pixel\"");
+  EXPECT_TRUE(open("unit_mm = 0.5").ok());
+}
+
+TEST_F(AravisDriver, WithoutAnythingOfItsLensDepthAloneIsThere) {
+  camera_.setFloatReg(Emulated::kFocal, 0.0);
+  auto source = started("components = ['Range']");
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(source->info().planes, (std::vector{PlaneKind::Depth, PlaneKind::Flags}));
+  EXPECT_TRUE(source->info().camera.calibration_id.empty());
+  source.reset();
+  const auto told = started("components = ['Range']\nlens.field_of_view_deg = 60");
+  ASSERT_NE(told, nullptr);
+  EXPECT_EQ(told->info().planes.front(), PlaneKind::Range);
+}
+
+TEST_F(AravisDriver, ChunkDataSayTheExposureOfEachFrame) {
+  const auto source = started("components = ['Range']\nchunks = true");
+  ASSERT_NE(source, nullptr);
+  ASSERT_TRUE(nextFrame(*source).ok());
+  camera_.setFloatReg(Emulated::kExposure, 777.0);  // automatically, behind our back
+  double exposure_us = 0.0;
+  for (int i = 0; i < 10 && std::abs(exposure_us - 777.0) > 1e-9; ++i) {
+    const auto frame = nextFrame(*source);
+    ASSERT_TRUE(frame.ok()) << frame.error().message;
+    exposure_us = frame->moment.exposures.at(0).duration.in(microsecond);
+  }
+  EXPECT_NEAR(exposure_us, 777.0, 1e-9);
+}
+
+// ---- time --------------------------------------------------------------------------------------
+
+TEST_F(AravisDriver, DeviceTimeGoesOnWhenTheCamerasClockIsSet) {
+  const auto source = started();
+  ASSERT_NE(source, nullptr);
+  auto before = nextFrame(*source);
+  ASSERT_TRUE(before.ok());
+  for (const std::int64_t jump_ns : {-3'600'000'000'000LL, 7'200'000'000'000LL}) {
+    camera_.clock_ns += jump_ns;
+    for (int i = 0; i < 10; ++i) {
+      auto frame = nextFrame(*source);
+      ASSERT_TRUE(frame.ok()) << frame.error().message;
+      const std::int64_t step_ns =
+          frame->moment.exposures.at(0).start.ns - before->moment.exposures.at(0).start.ns;
+      EXPECT_GT(step_ns, 0);
+      EXPECT_LT(step_ns, 1'000'000'000) << "the jump is not in it";
+      before = std::move(frame);
+    }
+  }
+}
+
+TEST_F(AravisDriver, TheCamerasClockIsRelatedToTheHosts) {
+  const auto source = started("delay_ms = 1");
+  ASSERT_NE(source, nullptr);
+  Result<Frame> frame = nextFrame(*source);
+  for (int i = 0; i < 20 && frame; ++i) frame = nextFrame(*source);
+  ASSERT_TRUE(frame.ok());
+  const Moment& moment = frame->moment;
+  ASSERT_GE(moment.clock.uncertainty_ns, 0);
+  const std::int64_t host_ns =
+      moment.exposures.at(0).start.ns + moment.clock.host_minus_device_ns + 1'000'000;
+  const std::int64_t now_ns = std::chrono::system_clock::now().time_since_epoch().count();
+  EXPECT_NEAR(static_cast<double>(now_ns - host_ns), 0.0, 5e8) << "within the last half second";
+}
+
+TEST_F(AravisDriver, PtpIsSwitchedOnAsAsked) {
+  EXPECT_EQ(camera_.reg(Emulated::kPtp), 0u);
+  EXPECT_TRUE(open("ptp = true").ok());
+  EXPECT_EQ(camera_.reg(Emulated::kPtp), 1u);
+}
+
+// ---- triggers ----------------------------------------------------------------------------------
+
+TEST_F(AravisDriver, ASoftwareTriggerMakesOneFrame) {
+  const auto source = started("trigger = 'software'");
+  ASSERT_NE(source, nullptr);
+  EXPECT_TRUE(source->info().can_trigger);
+  EXPECT_FALSE(source->info().frame_interval.has_value());
+  for (int i = 0; i < 3; ++i) {
+    const auto triggered = source->trigger();
+    ASSERT_TRUE(triggered.ok()) << triggered.error().message;
+    const auto frame = nextFrame(*source);
+    ASSERT_TRUE(frame.ok()) << frame.error().message;
+    expectWhatWasSent(*frame);
+  }
+  const auto none = source->next({}, false);
+  ASSERT_FALSE(none.ok()) << "nobody triggered it";
+  EXPECT_EQ(none.error().code, Error::Code::Timeout) << none.error().message;
+}
+
+TEST_F(AravisDriver, AHardwareTriggerIsTheInputsAndNobodyElses) {
+  const auto source =
+      started("trigger = 'hardware'\nset = ['TriggerActivation = FallingEdge', 'Gain = 3']");
+  ASSERT_NE(source, nullptr);
+  EXPECT_FALSE(source->info().can_trigger);
+  EXPECT_FALSE(source->trigger().ok());
+  EXPECT_EQ(camera_.reg(Emulated::kActivation), 1u);
+  camera_.edge();
+  EXPECT_TRUE(nextFrame(*source).ok());
+  const auto none = source->next({}, false);
+  ASSERT_FALSE(none.ok());
+  EXPECT_EQ(none.error().code, Error::Code::Timeout);
+}
+
+TEST_F(AravisDriver, FreeRunUndoesATrigger) {
+  ASSERT_TRUE(open("trigger = 'software'").ok());
+  auto as_set = started();
+  ASSERT_NE(as_set, nullptr);
+  EXPECT_TRUE(as_set->info().can_trigger) << "as the camera is set";
+  as_set.reset();
+  const auto source = started("trigger = 'free_run'\nframe_rate_hz = 25");
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(camera_.floatReg(Emulated::kRate), 25.0);
+  EXPECT_TRUE(nextFrame(*source).ok());
+}
+
+// ---- features ----------------------------------------------------------------------------------
+
+TEST_F(AravisDriver, ParametersAreTheCamerasFeatures) {
+  const auto source = started(
+      "parameters = ['ExposureTime', 'Gain', 'FlyingPixelFilter', 'Scan3dCoordinateSystem']");
+  ASSERT_NE(source, nullptr);
+  const auto parameters = source->state().parameters;
+  ASSERT_EQ(parameters.size(), 4u);
+  EXPECT_EQ(parameters[0].name, "ExposureTime");
+  EXPECT_EQ(parameters[0].value, 1000.0);
+  EXPECT_EQ(parameters[0].bounds.max, 20000.0);
+  EXPECT_EQ(parameters[1].bounds.max, 24.0);
+  EXPECT_EQ(parameters[2].bounds.max, 1.0);
+  EXPECT_EQ(parameters[3].value, 0.0) << "an enumeration's entry by its number";
+  ASSERT_TRUE(source->setParameter("ExposureTime", 512.5).ok());
+  ASSERT_TRUE(source->setParameter("Gain", 12).ok());
+  ASSERT_TRUE(source->setParameter("FlyingPixelFilter", 1).ok());
+  EXPECT_EQ(camera_.floatReg(Emulated::kExposure), 512.5);
+  EXPECT_EQ(camera_.reg(Emulated::kGain), 12u);
+  EXPECT_EQ(camera_.reg(Emulated::kFilter), 1u);
+  EXPECT_EQ(source->state().parameters[0].value, 512.5);
+  for (const auto& [name, wrong, says] : {std::tuple{"ExposureTime", 5.0, "from 10 to 20000"},
+                                          {"Gain", 1.5, "a whole number from 0 to 24"},
+                                          {"FlyingPixelFilter", 2.0, "from 0 to 1"},
+                                          {"Gain", std::nan(""), "a whole number"},
+                                          {"Width", 1.0, "it has: ExposureTime, Gain"}}) {
+    const auto set = source->setParameter(name, wrong);
+    ASSERT_FALSE(set.ok()) << name;
+    EXPECT_NE(set.error().message.find(says), std::string::npos) << set.error().message;
+  }
+}
+
+TEST_F(AravisDriver, ByDefaultExposureAndGainAreParameters) {
+  const auto source = open();
+  ASSERT_TRUE(source.ok());
+  EXPECT_EQ((*source)->info().parameters, (std::vector<std::string>{"ExposureTime", "Gain"}));
+}
+
+TEST_F(AravisDriver, FeaturesOfEveryTypeAreSetWhenItIsOpened) {
+  const auto source = open(
+      "set = ['ExposureTime = 250', 'Gain=7', 'FlyingPixelFilter = true', 'UserText = dock 3', "
+      "'AcquisitionMode = Continuous']");
+  ASSERT_TRUE(source.ok()) << source.error().message;
+  EXPECT_EQ(camera_.floatReg(Emulated::kExposure), 250.0);
+  EXPECT_EQ(camera_.reg(Emulated::kGain), 7u);
+  EXPECT_EQ(camera_.reg(Emulated::kFilter), 1u);
+  EXPECT_EQ(camera_.reg(Emulated::kUserText), 0x646F636BU) << "dock";
+  EXPECT_EQ(camera_.reg(Emulated::kHeartbeat), 2000u);
+}
+
+TEST_F(AravisDriver, WrongKeysSayWhatThereIs) {
+  for (const auto& [keys, says] :
+       {std::pair{"set = ['Gain']", "write \"ExposureTime = 1000\""},
+        {"set = ['Gian = 3']", "no feature \"Gian\""},
+        {"set = ['Gain = loud']", "Gain = loud cannot be set: it must be a number"},
+        {"set = ['Gain = 99']", "from 0 to 24"},
+        {"set = ['TriggerActivation = AnyEdge']", "one of: RisingEdge, FallingEdge"},
+        {"components = ['Depth']", "it has: Range, Intensity, Confidence"},
+        {"pixel_format = 'RGB8'", "one of: Coord3D_C8"},
+        {"pixel_format = 'BayerRG8'", "cannot be read"},
+        {"trigger = 'hardware'\ntrigger_source = 'Line9'", "it has: Software, Line1"},
+        {"parameters = ['UserText']", "is a number"},
+        {"lens.fx = 1\nlens.field_of_view_deg = 2", "leave one out"},
+        {"buffers = 1", "buffers"}}) {
+    expectRefused(keys, says);
+  }
+  for (const auto& [uri, says] :
+       {std::pair{"nobody", "aravis:nobody"}, {"127.0.0.77", "aravis:127.0.0.77"}}) {
+    const auto opened = openWith(uri);
+    ASSERT_FALSE(opened.ok());
+    EXPECT_NE(opened.error().message.find(says), std::string::npos) << opened.error().message;
+  }
+  auto table = settings::Table::parse("uri = 'usb:1'", "aravis.toml");
+  EXPECT_FALSE(row().open(*table).ok());
+}
+
+TEST_F(AravisDriver, ACameraThatSendsWhatCannotBeReadSaysSo) {
+  camera_.setReg(Emulated::kFormat + 4, Emulated::kBayer8);
+  expectRefused("", "pixel format BayerRG8 cannot be read");
+  camera_.setReg(Emulated::kFormat + 4, Emulated::kMono8);
+  camera_.setReg(Emulated::kMultipartAble, 0);
+  expectRefused("", "multipart");
+  EXPECT_TRUE(open("components = ['Range']").ok());
+  camera_.setReg(Emulated::kWidthReg, 0);
+  expectRefused("components = ['Range']", "its image is 0 x 32");
+}
+
+TEST_F(AravisDriver, IsFoundByItsNames) {
+  for (const char* name : {"dock", "EMU-1", "toftwin-Emulated ToF-EMU-1"}) {
+    // Another test's camera may have the same name: any of them will do.
+    const auto opened = openWith(name);
+    if (!opened) {
+      EXPECT_EQ(opened.error().code, Error::Code::Busy) << name << ": " << opened.error().message;
+    }
+  }
+}
+
+TEST_F(AravisDriver, ACameraThatAnotherProgramControlsIsBusy) {
+  camera_.is_other_controller = true;
+  const auto opened = open();
+  ASSERT_FALSE(opened.ok());
+  EXPECT_EQ(opened.error().code, Error::Code::Busy) << opened.error().message;
+}
+
+// ---- compliance --------------------------------------------------------------------------------
+
+void expectCompliant(const Emulated& camera, const std::string& keys) {
+  const Driver driver = row();
+  const Candidate candidate{.driver = &driver,
+                            .keys = fmt::format("uri = 'aravis:{}'\n{}", camera.address(), keys),
+                            .absent_keys = "uri = 'aravis:127.0.0.77'",
+                            .absent_name = "aravis:127.0.0.77"};
+  for (const Finding& finding : checkCompliance(candidate)) {
+    EXPECT_NE(finding.outcome, Finding::Outcome::Failed)
+        << finding.check << ", because " << finding.because << "\n  " << finding.detail;
+  }
+}
+
+TEST_F(AravisDriver, IsCompliantWithSeveralImages) { expectCompliant(camera_, ""); }
+TEST_F(AravisDriver, IsCompliantWithOneImage) {
+  expectCompliant(camera_,
+                  "components = ['Range']\nparameters = ['ExposureTime', 'Gain', "
+                  "'FlyingPixelFilter', 'TriggerActivation']");
+}
+TEST_F(AravisDriver, IsCompliantWithPoints) {
+  expectCompliant(camera_, "components = ['Range']\npixel_format = 'Coord3D_ABC32f'");
+}
+TEST_F(AravisDriver, IsCompliantWithASoftwareTrigger) {
+  expectCompliant(camera_, "trigger = 'software'");
+}
+
+}  // namespace
+}  // namespace toftwin::drivers::aravis
