@@ -11,6 +11,7 @@
 #include <string>
 
 #include "daemon/daemon.h"
+#include "daemon/memory.h"
 
 namespace {
 
@@ -114,6 +115,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  daemon::keepFreedMemory();
   try {
     return run(argc, argv);
   } catch (const std::exception& e) {

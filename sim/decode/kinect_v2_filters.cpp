@@ -21,8 +21,9 @@ struct Row {
   std::vector<float> re, im, u, v, square;
 };
 
-TOFTWIN_SIMD void splitRow(const std::complex<float>* phasors, std::size_t width, float* re,
-                           float* im, float* u, float* v, float* square) {
+TOFTWIN_SIMD void splitRow(const std::complex<float>* phasors, std::size_t width, float* __restrict re,
+                           float* __restrict im, float* __restrict u, float* __restrict v,
+                           float* __restrict square) {
   const auto* parts = reinterpret_cast<const float*>(phasors);
   for (std::size_t x = 0; x < width; ++x) {
     const float a = parts[2 * x], b = parts[2 * x + 1];
@@ -88,15 +89,18 @@ TOFTWIN_SIMD void addNeighbour(const Row& own, const Row& other, int shift, floa
 }
 
 TOFTWIN_SIMD void finishRow(const Row& own, const Sums& sums, std::complex<float>* phasors,
-                            float* unlikeness) {
-  auto* parts = reinterpret_cast<float*>(phasors);
+                            float* __restrict unlikeness) {
+  auto* __restrict parts = reinterpret_cast<float*>(phasors);
+  const float *square = own.square.data(), *own_re = own.re.data(), *own_im = own.im.data();
+  const float *re = sums.re.data(), *im = sums.im.data(), *total = sums.weight.data();
+  const float* unlike = sums.unlikeness.data();
   const std::size_t last = own.re.size() - 1;
   for (std::size_t x = 1; x < last; ++x) {
-    if (!(own.square[x] > 0.0F)) continue;
-    const float weight = 1.0F / (sums.weight[x] + kMiddle);
-    parts[2 * x] = (sums.re[x] + kMiddle * own.re[x]) * weight;
-    parts[2 * x + 1] = (sums.im[x] + kMiddle * own.im[x]) * weight;
-    unlikeness[x] = sums.unlikeness[x];
+    const bool is_signal = square[x] > 0.0F;  // not NaN
+    const float weight = 1.0F / (total[x] + kMiddle);
+    parts[2 * x] = is_signal ? (re[x] + kMiddle * own_re[x]) * weight : parts[2 * x];
+    parts[2 * x + 1] = is_signal ? (im[x] + kMiddle * own_im[x]) * weight : parts[2 * x + 1];
+    unlikeness[x] = is_signal ? unlike[x] : unlikeness[x];
   }
 }
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim/effects/companding.h"
 
-#include <algorithm>
 #include <bit>
 #include <cmath>
 
@@ -16,28 +15,40 @@ inline float powerBelow(float m) {
   return std::bit_cast<float>(std::bit_cast<std::uint32_t>(m) & 0x7f80'0000U);
 }
 
-/// Converts one row; `second` is null where there is one tap. What conversion takes off the
-/// difference goes to both taps alike, so that their sum stays.
-TOFTWIN_SIMD void convert(float* __restrict first, float* __restrict second, std::uint8_t* __restrict flags,
-                          int width, float counts_per_electron) {
-  constexpr auto kSaturated = static_cast<std::uint8_t>(PixelFlag::Saturated);
+/// What conversion adds to a difference of charges; says whether that is too large for it.
+inline float changeOf(float difference, float counts_per_electron, float electrons_per_count, bool& is_saturated) {
+  const float counts = difference * counts_per_electron;
+  const float magnitude = std::abs(counts), fraction = powerBelow(magnitude) * (1.0F / 128.0F);
+  const float step = fraction > 1.0F ? fraction : 1.0F;
+  const float code = step * std::nearbyint(magnitude / step);
+  is_saturated = code > Companding::kLargest;
+  const float kept = is_saturated ? Companding::kLargest : code;
+  return std::copysign(kept, counts) * electrons_per_count - difference;
+}
+
+constexpr auto kSaturated = static_cast<std::uint8_t>(PixelFlag::Saturated);
+
+/// Converts one row of two taps. What conversion takes off the difference goes to both alike, so that
+/// their sum stays.
+TOFTWIN_SIMD void convertTwo(float* __restrict first, float* __restrict second, std::uint8_t* __restrict flags,
+                             int width, float counts_per_electron) {
   const float electrons_per_count = 1.0F / counts_per_electron;
   for (int x = 0; x < width; ++x) {
-    const float difference = second == nullptr ? first[x] : first[x] - second[x];
-    const float counts = difference * counts_per_electron;
-    const float magnitude = std::abs(counts);
-    const float step = std::max(1.0F, powerBelow(magnitude) * (1.0F / 128.0F));
-    const float code = step * std::nearbyint(magnitude / step);
-    const bool is_saturated = code > Companding::kLargest;
-    const float kept = is_saturated ? Companding::kLargest : code;
-    const float change = std::copysign(kept, counts) * electrons_per_count - difference;
+    bool is_saturated = false;
+    const float change = changeOf(first[x] - second[x], counts_per_electron, electrons_per_count, is_saturated);
     flags[x] = static_cast<std::uint8_t>(flags[x] | (is_saturated ? kSaturated : 0));
-    if (second == nullptr) {
-      first[x] += change;
-    } else {
-      first[x] += 0.5F * change;
-      second[x] -= 0.5F * change;
-    }
+    first[x] += 0.5F * change;
+    second[x] -= 0.5F * change;
+  }
+}
+
+TOFTWIN_SIMD void convertOne(float* __restrict first, std::uint8_t* __restrict flags, int width,
+                             float counts_per_electron) {
+  const float electrons_per_count = 1.0F / counts_per_electron;
+  for (int x = 0; x < width; ++x) {
+    bool is_saturated = false;
+    first[x] += changeOf(first[x], counts_per_electron, electrons_per_count, is_saturated);
+    flags[x] = static_cast<std::uint8_t>(flags[x] | (is_saturated ? kSaturated : 0));
   }
 }
 
@@ -50,8 +61,14 @@ Samples Companding::apply(Samples samples, const Conditions&, const Random&) con
   forRows(samples.height(), [&](int first_row, int last_row) {
     for (std::size_t i = 0; i < samples.electrons.size(); i += taps) {
       for (int y = first_row; y < last_row; ++y) {
-        convert(&samples.electrons[i](0, y), taps == 2 ? &samples.electrons[i + 1](0, y) : nullptr,
-                &samples.flags(0, y), samples.width(), static_cast<float>(counts_per_electron));
+        float* first = &samples.electrons[i](0, y);
+        std::uint8_t* flags = &samples.flags(0, y);
+        const auto scale = static_cast<float>(counts_per_electron);
+        if (taps == 2) {
+          convertTwo(first, &samples.electrons[i + 1](0, y), flags, samples.width(), scale);
+        } else {
+          convertOne(first, flags, samples.width(), scale);
+        }
       }
     }
   });

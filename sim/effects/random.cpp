@@ -40,14 +40,32 @@ TOFTWIN_SIMD bool gaussianPoisson(const float* means, float* z, std::size_t coun
   return small != 0;
 }
 
+/// True if any is in the tails: NaN.
+TOFTWIN_SIMD bool fillCentralNormals(const Random::Draw& draw, std::uint32_t first_pixel, std::uint32_t count,
+                                     float* out) {
+  const Random::Draw copy = draw;  // its keys in registers: no store below can change them
+  int is_tail = 0;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const float normal = copy.centralNormal(first_pixel + i);
+    is_tail |= normal == normal ? 0 : 1;  // NaN
+    out[i] = normal;
+  }
+  return is_tail != 0;
+}
+
 }  // namespace
 
-TOFTWIN_SIMD void fillNormals(const Random::Draw& draw, std::uint32_t first_pixel,
-                              std::span<float> normals) {
-  const Random::Draw copy = draw;  // its keys in registers: no store below can change them
-  float* out = normals.data();
+void fillNormals(const Random::Draw& draw, std::uint32_t first_pixel, std::span<float> normals) {
+  constexpr std::uint32_t kBlock = 256;
   const auto count = static_cast<std::uint32_t>(normals.size());
-  for (std::uint32_t i = 0; i < count; ++i) out[i] = copy.normal(first_pixel + i);
+  for (std::uint32_t start = 0; start < count; start += kBlock) {
+    float* out = &normals[start];
+    const std::uint32_t in_block = std::min(kBlock, count - start), first = first_pixel + start;
+    if (!fillCentralNormals(draw, first, in_block, out)) continue;
+    for (std::uint32_t i = 0; i < in_block; ++i) {
+      if (std::isnan(out[i])) out[i] = draw.normal(first + i);
+    }
+  }
 }
 
 void poisson(const Random::Draw& draw, std::uint32_t first_pixel, std::span<float> means) {

@@ -78,7 +78,8 @@ Contact contactAtEdge(const BuiltObject& object, double blur, std::uint32_t prim
 /// A plane of a moving object, in the scene; its bounds count what taking rays to the object rounds.
 TrianglePlane placed(const TrianglePlane& own, const Standing& standing) {
   TrianglePlane plane = own;
-  plane.normal = standing.scene_from_object.rotate(own.normal);
+  const auto& [a, b, c] = standing.axes;
+  plane.normal = a * own.normal.x + b * own.normal.y + c * own.normal.z;
   plane.level = own.level + dot(plane.normal, standing.scene_from_object.translation_m);
   plane.offset += static_cast<float>(standing.blur);
   plane.margin += static_cast<float>(kEdgeMargin * standing.blur);

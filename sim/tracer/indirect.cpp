@@ -143,7 +143,15 @@ Channels::Channels(const TraceRequest& request, std::span<const std::uint8_t> wa
   for (std::size_t term = 0; term < request.frequencies.size() * harmonics; ++term) {
     const bool is_first = term % harmonics == 0;
     if (is_first) firsts_.push_back(terms_.size());
-    if (is_first || wanted.empty() || wanted[term] != 0) terms_.push_back(term);
+    if (!is_first && !wanted.empty() && wanted[term] == 0) continue;
+    terms_.push_back(term);
+    const int order = static_cast<int>(term % harmonics) + 1;
+    if (const auto at = std::ranges::lower_bound(orders_, order); at == orders_.end() || *at != order)
+      orders_.insert(at, order);
+  }
+  for (const std::size_t term : terms_) {
+    const auto at = std::ranges::lower_bound(orders_, static_cast<int>(term % harmonics) + 1) - orders_.begin();
+    lanes_.push_back(term / harmonics * orders_.size() + static_cast<std::size_t>(at));
   }
 }
 

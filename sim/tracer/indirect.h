@@ -42,13 +42,17 @@ class Channels {
   static constexpr std::size_t re(std::size_t phasor) { return 2 + 2 * phasor; }
   static constexpr std::size_t im(std::size_t phasor) { return 3 + 2 * phasor; }
   [[nodiscard]] std::size_t count() const { return 2 + 2 * terms_.size(); }
-  /// Which terms are wanted, ascending; phasor k is that of terms()[k].
+  /// Which terms are wanted, ascending; phasor k is that of terms()[k], and in LaneSums that of lanes()[k].
   [[nodiscard]] const std::vector<std::size_t>& terms() const { return terms_; }
+  [[nodiscard]] const std::vector<std::size_t>& lanes() const { return lanes_; }
+  /// The harmonics that any frequency wants: Tracing::orders.
+  [[nodiscard]] const std::vector<int>& orders() const { return orders_; }
   /// The phasor of a frequency's first harmonic.
   [[nodiscard]] std::size_t first(std::size_t frequency) const { return firsts_[frequency]; }
 
  private:
-  std::vector<std::size_t> terms_, firsts_;
+  std::vector<std::size_t> terms_, lanes_, firsts_;
+  std::vector<int> orders_;
 };
 
 /// Adds weight · light · exp(−i 2π n f L/c), channel by channel, to the sums' terms.
@@ -76,7 +80,7 @@ class IndirectLight {
 
   /// What spread() writes, and room for it to work.
   struct Spread {
-    Spread(const Channels& channels, const TraceRequest& request);
+    Spread(const Channels& channels, std::size_t frequencies);
     LaneSums sums;
     std::vector<Lanes<float>> variance;  ///< by frequency
     std::vector<Lanes<float>> light;

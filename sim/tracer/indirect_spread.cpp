@@ -188,9 +188,9 @@ void IndirectLight::smooth() {
   });
 }
 
-IndirectLight::Spread::Spread(const Channels& channels, const TraceRequest& request)
-    : sums(request.frequencies.size() * static_cast<std::size_t>(request.harmonics)),
-      variance(request.frequencies.size()),
+IndirectLight::Spread::Spread(const Channels& channels, std::size_t frequencies)
+    : sums(frequencies * channels.orders().size()),
+      variance(frequencies),
       light(channels.count()) {}
 
 void IndirectLight::spread(const Tracing& tracing, int left, int top, const BlockGeometry& pixels,

@@ -49,7 +49,7 @@ void startAnew(Packet& packet, Hits& hits) {
 TOFTWIN_VECTOR
 void addTurned(const Tracing& tracing, const Channels& channels, const Lanes<float>& weight,
                const Lanes<double>& length, const std::vector<Lanes<float>>& light, LaneSums& sums) {
-  const auto harmonics = static_cast<std::size_t>(tracing.request.harmonics);
+  const std::vector<int>& orders = tracing.orders;
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     sums.steady[i] += weight[i] * light[Channels::kSteady][i];
     sums.ambient[i] += weight[i] * light[Channels::kAmbient][i];
@@ -62,9 +62,10 @@ void addTurned(const Tracing& tracing, const Channels& channels, const Lanes<flo
       cosine[i] = turn_re[i] = z.cos;
       sine[i] = turn_im[i] = -z.sin;
     }
-    for (std::size_t term = f * harmonics; term < (f + 1) * harmonics; ++term) {
-      if (phasor == channels.terms().size()) return;
-      if (channels.terms()[phasor] == term) {
+    std::size_t term = f * orders.size();
+    for (int n = 1;; ++n) {
+      const bool is_one = orders[term - f * orders.size()] == n;
+      if (is_one && phasor < channels.lanes().size() && channels.lanes()[phasor] == term) {
         const Lanes<float>&re = light[Channels::re(phasor)], &im = light[Channels::im(phasor)];
         Lanes<float> sum_re = sums.re[term], sum_im = sums.im[term];
         for (std::size_t i = 0; i < kLaneCount; ++i) {
@@ -75,6 +76,7 @@ void addTurned(const Tracing& tracing, const Channels& channels, const Lanes<flo
         sums.im[term] = sum_im;
         ++phasor;
       }
+      if (is_one && ++term == (f + 1) * orders.size()) break;
       for (std::size_t i = 0; i < kLaneCount; ++i) next[i] = turn_re[i] * cosine[i] - turn_im[i] * sine[i];
       for (std::size_t i = 0; i < kLaneCount; ++i) turn_im[i] = turn_re[i] * sine[i] + turn_im[i] * cosine[i];
       turn_re = next;
@@ -86,7 +88,7 @@ TileGatherer::TileGatherer(const Tracing& tracing, const IrradianceCells& cells,
     : tracing_(tracing),
       cells_(cells),
       channels_(channels),
-      sums_(tracing.turns_per_metre.size() * static_cast<std::size_t>(tracing.request.harmonics)),
+      sums_(tracing.turns_per_metre.size() * tracing.orders.size()),
       further_(sums_.re.size()),
       found_(channels.count()) {
   tile_.sums.resize(channels.count());
@@ -149,8 +151,8 @@ void TileGatherer::follow(Packet& packet, CellUpdate* update) {
   update->values[Channels::kSteady] = further_.steady;
   update->values[Channels::kAmbient] = further_.ambient;
   for (std::size_t phasor = 0; phasor < channels_.terms().size(); ++phasor) {
-    update->values[Channels::re(phasor)] = further_.re[channels_.terms()[phasor]];
-    update->values[Channels::im(phasor)] = further_.im[channels_.terms()[phasor]];
+    update->values[Channels::re(phasor)] = further_.re[channels_.lanes()[phasor]];
+    update->values[Channels::im(phasor)] = further_.im[channels_.lanes()[phasor]];
   }
   addTurned(tracing_, channels_, weight, length, update->values, sums_);
 }
@@ -231,10 +233,10 @@ void TileGatherer::keepSums(const Lanes<int>& valid) {
   add(Channels::kSteady, sums_.steady);
   add(Channels::kAmbient, sums_.ambient);
   for (std::size_t phasor = 0; phasor < channels_.terms().size(); ++phasor) {
-    add(Channels::re(phasor), sums_.re[channels_.terms()[phasor]]);
-    add(Channels::im(phasor), sums_.im[channels_.terms()[phasor]]);
+    add(Channels::re(phasor), sums_.re[channels_.lanes()[phasor]]);
+    add(Channels::im(phasor), sums_.im[channels_.lanes()[phasor]]);
   }
-  const auto harmonics = static_cast<std::size_t>(tracing_.request.harmonics);
+  const std::size_t harmonics = tracing_.orders.size();
   for (std::size_t f = 0; f < tile_.squares.size(); ++f) {
     const Lanes<float>&re = sums_.re[f * harmonics], &im = sums_.im[f * harmonics];
     for (std::size_t i = 0; i < kLaneCount; ++i) {

@@ -6,6 +6,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "sim/tracer/cast.h"
 #include "sim/tracer/hit.h"
@@ -53,19 +54,28 @@ void addEmission(const Packet& packet, const Hits& hits, Lanes<float>& ambient) 
   }
 }
 
-void gatherLightOf(const Tracing& tracing, std::size_t e, const Packet& packet, const Hits& hits, int surface, bool coherent,
-                   Vec3Lanes& places, LaneSums& sums) {
+bool findLightOf(const Tracing& tracing, std::size_t e, const Packet& packet, const Hits& hits, int surface,
+                 bool coherent, Vec3Lanes& places, DirectLight& light) {
   const PlacedEmitter& emitter = tracing.emitters[e];
   drawPlaces(packet, emitter, dimensionsOf(tracing).emitter(surface, e), places);
-  DirectLight light;
   lightHits(packet, hits, emitter, places, light);
-  if (!isAny(light.valid)) return;
+  if (!isAny(light.valid)) {
+    light.weight = {};
+    light.length = {};
+    return false;
+  }
   RTCRay16 rays;
   setShadowRays(hits, places, rays);
   record(tracing.log, light.valid, rays, coherent, true);
   castShadowRays(tracing.scene, light.valid.v, rays, coherent);
   for (std::size_t i = 0; i < kLaneCount; ++i) light.weight[i] = rays.tfar[i] < 0.0f ? 0.0f : light.weight[i];
-  addLight(tracing, light, sums);
+  return true;
+}
+
+void gatherLightOf(const Tracing& tracing, std::size_t e, const Packet& packet, const Hits& hits, int surface, bool coherent,
+                   Vec3Lanes& places, LaneSums& sums) {
+  DirectLight light;
+  if (findLightOf(tracing, e, packet, hits, surface, coherent, places, light)) addLight(tracing, light, sums);
 }
 
 void gatherDirectLight(const Tracing& tracing, const Packet& packet, const Hits& hits, int surface, bool coherent,
@@ -235,15 +245,25 @@ void keepTruth(const Tracing& tracing, const Packet& packet, const Hits& hits, T
 }
 
 void addLight(const Tracing& tracing, const DirectLight& light, LaneSums& sums) {
-  addPhasors(tracing.turns_per_metre, tracing.request.harmonics, light.weight, light.length, sums);
+  addPhasors(tracing.turns_per_metre, tracing.orders, light.weight, light.length, sums);
   for (std::size_t g = 0; g < tracing.request.gates.size(); ++g) {
     addGates(tracing.request.gates[g], light.weight, light.length, sums.re[g], sums.im[g]);
   }
   if (!sums.bins.empty()) addToBins(tracing.bins, light, sums);
 }
 
-Tracing::Tracing(const Scene::Impl& s, const TraceRequest& r, RayLog* l)
-    : scene(s), request(r), log(l), lens(r.camera), scene_from_camera(r.world_from_camera), seed(seedKey(r.seed)) {
+Tracing::Tracing(const Scene::Impl& s, const TraceRequest& r, RayLog* l, std::vector<int> o)
+    : scene(s),
+      request(r),
+      log(l),
+      lens(r.camera),
+      scene_from_camera(r.world_from_camera),
+      orders(std::move(o)),
+      seed(seedKey(r.seed)) {
+  if (orders.empty()) {
+    orders.resize(static_cast<std::size_t>(r.harmonics));
+    std::iota(orders.begin(), orders.end(), 1);
+  }
   scene_from_camera.translation_m = scene_from_camera.translation_m - scene.origin_in_world;
   pinhole = scene_from_camera.translation_m;
   camera_axes = {scene_from_camera.rotate({1, 0, 0}), scene_from_camera.rotate({0, 1, 0}), scene_from_camera.rotate({0, 0, 1})};

@@ -54,7 +54,8 @@ struct RayLog {
 
 /// Everything that is the same for all pixels of a request.
 struct Tracing {
-  Tracing(const Scene::Impl& scene, const TraceRequest& request, RayLog* log);
+  /// `orders`: which harmonics, ascending from 1; empty: all of the request. LaneSums hold those, by frequency.
+  Tracing(const Scene::Impl& scene, const TraceRequest& request, RayLog* log, std::vector<int> orders = {});
 
   const Scene::Impl& scene;
   const TraceRequest& request;
@@ -65,6 +66,7 @@ struct Tracing {
   std::array<Vec3d, 3> camera_axes;  ///< x, y, z of the camera in the scene
   std::vector<PlacedEmitter> emitters;
   std::vector<double> turns_per_metre;  ///< f / c
+  std::vector<int> orders;
   TransientBins bins;                   ///< none but in transient.cpp
   PixelKey seed;
 };
@@ -153,6 +155,9 @@ void addEmission(const Packet& packet, const Hits& hits, Lanes<float>& ambient);
 /// Next-event estimation: from every hit to every emitter.
 void gatherDirectLight(const Tracing& tracing, const Packet& packet, const Hits& hits, int surface, bool coherent,
                        LaneSums& sums);
+/// The light itself, of emitter `e`; false if there is none, and then `light` holds none.
+bool findLightOf(const Tracing& tracing, std::size_t e, const Packet& packet, const Hits& hits, int surface,
+                 bool coherent, Vec3Lanes& places, DirectLight& light);
 /// The same to emitter `e` alone; `places` are those on it.
 void gatherLightOf(const Tracing& tracing, std::size_t e, const Packet& packet, const Hits& hits, int surface, bool coherent,
                    Vec3Lanes& places, LaneSums& sums);

@@ -49,6 +49,16 @@ double reachOf(const BuiltObject& own) {
   return reach;
 }
 
+double radiusOf(const BuiltObject& own, const RTCBounds& box) {
+  const auto d = [](float v) { return static_cast<double>(v); };
+  const Vec3d lower{d(box.lower_x), d(box.lower_y), d(box.lower_z)};
+  const Vec3d upper{d(box.upper_x), d(box.upper_y), d(box.upper_z)};
+  if (own.vertices.empty()) return norm(upper - lower) / 2.0;
+  double radius = 0.0;
+  for (const Vec3d& v : own.vertices) radius = std::max(radius, norm(v - (lower + upper) / 2.0));
+  return radius;
+}
+
 void placeMovers(Scene::Impl& scene, const Scene::Impl& loaded, Duration time) {
   scene.rows.clear();
   for (const BuiltObject& object : scene.objects) {
@@ -68,6 +78,7 @@ void placeMovers(Scene::Impl& scene, const Scene::Impl& loaded, Duration time) {
     rtcGetSceneBounds(mover.embree, &box);
     standing.lower = {box.lower_x, box.lower_y, box.lower_z};
     standing.upper = {box.upper_x, box.upper_y, box.upper_z};
+    standing.radius = mover.radius;
     scene.rows[mover.object].standing = &standing;
   }
 }

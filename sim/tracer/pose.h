@@ -11,5 +11,7 @@ void moveInto(BuiltObject& object, const Transform<World, Object>& scene_from_ob
 void addPlanes(BuiltObject& object);
 /// The largest coordinate of anything on it, in its own frame.
 double reachOf(const BuiltObject& own);
+/// Radius of a ball around it, whose middle is that of its box in its own frame.
+double radiusOf(const BuiltObject& own, const RTCBounds& box);
 
 }  // namespace toftwin::sim

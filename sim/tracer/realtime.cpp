@@ -13,6 +13,7 @@
 #include "sim/tracer/hit.h"
 #include "sim/tracer/indirect.h"
 #include "sim/tracer/path.h"
+#include "sim/tracer/shade.h"
 
 namespace toftwin::sim {
 namespace {
@@ -111,6 +112,145 @@ std::vector<std::array<int, 2>> pixelsWithJumps(const Image<float>& range) {
   return pixels;
 }
 
+/// A ball around a moving object and a point that straight ways lead to, in the camera's frame.
+struct Shade {
+  float x, y, z, radius2;  ///< of the ball
+  float to_x, to_y, to_z;
+};
+
+/// Balls around all movers, on the way to the pinhole and to each emitter.
+std::vector<Shade> shadesOf(const Tracing& tracing) {
+  std::vector<Shade> shades;
+  const auto camera_from_scene = tracing.scene_from_camera.inverse();
+  for (const Standing& standing : tracing.scene.poses) {
+    const Vec3f lower = standing.lower, upper = standing.upper, middle = (lower + upper) / 2.0f;
+    const Vec3d object{static_cast<double>(middle.x), static_cast<double>(middle.y), static_cast<double>(middle.z)};
+    const Vec3d in_scene = (standing.scene_from_object * Point<Object>{object}).m;
+    const Vec3d c = (camera_from_scene * Point<World>{in_scene}).m;
+    // Wider by far more than what single precision rounds, here and in rays.
+    const double radius = 1.001 * standing.radius + 1e-4 * norm(c) + standing.blur;
+    const auto add = [&](Vec3d to, double by) {
+      shades.push_back({static_cast<float>(c.x), static_cast<float>(c.y), static_cast<float>(c.z),
+                        static_cast<float>((radius + by) * (radius + by)), static_cast<float>(to.x),
+                        static_cast<float>(to.y), static_cast<float>(to.z)});
+    };
+    add({}, 0.0);
+    for (const EmitterSpec& emitter : tracing.request.emitters) add(emitter.position_m, emitter.radius.in(metre));
+  }
+  return shades;
+}
+
+/// Whether a mover may lie on the way to any of the pixels, or has nothing behind it that would say so.
+TOFTWIN_VECTOR
+bool isNear(const BlockGeometry& pixels, const Shade& shade) {
+  const Shade s = shade;
+  const float mx = s.x - s.to_x, my = s.y - s.to_y, mz = s.z - s.to_z;
+  int any = 0;
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    const float dx = pixels.x[i] - s.to_x, dy = pixels.y[i] - s.to_y, dz = pixels.z[i] - s.to_z;
+    const float share = (mx * dx + my * dy + mz * dz) / (dx * dx + dy * dy + dz * dz + 1e-20f);
+    const float low = share > 0.0f ? share : 0.0f, t = low < 1.0f ? low : 1.0f;
+    const float ax = mx - t * dx, ay = my - t * dy, az = mz - t * dz;
+    any |= (ax * ax + ay * ay + az * az <= s.radius2) | !(pixels.range_m[i] > 0.0) ? 1 : 0;
+  }
+  return any != 0;
+}
+
+/// Direct light of blocks that no mover is near to, kept while the camera stands still: tracing it again would
+/// give the same bits.
+class KeptDirect {
+ public:
+  struct Ways {
+    Lanes<float> weight;
+    Lanes<double> length;
+  };
+
+  /// Forgets everything that this frame's tracing would do otherwise.
+  void prepare(const Tracing& tracing, std::size_t blocks) {
+    const TraceRequest& r = tracing.request;
+    shades_ = shadesOf(tracing);
+    Key key{tracing.scene.id, r.camera, r.world_from_camera, r.emitters, r.seed, r.sampler};
+    if (key == key_ && is_kept_.size() == blocks) return;
+    key_ = std::move(key);
+    is_kept_.assign(blocks, 0);
+    ambient_.resize(tracing.scene.is_matt ? blocks : 0);
+    ways_.resize(ambient_.size() * r.emitters.size());
+  }
+  [[nodiscard]] bool isStill(const BlockGeometry& pixels) const {
+    return std::ranges::none_of(shades_, [&](const Shade& shade) { return isNear(pixels, shade); });
+  }
+  [[nodiscard]] bool has(std::size_t block) const { return is_kept_[block] != 0; }
+  void mark(std::size_t block, bool is_kept) { is_kept_[block] = is_kept ? 1 : 0; }
+  /// Of all emitters.
+  Ways* ways(std::size_t block) { return ways_.data() + block * key_.emitters.size(); }
+  Lanes<float>& ambient(std::size_t block) { return ambient_[block]; }
+
+ private:
+  struct Key {
+    std::string scene;
+    CameraInfo camera;
+    Transform<World, Camera> pose;
+    std::vector<EmitterSpec> emitters;
+    std::uint64_t seed;
+    Sampler sampler;
+    bool operator==(const Key&) const = default;
+  };
+  Key key_{};
+  std::vector<Shade> shades_;
+  std::vector<Ways> ways_;
+  std::vector<Lanes<float>> ambient_;
+  std::vector<unsigned char> is_kept_;
+};
+
+/// Traces direct light and truth of a block's central rays.
+class DirectTracer {
+ public:
+  explicit DirectTracer(const Tracing& tracing)
+      : tracing_(tracing), sums(tracing.turns_per_metre.size() * tracing.orders.size()) {}
+
+  void trace(const Block& block, KeptDirect& kept, std::size_t index) {
+    clearSums(sums);
+    preparePacket(tracing_, block, packet_);
+    startInTheMiddle(tracing_, block, packet_);
+    if (!tracing_.scene.is_matt) {
+      followAll(tracing_, packet_, sums);
+      traceTruth(tracing_, block, truth);
+      return;
+    }
+    intersect(tracing_, packet_, rays_, true);
+    endMissed(tracing_.scene.ambient_radiance, rays_, packet_, sums.ambient);
+    findHits(tracing_.scene, packet_, rays_, hits_);
+    addEmission(packet_, hits_, sums.ambient);
+    kept.ambient(index) = sums.ambient;
+    for (std::size_t e = 0; e < tracing_.emitters.size(); ++e) {
+      DirectLight light;
+      Vec3Lanes places;
+      if (findLightOf(tracing_, e, packet_, hits_, 0, true, places, light)) addLight(tracing_, light, sums);
+      kept.ways(index)[e] = {light.weight, light.length};
+    }
+    keepTruth(tracing_, packet_, hits_, truth);
+  }
+
+  void recall(KeptDirect& kept, std::size_t index) {
+    clearSums(sums);
+    sums.ambient = kept.ambient(index);
+    for (std::size_t e = 0; e < tracing_.emitters.size(); ++e) {
+      const KeptDirect::Ways& ways = kept.ways(index)[e];
+      addPhasors(tracing_.turns_per_metre, tracing_.orders, ways.weight, ways.length, sums);
+    }
+  }
+
+ private:
+  const Tracing& tracing_;
+  Packet packet_;
+  RTCRayHit16 rays_;
+  Hits hits_;
+
+ public:
+  LaneSums sums;
+  TruthLanes truth;
+};
+
 }  // namespace
 
 struct RealtimeTracer::Impl {
@@ -118,14 +258,16 @@ struct RealtimeTracer::Impl {
   Channels channels;
   IndirectLight indirect;
   std::vector<BlockGeometry> geometry;
+  KeptDirect kept;
 
   void resize(const TraceRequest& request);
   template <class Work>
   void forBlocks(const CameraInfo& camera, const Work& work) const;
   void traceDirect(const Tracing& tracing);
-  void storeDirect(const Part& at, const LaneSums& sums, const TruthLanes& truth);
+  void storeDirect(const Part& at, const LaneSums& sums);
+  void storeTruth(const Part& at, const TruthLanes& truth);
   void refineJumps(const Scene& scene, const TraceRequest& request);
-  void storeMeans(const BlockSums& sums, int x, int y);
+  void storeMeans(const LaneSums& sums, int samples, int x, int y);
   void addIndirect(const Tracing& tracing);
   void addSpread(const Part& at, const IndirectLight::Spread& spread);
   void makeFrame(const Scene& scene, const TraceRequest& request);
@@ -165,64 +307,44 @@ void RealtimeTracer::Impl::forBlocks(const CameraInfo& camera, const Work& work)
   });
 }
 
-/// Traces direct light and truth of a block's central rays.
-class DirectTracer {
- public:
-  explicit DirectTracer(const Tracing& tracing)
-      : tracing_(tracing),
-        sums(tracing.turns_per_metre.size() * static_cast<std::size_t>(tracing.request.harmonics)) {}
-
-  void trace(const Block& block) {
-    clearSums(sums);
-    preparePacket(tracing_, block, packet_);
-    startInTheMiddle(tracing_, block, packet_);
-    if (!tracing_.scene.is_matt) {
-      followAll(tracing_, packet_, sums);
-      traceTruth(tracing_, block, truth);
-      return;
-    }
-    intersect(tracing_, packet_, rays_, true);
-    endMissed(tracing_.scene.ambient_radiance, rays_, packet_, sums.ambient);
-    findHits(tracing_.scene, packet_, rays_, hits_);
-    addEmission(packet_, hits_, sums.ambient);
-    gatherDirectLight(tracing_, packet_, hits_, 0, true, sums);
-    keepTruth(tracing_, packet_, hits_, truth);
-  }
-
- private:
-  const Tracing& tracing_;
-  Packet packet_;
-  RTCRayHit16 rays_;
-  Hits hits_;
-
- public:
-  LaneSums sums;
-  TruthLanes truth;
-};
-
 void RealtimeTracer::Impl::traceDirect(const Tracing& tracing) {
   const BlockShape shape = BlockShape::forSamples(1);
+  kept.prepare(tracing, geometry.size());
   forBlocks(tracing.request.camera, [&](int begin, int end, int columns) {
     Block block;
     DirectTracer direct{tracing};
     for (int i = begin; i != end; ++i) {
-      prepareBlock(tracing, shape, i % columns * kSize, i / columns * kSize, block);
-      direct.trace(block);
-      keepGeometry(block, direct.truth, geometry[static_cast<std::size_t>(i)]);
-      storeDirect({block, tracing.request.camera}, direct.sums, direct.truth);
+      const auto index = static_cast<std::size_t>(i);
+      BlockGeometry& pixels = geometry[index];
+      block.x = i % columns * kSize;
+      block.y = i / columns * kSize;
+      const Part at{block, tracing.request.camera};
+      if (kept.has(index) && kept.isStill(pixels)) {
+        direct.recall(kept, index);
+      } else {
+        prepareBlock(tracing, shape, block.x, block.y, block);
+        direct.trace(block, kept, index);
+        keepGeometry(block, direct.truth, pixels);
+        storeTruth(at, direct.truth);
+        kept.mark(index, tracing.scene.is_matt && kept.isStill(pixels));
+      }
+      storeDirect(at, direct.sums);
     }
   });
 }
 
-void RealtimeTracer::Impl::storeDirect(const Part& at, const LaneSums& sums, const TruthLanes& truth) {
+void RealtimeTracer::Impl::storeDirect(const Part& at, const LaneSums& sums) {
   at.store(light.steady, [&](std::size_t i, float) { return sums.steady[i]; });
   at.store(light.ambient, [&](std::size_t i, float) { return sums.ambient[i]; });
-  for (const std::size_t term : channels.terms()) {
-    const Lanes<float>&re = sums.re[term], &im = sums.im[term];
-    at.store(light.phasors[term],
+  for (std::size_t k = 0; k < channels.terms().size(); ++k) {
+    const Lanes<float>&re = sums.re[channels.lanes()[k]], &im = sums.im[channels.lanes()[k]];
+    at.store(light.phasors[channels.terms()[k]],
              [&](std::size_t i, std::complex<float>) { return std::complex<float>{re[i], im[i]}; });
   }
   for (Image<float>& variance : light.variance) at.store(variance, [](std::size_t, float) { return 0.0f; });
+}
+
+void RealtimeTracer::Impl::storeTruth(const Part& at, const TruthLanes& truth) {
   at.store(light.truth.range_m, [&](std::size_t i, float) { return truth.range_m[i]; });
   at.store(light.truth.albedo, [&](std::size_t i, float) { return truth.albedo[i]; });
   at.store(light.truth.normal, [&](std::size_t i, Vec3f) { return truth.normal[i]; });
@@ -235,39 +357,45 @@ void RealtimeTracer::Impl::refineJumps(const Scene& scene, const TraceRequest& r
   if (pixels.empty()) return;
   const int share = std::clamp(kFootprintSamples / static_cast<int>(pixels.size()), 2, 16);
   const TraceRequest what = directOnly(request, static_cast<int>(std::bit_floor(static_cast<unsigned>(share))));
-  const Tracing tracing{scene.impl(), what, nullptr};
+  const Tracing tracing{scene.impl(), what, nullptr, channels.orders()};
   const BlockShape shape;  // the pixel itself, with all lanes
   inParallel(static_cast<int>(pixels.size()), 16, [&](int begin, int end) {
     const FlushDenormals flush;
     Block block;
-    BlockSums sums{what};
+    Packet packet;
+    LaneSums sums{tracing.turns_per_metre.size() * tracing.orders.size()};
     for (int i = begin; i != end; ++i) {
       const auto [x, y] = pixels[static_cast<std::size_t>(i)];
       prepareBlock(tracing, shape, x, y, block);
       clearSums(sums);
-      traceBlock(tracing, block, 0, what.samples_per_pixel, sums);
-      storeMeans(sums, x, y);
+      preparePacket(tracing, block, packet);
+      startAtPlaces(tracing, block, 0, what.samples_per_pixel, packet);
+      followAll(tracing, packet, sums);
+      storeMeans(sums, what.samples_per_pixel, x, y);
     }
   });
 }
 
-void RealtimeTracer::Impl::storeMeans(const BlockSums& sums, int x, int y) {
-  const auto total = [](const Lanes<double>& lanes) {
+void RealtimeTracer::Impl::storeMeans(const LaneSums& sums, int samples, int x, int y) {
+  const auto mean = [&](const Lanes<float>& lanes) {
     double sum = 0.0;
-    for (std::size_t i = 0; i < kLaneCount; ++i) sum += lanes[i];
-    return sum;
+    for (std::size_t i = 0; i < kLaneCount; ++i) sum += static_cast<double>(lanes[i]);
+    return sum / samples;
   };
-  const double n = total(sums.samples);
-  light.steady(x, y) = static_cast<float>(total(sums.steady) / n);
-  light.ambient(x, y) = static_cast<float>(total(sums.ambient) / n);
-  for (const std::size_t term : channels.terms()) {
-    light.phasors[term](x, y) =
-        std::complex<float>{std::complex<double>{total(sums.re[term]) / n, total(sums.im[term]) / n}};
+  light.steady(x, y) = static_cast<float>(mean(sums.steady));
+  light.ambient(x, y) = static_cast<float>(mean(sums.ambient));
+  for (std::size_t k = 0; k < channels.terms().size(); ++k) {
+    const std::size_t lanes = channels.lanes()[k];
+    light.phasors[channels.terms()[k]](x, y) =
+        std::complex<float>{std::complex<double>{mean(sums.re[lanes]), mean(sums.im[lanes])}};
   }
   for (std::size_t f = 0; f < light.variance.size(); ++f) {
-    const std::complex<double> mean{light.phasors[f * static_cast<std::size_t>(light.harmonics)](x, y)};
-    const double spread = std::max(0.0, total(sums.squares[f]) / n - std::norm(mean));
-    light.variance[f](x, y) = static_cast<float>(spread / (2.0 * (n - 1.0)));
+    const std::size_t first = channels.lanes()[channels.first(f)];
+    const Lanes<float>&re = sums.re[first], &im = sums.im[first];
+    Lanes<float> squares;
+    for (std::size_t i = 0; i < kLaneCount; ++i) squares[i] = re[i] * re[i] + im[i] * im[i];
+    const double spread = std::max(0.0, mean(squares) - std::norm(std::complex<double>{mean(re), mean(im)}));
+    light.variance[f](x, y) = static_cast<float>(spread / (2.0 * (samples - 1.0)));
   }
 }
 
@@ -275,7 +403,7 @@ void RealtimeTracer::Impl::addIndirect(const Tracing& tracing) {
   const CameraInfo& camera = tracing.request.camera;
   forBlocks(camera, [&](int begin, int end, int columns) {
     Block block;
-    IndirectLight::Spread spread{channels, tracing.request};
+    IndirectLight::Spread spread{channels, tracing.turns_per_metre.size()};
     for (int i = begin; i != end; ++i) {
       block.x = i % columns * kSize;
       block.y = i / columns * kSize;
@@ -289,9 +417,9 @@ void RealtimeTracer::Impl::addSpread(const Part& at, const IndirectLight::Spread
   const LaneSums& sums = spread.sums;
   at.store(light.steady, [&](std::size_t i, float before) { return before + sums.steady[i]; });
   at.store(light.ambient, [&](std::size_t i, float before) { return before + sums.ambient[i]; });
-  for (const std::size_t term : channels.terms()) {
-    const Lanes<float>&re = sums.re[term], &im = sums.im[term];
-    at.store(light.phasors[term], [&](std::size_t i, std::complex<float> before) {
+  for (std::size_t k = 0; k < channels.terms().size(); ++k) {
+    const Lanes<float>&re = sums.re[channels.lanes()[k]], &im = sums.im[channels.lanes()[k]];
+    at.store(light.phasors[channels.terms()[k]], [&](std::size_t i, std::complex<float> before) {
       return std::complex<float>{before.real() + re[i], before.imag() + im[i]};
     });
   }
@@ -303,10 +431,10 @@ void RealtimeTracer::Impl::addSpread(const Part& at, const IndirectLight::Spread
 void RealtimeTracer::Impl::makeFrame(const Scene& scene, const TraceRequest& request) {
   resize(request);
   const TraceRequest direct = directOnly(request, 1);
-  traceDirect(Tracing{scene.impl(), direct, nullptr});
+  traceDirect(Tracing{scene.impl(), direct, nullptr, channels.orders()});
   refineJumps(scene, request);
   if (request.max_surfaces == 1) return;
-  const Tracing tracing{scene.impl(), request, nullptr};
+  const Tracing tracing{scene.impl(), request, nullptr, channels.orders()};
   indirect.gather(tracing, channels, kSamples);
   if (indirect.shareOfNew() > kMuchIsNew) {
     for (int pass = 1; pass < kFirstPasses; ++pass) indirect.gather(tracing, channels, kSamples);

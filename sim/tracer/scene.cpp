@@ -262,6 +262,9 @@ struct SceneBuilder {
     for (Mover& mover : scene->movers) {
       const BuiltObject& object = scene->objects[mover.object];
       mover.embree = makeEmbreeScene(scene->device, {{static_cast<unsigned>(mover.object), &object}});
+      RTCBounds box;
+      rtcGetSceneBounds(mover.embree, &box);
+      mover.radius = radiusOf(object, box);
     }
     placeMovers(*scene, *scene, {});
     if (const RTCError error = rtcGetDeviceError(scene->device); error != RTC_ERROR_NONE) {

@@ -52,6 +52,7 @@ struct Standing {
   Transform<World, Object> scene_from_object;
   std::array<Vec3d, 3> axes;  ///< of the object, in the scene
   Vec3f lower, upper;         ///< the box around it, in its own frame
+  double radius = 0.0;        ///< of the ball around it whose middle is the box's, m
   double blur = 0.0;          ///< bound on what rounding moves rays by that are taken there, m
 };
 
@@ -68,6 +69,7 @@ struct Mover {
   Motion motion;
   Transform<World, Object> start;
   double reach = 0.0;  ///< largest |coordinate| in its own frame
+  double radius = 0.0;  ///< of the ball around it whose middle is that of its box
   RTCScene embree = nullptr;
 };
 

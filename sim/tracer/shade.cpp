@@ -197,7 +197,7 @@ void setRays(const Packet& packet, RTCRayHit16& rays) {
 }
 
 TOFTWIN_VECTOR
-void addPhasors(const std::vector<double>& turns_per_metre, int harmonics, const Lanes<float>& weight,
+void addPhasors(const std::vector<double>& turns_per_metre, const std::vector<int>& orders, const Lanes<float>& weight,
                 const Lanes<double>& length, LaneSums& sums) {
   addLanes(weight.v, sums.steady.v);
   for (std::size_t f = 0; f < turns_per_metre.size(); ++f) {
@@ -210,11 +210,13 @@ void addPhasors(const std::vector<double>& turns_per_metre, int harmonics, const
       re[i] = weight[i] * z.cos;
       im[i] = weight[i] * -z.sin;
     }
-    for (int n = 0;; ++n) {
-      const std::size_t term = f * static_cast<std::size_t>(harmonics) + static_cast<std::size_t>(n);
-      addLanes(re.v, sums.re[term].v);
-      addLanes(im.v, sums.im[term].v);
-      if (n + 1 == harmonics) break;
+    std::size_t term = f * orders.size();
+    for (int n = 1;; ++n) {
+      if (orders[term - f * orders.size()] == n) {
+        addLanes(re.v, sums.re[term].v);
+        addLanes(im.v, sums.im[term].v);
+        if (++term == (f + 1) * orders.size()) break;
+      }
       for (std::size_t i = 0; i < kLaneCount; ++i) next[i] = re[i] * cosine[i] - im[i] * sine[i];
       for (std::size_t i = 0; i < kLaneCount; ++i) im[i] = re[i] * sine[i] + im[i] * cosine[i];
       re = next;

@@ -31,6 +31,8 @@ struct EmitterSpec {
   /// 0, at least two; linear between, dark beyond the last. The power is that of the whole pattern.
   std::vector<double> pattern_deg{}, pattern{};
   Duration delay{};  ///< its light is late by this: cables, drivers
+
+  bool operator==(const EmitterSpec&) const = default;
 };
 
 /// Two functions of the light's whole way, as pulsed cameras need them: what a gate collects of a pulse that

@@ -119,6 +119,27 @@ TEST(Realtime, FollowsABallThatMoves) {
     ASSERT_NEAR(run.light->truth.range_m[p], still.truth.range_m[p], 1e-5f) << "direct light knows no past";
 }
 
+/// Blocks of pixels that no mover is near to keep their direct light; it must be the bits of tracing it again. The
+/// ball casts its shadow away from where it is seen, and turns back.
+TEST(Realtime, KeepsOnlyDirectLightThatStaysTheSame) {
+  const Scene moving = sceneOf(room(0.0, "velocity_m_per_s = [0.9, 0.4, -0.5]"));
+  TraceRequest request = roomRequest();
+  request.emitters.push_back({.position_m = {-0.9, 0.3, 0.1}, .radius = 30_mm});
+  request.max_surfaces = 1;
+  RealtimeTracer with_past;
+  for (const Duration time : {0_ms, 33_ms, 66_ms, 400_ms, 433_ms, 0_ms, 33_ms}) {
+    if (time == 433_ms) request.world_from_camera.translation_m.x += 0.01;
+    const Scene scene = moving.at(time);
+    RealtimeTracer anew;
+    const Light &a = with_past.next(scene, request), &b = anew.next(scene, request);
+    EXPECT_EQ(a.steady, b.steady);
+    EXPECT_EQ(a.ambient, b.ambient);
+    EXPECT_EQ(a.phasors, b.phasors);
+    EXPECT_EQ(a.truth.normal, b.truth.normal);
+    EXPECT_EQ(a.truth.range_m, b.truth.range_m);
+  }
+}
+
 TEST(Realtime, FollowsTheCamera) {
   const Scene scene = sceneOf(room(0.2));
   TraceRequest request = roomRequest();
