@@ -136,8 +136,7 @@ Result<std::unique_ptr<Source>> open(settings::Table& table) {
   return makeSource({.keys = std::move(keys),
                      .info = std::move(info),
                      .connection = *std::move(connection),
-                     .images = std::move(images),
-                     .is_triggered = setup->is_triggered});
+                     .images = std::move(images)});
 }
 
 std::vector<std::string> list() {

@@ -35,8 +35,7 @@ struct Keys {
   Duration packet_timeout = 20_ms;
   Duration frame_retention = 100_ms;
   int socket_buffer_kb = 0;
-  bool packet_socket = false;
-  Duration heartbeat = 2000_ms;
+  Duration heartbeat = 1500_ms;
   int buffers = 8;
   bool chunks = false;
   bool ptp = false;
@@ -88,8 +87,6 @@ struct Keys {
     v.number("socket_buffer_kb", socket_buffer_kb, {0, 1048576},
              "of the stream's socket; 0: two frames, a megabyte at least (the kernel's "
              "net.core.rmem_max bounds it)");
-    v.flag("packet_socket", packet_socket,
-           "whether packets are read from the network card's ring, which needs CAP_NET_RAW");
     v.quantity(
         "heartbeat", heartbeat, millisecond, {0, 60000},
         "how long a GigE camera waits for a daemon that has vanished; 0: as the camera is set");

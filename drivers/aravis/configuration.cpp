@@ -157,9 +157,8 @@ Result<> setTransport(const Connection& connection, const Features& features, co
     if (failure) return failure.toError("the packet size cannot be found out; set packet_size");
   }
   arv_camera_gv_set_packet_size_adjustment(camera, ARV_GV_PACKET_SIZE_ADJUSTMENT_NEVER);
-  arv_camera_gv_set_stream_options(camera, keys.packet_socket
-                                               ? ARV_GV_STREAM_OPTION_NONE
-                                               : ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED);
+  // Packets from the network card's ring would pass by the packet filter.
+  arv_camera_gv_set_stream_options(camera, ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED);
   return {};
 }
 

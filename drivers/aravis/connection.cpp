@@ -191,6 +191,13 @@ Result<> Connection::check(milliseconds wait) {
   return {};
 }
 
+int Connection::socketOfPort(std::uint16_t port) const {
+  for (const ControlSocket& one : socketsOn(interface_)) {
+    if (one.port == port) return one.file;
+  }
+  return -1;
+}
+
 /// The library asks a camera that is gone five times, half a second each, whatever the question; a
 /// closing asks twice. A socket that cannot send fails at once instead. Where the socket is not
 /// known, closing takes a few seconds, and all is well otherwise.

@@ -42,6 +42,8 @@ class Connection {
   Result<> check(std::chrono::milliseconds wait);
   /// The library lost the control of the camera: its heartbeat said so, or its USB.
   [[nodiscard]] bool isLost() const { return *is_lost_; }
+  /// The socket of this process on the interface towards the camera that has that port, or -1.
+  [[nodiscard]] int socketOfPort(std::uint16_t port) const;
   /// The camera is gone. From here on nothing waits for its answers.
   void giveUp();
 

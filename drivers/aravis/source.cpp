@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "drivers/aravis/configuration.h"
+#include "drivers/aravis/discovery.h"
 #include "drivers/aravis/features.h"
 #include "drivers/aravis/frame_ids.h"
 #include "drivers/aravis/stream.h"
@@ -29,6 +30,7 @@ constexpr milliseconds kLeastSilence{
 constexpr int kMostBadFrames = 10;        ///< in a row, until the camera is opened anew
 constexpr double kSdPerWidth = 0.288675;  ///< of a uniform distribution: 1/√12
 constexpr Duration kUnknownInterval = 100_ms;
+constexpr milliseconds kKeepAliveEvery{300};
 constexpr std::chrono::seconds kReportEvery{10};       ///< losses, in the log
 constexpr std::chrono::seconds kTemperatureEvery{10};  ///< asked for
 
@@ -39,7 +41,6 @@ class AravisSource final : public Source {
         info_(std::move(camera.info)),
         connection_(std::move(camera.connection)),
         images_(std::move(camera.images)),
-        is_triggered_(camera.is_triggered),
         interval_(info_.frame_interval.value_or(kUnknownInterval)),
         stream_(keys_),
         clock_(DeviceClock::Options{}) {
@@ -58,7 +59,7 @@ class AravisSource final : public Source {
     exposure_ = exposureNow();
     auto started = stream_.start(connection_);
     if (!started) return lost(started.error());
-    heard_at_ = asked_at_ = Clock::now();
+    asked_at_ = Clock::now();
     return {};
   }
 
@@ -137,7 +138,7 @@ class AravisSource final : public Source {
   /// A frame that cannot be used is counted as lost: Malformed. Many in a row: Disconnected, so
   /// that the camera is opened anew.
   Result<Frame> toFrame(const Stream::Filled& filled) {
-    heard_at_ = asked_at_ = Clock::now();
+    asked_at_ = Clock::now();
     if (!filled.why_not_whole.empty()) return badFrame(filled.why_not_whole);
     auto planes = images_.planes(filled.parts);
     if (!planes) return badFrame(planes.error().message);
@@ -176,11 +177,10 @@ class AravisSource final : public Source {
     std::string why;
     for (const auto& [reason, count] : reasons_) why += fmt::format("; {} times {}", count, reason);
     spdlog::warn(
-        "{}: {} frames lost{}; of their packets {} were asked for again, {} of these came, "
-        "{} never did; {} frames found no buffer",
+        "{}: {} frames lost{}; {} packets were asked for again, {} never came; {} frames found no "
+        "buffer",
         info_.serial, lost_frames_, why, now.asked_again - reported_.asked_again,
-        now.resent - reported_.resent, now.missing - reported_.missing,
-        now.underruns - reported_.underruns);
+        now.missing - reported_.missing, now.underruns - reported_.underruns);
     reported_ = now;
     reported_at_ = Clock::now();
     lost_frames_ = 0;
@@ -194,6 +194,7 @@ class AravisSource final : public Source {
     const DeviceTime time = clock_.read(filled.stamp_ns, filled.arrived);
     moment.exposures = {{time, chunkExposure(filled).value_or(exposure_), 0_Hz}};
     moment.clock = relation(filled.arrived);
+    keepAlive();
     if (filled.arrived - temperature_at_ > kTemperatureEvery) {
       temperature_at_ = filled.arrived;
       temperature_c_ = Features{connection_.device()}.number("DeviceTemperature");
@@ -238,6 +239,17 @@ class AravisSource final : public Source {
 
   // ---- losing it -------------------------------------------------------------------------------
 
+  /// The library's heartbeat comes once a second; a camera may wait for it little longer, so that
+  /// it is free again soon after a cut. It has just sent a frame, so it answers.
+  void keepAlive() {
+    const SteadyTime now = Clock::now();
+    if (!connection_.address() || now - kept_alive_at_ < kKeepAliveEvery) return;
+    kept_alive_at_ = now;
+    Failure ignored;
+    std::uint32_t control = 0;
+    arv_device_read_register(connection_.device(), kControlPrivilege, &control, ignored.slot());
+  }
+
   /// A camera that says nothing for a while is asked whether it lives, and again after a while. One
   /// that lives and streams nothing is for whoever called, who knows when that is a standstill.
   [[nodiscard]] std::optional<Error> whatIsWrong() {
@@ -255,7 +267,6 @@ class AravisSource final : public Source {
   SourceInfo info_;
   Connection connection_;
   ImageMaker images_;
-  bool is_triggered_;
   Duration interval_;
   Object<ArvChunkParser> chunks_;
   Stream stream_;
@@ -263,7 +274,7 @@ class AravisSource final : public Source {
   Duration exposure_ = 0_s;
   std::optional<double> temperature_c_;
   SteadyTime temperature_at_{};
-  SteadyTime heard_at_{}, asked_at_{};
+  SteadyTime asked_at_{}, kept_alive_at_{};
   std::optional<SteadyTime> triggered_at_;
   std::optional<std::uint64_t> last_id_;
   int bad_ = 0, bad_in_a_row_ = 0;  // since the last good frame

@@ -15,7 +15,6 @@ struct OpenCamera {
   SourceInfo info;
   Connection connection;
   ImageMaker images;
-  bool is_triggered = false;
 };
 std::unique_ptr<Source> makeSource(OpenCamera camera);
 

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "drivers/aravis/packet_filter.h"
+
 namespace toftwin::drivers::aravis {
 namespace {
 
@@ -90,6 +92,19 @@ void Stream::configure(std::size_t frame_bytes) {
     g_object_set(stream_.get(), "packet-resend", ARV_GV_STREAM_PACKET_RESEND_NEVER, nullptr);
 }
 
+Result<> Stream::filter(const Connection& connection, std::uint32_t frame_bytes) const {
+  if (ARV_IS_GV_STREAM(stream_.get()) == FALSE) return {};
+  Failure failure;
+  ArvCamera* camera = connection.camera();
+  const StreamShape shape{
+      .is_multipart = arv_camera_gv_get_multipart(camera, failure.slot()) != FALSE,
+      .frame_bytes = frame_bytes,
+      .packet_bytes = arv_camera_gv_get_packet_size(camera, failure.slot())};
+  if (failure) return failure.toError("the packet size cannot be read");
+  const int socket = connection.socketOfPort(arv_gv_stream_get_port(ARV_GV_STREAM(stream_.get())));
+  return filterPackets(socket, shape);
+}
+
 Result<> Stream::start(Connection& connection) {
   ArvCamera* camera = connection.camera();
   Failure failure;
@@ -106,6 +121,10 @@ Result<> Stream::start(Connection& connection) {
   if (failure || stream_ == nullptr) return failure.toError("the camera gives no stream");
   buffer_bytes_ = payload;
   configure(payload);
+  if (auto filtered = filter(connection, payload); !filtered) {
+    abandon();
+    return filtered;
+  }
   for (int i = 0; i < keys_.buffers; ++i)
     arv_stream_push_buffer(stream_.get(), arv_buffer_new_allocate(payload));
   arv_camera_start_acquisition(camera, failure.slot());
@@ -154,7 +173,7 @@ PacketCounts Stream::counts() const {
   counts.underruns = underruns;
   if (ARV_IS_GV_STREAM(stream_.get()) != FALSE) {
     counts.asked_again = arv_stream_get_info_uint64_by_name(stream_.get(), "n_resend_requests");
-    arv_gv_stream_get_statistics(ARV_GV_STREAM(stream_.get()), &counts.resent, &counts.missing);
+    arv_gv_stream_get_statistics(ARV_GV_STREAM(stream_.get()), nullptr, &counts.missing);
   }
   return counts;
 }

@@ -18,7 +18,7 @@ namespace toftwin::drivers::aravis {
 
 /// What the library counted since the stream began.
 struct PacketCounts {
-  std::uint64_t asked_again = 0, resent = 0, missing = 0, underruns = 0;
+  std::uint64_t asked_again = 0, missing = 0, underruns = 0;
 };
 
 /// Frames of a camera, from start to stop. The library's thread receives them.
@@ -52,6 +52,7 @@ class Stream {
 
  private:
   void configure(std::size_t frame_bytes);
+  Result<> filter(const Connection& connection, std::uint32_t frame_bytes) const;
   const Keys& keys_;
   Object<ArvStream> stream_;
   std::size_t buffer_bytes_ = 0;

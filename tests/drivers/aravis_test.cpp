@@ -302,7 +302,7 @@ TEST_F(AravisDriver, FeaturesOfEveryTypeAreSetWhenItIsOpened) {
   EXPECT_EQ(camera_.reg(Emulated::kGain), 7u);
   EXPECT_EQ(camera_.reg(Emulated::kFilter), 1u);
   EXPECT_EQ(camera_.reg(Emulated::kUserText), 0x646F636BU) << "dock";
-  EXPECT_EQ(camera_.reg(Emulated::kHeartbeat), 2000u);
+  EXPECT_EQ(camera_.reg(Emulated::kHeartbeat), 1500u);
 }
 
 TEST_F(AravisDriver, WrongKeysSayWhatThereIs) {

@@ -25,3 +25,17 @@ add_test(NAME fuzz_kinect2
          COMMAND fuzz_kinect2 -max_total_time=10 -max_len=512 -print_final_stats=1
                  ${CMAKE_BINARY_DIR}/fuzz_kinect2_corpus)
 set_tests_properties(fuzz_kinect2 PROPERTIES TIMEOUT 120)
+
+# Without libaravis: what reads bytes knows nothing of it.
+set(aravis ${PROJECT_SOURCE_DIR}/drivers/aravis)
+add_executable(fuzz_aravis ${folder}/fuzz_aravis.cpp ${folder}/aravis_fuzz_one_input.cpp
+               ${aravis}/images.cpp ${aravis}/pixel_format.cpp ${aravis}/discovery.cpp
+               ${PROJECT_SOURCE_DIR}/drivers/lens.cpp)
+target_link_libraries(fuzz_aravis PRIVATE toftwin::settings toftwin::images fmt::fmt)
+target_link_options(fuzz_aravis PRIVATE -fsanitize=fuzzer)
+add_dependencies(fuzzers fuzz_aravis)
+file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/fuzz_aravis_corpus)
+add_test(NAME fuzz_aravis
+         COMMAND fuzz_aravis -max_total_time=10 -max_len=512 -print_final_stats=1
+                 ${CMAKE_BINARY_DIR}/fuzz_aravis_corpus)
+set_tests_properties(fuzz_aravis PROPERTIES TIMEOUT 120)

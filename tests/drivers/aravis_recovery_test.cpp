@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+// A GigE camera is lost and comes back, while a subscriber stays: one of ours, and the library's
+// own in a process that is killed.
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+
+#include "aravis_testing.h"
+#include "drivers/compliance.h"
+#include "recovery_rig.h"
+
+namespace toftwin::test {
+namespace {
+
+using drivers::aravis::test::openWith;
+using std::chrono::milliseconds;
+
+void losesAndFinds(std::string_view what, const std::function<void(EmulatedGige&)>& lose,
+                   const std::function<void(EmulatedGige&)>& giveBack) {
+  EmulatedGige camera{ownLoopbackAddress()};
+  RecoveryRig rig{[&] { return openWith(camera.address()); }};
+  ASSERT_TRUE(rig.isSubscribed());
+  const Result<> set =
+      rig.command([](drivers::Source& source) { return source.setParameter("Gain", 7.0); });
+  ASSERT_TRUE(set.ok()) << set.error().message;
+  const auto outcome = rig.loseAndFind(
+      what, milliseconds{700}, [&] { lose(camera); }, [&] { giveBack(camera); });
+  ASSERT_TRUE(outcome.has_value());
+  const auto& [last, first, took] = *outcome;
+  EXPECT_LT(took, milliseconds{1000});
+  EXPECT_EQ(first.sequence, last.sequence + 1) << "the subscription went on";
+  const double gap_ms =
+      static_cast<double>(first.moment.received.ns - last.moment.received.ns) * 1e-6;
+  // An interval of rounding, and one because a frame may have come up to an interval late.
+  EXPECT_NEAR(static_cast<double>(first.dropped_by_device + 1), gap_ms / 20.0, 2.0);
+  EXPECT_GT(first.moment.exposures[0].start, last.moment.exposures[0].start);
+  EXPECT_EQ(camera.reg(EmulatedGige::kGain), 7u) << "what a client had set is set again";
+}
+
+TEST(AravisRecovery, ARebootedCameraIsBackWithinASecond) {
+  losesAndFinds(
+      "rebooted", [](auto& camera) { camera.is_cut = true; },
+      [](auto& camera) {
+        camera.reboot();
+        camera.is_cut = false;
+      });
+}
+
+TEST(AravisRecovery, ACutLineIsBackWithinASecond) {
+  // The camera waits for the heartbeat of who vanished; that time runs while the line is cut.
+  losesAndFinds(
+      "cable pulled", [](auto& camera) { camera.is_cut = true; },
+      [](auto& camera) { camera.is_cut = false; });
+}
+
+TEST(AravisRecovery, AHungCameraIsBackWithinASecond) {
+  losesAndFinds(
+      "hung", [](auto& camera) { camera.is_hung = true; },
+      [](auto& camera) { camera.is_hung = false; });
+}
+
+// ---- the library's own camera ------------------------------------------------------------------
+
+/// In a process of its own, on 127.0.0.1, which one test at a time may use.
+class LibraryCamera {
+ public:
+  LibraryCamera()
+      : lock_(::open("/tmp/toftwin_gige_camera.lock", O_CREAT | O_RDWR | O_CLOEXEC, 0666)) {
+    ::flock(lock_, LOCK_EX);
+    start();
+  }
+  LibraryCamera(const LibraryCamera&) = delete;
+  LibraryCamera& operator=(const LibraryCamera&) = delete;
+  ~LibraryCamera() {
+    kill();
+    ::close(lock_);
+  }
+  void kill() {
+    if (process_ <= 0) return;
+    ::kill(process_, SIGKILL);
+    ::waitpid(process_, nullptr, 0);
+    process_ = -1;
+  }
+  void start() {
+    process_ = ::fork();
+    if (process_ == 0) {
+      ::execl(TOFTWIN_LIBRARY_CAMERA, TOFTWIN_LIBRARY_CAMERA, nullptr);
+      ::_exit(127);
+    }
+  }
+  /// Small images: the camera sends a frame at once, and the kernel's socket buffers are small.
+  static constexpr const char* kKeys =
+      "set = ['Width = 128', 'Height = 96']\nparameters = ['ExposureTimeAbs', 'GainRaw']\n";
+  Result<std::unique_ptr<drivers::Source>> waitFor() {
+    Result<std::unique_ptr<drivers::Source>> opened = openWith("127.0.0.1", kKeys);
+    for (int i = 0; i < 100 && !opened; ++i) {
+      std::this_thread::sleep_for(milliseconds{50});
+      opened = openWith("127.0.0.1", kKeys);
+    }
+    return opened;
+  }
+
+ private:
+  int lock_;
+  pid_t process_ = -1;
+};
+
+TEST(AravisLibrary, ItsOwnCameraIsCompliantAndTriggered) {
+  LibraryCamera camera;
+  {
+    const auto opened = camera.waitFor();
+    ASSERT_TRUE(opened.ok()) << opened.error().message;
+    EXPECT_EQ((*opened)->info().model, "Aravis Fake");
+    EXPECT_EQ((*opened)->info().planes, std::vector{PlaneKind::Amplitude});
+    ASSERT_TRUE((*opened)->setParameter("ExposureTimeAbs", 5000).ok());
+    EXPECT_EQ((*opened)->state().parameters.at(0).value, 5000.0);
+  }
+  const drivers::Driver driver = drivers::aravis::row();
+  for (const char* trigger : {"", "trigger = 'software'\n"}) {
+    const drivers::Candidate candidate{
+        .driver = &driver,
+        .keys = fmt::format("uri = 'aravis:127.0.0.1'\n{}{}", LibraryCamera::kKeys, trigger),
+        .absent_keys = "uri = 'aravis:127.0.0.77'",
+        .absent_name = "aravis:127.0.0.77"};
+    for (const drivers::Finding& finding : drivers::checkCompliance(candidate)) {
+      EXPECT_NE(finding.outcome, drivers::Finding::Outcome::Failed)
+          << finding.check << ", because " << finding.because << "\n  " << finding.detail;
+    }
+  }
+}
+
+TEST(AravisLibrary, ItsOwnCameraIsBackWithinASecondAfterItsProcessWasKilled) {
+  LibraryCamera camera;
+  ASSERT_TRUE(camera.waitFor().ok());
+  RecoveryRig rig{[] { return openWith("127.0.0.1", LibraryCamera::kKeys); }};
+  ASSERT_TRUE(rig.isSubscribed());
+  const auto outcome = rig.loseAndFind(
+      "the library's camera, killed", milliseconds{700}, [&] { camera.kill(); },
+      [&] { camera.start(); });
+  ASSERT_TRUE(outcome.has_value());
+  EXPECT_LT(outcome->took, milliseconds{1000});
+  EXPECT_EQ(outcome->first.sequence, outcome->last.sequence + 1);
+}
+
+}  // namespace
+}  // namespace toftwin::test
