@@ -48,6 +48,9 @@ class ClientFeed final : public Feed {
   Result<> setPose(const Transform<World, Camera>& pose) override {
     return client_.setPose(source_, pose);
   }
+  Result<> setParameter(std::string_view name, double value) override {
+    return client_.setParameter(source_, name, value);
+  }
 
  private:
   Client& client_;
@@ -208,7 +211,17 @@ Result<> capturePose(Feed& a, Feed& b, const CaptureOptions& options, Progress& 
 
 }  // namespace
 
-Result<std::unique_ptr<Feed>> openFeed(Client& client, const std::string& source) {
+Result<> Feed::setParameter(std::string_view name, double) {
+  return Error{Error::Code::Unsupported, fmt::format("{}: has no parameter {}", details().entry.name, name)};
+}
+
+Result<Frame> nextFrameAt(Feed& feed, const std::optional<Transform<World, Camera>>& pose,
+                          const CaptureOptions& options) {
+  return nextAt(feed, pose, options);
+}
+
+Result<std::unique_ptr<Feed>> openFeed(Client& client, const std::string& source,
+                                       const std::vector<PlaneKind>& more) {
   auto details = client.describe(source);
   if (!details) return details.error();
   SubscribeOptions options;
@@ -219,10 +232,11 @@ Result<std::unique_ptr<Feed>> openFeed(Client& client, const std::string& source
   // What the comparison reads; raw samples and phasors would only cost bandwidth.
   for (const PlaneKind kind : details->planes) {
     if (kind == PlaneKind::Range || kind == PlaneKind::Depth || kind == PlaneKind::Amplitude ||
-        kind == PlaneKind::Flags)
+        kind == PlaneKind::Flags || std::ranges::find(more, kind) != more.end())
       options.planes.push_back(kind);
   }
-  if (options.planes.empty()) {
+  const auto isRange = [](PlaneKind kind) { return kind == PlaneKind::Range || kind == PlaneKind::Depth; };
+  if (std::ranges::none_of(options.planes, isRange)) {
     return Error{
         Error::Code::Unsupported,
         fmt::format("{}: gives neither range nor depth, so there is nothing to compare", source)};

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <toftwin/client.h>
@@ -26,6 +27,7 @@ class Feed {
   /// From a camera that cannot lockstep, the newest frame.
   virtual Result<Frame> next(std::chrono::milliseconds timeout) = 0;
   virtual Result<> setPose(const Transform<World, Camera>& world_from_camera) = 0;
+  virtual Result<> setParameter(std::string_view name, double value);
   /// Forgets frames that are under way: the next one is taken from now on.
   virtual Result<> beginAnew() { return {}; }
 };
@@ -43,8 +45,10 @@ class Carrier {
 };
 
 /// A source of a daemon: in LOCKSTEP where it can, so that no frame is made or lost without us,
-/// else LATEST: the newest frame whenever we are ready for one. The client must outlive it.
-Result<std::unique_ptr<Feed>> openFeed(Client& client, const std::string& source);
+/// else LATEST: the newest frame whenever we are ready for one. The client must outlive it. `more`:
+/// planes besides those that a comparison reads, where the source has them.
+Result<std::unique_ptr<Feed>> openFeed(Client& client, const std::string& source,
+                                       const std::vector<PlaneKind>& more = {});
 
 /// A recording: "file.mcap", or "file.mcap#source" where it holds several sources. It cannot be
 /// moved; its frames are taken at the poses they say.
@@ -87,5 +91,10 @@ struct CaptureOptions {
 /// say which camera could not follow and why. At the end each camera is put back to where it stood.
 Result<Capture> capture(Feed& a, Feed& b, const CaptureOptions& options, Progress& progress);
 void planCapture(Progress& progress, const CaptureOptions& options);
+
+/// The next frame of that pose; frames that say another one are skipped. Stopped soon after the user
+/// wants to end.
+Result<Frame> nextFrameAt(Feed& feed, const std::optional<Transform<World, Camera>>& pose,
+                          const CaptureOptions& options);
 
 }  // namespace toftwin::compare

@@ -2,6 +2,7 @@
 #include "calib/compare/json.h"
 
 #include <cmath>
+#include <limits>
 
 #include <fmt/format.h>
 
@@ -61,6 +62,32 @@ Json& Json::push(Json value) {
   std::get<Array>(value_).push_back(std::move(value));
   return *this;
 }
+
+const Json* Json::find(std::string_view key) const {
+  const auto* members = std::get_if<Object>(&value_);
+  if (members == nullptr) return nullptr;
+  for (const auto& [known, value] : *members) {
+    if (known == key) return &value;
+  }
+  return nullptr;
+}
+
+std::size_t Json::size() const {
+  const auto* list = std::get_if<Array>(&value_);
+  return list == nullptr ? 0 : list->size();
+}
+
+const Json& Json::at(std::size_t element) const { return std::get<Array>(value_).at(element); }
+
+double Json::number() const {
+  if (const auto* whole = std::get_if<long long>(&value_)) return static_cast<double>(*whole);
+  const auto* real = std::get_if<double>(&value_);
+  return real == nullptr ? std::numeric_limits<double>::quiet_NaN() : *real;
+}
+
+bool Json::isText() const { return std::holds_alternative<std::string>(value_); }
+
+std::string Json::words() const { return isText() ? std::get<std::string>(value_) : std::string{}; }
 
 std::string Json::text() const {
   std::string out;

@@ -4,13 +4,14 @@
 #include <concepts>
 #include <cstddef>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <variant>
 #include <vector>
 
 namespace toftwin::compare {
 
-/// A JSON value to be written. Objects keep the order in which keys were set; a number that is not
+/// A JSON value, to be written or read. Objects keep the order in which keys were set; a number that is not
 /// finite is written as null, because JSON has no other word for it.
 class Json {
  public:
@@ -37,6 +38,16 @@ class Json {
   Json& set(std::string key, Json value);
   /// Appends to an array (a null value becomes an array) and gives this value back.
   Json& push(Json value);
+  /// Of an object, or null.
+  [[nodiscard]] const Json* find(std::string_view key) const;
+  /// Elements of an array; 0 for anything else.
+  [[nodiscard]] std::size_t size() const;
+  [[nodiscard]] const Json& at(std::size_t element) const;
+  /// NaN for anything but a number.
+  [[nodiscard]] double number() const;
+  [[nodiscard]] bool isText() const;
+  /// Empty for anything but text.
+  [[nodiscard]] std::string words() const;
   /// The text, indented by two spaces a level.
   [[nodiscard]] std::string text() const;
   /// The text on one line, for logs of one value a line.

@@ -14,11 +14,6 @@
 namespace toftwin::compare {
 namespace {
 
-/// Surfaces, where there are any: at edges a pixel's two cameras need not see the same surface.
-const Region& mainOf(const Characteristics& c) {
-  return c.regions.size() > 1 ? c.regions[1] : c.regions.front();
-}
-
 /// B − A in words: "3.2 ± 0.1 mm farther"; no error where there is none to tell, at one place.
 std::string inWords(const Summary& difference) {
   const std::string magnitude = shown(std::abs(difference.mean), 2);
@@ -33,25 +28,6 @@ std::string posesInWords(std::size_t poses, std::size_t places) {
   if (poses == 1) return "1 pose";
   if (places == poses) return fmt::format("{} poses", poses);
   return fmt::format("{} poses, {} of them different", poses, places);
-}
-
-TableBlock regionTable(const Characteristics& c) {
-  TableBlock table{
-      fmt::format("B − A by region: pixels of all poses, mean of the frames at each. ± is one "
-                  "standard error of the mean over {} different poses, the pixels of one taken as "
-                  "one; – where only one pose sees the region",
-                  c.places),
-      {"region", "n", "bias [mm]", "RMS [mm]", "95 % within [mm]", "median [mm]", "noise A [mm]",
-       "noise B [mm]"},
-      {}};
-  for (const Region& r : c.regions) {
-    table.rows.push_back({r.name, std::to_string(r.difference_mm.n),
-                          shownWithError(r.difference_mm.mean, r.difference_mm.standard_error, 2),
-                          shown(r.difference_mm.rms, 2), shown(r.difference_mm.p95_abs, 2),
-                          shown(r.difference_mm.median, 2), shown(r.noise_a_mm, 2),
-                          shown(r.noise_b_mm, 2)});
-  }
-  return table;
 }
 
 TableBlock cameraTable(const Capture& capture) {
@@ -144,28 +120,6 @@ double flyingPercent(const Characteristics& c, std::size_t count) {
   return 100.0 * static_cast<double>(count) / static_cast<double>(c.compared);
 }
 
-TableBlock maskTable(const Characteristics& c) {
-  TableBlock table{"Validity, edges and signal", {"what", "A", "B", "both or ratio"}, {}};
-  table.rows.push_back({"valid pixels (in at least half of the frames)", shownPercent(c.valid_a),
-                        shownPercent(c.valid_b),
-                        fmt::format("{} agree", shown(100.0 * c.mask_agreement, 2) + " %")});
-  const auto flying = [&](std::size_t count) {
-    return shown(flyingPercent(c, count), 2) + fmt::format(" % ({})", count);
-  };
-  table.rows.push_back({fmt::format("flying, of the {} pixels compared", c.compared),
-                        flying(c.flying_a), flying(c.flying_b),
-                        c.flying_both ? fmt::format("{} in the same pixel", *c.flying_both)
-                                      : "– (other pixel grid)"});
-  table.rows.push_back(
-      {"temporal noise B / A", "", "", fmt::format("{} (median)", shown(c.noise_ratio.median, 3))});
-  if (c.amplitude_ratio.n > 0)
-    table.rows.push_back(
-        {"amplitude B / A", "", "",
-         fmt::format("{} ± {} (median, spread)", shown(c.amplitude_ratio.median, 4),
-                     shown(c.amplitude_ratio.sd, 4))});
-  return table;
-}
-
 Figure trendFigure(const std::vector<double>& x, const Pixels& pixels, std::string x_label,
                    std::string caption, int bins) {
   const Trend trend = trendOf(x, pixels.difference_mm, pixels.place, bins);
@@ -224,6 +178,54 @@ std::optional<Figure> timeFigure(const Capture& capture) {
                  .compact = true})};
 }
 
+}  // namespace
+
+/// At edges a pixel's two cameras need not see the same surface.
+const Region& mainRegionOf(const Characteristics& c) {
+  return c.regions.size() > 1 ? c.regions[1] : c.regions.front();
+}
+
+TableBlock regionTable(const Characteristics& c) {
+  TableBlock table{
+      fmt::format("B − A by region: pixels of all poses, mean of the frames at each. ± is one "
+                  "standard error of the mean over {} different poses, the pixels of one taken as "
+                  "one; – where only one pose sees the region",
+                  c.places),
+      {"region", "n", "bias [mm]", "RMS [mm]", "95 % within [mm]", "median [mm]", "noise A [mm]",
+       "noise B [mm]"},
+      {}};
+  for (const Region& r : c.regions) {
+    table.rows.push_back({r.name, std::to_string(r.difference_mm.n),
+                          shownWithError(r.difference_mm.mean, r.difference_mm.standard_error, 2),
+                          shown(r.difference_mm.rms, 2), shown(r.difference_mm.p95_abs, 2),
+                          shown(r.difference_mm.median, 2), shown(r.noise_a_mm, 2),
+                          shown(r.noise_b_mm, 2)});
+  }
+  return table;
+}
+
+TableBlock maskTable(const Characteristics& c) {
+  TableBlock table{"Validity, edges and signal", {"what", "A", "B", "both or ratio"}, {}};
+  table.rows.push_back({"valid pixels (in at least half of the frames)", shownPercent(c.valid_a),
+                        shownPercent(c.valid_b),
+                        fmt::format("{} agree", shown(100.0 * c.mask_agreement, 2) + " %")});
+  const auto flying = [&](std::size_t count) {
+    return shown(flyingPercent(c, count), 2) + fmt::format(" % ({})", count);
+  };
+  table.rows.push_back({fmt::format("flying, of the {} pixels compared", c.compared),
+                        flying(c.flying_a), flying(c.flying_b),
+                        c.flying_both ? fmt::format("{} in the same pixel", *c.flying_both)
+                                      : "– (other pixel grid)"});
+  table.rows.push_back(
+      {"temporal noise B / A", "", "", fmt::format("{} (median)", shown(c.noise_ratio.median, 3))});
+  if (c.amplitude_ratio.n > 0)
+    table.rows.push_back(
+        {"amplitude B / A", "", "",
+         fmt::format("{} ± {} (median, spread)", shown(c.amplitude_ratio.median, 4),
+                     shown(c.amplitude_ratio.sd, 4))});
+  return table;
+}
+
 double roundUp(double value) {
   const double power = std::pow(10.0, std::floor(std::log10(value)));
   for (const double step : {1.0, 2.0, 5.0, 10.0}) {
@@ -232,21 +234,21 @@ double roundUp(double value) {
   return value;
 }
 
-FigureRow maps(const CapturedPose& pose, const PoseComparison& comparison, double reach_mm) {
+FigureRow mapsOf(const std::string& name, const PoseComparison& comparison, double reach_mm) {
   std::vector<double> ranges;
   Image<float> range_m = comparison.range_a_mm;
   for (float& v : range_m.pixels()) {
     v *= 1e-3F;
     ranges.push_back(static_cast<double>(v));
   }
-  return {{{fmt::format("{}: what A sees.", pose.name),
+  return {{{fmt::format("{}: what A sees.", name),
             toSvg(ImageMap{.title = "Range",
                            .label = "range [m]",
                            .values = range_m,
                            .low = quantile(ranges, 0.01),
                            .high = quantile(ranges, 0.99)})},
            {fmt::format("{}: B − A. Blue: B nearer, red: B farther. Hatched: not valid in both.",
-                        pose.name),
+                        name),
             toSvg(ImageMap{.title = "Difference",
                            .label = "B − A [mm]",
                            .values = comparison.difference_mm,
@@ -255,13 +257,10 @@ FigureRow maps(const CapturedPose& pose, const PoseComparison& comparison, doubl
                            .diverging = true})}}};
 }
 
-/// By size alone: a difference that is not significant is not small for that.
 Tone toneOfDifference(const Summary& difference) {
   if (std::abs(difference.mean) <= 1.0 && difference.p95_abs <= 10.0) return Tone::Good;
   return std::abs(difference.mean) <= 10.0 ? Tone::Fair : Tone::Bad;
 }
-
-}  // namespace
 
 Result<Finding> judgeLive(const Capture& capture) {
   std::vector<PoseComparison> poses;
@@ -280,7 +279,7 @@ Result<Finding> judgeLive(const Capture& capture) {
                  "they look at something within their range?"};
   }
   const Pixels pixels = pixelsOf(poses);
-  const Region& main = mainOf(c);
+  const Region& main = mainRegionOf(c);
   const std::vector<Drift> drifts = driftsOf(poses);
   const Summary& all = main.difference_mm;
   std::vector<double> magnitudes, log_amplitude;
@@ -305,7 +304,7 @@ Result<Finding> judgeLive(const Capture& capture) {
     blocks.push_back(Paragraph{"Note: " + warning});
   const double reach = roundUp(std::max(0.5, quantile(magnitudes, 0.97)));
   for (std::size_t i = 0; i < poses.size() && i < 2; ++i)
-    blocks.push_back(maps(capture.poses[i], poses[i], reach));
+    blocks.push_back(mapsOf(capture.poses[i].name, poses[i], reach));
   blocks.push_back(regionTable(c));
   FigureRow trends{{histogramFigure(pixels),
                     trendFigure(pixels.range_mm, pixels, "range of A [mm]",

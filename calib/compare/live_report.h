@@ -11,6 +11,18 @@
 
 namespace toftwin::compare {
 
+// Parts of a report that several kinds of comparison have.
+TableBlock regionTable(const Characteristics& characteristics);
+TableBlock maskTable(const Characteristics& characteristics);
+/// What A sees at a pose, and B − A there on a scale that reaches so far.
+FigureRow mapsOf(const std::string& name, const PoseComparison& comparison, double reach_mm);
+/// The region that headlines are of: surfaces, where there are any.
+const Region& mainRegionOf(const Characteristics& characteristics);
+/// By size alone: a difference that is not significant is not small for that.
+Tone toneOfDifference(const Summary& difference);
+/// The next 1, 2 or 5 times a power of ten, for the reach of a scale.
+double roundUp(double value);
+
 /// What two captured cameras have in common and what not, as the report's first part. Error where a
 /// pose cannot be compared.
 Result<Finding> judgeLive(const Capture& capture);

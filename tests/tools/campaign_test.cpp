@@ -204,7 +204,7 @@ TEST_F(Campaign, TwoAtOnceDoNotMix) {
   const Ran ran = render("a/");
   ::close(held);
   EXPECT_EQ(ran.status, 5);
-  EXPECT_THAT(ran.err, HasSubstr("another `toftwin render` is writing this campaign"));
+  EXPECT_THAT(ran.err, HasSubstr("another `toftwin` is writing this campaign"));
 }
 
 TEST_F(Campaign, AFullDiskIsSaidAndGoneOnFrom) {

@@ -58,6 +58,8 @@ Command replayCommand();
 Command renderCommand();
 Command calibrateCommand();
 Command compareCommand();
+Command planCommand();
+Command measureCommand();
 Command poseCommand();
 Command rigCommand();
 Command setCommand();

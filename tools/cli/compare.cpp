@@ -6,10 +6,12 @@
 
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
 #include <optional>
 
 #include "calib/compare/csv.h"
 #include "calib/compare/real_data.h"
+#include "calib/plan/compare_run.h"
 #include "protocol/record/recording.h"
 #include "tools/cli/command.h"
 #include "tools/cli/options.h"
@@ -24,6 +26,7 @@ constexpr const char* kExamples =
     "  toftwin compare kinect monday.mcap -o report                   a camera and a recording\n"
     "  toftwin compare kinect cam --address-b lab:47800 -o report     two daemons\n"
     "  toftwin compare kinect twin --poses poses.toml --rig rig.toml  a rig moves the real one\n"
+    "  toftwin compare run -o report                                  what toftwin measure captured\n"
     "  toftwin compare --data ../shared/data -o report                the simulator and real "
     "measurements\n";
 
@@ -39,6 +42,10 @@ struct Options {
   double frame_timeout_s = 120.0;
   double effort = 1.0;
   bool no_data = false;
+  bool locked = false;
+
+  /// One name, of a folder: a run of `toftwin measure`.
+  [[nodiscard]] bool isRun() const { return sources.size() == 1 && std::filesystem::is_directory(sources[0]); }
 };
 
 /// A feed and the connection that it lives on; none for a recording.
@@ -159,7 +166,22 @@ Result<compare::CompareJob> jobOf(const Options& options) {
   return job;
 }
 
+Result<Exit> compareRun(const Options& options) {
+  catchInterrupts();
+  compare::Progress progress{stderr};
+  const auto page = plan::compareRun({.run = options.sources[0],
+                                      .output = options.output,
+                                      .locked = options.locked,
+                                      .note = options.note,
+                                      .interrupted = interrupted},
+                                     progress);
+  if (!page) return page.error();
+  fmt::print("{}\n", page->string());
+  return Exit::Ok;
+}
+
 Result<Exit> compareThem(const Options& options) {
+  if (options.isRun()) return compareRun(options);
   auto job = jobOf(options);
   if (!job) return job.error();
   catchInterrupts();
@@ -203,7 +225,7 @@ Run add(CLI::App& app) {
       ->check(isAddress);
   app.add_option("sources", options->sources,
                  "A and B: names of sources, or recordings (FILE.mcap, FILE.mcap#SOURCE if it "
-                 "holds several); none: only the "
+                 "holds several); or the folder of one run of toftwin measure; none: only the "
                  "simulator against real measurements")
       ->expected(0, 2);
   app.add_option("--poses", options->poses,
@@ -226,6 +248,8 @@ Run add(CLI::App& app) {
                  "factor on the paths traced for the real measurements")
       ->check(CLI::Range(0.01, 100.0))
       ->capture_default_str();
+  app.add_flag("--locked", options->locked,
+               "of a run: judge on the captures that were held back, which can be done once");
   app.add_option("-o,--output", options->output, "folder of the report")->capture_default_str();
   app.add_option("--note", options->note, "for the report's foot, such as a commit");
   checkUsage(app, [options]() -> Result<> {
@@ -235,12 +259,24 @@ Run add(CLI::App& app) {
                                options->data)};
     }
     if (isRefused(*options)) return sameTwice(options->sources[0]);
+    const bool is_live = !options->poses.empty() || !options->rig.empty() || !options->data.empty() ||
+                         !options->daemon_b.address.empty();
+    if (options->isRun() && is_live) {
+      return Error{Error::Code::InvalidArgument,
+                   "a run is compared as it was captured: --poses, --rig, --data and --address-b mean nothing for it"};
+    }
+    if (options->locked && !options->isRun()) {
+      return Error{Error::Code::InvalidArgument, "--locked is for the folder of a run"};
+    }
+    if (options->isRun()) return {};
     if (!options->rig.empty() && (options->poses.empty() || options->sources.size() != 2)) {
       return Error{Error::Code::InvalidArgument, "--rig is for two sources and --poses"};
     }
     if (options->sources.size() != 1) return {};
     return Error{Error::Code::InvalidArgument,
-                 "name two sources, A and B, or none to judge the simulator only"};
+                 fmt::format("name two sources, A and B, the folder of a run, or none to judge the simulator only; there is "
+                             "no folder {}",
+                             options->sources[0])};
   });
   return [options] { return compareThem(*options); };
 }

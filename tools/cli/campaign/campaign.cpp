@@ -130,6 +130,10 @@ void removeLeftovers(const CampaignFiles& files) {
 Result<CampaignReport> runCampaign(FrameMaker& maker, Sink& sink, const std::vector<Input>& inputs,
                                    const CampaignFiles& files) {
   auto manifest = Manifest::open(files.manifest, inputs, files.overwrite);
+  if (!manifest && manifest.error().code == Error::Code::InvalidArgument) {
+    return Error{manifest.error().code, manifest.error().message +
+                                            "\nWrite somewhere else, or replace what is there with --overwrite"};
+  }
   if (!manifest) return manifest.error();
   if (files.overwrite && !manifest->isSame()) {
     files.memory.remove();

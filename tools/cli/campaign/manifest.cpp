@@ -82,7 +82,7 @@ Result<Manifest> Manifest::open(const std::filesystem::path& file, std::vector<I
   if (::flock(manifest.fd_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
     return Error{
         Error::Code::Busy,
-        fmt::format("{}: another `toftwin render` is writing this campaign; wait until it is through, or "
+        fmt::format("{}: another `toftwin` is writing this campaign; wait until it is through, or "
                     "write somewhere else",
                     file.string())};
   }
@@ -99,14 +99,12 @@ Result<Manifest> Manifest::open(const std::filesystem::path& file, std::vector<I
   if (overwrite) return manifest;
   return Error{
       Error::Code::InvalidArgument,
-      fmt::format("{} is of another campaign:{}\nWrite somewhere else, or replace what is there with "
-                  "--overwrite",
-                  file.string(), differences(there, manifest.inputs_))};
+      fmt::format("{} is of another campaign:{}", file.string(), differences(there, manifest.inputs_))};
 }
 
 Result<> Manifest::write() {
   std::string text =
-      "# What `toftwin render` made the frames here from. The same command continues where it was stopped.\n";
+      "# What `toftwin` made the frames here from. The same command continues where it was stopped.\n";
   for (const Input& input : inputs_) {
     if (!input.shown.empty()) text += fmt::format("# {}: {}\n", input.name, input.shown);
     text += fmt::format("{} = \"{}\"\n", input.name, input.value);

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "calib/compare/stack.h"
+#include "calib/plan/compare_run.h"
+#include "protocol/record/recording.h"
+
+namespace toftwin::plan {
+namespace {
+
+using compare::PoseComparison;
+using compare::Stack;
+
+Error ofCapture(const CaptureRecord& record, const Error& error) {
+  return {error.code, fmt::format("capture {} (\"{}\"): {}", record.number, record.name, error.message)};
+}
+
+Result<Stack> stackOf(const std::filesystem::path& run, const RecordedFile& file) {
+  const auto path = run / file.file;
+  if (auto checked = checkHash(run, file); !checked) return checked.error();
+  auto reader = record::Reader::open(path);
+  if (!reader) return reader.error();
+  Stack stack;
+  while (true) {
+    auto frame = reader->next();
+    if (!frame && frame.error().code == Error::Code::EndOfStream) break;
+    if (!frame) return frame.error();
+    if (auto added = stack.add(*frame); !added) return added.error();
+  }
+  if (stack.frames() == file.frames) return stack;
+  return Error{Error::Code::Malformed, fmt::format("{}: has {} frames, not the {} of the index",
+                                                   path.string(), stack.frames(), file.frames)};
+}
+
+template <class T>
+Image<T> thinned(const Image<T>& image, int stride) {
+  if (image.empty() || stride == 1) return image;
+  Image<T> few((image.width() + stride - 1) / stride, (image.height() + stride - 1) / stride);
+  for (int y = 0; y < few.height(); ++y) {
+    for (int x = 0; x < few.width(); ++x) few(x, y) = image(x * stride, y * stride);
+  }
+  return few;
+}
+
+PoseComparison thinned(const PoseComparison& all, int stride) {
+  PoseComparison few;
+  few.range_a_mm = thinned(all.range_a_mm, stride);
+  few.difference_mm = thinned(all.difference_mm, stride);
+  few.noise_a_mm = thinned(all.noise_a_mm, stride), few.noise_b_mm = thinned(all.noise_b_mm, stride);
+  few.valid_a = thinned(all.valid_a, stride), few.valid_b = thinned(all.valid_b, stride);
+  few.amplitude_a = thinned(all.amplitude_a, stride),
+  few.amplitude_ratio = thinned(all.amplitude_ratio, stride);
+  few.edge = thinned(all.edge, stride);
+  few.flying_a = thinned(all.flying_a, stride), few.flying_b = thinned(all.flying_b, stride);
+  few.resampled = all.resampled, few.pose = all.pose;
+  return few;
+}
+
+void summarise(const PoseComparison& all, ComparedCapture& one) {
+  compare::Running difference, range;
+  std::vector<double> noise_a, noise_b;
+  std::size_t looked_at = 0, valid_a = 0, valid_b = 0, agree = 0;
+  for (std::size_t i = 0; i < all.difference_mm.size(); ++i) {
+    if (std::isfinite(all.valid_b[i])) {
+      const bool a = all.valid_a[i] >= 0.5F, b = all.valid_b[i] >= 0.5F;
+      ++looked_at, valid_a += a, valid_b += b, agree += a == b;
+    }
+    if (!compare::isCompared(all, i) || !std::isfinite(all.difference_mm[i])) continue;
+    difference.add(static_cast<double>(all.difference_mm[i]));
+    range.add(static_cast<double>(all.range_a_mm[i]));
+    noise_a.push_back(static_cast<double>(all.noise_a_mm[i])),
+        noise_b.push_back(static_cast<double>(all.noise_b_mm[i]));
+  }
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  const bool has_any = difference.n() > 0;
+  one.pixels = difference.n();
+  one.difference_mm = has_any ? difference.mean() : kNaN, one.range_a_mm = has_any ? range.mean() : kNaN;
+  one.error_mm = compare::blockedError(compare::comparedDifference_mm(all));
+  one.noise_a_mm = compare::quantile(std::move(noise_a), 0.5),
+  one.noise_b_mm = compare::quantile(std::move(noise_b), 0.5);
+  const auto n = static_cast<double>(std::max<std::size_t>(1, looked_at));
+  one.valid_a = static_cast<double>(valid_a) / n, one.valid_b = static_cast<double>(valid_b) / n;
+  one.masks_agree = static_cast<double>(agree) / n;
+}
+
+}  // namespace
+
+Result<> checkHash(const std::filesystem::path& run, const RecordedFile& file) {
+  const auto hash = sha256Of(run / file.file);
+  if (!hash) return hash.error();
+  if (*hash == file.sha256) return {};
+  return Error{Error::Code::Malformed,
+               fmt::format("{}: is not the file that was captured (its SHA-256 is another one); `toftwin "
+                           "measure` captures it anew",
+                           (run / file.file).string())};
+}
+
+Result<ComparedCapture> compareCapture(const std::filesystem::path& run, const CaptureRecord& record,
+                                       int stride, PoseComparison* whole) {
+  const auto a = stackOf(run, record.a);
+  if (!a) return ofCapture(record, a.error());
+  const auto b = stackOf(run, record.b);
+  if (!b) return ofCapture(record, b.error());
+  auto compared = compare::comparePose(*a, *b);
+  if (!compared) return ofCapture(record, compared.error());
+  ComparedCapture one;
+  one.record = record;
+  summarise(*compared, one);
+  one.thinned = thinned(*compared, stride);
+  if (whole != nullptr) *whole = *std::move(compared);
+  return one;
+}
+
+}  // namespace toftwin::plan

@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/plan/compare_run.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <ctime>
+#include <fstream>
+#include <optional>
+#include <set>
+#include <sstream>
+#include <system_error>
+#include <thread>
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include "calib/compare/json_parse.h"
+#include "calib/compare/live_report.h"
+#include "calib/plan/captures.h"
+#include "calib/plan/run_report.h"
+#include "protocol/record/recording.h"
+#include "protocol/settings/settings.h"
+
+namespace toftwin::plan {
+namespace {
+
+/// So many pixels of all captures together are kept for what is told of them all.
+constexpr double kPixelsKept = 3e6;
+
+std::string today() {
+  const std::time_t now = std::time(nullptr);
+  return fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(now));
+}
+
+/// What a run's own files say of it.
+struct RunFiles {
+  Plan plan;
+  Schedule schedule;
+};
+
+Result<RunFiles> readRun(const std::filesystem::path& folder) {
+  auto table = settings::Table::load(folder / kRunFile);
+  if (!table) {
+    return Error{table.error().code, fmt::format("{}\nIs {} the folder of a run of `toftwin measure`?",
+                                                 table.error().message, folder.string())};
+  }
+  std::vector<std::string> skip;
+  std::istringstream names{table->text("skip").value_or("")};
+  for (std::string name; std::getline(names, name, ',');) {
+    name.erase(0, name.find_first_not_of(' '));
+    if (!name.empty()) skip.push_back(name);
+  }
+  auto plan = loadPlan(folder / kPlanFile, skip);
+  if (!plan) return plan.error();
+  auto schedule = scheduleOf(*plan);
+  if (!schedule) return schedule.error();
+  return RunFiles{*std::move(plan), *std::move(schedule)};
+}
+
+/// Locked captures are opened once: the note of it is there before they are read. A file that is not the one that was
+/// captured is found before.
+Result<> openLocked(const CompareRunJob& job, const std::vector<CaptureRecord>& records) {
+  const auto file = job.run / kOpenedFile;
+  if (std::ifstream in{file}; in) {
+    std::stringstream text;
+    text << in.rdbuf();
+    const auto before = compare::parseJson(text.str());
+    const auto said = [&](const char* key) {
+      const compare::Json* found = before ? before->find(key) : nullptr;
+      return found == nullptr ? std::string{"(unknown)"} : found->words();
+    };
+    return Error{
+        Error::Code::InvalidArgument,
+        fmt::format(
+            "{}: the locked captures were opened on {} for {}. What is judged on them twice is fitted "
+            "to them; capture new ones",
+            job.run.string(), said("date"), said("report"))};
+  }
+  for (const CaptureRecord& one : records) {
+    for (const RecordedFile* recorded : {&one.a, &one.b}) {
+      if (auto checked = checkHash(job.run, *recorded); !checked) return checked;
+    }
+  }
+  compare::Json json = compare::Json::object();
+  json.set("date", today()).set("report", job.output.string()).set("note", job.note);
+  std::ofstream out{file};
+  out << json.text();
+  out.flush();
+  if (out) return {};
+  return Error{Error::Code::StorageFull,
+               fmt::format("{}: cannot be written, so the locked captures stay closed", file.string())};
+}
+
+/// A moving plate is at another place in each frame; a mean over frames says nothing of it.
+bool standsStill(const CaptureRecord& record) { return record.kind != "moving"; }
+
+/// The first capture of each block whose picture says something.
+std::set<std::size_t> examplesOf(const std::vector<CaptureRecord>& records) {
+  const std::set<std::string> kinds{"distance", "checkerboard", "foreground", "corner", "tilt", "locked"};
+  std::set<std::string> seen;
+  std::set<std::size_t> numbers;
+  for (const CaptureRecord& one : records) {
+    if (kinds.contains(one.kind) && seen.insert(one.kind).second) numbers.insert(one.number);
+  }
+  return numbers;
+}
+
+/// How far apart the pixels are that are kept, by the first capture's size.
+Result<int> strideOf(const std::filesystem::path& run, const std::vector<CaptureRecord>& records) {
+  auto reader = record::Reader::open(run / records.front().a.file);
+  if (!reader) return reader.error();
+  const auto frame = reader->next();
+  if (!frame) return frame.error();
+  const double pixels =
+      static_cast<double>(frame->camera.width) * frame->camera.height * static_cast<double>(records.size());
+  return static_cast<int>(std::ceil(std::sqrt(std::max(1.0, pixels / kPixelsKept))));
+}
+
+/// Two captures at a time; each is read, compared and thinned before the next.
+Result<ComparedRun> compareAll(const CompareRunJob& job, const std::vector<CaptureRecord>& records,
+                               compare::Progress& progress) {
+  const auto stride = strideOf(job.run, records);
+  if (!stride) return stride.error();
+  const auto shown = examplesOf(records);
+  const unsigned workers = std::clamp(std::thread::hardware_concurrency(), 1u, 4u);
+  std::vector<std::optional<Result<ComparedCapture>>> results(records.size());
+  std::vector<compare::PoseComparison> wholes(records.size());
+  std::atomic<std::size_t> next{0}, done{0};
+  std::atomic<bool> gives_up{false};
+  const auto work = [&] {
+    for (std::size_t i = next++; i < records.size() && !gives_up; i = next++) {
+      const bool is_shown = shown.contains(records[i].number);
+      results[i] = compareCapture(job.run, records[i], *stride, is_shown ? &wholes[i] : nullptr);
+      if (!*results[i]) gives_up = true;
+      ++done;
+    }
+  };
+  progress.begin();
+  {
+    std::vector<std::jthread> threads;
+    for (unsigned i = 0; i < workers; ++i) threads.emplace_back(work);
+    while (done < records.size() && !gives_up) {
+      if (job.interrupted && job.interrupted()) gives_up = true;
+      progress.at(static_cast<double>(done) / static_cast<double>(records.size()));
+      std::this_thread::sleep_for(std::chrono::milliseconds{20});
+    }
+  }
+  if (job.interrupted && job.interrupted()) return Error{Error::Code::Stopped, "interrupted"};
+  ComparedRun run;
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    if (results[i] && !*results[i]) return results[i]->error();
+    if (!results[i]) continue;  // after an error, which another one has
+    if (shown.contains(records[i].number)) run.examples.emplace_back(records[i].name, std::move(wholes[i]));
+    run.captures.push_back(**std::move(results[i]));
+  }
+  return run;
+}
+
+std::vector<std::string> warningsOf(const RunFiles& files, const std::map<std::size_t, CaptureRecord>& index,
+                                    const std::vector<CaptureRecord>& taken) {
+  std::vector<std::string> warnings;
+  const std::size_t planned = files.schedule.captures.size();
+  if (index.size() < planned) {
+    warnings.push_back(
+        fmt::format("The run is not through: {} of {} captures are there. `toftwin measure` goes on with it.",
+                    index.size(), planned));
+  }
+  std::set<std::string> notes;
+  bool by_person = false;
+  for (const CaptureRecord& one : taken) {
+    by_person = by_person || one.pose_by == "person";
+    notes.insert(one.notes.begin(), one.notes.end());
+  }
+  if (by_person) {
+    warnings.emplace_back(
+        "A person took a camera to its poses: that both stood where the plan says is taken on trust.");
+  }
+  warnings.insert(warnings.end(), notes.begin(), notes.end());
+  const auto moving = std::ranges::count_if(index, [](const auto& one) { return !standsStill(one.second); });
+  if (moving > 0) warnings.push_back(fmt::format("{} captures of a moving plate are left out here.", moving));
+  return warnings;
+}
+
+}  // namespace
+
+Result<std::filesystem::path> compareRun(const CompareRunJob& job, compare::Progress& progress) {
+  const auto files = readRun(job.run);
+  if (!files) return files.error();
+  const auto index = readIndex(job.run / kIndexFile);
+  if (!index) return index.error();
+  std::vector<CaptureRecord> records;
+  for (const auto& [number, one] : *index) {
+    if (one.is_locked == job.locked && standsStill(one)) records.push_back(one);
+  }
+  if (records.empty()) {
+    return Error{Error::Code::InvalidArgument, fmt::format("{}: there are no {}captures to compare",
+                                                           job.run.string(), job.locked ? "locked " : "")};
+  }
+  if (job.locked) {
+    if (auto opened = openLocked(job, records); !opened) return opened.error();
+  }
+  std::error_code failed;
+  std::filesystem::create_directories(job.output, failed);
+  if (failed) {
+    return Error{Error::Code::StorageFull, fmt::format("{}: cannot make the report's folder: {}",
+                                                       job.output.string(), failed.message())};
+  }
+  progress.plan(fmt::format("{} captures", records.size()), 0.3 * static_cast<double>(records.size()));
+  progress.plan("report", 3.0);
+  auto run = compareAll(job, records, progress);
+  if (!run) return run.error();
+  run->plan = files->plan.name, run->is_locked = job.locked;
+  run->warnings = warningsOf(*files, *index, records);
+  progress.begin();
+  auto finding = judgeRun(*run);
+  if (!finding) return finding.error();
+  progress.end();
+  compare::Report report{.title = "Comparison of time-of-flight cameras"};
+  report.subtitle =
+      fmt::format("{} against {}: {} {}captures of the plan \"{}\"", records.front().b.source,
+                  records.front().a.source, records.size(), job.locked ? "locked " : "", files->plan.name);
+  report.verdict = finding->headline + ".";
+  report.tone = finding->section.tone;
+  report.cards = std::move(finding->cards);
+  report.data.set(finding->section.id, std::move(finding->data));
+  report.sections.push_back(std::move(finding->section));
+  report.colophon =
+      fmt::format("toftwin {}, {}{}{}", TOFTWIN_VERSION, today(), job.note.empty() ? "" : ", ", job.note);
+  report.data.set("software", "toftwin " TOFTWIN_VERSION).set("date", today()).set("note", job.note);
+  report.data.set("verdict", report.verdict).set("folder", job.run.string()).set("locked", job.locked);
+  return compare::write(report, job.output);
+}
+
+}  // namespace toftwin::plan

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include <toftwin/result.h>
+
+#include "calib/compare/characteristics.h"
+#include "calib/compare/progress.h"
+#include "calib/plan/run_index.h"
+
+namespace toftwin::plan {
+
+/// One capture of a run, compared.
+struct ComparedCapture {
+  CaptureRecord record;
+  std::size_t pixels = 0;                                  ///< compared, surfaces and edges together
+  double difference_mm = 0.0;                              ///< mean of B − A over them; NaN without any
+  double error_mm = 0.0;                                   ///< its standard error over the image, by blocks
+  double range_a_mm = 0.0;                                 ///< mean
+  double noise_a_mm = 0.0, noise_b_mm = 0.0;               ///< temporal, medians
+  double valid_a = 0.0, valid_b = 0.0, masks_agree = 0.0;  ///< shares of the pixels
+  /// Every so-manieth pixel of each row and column, for what is told of all captures together.
+  compare::PoseComparison thinned;
+};
+
+/// Reads both recordings of a capture and compares them pixel by pixel. Errors name the capture: a file that
+/// is missing, damaged or not the one that the index names, poses that disagree, fields of view that do not
+/// overlap. `whole`: also gives the comparison of all pixels.
+Result<ComparedCapture> compareCapture(const std::filesystem::path& run, const CaptureRecord& record,
+                                       int stride, compare::PoseComparison* whole = nullptr);
+
+/// Error where a recording is missing or not the one that was captured.
+Result<> checkHash(const std::filesystem::path& run, const RecordedFile& file);
+
+/// What a run is judged by.
+struct CompareRunJob {
+  std::filesystem::path run;
+  std::filesystem::path output;
+  bool locked = false;  ///< judge on the locked captures, which can be done once
+  std::string note;
+  std::function<bool()> interrupted{};
+};
+
+/// Compares the captures of a run and leaves index.html, report.json and report.md in the output folder;
+/// gives the page's path. A run that is not through is compared as far as it is, and the report says so.
+Result<std::filesystem::path> compareRun(const CompareRunJob& job, compare::Progress& progress);
+
+}  // namespace toftwin::plan

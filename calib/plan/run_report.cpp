@@ -1,0 +1,252 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/plan/run_report.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <map>
+
+#include <fmt/format.h>
+
+#include "calib/compare/live_report.h"
+
+namespace toftwin::plan {
+namespace {
+
+using namespace compare;  // this page is made of its parts
+
+/// Captures whose pixels can be compared: not those in the dark.
+bool isSeen(const ComparedCapture& one) { return one.pixels > 0; }
+
+std::vector<PoseComparison> imagesOf(const ComparedRun& run,
+                                     const std::function<bool(const ComparedCapture&)>& belongs) {
+  std::vector<PoseComparison> images;
+  for (const ComparedCapture& one : run.captures) {
+    if (isSeen(one) && belongs(one)) images.push_back(one.thinned);
+  }
+  return images;
+}
+
+/// Without an error where there is none to tell: at one pose.
+std::string withError(double value, double error) {
+  return std::isfinite(error) ? shownWithError(value, error, 2) : shown(value, 2);
+}
+
+TableBlock blockTable(const ComparedRun& run) {
+  TableBlock table{
+      "B − A by block, surfaces. ± is one standard error of the mean over different poses, where there are "
+      "several; – where there is nothing to see",
+      {"block", "captures", "bias [mm]", "RMS [mm]", "95 % within [mm]", "noise A [mm]", "noise B [mm]",
+       "valid A", "valid B", "masks agree"},
+      {}};
+  std::vector<std::string> names;
+  for (const ComparedCapture& one : run.captures) {
+    if (std::ranges::find(names, one.record.block) == names.end()) names.push_back(one.record.block);
+  }
+  for (const std::string& name : names) {
+    const auto belongs = [&](const ComparedCapture& one) { return one.record.block == name; };
+    double valid_a = 0.0, valid_b = 0.0, agree = 0.0;
+    const auto count = std::ranges::count_if(run.captures, belongs);
+    for (const ComparedCapture& one : run.captures) {
+      if (!belongs(one)) continue;
+      const double share = 1.0 / static_cast<double>(count);
+      valid_a += share * one.valid_a, valid_b += share * one.valid_b, agree += share * one.masks_agree;
+    }
+    std::vector<std::string> row{name, std::to_string(count), "–", "–", "–", "–", "–"};
+    const auto c = characterise(imagesOf(run, belongs));
+    if (!c.regions.empty()) {
+      const Region& main = mainRegionOf(c);
+      row[2] = withError(main.difference_mm.mean, main.difference_mm.standard_error);
+      row[3] = shown(main.difference_mm.rms, 2), row[4] = shown(main.difference_mm.p95_abs, 2);
+      row[5] = shown(main.noise_a_mm, 2), row[6] = shown(main.noise_b_mm, 2);
+    }
+    for (const double share : {valid_a, valid_b, agree}) row.push_back(shownPercent(share));
+    table.rows.push_back(std::move(row));
+  }
+  return table;
+}
+
+/// How a capture's mean difference goes with something, over the blocks that change it.
+struct TrendOf {
+  const char* kind;  ///< of the blocks; null: all
+  const char* title;
+  const char* label;
+  double (*x)(const CaptureRecord&);
+};
+constexpr std::array kTrends{
+    TrendOf{nullptr, "over time", "time since power-on of A [s]",
+            [](const CaptureRecord& r) { return r.a.since_power_on_s; }},
+    TrendOf{"warm_up", "while warming up", "time since power-on of A [s]",
+            [](const CaptureRecord& r) { return r.a.since_power_on_s; }},
+    TrendOf{"distance", "over distance", "distance [m]", [](const CaptureRecord& r) { return r.distance_m; }},
+    TrendOf{"exposure", "over exposure", "exposure [us]",
+            [](const CaptureRecord& r) { return r.exposure_us; }},
+    TrendOf{"tilt", "over the angle", "angle [deg]", [](const CaptureRecord& r) { return r.angle_deg; }},
+    TrendOf{"ambient", "over ambient light", "ambient light [klx]",
+            [](const CaptureRecord& r) { return r.ambient_klx; }}};
+
+std::optional<Figure> figureOf(const ComparedRun& run, const TrendOf& trend) {
+  Curve curve{.name = "mean of a capture over its image", .ink = Ink::Simulated, .stroke = Stroke::Dots};
+  std::vector<const ComparedCapture*> chosen;
+  for (const ComparedCapture& one : run.captures) {
+    const bool belongs = trend.kind == nullptr || one.record.kind == trend.kind;
+    if (belongs && isSeen(one) && std::isfinite(trend.x(one.record))) chosen.push_back(&one);
+  }
+  std::ranges::stable_sort(chosen, {}, [&](const ComparedCapture* one) { return trend.x(one->record); });
+  for (const ComparedCapture* one : chosen) {
+    curve.x.push_back(trend.x(one->record)), curve.y.push_back(one->difference_mm);
+  }
+  if (curve.x.size() < 3 || curve.x.front() == curve.x.back()) return std::nullopt;
+  return Figure{
+      fmt::format("B − A {}: a dot for each capture{}.", trend.title,
+                  trend.kind == nullptr ? "" : fmt::format(" of the blocks of kind {}", trend.kind)),
+      toSvg(Plot{.title = fmt::format("B − A {}", trend.title),
+                 .x_label = trend.label,
+                 .y_label = "B − A [mm]",
+                 .curves = {curve},
+                 .zero_line = true,
+                 .compact = true})};
+}
+
+const ComparedCapture* find(const ComparedRun& run, std::size_t number) {
+  const auto found =
+      std::ranges::find_if(run.captures, [&](const auto& one) { return one.record.number == number; });
+  return found == run.captures.end() ? nullptr : &*found;
+}
+
+TableBlock againTable(const ComparedRun& run) {
+  TableBlock table{"Captured again: last visit minus first, means over the compared pixels of each",
+                   {"condition", "A's time between [s]", "A [mm]", "B [mm]", "B − A [mm]"},
+                   {}};
+  for (const ComparedCapture& one : run.captures) {
+    const ComparedCapture* before = one.record.again ? find(run, *one.record.again) : nullptr;
+    if (before == nullptr || !isSeen(one) || !isSeen(*before)) continue;
+    const double a = one.range_a_mm - before->range_a_mm, d = one.difference_mm - before->difference_mm;
+    table.rows.push_back(
+        {before->record.name, shown(one.record.a.since_power_on_s - before->record.a.since_power_on_s, 0),
+         shown(a, 2), shown(a + d, 2), withError(d, std::hypot(one.error_mm, before->error_mm))});
+  }
+  return table;
+}
+
+TableBlock captureTable(const ComparedRun& run) {
+  TableBlock table{
+      "All captures in their order. ± is one standard error of the mean over the image, by blocks",
+      {"capture", "name", "pixels", "bias [mm]", "noise A [mm]", "noise B [mm]", "masks agree"},
+      {}};
+  for (const ComparedCapture& one : run.captures) {
+    table.rows.push_back({std::to_string(one.record.number), one.record.name, std::to_string(one.pixels),
+                          isSeen(one) ? withError(one.difference_mm, one.error_mm) : "–",
+                          isSeen(one) ? shown(one.noise_a_mm, 2) : "–",
+                          isSeen(one) ? shown(one.noise_b_mm, 2) : "–", shownPercent(one.masks_agree)});
+  }
+  return table;
+}
+
+Json captureJson(const ComparedRun& run) {
+  Json all = Json::array();
+  for (const ComparedCapture& one : run.captures) {
+    const CaptureRecord& r = one.record;
+    Json row = Json::object();
+    row.set("number", r.number).set("block", r.block).set("kind", r.kind).set("name", r.name);
+    row.set("condition", r.condition).set("repeat", r.repeat).set("again", r.again ? Json{*r.again} : Json{});
+    row.set("distance_m", r.distance_m).set("angle_deg", r.angle_deg).set("exposure_us", r.exposure_us);
+    row.set("ambient_klx", r.ambient_klx).set("since_power_on_a_s", r.a.since_power_on_s);
+    row.set("pixels", one.pixels)
+        .set("difference_mm", one.difference_mm)
+        .set("standard_error_mm", one.error_mm);
+    row.set("noise_a_mm", one.noise_a_mm)
+        .set("noise_b_mm", one.noise_b_mm)
+        .set("mean_range_a_mm", one.range_a_mm);
+    row.set("valid_share_a", one.valid_a)
+        .set("valid_share_b", one.valid_b)
+        .set("masks_agree", one.masks_agree);
+    all.push(std::move(row));
+  }
+  return all;
+}
+
+double reachOf(const ComparedRun& run) {
+  std::vector<double> magnitudes;
+  for (const auto& [name, image] : run.examples) {
+    const Image<float> compared = comparedDifference_mm(image);
+    for (std::size_t i = 0; i < compared.size(); i += 7) {
+      if (std::isfinite(compared[i])) magnitudes.push_back(std::abs(static_cast<double>(compared[i])));
+    }
+  }
+  return magnitudes.empty() ? 1.0 : roundUp(std::max(0.5, quantile(std::move(magnitudes), 0.97)));
+}
+
+void addFigures(const ComparedRun& run, std::vector<Block>& blocks) {
+  FigureRow row;
+  for (const TrendOf& trend : kTrends) {
+    if (auto figure = figureOf(run, trend)) row.figures.push_back(*std::move(figure));
+  }
+  if (!row.figures.empty()) blocks.push_back(std::move(row));
+  const double reach = reachOf(run);
+  for (const auto& [name, image] : run.examples) blocks.push_back(mapsOf(name, image, reach));
+}
+
+std::string signedMm(const Summary& difference) {
+  const std::string error =
+      std::isfinite(difference.standard_error) ? " ± " + shown(difference.standard_error, 2) : "";
+  return fmt::format("{}{} mm {}", shown(std::abs(difference.mean), 2), error,
+                     difference.mean >= 0.0 ? "farther" : "nearer");
+}
+
+std::vector<Card> cardsOf(const Characteristics& c) {
+  const Region& main = mainRegionOf(c);
+  const Summary& all = main.difference_mm;
+  return {{"Bias, B − A", withError(all.mean, all.standard_error) + " mm",
+           fmt::format("± standard error over {} different poses", c.places), toneOfDifference(all)},
+          {"95 % agree within", shown(all.p95_abs) + " mm", fmt::format("RMS {} mm", shown(all.rms)),
+           Tone::Neutral},
+          {"Noise, A | B", fmt::format("{} | {} mm", shown(main.noise_a_mm, 2), shown(main.noise_b_mm, 2)),
+           "temporal, median over pixels", Tone::Neutral},
+          {"Masks agree", shown(100.0 * c.mask_agreement, 1) + " %", "where both are valid or both are not",
+           c.mask_agreement > 0.98 ? Tone::Good : Tone::Fair}};
+}
+
+}  // namespace
+
+Result<Finding> judgeRun(const ComparedRun& run) {
+  const Characteristics c = characterise(imagesOf(run, [](const ComparedCapture&) { return true; }));
+  if (c.regions.empty()) {
+    return Error{
+        Error::Code::InvalidArgument,
+        "no pixel is valid in both cameras at any capture: there is nothing to compare. Do they look at "
+        "something within their range?"};
+  }
+  const Region& main = mainRegionOf(c);
+  Finding finding;
+  finding.headline = fmt::format(
+      "On surfaces B ({}) reads {} than A ({}) over {} captures; 95 % of the pixels agree within "
+      "{} mm; B's temporal noise is {} times A's",
+      run.captures.front().record.b.source, signedMm(main.difference_mm),
+      run.captures.front().record.a.source, run.captures.size(), shown(main.difference_mm.p95_abs),
+      shown(c.noise_ratio.median, 2));
+  finding.cards = cardsOf(c);
+  finding.section = {.id = run.is_locked ? "locked" : "run",
+                     .title = run.is_locked ? "Locked captures" : "The plan's captures",
+                     .verdict = finding.headline + ".",
+                     .tone = toneOfDifference(main.difference_mm)};
+  auto& blocks = finding.section.blocks;
+  for (const std::string& warning : run.warnings) blocks.push_back(Paragraph{"Note: " + warning});
+  blocks.push_back(blockTable(run));
+  addFigures(run, blocks);
+  if (auto again = againTable(run); !again.rows.empty()) blocks.push_back(std::move(again));
+  blocks.push_back(regionTable(c));
+  blocks.push_back(maskTable(c));
+  blocks.push_back(captureTable(run));
+  blocks.push_back(Paragraph{
+      "Tables of all captures together are over every so-manieth pixel of their images, at most three "
+      "million; means of single captures, their errors and the maps are over all pixels.",
+      true});
+  finding.data = toJson(c);
+  finding.data.set("captures", captureJson(run));
+  return finding;
+}
+
+}  // namespace toftwin::plan

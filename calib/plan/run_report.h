@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <toftwin/result.h>
+
+#include "calib/compare/real_data.h"
+#include "calib/plan/compare_run.h"
+
+namespace toftwin::plan {
+
+/// The compared captures of a run, in its order.
+struct ComparedRun {
+  std::string plan;  ///< its name
+  std::vector<ComparedCapture> captures;
+  std::vector<std::pair<std::string, compare::PoseComparison>>
+      examples;  ///< whole images, a capture of each block
+  std::vector<std::string> warnings;
+  bool is_locked = false;  ///< of the locked captures
+};
+
+/// Error where nothing can be compared: no pixel valid in both at any capture.
+Result<compare::Finding> judgeRun(const ComparedRun& run);
+
+}  // namespace toftwin::plan
