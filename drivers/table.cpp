@@ -2,6 +2,7 @@
 #include <array>
 
 #include "drivers/aravis/aravis.h"
+#include "drivers/kinect2/kinect2.h"
 #include "drivers/not_built.h"
 #include "drivers/o3d303/o3d303.h"
 #include "drivers/openni2/openni2.h"
@@ -34,6 +35,11 @@ std::span<const Driver> allDrivers() {
       aravis::row(),
 #else
       notBuilt<aravis::About>(),
+#endif
+#ifdef TOFTWIN_HAS_KINECT2
+      kinect2::row(),
+#else
+      notBuilt<kinect2::About>(),
 #endif
   };
   return rows;

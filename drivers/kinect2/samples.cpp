@@ -106,17 +106,17 @@ CameraInfo mirrored(const CameraInfo& camera) {
 
 std::vector<Image<std::complex<float>>> turnsOf(const PhaseTables& tables) {
   constexpr double kStep_rad = 0.000031 * std::numbers::pi;
+  static const std::vector<std::complex<float>> turn_of = [] {
+    std::vector<std::complex<float>> all(std::size_t{1} << 16U);
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      all[i] = std::complex<float>{std::polar(1.0, -kStep_rad * static_cast<double>(i))};
+    }
+    return all;
+  }();
   std::vector<Image<std::complex<float>>> turns;
   for (const auto& table : tables) {
     Image<std::complex<float>>& image = turns.emplace_back(kWidth, kHeight);
-    sim::forRows(kHeight, [&](int first, int last) {
-      for (int y = first; y < last; ++y) {
-        for (int x = 0; x < kWidth; ++x) {
-          const auto i = static_cast<std::size_t>(y) * kWidth + static_cast<std::size_t>(x);
-          image(x, y) = std::complex<float>{std::polar(1.0, -kStep_rad * table[i])};
-        }
-      }
-    });
+    for (std::size_t i = 0; i < kPixels; ++i) image[i] = turn_of[table[i]];
   }
   return turns;
 }

@@ -53,8 +53,8 @@ std::span<const KnownCamera> knownCameras() {
   // Vendor and product numbers as in the public USB ID registry (linux-usb.org/usb.ids) and in the
   // vendors' own udev rules.
   static constexpr std::array kCameras{
-      KnownCamera{0x045e, 0x02c4, "Microsoft Kinect v2 (for Windows)", "kinect_v2", kUsb3},
-      KnownCamera{0x045e, 0x02d8, "Microsoft Kinect v2 (Xbox One)", "kinect_v2", kUsb3},
+      KnownCamera{0x045e, 0x02c4, "Microsoft Kinect v2 (for Windows)", "kinect2", kUsb3},
+      KnownCamera{0x045e, 0x02d8, "Microsoft Kinect v2 (Xbox One)", "kinect2", kUsb3},
       KnownCamera{0x045e, 0x02ae, "Microsoft Kinect v1 camera", "", kUsb2},
       KnownCamera{0x045e, 0x097c, "Microsoft Azure Kinect depth camera", "", kUsb3},
       KnownCamera{0x1d27, 0x0600, "ASUS Xtion", "openni2", kUsb2},

@@ -36,7 +36,7 @@ std::vector<Device> list(const std::filesystem::path& root = "/");
 
 /// What is wrong with the link and what to do, or nothing: a USB 3 camera on USB 2.
 std::string warningOf(const Device& device);
-/// "Microsoft Kinect v2 at 2-1.4, 5000 Mbit/s, serial 123, for driver kinect_v2"
+/// "Microsoft Kinect v2 at 2-1.4, 5000 Mbit/s, serial 123, for driver kinect2"
 std::string describe(const Device& device);
 
 }  // namespace toftwin::usb

@@ -26,7 +26,7 @@ TEST(UsbCameras, AreFoundWithPortSpeedSerialAndDriver) {
   EXPECT_EQ(devices[1].node, "/dev/bus/usb/002/005");
   EXPECT_EQ(describe(devices[1]),
             "Microsoft Kinect v2 (for Windows) at 2-1.4, 5000 Mbit/s, serial A02-1.4, for driver "
-            "kinect_v2");
+            "kinect2");
   EXPECT_TRUE(list(root.path() / "nowhere").empty());
 }
 

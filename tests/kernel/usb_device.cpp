@@ -42,9 +42,13 @@ Answer standard(UsbDevice& device, const Setup& setup) {
       return {0, Writer{}.u8(1).done()};
     case USB_REQ_GET_STATUS:
       return {0, Writer{}.u16(0).done()};
+    case USB_REQ_SET_FEATURE:
+      if ((setup.type & USB_RECIP_MASK) == USB_RECIP_INTERFACE && setup.value == USB_INTRF_FUNC_SUSPEND) {
+        device.onFunctionSuspend((setup.index & USB_INTRF_FUNC_SUSPEND_LP) != 0);
+      }
+      return {};
     case USB_REQ_SET_ADDRESS:
     case USB_REQ_SET_CONFIGURATION:
-    case USB_REQ_SET_FEATURE:
     case USB_REQ_SET_SEL:
     case USB_REQ_SET_ISOCH_DELAY:
       return {};

@@ -60,6 +60,8 @@ class UsbDevice {
   /// Class and vendor requests on endpoint 0; `out` are the bytes that came along.
   virtual Answer control(const Setup& setup, std::span<const std::byte> out) = 0;
   virtual void onInterface(int /*number*/, int /*alternate*/) {}
+  /// Of interface 0's function. [USB 3.1, 9.4.9]
+  virtual void onFunctionSuspend(bool /*is_suspended*/) {}
   virtual void onClearHalt(std::uint8_t /*endpoint*/) {}
 
   /// Does the transfer that is first in its endpoint's queue if that can be done now.
