@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
@@ -79,6 +80,13 @@ std::string portOf(libusb_device* device) {
   return port;
 }
 
+/// Before 1.0.27, libusb_set_interface_alt_setting of a device that is gone leaves its handle locked, and closing that
+/// fails an assertion [libusb, issue 1199].
+bool leavesHandlesLocked() {
+  const libusb_version* version = libusb_get_version();
+  return version->major == 1 && version->minor == 0 && version->micro < 27;
+}
+
 Result<Handle> openAt(libusb_context* context, const std::string& port) {
   libusb_device** devices = nullptr;
   const ssize_t count = libusb_get_device_list(context, &devices);
@@ -125,7 +133,10 @@ int packetBytes(libusb_context* context, libusb_device_handle* handle) {
 class UsbLink final : public Link {
  public:
   static Result<std::unique_ptr<Link>> open(const std::string& port, bool reset);
-  ~UsbLink() override { stopPackets(); }
+  UsbLink() : context_(std::make_unique<Context>()) {}
+  UsbLink(const UsbLink&) = delete;
+  UsbLink& operator=(const UsbLink&) = delete;
+  ~UsbLink() override;
 
   Result<> send(std::span<const std::byte> bytes) override {
     // libusb does not write to what it sends.
@@ -155,7 +166,9 @@ class UsbLink final : public Link {
   }
 
   Result<> enableStream(bool on) override {
+    if (is_lost_) return failed("changing the stream's setting", LIBUSB_ERROR_NO_DEVICE);
     const int error = libusb_set_interface_alt_setting(handle_.get(), kStreamInterface, on ? 1 : 0);
+    is_locked_ = is_locked_ || (error == LIBUSB_ERROR_NO_DEVICE && leavesHandlesLocked());
     return error == 0 ? Result<>{} : failed(on ? "enabling the stream" : "disabling the stream", error);
   }
 
@@ -178,22 +191,33 @@ class UsbLink final : public Link {
   void hand(const libusb_transfer& transfer);
 
   // In the order of need; the context goes last.
-  Context context_;
+  std::unique_ptr<Context> context_;
   Handle handle_;
+  bool is_locked_ = false;  ///< by libusb, which would abort when the handle is closed
   int packet_bytes_ = 0;
   PacketSink* sink_ = nullptr;
   std::vector<Transfer> transfers_;
   std::mutex mutex_;
   std::condition_variable changed_;
   std::size_t in_flight_ = 0;
-  bool is_stopping_ = false, is_lost_ = false;
+  bool is_stopping_ = false;
+  std::atomic<bool> is_lost_{false};
   std::jthread events_;
 };
 
+/// A handle that libusb keeps locked is never closed: that costs some memory, where closing it would cost the
+/// daemon. It happens only if the camera is unplugged at the moment in which its stream is enabled.
+UsbLink::~UsbLink() {
+  stopPackets();
+  if (!is_locked_) return;
+  static_cast<void>(handle_.release());
+  static_cast<void>(context_.release());
+}
+
 Result<std::unique_ptr<Link>> UsbLink::open(const std::string& port, bool reset) {
   auto link = std::make_unique<UsbLink>();
-  if (link->context_.error() != 0) return failed("starting libusb", link->context_.error());
-  auto handle = openAt(link->context_.get(), port);
+  if (link->context_->error() != 0) return failed("starting libusb", link->context_->error());
+  auto handle = openAt(link->context_->get(), port);
   if (!handle) return handle.error();
   link->handle_ = *std::move(handle);
   if (reset) {
@@ -204,7 +228,7 @@ Result<std::unique_ptr<Link>> UsbLink::open(const std::string& port, bool reset)
       const auto until = Clock::now() + kBackWithin;
       do {
         std::this_thread::sleep_for(kLookAgain);
-        handle = openAt(link->context_.get(), port);
+        handle = openAt(link->context_->get(), port);
       } while (!handle && Clock::now() < until);
       if (!handle) return handle.error();
       link->handle_ = *std::move(handle);
@@ -229,7 +253,7 @@ Result<> UsbLink::prepare() {
     const int error = libusb_claim_interface(handle_.get(), interface);
     if (error != 0) return failed("claiming it", error);
   }
-  packet_bytes_ = packetBytes(context_.get(), handle_.get());
+  packet_bytes_ = packetBytes(context_->get(), handle_.get());
   if (packet_bytes_ < kLeastPacketBytes) {
     return Error{Error::Code::Incompatible,
                  fmt::format("kinect2: the camera gives {} bytes in 125 us, and {} are needed: it is not on USB 3. Use a "
@@ -251,7 +275,8 @@ Result<> UsbLink::prepare() {
 Result<> UsbLink::startPackets(PacketSink& sink, int transfers) {
   stopPackets();
   sink_ = &sink;
-  is_stopping_ = is_lost_ = false;
+  is_stopping_ = false;
+  is_lost_ = false;
   const auto size = static_cast<std::size_t>(kPacketsPerTransfer * packet_bytes_);
   int error = 0;
   for (int i = 0; i < transfers && error == 0; ++i) {
@@ -272,7 +297,7 @@ Result<> UsbLink::startPackets(PacketSink& sink, int transfers) {
   }
   events_ = std::jthread{[this](const std::stop_token& stop) {
     timeval most{.tv_sec = 0, .tv_usec = 100'000};
-    while (!stop.stop_requested()) libusb_handle_events_timeout_completed(context_.get(), &most, nullptr);
+    while (!stop.stop_requested()) libusb_handle_events_timeout_completed(context_->get(), &most, nullptr);
   }};
   if (error == 0) return {};
   Error why = failed(fmt::format("giving it transfer {} of {}", transfers_.size() + 1, transfers), error);
@@ -294,7 +319,7 @@ void UsbLink::stopPackets() {
     changed_.wait(lock, [this] { return in_flight_ == 0; });
   }
   events_.request_stop();
-  libusb_interrupt_event_handler(context_.get());
+  libusb_interrupt_event_handler(context_->get());
   events_ = {};
   transfers_.clear();
   sink_ = nullptr;
@@ -314,7 +339,7 @@ void UsbLink::done(libusb_transfer& transfer) {
   const bool is_gone = transfer.status == LIBUSB_TRANSFER_NO_DEVICE;
   if (!is_stopping_ && !is_gone) error = libusb_submit_transfer(&transfer);
   if (!is_stopping_ && !is_gone && error == 0) return;
-  if (!is_stopping_ && !std::exchange(is_lost_, true)) {
+  if ((is_gone || !is_stopping_) && !is_lost_.exchange(true) && !is_stopping_) {
     sink_->lost(is_gone ? Error{Error::Code::Disconnected, "kinect2: the camera was unplugged"}
                         : failed("asking for more of the stream", error));
   }

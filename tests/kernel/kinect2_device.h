@@ -15,7 +15,7 @@ class Kinect2Device final : public UsbDevice {
  public:
   struct Options {
     test::EmulatedKinect2::Options camera{};
-    std::chrono::milliseconds interval{200};  ///< between frames; the emulated machine is slow
+    std::chrono::milliseconds interval{700};  ///< between frames; the emulated machine is slow
     std::uint16_t product = 0x02C4;
     UsbSpeed speed = UsbSpeed::Super;
   };
