@@ -138,7 +138,8 @@ std::string describe(const Losses& losses) {
   std::string text;
   for (const Line& line : lines) {
     if (line.count == 0) continue;
-    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", line.count, line.count == 1 ? line.one : line.many);
+    text +=
+        fmt::format("{}{} {}", text.empty() ? "" : ", ", line.count, line.count == 1 ? line.one : line.many);
   }
   return text;
 }

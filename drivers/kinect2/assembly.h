@@ -17,8 +17,8 @@ namespace toftwin::drivers::kinect2 {
 constexpr std::size_t kImages = 10;     ///< of a frame; what the last one is for is not known
 constexpr std::size_t kUsedImages = 9;  ///< three frequencies × three steps
 constexpr std::size_t kImageBytes = kPixels * 11 / 8;
-/// Behind each image: 0, 9 (as seen, and not asked for), time stamp, frame number, image number, length of the image, and 32 words of
-/// unknown meaning.
+/// Behind each image: 0, 9 (as seen, and not asked for), time stamp, frame number, image number, length of
+/// the image, and 32 words of unknown meaning.
 constexpr std::size_t kFooterBytes = 38 * 4;
 
 struct RawFrame {
@@ -30,13 +30,13 @@ struct RawFrame {
 
 /// What did not become a frame, and why.
 struct Losses {
-  std::uint64_t packets = 0;      ///< that the bus did not deliver
-  std::uint64_t lengths = 0;      ///< images of another length
-  std::uint64_t footers = 0;      ///< images whose footer contradicts itself
-  std::uint64_t incomplete = 0;   ///< frames of which images are missing, for these reasons or none known
-  std::uint64_t mixed = 0;        ///< frames whose images are of different times
-  std::uint64_t numbers = 0;      ///< frames that never came: gaps between their numbers
-  std::uint64_t late = 0;         ///< frames that nobody fetched in time
+  std::uint64_t packets = 0;     ///< that the bus did not deliver
+  std::uint64_t lengths = 0;     ///< images of another length
+  std::uint64_t footers = 0;     ///< images whose footer contradicts itself
+  std::uint64_t incomplete = 0;  ///< frames of which images are missing, for these reasons or none known
+  std::uint64_t mixed = 0;       ///< frames whose images are of different times
+  std::uint64_t numbers = 0;     ///< frames that never came: gaps between their numbers
+  std::uint64_t late = 0;        ///< frames that nobody fetched in time
   bool operator==(const Losses&) const = default;
 };
 /// "3 frames of which images are missing, 1 packet that the bus did not deliver"; empty if there are none.
@@ -61,10 +61,10 @@ class Assembler {
   void beginFrame(std::uint32_t number, std::uint32_t stamp);
   void finishFrame(SteadyTime now);
 
-  Bytes image_;              // with its footer
-  bool is_spoiled_ = true;   // until the next image begins
-  RawFrame frame_;           // being filled
-  std::uint32_t have_ = 0;   // bits: its images
+  Bytes image_;             // with its footer
+  bool is_spoiled_ = true;  // until the next image begins
+  RawFrame frame_;          // being filled
+  std::uint32_t have_ = 0;  // bits: its images
   bool is_mixed_ = false;
   std::optional<std::uint32_t> last_number_;  // of the last complete frame
   std::uint64_t unfinished_ = 0;              // frames that were given up since then

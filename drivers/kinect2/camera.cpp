@@ -89,9 +89,11 @@ Result<> CameraSession::waitUntilReady() {
     if (!status) return status.error();
     if ((*status & kReady) != 0) return {};
     if (Clock::now() >= until) {
-      return Error{Error::Code::Timeout,
-                   fmt::format("kinect2: the camera is not ready to stream (status {:#x}); is its power supply plugged in?",
-                               *status)};
+      return Error{
+          Error::Code::Timeout,
+          fmt::format(
+              "kinect2: the camera is not ready to stream (status {:#x}); is its power supply plugged in?",
+              *status)};
     }
     std::this_thread::sleep_for(kAskAgain);
   }

@@ -25,8 +25,8 @@ class CameraSession {
     Lens lens;
   };
   Result<About> open();
-  /// The tables are the factory's, but are said to be of use only for as long as the camera is on, so that they
-  /// are read whenever it starts [libfreenect2, issue 169].
+  /// The tables are the factory's, but are said to be of use only for as long as the camera is on, so that
+  /// they are read whenever it starts [libfreenect2, issue 169].
   Result<PhaseTables> start(PacketSink& sink, int transfers);
   void stop();
 

@@ -24,8 +24,9 @@ constexpr std::size_t kPhaseHeader = 8 * kWord, kPhaseTable = 2 * (kPixels + 2);
 
 Error tooShort(std::string_view what, std::size_t has, std::size_t needs) {
   return {Error::Code::Malformed,
-          fmt::format("kinect2: the camera's {} has {} bytes, of {}: unplug it, its power supply too, and plug it in",
-                      what, has, needs)};
+          fmt::format(
+              "kinect2: the camera's {} has {} bytes, of {}: unplug it, its power supply too, and plug it in",
+              what, has, needs)};
 }
 
 double floatAt(std::span<const std::byte> bytes, std::size_t index) {
@@ -89,16 +90,19 @@ Result<std::string> serialIn(std::span<const std::byte> answer) {
     if (std::isgraph(static_cast<unsigned char>(c)) == 0) break;
     serial += c;
   }
-  if (serial.empty()) return Error{Error::Code::Malformed, "kinect2: the camera does not say its serial number"};
+  if (serial.empty())
+    return Error{Error::Code::Malformed, "kinect2: the camera does not say its serial number"};
   return serial;
 }
 
 Result<std::string> firmwareIn(std::span<const std::byte> answer) {
   constexpr std::size_t kPart = 4 * kWord, kMain = 3;
-  if (answer.size() < (kMain + 1) * kPart) return tooShort("firmware's version", answer.size(), (kMain + 1) * kPart);
+  if (answer.size() < (kMain + 1) * kPart)
+    return tooShort("firmware's version", answer.size(), (kMain + 1) * kPart);
   const auto main = answer.subspan(kMain * kPart, kPart);
   const std::uint32_t version = u32At(main, 0);
-  return fmt::format("{}.{}.{}.{}", version >> 16U, version & 0xFFFFU, u32At(main, kWord), u32At(main, 2 * kWord));
+  return fmt::format("{}.{}.{}.{}", version >> 16U, version & 0xFFFFU, u32At(main, kWord),
+                     u32At(main, 2 * kWord));
 }
 
 Result<Lens> lensIn(std::span<const std::byte> answer) {
@@ -114,10 +118,12 @@ Result<Lens> lensIn(std::span<const std::byte> answer) {
                   .p2 = number(8),
                   .k3 = number(9)};
   if (isPlausible(lens)) return lens;
-  return Error{Error::Code::Malformed,
-               fmt::format("kinect2: no lens is like the camera says of its own (fx {}, fy {}, cx {}, cy {}, k {} {} {}, "
-                           "p {} {})",
-                           lens.fx, lens.fy, lens.cx, lens.cy, lens.k1, lens.k2, lens.k3, lens.p1, lens.p2)};
+  return Error{
+      Error::Code::Malformed,
+      fmt::format(
+          "kinect2: no lens is like the camera says of its own (fx {}, fy {}, cx {}, cy {}, k {} {} {}, "
+          "p {} {})",
+          lens.fx, lens.fy, lens.cx, lens.cy, lens.k1, lens.k2, lens.k3, lens.p1, lens.p2)};
 }
 
 Result<PhaseTables> phaseTablesIn(std::span<const std::byte> answer) {

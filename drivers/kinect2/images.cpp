@@ -47,7 +47,8 @@ Plane phasorsPlane(const sim::RangeImage& decoded, bool flip) {
     for (const auto& p : phasors.pixels()) values.push_back(p.real());
     for (const auto& p : phasors.pixels()) values.push_back(p.imag());
   }
-  return planar(PlaneKind::Phasors, decoded.range_m.width(), decoded.range_m.height(), std::move(values), flip);
+  return planar(PlaneKind::Phasors, decoded.range_m.width(), decoded.range_m.height(), std::move(values),
+                flip);
 }
 
 Image<float> depthOf(const Image<float>& range_m, const Image<float>& ray_z) {

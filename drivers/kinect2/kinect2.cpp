@@ -49,7 +49,8 @@ constexpr std::array kAdjustables{
                [](auto& s, double value) { s.nearest = value * metre; }},
     Adjustable{"farthest_m", kDepthBounds_m, [](const auto& s) { return s.farthest.in(metre); },
                [](auto& s, double value) { s.farthest = value * metre; }},
-    Adjustable{"bilateral_filter", kSwitch, [](const auto& s) { return s.kinect.bilateral_filter ? 1.0 : 0.0; },
+    Adjustable{"bilateral_filter", kSwitch,
+               [](const auto& s) { return s.kinect.bilateral_filter ? 1.0 : 0.0; },
                [](auto& s, double value) { s.kinect.bilateral_filter = value > 0.0; }, true},
     Adjustable{"edge_filter", kSwitch, [](const auto& s) { return s.kinect.edge_filter ? 1.0 : 0.0; },
                [](auto& s, double value) { s.kinect.edge_filter = value > 0.0; }, true}};
@@ -84,7 +85,8 @@ class Kinect2Source final : public Source {
                 std::unique_ptr<CameraSession> session, std::vector<PlaneKind> planes)
       : keys_(keys),
         info_(describe(keys, found, about, std::move(planes))),
-        is_decoding_(std::ranges::any_of(info_.planes, [](PlaneKind kind) { return kind != PlaneKind::Samples; })),
+        is_decoding_(
+            std::ranges::any_of(info_.planes, [](PlaneKind kind) { return kind != PlaneKind::Samples; })),
         rays_(is_decoding_ ? raysOf(cameraOf(about.lens)) : sim::DecodeRays{}),
         settings_(settingsOf(keys)),
         session_(std::move(session)) {}
@@ -131,7 +133,8 @@ class Kinect2Source final : public Source {
   [[nodiscard]] SourceState state() const override {
     SourceState state;
     for (const Adjustable& one : kAdjustables) {
-      state.parameters.push_back({.name = std::string{one.name}, .value = one.get(settings_), .bounds = one.bounds});
+      state.parameters.push_back(
+          {.name = std::string{one.name}, .value = one.get(settings_), .bounds = one.bounds});
     }
     return state;
   }
@@ -139,8 +142,8 @@ class Kinect2Source final : public Source {
   Result<> setParameter(std::string_view name, double value) override {
     const auto found = std::ranges::find(kAdjustables, name, &Adjustable::name);
     if (found == kAdjustables.end()) {
-      return Error{Error::Code::NotFound, fmt::format("{} has no parameter \"{}\"; it has: {}", info_.model, name,
-                                                      fmt::join(info_.parameters, ", "))};
+      return Error{Error::Code::NotFound, fmt::format("{} has no parameter \"{}\"; it has: {}", info_.model,
+                                                      name, fmt::join(info_.parameters, ", "))};
     }
     if (!found->bounds.contains(value) || (found->is_switch && value != 0.0 && value != 1.0)) {
       return Error{Error::Code::InvalidArgument,
@@ -156,7 +159,8 @@ class Kinect2Source final : public Source {
     const DeviceTime time = clock_.read(std::int64_t{raw.stamp} * kStamp_ns, raw.arrived);
     Moment moment;
     // When within the frame each of them began, and for how long, nobody outside knows.
-    for (const Frequency modulation : {80_MHz, 16_MHz, 120_MHz}) moment.exposures.push_back({time, 0_s, modulation});
+    for (const Frequency modulation : {80_MHz, 16_MHz, 120_MHz})
+      moment.exposures.push_back({time, 0_s, modulation});
     moment.clock = keys_.delay > 0_ms ? clock_.relation(keys_.delay, 0_ms)
                                       : clock_.relation(kInterval / 2.0, kSdPerWidth * kInterval);
     return moment;
@@ -211,7 +215,8 @@ Result<Found> find(Bus& bus, const Keys& keys, const settings::Table& table) {
   if (keys.uri.starts_with(kScheme)) {
     const std::string wanted = keys.uri.substr(kScheme.size());
     for (const Found& camera : cameras) {
-      if (wanted == "any" || wanted == camera.port || (wanted == camera.serial && !wanted.empty())) return camera;
+      if (wanted == "any" || wanted == camera.port || (wanted == camera.serial && !wanted.empty()))
+        return camera;
     }
   }
   for (const Found& camera : cameras) there.push_back(uriOf(camera));
@@ -243,7 +248,8 @@ Result<std::unique_ptr<Source>> openOn(Bus& bus, settings::Table& table) {
   auto session = std::make_unique<CameraSession>(*std::move(link));
   const auto about = session->open();
   if (!about) return about.error();
-  spdlog::info("kinect2: {} at {}, serial {}, firmware {}", found->name, found->port, about->serial, about->firmware);
+  spdlog::info("kinect2: {} at {}, serial {}, firmware {}", found->name, found->port, about->serial,
+               about->firmware);
   return std::unique_ptr<Source>{
       std::make_unique<Kinect2Source>(keys, *found, *about, std::move(session), std::move(planes))};
 }

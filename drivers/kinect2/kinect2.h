@@ -40,13 +40,16 @@ struct Keys {
     v.flag("bilateral_filter", bilateral_filter, "average phases over 3 x 3 pixels that are alike");
     v.flag("edge_filter", edge_filter, "drop pixels at edges and those that hang in between");
     v.flag("reset", reset,
-           "reset the camera when it is opened, as libfreenect2 does; it may still be as another program left it");
+           "reset the camera when it is opened, as libfreenect2 does; it may still be as another program "
+           "left it");
     v.number("transfers", transfers, {2, 1000},
-             "waiting at a time, a millisecond each; the kernel's limit for all USB programs together is 16 MB, which "
+             "waiting at a time, a millisecond each; the kernel's limit for all USB programs together is 16 "
+             "MB, which "
              "60 fit in");
-    v.quantity("delay", delay, millisecond, {0.0, 1000.0},
-               "from a frame's device time until it is here, if you measured it; 0: unknown, anything up to a frame "
-               "interval");
+    v.quantity(
+        "delay", delay, millisecond, {0.0, 1000.0},
+        "from a frame's device time until it is here, if you measured it; 0: unknown, anything up to a frame "
+        "interval");
   }
 };
 

@@ -43,10 +43,10 @@ class Link {
 };
 
 struct Found {
-  std::string name;    ///< as usb::KnownCamera says
-  std::string serial;  ///< empty if the system does not say
-  std::string port;    ///< "2-1.4"
-  std::string warning; ///< what is wrong with how it is connected, or nothing
+  std::string name;     ///< as usb::KnownCamera says
+  std::string serial;   ///< empty if the system does not say
+  std::string port;     ///< "2-1.4"
+  std::string warning;  ///< what is wrong with how it is connected, or nothing
 };
 
 class Bus {

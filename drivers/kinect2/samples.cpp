@@ -90,8 +90,9 @@ CameraInfo cameraOf(const Lens& lens) {
                     .distortion = {lens.k1, lens.k2, lens.p1, lens.p2, lens.k3},
                     .calibration_id = {}};
   const auto& d = camera.distortion;
-  camera.calibration_id = sim::contentHash(fmt::format("kinect2 {} {} {} {} {} {} {} {} {}", camera.fx, camera.fy,
-                                                       camera.cx, camera.cy, d[0], d[1], d[2], d[3], d[4]));
+  camera.calibration_id =
+      sim::contentHash(fmt::format("kinect2 {} {} {} {} {} {} {} {} {}", camera.fx, camera.fy, camera.cx,
+                                   camera.cy, d[0], d[1], d[2], d[3], d[4]));
   return camera;
 }
 
@@ -100,7 +101,8 @@ CameraInfo mirrored(const CameraInfo& camera) {
   CameraInfo other = camera;
   other.cx = camera.width - 1 - camera.cx;
   other.distortion[3] = -camera.distortion[3];
-  if (!camera.calibration_id.empty()) other.calibration_id = sim::contentHash("mirrored " + camera.calibration_id);
+  if (!camera.calibration_id.empty())
+    other.calibration_id = sim::contentHash("mirrored " + camera.calibration_id);
   return other;
 }
 

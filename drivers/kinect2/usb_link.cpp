@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The cable, by libusb. Interfaces, endpoints and the order of requests as in libfreenect2's usb_control.h and
-// usb_control.cpp.
+// The cable, by libusb. Interfaces, endpoints and the order of requests as in libfreenect2's usb_control.h
+// and usb_control.cpp.
 #include <fmt/format.h>
 #include <libusb.h>
 #include <spdlog/spdlog.h>
@@ -76,12 +76,13 @@ std::string portOf(libusb_device* device) {
   std::array<std::uint8_t, 7> ports{};
   const int count = libusb_get_port_numbers(device, ports.data(), static_cast<int>(ports.size()));
   std::string port = fmt::format("{}", libusb_get_bus_number(device));
-  for (int i = 0; i < count; ++i) port += fmt::format("{}{}", i == 0 ? "-" : ".", ports[static_cast<std::size_t>(i)]);
+  for (int i = 0; i < count; ++i)
+    port += fmt::format("{}{}", i == 0 ? "-" : ".", ports[static_cast<std::size_t>(i)]);
   return port;
 }
 
-/// Before 1.0.27, libusb_set_interface_alt_setting of a device that is gone leaves its handle locked, and closing that
-/// fails an assertion [libusb, issue 1199].
+/// Before 1.0.27, libusb_set_interface_alt_setting of a device that is gone leaves its handle locked, and
+/// closing that fails an assertion [libusb, issue 1199].
 bool leavesHandlesLocked() {
   const libusb_version* version = libusb_get_version();
   return version->major == 1 && version->minor == 0 && version->micro < 27;
@@ -91,7 +92,8 @@ Result<Handle> openAt(libusb_context* context, const std::string& port) {
   libusb_device** devices = nullptr;
   const ssize_t count = libusb_get_device_list(context, &devices);
   if (count < 0) return failed("listing the USB devices", static_cast<int>(count));
-  Result<Handle> opened = Error{Error::Code::NotFound, fmt::format("kinect2: there is no device at port {} any more", port)};
+  Result<Handle> opened =
+      Error{Error::Code::NotFound, fmt::format("kinect2: there is no device at port {} any more", port)};
   for (ssize_t i = 0; i < count; ++i) {
     libusb_device_descriptor about{};
     if (portOf(devices[i]) != port || libusb_get_device_descriptor(devices[i], &about) != 0) continue;
@@ -109,7 +111,8 @@ Result<Handle> openAt(libusb_context* context, const std::string& port) {
 /// Bytes that the stream's endpoint gives in each 125 µs; 0 where it is not on USB 3.
 int packetBytes(libusb_context* context, libusb_device_handle* handle) {
   libusb_config_descriptor* configuration = nullptr;
-  if (libusb_get_config_descriptor_by_value(libusb_get_device(handle), kConfiguration, &configuration) != 0) return 0;
+  if (libusb_get_config_descriptor_by_value(libusb_get_device(handle), kConfiguration, &configuration) != 0)
+    return 0;
   int bytes = 0;
   for (int i = 0; i < configuration->bNumInterfaces; ++i) {
     const libusb_interface& one = configuration->interface[i];
@@ -152,8 +155,9 @@ class UsbLink final : public Link {
   Result<Bytes> receive(std::size_t most) override {
     Bytes bytes(most);
     int got = 0;
-    const int error = libusb_bulk_transfer(handle_.get(), kAnswerEndpoint, reinterpret_cast<unsigned char*>(bytes.data()),
-                                           static_cast<int>(most), &got, kTimeout_ms);
+    const int error =
+        libusb_bulk_transfer(handle_.get(), kAnswerEndpoint, reinterpret_cast<unsigned char*>(bytes.data()),
+                             static_cast<int>(most), &got, kTimeout_ms);
     if (error != 0) return failed("waiting for an answer", error);
     bytes.resize(static_cast<std::size_t>(got));
     return bytes;
@@ -181,9 +185,10 @@ class UsbLink final : public Link {
     std::vector<unsigned char> buffer;
   };
   Result<> prepare();
-  Result<> request(int recipient, std::uint8_t what, std::uint16_t value, std::uint16_t index, std::string_view doing) {
-    const int error = libusb_control_transfer(handle_.get(), static_cast<std::uint8_t>(recipient), what, value, index,
-                                              nullptr, 0, kTimeout_ms);
+  Result<> request(int recipient, std::uint8_t what, std::uint16_t value, std::uint16_t index,
+                   std::string_view doing) {
+    const int error = libusb_control_transfer(handle_.get(), static_cast<std::uint8_t>(recipient), what,
+                                              value, index, nullptr, 0, kTimeout_ms);
     return error < 0 ? failed(doing, error) : Result<>{};
   }
   static void LIBUSB_CALL onDone(libusb_transfer* transfer);
@@ -255,10 +260,12 @@ Result<> UsbLink::prepare() {
   }
   packet_bytes_ = packetBytes(context_->get(), handle_.get());
   if (packet_bytes_ < kLeastPacketBytes) {
-    return Error{Error::Code::Incompatible,
-                 fmt::format("kinect2: the camera gives {} bytes in 125 us, and {} are needed: it is not on USB 3. Use a "
-                             "blue or SS port, without a hub in between",
-                             packet_bytes_, kLeastPacketBytes)};
+    return Error{
+        Error::Code::Incompatible,
+        fmt::format(
+            "kinect2: the camera gives {} bytes in 125 us, and {} are needed: it is not on USB 3. Use a "
+            "blue or SS port, without a hub in between",
+            packet_bytes_, kLeastPacketBytes)};
   }
   if (auto disabled = enableStream(false); !disabled) return disabled;
   // To save power, and to be on time; a camera or a host that cannot streams all the same.
@@ -302,8 +309,9 @@ Result<> UsbLink::startPackets(PacketSink& sink, int transfers) {
   if (error == 0) return {};
   Error why = failed(fmt::format("giving it transfer {} of {}", transfers_.size() + 1, transfers), error);
   stopPackets();
-  why.message += "; if the kernel has too little memory for USB (16 MB by default), set transfers to less or run: echo "
-                 "64 > /sys/module/usbcore/parameters/usbfs_memory_mb";
+  why.message +=
+      "; if the kernel has too little memory for USB (16 MB by default), set transfers to less or run: echo "
+      "64 > /sys/module/usbcore/parameters/usbfs_memory_mb";
   return why;
 }
 
@@ -325,7 +333,9 @@ void UsbLink::stopPackets() {
   sink_ = nullptr;
 }
 
-void UsbLink::onDone(libusb_transfer* transfer) { static_cast<UsbLink*>(transfer->user_data)->done(*transfer); }
+void UsbLink::onDone(libusb_transfer* transfer) {
+  static_cast<UsbLink*>(transfer->user_data)->done(*transfer);
+}
 
 void UsbLink::done(libusb_transfer& transfer) {
   bool is_stopping = false;

@@ -26,15 +26,19 @@ void put16(Bytes& bytes, std::uint32_t word) {
   bytes.push_back(static_cast<std::byte>(word));
   bytes.push_back(static_cast<std::byte>(word >> 8U));
 }
-void putFloat(Bytes& bytes, double value) { put32(bytes, std::bit_cast<std::uint32_t>(static_cast<float>(value))); }
+void putFloat(Bytes& bytes, double value) {
+  put32(bytes, std::bit_cast<std::uint32_t>(static_cast<float>(value)));
+}
 
 /// Bit by bit, for a test's sake: lowest bit first.
 void putCode(std::byte* row, int column, std::uint32_t code) {
   for (unsigned bit = 0; bit < 11; ++bit) {
     const unsigned at = static_cast<unsigned>(column) * 11 + bit;
     const auto mask = static_cast<std::byte>(1U << at % 8);
-    if ((code >> bit & 1U) != 0) row[at / 8] |= mask;
-    else row[at / 8] &= ~mask;
+    if ((code >> bit & 1U) != 0)
+      row[at / 8] |= mask;
+    else
+      row[at / 8] &= ~mask;
   }
 }
 
@@ -66,15 +70,17 @@ Bytes imagesOf(const sim::Samples& samples, double counts_per_electron) {
         if (samples.taps == 2) electrons -= samples.tap(frequency, stepOfImage(i), 1)(x, y);
         const bool is_saturated = !samples.flags.empty() && (samples.flags(x, y) & kSaturated) != 0;
         putCode(image + static_cast<std::size_t>(storedRow(y)) * kRowBytes, storedColumn(x),
-                is_saturated ? kSaturatedCode
-                             : codeOf(static_cast<float>(static_cast<double>(electrons) * counts_per_electron)));
+                is_saturated
+                    ? kSaturatedCode
+                    : codeOf(static_cast<float>(static_cast<double>(electrons) * counts_per_electron)));
       }
     }
   }
   return bytes;
 }
 
-Bytes withFooter(std::span<const std::byte> image, std::uint32_t stamp, std::uint32_t number, std::uint32_t index) {
+Bytes withFooter(std::span<const std::byte> image, std::uint32_t stamp, std::uint32_t number,
+                 std::uint32_t index) {
   Bytes bytes{image.begin(), image.end()};
   for (const std::uint32_t word : {0U, 9U, stamp, number, index, static_cast<std::uint32_t>(image.size())}) {
     put32(bytes, word);
@@ -85,7 +91,8 @@ Bytes withFooter(std::span<const std::byte> image, std::uint32_t stamp, std::uin
 
 Bytes lensAnswer(const Lens& lens) {
   Bytes bytes;
-  for (const double number : {lens.fx, lens.fy, 0.0, lens.cx, lens.cy, lens.k1, lens.k2, lens.p1, lens.p2, lens.k3}) {
+  for (const double number :
+       {lens.fx, lens.fy, 0.0, lens.cx, lens.cy, lens.k1, lens.k2, lens.p1, lens.p2, lens.k3}) {
     putFloat(bytes, number);
   }
   for (int i = 0; i < 13; ++i) putFloat(bytes, 0.0);
@@ -114,7 +121,8 @@ Bytes imagesOfWall(const Lens& lens, double depth_m, double amplitude_counts) {
     const double r = depth_m / static_cast<double>(rays.z[i]);
     const double way_m = r + std::sqrt(r * r - 2.0 * r * kBaseline_m * static_cast<double>(rays.x[i]));
     for (std::size_t f = 0; f < 3; ++f) {
-      const double phase = 2.0 * std::numbers::pi * samples.frequencies[f].in(hertz) * way_m / kSpeedOfLight_m_per_s;
+      const double phase =
+          2.0 * std::numbers::pi * samples.frequencies[f].in(hertz)*way_m / kSpeedOfLight_m_per_s;
       for (int k = 0; k < 3; ++k) {
         samples.tap(f, k, 0)[i] =
             static_cast<float>(amplitude_counts * std::cos(phase - 2.0 * std::numbers::pi * k / 3.0));
@@ -135,7 +143,8 @@ Bytes EmulatedKinect2::dataFor(Code code, std::span<const std::uint32_t> paramet
   switch (code) {
     case Code::FirmwareVersions:
       for (std::uint32_t part = 0; part < 7; ++part) {
-        for (const std::uint32_t word : {0x0004'0000U + (part == 3 ? 0 : part), 3912U, 0U, 0U}) put32(data, word);
+        for (const std::uint32_t word : {0x0004'0000U + (part == 3 ? 0 : part), 3912U, 0U, 0U})
+          put32(data, word);
       }
       return data;
     case Code::HardwareInfo:
@@ -166,7 +175,8 @@ void EmulatedKinect2::command(std::span<const std::byte> bytes) {
   for (std::size_t at = 20; at + 4 <= bytes.size(); at += 4) parameters.push_back(u32At(bytes, at));
   seen_.push_back(code);
   if (code == Code::InitStreams) is_initialised_ = true;
-  if (code == Code::SetStreaming) is_streaming_ = is_initialised_ && !parameters.empty() && parameters[0] == 1;
+  if (code == Code::SetStreaming)
+    is_streaming_ = is_initialised_ && !parameters.empty() && parameters[0] == 1;
   if (code == Code::Stop || code == Code::Shutdown) is_initialised_ = is_streaming_ = false;
   answers_.clear();
   if (most > 0) {
@@ -236,7 +246,8 @@ std::vector<EmulatedKinect2::Packet> EmulatedKinect2::nextFrame() {
           number_ % kNumberCodes);
   std::vector<Packet> packets;
   for (std::uint32_t i = 0; i < kImages; ++i) {
-    Bytes image = withFooter(std::span{options_.images}.subspan(i * kImageBytes, kImageBytes), stamp_, number_, i);
+    Bytes image =
+        withFooter(std::span{options_.images}.subspan(i * kImageBytes, kImageBytes), stamp_, number_, i);
     if (takeOne(short_images_)) image.erase(image.begin(), image.begin() + 100);
     for (std::size_t at = 0; at < image.size(); at += kPacketBytes) {
       const auto begin = image.begin() + static_cast<std::ptrdiff_t>(at);

@@ -23,7 +23,8 @@ std::uint32_t codeOf(float counts);
 /// taps are taken as their difference; `counts_per_electron` converts them.
 Bytes imagesOf(const sim::Samples& samples, double counts_per_electron = 1.0);
 /// An image with the footer that it has on the wire.
-Bytes withFooter(std::span<const std::byte> image, std::uint32_t stamp, std::uint32_t number, std::uint32_t index);
+Bytes withFooter(std::span<const std::byte> image, std::uint32_t stamp, std::uint32_t number,
+                 std::uint32_t index);
 
 /// The answers that hold what the factory measured.
 Bytes lensAnswer(const drivers::kinect2::Lens& lens);
@@ -38,10 +39,10 @@ class EmulatedKinect2 {
   struct Options {
     std::string serial = "003370163847";
     drivers::kinect2::Lens lens{365.8608, 365.8608, 254.5022, 205.2526, 0.0964, -0.2758, 0, 0, 0.0921};
-    drivers::kinect2::PhaseTables tables{};  ///< empty: zeros
-    Bytes images{};                          ///< of every frame; empty: a wall at 2 m
-    std::uint32_t first_number = 65'530;     ///< wraps around soon
-    std::uint32_t first_stamp = 0xFFFF'F000; ///< likewise
+    drivers::kinect2::PhaseTables tables{};   ///< empty: zeros
+    Bytes images{};                           ///< of every frame; empty: a wall at 2 m
+    std::uint32_t first_number = 65'530;      ///< wraps around soon
+    std::uint32_t first_stamp = 0xFFFF'F000;  ///< likewise
     std::uint32_t stamps_per_frame = 267;
   };
   explicit EmulatedKinect2(Options options);

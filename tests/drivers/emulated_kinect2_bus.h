@@ -20,7 +20,10 @@ class EmulatedKinect2Bus final : public drivers::kinect2::Bus {
 
   std::vector<drivers::kinect2::Found> cameras() override {
     if (!state_->is_plugged) return {};
-    return {{.name = "Emulated Kinect v2", .serial = state_->device.options().serial, .port = "2-1.4", .warning = {}}};
+    return {{.name = "Emulated Kinect v2",
+             .serial = state_->device.options().serial,
+             .port = "2-1.4",
+             .warning = {}}};
   }
   Result<std::unique_ptr<drivers::kinect2::Link>> open(const drivers::kinect2::Found&, bool reset) override {
     if (!state_->is_plugged) return gone();
@@ -93,12 +96,15 @@ class EmulatedKinect2Bus final : public drivers::kinect2::Bus {
           sink.lost(gone());
           return;
         }
-        const auto due = std::chrono::steady_clock::now() + std::chrono::microseconds{state_->interval_us.load()};
+        const auto due =
+            std::chrono::steady_clock::now() + std::chrono::microseconds{state_->interval_us.load()};
         if (state_->device.isStreaming()) {
           sink.packet({});
           for (const auto& packet : state_->device.nextFrame()) {
-            if (packet.is_lost) sink.missed();
-            else sink.packet(packet.bytes);
+            if (packet.is_lost)
+              sink.missed();
+            else
+              sink.packet(packet.bytes);
           }
         }
         while (!stop.stop_requested() && state_->is_plugged && std::chrono::steady_clock::now() < due) {

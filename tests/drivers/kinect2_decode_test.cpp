@@ -42,19 +42,21 @@ double wallRange_m(int x, int y) { return (x > 300 ? 1.2 : 2.0) + 0.002 * x + 0.
 /// A slanted wall with a step, brighter to one side, too near and bright in a corner.
 sim::SensorModel::Exposed exposeWall(const sim::SensorModel& model) {
   const auto request = model.traceRequest();
-  const sim::Light light = sim::syntheticLight(
-      kWidth, kHeight, request.frequencies, request.harmonics,
-      [&](int x, int y) {
+  const sim::Light light =
+      sim::syntheticLight(kWidth, kHeight, request.frequencies, request.harmonics, [&](int x, int y) {
         const double r = wallRange_m(x, y);
         const double radiance = (x < 40 && y < 40 ? 8.0 : 0.05) * (1.0 + 0.001 * x) / (r * r);
-        // Half of the way there and back whose range the decoder's formula makes r (decode_steps.h, without L²).
+        // Half of the way there and back whose range the decoder's formula makes r (decode_steps.h, without
+        // L²).
         const double root = std::sqrt(r * r - 2.0 * r * 0.045 * static_cast<double>(model.rays().x(x, y)));
         return std::vector<sim::Way>{{radiance, 0.5 * (r + root)}};
       });
   return model.expose(light, Moment{}, 5, 1);
 }
 
-std::span<const std::byte> used(const Bytes& images) { return std::span{images}.first(kUsedImages * kImageBytes); }
+std::span<const std::byte> used(const Bytes& images) {
+  return std::span{images}.first(kUsedImages * kImageBytes);
+}
 
 template <class T>
 bool sameBits(const Image<T>& a, const Image<T>& b) {
@@ -86,10 +88,10 @@ TEST_F(Kinect2Decode, OfASimulatedFrameThatWentOverTheWireIsThatOfItsCountsBitFo
         for (int x = 1; x < kWidth - 1; ++x) {
           const double electrons = static_cast<double>(exposed_->samples.tap(f, k, 0)(x, y)) -
                                    static_cast<double>(exposed_->samples.tap(f, k, 1)(x, y));
-          const bool is_saturated =
-              (counts.flags(x, y) & static_cast<unsigned>(PixelFlag::Saturated)) != 0;
-          counts.tap(f, k, 0)(x, y) = is_saturated ? countsOf(kSaturatedCode)
-                                                   : static_cast<float>(std::round(electrons * kCountsPerElectron));
+          const bool is_saturated = (counts.flags(x, y) & static_cast<unsigned>(PixelFlag::Saturated)) != 0;
+          counts.tap(f, k, 0)(x, y) = is_saturated
+                                          ? countsOf(kSaturatedCode)
+                                          : static_cast<float>(std::round(electrons * kCountsPerElectron));
         }
       }
     }
@@ -108,15 +110,19 @@ TEST_F(Kinect2Decode, OfASimulatedFrameThatWentOverTheWireIsThatOfItsCountsBitFo
 
 // The simulator decodes electrons with the file's settings, the driver counts with its own: that both agree
 // shows that the settings are the same. Float's rounding: charge of two taps of up to 1.2e6 electrons is
-// stored to 2⁻⁴ (half of an ulp, 0.0625 each), so a phasor of A electrons turns by 0.15 / A rad at most, which is 110.5 mm
-// times that and the sum over three frequencies: below 0.02 mm for A of 3000 electrons and more.
+// stored to 2⁻⁴ (half of an ulp, 0.0625 each), so a phasor of A electrons turns by 0.15 / A rad at most,
+// which is 110.5 mm times that and the sum over three frequencies: below 0.02 mm for A of 3000 electrons and
+// more.
 TEST_F(Kinect2Decode, OfASimulatedFrameIsWhatTheSimulatorDecodedFromIt) {
   // Without what acts on ranges after decoding, which the wire does not carry.
-  const sim::RangeImage expected = sim::decode(exposed_->samples, [] {
-    auto settings = decodeSettings();
-    settings.kinect.counts_per_electron = kCountsPerElectron;
-    return settings;
-  }(), model_->rays());
+  const sim::RangeImage expected = sim::decode(
+      exposed_->samples,
+      [] {
+        auto settings = decodeSettings();
+        settings.kinect.counts_per_electron = kCountsPerElectron;
+        return settings;
+      }(),
+      model_->rays());
   const Bytes images = imagesOf(exposed_->samples, kCountsPerElectron);
   const sim::RangeImage range = sim::decode(samplesOf(used(images)), decodeSettings(), model_->rays());
   std::size_t valid = 0, differ = 0;
@@ -178,7 +184,8 @@ TEST(Kinect2PhaseTables, AreTakenOffAsLibfreenect2DoesIt) {
     for (std::size_t f = 0; f < 3; ++f) {
       double a = 0.0, b = 0.0;
       for (int image = 0; image < 3; ++image) {
-        const double theta = 2.0 * std::numbers::pi * image / 3.0 - 0.000031 * std::numbers::pi * tables[f][i];
+        const double theta =
+            2.0 * std::numbers::pi * image / 3.0 - 0.000031 * std::numbers::pi * tables[f][i];
         const auto m = static_cast<double>(samples.tap(f, stepOfImage(image), 0)[i]);
         a += std::cos(theta) * m;
         b -= std::sin(theta) * m;
@@ -208,8 +215,9 @@ TEST(Kinect2Wall, IsFlatAfterTheBaselineIsTakenOff) {
   const sim::DecodeRays rays = raysOf(cameraOf(lens));
   const Bytes images = imagesOfWall(lens, 2.0, 2000.0);
   const sim::RangeImage range = sim::decode(samplesOf(used(images)), decodeSettings(), rays);
-  // Steps of 8 at 2000 counts: each sample is off by 4 at most, a phasor by 2/3 · 4 · 2, its phase by that over 2000; at
-  // all three frequencies at once, times 110.5 mm: 0.9 mm. The filter cannot make it worse where it looks to both sides.
+  // Steps of 8 at 2000 counts: each sample is off by 4 at most, a phasor by 2/3 · 4 · 2, its phase by that
+  // over 2000; at all three frequencies at once, times 110.5 mm: 0.9 mm. The filter cannot make it worse
+  // where it looks to both sides.
   std::size_t valid = 0;
   for (int y = 1; y < kHeight - 1; ++y) {
     for (int x = 2; x < kWidth - 2; ++x) {

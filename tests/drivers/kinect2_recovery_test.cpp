@@ -19,7 +19,8 @@ void losesAndFinds(std::string_view what, const std::function<void(EmulatedKinec
     return drivers::kinect2::openOn(bus, *table);
   }};
   ASSERT_TRUE(rig.isSubscribed());
-  const auto narrow = rig.command([](drivers::Source& source) { return source.setParameter("farthest_m", 3.25); });
+  const auto narrow =
+      rig.command([](drivers::Source& source) { return source.setParameter("farthest_m", 3.25); });
   ASSERT_TRUE(narrow.ok()) << narrow.error().message;
   const auto outcome = rig.loseAndFind(
       what, milliseconds{700}, [&] { lose(bus); }, [&] { giveBack(bus); });
@@ -35,7 +36,8 @@ void losesAndFinds(std::string_view what, const std::function<void(EmulatedKinec
   ASSERT_TRUE(rig.command([&](drivers::Source& source) -> Result<> {
                    farthest_m = source.state().parameters[1].value.value_or(0.0);
                    return {};
-                 }).ok());
+                 })
+                  .ok());
   EXPECT_EQ(farthest_m, 3.25) << "what a client had set is set again";
 }
 

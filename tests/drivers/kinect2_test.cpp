@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The driver on an emulated bus: opening, frames, what is lost, parameters. That it speaks libusb's language is
-// for tests/kernel to show.
+// The driver on an emulated bus: opening, frames, what is lost, parameters. That it speaks libusb's language
+// is for tests/kernel to show.
 #include "drivers/kinect2/kinect2.h"
 
 #include <gmock/gmock.h>
@@ -22,7 +22,8 @@ using testing::HasSubstr;
 
 constexpr const char* kUri = "kinect2:003370163847";
 
-Result<std::unique_ptr<drivers::Source>> openWith(Bus& bus, const std::string& keys = {}, const std::string& uri = kUri) {
+Result<std::unique_ptr<drivers::Source>> openWith(Bus& bus, const std::string& keys = {},
+                                                  const std::string& uri = kUri) {
   auto table = settings::Table::parse(fmt::format("uri = '{}'\n{}", uri, keys), "kinect2.toml");
   return openOn(bus, *table);
 }
@@ -58,7 +59,8 @@ TEST(Kinect2, IsFoundByItsSerialItsPortOrAny) {
     ASSERT_TRUE(opened.ok()) << opened.error().message;
     EXPECT_EQ((*opened)->info().serial, "003370163847");
   }
-  EXPECT_THAT(openWith(bus, {}, "kinect2:42").error().message, HasSubstr("no camera kinect2:42; there are: kinect2:0033"));
+  EXPECT_THAT(openWith(bus, {}, "kinect2:42").error().message,
+              HasSubstr("no camera kinect2:42; there are: kinect2:0033"));
   bus.unplug();
   EXPECT_THAT(openWith(bus).error().message, HasSubstr("power supply"));
   EXPECT_TRUE(listOn(bus).empty());
@@ -79,7 +81,8 @@ TEST(Kinect2, IsCompliant) {
 
 TEST(Kinect2, FramesAreOfTheWallThatItSeesAndOneAfterTheOther) {
   EmulatedKinect2Bus bus;
-  const auto source = started(bus, "planes = ['range', 'depth', 'amplitude', 'flags', 'samples', 'phasors']\ndelay_ms = 20");
+  const auto source =
+      started(bus, "planes = ['range', 'depth', 'amplitude', 'flags', 'samples', 'phasors']\ndelay_ms = 20");
   ASSERT_NE(source, nullptr);
   std::optional<std::uint32_t> last;
   for (int i = 0; i < 10; ++i) {
@@ -173,8 +176,9 @@ TEST(Kinect2, IsTakenThroughTheStepsThatAreKnownToWork) {
   using enum Code;
   EXPECT_THAT(bus.device().seen(),
               testing::ElementsAre(FirmwareVersions, HardwareInfo, DataPage, DataPage,  // open
-                                   DataPage, SetMode, SetMode, Status, Status, Status, InitStreams, Status, SetStreaming,
-                                   SetMode, SetMode, Stop, SetStreaming, SetMode, SetMode, SetMode, SetMode,  // stop
+                                   DataPage, SetMode, SetMode, Status, Status, Status, InitStreams, Status,
+                                   SetStreaming, SetMode, SetMode, Stop, SetStreaming, SetMode, SetMode,
+                                   SetMode, SetMode,  // stop
                                    SetMode, SetMode, Shutdown));
 }
 
@@ -230,9 +234,11 @@ TEST(Kinect2, ParametersChangeWhatIsDecoded) {
 
 TEST(Kinect2, KeysThatMakeNoSenseAreNamed) {
   EmulatedKinect2Bus bus;
-  EXPECT_THAT(openWith(bus, "planes = ['colour', 'range', 'range']").error().message,
-              testing::AllOf(HasSubstr("\"colour\", which a Kinect v2 does not have"), HasSubstr("\"range\" twice")));
-  EXPECT_THAT(openWith(bus, "nearest_m = 5\nfarthest_m = 4").error().message, HasSubstr("less than farthest_m"));
+  EXPECT_THAT(
+      openWith(bus, "planes = ['colour', 'range', 'range']").error().message,
+      testing::AllOf(HasSubstr("\"colour\", which a Kinect v2 does not have"), HasSubstr("\"range\" twice")));
+  EXPECT_THAT(openWith(bus, "nearest_m = 5\nfarthest_m = 4").error().message,
+              HasSubstr("less than farthest_m"));
 }
 
 TEST(Kinect2, DeviceTimeIsItsOwnClockOverAWrapOfItsStamps) {

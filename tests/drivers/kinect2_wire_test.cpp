@@ -23,7 +23,8 @@ using namespace drivers::kinect2;
 // ---- codes -------------------------------------------------------------------------------------
 
 TEST(Kinect2Codes, GrowByStepsThatDoubleAndEndAt16320) {
-  // libfreenect2 adds up 1 << (code / 128 − (code ≥ 128)); written as such here, in closed form in the driver.
+  // libfreenect2 adds up 1 << (code / 128 − (code ≥ 128)); written as such here, in closed form in the
+  // driver.
   float counts = 0.0F;
   for (std::uint32_t code = 0; code < 1024; ++code) {
     EXPECT_EQ(countsOf(code), counts) << code;
@@ -66,7 +67,8 @@ TEST(Kinect2Codes, LieInEveryRowWhereLibfreenect2LooksForThem) {
     const int row = decoder_row < 212 ? decoder_row + 212 : 423 - decoder_row;
     const std::size_t word = static_cast<std::size_t>(11 * (x / 4 + 128 * (x % 4)) / 16);
     const unsigned shift = static_cast<unsigned>(11 * (x / 4 + 128 * (x % 4)) % 16);
-    const std::size_t at = static_cast<std::size_t>(image) * 298'496 + 2 * (static_cast<std::size_t>(row) * 352 + word);
+    const std::size_t at =
+        static_cast<std::size_t>(image) * 298'496 + 2 * (static_cast<std::size_t>(row) * 352 + word);
     const unsigned next = shift > 5 ? u16At(images, at + 2) : 0U;
     return (u16At(images, at) >> shift | next << (16 - shift)) & 2047U;
   };
@@ -100,7 +102,8 @@ TEST(Kinect2Codes, WhatIsPackedComesOutAgain) {
     if (x == 0 || x == kWidth - 1) continue;
     if (random() % 100 == 0) samples.flags[i] = static_cast<std::uint8_t>(PixelFlag::Saturated);
     for (auto& image : samples.electrons) {
-      image[i] = samples.flags[i] != 0 ? sim::Companding::kLargest : countsOf(static_cast<std::uint32_t>(random()) % 2048);
+      image[i] = samples.flags[i] != 0 ? sim::Companding::kLargest
+                                       : countsOf(static_cast<std::uint32_t>(random()) % 2048);
       if (samples.flags[i] == 0 && image[i] == sim::Companding::kLargest) image[i] = 0.0F;
     }
   }
@@ -125,7 +128,14 @@ TEST(Kinect2Commands, AreFiveWordsAndTheirParameters) {
 }
 
 TEST(Kinect2Answers, AreReadToWhatTheyMean) {
-  const Lens lens{.fx = 365.5, .fy = 366.25, .cx = 254.75, .cy = 205.5, .k1 = 0.5, .k2 = -0.25, .p1 = 0.125, .p2 = -1.5,
+  const Lens lens{.fx = 365.5,
+                  .fy = 366.25,
+                  .cx = 254.75,
+                  .cy = 205.5,
+                  .k1 = 0.5,
+                  .k2 = -0.25,
+                  .p1 = 0.125,
+                  .p2 = -1.5,
                   .k3 = 0.75};  // exact in float
   const auto read = lensIn(lensAnswer(lens));
   ASSERT_TRUE(read.ok()) << read.error().message;
@@ -190,8 +200,10 @@ class Kinect2Packets : public testing::Test {
   std::optional<RawFrame> feed(const std::vector<EmulatedKinect2::Packet>& packets) {
     std::optional<RawFrame> frame;
     for (const auto& packet : packets) {
-      if (packet.is_lost) assembler.missed();
-      else assembler.packet(packet.bytes, {});
+      if (packet.is_lost)
+        assembler.missed();
+      else
+        assembler.packet(packet.bytes, {});
       if (auto taken = assembler.take()) frame = std::move(taken);
     }
     return frame;
@@ -235,7 +247,8 @@ TEST_F(Kinect2Packets, ThatAreLostCostTheirFrameAndNoOther) {
   ASSERT_TRUE(feed().has_value());
   EXPECT_EQ(assembler.losses(), (Losses{.packets = 2, .lengths = 1, .incomplete = 2, .numbers = 3}));
   EXPECT_EQ(describe(assembler.losses()),
-            "3 frames that never came, 2 frames of which images are missing, 2 packets that the bus did not deliver, "
+            "3 frames that never came, 2 frames of which images are missing, 2 packets that the bus did not "
+            "deliver, "
             "1 image of another length");
 }
 

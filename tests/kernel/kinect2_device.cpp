@@ -14,8 +14,15 @@ constexpr unsigned kBulkPacket = 1024, kStreamPacket = 1024, kBurst = 11, kMult 
 
 Bytes interface(unsigned number, unsigned alternate, unsigned endpoints) {
   return Writer{}
-      .u8(9).u8(USB_DT_INTERFACE).u8(number).u8(alternate).u8(endpoints)
-      .u8(USB_CLASS_VENDOR_SPEC).u8(0xFF).u8(0).u8(0)
+      .u8(9)
+      .u8(USB_DT_INTERFACE)
+      .u8(number)
+      .u8(alternate)
+      .u8(endpoints)
+      .u8(USB_CLASS_VENDOR_SPEC)
+      .u8(0xFF)
+      .u8(0)
+      .u8(0)
       .done();
 }
 
@@ -38,9 +45,20 @@ Kinect2Device::Kinect2Device(Options options) : options_(std::move(options)), ca
 Bytes Kinect2Device::deviceDescriptor() const {
   const bool is_super = options_.speed == UsbSpeed::Super;
   return Writer{}
-      .u8(18).u8(USB_DT_DEVICE).u16(is_super ? 0x0300 : 0x0200)
-      .u8(USB_CLASS_MISC).u8(2).u8(1).u8(is_super ? 9 : 64)
-      .u16(0x045E).u16(options_.product).u16(0x0100).u8(1).u8(2).u8(3).u8(1)
+      .u8(18)
+      .u8(USB_DT_DEVICE)
+      .u16(is_super ? 0x0300 : 0x0200)
+      .u8(USB_CLASS_MISC)
+      .u8(2)
+      .u8(1)
+      .u8(is_super ? 9 : 64)
+      .u16(0x045E)
+      .u16(options_.product)
+      .u16(0x0100)
+      .u8(1)
+      .u8(2)
+      .u8(3)
+      .u8(1)
       .done();
 }
 
@@ -58,7 +76,14 @@ Bytes Kinect2Device::configurationDescriptor() const {
   body.bytes(endpoint(kStream, USB_ENDPOINT_XFER_ISOC, options_.speed));
   const Bytes all = body.done();
   return Writer{}
-      .u8(9).u8(USB_DT_CONFIG).u16(9 + static_cast<unsigned>(all.size())).u8(2).u8(1).u8(0).u8(0x80).u8(50)
+      .u8(9)
+      .u8(USB_DT_CONFIG)
+      .u16(9 + static_cast<unsigned>(all.size()))
+      .u8(2)
+      .u8(1)
+      .u8(0)
+      .u8(0x80)
+      .u8(50)
       .bytes(all)
       .done();
 }
@@ -105,7 +130,8 @@ bool Kinect2Device::serveAnswer(Transfer& transfer) {
   return true;
 }
 
-/// Between frames the real camera sends empty packets all the time; here transfers wait, to leave the machine time.
+/// Between frames the real camera sends empty packets all the time; here transfers wait, to leave the machine
+/// time.
 bool Kinect2Device::serveStream(Transfer& transfer, SteadyTime now) {
   if (packets_.empty()) {
     if (!camera_.isStreaming() || now < next_frame_) return false;

@@ -9,8 +9,8 @@
 
 namespace toftwin::kernel_test {
 
-/// An emulated Kinect v2 as a USB 3 device: commands over bulk endpoints, the stream over an isochronous one with
-/// packets of up to 33792 bytes, which only its alternate setting 1 has.
+/// An emulated Kinect v2 as a USB 3 device: commands over bulk endpoints, the stream over an isochronous one
+/// with packets of up to 33792 bytes, which only its alternate setting 1 has.
 class Kinect2Device final : public UsbDevice {
  public:
   struct Options {

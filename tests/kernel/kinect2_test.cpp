@@ -32,7 +32,8 @@ constexpr const char* kUri = "kinect2:003370163847";
 constexpr const char* kQuick = "planes = ['samples']\n";
 
 void waitUntil(bool there) {
-  for (int i = 0; i < 500 && row().list().empty() == there; ++i) std::this_thread::sleep_for(milliseconds{10});
+  for (int i = 0; i < 500 && row().list().empty() == there; ++i)
+    std::this_thread::sleep_for(milliseconds{10});
   ASSERT_EQ(!row().list().empty(), there);
 }
 
@@ -104,7 +105,8 @@ void expectExact(const Frame& frame, const Plugged& plugged) {
   std::size_t wrong = 0, i = 0;
   for (const Image<float>& image : sent.electrons) {
     for (int y = 0; y < kHeight; ++y) {
-      for (int x = 0; x < kWidth; ++x, ++i) wrong += values[i] != image(kWidth - 1 - x, y) && i != kWidth - 2 ? 1 : 0;
+      for (int x = 0; x < kWidth; ++x, ++i)
+        wrong += values[i] != image(kWidth - 1 - x, y) && i != kWidth - 2 ? 1 : 0;
     }
   }
   EXPECT_EQ(wrong, 0u);
@@ -198,7 +200,8 @@ TEST(Kinect2Usb, OpeningAndClosingLeaksNothing) {
 constexpr milliseconds kSlowness{1600};
 
 /// Soon, told as a gap, and with the settings of before.
-void expectRecovered(test::RecoveryRig& rig, const std::optional<test::RecoveryRig::Outcome>& outcome, milliseconds boot) {
+void expectRecovered(test::RecoveryRig& rig, const std::optional<test::RecoveryRig::Outcome>& outcome,
+                     milliseconds boot) {
   ASSERT_TRUE(outcome.has_value()) << "the stream did not go on";
   EXPECT_LT(outcome->took, kSlowness + boot);
   EXPECT_GT(outcome->first.dropped_by_device, 0u) << "the gap has no frames";
@@ -235,7 +238,8 @@ TEST(Kinect2Usb, AClientOfTheDaemonKeepsItsStreamWhenTheCameraHangsForAWhile) {
   ASSERT_TRUE(rig.isSubscribed());
   ASSERT_TRUE(rig.command(kSetFarthest).ok());
   const auto outcome = rig.loseAndFind(
-      "hangs", milliseconds{700}, [&] { plugged.camera().hang(true); }, [&] { plugged.camera().hang(false); });
+      "hangs", milliseconds{700}, [&] { plugged.camera().hang(true); },
+      [&] { plugged.camera().hang(false); });
   // One question that it never answered may be under way, which takes a second.
   expectRecovered(rig, outcome, milliseconds{1000});
 }
