@@ -29,15 +29,6 @@ Result<> makeFolder(const std::filesystem::path& folder) {
   return failed ? cannotWrite(folder, failed.value()) : Result<>{};
 }
 
-/// Of a killed program; we hold the lock, so nobody is writing them.
-void removeParts(const std::filesystem::path& folder) {
-  std::error_code ignored;
-  for (const auto& entry : std::filesystem::directory_iterator{folder, ignored}) {
-    const std::string name = entry.path().filename().string();
-    if (name.starts_with('.') && name.ends_with(".part")) std::filesystem::remove(entry.path(), ignored);
-  }
-}
-
 bool isWhole(const std::filesystem::path& folder, const plan::RecordedFile& file) {
   const auto hash = plan::sha256Of(folder / file.file);
   return hash && *hash == file.sha256;
@@ -123,7 +114,6 @@ Result<RunFolder> RunFolder::open(const std::filesystem::path& folder, const std
     if (auto wrote = writeWhole(folder / plan::kPlanFile, plan_text); !wrote) return wrote.error();
     if (auto wrote = run.manifest_.write(); !wrote) return wrote.error();
   }
-  for (const char* name : {plan::kOpenFolder, plan::kLockedFolder}) removeParts(folder / name);
   if (auto there = run.readWhatIsThere(); !there) return there.error();
   return run;
 }

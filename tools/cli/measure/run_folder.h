@@ -18,7 +18,8 @@
 
 namespace toftwin::cli {
 
-/// The recordings of one capture while they are written, beside where they will lie.
+/// The recordings of one capture while they are written, beside where they will lie. What a kill leaves of them has the
+/// same name when the capture is taken again.
 class CaptureFiles {
  public:
   CaptureFiles(std::filesystem::path folder, std::string name_a, std::string name_b)
