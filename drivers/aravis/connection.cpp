@@ -113,11 +113,16 @@ Result<Connection> Connection::open(const std::string& name) {
   }
   if (const auto usb = usbCameraCalled(is_any ? "any" : name)) return openUsb(*usb);
   for (std::string& one : usbCameras()) there.push_back(std::move(one));
-  return Error{Error::Code::NotFound,
-               fmt::format("there is no camera aravis:{}; {}", name,
-                           there.empty() ? "none answers. Is it on, and in this computer's subnet? "
-                                           "(toftwin doctor knows what keeps answers away)"
-                                         : fmt::format("there is: {}", fmt::join(there, ", ")))};
+  std::string why =
+      "none answers. Is it on, and in this computer's subnet? (toftwin doctor knows what keeps "
+      "answers away)";
+  if (!there.empty()) why = fmt::format("there is: {}", fmt::join(there, ", "));
+  if (there.empty() && !seesInterfaces()) {
+    why =
+        "this process may not see its network interfaces, so it cannot look for one. Name its IP "
+        "address, or allow AF_NETLINK (systemd: RestrictAddressFamilies)";
+  }
+  return Error{Error::Code::NotFound, fmt::format("there is no camera aravis:{}; {}", name, why)};
 }
 
 Result<Connection> Connection::openGige(std::uint32_t address) {

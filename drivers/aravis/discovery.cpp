@@ -253,6 +253,8 @@ std::vector<GigeCamera> discover(const Discovery& how) {
   return found;
 }
 
+bool seesInterfaces() { return !interfaces().empty(); }
+
 std::optional<GigeCamera> discoverAt(std::uint32_t address, milliseconds wait) {
   std::optional<GigeCamera> camera;
   ask(address, commandOf(kDiscover, {}), wait, [&](std::span<const std::byte> datagram) {

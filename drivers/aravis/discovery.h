@@ -40,6 +40,8 @@ struct Discovery {
   std::function<bool(const GigeCamera&)> enough{};
 };
 std::vector<GigeCamera> discover(const Discovery& how);
+/// Whether this process may see its network interfaces, without which it can ask nobody.
+bool seesInterfaces();
 /// Asks one, twice if it does not answer at once.
 std::optional<GigeCamera> discoverAt(std::uint32_t address, std::chrono::milliseconds wait);
 
