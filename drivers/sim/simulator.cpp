@@ -8,10 +8,7 @@
 #include <cmath>
 #include <utility>
 
-#include <toftwin/names.h>
-
-#include "drivers/sim/default_scene.h"
-#include "drivers/sim/keys.h"
+#include "drivers/sim/chosen.h"
 #include "drivers/sim/view.h"
 #include "protocol/settings/describe.h"
 #include "sim/sensor/collect_moving.h"
@@ -64,29 +61,20 @@ SourceInfo describe(const Keys& keys, const sim::SensorModel& model,
   return info;
 }
 
-/// Frames must not overlap: the next begins when the last raw exposure of this one is over.
-Result<> exposuresFit(const sim::SensorModel& model, Duration frame_interval) {
-  if (model.exposureTime() <= frame_interval) return {};
-  return Error{Error::Code::InvalidArgument,
-               fmt::format("the raw exposures of a frame take {:.6g} ms, more than the frame "
-                           "interval of {:.6g} ms",
-                           model.exposureTime().in(millisecond), frame_interval.in(millisecond))};
-}
-
 /// One thread calls everything here (source.h), so nothing is locked.
 class SimulatedSource final : public Source {
  public:
-  SimulatedSource(const Keys& keys, sim::SensorModel model, View view,
-                  std::vector<PlaneKind> planes)
-      : keys_(keys),
-        model_(std::move(model)),
-        info_(describe(keys, model_, std::move(planes))),
+  SimulatedSource(Chosen chosen, View view)
+      : keys_(std::move(chosen.keys)),
+        model_(std::move(chosen.model)),
+        info_(describe(keys_, model_, std::move(chosen.planes))),
         view_(std::move(view)),
-        pacer_(keys.pace, *info_.frame_interval),
-        since_power_on_(keys.powered_on_before),
-        room_temperature_(keys.room_temperature),
-        ambient_(keys.ambient) {
-    view_.setPose(startPose(keys));
+        color_(std::move(chosen.color)),
+        pacer_(keys_.pace, *info_.frame_interval),
+        since_power_on_(keys_.powered_on_before),
+        room_temperature_(keys_.room_temperature),
+        ambient_(keys_.ambient) {
+    view_.setPose(startPose(keys_));
   }
 
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
@@ -108,7 +96,8 @@ class SimulatedSource final : public Source {
     const Error stopped{Error::Code::Stopped, "asked to stop"};
     // Light first: after a new pose it takes long, and the pace then counts what a camera would
     // have delivered meanwhile as lost.
-    if (!view_.isRealtime() && !view_.changesWithTime() && !view_.complete(stop)) return stopped;
+    if (!view_.isRealtime() && !view_.changesWithTime() && !(view_.complete(stop) && completeColor(stop)))
+      return stopped;
     Frame frame;
     const auto lost = pacer_.waitForTurn(stop, lockstep);
     if (!lost) return lost.error();
@@ -116,7 +105,7 @@ class SimulatedSource final : public Source {
     frame.moment = momentOfFrame();
     if (view_.isRealtime()) {
       gatherInRealtime(frame.moment);
-    } else if (view_.changesWithTime() && !gatherMoving(frame.moment, stop)) {
+    } else if (view_.changesWithTime() && !(gatherMoving(frame.moment, stop) && completeColor(stop))) {
       return stopped;
     }
     frame.provenance = sim::provenanceOf(model_, view_.scene().id(), keys_.seed);
@@ -205,6 +194,14 @@ class SimulatedSource final : public Source {
     return {};
   }
 
+  /// The colour image, where one is given, is of the middle of the frame. False if asked to stop before the end.
+  bool completeColor(const std::stop_token& stop) {
+    if (!color_) return true;
+    const Moment moment = momentOfFrame();
+    return color_->complete(*moment.world_from_camera, sim::middleOf(moment.exposures[moment.exposures.size() / 2]),
+                            view_.changesWithTime() ? pacer_.index() : 0, stop);
+  }
+
   /// One light for all raw exposures, of the time of the middle one.
   void gatherInRealtime(const Moment& moment) {
     view_.traceFrame(sim::middleOf(moment.exposures[moment.exposures.size() / 2]));
@@ -236,9 +233,13 @@ class SimulatedSource final : public Source {
       last_collected_ = *collected_;
       last_range_ = exposed.range;
     }
+    std::optional<Plane> color;
+    if (color_) color = color_->over(model_.rays(), exposed.range.range_m);
     const bool is_of_middle = !view_.isRealtime() && view_.changesWithTime();
-    return sim::planesOf(model_, std::move(exposed), is_of_middle ? truth_of_middle_ : view_.light().truth,
-                         info_.planes);
+    auto planes = sim::planesOf(model_, std::move(exposed), is_of_middle ? truth_of_middle_ : view_.light().truth,
+                                info_.planes);
+    if (color) planes.push_back(*std::move(color));
+    return planes;
   }
 
   [[nodiscard]] Duration deviceDuration() const {
@@ -261,6 +262,7 @@ class SimulatedSource final : public Source {
   sim::SensorModel model_;
   SourceInfo info_;
   View view_;
+  std::optional<ColorView> color_;  ///< if its plane is wanted
   std::optional<sim::Samples> collected_;  ///< of the present pose and parameters, free of noise
   sim::Truth truth_of_middle_;  ///< where things move: at the middle raw exposure
   /// Of the frame before, where an effect remembers it.
@@ -273,96 +275,14 @@ class SimulatedSource final : public Source {
   Illuminance ambient_;
 };
 
-std::vector<PlaneKind> chosenPlanes(const Keys& keys, settings::Table& table) {
-  const auto all = sim::allPlanes();
-  if (keys.planes.empty()) return {all.begin(), all.begin() + kDefaultPlanes};
-  std::vector<PlaneKind> chosen;
-  for (const std::string& name : keys.planes) {
-    const auto kind = planeKindNamed(name);
-    if (!kind || std::ranges::find(all, *kind) == all.end()) {
-      std::string known;
-      for (PlaneKind plane : all) known += (known.empty() ? "" : ", ") + std::string{nameOf(plane)};
-      table.complain("planes",
-                     fmt::format("names \"{}\", but a simulated camera has only: {}", name, known));
-    } else if (std::ranges::find(chosen, *kind) == chosen.end()) {
-      chosen.push_back(*kind);
-    }
-  }
-  return chosen;
-}
-
-/// Nothing after complaining: a preset or a file that is missing will not come by itself, as a camera
-/// may, so it is a mistake in the configuration.
-std::optional<sim::SensorModel> chosenCamera(const Keys& keys, settings::Table& table) {
-  if (!keys.camera.empty()) {
-    if (table.has("uri")) {
-      table.complain("uri", fmt::format("= \"{}\" has no meaning beside camera = \"{}\": remove one of "
-                                        "the two",
-                                        keys.uri, keys.camera));
-    }
-    auto model = sim::SensorModel::load(table.resolve(keys.camera));
-    if (model) return *std::move(model);
-    table.complain("camera", fmt::format("= \"{}\": {}", keys.camera, model.error().message));
-    return std::nullopt;
-  }
-  constexpr std::string_view kScheme = "sim:";
-  if (keys.uri.starts_with(kScheme)) {
-    if (auto model = sim::SensorModel::preset(keys.uri.substr(kScheme.size())))
-      return *std::move(model);
-  }
-  std::string known;
-  for (const std::string& name : sim::SensorModel::presetNames())
-    known += (known.empty() ? "sim:" : ", sim:") + name;
-  table.complain("uri", fmt::format("= \"{}\": there is no such preset; there are {}, and any "
-                                    "camera file by the key camera",
-                                    keys.uri, known));
-  return std::nullopt;
-}
-
-std::optional<sim::Scene> chosenScene(const Keys& keys, settings::Table& table) {
-  auto scene = keys.scene.empty() ? sim::Scene::parse(kDefaultScene, "default scene")
-                                  : sim::Scene::load(table.resolve(keys.scene));
-  if (scene) return *std::move(scene);
-  table.complain("scene", fmt::format("= \"{}\": {}", keys.scene, scene.error().message));
-  return std::nullopt;
-}
-
-void complainOfMode(const Keys& keys, const std::optional<sim::SensorModel>& model,
-                    const std::optional<sim::Scene>& scene, settings::Table& table) {
-  if (keys.mode != Mode::RealTime) return;
-  const auto complain = [&](std::string_view why) {
-    table.complain("mode", fmt::format("= \"realtime\" cannot have {}: leave it out for \"unbiased\"", why));
-  };
-  if (model && !model->hasPhasors()) complain(fmt::format("a pulsed camera, as {} is", model->model()));
-  if (model && model->rowDelay() > 0_ms) complain("a rolling shutter");
-  if (scene && !scene->foreignEmitters().empty()) complain("other cameras' light, as the scene has");
-}
-
 Result<std::unique_ptr<Source>> open(settings::Table& table) {
-  Keys keys;
-  table.read(keys);
-  std::vector<PlaneKind> planes = chosenPlanes(keys, table);
-  auto model = chosenCamera(keys, table);
-  auto scene = chosenScene(keys, table);
-  if (model && keys.frame_interval > 0_ms) {
-    if (auto fits = exposuresFit(*model, keys.frame_interval); !fits)
-      table.complain("frame_interval_ms", fmt::format("is too short: {}", fits.error().message));
-  }
-  for (PlaneKind kind : planes) {
-    if (!model || std::ranges::count(sim::planesOfCamera(*model), kind) > 0) continue;
-    table.complain("planes", fmt::format("names \"{}\", which {} does not have", nameOf(kind), model->model()));
-  }
-  complainOfMode(keys, model, scene, table);
-  if (model && keys.light_noise > 0_mm && !model->hasPhasors()) {
-    table.complain("light_noise_mm", fmt::format("cannot be had of a pulsed camera, as {} is: leave it out", model->model()));
-  }
-  if (auto checked = table.check(); !checked) return checked.error();
-  sim::TraceRequest request = model->traceRequest();
-  keys.applyTo(request);
-  View view{*std::move(scene), std::move(request), motionOf(keys), model->rowDelay()};
-  if (keys.mode == Mode::RealTime) view.goRealtime(model->correlatedTerms());
-  return std::unique_ptr<Source>{
-      std::make_unique<SimulatedSource>(keys, *std::move(model), std::move(view), std::move(planes))};
+  auto chosen = choose(table);
+  if (!chosen) return chosen.error();
+  sim::TraceRequest request = chosen->model.traceRequest();
+  chosen->keys.applyTo(request);
+  View view{std::move(chosen->scene), std::move(request), motionOf(chosen->keys), chosen->model.rowDelay()};
+  if (chosen->keys.mode == Mode::RealTime) view.goRealtime(chosen->model.correlatedTerms());
+  return std::unique_ptr<Source>{std::make_unique<SimulatedSource>(std::move(*chosen), std::move(view))};
 }
 
 std::vector<std::string> list() {

@@ -12,7 +12,7 @@ namespace {
 constexpr std::array kAllPlanes{PlaneKind::Range,   PlaneKind::Depth,      PlaneKind::Amplitude,
                                 PlaneKind::Ambient, PlaneKind::Flags,      PlaneKind::Samples,
                                 PlaneKind::Phasors, PlaneKind::TruthRange, PlaneKind::TruthNormal,
-                                PlaneKind::Exposure};
+                                PlaneKind::Exposure, PlaneKind::Color};
 
 void rejectImpossible(RangeImage& range) {
   for (std::size_t i = 0; i < range.range_m.size(); ++i) {
@@ -86,6 +86,7 @@ std::vector<PlaneKind> planesOfCamera(const SensorModel& model) {
   for (PlaneKind kind : kAllPlanes) {
     if (kind == PlaneKind::Phasors && !model.hasPhasors()) continue;
     if (kind == PlaneKind::Exposure && model.exposureCount() == 1) continue;
+    if (kind == PlaneKind::Color && !model.colorLens()) continue;
     kinds.push_back(kind);
   }
   return kinds;
@@ -143,6 +144,14 @@ std::vector<Plane> planesOf(const SensorModel& model, SensorModel::Exposed expos
     }
   }
   return planes;
+}
+
+Plane planeOf(const ColorImage& color) {
+  const int width = color[0].width(), height = color[0].height();
+  std::vector<std::uint8_t> planar;
+  for (const Image<std::uint8_t>& channel : color)
+    planar.insert(planar.end(), channel.pixels().begin(), channel.pixels().end());
+  return {PlaneKind::Color, ElementType::U8, width, height, 3, Buffer::adopt(std::move(planar))};
 }
 
 Provenance provenanceOf(const SensorModel& model, std::string scene_id, std::uint64_t seed) {

@@ -317,6 +317,65 @@ TEST_F(Simulator, GivesAllPlanesWhenAsked) {
   EXPECT_EQ(frame.find(PlaneKind::Samples)->channels, 4);
 }
 
+/// A red wall on the left and a green one on the right, and a colour lens 0.4 m to the left. They are walls of one
+/// plane, so the depth image says where each colour lies, whatever lens saw it.
+TEST_F(Simulator, ColoursLieWhereTheirSurfacesAre) {
+  const std::string without_noise{kCamera, std::string_view{kCamera}.find("[[effect]]")};
+  std::ofstream{folder_ / "rgbd.toml"} << without_noise << "[color]\nposition_mm = [-400, 0, 0]\n[color.lens]\nwidth = 240\n"
+                                       << "height = 160\nfx = 120\nfy = 120\ncx = 119.5\ncy = 79.5\n";
+  std::ofstream{folder_ / "red_and_green.toml"} << R"(
+[ambient]
+radiance_w_per_m2_sr = 1.0
+[[material]]
+name = "red"
+albedo = 0.8
+color = [0.8, 0.1, 0.1]
+[[material]]
+name = "green"
+albedo = 0.8
+color = [0.1, 0.8, 0.1]
+[[object]]
+shape = "rectangle"
+size_m = [8, 40, 0]
+position_m = [-4, 0, 2]
+material = "red"
+[[object]]
+shape = "rectangle"
+size_m = [8, 40, 0]
+position_m = [4, 0, 2]
+material = "green"
+)";
+  const std::string keys = "camera = 'rgbd.toml'\nscene = 'red_and_green.toml'\npace = 'fast'\nsamples_per_pixel = 64\n"
+                           "planes = ['range', 'color']\n";
+  auto source = tryOpen(keys);
+  ASSERT_TRUE(source) << source.error().message;
+  ASSERT_TRUE((*source)->start());
+  const Frame first = frameOf(**source);
+  for (const double shift_m : {0.0, -0.6}) {
+    Transform<World, Camera> pose;
+    pose.translation_m = {shift_m, 0.0, 0.0};
+    ASSERT_TRUE((*source)->setPose(pose));
+    const Frame frame = frameOf(**source);
+    ASSERT_EQ(frame.planes.size(), 2u);
+    const Plane& color = frame.planes[1];
+    ASSERT_EQ(color.kind, PlaneKind::Color);
+    ASSERT_EQ(color.width, 24);
+    ASSERT_EQ(color.channels, 3);
+    const auto values = color.as<std::uint8_t>();
+    for (int x = 0; x < 24; ++x) {
+      const double place_m = shift_m + 2.0 * (x - 11.5) / 30.0;
+      if (std::abs(place_m) < 0.1) continue;  // a pixel of either lens at the seam
+      const std::size_t at = 24 * 10 + static_cast<std::size_t>(x);
+      const int red = values[at], green = values[480 + at];
+      EXPECT_GT(place_m < 0 ? red : green, 200) << x << ", " << shift_m;
+      EXPECT_LT(place_m < 0 ? green : red, 150) << x << ", " << shift_m;
+    }
+  }
+  EXPECT_THAT(errorOf(keys + "mode = 'realtime'\n"), HasSubstr("cannot have colours"));
+  EXPECT_THAT(errorOf("camera = 'camera.toml'\nplanes = ['color']\n"),
+              testing::AllOf(HasSubstr("color"), HasSubstr("does not have")));
+}
+
 TEST_F(Simulator, ErrorsSayWhatIsWrongAndWhere) {
   EXPECT_THAT(errorOf("planes = ['colour']\n"),
               testing::AllOf(HasSubstr("toftwind.toml:1"), HasSubstr("truth_range")));

@@ -39,11 +39,10 @@ bool isIn(PlaneKind kind, const std::vector<PlaneKind>& kinds) {
 /// Those of a simulated source and what was asked for besides; of a campaign exactly what was asked for.
 Result<std::vector<PlaneKind>> planesFor(const sim::SensorModel& model, const RenderOptions& options) {
   const std::vector<PlaneKind>& wanted = options.output.how.planes;
-  auto all = sim::planesOfCamera(model);
+  const auto all = sim::planesOfCamera(model);
   const bool is_campaign = targetOf(options).kind != TargetKind::Frame;
   std::vector<PlaneKind> kinds{all.begin(), all.begin() + drivers::simulator::kDefaultPlanes};
   if (is_campaign && !wanted.empty()) kinds.clear();
-  if (model.colorLens()) all.push_back(PlaneKind::Color);
   std::string names;
   for (const PlaneKind kind : all) names += (names.empty() ? "" : ", ") + std::string{nameOf(kind)};
   for (const PlaneKind kind : wanted) {

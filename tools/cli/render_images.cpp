@@ -9,18 +9,11 @@
 
 #include "drivers/sim/default_scene.h"
 #include "sim/sensor/color.h"
+#include "sim/sensor/frame_assembly.h"
 #include "tools/cli/export/export.h"
 #include "tools/cli/render_bands.h"
 
 namespace toftwin::cli {
-
-Plane planeOf(const sim::ColorImage& color) {
-  const int width = color[0].width(), height = color[0].height();
-  std::vector<std::uint8_t> planar;
-  for (const Image<std::uint8_t>& channel : color)
-    planar.insert(planar.end(), channel.pixels().begin(), channel.pixels().end());
-  return {PlaneKind::Color, ElementType::U8, width, height, 3, Buffer::adopt(std::move(planar))};
-}
 
 namespace {
 
@@ -59,12 +52,12 @@ Result<> writeColor(const Frame& frame, const sim::SensorModel& model, const sim
   const sim::ColorImage color_in_depth =
       sim::colorInDepth(lenses, model.rays(), range_m, depth_in_color, color);
   const Frame beside =
-      frameWith(frame, {planeOf(color), toPlane(PlaneKind::Depth, depth_in_color)});
+      frameWith(frame, {sim::planeOf(color), toPlane(PlaneKind::Depth, depth_in_color)});
   if (auto done = pictures.write(beside, PlaneKind::Color, "color", {}); !done) return done;
   if (auto done = pictures.write(beside, PlaneKind::Depth, "depth-in-color", {.color = true});
       !done)
     return done;
-  return pictures.write(frameWith(frame, {planeOf(color_in_depth)}), PlaneKind::Color,
+  return pictures.write(frameWith(frame, {sim::planeOf(color_in_depth)}), PlaneKind::Color,
                         "color-in-depth", {});
 }
 

@@ -13,9 +13,6 @@
 
 namespace toftwin::cli {
 
-/// A colour image as a plane.
-Plane planeOf(const sim::ColorImage& color);
-
 /// Writes what the camera's lenses give as pictures to look at, beside `file`: infrared and depth
 /// of the frame and, where the camera has a colour lens, colour from its own place, and each
 /// registered to the other. `scene` is a scene file, or empty for the default scene.

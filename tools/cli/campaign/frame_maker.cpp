@@ -146,7 +146,7 @@ Result<Plane> FrameMaker::colorOf(const Moment& moment, std::uint64_t number, co
                                        .seed = settings_.keys.seed + settings_.first_noise + number},
                                       trace);
   if (!color) return color.error();
-  return planeOf(*color);
+  return sim::planeOf(*color);
 }
 
 Frame FrameMaker::example() {
@@ -163,7 +163,7 @@ Frame FrameMaker::example() {
   if (visible_) {
     const CameraInfo lens = model_.colorLens()->color;
     const Image<std::uint8_t> black{lens.width, lens.height};
-    frame.planes.push_back(planeOf({black, black, black}));
+    frame.planes.push_back(sim::planeOf({black, black, black}));
   }
   return frame;
 }
