@@ -28,6 +28,7 @@ inline constexpr std::uint16_t kNotImplemented = 0x8001, kInvalidAddress = 0x800
                                kAccessDenied = 0x8006;
 
 inline void put(Bytes& bytes, std::uint64_t number, unsigned size) {
+  for (; size > 8; --size) bytes.push_back(std::byte{0});
   for (unsigned i = size; i-- > 0;) bytes.push_back(static_cast<std::byte>(number >> (8 * i)));
 }
 inline void putLittle(Bytes& bytes, std::uint64_t number, unsigned size) {
