@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "calib/file/calibration_file.h"
 #include "sim/images/content_hash.h"
 
 namespace toftwin::drivers {
@@ -59,6 +60,27 @@ Result<Lens> lensFor(const LensKeys& keys, int width, int height, std::string_vi
         fromFieldOfView(lens.is_known ? keys.field_of_view : kStandInFieldOfView, width, height);
   }
   if (lens.is_known) lens.camera.calibration_id = idOf(lens.camera, driver);
+  return lens;
+}
+
+std::optional<CameraInfo> calibrationAt(settings::Table& table, const std::string& file) {
+  if (file.empty()) return std::nullopt;
+  const auto loaded = calibration::load(table.resolve(file));
+  if (loaded) return calibration::cameraOf(loaded->lens);
+  table.complain("calibration", fmt::format("= \"{}\": {}", file, loaded.error().message));
+  return std::nullopt;
+}
+
+Result<Lens> lensFor(const CameraInfo& calibrated, int width, int height, std::string_view driver) {
+  auto lens = lensFor(LensKeys{.width = calibrated.width,
+                       .height = calibrated.height,
+                       .fx = calibrated.fx,
+                       .fy = calibrated.fy,
+                       .cx = calibrated.cx,
+                       .cy = calibrated.cy,
+                       .distortion = calibrated.distortion},
+                      width, height, driver);
+  if (lens) lens->camera.calibration_id = calibration::idOf(lens->camera);
   return lens;
 }
 

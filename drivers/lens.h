@@ -2,12 +2,16 @@
 #pragma once
 
 #include <array>
+#include <optional>
+#include <string>
 #include <string_view>
 
 #include <toftwin/camera_info.h>
 #include <toftwin/image.h>
 #include <toftwin/result.h>
 #include <toftwin/units.h>
+
+#include "protocol/settings/settings.h"
 
 /// What is known of a lens where the camera does not say it: written by a person.
 namespace toftwin::drivers {
@@ -41,6 +45,16 @@ struct Lens {
 };
 /// `driver` names it in errors and makes its calibration ids different from those of others.
 Result<Lens> lensFor(const LensKeys& keys, int width, int height, std::string_view driver);
+
+/// What the key `calibration` of a source is for.
+inline constexpr const char* kCalibrationHelp =
+    "a file of `toftwin calibrate`, relative to this one: the lens, instead of what is known of it otherwise; its id is "
+    "in every frame";
+/// The lens of that file. Nothing if `file` is empty, or after complaining about the key `calibration`.
+std::optional<CameraInfo> calibrationAt(settings::Table& table, const std::string& file);
+/// A calibrated lens for an image of that size, scaled if it is of another size and the same shape. Its id stays that of
+/// the calibration, or becomes that of the scaled lens.
+Result<Lens> lensFor(const CameraInfo& calibrated, int width, int height, std::string_view driver);
 
 /// The z of each pixel's unit ray: depth per range.
 Image<float> depthPerRange(const CameraInfo& camera);

@@ -20,7 +20,6 @@ enum Parameter { U, V, AngleA, AngleB, LogBlur, Level, SlopeX, SlopeY, Half, Hal
 using Vector = Eigen::Matrix<double, Count, 1>;
 using Matrix = Eigen::Matrix<double, Count, Count>;
 
-constexpr double kReach = 0.55;       // of a square: the next edges are one square away
 constexpr double kLeastReach_px = 2.0;
 constexpr int kSteps = 40;
 constexpr double kLeastBlur_px = 0.2, kMostBlur_px = 6.0;
@@ -45,14 +44,14 @@ void dropPixelsWithoutValue(std::vector<Sample>& samples) {
   if (zeros * kFew < samples.size()) std::erase_if(samples, [](const Sample& one) { return one.value == 0.0; });
 }
 
-/// The pixels whose place in the board's own axes is within kReach squares.
+/// The pixels whose place in the board's own axes is within reach.
 Window windowAround(const Image<float>& image, const CornerGuess& guess, float saturation) {
   const auto& a = guess.along;
   const auto& b = guess.across;
   const double determinant = a[0] * b[1] - a[1] * b[0];
   Window window{.samples = {}, .reach = 0.5 * std::max(length(a), length(b)), .saturation = saturation};
   const double short_side = std::min(length(a), length(b));
-  const double share = std::max(kReach, kLeastReach_px / std::max(short_side, 1.0));
+  const double share = std::max(guess.reach, kLeastReach_px / std::max(short_side, 1.0));
   const int half = static_cast<int>(std::ceil(share * (length(a) + length(b))));
   const int u0 = static_cast<int>(std::lround(guess.at.u)), v0 = static_cast<int>(std::lround(guess.at.v));
   for (int v = std::max(0, v0 - half); v <= std::min(image.height() - 1, v0 + half); ++v) {
@@ -155,7 +154,8 @@ Vector start(const CornerGuess& guess, const Window& window) {
 
 /// Levenberg-Marquardt; false if it never settled.
 bool minimise(Vector& x, const Window& window) {
-  double damping = 1e-3, now = misfit(x, window);
+  constexpr double kNearlyStill_px = 0.005;
+  double damping = 1e-3, now = misfit(x, window), moved = HUGE_VAL;
   for (int step = 0; step < kSteps; ++step) {
     const Normal normal = normalEquations(x, window);
     Matrix damped = normal.a;
@@ -167,6 +167,7 @@ bool minimise(Vector& x, const Window& window) {
     const double then = misfit(next, window);
     if (then <= now) {
       const bool is_settled = std::hypot(change[U], change[V]) < 1e-4 && now - then <= 1e-6 * now;
+      moved = std::hypot(change[U], change[V]);
       x = next;
       now = then;
       damping = std::max(damping * 0.2, 1e-9);
@@ -176,7 +177,7 @@ bool minimise(Vector& x, const Window& window) {
       if (damping > 1e9) return true;  // no step improves it: it is at the bottom
     }
   }
-  return false;
+  return moved < kNearlyStill_px;  // other parameters may creep, such as a blur that is too small to tell
 }
 
 }  // namespace

@@ -15,6 +15,7 @@ struct CornerGuess {
   Pixel at{};
   std::array<double, 2> along{};   ///< from here to the next corner in the row, pixels
   std::array<double, 2> across{};  ///< to the next corner in the column
+  double reach = 0.55;             ///< of a square: how far around nothing but the four squares is seen
 };
 
 struct FittedCorner {

@@ -8,7 +8,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <span>
+
+#include "calib/intrinsics/charuco.h"
 
 namespace toftwin::intrinsics {
 namespace {
@@ -31,7 +34,7 @@ struct Look {
 // Ordered by how often each finds what those before it did not.
 constexpr Look kLooks[] = {{1.0, 1, false}, {0.5, 2, false}, {1.0, 2, true},  {0.5, 1, true},
                            {0.25, 2, true}, {1.0, 3, false}, {0.5, 3, true}, {2.0, 2, false}};
-constexpr std::size_t kQuickLooks = 2;
+constexpr std::size_t kQuickLooks = 2, kSlowLooks = 4;
 
 /// Brightness between which an image's pixels lie, but for a few; black borders are left out.
 struct Span {
@@ -98,13 +101,14 @@ std::optional<Pixels> search(const Image<float>& image, const Target& target, bo
   std::vector<cv::Point2f> found;
   const std::span looks{kLooks, is_thorough ? std::size(kLooks) : kQuickLooks};
   for (const int flags : {kQuick, kQuick | cv::CALIB_CB_EXHAUSTIVE}) {
-    for (const Look& look : looks) {
+    const bool is_slow = flags != kQuick;
+    for (const Look& look : is_slow ? looks.first(kSlowLooks) : looks) {
       const cv::Mat shown = show(image, span, look);
       if (cv::findChessboardCornersSB(shown, size, found, flags)) return shrunk(found, look.scale);
     }
     if (!is_thorough) return std::nullopt;
   }
-  for (const Look& look : looks) {
+  for (const Look& look : looks.first(kSlowLooks)) {
     const cv::Mat shown = show(image, span, look);
     if (cv::findChessboardCorners(shown, size, found, kClassic)) return shrunk(found, look.scale);
   }
@@ -140,6 +144,45 @@ Pixels inOrder(Pixels grid, const Target& target, bool first_is_bright) {
   return grid;
 }
 
+/// The whole grid by a homography from those corners of a ChArUco board that were found, in the image as it is.
+struct PartialGrid {
+  Pixels grid;
+  std::vector<bool> is_found;
+};
+std::optional<PartialGrid> searchMarkers(const Image<float>& image, const Target& target, bool is_thorough) {
+  const Span span = spanOf(image);
+  const std::span looks{kLooks, is_thorough ? std::size(kLooks) : kQuickLooks};
+  std::vector<CharucoCorner> best;
+  int scale = 1;
+  for (const Look& look : looks) {
+    auto found = searchCharuco(show(image, span, look), target);
+    if (found.size() <= best.size()) continue;
+    best = std::move(found);
+    scale = look.scale;
+    if (best.size() == target.corners()) break;
+  }
+  if (best.size() < 4) return std::nullopt;
+  std::vector<cv::Point2f> on_board, seen, all, everywhere;
+  const auto columns = static_cast<std::size_t>(target.columns);
+  const auto place = [&](std::size_t i) {
+    return cv::Point2f{static_cast<float>(i % columns), static_cast<float>(i / columns)};
+  };
+  for (const CharucoCorner& corner : best) {
+    on_board.push_back(place(corner.index));
+    seen.push_back(corner.at);
+  }
+  const cv::Mat homography = cv::findHomography(on_board, seen, cv::RANSAC, 3.0 * scale);
+  if (homography.empty()) return std::nullopt;
+  for (std::size_t i = 0; i < target.corners(); ++i) all.push_back(place(i));
+  cv::perspectiveTransform(all, everywhere, homography);
+  PartialGrid partial{shrunk(everywhere, scale), std::vector<bool>(target.corners(), false)};
+  for (const CharucoCorner& corner : best) {
+    partial.grid[corner.index] = shrunk({corner.at}, scale).front();
+    partial.is_found[corner.index] = true;
+  }
+  return partial;
+}
+
 struct Fitted {
   std::vector<Corner> corners;
   std::vector<double> blurs;
@@ -147,11 +190,16 @@ struct Fitted {
   double flattest = 1.0;  ///< least sine between along and across, times the ratio of their lengths
 };
 
-Fitted fitAll(const Image<float>& image, const Target& target, const Pixels& grid, float saturation) {
+/// `wanted`: empty, or whether each corner is.
+Fitted fitAll(const Image<float>& image, const Target& target, const Pixels& grid, float saturation,
+              const std::vector<bool>& wanted = {}) {
   Fitted fitted;
   for (int row = 0; row < target.rows; ++row) {
     for (int column = 0; column < target.columns; ++column) {
-      const CornerGuess guess = guessAt(grid, target, column, row);
+      const auto index = static_cast<std::size_t>(row * target.columns + column);
+      if (!wanted.empty() && !wanted[index]) continue;
+      CornerGuess guess = guessAt(grid, target, column, row);
+      if (target.kind == Target::Kind::Charuco) guess.reach = 0.5 * (1.0 - target.marker / target.square);
       const double along = std::hypot(guess.along[0], guess.along[1]);
       const double across = std::hypot(guess.across[0], guess.across[1]);
       const double area = std::abs(guess.along[0] * guess.across[1] - guess.along[1] * guess.across[0]);
@@ -159,7 +207,6 @@ Fitted fitAll(const Image<float>& image, const Target& target, const Pixels& gri
       fitted.flattest = std::min(fitted.flattest, area / std::pow(std::max(along, across), 2));
       const auto corner = fitCorner(image, guess, saturation);
       if (!corner) continue;
-      const auto index = static_cast<std::size_t>(row * target.columns + column);
       fitted.corners.push_back({index, corner->at, corner->error_px});
       fitted.blurs.push_back(corner->blur_px);
     }
@@ -172,7 +219,8 @@ void judge(Sighting& sighting, const Target& target, const DetectOptions& option
     sighting.rejection = reason;
     sighting.detail = std::move(detail);
   };
-  const double lost = 1.0 - static_cast<double>(sighting.corners.size()) / static_cast<double>(target.corners());
+  const bool is_charuco = target.kind == Target::Kind::Charuco;
+  const double lost = is_charuco ? (sighting.corners.size() < options.fewest_corners ? 1.0 : 0.0) : 1.0 - static_cast<double>(sighting.corners.size()) / static_cast<double>(target.corners());
   if (sighting.square_px < options.least_square_px) {
     reject(Rejection::TooSmall, fmt::format("squares of {:.1f} px, {:g} are needed", sighting.square_px,
                                             options.least_square_px));
@@ -218,7 +266,33 @@ std::optional<float> saturationOf(const Image<float>& image) {
   return largest;
 }
 
+namespace {
+
+void keep(Sighting& sighting, Fitted fitted) {
+  sighting.corners = std::move(fitted.corners);
+  sighting.blur_px = median(std::move(fitted.blurs));
+  sighting.square_px = fitted.least_square_px;
+  sighting.tilt_deg = std::acos(std::clamp(fitted.flattest, 0.0, 1.0)) * 180.0 / std::numbers::pi;
+}
+
+Sighting findCharuco(const Image<float>& image, const Target& target, const DetectOptions& options) {
+  Sighting sighting;
+  const auto found = searchMarkers(mended(image), target, options.is_thorough);
+  if (!found) {
+    sighting.rejection = Rejection::NotFound;
+    sighting.detail = fmt::format("no markers of {} with corners between them", target.dictionary);
+    return sighting;
+  }
+  const float saturation = saturationOf(image).value_or(std::numeric_limits<float>::infinity());
+  keep(sighting, fitAll(image, target, found->grid, saturation, found->is_found));
+  judge(sighting, target, options);
+  return sighting;
+}
+
+}  // namespace
+
 Sighting findBoard(const Image<float>& image, const Target& target, const DetectOptions& options) {
+  if (target.kind == Target::Kind::Charuco) return findCharuco(image, target, options);
   Sighting sighting;
   const auto found = search(mended(image), target, options.is_thorough);
   if (!found) {
@@ -234,11 +308,7 @@ Sighting findBoard(const Image<float>& image, const Target& target, const Detect
   const auto first = fitCorner(image, guessAt(grid, target, 0, 0), saturation);
   grid = inOrder(std::move(grid), target, first && first->contrast > 0.0);
   fitted = fitAll(image, target, grid, saturation);
-
-  sighting.corners = std::move(fitted.corners);
-  sighting.blur_px = median(std::move(fitted.blurs));
-  sighting.square_px = fitted.least_square_px;
-  sighting.tilt_deg = std::acos(std::clamp(fitted.flattest, 0.0, 1.0)) * 180.0 / M_PI;
+  keep(sighting, std::move(fitted));
   judge(sighting, target, options);
   return sighting;
 }

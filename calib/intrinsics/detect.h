@@ -56,6 +56,7 @@ struct DetectOptions {
   double most_blur = 0.30;          ///< of the least side of a square
   double most_lost = 0.25;          ///< share of corners
   double least_square_px = 4.0;
+  std::size_t fewest_corners = 12;  ///< of a ChArUco board, which need not be seen whole
   double most_tilt_deg = 75.0;
   bool is_thorough = true;  ///< false: fewer copies are searched, for live images
 };

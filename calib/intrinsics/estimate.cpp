@@ -83,17 +83,16 @@ std::vector<double> rmsByView(const Working& working) {
 }
 
 /// Takes the worst offenders out; true if anything was.
-bool rejectOutliers(const Target& target, Working& working, std::vector<Sighting>& sightings,
+bool rejectOutliers(Working& working, std::vector<Sighting>& sightings,
                     const EstimateOptions& options) {
   bool has_changed = false;
   for (std::size_t v = working.views.size(); v-- > 0;) {
     has_changed |= dropCorners(working, v);
-    const double share = static_cast<double>(working.views[v].corners.size()) / static_cast<double>(target.corners());
-    if (1.0 - share <= options.most_lost) continue;
+    const std::size_t left = working.views[v].corners.size(), seen = left + working.dropped[v];
+    if (static_cast<double>(working.dropped[v]) <= options.most_lost * static_cast<double>(seen)) continue;
     Sighting& sighting = sightings[working.used[v]];
     sighting.rejection = Rejection::CornerOutliers;
-    sighting.detail = fmt::format("{} of {} corners lie where the others put them",
-                                  working.views[v].corners.size(), target.corners());
+    sighting.detail = fmt::format("{} of {} corners lie where the others put them", left, seen);
     working.erase(v);
   }
   if (working.views.size() <= kFewestViews) return has_changed;
@@ -173,7 +172,7 @@ Result<Working> fitRobustly(const Target& target, std::vector<Sighting>& sightin
     // What a bent board does to oblique views must not make them outliers, so its surface comes first.
     views_before = working.views.size();
     surfaces = fitSurface(target, working, general, options);
-    while (rejectOutliers(target, working, sightings, options)) {
+    while (rejectOutliers(working, sightings, options)) {
       if (working.views.size() < kFewestViews) return tooFew(sightings, working.views.size());
       fit(working, general);
     }

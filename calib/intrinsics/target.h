@@ -44,4 +44,8 @@ struct Target {
 /// "8x5": inner corners in a row and in a column. An Error says what a board must have.
 Result<Target> targetOf(std::string_view columns_by_rows, Length square);
 
+/// Makes a ChArUco board of a checkerboard: markers of the dictionary, as OpenCV names it ("DICT_4X4_50"), in its
+/// bright squares. Errors: no such dictionary, too few markers in it, a marker that does not fit, built without ArUco.
+Result<Target> charucoOf(Target board, Length marker, const std::string& dictionary);
+
 }  // namespace toftwin::intrinsics

@@ -350,6 +350,7 @@ Result<Identity> identify(Rpc& rpc, const Endpoint& xmlrpc) {
 Result<std::unique_ptr<Source>> open(settings::Table& table) {
   Keys keys;
   table.read(keys);
+  const auto calibrated = calibrationAt(table, keys.calibration);
   if (auto checked = table.check(); !checked) return checked.error();
   const auto xmlrpc = endpointOf(keys, table);
   if (!xmlrpc) return xmlrpc.error();
@@ -366,6 +367,12 @@ Result<std::unique_ptr<Source>> open(settings::Table& table) {
       readCalibration(*loop, identity->pcic, !is_free_running,
                       std::max(kAnswerTime, milliseconds{std::llround(2.0 * interval_ms)}));
   if (!calibration) return calibration.error();
+  if (calibrated) {
+    const CameraInfo& own = calibration->camera;
+    const auto lens = lensFor(*calibrated, own.width, own.height, "o3d303");
+    if (!lens) return lens.error();
+    calibration = Calibration{lens->camera, depthPerRange(lens->camera)};
+  }
   auto health = askHealth(rpc, {});
   if (!health) return health.error();
   return std::unique_ptr<Source>{std::make_unique<O3d303Source>(

@@ -5,6 +5,7 @@
 
 #include <toftwin/units.h>
 
+#include "drivers/lens.h"
 #include "drivers/source.h"
 
 /// The ifm O3D303 (and its relatives O3D301, O3D302) over its own protocols: XML-RPC to configure
@@ -27,6 +28,7 @@ struct Keys {
   Frequency frame_rate = 0_Hz;
   int channel = -1;
   Amplitude amplitude = Amplitude::Normalised;
+  std::string calibration;
   Duration delay = 0_ms;
 
   template <class Visitor>
@@ -59,6 +61,7 @@ struct Keys {
     v.choice("amplitude", amplitude,
              {{"normalised", Amplitude::Normalised}, {"raw", Amplitude::Raw}},
              "which amplitude image: normalised by exposure time, or as measured");
+    v.text("calibration", calibration, kCalibrationHelp);
     v.quantity(
         "delay", delay, millisecond, {0.0, 1000.0},
         "from a frame's device time until its first byte is here, if you measured it; 0: unknown, "

@@ -42,13 +42,14 @@ struct Arrival {
 
 class OpenNISource final : public Source {
  public:
-  OpenNISource(Library library, std::string uri, Keys keys, std::unique_ptr<Watch> watch,
-               Device device)
+  OpenNISource(Library library, std::string uri, Keys keys, std::unique_ptr<Watch> watch, Device device,
+               std::optional<CameraInfo> calibrated)
       : library_(std::move(library)),
         uri_(std::move(uri)),
         keys_(std::move(keys)),
         watch_(std::move(watch)),
         device_(std::move(device)),
+        calibrated_(std::move(calibrated)),
         depth_per_range_(describe()),
         pairing_(pairingFor(device_)) {}
 
@@ -120,6 +121,10 @@ class OpenNISource final : public Source {
     for (const Parameter& parameter : device_.parameters())
       info_.parameters.push_back(parameter.name);
 
+    if (calibrated_) {
+      info_.camera = *calibrated_;
+      return depthPerRange(info_.camera);
+    }
     Angle field_of_view = keys_.field_of_view;
     if (field_of_view <= 0_deg) {
       const auto said = device_.fieldOfView();
@@ -137,13 +142,7 @@ class OpenNISource final : public Source {
     camera.fx = camera.fy = camera.width / 2.0 / std::tan(field_of_view.in(radian) / 2.0);
     camera.cx = (camera.width - 1) / 2.0;
     camera.cy = (camera.height - 1) / 2.0;
-    Image<float> depth_per_range{camera.width, camera.height};
-    for (int y = 0; y < camera.height; ++y) {
-      for (int x = 0; x < camera.width; ++x) {
-        depth_per_range(x, y) = static_cast<float>(rayThroughPixel(camera, x, y).v.z);
-      }
-    }
-    return depth_per_range;
+    return depthPerRange(camera);
   }
 
   static Pairs::Options pairingFor(const Device& device) {
@@ -248,6 +247,7 @@ class OpenNISource final : public Source {
     frame.planes = *std::move(planes);
     frame.camera = info_.camera;
     frame.provenance.kind = info_.kind;
+    frame.provenance.calibration_id = info_.camera.calibration_id;
     frame.dropped_by_device = std::exchange(lost_, 0);
     frame.moment = isFile(uri_) ? momentInFile(set->depth.stamp_us) : momentOf(set->depth);
     waiting_ = std::move(frame);
@@ -350,6 +350,7 @@ class OpenNISource final : public Source {
   SourceInfo info_;
   std::unique_ptr<Watch> watch_;
   Device device_;
+  std::optional<CameraInfo> calibrated_;
   Image<float> depth_per_range_;
   Pairs pairing_;
   DeviceClock clock_{DeviceClock::Options{}};
@@ -398,6 +399,7 @@ Result<std::string> find(const Library& library, const Keys& keys, settings::Tab
 Result<std::unique_ptr<Source>> open(settings::Table& table) {
   Keys keys;
   table.read(keys);
+  auto calibrated = calibrationAt(table, keys.calibration);
   if (auto checked = table.check(); !checked) return checked.error();
   auto library = Library::acquire();
   if (!library) return library.error();
@@ -406,8 +408,15 @@ Result<std::unique_ptr<Source>> open(settings::Table& table) {
   auto watch = std::make_unique<Watch>(*uri);
   auto device = Device::open(*uri, keys);
   if (!device) return device.error();
-  return std::unique_ptr<Source>{std::make_unique<OpenNISource>(
-      *std::move(library), *uri, std::move(keys), std::move(watch), *std::move(device))};
+  if (calibrated) {
+    const OniVideoMode& mode = device->streams().front().mode;
+    auto lens = lensFor(*calibrated, mode.resolutionX, mode.resolutionY, About::name);
+    if (!lens) return lens.error();
+    calibrated = std::move(lens->camera);
+  }
+  return std::unique_ptr<Source>{std::make_unique<OpenNISource>(*std::move(library), *uri, std::move(keys),
+                                                                std::move(watch), *std::move(device),
+                                                                std::move(calibrated))};
 }
 
 std::vector<std::string> list() {

@@ -6,6 +6,7 @@
 
 #include <toftwin/units.h>
 
+#include "drivers/lens.h"
 #include "drivers/source.h"
 
 /// Cameras that have a driver for OpenNI2 (Asus Xtion, PrimeSense, Kinect through libfreenect, …),
@@ -27,6 +28,7 @@ struct Keys {
   Registration registration = Registration::AsSet;
   Mirror mirror = Mirror::Off;
   Angle field_of_view = 0_deg;
+  std::string calibration;
   Duration delay = 0_ms;
   double speed = 1.0;
   bool loop = false;
@@ -54,6 +56,7 @@ struct Keys {
              "whether left is right; many devices begin mirrored");
     v.quantity("field_of_view", field_of_view, degree, {0, 179},
                "horizontal; 0: as the device says, and 60 if it says nothing");
+    v.text("calibration", calibration, kCalibrationHelp);
     v.quantity(
         "delay", delay, millisecond, {0.0, 1000.0},
         "from a frame's device time until it is here, if you measured it; 0: unknown, anything "

@@ -8,6 +8,7 @@
 
 #include <toftwin/names.h>
 
+#include "drivers/lens.h"
 #include "drivers/sim/default_scene.h"
 #include "sim/sensor/frame_assembly.h"
 
@@ -69,6 +70,17 @@ std::optional<sim::SensorModel> chosenCamera(const Keys& keys, settings::Table& 
   return std::nullopt;
 }
 
+/// The same camera with the calibrated lens, if the keys name one.
+sim::SensorModel withCalibration(sim::SensorModel model, const Keys& keys, settings::Table& table) {
+  const auto calibrated = calibrationAt(table, keys.calibration);
+  if (!calibrated) return model;
+  const CameraInfo& own = model.camera();
+  const auto lens = lensFor(*calibrated, own.width, own.height, "sim");
+  if (lens) return model.withLens(lens->camera);
+  table.complain("calibration", fmt::format("= \"{}\": {}", keys.calibration, lens.error().message));
+  return model;
+}
+
 std::optional<sim::Scene> chosenScene(const Keys& keys, settings::Table& table) {
   auto scene = keys.scene.empty() ? sim::Scene::parse(kDefaultScene, "default scene")
                                   : sim::Scene::load(table.resolve(keys.scene));
@@ -114,6 +126,7 @@ Result<Chosen> choose(settings::Table& table) {
   table.read(keys);
   std::vector<PlaneKind> planes = chosenPlanes(keys, table);
   auto model = chosenCamera(keys, table);
+  if (model) model = withCalibration(*std::move(model), keys, table);
   auto scene = chosenScene(keys, table);
   if (model && keys.frame_interval > 0_ms) {
     if (auto fits = exposuresFit(*model, keys.frame_interval); !fits)

@@ -9,6 +9,7 @@
 
 #include <toftwin/units.h>
 
+#include "drivers/lens.h"
 #include "drivers/pace.h"
 #include "sim/tracer/trace.h"
 
@@ -37,6 +38,7 @@ inline std::string nameOf(sim::Sampler sampler) {
 struct Keys {
   std::string uri = "sim:generic_cw";
   std::string camera;
+  std::string calibration;
   std::string scene;
   Mode mode = Mode::Unbiased;
   sim::Sampler sampler = sim::Sampler::Shared;
@@ -61,6 +63,7 @@ struct Keys {
   void visit(Visitor& v) {
     v.text("uri", uri, "sim: and the name of a camera preset");
     v.text("camera", camera, "path of a camera file, relative to this file, instead of a preset");
+    v.text("calibration", calibration, kCalibrationHelp);
     v.text("scene", scene,
            "path of a scene file, relative to this file; empty: a box before a wall");
     v.choice("mode", mode, {{"unbiased", Mode::Unbiased}, {"realtime", Mode::RealTime}},

@@ -90,14 +90,16 @@ SourceInfo infoOf(const Node& node, const Description& description, const Channe
 
 /// The rest of what can be wrong before anything streams.
 Result<std::unique_ptr<Source>> assemble(System& system, const Keys& keys,
-                                         const Description& description, const Choice& choice) {
+                                         const Description& description, const Choice& choice,
+                                         const std::optional<CameraInfo>& calibrated) {
   auto depth = openChannel(system, choice.depth, *choice.depth_format,
                            sizeOf(keys, description.depth), keys);
   if (!depth) return depth.error();
   const Size size{depth->layout.width, depth->layout.height};
   auto infrared = openInfrared(system, choice, size, keys);
   if (!infrared) return infrared.error();
-  const auto lens = lensFor(description.lens, size.width, size.height, About::name);
+  const auto lens = calibrated ? lensFor(*calibrated, size.width, size.height, About::name)
+                               : lensFor(description.lens, size.width, size.height, About::name);
   if (!lens) return lens.error();
   if (!lens->is_known) {
     spdlog::warn(
@@ -133,6 +135,7 @@ std::vector<std::string> listOn(System& system) {
 Result<std::unique_ptr<Source>> openOn(System& system, settings::Table& table) {
   Keys keys;
   table.read(keys);
+  const auto calibrated = calibrationAt(table, keys.calibration);
   if (auto checked = checkKeys(keys, table); !checked) return checked.error();
   const auto camera = findCamera(system, keys.uri, table.place("uri"));
   if (!camera) return camera.error();
@@ -140,7 +143,7 @@ Result<std::unique_ptr<Source>> openOn(System& system, settings::Table& table) {
   if (!description) return description.error();
   const auto choice = choose(*camera, *description, keys.infrared);
   if (!choice) return choice.error();
-  return assemble(system, keys, *description, *choice);
+  return assemble(system, keys, *description, *choice, calibrated);
 }
 
 Driver row() {

@@ -8,6 +8,7 @@
 
 #include <toftwin/units.h>
 
+#include "drivers/lens.h"
 #include "drivers/source.h"
 #include "drivers/v4l2/stream.h"
 #include "drivers/v4l2/system.h"
@@ -18,6 +19,7 @@ namespace toftwin::drivers::v4l2 {
 struct Keys {
   std::string uri = "v4l2:/dev/video0";
   std::string camera;
+  std::string calibration;
   int width = 0;
   int height = 0;
   Frequency frame_rate = 0_Hz;
@@ -35,6 +37,7 @@ struct Keys {
     v.text("camera", camera,
            "its description: a file, relative to this one, or the name of one that comes with "
            "toftwin; empty: the one that matches, or none");
+    v.text("calibration", calibration, kCalibrationHelp);
     v.number("width", width, {0, 16384},
              "pixels per row; 0: as described, or as the camera is set");
     v.number("height", height, {0, 16384}, "rows; likewise");

@@ -75,6 +75,7 @@ std::vector<Response> responsesOf(const CameraFile& file) {
 
 std::shared_ptr<const SensorModel::Impl> SensorModel::build(Impl impl) {
   impl.camera = cameraInfo(impl.file.lens);
+  if (!impl.lens_id.empty()) impl.camera.calibration_id = impl.lens_id;
   impl.id = contentHash(canonicalText(impl.file, impl.effects));
   impl.responses = responsesOf(impl.file);
   impl.decoder = impl.file.decoder;
@@ -229,6 +230,21 @@ bool SensorModel::remembers() const {
     return std::visit(
         []<class E>(const E&) { return E::about.explains.contains(Covariate::History); }, any);
   });
+}
+
+SensorModel SensorModel::withLens(const CameraInfo& lens) const {
+  Impl changed = *impl_;
+  changed.decoder = {};
+  changed.rays = {};
+  changed.file.lens = {.width = lens.width,
+                       .height = lens.height,
+                       .fx = lens.fx,
+                       .fy = lens.fy,
+                       .cx = lens.cx,
+                       .cy = lens.cy,
+                       .distortion = lens.distortion};
+  changed.lens_id = lens.calibration_id;
+  return SensorModel{build(std::move(changed))};
 }
 
 SensorModel SensorModel::withEffects(std::vector<AnyEffect> effects) const {

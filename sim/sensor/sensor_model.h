@@ -109,6 +109,9 @@ class SensorModel {
   /// The same camera with other effects, in the order in which they act within each stage.
   [[nodiscard]] SensorModel withEffects(std::vector<AnyEffect> effects) const;
 
+  /// The same camera with a lens that was calibrated, and its id.
+  [[nodiscard]] SensorModel withLens(const CameraInfo& lens) const;
+
   struct Impl;
 
  private:

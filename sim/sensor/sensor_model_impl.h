@@ -16,7 +16,8 @@ namespace toftwin::sim {
 struct SensorModel::Impl {
   CameraFile file;
   std::vector<AnyEffect> effects;
-  // Derived from the two above by build():
+  std::string lens_id;  ///< of a lens that was calibrated; empty: the hash of the file's
+  // Derived from those above by build():
   CameraInfo camera;
   std::string id;
   std::vector<Response> responses;

@@ -114,7 +114,7 @@ std::vector<Sighting> drawViews(const Truth& truth, const Surface& surface, std:
 
 Image<float> render(const Truth& truth, const Target& target, const BoardPose& pose, const Exposure& exposure,
                     std::mt19937_64& random) {
-  constexpr int kRays = 6;
+  constexpr int kRays = 4;
   const CameraInfo camera{.width = truth.size.width,
                           .height = truth.size.height,
                           .fx = truth.lens[0],

@@ -40,6 +40,8 @@ struct Options {
   std::vector<std::string> images;
   std::string board;
   double square_mm = 0.0;
+  double marker_mm = 0.0;
+  std::string dictionary = "DICT_4X4_50";
   std::string model = "auto";
   std::string output;
   std::string overlay;
@@ -51,7 +53,9 @@ struct Options {
 };
 
 Result<Target> targetFrom(const Options& options) {
-  return targetOf(options.board, options.square_mm * millimetre);
+  auto target = targetOf(options.board, options.square_mm * millimetre);
+  if (!target || options.marker_mm == 0.0) return target;
+  return charucoOf(*std::move(target), options.marker_mm * millimetre, options.dictionary);
 }
 
 std::optional<LensModel> modelFrom(const std::string& name) {
@@ -216,6 +220,9 @@ Result<> check(const Options& options) {
 void addBoard(CLI::App& app, Options& options) {
   app.add_option("--board", options.board, "inner corners as COLSxROWS: 8x5 for 9 × 6 squares");
   app.add_option("--square", options.square_mm, "side of a square, mm")->check(CLI::Range(0.1, 10'000.0));
+  app.add_option("--marker", options.marker_mm, "side of a ChArUco board's markers, mm; 0: a checkerboard")
+      ->check(CLI::Range(0.0, 10'000.0));
+  app.add_option("--dictionary", options.dictionary, "of the markers, as OpenCV names it")->capture_default_str();
 }
 
 Run add(CLI::App& app) {
@@ -251,7 +258,7 @@ Run add(CLI::App& app) {
 }  // namespace
 
 Command calibrateCommand() {
-  return {"calibrate", "a camera's lens from images of a checkerboard", kExamples, add};
+  return {"calibrate", "a camera's lens from images of a checkerboard or ChArUco board", kExamples, add};
 }
 
 }  // namespace toftwin::cli

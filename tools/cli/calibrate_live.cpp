@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <optional>
 
 #include "calib/intrinsics/brightness.h"
@@ -43,6 +44,17 @@ std::optional<Estimate> soFar(const Collector& collector) {
   return result ? std::optional{*std::move(result)} : std::nullopt;
 }
 
+/// In which a board can be seen.
+Result<PlaneKind> planeOf(Client& client, const std::string& source) {
+  const auto details = client.describe(source);
+  if (!details) return details.error();
+  for (const PlaneKind kind : {PlaneKind::Amplitude, PlaneKind::Ambient}) {
+    if (std::ranges::find(details->planes, kind) != details->planes.end()) return kind;
+  }
+  return Error{Error::Code::Unsupported,
+               fmt::format("{} has no amplitude plane, in which a board could be seen", source)};
+}
+
 Guidance guidanceFor(const Collector& collector) {
   const auto lens = soFar(collector);
   return guide(collector.target(), collector.sightings(), collector.size(), lens ? &*lens : nullptr);
@@ -54,7 +66,9 @@ Result<> collectLive(const DaemonOptions& daemon, const LiveOptions& live, Colle
                      const OnView& on_view) {
   auto client = daemon.connect();
   if (!client) return client.error();
-  auto frames = client->subscribe(live.source, {.planes = {PlaneKind::Amplitude, PlaneKind::Ambient}});
+  const auto plane = planeOf(*client, live.source);
+  if (!plane) return plane.error();
+  auto frames = client->subscribe(live.source, {.planes = {*plane}});
   if (!frames) return frames.error();
   Prompter prompter;
   prompter.sayOnce("show the board and hold it still; Ctrl-C ends\n");
@@ -63,7 +77,11 @@ Result<> collectLive(const DaemonOptions& daemon, const LiveOptions& live, Colle
   while (!interrupted() && views < live.most_views) {
     const auto frame = waitForFrame(*frames, daemon.timeout());
     if (!frame && frame.error().code == Error::Code::Stopped) break;
-    if (!frame) return frame.error();
+    if (!frame && views == 0) return frame.error();
+    if (!frame) {
+      fmt::print(stderr, "no more frames ({}); the {} views so far are used\n", frame.error().message, views);
+      break;
+    }
     auto brightness = brightnessOf(*frame);
     if (!brightness) return brightness.error();
     const NamedImage image{fmt::format("{} frame {}", live.source, frame->sequence), *std::move(brightness)};
