@@ -31,7 +31,7 @@ set(aravis ${PROJECT_SOURCE_DIR}/drivers/aravis)
 add_executable(fuzz_aravis ${folder}/fuzz_aravis.cpp ${folder}/aravis_fuzz_one_input.cpp
                ${aravis}/images.cpp ${aravis}/pixel_format.cpp ${aravis}/discovery.cpp
                ${PROJECT_SOURCE_DIR}/drivers/lens.cpp)
-target_link_libraries(fuzz_aravis PRIVATE toftwin::settings toftwin::images fmt::fmt)
+target_link_libraries(fuzz_aravis PRIVATE toftwin::settings toftwin::images toftwin::calibration fmt::fmt)
 target_link_options(fuzz_aravis PRIVATE -fsanitize=fuzzer)
 add_dependencies(fuzzers fuzz_aravis)
 file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/fuzz_aravis_corpus)
