@@ -51,8 +51,16 @@ void Recorder::start(Done opened) {
 }
 
 Recorder::~Recorder() {
-  stop([](const Result<std::filesystem::path>&) {});
+  askToStop();  // nothing that needs memory: this also runs where there is none left
   if (thread_.joinable()) thread_.join();
+}
+
+void Recorder::askToStop() {
+  {
+    const std::scoped_lock lock{work_->mutex};
+    work_->is_stopping = true;
+  }
+  work_->changed.notify_all();
 }
 
 void Recorder::stop(Done closed) {
@@ -63,11 +71,7 @@ void Recorder::stop(Done closed) {
     is_told_ = is_told_ || outcome_.has_value();
     if (!outcome && !closed_) closed_ = std::exchange(closed, nullptr);
   }
-  {
-    const std::scoped_lock lock{work_->mutex};
-    work_->is_stopping = true;
-  }
-  work_->changed.notify_all();
+  askToStop();
   if (closed == nullptr) return;
   closed(outcome ? *outcome : Error{Error::Code::Busy, "the recording is being closed already"});
 }

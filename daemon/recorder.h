@@ -53,6 +53,7 @@ class Recorder {
   [[nodiscard]] std::string problem() const;
 
  private:
+  void askToStop();
   void run(const Done& opened) noexcept;
   Error notOpened(const Done& opened, Error why);
   Result<> recordUntilEnd(const Done& opened);
