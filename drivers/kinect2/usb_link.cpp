@@ -6,7 +6,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
@@ -19,11 +18,13 @@
 #include "drivers/kinect2/kinect2.h"
 #include "drivers/kinect2/link.h"
 #include "drivers/usb/cameras.h"
+#include "drivers/usb/libusb_parts.h"
 
 namespace toftwin::drivers::kinect2 {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+using usb::Context;
 
 constexpr int kConfiguration = 1, kControlInterface = 0, kStreamInterface = 1;
 constexpr unsigned char kCommandEndpoint = 0x02, kAnswerEndpoint = 0x81, kStreamEndpoint = 0x84;
@@ -49,37 +50,11 @@ Error failed(std::string_view doing, int error) {
   return {code, text};
 }
 
-class Context {
- public:
-  Context() { error_ = libusb_init(&context_); }
-  ~Context() {
-    if (error_ == 0) libusb_exit(context_);
-  }
-  Context(const Context&) = delete;
-  Context& operator=(const Context&) = delete;
-  [[nodiscard]] int error() const { return error_; }
-  [[nodiscard]] libusb_context* get() const { return context_; }
-
- private:
-  libusb_context* context_ = nullptr;
-  int error_ = 0;
-};
-
 struct Closer {
   void operator()(libusb_device_handle* handle) const { libusb_close(handle); }
   void operator()(libusb_transfer* transfer) const { libusb_free_transfer(transfer); }
 };
 using Handle = std::unique_ptr<libusb_device_handle, Closer>;
-
-/// As the kernel writes it below /sys.
-std::string portOf(libusb_device* device) {
-  std::array<std::uint8_t, 7> ports{};
-  const int count = libusb_get_port_numbers(device, ports.data(), static_cast<int>(ports.size()));
-  std::string port = fmt::format("{}", libusb_get_bus_number(device));
-  for (int i = 0; i < count; ++i)
-    port += fmt::format("{}{}", i == 0 ? "-" : ".", ports[static_cast<std::size_t>(i)]);
-  return port;
-}
 
 /// Before 1.0.27, libusb_set_interface_alt_setting of a device that is gone leaves its handle locked, and
 /// closing that fails an assertion [libusb, issue 1199].
@@ -96,7 +71,7 @@ Result<Handle> openAt(libusb_context* context, const std::string& port) {
       Error{Error::Code::NotFound, fmt::format("kinect2: there is no device at port {} any more", port)};
   for (ssize_t i = 0; i < count; ++i) {
     libusb_device_descriptor about{};
-    if (portOf(devices[i]) != port || libusb_get_device_descriptor(devices[i], &about) != 0) continue;
+    if (usb::portOf(devices[i]) != port || libusb_get_device_descriptor(devices[i], &about) != 0) continue;
     const usb::KnownCamera* camera = usb::find(about.idVendor, about.idProduct);
     if (camera == nullptr || camera->driver != About::name) continue;
     libusb_device_handle* handle = nullptr;
