@@ -198,13 +198,13 @@ class SimulatedSource final : public Source {
   bool completeColor(const std::stop_token& stop) {
     if (!color_) return true;
     const Moment moment = momentOfFrame();
-    return color_->complete(*moment.world_from_camera, sim::middleOf(moment.exposures[moment.exposures.size() / 2]),
+    return color_->complete(*moment.world_from_camera, sim::middleOf(moment),
                             view_.changesWithTime() ? pacer_.index() : 0, stop);
   }
 
   /// One light for all raw exposures, of the time of the middle one.
   void gatherInRealtime(const Moment& moment) {
-    view_.traceFrame(sim::middleOf(moment.exposures[moment.exposures.size() / 2]));
+    view_.traceFrame(sim::middleOf(moment));
     collected_ = model_.collect(view_.light(), moment, keys_.seed, pacer_.index());
   }
 

@@ -6,36 +6,13 @@
 
 #include "sim/sensor/collect_moving.h"
 #include "sim/tracer/foreign.h"
+#include "sim/tracer/trace_bands.h"
 
 namespace toftwin::drivers::simulator {
 namespace {
 
 constexpr int kRowsPerBand = 16;
 constexpr int kRowsPerRollingBand = 4;  // which see the same time
-
-template <class T>
-void copyBand(const Image<T>& band, int first_row, Image<T>& whole, int height) {
-  if (whole.empty()) whole = Image<T>{band.width(), height};
-  std::copy(band.pixels().begin(), band.pixels().end(), &whole(0, first_row));
-}
-
-template <class T>
-void copyBands(const std::vector<Image<T>>& bands, int first_row, std::vector<Image<T>>& whole, int height) {
-  whole.resize(bands.size());
-  for (std::size_t i = 0; i < bands.size(); ++i) copyBand(bands[i], first_row, whole[i], height);
-}
-
-void copyBand(const sim::Light& band, int first_row, sim::Light& whole, int height) {
-  whole.frequencies = band.frequencies;
-  whole.harmonics = band.harmonics;
-  copyBands(band.phasors, first_row, whole.phasors, height);
-  copyBand(band.steady, first_row, whole.steady, height);
-  copyBand(band.ambient, first_row, whole.ambient, height);
-  copyBands(band.variance, first_row, whole.variance, height);
-  copyBand(band.truth.range_m, first_row, whole.truth.range_m, height);
-  copyBand(band.truth.normal, first_row, whole.truth.normal, height);
-  copyBand(band.truth.albedo, first_row, whole.truth.albedo, height);
-}
 
 }  // namespace
 
@@ -85,7 +62,7 @@ bool View::complete(const sim::ForeignEmitterSpec* foreign, Pass& pass, const st
     // A tile of pixels that share their paths would be traced for each of its bands anew.
     if (is_rolling && band.sampler == sim::Sampler::Shared) band.sampler = sim::Sampler::Even;
     if (foreign != nullptr) band = sim::foreignRequest(*foreign, band);
-    copyBand(sim::trace(posed, band), pass.rows_done, pass.light, height);
+    sim::putBand(sim::trace(posed, band), pass.rows_done, height, pass.light);
     pass.rows_done += band.region_height;
     if (tell_) tell_(band.region_height);
   }

@@ -9,6 +9,8 @@ Duration middleOf(const Exposure& exposure) {
   return static_cast<double>(exposure.start.ns) * nanosecond + exposure.duration / 2.0;
 }
 
+Duration middleOf(const Moment& moment) { return middleOf(moment.exposures[moment.exposures.size() / 2]); }
+
 std::optional<Samples> collectMoving(const SensorModel& model, const Moment& moment, std::uint64_t seed,
                                      std::uint64_t frame,
                                      const std::function<const Light*(std::size_t)>& light_at) {

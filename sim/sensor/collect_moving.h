@@ -11,6 +11,8 @@ namespace toftwin::sim {
 
 /// The middle of a raw exposure, since device time 0: when its light is gathered.
 Duration middleOf(const Exposure& exposure);
+/// Of a frame: the middle of its middle raw exposure.
+Duration middleOf(const Moment& moment);
 
 /// SensorModel::collect() where things move: each raw exposure collects the light of its own time. `light_at`
 /// gives the light of the raw exposure with that index in moment.exposures, or nothing to give up; with a

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "sim/images/content_hash.h"
+#include "sim/sensor/collect_moving.h"
 #include "tools/cli/campaign/frame_maker.h"
 #include "tools/cli/campaign/sink.h"
 #include "tools/cli/export/atomic_file.h"
@@ -39,7 +40,7 @@ std::string lineOf(std::uint64_t number, const Frame& frame, const std::string& 
   const Vec3d& t = pose.translation_m;
   return fmt::format(
       "{},{},{},{},{},{},{},{}\n", number, static_cast<double>(moment.exposures.front().start.ns) * 1e-9,
-      poseTimeOf(moment).in(second), t.x, t.y, t.z, fmt::join(pose.rotation_wxyz, ","), content);
+      sim::middleOf(moment).in(second), t.x, t.y, t.z, fmt::join(pose.rotation_wxyz, ","), content);
 }
 
 /// The lines of an index, a torn last one left out.

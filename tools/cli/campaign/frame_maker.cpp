@@ -26,10 +26,6 @@ std::vector<PlaneKind> withoutColor(std::vector<PlaneKind> planes) {
 
 }  // namespace
 
-Duration poseTimeOf(const Moment& moment) {
-  return sim::middleOf(moment.exposures[moment.exposures.size() / 2]);
-}
-
 FrameMaker::FrameMaker(sim::SensorModel model, sim::Scene scene, Trajectory trajectory,
                        const Transform<World, Camera>& pose, Schedule schedule, RenderSettings settings,
                        std::vector<PlaneKind> planes, std::string source)
@@ -70,7 +66,7 @@ Moment FrameMaker::momentOf(std::uint64_t number) const {
   moment.temperatures = model_.temperatures(room, *moment.since_power_on);
   moment.temperatures.push_back({"room", room});
   moment.ambient = settings_.ambient_klx * kilolux;
-  moment.world_from_camera = view_.poseAt(poseTimeOf(moment));
+  moment.world_from_camera = view_.poseAt(sim::middleOf(moment));
   return moment;
 }
 
@@ -95,7 +91,7 @@ std::optional<sim::Samples> FrameMaker::gather(std::uint64_t number, const Momen
   }
   const std::size_t count = moment.exposures.size();
   return sim::collectMoving(model_, moment, seed, noise, [&](std::size_t e) -> const sim::Light* {
-    const Duration time = settings_.freeze ? poseTimeOf(moment) : sim::middleOf(moment.exposures[e]);
+    const Duration time = settings_.freeze ? sim::middleOf(moment) : sim::middleOf(moment.exposures[e]);
     if (!settings_.freeze || e == 0) view_.moveTo(time, noise * count + e);
     if (!view_.complete(stop)) return nullptr;
     if (e == count / 2) truth_ = view_.light().truth;
@@ -136,7 +132,7 @@ Result<Frame> FrameMaker::make(std::uint64_t number, const Watch& watch) {
 Result<Plane> FrameMaker::colorOf(const Moment& moment, std::uint64_t number, const Watch& watch) {
   const auto trace = [&](const sim::Scene& scene, const sim::TraceRequest& request) -> Result<sim::Light> {
     if (!watch(1.0)) return Error{Error::Code::Stopped, "interrupted"};
-    return sim::trace(scene.at(poseTimeOf(moment)), request);
+    return sim::trace(scene.at(sim::middleOf(moment)), request);
   };
   const auto color = sim::renderColor(*visible_,
                                       {.lenses = *model_.colorLens(),

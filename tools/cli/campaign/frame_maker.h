@@ -81,7 +81,4 @@ class FrameMaker {
   std::stop_source stop_;
 };
 
-/// The raw exposure in whose middle a frame's pose and truth are taken.
-Duration poseTimeOf(const Moment& moment);
-
 }  // namespace toftwin::cli
