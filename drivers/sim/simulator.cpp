@@ -197,9 +197,8 @@ class SimulatedSource final : public Source {
   /// The colour image, where one is given, is of the middle of the frame. False if asked to stop before the end.
   bool completeColor(const std::stop_token& stop) {
     if (!color_) return true;
-    const Moment moment = momentOfFrame();
-    return color_->complete(*moment.world_from_camera, sim::middleOf(moment),
-                            view_.changesWithTime() ? pacer_.index() : 0, stop);
+    const Duration middle = sim::middleOf(momentOfFrame());
+    return color_->complete(view_.poseAt(middle), middle, view_.changesWithTime() ? pacer_.index() : 0, stop);
   }
 
   /// One light for all raw exposures, of the time of the middle one.

@@ -371,6 +371,19 @@ material = "green"
       EXPECT_LT(place_m < 0 ? green : red, 150) << x << ", " << shift_m;
     }
   }
+  // A moving camera's are those of the middle of raw exposure 2 of four, 3.5 ms after the start: 0.35 m further.
+  auto moving = tryOpen(keys + "velocity_m_per_s = [100, 0, 0]\n");
+  ASSERT_TRUE(moving) << moving.error().message;
+  ASSERT_TRUE((*moving)->start());
+  const Frame passing = frameOf(**moving);
+  const auto values = passing.planes[1].as<std::uint8_t>();
+  for (int x = 0; x < 24; ++x) {
+    const double place_m = 0.35 + 2.0 * (x - 11.5) / 30.0;
+    if (std::abs(place_m) < 0.1) continue;
+    const std::size_t at = 240 + static_cast<std::size_t>(x);
+    EXPECT_GT(place_m < 0 ? values[at] : values[480 + at], 200) << x;
+    EXPECT_LT(place_m < 0 ? values[480 + at] : values[at], 150) << x;
+  }
   EXPECT_THAT(errorOf(keys + "mode = 'realtime'\n"), HasSubstr("cannot have colours"));
   EXPECT_THAT(errorOf("camera = 'camera.toml'\nplanes = ['color']\n"),
               testing::AllOf(HasSubstr("color"), HasSubstr("does not have")));
