@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <toftwin/result.h>
+
+#include "calib/discover/evidence.h"
+
+/// Functions of covariates: what an undeclared effect is made of.
+namespace toftwin::discover {
+
+enum class Shape {
+  Power,    ///< x^p                    numbers: p
+  Log,      ///< ln x
+  Decay,    ///< exp(−x/τ)              numbers: τ
+  Sine,     ///< sin(2π x/Λ)            numbers: Λ
+  Cosine,   ///< cos(2π x/Λ)            numbers: Λ
+  Step,     ///< 1 where x ≥ a, else 0  numbers: a
+  Sigmoid,  ///< 1/(1 + exp(−(x−a)/w))  numbers: a, w
+  Hat,      ///< 0 at a, 1 at b, 0 at c, straight between; a = b or b = c: 1 beyond   numbers: a, b, c
+  Equal,    ///< 1 where x = a          numbers: a
+  Modulo    ///< 1 where ⌊x⌋ mod m = r  numbers: m, r
+};
+
+/// A function of one covariate.
+struct Factor {
+  std::string covariate{};
+  Shape shape = Shape::Power;
+  std::vector<double> numbers{};
+  [[nodiscard]] double at(double x) const;
+};
+
+/// One column: a product of factors, acting at a stage. In the unit of the measured value per unit of its
+/// coefficient.
+struct Term {
+  std::vector<Factor> factors{};
+  std::optional<Stage> stage{};
+  /// `value` gives the covariate of that name.
+  [[nodiscard]] double at(const std::function<double(const std::string&)>& value) const;
+};
+/// "exp(−time_s/300)", "ambient_klx · range_m".
+std::string inWords(const Factor& factor);
+std::string inWords(const Term& term);
+
+/// Terms that stand or fall together.
+struct TermGroup {
+  std::string name{};
+  Kind kind = Kind::Generic;
+  std::vector<Term> terms{};
+  int inner_numbers = 0;  ///< numbers inside its terms that were fitted, such as a time constant
+};
+/// The covariates of all of its terms, each once.
+std::vector<std::string> covariatesOf(const TermGroup& group);
+
+/// What a covariate is, so far as it changes what is looked for.
+enum class Nature {
+  Plain,
+  Time,      ///< exponentials are looked for
+  Distance,  ///< and where the frequency is known, harmonics of its period
+  Index,     ///< counts frames: even and odd
+  Category   ///< names without order
+};
+
+/// How a covariate is spread over the data.
+struct CovariateInfo {
+  std::string name{};
+  std::string unit{};
+  Nature nature = Nature::Plain;
+  std::vector<double> quantiles{};  ///< 33 of them, least to most
+  std::vector<double> levels{};     ///< its values, if they are at most 12
+  double period = 0.0;              ///< of the modulation, c/(2f), in its unit; 0: not known
+  std::optional<Stage> stage{};     ///< where functions of it are inserted
+};
+
+/// Data that Evidence can be made from as often as the shape of a term is refined. One call is one pass over all
+/// rows; it adds the columns of many terms at once.
+class RowSource {
+ public:
+  virtual ~RowSource() = default;
+  /// The nuisances and random effects, the catalogue if there is one, and behind them a group for each of
+  /// `extra`, in their order, with their names.
+  [[nodiscard]] virtual Evidence evidence(std::span<const TermGroup> extra) const = 0;
+  /// What terms can be made of.
+  [[nodiscard]] virtual std::vector<CovariateInfo> covariates() const = 0;
+};
+
+}  // namespace toftwin::discover
