@@ -9,11 +9,11 @@
 #include <sys/socket.h>
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 
 #include "daemon/thrown.h"
+#include "drivers/logging.h"
 
 namespace toftwin::daemon {
 namespace {
@@ -84,7 +84,7 @@ void Connection::guarded(Work work) noexcept {
   } catch (...) {
     try {
       const Error why = thrownError("serving this client");
-      spdlog::error("{}: {}; closing", name_, why.message);
+      logging::error("{}: {}; closing", name_, why.message);
       return dismiss(why);
     } catch (...) {
       close();
@@ -167,7 +167,7 @@ void Connection::take(Result<wire::Message> message) {
   } else if (message.error().code == Error::Code::Disconnected) {
     return close();
   } else {
-    spdlog::warn("{}: {}; closing", name_, message.error().message);
+    logging::warn("{}: {}; closing", name_, message.error().message);
     return dismiss(message.error());
   }
   read();
@@ -200,7 +200,7 @@ void Connection::send(const Session::Outgoing& outgoing) {
   message.frame.dropped_before = delivery.dropped_before;
   auto encoded = wire::encode(message, delivery.frame->body);
   if (!encoded) {  // it could be encoded when it was prepared, so this is a mistake in this program
-    spdlog::error("{}: {}; closing", name_, encoded.error().message);
+    logging::error("{}: {}; closing", name_, encoded.error().message);
     return close();
   }
   if (auto shared = in_shared_memory ? delivery.frame->sharedBody() : nullptr) {

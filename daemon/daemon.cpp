@@ -17,6 +17,7 @@
 #include "daemon/notify.h"
 #include "daemon/start_signals.h"
 #include "daemon/thrown.h"
+#include "drivers/logging.h"
 
 namespace toftwin::daemon {
 namespace {
@@ -110,8 +111,8 @@ Result<> Daemon::listen(ListenKeys keys) {
   }
   // Only now: a daemon that cannot have its port does not listen.
   if (const std::string path = server_.socketPath(); !path.empty())
-    spdlog::info("listening on {}", path);
-  if (!keys.address.empty()) spdlog::info("listening on {} port {}", keys.address, server_.port());
+    logging::info("listening on {}", path);
+  if (!keys.address.empty()) logging::info("listening on {} port {}", keys.address, server_.port());
   return {};
 }
 
@@ -125,7 +126,7 @@ Result<> Daemon::listenUnix(const ListenKeys& keys) {
   using Code = Error::Code;
   const Code code = done.error().code;
   if (code != Code::StorageFull && code != Code::PermissionDenied) return done;
-  spdlog::warn("no Unix socket, TCP only: {}", done.error().message);
+  logging::warn("no Unix socket, TCP only: {}", done.error().message);
   return {};
 }
 
@@ -166,7 +167,7 @@ void Daemon::applyKeys(const Config& config) {
   server_.setOptions(serverOptions(config.keys.limits));
   source_stuck_ = config.keys.limits.source_stuck;
   if (!sameListen(listen_, config.keys.listen)) {
-    spdlog::warn("[listen] has changed, which takes effect only after a restart");
+    logging::warn("[listen] has changed, which takes effect only after a restart");
   }
 }
 
@@ -179,7 +180,7 @@ void Daemon::run(ConfiguredSource source) {
     return driver->open(again);
   };
   const SourceHost::Options options{.always = source.keys.start == SourceKeys::Start::Always};
-  spdlog::info("source {}: driver {}", source.keys.name, source.driver->name);
+  logging::info("source {}: driver {}", source.keys.name, source.driver->name);
   hub_.add(std::make_shared<SourceHost>(source.keys.name, open, std::move(source.opened), options,
                                         *options_.clock));
 }
@@ -195,7 +196,7 @@ void Daemon::beginReload() {
     return;
   }
   notify::reloading();
-  spdlog::info("reading {} again", options_.config.string());
+  logging::info("reading {} again", options_.config.string());
   // Opening a source may take its time, during which clients are served.
   try {
     reload_ = std::async(std::launch::async, [this, running = fingerprints()] {
@@ -218,10 +219,10 @@ void Daemon::finishReload() {
   if (is_stopping_) return;
   if (config) {
     apply(*std::move(config));
-    spdlog::info("the new configuration is in force");
+    logging::info("the new configuration is in force");
   } else {
-    spdlog::error("the configuration stays as it was, because the new one is wrong:\n{}",
-                  config.error().message);
+    logging::error("the configuration stays as it was, because the new one is wrong:\n{}",
+                   config.error().message);
   }
   notify::ready(statusLine());
   if (std::exchange(reload_again_, false)) beginReload();
@@ -261,7 +262,7 @@ void Daemon::waitForSignal() {
     if (number == SIGHUP) {
       beginReload();
     } else {
-      spdlog::info("stopping on signal {}", number);
+      logging::info("stopping on signal {}", number);
       beginStop();
     }
     if (!is_stopping_) waitForSignal();
@@ -330,8 +331,8 @@ void Daemon::watch() {
   if (stuck.empty()) {
     notify::watchdog();
   } else {
-    spdlog::error("source {} has been in one call of its driver for more than {} s", stuck,
-                  source_stuck_.in(second));
+    logging::error("source {} has been in one call of its driver for more than {} s", stuck,
+                   source_stuck_.in(second));
   }
   watchdog_.expires_after(*limit / 2);
   watchdog_.async_wait([this](boost::system::error_code fault) {

@@ -2,7 +2,6 @@
 #include "daemon/recorder.h"
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <cctype>
@@ -10,6 +9,7 @@
 #include <utility>
 
 #include "daemon/thrown.h"
+#include "drivers/logging.h"
 
 namespace toftwin::daemon {
 
@@ -149,8 +149,9 @@ Result<> Recorder::recordUntilEnd(const Done& opened) {
   opened(file_);
   Result<> written = writeAll(*writer, *subscribed);
   const Result<> closed = writer->close();
-  spdlog::info("{}: recorded {} frames into {}{}", source_->name(), writer->frames(), file_.string(),
-               writer->lost() > 0 ? fmt::format("; {} more did not fit", writer->lost()) : "");
+  logging::info("{}: recorded {} frames into {}{}", source_->name(), writer->frames(),
+                file_.string(),
+                writer->lost() > 0 ? fmt::format("; {} more did not fit", writer->lost()) : "");
   if (!written && written.error().code == Error::Code::StorageFull) {
     return Error{Error::Code::StorageFull,
                  fmt::format("{} (recording.max_mb = {}, recording.keep_free_mb = {})",
@@ -189,7 +190,8 @@ Result<> Recorder::writeAll(record::Writer& writer, const SubscriberPtr& subscri
 
 void Recorder::finish(Result<> outcome) {
   if (!outcome) {
-    spdlog::error("{}: recording {}: {}", source_->name(), file_.string(), outcome.error().message);
+    logging::error("{}: recording {}: {}", source_->name(), file_.string(),
+                   outcome.error().message);
   }
   Done closed;
   Result<std::filesystem::path> result = file_;

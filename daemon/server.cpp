@@ -4,12 +4,12 @@
 #include <boost/asio/post.hpp>
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include <utility>
 #include <vector>
 
 #include "daemon/thrown.h"
+#include "drivers/logging.h"
 
 namespace toftwin::daemon {
 namespace {
@@ -78,7 +78,7 @@ void Server::accept(Acceptor& acceptor, Accepting& accepting) {
     // This may have been queued before the acceptor went.
     if (is_shut_ || fault == asio::error::operation_aborted) return;
     if (fault) {
-      spdlog::warn("cannot accept a client: {}; trying again", fault.message());
+      logging::warn("cannot accept a client: {}; trying again", fault.message());
       accepting.pause.expires_after(kPause);
       accepting.pause.async_wait([this, &acceptor, &accepting, pausing = UnderWay{accepting}](
                                      boost::system::error_code stopped) mutable {
@@ -110,8 +110,8 @@ void Server::adopt(transport::Socket socket) {
                                    fmt::format("client {}", id), [this, id] { forget(id); });
   connections_.emplace(id, connection);
   connection->start();
-  if (!is_full) return spdlog::debug("client {}: connected", id);
-  spdlog::warn("client {}: turned away, limits.sessions = {} is reached", id, options_.sessions);
+  if (!is_full) return logging::debug("client {}: connected", id);
+  logging::warn("client {}: turned away, limits.sessions = {} is reached", id, options_.sessions);
   connection->dismiss(
       {Error::Code::Busy,
        fmt::format("this daemon has {} clients already, the most that limits.sessions "
@@ -120,7 +120,7 @@ void Server::adopt(transport::Socket socket) {
 }
 
 void Server::forget(std::uint64_t id) {
-  spdlog::debug("client {}: gone", id);
+  logging::debug("client {}: gone", id);
   connections_.erase(id);
   if (connections_.empty() && on_empty_) std::exchange(on_empty_, nullptr)();
 }

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // The thread that owns a source; what other threads ask is in source_host.cpp.
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <utility>
 
 #include "daemon/source_host.h"
 #include "daemon/thrown.h"
+#include "drivers/logging.h"
 
 namespace toftwin::daemon {
 namespace {
@@ -222,7 +222,7 @@ bool SourceHost::reopen(const std::stop_token& stop) {
     return false;
   }
   adopt(inDriver(open_));
-  if (source_) spdlog::info("{}: opened", name_);
+  if (source_) logging::info("{}: opened", name_);
   return source_ != nullptr;
 }
 
@@ -315,7 +315,7 @@ void SourceHost::onError(const Error& error, std::uint64_t next_subscriber) {
     return;
   }
   if (error.code == Code::EndOfStream) {
-    spdlog::info("{}: {}", name_, error.message);
+    logging::info("{}: {}", name_, error.message);
     stopSource();
     return endAll(error, next_subscriber);
   }
@@ -357,7 +357,8 @@ void SourceHost::endAll(const Error& reason, std::uint64_t before) {
 void SourceHost::noteError(const Error& error, bool is_loss) {
   const std::scoped_lock lock{mutex_};
   // A camera that is away is tried several times a second: said once, it is enough.
-  if (is_loss || is_there_ || error.message != last_error_) spdlog::warn("{}: {}", name_, error.message);
+  if (is_loss || is_there_ || error.message != last_error_)
+    logging::warn("{}: {}", name_, error.message);
   last_error_ = error.message;
 }
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <spdlog/spdlog.h>
-
 #include <exception>
 #include <string>
 #include <string_view>
 
 #include <toftwin/result.h>
+
+#include "drivers/logging.h"
 
 namespace toftwin::daemon {
 
@@ -26,7 +26,7 @@ inline Error thrownError(std::string_view who) {
 /// In a catch (...) behind which all goes on: tells the log, if there is memory for that.
 inline void logThrown(std::string_view who) noexcept {
   try {
-    spdlog::error("{}", thrownError(who).message);
+    logging::error("{}", thrownError(who).message);
   } catch (...) {
     return;
   }

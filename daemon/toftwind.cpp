@@ -12,6 +12,7 @@
 
 #include "daemon/daemon.h"
 #include "daemon/memory.h"
+#include "drivers/logging.h"
 
 namespace {
 
@@ -60,7 +61,7 @@ int serve(const Arguments& arguments) {
                                         .handle_signals = true});
   if (!started) return fail(started.error());
   (*started)->run();
-  spdlog::info("stopped");
+  logging::info("stopped");
   return kOk;
 }
 
@@ -70,7 +71,7 @@ void raiseFileLimit() {
   rlimit files{};
   if (::getrlimit(RLIMIT_NOFILE, &files) != 0 || files.rlim_cur == files.rlim_max) return;
   files.rlim_cur = files.rlim_max;
-  if (::setrlimit(RLIMIT_NOFILE, &files) != 0) spdlog::debug("the limit of open files stays");
+  if (::setrlimit(RLIMIT_NOFILE, &files) != 0) logging::debug("the limit of open files stays");
 }
 
 /// To standard error; without the time where the journal adds it.

@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <utility>
@@ -12,6 +11,7 @@
 #include "drivers/aravis/connection.h"
 #include "drivers/aravis/source.h"
 #include "drivers/aravis/stream.h"
+#include "drivers/logging.h"
 #include "drivers/ray_fit.h"
 #include "protocol/settings/describe.h"
 
@@ -56,10 +56,11 @@ std::optional<CameraInfo> lensFromPoints(Connection& connection, const Keys& key
       const auto rays = raysOf(*part, setup.scan);
       auto fit =
           rays ? fitCamera(setup.width, setup.height, *rays) : Result<FittedCamera>{rays.error()};
-      if (!fit) spdlog::warn("aravis: its points say no lens: {}", fit.error().message);
+      if (!fit) logging::warn("aravis: its points say no lens: {}", fit.error().message);
       if (fit && fit->rms_px > kWorstFit_px) {
-        spdlog::warn("aravis: a lens explains its points to {:.1f} pixels only, so it is not taken",
-                     fit->rms_px);
+        logging::warn(
+            "aravis: a lens explains its points to {:.1f} pixels only, so it is not taken",
+            fit->rms_px);
       } else if (fit) {
         camera = fit->camera;
       }
@@ -87,11 +88,11 @@ Result<Lens> findLens(Connection& connection, const Keys& keys, const Setup& set
     }
   }
   if (setup.layout.has_range) {
-    spdlog::warn("aravis: {}: nothing is known of this camera's lens{}; give [source.lens]",
-                 keys.uri,
-                 setup.layout.has_points ? ""
-                 : setup.scan.c_is_range ? ", so it has no depth image"
-                                         : ", so it has no range image");
+    logging::warn("aravis: {}: nothing is known of this camera's lens{}; give [source.lens]",
+                  keys.uri,
+                  setup.layout.has_points ? ""
+                  : setup.scan.c_is_range ? ", so it has no depth image"
+                                          : ", so it has no range image");
   }
   return lens;
 }

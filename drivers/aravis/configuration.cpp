@@ -3,12 +3,13 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <utility>
+
+#include "drivers/logging.h"
 
 namespace toftwin::drivers::aravis {
 namespace {
@@ -146,7 +147,7 @@ Result<> setTransport(const Connection& connection, const Features& features, co
     } else {
       arv_device_write_register(connection.device(), kHeartbeatRegister,
                                 static_cast<std::uint32_t>(ms), failure.slot());
-      if (failure) spdlog::warn("aravis: the camera keeps its heartbeat timeout");
+      if (failure) logging::warn("aravis: the camera keeps its heartbeat timeout");
     }
   }
   if (keys.packet_size > 0) {

@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <map>
@@ -16,6 +15,7 @@
 #include "drivers/aravis/frame_ids.h"
 #include "drivers/aravis/stream.h"
 #include "drivers/clock_fit.h"
+#include "drivers/logging.h"
 
 namespace toftwin::drivers::aravis {
 namespace {
@@ -176,7 +176,7 @@ class AravisSource final : public Source {
     if (!is_new || (!at_end && Clock::now() - reported_at_ < kReportEvery)) return;
     std::string why;
     for (const auto& [reason, count] : reasons_) why += fmt::format("; {} times {}", count, reason);
-    spdlog::warn(
+    logging::warn(
         "{}: {} frames lost{}; {} packets were asked for again, {} never came; {} frames found no "
         "buffer",
         info_.serial, lost_frames_, why, now.asked_again - reported_.asked_again,

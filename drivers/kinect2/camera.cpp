@@ -2,7 +2,6 @@
 #include "drivers/kinect2/camera.h"
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include <thread>
 #include <utility>

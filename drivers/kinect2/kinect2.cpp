@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <array>
@@ -19,6 +18,7 @@
 #include "drivers/kinect2/images.h"
 #include "drivers/kinect2/link.h"
 #include "drivers/kinect2/samples.h"
+#include "drivers/logging.h"
 #include "protocol/settings/describe.h"
 
 namespace toftwin::drivers::kinect2 {
@@ -170,7 +170,7 @@ class Kinect2Source final : public Source {
     told_at_ = Clock::now();
     const Losses now = queue_.losses();
     const std::string text = kinect2::describe(now - told_);
-    if (!text.empty()) spdlog::warn("kinect2: {}: lost were {}", info_.serial, text);
+    if (!text.empty()) logging::warn("kinect2: {}: lost were {}", info_.serial, text);
     told_ = now;
   }
 
@@ -242,14 +242,14 @@ Result<std::unique_ptr<Source>> openOn(Bus& bus, settings::Table& table) {
   if (auto checked = table.check(); !checked) return checked.error();
   const auto found = find(bus, keys, table);
   if (!found) return found.error();
-  if (!found->warning.empty()) spdlog::warn("kinect2: {}", found->warning);
+  if (!found->warning.empty()) logging::warn("kinect2: {}", found->warning);
   auto link = bus.open(*found, keys.reset);
   if (!link) return link.error();
   auto session = std::make_unique<CameraSession>(*std::move(link));
   const auto about = session->open();
   if (!about) return about.error();
-  spdlog::info("kinect2: {} at {}, serial {}, firmware {}", found->name, found->port, about->serial,
-               about->firmware);
+  logging::info("kinect2: {} at {}, serial {}, firmware {}", found->name, found->port,
+                about->serial, about->firmware);
   return std::unique_ptr<Source>{
       std::make_unique<Kinect2Source>(keys, *found, *about, std::move(session), std::move(planes))};
 }

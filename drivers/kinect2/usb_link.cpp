@@ -3,7 +3,6 @@
 // and usb_control.cpp.
 #include <fmt/format.h>
 #include <libusb.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <atomic>
@@ -17,6 +16,7 @@
 
 #include "drivers/kinect2/kinect2.h"
 #include "drivers/kinect2/link.h"
+#include "drivers/logging.h"
 #include "drivers/usb/cameras.h"
 #include "drivers/usb/libusb_parts.h"
 
@@ -248,7 +248,7 @@ Result<> UsbLink::prepare() {
                                     std::pair{std::uint8_t{LIBUSB_REQUEST_SET_FEATURE}, kU1Enable},
                                     std::pair{std::uint8_t{LIBUSB_REQUEST_SET_FEATURE}, kU2Enable}}) {
     if (auto done = request(LIBUSB_RECIPIENT_DEVICE, what, value, 0, "telling it of the host"); !done) {
-      spdlog::debug("{}", done.error().message);
+      logging::debug("{}", done.error().message);
     }
   }
   return {};

@@ -2,11 +2,11 @@
 #include "drivers/o3d303/calibration.h"
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include <cmath>
 #include <utility>
 
+#include "drivers/logging.h"
 #include "drivers/o3d303/wire/frame_content.h"
 #include "drivers/ray_fit.h"
 #include "sim/images/content_hash.h"
@@ -39,8 +39,8 @@ Result<Calibration> calibrationOf(const FrameContent& content) {
   auto fitted = fitCamera(width, height, *rays);
   if (!fitted) return Error{fitted.error().code, "o3d303: " + fitted.error().message};
   if (fitted->rms_px > kExpectedRms_px) {
-    spdlog::warn("o3d303: the camera's rays differ from our lens model by {:.2f} pixels (rms)",
-                 fitted->rms_px);
+    logging::warn("o3d303: the camera's rays differ from our lens model by {:.2f} pixels (rms)",
+                  fitted->rms_px);
   }
   Calibration calibration{fitted->camera, Image<float>{width, height}};
   calibration.camera.calibration_id = idOf(calibration.camera);

@@ -2,7 +2,6 @@
 #include "drivers/o3d303/o3d303.h"
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <boost/asio/ip/tcp.hpp>
@@ -12,6 +11,7 @@
 #include <utility>
 
 #include "drivers/clock_fit.h"
+#include "drivers/logging.h"
 #include "drivers/o3d303/calibration.h"
 #include "drivers/o3d303/configuration.h"
 #include "drivers/o3d303/frame_images.h"
@@ -207,7 +207,7 @@ class O3d303Source final : public Source {
   }
 
   Error badFrame(const Error& error) {
-    spdlog::warn("{}: a frame that cannot be read: {}", info_.serial, error.message);
+    logging::warn("{}: a frame that cannot be read: {}", info_.serial, error.message);
     if (++bad_frames_ < kMostBadFrames) return error;
     return {Error::Code::Disconnected, fmt::format("o3d303: {} frames in a row cannot be read: {}",
                                                    bad_frames_, error.message)};
@@ -286,7 +286,7 @@ class O3d303Source final : public Source {
   }
 
   void noteCameraError(const PcicMessage& message) const {
-    spdlog::warn("{}: the camera reports: {}", info_.serial, textOf(message.content));
+    logging::warn("{}: the camera reports: {}", info_.serial, textOf(message.content));
   }
 
   std::unique_ptr<EventLoop> loop_;

@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <chrono>
@@ -13,6 +12,7 @@
 #include <utility>
 
 #include "drivers/clock_fit.h"
+#include "drivers/logging.h"
 #include "drivers/openni2/device.h"
 #include "drivers/openni2/images.h"
 #include "drivers/openni2/library.h"
@@ -129,7 +129,7 @@ class OpenNISource final : public Source {
     if (field_of_view <= 0_deg) {
       const auto said = device_.fieldOfView();
       if (!said) {
-        spdlog::warn(
+        logging::warn(
             "openni2: {} does not say its field of view; 60 degrees are taken. Set "
             "field_of_view_deg",
             uri_);
@@ -235,7 +235,7 @@ class OpenNISource final : public Source {
     auto planes = planesOf(*set);
     if (!planes) {
       ++lost_;
-      spdlog::warn("{}: a frame that cannot be read: {}", info_.serial, planes.error().message);
+      logging::warn("{}: a frame that cannot be read: {}", info_.serial, planes.error().message);
       if (++bad_frames_ < kMostBadFrames) return planes.error();
       return Error{Error::Code::Disconnected,
                    fmt::format("openni2: {} frames in a row cannot be read: {}", bad_frames_,

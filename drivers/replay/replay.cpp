@@ -2,13 +2,13 @@
 #include "drivers/replay/replay.h"
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <limits>
 #include <optional>
 #include <utility>
 
+#include "drivers/logging.h"
 #include "drivers/pace.h"
 #include "protocol/record/recording.h"
 #include "protocol/settings/describe.h"
@@ -155,7 +155,7 @@ class ReplaySource final : public Source {
     damage_before_next_ |= damage_.places > places_before;
     if (damage_before_next_ && !warned_ &&
         (frame || frame.error().code == Error::Code::EndOfStream)) {
-      spdlog::warn("replay of {}, after {} frames{}", info_.serial, played_, damage_.text());
+      logging::warn("replay of {}, after {} frames{}", info_.serial, played_, damage_.text());
       warned_ = true;  // once; a loop would say it for ever
     }
     if (!frame) return frame;

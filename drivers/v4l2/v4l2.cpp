@@ -3,11 +3,11 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <charconv>
 
+#include "drivers/logging.h"
 #include "drivers/v4l2/selection.h"
 #include "drivers/v4l2/source.h"
 #include "protocol/settings/describe.h"
@@ -102,7 +102,7 @@ Result<std::unique_ptr<Source>> assemble(System& system, const Keys& keys,
                                : lensFor(description.lens, size.width, size.height, About::name);
   if (!lens) return lens.error();
   if (!lens->is_known) {
-    spdlog::warn(
+    logging::warn(
         "v4l2: {}: nothing is known of this camera's lens, so it has no {} image; describe "
         "the camera (docs/drivers/v4l2.md)",
         choice.depth.card, description.depth.measures == Measures::Depth ? "range" : "depth");
