@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/cli/calibrate.h"
 
-#include <CLI/CLI.hpp>
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
@@ -217,41 +216,46 @@ Result<> check(const Options& options) {
   return target ? Result<>{} : target.error();
 }
 
-void addBoard(CLI::App& app, Options& options) {
-  app.add_option("--board", options.board, "inner corners as COLSxROWS: 8x5 for 9 × 6 squares");
-  app.add_option("--square", options.square_mm, "side of a square, mm")->check(CLI::Range(0.1, 10'000.0));
-  app.add_option("--marker", options.marker_mm, "side of a ChArUco board's markers, mm; 0: a checkerboard")
-      ->check(CLI::Range(0.0, 10'000.0));
-  app.add_option("--dictionary", options.dictionary, "of the markers, as OpenCV names it")->capture_default_str();
+void addBoard(Arguments& args, Options& options) {
+  args.option("--board", options.board, "inner corners as COLSxROWS: 8x5 for 9 × 6 squares");
+  args.option("--square", options.square_mm, "side of a square, mm").within(0.1, 10'000.0);
+  args.option("--marker", options.marker_mm,
+              "side of a ChArUco board's markers, mm; 0: a checkerboard")
+      .within(0.0, 10'000.0);
+  args.option("--dictionary", options.dictionary, "of the markers, as OpenCV names it")
+      .showsDefault();
 }
 
-Run add(CLI::App& app) {
+Run add(Arguments& args) {
   auto options = std::make_shared<Options>();
-  app.add_option("IMAGES", options->images,
-                 "grey images (PNG, 8 or 16 bits, …) or recordings (FILE.mcap, FILE.mcap#SOURCE), whose amplitude is "
-                 "taken; all of one size");
-  addBoard(app, *options);
-  app.add_option("-o,--output", options->output, "the calibration, TOML");
+  args.option("IMAGES", options->images,
+              "grey images (PNG, 8 or 16 bits, …) or recordings (FILE.mcap, FILE.mcap#SOURCE), "
+              "whose amplitude is "
+              "taken; all of one size");
+  addBoard(args, *options);
+  args.option("-o,--output", options->output, "the calibration, TOML");
   std::vector<std::string> models{"auto"};
   for (const LensModel model : kLensModels) models.emplace_back(nameOf(model));
-  app.add_option("--model", options->model, "terms of distortion; auto: as many as help on held-out views")
-      ->check(CLI::IsMember(models))
-      ->capture_default_str();
-  app.add_flag("--flat", options->is_flat, "take the board as flat, even if views say it is bent");
-  app.add_option("--overlay", options->overlay, "folder for a picture of each view with what was found in it");
-  app.add_option("--every", options->every, "of a recording, every n-th frame")
-      ->check(CLI::Range(1, 1'000'000))
-      ->capture_default_str();
-  app.add_option("--source", options->live.source, "name of a camera, to take views live");
-  app.add_option("--views", options->live.most_views, "live: no more than so many")
-      ->check(CLI::Range(3, 1000))
-      ->capture_default_str();
-  app.add_option("--store", options->store,
-                 "folder that keeps calibrations by id; default: $XDG_DATA_HOME/toftwin/calibrations");
-  app.add_flag("--no-store", options->no_store, "do not keep it there");
-  app.add_option("--show", options->shown_id, "print the kept calibration with this id");
-  options->daemon.add(app);
-  checkUsage(app, [options] { return check(*options); });
+  args.option("--model", options->model,
+              "terms of distortion; auto: as many as help on held-out views")
+      .oneOf(models)
+      .showsDefault();
+  args.flag("--flat", options->is_flat, "take the board as flat, even if views say it is bent");
+  args.option("--overlay", options->overlay,
+              "folder for a picture of each view with what was found in it");
+  args.option("--every", options->every, "of a recording, every n-th frame")
+      .within(1, 1'000'000)
+      .showsDefault();
+  args.option("--source", options->live.source, "name of a camera, to take views live");
+  args.option("--views", options->live.most_views, "live: no more than so many")
+      .within(3, 1000)
+      .showsDefault();
+  args.option("--store", options->store,
+              "folder that keeps calibrations by id; default: $XDG_DATA_HOME/toftwin/calibrations");
+  args.flag("--no-store", options->no_store, "do not keep it there");
+  args.option("--show", options->shown_id, "print the kept calibration with this id");
+  options->daemon.add(args);
+  args.check([options] { return check(*options); });
   return [options] { return run(*options); };
 }
 

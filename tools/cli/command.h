@@ -7,9 +7,7 @@
 
 #include <toftwin/result.h>
 
-namespace CLI {
-class App;
-}
+#include "tools/cli/arguments.h"
 
 /// The command line tool. A subcommand is one file and one row in the table of commands.cpp.
 namespace toftwin::cli {
@@ -43,7 +41,7 @@ struct Command {
   const char* name;
   const char* summary;        ///< one line
   const char* examples;       ///< shown below --help, two blanks before each line
-  Run (*add)(CLI::App& app);  ///< declares the options
+  Run (*add)(Arguments& args);  ///< declares the options
 };
 
 /// All subcommands, in the order of --help.

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/compare/compare.h"
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -216,43 +215,44 @@ Result<Exit> compareThem(const Options& options) {
   return Exit::Ok;
 }
 
-Run add(CLI::App& app) {
+Run add(Arguments& args) {
   auto options = std::make_shared<Options>();
   // A simulated source answers when the frame that it is tracing is done; at a new pose that can take long.
   options->daemon.timeout_s = options->daemon_b.timeout_s = 120.0;
-  options->daemon.add(app);
-  app.add_option("--address-b", options->daemon_b.address, "daemon of B, if it is another one")
-      ->check(isAddress);
-  app.add_option("sources", options->sources,
-                 "A and B: names of sources, or recordings (FILE.mcap, FILE.mcap#SOURCE if it "
-                 "holds several); or the folder of one run of toftwin measure; none: only the "
-                 "simulator against real measurements")
-      ->expected(0, 2);
-  app.add_option("--poses", options->poses,
-                 "pose file; both cameras are captured at each pose, and then put back. Without it: where "
-                 "they are");
-  app.add_option("--rig", options->rig,
-                 "rig file; the rig takes the cameras to each pose, and nothing is captured at one that it "
-                 "did not reach");
-  app.add_option("--frames", options->frames, "frames of each camera at each pose")
-      ->check(CLI::Range(2, 100'000))
-      ->capture_default_str();
-  app.add_option("--frame-timeout", options->frame_timeout_s, "seconds to wait for one frame")
-      ->check(CLI::Range(0.1, 86'400.0))
-      ->capture_default_str();
-  app.add_option("--data", options->data,
-                 "folder that holds tof-thesis-2018; default: $TOFTWIN_DATA, else ../shared/data "
-                 "of the repository");
-  app.add_flag("--no-data", options->no_data, "leave the real measurements out");
-  app.add_option("--effort", options->effort,
-                 "factor on the paths traced for the real measurements")
-      ->check(CLI::Range(0.01, 100.0))
-      ->capture_default_str();
-  app.add_flag("--locked", options->locked,
-               "of a run: judge on the captures that were held back, which can be done once");
-  app.add_option("-o,--output", options->output, "folder of the report")->capture_default_str();
-  app.add_option("--note", options->note, "for the report's foot, such as a commit");
-  checkUsage(app, [options]() -> Result<> {
+  options->daemon.add(args);
+  args.option("--address-b", options->daemon_b.address, "daemon of B, if it is another one")
+      .valid(isAddress);
+  args.option("sources", options->sources,
+              "A and B: names of sources, or recordings (FILE.mcap, FILE.mcap#SOURCE if it "
+              "holds several); or the folder of one run of toftwin measure; none: only the "
+              "simulator against real measurements")
+      .values(0, 2);
+  args.option(
+      "--poses", options->poses,
+      "pose file; both cameras are captured at each pose, and then put back. Without it: where "
+      "they are");
+  args.option(
+      "--rig", options->rig,
+      "rig file; the rig takes the cameras to each pose, and nothing is captured at one that it "
+      "did not reach");
+  args.option("--frames", options->frames, "frames of each camera at each pose")
+      .within(2, 100'000)
+      .showsDefault();
+  args.option("--frame-timeout", options->frame_timeout_s, "seconds to wait for one frame")
+      .within(0.1, 86'400.0)
+      .showsDefault();
+  args.option("--data", options->data,
+              "folder that holds tof-thesis-2018; default: $TOFTWIN_DATA, else ../shared/data "
+              "of the repository");
+  args.flag("--no-data", options->no_data, "leave the real measurements out");
+  args.option("--effort", options->effort, "factor on the paths traced for the real measurements")
+      .within(0.01, 100.0)
+      .showsDefault();
+  args.flag("--locked", options->locked,
+            "of a run: judge on the captures that were held back, which can be done once");
+  args.option("-o,--output", options->output, "folder of the report").showsDefault();
+  args.option("--note", options->note, "for the report's foot, such as a commit");
+  args.check([options]() -> Result<> {
     if (!options->data.empty() && !options->no_data && !compare::findThesisData(options->data)) {
       return Error{Error::Code::InvalidArgument,
                    fmt::format("--data {}: there is no folder tof-thesis-2018 in it, nor is it one",

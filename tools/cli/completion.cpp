@@ -206,11 +206,11 @@ Command completionCommand() {
       "  toftwin completion bash > ~/.local/share/bash-completion/completions/toftwin\n"
       "  toftwin completion zsh > ~/.zfunc/_toftwin\n"
       "  toftwin completion fish > ~/.config/fish/completions/toftwin.fish\n",
-      [](CLI::App& app) -> Run {
+      [](Arguments& args) -> Run {
         const auto shell = std::make_shared<std::string>();
-        app.add_option("SHELL", *shell, "bash, zsh or fish; manual: the page docs/command-line.md")
-            ->required()
-            ->check(CLI::IsMember({"bash", "zsh", "fish", "manual"}));
+        args.option("SHELL", *shell, "bash, zsh or fish; manual: the page docs/command-line.md")
+            .required()
+            .oneOf({"bash", "zsh", "fish", "manual"});
         return [shell]() -> Result<Exit> {
           CLI::App whole;
           whole.name("toftwin");

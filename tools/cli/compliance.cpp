@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "drivers/compliance.h"
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -128,19 +127,19 @@ Command complianceCommand() {
           "  toftwin compliance sim:kinect_v2\n"
           "  toftwin compliance sim:o3d303 --keys 'samples_per_pixel = 1'\n"
           "  toftwin compliance monday.mcap\n",
-          [](CLI::App& app) -> Run {
+          [](Arguments& args) -> Run {
             const auto options = std::make_shared<Options>();
-            app.add_option("CAMERA", options->camera,
-                           "as `toftwin list --drivers` names it, or a recording (.mcap); it is "
-                           "opened here, so no daemon may hold it")
-                ->required();
-            app.add_option("--keys", options->keys,
-                           "more keys of its [[source]] table, as TOML (docs/drivers)");
-            app.add_option("--frame-timeout", options->frame_timeout_s,
-                           "seconds within which a frame must come")
-                ->check(CLI::Range(0.1, 86'400.0))
-                ->capture_default_str();
-            app.add_flag("--json", options->json, "as JSON");
+            args.option("CAMERA", options->camera,
+                        "as `toftwin list --drivers` names it, or a recording (.mcap); it is "
+                        "opened here, so no daemon may hold it")
+                .required();
+            args.option("--keys", options->keys,
+                        "more keys of its [[source]] table, as TOML (docs/drivers)");
+            args.option("--frame-timeout", options->frame_timeout_s,
+                        "seconds within which a frame must come")
+                .within(0.1, 86'400.0)
+                .showsDefault();
+            args.flag("--json", options->json, "as JSON");
             return [options] { return run(*options); };
           }};
 }

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "calib/compare/json.h"
@@ -53,13 +52,13 @@ Command doctorCommand() {
   return {"doctor", "finds out why something does not work, and says how to mend it",
           "  toftwin doctor\n"
           "  toftwin doctor --address 192.168.0.7:47800 --json\n",
-          [](CLI::App& app) -> Run {
+          [](Arguments& args) -> Run {
             const auto options = std::make_shared<Options>();
-            app.add_option("--folder", options->folder,
-                           "where recordings shall go, to look for room there")
-                ->capture_default_str();
-            app.add_flag("--json", options->json, "as JSON");
-            options->daemon.add(app);
+            args.option("--folder", options->folder,
+                        "where recordings shall go, to look for room there")
+                .showsDefault();
+            args.flag("--json", options->json, "as JSON");
+            options->daemon.add(args);
             return [options] { return run(*options); };
           }};
 }

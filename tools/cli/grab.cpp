@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -126,38 +125,37 @@ Result<Exit> run(Options& options) {
 }  // namespace
 
 Command grabCommand() {
-  return {
-      "grab", "frames of a camera as PNG, PLY, NPY, CSV or HDF5",
-      "  toftwin grab kinect -o range.png                16-bit, 1 count = 1 mm, 0 = invalid\n"
-      "  toftwin grab kinect -o look.png --color --plane amplitude\n"
-      "  toftwin grab kinect -o cloud.ply\n"
-      "  toftwin grab kinect -o frame.npy --count 100    frame-0000.npy to frame-0099.npy, "
-      "consecutive\n"
-      "  toftwin grab kinect -o frames.h5 --count 100    all planes of all frames in one file\n"
-      "  toftwin grab kinect -o line.csv --row 212       a scan line, all planes\n",
-      [](CLI::App& app) -> Run {
-        const auto options = std::make_shared<Options>();
-        app.add_option("SOURCE", options->source, "name of the camera, as `toftwin list` shows it")
-            ->required();
-        options->output.add(app, true);
-        app.add_option("-n,--count", options->count, "how many frames")
-            ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1'000'000}))
-            ->capture_default_str();
-        app.add_option("--skip", options->skip, "frames to let pass first")
-            ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1'000'000'000}))
-            ->capture_default_str();
-        app.add_option("--region", options->region, "only these pixels: X,Y,WIDTH,HEIGHT")
-            ->delimiter(',')
-            ->expected(4);
-        app.add_option("--decimation", options->decimation, "every n-th pixel in both directions")
-            ->check(CLI::Range(1, 64))
-            ->capture_default_str();
-        app.add_flag("--trigger", options->trigger,
-                     "trigger each frame, for a camera whose pace is \"trigger\"");
-        options->daemon.add(app);
-        checkUsage(app, [options] { return checkOptions(*options); });
-        return [options] { return run(*options); };
-      }};
+  return {"grab", "frames of a camera as PNG, PLY, NPY, CSV or HDF5",
+          "  toftwin grab kinect -o range.png                16-bit, 1 count = 1 mm, 0 = invalid\n"
+          "  toftwin grab kinect -o look.png --color --plane amplitude\n"
+          "  toftwin grab kinect -o cloud.ply\n"
+          "  toftwin grab kinect -o frame.npy --count 100    frame-0000.npy to frame-0099.npy, "
+          "consecutive\n"
+          "  toftwin grab kinect -o frames.h5 --count 100    all planes of all frames in one file\n"
+          "  toftwin grab kinect -o line.csv --row 212       a scan line, all planes\n",
+          [](Arguments& args) -> Run {
+            const auto options = std::make_shared<Options>();
+            args.option("SOURCE", options->source, "name of the camera, as `toftwin list` shows it")
+                .required();
+            options->output.add(args, true);
+            args.option("-n,--count", options->count, "how many frames")
+                .within(std::uint64_t{1}, std::uint64_t{1'000'000})
+                .showsDefault();
+            args.option("--skip", options->skip, "frames to let pass first")
+                .within(std::uint64_t{0}, std::uint64_t{1'000'000'000})
+                .showsDefault();
+            args.option("--region", options->region, "only these pixels: X,Y,WIDTH,HEIGHT")
+                .separatedBy(',')
+                .values(4);
+            args.option("--decimation", options->decimation, "every n-th pixel in both directions")
+                .within(1, 64)
+                .showsDefault();
+            args.flag("--trigger", options->trigger,
+                      "trigger each frame, for a camera whose pace is \"trigger\"");
+            options->daemon.add(args);
+            args.check([options] { return checkOptions(*options); });
+            return [options] { return run(*options); };
+          }};
 }
 
 }  // namespace toftwin::cli

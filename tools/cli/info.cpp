@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include <toftwin/names.h>
@@ -206,17 +205,17 @@ Command infoCommand() {
           "  toftwin info preset:kinect_v2\n"
           "  toftwin info preset:kinect_v2 --text > my_camera.toml\n"
           "  toftwin info my_camera.toml\n",
-          [](CLI::App& app) -> Run {
+          [](Arguments& args) -> Run {
             const auto options = std::make_shared<Options>();
-            app.add_option(
-                   "WHAT", options->what,
-                   "name of a camera, a recording (.mcap), a camera file (.toml) or preset:NAME")
-                ->required();
-            app.add_flag("--json", options->json, "as JSON");
-            app.add_flag("--text", options->text,
-                         "print the preset's camera file, to start one of your own from");
-            options->daemon.add(app);
-            checkUsage(app, [options]() -> Result<> {
+            args.option(
+                    "WHAT", options->what,
+                    "name of a camera, a recording (.mcap), a camera file (.toml) or preset:NAME")
+                .required();
+            args.flag("--json", options->json, "as JSON");
+            args.flag("--text", options->text,
+                      "print the preset's camera file, to start one of your own from");
+            options->daemon.add(args);
+            args.check([options]() -> Result<> {
               if (!options->text || options->what.starts_with(kPreset)) return {};
               return Error{Error::Code::InvalidArgument, "--text goes with preset:NAME"};
             });

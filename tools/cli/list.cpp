@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include <toftwin/names.h>
@@ -93,13 +92,13 @@ Command listCommand() {
           "  toftwin list\n"
           "  toftwin list --address 192.168.0.7:47800 --json\n"
           "  toftwin list --drivers                     no daemon needed\n",
-          [](CLI::App& app) -> Run {
+          [](Arguments& args) -> Run {
             const auto options = std::make_shared<Options>();
-            options->daemon.add(app);
-            app.add_flag("--drivers", options->drivers,
-                         "the drivers of this build and the cameras they see now");
-            app.add_flag("--names", options->names, "only the names, one a line");
-            app.add_flag("--json", options->json, "as JSON");
+            options->daemon.add(args);
+            args.flag("--drivers", options->drivers,
+                      "the drivers of this build and the cameras they see now");
+            args.flag("--names", options->names, "only the names, one a line");
+            args.flag("--json", options->json, "as JSON");
             return [options] { return run(*options); };
           }};
 }

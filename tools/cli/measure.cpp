@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -229,41 +228,44 @@ Result<Exit> measure(const Options& options) {
   return carryOut(options, *plan, *plan_text);
 }
 
-Run add(CLI::App& app) {
+Run add(Arguments& args) {
   const auto options = std::make_shared<Options>();
   // A simulated source answers when the frame that it is tracing is done; at a new pose that can take long.
   options->daemon.timeout_s = options->daemon_b.timeout_s = 120.0;
-  app.add_option("PLAN", options->plan, "plan file")->required();
-  app.add_option("A", options->a,
-                 "name of the camera; NAME.BLOCK instead, for a block for which there is such a source")
-      ->required();
-  app.add_option("B", options->b,
-                 "name of the other one, the twin: set to A's moment at each capture; likewise")
-      ->required();
-  app.add_option("-o,--output", options->output, "folder of the run; where it is there, the run goes on")
-      ->required();
-  app.add_option("--skip", options->skip, "names of blocks to leave out")
-      ->delimiter(',')
-      ->allow_extra_args(false);
-  app.add_option("--rig", options->rig, "rig file; the rig takes the cameras to each pose");
-  app.add_option("--planes", options->planes,
-                 "to record besides range, depth, amplitude and flags: " + planeNames())
-      ->delimiter(',')
-      ->allow_extra_args(false);
-  app.add_flag("--prepared", options->prepared,
-               "take for done what a person must prepare: everything stands there");
-  app.add_option("--powered-on-for", options->powered_on_for_s,
-                 "seconds for which A was on when the plan begins, if it does not say so itself; a simulated "
-                 "one is set "
-                 "to it (default: 0)")
-      ->check(CLI::Range(0.0, 1e9));
-  app.add_option("--frame-timeout", options->frame_timeout_s, "seconds to wait for one frame")
-      ->check(CLI::Range(0.1, 86'400.0))
-      ->capture_default_str();
-  options->daemon.add(app);
-  app.add_option("--address-b", options->daemon_b.address, "daemon of B, if it is another one")
-      ->check(isAddress);
-  checkUsage(app, [options]() -> Result<> {
+  args.option("PLAN", options->plan, "plan file").required();
+  args.option(
+          "A", options->a,
+          "name of the camera; NAME.BLOCK instead, for a block for which there is such a source")
+      .required();
+  args.option("B", options->b,
+              "name of the other one, the twin: set to A's moment at each capture; likewise")
+      .required();
+  args.option("-o,--output", options->output,
+              "folder of the run; where it is there, the run goes on")
+      .required();
+  args.option("--skip", options->skip, "names of blocks to leave out")
+      .separatedBy(',')
+      .oneAtATime();
+  args.option("--rig", options->rig, "rig file; the rig takes the cameras to each pose");
+  args.option("--planes", options->planes,
+              "to record besides range, depth, amplitude and flags: " + planeNames())
+      .separatedBy(',')
+      .oneAtATime();
+  args.flag("--prepared", options->prepared,
+            "take for done what a person must prepare: everything stands there");
+  args.option("--powered-on-for", options->powered_on_for_s,
+              "seconds for which A was on when the plan begins, if it does not say so itself; a "
+              "simulated "
+              "one is set "
+              "to it (default: 0)")
+      .within(0.0, 1e9);
+  args.option("--frame-timeout", options->frame_timeout_s, "seconds to wait for one frame")
+      .within(0.1, 86'400.0)
+      .showsDefault();
+  options->daemon.add(args);
+  args.option("--address-b", options->daemon_b.address, "daemon of B, if it is another one")
+      .valid(isAddress);
+  args.check([options]() -> Result<> {
     for (const std::string& plane : options->planes) {
       if (planeKindNamed(plane)) continue;
       return Error{Error::Code::InvalidArgument,

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/cli/options.h"
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -28,16 +27,15 @@ std::string isAddress(const std::string& text) {
   return parsed ? std::string{} : parsed.error().message;
 }
 
-void DaemonOptions::add(CLI::App& app) {
-  app.add_option(
-         "-a,--address", address,
-         "where the daemon is: HOST:PORT or unix:/PATH; default: its socket on this machine, "
-         "then port 47800 of it")
-      ->check(isAddress)
-      ->envname("TOFTWIN_ADDRESS");
-  app.add_option("--timeout", timeout_s, "seconds to wait for the daemon or for a frame")
-      ->check(CLI::Range(0.001, 86'400.0))
-      ->capture_default_str();
+void DaemonOptions::add(Arguments& args) {
+  args.option("-a,--address", address,
+              "where the daemon is: HOST:PORT or unix:/PATH; default: its socket on this machine, "
+              "then port 47800 of it")
+      .valid(isAddress)
+      .environment("TOFTWIN_ADDRESS");
+  args.option("--timeout", timeout_s, "seconds to wait for the daemon or for a frame")
+      .within(0.001, 86'400.0)
+      .showsDefault();
 }
 
 Result<Client> DaemonOptions::connect() const {
@@ -50,30 +48,29 @@ Result<Client> DaemonOptions::connect() const {
                   client.error().message)};
 }
 
-void OutputOptions::add(CLI::App& app, bool required) {
-  app.add_option(
-         "-o,--output", file,
-         "file to write; its extension says the format: .png .ply .npy .csv .h5. Written whole or "
-         "not at all")
-      ->required(required);
-  app.add_option("-p,--plane", plane_names,
-                 "plane to write: " + planeNames() +
-                     "; default: range, or depth where there is no range; "
-                     "CSV and HDF5 take several (-p range,flags), and all by default")
-      ->delimiter(',')
-      ->allow_extra_args(false);
-  app.add_option("--channel", how.channel, "of a plane with several (PNG, CSV)")
-      ->capture_default_str();
-  app.add_option("--scale", how.mm_per_count, "PNG: millimetres per count")
-      ->check(CLI::Range(1e-3, 1e3))
-      ->capture_default_str();
-  app.add_flag("--color", how.color, "PNG: a picture in colours instead of counts");
-  app.add_option("--min", how.min,
-                 "--color: value of the first colour; default: 1 % of the pixels lie below");
-  app.add_option("--max", how.max,
-                 "--color: value of the last colour; default: 1 % of the pixels lie above");
-  app.add_option("--row", how.row, "CSV: only this row of pixels");
-  app.add_flag("--world", how.world, "PLY: in world coordinates, if the camera knows its pose");
+void OutputOptions::add(Arguments& args, bool required) {
+  args.option(
+          "-o,--output", file,
+          "file to write; its extension says the format: .png .ply .npy .csv .h5. Written whole or "
+          "not at all")
+      .required(required);
+  args.option("-p,--plane", plane_names,
+              "plane to write: " + planeNames() +
+                  "; default: range, or depth where there is no range; "
+                  "CSV and HDF5 take several (-p range,flags), and all by default")
+      .separatedBy(',')
+      .oneAtATime();
+  args.option("--channel", how.channel, "of a plane with several (PNG, CSV)").showsDefault();
+  args.option("--scale", how.mm_per_count, "PNG: millimetres per count")
+      .within(1e-3, 1e3)
+      .showsDefault();
+  args.flag("--color", how.color, "PNG: a picture in colours instead of counts");
+  args.option("--min", how.min,
+              "--color: value of the first colour; default: 1 % of the pixels lie below");
+  args.option("--max", how.max,
+              "--color: value of the last colour; default: 1 % of the pixels lie above");
+  args.option("--row", how.row, "CSV: only this row of pixels");
+  args.flag("--world", how.world, "PLY: in world coordinates, if the camera knows its pose");
 }
 
 namespace {
@@ -145,12 +142,6 @@ Result<> OutputOptions::check(const std::vector<Format>& formats) {
     how.planes.push_back(*kind);
   }
   return {};
-}
-
-void checkUsage(CLI::App& app, std::function<Result<>()> check) {
-  app.callback([check = std::move(check)] {
-    if (const auto checked = check(); !checked) throw CLI::ValidationError{checked.error().message};
-  });
 }
 
 Result<Frame> waitForFrame(Subscription& frames, std::chrono::milliseconds timeout) {

@@ -9,11 +9,8 @@
 
 #include <toftwin/client.h>
 
+#include "tools/cli/arguments.h"
 #include "tools/cli/export/export.h"
-
-namespace CLI {
-class App;
-}
 
 /// Options that several subcommands have, and what they mean.
 namespace toftwin::cli {
@@ -22,7 +19,7 @@ namespace toftwin::cli {
 struct DaemonOptions {
   std::string address;
   double timeout_s = 5.0;
-  void add(CLI::App& app);
+  void add(Arguments& args);
   /// The connection, or an Error Disconnected (whatever the reason) that says how to start a
   /// daemon.
   [[nodiscard]] Result<Client> connect() const;
@@ -36,7 +33,7 @@ struct OutputOptions {
   std::string file;
   std::vector<std::string> plane_names;
   ExportOptions how;
-  void add(CLI::App& app, bool required);
+  void add(Arguments& args, bool required);
   /// Puts the names into `how`. An unknown extension or plane, and an option that means nothing for
   /// this kind of file, are errors of the command line, before any work.
   Result<> check();
@@ -44,11 +41,8 @@ struct OutputOptions {
   Result<> check(const std::vector<Format>& formats);
 };
 
-/// For CLI11's check: what is wrong with an address, or nothing.
+/// What is wrong with an address, or nothing.
 std::string isAddress(const std::string& text);
-
-/// Has `check` called when the command line is read; its error is one of usage (Exit::Usage).
-void checkUsage(CLI::App& app, std::function<Result<>()> check);
 
 /// The next frame, or Stopped soon after Ctrl-C.
 Result<Frame> waitForFrame(Subscription& frames, std::chrono::milliseconds timeout);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/plan/plan.h"
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include <cmath>
@@ -97,22 +96,22 @@ Result<Exit> act(const Options& options) {
   return checked.passes() ? Exit::Ok : Exit::Incomplete;
 }
 
-Run add(CLI::App& app) {
+Run add(Arguments& args) {
   const auto options = std::make_shared<Options>();
-  app.add_option(
-         "ACTION", options->action,
-         "check: whether effects can be told apart, and what to mend; show: its blocks and covariates, too")
-      ->required()
-      ->check(CLI::IsMember({"check", "show"}));
-  app.add_option("FILE", options->file, "plan file")->required();
-  app.add_option("--skip", options->skip, "names of blocks to leave out; the others stay as they are")
-      ->delimiter(',');
-  app.add_option("--frame-interval-ms", options->frame_interval_ms,
-                 "of the cameras, to tell how long it takes")
-      ->check(CLI::Range(0.01, 1e6))
-      ->capture_default_str();
-  app.add_flag("--csv", options->csv, "show: its captures in their order, as CSV");
-  checkUsage(app, [options]() -> Result<> {
+  args.option("ACTION", options->action,
+              "check: whether effects can be told apart, and what to mend; show: its blocks and "
+              "covariates, too")
+      .required()
+      .oneOf({"check", "show"});
+  args.option("FILE", options->file, "plan file").required();
+  args.option("--skip", options->skip, "names of blocks to leave out; the others stay as they are")
+      .separatedBy(',');
+  args.option("--frame-interval-ms", options->frame_interval_ms,
+              "of the cameras, to tell how long it takes")
+      .within(0.01, 1e6)
+      .showsDefault();
+  args.flag("--csv", options->csv, "show: its captures in their order, as CSV");
+  args.check([options]() -> Result<> {
     if (!options->csv || options->action == "show") return {};
     return Error{Error::Code::InvalidArgument, "--csv is for show"};
   });

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/cli/pose.h"
 
-#include <CLI/CLI.hpp>
-
 #include <algorithm>
 #include <cmath>
 
@@ -52,25 +50,26 @@ Result<Transform<World, Camera>> lookFrom(const std::vector<double>& position_m,
   return world_from_camera;
 }
 
-void PoseOptions::add(CLI::App& app) {
-  const auto numbers = [&app](const char* name, std::vector<double>& values, int count,
-                              const char* help) {
-    return app.add_option(name, values, help)->delimiter(',')->expected(count);
+void PoseOptions::add(Arguments& args) {
+  const auto numbers = [&args](const char* name, std::vector<double>& values, int count,
+                               const char* help) {
+    return args.option(name, values, help).separatedBy(',').values(count);
   };
   numbers("--position", position_m, 3, "place of the camera in the world: X,Y,Z in metres");
-  auto* look_at = numbers("--look-at", look_at_m, 3,
-                          "a point on the camera's axis: X,Y,Z in metres; default: along the "
-                          "world's z");
-  numbers("--up", up, 3, "what is up in the world, for --look-at; default: 0,-1,0")
-      ->needs(look_at);
-  auto* euler = numbers("--euler-deg", euler_deg, 3,
-                        "how it is turned, instead of --look-at: X,Y,Z in degrees about the fixed "
-                        "world axes x, then y, then z")
-                    ->excludes(look_at);
+  const Argument look_at =
+      numbers("--look-at", look_at_m, 3,
+              "a point on the camera's axis: X,Y,Z in metres; default: along the "
+              "world's z");
+  numbers("--up", up, 3, "what is up in the world, for --look-at; default: 0,-1,0").needs(look_at);
+  const Argument euler =
+      numbers("--euler-deg", euler_deg, 3,
+              "how it is turned, instead of --look-at: X,Y,Z in degrees about the fixed "
+              "world axes x, then y, then z")
+          .excludes(look_at);
   numbers("--rotation-wxyz", rotation_wxyz, 4,
           "how it is turned, instead of --look-at: a quaternion W,X,Y,Z")
-      ->excludes(look_at)
-      ->excludes(euler);
+      .excludes(look_at)
+      .excludes(euler);
 }
 
 bool PoseOptions::isTurned() const {

@@ -7,9 +7,7 @@
 #include <toftwin/geometry.h>
 #include <toftwin/result.h>
 
-namespace CLI {
-class App;
-}
+#include "tools/cli/arguments.h"
 
 namespace toftwin::cli {
 
@@ -27,7 +25,7 @@ struct PoseOptions {
   std::vector<double> up{0.0, -1.0, 0.0};
   std::vector<double> euler_deg;
   std::vector<double> rotation_wxyz;
-  void add(CLI::App& app);
+  void add(Arguments& args);
   [[nodiscard]] bool isGiven() const;
   /// Whether the way it is turned is given, not only the place.
   [[nodiscard]] bool isTurned() const;

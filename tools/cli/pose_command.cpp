@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "tools/cli/command.h"
@@ -55,18 +54,19 @@ Result<Exit> run(const Options& options) {
 }  // namespace
 
 Command poseCommand() {
-  return {"pose", "show or set where a simulated camera stands",
-          "  toftwin pose kinect                                    shows it\n"
-          "  toftwin pose kinect --position 0,-0.2,-1 --look-at 0,0,2\n"
-          "  toftwin pose kinect --euler-deg 0,15,0                 turns it; it stays where it is\n",
-          [](CLI::App& app) -> Run {
-            const auto options = std::make_shared<Options>();
-            app.add_option("SOURCE", options->source, "name of the camera")->required();
-            options->pose.add(app);
-            app.add_flag("--json", options->json, "as JSON");
-            options->daemon.add(app);
-            return [options] { return run(*options); };
-          }};
+  return {
+      "pose", "show or set where a simulated camera stands",
+      "  toftwin pose kinect                                    shows it\n"
+      "  toftwin pose kinect --position 0,-0.2,-1 --look-at 0,0,2\n"
+      "  toftwin pose kinect --euler-deg 0,15,0                 turns it; it stays where it is\n",
+      [](Arguments& args) -> Run {
+        const auto options = std::make_shared<Options>();
+        args.option("SOURCE", options->source, "name of the camera").required();
+        options->pose.add(args);
+        args.flag("--json", options->json, "as JSON");
+        options->daemon.add(args);
+        return [options] { return run(*options); };
+      }};
 }
 
 }  // namespace toftwin::cli

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -181,36 +180,35 @@ Result<Exit> run(const Options& options) {
 }  // namespace
 
 Command recordCommand() {
-  return {"record", "record cameras into an MCAP file",
-          "  toftwin record kinect -o monday.mcap            until Ctrl-C; the file is whole at "
-          "any time\n"
-          "  toftwin record kinect o3d -o both.mcap --duration 60\n"
-          "  toftwin record kinect -o a.mcap --count 1000\n"
-          "  toftwin record kinect -o a.mcap --on-daemon     the daemon writes into its recording "
-          "folder\n"
-          "  toftwin record kinect --on-daemon --stop\n",
-          [](CLI::App& app) -> Run {
-            const auto options = std::make_shared<Options>();
-            app.add_option("SOURCE", options->sources, "names of the cameras")->required();
-            app.add_option("-o,--output", options->file,
-                           "file to write; with --on-daemon a name without a folder");
-            app.add_option("-n,--count", options->count,
-                           "end after so many frames of each camera; 0: Ctrl-C ends it")
-                ->capture_default_str();
-            app.add_option("--duration", options->duration_s, "end after so many seconds")
-                ->check(CLI::NonNegativeNumber);
-            app.add_flag("--drop", options->drop,
-                         "when the disk cannot keep up, leave frames out and count them, instead "
-                         "of ending with an error");
-            app.add_flag("--force", options->force, "replace a file that is there already");
-            app.add_flag("--on-daemon", options->on_daemon,
-                         "record on the daemon's machine instead of here");
-            app.add_flag("--stop", options->stop,
-                         "end a recording that was started with --on-daemon");
-            options->daemon.add(app);
-            checkUsage(app, [options] { return checkOptions(*options); });
-            return [options] { return run(*options); };
-          }};
+  return {
+      "record", "record cameras into an MCAP file",
+      "  toftwin record kinect -o monday.mcap            until Ctrl-C; the file is whole at "
+      "any time\n"
+      "  toftwin record kinect o3d -o both.mcap --duration 60\n"
+      "  toftwin record kinect -o a.mcap --count 1000\n"
+      "  toftwin record kinect -o a.mcap --on-daemon     the daemon writes into its recording "
+      "folder\n"
+      "  toftwin record kinect --on-daemon --stop\n",
+      [](Arguments& args) -> Run {
+        const auto options = std::make_shared<Options>();
+        args.option("SOURCE", options->sources, "names of the cameras").required();
+        args.option("-o,--output", options->file,
+                    "file to write; with --on-daemon a name without a folder");
+        args.option("-n,--count", options->count,
+                    "end after so many frames of each camera; 0: Ctrl-C ends it")
+            .showsDefault();
+        args.option("--duration", options->duration_s, "end after so many seconds").notNegative();
+        args.flag("--drop", options->drop,
+                  "when the disk cannot keep up, leave frames out and count them, instead "
+                  "of ending with an error");
+        args.flag("--force", options->force, "replace a file that is there already");
+        args.flag("--on-daemon", options->on_daemon,
+                  "record on the daemon's machine instead of here");
+        args.flag("--stop", options->stop, "end a recording that was started with --on-daemon");
+        options->daemon.add(args);
+        args.check([options] { return checkOptions(*options); });
+        return [options] { return run(*options); };
+      }};
 }
 
 }  // namespace toftwin::cli

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -91,97 +90,115 @@ Result<Exit> run(const RenderOptions& options) {
   return targetOf(options).kind == TargetKind::Frame ? renderOne(options) : renderCampaign(options);
 }
 
-void addSettings(CLI::App& app, RenderSettings& settings) {
-  app.add_option("--samples", settings.keys.samples_per_pixel, "light paths per pixel")
-      ->check(CLI::Range(1, 65'536))
-      ->capture_default_str();
-  app.add_option_function<std::string>(
-         "--sampler",
-         [&settings](const std::string& name) { settings.keys.sampler = drivers::simulator::samplers().at(name); },
-         "how light paths are drawn: shared by tiles of pixels (as if not given), even in each pixel, or plain")
-      ->check(CLI::IsMember(drivers::simulator::samplers()));
-  app.add_option_function<double>(
-         "--light-noise-mm", [&settings](double mm) { settings.keys.light_noise = mm * millimetre; },
-         "only as many paths as leave this noise of the light in the range at the highest frequency, at most "
-         "--samples; 0: always that many")
-      ->check(CLI::Range(0.0, 1000.0));
-  app.add_option("--surfaces", settings.keys.max_surfaces,
-                 "surfaces that a path may meet; 1: direct light only")
-      ->check(CLI::Range(1, 64))
-      ->capture_default_str();
-  app.add_option("--pixel-extent", settings.keys.pixel_extent,
-                 "side of a pixel's footprint in pixels; 0: its central ray, no flying pixels")
-      ->check(CLI::Range(0.0, 4.0))
-      ->capture_default_str();
-  app.add_option("--seed", settings.keys.seed, "of the light paths and the noise")->capture_default_str();
-  app.add_option("--frame", settings.first_noise, "number of the (first) frame: another one has other noise")
-      ->capture_default_str();
-  app.add_option("--since-power-on", settings.since_power_on_s,
-                 "seconds that the camera has been on at device time 0")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
-  app.add_option("--ambient-klx", settings.ambient_klx, "ambient light at the scene, in kilolux")
-      ->check(CLI::Range(0.0, 200.0))
-      ->capture_default_str();
-  app.add_option("--room-temperature-c", settings.room_temperature_c, "in degrees Celsius")
-      ->check(CLI::Range(-40.0, 100.0))
-      ->capture_default_str();
-  app.add_flag(
-      "--freeze", settings.freeze,
-      "within a frame nothing moves: all raw exposures get the light of the middle one. As many times "
-      "faster as there are raw exposures");
+std::vector<std::string> samplerNames() {
+  std::vector<std::string> names;
+  for (const auto& [name, sampler] : drivers::simulator::samplers()) names.push_back(name);
+  return names;
 }
 
-void addCampaign(CLI::App& app, RenderOptions& options) {
-  app.add_option(
-      "--trajectory", options.trajectory,
-      "poses of the camera (.toml or .csv): between times it moves, without times each pose gives a frame");
-  app.add_option("--frames", options.frames,
-                 "how many; default: from the first pose of the trajectory to the last, or 1")
-      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{100'000'000}));
-  app.add_option("--frame-interval-ms", options.frame_interval_ms,
-                 "from frame to frame; default: the camera's own")
-      ->check(CLI::Range(1e-3, 1e9));
-  app.add_option("--format", options.format_names,
-                 "of the files in a folder: png, npy, ply, csv, or several (--format png,ply); default: npy")
-      ->delimiter(',')
-      ->allow_extra_args(false);
-  app.add_flag("--overwrite", options.overwrite, "replace another campaign's frames that are there already");
+void addSettings(Arguments& args, RenderSettings& settings) {
+  args.option("--samples", settings.keys.samples_per_pixel, "light paths per pixel")
+      .within(1, 65'536)
+      .showsDefault();
+  args.given<std::string>(
+          "--sampler",
+          [&settings](const std::string& name) {
+            settings.keys.sampler = drivers::simulator::samplers().at(name);
+          },
+          "how light paths are drawn: shared by tiles of pixels (as if not given), even in each "
+          "pixel, or plain")
+      .oneOf(samplerNames());
+  args.given<double>(
+          "--light-noise-mm",
+          [&settings](double mm) { settings.keys.light_noise = mm * millimetre; },
+          "only as many paths as leave this noise of the light in the range at the highest "
+          "frequency, at most "
+          "--samples; 0: always that many")
+      .within(0.0, 1000.0);
+  args.option("--surfaces", settings.keys.max_surfaces,
+              "surfaces that a path may meet; 1: direct light only")
+      .within(1, 64)
+      .showsDefault();
+  args.option("--pixel-extent", settings.keys.pixel_extent,
+              "side of a pixel's footprint in pixels; 0: its central ray, no flying pixels")
+      .within(0.0, 4.0)
+      .showsDefault();
+  args.option("--seed", settings.keys.seed, "of the light paths and the noise").showsDefault();
+  args.option("--frame", settings.first_noise,
+              "number of the (first) frame: another one has other noise")
+      .showsDefault();
+  args.option("--since-power-on", settings.since_power_on_s,
+              "seconds that the camera has been on at device time 0")
+      .notNegative()
+      .showsDefault();
+  args.option("--ambient-klx", settings.ambient_klx, "ambient light at the scene, in kilolux")
+      .within(0.0, 200.0)
+      .showsDefault();
+  args.option("--room-temperature-c", settings.room_temperature_c, "in degrees Celsius")
+      .within(-40.0, 100.0)
+      .showsDefault();
+  args.flag("--freeze", settings.freeze,
+            "within a frame nothing moves: all raw exposures get the light of the middle one. As "
+            "many times "
+            "faster as there are raw exposures");
+}
+
+void addCampaign(Arguments& args, RenderOptions& options) {
+  args.option("--trajectory", options.trajectory,
+              "poses of the camera (.toml or .csv): between times it moves, without times each "
+              "pose gives a frame");
+  args.option("--frames", options.frames,
+              "how many; default: from the first pose of the trajectory to the last, or 1")
+      .within(std::uint64_t{1}, std::uint64_t{100'000'000});
+  args.option("--frame-interval-ms", options.frame_interval_ms,
+              "from frame to frame; default: the camera's own")
+      .within(1e-3, 1e9);
+  args.option("--format", options.format_names,
+              "of the files in a folder: png, npy, ply, csv, or several (--format png,ply); "
+              "default: npy")
+      .separatedBy(',')
+      .oneAtATime();
+  args.flag("--overwrite", options.overwrite,
+            "replace another campaign's frames that are there already");
 }
 
 }  // namespace
 
 Command renderCommand() {
-  return {"render", "frames of the simulator, without a daemon; defaults as of a simulated source",
-          "  toftwin render kinect_v2 -o range.png\n"
-          "  toftwin render my_camera.toml --scene room.toml -o cloud.ply --position 0,0,-1 --look-at 0,0,2\n"
-          "  toftwin render kinect_v2 --scene room.toml -o truth.npy --plane truth_range\n"
-          "  toftwin render kinect_v2 --samples 64 -o raw.npy --plane samples\n"
-          "  toftwin render kinect_v2 --scene desk.toml --samples 64 --images -o desk.png\n"
-          "  toftwin render o3d303 --scene room.toml --trajectory walk.csv -o walk/ --format png,ply\n"
-          "  toftwin render o3d303 --scene room.toml --trajectory walk.csv -o walk.h5      resumes when it "
-          "was killed\n"
-          "  toftwin render o3d303 --scene room.toml --frames 1000 -o noise.mcap\n",
-          [](CLI::App& app) -> Run {
-            const auto options = std::make_shared<RenderOptions>();
-            app.add_option("CAMERA,--camera", options->camera, presetHelp())->required();
-            app.add_option("--scene", options->scene, "scene file (.toml); default: a box before a wall");
-            options->output.add(app, true);
-            app.get_option("--output")
-                ->description(
-                    "file of one frame (.png .ply .npy .csv .h5), of all frames (.h5 .mcap), or a folder "
-                    "(frames/) for a file of each; several frames in .png .ply .npy .csv are numbered");
-            options->pose.add(app);
-            addCampaign(app, *options);
-            addSettings(app, options->settings);
-            app.add_flag(
-                "--images", options->images,
-                "also FILE-infrared.png and FILE-depth.png as pictures to look at, and, for a camera with a "
-                "colour lens, FILE-color.png from its place, FILE-color-in-depth.png and "
-                "FILE-depth-in-color.png");
-            checkUsage(app, [options] { return checkOptions(*options); });
-            return [options] { return run(*options); };
-          }};
+  return {
+      "render", "frames of the simulator, without a daemon; defaults as of a simulated source",
+      "  toftwin render kinect_v2 -o range.png\n"
+      "  toftwin render my_camera.toml --scene room.toml -o cloud.ply --position 0,0,-1 --look-at "
+      "0,0,2\n"
+      "  toftwin render kinect_v2 --scene room.toml -o truth.npy --plane truth_range\n"
+      "  toftwin render kinect_v2 --samples 64 -o raw.npy --plane samples\n"
+      "  toftwin render kinect_v2 --scene desk.toml --samples 64 --images -o desk.png\n"
+      "  toftwin render o3d303 --scene room.toml --trajectory walk.csv -o walk/ --format png,ply\n"
+      "  toftwin render o3d303 --scene room.toml --trajectory walk.csv -o walk.h5      resumes "
+      "when it "
+      "was killed\n"
+      "  toftwin render o3d303 --scene room.toml --frames 1000 -o noise.mcap\n",
+      [](Arguments& args) -> Run {
+        const auto options = std::make_shared<RenderOptions>();
+        args.option("CAMERA,--camera", options->camera, presetHelp()).required();
+        args.option("--scene", options->scene, "scene file (.toml); default: a box before a wall");
+        options->output.add(args, true);
+        args.declared("--output")
+            .describe(
+                "file of one frame (.png .ply .npy .csv .h5), of all frames (.h5 .mcap), or a "
+                "folder "
+                "(frames/) for a file of each; several frames in .png .ply .npy .csv are numbered");
+        options->pose.add(args);
+        addCampaign(args, *options);
+        addSettings(args, options->settings);
+        args.flag("--images", options->images,
+                  "also FILE-infrared.png and FILE-depth.png as pictures to look at, and, for a "
+                  "camera with a "
+                  "colour lens, FILE-color.png from its place, FILE-color-in-depth.png and "
+                  "FILE-depth-in-color.png");
+        args.check([options] { return checkOptions(*options); });
+        return [options] { return run(*options); };
+      }};
 }
 
 }  // namespace toftwin::cli

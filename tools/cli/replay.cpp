@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include <cmath>
@@ -189,21 +188,20 @@ Command replayCommand() {
           "  toftwin replay monday.mcap -o at.png --from 12.5 --count 1\n"
           "  toftwin replay monday.mcap --serve              a daemon whose cameras are the "
           "recorded ones\n",
-          [](CLI::App& app) -> Run {
+          [](Arguments& args) -> Run {
             const auto options = std::make_shared<Options>();
-            app.add_option("FILE", options->file, "recording (.mcap)")->required();
-            app.add_option("-s,--source", options->source, "only this camera; default: all");
-            app.add_option("--from", options->from_s,
-                           "begin so many seconds after the recording's start")
-                ->check(CLI::NonNegativeNumber);
-            app.add_option("-n,--count", options->count, "only so many frames; 0: all")
-                ->capture_default_str();
-            options->output.add(app, false);
-            app.add_flag("--json", options->json, "list: one JSON object a line");
-            app.add_flag("--serve", options->should_serve,
-                         "start a daemon that replays the file; Ctrl-C ends it");
-            options->serve.add(app, app.get_option("--serve"));
-            checkUsage(app, [options] { return checkOptions(*options); });
+            args.option("FILE", options->file, "recording (.mcap)").required();
+            args.option("-s,--source", options->source, "only this camera; default: all");
+            args.option("--from", options->from_s,
+                        "begin so many seconds after the recording's start")
+                .notNegative();
+            args.option("-n,--count", options->count, "only so many frames; 0: all").showsDefault();
+            options->output.add(args, false);
+            args.flag("--json", options->json, "list: one JSON object a line");
+            args.flag("--serve", options->should_serve,
+                      "start a daemon that replays the file; Ctrl-C ends it");
+            options->serve.add(args, args.declared("--serve"));
+            args.check([options] { return checkOptions(*options); });
             return [options] { return run(*options); };
           }};
 }

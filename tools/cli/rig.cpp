@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "drivers/rig/rig.h"
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -159,23 +158,23 @@ Result<Exit> act(const Options& options, const std::string& action) {
   return Exit::Ok;
 }
 
-Run add(CLI::App& app) {
+Run add(Arguments& args) {
   const auto options = std::make_shared<Options>();
   const auto action = std::make_shared<std::string>();
-  app.add_option("ACTION", *action,
-                 "status: how it stands; stop; home; move; follow: a capture for every "
-                 "trigger of the PLC's")
-      ->required()
-      ->check(CLI::IsMember({"status", "stop", "home", "move", "follow"}));
-  app.add_option("FILE", options->file, "rig file")->required();
-  app.add_option("SOURCE", options->source, "follow: name of the camera");
-  app.add_option("--axis", options->axes, "move: NAME=VALUE in mm or degrees; the others stay");
-  options->pose.add(app);
-  app.add_option("--captures", options->captures, "follow: end after so many; 0: never")
-      ->capture_default_str();
-  app.add_flag("--json", options->json, "as JSON");
-  options->daemon.add(app);
-  checkUsage(app, [options, action]() -> Result<> {
+  args.option("ACTION", *action,
+              "status: how it stands; stop; home; move; follow: a capture for every "
+              "trigger of the PLC's")
+      .required()
+      .oneOf({"status", "stop", "home", "move", "follow"});
+  args.option("FILE", options->file, "rig file").required();
+  args.option("SOURCE", options->source, "follow: name of the camera");
+  args.option("--axis", options->axes, "move: NAME=VALUE in mm or degrees; the others stay");
+  options->pose.add(args);
+  args.option("--captures", options->captures, "follow: end after so many; 0: never")
+      .showsDefault();
+  args.flag("--json", options->json, "as JSON");
+  options->daemon.add(args);
+  args.check([options, action]() -> Result<> {
     const bool is_aimed = options->pose.isGiven() || !options->axes.empty();
     if (*action == "move" && options->pose.isGiven() == !options->axes.empty()) {
       return Error{Error::Code::InvalidArgument,

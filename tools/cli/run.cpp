@@ -51,7 +51,8 @@ std::vector<Run> declare(CLI::App& app) {
     CLI::App* sub = app.add_subcommand(command.name, command.summary);
     sub->set_help_flag("-h,--help", "show this text");
     if (command.examples[0] != '\0') sub->footer(std::string{"Examples:\n"} + command.examples);
-    runs.push_back(command.add(*sub));
+    Arguments args{*sub};
+    runs.push_back(command.add(args));
     for (CLI::Option* option : sub->get_options()) refuseNegativeCounts(*option);
   }
   return runs;

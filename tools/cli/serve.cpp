@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/cli/serve.h"
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
@@ -106,17 +105,17 @@ Result<Exit> runDaemon(const std::string& program, const std::string& config) {
 
 }  // namespace
 
-void ServeOptions::add(CLI::App& app, CLI::Option* serve) {
-  app.add_option("--port", port, "--serve: TCP port on loopback; 0: any free one")
-      ->check(CLI::Range(0, 65535))
-      ->capture_default_str()
-      ->needs(serve);
-  app.add_option("--socket", socket, "--serve: path of a Unix socket; default: none")->needs(serve);
-  app.add_option("--pace", pace, "--serve: exact: at the recorded times; fast: as fast as possible")
-      ->check(CLI::IsMember({"exact", "fast"}))
-      ->capture_default_str()
-      ->needs(serve);
-  app.add_flag("--loop", loop, "--serve: begin again at the end")->needs(serve);
+void ServeOptions::add(Arguments& args, const Argument& serve) {
+  args.option("--port", port, "--serve: TCP port on loopback; 0: any free one")
+      .within(0, 65535)
+      .showsDefault()
+      .needs(serve);
+  args.option("--socket", socket, "--serve: path of a Unix socket; default: none").needs(serve);
+  args.option("--pace", pace, "--serve: exact: at the recorded times; fast: as fast as possible")
+      .oneOf({"exact", "fast"})
+      .showsDefault()
+      .needs(serve);
+  args.flag("--loop", loop, "--serve: begin again at the end").needs(serve);
 }
 
 Result<Exit> serve(const std::string& file, const std::string& source,

@@ -6,11 +6,6 @@
 #include "protocol/record/recording.h"
 #include "tools/cli/command.h"
 
-namespace CLI {
-class App;
-class Option;
-}  // namespace CLI
-
 namespace toftwin::cli {
 
 /// Options of `toftwin replay --serve`.
@@ -19,7 +14,7 @@ struct ServeOptions {
   std::string socket;
   std::string pace = "exact";
   bool loop = false;
-  void add(CLI::App& app, CLI::Option* serve);  ///< which each of them needs
+  void add(Arguments& args, const Argument& serve);  ///< which each of them needs
 };
 
 /// Becomes a `toftwind` (the one beside this program, else the one in PATH) whose sources are those

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -55,13 +54,13 @@ Command setCommand() {
           "  toftwin set kinect                             all, with their values and bounds\n"
           "  toftwin set kinect ambient_klx 20\n"
           "  toftwin set kinect exposure_us                 shows this one\n",
-          [](CLI::App& app) -> Run {
+          [](Arguments& args) -> Run {
             const auto options = std::make_shared<Options>();
-            app.add_option("SOURCE", options->source, "name of the camera")->required();
-            app.add_option("KEY", options->key, "the parameter; its name ends in its unit");
-            app.add_option("VALUE", options->value, "a number; without it the present one is shown");
-            app.add_flag("--json", options->json, "as JSON");
-            options->daemon.add(app);
+            args.option("SOURCE", options->source, "name of the camera").required();
+            args.option("KEY", options->key, "the parameter; its name ends in its unit");
+            args.option("VALUE", options->value, "a number; without it the present one is shown");
+            args.flag("--json", options->json, "as JSON");
+            options->daemon.add(args);
             return [options] { return run(*options); };
           }};
 }

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -59,13 +58,13 @@ Command triggerCommand() {
           "  toftwin record rig -o run.mcap &\n"
           "  toftwin trigger rig                            one frame into that recording\n"
           "  toftwin grab rig --trigger -o frame.png        takes and triggers in one\n",
-          [](CLI::App& app) -> Run {
+          [](Arguments& args) -> Run {
             const auto options = std::make_shared<Options>();
-            app.add_option("SOURCE", options->source,
-                           "name of the camera; the frame goes to whoever takes its frames, who is "
-                           "waited for until --timeout")
-                ->required();
-            options->daemon.add(app);
+            args.option("SOURCE", options->source,
+                        "name of the camera; the frame goes to whoever takes its frames, who is "
+                        "waited for until --timeout")
+                .required();
+            options->daemon.add(args);
             return [options] { return run(*options); };
           }};
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdio>
 
 #include "calib/compare/json.h"
@@ -84,12 +84,12 @@ Command usbCommand() {
       "  toftwin usb                list\n"
       "  toftwin usb --watch        tells what comes and goes, until Ctrl-C\n"
       "  toftwin usb --reset 2-1.4  as if it was unplugged and plugged in\n",
-      [](CLI::App& app) -> Run {
+      [](Arguments& args) -> Run {
         const auto options = std::make_shared<Options>();
-        app.add_flag("--watch", options->watch, "tells what comes and goes");
-        app.add_option("--reset", options->port, "port of the camera to reset, as the list has it");
-        app.add_flag("--json", options->json, "the list as JSON");
-        checkUsage(app, [options]() -> Result<> {
+        args.flag("--watch", options->watch, "tells what comes and goes");
+        args.option("--reset", options->port, "port of the camera to reset, as the list has it");
+        args.flag("--json", options->json, "the list as JSON");
+        args.check([options]() -> Result<> {
           if (options->watch + !options->port.empty() + options->json <= 1) return {};
           return Error{Error::Code::InvalidArgument,
                        "--watch, --reset and --json exclude each other"};
