@@ -304,6 +304,11 @@ int EmulatedRig::departures() {
   const std::scoped_lock lock{impl_->mutex_};
   return impl_->departures_;
 }
+void EmulatedRig::leaveCaptured() {
+  const std::scoped_lock lock{impl_->mutex_};
+  impl_->mapping_->tab_bits[Captured] = 1;
+}
+
 bool EmulatedRig::isCaptured() {
   const std::scoped_lock lock{impl_->mutex_};
   return impl_->mapping_->tab_bits[Captured] != 0;

@@ -39,6 +39,7 @@ class EmulatedRig {
   /// How often motion began.
   [[nodiscard]] int departures();
   [[nodiscard]] bool isCaptured();
+  void leaveCaptured();  ///< set, as after an earlier capture
 
   // What goes wrong, when the axis x has come past that place on its way up.
   void stallAt(double x);

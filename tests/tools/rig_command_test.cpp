@@ -74,12 +74,12 @@ TEST_F(Rigged, AComparisonEndsAtAPoseThatIsNotReached) {
 }
 
 TEST_F(Rigged, ThePlcHasFramesTaken) {
+  rig_.leaveCaptured();
   Background following{{TOFTWIN_PROGRAM, "rig", "follow", (folder_ / "rig.toml").string(),
                         "pattern", "--captures", "2", "--address", "unix:" + socket()}};
   for (int i = 0; i < 2; ++i) {
     rig_.setTrigger(false);
-    // Until it has seen that the trigger is gone, which it says by taking "captured" back.
-    std::this_thread::sleep_for(std::chrono::milliseconds{500});
+    // It says that it has seen the trigger go by taking "captured" back.
     ASSERT_TRUE(eventually([&] { return !rig_.isCaptured(); }));
     rig_.setTrigger(true);
     ASSERT_TRUE(eventually([&] { return rig_.isCaptured(); }));
