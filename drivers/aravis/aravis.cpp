@@ -72,8 +72,10 @@ std::optional<CameraInfo> lensFromPoints(Connection& connection, const Keys& key
   return camera;
 }
 
-/// What a person wrote, or the camera says, or its points say.
-Result<Lens> findLens(Connection& connection, const Keys& keys, const Setup& setup) {
+/// What was calibrated, or a person wrote, or the camera says, or its points say.
+Result<Lens> findLens(Connection& connection, const Keys& keys, const Setup& setup,
+                      const std::optional<CameraInfo>& calibrated) {
+  if (calibrated) return lensFor(*calibrated, setup.width, setup.height, About::name);
   auto lens = lensFor(keys.lens, setup.width, setup.height, About::name);
   if (!lens || lens->is_known) return lens;
   if (setup.lens) return lensFor(*setup.lens, setup.width, setup.height, About::name);
@@ -122,6 +124,7 @@ SourceInfo infoOf(const Connection& connection, const Setup& setup, const ImageM
 Result<std::unique_ptr<Source>> open(settings::Table& table) {
   Keys keys;
   table.read(keys);
+  const auto calibrated = calibrationAt(table, keys.calibration);
   if (auto checked = checkKeys(keys, table); !checked) return checked.error();
   auto connection = Connection::open(keys.uri.substr(kScheme.size()));
   if (!connection) return connection.error();
@@ -130,7 +133,7 @@ Result<std::unique_ptr<Source>> open(settings::Table& table) {
     if (setup.error().code == Error::Code::Disconnected) connection->giveUp();
     return setup.error();
   }
-  const auto lens = findLens(*connection, keys, *setup);
+  const auto lens = findLens(*connection, keys, *setup, calibrated);
   if (!lens) return lens.error();
   ImageMaker images{setup->layout, setup->scan, *lens};
   SourceInfo info = infoOf(*connection, *setup, images);

@@ -30,6 +30,7 @@ struct Keys {
   Length unit = 0_mm;
   double least_confidence = 1.0;
   LensKeys lens;
+  std::string calibration;
   int packet_size = 0;
   bool resend = true;
   Duration packet_timeout = 20_ms;
@@ -76,6 +77,7 @@ struct Keys {
     v.number("least_confidence", least_confidence, {0, 65535},
              "a pixel of less confidence is invalid, in the camera's unit");
     v.group("lens", lens, "of the range image, if the camera does not say it");
+    v.text("calibration", calibration, kCalibrationHelp);
     v.number(
         "packet_size", packet_size, {0, 65535},
         "bytes of a GigE packet; 0: the largest that comes through, found out when it is opened");

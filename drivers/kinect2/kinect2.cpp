@@ -65,14 +65,27 @@ sim::DecodeSettings settingsOf(const Keys& keys) {
   return settings;
 }
 
-SourceInfo describe(const Keys& keys, const Found& found, const CameraSession::About& about,
+/// The lens of the images that the camera sends, which are mirrored, and of those that are given
+/// out.
+struct Optics {
+  CameraInfo as_sent, as_given;
+};
+
+/// Without a calibration that a person made, the factory's.
+Optics opticsOf(const Keys& keys, const CameraSession::About& about,
+                const std::optional<CameraInfo>& calibrated) {
+  if (calibrated) return {keys.mirror ? *calibrated : mirrored(*calibrated), *calibrated};
+  const CameraInfo as_sent = cameraOf(about.lens);
+  return {as_sent, keys.mirror ? as_sent : mirrored(as_sent)};
+}
+
+SourceInfo describe(const Found& found, const CameraSession::About& about, const CameraInfo& camera,
                     std::vector<PlaneKind> planes) {
   SourceInfo info;
   info.driver = About::name;
   info.model = found.name;
   info.serial = about.serial;
-  const CameraInfo as_sent = cameraOf(about.lens);
-  info.camera = keys.mirror ? as_sent : mirrored(as_sent);
+  info.camera = camera;
   info.planes = std::move(planes);
   info.frame_interval = kInterval;
   for (const Adjustable& one : kAdjustables) info.parameters.emplace_back(one.name);
@@ -82,12 +95,13 @@ SourceInfo describe(const Keys& keys, const Found& found, const CameraSession::A
 class Kinect2Source final : public Source {
  public:
   Kinect2Source(const Keys& keys, const Found& found, const CameraSession::About& about,
-                std::unique_ptr<CameraSession> session, std::vector<PlaneKind> planes)
+                const Optics& optics, std::unique_ptr<CameraSession> session,
+                std::vector<PlaneKind> planes)
       : keys_(keys),
-        info_(describe(keys, found, about, std::move(planes))),
-        is_decoding_(
-            std::ranges::any_of(info_.planes, [](PlaneKind kind) { return kind != PlaneKind::Samples; })),
-        rays_(is_decoding_ ? raysOf(cameraOf(about.lens)) : sim::DecodeRays{}),
+        info_(describe(found, about, optics.as_given, std::move(planes))),
+        is_decoding_(std::ranges::any_of(
+            info_.planes, [](PlaneKind kind) { return kind != PlaneKind::Samples; })),
+        rays_(is_decoding_ ? raysOf(optics.as_sent) : sim::DecodeRays{}),
         settings_(settingsOf(keys)),
         session_(std::move(session)) {}
 
@@ -238,8 +252,15 @@ Result<std::unique_ptr<Source>> openOn(Bus& bus, settings::Table& table) {
   Keys keys;
   table.read(keys);
   std::vector<PlaneKind> planes = chosenPlanes(keys, table);
+  const auto calibration = calibrationAt(table, keys.calibration);
   if (keys.nearest >= keys.farthest) table.complain("nearest_m", "must be less than farthest_m");
   if (auto checked = table.check(); !checked) return checked.error();
+  std::optional<CameraInfo> calibrated;
+  if (calibration) {
+    const auto lens = lensFor(*calibration, kWidth, kHeight, About::name);
+    if (!lens) return lens.error();
+    calibrated = lens->camera;
+  }
   const auto found = find(bus, keys, table);
   if (!found) return found.error();
   if (!found->warning.empty()) logging::warn("kinect2: {}", found->warning);
@@ -251,7 +272,8 @@ Result<std::unique_ptr<Source>> openOn(Bus& bus, settings::Table& table) {
   logging::info("kinect2: {} at {}, serial {}, firmware {}", found->name, found->port,
                 about->serial, about->firmware);
   return std::unique_ptr<Source>{
-      std::make_unique<Kinect2Source>(keys, *found, *about, std::move(session), std::move(planes))};
+      std::make_unique<Kinect2Source>(keys, *found, *about, opticsOf(keys, *about, calibrated),
+                                      std::move(session), std::move(planes))};
 }
 
 Driver row() {

@@ -8,6 +8,7 @@
 
 #include <toftwin/units.h>
 
+#include "drivers/lens.h"
 #include "drivers/source.h"
 
 /// The Microsoft Kinect v2 over USB, by what the libfreenect2 project found out about it.
@@ -17,6 +18,7 @@ namespace toftwin::drivers::kinect2 {
 struct Keys {
   std::string uri = "kinect2:any";
   std::vector<std::string> planes;
+  std::string calibration;
   bool mirror = false;
   Length nearest = 0.5_m;
   Length farthest = 18.7_m;
@@ -32,6 +34,7 @@ struct Keys {
     v.text("uri", uri, "kinect2: and the camera's serial number, or its USB port (2-1.4), or any");
     v.texts("planes", planes,
             "which of range, depth, amplitude, flags, samples, phasors; empty: the first four");
+    v.text("calibration", calibration, kCalibrationHelp);
     v.flag("mirror", mirror, "left is right, as the camera sends it");
     v.quantity("nearest", nearest, metre, {0.05, 20.0}, "nearer depths are invalid");
     v.quantity("farthest", farthest, metre, {0.05, 20.0}, "farther depths are invalid");

@@ -253,7 +253,7 @@ class SimulatedSource final : public Source {
     moment.temperatures = model_.temperatures(room_temperature_, *moment.since_power_on);
     moment.temperatures.push_back({"room", room_temperature_});
     moment.ambient = ambient_;
-    moment.world_from_camera = view_.poseAt(deviceDuration());
+    moment.world_from_camera = view_.poseAt(sim::middleOf(moment));
     return moment;
   }
 

@@ -7,9 +7,13 @@
 #include <gtest/gtest.h>
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 
+#include "calib/file/calibration_file.h"
 #include "drivers/compliance.h"
 #include "drivers/kinect2/samples.h"
 #include "emulated_kinect2_bus.h"
@@ -134,6 +138,43 @@ TEST(Kinect2, LeftIsLeftUnlessAskedFor) {
       EXPECT_NEAR(static_cast<double>(range_m[50 * kWidth + static_cast<std::size_t>(x)]) * z, 2.0, 1.5e-3);
     }
   }
+}
+
+TEST(Kinect2, ACalibrationOfOnesOwnTakesThePlaceOfTheFactorys) {
+  calibration::CalibrationFile file;
+  file.lens = {.width = kWidth,
+               .height = kHeight,
+               .fx = 361,
+               .fy = 362,
+               .cx = 240,
+               .cy = 205,
+               .distortion = {0.09, -0.2, 0.01, 0.02, 0}};
+  const auto path =
+      std::filesystem::path{testing::TempDir()} / fmt::format("kinect2-lens-{}.toml", ::getpid());
+  std::ofstream{path} << calibration::toText(file);
+  EmulatedKinect2Bus bus;
+  for (const bool mirror : {false, true}) {
+    const auto source =
+        started(bus, fmt::format("calibration = '{}'\nmirror = {}", path.string(), mirror));
+    ASSERT_NE(source, nullptr);
+    const auto frame = nextFrame(*source);
+    ASSERT_TRUE(frame.ok()) << frame.error().message;
+    const CameraInfo expected = calibration::cameraOf(file.lens);
+    EXPECT_EQ(frame->camera.cx, 240.0);
+    EXPECT_EQ(frame->camera.distortion, expected.distortion);
+    EXPECT_EQ(frame->provenance.calibration_id, expected.calibration_id);
+    // What is decoded with it agrees: depth is the part of the range along the axis.
+    const auto range_m = frame->find(PlaneKind::Range)->as<float>();
+    const auto depth_m = frame->find(PlaneKind::Depth)->as<float>();
+    for (const int x : {60, 256, 450}) {
+      const auto at = 80 * kWidth + static_cast<std::size_t>(x);
+      EXPECT_NEAR(static_cast<double>(depth_m[at] / range_m[at]),
+                  rayThroughPixel(expected, x, 80).v.z, 1e-6);
+    }
+  }
+  std::filesystem::remove(path);
+  EXPECT_THAT(openWith(bus, "calibration = 'nowhere.toml'").error().message,
+              HasSubstr("nowhere.toml"));
 }
 
 TEST(Kinect2, WhatIsLostIsCountedInTheNextFrame) {

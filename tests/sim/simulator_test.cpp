@@ -137,6 +137,20 @@ TEST_F(Simulator, StartsAtThePoseOfItsKeys) {
   EXPECT_EQ(frame.moment.world_from_camera->translation_m.z, 4.0);
 }
 
+TEST_F(Simulator, AMovingCamerasPoseIsThatInTheMiddleOfTheFrame) {
+  const auto source = open("velocity_m_per_s = [0, 0, 2]\n");
+  for (int i = 0; i < 2; ++i) {
+    const Frame frame = frameOf(*source);
+    const auto& middle = frame.moment.exposures[frame.moment.exposures.size() / 2];
+    const double middle_s =
+        static_cast<double>(middle.start.ns) * 1e-9 + middle.duration.in(second) / 2;
+    EXPECT_GT(middle_s, 0.0);
+    EXPECT_NEAR(frame.moment.world_from_camera->translation_m.z, 2.0 * middle_s, 1e-12);
+    // And so what it measures is what is seen from there.
+    EXPECT_NEAR(meanRange(frame), 2.0 - 2.0 * middle_s, 5e-3);
+  }
+}
+
 TEST_F(Simulator, RefusesAPoseThatIsNone) {
   const auto source = open();
   EXPECT_THAT(source->setPose({{1, 1, 0, 0}, {}}).error().message, HasSubstr("unit quaternion"));
