@@ -117,6 +117,50 @@ ConfiguredSource readSource(settings::Table table, std::span<const drivers::Driv
   return source;
 }
 
+std::string namesOf(std::span<const FacadeKind> facades) {
+  std::string names;
+  for (const FacadeKind& facade : facades) names += (names.empty() ? "" : ", ") + std::string{facade.name};
+  return names;
+}
+
+/// The keys that every facade has; what is wrong with them goes to the table.
+FacadeKeys readFacadeKeys(settings::Table& table, const std::set<std::string>& sources) {
+  FacadeKeys keys;
+  table.read(keys);
+  if (!sources.contains(keys.source)) {
+    table.complain(table.has("source") ? "source" : "",
+                   table.has("source")
+                       ? fmt::format("= \"{}\" is not the name of a [[source]] of this file", keys.source)
+                       : "source is missing: it must be the name of a [[source]]");
+  }
+  const ListenKeys listen{.address = keys.address, .allow_remote = keys.allow_remote};
+  if (keys.address.empty()) {
+    table.complain("address", "is empty, but a facade must listen somewhere, such as on 127.0.0.1");
+  } else if (auto checked = checkListen(listen); !checked) {
+    table.complain("address", checked.error().message);
+  }
+  return keys;
+}
+
+ConfiguredFacade readFacade(settings::Table& table, const std::set<std::string>& sources) {
+  const auto facades = allFacades();
+  FacadeKeys keys = readFacadeKeys(table, sources);
+  std::string fingerprint = table.resolve("").string() + "\n" + table.canonicalText() + "\n" + stampsOf(table);
+  const auto kind = std::ranges::find(facades, std::string_view{keys.kind}, &FacadeKind::name);
+  FacadeKind::Start start;
+  if (kind != facades.end() && kind->not_built.empty()) {
+    start = kind->read(table);
+  } else {
+    table.complain(table.has("kind") ? "kind" : "",
+                   kind != facades.end() ? fmt::format("= \"{}\" is {}", keys.kind, kind->not_built)
+                   : table.has("kind")
+                       ? fmt::format("= \"{}\" is no facade; there are: {}", keys.kind, namesOf(facades))
+                       : fmt::format("kind is missing: it must be one of {}", namesOf(facades)));
+    table.acceptAll();  // whose keys the others are cannot be told
+  }
+  return {std::move(keys), std::move(fingerprint), std::move(start)};
+}
+
 std::filesystem::path recordingFolder(const DaemonKeys& keys, const settings::Table& table) {
   if (!keys.recording_folder.empty())
     return table.resolve(keys.recording_folder).lexically_normal();
@@ -141,6 +185,9 @@ Result<Config> readConfig(settings::Table& table, std::span<const drivers::Drive
   std::set<std::string> names;
   for (settings::Table& below : table.tables("source")) {
     config.sources.push_back(readSource(below, drivers, running, names));
+  }
+  for (settings::Table& below : table.tables("facade")) {
+    config.facades.push_back(readFacade(below, names));
   }
   if (auto checked = table.check(); !checked) return checked.error();
   config.recording_folder = recordingFolder(config.keys, table);
@@ -196,6 +243,11 @@ std::string documentConfig(std::span<const drivers::Driver> drivers) {
     text += fmt::format("\n### A `[[source]]` with `driver = \"{}\"`: {}\n\n", driver.name,
                         driver.summary);
     text += driver.document();
+  }
+  text += "\n### Every `[[facade]]`\n\n" + markdownTable(keysOf<FacadeKeys>());
+  for (const FacadeKind& facade : allFacades()) {
+    text += fmt::format("\n### A `[[facade]]` with `kind = \"{}\"`: {}\n\n", facade.name, facade.summary);
+    text += facade.document();
   }
   return text;
 }

@@ -11,6 +11,7 @@
 #include <toftwin/result.h>
 #include <toftwin/units.h>
 
+#include "daemon/facades/facade.h"
 #include "drivers/source.h"
 #include "protocol/settings/settings.h"
 
@@ -141,9 +142,17 @@ struct ConfiguredSource {
   Result<std::unique_ptr<drivers::Source>> opened = Error{};
 };
 
+/// A facade as configured; `start` starts it.
+struct ConfiguredFacade {
+  FacadeKeys keys;
+  std::string fingerprint;  ///< equal for those that need not be started anew on a reload
+  FacadeKind::Start start;
+};
+
 struct Config {
   DaemonKeys keys;
   std::vector<ConfiguredSource> sources;
+  std::vector<ConfiguredFacade> facades;
   std::filesystem::path recording_folder;  ///< absolute, or empty
 };
 
@@ -161,7 +170,7 @@ Result<Config> parseConfig(std::string_view toml, const std::filesystem::path& n
 /// Whether the daemon may listen there: a non-loopback address needs `allow_remote`.
 Result<> checkListen(const ListenKeys& listen);
 
-/// All keys as Markdown: the daemon's, those of a source, those of each driver.
+/// All keys as Markdown: the daemon's, those of a source, those of each driver, those of each facade.
 std::string documentConfig(std::span<const drivers::Driver> drivers);
 
 }  // namespace toftwin::daemon

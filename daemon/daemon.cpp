@@ -88,6 +88,7 @@ Daemon::Daemon(Options options, const Config& config)
     : options_(std::move(options)),
       hub_(hubOptions(config), *options_.clock),
       server_(io_, hub_, serverOptions(config.keys.limits)),
+      facades_(io_, hub_, *options_.clock),
       signals_(io_),
       watchdog_(io_),
       listen_(config.keys.listen) {}
@@ -159,6 +160,7 @@ void Daemon::apply(Config config) {
       std::erase_if(running_, [&](const Running& running) { return running.name == name; });
     }
   }
+  facades_.apply(std::move(config.facades));
 }
 
 void Daemon::applyKeys(const Config& config) {
@@ -305,6 +307,7 @@ void Daemon::beginStop() {
   boost::system::error_code ignored;
   for (const int number : {SIGTERM, SIGINT}) signals_.remove(number, ignored);
   signals_.cancel(ignored);
+  facades_.stop();
   std::vector<std::shared_ptr<void>> all;
   for (const Running& running : running_) {
     for (auto& thing : hub_.remove(running.name)) all.push_back(std::move(thing));

@@ -21,6 +21,7 @@
 
 #include "daemon/clock.h"
 #include "daemon/config.h"
+#include "daemon/facades/facades.h"
 #include "daemon/hub.h"
 #include "daemon/server.h"
 #include "drivers/source.h"
@@ -86,6 +87,7 @@ class Daemon {
   boost::asio::io_context io_{1};
   Hub hub_;
   Server server_;
+  Facades facades_;
   boost::asio::signal_set signals_;
   boost::asio::steady_timer watchdog_;
   ListenKeys listen_;

@@ -25,19 +25,20 @@ using asio::ip::tcp;
 using boost::system::error_code;
 using Local = asio::local::stream_protocol;
 
-Error cannotListen(const std::string& where, const error_code& fault, const std::string& holder) {
+Error cannotListen(const std::string& where, const error_code& fault, const std::string& holder,
+                   std::string_view setting) {
   using Code = Error::Code;
   const int number = fault.value();
   if (number == EADDRINUSE) {
-    return {Code::Busy, fmt::format("{} is in use by {}: stop that, or choose another port with "
-                                    "listen.port or --port",
-                                    where, holder)};
+    return {Code::Busy, fmt::format("{} is in use by {}: stop that, or choose another port with {}", where, holder,
+                                    setting)};
   }
   if (number == EACCES) {
     return {Code::PermissionDenied,
             fmt::format("{} may not be used by this user: ports below 1024 are "
-                        "for root; choose a higher one with listen.port or --port",
-                        where)};
+                        "for root; choose a higher one with {}, or give the daemon "
+                        "CAP_NET_BIND_SERVICE",
+                        where, setting)};
   }
   if (number == EADDRNOTAVAIL) {
     return {Code::InvalidArgument,
@@ -156,14 +157,14 @@ std::string whoListensOn(std::uint16_t port) {
 }
 
 Result<tcp::acceptor> listenTcp(asio::io_context& io, const std::string& address,
-                                std::uint16_t port) {
+                                std::uint16_t port, std::string_view setting) {
   const std::string where = fmt::format("TCP port {} of {}", port, address);
   error_code fault;
   const auto ip = asio::ip::make_address(address == "localhost" ? "127.0.0.1" : address, fault);
   if (fault) {
     return Error{
         Error::Code::InvalidArgument,
-        fmt::format("listen.address = \"{}\" is no IP address, such as 127.0.0.1 or ::1", address)};
+        fmt::format("the address \"{}\" is no IP address, such as 127.0.0.1 or ::1", address)};
   }
   tcp::acceptor acceptor{io};
   const tcp::endpoint endpoint{ip, port};
@@ -171,7 +172,7 @@ Result<tcp::acceptor> listenTcp(asio::io_context& io, const std::string& address
   if (!fault) acceptor.set_option(tcp::acceptor::reuse_address{true}, fault);
   if (!fault) acceptor.bind(endpoint, fault);
   if (!fault) acceptor.listen(asio::socket_base::max_listen_connections, fault);
-  if (fault) return cannotListen(where, fault, whoListensOn(port));
+  if (fault) return cannotListen(where, fault, whoListensOn(port), setting);
   return acceptor;
 }
 
@@ -193,7 +194,7 @@ Result<UnixListener> UnixListener::open(asio::io_context& io, const fs::path& pa
   // As open as the loopback port beside it, which every user of this machine can reach, too. Who
   // wants less closes the folder.
   if (!fault && ::chmod(path.c_str(), 0666) != 0) fault = {errno, boost::system::system_category()};
-  if (fault) return cannotListen(path.string(), fault, "another process");
+  if (fault) return cannotListen(path.string(), fault, "another process", "listen.socket");
   return UnixListener{path, *std::move(lock), std::move(acceptor)};
 }
 

@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <string_view>
 
 #include <toftwin/result.h>
 
@@ -17,9 +18,11 @@
 
 namespace toftwin::daemon {
 
-/// Listens on a TCP port; port 0 is any free one. An error names who holds the port and what to do.
+/// Listens on a TCP port; port 0 is any free one. An error names who holds the port and what to do: change
+/// `setting`.
 Result<boost::asio::ip::tcp::acceptor> listenTcp(boost::asio::io_context& io,
-                                                 const std::string& address, std::uint16_t port);
+                                                 const std::string& address, std::uint16_t port,
+                                                 std::string_view setting = "listen.port or --port");
 
 /// A Unix socket that this process alone listens on. A lock file beside it tells a second daemon,
 /// whose pid it names; a socket that a killed daemon left behind is replaced.

@@ -209,8 +209,13 @@ bool SourceHost::restoreSettings() {
 void SourceHost::noteState() {
   auto state = inDriver([&]() -> Result<drivers::SourceState> { return source_->state(); });
   if (!state) return noteError(state.error());
+  auto info = inDriver([&]() -> Result<drivers::SourceInfo> { return source_->info(); });
+  if (!info) return noteError(info.error());
   const std::scoped_lock lock{mutex_};
   state_ = *std::move(state);
+  if (!info_) return;
+  info_->frame_interval = info->frame_interval;
+  info_->can_trigger = info->can_trigger;
 }
 
 /// Opens the source again when it is time to; else waits for that, for a command, or for the stop.

@@ -32,9 +32,27 @@ ClockRelation relateToHost(DeviceTime device, SteadyTime at) {
           .uncertainty_ns = duration_cast<nanoseconds>(half).count()};
 }
 
-Pacer::Pacer(Pace pace, Duration frame_interval)
-    : pace_(pace),
-      interval_ns_(std::max<std::int64_t>(1, std::llround(frame_interval.in(nanosecond)))) {}
+namespace {
+
+std::int64_t nanosecondsOf(Duration frame_interval) {
+  return std::max<std::int64_t>(1, std::llround(frame_interval.in(nanosecond)));
+}
+
+}  // namespace
+
+Pacer::Pacer(Pace pace, Duration frame_interval) : pace_(pace), interval_ns_(nanosecondsOf(frame_interval)) {}
+
+void Pacer::setInterval(Duration frame_interval) {
+  base_ns_ = deviceTime().ns;
+  base_index_ = index_;
+  interval_ns_ = nanosecondsOf(frame_interval);
+}
+
+void Pacer::setPace(Pace pace) {
+  pace_ = pace;
+  since_.reset();  // what was not paced is not caught up with
+  triggers_ = 0;
+}
 
 void Pacer::restart() {
   since_.reset();

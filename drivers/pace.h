@@ -44,11 +44,14 @@ class Pacer {
   /// The frame was made.
   void advance() { ++index_; }
   void trigger() { ++triggers_; }
+  /// From the next frame on; device time goes on from where it is.
+  void setInterval(Duration frame_interval);
+  void setPace(Pace pace);
 
   /// Of the next frame since the source was opened, lost ones counted.
   [[nodiscard]] std::uint64_t index() const { return index_; }
   [[nodiscard]] DeviceTime deviceTime() const {
-    return {static_cast<std::int64_t>(index_) * interval_ns_};
+    return {base_ns_ + static_cast<std::int64_t>(index_ - base_index_) * interval_ns_};
   }
   /// Unknown unless the last turn was paced in real time.
   [[nodiscard]] const ClockRelation& clock() const { return clock_; }
@@ -57,6 +60,8 @@ class Pacer {
   Pace pace_;
   std::int64_t interval_ns_;
   std::uint64_t index_ = 0;
+  std::uint64_t base_index_ = 0;  ///< of the first frame with this interval,
+  std::int64_t base_ns_ = 0;      ///< and its device time
   std::uint64_t triggers_ = 0;
   std::optional<SteadyTime> since_;  ///< when device time 0 was, if paced in real time
   ClockRelation clock_;

@@ -19,9 +19,10 @@ namespace toftwin::drivers::simulator {
 namespace {
 
 constexpr std::string_view kAmbient = "ambient_klx", kSincePowerOn = "since_power_on_s",
-                           kTemperature = "room_temperature_c";
+                           kTemperature = "room_temperature_c", kFrameRate = "frame_rate_hz",
+                           kTriggered = "triggered";
 constexpr Bounds kAmbientBounds_klx{0.0, 200.0}, kSincePowerOnBounds_s{0.0, 1e9},
-    kTemperatureBounds_c{-40.0, 100.0};
+    kTemperatureBounds_c{-40.0, 100.0}, kFrameRateBounds_hz{0.001, 1000.0}, kTriggeredBounds{0.0, 1.0};
 
 Transform<World, Camera> startPose(const Keys& keys) {
   constexpr double kToRadian = degree.in_si;
@@ -56,7 +57,7 @@ SourceInfo describe(const Keys& keys, const sim::SensorModel& model,
   info.can_trigger = keys.pace == Pace::Trigger;
   info.can_lockstep = true;
   info.parameters = model.parameterNames();
-  for (std::string_view name : {kAmbient, kSincePowerOn, kTemperature})
+  for (std::string_view name : {kAmbient, kSincePowerOn, kTemperature, kFrameRate, kTriggered})
     info.parameters.emplace_back(name);
   return info;
 }
@@ -123,6 +124,9 @@ class SimulatedSource final : public Source {
     state.parameters.push_back({std::string{kSincePowerOn}, {}, kSincePowerOnBounds_s});
     state.parameters.push_back(
         {std::string{kTemperature}, room_temperature_.in(celsius), kTemperatureBounds_c});
+    state.parameters.push_back(
+        {std::string{kFrameRate}, 1.0 / info_.frame_interval->in(second), kFrameRateBounds_hz});
+    state.parameters.push_back({std::string{kTriggered}, info_.can_trigger ? 1.0 : 0.0, kTriggeredBounds});
     return state;
   }
 
@@ -160,6 +164,8 @@ class SimulatedSource final : public Source {
       since_power_on_ = now - deviceDuration();
       return {};
     }
+    if (name == kFrameRate) return setFrameRate(value);
+    if (name == kTriggered) return setTriggered(value);
     auto changed = model_.with(name, value);
     if (!changed) {
       return changed.error().code != Error::Code::NotFound
@@ -191,6 +197,29 @@ class SimulatedSource final : public Source {
     }
     quantity = value * unit;
     collected_.reset();
+    return {};
+  }
+
+  Result<> setFrameRate(double value_hz) {
+    Frequency rate;
+    if (auto within = set(rate, value_hz, kFrameRateBounds_hz, hertz, kFrameRate); !within) return within;
+    const Duration interval = (1.0 / value_hz) * second;
+    if (auto fits = exposuresFit(model_, interval); !fits) return fits;
+    pacer_.setInterval(interval);
+    info_.frame_interval = interval;
+    return {};
+  }
+
+  /// 1: a frame per trigger; 0: at the pace of the configuration, or in real time if that was the trigger's.
+  Result<> setTriggered(double value) {
+    if (value != 0.0 && value != 1.0) {
+      return Error{Error::Code::InvalidArgument,
+                   fmt::format("{} = {} is out of bounds: it must be 0 (free run) or 1 (by trigger)", kTriggered, value)};
+    }
+    const bool is_wanted = value == 1.0;
+    if (is_wanted == info_.can_trigger) return {};
+    pacer_.setPace(is_wanted ? Pace::Trigger : keys_.pace == Pace::Trigger ? Pace::RealTime : keys_.pace);
+    info_.can_trigger = is_wanted;
     return {};
   }
 

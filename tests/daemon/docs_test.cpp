@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "daemon/config.h"
+#include "daemon/facades/facade.h"
 #include "drivers/rig/rig_file.h"
 #include "drivers/source.h"
 #include "protocol/settings/describe.h"
@@ -37,6 +38,14 @@ TEST(Docs, OfEveryDriverHaveAllItsKeysAndARowInTheTable) {
     expectIn(fmt::format("drivers/{}.md", driver.name), driver.document());
     expectIn("drivers/README.md",
              fmt::format("| [{0}]({0}.md) | {1} |\n", driver.name, driver.summary));
+  }
+}
+
+TEST(Docs, OfEveryFacadeHaveAllItsKeysAndARowInTheTable) {
+  expectIn("daemon.md", settings::markdownTable(settings::keysOf<daemon::FacadeKeys>()));
+  for (const daemon::FacadeKind& facade : daemon::allFacades()) {
+    expectIn(fmt::format("facades/{}.md", facade.name), facade.document());
+    expectIn("daemon.md", fmt::format("| [{0}](facades/{0}.md) | {1} |\n", facade.name, facade.summary));
   }
 }
 

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <utility>  // before asio: Boost 1.74 uses std::exchange without it
+
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
+
+#include <chrono>
+#include <functional>
+#include <memory>
+
+namespace toftwin::daemon {
+
+/// Takes connections one after another. Where accept(2) fails, for want of file descriptors say, it waits a moment
+/// instead of failing at full speed. Used on the acceptor's thread only.
+class Accepting {
+ public:
+  Accepting(boost::asio::ip::tcp::acceptor acceptor, std::function<void(boost::asio::ip::tcp::socket)> take)
+      : acceptor_(std::move(acceptor)),
+        pause_(acceptor_.get_executor()),
+        port_(acceptor_.local_endpoint().port()),
+        take_(std::move(take)) {
+    next();
+  }
+  ~Accepting() { *is_alive_ = false; }
+  Accepting(const Accepting&) = delete;
+  Accepting& operator=(const Accepting&) = delete;
+  [[nodiscard]] std::uint16_t port() const { return port_; }
+
+ private:
+  void next() {
+    acceptor_.async_accept([this, alive = is_alive_](boost::system::error_code error,
+                                                     boost::asio::ip::tcp::socket socket) {
+      if (!*alive || error == boost::asio::error::operation_aborted) return;
+      struct GoOn {  // also where taking it throws
+        Accepting& accepting;
+        bool has_failed;
+        ~GoOn() { has_failed ? accepting.nextAfterAWhile() : accepting.next(); }
+      } const go_on{*this, static_cast<bool>(error)};
+      if (!error) take_(std::move(socket));
+    });
+  }
+  void nextAfterAWhile() {
+    pause_.expires_after(std::chrono::milliseconds{100});
+    pause_.async_wait([this, alive = is_alive_](boost::system::error_code cancelled) {
+      if (!cancelled && *alive) next();
+    });
+  }
+
+  boost::asio::ip::tcp::acceptor acceptor_;
+  boost::asio::steady_timer pause_;
+  const std::uint16_t port_;
+  const std::function<void(boost::asio::ip::tcp::socket)> take_;
+  const std::shared_ptr<bool> is_alive_ = std::make_shared<bool>(true);  // shared with handlers that come later
+};
+
+}  // namespace toftwin::daemon

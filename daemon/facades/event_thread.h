@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <utility>  // before asio: Boost 1.74 uses std::exchange without it
+
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/io_context.hpp>
+
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+
+namespace toftwin::daemon {
+
+/// A facade's one thread, on which all its handlers run. Whatever they throw is logged, and the others run on.
+class EventThread {
+ public:
+  /// How other threads reach it; they may keep it longer than the thread lasts.
+  class Door {
+   public:
+    explicit Door(boost::asio::io_context& io) : io_(&io) {}
+    /// Runs `work` on the thread; drops it if the thread has been stopped.
+    void post(std::function<void()> work);
+
+   private:
+    friend class EventThread;
+    void close();
+    std::mutex mutex_;
+    boost::asio::io_context* io_;
+  };
+
+  explicit EventThread(std::string name);
+  ~EventThread() { stop(); }
+  EventThread(const EventThread&) = delete;
+  EventThread& operator=(const EventThread&) = delete;
+
+  /// For what is made before start(), and on the thread itself.
+  [[nodiscard]] boost::asio::io_context& io() { return io_; }
+  /// Shared with everyone who may still want to post when the thread is gone.
+  [[nodiscard]] const std::shared_ptr<Door>& door() const { return door_; }
+  void start();
+  /// Waits for the handler that runs; none runs afterwards.
+  void stop();
+
+ private:
+  void run();
+
+  const std::string name_;
+  boost::asio::io_context io_{1};
+  boost::asio::executor_work_guard<boost::asio::io_context::executor_type> stay_{io_.get_executor()};
+  const std::shared_ptr<Door> door_ = std::make_shared<Door>(io_);
+  std::jthread thread_;
+};
+
+}  // namespace toftwin::daemon

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <utility>  // before asio: Boost 1.74 uses std::exchange without it
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include <toftwin/result.h>
+
+#include "daemon/clock.h"
+#include "daemon/hub.h"
+#include "protocol/settings/settings.h"
+
+namespace toftwin::daemon {
+
+/// What every [[facade]] has; the other keys are its kind's.
+struct FacadeKeys {
+  std::string kind;
+  std::string source;
+  std::string address = "127.0.0.1";
+  bool allow_remote = false;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.text("kind", kind, "one of the facades below: the language that is spoken");
+    v.text("source", source, "name of the [[source]] that is shown");
+    v.text("address", address, "where it listens, with the ports of its kind");
+    v.flag("allow_remote", allow_remote,
+           "allows an address that other machines reach. Whatever the language is, it has no encryption and "
+           "at most a password in clear text: everyone who reaches the ports sees the source and can set it. "
+           "Only for a network that you trust whole");
+  }
+};
+
+/// One source in another language, on sockets and a thread of its own. Its destructor closes them.
+class Facade {
+ public:
+  virtual ~Facade() = default;
+  /// Where clients find it, for the log: "XML-RPC on 127.0.0.1 port 80".
+  [[nodiscard]] virtual std::string where() const = 0;
+};
+
+/// What a facade is started with.
+struct FacadePlace {
+  FacadeKeys keys;
+  Hub& hub;
+  const Clock& clock;
+};
+
+/// One row of the table of facades.
+struct FacadeKind {
+  using Start = std::function<Result<std::unique_ptr<Facade>>(const FacadePlace&)>;
+
+  std::string_view name;
+  std::string_view summary;
+  /// Reads the facade's own keys, tells the table what is wrong with them, and gives what starts it.
+  Start (*read)(settings::Table& keys);
+  /// The facade's keys as a Markdown table.
+  std::string (*document)();
+  /// Empty, or why this build lacks it and what to do.
+  std::string_view not_built = {};
+};
+
+/// All facades, in the order of the documents.
+std::span<const FacadeKind> allFacades();
+
+/// A TCP listener of a facade; `key` is what sets the port.
+Result<boost::asio::ip::tcp::acceptor> listenFor(boost::asio::io_context& io, const FacadeKeys& keys,
+                                                 std::uint16_t port, std::string_view key);
+
+}  // namespace toftwin::daemon

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <utility>  // before asio: Boost 1.74 uses std::exchange without it
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/steady_timer.hpp>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "daemon/config.h"
+#include "daemon/facades/facade.h"
+
+namespace toftwin::daemon {
+
+/// The facades of a running daemon. One that cannot start, because its port is in use, say, is told in the log
+/// and tried again; the daemon serves its other clients meanwhile. Used on the thread of the io_context only.
+class Facades {
+ public:
+  Facades(boost::asio::io_context& io, Hub& hub, const Clock& clock)
+      : hub_(hub), clock_(clock), pause_(io) {}
+
+  /// Makes what runs what is configured. Those that are configured as before run on.
+  void apply(std::vector<ConfiguredFacade> configured);
+  /// Closes all; may wait for what a facade does at that moment.
+  void stop();
+
+ private:
+  struct Running {
+    ConfiguredFacade configured;
+    std::unique_ptr<Facade> facade;  ///< null: to be tried again
+    std::string last_error;
+  };
+  void start(Running& one);
+  void startThoseThatAreNot();
+
+  Hub& hub_;
+  const Clock& clock_;
+  boost::asio::steady_timer pause_;
+  std::vector<Running> running_;
+};
+
+}  // namespace toftwin::daemon

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <utility>  // before asio: Boost 1.74 uses std::exchange without it
+
+#include <boost/asio/ip/tcp.hpp>
+
+#include <functional>
+#include <memory>
+#include <set>
+#include <string>
+
+#include "daemon/facades/accepting.h"
+
+namespace toftwin::daemon::o3d303 {
+
+/// XML over HTTP: the camera's configuration port. A client that stalls is closed after half a minute and holds up
+/// nobody. Used on the facade's thread only.
+class HttpServer {
+ public:
+  using Answer = std::function<void(std::string xml)>;
+  /// Called with a request's path and body; the answer may be given later.
+  using Ask = std::function<void(std::string path, std::string body, Answer)>;
+
+  HttpServer(boost::asio::ip::tcp::acceptor acceptor, Ask ask);
+  ~HttpServer();
+  HttpServer(const HttpServer&) = delete;
+  HttpServer& operator=(const HttpServer&) = delete;
+
+  [[nodiscard]] std::uint16_t port() const { return accepting_.port(); }
+  /// Closes all connections and takes no more, or takes them again.
+  void setOpen(bool is_open);
+
+ private:
+  class Connection;
+  void take(boost::asio::ip::tcp::socket socket);
+
+  const Ask ask_;
+  bool is_open_ = true;
+  std::set<std::shared_ptr<Connection>> connections_;  // shared with their handlers
+  const std::shared_ptr<bool> is_alive_ = std::make_shared<bool>(true);
+  Accepting accepting_;
+};
+
+}  // namespace toftwin::daemon::o3d303

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/facades/o3d303/images.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "daemon/facades/o3d303/inverse_lens.h"
+#include "drivers/o3d303/wire/confidence.h"
+
+namespace toftwin::daemon::o3d303 {
+namespace {
+
+using toftwin::o3d303::Confidence;
+
+constexpr double kMost = std::numeric_limits<std::uint16_t>::max();
+constexpr double kMillimetres = 1000.0;
+constexpr std::size_t kMostExposures = 3;
+
+/// 0 for what is no number, or does not fit.
+std::uint16_t countsOf(double value) {
+  return value > 0.0 && value <= kMost ? static_cast<std::uint16_t>(std::lround(value)) : std::uint16_t{0};
+}
+
+const Plane* planeOf(const Frame& frame, PlaneKind kind, ElementType type) {
+  const Plane* plane = frame.find(kind);
+  return plane != nullptr && plane->type == type && plane->width == frame.camera.width &&
+                 plane->height == frame.camera.height
+             ? plane
+             : nullptr;
+}
+
+Result<std::vector<std::uint16_t>> distancesOf(const Frame& frame, const LensChunks& lens) {
+  const Plane* range = planeOf(frame, PlaneKind::Range, ElementType::F32);
+  const Plane* depth = planeOf(frame, PlaneKind::Depth, ElementType::F32);
+  if (range == nullptr && depth == nullptr) {
+    return Error{Error::Code::Unsupported, "the source has neither range nor depth, which an O3D303 is made of"};
+  }
+  const auto metres = (range != nullptr ? range : depth)->as<float>();
+  std::vector<std::uint16_t> distance_mm(metres.size());
+  for (std::size_t i = 0; i < metres.size(); ++i) {
+    const double per_range = range != nullptr ? 1.0 : static_cast<double>(lens.unit_vectors[3 * i + 2]);
+    distance_mm[i] = countsOf(kMillimetres * static_cast<double>(metres[i]) / per_range);
+  }
+  return distance_mm;
+}
+
+/// 11: the longest exposure, 10: the shorter one, 01: the shortest of three (the vendor's description).
+unsigned exposureBits(unsigned index) {
+  return (3U - std::min(index, 2U)) << 4;
+}
+
+}  // namespace
+
+FrameFacts factsOf(const Frame& frame) {
+  std::set<std::uint32_t> durations_us;
+  std::set<double> modulations;
+  for (const Exposure& one : frame.moment.exposures) {
+    durations_us.insert(static_cast<std::uint32_t>(std::lround(std::clamp(one.duration.in(microsecond), 0.0, 1e9))));
+    if (one.modulation > 0_Hz) modulations.insert(one.modulation.in(hertz));
+  }
+  FrameFacts facts;
+  facts.exposures_us.assign(durations_us.begin(), durations_us.end());
+  if (facts.exposures_us.size() > kMostExposures) facts.exposures_us = {facts.exposures_us.back()};
+  facts.frequencies = std::clamp(static_cast<int>(modulations.size()), 1, 3);
+  for (const NamedTemperature& one : frame.moment.temperatures) {
+    if (one.where == "illumination") facts.illumination_c = one.value.in(celsius);
+  }
+  return facts;
+}
+
+LensChunks lensChunksOf(const CameraInfo& camera) {
+  LensChunks lens{camera, {}, {}, {}};
+  lens.unit_vectors.reserve(3 * static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height));
+  for (int v = 0; v < camera.height; ++v) {
+    for (int u = 0; u < camera.width; ++u) {
+      const Vec3d ray = rayThroughPixel(camera, u, v).v;
+      for (const double e : {ray.x, ray.y, ray.z}) lens.unit_vectors.push_back(static_cast<float>(e));
+    }
+  }
+  // fx fy mx my alpha k1 k2 k5 k3 k4, then the optics against the housing: none.
+  const auto chunkOf = [&](const std::array<double, 5>& d) {
+    std::array<float, 16> chunk{};
+    std::size_t i = 0;
+    for (const double number : {camera.fx, camera.fy, camera.cx, camera.cy, 0.0, d[0], d[1], d[4], d[2], d[3]}) {
+      chunk[i++] = static_cast<float>(number);
+    }
+    return chunk;
+  };
+  lens.intrinsics = chunkOf(camera.distortion);
+  lens.inverse_intrinsics = chunkOf(inverseDistortion(camera));
+  return lens;
+}
+
+namespace {
+
+/// What every chunk of the frame says of it.
+void describe(const Frame& frame, toftwin::o3d303::CameraFrame& wire) {
+  wire.width = static_cast<std::uint32_t>(frame.camera.width);
+  wire.height = static_cast<std::uint32_t>(frame.camera.height);
+  wire.frame_count = static_cast<std::uint32_t>(frame.sequence);
+  const std::int64_t ns = std::max<std::int64_t>(
+      0, frame.moment.exposures.empty() ? frame.moment.received.ns : frame.moment.exposures.front().start.ns);
+  wire.time = {static_cast<std::uint32_t>(ns / 1'000'000'000),
+                      static_cast<std::uint32_t>(ns % 1'000'000'000)};
+  wire.time_us = static_cast<std::uint32_t>(ns / 1000);
+  const FrameFacts facts = factsOf(frame);
+  for (std::size_t i = 0; i < facts.exposures_us.size(); ++i) wire.exposures_us[i] = facts.exposures_us[i];
+  constexpr float kNoSensor_c = 3276.7F;
+  wire.illumination_c = facts.illumination_c ? static_cast<float>(*facts.illumination_c) : kNoSensor_c;
+}
+
+}  // namespace
+
+Result<CameraImages> imagesOf(const Frame& frame, const LensChunks& lens, double electrons_per_count) {
+  auto distance_mm = distancesOf(frame, lens);
+  if (!distance_mm) return distance_mm.error();
+  CameraImages images;
+  images.distance_mm = *std::move(distance_mm);
+  const std::size_t pixels = images.distance_mm.size();
+  images.amplitude.resize(pixels);
+  images.confidence.resize(pixels);
+  const Plane* amplitude = planeOf(frame, PlaneKind::Amplitude, ElementType::F32);
+  const Plane* flags = planeOf(frame, PlaneKind::Flags, ElementType::U8);
+  const Plane* exposure = planeOf(frame, PlaneKind::Exposure, ElementType::U8);
+  for (std::size_t i = 0; i < pixels; ++i) {
+    if (amplitude != nullptr) {
+      const double counts = static_cast<double>(amplitude->as<float>()[i]) / electrons_per_count;
+      images.amplitude[i] = countsOf(std::min(counts, kMost));
+    }
+    unsigned confidence =
+        flags != nullptr ? toftwin::o3d303::confidenceOf(flags->as<std::uint8_t>()[i]) : std::uint8_t{0};
+    confidence |= exposureBits(exposure != nullptr ? exposure->as<std::uint8_t>()[i] : 0U);
+    if (images.distance_mm[i] == 0) confidence |= static_cast<unsigned>(Confidence::Invalid);
+    if ((confidence & static_cast<unsigned>(Confidence::Invalid)) != 0) images.distance_mm[i] = 0;
+    images.confidence[i] = static_cast<std::uint8_t>(confidence);
+  }
+  describe(frame, images.wire);
+  images.wire.distance_mm = images.distance_mm;
+  images.wire.amplitude = images.wire.raw_amplitude = images.amplitude;
+  images.wire.confidence = images.confidence;
+  images.wire.unit_vectors = lens.unit_vectors;
+  images.wire.intrinsics = lens.intrinsics;
+  images.wire.inverse_intrinsics = lens.inverse_intrinsics;
+  return images;
+}
+
+}  // namespace toftwin::daemon::o3d303

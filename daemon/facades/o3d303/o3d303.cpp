@@ -1,0 +1,355 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <boost/asio/steady_timer.hpp>
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <deque>
+#include <memory>
+#include <optional>
+
+#include "daemon/facades/event_thread.h"
+#include "daemon/facades/o3d303/device.h"
+#include "daemon/facades/o3d303/discovery.h"
+#include "daemon/facades/o3d303/http_server.h"
+#include "daemon/facades/o3d303/images.h"
+#include "daemon/facades/o3d303/keys.h"
+#include "daemon/facades/o3d303/pcic_server.h"
+#include "daemon/facades/o3d303/unevenness.h"
+#include "daemon/facades/source_link.h"
+#include "protocol/settings/describe.h"
+
+namespace toftwin::daemon::o3d303 {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::steady_clock;
+using toftwin::o3d303::XmlRpcAnswer;
+using toftwin::o3d303::XmlRpcFault;
+
+constexpr std::chrono::seconds kTick{1}, kTriggerLost{10};
+constexpr std::size_t kMostHeldBack = 64;
+constexpr int kApplicationChanged = 500'000;
+constexpr double kCooled_k = 2.0;  ///< below the limit, until it may be too hot anew
+
+/// A locally administered address, always the same for a source's name (FNV-1a).
+std::array<std::uint8_t, 6> macOf(std::string_view source) {
+  std::uint64_t hash = 0xcbf2'9ce4'8422'2325;
+  for (const char c : source) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100'0000'01b3;
+  std::array<std::uint8_t, 6> mac{0x02};
+  for (std::size_t i = 1; i < mac.size(); ++i) mac[i] = static_cast<std::uint8_t>(hash >> (8 * i));
+  return mac;
+}
+
+std::string textOf(const std::array<std::uint8_t, 6>& mac) {
+  return fmt::format("{:02X}:{:02X}:{:02X}:{:02X}:{:02X}:{:02X}", mac[0], mac[1], mac[2], mac[3], mac[4], mac[5]);
+}
+
+XmlRpcFault faultOf(const Error& error) {
+  using Code = Error::Code;
+  const int code = error.code == Code::InvalidArgument                                   ? Fault::kOutOfRange
+                   : error.code == Code::NotFound || error.code == Code::Unsupported ? Fault::kReadOnly
+                                                                                       : Fault::kInternal;
+  return {code, error.message};
+}
+
+class O3d303Facade final : public Facade {
+ public:
+  O3d303Facade(Keys keys, Unevenness unevenness, const FacadePlace& place)
+      : keys_(std::move(keys)),
+        unevenness_(std::move(unevenness)),
+        place_(place),
+        thread_("facade o3d303 of " + place.keys.source),
+        link_(thread_, place.hub,
+              {.source = place.keys.source,
+               .planes = {PlaneKind::Range, PlaneKind::Depth, PlaneKind::Amplitude, PlaneKind::Flags,
+                          PlaneKind::Exposure}},
+              [this](const Frame& frame) { takeFrame(frame); }),
+        tick_(thread_.io()),
+        leave_(thread_.io()),
+        began_(steady_clock::now()) {}
+
+  ~O3d303Facade() override { thread_.stop(); }
+
+  Result<> open() {
+    auto xmlrpc = listenFor(thread_.io(), place_.keys, static_cast<std::uint16_t>(keys_.xmlrpc_port), "xmlrpc_port");
+    if (!xmlrpc) return xmlrpc.error();
+    auto pcic = listenFor(thread_.io(), place_.keys, static_cast<std::uint16_t>(keys_.pcic_port), "pcic_port");
+    if (!pcic) return pcic.error();
+    const int xmlrpc_port = xmlrpc->local_endpoint().port(), pcic_port = pcic->local_endpoint().port();
+    const auto mac = macOf(place_.keys.source);
+    device_.emplace(Device::Identity{.name = keys_.name,
+                                     .password = keys_.password,
+                                     .mac = textOf(mac),
+                                     .address = place_.keys.address,
+                                     .xmlrpc_port = xmlrpc_port,
+                                     .pcic_port = pcic_port});
+    http_.emplace(*std::move(xmlrpc), [this](std::string path, std::string body, HttpServer::Answer answer) {
+      ask(path, body, std::move(answer));
+    });
+    pcic_.emplace(*std::move(pcic),
+                  PcicServer::Hooks{.trigger = [this](auto done) { trigger(std::move(done)); },
+                                    .default_schema = [this] { return device_->defaultSchema(); },
+                                    .ask = [this](std::string_view command) { return tellOfDevice(command); },
+                                    .connections = [this](std::size_t count) { noteConnections(count); }});
+    if (keys_.discoverable) {
+      auto discovery = Discovery::listen(thread_.io(), place_.keys.address,
+                                         static_cast<std::uint16_t>(keys_.discovery_port),
+                                         {.port = static_cast<std::uint16_t>(xmlrpc_port),
+                                          .mac = mac,
+                                          .host_name = place_.keys.source,
+                                          .device_name = keys_.name});
+      // Who knows the address needs no search, and another camera of this machine may be the one that is found.
+      if (!discovery) spdlog::warn("facade o3d303 of {}: it cannot be searched for: {}", place_.keys.source,
+                                   discovery.error().message);
+      if (discovery) discovery_ = *std::move(discovery);
+    }
+    where_ = fmt::format("XML-RPC on {} port {}, PCIC on port {}{}", place_.keys.address, xmlrpc_port, pcic_port,
+                         discovery_ ? fmt::format(", found by searches on UDP port {}", keys_.discovery_port) : "");
+    link_.want(true);  // one frame, which says what kind of camera it is
+    tick();
+    thread_.start();
+    return {};
+  }
+  [[nodiscard]] std::string where() const override { return where_; }
+
+ private:
+  // ---- frames ------------------------------------------------------------------------------------
+
+  void takeFrame(const Frame& frame) {
+    triggered_at_.reset();
+    facts_ = factsOf(frame);
+    has_seen_frame_ = true;
+    device_s_ = frame.moment.exposures.empty() ? 0 : frame.moment.exposures.front().start.ns / 1'000'000'000;
+    if (frame.moment.since_power_on) {
+      powered_on_ = steady_clock::now() - std::chrono::duration_cast<steady_clock::duration>(std::chrono::duration<double>{
+                                              frame.moment.since_power_on->in(second)});
+    }
+    watchTemperature();
+    noteConnections(connections_);
+    if (connections_ == 0 || device_->isEditing()) return;
+    if (!lens_ || lens_->camera != frame.camera) {
+      lens_ = std::make_shared<const LensChunks>(lensChunksOf(frame.camera));
+    }
+    auto images = imagesOf(frame, *lens_, keys_.electrons_per_count);
+    if (!images) return complainOnce(images.error());
+    const auto t = device_->translation_mm();
+    images->wire.extrinsics = {t[0], t[1], t[2], 0.0F, 0.0F, 0.0F};
+    if (unevenness_.isNone()) return pcic_->publish(images->wire);
+    holdBack({steady_clock::now() + unevenness_.delay(taken_++),
+              std::make_shared<const CameraImages>(*std::move(images)), lens_});
+  }
+
+  void complainOnce(const Error& error) {
+    if (error.message != last_complaint_) spdlog::warn("facade o3d303 of {}: {}", place_.keys.source, error.message);
+    last_complaint_ = error.message;
+  }
+
+  /// A frame that waits until a real camera's would leave.
+  struct HeldBack {
+    steady_clock::time_point leaves;
+    std::shared_ptr<const CameraImages> images;
+    std::shared_ptr<const LensChunks> lens;  ///< shared with the images, which refer to it
+  };
+  void holdBack(HeldBack frame) {
+    if (held_back_.size() >= kMostHeldBack) return;
+    if (!held_back_.empty()) frame.leaves = std::max(frame.leaves, held_back_.back().leaves);
+    held_back_.push_back(std::move(frame));
+    if (held_back_.size() == 1) letLeave();
+  }
+  void letLeave() {
+    leave_.expires_at(held_back_.front().leaves);
+    leave_.async_wait([this](boost::system::error_code cancelled) {
+      if (cancelled || held_back_.empty()) return;
+      const HeldBack next = std::move(held_back_.front());
+      held_back_.pop_front();
+      if (!held_back_.empty()) letLeave();
+      if (!device_->isEditing()) pcic_->publish(next.images->wire);
+    });
+  }
+
+  void noteConnections(std::size_t count) {
+    connections_ = count;
+    link_.want(count > 0 || !has_seen_frame_);
+  }
+
+  void watchTemperature() {
+    if (!facts_.illumination_c) return;
+    const double limit_c = keys_.most_illumination.in(celsius);
+    if (*facts_.illumination_c > limit_c && !is_too_hot_) {
+      is_too_hot_ = true;
+      pcic_->tellError(PcicError::kIlluminationTooHot);
+    } else if (*facts_.illumination_c < limit_c - kCooled_k) {
+      is_too_hot_ = false;
+    }
+  }
+
+  void trigger(std::function<void(int)> done) {
+    refresh();
+    if (device_->isEditing() || !can_trigger_) return done(PcicError::kNoTriggerAllowed);
+    const auto now = steady_clock::now();
+    if (triggered_at_ && now - *triggered_at_ < kTriggerLost) return done(PcicError::kTriggerOverrun);
+    triggered_at_ = now;
+    link_.trigger([this, done](const Result<>& result) {
+      if (!result) triggered_at_.reset();
+      constexpr int kUnspecified = 100'000'003;
+      done(result ? 0 : result.error().code == Error::Code::Busy ? PcicError::kTriggerOverrun : kUnspecified);
+    });
+  }
+
+  // ---- configuration -----------------------------------------------------------------------------
+
+  void ask(const std::string& path, const std::string& body, HttpServer::Answer answer) {
+    constexpr int kNoXmlRpc = -503;
+    const auto call = toftwin::o3d303::readXmlRpcCall(body);
+    if (!call) return answer(encodeXmlRpc(XmlRpcAnswer{XmlRpcFault{kNoXmlRpc, call.error().message}}));
+    refresh();
+    Device::Outcome outcome = device_->answer(path, *call, steady_clock::now());
+    if (outcome.is_reboot) reboot();
+    if (outcome.changes.empty()) return finish(outcome, {}, answer);
+    change(outcome.changes, [this, outcome, answer](const Result<>& done) { finish(outcome, done, answer); });
+  }
+
+  void finish(const Device::Outcome& outcome, const Result<>& done, const HttpServer::Answer& answer) {
+    refresh();
+    answer(encodeXmlRpc(done ? outcome.answer : XmlRpcAnswer{faultOf(done.error())}));
+    if (!done || !outcome.has_saved) return;
+    const int index = device_->activeApplication();
+    pcic_->tellNotification(kApplicationChanged,
+                            fmt::format(R"({{"ID":{},"Index":{},"valid":true}})", 10'000 + index, index));
+  }
+
+  void change(const SourceChanges& changes, SourceLink::Done done) {
+    link_.post(
+        [changes](drivers::Source& source) -> Result<> {
+          for (const auto& [name, value] : changes) {
+            if (auto set = source.setParameter(name, value); !set) return set;
+          }
+          return {};
+        },
+        std::move(done));
+  }
+
+  /// What the source has now is what clients read.
+  void refresh() {
+    SourceFacts facts;
+    if (const auto description = link_.describe()) {
+      facts.parameters = description->parameters;
+      facts.can_trigger = description->can_trigger;
+      facts.width = description->camera.width;
+      facts.height = description->camera.height;
+      if (description->frame_interval && *description->frame_interval > 0_s) {
+        facts.frame_rate_hz = 1.0 / description->frame_interval->in(second);
+      }
+    }
+    can_trigger_ = facts.can_trigger;
+    facts.exposures_us = facts_.exposures_us;
+    facts.frequencies = facts_.frequencies;
+    facts.illumination_c = facts_.illumination_c;
+    facts.since_power_on_s =
+        std::chrono::duration<double>{steady_clock::now() - powered_on_.value_or(began_)}.count();
+    facts.device_s = device_s_;
+    device_->update(facts);
+  }
+
+  void tick() {
+    tick_.expires_after(kTick);
+    tick_.async_wait([this](boost::system::error_code cancelled) {
+      if (cancelled) return;
+      tick();
+      const SourceChanges undone = device_->expire(steady_clock::now());
+      if (undone.empty()) return;
+      change(undone, [this](const Result<>& done) {
+        if (!done) complainOnce(done.error());
+      });
+    });
+  }
+
+  void setOpen(bool is_open) {
+    http_->setOpen(is_open);
+    pcic_->setOpen(is_open);
+    if (discovery_) discovery_->setOpen(is_open);
+  }
+
+  /// After the answer is out.
+  void reboot() {
+    constexpr milliseconds kAnswerFirst{100};
+    const auto boot = std::chrono::duration_cast<steady_clock::duration>(
+        std::chrono::duration<double>{keys_.boot_time.in(second)});
+    auto timer = std::make_shared<boost::asio::steady_timer>(thread_.io(), kAnswerFirst);
+    timer->async_wait([this, timer, boot](boost::system::error_code) {
+      device_->restart();
+      setOpen(false);
+      timer->expires_after(boot);
+      timer->async_wait([this, timer](boost::system::error_code) { setOpen(true); });
+    });
+  }
+
+  /// The PCIC commands that ask.
+  std::string tellOfDevice(std::string_view command) {
+    if (command == "V?") return "03 01 04";  // the version in use, the oldest and the newest
+    if (command == "G?") {
+      return fmt::format("ifm electronic\tO3D303\t{}\t\t{}", device_->parameters().at("Name"), place_.keys.address);
+    }
+    if (command == "A?") {
+      const auto all = device_->applications();
+      std::string text = fmt::format("{:03}\t{:02}", all.size(), device_->activeApplication());
+      for (const int index : all) text += fmt::format("\t{:02}", index);
+      return text;
+    }
+    return {};
+  }
+
+  const Keys keys_;
+  const Unevenness unevenness_;
+  const FacadePlace place_;
+  std::string where_;
+  EventThread thread_;
+  SourceLink link_;
+  std::optional<Device> device_;
+  std::optional<HttpServer> http_;
+  std::optional<PcicServer> pcic_;
+  std::unique_ptr<Discovery> discovery_;
+  boost::asio::steady_timer tick_, leave_;
+  const steady_clock::time_point began_;
+
+  std::size_t connections_ = 0;
+  bool has_seen_frame_ = false, can_trigger_ = false, is_too_hot_ = false;
+  FrameFacts facts_;
+  std::int64_t device_s_ = 0;
+  std::optional<steady_clock::time_point> powered_on_, triggered_at_;
+  std::shared_ptr<const LensChunks> lens_;  // shared with frames that are held back
+  std::deque<HeldBack> held_back_;
+  std::uint64_t taken_ = 0;
+  std::string last_complaint_;
+};
+
+FacadeKind::Start read(settings::Table& table) {
+  Keys keys;
+  table.read(keys);
+  Unevenness unevenness;
+  if (!keys.intervals.empty()) {
+    auto loaded = Unevenness::load(table.resolve(keys.intervals));
+    if (!loaded) table.complain("intervals", "= " + loaded.error().message);
+    if (loaded) unevenness = *std::move(loaded);
+  }
+  return [keys, unevenness](const FacadePlace& place) -> Result<std::unique_ptr<Facade>> {
+    auto facade = std::make_unique<O3d303Facade>(keys, unevenness, place);
+    if (auto opened = facade->open(); !opened) return opened.error();
+    return std::unique_ptr<Facade>{std::move(facade)};
+  };
+}
+
+}  // namespace
+
+FacadeKind facade() {
+  return {.name = "o3d303",
+          .summary = "an ifm O3D303: XML-RPC, PCIC, the vendor's search",
+          .read = read,
+          .document = [] { return settings::markdownTable(settings::keysOf<Keys>()); }};
+}
+
+}  // namespace toftwin::daemon::o3d303

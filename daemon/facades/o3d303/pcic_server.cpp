@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/facades/o3d303/pcic_server.h"
+
+#include <boost/asio/write.hpp>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <deque>
+#include <optional>
+#include <vector>
+
+#include "daemon/facades/o3d303/commands.h"
+
+namespace toftwin::daemon::o3d303 {
+namespace {
+
+using boost::asio::ip::tcp;
+using boost::system::error_code;
+using toftwin::o3d303::Bytes;
+using toftwin::o3d303::Schema;
+
+constexpr std::size_t kMostConnections = 16;
+constexpr std::size_t kLongestCommand = 128 << 10;
+constexpr std::size_t kMostFramesWaiting = 3;     ///< for one connection; more are lost
+constexpr std::size_t kMostMessagesWaiting = 64;  ///< one that asks and never reads is closed
+/// Shared by the connections that send them.
+using SharedBytes = std::shared_ptr<const Bytes>;
+
+void closeHard(tcp::socket& socket) {
+  error_code ignored;
+  socket.close(ignored);
+}
+
+}  // namespace
+
+class PcicServer::Connection : public std::enable_shared_from_this<Connection> {
+ public:
+  Connection(PcicServer& server, tcp::socket socket)
+      : server_(server), alive_(server.is_alive_), socket_(std::move(socket)) {
+    error_code ignored;
+    socket_.set_option(tcp::no_delay{true}, ignored);
+    socket_.set_option(boost::asio::socket_base::keep_alive{true}, ignored);
+  }
+  /// What it gets a frame by; nothing if it wants none.
+  [[nodiscard]] std::optional<Schema> wanted() const {
+    if ((output_ & Output::kResults) == 0) return std::nullopt;
+    return schema_ ? *schema_ : server_.hooks_.default_schema();
+  }
+  [[nodiscard]] bool takes(unsigned output) const { return (output_ & output) != 0; }
+
+  void read() {
+    socket_.async_read_some(boost::asio::buffer(piece_),
+                            [self = shared_from_this()](error_code error, std::size_t size) {
+                              if (error || !*self->alive_) return self->close();
+                              self->reader_.feed(std::span{self->piece_}.first(size));
+                              if (self->obeyAll()) self->read();
+                            });
+  }
+  void send(SharedBytes bytes, bool is_frame) {
+    if (is_frame && frames_waiting_ >= kMostFramesWaiting) return;
+    if (queue_.size() >= kMostMessagesWaiting) return close();
+    frames_waiting_ += is_frame ? 1 : 0;
+    queue_.push_back({std::move(bytes), is_frame});
+    if (queue_.size() == 1) write();
+  }
+  void close() {
+    closeHard(socket_);
+    if (*alive_) server_.remove(shared_from_this());
+  }
+
+ private:
+  struct Waiting {
+    SharedBytes bytes;
+    bool is_frame;
+  };
+
+  /// False if the connection was closed.
+  bool obeyAll() {
+    while (true) {
+      auto message = reader_.next();
+      if (!message) return close(), false;
+      if (!*message) return true;
+      obey(**message);
+      if (!socket_.is_open()) return false;
+    }
+  }
+  void obey(const toftwin::o3d303::PcicMessage& message) {
+    const Command command = readCommand(toftwin::o3d303::textOf(message.content));
+    switch (command.kind) {
+      case Command::Kind::SetSchema:
+        schema_ = command.schema;
+        return reply(message.ticket, toftwin::o3d303::kDone);
+      case Command::Kind::SetOutput:
+        output_ = command.output;
+        return reply(message.ticket, toftwin::o3d303::kDone);
+      case Command::Kind::AskSchema: {
+        const std::string json = toJson(schema_ ? *schema_ : server_.hooks_.default_schema());
+        return reply(message.ticket, fmt::format("{:09}{}", json.size(), json));
+      }
+      case Command::Kind::Trigger:
+        return trigger(message.ticket);
+      case Command::Kind::AskError:
+        return reply(message.ticket, fmt::format("{:09}", server_.last_error_));
+      case Command::Kind::Refused:
+        return reply(message.ticket, toftwin::o3d303::kRefused);
+      case Command::Kind::Other:
+        break;
+    }
+    const std::string answer = server_.hooks_.ask(toftwin::o3d303::textOf(message.content));
+    answer.empty() ? reply(message.ticket, toftwin::o3d303::kUnknown) : reply(message.ticket, answer);
+  }
+  void trigger(const std::string& ticket) {
+    server_.hooks_.trigger([self = shared_from_this(), ticket](int error) {
+      self->reply(ticket, error == 0 ? toftwin::o3d303::kDone : toftwin::o3d303::kRefused);
+      if (error != 0 && *self->alive_) self->server_.tellError(error);
+    });
+  }
+  void reply(std::string_view ticket, char answer) { reply(ticket, std::string_view{&answer, 1}); }
+  void reply(std::string_view ticket, std::string_view answer) {
+    if (!socket_.is_open()) return;
+    send(std::make_shared<const Bytes>(toftwin::o3d303::encodePcic(ticket, answer)), false);
+  }
+  void write() {
+    boost::asio::async_write(socket_, boost::asio::buffer(*queue_.front().bytes),
+                             [self = shared_from_this()](error_code error, std::size_t) {
+                               if (error || !*self->alive_) return self->close();
+                               self->frames_waiting_ -= self->queue_.front().is_frame ? 1 : 0;
+                               self->queue_.pop_front();
+                               if (!self->queue_.empty()) self->write();
+                             });
+  }
+
+  PcicServer& server_;
+  const std::shared_ptr<bool> alive_;
+  tcp::socket socket_;
+  toftwin::o3d303::PcicReader reader_{kLongestCommand};
+  std::array<std::byte, 4096> piece_{};
+  std::optional<Schema> schema_;
+  unsigned output_ = Output::kAll;
+  std::deque<Waiting> queue_;
+  std::size_t frames_waiting_ = 0;
+};
+
+PcicServer::PcicServer(tcp::acceptor acceptor, Hooks hooks)
+    : hooks_(std::move(hooks)),
+      accepting_(std::move(acceptor), [this](tcp::socket socket) { take(std::move(socket)); }) {}
+
+PcicServer::~PcicServer() {
+  *is_alive_ = false;
+  for (const auto& connection : connections_) connection->close();
+}
+
+void PcicServer::setOpen(bool is_open) {
+  is_open_ = is_open;
+  if (is_open) return;
+  const auto all = connections_;
+  for (const auto& connection : all) connection->close();
+}
+
+void PcicServer::take(tcp::socket socket) {
+  if (!is_open_) return;
+  if (connections_.size() >= kMostConnections) return tellError(PcicError::kTooManyConnections);
+  auto connection = std::make_shared<Connection>(*this, std::move(socket));
+  connections_.push_back(connection);
+  hooks_.connections(connections_.size());
+  connection->read();
+}
+
+void PcicServer::remove(const std::shared_ptr<Connection>& connection) {
+  const std::size_t before = connections_.size();
+  connections_.remove(connection);
+  if (connections_.size() != before) hooks_.connections(connections_.size());
+}
+
+void PcicServer::publish(const toftwin::o3d303::CameraFrame& frame) {
+  std::vector<std::pair<Schema, SharedBytes>> made;
+  const auto all = connections_;  // sending may close one
+  for (const auto& connection : all) {
+    const auto schema = connection->wanted();
+    if (!schema) continue;
+    auto found = std::ranges::find(made, *schema, &std::pair<Schema, SharedBytes>::first);
+    if (found == made.end()) {
+      const auto content = writeFrameContent(*schema, frame);
+      if (!content) continue;  // no schema comes here that was not checked
+      const std::span<const std::byte> bytes{*content};
+      made.emplace_back(*schema, std::make_shared<const Bytes>(
+                                     toftwin::o3d303::encodePcic(toftwin::o3d303::kFrameTicket, bytes)));
+      found = made.end() - 1;
+    }
+    connection->send(found->second, true);
+  }
+}
+
+void PcicServer::tellError(int code) {
+  last_error_ = code;
+  tell(toftwin::o3d303::kErrorTicket, Output::kErrors, fmt::format("{:09}", code));
+}
+
+void PcicServer::tellNotification(int code, std::string_view json) {
+  tell(toftwin::o3d303::kNotificationTicket, Output::kNotifications, fmt::format("{:09}:{}", code, json));
+}
+
+void PcicServer::tell(std::string_view ticket, unsigned output, std::string_view text) {
+  const auto bytes = std::make_shared<const Bytes>(toftwin::o3d303::encodePcic(ticket, text));
+  const auto all = connections_;
+  for (const auto& connection : all) {
+    if (connection->takes(output)) connection->send(bytes, false);
+  }
+}
+
+}  // namespace toftwin::daemon::o3d303

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <utility>  // before asio: Boost 1.74 uses std::exchange without it
+
+#include <boost/asio/ip/tcp.hpp>
+
+#include <functional>
+#include <list>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "daemon/facades/accepting.h"
+#include "drivers/o3d303/wire/frame_writer.h"
+#include "drivers/o3d303/wire/pcic.h"
+
+namespace toftwin::daemon::o3d303 {
+
+
+/// Asynchronous errors that the camera tells its clients, by the vendor's numbers.
+struct PcicError {
+  static constexpr int kTooManyConnections = 100'000'001;
+  static constexpr int kNoTriggerAllowed = 100'001'000;
+  static constexpr int kTriggerOverrun = 110'001'006;
+  static constexpr int kIlluminationTooHot = 110'004'000;
+};
+
+/// The camera's port for frames and commands. Every connection has a schema of its own; one that is slow loses
+/// frames, one that stalls holds up nobody. Used on the facade's thread only.
+class PcicServer {
+ public:
+  struct Hooks {
+    /// Asks for a frame and says later with which error it was refused, 0: it comes.
+    std::function<void(std::function<void(int)>)> trigger;
+    /// What connections get that have asked for nothing.
+    std::function<toftwin::o3d303::Schema()> default_schema;
+    /// Answers to questions about the device ("G?"), or nothing for a command that is not known.
+    std::function<std::string(std::string_view command)> ask;
+    /// How many there are, whenever that changed.
+    std::function<void(std::size_t)> connections;
+  };
+  PcicServer(boost::asio::ip::tcp::acceptor acceptor, Hooks hooks);
+  ~PcicServer();
+  PcicServer(const PcicServer&) = delete;
+  PcicServer& operator=(const PcicServer&) = delete;
+
+  [[nodiscard]] std::uint16_t port() const { return accepting_.port(); }
+  void setOpen(bool is_open);
+  /// To every connection that wants frames, in its own schema; those with equal schemas share the bytes.
+  void publish(const toftwin::o3d303::CameraFrame& frame);
+  void tellError(int code);
+  void tellNotification(int code, std::string_view json);
+  /// Since the last such error, for the command "E?".
+  [[nodiscard]] int lastError() const { return last_error_; }
+
+ private:
+  class Connection;
+  void take(boost::asio::ip::tcp::socket socket);
+  void tell(std::string_view ticket, unsigned output, std::string_view text);
+  void remove(const std::shared_ptr<Connection>& connection);
+
+  const Hooks hooks_;
+  bool is_open_ = true;
+  int last_error_ = 0;
+  std::list<std::shared_ptr<Connection>> connections_;  // shared with their handlers
+  const std::shared_ptr<bool> is_alive_ = std::make_shared<bool>(true);
+  Accepting accepting_;
+};
+
+}  // namespace toftwin::daemon::o3d303

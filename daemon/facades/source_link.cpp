@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/facades/source_link.h"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+namespace toftwin::daemon {
+namespace {
+
+constexpr std::chrono::milliseconds kPause{200};
+
+}  // namespace
+
+SourceLink::SourceLink(EventThread& thread, Hub& hub, Wants wants, TakeFrame take)
+    : hub_(hub), wants_(std::move(wants)), take_(std::move(take)), door_(thread.door()), pause_(thread.io()) {}
+
+SourceLink::~SourceLink() {
+  *is_alive_ = false;
+  unsubscribe();
+}
+
+void SourceLink::want(bool is_wanted) {
+  if (is_wanted == is_wanted_) return;
+  is_wanted_ = is_wanted;
+  if (is_wanted) return subscribe();
+  pause_.cancel();
+  unsubscribe();
+}
+
+Result<wire::SourceDescription> SourceLink::describe() const {
+  const auto host = hub_.find(wants_.source);
+  if (!host) return host.error();
+  return (*host)->describe();
+}
+
+wire::SourceHealth SourceLink::health() const {
+  const auto host = hub_.find(wants_.source);
+  wire::SourceHealth health;
+  health.name = wants_.source;
+  return host ? (*host)->health() : health;
+}
+
+void SourceLink::post(SourceHost::Command command, Done done) {
+  const auto host = hub_.find(wants_.source);
+  if (!host) return done(host.error());
+  (*host)->post(std::move(command), onThread(std::move(done)));
+}
+
+void SourceLink::trigger(Done done) {
+  const auto host = hub_.find(wants_.source);
+  if (!host) return done(host.error());
+  (*host)->trigger(onThread(std::move(done)));
+}
+
+SourceLink::Done SourceLink::onThread(Done done) const {
+  return [door = door_, done = std::move(done), alive = is_alive_](const Result<>& result) {
+    door->post([done, result, alive] {
+      if (*alive) done(result);
+    });
+  };
+}
+
+void SourceLink::subscribe() {
+  if (!is_wanted_ || subscriber_) return;
+  auto host = hub_.find(wants_.source);
+  const auto description = host ? (*host)->describe() : Result<wire::SourceDescription>{host.error()};
+  if (!description) return tryAgain();
+  Wish wish;
+  for (const PlaneKind kind : wants_.planes) {
+    if (std::ranges::count(description->planes, kind) > 0) wish.selection.planes.push_back(kind);
+  }
+  wish.backlog = {.policy = wire::Policy::Queue,
+                  .depth = wants_.queue,
+                  .byte_limit = hub_.options().backlog_bytes,
+                  .budget = hub_.budget()};
+  auto subscribed = (*host)->subscribe(std::move(wish), [this, door = door_, alive = is_alive_] {
+    door->post([this, alive] {
+      if (*alive) takeAll();
+    });
+  });
+  if (!subscribed) return tryAgain();
+  host_ = *std::move(host);
+  subscriber_ = *std::move(subscribed);
+}
+
+void SourceLink::unsubscribe() {
+  if (subscriber_) host_->unsubscribe(subscriber_);
+  subscriber_.reset();
+  host_.reset();
+}
+
+void SourceLink::tryAgain() {
+  pause_.expires_after(kPause);
+  pause_.async_wait([this, alive = is_alive_](boost::system::error_code cancelled) {
+    if (!cancelled && *alive) subscribe();
+  });
+}
+
+void SourceLink::takeAll() {
+  while (subscriber_) {
+    auto item = subscriber_->backlog.take();
+    if (!item) return;
+    if (const auto* delivery = std::get_if<Backlog::Delivery>(&*item)) {
+      take_(delivery->frame->frame);
+      continue;
+    }
+    unsubscribe();  // it ended; the source may be back soon, or be another one of that name
+    if (is_wanted_) tryAgain();
+  }
+}
+
+}  // namespace toftwin::daemon

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <array>
+
+#include "daemon/facades/facade.h"
+#include "daemon/facades/o3d303/keys.h"
+
+namespace toftwin::daemon {
+
+std::span<const FacadeKind> allFacades() {
+  static const std::array kTable{
+      o3d303::facade(),
+  };
+  return kTable;
+}
+
+}  // namespace toftwin::daemon

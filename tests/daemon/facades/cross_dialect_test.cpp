@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+// One truth: the same frame, read natively and through each facade by an unmodified client.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+
+#include "drivers/o3d303/wire/confidence.h"
+#include "facade_testing.h"
+
+namespace toftwin::daemon {
+namespace {
+
+using namespace test;
+using Policy = SubscribeOptions::Policy;
+
+constexpr double kElectronsPerCount = 6.0;  // the facade's default
+
+/// What docs/facades/o3d303.md says becomes of a pixel, and what the driver makes of that.
+struct Converted {
+  float range_m, amplitude;
+  unsigned flags;
+};
+Converted convert(float range_m, float amplitude, unsigned flags) {
+  const double mm = std::round(1000.0 * static_cast<double>(range_m));
+  const bool has_range = mm >= 1.0 && mm <= 65'535.0 && (flags & 1U) == 0;
+  const double counts = std::min(65'535.0, std::round(static_cast<double>(amplitude) / kElectronsPerCount));
+  const unsigned kept = o3d303::flagsOf(o3d303::confidenceOf(static_cast<std::uint8_t>(flags)));
+  return {has_range ? static_cast<float>(mm) * 1e-3F : std::nanf(""),
+          std::isnan(amplitude) ? 0.0F : static_cast<float>(counts), has_range ? kept : kept | 1U};
+}
+
+void expectSame(const Frame& native, const Frame& through) {
+  const auto range_m = native.find(PlaneKind::Range)->as<float>();
+  const auto amplitude = native.find(PlaneKind::Amplitude)->as<float>();
+  const auto flags = native.find(PlaneKind::Flags)->as<std::uint8_t>();
+  const auto range_got = through.find(PlaneKind::Range)->as<float>();
+  const auto depth_got = through.find(PlaneKind::Depth)->as<float>();
+  const auto amplitude_got = through.find(PlaneKind::Amplitude)->as<float>();
+  const auto flags_got = through.find(PlaneKind::Flags)->as<std::uint8_t>();
+  ASSERT_EQ(range_got.size(), range_m.size());
+  std::size_t with_value = 0;
+  for (std::size_t i = 0; i < range_m.size(); ++i) {
+    const Converted expected = convert(range_m[i], amplitude[i], flags[i]);
+    ASSERT_EQ(flags_got[i], expected.flags) << i;
+    ASSERT_EQ(amplitude_got[i], expected.amplitude) << i;
+    ASSERT_EQ(std::isnan(range_got[i]), std::isnan(expected.range_m)) << i;
+    if (std::isnan(expected.range_m)) continue;
+    ++with_value;
+    ASSERT_EQ(range_got[i], expected.range_m) << i;
+    const auto u = static_cast<double>(i % static_cast<std::size_t>(native.camera.width));
+    const auto v = static_cast<double>(i / static_cast<std::size_t>(native.camera.width));
+    // The driver divides the ray's float z by the length of its float components, of which each errs by 6e-8.
+    ASSERT_NEAR(depth_got[i], static_cast<double>(range_got[i]) * rayThroughPixel(native.camera, u, v).v.z,
+                3e-7 * static_cast<double>(range_got[i]));
+  }
+  EXPECT_GT(with_value, range_m.size() / 2);
+}
+
+class CrossDialect : public RunningFacade {};
+
+TEST_F(CrossDialect, TheO3d303sFramesAreTheNativeOnesBitForBitWithTheirTimeStamps) {
+  startO3d303(kSmallSim);
+  auto native_client = client();
+  auto driver = openDriver();
+  ASSERT_TRUE(driver.ok()) << driver.error().message;
+  EXPECT_EQ((*driver)->info().camera.width, 176);
+  auto native_stream = native_client.subscribe("cam", {.policy = Policy::Queue, .queue = 64});
+  ASSERT_TRUE(native_stream.ok()) << native_stream.error().message;
+  ASSERT_TRUE((*driver)->start().ok());
+  std::map<std::int64_t, Frame> natives;  // by device time
+  int compared = 0;
+  for (int i = 0; i < 60 && compared < 5; ++i) {
+    const auto through = nextFrame(**driver);
+    ASSERT_TRUE(through.ok()) << through.error().message;
+    const std::int64_t stamp = through->moment.exposures.at(0).start.ns;
+    while (natives.empty() || natives.rbegin()->first < stamp) {
+      auto native = native_stream->next(kSoon);
+      ASSERT_TRUE(native.ok()) << native.error().message;
+      const std::int64_t start = native->moment.exposures.at(0).start.ns;
+      natives.insert_or_assign(start, *std::move(native));
+    }
+    const auto same = natives.find(stamp);
+    if (same == natives.end()) continue;  // from before the native subscription
+    ASSERT_NO_FATAL_FAILURE(expectSame(same->second, *through));
+    EXPECT_EQ(through->moment.exposures.at(0).duration, same->second.moment.exposures.at(0).duration);
+    ++compared;
+  }
+  EXPECT_EQ(compared, 5);
+  (*driver)->stop();
+}
+
+}  // namespace
+}  // namespace toftwin::daemon

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <fmt/format.h>
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "../running_daemon.h"
+#include "drivers/o3d303/o3d303.h"
+#include "drivers/source.h"
+
+namespace toftwin::daemon::test {
+
+/// A TCP port that was free just now.
+inline std::uint16_t freePort() {
+  boost::asio::io_context io;
+  boost::asio::ip::tcp::acceptor acceptor{io, {boost::asio::ip::address_v4::loopback(), 0}};
+  return acceptor.local_endpoint().port();
+}
+
+/// A daemon with a source "cam" and a facade before it.
+class RunningFacade : public RunningDaemon {
+ protected:
+  /// With an O3D303 at `xmlrpc_` before the source of those keys.
+  void startO3d303(const std::string& source_keys, const std::string& facade_keys = {}) {
+    xmlrpc_ = freePort();
+    start(fmt::format("[[source]]\nname = 'cam'\n{}\n[[facade]]\nkind = 'o3d303'\nsource = 'cam'\nxmlrpc_port = {}\n"
+                      "pcic_port = 0\ndiscoverable = false\n{}\n",
+                      source_keys, xmlrpc_, facade_keys));
+  }
+  /// Our own driver, as it is, at the facade.
+  Result<std::unique_ptr<drivers::Source>> openDriver(const std::string& keys = {}) {
+    auto table =
+        settings::Table::parse(fmt::format("uri = 'o3d303:127.0.0.1:{}'\n{}", xmlrpc_, keys), "driver.toml");
+    return drivers::o3d303::row().open(*table);
+  }
+  std::uint16_t xmlrpc_ = 0;
+};
+
+/// A small simulated O3D303 that is fast: its image has a quarter of the pixels per side.
+inline const std::string kSmallSim =
+    "driver = 'sim'\nuri = 'sim:o3d303_binned'\nsamples_per_pixel = 1\nmax_surfaces = 1\nframe_interval_ms = 50\n";
+inline const std::string kPattern =
+    "driver = 'pattern'\nwidth = 64\nheight = 48\nframe_rate_hz = 50\n";
+
+/// The next frame; a Timeout is asked again.
+inline Result<Frame> nextFrame(drivers::Source& source) {
+  for (int i = 0; i < 30; ++i) {
+    Result<Frame> frame = source.next({}, false);
+    if (frame || frame.error().code != Error::Code::Timeout) return frame;
+  }
+  return Error{Error::Code::Timeout, "no frame for long"};
+}
+
+}  // namespace toftwin::daemon::test

@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: Apache-2.0
+// The O3D303 facade in a running daemon, with our own driver and with bare sockets as its clients.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <thread>
+
+#include "facade_testing.h"
+#include "o3d303_client.h"
+
+namespace toftwin::daemon {
+namespace {
+
+using namespace std::chrono_literals;
+using namespace test;
+using o3d303::XmlRpcValue;
+using testing::HasSubstr;
+
+class O3d303Facade : public RunningFacade {
+ protected:
+  O3d303Client camera() { return O3d303Client{xmlrpc_}; }
+};
+
+TEST_F(O3d303Facade, AppliesWhatADriverSetsToTheSimulatedCamera) {
+  startO3d303(kSmallSim);
+  auto driver = openDriver("trigger = 'free_run'\nexposure_us = 700\nframe_rate_hz = 12.5");
+  ASSERT_TRUE(driver.ok()) << driver.error().message;
+  const auto native = client().describe("cam");
+  ASSERT_TRUE(native.ok());
+  const auto valueOf = [&](const SourceDetails& of, std::string_view name) {
+    for (const Parameter& one : of.parameters) {
+      if (one.name == name) return one.value.value_or(-1.0);
+    }
+    return -2.0;
+  };
+  EXPECT_EQ(valueOf(*native, "exposure_us"), 700.0);
+  EXPECT_EQ(valueOf(*native, "frame_rate_hz"), 12.5);
+  EXPECT_NEAR(native->frame_interval->in(millisecond), 80.0, 1e-9);
+  ASSERT_TRUE((*driver)->setParameter("exposure_us", 900.0).ok());
+  EXPECT_EQ(valueOf(*client().describe("cam"), "exposure_us"), 900.0);
+  ASSERT_TRUE((*driver)->start().ok());
+  const auto frame = nextFrame(**driver);
+  ASSERT_TRUE(frame.ok()) << frame.error().message;
+  EXPECT_EQ(frame->moment.exposures.at(0).duration, 900_us) << "the frame says it, too";
+}
+
+TEST_F(O3d303Facade, RefusesWithTheDevicesOwnNumbers) {
+  startO3d303(kSmallSim);
+  auto rpc = camera();
+  EXPECT_EQ(rpc.fault("", "getParameter", {"Nonsense"}), 101'000);
+  EXPECT_EQ(rpc.fault("session_0123456789abcdef0123456789abcdef/", "heartbeat", {300}), 100'000);
+  EXPECT_EQ(rpc.fault("", "requestSession", {"", "no id"}), 101'010);
+  rpc.beginSession();
+  EXPECT_EQ(rpc.fault("", "requestSession", {"", rpc.kSession}), 101'004);
+  EXPECT_EQ(rpc.fault(rpc.session("edit/"), "editApplication", {1}), 100'000) << "not in edit mode";
+  rpc.call(rpc.session(""), "setOperatingMode", {1});
+  EXPECT_EQ(rpc.fault(rpc.session("edit/"), "editApplication", {7}), 101'013);
+  EXPECT_EQ(rpc.fault(rpc.session("edit/"), "createApplication", {"Nonsense"}), 101'028);
+  EXPECT_EQ(rpc.fault(rpc.session("edit/application/"), "save", {}), 101'016);
+  rpc.call(rpc.session("edit/"), "editApplication", {1});
+  const std::string imager = rpc.session("edit/application/imager_001/");
+  EXPECT_EQ(rpc.fault(imager, "setParameter", {"Nonsense", "1"}), 101'000);
+  EXPECT_EQ(rpc.fault(imager, "setParameter", {"ExposureTime", "soon"}), 101'001);
+  EXPECT_EQ(rpc.fault(imager, "setParameter", {"ExposureTime", "12.5"}), 101'001);
+  EXPECT_EQ(rpc.fault(imager, "setParameter", {"ExposureTime", "30000"}), 101'002);
+  EXPECT_EQ(rpc.fault(imager, "setParameter", {"MinimumAmplitude", "17"}), 101'003);
+  EXPECT_EQ(rpc.fault(imager, "changeType", {"morethan30m_high"}), 101'027);
+  EXPECT_EQ(rpc.fault(rpc.session("edit/application/"), "setParameter", {"PcicTcpResultSchema", "{}"}), 101'010);
+  EXPECT_EQ(rpc.fault(imager, "setParameter", {"MinimumAmplitude", "42"}), 0) << "what it is already";
+}
+
+TEST_F(O3d303Facade, WhatTheSourceRefusesAtTheEndIsRefusedToo) {
+  startO3d303(kSmallSim);
+  auto rpc = camera();
+  rpc.edit();
+  // 4 exposures of 15 ms do not fit into 50 ms, which only the source knows.
+  EXPECT_EQ(rpc.fault(rpc.imager(), "setParameter", {"ExposureTime", "15000"}), 0);
+  EXPECT_EQ(rpc.fault(rpc.session("edit/application/"), "save", {}), 101'002);
+  rpc.endSession();
+  rpc.edit();
+  EXPECT_EQ(rpc.call(rpc.imager(), "getParameter", {"ExposureTime"}).text(), "1000");
+}
+
+TEST_F(O3d303Facade, SessionsEndWithoutHeartbeatAndWhatWasTemporaryIsUndone) {
+  startO3d303(kSmallSim);
+  auto rpc = camera();
+  rpc.beginSession();
+  EXPECT_EQ(rpc.call(rpc.session(""), "heartbeat", {1}).text(), "5") << "the least that the camera grants";
+  rpc.call(rpc.session(""), "setTemporaryApplicationParameters",
+           {XmlRpcValue{XmlRpcValue::Struct{{"imager_001/ExposureTime", "800"}}}});
+  const auto exposure = [&] { return client().describe("cam")->parameters.at(0).value.value_or(0.0); };
+  EXPECT_NEAR(exposure(), 800.0, 1e-6);  // it goes through seconds
+  EXPECT_TRUE(eventually([&] { return std::abs(exposure() - 1000.0) < 1e-6; }));
+  EXPECT_EQ(rpc.fault(rpc.session(""), "heartbeat", {5}), 100'000);
+}
+
+TEST_F(O3d303Facade, EveryConnectionHasASchemaOfItsOwn) {
+  startO3d303(kPattern);
+  PcicClient distance{camera().pcicPort()}, confidence{camera().pcicPort()}, none{camera().pcicPort()};
+  EXPECT_EQ(none.command("p6"), "*");
+  EXPECT_EQ(distance.setSchema({o3d303::kDistanceBlob}), "*");
+  EXPECT_EQ(confidence.setSchema({o3d303::kConfidenceBlob, o3d303::kUnitVectorsBlob}), "*");
+  const auto first = distance.frame(), second = confidence.frame();
+  EXPECT_NE(first.find(o3d303::ChunkType::RadialDistance), nullptr);
+  EXPECT_EQ(first.find(o3d303::ChunkType::Confidence), nullptr);
+  EXPECT_EQ(second.find(o3d303::ChunkType::RadialDistance), nullptr);
+  EXPECT_NE(second.find(o3d303::ChunkType::UnitVectors), nullptr);
+  EXPECT_EQ(none.framesSoFar(), 0);
+  EXPECT_EQ(distance.command("c000000002{}"), "!");
+  EXPECT_EQ(distance.command("xyz"), "?");
+  EXPECT_THAT(distance.command("C?"), HasSubstr("distance_image"));
+  EXPECT_EQ(distance.command("V?"), "03 01 04");
+}
+
+TEST_F(O3d303Facade, ATriggerGivesAllConnectionsTheSameBytesOnce) {
+  startO3d303(kSmallSim + "pace = 'trigger'\n");
+  PcicClient asks{camera().pcicPort()}, listens{camera().pcicPort()};
+  for (auto* one : {&asks, &listens}) EXPECT_EQ(one->setSchema({o3d303::kDistanceBlob}), "*");
+  EXPECT_EQ(asks.command("t"), "*");
+  const auto frame = asks.nextOf("0000"), same = listens.nextOf("0000");
+  EXPECT_EQ(frame, same);
+  EXPECT_GT(frame.size(), 176u * 132u * 2u);
+}
+
+TEST_F(O3d303Facade, InFreeRunATriggerIsRefusedAndTheErrorTold) {
+  startO3d303(kPattern);
+  PcicClient asks{camera().pcicPort()};
+  EXPECT_EQ(asks.command("p6"), "*");
+  EXPECT_EQ(asks.command("t"), "!");
+  EXPECT_EQ(asks.nextOf("0001"), "100001000");
+  EXPECT_EQ(asks.command("E?"), "100001000");
+}
+
+TEST_F(O3d303Facade, ADriverSwitchesItToTriggersAndBack) {
+  startO3d303(kSmallSim);
+  auto driver = openDriver("trigger = 'software'");
+  ASSERT_TRUE(driver.ok()) << driver.error().message;
+  ASSERT_TRUE((*driver)->info().can_trigger);
+  ASSERT_TRUE((*driver)->start().ok());
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_TRUE((*driver)->trigger().ok());
+    ASSERT_TRUE(nextFrame(**driver).ok());
+  }
+  EXPECT_TRUE(client().describe("cam")->can_trigger);
+  auto free = openDriver("trigger = 'free_run'");
+  ASSERT_TRUE(free.ok()) << free.error().message;
+  EXPECT_FALSE(client().describe("cam")->can_trigger);
+}
+
+TEST_F(O3d303Facade, ClientsThatEditStopTheFramesAndSavingNotifiesTheOthers) {
+  startO3d303(kPattern);
+  PcicClient watches{camera().pcicPort()};
+  auto rpc = camera();
+  rpc.edit();
+  rpc.call(rpc.session("edit/application/"), "setParameter", {"Name", "dock"});
+  rpc.call(rpc.session("edit/application/"), "save", {});
+  EXPECT_THAT(watches.nextOf("0010"), testing::StartsWith("000500000:{"));
+  watches.forgetFrames();
+  std::this_thread::sleep_for(200ms);  // ten frame intervals
+  watches.command("V?");
+  EXPECT_LE(watches.framesSoFar(), 1) << "one may have been on its way";
+  rpc.endSession();
+  watches.frame();
+}
+
+TEST_F(O3d303Facade, AStalledClientHoldsUpNobody) {
+  startO3d303(kPattern);
+  PcicClient stalled{camera().pcicPort()}, lively{camera().pcicPort()};
+  stalled.sendBytes("1000L00");  // and never more; nor does it read
+  RawHttp half{xmlrpc_};
+  half.send("POST /api/rpc/v1/com.ifm.efector/ HTTP/1.1\r\nContent-Le");
+  EXPECT_EQ(lively.setSchema({o3d303::kDistanceBlob}), "*");
+  std::uint32_t last = 0;
+  for (int i = 0; i < 100; ++i) {
+    const auto frame = lively.frame();
+    const std::uint32_t count = frame.find(o3d303::ChunkType::RadialDistance)->header.frame_count;
+    EXPECT_GT(count, last);
+    last = count;
+  }
+  EXPECT_EQ(camera().call("", "getParameter", {"DeviceType"}).text(), "1:2");
+}
+
+TEST_F(O3d303Facade, ARebootDropsEveryoneAndComesBack) {
+  startO3d303(kPattern, "boot_time_s = 0.2");
+  PcicClient connected{camera().pcicPort()};
+  auto rpc = camera();
+  rpc.beginSession();
+  rpc.call("", "reboot", {0});
+  EXPECT_TRUE(connected.isClosedByPeer());
+  EXPECT_TRUE(eventually([&] { return camera().tryCall("", "getParameter", {"DeviceType"}); }));
+  EXPECT_EQ(rpc.fault(rpc.session(""), "heartbeat", {5}), 100'000) << "the session is gone";
+}
+
+TEST_F(O3d303Facade, TheTemperatureOfASimulatedCameraCanBeWatchedWarmingUp) {
+  startO3d303(kSmallSim + "powered_on_before_s = 156\n", "most_illumination_c = 20");
+  PcicClient watches{camera().pcicPort()};
+  EXPECT_EQ(watches.nextOf("0001"), "110004000") << "hotter than 20 degrees";
+  const auto all = camera().call("", "getAllParameters", {});
+  // The preset's own source: 28.6 degrees 2.6 minutes after power-on; frames have taken some seconds more.
+  EXPECT_NEAR(std::stod(all.textAt("TemperatureIllu")), 28.6, 0.5);
+  EXPECT_NEAR(std::stod(all.textAt("UpTime")) * 3600.0, 156.0, 30.0);
+}
+
+TEST_F(O3d303Facade, AnotherSourceOfThatNameAfterAReloadIsShown) {
+  startO3d303(kPattern);
+  PcicClient watches{camera().pcicPort()};
+  EXPECT_EQ(watches.frame().chunks.at(0).header.width, 64u);
+  configure(fmt::format("[[source]]\nname = 'cam'\ndriver = 'pattern'\nwidth = 32\nheight = 16\n"
+                        "[[facade]]\nkind = 'o3d303'\nsource = 'cam'\nxmlrpc_port = {}\npcic_port = 0\n"
+                        "discoverable = false\n",
+                        xmlrpc_));
+  daemon_->reload();
+  EXPECT_TRUE(eventually([&] { return watches.frame().chunks.at(0).header.width == 32u; }));
+  EXPECT_EQ(log_->count("facade o3d303 of cam: XML-RPC"), 1) << "the facade ran on";
+}
+
+TEST_F(O3d303Facade, APortInUseIsToldAndTriedAgainWhileTheDaemonServes) {
+  boost::asio::io_context io;
+  auto holder = std::make_unique<boost::asio::ip::tcp::acceptor>(
+      io, boost::asio::ip::tcp::endpoint{boost::asio::ip::address_v4::loopback(), 0});
+  const auto port = holder->local_endpoint().port();
+  start(fmt::format("[[source]]\nname = 'cam'\n{}[[facade]]\nkind = 'o3d303'\nsource = 'cam'\nxmlrpc_port = {}\n"
+                    "pcic_port = 0\ndiscoverable = false\n",
+                    kPattern, port));
+  EXPECT_TRUE(log_->waitFor("is in use by", 1));
+  EXPECT_TRUE(client().sources().ok());
+  holder.reset();
+  EXPECT_TRUE(log_->waitFor("facade o3d303 of cam: XML-RPC", 1));
+  EXPECT_EQ(O3d303Client{port}.call("", "getParameter", {"DeviceType"}).text(), "1:2");
+}
+
+}  // namespace
+}  // namespace toftwin::daemon
