@@ -4,7 +4,6 @@
 #include <boost/asio/ip/address.hpp>
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <chrono>
@@ -12,6 +11,7 @@
 
 #include "daemon/listen.h"
 #include "daemon/thrown.h"
+#include "drivers/logging.h"
 
 namespace toftwin::daemon {
 namespace {
@@ -24,7 +24,7 @@ void warnIfRemote(const FacadeKeys& keys) {
   boost::system::error_code is_none;
   const auto address = boost::asio::ip::make_address(keys.address, is_none);
   if (is_none || address.is_loopback()) return;
-  spdlog::warn("{} listens on {}, which other machines reach: everyone there can see the camera and set it, because "
+  logging::warn("{} listens on {}, which other machines reach: everyone there can see the camera and set it, because "
                "its language has no encryption and at most a password in clear text",
                nameOf(keys), keys.address);
 }
@@ -72,10 +72,10 @@ void Facades::start(Running& one) {
     one.facade = *std::move(started);
     one.last_error.clear();
     warnIfRemote(keys);
-    spdlog::info("{}: {}", nameOf(keys), one.facade->where());
+    logging::info("{}: {}", nameOf(keys), one.facade->where());
   } else if (started.error().message != one.last_error) {
     one.last_error = started.error().message;
-    spdlog::error("{} is not there, and is tried again: {}", nameOf(keys), one.last_error);
+    logging::error("{} is not there, and is tried again: {}", nameOf(keys), one.last_error);
   }
 }
 

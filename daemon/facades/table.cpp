@@ -2,6 +2,7 @@
 #include <array>
 
 #include "daemon/facades/facade.h"
+#include "daemon/facades/modbus/keys.h"
 #include "daemon/facades/o3d303/keys.h"
 
 namespace toftwin::daemon {
@@ -9,6 +10,7 @@ namespace toftwin::daemon {
 std::span<const FacadeKind> allFacades() {
   static const std::array kTable{
       o3d303::facade(),
+      modbus::facade(),
   };
   return kTable;
 }

@@ -2,7 +2,6 @@
 #include <boost/asio/steady_timer.hpp>
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <array>
@@ -20,6 +19,7 @@
 #include "daemon/facades/o3d303/pcic_server.h"
 #include "daemon/facades/o3d303/unevenness.h"
 #include "daemon/facades/source_link.h"
+#include "drivers/logging.h"
 #include "protocol/settings/describe.h"
 
 namespace toftwin::daemon::o3d303 {
@@ -103,7 +103,7 @@ class O3d303Facade final : public Facade {
                                           .host_name = place_.keys.source,
                                           .device_name = keys_.name});
       // Who knows the address needs no search, and another camera of this machine may be the one that is found.
-      if (!discovery) spdlog::warn("facade o3d303 of {}: it cannot be searched for: {}", place_.keys.source,
+      if (!discovery) logging::warn("facade o3d303 of {}: it cannot be searched for: {}", place_.keys.source,
                                    discovery.error().message);
       if (discovery) discovery_ = *std::move(discovery);
     }
@@ -144,7 +144,7 @@ class O3d303Facade final : public Facade {
   }
 
   void complainOnce(const Error& error) {
-    if (error.message != last_complaint_) spdlog::warn("facade o3d303 of {}: {}", place_.keys.source, error.message);
+    if (error.message != last_complaint_) logging::warn("facade o3d303 of {}: {}", place_.keys.source, error.message);
     last_complaint_ = error.message;
   }
 

@@ -2,6 +2,10 @@
 // One truth: the same frame, read natively and through each facade by an unmodified client.
 #include <gtest/gtest.h>
 
+#include <array>
+#include <bit>
+#include <boost/asio/read.hpp>
+#include <boost/asio/write.hpp>
 #include <cmath>
 #include <map>
 
@@ -88,6 +92,44 @@ TEST_F(CrossDialect, TheO3d303sFramesAreTheNativeOnesBitForBitWithTheirTimeStamp
   }
   EXPECT_EQ(compared, 5);
   (*driver)->stop();
+}
+
+TEST_F(CrossDialect, ThePlcsRangesAreTheNativeFloatsWithTheirTimeStamp) {
+  const std::uint16_t port = freePort();
+  start(fmt::format("[[source]]\nname = 'cam'\n{}pace = 'trigger'\n[[facade]]\nkind = 'modbus'\nsource = 'cam'\nport = {}\n",
+                    kSmallSim, port));
+  boost::asio::io_context io;
+  boost::asio::ip::tcp::socket plc{io};
+  plc.connect({boost::asio::ip::address_v4::loopback(), port});
+  // Input registers 30 to 37: centre and nearest range, device time.
+  const std::array<std::uint8_t, 12> request{0, 7, 0, 0, 0, 6, 1, 4, 0, 30, 0, 8};
+  const auto ask = [&] {
+    std::array<std::uint8_t, 25> answer{};
+    boost::asio::write(plc, boost::asio::buffer(request));
+    boost::asio::read(plc, boost::asio::buffer(answer));
+    std::array<std::uint32_t, 4> numbers{};
+    for (std::size_t i = 0; i < 16; ++i) numbers[i / 4] = numbers[i / 4] << 8 | answer[9 + i];
+    return numbers;
+  };
+  ask();  // now it is connected, and wants frames
+  auto native = client();
+  auto stream = native.subscribe("cam");
+  ASSERT_TRUE(stream.ok()) << stream.error().message;
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_TRUE(native.trigger("cam").ok());
+    const auto frame = stream->next(kSoon);
+    ASSERT_TRUE(frame.ok()) << frame.error().message;
+    const auto range = frame->find(PlaneKind::Range)->as<float>();
+    const auto ns = static_cast<std::uint64_t>(frame->moment.exposures.at(0).start.ns);
+    EXPECT_TRUE(eventually([&] { return ask()[3] == ns % 1'000'000'000 && (ns == 0 || ask()[0] != 0); }));
+    const auto numbers = ask();
+    EXPECT_EQ(numbers[2], ns / 1'000'000'000);
+    float nearest = std::nanf("");
+    for (const float one : range) nearest = std::fmin(nearest, one);
+    if (i == 0) continue;  // before the first frame the device time is 0, too
+    EXPECT_EQ(numbers[0], std::bit_cast<std::uint32_t>(range[static_cast<std::size_t>(66 * 176 + 88)]));
+    EXPECT_EQ(numbers[1], std::bit_cast<std::uint32_t>(nearest));
+  }
 }
 
 }  // namespace
