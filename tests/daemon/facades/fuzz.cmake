@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: Apache-2.0
+# Like tests/protocol/fuzz.cmake, for what clients of facades send. Without sockets, sources or threads.
+find_package(Boost 1.74 REQUIRED)
+set(folder ${PROJECT_SOURCE_DIR}/tests/daemon/facades)
+set(facades ${PROJECT_SOURCE_DIR}/daemon/facades)
+
+# fuzz_<name>_facade of what <name>_fuzz_one_input.cpp and the sources take, from <name>_facade_corpus.
+function(toftwin_fuzz_facade name)
+  add_executable(fuzz_${name}_facade ${folder}/fuzz_facades.cpp ${folder}/${name}_fuzz_one_input.cpp ${ARGN})
+  target_include_directories(fuzz_${name}_facade PRIVATE ${PROJECT_SOURCE_DIR})
+  target_compile_definitions(fuzz_${name}_facade PRIVATE TOFTWIN_VERSION="${PROJECT_VERSION}")
+  target_link_libraries(fuzz_${name}_facade PRIVATE toftwin::o3d303_wire toftwin::settings Boost::headers fmt::fmt)
+  target_link_options(fuzz_${name}_facade PRIVATE -fsanitize=fuzzer)
+  add_dependencies(fuzzers fuzz_${name}_facade)
+  file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/fuzz_${name}_facade_corpus)
+  add_test(NAME fuzz_${name}_facade
+           COMMAND fuzz_${name}_facade -max_total_time=10 -max_len=4096 -print_final_stats=1
+                   ${CMAKE_BINARY_DIR}/fuzz_${name}_facade_corpus ${folder}/${name}_facade_corpus)
+  set_tests_properties(fuzz_${name}_facade PROPERTIES TIMEOUT 120)
+endfunction()
+
+set(o3d303 answers.cpp commands.cpp defaults.cpp device.cpp device_edit.cpp discovery.cpp)
+list(TRANSFORM o3d303 PREPEND ${facades}/o3d303/)
+toftwin_fuzz_facade(o3d303 ${o3d303})
+toftwin_fuzz_facade(modbus ${facades}/modbus/registers.cpp ${facades}/modbus/requests.cpp)

@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+// libFuzzer's entry for what facades read: cmake --preset fuzz, then fuzz_o3d303_facade or fuzz_modbus_facade.
+#include <cstdint>
+#include <span>
+
+#include "fuzz_one_input.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
+
+int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  toftwin::daemon::fuzzOneInput(std::as_bytes(std::span{data, size}));
+  return 0;
+}

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+// What an O3D303 facade is sent: XML-RPC calls one after another to one device, PCIC messages, searches.
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <string_view>
+
+#include "daemon/facades/o3d303/commands.h"
+#include "daemon/facades/o3d303/device.h"
+#include "daemon/facades/o3d303/discovery.h"
+#include "drivers/o3d303/wire/frame_writer.h"
+#include "drivers/o3d303/wire/pcic.h"
+#include "fuzz_one_input.h"
+
+namespace toftwin::daemon {
+namespace {
+
+using namespace o3d303;
+using toftwin::o3d303::XmlRpcCall;
+using toftwin::o3d303::XmlRpcValue;
+
+void demand(bool holds) {
+  if (!holds) std::abort();
+}
+
+constexpr std::string_view kSession = "session_0123456789abcdef0123456789abcdef/";
+constexpr std::array<std::string_view, 9> kObjects{
+    "", "", "edit/", "edit/device/", "edit/device/network/", "edit/device/time/", "edit/application/",
+    "edit/application/imager_001/", "edit/application/imager_001/spatialfilter"};
+constexpr std::array<std::string_view, 29> kMethods{
+    "requestSession", "setOperatingMode", "editApplication", "setParameter", "save", "getParameter", "getAllParameters",
+    "heartbeat", "cancelSession", "setTemporaryApplicationParameters", "getSWVersion", "getHWInfo", "getApplicationList",
+    "getTraceLogs", "reboot", "stopEditingApplication", "availableApplicationTypes", "copyApplication",
+    "deleteApplication", "createApplication", "factoryReset", "saveAndActivateConfig", "setCurrentTime",
+    "activatePassword", "disablePassword", "availableTypes", "changeType", "expire", "nonsense"};
+
+SourceFacts facts() {
+  SourceFacts facts;
+  facts.parameters = {{"exposure_us", 1000.0, {1.0, 20'000.0}}, {"frame_rate_hz", 10.0, {0.1, 30.0}}, {"triggered", 0.0, {0.0, 1.0}}};
+  facts.frame_rate_hz = 10.0;
+  facts.exposures_us = {40, 1000};
+  return facts;
+}
+
+/// What the source is asked for lies within its bounds.
+void checkChanges(const SourceChanges& changes) {
+  for (const auto& [name, value] : changes) {
+    bool is_known = false;
+    for (const Parameter& one : facts().parameters) {
+      if (one.name == name) is_known = one.bounds.contains(value);
+    }
+    demand(is_known);
+  }
+}
+
+/// Lines: a byte for the object, one for the method, then two texts, with a '\t' between them.
+void playCalls(std::string_view text) {
+  Device device{{.name = "fuzz", .password = "", .mac = "02:00:00:00:00:00", .address = "127.0.0.1"}};
+  device.update(facts());
+  SteadyTime now{};
+  while (text.size() >= 2) {
+    const auto object = static_cast<unsigned char>(text[0]) % kObjects.size();
+    const auto method = static_cast<unsigned char>(text[1]) % kMethods.size();
+    std::string_view line = text.substr(2, text.find('\n', 2) == std::string_view::npos ? text.size() : text.find('\n', 2) - 2);
+    text.remove_prefix(std::min(text.size(), 2 + line.size() + 1));
+    XmlRpcCall call{std::string{kMethods[method]}, {}};
+    const std::size_t tab = line.find('\t');
+    const std::string first{line.substr(0, tab)}, second{tab == std::string_view::npos ? "" : line.substr(tab + 1)};
+    if (call.method == "requestSession") {
+      call.params = {XmlRpcValue{""}, XmlRpcValue{"0123456789abcdef0123456789abcdef"}};
+    } else if (call.method == "setTemporaryApplicationParameters") {
+      call.params = {XmlRpcValue{XmlRpcValue::Struct{{first, XmlRpcValue{second}}}}};
+    } else {
+      call.params = {XmlRpcValue{first}, XmlRpcValue{second}};
+    }
+    now += std::chrono::seconds{1};
+    if (call.method == "expire") {
+      now += std::chrono::seconds{400};
+      checkChanges(device.expire(now));
+      demand(!device.isEditing());
+      continue;
+    }
+    const std::string path = "/api/rpc/v1/com.ifm.efector/" + (object == 0 ? std::string{} : std::string{kSession}) +
+                             std::string{kObjects[object]};
+    const auto outcome = device.answer(path, call, now);
+    checkChanges(outcome.changes);
+    static_cast<void>(encodeXmlRpc(outcome.answer));
+    device.update(facts());
+    demand(isServed(device.defaultSchema()));
+    for (const float t : device.translation_mm()) demand(std::isfinite(t));
+  }
+}
+
+void readMessages(std::span<const std::byte> bytes) {
+  toftwin::o3d303::PcicReader reader{1 << 17};
+  reader.feed(bytes);
+  while (true) {
+    const auto message = reader.next();
+    if (!message || !*message) return;
+    const Command command = readCommand(toftwin::o3d303::textOf((*message)->content));
+    if (command.kind == Command::Kind::SetSchema) demand(isServed(command.schema));
+    if (command.kind == Command::Kind::SetOutput) demand(command.output < 16);
+  }
+}
+
+}  // namespace
+
+void fuzzOneInput(std::span<const std::byte> bytes) {
+  const std::string_view text = toftwin::o3d303::textOf(bytes);
+  readMessages(bytes);
+  static_cast<void>(readCommand(text));
+  static_cast<void>(readSearch(bytes));
+  playCalls(text);
+  if (const auto call = toftwin::o3d303::readXmlRpcCall(text)) {
+    Device device{{.name = "fuzz", .password = "x", .mac = "02:00:00:00:00:00", .address = "127.0.0.1"}};
+    static_cast<void>(device.answer("/api/rpc/v1/com.ifm.efector/", *call, {}));
+    static_cast<void>(device.answer(text.substr(0, 200), *call, {}));
+  }
+}
+
+}  // namespace toftwin::daemon
