@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/reference_device/device/light.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace toftwin::reference {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+constexpr double kSpeedOfLight_m_per_s = 299'792'458.0;
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+/// Of a pixel in which an edge or a shadow's edge lies: the additive recurrence of the plastic number, whose shares of
+/// areas are right within about 3 / kEdgeSamples.
+constexpr int kEdgeSamples = 600;
+
+struct Lamp {
+  Vec3d at_m;  ///< in the world
+  double power_w, cos_half_angle;
+};
+
+/// Irradiance by a Lambertian point that looks along `axis`, and its way; 0 where it does not reach.
+double irradianceBy(const Room& room, const Lamp& lamp, Vec3d axis, Vec3d at, Vec3d normal, double& way_m) {
+  const Vec3d way = at - lamp.at_m;
+  way_m = norm(way);
+  const double along = dot(way, axis) / way_m, incidence = -dot(way, normal) / way_m;
+  if (along <= 0.0 || along < lamp.cos_half_angle || incidence <= 0.0) return 0.0;
+  if (isHidden(room, lamp.at_m, at)) return 0.0;
+  return lamp.power_w / kPi * along * incidence / (way_m * way_m);
+}
+
+}  // namespace
+
+/// What is the same for all pixels of a pose, and what a pixel gathers while it is looked at.
+struct Transport::View {
+  Transform<World, Camera> world_from_camera;
+  CameraInfo camera;
+  Vec3d axis{};
+  std::vector<Lamp> lamps;
+  struct Seen {
+    std::size_t board = 0;
+    double weight = 0.0;
+    Vec3d sum{}, normal{};
+  };
+  std::vector<Seen> seen;  ///< boards in the pixel
+
+  [[nodiscard]] Vec3d ray(double u, double v) const {
+    return world_from_camera.rotate(rayThroughPixel(camera, u, v).v);
+  }
+};
+
+Transport::Transport(Room room, const Datasheet& sheet, const RadiosityOptions& options)
+    : room_(std::move(room)), sheet_(sheet), radiosity_(room_, options) {
+  for (std::size_t f = 0; f < sheet_.modulations.size(); ++f) {
+    const auto& modulation = sheet_.modulations[f];
+    wavenumbers_.push_back(2.0 * kPi * modulation.frequency.in(hertz) / kSpeedOfLight_m_per_s);
+    for (int n = 1; n <= sheet_.sampling.harmonics; ++n) {
+      if (std::abs(contentOf(modulation, n)) > 1e-12)
+        terms_.push_back({f, static_cast<std::size_t>(n), n * wavenumbers_[f]});
+    }
+  }
+}
+
+bool Transport::isSmooth(const View& view, int x, int y) const {
+  std::optional<std::size_t> board;
+  bool is_first = true;
+  unsigned lit = 0;
+  for (const double dv : {-0.5, 0.0, 0.5}) {
+    for (const double du : {-0.5, 0.0, 0.5}) {
+      const Vec3d ray = view.ray(x + du, y + dv);
+      const auto met = firstMeeting(room_, view.world_from_camera.translation_m, ray);
+      unsigned now = 0;
+      for (std::size_t i = 0; met && i < view.lamps.size(); ++i) {
+        const Vec3d at = view.world_from_camera.translation_m + met->distance_m * ray, way = at - view.lamps[i].at_m;
+        const bool in_cone = dot(way, view.axis) >= view.lamps[i].cos_half_angle * norm(way);
+        if (in_cone && !isHidden(room_, view.lamps[i].at_m, at)) now |= 1U << i;
+      }
+      const auto here = met ? std::optional{met->board} : std::nullopt;
+      if (!is_first && (here != board || now != lit)) return false;
+      board = here, lit = now, is_first = false;
+    }
+  }
+  return true;
+}
+
+void Transport::addSample(Light& light, View& view, std::size_t pixel, double u, double v, double weight) const {
+  const Vec3d origin = view.world_from_camera.translation_m, ray = view.ray(u, v);
+  const auto met = firstMeeting(room_, origin, ray);
+  if (!met) return;
+  const Board& board = room_.boards[met->board];
+  const Vec3d at = origin + met->distance_m * ray;
+  const Vec3d normal = dot(ray, board.normal) < 0.0 ? board.normal : -board.normal;
+  light.albedo[pixel] += weight * board.albedo;
+  auto seen = std::ranges::find(view.seen, met->board, &View::Seen::board);
+  if (seen == view.seen.end()) seen = view.seen.insert(seen, {met->board, 0.0, {}, normal});
+  seen->weight += weight, seen->sum = seen->sum + weight * at;
+  for (const Lamp& lamp : view.lamps) {
+    double way = 0.0;
+    const double radiance = board.albedo / kPi * irradianceBy(room_, lamp, view.axis, at, normal, way) * weight;
+    if (radiance == 0.0) continue;
+    light.steady[pixel] += radiance;
+    for (const Term& term : terms_) {
+      light.phasor(term.frequency, term.harmonic, pixel) +=
+          std::polar(radiance, -term.wavenumber * (way + met->distance_m));
+    }
+  }
+}
+
+void Transport::addIndirect(Light& light, const View& view, const Radiosity::Solution& solution,
+                            std::size_t pixel) const {
+  for (const View::Seen& seen : view.seen) {
+    const Vec3d at = seen.sum / seen.weight;
+    const auto shines = radiosity_.gather(solution, seen.board, at, seen.normal);
+    const double factor = seen.weight * room_.boards[seen.board].albedo / kPi;
+    const double back_m = norm(at - view.world_from_camera.translation_m);
+    light.steady[pixel] += factor * shines[0].real();
+    for (std::size_t t = 0; t < terms_.size(); ++t) {
+      light.phasor(terms_[t].frequency, terms_[t].harmonic, pixel) +=
+          factor * shines[t + 1] * std::polar(1.0, -terms_[t].wavenumber * back_m);
+    }
+  }
+}
+
+void Transport::seePixel(Light& light, View& view, int x, int y) const {
+  const auto pixel = static_cast<std::size_t>(y) * static_cast<std::size_t>(light.width) + static_cast<std::size_t>(x);
+  view.seen.clear();
+  const Vec3d middle = view.ray(x, y);
+  if (const auto met = firstMeeting(room_, view.world_from_camera.translation_m, middle)) {
+    light.range_m[pixel] = met->distance_m;
+    light.cosine[pixel] = std::abs(dot(middle, room_.boards[met->board].normal));
+  }
+  if (isSmooth(view, x, y)) {  // Gauss–Legendre, two points along each side: exact for cubics
+    const double off = 0.5 / std::sqrt(3.0);
+    for (const double dv : {-off, off}) {
+      for (const double du : {-off, off}) addSample(light, view, pixel, x + du, y + dv, 0.25);
+    }
+    return;
+  }
+  constexpr double kPlastic = 1.32471795724474602596;
+  for (int i = 0; i < kEdgeSamples; ++i) {
+    double whole = 0.0;
+    const double du = std::modf(0.5 + i / kPlastic, &whole) - 0.5;
+    const double dv = std::modf(0.5 + i / (kPlastic * kPlastic), &whole) - 0.5;
+    addSample(light, view, pixel, x + du, y + dv, 1.0 / kEdgeSamples);
+  }
+}
+
+Light Transport::see(const Transform<World, Camera>& world_from_camera) const {
+  View view{.world_from_camera = world_from_camera, .camera = sheet_.camera(), .lamps = {}, .seen = {}};
+  view.axis = world_from_camera.rotate({0, 0, 1});
+  for (const auto& emitter : sheet_.emitters) {
+    const Vec3d at{emitter.position_mm[0] / 1e3, emitter.position_mm[1] / 1e3, emitter.position_mm[2] / 1e3};
+    const Point<World> place = world_from_camera * Point<Camera>{at};
+    view.lamps.push_back({place.m, emitter.power_w, std::cos(emitter.half_angle.in(radian))});
+  }
+  Light light{.width = view.camera.width, .height = view.camera.height, .frequencies = wavenumbers_.size(),
+              .harmonics = static_cast<std::size_t>(sheet_.sampling.harmonics), .phasors = {}, .steady = {}, .albedo = {},
+              .cosine = {}, .range_m = {}};
+  const auto pixels = static_cast<std::size_t>(light.width) * static_cast<std::size_t>(light.height);
+  light.phasors.resize(light.frequencies * light.harmonics * pixels);
+  light.steady.resize(pixels), light.albedo.resize(pixels);
+  light.cosine.assign(pixels, kNan), light.range_m.assign(pixels, kNan);
+
+  std::vector<double> wavenumbers{0.0};
+  for (const Term& term : terms_) wavenumbers.push_back(term.wavenumber);
+  const auto solution = radiosity_.solve(wavenumbers, [&](Vec3d at, Vec3d normal) {
+    std::vector<std::complex<double>> shines(wavenumbers.size());
+    for (const Lamp& lamp : view.lamps) {
+      double way = 0.0;
+      const double irradiance = irradianceBy(room_, lamp, view.axis, at, normal, way);
+      for (std::size_t w = 0; irradiance > 0.0 && w < wavenumbers.size(); ++w)
+        shines[w] += std::polar(irradiance, -wavenumbers[w] * way);
+    }
+    return shines;
+  });
+  for (int y = 0; y < light.height; ++y) {
+    for (int x = 0; x < light.width; ++x) {
+      seePixel(light, view, x, y);
+      if (radiosity_.empty()) continue;
+      addIndirect(light, view, solution,
+                  static_cast<std::size_t>(y) * static_cast<std::size_t>(light.width) + static_cast<std::size_t>(x));
+    }
+  }
+  return light;
+}
+
+void delay(Light& light, const Transport& transport, std::size_t pixel, double range_m) {
+  for (std::size_t f = 0; f < light.frequencies; ++f) {
+    const std::complex<double> turn = std::polar(1.0, -2.0 * transport.wavenumber(f) * range_m);
+    std::complex<double> power = 1.0;
+    for (std::size_t n = 1; n <= light.harmonics; ++n) light.phasor(f, n, pixel) *= (power *= turn);
+  }
+}
+
+}  // namespace toftwin::reference
