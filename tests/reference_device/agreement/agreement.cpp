@@ -20,7 +20,7 @@ T valueOf(Result<T> result) {
 
 sim::RangeImage simulated(const AgreementJob& job) {
   const sim::SensorModel model = valueOf(sim::SensorModel::load(job.camera));
-  const double exposure_us = model.exposures({}).front().duration.in(microsecond) * job.exposure_scale;
+  const double exposure_us = model.exposures({}).front().duration.in(microsecond)*job.exposure_scale;
   const sim::SensorModel quiet = valueOf(model.with("exposure_us", exposure_us)).withEffects({});
   sim::TraceRequest request = quiet.traceRequest();
   request.world_from_camera = job.world_from_camera;
@@ -56,7 +56,8 @@ Agreement agreementOf(const AgreementJob& job) {
   State state{.world_from_camera = job.world_from_camera, .exposure_scale = job.exposure_scale};
   const Measured ours = device.exposeNoiseFree(state, 0, false).measured;
   const sim::RangeImage theirs = simulated(job);
-  const double metre_per_rad = 299'792'458.0 / (4.0 * std::numbers::pi * sheet.modulations.front().frequency.in(hertz));
+  const double metre_per_rad =
+      299'792'458.0 / (4.0 * std::numbers::pi * sheet.modulations.front().frequency.in(hertz));
   const auto* read = sheet.declares("read_noise");
   const double read_variance = read == nullptr ? 0.0 : read->sigma_electrons * read->sigma_electrons;
 
@@ -71,14 +72,18 @@ Agreement agreementOf(const AgreementJob& job) {
     }
     const double amplitude = static_cast<double>(ours.amplitude[i]);
     const double gain = std::log(static_cast<double>(theirs.amplitude[i]) / amplitude);
-    ++all.pixels, all.mean_mm += off_mm, squares += off_mm * off_mm, all.mean_gain += gain, gains += gain * gain;
+    ++all.pixels, all.mean_mm += off_mm, squares += off_mm * off_mm, all.mean_gain += gain,
+        gains += gain * gain;
     all.worst_mm = std::max(all.worst_mm, std::abs(off_mm));
-    const double variance = 2.0 / sheet.sampling.steps * (static_cast<double>(ours.ambient[i]) + 2.0 * read_variance) / 8.0;
+    const double variance =
+        2.0 / sheet.sampling.steps * (static_cast<double>(ours.ambient[i]) + 2.0 * read_variance) / 8.0;
     noise += variance / (amplitude * amplitude);
   }
-  const double n = std::max(1.0, static_cast<double>(all.pixels)), edges = std::max(1.0, static_cast<double>(all.edges));
+  const double n = std::max(1.0, static_cast<double>(all.pixels)),
+               edges = std::max(1.0, static_cast<double>(all.edges));
   all.mean_mm /= n, all.mean_gain /= n, all.edge_mean_mm /= edges;
-  all.rms_mm = std::sqrt(squares / n), all.rms_gain = std::sqrt(gains / n), all.edge_rms_mm = std::sqrt(edge_squares / edges);
+  all.rms_mm = std::sqrt(squares / n), all.rms_gain = std::sqrt(gains / n),
+  all.edge_rms_mm = std::sqrt(edge_squares / edges);
   all.noise_mm = 1e3 * metre_per_rad * std::sqrt(noise / n);
   return all;
 }

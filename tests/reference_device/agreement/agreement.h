@@ -6,8 +6,8 @@
 
 #include <toftwin/geometry.h>
 
-/// With nothing hidden, the simulator with the device's datasheet must see what the device sees; else what a finder
-/// finds is a disagreement of two models.
+/// With nothing hidden, the simulator with the device's datasheet must see what the device sees; else what a
+/// finder finds is a disagreement of two models.
 namespace toftwin::reference {
 
 /// How two free-of-noise pictures of the same thing differ, over pixels valid in both.
@@ -16,7 +16,7 @@ struct Agreement {
   double mean_mm = 0.0, rms_mm = 0.0, worst_mm = 0.0;  ///< simulator less device, in range, edges aside
   double mean_gain = 0.0, rms_gain = 0.0;              ///< likewise, logarithm of the amplitude
   double edge_mean_mm = 0.0, edge_rms_mm = 0.0;        ///< over pixels within one of an edge
-  double noise_mm = 0.0;                               ///< of a pixel in the mean of 8 frames, root mean square
+  double noise_mm = 0.0;  ///< of a pixel in the mean of 8 frames, root mean square
 };
 
 struct AgreementJob {

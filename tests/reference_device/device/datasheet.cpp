@@ -21,14 +21,21 @@ double shapeOf(Datasheet::Wave wave, int n) {
 std::complex<double> contentOf(const Datasheet::Modulation& modulation, int n) {
   const double omega_tau = 2.0 * std::numbers::pi * modulation.frequency.in(hertz)*modulation.rise.in(second);
   const auto of = [&](int m) {
-    return shapeOf(modulation.emitted, m) * shapeOf(modulation.demodulated, m) / std::complex<double>{1.0, m * omega_tau};
+    return shapeOf(modulation.emitted, m) * shapeOf(modulation.demodulated, m) /
+           std::complex<double>{1.0, m * omega_tau};
   };
   return of(n) / std::abs(of(1));
 }
 
 CameraInfo Datasheet::camera() const {
-  return {.width = lens.width, .height = lens.height, .fx = lens.fx, .fy = lens.fy, .cx = lens.cx, .cy = lens.cy,
-          .distortion = {}, .calibration_id = {}};
+  return {.width = lens.width,
+          .height = lens.height,
+          .fx = lens.fx,
+          .fy = lens.fy,
+          .cx = lens.cx,
+          .cy = lens.cy,
+          .distortion = {},
+          .calibration_id = {}};
 }
 
 const Datasheet::Declared* Datasheet::declares(std::string_view type) const {

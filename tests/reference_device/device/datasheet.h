@@ -13,12 +13,12 @@
 #include <toftwin/result.h>
 #include <toftwin/units.h>
 
-/// A camera that is not the simulator: light transport and pixels of its own, to test what the simulator and the
-/// finder make of a device that they were not made from. Nothing of sim/ is included or linked.
+/// A camera that is not the simulator: light transport and pixels of its own, to test what the simulator and
+/// the finder make of a device that they were not made from. Nothing of sim/ is included or linked.
 namespace toftwin::reference {
 
-/// What the maker says of the camera: those keys of a camera file (docs/camera-file.md) that this device has. Any
-/// other key is an error, so that nothing declared is left out silently.
+/// What the maker says of the camera: those keys of a camera file (docs/camera-file.md) that this device has.
+/// Any other key is an error, so that nothing declared is left out silently.
 struct Datasheet {
   struct Lens {
     int width = 64, height = 48;
@@ -37,11 +37,14 @@ struct Datasheet {
     std::array<double, 3> position_mm{};
     double power_w = 1.0;
     Angle half_angle = 90_deg;
+    bool isotropic = false;
     template <class Visitor>
     void visit(Visitor& v) {
       v.numbers("position_mm", position_mm, {-1e4, 1e4}, "from the lens: right, down, ahead");
-      v.number("power_w", power_w, {0.0, 1e6}, "of a Lambertian point that looks along the axis");
+      v.number("power_w", power_w, {0.0, 1e6},
+               "of a Lambertian point that looks along the axis, over the half space");
       v.quantity("half_angle", half_angle, degree, {0.1, 90.0}, "no light outside this cone");
+      v.flag("isotropic", isotropic, "the same in all directions instead");
     }
   };
   enum class Wave { Sine, Square };
@@ -72,7 +75,8 @@ struct Datasheet {
       v.number("harmonics", harmonics, {1, 31}, "of the modulation that its waveforms have");
       v.quantity("gap", gap, microsecond, {0.0, 1e5}, "between raw exposures");
       v.quantity("frame_interval", frame_interval, millisecond, {1.0, 1e5}, "from frame to frame");
-      v.choice("factory_calibration", factory_calibration, {{"delay", std::string{"delay"}}}, "this device's");
+      v.choice("factory_calibration", factory_calibration, {{"delay", std::string{"delay"}}},
+               "this device's");
     }
   };
   struct Pixel {
@@ -148,11 +152,12 @@ struct Datasheet {
   [[nodiscard]] const Declared* declares(std::string_view type) const;
 };
 
-/// Of the correlation of the two waveforms, ĉ_n = e_n r_n* / |e_1 r_1|: a sine has e_1 alone, a square wave of half duty
-/// e_n ∝ sin(nπ/2) / n, a low pass of time constant τ adds 1 / (1 + i n ω τ).
+/// Of the correlation of the two waveforms, ĉ_n = e_n r_n* / |e_1 r_1|: a sine has e_1 alone, a square wave
+/// of half duty e_n ∝ sin(nπ/2) / n, a low pass of time constant τ adds 1 / (1 + i n ω τ).
 std::complex<double> contentOf(const Datasheet::Modulation& modulation, int n);
 
-/// Errors name file, line and key; also a camera without emitter or modulation, or an effect that this device lacks.
+/// Errors name file, line and key; also a camera without emitter or modulation, or an effect that this device
+/// lacks.
 Result<Datasheet> readDatasheet(const std::filesystem::path& file);
 
 }  // namespace toftwin::reference

@@ -35,8 +35,8 @@ class Device {
   };
   /// Frame `frame` of a state, with noise.
   Exposed expose(const State& state, std::uint64_t frame);
-  /// Without noise and rig error, and with or without what is hidden; `nudge`: the camera stands there instead,
-  /// relative to the state's pose.
+  /// Without noise and rig error, and with or without what is hidden; `nudge`: the camera stands there
+  /// instead, relative to the state's pose.
   Exposed exposeNoiseFree(const State& state, std::uint64_t frame, bool with_hidden,
                           const Transform<Camera, Camera>& nudge = {});
 
@@ -47,13 +47,15 @@ class Device {
  private:
   Exposed make(Light light, const State& state, std::uint64_t frame, bool with_hidden, Dice* dice) const;
   [[nodiscard]] Transform<World, Camera> standing(Transform<World, Camera> commanded) const;
-  [[nodiscard]] const Light& lightAt(const Transform<World, Camera>& world_from_camera);
+  [[nodiscard]] const Light& lightAt(const Transform<World, Camera>& world_from_camera, bool with_hidden);
 
   Transport transport_;
+  std::optional<Transport> plain_;  ///< without what is hidden, where that is in the transport itself
   Sealed sealed_;
   std::uint64_t seed_;
   struct Kept {
     Transform<World, Camera> pose;
+    bool is_plain;
     Light light;
   };
   std::optional<Kept> kept_;  ///< light of the last pose

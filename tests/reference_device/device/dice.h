@@ -8,26 +8,29 @@
 
 namespace toftwin::reference {
 
-/// Random numbers of this device: xoshiro256++ (D. Blackman, S. Vigna, 2019), seeded by SplitMix64. One stream for
-/// each key, so that the same key always gives the same numbers.
+/// Random numbers of this device: xoshiro256++ (D. Blackman, S. Vigna, 2019), seeded by SplitMix64. One
+/// stream for each key, so that the same key always gives the same numbers.
 class Dice {
  public:
   explicit Dice(std::uint64_t key) {
     for (std::uint64_t& word : state_) word = mix(key += 0x9E3779B97F4A7C15U);
   }
   /// One key of several.
-  static std::uint64_t key(std::uint64_t a, std::uint64_t b) { return mix(a ^ (mix(b) + 0x9E3779B97F4A7C15U)); }
+  static std::uint64_t key(std::uint64_t a, std::uint64_t b) {
+    return mix(a ^ (mix(b) + 0x9E3779B97F4A7C15U));
+  }
 
   double uniform() { return static_cast<double>(next() >> 11) * 0x1p-53; }  ///< in [0, 1)
   /// Box–Muller, both of a pair used.
   double normal() {
     if (has_spare_) return has_spare_ = false, spare_;
-    const double radius = std::sqrt(-2.0 * std::log(1.0 - uniform())), angle = 2.0 * std::numbers::pi * uniform();
+    const double radius = std::sqrt(-2.0 * std::log(1.0 - uniform())),
+                 angle = 2.0 * std::numbers::pi * uniform();
     spare_ = radius * std::sin(angle), has_spare_ = true;
     return radius * std::cos(angle);
   }
-  /// Poisson: by multiplication (Knuth) below a mean of 30; above, the rounded square of a shifted normal (Anscombe),
-  /// whose mean and variance are right within 1e-3 of the mean's root.
+  /// Poisson: by multiplication (Knuth) below a mean of 30; above, the rounded square of a shifted normal
+  /// (Anscombe), whose mean and variance are right within 1e-3 of the mean's root.
   double poisson(double mean) {
     if (!(mean > 0.0)) return 0.0;
     if (mean < 30.0) {

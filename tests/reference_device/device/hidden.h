@@ -22,7 +22,7 @@ struct Circumstances {
   double exposure_s = 0.0;  ///< of a raw exposure of the first frequency
   double ambient_klx = 0.0;
   double illumination_c = 0.0, sensor_c = 0.0, sensor_rate_c_per_s = 0.0;
-  std::uint64_t frame = 0;  ///< counts on from the opening
+  std::uint64_t frame = 0;                       ///< counts on from the opening
   Transform<World, Camera> world_from_camera{};  ///< as commanded
 };
 
@@ -34,9 +34,10 @@ struct About {
   std::string_view name;
   std::string_view summary;
   Stage stage;
-  std::string_view unit;        ///< of its strength
-  std::string_view covariates;  ///< that a right answer names, as in docs/effects; those in brackets may be named
-  std::string_view catalogue;   ///< the catalogue's effect that it is, or empty
+  std::string_view unit;  ///< of its strength
+  std::string_view
+      covariates;  ///< that a right answer names, as in docs/effects; those in brackets may be named
+  std::string_view catalogue;  ///< the catalogue's effect that it is, or empty
 };
 
 /// Something that the device does and its datasheet does not say. With strength 0 it does nothing.

@@ -12,23 +12,26 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 constexpr double kSpeedOfLight_m_per_s = 299'792'458.0;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-/// Of a pixel in which an edge or a shadow's edge lies: the additive recurrence of the plastic number, whose shares of
-/// areas are right within about 3 / kEdgeSamples.
+/// Of a pixel in which an edge or a shadow's edge lies: the additive recurrence of the plastic number, whose
+/// shares of areas are right within about 3 / kEdgeSamples.
 constexpr int kEdgeSamples = 600;
 
 struct Lamp {
   Vec3d at_m;  ///< in the world
   double power_w, cos_half_angle;
+  bool is_isotropic;
 };
 
-/// Irradiance by a Lambertian point that looks along `axis`, and its way; 0 where it does not reach.
+/// Irradiance by a point, and its way; 0 where it does not reach. Its radiant intensity is P/π cos γ from
+/// `axis`, or P/4π in all directions.
 double irradianceBy(const Room& room, const Lamp& lamp, Vec3d axis, Vec3d at, Vec3d normal, double& way_m) {
   const Vec3d way = at - lamp.at_m;
   way_m = norm(way);
   const double along = dot(way, axis) / way_m, incidence = -dot(way, normal) / way_m;
-  if (along <= 0.0 || along < lamp.cos_half_angle || incidence <= 0.0) return 0.0;
-  if (isHidden(room, lamp.at_m, at)) return 0.0;
-  return lamp.power_w / kPi * along * incidence / (way_m * way_m);
+  const bool is_outside = !lamp.is_isotropic && (along <= 0.0 || along < lamp.cos_half_angle);
+  if (is_outside || incidence <= 0.0 || isHidden(room, lamp.at_m, at)) return 0.0;
+  const double intensity = lamp.power_w / kPi * (lamp.is_isotropic ? 0.25 : along);
+  return intensity * incidence / (way_m * way_m);
 }
 
 }  // namespace
@@ -73,8 +76,10 @@ bool Transport::isSmooth(const View& view, int x, int y) const {
       const auto met = firstMeeting(room_, view.world_from_camera.translation_m, ray);
       unsigned now = 0;
       for (std::size_t i = 0; met && i < view.lamps.size(); ++i) {
-        const Vec3d at = view.world_from_camera.translation_m + met->distance_m * ray, way = at - view.lamps[i].at_m;
-        const bool in_cone = dot(way, view.axis) >= view.lamps[i].cos_half_angle * norm(way);
+        const Vec3d at = view.world_from_camera.translation_m + met->distance_m * ray,
+                    way = at - view.lamps[i].at_m;
+        const bool in_cone =
+            view.lamps[i].is_isotropic || dot(way, view.axis) >= view.lamps[i].cos_half_angle * norm(way);
         if (in_cone && !isHidden(room_, view.lamps[i].at_m, at)) now |= 1U << i;
       }
       const auto here = met ? std::optional{met->board} : std::nullopt;
@@ -85,7 +90,8 @@ bool Transport::isSmooth(const View& view, int x, int y) const {
   return true;
 }
 
-void Transport::addSample(Light& light, View& view, std::size_t pixel, double u, double v, double weight) const {
+void Transport::addSample(Light& light, View& view, std::size_t pixel, double u, double v,
+                          double weight) const {
   const Vec3d origin = view.world_from_camera.translation_m, ray = view.ray(u, v);
   const auto met = firstMeeting(room_, origin, ray);
   if (!met) return;
@@ -98,7 +104,8 @@ void Transport::addSample(Light& light, View& view, std::size_t pixel, double u,
   seen->weight += weight, seen->sum = seen->sum + weight * at;
   for (const Lamp& lamp : view.lamps) {
     double way = 0.0;
-    const double radiance = board.albedo / kPi * irradianceBy(room_, lamp, view.axis, at, normal, way) * weight;
+    const double radiance =
+        board.albedo / kPi * irradianceBy(room_, lamp, view.axis, at, normal, way) * weight;
     if (radiance == 0.0) continue;
     light.steady[pixel] += radiance;
     for (const Term& term : terms_) {
@@ -124,7 +131,8 @@ void Transport::addIndirect(Light& light, const View& view, const Radiosity::Sol
 }
 
 void Transport::seePixel(Light& light, View& view, int x, int y) const {
-  const auto pixel = static_cast<std::size_t>(y) * static_cast<std::size_t>(light.width) + static_cast<std::size_t>(x);
+  const auto pixel =
+      static_cast<std::size_t>(y) * static_cast<std::size_t>(light.width) + static_cast<std::size_t>(x);
   view.seen.clear();
   const Vec3d middle = view.ray(x, y);
   if (const auto met = firstMeeting(room_, view.world_from_camera.translation_m, middle)) {
@@ -153,11 +161,18 @@ Light Transport::see(const Transform<World, Camera>& world_from_camera) const {
   for (const auto& emitter : sheet_.emitters) {
     const Vec3d at{emitter.position_mm[0] / 1e3, emitter.position_mm[1] / 1e3, emitter.position_mm[2] / 1e3};
     const Point<World> place = world_from_camera * Point<Camera>{at};
-    view.lamps.push_back({place.m, emitter.power_w, std::cos(emitter.half_angle.in(radian))});
+    view.lamps.push_back(
+        {place.m, emitter.power_w, std::cos(emitter.half_angle.in(radian)), emitter.isotropic});
   }
-  Light light{.width = view.camera.width, .height = view.camera.height, .frequencies = wavenumbers_.size(),
-              .harmonics = static_cast<std::size_t>(sheet_.sampling.harmonics), .phasors = {}, .steady = {}, .albedo = {},
-              .cosine = {}, .range_m = {}};
+  Light light{.width = view.camera.width,
+              .height = view.camera.height,
+              .frequencies = wavenumbers_.size(),
+              .harmonics = static_cast<std::size_t>(sheet_.sampling.harmonics),
+              .phasors = {},
+              .steady = {},
+              .albedo = {},
+              .cosine = {},
+              .range_m = {}};
   const auto pixels = static_cast<std::size_t>(light.width) * static_cast<std::size_t>(light.height);
   light.phasors.resize(light.frequencies * light.harmonics * pixels);
   light.steady.resize(pixels), light.albedo.resize(pixels);
@@ -179,8 +194,9 @@ Light Transport::see(const Transform<World, Camera>& world_from_camera) const {
     for (int x = 0; x < light.width; ++x) {
       seePixel(light, view, x, y);
       if (radiosity_.empty()) continue;
-      addIndirect(light, view, solution,
-                  static_cast<std::size_t>(y) * static_cast<std::size_t>(light.width) + static_cast<std::size_t>(x));
+      addIndirect(
+          light, view, solution,
+          static_cast<std::size_t>(y) * static_cast<std::size_t>(light.width) + static_cast<std::size_t>(x));
     }
   }
   return light;

@@ -20,8 +20,8 @@ struct Light {
   std::vector<std::complex<double>> phasors;  ///< [(frequency · harmonics + n − 1) · pixels + pixel]
   std::vector<double> steady;                 ///< the same light, not modulated
   std::vector<double> albedo;                 ///< mean over the pixel; nothing there counts as 0
-  std::vector<double> cosine;                 ///< of the angle of incidence at the pixel's middle; NaN: nothing there
-  std::vector<double> range_m;                ///< likewise, from the lens
+  std::vector<double> cosine;   ///< of the angle of incidence at the pixel's middle; NaN: nothing there
+  std::vector<double> range_m;  ///< likewise, from the lens
 
   [[nodiscard]] std::size_t pixels() const { return steady.size(); }
   std::complex<double>& phasor(std::size_t f, std::size_t n, std::size_t pixel) {
@@ -32,8 +32,8 @@ struct Light {
   }
 };
 
-/// Light from the emitters by boards to the pixels: direct light by exact geometry, integrated over each pixel's
-/// square; light between boards by radiosity (radiosity.h).
+/// Light from the emitters by boards to the pixels: direct light by exact geometry, integrated over each
+/// pixel's square; light between boards by radiosity (radiosity.h).
 class Transport {
  public:
   Transport(Room room, const Datasheet& sheet, const RadiosityOptions& options = {});
@@ -46,14 +46,16 @@ class Transport {
  private:
   struct View;
   void addSample(Light& light, View& view, std::size_t pixel, double u, double v, double weight) const;
-  void addIndirect(Light& light, const View& view, const Radiosity::Solution& solution, std::size_t pixel) const;
+  void addIndirect(Light& light, const View& view, const Radiosity::Solution& solution,
+                   std::size_t pixel) const;
   void seePixel(Light& light, View& view, int x, int y) const;
   [[nodiscard]] bool isSmooth(const View& view, int x, int y) const;
 
   Room room_;
   Datasheet sheet_;
   std::vector<double> wavenumbers_;
-  /// Harmonics that the waveforms have: where their phasors begin, and by how much a path's length turns them.
+  /// Harmonics that the waveforms have: where their phasors begin, and by how much a path's length turns
+  /// them.
   struct Term {
     std::size_t frequency = 0, harmonic = 1;
     double wavenumber = 0.0;

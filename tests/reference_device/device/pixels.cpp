@@ -45,8 +45,8 @@ struct Agreed {
 
 /// Tries every turn of the finest frequency.
 Agreed agree(const Ruler& ruler, const std::vector<double>& turns, const std::vector<double>& amplitudes) {
-  const auto finest = static_cast<std::size_t>(
-      std::ranges::min_element(ruler.metres_per_turn) - ruler.metres_per_turn.begin());
+  const auto finest = static_cast<std::size_t>(std::ranges::min_element(ruler.metres_per_turn) -
+                                               ruler.metres_per_turn.begin());
   const int candidates = static_cast<int>(std::lround(ruler.common_m / ruler.metres_per_turn[finest]));
   Agreed best;
   double least = std::numeric_limits<double>::infinity();
@@ -86,15 +86,17 @@ double contradiction(const Charges& charges, std::size_t f, std::size_t pixel) {
 
 Charges collect(const Light& light, const Datasheet& sheet, double exposure_scale, double ambient_w_per_m2) {
   const auto steps = static_cast<std::size_t>(sheet.sampling.steps);
-  Charges charges{.frequencies = light.frequencies, .steps = steps, .pixels = light.pixels(), .taps = {}, .flags = {}};
+  Charges charges{
+      .frequencies = light.frequencies, .steps = steps, .pixels = light.pixels(), .taps = {}, .flags = {}};
   charges.taps.resize(light.frequencies * steps * 2 * light.pixels());
   charges.flags.resize(light.pixels());
   for (std::size_t f = 0; f < light.frequencies; ++f) {
     const auto& modulation = sheet.modulations[f];
     const double half_gain =
-        0.5 * sheet.pixel.electrons_per_radiance_s * modulation.exposure.in(second) * exposure_scale;
+        0.5 * sheet.pixel.electrons_per_radiance_s * modulation.exposure.in(second)*exposure_scale;
     std::vector<std::complex<double>> contents;
-    for (std::size_t n = 1; n <= light.harmonics; ++n) contents.push_back(contentOf(modulation, static_cast<int>(n)));
+    for (std::size_t n = 1; n <= light.harmonics; ++n)
+      contents.push_back(contentOf(modulation, static_cast<int>(n)));
     for (std::size_t k = 0; k < steps; ++k) {
       const double theta = kTurn * static_cast<double>(k) / static_cast<double>(steps);
       std::vector<std::complex<double>> weights;
@@ -131,8 +133,13 @@ void readOut(Charges& charges, const Datasheet& sheet, Dice* dice) {
 
 Measured decode(const Charges& charges, const Datasheet& sheet) {
   constexpr double kAsymmetric = 0.4;
-  Measured measured{.width = sheet.lens.width, .height = sheet.lens.height, .range_m = {}, .amplitude = {}, .ambient = {},
-                    .flags = charges.flags, .phasors = {}};
+  Measured measured{.width = sheet.lens.width,
+                    .height = sheet.lens.height,
+                    .range_m = {},
+                    .amplitude = {},
+                    .ambient = {},
+                    .flags = charges.flags,
+                    .phasors = {}};
   measured.range_m.assign(charges.pixels, kNan);
   measured.amplitude.resize(charges.pixels), measured.ambient.resize(charges.pixels);
   measured.phasors.resize(charges.frequencies * charges.pixels);
@@ -169,7 +176,8 @@ Measured decode(const Charges& charges, const Datasheet& sheet) {
     if (has(flags, PixelFlag::Saturated)) raise(flags, PixelFlag::Invalid);
     if (agreed.deviation_rad > sheet.decoder.unwrap_threshold.in(radian))
       raise(flags, PixelFlag::UnwrapUnreliable), raise(flags, PixelFlag::Invalid);
-    if (!(agreed.range_m >= sheet.decoder.nearest.in(metre) && agreed.range_m <= sheet.decoder.farthest.in(metre)) ||
+    if (!(agreed.range_m >= sheet.decoder.nearest.in(metre) &&
+          agreed.range_m <= sheet.decoder.farthest.in(metre)) ||
         agreed.range_m <= 0.0)
       raise(flags, PixelFlag::OutOfRange), raise(flags, PixelFlag::Invalid);
     if (!has(flags, PixelFlag::Invalid)) measured.range_m[i] = static_cast<float>(agreed.range_m);

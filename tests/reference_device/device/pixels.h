@@ -39,11 +39,12 @@ struct Measured {
 /// with `exposure_scale` times the sheet's exposures and light of `ambient_w_per_m2` on all that is seen.
 Charges collect(const Light& light, const Datasheet& sheet, double exposure_scale, double ambient_w_per_m2);
 
-/// Photons, read noise and full wells, as far as they are declared. Without dice the charges stay means, but are cut.
+/// Photons, read noise and full wells, as far as they are declared. Without dice the charges stay means, but
+/// are cut.
 void readOut(Charges& charges, const Datasheet& sheet, Dice* dice);
 
-/// p = (2/N) Σ_k S_k e^(−iθ_k), φ = −arg p less the waveforms' own delay; with several frequencies the range on which
-/// they agree best within their common period, weighted by (amplitude · frequency)².
+/// p = (2/N) Σ_k S_k e^(−iθ_k), φ = −arg p less the waveforms' own delay; with several frequencies the range
+/// on which they agree best within their common period, weighted by (amplitude · frequency)².
 Measured decode(const Charges& charges, const Datasheet& sheet);
 
 }  // namespace toftwin::reference

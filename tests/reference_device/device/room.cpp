@@ -106,9 +106,9 @@ Result<Room> readRoom(const std::filesystem::path& scene) {
   for (const ObjectKeys& object : keys->objects) {
     const auto albedo = albedos.find(object.material);
     if (albedo == albedos.end()) {
-      return Error{Error::Code::InvalidArgument,
-                   scene.string() + ": object \"" + object.name + "\" is of a material \"" + object.material +
-                       "\", which the file does not describe"};
+      return Error{Error::Code::InvalidArgument, scene.string() + ": object \"" + object.name +
+                                                     "\" is of a material \"" + object.material +
+                                                     "\", which the file does not describe"};
     }
     if (object.size_m[0] == 0.0 || object.size_m[1] == 0.0 ||
         (object.shape == Shape::Box && object.size_m[2] == 0.0)) {

@@ -22,8 +22,8 @@ struct Room {
   std::vector<Board> boards;
 };
 
-/// Reads rectangles and boxes of Lambertian material from a scene file (docs/scene.md). Anything else is an error, so
-/// that nothing that stands there is left out silently.
+/// Reads rectangles and boxes of Lambertian material from a scene file (docs/scene.md). Anything else is an
+/// error, so that nothing that stands there is left out silently.
 Result<Room> readRoom(const std::filesystem::path& scene);
 
 /// Where a ray meets a board first.

@@ -19,7 +19,8 @@ Result<Sealed> readSealed(const std::filesystem::path& file, double scale) {
     const auto rows = allHidden();
     const auto row = std::ranges::find(rows, name, [](const Row& r) { return r.about.name; });
     if (row == rows.end()) {
-      one.complain("effect", "\"" + name + "\" is none of this device's hidden effects (docs/reference-device.md)");
+      one.complain("effect",
+                   "\"" + name + "\" is none of this device's hidden effects (docs/reference-device.md)");
       one.acceptAll();
       continue;
     }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A daemon with one driver, the reference device. It defines the table of drivers itself, so that no other driver, the
-// simulator least of all, is linked into it.
+// A daemon with one driver, the reference device. It defines the table of drivers itself, so that no other
+// driver, the simulator least of all, is linked into it.
 #include <fmt/format.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
@@ -22,7 +22,8 @@ std::span<const Driver> allDrivers() {
 
 int main(int argc, char** argv) {
   if (argc != 2 || argv[1][0] == '-') {
-    fmt::print(stderr, "usage: reference_device CONFIGURATION      as for toftwind, with driver = \"reference\"\n");
+    fmt::print(stderr,
+               "usage: reference_device CONFIGURATION      as for toftwind, with driver = \"reference\"\n");
     return 2;
   }
   try {
@@ -30,7 +31,8 @@ int main(int argc, char** argv) {
     log->set_pattern("%l: %v");
     log->set_level(spdlog::level::warn);
     spdlog::set_default_logger(std::move(log));
-    auto started = toftwin::daemon::Daemon::start({.config = argv[1], .port = {}, .socket = {}, .handle_signals = true});
+    auto started =
+        toftwin::daemon::Daemon::start({.config = argv[1], .port = {}, .socket = {}, .handle_signals = true});
     if (!started) {
       fmt::print(stderr, "reference_device: {}\n", started.error().message);
       return 2;

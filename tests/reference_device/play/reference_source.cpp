@@ -25,7 +25,6 @@ struct Keys {
   std::string camera, scene, sealed;
   double scale = 1.0;
   std::uint64_t seed = 1;
-  int patches = 32;
   Pace pace = Pace::RealTime;
 
   template <class Visitor>
@@ -33,17 +32,17 @@ struct Keys {
     v.text("uri", uri, "reference: and the serial number");
     v.text("camera", camera, "path of the camera file that the maker gives out, relative to this file");
     v.text("scene", scene, "path of the scene file, relative to this file: rectangles and boxes");
-    v.text("sealed", sealed, "path of the sealed specification, relative to this file; empty: nothing is hidden");
+    v.text("sealed", sealed,
+           "path of the sealed specification, relative to this file; empty: nothing is hidden");
     v.number("scale", scale, {0.0, 1e9}, "of all hidden strengths");
     v.number("seed", seed, {0, 9'007'199'254'740'992.0}, "of noise and of the rig's errors");
-    v.number("patches", patches, {4, 128}, "along each board's edge, for the light between boards");
     v.choice("pace", pace, {{"real_time", Pace::RealTime}, {"fast", Pace::Fast}, {"trigger", Pace::Trigger}},
              "when a frame comes; under lockstep the clients say when");
   }
 };
 
-constexpr std::string_view kExposure = "exposure_us", kAmbient = "ambient_klx", kSincePowerOn = "since_power_on_s",
-                           kRoom = "room_temperature_c";
+constexpr std::string_view kExposure = "exposure_us", kAmbient = "ambient_klx",
+                           kSincePowerOn = "since_power_on_s", kRoom = "room_temperature_c";
 constexpr Bounds kAmbientBounds{0.0, 200.0}, kSinceBounds{0.0, 1e9}, kRoomBounds{-40.0, 100.0};
 
 SourceInfo describe(const Keys& keys, const Datasheet& sheet) {
@@ -59,18 +58,26 @@ SourceInfo describe(const Keys& keys, const Datasheet& sheet) {
   info.can_set_pose = true;
   info.can_trigger = keys.pace == Pace::Trigger;
   info.can_lockstep = true;
-  info.parameters = {std::string{kExposure}, std::string{kAmbient}, std::string{kSincePowerOn}, std::string{kRoom}};
+  info.parameters = {std::string{kExposure}, std::string{kAmbient}, std::string{kSincePowerOn},
+                     std::string{kRoom}};
   return info;
 }
 
 Plane planeOf(PlaneKind kind, const Datasheet& sheet, int channels, std::vector<float> values) {
-  return {kind, ElementType::F32, sheet.lens.width, sheet.lens.height, channels, Buffer::adopt(std::move(values))};
+  return {kind,
+          ElementType::F32,
+          sheet.lens.width,
+          sheet.lens.height,
+          channels,
+          Buffer::adopt(std::move(values))};
 }
 
 class ReferenceSource final : public drivers::Source {
  public:
   ReferenceSource(const Keys& keys, Device device)
-      : keys_(keys), device_(std::move(device)), info_(describe(keys, device_.sheet())),
+      : keys_(keys),
+        device_(std::move(device)),
+        info_(describe(keys, device_.sheet())),
         pacer_(keys.pace, *info_.frame_interval) {
     for (int y = 0; y < info_.camera.height; ++y) {
       for (int x = 0; x < info_.camera.width; ++x) ray_z_.push_back(rayThroughPixel(info_.camera, x, y).v.z);
@@ -99,7 +106,7 @@ class ReferenceSource final : public drivers::Source {
   }
 
   [[nodiscard]] SourceState state() const override {
-    return {{{std::string{kExposure}, exposure_us(), exposureBounds()},
+    return {{{std::string{kExposure}, exposure_us_, exposureBounds()},
              {std::string{kAmbient}, state_.ambient_klx, kAmbientBounds},
              {std::string{kSincePowerOn}, {}, kSinceBounds},
              {std::string{kRoom}, state_.room_c, kRoomBounds}},
@@ -120,14 +127,13 @@ class ReferenceSource final : public drivers::Source {
   Result<> setParameter(std::string_view name, double value) override {
     const auto set = [&](double& into, Bounds bounds, double to) -> Result<> {
       if (std::isnan(value) || !bounds.contains(value)) {
-        return Error{Error::Code::InvalidArgument, fmt::format("{} = {} is out of bounds: it must be {}", name, value,
-                                                               settings::describe(bounds))};
+        return Error{Error::Code::InvalidArgument, fmt::format("{} = {} is out of bounds: it must be {}",
+                                                               name, value, settings::describe(bounds))};
       }
       into = to;
       return {};
     };
-    if (name == kExposure)
-      return set(state_.exposure_scale, exposureBounds(), value / declaredExposure_us());
+    if (name == kExposure) return set(exposure_us_, exposureBounds(), value);
     if (name == kAmbient) return set(state_.ambient_klx, kAmbientBounds, value);
     if (name == kRoom) return set(state_.room_c, kRoomBounds, value);
     if (name == kSincePowerOn) {
@@ -148,22 +154,24 @@ class ReferenceSource final : public drivers::Source {
   [[nodiscard]] double declaredExposure_us() const {
     return device_.sheet().modulations.front().exposure.in(microsecond);
   }
-  [[nodiscard]] double exposure_us() const { return state_.exposure_scale * declaredExposure_us(); }
   /// Raw exposures and gaps must fit between two frames.
   [[nodiscard]] Bounds exposureBounds() const {
     const auto& sampling = device_.sheet().sampling;
     const auto count = static_cast<double>(device_.sheet().modulations.size()) * sampling.steps;
-    return {1.0, std::min(20'000.0, sampling.frame_interval.in(microsecond) / count - sampling.gap.in(microsecond))};
+    return {1.0, std::min(20'000.0,
+                          sampling.frame_interval.in(microsecond) / count - sampling.gap.in(microsecond))};
   }
   [[nodiscard]] double deviceTime_s() const { return static_cast<double>(pacer_.deviceTime().ns) * 1e-9; }
 
   /// The rig errs anew for each pose and each time that a clock was set to.
   [[nodiscard]] State stateNow() const {
     State state = state_;
+    state.exposure_scale = exposure_us_ / declaredExposure_us();
     state.since_power_on_s = power_on_s_ + deviceTime_s();
     const auto& pose = state.world_from_camera;
-    for (const double number : {pose.translation_m.x, pose.translation_m.y, pose.translation_m.z, pose.rotation_wxyz[0],
-                                pose.rotation_wxyz[1], pose.rotation_wxyz[2], pose.rotation_wxyz[3], capture_s_})
+    for (const double number :
+         {pose.translation_m.x, pose.translation_m.y, pose.translation_m.z, pose.rotation_wxyz[0],
+          pose.rotation_wxyz[1], pose.rotation_wxyz[2], pose.rotation_wxyz[3], capture_s_})
       state.capture = Dice::key(state.capture, std::bit_cast<std::uint64_t>(number));
     return state;
   }
@@ -194,7 +202,8 @@ class ReferenceSource final : public drivers::Source {
   [[nodiscard]] std::vector<Plane> planesOf(const Device::Exposed& exposed) const {
     const Datasheet& sheet = device_.sheet();
     const Measured& measured = exposed.measured;
-    const std::size_t pixels = measured.range_m.size(), channels = exposed.charges.frequencies * exposed.charges.steps;
+    const std::size_t pixels = measured.range_m.size(),
+                      channels = exposed.charges.frequencies * exposed.charges.steps;
     std::vector<float> depth_m(pixels), samples(channels * pixels), phasors(2 * measured.phasors.size());
     for (std::size_t i = 0; i < pixels; ++i) {
       depth_m[i] = static_cast<float>(static_cast<double>(measured.range_m[i]) * ray_z_[i]);
@@ -215,7 +224,8 @@ class ReferenceSource final : public drivers::Source {
             planeOf(PlaneKind::Ambient, sheet, 1, measured.ambient),
             toPlane(PlaneKind::Flags, std::move(flags)),
             planeOf(PlaneKind::Samples, sheet, static_cast<int>(channels), std::move(samples)),
-            planeOf(PlaneKind::Phasors, sheet, static_cast<int>(2 * exposed.charges.frequencies), std::move(phasors))};
+            planeOf(PlaneKind::Phasors, sheet, static_cast<int>(2 * exposed.charges.frequencies),
+                    std::move(phasors))};
   }
 
   Keys keys_;
@@ -224,6 +234,7 @@ class ReferenceSource final : public drivers::Source {
   drivers::Pacer pacer_;
   std::vector<double> ray_z_;
   State state_;
+  double exposure_us_ = declaredExposure_us();
   double power_on_s_ = State{}.since_power_on_s;  ///< at device time 0
   double capture_s_ = 0.0;                        ///< what the clock was set to last
 };
@@ -236,16 +247,18 @@ Result<std::unique_ptr<drivers::Source>> open(settings::Table& table) {
   }
   if (auto checked = table.check(); !checked) return checked.error();
   if (!keys.uri.starts_with("reference:")) {
-    return Error{Error::Code::NotFound, fmt::format("{}: there is no camera {}; say reference: and a serial number",
-                                                    table.place("uri"), keys.uri)};
+    return Error{Error::Code::NotFound,
+                 fmt::format("{}: there is no camera {}; say reference: and a serial number",
+                             table.place("uri"), keys.uri)};
   }
   auto sheet = readDatasheet(table.resolve(keys.camera));
   if (!sheet) return sheet.error();
   auto room = readRoom(table.resolve(keys.scene));
   if (!room) return room.error();
-  auto sealed = readSealed(keys.sealed.empty() ? std::filesystem::path{} : table.resolve(keys.sealed), keys.scale);
+  auto sealed =
+      readSealed(keys.sealed.empty() ? std::filesystem::path{} : table.resolve(keys.sealed), keys.scale);
   if (!sealed) return sealed.error();
-  Device device{*std::move(room), *std::move(sheet), *std::move(sealed), keys.seed, {.patches = keys.patches}};
+  Device device{*std::move(room), *std::move(sheet), *std::move(sealed), keys.seed, {}};
   return std::unique_ptr<drivers::Source>{std::make_unique<ReferenceSource>(keys, std::move(device))};
 }
 

@@ -23,11 +23,11 @@ struct AlbedoDelay final : Hidden {
 
 Row albedoDelay() {
   return rowOf<AlbedoDelay>({.name = "albedo_delay",
-                    .summary = "dark things answer late, whatever their distance",
-                    .stage = Stage::Light,
-                    .unit = "mm per e-fold of darkness",
-                    .covariates = "albedo [amplitude]",
-                    .catalogue = ""});
+                             .summary = "dark things answer late, whatever their distance",
+                             .stage = Stage::Light,
+                             .unit = "mm per e-fold of darkness",
+                             .covariates = "albedo [amplitude]",
+                             .catalogue = ""});
 }
 
 }  // namespace toftwin::reference

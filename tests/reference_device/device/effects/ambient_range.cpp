@@ -22,11 +22,11 @@ struct AmbientRange final : Hidden {
 
 Row ambientRange() {
   return rowOf<AmbientRange>({.name = "ambient_range",
-                    .summary = "ambient light makes far things farther",
-                    .stage = Stage::Light,
-                    .unit = "mm per klx and metre",
-                    .covariates = "ambient, range",
-                    .catalogue = ""});
+                              .summary = "ambient light makes far things farther",
+                              .stage = Stage::Light,
+                              .unit = "mm per klx and metre",
+                              .covariates = "ambient, range",
+                              .catalogue = ""});
 }
 
 }  // namespace toftwin::reference

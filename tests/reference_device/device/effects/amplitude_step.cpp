@@ -17,7 +17,8 @@ struct AmplitudeStep final : Hidden {
   void onLight(Light& light, const Transport& transport, const Circumstances& now) const override {
     const double gain = transport.sheet().pixel.electrons_per_radiance_s * now.exposure_s;
     delayEach(light, transport, [&](std::size_t i) {
-      return strength / (1.0 + std::exp(-8.0 * std::log(std::max(gain * light.steady[i], 1e-9) / at_electrons)));
+      return strength /
+             (1.0 + std::exp(-8.0 * std::log(std::max(gain * light.steady[i], 1e-9) / at_electrons)));
     });
   }
 };
@@ -26,11 +27,11 @@ struct AmplitudeStep final : Hidden {
 
 Row amplitudeStep() {
   return rowOf<AmplitudeStep>({.name = "amplitude_step",
-                    .summary = "an amplifier that switches its gain is late above a brightness",
-                    .stage = Stage::Light,
-                    .unit = "mm",
-                    .covariates = "amplitude",
-                    .catalogue = ""});
+                               .summary = "an amplifier that switches its gain is late above a brightness",
+                               .stage = Stage::Light,
+                               .unit = "mm",
+                               .covariates = "amplitude",
+                               .catalogue = ""});
 }
 
 }  // namespace toftwin::reference

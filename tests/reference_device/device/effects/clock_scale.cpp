@@ -18,11 +18,11 @@ struct ClockScale final : Hidden {
 
 Row clockScale() {
   return rowOf<ClockScale>({.name = "clock_scale",
-                    .summary = "the clock is wrong: all ranges by the same share",
-                    .stage = Stage::Range,
-                    .unit = "mm per metre",
-                    .covariates = "range",
-                    .catalogue = "clock_scale"});
+                            .summary = "the clock is wrong: all ranges by the same share",
+                            .stage = Stage::Range,
+                            .unit = "mm per metre",
+                            .covariates = "range",
+                            .catalogue = "clock_scale"});
 }
 
 }  // namespace toftwin::reference

@@ -26,11 +26,11 @@ struct ColumnDelay final : Hidden {
 
 Row columnDelay() {
   return rowOf<ColumnDelay>({.name = "column_delay",
-                    .summary = "the clock reaches every m-th column late",
-                    .stage = Stage::Light,
-                    .unit = "mm",
-                    .covariates = "position",
-                    .catalogue = ""});
+                             .summary = "the clock reaches every m-th column late",
+                             .stage = Stage::Light,
+                             .unit = "mm",
+                             .covariates = "position",
+                             .catalogue = ""});
 }
 
 }  // namespace toftwin::reference

@@ -21,11 +21,11 @@ struct ExposureDelay final : Hidden {
 
 Row exposureDelay() {
   return rowOf<ExposureDelay>({.name = "exposure_delay",
-                    .summary = "the driver of the light is late by the logarithm of the exposure",
-                    .stage = Stage::Light,
-                    .unit = "mm per e-fold of exposure",
-                    .covariates = "exposure",
-                    .catalogue = ""});
+                               .summary = "the driver of the light is late by the logarithm of the exposure",
+                               .stage = Stage::Light,
+                               .unit = "mm per e-fold of exposure",
+                               .covariates = "exposure",
+                               .catalogue = ""});
 }
 
 }  // namespace toftwin::reference

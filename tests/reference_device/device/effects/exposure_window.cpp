@@ -25,12 +25,13 @@ struct ExposureWindow final : Hidden {
 }  // namespace
 
 Row exposureWindow() {
-  return rowOf<ExposureWindow>({.name = "exposure_window",
-                    .summary = "late at one exposure time only, as by a resonance: at that of the locked captures",
-                    .stage = Stage::Light,
-                    .unit = "mm",
-                    .covariates = "exposure",
-                    .catalogue = ""});
+  return rowOf<ExposureWindow>(
+      {.name = "exposure_window",
+       .summary = "late at one exposure time only, as by a resonance: at that of the locked captures",
+       .stage = Stage::Light,
+       .unit = "mm",
+       .covariates = "exposure",
+       .catalogue = ""});
 }
 
 }  // namespace toftwin::reference

@@ -15,9 +15,12 @@ struct FirmwareFilter final : Hidden {
   }
   void onRange(Measured& measured, const Light&, const Circumstances&) const override {
     for (std::size_t i = 1; i < measured.range_m.size(); ++i) {
-      if (i % static_cast<std::size_t>(measured.width) == 0 || measured.amplitude[i] > static_cast<float>(below_electrons)) continue;
+      if (i % static_cast<std::size_t>(measured.width) == 0 ||
+          measured.amplitude[i] > static_cast<float>(below_electrons))
+        continue;
       const float left = measured.range_m[i - 1];
-      if (!std::isnan(left)) measured.range_m[i] += static_cast<float>(strength) * (left - measured.range_m[i]);
+      if (!std::isnan(left))
+        measured.range_m[i] += static_cast<float>(strength) * (left - measured.range_m[i]);
     }
   }
 };
@@ -25,12 +28,13 @@ struct FirmwareFilter final : Hidden {
 }  // namespace
 
 Row firmwareFilter() {
-  return rowOf<FirmwareFilter>({.name = "firmware_filter",
-                    .summary = "ranges are smeared along the row, from left to right, where the signal is weak",
-                    .stage = Stage::Range,
-                    .unit = "share of the left neighbour",
-                    .covariates = "neighbours [amplitude]",
-                    .catalogue = ""});
+  return rowOf<FirmwareFilter>(
+      {.name = "firmware_filter",
+       .summary = "ranges are smeared along the row, from left to right, where the signal is weak",
+       .stage = Stage::Range,
+       .unit = "share of the left neighbour",
+       .covariates = "neighbours [amplitude]",
+       .catalogue = ""});
 }
 
 }  // namespace toftwin::reference

@@ -17,12 +17,13 @@ struct FrameParity final : Hidden {
 }  // namespace
 
 Row frameParity() {
-  return rowOf<FrameParity>({.name = "frame_parity",
-                    .summary = "every other frame is late, the ones between early: nothing on the average of two",
-                    .stage = Stage::Light,
-                    .unit = "mm",
-                    .covariates = "frame",
-                    .catalogue = ""});
+  return rowOf<FrameParity>(
+      {.name = "frame_parity",
+       .summary = "every other frame is late, the ones between early: nothing on the average of two",
+       .stage = Stage::Light,
+       .unit = "mm",
+       .covariates = "frame",
+       .catalogue = ""});
 }
 
 }  // namespace toftwin::reference

@@ -10,7 +10,8 @@ struct HalfStep final : Hidden {
     v.number("strength", strength, {-1e9, 1e9}, "mm from half to half");
   }
   void onLight(Light& light, const Transport& transport, const Circumstances&) const override {
-    delayEach(light, transport, [&](std::size_t i) { return i < light.pixels() / 2 ? -0.5 * strength : 0.5 * strength; });
+    delayEach(light, transport,
+              [&](std::size_t i) { return i < light.pixels() / 2 ? -0.5 * strength : 0.5 * strength; });
   }
 };
 
@@ -18,11 +19,11 @@ struct HalfStep final : Hidden {
 
 Row halfStep() {
   return rowOf<HalfStep>({.name = "half_step",
-                    .summary = "the sensor is read in two halves, and the lower one is late",
-                    .stage = Stage::Light,
-                    .unit = "mm from half to half",
-                    .covariates = "position",
-                    .catalogue = ""});
+                          .summary = "the sensor is read in two halves, and the lower one is late",
+                          .stage = Stage::Light,
+                          .unit = "mm from half to half",
+                          .covariates = "position",
+                          .catalogue = ""});
 }
 
 }  // namespace toftwin::reference

@@ -23,11 +23,11 @@ struct IncidenceDelay final : Hidden {
 
 Row incidenceDelay() {
   return rowOf<IncidenceDelay>({.name = "incidence_delay",
-                    .summary = "surfaces seen aslant answer late",
-                    .stage = Stage::Light,
-                    .unit = "mm for each 1 / cos - 1",
-                    .covariates = "incidence [position, range]",
-                    .catalogue = ""});
+                                .summary = "surfaces seen aslant answer late",
+                                .stage = Stage::Light,
+                                .unit = "mm for each 1 / cos - 1",
+                                .covariates = "incidence [position, range]",
+                                .catalogue = ""});
 }
 
 }  // namespace toftwin::reference

@@ -32,12 +32,13 @@ struct InterferenceBurst final : Hidden {
 }  // namespace
 
 Row interferenceBurst() {
-  return rowOf<InterferenceBurst>({.name = "interference_burst",
-                    .summary = "another device shines into every seventh frame, beating from exposure to exposure",
-                    .stage = Stage::Samples,
-                    .unit = "electrons",
-                    .covariates = "frame",
-                    .catalogue = ""});
+  return rowOf<InterferenceBurst>(
+      {.name = "interference_burst",
+       .summary = "another device shines into every seventh frame, beating from exposure to exposure",
+       .stage = Stage::Samples,
+       .unit = "electrons",
+       .covariates = "frame",
+       .catalogue = ""});
 }
 
 }  // namespace toftwin::reference

@@ -16,7 +16,9 @@ struct RadiusWiggle final : Hidden {
   void onLight(Light& light, const Transport& transport, const Circumstances&) const override {
     const double per_metre = 2.0 * transport.wavenumber(0) * cycles;
     delayEach(light, transport, [&](std::size_t i) {
-      return std::isnan(light.range_m[i]) ? 0.0 : strength * squareOfRadius(light, i) * std::sin(per_metre * light.range_m[i]);
+      return std::isnan(light.range_m[i])
+                 ? 0.0
+                 : strength * squareOfRadius(light, i) * std::sin(per_metre * light.range_m[i]);
     });
   }
 };
@@ -25,11 +27,11 @@ struct RadiusWiggle final : Hidden {
 
 Row radiusWiggle() {
   return rowOf<RadiusWiggle>({.name = "radius_wiggle",
-                    .summary = "a cyclic error that grows towards the image's edge",
-                    .stage = Stage::Light,
-                    .unit = "mm at the corner",
-                    .covariates = "range, position",
-                    .catalogue = ""});
+                              .summary = "a cyclic error that grows towards the image's edge",
+                              .stage = Stage::Light,
+                              .unit = "mm at the corner",
+                              .covariates = "range, position",
+                              .catalogue = ""});
 }
 
 }  // namespace toftwin::reference

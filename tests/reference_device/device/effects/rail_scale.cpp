@@ -17,12 +17,13 @@ struct RailScale final : Hidden {
 }  // namespace
 
 Row railScale() {
-  return rowOf<RailScale>({.name = "rail_scale",
-                    .summary = "the rig goes farther than it says: an error of the reference, not of the camera",
-                    .stage = Stage::Light,
-                    .unit = "mm per metre of way",
-                    .covariates = "pose [range]",
-                    .catalogue = ""});
+  return rowOf<RailScale>(
+      {.name = "rail_scale",
+       .summary = "the rig goes farther than it says: an error of the reference, not of the camera",
+       .stage = Stage::Light,
+       .unit = "mm per metre of way",
+       .covariates = "pose [range]",
+       .catalogue = ""});
 }
 
 }  // namespace toftwin::reference

@@ -15,12 +15,13 @@ struct RayOffset final : Hidden {
 }  // namespace
 
 Row rayOffset() {
-  return rowOf<RayOffset>({.name = "ray_offset",
-                    .summary = "light between places nearer than this is missing, as with a renderer's ray offset",
-                    .stage = Stage::Light,
-                    .unit = "mm",
-                    .covariates = "neighbours [position, range]",
-                    .catalogue = ""});
+  return rowOf<RayOffset>(
+      {.name = "ray_offset",
+       .summary = "light between places nearer than this is missing, as with a renderer's ray offset",
+       .stage = Stage::Light,
+       .unit = "mm",
+       .covariates = "neighbours [position, range]",
+       .catalogue = ""});
 }
 
 }  // namespace toftwin::reference

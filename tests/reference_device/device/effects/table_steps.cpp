@@ -25,11 +25,11 @@ struct TableSteps final : Hidden {
 
 Row tableSteps() {
   return rowOf<TableSteps>({.name = "table_steps",
-                    .summary = "the firmware's table of ranges is coarse: a sawtooth",
-                    .stage = Stage::Range,
-                    .unit = "mm from peak to peak",
-                    .covariates = "range",
-                    .catalogue = ""});
+                            .summary = "the firmware's table of ranges is coarse: a sawtooth",
+                            .stage = Stage::Range,
+                            .unit = "mm from peak to peak",
+                            .covariates = "range",
+                            .catalogue = ""});
 }
 
 }  // namespace toftwin::reference

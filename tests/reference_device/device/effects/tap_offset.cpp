@@ -19,12 +19,13 @@ struct TapOffset final : Hidden {
 }  // namespace
 
 Row tapOffset() {
-  return rowOf<TapOffset>({.name = "tap_offset",
-                    .summary = "a charge that does not come from light stays in the first raw exposure's first tap",
-                    .stage = Stage::Samples,
-                    .unit = "electrons",
-                    .covariates = "amplitude [range, exposure]",
-                    .catalogue = "sample_offset"});
+  return rowOf<TapOffset>(
+      {.name = "tap_offset",
+       .summary = "a charge that does not come from light stays in the first raw exposure's first tap",
+       .stage = Stage::Samples,
+       .unit = "electrons",
+       .covariates = "amplitude [range, exposure]",
+       .catalogue = "sample_offset"});
 }
 
 }  // namespace toftwin::reference

@@ -17,12 +17,13 @@ struct TemperatureRate final : Hidden {
 }  // namespace
 
 Row temperatureRate() {
-  return rowOf<TemperatureRate>({.name = "temperature_rate",
-                    .summary = "late by how fast the sensor warms or cools, not by how warm it is",
-                    .stage = Stage::Light,
-                    .unit = "mm per kelvin a minute",
-                    .covariates = "temperature rate [time, temperature]",
-                    .catalogue = ""});
+  return rowOf<TemperatureRate>(
+      {.name = "temperature_rate",
+       .summary = "late by how fast the sensor warms or cools, not by how warm it is",
+       .stage = Stage::Light,
+       .unit = "mm per kelvin a minute",
+       .covariates = "temperature rate [time, temperature]",
+       .catalogue = ""});
 }
 
 }  // namespace toftwin::reference

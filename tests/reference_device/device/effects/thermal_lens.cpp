@@ -18,12 +18,13 @@ struct ThermalLens final : Hidden {
 }  // namespace
 
 Row thermalLens() {
-  return rowOf<ThermalLens>({.name = "thermal_lens",
-                    .summary = "a warm lens delays the image's edges: by temperature and square of the radius",
-                    .stage = Stage::Light,
-                    .unit = "mm at the corner, 10 K above the room",
-                    .covariates = "temperature, position [time]",
-                    .catalogue = ""});
+  return rowOf<ThermalLens>(
+      {.name = "thermal_lens",
+       .summary = "a warm lens delays the image's edges: by temperature and square of the radius",
+       .stage = Stage::Light,
+       .unit = "mm at the corner, 10 K above the room",
+       .covariates = "temperature, position [time]",
+       .catalogue = ""});
 }
 
 }  // namespace toftwin::reference

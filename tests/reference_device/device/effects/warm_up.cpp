@@ -23,11 +23,11 @@ struct WarmUp final : Hidden {
 
 Row warmUp() {
   return rowOf<WarmUp>({.name = "warm_up",
-                    .summary = "reads near when cold, and less from minute to minute",
-                    .stage = Stage::Light,
-                    .unit = "mm when cold",
-                    .covariates = "time [temperature]",
-                    .catalogue = "warm_up"});
+                        .summary = "reads near when cold, and less from minute to minute",
+                        .stage = Stage::Light,
+                        .unit = "mm when cold",
+                        .covariates = "time [temperature]",
+                        .catalogue = "warm_up"});
 }
 
 }  // namespace toftwin::reference
