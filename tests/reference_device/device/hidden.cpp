@@ -21,4 +21,18 @@ std::span<const Row> allHidden() {
   return rows;
 }
 
+std::string documentHidden() {
+  const auto wordOf = [](Stage stage) {
+    return stage == Stage::Light ? "light" : stage == Stage::Samples ? "samples" : "range";
+  };
+  std::string text = "| effect | what it does | acts on | strength | goes with |\n| --- | --- | --- | --- | --- |\n";
+  for (const auto& [about, read] : allHidden()) {
+    text += "| `" + std::string{about.name} + "` | " + std::string{about.summary};
+    if (!about.catalogue.empty()) text += " (the catalogue's `" + std::string{about.catalogue} + "`)";
+    text += std::string{" | "} + wordOf(about.stage) + " | " + std::string{about.unit} + " | " +
+            std::string{about.covariates} + " |\n";
+  }
+  return text;
+}
+
 }  // namespace toftwin::reference

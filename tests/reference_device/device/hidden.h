@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -61,6 +62,8 @@ struct Row {
   std::unique_ptr<Hidden> (*read)(settings::Table& keys);
 };
 std::span<const Row> allHidden();
+/// As a Markdown table, for docs/reference-device.md.
+std::string documentHidden();
 
 /// The row of an effect whose keys are its members' visit().
 template <class Effect>

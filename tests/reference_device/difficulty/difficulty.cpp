@@ -157,7 +157,7 @@ double Difficulty::scaleFor(const std::filesystem::path& sealed, double wanted) 
     if (!(there > 0.0)) return 0.0;
     const double factor = std::sqrt(wanted / there);
     scale *= std::clamp(factor, 0.05, 20.0);
-    if (std::abs(factor - 1.0) < 0.01) break;
+    if (std::abs(factor - 1.0) < 0.03) break;
   }
   return scale;
 }

@@ -7,8 +7,10 @@
 
 #include <array>
 #include <exception>
+#include <string_view>
 
 #include "daemon/daemon.h"
+#include "tests/reference_device/device/hidden.h"
 #include "tests/reference_device/play/reference_source.h"
 
 namespace toftwin::drivers {
@@ -21,6 +23,10 @@ std::span<const Driver> allDrivers() {
 }  // namespace toftwin::drivers
 
 int main(int argc, char** argv) {
+  if (argc == 2 && std::string_view{argv[1]} == "--document") {
+    fmt::print("{}", toftwin::reference::documentHidden());
+    return 0;
+  }
   if (argc != 2 || argv[1][0] == '-') {
     fmt::print(stderr,
                "usage: reference_device CONFIGURATION      as for toftwind, with driver = \"reference\"\n");

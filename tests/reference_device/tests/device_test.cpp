@@ -5,6 +5,7 @@
 #include <cmath>
 #include <fstream>
 #include <numbers>
+#include <sstream>
 
 #include "tests/reference_device/device/device.h"
 
@@ -199,6 +200,24 @@ std::vector<std::string> names() {
 }
 INSTANTIATE_TEST_SUITE_P(All, EachHidden, testing::ValuesIn(names()),
                          [](const auto& one) { return one.param; });
+
+TEST(Documents, HoldTheTableOfHiddenEffectsAsItIs) {
+  std::stringstream page;
+  page << std::ifstream{std::string{TOFTWIN_SOURCE_DIR} + "/docs/reference-device.md"}.rdbuf();
+  EXPECT_THAT(page.str(), testing::HasSubstr("<!-- hidden: generated -->\n" + documentHidden() + "<!-- end -->"))
+      << "reference_device --document prints it";
+}
+
+TEST(Sealed, AllSpecificationsOfTheRepositoryAreRead) {
+  int count = 0;
+  const auto folder = std::filesystem::path{TOFTWIN_SOURCE_DIR} / "tests/reference_device/sealed";
+  for (const auto& file : std::filesystem::directory_iterator{folder}) {
+    const auto sealed = readSealed(file.path());
+    EXPECT_TRUE(sealed.ok()) << sealed.error().message;
+    ++count;
+  }
+  EXPECT_GE(count, 30);
+}
 
 TEST(Sealed, OfAnUnknownEffectOrKeyIsRefusedWithItsPlace) {
   const std::string file = testing::TempDir() + "wrong.toml";
