@@ -5,14 +5,12 @@
 
 #include <cstring>
 #include <mutex>
-#include <utility>
 
 namespace toftwin::drivers::openni2 {
 namespace {
 
-// The library counts its users too, but not safely for several threads.
-std::mutex users_mutex;
-int users = 0;
+std::mutex start_mutex;
+bool is_started = false;
 
 std::string_view textOf(OniStatus status) {
   switch (status) {
@@ -36,8 +34,8 @@ std::string_view textOf(OniStatus status) {
 }  // namespace
 
 Result<Library> Library::acquire() {
-  const std::lock_guard lock{users_mutex};
-  if (users == 0) {
+  const std::lock_guard lock{start_mutex};
+  if (!is_started) {
     if (const OniStatus status = oniInitialize(ONI_API_VERSION); status != ONI_STATUS_OK) {
       oniShutdown();
       return failure(
@@ -46,14 +44,8 @@ Result<Library> Library::acquire() {
           status);
     }
   }
-  ++users;
+  is_started = true;
   return Library{};
-}
-
-Library::~Library() {
-  if (!holds_) return;
-  const std::lock_guard lock{users_mutex};
-  if (--users == 0) oniShutdown();
 }
 
 std::vector<OniDeviceInfo> Library::devices() const {

@@ -258,7 +258,7 @@ class Driver final : public oni::driver::DriverBase {
     const OniStatus status = DriverBase::initialize(connected, disconnected, changed, cookie);
     current = this;
     emulated.unplug = [] { current.load()->unplug(); };
-    emulated.plugIn = [] { emulated.is_hung = !(is_plugged = true); };
+    emulated.plugIn = [] { current.load()->plugIn(); };
     if (is_plugged) deviceConnected(&info_);
     return status;
   }
@@ -274,7 +274,10 @@ class Driver final : public oni::driver::DriverBase {
     emulated.is_hung = true;
     deviceDisconnected(&info_);
   }
-  // Nobody tells the library of its return: it may be shutting down. It looks when it starts.
+  void plugIn() {
+    emulated.is_hung = false;
+    if (!is_plugged.exchange(true)) deviceConnected(&info_);
+  }
   static inline std::atomic<Driver*> current{nullptr};
   static inline std::atomic<bool> is_plugged{true};
   OniDeviceInfo info_{};

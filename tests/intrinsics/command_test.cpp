@@ -8,6 +8,7 @@
 #include <regex>
 
 #include "calib/file/calibration_file.h"
+#include "calib/intrinsics/detect.h"
 #include "protocol/record/recording.h"
 #include "synthetic.h"
 #include "tests/tools/program.h"
@@ -49,12 +50,13 @@ void writePng(const std::filesystem::path& file, const Image<float>& image) {
   ASSERT_TRUE(cv::imwrite(file.string(), counts));
 }
 
-void writeRecording(const std::filesystem::path& file, int frames_per_shot) {
+void writeRecording(const std::filesystem::path& file, const std::vector<Image<float>>& images,
+                    int frames_of_each) {
   auto writer = record::Writer::create(file);
   ASSERT_TRUE(writer.ok());
   std::uint64_t sequence = 0;
-  for (const Image<float>& shot : shots()) {
-    for (int i = 0; i < frames_per_shot; ++i) {
+  for (const Image<float>& shot : images) {
+    for (int i = 0; i < frames_of_each; ++i) {
       Frame frame;
       frame.source = "cam";
       frame.sequence = sequence;
@@ -103,7 +105,7 @@ TEST(CalibrateCommand, MakesAFileOfImagesAndKeepsItByItsId) {
 
 TEST(CalibrateCommand, TakesEachViewOfARecordingOnce) {
   const Folder folder;
-  writeRecording(folder / "walk.mcap", 2);
+  writeRecording(folder / "walk.mcap", shots(), 2);
   const Ran ran = cli::toftwin("calibrate " + quoted(folder / "walk.mcap") + kBoard + "--no-store -o " +
                                quoted(folder / "camera.toml"));
   ASSERT_EQ(ran.status, 0) << ran.err;
@@ -134,6 +136,38 @@ TEST(CalibrateCommand, SaysWhatIsWrong) {
   fails(kBoard + out, 2, "--source");
   fails(quoted(folder / "one.png") + kBoard + "--model rational" + out, 2, "five terms");
   EXPECT_FALSE(std::filesystem::exists(folder / "camera.toml")) << "nothing is written after an error";
+}
+
+/// Images in which the quick search of live frames finds the board.
+std::vector<Image<float>> easyShots(std::size_t count) {
+  std::mt19937_64 random{kSeed};
+  std::vector<Image<float>> made;
+  while (made.size() < count) {
+    const BoardPose pose = testing::drawPose(smallCamera(), Surface{checkerboard(), 0}, random);
+    Image<float> shot = testing::render(smallCamera(), checkerboard(), pose, {}, random);
+    if (findBoard(shot, checkerboard(), {.is_thorough = false}).isUsed())
+      made.push_back(std::move(shot));
+  }
+  return made;
+}
+
+/// A camera before which a board is held at eight places, half a second each, over and over.
+class HeldBoard : public cli::WithDaemon {
+ protected:
+  std::string moreSources() const override {
+    writeRecording(folder_ / "held.mcap", easyShots(8), 5);
+    return "[[source]]\nname = 'cam'\ndriver = 'replay'\nfile = 'held.mcap'\nloop = true\n";
+  }
+};
+
+TEST_F(HeldBoard, IsCalibratedFromLive) {
+  const Ran ran = run("calibrate --source cam --views 6" + kBoard + "--no-store -o " +
+                      quoted(folder_ / "camera.toml"));
+  ASSERT_EQ(ran.status, 0) << ran.err;
+  EXPECT_THAT(ran.err, HasSubstr("hold it still"));
+  EXPECT_THAT(ran.err, HasSubstr("6 views, "));
+  EXPECT_THAT(ran.out, HasSubstr("6 of 6 views used"));
+  expectTheLens(folder_ / "camera.toml");
 }
 
 class CalibratedTwin : public cli::WithDaemon {

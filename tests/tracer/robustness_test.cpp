@@ -113,9 +113,10 @@ std::vector<TraceRequest> requestsOfAllKinds() {
   for (const std::size_t most : {3, 7}) {
     TraceRequest& large = requests[most];
     large.region_x = 5, large.region_y = 6, large.region_width = large.region_height = 2;
-    requests.push_back(busyRequest(200));
-    requests.back().sampler = large.sampler;
-    requests.back().wanted_noise = 30_mm;
+    TraceRequest piloted = busyRequest(200);
+    piloted.sampler = large.sampler;
+    piloted.wanted_noise = 30_mm;
+    requests.push_back(piloted);
   }
   return requests;
 }

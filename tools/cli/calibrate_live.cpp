@@ -44,6 +44,10 @@ std::optional<Estimate> soFar(const Collector& collector) {
   return result ? std::optional{*std::move(result)} : std::nullopt;
 }
 
+/// Where squares are of ten pixels the quick search misses most boards that the thorough one finds,
+/// which takes a second. After so many misses in a row it is tried.
+constexpr int kMissesUntilThorough = 3;
+
 /// In which a board can be seen.
 Result<PlaneKind> planeOf(Client& client, const std::string& source) {
   const auto details = client.describe(source);
@@ -73,7 +77,7 @@ Result<> collectLive(const DaemonOptions& daemon, const LiveOptions& live, Colle
   Prompter prompter;
   prompter.sayOnce("show the board and hold it still; Ctrl-C ends\n");
   std::optional<Sighting> before;
-  int views = 0;
+  int views = 0, misses = 0;
   while (!interrupted() && views < live.most_views) {
     const auto frame = waitForFrame(*frames, daemon.timeout());
     if (!frame && frame.error().code == Error::Code::Stopped) break;
@@ -85,14 +89,17 @@ Result<> collectLive(const DaemonOptions& daemon, const LiveOptions& live, Colle
     auto brightness = brightnessOf(*frame);
     if (!brightness) return brightness.error();
     const NamedImage image{fmt::format("{} frame {}", live.source, frame->sequence), *std::move(brightness)};
-    DetectOptions quick = collector.options();
-    quick.is_thorough = false;
-    Sighting sighting = findBoard(image.brightness, collector.target(), quick);
+    DetectOptions how = collector.options();
+    how.is_thorough = misses >= kMissesUntilThorough;
+    Sighting sighting = findBoard(image.brightness, collector.target(), how);
     sighting.name = image.name;
+    if (!sighting.isUsed()) misses = how.is_thorough ? 0 : misses + 1;
     // Two frames that agree: the board is held still, so the exposures of one frame agree as well.
     const bool is_still = before && sighting.isUsed() && movedBy(*before, sighting) < live.still_px;
     before = sighting.isUsed() ? std::optional{sighting} : std::nullopt;
-    if (!is_still || collector.isLikeAnother(sighting)) continue;
+    if (!is_still) continue;  // a board that took the thorough search is looked for so once more
+    misses = 0;
+    if (collector.isLikeAnother(sighting)) continue;
     const ImageSize size{image.brightness.width(), image.brightness.height()};
     if (auto added = collector.add(std::move(sighting), size); !added) return added;
     on_view(image);
