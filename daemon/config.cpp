@@ -65,9 +65,11 @@ SourceKeys readSourceKeys(settings::Table& table, std::span<const drivers::Drive
 }
 
 /// A line for each file that the table names, and that a TOML file among them names in turn (a
-/// scene its meshes): path, size and time of change. Equal text: nobody changed them.
-std::string stampsOf(const settings::Table& table) {
+/// scene its meshes): path, size and time of change. Equal text: nobody changed them. But for `written`, which the
+/// daemon itself changes.
+std::string stampsOf(const settings::Table& table, const std::filesystem::path& written = {}) {
   std::vector<std::filesystem::path> files = table.files();
+  std::erase(files, written);
   for (std::size_t i = 0, named_here = files.size(); i < named_here; ++i) {
     if (files[i].extension() != ".toml") continue;
     if (const auto below = settings::Table::load(files[i])) {
@@ -100,15 +102,17 @@ ConfiguredSource readSource(settings::Table table, std::span<const drivers::Driv
   const drivers::Driver* driver = findDriver(drivers, keys.driver);
   // Relative paths in the table start at its file's folder, which therefore counts too. The stamps
   // come before the opening: a file that changes in between is opened again rather than missed.
+  const std::filesystem::path log = keys.fault_log.empty() ? "" : table.resolve(keys.fault_log);
   std::string fingerprint =
-      table.resolve("").string() + "\n" + table.canonicalText() + "\n" + stampsOf(table);
+      table.resolve("").string() + "\n" + table.canonicalText() + "\n" + stampsOf(table, log);
   const bool is_as_before = std::ranges::find(running, fingerprint) != running.end();
-  ConfiguredSource source{std::move(keys), driver, table, std::move(fingerprint), is_as_before};
+  ConfiguredSource source{std::move(keys), driver, table, nullptr, std::move(fingerprint), is_as_before};
   if (driver == nullptr) return source;
   if (is_as_before) {
     table.acceptAll();
   } else {
-    source.opened = openGuarded(*driver, source.table);
+    source.faults = std::make_shared<FaultPlan>(source.keys.faults, source.keys.name, log);
+    source.opened = FaultPlan::open(source.faults, openGuarded(*driver, source.table));
     // What is wrong in another file is told at the source that names it.
     if (!source.opened && source.opened.error().code == Error::Code::InvalidArgument &&
         source.table.check())

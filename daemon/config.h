@@ -12,6 +12,7 @@
 #include <toftwin/units.h>
 
 #include "daemon/facades/facade.h"
+#include "daemon/faults.h"
 #include "drivers/source.h"
 #include "protocol/settings/settings.h"
 
@@ -121,6 +122,8 @@ struct SourceKeys {
   std::string name;
   std::string driver;
   Start start = Start::OnDemand;
+  std::vector<FaultKeys> faults;
+  std::string fault_log;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -129,6 +132,9 @@ struct SourceKeys {
     v.text("driver", driver, "one of the drivers below");
     v.choice("start", start, {{"on_demand", Start::OnDemand}, {"always", Start::Always}},
              "makes frames only while somebody wants them, or from the daemon's start to its end");
+    v.group("fault", faults, "what goes wrong on purpose");
+    v.text("fault_log", fault_log,
+           "a file, relative to this one, that is written anew: a line of CSV for every fault that struck");
   }
 };
 
@@ -137,6 +143,7 @@ struct ConfiguredSource {
   SourceKeys keys;
   const drivers::Driver* driver = nullptr;
   settings::Table table;
+  std::shared_ptr<FaultPlan> faults;  ///< shared by all openings of the source; null: as before
   std::string fingerprint;  ///< equal for sources that need not be opened anew on a reload
   bool is_as_before = false;
   Result<std::unique_ptr<drivers::Source>> opened = Error{};

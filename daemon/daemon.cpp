@@ -175,11 +175,13 @@ void Daemon::applyKeys(const Config& config) {
 
 void Daemon::run(ConfiguredSource source) {
   running_.push_back({source.keys.name, source.fingerprint});
-  const auto open = [driver = source.driver, table = source.table] {
+  const auto open = [driver = source.driver, table = source.table,
+                     faults = source.faults]() -> Result<std::unique_ptr<drivers::Source>> {
+    if (auto may = faults->mayOpen(); !may) return may.error();
     settings::Table again = table.anew();
     SourceKeys known;  // ticked off, so that what the driver leaves over is unknown to both
     again.read(known);
-    return driver->open(again);
+    return FaultPlan::open(faults, driver->open(again));
   };
   const SourceHost::Options options{.always = source.keys.start == SourceKeys::Start::Always};
   logging::info("source {}: driver {}", source.keys.name, source.driver->name);
