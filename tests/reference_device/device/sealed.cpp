@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <string>
+#include <string_view>
 
 #include "protocol/settings/settings.h"
 
@@ -26,6 +27,7 @@ Result<Sealed> readSealed(const std::filesystem::path& file, double scale) {
     }
     sealed.hidden.push_back(row->read(one));
     sealed.hidden.back()->strength *= scale;
+    sealed.changes_each_frame |= row->about.covariates.find("frame") != std::string_view::npos;
   }
   if (auto checked = table->check(); !checked) return checked.error();
   return sealed;

@@ -26,6 +26,7 @@ struct Rig {
 struct Sealed {
   Rig rig{};
   std::vector<std::unique_ptr<Hidden>> hidden;
+  bool changes_each_frame = false;  ///< beyond noise
 };
 
 /// `scale` multiplies all strengths. Errors name file, line and key. An empty path: nothing is hidden.

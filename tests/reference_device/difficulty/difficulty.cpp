@@ -116,10 +116,12 @@ Difficulty::Rows Difficulty::rows(const Plain& plain, const Measured& other) con
 }
 
 double Difficulty::lambda(const std::filesystem::path& sealed, double scale) const {
+  int frames = frames_;  // that differ
   std::map<std::string, Device> devices;
   for (const auto& [name, room] : rooms_) {
     auto read = readSealed(sealed, scale);
     if (!read) throw std::runtime_error(read.error().message);
+    if (!read->changes_each_frame) frames = 1;
     devices.emplace(name, Device{room, sheet_, *std::move(read), 1, kCoarse});
   }
   double between_frames = 0.0;
@@ -129,7 +131,7 @@ double Difficulty::lambda(const std::filesystem::path& sealed, double scale) con
     const std::size_t pixels = plain.weight.size();
     Rows sum(2 * pixels);
     double squares = 0.0;
-    for (int frame = 0; frame < frames_; ++frame) {
+    for (int frame = 0; frame < frames; ++frame) {
       const auto seen =
           devices.at(settings_[c].scene)
               .exposeNoiseFree(settings_[c].state,
@@ -139,8 +141,8 @@ double Difficulty::lambda(const std::filesystem::path& sealed, double scale) con
       squares += inner(one, one);
     }
     const double repeats = std::sqrt(static_cast<double>(frames_));
-    for (double& value : sum) value /= repeats;
-    between_frames += squares - inner(sum, sum);
+    for (double& value : sum) value *= repeats / frames;
+    between_frames += squares * frames_ / frames - inner(sum, sum);
     Rows delay(2 * pixels), gain(2 * pixels);
     for (std::size_t i = 0; i < pixels; ++i) delay[pixels + i] = gain[i] = repeats * plain.weight[i];
     const auto products = whitenedProducts(plain.nuisances, {&delay, &gain, &sum});
