@@ -70,6 +70,7 @@ struct Report {
   std::vector<Section> sections{};
   std::string colophon{};  ///< software, commit, date
   Json data = Json::object();
+  std::string written_by = "toftwin compare", explained_in = "docs/compare.md";
 };
 
 /// The page: one HTML text that needs nothing else, no network, no script.

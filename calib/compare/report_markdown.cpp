@@ -37,9 +37,8 @@ std::string markdown(const TableBlock& table) {
 
 std::string toMarkdown(const Report& report) {
   std::string out =
-      fmt::format("# {}\n\n{}. Written by `toftwin compare`; how each number is made: "
-                  "docs/compare.md.\n\n{}\n\n{}\n\n",
-                  report.title, report.colophon, report.subtitle, report.verdict);
+      fmt::format("# {}\n\n{}. Written by `{}`; how each number is made: {}.\n\n{}\n\n{}\n\n", report.title,
+                  report.colophon, report.written_by, report.explained_in, report.subtitle, report.verdict);
   for (const Section& section : report.sections) {
     out += fmt::format("## {}\n\n", section.title);
     if (!section.verdict.empty()) out += section.verdict + "\n\n";

@@ -26,7 +26,7 @@ double Factor::at(double x) const {
     case Shape::Log:
       return std::log(x);
     case Shape::Decay:
-      return std::exp(-x / number(0));
+      return std::exp(-(x - number(1)) / number(0));
     case Shape::Sine:
       return std::sin(kTurn * x / number(0));
     case Shape::Cosine:
@@ -65,7 +65,8 @@ std::string inWords(const Factor& factor) {
     case Shape::Log:
       return fmt::format("ln {}", x);
     case Shape::Decay:
-      return fmt::format("exp(−{}/{})", x, number(0));
+      if (factor.numbers[1] == 0.0) return fmt::format("exp(−{}/{})", x, number(0));
+      return fmt::format("exp(−({} − {})/{})", x, number(1), number(0));
     case Shape::Sine:
       return fmt::format("sin(2π {}/{})", x, number(0));
     case Shape::Cosine:

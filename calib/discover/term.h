@@ -19,7 +19,7 @@ namespace toftwin::discover {
 enum class Shape {
   Power,    ///< x^p                    numbers: p
   Log,      ///< ln x
-  Decay,    ///< exp(−x/τ)              numbers: τ
+  Decay,    ///< exp(−(x−x₀)/τ)         numbers: τ, x₀
   Sine,     ///< sin(2π x/Λ)            numbers: Λ
   Cosine,   ///< cos(2π x/Λ)            numbers: Λ
   Step,     ///< 1 where x ≥ a, else 0  numbers: a
@@ -87,6 +87,11 @@ class RowSource {
   /// The nuisances and random effects, the catalogue if there is one, and behind them a group for each of
   /// `extra`, in their order, with their names.
   [[nodiscard]] virtual Evidence evidence(std::span<const TermGroup> extra) const = 0;
+  /// The same without the catalogue: shapes are refined with it. As good, but less work where it is overridden.
+  [[nodiscard]] virtual Evidence withoutCatalogue(std::span<const TermGroup> extra) const { return evidence(extra); }
+  /// That summed over the captures, with the random effects integrated out (see marginalise): one capture. It is
+  /// asked for most, once for each step of a search. As good, but less work where it is overridden.
+  [[nodiscard]] virtual Evidence summed(std::span<const TermGroup> extra, std::span<const double> scales) const;
   /// What terms can be made of.
   [[nodiscard]] virtual std::vector<CovariateInfo> covariates() const = 0;
 };

@@ -56,6 +56,7 @@ Command replayCommand();
 Command renderCommand();
 Command calibrateCommand();
 Command compareCommand();
+Command discoverCommand();
 Command planCommand();
 Command measureCommand();
 Command poseCommand();

@@ -9,7 +9,8 @@ std::span<const Command> commands() {
   static const std::array kCommands{
       listCommand(),      infoCommand(), grabCommand(),    recordCommand(),     replayCommand(),
       poseCommand(),      rigCommand(),  setCommand(),     triggerCommand(),    renderCommand(),
-      calibrateCommand(), planCommand(), measureCommand(), compareCommand(),    usbCommand(),
+      calibrateCommand(), planCommand(), measureCommand(), compareCommand(),    discoverCommand(),
+      usbCommand(),
       doctorCommand(),    complianceCommand(), completionCommand(),
   };
   return kCommands;

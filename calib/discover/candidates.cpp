@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/discover/candidates.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+namespace toftwin::discover {
+namespace {
+
+bool isOneOfFew(const CovariateInfo& covariate) {
+  return covariate.nature == Nature::Category ||
+         (!covariate.levels.empty() && covariate.levels.size() <= kSurfaceKnots);
+}
+
+Term one(const CovariateInfo& covariate, Shape shape, std::vector<double> numbers) {
+  return {{{covariate.name, shape, std::move(numbers)}}, covariate.stage};
+}
+
+/// Places of knots: each level, or quantiles, each once.
+std::vector<double> knotsOf(const CovariateInfo& covariate, std::size_t count) {
+  std::vector<double> knots;
+  if (!covariate.levels.empty() && covariate.levels.size() <= count) return covariate.levels;
+  const auto& q = covariate.quantiles;
+  if (q.empty()) return knots;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double place = static_cast<double>(i * (q.size() - 1)) / static_cast<double>(count - 1);
+    const auto below = std::min(static_cast<std::size_t>(place), q.size() - 1);
+    const double part = place - static_cast<double>(below);
+    const double above = q[std::min(below + 1, q.size() - 1)];
+    knots.push_back(q[below] + part * (above - q[below]));
+  }
+  knots.erase(std::ranges::unique(knots).begin(), knots.end());
+  return knots;
+}
+
+/// All hats, or all values.
+std::vector<Term> completeBasis(const CovariateInfo& covariate, std::size_t count) {
+  std::vector<Term> terms;
+  if (isOneOfFew(covariate)) {
+    for (const double level : covariate.levels) terms.push_back(one(covariate, Shape::Equal, {level}));
+    return terms;
+  }
+  const auto knots = knotsOf(covariate, count);
+  for (std::size_t i = 0; i < knots.size(); ++i) {
+    terms.push_back(one(covariate, Shape::Hat,
+                        {knots[i == 0 ? 0 : i - 1], knots[i], knots[i + 1 < knots.size() ? i + 1 : i]}));
+  }
+  return terms;
+}
+
+TermGroup waves(const CovariateInfo& covariate, int least, int most) {
+  TermGroup group{fmt::format("{} to {} waves over {}", least, most, covariate.name), Kind::Generic, {}, 0};
+  const double span = covariate.quantiles.back() - covariate.quantiles.front();
+  for (int k = least; k <= most; ++k) {
+    group.terms.push_back(one(covariate, Shape::Sine, {span / k}));
+    group.terms.push_back(one(covariate, Shape::Cosine, {span / k}));
+  }
+  return group;
+}
+
+TermGroup parity(const CovariateInfo& covariate, int modulus) {
+  TermGroup group{fmt::format("{} modulo {}", covariate.name, modulus), Kind::Generic, {}, 0};
+  for (int r = 1; r < modulus; ++r)
+    group.terms.push_back(one(covariate, Shape::Modulo, {static_cast<double>(modulus), static_cast<double>(r)}));
+  return group;
+}
+
+bool varies(const CovariateInfo& covariate) {
+  return covariate.nature == Nature::Category
+             ? covariate.levels.size() > 1
+             : !covariate.quantiles.empty() && covariate.quantiles.back() > covariate.quantiles.front();
+}
+
+}  // namespace
+
+std::vector<Term> products(const std::vector<Term>& a, const std::vector<Term>& b) {
+  std::vector<Term> all;
+  for (const Term& left : a) {
+    for (const Term& right : b) {
+      Term both = left;
+      both.factors.insert(both.factors.end(), right.factors.begin(), right.factors.end());
+      all.push_back(std::move(both));
+    }
+  }
+  return all;
+}
+
+TermGroup smoothIn(const CovariateInfo& covariate, std::size_t knots) {
+  TermGroup group{fmt::format("smooth in {}", covariate.name), Kind::Generic, completeBasis(covariate, knots), 0};
+  if (!group.terms.empty()) group.terms.erase(group.terms.begin());
+  return group;
+}
+
+TermGroup smoothIn(const CovariateInfo& a, const CovariateInfo& b, std::size_t knots) {
+  TermGroup group{fmt::format("smooth in {} and {}", a.name, b.name), Kind::Generic,
+                  products(completeBasis(a, knots), completeBasis(b, knots)), 0};
+  if (!group.terms.empty()) group.terms.erase(group.terms.begin());
+  return group;
+}
+
+std::vector<TermGroup> genericCandidates(std::span<const CovariateInfo> covariates,
+                                         const CandidateOptions& options) {
+  std::vector<TermGroup> groups;
+  const std::size_t knots = std::clamp<std::size_t>(options.captures / 5, 4, kSmoothKnots);
+  for (const CovariateInfo& covariate : covariates) {
+    if (!varies(covariate)) continue;
+    groups.push_back(smoothIn(covariate, knots));
+    if (covariate.nature == Nature::Index) {
+      for (const int modulus : {2, 3, 4}) groups.push_back(parity(covariate, modulus));
+    }
+    const bool is_continuous = covariate.nature != Nature::Category && covariate.levels.empty();
+    if (!is_continuous || covariate.nature == Nature::Index) continue;
+    if (options.captures >= 20) groups.push_back(waves(covariate, 1, 4));
+    if (options.captures >= 40) groups.push_back(waves(covariate, 5, 10));
+    if (options.captures >= 60) groups.push_back(waves(covariate, 11, 20));
+  }
+  if (options.captures < 30) return groups;
+  std::size_t pairs = 0;
+  for (std::size_t j = 1; j < covariates.size(); ++j) {
+    for (std::size_t i = 0; i < j && pairs < options.most_pairs; ++i) {
+      if (!varies(covariates[i]) || !varies(covariates[j])) continue;
+      if (covariates[i].nature == Nature::Index || covariates[j].nature == Nature::Index) continue;
+      groups.push_back(smoothIn(covariates[i], covariates[j], kSurfaceKnots)), ++pairs;
+    }
+  }
+  return groups;
+}
+
+}  // namespace toftwin::discover

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/discover/cross_validation.h"
+
+#include <cmath>
+#include <map>
+
+namespace toftwin::discover {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Sums over the captures that are fitted in a fold.
+struct Training {
+  MatrixXd gram;
+  VectorXd moment;
+};
+
+std::vector<Training> trainingSums(const Marginal& marginal, const std::vector<int>& fold, int folds) {
+  std::vector<Training> sums(static_cast<std::size_t>(folds), {marginal.gram, marginal.moment});
+  for (std::size_t c = 0; c < marginal.captures.size(); ++c) {
+    Training& without = sums[static_cast<std::size_t>(fold[c])];
+    without.gram -= marginal.captures[c].gram;
+    without.moment -= marginal.captures[c].moment;
+  }
+  return sums;
+}
+
+VectorXd solve(const Marginal& marginal, const Training& training, const Columns& columns) {
+  MatrixXd gram = training.gram(columns, columns);
+  gram.diagonal() += marginal.precision(columns);
+  // A coefficient that the fitted captures do not know stays at nothing instead of anywhere: a thousandth of a
+  // typical column's weight.
+  gram.diagonal() += 1e-6 * MatrixXd(marginal.gram(columns, columns)).diagonal();
+  return pseudoInverse(gram, 1e-8).inverse * VectorXd(training.moment(columns));
+}
+
+double deviance(const CaptureEvidence& capture, const Columns& columns, const VectorXd& value) {
+  return capture.energy - 2.0 * value.dot(VectorXd(capture.moment(columns))) +
+         value.dot(capture.gram(columns, columns) * value);
+}
+
+}  // namespace
+
+std::vector<int> foldsOf(const Marginal& marginal, int folds) {
+  std::map<std::string, int> next;
+  int started = 0;
+  std::vector<int> fold;
+  for (const CaptureEvidence& capture : marginal.captures) {
+    // Blocks start at different folds, so that many blocks of one capture do not all fall into the first.
+    const auto [at, is_new] = next.try_emplace(capture.block, started);
+    if (is_new) ++started;
+    fold.push_back(at->second++ % folds);
+  }
+  return fold;
+}
+
+std::vector<Gain> crossValidate(const Marginal& marginal, const Columns& model,
+                                const std::vector<std::size_t>& groups, int folds) {
+  const std::vector<int> fold = foldsOf(marginal, folds);
+  const auto sums = trainingSums(marginal, fold, folds);
+  std::vector<double> before(marginal.captures.size());
+  const auto leave = [&](const Columns& columns, std::vector<double>& into) {
+    std::vector<VectorXd> value;
+    for (const Training& training : sums) value.push_back(solve(marginal, training, columns));
+    for (std::size_t c = 0; c < into.size(); ++c)
+      into[c] = deviance(marginal.captures[c], columns, value[static_cast<std::size_t>(fold[c])]);
+  };
+  leave(model, before);
+  std::vector<Gain> gains;
+  for (const std::size_t group : groups) {
+    Columns columns = model;
+    append(columns, marginal.groups[group]);
+    Gain gain{group, 0.0, std::vector<double>(before.size())};
+    leave(columns, gain.by_capture);
+    for (std::size_t c = 0; c < before.size(); ++c) {
+      gain.by_capture[c] = before[c] - gain.by_capture[c];
+      gain.total += gain.by_capture[c];
+    }
+    gains.push_back(std::move(gain));
+  }
+  return gains;
+}
+
+Difference difference(const Gain& a, const Gain& b) {
+  Difference out;
+  const auto n = static_cast<double>(a.by_capture.size());
+  for (std::size_t c = 0; c < a.by_capture.size(); ++c) out.mean += a.by_capture[c] - b.by_capture[c];
+  double squares = 0.0;
+  for (std::size_t c = 0; c < a.by_capture.size(); ++c) {
+    const double off = a.by_capture[c] - b.by_capture[c] - out.mean / n;
+    squares += off * off;
+  }
+  if (n > 1.0) out.error = std::sqrt(squares * n / (n - 1.0));
+  return out;
+}
+
+Difference against0(const Gain& gain) { return difference(gain, {gain.group, 0.0, std::vector<double>(gain.by_capture.size())}); }
+
+}  // namespace toftwin::discover

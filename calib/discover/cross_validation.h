@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "calib/discover/marginal.h"
+
+/// Does a group predict captures that it was not fitted to?
+namespace toftwin::discover {
+
+/// How much less deviance is left of held-out captures with the group than without it; in units of the noise's
+/// variance, so that an effect of noncentrality λ with k numbers gains about λ − k.
+struct Gain {
+  std::size_t group = 0;
+  double total = 0.0;
+  std::vector<double> by_capture{};
+};
+
+/// Which fold each capture is in: they take turns within their block, so that every fold has some of each.
+std::vector<int> foldsOf(const Marginal& marginal, int folds = 5);
+
+/// For each of `groups` on top of `model`.
+std::vector<Gain> crossValidate(const Marginal& marginal, const Columns& model,
+                                const std::vector<std::size_t>& groups, int folds = 5);
+
+/// a − b over the captures, and its standard error.
+struct Difference {
+  double mean = 0.0, error = 0.0;
+};
+Difference difference(const Gain& a, const Gain& b);
+/// The total with its standard error.
+Difference against0(const Gain& gain);
+
+}  // namespace toftwin::discover

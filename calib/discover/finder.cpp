@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/discover/finder.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "calib/discover/candidates.h"
+#include "calib/discover/estimate.h"
+#include "calib/discover/shape_choice.h"
+
+namespace toftwin::discover {
+namespace {
+
+constexpr int kMostParts = 8;  ///< over all effects
+
+class Search {
+ public:
+  Search(const RowSource& source, const FinderOptions& options)
+      : options_(options), context_{source, source.covariates(), {}, {}, {}} {
+    const std::size_t captures = source.withoutCatalogue({}).captures.size();
+    context_.generic = genericCandidates(context_.covariates, {.captures = captures});
+  }
+
+  Finding run() {
+    for (int step = 0; step < kMostParts; ++step) {
+      updateKnown();
+      updateScales();
+      const Significance significance = testNow(step);
+      // The first test has all of alpha; each later one a half, so that all of a run's stay below a few alpha.
+      if (significance.p > (step == 0 ? options_.alpha : 0.5 * options_.alpha)) break;
+      if (static_cast<int>(finding_.effects.size()) >= options_.most_effects) break;
+      if (!addEffect(significance.p)) break;
+    }
+    if (finding_.effects.size() > 1) {
+      revise();
+      prune();
+    }
+    finding_.nuisances = estimate(context_.source, context_.scales, finding_.effects);
+    finding_.scales = context_.scales;
+    updateKnown();
+    finding_.dispersion = dispersionNow();
+    return std::move(finding_);
+  }
+
+ private:
+  /// Effects' groups and their tangents; catalogue effects are columns of the evidence already.
+  void updateKnown() {
+    context_.known = groupsOf(finding_.effects);
+    for (TermGroup& tangent : tangentsOf(finding_.effects)) context_.known.push_back(std::move(tangent));
+    for (std::size_t i = 0; i < context_.known.size(); ++i) context_.known[i].name = fmt::format("known {}", i + 1);
+    context_.catalogue.clear();
+    for (const Effect& effect : finding_.effects) {
+      if (effect.is_catalogue) context_.catalogue.push_back(effect.name);
+    }
+  }
+
+  /// Scales of random effects, with everything known and, where captures are many, a smooth function of each
+  /// covariate projected out: what is an effect must not make poses look worse than they are.
+  void updateScales() {
+    std::vector<TermGroup> extra = context_.known;
+    std::vector<std::string> names;
+    for (const TermGroup& known : context_.known) names.push_back(known.name);
+    const Evidence plain = context_.source.withoutCatalogue({});
+    const bool has_random = std::ranges::any_of(plain.groups, [](const Group& group) {
+      return group.kind == Kind::PerCapture || group.kind == Kind::Shared;
+    });
+    if (!has_random) return;
+    std::size_t columns = 0;
+    for (const CovariateInfo& covariate : context_.covariates) {
+      TermGroup smooth = smoothIn(covariate, 5);
+      columns += smooth.terms.size();
+      if (columns > plain.captures.size() / 3) break;
+      names.push_back(smooth.name);
+      extra.push_back(std::move(smooth));
+    }
+    context_.scales = estimateScales(context_.catalogue.empty() ? context_.source.withoutCatalogue(extra)
+                                                                : context_.source.evidence(extra),
+                                     names);
+  }
+
+  Significance testNow(int step) {
+    Test test{{options_.null_model, options_.draws, options_.seed + 1000003U * static_cast<std::uint64_t>(step)}};
+    inParts(context_, context_.generic, [&](const Part& part) { test.add(part.marginal, part.model); });
+    Significance significance = test.result();
+    finding_.last_p = significance.p;
+    if (step == 0) {
+      finding_.first_p = significance.p;
+      finding_.by_sign_flips = significance.by_sign_flips, finding_.draws = significance.draws;
+      finding_.odd_captures = significance.odd_captures;
+      finding_.scores = significance.scores;
+      finding_.score_names = test.names();
+    }
+    return significance;
+  }
+
+  /// One more effect, or one more part of one; false: nothing predicts what it was not fitted to.
+  bool addEffect(double p) {
+    const auto explanations = compete(context_);
+    const auto chosen = choose(explanations);
+    if (!chosen) return false;
+    Effect effect = effectOf(context_, explanations, *chosen);
+    if (effect.gain.mean <= 2.0 * effect.gain.error) return false;
+    effect.p = p;
+    const auto same = std::ranges::find_if(finding_.effects, [&](const Effect& known) {
+      return known.covariates == effect.covariates && known.is_catalogue == effect.is_catalogue;
+    });
+    if (same == finding_.effects.end()) {
+      finding_.effects.push_back(std::move(effect));
+    } else if (effect.is_catalogue) {
+      return false;
+    } else {
+      reshape(*same, effect);
+    }
+    estimate(context_.source, context_.scales, finding_.effects);
+    return true;
+  }
+
+  /// What is left goes with the covariates of an effect that is known: its shape was not it. Another single shape,
+  /// if one does as well as both together; else their sum.
+  void reshape(Effect& effect, const Effect& more) {
+    std::vector<Effect> others;
+    for (const Effect& one : finding_.effects)
+      if (&one != &effect) others.push_back(one);
+    Context without = context_;
+    without.known = groupsOf(others);
+    for (TermGroup& tangent : tangentsOf(others)) without.known.push_back(std::move(tangent));
+    auto explanations = competeFor(without, effect.covariates);
+    const Gain both = gainOfSum(without, effect, more);
+    const auto chosen = choose(explanations);
+    if (chosen) {
+      const Difference worse = difference(both, explanations[*chosen].gain);
+      if (both.total - explanations[*chosen].gain.total < worse.error) {
+        Effect again = effectOf(without, explanations, *chosen);
+        again.p = effect.p;
+        effect = std::move(again);
+        return;
+      }
+    }
+    effect.parts.insert(effect.parts.end(), more.parts.begin(), more.parts.end());
+    effect.name += " + " + more.name;
+  }
+
+  static Gain gainOfSum(const Context& without, const Effect& effect, const Effect& more) {
+    TermGroup sum{"sum", Kind::Generic, termsOf(effect), 0};
+    for (const Term& term : termsOf(more)) sum.terms.push_back(term);
+    std::vector<TermGroup> extra = without.known;
+    extra.push_back(std::move(sum));
+    const Marginal marginal = marginalise(without.source.evidence(extra), without.scales);
+    const Columns model = modelOf(without, marginal, extra.size());
+    Gain gain = crossValidate(marginal, model, {marginal.groups.size() - 1}).front();
+    for (const std::vector<FittedForm>* parts : {&effect.parts, &more.parts})
+      for (const FittedForm& part : *parts)
+        for (const Inner& inner : part.form.inner) gain.total -= inner.price;
+    return gain;
+  }
+
+  /// Each effect's shape once more, now that the others no longer stand in its way.
+  void revise() {
+    for (Effect& effect : finding_.effects) {
+      if (effect.is_catalogue || effect.parts.size() != 1) continue;
+      std::vector<Effect> others;
+      for (const Effect& one : finding_.effects)
+        if (&one != &effect) others.push_back(one);
+      Context without = context_;
+      without.known = groupsOf(others);
+      for (TermGroup& tangent : tangentsOf(others)) without.known.push_back(std::move(tangent));
+      const auto explanations = competeFor(without, effect.covariates);
+      const auto chosen = choose(explanations);
+      if (!chosen || explanations[*chosen].name == effect.name) continue;
+      Effect again = effectOf(without, explanations, *chosen);
+      again.p = effect.p, again.frequency = effect.frequency;
+      again.alternatives = effect.alternatives, again.experiment = effect.experiment;
+      effect = std::move(again);
+    }
+  }
+
+  /// An effect that the others explain as well was a step on the way to them: it goes, the least useful first.
+  void prune() {
+    while (finding_.effects.size() > 1) {
+      std::size_t least = finding_.effects.size();
+      double smallest = 2.0;
+      for (std::size_t i = 0; i < finding_.effects.size(); ++i) {
+        if (finding_.effects[i].is_catalogue) continue;
+        const Difference gain = gainAmongOthers(i);
+        const double z = gain.mean / std::max(gain.error, 1e-9);
+        if (gain.mean < 4.0 || z < smallest) smallest = std::min(z, smallest), least = i;
+      }
+      if (least == finding_.effects.size()) return;
+      finding_.effects.erase(finding_.effects.begin() + static_cast<std::ptrdiff_t>(least));
+    }
+  }
+
+  Difference gainAmongOthers(std::size_t which) {
+    std::vector<Effect> others = finding_.effects;
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(which));
+    Context without = context_;
+    without.known = groupsOf(others);
+    std::vector<TermGroup> extra = without.known;
+    extra.push_back({"this", Kind::Generic, termsOf(finding_.effects[which]), 0});
+    const Marginal marginal = marginalise(without.source.evidence(extra), without.scales);
+    const Columns model = modelOf(without, marginal, extra.size());
+    return against0(crossValidate(marginal, model, {marginal.groups.size() - 1}).front());
+  }
+
+  double dispersionNow() const {
+    const Marginal marginal = marginalise(context_.source.evidence(context_.known), context_.scales);
+    return fit(marginal, modelOf(context_, marginal, context_.known.size())).dispersion();
+  }
+
+  FinderOptions options_;
+  Context context_;
+  Finding finding_;
+};
+
+}  // namespace
+
+std::vector<Term> termsOf(const Effect& effect) {
+  std::vector<Term> terms;
+  for (const FittedForm& part : effect.parts)
+    terms.insert(terms.end(), part.group.terms.begin(), part.group.terms.end());
+  return terms;
+}
+
+bool isFormula(const Effect& effect) {
+  return !effect.parts.empty() &&
+         std::ranges::all_of(effect.parts, [](const FittedForm& part) { return part.form.build != nullptr; });
+}
+
+Finding find(const RowSource& source, const FinderOptions& options) { return Search{source, options}.run(); }
+
+}  // namespace toftwin::discover

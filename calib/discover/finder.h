@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calib/discover/cross_validation.h"
+#include "calib/discover/forms.h"
+#include "calib/discover/significance.h"
+#include "calib/discover/term.h"
+
+/// From evidence to effects: is there anything, which is it, what shape has it, could it be something else?
+namespace toftwin::discover {
+
+struct FinderOptions {
+  double alpha = 0.01;  ///< of finding anything where there is nothing
+  int draws = 400;      ///< for each test
+  int most_effects = 4;
+  std::uint64_t seed = 1;
+  NullModel null_model = NullModel::Automatic;
+};
+
+/// A number with its standard error.
+struct Estimate {
+  std::string name{};
+  double value = 0.0, error = 0.0;
+};
+
+/// Something else that explains as much.
+struct Alternative {
+  std::string name{};
+  std::vector<std::string> covariates{};
+  TermGroup group{};  ///< empty terms: an effect of the catalogue
+  std::vector<double> coefficient{};
+  Difference worse{};        ///< held-out gain of the chosen one minus this one's
+  double correlation = 0.0;  ///< of the two fitted curves over the captures, after the nuisances
+};
+
+/// What was tried for the shape of an effect.
+struct TriedShape {
+  std::string name{};
+  int numbers = 0;
+  Difference gain{};   ///< on held-out captures
+  Difference worse{};  ///< than the best
+};
+
+/// What would tell two explanations apart: hold one covariate, change the other.
+struct Experiment {
+  std::string vary{}, hold{};
+  double from = 0.0, to = 0.0, held_at = 0.0;
+  double difference = 0.0;  ///< between what the two expect
+};
+
+struct Effect {
+  std::string name{};
+  bool is_catalogue = false;
+  std::vector<std::string> covariates{};
+  std::optional<Stage> stage{};
+  /// Its parts, added up: one, unless what was left after it went with the same covariates. A part whose form has no
+  /// build is a smooth curve, because no formula does as well. None: an effect of the catalogue.
+  std::vector<FittedForm> parts{};
+  std::vector<double> coefficient{};  ///< of all terms of its parts, or of the catalogue's columns
+  std::vector<Estimate> numbers{};    ///< coefficients, then inner numbers
+  Eigen::MatrixXd covariance{};     ///< of `numbers`
+  double p = 1.0;                   ///< of the test that led to it
+  Difference gain{};
+  double frequency = 1.0;  ///< how often it is the best again when captures are drawn anew with replacement
+  std::vector<TriedShape> tried{};
+  std::vector<Alternative> alternatives{};
+  std::optional<Experiment> experiment{};
+};
+
+struct Finding {
+  std::vector<Effect> effects{};
+  double first_p = 1.0, last_p = 1.0;  ///< of the first test, and of what is left
+  bool by_sign_flips = false;
+  int draws = 0;
+  std::vector<double> scales{};         ///< of the random effects, by class
+  double dispersion = 1.0;              ///< of what is left, in units of the noise's variance
+  std::vector<Estimate> nuisances{};
+  std::vector<std::string> odd_captures{};
+  std::vector<GroupScore> scores{};     ///< of the first test
+  std::vector<std::string> score_names{};
+};
+
+/// All terms of its parts.
+std::vector<Term> termsOf(const Effect& effect);
+/// Whether all of its parts are short formulas.
+bool isFormula(const Effect& effect);
+
+Finding find(const RowSource& source, const FinderOptions& options);
+
+}  // namespace toftwin::discover

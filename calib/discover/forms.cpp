@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/discover/forms.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <fmt/format.h>
+
+namespace toftwin::discover {
+namespace {
+
+constexpr std::array kPowers{1.0, 2.0, 3.0, 0.5, -1.0, -2.0};
+
+double least(const CovariateInfo& x) { return x.quantiles.front(); }
+double most(const CovariateInfo& x) { return x.quantiles.back(); }
+double span(const CovariateInfo& x) { return most(x) - least(x); }
+
+/// Whether 1/x and ln x are what a reader takes them for: x stays away from zero.
+bool isPositive(const CovariateInfo& x) { return least(x) > 1e-4 * span(x); }
+
+std::vector<double> geometric(double low, double high, int count) {
+  std::vector<double> grid;
+  for (int i = 0; i < count; ++i) grid.push_back(low * std::pow(high / low, i / (count - 1.0)));
+  return grid;
+}
+
+TermGroup group(const Form& form, std::vector<Term> terms) {
+  return {form.name, Kind::Generic, std::move(terms), static_cast<int>(form.inner.size())};
+}
+
+Term term(const CovariateInfo& x, Shape shape, std::vector<double> numbers) {
+  return {{{x.name, shape, std::move(numbers)}}, x.stage};
+}
+
+Term powerOrLog(const CovariateInfo& x, double power) {
+  return power == 0.0 ? term(x, Shape::Log, {}) : term(x, Shape::Power, {power});
+}
+
+std::string wordOf(const CovariateInfo& x, double power) { return inWords(powerOrLog(x, power)); }
+
+Form form(std::string name, std::vector<CovariateInfo> of, TermGroup (*build)(const Form&, std::span<const double>),
+          std::vector<Inner> inner = {}, std::vector<double> fixed = {}) {
+  Form made{std::move(name), {}, std::move(inner), build, std::move(fixed), std::move(of)};
+  for (const CovariateInfo& x : made.of) made.covariates.push_back(x.name);
+  return made;
+}
+
+/// Powers of one covariate; 0 stands for its logarithm.
+TermGroup powers(const Form& f, std::span<const double>) {
+  std::vector<Term> terms;
+  for (const double power : f.fixed) terms.push_back(powerOrLog(f.of[0], power));
+  return group(f, std::move(terms));
+}
+
+TermGroup decay(const Form& f, std::span<const double> inner) {
+  return group(f, {term(f.of[0], Shape::Decay, {inner[0], f.fixed[0]})});
+}
+
+TermGroup wave(const Form& f, std::span<const double> inner) {
+  const double length = f.fixed.empty() ? 1.0 / inner[0] : f.fixed[0];
+  return group(f, {term(f.of[0], Shape::Sine, {length}), term(f.of[0], Shape::Cosine, {length})});
+}
+
+TermGroup step(const Form& f, std::span<const double> inner) {
+  return group(f, {term(f.of[0], Shape::Step, {inner[0]})});
+}
+
+TermGroup sigmoid(const Form& f, std::span<const double> inner) {
+  return group(f, {term(f.of[0], Shape::Sigmoid, {inner[0], inner[1]})});
+}
+
+TermGroup modulo(const Form& f, std::span<const double>) {
+  std::vector<Term> terms;
+  for (double r = 1.0; r < f.fixed[0]; ++r) terms.push_back(term(f.of[0], Shape::Modulo, {f.fixed[0], r}));
+  return group(f, std::move(terms));
+}
+
+TermGroup levels(const Form& f, std::span<const double>) {
+  std::vector<Term> terms;
+  for (std::size_t i = 1; i < f.of[0].levels.size(); ++i)
+    terms.push_back(term(f.of[0], Shape::Equal, {f.of[0].levels[i]}));
+  return group(f, std::move(terms));
+}
+
+/// x^p · y^q, and where fixed[2] or fixed[3] says so, x^p and y^q of their own.
+TermGroup product(const Form& f, std::span<const double>) {
+  Term both = powerOrLog(f.of[0], f.fixed[0]);
+  both.factors.push_back(powerOrLog(f.of[1], f.fixed[1]).factors[0]);
+  std::vector<Term> terms{both};
+  if (f.fixed[2] != 0.0) terms.push_back(powerOrLog(f.of[0], f.fixed[0]));
+  if (f.fixed[3] != 0.0) terms.push_back(powerOrLog(f.of[1], f.fixed[1]));
+  return group(f, std::move(terms));
+}
+
+/// One value of f.of[0] has its own x^q of f.of[1].
+TermGroup switched(const Form& f, std::span<const double>) {
+  std::vector<Term> terms;
+  for (std::size_t i = 1; i < f.of[0].levels.size(); ++i) {
+    Term both = term(f.of[0], Shape::Equal, {f.of[0].levels[i]});
+    terms.push_back(both);
+    both.factors.push_back(powerOrLog(f.of[1], f.fixed[0]).factors[0]);
+    terms.push_back(both);
+  }
+  return group(f, std::move(terms));
+}
+
+/// exp(−x/τ) · y^q
+TermGroup decayTimes(const Form& f, std::span<const double> inner) {
+  Term both = term(f.of[0], Shape::Decay, {inner[0], f.fixed[0]});
+  both.factors.push_back(powerOrLog(f.of[1], f.fixed[1]).factors[0]);
+  return group(f, {both});
+}
+
+/// Numbers between the ends, so that both sides of a step have data.
+std::vector<double> stepPlaces(const CovariateInfo& x) {
+  std::vector<double> places;
+  const auto& from = x.levels.empty() ? x.quantiles : x.levels;
+  for (std::size_t i = x.levels.empty() ? 3 : 1; i + (x.levels.empty() ? 3 : 0) < from.size(); ++i)
+    places.push_back(0.5 * (from[i - 1] + from[i]));
+  places.erase(std::ranges::unique(places).begin(), places.end());
+  return places;
+}
+
+void addWaves(const CovariateInfo& x, std::vector<Form>& forms) {
+  if (x.period > 0.0 && span(x) > 0.15 * x.period) {
+    for (int k = 1; k <= 8; ++k) {
+      const double length = x.period / k;
+      if (span(x) < 0.6 * length) continue;
+      forms.push_back(form(k == 1 ? fmt::format("once per period over {}", x.name)
+                                  : fmt::format("{} times per period over {}", k, x.name),
+                           {x}, wave, {}, {length}));
+    }
+  }
+  Inner frequency{{}, false, 3};
+  for (double turns = 0.75; turns <= 24.0; turns += 0.25) frequency.grid.push_back(turns / span(x));
+  forms.push_back(form(fmt::format("wave over {}", x.name), {x}, wave, {std::move(frequency)}));
+}
+
+std::vector<double> usablePowers(const CovariateInfo& x) {
+  if (isPositive(x)) return {1.0, -1.0, 2.0, -2.0, 0.5, 0.0};
+  return {1.0, 2.0};
+}
+
+}  // namespace
+
+TermGroup built(const Form& form, std::span<const double> inner) { return form.build(form, inner); }
+
+std::vector<Form> formsIn(const CovariateInfo& x) {
+  std::vector<Form> forms;
+  if (x.nature == Nature::Category || x.levels.size() == 2) {
+    return {form(fmt::format("a value for each {}", x.name), {x}, levels)};
+  }
+  if (x.quantiles.empty() || span(x) <= 0.0) return forms;
+  if (x.nature == Nature::Index) {
+    for (const double modulus : {2.0, 3.0, 4.0})
+      forms.push_back(form(fmt::format("{} modulo {}", x.name, modulus), {x}, modulo, {}, {modulus}));
+  }
+  for (const double power : kPowers) {
+    if ((power < 0.0 || power == 0.5) && !isPositive(x) && !(power == 0.5 && least(x) >= 0.0)) continue;
+    forms.push_back(form(wordOf(x, power), {x}, powers, {}, {power}));
+  }
+  if (isPositive(x)) forms.push_back(form(wordOf(x, 0.0), {x}, powers, {}, {0.0}));
+  forms.push_back(form(fmt::format("parabola in {}", x.name), {x}, powers, {}, {1.0, 2.0}));
+  const double origin = least(x) >= 0.0 && least(x) < span(x) ? 0.0 : least(x);
+  forms.push_back(form(fmt::format("exponential in {}", x.name), {x}, decay,
+                       {{geometric(span(x) / 40.0, 2.0 * span(x), 20), true, 1}}, {origin}));
+  if (auto places = stepPlaces(x); !places.empty()) {
+    forms.push_back(form(fmt::format("step in {}", x.name), {x}, step, {{std::move(places), false, 2}}));
+  }
+  if (!x.levels.empty()) return forms;
+  addWaves(x, forms);
+  std::vector<double> centres;
+  for (std::size_t i = 4; i + 4 < x.quantiles.size(); i += 4) centres.push_back(x.quantiles[i]);
+  centres.erase(std::ranges::unique(centres).begin(), centres.end());
+  forms.push_back(form(fmt::format("sigmoid in {}", x.name), {x}, sigmoid,
+                       {{std::move(centres), false, 1}, {geometric(span(x) / 50.0, span(x) / 5.0, 4), true, 1}}));
+  return forms;
+}
+
+std::vector<Form> formsIn(const CovariateInfo& a, const CovariateInfo& b) {
+  std::vector<Form> forms;
+  const auto isNamed = [](const CovariateInfo& x) { return x.nature == Nature::Category || x.levels.size() == 2; };
+  if (isNamed(a) && isNamed(b)) return forms;
+  if (isNamed(a) || isNamed(b)) {
+    const CovariateInfo &names = isNamed(a) ? a : b, &x = isNamed(a) ? b : a;
+    for (const double power : usablePowers(x))
+      forms.push_back(form(fmt::format("{} for each {}", wordOf(x, power), names.name), {names, x}, switched, {}, {power}));
+    return forms;
+  }
+  for (const double p : usablePowers(a)) {
+    for (const double q : usablePowers(b)) {
+      const std::string name = wordOf(a, p) + " · " + wordOf(b, q);
+      forms.push_back(form(name, {a, b}, product, {}, {p, q, 0.0, 0.0}));
+      if (p != 1.0 || q != 1.0) continue;
+      forms.push_back(form(name + " + " + wordOf(b, q), {a, b}, product, {}, {p, q, 0.0, 1.0}));
+      forms.push_back(form(name + " + " + wordOf(a, p), {a, b}, product, {}, {p, q, 1.0, 0.0}));
+      forms.push_back(form(name + " + both", {a, b}, product, {}, {p, q, 1.0, 1.0}));
+    }
+  }
+  for (const auto& [x, y] : {std::pair{a, b}, std::pair{b, a}}) {
+    if (x.nature != Nature::Time) continue;
+    const double origin = least(x) >= 0.0 && least(x) < span(x) ? 0.0 : least(x);
+    for (const double q : usablePowers(y)) {
+      forms.push_back(form(fmt::format("exponential in {} · {}", x.name, wordOf(y, q)), {x, y}, decayTimes,
+                           {{geometric(span(x) / 20.0, 2.0 * span(x), 8), true, 1}}, {origin, q}));
+    }
+  }
+  return forms;
+}
+
+}  // namespace toftwin::discover

@@ -1,0 +1,221 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/discover/headers.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <set>
+#include <string_view>
+
+#include <fmt/format.h>
+
+namespace toftwin::discover {
+namespace {
+
+constexpr std::array<std::string_view, 20> kUnits{"mm", "cm",  "um", "m",   "s",   "ms",  "us",  "ns",      "min", "h",
+                                                  "c",  "deg", "rad", "klx", "lx", "mhz", "hz", "counts", "px",  "mw"};
+
+/// Words of a header, in small letters: "Reference [mm]" → reference, mm.
+std::vector<std::string> wordsOf(const std::string& header) {
+  std::vector<std::string> words(1);
+  for (const char c : header) {
+    const auto letter = static_cast<unsigned char>(c);
+    if (std::isalnum(letter) || letter >= 0x80) {
+      words.back() += static_cast<char>(std::tolower(letter));
+    } else if (!words.back().empty()) {
+      words.emplace_back();
+    }
+  }
+  if (words.back().empty()) words.pop_back();
+  return words;
+}
+
+using Known = std::vector<std::string_view>;
+
+bool hasWord(const std::string& header, const Known& known) {
+  return std::ranges::any_of(wordsOf(header), [&](const std::string& word) {
+    return std::ranges::find(known, word) != known.end();
+  });
+}
+
+const Known kMeasured{"measured", "measurement", "value", "reading", "output", "observed"};
+const Known kReference{"reference", "ref", "truth", "true", "groundtruth", "ground", "expected", "nominal", "actual"};
+const Known kError{"error", "residual", "deviation", "bias", "difference", "minus"};
+const Known kSigma{"sigma", "std", "stddev", "sd", "noise", "uncertainty", "stdev"};
+const Known kSession{"session", "run", "series", "campaign", "day"};
+const Known kCapture{"capture", "pose", "shot", "burst"};
+const Known kLocked{"locked", "held", "heldout", "holdout"};
+const Known kLength{"depth", "range", "distance", "z"};
+const Known kTime{"time", "timestamp", "t", "uptime", "elapsed", "age", "minutes", "seconds"};
+const Known kDistance{"distance", "range", "depth", "z", "dist", "d"};
+const Known kIndex{"frame", "index", "number", "sequence", "seq", "counter", "count", "n", "row"};
+
+/// The one column whose header has one of these words; nothing if there are none or several.
+std::string onlyOne(const std::vector<std::string>& header, const Known& known, const std::set<std::string>& taken) {
+  std::string found;
+  for (const std::string& name : header) {
+    if (taken.contains(name) || !hasWord(name, known)) continue;
+    if (!found.empty()) return {};
+    found = name;
+  }
+  return found;
+}
+
+Error badMap(const std::filesystem::path& file, const std::string& what) {
+  return {Error::Code::InvalidArgument, fmt::format("{}: {}", file.string(), what)};
+}
+
+/// Columns that are free for a role; what the map names is taken.
+class Assignment {
+ public:
+  Assignment(const std::vector<std::string>& header, const std::filesystem::path& file) : header_(header), file_(file) {}
+
+  Result<> name(std::string& role, const std::string& said, std::string_view key) {
+    if (said.empty()) return {};
+    if (std::ranges::find(header_, said) == header_.end()) {
+      return Error{Error::Code::NotFound, fmt::format("{}: has no column \"{}\" for `{}`, only: {}", file_.string(),
+                                                      said, key, fmt::join(header_, ", "))};
+    }
+    if (!taken_.insert(said).second) return badMap(file_, fmt::format("column \"{}\" has two roles", said));
+    role = said;
+    return {};
+  }
+  void guess(std::string& role, const Known& known) {
+    if (!role.empty()) return;
+    role = onlyOne(header_, known, taken_);
+    if (!role.empty()) taken_.insert(role);
+  }
+  [[nodiscard]] bool isTaken(const std::string& name) const { return taken_.contains(name); }
+
+ private:
+  const std::vector<std::string>& header_;
+  const std::filesystem::path& file_;
+  std::set<std::string> taken_;
+};
+
+/// "reference_minus_measured": the second word before "minus" is which.
+bool isReversed(const std::string& header) {
+  const auto words = wordsOf(header);
+  const auto minus = std::ranges::find(words, "minus");
+  if (minus == words.end() || minus == words.begin()) return false;
+  return std::ranges::find(kReference, *(minus - 1)) != kReference.end();
+}
+
+void guessValues(Roles& roles, Assignment& free, bool is_said) {
+  if (!is_said) {
+    // An error stands for itself; "reference_minus_measured" has the words of all three.
+    free.guess(roles.error, kError);
+    if (!roles.error.empty()) roles.is_reversed = isReversed(roles.error);
+  }
+  if (roles.error.empty()) free.guess(roles.measured, kMeasured);
+  free.guess(roles.reference, kReference);
+  if (roles.error.empty() && roles.measured.empty()) free.guess(roles.measured, kLength);
+}
+
+Result<> takeCovariates(const std::vector<std::string>& header, const TableMap& map,
+                        const std::filesystem::path& file, const Assignment& used, Roles& roles) {
+  const auto isIgnored = [&](const std::string& name) { return std::ranges::find(map.ignore, name) != map.ignore.end(); };
+  for (const std::string& name : map.ignore)
+    if (std::ranges::find(header, name) == header.end())
+      return badMap(file, fmt::format("has no column \"{}\" to ignore, only: {}", name, fmt::join(header, ", ")));
+  std::set<std::string> seen;
+  for (const MappedCovariate& covariate : map.covariates) {
+    if (std::ranges::find(header, covariate.column) == header.end()) {
+      return Error{Error::Code::NotFound, fmt::format("{}: has no column \"{}\" for a covariate, only: {}",
+                                                      file.string(), covariate.column, fmt::join(header, ", "))};
+    }
+    if (!seen.insert(covariate.column).second)
+      return badMap(file, fmt::format("column \"{}\" is a covariate twice", covariate.column));
+    roles.covariates.emplace_back(covariate.column, covariate.nature);
+  }
+  const bool is_distance_known = std::ranges::any_of(
+      roles.covariates, [&](const auto& one) { return one.first == roles.reference; });
+  if (!roles.reference.empty() && !is_distance_known && !isIgnored(roles.reference))
+    roles.covariates.emplace_back(roles.reference, MapNature::Distance);
+  if (!map.covariates.empty()) return {};
+  for (const std::string& name : header)
+    if (!used.isTaken(name) && !isIgnored(name)) roles.covariates.emplace_back(name, MapNature::Guessed);
+  return {};
+}
+
+}  // namespace
+
+std::string Roles::inWords() const {
+  std::string words = !error.empty() ? fmt::format("error = {}{}", is_reversed ? "−" : "", error)
+                      : reference.empty() ? fmt::format("error = {} (without a reference)", measured)
+                                          : fmt::format("error = {} − {}", measured, reference);
+  for (const auto& [name, what] : {std::pair{&sigma, "sigma"}, std::pair{&session, "session"},
+                                   std::pair{&capture, "capture"}, std::pair{&locked, "locked"}}) {
+    if (!name->empty()) words += fmt::format("; {} = {}", what, *name);
+  }
+  std::string list;
+  for (const auto& [name, nature] : covariates) list += (list.empty() ? "" : ", ") + name;
+  return words + "; covariates: " + (list.empty() ? "none" : list);
+}
+
+std::string unitOf(const std::string& header) {
+  const auto words = wordsOf(header);
+  if (words.size() < 2) return {};
+  return std::ranges::find(kUnits, words.back()) == kUnits.end() ? std::string{} : words.back();
+}
+
+Nature natureOf(const std::string& header, MapNature said) {
+  switch (said) {
+    case MapNature::Plain:
+      return Nature::Plain;
+    case MapNature::Time:
+      return Nature::Time;
+    case MapNature::Distance:
+      return Nature::Distance;
+    case MapNature::Index:
+      return Nature::Index;
+    case MapNature::Category:
+      return Nature::Category;
+    case MapNature::Guessed:
+      break;
+  }
+  if (hasWord(header, {"exposure", "integration"})) return Nature::Plain;  // "exposure_time" is not time
+  if (hasWord(header, kTime)) return Nature::Time;
+  if (hasWord(header, kDistance)) return Nature::Distance;
+  return hasWord(header, kIndex) ? Nature::Index : Nature::Plain;
+}
+
+Result<Roles> rolesOf(const std::vector<std::string>& header, const TableMap& map,
+                      const std::filesystem::path& file) {
+  Roles roles;
+  Assignment assignment{header, file};
+  const std::array said{std::tuple{&roles.measured, &map.measured, "measured"},
+                        std::tuple{&roles.reference, &map.reference, "reference"},
+                        std::tuple{&roles.error, &map.error, "error"},
+                        std::tuple{&roles.sigma, &map.sigma, "sigma"},
+                        std::tuple{&roles.session, &map.session, "session"},
+                        std::tuple{&roles.capture, &map.capture, "capture"},
+                        std::tuple{&roles.locked, &map.locked, "locked"}};
+  for (const auto& [role, column, key] : said)
+    if (auto done = assignment.name(*role, *column, key); !done) return done.error();
+  roles.is_reversed = map.error_sign == Sign::ReferenceMinusMeasured;
+  Assignment guesses = assignment;
+  for (const MappedCovariate& covariate : map.covariates) {
+    std::string ignored;
+    if (covariate.column != roles.reference) (void)guesses.name(ignored, covariate.column, "covariate");
+  }
+  for (const std::string& name : map.ignore) {
+    std::string ignored;
+    (void)guesses.name(ignored, name, "ignore");
+  }
+  guesses.guess(roles.locked, kLocked);
+  guesses.guess(roles.session, kSession);
+  guesses.guess(roles.capture, kCapture);
+  guessValues(roles, guesses, !map.measured.empty() || !map.error.empty());
+  guesses.guess(roles.sigma, kSigma);
+  if (roles.error.empty() && roles.measured.empty()) {
+    return Error{Error::Code::InvalidArgument,
+                 fmt::format("{}: which column was measured? None of the headers says so ({}). Write a map: "
+                             "measured = \"…\" and reference = \"…\", or error = \"…\" (docs/discover.md)",
+                             file.string(), fmt::join(header, ", "))};
+  }
+  if (auto done = takeCovariates(header, map, file, guesses, roles); !done) return done.error();
+  return roles;
+}
+
+}  // namespace toftwin::discover

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <toftwin/result.h>
+
+#include "calib/discover/table_map.h"
+
+/// What headers say.
+namespace toftwin::discover {
+
+/// Which column is what.
+struct Roles {
+  std::string measured{}, reference{}, error{}, sigma{}, session{}, capture{}, locked{};
+  bool is_reversed = false;  ///< error is reference − measured
+  std::vector<std::pair<std::string, MapNature>> covariates{};
+  /// "error = depth_mm − reference_mm; covariates time_s, temperature_c".
+  [[nodiscard]] std::string inWords() const;
+};
+
+/// By the map, and where it is silent by the headers' words. Errors: a column of the map that is not there, or one
+/// with two roles; neither measured values nor errors to be found.
+Result<Roles> rolesOf(const std::vector<std::string>& header, const TableMap& map, const std::filesystem::path& file);
+
+/// The unit that a header ends in: "depth_mm" → "mm"; "depth [mm]" and "depth (mm)", too. Empty: none is known.
+std::string unitOf(const std::string& header);
+
+Nature natureOf(const std::string& header, MapNature said);
+
+}  // namespace toftwin::discover

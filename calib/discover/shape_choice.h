@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "calib/discover/finder.h"
+
+/// Which covariates, and which function of them.
+namespace toftwin::discover {
+
+/// One explanation in the competition: a formula, a smooth curve or a catalogue effect.
+struct Explanation {
+  std::string name{};
+  std::vector<std::string> covariates{};  ///< sorted
+  std::optional<Stage> stage{};
+  FittedForm fitted{};                    ///< its group has no terms for a catalogue effect
+  bool is_catalogue = false;
+  bool is_sum = false;  ///< two smooth functions added up: what a pair has to beat
+  int numbers = 0;
+  double price = 0.0;   ///< for inner numbers that were searched
+  Gain gain{};
+};
+
+/// Everything that a choice needs to know.
+struct Context {
+  const RowSource& source;
+  std::vector<CovariateInfo> covariates;
+  std::vector<TermGroup> generic;
+  std::vector<TermGroup> known;  ///< effects found before, with their tangents
+  std::vector<double> scales;
+  std::vector<std::string> catalogue{};  ///< effects of the catalogue that were found before
+};
+
+/// Columns of the nuisances and of what is known, in evidence that was made with `extra` more groups, the known ones
+/// first.
+Columns modelOf(const Context& context, const Marginal& marginal, std::size_t extra);
+
+/// Evidence for some groups on top of what is known, some columns at a time: each part with its model and the number
+/// of its first new group. The catalogue is in the first part only.
+struct Part {
+  Marginal marginal;
+  Columns model;
+  std::size_t first = 0;
+  std::size_t begin = 0, end = 0;  ///< of the groups
+};
+void inParts(const Context& context, const std::vector<TermGroup>& groups,
+             const std::function<void(const Part&)>& use);
+
+/// The competition over all covariates: the generic groups by cross-validation first, then formulas for the sets of
+/// covariates that are not much worse than the best.
+std::vector<Explanation> compete(const Context& context);
+/// Only over these covariates.
+std::vector<Explanation> competeFor(const Context& context, const std::vector<std::string>& covariates);
+
+/// The simplest that is not worse than the best by more than a standard error of their difference. A pair of
+/// covariates must also beat the sum of their own functions; a catalogue effect wins when it is about as good.
+/// Gives its place; nothing when there are none.
+std::optional<std::size_t> choose(const std::vector<Explanation>& explanations);
+
+/// Its place among `explanations` and what else explains as much, the next experiment, how often it is best.
+Effect effectOf(const Context& context, const std::vector<Explanation>& explanations, std::size_t chosen);
+
+}  // namespace toftwin::discover

@@ -1,0 +1,256 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/discover/significance.h"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <set>
+
+namespace toftwin::discover {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// A group after projection: T = |L u|², u = the moment of its columns minus slope · that of the model's.
+struct Projected {
+  std::size_t group = 0;
+  Columns columns;
+  MatrixXd slope;   ///< G_gM A⁻¹
+  MatrixXd whiten;  ///< L: Lᵀ L = S⁺
+  int rank = 0;
+  double correction = 1.0;  ///< on flipped statistics: residuals are smaller than errors
+};
+
+Projected project(const Marginal& marginal, const Fit& model, const Group& group, std::size_t which) {
+  Projected out;
+  out.group = which;
+  append(out.columns, group);
+  const MatrixXd cross = marginal.gram(out.columns, model.columns);
+  out.slope = cross * model.inverse;
+  const MatrixXd left = marginal.gram(out.columns, out.columns) - out.slope * cross.transpose();
+  // Sizes before projection: what is left of a column that the model explains is rounding.
+  const VectorXd size = marginal.gram.diagonal()(out.columns).cwiseMax(0.0).cwiseSqrt();
+  const VectorXd shrink = size.unaryExpr([](double s) { return s > 0.0 ? 1.0 / s : 0.0; });
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(shrink.asDiagonal() * left * shrink.asDiagonal());
+  std::vector<Index> used;
+  for (Index i = 0; i < eigen.eigenvalues().size(); ++i) {
+    if (eigen.eigenvalues()(i) > 1e-6) used.push_back(i);
+  }
+  out.rank = static_cast<int>(used.size());
+  const VectorXd roots = eigen.eigenvalues()(used).cwiseSqrt().cwiseInverse();
+  out.whiten = roots.asDiagonal() * MatrixXd(eigen.eigenvectors()(Eigen::all, used)).transpose() * shrink.asDiagonal();
+  return out;
+}
+
+/// Residual moments of each capture in the group's whitened directions, one column for each capture.
+MatrixXd whitenedMoments(const Projected& group, const MatrixXd& residual, const Columns& model) {
+  return group.whiten * (residual(group.columns, Eigen::all) - group.slope * residual(model, Eigen::all));
+}
+
+/// Σ_c cov of the whitened moments under unit noise: E r_c r_cᵀ = G_c − G_c A⁻¹ G_c. Its trace is what flipping
+/// gives on average; what data give is the rank.
+double flipCorrection(const Marginal& marginal, const Fit& model, const Projected& group) {
+  double trace = 0.0;
+  for (const CaptureEvidence& capture : marginal.captures) {
+    const MatrixXd to_group = capture.gram(group.columns, model.columns);
+    const MatrixXd within = capture.gram(model.columns, model.columns);
+    const MatrixXd half = group.whiten * (to_group - group.slope * within);
+    const MatrixXd own = capture.gram(group.columns, group.columns) - to_group * group.slope.transpose() -
+                         group.slope * to_group.transpose() + group.slope * within * group.slope.transpose();
+    trace += (group.whiten * own * group.whiten.transpose()).trace() -
+             (half * model.inverse * half.transpose()).trace();
+  }
+  return trace > 1e-9 ? std::max(1.0, group.rank / trace) : 1.0;
+}
+
+/// A sum of squares with mean and variance of its null draws as a normal deviate: (E. B. Wilson, M. M. Hilferty,
+/// PNAS 17 (1931) 684) with ν = 2 mean²/variance degrees of freedom.
+struct Gauge {
+  double mean = 1.0, nu = 1.0;
+  explicit Gauge(const VectorXd& draws) {
+    mean = std::max(draws.mean(), 1e-300);
+    const double variance = (draws.array() - mean).square().mean();
+    nu = variance > 0.0 ? std::clamp(2.0 * mean * mean / variance, 0.3, 1e6) : 1e6;
+  }
+  [[nodiscard]] double z(double statistic) const {
+    const double v = 2.0 / (9.0 * nu);
+    return (std::cbrt(std::max(statistic, 0.0) / mean) - (1.0 - v)) / std::sqrt(v);
+  }
+};
+
+bool isTested(const Group& group, const std::set<Index>& model) {
+  return (group.kind == Kind::Catalogue || group.kind == Kind::Generic) && group.count > 0 &&
+         !model.contains(static_cast<Index>(group.first));
+}
+
+/// Dispersion of each capture about the model, at least 1/4 of the typical one: a capture of few rows may look
+/// quieter than it is.
+VectorXd dispersions(const Marginal& marginal, const Fit& model) {
+  VectorXd out(static_cast<Index>(marginal.captures.size()));
+  for (Index c = 0; c < out.size(); ++c) {
+    const CaptureEvidence& capture = marginal.captures[static_cast<std::size_t>(c)];
+    const VectorXd moment = capture.moment(model.columns);
+    const double left = capture.energy - 2.0 * model.coefficient.dot(moment) +
+                        model.coefficient.dot(capture.gram(model.columns, model.columns) * model.coefficient);
+    out(c) = capture.rows > 0.0 ? std::max(0.0, left) / capture.rows : 1.0;
+  }
+  return out.cwiseMax(0.25 * model.dispersion());
+}
+
+/// Captures that err more than five typical deviations of the dispersion's logarithm above the median.
+std::vector<std::string> oddOnes(const Marginal& marginal, const VectorXd& dispersion) {
+  std::vector<double> logs;
+  for (const double d : dispersion) logs.push_back(std::log(std::max(d, 1e-12)));
+  std::vector<double> sorted = logs;
+  std::ranges::sort(sorted);
+  const double median = sorted[sorted.size() / 2];
+  for (double& one : sorted) one = std::abs(one - median);
+  std::ranges::sort(sorted);
+  const double spread = std::max(1.4826 * sorted[sorted.size() / 2], 0.05);
+  std::vector<std::string> odd;
+  for (std::size_t c = 0; c < logs.size(); ++c) {
+    if (logs[c] > median + 5.0 * spread) odd.push_back(marginal.captures[c].name);
+  }
+  return odd;
+}
+
+/// Signs from a counter-free generator whose sequence the standard fixes.
+class Signs {
+ public:
+  explicit Signs(std::uint64_t seed) : bits_(seed) {}
+  VectorXd next(Index count) {
+    VectorXd signs(count);
+    std::uint64_t word = 0;
+    for (Index i = 0; i < count; ++i) {
+      if (i % 64 == 0) word = bits_();
+      signs(i) = (word >> (i % 64)) & 1U ? 1.0 : -1.0;
+    }
+    return signs;
+  }
+  double normal() {  // Box and Muller
+    const double u = (static_cast<double>(bits_() >> 11) + 0.5) * 0x1p-53;
+    const double v = (static_cast<double>(bits_() >> 11) + 0.5) * 0x1p-53;
+    return std::sqrt(-2.0 * std::log(u)) * std::cos(6.283185307179586 * v);
+  }
+
+ private:
+  std::mt19937_64 bits_;
+};
+
+/// Null draws of all statistics, one column a draw.
+MatrixXd flippedDraws(const std::vector<Projected>& groups, const MatrixXd& residual, const Columns& model,
+                      const TestOptions& options) {
+  const Index captures = residual.cols();
+  MatrixXd signs(captures, options.draws);
+  Signs random(options.seed);
+  for (int d = 0; d < options.draws; ++d) signs.col(d) = random.next(captures);
+  MatrixXd draws(static_cast<Index>(groups.size()), options.draws);
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    const MatrixXd sums = whitenedMoments(groups[g], residual, model) * signs;
+    draws.row(static_cast<Index>(g)) = groups[g].correction * sums.colwise().squaredNorm();
+  }
+  return draws;
+}
+
+MatrixXd noiseDraws(const Marginal& marginal, const std::vector<Projected>& groups, const VectorXd& dispersion,
+                    const Columns& model, const TestOptions& options) {
+  MatrixXd covariance = MatrixXd::Zero(marginal.gram.rows(), marginal.gram.cols());
+  for (std::size_t c = 0; c < marginal.captures.size(); ++c)
+    covariance += dispersion(static_cast<Index>(c)) * marginal.captures[c].gram;
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(covariance);
+  const MatrixXd root = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  Signs random(options.seed);
+  MatrixXd normal(root.cols(), options.draws);
+  for (Index d = 0; d < normal.cols(); ++d)
+    for (Index i = 0; i < normal.rows(); ++i) normal(i, d) = random.normal();
+  const MatrixXd moments = root * normal;
+  MatrixXd draws(static_cast<Index>(groups.size()), options.draws);
+  for (std::size_t g = 0; g < groups.size(); ++g)
+    draws.row(static_cast<Index>(g)) = whitenedMoments(groups[g], moments, model).colwise().squaredNorm();
+  return draws;
+}
+
+MatrixXd residualMoments(const Marginal& marginal, const Fit& model) {
+  MatrixXd residual(marginal.moment.size(), static_cast<Index>(marginal.captures.size()));
+  for (std::size_t c = 0; c < marginal.captures.size(); ++c) {
+    const CaptureEvidence& capture = marginal.captures[c];
+    residual.col(static_cast<Index>(c)) =
+        capture.moment - capture.gram(Eigen::all, model.columns) * model.coefficient;
+  }
+  return residual;
+}
+
+std::vector<Projected> projectedGroups(const Marginal& marginal, const Fit& model) {
+  const std::set<Index> known(model.columns.begin(), model.columns.end());
+  std::vector<Projected> groups;
+  for (std::size_t g = 0; g < marginal.groups.size(); ++g) {
+    if (!isTested(marginal.groups[g], known)) continue;
+    Projected group = project(marginal, model, marginal.groups[g], g);
+    if (group.rank > 0) groups.push_back(std::move(group));
+  }
+  return groups;
+}
+
+bool flips(const Marginal& marginal, NullModel chosen) {
+  if (chosen != NullModel::Automatic) return chosen == NullModel::SignFlips;
+  return marginal.rows < 64.0 * static_cast<double>(marginal.captures.size());
+}
+
+}  // namespace
+
+std::vector<GroupScore> statistics(const Marginal& marginal, const Columns& model_columns) {
+  const Fit model = fit(marginal, model_columns);
+  const VectorXd residual = marginal.moment - marginal.gram(Eigen::all, model.columns) * model.coefficient;
+  std::vector<GroupScore> scores;
+  for (const Projected& group : projectedGroups(marginal, model)) {
+    const double statistic = whitenedMoments(group, residual, model_columns).squaredNorm();
+    scores.push_back({group.group, statistic, group.rank, 0.0});
+  }
+  return scores;
+}
+
+void Test::add(const Marginal& marginal, const Columns& model_columns) {
+  out_.draws = options_.draws;
+  out_.by_sign_flips = flips(marginal, options_.null_model);
+  if (marginal.captures.empty()) return;
+  const Fit model = fit(marginal, model_columns);
+  const MatrixXd residual = residualMoments(marginal, model);
+  const VectorXd dispersion = dispersions(marginal, model);
+  out_.odd_captures = oddOnes(marginal, dispersion);
+  std::vector<Projected> groups = projectedGroups(marginal, model);
+  if (groups.empty()) return;
+  if (out_.by_sign_flips) {
+    for (Projected& group : groups) group.correction = flipCorrection(marginal, model, group);
+  }
+  const MatrixXd draws = out_.by_sign_flips
+                             ? flippedDraws(groups, residual, model_columns, options_)
+                             : noiseDraws(marginal, groups, dispersion, model_columns, options_);
+  if (largest_.size() == 0) largest_ = VectorXd::Constant(options_.draws, -1e300);
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    const Gauge gauge(draws.row(static_cast<Index>(g)).transpose());
+    const double statistic = whitenedMoments(groups[g], residual, model_columns).rowwise().sum().squaredNorm();
+    out_.scores.push_back({names_.size(), statistic, groups[g].rank, gauge.z(statistic)});
+    names_.push_back(marginal.groups[groups[g].group].name);
+    for (int d = 0; d < options_.draws; ++d)
+      largest_(d) = std::max(largest_(d), gauge.z(draws(static_cast<Index>(g), d)));
+    if (out_.scores.back().z > out_.scores[out_.best].z) out_.best = out_.scores.size() - 1;
+  }
+}
+
+Significance Test::result() const {
+  Significance out = out_;
+  if (out.scores.empty()) return out;
+  const auto above = (largest_.array() >= out.scores[out.best].z).count();
+  out.p = (1.0 + static_cast<double>(above)) / (options_.draws + 1.0);
+  return out;
+}
+
+Significance test(const Marginal& marginal, const Columns& model, const TestOptions& options) {
+  Test all{options};
+  all.add(marginal, model);
+  return all.result();
+}
+
+}  // namespace toftwin::discover

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "calib/discover/marginal.h"
+
+/// Is there anything, beyond what the columns of a model explain?
+namespace toftwin::discover {
+
+/// What the data would be like with nothing in them.
+enum class NullModel {
+  /// The residuals of whole captures keep what they are but their sign. It knows neither the noise's size nor its
+  /// tails nor how rows of a capture err together; an effect in fewer than about seven captures is lost on it.
+  SignFlips,
+  /// Gaussian, with each capture's own dispersion. For captures of many rows, which know it well.
+  Noise,
+  Automatic  ///< Noise where captures have 64 independent rows on average
+};
+
+struct TestOptions {
+  NullModel null_model = NullModel::Automatic;
+  int draws = 400;
+  std::uint64_t seed = 1;
+};
+
+/// How much a group explains: T = uᵀ S⁺ u, u the moment and S the Gram of its columns after the model's are
+/// projected out (the efficient score).
+struct GroupScore {
+  std::size_t group = 0;  ///< of the Marginal, or of Test's names
+  double statistic = 0.0;
+  int rank = 0;
+  double z = 0.0;  ///< T against its own null draws, as a normal deviate (Wilson and Hilferty)
+};
+
+struct Significance {
+  double p = 1.0;  ///< rank of the largest z among the largest of the null draws: (1 + #{null ≥ data})/(draws + 1)
+  std::vector<GroupScore> scores{};
+  std::size_t best = 0;  ///< of `scores`
+  int draws = 0;
+  bool by_sign_flips = false;
+  /// Captures whose dispersion is far from the others': moved, bumped, or wrong.
+  std::vector<std::string> odd_captures{};
+};
+
+/// Tests all groups that are neither in `model` nor nuisances, together: whatever their number and correlation,
+/// p is one number for all.
+Significance test(const Marginal& marginal, const Columns& model, const TestOptions& options);
+
+/// The same for groups that come in parts, because all at once are too many columns.
+class Test {
+ public:
+  explicit Test(const TestOptions& options) : options_(options) {}
+  /// The groups of one part; the nuisances and the model are the same in all. `score.group` counts on through the
+  /// parts in the order of their tested groups' names.
+  void add(const Marginal& marginal, const Columns& model);
+  [[nodiscard]] Significance result() const;
+  [[nodiscard]] const std::vector<std::string>& names() const { return names_; }
+
+ private:
+  TestOptions options_;
+  Significance out_;
+  Eigen::VectorXd largest_;
+  std::vector<std::string> names_;
+};
+
+/// The statistics alone, without draws.
+std::vector<GroupScore> statistics(const Marginal& marginal, const Columns& model);
+
+}  // namespace toftwin::discover

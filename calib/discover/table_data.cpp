@@ -1,0 +1,312 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/discover/table_data.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <map>
+#include <optional>
+#include <random>
+#include <set>
+
+#include <openssl/evp.h>
+
+#include <fmt/format.h>
+
+#include "calib/discover/headers.h"
+
+namespace toftwin::discover {
+namespace {
+
+constexpr std::size_t kFewestRows = 20, kMostWords = 12;
+
+/// Reads columns of a CsvTable; errors name file and line.
+class Columns {
+ public:
+  Columns(const CsvTable& table, const std::filesystem::path& file) : table_(table), file_(file) {}
+
+  [[nodiscard]] std::optional<std::size_t> find(const std::string& name) const {
+    const auto at = std::ranges::find(table_.header, name);
+    if (at == table_.header.end()) return std::nullopt;
+    return static_cast<std::size_t>(at - table_.header.begin());
+  }
+  [[nodiscard]] Error missing(const std::string& name) const {
+    return {Error::Code::NotFound, fmt::format("{}: has no column \"{}\", only: {}", file_.string(), name,
+                                               fmt::join(table_.header, ", "))};
+  }
+  [[nodiscard]] const std::vector<std::string>& text(const std::string& name) const {
+    return table_.columns[*find(name)];
+  }
+  /// NaN where a field is empty or says nan.
+  [[nodiscard]] Result<std::vector<double>> numbers(const std::string& name) const {
+    const auto at = find(name);
+    if (!at) return missing(name);
+    std::vector<double> values;
+    for (std::size_t row = 0; row < table_.rows(); ++row) {
+      const auto value = toNumber(table_.columns[*at][row]);
+      if (!value) {
+        return Error{Error::Code::Malformed,
+                     fmt::format("{}:{}: \"{}\" in column \"{}\" is not a number", file_.string(),
+                                 table_.line[row], table_.columns[*at][row].substr(0, 40), name)};
+      }
+      values.push_back(*value);
+    }
+    return values;
+  }
+  static std::optional<double> toNumber(std::string_view field) {
+    if (field.empty() || field == "nan" || field == "NaN" || field == "NA") return std::nan("");
+    if (field.front() == '+') field.remove_prefix(1);
+    double value = 0.0;
+    const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
+    if (error != std::errc{} || end != field.data() + field.size()) return std::nullopt;
+    // Squares of what is larger overflow before anything can be said about it.
+    return std::isfinite(value) && std::abs(value) < 1e100 ? value : std::nan("");
+  }
+  [[nodiscard]] bool isText(const std::string& name) const {
+    return std::ranges::any_of(text(name), [](const std::string& field) { return !toNumber(field); });
+  }
+
+ private:
+  const CsvTable& table_;
+  const std::filesystem::path& file_;
+};
+
+/// Numbers for names, in the order in which they first stand there.
+std::vector<int> numbered(const std::vector<std::string>& words, std::vector<std::string>& names) {
+  std::map<std::string, int> known;
+  std::vector<int> numbers;
+  for (const std::string& word : words) {
+    const auto [at, is_new] = known.try_emplace(word, static_cast<int>(known.size()));
+    if (is_new) names.push_back(word);
+    numbers.push_back(at->second);
+  }
+  return numbers;
+}
+
+Result<> readErrors(const Columns& columns, const Roles& roles, TableData& data) {
+  if (!roles.error.empty()) {
+    auto error = columns.numbers(roles.error);
+    if (!error) return error.error();
+    data.error = *std::move(error);
+    if (roles.is_reversed)
+      for (double& one : data.error) one = -one;
+    data.unit = unitOf(roles.error);
+  }
+  if (!roles.reference.empty()) {
+    auto reference = columns.numbers(roles.reference);
+    if (!reference) return reference.error();
+    data.reference = *std::move(reference), data.reference_name = roles.reference;
+  }
+  if (roles.error.empty()) {
+    auto measured = columns.numbers(roles.measured);
+    if (!measured) return measured.error();
+    data.error = *std::move(measured);
+    data.unit = unitOf(roles.measured);
+    for (std::size_t i = 0; i < data.reference.size(); ++i) data.error[i] -= data.reference[i];
+  }
+  return {};
+}
+
+Result<> readCovariate(const Columns& columns, const std::string& name, MapNature said, TableData& data) {
+  if (!columns.find(name)) return columns.missing(name);
+  TableCovariate covariate{name, natureOf(name, said), {}, {}};
+  const bool is_text = columns.isText(name);
+  if (is_text || covariate.nature == Nature::Category) {
+    if (is_text && said != MapNature::Guessed && said != MapNature::Category) {
+      auto error = columns.numbers(name);
+      return error.error();
+    }
+    const auto numbers = numbered(columns.text(name), covariate.words);
+    if (covariate.words.size() > kMostWords) {
+      data.doubts.push_back(fmt::format("column \"{}\" holds {} different texts, more than {}: left out", name,
+                                        covariate.words.size(), kMostWords));
+      return {};
+    }
+    covariate.nature = Nature::Category;
+    covariate.values.assign(numbers.begin(), numbers.end());
+  } else {
+    auto values = columns.numbers(name);
+    if (!values) return values.error();
+    covariate.values = *std::move(values);
+  }
+  data.covariates.push_back(std::move(covariate));
+  return {};
+}
+
+/// Covariates that cannot show anything: they never change.
+void dropConstant(TableData& data) {
+  std::erase_if(data.covariates, [&](const TableCovariate& covariate) {
+    std::set<double> values(covariate.values.begin(), covariate.values.end());
+    if (values.size() > 1) return false;
+    data.doubts.push_back(fmt::format("column \"{}\" never changes: what goes with it cannot be seen", covariate.name));
+    return true;
+  });
+}
+
+/// Rows in which everything that is used is there.
+std::vector<bool> complete(const TableData& data) {
+  std::vector<bool> is_complete(data.rows(), true);
+  const auto need = [&](const std::vector<double>& values) {
+    for (std::size_t i = 0; i < values.size(); ++i)
+      if (!std::isfinite(values[i])) is_complete[i] = false;
+  };
+  need(data.error), need(data.reference), need(data.sigma);
+  for (const TableCovariate& covariate : data.covariates) need(covariate.values);
+  for (std::size_t i = 0; i < data.sigma.size(); ++i)
+    if (!(data.sigma[i] > 0.0)) is_complete[i] = false;
+  return is_complete;
+}
+
+/// A column that is empty in most rows would take the rows with it.
+void dropSparse(TableData& data) {
+  std::erase_if(data.covariates, [&](const TableCovariate& covariate) {
+    const auto missing = std::ranges::count_if(covariate.values, [](double v) { return !std::isfinite(v); });
+    if (2 * static_cast<std::size_t>(missing) <= covariate.values.size()) return false;
+    data.doubts.push_back(fmt::format("column \"{}\" is empty in {} of {} rows: left out", covariate.name, missing,
+                                      covariate.values.size()));
+    return true;
+  });
+}
+
+/// Speed of light over twice the frequency, in the unit of a header.
+double periodIn(Frequency modulation, const std::string& unit) {
+  if (!(modulation > Frequency{})) return 0.0;
+  const double metres = 299'792'458.0 / (2.0 * modulation.in(hertz));
+  const std::map<std::string, double> per_metre{{"m", 1.0}, {"cm", 1e2}, {"mm", 1e3}, {"um", 1e6}};
+  const auto found = per_metre.find(unit);
+  return metres * (found == per_metre.end() ? 1.0 : found->second);
+}
+
+Result<> readGroups(const Columns& columns, const Roles& roles, TableData& data) {
+  if (!roles.sigma.empty()) {
+    auto sigma = columns.numbers(roles.sigma);
+    if (!sigma) return sigma.error();
+    data.sigma = *std::move(sigma);
+  }
+  for (const std::string* name : {&roles.session, &roles.capture})
+    if (!name->empty() && !columns.find(*name)) return columns.missing(*name);
+  if (roles.session.empty()) {
+    data.session.assign(data.rows(), 0), data.session_names = {"all"};
+  } else {
+    data.session = numbered(columns.text(roles.session), data.session_names);
+  }
+  std::vector<std::string> ignored;
+  if (!roles.capture.empty()) data.capture = numbered(columns.text(roles.capture), ignored);
+  data.locked.assign(data.rows(), false);
+  if (roles.locked.empty()) return {};
+  auto locked = columns.numbers(roles.locked);
+  if (!locked) return locked.error();
+  data.has_locked_column = true;
+  for (std::size_t i = 0; i < data.rows(); ++i) data.locked[i] = (*locked)[i] != 0.0;
+  return {};
+}
+
+void note(const Roles& roles, std::size_t before, TableData& data) {
+  data.notes.push_back(roles.inWords());
+  if (data.rows() < before) {
+    data.doubts.push_back(fmt::format("{} of {} rows have an empty, infinite or impossible value: left out",
+                                      before - data.rows(), before));
+  }
+  if (data.session_names.size() == 1) {
+    data.doubts.push_back("one session only: what is found may be of this session; measure another to know");
+  }
+  if (data.reference.empty() && roles.error.empty()) {
+    data.doubts.push_back("no reference: only changes of the measured value are seen, not whether it is right");
+  }
+}
+
+}  // namespace
+
+Result<TableData> readTable(const CsvTable& table, const TableMap& map, const std::filesystem::path& file) {
+  const Columns columns{table, file};
+  const auto roles = rolesOf(table.header, map, file);
+  if (!roles) return roles.error();
+  TableData data;
+  data.file = file, data.line = table.line;
+  if (auto done = readErrors(columns, *roles, data); !done) return done.error();
+  if (auto done = readGroups(columns, *roles, data); !done) return done.error();
+  for (const auto& [name, nature] : roles->covariates)
+    if (auto done = readCovariate(columns, name, nature, data); !done) return done.error();
+  dropSparse(data);
+  const std::size_t before = data.rows();
+  data = rowsOf(data, complete(data));
+  if (data.rows() < kFewestRows) {
+    return Error{Error::Code::InvalidArgument,
+                 fmt::format("{}: has {} usable rows; at least {} are needed", file.string(), data.rows(), kFewestRows)};
+  }
+  dropConstant(data);
+  if (data.covariates.empty()) {
+    return Error{Error::Code::InvalidArgument,
+                 fmt::format("{}: has no column that changes and that the error could go with, besides {}",
+                             file.string(), roles->inWords())};
+  }
+  data.period = periodIn(map.modulation, unitOf(roles->reference.empty() ? roles->error : roles->reference));
+  note(*roles, before, data);
+  return data;
+}
+
+TableData rowsOf(const TableData& data, const std::vector<bool>& wanted) {
+  TableData out = data;
+  const auto keep = [&](auto& values) {
+    std::size_t next = 0;
+    for (std::size_t i = 0; i < values.size(); ++i)
+      if (wanted[i]) values[next++] = values[i];
+    values.resize(next);
+  };
+  keep(out.error), keep(out.reference), keep(out.sigma), keep(out.session), keep(out.capture), keep(out.locked);
+  keep(out.line);
+  for (TableCovariate& covariate : out.covariates) keep(covariate.values);
+  return out;
+}
+
+void lock(TableData& data, const TableMap& map) {
+  if (data.has_locked_column) return;
+  std::mt19937_64 random{map.seed + 77};
+  const auto sessions = data.session_names.size();
+  if (sessions >= 5) {
+    std::vector<std::size_t> order(sessions);
+    for (std::size_t i = 0; i < sessions; ++i) order[i] = i;
+    for (std::size_t i = sessions - 1; i > 0; --i) std::swap(order[i], order[random() % (i + 1)]);
+    order.resize(std::max<std::size_t>(1, static_cast<std::size_t>(map.locked_share * static_cast<double>(sessions))));
+    for (std::size_t i = 0; i < data.rows(); ++i)
+      data.locked[i] = std::ranges::find(order, static_cast<std::size_t>(data.session[i])) != order.end();
+    data.notes.push_back(fmt::format("{} of {} sessions are locked", order.size(), sessions));
+    return;
+  }
+  // Blocks of rows that follow each other: one of every `every` is drawn.
+  const auto every = static_cast<std::size_t>(std::lround(1.0 / map.locked_share));
+  const std::size_t size = std::max<std::size_t>(1, data.rows() / (8 * every));
+  for (std::size_t first = 0; first < data.rows(); first += size * every) {
+    const std::size_t begin = first + size * (random() % every);
+    for (std::size_t i = begin; i < std::min(begin + size, data.rows()); ++i) data.locked[i] = true;
+  }
+  // Rows of one capture stay together.
+  std::set<int> captures;
+  for (std::size_t i = 0; i < data.capture.size(); ++i)
+    if (data.locked[i]) captures.insert(data.capture[i]);
+  for (std::size_t i = 0; i < data.capture.size(); ++i) data.locked[i] = captures.contains(data.capture[i]);
+  data.doubts.push_back("locked rows are of the same sessions as the others, because there are fewer than five");
+}
+
+std::string hashOf(const TableData& data) {
+  EVP_MD_CTX* context = EVP_MD_CTX_new();
+  EVP_DigestInit_ex(context, EVP_sha256(), nullptr);
+  const auto add = [&](const auto& values) {
+    for (const auto& value : values) {
+      const double number = static_cast<double>(value);
+      EVP_DigestUpdate(context, &number, sizeof number);
+    }
+  };
+  add(data.line), add(data.error), add(data.reference), add(data.sigma), add(data.session);
+  for (const TableCovariate& covariate : data.covariates) add(covariate.values);
+  unsigned char digest[EVP_MAX_MD_SIZE];
+  unsigned length = 0;
+  EVP_DigestFinal_ex(context, digest, &length);
+  EVP_MD_CTX_free(context);
+  std::string hex;
+  for (unsigned i = 0; i < length; ++i) hex += fmt::format("{:02x}", digest[i]);
+  return hex;
+}
+
+}  // namespace toftwin::discover

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/discover/table_map.h"
+
+#include "protocol/settings/describe.h"
+#include "protocol/settings/settings.h"
+
+namespace toftwin::discover {
+
+Result<TableMap> loadTableMap(const std::filesystem::path& file) {
+  auto table = settings::Table::load(file);
+  if (!table) return table.error();
+  TableMap map;
+  table->read(map);
+  if (!map.error.empty() && (!map.measured.empty() || table->has("reference") != !map.reference.empty()))
+    table->complain("error", "stands beside `measured`: say it one way");
+  for (auto& below : table->anew().tables("covariate"))
+    if (!below.has("column")) table->complain("covariate", "needs `column`, its header, at " + below.place());
+  if (auto checked = table->check(); !checked) return checked.error();
+  return map;
+}
+
+std::string documentTableMap() { return settings::markdownTable(settings::keysOf<TableMap>()); }
+
+}  // namespace toftwin::discover

@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/discover/table_source.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include <fmt/format.h>
+
+namespace toftwin::discover {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+constexpr std::size_t kMostCaptures = 100, kMostLevels = 12, kQuantiles = 33, kManySessions = 20;
+
+double quantileOf(const std::vector<double>& sorted, double q) {
+  const double place = q * static_cast<double>(sorted.size() - 1);
+  const auto below = static_cast<std::size_t>(place);
+  const double above = sorted[std::min(below + 1, sorted.size() - 1)];
+  return sorted[below] + (place - static_cast<double>(below)) * (above - sorted[below]);
+}
+
+double spreadOf(const std::vector<double>& values) {
+  double mean = 0.0, squares = 0.0;
+  for (const double v : values) mean += v / static_cast<double>(values.size());
+  for (const double v : values) squares += (v - mean) * (v - mean);
+  return std::sqrt(squares / std::max<double>(1.0, static_cast<double>(values.size()) - 1.0));
+}
+
+}  // namespace
+
+std::vector<CovariateInfo> infosOf(const TableData& data) {
+  std::vector<CovariateInfo> infos;
+  for (const TableCovariate& covariate : data.covariates) {
+    CovariateInfo info;
+    info.name = covariate.name, info.nature = covariate.nature;
+    info.stage = std::nullopt;
+    std::vector<double> sorted = covariate.values;
+    std::ranges::sort(sorted);
+    if (sorted.empty()) continue;
+    for (std::size_t i = 0; i < kQuantiles; ++i)
+      info.quantiles.push_back(quantileOf(sorted, static_cast<double>(i) / (kQuantiles - 1)));
+    std::vector<double> levels = sorted;
+    levels.erase(std::ranges::unique(levels).begin(), levels.end());
+    if (levels.size() <= kMostLevels) info.levels = std::move(levels);
+    if (covariate.nature == Nature::Distance && covariate.name == data.reference_name) info.period = data.period;
+    infos.push_back(std::move(info));
+  }
+  return infos;
+}
+
+MatrixXd columnsOf(const TableData& data, std::span<const Term> terms) {
+  MatrixXd columns(static_cast<Index>(data.rows()), static_cast<Index>(terms.size()));
+  for (std::size_t t = 0; t < terms.size(); ++t) {
+    auto column = columns.col(static_cast<Index>(t));
+    column.setOnes();
+    for (const Factor& factor : terms[t].factors) {
+      const auto at = std::ranges::find(data.covariates, factor.covariate, &TableCovariate::name);
+      if (at == data.covariates.end()) {
+        column.setZero();
+        continue;
+      }
+      for (Index i = 0; i < column.size(); ++i) column(i) *= factor.at(at->values[static_cast<std::size_t>(i)]);
+    }
+    // A logarithm of nothing, a power of a negative number: such rows say nothing about this term.
+    column = column.unaryExpr([](double v) { return std::isfinite(v) ? v : 0.0; });
+  }
+  return columns;
+}
+
+TableSource::TableSource(TableData data, bool fits_gain) : data_(std::move(data)), infos_(infosOf(data_)) {
+  error_spread_ = std::max(spreadOf(data_.error), 1e-12);
+  if (!data_.reference.empty()) {
+    std::vector<double> sorted = data_.reference;
+    std::ranges::sort(sorted);
+    reference_middle_ = quantileOf(sorted, 0.5);
+    reference_spread_ = spreadOf(data_.reference);
+    fits_gain_ = fits_gain && reference_spread_ > 0.02 * std::abs(reference_middle_);
+  }
+  // The variance of an offset is known from many sessions only: then it is a random effect of each, and what changes
+  // from session to session is seen. A few sessions' offsets are free, and only what changes within them is.
+  if (data_.capture.empty() && data_.session_names.size() >= kManySessions) data_.capture = data_.session;
+  std::set<int> captures(data_.capture.begin(), data_.capture.end());
+  has_captures_ = !captures.empty() && 2 * captures.size() <= data_.rows();
+  has_sessions_ = data_.session_names.size() > 1 && data_.session_names.size() < kManySessions;
+  learn({});
+}
+
+void TableSource::learn(std::span<const Term> known) {
+  MatrixXd columns = columnsOf(data_, known);
+  for (const auto& [group, more] : nuisanceColumns(data_)) {
+    columns.conservativeResize(Eigen::NoChange, columns.cols() + more.cols());
+    columns.rightCols(more.cols()) = more;
+  }
+  noise_ = estimateNoise(data_, infos_, columns);
+  makeCaptures();
+}
+
+std::vector<std::pair<Group, MatrixXd>> TableSource::nuisanceColumns(const TableData& rows) const {
+  const auto n = static_cast<Index>(rows.rows());
+  std::vector<std::pair<Group, MatrixXd>> all;
+  if (!has_sessions_) all.push_back({Group{.name = "offset", .kind = Kind::Nuisance}, MatrixXd::Ones(n, 1)});
+  if (fits_gain_) {
+    MatrixXd gain(n, 1);
+    for (Index i = 0; i < n; ++i)
+      gain(i, 0) = rows.reference[static_cast<std::size_t>(i)] - reference_middle_;
+    all.push_back({Group{.name = "gain", .kind = Kind::Nuisance}, std::move(gain)});
+  }
+  if (has_sessions_) {
+    MatrixXd offsets = MatrixXd::Zero(n, static_cast<Index>(data_.session_names.size()));
+    for (Index i = 0; i < n; ++i) offsets(i, rows.session[static_cast<std::size_t>(i)]) = 1.0;
+    all.push_back({Group{.name = "session", .kind = Kind::Nuisance}, std::move(offsets)});
+  }
+  return all;
+}
+
+/// Captures of a column; else blocks of rows within a session.
+void TableSource::makeCaptures() {
+  names_.clear(), blocks_.clear();
+  const std::size_t rows = data_.rows();
+  capture_.assign(rows, 0);
+  std::map<std::pair<int, std::size_t>, int> known;
+  const auto size = std::max<std::size_t>(
+      (rows + kMostCaptures - 1) / kMostCaptures, static_cast<std::size_t>(std::ceil(3.0 * (noise_.correlation_rows - 1.0))));
+  std::map<int, std::size_t> seen;  // rows of each session so far
+  for (std::size_t i = 0; i < rows; ++i) {
+    const int session = data_.session[i];
+    const std::size_t block = has_captures_ ? static_cast<std::size_t>(data_.capture[i])
+                                            : seen[session]++ / std::max<std::size_t>(size, 1);
+    const auto [at, is_new] = known.try_emplace({session, block}, static_cast<int>(known.size()));
+    capture_[i] = at->second;
+    if (!is_new) continue;
+    names_.push_back(fmt::format("line {}", data_.line[i]));
+    blocks_.push_back(data_.session_names[static_cast<std::size_t>(session)]);
+  }
+}
+
+Evidence TableSource::evidence(std::span<const TermGroup> extra) const {
+  return evidenceOf(extra, capture_, names_.size());
+}
+
+/// Without captures' own offsets, one capture of all rows says the same as their sum.
+Evidence TableSource::summed(std::span<const TermGroup> extra, std::span<const double> scales) const {
+  if (has_captures_) return RowSource::summed(extra, scales);
+  return evidenceOf(extra, std::vector<int>(data_.rows(), 0), 1);
+}
+
+Evidence TableSource::evidenceOf(std::span<const TermGroup> extra, const std::vector<int>& capture_of,
+                                 std::size_t captures) const {
+  Evidence out;
+  std::vector<MatrixXd> parts;
+  const auto add = [&](Group group, MatrixXd columns) {
+    group.first = out.columns(), group.count = static_cast<std::size_t>(columns.cols());
+    out.groups.push_back(std::move(group));
+    parts.push_back(std::move(columns));
+  };
+  for (auto& [group, columns] : nuisanceColumns(data_)) add(std::move(group), std::move(columns));
+  if (has_captures_) {
+    const auto n = static_cast<Index>(data_.rows());
+    add({.name = "capture", .kind = Kind::PerCapture, .scale_class = 0}, MatrixXd::Constant(n, 1, error_spread_));
+  }
+  for (const TermGroup& terms : extra) {
+    Group group{.name = terms.name, .kind = terms.kind, .stage = std::nullopt};
+    group.covariates = covariatesOf(terms);
+    group.numbers = static_cast<int>(terms.terms.size()) + terms.inner_numbers;
+    add(std::move(group), columnsOf(data_, terms.terms));
+  }
+  MatrixXd x(static_cast<Index>(data_.rows()), static_cast<Index>(out.columns()));
+  for (std::size_t g = 0; g < parts.size(); ++g)
+    x.middleCols(static_cast<Index>(out.groups[g].first), parts[g].cols()) = parts[g];
+  std::vector<std::vector<Index>> rows_of(captures);
+  for (std::size_t i = 0; i < capture_of.size(); ++i)
+    rows_of[static_cast<std::size_t>(capture_of[i])].push_back(static_cast<Index>(i));
+  for (std::size_t c = 0; c < captures; ++c) {
+    MatrixXd own = x(rows_of[c], Eigen::all);
+    Eigen::VectorXd y(own.rows());
+    CaptureEvidence capture;
+    for (Index i = 0; i < own.rows(); ++i) {
+      const auto row = static_cast<std::size_t>(rows_of[c][static_cast<std::size_t>(i)]);
+      const double scale = std::sqrt(noise_.weight[row]) / noise_.sigma[row];
+      own.row(i) *= scale;
+      y(i) = data_.error[row] * scale;
+      capture.rows += noise_.weight[row];
+    }
+    capture.gram.noalias() = own.transpose() * own;
+    capture.moment.noalias() = own.transpose() * y;
+    capture.energy = y.squaredNorm();
+    capture.name = names_[c], capture.block = blocks_[c];
+    out.captures.push_back(std::move(capture));
+  }
+  return out;
+}
+
+}  // namespace toftwin::discover

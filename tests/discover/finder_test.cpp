@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+// Effects that were hidden in tables must be found by what they go with.
+#include <gmock/gmock.h>
+
+#include <cctype>
+#include <cmath>
+#include <set>
+
+#include <fmt/format.h>
+
+#include "calib/discover/curve.h"
+#include "calib/discover/find_in_table.h"
+#include "planted.h"
+
+namespace toftwin::discover {
+namespace {
+
+using testing::SizeIs;
+
+struct Found {
+  Planted planted;
+  Finding finding;
+};
+
+Found findHidden(const std::vector<Hidden>& hidden, double lambda, std::uint64_t seed) {
+  Found out{plant(seed, hidden, lambda), {}};
+  TableSource source{out.planted.data, true};
+  out.finding = findInTable(source, {.seed = seed});
+  return out;
+}
+
+bool hasEffectIn(const Finding& finding, Hidden hidden) {
+  return std::ranges::any_of(finding.effects,
+                             [&](const Effect& effect) { return effect.covariates == covariatesOf(hidden); });
+}
+
+std::string inWords(const Finding& finding) {
+  std::string words = fmt::format("p = {}:", finding.first_p);
+  for (const Effect& effect : finding.effects) words += " [" + effect.name + "]";
+  return words;
+}
+
+class EachHidden : public testing::TestWithParam<Hidden> {};
+
+TEST_P(EachHidden, IsNamedAtMediumAndStrongStrength) {
+  for (const double lambda : {600.0, 3000.0}) {
+    const Found found = findHidden({GetParam()}, lambda, 2);
+    EXPECT_TRUE(hasEffectIn(found.finding, GetParam())) << lambda << ", seed 2, " << inWords(found.finding);
+    EXPECT_THAT(found.finding.effects, SizeIs(1)) << lambda << ", seed 2, " << inWords(found.finding);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Finder, EachHidden, testing::ValuesIn(kHidden), [](const auto& which) {
+  std::string name;
+  for (const char* c = nameOf(which.param); *c != '\0'; ++c)
+    if (std::isalnum(static_cast<unsigned char>(*c))) name += *c;
+  return name;
+});
+
+TEST(Finder, SeparatesTwoEffects) {
+  const Found found = findHidden({Hidden::WarmUp, Hidden::Wiggle}, 1500.0, 3);
+  EXPECT_TRUE(hasEffectIn(found.finding, Hidden::WarmUp)) << inWords(found.finding);
+  EXPECT_TRUE(hasEffectIn(found.finding, Hidden::Wiggle)) << inWords(found.finding);
+  EXPECT_THAT(found.finding.effects, SizeIs(2)) << inWords(found.finding);
+  EXPECT_GT(found.finding.last_p, 0.005);
+}
+
+/// A strong exponential's time constant, 300 s, within 4 of its standard errors (once in 16,000), which are small.
+TEST(Finder, MeasuresTheTimeConstantOfAnExponential) {
+  const Found found = findHidden({Hidden::WarmUp}, 3000.0, 4);
+  ASSERT_THAT(found.finding.effects, SizeIs(1)) << inWords(found.finding);
+  const Effect& effect = found.finding.effects[0];
+  ASSERT_EQ(effect.name, "exponential in time_s");
+  const Estimate& tau = effect.numbers.back();
+  EXPECT_NEAR(tau.value, 300.0, 4.0 * tau.error) << tau.name;
+  EXPECT_LT(tau.error, 60.0);
+  EXPECT_GT(tau.error, 3.0);
+}
+
+TEST(Finder, GivesTheSameForTheSameSeed) {
+  const Found a = findHidden({Hidden::Temperature}, 600.0, 5), b = findHidden({Hidden::Temperature}, 600.0, 5);
+  EXPECT_EQ(inWords(a.finding), inWords(b.finding));
+  ASSERT_FALSE(a.finding.effects.empty());
+  EXPECT_EQ(a.finding.effects[0].coefficient, b.finding.effects[0].coefficient);
+}
+
+/// Time and temperature that rise together: whatever it is called, the other must be offered, and an experiment.
+TEST(Finder, OffersBothOfTwoCovariatesThatGoTogether) {
+  Planted planted = plant(6, {Hidden::Nothing}, 0.0);
+  TableData& data = planted.data;
+  std::erase_if(data.covariates, [](const TableCovariate& c) { return c.name == "temperature_c"; });
+  const auto time = *std::ranges::find(data.covariates, "time_s", &TableCovariate::name);
+  TableCovariate copy = time;
+  copy.name = "lamp_hours", copy.nature = Nature::Plain;
+  for (std::size_t i = 0; i < data.rows(); ++i) {
+    data.error[i] += 0.006 * time.values[i];
+    copy.values[i] = time.values[i] / 3600.0 + 1e-4 * std::sin(7.0 * static_cast<double>(i));
+  }
+  data.covariates.push_back(copy);
+  TableSource source{data, true};
+  const Finding finding = findInTable(source, {});
+  ASSERT_THAT(finding.effects, SizeIs(1)) << inWords(finding);
+  const Effect& effect = finding.effects[0];
+  std::set<std::string> offered(effect.covariates.begin(), effect.covariates.end());
+  for (const Alternative& other : effect.alternatives) offered.insert(other.covariates.begin(), other.covariates.end());
+  EXPECT_TRUE(offered.contains("time_s") && offered.contains("lamp_hours")) << inWords(finding);
+  ASSERT_TRUE(effect.experiment);
+  EXPECT_NE(effect.experiment->vary, effect.experiment->hold);
+}
+
+}  // namespace
+}  // namespace toftwin::discover

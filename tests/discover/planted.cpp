@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "planted.h"
+
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include <Eigen/Dense>
+
+namespace toftwin::discover {
+namespace {
+
+constexpr int kRows = 400, kSessions = 4;
+
+/// Draws that are the same everywhere: the standard fixes the engine, not the distributions.
+class Draws {
+ public:
+  explicit Draws(std::uint64_t seed) : bits_(seed) {}
+  double uniform() { return (static_cast<double>(bits_() >> 11) + 0.5) * 0x1p-53; }
+  double uniform(double low, double high) { return low + (high - low) * uniform(); }
+  double normal() { return std::sqrt(-2.0 * std::log(uniform())) * std::cos(2.0 * std::numbers::pi * uniform()); }
+  /// Variance 1: t₄ has 2.
+  double t4() {
+    double squares = 0.0;
+    for (int i = 0; i < 4; ++i) squares += std::pow(normal(), 2);
+    return normal() / std::sqrt(squares / 4.0) / std::numbers::sqrt2;
+  }
+
+ private:
+  std::mt19937_64 bits_;
+};
+
+struct Row {
+  double time, distance, temperature, ambient, amplitude, exposure, frame, incidence;
+};
+
+double valueOf(Hidden hidden, const Row& row) {
+  switch (hidden) {
+    case Hidden::Nothing:
+      return 0.0;
+    case Hidden::WarmUp:
+      return std::exp(-row.time / 300.0);
+    case Hidden::Wiggle:
+      return std::cos(2.0 * std::numbers::pi * row.distance / (4.99654 / 4.0) + 0.7);
+    case Hidden::Temperature:
+      return row.temperature;
+    case Hidden::AmbientTimesDistance:
+      return row.ambient * row.distance;
+    case Hidden::Step:
+      return row.time >= 700.0 ? 1.0 : 0.0;
+    case Hidden::Parity:
+      return std::fmod(row.frame, 2.0);
+    case Hidden::InverseAmplitude:
+      return 1.0 / row.amplitude;
+    case Hidden::Exposure:
+      return std::log(row.exposure);
+    case Hidden::IncidenceSquared:
+      return row.incidence * row.incidence;
+  }
+  return 0.0;
+}
+
+/// Times √(λ/χ²) of what is left after offset, gain and session offsets.
+void scaleTo(double lambda, double sigma, const std::vector<Row>& rows, const std::vector<int>& session,
+             Eigen::VectorXd& effect) {
+  Eigen::MatrixXd x = Eigen::MatrixXd::Zero(effect.size(), kSessions + 1);
+  for (Eigen::Index i = 0; i < effect.size(); ++i) {
+    x(i, session[static_cast<std::size_t>(i)]) = 1.0;
+    x(i, kSessions) = rows[static_cast<std::size_t>(i)].distance;
+  }
+  const Eigen::VectorXd left = effect - x * x.colPivHouseholderQr().solve(effect);
+  effect *= std::sqrt(lambda / left.squaredNorm()) * sigma;
+}
+
+}  // namespace
+
+const char* nameOf(Hidden hidden) {
+  switch (hidden) {
+    case Hidden::Nothing:
+      return "nothing";
+    case Hidden::WarmUp:
+      return "exp(-time/300 s)";
+    case Hidden::Wiggle:
+      return "4 waves per period";
+    case Hidden::Temperature:
+      return "temperature";
+    case Hidden::AmbientTimesDistance:
+      return "ambient x distance";
+    case Hidden::Step:
+      return "step at 700 s";
+    case Hidden::Parity:
+      return "odd frames";
+    case Hidden::InverseAmplitude:
+      return "1/amplitude";
+    case Hidden::Exposure:
+      return "ln exposure";
+    case Hidden::IncidenceSquared:
+      break;
+  }
+  return "incidence^2";
+}
+
+std::vector<std::string> covariatesOf(Hidden hidden) {
+  switch (hidden) {
+    case Hidden::WarmUp:
+    case Hidden::Step:
+      return {"time_s"};
+    case Hidden::Wiggle:
+      return {"distance_m"};
+    case Hidden::Temperature:
+      return {"temperature_c"};
+    case Hidden::AmbientTimesDistance:
+      return {"ambient_klx", "distance_m"};
+    case Hidden::Parity:
+      return {"frame"};
+    case Hidden::InverseAmplitude:
+      return {"amplitude"};
+    case Hidden::Exposure:
+      return {"exposure_us"};
+    case Hidden::IncidenceSquared:
+      return {"incidence_deg"};
+    case Hidden::Nothing:
+      break;
+  }
+  return {};
+}
+
+Planted plant(std::uint64_t seed, const std::vector<Hidden>& hidden, double lambda, const Errors& errors) {
+  Draws draws{seed * 2654435761U + 12345U};
+  std::vector<Row> rows;
+  Planted out;
+  TableData& data = out.data;
+  const double exposures[]{200.0, 500.0, 1000.0, 2000.0};
+  double room[kSessions], offset[kSessions];
+  for (int s = 0; s < kSessions; ++s) room[s] = draws.uniform(15.0, 30.0), offset[s] = errors.session_mm * draws.normal();
+  for (int i = 0; i < kRows; ++i) {
+    const int session = i * kSessions / kRows;
+    Row row{};
+    row.time = 15.0 * (i % (kRows / kSessions)) + draws.uniform(0.0, 10.0);
+    row.distance = draws.uniform(0.5, 4.0);
+    row.temperature = room[session] + 12.0 * (1.0 - std::exp(-row.time / 400.0)) + draws.normal();
+    row.ambient = draws.uniform(0.0, 40.0);
+    row.exposure = exposures[static_cast<int>(4.0 * draws.uniform())];
+    row.amplitude = row.exposure * draws.uniform(0.1, 0.9) / (row.distance * row.distance);
+    row.frame = 37.0 * i + std::floor(draws.uniform(0.0, 20.0));
+    row.incidence = draws.uniform(0.0, 60.0);
+    rows.push_back(row);
+    data.session.push_back(session);
+  }
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(kRows);
+  for (const Hidden one : hidden) {
+    if (one == Hidden::Nothing) continue;
+    Eigen::VectorXd effect(kRows);
+    for (int i = 0; i < kRows; ++i) effect(i) = valueOf(one, rows[static_cast<std::size_t>(i)]);
+    scaleTo(lambda, errors.sigma_mm, rows, data.session, effect);
+    sum += effect;
+  }
+  for (int i = 0; i < kRows; ++i) {
+    const Row& row = rows[static_cast<std::size_t>(i)];
+    double noise = errors.sigma_mm * (errors.heavy_tails ? draws.t4() : draws.normal());
+    if (errors.bumped && i >= 120 && i < 130) noise += 6.0 * errors.sigma_mm;
+    data.error.push_back(3.0 + 2.0 * row.distance + offset[data.session[static_cast<std::size_t>(i)]] + sum(i) + noise);
+    data.reference.push_back(row.distance);
+    data.line.push_back(static_cast<std::size_t>(i) + 2);
+  }
+  out.effect_mm.assign(sum.begin(), sum.end());
+  const auto column = [&](const char* name, Nature nature, double Row::*member) {
+    TableCovariate covariate{name, nature, {}, {}};
+    for (const Row& row : rows) covariate.values.push_back(row.*member);
+    data.covariates.push_back(std::move(covariate));
+  };
+  column("distance_m", Nature::Distance, &Row::distance);
+  column("time_s", Nature::Time, &Row::time);
+  column("temperature_c", Nature::Plain, &Row::temperature);
+  column("ambient_klx", Nature::Plain, &Row::ambient);
+  column("exposure_us", Nature::Plain, &Row::exposure);
+  column("amplitude", Nature::Plain, &Row::amplitude);
+  column("frame", Nature::Index, &Row::frame);
+  column("incidence_deg", Nature::Plain, &Row::incidence);
+  data.reference_name = "distance_m", data.unit = "mm", data.period = 4.99654;  // c/(2 · 30 MHz)
+  data.session_names = {"1", "2", "3", "4"};
+  data.locked.assign(kRows, false);
+  return out;
+}
+
+}  // namespace toftwin::discover
