@@ -139,7 +139,8 @@ class Search {
       }
     }
     effect.parts.insert(effect.parts.end(), more.parts.begin(), more.parts.end());
-    effect.name += " + " + more.name;
+    const std::string along = fmt::format("{}", fmt::join(effect.covariates, " and "));
+    effect.name = isFormula(effect) ? effect.name + " + " + more.name : "smooth in " + along;
   }
 
   static Gain gainOfSum(const Context& without, const Effect& effect, const Effect& more) {

@@ -126,8 +126,9 @@ std::string experimentInWords(const TableDiscovery& d, const Effect& effect) {
 bool isCertain(const Effect& effect) { return effect.alternatives.empty() && effect.frequency >= 0.8; }
 
 std::string nameInWords(const Effect& effect) {
-  std::string words = effect.is_catalogue ? effect.name : fmt::format("a function of {} ({})", joined(effect.covariates), effect.name);
-  for (const Alternative& other : effect.alternatives) words += fmt::format(", or of {} ({})", joined(other.covariates), other.name);
+  const auto shape = [](const std::string& name) { return name.find("smooth in") != std::string::npos ? std::string{"a curve without a short formula"} : name; };
+  std::string words = effect.is_catalogue ? effect.name : fmt::format("it goes with {} ({})", joined(effect.covariates), shape(effect.name));
+  for (const Alternative& other : effect.alternatives) words += fmt::format(", or with {} ({})", joined(other.covariates), shape(other.name));
   return words;
 }
 
@@ -157,9 +158,11 @@ TableBlock triedTable(const Effect& effect) {
 Section effectSection(const TableDiscovery& d, const Effect& effect, std::size_t number) {
   Section section{fmt::format("effect-{}", number), fmt::format("Effect {}: {}", number, effect.name), {}, Tone::Neutral, {}};
   section.tone = isCertain(effect) ? Tone::Good : Tone::Fair;
-  section.verdict = fmt::format("The error holds {}. Formula: {}. p = {} of there being nothing; chosen again in {} of 200 "
-                                "draws of the captures.",
-                                nameInWords(effect), formulaOf(effect), significant(effect.p), shownPercent(effect.frequency));
+  section.verdict = fmt::format("A part of the error: {}. Formula: {}. Without any effect a share of {} of data sets would look "
+                                "like this (p; the least that {} draws can say is {}). The same is chosen in {} of 200 draws "
+                                "of the captures.",
+                                nameInWords(effect), formulaOf(effect), significant(effect.p), d.finding.draws,
+                                significant(1.0 / (d.finding.draws + 1.0)), shownPercent(effect.frequency));
   section.blocks.push_back(figuresOf(d, effect));
   if (auto numbers = numbersTable(d, effect); !numbers.rows.empty()) section.blocks.push_back(std::move(numbers));
   if (!effect.alternatives.empty()) {
@@ -330,7 +333,7 @@ std::string verdictOf(const TableDiscovery& d) {
                : fmt::format("There is something above the noise (p = {}), but nothing that predicts rows it was not fitted to: "
                              "measure more before believing any cause.", significant(d.finding.first_p));
   }
-  std::string words = effects.size() == 1 ? "One effect: " : fmt::format("{} effects: ", effects.size());
+  std::string words = effects.size() == 1 ? "One effect is in the error: " : fmt::format("{} effects are in the error: ", effects.size());
   for (std::size_t i = 0; i < effects.size(); ++i) words += (i > 0 ? "; " : "") + nameInWords(effects[i]);
   if (d.judged.rows > 0) {
     words += fmt::format(". On locked rows the RMSE goes from {} to {}{}", shown(d.judged.before.rms, decimalsOf(d)),

@@ -58,10 +58,10 @@ TEST(Term, IsTheProductOfItsFactorsInWordsToo) {
 TEST(Forms, HaveHarmonicsOnlyOfDistancesThatAreLongEnoughToShowThem) {
   CovariateInfo d{.name = "d", .unit = "m", .nature = Nature::Distance};
   for (int i = 0; i <= 32; ++i) d.quantiles.push_back(1.0 + i / 32.0);
-  d.period = 5.0;
+  d.period = 5.2;
   std::size_t harmonics = 0;
   for (const Form& form : formsIn(d)) harmonics += form.name.find("per period") != std::string::npos;
-  EXPECT_EQ(harmonics, 5u) << "a metre is 0.6 of a wave of 5/4 m and longer than that of 5/5 … 5/8 m";
+  EXPECT_EQ(harmonics, 5u) << "a metre is less than 0.6 of a wave of 5.2/3 m, more of 5.2/4 … 5.2/8 m";
 }
 
 }  // namespace
