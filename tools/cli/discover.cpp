@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include <filesystem>
@@ -33,12 +32,13 @@ Result<Exit> act(const Options& options) {
   return Exit::Ok;
 }
 
-Run add(CLI::App& app) {
+Run add(Arguments& args) {
   const auto options = std::make_shared<Options>();
-  app.add_option("TABLE", options->table, "CSV file with a line of headers: measured values, their reference, and what may matter")
-      ->required();
-  app.add_option("--map", options->map, "TOML file that says what the columns are; without it the headers do");
-  app.add_option("-o,--output", options->output, "folder for the report, report.json and model.toml")->capture_default_str();
+  args.option("TABLE", options->table,
+              "CSV file with a line of headers: measured values, their reference, and what may matter")
+      .required();
+  args.option("--map", options->map, "TOML file that says what the columns are; without it the headers do");
+  args.option("-o,--output", options->output, "folder for the report, report.json and model.toml").showsDefault();
   return [options] { return act(*options); };
 }
 
