@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/facades/o3d303/unevenness.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <numeric>
+#include <vector>
+
+namespace toftwin::daemon::o3d303 {
+namespace {
+
+// Evenly spaced frames that are held back so leave at the intervals that were measured on a real one.
+TEST(Unevenness, GivesARealCamerasIntervals) {
+  const char* set = std::getenv("TOFTWIN_DATA");
+  const std::filesystem::path data = set != nullptr ? set : TOFTWIN_SOURCE_DIR "/../shared/data";
+  const auto file = data / "ifm-frame-timing/libo3d3xx_jitter-2000-30-8.txt";
+  if (!std::filesystem::exists(file)) GTEST_SKIP() << "the measurements are not there: " << file;
+  std::vector<double> intervals_ms;
+  std::ifstream in{file};
+  for (double ms = 0.0; in >> ms;) intervals_ms.push_back(ms);
+  ASSERT_EQ(intervals_ms.size(), 1000u);
+  const auto uneven = Unevenness::load(file);
+  ASSERT_TRUE(uneven.ok()) << uneven.error().message;
+  const double mean_ms = std::accumulate(intervals_ms.begin(), intervals_ms.end(), 0.0) / 1000.0;
+  EXPECT_NEAR(mean_ms, 37.9, 0.05);
+  const auto delay_ms = [&](std::size_t i) {
+    return std::chrono::duration<double, std::milli>{uneven->delay(i)}.count();
+  };
+  double least_ms = delay_ms(0);
+  for (std::size_t i = 0; i + 1 < 2000; ++i) {
+    least_ms = std::min(least_ms, delay_ms(i));
+    EXPECT_NEAR(mean_ms + delay_ms(i + 1) - delay_ms(i), intervals_ms[i % 1000], 1e-5) << i;  // whole nanoseconds
+  }
+  EXPECT_EQ(least_ms, 0.0) << "no frame leaves before it is there";
+}
+
+}  // namespace
+}  // namespace toftwin::daemon::o3d303
