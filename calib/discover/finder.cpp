@@ -167,12 +167,16 @@ class Search {
       Context without = context_;
       without.known = groupsOf(others);
       for (TermGroup& tangent : tangentsOf(others)) without.known.push_back(std::move(tangent));
-      const auto explanations = competeFor(without, effect.covariates);
+      // What else it could be, too: until now the other effects were among its rivals.
+      std::erase_if(effect.alternatives, [&](const Alternative& other) {
+        return std::ranges::find(others, other.covariates, &Effect::covariates) != others.end();
+      });
+      if (effect.alternatives.empty()) effect.experiment.reset();
+      const auto explanations = compete(without);
       const auto chosen = choose(explanations);
-      if (!chosen || explanations[*chosen].name == effect.name) continue;
+      if (!chosen || explanations[*chosen].is_catalogue || explanations[*chosen].covariates != effect.covariates) continue;
       Effect again = effectOf(without, explanations, *chosen);
-      again.p = effect.p, again.frequency = effect.frequency;
-      again.alternatives = effect.alternatives, again.experiment = effect.experiment;
+      again.p = effect.p;
       effect = std::move(again);
     }
   }

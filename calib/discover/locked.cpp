@@ -123,14 +123,12 @@ Judged judgeLocked(const TableSource& source, const TableData& locked, const std
   removeUnseenOffsets(source, locked, judged.before_value);
   removeUnseenOffsets(source, locked, judged.after_value);
   judged.before = compare::summarise(judged.before_value), judged.after = compare::summarise(judged.after_value);
-  // Rows beyond 4 deviations after the correction say nothing about it; one of them could outweigh all others.
   const std::size_t size = std::max<std::size_t>(1, locked.rows() / 40);
   std::vector<ChiSquares> blocks;
   ChiSquares all;
   for (std::size_t i = 0; i < locked.rows(); ++i) {
     if (i % size == 0) blocks.emplace_back();
     const double z0 = judged.before_value[i] / sigma[i], z1 = judged.after_value[i] / sigma[i];
-    if (std::abs(z1) > 4.0) continue;
     for (ChiSquares* sums : {&blocks.back(), &all}) sums->before += z0 * z0, sums->after += z1 * z1, sums->rows += 1.0;
   }
   judged.captures = blocks.size();

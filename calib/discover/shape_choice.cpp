@@ -71,9 +71,11 @@ std::vector<Explanation> explanationsFor(const Context& context, const std::vect
       if (sorted(covariatesOf(group)) == set) all.push_back(curve(group));
     }
     if (set.size() == 1) {
-      TermGroup finer = smoothIn(*find(context, set[0]), 2 * kSmoothKnots - 1);
-      finer.name = "finer " + finer.name;
-      if (finer.terms.size() >= kSmoothKnots) all.push_back(curve(std::move(finer)));
+      for (const auto& [knots, name] : {std::pair{2 * kSmoothKnots - 1, "finer "}, {4 * kSmoothKnots - 3, "finest "}}) {
+        TermGroup finer = smoothIn(*find(context, set[0]), knots);
+        finer.name = name + finer.name;
+        if (finer.terms.size() >= kSmoothKnots) all.push_back(curve(std::move(finer)));
+      }
     } else {
       all.push_back(sumOf(*find(context, set[0]), *find(context, set[1])));
     }

@@ -338,6 +338,7 @@ std::string verdictOf(const TableDiscovery& d) {
   if (d.judged.rows > 0) {
     words += fmt::format(". On locked rows the RMSE goes from {} to {}{}", shown(d.judged.before.rms, decimalsOf(d)),
                          shown(d.judged.after.rms, decimalsOf(d)), unitOf(d));
+    if (d.judged.after.rms >= d.judged.before.rms) words += ", which is no improvement: do not use it without measuring more";
   }
   return words + ".";
 }
@@ -348,7 +349,8 @@ Report reportOf(const TableDiscovery& d) {
   report.subtitle = fmt::format("{}: {} rows, {} of them locked", d.open.file.filename().string(), d.open.rows() + d.locked.rows(), d.locked.rows());
   report.verdict = verdictOf(d);
   const bool is_certain = std::ranges::all_of(d.finding.effects, isCertain);
-  report.tone = d.finding.effects.empty() && d.finding.first_p <= d.map.alpha ? Tone::Fair : is_certain ? Tone::Good : Tone::Fair;
+  const bool is_worse = !d.finding.effects.empty() && d.judged.rows > 0 && d.judged.after.rms >= d.judged.before.rms;
+  report.tone = is_worse ? Tone::Bad : d.finding.effects.empty() && d.finding.first_p <= d.map.alpha ? Tone::Fair : is_certain ? Tone::Good : Tone::Fair;
   const int digits = decimalsOf(d);
   report.cards.push_back({"Is there anything?", fmt::format("p = {}", significant(d.finding.first_p)),
                           fmt::format("{} null draws, α = {}", d.finding.draws, d.map.alpha),
