@@ -14,7 +14,7 @@ constexpr double kSpeedOfLight_m_per_s = 299'792'458.0;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 /// Of a pixel in which an edge or a shadow's edge lies: the additive recurrence of the plastic number, whose
 /// shares of areas are right within about 3 / kEdgeSamples.
-constexpr int kEdgeSamples = 600;
+constexpr int kEdgeSamples = 2400;
 
 struct Lamp {
   Vec3d at_m;  ///< in the world
@@ -70,8 +70,8 @@ bool Transport::isSmooth(const View& view, int x, int y) const {
   std::optional<std::size_t> board;
   bool is_first = true;
   unsigned lit = 0;
-  for (const double dv : {-0.5, 0.0, 0.5}) {
-    for (const double du : {-0.5, 0.0, 0.5}) {
+  for (const double dv : {-0.5, -0.25, 0.0, 0.25, 0.5}) {
+    for (const double du : {-0.5, -0.25, 0.0, 0.25, 0.5}) {
       const Vec3d ray = view.ray(x + du, y + dv);
       const auto met = firstMeeting(room_, view.world_from_camera.translation_m, ray);
       unsigned now = 0;

@@ -33,7 +33,7 @@ TEST(SimulatorAndReference, AgreeOnAWall) {
   }
 }
 
-// Shares of pixels at edges are found by 256 even samples there and 600 here: some 1e-2 of a pixel each, of
+// Shares of pixels at edges are found by 256 even samples there and 2400 here: some 1e-2 of a pixel each, of
 // 150 mm.
 TEST(SimulatorAndReference, AgreeOnEdges) {
   const Agreement a = at("checkerboard", {0, 0, 0.9}, 0.0, 256);
