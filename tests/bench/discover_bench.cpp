@@ -70,6 +70,21 @@ void run(const std::vector<Hidden>& hidden, double lambda, std::uint64_t seed, c
   fmt::print("   seed {}: p {:.4f}{}\n", seed, finding.first_p, words);
 }
 
+/// How often the 95 % interval of a time constant and of a place holds the truth, where the formula was found.
+void coverage(Hidden hidden, const char* name, double truth, double lambda, int seeds) {
+  int formulas = 0, held = 0;
+  for (int seed = 1; seed <= seeds; ++seed) {
+    const Planted planted = plant(static_cast<std::uint64_t>(seed + 300), {hidden}, lambda);
+    TableSource source{planted.data, true};
+    const Finding finding = findInTable(source, {.seed = static_cast<std::uint64_t>(seed)});
+    if (finding.effects.size() != 1 || finding.effects[0].name != name) continue;
+    const Estimate& inner = finding.effects[0].numbers.back();
+    ++formulas, held += std::abs(inner.value - truth) <= 1.96 * inner.error;
+  }
+  fmt::print("95 % interval of {} in \"{}\", lambda {:.0f}: holds the truth in {} of {} (of {} seeds)\n", truth, name, lambda,
+             held, formulas, seeds);
+}
+
 double quantile(std::vector<double> values, double q) {
   if (values.empty()) return NAN;
   std::ranges::sort(values);
@@ -91,7 +106,7 @@ int main(int argc, char** argv) {
   const bool is_loud = argc > 2;
   fmt::print("{:<34} {:>4} {:>8} {:>8} {:>8} {:>9} {:>8} {:>8} {:>7}\n", "tables of 400 rows", "runs", "detected",
              "named", "offered", "spurious", "removed", "worst10", "s/run");
-  const bool only_nulls = argc > 2 && std::string{argv[2]} == "nulls";
+  const bool only_nulls = argc > 2 && std::string{argv[2]} != "loud";
   for (const double lambda : only_nulls ? std::vector<double>{} : std::vector<double>{150.0, 600.0, 3000.0}) {
     Score all;
     const auto begin = std::chrono::steady_clock::now();
@@ -107,6 +122,8 @@ int main(int argc, char** argv) {
     }
     row(fmt::format("ALL {:.0f}", lambda), all, Seconds{std::chrono::steady_clock::now() - begin}.count());
   }
+  for (const double lambda : {600.0, 3000.0}) coverage(Hidden::WarmUp, "exponential in time_s", 300.0, lambda, 6 * seeds);
+  if (argc > 2 && std::string{argv[2]} == "coverage") return 0;
   const std::pair<const char*, Errors> nulls[]{{"nothing", {}},
                                                {"nothing, t4 tails", {.heavy_tails = true}},
                                                {"nothing, 10 rows bumped", {.bumped = true}},
