@@ -12,7 +12,8 @@ namespace toftwin::daemon {
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-constexpr unsigned kBlind = static_cast<unsigned>(PixelFlag::Invalid) | static_cast<unsigned>(PixelFlag::LowAmplitude);
+constexpr unsigned kBlind =
+    static_cast<unsigned>(PixelFlag::Invalid) | static_cast<unsigned>(PixelFlag::LowAmplitude);
 constexpr float kThroughDirt = 0.05F;  ///< of the amplitude: light passes the spot twice
 
 double uniform(std::uint64_t bits) { return static_cast<double>(bits >> 11) * 0x1p-53; }
@@ -43,7 +44,8 @@ void setRanges(Frame& frame, const std::vector<bool>& hit, RangeAt range_at) {
   const auto width = static_cast<std::size_t>(std::max(1, frame.camera.width));
   change<float>(frame, PlaneKind::Depth, ElementType::F32, [&](std::size_t i, float& depth_m) {
     if (!hit[i]) return;
-    const double z = rayThroughPixel(frame.camera, static_cast<double>(i % width), static_cast<double>(i / width)).v.z;
+    const double z =
+        rayThroughPixel(frame.camera, static_cast<double>(i % width), static_cast<double>(i / width)).v.z;
     depth_m = static_cast<float>(static_cast<double>(range_at(i)) * z);
   });
   change<std::uint8_t>(frame, PlaneKind::Flags, ElementType::U8, [&](std::size_t i, std::uint8_t& flags) {
@@ -80,7 +82,8 @@ std::uint64_t faultBits(std::uint64_t seed, std::uint64_t number, std::uint64_t 
 }
 
 std::size_t damagePixels(Frame& frame, const FaultKeys& fault, std::uint64_t index, std::size_t number) {
-  const auto pixels = static_cast<std::size_t>(frame.camera.width) * static_cast<std::size_t>(frame.camera.height);
+  const auto pixels =
+      static_cast<std::size_t>(frame.camera.width) * static_cast<std::size_t>(frame.camera.height);
   for (const Plane& plane : frame.planes) {
     if (static_cast<std::size_t>(plane.width) * static_cast<std::size_t>(plane.height) != pixels) return 0;
   }

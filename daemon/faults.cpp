@@ -18,7 +18,8 @@ namespace {
 using std::chrono::steady_clock;
 
 steady_clock::duration steadyOf(Duration duration) {
-  return std::chrono::duration_cast<steady_clock::duration>(std::chrono::duration<double>{duration.in(second)});
+  return std::chrono::duration_cast<steady_clock::duration>(
+      std::chrono::duration<double>{duration.in(second)});
 }
 
 std::int64_t nanosecondsOf(Duration duration) { return std::llround(duration.in(nanosecond)); }
@@ -56,7 +57,9 @@ class FaultySource final : public drivers::Source {
   }
   [[nodiscard]] drivers::SourceState state() const override { return inner_->state(); }
   Result<> setPose(const Transform<World, Camera>& pose) override { return inner_->setPose(pose); }
-  Result<> setParameter(std::string_view name, double value) override { return inner_->setParameter(name, value); }
+  Result<> setParameter(std::string_view name, double value) override {
+    return inner_->setParameter(name, value);
+  }
   Result<> trigger() override { return inner_->trigger(); }
 
   Result<Frame> next(std::stop_token stop, bool lockstep) override {
@@ -85,7 +88,8 @@ class FaultySource final : public drivers::Source {
 
   Result<Frame> takeWaiting(const std::stop_token& stop) {
     // What is interrupted loses no frame.
-    if (waiting_->due && !drivers::sleepUntil(*waiting_->due, stop)) return Error{Error::Code::Stopped, "asked to stop"};
+    if (waiting_->due && !drivers::sleepUntil(*waiting_->due, stop))
+      return Error{Error::Code::Stopped, "asked to stop"};
     Frame frame = std::move(waiting_->frame);
     if (!waiting_->due) {
       frame.dropped_by_device = 0;
@@ -104,7 +108,8 @@ class FaultySource final : public drivers::Source {
       const std::string detail = applyOne(fault, number, strike.frame, frame);
       plan_->note(strike, number, startOf(frame), detail);
       if (fault.kind == FaultKind::Disconnect) {
-        return Error{Error::Code::Disconnected, fmt::format("the fault plan disconnected it at frame {}", strike.frame)};
+        return Error{Error::Code::Disconnected,
+                     fmt::format("the fault plan disconnected it at frame {}", strike.frame)};
       }
     }
     if (!isStruckBy(strike, FaultKind::Freeze)) frozen_ = frame.planes;
@@ -112,7 +117,8 @@ class FaultySource final : public drivers::Source {
   }
 
   [[nodiscard]] bool isStruckBy(const FaultPlan::Strike& strike, FaultKind kind) const {
-    return std::ranges::any_of(strike.faults, [&](std::size_t number) { return plan_->fault(number).kind == kind; });
+    return std::ranges::any_of(strike.faults,
+                               [&](std::size_t number) { return plan_->fault(number).kind == kind; });
   }
 
   std::string applyOne(const FaultKeys& fault, std::size_t number, std::uint64_t index, Frame& frame) {
@@ -166,13 +172,17 @@ class FaultySource final : public drivers::Source {
 }  // namespace
 
 std::string_view nameOf(FaultKind kind) {
-  constexpr std::array<std::string_view, 10> kNames{"loss", "duplicate", "delay", "corruption", "clock_step", "freeze",
-                                                    "disconnect", "over_temperature", "stuck_pixels", "dirt"};
+  constexpr std::array<std::string_view, 10> kNames{
+      "loss",       "duplicate",        "delay",        "corruption", "clock_step", "freeze",
+      "disconnect", "over_temperature", "stuck_pixels", "dirt"};
   return kNames[static_cast<std::size_t>(kind)];
 }
 
 FaultPlan::FaultPlan(std::vector<FaultKeys> faults, std::string source, std::filesystem::path log)
-    : faults_(std::move(faults)), source_(std::move(source)), log_path_(std::move(log)), next_in_row_(faults_.size()) {}
+    : faults_(std::move(faults)),
+      source_(std::move(source)),
+      log_path_(std::move(log)),
+      next_in_row_(faults_.size()) {}
 
 Result<> FaultPlan::mayOpen() const {
   if (steady_clock::now() >= away_until_) return {};
@@ -193,13 +203,15 @@ FaultPlan::Strike FaultPlan::next() {
     const std::uint64_t since = strike.frame - fault.first;
     const std::uint64_t within = fault.every > 0 ? since % fault.every : since;
     if (fault.frames > 0 && within >= fault.frames) continue;
-    const double chance = static_cast<double>(faultBits(fault.seed, number, strike.frame, ~0ULL) >> 11) * 0x1p-53;
+    const double chance =
+        static_cast<double>(faultBits(fault.seed, number, strike.frame, ~0ULL) >> 11) * 0x1p-53;
     if (chance < fault.probability) strike.faults.push_back(number);
   }
   return strike;
 }
 
-void FaultPlan::note(const Strike& strike, std::size_t number, std::int64_t device_ns, std::string_view detail) {
+void FaultPlan::note(const Strike& strike, std::size_t number, std::int64_t device_ns,
+                     std::string_view detail) {
   const FaultKeys& fault = faults_[number];
   const bool goes_on = strike.frame > 0 && strike.frame == next_in_row_[number];
   next_in_row_[number] = strike.frame + 1;
@@ -213,7 +225,8 @@ void FaultPlan::note(const Strike& strike, std::size_t number, std::int64_t devi
     log_ << "frame,device_ns,fault,kind,detail\n";
     if (!log_) logging::error("{}: the log of faults {} cannot be written", source_, log_path_.string());
   }
-  log_ << fmt::format("{},{},{},{},{}\n", strike.frame, device_ns, number, nameOf(fault.kind), detail) << std::flush;
+  log_ << fmt::format("{},{},{},{},{}\n", strike.frame, device_ns, number, nameOf(fault.kind), detail)
+       << std::flush;
 }
 
 void FaultPlan::sendAway(Duration outage) { away_until_ = steady_clock::now() + steadyOf(outage); }

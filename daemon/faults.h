@@ -20,7 +20,16 @@
 namespace toftwin::daemon {
 
 enum class FaultKind {
-  Loss, Duplicate, Delay, Corruption, ClockStep, Freeze, Disconnect, OverTemperature, StuckPixels, Dirt
+  Loss,
+  Duplicate,
+  Delay,
+  Corruption,
+  ClockStep,
+  Freeze,
+  Disconnect,
+  OverTemperature,
+  StuckPixels,
+  Dirt
 };
 std::string_view nameOf(FaultKind kind);
 
@@ -53,7 +62,8 @@ struct FaultKeys {
               {"dirt", FaultKind::Dirt}},
              "what goes wrong");
     v.number("first", first, {0, 1e15},
-             "the first frame that it may strike, counted from 0 over all that the device gave since the daemon runs");
+             "the first frame that it may strike, counted from 0 over all that the device gave since the "
+             "daemon runs");
     v.number("frames", frames, {0, 1e15}, "how many frames in a row; 0: all from then on");
     v.number("every", every, {0, 1e15}, "again after so many frames, counted from first; 0: once");
     v.number("probability", probability, {0.0, 1.0}, "of each of those frames, by seed and frame");
@@ -67,7 +77,8 @@ struct FaultKeys {
   }
 };
 
-/// The faults of one source, over all the times that it is opened. Used on the source's thread, one after another.
+/// The faults of one source, over all the times that it is opened. Used on the source's thread, one after
+/// another.
 class FaultPlan {
  public:
   FaultPlan(std::vector<FaultKeys> faults, std::string source, std::filesystem::path log);
@@ -86,8 +97,8 @@ class FaultPlan {
   };
   Strike next();
   [[nodiscard]] const FaultKeys& fault(std::size_t number) const { return faults_[number]; }
-  /// A line of the file, which proves the fault: frame, device time, kind, detail. The first of a row is told in the
-  /// daemon's log, too.
+  /// A line of the file, which proves the fault: frame, device time, kind, detail. The first of a row is told
+  /// in the daemon's log, too.
   void note(const Strike& strike, std::size_t number, std::int64_t device_ns, std::string_view detail);
   void sendAway(Duration outage);
   void stepClock(Duration step);
@@ -97,7 +108,7 @@ class FaultPlan {
   const std::vector<FaultKeys> faults_;
   const std::string source_;
   const std::filesystem::path log_path_;
-  std::ofstream log_;                      ///< from the first fault on: a plan that is only checked writes nothing
+  std::ofstream log_;  ///< from the first fault on: a plan that is only checked writes nothing
   std::vector<std::uint64_t> next_in_row_;  ///< of each fault: the frame after the last that it struck
   std::uint64_t frames_ = 0;
   std::int64_t clock_step_ns_ = 0;

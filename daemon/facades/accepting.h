@@ -12,8 +12,8 @@
 
 namespace toftwin::daemon {
 
-/// Takes connections one after another. Where accept(2) fails, for want of file descriptors say, it waits a moment
-/// instead of failing at full speed. Used on the acceptor's thread only.
+/// Takes connections one after another. Where accept(2) fails, for want of file descriptors say, it waits a
+/// moment instead of failing at full speed. Used on the acceptor's thread only.
 class Accepting {
  public:
   Accepting(boost::asio::ip::tcp::acceptor acceptor, std::function<void(boost::asio::ip::tcp::socket)> take)
@@ -30,16 +30,16 @@ class Accepting {
 
  private:
   void next() {
-    acceptor_.async_accept([this, alive = is_alive_](boost::system::error_code error,
-                                                     boost::asio::ip::tcp::socket socket) {
-      if (!*alive || error == boost::asio::error::operation_aborted) return;
-      struct GoOn {  // also where taking it throws
-        Accepting& accepting;
-        bool has_failed;
-        ~GoOn() { has_failed ? accepting.nextAfterAWhile() : accepting.next(); }
-      } const go_on{*this, static_cast<bool>(error)};
-      if (!error) take_(std::move(socket));
-    });
+    acceptor_.async_accept(
+        [this, alive = is_alive_](boost::system::error_code error, boost::asio::ip::tcp::socket socket) {
+          if (!*alive || error == boost::asio::error::operation_aborted) return;
+          struct GoOn {  // also where taking it throws
+            Accepting& accepting;
+            bool has_failed;
+            ~GoOn() { has_failed ? accepting.nextAfterAWhile() : accepting.next(); }
+          } const go_on{*this, static_cast<bool>(error)};
+          if (!error) take_(std::move(socket));
+        });
   }
   void nextAfterAWhile() {
     pause_.expires_after(std::chrono::milliseconds{100});
@@ -52,7 +52,8 @@ class Accepting {
   boost::asio::steady_timer pause_;
   const std::uint16_t port_;
   const std::function<void(boost::asio::ip::tcp::socket)> take_;
-  const std::shared_ptr<bool> is_alive_ = std::make_shared<bool>(true);  // shared with handlers that come later
+  const std::shared_ptr<bool> is_alive_ =
+      std::make_shared<bool>(true);  // shared with handlers that come later
 };
 
 }  // namespace toftwin::daemon

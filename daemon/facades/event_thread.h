@@ -14,7 +14,8 @@
 
 namespace toftwin::daemon {
 
-/// A facade's one thread, on which all its handlers run. Whatever they throw is logged, and the others run on.
+/// A facade's one thread, on which all its handlers run. Whatever they throw is logged, and the others run
+/// on.
 class EventThread {
  public:
   /// How other threads reach it; they may keep it longer than the thread lasts.

@@ -24,9 +24,10 @@ void warnIfRemote(const FacadeKeys& keys) {
   boost::system::error_code is_none;
   const auto address = boost::asio::ip::make_address(keys.address, is_none);
   if (is_none || address.is_loopback()) return;
-  logging::warn("{} listens on {}, which other machines reach: everyone there can see the camera and set it, because "
-               "its language has no encryption and at most a password in clear text",
-               nameOf(keys), keys.address);
+  logging::warn(
+      "{} listens on {}, which other machines reach: everyone there can see the camera and set it, because "
+      "its language has no encryption and at most a password in clear text",
+      nameOf(keys), keys.address);
 }
 
 }  // namespace
@@ -40,9 +41,8 @@ void Facades::apply(std::vector<ConfiguredFacade> configured) {
   std::vector<Running> before = std::exchange(running_, {});
   std::vector<Running> wanted;
   for (ConfiguredFacade& one : configured) {
-    const auto same = std::ranges::find_if(before, [&](const Running& running) {
-      return running.configured.fingerprint == one.fingerprint;
-    });
+    const auto same = std::ranges::find_if(
+        before, [&](const Running& running) { return running.configured.fingerprint == one.fingerprint; });
     if (same != before.end()) {
       wanted.push_back(std::move(*same));
       before.erase(same);

@@ -15,12 +15,12 @@
 
 namespace toftwin::daemon {
 
-/// The facades of a running daemon. One that cannot start, because its port is in use, say, is told in the log
-/// and tried again; the daemon serves its other clients meanwhile. Used on the thread of the io_context only.
+/// The facades of a running daemon. One that cannot start, because its port is in use, say, is told in the
+/// log and tried again; the daemon serves its other clients meanwhile. Used on the thread of the io_context
+/// only.
 class Facades {
  public:
-  Facades(boost::asio::io_context& io, Hub& hub, const Clock& clock)
-      : hub_(hub), clock_(clock), pause_(io) {}
+  Facades(boost::asio::io_context& io, Hub& hub, const Clock& clock) : hub_(hub), clock_(clock), pause_(io) {}
 
   /// Makes what runs what is configured. Those that are configured as before run on.
   void apply(std::vector<ConfiguredFacade> configured);

@@ -13,7 +13,11 @@ constexpr std::chrono::milliseconds kPause{200};
 }  // namespace
 
 SourceLink::SourceLink(EventThread& thread, Hub& hub, Wants wants, TakeFrame take)
-    : hub_(hub), wants_(std::move(wants)), take_(std::move(take)), door_(thread.door()), pause_(thread.io()) {}
+    : hub_(hub),
+      wants_(std::move(wants)),
+      take_(std::move(take)),
+      door_(thread.door()),
+      pause_(thread.io()) {}
 
 SourceLink::~SourceLink() {
   *is_alive_ = false;

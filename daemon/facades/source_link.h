@@ -15,8 +15,8 @@
 
 namespace toftwin::daemon {
 
-/// What joins a facade to its source, by the source's name: a source that is stopped, lost or configured anew is
-/// found again. Everything here is called on the facade's thread, and calls back on it.
+/// What joins a facade to its source, by the source's name: a source that is stopped, lost or configured anew
+/// is found again. Everything here is called on the facade's thread, and calls back on it.
 class SourceLink {
  public:
   struct Wants {

@@ -21,7 +21,7 @@ using std::chrono::milliseconds;
 
 constexpr std::uint64_t kLongestAnswer = 4 << 20;
 // Faults of the camera that are not a mistake in what was asked for.
-constexpr int kSessionExists = 101'004, kWrongPassword = 101'003, kNoSession = 100'000;
+constexpr int kSessionExists = 101'004, kWrongPassword = 101'005, kNoSession = 100'000;
 
 std::string nameOf(const Endpoint& endpoint) {
   return fmt::format("{}:{}", endpoint.address().to_string(), endpoint.port());

@@ -31,7 +31,8 @@ class Faulty {
     source_ = open();
   }
   std::unique_ptr<drivers::Source> open() {
-    auto table = settings::Table::parse("width = 64\nheight = 48\npace = 'fast'\nframe_rate_hz = 100", "t.toml");
+    auto table =
+        settings::Table::parse("width = 64\nheight = 48\npace = 'fast'\nframe_rate_hz = 100", "t.toml");
     auto opened = FaultPlan::open(plan_, drivers::pattern::row().open(*table));
     EXPECT_TRUE(opened.ok() && (*opened)->start().ok());
     return *std::move(opened);
@@ -112,7 +113,8 @@ std::vector<float> rangesOf(const Frame& frame) {
   return {range.begin(), range.end()};
 }
 bool areSame(const std::vector<float>& a, const std::vector<float>& b) {
-  return std::ranges::equal(a, b, [](float x, float y) { return x == y || (std::isnan(x) && std::isnan(y)); });
+  return std::ranges::equal(a, b,
+                            [](float x, float y) { return x == y || (std::isnan(x) && std::isnan(y)); });
 }
 
 TEST(Faults, AFrozenCameraRepeatsItsPixelsWhileTimeGoesOn) {
@@ -145,13 +147,15 @@ std::size_t changed(const Frame& frame, std::uint64_t shift) {
   std::size_t count = 0;
   for (std::size_t i = 0; i < range.size(); ++i) {
     const auto expected = drivers::pattern::pixelAt(kWidth, kHeight, shift, static_cast<int>(i % kWidth),
-                                                    static_cast<int>(i / kWidth)).range_m;
+                                                    static_cast<int>(i / kWidth))
+                              .range_m;
     if (range[i] != expected && !(std::isnan(range[i]) && std::isnan(expected))) ++count;
   }
   return count;
 }
 
-// Binomial: 3072 pixels at 0.1 are 307.2 ± 16.6; 5 sigma are exceeded once in 1.7 million runs, and the seed is fixed.
+// Binomial: 3072 pixels at 0.1 are 307.2 ± 16.6; 5 sigma are exceeded once in 1.7 million runs, and the seed
+// is fixed.
 TEST(Faults, CorruptedPixelsAreAsManyAsAskedForAndOthersInEachFrame) {
   auto corrupt = fault(FaultKind::Corruption, 0, 2);
   corrupt.share = 0.1;
@@ -164,7 +168,8 @@ TEST(Faults, CorruptedPixelsAreAsManyAsAskedForAndOthersInEachFrame) {
   for (std::size_t i = 0; i < kPixels; ++i) {
     const auto was = [&](const Frame& frame, std::uint64_t shift) {
       const float expected = drivers::pattern::pixelAt(kWidth, kHeight, shift, static_cast<int>(i % kWidth),
-                                                       static_cast<int>(i / kWidth)).range_m;
+                                                       static_cast<int>(i / kWidth))
+                                 .range_m;
       const float got = frame.find(PlaneKind::Range)->as<float>()[i];
       return got != expected && !(std::isnan(got) && std::isnan(expected));
     };
@@ -192,8 +197,8 @@ TEST(Faults, DirtBlindsARoundSpot) {
   const auto flags = frame->find(PlaneKind::Flags)->as<std::uint8_t>();
   std::size_t blind = 0;
   for (std::size_t i = 0; i < kPixels; ++i) {
-    const auto expected =
-        drivers::pattern::pixelAt(kWidth, kHeight, 0, static_cast<int>(i % kWidth), static_cast<int>(i / kWidth));
+    const auto expected = drivers::pattern::pixelAt(kWidth, kHeight, 0, static_cast<int>(i % kWidth),
+                                                    static_cast<int>(i / kWidth));
     if (flags[i] == expected.flags) continue;
     ++blind;
     EXPECT_TRUE(std::isnan(frame->find(PlaneKind::Range)->as<float>()[i]));
@@ -216,9 +221,11 @@ TEST(Faults, AProbabilityIsKept) {
 class FaultsInTheDaemon : public RunningDaemon {};
 
 TEST_F(FaultsInTheDaemon, AreToldByTheFramesTheLogAndTheFile) {
-  start("[[source]]\nname = 'cam'\ndriver = 'pattern'\npace = 'fast'\nwidth = 64\nheight = 48\nfault_log = 'faults.csv'\n"
-        "[[source.fault]]\nkind = 'corruption'\nfirst = 3\nframes = 2\n"
-        "[[source.fault]]\nkind = 'disconnect'\nfirst = 10\noutage_s = 0.05\n");
+  start(
+      "[[source]]\nname = 'cam'\ndriver = 'pattern'\npace = 'fast'\nwidth = 64\nheight = 48\nfault_log = "
+      "'faults.csv'\n"
+      "[[source.fault]]\nkind = 'corruption'\nfirst = 3\nframes = 2\n"
+      "[[source.fault]]\nkind = 'disconnect'\nfirst = 10\noutage_s = 0.05\n");
   auto client = this->client();
   auto stream = client.subscribe("cam", {.policy = SubscribeOptions::Policy::Lockstep});
   ASSERT_TRUE(stream.ok()) << stream.error().message;

@@ -48,13 +48,17 @@ struct Keys {
 
   template <class Visitor>
   void visit(Visitor& v) {
-    v.number("port", port, {0, 65'535}, "TCP port, Modbus' own by default; 0: any free one, which the log tells");
-    v.flag("streams", streams, "how the coil \"stream\" is at first: frames are made while a client is connected");
+    v.number("port", port, {0, 65'535},
+             "TCP port, Modbus' own by default; 0: any free one, which the log tells");
+    v.flag("streams", streams,
+           "how the coil \"stream\" is at first: frames are made while a client is connected");
     v.quantity("most_temperature", most_temperature, celsius, {-40.0, 200.0},
                "alarm \"temperature\": the illumination or the sensor is hotter");
-    v.quantity("stale_after", stale_after, second, {0.01, 86'400.0},
-               "alarm \"stale\": no frame for so long although frames come by themselves or one was asked for");
-    v.number("least_valid", least_valid, {0.0, 1.0}, "alarm \"few_valid\": a smaller share of the pixels is valid");
+    v.quantity(
+        "stale_after", stale_after, second, {0.01, 86'400.0},
+        "alarm \"stale\": no frame for so long although frames come by themselves or one was asked for");
+    v.number("least_valid", least_valid, {0.0, 1.0},
+             "alarm \"few_valid\": a smaller share of the pixels is valid");
     v.group("recipe", recipes, "settings that are selected by number");
     v.group("pose", poses, "places of a simulated camera that are selected by number");
   }

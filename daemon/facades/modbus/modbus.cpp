@@ -49,7 +49,8 @@ std::optional<Setting> readSetting(std::string_view text) {
 }
 using Recipe = std::vector<Setting>;
 
-Transform<World, Camera> poseAt(const std::array<double, 3>& position_m, const std::array<double, 3>& euler_deg) {
+Transform<World, Camera> poseAt(const std::array<double, 3>& position_m,
+                                const std::array<double, 3>& euler_deg) {
   const auto& [x, y, z] = euler_deg;
   Transform<World, Camera> pose = rotation<World, World>({0, 0, 1}, z * degree.in_si) *
                                   (rotation<World, World>({0, 1, 0}, y * degree.in_si) *
@@ -78,7 +79,8 @@ FrameFacts factsOf(const Frame& frame) {
     if (one.where == "room") facts.room_c = value_c;
   }
   if (frame.moment.since_power_on) facts.powered_on_s = frame.moment.since_power_on->in(second);
-  if (!frame.moment.exposures.empty()) facts.device_ns = std::max<std::int64_t>(0, frame.moment.exposures[0].start.ns);
+  if (!frame.moment.exposures.empty())
+    facts.device_ns = std::max<std::int64_t>(0, frame.moment.exposures[0].start.ns);
   const Plane* range = frame.find(PlaneKind::Range);
   if (range == nullptr || range->type != ElementType::F32) return facts;
   const auto metres = range->as<float>();
@@ -112,12 +114,14 @@ class ModbusFacade final : public Facade {
   Result<> open() {
     auto acceptor = listenFor(thread_.io(), place_.keys, static_cast<std::uint16_t>(keys_.port), "port");
     if (!acceptor) return acceptor.error();
-    server_.emplace(*std::move(acceptor),
-                    Server::Hooks{.answer = [this](std::span<const std::byte> message) { return answerTo(message); },
-                                  .connections = [this](std::size_t count) {
-                                    connections_ = count;
-                                    adjust();
-                                  }});
+    server_.emplace(
+        *std::move(acceptor),
+        Server::Hooks{.answer = [this](std::span<const std::byte> message) { return answerTo(message); },
+                      .connections =
+                          [this](std::size_t count) {
+                            connections_ = count;
+                            adjust();
+                          }});
     where_ = fmt::format("Modbus TCP on {} port {}", place_.keys.address, server_->port());
     thread_.start();
     return {};
@@ -136,7 +140,8 @@ class ModbusFacade final : public Facade {
     triggered_at_.reset();
   }
 
-  /// Frames are wanted while somebody is connected; a source that waits for triggers must be started to take one.
+  /// Frames are wanted while somebody is connected; a source that waits for triggers must be started to take
+  /// one.
   void adjust() {
     const bool is_wanted = connections_ > 0 && registers_.get(Item::Stream) != 0.0;
     if (is_wanted && !wanted_since_) wanted_since_ = steady_clock::now();
@@ -159,12 +164,13 @@ class ModbusFacade final : public Facade {
       }
       if (isBusy() && startsSomething(write.memory, address, word)) return Exception::kBusy;
     }
-    for (std::size_t i = 0; i < write.words.size(); ++i) obey(write.memory, write.address + i, write.words[i]);
+    for (std::size_t i = 0; i < write.words.size(); ++i)
+      obey(write.memory, write.address + i, write.words[i]);
     return 0;
   }
 
   static constexpr std::size_t kTrigger = 0, kAcknowledge = 1, kStream = 2, kApplyPose = 3;  // coils
-  static constexpr std::size_t kRecipe = 0, kPose = 1;                                       // holding registers
+  static constexpr std::size_t kRecipe = 0, kPose = 1;  // holding registers
 
   static bool startsSomething(Memory memory, std::size_t address, std::uint16_t word) {
     return memory == Memory::Coil ? word != 0 && (address == kTrigger || address == kApplyPose)
@@ -281,7 +287,8 @@ class ModbusFacade final : public Facade {
 
   [[nodiscard]] bool isStale(steady_clock::time_point now, bool comes_by_itself) const {
     std::optional<steady_clock::time_point> since = triggered_at_;
-    if (comes_by_itself && wanted_since_) since = std::max(*wanted_since_, facts_ ? facts_->came : *wanted_since_);
+    if (comes_by_itself && wanted_since_)
+      since = std::max(*wanted_since_, facts_ ? facts_->came : *wanted_since_);
     return since && std::chrono::duration<double>(now - *since).count() > keys_.stale_after.in(second);
   }
 
@@ -363,7 +370,8 @@ FacadeKind facade() {
           .summary = "a source for a PLC: status, alarms, triggers, recipes and poses over Modbus TCP",
           .read = read,
           .document = [] {
-            return settings::markdownTable(settings::keysOf<Keys>()) + "\n## Registers\n\n" + documentRegisters();
+            return settings::markdownTable(settings::keysOf<Keys>()) + "\n## Registers\n\n" +
+                   documentRegisters();
           }};
 }
 

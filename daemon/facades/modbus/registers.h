@@ -17,15 +17,50 @@ enum class Memory { Coil, Discrete, Holding, Input };
 /// Everything that a client can read or write. The order is that of the table.
 enum class Item {
   // coils
-  Trigger, Acknowledge, Stream, ApplyPose,
+  Trigger,
+  Acknowledge,
+  Stream,
+  ApplyPose,
   // discrete inputs
-  Present, Streaming, CanTrigger, Busy, AnyAlarm, AlarmLost, AlarmStale, AlarmTemperature, AlarmCommand, AlarmDrops,
+  Present,
+  Streaming,
+  CanTrigger,
+  Busy,
+  AnyAlarm,
+  AlarmLost,
+  AlarmStale,
+  AlarmTemperature,
+  AlarmCommand,
+  AlarmDrops,
   AlarmFewValid,
   // holding registers
-  Recipe, Pose, Heartbeat, PoseX, PoseY, PoseZ, PoseRx, PoseRy, PoseRz,
+  Recipe,
+  Pose,
+  Heartbeat,
+  PoseX,
+  PoseY,
+  PoseZ,
+  PoseRx,
+  PoseRy,
+  PoseRz,
   // input registers
-  Status, Alarms, MapVersion, CommandResult, Frames, Lost, Reconnects, FrameAge, PoweredOn, TemperatureIllumination,
-  TemperatureSensor, TemperatureHousing, TemperatureRoom, Valid, CentreRange, NearestRange, DeviceSeconds,
+  Status,
+  Alarms,
+  MapVersion,
+  CommandResult,
+  Frames,
+  Lost,
+  Reconnects,
+  FrameAge,
+  PoweredOn,
+  TemperatureIllumination,
+  TemperatureSensor,
+  TemperatureHousing,
+  TemperatureRoom,
+  Valid,
+  CentreRange,
+  NearestRange,
+  DeviceSeconds,
   DeviceNanoseconds,
   kCount
 };
@@ -49,8 +84,8 @@ constexpr int wordsOf(NumberKind kind) { return kind == NumberKind::U32 || kind 
 class Registers {
  public:
   Registers();
-  /// Numbers that do not fit become the nearest that does; one that is none becomes 0x8000 in an S16, NaN in an
-  /// F32, 0 in others.
+  /// Numbers that do not fit become the nearest that does; one that is none becomes 0x8000 in an S16, NaN in
+  /// an F32, 0 in others.
   void set(Item item, double value);
   [[nodiscard]] double get(Item item) const;
 
@@ -65,7 +100,9 @@ class Registers {
   [[nodiscard]] const std::vector<std::uint16_t>& words(Memory memory) const {
     return words_[static_cast<std::size_t>(memory)];
   }
-  [[nodiscard]] std::vector<std::uint16_t>& words(Memory memory) { return words_[static_cast<std::size_t>(memory)]; }
+  [[nodiscard]] std::vector<std::uint16_t>& words(Memory memory) {
+    return words_[static_cast<std::size_t>(memory)];
+  }
   std::array<std::vector<std::uint16_t>, 4> words_;  ///< bits as 0 and 1
 };
 

@@ -9,10 +9,13 @@ namespace {
 // The header: transaction, protocol (0), length of what follows, unit; then function and data.
 constexpr std::size_t kLength = 4, kUnit = 6, kFunction = 7, kData = 8;
 constexpr std::size_t kLeastLength = 2, kMostLength = 254;
-constexpr std::size_t kMostBitsRead = 2000, kMostWordsRead = 125, kMostBitsWritten = 1968, kMostWordsWritten = 123;
+constexpr std::size_t kMostBitsRead = 2000, kMostWordsRead = 125, kMostBitsWritten = 1968,
+                      kMostWordsWritten = 123;
 constexpr std::uint16_t kOn = 0xFF00, kOff = 0x0000;
 
-std::uint8_t byteAt(std::span<const std::byte> bytes, std::size_t at) { return std::to_integer<std::uint8_t>(bytes[at]); }
+std::uint8_t byteAt(std::span<const std::byte> bytes, std::size_t at) {
+  return std::to_integer<std::uint8_t>(bytes[at]);
+}
 std::uint16_t wordAt(std::span<const std::byte> bytes, std::size_t at) {
   return static_cast<std::uint16_t>(byteAt(bytes, at) << 8 | byteAt(bytes, at + 1));
 }
@@ -48,7 +51,8 @@ Reply read(const Registers& registers, Memory memory, std::span<const std::byte>
   return reply;
 }
 
-Reply taken(const Registers& registers, const TakeWrite& take, const Write& write, std::span<const std::byte> echo) {
+Reply taken(const Registers& registers, const TakeWrite& take, const Write& write,
+            std::span<const std::byte> echo) {
   for (std::size_t i = 0; i < write.words.size(); ++i) {
     if (!registers.isWritable(write.memory, write.address + i)) return refuse(Exception::kAddress);
   }
@@ -56,7 +60,8 @@ Reply taken(const Registers& registers, const TakeWrite& take, const Write& writ
   return {Bytes(echo.begin(), echo.end()), 0};
 }
 
-Reply writeOne(const Registers& registers, const TakeWrite& take, Memory memory, std::span<const std::byte> data) {
+Reply writeOne(const Registers& registers, const TakeWrite& take, Memory memory,
+               std::span<const std::byte> data) {
   if (data.size() != 4) return refuse(Exception::kValue);
   std::uint16_t value = wordAt(data, 2);
   if (memory == Memory::Coil) {
@@ -66,7 +71,8 @@ Reply writeOne(const Registers& registers, const TakeWrite& take, Memory memory,
   return taken(registers, take, {memory, wordAt(data, 0), {value}}, data);
 }
 
-Reply writeMany(const Registers& registers, const TakeWrite& take, Memory memory, std::span<const std::byte> data) {
+Reply writeMany(const Registers& registers, const TakeWrite& take, Memory memory,
+                std::span<const std::byte> data) {
   const bool is_bits = memory == Memory::Coil;
   if (data.size() < 5) return refuse(Exception::kValue);
   const std::size_t count = wordAt(data, 2), bytes = byteAt(data, 4);
@@ -82,7 +88,8 @@ Reply writeMany(const Registers& registers, const TakeWrite& take, Memory memory
   return taken(registers, take, write, data.first(4));
 }
 
-Reply reply(const Registers& registers, const TakeWrite& take, std::uint8_t function, std::span<const std::byte> data) {
+Reply reply(const Registers& registers, const TakeWrite& take, std::uint8_t function,
+            std::span<const std::byte> data) {
   switch (function) {
     case 1:
       return read(registers, Memory::Coil, data);

@@ -28,7 +28,8 @@ struct Write {
 /// Takes a write to addresses that are all writable, or gives the exception to answer with; 0: taken.
 using TakeWrite = std::function<std::uint8_t(const Write&)>;
 
-/// The size of the message that begins with these bytes: nothing if there are too few to tell, 0 if it is none.
+/// The size of the message that begins with these bytes: nothing if there are too few to tell, 0 if it is
+/// none.
 std::optional<std::size_t> messageSize(std::span<const std::byte> bytes);
 /// The answer to a whole message of that size. Any bytes are safe.
 Bytes answer(std::span<const std::byte> message, const Registers& registers, const TakeWrite& take);

@@ -45,14 +45,13 @@ class Server::Connection : public std::enable_shared_from_this<Connection> {
 
  private:
   void read() {
-    socket_.async_read_some(boost::asio::buffer(piece_),
-                            [self = shared_from_this()](error_code error, std::size_t size) {
-                              if (error || !*self->alive_) return self->close();
-                              const auto begin = self->piece_.begin();
-                              self->received_.insert(self->received_.end(), begin,
-                                                     begin + static_cast<std::ptrdiff_t>(size));
-                              self->goOn();
-                            });
+    socket_.async_read_some(
+        boost::asio::buffer(piece_), [self = shared_from_this()](error_code error, std::size_t size) {
+          if (error || !*self->alive_) return self->close();
+          const auto begin = self->piece_.begin();
+          self->received_.insert(self->received_.end(), begin, begin + static_cast<std::ptrdiff_t>(size));
+          self->goOn();
+        });
   }
 
   Server& server_;

@@ -14,8 +14,8 @@
 
 namespace toftwin::daemon::modbus {
 
-/// Modbus TCP's connections. Each has one request at a time, so that one that stalls or does not read holds up and
-/// costs nobody else. Used on the facade's thread only.
+/// Modbus TCP's connections. Each has one request at a time, so that one that stalls or does not read holds
+/// up and costs nobody else. Used on the facade's thread only.
 class Server {
  public:
   struct Hooks {

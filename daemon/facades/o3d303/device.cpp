@@ -36,8 +36,13 @@ bool isSessionId(std::string_view id) {
 std::string typeOf(const SourceFacts& facts) {
   const int range = std::clamp(facts.frequencies, 1, 3);
   const auto exposures = std::clamp<std::size_t>(facts.exposures_us.size(), 1, 3);
-  return fmt::format("{}_{}", range == 1 ? "under5m" : range == 2 ? "upto30m" : "morethan30m",
-                     exposures == 1 ? "low" : exposures == 2 ? "moderate" : "high");
+  return fmt::format("{}_{}",
+                     range == 1   ? "under5m"
+                     : range == 2 ? "upto30m"
+                                  : "morethan30m",
+                     exposures == 1   ? "low"
+                     : exposures == 2 ? "moderate"
+                                      : "high");
 }
 
 }  // namespace
@@ -60,7 +65,8 @@ void Device::createApplication(int index) {
 Device::Outcome Device::answer(std::string_view path, const XmlRpcCall& call, SteadyTime now) {
   while (path.ends_with('/')) path.remove_suffix(1);
   if (path == kMain) return onMain(call, now);
-  if (!path.starts_with(kMain) || path[kMain.size()] != '/') return {fault(Fault::kNoSuchObject, "no such object")};
+  if (!path.starts_with(kMain) || path[kMain.size()] != '/')
+    return {fault(Fault::kNoSuchObject, "no such object")};
   path.remove_prefix(kMain.size() + 1);
   const std::string mine = "session_" + (session_ ? session_->id : std::string{});
   if (!session_ || !path.starts_with(mine)) return {fault(Fault::kNoSuchObject, "no such session")};
@@ -109,7 +115,8 @@ Device::Outcome Device::onMain(const XmlRpcCall& call, SteadyTime now) {
 
 Device::Outcome Device::requestSession(const XmlRpcCall& call, SteadyTime now) {
   if (session_) return {fault(Fault::kSessionExists, "another client has a session; wait until it ends")};
-  if (!password_.empty() && paramText(call, 0) != password_) return {fault(Fault::kWrongPassword, "wrong password")};
+  if (!password_.empty() && paramText(call, 0) != password_)
+    return {fault(Fault::kWrongPassword, "wrong password")};
   std::string id = paramText(call, 1);
   if (id.empty()) id = anySessionId();
   if (!isSessionId(id)) return {fault(Fault::kWrongFormat, "a session id is 32 hexadecimal digits")};
@@ -143,7 +150,8 @@ Device::Outcome Device::inSession(std::string_view object, const XmlRpcCall& cal
   if (!edited_) return {fault(Fault::kNoApplicationInEdit, "no application is being edited")};
   if (object == "edit/application") return onApplication(call);
   if (object == "edit/application/imager_001") return onImager(call);
-  if (object == "edit/application/imager_001/spatialfilter" || object == "edit/application/imager_001/temporalfilter") {
+  if (object == "edit/application/imager_001/spatialfilter" ||
+      object == "edit/application/imager_001/temporalfilter") {
     return {look({}, call)};  // both are off, and what is off has no parameters
   }
   return {fault(Fault::kNoSuchObject, "no such object")};
@@ -184,7 +192,8 @@ SourceChanges Device::expire(SteadyTime now) {
 }
 
 Device::Outcome Device::setTemporarily(const XmlRpcCall& call) {
-  const auto* wanted = call.params.empty() ? nullptr : std::get_if<XmlRpcValue::Struct>(&call.params[0].value);
+  const auto* wanted =
+      call.params.empty() ? nullptr : std::get_if<XmlRpcValue::Struct>(&call.params[0].value);
   if (wanted == nullptr) return {fault(Fault::kWrongType, "a struct of parameters is wanted")};
   Application changed = applications_.at(activeApplication());
   Parameters before;
@@ -219,8 +228,8 @@ void Device::show(Application& one) const {
   for (const Binding& binding : imagerBindings()) {
     const Parameter* parameter = parameterOf(binding.source_name);
     if (parameter == nullptr || !parameter->value) continue;
-    imager[std::string{binding.name}] =
-        binding.is_integral ? fmt::format("{:.0f}", *parameter->value) : fmt::format("{:g}", *parameter->value);
+    imager[std::string{binding.name}] = binding.is_integral ? fmt::format("{:.0f}", *parameter->value)
+                                                            : fmt::format("{:g}", *parameter->value);
   }
   one.application["TriggerMode"] = facts_.can_trigger ? "2" : "1";
   imager["Type"] = typeOf(facts_);
@@ -240,7 +249,8 @@ SourceChanges Device::changesTo(const Application& wanted) const {
   for (const Binding& binding : imagerBindings()) {
     const std::string name{binding.name};
     const auto value = realIn(wanted.imager.at(name));
-    if (parameterOf(binding.source_name) == nullptr || !value || wanted.imager.at(name) == now.imager.at(name)) {
+    if (parameterOf(binding.source_name) == nullptr || !value ||
+        wanted.imager.at(name) == now.imager.at(name)) {
       continue;
     }
     changes.emplace_back(binding.source_name, *value);
@@ -263,7 +273,8 @@ std::vector<int> Device::applications() const {
 std::array<float, 3> Device::translation_mm() const {
   std::array<float, 3> t{};
   const char* names[] = {"ExtrinsicCalibTransX", "ExtrinsicCalibTransY", "ExtrinsicCalibTransZ"};
-  for (std::size_t i = 0; i < t.size(); ++i) t[i] = static_cast<float>(realIn(device_.at(names[i])).value_or(0.0));
+  for (std::size_t i = 0; i < t.size(); ++i)
+    t[i] = static_cast<float>(realIn(device_.at(names[i])).value_or(0.0));
   return t;
 }
 

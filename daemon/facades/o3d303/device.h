@@ -63,8 +63,8 @@ class Device {
     std::string name, password, mac, address;
     int xmlrpc_port = 80, pcic_port = 50'010;
   };
-  /// What a call comes to. The changes are to be made before the answer is given; if the source refuses them, the
-  /// answer is a fault instead, and the parameters show what the source has.
+  /// What a call comes to. The changes are to be made before the answer is given; if the source refuses them,
+  /// the answer is a fault instead, and the parameters show what the source has.
   struct Outcome {
     toftwin::o3d303::XmlRpcAnswer answer;
     SourceChanges changes{};
@@ -123,8 +123,10 @@ class Device {
   Outcome activate(int index);
   std::optional<Answer> setDeviceParameter(const std::string& name, const std::string& value);
   std::optional<Answer> setApplicationParameter(const std::string& name, const std::string& value);
-  std::optional<Answer> setImagerParameter(Parameters& imager, const std::string& name, const std::string& value);
-  std::optional<Answer> checkBound(std::string_view source_name, const std::string& value, bool is_integral) const;
+  std::optional<Answer> setImagerParameter(Parameters& imager, const std::string& name,
+                                           const std::string& value);
+  std::optional<Answer> checkBound(std::string_view source_name, const std::string& value,
+                                   bool is_integral) const;
   [[nodiscard]] const Parameter* parameterOf(std::string_view source_name) const;
   [[nodiscard]] SourceChanges changesTo(const Application& wanted) const;
   void show(Application& application) const;

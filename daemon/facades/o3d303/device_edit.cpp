@@ -23,7 +23,8 @@ constexpr std::size_t kLongestText = 500;
 bool isFreeText(const std::string& name) { return name == "Name" || name == "Description"; }
 
 XmlRpcAnswer readOnly(const std::string& name) {
-  return fault(Fault::kReadOnly, name + " cannot be changed: the source behind this camera has nothing like it");
+  return fault(Fault::kReadOnly,
+               name + " cannot be changed: the source behind this camera has nothing like it");
 }
 
 XmlRpcAnswer noSuchParameter(const std::string& name) {
@@ -43,7 +44,8 @@ Device::Outcome Device::onEdit(const XmlRpcCall& call) {
     applications_.clear();
     edited_.reset();
     const Parameters now = std::exchange(device_, defaultDevice());
-    for (const char* kept : {"PcicTcpPort", "OperatingMode", "TemperatureIllu", "UpTime", "ImageTimestampReference"}) {
+    for (const char* kept :
+         {"PcicTcpPort", "OperatingMode", "TemperatureIllu", "UpTime", "ImageTimestampReference"}) {
       device_[kept] = now.at(kept);
     }
     device_["Name"] = identity_.name;
@@ -54,8 +56,10 @@ Device::Outcome Device::onEdit(const XmlRpcCall& call) {
     return {nothing()};
   }
   if (call.method == "createApplication") {
-    if (paramText(call, 0) != "Camera") return {fault(Fault::kWrongApplicationType, "the only type is Camera")};
-    if (applications_.size() >= kMostApplications) return {fault(Fault::kTooManyApplications, "there are too many")};
+    if (paramText(call, 0) != "Camera")
+      return {fault(Fault::kWrongApplicationType, "the only type is Camera")};
+    if (applications_.size() >= kMostApplications)
+      return {fault(Fault::kTooManyApplications, "there are too many")};
     const int made = freeIndex();
     createApplication(made);
     return {XmlRpcValue{made}};
@@ -68,7 +72,8 @@ Device::Outcome Device::onEdit(const XmlRpcCall& call) {
   }
   if (call.method == "copyApplication") {
     if (!is_known) return {fault(Fault::kNoSuchApplication, "there is no such application")};
-    if (applications_.size() >= kMostApplications) return {fault(Fault::kTooManyApplications, "there are too many")};
+    if (applications_.size() >= kMostApplications)
+      return {fault(Fault::kTooManyApplications, "there are too many")};
     const int made = freeIndex();
     applications_[made] = applications_.at(*index);
     return {XmlRpcValue{made}};
@@ -120,11 +125,13 @@ std::optional<XmlRpcAnswer> Device::setDeviceParameter(const std::string& name, 
   if (name == "ActiveApplication") {
     const auto index = numberIn(value);
     if (!index) return fault(Fault::kWrongType, "ActiveApplication is a number");
-    if (!applications_.contains(*index)) return fault(Fault::kNoSuchApplication, "there is no such application");
+    if (!applications_.contains(*index))
+      return fault(Fault::kNoSuchApplication, "there is no such application");
   } else if (name == "SessionTimeout") {
     const auto seconds = numberIn(value);
     if (!seconds) return fault(Fault::kWrongType, "SessionTimeout is a number of seconds");
-    if (*seconds < 5 || *seconds > 300) return fault(Fault::kOutOfRange, "SessionTimeout is 5 to 300 seconds");
+    if (*seconds < 5 || *seconds > 300)
+      return fault(Fault::kOutOfRange, "SessionTimeout is 5 to 300 seconds");
   } else if (name.starts_with("ExtrinsicCalibTrans")) {
     const auto mm = realIn(value);
     if (!mm) return fault(Fault::kWrongType, name + " is a number of millimetres");
@@ -148,7 +155,8 @@ Device::Outcome Device::saveDevice() {
   const int wanted = numberIn(edited_device_.at("ActiveApplication")).value_or(before);
   device_ = std::move(saved);
   if (wanted == before) return {nothing()};
-  if (!applications_.contains(wanted)) return {fault(Fault::kNoSuchApplication, "there is no such application")};
+  if (!applications_.contains(wanted))
+    return {fault(Fault::kNoSuchApplication, "there is no such application")};
   return activate(wanted);
 }
 
@@ -194,18 +202,21 @@ Device::Outcome Device::onApplication(const XmlRpcCall& call) {
   return {refused ? *std::move(refused) : nothing()};
 }
 
-std::optional<XmlRpcAnswer> Device::setApplicationParameter(const std::string& name, const std::string& value) {
+std::optional<XmlRpcAnswer> Device::setApplicationParameter(const std::string& name,
+                                                            const std::string& value) {
   Parameters& all = edited_->second.application;
   const auto found = all.find(name);
   if (found == all.end()) return noSuchParameter(name);
   if (found->second == value) return std::nullopt;
   if (name == "TriggerMode") {
     if (!numberIn(value)) return fault(Fault::kWrongType, "TriggerMode is a number");
-    if (value != "1" && value != "2") return fault(Fault::kOutOfRange, "there is no wire to trigger by: 1 or 2");
+    if (value != "1" && value != "2")
+      return fault(Fault::kOutOfRange, "there is no wire to trigger by: 1 or 2");
     if (parameterOf(kTriggered) == nullptr) return readOnly(name);
   } else if (name == "PcicTcpResultSchema") {
     const auto schema = toftwin::o3d303::readSchema(value);
-    if (!schema || !isServed(*schema)) return fault(Fault::kWrongFormat, "frames cannot be made after that schema");
+    if (!schema || !isServed(*schema))
+      return fault(Fault::kWrongFormat, "frames cannot be made after that schema");
   } else if (!isFreeText(name)) {
     return readOnly(name);
   } else if (value.size() > kLongestText) {
@@ -218,7 +229,9 @@ std::optional<XmlRpcAnswer> Device::setApplicationParameter(const std::string& n
 Device::Outcome Device::saveApplication() {
   const auto& [index, wanted] = *edited_;
   const bool is_active = index == activeApplication();
-  Outcome outcome{.answer = nothing(), .changes = is_active ? changesTo(wanted) : SourceChanges{}, .has_saved = is_active};
+  Outcome outcome{.answer = nothing(),
+                  .changes = is_active ? changesTo(wanted) : SourceChanges{},
+                  .has_saved = is_active};
   applications_[index] = wanted;
   refreshSchema();
   return outcome;
@@ -231,7 +244,8 @@ Device::Outcome Device::onImager(const XmlRpcCall& call) {
   }
   const bool is_type = call.method == "changeType";
   if (!is_type && call.method != "setParameter") return {look(all, call)};
-  auto refused = setImagerParameter(all, is_type ? "Type" : paramText(call, 0), paramText(call, is_type ? 0 : 1));
+  auto refused =
+      setImagerParameter(all, is_type ? "Type" : paramText(call, 0), paramText(call, is_type ? 0 : 1));
   return {refused ? *std::move(refused) : nothing()};
 }
 
@@ -256,7 +270,8 @@ std::optional<XmlRpcAnswer> Device::checkBound(std::string_view source_name, con
   if (parameter == nullptr) return readOnly(std::string{source_name});
   const auto number = realIn(value);
   if (!number || (is_integral && *number != std::floor(*number))) {
-    return fault(Fault::kWrongType, fmt::format("\"{}\" is not {} number", value, is_integral ? "a whole" : "a"));
+    return fault(Fault::kWrongType,
+                 fmt::format("\"{}\" is not {} number", value, is_integral ? "a whole" : "a"));
   }
   if (parameter->bounds.contains(*number)) return std::nullopt;
   return fault(Fault::kOutOfRange, fmt::format("{} is out of range: {} to {} is possible", value,

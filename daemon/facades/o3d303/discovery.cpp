@@ -17,7 +17,8 @@ constexpr std::uint16_t kVendor = 310;  // ifm's number at IO-Link; clients do n
 constexpr std::uint16_t kDevice = 2;    // of DeviceType "1:2"
 
 void appendBig(std::vector<std::byte>& bytes, std::uint64_t number, int count) {
-  for (int shift = 8 * (count - 1); shift >= 0; shift -= 8) bytes.push_back(static_cast<std::byte>(number >> shift));
+  for (int shift = 8 * (count - 1); shift >= 0; shift -= 8)
+    bytes.push_back(static_cast<std::byte>(number >> shift));
 }
 
 /// Padded with zeros, of which there is at least one.
@@ -63,7 +64,8 @@ Result<std::unique_ptr<Discovery>> Discovery::listen(boost::asio::io_context& io
   announcement.netmask = own.is_loopback() ? std::array<std::uint8_t, 4>{255, 0, 0, 0}
                                            : std::array<std::uint8_t, 4>{255, 255, 255, 0};
   std::unique_ptr<Discovery> discovery{new Discovery{encode(announcement)}};
-  // A socket that is bound to an address hears no broadcasts; one that is bound to the broadcast address does.
+  // A socket that is bound to an address hears no broadcasts; one that is bound to the broadcast address
+  // does.
   std::vector<ip::address_v4> addresses{ip::address_v4::any()};
   if (own.is_loopback()) addresses = {own, ip::make_address_v4("127.255.255.255")};
   for (const auto& one : addresses) {
@@ -72,9 +74,10 @@ Result<std::unique_ptr<Discovery>> Discovery::listen(boost::asio::io_context& io
     if (!error) ear->socket.set_option(udp::socket::reuse_address{true}, error);
     if (!error) ear->socket.bind({one, port}, error);
     if (error) {
-      return Error{Error::Code::Busy, fmt::format("UDP port {} of {}: {}; choose another with discovery_port, or set "
-                                                  "discoverable = false",
-                                                  port, one.to_string(), error.message())};
+      return Error{Error::Code::Busy,
+                   fmt::format("UDP port {} of {}: {}; choose another with discovery_port, or set "
+                               "discoverable = false",
+                               port, one.to_string(), error.message())};
     }
     discovery->ears_.push_back(ear);
   }
@@ -82,20 +85,21 @@ Result<std::unique_ptr<Discovery>> Discovery::listen(boost::asio::io_context& io
   return discovery;
 }
 
-/// The answer goes to the address that asked, at the port that it names: 45 times the bytes of the question, which is
-/// one reason more to listen beyond loopback only where all are trusted.
+/// The answer goes to the address that asked, at the port that it names: 45 times the bytes of the question,
+/// which is one reason more to listen beyond loopback only where all are trusted.
 void Discovery::receive(const std::shared_ptr<Ear>& ear) {
-  ear->socket.async_receive_from(
-      boost::asio::buffer(ear->datagram), ear->from,
-      [this, ear, alive = is_alive_](error_code error, std::size_t size) {
-        if (!*alive || error == boost::asio::error::operation_aborted) return;
-        const auto port = error ? std::nullopt : readSearch(std::span{ear->datagram}.first(size));
-        if (port && is_open_) {
-          error_code ignored;
-          ears_.front()->socket.send_to(boost::asio::buffer(reply_), {ear->from.address(), *port}, 0, ignored);
-        }
-        receive(ear);
-      });
+  ear->socket.async_receive_from(boost::asio::buffer(ear->datagram), ear->from,
+                                 [this, ear, alive = is_alive_](error_code error, std::size_t size) {
+                                   if (!*alive || error == boost::asio::error::operation_aborted) return;
+                                   const auto port = error ? std::nullopt
+                                                           : readSearch(std::span{ear->datagram}.first(size));
+                                   if (port && is_open_) {
+                                     error_code ignored;
+                                     ears_.front()->socket.send_to(boost::asio::buffer(reply_),
+                                                                   {ear->from.address(), *port}, 0, ignored);
+                                   }
+                                   receive(ear);
+                                 });
 }
 
 }  // namespace toftwin::daemon::o3d303

@@ -27,7 +27,10 @@ constexpr std::chrono::seconds kPatience{30};
 class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
  public:
   Connection(HttpServer& server, tcp::socket socket)
-      : server_(server), alive_(server.is_alive_), socket_(std::move(socket)), timer_(socket_.get_executor()) {}
+      : server_(server),
+        alive_(server.is_alive_),
+        socket_(std::move(socket)),
+        timer_(socket_.get_executor()) {}
 
   void read() {
     parser_.emplace();
@@ -51,8 +54,9 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
     const auto& request = parser_->get();
     if (request.method() != http::verb::post) return answer(http::status::method_not_allowed, "only POST\n");
     const auto target = request.target();
-    server_.ask_(std::string{target.data(), target.size()}, request.body(),
-                 [self = shared_from_this()](std::string xml) { self->answer(http::status::ok, std::move(xml)); });
+    server_.ask_(
+        std::string{target.data(), target.size()}, request.body(),
+        [self = shared_from_this()](std::string xml) { self->answer(http::status::ok, std::move(xml)); });
   }
   void answer(http::status status, std::string body) {
     if (!socket_.is_open()) return;

@@ -14,8 +14,8 @@
 
 namespace toftwin::daemon::o3d303 {
 
-/// XML over HTTP: the camera's configuration port. A client that stalls is closed after half a minute and holds up
-/// nobody. Used on the facade's thread only.
+/// XML over HTTP: the camera's configuration port. A client that stalls is closed after half a minute and
+/// holds up nobody. Used on the facade's thread only.
 class HttpServer {
  public:
   using Answer = std::function<void(std::string xml)>;

@@ -35,7 +35,8 @@ Result<std::vector<std::uint16_t>> distancesOf(const Frame& frame, const LensChu
   const Plane* range = planeOf(frame, PlaneKind::Range, ElementType::F32);
   const Plane* depth = planeOf(frame, PlaneKind::Depth, ElementType::F32);
   if (range == nullptr && depth == nullptr) {
-    return Error{Error::Code::Unsupported, "the source has neither range nor depth, which an O3D303 is made of"};
+    return Error{Error::Code::Unsupported,
+                 "the source has neither range nor depth, which an O3D303 is made of"};
   }
   const auto metres = (range != nullptr ? range : depth)->as<float>();
   std::vector<std::uint16_t> distance_mm(metres.size());
@@ -47,9 +48,7 @@ Result<std::vector<std::uint16_t>> distancesOf(const Frame& frame, const LensChu
 }
 
 /// 11: the longest exposure, 10: the shorter one, 01: the shortest of three (the vendor's description).
-unsigned exposureBits(unsigned index) {
-  return (3U - std::min(index, 2U)) << 4;
-}
+unsigned exposureBits(unsigned index) { return (3U - std::min(index, 2U)) << 4; }
 
 }  // namespace
 
@@ -57,7 +56,8 @@ FrameFacts factsOf(const Frame& frame) {
   std::set<std::uint32_t> durations_us;
   std::set<double> modulations;
   for (const Exposure& one : frame.moment.exposures) {
-    durations_us.insert(static_cast<std::uint32_t>(std::lround(std::clamp(one.duration.in(microsecond), 0.0, 1e9))));
+    durations_us.insert(
+        static_cast<std::uint32_t>(std::lround(std::clamp(one.duration.in(microsecond), 0.0, 1e9))));
     if (one.modulation > 0_Hz) modulations.insert(one.modulation.in(hertz));
   }
   FrameFacts facts;
@@ -72,7 +72,8 @@ FrameFacts factsOf(const Frame& frame) {
 
 LensChunks lensChunksOf(const CameraInfo& camera) {
   LensChunks lens{camera, {}, {}, {}};
-  lens.unit_vectors.reserve(3 * static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height));
+  lens.unit_vectors.reserve(3 * static_cast<std::size_t>(camera.width) *
+                            static_cast<std::size_t>(camera.height));
   for (int v = 0; v < camera.height; ++v) {
     for (int u = 0; u < camera.width; ++u) {
       const Vec3d ray = rayThroughPixel(camera, u, v).v;
@@ -83,7 +84,8 @@ LensChunks lensChunksOf(const CameraInfo& camera) {
   const auto chunkOf = [&](const std::array<double, 5>& d) {
     std::array<float, 16> chunk{};
     std::size_t i = 0;
-    for (const double number : {camera.fx, camera.fy, camera.cx, camera.cy, 0.0, d[0], d[1], d[4], d[2], d[3]}) {
+    for (const double number :
+         {camera.fx, camera.fy, camera.cx, camera.cy, 0.0, d[0], d[1], d[4], d[2], d[3]}) {
       chunk[i++] = static_cast<float>(number);
     }
     return chunk;
@@ -103,7 +105,7 @@ void describe(const Frame& frame, toftwin::o3d303::CameraFrame& wire) {
   const std::int64_t ns = std::max<std::int64_t>(
       0, frame.moment.exposures.empty() ? frame.moment.received.ns : frame.moment.exposures.front().start.ns);
   wire.time = {static_cast<std::uint32_t>(ns / 1'000'000'000),
-                      static_cast<std::uint32_t>(ns % 1'000'000'000)};
+               static_cast<std::uint32_t>(ns % 1'000'000'000)};
   wire.time_us = static_cast<std::uint32_t>(ns / 1000);
   const FrameFacts facts = factsOf(frame);
   for (std::size_t i = 0; i < facts.exposures_us.size(); ++i) wire.exposures_us[i] = facts.exposures_us[i];

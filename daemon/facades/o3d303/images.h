@@ -39,7 +39,8 @@ LensChunks lensChunksOf(const CameraInfo& camera);
 ///   distance = round(1000 range / m), 0 where there is none or beyond 65535
 ///   amplitude = round(amplitude / electrons_per_count), at most 65535
 ///   confidence: the flags in the camera's bits, and which exposure a pixel is of
-/// `lens` must be of the frame's camera and outlive the result. Unsupported: the frame has neither range nor depth.
+/// `lens` must be of the frame's camera and outlive the result. Unsupported: the frame has neither range nor
+/// depth.
 Result<CameraImages> imagesOf(const Frame& frame, const LensChunks& lens, double electrons_per_count);
 
 }  // namespace toftwin::daemon::o3d303

@@ -56,8 +56,10 @@ std::array<double, 5> inverseDistortion(const CameraInfo& camera) {
       const double x = (u - camera.cx) / camera.fx, y = (v - camera.cy) / camera.fy;
       const Vec3d ray = rayThroughPixel(camera, u, v).v;
       const double r2 = x * x + y * y;
-      add(equations, {x * r2, x * r2 * r2, 2.0 * x * y, r2 + 2.0 * x * x, x * r2 * r2 * r2}, ray.x / ray.z - x);
-      add(equations, {y * r2, y * r2 * r2, r2 + 2.0 * y * y, 2.0 * x * y, y * r2 * r2 * r2}, ray.y / ray.z - y);
+      add(equations, {x * r2, x * r2 * r2, 2.0 * x * y, r2 + 2.0 * x * x, x * r2 * r2 * r2},
+          ray.x / ray.z - x);
+      add(equations, {y * r2, y * r2 * r2, r2 + 2.0 * y * y, 2.0 * x * y, y * r2 * r2 * r2},
+          ray.y / ray.z - y);
     }
   }
   return solve(equations);

@@ -7,8 +7,8 @@
 
 #include "daemon/facades/facade.h"
 
-/// An ifm O3D303 as its clients know it, in front of any source: XML-RPC to configure it, PCIC for frames, UDP to
-/// be found.
+/// An ifm O3D303 as its clients know it, in front of any source: XML-RPC to configure it, PCIC for frames,
+/// UDP to be found.
 namespace toftwin::daemon::o3d303 {
 
 /// The keys of a [[facade]] table with kind = "o3d303".
@@ -26,21 +26,25 @@ struct Keys {
 
   template <class Visitor>
   void visit(Visitor& v) {
-    v.number("xmlrpc_port", xmlrpc_port, {0, 65'535},
-             "TCP port of the configuration, the camera's own by default; 0: any free one, which the log tells");
+    v.number(
+        "xmlrpc_port", xmlrpc_port, {0, 65'535},
+        "TCP port of the configuration, the camera's own by default; 0: any free one, which the log tells");
     v.number("pcic_port", pcic_port, {0, 65'535},
              "TCP port of the frames; clients ask for it (PcicTcpPort). 0: any free one");
     v.flag("discoverable", discoverable, "whether it answers the vendor's search for cameras");
     v.number("discovery_port", discovery_port, {1, 65'535}, "UDP port of that search");
     v.text("name", name, "of the camera, until a client sets another");
     v.text("password", password, "of the configuration; empty: none");
-    v.number("electrons_per_count", electrons_per_count, {1e-6, 1e9},
-             "what one count of the camera's amplitude stands for in the source's unit; 6: the camera's usual "
-             "MinimumAmplitude of 42 is the simulated O3D303's 250 electrons");
+    v.number(
+        "electrons_per_count", electrons_per_count, {1e-6, 1e9},
+        "what one count of the camera's amplitude stands for in the source's unit; 6: the camera's usual "
+        "MinimumAmplitude of 42 is the simulated O3D303's 250 electrons");
     v.text("intervals", intervals,
-           "a file with the intervals between a real camera's frames, one number in milliseconds per line, relative "
+           "a file with the intervals between a real camera's frames, one number in milliseconds per line, "
+           "relative "
            "to this file: frames leave as unevenly as those; empty: as they come");
-    v.quantity("boot_time", boot_time, second, {0.0, 600.0}, "how long nobody answers after a client's reboot");
+    v.quantity("boot_time", boot_time, second, {0.0, 600.0},
+               "how long nobody answers after a client's reboot");
     v.quantity("most_illumination", most_illumination, celsius, {-40.0, 200.0},
                "clients are told the error 110004000 when the illumination gets hotter than that");
   }

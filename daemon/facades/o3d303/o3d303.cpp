@@ -45,14 +45,15 @@ std::array<std::uint8_t, 6> macOf(std::string_view source) {
 }
 
 std::string textOf(const std::array<std::uint8_t, 6>& mac) {
-  return fmt::format("{:02X}:{:02X}:{:02X}:{:02X}:{:02X}:{:02X}", mac[0], mac[1], mac[2], mac[3], mac[4], mac[5]);
+  return fmt::format("{:02X}:{:02X}:{:02X}:{:02X}:{:02X}:{:02X}", mac[0], mac[1], mac[2], mac[3], mac[4],
+                     mac[5]);
 }
 
 XmlRpcFault faultOf(const Error& error) {
   using Code = Error::Code;
-  const int code = error.code == Code::InvalidArgument                                   ? Fault::kOutOfRange
+  const int code = error.code == Code::InvalidArgument                               ? Fault::kOutOfRange
                    : error.code == Code::NotFound || error.code == Code::Unsupported ? Fault::kReadOnly
-                                                                                       : Fault::kInternal;
+                                                                                     : Fault::kInternal;
   return {code, error.message};
 }
 
@@ -75,9 +76,11 @@ class O3d303Facade final : public Facade {
   ~O3d303Facade() override { thread_.stop(); }
 
   Result<> open() {
-    auto xmlrpc = listenFor(thread_.io(), place_.keys, static_cast<std::uint16_t>(keys_.xmlrpc_port), "xmlrpc_port");
+    auto xmlrpc =
+        listenFor(thread_.io(), place_.keys, static_cast<std::uint16_t>(keys_.xmlrpc_port), "xmlrpc_port");
     if (!xmlrpc) return xmlrpc.error();
-    auto pcic = listenFor(thread_.io(), place_.keys, static_cast<std::uint16_t>(keys_.pcic_port), "pcic_port");
+    auto pcic =
+        listenFor(thread_.io(), place_.keys, static_cast<std::uint16_t>(keys_.pcic_port), "pcic_port");
     if (!pcic) return pcic.error();
     const int xmlrpc_port = xmlrpc->local_endpoint().port(), pcic_port = pcic->local_endpoint().port();
     const auto mac = macOf(place_.keys.source);
@@ -102,13 +105,16 @@ class O3d303Facade final : public Facade {
                                           .mac = mac,
                                           .host_name = place_.keys.source,
                                           .device_name = keys_.name});
-      // Who knows the address needs no search, and another camera of this machine may be the one that is found.
-      if (!discovery) logging::warn("facade o3d303 of {}: it cannot be searched for: {}", place_.keys.source,
-                                   discovery.error().message);
+      // Who knows the address needs no search, and another camera of this machine may be the one that is
+      // found.
+      if (!discovery)
+        logging::warn("facade o3d303 of {}: it cannot be searched for: {}", place_.keys.source,
+                      discovery.error().message);
       if (discovery) discovery_ = *std::move(discovery);
     }
-    where_ = fmt::format("XML-RPC on {} port {}, PCIC on port {}{}", place_.keys.address, xmlrpc_port, pcic_port,
-                         discovery_ ? fmt::format(", found by searches on UDP port {}", keys_.discovery_port) : "");
+    where_ = fmt::format(
+        "XML-RPC on {} port {}, PCIC on port {}{}", place_.keys.address, xmlrpc_port, pcic_port,
+        discovery_ ? fmt::format(", found by searches on UDP port {}", keys_.discovery_port) : "");
     link_.want(true);  // one frame, which says what kind of camera it is
     tick();
     thread_.start();
@@ -125,8 +131,9 @@ class O3d303Facade final : public Facade {
     has_seen_frame_ = true;
     device_s_ = frame.moment.exposures.empty() ? 0 : frame.moment.exposures.front().start.ns / 1'000'000'000;
     if (frame.moment.since_power_on) {
-      powered_on_ = steady_clock::now() - std::chrono::duration_cast<steady_clock::duration>(std::chrono::duration<double>{
-                                              frame.moment.since_power_on->in(second)});
+      powered_on_ =
+          steady_clock::now() - std::chrono::duration_cast<steady_clock::duration>(
+                                    std::chrono::duration<double>{frame.moment.since_power_on->in(second)});
     }
     watchTemperature();
     noteConnections(connections_);
@@ -144,7 +151,8 @@ class O3d303Facade final : public Facade {
   }
 
   void complainOnce(const Error& error) {
-    if (error.message != last_complaint_) logging::warn("facade o3d303 of {}: {}", place_.keys.source, error.message);
+    if (error.message != last_complaint_)
+      logging::warn("facade o3d303 of {}: {}", place_.keys.source, error.message);
     last_complaint_ = error.message;
   }
 
@@ -292,7 +300,8 @@ class O3d303Facade final : public Facade {
   std::string tellOfDevice(std::string_view command) {
     if (command == "V?") return "03 01 04";  // the version in use, the oldest and the newest
     if (command == "G?") {
-      return fmt::format("ifm electronic\tO3D303\t{}\t\t{}", device_->parameters().at("Name"), place_.keys.address);
+      return fmt::format("ifm electronic\tO3D303\t{}\t\t{}", device_->parameters().at("Name"),
+                         place_.keys.address);
     }
     if (command == "A?") {
       const auto all = device_->applications();

@@ -17,7 +17,6 @@
 
 namespace toftwin::daemon::o3d303 {
 
-
 /// Asynchronous errors that the camera tells its clients, by the vendor's numbers.
 struct PcicError {
   static constexpr int kTooManyConnections = 100'000'001;
@@ -26,8 +25,8 @@ struct PcicError {
   static constexpr int kIlluminationTooHot = 110'004'000;
 };
 
-/// The camera's port for frames and commands. Every connection has a schema of its own; one that is slow loses
-/// frames, one that stalls holds up nobody. Used on the facade's thread only.
+/// The camera's port for frames and commands. Every connection has a schema of its own; one that is slow
+/// loses frames, one that stalls holds up nobody. Used on the facade's thread only.
 class PcicServer {
  public:
   struct Hooks {

@@ -9,8 +9,8 @@
 
 namespace toftwin::daemon::o3d303 {
 
-/// Frame i left at the sum of the intervals before it, evenly spaced ones leave at i times their mean; the earliest
-/// against that is held back by nothing.
+/// Frame i left at the sum of the intervals before it, evenly spaced ones leave at i times their mean; the
+/// earliest against that is held back by nothing.
 Unevenness::Unevenness(const std::vector<Time>& intervals) {
   const Time round = std::accumulate(intervals.begin(), intervals.end(), Time{0});
   const auto count = static_cast<std::int64_t>(intervals.size());
@@ -39,8 +39,9 @@ Result<Unevenness> Unevenness::load(const std::filesystem::path& file) {
     intervals.emplace_back(static_cast<std::int64_t>(ms * 1e6));
   }
   if (intervals.empty() || !in.eof()) {
-    return Error{Error::Code::InvalidArgument,
-                 fmt::format("{} must have one interval in milliseconds per line, and nothing else", file.string())};
+    return Error{
+        Error::Code::InvalidArgument,
+        fmt::format("{} must have one interval in milliseconds per line, and nothing else", file.string())};
   }
   return Unevenness{intervals};
 }

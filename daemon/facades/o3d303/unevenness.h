@@ -10,8 +10,8 @@
 
 namespace toftwin::daemon::o3d303 {
 
-/// By how much each frame of a real camera left later than evenly spaced ones would have, over and over. Frames that
-/// come evenly and are held back by that leave at the real one's intervals.
+/// By how much each frame of a real camera left later than evenly spaced ones would have, over and over.
+/// Frames that come evenly and are held back by that leave at the real one's intervals.
 class Unevenness {
  public:
   using Time = std::chrono::nanoseconds;

@@ -96,8 +96,10 @@ TEST_F(CrossDialect, TheO3d303sFramesAreTheNativeOnesBitForBitWithTheirTimeStamp
 
 TEST_F(CrossDialect, ThePlcsRangesAreTheNativeFloatsWithTheirTimeStamp) {
   const std::uint16_t port = freePort();
-  start(fmt::format("[[source]]\nname = 'cam'\n{}pace = 'trigger'\n[[facade]]\nkind = 'modbus'\nsource = 'cam'\nport = {}\n",
-                    kSmallSim, port));
+  start(
+      fmt::format("[[source]]\nname = 'cam'\n{}pace = 'trigger'\n[[facade]]\nkind = 'modbus'\nsource = "
+                  "'cam'\nport = {}\n",
+                  kSmallSim, port));
   boost::asio::io_context io;
   boost::asio::ip::tcp::socket plc{io};
   plc.connect({boost::asio::ip::address_v4::loopback(), port});

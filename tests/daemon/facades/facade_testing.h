@@ -32,9 +32,10 @@ class RunningFacade : public RunningDaemon {
   /// With an O3D303 at `xmlrpc_` before the source of those keys.
   void startO3d303(const std::string& source_keys, const std::string& facade_keys = {}) {
     xmlrpc_ = freePort();
-    start(fmt::format("[[source]]\nname = 'cam'\n{}\n[[facade]]\nkind = 'o3d303'\nsource = 'cam'\nxmlrpc_port = {}\n"
-                      "pcic_port = 0\ndiscoverable = false\n{}\n",
-                      source_keys, xmlrpc_, facade_keys));
+    start(fmt::format(
+        "[[source]]\nname = 'cam'\n{}\n[[facade]]\nkind = 'o3d303'\nsource = 'cam'\nxmlrpc_port = {}\n"
+        "pcic_port = 0\ndiscoverable = false\n{}\n",
+        source_keys, xmlrpc_, facade_keys));
   }
   /// Our own driver, as it is, at the facade.
   Result<std::unique_ptr<drivers::Source>> openDriver(const std::string& keys = {}) {
@@ -47,9 +48,9 @@ class RunningFacade : public RunningDaemon {
 
 /// A small simulated O3D303 that is fast: its image has a quarter of the pixels per side.
 inline const std::string kSmallSim =
-    "driver = 'sim'\nuri = 'sim:o3d303_binned'\nsamples_per_pixel = 1\nmax_surfaces = 1\nframe_interval_ms = 50\n";
-inline const std::string kPattern =
-    "driver = 'pattern'\nwidth = 64\nheight = 48\nframe_rate_hz = 50\n";
+    "driver = 'sim'\nuri = 'sim:o3d303_binned'\nsamples_per_pixel = 1\nmax_surfaces = 1\nframe_interval_ms = "
+    "50\n";
+inline const std::string kPattern = "driver = 'pattern'\nwidth = 64\nheight = 48\nframe_rate_hz = 50\n";
 
 /// The next frame; a Timeout is asked again.
 inline Result<Frame> nextFrame(drivers::Source& source) {

@@ -41,7 +41,8 @@ class Plc {
     std::uint8_t value = 9;
     const int at = rowOf(item).address;
     EXPECT_EQ(rowOf(item).memory == Memory::Coil ? modbus_read_bits(line_, at, 1, &value)
-                                                 : modbus_read_input_bits(line_, at, 1, &value), 1);
+                                                 : modbus_read_input_bits(line_, at, 1, &value),
+              1);
     return value != 0;
   }
   double number(Item item) {
@@ -49,7 +50,8 @@ class Plc {
     std::uint16_t words[2] = {};
     const int count = modbus::wordsOf(row.kind);
     EXPECT_EQ(row.memory == Memory::Holding ? modbus_read_registers(line_, row.address, count, words)
-                                            : modbus_read_input_registers(line_, row.address, count, words), count);
+                                            : modbus_read_input_registers(line_, row.address, count, words),
+              count);
     switch (row.kind) {
       case modbus::NumberKind::F32:
         return static_cast<double>(modbus_get_float_abcd(words));
@@ -62,8 +64,12 @@ class Plc {
     }
   }
   /// 0, or the exception.
-  int setBit(Item item, bool value) { return outcome(modbus_write_bit(line_, rowOf(item).address, value ? 1 : 0)); }
-  int setWord(Item item, std::uint16_t value) { return outcome(modbus_write_register(line_, rowOf(item).address, value)); }
+  int setBit(Item item, bool value) {
+    return outcome(modbus_write_bit(line_, rowOf(item).address, value ? 1 : 0));
+  }
+  int setWord(Item item, std::uint16_t value) {
+    return outcome(modbus_write_register(line_, rowOf(item).address, value));
+  }
   void setFloat(Item item, float value) {
     const auto bits = std::bit_cast<std::uint32_t>(value);  // libmodbus 3.1.6's own function swaps bytes
     const std::uint16_t words[] = {static_cast<std::uint16_t>(bits >> 16), static_cast<std::uint16_t>(bits)};
@@ -80,8 +86,9 @@ class ModbusFacade : public RunningFacade {
  protected:
   void startModbus(const std::string& source_keys, const std::string& facade_keys = {}) {
     port_ = freePort();
-    start(fmt::format("[[source]]\nname = 'cam'\n{}\n[[facade]]\nkind = 'modbus'\nsource = 'cam'\nport = {}\n{}\n",
-                      source_keys, port_, facade_keys));
+    start(fmt::format(
+        "[[source]]\nname = 'cam'\n{}\n[[facade]]\nkind = 'modbus'\nsource = 'cam'\nport = {}\n{}\n",
+        source_keys, port_, facade_keys));
   }
   std::uint16_t port_ = 0;
 };
@@ -110,7 +117,8 @@ TEST_F(ModbusFacade, TellsOfTheSourceAndItsFrames) {
   EXPECT_TRUE(plc.bit(Item::Streaming));
   EXPECT_FALSE(plc.bit(Item::CanTrigger));
   // A slow machine may lose frames, which is an alarm of its own.
-  for (const Item alarm : {Item::AlarmLost, Item::AlarmTemperature, Item::AlarmCommand, Item::AlarmFewValid}) {
+  for (const Item alarm :
+       {Item::AlarmLost, Item::AlarmTemperature, Item::AlarmCommand, Item::AlarmFewValid}) {
     EXPECT_FALSE(plc.bit(alarm)) << plc.number(Item::Alarms);
   }
   EXPECT_EQ(plc.number(Item::MapVersion), 1.0);
@@ -118,10 +126,12 @@ TEST_F(ModbusFacade, TellsOfTheSourceAndItsFrames) {
   EXPECT_EQ(plc.number(Item::TemperatureHousing), -32'768.0) << "not known";
   // The wall is there in every frame; noise of single frames is below a centimetre here.
   const auto range = frame->find(PlaneKind::Range)->as<float>();
-  const auto centre = static_cast<std::size_t>(frame->camera.height / 2 * frame->camera.width + frame->camera.width / 2);
+  const auto centre =
+      static_cast<std::size_t>(frame->camera.height / 2 * frame->camera.width + frame->camera.width / 2);
   EXPECT_NEAR(plc.number(Item::CentreRange), static_cast<double>(range[centre]), 0.1);
   const auto valid = std::count_if(range.begin(), range.end(), [](float one) { return std::isfinite(one); });
-  EXPECT_NEAR(plc.number(Item::Valid), 1000.0 * static_cast<double>(valid) / static_cast<double>(range.size()), 10.0);
+  EXPECT_NEAR(plc.number(Item::Valid),
+              1000.0 * static_cast<double>(valid) / static_cast<double>(range.size()), 10.0);
   const double before = plc.number(Item::Frames);
   EXPECT_TRUE(eventually([&] { return plc.number(Item::Frames) > before; }));
 }

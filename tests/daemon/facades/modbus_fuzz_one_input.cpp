@@ -30,7 +30,8 @@ void fuzzOneInput(std::span<const std::byte> bytes) {
     const auto size = messageSize(bytes);
     if (!size || *size == 0 || bytes.size() < *size) return;
     const Bytes made = answer(bytes.first(*size), registers, take);
-    const auto answered = messageSize(made);  // an answer is a message, too, and goes into one of the largest size
+    const auto answered =
+        messageSize(made);  // an answer is a message, too, and goes into one of the largest size
     demand(answered && *answered == made.size() && made.size() <= 260);
     demand(made[0] == bytes[0] && made[1] == bytes[1] && made[6] == bytes[6]);
     bytes = bytes.subspan(*size);

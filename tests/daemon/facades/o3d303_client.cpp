@@ -36,12 +36,14 @@ std::string RawHttp::receiveAll() {
   return all;
 }
 
-o3d303::XmlRpcAnswer O3d303Client::ask(const std::string& object, const std::string& method, RpcParams params) {
+o3d303::XmlRpcAnswer O3d303Client::ask(const std::string& object, const std::string& method,
+                                       RpcParams params) {
   const std::string body = encodeXmlRpc(o3d303::XmlRpcCall{method, std::move(params)});
   RawHttp http{xmlrpc_};
-  http.send(fmt::format("POST /api/rpc/v1/com.ifm.efector/{} HTTP/1.1\r\nHost: x\r\nConnection: close\r\n"
-                        "Content-Length: {}\r\n\r\n{}",
-                        object, body.size(), body));
+  http.send(
+      fmt::format("POST /api/rpc/v1/com.ifm.efector/{} HTTP/1.1\r\nHost: x\r\nConnection: close\r\n"
+                  "Content-Length: {}\r\n\r\n{}",
+                  object, body.size(), body));
   const std::string answer = http.receiveAll();
   const auto begin = answer.find("\r\n\r\n");
   if (begin == std::string::npos) return o3d303::XmlRpcFault{-1, "no answer"};
@@ -49,7 +51,8 @@ o3d303::XmlRpcAnswer O3d303Client::ask(const std::string& object, const std::str
   return read ? *std::move(read) : o3d303::XmlRpcAnswer{o3d303::XmlRpcFault{-2, read.error().message}};
 }
 
-o3d303::XmlRpcValue O3d303Client::call(const std::string& object, const std::string& method, RpcParams params) {
+o3d303::XmlRpcValue O3d303Client::call(const std::string& object, const std::string& method,
+                                       RpcParams params) {
   const auto answer = ask(object, method, std::move(params));
   if (const auto* fault = std::get_if<o3d303::XmlRpcFault>(&answer)) {
     ADD_FAILURE() << object << " " << method << ": " << fault->code << " " << fault->text;

@@ -48,7 +48,9 @@ class O3d303Client {
   bool tryCall(const std::string& object, const std::string& method, RpcParams params);
   std::uint16_t pcicPort();
 
-  [[nodiscard]] std::string session(const std::string& object) const { return "session_" + std::string{kSession} + "/" + object; }
+  [[nodiscard]] std::string session(const std::string& object) const {
+    return "session_" + std::string{kSession} + "/" + object;
+  }
   [[nodiscard]] std::string imager() const { return session("edit/application/imager_001/"); }
   void beginSession();
   void edit();

@@ -66,7 +66,8 @@ TEST_F(O3d303Facade, RefusesWithTheDevicesOwnNumbers) {
   EXPECT_EQ(rpc.fault(imager, "setParameter", {"ExposureTime", "30000"}), 101'002);
   EXPECT_EQ(rpc.fault(imager, "setParameter", {"MinimumAmplitude", "17"}), 101'003);
   EXPECT_EQ(rpc.fault(imager, "changeType", {"morethan30m_high"}), 101'027);
-  EXPECT_EQ(rpc.fault(rpc.session("edit/application/"), "setParameter", {"PcicTcpResultSchema", "{}"}), 101'010);
+  EXPECT_EQ(rpc.fault(rpc.session("edit/application/"), "setParameter", {"PcicTcpResultSchema", "{}"}),
+            101'010);
   EXPECT_EQ(rpc.fault(imager, "setParameter", {"MinimumAmplitude", "42"}), 0) << "what it is already";
 }
 
@@ -113,8 +114,8 @@ TEST_F(O3d303Facade, EveryConnectionHasASchemaOfItsOwn) {
   EXPECT_EQ(distance.command("V?"), "03 01 04");
 }
 
-// A real camera's message of these images at 176 x 132 was measured to be 209414 bytes behind its first line, the ticket
-// and the line end among them.
+// A real camera's message of these images at 176 x 132 was measured to be 209414 bytes behind its first line,
+// the ticket and the line end among them.
 TEST_F(O3d303Facade, AFrameIsAsLongAsTheRealCameras) {
   startO3d303(kSmallSim);
   using Type = o3d303::SchemaElement::Type;
@@ -223,10 +224,11 @@ TEST_F(O3d303Facade, AnotherSourceOfThatNameAfterAReloadIsShown) {
   startO3d303(kPattern);
   PcicClient watches{camera().pcicPort()};
   EXPECT_EQ(watches.frame().chunks.at(0).header.width, 64u);
-  configure(fmt::format("[[source]]\nname = 'cam'\ndriver = 'pattern'\nwidth = 32\nheight = 16\n"
-                        "[[facade]]\nkind = 'o3d303'\nsource = 'cam'\nxmlrpc_port = {}\npcic_port = 0\n"
-                        "discoverable = false\n",
-                        xmlrpc_));
+  configure(
+      fmt::format("[[source]]\nname = 'cam'\ndriver = 'pattern'\nwidth = 32\nheight = 16\n"
+                  "[[facade]]\nkind = 'o3d303'\nsource = 'cam'\nxmlrpc_port = {}\npcic_port = 0\n"
+                  "discoverable = false\n",
+                  xmlrpc_));
   daemon_->reload();
   EXPECT_TRUE(eventually([&] { return watches.frame().chunks.at(0).header.width == 32u; }));
   EXPECT_EQ(log_->count("facade o3d303 of cam: XML-RPC"), 1) << "the facade ran on";
@@ -237,9 +239,10 @@ TEST_F(O3d303Facade, APortInUseIsToldAndTriedAgainWhileTheDaemonServes) {
   auto holder = std::make_unique<boost::asio::ip::tcp::acceptor>(
       io, boost::asio::ip::tcp::endpoint{boost::asio::ip::address_v4::loopback(), 0});
   const auto port = holder->local_endpoint().port();
-  start(fmt::format("[[source]]\nname = 'cam'\n{}[[facade]]\nkind = 'o3d303'\nsource = 'cam'\nxmlrpc_port = {}\n"
-                    "pcic_port = 0\ndiscoverable = false\n",
-                    kPattern, port));
+  start(fmt::format(
+      "[[source]]\nname = 'cam'\n{}[[facade]]\nkind = 'o3d303'\nsource = 'cam'\nxmlrpc_port = {}\n"
+      "pcic_port = 0\ndiscoverable = false\n",
+      kPattern, port));
   EXPECT_TRUE(log_->waitFor("is in use by", 1));
   EXPECT_TRUE(client().sources().ok());
   holder.reset();

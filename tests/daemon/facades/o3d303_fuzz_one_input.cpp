@@ -25,19 +25,50 @@ void demand(bool holds) {
 }
 
 constexpr std::string_view kSession = "session_0123456789abcdef0123456789abcdef/";
-constexpr std::array<std::string_view, 9> kObjects{
-    "", "", "edit/", "edit/device/", "edit/device/network/", "edit/device/time/", "edit/application/",
-    "edit/application/imager_001/", "edit/application/imager_001/spatialfilter"};
-constexpr std::array<std::string_view, 29> kMethods{
-    "requestSession", "setOperatingMode", "editApplication", "setParameter", "save", "getParameter", "getAllParameters",
-    "heartbeat", "cancelSession", "setTemporaryApplicationParameters", "getSWVersion", "getHWInfo", "getApplicationList",
-    "getTraceLogs", "reboot", "stopEditingApplication", "availableApplicationTypes", "copyApplication",
-    "deleteApplication", "createApplication", "factoryReset", "saveAndActivateConfig", "setCurrentTime",
-    "activatePassword", "disablePassword", "availableTypes", "changeType", "expire", "nonsense"};
+constexpr std::array<std::string_view, 9> kObjects{"",
+                                                   "",
+                                                   "edit/",
+                                                   "edit/device/",
+                                                   "edit/device/network/",
+                                                   "edit/device/time/",
+                                                   "edit/application/",
+                                                   "edit/application/imager_001/",
+                                                   "edit/application/imager_001/spatialfilter"};
+constexpr std::array<std::string_view, 29> kMethods{"requestSession",
+                                                    "setOperatingMode",
+                                                    "editApplication",
+                                                    "setParameter",
+                                                    "save",
+                                                    "getParameter",
+                                                    "getAllParameters",
+                                                    "heartbeat",
+                                                    "cancelSession",
+                                                    "setTemporaryApplicationParameters",
+                                                    "getSWVersion",
+                                                    "getHWInfo",
+                                                    "getApplicationList",
+                                                    "getTraceLogs",
+                                                    "reboot",
+                                                    "stopEditingApplication",
+                                                    "availableApplicationTypes",
+                                                    "copyApplication",
+                                                    "deleteApplication",
+                                                    "createApplication",
+                                                    "factoryReset",
+                                                    "saveAndActivateConfig",
+                                                    "setCurrentTime",
+                                                    "activatePassword",
+                                                    "disablePassword",
+                                                    "availableTypes",
+                                                    "changeType",
+                                                    "expire",
+                                                    "nonsense"};
 
 SourceFacts facts() {
   SourceFacts facts;
-  facts.parameters = {{"exposure_us", 1000.0, {1.0, 20'000.0}}, {"frame_rate_hz", 10.0, {0.1, 30.0}}, {"triggered", 0.0, {0.0, 1.0}}};
+  facts.parameters = {{"exposure_us", 1000.0, {1.0, 20'000.0}},
+                      {"frame_rate_hz", 10.0, {0.1, 30.0}},
+                      {"triggered", 0.0, {0.0, 1.0}}};
   facts.frame_rate_hz = 10.0;
   facts.exposures_us = {40, 1000};
   return facts;
@@ -62,11 +93,13 @@ void playCalls(std::string_view text) {
   while (text.size() >= 2) {
     const auto object = static_cast<unsigned char>(text[0]) % kObjects.size();
     const auto method = static_cast<unsigned char>(text[1]) % kMethods.size();
-    std::string_view line = text.substr(2, text.find('\n', 2) == std::string_view::npos ? text.size() : text.find('\n', 2) - 2);
+    std::string_view line =
+        text.substr(2, text.find('\n', 2) == std::string_view::npos ? text.size() : text.find('\n', 2) - 2);
     text.remove_prefix(std::min(text.size(), 2 + line.size() + 1));
     XmlRpcCall call{std::string{kMethods[method]}, {}};
     const std::size_t tab = line.find('\t');
-    const std::string first{line.substr(0, tab)}, second{tab == std::string_view::npos ? "" : line.substr(tab + 1)};
+    const std::string first{line.substr(0, tab)},
+        second{tab == std::string_view::npos ? "" : line.substr(tab + 1)};
     if (call.method == "requestSession") {
       call.params = {XmlRpcValue{""}, XmlRpcValue{"0123456789abcdef0123456789abcdef"}};
     } else if (call.method == "setTemporaryApplicationParameters") {
@@ -81,7 +114,8 @@ void playCalls(std::string_view text) {
       demand(!device.isEditing());
       continue;
     }
-    const std::string path = "/api/rpc/v1/com.ifm.efector/" + (object == 0 ? std::string{} : std::string{kSession}) +
+    const std::string path = "/api/rpc/v1/com.ifm.efector/" +
+                             (object == 0 ? std::string{} : std::string{kSession}) +
                              std::string{kObjects[object]};
     const auto outcome = device.answer(path, call, now);
     checkChanges(outcome.changes);

@@ -33,7 +33,8 @@ TEST(Unevenness, GivesARealCamerasIntervals) {
   double least_ms = delay_ms(0);
   for (std::size_t i = 0; i + 1 < 2000; ++i) {
     least_ms = std::min(least_ms, delay_ms(i));
-    EXPECT_NEAR(mean_ms + delay_ms(i + 1) - delay_ms(i), intervals_ms[i % 1000], 1e-5) << i;  // whole nanoseconds
+    EXPECT_NEAR(mean_ms + delay_ms(i + 1) - delay_ms(i), intervals_ms[i % 1000], 1e-5)
+        << i;  // whole nanoseconds
   }
   EXPECT_EQ(least_ms, 0.0) << "no frame leaves before it is there";
 }
