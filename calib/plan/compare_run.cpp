@@ -58,40 +58,6 @@ Result<RunFiles> readRun(const std::filesystem::path& folder) {
   return RunFiles{*std::move(plan), *std::move(schedule)};
 }
 
-/// Locked captures are opened once: the note of it is there before they are read. A file that is not the one that was
-/// captured is found before.
-Result<> openLocked(const CompareRunJob& job, const std::vector<CaptureRecord>& records) {
-  const auto file = job.run / kOpenedFile;
-  if (std::ifstream in{file}; in) {
-    std::stringstream text;
-    text << in.rdbuf();
-    const auto before = compare::parseJson(text.str());
-    const auto said = [&](const char* key) {
-      const compare::Json* found = before ? before->find(key) : nullptr;
-      return found == nullptr ? std::string{"(unknown)"} : found->words();
-    };
-    return Error{
-        Error::Code::InvalidArgument,
-        fmt::format(
-            "{}: the locked captures were opened on {} for {}. What is judged on them twice is fitted "
-            "to them; capture new ones",
-            job.run.string(), said("date"), said("report"))};
-  }
-  for (const CaptureRecord& one : records) {
-    for (const RecordedFile* recorded : {&one.a, &one.b}) {
-      if (auto checked = checkHash(job.run, *recorded); !checked) return checked;
-    }
-  }
-  compare::Json json = compare::Json::object();
-  json.set("date", today()).set("report", job.output.string()).set("note", job.note);
-  std::ofstream out{file};
-  out << json.text();
-  out.flush();
-  if (out) return {};
-  return Error{Error::Code::StorageFull,
-               fmt::format("{}: cannot be written, so the locked captures stay closed", file.string())};
-}
-
 /// A moving plate is at another place in each frame; a mean over frames says nothing of it.
 bool standsStill(const CaptureRecord& record) { return record.kind != "moving"; }
 
@@ -183,6 +149,38 @@ std::vector<std::string> warningsOf(const RunFiles& files, const std::map<std::s
 }
 
 }  // namespace
+
+Result<> openLocked(const CompareRunJob& job, const std::vector<CaptureRecord>& records) {
+  const auto file = job.run / kOpenedFile;
+  if (std::ifstream in{file}; in) {
+    std::stringstream text;
+    text << in.rdbuf();
+    const auto before = compare::parseJson(text.str());
+    const auto said = [&](const char* key) {
+      const compare::Json* found = before ? before->find(key) : nullptr;
+      return found == nullptr ? std::string{"(unknown)"} : found->words();
+    };
+    return Error{
+        Error::Code::InvalidArgument,
+        fmt::format(
+            "{}: the locked captures were opened on {} for {}. What is judged on them twice is fitted "
+            "to them; capture new ones",
+            job.run.string(), said("date"), said("report"))};
+  }
+  for (const CaptureRecord& one : records) {
+    for (const RecordedFile* recorded : {&one.a, &one.b}) {
+      if (auto checked = checkHash(job.run, *recorded); !checked) return checked;
+    }
+  }
+  compare::Json json = compare::Json::object();
+  json.set("date", today()).set("report", job.output.string()).set("note", job.note);
+  std::ofstream out{file};
+  out << json.text();
+  out.flush();
+  if (out) return {};
+  return Error{Error::Code::StorageFull,
+               fmt::format("{}: cannot be written, so the locked captures stay closed", file.string())};
+}
 
 Result<std::filesystem::path> compareRun(const CompareRunJob& job, compare::Progress& progress) {
   const auto files = readRun(job.run);

@@ -20,6 +20,7 @@
 #include "sim/effects/harmonics.h"
 #include "sim/effects/internal_reflection.h"
 #include "sim/effects/lag.h"
+#include "sim/effects/learned_range.h"
 #include "sim/effects/lens_ghost.h"
 #include "sim/effects/lens_scatter.h"
 #include "sim/effects/low_amplitude_filter.h"
@@ -54,6 +55,7 @@ using AllEffects = EffectList<
     Lag, ShotNoise, AmbientSuppression, Saturation,                                  // samples: the pixel
     Nonlinearity, SampleGain, SampleOffset, ColumnComb, ReadNoise, Quantisation, Companding,  // the converter
     RangeNoise, WarmUp, TimeWalk, ClockScale, ResidualDrift, Delay, CalibrationTable,  // range: decoding
+    LearnedRange,  // what has no name yet
     LowAmplitudeFilter, FlyingPixelFilter, EdgeFilter, MedianFilter, BilateralFilter,
     TemporalFilter>;                                                                 // filters
 

@@ -99,6 +99,8 @@ class NumberSetter {
   }
   template <class Values>
   void numbers(const char*, Values&, Bounds, const char*) {}  // a list is no number
+  template <class Enum>
+  void choice(const char*, Enum&, std::initializer_list<std::pair<const char*, Enum>>, const char*) {}
 
  private:
   bool wants(Parameter parameter, bool integral) {

@@ -85,6 +85,49 @@ TEST(CalibrationTable, OfMoreThanFortyNineKnotsIsAnError) {
               testing::HasSubstr("has 50 knots in offsets_mm; it can have at most 49"));
 }
 
+TEST(LearnedRange, IsLinearOverWhateverItGoesWithAndConstantBeyond) {
+  const LearnedRange over_range{.knots = {1.0, 2.0, 4.0}, .offsets_mm = {10.0, -20.0, 40.0}};
+  const std::pair<double, double> expected[] = {{0.2, 10.0}, {1.5, -5.0}, {2.0, -20.0}, {3.0, 10.0}, {9.0, 40.0}};
+  for (const auto& [range_m, offset_mm] : expected) {
+    const RangeImage image = applied(over_range, imageOfRanges(1, 1, [r = range_m](int, int) { return r; }));
+    EXPECT_NEAR(image.range_m[0] - range_m, 1e-3 * offset_mm, 1e-6) << range_m;
+  }
+  const LearnedRange over_column{
+      .over = LearnedRange::Over::Column, .knots = {0.0, 2.0}, .offsets_mm = {0.0, 8.0}};
+  const RangeImage image = applied(over_column, imageOfRanges(4, 1, [](int, int) { return 2.0; }));
+  for (int x = 0; x < 4; ++x) EXPECT_NEAR(image.range_m[static_cast<std::size_t>(x)], 2.0 + 0.004 * std::min(x, 2), 1e-6) << x;
+}
+
+TEST(LearnedRange, OverTwoThingsIsBilinear) {
+  const LearnedRange table{.over = LearnedRange::Over::Range,
+                           .knots = {1.0, 2.0},
+                           .and_over = LearnedRange::Over::Column,
+                           .and_knots = {0.0, 10.0, 20.0},
+                           .offsets_mm = {0.0, 10.0, 20.0, 100.0, 110.0, 140.0}};
+  EXPECT_EQ(table.problem(), "");
+  EXPECT_NEAR(table.offset_mm(1.0, 15.0), 15.0, 1e-12);
+  EXPECT_NEAR(table.offset_mm(2.0, 15.0), 125.0, 1e-12);
+  EXPECT_NEAR(table.offset_mm(1.5, 15.0), 70.0, 1e-12);
+}
+
+TEST(LearnedRange, AddsNothingWhereAFrameDoesNotSayWhatItGoesWith) {
+  const LearnedRange over_temperature{
+      .over = LearnedRange::Over::Illumination, .knots = {0.0, 50.0}, .offsets_mm = {5.0, 9.0}};
+  const RangeImage image = applied(over_temperature, imageOfRanges(1, 1, [](int, int) { return 2.0; }));
+  EXPECT_EQ(image.range_m[0], 2.0F);
+}
+
+TEST(LearnedRange, SaysWhatIsWrongWithItsTable) {
+  const std::string effect = "[[effect]]\ntype = 'learned_range'\n";
+  EXPECT_EQ(errorOf(plainCamera(4, 2, 0.5, effect)), "");
+  EXPECT_THAT(errorOf(plainCamera(4, 2, 0.5, effect + "knots = [1, 3, 2]\n")),
+              testing::HasSubstr("must have knots and and_knots that ascend"));
+  EXPECT_THAT(errorOf(plainCamera(4, 2, 0.5, effect + "knots = [1, 2]\n")),
+              testing::HasSubstr("has 3 offsets_mm for 2 knots"));
+  EXPECT_THAT(errorOf(plainCamera(4, 2, 0.5, effect + "and_over = 'time_s'\n")),
+              testing::HasSubstr("and_over without and_knots"));
+}
+
 TEST(LowAmplitudeFilter, RejectsWhatIsBelowItsMinimumAndSaysWhy) {
   RangeImage image = imageOfRanges(3, 1, [](int, int) { return 2.0; });
   image.amplitude[0] = 299.0F, image.amplitude[1] = 300.0F, image.amplitude[2] = kNan;

@@ -410,6 +410,10 @@ struct BoundsCheck {
                const char* help) {
     for (double value : values) number(name, value, bounds, help);
   }
+  template <class Enum>
+  void choice(const char*, Enum&, std::initializer_list<std::pair<const char*, Enum>>, const char*) {
+    ++count;
+  }
   int count = 0;
 };
 

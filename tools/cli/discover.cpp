@@ -6,24 +6,30 @@
 #include <string>
 
 #include "calib/discover/discover_table.h"
+#include "tools/cli/arguments.h"
 #include "tools/cli/command.h"
-#include "tools/cli/options.h"
+#include "tools/cli/discover_campaign.h"
 
 namespace toftwin::cli {
 namespace {
 
 struct Options {
-  std::string table, map, output = "discovery";
+  std::string data, map, output = "discovery";
+  CampaignOptions campaign;
+
+  /// The folder of a run of `toftwin measure`, not a table.
+  [[nodiscard]] bool isRun() const { return std::filesystem::is_directory(data); }
 };
 
 Result<Exit> act(const Options& options) {
+  if (options.isRun()) return discoverRun(options.data, options.output, options.campaign);
   discover::TableMap map;
   if (!options.map.empty()) {
     auto loaded = discover::loadTableMap(options.map);
     if (!loaded) return loaded.error();
     map = *std::move(loaded);
   }
-  const auto discovery = discover::discoverTable(options.table, map);
+  const auto discovery = discover::discoverTable(options.data, map);
   if (!discovery) return discovery.error();
   const auto page = discover::writeDiscovery(*discovery, options.output);
   if (!page) return page.error();
@@ -34,11 +40,30 @@ Result<Exit> act(const Options& options) {
 
 Run add(Arguments& args) {
   const auto options = std::make_shared<Options>();
-  args.option("TABLE", options->table,
-              "CSV file with a line of headers: measured values, their reference, and what may matter")
+  args.option("DATA", options->data,
+              "a CSV file with a line of headers: measured values, their reference, and what may "
+              "matter; or the folder of "
+              "a run of toftwin measure")
       .required();
-  args.option("--map", options->map, "TOML file that says what the columns are; without it the headers do");
-  args.option("-o,--output", options->output, "folder for the report, report.json and model.toml").showsDefault();
+  args.option("--map", options->map,
+              "of a table: TOML file that says what the columns are; without it the headers do");
+  args.option("-o,--output", options->output, "folder for the report, report.json and model.toml")
+      .showsDefault();
+  options->campaign.add(args);
+  args.check([options]() -> Result<> {
+    if (options->isRun() && !options->map.empty()) {
+      return Error{Error::Code::InvalidArgument,
+                   "--map is for a table, not for the folder of a run"};
+    }
+    if (!options->isRun() && options->campaign.isGiven()) {
+      return Error{
+          Error::Code::InvalidArgument,
+          fmt::format(
+              "{} is no folder: --model, --scene and their like are for the folder of a run",
+              options->data)};
+    }
+    return {};
+  });
   return [options] { return act(*options); };
 }
 
@@ -47,7 +72,9 @@ Run add(Arguments& args) {
 Command discoverCommand() {
   return {"discover", "find what measured errors go with, and how much of them that explains",
           "  toftwin discover warmup.csv -o out                  headers say what the columns are\n"
-          "  toftwin discover distances.csv --map map.toml -o out\n",
+          "  toftwin discover distances.csv --map map.toml -o out\n"
+          "  toftwin discover run --model camera.toml --scene wall.toml -o out   what toftwin "
+          "measure captured\n",
           add};
 }
 

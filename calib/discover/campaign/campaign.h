@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <array>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <toftwin/frame.h>
+#include <toftwin/result.h>
+
+#include "calib/plan/run_index.h"
+#include "sim/images/range.h"
+#include "sim/sensor/sensor_model.h"
+#include "sim/tracer/scene.h"
+
+namespace toftwin::discover {
+
+/// Mean and noise of one measured quantity over the repeats of a capture.
+struct Repeated {
+  Image<float> mean;      ///< NaN where less than half of the frames are valid
+  Image<float> variance;  ///< of the mean, pooled over pixels that are alike
+  /// How many pixels' noise is worth one independent one, from block averages over 4 × 4 pixels: at
+  /// least 1.
+  double clumping = 1.0;
+};
+
+/// One capture of a measured camera: what it said of its moment, and its images over the repeats.
+struct MeasuredCapture {
+  plan::CaptureRecord record;
+  Moment moment;  ///< of the first frame
+  std::size_t frames = 0;
+  Repeated range_m, log_amplitude;  ///< the latter empty where the camera gives none
+  Image<float> valid_share;
+  /// Even minus odd frames, means over the image of the range: what goes with the frame's number.
+  double parity_m = 0.0, parity_error_m = 0.0;
+};
+
+/// Which camera of a run, and which of its captures.
+enum class Side { A, B };
+
+/// A run of `toftwin measure` as far as it is open.
+struct Campaign {
+  std::filesystem::path folder{};
+  std::string name{};
+  Side side = Side::A;
+  CameraInfo camera{};
+  std::vector<MeasuredCapture> captures{};    ///< open ones that can be compared pixel by pixel
+  std::vector<plan::CaptureRecord> locked{};  ///< unopened
+  std::vector<std::string> notes{};           ///< what was left out and why
+};
+
+/// Reads the open captures. Errors name capture and file: no run, one that is damaged, without
+/// poses, without repeats, without ranges.
+Result<Campaign> readCampaign(const std::filesystem::path& folder, Side side);
+/// Reads captures that were locked; their hashes are checked. The caller has written that they are
+/// opened.
+Result<std::vector<MeasuredCapture>> readLocked(const Campaign& campaign);
+
+/// What the declared camera sees: a scene for all blocks, and others for some.
+struct Declared {
+  sim::SensorModel model;
+  sim::Scene scene;
+  std::map<std::string, sim::Scene> scene_of_block{};
+
+  [[nodiscard]] const sim::Scene& sceneOf(const std::string& block) const {
+    const auto found = scene_of_block.find(block);
+    return found == scene_of_block.end() ? scene : found->second;
+  }
+};
+
+/// How light is traced for a re-simulation.
+struct TraceOptions {
+  int samples_per_pixel = 256;  ///< at most; as many as it takes to be quieter than the measurement
+  int max_surfaces = 4;
+  double pixel_extent = 1.0;
+  std::uint64_t seed = 20'261;
+};
+
+/// Where a camera stood against its pose, in prior standard deviations: right, down, ahead, turned
+/// about x, about y.
+using Stood = std::array<double, 5>;
+
+/// The light of one capture, free of sensor noise, and how it changes as the camera stands a little
+/// elsewhere.
+struct TracedCapture {
+  sim::Light light;
+  /// Change of range in metres and of ln amplitude for one prior standard deviation of what moves
+  /// the camera: right, down, ahead by 1 mm, turned about x and about y by 0.1°.
+  std::array<Image<float>, 5> range_m{}, log_amplitude{};
+  Image<float> tracing_variance_m2,
+      tracing_variance;         ///< of range and of ln amplitude, from Monte Carlo
+  Stood stood{};                ///< the light was traced there; the changes are from there, too
+  Image<std::uint8_t> is_edge;  ///< next to a jump of range, or of what is painted on it
+};
+
+inline constexpr double kPosePrior_m = 1e-3, kPosePrior_deg = 0.1, kGainPrior = 0.01;
+
+/// Traces each capture's scene at its pose, or `stood` off it. Captures of one scene and place
+/// share their light; each place has a seed of its own, because one seed for all would leave a
+/// pattern that looks like a camera's.
+Result<std::vector<std::shared_ptr<const TracedCapture>>> traceAll(
+    const Declared& declared, const std::vector<MeasuredCapture>& captures,
+    const TraceOptions& options, const std::function<void(double)>& tell = {},
+    const std::vector<Stood>& stood = {});
+
+}  // namespace toftwin::discover

@@ -1,0 +1,305 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <functional>
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "calib/compare/report.h"
+#include "calib/discover/campaign/discover_campaign.h"
+
+namespace toftwin::discover {
+namespace {
+
+using compare::Json;
+using compare::shown;
+
+std::string stageOf(const Effect& effect) {
+  return effect.stage ? std::string{discover::nameOf(*effect.stage)} : "not told";
+}
+
+std::string titleOf(const Effect& effect) {
+  return effect.is_catalogue
+             ? effect.name
+             : fmt::format("undeclared: {} ({})", effect.name, fmt::join(effect.covariates, ", "));
+}
+
+std::string numbersOf(const FoundEffect& one) {
+  if (!one.fitted) return "the simulator has no form for it; it is not in model.toml";
+  std::vector<std::string> words;
+  for (const FittedNumber& number : one.fitted->numbers)
+    words.push_back(fmt::format("{} = {:.4g} ± {:.2g}", number.key, number.value, number.error));
+  if (!words.empty()) return fmt::format("{}", fmt::join(words, "; "));
+  for (const Estimate& number : one.found.numbers)
+    words.push_back(fmt::format("{}: {:.4g} ± {:.2g}", number.name, number.value, number.error));
+  const std::size_t most = 6;
+  if (words.size() > most) return "a table: see model.toml";
+  return fmt::format("a table of {}", fmt::join(words, "; "));
+}
+
+compare::TableBlock effectTable(const CampaignFinding& finding) {
+  compare::TableBlock table{
+      "What the model lacked. Gain: how much less χ² is left of captures that it was not fitted "
+      "to; again: how often it is the best when captures are drawn anew",
+      {"effect", "acts on", "goes with", "numbers", "gain", "again"},
+      {}};
+  for (const FoundEffect& one : finding.effects) {
+    table.rows.push_back({titleOf(one.found), stageOf(one.found),
+                          fmt::format("{}", fmt::join(one.found.covariates, ", ")), numbersOf(one),
+                          compare::shownWithError(one.found.gain.mean, one.found.gain.error, 0),
+                          compare::shownPercent(one.found.frequency)});
+  }
+  for (const FittedEffect& one : finding.updates) {
+    std::vector<std::string> words;
+    for (const FittedNumber& number : one.numbers)
+      words.push_back(fmt::format("{} = {:.4g} ± {:.2g}", number.key, number.value, number.error));
+    table.rows.push_back({"parameter update: " + nameOf(one.effect),
+                          std::string{discover::nameOf(discover::stageOf(one.effect))}, "",
+                          fmt::format("{}", fmt::join(words, "; ")), "–", "–"});
+  }
+  return table;
+}
+
+compare::TableBlock lockedTable(const Judgement& judgement) {
+  compare::TableBlock table{"Measured − simulated on the locked captures, edges left out",
+                            {"model", "bias [mm]", "RMS [mm]", "95 % within [mm]", "χ² per row",
+                             "neighbours alike", "masks agree"},
+                            {}};
+  const auto row = [&](const char* name, const RangeErrors& errors) {
+    table.rows.push_back({name, shown(errors.bias_mm, 2), shown(errors.rms_mm, 2),
+                          shown(errors.p95_mm, 2), shown(errors.per_row, 2),
+                          shown(errors.neighbour_correlation, 2),
+                          compare::shownPercent(errors.masks_agree)});
+  };
+  row("as declared", judgement.before);
+  row("with what was found", judgement.after);
+  return table;
+}
+
+compare::Figure figureOver(const Judgement& judgement, const char* label,
+                           const std::function<double(const JudgedCapture&)>& x) {
+  compare::Curve before{
+      .name = "as declared", .ink = compare::Ink::Baseline, .stroke = compare::Stroke::Dots};
+  compare::Curve after{.name = "with what was found",
+                       .ink = compare::Ink::Simulated,
+                       .stroke = compare::Stroke::Dots};
+  for (const JudgedCapture& one : judgement.captures) {
+    if (!std::isfinite(x(one))) continue;
+    before.x.push_back(x(one)), before.y.push_back(one.before_mm);
+    after.x.push_back(x(one)), after.y.push_back(one.after_mm);
+  }
+  return {fmt::format("Mean error of each locked capture over {}.", label),
+          toSvg(compare::Plot{.title = fmt::format("error over {}", label),
+                              .x_label = label,
+                              .y_label = "measured − simulated [mm]",
+                              .curves = {before, after},
+                              .zero_line = true,
+                              .compact = true})};
+}
+
+std::string today() {
+  const std::time_t now = std::time(nullptr);
+  return fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(now));
+}
+
+compare::TableBlock seenTable(const CampaignFinding& finding) {
+  compare::TableBlock table{
+      "What explains most of the difference, each by itself: χ² of its columns, and how unlikely "
+      "it "
+      "is where nothing is there, as a normal deviate",
+      {"group", "z", "χ²", "numbers"},
+      {}};
+  for (const SeenGroup& one : seenFirst(finding))
+    table.rows.push_back(
+        {one.name, shown(one.z, 1), shown(one.statistic, 1), std::to_string(one.rank)});
+  return table;
+}
+
+compare::Section foundSection(const CampaignFinding& finding) {
+  compare::Section section{
+      .id = "effects", .title = "What was found", .verdict = verdictOf(finding)};
+  section.tone = compare::Tone::Neutral;
+  if (!finding.effects.empty() || !finding.updates.empty())
+    section.blocks.emplace_back(effectTable(finding));
+  for (const FoundEffect& one : finding.effects) {
+    for (const Alternative& other : one.found.alternatives) {
+      section.blocks.emplace_back(compare::Paragraph{
+          fmt::format("{} or {}: these captures hardly tell them apart (correlation {:.2f}).",
+                      titleOf(one.found), other.name, other.correlation)});
+    }
+    if (const auto& next = one.found.experiment) {
+      section.blocks.emplace_back(compare::Paragraph{
+          fmt::format("Next experiment: hold {} at {:.4g} and change {} from {:.4g} to {:.4g}.",
+                      next->hold, next->held_at, next->vary, next->from, next->to)});
+    }
+  }
+  section.blocks.emplace_back(compare::Paragraph{fmt::format(
+      "Is there anything? p = {:.3g} for all {} groups together, against {} campaigns with nothing "
+      "in "
+      "them{}; of what is left p = {:.3g}. Offset of the device against its poses: {}.",
+      finding.finding.first_p, finding.finding.score_names.size(), finding.finding.draws,
+      finding.finding.by_sign_flips ? " (sign flips of captures)" : "", finding.finding.last_p,
+      compare::shownWithError(finding.offset_mm, finding.offset_error_mm, 2) + " mm")});
+  section.blocks.emplace_back(seenTable(finding));
+  if (finding.finding.scales.size() >= 2) {
+    section.blocks.emplace_back(compare::Paragraph{
+        fmt::format("Poses are off by {:.2g} times 1 mm and 0.1°, the light by {:.2g} times 1 %, "
+                    "as the captures "
+                    "themselves say. χ² per row of what is left: {:.2f}.",
+                    finding.finding.scales[0], finding.finding.scales[1], finding.dispersion),
+        true});
+  }
+  for (const std::string& note : finding.notes)
+    section.blocks.emplace_back(compare::Paragraph{note, true});
+  return section;
+}
+
+Json toJson(const RangeErrors& errors) {
+  Json json = Json::object();
+  json.set("pixels", errors.pixels).set("bias_mm", errors.bias_mm).set("rms_mm", errors.rms_mm);
+  json.set("p95_mm", errors.p95_mm).set("chi2_per_row", errors.per_row);
+  json.set("neighbour_correlation", errors.neighbour_correlation)
+      .set("masks_agree", errors.masks_agree);
+  return json;
+}
+
+Json toJson(const FoundEffect& one) {
+  Json json = Json::object(), numbers = Json::array();
+  json.set("name", one.found.name).set("kind", one.found.is_catalogue ? "catalogue" : "undeclared");
+  json.set("stage", stageOf(one.found)).set("covariates", Json::arrayOf(one.found.covariates));
+  json.set("p", one.found.p)
+      .set("gain", one.found.gain.mean)
+      .set("gain_error", one.found.gain.error);
+  json.set("frequency", one.found.frequency).set("in_model", one.fitted.has_value());
+  if (one.fitted) {
+    for (const FittedNumber& number : one.fitted->numbers) {
+      Json each = Json::object();
+      each.set("key", number.key).set("value", number.value).set("error", number.error);
+      numbers.push(std::move(each));
+    }
+  }
+  json.set("numbers", std::move(numbers));
+  Json others = Json::array();
+  for (const Alternative& other : one.found.alternatives) others.push(other.name);
+  json.set("or", std::move(others));
+  return json;
+}
+
+Json dataOf(const CampaignJob& job, const CampaignFinding& finding) {
+  Json data = Json::object(), effects = Json::array(), updates = Json::array();
+  data.set("verdict", verdictOf(finding)).set("run", job.run.string()).set("model", job.model);
+  data.set("captures", finding.captures)
+      .set("frames", finding.frames)
+      .set("locked", finding.locked);
+  data.set("p", finding.finding.first_p).set("p_left", finding.finding.last_p);
+  data.set("offset_mm", finding.offset_mm).set("offset_error_mm", finding.offset_error_mm);
+  data.set("scales", Json::arrayOf(finding.finding.scales)).set("chi2_per_row", finding.dispersion);
+  for (const FoundEffect& one : finding.effects) effects.push(toJson(one));
+  for (const FittedEffect& one : finding.updates) updates.push(nameOf(one.effect));
+  data.set("effects", std::move(effects)).set("parameter_updates", std::move(updates));
+  if (const auto& judged = finding.judgement) {
+    Json locked = Json::object();
+    locked.set("before", toJson(judged->before)).set("after", toJson(judged->after));
+    locked.set("removed", judged->removed).set("removed_low", judged->removed_low);
+    locked.set("removed_high", judged->removed_high).set("explainable_chi2", judged->explainable);
+    data.set("locked_captures", std::move(locked));
+  }
+  data.set("notes", Json::arrayOf(finding.notes)).set("seconds", finding.seconds);
+  return data.set("software", "toftwin " TOFTWIN_VERSION)
+      .set("date", today())
+      .set("note", job.note);
+}
+
+std::vector<compare::Card> cardsOf(const CampaignFinding& finding) {
+  std::vector<compare::Card> cards{
+      {"effects found", std::to_string(finding.effects.size() + finding.updates.size()),
+       fmt::format("{} captures, {} frames", finding.captures, finding.frames)},
+      {"p of nothing being there", fmt::format("{:.3g}", finding.finding.first_p),
+       fmt::format("of what is left: {:.3g}", finding.finding.last_p)}};
+  if (const auto& judged = finding.judgement) {
+    cards.push_back(
+        {"RMS, locked captures",
+         fmt::format("{} → {} mm", shown(judged->before.rms_mm, 2), shown(judged->after.rms_mm, 2)),
+         fmt::format("bias {} → {} mm", shown(judged->before.bias_mm, 2),
+                     shown(judged->after.bias_mm, 2))});
+    const bool has_any = !finding.effects.empty() || !finding.updates.empty();
+    if (has_any) {
+      cards.push_back({"explainable error removed", compare::shownPercent(judged->removed),
+                       fmt::format("95 %: {} to {}", compare::shownPercent(judged->removed_low),
+                                   compare::shownPercent(judged->removed_high)),
+                       judged->removed_low > 0.0 ? compare::Tone::Good : compare::Tone::Fair});
+    }
+  }
+  return cards;
+}
+
+}  // namespace
+
+std::vector<SeenGroup> seenFirst(const CampaignFinding& finding, std::size_t most) {
+  std::vector<SeenGroup> all;
+  const auto& scores = finding.finding.scores;
+  for (std::size_t i = 0; i < std::min(scores.size(), finding.finding.score_names.size()); ++i)
+    all.push_back(
+        {finding.finding.score_names[i], scores[i].z, scores[i].statistic, scores[i].rank});
+  std::ranges::sort(all, std::greater<>{}, &SeenGroup::z);
+  all.resize(std::min(all.size(), most));
+  return all;
+}
+
+std::string verdictOf(const CampaignFinding& finding) {
+  if (finding.effects.empty() && finding.updates.empty()) {
+    return finding.finding.first_p > 0.01
+               ? fmt::format("Nothing is left above the noise (p = {:.2g})",
+                             finding.finding.first_p)
+               : fmt::format(
+                     "Something is left (p = {:.2g}), but nothing that holds on captures it was "
+                     "not fitted to",
+                     finding.finding.first_p);
+  }
+  std::vector<std::string> names;
+  for (const FoundEffect& one : finding.effects) names.push_back(titleOf(one.found));
+  for (const FittedEffect& one : finding.updates)
+    names.push_back("parameter update: " + nameOf(one.effect));
+  std::string verdict = fmt::format("The model lacks {}", fmt::join(names, "; "));
+  if (finding.effects.empty())
+    verdict = fmt::format("The model has wrong numbers: {}", fmt::join(names, "; "));
+  if (const auto& judged = finding.judgement) {
+    verdict += fmt::format(
+        ". On the locked captures: RMS {} → {} mm, {} of what can be explained is removed",
+        shown(judged->before.rms_mm, 2), shown(judged->after.rms_mm, 2),
+        compare::shownPercent(judged->removed));
+  }
+  return verdict;
+}
+
+Result<std::filesystem::path> writeReport(const CampaignJob& job, const CampaignFinding& finding) {
+  compare::Report report{.title = "What the camera model lacks"};
+  report.subtitle = fmt::format("{}: {} open and {} locked captures of {}", finding.camera,
+                                finding.captures, finding.locked, finding.plan);
+  report.verdict = verdictOf(finding) + ".";
+  report.cards = cardsOf(finding);
+  report.sections.push_back(foundSection(finding));
+  if (finding.judgement) {
+    compare::Section section{.id = "locked", .title = "Before and after, on locked captures"};
+    section.verdict = fmt::format("χ² above the noise falls by {} (95 %: {} to {}).",
+                                  compare::shownPercent(finding.judgement->removed),
+                                  compare::shownPercent(finding.judgement->removed_low),
+                                  compare::shownPercent(finding.judgement->removed_high));
+    section.blocks.emplace_back(lockedTable(*finding.judgement));
+    section.blocks.emplace_back(
+        compare::FigureRow{{figureOver(*finding.judgement, "time since power-on [s]",
+                                       [](const JudgedCapture& c) { return c.since_power_on_s; }),
+                            figureOver(*finding.judgement, "distance [m]",
+                                       [](const JudgedCapture& c) { return c.distance_m; })}});
+    report.sections.push_back(std::move(section));
+  }
+  report.colophon = fmt::format("toftwin {}, {}{}{}; {:.0f} s", TOFTWIN_VERSION, today(),
+                                job.note.empty() ? "" : ", ", job.note, finding.seconds);
+  report.data = dataOf(job, finding);
+  return compare::write(report, job.output);
+}
+
+}  // namespace toftwin::discover

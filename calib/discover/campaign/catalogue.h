@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "calib/discover/evidence.h"
+#include "sim/effects/effects.h"
+
+namespace toftwin::discover {
+
+/// A number of an effect that can be changed, by its key in a camera file.
+struct EffectNumber {
+  std::string key{};
+  double value = 0.0;
+  double low = 0.0, high = 0.0;
+  bool is_whole = false;
+  bool is_label = false;  ///< of a device, without order: an unsigned whole number
+};
+std::vector<EffectNumber> numbersOf(const sim::AnyEffect& effect);
+/// The same effect with one number changed; within its bounds, whole where it must be.
+sim::AnyEffect withNumber(const sim::AnyEffect& effect, const std::string& key, double value);
+
+std::string nameOf(const sim::AnyEffect& effect);
+Stage stageOf(const sim::AnyEffect& effect);
+std::vector<std::string> covariatesOf(const sim::AnyEffect& effect);
+/// Its place in sim::AllEffects: where light meets it.
+std::size_t placeOf(const sim::AnyEffect& effect);
+
+/// The list with one effect more, where light meets it, behind others of its kind.
+std::vector<sim::AnyEffect> withInserted(std::vector<sim::AnyEffect> effects,
+                                         const sim::AnyEffect& effect);
+
+/// One way in which an effect can differ from not being there: from `off` to `on`.
+struct Variation {
+  sim::AnyEffect off, on;
+  std::string key{};  ///< of the number that changes
+  double step = 1.0;  ///< by how much it changes
+  bool is_shape =
+      false;  ///< a number that does nothing by itself was changed, such as a time constant
+};
+
+/// How much the camera's readings change between two effects, on some captures that stand for all:
+/// root mean squares of range [mm] and of 100 ln amplitude, of which the larger counts. Infinite
+/// where it cannot be told.
+using Sensitivity = std::function<std::vector<float>(const Variation&)>;
+
+/// An effect that may be missing, with the ways in which it can show: made from its `none()`, its
+/// defaults and its `visit`, the same for every effect.
+struct Candidate {
+  sim::AnyEffect example;  ///< with its defaults
+  std::vector<Variation> variations{};
+};
+
+/// All effects but noise and those that `probe` cannot see. `probe` gives the changes of some
+/// pixels' readings in units of about a millimetre.
+std::vector<Candidate> candidatesOf(const Sensitivity& probe,
+                                    const std::vector<std::string>& left_out);
+/// The numbers of an effect that is there, each by a small step.
+Candidate declaredCandidate(const sim::AnyEffect& effect, const Sensitivity& probe);
+
+}  // namespace toftwin::discover

@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/discover/campaign/covariates.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+namespace toftwin::discover {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+/// Mean over the square of 2 `reach` + 1 pixels, what lies outside or is NaN left out.
+Image<float> smoothed(const Image<float>& image, int reach) {
+  const int width = image.width(), height = image.height();
+  Image<double> sums(width + 1, height + 1), counts(width + 1, height + 1);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const auto value = static_cast<double>(image(x, y));
+      const bool is_there = std::isfinite(value);
+      sums(x + 1, y + 1) = sums(x, y + 1) + sums(x + 1, y) - sums(x, y) + (is_there ? value : 0.0);
+      counts(x + 1, y + 1) =
+          counts(x, y + 1) + counts(x + 1, y) - counts(x, y) + (is_there ? 1.0 : 0.0);
+    }
+  }
+  Image<float> mean(width, height);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const int a = std::max(0, x - reach), b = std::min(width, x + reach + 1);
+      const int c = std::max(0, y - reach), d = std::min(height, y + reach + 1);
+      const auto over = [&](const Image<double>& of) {
+        return of(b, d) - of(a, d) - of(b, c) + of(a, c);
+      };
+      mean(x, y) = static_cast<float>(over(sums) / std::max(1.0, over(counts)));
+    }
+  }
+  return mean;
+}
+
+struct Gatherer {
+  const Cells& cells;
+  CaptureCovariates all{};
+  std::vector<Eigen::VectorXf> columns{};
+
+  void add(std::string name, Eigen::VectorXf values) {
+    all.names.push_back(std::move(name));
+    columns.push_back(std::move(values));
+  }
+  void add(std::string name, double value) {
+    add(std::move(name), Eigen::VectorXf::Constant(static_cast<Eigen::Index>(cells.size()),
+                                                   static_cast<float>(value)));
+  }
+  void add(std::string name, const Image<float>& image) {
+    add(std::move(name), cells.means(image));
+  }
+
+  CaptureCovariates finish() {
+    all.values.resize(static_cast<Eigen::Index>(cells.size()),
+                      static_cast<Eigen::Index>(columns.size()));
+    for (std::size_t i = 0; i < columns.size(); ++i)
+      all.values.col(static_cast<Eigen::Index>(i)) = columns[i];
+    return std::move(all);
+  }
+};
+
+void addMoment(const MeasuredCapture& capture, Gatherer& gatherer) {
+  const Moment& moment = capture.moment;
+  const auto known = [](const auto& value, auto unit) { return value ? value->in(unit) : kNaN; };
+  gatherer.add("time_s", known(moment.since_power_on, second));
+  for (const NamedTemperature& one : moment.temperatures) {
+    if (one.where != "room") gatherer.add("temperature_" + one.where + "_c", one.value.in(celsius));
+  }
+  gatherer.add("ambient_klx",
+               moment.ambient ? moment.ambient->in(kilolux) : capture.record.ambient_klx);
+  gatherer.add("exposure_us", moment.exposures.empty()
+                                  ? capture.record.exposure_us
+                                  : moment.exposures.front().duration.in(microsecond));
+}
+
+void addPlaces(const CameraInfo& camera, const sim::Truth& truth, Gatherer& gatherer) {
+  Image<float> column(camera.width, camera.height), row = column, radius = column,
+                                                    incidence = column;
+  for (int y = 0; y < camera.height; ++y) {
+    for (int x = 0; x < camera.width; ++x) {
+      column(x, y) = static_cast<float>(x), row(x, y) = static_cast<float>(y);
+      radius(x, y) = static_cast<float>(std::hypot(x - camera.cx, y - camera.cy));
+      const Vec3d ray = rayThroughPixel(camera, x, y).v;
+      const auto& n = truth.normal(x, y);
+      const double cosine = -(ray.x * static_cast<double>(n.x) + ray.y * static_cast<double>(n.y) +
+                              ray.z * static_cast<double>(n.z));
+      incidence(x, y) = static_cast<float>(1.0 / std::max(0.05, cosine));
+    }
+  }
+  gatherer.add("column", column);
+  gatherer.add("row", row);
+  gatherer.add("radius_px", radius);
+  gatherer.add("incidence", incidence);
+}
+
+/// How much brighter than itself a pixel's surroundings are, at three scales: what scatters in the
+/// lens.
+void addSurroundings(const Reading& declared, Gatherer& gatherer) {
+  Image<float> amplitude = declared.log_amplitude;
+  for (float& value : amplitude.pixels()) value = std::exp(value);
+  const auto add = [&](std::string name, int reach) {
+    Image<float> ratio = smoothed(amplitude, reach);
+    for (std::size_t i = 0; i < ratio.size(); ++i)
+      ratio[i] = std::log(ratio[i]) - declared.log_amplitude[i];
+    gatherer.add(std::move(name), ratio);
+  };
+  add("surround_4px", 4);
+  add("surround_16px", 16);
+  add("surround_all", std::max(amplitude.width(), amplitude.height()));
+}
+
+struct Known {
+  std::string_view name, word, unit;
+  Nature nature;
+  Stage stage;
+};
+constexpr std::array kKnown{Known{"time_s", "time", "s", Nature::Time, Stage::Range},
+                            Known{"ambient_klx", "ambient", "klx", Nature::Plain, Stage::Range},
+                            Known{"exposure_us", "exposure", "us", Nature::Plain, Stage::Range},
+                            Known{"range_m", "range", "m", Nature::Distance, Stage::Range},
+                            Known{"amplitude_e", "amplitude", "e", Nature::Plain, Stage::Range},
+                            Known{"column", "position", "px", Nature::Plain, Stage::Range},
+                            Known{"row", "position", "px", Nature::Plain, Stage::Range},
+                            Known{"radius_px", "position", "px", Nature::Plain, Stage::Range},
+                            Known{"incidence", "incidence", "", Nature::Plain, Stage::Range},
+                            Known{"surround_4px", "neighbours", "", Nature::Plain, Stage::Range},
+                            Known{"surround_16px", "neighbours", "", Nature::Plain, Stage::Range},
+                            Known{"surround_all", "neighbours", "", Nature::Plain, Stage::Range}};
+
+}  // namespace
+
+CaptureCovariates covariatesOf(const MeasuredCapture& capture, const TracedCapture& traced,
+                               const Reading& declared, const CameraInfo& camera,
+                               const Cells& cells) {
+  Gatherer gatherer{cells};
+  addMoment(capture, gatherer);
+  gatherer.add("range_m", declared.range_m);
+  Image<float> amplitude = declared.log_amplitude;
+  for (float& value : amplitude.pixels()) value = std::exp(value);
+  gatherer.add("amplitude_e", amplitude);
+  addPlaces(camera, traced.light.truth, gatherer);
+  addSurroundings(declared, gatherer);
+  return gatherer.finish();
+}
+
+std::string_view wordOf(std::string_view covariate) {
+  for (const Known& known : kKnown) {
+    if (known.name == covariate) return known.word;
+  }
+  return covariate.starts_with("temperature_") ? "temperature" : covariate;
+}
+
+CovariateInfo describe(const std::string& name) {
+  CovariateInfo info{.name = name};
+  for (const Known& known : kKnown) {
+    if (known.name == name)
+      info.unit = known.unit, info.nature = known.nature, info.stage = known.stage;
+  }
+  if (name.starts_with("temperature_")) info.unit = "c", info.stage = Stage::Range;
+  return info;
+}
+
+}  // namespace toftwin::discover

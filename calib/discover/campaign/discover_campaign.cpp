@@ -1,0 +1,324 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/discover/campaign/discover_campaign.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <fstream>
+#include <sstream>
+
+#include <fmt/format.h>
+
+#include "calib/discover/campaign/model_file.h"
+#include "calib/discover/marginal.h"
+#include "calib/plan/compare_run.h"
+
+namespace toftwin::discover {
+namespace {
+
+struct DeclaredFiles {
+  Declared declared;
+  std::string text;  ///< of the camera file
+};
+
+Result<std::string> textOf(const std::filesystem::path& file) {
+  std::ifstream in{file, std::ios::binary};
+  std::ostringstream text;
+  if (in) text << in.rdbuf();
+  if (in) return text.str();
+  return Error{Error::Code::NotFound, fmt::format("{}: cannot be read", file.string())};
+}
+
+Result<DeclaredFiles> loadDeclared(const CampaignJob& job) {
+  const auto names = sim::SensorModel::presetNames();
+  const bool is_preset = std::ranges::find(names, job.model) != names.end();
+  auto text = is_preset ? sim::SensorModel::presetText(job.model) : textOf(job.model);
+  if (!text) {
+    return Error{text.error().code,
+                 fmt::format("{}; --model takes a camera file or one of the presets {}",
+                             text.error().message, fmt::join(names, ", "))};
+  }
+  auto model = sim::SensorModel::parse(*text, is_preset ? job.model + ".toml" : job.model);
+  if (!model) return model.error();
+  auto scene = sim::Scene::load(job.scene);
+  if (!scene) return scene.error();
+  DeclaredFiles files{{*std::move(model), *std::move(scene)}, *std::move(text)};
+  for (const auto& [block, file] : job.scene_of_block) {
+    auto other = sim::Scene::load(file);
+    if (!other) return other.error();
+    files.declared.scene_of_block.emplace(block, *std::move(other));
+  }
+  return files;
+}
+
+/// The measured camera's lens, if the camera file's has the same size.
+Result<> takeLens(const Campaign& campaign, Declared& declared, std::vector<std::string>& notes) {
+  const CameraInfo &measured = campaign.camera, &own = declared.model.camera();
+  if (measured.width != own.width || measured.height != own.height) {
+    return Error{
+        Error::Code::InvalidArgument,
+        fmt::format(
+            "the run's images have {} x {} pixels, the camera file's camera has {} x {}: these are "
+            "not the same camera, or a region or a decimation of it was recorded; give the camera "
+            "file of the camera that was measured (--model)",
+            measured.width, measured.height, own.width, own.height)};
+  }
+  const bool is_same = measured.fx == own.fx && measured.fy == own.fy && measured.cx == own.cx &&
+                       measured.cy == own.cy && measured.distortion == own.distortion;
+  if (is_same) return {};
+  declared.model = declared.model.withLens(measured);
+  notes.emplace_back("The recording's lens is not the camera file's; the recording's was taken.");
+  return {};
+}
+
+Error unknownBlock(const std::string& block, const Campaign& campaign) {
+  std::vector<std::string> names;
+  for (const MeasuredCapture& capture : campaign.captures) {
+    if (std::ranges::find(names, capture.record.block) == names.end())
+      names.push_back(capture.record.block);
+  }
+  return {Error::Code::InvalidArgument,
+          fmt::format("--scene-of {}: the run has no such block; there are: {}", block,
+                      fmt::join(names, ", "))};
+}
+
+/// Effects of the declared model whose numbers the data move by so much that it is no chance: χ² of
+/// their columns, with everything that was found, over 25 more than their number (5 standard
+/// errors).
+std::vector<std::size_t> wrongNumbers(const Evidence& evidence, const Finding& finding,
+                                      const std::vector<sim::AnyEffect>& effects) {
+  const Marginal marginal = marginalise(evidence, finding.scales);
+  Columns columns = nuisanceColumns(marginal);
+  for (const Group& group : marginal.groups) {
+    const bool is_found = std::ranges::any_of(finding.effects, [&](const Effect& effect) {
+      return effect.is_catalogue && effect.name == group.name;
+    });
+    if (is_found || group.kind == Kind::Generic) append(columns, group);
+  }
+  const Fit all = fit(marginal, columns);
+  std::vector<std::size_t> places;
+  for (const Group& group : marginal.groups) {
+    if (group.kind != Kind::Declared) continue;
+    Columns without;
+    for (const Eigen::Index column : columns) {
+      const auto c = static_cast<std::size_t>(column);
+      if (c < group.first || c >= group.first + group.count) without.push_back(column);
+    }
+    const double gain =
+        (fit(marginal, without).deviance - all.deviance) / std::max(1.0, all.dispersion());
+    if (gain < 25.0 + static_cast<double>(group.count)) continue;
+    const auto place = std::ranges::find_if(
+        effects, [&](const auto& effect) { return nameOf(effect) == group.name; });
+    if (place != effects.end()) places.push_back(static_cast<std::size_t>(place - effects.begin()));
+  }
+  return places;
+}
+
+/// The effects without noise, with what was found in them.
+struct Inserted {
+  std::vector<sim::AnyEffect> effects;
+  std::vector<std::size_t> fitted;  ///< places of those whose numbers are to be fitted
+};
+
+std::size_t insert(Inserted& inserted, const sim::AnyEffect& effect) {
+  const auto behind = std::ranges::find_if(inserted.effects, [&](const sim::AnyEffect& other) {
+    return placeOf(other) > placeOf(effect);
+  });
+  const auto place = static_cast<std::size_t>(behind - inserted.effects.begin());
+  inserted.effects.insert(behind, effect);
+  for (std::size_t& other : inserted.fitted) other += other >= place ? 1 : 0;
+  return place;
+}
+
+const Candidate* candidateNamed(const CampaignRows& rows, const std::string& name) {
+  for (const Candidate& candidate : rows.candidates()) {
+    if (nameOf(candidate.example) == name) return &candidate;
+  }
+  return nullptr;
+}
+
+Inserted insertFound(const CampaignRows& rows, const Declared& declared,
+                     const std::vector<std::size_t>& updates, CampaignFinding& finding) {
+  Inserted inserted{effectsWithoutNoise(declared.model), updates};
+  const std::vector<CovariateInfo> covariates = rows.covariates();
+  for (const Effect& effect : finding.finding.effects) {
+    FoundEffect found{effect, {}};
+    if (effect.is_catalogue) {
+      if (const Candidate* candidate = candidateNamed(rows, effect.name)) {
+        const sim::AnyEffect start = startOf(rows, *candidate, finding.finding.scales);
+        const std::size_t place = insert(inserted, start);
+        inserted.fitted.push_back(place);
+        found.fitted = FittedEffect{start, {}};
+      }
+    } else if (const auto learned = learnedEffectOf(effect, covariates)) {
+      insert(inserted, *learned);
+      found.fitted = FittedEffect{*learned, {}};
+    }
+    finding.effects.push_back(std::move(found));
+  }
+  return inserted;
+}
+
+void takeFitted(const Refitted& refitted, const Declared& declared, CampaignFinding& finding) {
+  const auto before = effectsWithoutNoise(declared.model);
+  for (const FittedEffect& one : refitted.fitted) {
+    const auto found = std::ranges::find_if(finding.effects, [&](const FoundEffect& effect) {
+      return effect.found.is_catalogue && effect.found.name == nameOf(one.effect);
+    });
+    if (found != finding.effects.end())
+      found->fitted = one;
+    else
+      finding.updates.push_back(one);
+  }
+  finding.offset_mm = refitted.offset_mm, finding.offset_error_mm = refitted.offset_error_mm;
+  finding.dispersion = refitted.dispersion;
+  static_cast<void>(before);
+}
+
+/// The camera file with what was found. An offset that is no chance goes in as a delay, unless
+/// there is one.
+std::string modelText(const std::string& text, const Declared& declared,
+                      const CampaignFinding& finding) {
+  const auto& effects = declared.model.effects();
+  std::vector<std::optional<FittedEffect>> updates(effects.size());
+  for (std::size_t i = 0; i < effects.size(); ++i) {
+    for (const FittedEffect& one : finding.updates) {
+      if (nameOf(one.effect) == nameOf(effects[i])) updates[i] = one;
+    }
+  }
+  std::vector<FittedEffect> added;
+  for (const FoundEffect& one : finding.effects) {
+    if (one.fitted) added.push_back(*one.fitted);
+  }
+  const bool has_delay =
+      std::ranges::any_of(effects, [](const auto& effect) { return nameOf(effect) == "delay"; });
+  if (!has_delay && std::abs(finding.offset_mm) > 3.0 * finding.offset_error_mm) {
+    added.push_back({sim::Delay{.offset = finding.offset_mm * millimetre},
+                     {{"offset_mm", finding.offset_mm, finding.offset_error_mm}}});
+  }
+  return withEffects(text, effects, updates, added,
+                     fmt::format("Written by toftwin discover from {} captures of {}.",
+                                 finding.captures, finding.plan.empty() ? "a run" : finding.plan));
+}
+
+Result<> judgeLocked(const CampaignJob& job, const Campaign& campaign, const Declared& declared,
+                     const JudgedModel& before, const JudgedModel& after,
+                     CampaignFinding& finding) {
+  if (auto opened =
+          plan::openLocked({.run = job.run, .output = job.output, .locked = true, .note = job.note},
+                           campaign.locked);
+      !opened)
+    return opened;
+  const auto captures = readLocked(campaign);
+  if (!captures) return captures.error();
+  TraceOptions options = job.trace;
+  options.seed +=
+      0x5bd1e995U;  // light of its own: what the open captures' light has by chance must not help
+  const auto at_poses = traceAll(declared, *captures, options);
+  if (!at_poses) return at_poses.error();
+  const auto traced = traceWhereTheyStood(declared, *captures, *at_poses, options);
+  if (!traced) return traced.error();
+  // Few large cells: what noise leaves of the explainable share is the smaller the fewer they are.
+  constexpr int kMostCells = 96;
+  // What an imperfect fit leaves of the open captures is no noise.
+  constexpr double kMostNoise = 1.1;
+  auto judgement = judge({declared, *captures, *traced, finding.finding.scales, kMostCells}, before,
+                         after, std::min(kMostNoise, finding.dispersion));
+  if (!judgement) return judgement.error();
+  finding.judgement = *std::move(judgement);
+  return {};
+}
+
+}  // namespace
+
+Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress& progress) {
+  const auto began = std::chrono::steady_clock::now();
+  auto files = loadDeclared(job);
+  if (!files) return files.error();
+  Declared& declared = files->declared;
+  progress.plan("read", 2.0);
+  progress.plan("trace", 8.0);
+  progress.plan("trace again where the cameras stood", 8.0);
+  progress.plan("what each effect would do", 15.0);
+  progress.plan("find", 15.0);
+  progress.plan("fit", 8.0);
+  progress.plan("judge", 5.0);
+  progress.begin();
+  const auto campaign = readCampaign(job.run, job.side);
+  if (!campaign) return campaign.error();
+  CampaignFinding finding;
+  finding.notes = campaign->notes;
+  if (auto taken = takeLens(*campaign, declared, finding.notes); !taken) return taken.error();
+  for (const auto& [block, scene] : declared.scene_of_block) {
+    const auto is_of = [&](const MeasuredCapture& capture) {
+      return capture.record.block == block;
+    };
+    if (std::ranges::none_of(campaign->captures, is_of)) return unknownBlock(block, *campaign);
+  }
+  finding.camera = declared.model.model(), finding.plan = campaign->name;
+  finding.captures = campaign->captures.size(), finding.locked = campaign->locked.size();
+  for (const MeasuredCapture& capture : campaign->captures) finding.frames += capture.frames;
+  progress.begin();
+  const auto tell = [&](double share) { progress.at(share); };
+  const auto at_poses = traceAll(declared, campaign->captures, job.trace, tell);
+  if (!at_poses) return at_poses.error();
+  progress.begin();
+  const auto traced = traceWhereTheyStood(declared, campaign->captures, *at_poses, job.trace, tell);
+  if (!traced) return traced.error();
+  progress.begin();
+  const auto rows =
+      CampaignRows::make(declared, campaign->captures, *traced, {.left_out = job.left_out});
+  if (!rows) return rows.error();
+  progress.begin();
+  finding.finding = find(*rows, job.finder);
+  progress.begin();
+  const Judged judged{declared, campaign->captures, *traced, finding.finding.scales};
+  const auto as_declared = effectsWithoutNoise(declared.model);
+  const auto plain = refit(judged, as_declared, {});
+  if (!plain) return plain.error();
+  finding.offset_before_mm = plain->offset_mm;
+  std::vector<TermGroup> terms;
+  for (const Effect& effect : finding.finding.effects) {
+    if (!effect.is_catalogue) terms.push_back({effect.name, Kind::Generic, termsOf(effect), 0});
+  }
+  const auto updates = wrongNumbers(rows->evidence(terms), finding.finding, as_declared);
+  Inserted inserted = insertFound(*rows, declared, updates, finding);
+  const auto refitted = refit(judged, inserted.effects, inserted.fitted);
+  if (!refitted) return refitted.error();
+  takeFitted(*refitted, declared, finding);
+  finding.model_toml = modelText(files->text, declared, finding);
+  progress.begin();
+  if (job.open_locked && !campaign->locked.empty()) {
+    const JudgedModel before{as_declared, plain->offset_mm, plain->gain_percent};
+    const JudgedModel after{refitted->effects, refitted->offset_mm, refitted->gain_percent};
+    if (auto done = judgeLocked(job, *campaign, declared, before, after, finding); !done)
+      return done.error();
+  } else {
+    finding.notes.emplace_back(
+        campaign->locked.empty()
+            ? "The run has no locked captures, so nothing is said of captures that the search "
+              "has not seen: lock some in the plan."
+            : "The locked captures stay closed, as asked.");
+  }
+  finding.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+  return finding;
+}
+
+Result<std::filesystem::path> discoverCampaign(const CampaignJob& job, compare::Progress& progress,
+                                               std::string* verdict) {
+  auto finding = searchCampaign(job, progress);
+  if (!finding) return finding.error();
+  auto page = writeReport(job, *finding);
+  if (!page) return page.error();
+  std::ofstream out{job.output / "model.toml"};
+  out << finding->model_toml;
+  out.flush();
+  if (!out)
+    return Error{Error::Code::StorageFull,
+                 fmt::format("{}: cannot be written", (job.output / "model.toml").string())};
+  if (verdict != nullptr) *verdict = verdictOf(*finding);
+  progress.end();
+  return page;
+}
+
+}  // namespace toftwin::discover

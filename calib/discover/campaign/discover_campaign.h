@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <toftwin/result.h>
+
+#include "calib/compare/progress.h"
+#include "calib/discover/campaign/judge.h"
+#include "calib/discover/finder.h"
+
+namespace toftwin::discover {
+
+/// What a campaign is to be searched with.
+struct CampaignJob {
+  std::filesystem::path run;
+  std::string model;  ///< a camera file, or the name of a preset
+  std::filesystem::path scene;
+  std::map<std::string, std::filesystem::path> scene_of_block{};
+  std::filesystem::path output{"discovery"};
+  Side side = Side::A;
+  TraceOptions trace{};
+  FinderOptions finder{};
+  std::vector<std::string> left_out{};  ///< effects that are no candidates
+  bool open_locked = true;
+  std::string note{};
+};
+
+/// What an effect that was found became in the model.
+struct FoundEffect {
+  Effect found;
+  std::optional<FittedEffect> fitted{};  ///< none: the simulator has no form for it
+};
+
+/// All that is known when a campaign was searched.
+struct CampaignFinding {
+  std::string camera{}, plan{};
+  std::size_t captures = 0, locked = 0, frames = 0;
+  Finding finding{};
+  std::vector<FoundEffect> effects{};
+  std::vector<FittedEffect> updates{};  ///< declared effects whose numbers were wrong
+  double offset_before_mm = 0.0, offset_mm = 0.0, offset_error_mm = 0.0;
+  double dispersion = 1.0;
+  std::optional<Judgement> judgement{};  ///< on the locked captures
+  std::string model_toml{};
+  std::vector<std::string> notes{};
+  double seconds = 0.0;
+};
+
+/// Searches the open captures, fits what was found through the simulator, and judges the model
+/// before and after on the locked captures, which it opens for that, once. Writes nothing but the
+/// note that they were opened.
+Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress& progress);
+
+/// The same, and leaves index.html, report.json, report.md and model.toml in the output folder;
+/// gives the page's path.
+Result<std::filesystem::path> discoverCampaign(const CampaignJob& job, compare::Progress& progress,
+                                               std::string* verdict = nullptr);
+
+/// Groups of the first test by how much more they explain than noise would, the most first.
+struct SeenGroup {
+  std::string name{};
+  double z = 0.0, statistic = 0.0;
+  int rank = 0;
+};
+std::vector<SeenGroup> seenFirst(const CampaignFinding& finding, std::size_t most = 10);
+
+/// In one sentence.
+std::string verdictOf(const CampaignFinding& finding);
+Result<std::filesystem::path> writeReport(const CampaignJob& job, const CampaignFinding& finding);
+
+}  // namespace toftwin::discover

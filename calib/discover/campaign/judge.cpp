@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/discover/campaign/judge.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "calib/compare/statistics.h"
+#include "calib/discover/campaign/reading.h"
+#include "calib/discover/marginal.h"
+
+namespace toftwin::discover {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+/// χ² of each capture under a model with fixed offset and gain, poses and light integrated out.
+struct ByCapture {
+  std::vector<double> energy{}, rows{};
+};
+Result<ByCapture> energiesOf(const Judged& judged, const JudgedModel& model) {
+  const auto evidence = residualEvidence(judged, model.effects);
+  if (!evidence) return evidence.error();
+  const Marginal marginal = marginalise(*evidence, judged.scales);
+  const Eigen::Vector2d known{model.offset_mm, model.gain_percent};
+  ByCapture all;
+  for (const CaptureEvidence& capture : marginal.captures) {
+    const Eigen::Matrix2d gram = capture.gram.topLeftCorner<2, 2>();
+    all.energy.push_back(capture.energy - 2.0 * known.dot(capture.moment.head<2>()) +
+                         known.dot(gram * known));
+    all.rows.push_back(capture.rows);
+  }
+  return all;
+}
+
+double removedShare(const ByCapture& before, const ByCapture& after,
+                    const std::vector<std::size_t>& drawn, double dispersion) {
+  double all = 0.0, left = 0.0;
+  for (const std::size_t c : drawn) {
+    all += before.energy[c] - dispersion * before.rows[c];
+    left += after.energy[c] - dispersion * after.rows[c];
+  }
+  return all > 0.0 ? 1.0 - left / all : kNaN;
+}
+
+void addRemoved(const ByCapture& before, const ByCapture& after, double dispersion,
+                Judgement& judgement) {
+  constexpr int kDraws = 2000;
+  constexpr std::uint64_t kSeed = 20'262;
+  const std::size_t count = before.energy.size();
+  std::vector<std::size_t> all(count);
+  for (std::size_t c = 0; c < count; ++c) {
+    all[c] = c;
+    judgement.explainable += before.energy[c] - dispersion * before.rows[c];
+  }
+  judgement.removed = removedShare(before, after, all, dispersion);
+  std::mt19937_64 engine{kSeed};
+  std::uniform_int_distribution<std::size_t> any{0, count - 1};
+  std::vector<double> shares;
+  for (int k = 0; k < kDraws; ++k) {
+    std::vector<std::size_t> drawn(count);
+    for (std::size_t& c : drawn) c = any(engine);
+    const double share = removedShare(before, after, drawn, dispersion);
+    if (std::isfinite(share)) shares.push_back(share);
+  }
+  judgement.removed_low = compare::quantile(shares, 0.025);
+  judgement.removed_high = compare::quantile(std::move(shares), 0.975);
+  double energy_before = 0.0, energy_after = 0.0, rows = 0.0;
+  for (std::size_t c = 0; c < count; ++c)
+    energy_before += before.energy[c], energy_after += after.energy[c], rows += before.rows[c];
+  judgement.before.per_row = energy_before / rows, judgement.after.per_row = energy_after / rows;
+}
+
+/// Errors of one capture's pixels.
+struct Errors {
+  std::vector<double> all_mm{};
+  double agree = 0.0, looked_at = 0.0;
+  double neighbours = 0.0, squares = 0.0;
+};
+Errors errorsOf(const MeasuredCapture& capture, const TracedCapture& traced,
+                const Reading& simulated, double offset_mm) {
+  constexpr float kGross_m = 0.3F;
+  Errors errors;
+  const int width = simulated.range_m.width(), height = simulated.range_m.height();
+  Image<float> left(width, height, std::numeric_limits<float>::quiet_NaN());
+  double mean = 0.0;
+  for (std::size_t i = 0; i < left.size(); ++i) {
+    const bool measured = capture.valid_share[i] >= 0.5F,
+               said = std::isfinite(simulated.range_m[i]);
+    errors.agree += measured == said ? 1.0 : 0.0, errors.looked_at += 1.0;
+    float error = capture.range_m.mean[i] - simulated.range_m[i];
+    for (std::size_t way = 0; way < traced.stood.size(); ++way)
+      error += static_cast<float>(traced.stood[way]) * traced.range_m[way][i];
+    if (!std::isfinite(error) || std::abs(error) > kGross_m || traced.is_edge[i] != 0) continue;
+    left[i] = error;
+    errors.all_mm.push_back(1e3 * static_cast<double>(error) - offset_mm);
+    mean += static_cast<double>(error);
+  }
+  mean /= std::max<double>(1.0, static_cast<double>(errors.all_mm.size()));
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x + 1 < width; ++x) {
+      const double a = static_cast<double>(left(x, y)) - mean,
+                   b = static_cast<double>(left(x + 1, y)) - mean;
+      if (std::isfinite(a + b)) errors.neighbours += a * b, errors.squares += 0.5 * (a * a + b * b);
+    }
+  }
+  return errors;
+}
+
+struct Totals {
+  std::vector<double> all_mm{};
+  double agree = 0.0, looked_at = 0.0, neighbours = 0.0, squares = 0.0;
+  void add(const Errors& one) {
+    all_mm.insert(all_mm.end(), one.all_mm.begin(), one.all_mm.end());
+    agree += one.agree, looked_at += one.looked_at, neighbours += one.neighbours,
+        squares += one.squares;
+  }
+  void into(RangeErrors& errors) const {
+    const compare::Summary summary = compare::summarise(all_mm);
+    errors.pixels = summary.n, errors.bias_mm = summary.mean, errors.rms_mm = summary.rms;
+    errors.p95_mm = summary.p95_abs;
+    errors.masks_agree = agree / std::max(1.0, looked_at);
+    errors.neighbour_correlation = squares > 0.0 ? neighbours / squares : 0.0;
+  }
+};
+
+}  // namespace
+
+Result<Judgement> judge(const Judged& judged, const JudgedModel& before, const JudgedModel& after,
+                        double dispersion) {
+  const auto camera_before =
+      NoiselessCamera::make(judged.declared.model, before.effects, judged.captures);
+  if (!camera_before) return camera_before.error();
+  const auto camera_after =
+      NoiselessCamera::make(judged.declared.model, after.effects, judged.captures);
+  if (!camera_after) return camera_after.error();
+  Judgement judgement;
+  Totals all_before, all_after;
+  for (std::size_t c = 0; c < judged.captures.size(); ++c) {
+    const MeasuredCapture& capture = judged.captures[c];
+    const TracedCapture& traced = *judged.traced[c];
+    const Errors then =
+        errorsOf(capture, traced, camera_before->read(capture, traced.light), before.offset_mm);
+    const Errors now =
+        errorsOf(capture, traced, camera_after->read(capture, traced.light), after.offset_mm);
+    all_before.add(then), all_after.add(now);
+    const compare::Summary s = compare::summarise(then.all_mm), t = compare::summarise(now.all_mm);
+    judgement.captures.push_back({capture.record.name, capture.record.block, s.mean, t.mean, s.rms,
+                                  t.rms, capture.record.a.since_power_on_s,
+                                  capture.record.distance_m});
+  }
+  all_before.into(judgement.before), all_after.into(judgement.after);
+  const auto energy_before = energiesOf(judged, before), energy_after = energiesOf(judged, after);
+  if (!energy_before) return energy_before.error();
+  if (!energy_after) return energy_after.error();
+  if (!judged.captures.empty()) addRemoved(*energy_before, *energy_after, dispersion, judgement);
+  return judgement;
+}
+
+}  // namespace toftwin::discover

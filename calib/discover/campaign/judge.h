@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include <toftwin/result.h>
+
+#include "calib/discover/campaign/refit.h"
+
+namespace toftwin::discover {
+
+/// Range errors of a model over the pixels of captures that it has not seen, measured − simulated.
+struct RangeErrors {
+  std::size_t pixels = 0;
+  double bias_mm = 0.0, rms_mm = 0.0, p95_mm = 0.0;
+  double masks_agree = 0.0;  ///< share of the pixels where both are valid or both are not
+  double per_row =
+      0.0;  ///< χ² per row of whitened cells, poses and light integrated out; noise alone: 1
+  /// Correlation of what is left between neighbouring cells; noise alone: 0.
+  double neighbour_correlation = 0.0;
+};
+
+/// One capture, before and after.
+struct JudgedCapture {
+  std::string name{}, block{};
+  double before_mm = 0.0, after_mm = 0.0;  ///< mean error
+  double rms_before_mm = 0.0, rms_after_mm = 0.0;
+  double since_power_on_s = 0.0, distance_m = 0.0;
+};
+
+/// A camera model without noise, and what its device's offset and gain are.
+struct JudgedModel {
+  std::vector<sim::AnyEffect> effects{};
+  double offset_mm = 0.0, gain_percent = 0.0;
+};
+
+struct Judgement {
+  RangeErrors before{}, after{};
+  std::vector<JudgedCapture> captures{};
+  /// 1 − (χ²_after − noise)/(χ²_before − noise), and its 95 % interval from captures drawn anew
+  /// with replacement.
+  double removed = 0.0, removed_low = 0.0, removed_high = 0.0;
+  double explainable = 0.0;  ///< χ²_before − noise
+};
+
+/// `dispersion`: the noise's χ² per row, as the open captures say. Error: an exposure that a model
+/// cannot have.
+Result<Judgement> judge(const Judged& judged, const JudgedModel& before, const JudgedModel& after,
+                        double dispersion);
+
+}  // namespace toftwin::discover

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/discover/campaign/reading.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <variant>
+
+#include <fmt/format.h>
+
+namespace toftwin::discover {
+namespace {
+
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+
+Reading readingOf(const sim::RangeImage& image) {
+  Reading reading{image.range_m, Image<float>(image.range_m.width(), image.range_m.height(), kNaN)};
+  for (std::size_t i = 0; i < image.range_m.size(); ++i) {
+    if (!(image.range_m[i] > 0.0F)) reading.range_m[i] = kNaN;
+    if (std::isfinite(reading.range_m[i]) && image.amplitude[i] > 0.0F)
+      reading.log_amplitude[i] = std::log(image.amplitude[i]);
+  }
+  return reading;
+}
+
+/// In microseconds; 0: that of the camera file.
+double exposureOf(const sim::SensorModel& model, const MeasuredCapture& capture) {
+  const auto& measured = capture.moment.exposures;
+  const auto own = model.exposures({});
+  const bool is_same = measured.size() == own.size() &&
+                       std::ranges::equal(own, measured, [](const auto& a, const auto& b) {
+                         return std::abs((a.duration - b.duration).in(microsecond)) < 1e-3;
+                       });
+  return measured.empty() || is_same ? 0.0 : measured.front().duration.in(microsecond);
+}
+
+}  // namespace
+
+std::vector<sim::AnyEffect> effectsWithoutNoise(const sim::SensorModel& model) {
+  std::vector<sim::AnyEffect> effects = model.effects();
+  std::erase_if(effects, [](const sim::AnyEffect& any) {
+    return std::visit(
+        []<class E>(const E&) { return E::about.explains.contains(sim::Covariate::Frame); }, any);
+  });
+  return effects;
+}
+
+Moment momentFor(const sim::SensorModel& model, const MeasuredCapture& capture) {
+  Moment moment = capture.moment;
+  moment.exposures = model.exposures({});
+  return moment;
+}
+
+Result<NoiselessCamera> NoiselessCamera::make(const sim::SensorModel& model,
+                                              std::vector<sim::AnyEffect> effects,
+                                              const std::vector<MeasuredCapture>& captures) {
+  NoiselessCamera camera;
+  const sim::SensorModel changed = model.withEffects(std::move(effects));
+  camera.models_.emplace(0.0, changed);
+  for (const MeasuredCapture& capture : captures) {
+    const double exposure_us = exposureOf(model, capture);
+    if (camera.models_.contains(exposure_us)) continue;
+    auto exposed = changed.with("exposure_us", exposure_us);
+    if (!exposed) {
+      return Error{
+          exposed.error().code,
+          fmt::format(
+              "capture {} (\"{}\") was exposed for {:.6g} us, at which the camera file's camera "
+              "cannot be simulated: {}",
+              capture.record.number, capture.record.name, exposure_us, exposed.error().message)};
+    }
+    camera.models_.emplace(exposure_us, *std::move(exposed));
+  }
+  return camera;
+}
+
+const sim::SensorModel& NoiselessCamera::at(const MeasuredCapture& capture) const {
+  return models_.at(exposureOf(models_.at(0.0), capture));
+}
+
+sim::Samples NoiselessCamera::collect(const MeasuredCapture& capture,
+                                      const sim::Light& light) const {
+  const sim::SensorModel& model = at(capture);
+  return model.collect(light, momentFor(model, capture), 0, 0);
+}
+
+Reading NoiselessCamera::read(const MeasuredCapture& capture, const sim::Light& light) const {
+  return read(capture, collect(capture, light));
+}
+
+Reading NoiselessCamera::read(const MeasuredCapture& capture, const sim::Samples& collected) const {
+  const sim::SensorModel& model = at(capture);
+  const Moment moment = momentFor(model, capture);
+  auto exposed = model.readOut(collected, moment, 0, 0);
+  if (model.remembers()) {  // repeats: the frame before saw the same
+    const sim::RangeImage before = std::move(exposed.range);
+    exposed = model.readOut(collected, moment, 0, 0, 0, 0, {&collected, &before});
+  }
+  return readingOf(exposed.range);
+}
+
+}  // namespace toftwin::discover

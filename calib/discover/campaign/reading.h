@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <optional>
+
+#include <toftwin/result.h>
+
+#include "calib/discover/campaign/campaign.h"
+
+namespace toftwin::discover {
+
+/// What a camera model says of a capture, free of noise; NaN where it has no range.
+struct Reading {
+  Image<float> range_m, log_amplitude;
+};
+
+/// The effects of a model that are not chance.
+std::vector<sim::AnyEffect> effectsWithoutNoise(const sim::SensorModel& model);
+
+/// A camera model without noise, at whatever exposure a capture was taken.
+class NoiselessCamera {
+ public:
+  /// `effects`: in the order in which they act; the caller leaves noise out. Errors: a capture's
+  /// exposure that the model cannot have.
+  static Result<NoiselessCamera> make(const sim::SensorModel& model,
+                                      std::vector<sim::AnyEffect> effects,
+                                      const std::vector<MeasuredCapture>& captures);
+
+  [[nodiscard]] Reading read(const MeasuredCapture& capture, const sim::Light& light) const;
+  /// The same from what the pixels collected, where that is known already.
+  [[nodiscard]] Reading read(const MeasuredCapture& capture, const sim::Samples& collected) const;
+  [[nodiscard]] sim::Samples collect(const MeasuredCapture& capture, const sim::Light& light) const;
+
+ private:
+  /// The model at the capture's exposure, which must be one of those that it was made for.
+  [[nodiscard]] const sim::SensorModel& at(const MeasuredCapture& capture) const;
+  std::map<double, sim::SensorModel>
+      models_{};  ///< by exposure in microseconds; 0: the model's own
+};
+
+/// The moment as the model's effects see it: the measured one, with the model's own raw exposures.
+Moment momentFor(const sim::SensorModel& model, const MeasuredCapture& capture);
+
+}  // namespace toftwin::discover

@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/discover/campaign/rows.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <variant>
+
+#include <fmt/format.h>
+
+#include "calib/discover/campaign/covariates.h"
+#include "sim/images/rows.h"
+
+namespace toftwin::discover {
+namespace {
+
+constexpr std::size_t kRange = static_cast<std::size_t>(Channel::Range);
+constexpr std::size_t kLog = static_cast<std::size_t>(Channel::LogAmplitude);
+
+/// What the simulation says with other effects than the declared ones.
+struct Variant {
+  NoiselessCamera camera;
+  bool acts_on_light = false;
+  double step = 1.0;
+};
+
+std::vector<sim::AnyEffect> replaced(std::vector<sim::AnyEffect> effects, std::size_t place,
+                                     const sim::AnyEffect& by) {
+  effects[place] = by;
+  return effects;
+}
+
+/// A capture's simulation as declared, from which variants start.
+struct Base {
+  const MeasuredCapture& capture;
+  const sim::Light& light;
+  sim::Samples collected;
+  Reading reading;
+
+  [[nodiscard]] Reading with(const Variant& variant) const {
+    return variant.acts_on_light ? variant.camera.read(capture, light)
+                                 : variant.camera.read(capture, collected);
+  }
+};
+
+/// Changes of some pixels' readings in about a millimetre: of captures that differ most.
+class Probe {
+ public:
+  Probe(const Declared& declared, const std::vector<sim::AnyEffect>& effects,
+        const std::vector<MeasuredCapture>& captures, const std::vector<const Base*>& bases)
+      : declared_(declared), effects_(effects), captures_(captures), bases_(bases) {}
+
+  /// `declared_place`: of the effect among the declared ones that varies; past the end: it is
+  /// inserted.
+  [[nodiscard]] std::vector<float> operator()(const Variation& variation,
+                                              std::size_t declared_place) const {
+    const bool is_declared = declared_place < effects_.size();
+    auto effects = is_declared ? replaced(effects_, declared_place, variation.on)
+                               : withInserted(effects_, variation.on);
+    const auto camera = NoiselessCamera::make(declared_.model, std::move(effects), captures_);
+    if (!camera) return {};
+    const Variant variant{*camera, stageOf(variation.on) == Stage::Light, 1.0};
+    std::vector<float> changes;
+    for (const Base* base : bases_) {
+      const Reading there = base->with(variant);
+      const std::size_t count = there.range_m.size(), stride = 1 + count / kPixels;
+      for (std::size_t i = 0; i < count; i += stride) {
+        const float range = 1e3F * (there.range_m[i] - base->reading.range_m[i]);
+        const float log = 1e2F * (there.log_amplitude[i] - base->reading.log_amplitude[i]);
+        changes.push_back(std::isfinite(range) ? range : 0.0F);
+        changes.push_back(std::isfinite(log) ? log : 0.0F);
+      }
+    }
+    return changes;
+  }
+
+ private:
+  static constexpr std::size_t kPixels = 1500;
+  const Declared& declared_;
+  const std::vector<sim::AnyEffect>& effects_;
+  const std::vector<MeasuredCapture>& captures_;
+  std::vector<const Base*> bases_;
+};
+
+/// Captures that between them change most of what can be changed.
+std::vector<std::size_t> probedOf(const std::vector<MeasuredCapture>& captures) {
+  std::vector<std::size_t> chosen;
+  const auto add = [&](auto&& of) {
+    const auto [least, most] = std::ranges::minmax_element(captures, {}, of);
+    for (const auto at : {least, most}) {
+      const auto number = static_cast<std::size_t>(at - captures.begin());
+      if (std::ranges::find(chosen, number) == chosen.end()) chosen.push_back(number);
+    }
+  };
+  add([](const MeasuredCapture& c) {
+    return c.moment.since_power_on ? c.moment.since_power_on->in(second) : 0.0;
+  });
+  add([](const MeasuredCapture& c) { return c.record.ambient_klx; });
+  add([](const MeasuredCapture& c) { return c.record.exposure_us; });
+  add([](const MeasuredCapture& c) {
+    return std::isfinite(c.record.distance_m) ? c.record.distance_m : 1.0;
+  });
+  return chosen;
+}
+
+std::vector<std::string> namesOf(const std::vector<sim::AnyEffect>& effects) {
+  std::vector<std::string> names;
+  for (const sim::AnyEffect& effect : effects) names.push_back(nameOf(effect));
+  return names;
+}
+
+/// Changes of z, the phasor of the highest frequency, by an electron more in its first raw
+/// exposure:
+///     δz = 2/N,   δ ln|z| = 2 cos φ / (N A),   δr = −(R/2π) 2 sin φ / (N A),   φ = 2π r/R
+/// with R the unambiguous range and N steps.
+Reading sampleImages(const sim::SensorModel& model, const Reading& declared, double period_m) {
+  Reading images{declared.range_m, declared.log_amplitude};
+  const double steps = std::max<double>(1.0, static_cast<double>(model.exposures({}).size()));
+  for (std::size_t i = 0; i < images.range_m.size(); ++i) {
+    const double phase =
+        2.0 * std::numbers::pi * static_cast<double>(declared.range_m[i]) / period_m;
+    const double share = 2.0 / steps * std::exp(-static_cast<double>(declared.log_amplitude[i]));
+    images.log_amplitude[i] = static_cast<float>(share * std::cos(phase));
+    images.range_m[i] =
+        static_cast<float>(-period_m / (2.0 * std::numbers::pi) * share * std::sin(phase));
+  }
+  return images;
+}
+
+/// One effect that varies, as a group with a camera for each of its columns.
+struct VariedEffect {
+  Group group;
+  std::vector<Variant> variants;
+};
+
+/// All effects that may be missing or have a wrong number, with the cameras that say what they
+/// would do.
+struct Varied {
+  std::vector<Candidate> candidates;
+  std::vector<VariedEffect> effects;
+};
+
+Group groupOf(const Candidate& candidate, Kind kind) {
+  Group group{.name = nameOf(candidate.example), .kind = kind, .stage = stageOf(candidate.example)};
+  group.covariates = covariatesOf(candidate.example);
+  group.count = candidate.variations.size(), group.numbers = static_cast<int>(group.count);
+  return group;
+}
+
+Result<VariedEffect> variedOf(const Declared& declared, const std::vector<sim::AnyEffect>& effects,
+                              const std::vector<MeasuredCapture>& captures,
+                              const Candidate& candidate, std::size_t declared_place) {
+  const bool is_declared = declared_place < effects.size();
+  VariedEffect varied{groupOf(candidate, is_declared ? Kind::Declared : Kind::Catalogue), {}};
+  for (const Variation& variation : candidate.variations) {
+    auto camera =
+        NoiselessCamera::make(declared.model,
+                              is_declared ? replaced(effects, declared_place, variation.on)
+                                          : withInserted(effects, variation.on),
+                              captures);
+    if (!camera) return camera.error();
+    varied.variants.push_back(
+        {*std::move(camera), stageOf(variation.on) == Stage::Light, variation.step});
+  }
+  return varied;
+}
+
+Result<Varied> varyAll(const Declared& declared, const std::vector<sim::AnyEffect>& effects,
+                       const std::vector<MeasuredCapture>& captures,
+                       const std::vector<const Base*>& probed, std::vector<std::string> left_out) {
+  const Probe probe{declared, effects, captures, probed};
+  Varied all;
+  const auto add = [&](Candidate candidate, std::size_t place) -> Result<> {
+    auto varied = variedOf(declared, effects, captures, candidate, place);
+    if (!varied) return varied.error();
+    all.effects.push_back(*std::move(varied));
+    all.candidates.push_back(std::move(candidate));
+    return {};
+  };
+  for (std::size_t place = 0; place < effects.size(); ++place) {
+    Candidate candidate = declaredCandidate(
+        effects[place], [&](const Variation& variation) { return probe(variation, place); });
+    if (candidate.variations.empty()) continue;
+    if (auto added = add(std::move(candidate), place); !added) return added.error();
+  }
+  for (std::string& name : namesOf(declared.model.effects())) left_out.push_back(std::move(name));
+  left_out.emplace_back("delay");  // the nuisance "offset" says the same
+  for (Candidate& candidate :
+       candidatesOf([&](const Variation& variation) { return probe(variation, effects.size()); },
+                    left_out)) {
+    if (auto added = add(std::move(candidate), effects.size()); !added) return added.error();
+  }
+  return all;
+}
+
+double periodOf(const sim::SensorModel& model) {
+  Frequency highest = 0_MHz;
+  for (const Frequency frequency : model.traceRequest().frequencies)
+    highest = std::max(highest, frequency);
+  return highest > 0_MHz ? unambiguousRange(highest).in(metre) : 0.0;
+}
+
+}  // namespace
+
+void CampaignRows::fill(const MeasuredCapture& capture, const TracedCapture& traced,
+                        const Reading& declared, const CameraInfo& camera,
+                        CaptureRows& rows) const {
+  rows.name = capture.record.name, rows.block = capture.record.block;
+  rows.cells = Cells{capture, traced, declared};
+  rows.covariates = covariatesOf(capture, traced, declared, camera, rows.cells);
+  std::size_t columns = kCommon;
+  for (const Group& group : groups_) columns = std::max(columns, group.first + group.count);
+  rows.whitened = WhitenedCapture{rows.cells, columns};
+  rows.whitened.putCommon(rows.cells, traced);
+  rows.whitened.putResidual(rows.cells, capture, traced, declared);
+}
+
+Result<CampaignRows> CampaignRows::make(
+    const Declared& declared, const std::vector<MeasuredCapture>& captures,
+    const std::vector<std::shared_ptr<const TracedCapture>>& traced, const Options& options) {
+  const std::vector<sim::AnyEffect> effects = effectsWithoutNoise(declared.model);
+  const auto camera = NoiselessCamera::make(declared.model, effects, captures);
+  if (!camera) return camera.error();
+  const auto baseOf = [&](std::size_t c) {
+    sim::Samples collected = camera->collect(captures[c], traced[c]->light);
+    Reading reading = camera->read(captures[c], collected);
+    return Base{captures[c], traced[c]->light, std::move(collected), std::move(reading)};
+  };
+  std::vector<Base> probed;
+  for (const std::size_t c : probedOf(captures)) probed.push_back(baseOf(c));
+  std::vector<const Base*> probed_at;
+  for (const Base& base : probed) probed_at.push_back(&base);
+  auto varied = varyAll(declared, effects, captures, probed_at, options.left_out);
+  if (!varied) return varied.error();
+
+  CampaignRows all;
+  all.groups_ = commonGroups();
+  std::size_t next = kCommon;
+  for (VariedEffect& effect : varied->effects) {
+    effect.group.first = next;
+    next += effect.group.count;
+    all.groups_.push_back(effect.group);
+  }
+  all.period_m_ = periodOf(declared.model);
+  all.candidates_ = std::move(varied->candidates);
+  all.rows_.resize(captures.size());
+  std::atomic<std::size_t> done{0};
+  sim::inParallel(static_cast<int>(captures.size()), 1, [&](int first, int last) {
+    for (auto c = static_cast<std::size_t>(first); c < static_cast<std::size_t>(last); ++c) {
+      const Base base = baseOf(c);
+      CaptureRows& rows = all.rows_[c];
+      all.fill(captures[c], *traced[c], base.reading, declared.model.camera(), rows);
+      for (const VariedEffect& effect : varied->effects) {
+        for (std::size_t i = 0; i < effect.variants.size(); ++i) {
+          rows.whitened.putChange(rows.cells, effect.group.first + i, base.reading,
+                                  base.with(effect.variants[i]));
+        }
+      }
+      const Reading sample =
+          sampleImages(declared.model, base.reading, std::max(all.period_m_, 1e-3));
+      rows.sample[kRange] = rows.cells.whitened(Channel::Range, sample.range_m);
+      if (rows.cells.has(Channel::LogAmplitude))
+        rows.sample[kLog] = rows.cells.whitened(Channel::LogAmplitude, sample.log_amplitude);
+      rows.evidence = rows.whitened.evidence(rows.name, rows.block);
+      if (options.tell)
+        options.tell(static_cast<double>(++done) / static_cast<double>(captures.size()));
+    }
+  });
+  return all;
+}
+
+}  // namespace toftwin::discover

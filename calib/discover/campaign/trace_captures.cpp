@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <array>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <numbers>
+
+#include "calib/compare/stack.h"
+#include "calib/compare/statistics.h"
+#include "calib/discover/campaign/campaign.h"
+#include "sim/tracer/trace.h"
+
+namespace toftwin::discover {
+namespace {
+
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+
+/// A share of the measurement's own noise that tracing may add; less where captures share their
+/// light, since what is the same in all of them does not average out.
+constexpr double kQuieter = 0.3;
+
+/// Where the camera is if it stands that much off.
+Transform<World, Camera> moved(const Transform<World, Camera>& world_from_camera,
+                               const Stood& stood) {
+  constexpr double kTurn = kPosePrior_deg * std::numbers::pi / 180.0;
+  Transform<Camera, Camera> by = rotation<Camera, Camera>({1.0, 0.0, 0.0}, kTurn * stood[3]) *
+                                 rotation<Camera, Camera>({0.0, 1.0, 0.0}, kTurn * stood[4]);
+  by.translation_m = kPosePrior_m * Vec3d{stood[0], stood[1], stood[2]};
+  return world_from_camera * by;
+}
+
+/// How far the phase noise of light's paths reaches into the range: σ_r = σ_φ c/(4πf) at the
+/// highest frequency.
+void addTracingNoise(TracedCapture& traced) {
+  const sim::Light& light = traced.light;
+  traced.tracing_variance_m2 = traced.tracing_variance =
+      Image<float>(light.width(), light.height());
+  if (light.frequencies.empty() || light.variance.empty()) return;
+  std::size_t highest = 0;
+  for (std::size_t f = 1; f < light.frequencies.size(); ++f) {
+    if (light.frequencies[f] > light.frequencies[highest]) highest = f;
+  }
+  const double metres =
+      unambiguousRange(light.frequencies[highest]).in(metre) / (2.0 * std::numbers::pi);
+  const auto& phasor = light.phasor(highest, 1);
+  for (std::size_t i = 0; i < phasor.size(); ++i) {
+    const auto power = static_cast<double>(std::norm(phasor[i]));
+    if (!(power > 0.0)) continue;
+    const double relative = static_cast<double>(light.variance[highest][i]) / power;
+    traced.tracing_variance[i] = static_cast<float>(relative);
+    traced.tracing_variance_m2[i] = static_cast<float>(relative * metres * metres);
+  }
+}
+
+/// Edges of range (a jump of 3 %) and of paint (one of 5 % in albedo): there a pose that is a
+/// little off changes a pixel by more than its derivative says.
+Image<std::uint8_t> edgesOf(const sim::Truth& truth) {
+  const int width = truth.range_m.width(), height = truth.range_m.height();
+  Image<std::uint8_t> edge(width, height);
+  const auto differ = [](float a, float b, float share) {
+    return std::isfinite(a) != std::isfinite(b) ||
+           std::abs(a - b) > share * std::min(std::abs(a), std::abs(b));
+  };
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      for (int j = -1; j <= 1; ++j) {
+        for (int i = -1; i <= 1; ++i) {
+          const int u = x + i, v = y + j;
+          const bool is_outside = u < 0 || v < 0 || u >= width || v >= height;  // nobody knows
+          if (is_outside || differ(truth.range_m(x, y), truth.range_m(u, v), 0.03F) ||
+              differ(truth.albedo(x, y), truth.albedo(u, v), 0.05F)) {
+            edge(x, y) = 1;
+          }
+        }
+      }
+    }
+  }
+  return edge;
+}
+
+/// Direct light through the pixels' footprints, with the same paths at each place: its changes are
+/// those of the place alone.
+sim::Light directLight(const sim::Scene& scene, sim::TraceRequest request,
+                       const Transform<World, Camera>& pose) {
+  request.world_from_camera = pose;
+  request.max_surfaces = 1;
+  request.samples_per_pixel = 4;
+  request.wanted_noise = {};
+  request.sampler = sim::Sampler::Even;
+  return sim::trace(scene, request);
+}
+
+void addMoves(const sim::Scene& scene, const sim::TraceRequest& request, TracedCapture& traced) {
+  const sim::Light here = directLight(scene, request, request.world_from_camera);
+  for (std::size_t way = 0; way < traced.range_m.size(); ++way) {
+    Stood one{};
+    one[way] = 1.0;
+    const sim::Light there = directLight(scene, request, moved(request.world_from_camera, one));
+    Image<float> range_m(here.width(), here.height()), log(here.width(), here.height());
+    for (std::size_t i = 0; i < range_m.size(); ++i) {
+      range_m[i] = there.truth.range_m[i] - here.truth.range_m[i];
+      log[i] = here.steady[i] > 0.0F && there.steady[i] > 0.0F
+                   ? std::log(there.steady[i] / here.steady[i])
+                   : kNaN;
+    }
+    traced.range_m[way] = std::move(range_m), traced.log_amplitude[way] = std::move(log);
+  }
+}
+
+/// A capture's scene and place; captures that share it share their light.
+struct Site {
+  std::size_t first = 0;  ///< a capture there
+  std::vector<std::size_t> captures{};
+  double noise_m = std::numeric_limits<double>::infinity();  ///< of the quietest, over its repeats
+};
+
+std::vector<Site> sitesOf(const std::vector<MeasuredCapture>& captures, bool each_alone) {
+  std::vector<Site> sites;
+  for (std::size_t c = 0; c < captures.size(); ++c) {
+    auto found = std::ranges::find_if(sites, [&](const Site& site) {
+      const MeasuredCapture& other = captures[site.first];
+      return !each_alone && other.record.block == captures[c].record.block &&
+             compare::samePose(*other.moment.world_from_camera,
+                               *captures[c].moment.world_from_camera);
+    });
+    if (found == sites.end()) found = sites.insert(sites.end(), Site{.first = c});
+    found->captures.push_back(c);
+    std::vector<double> variances;
+    for (const float variance : captures[c].range_m.variance.pixels()) {
+      if (std::isfinite(variance)) variances.push_back(static_cast<double>(variance));
+    }
+    if (!variances.empty())
+      found->noise_m =
+          std::min(found->noise_m, std::sqrt(compare::quantile(std::move(variances), 0.5)));
+  }
+  return sites;
+}
+
+}  // namespace
+
+Result<std::vector<std::shared_ptr<const TracedCapture>>> traceAll(
+    const Declared& declared, const std::vector<MeasuredCapture>& captures,
+    const TraceOptions& options, const std::function<void(double)>& tell,
+    const std::vector<Stood>& stood) {
+  constexpr std::uint64_t kGolden = 0x9e3779b97f4a7c15U;  // 2⁶⁴ / golden ratio
+  std::vector<std::shared_ptr<const TracedCapture>> all(captures.size());
+  const std::vector<Site> sites = sitesOf(captures, !stood.empty());
+  for (std::size_t s = 0; s < sites.size(); ++s) {
+    const MeasuredCapture& capture = captures[sites[s].first];
+    const sim::Scene& scene = declared.sceneOf(capture.record.block);
+    sim::TraceRequest request = declared.model.traceRequest();
+    const Stood here = stood.empty() ? Stood{} : stood[sites[s].first];
+    request.world_from_camera = moved(*capture.moment.world_from_camera, here);
+    request.sampler =
+        sim::Sampler::Even;  // what tiles share would look like a pattern of the camera
+    request.samples_per_pixel = options.samples_per_pixel;
+    request.max_surfaces = options.max_surfaces;
+    request.pixel_extent = options.pixel_extent;
+    request.seed = options.seed + (s + 1) * kGolden;
+    if (std::isfinite(sites[s].noise_m))
+      request.wanted_noise = std::max(kQuieter * sites[s].noise_m /
+                                          std::sqrt(static_cast<double>(sites[s].captures.size())),
+                                      1e-6) *
+                             metre;
+    auto traced = std::make_shared<TracedCapture>();
+    traced->stood = here;
+    traced->light = sim::trace(scene, request);
+    traced->is_edge = edgesOf(traced->light.truth);
+    addTracingNoise(*traced);
+    addMoves(scene, request, *traced);
+    for (const std::size_t c : sites[s].captures) all[c] = traced;
+    if (tell) tell(static_cast<double>(s + 1) / static_cast<double>(sites.size()));
+  }
+  return all;
+}
+
+}  // namespace toftwin::discover

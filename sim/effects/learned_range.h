@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "sim/effects/effect.h"
+
+namespace toftwin::sim {
+
+/// An error of the range that measurements showed and no other effect explains, as a table:
+///     r → r + t(x)    or    r → r + t(x, y)
+/// with x and y whatever the error goes with; t linear (bilinear) between its knots and constant
+/// beyond them. What `toftwin discover` writes for an effect that has no name yet.
+struct LearnedRange {
+  enum class Over {
+    Nothing,
+    Time,
+    Illumination,
+    Sensor,
+    Ambient,
+    Exposure,
+    Range,
+    Amplitude,
+    Column,
+    Row,
+    Radius
+  };
+  Over over = Over::Range;
+  std::vector<double> knots{1.0, 2.0, 3.0};
+  Over and_over = Over::Nothing;
+  std::vector<double> and_knots{};
+  std::vector<double> offsets_mm{0.0, 3.0, -1.0};
+
+  static constexpr About about{
+      .name = "learned_range",
+      .summary = "a range error learned from measurements: a table over one or two covariates",
+      .reference = "docs/discover-campaigns.md",
+      .explains = {Covariate::Range}};
+  static LearnedRange none() { return {.knots = {}, .offsets_mm = {}}; }
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.choice("over", over,
+             {{"time_s", Over::Time},
+              {"temperature_illumination_c", Over::Illumination},
+              {"temperature_sensor_c", Over::Sensor},
+              {"ambient_klx", Over::Ambient},
+              {"exposure_us", Over::Exposure},
+              {"range_m", Over::Range},
+              {"amplitude_e", Over::Amplitude},
+              {"column", Over::Column},
+              {"row", Over::Row},
+              {"radius_px", Over::Radius}},
+             "x: what the error goes with; the radius is about the principal point");
+    v.numbers("knots", knots, {-1e12, 1e12}, "values of x, ascending; none: nothing is done");
+    v.choice("and_over", and_over,
+             {{"nothing", Over::Nothing},
+              {"time_s", Over::Time},
+              {"temperature_illumination_c", Over::Illumination},
+              {"temperature_sensor_c", Over::Sensor},
+              {"ambient_klx", Over::Ambient},
+              {"exposure_us", Over::Exposure},
+              {"range_m", Over::Range},
+              {"amplitude_e", Over::Amplitude},
+              {"column", Over::Column},
+              {"row", Over::Row},
+              {"radius_px", Over::Radius}},
+             "y: what else it goes with");
+    v.numbers("and_knots", and_knots, {-1e12, 1e12}, "values of y, ascending");
+    v.numbers("offsets_mm", offsets_mm, {-10'000.0, 10'000.0},
+              "t at each knot; with y: for the first x all y, then for the next x");
+  }
+  /// What no single key can say of what is wrong, or nothing.
+  [[nodiscard]] std::string problem() const;
+  /// t, in millimetres. NaN where x or y is not known.
+  [[nodiscard]] double offset_mm(double x, double y = 0.0) const;
+  [[nodiscard]] RangeImage apply(RangeImage image, const Conditions& now,
+                                 const Random& random) const;
+};
+
+}  // namespace toftwin::sim

@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: Apache-2.0
+// Whole searches of small campaigns: what is hidden in them the finder is never told.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+
+#include "calib/discover/campaign/discover_campaign.h"
+#include "tests/discover/simulated_run.h"
+
+namespace toftwin::discover {
+namespace {
+
+using testing::Contains;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+class Searched : public testing::Test {
+ protected:
+  Searched()
+      : folder_(std::filesystem::temp_directory_path() /
+                fmt::format("toftwin-campaign-{}", ::getpid())) {
+    std::filesystem::create_directories(folder_);
+    write("camera.toml", smallCamera());
+    write("scene.toml", smallScene());
+  }
+  ~Searched() override { std::filesystem::remove_all(folder_); }
+
+  void write(const std::string& name, const std::string& text) const {
+    std::ofstream{folder_ / name} << text;
+  }
+
+  using Spoil = decltype(SimulatedRun::spoil);
+  void simulate(const std::string& hidden, const Spoil& spoil = {}, bool with_poses = true,
+                int frames = 0) const {
+    auto plan = plan::parsePlan(smallPlan(), "plan.toml");
+    const auto camera = sim::SensorModel::parse(smallCamera(hidden), "camera.toml");
+    const auto scene = sim::Scene::parse(smallScene(), "scene.toml");
+    if (!plan || !camera || !scene)
+      throw std::runtime_error("the small campaign's files are wrong");
+    SimulatedRun run{.plan = *plan,
+                     .camera = *camera,
+                     .scene = *scene,
+                     .spoil = spoil,
+                     .with_poses = with_poses};
+    run.frames = frames;
+    discover::write(run, folder_ / "run");
+  }
+  [[nodiscard]] CampaignJob job() const {
+    CampaignJob job{.run = folder_ / "run",
+                    .model = (folder_ / "camera.toml").string(),
+                    .scene = folder_ / "scene.toml"};
+    job.output = folder_ / "out";
+    job.trace.max_surfaces = 1;
+    return job;
+  }
+  static CampaignFinding search(const CampaignJob& job) {
+    compare::Progress silent{nullptr};
+    auto finding = searchCampaign(job, silent);
+    if (!finding) throw std::runtime_error(finding.error().message);
+    return *std::move(finding);
+  }
+  static std::string errorOf(const CampaignJob& job) {
+    compare::Progress silent{nullptr};
+    const auto finding = searchCampaign(job, silent);
+    return finding ? "" : finding.error().message;
+  }
+  static std::vector<std::string> namesOf(const CampaignFinding& finding) {
+    std::vector<std::string> names;
+    for (const FoundEffect& one : finding.effects)
+      names.push_back(one.found.is_catalogue ? one.found.name : "undeclared");
+    return names;
+  }
+  std::filesystem::path folder_;
+};
+
+TEST_F(Searched, NothingIsFoundWhereNothingIsHidden) {
+  simulate("");
+  const CampaignFinding finding = search(job());
+  EXPECT_TRUE(finding.effects.empty()) << verdictOf(finding);
+  EXPECT_TRUE(finding.updates.empty()) << verdictOf(finding);
+}
+
+TEST_F(Searched, AHiddenEffectOfTheCatalogueIsNamedFittedAndAdded) {
+  simulate("[[effect]]\ntype = 'lens_scatter'\nveil = 0.004\nhalo = 0.006\n");
+  compare::Progress silent{nullptr};
+  std::string verdict;
+  const auto page = discoverCampaign(job(), silent, &verdict);
+  ASSERT_TRUE(page) << page.error().message;
+  EXPECT_THAT(verdict, HasSubstr("The model lacks lens_scatter"));
+  const auto model = sim::SensorModel::load(folder_ / "out" / "model.toml");
+  ASSERT_TRUE(model) << model.error().message;
+  const auto effects = model->effects();
+  const auto scatter = std::ranges::find_if(
+      effects, [](const auto& any) { return std::holds_alternative<sim::LensScatter>(any); });
+  ASSERT_NE(scatter, effects.end());
+  const auto& found = std::get<sim::LensScatter>(*scatter);
+  EXPECT_GT(found.veil + found.halo, 0.0);
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "out" / "report.json"));
+  // Opened once, and no more.
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "run" / plan::kOpenedFile));
+  EXPECT_THAT(errorOf(job()), HasSubstr("the locked captures were opened on 20"));
+}
+
+TEST_F(Searched, WhatRemainsOnLockedCapturesIsLess) {
+  simulate("[[effect]]\ntype = 'clock_scale'\nppm = 3000.0\n");
+  const CampaignFinding finding = search(job());
+  ASSERT_THAT(namesOf(finding), ElementsAre("clock_scale")) << verdictOf(finding);
+  ASSERT_TRUE(finding.judgement);
+  EXPECT_LT(finding.judgement->after.rms_mm, 0.8 * finding.judgement->before.rms_mm);
+  EXPECT_GT(finding.judgement->removed, 0.75);
+  const auto& numbers = finding.effects.front().fitted->numbers;
+  ASSERT_EQ(numbers.size(), 1u);
+  EXPECT_NEAR(numbers.front().value, 3000.0, 4.0 * numbers.front().error);
+}
+
+/// 5 mm for each e-fold of exposure, which no effect of the catalogue does.
+TEST_F(Searched, AnEffectOfNoCatalogueIsCalledUndeclaredAndNamedByWhatItGoesWith) {
+  simulate("", [](sim::RangeImage& image, const Moment& moment, const CameraInfo&, std::uint64_t) {
+    const double folds = std::log(moment.exposures.front().duration.in(microsecond) / 500.0);
+    for (float& range_m : image.range_m.pixels()) range_m += static_cast<float>(5e-3 * folds);
+  });
+  const CampaignFinding finding = search(job());
+  ASSERT_THAT(namesOf(finding), ElementsAre("undeclared")) << verdictOf(finding);
+  EXPECT_THAT(finding.effects.front().found.covariates, ElementsAre("exposure_us"));
+  ASSERT_TRUE(finding.effects.front().fitted) << "not in the model";
+  const auto model = sim::SensorModel::parse(finding.model_toml, "model.toml");
+  ASSERT_TRUE(model) << model.error().message;
+  EXPECT_THAT(model->effectNames(), Contains("learned_range"));
+}
+
+TEST_F(Searched, AWrongNumberOfADeclaredEffectIsAnUpdateAndNoNewEffect) {
+  simulate("[[effect]]\ntype = 'clock_scale'\nppm = 5000.0\n");
+  write("camera.toml", smallCamera("[[effect]]\ntype = 'clock_scale'\nppm = 1000.0\n"));
+  const CampaignFinding finding = search(job());
+  EXPECT_TRUE(finding.effects.empty()) << verdictOf(finding);
+  ASSERT_EQ(finding.updates.size(), 1u) << verdictOf(finding);
+  const FittedNumber& ppm = finding.updates.front().numbers.front();
+  EXPECT_NEAR(ppm.value, 5000.0, 4.0 * ppm.error);
+  const auto model = sim::SensorModel::parse(finding.model_toml, "model.toml");
+  ASSERT_TRUE(model) << model.error().message;
+  EXPECT_EQ(std::ranges::count(model->effectNames(), std::string{"clock_scale"}), 1);
+}
+
+TEST_F(Searched, SaysWhatIsMissingOrWrong) {
+  CampaignJob other = job();
+  EXPECT_THAT(errorOf(other), HasSubstr("the folder of a run of `toftwin measure`?"));
+  other.scene = folder_ / "nowhere.toml";
+  EXPECT_THAT(errorOf(other), HasSubstr("nowhere.toml"));
+  other = job();
+  other.model = (folder_ / "no.toml").string();
+  EXPECT_THAT(errorOf(other), HasSubstr("--model takes a camera file or one of the presets"));
+  write("camera.toml", smallCamera("[[effect]]\ntype = 'clock_scale'\nppmm = 1\n"));
+  EXPECT_THAT(errorOf(job()), HasSubstr("ppmm"));
+}
+
+TEST_F(Searched, SaysWhyARunCannotBeSearched) {
+  simulate("", {}, false, 2);
+  EXPECT_THAT(errorOf(job()), HasSubstr("give poses in the plan"));
+  simulate("", {}, true, 1);
+  EXPECT_THAT(errorOf(job()), HasSubstr("without repeats nothing is known of the noise"));
+  simulate("", {}, true, 2);
+  std::string small = smallCamera();
+  small.replace(small.find("width = 44"), 10, "width = 40");
+  write("camera.toml", small);
+  EXPECT_THAT(
+      errorOf(job()),
+      HasSubstr("the run's images have 44 x 33 pixels, the camera file's camera has 40 x 33"));
+  write("camera.toml", smallCamera());
+  CampaignJob with_block = job();
+  with_block.scene_of_block["corner"] = folder_ / "scene.toml";
+  EXPECT_THAT(errorOf(with_block), HasSubstr("the run has no such block; there are: warm-up"));
+}
+
+TEST_F(Searched, ADamagedCaptureIsAnErrorThatNamesIt) {
+  simulate("", {}, true, 2);
+  write("run/captures/0003-a.mcap", "damaged");
+  EXPECT_THAT(errorOf(job()), HasSubstr("capture 3 (\"warm-up: 1.5 m\")"));
+}
+
+}  // namespace
+}  // namespace toftwin::discover

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <string>
+
+#include "calib/plan/plan.h"
+#include "sim/sensor/sensor_model.h"
+#include "sim/tracer/scene.h"
+
+namespace toftwin::discover {
+
+/// A run of `toftwin measure` made without a daemon: what a simulated camera would have recorded,
+/// with a rig and a lamp that are a little off.
+struct SimulatedRun {
+  const plan::Plan& plan;
+  const sim::SensorModel& camera;  ///< with what is hidden in it
+  const sim::Scene& scene;
+  std::map<std::string, sim::Scene> scene_of_block{};
+  std::uint64_t seed = 1;
+  double pose_error_m = 1e-3, pose_error_deg = 0.1, light_error = 0.01;
+  /// What no camera file says is done to each frame's ranges: an effect of no catalogue.
+  std::function<void(sim::RangeImage&, const Moment&, const CameraInfo&, std::uint64_t frame)>
+      spoil{};
+  bool with_poses = true;
+  int frames = 0;  ///< of each capture; 0: the plan's
+};
+
+/// Writes the folder. Throws std::runtime_error: a test has no other use for it.
+void write(const SimulatedRun& run, const std::filesystem::path& folder);
+
+/// A small camera of 44 × 33 pixels with two frequencies, as text; `effects` are appended to it.
+std::string smallCamera(const std::string& effects = {});
+/// A wall with a bright plate before it, and a floor: something to see from everywhere.
+std::string smallScene();
+/// 30 captures and 8 locked ones: warm-up, distance, exposure, ambient, tilt.
+std::string smallPlan();
+
+}  // namespace toftwin::discover

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/cli/discover_campaign.h"
+
+#include <fmt/format.h>
+
+#include "calib/discover/campaign/discover_campaign.h"
+#include "sim/effects/effects.h"
+
+namespace toftwin::cli {
+namespace {
+
+Result<discover::CampaignJob> jobOf(const std::string& run, const std::string& output,
+                                    const CampaignOptions& options) {
+  if (options.model.empty() || options.scene.empty()) {
+    return Error{Error::Code::InvalidArgument,
+                 fmt::format("{} is the folder of a run: that takes --model, the camera file that "
+                             "is to be mended, and "
+                             "--scene, what the camera looked at",
+                             run)};
+  }
+  discover::CampaignJob job{
+      .run = run, .model = options.model, .scene = options.scene, .output = output};
+  for (const std::string& one : options.scenes_of) {
+    const auto equals = one.find('=');
+    if (equals == std::string::npos || equals == 0 || equals + 1 == one.size()) {
+      return Error{
+          Error::Code::InvalidArgument,
+          fmt::format("--scene-of {}: it takes BLOCK=FILE, such as corner-90=corner.toml", one)};
+    }
+    job.scene_of_block[one.substr(0, equals)] = one.substr(equals + 1);
+  }
+  for (const std::string& name : options.without) {
+    bool is_known = false;
+    sim::AllEffects::forEach([&]<class E>() { is_known |= name == E::about.name; });
+    if (!is_known) {
+      return Error{
+          Error::Code::InvalidArgument,
+          fmt::format("--without {}: there is no such effect; docs/effects/README.md lists them",
+                      name)};
+    }
+  }
+  job.left_out = options.without;
+  job.side = options.is_b ? discover::Side::B : discover::Side::A;
+  job.open_locked = !options.keep_locked;
+  job.trace.samples_per_pixel = options.samples_per_pixel;
+  job.trace.max_surfaces = options.max_surfaces;
+  job.note = options.note;
+  return job;
+}
+
+}  // namespace
+
+void CampaignOptions::add(Arguments& args) {
+  args.option("--model", model, "of a run: the camera file that is to be mended, or a preset");
+  args.option("--scene", scene, "of a run: the scene file of what the camera looked at");
+  args.option("--scene-of", scenes_of,
+              "of a run: BLOCK=FILE, another scene in a block of the plan; as often as needed")
+      .oneAtATime();
+  args.flag("--b", is_b, "of a run: search the recordings of camera B instead of A");
+  args.flag("--keep-locked", keep_locked,
+            "of a run: leave the locked captures closed, and judge nothing");
+  args.option("--samples-per-pixel", samples_per_pixel, "of a run: light paths at most")
+      .within(1, 65'536)
+      .showsDefault();
+  args.option("--max-surfaces", max_surfaces, "of a run: surfaces that a light path may touch")
+      .within(1, 64)
+      .showsDefault();
+  args.option("--without", without, "of a run: effects that are not to be thought of")
+      .separatedBy(',')
+      .oneAtATime();
+  args.option("--note", note, "for the report's foot, such as a commit");
+}
+
+bool CampaignOptions::isGiven() const {
+  return !model.empty() || !scene.empty() || !scenes_of.empty() || is_b || keep_locked ||
+         !without.empty();
+}
+
+Result<Exit> discoverRun(const std::string& run, const std::string& output,
+                         const CampaignOptions& options) {
+  const auto job = jobOf(run, output, options);
+  if (!job) return job.error();
+  compare::Progress progress{stderr};
+  std::string verdict;
+  const auto page = discover::discoverCampaign(*job, progress, &verdict);
+  if (!page) return page.error();
+  fmt::print("{}.\n{}\n", verdict, page->string());
+  return Exit::Ok;
+}
+
+}  // namespace toftwin::cli

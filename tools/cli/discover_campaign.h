@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "tools/cli/arguments.h"
+#include "tools/cli/command.h"
+
+namespace toftwin::cli {
+
+/// What `toftwin discover` asks for where it searches a run of `toftwin measure`.
+struct CampaignOptions {
+  std::string model, scene;
+  std::vector<std::string> scenes_of;
+  bool is_b = false;
+  bool keep_locked = false;
+  int samples_per_pixel = 256, max_surfaces = 4;
+  std::vector<std::string> without;
+  std::string note;
+  void add(Arguments& args);
+  /// Whether any of them was given.
+  [[nodiscard]] bool isGiven() const;
+};
+
+/// Searches the run and leaves its report in the folder.
+Result<Exit> discoverRun(const std::string& run, const std::string& output,
+                         const CampaignOptions& options);
+
+}  // namespace toftwin::cli
