@@ -63,7 +63,8 @@ TermGroup waves(const CovariateInfo& covariate, int least, int most) {
 TermGroup parity(const CovariateInfo& covariate, int modulus) {
   TermGroup group{fmt::format("{} modulo {}", covariate.name, modulus), Kind::Generic, {}, 0};
   for (int r = 1; r < modulus; ++r)
-    group.terms.push_back(one(covariate, Shape::Modulo, {static_cast<double>(modulus), static_cast<double>(r)}));
+    group.terms.push_back(
+        one(covariate, Shape::Modulo, {static_cast<double>(modulus), static_cast<double>(r)}));
   return group;
 }
 
@@ -88,7 +89,8 @@ std::vector<Term> products(const std::vector<Term>& a, const std::vector<Term>& 
 }
 
 TermGroup smoothIn(const CovariateInfo& covariate, std::size_t knots) {
-  TermGroup group{fmt::format("smooth in {}", covariate.name), Kind::Generic, completeBasis(covariate, knots), 0};
+  TermGroup group{fmt::format("smooth in {}", covariate.name), Kind::Generic, completeBasis(covariate, knots),
+                  0};
   if (!group.terms.empty()) group.terms.erase(group.terms.begin());
   return group;
 }

@@ -12,16 +12,17 @@
 namespace toftwin::discover {
 
 struct CandidateOptions {
-  std::size_t captures = 100;    ///< that the columns are to be fitted to: few captures, few columns
-  std::size_t most_pairs = 28;   ///< of covariates that act together
+  std::size_t captures = 100;   ///< that the columns are to be fitted to: few captures, few columns
+  std::size_t most_pairs = 28;  ///< of covariates that act together
 };
 
-/// For each covariate: a smooth function of it; waves of 1 to 20 periods over its spread; for a count of frames,
-/// even and odd; for names, each its own value. For each pair: a smooth surface.
-std::vector<TermGroup> genericCandidates(std::span<const CovariateInfo> covariates, const CandidateOptions& options);
+/// For each covariate: a smooth function of it; waves of 1 to 20 periods over its spread; for a count of
+/// frames, even and odd; for names, each its own value. For each pair: a smooth surface.
+std::vector<TermGroup> genericCandidates(std::span<const CovariateInfo> covariates,
+                                         const CandidateOptions& options);
 
-/// A smooth function: hats between `knots` quantiles, without the first, whose place an offset takes. Levels: one
-/// hat for each; names: one value for each.
+/// A smooth function: hats between `knots` quantiles, without the first, whose place an offset takes. Levels:
+/// one hat for each; names: one value for each.
 TermGroup smoothIn(const CovariateInfo& covariate, std::size_t knots);
 /// A surface over two covariates.
 TermGroup smoothIn(const CovariateInfo& a, const CovariateInfo& b, std::size_t knots);

@@ -29,8 +29,8 @@ std::vector<Training> trainingSums(const Marginal& marginal, const std::vector<i
 VectorXd solve(const Marginal& marginal, const Training& training, const Columns& columns) {
   MatrixXd gram = training.gram(columns, columns);
   gram.diagonal() += marginal.precision(columns);
-  // A coefficient that the fitted captures do not know stays at nothing instead of anywhere: a thousandth of a
-  // typical column's weight.
+  // A coefficient that the fitted captures do not know stays at nothing instead of anywhere: a thousandth of
+  // a typical column's weight.
   gram.diagonal() += 1e-6 * MatrixXd(marginal.gram(columns, columns)).diagonal();
   return pseudoInverse(gram, 1e-8).inverse * VectorXd(training.moment(columns));
 }
@@ -95,6 +95,8 @@ Difference difference(const Gain& a, const Gain& b) {
   return out;
 }
 
-Difference against0(const Gain& gain) { return difference(gain, {gain.group, 0.0, std::vector<double>(gain.by_capture.size())}); }
+Difference against0(const Gain& gain) {
+  return difference(gain, {gain.group, 0.0, std::vector<double>(gain.by_capture.size())});
+}
 
 }  // namespace toftwin::discover

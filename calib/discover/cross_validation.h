@@ -9,8 +9,8 @@
 /// Does a group predict captures that it was not fitted to?
 namespace toftwin::discover {
 
-/// How much less deviance is left of held-out captures with the group than without it; in units of the noise's
-/// variance, so that an effect of noncentrality λ with k numbers gains about λ − k.
+/// How much less deviance is left of held-out captures with the group than without it; in units of the
+/// noise's variance, so that an effect of noncentrality λ with k numbers gains about λ − k.
 struct Gain {
   std::size_t group = 0;
   double total = 0.0;

@@ -56,7 +56,8 @@ std::optional<std::vector<std::string>> fieldsOf(std::string_view line, char sep
 
 Result<> takeHeader(CsvTable& table, const std::filesystem::path& name, std::size_t line) {
   if (table.header.size() > kMostColumns)
-    return malformed(name, line, fmt::format("has {} columns, more than {}", table.header.size(), kMostColumns));
+    return malformed(name, line,
+                     fmt::format("has {} columns, more than {}", table.header.size(), kMostColumns));
   std::set<std::string> seen;
   for (std::size_t i = 0; i < table.header.size(); ++i) {
     if (table.header[i].empty()) return malformed(name, line, fmt::format("column {} has no header", i + 1));
@@ -91,8 +92,9 @@ Result<CsvTable> parseCsv(std::string_view text, const std::filesystem::path& na
       continue;
     }
     if (fields->size() != table.header.size()) {
-      return malformed(name, number, fmt::format("has {} fields, but the header has {}", fields->size(),
-                                                 table.header.size()));
+      return malformed(
+          name, number,
+          fmt::format("has {} fields, but the header has {}", fields->size(), table.header.size()));
     }
     if (table.rows() == kMostRows) return malformed(name, number, "is beyond a million rows: thin the table");
     for (std::size_t i = 0; i < fields->size(); ++i) table.columns[i].push_back(std::move((*fields)[i]));

@@ -19,9 +19,10 @@ struct CsvTable {
   [[nodiscard]] std::size_t rows() const { return line.size(); }
 };
 
-/// A header line and rows, separated by commas, semicolons or tabs (whichever the header has most of); fields may be
-/// quoted, lines that begin with # and empty lines are left out. Errors name file and line: a row with more or fewer
-/// fields than the header, a header twice, an open quote, no rows, over a million rows or 400 columns.
+/// A header line and rows, separated by commas, semicolons or tabs (whichever the header has most of); fields
+/// may be quoted, lines that begin with # and empty lines are left out. Errors name file and line: a row with
+/// more or fewer fields than the header, a header twice, an open quote, no rows, over a million rows or 400
+/// columns.
 Result<CsvTable> parseCsv(std::string_view text, const std::filesystem::path& name);
 Result<CsvTable> loadCsv(const std::filesystem::path& file);
 

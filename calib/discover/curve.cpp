@@ -44,7 +44,8 @@ Point effectAt(const Effect& effect, const std::map<std::string, double>& at) {
       if (inner < numbers) slope(inner++) = (partAt(part, coefficient, moved, at) - here) / step;
     }
   }
-  if (effect.covariance.rows() == numbers) point.error = std::sqrt(std::max(0.0, slope.dot(effect.covariance * slope)));
+  if (effect.covariance.rows() == numbers)
+    point.error = std::sqrt(std::max(0.0, slope.dot(effect.covariance * slope)));
   return point;
 }
 

@@ -31,11 +31,13 @@ void addConfounded(TableData& data) {
   for (const TableCovariate& covariate : data.covariates) ranks.push_back(ranksOf(covariate.values));
   for (std::size_t i = 0; i < ranks.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j) {
-      const double r = ranks[i].dot(ranks[j]) / std::sqrt(ranks[i].squaredNorm() * ranks[j].squaredNorm() + 1e-300);
+      const double r =
+          ranks[i].dot(ranks[j]) / std::sqrt(ranks[i].squaredNorm() * ranks[j].squaredNorm() + 1e-300);
       if (std::abs(r) < 0.9) continue;
-      data.doubts.push_back(fmt::format("{} and {} go together (rank correlation {:.2f}): what goes with one can "
-                                        "hardly be told from what goes with the other",
-                                        data.covariates[j].name, data.covariates[i].name, r));
+      data.doubts.push_back(
+          fmt::format("{} and {} go together (rank correlation {:.2f}): what goes with one can "
+                      "hardly be told from what goes with the other",
+                      data.covariates[j].name, data.covariates[i].name, r));
     }
   }
 }
@@ -61,7 +63,8 @@ Result<TableDiscovery> discoverTable(const std::filesystem::path& file, const Ta
   out.locked = rowsOf(*data, data->locked), out.open = rowsOf(*data, is_open);
   if (out.open.rows() < 16) {
     return Error{Error::Code::InvalidArgument,
-                 fmt::format("{}: only {} rows are not locked; at least 16 are needed", file.string(), out.open.rows())};
+                 fmt::format("{}: only {} rows are not locked; at least 16 are needed", file.string(),
+                             out.open.rows())};
   }
   out.judged.sha256 = hashOf(out.locked);
   addConfounded(out.open);
@@ -78,7 +81,8 @@ Result<TableDiscovery> discoverTable(const std::filesystem::path& file, const Ta
   return out;
 }
 
-Result<std::filesystem::path> writeDiscovery(const TableDiscovery& discovery, const std::filesystem::path& folder) {
+Result<std::filesystem::path> writeDiscovery(const TableDiscovery& discovery,
+                                             const std::filesystem::path& folder) {
   auto page = compare::write(reportOf(discovery), folder);
   if (!page) return page;
   const auto file = folder / "model.toml";

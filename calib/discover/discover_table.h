@@ -21,7 +21,7 @@ struct TableDiscovery {
   TableMap map{};
   Finding finding{};
   TableNoise noise{};
-  std::vector<Estimate> plain{};  ///< nuisances without effects
+  std::vector<Estimate> plain{};          ///< nuisances without effects
   std::vector<double> before{}, after{};  ///< what is left of the open rows
   Judged judged{};
   std::size_t captures = 0;
@@ -37,6 +37,7 @@ compare::Report reportOf(const TableDiscovery& discovery);
 std::string modelToml(const TableDiscovery& discovery);
 
 /// Writes index.html, report.json, report.md and model.toml into the folder; gives the page's path.
-Result<std::filesystem::path> writeDiscovery(const TableDiscovery& discovery, const std::filesystem::path& folder);
+Result<std::filesystem::path> writeDiscovery(const TableDiscovery& discovery,
+                                             const std::filesystem::path& folder);
 
 }  // namespace toftwin::discover

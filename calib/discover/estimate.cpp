@@ -28,7 +28,7 @@ TermGroup moved(const FittedForm& part, std::size_t which) {
 
 /// Derivatives of the model by its numbers: which combination of the evidence's columns each is.
 struct Jacobian {
-  MatrixXd columns;                 ///< of the evidence × numbers
+  MatrixXd columns;  ///< of the evidence × numbers
   std::vector<FittedForm*> inner_of;
   std::vector<std::size_t> inner_which;
   Index nuisances = 0, coefficients = 0;
@@ -43,8 +43,8 @@ Jacobian jacobianOf(const Marginal& marginal, std::vector<Effect>& effects, cons
   Jacobian out;
   out.nuisances = static_cast<Index>(nuisances.size());
   out.coefficients = static_cast<Index>(own.size());
-  out.columns = MatrixXd::Zero(marginal.moment.size(),
-                               out.nuisances + out.coefficients + static_cast<Index>(inner));
+  out.columns =
+      MatrixXd::Zero(marginal.moment.size(), out.nuisances + out.coefficients + static_cast<Index>(inner));
   Index next = 0;
   for (const Index column : nuisances) out.columns(column, next++) = 1.0;
   for (const Index column : own) out.columns(column, next++) = 1.0;
@@ -78,13 +78,15 @@ struct Linear {
   VectorXd coefficient;  ///< of `own`
 };
 
-Linear linearise(const RowSource& source, std::span<const double> scales, const std::vector<Effect>& effects) {
+Linear linearise(const RowSource& source, std::span<const double> scales,
+                 const std::vector<Effect>& effects) {
   const bool needs_catalogue = std::ranges::any_of(effects, &Effect::is_catalogue);
   Linear out;
   std::vector<TermGroup> extra = groupsOf(effects);
   const std::size_t parts = extra.size();
   for (TermGroup& tangent : tangentsOf(effects)) extra.push_back(std::move(tangent));
-  out.marginal = marginalise(needs_catalogue ? source.evidence(extra) : source.withoutCatalogue(extra), scales);
+  out.marginal =
+      marginalise(needs_catalogue ? source.evidence(extra) : source.withoutCatalogue(extra), scales);
   out.nuisances = nuisanceColumns(out.marginal);
   std::size_t group = out.marginal.groups.size() - extra.size();
   const std::size_t end = group + parts;
@@ -95,9 +97,8 @@ Linear linearise(const RowSource& source, std::span<const double> scales, const 
     }
     for (std::size_t i = 0; i < effect.parts.size(); ++i) append(out.own, out.marginal.groups[group++]);
   }
-  out.first_tangent = end < out.marginal.groups.size()
-                          ? static_cast<Index>(out.marginal.groups[end].first)
-                          : out.marginal.moment.size();
+  out.first_tangent = end < out.marginal.groups.size() ? static_cast<Index>(out.marginal.groups[end].first)
+                                                       : out.marginal.moment.size();
   Columns columns = out.nuisances;
   columns.insert(columns.end(), out.own.begin(), out.own.end());
   out.fitted = fit(out.marginal, columns);
@@ -116,7 +117,8 @@ void improve(const RowSource& source, std::span<const double> scales, std::vecto
   for (int iteration = 0; iteration < 4; ++iteration) {
     const Linear now = linearise(source, scales, effects);
     std::vector<Effect> next = effects;
-    const Jacobian j = jacobianOf(now.marginal, next, now.own, now.nuisances, now.coefficient, now.first_tangent);
+    const Jacobian j =
+        jacobianOf(now.marginal, next, now.own, now.nuisances, now.coefficient, now.first_tangent);
     if (j.inner_of.empty()) return;
     MatrixXd gram = j.columns.transpose() * now.marginal.gram * j.columns;
     gram.diagonal().head(j.nuisances) += now.marginal.precision(now.nuisances);
@@ -126,7 +128,8 @@ void improve(const RowSource& source, std::span<const double> scales, std::vecto
       const Inner& inner = part.form.inner[j.inner_which[i]];
       double& value = part.inner[j.inner_which[i]];
       const double most = 5.0 * stepOf(inner, value);
-      value = kept(inner, value + std::clamp(step(j.nuisances + j.coefficients + static_cast<Index>(i)), -most, most));
+      value = kept(
+          inner, value + std::clamp(step(j.nuisances + j.coefficients + static_cast<Index>(i)), -most, most));
     }
     for (Effect& effect : next)
       for (FittedForm& part : effect.parts)
@@ -143,8 +146,9 @@ MatrixXd covarianceOf(const Linear& at, const Jacobian& j) {
   const PseudoInverse bread = pseudoInverse(gram, 1e-8);
   MatrixXd meat = MatrixXd::Zero(gram.rows(), gram.cols());
   for (const CaptureEvidence& capture : at.marginal.captures) {
-    const VectorXd residual = j.columns.transpose() * (capture.moment - capture.gram(Eigen::all, at.fitted.columns) *
-                                                                            at.fitted.coefficient);
+    const VectorXd residual =
+        j.columns.transpose() *
+        (capture.moment - capture.gram(Eigen::all, at.fitted.columns) * at.fitted.coefficient);
     meat += residual * residual.transpose();
   }
   meat *= captures / std::max(captures - bread.rank, 1.0);
@@ -201,7 +205,8 @@ std::vector<Estimate> estimate(const RowSource& source, std::span<const double> 
   for (const Group& group : at.marginal.groups) {
     if (group.kind != Kind::Nuisance && group.kind != Kind::Shared && group.kind != Kind::Declared) continue;
     for (std::size_t i = 0; i < group.count; ++i, ++next) {
-      nuisances.push_back({group.name, at.fitted.coefficient(next), std::sqrt(std::max(0.0, covariance(next, next)))});
+      nuisances.push_back(
+          {group.name, at.fitted.coefficient(next), std::sqrt(std::max(0.0, covariance(next, next)))});
     }
   }
   Index term = j.nuisances, inner = j.nuisances + j.coefficients;
@@ -213,9 +218,9 @@ std::vector<Estimate> estimate(const RowSource& source, std::span<const double> 
     for (std::size_t t = 0; t < count; ++t, ++term) {
       which.push_back(term);
       effect.coefficient.push_back(at.coefficient(term - j.nuisances));
-      effect.numbers.push_back({effect.is_catalogue ? fmt::format("{} {}", effect.name, t + 1)
-                                                    : inWords(termsOf(effect)[t]),
-                                effect.coefficient.back(), 0.0});
+      effect.numbers.push_back(
+          {effect.is_catalogue ? fmt::format("{} {}", effect.name, t + 1) : inWords(termsOf(effect)[t]),
+           effect.coefficient.back(), 0.0});
     }
     for (const FittedForm& part : effect.parts) {
       for (std::size_t i = 0; i < part.inner.size(); ++i, ++inner) {

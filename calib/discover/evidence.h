@@ -9,8 +9,8 @@
 
 #include <Eigen/Dense>
 
-/// What measured data say against a declared model, and what they say about each thing that could be missing in
-/// it. The finder (finder.h) sees nothing else: neither cameras nor files.
+/// What measured data say against a declared model, and what they say about each thing that could be missing
+/// in it. The finder (finder.h) sees nothing else: neither cameras nor files.
 namespace toftwin::discover {
 
 /// Where an effect acts; see docs/architecture.md, "Light → electrons → metres".

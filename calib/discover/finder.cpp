@@ -28,7 +28,8 @@ class Search {
       updateKnown();
       updateScales();
       const Significance significance = testNow(step);
-      // The first test has all of alpha; each later one a half, so that all of a run's stay below a few alpha.
+      // The first test has all of alpha; each later one a half, so that all of a run's stay below a few
+      // alpha.
       if (significance.p > (step == 0 ? options_.alpha : 0.5 * options_.alpha)) break;
       if (static_cast<int>(finding_.effects.size()) >= options_.most_effects) break;
       if (!addEffect(significance.p)) break;
@@ -49,7 +50,8 @@ class Search {
   void updateKnown() {
     context_.known = groupsOf(finding_.effects);
     for (TermGroup& tangent : tangentsOf(finding_.effects)) context_.known.push_back(std::move(tangent));
-    for (std::size_t i = 0; i < context_.known.size(); ++i) context_.known[i].name = fmt::format("known {}", i + 1);
+    for (std::size_t i = 0; i < context_.known.size(); ++i)
+      context_.known[i].name = fmt::format("known {}", i + 1);
     context_.catalogue.clear();
     for (const Effect& effect : finding_.effects) {
       if (effect.is_catalogue) context_.catalogue.push_back(effect.name);
@@ -81,7 +83,8 @@ class Search {
   }
 
   Significance testNow(int step) {
-    Test test{{options_.null_model, options_.draws, options_.seed + 1000003U * static_cast<std::uint64_t>(step)}};
+    Test test{
+        {options_.null_model, options_.draws, options_.seed + 1000003U * static_cast<std::uint64_t>(step)}};
     inParts(context_, context_.generic, [&](const Part& part) { test.add(part.marginal, part.model); });
     Significance significance = test.result();
     finding_.last_p = significance.p;
@@ -117,8 +120,8 @@ class Search {
     return true;
   }
 
-  /// What is left goes with the covariates of an effect that is known: its shape was not it. Another single shape,
-  /// if one does as well as both together; else their sum.
+  /// What is left goes with the covariates of an effect that is known: its shape was not it. Another single
+  /// shape, if one does as well as both together; else their sum.
   void reshape(Effect& effect, const Effect& more) {
     std::vector<Effect> others;
     for (const Effect& one : finding_.effects)
@@ -174,14 +177,17 @@ class Search {
       if (effect.alternatives.empty()) effect.experiment.reset();
       const auto explanations = compete(without);
       const auto chosen = choose(explanations);
-      if (!chosen || explanations[*chosen].is_catalogue || explanations[*chosen].covariates != effect.covariates) continue;
+      if (!chosen || explanations[*chosen].is_catalogue ||
+          explanations[*chosen].covariates != effect.covariates)
+        continue;
       Effect again = effectOf(without, explanations, *chosen);
       again.p = effect.p;
       effect = std::move(again);
     }
   }
 
-  /// An effect that the others explain as well was a step on the way to them: it goes, the least useful first.
+  /// An effect that the others explain as well was a step on the way to them: it goes, the least useful
+  /// first.
   void prune() {
     while (finding_.effects.size() > 1) {
       std::size_t least = finding_.effects.size();

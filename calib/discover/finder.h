@@ -59,13 +59,13 @@ struct Effect {
   bool is_catalogue = false;
   std::vector<std::string> covariates{};
   std::optional<Stage> stage{};
-  /// Its parts, added up: one, unless what was left after it went with the same covariates. A part whose form has no
-  /// build is a smooth curve, because no formula does as well. None: an effect of the catalogue.
+  /// Its parts, added up: one, unless what was left after it went with the same covariates. A part whose form
+  /// has no build is a smooth curve, because no formula does as well. None: an effect of the catalogue.
   std::vector<FittedForm> parts{};
   std::vector<double> coefficient{};  ///< of all terms of its parts, or of the catalogue's columns
   std::vector<Estimate> numbers{};    ///< coefficients, then inner numbers
-  Eigen::MatrixXd covariance{};     ///< of `numbers`
-  double p = 1.0;                   ///< of the test that led to it
+  Eigen::MatrixXd covariance{};       ///< of `numbers`
+  double p = 1.0;                     ///< of the test that led to it
   Difference gain{};
   double frequency = 1.0;  ///< how often it is the best again when captures are drawn anew with replacement
   std::vector<TriedShape> tried{};
@@ -78,11 +78,11 @@ struct Finding {
   double first_p = 1.0, last_p = 1.0;  ///< of the first test, and of what is left
   bool by_sign_flips = false;
   int draws = 0;
-  std::vector<double> scales{};         ///< of the random effects, by class
-  double dispersion = 1.0;              ///< of what is left, in units of the noise's variance
+  std::vector<double> scales{};  ///< of the random effects, by class
+  double dispersion = 1.0;       ///< of what is left, in units of the noise's variance
   std::vector<Estimate> nuisances{};
   std::vector<std::string> odd_captures{};
-  std::vector<GroupScore> scores{};     ///< of the first test
+  std::vector<GroupScore> scores{};  ///< of the first test
   std::vector<std::string> score_names{};
 };
 

@@ -39,8 +39,9 @@ Term powerOrLog(const CovariateInfo& x, double power) {
 
 std::string wordOf(const CovariateInfo& x, double power) { return inWords(powerOrLog(x, power)); }
 
-Form form(std::string name, std::vector<CovariateInfo> of, TermGroup (*build)(const Form&, std::span<const double>),
-          std::vector<Inner> inner = {}, std::vector<double> fixed = {}) {
+Form form(std::string name, std::vector<CovariateInfo> of,
+          TermGroup (*build)(const Form&, std::span<const double>), std::vector<Inner> inner = {},
+          std::vector<double> fixed = {}) {
   Form made{std::move(name), {}, std::move(inner), build, std::move(fixed), std::move(of)};
   for (const CovariateInfo& x : made.of) made.covariates.push_back(x.name);
   return made;
@@ -173,19 +174,23 @@ std::vector<Form> formsIn(const CovariateInfo& x) {
   std::vector<double> centres;
   for (std::size_t i = 4; i + 4 < x.quantiles.size(); i += 4) centres.push_back(x.quantiles[i]);
   centres.erase(std::ranges::unique(centres).begin(), centres.end());
-  forms.push_back(form(fmt::format("sigmoid in {}", x.name), {x}, sigmoid,
-                       {{std::move(centres), false, 1}, {geometric(span(x) / 50.0, span(x) / 5.0, 4), true, 1}}));
+  forms.push_back(
+      form(fmt::format("sigmoid in {}", x.name), {x}, sigmoid,
+           {{std::move(centres), false, 1}, {geometric(span(x) / 50.0, span(x) / 5.0, 4), true, 1}}));
   return forms;
 }
 
 std::vector<Form> formsIn(const CovariateInfo& a, const CovariateInfo& b) {
   std::vector<Form> forms;
-  const auto isNamed = [](const CovariateInfo& x) { return x.nature == Nature::Category || x.levels.size() == 2; };
+  const auto isNamed = [](const CovariateInfo& x) {
+    return x.nature == Nature::Category || x.levels.size() == 2;
+  };
   if (isNamed(a) && isNamed(b)) return forms;
   if (isNamed(a) || isNamed(b)) {
     const CovariateInfo &names = isNamed(a) ? a : b, &x = isNamed(a) ? b : a;
     for (const double power : usablePowers(x))
-      forms.push_back(form(fmt::format("{} for each {}", wordOf(x, power), names.name), {names, x}, switched, {}, {power}));
+      forms.push_back(form(fmt::format("{} for each {}", wordOf(x, power), names.name), {names, x}, switched,
+                           {}, {power}));
     return forms;
   }
   for (const double p : usablePowers(a)) {

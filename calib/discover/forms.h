@@ -42,8 +42,8 @@ struct FittedForm {
   double statistic = 0.0;  ///< what it explains of the data that it was found in
 };
 
-/// The inner numbers that explain most on top of `known` (in the model) — the grid, and then ever finer ones around
-/// the best. All forms are searched in the same few passes over the data.
+/// The inner numbers that explain most on top of `known` (in the model) — the grid, and then ever finer ones
+/// around the best. All forms are searched in the same few passes over the data.
 std::vector<FittedForm> findInnerNumbers(const RowSource& source, std::span<const TermGroup> known,
                                          std::span<const double> scales, std::vector<Form> forms);
 

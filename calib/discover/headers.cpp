@@ -12,8 +12,9 @@
 namespace toftwin::discover {
 namespace {
 
-constexpr std::array<std::string_view, 20> kUnits{"mm", "cm",  "um", "m",   "s",   "ms",  "us",  "ns",      "min", "h",
-                                                  "c",  "deg", "rad", "klx", "lx", "mhz", "hz", "counts", "px",  "mw"};
+constexpr std::array<std::string_view, 20> kUnits{"mm", "cm",  "um", "m",      "s",   "ms",  "us",
+                                                  "ns", "min", "h",  "c",      "deg", "rad", "klx",
+                                                  "lx", "mhz", "hz", "counts", "px",  "mw"};
 
 /// Words of a header, in small letters: "Reference [mm]" → reference, mm.
 std::vector<std::string> wordsOf(const std::string& header) {
@@ -39,7 +40,8 @@ bool hasWord(const std::string& header, const Known& known) {
 }
 
 const Known kMeasured{"measured", "measurement", "value", "reading", "output", "observed"};
-const Known kReference{"reference", "ref", "truth", "true", "groundtruth", "ground", "expected", "nominal", "actual"};
+const Known kReference{"reference", "ref",      "truth",   "true",  "groundtruth",
+                       "ground",    "expected", "nominal", "actual"};
 const Known kError{"error", "residual", "deviation", "bias", "difference", "minus"};
 const Known kSigma{"sigma", "std", "stddev", "sd", "noise", "uncertainty", "stdev"};
 const Known kSession{"session", "run", "series", "campaign", "day"};
@@ -51,7 +53,8 @@ const Known kDistance{"distance", "range", "depth", "z", "dist", "d"};
 const Known kIndex{"frame", "index", "number", "sequence", "seq", "counter", "count", "n", "row"};
 
 /// The one column whose header has one of these words; nothing if there are none or several.
-std::string onlyOne(const std::vector<std::string>& header, const Known& known, const std::set<std::string>& taken) {
+std::string onlyOne(const std::vector<std::string>& header, const Known& known,
+                    const std::set<std::string>& taken) {
   std::string found;
   for (const std::string& name : header) {
     if (taken.contains(name) || !hasWord(name, known)) continue;
@@ -68,13 +71,14 @@ Error badMap(const std::filesystem::path& file, const std::string& what) {
 /// Columns that are free for a role; what the map names is taken.
 class Assignment {
  public:
-  Assignment(const std::vector<std::string>& header, const std::filesystem::path& file) : header_(header), file_(file) {}
+  Assignment(const std::vector<std::string>& header, const std::filesystem::path& file)
+      : header_(header), file_(file) {}
 
   Result<> name(std::string& role, const std::string& said, std::string_view key) {
     if (said.empty()) return {};
     if (std::ranges::find(header_, said) == header_.end()) {
-      return Error{Error::Code::NotFound, fmt::format("{}: has no column \"{}\" for `{}`, only: {}", file_.string(),
-                                                      said, key, fmt::join(header_, ", "))};
+      return Error{Error::Code::NotFound, fmt::format("{}: has no column \"{}\" for `{}`, only: {}",
+                                                      file_.string(), said, key, fmt::join(header_, ", "))};
     }
     if (!taken_.insert(said).second) return badMap(file_, fmt::format("column \"{}\" has two roles", said));
     role = said;
@@ -114,22 +118,26 @@ void guessValues(Roles& roles, Assignment& free, bool is_said) {
 
 Result<> takeCovariates(const std::vector<std::string>& header, const TableMap& map,
                         const std::filesystem::path& file, const Assignment& used, Roles& roles) {
-  const auto isIgnored = [&](const std::string& name) { return std::ranges::find(map.ignore, name) != map.ignore.end(); };
+  const auto isIgnored = [&](const std::string& name) {
+    return std::ranges::find(map.ignore, name) != map.ignore.end();
+  };
   for (const std::string& name : map.ignore)
     if (std::ranges::find(header, name) == header.end())
-      return badMap(file, fmt::format("has no column \"{}\" to ignore, only: {}", name, fmt::join(header, ", ")));
+      return badMap(file,
+                    fmt::format("has no column \"{}\" to ignore, only: {}", name, fmt::join(header, ", ")));
   std::set<std::string> seen;
   for (const MappedCovariate& covariate : map.covariates) {
     if (std::ranges::find(header, covariate.column) == header.end()) {
-      return Error{Error::Code::NotFound, fmt::format("{}: has no column \"{}\" for a covariate, only: {}",
-                                                      file.string(), covariate.column, fmt::join(header, ", "))};
+      return Error{Error::Code::NotFound,
+                   fmt::format("{}: has no column \"{}\" for a covariate, only: {}", file.string(),
+                               covariate.column, fmt::join(header, ", "))};
     }
     if (!seen.insert(covariate.column).second)
       return badMap(file, fmt::format("column \"{}\" is a covariate twice", covariate.column));
     roles.covariates.emplace_back(covariate.column, covariate.nature);
   }
-  const bool is_distance_known = std::ranges::any_of(
-      roles.covariates, [&](const auto& one) { return one.first == roles.reference; });
+  const bool is_distance_known =
+      std::ranges::any_of(roles.covariates, [&](const auto& one) { return one.first == roles.reference; });
   if (!roles.reference.empty() && !is_distance_known && !isIgnored(roles.reference))
     roles.covariates.emplace_back(roles.reference, MapNature::Distance);
   if (!map.covariates.empty()) return {};
@@ -141,7 +149,7 @@ Result<> takeCovariates(const std::vector<std::string>& header, const TableMap& 
 }  // namespace
 
 std::string Roles::inWords() const {
-  std::string words = !error.empty() ? fmt::format("error = {}{}", is_reversed ? "−" : "", error)
+  std::string words = !error.empty()      ? fmt::format("error = {}{}", is_reversed ? "−" : "", error)
                       : reference.empty() ? fmt::format("error = {} (without a reference)", measured)
                                           : fmt::format("error = {} − {}", measured, reference);
   for (const auto& [name, what] : {std::pair{&sigma, "sigma"}, std::pair{&session, "session"},

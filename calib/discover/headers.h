@@ -22,11 +22,13 @@ struct Roles {
   [[nodiscard]] std::string inWords() const;
 };
 
-/// By the map, and where it is silent by the headers' words. Errors: a column of the map that is not there, or one
-/// with two roles; neither measured values nor errors to be found.
-Result<Roles> rolesOf(const std::vector<std::string>& header, const TableMap& map, const std::filesystem::path& file);
+/// By the map, and where it is silent by the headers' words. Errors: a column of the map that is not there,
+/// or one with two roles; neither measured values nor errors to be found.
+Result<Roles> rolesOf(const std::vector<std::string>& header, const TableMap& map,
+                      const std::filesystem::path& file);
 
-/// The unit that a header ends in: "depth_mm" → "mm"; "depth [mm]" and "depth (mm)", too. Empty: none is known.
+/// The unit that a header ends in: "depth_mm" → "mm"; "depth [mm]" and "depth (mm)", too. Empty: none is
+/// known.
 std::string unitOf(const std::string& header);
 
 Nature natureOf(const std::string& header, MapNature said);

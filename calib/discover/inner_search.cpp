@@ -21,7 +21,8 @@ struct Trial {
   std::vector<double> inner;
 };
 
-void addProducts(const std::vector<std::vector<double>>& grids, std::size_t form, std::vector<Trial>& trials) {
+void addProducts(const std::vector<std::vector<double>>& grids, std::size_t form,
+                 std::vector<Trial>& trials) {
   std::vector<Trial> made{{form, {}}};
   for (const auto& grid : grids) {
     std::vector<Trial> longer;
@@ -73,7 +74,8 @@ std::vector<double> closer(double best, double step, bool is_ratio) {
 
 double firstStep(const Inner& inner) {
   if (inner.grid.size() < 2) return 0.0;
-  const double first = inner.grid.front(), last = inner.grid.back(), n = static_cast<double>(inner.grid.size() - 1);
+  const double first = inner.grid.front(), last = inner.grid.back(),
+               n = static_cast<double>(inner.grid.size() - 1);
   return inner.is_ratio ? std::log(last / first) / n : (last - first) / n;
 }
 

@@ -95,15 +95,16 @@ std::vector<Estimate> fitNuisances(const TableSource& source, std::span<const do
   return estimate(source, scales, none);
 }
 
-std::vector<double> predicted(const TableSource& source, const TableData& rows, const std::vector<Estimate>& nuisances,
-                              const std::vector<Effect>& effects) {
+std::vector<double> predicted(const TableSource& source, const TableData& rows,
+                              const std::vector<Estimate>& nuisances, const std::vector<Effect>& effects) {
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(static_cast<Index>(rows.rows()));
   std::size_t next = 0;
   for (const auto& [group, columns] : source.nuisanceColumns(rows))
     for (Index c = 0; c < columns.cols(); ++c) sum += nuisances[next++].value * columns.col(c);
   for (const Effect& effect : effects) {
     const Eigen::MatrixXd columns = columnsOf(rows, termsOf(effect));
-    for (Index c = 0; c < columns.cols(); ++c) sum += effect.coefficient[static_cast<std::size_t>(c)] * columns.col(c);
+    for (Index c = 0; c < columns.cols(); ++c)
+      sum += effect.coefficient[static_cast<std::size_t>(c)] * columns.col(c);
   }
   return {sum.begin(), sum.end()};
 }
@@ -122,19 +123,23 @@ Judged judgeLocked(const TableSource& source, const TableData& locked, const std
   }
   removeUnseenOffsets(source, locked, judged.before_value);
   removeUnseenOffsets(source, locked, judged.after_value);
-  judged.before = compare::summarise(judged.before_value), judged.after = compare::summarise(judged.after_value);
+  judged.before = compare::summarise(judged.before_value),
+  judged.after = compare::summarise(judged.after_value);
   const std::size_t size = std::max<std::size_t>(1, locked.rows() / 40);
   std::vector<ChiSquares> blocks;
   ChiSquares all;
   for (std::size_t i = 0; i < locked.rows(); ++i) {
     if (i % size == 0) blocks.emplace_back();
     const double z0 = judged.before_value[i] / sigma[i], z1 = judged.after_value[i] / sigma[i];
-    for (ChiSquares* sums : {&blocks.back(), &all}) sums->before += z0 * z0, sums->after += z1 * z1, sums->rows += 1.0;
+    for (ChiSquares* sums : {&blocks.back(), &all})
+      sums->before += z0 * z0, sums->after += z1 * z1, sums->rows += 1.0;
   }
   judged.captures = blocks.size();
-  judged.explainable = all.before - all.rows, judged.explainable_error = std::sqrt(2.0 * std::max(all.rows, 1.0));
+  judged.explainable = all.before - all.rows,
+  judged.explainable_error = std::sqrt(2.0 * std::max(all.rows, 1.0));
   judged.removed = removedOf(all);
-  judged.noise_before = all.before / std::max(all.rows, 1.0), judged.noise_after = all.after / std::max(all.rows, 1.0);
+  judged.noise_before = all.before / std::max(all.rows, 1.0),
+  judged.noise_after = all.after / std::max(all.rows, 1.0);
   addInterval(blocks, judged);
   judged.lag1_before = lag1(judged.before_value, locked.session);
   judged.lag1_after = lag1(judged.after_value, locked.session);

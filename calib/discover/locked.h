@@ -13,14 +13,14 @@ namespace toftwin::discover {
 
 struct Judged {
   std::size_t rows = 0, captures = 0;
-  std::string sha256{};  ///< of the locked rows, from before the search
+  std::string sha256{};                ///< of the locked rows, from before the search
   compare::Summary before{}, after{};  ///< offset and gain removed from both
   std::vector<double> before_value{}, after_value{};
   /// Of what can be explained: (χ²_before − χ²_after)/(χ²_before − rows), with χ² in units of the noise; 95 %
   /// interval by drawing captures anew.
   double removed = 0.0, removed_low = 0.0, removed_high = 0.0;
-  double explainable = 0.0;        ///< χ²_before − rows
-  double explainable_error = 0.0;  ///< what chance alone makes of it
+  double explainable = 0.0;                      ///< χ²_before − rows
+  double explainable_error = 0.0;                ///< what chance alone makes of it
   double noise_before = 0.0, noise_after = 0.0;  ///< χ²/rows
   double lag1_before = 0.0, lag1_after = 0.0;    ///< correlation of rows that follow each other
 };
@@ -33,7 +33,7 @@ Judged judgeLocked(const TableSource& source, const TableData& locked, const std
 std::vector<Estimate> fitNuisances(const TableSource& source, std::span<const double> scales);
 
 /// What effects and nuisances amount to in each row.
-std::vector<double> predicted(const TableSource& source, const TableData& rows, const std::vector<Estimate>& nuisances,
-                              const std::vector<Effect>& effects);
+std::vector<double> predicted(const TableSource& source, const TableData& rows,
+                              const std::vector<Estimate>& nuisances, const std::vector<Effect>& effects);
 
 }  // namespace toftwin::discover

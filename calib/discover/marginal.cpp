@@ -35,7 +35,8 @@ Split splitOf(const Evidence& evidence, std::span<const double> scale) {
       append(split.kept, group);
     }
   }
-  split.deviation = Eigen::Map<Eigen::VectorXd>(deviation.data(), static_cast<Eigen::Index>(deviation.size()));
+  split.deviation =
+      Eigen::Map<Eigen::VectorXd>(deviation.data(), static_cast<Eigen::Index>(deviation.size()));
   return split;
 }
 
@@ -51,7 +52,8 @@ CaptureEvidence integratedOut(const CaptureEvidence& capture, const Split& split
   Eigen::MatrixXd inner = s * Eigen::MatrixXd(capture.gram(split.random, split.random)) * s;
   inner.diagonal().array() += 1.0;
   const Eigen::LLT<Eigen::MatrixXd> factor(inner);
-  const Eigen::MatrixXd half = factor.matrixL().solve(s * Eigen::MatrixXd(capture.gram(split.random, split.kept)));
+  const Eigen::MatrixXd half =
+      factor.matrixL().solve(s * Eigen::MatrixXd(capture.gram(split.random, split.kept)));
   const Eigen::VectorXd half_y = factor.matrixL().solve(s * Eigen::VectorXd(capture.moment(split.random)));
   out.gram -= half.transpose() * half;
   out.moment -= half.transpose() * half_y;
@@ -84,7 +86,8 @@ double criterion(const Evidence& evidence, std::span<const std::string> projecte
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled, Eigen::EigenvaluesOnly);
   for (const double value : eigen.eigenvalues()) log_fixed += value > 1e-9 ? std::log(value) : 0.0;
   for (const double value : size) log_fixed += 2.0 * std::log(value);
-  return marginal.log_determinant + log_fixed + freedom * std::log(std::max(fitted.deviance, 1e-300) / freedom);
+  return marginal.log_determinant + log_fixed +
+         freedom * std::log(std::max(fitted.deviance, 1e-300) / freedom);
 }
 
 }  // namespace
@@ -146,7 +149,8 @@ PseudoInverse pseudoInverse(const Eigen::MatrixXd& matrix, double tolerance) {
   const double largest = root.maxCoeff();
   const Eigen::VectorXd shrink =
       root.unaryExpr([&](double size) { return size > 1e-14 * largest && size > 0.0 ? 1.0 / size : 0.0; });
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(shrink.asDiagonal() * matrix * shrink.asDiagonal());
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(shrink.asDiagonal() * matrix *
+                                                             shrink.asDiagonal());
   const Eigen::VectorXd inverse =
       eigen.eigenvalues().unaryExpr([&](double value) { return value > tolerance ? 1.0 / value : 0.0; });
   out.rank = static_cast<int>((inverse.array() > 0.0).count());

@@ -14,12 +14,12 @@ namespace toftwin::discover {
 
 using Columns = std::vector<Eigen::Index>;
 
-/// Evidence under y ~ N(Xβ, I + Z S² Zᵀ) for each capture, Z its PerCapture columns and S their scales. Its Gram
-/// is Xᵀ(I + Z S² Zᵀ)⁻¹X by the Woodbury identity; these columns are gone, the others are renumbered.
+/// Evidence under y ~ N(Xβ, I + Z S² Zᵀ) for each capture, Z its PerCapture columns and S their scales. Its
+/// Gram is Xᵀ(I + Z S² Zᵀ)⁻¹X by the Woodbury identity; these columns are gone, the others are renumbered.
 struct Marginal {
   std::vector<Group> groups{};
   std::vector<CaptureEvidence> captures{};
-  Eigen::VectorXd precision{};  ///< of the priors: 1/s² of Shared columns, 0 elsewhere
+  Eigen::VectorXd precision{};   ///< of the priors: 1/s² of Shared columns, 0 elsewhere
   double log_determinant = 0.0;  ///< Σ ln det(I + Z S² Zᵀ), and of the Shared priors
   Eigen::MatrixXd gram{};        ///< sum over captures
   Eigen::VectorXd moment{};
@@ -43,10 +43,10 @@ PseudoInverse pseudoInverse(const Eigen::MatrixXd& matrix, double tolerance = 1e
 /// A fit of some columns to some captures.
 struct Fit {
   Columns columns{};
-  Eigen::MatrixXd inverse{};      ///< (G + P)⁻¹
+  Eigen::MatrixXd inverse{};  ///< (G + P)⁻¹
   Eigen::VectorXd coefficient{};
-  double deviance = 0.0;          ///< of what is left, with the priors' share
-  double freedom = 0.0;           ///< rows − rank
+  double deviance = 0.0;  ///< of what is left, with the priors' share
+  double freedom = 0.0;   ///< rows − rank
   [[nodiscard]] double dispersion() const { return freedom > 0.0 ? deviance / freedom : 1.0; }
 };
 Fit fit(const Marginal& marginal, const Columns& columns);

@@ -71,7 +71,8 @@ std::vector<Explanation> explanationsFor(const Context& context, const std::vect
       if (sorted(covariatesOf(group)) == set) all.push_back(curve(group));
     }
     if (set.size() == 1) {
-      for (const auto& [knots, name] : {std::pair{2 * kSmoothKnots - 1, "finer "}, {4 * kSmoothKnots - 3, "finest "}}) {
+      for (const auto& [knots, name] :
+           {std::pair{2 * kSmoothKnots - 1, "finer "}, {4 * kSmoothKnots - 3, "finest "}}) {
         TermGroup finer = smoothIn(*find(context, set[0]), knots);
         finer.name = name + finer.name;
         if (finer.terms.size() >= kSmoothKnots) all.push_back(curve(std::move(finer)));
@@ -80,7 +81,8 @@ std::vector<Explanation> explanationsFor(const Context& context, const std::vect
       all.push_back(sumOf(*find(context, set[0]), *find(context, set[1])));
     }
   }
-  for (FittedForm& fitted : findInnerNumbers(context.source, context.known, context.scales, std::move(forms))) {
+  for (FittedForm& fitted :
+       findInnerNumbers(context.source, context.known, context.scales, std::move(forms))) {
     if (fitted.statistic > 0.0) all.push_back(explanationOf(std::move(fitted)));
   }
   return all;
@@ -91,8 +93,9 @@ Part prepare(const Context& context, std::span<const TermGroup> groups, bool wit
   extra.insert(extra.end(), groups.begin(), groups.end());
   Part out;
   const bool needs_catalogue = with_catalogue || !context.catalogue.empty();
-  out.marginal = marginalise(needs_catalogue ? context.source.evidence(extra) : context.source.withoutCatalogue(extra),
-                             context.scales);
+  out.marginal =
+      marginalise(needs_catalogue ? context.source.evidence(extra) : context.source.withoutCatalogue(extra),
+                  context.scales);
   out.model = modelOf(context, out.marginal, extra.size());
   out.first = out.marginal.groups.size() - groups.size();
   out.end = groups.size();
@@ -100,7 +103,8 @@ Part prepare(const Context& context, std::span<const TermGroup> groups, bool wit
 }
 
 /// The catalogue's effects that are not in the model yet; their groups are appended to `which`.
-std::vector<Explanation> catalogueOf(const Context& context, const Part& part, std::vector<std::size_t>& which) {
+std::vector<Explanation> catalogueOf(const Context& context, const Part& part,
+                                     std::vector<std::size_t>& which) {
   std::vector<Explanation> all;
   for (std::size_t g = 0; g < part.first; ++g) {
     const Group& group = part.marginal.groups[g];
@@ -161,7 +165,8 @@ std::vector<Set> shortlist(const Context& context) {
     if (gain >= most - tolerance) order.emplace_back(-gain, set);
   std::ranges::sort(order);
   std::vector<Set> chosen;
-  // The best functions of one covariate always compete: a surface over two may only look better for having more.
+  // The best functions of one covariate always compete: a surface over two may only look better for having
+  // more.
   for (const std::size_t size : {1U, 2U}) {
     std::size_t taken = 0;
     for (const auto& [gain, set] : order)
@@ -183,7 +188,8 @@ bool contains(const Set& large, const Set& small) { return std::ranges::includes
 Columns modelOf(const Context& context, const Marginal& marginal, std::size_t extra) {
   Columns columns = nuisanceColumns(marginal);
   for (const Group& group : marginal.groups) {
-    if (group.kind == Kind::Catalogue && std::ranges::find(context.catalogue, group.name) != context.catalogue.end())
+    if (group.kind == Kind::Catalogue &&
+        std::ranges::find(context.catalogue, group.name) != context.catalogue.end())
       append(columns, group);
   }
   const std::size_t first = marginal.groups.size() - extra;
@@ -272,7 +278,8 @@ std::optional<std::size_t> choose(const std::vector<Explanation>& all) {
   } else {
     const double most = all[*best].gain.total;
     const double error = difference(all[*best].gain, all[*catalogue].gain).error;
-    if (most - all[*catalogue].gain.total <= std::max(std::min(error, 0.25 * most), 0.03 * most)) return catalogue;
+    if (most - all[*catalogue].gain.total <= std::max(std::min(error, 0.25 * most), 0.03 * most))
+      return catalogue;
   }
   // The best explanation decides on the covariates, simplicity on the shape.
   std::size_t chosen = *best;
@@ -280,8 +287,9 @@ std::optional<std::size_t> choose(const std::vector<Explanation>& all) {
     if (all[i].is_catalogue || all[i].covariates != all[*best].covariates) continue;
     const double by = all[*best].gain.total - all[i].gain.total;
     if (by > difference(all[*best].gain, all[i].gain).error) continue;
-    const bool is_simpler = all[i].numbers != all[chosen].numbers ? all[i].numbers < all[chosen].numbers
-                                                                  : all[i].gain.total > all[chosen].gain.total;
+    const bool is_simpler = all[i].numbers != all[chosen].numbers
+                                ? all[i].numbers < all[chosen].numbers
+                                : all[i].gain.total > all[chosen].gain.total;
     if (is_simpler) chosen = i;
   }
   return chosen;
@@ -293,7 +301,8 @@ namespace {
 std::vector<std::size_t> rivals(const std::vector<Explanation>& all, std::size_t chosen) {
   std::map<std::pair<Set, bool>, std::size_t> best;
   for (const std::size_t i : eligible(all)) {
-    if (all[i].covariates == all[chosen].covariates && all[i].is_catalogue == all[chosen].is_catalogue) continue;
+    if (all[i].covariates == all[chosen].covariates && all[i].is_catalogue == all[chosen].is_catalogue)
+      continue;
     if (!all[i].is_catalogue && contains(all[i].covariates, all[chosen].covariates)) continue;
     const auto key = std::pair{all[i].covariates, all[i].is_catalogue};
     const auto [at, is_new] = best.try_emplace(key, i);
@@ -305,7 +314,8 @@ std::vector<std::size_t> rivals(const std::vector<Explanation>& all, std::size_t
 }
 
 /// How often the chosen one beats all rivals when captures are drawn with replacement.
-double stability(const std::vector<Explanation>& all, std::size_t chosen, const std::vector<std::size_t>& others) {
+double stability(const std::vector<Explanation>& all, std::size_t chosen,
+                 const std::vector<std::size_t>& others) {
   const auto& own = all[chosen].gain.by_capture;
   if (own.empty()) return 0.0;
   constexpr int kDraws = 200;
@@ -341,7 +351,8 @@ double correlationOf(const Part& prepared, const Group& a, const Group& b) {
   append(of_a, a), append(of_b, b);
   const Fit model = fit(prepared.marginal, prepared.model);
   const auto left = [&](const Columns& x, const Columns& y) {
-    return Eigen::MatrixXd(prepared.marginal.gram(x, y) - prepared.marginal.gram(x, prepared.model) * model.inverse *
+    return Eigen::MatrixXd(prepared.marginal.gram(x, y) - prepared.marginal.gram(x, prepared.model) *
+                                                              model.inverse *
                                                               prepared.marginal.gram(prepared.model, y));
   };
   const Eigen::VectorXd fa = coefficients(prepared, a), fb = coefficients(prepared, b);
@@ -349,7 +360,8 @@ double correlationOf(const Part& prepared, const Group& a, const Group& b) {
   return aa > 0.0 && bb > 0.0 ? fa.dot(left(of_a, of_b) * fb) / std::sqrt(aa * bb) : 0.0;
 }
 
-double valueOf(const TermGroup& group, const std::vector<double>& coefficient, const std::map<std::string, double>& at) {
+double valueOf(const TermGroup& group, const std::vector<double>& coefficient,
+               const std::map<std::string, double>& at) {
   double sum = 0.0;
   for (std::size_t t = 0; t < group.terms.size(); ++t) {
     sum += coefficient[t] * group.terms[t].at([&](const std::string& name) {
@@ -360,8 +372,10 @@ double valueOf(const TermGroup& group, const std::vector<double>& coefficient, c
   return sum;
 }
 
-/// One covariate is held in the middle of its spread, the other goes from end to end: where do they differ most?
-std::optional<Experiment> experimentOf(const Context& context, const Effect& effect, const Alternative& other) {
+/// One covariate is held in the middle of its spread, the other goes from end to end: where do they differ
+/// most?
+std::optional<Experiment> experimentOf(const Context& context, const Effect& effect,
+                                       const Alternative& other) {
   std::set<std::string> names(effect.covariates.begin(), effect.covariates.end());
   names.insert(other.covariates.begin(), other.covariates.end());
   std::map<std::string, double> middle;
@@ -431,8 +445,11 @@ Effect effectOf(const Context& context, const std::vector<Explanation>& all, std
   effect.frequency = stability(all, chosen, others);
   for (std::size_t s = 1; s < shown.size(); ++s) {
     const Explanation& other = all[shown[s]];
-    Alternative alternative{other.name, other.covariates, other.fitted.group,
-                            plain(coefficients(prepared, *in_marginal[s])), difference(mine.gain, other.gain),
+    Alternative alternative{other.name,
+                            other.covariates,
+                            other.fitted.group,
+                            plain(coefficients(prepared, *in_marginal[s])),
+                            difference(mine.gain, other.gain),
                             correlationOf(prepared, *in_marginal[0], *in_marginal[s])};
     effect.alternatives.push_back(std::move(alternative));
   }

@@ -17,11 +17,11 @@ struct Explanation {
   std::string name{};
   std::vector<std::string> covariates{};  ///< sorted
   std::optional<Stage> stage{};
-  FittedForm fitted{};                    ///< its group has no terms for a catalogue effect
+  FittedForm fitted{};  ///< its group has no terms for a catalogue effect
   bool is_catalogue = false;
   bool is_sum = false;  ///< two smooth functions added up: what a pair has to beat
   int numbers = 0;
-  double price = 0.0;   ///< for inner numbers that were searched
+  double price = 0.0;  ///< for inner numbers that were searched
   Gain gain{};
 };
 
@@ -35,12 +35,12 @@ struct Context {
   std::vector<std::string> catalogue{};  ///< effects of the catalogue that were found before
 };
 
-/// Columns of the nuisances and of what is known, in evidence that was made with `extra` more groups, the known ones
-/// first.
+/// Columns of the nuisances and of what is known, in evidence that was made with `extra` more groups, the
+/// known ones first.
 Columns modelOf(const Context& context, const Marginal& marginal, std::size_t extra);
 
-/// Evidence for some groups on top of what is known, some columns at a time: each part with its model and the number
-/// of its first new group. The catalogue is in the first part only.
+/// Evidence for some groups on top of what is known, some columns at a time: each part with its model and the
+/// number of its first new group. The catalogue is in the first part only.
 struct Part {
   Marginal marginal;
   Columns model;
@@ -50,15 +50,15 @@ struct Part {
 void inParts(const Context& context, const std::vector<TermGroup>& groups,
              const std::function<void(const Part&)>& use);
 
-/// The competition over all covariates: the generic groups by cross-validation first, then formulas for the sets of
-/// covariates that are not much worse than the best.
+/// The competition over all covariates: the generic groups by cross-validation first, then formulas for the
+/// sets of covariates that are not much worse than the best.
 std::vector<Explanation> compete(const Context& context);
 /// Only over these covariates.
 std::vector<Explanation> competeFor(const Context& context, const std::vector<std::string>& covariates);
 
 /// The simplest that is not worse than the best by more than a standard error of their difference. A pair of
-/// covariates must also beat the sum of their own functions; a catalogue effect wins when it is about as good.
-/// Gives its place; nothing when there are none.
+/// covariates must also beat the sum of their own functions; a catalogue effect wins when it is about as
+/// good. Gives its place; nothing when there are none.
 std::optional<std::size_t> choose(const std::vector<Explanation>& explanations);
 
 /// Its place among `explanations` and what else explains as much, the next experiment, how often it is best.

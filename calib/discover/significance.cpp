@@ -40,7 +40,8 @@ Projected project(const Marginal& marginal, const Fit& model, const Group& group
   }
   out.rank = static_cast<int>(used.size());
   const VectorXd roots = eigen.eigenvalues()(used).cwiseSqrt().cwiseInverse();
-  out.whiten = roots.asDiagonal() * MatrixXd(eigen.eigenvectors()(Eigen::all, used)).transpose() * shrink.asDiagonal();
+  out.whiten =
+      roots.asDiagonal() * MatrixXd(eigen.eigenvectors()(Eigen::all, used)).transpose() * shrink.asDiagonal();
   return out;
 }
 
@@ -49,8 +50,8 @@ MatrixXd whitenedMoments(const Projected& group, const MatrixXd& residual, const
   return group.whiten * (residual(group.columns, Eigen::all) - group.slope * residual(model, Eigen::all));
 }
 
-/// Σ_c cov of the whitened moments under unit noise: E r_c r_cᵀ = G_c − G_c A⁻¹ G_c. Its trace is what flipping
-/// gives on average; what data give is the rank.
+/// Σ_c cov of the whitened moments under unit noise: E r_c r_cᵀ = G_c − G_c A⁻¹ G_c. Its trace is what
+/// flipping gives on average; what data give is the rank.
 double flipCorrection(const Marginal& marginal, const Fit& model, const Projected& group) {
   double trace = 0.0;
   for (const CaptureEvidence& capture : marginal.captures) {
@@ -65,8 +66,8 @@ double flipCorrection(const Marginal& marginal, const Fit& model, const Projecte
   return trace > 1e-9 ? std::max(1.0, group.rank / trace) : 1.0;
 }
 
-/// A sum of squares with mean and variance of its null draws as a normal deviate: (E. B. Wilson, M. M. Hilferty,
-/// PNAS 17 (1931) 684) with ν = 2 mean²/variance degrees of freedom.
+/// A sum of squares with mean and variance of its null draws as a normal deviate: (E. B. Wilson, M. M.
+/// Hilferty, PNAS 17 (1931) 684) with ν = 2 mean²/variance degrees of freedom.
 struct Gauge {
   double mean = 1.0, nu = 1.0;
   explicit Gauge(const VectorXd& draws) {
@@ -85,8 +86,8 @@ bool isTested(const Group& group, const std::set<Index>& model) {
          !model.contains(static_cast<Index>(group.first));
 }
 
-/// Dispersion of each capture about the model, at least 1/4 of the typical one: a capture of few rows may look
-/// quieter than it is.
+/// Dispersion of each capture about the model, at least 1/4 of the typical one: a capture of few rows may
+/// look quieter than it is.
 VectorXd dispersions(const Marginal& marginal, const Fit& model) {
   VectorXd out(static_cast<Index>(marginal.captures.size()));
   for (Index c = 0; c < out.size(); ++c) {
@@ -154,8 +155,8 @@ MatrixXd flippedDraws(const std::vector<Projected>& groups, const MatrixXd& resi
   return draws;
 }
 
-MatrixXd noiseDraws(const Marginal& marginal, const std::vector<Projected>& groups, const VectorXd& dispersion,
-                    const Columns& model, const TestOptions& options) {
+MatrixXd noiseDraws(const Marginal& marginal, const std::vector<Projected>& groups,
+                    const VectorXd& dispersion, const Columns& model, const TestOptions& options) {
   MatrixXd covariance = MatrixXd::Zero(marginal.gram.rows(), marginal.gram.cols());
   for (std::size_t c = 0; c < marginal.captures.size(); ++c)
     covariance += dispersion(static_cast<Index>(c)) * marginal.captures[c].gram;
@@ -230,7 +231,8 @@ void Test::add(const Marginal& marginal, const Columns& model_columns) {
   if (largest_.size() == 0) largest_ = VectorXd::Constant(options_.draws, -1e300);
   for (std::size_t g = 0; g < groups.size(); ++g) {
     const Gauge gauge(draws.row(static_cast<Index>(g)).transpose());
-    const double statistic = whitenedMoments(groups[g], residual, model_columns).rowwise().sum().squaredNorm();
+    const double statistic =
+        whitenedMoments(groups[g], residual, model_columns).rowwise().sum().squaredNorm();
     out_.scores.push_back({names_.size(), statistic, groups[g].rank, gauge.z(statistic)});
     names_.push_back(marginal.groups[groups[g].group].name);
     for (int d = 0; d < options_.draws; ++d)

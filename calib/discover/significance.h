@@ -13,8 +13,10 @@ namespace toftwin::discover {
 
 /// What the data would be like with nothing in them.
 enum class NullModel {
-  /// The residuals of whole captures keep what they are but their sign. It knows neither the noise's size nor its
-  /// tails nor how rows of a capture err together; an effect in fewer than about seven captures is lost on it.
+  /// The residuals of whole captures keep what they are but their sign. It knows neither the noise's size nor
+  /// its
+  /// tails nor how rows of a capture err together; an effect in fewer than about seven captures is lost on
+  /// it.
   SignFlips,
   /// Gaussian, with each capture's own dispersion. For captures of many rows, which know it well.
   Noise,
@@ -37,7 +39,8 @@ struct GroupScore {
 };
 
 struct Significance {
-  double p = 1.0;  ///< rank of the largest z among the largest of the null draws: (1 + #{null ≥ data})/(draws + 1)
+  double p =
+      1.0;  ///< rank of the largest z among the largest of the null draws: (1 + #{null ≥ data})/(draws + 1)
   std::vector<GroupScore> scores{};
   std::size_t best = 0;  ///< of `scores`
   int draws = 0;
@@ -46,16 +49,16 @@ struct Significance {
   std::vector<std::string> odd_captures{};
 };
 
-/// Tests all groups that are neither in `model` nor nuisances, together: whatever their number and correlation,
-/// p is one number for all.
+/// Tests all groups that are neither in `model` nor nuisances, together: whatever their number and
+/// correlation, p is one number for all.
 Significance test(const Marginal& marginal, const Columns& model, const TestOptions& options);
 
 /// The same for groups that come in parts, because all at once are too many columns.
 class Test {
  public:
   explicit Test(const TestOptions& options) : options_(options) {}
-  /// The groups of one part; the nuisances and the model are the same in all. `score.group` counts on through the
-  /// parts in the order of their tested groups' names.
+  /// The groups of one part; the nuisances and the model are the same in all. `score.group` counts on through
+  /// the parts in the order of their tested groups' names.
   void add(const Marginal& marginal, const Columns& model);
   [[nodiscard]] Significance result() const;
   [[nodiscard]] const std::vector<std::string>& names() const { return names_; }

@@ -119,8 +119,8 @@ Result<> readCovariate(const Columns& columns, const std::string& name, MapNatur
     }
     const auto numbers = numbered(columns.text(name), covariate.words);
     if (covariate.words.size() > kMostWords) {
-      data.doubts.push_back(fmt::format("column \"{}\" holds {} different texts, more than {}: left out", name,
-                                        covariate.words.size(), kMostWords));
+      data.doubts.push_back(fmt::format("column \"{}\" holds {} different texts, more than {}: left out",
+                                        name, covariate.words.size(), kMostWords));
       return {};
     }
     covariate.nature = Nature::Category;
@@ -139,7 +139,8 @@ void dropConstant(TableData& data) {
   std::erase_if(data.covariates, [&](const TableCovariate& covariate) {
     std::set<double> values(covariate.values.begin(), covariate.values.end());
     if (values.size() > 1) return false;
-    data.doubts.push_back(fmt::format("column \"{}\" never changes: what goes with it cannot be seen", covariate.name));
+    data.doubts.push_back(
+        fmt::format("column \"{}\" never changes: what goes with it cannot be seen", covariate.name));
     return true;
   });
 }
@@ -163,8 +164,8 @@ void dropSparse(TableData& data) {
   std::erase_if(data.covariates, [&](const TableCovariate& covariate) {
     const auto missing = std::ranges::count_if(covariate.values, [](double v) { return !std::isfinite(v); });
     if (2 * static_cast<std::size_t>(missing) <= covariate.values.size()) return false;
-    data.doubts.push_back(fmt::format("column \"{}\" is empty in {} of {} rows: left out", covariate.name, missing,
-                                      covariate.values.size()));
+    data.doubts.push_back(fmt::format("column \"{}\" is empty in {} of {} rows: left out", covariate.name,
+                                      missing, covariate.values.size()));
     return true;
   });
 }
@@ -212,7 +213,8 @@ void note(const Roles& roles, std::size_t before, TableData& data) {
     data.doubts.push_back("one session only: what is found may be of this session; measure another to know");
   }
   if (data.reference.empty() && roles.error.empty()) {
-    data.doubts.push_back("no reference: only changes of the measured value are seen, not whether it is right");
+    data.doubts.push_back(
+        "no reference: only changes of the measured value are seen, not whether it is right");
   }
 }
 
@@ -232,8 +234,8 @@ Result<TableData> readTable(const CsvTable& table, const TableMap& map, const st
   const std::size_t before = data.rows();
   data = rowsOf(data, complete(data));
   if (data.rows() < kFewestRows) {
-    return Error{Error::Code::InvalidArgument,
-                 fmt::format("{}: has {} usable rows; at least {} are needed", file.string(), data.rows(), kFewestRows)};
+    return Error{Error::Code::InvalidArgument, fmt::format("{}: has {} usable rows; at least {} are needed",
+                                                           file.string(), data.rows(), kFewestRows)};
   }
   dropConstant(data);
   if (data.covariates.empty()) {
@@ -254,7 +256,8 @@ TableData rowsOf(const TableData& data, const std::vector<bool>& wanted) {
       if (wanted[i]) values[next++] = values[i];
     values.resize(next);
   };
-  keep(out.error), keep(out.reference), keep(out.sigma), keep(out.session), keep(out.capture), keep(out.locked);
+  keep(out.error), keep(out.reference), keep(out.sigma), keep(out.session), keep(out.capture),
+      keep(out.locked);
   keep(out.line);
   for (TableCovariate& covariate : out.covariates) keep(covariate.values);
   return out;
@@ -268,7 +271,8 @@ void lock(TableData& data, const TableMap& map) {
     std::vector<std::size_t> order(sessions);
     for (std::size_t i = 0; i < sessions; ++i) order[i] = i;
     for (std::size_t i = sessions - 1; i > 0; --i) std::swap(order[i], order[random() % (i + 1)]);
-    order.resize(std::max<std::size_t>(1, static_cast<std::size_t>(map.locked_share * static_cast<double>(sessions))));
+    order.resize(
+        std::max<std::size_t>(1, static_cast<std::size_t>(map.locked_share * static_cast<double>(sessions))));
     for (std::size_t i = 0; i < data.rows(); ++i)
       data.locked[i] = std::ranges::find(order, static_cast<std::size_t>(data.session[i])) != order.end();
     data.notes.push_back(fmt::format("{} of {} sessions are locked", order.size(), sessions));
@@ -286,7 +290,8 @@ void lock(TableData& data, const TableMap& map) {
   for (std::size_t i = 0; i < data.capture.size(); ++i)
     if (data.locked[i]) captures.insert(data.capture[i]);
   for (std::size_t i = 0; i < data.capture.size(); ++i) data.locked[i] = captures.contains(data.capture[i]);
-  data.doubts.push_back("locked rows are of the same sessions as the others, because there are fewer than five");
+  data.doubts.push_back(
+      "locked rows are of the same sessions as the others, because there are fewer than five");
 }
 
 std::string hashOf(const TableData& data) {

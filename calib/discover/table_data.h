@@ -24,14 +24,14 @@ struct TableCovariate {
 /// Numbers of a table, rows in the file's order.
 struct TableData {
   std::filesystem::path file{};
-  std::string unit{};              ///< of the error, from a header's end: "mm"; may be empty
-  std::vector<double> error{};     ///< measured − reference
+  std::string unit{};               ///< of the error, from a header's end: "mm"; may be empty
+  std::vector<double> error{};      ///< measured − reference
   std::vector<double> reference{};  ///< empty if there is none
   std::string reference_name{};
-  std::vector<double> sigma{};     ///< empty if not given
-  std::vector<int> session{};      ///< number of each row's session
+  std::vector<double> sigma{};  ///< empty if not given
+  std::vector<int> session{};   ///< number of each row's session
   std::vector<std::string> session_names{};
-  std::vector<int> capture{};      ///< numbers; empty if no column names them
+  std::vector<int> capture{};  ///< numbers; empty if no column names them
   std::vector<bool> locked{};
   std::vector<TableCovariate> covariates{};
   std::vector<std::size_t> line{};
@@ -42,12 +42,12 @@ struct TableData {
   [[nodiscard]] std::size_t rows() const { return error.size(); }
 };
 
-/// By the map, and where it is silent by the headers. Errors: a column that is not there; a number that is none;
-/// neither measured values nor errors; fewer than 20 usable rows; nothing that the error could go with.
+/// By the map, and where it is silent by the headers. Errors: a column that is not there; a number that is
+/// none; neither measured values nor errors; fewer than 20 usable rows; nothing that the error could go with.
 Result<TableData> readTable(const CsvTable& table, const TableMap& map, const std::filesystem::path& file);
 
-/// Marks rows to be locked: the column's, else whole sessions where there are five, else one of every few blocks of
-/// rows that follow each other.
+/// Marks rows to be locked: the column's, else whole sessions where there are five, else one of every few
+/// blocks of rows that follow each other.
 void lock(TableData& data, const TableMap& map);
 
 /// The rows for which `wanted` is true; their notes too.

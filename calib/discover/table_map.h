@@ -39,7 +39,8 @@ struct MappedCovariate {
 
 enum class Sign { MeasuredMinusReference, ReferenceMinusMeasured };
 
-/// What the columns of a table mean. All keys may be left out: then headers are understood as far as they can be.
+/// What the columns of a table mean. All keys may be left out: then headers are understood as far as they can
+/// be.
 struct TableMap {
   std::string measured{}, reference{}, error{};
   Sign error_sign = Sign::MeasuredMinusReference;
@@ -68,11 +69,13 @@ struct TableMap {
     v.text("locked", locked, "column that is 1 in rows that are only for judging, 0 elsewhere");
     v.group("covariate", covariates, "columns that the error may go with; none: all others");
     v.texts("ignore", ignore, "columns to leave out");
-    v.quantity("modulation", modulation, megahertz, {0.0, 10'000.0},
-               "frequency of the modulation, if known: harmonics of its period are looked for over distances");
+    v.quantity(
+        "modulation", modulation, megahertz, {0.0, 10'000.0},
+        "frequency of the modulation, if known: harmonics of its period are looked for over distances");
     v.flag("fits_gain", fits_gain, "whether a gain of the measured value is a nuisance, beside an offset");
     v.number("locked_share", locked_share, {0.05, 0.5},
-             "without `locked`: of the sessions, or of the rows where sessions are few, that are drawn for judging");
+             "without `locked`: of the sessions, or of the rows where sessions are few, that are drawn for "
+             "judging");
     v.number("alpha", alpha, {0.0025, 0.1}, "how often something is found where there is nothing");
     v.number("draws", draws, {300, 100'000}, "null draws for each test");
     v.number("seed", seed, {0, 9'007'199'254'740'992.0}, "of every draw");

@@ -62,7 +62,8 @@ std::string effectToml(const TableDiscovery& discovery, const Effect& effect) {
                                 settings::toToml(effect.name), settings::toToml(formulaOf(effect)),
                                 settings::toToml(discovery.open.unit));
   std::string names;
-  for (const std::string& name : effect.covariates) names += (names.empty() ? "" : ", ") + settings::toToml(name);
+  for (const std::string& name : effect.covariates)
+    names += (names.empty() ? "" : ", ") + settings::toToml(name);
   out += fmt::format("covariates = [{}]\np = {}\nchosen_again = {}\n", names, settings::toToml(effect.p),
                      settings::toToml(effect.frequency));
   out += "covariance = [";
@@ -72,9 +73,10 @@ std::string effectToml(const TableDiscovery& discovery, const Effect& effect) {
   }
   out += "]\n";
   for (const Estimate& number : effect.numbers) {
-    out += fmt::format("  [[effect.number]]\n  name = {}\n  value = {}\n  standard_error = {}\n  interval_95 = {}\n",
-                       settings::toToml(number.name), settings::toToml(number.value), settings::toToml(number.error),
-                       list({number.value - 1.96 * number.error, number.value + 1.96 * number.error}));
+    out += fmt::format(
+        "  [[effect.number]]\n  name = {}\n  value = {}\n  standard_error = {}\n  interval_95 = {}\n",
+        settings::toToml(number.name), settings::toToml(number.value), settings::toToml(number.error),
+        list({number.value - 1.96 * number.error, number.value + 1.96 * number.error}));
   }
   return out + tableOf(discovery, effect);
 }
@@ -82,14 +84,16 @@ std::string effectToml(const TableDiscovery& discovery, const Effect& effect) {
 }  // namespace
 
 std::string modelToml(const TableDiscovery& discovery) {
-  std::string out = fmt::format("# Learned by toftwin discover {}: what measured − reference goes with. See docs/discover.md.\n",
-                                TOFTWIN_VERSION);
+  std::string out = fmt::format(
+      "# Learned by toftwin discover {}: what measured − reference goes with. See docs/discover.md.\n",
+      TOFTWIN_VERSION);
   out += fmt::format("data = {}\nopen_rows = {}\nlocked_rows = {}\nlocked_sha256 = \"{}\"\nunit = {}\n",
                      settings::toToml(discovery.open.file.filename().string()), discovery.open.rows(),
                      discovery.locked.rows(), discovery.judged.sha256, settings::toToml(discovery.open.unit));
   for (const Estimate& nuisance : discovery.finding.nuisances) {
-    out += fmt::format("\n[[nuisance]]\nname = {}\nvalue = {}\nstandard_error = {}\n", settings::toToml(nuisance.name),
-                       settings::toToml(nuisance.value), settings::toToml(nuisance.error));
+    out += fmt::format("\n[[nuisance]]\nname = {}\nvalue = {}\nstandard_error = {}\n",
+                       settings::toToml(nuisance.name), settings::toToml(nuisance.value),
+                       settings::toToml(nuisance.error));
   }
   for (const Effect& effect : discovery.finding.effects) out += effectToml(discovery, effect);
   return out;

@@ -17,8 +17,8 @@ using Eigen::VectorXd;
 
 constexpr double kHuber = 3.0;
 
-/// What is known, and powers, smooth functions, products and waves of the covariates, as long as four rows are left
-/// for each column.
+/// What is known, and powers, smooth functions, products and waves of the covariates, as long as four rows
+/// are left for each column.
 MatrixXd flexible(const TableData& data, const std::vector<CovariateInfo>& infos, const MatrixXd& known) {
   MatrixXd x = known;
   const auto most = static_cast<Index>(data.rows() / 4);
@@ -40,7 +40,8 @@ MatrixXd flexible(const TableData& data, const std::vector<CovariateInfo>& infos
     if (info.nature == Nature::Category) continue;
     straight.push_back({{{info.name, Shape::Power, {1.0}}}, {}});
     if (info.quantiles.front() > 0.0) {
-      add({{{{info.name, Shape::Power, {-1.0}}}, {}}, {{{info.name, Shape::Power, {-2.0}}}, {}},
+      add({{{{info.name, Shape::Power, {-1.0}}}, {}},
+           {{{info.name, Shape::Power, {-2.0}}}, {}},
            {{{info.name, Shape::Log, {}}}, {}}});
     }
   }
@@ -72,8 +73,8 @@ double medianOf(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-/// Whether |residual| goes with a covariate: ln of its square on a smooth function, if that explains far more than
-/// chance. ln χ²₁ has variance π²/2.
+/// Whether |residual| goes with a covariate: ln of its square on a smooth function, if that explains far more
+/// than chance. ln χ²₁ has variance π²/2.
 void findGrowth(const TableData& data, const std::vector<CovariateInfo>& infos, const VectorXd& residual,
                 TableNoise& noise, VectorXd& relative) {
   VectorXd logs(residual.size());
@@ -85,7 +86,9 @@ void findGrowth(const TableData& data, const std::vector<CovariateInfo>& infos, 
   VectorXd chosen;
   for (const CovariateInfo& info : infos) {
     TermGroup group = smoothIn(info, 4);
-    if (group.terms.empty() || static_cast<double>(group.terms.size()) > 0.05 * static_cast<double>(data.rows())) continue;
+    if (group.terms.empty() ||
+        static_cast<double>(group.terms.size()) > 0.05 * static_cast<double>(data.rows()))
+      continue;
     MatrixXd x(residual.size(), static_cast<Index>(group.terms.size()) + 1);
     x.col(0).setOnes();
     x.rightCols(static_cast<Index>(group.terms.size())) = columnsOf(data, group.terms);
@@ -96,10 +99,12 @@ void findGrowth(const TableData& data, const std::vector<CovariateInfo>& infos, 
     noise.grows_with = info.name;
   }
   if (chosen.size() == 0) return;
-  for (Index i = 0; i < relative.size(); ++i) relative(i) *= std::exp(std::clamp(chosen(i) - 0.5 * mean, -2.5, 2.5));
+  for (Index i = 0; i < relative.size(); ++i)
+    relative(i) *= std::exp(std::clamp(chosen(i) - 0.5 * mean, -2.5, 2.5));
 }
 
-/// 1 + 2 Σ ρ_k as long as ρ_k is clearly above nothing: over so many rows that follow each other they err alike.
+/// 1 + 2 Σ ρ_k as long as ρ_k is clearly above nothing: over so many rows that follow each other they err
+/// alike.
 double correlationRows(const TableData& data, const VectorXd& standard) {
   const auto n = static_cast<std::size_t>(standard.size());
   double sum = 1.0;
@@ -119,12 +124,14 @@ double correlationRows(const TableData& data, const VectorXd& standard) {
 
 }  // namespace
 
-TableNoise estimateNoise(const TableData& data, const std::vector<CovariateInfo>& infos, const MatrixXd& known) {
+TableNoise estimateNoise(const TableData& data, const std::vector<CovariateInfo>& infos,
+                         const MatrixXd& known) {
   TableNoise noise;
   const auto n = static_cast<Index>(data.rows());
   const MatrixXd x = flexible(data, infos, known);
   const VectorXd y = Eigen::Map<const VectorXd>(data.error.data(), n);
-  VectorXd relative = data.sigma.empty() ? VectorXd::Ones(n) : VectorXd(Eigen::Map<const VectorXd>(data.sigma.data(), n));
+  VectorXd relative =
+      data.sigma.empty() ? VectorXd::Ones(n) : VectorXd(Eigen::Map<const VectorXd>(data.sigma.data(), n));
   relative /= medianOf({relative.begin(), relative.end()});
   VectorXd weight = VectorXd::Ones(n);
   double scale = 1.0;
@@ -136,7 +143,8 @@ TableNoise estimateNoise(const TableData& data, const std::vector<CovariateInfo>
     std::vector<double> magnitudes;
     for (const double v : standard) magnitudes.push_back(std::abs(v) * shrink);
     const double middle = 1.4826 * medianOf(magnitudes);
-    scale = std::sqrt(weight.cwiseProduct(standard.cwiseAbs2()).sum() / std::max(1.0, weight.sum() * left.freedom / static_cast<double>(n)));
+    scale = std::sqrt(weight.cwiseProduct(standard.cwiseAbs2()).sum() /
+                      std::max(1.0, weight.sum() * left.freedom / static_cast<double>(n)));
     // Rows that are rounded may be equal in most: then the median says nothing.
     const double ruler = middle > 0.05 * scale ? middle : scale;
     noise.outliers = 0;

@@ -45,7 +45,8 @@ std::vector<CovariateInfo> infosOf(const TableData& data) {
     std::vector<double> levels = sorted;
     levels.erase(std::ranges::unique(levels).begin(), levels.end());
     if (levels.size() <= kMostLevels) info.levels = std::move(levels);
-    if (covariate.nature == Nature::Distance && covariate.name == data.reference_name) info.period = data.period;
+    if (covariate.nature == Nature::Distance && covariate.name == data.reference_name)
+      info.period = data.period;
     infos.push_back(std::move(info));
   }
   return infos;
@@ -62,7 +63,8 @@ MatrixXd columnsOf(const TableData& data, std::span<const Term> terms) {
         column.setZero();
         continue;
       }
-      for (Index i = 0; i < column.size(); ++i) column(i) *= factor.at(at->values[static_cast<std::size_t>(i)]);
+      for (Index i = 0; i < column.size(); ++i)
+        column(i) *= factor.at(at->values[static_cast<std::size_t>(i)]);
     }
     // A logarithm of nothing, a power of a negative number: such rows say nothing about this term.
     column = column.unaryExpr([](double v) { return std::isfinite(v) ? v : 0.0; });
@@ -79,8 +81,9 @@ TableSource::TableSource(TableData data, bool fits_gain) : data_(std::move(data)
     reference_spread_ = spreadOf(data_.reference);
     fits_gain_ = fits_gain && reference_spread_ > 0.02 * std::abs(reference_middle_);
   }
-  // The variance of an offset is known from many sessions only: then it is a random effect of each, and what changes
-  // from session to session is seen. A few sessions' offsets are free, and only what changes within them is.
+  // The variance of an offset is known from many sessions only: then it is a random effect of each, and what
+  // changes from session to session is seen. A few sessions' offsets are free, and only what changes within
+  // them is.
   if (data_.capture.empty() && data_.session_names.size() >= kManySessions) data_.capture = data_.session;
   std::set<int> captures(data_.capture.begin(), data_.capture.end());
   has_captures_ = !captures.empty() && 2 * captures.size() <= data_.rows();
@@ -122,8 +125,9 @@ void TableSource::makeCaptures() {
   const std::size_t rows = data_.rows();
   capture_.assign(rows, 0);
   std::map<std::pair<int, std::size_t>, int> known;
-  const auto size = std::max<std::size_t>(
-      (rows + kMostCaptures - 1) / kMostCaptures, static_cast<std::size_t>(std::ceil(3.0 * (noise_.correlation_rows - 1.0))));
+  const auto size =
+      std::max<std::size_t>((rows + kMostCaptures - 1) / kMostCaptures,
+                            static_cast<std::size_t>(std::ceil(3.0 * (noise_.correlation_rows - 1.0))));
   std::map<int, std::size_t> seen;  // rows of each session so far
   for (std::size_t i = 0; i < rows; ++i) {
     const int session = data_.session[i];
@@ -159,7 +163,8 @@ Evidence TableSource::evidenceOf(std::span<const TermGroup> extra, const std::ve
   for (auto& [group, columns] : nuisanceColumns(data_)) add(std::move(group), std::move(columns));
   if (has_captures_) {
     const auto n = static_cast<Index>(data_.rows());
-    add({.name = "capture", .kind = Kind::PerCapture, .scale_class = 0}, MatrixXd::Constant(n, 1, error_spread_));
+    add({.name = "capture", .kind = Kind::PerCapture, .scale_class = 0},
+        MatrixXd::Constant(n, 1, error_spread_));
   }
   for (const TermGroup& terms : extra) {
     Group group{.name = terms.name, .kind = terms.kind, .stage = std::nullopt};

@@ -14,23 +14,24 @@ namespace toftwin::discover {
 
 /// What the rows of a table err by beyond anything smooth.
 struct TableNoise {
-  std::vector<double> sigma{};   ///< of each row, in the error's unit
-  std::vector<double> weight{};  ///< 1, and less for rows that lie far off (Huber's weights)
-  double typical = 0.0;          ///< median of sigma
+  std::vector<double> sigma{};    ///< of each row, in the error's unit
+  std::vector<double> weight{};   ///< 1, and less for rows that lie far off (Huber's weights)
+  double typical = 0.0;           ///< median of sigma
   double correlation_rows = 1.0;  ///< over so many rows that follow each other they err alike
-  std::size_t outliers = 0;      ///< rows beyond three deviations
-  std::string grows_with{};      ///< covariate that sigma goes with, or empty
+  std::size_t outliers = 0;       ///< rows beyond three deviations
+  std::string grows_with{};       ///< covariate that sigma goes with, or empty
 };
 
-/// A table as a source of evidence. Captures are what a column names, or blocks of rows that follow each other,
-/// longer than rows err alike.
+/// A table as a source of evidence. Captures are what a column names, or blocks of rows that follow each
+/// other, longer than rows err alike.
 class TableSource : public RowSource {
  public:
   /// The rows are copied; locked ones must not be among them.
   TableSource(TableData data, bool fits_gain);
 
   [[nodiscard]] Evidence evidence(std::span<const TermGroup> extra) const override;
-  [[nodiscard]] Evidence summed(std::span<const TermGroup> extra, std::span<const double> scales) const override;
+  [[nodiscard]] Evidence summed(std::span<const TermGroup> extra,
+                                std::span<const double> scales) const override;
   [[nodiscard]] std::vector<CovariateInfo> covariates() const override { return infos_; }
 
   /// Estimates the noise anew, with these terms beside what is smooth: what they explain is no noise.
@@ -63,9 +64,10 @@ class TableSource : public RowSource {
 Eigen::MatrixXd columnsOf(const TableData& data, std::span<const Term> terms);
 std::vector<CovariateInfo> infosOf(const TableData& data);
 
-/// Noise of a table from what is left after a flexible fit of everything smooth: weights and deviations in turn
-/// (P. J. Huber, Ann. Math. Stat. 35 (1964) 73; k = 3).
-/// `known`: columns that are there for certain, nuisances among them.
-TableNoise estimateNoise(const TableData& data, const std::vector<CovariateInfo>& infos, const Eigen::MatrixXd& known);
+/// Noise of a table from what is left after a flexible fit of everything smooth: weights and deviations in
+/// turn (P. J. Huber, Ann. Math. Stat. 35 (1964) 73; k = 3). `known`: columns that are there for certain,
+/// nuisances among them.
+TableNoise estimateNoise(const TableData& data, const std::vector<CovariateInfo>& infos,
+                         const Eigen::MatrixXd& known);
 
 }  // namespace toftwin::discover

@@ -79,19 +79,23 @@ struct CovariateInfo {
   std::optional<Stage> stage{};     ///< where functions of it are inserted
 };
 
-/// Data that Evidence can be made from as often as the shape of a term is refined. One call is one pass over all
-/// rows; it adds the columns of many terms at once.
+/// Data that Evidence can be made from as often as the shape of a term is refined. One call is one pass over
+/// all rows; it adds the columns of many terms at once.
 class RowSource {
  public:
   virtual ~RowSource() = default;
   /// The nuisances and random effects, the catalogue if there is one, and behind them a group for each of
   /// `extra`, in their order, with their names.
   [[nodiscard]] virtual Evidence evidence(std::span<const TermGroup> extra) const = 0;
-  /// The same without the catalogue: shapes are refined with it. As good, but less work where it is overridden.
-  [[nodiscard]] virtual Evidence withoutCatalogue(std::span<const TermGroup> extra) const { return evidence(extra); }
-  /// That summed over the captures, with the random effects integrated out (see marginalise): one capture. It is
-  /// asked for most, once for each step of a search. As good, but less work where it is overridden.
-  [[nodiscard]] virtual Evidence summed(std::span<const TermGroup> extra, std::span<const double> scales) const;
+  /// The same without the catalogue: shapes are refined with it. As good, but less work where it is
+  /// overridden.
+  [[nodiscard]] virtual Evidence withoutCatalogue(std::span<const TermGroup> extra) const {
+    return evidence(extra);
+  }
+  /// That summed over the captures, with the random effects integrated out (see marginalise): one capture. It
+  /// is asked for most, once for each step of a search. As good, but less work where it is overridden.
+  [[nodiscard]] virtual Evidence summed(std::span<const TermGroup> extra,
+                                        std::span<const double> scales) const;
   /// What terms can be made of.
   [[nodiscard]] virtual std::vector<CovariateInfo> covariates() const = 0;
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What `toftwin discover` finds in tables with hidden effects, by strength. λ is the noncentrality of the hidden
-// effect after the nuisances. Usage: discover_bench [seeds]
+// What `toftwin discover` finds in tables with hidden effects, by strength. λ is the noncentrality of the
+// hidden effect after the nuisances. Usage: discover_bench [seeds]
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -43,8 +43,8 @@ double removedOf(const TableSource& source, const Finding& finding, const Plante
   return 1.0 - left(hidden - found).squaredNorm() / left(hidden).squaredNorm();
 }
 
-void run(const std::vector<Hidden>& hidden, double lambda, std::uint64_t seed, const Errors& errors, Score& score,
-         bool is_loud) {
+void run(const std::vector<Hidden>& hidden, double lambda, std::uint64_t seed, const Errors& errors,
+         Score& score, bool is_loud) {
   const Planted planted = plant(seed, hidden, lambda, errors);
   TableSource source{planted.data, true};
   const Finding finding = findInTable(source, {.seed = seed});
@@ -62,15 +62,19 @@ void run(const std::vector<Hidden>& hidden, double lambda, std::uint64_t seed, c
   }
   const bool is_named = hidden[0] != Hidden::Nothing && right == static_cast<int>(hidden.size());
   score.named += is_named, score.offered += is_offered;
-  score.spurious += std::max(0, static_cast<int>(finding.effects.size()) - (hidden[0] == Hidden::Nothing ? 0 : right));
+  score.spurious +=
+      std::max(0, static_cast<int>(finding.effects.size()) - (hidden[0] == Hidden::Nothing ? 0 : right));
   if (hidden[0] != Hidden::Nothing) score.removed.push_back(removedOf(source, finding, planted));
   if (!is_loud) return;
   std::string words;
-  for (const Effect& e : finding.effects) words += fmt::format(" [{} p={:.4f} f={:.2f} gain {:.0f}±{:.0f}]", e.name, e.p, e.frequency, e.gain.mean, e.gain.error);
+  for (const Effect& e : finding.effects)
+    words += fmt::format(" [{} p={:.4f} f={:.2f} gain {:.0f}±{:.0f}]", e.name, e.p, e.frequency, e.gain.mean,
+                         e.gain.error);
   fmt::print("   seed {}: p {:.4f}{}\n", seed, finding.first_p, words);
 }
 
-/// How often the 95 % interval of a time constant and of a place holds the truth, where the formula was found.
+/// How often the 95 % interval of a time constant and of a place holds the truth, where the formula was
+/// found.
 void coverage(Hidden hidden, const char* name, double truth, double lambda, int seeds) {
   int formulas = 0, held = 0;
   for (int seed = 1; seed <= seeds; ++seed) {
@@ -81,8 +85,8 @@ void coverage(Hidden hidden, const char* name, double truth, double lambda, int 
     const Estimate& inner = finding.effects[0].numbers.back();
     ++formulas, held += std::abs(inner.value - truth) <= 1.96 * inner.error;
   }
-  fmt::print("95 % interval of {} in \"{}\", lambda {:.0f}: holds the truth in {} of {} (of {} seeds)\n", truth, name, lambda,
-             held, formulas, seeds);
+  fmt::print("95 % interval of {} in \"{}\", lambda {:.0f}: holds the truth in {} of {} (of {} seeds)\n",
+             truth, name, lambda, held, formulas, seeds);
 }
 
 double quantile(std::vector<double> values, double q) {
@@ -104,8 +108,8 @@ void row(const std::string& name, const Score& s, double seconds) {
 int main(int argc, char** argv) {
   const int seeds = argc > 1 ? std::atoi(argv[1]) : 5;
   const bool is_loud = argc > 2;
-  fmt::print("{:<34} {:>4} {:>8} {:>8} {:>8} {:>9} {:>8} {:>8} {:>7}\n", "tables of 400 rows", "runs", "detected",
-             "named", "offered", "spurious", "removed", "worst10", "s/run");
+  fmt::print("{:<34} {:>4} {:>8} {:>8} {:>8} {:>9} {:>8} {:>8} {:>7}\n", "tables of 400 rows", "runs",
+             "detected", "named", "offered", "spurious", "removed", "worst10", "s/run");
   const bool only_nulls = argc > 2 && std::string{argv[2]} != "loud";
   for (const double lambda : only_nulls ? std::vector<double>{} : std::vector<double>{150.0, 600.0, 3000.0}) {
     Score all;
@@ -115,14 +119,16 @@ int main(int argc, char** argv) {
       const auto start = std::chrono::steady_clock::now();
       for (int seed = 1; seed <= seeds; ++seed)
         run({hidden}, lambda, static_cast<std::uint64_t>(seed), {}, score, is_loud);
-      row(fmt::format("{} {:.0f}", nameOf(hidden), lambda), score, Seconds{std::chrono::steady_clock::now() - start}.count());
+      row(fmt::format("{} {:.0f}", nameOf(hidden), lambda), score,
+          Seconds{std::chrono::steady_clock::now() - start}.count());
       all.runs += score.runs, all.detected += score.detected, all.named += score.named;
       all.spurious += score.spurious, all.offered += score.offered;
       all.removed.insert(all.removed.end(), score.removed.begin(), score.removed.end());
     }
     row(fmt::format("ALL {:.0f}", lambda), all, Seconds{std::chrono::steady_clock::now() - begin}.count());
   }
-  for (const double lambda : {600.0, 3000.0}) coverage(Hidden::WarmUp, "exponential in time_s", 300.0, lambda, 6 * seeds);
+  for (const double lambda : {600.0, 3000.0})
+    coverage(Hidden::WarmUp, "exponential in time_s", 300.0, lambda, 6 * seeds);
   if (argc > 2 && std::string{argv[2]} == "coverage") return 0;
   const std::pair<const char*, Errors> nulls[]{{"nothing", {}},
                                                {"nothing, t4 tails", {.heavy_tails = true}},
@@ -140,8 +146,10 @@ int main(int argc, char** argv) {
   const auto start = std::chrono::steady_clock::now();
   for (int seed = 1; seed <= seeds; ++seed) {
     run({Hidden::WarmUp, Hidden::Wiggle}, 1500.0, static_cast<std::uint64_t>(seed), {}, pairs, is_loud);
-    run({Hidden::Temperature, Hidden::InverseAmplitude}, 1500.0, static_cast<std::uint64_t>(seed), {}, pairs, is_loud);
-    run({Hidden::Parity, Hidden::AmbientTimesDistance}, 1500.0, static_cast<std::uint64_t>(seed), {}, pairs, is_loud);
+    run({Hidden::Temperature, Hidden::InverseAmplitude}, 1500.0, static_cast<std::uint64_t>(seed), {}, pairs,
+        is_loud);
+    run({Hidden::Parity, Hidden::AmbientTimesDistance}, 1500.0, static_cast<std::uint64_t>(seed), {}, pairs,
+        is_loud);
   }
   row("pairs 1500", pairs, Seconds{std::chrono::steady_clock::now() - start}.count());
 }

@@ -24,9 +24,7 @@ struct Made {
 
 class Rows : public testing::Test {
  protected:
-  Rows()
-      : folder_(std::filesystem::temp_directory_path() /
-                fmt::format("toftwin-rows-{}", ::getpid())) {}
+  Rows() : folder_(std::filesystem::temp_directory_path() / fmt::format("toftwin-rows-{}", ::getpid())) {}
   ~Rows() override { std::filesystem::remove_all(folder_); }
 
   Made make(const std::string& hidden) {
@@ -83,11 +81,9 @@ TEST_F(Rows, NothingIsLeftButNoiseWhereNothingIsHidden) {
 TEST_F(Rows, EveryEffectOfTheCatalogueThatShowsIsACandidateAndNoiseIsNot) {
   const Made made = make("");
   std::vector<std::string> names;
-  for (const Candidate& one : made.rows.candidates())
-    names.push_back(discover::nameOf(one.example));
-  for (const char* shows :
-       {"lens_scatter", "warm_up", "thermal_delay", "time_walk", "clock_scale", "sample_offset",
-        "vignetting", "propagation_delay", "calibration_table"})
+  for (const Candidate& one : made.rows.candidates()) names.push_back(discover::nameOf(one.example));
+  for (const char* shows : {"lens_scatter", "warm_up", "thermal_delay", "time_walk", "clock_scale",
+                            "sample_offset", "vignetting", "propagation_delay", "calibration_table"})
     EXPECT_THAT(names, testing::Contains(shows));
   for (const char* does_not : {"shot_noise", "read_noise", "range_noise", "delay", "learned_range"})
     EXPECT_THAT(names, testing::Not(testing::Contains(does_not)));
@@ -96,19 +92,14 @@ TEST_F(Rows, EveryEffectOfTheCatalogueThatShowsIsACandidateAndNoiseIsNot) {
 TEST(Catalogue, NumbersOfAnEffectAreSetByTheirKeysAndStayWithinBounds) {
   const sim::AnyEffect effect = withNumber(sim::AnyEffect{sim::WarmUp{}}, "fast_mm", 7.0);
   EXPECT_DOUBLE_EQ(std::get<sim::WarmUp>(effect).fast.in(millimetre), 7.0);
-  EXPECT_DOUBLE_EQ(std::get<sim::WarmUp>(withNumber(effect, "fast_mm", 1e9)).fast.in(millimetre),
-                   1000.0);
-  EXPECT_EQ(
-      std::get<sim::SampleOffset>(withNumber(sim::AnyEffect{sim::SampleOffset{}}, "step", 2.4))
-          .step,
-      2);
+  EXPECT_DOUBLE_EQ(std::get<sim::WarmUp>(withNumber(effect, "fast_mm", 1e9)).fast.in(millimetre), 1000.0);
+  EXPECT_EQ(std::get<sim::SampleOffset>(withNumber(sim::AnyEffect{sim::SampleOffset{}}, "step", 2.4)).step,
+            2);
 }
 
 TEST(Catalogue, AnEffectIsInsertedWhereLightMeetsIt) {
-  const std::vector<sim::AnyEffect> some{sim::Vignetting{}, sim::ReadNoise{},
-                                         sim::TemporalFilter{}};
-  EXPECT_EQ(discover::nameOf(withInserted(some, sim::AnyEffect{sim::LensScatter{}})[1]),
-            "lens_scatter");
+  const std::vector<sim::AnyEffect> some{sim::Vignetting{}, sim::ReadNoise{}, sim::TemporalFilter{}};
+  EXPECT_EQ(discover::nameOf(withInserted(some, sim::AnyEffect{sim::LensScatter{}})[1]), "lens_scatter");
   EXPECT_EQ(discover::nameOf(withInserted(some, sim::AnyEffect{sim::WarmUp{}})[2]), "warm_up");
   EXPECT_EQ(discover::nameOf(withInserted(some, sim::AnyEffect{sim::Harmonics{}})[0]), "harmonics");
 }

@@ -23,8 +23,7 @@ using testing::HasSubstr;
 class Searched : public testing::Test {
  protected:
   Searched()
-      : folder_(std::filesystem::temp_directory_path() /
-                fmt::format("toftwin-campaign-{}", ::getpid())) {
+      : folder_(std::filesystem::temp_directory_path() / fmt::format("toftwin-campaign-{}", ::getpid())) {
     std::filesystem::create_directories(folder_);
     write("camera.toml", smallCamera());
     write("scene.toml", smallScene());
@@ -41,20 +40,15 @@ class Searched : public testing::Test {
     auto plan = plan::parsePlan(smallPlan(), "plan.toml");
     const auto camera = sim::SensorModel::parse(smallCamera(hidden), "camera.toml");
     const auto scene = sim::Scene::parse(smallScene(), "scene.toml");
-    if (!plan || !camera || !scene)
-      throw std::runtime_error("the small campaign's files are wrong");
-    SimulatedRun run{.plan = *plan,
-                     .camera = *camera,
-                     .scene = *scene,
-                     .spoil = spoil,
-                     .with_poses = with_poses};
+    if (!plan || !camera || !scene) throw std::runtime_error("the small campaign's files are wrong");
+    SimulatedRun run{
+        .plan = *plan, .camera = *camera, .scene = *scene, .spoil = spoil, .with_poses = with_poses};
     run.frames = frames;
     discover::write(run, folder_ / "run");
   }
   [[nodiscard]] CampaignJob job() const {
-    CampaignJob job{.run = folder_ / "run",
-                    .model = (folder_ / "camera.toml").string(),
-                    .scene = folder_ / "scene.toml"};
+    CampaignJob job{
+        .run = folder_ / "run", .model = (folder_ / "camera.toml").string(), .scene = folder_ / "scene.toml"};
     job.output = folder_ / "out";
     job.trace.max_surfaces = 1;
     return job;
@@ -168,9 +162,8 @@ TEST_F(Searched, SaysWhyARunCannotBeSearched) {
   std::string small = smallCamera();
   small.replace(small.find("width = 44"), 10, "width = 40");
   write("camera.toml", small);
-  EXPECT_THAT(
-      errorOf(job()),
-      HasSubstr("the run's images have 44 x 33 pixels, the camera file's camera has 40 x 33"));
+  EXPECT_THAT(errorOf(job()),
+              HasSubstr("the run's images have 44 x 33 pixels, the camera file's camera has 40 x 33"));
   write("camera.toml", smallCamera());
   CampaignJob with_block = job();
   with_block.scene_of_block["corner"] = folder_ / "scene.toml";

@@ -21,7 +21,8 @@ std::string errorOf(const std::string& text) {
 }
 
 TEST(ParseCsv, ReadsQuotesSemicolonsTabsCommentsAndWindowsLines) {
-  const auto table = parseCsv("\xEF\xBB\xBF# made by hand\r\na;\"b;c\"\r\n1; \"say \"\"x\"\"\"\r\n\r\n2;y\r\n", "t.csv");
+  const auto table =
+      parseCsv("\xEF\xBB\xBF# made by hand\r\na;\"b;c\"\r\n1; \"say \"\"x\"\"\"\r\n\r\n2;y\r\n", "t.csv");
   ASSERT_TRUE(table);
   EXPECT_THAT(table->header, ElementsAre("a", "b;c"));
   EXPECT_THAT(table->columns[1], ElementsAre("say \"x\"", "y"));
@@ -48,9 +49,10 @@ TEST(Headers, SayWhatTheColumnsAre) {
   EXPECT_EQ(rolesIn({"time_s", "depth_mm"}), "error = depth_mm (without a reference); covariates: time_s");
   EXPECT_EQ(rolesIn({"reference_mm", "reference_minus_measured_mm"}),
             "error = −reference_minus_measured_mm; covariates: reference_mm");
-  EXPECT_EQ(rolesIn({"measured_mm", "reference_mm", "sigma_mm", "run", "locked", "temperature_c"}),
-            "error = measured_mm − reference_mm; sigma = sigma_mm; session = run; locked = locked; covariates: "
-            "reference_mm, temperature_c");
+  EXPECT_EQ(
+      rolesIn({"measured_mm", "reference_mm", "sigma_mm", "run", "locked", "temperature_c"}),
+      "error = measured_mm − reference_mm; sigma = sigma_mm; session = run; locked = locked; covariates: "
+      "reference_mm, temperature_c");
   EXPECT_EQ(rolesIn({"range_error_mm", "distance_m", "exposure_time_us"}),
             "error = range_error_mm; covariates: distance_m, exposure_time_us");
   EXPECT_THAT(rolesIn({"a", "b"}), HasSubstr("which column was measured?"));
@@ -66,7 +68,8 @@ TEST(Headers, ExposureTimeIsNoTime) {
 TEST(Headers, MapErrorsNameColumnAndKey) {
   TableMap map;
   map.measured = "depht";
-  EXPECT_THAT(rolesOf({"depth", "t"}, map, "t.csv").error().message, HasSubstr("no column \"depht\" for `measured`"));
+  EXPECT_THAT(rolesOf({"depth", "t"}, map, "t.csv").error().message,
+              HasSubstr("no column \"depht\" for `measured`"));
   map.measured = "depth", map.reference = "depth";
   EXPECT_THAT(rolesOf({"depth", "t"}, map, "t.csv").error().message, HasSubstr("has two roles"));
   map.reference = "", map.ignore = {"u"};
@@ -104,7 +107,8 @@ TEST(ReadTable, RefusesTextAmongNumbersTooFewRowsAndNothingToGoWith) {
 
 TEST(Lock, TakesWholeSessionsWhereThereAreFiveAndKeepsTheColumnWhereThereIsOne) {
   std::string text = "error_mm,time_s,session\n";
-  for (int i = 0; i < 100; ++i) text += std::to_string(i % 7) + "," + std::to_string(i) + "," + std::to_string(i / 10) + "\n";
+  for (int i = 0; i < 100; ++i)
+    text += std::to_string(i % 7) + "," + std::to_string(i) + "," + std::to_string(i / 10) + "\n";
   auto data = *dataOf(text);
   lock(data, {});
   std::map<int, std::set<bool>> by_session;
@@ -129,14 +133,17 @@ TEST(ReadTable, SurvivesAnyBytes) {
     for (std::uint64_t e = 0; e < edits; ++e) {
       const char c = bits() % 8 == 0 ? static_cast<char>(bits()) : alphabet[bits() % alphabet.size()];
       const auto at = text.empty() ? 0 : bits() % text.size();
-      if (bits() % 3 == 0 && !text.empty()) text.erase(at, bits() % 5);
-      else text.insert(std::min<std::size_t>(at, text.size()), 1, c);
+      if (bits() % 3 == 0 && !text.empty())
+        text.erase(at, bits() % 5);
+      else
+        text.insert(std::min<std::size_t>(at, text.size()), 1, c);
     }
     const auto data = dataOf(text);
     answers += static_cast<bool>(data);
     EXPECT_TRUE(data || !data.error().message.empty());
   }
-  EXPECT_GT(answers, 20) << "some of the damaged tables must still be tables, or nothing behind the parser is tested";
+  EXPECT_GT(answers, 20)
+      << "some of the damaged tables must still be tables, or nothing behind the parser is tested";
 }
 
 }  // namespace

@@ -65,7 +65,8 @@ TEST(Finder, SeparatesTwoEffects) {
   EXPECT_GT(found.finding.last_p, 0.005);
 }
 
-/// A strong exponential's time constant, 300 s, within 4 of its standard errors (once in 16,000), which are small.
+/// A strong exponential's time constant, 300 s, within 4 of its standard errors (once in 16,000), which are
+/// small.
 TEST(Finder, MeasuresTheTimeConstantOfAnExponential) {
   const Found found = findHidden({Hidden::WarmUp}, 3000.0, 4);
   ASSERT_THAT(found.finding.effects, SizeIs(1)) << inWords(found.finding);
@@ -78,13 +79,15 @@ TEST(Finder, MeasuresTheTimeConstantOfAnExponential) {
 }
 
 TEST(Finder, GivesTheSameForTheSameSeed) {
-  const Found a = findHidden({Hidden::Temperature}, 600.0, 5), b = findHidden({Hidden::Temperature}, 600.0, 5);
+  const Found a = findHidden({Hidden::Temperature}, 600.0, 5),
+              b = findHidden({Hidden::Temperature}, 600.0, 5);
   EXPECT_EQ(inWords(a.finding), inWords(b.finding));
   ASSERT_FALSE(a.finding.effects.empty());
   EXPECT_EQ(a.finding.effects[0].coefficient, b.finding.effects[0].coefficient);
 }
 
-/// Time and temperature that rise together: whatever it is called, the other must be offered, and an experiment.
+/// Time and temperature that rise together: whatever it is called, the other must be offered, and an
+/// experiment.
 TEST(Finder, OffersBothOfTwoCovariatesThatGoTogether) {
   Planted planted = plant(6, {Hidden::Nothing}, 0.0);
   TableData& data = planted.data;
@@ -102,7 +105,8 @@ TEST(Finder, OffersBothOfTwoCovariatesThatGoTogether) {
   ASSERT_THAT(finding.effects, SizeIs(1)) << inWords(finding);
   const Effect& effect = finding.effects[0];
   std::set<std::string> offered(effect.covariates.begin(), effect.covariates.end());
-  for (const Alternative& other : effect.alternatives) offered.insert(other.covariates.begin(), other.covariates.end());
+  for (const Alternative& other : effect.alternatives)
+    offered.insert(other.covariates.begin(), other.covariates.end());
   EXPECT_TRUE(offered.contains("time_s") && offered.contains("lamp_hours")) << inWords(finding);
   ASSERT_TRUE(effect.experiment);
   EXPECT_NE(effect.experiment->vary, effect.experiment->hold);

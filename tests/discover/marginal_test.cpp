@@ -40,7 +40,8 @@ Rows rowsOf(int captures, int rows, double deviation, std::uint64_t seed) {
       x.row(i) << 1.0, 1.0, normal();
       y(i) = pose + 2.0 + 0.5 * x(i, 2) + normal();
     }
-    out.evidence.captures.push_back({x.transpose() * x, x.transpose() * y, y.squaredNorm(), static_cast<double>(rows), "", ""});
+    out.evidence.captures.push_back(
+        {x.transpose() * x, x.transpose() * y, y.squaredNorm(), static_cast<double>(rows), "", ""});
     out.x.push_back(std::move(x)), out.y.push_back(std::move(y));
   }
   return out;
@@ -66,8 +67,8 @@ TEST(Marginalise, IsGeneralisedLeastSquaresOverAllRows) {
   EXPECT_NEAR(marginal.log_determinant, log_determinant, 1e-12);
 }
 
-/// At 0.5 the 200 captures' means vary by 0.5² + 1/8, known to √(2/200) = 10 %: the deviation to 7.5 %, three of
-/// which and half of the grid's step of 20 % are 33 %; less at larger ones.
+/// At 0.5 the 200 captures' means vary by 0.5² + 1/8, known to √(2/200) = 10 %: the deviation to 7.5 %, three
+/// of which and half of the grid's step of 20 % are 33 %; less at larger ones.
 TEST(EstimateScales, FindsTheDeviationOfWhatIsDrawnAnew) {
   for (const double truth : {0.5, 1.0, 3.0}) {
     const auto scale = estimateScales(rowsOf(200, 8, truth, 11).evidence, {});

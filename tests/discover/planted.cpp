@@ -18,7 +18,9 @@ class Draws {
   explicit Draws(std::uint64_t seed) : bits_(seed) {}
   double uniform() { return (static_cast<double>(bits_() >> 11) + 0.5) * 0x1p-53; }
   double uniform(double low, double high) { return low + (high - low) * uniform(); }
-  double normal() { return std::sqrt(-2.0 * std::log(uniform())) * std::cos(2.0 * std::numbers::pi * uniform()); }
+  double normal() {
+    return std::sqrt(-2.0 * std::log(uniform())) * std::cos(2.0 * std::numbers::pi * uniform());
+  }
   /// Variance 1: t₄ has 2.
   double t4() {
     double squares = 0.0;
@@ -132,7 +134,8 @@ Planted plant(std::uint64_t seed, const std::vector<Hidden>& hidden, double lamb
   TableData& data = out.data;
   const double exposures[]{200.0, 500.0, 1000.0, 2000.0};
   double room[kSessions], offset[kSessions];
-  for (int s = 0; s < kSessions; ++s) room[s] = draws.uniform(15.0, 30.0), offset[s] = errors.session_mm * draws.normal();
+  for (int s = 0; s < kSessions; ++s)
+    room[s] = draws.uniform(15.0, 30.0), offset[s] = errors.session_mm * draws.normal();
   for (int i = 0; i < kRows; ++i) {
     const int session = i * kSessions / kRows;
     Row row{};
@@ -159,7 +162,8 @@ Planted plant(std::uint64_t seed, const std::vector<Hidden>& hidden, double lamb
     const Row& row = rows[static_cast<std::size_t>(i)];
     double noise = errors.sigma_mm * (errors.heavy_tails ? draws.t4() : draws.normal());
     if (errors.bumped && i >= 120 && i < 130) noise += 6.0 * errors.sigma_mm;
-    data.error.push_back(3.0 + 2.0 * row.distance + offset[data.session[static_cast<std::size_t>(i)]] + sum(i) + noise);
+    data.error.push_back(3.0 + 2.0 * row.distance + offset[data.session[static_cast<std::size_t>(i)]] +
+                         sum(i) + noise);
     data.reference.push_back(row.distance);
     data.line.push_back(static_cast<std::size_t>(i) + 2);
   }

@@ -13,9 +13,9 @@ namespace toftwin::discover {
 /// How rows err besides the effect.
 struct Errors {
   double sigma_mm = 1.0;
-  bool heavy_tails = false;   ///< Student's t with 4 degrees of freedom, of the same variance
-  bool bumped = false;        ///< rows 120 to 129 are 6 sigma off together
-  double session_mm = 0.5;    ///< deviation of the sessions' offsets
+  bool heavy_tails = false;  ///< Student's t with 4 degrees of freedom, of the same variance
+  bool bumped = false;       ///< rows 120 to 129 are 6 sigma off together
+  double session_mm = 0.5;   ///< deviation of the sessions' offsets
 };
 
 enum class Hidden {
@@ -30,9 +30,9 @@ enum class Hidden {
   Exposure,
   IncidenceSquared
 };
-inline constexpr Hidden kHidden[]{Hidden::WarmUp,    Hidden::Wiggle, Hidden::Temperature,
-                                  Hidden::AmbientTimesDistance, Hidden::Step,   Hidden::Parity,
-                                  Hidden::InverseAmplitude,     Hidden::Exposure, Hidden::IncidenceSquared};
+inline constexpr Hidden kHidden[]{
+    Hidden::WarmUp, Hidden::Wiggle,           Hidden::Temperature, Hidden::AmbientTimesDistance, Hidden::Step,
+    Hidden::Parity, Hidden::InverseAmplitude, Hidden::Exposure,    Hidden::IncidenceSquared};
 const char* nameOf(Hidden hidden);
 /// What it goes with, sorted.
 std::vector<std::string> covariatesOf(Hidden hidden);
@@ -41,8 +41,9 @@ struct Planted {
   TableData data;
   std::vector<double> effect_mm;  ///< of each row: what was hidden
 };
-/// 400 rows of 4 sessions, each from switching on, distances in random order. The effects are scaled so that each
-/// has noncentrality `lambda` over the rows after offset, gain and session offsets.
-Planted plant(std::uint64_t seed, const std::vector<Hidden>& hidden, double lambda, const Errors& errors = {});
+/// 400 rows of 4 sessions, each from switching on, distances in random order. The effects are scaled so that
+/// each has noncentrality `lambda` over the rows after offset, gain and session offsets.
+Planted plant(std::uint64_t seed, const std::vector<Hidden>& hidden, double lambda,
+              const Errors& errors = {});
 
 }  // namespace toftwin::discover

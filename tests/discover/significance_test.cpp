@@ -36,12 +36,13 @@ Alarms alarmsOf(const Errors& errors, int tests, std::uint64_t first_seed) {
   return {tests, found[0] + found[1]};
 }
 
-/// At α = 1 % more than 4 alarms in 60 tables have probability 0.04 % if α is right, and 85 % at a rate of 12 %: these
-/// catch what is badly wrong. More than 8 in all 240: 0.1 %, and 84 % at a rate of 5 %.
-/// The benchmark (tests/bench/discover_bench.cpp) measures the rate itself.
+/// At α = 1 % more than 4 alarms in 60 tables have probability 0.04 % if α is right, and 85 % at a rate of 12
+/// %: these catch what is badly wrong. More than 8 in all 240: 0.1 %, and 84 % at a rate of 5 %. The
+/// benchmark (tests/bench/discover_bench.cpp) measures the rate itself.
 TEST(FalseAlarms, AreRareWhateverTheNoiseIsLike) {
   int all = 0;
-  const std::array cases{std::pair{"as declared", Errors{}}, std::pair{"15 % larger", Errors{.sigma_mm = 1.15}},
+  const std::array cases{std::pair{"as declared", Errors{}},
+                         std::pair{"15 % larger", Errors{.sigma_mm = 1.15}},
                          std::pair{"t4 tails", Errors{.heavy_tails = true}},
                          std::pair{"ten rows bumped", Errors{.bumped = true}}};
   for (const auto& [name, errors] : cases) {

@@ -76,12 +76,10 @@ plan::RecordedFile capture(const SimulatedRun& run, const plan::PlannedCapture& 
   request.samples_per_pixel = 128;
   request.max_surfaces = 1;
   request.seed = engine();
-  sim::Light light =
-      sim::trace(other == run.scene_of_block.end() ? run.scene : other->second, request);
+  sim::Light light = sim::trace(other == run.scene_of_block.end() ? run.scene : other->second, request);
   brighten(light, static_cast<float>(std::exp(run.light_error * normal(engine))));
-  const std::string name =
-      fmt::format("{}/{:04}-a.mcap", planned.is_locked ? plan::kLockedFolder : plan::kOpenFolder,
-                  planned.number);
+  const std::string name = fmt::format(
+      "{}/{:04}-a.mcap", planned.is_locked ? plan::kLockedFolder : plan::kOpenFolder, planned.number);
   auto writer = orThrow(record::Writer::create(folder / name, {.overwrite = true}));
   const std::array kinds{PlaneKind::Range, PlaneKind::Amplitude, PlaneKind::Flags};
   sim::Samples before_collected;
@@ -94,12 +92,10 @@ plan::RecordedFile capture(const SimulatedRun& run, const plan::PlannedCapture& 
     frame.moment = momentOf(camera, planned, run.with_poses ? std::optional{pose} : std::nullopt,
                             static_cast<std::uint64_t>(k));
     sim::Samples collected = camera.collect(light, frame.moment, run.seed, number);
-    const sim::History history =
-        k == 0 ? sim::History{} : sim::History{&before_collected, &before_range};
+    const sim::History history = k == 0 ? sim::History{} : sim::History{&before_collected, &before_range};
     auto exposed = camera.readOut(collected, frame.moment, run.seed, number, 0, 0, history);
     before_collected = std::move(collected), before_range = exposed.range;
-    if (run.spoil)
-      run.spoil(exposed.range, frame.moment, camera.camera(), static_cast<std::uint64_t>(k));
+    if (run.spoil) run.spoil(exposed.range, frame.moment, camera.camera(), static_cast<std::uint64_t>(k));
     if (k == 0) taken.a.exposure = frame.moment.exposures.front().duration;
     frame.planes = sim::planesOf(camera, std::move(exposed), light.truth, kinds);
     orThrow(writer.write(frame));

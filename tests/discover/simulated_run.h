@@ -23,8 +23,7 @@ struct SimulatedRun {
   std::uint64_t seed = 1;
   double pose_error_m = 1e-3, pose_error_deg = 0.1, light_error = 0.01;
   /// What no camera file says is done to each frame's ranges: an effect of no catalogue.
-  std::function<void(sim::RangeImage&, const Moment&, const CameraInfo&, std::uint64_t frame)>
-      spoil{};
+  std::function<void(sim::RangeImage&, const Moment&, const CameraInfo&, std::uint64_t frame)> spoil{};
   bool with_poses = true;
   int frames = 0;  ///< of each capture; 0: the plan's
 };

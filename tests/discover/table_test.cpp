@@ -77,7 +77,8 @@ TEST(DiscoverTable, WritesAReportAModelAndNumbers) {
 }
 
 TEST(DiscoverTable, SaysNothingAboveTheNoiseWhereThereIsNothing) {
-  const auto discovery = discoverTable(write("null.csv", csvOf(plant(9, {Hidden::Nothing}, 0.0).data)), withReference());
+  const auto discovery =
+      discoverTable(write("null.csv", csvOf(plant(9, {Hidden::Nothing}, 0.0).data)), withReference());
   ASSERT_TRUE(discovery) << discovery.error().message;
   EXPECT_THAT(verdictOf(*discovery), HasSubstr("Nothing above the noise"));
   EXPECT_THAT(modelToml(*discovery), testing::Not(HasSubstr("[[effect]]")));
@@ -108,8 +109,10 @@ TEST(DiscoverTable, NeverLooksAtLockedRowsBeforeItIsDone) {
 
 TEST(TableMap, SaysUnknownKeysAndDoubleMeanings) {
   EXPECT_THAT(loadTableMap(write("a.toml", "mesured = 'a'\n")).error().message, HasSubstr("mesured"));
-  EXPECT_THAT(loadTableMap(write("b.toml", "measured = 'a'\nerror = 'b'\n")).error().message, HasSubstr("say it one way"));
-  EXPECT_THAT(loadTableMap(write("c.toml", "[[covariate]]\nnature = 'time'\n")).error().message, HasSubstr("needs `column`"));
+  EXPECT_THAT(loadTableMap(write("b.toml", "measured = 'a'\nerror = 'b'\n")).error().message,
+              HasSubstr("say it one way"));
+  EXPECT_THAT(loadTableMap(write("c.toml", "[[covariate]]\nnature = 'time'\n")).error().message,
+              HasSubstr("needs `column`"));
 }
 
 TEST(TableMap, IsTheTableInTheDocumentation) {

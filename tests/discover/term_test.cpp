@@ -12,7 +12,9 @@
 namespace toftwin::discover {
 namespace {
 
-double at(Shape shape, std::vector<double> numbers, double x) { return Factor{"x", shape, std::move(numbers)}.at(x); }
+double at(Shape shape, std::vector<double> numbers, double x) {
+  return Factor{"x", shape, std::move(numbers)}.at(x);
+}
 
 TEST(Factor, IsTheFunctionThatItsNameSays) {
   EXPECT_DOUBLE_EQ(at(Shape::Power, {-2.0}, 4.0), 1.0 / 16.0);

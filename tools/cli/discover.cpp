@@ -52,15 +52,12 @@ Run add(Arguments& args) {
   options->campaign.add(args);
   args.check([options]() -> Result<> {
     if (options->isRun() && !options->map.empty()) {
-      return Error{Error::Code::InvalidArgument,
-                   "--map is for a table, not for the folder of a run"};
+      return Error{Error::Code::InvalidArgument, "--map is for a table, not for the folder of a run"};
     }
     if (!options->isRun() && options->campaign.isGiven()) {
-      return Error{
-          Error::Code::InvalidArgument,
-          fmt::format(
-              "{} is no folder: --model, --scene and their like are for the folder of a run",
-              options->data)};
+      return Error{Error::Code::InvalidArgument,
+                   fmt::format("{} is no folder: --model, --scene and their like are for the folder of a run",
+                               options->data)};
     }
     return {};
   });

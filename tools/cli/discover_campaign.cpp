@@ -18,14 +18,12 @@ Result<discover::CampaignJob> jobOf(const std::string& run, const std::string& o
                              "--scene, what the camera looked at",
                              run)};
   }
-  discover::CampaignJob job{
-      .run = run, .model = options.model, .scene = options.scene, .output = output};
+  discover::CampaignJob job{.run = run, .model = options.model, .scene = options.scene, .output = output};
   for (const std::string& one : options.scenes_of) {
     const auto equals = one.find('=');
     if (equals == std::string::npos || equals == 0 || equals + 1 == one.size()) {
-      return Error{
-          Error::Code::InvalidArgument,
-          fmt::format("--scene-of {}: it takes BLOCK=FILE, such as corner-90=corner.toml", one)};
+      return Error{Error::Code::InvalidArgument,
+                   fmt::format("--scene-of {}: it takes BLOCK=FILE, such as corner-90=corner.toml", one)};
     }
     job.scene_of_block[one.substr(0, equals)] = one.substr(equals + 1);
   }
@@ -35,8 +33,7 @@ Result<discover::CampaignJob> jobOf(const std::string& run, const std::string& o
     if (!is_known) {
       return Error{
           Error::Code::InvalidArgument,
-          fmt::format("--without {}: there is no such effect; docs/effects/README.md lists them",
-                      name)};
+          fmt::format("--without {}: there is no such effect; docs/effects/README.md lists them", name)};
     }
   }
   job.left_out = options.without;
@@ -57,8 +54,7 @@ void CampaignOptions::add(Arguments& args) {
               "of a run: BLOCK=FILE, another scene in a block of the plan; as often as needed")
       .oneAtATime();
   args.flag("--b", is_b, "of a run: search the recordings of camera B instead of A");
-  args.flag("--keep-locked", keep_locked,
-            "of a run: leave the locked captures closed, and judge nothing");
+  args.flag("--keep-locked", keep_locked, "of a run: leave the locked captures closed, and judge nothing");
   args.option("--samples-per-pixel", samples_per_pixel, "of a run: light paths at most")
       .within(1, 65'536)
       .showsDefault();
@@ -72,12 +68,10 @@ void CampaignOptions::add(Arguments& args) {
 }
 
 bool CampaignOptions::isGiven() const {
-  return !model.empty() || !scene.empty() || !scenes_of.empty() || is_b || keep_locked ||
-         !without.empty();
+  return !model.empty() || !scene.empty() || !scenes_of.empty() || is_b || keep_locked || !without.empty();
 }
 
-Result<Exit> discoverRun(const std::string& run, const std::string& output,
-                         const CampaignOptions& options) {
+Result<Exit> discoverRun(const std::string& run, const std::string& output, const CampaignOptions& options) {
   const auto job = jobOf(run, output, options);
   if (!job) return job.error();
   compare::Progress progress{stderr};
