@@ -218,7 +218,7 @@ Result<Roles> rolesOf(const std::vector<std::string>& header, const TableMap& ma
   guesses.guess(roles.sigma, kSigma);
   if (roles.error.empty() && roles.measured.empty()) {
     return Error{Error::Code::InvalidArgument,
-                 fmt::format("{}: which column was measured? None of the headers says so ({}). Write a map: "
+                 fmt::format("{}: which column was measured? None of the headers says so alone ({}). Write a map: "
                              "measured = \"…\" and reference = \"…\", or error = \"…\" (docs/discover.md)",
                              file.string(), fmt::join(header, ", "))};
   }
