@@ -66,7 +66,7 @@ Result<TableDiscovery> discoverTable(const std::filesystem::path& file, const Ta
                  fmt::format("{}: only {} rows are not locked; at least 16 are needed", file.string(),
                              out.open.rows())};
   }
-  out.judged.sha256 = hashOf(out.locked);
+  const std::string sha256 = hashOf(out.locked);
   addConfounded(out.open);
   TableSource source{out.open, map.fits_gain};
   out.finding = findInTable(source, {.alpha = map.alpha, .draws = map.draws, .seed = map.seed});
@@ -75,7 +75,6 @@ Result<TableDiscovery> discoverTable(const std::filesystem::path& file, const Ta
   out.before = left(out.open, predicted(source, out.open, out.plain, {}));
   out.after = left(out.open, predicted(source, out.open, out.finding.nuisances, out.finding.effects));
   // Everything is decided: now the locked rows.
-  const std::string sha256 = out.judged.sha256;
   out.judged = judgeLocked(source, out.locked, out.plain, out.finding);
   out.judged.sha256 = sha256;
   return out;
