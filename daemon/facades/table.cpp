@@ -2,6 +2,7 @@
 #include <array>
 
 #include "daemon/facades/facade.h"
+#include "daemon/facades/gige_vision/keys.h"
 #include "daemon/facades/modbus/keys.h"
 #include "daemon/facades/o3d303/keys.h"
 
@@ -11,6 +12,7 @@ std::span<const FacadeKind> allFacades() {
   static const std::array kTable{
       o3d303::facade(),
       modbus::facade(),
+      gige_vision::facade(),
   };
   return kTable;
 }

@@ -11,6 +11,7 @@
 #include <optional>
 
 #include "daemon/facades/event_thread.h"
+#include "daemon/facades/mac_address.h"
 #include "daemon/facades/o3d303/device.h"
 #include "daemon/facades/o3d303/discovery.h"
 #include "daemon/facades/o3d303/http_server.h"
@@ -34,15 +35,6 @@ constexpr std::chrono::seconds kTick{1}, kTriggerLost{10};
 constexpr std::size_t kMostHeldBack = 64;
 constexpr int kApplicationChanged = 500'000;
 constexpr double kCooled_k = 2.0;  ///< below the limit, until it may be too hot anew
-
-/// A locally administered address, always the same for a source's name (FNV-1a).
-std::array<std::uint8_t, 6> macOf(std::string_view source) {
-  std::uint64_t hash = 0xcbf2'9ce4'8422'2325;
-  for (const char c : source) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100'0000'01b3;
-  std::array<std::uint8_t, 6> mac{0x02};
-  for (std::size_t i = 1; i < mac.size(); ++i) mac[i] = static_cast<std::uint8_t>(hash >> (8 * i));
-  return mac;
-}
 
 std::string textOf(const std::array<std::uint8_t, 6>& mac) {
   return fmt::format("{:02X}:{:02X}:{:02X}:{:02X}:{:02X}:{:02X}", mac[0], mac[1], mac[2], mac[3], mac[4],

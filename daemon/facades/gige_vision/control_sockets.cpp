@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/facades/gige_vision/control_sockets.h"
+
+#include <fmt/format.h>
+#include <ifaddrs.h>
+#include <netinet/in.h>
+
+#include "drivers/logging.h"
+
+namespace toftwin::daemon::gige_vision {
+namespace {
+
+using boost::asio::ip::address_v4;
+using boost::asio::ip::udp;
+using boost::system::error_code;
+
+/// Of the interface that has that address; of a small network where that is not told.
+std::uint32_t netmaskOf(address_v4 address) {
+  constexpr std::uint32_t kLoopback = 0xFF00'0000, kSmall = 0xFFFF'FF00;
+  if (address.is_loopback()) return kLoopback;
+  ifaddrs* all = nullptr;
+  if (::getifaddrs(&all) != 0) return kSmall;
+  std::uint32_t netmask = kSmall;
+  for (const ifaddrs* one = all; one != nullptr; one = one->ifa_next) {
+    if (one->ifa_addr == nullptr || one->ifa_netmask == nullptr || one->ifa_addr->sa_family != AF_INET)
+      continue;
+    const auto* own = reinterpret_cast<const sockaddr_in*>(one->ifa_addr);
+    if (ntohl(own->sin_addr.s_addr) != address.to_uint()) continue;
+    netmask = ntohl(reinterpret_cast<const sockaddr_in*>(one->ifa_netmask)->sin_addr.s_addr);
+  }
+  ::freeifaddrs(all);
+  return netmask;
+}
+
+}  // namespace
+
+Result<LocalPlace> localPlace(const std::string& address) {
+  error_code error;
+  const auto own = boost::asio::ip::make_address_v4(address == "localhost" ? "127.0.0.1" : address, error);
+  if (error || own.is_unspecified() || own.is_multicast()) {
+    return Error{Error::Code::InvalidArgument,
+                 fmt::format("address = \"{}\": a GigE Vision camera has one IPv4 address; name one of this "
+                             "computer's",
+                             address)};
+  }
+  return LocalPlace{own, netmaskOf(own)};
+}
+
+Result<udp::socket> udpSocket(boost::asio::io_context& io, address_v4 address, std::uint16_t port,
+                              bool is_shared) {
+  udp::socket socket{io};
+  error_code error;
+  socket.open(udp::v4(), error);
+  if (!error && is_shared) socket.set_option(udp::socket::reuse_address{true}, error);
+  if (!error) socket.bind({address, port}, error);
+  if (!error) return socket;
+  return Error{Error::Code::Busy,
+               fmt::format("UDP port {} of {}: {}. GigE Vision has that port alone: give each camera another "
+                           "address (127.0.0.2, or one more of an interface)",
+                           port, address.to_string(), error.message())};
+}
+
+Result<std::unique_ptr<ControlSockets>> ControlSockets::open(boost::asio::io_context& io,
+                                                             const LocalPlace& place, Take take) {
+  auto own = udpSocket(io, place.address, kControlPort);
+  if (!own) return own.error();
+  std::unique_ptr<ControlSockets> sockets{new ControlSockets{place, std::move(take)}};
+  sockets->ears_.push_back(std::make_shared<Ear>(*std::move(own)));
+  sockets->ears_.front()->takes_all = true;
+  // A socket that is bound to an address hears no broadcasts; one that is bound to the broadcast address
+  // does.
+  for (const address_v4& one :
+       {address_v4{place.address.to_uint() | ~place.netmask}, address_v4::broadcast()}) {
+    auto ear = udpSocket(io, one, kControlPort, true);
+    if (ear) {
+      sockets->ears_.push_back(std::make_shared<Ear>(*std::move(ear)));
+    } else {
+      logging::warn("gige_vision: it is not found by broadcasts to {}: {}", one.to_string(),
+                    ear.error().message);
+    }
+  }
+  for (const auto& ear : sockets->ears_) sockets->receive(ear);
+  return sockets;
+}
+
+void ControlSockets::send(const Peer& to, std::span<const std::byte> answer) {
+  if (answer.empty()) return;
+  error_code ignored;  // who cannot be reached asks again
+  ears_.front()->socket.send_to(boost::asio::buffer(answer.data(), answer.size()),
+                                {address_v4{to.address}, to.port}, 0, ignored);
+}
+
+void ControlSockets::receive(const std::shared_ptr<Ear>& ear) {
+  ear->socket.async_receive_from(boost::asio::buffer(ear->datagram), ear->from,
+                                 [this, ear, alive = is_alive_](error_code error, std::size_t size) {
+                                   if (!*alive || error == boost::asio::error::operation_aborted) return;
+                                   if (!error) hear(*ear, size);
+                                   receive(ear);
+                                 });
+}
+
+void ControlSockets::hear(const Ear& ear, std::size_t size) {
+  const auto datagram = std::span{ear.datagram}.first(size);
+  const address_v4 from = ear.from.address().to_v4();
+  // On loopback, nobody else is told that there is a camera.
+  if (place_.address.is_loopback() && !from.is_loopback()) return;
+  if (!ear.takes_all) {
+    const auto request = readRequest(datagram);
+    if (!request || request->command != Command::kDiscovery) return;
+  }
+  take_({from.to_uint(), ear.from.port()}, datagram);
+}
+
+}  // namespace toftwin::daemon::gige_vision

@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/facades/gige_vision/sender.h"
+
+#include <fmt/format.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+
+#include <algorithm>
+
+#include "drivers/logging.h"
+
+namespace toftwin::daemon::gige_vision {
+namespace {
+
+using boost::system::error_code;
+using std::chrono::steady_clock;
+
+constexpr std::size_t kMostBlocks = 3, kMostAgain = 4096, kLeastKept = 2;
+constexpr int kBatch = 64;  ///< packets in one go, so that commands are answered in between
+constexpr std::chrono::microseconds kFull{200};      ///< until a socket that was full is tried again
+constexpr std::chrono::milliseconds kMostBehind{1};  ///< that is caught up by sending faster
+constexpr int kSocketBytes = 4 << 20;
+constexpr std::uint32_t kMostUnavailable = 64;
+
+}  // namespace
+
+Sender::Sender(boost::asio::io_context& io, boost::asio::ip::udp::socket socket, LineFaults faults,
+               std::size_t bytes_kept, std::string name)
+    : socket_(std::move(socket)),
+      timer_(io),
+      faults_(std::move(faults)),
+      bytes_kept_(bytes_kept),
+      name_(std::move(name)) {
+  error_code ignored;
+  socket_.non_blocking(true, ignored);
+  socket_.set_option(boost::asio::socket_base::send_buffer_size{kSocketBytes}, ignored);
+  // A packet that is too large for the line must not come in pieces: that is how clients find the size.
+  const int never = IP_PMTUDISC_DO;
+  ::setsockopt(socket_.native_handle(), IPPROTO_IP, IP_MTU_DISCOVER, &never, sizeof never);
+}
+
+void Sender::aim(const Endpoint& to, std::chrono::nanoseconds delay) {
+  to_ = to;
+  delay_ = delay;
+}
+
+bool Sender::send(std::shared_ptr<const Block> block) {
+  if (waiting_.size() >= kMostBlocks) return false;
+  sent_.push_back(block);
+  sent_bytes_ += block->size();
+  while (sent_.size() > kLeastKept && sent_bytes_ > bytes_kept_) {
+    sent_bytes_ -= sent_.front()->size();
+    sent_.pop_front();
+  }
+  const std::uint32_t last = block->packets() - 1;
+  waiting_.push_back({std::move(block), 0, last, false});
+  if (!is_pumping_) pump();
+  return true;
+}
+
+void Sender::sendAgain(const Resend& asked) {
+  const auto block = std::ranges::find_if(sent_, [&](const auto& one) {
+    return one->id() == asked.block && one->hasLongIds() == asked.has_long_ids;
+  });
+  if (block == sent_.end()) {
+    const std::uint64_t end =
+        std::min<std::uint64_t>(std::uint64_t{asked.last} + 1, std::uint64_t{asked.first} + kMostUnavailable);
+    for (std::uint64_t i = asked.first; i < end; ++i)
+      put(unavailablePacket(asked, static_cast<std::uint32_t>(i)));
+    return;
+  }
+  std::uint64_t end = std::min<std::uint64_t>(std::uint64_t{asked.last} + 1, (*block)->packets());
+  for (const Waiting& one : waiting_) {
+    if (one.block == *block) end = std::min<std::uint64_t>(end, one.next);  // those come anyway
+  }
+  if (asked.first >= end || again_.size() >= kMostAgain) return;
+  again_.push_back({*block, asked.first, static_cast<std::uint32_t>(end - 1), true});
+  if (!is_pumping_) pump();
+}
+
+void Sender::sendTestPacket(std::uint32_t size) { put(testPacket(size)); }
+
+void Sender::clear() {
+  waiting_.clear();
+  again_.clear();
+  sent_.clear();
+  sent_bytes_ = 0;
+  late_.reset();
+}
+
+void Sender::pump() {
+  is_pumping_ = false;
+  const auto now = steady_clock::now();
+  due_ = std::max(due_, now - kMostBehind);
+  for (int i = 0; due_ <= now; ++i) {
+    if (waiting_.empty() && again_.empty()) {
+      if (late_) put(*std::exchange(late_, std::nullopt));
+      return;
+    }
+    if (i == kBatch) break;
+    if (!sendNext()) return wake(now + kFull);
+    due_ += delay_;
+  }
+  wake(due_);
+}
+
+void Sender::wake(steady_clock::time_point when) {
+  is_pumping_ = true;
+  timer_.expires_at(when);
+  timer_.async_wait([this, alive = is_alive_](error_code cancelled) {
+    if (!cancelled && *alive) pump();
+  });
+}
+
+bool Sender::sendNext() {
+  auto& queue = again_.empty() ? waiting_ : again_;
+  Waiting& front = queue.front();
+  if (!sendStruck(*front.block, front.next, front.is_again)) return false;
+  if (front.next++ == front.last) queue.pop_front();
+  return true;
+}
+
+bool Sender::sendStruck(const Block& block, std::uint32_t number, bool is_again) {
+  Bytes packet = block.packet(number, is_again);
+  if (faults_.isNone()) return put(packet);
+  const auto fate =
+      faults_.next(fmt::format("block {} packet {}{}", block.id(), number, is_again ? " again" : ""));
+  if (fate.is_lost) return true;
+  if (fate.is_late && !late_) {
+    late_ = std::move(packet);
+    return true;
+  }
+  put(packet);
+  if (fate.is_doubled) put(packet);
+  if (late_) put(*std::exchange(late_, std::nullopt));
+  return true;
+}
+
+bool Sender::put(const Bytes& packet) {
+  if (to_.port() == 0) return true;
+  error_code error;
+  socket_.send_to(boost::asio::buffer(packet), to_, 0, error);
+  if (error == boost::asio::error::would_block || error == boost::asio::error::no_buffer_space) return false;
+  if (error == boost::asio::error::message_size && !std::exchange(is_too_large_told_, true)) {
+    logging::warn("{}: packets of {} bytes do not fit through the line; a client must set a smaller size",
+                  name_, packet.size() + 28);
+  }
+  return true;  // what cannot be sent is lost on the line
+}
+
+}  // namespace toftwin::daemon::gige_vision

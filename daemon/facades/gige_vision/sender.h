@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/udp.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>  // before asio: Boost 1.74 uses std::exchange without it
+
+#include "daemon/facades/gige_vision/gvsp.h"
+#include "daemon/facades/line_faults.h"
+
+namespace toftwin::daemon::gige_vision {
+
+/// Sends blocks packet by packet at the pace that is set, and those that were lost once more. Used on the
+/// facade's thread only.
+class Sender {
+ public:
+  using Endpoint = boost::asio::ip::udp::endpoint;
+  /// A socket that packets come from.
+  Sender(boost::asio::io_context& io, boost::asio::ip::udp::socket socket, LineFaults faults,
+         std::size_t bytes_kept, std::string name);
+  ~Sender() { *is_alive_ = false; }
+  Sender(const Sender&) = delete;
+  Sender& operator=(const Sender&) = delete;
+
+  void aim(const Endpoint& to, std::chrono::nanoseconds delay);
+  /// False where too many blocks wait already; this one is lost then.
+  bool send(std::shared_ptr<const Block> block);
+  void sendAgain(const Resend& asked);
+  void sendTestPacket(std::uint32_t size);
+  /// Forgets all that waits and all that was sent.
+  void clear();
+
+ private:
+  /// Packets of a block that wait.
+  struct Waiting {
+    std::shared_ptr<const Block> block;  // shared with those that are kept
+    std::uint32_t next = 0, last = 0;
+    bool is_again = false;
+  };
+  void pump();
+  void wake(std::chrono::steady_clock::time_point when);
+  /// False if the socket takes no more now.
+  bool sendNext();
+  bool sendStruck(const Block& block, std::uint32_t number, bool is_again);
+  bool put(const Bytes& packet);
+
+  boost::asio::ip::udp::socket socket_;
+  boost::asio::steady_timer timer_;
+  LineFaults faults_;
+  const std::size_t bytes_kept_;
+  const std::string name_;
+  Endpoint to_;
+  std::chrono::nanoseconds delay_{};
+  std::chrono::steady_clock::time_point due_{};
+  std::deque<Waiting> waiting_, again_;
+  std::deque<std::shared_ptr<const Block>> sent_;
+  std::size_t sent_bytes_ = 0;
+  std::optional<Bytes> late_;  ///< leaves after the next one
+  bool is_pumping_ = false, is_too_large_told_ = false;
+  /// Shared with handlers that may come when this is gone.
+  const std::shared_ptr<bool> is_alive_ = std::make_shared<bool>(true);
+};
+
+}  // namespace toftwin::daemon::gige_vision
