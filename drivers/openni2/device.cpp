@@ -57,9 +57,9 @@ bool isUsable(OniSensorType sensor, const OniVideoMode& mode) {
   constexpr int kLargest = 16384;
   const bool has_size = mode.resolutionX > 0 && mode.resolutionX <= kLargest &&
                         mode.resolutionY > 0 && mode.resolutionY <= kLargest;
-  const bool has_format = sensor == ONI_SENSOR_DEPTH ? isDepth(mode.pixelFormat)
-                          : sensor == ONI_SENSOR_IR  ? isInfrared(mode.pixelFormat)
-                                                     : isColor(mode.pixelFormat);
+  const bool has_format = sensor == ONI_SENSOR_DEPTH ? isDepth(formatOf(mode))
+                          : sensor == ONI_SENSOR_IR  ? isInfrared(formatOf(mode))
+                                                     : isColor(formatOf(mode));
   return has_size && has_format;
 }
 
@@ -177,7 +177,7 @@ Result<> Device::addStream(OniSensorType sensor, const OniVideoMode& mode) {
   Stream stream{sensor, mode, StreamPtr{handle}};
   const auto now = streamProperty<OniVideoMode>(handle, ONI_STREAM_PROPERTY_VIDEO_MODE);
   const bool is_so =
-      !now || (now->pixelFormat == mode.pixelFormat && now->fps == mode.fps &&
+      !now || (formatOf(*now) == formatOf(mode) && now->fps == mode.fps &&
                now->resolutionX == mode.resolutionX && now->resolutionY == mode.resolutionY);
   if (!is_so) {
     status = oniStreamSetProperty(handle, ONI_STREAM_PROPERTY_VIDEO_MODE, &mode, sizeof mode);

@@ -15,7 +15,7 @@ namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
-int bytesPerPixel(OniPixelFormat format) {
+int bytesPerPixel(int format) {
   return format == ONI_PIXEL_FORMAT_GRAY8 ? 1 : format == ONI_PIXEL_FORMAT_RGB888 ? 3 : 2;
 }
 
@@ -59,7 +59,7 @@ Rgb rgbOfYuv(int luma, int u, int v) {
   return {clipped(y + 1.402 * r), clipped(y - 0.344136 * b - 0.714136 * r), clipped(y + 1.772 * b)};
 }
 
-Rgb rgbAt(OniPixelFormat format, const std::byte* row, int x, int width) {
+Rgb rgbAt(int format, const std::byte* row, int x, int width) {
   const auto at = [&](int i) { return std::to_integer<std::uint8_t>(row[i]); };
   if (format == ONI_PIXEL_FORMAT_RGB888) return {at(3 * x), at(3 * x + 1), at(3 * x + 2)};
   if (format == ONI_PIXEL_FORMAT_GRAY8) return {at(x), at(x), at(x)};
@@ -73,13 +73,20 @@ Rgb rgbAt(OniPixelFormat format, const std::byte* row, int x, int width) {
 
 }  // namespace
 
-bool isDepth(OniPixelFormat format) {
+int formatOf(const OniVideoMode& mode) {
+  static_assert(sizeof mode.pixelFormat == sizeof(int));
+  int format = 0;
+  std::memcpy(&format, &mode.pixelFormat, sizeof format);
+  return format;
+}
+
+bool isDepth(int format) {
   return format == ONI_PIXEL_FORMAT_DEPTH_1_MM || format == ONI_PIXEL_FORMAT_DEPTH_100_UM;
 }
-bool isInfrared(OniPixelFormat format) {
+bool isInfrared(int format) {
   return format == ONI_PIXEL_FORMAT_GRAY16 || format == ONI_PIXEL_FORMAT_GRAY8;
 }
-bool isColor(OniPixelFormat format) {
+bool isColor(int format) {
   return format == ONI_PIXEL_FORMAT_RGB888 || format == ONI_PIXEL_FORMAT_YUV422 ||
          format == ONI_PIXEL_FORMAT_YUYV || format == ONI_PIXEL_FORMAT_GRAY8;
 }
@@ -88,7 +95,7 @@ Result<DepthImages> depthImages(const RawImage& raw, const Image<float>& depth_p
   const int width = depth_per_range.width(), height = depth_per_range.height();
   if (!isDepth(raw.format)) {
     return Error{Error::Code::Malformed,
-                 fmt::format("openni2: pixel format {} is no depth", static_cast<int>(raw.format))};
+                 fmt::format("openni2: pixel format {} is no depth", raw.format)};
   }
   if (auto checked = check(raw, width, height); !checked) return checked.error();
   const float unit_m = raw.format == ONI_PIXEL_FORMAT_DEPTH_1_MM ? 1e-3F : 1e-4F;
@@ -112,7 +119,7 @@ Result<Image<float>> infraredImage(const RawImage& raw, int width, int height) {
   if (!isInfrared(raw.format)) {
     return Error{
         Error::Code::Malformed,
-        fmt::format("openni2: pixel format {} is no infrared image", static_cast<int>(raw.format))};
+        fmt::format("openni2: pixel format {} is no infrared image", raw.format)};
   }
   if (auto checked = check(raw, width, height); !checked) return checked.error();
   Image<float> image{width, height};
@@ -130,7 +137,7 @@ Result<Image<float>> infraredImage(const RawImage& raw, int width, int height) {
 Result<Plane> colorPlane(const RawImage& raw, int width, int height) {
   if (!isColor(raw.format)) {
     return Error{Error::Code::Malformed, fmt::format("openni2: pixel format {} is no colour",
-                                                     static_cast<int>(raw.format))};
+                                                     raw.format)};
   }
   if (auto checked = check(raw, width, height); !checked) return checked.error();
   const std::size_t size = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);

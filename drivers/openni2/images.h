@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <openni2/OniCEnums.h>
+#include <openni2/OniCTypes.h>
 
 #include <cstddef>
 #include <span>
@@ -19,12 +19,15 @@ struct RawImage {
   std::span<const std::byte> bytes;
   int width = 0, height = 0;
   int stride = 0;  ///< bytes from one row to the next
-  OniPixelFormat format = ONI_PIXEL_FORMAT_DEPTH_1_MM;
+  int format = ONI_PIXEL_FORMAT_DEPTH_1_MM;  ///< of OniPixelFormat, or whatever else was said
 };
 
-[[nodiscard]] bool isDepth(OniPixelFormat format);
-[[nodiscard]] bool isInfrared(OniPixelFormat format);
-[[nodiscard]] bool isColor(OniPixelFormat format);
+/// As a plain number: a value that is none of the enumeration's must not be read as one.
+[[nodiscard]] int formatOf(const OniVideoMode& mode);
+
+[[nodiscard]] bool isDepth(int format);
+[[nodiscard]] bool isInfrared(int format);
+[[nodiscard]] bool isColor(int format);
 
 struct DepthImages {
   Image<float> range_m, depth_m;

@@ -284,7 +284,7 @@ class OpenNISource final : public Source {
             frame.width,
             frame.height,
             frame.stride,
-            frame.videoMode.pixelFormat};
+            formatOf(frame.videoMode)};
   }
 
   Moment momentOf(const Arrival& image) {

@@ -26,7 +26,7 @@ void losesAndFinds(std::string_view what, const std::function<void(EmulatedKinec
       what, milliseconds{700}, [&] { lose(bus); }, [&] { giveBack(bus); });
   ASSERT_TRUE(outcome.has_value());
   const auto& [last, first, took] = *outcome;
-  EXPECT_LT(took, milliseconds{1000});
+  EXPECT_LT(took, kBackWithin);
   EXPECT_EQ(first.sequence, last.sequence + 1) << "the subscription went on";
   const double gap_ms = static_cast<double>(first.moment.received.ns - last.moment.received.ns) * 1e-6;
   // An interval of rounding, and up to two frames that waited in the queue.

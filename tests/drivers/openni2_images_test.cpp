@@ -85,7 +85,7 @@ TEST(OpenNI2Images, NoDescriptionLeadsOutsideOfTheBytes) {
   for (int i = 0; i < 20'000; ++i) {
     const int width = pick(1, 9), height = pick(1, 6);
     const std::vector<std::byte> bytes(static_cast<std::size_t>(pick(0, 200)), std::byte{0x5A});
-    const auto format = static_cast<OniPixelFormat>(kFormats[pick(0, 11)]);
+    const int format = kFormats[pick(0, 11)];
     const bool is_wild = pick(0, 9) == 0;
     const RawImage raw{bytes, is_wild ? pick(-5, 1 << 30) : width, height,
                        is_wild ? pick(-(1 << 30), 1 << 30) : pick(0, 40), format};

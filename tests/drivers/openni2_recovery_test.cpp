@@ -29,7 +29,7 @@ void losesAndFinds(std::string_view what, milliseconds away,
       what, away, [&] { lose(device); }, [&] { giveBack(device); });
   ASSERT_TRUE(outcome.has_value());
   const auto& [last, first, took] = *outcome;
-  EXPECT_LT(took, milliseconds{1000});
+  EXPECT_LT(took, kBackWithin);
   EXPECT_EQ(first.sequence, last.sequence + 1) << "the subscription went on";
   const double gap_ms =
       static_cast<double>(first.moment.received.ns - last.moment.received.ns) * 1e-6;

@@ -21,6 +21,14 @@
 
 namespace toftwin::test {
 
+/// Frames are here again so soon after a camera is: the drivers' bar. Sanitizers make all of it several times
+/// slower, and are there for other faults.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+inline constexpr std::chrono::milliseconds kBackWithin{10'000};
+#else
+inline constexpr std::chrono::milliseconds kBackWithin{1000};
+#endif
+
 /// A camera in the daemon's hands, with one subscriber that stays: what happens to it when the
 /// camera is lost, and how soon it has frames again.
 class RecoveryRig {

@@ -59,7 +59,7 @@ class SoftwareRecovery : public testing::Test {
     const auto outcome = rig.loseAndFind(
         name, std::chrono::milliseconds{700}, [&] { *is_away = true; }, [&] { *is_away = false; });
     ASSERT_TRUE(outcome.has_value());
-    EXPECT_LT(outcome->took, std::chrono::milliseconds{1000});
+    EXPECT_LT(outcome->took, kBackWithin);
     EXPECT_EQ(outcome->first.sequence, outcome->last.sequence + 1);
     if (is_movable) {
       EXPECT_EQ(outcome->first.moment.world_from_camera, pose);
