@@ -57,6 +57,7 @@ Command renderCommand();
 Command calibrateCommand();
 Command compareCommand();
 Command discoverCommand();
+Command suitCommand();
 Command planCommand();
 Command measureCommand();
 Command poseCommand();

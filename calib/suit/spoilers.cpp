@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "calib/suit/suit.h"
+
+namespace toftwin::suit {
+namespace {
+
+std::string nameOf(const sim::AnyEffect& effect) {
+  return std::visit([]<class E>(const E&) { return std::string{E::about.name}; }, effect);
+}
+
+bool moves(const Case& use, const sim::Scene& scene) {
+  const std::array<double, 3> still{};
+  return scene.moves() || std::ranges::any_of(use.spec.poses, [&](const StationSpec& pose) {
+           return pose.velocity_m_per_s != still || pose.rotation_rate_deg_per_s != still;
+         });
+}
+
+/// The variant itself, and then without each thing. Those that see the same light stand together.
+std::vector<Variant> variantsOf(const Case& use, const sim::Scene& scene, const Variant& whole) {
+  std::vector<Variant> variants{whole};
+  const auto& effects = whole.model.effects();
+  std::multiset<std::string> met;
+  for (std::size_t i = 0; i < effects.size(); ++i) {
+    auto others = effects;
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
+    std::string name = nameOf(effects[i]);
+    met.insert(name);
+    if (met.count(name) > 1) name += fmt::format(" {}", met.count(name));
+    Variant& without = variants.emplace_back(whole);
+    without.name = name;
+    without.model = whole.model.withEffects(std::move(others));
+  }
+  Variant all = whole;
+  all.name = "all of these";
+  all.model = whole.model.withEffects({});
+  if (whole.max_surfaces > 1) {
+    Variant& without = variants.emplace_back(whole);
+    without.name = "light over several surfaces";
+    without.max_surfaces = all.max_surfaces = 1;
+  }
+  if (whole.pixel_extent > 0.0) {
+    Variant& without = variants.emplace_back(whole);
+    without.name = "mixed pixels";
+    without.pixel_extent = all.pixel_extent = 0.0;
+  }
+  if (moves(use, scene)) {
+    Variant& without = variants.emplace_back(whole);
+    without.name = "motion";
+    without.stands_still = all.stands_still = true;
+  }
+  variants.push_back(std::move(all));
+  return variants;
+}
+
+/// The worst conditions of what failed, and nothing else.
+Case onlyFailures(const Case& use, const std::vector<RequirementResult>& results) {
+  std::set<std::size_t> poses, lightings;
+  for (const RequirementResult& result : results) {
+    if (!result.is_judged || result.verdict.is_met || result.conditions.empty()) continue;
+    poses.insert(result.conditions[result.worst].pose);
+    lightings.insert(result.conditions[result.worst].lighting);
+  }
+  Case part = use;
+  part.spec.poses.clear();
+  part.spec.lightings.clear();
+  for (const std::size_t pose : poses) part.spec.poses.push_back(use.spec.poses[pose]);
+  for (const std::size_t lighting : lightings) part.spec.lightings.push_back(use.spec.lightings[lighting]);
+  return part;
+}
+
+const ConditionValues& at(const Case& part, const Case& use, const AtCondition& worst,
+                          const std::vector<ConditionValues>& values) {
+  return *std::ranges::find_if(values, [&](const ConditionValues& one) {
+    return part.spec.poses[one.pose].name == use.spec.poses[worst.pose].name &&
+           part.spec.lightings[one.lighting].name == use.spec.lightings[worst.lighting].name;
+  });
+}
+
+double marginOf(const RequirementSpec& requirement, double value) {
+  return verdictOf(requirement, exactly(value)).margin;
+}
+
+Spoiler spoilerOf(const RequirementSpec& requirement, std::size_t r, const std::string& name,
+                  const ConditionValues& whole, const ConditionValues& without) {
+  std::vector<double> gains;
+  for (std::size_t i = 0; i < whole.repeats[r].size(); ++i)
+    gains.push_back(marginOf(requirement, without.repeats[r][i]) - marginOf(requirement, whole.repeats[r][i]));
+  const double together = without.together.empty() ? without.repeats[r].front() : without.together[r];
+  return {.what = name,
+          .gain = estimateOf(gains, std::nullopt, false),
+          .is_met_without = verdictOf(requirement, exactly(together)).is_met};
+}
+
+}  // namespace
+
+Result<std::vector<std::vector<Spoiler>>> spoilersOf(const Case& use, const sim::Scene& scene, const Variant& variant,
+                                                     const std::vector<RequirementResult>& results, const Watch& watch) {
+  std::vector<std::vector<Spoiler>> spoilers(results.size());
+  const Case part = onlyFailures(use, results);
+  if (part.spec.poses.empty()) return spoilers;
+  const std::vector<Variant> variants = variantsOf(use, scene, variant);
+  const auto values = simulate(part, scene, variants, {.first = 0, .count = use.spec.repeats}, watch);
+  if (!values) return values.error();
+  for (std::size_t r = 0; r < results.size(); ++r) {
+    const RequirementResult& result = results[r];
+    if (!result.is_judged || result.verdict.is_met || result.conditions.empty()) continue;
+    const AtCondition& worst = result.conditions[result.worst];
+    const auto& requirement = use.spec.requirements[r];
+    for (std::size_t v = 1; v < variants.size(); ++v) {
+      spoilers[r].push_back(spoilerOf(requirement, r, variants[v].name, at(part, use, worst, values->front()),
+                                      at(part, use, worst, (*values)[v])));
+    }
+    // What cannot be told (nothing valid in either) is last; "all of these" keeps its place at the end.
+    const auto order = [](const Spoiler& one) { return std::isnan(one.gain.value) ? 1e300 : -one.gain.value; };
+    std::ranges::stable_sort(spoilers[r].begin(), spoilers[r].end() - 1, {}, order);
+  }
+  return spoilers;
+}
+
+}  // namespace toftwin::suit

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+// A recording in the place of a simulated camera.
+#include "protocol/record/recording.h"
+
+#include <random>
+
+#include "cases.h"
+#include "sim/sensor/sensor_model.h"
+
+namespace toftwin::suit {
+namespace {
+
+using testing::HasSubstr;
+
+/// So many frames of what is true and 7 mm, with 2 mm of noise, 25 a second.
+void record(const Folder& folder, int count, std::optional<Transform<World, Camera>> pose, const std::string& file = "real.mcap") {
+  const auto model = sim::SensorModel::load(folder.camera("lens.toml"));
+  const auto scene = sim::Scene::load(folder.path() / "scene.toml");
+  ASSERT_TRUE(model && scene);
+  const Seen seen = seenFrom(*scene, model->camera(), pose.value_or(Transform<World, Camera>{}), {});
+  auto writer = record::Writer::create(folder.path() / file);
+  ASSERT_TRUE(writer) << writer.error().message;
+  std::mt19937 random{5};
+  std::normal_distribution<float> noise{0.007f, 0.002f};
+  for (int i = 0; i < count; ++i) {
+    Frame frame;
+    frame.source = "camera";
+    frame.sequence = static_cast<std::uint64_t>(i);
+    frame.camera = model->camera();
+    frame.moment.world_from_camera = pose;
+    frame.moment.received.ns = i * 40'000'000;
+    frame.moment.exposures = {{.start = {i * 40'000'000}, .duration = 1_ms, .modulation = 20_MHz}};
+    Image<float> range = seen.range_m;
+    for (float& value : range.pixels()) value += noise(random);
+    frame.planes.push_back(toPlane(PlaneKind::Range, std::move(range)));
+    ASSERT_TRUE(writer->write(frame));
+  }
+  ASSERT_TRUE(writer->close());
+}
+
+const std::string kCase = kPose + R"(
+[[require]]
+name = 'bias'
+kind = 'bias'
+at_most_mm = 5
+[[require]]
+name = 'noise'
+kind = 'noise'
+at_most_mm = 3
+[[require]]
+name = 'rate'
+kind = 'frame_rate'
+at_least_hz = 25
+[[camera]]
+name = 'real'
+recording = 'real.mcap'
+)";
+
+/// Median of 768 pixels' means over four frames: standard error 1.25 · 2 / √4 / √768 = 0.05 mm and less over ten groups;
+/// noise: 0.6 % · √(4000/768) per group. Five standard errors.
+TEST(Recording, IsJudgedByTheSameRequirements) {
+  const Folder folder;
+  record(folder, 40, Transform<World, Camera>{});
+  const auto suit = folder.judged(kCase);
+  ASSERT_TRUE(suit) << suit.error().message;
+  const CameraResult& camera = suit->cameras.front();
+  EXPECT_TRUE(camera.is_recording);
+  EXPECT_NEAR(camera.requirements[0].verdict.estimate.value, 7.0, 0.1);
+  EXPECT_FALSE(camera.requirements[0].verdict.is_met);
+  EXPECT_TRUE(camera.requirements[0].verdict.is_certain);
+  EXPECT_NEAR(camera.requirements[1].verdict.estimate.value, 2.0, 0.1);
+  EXPECT_NEAR(camera.requirements[2].verdict.estimate.value, 25.0, 1e-6);
+}
+
+TEST(Recording, ThatDoesNotSayItsPoseIsTakenAtTheOneNamed) {
+  const Folder folder;
+  record(folder, 8, std::nullopt);
+  const auto without = folder.judged(kCase);
+  ASSERT_FALSE(without);
+  EXPECT_THAT(without.error().message, HasSubstr("none of its 8 frames was taken at a pose of the use case (0 elsewhere, 8 that do not say where"));
+  const auto with = folder.judged(kCase + "pose = 'here'\n");
+  ASSERT_TRUE(with) << with.error().message;
+  EXPECT_NEAR(with->cameras.front().requirements[0].verdict.estimate.value, 7.0, 0.2);
+}
+
+TEST(Recording, OfOtherPosesSaysSo) {
+  const Folder folder;
+  record(folder, 8, Transform<World, Camera>{.rotation_wxyz = {1, 0, 0, 0}, .translation_m = {0, 0, 0.5}});
+  const auto suit = folder.judged(kCase);
+  ASSERT_FALSE(suit);
+  EXPECT_THAT(suit.error().message, HasSubstr("8 elsewhere"));
+}
+
+TEST(Recording, LeavesOpenWhatItMetAtSomePosesOnly) {
+  const Folder folder;
+  record(folder, 8, Transform<World, Camera>{});
+  const auto suit = folder.judged("[[pose]]\nname = 'other'\nposition_m = [0, 0, -1]\n" + kCase);
+  ASSERT_TRUE(suit) << suit.error().message;
+  const CameraResult& camera = suit->cameras.front();
+  EXPECT_FALSE(camera.requirements[0].verdict.is_met);  // a failure is one wherever it is
+  EXPECT_FALSE(camera.requirements[1].is_judged);
+  EXPECT_THAT(camera.requirements[1].why_not, HasSubstr("1 of 2 conditions"));
+  EXPECT_FALSE(camera.isFit());
+}
+
+TEST(Recording, ThatIsNotThereIsNamedWithItsPlace) {
+  const Folder folder;
+  const auto suit = folder.judged(kCase);
+  ASSERT_FALSE(suit);
+  EXPECT_THAT(suit.error().message, testing::AllOf(HasSubstr("case.toml:21"), HasSubstr("real.mcap")));
+}
+
+}  // namespace
+}  // namespace toftwin::suit
