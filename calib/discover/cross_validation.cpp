@@ -16,23 +16,25 @@ struct Training {
   VectorXd moment;
 };
 
-std::vector<Training> trainingSums(const Marginal& marginal, const std::vector<int>& fold, int folds) {
-  std::vector<Training> sums(static_cast<std::size_t>(folds), {marginal.gram, marginal.moment});
+std::vector<Training> trainingSums(const Marginal& marginal, const std::vector<int>& fold, int folds,
+                                   const Columns& columns) {
+  std::vector<Training> sums(static_cast<std::size_t>(folds),
+                             {marginal.gram(columns, columns), marginal.moment(columns)});
   for (std::size_t c = 0; c < marginal.captures.size(); ++c) {
     Training& without = sums[static_cast<std::size_t>(fold[c])];
-    without.gram -= marginal.captures[c].gram;
-    without.moment -= marginal.captures[c].moment;
+    without.gram -= marginal.captures[c].gram(columns, columns);
+    without.moment -= marginal.captures[c].moment(columns);
   }
   return sums;
 }
 
 VectorXd solve(const Marginal& marginal, const Training& training, const Columns& columns) {
-  MatrixXd gram = training.gram(columns, columns);
+  MatrixXd gram = training.gram;
   gram.diagonal() += marginal.precision(columns);
   // A coefficient that the fitted captures do not know stays at nothing instead of anywhere: a thousandth of
   // a typical column's weight.
   gram.diagonal() += 1e-6 * MatrixXd(marginal.gram(columns, columns)).diagonal();
-  return pseudoInverse(gram, 1e-8).inverse * VectorXd(training.moment(columns));
+  return pseudoInverse(gram, 1e-8).inverse * training.moment;
 }
 
 double deviance(const CaptureEvidence& capture, const Columns& columns, const VectorXd& value) {
@@ -55,29 +57,35 @@ std::vector<int> foldsOf(const Marginal& marginal, int folds) {
   return fold;
 }
 
+std::vector<double> heldOut(const Marginal& marginal, const Columns& columns, int folds) {
+  const std::vector<int> fold = foldsOf(marginal, folds);
+  std::vector<VectorXd> value;
+  for (const Training& training : trainingSums(marginal, fold, folds, columns))
+    value.push_back(solve(marginal, training, columns));
+  std::vector<double> left(marginal.captures.size());
+  for (std::size_t c = 0; c < left.size(); ++c)
+    left[c] = deviance(marginal.captures[c], columns, value[static_cast<std::size_t>(fold[c])]);
+  return left;
+}
+
+Gain gainOf(const std::vector<double>& before, std::vector<double> after) {
+  Gain gain{0, 0.0, std::move(after)};
+  for (std::size_t c = 0; c < before.size(); ++c) {
+    gain.by_capture[c] = before[c] - gain.by_capture[c];
+    gain.total += gain.by_capture[c];
+  }
+  return gain;
+}
+
 std::vector<Gain> crossValidate(const Marginal& marginal, const Columns& model,
                                 const std::vector<std::size_t>& groups, int folds) {
-  const std::vector<int> fold = foldsOf(marginal, folds);
-  const auto sums = trainingSums(marginal, fold, folds);
-  std::vector<double> before(marginal.captures.size());
-  const auto leave = [&](const Columns& columns, std::vector<double>& into) {
-    std::vector<VectorXd> value;
-    for (const Training& training : sums) value.push_back(solve(marginal, training, columns));
-    for (std::size_t c = 0; c < into.size(); ++c)
-      into[c] = deviance(marginal.captures[c], columns, value[static_cast<std::size_t>(fold[c])]);
-  };
-  leave(model, before);
+  const std::vector<double> before = heldOut(marginal, model, folds);
   std::vector<Gain> gains;
   for (const std::size_t group : groups) {
     Columns columns = model;
     append(columns, marginal.groups[group]);
-    Gain gain{group, 0.0, std::vector<double>(before.size())};
-    leave(columns, gain.by_capture);
-    for (std::size_t c = 0; c < before.size(); ++c) {
-      gain.by_capture[c] = before[c] - gain.by_capture[c];
-      gain.total += gain.by_capture[c];
-    }
-    gains.push_back(std::move(gain));
+    gains.push_back(gainOf(before, heldOut(marginal, columns, folds)));
+    gains.back().group = group;
   }
   return gains;
 }

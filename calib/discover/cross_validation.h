@@ -20,6 +20,11 @@ struct Gain {
 /// Which fold each capture is in: they take turns within their block, so that every fold has some of each.
 std::vector<int> foldsOf(const Marginal& marginal, int folds = 5);
 
+/// What is left of each capture by a model that was fitted to the other folds.
+std::vector<double> heldOut(const Marginal& marginal, const Columns& columns, int folds = 5);
+/// How much less is left after than before.
+Gain gainOf(const std::vector<double>& before, std::vector<double> after);
+
 /// For each of `groups` on top of `model`.
 std::vector<Gain> crossValidate(const Marginal& marginal, const Columns& model,
                                 const std::vector<std::size_t>& groups, int folds = 5);

@@ -80,7 +80,8 @@ struct Linear {
 
 Linear linearise(const RowSource& source, std::span<const double> scales,
                  const std::vector<Effect>& effects) {
-  const bool needs_catalogue = std::ranges::any_of(effects, &Effect::is_catalogue);
+  const bool needs_catalogue = std::ranges::any_of(
+      effects, [](const Effect& effect) { return effect.is_catalogue && !effect.fit; });
   Linear out;
   std::vector<TermGroup> extra = groupsOf(effects);
   const std::size_t parts = extra.size();
@@ -91,7 +92,7 @@ Linear linearise(const RowSource& source, std::span<const double> scales,
   std::size_t group = out.marginal.groups.size() - extra.size();
   const std::size_t end = group + parts;
   for (const Effect& effect : effects) {
-    if (effect.is_catalogue) {
+    if (effect.is_catalogue && !effect.fit) {
       for (const Group& known : out.marginal.groups)
         if (known.kind == Kind::Catalogue && known.name == effect.name) append(out.own, known);
     }
@@ -211,6 +212,7 @@ std::vector<Estimate> estimate(const RowSource& source, std::span<const double> 
   }
   Index term = j.nuisances, inner = j.nuisances + j.coefficients;
   for (Effect& effect : effects) {
+    if (effect.fit) continue;  // it has no columns
     std::vector<Index> which;
     effect.numbers.clear();
     const auto count = effect.is_catalogue ? effect.coefficient.size() : termsOf(effect).size();

@@ -23,6 +23,7 @@ enum class Kind {
   Shared,      ///< drawn once for several captures, as the offset of a session; scaled likewise
   Declared,    ///< a parameter of the declared model: it is projected out, and its shift is reported
   Catalogue,   ///< an effect that is known by name
+  Retired,     ///< one that is in the model already: its columns are there and count for nothing
   Generic      ///< a function of covariates that has no name yet
 };
 

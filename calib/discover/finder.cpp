@@ -17,10 +17,15 @@ constexpr int kMostParts = 8;  ///< over all effects
 
 class Search {
  public:
-  Search(const RowSource& source, const FinderOptions& options)
-      : options_(options), context_{source, source.covariates(), {}, {}, {}} {
+  Search(const RowSource& source, const FinderOptions& options) : options_(options) {
+    // The caller keeps it.
+    context_.original = context_.source = std::shared_ptr<const RowSource>{std::shared_ptr<void>{}, &source};
+    context_.covariates = source.covariates();
+    context_.test = {options.null_model, options.draws, options.seed};
+    context_.alpha = options.alpha;
     const std::size_t captures = source.withoutCatalogue({}).captures.size();
     context_.generic = genericCandidates(context_.covariates, {.captures = captures});
+    for (TermGroup& own : source.ownGroups()) context_.generic.push_back(std::move(own));
   }
 
   Finding run() {
@@ -38,7 +43,7 @@ class Search {
       revise();
       prune();
     }
-    finding_.nuisances = estimate(context_.source, context_.scales, finding_.effects);
+    finding_.nuisances = estimate(*context_.source, context_.scales, finding_.effects);
     finding_.scales = context_.scales;
     updateKnown();
     finding_.dispersion = dispersionNow();
@@ -54,7 +59,7 @@ class Search {
       context_.known[i].name = fmt::format("known {}", i + 1);
     context_.catalogue.clear();
     for (const Effect& effect : finding_.effects) {
-      if (effect.is_catalogue) context_.catalogue.push_back(effect.name);
+      if (effect.is_catalogue && !effect.fit) context_.catalogue.push_back(effect.name);
     }
   }
 
@@ -64,7 +69,7 @@ class Search {
     std::vector<TermGroup> extra = context_.known;
     std::vector<std::string> names;
     for (const TermGroup& known : context_.known) names.push_back(known.name);
-    const Evidence plain = context_.source.withoutCatalogue({});
+    const Evidence plain = context_.source->withoutCatalogue({});
     const bool has_random = std::ranges::any_of(plain.groups, [](const Group& group) {
       return group.kind == Kind::PerCapture || group.kind == Kind::Shared;
     });
@@ -77,8 +82,8 @@ class Search {
       names.push_back(smooth.name);
       extra.push_back(std::move(smooth));
     }
-    context_.scales = estimateScales(context_.catalogue.empty() ? context_.source.withoutCatalogue(extra)
-                                                                : context_.source.evidence(extra),
+    context_.scales = estimateScales(context_.catalogue.empty() ? context_.source->withoutCatalogue(extra)
+                                                                : context_.source->evidence(extra),
                                      names);
   }
 
@@ -100,24 +105,50 @@ class Search {
 
   /// One more effect, or one more part of one; false: nothing predicts what it was not fitted to.
   bool addEffect(double p) {
-    const auto explanations = compete(context_);
-    const auto chosen = choose(explanations);
+    auto explanations = compete(context_);
+    const auto chosen = chosenOf(context_, explanations);
     if (!chosen) return false;
     Effect effect = effectOf(context_, explanations, *chosen);
     if (effect.gain.mean <= 2.0 * effect.gain.error) return false;
     effect.p = p;
     const auto same = std::ranges::find_if(finding_.effects, [&](const Effect& known) {
-      return known.covariates == effect.covariates && known.is_catalogue == effect.is_catalogue;
+      return known.covariates == effect.covariates && known.is_catalogue == effect.is_catalogue &&
+             !known.fit && !effect.fit;
     });
     if (same == finding_.effects.end()) {
       finding_.effects.push_back(std::move(effect));
+      include();
     } else if (effect.is_catalogue) {
       return false;
     } else {
       reshape(*same, effect);
     }
-    estimate(context_.source, context_.scales, finding_.effects);
+    estimate(*context_.source, context_.scales, finding_.effects);
     return true;
+  }
+
+  static std::optional<std::size_t> chosenOf(const Context& context, std::vector<Explanation>& explanations) {
+    fitCatalogue(context, explanations);
+    if (const auto named = chooseNamed(context, explanations)) return named;
+    return choose(explanations);
+  }
+
+  /// Effects that were fitted as themselves are in the source's model from now on.
+  void include() {
+    context_.included = fitsOf(finding_.effects);
+    context_.source = sourceWith(context_.included);
+  }
+  static std::vector<std::shared_ptr<const NamedFit>> fitsOf(const std::vector<Effect>& effects) {
+    std::vector<std::shared_ptr<const NamedFit>> fits;
+    for (const Effect& effect : effects)
+      if (effect.fit) fits.push_back(effect.fit);
+    return fits;
+  }
+  std::shared_ptr<const RowSource> sourceWith(const std::vector<std::shared_ptr<const NamedFit>>& fits) const {
+    if (fits.empty()) return context_.original;
+    std::vector<const NamedFit*> plain;
+    for (const auto& fit : fits) plain.push_back(fit.get());
+    return context_.original->named()->including(plain);
   }
 
   /// What is left goes with the covariates of an effect that is known: its shape was not it. Another single
@@ -146,12 +177,17 @@ class Search {
     effect.name = isFormula(effect) ? effect.name + " + " + more.name : "smooth in " + along;
   }
 
+  static Evidence evidenceOf(const Context& context, std::span<const TermGroup> extra) {
+    return context.catalogue.empty() ? context.source->withoutCatalogue(extra)
+                                     : context.source->evidence(extra);
+  }
+
   static Gain gainOfSum(const Context& without, const Effect& effect, const Effect& more) {
     TermGroup sum{"sum", Kind::Generic, termsOf(effect), 0};
     for (const Term& term : termsOf(more)) sum.terms.push_back(term);
     std::vector<TermGroup> extra = without.known;
     extra.push_back(std::move(sum));
-    const Marginal marginal = marginalise(without.source.evidence(extra), without.scales);
+    const Marginal marginal = marginalise(evidenceOf(without, extra), without.scales);
     const Columns model = modelOf(without, marginal, extra.size());
     Gain gain = crossValidate(marginal, model, {marginal.groups.size() - 1}).front();
     for (const std::vector<FittedForm>* parts : {&effect.parts, &more.parts})
@@ -175,14 +211,15 @@ class Search {
         return std::ranges::find(others, other.covariates, &Effect::covariates) != others.end();
       });
       if (effect.alternatives.empty()) effect.experiment.reset();
-      const auto explanations = compete(without);
-      const auto chosen = choose(explanations);
-      if (!chosen || explanations[*chosen].is_catalogue ||
-          explanations[*chosen].covariates != effect.covariates)
-        continue;
+      auto explanations = compete(without);
+      const auto chosen = chosenOf(without, explanations);
+      if (!chosen) continue;
+      const Explanation& now = explanations[*chosen];
+      if (now.is_catalogue ? !now.named : now.covariates != effect.covariates) continue;
       Effect again = effectOf(without, explanations, *chosen);
       again.p = effect.p;
       effect = std::move(again);
+      if (effect.fit) include();
     }
   }
 
@@ -193,13 +230,14 @@ class Search {
       std::size_t least = finding_.effects.size();
       double smallest = 2.0;
       for (std::size_t i = 0; i < finding_.effects.size(); ++i) {
-        if (finding_.effects[i].is_catalogue) continue;
+        if (finding_.effects[i].is_catalogue && !finding_.effects[i].fit) continue;
         const Difference gain = gainAmongOthers(i);
         const double z = gain.mean / std::max(gain.error, 1e-9);
         if (gain.mean < 4.0 || z < smallest) smallest = std::min(z, smallest), least = i;
       }
       if (least == finding_.effects.size()) return;
       finding_.effects.erase(finding_.effects.begin() + static_cast<std::ptrdiff_t>(least));
+      include();
     }
   }
 
@@ -208,15 +246,25 @@ class Search {
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(which));
     Context without = context_;
     without.known = groupsOf(others);
+    if (finding_.effects[which].fit) {
+      const auto left = [&](const RowSource& source) {
+        const Marginal marginal = marginalise(source.withoutCatalogue(without.known), without.scales);
+        return heldOut(marginal, modelOf(without, marginal, without.known.size()));
+      };
+      return against0(gainOf(left(*sourceWith(fitsOf(others))), left(*context_.source)));
+    }
     std::vector<TermGroup> extra = without.known;
     extra.push_back({"this", Kind::Generic, termsOf(finding_.effects[which]), 0});
-    const Marginal marginal = marginalise(without.source.evidence(extra), without.scales);
+    const Marginal marginal = marginalise(evidenceOf(without, extra), without.scales);
     const Columns model = modelOf(without, marginal, extra.size());
     return against0(crossValidate(marginal, model, {marginal.groups.size() - 1}).front());
   }
 
   double dispersionNow() const {
-    const Marginal marginal = marginalise(context_.source.evidence(context_.known), context_.scales);
+    const Marginal marginal =
+        marginalise(context_.catalogue.empty() ? context_.source->withoutCatalogue(context_.known)
+                                               : context_.source->evidence(context_.known),
+                    context_.scales);
     return fit(marginal, modelOf(context_, marginal, context_.known.size())).dispersion();
   }
 

@@ -3,12 +3,14 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "calib/discover/cross_validation.h"
 #include "calib/discover/forms.h"
+#include "calib/discover/named_effects.h"
 #include "calib/discover/significance.h"
 #include "calib/discover/term.h"
 
@@ -21,12 +23,6 @@ struct FinderOptions {
   int most_effects = 4;
   std::uint64_t seed = 1;
   NullModel null_model = NullModel::Automatic;
-};
-
-/// A number with its standard error.
-struct Estimate {
-  std::string name{};
-  double value = 0.0, error = 0.0;
 };
 
 /// Something else that explains as much.
@@ -65,6 +61,8 @@ struct Effect {
   std::vector<double> coefficient{};  ///< of all terms of its parts, or of the catalogue's columns
   std::vector<Estimate> numbers{};    ///< coefficients, then inner numbers
   Eigen::MatrixXd covariance{};       ///< of `numbers`
+  /// An effect of the catalogue that was fitted as itself; it has no coefficients.
+  std::shared_ptr<const NamedFit> fit{};
   double p = 1.0;                     ///< of the test that led to it
   Difference gain{};
   double frequency = 1.0;  ///< how often it is the best again when captures are drawn anew with replacement

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -23,17 +24,26 @@ struct Explanation {
   int numbers = 0;
   double price = 0.0;  ///< for inner numbers that were searched
   Gain gain{};
+  std::shared_ptr<const NamedFit> named{};  ///< an effect of the catalogue that was fitted as itself
+  std::string refused{};  ///< why such an effect is not named; empty: it may be
 };
 
 /// Everything that a choice needs to know.
 struct Context {
-  const RowSource& source;
+  std::shared_ptr<const RowSource> source;
   std::vector<CovariateInfo> covariates;
   std::vector<TermGroup> generic;
   std::vector<TermGroup> known;  ///< effects found before, with their tangents
   std::vector<double> scales;
   std::vector<std::string> catalogue{};  ///< effects of the catalogue that were found before
+  /// The source without any found effect, and the effects that `source` includes.
+  std::shared_ptr<const RowSource> original{};
+  std::vector<std::shared_ptr<const NamedFit>> included{};
+  TestOptions test{};
+  double alpha = 0.01;
 };
+/// Nothing where it is no covariate, but what a source calls a carrier.
+const CovariateInfo* infoOf(const Context& context, const std::string& name);
 
 /// Columns of the nuisances and of what is known, in evidence that was made with `extra` more groups, the
 /// known ones first.
@@ -47,6 +57,7 @@ struct Part {
   std::size_t first = 0;
   std::size_t begin = 0, end = 0;  ///< of the groups
 };
+Part prepare(const Context& context, std::span<const TermGroup> groups, bool with_catalogue);
 void inParts(const Context& context, const std::vector<TermGroup>& groups,
              const std::function<void(const Part&)>& use);
 
@@ -56,10 +67,20 @@ std::vector<Explanation> compete(const Context& context);
 /// Only over these covariates.
 std::vector<Explanation> competeFor(const Context& context, const std::vector<std::string>& covariates);
 
+/// Places of explanations that may be chosen: a pair of covariates only if it acts together.
+std::vector<std::size_t> eligible(const std::vector<Explanation>& explanations);
+
 /// The simplest that is not worse than the best by more than a standard error of their difference. A pair of
 /// covariates must also beat the sum of their own functions; a catalogue effect wins when it is about as
 /// good. Gives its place; nothing when there are none.
 std::optional<std::size_t> choose(const std::vector<Explanation>& explanations);
+
+/// Where the source can fit its catalogue: those effects that could be worth it are fitted, the others go.
+void fitCatalogue(const Context& context, std::vector<Explanation>& explanations);
+/// An effect of the catalogue that was fitted, if one is to be named: it predicts other captures, no free
+/// curve does so better (2 standard errors), what it leaves does not go with its own covariates, and no formula
+/// with fewer numbers is as good.
+std::optional<std::size_t> chooseNamed(const Context& context, std::vector<Explanation>& explanations);
 
 /// Its place among `explanations` and what else explains as much, the next experiment, how often it is best.
 Effect effectOf(const Context& context, const std::vector<Explanation>& explanations, std::size_t chosen);

@@ -86,17 +86,19 @@ std::string inWords(const Factor& factor) {
 }
 
 std::string inWords(const Term& term) {
-  std::string words;
+  std::string words = term.carrier;
   for (const Factor& factor : term.factors) words += (words.empty() ? "" : " · ") + inWords(factor);
   return words.empty() ? "1" : words;
 }
 
 std::vector<std::string> covariatesOf(const TermGroup& group) {
   std::vector<std::string> names;
+  const auto add = [&](const std::string& name) {
+    if (std::ranges::find(names, name) == names.end()) names.push_back(name);
+  };
   for (const Term& term : group.terms) {
-    for (const Factor& factor : term.factors) {
-      if (std::ranges::find(names, factor.covariate) == names.end()) names.push_back(factor.covariate);
-    }
+    if (!term.carrier.empty()) add(term.carrier.substr(0, term.carrier.find(':')));
+    for (const Factor& factor : term.factors) add(factor.covariate);
   }
   return names;
 }

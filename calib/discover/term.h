@@ -42,6 +42,9 @@ struct Factor {
 struct Term {
   std::vector<Factor> factors{};
   std::optional<Stage> stage{};
+  /// What the factors are multiplied with, by a name that its source knows, such as "neighbours:3px"; empty:
+  /// nothing else. Its name as far as the colon counts as a covariate.
+  std::string carrier{};
   /// `value` gives the covariate of that name.
   [[nodiscard]] double at(const std::function<double(const std::string&)>& value) const;
 };
@@ -77,7 +80,10 @@ struct CovariateInfo {
   std::vector<double> levels{};     ///< its values, if they are at most 12
   double period = 0.0;              ///< of the modulation, c/(2f), in its unit; 0: not known
   std::optional<Stage> stage{};     ///< where functions of it are inserted
+  std::string word{};  ///< what effects of the catalogue call it; empty: they do not know it
 };
+
+class NamedEffects;
 
 /// Data that Evidence can be made from as often as the shape of a term is refined. One call is one pass over
 /// all rows; it adds the columns of many terms at once.
@@ -96,6 +102,12 @@ class RowSource {
   /// is asked for most, once for each step of a search. As good, but less work where it is overridden.
   [[nodiscard]] virtual Evidence summed(std::span<const TermGroup> extra,
                                         std::span<const double> scales) const;
+  /// Explanations that are no function of covariates alone.
+  [[nodiscard]] virtual std::vector<TermGroup> ownGroups() const { return {}; }
+  /// What effects of the catalogue call a carrier; empty: nothing.
+  [[nodiscard]] virtual std::string wordOfCarrier(const std::string&) const { return {}; }
+  /// Its catalogue, where it can be fitted as it is.
+  [[nodiscard]] virtual const NamedEffects* named() const { return nullptr; }
   /// What terms can be made of.
   [[nodiscard]] virtual std::vector<CovariateInfo> covariates() const = 0;
 };

@@ -106,9 +106,11 @@ double lambdaOf(const Setting& world, const sim::SensorModel& truth) {
   const Campaign campaign = orEnd(readCampaign(folder(), Side::A));
   const Declared declared{world.declared, world.scene};
   const auto traced = orEnd(traceAll(declared, campaign.captures, kTrace));
-  const Judged judged{declared, campaign.captures, traced, {}};
+  const Lit lit{campaign.captures, traced, traced};
   const auto deviance = [&](const std::vector<sim::AnyEffect>& effects) {
-    return orEnd(refit(judged, effects, {})).deviance;
+    const Marginal marginal =
+        marginalise(orEnd(residualEvidence({declared, lit, {}}, effects)), {});
+    return fit(marginal, nuisanceColumns(marginal)).deviance;
   };
   return deviance(effectsWithoutNoise(world.declared)) - deviance(effectsWithoutNoise(truth));
 }

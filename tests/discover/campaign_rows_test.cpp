@@ -40,7 +40,8 @@ class Rows : public testing::Test {
     const Declared as_declared{*declared, *scene};
     auto traced = traceAll(as_declared, campaign->captures, {.max_surfaces = 1});
     if (!traced) throw std::runtime_error(traced.error().message);
-    auto rows = CampaignRows::make(as_declared, campaign->captures, *traced, {});
+    const Lit lit{campaign->captures, *traced, *traced};
+    auto rows = CampaignRows::make(as_declared, lit, {});
     if (!rows) throw std::runtime_error(rows.error().message);
     return {*std::move(campaign), *std::move(traced), *std::move(rows)};
   }

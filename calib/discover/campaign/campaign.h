@@ -102,6 +102,17 @@ struct TracedCapture {
 
 inline constexpr double kPosePrior_m = 1e-3, kPosePrior_deg = 0.1, kGainPrior = 0.01;
 
+/// Captures with light of their scenes, traced twice.
+struct Lit {
+  const std::vector<MeasuredCapture>& captures;
+  /// What is compared with what was measured.
+  const std::vector<std::shared_ptr<const TracedCapture>>& traced;
+  /// Light of other paths, on which effects are varied. An effect that smooths an image also smooths
+  /// what its light has by chance: varied on the light that is compared, it would seem to explain
+  /// the difference.
+  const std::vector<std::shared_ptr<const TracedCapture>>& varied;
+};
+
 /// Traces each capture's scene at its pose, or `stood` off it. Captures of one scene and place
 /// share their light; each place has a seed of its own, because one seed for all would leave a
 /// pattern that looks like a camera's.

@@ -266,6 +266,19 @@ sim::AnyEffect withNumber(const sim::AnyEffect& effect, const std::string& key, 
   return copy;
 }
 
+bool isStrength(const sim::AnyEffect& effect, const std::string& key) {
+  return std::visit(
+      [&]<class E>(const E&) {
+        const Roles roles = rolesOf(sim::AnyEffect{E::none()}, sim::AnyEffect{E{}});
+        if (std::ranges::find(roles.strengths, key, &EffectNumber::key) != roles.strengths.end()) return true;
+        // A list may be longer than in the defaults.
+        return key.ends_with("]") && std::ranges::any_of(roles.strengths, [&](const EffectNumber& number) {
+                 return number.key.substr(0, number.key.find('[')) == key.substr(0, key.find('['));
+               });
+      },
+      effect);
+}
+
 std::string nameOf(const sim::AnyEffect& effect) {
   return std::visit([]<class E>(const E&) { return std::string{E::about.name}; }, effect);
 }

@@ -22,6 +22,9 @@ std::vector<EffectNumber> numbersOf(const sim::AnyEffect& effect);
 /// The same effect with one number changed; within its bounds, whole where it must be.
 sim::AnyEffect withNumber(const sim::AnyEffect& effect, const std::string& key, double value);
 
+/// Whether it makes the effect strong: it differs between the effect's `none()` and its defaults.
+bool isStrength(const sim::AnyEffect& effect, const std::string& key);
+
 std::string nameOf(const sim::AnyEffect& effect);
 Stage stageOf(const sim::AnyEffect& effect);
 std::vector<std::string> covariatesOf(const sim::AnyEffect& effect);

@@ -6,37 +6,13 @@
 #include <cmath>
 #include <limits>
 
+#include "calib/discover/campaign/carriers.h"
+#include "calib/discover/campaign/smoothed.h"
+
 namespace toftwin::discover {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-
-/// Mean over the square of 2 `reach` + 1 pixels, what lies outside or is NaN left out.
-Image<float> smoothed(const Image<float>& image, int reach) {
-  const int width = image.width(), height = image.height();
-  Image<double> sums(width + 1, height + 1), counts(width + 1, height + 1);
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      const auto value = static_cast<double>(image(x, y));
-      const bool is_there = std::isfinite(value);
-      sums(x + 1, y + 1) = sums(x, y + 1) + sums(x + 1, y) - sums(x, y) + (is_there ? value : 0.0);
-      counts(x + 1, y + 1) =
-          counts(x, y + 1) + counts(x + 1, y) - counts(x, y) + (is_there ? 1.0 : 0.0);
-    }
-  }
-  Image<float> mean(width, height);
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      const int a = std::max(0, x - reach), b = std::min(width, x + reach + 1);
-      const int c = std::max(0, y - reach), d = std::min(height, y + reach + 1);
-      const auto over = [&](const Image<double>& of) {
-        return of(b, d) - of(a, d) - of(b, c) + of(a, c);
-      };
-      mean(x, y) = static_cast<float>(over(sums) / std::max(1.0, over(counts)));
-    }
-  }
-  return mean;
-}
 
 struct Gatherer {
   const Cells& cells;
@@ -149,6 +125,7 @@ CaptureCovariates covariatesOf(const MeasuredCapture& capture, const TracedCaptu
 }
 
 std::string_view wordOf(std::string_view covariate) {
+  if (const auto word = wordOfCarrier(covariate); !word.empty()) return word;
   for (const Known& known : kKnown) {
     if (known.name == covariate) return known.word;
   }
@@ -162,6 +139,7 @@ CovariateInfo describe(const std::string& name) {
       info.unit = known.unit, info.nature = known.nature, info.stage = known.stage;
   }
   if (name.starts_with("temperature_")) info.unit = "c", info.stage = Stage::Range;
+  info.word = wordOf(name);
   return info;
 }
 

@@ -118,6 +118,7 @@ std::vector<std::size_t> wrongNumbers(const Evidence& evidence, const Finding& f
 struct Inserted {
   std::vector<sim::AnyEffect> effects;
   std::vector<std::size_t> fitted;  ///< places of those whose numbers are to be fitted
+  std::map<std::size_t, std::vector<std::string>> only{};  ///< of those that were found, the numbers
 };
 
 std::size_t insert(Inserted& inserted, const sim::AnyEffect& effect) {
@@ -127,14 +128,10 @@ std::size_t insert(Inserted& inserted, const sim::AnyEffect& effect) {
   const auto place = static_cast<std::size_t>(behind - inserted.effects.begin());
   inserted.effects.insert(behind, effect);
   for (std::size_t& other : inserted.fitted) other += other >= place ? 1 : 0;
+  std::map<std::size_t, std::vector<std::string>> only;
+  for (auto& [other, keys] : inserted.only) only.emplace(other + (other >= place ? 1 : 0), std::move(keys));
+  inserted.only = std::move(only);
   return place;
-}
-
-const Candidate* candidateNamed(const CampaignRows& rows, const std::string& name) {
-  for (const Candidate& candidate : rows.candidates()) {
-    if (nameOf(candidate.example) == name) return &candidate;
-  }
-  return nullptr;
 }
 
 Inserted insertFound(const CampaignRows& rows, const Declared& declared,
@@ -143,13 +140,12 @@ Inserted insertFound(const CampaignRows& rows, const Declared& declared,
   const std::vector<CovariateInfo> covariates = rows.covariates();
   for (const Effect& effect : finding.finding.effects) {
     FoundEffect found{effect, {}};
-    if (effect.is_catalogue) {
-      if (const Candidate* candidate = candidateNamed(rows, effect.name)) {
-        const sim::AnyEffect start = startOf(rows, *candidate, finding.finding.scales);
-        const std::size_t place = insert(inserted, start);
-        inserted.fitted.push_back(place);
-        found.fitted = FittedEffect{start, {}};
-      }
+    if (effect.fit) {
+      const CampaignFit& fit = campaignFitOf(*effect.fit);
+      const std::size_t place = insert(inserted, fit.effect);
+      inserted.fitted.push_back(place);
+      inserted.only[place] = fit.keys;
+      found.fitted = FittedEffect{fit.effect, {}};
     } else if (const auto learned = learnedEffectOf(effect, covariates)) {
       insert(inserted, *learned);
       found.fitted = FittedEffect{*learned, {}};
@@ -222,8 +218,9 @@ Result<> judgeLocked(const CampaignJob& job, const Campaign& campaign, const Dec
   constexpr int kMostCells = 96;
   // What an imperfect fit leaves of the open captures is no noise.
   constexpr double kMostNoise = 1.1;
-  auto judgement = judge({declared, *captures, *traced, finding.finding.scales, kMostCells}, before,
-                         after, std::min(kMostNoise, finding.dispersion));
+  const Lit lit{*captures, *traced, *at_poses};
+  auto judgement = judge({declared, lit, finding.finding.scales, kMostCells}, before, after,
+                         std::min(kMostNoise, finding.dispersion));
   if (!judgement) return judgement.error();
   finding.judgement = *std::move(judgement);
   return {};
@@ -266,15 +263,15 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
   const auto traced = traceWhereTheyStood(declared, campaign->captures, *at_poses, job.trace, tell);
   if (!traced) return traced.error();
   progress.begin();
-  const auto rows =
-      CampaignRows::make(declared, campaign->captures, *traced, {.left_out = job.left_out});
+  const Lit lit{campaign->captures, *traced, *at_poses};
+  const auto rows = CampaignRows::make(declared, lit, {.left_out = job.left_out});
   if (!rows) return rows.error();
   progress.begin();
   finding.finding = find(*rows, job.finder);
   progress.begin();
-  const Judged judged{declared, campaign->captures, *traced, finding.finding.scales};
   const auto as_declared = effectsWithoutNoise(declared.model);
-  const auto plain = refit(judged, as_declared, {});
+  const RefitOptions fitting{.scales = finding.finding.scales};
+  const auto plain = refit(*rows, as_declared, {}, fitting);
   if (!plain) return plain.error();
   finding.offset_before_mm = plain->offset_mm;
   std::vector<TermGroup> terms;
@@ -283,7 +280,8 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
   }
   const auto updates = wrongNumbers(rows->evidence(terms), finding.finding, as_declared);
   Inserted inserted = insertFound(*rows, declared, updates, finding);
-  const auto refitted = refit(judged, inserted.effects, inserted.fitted);
+  const auto refitted = refit(*rows, inserted.effects, inserted.fitted,
+                              {.scales = finding.finding.scales, .only = inserted.only});
   if (!refitted) return refitted.error();
   takeFitted(*refitted, declared, finding);
   finding.model_toml = modelText(files->text, declared, finding);

@@ -130,20 +130,23 @@ struct Totals {
 Result<Judgement> judge(const Judged& judged, const JudgedModel& before, const JudgedModel& after,
                         double dispersion) {
   const auto camera_before =
-      NoiselessCamera::make(judged.declared.model, before.effects, judged.captures);
+      NoiselessCamera::make(judged.declared.model, before.effects, judged.lit.captures);
   if (!camera_before) return camera_before.error();
   const auto camera_after =
-      NoiselessCamera::make(judged.declared.model, after.effects, judged.captures);
+      NoiselessCamera::make(judged.declared.model, after.effects, judged.lit.captures);
   if (!camera_after) return camera_after.error();
   Judgement judgement;
   Totals all_before, all_after;
-  for (std::size_t c = 0; c < judged.captures.size(); ++c) {
-    const MeasuredCapture& capture = judged.captures[c];
-    const TracedCapture& traced = *judged.traced[c];
-    const Errors then =
-        errorsOf(capture, traced, camera_before->read(capture, traced.light), before.offset_mm);
-    const Errors now =
-        errorsOf(capture, traced, camera_after->read(capture, traced.light), after.offset_mm);
+  for (std::size_t c = 0; c < judged.lit.captures.size(); ++c) {
+    const MeasuredCapture& capture = judged.lit.captures[c];
+    const TracedCapture& traced = *judged.lit.traced[c];
+    const sim::Light& varied = judged.lit.varied[c]->light;
+    const auto errors = [&](const NoiselessCamera& camera, double offset_mm) {
+      return errorsOf(capture, traced,
+                      readingOf(*camera_before, camera, capture, traced.light, varied), offset_mm);
+    };
+    const Errors then = errors(*camera_before, before.offset_mm),
+                 now = errors(*camera_after, after.offset_mm);
     all_before.add(then), all_after.add(now);
     const compare::Summary s = compare::summarise(then.all_mm), t = compare::summarise(now.all_mm);
     judgement.captures.push_back({capture.record.name, capture.record.block, s.mean, t.mean, s.rms,
@@ -154,7 +157,7 @@ Result<Judgement> judge(const Judged& judged, const JudgedModel& before, const J
   const auto energy_before = energiesOf(judged, before), energy_after = energiesOf(judged, after);
   if (!energy_before) return energy_before.error();
   if (!energy_after) return energy_after.error();
-  if (!judged.captures.empty()) addRemoved(*energy_before, *energy_after, dispersion, judgement);
+  if (!judged.lit.captures.empty()) addRemoved(*energy_before, *energy_after, dispersion, judgement);
   return judgement;
 }
 

@@ -74,6 +74,21 @@ Result<NoiselessCamera> NoiselessCamera::make(const sim::SensorModel& model,
   return camera;
 }
 
+Reading changed(Reading a, const Reading& b, const Reading& c) {
+  for (std::size_t i = 0; i < a.range_m.size(); ++i) {
+    a.range_m[i] += b.range_m[i] - c.range_m[i];
+    a.log_amplitude[i] += b.log_amplitude[i] - c.log_amplitude[i];
+  }
+  return a;
+}
+
+Reading readingOf(const NoiselessCamera& declared, const NoiselessCamera& other,
+                  const MeasuredCapture& capture, const sim::Light& traced,
+                  const sim::Light& varied) {
+  return changed(declared.read(capture, traced), other.read(capture, varied),
+                 declared.read(capture, varied));
+}
+
 const sim::SensorModel& NoiselessCamera::at(const MeasuredCapture& capture) const {
   return models_.at(exposureOf(models_.at(0.0), capture));
 }

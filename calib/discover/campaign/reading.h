@@ -39,6 +39,14 @@ class NoiselessCamera {
       models_{};  ///< by exposure in microseconds; 0: the model's own
 };
 
+/// Of one capture, what other effects than the declared ones say, on both of its lights:
+/// declared(traced) + other(varied) − declared(varied).
+Reading readingOf(const NoiselessCamera& declared, const NoiselessCamera& other,
+                  const MeasuredCapture& capture, const sim::Light& traced,
+                  const sim::Light& varied);
+/// a + (b − c), NaN where any is.
+Reading changed(Reading a, const Reading& b, const Reading& c);
+
 /// The moment as the model's effects see it: the measured one, with the model's own raw exposures.
 Moment momentFor(const sim::SensorModel& model, const MeasuredCapture& capture);
 

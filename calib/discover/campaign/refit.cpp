@@ -3,130 +3,50 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "calib/discover/campaign/reading.h"
-#include "calib/discover/marginal.h"
 #include "sim/images/rows.h"
 
 namespace toftwin::discover {
 namespace {
 
-/// A number that is fitted: of which effect of the list, and by how much it is changed for its
-/// derivative.
-struct Free {
-  std::size_t place = 0;
-  std::string key{};
-  double step = 0.0;
-};
-
-double valueOf(const sim::AnyEffect& effect, const std::string& key) {
-  for (const EffectNumber& number : numbersOf(effect)) {
-    if (number.key == key) return number.value;
-  }
-  return 0.0;
+sim::AnyEffect defaultsOf(const sim::AnyEffect& effect) {
+  return std::visit([]<class E>(const E&) { return sim::AnyEffect{E{}}; }, effect);
 }
 
-/// A tenth of what the effect has, or of what its defaults have.
-std::vector<Free> freeNumbersOf(const std::vector<sim::AnyEffect>& effects,
-                                const std::vector<std::size_t>& places) {
-  std::vector<Free> all;
-  for (const std::size_t place : places) {
-    const sim::AnyEffect defaults =
-        std::visit([]<class E>(const E&) { return sim::AnyEffect{E{}}; }, effects[place]);
-    for (const EffectNumber& number : numbersOf(effects[place])) {
-      if (number.is_whole) continue;
-      double step =
-          0.05 * std::max(std::abs(number.value), 0.1 * std::abs(valueOf(defaults, number.key)));
-      if (step == 0.0) step = 1e-4 * (number.high - number.low);
-      if (number.value + step > number.high) step = -step;
-      all.push_back({place, number.key, step});
-    }
-  }
-  return all;
-}
+using Kept = std::set<std::pair<std::size_t, std::string>>;  ///< numbers that stay as they are
 
-std::vector<sim::AnyEffect> moved(std::vector<sim::AnyEffect> effects, const Free& free,
-                                  double by) {
-  effects[free.place] =
-      withNumber(effects[free.place], free.key, valueOf(effects[free.place], free.key) + by);
-  return effects;
-}
-
-/// The evidence of the residuals that a list of effects leaves, with a column for each free number.
-Result<Evidence> evidenceOf(const Judged& judged, const std::vector<sim::AnyEffect>& effects,
-                            const std::vector<Free>& free) {
-  const auto declared = NoiselessCamera::make(
-      judged.declared.model, effectsWithoutNoise(judged.declared.model), judged.captures);
-  if (!declared) return declared.error();
-  std::vector<NoiselessCamera> cameras;
-  auto here = NoiselessCamera::make(judged.declared.model, effects, judged.captures);
-  if (!here) return here.error();
-  for (const Free& one : free) {
-    auto camera = NoiselessCamera::make(judged.declared.model, moved(effects, one, one.step),
-                                        judged.captures);
-    if (!camera) return camera.error();
-    cameras.push_back(*std::move(camera));
-  }
-  Evidence evidence;
-  evidence.groups = commonGroups();
-  for (std::size_t i = 0; i < free.size(); ++i) {
-    evidence.groups.push_back({.name = free[i].key,
-                               .kind = Kind::Declared,
-                               .first = kCommon + i,
-                               .count = 1,
-                               .numbers = 1});
-  }
-  evidence.captures.resize(judged.captures.size());
-  sim::inParallel(static_cast<int>(judged.captures.size()), 1, [&](int first, int last) {
-    for (auto c = static_cast<std::size_t>(first); c < static_cast<std::size_t>(last); ++c) {
-      const MeasuredCapture& capture = judged.captures[c];
-      const TracedCapture& traced = *judged.traced[c];
-      // Which pixels count must not depend on what is fitted.
-      const Cells cells{capture, traced, declared->read(capture, traced.light), judged.most_cells};
-      const Reading reading = here->read(capture, traced.light);
-      WhitenedCapture whitened{cells, kCommon + free.size()};
-      whitened.putCommon(cells, traced);
-      whitened.putResidual(cells, capture, traced, reading);
-      for (std::size_t i = 0; i < free.size(); ++i)
-        whitened.putChange(cells, kCommon + i, reading, cameras[i].read(capture, traced.light));
-      evidence.captures[c] = whitened.evidence(capture.record.name, capture.record.block);
-    }
-  });
-  return evidence;
-}
-
+/// Normal equations of the free numbers, everything else eliminated.
 struct Step {
-  Fit nuisances;
-  Eigen::MatrixXd gram;  ///< of the free numbers after the nuisances
+  Fit others;
+  Eigen::MatrixXd gram;
   Eigen::VectorXd moment;
   Eigen::VectorXd own;  ///< squares of the free numbers' columns
   double deviance = 0.0, freedom = 1.0;
 };
 
-Step stepOf(const Judged& judged, const Evidence& evidence, std::size_t free) {
-  const Marginal marginal = marginalise(evidence, judged.scales);
-  Columns nuisances;
-  for (const Group& group : marginal.groups) {
-    if (group.kind == Kind::Nuisance) append(nuisances, group);
-  }
+Step stepOf(const Marginal& marginal, std::size_t free) {
+  Columns others;
+  for (Eigen::Index i = 0; i < marginal.moment.size() - static_cast<Eigen::Index>(free); ++i)
+    others.push_back(i);
   Step step;
-  step.nuisances = fit(marginal, nuisances);
-  step.deviance = step.nuisances.deviance, step.freedom = step.nuisances.freedom;
-  // Normal equations of the free numbers, the nuisances eliminated.
+  step.others = fit(marginal, others);
+  step.deviance = step.others.deviance, step.freedom = step.others.freedom;
   const auto n = static_cast<Eigen::Index>(free);
-  const Eigen::MatrixXd cross = marginal.gram(nuisances, Eigen::lastN(n));
-  const Eigen::MatrixXd inverse = pseudoInverse(marginal.gram(nuisances, nuisances)).inverse;
-  step.gram = marginal.gram.bottomRightCorner(n, n) - cross.transpose() * inverse * cross;
-  step.moment = marginal.moment.tail(n) - cross.transpose() * inverse * marginal.moment(nuisances);
+  const Eigen::MatrixXd cross = marginal.gram(others, Eigen::lastN(n));
+  step.gram = marginal.gram.bottomRightCorner(n, n) - cross.transpose() * step.others.inverse * cross;
+  step.moment =
+      marginal.moment.tail(n) - cross.transpose() * step.others.inverse * marginal.moment(others);
   step.own = marginal.gram.diagonal().tail(n);
   return step;
 }
 
 /// Those that are not told by offset, gain and the numbers before them: of a reference temperature,
 /// an offset says all.
-std::vector<Free> toldApart(const std::vector<Free>& free, const Step& step) {
+std::vector<FreeNumber> toldApart(const std::vector<FreeNumber>& free, const Step& step) {
   constexpr double kLeast = 1e-4;  // of a column's square
-  std::vector<Free> kept;
+  std::vector<FreeNumber> kept;
   std::vector<Eigen::Index> rows;
   for (std::size_t i = 0; i < free.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);
@@ -142,89 +62,226 @@ std::vector<Free> toldApart(const std::vector<Free>& free, const Step& step) {
   return kept;
 }
 
-/// The same numbers with steps that suit their effects as they are now.
-std::vector<Free> again(const std::vector<Free>& free, const std::vector<sim::AnyEffect>& effects,
-                        const std::vector<std::size_t>& places) {
-  std::vector<Free> all = freeNumbersOf(effects, places);
-  std::erase_if(all, [&](const Free& one) {
-    return std::ranges::none_of(
-        free, [&](const Free& f) { return f.place == one.place && f.key == one.key; });
-  });
-  return all;
-}
-
 /// A list of effects while it is fitted.
 struct State {
   std::vector<sim::AnyEffect> effects;
-  std::vector<Free> free{};
+  std::vector<FreeNumber> free{};
+  Marginal marginal{};
   Step at{};
 };
 
-Result<> look(const Judged& judged, State& state) {
-  const auto evidence = evidenceOf(judged, state.effects, state.free);
-  if (!evidence) return evidence.error();
-  state.at = stepOf(judged, *evidence, state.free.size());
-  return {};
-}
+class Descent {
+ public:
+  Descent(const CampaignRows& rows, const std::vector<std::size_t>& places, const RefitOptions& options)
+      : rows_(rows), places_(places), options_(options) {}
 
-/// All numbers that can be told apart where the fit is now: a radius shows only once there is
-/// something that has it.
-Result<> freeWhatShows(const Judged& judged, const std::vector<std::size_t>& places, State& state) {
-  state.free = freeNumbersOf(state.effects, places);
-  if (auto looked = look(judged, state); !looked) return looked;
-  std::vector<Free> kept = toldApart(state.free, state.at);
-  if (kept.size() == state.free.size()) return {};
-  state.free = std::move(kept);
-  return look(judged, state);
-}
+  /// All numbers that can be told apart where the fit is now: a radius shows only once there is
+  /// something that has it.
+  Result<> freeWhatShows(State& state) const {
+    state.free = candidates(state.effects);
+    if (auto looked = look(state); !looked) return looked;
+    std::vector<FreeNumber> kept = toldApart(state.free, state.at);
+    if (kept.size() == state.free.size()) return {};
+    state.free = std::move(kept);
+    return look(state);
+  }
 
-/// Levenberg-Marquardt with the numbers that are free.
-Result<> descend(const Judged& judged, const std::vector<std::size_t>& places, State& state) {
-  constexpr int kMostSteps = 10;
-  constexpr double kDone = 0.1;  // of the deviance: a tenth of a standard error squared
-  double damping = 1e-3;
-  for (int k = 0; k < kMostSteps && !state.free.empty() && damping < 1e8; ++k) {
-    Eigen::MatrixXd damped = state.at.gram;
-    damped.diagonal() *= 1.0 + damping;
-    const Eigen::VectorXd change = pseudoInverse(damped, 1e-7).inverse * state.at.moment;
-    State next{state.effects};
-    for (std::size_t i = 0; i < state.free.size(); ++i)
-      next.effects = moved(std::move(next.effects), state.free[i],
-                           change[static_cast<Eigen::Index>(i)] * state.free[i].step);
-    next.free = again(state.free, next.effects, places);
-    if (auto looked = look(judged, next); !looked) return looked;
-    const double better = state.at.deviance - next.at.deviance;
-    if (better > 0.0) {
-      state = std::move(next);
-      damping = std::max(1e-9, 0.1 * damping);
-      if (better < kDone) break;
-    } else {
-      damping *= 30.0;
+  Result<> descend(State& state) const {
+    constexpr int kMostSteps = 10;
+    constexpr double kDone = 0.1;  // of the deviance: a tenth of a standard error squared
+    double damping = 1e-3;
+    for (int k = 0; k < kMostSteps && !state.free.empty() && damping < 1e8; ++k) {
+      Eigen::MatrixXd damped = state.at.gram;
+      damped.diagonal() *= 1.0 + damping;
+      const Eigen::VectorXd change = pseudoInverse(damped, 1e-7).inverse * state.at.moment;
+      State next{state.effects};
+      for (std::size_t i = 0; i < state.free.size(); ++i)
+        next.effects = moved(std::move(next.effects), state.free[i],
+                             change[static_cast<Eigen::Index>(i)] * state.free[i].step);
+      next.free = again(state.free, next.effects);
+      if (auto looked = look(next); !looked) return looked;
+      const double better = state.at.deviance - next.at.deviance;
+      if (better > 0.0) {
+        state = std::move(next);
+        damping = std::max(1e-9, 0.1 * damping);
+        if (better < kDone) break;
+      } else {
+        damping *= 30.0;
+      }
+    }
+    return {};
+  }
+
+  Result<> fit(State& state) const {
+    if (auto shown = freeWhatShows(state); !shown) return shown;
+    for (int round = 0; round < 3; ++round) {
+      const std::size_t before = state.free.size();
+      if (auto done = descend(state); !done) return done;
+      if (auto shown = freeWhatShows(state); !shown) return shown;
+      if (state.free.size() <= before) break;
+    }
+    return {};
+  }
+
+  /// The strength that is least needed goes back to nothing, one after the other; the last one of an
+  /// effect stays.
+  Result<> dropNeedless(State& state) {
+    constexpr double kNeeded = 2.0;  // standard errors
+    while (true) {
+      const auto least = leastNeeded(state, kNeeded);
+      if (!least) return {};
+      const FreeNumber gone = *least;
+      const double nothing = nothingOf(state.effects[gone.place], gone.key);
+      state.effects[gone.place] = withNumber(state.effects[gone.place], gone.key, nothing);
+      kept_.emplace(gone.place, gone.key);
+      if (auto done = fit(state); !done) return done;
     }
   }
-  return {};
-}
+
+ private:
+  Result<> look(State& state) const {
+    const auto evidence = rows_.evidenceLeft({.effects = state.effects,
+                                              .free = state.free,
+                                              .terms = options_.terms,
+                                              .with_numbers = options_.with_numbers});
+    if (!evidence) return evidence.error();
+    state.marginal = marginalise(*evidence, options_.scales);
+    state.at = stepOf(state.marginal, state.free.size());
+    return {};
+  }
+
+  [[nodiscard]] std::vector<FreeNumber> candidates(const std::vector<sim::AnyEffect>& effects) const {
+    std::vector<FreeNumber> all = freeNumbersOf(effects, places_);
+    std::erase_if(all, [&](const FreeNumber& one) {
+      const auto only = options_.only.find(one.place);
+      return kept_.contains({one.place, one.key}) ||
+             (only != options_.only.end() && std::ranges::count(only->second, one.key) == 0);
+    });
+    return all;
+  }
+
+  /// The same numbers with steps that suit their effects as they are now.
+  [[nodiscard]] std::vector<FreeNumber> again(const std::vector<FreeNumber>& free,
+                                              const std::vector<sim::AnyEffect>& effects) const {
+    std::vector<FreeNumber> all = candidates(effects);
+    std::erase_if(all, [&](const FreeNumber& one) {
+      return std::ranges::none_of(
+          free, [&](const FreeNumber& f) { return f.place == one.place && f.key == one.key; });
+    });
+    return all;
+  }
+
+  static double nothingOf(const sim::AnyEffect& effect, const std::string& key) {
+    const sim::AnyEffect none =
+        std::visit([]<class E>(const E&) { return sim::AnyEffect{E::none()}; }, effect);
+    return valueOf(none, key);  // 0 where `none` has no such number: a list that is empty
+  }
+
+  [[nodiscard]] std::optional<FreeNumber> leastNeeded(const State& state, double needed) const {
+    const Eigen::MatrixXd covariance = pseudoInverse(state.at.gram, 1e-7).inverse;
+    const double size = std::max(1.0, state.at.deviance / std::max(1.0, state.at.freedom));
+    std::optional<FreeNumber> least;
+    std::map<std::size_t, int> strengths;
+    double smallest = needed;
+    for (std::size_t i = 0; i < state.free.size(); ++i) {
+      const FreeNumber& one = state.free[i];
+      if (!isStrength(state.effects[one.place], one.key)) continue;
+      ++strengths[one.place];
+      const auto row = static_cast<Eigen::Index>(i);
+      const double error = std::sqrt(std::max(0.0, covariance(row, row)) * size) * std::abs(one.step);
+      const double off =
+          std::abs(valueOf(state.effects[one.place], one.key) - nothingOf(state.effects[one.place], one.key));
+      const double z = error > 0.0 ? off / error : 0.0;
+      if (z < smallest) smallest = z, least = one;
+    }
+    return least && strengths[least->place] > 1 ? least : std::nullopt;
+  }
+
+  const CampaignRows& rows_;
+  const std::vector<std::size_t>& places_;
+  const RefitOptions& options_;
+  Kept kept_{};
+};
 
 }  // namespace
 
-Result<Evidence> residualEvidence(const Judged& judged,
-                                  const std::vector<sim::AnyEffect>& effects) {
-  return evidenceOf(judged, effects, {});
+double valueOf(const sim::AnyEffect& effect, const std::string& key) {
+  for (const EffectNumber& number : numbersOf(effect)) {
+    if (number.key == key) return number.value;
+  }
+  return 0.0;
 }
 
-Result<Refitted> refit(const Judged& judged, std::vector<sim::AnyEffect> effects,
-                       const std::vector<std::size_t>& places) {
+std::vector<sim::AnyEffect> moved(std::vector<sim::AnyEffect> effects, const FreeNumber& free,
+                                  double by) {
+  effects[free.place] =
+      withNumber(effects[free.place], free.key, valueOf(effects[free.place], free.key) + by);
+  return effects;
+}
+
+bool actsOnLight(const std::vector<sim::AnyEffect>& effects) {
+  return std::ranges::any_of(effects,
+                             [](const auto& effect) { return stageOf(effect) == Stage::Light; });
+}
+
+/// A twentieth of what the effect has, or of a tenth of what its defaults have.
+std::vector<FreeNumber> freeNumbersOf(const std::vector<sim::AnyEffect>& effects,
+                                      const std::vector<std::size_t>& places) {
+  std::vector<FreeNumber> all;
+  for (const std::size_t place : places) {
+    const sim::AnyEffect defaults = defaultsOf(effects[place]);
+    for (const EffectNumber& number : numbersOf(effects[place])) {
+      if (number.is_whole) continue;
+      double step =
+          0.05 * std::max(std::abs(number.value), 0.1 * std::abs(valueOf(defaults, number.key)));
+      if (step == 0.0) step = 1e-4 * (number.high - number.low);
+      if (number.value + step > number.high) step = -step;
+      all.push_back({place, number.key, step});
+    }
+  }
+  return all;
+}
+
+Result<Evidence> residualEvidence(const Judged& judged,
+                                  const std::vector<sim::AnyEffect>& effects) {
+  const Lit& lit = judged.lit;
+  const auto declared = NoiselessCamera::make(
+      judged.declared.model, effectsWithoutNoise(judged.declared.model), lit.captures);
+  if (!declared) return declared.error();
+  const auto here = NoiselessCamera::make(judged.declared.model, effects, lit.captures);
+  if (!here) return here.error();
+  Evidence evidence;
+  evidence.groups = commonGroups();
+  evidence.captures.resize(lit.captures.size());
+  sim::inParallel(static_cast<int>(lit.captures.size()), 1, [&](int first, int last) {
+    for (auto c = static_cast<std::size_t>(first); c < static_cast<std::size_t>(last); ++c) {
+      const MeasuredCapture& capture = lit.captures[c];
+      const TracedCapture& traced = *lit.traced[c];
+      // Which pixels count must not depend on what is fitted.
+      const Cells cells{capture, traced, declared->read(capture, traced.light), judged.most_cells};
+      WhitenedCapture whitened{cells, kCommon};
+      whitened.putCommon(cells, traced);
+      whitened.putResidual(
+          cells, capture, traced,
+          readingOf(*declared, *here, capture, traced.light, lit.varied[c]->light));
+      evidence.captures[c] = whitened.evidence(capture.record.name, capture.record.block);
+    }
+  });
+  return evidence;
+}
+
+Result<Refitted> refit(const CampaignRows& rows, std::vector<sim::AnyEffect> effects,
+                       const std::vector<std::size_t>& places, const RefitOptions& options) {
   State state{std::move(effects)};
-  if (auto shown = freeWhatShows(judged, places, state); !shown) return shown.error();
-  for (int round = 0; round < 3; ++round) {
-    const std::size_t before = state.free.size();
-    if (auto done = descend(judged, places, state); !done) return done.error();
-    if (auto shown = freeWhatShows(judged, places, state); !shown) return shown.error();
-    if (state.free.size() <= before) break;
+  Descent descent{rows, places, options};
+  if (auto done = descent.fit(state); !done) return done.error();
+  if (options.drops_needless) {
+    if (auto done = descent.dropNeedless(state); !done) return done.error();
   }
   const Step& at = state.at;
   const auto& free = state.free;
   Refitted result{.effects = state.effects,
+                  .free = free,
                   .deviance = at.deviance,
                   .dispersion = at.deviance / std::max(1.0, at.freedom)};
   const double size = std::max(1.0, result.dispersion);
@@ -240,8 +297,9 @@ Result<Refitted> refit(const Judged& judged, std::vector<sim::AnyEffect> effects
     }
     result.fitted.push_back(std::move(one));
   }
-  result.offset_mm = at.nuisances.coefficient[0], result.gain_percent = at.nuisances.coefficient[1];
-  result.offset_error_mm = std::sqrt(std::max(0.0, at.nuisances.inverse(0, 0)) * size);
+  result.offset_mm = at.others.coefficient[0], result.gain_percent = at.others.coefficient[1];
+  result.offset_error_mm = std::sqrt(std::max(0.0, at.others.inverse(0, 0)) * size);
+  result.marginal = std::move(state.marginal);
   return result;
 }
 
@@ -250,10 +308,11 @@ Result<std::vector<std::shared_ptr<const TracedCapture>>> traceWhereTheyStood(
     const std::vector<std::shared_ptr<const TracedCapture>>& traced, const TraceOptions& options,
     const std::function<void(double)>& tell) {
   constexpr Eigen::Index kOwn = 6;  // pose and light
-  const Judged judged{declared, captures, traced, {}};
-  const auto evidence = evidenceOf(judged, effectsWithoutNoise(declared.model), {});
+  const Lit lit{captures, traced, traced};
+  const auto evidence =
+      residualEvidence({declared, lit, {}}, effectsWithoutNoise(declared.model));
   if (!evidence) return evidence.error();
-  const Eigen::VectorXd common = stepOf(judged, *evidence, 0).nuisances.coefficient;
+  const Eigen::VectorXd common = stepOf(marginalise(*evidence, {}), 0).others.coefficient;
   std::vector<Stood> stood;
   for (std::size_t c = 0; c < captures.size(); ++c) {
     const CaptureEvidence& one = evidence->captures[c];
@@ -268,30 +327,6 @@ Result<std::vector<std::shared_ptr<const TracedCapture>>> traceWhereTheyStood(
   TraceOptions again = options;
   again.seed += 0x2545f491U;
   return traceAll(declared, captures, again, tell, stood);
-}
-
-sim::AnyEffect startOf(const CampaignRows& rows, const Candidate& candidate,
-                       std::span<const double> scales) {
-  const Evidence evidence = rows.evidence({});
-  const Marginal marginal = marginalise(evidence, scales);
-  const Columns nuisances = nuisanceColumns(marginal);
-  const double without = fit(marginal, nuisances).deviance;
-  sim::AnyEffect best = candidate.example;
-  double most = -1.0;
-  for (const Group& group : marginal.groups) {
-    if (group.name != nameOf(candidate.example) || group.kind != Kind::Catalogue) continue;
-    for (std::size_t i = 0; i < group.count; ++i) {
-      Columns columns = nuisances;
-      columns.push_back(static_cast<Eigen::Index>(group.first + i));
-      const Fit with = fit(marginal, columns);
-      if (!(without - with.deviance > most)) continue;
-      most = without - with.deviance;
-      const Variation& variation = candidate.variations[i];
-      const double by = with.coefficient[with.coefficient.size() - 1] * variation.step;
-      best = withNumber(variation.off, variation.key, valueOf(variation.off, variation.key) + by);
-    }
-  }
-  return best;
 }
 
 }  // namespace toftwin::discover

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <map>
 #include <span>
 #include <string>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "calib/discover/campaign/campaign.h"
 #include "calib/discover/campaign/catalogue.h"
 #include "calib/discover/campaign/rows.h"
+#include "calib/discover/marginal.h"
 
 namespace toftwin::discover {
 
@@ -28,8 +30,7 @@ struct FittedEffect {
 /// A campaign on which models are judged: what is needed of it again and again.
 struct Judged {
   const Declared& declared;
-  const std::vector<MeasuredCapture>& captures;
-  const std::vector<std::shared_ptr<const TracedCapture>>& traced;
+  const Lit& lit;
   std::vector<double> scales{};  ///< of poses and light, as estimated
   int most_cells = 2000;         ///< of each capture
 };
@@ -38,17 +39,39 @@ struct Judged {
 /// the model cannot have.
 Result<Evidence> residualEvidence(const Judged& judged, const std::vector<sim::AnyEffect>& effects);
 
+double valueOf(const sim::AnyEffect& effect, const std::string& key);
+std::vector<sim::AnyEffect> moved(std::vector<sim::AnyEffect> effects, const FreeNumber& free,
+                                  double by);
+/// Whether any of the effects acts on light.
+bool actsOnLight(const std::vector<sim::AnyEffect>& effects);
+/// Numbers of the effects at these places that are not whole, with steps that suit them.
+std::vector<FreeNumber> freeNumbersOf(const std::vector<sim::AnyEffect>& effects,
+                                      const std::vector<std::size_t>& places);
+
+struct RefitOptions {
+  std::span<const double> scales{};    ///< of poses and light
+  std::span<const TermGroup> terms{};  ///< known besides
+  bool with_numbers = false;           ///< the source's effects' own numbers are nuisances
+  /// Numbers that make an effect strong go if the data do not need them: less than two standard
+  /// errors from nothing.
+  bool drops_needless = false;
+  /// Of the effects at these places, only these numbers.
+  std::map<std::size_t, std::vector<std::string>> only{};
+};
+
 /// Fits the numbers of the effects at `places` of the list by least squares through the simulator
 /// (Levenberg and Marquardt), and gives the list with the errors of what was fitted.
 struct Refitted {
   std::vector<sim::AnyEffect> effects{};
   std::vector<FittedEffect> fitted{};  ///< by place
+  std::vector<FreeNumber> free{};      ///< what was fitted
+  Marginal marginal{};                 ///< of what is left, the free numbers' columns last
   double deviance = 0.0, dispersion = 1.0;
   double offset_mm = 0.0, offset_error_mm = 0.0;
   double gain_percent = 0.0;
 };
-Result<Refitted> refit(const Judged& judged, std::vector<sim::AnyEffect> effects,
-                       const std::vector<std::size_t>& places);
+Result<Refitted> refit(const CampaignRows& rows, std::vector<sim::AnyEffect> effects,
+                       const std::vector<std::size_t>& places, const RefitOptions& options);
 
 /// Light traced again where the cameras probably stood: what a place off the pose changes is then
 /// known to second order, which counts where a thousand pixels say the same.
@@ -57,9 +80,9 @@ Result<std::vector<std::shared_ptr<const TracedCapture>>> traceWhereTheyStood(
     const std::vector<std::shared_ptr<const TracedCapture>>& traced, const TraceOptions& options,
     const std::function<void(double)>& tell = {});
 
-/// Where to begin: the one variation of a candidate that explains most, as strong as it explains
-/// most.
+/// Where to begin: the one variation of a candidate that explains most beyond nuisances and `known`, as
+/// strong as it explains most.
 sim::AnyEffect startOf(const CampaignRows& rows, const Candidate& candidate,
-                       std::span<const double> scales);
+                       std::span<const TermGroup> known, std::span<const double> scales);
 
 }  // namespace toftwin::discover

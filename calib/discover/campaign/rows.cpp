@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 
+#include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/covariates.h"
 #include "sim/images/rows.h"
 
@@ -32,7 +33,8 @@ std::vector<sim::AnyEffect> replaced(std::vector<sim::AnyEffect> effects, std::s
   return effects;
 }
 
-/// A capture's simulation as declared, from which variants start.
+/// A capture's simulation as declared on the light that effects are varied on, from which variants
+/// start.
 struct Base {
   const MeasuredCapture& capture;
   const sim::Light& light;
@@ -111,24 +113,6 @@ std::vector<std::string> namesOf(const std::vector<sim::AnyEffect>& effects) {
   return names;
 }
 
-/// Changes of z, the phasor of the highest frequency, by an electron more in its first raw
-/// exposure:
-///     δz = 2/N,   δ ln|z| = 2 cos φ / (N A),   δr = −(R/2π) 2 sin φ / (N A),   φ = 2π r/R
-/// with R the unambiguous range and N steps.
-Reading sampleImages(const sim::SensorModel& model, const Reading& declared, double period_m) {
-  Reading images{declared.range_m, declared.log_amplitude};
-  const double steps = std::max<double>(1.0, static_cast<double>(model.exposures({}).size()));
-  for (std::size_t i = 0; i < images.range_m.size(); ++i) {
-    const double phase =
-        2.0 * std::numbers::pi * static_cast<double>(declared.range_m[i]) / period_m;
-    const double share = 2.0 / steps * std::exp(-static_cast<double>(declared.log_amplitude[i]));
-    images.log_amplitude[i] = static_cast<float>(share * std::cos(phase));
-    images.range_m[i] =
-        static_cast<float>(-period_m / (2.0 * std::numbers::pi) * share * std::sin(phase));
-  }
-  return images;
-}
-
 /// One effect that varies, as a group with a camera for each of its columns.
 struct VariedEffect {
   Group group;
@@ -204,68 +188,97 @@ double periodOf(const sim::SensorModel& model) {
 
 }  // namespace
 
-void CampaignRows::fill(const MeasuredCapture& capture, const TracedCapture& traced,
-                        const Reading& declared, const CameraInfo& camera,
-                        CaptureRows& rows) const {
-  rows.name = capture.record.name, rows.block = capture.record.block;
-  rows.cells = Cells{capture, traced, declared};
-  rows.covariates = covariatesOf(capture, traced, declared, camera, rows.cells);
-  std::size_t columns = kCommon;
-  for (const Group& group : groups_) columns = std::max(columns, group.first + group.count);
-  rows.whitened = WhitenedCapture{rows.cells, columns};
-  rows.whitened.putCommon(rows.cells, traced);
-  rows.whitened.putResidual(rows.cells, capture, traced, declared);
+void CampaignRows::fillFixed(std::size_t c, const Reading& declared, Fixed& fixed) const {
+  const MeasuredCapture& capture = lit_->captures[c];
+  const TracedCapture& varied = *lit_->varied[c];
+  fixed.name = capture.record.name, fixed.block = capture.record.block;
+  fixed.cells = Cells{capture, *lit_->traced[c], declared};
+  fixed.covariates =
+      covariatesOf(capture, varied, fixed.varied, declared_->model.camera(), fixed.cells);
+  for (const auto& [name, change] :
+       carriersOf(declared_->model, fixed.varied, std::max(period_m_, 1e-3))) {
+    PerChannel& columns = fixed.carriers[name];
+    columns[kRange] = fixed.cells.whitened(Channel::Range, change.range_m);
+    if (fixed.cells.has(Channel::LogAmplitude))
+      columns[kLog] = fixed.cells.whitened(Channel::LogAmplitude, change.log_amplitude);
+  }
 }
 
-Result<CampaignRows> CampaignRows::make(
-    const Declared& declared, const std::vector<MeasuredCapture>& captures,
-    const std::vector<std::shared_ptr<const TracedCapture>>& traced, const Options& options) {
+Reading CampaignRows::read(const NoiselessCamera& camera, std::size_t c, bool acts_on_light) const {
+  return acts_on_light ? camera.read(lit_->captures[c], lit_->varied[c]->light)
+                       : camera.read(lit_->captures[c], rows_[c].fixed->collected);
+}
+
+Result<NoiselessCamera> CampaignRows::cameraWith(std::vector<sim::AnyEffect> effects) const {
+  return NoiselessCamera::make(declared_->model, std::move(effects), lit_->captures);
+}
+
+Result<CampaignRows> CampaignRows::make(const Declared& declared, const Lit& lit,
+                                        const Options& options) {
   const std::vector<sim::AnyEffect> effects = effectsWithoutNoise(declared.model);
-  const auto camera = NoiselessCamera::make(declared.model, effects, captures);
+  const auto camera = NoiselessCamera::make(declared.model, effects, lit.captures);
   if (!camera) return camera.error();
   const auto baseOf = [&](std::size_t c) {
-    sim::Samples collected = camera->collect(captures[c], traced[c]->light);
-    Reading reading = camera->read(captures[c], collected);
-    return Base{captures[c], traced[c]->light, std::move(collected), std::move(reading)};
+    const sim::Light& light = lit.varied[c]->light;
+    sim::Samples collected = camera->collect(lit.captures[c], light);
+    Reading reading = camera->read(lit.captures[c], collected);
+    return Base{lit.captures[c], light, std::move(collected), std::move(reading)};
   };
   std::vector<Base> probed;
-  for (const std::size_t c : probedOf(captures)) probed.push_back(baseOf(c));
+  for (const std::size_t c : probedOf(lit.captures)) probed.push_back(baseOf(c));
   std::vector<const Base*> probed_at;
   for (const Base& base : probed) probed_at.push_back(&base);
-  auto varied = varyAll(declared, effects, captures, probed_at, options.left_out);
+  auto varied = varyAll(declared, effects, lit.captures, probed_at, options.left_out);
   if (!varied) return varied.error();
 
   CampaignRows all;
+  all.declared_ = &declared, all.lit_ = std::make_shared<const Lit>(lit), all.effects_ = effects;
   all.groups_ = commonGroups();
   std::size_t next = kCommon;
-  for (VariedEffect& effect : varied->effects) {
-    effect.group.first = next;
-    next += effect.group.count;
+  for (std::size_t i = 0; i < varied->effects.size(); ++i) {
+    VariedEffect& effect = varied->effects[i];
+    effect.group.first = next, next += effect.group.count;
     all.groups_.push_back(effect.group);
+    if (effect.group.kind == Kind::Declared)
+      all.base_columns_ = next;
+    else
+      all.candidates_.push_back(std::move(varied->candidates[i]));
   }
+  all.base_columns_ = std::max(all.base_columns_, kCommon);
   all.period_m_ = periodOf(declared.model);
-  all.candidates_ = std::move(varied->candidates);
-  all.rows_.resize(captures.size());
+  all.rows_.resize(lit.captures.size());
   std::atomic<std::size_t> done{0};
-  sim::inParallel(static_cast<int>(captures.size()), 1, [&](int first, int last) {
+  sim::inParallel(static_cast<int>(lit.captures.size()), 1, [&](int first, int last) {
     for (auto c = static_cast<std::size_t>(first); c < static_cast<std::size_t>(last); ++c) {
-      const Base base = baseOf(c);
-      CaptureRows& rows = all.rows_[c];
-      all.fill(captures[c], *traced[c], base.reading, declared.model.camera(), rows);
+      Base base = baseOf(c);
+      const Reading declared_reading = camera->read(lit.captures[c], lit.traced[c]->light);
+      auto fixed = std::make_shared<Fixed>();
+      fixed->varied = base.reading;
+      all.fillFixed(c, declared_reading, *fixed);
+      WhitenedCapture columns{fixed->cells, next};
+      columns.putCommon(fixed->cells, *lit.traced[c]);
+      columns.putResidual(fixed->cells, lit.captures[c], *lit.traced[c], declared_reading);
       for (const VariedEffect& effect : varied->effects) {
         for (std::size_t i = 0; i < effect.variants.size(); ++i) {
-          rows.whitened.putChange(rows.cells, effect.group.first + i, base.reading,
-                                  base.with(effect.variants[i]));
+          columns.putChange(fixed->cells, effect.group.first + i, base.reading,
+                            base.with(effect.variants[i]));
         }
       }
-      const Reading sample =
-          sampleImages(declared.model, base.reading, std::max(all.period_m_, 1e-3));
-      rows.sample[kRange] = rows.cells.whitened(Channel::Range, sample.range_m);
-      if (rows.cells.has(Channel::LogAmplitude))
-        rows.sample[kLog] = rows.cells.whitened(Channel::LogAmplitude, sample.log_amplitude);
-      rows.evidence = rows.whitened.evidence(rows.name, rows.block);
+      CaptureRows& rows = all.rows_[c];
+      const auto in_base = static_cast<Eigen::Index>(all.base_columns_);
+      for (std::size_t k = 0; k < kChannels; ++k) {
+        if (columns.columns[k].size() == 0) continue;
+        fixed->catalogue[k] =
+            columns.columns[k].rightCols(columns.columns[k].cols() - in_base);
+        columns.columns[k].conservativeResize(Eigen::NoChange, in_base);
+      }
+      fixed->collected = std::move(base.collected);
+      fixed->residual = columns.residual;
+      rows.base = std::move(columns);
+      rows.fixed = std::move(fixed);
+      rows.evidence = ownEvidence(rows);
       if (options.tell)
-        options.tell(static_cast<double>(++done) / static_cast<double>(captures.size()));
+        options.tell(static_cast<double>(++done) / static_cast<double>(lit.captures.size()));
     }
   });
   return all;

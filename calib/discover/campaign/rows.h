@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <functional>
+#include <map>
 #include <memory>
 #include <span>
 #include <string>
@@ -16,6 +17,7 @@
 #include "calib/discover/campaign/campaign.h"
 #include "calib/discover/campaign/catalogue.h"
 #include "calib/discover/campaign/reading.h"
+#include "calib/discover/named_effects.h"
 #include "calib/discover/term.h"
 
 namespace toftwin::discover {
@@ -70,6 +72,9 @@ struct WhitenedCapture {
   /// changes is, to first order, taken back. putCommon must have been called.
   void putResidual(const Cells& cells, const MeasuredCapture& capture, const TracedCapture& traced,
                    const Reading& simulated);
+  /// What is left of `residual` when the simulation says `to` instead of `from`.
+  void putResidual(const Cells& cells, const std::array<Eigen::VectorXf, kChannels>& residual_before,
+                   const Reading& from, const Reading& to);
   void put(const Cells& cells, std::size_t column, const Reading& change);
   void putChange(const Cells& cells, std::size_t column, const Reading& from, const Reading& to);
   [[nodiscard]] CaptureEvidence evidence(std::string name, std::string block) const;
@@ -81,47 +86,103 @@ struct CaptureCovariates {
   Eigen::MatrixXf values{};  ///< cells × names
 };
 
+/// A number of an effect of a list that is fitted, and by how much it is changed for its derivative.
+struct FreeNumber {
+  std::size_t place = 0;  ///< of the effect
+  std::string key{};
+  double step = 0.0;
+};
+
+/// What a campaign's NamedFit holds: the effect, and the keys of the numbers that were fitted.
+struct CampaignFit {
+  sim::AnyEffect effect;
+  std::vector<std::string> keys{};
+};
+const CampaignFit& campaignFitOf(const NamedFit& fit);
+
 /// A campaign's rows: measured − simulated over noise, and what each thing that could be missing
 /// would add.
-class CampaignRows final : public RowSource {
+class CampaignRows final : public RowSource, public NamedEffects {
  public:
   struct Options {
     std::vector<std::string> left_out{};  ///< names of effects that are no candidates
     std::function<void(double)> tell{};
   };
-  /// Errors: an exposure that the model cannot have; nothing in common with what was measured.
-  static Result<CampaignRows> make(const Declared& declared,
-                                   const std::vector<MeasuredCapture>& captures,
-                                   const std::vector<std::shared_ptr<const TracedCapture>>& traced,
+  /// The model and the captures must outlive the rows. Errors: an exposure that the model cannot
+  /// have; nothing in common with what was measured.
+  static Result<CampaignRows> make(const Declared& declared, const Lit& lit,
                                    const Options& options);
 
   [[nodiscard]] Evidence evidence(std::span<const TermGroup> extra) const override;
+  [[nodiscard]] Evidence withoutCatalogue(std::span<const TermGroup> extra) const override;
   [[nodiscard]] std::vector<CovariateInfo> covariates() const override;
+  [[nodiscard]] std::vector<TermGroup> ownGroups() const override;
+  [[nodiscard]] std::string wordOfCarrier(const std::string& carrier) const override;
+  [[nodiscard]] const NamedEffects* named() const override { return this; }
+  [[nodiscard]] std::vector<NamedFit> fitNamed(std::span<const std::string> names,
+                                               std::span<const TermGroup> known,
+                                               std::span<const double> scales) const override;
+  [[nodiscard]] std::shared_ptr<const RowSource> including(
+      std::span<const NamedFit* const> fits) const override;
 
   [[nodiscard]] const std::vector<Candidate>& candidates() const { return candidates_; }
   [[nodiscard]] const std::vector<Group>& baseGroups() const { return groups_; }
+  /// Declared effects without noise, and those that were included.
+  [[nodiscard]] const std::vector<sim::AnyEffect>& effects() const { return effects_; }
+
+  /// What a list of effects leaves. Columns: what is common to all lists (`with_numbers`: and the
+  /// numbers of this source's effects), terms, and last the free numbers' derivatives. Error: an
+  /// exposure that the model cannot have.
+  struct Left {
+    const std::vector<sim::AnyEffect>& effects;
+    std::span<const FreeNumber> free{};
+    std::span<const TermGroup> terms{};
+    bool with_numbers = false;
+  };
+  [[nodiscard]] Result<Evidence> evidenceLeft(const Left& left) const;
 
  private:
-  struct CaptureRows {
+  using PerChannel = std::array<Eigen::VectorXf, kChannels>;
+  /// What stays the same whatever is included.
+  struct Fixed {
     std::string name{}, block{};
     Cells cells;
     CaptureCovariates covariates;
-    WhitenedCapture whitened;  ///< columns of the groups that are there without terms
-    std::array<Eigen::VectorXf, kChannels>
-        sample;                ///< what an electron more in the first raw exposure does
-    CaptureEvidence evidence;  ///< of the whitened columns
+    std::map<std::string, PerChannel> carriers{};
+    std::array<Eigen::MatrixXf, kChannels> catalogue{};
+    sim::Samples collected;  ///< by the declared model, of the light on which effects are varied
+    Reading varied;          ///< what it says of that light
+    PerChannel residual;     ///< of the declared model
   };
-  void fill(const MeasuredCapture& capture, const TracedCapture& traced, const Reading& declared,
-            const CameraInfo& camera, CaptureRows& rows) const;
+  struct CaptureRows {
+    std::shared_ptr<const Fixed> fixed;  ///< shared by sources that include different effects
+    WhitenedCapture base;                ///< common columns, then numbers of effects
+    CaptureEvidence evidence{};          ///< of the base's columns and the catalogue's
+  };
+  struct Terms {
+    std::array<Eigen::MatrixXf, kChannels> columns{};
+    Eigen::Index count = 0;
+  };
+  void fillFixed(std::size_t capture, const Reading& declared, Fixed& fixed) const;
   /// What a term of coefficient 1 adds to a capture: millimetres of range, per cent of light, or
-  /// electrons.
-  static std::array<Eigen::VectorXf, kChannels> columnsOf(const CaptureRows& rows,
-                                                          const Term& term);
+  /// of its carrier.
+  static PerChannel columnsOf(const Fixed& fixed, const Term& term);
+  static Terms termsOf(const Fixed& fixed, std::span<const TermGroup> groups);
+  static CaptureEvidence ownEvidence(const CaptureRows& rows);
+  [[nodiscard]] Evidence evidenceWith(std::span<const TermGroup> extra, bool with_catalogue) const;
   [[nodiscard]] CaptureEvidence evidenceOf(const CaptureRows& rows,
                                            std::span<const TermGroup> extra,
-                                           std::size_t extra_columns) const;
-  std::vector<Candidate> candidates_;
-  std::vector<Group> groups_;
+                                           bool with_catalogue) const;
+  [[nodiscard]] Reading read(const NoiselessCamera& camera, std::size_t capture,
+                             bool acts_on_light) const;
+  [[nodiscard]] Result<NoiselessCamera> cameraWith(std::vector<sim::AnyEffect> effects) const;
+
+  const Declared* declared_ = nullptr;
+  std::shared_ptr<const Lit> lit_;  ///< shared by sources that include different effects
+  std::vector<Candidate> candidates_;  ///< in the order of the catalogue's groups
+  std::vector<sim::AnyEffect> effects_;
+  std::vector<Group> groups_;  ///< of the base, then of the catalogue
+  std::size_t base_columns_ = 0;
   std::vector<CaptureRows> rows_;
   double period_m_ = 0.0;
 };

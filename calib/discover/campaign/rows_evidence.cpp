@@ -4,7 +4,9 @@
 #include <cmath>
 #include <set>
 
+#include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/covariates.h"
+#include "calib/discover/campaign/refit.h"
 #include "calib/discover/campaign/rows.h"
 #include "sim/images/rows.h"
 
@@ -31,71 +33,93 @@ Eigen::VectorXf valuesOf(const Term& term, const CaptureCovariates& covariates) 
 
 }  // namespace
 
-std::array<Eigen::VectorXf, kChannels> CampaignRows::columnsOf(const CaptureRows& rows,
-                                                               const Term& term) {
-  const Eigen::VectorXf values = valuesOf(term, rows.covariates);
-  std::array<Eigen::VectorXf, kChannels> columns;  // empty: nothing is added
-  const bool has_amplitude = rows.cells.has(Channel::LogAmplitude);
-  switch (term.stage.value_or(Stage::Range)) {
-    case Stage::Range:
-      columns[kRange] = 1e-3F * values.cwiseProduct(rows.cells.rootWeights(Channel::Range));
-      break;
-    case Stage::Light:
-      if (has_amplitude)
-        columns[kLog] = 1e-2F * values.cwiseProduct(rows.cells.rootWeights(Channel::LogAmplitude));
-      break;
-    case Stage::Samples:
-      columns[kRange] = values.cwiseProduct(rows.sample[kRange]);
-      if (has_amplitude) columns[kLog] = values.cwiseProduct(rows.sample[kLog]);
-      break;
+CampaignRows::PerChannel CampaignRows::columnsOf(const Fixed& fixed, const Term& term) {
+  const Eigen::VectorXf values = valuesOf(term, fixed.covariates);
+  PerChannel columns;  // empty: nothing is added
+  if (!term.carrier.empty()) {
+    const auto carrier = fixed.carriers.find(term.carrier);
+    if (carrier == fixed.carriers.end()) return columns;
+    for (std::size_t c = 0; c < kChannels; ++c) {
+      if (carrier->second[c].size() != 0) columns[c] = values.cwiseProduct(carrier->second[c]);
+    }
+    return columns;
   }
+  if (term.stage.value_or(Stage::Range) == Stage::Range)
+    columns[kRange] = 1e-3F * values.cwiseProduct(fixed.cells.rootWeights(Channel::Range));
+  else if (fixed.cells.has(Channel::LogAmplitude))
+    columns[kLog] = 1e-2F * values.cwiseProduct(fixed.cells.rootWeights(Channel::LogAmplitude));
   return columns;
 }
 
-CaptureEvidence CampaignRows::evidenceOf(const CaptureRows& rows, std::span<const TermGroup> extra,
-                                         std::size_t extra_columns) const {
-  const Eigen::Index old = rows.evidence.gram.rows(),
-                     added = static_cast<Eigen::Index>(extra_columns);
-  std::array<Eigen::MatrixXf, kChannels> terms;
+CampaignRows::Terms CampaignRows::termsOf(const Fixed& fixed, std::span<const TermGroup> groups) {
+  Terms terms;
+  for (const TermGroup& group : groups) terms.count += static_cast<Eigen::Index>(group.terms.size());
   Eigen::Index next = 0;
-  for (const TermGroup& group : extra) {
+  for (const TermGroup& group : groups) {
     for (const Term& term : group.terms) {
-      const auto columns = columnsOf(rows, term);
+      const PerChannel columns = columnsOf(fixed, term);
       for (std::size_t c = 0; c < kChannels; ++c) {
         if (columns[c].size() == 0) continue;
-        if (terms[c].size() == 0)
-          terms[c] = Eigen::MatrixXf::Zero(static_cast<Eigen::Index>(rows.cells.size()), added);
-        terms[c].col(next) = columns[c];
+        if (terms.columns[c].size() == 0)
+          terms.columns[c] =
+              Eigen::MatrixXf::Zero(static_cast<Eigen::Index>(fixed.cells.size()), terms.count);
+        terms.columns[c].col(next) = columns[c];
       }
       ++next;
     }
   }
-  CaptureEvidence evidence = rows.evidence;
-  if (added == 0) return evidence;
-  evidence.gram.conservativeResize(old + added, old + added);
-  evidence.gram.rightCols(added).setZero();
-  evidence.gram.bottomRows(added).setZero();
-  evidence.moment.conservativeResize(old + added);
-  evidence.moment.tail(added).setZero();
+  return terms;
+}
+
+CaptureEvidence CampaignRows::ownEvidence(const CaptureRows& rows) {
+  WhitenedCapture both = rows.base;
   for (std::size_t c = 0; c < kChannels; ++c) {
-    if (terms[c].size() == 0) continue;
-    const Eigen::MatrixXd cross = (rows.whitened.columns[c].transpose() * terms[c]).cast<double>();
+    const Eigen::MatrixXf& more = rows.fixed->catalogue[c];
+    if (both.columns[c].size() == 0) continue;
+    const Eigen::Index old = both.columns[c].cols();
+    both.columns[c].conservativeResize(Eigen::NoChange, old + more.cols());
+    both.columns[c].rightCols(more.cols()) = more;
+  }
+  return both.evidence(rows.fixed->name, rows.fixed->block);
+}
+
+CaptureEvidence CampaignRows::evidenceOf(const CaptureRows& rows, std::span<const TermGroup> extra,
+                                         bool with_catalogue) const {
+  const auto in_base = static_cast<Eigen::Index>(base_columns_);
+  const Eigen::Index old = with_catalogue ? rows.evidence.gram.rows() : in_base;
+  const Terms terms = termsOf(*rows.fixed, extra);
+  const Eigen::Index added = terms.count;
+  CaptureEvidence evidence{.gram = Eigen::MatrixXd::Zero(old + added, old + added),
+                           .moment = Eigen::VectorXd::Zero(old + added),
+                           .energy = rows.evidence.energy,
+                           .rows = rows.evidence.rows,
+                           .name = rows.evidence.name,
+                           .block = rows.evidence.block};
+  evidence.gram.topLeftCorner(old, old) = rows.evidence.gram.topLeftCorner(old, old);
+  evidence.moment.head(old) = rows.evidence.moment.head(old);
+  for (std::size_t c = 0; c < kChannels; ++c) {
+    const Eigen::MatrixXf& own = terms.columns[c];
+    if (own.size() == 0) continue;
+    Eigen::MatrixXd cross(old, added);
+    cross.topRows(in_base) = (rows.base.columns[c].transpose() * own).cast<double>();
+    if (with_catalogue)
+      cross.bottomRows(old - in_base) =
+          (rows.fixed->catalogue[c].transpose() * own).cast<double>();
     evidence.gram.topRightCorner(old, added) += cross;
     evidence.gram.bottomLeftCorner(added, old) += cross.transpose();
-    Eigen::MatrixXf own = Eigen::MatrixXf::Zero(added, added);
-    own.selfadjointView<Eigen::Lower>().rankUpdate(terms[c].transpose());
+    Eigen::MatrixXf squares = Eigen::MatrixXf::Zero(added, added);
+    squares.selfadjointView<Eigen::Lower>().rankUpdate(own.transpose());
     evidence.gram.bottomRightCorner(added, added) +=
-        Eigen::MatrixXf{own.selfadjointView<Eigen::Lower>()}.cast<double>();
-    evidence.moment.tail(added) +=
-        (terms[c].transpose() * rows.whitened.residual[c]).cast<double>();
+        Eigen::MatrixXf{squares.selfadjointView<Eigen::Lower>()}.cast<double>();
+    evidence.moment.tail(added) += (own.transpose() * rows.base.residual[c]).cast<double>();
   }
   return evidence;
 }
 
-Evidence CampaignRows::evidence(std::span<const TermGroup> extra) const {
-  Evidence evidence;
-  evidence.groups = groups_;
-  std::size_t next = evidence.columns(), added = 0;
+namespace {
+
+/// Groups of terms behind `groups`, whose columns end at `next`.
+void appendTerms(std::span<const TermGroup> extra, std::size_t next, std::vector<Group>& groups) {
   for (const TermGroup& term : extra) {
     Group group{.name = term.name,
                 .kind = term.kind,
@@ -105,13 +129,75 @@ Evidence CampaignRows::evidence(std::span<const TermGroup> extra) const {
     if (!term.terms.empty()) group.stage = term.terms.front().stage.value_or(Stage::Range);
     group.covariates = discover::covariatesOf(term);
     group.numbers = static_cast<int>(term.terms.size()) + term.inner_numbers;
-    next += group.count, added += group.count;
-    evidence.groups.push_back(std::move(group));
+    next += group.count;
+    groups.push_back(std::move(group));
   }
+}
+
+}  // namespace
+
+Evidence CampaignRows::evidenceWith(std::span<const TermGroup> extra, bool with_catalogue) const {
+  Evidence evidence;
+  for (const Group& group : groups_)
+    if (with_catalogue || group.first < base_columns_) evidence.groups.push_back(group);
+  appendTerms(extra, evidence.columns(), evidence.groups);
   evidence.captures.resize(rows_.size());
   sim::inParallel(static_cast<int>(rows_.size()), 1, [&](int first, int last) {
     for (auto c = static_cast<std::size_t>(first); c < static_cast<std::size_t>(last); ++c)
-      evidence.captures[c] = evidenceOf(rows_[c], extra, added);
+      evidence.captures[c] = evidenceOf(rows_[c], extra, with_catalogue);
+  });
+  return evidence;
+}
+
+Evidence CampaignRows::evidence(std::span<const TermGroup> extra) const {
+  return evidenceWith(extra, true);
+}
+Evidence CampaignRows::withoutCatalogue(std::span<const TermGroup> extra) const {
+  return evidenceWith(extra, false);
+}
+
+Result<Evidence> CampaignRows::evidenceLeft(const Left& left) const {
+  const auto here = cameraWith(left.effects);
+  if (!here) return here.error();
+  std::vector<NoiselessCamera> cameras;
+  for (const FreeNumber& one : left.free) {
+    auto camera = cameraWith(moved(left.effects, one, one.step));
+    if (!camera) return camera.error();
+    cameras.push_back(*std::move(camera));
+  }
+  const bool on_light = actsOnLight(left.effects);
+  Evidence evidence;
+  const std::size_t own = left.with_numbers ? base_columns_ : kCommon;
+  for (const Group& group : groups_)
+    if (group.first < own) evidence.groups.push_back(group);
+  appendTerms(left.terms, own, evidence.groups);
+  const std::size_t first_free = evidence.columns();
+  for (std::size_t i = 0; i < left.free.size(); ++i) {
+    evidence.groups.push_back({.name = left.free[i].key,
+                               .kind = Kind::Declared,
+                               .first = first_free + i,
+                               .count = 1,
+                               .numbers = 1});
+  }
+  evidence.captures.resize(rows_.size());
+  sim::inParallel(static_cast<int>(rows_.size()), 1, [&](int first, int last) {
+    for (auto c = static_cast<std::size_t>(first); c < static_cast<std::size_t>(last); ++c) {
+      const Fixed& fixed = *rows_[c].fixed;
+      WhitenedCapture whitened{fixed.cells, first_free + left.free.size()};
+      const Reading reading = read(*here, c, on_light);
+      const Terms terms = termsOf(fixed, left.terms);
+      whitened.putResidual(fixed.cells, fixed.residual, fixed.varied, reading);
+      for (std::size_t k = 0; k < kChannels; ++k) {
+        if (whitened.columns[k].size() == 0) continue;
+        const auto in_base = static_cast<Eigen::Index>(own);
+        whitened.columns[k].leftCols(in_base) = rows_[c].base.columns[k].leftCols(in_base);
+        if (terms.columns[k].size() != 0)
+          whitened.columns[k].middleCols(in_base, terms.count) = terms.columns[k];
+      }
+      for (std::size_t i = 0; i < left.free.size(); ++i)
+        whitened.putChange(fixed.cells, first_free + i, reading, read(cameras[i], c, on_light));
+      evidence.captures[c] = whitened.evidence(fixed.name, fixed.block);
+    }
   });
   return evidence;
 }
@@ -120,12 +206,12 @@ std::vector<CovariateInfo> CampaignRows::covariates() const {
   constexpr std::size_t kQuantiles = 33, kMostLevels = 12;
   std::vector<CovariateInfo> all;
   if (rows_.empty()) return all;
-  for (std::size_t i = 0; i < rows_.front().covariates.names.size(); ++i) {
-    CovariateInfo info = describe(rows_.front().covariates.names[i]);
+  for (std::size_t i = 0; i < rows_.front().fixed->covariates.names.size(); ++i) {
+    CovariateInfo info = describe(rows_.front().fixed->covariates.names[i]);
     std::vector<double> values;
     std::set<double> levels;
     for (const CaptureRows& rows : rows_) {
-      const auto column = rows.covariates.values.col(static_cast<Eigen::Index>(i));
+      const auto column = rows.fixed->covariates.values.col(static_cast<Eigen::Index>(i));
       for (Eigen::Index k = 0; k < column.size(); ++k) {
         const auto value = static_cast<double>(column[k]);
         if (!std::isfinite(value)) continue;
@@ -143,5 +229,11 @@ std::vector<CovariateInfo> CampaignRows::covariates() const {
   }
   return all;
 }
+
+std::string CampaignRows::wordOfCarrier(const std::string& carrier) const {
+  return std::string{discover::wordOfCarrier(carrier)};
+}
+
+std::vector<TermGroup> CampaignRows::ownGroups() const { return carrierGroups(covariates()); }
 
 }  // namespace toftwin::discover

@@ -81,6 +81,17 @@ void WhitenedCapture::putResidual(const Cells& cells, const MeasuredCapture& cap
   }
 }
 
+void WhitenedCapture::putResidual(
+    const Cells& cells, const std::array<Eigen::VectorXf, kChannels>& residual_before,
+    const Reading& from, const Reading& to) {
+  residual[kRange] = residual_before[kRange] -
+                     cells.whitened(Channel::Range, difference(to.range_m, from.range_m));
+  if (cells.has(Channel::LogAmplitude))
+    residual[kLog] = residual_before[kLog] -
+                     cells.whitened(Channel::LogAmplitude,
+                                    difference(to.log_amplitude, from.log_amplitude));
+}
+
 CaptureEvidence WhitenedCapture::evidence(std::string name, std::string block) const {
   const auto count = columns[kRange].cols();
   CaptureEvidence all{.gram = Eigen::MatrixXd::Zero(count, count),

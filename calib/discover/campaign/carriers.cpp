@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/discover/campaign/carriers.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <complex>
+#include <functional>
+#include <limits>
+#include <numbers>
+
+#include <fmt/format.h>
+
+#include "calib/discover/campaign/smoothed.h"
+#include "calib/discover/candidates.h"
+
+namespace toftwin::discover {
+namespace {
+
+constexpr std::string_view kNeighbours = "neighbours", kCharge = "charge", kGain = "gain";
+/// Half widths of the squares; the last one is the whole image.
+constexpr std::array kReaches{1, 3, 7, 15, 31, 1'000'000};
+
+std::string neighbourName(int reach) {
+  return reach > 10'000 ? fmt::format("{}:everywhere", kNeighbours)
+                        : fmt::format("{}:{}px", kNeighbours, reach);
+}
+
+/// δz/z as a change of what is read.
+Reading changeBy(const Image<std::complex<float>>& share, double period_m) {
+  Reading change{Image<float>(share.width(), share.height()), {}};
+  change.log_amplitude = change.range_m;
+  const auto metres = static_cast<float>(period_m / (2.0 * std::numbers::pi));
+  for (std::size_t i = 0; i < share.size(); ++i) {
+    change.range_m[i] = -metres * share[i].imag();
+    change.log_amplitude[i] = share[i].real();
+  }
+  return change;
+}
+
+/// Light's phasor exp(−iφ) of what the pixels would read.
+Image<std::complex<float>> phasorOf(const Reading& reading, double period_m) {
+  constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+  Image<std::complex<float>> z(reading.range_m.width(), reading.range_m.height(), {kNaN, kNaN});
+  for (std::size_t i = 0; i < z.size(); ++i) {
+    const double phase = 2.0 * std::numbers::pi * static_cast<double>(reading.range_m[i]) / period_m;
+    const double size = std::exp(static_cast<double>(reading.log_amplitude[i]));
+    if (std::isfinite(phase) && std::isfinite(size))
+      z[i] = {static_cast<float>(size * std::cos(phase)), static_cast<float>(-size * std::sin(phase))};
+  }
+  return z;
+}
+
+Image<std::complex<float>> over(const Image<std::complex<float>>& z,
+                                const std::function<std::complex<float>(std::size_t)>& change) {
+  Image<std::complex<float>> share(z.width(), z.height());
+  for (std::size_t i = 0; i < z.size(); ++i) {
+    const std::complex<float> of = change(i) / z[i];
+    if (std::isfinite(of.real()) && std::isfinite(of.imag())) share[i] = of;
+  }
+  return share;
+}
+
+}  // namespace
+
+std::map<std::string, Reading> carriersOf(const sim::SensorModel& model, const Reading& declared,
+                                          double period_m) {
+  std::map<std::string, Reading> all;
+  const Image<std::complex<float>> z = phasorOf(declared, period_m);
+  Image<float> real(z.width(), z.height()), imaginary = real;
+  for (std::size_t i = 0; i < z.size(); ++i) real[i] = z[i].real(), imaginary[i] = z[i].imag();
+  for (const int reach : kReaches) {
+    const int most = std::max(z.width(), z.height());
+    const Image<float> re = smoothed(real, std::min(reach, most)),
+                       im = smoothed(imaginary, std::min(reach, most));
+    all.emplace(neighbourName(reach), changeBy(over(z,
+                                                    [&](std::size_t i) {
+                                                      return 0.01F * std::complex{re[i], im[i]};
+                                                    }),
+                                               period_m));
+  }
+  const double steps = std::max<double>(1.0, static_cast<double>(model.exposures({}).size()));
+  const auto electron = static_cast<float>(2.0 / steps);
+  all.emplace(fmt::format("{}:in_phase", kCharge),
+              changeBy(over(z, [&](std::size_t) { return std::complex{electron, 0.0F}; }), period_m));
+  all.emplace(fmt::format("{}:quadrature", kCharge),
+              changeBy(over(z, [&](std::size_t) { return std::complex{0.0F, electron}; }), period_m));
+  Reading& gain = all[std::string{kGain}];
+  gain.range_m = gain.log_amplitude = Image<float>(z.width(), z.height());
+  for (float& change : gain.log_amplitude.pixels()) change = 0.01F;
+  return all;
+}
+
+std::vector<TermGroup> carrierGroups(std::span<const CovariateInfo> covariates) {
+  std::vector<TermGroup> groups;
+  TermGroup light{"light from neighbours", Kind::Generic, {}, 0};
+  for (const int reach : kReaches) light.terms.push_back({{}, Stage::Light, neighbourName(reach)});
+  groups.push_back(std::move(light));
+  const auto add = [&](std::string name, const std::vector<Term>& factors) {
+    TermGroup charge{std::move(name), Kind::Generic, {}, 0};
+    for (const char* part : {"in_phase", "quadrature"}) {
+      for (Term term : factors) {
+        term.stage = Stage::Samples, term.carrier = fmt::format("{}:{}", kCharge, part);
+        charge.terms.push_back(std::move(term));
+      }
+    }
+    groups.push_back(std::move(charge));
+  };
+  add("a constant charge", {Term{}});
+  for (const CovariateInfo& covariate : covariates) {
+    if (covariate.word != "exposure" && covariate.word != "ambient" && covariate.word != "temperature")
+      continue;
+    std::vector<Term> factors{Term{}};
+    for (Term& term : smoothIn(covariate, 4).terms) factors.push_back(std::move(term));
+    add("a charge that goes with " + covariate.name, factors);
+  }
+  for (const CovariateInfo& covariate : covariates) {
+    TermGroup gain = smoothIn(covariate, kSmoothKnots);
+    gain.name = "a gain that is " + gain.name;
+    for (Term& term : gain.terms) term.stage = Stage::Light, term.carrier = kGain;
+    if (!gain.terms.empty()) groups.push_back(std::move(gain));
+  }
+  return groups;
+}
+
+std::string_view wordOfCarrier(std::string_view carrier) {
+  if (carrier == kNeighbours) return "neighbours";
+  return carrier == kCharge ? "amplitude" : "";
+}
+
+}  // namespace toftwin::discover

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: Apache-2.0
+// Whether an effect of the catalogue is to be named. One that merely goes with the right one fits worse than a
+// free curve, or leaves something that goes with its own covariates.
+#include <algorithm>
+#include <cmath>
+
+#include "calib/discover/shape_choice.h"
+
+namespace toftwin::discover {
+namespace {
+
+/// What no number of a fit accounts for: χ² of one number at two standard errors.
+constexpr double kSlack = 4.0;
+
+/// In-sample χ² of each catalogue group on top of what is known.
+std::vector<std::pair<double, std::string>> byStatistic(const Context& context) {
+  const Part part = prepare(context, {}, true);
+  std::vector<std::pair<double, std::string>> order;
+  for (const GroupScore& score : statistics(part.marginal, part.model)) {
+    const Group& group = part.marginal.groups[score.group];
+    if (group.kind == Kind::Catalogue) order.emplace_back(score.statistic, group.name);
+  }
+  std::ranges::sort(order, std::greater{});
+  return order;
+}
+
+double bestGeneric(const std::vector<Explanation>& all) {
+  double most = 0.0;
+  for (const std::size_t i : eligible(all))
+    if (!all[i].is_catalogue) most = std::max(most, all[i].gain.total);
+  return most;
+}
+
+/// Groups of functions of the covariates that the effect goes with.
+std::vector<TermGroup> ofItsCovariates(const Context& context, const Explanation& effect) {
+  std::vector<TermGroup> groups;
+  for (const TermGroup& group : context.generic) {
+    const auto names = covariatesOf(group);
+    const bool is_own = std::ranges::all_of(names, [&](const std::string& name) {
+      const CovariateInfo* info = infoOf(context, name);
+      const std::string word = info != nullptr ? info->word : context.source->wordOfCarrier(name);
+      return (info == nullptr && word.empty()) || std::ranges::count(effect.covariates, word) > 0;
+    });
+    if (is_own) groups.push_back(group);
+  }
+  return groups;
+}
+
+/// Whether something remains that goes with the effect's own covariates, once it is in the model.
+bool leavesSomething(const Context& context, const Explanation& effect) {
+  const std::vector<TermGroup> groups = ofItsCovariates(context, effect);
+  if (groups.empty()) return false;
+  Context with = context;
+  std::vector<const NamedFit*> fits;
+  for (const auto& fit : context.included) fits.push_back(fit.get());
+  fits.push_back(effect.named.get());
+  with.source = context.original->named()->including(fits);
+  constexpr std::size_t kAtOnce = 4;
+  Test test{context.test};
+  for (std::size_t begin = 0; begin < groups.size(); begin += kAtOnce) {
+    const Part part = prepare(
+        with, std::span{groups}.subspan(begin, std::min(kAtOnce, groups.size() - begin)), false);
+    test.add(part.marginal, part.model);
+  }
+  return test.result().p < context.alpha;
+}
+
+}  // namespace
+
+void fitCatalogue(const Context& context, std::vector<Explanation>& all) {
+  // Columns explain about as much as the effect does, and more where they are freer than it.
+  constexpr double kWorthIt = 0.7;
+  constexpr std::size_t kMost = 6;
+  const NamedEffects* named = context.source->named();
+  if (named == nullptr) return;
+  std::vector<std::string> names;
+  const double least = kWorthIt * bestGeneric(all);
+  for (const auto& [statistic, name] : byStatistic(context))
+    if (statistic >= least && names.size() < kMost) names.push_back(name);
+  std::vector<NamedFit> fits = named->fitNamed(names, context.known, context.scales);
+  std::erase_if(all, [&](const Explanation& one) {
+    return one.is_catalogue && std::ranges::find(fits, one.name, &NamedFit::name) == fits.end();
+  });
+  for (Explanation& one : all) {
+    if (!one.is_catalogue) continue;
+    NamedFit& fit = *std::ranges::find(fits, one.name, &NamedFit::name);
+    one.gain = fit.gain, one.numbers = static_cast<int>(fit.numbers.size());
+    one.named = std::make_shared<const NamedFit>(std::move(fit));
+  }
+}
+
+std::optional<std::size_t> chooseNamed(const Context& context, std::vector<Explanation>& all) {
+  std::optional<std::size_t> generic;
+  std::vector<std::size_t> named;
+  for (const std::size_t i : eligible(all)) {
+    if (all[i].is_catalogue)
+      named.push_back(i);
+    else if (!generic || all[i].gain.total > all[*generic].gain.total)
+      generic = i;
+  }
+  std::ranges::sort(named, std::greater{}, [&](std::size_t i) { return all[i].gain.total; });
+  std::optional<std::size_t> chosen;
+  for (const std::size_t i : named) {
+    Explanation& one = all[i];
+    const Difference gain = against0(one.gain);
+    const auto isWorseThan = [&](const Explanation& other) {
+      return other.gain.total - one.gain.total >
+             std::max(2.0 * difference(other.gain, one.gain).error, kSlack);
+    };
+    if (one.named->is_at_bound)
+      one.refused = "it would have to be stronger than it can be";
+    else if (gain.mean <= 2.0 * gain.error)
+      one.refused = "it does not predict other captures";
+    else if (generic && isWorseThan(all[*generic]))
+      one.refused = "a curve that goes with " + all[*generic].name + " explains more";
+    else if (chosen && isWorseThan(all[*chosen]))
+      one.refused = all[*chosen].name + " explains more";
+    else if (leavesSomething(context, one))
+      one.refused = "what it leaves still goes with its covariates";
+    if (!one.refused.empty()) continue;
+    const bool is_simpler =
+        chosen && one.numbers < all[*chosen].numbers &&
+        all[*chosen].gain.total - one.gain.total < difference(all[*chosen].gain, one.gain).error;
+    if (!chosen || is_simpler) chosen = i;
+  }
+  if (!chosen) return std::nullopt;
+  // An effect with many numbers, such as a table, can look like anything: a formula with fewer that is as
+  // good says what it is.
+  for (const std::size_t i : eligible(all)) {
+    const Explanation& one = all[i];
+    if (one.is_catalogue || one.numbers >= all[*chosen].numbers) continue;
+    const double by = all[*chosen].gain.total - one.gain.total;
+    if (by < difference(all[*chosen].gain, one.gain).error) return std::nullopt;
+  }
+  return chosen;
+}
+
+}  // namespace toftwin::discover
