@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::size_t kDiscoveryBytes = 0xF8, kMostBytesRead = 536, kMostRegisters = 135;
 constexpr std::chrono::seconds kRepeats{3};  ///< within which the same command again is the same command
-constexpr std::uint32_t kPendingBit = 0x4;
+constexpr std::uint32_t kPendingBit = 0x2;
 /// User's name, serial number, link speed, application's port and address, IEEE 1588, pending answers,
 /// resending, writing memory, several registers at once.
 constexpr std::uint32_t kControlCapability =

@@ -70,7 +70,7 @@ class Device {
   struct Identity {
     std::uint32_t address = 0, netmask = 0;
     std::array<std::uint8_t, 6> mac{};
-    std::string source, serial, user_name, version;
+    std::string source{}, serial{}, user_name{}, version{};
     std::uint16_t source_port = 0;
     std::uint32_t packet_size = 1500;
     std::uint32_t packet_delay_ns = 0;

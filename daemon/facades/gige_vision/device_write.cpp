@@ -10,7 +10,7 @@ namespace toftwin::daemon::gige_vision {
 namespace {
 
 constexpr std::size_t kMostRegisters = 67;
-constexpr std::uint32_t kMultipartBit = 0x40, kLongIdsBit = 0x4000'0000, kPendingBit = 0x4;
+constexpr std::uint32_t kMultipartBit = 0x40, kLongIdsBit = 0x4000'0000, kPendingBit = 0x2;
 constexpr std::uint32_t kTestPacketBit = 0x8000'0000, kWholeBit = 0x4000'0000, kLatchBit = 0x2;
 constexpr std::uint32_t kLeastPacket = 576, kMostPacket = 16'112;
 

@@ -84,8 +84,7 @@ void Block::appendLeader(Bytes& to) const {
 
 void Block::appendTrailer(Bytes& to) const {
   append(to, payloadType(), 4);
-  if (header_.is_multipart) return;
-  append(to, payload_.parts.front().height, 4);
+  if (!header_.is_multipart) append(to, payload_.parts.front().height, 4);
   if (!payload_.has_chunks) return;
   append(to, payload_.bytes.size(), 4);
   append(to, 0, 4);  // layout of the chunks

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// libFuzzer's entry for what facades read: cmake --preset fuzz, then fuzz_o3d303_facade or
-// fuzz_modbus_facade.
+// libFuzzer's entry for what facades read: cmake --preset fuzz, then fuzz_o3d303_facade,
+// fuzz_modbus_facade or fuzz_gige_vision_facade.
 #include <cstdint>
 #include <span>
 

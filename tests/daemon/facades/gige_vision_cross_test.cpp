@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+// One truth: the same frame, natively and through GigE Vision, read by our own driver of such cameras.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+
+#include "drivers/aravis/aravis.h"
+#include "drivers/compliance.h"
+#include "gige_vision_testing.h"
+
+namespace toftwin::daemon {
+namespace {
+
+using namespace test;
+using Policy = SubscribeOptions::Policy;
+
+class GigeVisionCross : public RunningGigeVision {
+ protected:
+  Result<std::unique_ptr<drivers::Source>> openDriver(const std::string& keys) {
+    auto table = settings::Table::parse(fmt::format("uri = 'aravis:{}'\n{}", address_, keys), "driver.toml");
+    EXPECT_TRUE(table.ok());
+    return drivers::aravis::row().open(*table);
+  }
+  /// Frames of the driver with the native ones of the same device time.
+  template <class Compare>
+  void compare(const std::string& keys, Compare compare_frames) {
+    auto native_client = client();
+    auto driver = openDriver(keys);
+    ASSERT_TRUE(driver.ok()) << driver.error().message;
+    auto native_stream = native_client.subscribe("cam", {.policy = Policy::Queue, .queue = 64});
+    ASSERT_TRUE(native_stream.ok()) << native_stream.error().message;
+    ASSERT_TRUE((*driver)->start().ok());
+    std::map<std::int64_t, Frame> natives;  // by device time
+    int compared = 0;
+    for (int i = 0; i < 60 && compared < 4; ++i) {
+      const auto through = nextFrame(**driver);
+      ASSERT_TRUE(through.ok()) << through.error().message;
+      const std::int64_t stamp = through->moment.exposures.at(0).start.ns;
+      while (natives.empty() || natives.rbegin()->first < stamp) {
+        auto native = native_stream->next(kSoon);
+        ASSERT_TRUE(native.ok()) << native.error().message;
+        const std::int64_t start = native->moment.exposures.at(0).start.ns;
+        natives.insert_or_assign(start, *std::move(native));
+      }
+      const auto same = natives.find(stamp);
+      if (same == natives.end()) continue;  // from before the native subscription
+      ASSERT_NO_FATAL_FAILURE(compare_frames(same->second, *through));
+      ++compared;
+    }
+    EXPECT_EQ(compared, 4);
+    (*driver)->stop();
+  }
+};
+
+/// What docs/facades/gige_vision.md says becomes of a range, and what the driver makes of that.
+float rangeThroughC16(float range_m) {
+  const double count = std::round(1000.0 * static_cast<double>(range_m) / 0.5);
+  return count >= 1.0 && count <= 65'535.0 ? static_cast<float>(0.5 * count * 1e-3) : std::nanf("");
+}
+float rangeThroughC32f(float range_m) {
+  return static_cast<float>(static_cast<double>(static_cast<float>(1000.0 * static_cast<double>(range_m))) *
+                            1e-3);
+}
+
+template <class Convert>
+void expectSame(const Frame& native, const Frame& through, Convert convert) {
+  const auto range_m = native.find(PlaneKind::Range)->as<float>();
+  const auto amplitude = native.find(PlaneKind::Amplitude)->as<float>();
+  const auto flags = native.find(PlaneKind::Flags)->as<std::uint8_t>();
+  const auto range_got = through.find(PlaneKind::Range)->as<float>();
+  const auto amplitude_got = through.find(PlaneKind::Amplitude)->as<float>();
+  const auto flags_got = through.find(PlaneKind::Flags)->as<std::uint8_t>();
+  ASSERT_EQ(range_got.size(), range_m.size());
+  std::size_t with_value = 0;
+  for (std::size_t i = 0; i < range_m.size(); ++i) {
+    const bool is_invalid = (flags[i] & 1U) != 0;
+    ASSERT_EQ((flags_got[i] & 1U) != 0, is_invalid) << i;
+    ASSERT_EQ(amplitude_got[i], std::fmin(65'535.0F, std::round(std::fmax(0.0F, amplitude[i])))) << i;
+    ASSERT_EQ(std::isnan(range_got[i]), is_invalid) << i;
+    if (is_invalid) continue;
+    ++with_value;
+    ASSERT_EQ(range_got[i], convert(range_m[i])) << i;
+  }
+  EXPECT_GT(with_value, range_m.size() / 2);
+}
+
+TEST_F(GigeVisionCross, FloatsAreTheNativeOnesBitForBitWithTheirTimeStamps) {
+  startGige(kSmallSim);
+  compare(
+      "components = ['Range', 'Intensity', 'Confidence']\npixel_format = 'Coord3D_C32f'\n"
+      "set = ['Scan3dCoordinateSystem = Spherical']",
+      [](const Frame& native, const Frame& through) { expectSame(native, through, rangeThroughC32f); });
+}
+
+TEST_F(GigeVisionCross, CountsAreTheNativeFloatsRoundedAsDocumented) {
+  startGige(kSmallSim);
+  compare(
+      "components = ['Range', 'Intensity', 'Confidence']\npixel_format = 'Coord3D_C16'\n"
+      "set = ['Scan3dCoordinateSystem = Spherical']",
+      [](const Frame& native, const Frame& through) { expectSame(native, through, rangeThroughC16); });
+}
+
+TEST_F(GigeVisionCross, PointsAreTheNativeRangesAlongTheirRays) {
+  startGige(kSmallSim);
+  compare("components = ['Range', 'Confidence']\npixel_format = 'Coord3D_ABC32f'", [](const Frame& native,
+                                                                                      const Frame& through) {
+    const auto range_m = native.find(PlaneKind::Range)->as<float>();
+    const auto range_got = through.find(PlaneKind::Range)->as<float>();
+    const auto depth_got = through.find(PlaneKind::Depth)->as<float>();
+    for (std::size_t i = 0; i < range_m.size(); ++i) {
+      ASSERT_EQ(std::isnan(range_got[i]), std::isnan(range_m[i])) << i;
+      if (std::isnan(range_m[i])) continue;
+      const auto u = static_cast<double>(i % 176), v = static_cast<double>(i / 176);
+      // Three floats of 6e-8 each in the ray, and three in the point.
+      const double z = rayThroughPixel(native.camera, u, v).v.z;
+      ASSERT_NEAR(range_got[i], range_m[i], 4e-7 * static_cast<double>(range_m[i])) << i;
+      ASSERT_NEAR(depth_got[i], static_cast<double>(range_m[i]) * z, 4e-7 * static_cast<double>(range_m[i]))
+          << i;
+    }
+  });
+}
+
+TEST_F(GigeVisionCross, IsCompliantThroughOurDriver) {
+  startGige(kSmallSim);
+  const drivers::Driver driver = drivers::aravis::row();
+  const drivers::Candidate candidate{.driver = &driver,
+                                     .keys = fmt::format("uri = 'aravis:{}'", address_),
+                                     .absent_keys = "uri = 'aravis:127.0.0.78'",
+                                     .absent_name = "aravis:127.0.0.78"};
+  for (const drivers::Finding& finding : drivers::checkCompliance(candidate)) {
+    EXPECT_NE(finding.outcome, drivers::Finding::Outcome::Failed)
+        << finding.check << ", because " << finding.because << "\n  " << finding.detail;
+  }
+}
+
+TEST_F(GigeVisionCross, SaysThatTheSourceLostFrames) {
+  startGige(kSmallSim + "[[source.fault]]\nkind = 'loss'\nfirst = 4\nframes = 2\nevery = 8\n");
+  auto driver = openDriver("");
+  ASSERT_TRUE(driver.ok()) << driver.error().message;
+  ASSERT_TRUE((*driver)->start().ok());
+  std::uint64_t lost = 0;
+  for (int i = 0; i < 12; ++i) {
+    const auto frame = nextFrame(**driver);
+    ASSERT_TRUE(frame.ok()) << frame.error().message;
+    lost += frame->dropped_by_device;
+  }
+  // Twelve frames are at least one and at most three gaps of two; a busy computer may lose some more.
+  EXPECT_GE(lost, 2U);
+  (*driver)->stop();
+}
+
+TEST_F(GigeVisionCross, LosesNoFrameOnALineThatLosesTwoPercent) {
+  startGige(kSmallSim, "[facade.line]\nloss = 0.02\nseed = 11");
+  auto driver = openDriver("frame_retention_ms = 2000");
+  ASSERT_TRUE(driver.ok()) << driver.error().message;
+  ASSERT_TRUE((*driver)->start().ok());
+  std::uint64_t lost = 0;
+  for (int i = 0; i < 20; ++i) {
+    const auto frame = nextFrame(**driver);
+    ASSERT_TRUE(frame.ok()) << frame.error().message;
+    lost += frame->dropped_by_device;
+  }
+  EXPECT_EQ(lost, 0U);  // of 2,000 packets about 40 were lost, and came when they were asked for
+  (*driver)->stop();
+}
+
+}  // namespace
+}  // namespace toftwin::daemon

@@ -1,0 +1,221 @@
+// SPDX-License-Identifier: Apache-2.0
+// What GigE Vision's commands do, without sockets and sources.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <regex>
+#include <set>
+
+#include "gige_vision_commands.h"
+
+namespace toftwin::daemon::gige_vision {
+namespace {
+
+using namespace test;
+using std::chrono::milliseconds;
+
+constexpr std::uint32_t kControl = 2, kExclusive = 1;
+
+TEST(GigeVisionDevice, DoesNotAnswerWhatIsNoCommand) {
+  Camera camera;
+  Bytes good = commandOf(Command::kDiscovery, 1, {});
+  EXPECT_EQ(camera.take(kOwner, good).answer.size(), 8U + 0xF8U);
+  for (std::size_t size = 0; size < good.size(); ++size)
+    EXPECT_TRUE(camera.take(kOwner, Bytes(good.begin(), good.begin() + static_cast<std::ptrdiff_t>(size)))
+                    .answer.empty());
+  good[0] = std::byte{0x43};
+  EXPECT_TRUE(camera.take(kOwner, good).answer.empty());
+  EXPECT_TRUE(camera.take(kOwner, commandOf(Command::kDiscovery, 0, {})).answer.empty());
+  Bytes longer = commandOf(Command::kDiscovery, 1, {});
+  longer[5] = std::byte{1};  // it says that one byte follows
+  EXPECT_EQ(Camera::statusOf(camera.take(kOwner, longer).answer), Status::kInvalidHeader);
+  EXPECT_EQ(Camera::statusOf(camera.take(kOwner, commandOf(0x1234, 1, {})).answer), Status::kNotImplemented);
+}
+
+TEST(GigeVisionDevice, IsSetByItsControllerAlone) {
+  Camera camera;
+  EXPECT_EQ(camera.write(Item::PacketDelay, 5), Status::kAccessDenied);  // nobody controls it
+  EXPECT_EQ(camera.write(Item::ControlPrivilege, kControl), Status::kSuccess);
+  EXPECT_EQ(camera.write(Item::PacketDelay, 5), Status::kSuccess);
+  for (const Peer& other : {kOther, kFar}) {
+    EXPECT_EQ(camera.write(Item::PacketDelay, 6, other), Status::kAccessDenied);
+    EXPECT_EQ(camera.write(Item::ControlPrivilege, kControl, other), Status::kAccessDenied);
+    EXPECT_EQ(camera.write(Item::ControlPrivilege, 0, other), Status::kAccessDenied);
+    EXPECT_EQ(camera.read(rowOf(Item::PacketDelay).address, other), Status::kSuccess);
+  }
+  EXPECT_EQ(camera.value(Item::PacketDelay), 5U);
+  EXPECT_EQ(camera.write(Item::ControlPrivilege, kExclusive), Status::kSuccess);
+  EXPECT_EQ(camera.read(rowOf(Item::PacketDelay).address, kOther), Status::kAccessDenied);
+  EXPECT_EQ(camera.read(rowOf(Item::ControlPrivilege).address, kOther), Status::kSuccess);
+  EXPECT_EQ(camera.write(Item::ControlPrivilege, 0), Status::kSuccess);
+  EXPECT_EQ(camera.write(Item::ControlPrivilege, kControl, kFar), Status::kSuccess);
+}
+
+TEST(GigeVisionDevice, SendsToItsControllersAddressAlone) {
+  Camera camera;
+  camera.write(Item::ControlPrivilege, kControl);
+  EXPECT_EQ(camera.write(Item::Destination, kFar.address), Status::kAccessDenied);
+  EXPECT_EQ(camera.write(Item::Destination, 0xE0000001), Status::kAccessDenied);  // multicast
+  EXPECT_EQ(camera.device.stream().to.address, 0U);
+  EXPECT_EQ(camera.write(Item::Destination, kOwner.address), Status::kSuccess);
+  EXPECT_EQ(camera.write(Item::HostPort, 7000), Status::kSuccess);
+  EXPECT_EQ(camera.device.stream().to, (Peer{kOwner.address, 7000}));
+  camera.write(Item::ControlPrivilege, 0);
+  EXPECT_EQ(camera.device.stream().to, Peer{});  // the next controller may have another address
+}
+
+TEST(GigeVisionDevice, IsFreeWhenItsControllerIsSilent) {
+  Camera camera;
+  camera.write(Item::ControlPrivilege, kControl);
+  EXPECT_EQ(camera.write(Item::HeartbeatTimeout, 499), Status::kInvalidParameter);
+  EXPECT_EQ(camera.write(Item::HeartbeatTimeout, 500), Status::kSuccess);
+  EXPECT_EQ(camera.write(Item::AcquisitionStart, 1), Status::kSuccess);
+  camera.now += milliseconds{499};
+  EXPECT_FALSE(camera.device.expire(camera.now));
+  camera.value(Item::ControlPrivilege);  // any command will do
+  camera.now += milliseconds{499};
+  camera.read(0, kOther);  // but another's does not
+  EXPECT_FALSE(camera.device.expire(camera.now));
+  EXPECT_TRUE(camera.device.isStreaming());
+  camera.now += milliseconds{1};
+  EXPECT_TRUE(camera.device.expire(camera.now));
+  EXPECT_FALSE(camera.device.isStreaming());
+  EXPECT_FALSE(camera.device.expire(camera.now));
+  EXPECT_EQ(camera.write(Item::ControlPrivilege, kControl, kOther), Status::kSuccess);
+}
+
+TEST(GigeVisionDevice, RefusesAddressesThatAreNotThereUpToTheLast) {
+  Camera camera;
+  camera.write(Item::ControlPrivilege, kControl);
+  for (const std::uint32_t address : {kBootstrapEnd, 0x8000U, 0xFFFF'FFFCU, 0xFFFF'FF00U, 0x00F0'0000U}) {
+    EXPECT_EQ(camera.read(address), Status::kInvalidAddress) << address;
+    EXPECT_EQ(camera.write(address, 1), Status::kInvalidAddress) << address;
+    Bytes many = words({address});
+    append(many, 536, 4);
+    EXPECT_EQ(Camera::statusOf(camera.take(kOwner, commandOf(Command::kReadMemory, 9, many)).answer),
+              Status::kInvalidAddress);
+    Bytes much = words({address});
+    much.resize(4 + 536);
+    EXPECT_EQ(Camera::statusOf(camera.take(kOwner, commandOf(Command::kWriteMemory, 9, much)).answer),
+              Status::kInvalidAddress);
+  }
+  EXPECT_EQ(camera.read(2), Status::kBadAlignment);
+  EXPECT_EQ(camera.write(rowOf(Item::SensorWidth).address, 1), Status::kWriteProtect);
+  EXPECT_EQ(camera.write(rowOf(Item::Version).address, 1), Status::kWriteProtect);
+}
+
+TEST(GigeVisionDevice, DoesWhatIsRepeatedForWantOfAnAnswerOnce) {
+  Camera camera;
+  SourceFacts facts = smallCamera();
+  facts.is_triggered = true;
+  camera.device.update(facts);
+  camera.write(Item::ControlPrivilege, kControl);
+  const Bytes trigger =
+      commandOf(Command::kWriteRegister, 77, words({rowOf(Item::TriggerSoftware).address, 1}));
+  const auto first = camera.take(kOwner, trigger);
+  EXPECT_TRUE(first.is_trigger);
+  EXPECT_EQ(Camera::statusOf(first.answer), Status::kSuccess);
+  const auto early = camera.take(kOwner, trigger);  // the answer still waits
+  EXPECT_FALSE(early.is_trigger);
+  EXPECT_TRUE(early.answer.empty());
+  camera.device.noteAnswer(trigger, first.answer);
+  EXPECT_EQ(camera.take(kOwner, trigger).answer, first.answer);
+  const auto next = camera.take(
+      kOwner, commandOf(Command::kWriteRegister, 78, words({rowOf(Item::TriggerSoftware).address, 1})));
+  EXPECT_TRUE(next.is_trigger);
+}
+
+TEST(GigeVisionDevice, TurnsNumbersIntoChangesOfTheSourceWithinItsBounds) {
+  Camera camera;
+  camera.write(Item::ControlPrivilege, kControl);
+  EXPECT_EQ(camera.writeFloat(Item::ExposureTime, 700.0), Status::kSuccess);
+  EXPECT_EQ(camera.last.changes, (SourceChanges{{"exposure_us", 700.0}}));
+  for (const double wrong : {9.0, 5001.0, std::nan(""), HUGE_VAL}) {
+    EXPECT_EQ(camera.writeFloat(Item::ExposureTime, wrong), Status::kInvalidParameter) << wrong;
+    EXPECT_TRUE(camera.last.changes.empty());
+  }
+  // In two halves: the second makes it whole.
+  const auto bits = std::bit_cast<std::uint64_t>(800.0);
+  EXPECT_EQ(camera.write(rowOf(Item::ExposureTime).address, static_cast<std::uint32_t>(bits >> 32U)),
+            Status::kSuccess);
+  EXPECT_TRUE(camera.last.changes.empty());
+  EXPECT_EQ(camera.write(rowOf(Item::ExposureTime).address + 4, static_cast<std::uint32_t>(bits)),
+            Status::kSuccess);
+  EXPECT_EQ(camera.last.changes, (SourceChanges{{"exposure_us", 800.0}}));
+  EXPECT_EQ(camera.write(Item::TriggerMode, 1), Status::kSuccess);
+  EXPECT_EQ(camera.last.changes, (SourceChanges{{"triggered", 1.0}}));
+  SourceFacts fixed = smallCamera();
+  fixed.exposure_us->parameter.clear();
+  fixed.can_choose_trigger = false;
+  camera.device.update(fixed);
+  EXPECT_EQ(camera.writeFloat(Item::ExposureTime, 700.0), Status::kWriteProtect);
+  EXPECT_EQ(camera.write(Item::TriggerMode, 1), Status::kWriteProtect);
+}
+
+TEST(GigeVisionDevice, KeepsRegionsInsideTheImageAndThePayloadsSizeTrue) {
+  Camera camera;
+  camera.write(Item::ControlPrivilege, kControl);
+  EXPECT_EQ(camera.value(Item::PayloadSize), 16U * 12U * 2U);  // the first component alone
+  EXPECT_EQ(camera.write(Item::ChannelConfiguration, 0x40), Status::kSuccess);
+  EXPECT_EQ(camera.value(Item::PayloadSize), 16U * 12U * 6U);
+  EXPECT_EQ(camera.write(Item::OffsetX, 1), Status::kInvalidParameter);
+  EXPECT_EQ(camera.write(Item::Width, 10), Status::kSuccess);
+  EXPECT_EQ(camera.write(Item::OffsetX, 6), Status::kSuccess);
+  EXPECT_EQ(camera.write(Item::OffsetX, 7), Status::kInvalidParameter);
+  EXPECT_EQ(camera.write(Item::Width, 11), Status::kInvalidParameter);
+  EXPECT_EQ(camera.write(Item::Width, 0), Status::kInvalidParameter);
+  EXPECT_EQ(camera.write(rowOf(Item::PixelFormat).address, Pixel::kAbc32f), Status::kSuccess);
+  EXPECT_EQ(camera.value(Item::PayloadSize), 10U * 12U * (12U + 2U + 2U));
+  EXPECT_EQ(camera.write(rowOf(Item::PixelFormat).address, Pixel::kMono16), Status::kInvalidParameter);
+  EXPECT_EQ(camera.write(Item::AcquisitionStart, 1), Status::kSuccess);
+  EXPECT_EQ(camera.write(Item::Width, 8), Status::kBusy);
+  EXPECT_EQ(camera.write(Item::AcquisitionStop, 1), Status::kSuccess);
+  EXPECT_EQ(camera.write(Item::Width, 8), Status::kSuccess);
+  SourceFacts larger = smallCamera();
+  larger.camera.width = 32;
+  camera.device.update(larger);
+  EXPECT_EQ(camera.value(Item::Width), 32U);
+}
+
+TEST(GigeVisionDevice, DescribesEveryRegisterThatItHasAndHasEveryOneThatItDescribes) {
+  const std::string& xml = genicamXml();
+  Camera camera;
+  std::map<std::string, int> nodes;
+  const std::regex node{R"re(<(\w+) Name="([\w]+)")re"};
+  for (std::sregex_iterator it{xml.begin(), xml.end(), node}, end; it != end; ++it) {
+    if ((*it)[1] != "EnumEntry" && (*it)[1] != "pVariable") ++nodes[(*it)[2]];
+  }
+  for (const auto& [name, count] : nodes) EXPECT_EQ(count, 1) << name;
+  const std::regex reference{R"re(<p(?!Port|Variable)(\w+)(?: \w+="\w+")?>(\w+)</p)re"};
+  int references = 0;
+  for (std::sregex_iterator it{xml.begin(), xml.end(), reference}, end; it != end; ++it, ++references)
+    EXPECT_EQ(nodes.count((*it)[2]), 1U) << (*it)[0];
+  EXPECT_GT(references, 150);
+  const std::regex address{
+      R"re(<Address>0x(\w+)</Address>(?:<pIndex[^/]*</pIndex>)?<Length>(\d+)</Length>)re"};
+  int registers = 0;
+  for (std::sregex_iterator it{xml.begin(), xml.end(), address}, end; it != end; ++it, ++registers) {
+    Bytes ignored;
+    EXPECT_TRUE(Memory{}.read(std::stoul((*it)[1], nullptr, 16), std::stoul((*it)[2]), ignored)) << (*it)[0];
+  }
+  EXPECT_GT(registers, 90);
+  // No two registers share a byte.
+  std::uint64_t free = 0;
+  std::map<std::uint32_t, const Row*> by_address;
+  for (const Row& row : allRows()) by_address[row.address] = &row;
+  EXPECT_EQ(by_address.size(), allRows().size());
+  for (const auto& [at, row] : by_address) {
+    EXPECT_GE(at, free) << row->name;
+    free = at + row->bytes();
+  }
+}
+
+TEST(GigeVisionDevice, HasItsRowsInTheOrderOfItsItems) {
+  for (std::size_t i = 0; i < allRows().size(); ++i)
+    EXPECT_EQ(static_cast<std::size_t>(allRows()[i].item), i) << allRows()[i].name;
+  EXPECT_EQ(allRows().size(), static_cast<std::size_t>(Item::kCount));
+}
+
+}  // namespace
+}  // namespace toftwin::daemon::gige_vision

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+// Packets of frames, and what goes wrong with packets on purpose.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <random>
+
+#include "daemon/facades/gige_vision/gvsp.h"
+#include "daemon/facades/line_faults.h"
+
+namespace toftwin::daemon::gige_vision {
+namespace {
+
+Payload payloadOfSizes(const std::vector<std::size_t>& sizes, std::mt19937& random) {
+  Payload payload;
+  for (const std::size_t size : sizes) {
+    payload.parts.push_back({.component = 4,
+                             .data_type = 5,
+                             .format = Pixel::kC16,
+                             .width = 7,
+                             .height = 9,
+                             .x = 0,
+                             .y = 0,
+                             .offset = payload.bytes.size(),
+                             .size = size});
+    for (std::size_t i = 0; i < size; ++i) payload.bytes.push_back(static_cast<std::byte>(random() & 0xFFU));
+  }
+  return payload;
+}
+
+TEST(GigeVisionStream, PacketsHoldThePayloadWholeAndOnce) {
+  constexpr unsigned kSeed = 71;
+  std::mt19937 random{kSeed};
+  for (const bool is_multipart : {false, true}) {
+    for (const std::uint32_t packet_size : {576U, 1500U, 9000U}) {
+      for (const std::size_t size :
+           {std::size_t{1}, std::size_t{1463}, std::size_t{1464}, std::size_t{1465}, std::size_t{30'000}}) {
+        const bool has_long_ids = is_multipart || size % 2 == 0;
+        const Payload payload = payloadOfSizes(
+            is_multipart ? std::vector{size, std::size_t{10}, size} : std::vector{size}, random);
+        const Block block{
+            {.id = 5, .packet_size = packet_size, .is_multipart = is_multipart, .has_long_ids = has_long_ids},
+            payload};
+        const std::size_t header = has_long_ids ? 20 : 8;
+        Bytes got(payload.bytes.size());
+        std::size_t filled = 0, next = 0;
+        for (std::uint32_t i = 0; i < block.packets(); ++i) {
+          const Bytes packet = block.packet(i);
+          ASSERT_LE(packet.size() + 28, packet_size);
+          const auto kind = numberAt(packet, 4, 1);
+          EXPECT_EQ((kind & 0x80) != 0, has_long_ids);
+          EXPECT_EQ(has_long_ids ? numberAt(packet, 16, 4) : numberAt(packet, 5, 3), i);
+          EXPECT_EQ(has_long_ids ? numberAt(packet, 8, 8) : numberAt(packet, 2, 2), 5U);
+          if (i == 0 || i + 1 == block.packets()) {
+            EXPECT_EQ(kind & 0x7F, i == 0 ? 1U : 2U);
+            continue;
+          }
+          EXPECT_EQ(kind & 0x7F, is_multipart ? 7U : 3U);
+          const std::size_t begin = header + (is_multipart ? 8 : 0);
+          const std::size_t at = is_multipart ? numberAt(packet, header + 2, 6) : next;
+          ASSERT_LE(at + packet.size() - begin, got.size());
+          std::copy(packet.begin() + static_cast<std::ptrdiff_t>(begin), packet.end(),
+                    got.begin() + static_cast<std::ptrdiff_t>(at));
+          filled += packet.size() - begin;
+          next = at + packet.size() - begin;
+        }
+        EXPECT_EQ(filled, payload.bytes.size());
+        EXPECT_EQ(got, payload.bytes) << "seed " << kSeed;
+      }
+    }
+  }
+}
+
+TEST(GigeVisionStream, IdsOfSixteenBitsLeaveOutZero) {
+  EXPECT_EQ(idAfter(65'534, 1, false), 65'535U);
+  EXPECT_EQ(idAfter(65'535, 1, false), 1U);
+  EXPECT_EQ(idAfter(65'535, 3, false), 3U);
+  EXPECT_EQ(idAfter(65'535, 1, true), 65'536U);
+}
+
+TEST(LineFaults, StrikeAsManyAsWasSaidAndTheSameOnesForTheSameSeed) {
+  LineFaultKeys keys{.loss = 0.02, .duplicate = 0.1, .reorder = 0.5, .seed = 3, .log = {}};
+  constexpr int kPackets = 100'000;
+  std::array<double, 3> struck{};
+  for (std::uint64_t i = 0; i < kPackets; ++i) {
+    const auto fate = LineFaults::fateOf(keys, i);
+    EXPECT_EQ(fate, LineFaults::fateOf(keys, i));
+    struck[0] += fate.is_lost ? 1 : 0;
+    struck[1] += fate.is_doubled ? 1 : 0;
+    struck[2] += fate.is_late ? 1 : 0;
+  }
+  const std::array share{keys.loss, keys.duplicate, keys.reorder};
+  for (std::size_t i = 0; i < share.size(); ++i) {
+    // Six standard deviations of a binomial: one false alarm in 10^9, and the seed is fixed.
+    const double sd = std::sqrt(kPackets * share[i] * (1.0 - share[i]));
+    EXPECT_NEAR(struck[i], kPackets * share[i], 6.0 * sd) << i;
+  }
+  LineFaultKeys other = keys;
+  other.seed = 4;
+  int different = 0;
+  for (std::uint64_t i = 0; i < 1000; ++i)
+    different += LineFaults::fateOf(keys, i) == LineFaults::fateOf(other, i) ? 0 : 1;
+  EXPECT_GT(different, 400);  // half of them, by reorder alone
+}
+
+}  // namespace
+}  // namespace toftwin::daemon::gige_vision
