@@ -18,6 +18,7 @@ namespace {
 using namespace drivers::kinect2;
 
 constexpr std::size_t kRowBytes = kWidth * 11 / 8;
+constexpr std::size_t kMostSeen = 1000;
 
 void put32(Bytes& bytes, std::uint32_t word) {
   for (unsigned shift = 0; shift < 32; shift += 8) bytes.push_back(static_cast<std::byte>(word >> shift));
@@ -173,7 +174,7 @@ void EmulatedKinect2::command(std::span<const std::byte> bytes) {
   const Code code{u32At(bytes, 12)};
   std::vector<std::uint32_t> parameters;
   for (std::size_t at = 20; at + 4 <= bytes.size(); at += 4) parameters.push_back(u32At(bytes, at));
-  seen_.push_back(code);
+  if (seen_.size() < kMostSeen) seen_.push_back(code);
   if (code == Code::InitStreams) is_initialised_ = true;
   if (code == Code::SetStreaming)
     is_streaming_ = is_initialised_ && !parameters.empty() && parameters[0] == 1;

@@ -72,7 +72,7 @@ class EmulatedKinect2 {
   void hang(bool hangs);  ///< it takes commands and answers none, and streams nothing
   [[nodiscard]] bool hangs() const;
   void notReadyFor(int questions) { set(not_ready_, questions); }
-  [[nodiscard]] std::vector<drivers::kinect2::Code> seen() const;  ///< the commands so far
+  [[nodiscard]] std::vector<drivers::kinect2::Code> seen() const;  ///< the first thousand commands
   [[nodiscard]] const Options& options() const { return options_; }
 
  private:

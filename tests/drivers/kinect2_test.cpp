@@ -17,6 +17,7 @@
 #include "drivers/compliance.h"
 #include "drivers/kinect2/samples.h"
 #include "emulated_kinect2_bus.h"
+#include "start_stop.h"
 
 namespace toftwin::test {
 namespace {
@@ -315,6 +316,14 @@ TEST(Kinect2, OpensAndClosesAHundredTimesAndKeepsNothing) {
     ASSERT_NE(source, nullptr) << i;
   }
   EXPECT_FALSE(bus.isOpen());
+}
+
+TEST(Kinect2, StartsAndStopsKeepNothing) {
+  EmulatedKinect2Bus bus;
+  bus.interval_us() = 1000;
+  const auto source = openWith(bus);
+  ASSERT_TRUE(source.ok()) << source.error().message;
+  expectNothingKept("kinect2", **source, 100, 600);
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 #include "drivers/compliance.h"
 #include "drivers/o3d303/wire/confidence.h"
 #include "emulated_o3d303.h"
+#include "start_stop.h"
 
 namespace toftwin::drivers::o3d303 {
 namespace {
@@ -299,10 +300,6 @@ TEST(O3d303, ItsClocksOffsetIsFoundAndASetClockDoesNotShow) {
 
 // ---- leaks -------------------------------------------------------------------------------------
 
-std::ptrdiff_t entriesOf(const char* folder) {
-  return std::distance(std::filesystem::directory_iterator{folder}, {});
-}
-
 /// The emulator closes its ends when it gets to it.
 void waitForConnections(EmulatedO3d303& camera, int wanted) {
   for (int i = 0; i < 10'000 && camera.connections() > wanted; ++i) std::this_thread::yield();
@@ -315,7 +312,7 @@ TEST(O3d303, TenThousandStartsAndStopsLeakNeitherFilesNorThreads) {
   Source& source = **opened;
   ASSERT_TRUE(source.start().ok());
   waitForConnections(camera, 1);
-  const auto files = entriesOf("/proc/self/fd"), threads = entriesOf("/proc/self/task");
+  const auto files = test::entriesOf("/proc/self/fd"), threads = test::entriesOf("/proc/self/task");
   for (int i = 0; i < 10'000; ++i) {
     source.stop();
     const auto begun = source.start();
@@ -323,17 +320,17 @@ TEST(O3d303, TenThousandStartsAndStopsLeakNeitherFilesNorThreads) {
   }
   EXPECT_TRUE(nextFrame(source).ok());
   waitForConnections(camera, 1);
-  EXPECT_EQ(entriesOf("/proc/self/fd"), files);
-  EXPECT_EQ(entriesOf("/proc/self/task"), threads);
+  EXPECT_EQ(test::entriesOf("/proc/self/fd"), files);
+  EXPECT_EQ(test::entriesOf("/proc/self/task"), threads);
 }
 
 TEST(O3d303, OpeningAndClosingLeaksNeitherFilesNorThreads) {
   EmulatedO3d303 camera{fast()};
-  const auto files = entriesOf("/proc/self/fd"), threads = entriesOf("/proc/self/task");
+  const auto files = test::entriesOf("/proc/self/fd"), threads = test::entriesOf("/proc/self/task");
   for (int i = 0; i < 50; ++i) ASSERT_NE(started(camera), nullptr);
   waitForConnections(camera, 0);
-  EXPECT_EQ(entriesOf("/proc/self/fd"), files);
-  EXPECT_EQ(entriesOf("/proc/self/task"), threads);
+  EXPECT_EQ(test::entriesOf("/proc/self/fd"), files);
+  EXPECT_EQ(test::entriesOf("/proc/self/task"), threads);
 }
 
 // ---- the emulator ------------------------------------------------------------------------------

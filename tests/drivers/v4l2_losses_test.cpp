@@ -15,6 +15,7 @@
 #include "drivers/pace.h"
 #include "drivers/v4l2/pairing.h"
 #include "v4l2_testing.h"
+#include "start_stop.h"
 
 namespace toftwin::drivers::v4l2 {
 namespace {
@@ -337,13 +338,9 @@ TEST(V4l2, AStopEndsTheWaitAndLosesNoFrame) {
   EXPECT_EQ(lostIn(*source, 2), 0u);
 }
 
-std::ptrdiff_t entriesOf(const char* folder) {
-  return std::distance(std::filesystem::directory_iterator{folder}, {});
-}
-
 TEST(V4l2, TenThousandStartsAndStopsLeakNothing) {
   EmulatedV4l2 system{{{}}};
-  const auto files = entriesOf("/proc/self/fd");
+  const auto files = toftwin::test::entriesOf("/proc/self/fd");
   {
     const auto opened = openWith(system, "memory = 'dmabuf'");
     ASSERT_TRUE(opened.ok());
@@ -357,7 +354,7 @@ TEST(V4l2, TenThousandStartsAndStopsLeakNothing) {
     EXPECT_TRUE((*opened)->next({}, false).ok());
   }
   EXPECT_EQ(system.heldByUser(), 0u);
-  EXPECT_EQ(entriesOf("/proc/self/fd"), files);
+  EXPECT_EQ(toftwin::test::entriesOf("/proc/self/fd"), files);
 }
 
 }  // namespace

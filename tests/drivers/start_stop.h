@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <fmt/format.h>
+#include <malloc.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <filesystem>
+#include <iterator>
+#include <string_view>
+
+#include "drivers/source.h"
+
+namespace toftwin::test {
+
+inline std::ptrdiff_t entriesOf(const char* folder) {
+  return std::distance(std::filesystem::directory_iterator{folder}, {});
+}
+
+/// What this process holds.
+struct Held {
+  std::ptrdiff_t files = entriesOf("/proc/self/fd"), threads = entriesOf("/proc/self/task");
+  std::int64_t heap_bytes = static_cast<std::int64_t>(::mallinfo2().uordblks);  // 0 under ASan
+};
+
+/// What is held at the end; of memory the least after any of the last fifty stops, for an emulator may keep a frame
+/// or not.
+inline void startAndStop(drivers::Source& source, int cycles, int frame_every, Held& held) {
+  for (int i = 0; i < cycles; ++i) {
+    const auto begun = source.start();
+    ASSERT_TRUE(begun.ok()) << "start " << i << ": " << begun.error().message;
+    if (i % frame_every == 0) {
+      auto frame = source.next({}, true);
+      for (int n = 0; n < 20 && !frame; ++n) frame = source.next({}, true);
+      ASSERT_TRUE(frame.ok()) << frame.error().message;
+    }
+    source.stop();
+    if (i < cycles - 50) continue;
+    const auto least = i > cycles - 50 ? held.heap_bytes : Held{}.heap_bytes;
+    held = {};
+    held.heap_bytes = std::min(held.heap_bytes, least);
+  }
+}
+
+/// Ten thousand starts and stops of an opened source, with a frame of each `frame_every`th, keep no file, no thread
+/// and no memory. Fewer where a camera takes its time, a hundredth of a second or more, to start.
+inline void expectNothingKept(std::string_view name, drivers::Source& source, int frame_every, int cycles = 10'000) {
+  constexpr int kWarmUp = 100;
+  // Allocators and libraries fill caches of their own; a leak is at least one block of 16 bytes per cycle, which is
+  // more than this from 500 cycles on.
+  constexpr std::int64_t kMostKept_bytes = 8'000;
+  Held before, after;
+  startAndStop(source, kWarmUp, frame_every, before);
+  startAndStop(source, cycles, frame_every, after);
+  fmt::print("{}: {} bytes more on the heap after {} starts and stops\n", name, after.heap_bytes - before.heap_bytes,
+             cycles);
+  EXPECT_EQ(after.files, before.files);
+  EXPECT_EQ(after.threads, before.threads);
+  EXPECT_LT(after.heap_bytes - before.heap_bytes, kMostKept_bytes);
+}
+
+}  // namespace toftwin::test
