@@ -89,7 +89,10 @@ class GigeVisionFacade final : public Facade {
   // ---- control -----------------------------------------------------------------------------------
 
   void take(const Peer& from, std::span<const std::byte> datagram) {
-    refresh();
+    const auto request = readRequest(datagram);
+    if (!request) return;
+    // A client may ask for packets thousands of times a second; that changes nothing.
+    if (request->command != Command::kPacketResend) refresh();
     Device::Outcome outcome = device_->take(from, datagram, steady_clock::now());
     if (outcome.mustWait()) {
       answerLater(from, datagram, std::move(outcome));
@@ -136,7 +139,12 @@ class GigeVisionFacade final : public Facade {
       last_.reset();
       sent_ = lost_ = 0;
     }
-    if (!is_streaming) sender_->clear();
+    if (!device_->controller()) {
+      sender_->clear();
+    } else if (!is_streaming && was_streaming_) {
+      sender_->finish();
+    }
+    was_streaming_ = is_streaming;
     link_.want(is_streaming);
   }
 
@@ -179,7 +187,8 @@ class GigeVisionFacade final : public Facade {
     if (!sender_->send(std::move(block))) noteLost();
     if (setup.frames > 0 && ++sent_ >= setup.frames) {
       device_->stopStreaming();
-      link_.want(false);  // what waits is still sent
+      was_streaming_ = false;  // what waits is still sent
+      link_.want(false);
     }
   }
 
@@ -224,6 +233,7 @@ class GigeVisionFacade final : public Facade {
   std::optional<Rays> rays_;
   std::optional<Last> last_;  ///< frame that was sent since the stream was started
   std::uint64_t starts_ = 0, sent_ = 0, lost_ = 0;
+  bool was_streaming_ = false;
 };
 
 void checkText(settings::Table& table, const char* key, const std::string& text) {

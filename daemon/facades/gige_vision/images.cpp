@@ -21,11 +21,14 @@ bool hasPoints(std::uint32_t format) { return format == Pixel::kAbc16 || format 
 /// PFNC: bits 16 to 23 of a format are the bits of a pixel.
 std::uint32_t bytesPerPixel(std::uint32_t format) { return (format >> 16U & 0xFF) / 8; }
 
-// Pixels are little endian, as everywhere but in registers.
-void appendLittle(Bytes& bytes, std::uint32_t number, unsigned size) {
-  for (unsigned i = 0; i < size; ++i) bytes.push_back(static_cast<std::byte>(number >> (8 * i)));
-}
-void appendFloat(Bytes& bytes, float number) { appendLittle(bytes, std::bit_cast<std::uint32_t>(number), 4); }
+/// Where the next pixel goes. Little endian, as everywhere but in registers.
+struct Cursor {
+  std::byte* at;
+  void put(std::uint32_t number, unsigned size) {
+    for (unsigned i = 0; i < size; ++i) *at++ = static_cast<std::byte>(number >> (8 * i));
+  }
+  void put(float number) { put(std::bit_cast<std::uint32_t>(number), 4); }
+};
 
 /// 0 for what is no number, or does not fit.
 std::uint32_t countOf(double value, double most) {
@@ -77,10 +80,10 @@ class Distances {
   const Rays& rays_;
 };
 
-void appendPoint(Bytes& bytes, const std::array<double, 3>& point_mm, std::uint32_t format, double scale_mm) {
+void putPoint(Cursor& to, const std::array<double, 3>& point_mm, std::uint32_t format, double scale_mm) {
   const bool is_valid = std::ranges::all_of(point_mm, [](double x) { return std::isfinite(x); });
   if (format == Pixel::kAbc32f) {
-    for (const double x : point_mm) appendFloat(bytes, is_valid ? static_cast<float>(x) : kNone);
+    for (const double x : point_mm) to.put(is_valid ? static_cast<float>(x) : kNone);
     return;
   }
   // count = (coordinate - offset) / scale; a point of which one coordinate does not fit is none.
@@ -90,10 +93,10 @@ void appendPoint(Bytes& bytes, const std::array<double, 3>& point_mm, std::uint3
     counts[i] = countOf((point_mm[i] - axis.offset_mm) / axis.scale_mm, kMost16);
   }
   const bool fits = is_valid && std::ranges::count(counts, 0U) == 0;
-  for (const std::uint32_t count : counts) appendLittle(bytes, fits ? count : 0U, 2);
+  for (const std::uint32_t count : counts) to.put(fits ? count : 0U, 2);
 }
 
-void appendRange(Bytes& bytes, const Frame& frame, const Rays& rays, const ImageSetup& setup) {
+void putRange(Cursor to, const Frame& frame, const Rays& rays, const ImageSetup& setup) {
   const Distances distances{frame, rays};
   const std::uint32_t format = setup.formats[Component::kRange];
   forRegion(setup, frame.camera, [&](std::size_t i) {
@@ -102,34 +105,34 @@ void appendRange(Bytes& bytes, const Frame& frame, const Rays& rays, const Image
       std::array<double, 3> point_mm{};
       for (std::size_t k = 0; k < 3; ++k)
         point_mm[k] = kMillimetres * d.range_m * static_cast<double>(rays.unit_vectors[3 * i + k]);
-      return appendPoint(bytes, point_mm, format, setup.scale_mm);
+      return putPoint(to, point_mm, format, setup.scale_mm);
     }
     const double length_mm = kMillimetres * (setup.is_spherical ? d.range_m : d.depth_m);
     if (format == Pixel::kC32f)
-      return appendFloat(bytes, std::isfinite(length_mm) ? static_cast<float>(length_mm) : kNone);
-    appendLittle(bytes, countOf(length_mm / setup.scale_mm, kMost16), 2);
+      return to.put(std::isfinite(length_mm) ? static_cast<float>(length_mm) : kNone);
+    to.put(countOf(length_mm / setup.scale_mm, kMost16), 2);
   });
 }
 
-void appendIntensity(Bytes& bytes, const Frame& frame, const ImageSetup& setup) {
+void putIntensity(Cursor to, const Frame& frame, const ImageSetup& setup) {
   const Plane& plane = *planeOf(frame, PlaneKind::Amplitude, ElementType::F32);
   const bool is_short = setup.formats[Component::kIntensity] == Pixel::kMono8;
   const double most = is_short ? kMost8 : kMost16;
   forRegion(setup, frame.camera, [&](std::size_t i) {
     const double counts = static_cast<double>(plane.as<float>()[i]) / setup.amplitude_per_count;
-    appendLittle(bytes, countOf(std::min(counts, most), most), is_short ? 1 : 2);
+    to.put(countOf(std::min(counts, most), most), is_short ? 1 : 2);
   });
 }
 
 /// 0: no value; half: there is a value and a warning; else all.
-void appendConfidence(Bytes& bytes, const Frame& frame, const ImageSetup& setup) {
+void putConfidence(Cursor to, const Frame& frame, const ImageSetup& setup) {
   const Plane& plane = *planeOf(frame, PlaneKind::Flags, ElementType::U8);
   const bool is_short = setup.formats[Component::kConfidence] == Pixel::kConfidence8;
   const std::uint32_t most = is_short ? 255 : 65'535;
   forRegion(setup, frame.camera, [&](std::size_t i) {
     const std::uint8_t flags = plane.as<std::uint8_t>()[i];
     const bool is_invalid = (flags & static_cast<std::uint8_t>(PixelFlag::Invalid)) != 0;
-    appendLittle(bytes, is_invalid ? 0 : flags != 0 ? (most + 1) / 2 : most, is_short ? 1 : 2);
+    to.put(is_invalid ? 0 : flags != 0 ? (most + 1) / 2 : most, is_short ? 1 : 2);
   });
 }
 
@@ -216,10 +219,13 @@ Result<Payload> payloadOf(const Frame& frame, const Rays& rays, const ImageSetup
   payload.bytes.reserve(payloadSizeOf(setup));
   for (std::uint32_t i = 0; i < Component::kCount; ++i) {
     if (!setup.is_sent[i]) continue;
-    const std::size_t offset = payload.bytes.size();
-    if (i == Component::kRange) appendRange(payload.bytes, frame, rays, setup);
-    if (i == Component::kIntensity) appendIntensity(payload.bytes, frame, setup);
-    if (i == Component::kConfidence) appendConfidence(payload.bytes, frame, setup);
+    const std::size_t offset = payload.bytes.size(),
+                      size = std::size_t{setup.width} * setup.height * bytesPerPixel(setup.formats[i]);
+    payload.bytes.resize(offset + size);
+    const Cursor to{payload.bytes.data() + offset};
+    if (i == Component::kRange) putRange(to, frame, rays, setup);
+    if (i == Component::kIntensity) putIntensity(to, frame, setup);
+    if (i == Component::kConfidence) putConfidence(to, frame, setup);
     payload.parts.push_back({.component = kIds[i],
                              .data_type = kTypes[i],
                              .format = setup.formats[i],
@@ -228,7 +234,7 @@ Result<Payload> payloadOf(const Frame& frame, const Rays& rays, const ImageSetup
                              .x = setup.x,
                              .y = setup.y,
                              .offset = offset,
-                             .size = payload.bytes.size() - offset});
+                             .size = size});
   }
   payload.has_chunks = hasChunks(setup);
   if (!payload.has_chunks) return payload;

@@ -17,8 +17,8 @@ using std::chrono::steady_clock;
 
 constexpr std::size_t kMostBlocks = 3, kMostAgain = 4096, kLeastKept = 2;
 constexpr int kBatch = 64;  ///< packets in one go, so that commands are answered in between
-constexpr std::chrono::microseconds kFull{200};      ///< until a socket that was full is tried again
-constexpr std::chrono::milliseconds kMostBehind{1};  ///< that is caught up by sending faster
+constexpr std::chrono::microseconds kFull{200};        ///< until a socket that was full is tried again
+constexpr std::chrono::microseconds kMostBehind{500};  ///< that is caught up by sending faster
 constexpr int kSocketBytes = 4 << 20;
 constexpr std::uint32_t kMostUnavailable = 64;
 
@@ -79,6 +79,10 @@ void Sender::sendAgain(const Resend& asked) {
 }
 
 void Sender::sendTestPacket(std::uint32_t size) { put(testPacket(size)); }
+
+void Sender::finish() {
+  if (waiting_.size() > 1) waiting_.resize(1);
+}
 
 void Sender::clear() {
   waiting_.clear();

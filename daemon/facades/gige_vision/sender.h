@@ -34,6 +34,8 @@ class Sender {
   bool send(std::shared_ptr<const Block> block);
   void sendAgain(const Resend& asked);
   void sendTestPacket(std::uint32_t size);
+  /// Nothing after the block that is under way, packets of which can still be asked for.
+  void finish();
   /// Forgets all that waits and all that was sent.
   void clear();
 

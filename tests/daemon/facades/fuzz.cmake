@@ -23,6 +23,6 @@ set(o3d303 answers.cpp commands.cpp defaults.cpp device.cpp device_edit.cpp disc
 list(TRANSFORM o3d303 PREPEND ${facades}/o3d303/)
 toftwin_fuzz_facade(o3d303 ${o3d303})
 toftwin_fuzz_facade(modbus ${facades}/modbus/registers.cpp ${facades}/modbus/requests.cpp)
-set(gige_vision device.cpp device_write.cpp features.cpp genicam_xml.cpp gvcp.cpp gvsp.cpp images.cpp memory.cpp)
+set(gige_vision bootstrap_registers.cpp device.cpp device_write.cpp features.cpp genicam_xml.cpp gvcp.cpp gvsp.cpp images.cpp memory.cpp)
 list(TRANSFORM gige_vision PREPEND ${facades}/gige_vision/)
 toftwin_fuzz_facade(gige_vision ${gige_vision})

@@ -150,6 +150,19 @@ TEST_F(GigeVisionCross, SaysThatTheSourceLostFrames) {
   (*driver)->stop();
 }
 
+TEST_F(GigeVisionCross, GoesOnWhenItsSourceWasAway) {
+  startGige(kSmallSim + "[[source.fault]]\nkind = 'disconnect'\nfirst = 4\noutage_s = 0.5\n");
+  auto driver = openDriver("");
+  ASSERT_TRUE(driver.ok()) << driver.error().message;
+  ASSERT_TRUE((*driver)->start().ok());
+  for (int i = 0; i < 10; ++i) {
+    const auto frame = nextFrame(**driver);
+    ASSERT_TRUE(frame.ok()) << frame.error().message;
+  }
+  EXPECT_EQ(client().health()->sources.at(0).reconnects, 1U);
+  (*driver)->stop();
+}
+
 TEST_F(GigeVisionCross, LosesNoFrameOnALineThatLosesTwoPercent) {
   startGige(kSmallSim, "[facade.line]\nloss = 0.02\nseed = 11");
   auto driver = openDriver("frame_retention_ms = 2000");

@@ -33,8 +33,10 @@ class GigeVision : public RunningGigeVision {
       ADD_FAILURE() << "it was not found: " << list.output;
       return {};
     }
-    return run(
-        fmt::format("arv-camera-test-0.8 -n '{}' --no-packet-socket --duration=1 {}", match.str(1), options));
+    // On a busy computer it asks early: it may ask for all packets twice (-q), and wait for them for long
+    // (-m).
+    return run(fmt::format("arv-camera-test-0.8 -n '{}' --no-packet-socket --duration=1 -q 2 -m 2000 {}",
+                           match.str(1), options));
   }
 };
 
@@ -63,12 +65,10 @@ TEST_F(GigeVision, GivesFramesToAnUnmodifiedClientAndLosesNone) {
 TEST_F(GigeVision, LosesNoFrameWhereTheLineLosesTwoPercentOfThePackets) {
   startGige(kSmallSim,
             "[facade.line]\nloss = 0.02\nduplicate = 0.01\nreorder = 0.01\nseed = 5\nlog = 'line.csv'");
-  // A busy computer makes the client ask early, too: it may ask for all packets twice (-q), and for long
-  // (-m).
-  const Ran ran = stream("--multipart -q 2 -m 2000");
+  const Ran ran = stream("--multipart");
   EXPECT_GT(ran.number("n_completed_buffers"), 5) << ran.output;
   EXPECT_EQ(ran.number("n_failures"), 0) << ran.output;
-  EXPECT_GT(ran.number("n_resent_packets"), 0) << ran.output;
+  EXPECT_GT(ran.number("n_resend_requests"), 0) << ran.output;
   std::ifstream log{folder_ / "line.csv"};
   std::string text{std::istreambuf_iterator<char>{log}, {}};
   for (const char* kind : {",loss,block ", ",duplicate,block ", ",reorder,block "})

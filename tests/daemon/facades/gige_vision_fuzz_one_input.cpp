@@ -49,13 +49,17 @@ const Frame& smallFrame() {
   return kFrame;
 }
 
-/// Every packet of a frame, and what the setup promises of them.
-void stream(const Device& device) {
-  static const Rays kRays = raysOf(smallFrame().camera);
+void checkTarget(const Device& device) {
   const StreamSetup setup = device.stream();
   const auto controller = device.controller();
   demand(setup.to.address == 0 || (controller && setup.to.address == controller->address));
   demand(!device.isStreaming() || controller.has_value());
+}
+
+/// Every packet of a frame, and what the setup promises of them.
+void stream(const Device& device) {
+  static const Rays kRays = raysOf(smallFrame().camera);
+  const StreamSetup setup = device.stream();
   const auto payload = payloadOf(smallFrame(), kRays, setup.images, 7);
   demand(payload.ok());
   demand(payload->bytes.size() == payloadSizeOf(setup.images));
@@ -87,9 +91,10 @@ void fuzzOneInput(std::span<const std::byte> bytes) {
     demand(outcome.answer.empty() || (outcome.answer.size() >= 8 && outcome.answer.size() <= 8 + 540));
     demand(outcome.answer.empty() || numberAt(outcome.answer, 4, 2) == outcome.answer.size() - 8);
     demand(outcome.changes.empty() || device.controller() == from);
-    stream(device);
+    checkTarget(device);
     bytes = bytes.subspan(kHeader + size);
   }
+  stream(device);
 }
 
 }  // namespace toftwin::daemon

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+// The GigE Vision facade in a running daemon, spoken to by datagrams.
+#include <gtest/gtest.h>
+
+#include <boost/asio/ip/udp.hpp>
+#include <poll.h>
+
+#include "gige_vision_commands.h"
+#include "gige_vision_testing.h"
+
+namespace toftwin::daemon {
+namespace {
+
+using namespace toftwin::daemon::test;
+using namespace gige_vision;
+using boost::asio::ip::udp;
+using gige_vision::test::commandOf;
+using gige_vision::test::words;
+
+class GigeVisionWire : public RunningGigeVision {
+ protected:
+  /// A socket of that address of this machine.
+  udp::socket socketOn(const std::string& address) {
+    return udp::socket{io_, {boost::asio::ip::make_address_v4(address), 0}};
+  }
+  void say(udp::socket& socket, const Bytes& bytes) {
+    socket.send_to(boost::asio::buffer(bytes), {boost::asio::ip::make_address_v4(address_), 3956});
+  }
+  /// The next datagram; nothing if none comes within `most_ms`.
+  static Bytes hear(udp::socket& socket, int most_ms = 20'000) {
+    pollfd file{socket.native_handle(), POLLIN, 0};
+    if (::poll(&file, 1, most_ms) < 1) return {};
+    Bytes bytes(70'000);
+    bytes.resize(socket.receive(boost::asio::buffer(bytes)));
+    return bytes;
+  }
+  std::uint16_t write(udp::socket& socket, Item item, std::uint32_t value) {
+    say(socket, commandOf(Command::kWriteRegister, ++number_, words({rowOf(item).address, value})));
+    const Bytes answer = hear(socket);
+    return answer.size() < 8 ? std::uint16_t{0xFFFF} : static_cast<std::uint16_t>(numberAt(answer, 0, 2));
+  }
+  boost::asio::io_context io_;
+  std::uint16_t number_ = 0;
+};
+
+TEST_F(GigeVisionWire, AnnouncesAnAnswerThatWaitsToWhoWantsThat) {
+  startGige(kSmallSim);
+  udp::socket control = socketOn("127.0.0.1");
+  EXPECT_EQ(write(control, Item::ControlPrivilege, 2), Status::kSuccess);
+  EXPECT_EQ(write(control, Item::ControlConfiguration, 2), Status::kSuccess);
+  Bytes data = words({rowOf(Item::ExposureTime).address});
+  append(data, std::bit_cast<std::uint64_t>(450.0), 8);
+  say(control, commandOf(Command::kWriteMemory, 900, data));
+  const Bytes pending = hear(control), answer = hear(control);
+  ASSERT_EQ(pending.size(), 12U);
+  EXPECT_EQ(numberAt(pending, 0, 8), 0x0000'0089'0004'0384U);  // of command 900
+  ASSERT_EQ(answer.size(), 12U);
+  EXPECT_EQ(numberAt(answer, 0, 8), 0x0000'0087'0004'0384U);
+  auto native = client();
+  const auto source = native.describe("cam");
+  ASSERT_TRUE(source.ok()) << source.error().message;
+  const auto exposure = std::ranges::find(source->parameters, "exposure_us", &Parameter::name);
+  ASSERT_NE(exposure, source->parameters.end());
+  EXPECT_EQ(exposure->value, 450.0);
+  // What the source refuses is refused: its own bound may be narrower than what the register said.
+  EXPECT_EQ(write(control, Item::TriggerSoftware, 1), Status::kBusy);  // it is not triggered
+}
+
+TEST_F(GigeVisionWire, GivesNoFrameToAnAddressThatDoesNotControlIt) {
+  startGige(kSmallSim);
+  udp::socket control = socketOn("127.0.0.1"), victim = socketOn("127.0.0.2"), stream = socketOn("127.0.0.1");
+  EXPECT_EQ(write(control, Item::ControlPrivilege, 2), Status::kSuccess);
+  EXPECT_EQ(write(control, Item::Destination, 0x7F000002), Status::kAccessDenied);
+  EXPECT_EQ(write(control, Item::HostPort, victim.local_endpoint().port()), Status::kSuccess);
+  EXPECT_EQ(write(control, Item::AcquisitionStart, 1), Status::kSuccess);
+  EXPECT_EQ(write(control, Item::PacketSize, 0x8000'0000U | 1500), Status::kSuccess);  // a test packet
+  udp::socket other = socketOn("127.0.0.2");
+  EXPECT_EQ(write(other, Item::Destination, 0x7F000002), Status::kAccessDenied);
+  // Nor does who asks for packets again get any.
+  Bytes asks = words({1, 0, 100});
+  say(other, commandOf(Command::kPacketResend, 7, asks, 0));
+  EXPECT_EQ(write(control, Item::Destination, 0x7F000001), Status::kSuccess);
+  EXPECT_EQ(write(control, Item::HostPort, stream.local_endpoint().port()), Status::kSuccess);
+  EXPECT_FALSE(hear(stream).empty());  // so there were frames all the time
+  EXPECT_TRUE(hear(victim, 0).empty());
+  EXPECT_TRUE(hear(other, 0).empty());
+}
+
+TEST_F(GigeVisionWire, StopsByItselfAfterAsManyFramesAsWereWanted) {
+  startGige(kSmallSim);
+  udp::socket control = socketOn("127.0.0.1"), stream = socketOn("127.0.0.1");
+  EXPECT_EQ(write(control, Item::ControlPrivilege, 2), Status::kSuccess);
+  EXPECT_EQ(write(control, Item::Destination, 0x7F000001), Status::kSuccess);
+  EXPECT_EQ(write(control, Item::HostPort, stream.local_endpoint().port()), Status::kSuccess);
+  EXPECT_EQ(write(control, Item::PacketSize, 9000), Status::kSuccess);
+  EXPECT_EQ(write(control, Item::AcquisitionMode, 2), Status::kSuccess);
+  EXPECT_EQ(write(control, Item::AcquisitionFrameCount, 3), Status::kSuccess);
+  EXPECT_EQ(write(control, Item::AcquisitionStart, 1), Status::kSuccess);
+  int trailers = 0;
+  while (trailers < 3) {
+    const Bytes packet = hear(stream);
+    ASSERT_GE(packet.size(), 8U);
+    trailers += numberAt(packet, 4, 1) == 2 ? 1 : 0;
+  }
+  // The next would have come after 50 ms; the camera can be set again, which it cannot be while it sends.
+  EXPECT_EQ(write(control, Item::AcquisitionFrameCount, 1), Status::kSuccess);
+  EXPECT_TRUE(hear(stream, 200).empty());
+}
+
+TEST_F(GigeVisionWire, SendsPacketsAgainAndSaysWhichItHasNotAnyMore) {
+  startGige(kSmallSim);
+  udp::socket control = socketOn("127.0.0.1"), stream = socketOn("127.0.0.1");
+  EXPECT_EQ(write(control, Item::ControlPrivilege, 2), Status::kSuccess);
+  EXPECT_EQ(write(control, Item::Destination, 0x7F000001), Status::kSuccess);
+  EXPECT_EQ(write(control, Item::HostPort, stream.local_endpoint().port()), Status::kSuccess);
+  EXPECT_EQ(write(control, Item::AcquisitionMode, 1), Status::kSuccess);
+  EXPECT_EQ(write(control, Item::PacketDelay, 1'000'000), Status::kSuccess);
+  EXPECT_EQ(write(control, Item::AcquisitionStart, 1), Status::kSuccess);
+  EXPECT_GT(hear(stream).size(), 8U);  // the leader; the frame goes on although commands come
+  EXPECT_EQ(write(control, Item::AcquisitionStop, 1), Status::kSuccess);
+  std::map<std::uint64_t, Bytes> first;  // by number
+  for (Bytes packet = hear(stream); packet.size() >= 8; packet = hear(stream)) {
+    first[numberAt(packet, 5, 3)] = packet;
+    if (numberAt(packet, 4, 1) == 2) break;
+  }
+  ASSERT_GT(first.size(), 5U);
+  say(control, commandOf(Command::kPacketResend, 70, words({1, 2, 4}), 0));
+  for (std::uint64_t i = 2; i <= 4; ++i) {
+    const Bytes again = hear(stream);
+    ASSERT_GE(again.size(), 8U);
+    EXPECT_EQ(numberAt(again, 0, 2), Status::kPacketResent);
+    EXPECT_TRUE(std::equal(again.begin() + 2, again.end(), first[i].begin() + 2, first[i].end()));
+  }
+  say(control, commandOf(Command::kPacketResend, 71, words({99, 2, 3}), 0));  // block 99
+  for (std::uint64_t i = 2; i <= 3; ++i) {
+    const Bytes none = hear(stream);
+    ASSERT_EQ(none.size(), 8U);
+    EXPECT_EQ(numberAt(none, 0, 2), Status::kPacketUnavailable);
+    EXPECT_EQ(numberAt(none, 5, 3), i);
+  }
+}
+
+}  // namespace
+}  // namespace toftwin::daemon
