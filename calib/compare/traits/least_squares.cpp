@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/compare/traits/least_squares.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <boost/math/distributions/beta.hpp>
+#include <boost/math/distributions/students_t.hpp>
+#include <cmath>
+#include <utility>
+
+#include "calib/compare/statistics.h"
+
+namespace toftwin::compare {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// A step of a parameter for the numeric derivative: the cube root of the rounding, which balances it with curvature.
+double stepOf(double parameter) { return 6e-6 * std::max(std::abs(parameter), 1e-3); }
+
+VectorXd residuals(const Model& model, Column y, std::span<const double> p) {
+  VectorXd r(static_cast<Eigen::Index>(y.size()));
+  for (std::size_t i = 0; i < y.size(); ++i) r[static_cast<Eigen::Index>(i)] = y[i] - model(p, i);
+  return r;
+}
+
+MatrixXd jacobian(const Model& model, std::size_t rows, std::vector<double> p) {
+  MatrixXd jacobian(static_cast<Eigen::Index>(rows), static_cast<Eigen::Index>(p.size()));
+  for (std::size_t k = 0; k < p.size(); ++k) {
+    const double at = p[k], step = stepOf(at);
+    for (std::size_t i = 0; i < rows; ++i) {
+      p[k] = at + step;
+      const double above = model(p, i);
+      p[k] = at - step;
+      jacobian(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) = (above - model(p, i)) / (2.0 * step);
+    }
+    p[k] = at;
+  }
+  return jacobian;
+}
+
+std::vector<double> moved(const std::vector<double>& p, const VectorXd& by) {
+  std::vector<double> there = p;
+  for (std::size_t k = 0; k < p.size(); ++k) there[k] += by[static_cast<Eigen::Index>(k)];
+  return there;
+}
+
+/// (JᵀJ)⁻¹, or nothing where a column is zero or hangs on the others.
+std::optional<MatrixXd> inverseOfNormal(const MatrixXd& j) {
+  const VectorXd scale = j.colwise().norm();
+  if (!scale.allFinite() || scale.minCoeff() <= 0.0) return std::nullopt;
+  const MatrixXd unit = j * scale.cwiseInverse().asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver{unit.transpose() * unit};
+  if (solver.eigenvalues().minCoeff() < 1e-10) return std::nullopt;
+  const MatrixXd inverse =
+      solver.eigenvectors() * solver.eigenvalues().cwiseInverse().asDiagonal() * solver.eigenvectors().transpose();
+  return MatrixXd{scale.cwiseInverse().asDiagonal() * inverse * scale.cwiseInverse().asDiagonal()};
+}
+
+}  // namespace
+
+double studentT(double degrees) {
+  return boost::math::quantile(boost::math::students_t{std::max(1.0, degrees)}, 0.975);
+}
+
+double Fit::error(std::size_t parameter) const { return std::sqrt(covariance[parameter * (at.size() + 1)]); }
+
+Trait Fit::trait(std::string name, std::string unit, std::size_t parameter, double scale) const {
+  return trait(std::move(name), std::move(unit), [=](std::span<const double> p) { return scale * p[parameter]; });
+}
+
+Trait Fit::trait(std::string name, std::string unit, const std::function<double(std::span<const double>)>& of) const {
+  std::vector<double> p = at, gradient;
+  for (std::size_t k = 0; k < p.size(); ++k) {
+    const double step = stepOf(at[k]);
+    p[k] = at[k] + step;
+    const double above = of(p);
+    p[k] = at[k] - step;
+    gradient.push_back((above - of(p)) / (2.0 * step));
+    p[k] = at[k];
+  }
+  double variance = 0.0;
+  for (std::size_t a = 0; a < p.size(); ++a) {
+    for (std::size_t b = 0; b < p.size(); ++b) variance += gradient[a] * gradient[b] * covariance[a * p.size() + b];
+  }
+  const double value = of(at), half = studentT(degrees) * std::sqrt(std::max(0.0, variance));
+  return {.name = std::move(name), .unit = std::move(unit), .value = value, .low = value - half, .high = value + half, .n = n};
+}
+
+void Fit::heedCorrelation(double rho) {
+  if (rho <= 0.0) return;
+  const double share = (1.0 - rho) / (1.0 + rho);
+  const double parameters = static_cast<double>(at.size());
+  const double fewer = std::max(1.0, static_cast<double>(n) * share - parameters);
+  // The residual variance stays that of the rows; what falls is how many of them there are.
+  for (double& c : covariance) c /= share;
+  degrees = fewer;
+}
+
+std::optional<Fit> fitLeastSquares(const Model& model, Column y, std::vector<double> start) {
+  if (y.size() <= start.size()) return std::nullopt;
+  std::vector<double> p = std::move(start);
+  VectorXd r = residuals(model, y, p);
+  double damping = 1e-3;
+  if (!r.allFinite()) return std::nullopt;
+  for (int step = 0; step < 40; ++step) {
+    const MatrixXd j = jacobian(model, y.size(), p);
+    if (!j.allFinite()) return std::nullopt;
+    const MatrixXd normal = j.transpose() * j;
+    const VectorXd gradient = j.transpose() * r;
+    bool is_better = false;
+    double gain = 0.0;
+    for (int attempt = 0; attempt < 30 && !is_better; ++attempt) {
+      MatrixXd damped = normal;
+      damped.diagonal() += damping * normal.diagonal().cwiseMax(1e-300);
+      const auto there = moved(p, damped.ldlt().solve(gradient));
+      const VectorXd then = residuals(model, y, there);
+      is_better = then.allFinite() && then.squaredNorm() <= r.squaredNorm();
+      damping *= is_better ? 0.2 : 5.0;
+      if (!is_better) continue;
+      gain = r.squaredNorm() - then.squaredNorm();
+      p = there;
+      r = then;
+    }
+    // A standard error is worth 1/n of the squares: what is left to gain is far below one.
+    if (!is_better || gain <= 1e-7 * r.squaredNorm()) break;
+  }
+  const auto inverse = inverseOfNormal(jacobian(model, y.size(), p));
+  if (!inverse) return std::nullopt;
+  Fit fit{.at = p, .covariance = {}, .squares = r.squaredNorm(), .n = y.size(),
+          .degrees = static_cast<double>(y.size() - p.size())};
+  for (std::size_t a = 0; a < p.size(); ++a) {
+    for (std::size_t b = 0; b < p.size(); ++b)
+      fit.covariance.push_back((*inverse)(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b)) * fit.squares / fit.degrees);
+  }
+  return fit;
+}
+
+double correlationOfResiduals(const Model& model, Column y, const Fit& fit) {
+  const VectorXd r = residuals(model, y, fit.at);
+  const double squares = r.squaredNorm();
+  if (!(squares > 0.0)) return 0.0;
+  const double rho = r.head(r.size() - 1).dot(r.tail(r.size() - 1)) / squares;
+  const double n = static_cast<double>(y.size()), k = static_cast<double>(fit.at.size());
+  // Each parameter takes about 1/n of correlation away (M. G. Kendall, Biometrika 41 (1954) 403, for the mean).
+  const double corrected = rho + k * (1.0 + rho) / n;
+  return corrected > 2.0 / std::sqrt(n) ? std::min(corrected, 0.95) : 0.0;
+}
+
+Trait meanTrait(std::string name, std::string unit, Column values, double scale) {
+  const Summary summary = summarise(values);
+  const double half = summary.n < 2 ? std::nan("") : studentT(static_cast<double>(summary.n - 1)) * summary.standard_error;
+  return {.name = std::move(name), .unit = std::move(unit), .value = scale * summary.mean,
+          .low = scale * (summary.mean - half), .high = scale * (summary.mean + half), .n = summary.n};
+}
+
+Trait shareTrait(std::string name, std::size_t k, std::size_t n) {
+  using Beta = boost::math::beta_distribution<>;
+  const double events = static_cast<double>(k), others = static_cast<double>(n - k);
+  return {.name = std::move(name), .unit = "1", .value = n == 0 ? std::nan("") : events / static_cast<double>(n),
+          .low = k == 0 ? 0.0 : boost::math::quantile(Beta{events + 0.5, others + 0.5}, 0.025),
+          .high = k == n ? 1.0 : boost::math::quantile(Beta{events + 0.5, others + 0.5}, 0.975), .n = n};
+}
+
+Result<std::vector<std::vector<double>>> finiteRows(std::initializer_list<Column> columns, std::size_t least,
+                                                    const char* of_what) {
+  const std::size_t rows = columns.begin()->size();
+  for (const Column& column : columns) {
+    if (column.size() != rows)
+      return Error{Error::Code::InvalidArgument, fmt::format("{}: one column has {} rows, another {}", of_what, rows, column.size())};
+  }
+  std::vector<std::vector<double>> kept(columns.size());
+  for (std::size_t i = 0; i < rows; ++i) {
+    bool is_finite = true;
+    for (const Column& column : columns) is_finite = is_finite && std::isfinite(column[i]);
+    std::size_t c = 0;
+    for (const Column& column : columns) {
+      if (is_finite) kept[c].push_back(column[i]);
+      ++c;
+    }
+  }
+  if (kept.front().size() < least) {
+    return Error{Error::Code::InvalidArgument, fmt::format("{}: {} of {} rows are finite, and it takes {}", of_what,
+                                                           kept.front().size(), rows, least)};
+  }
+  return kept;
+}
+
+Error undetermined(const char* of_what, const char* why) {
+  return {Error::Code::InvalidArgument, fmt::format("{}: these rows do not tell it: {}", of_what, why)};
+}
+
+}  // namespace toftwin::compare

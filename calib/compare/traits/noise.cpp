@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+// Noise of repeated frames: how large, how much of it stands still, how alike neighbours are.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "calib/compare/statistics.h"
+#include "calib/compare/traits/least_squares.h"
+
+namespace toftwin::compare {
+namespace {
+
+constexpr int kBlocks = 4;  ///< along each side
+
+/// Sums over the pixels of one block.
+struct Block {
+  double squares = 0.0, count = 0.0;          ///< of residuals from each pixel's mean
+  double along_x = 0.0, along_x_squares = 0.0, along_y = 0.0, along_y_squares = 0.0, in_time = 0.0;
+  Running means{};
+};
+
+struct Residuals {
+  std::vector<Image<float>> frames;
+  Image<float> mean;  ///< NaN where a frame is not valid
+};
+
+Residuals residualsOf(std::span<const Image<float>> frames) {
+  Residuals r{.frames = {frames.begin(), frames.end()}, .mean = Image<float>(frames[0].width(), frames[0].height())};
+  const auto n = static_cast<double>(frames.size());
+  for (std::size_t i = 0; i < r.mean.size(); ++i) {
+    double sum = 0.0;
+    for (const auto& frame : frames) sum += static_cast<double>(frame[i]);
+    r.mean[i] = static_cast<float>(sum / n);
+    for (auto& frame : r.frames) frame[i] = static_cast<float>(static_cast<double>(frame[i]) - sum / n);
+  }
+  return r;
+}
+
+/// A pixel's own squares, and its products with its right and lower neighbour and with its next frame.
+void add(const Residuals& r, int x, int y, Block& block) {
+  const auto value = [&](std::size_t f, int px, int py) { return static_cast<double>(r.frames[f](px, py)); };
+  if (std::isnan(r.mean(x, y))) return;
+  block.means.add(static_cast<double>(r.mean(x, y)));
+  const bool has_right = x + 1 < r.mean.width() && !std::isnan(r.mean(x + 1, y));
+  const bool has_below = y + 1 < r.mean.height() && !std::isnan(r.mean(x, y + 1));
+  for (std::size_t f = 0; f < r.frames.size(); ++f) {
+    const double e = value(f, x, y);
+    block.squares += e * e;
+    if (f + 1 < r.frames.size()) block.in_time += e * value(f + 1, x, y);
+    if (has_right) {
+      const double other = value(f, x + 1, y);
+      block.along_x += e * other;
+      block.along_x_squares += 0.5 * (e * e + other * other);
+    }
+    if (has_below) {
+      const double other = value(f, x, y + 1);
+      block.along_y += e * other;
+      block.along_y_squares += 0.5 * (e * e + other * other);
+    }
+  }
+  block.count += 1.0;
+}
+
+/// Variance of the mean of n values relative to theirs, if each goes with the one before by ρ (AR(1)):
+///   v = ( (1 + ρ)/(1 − ρ) − 2ρ (1 − ρⁿ) / (n (1 − ρ)²) ) / n
+double varianceOfMean(double rho, double n) {
+  const double rest = 1.0 - rho;
+  return ((1.0 + rho) / rest - 2.0 * rho * (1.0 - std::pow(rho, n)) / (n * rest * rest)) / n;
+}
+
+/// What Σ eₜ eₜ₊₁ / Σ eₜ² is on the mean for residuals from the mean of n such values:
+///   ( (n − 1) ρ − (n + 1) v + 2 c ) / ( n − n v ),   c = (1 − ρⁿ) / (n (1 − ρ)), the first value's covariance with the mean
+double expectedRatio(double rho, double n) {
+  const double v = varianceOfMean(rho, n), c = (1.0 - std::pow(rho, n)) / (n * (1.0 - rho));
+  return ((n - 1.0) * rho - (n + 1.0) * v + 2.0 * c) / (n - n * v);
+}
+
+/// The ρ whose ratio was measured.
+double correlationFrom(double ratio, double n) {
+  double low = -0.95, high = 0.98;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = 0.5 * (low + high);
+    (expectedRatio(middle, n) < ratio ? low : high) = middle;
+  }
+  return 0.5 * (low + high);
+}
+
+/// Mean over blocks and its interval, of a quantity whose root is shown.
+Trait rootTrait(const char* name, Column squares) {
+  Trait trait = meanTrait(name, "mm", squares);
+  for (double* one : {&trait.value, &trait.low, &trait.high}) *one = std::sqrt(std::max(0.0, *one));
+  return trait;
+}
+
+}  // namespace
+
+Traits noiseTraits(std::span<const Image<float>> frames_mm) {
+  const auto refuse = [](std::string why) { return Error{Error::Code::InvalidArgument, "noise: " + std::move(why)}; };
+  if (frames_mm.size() < 8) return refuse(fmt::format("{} frames; it takes eight", frames_mm.size()));
+  const int width = frames_mm[0].width(), height = frames_mm[0].height();
+  for (const auto& frame : frames_mm) {
+    if (frame.width() != width || frame.height() != height) return refuse("frames of different sizes");
+  }
+  if (std::min(width, height) < 2 * kBlocks) return refuse("an image of less than 8 x 8 pixels");
+  const Residuals r = residualsOf(frames_mm);
+  std::array<Block, kBlocks * kBlocks> blocks;
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x)
+      add(r, x, y, blocks[static_cast<std::size_t>(y * kBlocks / height * kBlocks + x * kBlocks / width)]);
+  }
+  const double n = static_cast<double>(frames_mm.size());
+  std::vector<double> temporal, fixed, along_x, along_y, in_time;
+  const auto isUsed = [](const Block& block) { return block.count >= 4.0 && block.squares > 0.0; };
+  for (const Block& block : blocks) {
+    if (isUsed(block)) in_time.push_back(correlationFrom(block.in_time / block.squares, n));
+  }
+  // Values that go with each other scatter less about their own mean, and their mean scatters more.
+  const double of_mean = varianceOfMean(summarise(in_time).mean, n);
+  for (const Block& block : blocks) {
+    if (!isUsed(block)) continue;
+    const double variance = block.squares / (block.count * n * (1.0 - of_mean));
+    temporal.push_back(variance);
+    fixed.push_back(block.means.variance() - variance * of_mean);
+    along_x.push_back(block.along_x / block.along_x_squares);
+    along_y.push_back(block.along_y / block.along_y_squares);
+  }
+  if (temporal.size() < 4) return refuse("fewer than four of 16 blocks of the image are valid and noisy");
+  return std::vector{rootTrait("temporal noise", temporal), rootTrait("fixed pattern", fixed),
+                     meanTrait("correlation along x", "1", along_x), meanTrait("correlation along y", "1", along_y),
+                     meanTrait("correlation in time", "1", in_time)};
+}
+
+}  // namespace toftwin::compare

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// Errors that go straight with something: amplitude, ambient light, speed.
+#include <algorithm>
+#include <cmath>
+
+#include "calib/compare/traits/least_squares.h"
+
+namespace toftwin::compare {
+namespace {
+
+/// y = p₀ + p₁ x.
+std::optional<Fit> line(const std::vector<double>& x, const std::vector<double>& y) {
+  return fitLeastSquares([&](std::span<const double> p, std::size_t i) { return p[0] + p[1] * x[i]; }, y, {0.0, 0.0});
+}
+
+}  // namespace
+
+Traits amplitudeTraits(Column amplitude, Column error_mm) {
+  auto rows = finiteRows({amplitude, error_mm}, 4, "amplitude-related error");
+  if (!rows) return rows.error();
+  auto& x = (*rows)[0];
+  if (std::ranges::min(x) <= 0.0) return undetermined("amplitude-related error", "amplitudes must be positive");
+  for (double& one : x) one = std::log10(one);
+  const auto fit = line(x, (*rows)[1]);
+  if (!fit) return undetermined("amplitude-related error", "all amplitudes are alike");
+  return std::vector{fit->trait("at 1", "mm", 0), fit->trait("per decade", "mm", 1)};
+}
+
+Traits ambientTraits(Column ambient_klx, Column error_mm, Column sigma_mm) {
+  auto rows = finiteRows({ambient_klx, error_mm, sigma_mm}, 4, "ambient-related error");
+  if (!rows) return rows.error();
+  auto& variance = (*rows)[2];
+  for (double& one : variance) one *= one;
+  const auto bias = line((*rows)[0], (*rows)[1]), noise = line((*rows)[0], variance);
+  if (!bias || !noise) return undetermined("ambient-related error", "all illuminances are alike");
+  return std::vector{bias->trait("bias", "mm/klx", 1), noise->trait("noise²", "mm²/klx", 1)};
+}
+
+Traits motionTraits(Column speed_m_per_s, Column error_mm) {
+  const auto rows = finiteRows({speed_m_per_s, error_mm}, 4, "motion artefact");
+  if (!rows) return rows.error();
+  const auto fit = line((*rows)[0], (*rows)[1]);
+  if (!fit) return undetermined("motion artefact", "all speeds are alike");
+  return std::vector{fit->trait("per speed", "mm/(m/s)", 1)};
+}
+
+}  // namespace toftwin::compare

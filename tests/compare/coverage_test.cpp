@@ -1,0 +1,323 @@
+// SPDX-License-Identifier: Apache-2.0
+// Characteristics that are planted: how often their stated 95 % intervals hold the truth, 200 seeds each. Seeds are 1 to
+// 200 for every row. The counts are those of docs/characteristics.md.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <fstream>
+#include <functional>
+#include <map>
+#include <numbers>
+#include <random>
+#include <sstream>
+
+#include "calib/compare/traits/traits.h"
+
+namespace toftwin::compare {
+namespace {
+
+constexpr int kRuns = 200;
+
+/// Normal numbers of one run.
+class Noise {
+ public:
+  explicit Noise(unsigned seed) : random_(seed) {}
+  double operator()(double sigma) { return sigma * normal_(random_); }
+  double uniform(double low, double high) { return low + (high - low) * uniform_(random_); }
+  bool chance(double p) { return uniform_(random_) < p; }
+
+ private:
+  std::mt19937_64 random_;
+  std::normal_distribution<double> normal_{0.0, 1.0};
+  std::uniform_real_distribution<double> uniform_{0.0, 1.0};
+};
+
+using Columns = std::vector<double>;
+using Truth = std::map<std::string, double>;
+
+/// What is planted, and what one run makes of it.
+struct Planted {
+  std::string name;
+  Truth truth;
+  std::function<Traits(Noise&)> run;
+};
+
+Columns spaced(double first, double last, int count) {
+  Columns x;
+  for (int i = 0; i < count; ++i) x.push_back(first + (last - first) * i / (count - 1));
+  return x;
+}
+
+/// y = f(x) + noise.
+Columns noisy(const Columns& x, double sigma, Noise& noise, const std::function<double(double)>& f) {
+  Columns y;
+  for (const double one : x) y.push_back(f(one) + noise(sigma));
+  return y;
+}
+
+Traits traitsOf(const Result<DriftTraits>& drift) {
+  if (!drift) return drift.error();
+  return drift->traits;
+}
+
+/// An hour of a value every 20 s, 0.3 mm of noise.
+Planted drift(std::string name, Truth truth, std::function<double(double)> f) {
+  return {std::move(name), std::move(truth), [f](Noise& noise) {
+            const Columns t = spaced(0.0, 3600.0, 181);
+            return traitsOf(driftTraits(t, noisy(t, 0.3, noise, f)));
+          }};
+}
+
+std::vector<Planted> drifts() {
+  const auto exponential = [](double t) { return 8.0 * std::exp(-t / 600.0); };
+  std::vector<Planted> rows;
+  rows.push_back(drift("drift, one exponential", {{"drift", exponential(3600) - exponential(0)}, {"time constant", 600.0}}, exponential));
+  const auto two = [](double t) { return 9.0 * std::exp(-t / 100.0) + 6.0 * std::exp(-t / 1200.0); };
+  rows.push_back(drift("drift, two exponentials", {{"drift", two(3600) - two(0)}}, two));
+  rows.push_back(drift("drift, ramp", {{"drift", 1.8}, {"slope", 5e-4}}, [](double t) { return 5e-4 * t; }));
+  rows.push_back(drift("drift, step", {{"step", 2.0}}, [](double t) { return t > 1510.0 ? 2.0 : 0.0; }));
+  rows.push_back({"drift, errors that go on (0.5)", {{"drift", exponential(3600) - exponential(0)}}, [=](Noise& noise) {
+                    const Columns t = spaced(0.0, 3600.0, 181);
+                    Columns y;
+                    double e = noise(0.3);
+                    for (const double one : t) {
+                      y.push_back(exponential(one) + e);
+                      e = 0.5 * e + noise(0.3 * std::sqrt(0.75));
+                    }
+                    return traitsOf(driftTraits(t, y));
+                  }});
+  return rows;
+}
+
+std::vector<Planted> overDistance() {
+  std::vector<Planted> rows;
+  rows.push_back({"harmonics", {{"30 MHz, 1 per period", 4.0}, {"30 MHz, 4 per period", 6.0}, {"scale", 0.7}, {"residual", 2.0}},
+                  [](Noise& noise) {
+                    const Columns d = spaced(0.5, 6.5, 240);
+                    const double k = 4.0 * std::numbers::pi * 30e6 / 299'792'458.0;
+                    const Columns e = noisy(d, 2.0, noise, [&](double x) {
+                      return 3.0 + 0.7 * x + 4.0 * std::cos(k * x + 1.0) + 6.0 * std::sin(4.0 * k * x - 0.4);
+                    });
+                    const std::vector<double> f{30e6};
+                    const std::vector<int> orders{1, 2, 4};
+                    return harmonicTraits(d, e, f, orders);
+                  }});
+  rows.push_back({"noise law", {{"floor", 2.0}, {"shot", 3.0}, {"read", 0.4}}, [](Noise& noise) {
+                    // σ of 60 frames each: √(1/118) of itself uncertain. Relative to the largest signal, 1000.
+                    Columns signal, sigma;
+                    for (int i = 0; i < 60; ++i) {
+                      const double x = std::pow(10.0, -2.0 * i / 59.0);
+                      signal.push_back(1000.0 * x);
+                      const double s = std::sqrt(4.0 + 9.0 / x + 0.16 / (x * x));
+                      sigma.push_back(s * std::exp(noise(std::sqrt(1.0 / 118.0))));
+                    }
+                    return noiseLawTraits(signal, sigma);
+                  }});
+  rows.push_back({"wraps", {{"wrapped", 0.02}}, [](Noise& noise) {
+                    Columns e;
+                    for (int i = 0; i < 20'000; ++i) e.push_back((noise.chance(0.02) ? 1.5 : 0.0) + noise(0.02));
+                    return wrapTraits(e, 1.5);
+                  }});
+  return rows;
+}
+
+std::vector<Planted> otherWays() {
+  std::vector<Planted> rows;
+  rows.push_back({"corner", {{"at the edge", 40.0}, {"reach", 0.25}, {"far from it", -3.0}}, [](Noise& noise) {
+                    const Columns x = spaced(0.0, 1.2, 150);
+                    return cornerTraits(x, noisy(x, 2.0, noise, [](double d) { return -3.0 + 40.0 * std::exp(-d / 0.25); }));
+                  }});
+  rows.push_back({"lens scatter", {{"veil", 0.015}}, [](Noise& noise) {
+                    const double k = 4.0 * std::numbers::pi * 30e6 / 299'792'458.0;
+                    Columns own, plate, ratio, error;
+                    for (int i = 0; i < 80; ++i) {
+                      own.push_back(2.5);
+                      plate.push_back(0.6 + 0.015 * i);
+                      ratio.push_back(8.0 / (plate.back() * plate.back()));
+                      const double q = 0.015 * ratio.back(), phase = k * (plate.back() - own.back());
+                      error.push_back(1e3 / k * std::atan2(q * std::sin(phase), 1.0 + q * std::cos(phase)) + noise(3.0));
+                    }
+                    return scatterTraits(own, plate, ratio, error, 30e6);
+                  }});
+  rows.push_back({"amplitude", {{"at 1", 12.0}, {"per decade", -4.0}}, [](Noise& noise) {
+                    Columns a, e;
+                    for (int i = 0; i < 100; ++i) {
+                      a.push_back(std::pow(10.0, noise.uniform(1.0, 4.0)));
+                      e.push_back(12.0 - 4.0 * std::log10(a.back()) + noise(2.0));
+                    }
+                    return amplitudeTraits(a, e);
+                  }});
+  rows.push_back({"ambient", {{"bias", 0.12}, {"noise²", 0.5}}, [](Noise& noise) {
+                    const Columns klx = spaced(0.0, 60.0, 25);
+                    Columns sigma;
+                    // Of 400 frames, so that the variance's own spread differs little over the steps.
+                    for (const double e : klx) sigma.push_back(std::sqrt((90.0 + 0.5 * e) * (1.0 + noise(std::sqrt(2.0 / 399.0)))));
+                    return ambientTraits(klx, noisy(klx, 1.0, noise, [](double e) { return 2.0 + 0.12 * e; }), sigma);
+                  }});
+  rows.push_back({"motion", {{"per speed", 7.5}}, [](Noise& noise) {
+                    const Columns v = spaced(-2.0, 2.0, 21);
+                    return motionTraits(v, noisy(v, 3.0, noise, [](double s) { return 1.0 + 7.5 * s; }));
+                  }});
+  return rows;
+}
+
+std::vector<Planted> overTime() {
+  std::vector<Planted> rows;
+  rows.push_back({"lag", {{"lag", 0.3}, {"rest", 100.0}}, [](Noise& noise) {
+                    Columns k, y;
+                    for (int cycle = 0; cycle < 6; ++cycle) {
+                      for (int i = 0; i < 12; ++i) {
+                        k.push_back(i);
+                        y.push_back(100.0 + 900.0 * std::pow(0.3, i) + noise(10.0));
+                      }
+                    }
+                    return lagTraits(k, y);
+                  }});
+  rows.push_back({"latency", {{"latency", 83.0}}, [](Noise& noise) {
+                    const Columns rt = spaced(-1.0, 11.0, 1201), t = spaced(0.0, 10.0, 200);
+                    const auto path = [](double s) { return 300.0 * std::sin(0.9 * s) + 80.0 * std::sin(2.3 * s); };
+                    Columns reference;
+                    for (const double s : rt) reference.push_back(path(s));
+                    return latencyTraits(t, noisy(t, 5.0, noise, [&](double s) { return 12.0 + path(s - 0.083); }), rt, reference);
+                  }});
+  rows.push_back({"frame timing", {{"interval", 33.3}, {"jitter", 0.4}, {"lost", 0.03}}, [](Noise& noise) {
+                    // Each interval jitters by itself; a lost frame joins two of them.
+                    Columns starts{0.0};
+                    double now = 0.0;
+                    for (int i = 0; i < 600; ++i) {
+                      now += 0.0333 + noise(0.0004);
+                      if (!noise.chance(0.03)) starts.push_back(now);
+                    }
+                    return timingTraits(starts);
+                  }});
+  return rows;
+}
+
+std::vector<Planted> atEdges() {
+  std::vector<Planted> rows;
+  rows.push_back({"flying pixels", {{"flying", 0.35}, {"offset", 0.4}, {"near side", 0.75}}, [](Noise& noise) {
+                    Image<float> range(24, 240);
+                    for (int y = 0; y < 240; ++y) {
+                      const bool flies = noise.chance(0.35);
+                      const double share = noise.uniform(0.2, 0.6);
+                      for (int x = 0; x < 24; ++x)
+                        range(x, y) = static_cast<float>((x < 12 ? 1.0 : x == 12 && flies ? 1.0 + share : 2.0) + noise(0.002));
+                    }
+                    return flyingTraits(range);
+                  }});
+  rows.push_back({"edge", {{"edge", 10.3}, {"width", 0.9}, {"10-90 width", 2.5631 * 0.9}, {"resolution", 0.187390 / 0.9}}, [](Noise& noise) {
+                    // A slanted edge: rows see it at different places, so that the values lie closer than pixels.
+                    Columns x, v;
+                    for (int y = 0; y < 20; ++y) {
+                      for (int i = 0; i < 20; ++i) {
+                        x.push_back(i - 0.13 * y + 1.3);
+                        v.push_back(1000.0 + 700.0 * 0.5 * std::erfc(-(x.back() - 10.3) / 0.9 / std::numbers::sqrt2) + noise(15.0));
+                      }
+                    }
+                    return edgeTraits(x, v);
+                  }});
+  rows.push_back({"emitter shadow", {{"left", 1.5}, {"right", 4.0}, {"asymmetry", 2.5}}, [](Noise& noise) {
+                    Image<float> range(60, 80, 2.0f);
+                    for (int y = 0; y < 80; ++y) {
+                      const int left = static_cast<int>(noise.uniform(0.0, 4.0)), right = 2 + static_cast<int>(noise.uniform(0.0, 5.0));
+                      for (int x = 20 - left; x < 40 + right; ++x)
+                        range(x, y) = x < 20 || x >= 40 ? std::numeric_limits<float>::quiet_NaN() : 1.0f;
+                    }
+                    return shadowTraits(range, 1.5);
+                  }});
+  return rows;
+}
+
+/// Frames of 32 × 32 pixels: fixed pattern of 3 mm, noise of 5 mm that is alike along x (0.4) and from frame to frame (0.3).
+Traits noisyFrames(Noise& noise) {
+  constexpr int kSize = 32, kFrames = 40;
+  const auto along = [&](std::vector<double> row) {
+    for (std::size_t i = 1; i < row.size(); ++i) row[i] = 0.4 * row[i - 1] + std::sqrt(1.0 - 0.16) * row[i];
+    return row;
+  };
+  Image<float> fixed(kSize, kSize);
+  for (float& one : fixed.pixels()) one = static_cast<float>(noise(3.0));
+  Image<double> last(kSize, kSize);
+  std::vector<Image<float>> frames;
+  for (int f = 0; f < kFrames; ++f) {
+    Image<float>& frame = frames.emplace_back(kSize, kSize);
+    for (int y = 0; y < kSize; ++y) {
+      std::vector<double> row;
+      for (int x = 0; x < kSize; ++x) row.push_back(noise(5.0));
+      row = along(std::move(row));
+      for (int x = 0; x < kSize; ++x) {
+        const double fresh = row[static_cast<std::size_t>(x)];
+        last(x, y) = f == 0 ? fresh : 0.3 * last(x, y) + std::sqrt(1.0 - 0.09) * fresh;
+        frame(x, y) = static_cast<float>(2000.0 + static_cast<double>(fixed(x, y)) + last(x, y));
+      }
+    }
+  }
+  return noiseTraits(frames);
+}
+
+std::vector<Planted> ofFrames() {
+  std::vector<Planted> rows;
+  rows.push_back({"noise of frames",
+                  {{"temporal noise", 5.0}, {"fixed pattern", 3.0}, {"correlation along x", 0.4}, {"correlation along y", 0.0}, {"correlation in time", 0.3}},
+                  noisyFrames});
+  // 90 % valid in A; B differs from A in 4 % of the pixels: both valid 0.9 · 0.96, only A 0.036, only B 0.004.
+  const double both = 0.864, agree = 0.96, share_b = both + 0.1 * 0.04, chance = 0.9 * share_b + 0.1 * (1.0 - share_b);
+  rows.push_back({"mask agreement", {{"agreement", agree}, {"overlap", both / (both + 0.04)}, {"kappa", (agree - chance) / (1.0 - chance)}},
+                  [](Noise& noise) {
+                    std::vector<Image<std::uint8_t>> a, b;
+                    for (int pose = 0; pose < 12; ++pose) {
+                      Image<std::uint8_t>&of_a = a.emplace_back(60, 40), &of_b = b.emplace_back(60, 40);
+                      for (std::size_t i = 0; i < of_a.size(); ++i) {
+                        of_a[i] = noise.chance(0.9) ? 1 : 0;
+                        of_b[i] = noise.chance(0.04) ? 1 - of_a[i] : of_a[i];
+                      }
+                    }
+                    return maskTraits(a, b);
+                  }});
+  return rows;
+}
+
+std::vector<Planted> allPlanted() {
+  std::vector<Planted> all;
+  for (const auto& part : {drifts(), overDistance(), otherWays(), overTime(), atEdges(), ofFrames()}) all.insert(all.end(), part.begin(), part.end());
+  return all;
+}
+
+/// How many of the runs held each truth. A trait that a run does not give (another drift model was chosen) did not.
+std::map<std::string, int> heldBy(const Planted& planted) {
+  std::map<std::string, int> held;
+  for (const auto& [name, truth] : planted.truth) held[name] = 0;
+  for (unsigned seed = 1; seed <= kRuns; ++seed) {
+    Noise noise{seed};
+    const Traits traits = planted.run(noise);
+    EXPECT_TRUE(traits) << planted.name << ", seed " << seed << ": " << traits.error().message;
+    if (!traits) continue;
+    for (const Trait& trait : *traits) {
+      const auto truth = planted.truth.find(trait.name);
+      if (truth != planted.truth.end() && trait.low <= truth->second && truth->second <= trait.high) ++held[trait.name];
+    }
+  }
+  return held;
+}
+
+class Coverage : public testing::TestWithParam<std::size_t> {};
+
+/// 90 to 98.5 % of 200 runs. The goal is 98; but what holds exactly 95 % exceeds 98 in 0.9 % of all choices of 200 seeds,
+/// and two of these 48 rows do. The seeds are fixed, so the test does not waver. What holds 85 % fails in 97 %.
+TEST_P(Coverage, OfIntervalsIs90To98Percent) {
+  const Planted planted = allPlanted()[GetParam()];
+  std::stringstream page;
+  page << std::ifstream{TOFTWIN_SOURCE_DIR "/docs/characteristics.md"}.rdbuf();
+  for (const auto& [name, held] : heldBy(planted)) {
+    EXPECT_GE(held, 180) << planted.name << ": " << name;
+    EXPECT_LE(held, 197) << planted.name << ": " << name;
+    const std::string row = fmt::format("| {} | {} | {:.6g} | {:.1f} |", planted.name, name, planted.truth.at(name), held / 2.0);
+    EXPECT_THAT(page.str(), testing::HasSubstr(row));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Planted, Coverage, testing::Range(std::size_t{0}, allPlanted().size()));
+
+}  // namespace
+}  // namespace toftwin::compare

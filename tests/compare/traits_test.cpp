@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+// Characteristics from series and frames: what no coverage shows.
+#include "calib/compare/traits/traits.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "calib/compare/traits/least_squares.h"
+
+namespace toftwin::compare {
+namespace {
+
+using testing::HasSubstr;
+
+/// 200 flat series of 181 values: a model other than the constant is an over-fit. 10 of 200 is the bar.
+TEST(DriftTraits, ChooseTheConstantOnFlatData) {
+  int wrong = 0;
+  for (unsigned seed = 1; seed <= 200; ++seed) {
+    std::mt19937_64 random{seed};
+    std::normal_distribution<double> noise{0.0, 0.3};
+    std::vector<double> t, y;
+    for (int i = 0; i < 181; ++i) {
+      t.push_back(20.0 * i);
+      y.push_back(1500.0 + noise(random));
+    }
+    const auto drift = driftTraits(t, y);
+    ASSERT_TRUE(drift);
+    wrong += drift->model != DriftModel::Constant;
+  }
+  EXPECT_LE(wrong, 10);
+}
+
+/// y = 2 + 3 x exactly at five places but for ±1 that is orthogonal to both: s² = 4/3, var(slope) = s²/Σx² = 4/3/10.
+TEST(LeastSquares, GivesTheErrorsOfAStraightLine) {
+  const std::vector<double> x{-2, -1, 0, 1, 2}, y{2 - 6 + 0.5, 2 - 3 - 1, 2 + 1, 2 + 3 - 1, 2 + 6 + 0.5};
+  // Residuals (0.5, −1, 1, −1, 0.5): sum 0, Σ x e = 0, Σ e² = 3.5.
+  const auto fit = fitLeastSquares([&](std::span<const double> p, std::size_t i) { return p[0] + p[1] * x[i]; }, y, {0.0, 0.0});
+  ASSERT_TRUE(fit);
+  EXPECT_NEAR(fit->at[0], 2.0, 1e-9);
+  EXPECT_NEAR(fit->at[1], 3.0, 1e-9);
+  EXPECT_NEAR(fit->error(1), std::sqrt(3.5 / 3.0 / 10.0), 1e-6);
+  EXPECT_NEAR(studentT(3), 3.18245, 1e-5);
+  const Trait slope = fit->trait("slope", "", 1);
+  EXPECT_NEAR(slope.high - slope.value, 3.18245 * std::sqrt(3.5 / 30.0), 1e-5);
+}
+
+TEST(LeastSquares, GivesNothingWhereRowsDoNotTellAParameter) {
+  const std::vector<double> y{1.0, 1.1, 0.9, 1.0};
+  EXPECT_FALSE(fitLeastSquares([](std::span<const double> p, std::size_t) { return p[0] + 2.0 * p[1]; }, y, {0.0, 0.0}));
+  EXPECT_FALSE(fitLeastSquares([](std::span<const double> p, std::size_t) { return p[0]; }, {}, {0.0}));
+}
+
+std::string errorOf(const Traits& traits) { return traits ? "no error" : traits.error().message; }
+
+TEST(Traits, SayWhatRowsCannotTell) {
+  const std::vector<double> few{1, 2, 3}, same(20, 1.0), zero(20, 0.0), nothing(20, std::numeric_limits<double>::quiet_NaN());
+  EXPECT_THAT(errorOf(wrapTraits(nothing, 1.5)), HasSubstr("0 of 20 rows are finite"));
+  EXPECT_THAT(errorOf(wrapTraits(same, 0.0)), HasSubstr("period"));
+  EXPECT_THAT(errorOf(amplitudeTraits(same, same)), HasSubstr("all amplitudes are alike"));
+  EXPECT_THAT(errorOf(amplitudeTraits(zero, same)), HasSubstr("must be positive"));
+  EXPECT_THAT(errorOf(ambientTraits(same, same, few)), HasSubstr("one column has 20 rows, another 3"));
+  EXPECT_THAT(errorOf(edgeTraits(same, same)), HasSubstr("one place"));
+  EXPECT_THAT(errorOf(flyingTraits(Image<float>(10, 10, 1.0f))), HasSubstr("fewer than four rows cross"));
+  EXPECT_THAT(errorOf(shadowTraits(Image<float>(10, 10, 1.0f), 0.5)), HasSubstr("fewer than four rows"));
+  EXPECT_THAT(errorOf(noiseTraits({})), HasSubstr("0 frames"));
+  EXPECT_THAT(errorOf(timingTraits(same)), HasSubstr("one after the other"));
+  EXPECT_FALSE(driftTraits(same, same));
+  EXPECT_FALSE(lagTraits(same, same));
+  EXPECT_FALSE(latencyTraits(same, same, few, few));
+  EXPECT_FALSE(cornerTraits(same, same));
+  EXPECT_FALSE(noiseLawTraits(same, same));
+}
+
+TEST(Traits, LeaveOutRowsThatAreNotFinite) {
+  std::vector<double> speed, error;
+  for (int i = 0; i < 10; ++i) {
+    speed.push_back(i == 4 ? std::nan("") : 0.2 * i);
+    error.push_back(i == 7 ? INFINITY : 3.0 * 0.2 * i + (i % 2 == 0 ? 0.01 : -0.01));
+  }
+  const auto traits = motionTraits(speed, error);
+  ASSERT_TRUE(traits);
+  EXPECT_EQ(traits->front().n, 8u);
+  EXPECT_NEAR(traits->front().value, 3.0, 0.05);
+}
+
+}  // namespace
+}  // namespace toftwin::compare
