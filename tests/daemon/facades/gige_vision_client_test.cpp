@@ -140,6 +140,35 @@ TEST_F(GigeVisionClient, ReadsOneImageOrAllWithAndWithoutChunksAndLongIds) {
   }
 }
 
+TEST_F(GigeVisionClient, TellsTheTimeOnTheSourcesClockOrOnTheDaemons) {
+  startGige(kSmallSim);
+  const auto camera = open();
+  ASSERT_NE(camera, nullptr);
+  ArvDevice* device = arv_camera_get_device(camera.get());
+  constexpr std::uint64_t kMinute_ns = 60'000'000'000;
+  const auto expectNear = [&](std::uint64_t later_ns, std::uint64_t earlier_ns) {
+    EXPECT_GE(later_ns, earlier_ns);
+    EXPECT_LT(later_ns - earlier_ns, kMinute_ns);
+  };
+  for (const bool on_host : {false, true}) {
+    arv_device_set_boolean_feature_value(device, "PtpEnable", on_host ? TRUE : FALSE, nullptr);
+    const std::chrono::nanoseconds host = std::chrono::system_clock::now().time_since_epoch();
+    const Received received = receive(camera.get(), {}, 3);
+    ASSERT_EQ(received.images.size(), 3U);
+    const std::uint64_t stamp_ns = received.images.back().stamp_ns;
+    expectNear(stamp_ns, on_host ? static_cast<std::uint64_t>(host.count()) - kMinute_ns / 2 : 0U);
+    for (const char* command : {"TimestampLatch", "GevTimestampControlLatch"}) {
+      arv_device_execute_command(device, command, nullptr);
+      for (const char* value : {"TimestampLatchValue", "GevTimestampValue"})
+        expectNear(static_cast<std::uint64_t>(arv_device_get_integer_feature_value(device, value, nullptr)),
+                   stamp_ns);
+    }
+    arv_device_execute_command(device, "PtpDataSetLatch", nullptr);
+    EXPECT_STREQ(arv_device_get_string_feature_value(device, "PtpStatus", nullptr),
+                 on_host ? "Slave" : "Disabled");
+  }
+}
+
 TEST_F(GigeVisionClient, ReadsAPartOfTheImage) {
   startGige(kSmallSim);
   const auto camera = open();

@@ -121,6 +121,36 @@ TEST_F(GigeVisionCross, PointsAreTheNativeRangesAlongTheirRays) {
   });
 }
 
+TEST_F(GigeVisionCross, CountsOfPointsAreWithinHalfACountOfThem) {
+  startGige(kSmallSim);
+  compare("components = ['Range']\npixel_format = 'Coord3D_ABC16'",
+          [](const Frame& native, const Frame& through) {
+            const auto range_m = native.find(PlaneKind::Range)->as<float>();
+            const auto range_got = through.find(PlaneKind::Range)->as<float>();
+            for (std::size_t i = 0; i < range_m.size(); ++i) {
+              ASSERT_EQ(std::isnan(range_got[i]), std::isnan(range_m[i])) << i;
+              if (std::isnan(range_m[i])) continue;
+              // Half a count of 0.5 mm in each of three coordinates.
+              ASSERT_NEAR(range_got[i], range_m[i], 0.25e-3 * std::sqrt(3.0) + 1e-6) << i;
+            }
+          });
+}
+
+TEST_F(GigeVisionCross, DepthIsTheNativeOneBitForBit) {
+  startGige(kSmallSim);
+  compare("components = ['Range']\npixel_format = 'Coord3D_C32f'",
+          [](const Frame& native, const Frame& through) {
+            ASSERT_NE(native.find(PlaneKind::Depth), nullptr);
+            const auto depth_m = native.find(PlaneKind::Depth)->as<float>();
+            const auto depth_got = through.find(PlaneKind::Depth)->as<float>();
+            for (std::size_t i = 0; i < depth_m.size(); ++i) {
+              ASSERT_EQ(std::isnan(depth_got[i]), std::isnan(depth_m[i])) << i;
+              if (std::isnan(depth_m[i])) continue;
+              ASSERT_EQ(depth_got[i], rangeThroughC32f(depth_m[i])) << i;
+            }
+          });
+}
+
 TEST_F(GigeVisionCross, IsCompliantThroughOurDriver) {
   startGige(kSmallSim);
   const drivers::Driver driver = drivers::aravis::row();
