@@ -5,6 +5,7 @@
 #include "daemon/facades/gige_vision/keys.h"
 #include "daemon/facades/modbus/keys.h"
 #include "daemon/facades/o3d303/keys.h"
+#include "daemon/facades/ros2/keys.h"
 
 namespace toftwin::daemon {
 
@@ -13,6 +14,7 @@ std::span<const FacadeKind> allFacades() {
       o3d303::facade(),
       modbus::facade(),
       gige_vision::facade(),
+      ros2::facade(),
   };
   return kTable;
 }

@@ -1,0 +1,301 @@
+// SPDX-License-Identifier: Apache-2.0
+// One truth: the same frame, read natively and as ROS 2's messages by a DDS of another maker.
+#include <unistd.h>
+
+#include <array>
+#include <bit>
+#include <cmath>
+#include <map>
+
+#include "facade_testing.h"
+#include "ros2_reader.h"
+
+namespace toftwin::daemon {
+namespace {
+
+using namespace test;
+using namespace toftwin::test;
+using Policy = SubscribeOptions::Policy;
+
+constexpr const char* kImage = "sensor_msgs::msg::dds_::Image_";
+constexpr const char* kInfo = "sensor_msgs::msg::dds_::CameraInfo_";
+constexpr const char* kPoints = "sensor_msgs::msg::dds_::PointCloud2_";
+constexpr const char* kTransforms = "tf2_msgs::msg::dds_::TFMessage_";
+constexpr const char* kPose = "geometry_msgs::msg::dds_::PoseStamped_";
+
+/// Where nobody else should be; tests run side by side.
+int someDomain() { return 1 + ::getpid() % 90; }
+
+/// The frame's time stamp, and who says it.
+std::int64_t readHeader(CdrReader& cdr, const std::string& frame = "cam_optical_frame") {
+  const auto seconds = cdr.number<std::int32_t>();
+  const auto nanoseconds = cdr.number<std::uint32_t>();
+  EXPECT_LT(nanoseconds, 1'000'000'000U);
+  EXPECT_EQ(cdr.text(), frame);
+  return std::int64_t{seconds} * 1'000'000'000 + nanoseconds;
+}
+std::int64_t rosTimeOf(const Frame& frame) {
+  return frame.moment.exposures.at(0).start.ns + frame.moment.clock.host_minus_device_ns;
+}
+
+std::uint32_t bitsOf(float value) {
+  return std::isnan(value) ? 0x7FC0'0000U : std::bit_cast<std::uint32_t>(value);
+}
+
+class Ros2Cross : public RunningFacade {
+ protected:
+  void startRos2(const std::string& source_keys, const std::string& facade_keys = {}) {
+    start(fmt::format(
+        "[[source]]\nname = 'cam'\n{}\n[[facade]]\nkind = 'ros2'\nsource = 'cam'\ndomain = {}\n{}\n",
+        source_keys, domain_, facade_keys));
+    program_.emplace(domain_);
+  }
+  /// Calls `compare(native, message)` for three messages of the reader.
+  template <class Compare>
+  void compare(dds::DataReader* reader, Compare compare_one) {
+    auto native_client = client();
+    auto stream = native_client.subscribe("cam", {.policy = Policy::Queue, .queue = 64});
+    ASSERT_TRUE(stream.ok()) << stream.error().message;
+    std::map<std::int64_t, Frame> natives;
+    int compared = 0;
+    for (int i = 0; i < 60 && compared < 3; ++i) {
+      auto message = nextOf(reader);
+      ASSERT_TRUE(message);
+      CdrReader head{*message};
+      const std::int64_t stamp = readHeader(head);
+      while (natives.empty() || natives.rbegin()->first < stamp) {
+        auto native = stream->next(kSoon);
+        ASSERT_TRUE(native.ok()) << native.error().message;
+        const std::int64_t at = rosTimeOf(*native);
+        natives.insert_or_assign(at, *std::move(native));
+      }
+      const auto same = natives.find(stamp);
+      if (same == natives.end()) continue;  // from before the native subscription
+      CdrReader cdr{*std::move(message)};
+      readHeader(cdr);
+      ASSERT_NO_FATAL_FAILURE(compare_one(same->second, cdr));
+      EXPECT_LT(cdr.left(), 4U);  // messages are filled up to a multiple of 4 bytes
+      ++compared;
+    }
+    EXPECT_EQ(compared, 3);
+  }
+
+  const int domain_ = someDomain();
+  std::optional<RosProgram> program_;
+};
+
+struct ImageHead {
+  std::uint32_t height, width;
+  std::string encoding;
+  std::uint8_t is_bigendian;
+  std::uint32_t step, size;
+};
+ImageHead readImageHead(CdrReader& cdr) {
+  ImageHead head{};
+  head.height = cdr.number<std::uint32_t>();
+  head.width = cdr.number<std::uint32_t>();
+  head.encoding = cdr.text();
+  head.is_bigendian = cdr.number<std::uint8_t>();
+  head.step = cdr.number<std::uint32_t>();
+  head.size = cdr.number<std::uint32_t>();
+  return head;
+}
+void expectHead(const ImageHead& head, const Frame& native, const std::string& encoding,
+                std::uint32_t bytes) {
+  EXPECT_EQ(head.width, static_cast<std::uint32_t>(native.camera.width));
+  EXPECT_EQ(head.height, static_cast<std::uint32_t>(native.camera.height));
+  EXPECT_EQ(head.encoding, encoding);
+  EXPECT_EQ(head.is_bigendian, 0);
+  EXPECT_EQ(head.step, bytes * head.width);
+  ASSERT_EQ(head.size, head.step * head.height);
+}
+
+/// What docs/facades/ros2.md says becomes of a range.
+float depthOf(const Frame& frame, std::size_t i) {
+  const auto width = static_cast<std::size_t>(frame.camera.width);
+  const auto u = static_cast<double>(i % width), v = static_cast<double>(i / width);
+  const float range_m = frame.find(PlaneKind::Range)->as<float>()[i];
+  if (const Plane* depth = frame.find(PlaneKind::Depth)) return depth->as<float>()[i];
+  return static_cast<float>(static_cast<double>(range_m) * rayThroughPixel(frame.camera, u, v).v.z);
+}
+
+TEST_F(Ros2Cross, DepthIsTheNativeOneBitForBitWithItsTimeStamp) {
+  startRos2(kSmallSim);
+  compare(program_->read("/cam/depth/image_raw", kImage), [](const Frame& native, CdrReader& cdr) {
+    ASSERT_NO_FATAL_FAILURE(expectHead(readImageHead(cdr), native, "32FC1", 4));
+    const auto got = cdr.numbers<std::uint8_t>(cdr.left());
+    std::size_t valid = 0;
+    for (std::size_t i = 0; i < got.size() / 4; ++i) {
+      float metres = 0.0F;
+      std::memcpy(&metres, got.data() + 4 * i, 4);
+      ASSERT_EQ(bitsOf(metres), bitsOf(depthOf(native, i))) << i;
+      valid += std::isfinite(metres) ? 1 : 0;
+    }
+    EXPECT_GT(valid, got.size() / 8);
+  });
+}
+
+TEST_F(Ros2Cross, DepthInMillimetresIsRoundedAsDocumented) {
+  startRos2(kSmallSim, "depth_format = '16UC1'\nname = 'front/left'\nframe_id = 'cam_optical_frame'\n");
+  compare(program_->read("/front/left/depth/image_raw", kImage), [](const Frame& native, CdrReader& cdr) {
+    ASSERT_NO_FATAL_FAILURE(expectHead(readImageHead(cdr), native, "16UC1", 2));
+    const auto got = cdr.numbers<std::uint8_t>(cdr.left());
+    for (std::size_t i = 0; i < got.size() / 2; ++i) {
+      const double expected = std::round(1000.0 * static_cast<double>(depthOf(native, i)));
+      ASSERT_EQ(got[2 * i] + 256 * got[2 * i + 1], std::isfinite(expected) ? expected : 0.0) << i;
+    }
+  });
+}
+
+TEST_F(Ros2Cross, AmplitudeIsTheNativeOneForAReaderThatAsksForReliable) {
+  startRos2(kSmallSim, "reliability = 'reliable'\n");
+  compare(program_->read("/cam/amplitude/image_raw", kImage, Asks::Reliable),
+          [](const Frame& native, CdrReader& cdr) {
+            ASSERT_NO_FATAL_FAILURE(expectHead(readImageHead(cdr), native, "32FC1", 4));
+            const auto got = cdr.numbers<std::uint8_t>(cdr.left());
+            const auto expected = native.find(PlaneKind::Amplitude)->data.bytes();
+            EXPECT_EQ(std::memcmp(got.data(), expected.data(), expected.size()), 0);
+          });
+}
+
+TEST_F(Ros2Cross, CameraInfoIsTheLens) {
+  startRos2(kSmallSim);
+  compare(program_->read("/cam/depth/camera_info", kInfo), [](const Frame& native, CdrReader& cdr) {
+    const CameraInfo& camera = native.camera;
+    EXPECT_EQ(cdr.number<std::uint32_t>(), 132U);
+    EXPECT_EQ(cdr.number<std::uint32_t>(), 176U);
+    EXPECT_EQ(cdr.text(), "plumb_bob");
+    const auto& d = camera.distortion;
+    EXPECT_EQ(cdr.sequence<double>(), (std::vector<double>{d.begin(), d.end()}));
+    const std::vector<double> k{camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1};
+    const std::vector<double> p{camera.fx, 0, camera.cx, 0, 0, camera.fy, camera.cy, 0, 0, 0, 1, 0};
+    EXPECT_EQ(cdr.numbers<double>(9), k);
+    EXPECT_EQ(cdr.numbers<double>(9), (std::vector<double>{1, 0, 0, 0, 1, 0, 0, 0, 1}));
+    EXPECT_EQ(cdr.numbers<double>(12), p);
+    EXPECT_EQ(cdr.numbers<std::uint32_t>(6), std::vector<std::uint32_t>(6, 0U));  // binning, region
+    EXPECT_EQ(cdr.number<std::uint8_t>(), 0);
+  });
+}
+
+TEST_F(Ros2Cross, PointsAreTheNativeRangesAlongTheirRays) {
+  startRos2(kSmallSim);
+  compare(program_->read("/cam/points", kPoints), [](const Frame& native, CdrReader& cdr) {
+    EXPECT_EQ(cdr.number<std::uint32_t>(), 132U);
+    EXPECT_EQ(cdr.number<std::uint32_t>(), 176U);
+    ASSERT_EQ(cdr.number<std::uint32_t>(), 4U);
+    std::uint32_t offset = 0;
+    for (const char* name : {"x", "y", "z", "intensity"}) {
+      EXPECT_EQ(cdr.text(), name);
+      EXPECT_EQ(cdr.number<std::uint32_t>(), offset);
+      EXPECT_EQ(cdr.number<std::uint8_t>(), 7);  // FLOAT32
+      EXPECT_EQ(cdr.number<std::uint32_t>(), 1U);
+      offset += 4;
+    }
+    EXPECT_EQ(cdr.number<std::uint8_t>(), 0);  // little endian
+    EXPECT_EQ(cdr.number<std::uint32_t>(), 16U);
+    EXPECT_EQ(cdr.number<std::uint32_t>(), 16U * 176U);
+    const auto data = cdr.sequence<std::uint8_t>();
+    ASSERT_EQ(data.size(), 16U * 176U * 132U);
+    const auto range_m = native.find(PlaneKind::Range)->as<float>();
+    const auto amplitude = native.find(PlaneKind::Amplitude)->as<float>();
+    for (std::size_t i = 0; i < range_m.size(); ++i) {
+      std::array<float, 4> point{};
+      std::memcpy(point.data(), data.data() + 16 * i, 16);
+      const Vec3d ray =
+          rayThroughPixel(native.camera, static_cast<double>(i % 176), static_cast<double>(i / 176)).v;
+      const auto range = static_cast<double>(range_m[i]);
+      ASSERT_EQ(bitsOf(point[0]), bitsOf(static_cast<float>(range * ray.x))) << i;
+      ASSERT_EQ(bitsOf(point[1]), bitsOf(static_cast<float>(range * ray.y))) << i;
+      ASSERT_EQ(bitsOf(point[2]), bitsOf(static_cast<float>(range * ray.z))) << i;
+      ASSERT_EQ(bitsOf(point[3]), bitsOf(amplitude[i])) << i;
+    }
+    EXPECT_EQ(cdr.number<std::uint8_t>(), 0);  // not dense
+  });
+}
+
+struct ReadTransform {
+  std::int64_t stamp_ns;
+  std::string child;
+  std::vector<double> numbers;  ///< translation, rotation x y z w
+};
+ReadTransform readTransform(Cdr message) {
+  CdrReader cdr{std::move(message)};
+  EXPECT_EQ(cdr.number<std::uint32_t>(), 1U);
+  ReadTransform transform{};
+  transform.stamp_ns = readHeader(cdr, "world");
+  transform.child = cdr.text();
+  transform.numbers = cdr.numbers<double>(7);
+  EXPECT_LT(cdr.left(), 4U);
+  return transform;
+}
+std::vector<double> numbersOf(const Transform<World, Camera>& pose) {
+  const auto& [w, x, y, z] = pose.rotation_wxyz;
+  const Vec3d& t = pose.translation_m;
+  return {t.x, t.y, t.z, x, y, z, w};
+}
+
+TEST_F(Ros2Cross, APoseThatIsSentIsWhereTheNextFrameIsFrom) {
+  startRos2("pace = 'trigger'\n" + kSmallSim, "pose_topic = '/amr/pose'\ntrigger_on_pose = true\n");
+  auto* transforms = program_->read("/tf_static", kTransforms, Asks::Latched);
+  auto* images = program_->read("/cam/depth/image_raw", kImage);
+  auto* poses = program_->write("/amr/pose", kPose);
+  auto native_client = client();
+  auto stream = native_client.subscribe("cam", {.policy = Policy::Queue, .queue = 64});
+  ASSERT_TRUE(stream.ok());
+  ASSERT_TRUE(eventually([&] {
+    dds::PublicationMatchedStatus status;
+    poses->get_publication_matched_status(status);
+    dds::SubscriptionMatchedStatus seen;
+    images->get_subscription_matched_status(seen);
+    return status.current_count > 0 && seen.current_count > 0;
+  }));
+  const auto send = [&](const std::array<double, 7>& numbers, const std::string& frame = "world") {
+    CdrWriter cdr;
+    cdr.number<std::int32_t>(5).number<std::uint32_t>(6).text(frame);
+    for (const double one : numbers) cdr.number(one);
+    ASSERT_TRUE(poses->write(&cdr.bytes()));
+  };
+  send({0, 0, 0, 0, 0, 0, std::nan("")});
+  ASSERT_TRUE(log_->waitFor("unit quaternion", 1));
+  send({1e300, 0, 0, 0.9, 0, 0, 0.9});
+  ASSERT_TRUE(log_->waitFor("1e+300", 1));
+  send({0, 0, 0, 0, 0, 0, 1}, "map");
+  ASSERT_TRUE(log_->waitFor("not in \"world\"", 1));
+  send({0.25, -0.125, -0.5, 0.0, 0.6, 0.0, 0.8});
+  const auto frame = stream->next(kSoon);
+  ASSERT_TRUE(frame.ok()) << frame.error().message;
+  const Transform<World, Camera> expected{{0.8, 0.0, 0.6, 0.0}, {0.25, -0.125, -0.5}};
+  ASSERT_TRUE(frame->moment.world_from_camera);
+  EXPECT_EQ(*frame->moment.world_from_camera, expected);
+  const auto image = nextOf(images);
+  ASSERT_TRUE(image);
+  CdrReader cdr{*image};
+  EXPECT_EQ(readHeader(cdr), rosTimeOf(*frame));
+  ReadTransform seen{};
+  do {
+    auto message = nextOf(transforms);
+    ASSERT_TRUE(message);
+    seen = readTransform(*std::move(message));
+  } while (seen.numbers != numbersOf(expected));
+  EXPECT_EQ(seen.child, "cam_optical_frame");
+  EXPECT_EQ(seen.stamp_ns, rosTimeOf(*frame));
+}
+
+TEST_F(Ros2Cross, AReaderThatComesLateGetsTheStaticTransform) {
+  startRos2(kSmallSim + "position_m = [0.5, 0.25, -1.0]\n");
+  auto native_client = client();
+  auto stream = native_client.subscribe("cam");
+  const auto frame = stream->next(kSoon);
+  ASSERT_TRUE(frame.ok());
+  auto message = nextOf(program_->read("/tf_static", kTransforms, Asks::Latched));
+  ASSERT_TRUE(message);
+  const auto first = readTransform(*std::move(message));
+  EXPECT_EQ(first.numbers, numbersOf(*frame->moment.world_from_camera));
+  RosProgram late{domain_};
+  auto again = nextOf(late.read("/tf_static", kTransforms, Asks::Latched));
+  ASSERT_TRUE(again);
+  EXPECT_EQ(readTransform(*std::move(again)).numbers, first.numbers);
+}
+
+}  // namespace
+}  // namespace toftwin::daemon
