@@ -62,7 +62,7 @@ PoseComparison thinned(const PoseComparison& all, int stride) {
 
 void summarise(const PoseComparison& all, ComparedCapture& one) {
   compare::Running difference, range;
-  std::vector<double> noise_a, noise_b;
+  std::vector<double> noise_a, noise_b, amplitude_a, amplitude_b;
   std::size_t looked_at = 0, valid_a = 0, valid_b = 0, agree = 0;
   for (std::size_t i = 0; i < all.difference_mm.size(); ++i) {
     if (std::isfinite(all.valid_b[i])) {
@@ -74,6 +74,10 @@ void summarise(const PoseComparison& all, ComparedCapture& one) {
     range.add(static_cast<double>(all.range_a_mm[i]));
     noise_a.push_back(static_cast<double>(all.noise_a_mm[i])),
         noise_b.push_back(static_cast<double>(all.noise_b_mm[i]));
+    if (all.amplitude_a.empty()) continue;
+    amplitude_a.push_back(static_cast<double>(all.amplitude_a[i]));
+    if (all.amplitude_ratio.empty() || !std::isfinite(all.amplitude_ratio[i])) continue;
+    amplitude_b.push_back(amplitude_a.back() * static_cast<double>(all.amplitude_ratio[i]));
   }
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   const bool has_any = difference.n() > 0;
@@ -82,6 +86,8 @@ void summarise(const PoseComparison& all, ComparedCapture& one) {
   one.error_mm = compare::blockedError(compare::comparedDifference_mm(all));
   one.noise_a_mm = compare::quantile(std::move(noise_a), 0.5),
   one.noise_b_mm = compare::quantile(std::move(noise_b), 0.5);
+  one.amplitude_a = compare::quantile(std::move(amplitude_a), 0.5);
+  one.amplitude_b = compare::quantile(std::move(amplitude_b), 0.5);
   const auto n = static_cast<double>(std::max<std::size_t>(1, looked_at));
   one.valid_a = static_cast<double>(valid_a) / n, one.valid_b = static_cast<double>(valid_b) / n;
   one.masks_agree = static_cast<double>(agree) / n;

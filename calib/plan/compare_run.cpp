@@ -72,22 +72,32 @@ std::set<std::size_t> examplesOf(const std::vector<CaptureRecord>& records) {
   return numbers;
 }
 
-/// How far apart the pixels are that are kept, by the first capture's size.
-Result<int> strideOf(const std::filesystem::path& run, const std::vector<CaptureRecord>& records) {
+/// What the first frame of A says.
+struct FirstFrame {
+  int stride = 1;  ///< how far apart the pixels are that are kept, by the image's size
+  std::vector<double> frequency_hz{};
+};
+
+Result<FirstFrame> firstFrameOf(const std::filesystem::path& run, const std::vector<CaptureRecord>& records) {
   auto reader = record::Reader::open(run / records.front().a.file);
   if (!reader) return reader.error();
   const auto frame = reader->next();
   if (!frame) return frame.error();
   const double pixels =
       static_cast<double>(frame->camera.width) * frame->camera.height * static_cast<double>(records.size());
-  return static_cast<int>(std::ceil(std::sqrt(std::max(1.0, pixels / kPixelsKept))));
+  FirstFrame first{.stride = static_cast<int>(std::ceil(std::sqrt(std::max(1.0, pixels / kPixelsKept))))};
+  for (const Exposure& exposure : frame->moment.exposures) {
+    const double f = exposure.modulation.in(hertz);
+    if (f > 0.0 && std::ranges::find(first.frequency_hz, f) == first.frequency_hz.end()) first.frequency_hz.push_back(f);
+  }
+  return first;
 }
 
 /// Two captures at a time; each is read, compared and thinned before the next.
 Result<ComparedRun> compareAll(const CompareRunJob& job, const std::vector<CaptureRecord>& records,
                                compare::Progress& progress) {
-  const auto stride = strideOf(job.run, records);
-  if (!stride) return stride.error();
+  const auto first = firstFrameOf(job.run, records);
+  if (!first) return first.error();
   const auto shown = examplesOf(records);
   const unsigned workers = std::clamp(std::thread::hardware_concurrency(), 1u, 4u);
   std::vector<std::optional<Result<ComparedCapture>>> results(records.size());
@@ -97,7 +107,7 @@ Result<ComparedRun> compareAll(const CompareRunJob& job, const std::vector<Captu
   const auto work = [&] {
     for (std::size_t i = next++; i < records.size() && !gives_up; i = next++) {
       const bool is_shown = shown.contains(records[i].number);
-      results[i] = compareCapture(job.run, records[i], *stride, is_shown ? &wholes[i] : nullptr);
+      results[i] = compareCapture(job.run, records[i], first->stride, is_shown ? &wholes[i] : nullptr);
       if (!*results[i]) gives_up = true;
       ++done;
     }
@@ -114,6 +124,7 @@ Result<ComparedRun> compareAll(const CompareRunJob& job, const std::vector<Captu
   }
   if (job.interrupted && job.interrupted()) return Error{Error::Code::Stopped, "interrupted"};
   ComparedRun run;
+  run.frequency_hz = first->frequency_hz;
   for (std::size_t i = 0; i < results.size(); ++i) {
     if (results[i] && !*results[i]) return results[i]->error();
     if (!results[i]) continue;  // after an error, which another one has

@@ -22,6 +22,7 @@ struct ComparedCapture {
   double error_mm = 0.0;                                   ///< its standard error over the image, by blocks
   double range_a_mm = 0.0;                                 ///< mean
   double noise_a_mm = 0.0, noise_b_mm = 0.0;               ///< temporal, medians
+  double amplitude_a = 0.0, amplitude_b = 0.0;             ///< medians; NaN where a camera gives none
   double valid_a = 0.0, valid_b = 0.0, masks_agree = 0.0;  ///< shares of the pixels
   /// Every so-manieth pixel of each row and column, for what is told of all captures together.
   compare::PoseComparison thinned;

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "calib/compare/live_report.h"
+#include "calib/plan/run_traits.h"
 
 namespace toftwin::plan {
 namespace {
@@ -237,6 +238,9 @@ Result<Finding> judgeRun(const ComparedRun& run) {
   blocks.push_back(blockTable(run));
   addFigures(run, blocks);
   if (auto again = againTable(run); !again.rows.empty()) blocks.push_back(std::move(again));
+  const RunTraits traits = traitsOf(run);
+  if (!traits.traits.empty()) blocks.push_back(traitTable(traits));
+  if (!traits.untold.empty()) blocks.push_back(Details{"What these captures cannot tell", traits.untold});
   blocks.push_back(regionTable(c));
   blocks.push_back(maskTable(c));
   blocks.push_back(captureTable(run));
@@ -245,7 +249,7 @@ Result<Finding> judgeRun(const ComparedRun& run) {
       "million; means of single captures, their errors and the maps are over all pixels.",
       true});
   finding.data = toJson(c);
-  finding.data.set("captures", captureJson(run));
+  finding.data.set("captures", captureJson(run)).set("characteristics", toJson(traits));
   return finding;
 }
 

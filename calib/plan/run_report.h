@@ -18,6 +18,7 @@ struct ComparedRun {
   std::vector<ComparedCapture> captures;
   std::vector<std::pair<std::string, compare::PoseComparison>>
       examples;  ///< whole images, a capture of each block
+  std::vector<double> frequency_hz;  ///< A's modulation frequencies; empty: none is told
   std::vector<std::string> warnings;
   bool is_locked = false;  ///< of the locked captures
 };

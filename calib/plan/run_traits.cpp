@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/plan/run_traits.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "calib/compare/live_report.h"
+
+namespace toftwin::plan {
+namespace {
+
+using compare::Trait;
+using Captures = std::vector<const ComparedCapture*>;
+
+/// Rows for each parameter of a fit; fewer tell little more than themselves.
+constexpr std::size_t kRowsPerParameter = 3;
+
+Captures capturesOf(const ComparedRun& run, std::string_view kind) {
+  Captures chosen;
+  for (const ComparedCapture& one : run.captures) {
+    if (one.pixels > 0 && (kind.empty() || one.record.kind == kind)) chosen.push_back(&one);
+  }
+  return chosen;
+}
+
+std::vector<double> column(const Captures& captures, const std::function<double(const ComparedCapture&)>& value) {
+  std::vector<double> values;
+  for (const ComparedCapture* one : captures) values.push_back(value(*one));
+  return values;
+}
+std::vector<double> differencesOf(const Captures& captures) {
+  return column(captures, [](const auto& one) { return one.difference_mm; });
+}
+
+/// A camera, and how its own numbers are got from a capture.
+struct Side {
+  const char* name;
+  double (*range_mm)(const ComparedCapture&);
+  double (*noise_mm)(const ComparedCapture&);
+  double (*amplitude)(const ComparedCapture&);
+  double (*since_power_on_s)(const ComparedCapture&);
+};
+constexpr std::array kSides{
+    Side{"A", [](const ComparedCapture& c) { return c.range_a_mm; },
+         [](const ComparedCapture& c) { return c.noise_a_mm; }, [](const ComparedCapture& c) { return c.amplitude_a; },
+         [](const ComparedCapture& c) { return c.record.a.since_power_on_s; }},
+    Side{"B", [](const ComparedCapture& c) { return c.range_a_mm + c.difference_mm; },
+         [](const ComparedCapture& c) { return c.noise_b_mm; }, [](const ComparedCapture& c) { return c.amplitude_b; },
+         [](const ComparedCapture& c) { return c.record.b.since_power_on_s; }}};
+
+class Collector {
+ public:
+  void add(const std::string& what, const char* of, const compare::Traits& traits) {
+    if (!traits) {
+      found_.untold.push_back(fmt::format("{} of {}: {}", what, of, traits.error().message));
+      return;
+    }
+    for (const Trait& trait : *traits) found_.traits.push_back({what, of, trait});
+  }
+  RunTraits found() && { return std::move(found_); }
+
+ private:
+  RunTraits found_;
+};
+
+const char* nameOf(compare::DriftModel model) {
+  switch (model) {
+    case compare::DriftModel::Constant: return "none";
+    case compare::DriftModel::Ramp: return "ramp";
+    case compare::DriftModel::OneExponential: return "one exponential";
+    case compare::DriftModel::TwoExponentials: return "two exponentials";
+    case compare::DriftModel::Step: return "step";
+  }
+  return "";
+}
+
+void addDrift(const ComparedRun& run, Collector& all) {
+  const Captures captures = capturesOf(run, "warm_up");
+  if (captures.empty()) return;
+  for (const Side& side : kSides) {
+    const auto drift = compare::driftTraits(column(captures, side.since_power_on_s), column(captures, side.range_mm));
+    if (drift) {
+      all.add(fmt::format("drift, {}", nameOf(drift->model)), side.name, drift->traits);
+    } else {
+      all.add("drift", side.name, drift.error());
+    }
+  }
+}
+
+/// As many of four, three, two and one wave per period as the rows allow: cameras of four and three steps have the
+/// first of these.
+void addHarmonics(const ComparedRun& run, Collector& all) {
+  const Captures captures = capturesOf(run, "distance");
+  if (captures.empty() || run.frequency_hz.empty()) return;
+  std::vector<int> orders;
+  for (const int order : {4, 3, 2, 1}) {
+    const std::size_t parameters = 2 + 2 * run.frequency_hz.size() * (orders.size() + 1);
+    if (captures.size() >= kRowsPerParameter * parameters) orders.push_back(order);
+  }
+  if (orders.empty()) {
+    all.add("harmonics", "B − A",
+            Error{Error::Code::InvalidArgument,
+                  fmt::format("{} captures over distance for {} frequencies; {} are needed", captures.size(),
+                              run.frequency_hz.size(), kRowsPerParameter * (2 + 2 * run.frequency_hz.size()))});
+    return;
+  }
+  const auto distance = column(captures, [](const auto& one) { return one.range_a_mm / 1000.0; });
+  all.add("harmonics", "B − A", compare::harmonicTraits(distance, differencesOf(captures), run.frequency_hz, orders));
+}
+
+void addAmplitudeAndAmbient(const ComparedRun& run, Collector& all) {
+  if (const Captures captures = capturesOf(run, "exposure"); !captures.empty()) {
+    all.add("error over amplitude", "B − A",
+            compare::amplitudeTraits(column(captures, kSides[0].amplitude), differencesOf(captures)));
+  }
+  const Captures captures = capturesOf(run, "ambient");
+  if (captures.empty()) return;
+  const auto light = column(captures, [](const auto& one) { return one.record.ambient_klx; });
+  for (const Side& side : kSides) {
+    all.add("ambient light", side.name,
+            compare::ambientTraits(light, column(captures, side.range_mm), column(captures, side.noise_mm)));
+  }
+}
+
+void addNoiseLaw(const ComparedRun& run, Collector& all) {
+  const Captures captures = capturesOf(run, "");
+  for (const Side& side : kSides) {
+    const auto amplitude = column(captures, side.amplitude);
+    if (std::ranges::none_of(amplitude, [](double a) { return std::isfinite(a); })) continue;  // it gives none
+    all.add("noise law", side.name, compare::noiseLawTraits(amplitude, column(captures, side.noise_mm)));
+  }
+}
+
+void addMasks(const ComparedRun& run, Collector& all) {
+  const auto maskOf = [](const Image<float>& share, const Image<float>& looked_at) {
+    Image<std::uint8_t> mask{share.width(), share.height()};
+    for (std::size_t i = 0; i < mask.size(); ++i) mask[i] = std::isfinite(looked_at[i]) && share[i] >= 0.5F ? 1 : 0;
+    return mask;
+  };
+  std::vector<Image<std::uint8_t>> a, b;
+  for (const ComparedCapture* one : capturesOf(run, "")) {
+    a.push_back(maskOf(one->thinned.valid_a, one->thinned.valid_b));
+    b.push_back(maskOf(one->thinned.valid_b, one->thinned.valid_b));
+  }
+  all.add("masks", "A and B", compare::maskTraits(a, b));
+}
+
+}  // namespace
+
+RunTraits traitsOf(const ComparedRun& run) {
+  Collector all;
+  addDrift(run, all);
+  addHarmonics(run, all);
+  addAmplitudeAndAmbient(run, all);
+  addNoiseLaw(run, all);
+  addMasks(run, all);
+  return std::move(all).found();
+}
+
+compare::TableBlock traitTable(const RunTraits& traits) {
+  compare::TableBlock table{
+      "Characteristics over the captures, with the intervals that are to hold them with 95 %: see docs/characteristics.md",
+      {"characteristic", "of", "number", "value", "95 % from", "to", "unit", "rows"},
+      {}};
+  for (const auto& [what, of, trait] : traits.traits) {
+    table.rows.push_back({what, of, trait.name, fmt::format("{:.4g}", trait.value), fmt::format("{:.4g}", trait.low),
+                          fmt::format("{:.4g}", trait.high), trait.unit, std::to_string(trait.n)});
+  }
+  return table;
+}
+
+compare::Json toJson(const RunTraits& traits) {
+  compare::Json rows = compare::Json::array(), untold = compare::Json::array();
+  for (const auto& [what, of, trait] : traits.traits) {
+    compare::Json row = compare::Json::object();
+    row.set("characteristic", what).set("of", of).set("name", trait.name).set("unit", trait.unit);
+    row.set("value", trait.value).set("low", trait.low).set("high", trait.high).set("n", trait.n);
+    rows.push(std::move(row));
+  }
+  for (const std::string& text : traits.untold) untold.push(text);
+  compare::Json json = compare::Json::object();
+  json.set("rows", std::move(rows)).set("untold", std::move(untold));
+  return json;
+}
+
+}  // namespace toftwin::plan
