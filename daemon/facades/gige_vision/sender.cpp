@@ -18,7 +18,7 @@ using std::chrono::steady_clock;
 constexpr std::size_t kMostBlocks = 3, kMostAgain = 4096, kLeastKept = 2;
 constexpr int kBatch = 64;  ///< packets in one go, so that commands are answered in between
 constexpr std::chrono::microseconds kFull{200};        ///< until a socket that was full is tried again
-constexpr std::chrono::microseconds kMostBehind{500};  ///< that is caught up by sending faster
+constexpr std::chrono::microseconds kMostBehind{800};  ///< that is caught up by sending faster
 constexpr int kSocketBytes = 4 << 20;
 constexpr std::uint32_t kMostUnavailable = 64;
 

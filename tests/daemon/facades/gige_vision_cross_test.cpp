@@ -164,6 +164,14 @@ TEST_F(GigeVisionCross, IsCompliantThroughOurDriver) {
   }
 }
 
+TEST_F(GigeVisionCross, IsFoundByOurDriverBySerialNumber) {
+  startGige(kSmallSim);
+  auto table = settings::Table::parse(fmt::format("uri = 'aravis:{}'", name_), "driver.toml");
+  const auto driver = drivers::aravis::row().open(*table);
+  ASSERT_TRUE(driver.ok()) << driver.error().message;
+  EXPECT_EQ((*driver)->info().serial, name_);
+}
+
 TEST_F(GigeVisionCross, SaysThatTheSourceLostFrames) {
   startGige(kSmallSim + "[[source.fault]]\nkind = 'loss'\nfirst = 4\nframes = 2\nevery = 8\n");
   auto driver = openDriver("");
