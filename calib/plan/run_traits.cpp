@@ -28,7 +28,8 @@ Captures capturesOf(const ComparedRun& run, std::string_view kind) {
   return chosen;
 }
 
-std::vector<double> column(const Captures& captures, const std::function<double(const ComparedCapture&)>& value) {
+std::vector<double> column(const Captures& captures,
+                           const std::function<double(const ComparedCapture&)>& value) {
   std::vector<double> values;
   for (const ComparedCapture* one : captures) values.push_back(value(*one));
   return values;
@@ -45,13 +46,14 @@ struct Side {
   double (*amplitude)(const ComparedCapture&);
   double (*since_power_on_s)(const ComparedCapture&);
 };
-constexpr std::array kSides{
-    Side{"A", [](const ComparedCapture& c) { return c.range_a_mm; },
-         [](const ComparedCapture& c) { return c.noise_a_mm; }, [](const ComparedCapture& c) { return c.amplitude_a; },
-         [](const ComparedCapture& c) { return c.record.a.since_power_on_s; }},
-    Side{"B", [](const ComparedCapture& c) { return c.range_a_mm + c.difference_mm; },
-         [](const ComparedCapture& c) { return c.noise_b_mm; }, [](const ComparedCapture& c) { return c.amplitude_b; },
-         [](const ComparedCapture& c) { return c.record.b.since_power_on_s; }}};
+constexpr std::array kSides{Side{"A", [](const ComparedCapture& c) { return c.range_a_mm; },
+                                 [](const ComparedCapture& c) { return c.noise_a_mm; },
+                                 [](const ComparedCapture& c) { return c.amplitude_a; },
+                                 [](const ComparedCapture& c) { return c.record.a.since_power_on_s; }},
+                            Side{"B", [](const ComparedCapture& c) { return c.range_a_mm + c.difference_mm; },
+                                 [](const ComparedCapture& c) { return c.noise_b_mm; },
+                                 [](const ComparedCapture& c) { return c.amplitude_b; },
+                                 [](const ComparedCapture& c) { return c.record.b.since_power_on_s; }}};
 
 class Collector {
  public:
@@ -70,11 +72,16 @@ class Collector {
 
 const char* nameOf(compare::DriftModel model) {
   switch (model) {
-    case compare::DriftModel::Constant: return "none";
-    case compare::DriftModel::Ramp: return "ramp";
-    case compare::DriftModel::OneExponential: return "one exponential";
-    case compare::DriftModel::TwoExponentials: return "two exponentials";
-    case compare::DriftModel::Step: return "step";
+    case compare::DriftModel::Constant:
+      return "none";
+    case compare::DriftModel::Ramp:
+      return "ramp";
+    case compare::DriftModel::OneExponential:
+      return "one exponential";
+    case compare::DriftModel::TwoExponentials:
+      return "two exponentials";
+    case compare::DriftModel::Step:
+      return "step";
   }
   return "";
 }
@@ -83,7 +90,8 @@ void addDrift(const ComparedRun& run, Collector& all) {
   const Captures captures = capturesOf(run, "warm_up");
   if (captures.empty()) return;
   for (const Side& side : kSides) {
-    const auto drift = compare::driftTraits(column(captures, side.since_power_on_s), column(captures, side.range_mm));
+    const auto drift =
+        compare::driftTraits(column(captures, side.since_power_on_s), column(captures, side.range_mm));
     if (drift) {
       all.add(fmt::format("drift, {}", nameOf(drift->model)), side.name, drift->traits);
     } else {
@@ -92,8 +100,8 @@ void addDrift(const ComparedRun& run, Collector& all) {
   }
 }
 
-/// As many of four, three, two and one wave per period as the rows allow: cameras of four and three steps have the
-/// first of these.
+/// As many of four, three, two and one wave per period as the rows allow: cameras of four and three steps
+/// have the first of these.
 void addHarmonics(const ComparedRun& run, Collector& all) {
   const Captures captures = capturesOf(run, "distance");
   if (captures.empty() || run.frequency_hz.empty()) return;
@@ -103,14 +111,16 @@ void addHarmonics(const ComparedRun& run, Collector& all) {
     if (captures.size() >= kRowsPerParameter * parameters) orders.push_back(order);
   }
   if (orders.empty()) {
-    all.add("harmonics", "B − A",
-            Error{Error::Code::InvalidArgument,
-                  fmt::format("{} captures over distance for {} frequencies; {} are needed", captures.size(),
-                              run.frequency_hz.size(), kRowsPerParameter * (2 + 2 * run.frequency_hz.size()))});
+    all.add(
+        "harmonics", "B − A",
+        Error{Error::Code::InvalidArgument,
+              fmt::format("{} captures over distance for {} frequencies; {} are needed", captures.size(),
+                          run.frequency_hz.size(), kRowsPerParameter * (2 + 2 * run.frequency_hz.size()))});
     return;
   }
   const auto distance = column(captures, [](const auto& one) { return one.range_a_mm / 1000.0; });
-  all.add("harmonics", "B − A", compare::harmonicTraits(distance, differencesOf(captures), run.frequency_hz, orders));
+  all.add("harmonics", "B − A",
+          compare::harmonicTraits(distance, differencesOf(captures), run.frequency_hz, orders));
 }
 
 void addAmplitudeAndAmbient(const ComparedRun& run, Collector& all) {
@@ -131,7 +141,8 @@ void addNoiseLaw(const ComparedRun& run, Collector& all) {
   const Captures captures = capturesOf(run, "");
   for (const Side& side : kSides) {
     const auto amplitude = column(captures, side.amplitude);
-    if (std::ranges::none_of(amplitude, [](double a) { return std::isfinite(a); })) continue;  // it gives none
+    if (std::ranges::none_of(amplitude, [](double a) { return std::isfinite(a); }))
+      continue;  // it gives none
     all.add("noise law", side.name, compare::noiseLawTraits(amplitude, column(captures, side.noise_mm)));
   }
 }
@@ -139,7 +150,8 @@ void addNoiseLaw(const ComparedRun& run, Collector& all) {
 void addMasks(const ComparedRun& run, Collector& all) {
   const auto maskOf = [](const Image<float>& share, const Image<float>& looked_at) {
     Image<std::uint8_t> mask{share.width(), share.height()};
-    for (std::size_t i = 0; i < mask.size(); ++i) mask[i] = std::isfinite(looked_at[i]) && share[i] >= 0.5F ? 1 : 0;
+    for (std::size_t i = 0; i < mask.size(); ++i)
+      mask[i] = std::isfinite(looked_at[i]) && share[i] >= 0.5F ? 1 : 0;
     return mask;
   };
   std::vector<Image<std::uint8_t>> a, b;
@@ -164,12 +176,14 @@ RunTraits traitsOf(const ComparedRun& run) {
 
 compare::TableBlock traitTable(const RunTraits& traits) {
   compare::TableBlock table{
-      "Characteristics over the captures, with the intervals that are to hold them with 95 %: see docs/characteristics.md",
+      "Characteristics over the captures, with the intervals that are to hold them with 95 %: see "
+      "docs/characteristics.md",
       {"characteristic", "of", "number", "value", "95 % from", "to", "unit", "rows"},
       {}};
   for (const auto& [what, of, trait] : traits.traits) {
-    table.rows.push_back({what, of, trait.name, fmt::format("{:.4g}", trait.value), fmt::format("{:.4g}", trait.low),
-                          fmt::format("{:.4g}", trait.high), trait.unit, std::to_string(trait.n)});
+    table.rows.push_back({what, of, trait.name, fmt::format("{:.4g}", trait.value),
+                          fmt::format("{:.4g}", trait.low), fmt::format("{:.4g}", trait.high), trait.unit,
+                          std::to_string(trait.n)});
   }
   return table;
 }

@@ -10,8 +10,8 @@
 
 namespace toftwin::plan {
 
-/// A characteristic over a run's captures, each of which is a row: its mean over the pixels that both cameras see. As
-/// nobody knows the true range of a real scene, errors are B − A, and drift is each camera's own.
+/// A characteristic over a run's captures, each of which is a row: its mean over the pixels that both cameras
+/// see. As nobody knows the true range of a real scene, errors are B − A, and drift is each camera's own.
 struct RunTrait {
   std::string what{};  ///< "drift, ramp"
   std::string of{};    ///< "A", "B" or "B − A"

@@ -26,8 +26,8 @@ struct Held {
   std::int64_t heap_bytes = static_cast<std::int64_t>(::mallinfo2().uordblks);  // 0 under ASan
 };
 
-/// What is held at the end; of memory the least after any of the last fifty stops, for an emulator may keep a frame
-/// or not.
+/// What is held at the end; of memory the least after any of the last fifty stops, for an emulator may keep
+/// a frame or not.
 inline void startAndStop(drivers::Source& source, int cycles, int frame_every, Held& held) {
   for (int i = 0; i < cycles; ++i) {
     const auto begun = source.start();
@@ -45,18 +45,19 @@ inline void startAndStop(drivers::Source& source, int cycles, int frame_every, H
   }
 }
 
-/// Ten thousand starts and stops of an opened source, with a frame of each `frame_every`th, keep no file, no thread
-/// and no memory. Fewer where a camera takes its time, a hundredth of a second or more, to start.
-inline void expectNothingKept(std::string_view name, drivers::Source& source, int frame_every, int cycles = 10'000) {
+/// Ten thousand starts and stops of an opened source, with a frame of each `frame_every`th, keep no file, no
+/// thread and no memory. Fewer where a camera takes its time, a hundredth of a second or more, to start.
+inline void expectNothingKept(std::string_view name, drivers::Source& source, int frame_every,
+                              int cycles = 10'000) {
   constexpr int kWarmUp = 100;
-  // Allocators and libraries fill caches of their own; a leak is at least one block of 16 bytes per cycle, which is
-  // more than this from 500 cycles on.
+  // Allocators and libraries fill caches of their own; a leak is at least one block of 16 bytes per cycle,
+  // which is more than this from 500 cycles on.
   constexpr std::int64_t kMostKept_bytes = 8'000;
   Held before, after;
   startAndStop(source, kWarmUp, frame_every, before);
   startAndStop(source, cycles, frame_every, after);
-  fmt::print("{}: {} bytes more on the heap after {} starts and stops\n", name, after.heap_bytes - before.heap_bytes,
-             cycles);
+  fmt::print("{}: {} bytes more on the heap after {} starts and stops\n", name,
+             after.heap_bytes - before.heap_bytes, cycles);
   EXPECT_EQ(after.files, before.files);
   EXPECT_EQ(after.threads, before.threads);
   EXPECT_LT(after.heap_bytes - before.heap_bytes, kMostKept_bytes);

@@ -14,8 +14,8 @@ namespace {
 constexpr double kFrequency_hz = 30e6, kPeriod_m = 299'792'458.0 / 2.0 / kFrequency_hz;
 constexpr unsigned kSeed = 20261122;
 
-/// 60 captures while B warms up (−8 mm, τ = 600 s) and A does not, 40 over distance with a wave of 5 mm four times per
-/// period; noise 400 mm / amplitude; pixel 0 is invalid in B alone.
+/// 60 captures while B warms up (−8 mm, τ = 600 s) and A does not, 40 over distance with a wave of 5 mm four
+/// times per period; noise 400 mm / amplitude; pixel 0 is invalid in B alone.
 ComparedRun plantedRun() {
   std::mt19937_64 random{kSeed};
   std::normal_distribution<double> error{0.0, 0.1};
@@ -44,7 +44,8 @@ ComparedRun plantedRun() {
   return run;
 }
 
-const RunTrait* find(const RunTraits& all, std::string_view what, std::string_view of, std::string_view name) {
+const RunTrait* find(const RunTraits& all, std::string_view what, std::string_view of,
+                     std::string_view name) {
   for (const RunTrait& one : all.traits) {
     if (one.what.starts_with(what) && one.of == of && one.trait.name == name) return &one;
   }
@@ -54,7 +55,8 @@ const RunTrait* find(const RunTraits& all, std::string_view what, std::string_vi
 /// Within twice its interval's half: 3.9 standard errors, a false alarm of 1e-4 for each.
 void expectNear(const RunTrait* found, double truth) {
   ASSERT_NE(found, nullptr);
-  EXPECT_NEAR(found->trait.value, truth, found->trait.high - found->trait.low) << found->what << ' ' << found->trait.name;
+  EXPECT_NEAR(found->trait.value, truth, found->trait.high - found->trait.low)
+      << found->what << ' ' << found->trait.name;
 }
 
 TEST(RunTraits, FindWhatWasPlanted) {
@@ -62,7 +64,8 @@ TEST(RunTraits, FindWhatWasPlanted) {
   RecordProperty("seed", kSeed);
   ASSERT_NE(find(all, "drift, one exponential", "B", "time constant"), nullptr);
   expectNear(find(all, "drift, one exponential", "B", "time constant"), 600.0);
-  expectNear(find(all, "drift, one exponential", "B", "drift"), -8.0 * (1.0 - std::exp(-59.0 * 60.0 / 600.0)));
+  expectNear(find(all, "drift, one exponential", "B", "drift"),
+             -8.0 * (1.0 - std::exp(-59.0 * 60.0 / 600.0)));
   expectNear(find(all, "drift, none", "A", "drift"), 0.0);
   expectNear(find(all, "harmonics", "B − A", "30 MHz, 4 per period"), 5.0);
   expectNear(find(all, "masks", "A and B", "agreement"), 15.0 / 16.0);
@@ -74,7 +77,8 @@ TEST(RunTraits, SayWhatTheyCannotTellAndWhy) {
   run.captures.resize(10);
   const RunTraits all = traitsOf(run);
   EXPECT_EQ(find(all, "harmonics", "B − A", "30 MHz, 4 per period"), nullptr);
-  EXPECT_THAT(all.untold, testing::Contains(testing::HasSubstr("5 captures over distance for 1 frequencies; 12 are")));
+  EXPECT_THAT(all.untold,
+              testing::Contains(testing::HasSubstr("5 captures over distance for 1 frequencies; 12 are")));
 }
 
 }  // namespace
