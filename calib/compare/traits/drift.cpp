@@ -128,12 +128,20 @@ Result<DriftTraits> driftTraits(Column time_s, Column value_mm) {
     fit = std::move(tried);
   }
   if (!fit) return undetermined(kName, "no model can be fitted");
-  fit->heedCorrelation(correlationOfResiduals(chosen->model, y, *fit));
   DriftTraits result{.model = chosen->kind, .traits = {}};
+  // Where no drift can be told, "drift" is what a ramp could still be: not known to be exactly nothing.
+  if (chosen->kind == DriftModel::Constant) {
+    chosen = &candidates[1];
+    if (auto hidden = bestFit(*chosen, y))
+      fit = std::move(hidden);
+    else
+      return undetermined(kName, "no ramp can be fitted");
+  }
+  fit->heedCorrelation(correlationOfResiduals(chosen->model, y, *fit));
   result.traits.push_back(fit->trait("drift", "mm", [&](std::span<const double> p) {
     return chosen->model(p, y.size() - 1) - chosen->model(p, 0);
   }));
-  addDetails(chosen->kind, *fit, length, result.traits);
+  addDetails(result.model, *fit, length, result.traits);
   return result;
 }
 

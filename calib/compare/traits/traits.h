@@ -28,7 +28,9 @@ using Column = std::span<const double>;
 enum class DriftModel { Constant, Ramp, OneExponential, TwoExponentials, Step };
 struct DriftTraits {
   DriftModel model = DriftModel::Constant;
-  std::vector<Trait> traits{};  ///< "drift" (last minus first), and of the model "time constant", "slope", "step"
+  /// "drift" (last minus first; of a constant, what a ramp could hide), and of the model "time constant", "slope",
+  /// "step"
+  std::vector<Trait> traits{};
 };
 /// value(t): constant; + s t; + Σ aᵢ e^(−t/τᵢ); + h (t > t₀). Errors that go on from row to row widen the intervals.
 Result<DriftTraits> driftTraits(Column time_s, Column value_mm);
