@@ -149,7 +149,10 @@ Result<dds_entity_t> Participant::read(const std::string& name, const dds_topic_
       dds_create_listener(wakes_.back().get()), dds_delete_listener};
   dds_lset_data_available(listener.get(),
                           [](dds_entity_t, void* call) { (*static_cast<std::function<void()>*>(call))(); });
-  const dds_entity_t reader = dds_create_reader(participant_, *of, qosOf(quality).get(), listener.get());
+  const Qos qos = qosOf(quality);
+  // What is told on /tf must not be taken for an order.
+  dds_qset_ignorelocal(qos.get(), DDS_IGNORELOCAL_PARTICIPANT);
+  const dds_entity_t reader = dds_create_reader(participant_, *of, qos.get(), listener.get());
   if (reader < 0) return errorOf(fmt::format("a reader of {}", name), reader);
   return reader;
 }

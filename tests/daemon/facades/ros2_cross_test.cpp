@@ -1,55 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 // One truth: the same frame, read natively and as ROS 2's messages by a DDS of another maker.
-#include <unistd.h>
-
 #include <array>
 #include <bit>
 #include <cmath>
 #include <map>
 
-#include "facade_testing.h"
-#include "ros2_reader.h"
+#include "ros2_testing.h"
 
 namespace toftwin::daemon {
 namespace {
 
 using namespace test;
-using namespace toftwin::test;
 using Policy = SubscribeOptions::Policy;
-
-constexpr const char* kImage = "sensor_msgs::msg::dds_::Image_";
-constexpr const char* kInfo = "sensor_msgs::msg::dds_::CameraInfo_";
-constexpr const char* kPoints = "sensor_msgs::msg::dds_::PointCloud2_";
-constexpr const char* kTransforms = "tf2_msgs::msg::dds_::TFMessage_";
-constexpr const char* kPose = "geometry_msgs::msg::dds_::PoseStamped_";
-
-/// Where nobody else should be; tests run side by side.
-int someDomain() { return 1 + ::getpid() % 90; }
-
-/// The frame's time stamp, and who says it.
-std::int64_t readHeader(CdrReader& cdr, const std::string& frame = "cam_optical_frame") {
-  const auto seconds = cdr.number<std::int32_t>();
-  const auto nanoseconds = cdr.number<std::uint32_t>();
-  EXPECT_LT(nanoseconds, 1'000'000'000U);
-  EXPECT_EQ(cdr.text(), frame);
-  return std::int64_t{seconds} * 1'000'000'000 + nanoseconds;
-}
-std::int64_t rosTimeOf(const Frame& frame) {
-  return frame.moment.exposures.at(0).start.ns + frame.moment.clock.host_minus_device_ns;
-}
 
 std::uint32_t bitsOf(float value) {
   return std::isnan(value) ? 0x7FC0'0000U : std::bit_cast<std::uint32_t>(value);
 }
 
-class Ros2Cross : public RunningFacade {
+class Ros2Cross : public RunningRos2 {
  protected:
-  void startRos2(const std::string& source_keys, const std::string& facade_keys = {}) {
-    start(fmt::format(
-        "[[source]]\nname = 'cam'\n{}\n[[facade]]\nkind = 'ros2'\nsource = 'cam'\ndomain = {}\n{}\n",
-        source_keys, domain_, facade_keys));
-    program_.emplace(domain_);
-  }
   /// Calls `compare(native, message)` for three messages of the reader.
   template <class Compare>
   void compare(dds::DataReader* reader, Compare compare_one) {
@@ -79,9 +48,6 @@ class Ros2Cross : public RunningFacade {
     }
     EXPECT_EQ(compared, 3);
   }
-
-  const int domain_ = someDomain();
-  std::optional<RosProgram> program_;
 };
 
 struct ImageHead {
@@ -211,90 +177,6 @@ TEST_F(Ros2Cross, PointsAreTheNativeRangesAlongTheirRays) {
     }
     EXPECT_EQ(cdr.number<std::uint8_t>(), 0);  // not dense
   });
-}
-
-struct ReadTransform {
-  std::int64_t stamp_ns;
-  std::string child;
-  std::vector<double> numbers;  ///< translation, rotation x y z w
-};
-ReadTransform readTransform(Cdr message) {
-  CdrReader cdr{std::move(message)};
-  EXPECT_EQ(cdr.number<std::uint32_t>(), 1U);
-  ReadTransform transform{};
-  transform.stamp_ns = readHeader(cdr, "world");
-  transform.child = cdr.text();
-  transform.numbers = cdr.numbers<double>(7);
-  EXPECT_LT(cdr.left(), 4U);
-  return transform;
-}
-std::vector<double> numbersOf(const Transform<World, Camera>& pose) {
-  const auto& [w, x, y, z] = pose.rotation_wxyz;
-  const Vec3d& t = pose.translation_m;
-  return {t.x, t.y, t.z, x, y, z, w};
-}
-
-TEST_F(Ros2Cross, APoseThatIsSentIsWhereTheNextFrameIsFrom) {
-  startRos2("pace = 'trigger'\n" + kSmallSim, "pose_topic = '/amr/pose'\ntrigger_on_pose = true\n");
-  auto* transforms = program_->read("/tf_static", kTransforms, Asks::Latched);
-  auto* images = program_->read("/cam/depth/image_raw", kImage);
-  auto* poses = program_->write("/amr/pose", kPose);
-  auto native_client = client();
-  auto stream = native_client.subscribe("cam", {.policy = Policy::Queue, .queue = 64});
-  ASSERT_TRUE(stream.ok());
-  ASSERT_TRUE(eventually([&] {
-    dds::PublicationMatchedStatus status;
-    poses->get_publication_matched_status(status);
-    dds::SubscriptionMatchedStatus seen;
-    images->get_subscription_matched_status(seen);
-    return status.current_count > 0 && seen.current_count > 0;
-  }));
-  const auto send = [&](const std::array<double, 7>& numbers, const std::string& frame = "world") {
-    CdrWriter cdr;
-    cdr.number<std::int32_t>(5).number<std::uint32_t>(6).text(frame);
-    for (const double one : numbers) cdr.number(one);
-    ASSERT_TRUE(poses->write(&cdr.bytes()));
-  };
-  send({0, 0, 0, 0, 0, 0, std::nan("")});
-  ASSERT_TRUE(log_->waitFor("unit quaternion", 1));
-  send({1e300, 0, 0, 0.9, 0, 0, 0.9});
-  ASSERT_TRUE(log_->waitFor("1e+300", 1));
-  send({0, 0, 0, 0, 0, 0, 1}, "map");
-  ASSERT_TRUE(log_->waitFor("not in \"world\"", 1));
-  send({0.25, -0.125, -0.5, 0.0, 0.6, 0.0, 0.8});
-  const auto frame = stream->next(kSoon);
-  ASSERT_TRUE(frame.ok()) << frame.error().message;
-  const Transform<World, Camera> expected{{0.8, 0.0, 0.6, 0.0}, {0.25, -0.125, -0.5}};
-  ASSERT_TRUE(frame->moment.world_from_camera);
-  EXPECT_EQ(*frame->moment.world_from_camera, expected);
-  const auto image = nextOf(images);
-  ASSERT_TRUE(image);
-  CdrReader cdr{*image};
-  EXPECT_EQ(readHeader(cdr), rosTimeOf(*frame));
-  ReadTransform seen{};
-  do {
-    auto message = nextOf(transforms);
-    ASSERT_TRUE(message);
-    seen = readTransform(*std::move(message));
-  } while (seen.numbers != numbersOf(expected));
-  EXPECT_EQ(seen.child, "cam_optical_frame");
-  EXPECT_EQ(seen.stamp_ns, rosTimeOf(*frame));
-}
-
-TEST_F(Ros2Cross, AReaderThatComesLateGetsTheStaticTransform) {
-  startRos2(kSmallSim + "position_m = [0.5, 0.25, -1.0]\n");
-  auto native_client = client();
-  auto stream = native_client.subscribe("cam");
-  const auto frame = stream->next(kSoon);
-  ASSERT_TRUE(frame.ok());
-  auto message = nextOf(program_->read("/tf_static", kTransforms, Asks::Latched));
-  ASSERT_TRUE(message);
-  const auto first = readTransform(*std::move(message));
-  EXPECT_EQ(first.numbers, numbersOf(*frame->moment.world_from_camera));
-  RosProgram late{domain_};
-  auto again = nextOf(late.read("/tf_static", kTransforms, Asks::Latched));
-  ASSERT_TRUE(again);
-  EXPECT_EQ(readTransform(*std::move(again)).numbers, first.numbers);
 }
 
 }  // namespace
