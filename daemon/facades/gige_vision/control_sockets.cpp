@@ -102,9 +102,11 @@ void ControlSockets::receive(const std::shared_ptr<Ear>& ear) {
 void ControlSockets::hear(const Ear& ear, std::size_t size) {
   const auto datagram = std::span{ear.datagram}.first(size);
   const address_v4 from = ear.from.address().to_v4();
-  // On loopback, nobody else is told that there is a camera.
-  if (place_.address.is_loopback() && !from.is_loopback()) return;
+  // Nobody but the address's own network, which loopback is one of, is told that there is a camera.
+  const bool is_near = ((from.to_uint() ^ place_.address.to_uint()) & place_.netmask) == 0;
+  if (place_.address.is_loopback() && !is_near) return;
   if (!ear.takes_all) {
+    if (!is_near) return;
     const auto request = readRequest(datagram);
     if (!request || request->command != Command::kDiscovery) return;
   }
