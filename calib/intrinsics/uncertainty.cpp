@@ -14,12 +14,6 @@ namespace {
 
 constexpr double kNormal95 = 1.959964;  // 97.5 % of a normal distribution lie below
 
-/// 97.5 % of Student's t lie below: the Cornish-Fisher expansion, right to 0.5 % from 4 degrees on.
-double studentQuantile(double degrees) {
-  const double z = kNormal95, z3 = z * z * z, z5 = z3 * z * z;
-  return z + (z3 + z) / (4.0 * degrees) + (5.0 * z5 + 16.0 * z3 + 3.0 * z) / (96.0 * degrees * degrees);
-}
-
 /// The views' gradients, made as large as their errors are. At the best lens a view's gradient is smaller
 /// than its error, because the lens has bent towards it. With S = Σ S_v = L Lᵀ and M_v = L⁻¹ S_v L⁻ᵀ,
 ///   g̃_v = L (1 − M_v)^(−1/2) L⁻¹ g_v
@@ -77,6 +71,11 @@ Eigen::VectorXd resampled(const std::vector<SharedInformation>& views,
 }
 
 }  // namespace
+
+double studentQuantile(double degrees) {
+  const double z = kNormal95, z3 = z * z * z, z5 = z3 * z * z;
+  return z + (z3 + z) / (4.0 * degrees) + (5.0 * z5 + 16.0 * z3 + 3.0 * z) / (96.0 * degrees * degrees);
+}
 
 LensUncertainty uncertaintyOf(const std::vector<Observed>& views, const Bundle& bundle, int resamples,
                               std::uint64_t seed) {

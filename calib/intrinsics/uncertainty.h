@@ -23,6 +23,9 @@ struct LensUncertainty {
 /// all: of few views each parameter's own is too noisy.
 inline constexpr double kClustered = 1.5;
 
+/// 97.5 % of Student's t lie below: the Cornish-Fisher expansion, right to 0.5 % from 4 degrees on.
+double studentQuantile(double degrees);
+
 /// Views are resampled `resamples` times, by one Gauss-Newton step each (docs/calibrate.md).
 LensUncertainty uncertaintyOf(const std::vector<Observed>& views,
                               const Bundle& bundle, int resamples = 1000, std::uint64_t seed = 1);

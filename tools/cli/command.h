@@ -58,6 +58,7 @@ Command calibrateCommand();
 Command compareCommand();
 Command discoverCommand();
 Command suitCommand();
+Command locateCommand();
 Command planCommand();
 Command measureCommand();
 Command poseCommand();

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "calib/compare/poses.h"
+#include "calib/file/calibration_file.h"
+#include "calib/intrinsics/board_pose.h"
+#include "calib/intrinsics/brightness.h"
+#include "calib/intrinsics/hand_eye.h"
+#include "protocol/settings/describe.h"
+#include "tools/cli/command.h"
+#include "tools/cli/export/atomic_file.h"
+
+namespace toftwin::cli {
+namespace {
+
+using namespace intrinsics;
+
+struct Options {
+  std::vector<std::string> images;
+  std::string board, dictionary = "DICT_4X4_50", calibration, rig, output;
+  double square_mm = 0.0, marker_mm = 0.0;
+  int every = 1;
+};
+
+struct Located {
+  std::string name;
+  BoardSighting board;
+};
+
+Result<Target> targetFrom(const Options& options) {
+  auto target = targetOf(options.board, options.square_mm * millimetre);
+  if (!target || options.marker_mm == 0.0) return target;
+  return charucoOf(*std::move(target), options.marker_mm * millimetre, options.dictionary);
+}
+
+/// All images in which the board is; the others are said and left out, unless a rig's poses need each.
+Result<std::vector<Located>> locateAll(const Options& options, const Target& target, const CameraInfo& camera) {
+  std::vector<Located> all;
+  const auto take = [&](NamedImage image) -> Result<> {
+    auto found = locateBoard(image.brightness, target, camera);
+    if (found) {
+      all.push_back({image.name, *found});
+      return {};
+    }
+    if (!options.rig.empty()) return Error{found.error().code, fmt::format("{}: {}", image.name, found.error().message)};
+    fmt::print(stderr, "  left out {}: {}\n", image.name, found.error().message);
+    return {};
+  };
+  for (const std::string& name : options.images) {
+    if (isRecording(name)) {
+      if (auto read = readRecording(name, options.every, take); !read) return read.error();
+      continue;
+    }
+    auto brightness = loadBrightness(name);
+    if (!brightness) return brightness.error();
+    if (auto taken = take({name, *std::move(brightness)}); !taken) return taken.error();
+  }
+  if (all.empty()) return Error{Error::Code::NotFound, "the board was found in none of the images"};
+  return all;
+}
+
+/// The pose file's entry, with what is known of it as a comment.
+template <class In>
+std::string entryOf(const Located& located, const Transform<In, Camera>& pose) {
+  const auto& p = pose.translation_m;
+  return fmt::format(
+      "\n[[pose]]\nname = {}\n# {} corners, {:.3f} px RMS; 95 % of the board in the camera: {}\nposition_m = [{:.6f}, {:.6f}, "
+      "{:.6f}]\nrotation_wxyz = [{:.8f}]\n",
+      settings::toToml(located.name), located.board.corners, located.board.rms_px,
+      uncertaintyInWords(located.board.camera_from_board.covariance, located.board.camera_from_board.degrees), p.x, p.y, p.z,
+      fmt::join(pose.rotation_wxyz, ", "));
+}
+
+Result<HandEye> handEyeFrom(const Options& options, const std::vector<Located>& all,
+                            std::vector<Transform<World, Rig>>& stands) {
+  const auto poses = compare::loadPoses(options.rig);
+  if (!poses) return poses.error();
+  if (poses->size() != all.size()) {
+    return Error{Error::Code::InvalidArgument,
+                 fmt::format("{} has {} poses of the rig, but there are {} images: one for each, in their order", options.rig,
+                             poses->size(), all.size())};
+  }
+  std::vector<HandEyeView> views;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const auto pose = (*poses)[i].world_from_camera();
+    stands.push_back({pose.rotation_wxyz, pose.translation_m});
+    views.push_back({stands.back(), all[i].board.camera_from_board});
+  }
+  return handEye(views);
+}
+
+std::string textOf(const HandEye& known) {
+  const auto& p = known.rig_from_camera.pose.translation_m;
+  const auto& b = known.world_from_board.pose.translation_m;
+  return fmt::format(
+      "the camera on the rig: at {:.5f}, {:.5f}, {:.5f} m, turned by {:.6f} (w, x, y, z); 95 %: {}\n"
+      "the board in the world: at {:.5f}, {:.5f}, {:.5f} m, turned by {:.6f}; 95 %: {}\n"
+      "misfit {:.2f} (1: rig and images contradict each other no more than the images' corners say)\n",
+      p.x, p.y, p.z, fmt::join(known.rig_from_camera.pose.rotation_wxyz, ", "),
+      uncertaintyInWords(known.rig_from_camera.covariance, known.rig_from_camera.degrees), b.x, b.y, b.z,
+      fmt::join(known.world_from_board.pose.rotation_wxyz, ", "),
+      uncertaintyInWords(known.world_from_board.covariance, known.world_from_board.degrees), known.misfit);
+}
+
+Result<Exit> act(const Options& options) {
+  const auto target = targetFrom(options);
+  if (!target) return target.error();
+  const auto lens = calibration::load(options.calibration);
+  if (!lens) return lens.error();
+  const auto all = locateAll(options, *target, calibration::cameraOf(lens->lens));
+  if (!all) return all.error();
+  std::string file = options.rig.empty()
+                         ? "# Where a camera stood, by toftwin locate. The world is the board: its origin is the first inner corner, x runs "
+                           "along\n# its columns, y along its rows, z away from the camera.\n"
+                         : "# Where a camera stood, by toftwin locate: the rig's poses and the camera's place on it.\n";
+  if (options.rig.empty()) {
+    for (const Located& one : *all) file += entryOf(one, one.board.camera_from_board.pose.inverse());
+  } else {
+    std::vector<Transform<World, Rig>> stands;
+    const auto known = handEyeFrom(options, *all, stands);
+    if (!known) return known.error();
+    fmt::print("{}", textOf(*known));
+    for (std::size_t i = 0; i < all->size(); ++i) file += entryOf((*all)[i], worldFromCamera(*known, stands[i]));
+  }
+  if (auto written = writeWhole(options.output, file); !written) return written.error();
+  fmt::print("{}: {} poses\n", options.output, all->size());
+  return Exit::Ok;
+}
+
+Run add(Arguments& args) {
+  const auto options = std::make_shared<Options>();
+  args.option("IMAGES", options->images, "grey images or recordings (FILE.mcap, FILE.mcap#SOURCE), whose amplitude is taken").required();
+  args.option("--board", options->board, "inner corners as COLSxROWS: 8x5 for 9 × 6 squares").required();
+  args.option("--square", options->square_mm, "side of a square, mm").required().within(0.1, 10'000.0);
+  args.option("--marker", options->marker_mm, "side of a ChArUco board's markers, mm; 0: a checkerboard").within(0.0, 10'000.0);
+  args.option("--dictionary", options->dictionary, "of the markers, as OpenCV names it; AprilTags: DICT_APRILTAG_36h11").showsDefault();
+  args.option("--calibration", options->calibration, "the lens: a file of toftwin calibrate").required();
+  args.option("--rig", options->rig,
+              "pose file with where the rig stood in each image: gives the camera's place on the rig and poses in the rig's world");
+  args.option("--every", options->every, "of a recording, every n-th frame").within(1, 1'000'000).showsDefault();
+  args.option("-o,--output", options->output, "pose file").required();
+  return [options] { return act(*options); };
+}
+
+}  // namespace
+
+Command locateCommand() {
+  return {"locate", "where a camera stood, from a board that it saw: a pose file",
+          "  toftwin locate shots/*.png --board 8x5 --square 32 --calibration lens.toml -o poses.toml\n"
+          "  toftwin locate shots/*.png --board 8x5 --square 32 --calibration lens.toml --rig rig.toml -o poses.toml\n",
+          add};
+}
+
+}  // namespace toftwin::cli
