@@ -29,7 +29,7 @@ TEST_F(WithDaemon, ListAndInfoSayWhatTheDaemonHas) {
   EXPECT_EQ(names.out, "pattern\nshort\n");
   EXPECT_THAT(run("list --json").out, HasSubstr("\"kind\": \"simulated\""));
   EXPECT_THAT(run("info pattern").out, HasSubstr("64 × 48 pixels"));
-  EXPECT_THAT(run("info pattern --json").out, HasSubstr("\"frame_rate_hz\": 200"));
+  EXPECT_THAT(run("info pattern --json").out, HasSubstr("\"frame_rate_hz\": 50"));
   const Ran unknown = run("info kinekt");
   EXPECT_EQ(unknown.status, 4);
   EXPECT_THAT(unknown.err, HasSubstr("kinekt"));

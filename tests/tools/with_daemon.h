@@ -75,7 +75,7 @@ class WithDaemon : public testing::Test {
         << socket()
         << "'\n"
            "[[source]]\nname = 'pattern'\ndriver = 'pattern'\nwidth = 64\n"
-           "height = 48\nframe_rate_hz = 200\n"
+           "height = 48\nframe_rate_hz = 50\n"
            "[[source]]\nname = 'short'\ndriver = 'pattern'\nwidth = 64\n"
            "height = 48\nframe_rate_hz = 200\nframes = 5\n"
         << moreSources();

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # The docking example, as its page says to run it, with free ports: docking_test.py TOFTWIND EXAMPLE_FOLDER
-# The robot docks with both cameras, and worse with the one that sees multipath and scatter.
+# The robot docks with both cameras, and too near with the one that sees multipath and scatter.
 import json
 import pathlib
 import re
@@ -47,7 +47,7 @@ assert ideal["docked"] and real["docked"]
 # The last step before the stop is at most 20 mm/s · 0.2 s beyond it; some 300 points of a few millimetres' noise each
 # leave less than 1 mm.
 assert -4.0 - 3.0 < ideal["too_far_mm"] < 3.0
-# Light by way of floor and shelf takes longer, so the pallet seems farther, and the robot drives on.
+# Light by way of floor and shelf takes longer, so the pallet seems farther, and the robot drives on. Two stops by the same
+# rule differ by a last step of 4 mm and that noise, 5 mm at most; what is beyond is the light's.
 assert real["too_far_mm"] < ideal["too_far_mm"] - 5.0
-assert abs(real["beside_mm"]) > abs(ideal["beside_mm"])
-print("docked with both, and worse with multipath and scatter")
+print("docked with both, and too near with multipath and scatter")
