@@ -147,7 +147,9 @@ StreamSetup Device::stream() const {
     return static_cast<std::uint32_t>(memory_.number(item, index));
   };
   StreamSetup setup;
-  setup.to = {number(Item::Destination), static_cast<std::uint16_t>(number(Item::HostPort) & 0xFFFF)};
+  // Address 0 is nowhere, but to sockets it is this computer, any port of which would be hit.
+  if (const std::uint32_t address = number(Item::Destination); address != 0)
+    setup.to = {address, static_cast<std::uint16_t>(number(Item::HostPort) & 0xFFFF)};
   setup.packet_size = number(Item::PacketSize) & 0xFFFF;
   setup.packet_delay = std::chrono::nanoseconds{number(Item::PacketDelay)};
   setup.is_multipart = (number(Item::ChannelConfiguration) & kMultipartBit) != 0;

@@ -159,6 +159,8 @@ void appendChunks(Bytes& bytes, const Frame& frame, const ImageSetup& setup, std
 bool hasChunks(const ImageSetup& setup) { return std::ranges::count(setup.has_chunk, true) > 0; }
 
 Result<> check(const Frame& frame, const ImageSetup& setup) {
+  if (payloadSizeOf(setup) == 0)
+    return Error{Error::Code::Unsupported, "the source has no image of those that are enabled to be sent"};
   const auto width = static_cast<std::uint64_t>(std::max(0, frame.camera.width)),
              height = static_cast<std::uint64_t>(std::max(0, frame.camera.height));
   if (std::uint64_t{setup.x} + setup.width > width || std::uint64_t{setup.y} + setup.height > height) {

@@ -57,8 +57,8 @@ struct Rays {
 };
 Rays raysOf(const CameraInfo& camera);
 
-/// `rays` of the frame's camera; `stamp_ns` for the chunk. Unsupported: the frame has not what is to be sent,
-/// or is not of the size that the region is of.
+/// `rays` of the frame's camera; `stamp_ns` for the chunk. Unsupported: nothing is to be sent, or the frame has
+/// not what is, or is smaller than the region. So a payload has an image at least.
 Result<Payload> payloadOf(const Frame& frame, const Rays& rays, const ImageSetup& setup,
                           std::int64_t stamp_ns);
 

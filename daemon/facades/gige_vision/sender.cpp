@@ -141,7 +141,7 @@ bool Sender::sendStruck(const Block& block, std::uint32_t number, bool is_again)
 }
 
 bool Sender::put(const Bytes& packet) {
-  if (to_.port() == 0) return true;
+  if (to_.port() == 0 || to_.address().is_unspecified()) return true;
   error_code error;
   socket_.send_to(boost::asio::buffer(packet), to_, 0, error);
   if (error == boost::asio::error::would_block || error == boost::asio::error::no_buffer_space) return false;

@@ -57,9 +57,9 @@ TEST(GigeVisionDevice, SendsToItsControllersAddressAlone) {
   camera.write(Item::ControlPrivilege, kControl);
   EXPECT_EQ(camera.write(Item::Destination, kFar.address), Status::kAccessDenied);
   EXPECT_EQ(camera.write(Item::Destination, 0xE0000001), Status::kAccessDenied);  // multicast
-  EXPECT_EQ(camera.device.stream().to.address, 0U);
-  EXPECT_EQ(camera.write(Item::Destination, kOwner.address), Status::kSuccess);
   EXPECT_EQ(camera.write(Item::HostPort, 7000), Status::kSuccess);
+  EXPECT_EQ(camera.device.stream().to, Peer{});  // address 0 is no address of this computer
+  EXPECT_EQ(camera.write(Item::Destination, kOwner.address), Status::kSuccess);
   EXPECT_EQ(camera.device.stream().to, (Peer{kOwner.address, 7000}));
   camera.write(Item::ControlPrivilege, 0);
   EXPECT_EQ(camera.device.stream().to, Peer{});  // the next controller may have another address
@@ -176,6 +176,26 @@ TEST(GigeVisionDevice, KeepsRegionsInsideTheImageAndThePayloadsSizeTrue) {
   larger.camera.width = 32;
   camera.device.update(larger);
   EXPECT_EQ(camera.value(Item::Width), 32U);
+}
+
+TEST(GigeVisionDevice, SendsNoFrameWhereItsSourceHasNoneOfItsImages) {
+  Frame frame;
+  frame.camera = smallCamera().camera;
+  frame.planes = {toPlane(PlaneKind::Range, Image<float>{16, 12, 2.5F})};
+  const Rays rays = raysOf(frame.camera);
+  Camera camera;
+  camera.write(Item::ControlPrivilege, kControl);
+  EXPECT_EQ(camera.write(Item::ChunkModeActive, 1), Status::kSuccess);
+  EXPECT_EQ(camera.write(Item::AcquisitionStart, 1), Status::kSuccess);
+  EXPECT_TRUE(payloadOf(frame, rays, camera.device.stream().images, 7).ok());
+  SourceFacts bare = smallCamera();
+  bare.has_range = bare.has_intensity = bare.has_confidence = false;
+  for (const SourceFacts& facts : {bare, SourceFacts{}}) {
+    camera.device.update(facts);
+    const auto payload = payloadOf(frame, rays, camera.device.stream().images, 7);
+    ASSERT_FALSE(payload.ok());
+    EXPECT_EQ(payload.error().code, Error::Code::Unsupported);
+  }
 }
 
 TEST(GigeVisionDevice, DescribesEveryRegisterThatItHasAndHasEveryOneThatItDescribes) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Datagrams from three peers to a GigE Vision camera, each after how long it takes, who sends it and its
-// length; then a frame as the camera is set up by then.
+// Datagrams from three peers to a GigE Vision camera, each after how long it takes, who sends it and what the
+// source is by then, and its length; a frame is made as the camera is set up after each.
 #include <chrono>
 #include <cstdlib>
 
@@ -37,6 +37,18 @@ SourceFacts smallCamera() {
   return facts;
 }
 
+/// Without some of its images, of another size, or not there, by bits of `how`.
+SourceFacts cameraOf(std::uint64_t how) {
+  constexpr std::uint64_t kGone = 0x8, kLarger = 0x10;
+  if ((how & kGone) != 0) return {};
+  SourceFacts facts = smallCamera();
+  facts.has_range = (how & 1U) == 0;
+  facts.has_intensity = (how & 2U) == 0;
+  facts.has_confidence = (how & 4U) == 0;
+  if ((how & kLarger) != 0) facts.camera.width = 2 * kWidth;
+  return facts;
+}
+
 const Frame& smallFrame() {
   static const Frame kFrame = [] {
     Frame frame;
@@ -52,7 +64,7 @@ const Frame& smallFrame() {
 void checkTarget(const Device& device) {
   const StreamSetup setup = device.stream();
   const auto controller = device.controller();
-  demand(setup.to.address == 0 || (controller && setup.to.address == controller->address));
+  demand(setup.to.port == 0 || (controller && setup.to.address == controller->address));
   demand(!device.isStreaming() || controller.has_value());
 }
 
@@ -61,9 +73,11 @@ void stream(const Device& device) {
   static const Rays kRays = raysOf(smallFrame().camera);
   const StreamSetup setup = device.stream();
   const auto payload = payloadOf(smallFrame(), kRays, setup.images, 7);
-  demand(payload.ok());
+  const bool fits = setup.images.x + setup.images.width <= kWidth &&
+                    setup.images.y + setup.images.height <= kHeight;
+  demand(payload.ok() == (fits && payloadSizeOf(setup.images) > 0));
+  if (!payload) return;
   demand(payload->bytes.size() == payloadSizeOf(setup.images));
-  if (payload->parts.empty()) return;
   const Block block{{.id = 1,
                      .packet_size = setup.packet_size,
                      .is_multipart = setup.is_multipart,
@@ -91,10 +105,11 @@ void fuzzOneInput(std::span<const std::byte> bytes) {
     demand(outcome.answer.empty() || (outcome.answer.size() >= 8 && outcome.answer.size() <= 8 + 540));
     demand(outcome.answer.empty() || numberAt(outcome.answer, 4, 2) == outcome.answer.size() - 8);
     demand(outcome.changes.empty() || device.controller() == from);
+    device.update(cameraOf(who / 4));
     checkTarget(device);
+    stream(device);
     bytes = bytes.subspan(kHeader + size);
   }
-  stream(device);
 }
 
 }  // namespace toftwin::daemon

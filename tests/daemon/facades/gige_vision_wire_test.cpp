@@ -71,7 +71,10 @@ TEST_F(GigeVisionWire, GivesNoFrameToAnAddressThatDoesNotControlIt) {
   udp::socket control = socketOn("127.0.0.1"), victim = socketOn("127.0.0.2"), stream = socketOn("127.0.0.1");
   EXPECT_EQ(write(control, Item::ControlPrivilege, 2), Status::kSuccess);
   EXPECT_EQ(write(control, Item::Destination, 0x7F000002), Status::kAccessDenied);
-  EXPECT_EQ(write(control, Item::HostPort, victim.local_endpoint().port()), Status::kSuccess);
+  const std::uint16_t port = victim.local_endpoint().port();
+  // No address is not this computer, whose services trust what comes from it.
+  udp::socket own{io_, {boost::asio::ip::make_address_v4(address_), port}};
+  EXPECT_EQ(write(control, Item::HostPort, port), Status::kSuccess);
   EXPECT_EQ(write(control, Item::AcquisitionStart, 1), Status::kSuccess);
   EXPECT_EQ(write(control, Item::PacketSize, 0x8000'0000U | 1500), Status::kSuccess);  // a test packet
   udp::socket other = socketOn("127.0.0.2");
@@ -83,6 +86,7 @@ TEST_F(GigeVisionWire, GivesNoFrameToAnAddressThatDoesNotControlIt) {
   EXPECT_EQ(write(control, Item::HostPort, stream.local_endpoint().port()), Status::kSuccess);
   EXPECT_FALSE(hear(stream).empty());  // so there were frames all the time
   EXPECT_TRUE(hear(victim, 0).empty());
+  EXPECT_TRUE(hear(own, 0).empty());
   EXPECT_TRUE(hear(other, 0).empty());
 }
 
