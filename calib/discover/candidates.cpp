@@ -74,6 +74,26 @@ bool varies(const CovariateInfo& covariate) {
              : !covariate.quantiles.empty() && covariate.quantiles.back() > covariate.quantiles.front();
 }
 
+/// Pairs that may act together, the likelier ones first: a state of the camera with a place or a pixel's signal,
+/// then two of the pixel's, then two states.
+std::vector<std::pair<std::size_t, std::size_t>> pairsOf(std::span<const CovariateInfo> covariates,
+                                                         std::size_t most) {
+  std::vector<std::pair<std::size_t, std::size_t>> pairs;
+  for (std::size_t j = 1; j < covariates.size(); ++j) {
+    for (std::size_t i = 0; i < j; ++i) {
+      if (!varies(covariates[i]) || !varies(covariates[j])) continue;
+      if (covariates[i].nature == Nature::Index || covariates[j].nature == Nature::Index) continue;
+      pairs.emplace_back(i, j);
+    }
+  }
+  std::ranges::stable_sort(pairs, {}, [&](const auto& pair) {
+    const bool a = covariates[pair.first].is_of_capture, b = covariates[pair.second].is_of_capture;
+    return a != b ? 0 : a ? 2 : 1;
+  });
+  pairs.resize(std::min(pairs.size(), most));
+  return pairs;
+}
+
 }  // namespace
 
 std::vector<Term> products(const std::vector<Term>& a, const std::vector<Term>& b) {
@@ -119,14 +139,8 @@ std::vector<TermGroup> genericCandidates(std::span<const CovariateInfo> covariat
     if (options.captures >= 60) groups.push_back(waves(covariate, 11, 20));
   }
   if (options.captures < 30) return groups;
-  std::size_t pairs = 0;
-  for (std::size_t j = 1; j < covariates.size(); ++j) {
-    for (std::size_t i = 0; i < j && pairs < options.most_pairs; ++i) {
-      if (!varies(covariates[i]) || !varies(covariates[j])) continue;
-      if (covariates[i].nature == Nature::Index || covariates[j].nature == Nature::Index) continue;
-      groups.push_back(smoothIn(covariates[i], covariates[j], kSurfaceKnots)), ++pairs;
-    }
-  }
+  for (const auto& [i, j] : pairsOf(covariates, options.most_pairs))
+    groups.push_back(smoothIn(covariates[i], covariates[j], kSurfaceKnots));
   return groups;
 }
 

@@ -181,8 +181,9 @@ Effect effectOf(const Context& context, const std::vector<Explanation>& all, std
   double best = mine.gain.total;
   for (const Explanation& one : all) best = std::max(best, one.gain.total);
   for (const Explanation& one : all) {
+    if (!one.refused.empty()) effect.refused.push_back(one.name + ": " + one.refused);
     if (one.covariates != mine.covariates && !one.is_catalogue) continue;
-    effect.tried.push_back({one.refused.empty() ? one.name : one.name + " (" + one.refused + ")", one.numbers, against0(one.gain), difference(mine.gain, one.gain)});
+    effect.tried.push_back({one.name, one.numbers, against0(one.gain), difference(mine.gain, one.gain)});
     effect.tried.back().gain.mean = one.gain.total;
   }
   std::ranges::sort(effect.tried, std::ranges::greater{}, [](const TriedShape& t) { return t.gain.mean; });

@@ -109,7 +109,7 @@ class Search {
     const auto chosen = chosenOf(context_, explanations);
     if (!chosen) return false;
     Effect effect = effectOf(context_, explanations, *chosen);
-    if (effect.gain.mean <= 2.0 * effect.gain.error) return false;
+    if (effect.gain.mean <= 2.0 * effect.gain.error || isWhatACurveLeaves(effect)) return false;
     effect.p = p;
     const auto same = std::ranges::find_if(finding_.effects, [&](const Effect& known) {
       return known.covariates == effect.covariates && known.is_catalogue == effect.is_catalogue &&
@@ -125,6 +125,16 @@ class Search {
     }
     estimate(*context_.source, context_.scales, finding_.effects);
     return true;
+  }
+
+  /// A curve without a formula is known to some per cent, since between its knots it is straight: what little is
+  /// left beside it is not called another effect.
+  bool isWhatACurveLeaves(const Effect& effect) const {
+    constexpr double kKnown = 0.05;
+    return std::ranges::any_of(finding_.effects, [&](const Effect& known) {
+      return !known.is_catalogue && !isFormula(known) && known.covariates != effect.covariates &&
+             effect.gain.mean < kKnown * known.gain.mean;
+    });
   }
 
   static std::optional<std::size_t> chosenOf(const Context& context, std::vector<Explanation>& explanations) {
@@ -148,7 +158,7 @@ class Search {
     if (fits.empty()) return context_.original;
     std::vector<const NamedFit*> plain;
     for (const auto& fit : fits) plain.push_back(fit.get());
-    return context_.original->named()->including(plain);
+    return context_.original->named()->including(plain, true);
   }
 
   /// What is left goes with the covariates of an effect that is known: its shape was not it. Another single

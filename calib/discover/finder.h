@@ -68,6 +68,7 @@ struct Effect {
   double frequency = 1.0;  ///< how often it is the best again when captures are drawn anew with replacement
   std::vector<TriedShape> tried{};
   std::vector<Alternative> alternatives{};
+  std::vector<std::string> refused{};  ///< effects of the catalogue that were fitted and not named, and why
   std::optional<Experiment> experiment{};
 };
 

@@ -54,7 +54,7 @@ bool leavesSomething(const Context& context, const Explanation& effect) {
   std::vector<const NamedFit*> fits;
   for (const auto& fit : context.included) fits.push_back(fit.get());
   fits.push_back(effect.named.get());
-  with.source = context.original->named()->including(fits);
+  with.source = context.original->named()->including(fits, false);
   constexpr std::size_t kAtOnce = 4;
   Test test{context.test};
   for (std::size_t begin = 0; begin < groups.size(); begin += kAtOnce) {

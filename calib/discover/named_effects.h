@@ -39,9 +39,9 @@ class NamedEffects {
                                                        std::span<const TermGroup> known,
                                                        std::span<const double> scales) const = 0;
   /// The source with these effects in its model and no others: residuals are what they leave, their numbers
-  /// are nuisances, and they are no candidates any more.
-  [[nodiscard]] virtual std::shared_ptr<const RowSource> including(
-      std::span<const NamedFit* const> fits) const = 0;
+  /// are nuisances, and they are no candidates any more. Without its catalogue it is for a look only: less work.
+  [[nodiscard]] virtual std::shared_ptr<const RowSource> including(std::span<const NamedFit* const> fits,
+                                                                   bool with_catalogue) const = 0;
 };
 
 }  // namespace toftwin::discover

@@ -80,6 +80,7 @@ struct CovariateInfo {
   std::vector<double> levels{};     ///< its values, if they are at most 12
   double period = 0.0;              ///< of the modulation, c/(2f), in its unit; 0: not known
   std::optional<Stage> stage{};     ///< where functions of it are inserted
+  bool is_of_capture = false;  ///< the same all over each capture
   std::string word{};  ///< what effects of the catalogue call it; empty: they do not know it
 };
 

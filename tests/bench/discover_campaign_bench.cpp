@@ -1,27 +1,33 @@
 // SPDX-License-Identifier: Apache-2.0
-// What toftwin discover finds in simulated campaigns: each effect of the catalogue hidden in turn,
-// at a chosen difficulty λ, with and without the catalogue knowing it. Prints a table.
+// What toftwin discover finds in simulated campaigns: each effect of the catalogue hidden in turn, at a chosen
+// difficulty λ, with the catalogue knowing it and without, and campaigns with nothing hidden.
 //
-//   discover_campaign_bench [--lambda 600] [--seeds 1] [--absent] [--null 5] [--large] [--scores]
-//   [effect …]
+//   discover_campaign_bench [--cases a,b] [--seeds 1:5] [--lambda 150,600,3000] [--absent no|yes|both]
+//                           [--null plain,noise,pose,tails,bump] [--threads 1] [--large] [--scores]
+//   discover_campaign_bench --table FILE...
 //
-// --scores: with what explains most by itself.
-// --large: 106 captures of 176 × 132 pixels instead of 45 of 44 × 33, to see how long a search
-// takes.
+// Prints one line of comma-separated values for each search, so that slices can run side by side; --table puts
+// such lines together. Without --cases and --null: all effects; with --null alone: no effects. --large: 106
+// captures of 176 × 132 pixels instead of 45 of 44 × 33, to see how long a search takes. --scores: with what
+// explains most by itself, as lines that begin with #.
 #include <fmt/format.h>
-#include <fmt/ranges.h>
+#include <tbb/global_control.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <optional>
+#include <random>
 #include <string>
 #include <vector>
 
 #include "calib/discover/campaign/discover_campaign.h"
 #include "calib/discover/campaign/model_file.h"
 #include "calib/discover/marginal.h"
+#include "tests/bench/campaign_score.h"
 #include "tests/discover/simulated_run.h"
 
 namespace {
@@ -30,12 +36,17 @@ using namespace toftwin;
 using namespace toftwin::discover;
 
 constexpr TraceOptions kTrace{.max_surfaces = 1};
+/// Of the small camera's range where it collects an electron: its phase noise is √(B/2)/A with about twice as many
+/// electrons B as amplitude A, and a radian is 0.8 m.
+constexpr float kNoiseAt1e_m = 0.8F;
 
 struct Options {
-  double lambda = 600.0;
-  int seeds = 1, nulls = 0;
-  bool absent = false, large = false, scores = false;
-  std::vector<std::string> effects{};
+  std::vector<double> lambdas{600.0};
+  std::uint64_t first_seed = 1, last_seed = 1;
+  std::size_t threads = 0;
+  bool present = true, absent = false, large = false, scores = false;
+  std::vector<std::string> cases{}, nulls{};
+  std::vector<std::filesystem::path> tables{};
 };
 
 std::filesystem::path folder() {
@@ -91,10 +102,15 @@ std::string largeCamera() {
   return text;
 }
 
+/// Effects on the waveform show in light that is traced with its harmonics.
+std::string withHarmonics(std::string camera) {
+  return camera.replace(camera.find("taps = 2"), 8, "taps = 2\nharmonics = 5");
+}
+
 struct Setting {
   explicit Setting(bool large)
       : plan(orEnd(plan::parsePlan(large ? largePlan() : smallPlan(), "plan.toml"))),
-        camera(large ? largeCamera() : smallCamera()) {}
+        camera(withHarmonics(large ? largeCamera() : smallCamera())) {}
   plan::Plan plan;
   std::string camera;
   sim::Scene scene = orEnd(sim::Scene::parse(smallScene(), "scene.toml"));
@@ -115,10 +131,26 @@ double lambdaOf(const Setting& world, const sim::SensorModel& truth) {
   return deviance(effectsWithoutNoise(world.declared)) - deviance(effectsWithoutNoise(truth));
 }
 
-void simulate(const Setting& world, const sim::SensorModel& camera, std::uint64_t seed) {
+void simulate(const Setting& world, const sim::SensorModel& camera, std::uint64_t seed,
+              const std::string& null = {}) {
   std::filesystem::remove_all(folder());
-  write(SimulatedRun{.plan = world.plan, .camera = camera, .scene = world.scene, .seed = seed},
-        folder());
+  SimulatedRun run{.plan = world.plan, .camera = camera, .scene = world.scene, .seed = seed};
+  if (null == "pose") run.pose_error_m *= 2.0, run.pose_error_deg *= 2.0;
+  if (null == "bump") run.bumped = 5 + static_cast<int>(seed % 20);
+  if (null == "noise" || null == "tails") {
+    run.spoil = [null, seed](sim::RangeImage& image, const Moment& moment, const CameraInfo&, std::uint64_t k) {
+      const auto at = static_cast<std::uint64_t>(moment.since_power_on->in(second) * 1e3);
+      std::mt19937_64 engine{seed * 1'000'003 + at * 101 + k};
+      std::normal_distribution<float> normal;
+      std::student_t_distribution<float> tailed{4.0F};
+      for (std::size_t i = 0; i < image.range_m.size(); ++i) {
+        // Shot noise goes with 1/√amplitude: a camera of 15 % more noise has 0.57 of it added.
+        const float sigma = 0.57F * kNoiseAt1e_m / std::sqrt(std::max(image.amplitude[i], 1.0F));
+        image.range_m[i] += null == "noise" ? sigma * normal(engine) : 2.0F * sigma * tailed(engine);
+      }
+    };
+  }
+  write(run, folder());
 }
 
 CampaignFinding search(const Setting& world, const std::vector<std::string>& left_out) {
@@ -137,53 +169,38 @@ CampaignFinding search(const Setting& world, const std::vector<std::string>& lef
   return orEnd(searchCampaign(job, silent));
 }
 
-std::string inWords(const CampaignFinding& finding) {
-  std::vector<std::string> words;
-  for (const FoundEffect& one : finding.effects) {
-    std::string word = one.found.is_catalogue
-                           ? one.found.name
-                           : fmt::format("f({})", fmt::join(one.found.covariates, ", "));
-    for (const Alternative& other : one.found.alternatives) word += " or " + other.name;
-    words.push_back(std::move(word));
-  }
-  for (const FittedEffect& one : finding.updates) words.push_back("update " + nameOf(one.effect));
-  return words.empty() ? "nothing" : fmt::format("{}", fmt::join(words, " + "));
-}
-
-void report(const Options& options, const std::string& hidden, double lambda, std::uint64_t seed,
+void report(const Options& options, const bench::Case& of, const sim::AnyEffect* hidden,
             const CampaignFinding& finding) {
-  const auto& judged = finding.judgement;
-  fmt::print("| {} | {:.0f} | {} | {:.3g} | {} | {:.2f} → {:.2f} | {:.0f} % | {:.1f} |\n", hidden,
-             lambda, seed, finding.finding.first_p, inWords(finding),
-             judged ? judged->before.rms_mm : NAN, judged ? judged->after.rms_mm : NAN,
-             judged ? 100.0 * judged->removed : NAN, finding.seconds);
+  fmt::print("{}", bench::lineOf(bench::scoreOf(of, hidden, finding)));
   for (const SeenGroup& one : seenFirst(finding, options.scores ? 10 : 0))
-    fmt::print("    {}: z {:.1f}, T {:.1f} of {}\n", one.name, one.z, one.statistic, one.rank);
+    fmt::print("# {}: z {:.1f}, T {:.1f} of {}\n", one.name, one.z, one.statistic, one.rank);
   std::fflush(stdout);
 }
 
+/// Hides the effect, made as strong as λ wants, and searches.
 void hide(const Setting& world, const sim::AnyEffect& none, const sim::AnyEffect& defaults,
-          const Options& options) {
-  const std::string name = discover::nameOf(defaults);
-  for (int seed = 1; seed <= options.seeds; ++seed) {
-    double factor = 1.0, lambda = 0.0;
-    sim::SensorModel truth = world.declared;
-    for (int pass = 0; pass < 3; ++pass) {
-      truth = world.declared.withEffects(
-          withInserted(world.declared.effects(), scaled(none, defaults, factor)));
-      simulate(world, truth, static_cast<std::uint64_t>(seed));
-      lambda = lambdaOf(world, truth);
-      if (!(lambda > 4.0) || std::abs(lambda / options.lambda - 1.0) < 0.15) break;
-      factor *= std::sqrt(options.lambda / lambda);
-    }
-    if (!(lambda > 0.3 * options.lambda)) {
-      fmt::print("| {} | {:.0f} | {} | | these captures do not show it | | | |\n", name, lambda,
-                 seed);
-      continue;
-    }
-    report(options, name, lambda, static_cast<std::uint64_t>(seed),
-           search(world,
-                  options.absent ? std::vector<std::string>{name} : std::vector<std::string>{}));
+          const Options& options, double wanted, std::uint64_t seed) {
+  bench::Case of{.hidden = discover::nameOf(defaults), .wanted = wanted, .seed = seed};
+  double factor = 1.0;
+  for (int pass = 0; pass < 4; ++pass) {
+    const sim::SensorModel truth = world.declared.withEffects(
+        withInserted(world.declared.effects(), scaled(none, defaults, factor)));
+    simulate(world, truth, seed);
+    of.lambda = lambdaOf(world, truth);
+    if (!(of.lambda > 4.0) || std::abs(of.lambda / wanted - 1.0) < 0.15) break;
+    factor *= std::sqrt(wanted / of.lambda);
+  }
+  if (!(of.lambda > 0.5 * wanted)) {
+    fmt::print("unseen,{},{:.0f},{:.1f},{}\n", of.hidden, wanted, of.lambda, seed);
+    std::fflush(stdout);
+    return;
+  }
+  for (const bool is_absent : {false, true}) {
+    if (!(is_absent ? options.absent : options.present)) continue;
+    of.is_absent = is_absent;
+    std::filesystem::remove(folder() / plan::kOpenedFile);
+    report(options, of, &defaults,
+           search(world, is_absent ? std::vector<std::string>{of.hidden} : std::vector<std::string>{}));
   }
 }
 
@@ -191,47 +208,95 @@ bool isNoise(const sim::AnyEffect& effect) {
   return std::ranges::count(discover::covariatesOf(effect), "frame") > 0;
 }
 
+std::vector<std::string> partsOf(const std::string& list) {
+  std::vector<std::string> parts;
+  std::size_t begin = 0;
+  for (std::size_t comma; (comma = list.find(',', begin)) != std::string::npos; begin = comma + 1)
+    parts.push_back(list.substr(begin, comma - begin));
+  parts.push_back(list.substr(begin));
+  return parts;
+}
+
+[[noreturn]] void endWithUsage(const std::string& word) {
+  fmt::print(stderr,
+             "discover_campaign_bench: {} is not understood; it takes --cases a,b, --seeds 1:5, --lambda 150,600, "
+             "--absent no|yes|both, --null plain,noise,pose,tails,bump, --threads N, --large, --scores, or "
+             "--table FILE...\n",
+             word);
+  std::exit(2);
+}
+
 Options optionsOf(int argc, char** argv) {
   Options options;
   for (int i = 1; i < argc; ++i) {
     const std::string word = argv[i];
-    const auto number = [&] { return i + 1 < argc ? std::atof(argv[++i]) : 0.0; };
-    if (word == "--lambda")
-      options.lambda = number();
-    else if (word == "--seeds")
-      options.seeds = static_cast<int>(number());
-    else if (word == "--null")
-      options.nulls = static_cast<int>(number());
-    else if (word == "--absent")
-      options.absent = true;
-    else if (word == "--scores")
-      options.scores = true;
-    else if (word == "--large")
+    const auto value = [&] {
+      if (i + 1 >= argc) endWithUsage(word + " without a value");
+      return std::string{argv[++i]};
+    };
+    if (word == "--lambda") {
+      options.lambdas.clear();
+      for (const std::string& one : partsOf(value())) options.lambdas.push_back(std::atof(one.c_str()));
+    } else if (word == "--seeds") {
+      const std::string range = value();
+      const auto colon = range.find(':');
+      options.first_seed = std::strtoull(range.c_str(), nullptr, 10);
+      options.last_seed = colon == std::string::npos
+                              ? options.first_seed
+                              : std::strtoull(range.substr(colon + 1).c_str(), nullptr, 10);
+    } else if (word == "--threads") {
+      options.threads = std::strtoull(value().c_str(), nullptr, 10);
+    } else if (word == "--absent") {
+      const std::string which = value();
+      options.absent = which != "no", options.present = which != "yes";
+    } else if (word == "--cases") {
+      options.cases = partsOf(value());
+    } else if (word == "--null") {
+      options.nulls = partsOf(value());
+    } else if (word == "--large") {
       options.large = true;
-    else
-      options.effects.push_back(word);
+    } else if (word == "--scores") {
+      options.scores = true;
+    } else if (word == "--table") {
+      while (i + 1 < argc) options.tables.emplace_back(argv[++i]);
+    } else {
+      endWithUsage(word);
+    }
   }
   return options;
+}
+
+void searchNulls(const Setting& world, const Options& options) {
+  for (const std::string& null : options.nulls) {
+    for (std::uint64_t seed = options.first_seed; seed <= options.last_seed; ++seed) {
+      simulate(world, world.declared, seed + 1000, null);
+      report(options, {.hidden = "nothing: " + null, .seed = seed}, nullptr, search(world, {}));
+    }
+  }
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   const Options options = optionsOf(argc, argv);
-  const Setting world{options.large};
-  fmt::print(
-      "| hidden | λ | seed | p | found | RMS, locked [mm] | removed | s "
-      "|\n|---|---|---|---|---|---|---|---|\n");
-  for (int seed = 1; seed <= options.nulls; ++seed) {
-    simulate(world, world.declared, static_cast<std::uint64_t>(seed) + 100);
-    report(options, "nothing", 0.0, static_cast<std::uint64_t>(seed), search(world, {}));
+  if (!options.tables.empty()) {
+    fmt::print("{}", bench::tableOf(options.tables));
+    return 0;
   }
+  std::optional<tbb::global_control> control;
+  if (options.threads > 0) control.emplace(tbb::global_control::max_allowed_parallelism, options.threads);
+  const Setting world{options.large};
+  fmt::print("{}", bench::header());
+  searchNulls(world, options);
   sim::AllEffects::forEach([&]<class E>() {
     const std::string name{E::about.name};
-    const bool is_asked = std::ranges::find(options.effects, name) != options.effects.end();
-    if (!is_asked && !(options.effects.empty() && options.nulls == 0)) return;
-    if (!isNoise(sim::AnyEffect{E{}}))
-      hide(world, sim::AnyEffect{E::none()}, sim::AnyEffect{E{}}, options);
+    const bool is_asked = std::ranges::find(options.cases, name) != options.cases.end();
+    if (!is_asked && !(options.cases.empty() && options.nulls.empty())) return;
+    if (isNoise(sim::AnyEffect{E{}}) || name == "learned_range" || name == "delay") return;
+    for (const double lambda : options.lambdas) {
+      for (std::uint64_t seed = options.first_seed; seed <= options.last_seed; ++seed)
+        hide(world, sim::AnyEffect{E::none()}, sim::AnyEffect{E{}}, options, lambda, seed);
+    }
   });
   std::filesystem::remove_all(folder());
 }

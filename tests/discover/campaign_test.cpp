@@ -141,6 +141,62 @@ TEST_F(Searched, AWrongNumberOfADeclaredEffectIsAnUpdateAndNoNewEffect) {
   EXPECT_EQ(std::ranges::count(model->effectNames(), std::string{"clock_scale"}), 1);
 }
 
+/// Light from other pixels shows like nothing else. Of what is left in the catalogue a ghost image comes nearest,
+/// and a charge in some raw exposures next: neither is it.
+TEST_F(Searched, AnEffectThatTheCatalogueLacksIsNotBlamedOnAnother) {
+  simulate("[[effect]]\ntype = 'lens_scatter'\nveil = 0.0015\nhalo = 0.002\n");
+  CampaignJob without = job();
+  without.left_out = {"lens_scatter"};
+  const CampaignFinding finding = search(without);
+  ASSERT_THAT(namesOf(finding), ElementsAre("undeclared")) << verdictOf(finding);
+  EXPECT_THAT(finding.effects.front().found.covariates, ElementsAre("neighbours")) << verdictOf(finding);
+  EXPECT_THAT(finding.effects.front().found.refused, testing::Not(testing::IsEmpty())) << "nothing was tried";
+}
+
+/// A table with a knob for each half metre can look like a scale, too.
+TEST_F(Searched, AFormulaIsNotCalledATable) {
+  simulate("[[effect]]\ntype = 'clock_scale'\nppm = 3000.0\n");
+  CampaignJob without = job();
+  without.left_out = {"clock_scale"};
+  const CampaignFinding finding = search(without);
+  ASSERT_THAT(namesOf(finding), ElementsAre("undeclared")) << verdictOf(finding);
+  EXPECT_THAT(finding.effects.front().found.covariates, ElementsAre("range_m")) << verdictOf(finding);
+}
+
+/// Half of the light in a corner has been at both boards; traced with few paths it is noisy, and filters that
+/// smooth noise must not seem to explain anything, nor must pixels of rare paths count less.
+TEST_F(Searched, WhatTracingHasByChanceIsNoEffectOfTheCamera) {
+  write("scene.toml", cornerScene());
+  const auto plan = plan::parsePlan(cornerPlan(), "plan.toml");
+  const auto camera = sim::SensorModel::parse(smallCamera(), "camera.toml");
+  const auto scene = sim::Scene::parse(cornerScene(), "scene.toml");
+  ASSERT_TRUE(plan && camera && scene);
+  discover::write({.plan = *plan, .camera = *camera, .scene = *scene, .max_surfaces = 3}, folder_ / "run");
+  CampaignJob noisy = job();
+  noisy.trace.max_surfaces = 3, noisy.trace.samples_per_pixel = 24;
+  const CampaignFinding finding = search(noisy);
+  EXPECT_THAT(namesOf(finding), testing::IsEmpty()) << verdictOf(finding);
+  EXPECT_GT(finding.finding.first_p, 0.01);
+}
+
+/// The other way round at the places that are only locked: what was learned makes it worse there.
+TEST_F(Searched, WhatDoesWorseOnLockedCapturesIsNotWritten) {
+  simulate("", [](sim::RangeImage& image, const Moment& moment, const CameraInfo&, std::uint64_t) {
+    const double z = moment.world_from_camera->translation_m.z;  // the wall is at 2 m
+    const bool is_only_locked = std::abs(z - std::round(z)) < 1e-6;
+    for (float& range_m : image.range_m.pixels()) range_m *= is_only_locked ? 0.99F : 1.005F;
+  });
+  const CampaignFinding finding = search(job());
+  ASSERT_FALSE(finding.effects.empty());
+  ASSERT_TRUE(finding.judgement);
+  EXPECT_TRUE(finding.is_worse) << verdictOf(finding);
+  EXPECT_THAT(verdictOf(finding), HasSubstr("model.toml is the camera file as it was"));
+  const auto model = sim::SensorModel::parse(finding.model_toml, "model.toml");
+  const auto declared = sim::SensorModel::parse(smallCamera(), "camera.toml");
+  ASSERT_TRUE(model && declared);
+  EXPECT_EQ(model->effectNames(), declared->effectNames());
+}
+
 TEST_F(Searched, SaysWhatIsMissingOrWrong) {
   CampaignJob other = job();
   EXPECT_THAT(errorOf(other), HasSubstr("the folder of a run of `toftwin measure`?"));

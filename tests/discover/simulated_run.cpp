@@ -33,11 +33,11 @@ using Engine = std::mt19937_64;
 double normal(Engine& engine) { return std::normal_distribution<double>{}(engine); }
 
 Transform<World, Camera> bumped(const Transform<World, Camera>& pose, const SimulatedRun& run,
-                                Engine& engine) {
-  const double turn = run.pose_error_deg * std::numbers::pi / 180.0;
+                                double times, Engine& engine) {
+  const double turn = times * run.pose_error_deg * std::numbers::pi / 180.0;
   Transform<Camera, Camera> by = rotation<Camera, Camera>({1, 0, 0}, turn * normal(engine)) *
                                  rotation<Camera, Camera>({0, 1, 0}, turn * normal(engine));
-  by.translation_m = run.pose_error_m * Vec3d{normal(engine), normal(engine), normal(engine)};
+  by.translation_m = times * run.pose_error_m * Vec3d{normal(engine), normal(engine), normal(engine)};
   return pose * by;
 }
 
@@ -72,9 +72,9 @@ plan::RecordedFile capture(const SimulatedRun& run, const plan::PlannedCapture& 
   const auto other = run.scene_of_block.find(block);
   sim::TraceRequest request = camera.traceRequest();
   const auto pose = planned.pose->world_from_camera();
-  request.world_from_camera = bumped(pose, run, engine);
+  request.world_from_camera = bumped(pose, run, static_cast<int>(planned.number) == run.bumped ? 10.0 : 1.0, engine);
   request.samples_per_pixel = 128;
-  request.max_surfaces = 1;
+  request.max_surfaces = run.max_surfaces;
   request.seed = engine();
   sim::Light light = sim::trace(other == run.scene_of_block.end() ? run.scene : other->second, request);
   brighten(light, static_cast<float>(std::exp(run.light_error * normal(engine))));
@@ -188,6 +188,41 @@ shape = "rectangle"
 size_m = [0.3, 1.2, 0]
 position_m = [-0.45, 0.0, 1.98]
 material = "dark"
+)";
+}
+
+std::string cornerScene() {
+  return R"(
+[[material]]
+name = "paint"
+albedo = 0.8
+[[object]]
+name = "right board"
+shape = "rectangle"
+size_m = [3.0, 3.0, 0.0]
+position_m = [1.06066017, 0.0, 0.93933983]
+euler_deg = [0.0, 45.0, 0.0]
+material = "paint"
+[[object]]
+name = "left board"
+shape = "rectangle"
+size_m = [3.0, 3.0, 0.0]
+position_m = [-1.06066017, 0.0, 0.93933983]
+euler_deg = [0.0, 135.0, 0.0]
+material = "paint"
+)";
+}
+
+std::string cornerPlan() {
+  return R"(name = "corner"
+seed = 7
+frames = 8
+exposure_us = 500.0
+[[block]]
+name = "distance"
+kind = "distance"
+distance_m = [1.0, 1.2, 1.4, 1.6, 1.8]
+repeats = 2
 )";
 }
 

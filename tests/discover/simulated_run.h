@@ -25,6 +25,8 @@ struct SimulatedRun {
   /// What no camera file says is done to each frame's ranges: an effect of no catalogue.
   std::function<void(sim::RangeImage&, const Moment&, const CameraInfo&, std::uint64_t frame)> spoil{};
   bool with_poses = true;
+  int max_surfaces = 1;  ///< of the light that the camera sees
+  int bumped = -1;  ///< the capture of this number stood ten times as far off as the others
   int frames = 0;  ///< of each capture; 0: the plan's
 };
 
@@ -35,6 +37,10 @@ void write(const SimulatedRun& run, const std::filesystem::path& folder);
 std::string smallCamera(const std::string& effects = {});
 /// A wall with a bright plate before it, and a floor: something to see from everywhere.
 std::string smallScene();
+/// Two bright boards that meet at a right angle: half of their light has been at both.
+std::string cornerScene();
+/// Ten captures of it, none of them locked.
+std::string cornerPlan();
 /// 30 captures and 8 locked ones: warm-up, distance, exposure, ambient, tilt.
 std::string smallPlan();
 

@@ -27,6 +27,14 @@ std::string titleOf(const Effect& effect) {
              : fmt::format("undeclared: {} ({})", effect.name, fmt::join(effect.covariates, ", "));
 }
 
+/// Its title, and what else it may be.
+std::string answerOf(const Effect& effect) {
+  std::string answer = titleOf(effect);
+  for (const Alternative& other : effect.alternatives)
+    answer += " or " + (other.group.terms.empty() ? other.name : fmt::format("undeclared: {}", other.name));
+  return effect.alternatives.empty() ? answer : answer + " (these captures do not tell them apart)";
+}
+
 std::string numbersOf(const FoundEffect& one) {
   if (!one.fitted) return "the simulator has no form for it; it is not in model.toml";
   std::vector<std::string> words;
@@ -130,6 +138,10 @@ compare::Section foundSection(const CampaignFinding& finding) {
           fmt::format("{} or {}: these captures hardly tell them apart (correlation {:.2f}).",
                       titleOf(one.found), other.name, other.correlation)});
     }
+    if (!one.found.refused.empty()) {
+      section.blocks.emplace_back(compare::Paragraph{
+          fmt::format("Fitted and not named. {}.", fmt::join(one.found.refused, "; ")), true});
+    }
     if (const auto& next = one.found.experiment) {
       section.blocks.emplace_back(compare::Paragraph{
           fmt::format("Next experiment: hold {} at {:.4g} and change {} from {:.4g} to {:.4g}.",
@@ -184,7 +196,7 @@ Json toJson(const FoundEffect& one) {
   json.set("numbers", std::move(numbers));
   Json others = Json::array();
   for (const Alternative& other : one.found.alternatives) others.push(other.name);
-  json.set("or", std::move(others));
+  json.set("or", std::move(others)).set("refused", Json::arrayOf(one.found.refused));
   return json;
 }
 
@@ -260,7 +272,7 @@ std::string verdictOf(const CampaignFinding& finding) {
                      finding.finding.first_p);
   }
   std::vector<std::string> names;
-  for (const FoundEffect& one : finding.effects) names.push_back(titleOf(one.found));
+  for (const FoundEffect& one : finding.effects) names.push_back(answerOf(one.found));
   for (const FittedEffect& one : finding.updates)
     names.push_back("parameter update: " + nameOf(one.effect));
   std::string verdict = fmt::format("The model lacks {}", fmt::join(names, "; "));
@@ -271,6 +283,7 @@ std::string verdictOf(const CampaignFinding& finding) {
         ". On the locked captures: RMS {} → {} mm, {} of what can be explained is removed",
         shown(judged->before.rms_mm, 2), shown(judged->after.rms_mm, 2),
         compare::shownPercent(judged->removed));
+    if (finding.is_worse) verdict += "; since that is worse than before, model.toml is the camera file as it was";
   }
   return verdict;
 }

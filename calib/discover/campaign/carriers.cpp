@@ -13,6 +13,7 @@
 
 #include "calib/discover/campaign/smoothed.h"
 #include "calib/discover/candidates.h"
+#include "sim/effects/effects.h"
 
 namespace toftwin::discover {
 namespace {
@@ -91,7 +92,26 @@ std::map<std::string, Reading> carriersOf(const sim::SensorModel& model, const R
   return all;
 }
 
-std::vector<TermGroup> carrierGroups(std::span<const CovariateInfo> covariates) {
+sim::AnyEffect delayInLight(const sim::SensorModel& model, double millimetres) {
+  sim::FrequencyOffset offset = sim::FrequencyOffset::none();
+  const std::vector<Frequency> frequencies = model.traceRequest().frequencies;
+  const std::array each{&offset.first, &offset.second, &offset.third};
+  for (std::size_t f = 0; f < std::min(each.size(), frequencies.size()); ++f)
+    *each[f] = 2.0 * std::numbers::pi * millimetres * 1e-3 / unambiguousRange(frequencies[f]).in(metre) * radian;
+  return offset;
+}
+
+bool isNoOffset(const Reading& change) {
+  double sum = 0.0, squares = 0.0, n = 0.0;
+  for (const float value : change.range_m.pixels()) {
+    if (!std::isfinite(value)) continue;
+    sum += static_cast<double>(value), squares += static_cast<double>(value) * static_cast<double>(value);
+    n += 1.0;
+  }
+  return n > 0.0 && squares / n - sum * sum / (n * n) > 0.02 * 0.02 * squares / n;
+}
+
+std::vector<TermGroup> carrierGroups(std::span<const CovariateInfo> covariates, bool has_delay) {
   std::vector<TermGroup> groups;
   TermGroup light{"light from neighbours", Kind::Generic, {}, 0};
   for (const int reach : kReaches) light.terms.push_back({{}, Stage::Light, neighbourName(reach)});
@@ -115,10 +135,15 @@ std::vector<TermGroup> carrierGroups(std::span<const CovariateInfo> covariates) 
     add("a charge that goes with " + covariate.name, factors);
   }
   for (const CovariateInfo& covariate : covariates) {
-    TermGroup gain = smoothIn(covariate, kSmoothKnots);
-    gain.name = "a gain that is " + gain.name;
-    for (Term& term : gain.terms) term.stage = Stage::Light, term.carrier = kGain;
-    if (!gain.terms.empty()) groups.push_back(std::move(gain));
+    for (const std::string_view carrier : {kGain, kDelayCarrier}) {
+      if (carrier == kDelayCarrier && !has_delay) continue;
+      TermGroup of_light = smoothIn(covariate, kSmoothKnots);
+      // The place of the first hat is taken by a constant: a gain is free, a delay of the light is not.
+      if (carrier == kDelayCarrier && !of_light.terms.empty()) of_light.terms.emplace_back();
+      of_light.name = fmt::format("a {} that is {}", carrier, of_light.name);
+      for (Term& term : of_light.terms) term.stage = Stage::Light, term.carrier = carrier;
+      if (!of_light.terms.empty()) groups.push_back(std::move(of_light));
+    }
   }
   return groups;
 }

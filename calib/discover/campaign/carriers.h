@@ -24,7 +24,16 @@ std::map<std::string, Reading> carriersOf(const sim::SensorModel& model, const R
 
 /// What is looked for with them: a kernel of squares of light; charge that is constant or goes with exposure,
 /// ambient light or temperature; a gain that goes with any covariate.
-std::vector<TermGroup> carrierGroups(std::span<const CovariateInfo> covariates);
+/// `has_delay`: and a delay of the light, where that is another thing than an error of the range.
+std::vector<TermGroup> carrierGroups(std::span<const CovariateInfo> covariates, bool has_delay);
+
+/// The carrier of a delay in the light, 1 mm of range: it is late before the waveform's harmonics bend the phase,
+/// so that it also moves the cyclic error.
+inline constexpr std::string_view kDelayCarrier = "delay";
+/// That delay as an effect.
+sim::AnyEffect delayInLight(const sim::SensorModel& model, double millimetres);
+/// Whether it can be told from an offset of the range: its change varies by more than 2 % of itself.
+bool isNoOffset(const Reading& change);
 
 /// What effects of the catalogue call a carrier; empty: it is none.
 std::string_view wordOfCarrier(std::string_view carrier);

@@ -68,10 +68,10 @@ void addPlaces(const CameraInfo& camera, const sim::Truth& truth, Gatherer& gath
       incidence(x, y) = static_cast<float>(1.0 / std::max(0.05, cosine));
     }
   }
-  gatherer.add("column", column);
-  gatherer.add("row", row);
   gatherer.add("radius_px", radius);
   gatherer.add("incidence", incidence);
+  gatherer.add("column", column);
+  gatherer.add("row", row);
 }
 
 /// How much brighter than itself a pixel's surroundings are, at three scales: what scatters in the

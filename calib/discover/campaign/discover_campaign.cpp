@@ -226,6 +226,17 @@ Result<> judgeLocked(const CampaignJob& job, const Campaign& campaign, const Dec
   return {};
 }
 
+/// What does worse on captures that it was not fitted to does not go into the model, whatever it is called.
+void keepIfWorse(const std::string& text, CampaignFinding& finding) {
+  if (!finding.judgement) return;
+  finding.is_worse = finding.judgement->after.per_row > finding.judgement->before.per_row;
+  if (!finding.is_worse) return;
+  finding.model_toml = "# Left as it was by toftwin discover: what it found does worse on the locked captures.\n" + text;
+  finding.notes.emplace_back(
+      "With what was found, the locked captures fit worse than before: it is not in model.toml, which is the "
+      "camera file as it was.");
+}
+
 }  // namespace
 
 Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress& progress) {
@@ -291,6 +302,7 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
     const JudgedModel after{refitted->effects, refitted->offset_mm, refitted->gain_percent};
     if (auto done = judgeLocked(job, *campaign, declared, before, after, finding); !done)
       return done.error();
+    keepIfWorse(files->text, finding);
   } else {
     finding.notes.emplace_back(
         campaign->locked.empty()

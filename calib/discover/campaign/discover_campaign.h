@@ -48,6 +48,7 @@ struct CampaignFinding {
   double dispersion = 1.0;
   std::optional<Judgement> judgement{};  ///< on the locked captures
   std::string model_toml{};
+  bool is_worse = false;  ///< on the locked captures: model_toml is the camera file as it was
   std::vector<std::string> notes{};
   double seconds = 0.0;
 };

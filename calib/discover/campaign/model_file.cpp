@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 
+#include "calib/discover/campaign/carriers.h"
 #include "protocol/settings/describe.h"
 
 namespace toftwin::discover {
@@ -85,8 +86,11 @@ std::string trimmed(const std::string& line) {
 
 }  // namespace
 
-std::optional<sim::AnyEffect> learnedEffectOf(const Effect& effect,
+std::optional<sim::AnyEffect> learnedEffectOf(const Effect& found,
                                               std::span<const CovariateInfo> covariates) {
+  Effect effect = found;
+  // A delay of the light is nearly the same error of the range; what differs, the cyclic error, stays.
+  if (std::erase(effect.covariates, std::string{kDelayCarrier}) > 0) effect.stage = Stage::Range;
   if (effect.covariates.empty() || effect.covariates.size() > 2) return std::nullopt;
   if (effect.stage && *effect.stage != Stage::Range) return std::nullopt;
   const CovariateInfo* x = find(covariates, effect.covariates[0]);

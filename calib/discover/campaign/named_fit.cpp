@@ -107,7 +107,7 @@ std::vector<NamedFit> CampaignRows::fitNamed(std::span<const std::string> names,
 }
 
 std::shared_ptr<const RowSource> CampaignRows::including(
-    std::span<const NamedFit* const> fits) const {
+    std::span<const NamedFit* const> fits, bool with_catalogue) const {
   auto all = std::make_shared<CampaignRows>(*this);
   // Declared numbers' columns stay, those of what was included before go.
   std::erase_if(all->groups_, [](const Group& group) { return group.name.starts_with("included "); });
@@ -143,7 +143,7 @@ std::shared_ptr<const RowSource> CampaignRows::including(
   all->base_columns_ = next;
   std::size_t behind = next;
   for (Group group : groups_) {
-    if (group.kind != Kind::Catalogue && group.kind != Kind::Retired) continue;
+    if (!with_catalogue || (group.kind != Kind::Catalogue && group.kind != Kind::Retired)) continue;
     group.first = behind, behind += group.count;
     const bool is_in = std::ranges::any_of(fits, [&](const NamedFit* fit) { return fit->name == group.name; });
     group.kind = is_in ? Kind::Retired : Kind::Catalogue;
@@ -163,7 +163,8 @@ std::shared_ptr<const RowSource> CampaignRows::including(
       rows.base.putResidual(fixed.cells, fixed.residual, fixed.varied, reading);
       for (std::size_t i = 0; i < free.size(); ++i)
         rows.base.putChange(fixed.cells, declared_columns + i, reading, read(cameras[i], c, on_light));
-      rows.evidence = ownEvidence(rows);
+      rows.evidence =
+          with_catalogue ? ownEvidence(rows) : rows.base.evidence(fixed.name, fixed.block);
     }
   });
   return all;

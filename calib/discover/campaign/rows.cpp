@@ -246,7 +246,12 @@ Result<CampaignRows> CampaignRows::make(const Declared& declared, const Lit& lit
   }
   all.base_columns_ = std::max(all.base_columns_, kCommon);
   all.period_m_ = periodOf(declared.model);
+  constexpr double kDelay_mm = 5.0;
+  const auto late = NoiselessCamera::make(
+      declared.model, withInserted(effects, delayInLight(declared.model, kDelay_mm)), lit.captures);
+  if (!late) return late.error();
   all.rows_.resize(lit.captures.size());
+  std::atomic<bool> has_delay{false};
   std::atomic<std::size_t> done{0};
   sim::inParallel(static_cast<int>(lit.captures.size()), 1, [&](int first, int last) {
     for (auto c = static_cast<std::size_t>(first); c < static_cast<std::size_t>(last); ++c) {
@@ -263,6 +268,19 @@ Result<CampaignRows> CampaignRows::make(const Declared& declared, const Lit& lit
           columns.putChange(fixed->cells, effect.group.first + i, base.reading,
                             base.with(effect.variants[i]));
         }
+      }
+      if (all.period_m_ > 0.0) {
+        Reading delay = base.with({*late, true});
+        for (std::size_t i = 0; i < delay.range_m.size(); ++i) {
+          delay.range_m[i] = (delay.range_m[i] - base.reading.range_m[i]) / static_cast<float>(kDelay_mm);
+          delay.log_amplitude[i] =
+              (delay.log_amplitude[i] - base.reading.log_amplitude[i]) / static_cast<float>(kDelay_mm);
+        }
+        if (isNoOffset(delay)) has_delay = true;
+        PerChannel& carrier = fixed->carriers[std::string{kDelayCarrier}];
+        carrier[kRange] = fixed->cells.whitened(Channel::Range, delay.range_m);
+        if (fixed->cells.has(Channel::LogAmplitude))
+          carrier[kLog] = fixed->cells.whitened(Channel::LogAmplitude, delay.log_amplitude);
       }
       CaptureRows& rows = all.rows_[c];
       const auto in_base = static_cast<Eigen::Index>(all.base_columns_);
@@ -281,6 +299,7 @@ Result<CampaignRows> CampaignRows::make(const Declared& declared, const Lit& lit
         options.tell(static_cast<double>(++done) / static_cast<double>(lit.captures.size()));
     }
   });
+  all.has_delay_ = has_delay;
   return all;
 }
 

@@ -123,7 +123,7 @@ class CampaignRows final : public RowSource, public NamedEffects {
                                                std::span<const TermGroup> known,
                                                std::span<const double> scales) const override;
   [[nodiscard]] std::shared_ptr<const RowSource> including(
-      std::span<const NamedFit* const> fits) const override;
+      std::span<const NamedFit* const> fits, bool with_catalogue) const override;
 
   [[nodiscard]] const std::vector<Candidate>& candidates() const { return candidates_; }
   [[nodiscard]] const std::vector<Group>& baseGroups() const { return groups_; }
@@ -185,6 +185,7 @@ class CampaignRows final : public RowSource, public NamedEffects {
   std::size_t base_columns_ = 0;
   std::vector<CaptureRows> rows_;
   double period_m_ = 0.0;
+  bool has_delay_ = false;  ///< a delay of the light is another thing than an error of the range
 };
 
 }  // namespace toftwin::discover

@@ -210,8 +210,11 @@ std::vector<CovariateInfo> CampaignRows::covariates() const {
     CovariateInfo info = describe(rows_.front().fixed->covariates.names[i]);
     std::vector<double> values;
     std::set<double> levels;
+    info.is_of_capture = true;
     for (const CaptureRows& rows : rows_) {
       const auto column = rows.fixed->covariates.values.col(static_cast<Eigen::Index>(i));
+      info.is_of_capture =
+          info.is_of_capture && (column.size() == 0 || column.minCoeff() == column.maxCoeff());
       for (Eigen::Index k = 0; k < column.size(); ++k) {
         const auto value = static_cast<double>(column[k]);
         if (!std::isfinite(value)) continue;
@@ -234,6 +237,6 @@ std::string CampaignRows::wordOfCarrier(const std::string& carrier) const {
   return std::string{discover::wordOfCarrier(carrier)};
 }
 
-std::vector<TermGroup> CampaignRows::ownGroups() const { return carrierGroups(covariates()); }
+std::vector<TermGroup> CampaignRows::ownGroups() const { return carrierGroups(covariates(), has_delay_); }
 
 }  // namespace toftwin::discover

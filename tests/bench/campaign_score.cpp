@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/bench/campaign_score.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <map>
+#include <set>
+#include <tuple>
+
+#include "calib/compare/statistics.h"
+#include "calib/discover/campaign/catalogue.h"
+#include "calib/discover/campaign/covariates.h"
+
+namespace toftwin::discover::bench {
+namespace {
+
+/// Whether all that a formula or curve goes with is what the effect goes with.
+bool goesWith(const std::vector<std::string>& covariates, const sim::AnyEffect& hidden) {
+  const auto words = covariatesOf(hidden);
+  bool has_any = false;
+  for (const std::string& name : covariates) {
+    if (name == "gain" || name == "delay") continue;  // what light does, no covariate
+    if (std::ranges::find(words, wordOf(name)) == words.end()) return false;
+    has_any = true;
+  }
+  return has_any;
+}
+
+bool isOfCatalogue(const Alternative& other) { return other.group.terms.empty(); }
+
+/// What one of the found effects may be: itself and what these data do not tell from it.
+struct Answer {
+  bool has_undeclared = false, has_name = false, has_covariates = false;
+};
+Answer answerOf(const Effect& effect, const sim::AnyEffect& hidden, const std::string& name) {
+  Answer answer{.has_undeclared = !effect.is_catalogue,
+                .has_name = effect.is_catalogue && effect.name == name,
+                .has_covariates = !effect.is_catalogue && goesWith(effect.covariates, hidden)};
+  for (const Alternative& other : effect.alternatives) {
+    if (isOfCatalogue(other)) {
+      answer.has_name = answer.has_name || other.name == name;
+    } else {
+      answer.has_undeclared = true;
+      answer.has_covariates = answer.has_covariates || goesWith(other.covariates, hidden);
+    }
+  }
+  return answer;
+}
+
+std::vector<std::string> fieldsOf(const std::string& line) {
+  std::vector<std::string> fields;
+  std::size_t begin = 0;
+  for (std::size_t comma; (comma = line.find(',', begin)) != std::string::npos; begin = comma + 1)
+    fields.push_back(line.substr(begin, comma - begin));
+  fields.push_back(line.substr(begin));
+  return fields;
+}
+
+constexpr std::size_t kFields = 18;
+
+std::optional<Score> readScore(const std::string& line) {
+  const auto fields = fieldsOf(line);
+  if (fields.size() < kFields || fields[0] != "score") return std::nullopt;
+  const auto number = [&](std::size_t i) { return std::strtod(fields[i].c_str(), nullptr); };
+  Score score;
+  score.of = {fields[1], number(2), number(3), static_cast<std::uint64_t>(number(4)), number(5) > 0.5};
+  score.p = number(6), score.is_detected = number(7) > 0.5, score.is_right = number(8) > 0.5;
+  score.is_alone = number(9) > 0.5, score.is_blamed = number(10) > 0.5;
+  score.has_covariates = number(11) > 0.5, score.has_stage = number(12) > 0.5;
+  score.spurious = static_cast<int>(number(13)), score.removed = number(14);
+  score.before_mm = number(15), score.after_mm = number(16), score.seconds = number(17);
+  for (std::size_t i = kFields; i < fields.size(); ++i)
+    score.found += (i > kFields ? "," : "") + fields[i];
+  return score;
+}
+
+double shareOf(const std::vector<Score>& scores, bool Score::*of) {
+  const auto count = std::ranges::count_if(scores, [&](const Score& one) { return one.*of; });
+  return static_cast<double>(count) / static_cast<double>(scores.size());
+}
+
+std::string rowOf(const std::string& what, const std::vector<Score>& scores, bool is_null, bool is_absent) {
+  double spurious = 0.0;
+  std::vector<double> removed;
+  for (const Score& one : scores) {
+    spurious += one.spurious;
+    if (std::isfinite(one.removed)) removed.push_back(one.removed);
+  }
+  const auto n = static_cast<double>(scores.size());
+  const auto share = [](double value) { return fmt::format("{:.2f}", value); };
+  const bool has_removed = !is_null && !is_absent && !removed.empty();
+  return fmt::format("| {} | {} | {} | {} | {} | {} | {} | {:.2f} | {} | {} |\n", what, scores.size(),
+                     fmt::format("{:.3f}", shareOf(scores, &Score::is_detected)),
+                     is_null || is_absent ? "" : share(shareOf(scores, &Score::is_right)),
+                     is_null || is_absent ? "" : share(shareOf(scores, &Score::is_alone)),
+                     is_absent ? share(1.0 - shareOf(scores, &Score::is_blamed)) : "",
+                     is_absent ? share(shareOf(scores, &Score::has_covariates)) : "", spurious / n,
+                     has_removed ? share(compare::quantile(removed, 0.5)) : "",
+                     has_removed ? share(compare::quantile(removed, 0.1)) : "");
+}
+
+bool isMiss(const Score& one) {
+  if (one.of.wanted == 0.0) return one.is_detected;
+  return !one.is_detected || one.spurious > 0 || one.is_blamed ||
+         (one.of.is_absent ? !one.has_covariates : !one.is_right);
+}
+
+}  // namespace
+
+std::string inWords(const CampaignFinding& finding) {
+  std::vector<std::string> words;
+  const auto undeclared = [](const std::vector<std::string>& covariates) {
+    return fmt::format("f({})", fmt::join(covariates, " "));
+  };
+  for (const FoundEffect& one : finding.effects) {
+    std::string word = one.found.is_catalogue ? one.found.name : undeclared(one.found.covariates);
+    for (const Alternative& other : one.found.alternatives)
+      word += " or " + (isOfCatalogue(other) ? other.name : undeclared(other.covariates));
+    words.push_back(std::move(word));
+  }
+  for (const FittedEffect& one : finding.updates) words.push_back("update " + nameOf(one.effect));
+  return words.empty() ? "nothing" : fmt::format("{}", fmt::join(words, " + "));
+}
+
+Score scoreOf(const Case& of, const sim::AnyEffect* hidden, const CampaignFinding& finding) {
+  Score score{.of = of, .p = finding.finding.first_p};
+  score.is_detected = score.p <= 0.01;
+  score.seconds = finding.seconds, score.found = inWords(finding);
+  if (finding.judgement) {
+    score.removed = finding.judgement->removed;
+    score.before_mm = finding.judgement->before.rms_mm, score.after_mm = finding.judgement->after.rms_mm;
+  }
+  score.spurious = static_cast<int>(finding.effects.size() + finding.updates.size());
+  if (hidden == nullptr) return score;
+  bool is_met = false;
+  for (const FoundEffect& one : finding.effects) {
+    const Answer answer = answerOf(one.found, *hidden, of.hidden);
+    const bool is_it = of.is_absent ? answer.has_covariates : answer.has_name || answer.has_covariates;
+    score.is_right = score.is_right || answer.has_name;
+    score.is_alone = score.is_alone || (one.found.is_catalogue && one.found.name == of.hidden);
+    score.has_covariates = score.has_covariates || answer.has_covariates;
+    score.is_blamed = score.is_blamed || (!answer.has_name && !answer.has_undeclared);
+    score.has_stage = score.has_stage || (is_it && one.found.stage == stageOf(*hidden));
+    if (is_it && !is_met) is_met = true, --score.spurious;
+  }
+  // One wrong name in the right one's place is a wrong name, not an effect too many.
+  if (!is_met && score.spurious > 0) --score.spurious;
+  return score;
+}
+
+std::string header() {
+  return "row,hidden,lambda_wanted,lambda,seed,absent,p,detected,named,named_first,blamed,covariates,stage,"
+         "spurious,removed,rms_before_mm,rms_after_mm,seconds,found\n";
+}
+
+std::string lineOf(const Score& one) {
+  const auto yes = [](bool value) { return value ? 1 : 0; };
+  return fmt::format("score,{},{:.0f},{:.1f},{},{},{:.4g},{},{},{},{},{},{},{},{:.4f},{:.4f},{:.4f},{:.1f},{}\n",
+                     one.of.hidden, one.of.wanted, one.of.lambda, one.of.seed, yes(one.of.is_absent), one.p,
+                     yes(one.is_detected), yes(one.is_right), yes(one.is_alone), yes(one.is_blamed),
+                     yes(one.has_covariates), yes(one.has_stage), one.spurious, one.removed, one.before_mm,
+                     one.after_mm, one.seconds, one.found);
+}
+
+std::string tableOf(const std::vector<std::filesystem::path>& files) {
+  std::map<std::tuple<double, bool, std::string>, std::vector<Score>> groups;
+  std::map<std::string, std::vector<Score>> by_effect;
+  std::vector<Score> misses;
+  std::set<std::string> hidden_from_captures;
+  std::size_t others = 0;
+  for (const auto& file : files) {
+    std::ifstream in{file};
+    for (std::string line; std::getline(in, line);) {
+      if (line.starts_with("unseen,")) hidden_from_captures.insert(fieldsOf(line).at(1));
+      auto score = readScore(line);
+      if (!score) {
+        others += line.starts_with("row,") || line.starts_with("unseen,") ? 0 : 1;
+        continue;
+      }
+      if (isMiss(*score)) misses.push_back(*score);
+      const bool is_null = score->of.wanted == 0.0;
+      groups[{score->of.wanted, score->of.is_absent, is_null ? score->of.hidden : ""}].push_back(*score);
+      if (!is_null && !score->of.is_absent) by_effect[score->of.hidden].push_back(*score);
+    }
+  }
+  std::string table =
+      "| hidden | runs | detected | named | named first | absent: none blamed | absent: covariates right | "
+      "spurious a run | removed, median | worst tenth |\n|---|---|---|---|---|---|---|---|---|---|\n";
+  for (const auto& [key, scores] : groups) {
+    const auto& [wanted, is_absent, name] = key;
+    table += rowOf(wanted == 0.0 ? name : fmt::format("λ = {:.0f}{}", wanted, is_absent ? ", absent" : ""),
+                   scores, wanted == 0.0, is_absent);
+  }
+  table += "\nBy effect, all λ:\n\n| hidden | runs | detected | named | named first | | | spurious | removed, "
+           "median | worst tenth |\n|---|---|---|---|---|---|---|---|---|---|\n";
+  for (const auto& [name, scores] : by_effect) table += rowOf(name, scores, false, false);
+  table += "\nMisses:\n\n| hidden | λ | seed | absent | p | found | removed |\n|---|---|---|---|---|---|---|\n";
+  for (const Score& one : misses)
+    table += fmt::format("| {} | {:.0f} | {} | {} | {:.2g} | {} | {:.2f} |\n", one.of.hidden, one.of.lambda,
+                         one.of.seed, one.of.is_absent ? "yes" : "", one.p, one.found, one.removed);
+  table += fmt::format("\nNot to be seen in these captures: {}.\n",
+                       hidden_from_captures.empty() ? "none" : fmt::format("{}", fmt::join(hidden_from_captures, ", ")));
+  if (others > 0) table += fmt::format("{} lines were no scores.\n", others);
+  return table;
+}
+
+}  // namespace toftwin::discover::bench
