@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <random>
 
@@ -177,6 +178,22 @@ TEST_F(Ros2Facade, ThatCannotStartSaysWhyAndTheDaemonServesOn) {
   auto stream = native.subscribe("cam");
   ASSERT_TRUE(stream.ok());
   EXPECT_TRUE(stream->next(kSoon).ok());
+}
+
+TEST_F(Ros2Facade, AReliableReaderThatStopsHoldsUpNobody) {
+  // 4.9 MB per message, so that no buffer on the way takes them all.
+  startRos2("driver = 'pattern'\nwidth = 640\nheight = 480\nframe_rate_hz = 10\n",
+            "reliability = 'reliable'\n");
+  const std::string sign = folder_ / "sign";
+  const Ran begun = run(
+      fmt::format("sh -c '{} {} {} > /dev/null 2>&1 & echo $!'", TOFTWIN_ROS2_POINTS_READER, domain_, sign));
+  const int program = std::stoi(begun.output);
+  ASSERT_TRUE(eventually([&] { return std::filesystem::exists(sign); }));
+  auto* points = program_->read("/cam/points", kPoints, Asks::Reliable);
+  EXPECT_TRUE(nextOf(points));
+  ::kill(program, SIGSTOP);
+  for (int i = 0; i < 20; ++i) ASSERT_TRUE(nextOf(points)) << i;
+  ::kill(program, SIGKILL);
 }
 
 TEST_F(Ros2Facade, SeveralCamerasShareADomain) {
