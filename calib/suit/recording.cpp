@@ -35,16 +35,30 @@ struct Taken {
   std::string model;
   std::map<std::size_t, AtPose> poses;  ///< by number in the use case
   std::vector<double> starts_s;
-  std::size_t elsewhere = 0, unplaced = 0;
+  std::size_t elsewhere = 0, unplaced = 0, near_several = 0;
 };
 
-/// The use case's pose that is nearest, if it is near enough.
-std::optional<std::size_t> poseOf(const Case& use, const Transform<World, Camera>& pose) {
+struct Match {
+  std::optional<std::size_t> nearest{};  ///< number of the use case's pose, if one is near enough
+  std::size_t within_reach = 0;          ///< how many are
+};
+
+/// Distance and angle count alike: each as a share of how far it may be off.
+Match poseOf(const Case& use, const Transform<World, Camera>& pose) {
+  Match match;
+  double least = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < use.spec.poses.size(); ++i) {
     const auto wanted = use.spec.poses[i].world_from_camera();
-    if (norm(pose.translation_m - wanted.translation_m) <= kNear_m && angleBetween(pose, wanted) <= kNear_rad) return i;
+    const double away = norm(pose.translation_m - wanted.translation_m) / kNear_m;
+    const double turned = angleBetween(pose, wanted) / kNear_rad;
+    if (away > 1.0 || turned > 1.0) continue;
+    ++match.within_reach;
+    if (const double off = std::hypot(away, turned); off < least) {
+      least = off;
+      match.nearest = i;
+    }
   }
-  return std::nullopt;
+  return match;
 }
 
 double startOf_s(const Moment& moment) {
@@ -67,11 +81,12 @@ Result<> take(const Case& use, const CameraSpec& spec, const Frame& frame, Taken
     ++taken.unplaced;
     return {};
   }
-  const auto number = poseOf(use, *pose);
+  const auto [number, within_reach] = poseOf(use, *pose);
   if (!number) {
     ++taken.elsewhere;
     return {};
   }
+  taken.near_several += within_reach > 1 ? 1 : 0;
   AtPose& there = taken.poses[*number];
   if (there.frames_m.empty()) there.pose = *pose;
   if (!compare::samePose(there.pose, *pose))
@@ -176,6 +191,11 @@ Result<CameraResult> judgeRecording(const Case& use, const sim::Scene& scene, co
   }
   if (taken->elsewhere > 0)
     camera.notes.push_back(fmt::format("{} frames were taken at no pose of the use case and left out", taken->elsewhere));
+  if (taken->near_several > 0) {
+    camera.notes.push_back(
+        fmt::format("{} frames stand within 50 mm and 2° of several poses of the use case; each counts at the nearest",
+                    taken->near_several));
+  }
   leaveOpen(use, camera.requirements);
   sumUp(use, camera);
   return camera;

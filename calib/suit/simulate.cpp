@@ -28,6 +28,10 @@ sim::Motion motionOf(const StationSpec& pose, double sign) {
           .period_s = 0.0};
 }
 
+bool areSame(const sim::PathFunctions& a, const sim::PathFunctions& b) {
+  return a.step == b.step && a.first == b.first && a.second == b.second;
+}
+
 /// Light of one variant's lens, modulation and paths; variants that ask for the same share it.
 struct Optics {
   sim::TraceRequest request;
@@ -37,7 +41,7 @@ struct Optics {
     const auto& b = other.request;
     return a.camera == b.camera && a.emitters == b.emitters && a.frequencies == b.frequencies &&
            a.harmonics == b.harmonics && a.max_surfaces == b.max_surfaces && a.pixel_extent == b.pixel_extent &&
-           a.gates.size() == b.gates.size() && stands_still == other.stands_still;
+           std::ranges::equal(a.gates, b.gates, areSame) && stands_still == other.stands_still;
   }
 };
 

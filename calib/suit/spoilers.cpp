@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <set>
 
 #include "calib/suit/suit.h"
@@ -86,15 +87,34 @@ double marginOf(const RequirementSpec& requirement, double value) {
   return verdictOf(requirement, exactly(value)).margin;
 }
 
+/// A repeat in which nothing is valid has no margin: what is met without the effect, and without a value in some
+/// repeats with it, is spoiled by it without a gain that could be told.
 Spoiler spoilerOf(const RequirementSpec& requirement, std::size_t r, const std::string& name,
                   const ConditionValues& whole, const ConditionValues& without) {
   std::vector<double> gains;
-  for (std::size_t i = 0; i < whole.repeats[r].size(); ++i)
-    gains.push_back(marginOf(requirement, without.repeats[r][i]) - marginOf(requirement, whole.repeats[r][i]));
+  std::size_t revealed = 0, hidden = 0;
+  for (std::size_t i = 0; i < whole.repeats[r].size(); ++i) {
+    const double with = marginOf(requirement, whole.repeats[r][i]), then = marginOf(requirement, without.repeats[r][i]);
+    revealed += std::isnan(with) && !std::isnan(then) ? 1 : 0;
+    hidden += !std::isnan(with) && std::isnan(then) ? 1 : 0;
+    if (!std::isnan(with) && !std::isnan(then)) gains.push_back(then - with);
+  }
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  const Estimate untold{.value = kNaN, .low = kNaN, .high = kNaN, .repeats = 0};
   const double together = without.together.empty() ? without.repeats[r].front() : without.together[r];
+  const bool is_met_without = verdictOf(requirement, exactly(together)).is_met;
   return {.what = name,
-          .gain = estimateOf(gains, std::nullopt, false),
-          .is_met_without = verdictOf(requirement, exactly(together)).is_met};
+          .gain = gains.empty() ? untold : estimateOf(gains, std::nullopt, false),
+          .is_met_without = is_met_without,
+          .is_valid_only_without =
+              hidden == 0 && (revealed == whole.repeats[r].size() || (revealed > 0 && is_met_without))};
+}
+
+/// What gives a value at all is before what gains, and of it what is met; what cannot be told (nothing valid in
+/// either) is last.
+double rankOf(const Spoiler& one) {
+  if (one.is_valid_only_without) return one.is_met_without ? -2e300 : -1e300;
+  return std::isnan(one.gain.value) ? 1e300 : -one.gain.value;
 }
 
 }  // namespace
@@ -116,9 +136,8 @@ Result<std::vector<std::vector<Spoiler>>> spoilersOf(const Case& use, const sim:
       spoilers[r].push_back(spoilerOf(requirement, r, variants[v].name, at(part, use, worst, values->front()),
                                       at(part, use, worst, (*values)[v])));
     }
-    // What cannot be told (nothing valid in either) is last; "all of these" keeps its place at the end.
-    const auto order = [](const Spoiler& one) { return std::isnan(one.gain.value) ? 1e300 : -one.gain.value; };
-    std::ranges::stable_sort(spoilers[r].begin(), spoilers[r].end() - 1, {}, order);
+    // "all of these" keeps its place at the end.
+    std::ranges::stable_sort(spoilers[r].begin(), spoilers[r].end() - 1, {}, rankOf);
   }
   return spoilers;
 }

@@ -36,7 +36,8 @@ struct Spoiler {
   std::string what{};
   Estimate gain{};  ///< in the unit of valueOf(); more is better without it
   bool is_met_without = false;
-  [[nodiscard]] bool isSpoiling() const { return gain.low > 0.0; }
+  bool is_valid_only_without = false;  ///< with it there is no value to gain from: nothing is valid
+  [[nodiscard]] bool isSpoiling() const { return is_valid_only_without || gain.low > 0.0; }
 };
 
 /// A mode and exposure that was tried with one simulation of its own.

@@ -165,7 +165,10 @@ TableBlock spoilerTable(const RequirementSpec& requirement, const std::vector<Sp
                    .header = {"left out", "gain", "95 % interval", "then"}};
   for (const Spoiler& one : spoilers) {
     if (!one.isSpoiling() && &one != &spoilers.back()) continue;
-    table.rows.push_back({one.what, valueText(requirement.kind, one.gain.value), intervalText(requirement.kind, one.gain),
+    const bool has_gain = !std::isnan(one.gain.value) && !one.is_valid_only_without;
+    const std::string untold = one.is_valid_only_without ? "nothing is valid with it" : "–";
+    table.rows.push_back({one.what, has_gain ? valueText(requirement.kind, one.gain.value) : untold,
+                          has_gain ? intervalText(requirement.kind, one.gain) : "–",
                           one.is_met_without ? "met" : "still not met"});
   }
   return table;
@@ -182,7 +185,8 @@ std::string spoilersInWords(const RequirementSpec& requirement, const std::vecto
                                                       : "Without all of them it is still not met: what is left are lens, light, "
                                                         "waveform and decoder.");
   }
-  return fmt::format("“{}” is spoiled most by {}{}.", requirement.name, spoilers.front().what,
+  return fmt::format("“{}” is spoiled most by {}{}{}.", requirement.name, spoilers.front().what,
+                     spoilers.front().is_valid_only_without ? ", with which nothing is valid" : "",
                      spoilers.front().is_met_without ? ": without it, it would be met" : "");
 }
 
@@ -301,7 +305,8 @@ Json toJson(const Case& use, const CameraResult& camera, std::size_t r) {
   for (const Spoiler& one : camera.spoilers.empty() ? std::vector<Spoiler>{} : camera.spoilers[r]) {
     const double scale = shownScale(requirement.kind);
     spoilers.push(Json::object().set("left_out", one.what).set("gain", one.gain.value * scale).set("low", one.gain.low * scale)
-                      .set("high", one.gain.high * scale).set("spoils", one.isSpoiling()).set("met_without", one.is_met_without));
+                      .set("high", one.gain.high * scale).set("spoils", one.isSpoiling())
+                      .set("valid_only_without", one.is_valid_only_without).set("met_without", one.is_met_without));
   }
   json.set("conditions", std::move(conditions)).set("spoilers", std::move(spoilers));
   return json;

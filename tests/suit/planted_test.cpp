@@ -166,6 +166,49 @@ lightings = ['noon']
   }
 }
 
+/// The same where the value is a bias, which does not exist while no pixel is valid: there is no gain to tell, and yet
+/// either of the two is the cause. Dark range noise of 3 mm, over 768 pixels and 12 frames, is not.
+TEST(Planted, SunThatLeavesNoPixelValidIsFoundAsTheCauseOfABiasThatCannotBeTold) {
+  const Folder folder;
+  folder.camera("dazzled.toml", effect("ambient_light") + effect("saturation", "full_well_electrons = 20000") +
+                                    effect("range_noise", "sigma_mm = 3"));
+  const auto suit = folder.judged(kPose + "[[lighting]]\nname = 'noon'\nambient_klx = 100\n" + kBias10 + entry("dazzled.toml"));
+  ASSERT_TRUE(suit) << suit.error().message;
+  const CameraResult& camera = only(*suit);
+  ASSERT_FALSE(camera.requirements[0].verdict.is_met);
+  ASSERT_TRUE(std::isnan(camera.requirements[0].verdict.estimate.value));
+  for (std::size_t i = 0; i < 2; ++i) {
+    const Spoiler& cause = camera.spoilers[0][i];
+    EXPECT_THAT(cause.what, testing::AnyOf("ambient_light", "saturation"));
+    EXPECT_TRUE(cause.isSpoiling() && cause.is_met_without) << cause.what;
+  }
+  EXPECT_FALSE(std::ranges::find(camera.spoilers[0], "range_noise", &Spoiler::what)->isSpoiling());
+  ASSERT_TRUE(writeSuit(*suit, folder.path() / "report", ""));
+  std::stringstream words;
+  words << std::ifstream{folder.path() / "report/report.md"}.rdbuf();
+  EXPECT_THAT(words.str(), AllOf(HasSubstr("with which nothing is valid: without it, it would be met"),
+                                 testing::Not(HasSubstr("no single effect"))));
+}
+
+/// Pulses of 30 and 60 ns need light of their own: a ratio of charges that one's gates let through is another range
+/// with the other's, metres off. Each range is 4.5 m or more; the wall is at 2 m.
+TEST(Planted, ModesWithOtherGatesSeeLightOfTheirOwn) {
+  const Folder folder;
+  for (const std::string width : {"30", "60"}) {
+    std::string text = "[lens]\nwidth = 16\nheight = 12\nfx = 26.0\nfy = 26.0\ncx = 7.5\ncy = 5.5\n"
+                       "[[emitter]]\npower_w = 2.0\n[[pulse]]\nwidth_ns = " + width + ".0\n"
+                       "[decoder]\nalgorithm = \"pulsed\"\n[sampling]\nfactory_calibration = \"waveform\"\n";
+    folder.write("pulse" + width + ".toml", text);
+  }
+  for (const std::string order : {"'pulse30.toml', 'pulse60.toml'", "'pulse60.toml', 'pulse30.toml'"}) {
+    const auto suit =
+        folder.judged(kPose + kBias10 + "[[camera]]\nmodels = [" + order + "]\nexposure_factors = [1.0]\n");
+    ASSERT_TRUE(suit) << suit.error().message;
+    ASSERT_EQ(only(*suit).tries.size(), 2u);
+    for (const Try& one : only(*suit).tries) EXPECT_EQ(one.failed, 0u) << one.mode << " of " << order;
+  }
+}
+
 /// 2 m/s towards the wall and 1.5 ms from one raw exposure to the next: 3 mm each, which phases of 100 MHz see.
 TEST(Planted, MotionIsFoundAsTheCause) {
   const Folder folder;

@@ -91,6 +91,18 @@ TEST(Recording, OfOtherPosesSaysSo) {
   EXPECT_THAT(suit.error().message, HasSubstr("8 elsewhere"));
 }
 
+/// Poses 40 mm apart, as of a fine sweep: a frame at the second is the second's, although the first is within 50 mm.
+TEST(Recording, CountsAtTheNearestPoseThatIsWithinReach) {
+  const Folder folder;
+  record(folder, 8, Transform<World, Camera>{.rotation_wxyz = {1, 0, 0, 0}, .translation_m = {0, 0, 0.04}});
+  const auto suit = folder.judged(kPose + "[[pose]]\nname = 'next'\nposition_m = [0, 0, 0.04]\n" + kCase.substr(kPose.size()));
+  ASSERT_TRUE(suit) << suit.error().message;
+  const CameraResult& camera = suit->cameras.front();
+  ASSERT_EQ(camera.requirements[0].conditions.size(), 1u);
+  EXPECT_EQ(camera.requirements[0].conditions[0].pose, 1u);
+  EXPECT_THAT(camera.notes, testing::Contains(HasSubstr("8 frames stand within 50 mm and 2° of several poses")));
+}
+
 TEST(Recording, LeavesOpenWhatItMetAtSomePosesOnly) {
   const Folder folder;
   record(folder, 8, Transform<World, Camera>{});
