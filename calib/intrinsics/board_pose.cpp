@@ -37,7 +37,8 @@ BoardPose mirrored(const Surface& surface, const Observed& view, const BoardPose
   return result;
 }
 
-Matrix6d informationOf(const Surface& surface, const Observed& view, const LensParameters& lens, const BoardPose& pose) {
+Matrix6d informationOf(const Surface& surface, const Observed& view, const LensParameters& lens,
+                       const BoardPose& pose) {
   Matrix6d information = Matrix6d::Zero();
   for (const Corner& corner : view.corners) {
     const Projection p = projectWithSlopes(lens, pose, surface.at(corner.index));
@@ -56,11 +57,14 @@ Transform<Camera, Board> transformOf(const BoardPose& pose) {
 
 Result<BoardSighting> locateBoard(const Sighting& sighting, const Target& target, const CameraInfo& camera) {
   if (!sighting.isUsed()) {
-    return Error{Error::Code::NotFound, fmt::format("no board to take a pose from: {}{}{}", nameOf(sighting.rejection),
-                                                    sighting.detail.empty() ? "" : ": ", sighting.detail)};
+    return Error{Error::Code::NotFound,
+                 fmt::format("no board to take a pose from: {}{}{}", nameOf(sighting.rejection),
+                             sighting.detail.empty() ? "" : ": ", sighting.detail)};
   }
   if (sighting.corners.size() < kFewest)
-    return Error{Error::Code::NotFound, fmt::format("only {} of the board's corners are seen; a pose takes {}", sighting.corners.size(), kFewest)};
+    return Error{Error::Code::NotFound,
+                 fmt::format("only {} of the board's corners are seen; a pose takes {}",
+                             sighting.corners.size(), kFewest)};
   const Surface surface{target, 0};
   const Observed view = observed(sighting.corners);
   const LensParameters lens = lensOf(camera);
@@ -72,10 +76,12 @@ Result<BoardSighting> locateBoard(const Sighting& sighting, const Target& target
   const double turned = Eigen::AngleAxisd{other.rotation * pose->rotation.transpose()}.angle();
   const double other_rms = rmsOf(residuals(surface, view, lens, other));
   if (turned > 0.02 && other_rms < kMirrored * rms) {
-    return Error{Error::Code::InvalidArgument,
-                 fmt::format("the board may as well be tilted the other way, by {:.0f} degrees ({:.2f} px instead of {:.2f}): it is "
-                             "too small in the image, or too square to the axis; bring it nearer or tilt it more",
-                             turned * 180.0 / std::numbers::pi, other_rms, rms)};
+    return Error{
+        Error::Code::InvalidArgument,
+        fmt::format("the board may as well be tilted the other way, by {:.0f} degrees ({:.2f} px instead of "
+                    "{:.2f}): it is "
+                    "too small in the image, or too square to the axis; bring it nearer or tilt it more",
+                    turned * 180.0 / std::numbers::pi, other_rms, rms)};
   }
   const double n = static_cast<double>(view.corners.size()), degrees = 2.0 * n - 6.0;
   BoardSighting result{.rms_px = rms, .corners = view.corners.size()};
@@ -88,11 +94,12 @@ Result<BoardSighting> locateBoard(const Sighting& sighting, const Target& target
   return result;
 }
 
-Result<BoardSighting> locateBoard(const Image<float>& amplitude, const Target& target, const CameraInfo& camera) {
+Result<BoardSighting> locateBoard(const Image<float>& amplitude, const Target& target,
+                                  const CameraInfo& camera) {
   if (amplitude.width() != camera.width || amplitude.height() != camera.height) {
     return Error{Error::Code::InvalidArgument,
-                 fmt::format("the image has {} x {} pixels, but the lens was calibrated with {} x {}", amplitude.width(),
-                             amplitude.height(), camera.width, camera.height)};
+                 fmt::format("the image has {} x {} pixels, but the lens was calibrated with {} x {}",
+                             amplitude.width(), amplitude.height(), camera.width, camera.height)};
   }
   return locateBoard(findBoard(amplitude, target), target, camera);
 }
@@ -104,8 +111,9 @@ Eigen::Matrix<double, 6, 1> halfWidths(const Matrix6d& covariance, double degree
 std::string uncertaintyInWords(const Matrix6d& covariance, double degrees) {
   const auto half = halfWidths(covariance, degrees);
   constexpr double kDegree = 180.0 / std::numbers::pi;
-  return fmt::format("x {:.2g}, y {:.2g}, z {:.2g} mm; turned by {:.2g}, {:.2g}, {:.2g} degrees", 1e3 * half[3], 1e3 * half[4],
-                     1e3 * half[5], kDegree * half[0], kDegree * half[1], kDegree * half[2]);
+  return fmt::format("x {:.2g}, y {:.2g}, z {:.2g} mm; turned by {:.2g}, {:.2g}, {:.2g} degrees",
+                     1e3 * half[3], 1e3 * half[4], 1e3 * half[5], kDegree * half[0], kDegree * half[1],
+                     kDegree * half[2]);
 }
 
 }  // namespace toftwin::intrinsics

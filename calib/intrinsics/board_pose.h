@@ -30,11 +30,12 @@ struct BoardSighting {
   std::size_t corners = 0;
 };
 
-/// The board of this target in an image of amplitude, seen through a lens that is known and that the result trusts.
-/// The corners' errors are taken from how well they fit, σ² = Σ r² / (2n − 6), as independent. Errors: no board, or
-/// one of no use (with the reason); an image of another size than the lens; a board so small or far that its
-/// mirrored pose fits nearly as well.
-Result<BoardSighting> locateBoard(const Image<float>& amplitude, const Target& target, const CameraInfo& camera);
+/// The board of this target in an image of amplitude, seen through a lens that is known and that the result
+/// trusts. The corners' errors are taken from how well they fit, σ² = Σ r² / (2n − 6), as independent.
+/// Errors: no board, or one of no use (with the reason); an image of another size than the lens; a board so
+/// small or far that its mirrored pose fits nearly as well.
+Result<BoardSighting> locateBoard(const Image<float>& amplitude, const Target& target,
+                                  const CameraInfo& camera);
 /// The same from corners that were found.
 Result<BoardSighting> locateBoard(const Sighting& sighting, const Target& target, const CameraInfo& camera);
 

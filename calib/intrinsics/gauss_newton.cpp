@@ -28,10 +28,12 @@ std::optional<Settled> settle(const std::function<Eigen::VectorXd(const Eigen::V
     if (!scale.allFinite() || scale.minCoeff() <= 0.0) return std::nullopt;
     const Eigen::MatrixXd unit = j * scale.cwiseInverse().asDiagonal();
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver{unit.transpose() * unit};
-    if (solver.eigenvalues().minCoeff() < kUndetermined * solver.eigenvalues().maxCoeff()) return std::nullopt;
+    if (solver.eigenvalues().minCoeff() < kUndetermined * solver.eigenvalues().maxCoeff())
+      return std::nullopt;
     const Eigen::MatrixXd inverse = solver.eigenvectors() * solver.eigenvalues().cwiseInverse().asDiagonal() *
                                     solver.eigenvectors().transpose();
-    const Eigen::MatrixXd covariance = scale.cwiseInverse().asDiagonal() * inverse * scale.cwiseInverse().asDiagonal();
+    const Eigen::MatrixXd covariance =
+        scale.cwiseInverse().asDiagonal() * inverse * scale.cwiseInverse().asDiagonal();
     const Eigen::VectorXd step = -covariance * (j.transpose() * r);
     at += step;
     if (step.cwiseAbs().cwiseProduct(scale).maxCoeff() < 1e-7 * (1.0 + r.norm()))

@@ -15,8 +15,8 @@ struct Settled {
   double squares = 0.0;
 };
 
-/// Gauss and Newton with a numeric Jacobian, for few parameters of order 1. Nothing if it does not settle, or if the
-/// residuals leave a parameter undetermined.
+/// Gauss and Newton with a numeric Jacobian, for few parameters of order 1. Nothing if it does not settle, or
+/// if the residuals leave a parameter undetermined.
 std::optional<Settled> settle(const std::function<Eigen::VectorXd(const Eigen::VectorXd&)>& residuals,
                               Eigen::Index parameters);
 

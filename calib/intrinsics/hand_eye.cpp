@@ -39,7 +39,8 @@ Transform<To, From> transformOf(const Rigid& rigid) {
 Rigid moved(const Rigid& from, const Vector6d& step) {
   Rigid to = from;
   const Eigen::Vector3d w = step.head<3>();
-  if (const double angle = w.norm(); angle > 0.0) to.linear() = Eigen::AngleAxisd{angle, w / angle} * from.linear();
+  if (const double angle = w.norm(); angle > 0.0)
+    to.linear() = Eigen::AngleAxisd{angle, w / angle} * from.linear();
   to.translation() += step.tail<3>();
   return to;
 }
@@ -81,7 +82,8 @@ std::optional<Rigid> firstGuess(const std::vector<Rigid>& rig, const std::vector
   }
   cv::Mat turn, shift;
   try {
-    cv::calibrateHandEye(rig_turns, rig_shifts, board_turns, board_shifts, turn, shift, cv::CALIB_HAND_EYE_PARK);
+    cv::calibrateHandEye(rig_turns, rig_shifts, board_turns, board_shifts, turn, shift,
+                         cv::CALIB_HAND_EYE_PARK);
   } catch (const cv::Exception&) {
     return std::nullopt;
   }
@@ -97,7 +99,9 @@ std::optional<Rigid> firstGuess(const std::vector<Rigid>& rig, const std::vector
 }  // namespace
 
 Result<HandEye> handEye(std::span<const HandEyeView> views) {
-  const auto refuse = [](std::string why) { return Error{Error::Code::InvalidArgument, "hand-eye: " + std::move(why)}; };
+  const auto refuse = [](std::string why) {
+    return Error{Error::Code::InvalidArgument, "hand-eye: " + std::move(why)};
+  };
   if (views.size() < 3) return refuse(fmt::format("{} views; it takes three", views.size()));
   std::vector<Rigid> rig, board;
   std::vector<Matrix6d> whiten;
@@ -109,7 +113,9 @@ Result<HandEye> handEye(std::span<const HandEyeView> views) {
       return refuse(fmt::format("view {} does not say how well its board is known", whiten.size()));
   }
   if (!turnsEnough(rig))
-    return refuse("the rig turns about less than two axes, by less than some degrees: where the camera sits along the axis stays open");
+    return refuse(
+        "the rig turns about less than two axes, by less than some degrees: where the camera sits along the "
+        "axis stays open");
   const auto guess = firstGuess(rig, board);
   if (!guess) return refuse("no place of the camera on the rig explains the views");
   const Rigid rig_from_camera = *guess, world_from_board = rig[0] * *guess * board[0];
@@ -132,9 +138,10 @@ Result<HandEye> handEye(std::span<const HandEyeView> views) {
   result.rig_from_camera = {.pose = transformOf<Rig, Camera>(moved(rig_from_camera, settled->step.head<6>())),
                             .covariance = wider * settled->covariance.topLeftCorner<6, 6>(),
                             .degrees = degrees};
-  result.world_from_board = {.pose = transformOf<World, Board>(moved(world_from_board, settled->step.tail<6>())),
-                             .covariance = wider * settled->covariance.bottomRightCorner<6, 6>(),
-                             .degrees = degrees};
+  result.world_from_board = {
+      .pose = transformOf<World, Board>(moved(world_from_board, settled->step.tail<6>())),
+      .covariance = wider * settled->covariance.bottomRightCorner<6, 6>(),
+      .degrees = degrees};
   return result;
 }
 

@@ -19,14 +19,14 @@ struct HandEyeView {
 struct HandEye {
   KnownPose<Rig, Camera> rig_from_camera{};
   KnownPose<World, Board> world_from_board{};
-  /// √ of Σ whitened residuals² over degrees of freedom: 1 where rig and sightings are as good as they say. Covariances
-  /// are widened by it where it is above.
+  /// √ of Σ whitened residuals² over degrees of freedom: 1 where rig and sightings are as good as they say.
+  /// Covariances are widened by it where it is above.
   double misfit = 0.0;
 };
 
-/// Where the camera sits on the rig and the board in the world: world_from_rig · rig_from_camera · camera_from_board =
-/// world_from_board in all views, least squares weighted by what is known of each sighting. Errors: fewer than three
-/// views; turns about one axis only, which leave a shift along it open.
+/// Where the camera sits on the rig and the board in the world: world_from_rig · rig_from_camera ·
+/// camera_from_board = world_from_board in all views, least squares weighted by what is known of each
+/// sighting. Errors: fewer than three views; turns about one axis only, which leave a shift along it open.
 Result<HandEye> handEye(std::span<const HandEyeView> views);
 
 /// Where the camera stands when the rig does there.

@@ -36,7 +36,9 @@ Rays raysOf(const Image<float>& range_m, const CameraInfo& camera, std::span<con
 }
 
 /// Range less that of the plane.
-double errorOf(const Rays& all, const Eigen::Vector3d& m, std::size_t i) { return all.range_m[i] - 1.0 / m.dot(all.rays[i]); }
+double errorOf(const Rays& all, const Eigen::Vector3d& m, std::size_t i) {
+  return all.range_m[i] - 1.0 / m.dot(all.rays[i]);
+}
 
 /// 1.4826 times the median magnitude: σ of normal errors.
 double spreadOf(const Rays& all, const Eigen::Vector3d& m) {
@@ -49,12 +51,18 @@ double spreadOf(const Rays& all, const Eigen::Vector3d& m) {
 
 }  // namespace
 
-Result<SeenPlane> fitPlane(const Image<float>& range_m, const CameraInfo& camera, std::span<const std::uint32_t> pixels) {
-  const auto refuse = [](std::string why) { return Error{Error::Code::InvalidArgument, "plane: " + std::move(why)}; };
-  if (range_m.width() != camera.width || range_m.height() != camera.height) return refuse("the image is of another size than the lens");
-  if (std::ranges::any_of(pixels, [&](std::uint32_t pixel) { return pixel >= range_m.size(); })) return refuse("a pixel is outside the image");
+Result<SeenPlane> fitPlane(const Image<float>& range_m, const CameraInfo& camera,
+                           std::span<const std::uint32_t> pixels) {
+  const auto refuse = [](std::string why) {
+    return Error{Error::Code::InvalidArgument, "plane: " + std::move(why)};
+  };
+  if (range_m.width() != camera.width || range_m.height() != camera.height)
+    return refuse("the image is of another size than the lens");
+  if (std::ranges::any_of(pixels, [&](std::uint32_t pixel) { return pixel >= range_m.size(); }))
+    return refuse("a pixel is outside the image");
   const Rays all = raysOf(range_m, camera, pixels);
-  if (all.rays.size() < 20) return refuse(fmt::format("{} of {} pixels are valid; it takes 20", all.rays.size(), pixels.size()));
+  if (all.rays.size() < 20)
+    return refuse(fmt::format("{} of {} pixels are valid; it takes 20", all.rays.size(), pixels.size()));
   std::vector<double> robust(all.rays.size(), 1.0);
   Eigen::Vector3d m;
   Eigen::Matrix3d normal;
@@ -67,7 +75,8 @@ Result<SeenPlane> fitPlane(const Image<float>& range_m, const CameraInfo& camera
       right += w / all.range_m[i] * all.rays[i];
     }
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver{normal};
-    if (!(solver.eigenvalues()[0] > 1e-9 * solver.eigenvalues()[2])) return refuse("its pixels lie on one line");
+    if (!(solver.eigenvalues()[0] > 1e-9 * solver.eigenvalues()[2]))
+      return refuse("its pixels lie on one line");
     m = normal.ldlt().solve(right);
     const double spread = std::max(spreadOf(all, m), 1e-9);
     for (std::size_t i = 0; i < all.rays.size(); ++i) {
@@ -99,8 +108,11 @@ Result<SeenPlane> fitPlane(const Image<float>& range_m, const CameraInfo& camera
                    .pixels = used};
 }
 
-Result<KnownPose<World, Camera>> poseFromPlanes(std::span<const SeenPlane> seen, std::span<const KnownPlane> known) {
-  const auto refuse = [](const char* why) { return Error{Error::Code::InvalidArgument, fmt::format("a pose from planes: {}", why)}; };
+Result<KnownPose<World, Camera>> poseFromPlanes(std::span<const SeenPlane> seen,
+                                                std::span<const KnownPlane> known) {
+  const auto refuse = [](const char* why) {
+    return Error{Error::Code::InvalidArgument, fmt::format("a pose from planes: {}", why)};
+  };
   if (seen.size() != known.size()) return refuse("each plane that is seen needs the one that it is");
   if (seen.size() < 3) return refuse("it takes three planes");
   Eigen::Matrix3d turn = Eigen::Matrix3d::Zero(), spread = Eigen::Matrix3d::Zero();
@@ -109,7 +121,8 @@ Result<KnownPose<World, Camera>> poseFromPlanes(std::span<const SeenPlane> seen,
     spread += eigenOf(known[i].normal.v) * eigenOf(known[i].normal.v).transpose();
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> span{spread};
-  if (span.eigenvalues()[0] < 0.02) return refuse("the planes' normals lie nearly in one plane, so that the camera may slide along them");
+  if (span.eigenvalues()[0] < 0.02)
+    return refuse("the planes' normals lie nearly in one plane, so that the camera may slide along them");
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd{turn, Eigen::ComputeFullU | Eigen::ComputeFullV};
   Eigen::Matrix3d rotation = svd.matrixU() * svd.matrixV().transpose();
   if (rotation.determinant() < 0.0)
@@ -119,11 +132,13 @@ Result<KnownPose<World, Camera>> poseFromPlanes(std::span<const SeenPlane> seen,
     right += (known[i].distance_m - seen[i].distance_m) * eigenOf(known[i].normal.v);
   const Eigen::Vector3d place = spread.ldlt().solve(right);
   std::vector<Eigen::Matrix3d> whiten;
-  for (const SeenPlane& plane : seen) whiten.push_back(Eigen::LLT<Eigen::Matrix3d>{plane.covariance}.matrixL());
+  for (const SeenPlane& plane : seen)
+    whiten.push_back(Eigen::LLT<Eigen::Matrix3d>{plane.covariance}.matrixL());
   const auto poseAt = [&](const Eigen::VectorXd& step) {
     const Eigen::Vector3d w = step.head<3>();
     const double angle = w.norm();
-    const Eigen::Matrix3d by = angle > 0.0 ? Eigen::AngleAxisd{angle, w / angle}.toRotationMatrix() : Eigen::Matrix3d::Identity();
+    const Eigen::Matrix3d by =
+        angle > 0.0 ? Eigen::AngleAxisd{angle, w / angle}.toRotationMatrix() : Eigen::Matrix3d::Identity();
     return std::pair<Eigen::Matrix3d, Eigen::Vector3d>{by * rotation, place + step.tail<3>()};
   };
   const auto settled = settle(
@@ -134,7 +149,8 @@ Result<KnownPose<World, Camera>> poseFromPlanes(std::span<const SeenPlane> seen,
           const Eigen::Vector3d n = eigenOf(known[i].normal.v);
           const Eigen::Vector3d expected = r.transpose() * n / (known[i].distance_m - n.dot(t));
           const Eigen::Vector3d measured = eigenOf(seen[i].normal.v) / seen[i].distance_m;
-          all.segment<3>(3 * static_cast<Eigen::Index>(i)) = whiten[i].triangularView<Eigen::Lower>().solve(measured - expected);
+          all.segment<3>(3 * static_cast<Eigen::Index>(i)) =
+              whiten[i].triangularView<Eigen::Lower>().solve(measured - expected);
         }
         return all;
       },

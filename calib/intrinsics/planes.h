@@ -9,20 +9,22 @@
 
 namespace toftwin::intrinsics {
 
-/// A plane that a camera sees: normal · p = distance for its points, normal towards the camera, so distance is negative.
+/// A plane that a camera sees: normal · p = distance for its points, normal towards the camera, so distance
+/// is negative.
 struct SeenPlane {
   Direction<Camera> normal{};
   double distance_m = 0.0;
   /// Of m = normal / distance, in 1/m: what is fitted.
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-  double rms_mm = 0.0;      ///< of ranges along the rays, of those that count
-  std::size_t pixels = 0;   ///< that count
+  double rms_mm = 0.0;     ///< of ranges along the rays, of those that count
+  std::size_t pixels = 0;  ///< that count
 };
 
-/// The plane of so many pixels' ranges. On a plane 1/range = m · ray, linear in m = normal / distance: least squares with
-/// weights range⁴ (errors of range are taken as alike), and Tukey's biweight against what is no plane. Error: fewer than 20
-/// valid pixels, or pixels along one line.
-Result<SeenPlane> fitPlane(const Image<float>& range_m, const CameraInfo& camera, std::span<const std::uint32_t> pixels);
+/// The plane of so many pixels' ranges. On a plane 1/range = m · ray, linear in m = normal / distance: least
+/// squares with weights range⁴ (errors of range are taken as alike), and Tukey's biweight against what is no
+/// plane. Error: fewer than 20 valid pixels, or pixels along one line.
+Result<SeenPlane> fitPlane(const Image<float>& range_m, const CameraInfo& camera,
+                           std::span<const std::uint32_t> pixels);
 
 /// A plane that is known: normal · p = distance for its points in the world, normal towards the cameras.
 struct KnownPlane {
@@ -30,8 +32,9 @@ struct KnownPlane {
   double distance_m = 0.0;
 };
 
-/// Where the camera stands that sees these planes, one by one. Error: fewer than three planes whose normals span space.
-/// Least squares in m weighted by the planes' covariances.
-Result<KnownPose<World, Camera>> poseFromPlanes(std::span<const SeenPlane> seen, std::span<const KnownPlane> known);
+/// Where the camera stands that sees these planes, one by one. Error: fewer than three planes whose normals
+/// span space. Least squares in m weighted by the planes' covariances.
+Result<KnownPose<World, Camera>> poseFromPlanes(std::span<const SeenPlane> seen,
+                                                std::span<const KnownPlane> known);
 
 }  // namespace toftwin::intrinsics

@@ -72,7 +72,8 @@ Result<> take(const Case& use, const CameraSpec& spec, const Frame& frame, Taken
     taken.model = frame.source;
   }
   if (!(taken.camera == frame.camera))
-    return Error{Error::Code::InvalidArgument, fmt::format("the lens of frame {} is another than before", frame.sequence)};
+    return Error{Error::Code::InvalidArgument,
+                 fmt::format("the lens of frame {} is another than before", frame.sequence)};
   taken.starts_s.push_back(startOf_s(frame.moment));
   auto pose = frame.moment.world_from_camera;
   if (!pose && !spec.pose.empty())
@@ -91,8 +92,8 @@ Result<> take(const Case& use, const CameraSpec& spec, const Frame& frame, Taken
   if (there.frames_m.empty()) there.pose = *pose;
   if (!compare::samePose(there.pose, *pose))
     return Error{Error::Code::InvalidArgument,
-                 fmt::format("frame {} stands elsewhere than those before at \"{}\"; a pose is one place", frame.sequence,
-                             use.spec.poses[*number].name)};
+                 fmt::format("frame {} stands elsewhere than those before at \"{}\"; a pose is one place",
+                             frame.sequence, use.spec.poses[*number].name)};
   auto range = compare::rangeOf(frame);
   if (!range) return range.error();
   if (there.frames_m.size() < kMostFrames) there.frames_m.push_back(*std::move(range));
@@ -127,16 +128,20 @@ Result<Taken> readAll(const Case& use, const CameraSpec& spec, const std::string
 
 /// Frames in groups that follow each other stand for repeats: enough of them for an interval, each with two
 /// frames or more, so that noise can be told.
-ConditionValues valuesAt(const Case& use, std::size_t pose, std::size_t lighting, const AtPose& there, const Seen& seen) {
+ConditionValues valuesAt(const Case& use, std::size_t pose, std::size_t lighting, const AtPose& there,
+                         const Seen& seen) {
   const std::size_t count = there.frames_m.size();
-  const std::size_t groups = std::clamp<std::size_t>(count / 2, 1, 8), each = std::max<std::size_t>(1, count / groups);
-  ConditionValues values{.pose = pose, .lighting = lighting, .pixels = {}, .repeats = {}, .together = {}, .frames = each};
+  const std::size_t groups = std::clamp<std::size_t>(count / 2, 1, 8),
+                    each = std::max<std::size_t>(1, count / groups);
+  ConditionValues values{
+      .pose = pose, .lighting = lighting, .pixels = {}, .repeats = {}, .together = {}, .frames = each};
   for (const auto& requirement : use.spec.requirements) {
     const auto pixels = pixelsOf(requirement, use, seen);
     values.pixels.push_back(pixels.size());
     auto& repeats = values.repeats.emplace_back();
     for (std::size_t g = 0; g < groups; ++g)
-      repeats.push_back(valueOf(requirement, seen, pixels, std::span{there.frames_m}.subspan(g * each, each)));
+      repeats.push_back(
+          valueOf(requirement, seen, pixels, std::span{there.frames_m}.subspan(g * each, each)));
   }
   return values;
 }
@@ -160,7 +165,8 @@ void leaveOpen(const Case& use, std::vector<RequirementResult>& results) {
     RequirementResult& result = results[r];
     if (!result.is_judged || result.conditions.size() >= wanted || !result.verdict.is_met) continue;
     result.is_judged = false;
-    result.why_not = fmt::format("met where it was recorded, {} of {} conditions", result.conditions.size(), wanted);
+    result.why_not =
+        fmt::format("met where it was recorded, {} of {} conditions", result.conditions.size(), wanted);
   }
 }
 
@@ -185,16 +191,18 @@ Result<CameraResult> judgeRecording(const Case& use, const sim::Scene& scene, co
   camera.tries.push_back({.mode = "as recorded", .exposure_us = std::numeric_limits<double>::quiet_NaN()});
   if (values.empty()) {
     camera.cannot = fmt::format(
-        "none of its {} frames was taken at a pose of the use case ({} elsewhere, {} that do not say where: [[camera]] "
+        "none of its {} frames was taken at a pose of the use case ({} elsewhere, {} that do not say where: "
+        "[[camera]] "
         "pose = … does)",
         taken->starts_s.size(), taken->elsewhere, taken->unplaced);
   }
   if (taken->elsewhere > 0)
-    camera.notes.push_back(fmt::format("{} frames were taken at no pose of the use case and left out", taken->elsewhere));
-  if (taken->near_several > 0) {
     camera.notes.push_back(
-        fmt::format("{} frames stand within 50 mm and 2° of several poses of the use case; each counts at the nearest",
-                    taken->near_several));
+        fmt::format("{} frames were taken at no pose of the use case and left out", taken->elsewhere));
+  if (taken->near_several > 0) {
+    camera.notes.push_back(fmt::format(
+        "{} frames stand within 50 mm and 2° of several poses of the use case; each counts at the nearest",
+        taken->near_several));
   }
   leaveOpen(use, camera.requirements);
   sumUp(use, camera);

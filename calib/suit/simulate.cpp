@@ -40,8 +40,9 @@ struct Optics {
     const auto& a = request;
     const auto& b = other.request;
     return a.camera == b.camera && a.emitters == b.emitters && a.frequencies == b.frequencies &&
-           a.harmonics == b.harmonics && a.max_surfaces == b.max_surfaces && a.pixel_extent == b.pixel_extent &&
-           std::ranges::equal(a.gates, b.gates, areSame) && stands_still == other.stands_still;
+           a.harmonics == b.harmonics && a.max_surfaces == b.max_surfaces &&
+           a.pixel_extent == b.pixel_extent && std::ranges::equal(a.gates, b.gates, areSame) &&
+           stands_still == other.stands_still;
   }
 };
 
@@ -55,7 +56,8 @@ Optics opticsOf(const Case& use, const Variant& variant) {
 }
 
 /// Of one pose under one lighting.
-Moment momentOf(const Case& use, const Variant& variant, const StationSpec& pose, const LightingSpec& lighting) {
+Moment momentOf(const Case& use, const Variant& variant, const StationSpec& pose,
+                const LightingSpec& lighting) {
   Moment moment;
   moment.exposures = variant.model.exposures({std::llround(pose.time.in(nanosecond))});
   moment.since_power_on = use.spec.powered_on_before;
@@ -72,7 +74,8 @@ class Look {
   Look(const Case& use, const sim::Scene& scene, const StationSpec& pose, Optics optics, std::uint64_t repeat)
       : stands_still_(optics.stands_still),
         seed_(use.spec.seed + 7919 * repeat),
-        view_(scene, seeded(std::move(optics.request), seed_), stands_still_ ? sim::Motion{} : motionOf(pose, 1.0)) {
+        view_(scene, seeded(std::move(optics.request), seed_),
+              stands_still_ ? sim::Motion{} : motionOf(pose, 1.0)) {
     const Transform<World, Camera> there = pose.world_from_camera();
     view_.setPose(stands_still_ ? there : sim::poseAt(motionOf(pose, -1.0), there, pose.time));
     view_.moveTo(pose.time, 0);
@@ -105,14 +108,16 @@ class Look {
     request.seed = seed;
     return request;
   }
-  /// The images of raw exposure `e`; samples lie in the order of the exposures, each with as many images as taps.
+  /// The images of raw exposure `e`; samples lie in the order of the exposures, each with as many images as
+  /// taps.
   static void take(sim::Samples samples, std::size_t e, std::size_t count, sim::Samples& all) {
     if (e == 0) {
       all = std::move(samples);
       return;
     }
     const std::size_t images = samples.electrons.size() / count;
-    for (std::size_t i = e * images; i < (e + 1) * images; ++i) all.electrons[i] = std::move(samples.electrons[i]);
+    for (std::size_t i = e * images; i < (e + 1) * images; ++i)
+      all.electrons[i] = std::move(samples.electrons[i]);
   }
   bool stands_still_;
   std::uint64_t seed_;
@@ -120,15 +125,16 @@ class Look {
 };
 
 /// So many frames of what was collected. An effect that remembers meets one frame before the first.
-std::vector<Image<float>> framesOf(const Variant& variant, const sim::Samples& collected, const Moment& moment,
-                                   std::uint64_t seed, std::uint64_t first_noise, int count) {
+std::vector<Image<float>> framesOf(const Variant& variant, const sim::Samples& collected,
+                                   const Moment& moment, std::uint64_t seed, std::uint64_t first_noise,
+                                   int count) {
   std::vector<Image<float>> frames;
   std::optional<sim::RangeImage> last;
   const int before = variant.model.remembers() ? 1 : 0;
   for (int i = 0; i < count + before; ++i) {
     const sim::History history{before > 0 ? &collected : nullptr, last ? &*last : nullptr};
-    auto exposed = variant.model.readOut(collected, moment, seed, first_noise + static_cast<std::uint64_t>(i), 0, 0,
-                                         i > 0 ? history : sim::History{});
+    auto exposed = variant.model.readOut(collected, moment, seed, first_noise + static_cast<std::uint64_t>(i),
+                                         0, 0, i > 0 ? history : sim::History{});
     Image<float> range = exposed.range.range_m;
     for (std::size_t p = 0; p < range.size(); ++p) {
       const bool is_invalid =
@@ -169,7 +175,8 @@ Station stationOf(const Case& use, const sim::Scene& scene, const StationSpec& p
   const Moment moment = momentOf(use, variant, pose, use.spec.lightings.front());
   // As the simulator's truth_range: the middle of the frame's middle exposure.
   const Duration middle = variant.stands_still ? pose.time : sim::middleOf(moment);
-  const auto there = sim::poseAt(motionOf(pose, 1.0), sim::poseAt(motionOf(pose, -1.0), pose.world_from_camera(), pose.time), middle);
+  const auto there = sim::poseAt(
+      motionOf(pose, 1.0), sim::poseAt(motionOf(pose, -1.0), pose.world_from_camera(), pose.time), middle);
   Station station{.seen = seenFrom(scene, variant.model.camera(), there, middle), .pixels = {}, .sums = {}};
   for (const auto& requirement : use.spec.requirements)
     station.pixels.push_back(pixelsOf(requirement, use, station.seen));
@@ -195,7 +202,11 @@ bool isWanted(const Case& use, std::size_t pose, std::size_t lighting) {
 }
 
 ConditionValues emptyValues(const Case& use, std::size_t pose, std::size_t lighting, const Station& station) {
-  ConditionValues values{.pose = pose, .lighting = lighting, .pixels = {}, .repeats = {}, .together = {},
+  ConditionValues values{.pose = pose,
+                         .lighting = lighting,
+                         .pixels = {},
+                         .repeats = {},
+                         .together = {},
                          .frames = static_cast<std::size_t>(use.spec.frames)};
   for (const auto& pixels : station.pixels) values.pixels.push_back(pixels.size());
   values.repeats.resize(use.spec.requirements.size());
@@ -235,8 +246,8 @@ class PoseRun {
         const sim::Samples mean = divided(std::move(sum), repeats.count);
         condition.together =
             valuesOf(use_, stations_[v], pose_, condition.lighting,
-                     framesOf(variants_[v], mean, moment, use_.spec.seed, noiseOf(repeats.first + repeats.count),
-                              use_.spec.frames * repeats.count));
+                     framesOf(variants_[v], mean, moment, use_.spec.seed,
+                              noiseOf(repeats.first + repeats.count), use_.spec.frames * repeats.count));
       }
     }
   }
@@ -245,8 +256,8 @@ class PoseRun {
 
  private:
   [[nodiscard]] bool seeTheSame(std::size_t a, std::size_t b) const {
-    return optics_[a] == optics_[b] &&
-           (variants_[a].stands_still || variants_[a].model.exposures({}) == variants_[b].model.exposures({}));
+    return optics_[a] == optics_[b] && (variants_[a].stands_still ||
+                                        variants_[a].model.exposures({}) == variants_[b].model.exposures({}));
   }
 
   /// Variants that see the same light, which is traced once.
@@ -264,8 +275,8 @@ class PoseRun {
     std::size_t next = 0;
     for (std::size_t v = first; v < end; ++v) {
       for (ConditionValues& condition : values_[v]) {
-        const auto frames =
-            framesOf(variants_[v], collected[next], takers[next].moment, look.seed(), noise, use_.spec.frames);
+        const auto frames = framesOf(variants_[v], collected[next], takers[next].moment, look.seed(), noise,
+                                     use_.spec.frames);
         const auto values = valuesOf(use_, stations_[v], pose_, condition.lighting, frames);
         for (std::size_t r = 0; r < values.size(); ++r) condition.repeats[r].push_back(values[r]);
         add(collected[next++], stations_[v].sums[condition.lighting]);
@@ -298,7 +309,8 @@ bool concerns(const RequirementSpec& requirement, const Case& use, std::size_t p
          isEmptyOrHas(requirement.lightings, use.spec.lightings[lighting].name);
 }
 
-Seen seenFrom(const sim::Scene& scene, const CameraInfo& camera, const Transform<World, Camera>& pose, Duration time) {
+Seen seenFrom(const sim::Scene& scene, const CameraInfo& camera, const Transform<World, Camera>& pose,
+              Duration time) {
   const sim::Scene there = scene.moves() ? scene.at(time) : scene;
   sim::TraceRequest request;
   request.camera = camera;
@@ -311,7 +323,8 @@ Seen seenFrom(const sim::Scene& scene, const CameraInfo& camera, const Transform
     for (int x = 0; x < camera.width; ++x) {
       const Vec3d at = rayThroughPixel(camera, x, y).v * static_cast<double>(seen.range_m(x, y));
       const Vec3d world = (pose * Point<Camera>{at}).m;
-      seen.point_m(x, y) = {static_cast<float>(world.x), static_cast<float>(world.y), static_cast<float>(world.z)};
+      seen.point_m(x, y) = {static_cast<float>(world.x), static_cast<float>(world.y),
+                            static_cast<float>(world.z)};
     }
   }
   return seen;
@@ -322,10 +335,11 @@ double frameRateOf_hz(const sim::SensorModel& model) {
 }
 
 Result<std::vector<std::vector<ConditionValues>>> simulate(const Case& use, const sim::Scene& scene,
-                                                           const std::vector<Variant>& variants, Repeats repeats,
-                                                           const Watch& watch) {
+                                                           const std::vector<Variant>& variants,
+                                                           Repeats repeats, const Watch& watch) {
   std::vector<std::vector<ConditionValues>> all(variants.size());
-  const double steps = static_cast<double>(use.spec.poses.size()) * (repeats.count + (repeats.count > 1 ? 1 : 0));
+  const double steps =
+      static_cast<double>(use.spec.poses.size()) * (repeats.count + (repeats.count > 1 ? 1 : 0));
   double done = 0.0;
   for (std::size_t pose = 0; pose < use.spec.poses.size(); ++pose) {
     PoseRun run{use, scene, variants, pose};

@@ -87,14 +87,15 @@ double marginOf(const RequirementSpec& requirement, double value) {
   return verdictOf(requirement, exactly(value)).margin;
 }
 
-/// A repeat in which nothing is valid has no margin: what is met without the effect, and without a value in some
-/// repeats with it, is spoiled by it without a gain that could be told.
+/// A repeat in which nothing is valid has no margin: what is met without the effect, and without a value in
+/// some repeats with it, is spoiled by it without a gain that could be told.
 Spoiler spoilerOf(const RequirementSpec& requirement, std::size_t r, const std::string& name,
                   const ConditionValues& whole, const ConditionValues& without) {
   std::vector<double> gains;
   std::size_t revealed = 0, hidden = 0;
   for (std::size_t i = 0; i < whole.repeats[r].size(); ++i) {
-    const double with = marginOf(requirement, whole.repeats[r][i]), then = marginOf(requirement, without.repeats[r][i]);
+    const double with = marginOf(requirement, whole.repeats[r][i]),
+                 then = marginOf(requirement, without.repeats[r][i]);
     revealed += std::isnan(with) && !std::isnan(then) ? 1 : 0;
     hidden += !std::isnan(with) && std::isnan(then) ? 1 : 0;
     if (!std::isnan(with) && !std::isnan(then)) gains.push_back(then - with);
@@ -110,8 +111,8 @@ Spoiler spoilerOf(const RequirementSpec& requirement, std::size_t r, const std::
               hidden == 0 && (revealed == whole.repeats[r].size() || (revealed > 0 && is_met_without))};
 }
 
-/// What gives a value at all is before what gains, and of it what is met; what cannot be told (nothing valid in
-/// either) is last.
+/// What gives a value at all is before what gains, and of it what is met; what cannot be told (nothing valid
+/// in either) is last.
 double rankOf(const Spoiler& one) {
   if (one.is_valid_only_without) return one.is_met_without ? -2e300 : -1e300;
   return std::isnan(one.gain.value) ? 1e300 : -one.gain.value;
@@ -119,8 +120,10 @@ double rankOf(const Spoiler& one) {
 
 }  // namespace
 
-Result<std::vector<std::vector<Spoiler>>> spoilersOf(const Case& use, const sim::Scene& scene, const Variant& variant,
-                                                     const std::vector<RequirementResult>& results, const Watch& watch) {
+Result<std::vector<std::vector<Spoiler>>> spoilersOf(const Case& use, const sim::Scene& scene,
+                                                     const Variant& variant,
+                                                     const std::vector<RequirementResult>& results,
+                                                     const Watch& watch) {
   std::vector<std::vector<Spoiler>> spoilers(results.size());
   const Case part = onlyFailures(use, results);
   if (part.spec.poses.empty()) return spoilers;

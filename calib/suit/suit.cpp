@@ -26,7 +26,8 @@ std::string fieldOfView(const CameraInfo& camera) {
   const auto degrees = [](double size, double focal) {
     return 2.0 * std::atan(0.5 * size / focal) * 180.0 / std::numbers::pi;
   };
-  return fmt::format("{:.0f} x {:.0f} degrees", degrees(camera.width, camera.fx), degrees(camera.height, camera.fy));
+  return fmt::format("{:.0f} x {:.0f} degrees", degrees(camera.width, camera.fx),
+                     degrees(camera.height, camera.fy));
 }
 
 struct Setting {
@@ -65,14 +66,16 @@ Result<std::vector<Setting>> settingsOf(const Case& use, const CameraSpec& camer
     }
   }
   if (settings.empty()) {
-    return Error{Error::Code::InvalidArgument,
-                 fmt::format("{}: none of its exposure_factors is an exposure that it can take", camera.name)};
+    return Error{
+        Error::Code::InvalidArgument,
+        fmt::format("{}: none of its exposure_factors is an exposure that it can take", camera.name)};
   }
   return settings;
 }
 
 /// Why a camera cannot do this at all, or empty.
-std::string misfitOf(const Case& use, const std::vector<RequirementResult>& results, const CameraInfo& camera) {
+std::string misfitOf(const Case& use, const std::vector<RequirementResult>& results,
+                     const CameraInfo& camera) {
   for (std::size_t r = 0; r < results.size(); ++r) {
     const auto& requirement = use.spec.requirements[r];
     if (requirement.kind == Kind::Pixels || requirement.kind == Kind::Missed) continue;
@@ -82,9 +85,10 @@ std::string misfitOf(const Case& use, const std::vector<RequirementResult>& resu
                                : !requirement.region.empty() ? "the region \"" + requirement.region + "\""
                                                              : "anything";
       return fmt::format(
-          "at the pose \"{}\" none of its {} x {} pixels ({}) sees {}, which the requirement \"{}\" ({}) is about",
-          use.spec.poses[at.pose].name, camera.width, camera.height, fieldOfView(camera), what, requirement.name,
-          use.requirement_places[r]);
+          "at the pose \"{}\" none of its {} x {} pixels ({}) sees {}, which the requirement \"{}\" ({}) is "
+          "about",
+          use.spec.poses[at.pose].name, camera.width, camera.height, fieldOfView(camera), what,
+          requirement.name, use.requirement_places[r]);
     }
   }
   return {};
@@ -99,7 +103,8 @@ Estimate estimateAt(const RequirementSpec& requirement, const ConditionValues& v
     for (const double share : repeats) missed += share * static_cast<double>(values.frames);
     return shareOf(static_cast<std::size_t>(std::lround(missed)), repeats.size() * values.frames);
   }
-  const std::optional<double> together = values.together.empty() ? std::nullopt : std::optional{values.together[r]};
+  const std::optional<double> together =
+      values.together.empty() ? std::nullopt : std::optional{values.together[r]};
   return estimateOf(repeats, together, isShare(requirement.kind));
 }
 
@@ -111,7 +116,8 @@ RequirementResult resultOf(const Case& use, std::size_t r, const std::vector<Con
     const Verdict verdict = verdictOf(requirement, estimateAt(requirement, values, r));
     result.conditions.push_back({values.pose, values.lighting, values.pixels[r], verdict});
     // A value that is not a number (no pixel is valid) is the worst of all.
-    const double margin = std::isnan(verdict.margin) ? -std::numeric_limits<double>::infinity() : verdict.margin;
+    const double margin =
+        std::isnan(verdict.margin) ? -std::numeric_limits<double>::infinity() : verdict.margin;
     const double worst = result.conditions[result.worst].verdict.margin;
     if (!(std::isnan(worst)) && margin < worst) result.worst = result.conditions.size() - 1;
   }
@@ -129,8 +135,8 @@ RequirementResult resultOf(const Case& use, std::size_t r, const std::vector<Con
   return result;
 }
 
-/// Simulates each setting once, with two frames and everything standing still, and says which does best. Motion
-/// would be traced anew for every raw exposure of every setting.
+/// Simulates each setting once, with two frames and everything standing still, and says which does best.
+/// Motion would be traced anew for every raw exposure of every setting.
 Result<> chooseSetting(const Case& use, const sim::Scene& scene, const std::vector<Setting>& settings,
                        CameraResult& camera, const Watch& watch) {
   if (settings.size() == 1) {
@@ -154,8 +160,8 @@ Result<> chooseSetting(const Case& use, const sim::Scene& scene, const std::vect
                             .worst = tried.worst});
   }
   const auto order = [](const Try& one) { return std::tuple{one.failed, one.shortfall, -one.worst}; };
-  camera.best = static_cast<std::size_t>(
-      std::ranges::min_element(camera.tries, {}, order) - camera.tries.begin());
+  camera.best =
+      static_cast<std::size_t>(std::ranges::min_element(camera.tries, {}, order) - camera.tries.begin());
   return {};
 }
 
@@ -168,11 +174,13 @@ Result<CameraResult> judgeModel(const Case& use, const sim::Scene& scene, const 
   const auto part = [&](double from, double to) {
     return [&watch, from, to](double share) { return watch(from + (to - from) * share); };
   };
-  if (auto chosen = chooseSetting(use, scene, *settings, camera, part(0.0, 0.4)); !chosen) return chosen.error();
+  if (auto chosen = chooseSetting(use, scene, *settings, camera, part(0.0, 0.4)); !chosen)
+    return chosen.error();
   const Variant& variant = (*settings)[camera.best].variant;
   camera.model = variant.model.model();
   camera.id = variant.model.id();
-  const auto values = simulate(use, scene, {variant}, {.first = 0, .count = use.spec.repeats}, part(0.4, 0.7));
+  const auto values =
+      simulate(use, scene, {variant}, {.first = 0, .count = use.spec.repeats}, part(0.4, 0.7));
   if (!values) return values.error();
   camera.requirements = resultsOf(use, values->front(), frameRateOf_hz(variant.model));
   camera.cannot = misfitOf(use, camera.requirements, variant.model.camera());
@@ -193,8 +201,8 @@ Result<std::vector<std::size_t>> chosenCameras(const Case& use, const std::vecto
     if (found == use.spec.cameras.end()) {
       std::vector<std::string> names;
       for (const auto& camera : use.spec.cameras) names.push_back(camera.name);
-      return Error{Error::Code::NotFound, fmt::format("{}: there is no camera \"{}\"; there are: {}", use.file.string(), name,
-                                                      fmt::join(names, ", "))};
+      return Error{Error::Code::NotFound, fmt::format("{}: there is no camera \"{}\"; there are: {}",
+                                                      use.file.string(), name, fmt::join(names, ", "))};
     }
     chosen.push_back(static_cast<std::size_t>(found - use.spec.cameras.begin()));
   }
@@ -214,11 +222,12 @@ std::vector<RequirementResult> resultsOf(const Case& use, const std::vector<Cond
   for (std::size_t r = 0; r < use.spec.requirements.size(); ++r) {
     const auto& requirement = use.spec.requirements[r];
     if (requirement.kind == Kind::FrameRate) {
-      results.push_back({.verdict = verdictOf(requirement, exactly(frame_rate_hz)),
-                         .conditions = {},
-                         .worst = 0,
-                         .is_judged = std::isfinite(frame_rate_hz),
-                         .why_not = std::isfinite(frame_rate_hz) ? "" : "its frames do not say when they were taken"});
+      results.push_back(
+          {.verdict = verdictOf(requirement, exactly(frame_rate_hz)),
+           .conditions = {},
+           .worst = 0,
+           .is_judged = std::isfinite(frame_rate_hz),
+           .why_not = std::isfinite(frame_rate_hz) ? "" : "its frames do not say when they were taken"});
     } else {
       results.push_back(resultOf(use, r, conditions));
     }
@@ -269,8 +278,8 @@ Result<Suit> judge(const Case& use, const SuitOptions& options, compare::Progres
   progress.end();
   if (std::ranges::none_of(suit.cameras, [](const auto& one) { return one.cannot.empty(); })) {
     const CameraResult& first = suit.cameras.front();
-    return Error{Error::Code::InvalidArgument,
-                 fmt::format("{}: no camera can be judged. {}: {}", use.file.string(), first.name, first.cannot)};
+    return Error{Error::Code::InvalidArgument, fmt::format("{}: no camera can be judged. {}: {}",
+                                                           use.file.string(), first.name, first.cannot)};
   }
   std::ranges::stable_sort(suit.cameras, {}, rankOf);
   return suit;

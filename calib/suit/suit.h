@@ -26,7 +26,7 @@ struct AtCondition {
 struct RequirementResult {
   Verdict verdict{};
   std::vector<AtCondition> conditions{};  ///< none for a frame rate
-  std::size_t worst = 0;                ///< of `conditions`
+  std::size_t worst = 0;                  ///< of `conditions`
   bool is_judged = true;
   std::string why_not{};
 };
@@ -54,7 +54,8 @@ struct CameraResult {
   bool is_recording = false;
   std::string cannot{};  ///< why it cannot be judged, or empty
   std::vector<RequirementResult> requirements{};
-  std::vector<std::vector<Spoiler>> spoilers{};  ///< of each requirement, greatest gain first; empty where it is met
+  std::vector<std::vector<Spoiler>>
+      spoilers{};  ///< of each requirement, greatest gain first; empty where it is met
   std::vector<Try> tries{};
   std::size_t best = 0;  ///< of `tries`: what the rest is about
   std::size_t failed = 0, unknown = 0;
@@ -77,8 +78,8 @@ struct SuitOptions {
 };
 
 /// Runs all cameras through the use case and ranks them: fewest requirements failed, then least missing, then
-/// largest margin. Errors: a name in `only` that is none, a scene that cannot be loaded, no camera that can be
-/// judged, interruption.
+/// largest margin. Errors: a name in `only` that is none, a scene that cannot be loaded, no camera that can
+/// be judged, interruption.
 Result<Suit> judge(const Case& use, const SuitOptions& options, compare::Progress& progress);
 
 /// Verdicts of all requirements from their values; `frame_rate_hz` NaN: not known.
@@ -88,17 +89,20 @@ std::vector<RequirementResult> resultsOf(const Case& use, const std::vector<Cond
 /// Fills in what the ranking goes by.
 void sumUp(const Case& use, CameraResult& camera);
 
-/// What spoils the requirements that a variant fails: each effect, light over several surfaces, mixed pixels and
-/// motion are left out one after the other, and then all of them. Same light, same noise.
-Result<std::vector<std::vector<Spoiler>>> spoilersOf(const Case& use, const sim::Scene& scene, const Variant& variant,
-                                                     const std::vector<RequirementResult>& results, const Watch& watch);
+/// What spoils the requirements that a variant fails: each effect, light over several surfaces, mixed pixels
+/// and motion are left out one after the other, and then all of them. Same light, same noise.
+Result<std::vector<std::vector<Spoiler>>> spoilersOf(const Case& use, const sim::Scene& scene,
+                                                     const Variant& variant,
+                                                     const std::vector<RequirementResult>& results,
+                                                     const Watch& watch);
 
 /// A recording of a real camera in the place of simulations. Groups of its frames stand for repeats.
 Result<CameraResult> judgeRecording(const Case& use, const sim::Scene& scene, const CameraSpec& camera,
                                     const std::string& place, const Watch& watch);
 
 /// Writes index.html, report.json and report.md into the folder; gives the page's path.
-Result<std::filesystem::path> writeSuit(const Suit& suit, const std::filesystem::path& folder, const std::string& note);
+Result<std::filesystem::path> writeSuit(const Suit& suit, const std::filesystem::path& folder,
+                                        const std::string& note);
 /// One sentence.
 std::string inWords(const Suit& suit);
 

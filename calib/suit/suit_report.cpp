@@ -29,7 +29,8 @@ std::string intervalText(Kind kind, const Estimate& estimate) {
 }
 
 std::string limitText(const RequirementSpec& requirement) {
-  const std::string limit = fmt::format("{:.6g} {}", limitOf(requirement) * shownScale(requirement.kind), unitOf(requirement.kind));
+  const std::string limit =
+      fmt::format("{:.6g} {}", limitOf(requirement) * shownScale(requirement.kind), unitOf(requirement.kind));
   return (isAtLeast(requirement.kind) ? "at least " : "at most ") + limit;
 }
 
@@ -46,7 +47,8 @@ std::string sentenceOf(const RequirementSpec& r) {
     case Kind::Valid:
       return limitText(r) + " of the pixels valid";
     case Kind::Missed:
-      return fmt::format("missed in {} of the frames (seen: {} pixels within {})", limitText(r), r.pixels, within);
+      return fmt::format("missed in {} of the frames (seen: {} pixels within {})", limitText(r), r.pixels,
+                         within);
     case Kind::Phantom:
       return limitText(r) + " of the pixels more than " + within + " too near";
     case Kind::Pixels:
@@ -71,21 +73,24 @@ std::string verdictText(const RequirementResult& result) {
 std::string whereText(const Case& use, const RequirementResult& result) {
   if (result.conditions.empty()) return result.why_not;
   const AtCondition& worst = result.conditions[result.worst];
-  const std::string more = use.spec.lightings.size() > 1 ? ", " + use.spec.lightings[worst.lighting].name : "";
+  const std::string more =
+      use.spec.lightings.size() > 1 ? ", " + use.spec.lightings[worst.lighting].name : "";
   return fmt::format("at {}{}", use.spec.poses[worst.pose].name, more);
 }
 
 std::string stateOf(const CameraResult& camera) {
   if (!camera.cannot.empty()) return "does not fit the scene";
   if (camera.isFit()) return "does it";
-  const std::string failed = camera.failed > 0 ? fmt::format("fails {} of {}", camera.failed, camera.requirements.size()) : "";
+  const std::string failed =
+      camera.failed > 0 ? fmt::format("fails {} of {}", camera.failed, camera.requirements.size()) : "";
   const std::string open = camera.unknown > 0 ? fmt::format("{} not known", camera.unknown) : "";
   return failed + (failed.empty() || open.empty() ? "" : ", ") + open;
 }
 
 Tone toneOf(const CameraResult& camera) {
   if (!camera.cannot.empty() || camera.failed > 0) return Tone::Bad;
-  const bool certain = std::ranges::all_of(camera.requirements, [](const auto& one) { return one.verdict.is_certain; });
+  const bool certain =
+      std::ranges::all_of(camera.requirements, [](const auto& one) { return one.verdict.is_certain; });
   return camera.isFit() && certain ? Tone::Good : Tone::Fair;
 }
 
@@ -107,14 +112,16 @@ std::string worstText(const Case& use, const CameraResult& camera) {
     least = std::isnan(margin) ? -1e300 : margin;
     const Kind kind = use.spec.requirements[r].kind;
     const std::string sign = result.verdict.margin > 0.0 ? "+" : "";
-    text = fmt::format("{}: {}{}", use.spec.requirements[r].name, sign, valueText(kind, result.verdict.margin));
+    text =
+        fmt::format("{}: {}{}", use.spec.requirements[r].name, sign, valueText(kind, result.verdict.margin));
   }
   return text;
 }
 
 TableBlock rankingTable(const Suit& suit) {
-  TableBlock table{.caption = "Best first. The margin is how far the worst requirement is from its limit; + is met.",
-                   .header = {"camera", "verdict", "best mode and exposure", "worst requirement and margin"}};
+  TableBlock table{
+      .caption = "Best first. The margin is how far the worst requirement is from its limit; + is met.",
+      .header = {"camera", "verdict", "best mode and exposure", "worst requirement and margin"}};
   for (const CameraResult& camera : suit.cameras) {
     const bool can = camera.cannot.empty();
     table.rows.push_back({camera.name, stateOf(camera), can ? settingText(camera) : "–",
@@ -124,9 +131,11 @@ TableBlock rankingTable(const Suit& suit) {
 }
 
 TableBlock requirementTable(const Suit& suit) {
-  TableBlock table{.caption = "Values at the worst pose and lighting. ✓ is met, ✗ is not; ? means that the 95 % interval "
-                              "includes the limit.",
-                   .header = {"requirement", "limit"}};
+  TableBlock table{
+      .caption =
+          "Values at the worst pose and lighting. ✓ is met, ✗ is not; ? means that the 95 % interval "
+          "includes the limit.",
+      .header = {"requirement", "limit"}};
   for (const CameraResult& camera : suit.cameras) table.header.push_back(camera.name);
   for (std::size_t r = 0; r < suit.use.spec.requirements.size(); ++r) {
     const auto& requirement = suit.use.spec.requirements[r];
@@ -135,7 +144,8 @@ TableBlock requirementTable(const Suit& suit) {
       const auto& result = camera.requirements[r];
       const bool is_known = result.is_judged && camera.cannot.empty();
       row.push_back(!is_known ? "–"
-                              : fmt::format("{}{} {}", result.verdict.is_met ? "✓" : "✗", result.verdict.is_certain ? "" : "?",
+                              : fmt::format("{}{} {}", result.verdict.is_met ? "✓" : "✗",
+                                            result.verdict.is_certain ? "" : "?",
                                             valueText(requirement.kind, result.verdict.estimate.value)));
     }
     table.rows.push_back(std::move(row));
@@ -144,14 +154,16 @@ TableBlock requirementTable(const Suit& suit) {
 }
 
 TableBlock cameraTable(const Suit& suit, const CameraResult& camera) {
-  TableBlock table{.caption = "At the worst pose and lighting of each requirement, with 95 % intervals.",
-                   .header = {"requirement", "verdict", "value", "95 % interval", "margin", "where", "pixels"}};
+  TableBlock table{
+      .caption = "At the worst pose and lighting of each requirement, with 95 % intervals.",
+      .header = {"requirement", "verdict", "value", "95 % interval", "margin", "where", "pixels"}};
   for (std::size_t r = 0; r < camera.requirements.size(); ++r) {
     const auto& requirement = suit.use.spec.requirements[r];
     const auto& result = camera.requirements[r];
     const bool is_known = result.is_judged;
     table.rows.push_back(
-        {requirement.name, verdictText(result), is_known ? valueText(requirement.kind, result.verdict.estimate.value) : "–",
+        {requirement.name, verdictText(result),
+         is_known ? valueText(requirement.kind, result.verdict.estimate.value) : "–",
          is_known ? intervalText(requirement.kind, result.verdict.estimate) : "–",
          is_known ? valueText(requirement.kind, result.verdict.margin) : "–", whereText(suit.use, result),
          result.conditions.empty() ? "–" : std::to_string(result.conditions[result.worst].pixels)});
@@ -161,8 +173,10 @@ TableBlock cameraTable(const Suit& suit, const CameraResult& camera) {
 
 /// Those that spoil, and always the last: without all of them.
 TableBlock spoilerTable(const RequirementSpec& requirement, const std::vector<Spoiler>& spoilers) {
-  TableBlock table{.caption = fmt::format("What spoils “{}”: gain in margin when it is left out of the simulation", requirement.name),
-                   .header = {"left out", "gain", "95 % interval", "then"}};
+  TableBlock table{
+      .caption = fmt::format("What spoils “{}”: gain in margin when it is left out of the simulation",
+                             requirement.name),
+      .header = {"left out", "gain", "95 % interval", "then"}};
   for (const Spoiler& one : spoilers) {
     if (!one.isSpoiling() && &one != &spoilers.back()) continue;
     const bool has_gain = !std::isnan(one.gain.value) && !one.is_valid_only_without;
@@ -176,14 +190,17 @@ TableBlock spoilerTable(const RequirementSpec& requirement, const std::vector<Sp
 
 std::string spoilersInWords(const RequirementSpec& requirement, const std::vector<Spoiler>& spoilers) {
   if (spoilers.empty()) {
-    return requirement.kind == Kind::FrameRate ? fmt::format("“{}” is what the camera's exposures and readout take; no effect spoils it.", requirement.name)
-                                               : fmt::format("What spoils “{}” was not looked for.", requirement.name);
+    return requirement.kind == Kind::FrameRate
+               ? fmt::format("“{}” is what the camera's exposures and readout take; no effect spoils it.",
+                             requirement.name)
+               : fmt::format("What spoils “{}” was not looked for.", requirement.name);
   }
   if (!spoilers.front().isSpoiling()) {
     return fmt::format("“{}”: no single effect spoils it measurably. {}", requirement.name,
-                       spoilers.back().is_met_without ? "Without all of them it is met."
-                                                      : "Without all of them it is still not met: what is left are lens, light, "
-                                                        "waveform and decoder.");
+                       spoilers.back().is_met_without
+                           ? "Without all of them it is met."
+                           : "Without all of them it is still not met: what is left are lens, light, "
+                             "waveform and decoder.");
   }
   return fmt::format("“{}” is spoiled most by {}{}{}.", requirement.name, spoilers.front().what,
                      spoilers.front().is_valid_only_without ? ", with which nothing is valid" : "",
@@ -191,29 +208,35 @@ std::string spoilersInWords(const RequirementSpec& requirement, const std::vecto
 }
 
 compare::Figure triesFigure(const CameraResult& camera) {
-  compare::Plot plot{.title = "Margin over exposure", .x_label = "exposure / ms", .y_label = "worst relative margin"};
+  compare::Plot plot{
+      .title = "Margin over exposure", .x_label = "exposure / ms", .y_label = "worst relative margin"};
   plot.zero_line = true;
   const std::vector<compare::Ink> inks{compare::Ink::Simulated, compare::Ink::Published, compare::Ink::Extra};
   for (const Try& one : camera.tries) {
     const auto found = std::ranges::find(plot.curves, one.mode, &compare::Curve::name);
-    compare::Curve& curve = found != plot.curves.end() ? *found : plot.curves.emplace_back(compare::Curve{.name = one.mode});
-    curve.ink = inks[static_cast<std::size_t>(found != plot.curves.end() ? found - plot.curves.begin()
-                                                                         : static_cast<std::ptrdiff_t>(plot.curves.size()) - 1) %
+    compare::Curve& curve =
+        found != plot.curves.end() ? *found : plot.curves.emplace_back(compare::Curve{.name = one.mode});
+    curve.ink = inks[static_cast<std::size_t>(found != plot.curves.end()
+                                                  ? found - plot.curves.begin()
+                                                  : static_cast<std::ptrdiff_t>(plot.curves.size()) - 1) %
                      inks.size()];
     curve.x.push_back(one.exposure_us * 1e-3);
     // Beyond this nothing is worth telling apart, and the rest could not be seen.
     curve.y.push_back(std::max(one.worst, -10.0));
   }
-  return {.caption = fmt::format("The worst requirement's margin, relative to its limit, in each mode and exposure that was "
-                                 "tried with one simulation each; below 0 is a failure (cut at −10). Best: {}.",
-                                 settingText(camera)),
+  return {.caption = fmt::format(
+              "The worst requirement's margin, relative to its limit, in each mode and exposure that was "
+              "tried with one simulation each; below 0 is a failure (cut at −10). Best: {}.",
+              settingText(camera)),
           .svg = compare::toSvg(plot)};
 }
 
 TableBlock triesTable(const CameraResult& camera) {
-  TableBlock table{.caption = "Every mode and exposure that was tried", .header = {"mode", "exposure / µs", "failed", "worst relative margin"}};
+  TableBlock table{.caption = "Every mode and exposure that was tried",
+                   .header = {"mode", "exposure / µs", "failed", "worst relative margin"}};
   for (const Try& one : camera.tries)
-    table.rows.push_back({one.mode, std::isnan(one.exposure_us) ? "–" : fmt::format("{:.6g}", one.exposure_us),
+    table.rows.push_back({one.mode,
+                          std::isnan(one.exposure_us) ? "–" : fmt::format("{:.6g}", one.exposure_us),
                           std::to_string(one.failed), shown(one.worst, 2)});
   return table;
 }
@@ -228,18 +251,23 @@ compare::Section sectionOf(const Suit& suit, std::size_t number) {
     section.blocks.emplace_back(compare::Paragraph{.text = camera.cannot});
     return section;
   }
-  const std::string model = camera.is_recording ? "A recording of " + camera.model : "The model " + camera.model;
-  section.blocks.emplace_back(compare::Paragraph{.text = fmt::format("{}; {}.", model, settingText(camera)), .small = true});
+  const std::string model =
+      camera.is_recording ? "A recording of " + camera.model : "The model " + camera.model;
+  section.blocks.emplace_back(
+      compare::Paragraph{.text = fmt::format("{}; {}.", model, settingText(camera)), .small = true});
   section.blocks.emplace_back(cameraTable(suit, camera));
-  for (const std::string& note : camera.notes) section.blocks.emplace_back(compare::Paragraph{.text = note, .small = true});
+  for (const std::string& note : camera.notes)
+    section.blocks.emplace_back(compare::Paragraph{.text = note, .small = true});
   for (std::size_t r = 0; r < camera.requirements.size(); ++r) {
     const auto& requirement = suit.use.spec.requirements[r];
     if (!camera.requirements[r].is_judged || camera.requirements[r].verdict.is_met) continue;
     if (camera.is_recording) continue;
     section.blocks.emplace_back(compare::Paragraph{.text = spoilersInWords(requirement, camera.spoilers[r])});
-    if (!camera.spoilers[r].empty()) section.blocks.emplace_back(spoilerTable(requirement, camera.spoilers[r]));
+    if (!camera.spoilers[r].empty())
+      section.blocks.emplace_back(spoilerTable(requirement, camera.spoilers[r]));
   }
-  const bool has_exposures = std::ranges::count_if(camera.tries, [](const Try& one) { return !std::isnan(one.exposure_us); }) > 1;
+  const bool has_exposures =
+      std::ranges::count_if(camera.tries, [](const Try& one) { return !std::isnan(one.exposure_us); }) > 1;
   if (has_exposures) section.blocks.emplace_back(triesFigure(camera));
   if (camera.tries.size() > 1) section.blocks.emplace_back(triesTable(camera));
   return section;
@@ -254,7 +282,9 @@ TableBlock askedTable(const Case& use) {
       return text.empty() ? std::string{all} : text;
     };
     table.rows.push_back({r.name, subjectOf(r), sentenceOf(r),
-                          r.kind == Kind::FrameRate ? "–" : "at " + list(r.poses, "all poses") + "; " + list(r.lightings, "all lightings")});
+                          r.kind == Kind::FrameRate ? "–"
+                                                    : "at " + list(r.poses, "all poses") + "; " +
+                                                          list(r.lightings, "all lightings")});
   }
   return table;
 }
@@ -264,18 +294,23 @@ compare::Section provenance(const Suit& suit) {
   compare::Section section{.id = "provenance", .title = "How this was made"};
   section.blocks.emplace_back(compare::Paragraph{
       .text = fmt::format(
-          "Use case {}; scene {} (id {}). {} repeats of {} frames at each of {} poses under {} lightings, {} paths per pixel, "
+          "Use case {}; scene {} (id {}). {} repeats of {} frames at each of {} poses under {} lightings, {} "
+          "paths per pixel, "
           "at most {} surfaces, footprint {:.6g} pixels, seed {}. Room {:.6g} °C, on for {:.6g} s.",
-          suit.use.file.filename().string(), suit.use.scene_file.filename().string(), suit.scene_id, spec.repeats, spec.frames,
-          spec.poses.size(), spec.lightings.size(), spec.samples_per_pixel, spec.max_surfaces, spec.pixel_extent, spec.seed,
-          spec.room_temperature.in(celsius), spec.powered_on_before.in(second))});
+          suit.use.file.filename().string(), suit.use.scene_file.filename().string(), suit.scene_id,
+          spec.repeats, spec.frames, spec.poses.size(), spec.lightings.size(), spec.samples_per_pixel,
+          spec.max_surfaces, spec.pixel_extent, spec.seed, spec.room_temperature.in(celsius),
+          spec.powered_on_before.in(second))});
   TableBlock models{.caption = "Camera models", .header = {"camera", "model", "id"}};
-  for (const auto& camera : suit.cameras) models.rows.push_back({camera.name, camera.model, camera.id.empty() ? "–" : camera.id});
+  for (const auto& camera : suit.cameras)
+    models.rows.push_back({camera.name, camera.model, camera.id.empty() ? "–" : camera.id});
   section.blocks.emplace_back(std::move(models));
-  section.blocks.emplace_back(compare::Paragraph{
-      .text = "The verdicts are about the models, which are as good as their files say (docs/cameras). Intervals hold noise "
-              "and the tracer's own error, not how well a model describes its camera, nor how well the scene describes yours.",
-      .small = true});
+  section.blocks.emplace_back(
+      compare::Paragraph{.text = "The verdicts are about the models, which are as good as their files say "
+                                 "(docs/cameras). Intervals hold noise "
+                                 "and the tracer's own error, not how well a model describes its camera, nor "
+                                 "how well the scene describes yours.",
+                         .small = true});
   return section;
 }
 
@@ -292,7 +327,9 @@ Json toJson(const Case& use, const CameraResult& camera, std::size_t r) {
   const auto& requirement = use.spec.requirements[r];
   const auto& result = camera.requirements[r];
   Json json = toJson(requirement.kind, result.verdict);
-  json.set("name", requirement.name).set("kind", std::string{nameOf(requirement.kind)}).set("judged", result.is_judged);
+  json.set("name", requirement.name)
+      .set("kind", std::string{nameOf(requirement.kind)})
+      .set("judged", result.is_judged);
   json.set("limit", limitOf(requirement) * shownScale(requirement.kind)).set("why_not", result.why_not);
   Json conditions = Json::array();
   for (const AtCondition& at : result.conditions) {
@@ -304,9 +341,14 @@ Json toJson(const Case& use, const CameraResult& camera, std::size_t r) {
   Json spoilers = Json::array();
   for (const Spoiler& one : camera.spoilers.empty() ? std::vector<Spoiler>{} : camera.spoilers[r]) {
     const double scale = shownScale(requirement.kind);
-    spoilers.push(Json::object().set("left_out", one.what).set("gain", one.gain.value * scale).set("low", one.gain.low * scale)
-                      .set("high", one.gain.high * scale).set("spoils", one.isSpoiling())
-                      .set("valid_only_without", one.is_valid_only_without).set("met_without", one.is_met_without));
+    spoilers.push(Json::object()
+                      .set("left_out", one.what)
+                      .set("gain", one.gain.value * scale)
+                      .set("low", one.gain.low * scale)
+                      .set("high", one.gain.high * scale)
+                      .set("spoils", one.isSpoiling())
+                      .set("valid_only_without", one.is_valid_only_without)
+                      .set("met_without", one.is_met_without));
   }
   json.set("conditions", std::move(conditions)).set("spoilers", std::move(spoilers));
   return json;
@@ -316,19 +358,33 @@ Json toJson(const Suit& suit) {
   Json cameras = Json::array();
   for (const CameraResult& camera : suit.cameras) {
     Json json = Json::object();
-    json.set("name", camera.name).set("model", camera.model).set("id", camera.id).set("recording", camera.is_recording);
-    json.set("cannot", camera.cannot).set("fits", camera.isFit()).set("failed", camera.failed).set("unknown", camera.unknown);
+    json.set("name", camera.name)
+        .set("model", camera.model)
+        .set("id", camera.id)
+        .set("recording", camera.is_recording);
+    json.set("cannot", camera.cannot)
+        .set("fits", camera.isFit())
+        .set("failed", camera.failed)
+        .set("unknown", camera.unknown);
     json.set("worst_relative_margin", camera.worst);
     Json tries = Json::array();
     for (const Try& one : camera.tries)
-      tries.push(Json::object().set("mode", one.mode).set("exposure_us", one.exposure_us).set("failed", one.failed)
-                     .set("shortfall", one.shortfall).set("worst_relative_margin", one.worst));
+      tries.push(Json::object()
+                     .set("mode", one.mode)
+                     .set("exposure_us", one.exposure_us)
+                     .set("failed", one.failed)
+                     .set("shortfall", one.shortfall)
+                     .set("worst_relative_margin", one.worst));
     json.set("tries", std::move(tries)).set("best_try", camera.best);
     Json requirements = Json::array();
-    for (std::size_t r = 0; r < camera.requirements.size(); ++r) requirements.push(toJson(suit.use, camera, r));
+    for (std::size_t r = 0; r < camera.requirements.size(); ++r)
+      requirements.push(toJson(suit.use, camera, r));
     cameras.push(std::move(json.set("requirements", std::move(requirements))));
   }
-  return std::move(Json::object().set("use_case", suit.use.spec.title).set("scene_id", suit.scene_id).set("cameras", std::move(cameras)));
+  return std::move(Json::object()
+                       .set("use_case", suit.use.spec.title)
+                       .set("scene_id", suit.scene_id)
+                       .set("cameras", std::move(cameras)));
 }
 
 }  // namespace
@@ -342,13 +398,16 @@ std::string inWords(const Suit& suit) {
     ++count;
   }
   const std::size_t all = suit.cameras.size();
-  if (count > 0) return fmt::format("{} of {} cameras {} what is asked, best first: {}.", count, all, count == 1 ? "does" : "do", fit);
+  if (count > 0)
+    return fmt::format("{} of {} cameras {} what is asked, best first: {}.", count, all,
+                       count == 1 ? "does" : "do", fit);
   const CameraResult& best = suit.cameras.front();
-  return fmt::format("None of {} camera{} does all that is asked. {} comes nearest: it {}.", all, all == 1 ? "" : "s", best.name,
-                     stateOf(best));
+  return fmt::format("None of {} camera{} does all that is asked. {} comes nearest: it {}.", all,
+                     all == 1 ? "" : "s", best.name, stateOf(best));
 }
 
-Result<std::filesystem::path> writeSuit(const Suit& suit, const std::filesystem::path& folder, const std::string& note) {
+Result<std::filesystem::path> writeSuit(const Suit& suit, const std::filesystem::path& folder,
+                                        const std::string& note) {
   const UseCase& spec = suit.use.spec;
   compare::Report report{.title = spec.title.empty() ? "Which camera fits?" : spec.title,
                          .subtitle = spec.about,
@@ -363,7 +422,8 @@ Result<std::filesystem::path> writeSuit(const Suit& suit, const std::filesystem:
                             .note = camera.cannot.empty() ? settingText(camera) : "see below",
                             .tone = toneOf(camera)});
   }
-  compare::Section ranking{.id = "ranking", .title = "Ranking", .verdict = inWords(suit), .tone = report.tone};
+  compare::Section ranking{
+      .id = "ranking", .title = "Ranking", .verdict = inWords(suit), .tone = report.tone};
   ranking.blocks = {rankingTable(suit), requirementTable(suit), askedTable(suit.use)};
   report.sections.push_back(std::move(ranking));
   for (std::size_t i = 0; i < suit.cameras.size(); ++i) report.sections.push_back(sectionOf(suit, i));

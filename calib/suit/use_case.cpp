@@ -37,9 +37,7 @@ const std::vector<KindName>& kinds() {
   return kKinds;
 }
 
-const KindName& rowOf(Kind kind) {
-  return *std::ranges::find(kinds(), kind, &KindName::kind);
-}
+const KindName& rowOf(Kind kind) { return *std::ranges::find(kinds(), kind, &KindName::kind); }
 
 /// A key that was written without its unit gets a better answer than "unknown".
 void complainOfUnits(Table& table) {
@@ -67,8 +65,7 @@ Result<> checkUnits(const Table& whole) {
 void checkKeys(const RequirementSpec& one, Table& table) {
   const KindName& kind = rowOf(one.kind);
   for (const std::string& key : kind.needs) {
-    if (!table.has(key))
-      table.complain("", fmt::format("is of kind \"{}\" and must say {}", kind.name, key));
+    if (!table.has(key)) table.complain("", fmt::format("is of kind \"{}\" and must say {}", kind.name, key));
   }
   for (const char* key : {"within_mm", "at_least_percent", "at_most_percent", "at_most_mm", "pixels",
                           "at_least_pixels", "at_least_hz"}) {
@@ -120,8 +117,7 @@ void checkRequirements(const Case& one, std::vector<Table>& tables) {
   for (std::size_t i = 0; i < tables.size(); ++i) {
     const RequirementSpec& r = one.spec.requirements[i];
     checkKeys(r, tables[i]);
-    if (!r.object.empty())
-      checkName(tables[i], "object", r.object, one.object_names, "object of the scene");
+    if (!r.object.empty()) checkName(tables[i], "object", r.object, one.object_names, "object of the scene");
     if (!r.region.empty()) checkName(tables[i], "region", r.region, namesOf(one.spec.regions), "[[region]]");
     for (const auto& name : r.poses) checkName(tables[i], "poses", name, namesOf(one.spec.poses), "[[pose]]");
     for (const auto& name : r.lightings)
@@ -165,7 +161,8 @@ void checkPlaces(const Case& one, std::vector<Table>& poses, std::vector<Table>&
     const RegionSpec& r = one.spec.regions[i];
     for (std::size_t k = 0; k < 3; ++k) {
       if (r.lower_m[k] >= r.upper_m[k])
-        regions[i].complain("upper_m", fmt::format("must be above lower_m on every axis; on {} it is not", "xyz"[k]));
+        regions[i].complain("upper_m",
+                            fmt::format("must be above lower_m on every axis; on {} it is not", "xyz"[k]));
     }
   }
 }
@@ -186,7 +183,12 @@ void loadNames(Case& one, Table& table) {
 }
 
 Result<Case> read(Table table, const std::filesystem::path& file) {
-  Case one{.spec = {}, .file = file, .scene_file = {}, .object_names = {}, .camera_places = {}, .requirement_places = {}};
+  Case one{.spec = {},
+           .file = file,
+           .scene_file = {},
+           .object_names = {},
+           .camera_places = {},
+           .requirement_places = {}};
   if (auto units = checkUnits(table); !units) return units.error();
   table.read(one.spec);
   auto poses = checkedNames(table, "pose", namesOf(one.spec.poses));

@@ -52,7 +52,8 @@ struct RequirementSpec {
     v.quantity("within", within, millimetre, {0.0, 1e6},
                "accuracy, missed: how far a range may be off; phantom: how much too near is one");
     v.number("at_least_percent", at_least_percent, {0.0, 100.0}, "accuracy, valid: of the pixels");
-    v.number("at_most_percent", at_most_percent, {0.0, 100.0}, "missed: of the frames; phantom: of the pixels");
+    v.number("at_most_percent", at_most_percent, {0.0, 100.0},
+             "missed: of the frames; phantom: of the pixels");
     v.quantity("at_most", at_most, millimetre, {0.0, 1e6}, "bias, noise");
     v.number("pixels", pixels, {1, 1e8}, "missed: so many accurate pixels make a thing seen in a frame");
     v.number("at_least_pixels", at_least_pixels, {0, 1e8}, "pixels: how many show it");
@@ -69,8 +70,10 @@ struct StationSpec : compare::PoseSpec {
   template <class Visitor>
   void visit(Visitor& v) {
     compare::PoseSpec::visit(v);
-    v.quantity("time", time, second, {0.0, 1e6}, "of the scene, where things move in it: when the frame begins");
-    v.numbers("velocity_m_per_s", velocity_m_per_s, {-1e4, 1e4}, "of the camera in the world, while it takes the frame");
+    v.quantity("time", time, second, {0.0, 1e6},
+               "of the scene, where things move in it: when the frame begins");
+    v.numbers("velocity_m_per_s", velocity_m_per_s, {-1e4, 1e4},
+              "of the camera in the world, while it takes the frame");
     v.numbers("rotation_rate_deg_per_s", rotation_rate_deg_per_s, {-36000.0, 36000.0},
               "of the camera about its lens, a vector in the world");
   }
@@ -83,7 +86,8 @@ struct LightingSpec {
   template <class Visitor>
   void visit(Visitor& v) {
     v.text("name", name, "what requirements and the report call it");
-    v.quantity("ambient", ambient, kilolux, {0.0, 200.0}, "sun or lamps, by the camera's effect ambient_light");
+    v.quantity("ambient", ambient, kilolux, {0.0, 200.0},
+               "sun or lamps, by the camera's effect ambient_light");
   }
 };
 
@@ -113,7 +117,8 @@ struct CameraSpec {
     v.texts("models", models, "its modes: presets, or camera files (.toml) relative to this file");
     v.numbers("exposure_factors", exposure_factors, {1e-3, 1e3},
               "times each model's exposure, which are tried; empty: 0.25, 0.5, 1, 2 and 4");
-    v.text("recording", recording, "instead: FILE.mcap or FILE.mcap#SOURCE of a camera that looked at this scene");
+    v.text("recording", recording,
+           "instead: FILE.mcap or FILE.mcap#SOURCE of a camera that looked at this scene");
     v.text("pose", pose, "recording: at which pose, if its frames do not say");
     v.text("lighting", lighting, "recording: under which lighting");
   }
@@ -164,7 +169,7 @@ struct Case {
   UseCase spec;
   std::filesystem::path file{};
   std::filesystem::path scene_file{};
-  std::vector<std::string> object_names{};  ///< of the scene, in its order
+  std::vector<std::string> object_names{};        ///< of the scene, in its order
   std::vector<std::string> camera_places{};       ///< "file.toml:12" of each camera; empty for presets
   std::vector<std::string> requirement_places{};  ///< of each requirement
 

@@ -16,7 +16,8 @@ namespace {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 bool isInside(const RegionSpec& region, Vec3f point) {
-  const std::array at{static_cast<double>(point.x), static_cast<double>(point.y), static_cast<double>(point.z)};
+  const std::array at{static_cast<double>(point.x), static_cast<double>(point.y),
+                      static_cast<double>(point.z)};
   for (std::size_t k = 0; k < 3; ++k) {
     if (at[k] < region.lower_m[k] || at[k] > region.upper_m[k]) return false;
   }
@@ -39,8 +40,8 @@ double share(const Seen& seen, std::span<const std::uint32_t> pixels, std::span<
   return static_cast<double>(count) / static_cast<double>(pixels.size() * frames_m.size());
 }
 
-double shareOfMissed(const RequirementSpec& requirement, const Seen& seen, std::span<const std::uint32_t> pixels,
-                     std::span<const Image<float>> frames_m) {
+double shareOfMissed(const RequirementSpec& requirement, const Seen& seen,
+                     std::span<const std::uint32_t> pixels, std::span<const Image<float>> frames_m) {
   std::size_t missed = 0;
   const double within = requirement.within.in(millimetre);
   for (const Image<float>& frame : frames_m) {
@@ -51,8 +52,8 @@ double shareOfMissed(const RequirementSpec& requirement, const Seen& seen, std::
   return static_cast<double>(missed) / static_cast<double>(frames_m.size());
 }
 
-/// The median of a variance over n frames, relative to the true one: of χ² with n − 1 degrees, over n − 1. Few
-/// frames understate noise by it: a tenth at four, a hundredth of the standard deviation at 34.
+/// The median of a variance over n frames, relative to the true one: of χ² with n − 1 degrees, over n − 1.
+/// Few frames understate noise by it: a tenth at four, a hundredth of the standard deviation at 34.
 double medianOfVariance(std::size_t n) {
   thread_local std::vector<double> known;
   if (known.size() <= n) known.resize(n + 1, 0.0);
@@ -74,7 +75,8 @@ double medianOverPixels(Kind kind, const Seen& seen, std::span<const std::uint32
       if (std::isfinite(error)) running.add(error);
     }
     if (kind == Kind::Bias && running.n() > 0) each.push_back(running.mean());
-    if (kind == Kind::Noise && running.n() > 1) each.push_back(running.variance() / medianOfVariance(running.n()));
+    if (kind == Kind::Noise && running.n() > 1)
+      each.push_back(running.variance() / medianOfVariance(running.n()));
   }
   const double median = compare::quantile(std::move(each), 0.5);
   return kind == Kind::Noise ? std::sqrt(median) : median;
@@ -198,7 +200,8 @@ Verdict verdictOf(const RequirementSpec& requirement, const Estimate& estimate) 
   const bool at_least = isAtLeast(requirement.kind);
   Verdict verdict{.estimate = estimate, .margin = at_least ? size - limit : limit - size};
   verdict.is_met = verdict.margin >= -1e-12 * std::max(1.0, limit);
-  const double worst = at_least ? least - limit : limit - most, best = at_least ? most - limit : limit - least;
+  const double worst = at_least ? least - limit : limit - most,
+               best = at_least ? most - limit : limit - least;
   verdict.is_certain = verdict.is_met ? worst >= -1e-12 * std::max(1.0, limit) : best < 0.0;
   return verdict;
 }
@@ -206,7 +209,8 @@ Verdict verdictOf(const RequirementSpec& requirement, const Estimate& estimate) 
 double relativeMargin(const RequirementSpec& requirement, const Verdict& verdict) {
   const double limit = limitOf(requirement);
   // Of "at least 95 %" 5 % may fail, and that is the scale; "none" has the scale of one in a hundred.
-  const double scale = isShare(requirement.kind) ? (isAtLeast(requirement.kind) ? 1.0 - limit : limit) : limit;
+  const double scale =
+      isShare(requirement.kind) ? (isAtLeast(requirement.kind) ? 1.0 - limit : limit) : limit;
   return verdict.margin / std::max(scale, isShare(requirement.kind) ? 0.01 : 1e-9);
 }
 

@@ -17,9 +17,9 @@ namespace toftwin::suit {
 
 /// What a camera at one place would see if it made no error.
 struct Seen {
-  Image<float> range_m{};           ///< along the ray; NaN where nothing is
-  Image<std::int32_t> object{};     ///< number in the scene, −1 where nothing is
-  Image<Vec3f> point_m{};           ///< in the world
+  Image<float> range_m{};        ///< along the ray; NaN where nothing is
+  Image<std::int32_t> object{};  ///< number in the scene, −1 where nothing is
+  Image<Vec3f> point_m{};        ///< in the world
 };
 
 /// Numbers of the pixels that a requirement is about: all that see anything, or its object, or its region.
@@ -29,11 +29,10 @@ std::vector<std::uint32_t> pixelsOf(const RequirementSpec& requirement, const Ca
 /// e = range − true range of each of `pixels` in each frame.
 ///   accuracy  share of pixels and frames that are valid with |e| ≤ within
 ///   bias      median over pixels of the mean of e over frames      (signed)
-///   noise     standard deviation over frames: √ of the median over pixels of s² (n − 1) / median of χ²(n − 1)
-///   valid     share of pixels and frames that are valid
-///   missed    share of frames with fewer than `pixels` pixels valid with |e| ≤ within
-///   phantom   share of pixels and frames that are valid with e < −within
-///   pixels    number of pixels
+///   noise     standard deviation over frames: √ of the median over pixels of s² (n − 1) / median of χ²(n −
+///   1) valid     share of pixels and frames that are valid missed    share of frames with fewer than
+///   `pixels` pixels valid with |e| ≤ within phantom   share of pixels and frames that are valid with e <
+///   −within pixels    number of pixels
 /// NaN where nothing is to be judged.
 double valueOf(const RequirementSpec& requirement, const Seen& seen, std::span<const std::uint32_t> pixels,
                std::span<const Image<float>> frames_m);

@@ -15,7 +15,8 @@ struct RowRays {
   RTCRayHit16 rays;
 };
 
-void setRays(const CameraInfo& camera, const Transform<World, Camera>& scene_from_camera, int x, int y, RowRays& row) {
+void setRays(const CameraInfo& camera, const Transform<World, Camera>& scene_from_camera, int x, int y,
+             RowRays& row) {
   for (int i = 0; i < embree::kLanes; ++i) {
     const auto lane = static_cast<std::size_t>(i);
     row.valid[lane] = x + i < camera.width ? -1 : 0;

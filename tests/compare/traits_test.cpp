@@ -37,11 +37,13 @@ TEST(DriftTraits, ChooseTheConstantOnFlatData) {
   EXPECT_GE(held, 180);
 }
 
-/// y = 2 + 3 x exactly at five places but for ±1 that is orthogonal to both: s² = 4/3, var(slope) = s²/Σx² = 4/3/10.
+/// y = 2 + 3 x exactly at five places but for ±1 that is orthogonal to both: s² = 4/3, var(slope) = s²/Σx² =
+/// 4/3/10.
 TEST(LeastSquares, GivesTheErrorsOfAStraightLine) {
   const std::vector<double> x{-2, -1, 0, 1, 2}, y{2 - 6 + 0.5, 2 - 3 - 1, 2 + 1, 2 + 3 - 1, 2 + 6 + 0.5};
   // Residuals (0.5, −1, 1, −1, 0.5): sum 0, Σ x e = 0, Σ e² = 3.5.
-  const auto fit = fitLeastSquares([&](std::span<const double> p, std::size_t i) { return p[0] + p[1] * x[i]; }, y, {0.0, 0.0});
+  const auto fit = fitLeastSquares(
+      [&](std::span<const double> p, std::size_t i) { return p[0] + p[1] * x[i]; }, y, {0.0, 0.0});
   ASSERT_TRUE(fit);
   EXPECT_NEAR(fit->at[0], 2.0, 1e-9);
   EXPECT_NEAR(fit->at[1], 3.0, 1e-9);
@@ -53,14 +55,16 @@ TEST(LeastSquares, GivesTheErrorsOfAStraightLine) {
 
 TEST(LeastSquares, GivesNothingWhereRowsDoNotTellAParameter) {
   const std::vector<double> y{1.0, 1.1, 0.9, 1.0};
-  EXPECT_FALSE(fitLeastSquares([](std::span<const double> p, std::size_t) { return p[0] + 2.0 * p[1]; }, y, {0.0, 0.0}));
+  EXPECT_FALSE(fitLeastSquares([](std::span<const double> p, std::size_t) { return p[0] + 2.0 * p[1]; }, y,
+                               {0.0, 0.0}));
   EXPECT_FALSE(fitLeastSquares([](std::span<const double> p, std::size_t) { return p[0]; }, {}, {0.0}));
 }
 
 std::string errorOf(const Traits& traits) { return traits ? "no error" : traits.error().message; }
 
 TEST(Traits, SayWhatRowsCannotTell) {
-  const std::vector<double> few{1, 2, 3}, same(20, 1.0), zero(20, 0.0), nothing(20, std::numeric_limits<double>::quiet_NaN());
+  const std::vector<double> few{1, 2, 3}, same(20, 1.0), zero(20, 0.0),
+      nothing(20, std::numeric_limits<double>::quiet_NaN());
   EXPECT_THAT(errorOf(wrapTraits(nothing, 1.5)), HasSubstr("0 of 20 rows are finite"));
   EXPECT_THAT(errorOf(wrapTraits(same, 0.0)), HasSubstr("period"));
   EXPECT_THAT(errorOf(amplitudeTraits(same, same)), HasSubstr("all amplitudes are alike"));

@@ -26,7 +26,12 @@ class Locate : public ::testing::Test {
     fs::create_directories(folder_);
     const auto truth = testing::smallCamera();
     calibration::CalibrationFile file;
-    file.lens = {.width = truth.size.width, .height = truth.size.height, .fx = truth.lens[0], .fy = truth.lens[1], .cx = truth.lens[2], .cy = truth.lens[3],
+    file.lens = {.width = truth.size.width,
+                 .height = truth.size.height,
+                 .fx = truth.lens[0],
+                 .fy = truth.lens[1],
+                 .cx = truth.lens[2],
+                 .cy = truth.lens[3],
                  .distortion = {truth.lens[4], truth.lens[5], truth.lens[6], truth.lens[7], truth.lens[8]}};
     std::ofstream{folder_ / "lens.toml"} << calibration::toText(file);
   }
@@ -43,13 +48,16 @@ class Locate : public ::testing::Test {
     const auto image = testing::render(testing::smallCamera(), testing::checkerboard(), pose, {}, random);
     cv::Mat grey(image.height(), image.width(), CV_8U);
     for (int y = 0; y < image.height(); ++y) {
-      for (int x = 0; x < image.width(); ++x) grey.at<unsigned char>(y, x) = static_cast<unsigned char>(image(x, y));
+      for (int x = 0; x < image.width(); ++x)
+        grey.at<unsigned char>(y, x) = static_cast<unsigned char>(image(x, y));
     }
     cv::imwrite((folder_ / name).string(), grey);
     return pose;
   }
   cli::Ran locate(const std::string& rest) {
-    return cli::toftwin(fmt::format("locate {} --board 8x5 --square 32 --calibration {}/lens.toml -o {}/poses.toml", rest, folder_.string(), folder_.string()));
+    return cli::toftwin(
+        fmt::format("locate {} --board 8x5 --square 32 --calibration {}/lens.toml -o {}/poses.toml", rest,
+                    folder_.string(), folder_.string()));
   }
   fs::path folder_;
 };
@@ -63,7 +71,8 @@ TEST_F(Locate, WritesAPoseFileThatOtherCommandsRead) {
   ASSERT_EQ(poses->size(), 1u);
   // The camera in the board's frame: −Rᵀ t.
   const Eigen::Vector3d expected = -1e-3 * (truth.rotation.transpose() * truth.translation_mm);
-  for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR((*poses)[0].position_m[k], expected[static_cast<Eigen::Index>(k)], 2e-3);
+  for (std::size_t k = 0; k < 3; ++k)
+    EXPECT_NEAR((*poses)[0].position_m[k], expected[static_cast<Eigen::Index>(k)], 2e-3);
 }
 
 TEST_F(Locate, SaysWhatIsMissing) {

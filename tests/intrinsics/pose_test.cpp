@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a camera stands, from a board, planes, and a rig: planted poses, and how often their intervals hold them.
+// Where a camera stands, from a board, planes, and a rig: planted poses, and how often their intervals hold
+// them.
 #include <gmock/gmock.h>
 
 #include <Eigen/Cholesky>
@@ -22,8 +23,14 @@ using Vector6d = Eigen::Matrix<double, 6, 1>;
 constexpr int kRuns = 200;
 
 CameraInfo cameraOf(const Truth& truth) {
-  return {.width = truth.size.width, .height = truth.size.height, .fx = truth.lens[0], .fy = truth.lens[1], .cx = truth.lens[2], .cy = truth.lens[3],
-          .distortion = {truth.lens[4], truth.lens[5], truth.lens[6], truth.lens[7], truth.lens[8]}, .calibration_id = {}};
+  return {.width = truth.size.width,
+          .height = truth.size.height,
+          .fx = truth.lens[0],
+          .fy = truth.lens[1],
+          .cx = truth.lens[2],
+          .cy = truth.lens[3],
+          .distortion = {truth.lens[4], truth.lens[5], truth.lens[6], truth.lens[7], truth.lens[8]},
+          .calibration_id = {}};
 }
 
 template <class To, class From>
@@ -56,7 +63,9 @@ struct Held {
     for (Eigen::Index k = 0; k < 6; ++k) count[static_cast<std::size_t>(k)] += std::abs(error[k]) <= half[k];
   }
   /// 90 to 98.5 % of 200: exactly 95 % are outside that in 1 % of choices of seeds; these are fixed.
-  void check() const { EXPECT_THAT(count, ::testing::Each(::testing::AllOf(::testing::Ge(180), ::testing::Le(197)))); }
+  void check() const {
+    EXPECT_THAT(count, ::testing::Each(::testing::AllOf(::testing::Ge(180), ::testing::Le(197))));
+  }
 };
 
 Eigen::Vector3d drawn(std::mt19937_64& random, double sigma) {
@@ -64,7 +73,8 @@ Eigen::Vector3d drawn(std::mt19937_64& random, double sigma) {
   return {normal(random), normal(random), normal(random)};
 }
 Eigen::Matrix3d turnBy(const Eigen::Vector3d& w) {
-  return w.norm() > 0.0 ? Eigen::AngleAxisd{w.norm(), w.normalized()}.toRotationMatrix() : Eigen::Matrix3d{Eigen::Matrix3d::Identity()};
+  return w.norm() > 0.0 ? Eigen::AngleAxisd{w.norm(), w.normalized()}.toRotationMatrix()
+                        : Eigen::Matrix3d{Eigen::Matrix3d::Identity()};
 }
 
 TEST(BoardPose, IntervalsHoldThePlantedPose) {
@@ -74,15 +84,17 @@ TEST(BoardPose, IntervalsHoldThePlantedPose) {
   for (unsigned seed = 1; seed <= kRuns; ++seed) {
     std::mt19937_64 random{seed};
     const BoardPose pose = testing::drawPose(truth, surface, random);
-    const auto found = locateBoard(testing::sightingAt(truth, surface, pose, 0.05, random), testing::checkerboard(), cameraOf(truth));
+    const auto found = locateBoard(testing::sightingAt(truth, surface, pose, 0.05, random),
+                                   testing::checkerboard(), cameraOf(truth));
     ASSERT_TRUE(found) << seed << ": " << found.error().message;
     held.add(found->camera_from_board, transformOf<Camera, Board>(pose.rotation, 1e-3 * pose.translation_mm));
   }
   held.check();
 }
 
-/// Rendered boards: the corner finder's errors are not quite independent, so the misfit in units of the stated
-/// covariance may be some times its six degrees; the pose itself must be within a millimetre and a third of a degree.
+/// Rendered boards: the corner finder's errors are not quite independent, so the misfit in units of the
+/// stated covariance may be some times its six degrees; the pose itself must be within a millimetre and a
+/// third of a degree.
 TEST(BoardPose, IsFoundInRenderedAmplitude) {
   const Truth truth = testing::smallCamera();
   const Surface surface{testing::checkerboard(), 0};
@@ -95,7 +107,8 @@ TEST(BoardPose, IsFoundInRenderedAmplitude) {
     const auto found = locateBoard(image, testing::checkerboard(), cameraOf(truth));
     if (!found) continue;  // too oblique or blurred for its size: refused, not wrong
     ++found_count;
-    const Vector6d error = errorOf(found->camera_from_board.pose, transformOf<Camera, Board>(pose.rotation, 1e-3 * pose.translation_mm));
+    const Vector6d error = errorOf(found->camera_from_board.pose,
+                                   transformOf<Camera, Board>(pose.rotation, 1e-3 * pose.translation_mm));
     EXPECT_LT(error.tail<3>().norm(), 1e-3) << seed;
     EXPECT_LT(error.head<3>().norm(), 6e-3) << seed;
     misfit += error.dot(found->camera_from_board.covariance.ldlt().solve(error)) / 6.0;
@@ -111,7 +124,8 @@ TEST(BoardPose, SaysWhyThereIsNone) {
   EXPECT_THAT(none.error().message, HasSubstr("no board"));
   const auto other = locateBoard(Image<float>(128, 106), testing::checkerboard(), cameraOf(truth));
   ASSERT_FALSE(other);
-  EXPECT_THAT(other.error().message, HasSubstr("128 x 106 pixels, but the lens was calibrated with 256 x 212"));
+  EXPECT_THAT(other.error().message,
+              HasSubstr("128 x 106 pixels, but the lens was calibrated with 256 x 212"));
 }
 
 /// A board of 15 pixels, 20 degrees tilted, with half a pixel of noise: either tilt explains it.
@@ -122,12 +136,22 @@ TEST(BoardPose, RefusesABoardThatMayAsWellBeTiltedTheOtherWay) {
   BoardPose pose;
   pose.rotation = Eigen::AngleAxisd{0.35, Eigen::Vector3d::UnitY()}.toRotationMatrix();
   pose.translation_mm = {-110.0, -60.0, 5500.0};
-  const auto found = locateBoard(testing::sightingAt(truth, surface, pose, 0.5, random), testing::checkerboard(), cameraOf(truth));
+  const auto found = locateBoard(testing::sightingAt(truth, surface, pose, 0.5, random),
+                                 testing::checkerboard(), cameraOf(truth));
   ASSERT_FALSE(found);
   EXPECT_THAT(found.error().message, HasSubstr("may as well be tilted the other way"));
 }
 
-CameraInfo plainCamera() { return {.width = 64, .height = 48, .fx = 60, .fy = 60, .cx = 31.5, .cy = 23.5, .distortion = {}, .calibration_id = {}}; }
+CameraInfo plainCamera() {
+  return {.width = 64,
+          .height = 48,
+          .fx = 60,
+          .fy = 60,
+          .cx = 31.5,
+          .cy = 23.5,
+          .distortion = {},
+          .calibration_id = {}};
+}
 
 /// Planes of the world as one camera sees them: each pixel shows the nearest.
 struct Room {
@@ -142,7 +166,8 @@ struct Room {
     Image<float> image(camera.width, camera.height, std::numeric_limits<float>::quiet_NaN());
     for (auto& of_plane : pixels) of_plane.clear();
     for (std::uint32_t i = 0; i < image.size(); ++i) {
-      const auto ray = pose * rayThroughPixel(camera, static_cast<int>(i) % camera.width, static_cast<int>(i) / camera.width);
+      const auto ray = pose * rayThroughPixel(camera, static_cast<int>(i) % camera.width,
+                                              static_cast<int>(i) / camera.width);
       double nearest = 1e9;
       std::size_t plane = 0;
       for (std::size_t p = 0; p < planes.size(); ++p) {
@@ -188,21 +213,26 @@ TEST(Planes, SayWhatTheyCannotTell) {
   const std::vector<SeenPlane> walls(3, *wall), two(2, *wall);
   const std::vector<KnownPlane> same(3, room.planes[0]);
   EXPECT_THAT(poseFromPlanes(walls, same).error().message, HasSubstr("may slide along them"));
-  EXPECT_THAT(poseFromPlanes(two, std::vector<KnownPlane>(2, room.planes[0])).error().message, HasSubstr("it takes three planes"));
+  EXPECT_THAT(poseFromPlanes(two, std::vector<KnownPlane>(2, room.planes[0])).error().message,
+              HasSubstr("it takes three planes"));
   std::vector<std::uint32_t> row, outside(30, 64u * 48u);
   for (std::uint32_t x = 0; x < 30; ++x) row.push_back(x);
   Image<float> flat(64, 48, 1.0f);
   EXPECT_THAT(fitPlane(flat, plainCamera(), row).error().message, HasSubstr("on one line"));
   EXPECT_THAT(fitPlane(flat, plainCamera(), outside).error().message, HasSubstr("outside the image"));
-  EXPECT_THAT(fitPlane(Image<float>(64, 48, 0.0f), plainCamera(), row).error().message, HasSubstr("0 of 30 pixels are valid"));
+  EXPECT_THAT(fitPlane(Image<float>(64, 48, 0.0f), plainCamera(), row).error().message,
+              HasSubstr("0 of 30 pixels are valid"));
 }
 
 /// Ten stands of a rig, the board known to 1 mrad and 1 mm (2 mm along z).
 struct Planted {
-  Transform<Rig, Camera> rig_from_camera = transformOf<Rig, Camera>(turnBy({0.2, -0.1, 1.5}), {0.05, -0.02, 0.1});
-  Transform<World, Board> world_from_board = transformOf<World, Board>(turnBy({-0.3, 0.1, 0.2}), {0.3, 0.2, 2.0});
+  Transform<Rig, Camera> rig_from_camera =
+      transformOf<Rig, Camera>(turnBy({0.2, -0.1, 1.5}), {0.05, -0.02, 0.1});
+  Transform<World, Board> world_from_board =
+      transformOf<World, Board>(turnBy({-0.3, 0.1, 0.2}), {0.3, 0.2, 2.0});
 
-  [[nodiscard]] std::vector<HandEyeView> views(std::mt19937_64& random, double noise, const Eigen::Vector3d& turns = {0.3, 0.3, 0.3}) const {
+  [[nodiscard]] std::vector<HandEyeView> views(std::mt19937_64& random, double noise,
+                                               const Eigen::Vector3d& turns = {0.3, 0.3, 0.3}) const {
     std::vector<HandEyeView> all;
     Vector6d sigma;
     sigma << 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 2e-3;
@@ -211,9 +241,11 @@ struct Planted {
       const Eigen::Vector3d turn = drawn(random, 1.0).cwiseProduct(turns), place = drawn(random, 0.2);
       view.world_from_rig = transformOf<World, Rig>(turnBy(turn), place);
       const auto exact = (view.world_from_rig * rig_from_camera).inverse() * world_from_board;
-      const Eigen::Vector3d w = noise * drawn(random, 1.0).cwiseProduct(sigma.head<3>()), t = noise * drawn(random, 1.0).cwiseProduct(sigma.tail<3>());
+      const Eigen::Vector3d w = noise * drawn(random, 1.0).cwiseProduct(sigma.head<3>()),
+                            t = noise * drawn(random, 1.0).cwiseProduct(sigma.tail<3>());
       const Vec3d at = exact.translation_m;
-      view.camera_from_board.pose = transformOf<Camera, Board>(turnBy(w) * turnOf(exact), Eigen::Vector3d{at.x, at.y, at.z} + t);
+      view.camera_from_board.pose =
+          transformOf<Camera, Board>(turnBy(w) * turnOf(exact), Eigen::Vector3d{at.x, at.y, at.z} + t);
       view.camera_from_board.covariance = sigma.cwiseAbs2().asDiagonal();
       view.camera_from_board.degrees = 74.0;
       all.push_back(view);

@@ -18,7 +18,8 @@ class Folder {
  public:
   Folder() {
     const auto* test = testing::UnitTest::GetInstance()->current_test_info();
-    path_ = std::filesystem::temp_directory_path() / fmt::format("toftwin_suit_{}_{}_{}", getpid(), test->test_suite_name(), test->name());
+    path_ = std::filesystem::temp_directory_path() /
+            fmt::format("toftwin_suit_{}_{}_{}", getpid(), test->test_suite_name(), test->name());
     std::filesystem::create_directories(path_);
     write("scene.toml", R"(
 [[material]]
@@ -49,7 +50,8 @@ material = "grey"
     std::ofstream{path_ / name} << text;
     return (path_ / name).string();
   }
-  /// A camera without any error, and what is appended: 32 × 24 pixels, 20 and 100 MHz, sines, 20 frames per second.
+  /// A camera without any error, and what is appended: 32 × 24 pixels, 20 and 100 MHz, sines, 20 frames per
+  /// second.
   std::string camera(const std::string& name, const std::string& effects = {}) const {
     return write(name, R"(
 model = "planted"

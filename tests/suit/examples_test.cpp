@@ -12,21 +12,29 @@ TEST(Examples, AreReadAndTheirObjectsAreSeenFromTheirPoses) {
     ASSERT_TRUE(use) << use.error().message;
     const auto scene = sim::Scene::load(use->scene_file);
     ASSERT_TRUE(scene) << scene.error().message;
-    const CameraInfo camera{.width = 160, .height = 120, .fx = 130, .fy = 130, .cx = 79.5, .cy = 59.5, .distortion = {}, .calibration_id = {}};
+    const CameraInfo camera{.width = 160,
+                            .height = 120,
+                            .fx = 130,
+                            .fy = 130,
+                            .cx = 79.5,
+                            .cy = 59.5,
+                            .distortion = {},
+                            .calibration_id = {}};
     for (const auto& requirement : use->spec.requirements) {
       if (requirement.kind == Kind::FrameRate) continue;
       for (std::size_t pose = 0; pose < use->spec.poses.size(); ++pose) {
         if (!concerns(requirement, *use, pose, 0) && !concerns(requirement, *use, pose, 1)) continue;
         const auto& station = use->spec.poses[pose];
         const Seen seen = seenFrom(*scene, camera, station.world_from_camera(), station.time);
-        EXPECT_GE(pixelsOf(requirement, *use, seen).size(), 10u) << name << ": " << requirement.name << " at " << station.name;
+        EXPECT_GE(pixelsOf(requirement, *use, seen).size(), 10u)
+            << name << ": " << requirement.name << " at " << station.name;
       }
     }
   }
 }
 
-/// Where a central ray meets the box by the tracer's own truth, its object is the box; beyond it the wall; and the
-/// object of a scene that moves is where it is then.
+/// Where a central ray meets the box by the tracer's own truth, its object is the box; beyond it the wall;
+/// and the object of a scene that moves is where it is then.
 TEST(ObjectsSeen, AreThoseWhoseRangeThePixelHas) {
   const Folder folder;
   folder.write("moving.toml", R"(
@@ -48,7 +56,14 @@ material = "grey"
 )");
   const auto scene = sim::Scene::load(folder.path() / "moving.toml");
   ASSERT_TRUE(scene) << scene.error().message;
-  const CameraInfo camera{.width = 33, .height = 24, .fx = 26, .fy = 26, .cx = 16, .cy = 11.5, .distortion = {}, .calibration_id = {}};
+  const CameraInfo camera{.width = 33,
+                          .height = 24,
+                          .fx = 26,
+                          .fy = 26,
+                          .cx = 16,
+                          .cy = 11.5,
+                          .distortion = {},
+                          .calibration_id = {}};
   const Seen seen = seenFrom(*scene, camera, {}, 1_s);
   std::size_t balls = 0;
   for (int y = 0; y < 24; ++y) {
@@ -66,7 +81,14 @@ material = "grey"
 TEST(ObjectsSeen, AreNoneWhereNothingIs) {
   const Folder folder;
   const auto scene = sim::Scene::load(folder.path() / "scene.toml");
-  const CameraInfo camera{.width = 17, .height = 2, .fx = 10, .fy = 10, .cx = 8, .cy = 0.5, .distortion = {}, .calibration_id = {}};
+  const CameraInfo camera{.width = 17,
+                          .height = 2,
+                          .fx = 10,
+                          .fy = 10,
+                          .cx = 8,
+                          .cy = 0.5,
+                          .distortion = {},
+                          .calibration_id = {}};
   Transform<World, Camera> away;
   away.rotation_wxyz = {0.0, 0.0, 1.0, 0.0};  // about y by half a turn
   const auto objects = sim::objectsSeen(*scene, camera, away);

@@ -41,8 +41,8 @@ at_least_hz = 20
   for (const auto& one : only(*suit).requirements) EXPECT_TRUE(one.verdict.is_certain);
 }
 
-/// Offset 25 mm, limit 10: it fails by 15, and without the effect it gains from −15 to +10. The noise has a mean
-/// over 768 pixels and 12 frames of 0.01 mm, its median 0.013: five of these.
+/// Offset 25 mm, limit 10: it fails by 15, and without the effect it gains from −15 to +10. The noise has a
+/// mean over 768 pixels and 12 frames of 0.01 mm, its median 0.013: five of these.
 TEST(Planted, AnOffsetFailsByWhatItIsTooLargeAndIsFoundAsTheCause) {
   const Folder folder;
   folder.camera("late.toml", effect("range_noise", "sigma_mm = 1") + effect("delay", "offset_mm = 25"));
@@ -62,8 +62,8 @@ TEST(Planted, AnOffsetFailsByWhatItIsTooLargeAndIsFoundAsTheCause) {
   EXPECT_FALSE(noise->is_met_without);
 }
 
-/// Normal errors of σ = 10 mm: 68.27 % are within 10 mm. 768 pixels × 12 frames: standard error 0.48 %; 2.5 % are
-/// five of these.
+/// Normal errors of σ = 10 mm: 68.27 % are within 10 mm. 768 pixels × 12 frames: standard error 0.48 %; 2.5 %
+/// are five of these.
 TEST(Planted, NoiseLeavesTheShareOfANormalDistribution) {
   const Folder folder;
   folder.camera("noisy.toml", effect("range_noise", "sigma_mm = 10"));
@@ -82,7 +82,8 @@ at_least_percent = 95
 TEST(Planted, AFrameRateIsThatOfTheFile) {
   const Folder folder;
   folder.camera("ideal.toml");
-  const auto suit = folder.judged(kPose + "[[require]]\nname = 'rate'\nkind = 'frame_rate'\nat_least_hz = 30\n" + entry("ideal.toml"));
+  const auto suit = folder.judged(
+      kPose + "[[require]]\nname = 'rate'\nkind = 'frame_rate'\nat_least_hz = 30\n" + entry("ideal.toml"));
   ASSERT_TRUE(suit) << suit.error().message;
   EXPECT_DOUBLE_EQ(only(*suit).requirements[0].verdict.margin, -10.0);
 }
@@ -91,8 +92,9 @@ TEST(Planted, AFrameRateIsThatOfTheFile) {
 TEST(Planted, ALongExposureLowersTheFrameRate) {
   const Folder folder;
   folder.camera("ideal.toml");
-  const auto suit = folder.judged(kPose + "[[require]]\nname = 'rate'\nkind = 'frame_rate'\nat_least_hz = 30\n" +
-                                  entry("ideal.toml", "[15.0]"));
+  const auto suit =
+      folder.judged(kPose + "[[require]]\nname = 'rate'\nkind = 'frame_rate'\nat_least_hz = 30\n" +
+                    entry("ideal.toml", "[15.0]"));
   ASSERT_TRUE(suit) << suit.error().message;
   EXPECT_NEAR(only(*suit).requirements[0].verdict.estimate.value, 1e3 / 123.5, 1e-6);
 }
@@ -114,8 +116,8 @@ TEST(Planted, CamerasAreRankedByWhatTheyMiss) {
 TEST(Planted, TheBestExposureIsTheLongestThatDoesNotSaturate) {
   const Folder folder;
   const std::string noisy = effect("shot_noise") + effect("read_noise", "sigma_electrons = 200");
-  // Brightest pixel: albedo 0.5 at 1.5 m straight ahead, 2 W Lambertian: L = 0.5/π · (2/π)/1.5² = 0.045 W/(m² sr), one
-  // tap half of 8.2e7 · 1e-3 s · L · (1 + contrast 0.5): 2769 electrons at the file's exposure.
+  // Brightest pixel: albedo 0.5 at 1.5 m straight ahead, 2 W Lambertian: L = 0.5/π · (2/π)/1.5² = 0.045 W/(m²
+  // sr), one tap half of 8.2e7 · 1e-3 s · L · (1 + contrast 0.5): 2769 electrons at the file's exposure.
   folder.camera("deep.toml", noisy + effect("saturation", "full_well_electrons = 8300"));
   const auto suit = folder.judged(kPose + R"(
 [[require]]
@@ -132,10 +134,12 @@ at_least_percent = 100
   EXPECT_EQ(only(*suit).tries.size(), 5u);
 }
 
-/// 100 klx: 27 W/m² on albedo 0.5 are 4.3 W/(m² sr), a hundred times the camera's own light: the well is full.
+/// 100 klx: 27 W/m² on albedo 0.5 are 4.3 W/(m² sr), a hundred times the camera's own light: the well is
+/// full.
 TEST(Planted, SunThatFillsTheWellIsFoundAsTheCauseAndDarknessIsNotBlamed) {
   const Folder folder;
-  folder.camera("dazzled.toml", effect("ambient_light") + effect("saturation", "full_well_electrons = 20000"));
+  folder.camera("dazzled.toml",
+                effect("ambient_light") + effect("saturation", "full_well_electrons = 20000"));
   const auto suit = folder.judged(kPose + R"(
 [[lighting]]
 name = 'dark'
@@ -166,13 +170,16 @@ lightings = ['noon']
   }
 }
 
-/// The same where the value is a bias, which does not exist while no pixel is valid: there is no gain to tell, and yet
-/// either of the two is the cause. Dark range noise of 3 mm, over 768 pixels and 12 frames, is not.
+/// The same where the value is a bias, which does not exist while no pixel is valid: there is no gain to
+/// tell, and yet either of the two is the cause. Dark range noise of 3 mm, over 768 pixels and 12 frames, is
+/// not.
 TEST(Planted, SunThatLeavesNoPixelValidIsFoundAsTheCauseOfABiasThatCannotBeTold) {
   const Folder folder;
-  folder.camera("dazzled.toml", effect("ambient_light") + effect("saturation", "full_well_electrons = 20000") +
+  folder.camera("dazzled.toml", effect("ambient_light") +
+                                    effect("saturation", "full_well_electrons = 20000") +
                                     effect("range_noise", "sigma_mm = 3"));
-  const auto suit = folder.judged(kPose + "[[lighting]]\nname = 'noon'\nambient_klx = 100\n" + kBias10 + entry("dazzled.toml"));
+  const auto suit = folder.judged(kPose + "[[lighting]]\nname = 'noon'\nambient_klx = 100\n" + kBias10 +
+                                  entry("dazzled.toml"));
   ASSERT_TRUE(suit) << suit.error().message;
   const CameraResult& camera = only(*suit);
   ASSERT_FALSE(camera.requirements[0].verdict.is_met);
@@ -190,14 +197,17 @@ TEST(Planted, SunThatLeavesNoPixelValidIsFoundAsTheCauseOfABiasThatCannotBeTold)
                                  testing::Not(HasSubstr("no single effect"))));
 }
 
-/// Pulses of 30 and 60 ns need light of their own: a ratio of charges that one's gates let through is another range
-/// with the other's, metres off. Each range is 4.5 m or more; the wall is at 2 m.
+/// Pulses of 30 and 60 ns need light of their own: a ratio of charges that one's gates let through is another
+/// range with the other's, metres off. Each range is 4.5 m or more; the wall is at 2 m.
 TEST(Planted, ModesWithOtherGatesSeeLightOfTheirOwn) {
   const Folder folder;
   for (const std::string width : {"30", "60"}) {
-    std::string text = "[lens]\nwidth = 16\nheight = 12\nfx = 26.0\nfy = 26.0\ncx = 7.5\ncy = 5.5\n"
-                       "[[emitter]]\npower_w = 2.0\n[[pulse]]\nwidth_ns = " + width + ".0\n"
-                       "[decoder]\nalgorithm = \"pulsed\"\n[sampling]\nfactory_calibration = \"waveform\"\n";
+    std::string text =
+        "[lens]\nwidth = 16\nheight = 12\nfx = 26.0\nfy = 26.0\ncx = 7.5\ncy = 5.5\n"
+        "[[emitter]]\npower_w = 2.0\n[[pulse]]\nwidth_ns = " +
+        width +
+        ".0\n"
+        "[decoder]\nalgorithm = \"pulsed\"\n[sampling]\nfactory_calibration = \"waveform\"\n";
     folder.write("pulse" + width + ".toml", text);
   }
   for (const std::string order : {"'pulse30.toml', 'pulse60.toml'", "'pulse60.toml', 'pulse30.toml'"}) {
@@ -209,11 +219,13 @@ TEST(Planted, ModesWithOtherGatesSeeLightOfTheirOwn) {
   }
 }
 
-/// 2 m/s towards the wall and 1.5 ms from one raw exposure to the next: 3 mm each, which phases of 100 MHz see.
+/// 2 m/s towards the wall and 1.5 ms from one raw exposure to the next: 3 mm each, which phases of 100 MHz
+/// see.
 TEST(Planted, MotionIsFoundAsTheCause) {
   const Folder folder;
   folder.camera("ideal.toml");
-  const auto suit = folder.judged("[[pose]]\nname = 'driving'\nvelocity_m_per_s = [0, 0, 2]\n" + std::string{R"(
+  const auto suit =
+      folder.judged("[[pose]]\nname = 'driving'\nvelocity_m_per_s = [0, 0, 2]\n" + std::string{R"(
 [[require]]
 name = 'accurate'
 kind = 'accuracy'
@@ -227,16 +239,18 @@ at_least_percent = 95
   EXPECT_TRUE(only(*suit).spoilers[0].front().is_met_without);
 }
 
-/// 100 MHz decide, whose four raw exposures are in their middles 6.5, 8, 9.5 and 11 ms after the frame's start: 8.75 ms
-/// on the mean, when the wall is 2 m/s · 2.25 ms nearer than in the middle of the middle one, to which truth belongs.
-/// Besides, samples that are 4π · 3 mm / 3 m = 12.6 mrad of phase apart make a cyclic error of at most half of that:
-/// 1.5 mm. Rays are up to 0.6 rad off the axis, so that the median of the projections is 0.93.
+/// 100 MHz decide, whose four raw exposures are in their middles 6.5, 8, 9.5 and 11 ms after the frame's
+/// start: 8.75 ms on the mean, when the wall is 2 m/s · 2.25 ms nearer than in the middle of the middle one,
+/// to which truth belongs. Besides, samples that are 4π · 3 mm / 3 m = 12.6 mrad of phase apart make a cyclic
+/// error of at most half of that: 1.5 mm. Rays are up to 0.6 rad off the axis, so that the median of the
+/// projections is 0.93.
 TEST(Planted, AMovingCameraIsOffByItsWayToTheExposuresThatDecide) {
   const Folder folder;
   folder.camera("ideal.toml");
-  const auto suit = folder.judged("[[pose]]\nname = 'driving'\nvelocity_m_per_s = [0, 0, 2]\n" +
-                                  std::string{"[[require]]\nname = 'it'\nkind = 'bias'\nobject = 'wall'\nat_most_mm = 1\n"} +
-                                  entry("ideal.toml"));
+  const auto suit = folder.judged(
+      "[[pose]]\nname = 'driving'\nvelocity_m_per_s = [0, 0, 2]\n" +
+      std::string{"[[require]]\nname = 'it'\nkind = 'bias'\nobject = 'wall'\nat_most_mm = 1\n"} +
+      entry("ideal.toml"));
   ASSERT_TRUE(suit) << suit.error().message;
   EXPECT_NEAR(only(*suit).requirements[0].verdict.estimate.value, -4.5 * 0.93, 1.6);
 }
@@ -263,12 +277,14 @@ at_least_percent = 100
   EXPECT_TRUE(only(*suit).spoilers[0].front().is_met_without);
 }
 
-/// The box is 1 m wide at 1.5 m, its left edge on the axis: 26 · 1/1.5 = 17.3 pixels from the middle to the right of
-/// which the image has 16; 17.3 rows, half of them above. Its left side is seen edge on.
+/// The box is 1 m wide at 1.5 m, its left edge on the axis: 26 · 1/1.5 = 17.3 pixels from the middle to the
+/// right of which the image has 16; 17.3 rows, half of them above. Its left side is seen edge on.
 TEST(Planted, PixelsOfAnObjectAreCountedByItsOutline) {
   const Folder folder;
   folder.camera("ideal.toml");
-  const auto suit = folder.judged(kPose + "[[require]]\nname = 'size'\nkind = 'pixels'\nobject = 'box'\nat_least_pixels = 1\n" + entry("ideal.toml"));
+  const auto suit = folder.judged(
+      kPose + "[[require]]\nname = 'size'\nkind = 'pixels'\nobject = 'box'\nat_least_pixels = 1\n" +
+      entry("ideal.toml"));
   ASSERT_TRUE(suit) << suit.error().message;
   // Columns 16 to 31, rows whose |y − 11.5| < 8.67: 3 to 20.
   EXPECT_EQ(only(*suit).requirements[0].verdict.estimate.value, 16.0 * 18.0);
@@ -306,12 +322,13 @@ cy = 3.5
 [[emitter]]
 [[modulation]]
 )");
-  const std::string rest = kPose + "[[require]]\nname = 'seen'\nkind = 'valid'\nat_least_percent = 50\nobject = 'box'\n";
+  const std::string rest =
+      kPose + "[[require]]\nname = 'seen'\nkind = 'valid'\nat_least_percent = 50\nobject = 'box'\n";
   const auto suit = folder.judged(rest + entry("narrow.toml") + entry("wide.toml"));
   ASSERT_TRUE(suit) << suit.error().message;
   EXPECT_EQ(suit->cameras[0].name, "wide.toml");
-  EXPECT_THAT(suit->cameras[1].cannot,
-              AllOf(HasSubstr("case.toml:13"), HasSubstr("none of its 8 x 8 pixels"), HasSubstr("sees \"box\""), HasSubstr("case.toml:8")));
+  EXPECT_THAT(suit->cameras[1].cannot, AllOf(HasSubstr("case.toml:13"), HasSubstr("none of its 8 x 8 pixels"),
+                                             HasSubstr("sees \"box\""), HasSubstr("case.toml:8")));
   const auto none = folder.judged(rest + entry("narrow.toml"));
   ASSERT_FALSE(none);
   EXPECT_THAT(none.error().message, HasSubstr("no camera can be judged"));
@@ -335,10 +352,12 @@ TEST(Planted, TheReportSaysVerdictCauseAndWhereAndHoldsItsNumbers) {
   std::stringstream html, json;
   html << std::ifstream{*page}.rdbuf();
   json << std::ifstream{folder.path() / "report/report.json"}.rdbuf();
-  EXPECT_THAT(html.str(), AllOf(HasSubstr("None of 1 camera does all that is asked"), HasSubstr("is spoiled most by delay: without it, it would be met"),
+  EXPECT_THAT(html.str(), AllOf(HasSubstr("None of 1 camera does all that is asked"),
+                                HasSubstr("is spoiled most by delay: without it, it would be met"),
                                 HasSubstr("at most 10 mm"), HasSubstr("a note")));
   EXPECT_THAT(html.str(), testing::Not(HasSubstr("http")));
-  EXPECT_THAT(json.str(), AllOf(HasSubstr("\"left_out\": \"delay\""), HasSubstr("\"met_without\": true"), HasSubstr("\"pose\": \"here\"")));
+  EXPECT_THAT(json.str(), AllOf(HasSubstr("\"left_out\": \"delay\""), HasSubstr("\"met_without\": true"),
+                                HasSubstr("\"pose\": \"here\"")));
 }
 
 }  // namespace

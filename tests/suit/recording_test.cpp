@@ -13,7 +13,8 @@ namespace {
 using testing::HasSubstr;
 
 /// So many frames of what is true and 7 mm, with 2 mm of noise, 25 a second.
-void record(const Folder& folder, int count, std::optional<Transform<World, Camera>> pose, const std::string& file = "real.mcap") {
+void record(const Folder& folder, int count, std::optional<Transform<World, Camera>> pose,
+            const std::string& file = "real.mcap") {
   const auto model = sim::SensorModel::load(folder.camera("lens.toml"));
   const auto scene = sim::Scene::load(folder.path() / "scene.toml");
   ASSERT_TRUE(model && scene);
@@ -56,8 +57,8 @@ name = 'real'
 recording = 'real.mcap'
 )";
 
-/// Median of 768 pixels' means over four frames: standard error 1.25 · 2 / √4 / √768 = 0.05 mm and less over ten groups;
-/// noise: 0.6 % · √(4000/768) per group. Five standard errors.
+/// Median of 768 pixels' means over four frames: standard error 1.25 · 2 / √4 / √768 = 0.05 mm and less over
+/// ten groups; noise: 0.6 % · √(4000/768) per group. Five standard errors.
 TEST(Recording, IsJudgedByTheSameRequirements) {
   const Folder folder;
   record(folder, 40, Transform<World, Camera>{});
@@ -77,7 +78,10 @@ TEST(Recording, ThatDoesNotSayItsPoseIsTakenAtTheOneNamed) {
   record(folder, 8, std::nullopt);
   const auto without = folder.judged(kCase);
   ASSERT_FALSE(without);
-  EXPECT_THAT(without.error().message, HasSubstr("none of its 8 frames was taken at a pose of the use case (0 elsewhere, 8 that do not say where"));
+  EXPECT_THAT(
+      without.error().message,
+      HasSubstr(
+          "none of its 8 frames was taken at a pose of the use case (0 elsewhere, 8 that do not say where"));
   const auto with = folder.judged(kCase + "pose = 'here'\n");
   ASSERT_TRUE(with) << with.error().message;
   EXPECT_NEAR(with->cameras.front().requirements[0].verdict.estimate.value, 7.0, 0.2);

@@ -22,33 +22,41 @@ std::string require(const std::string& keys) { return kPose + "[[require]]\nname
 
 TEST(UseCase, NamesTheUnitThatALimitLacks) {
   const Folder folder;
-  EXPECT_THAT(errorOf(folder, require("kind = 'accuracy'\nwithin = 10\nat_least_percent = 95\n")),
-              AllOf(HasSubstr("case.toml:11"), HasSubstr("within"), HasSubstr("has no unit: write within_mm")));
-  EXPECT_THAT(errorOf(folder, require("kind = 'bias'\nat_most = 10\n")), HasSubstr("write at_most_mm or at_most_percent"));
+  EXPECT_THAT(
+      errorOf(folder, require("kind = 'accuracy'\nwithin = 10\nat_least_percent = 95\n")),
+      AllOf(HasSubstr("case.toml:11"), HasSubstr("within"), HasSubstr("has no unit: write within_mm")));
+  EXPECT_THAT(errorOf(folder, require("kind = 'bias'\nat_most = 10\n")),
+              HasSubstr("write at_most_mm or at_most_percent"));
 }
 
 TEST(UseCase, NamesTheObjectThatTheSceneLacksAndThoseThatItHas) {
   const Folder folder;
   EXPECT_THAT(errorOf(folder, require("kind = 'valid'\nat_least_percent = 9\nobject = 'pallet'\n")),
-              AllOf(HasSubstr("case.toml:12"), HasSubstr("names \"pallet\", which is no object of the scene"), HasSubstr("box, wall")));
+              AllOf(HasSubstr("case.toml:12"), HasSubstr("names \"pallet\", which is no object of the scene"),
+                    HasSubstr("box, wall")));
 }
 
 TEST(UseCase, NamesTheRegionPoseAndLightingThatAreNone) {
   const Folder folder;
   const std::string valid = "kind = 'valid'\nat_least_percent = 9\n";
-  EXPECT_THAT(errorOf(folder, require(valid + "region = 'pocket'\n")), HasSubstr("names \"pocket\", which is no [[region]]; there are none"));
-  EXPECT_THAT(errorOf(folder, require(valid + "poses = ['far']\n")), HasSubstr("names \"far\", which is no [[pose]]; there are: here"));
-  EXPECT_THAT(errorOf(folder, require(valid + "lightings = ['noon']\n")), HasSubstr("names \"noon\", which is no [[lighting]]"));
+  EXPECT_THAT(errorOf(folder, require(valid + "region = 'pocket'\n")),
+              HasSubstr("names \"pocket\", which is no [[region]]; there are none"));
+  EXPECT_THAT(errorOf(folder, require(valid + "poses = ['far']\n")),
+              HasSubstr("names \"far\", which is no [[pose]]; there are: here"));
+  EXPECT_THAT(errorOf(folder, require(valid + "lightings = ['noon']\n")),
+              HasSubstr("names \"noon\", which is no [[lighting]]"));
 }
 
 TEST(UseCase, SaysWhatARequirementLacksAndWhatMeansNothing) {
   const Folder folder;
-  EXPECT_THAT(errorOf(folder, require("kind = 'accuracy'\nwithin_mm = 1\n")), HasSubstr("must say at_least_percent"));
+  EXPECT_THAT(errorOf(folder, require("kind = 'accuracy'\nwithin_mm = 1\n")),
+              HasSubstr("must say at_least_percent"));
   EXPECT_THAT(errorOf(folder, require("kind = 'bias'\nat_most_mm = 1\nwithin_mm = 1\n")),
               HasSubstr("has no meaning for kind = \"bias\""));
   EXPECT_THAT(errorOf(folder, require("kind = 'missed'\nwithin_mm = 1\nat_most_percent = 0\n")),
               HasSubstr("must say of which object or region"));
-  EXPECT_THAT(errorOf(folder, require("kind = 'valid'\nat_least_percent = 9\ncolour = 1\n")), HasSubstr("colour"));
+  EXPECT_THAT(errorOf(folder, require("kind = 'valid'\nat_least_percent = 9\ncolour = 1\n")),
+              HasSubstr("colour"));
 }
 
 TEST(UseCase, SaysAllThatIsWrongWithCamerasAndPlacesAtOnce) {
@@ -72,21 +80,25 @@ models = ['kinect_v3', 'none.toml']
 [[camera]]
 name = 'nothing'
 )");
-  EXPECT_THAT(error, AllOf(HasSubstr("another [[pose]] is called so"), HasSubstr("which is no rotation"), HasSubstr("on z it is not"),
-                           HasSubstr("has no meaning for a frame rate"), HasSubstr("there is no camera preset \"kinect_v3\""),
-                           HasSubstr("none.toml, which is not there"), HasSubstr("must have either models or a recording")));
+  EXPECT_THAT(error, AllOf(HasSubstr("another [[pose]] is called so"), HasSubstr("which is no rotation"),
+                           HasSubstr("on z it is not"), HasSubstr("has no meaning for a frame rate"),
+                           HasSubstr("there is no camera preset \"kinect_v3\""),
+                           HasSubstr("none.toml, which is not there"),
+                           HasSubstr("must have either models or a recording")));
 }
 
 TEST(UseCase, NeedsASceneAPoseAndARequirement) {
   const auto use = parseCase("title = 'x'\n", "case.toml");
   ASSERT_FALSE(use);
-  EXPECT_THAT(use.error().message, AllOf(HasSubstr("must name a scene file"), HasSubstr("no [[pose]]"), HasSubstr("no [[require]]")));
+  EXPECT_THAT(use.error().message, AllOf(HasSubstr("must name a scene file"), HasSubstr("no [[pose]]"),
+                                         HasSubstr("no [[require]]")));
 }
 
 TEST(UseCase, PassesOnWhatIsWrongWithTheScene) {
   const Folder folder;
   folder.write("scene.toml", "[[object]]\nshape = 'torus'\n");
-  EXPECT_THAT(errorOf(folder, require("kind = 'valid'\nat_least_percent = 9\n")), AllOf(HasSubstr("scene.toml:2"), HasSubstr("torus")));
+  EXPECT_THAT(errorOf(folder, require("kind = 'valid'\nat_least_percent = 9\n")),
+              AllOf(HasSubstr("scene.toml:2"), HasSubstr("torus")));
 }
 
 TEST(PresetCameras, TakeThoseThatAreCalledAfterAnotherAsItsModes) {

@@ -22,7 +22,9 @@ struct Row {
 
 /// Four pixels at 1 m, in two frames: errors +5 and +5, −20 and invalid, invalid twice, 0 and 2 mm.
 Row fourPixels() {
-  Row row{.seen = {.range_m = Image<float>(4, 1, 1.0f), .object = Image<std::int32_t>(4, 1, 0), .point_m = Image<Vec3f>(4, 1)},
+  Row row{.seen = {.range_m = Image<float>(4, 1, 1.0f),
+                   .object = Image<std::int32_t>(4, 1, 0),
+                   .point_m = Image<Vec3f>(4, 1)},
           .pixels = {0, 1, 2, 3},
           .frames = {Image<float>(4, 1), Image<float>(4, 1)}};
   const float first[]{1.005f, 0.980f, kNaN, 1.0f}, second[]{1.005f, kNaN, kNaN, 1.002f};
@@ -58,12 +60,16 @@ TEST(Value, OfBiasIsTheMedianOfThePixelsMeans) {
   EXPECT_NEAR(valueOf({.kind = Kind::Bias}, fourPixels()), 1.0, 2e-4);
 }
 
-/// 4000 pixels, four frames, σ = 8 mm. The median of 4000 variances has a relative error of 1.2 %, so σ of 0.6 %:
-/// 3 % are five standard errors, false alarm 6e-7. Uncorrected, the median would be 11 % low.
+/// 4000 pixels, four frames, σ = 8 mm. The median of 4000 variances has a relative error of 1.2 %, so σ of
+/// 0.6 %: 3 % are five standard errors, false alarm 6e-7. Uncorrected, the median would be 11 % low.
 TEST(Value, OfNoiseDoesNotDependOnHowFewFramesThereAre) {
   std::mt19937_64 random{7};
   std::normal_distribution<float> noise{1.0f, 0.008f};
-  Row row{.seen = {.range_m = Image<float>(4000, 1, 1.0f), .object = Image<std::int32_t>(4000, 1, 0), .point_m = {}}, .pixels = {}, .frames = {}};
+  Row row{.seen = {.range_m = Image<float>(4000, 1, 1.0f),
+                   .object = Image<std::int32_t>(4000, 1, 0),
+                   .point_m = {}},
+          .pixels = {},
+          .frames = {}};
   for (std::uint32_t i = 0; i < 4000; ++i) row.pixels.push_back(i);
   for (int f = 0; f < 4; ++f) {
     auto& frame = row.frames.emplace_back(4000, 1);
@@ -128,7 +134,8 @@ TEST(Verdict, IsCertainOnlyIfTheWholeIntervalIsOnOneSide) {
 
 /// None missed in so many frames does not prove that none ever will be.
 TEST(Verdict, OfNoneMissedIsMetAndNotCertain) {
-  const RequirementSpec never{.kind = Kind::Missed, .at_most_percent = 0.0}, rarely{.kind = Kind::Missed, .at_most_percent = 6.0};
+  const RequirementSpec never{.kind = Kind::Missed, .at_most_percent = 0.0},
+      rarely{.kind = Kind::Missed, .at_most_percent = 6.0};
   EXPECT_TRUE(verdictOf(never, shareOf(0, 60)).is_met);
   EXPECT_FALSE(verdictOf(never, shareOf(0, 60)).is_certain);
   EXPECT_TRUE(verdictOf(rarely, shareOf(0, 60)).is_certain);

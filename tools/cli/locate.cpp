@@ -40,7 +40,8 @@ Result<Target> targetFrom(const Options& options) {
 }
 
 /// All images in which the board is; the others are said and left out, unless a rig's poses need each.
-Result<std::vector<Located>> locateAll(const Options& options, const Target& target, const CameraInfo& camera) {
+Result<std::vector<Located>> locateAll(const Options& options, const Target& target,
+                                       const CameraInfo& camera) {
   std::vector<Located> all;
   const auto take = [&](NamedImage image) -> Result<> {
     auto found = locateBoard(image.brightness, target, camera);
@@ -48,7 +49,8 @@ Result<std::vector<Located>> locateAll(const Options& options, const Target& tar
       all.push_back({image.name, *found});
       return {};
     }
-    if (!options.rig.empty()) return Error{found.error().code, fmt::format("{}: {}", image.name, found.error().message)};
+    if (!options.rig.empty())
+      return Error{found.error().code, fmt::format("{}: {}", image.name, found.error().message)};
     fmt::print(stderr, "  left out {}: {}\n", image.name, found.error().message);
     return {};
   };
@@ -70,11 +72,12 @@ template <class In>
 std::string entryOf(const Located& located, const Transform<In, Camera>& pose) {
   const auto& p = pose.translation_m;
   return fmt::format(
-      "\n[[pose]]\nname = {}\n# {} corners, {:.3f} px RMS; 95 % of the board in the camera: {}\nposition_m = [{:.6f}, {:.6f}, "
+      "\n[[pose]]\nname = {}\n# {} corners, {:.3f} px RMS; 95 % of the board in the camera: {}\nposition_m = "
+      "[{:.6f}, {:.6f}, "
       "{:.6f}]\nrotation_wxyz = [{:.8f}]\n",
       settings::toToml(located.name), located.board.corners, located.board.rms_px,
-      uncertaintyInWords(located.board.camera_from_board.covariance, located.board.camera_from_board.degrees), p.x, p.y, p.z,
-      fmt::join(pose.rotation_wxyz, ", "));
+      uncertaintyInWords(located.board.camera_from_board.covariance, located.board.camera_from_board.degrees),
+      p.x, p.y, p.z, fmt::join(pose.rotation_wxyz, ", "));
 }
 
 Result<HandEye> handEyeFrom(const Options& options, const std::vector<Located>& all,
@@ -82,9 +85,10 @@ Result<HandEye> handEyeFrom(const Options& options, const std::vector<Located>& 
   const auto poses = compare::loadPoses(options.rig);
   if (!poses) return poses.error();
   if (poses->size() != all.size()) {
-    return Error{Error::Code::InvalidArgument,
-                 fmt::format("{} has {} poses of the rig, but there are {} images: one for each, in their order", options.rig,
-                             poses->size(), all.size())};
+    return Error{
+        Error::Code::InvalidArgument,
+        fmt::format("{} has {} poses of the rig, but there are {} images: one for each, in their order",
+                    options.rig, poses->size(), all.size())};
   }
   std::vector<HandEyeView> views;
   for (std::size_t i = 0; i < all.size(); ++i) {
@@ -115,10 +119,12 @@ Result<Exit> act(const Options& options) {
   if (!lens) return lens.error();
   const auto all = locateAll(options, *target, calibration::cameraOf(lens->lens));
   if (!all) return all.error();
-  std::string file = options.rig.empty()
-                         ? "# Where a camera stood, by toftwin locate. The world is the board: its origin is the first inner corner, x runs "
-                           "along\n# its columns, y along its rows, z away from the camera.\n"
-                         : "# Where a camera stood, by toftwin locate: the rig's poses and the camera's place on it.\n";
+  std::string file =
+      options.rig.empty()
+          ? "# Where a camera stood, by toftwin locate. The world is the board: its origin is the first "
+            "inner corner, x runs "
+            "along\n# its columns, y along its rows, z away from the camera.\n"
+          : "# Where a camera stood, by toftwin locate: the rig's poses and the camera's place on it.\n";
   if (options.rig.empty()) {
     for (const Located& one : *all) file += entryOf(one, one.board.camera_from_board.pose.inverse());
   } else {
@@ -126,7 +132,8 @@ Result<Exit> act(const Options& options) {
     const auto known = handEyeFrom(options, *all, stands);
     if (!known) return known.error();
     fmt::print("{}", textOf(*known));
-    for (std::size_t i = 0; i < all->size(); ++i) file += entryOf((*all)[i], worldFromCamera(*known, stands[i]));
+    for (std::size_t i = 0; i < all->size(); ++i)
+      file += entryOf((*all)[i], worldFromCamera(*known, stands[i]));
   }
   if (auto written = writeWhole(options.output, file); !written) return written.error();
   fmt::print("{}: {} poses\n", options.output, all->size());
@@ -135,15 +142,23 @@ Result<Exit> act(const Options& options) {
 
 Run add(Arguments& args) {
   const auto options = std::make_shared<Options>();
-  args.option("IMAGES", options->images, "grey images or recordings (FILE.mcap, FILE.mcap#SOURCE), whose amplitude is taken").required();
+  args.option("IMAGES", options->images,
+              "grey images or recordings (FILE.mcap, FILE.mcap#SOURCE), whose amplitude is taken")
+      .required();
   args.option("--board", options->board, "inner corners as COLSxROWS: 8x5 for 9 × 6 squares").required();
   args.option("--square", options->square_mm, "side of a square, mm").required().within(0.1, 10'000.0);
-  args.option("--marker", options->marker_mm, "side of a ChArUco board's markers, mm; 0: a checkerboard").within(0.0, 10'000.0);
-  args.option("--dictionary", options->dictionary, "of the markers, as OpenCV names it; AprilTags: DICT_APRILTAG_36h11").showsDefault();
+  args.option("--marker", options->marker_mm, "side of a ChArUco board's markers, mm; 0: a checkerboard")
+      .within(0.0, 10'000.0);
+  args.option("--dictionary", options->dictionary,
+              "of the markers, as OpenCV names it; AprilTags: DICT_APRILTAG_36h11")
+      .showsDefault();
   args.option("--calibration", options->calibration, "the lens: a file of toftwin calibrate").required();
   args.option("--rig", options->rig,
-              "pose file with where the rig stood in each image: gives the camera's place on the rig and poses in the rig's world");
-  args.option("--every", options->every, "of a recording, every n-th frame").within(1, 1'000'000).showsDefault();
+              "pose file with where the rig stood in each image: gives the camera's place on the rig and "
+              "poses in the rig's world");
+  args.option("--every", options->every, "of a recording, every n-th frame")
+      .within(1, 1'000'000)
+      .showsDefault();
   args.option("-o,--output", options->output, "pose file").required();
   return [options] { return act(*options); };
 }
@@ -153,7 +168,8 @@ Run add(Arguments& args) {
 Command locateCommand() {
   return {"locate", "where a camera stood, from a board that it saw: a pose file",
           "  toftwin locate shots/*.png --board 8x5 --square 32 --calibration lens.toml -o poses.toml\n"
-          "  toftwin locate shots/*.png --board 8x5 --square 32 --calibration lens.toml --rig rig.toml -o poses.toml\n",
+          "  toftwin locate shots/*.png --board 8x5 --square 32 --calibration lens.toml --rig rig.toml -o "
+          "poses.toml\n",
           add};
 }
 

@@ -28,14 +28,16 @@ Result<Exit> act(const Options& options) {
   if (options.repeats > 0) use->spec.repeats = options.repeats;
   if (options.frames > 0) use->spec.frames = options.frames;
   if (options.is_check) {
-    fmt::print("{}: {} cameras, {} requirements, {} poses, {} lightings; nothing is wrong with it\n", options.file,
-               use->spec.cameras.size(), use->spec.requirements.size(), use->spec.poses.size(), use->spec.lightings.size());
+    fmt::print("{}: {} cameras, {} requirements, {} poses, {} lightings; nothing is wrong with it\n",
+               options.file, use->spec.cameras.size(), use->spec.requirements.size(), use->spec.poses.size(),
+               use->spec.lightings.size());
     return Exit::Ok;
   }
   catchInterrupts();
   compare::Progress progress{stderr};
   const auto judged = suit::judge(
-      *use, {.only = options.only, .find_spoilers = !options.no_causes, .interrupted = interrupted}, progress);
+      *use, {.only = options.only, .find_spoilers = !options.no_causes, .interrupted = interrupted},
+      progress);
   if (!judged) return judged.error();
   const auto page = suit::writeSuit(*judged, options.output, options.note);
   if (!page) return page.error();
@@ -48,10 +50,12 @@ Run add(Arguments& args) {
   args.option("FILE", options->file, "use case: scene, poses, lighting and what is required").required();
   args.option("-o,--output", options->output, "folder for the report and report.json").showsDefault();
   args.option("--camera", options->only, "names of cameras to judge, instead of all").separatedBy(',');
-  args.option("--samples-per-pixel", options->samples_per_pixel, "instead of the file's: light paths").within(1, 65'536);
+  args.option("--samples-per-pixel", options->samples_per_pixel, "instead of the file's: light paths")
+      .within(1, 65'536);
   args.option("--repeats", options->repeats, "instead of the file's: independent simulations").within(2, 100);
   args.option("--frames", options->frames, "instead of the file's: frames at each pose").within(2, 10'000);
-  args.flag("--no-causes", options->no_causes, "do not look for what spoils a failure, which takes a third of the time");
+  args.flag("--no-causes", options->no_causes,
+            "do not look for what spoils a failure, which takes a third of the time");
   args.flag("--check", options->is_check, "read the file and what it names, and simulate nothing");
   args.option("--note", options->note, "for the report's foot, such as a commit");
   return [options] { return act(*options); };

@@ -45,17 +45,25 @@ Traits harmonicTraits(Column distance_m, Column error_mm, std::span<const double
     return sum;
   };
   const auto fit = fitLeastSquares(model, e, std::vector<double>(2 + 2 * waves.size(), 0.0));
-  if (!fit) return undetermined("harmonics", "the distances span too little of a period, or two orders coincide");
+  if (!fit)
+    return undetermined("harmonics", "the distances span too little of a period, or two orders coincide");
   std::vector<Trait> traits;
   for (std::size_t w = 0; w < waves.size(); ++w) {
-    // At a zero amplitude the direction has no derivative: a small number keeps it finite, and the interval ends at 0.
-    Trait one = fit->trait(waves[w].name, "mm", [w](std::span<const double> p) { return std::hypot(p[2 + 2 * w], p[3 + 2 * w]); });
+    // At a zero amplitude the direction has no derivative: a small number keeps it finite, and the interval
+    // ends at 0.
+    Trait one = fit->trait(waves[w].name, "mm",
+                           [w](std::span<const double> p) { return std::hypot(p[2 + 2 * w], p[3 + 2 * w]); });
     one.low = std::max(0.0, one.low);
     traits.push_back(std::move(one));
   }
   traits.push_back(fit->trait("scale", "mm/m", 1));
   const double sd = std::sqrt(fit->squares / fit->degrees), half = 1.96 / std::sqrt(2.0 * fit->degrees);
-  traits.push_back({.name = "residual", .unit = "mm", .value = sd, .low = sd * std::exp(-half), .high = sd * std::exp(half), .n = fit->n});
+  traits.push_back({.name = "residual",
+                    .unit = "mm",
+                    .value = sd,
+                    .low = sd * std::exp(-half),
+                    .high = sd * std::exp(half),
+                    .n = fit->n});
   return traits;
 }
 
@@ -64,7 +72,8 @@ Traits wrapTraits(Column error_m, double period_m) {
   const auto rows = finiteRows({error_m}, 1, "wraps");
   if (!rows) return rows.error();
   const auto& errors = rows->front();
-  const auto wrapped = std::ranges::count_if(errors, [&](double e) { return std::round(e / period_m) != 0.0; });
+  const auto wrapped =
+      std::ranges::count_if(errors, [&](double e) { return std::round(e / period_m) != 0.0; });
   return std::vector{shareTrait("wrapped", static_cast<std::size_t>(wrapped), errors.size())};
 }
 

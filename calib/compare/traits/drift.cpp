@@ -11,7 +11,8 @@ namespace {
 
 constexpr const char* kName = "drift";
 
-/// A model of the series, ready to be fitted. Times are relative to the series' length, so that numbers are of order 1.
+/// A model of the series, ready to be fitted. Times are relative to the series' length, so that numbers are
+/// of order 1.
 struct Candidate {
   DriftModel kind = DriftModel::Constant;
   Model model{};
@@ -33,14 +34,19 @@ double decay(double t, double log_tau) { return std::exp(-t / std::exp(log_tau))
 
 Candidate oneExponential(Column t) {
   Candidate one{DriftModel::OneExponential,
-                [t](Row p, std::size_t i) { return p[0] + p[1] * decay(t[i], p[2]); }, {}, 3.0};
+                [t](Row p, std::size_t i) { return p[0] + p[1] * decay(t[i], p[2]); },
+                {},
+                3.0};
   for (const double tau : {0.03, 0.1, 0.3, 1.0}) one.starts.push_back({0.0, 1.0, std::log(tau)});
   return one;
 }
 
 Candidate twoExponentials(Column t) {
-  Candidate two{DriftModel::TwoExponentials,
-                [t](Row p, std::size_t i) { return p[0] + p[1] * decay(t[i], p[2]) + p[3] * decay(t[i], p[4]); }, {}, 5.0};
+  Candidate two{
+      DriftModel::TwoExponentials,
+      [t](Row p, std::size_t i) { return p[0] + p[1] * decay(t[i], p[2]) + p[3] * decay(t[i], p[4]); },
+      {},
+      5.0};
   for (const auto& [fast, slow] : {std::pair{0.03, 0.3}, {0.1, 0.5}, {0.05, 1.0}})
     two.starts.push_back({0.0, 1.0, std::log(fast), 0.5, std::log(slow)});
   return two;
@@ -62,7 +68,10 @@ Candidate step(Column t, Column y) {
     }
   }
   const double place = 0.5 * (t[at - 1] + t[at]);
-  return {DriftModel::Step, [t, place](Row p, std::size_t i) { return p[0] + (t[i] > place ? p[1] : 0.0); }, {{0.0, 0.0}}, 4.0};
+  return {DriftModel::Step,
+          [t, place](Row p, std::size_t i) { return p[0] + (t[i] > place ? p[1] : 0.0); },
+          {{0.0, 0.0}},
+          4.0};
 }
 
 std::optional<Fit> bestFit(const Candidate& candidate, Column y) {
@@ -76,7 +85,8 @@ std::optional<Fit> bestFit(const Candidate& candidate, Column y) {
 
 /// Exponentials that are over before the second row or outlast the series twenty times are none.
 bool isPlausible(const Candidate& candidate, const Fit& fit, Column t) {
-  if (candidate.kind != DriftModel::OneExponential && candidate.kind != DriftModel::TwoExponentials) return true;
+  if (candidate.kind != DriftModel::OneExponential && candidate.kind != DriftModel::TwoExponentials)
+    return true;
   for (std::size_t k = 2; k < fit.at.size(); k += 2) {
     const double tau = std::exp(fit.at[k]);
     if (!(tau > t[1] - t[0]) || !(tau < 20.0)) return false;
@@ -113,15 +123,18 @@ Result<DriftTraits> driftTraits(Column time_s, Column value_mm) {
   const double n = static_cast<double>(y.size());
   const std::array candidates{constant(), ramp(t), oneExponential(t), twoExponentials(t), step(t, y)};
   double least = std::numeric_limits<double>::infinity(), rho = 0.0;
-  // Errors that go on look like structure: what they are is taken from the richest model, which leaves the least of it.
-  if (const auto rich = bestFit(candidates[3], y)) rho = correlationOfResiduals(candidates[3].model, y, *rich);
+  // Errors that go on look like structure: what they are is taken from the richest model, which leaves the
+  // least of it.
+  if (const auto rich = bestFit(candidates[3], y))
+    rho = correlationOfResiduals(candidates[3].model, y, *rich);
   const double effective = n * (1.0 - rho) / (1.0 + rho);
   const Candidate* chosen = nullptr;
   std::optional<Fit> fit;
   for (const Candidate& candidate : candidates) {
     auto tried = bestFit(candidate, y);
     if (!tried || !isPlausible(candidate, *tried, t)) continue;
-    const double bic = effective * std::log(std::max(tried->squares, 1e-18 * n) / n) + candidate.cost * std::log(effective);
+    const double bic =
+        effective * std::log(std::max(tried->squares, 1e-18 * n) / n) + candidate.cost * std::log(effective);
     if (bic >= least) continue;
     least = bic;
     chosen = &candidate;

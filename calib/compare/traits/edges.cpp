@@ -23,7 +23,8 @@ std::optional<Step> stepAt(const Image<float>& range, int x, int y) {
   const double left = at(range, x - 2, y), right = at(range, x + 2, y);
   const double step = std::abs(right - left);
   if (!(step > kJump * std::min(left, right))) return std::nullopt;
-  const bool is_flat = std::abs(at(range, x - 3, y) - left) < 0.2 * step && std::abs(at(range, x + 3, y) - right) < 0.2 * step;
+  const bool is_flat =
+      std::abs(at(range, x - 3, y) - left) < 0.2 * step && std::abs(at(range, x + 3, y) - right) < 0.2 * step;
   return is_flat ? std::optional{Step{left, right}} : std::nullopt;
 }
 
@@ -55,7 +56,8 @@ Traits flyingTraits(const Image<float>& range_m) {
       offsets.push_back(offset);
     }
   }
-  if (crossings < 4) return undetermined("flying pixels", "fewer than four rows cross an edge between two surfaces");
+  if (crossings < 4)
+    return undetermined("flying pixels", "fewer than four rows cross an edge between two surfaces");
   return std::vector{shareTrait("flying", flying, crossings), meanTrait("offset", "1", offsets),
                      shareTrait("near side", near_side, std::max<std::size_t>(1, flying))};
 }
@@ -71,7 +73,7 @@ Traits edgeTraits(Column x_px, Column value) {
   };
   double left = 0.0, right = 0.0, left_count = 0.0, right_count = 0.0;
   for (std::size_t i = 0; i < x.size(); ++i) {
-    const bool is_left = x[i] < low + 0.25 * (high - low), is_right = x[i] > high - 0.25 * (high - low);
+    const bool is_left = x[i]<low + 0.25 * (high - low), is_right = x[i]> high - 0.25 * (high - low);
     left += is_left ? v[i] : 0.0, left_count += is_left ? 1.0 : 0.0;
     right += is_right ? v[i] : 0.0, right_count += is_right ? 1.0 : 0.0;
   }
@@ -79,20 +81,28 @@ Traits edgeTraits(Column x_px, Column value) {
   std::optional<Fit> fit;
   for (const double place : {0.35, 0.5, 0.65}) {
     for (const double width : {0.02, 0.08, 0.2}) {
-      auto tried = fitLeastSquares(model, v, {left, right - left, low + place * (high - low), std::log(width * (high - low))});
+      auto tried = fitLeastSquares(
+          model, v, {left, right - left, low + place * (high - low), std::log(width * (high - low))});
       if (tried && (!fit || tried->squares < fit->squares)) fit = std::move(tried);
     }
   }
-  if (!fit) return undetermined("edge", "there is no step, or it is sharper than the places of the values tell");
+  if (!fit)
+    return undetermined("edge", "there is no step, or it is sharper than the places of the values tell");
   const Trait log_width = fit->trait("width", "px", 3);
   const auto scaled = [&](const char* name, const char* unit, double factor) {
-    return Trait{name, unit, factor * std::exp(log_width.value), factor * std::exp(log_width.low), factor * std::exp(log_width.high), log_width.n};
+    return Trait{name,
+                 unit,
+                 factor * std::exp(log_width.value),
+                 factor * std::exp(log_width.low),
+                 factor * std::exp(log_width.high),
+                 log_width.n};
   };
   // Contrast of a Gaussian blur: e^(−2π² w² f²) = 1/2.
   const double half = std::sqrt(0.5 * std::numbers::ln2) / std::numbers::pi;
-  return std::vector{fit->trait("edge", "px", 2), scaled("width", "px", 1.0), scaled("10-90 width", "px", 2.5631031310892),
-                     Trait{"resolution", "1/px", half / std::exp(log_width.value), half / std::exp(log_width.high),
-                           half / std::exp(log_width.low), log_width.n}};
+  return std::vector{fit->trait("edge", "px", 2), scaled("width", "px", 1.0),
+                     scaled("10-90 width", "px", 2.5631031310892),
+                     Trait{"resolution", "1/px", half / std::exp(log_width.value),
+                           half / std::exp(log_width.high), half / std::exp(log_width.low), log_width.n}};
 }
 
 Traits shadowTraits(const Image<float>& range_m, double split_m) {
@@ -113,8 +123,10 @@ Traits shadowTraits(const Image<float>& range_m, double split_m) {
     right.push_back(after - last - 1);
     difference.push_back(right.back() - left.back());
   }
-  if (left.size() < 4) return undetermined("emitter shadow", "fewer than four rows show an object before a background");
-  return std::vector{meanTrait("left", "px", left), meanTrait("right", "px", right), meanTrait("asymmetry", "px", difference)};
+  if (left.size() < 4)
+    return undetermined("emitter shadow", "fewer than four rows show an object before a background");
+  return std::vector{meanTrait("left", "px", left), meanTrait("right", "px", right),
+                     meanTrait("asymmetry", "px", difference)};
 }
 
 }  // namespace toftwin::compare

@@ -20,7 +20,8 @@ Traits lagTraits(Column frames_after, Column value) {
     auto tried = fitLeastSquares(model, y, {y.back(), y.front() - y.back(), lambda});
     if (tried && (!fit || tried->squares < fit->squares)) fit = std::move(tried);
   }
-  if (!fit || !(fit->at[2] > 0.0) || !(fit->at[2] < 1.0)) return undetermined("lag", "nothing dies away after the change");
+  if (!fit || !(fit->at[2] > 0.0) || !(fit->at[2] < 1.0))
+    return undetermined("lag", "nothing dies away after the change");
   return std::vector{fit->trait("lag", "1", 2), fit->trait("rest", "", 0)};
 }
 
@@ -36,14 +37,17 @@ double between(const std::vector<double>& t, const std::vector<double>& y, doubl
 }  // namespace
 
 Traits latencyTraits(Column time_s, Column measured, Column reference_time_s, Column reference) {
-  const auto rows = finiteRows({time_s, measured}, 6, "latency"), known = finiteRows({reference_time_s, reference}, 2, "latency's reference");
+  const auto rows = finiteRows({time_s, measured}, 6, "latency"),
+             known = finiteRows({reference_time_s, reference}, 2, "latency's reference");
   if (!rows) return rows.error();
   if (!known) return known.error();
   const auto &t = (*rows)[0], &y = (*rows)[1], &rt = (*known)[0], &ry = (*known)[1];
   for (std::size_t i = 1; i < rt.size(); ++i) {
     if (!(rt[i] > rt[i - 1])) return undetermined("latency", "the reference's times must ascend");
   }
-  const Model model = [&](std::span<const double> p, std::size_t i) { return between(rt, ry, t[i] - p[0]) + p[1]; };
+  const Model model = [&](std::span<const double> p, std::size_t i) {
+    return between(rt, ry, t[i] - p[0]) + p[1];
+  };
   // Motion that repeats itself has several best places: a coarse search finds the best of them.
   const double span = 0.25 * (rt.back() - rt.front());
   double best = 0.0, least = -1.0;

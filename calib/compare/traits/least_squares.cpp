@@ -17,7 +17,8 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// A step of a parameter for the numeric derivative: the cube root of the rounding, which balances it with curvature.
+/// A step of a parameter for the numeric derivative: the cube root of the rounding, which balances it with
+/// curvature.
 double stepOf(double parameter) { return 6e-6 * std::max(std::abs(parameter), 1e-3); }
 
 VectorXd residuals(const Model& model, Column y, std::span<const double> p) {
@@ -34,7 +35,8 @@ MatrixXd jacobian(const Model& model, std::size_t rows, std::vector<double> p) {
       p[k] = at + step;
       const double above = model(p, i);
       p[k] = at - step;
-      jacobian(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) = (above - model(p, i)) / (2.0 * step);
+      jacobian(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) =
+          (above - model(p, i)) / (2.0 * step);
     }
     p[k] = at;
   }
@@ -54,8 +56,8 @@ std::optional<MatrixXd> inverseOfNormal(const MatrixXd& j) {
   const MatrixXd unit = j * scale.cwiseInverse().asDiagonal();
   const Eigen::SelfAdjointEigenSolver<MatrixXd> solver{unit.transpose() * unit};
   if (solver.eigenvalues().minCoeff() < 1e-10) return std::nullopt;
-  const MatrixXd inverse =
-      solver.eigenvectors() * solver.eigenvalues().cwiseInverse().asDiagonal() * solver.eigenvectors().transpose();
+  const MatrixXd inverse = solver.eigenvectors() * solver.eigenvalues().cwiseInverse().asDiagonal() *
+                           solver.eigenvectors().transpose();
   return MatrixXd{scale.cwiseInverse().asDiagonal() * inverse * scale.cwiseInverse().asDiagonal()};
 }
 
@@ -68,10 +70,12 @@ double studentT(double degrees) {
 double Fit::error(std::size_t parameter) const { return std::sqrt(covariance[parameter * (at.size() + 1)]); }
 
 Trait Fit::trait(std::string name, std::string unit, std::size_t parameter, double scale) const {
-  return trait(std::move(name), std::move(unit), [=](std::span<const double> p) { return scale * p[parameter]; });
+  return trait(std::move(name), std::move(unit),
+               [=](std::span<const double> p) { return scale * p[parameter]; });
 }
 
-Trait Fit::trait(std::string name, std::string unit, const std::function<double(std::span<const double>)>& of) const {
+Trait Fit::trait(std::string name, std::string unit,
+                 const std::function<double(std::span<const double>)>& of) const {
   std::vector<double> p = at, gradient;
   for (std::size_t k = 0; k < p.size(); ++k) {
     const double step = stepOf(at[k]);
@@ -83,10 +87,16 @@ Trait Fit::trait(std::string name, std::string unit, const std::function<double(
   }
   double variance = 0.0;
   for (std::size_t a = 0; a < p.size(); ++a) {
-    for (std::size_t b = 0; b < p.size(); ++b) variance += gradient[a] * gradient[b] * covariance[a * p.size() + b];
+    for (std::size_t b = 0; b < p.size(); ++b)
+      variance += gradient[a] * gradient[b] * covariance[a * p.size() + b];
   }
   const double value = of(at), half = studentT(degrees) * std::sqrt(std::max(0.0, variance));
-  return {.name = std::move(name), .unit = std::move(unit), .value = value, .low = value - half, .high = value + half, .n = n};
+  return {.name = std::move(name),
+          .unit = std::move(unit),
+          .value = value,
+          .low = value - half,
+          .high = value + half,
+          .n = n};
 }
 
 void Fit::heedCorrelation(double rho) {
@@ -129,11 +139,15 @@ std::optional<Fit> fitLeastSquares(const Model& model, Column y, std::vector<dou
   }
   const auto inverse = inverseOfNormal(jacobian(model, y.size(), p));
   if (!inverse) return std::nullopt;
-  Fit fit{.at = p, .covariance = {}, .squares = r.squaredNorm(), .n = y.size(),
+  Fit fit{.at = p,
+          .covariance = {},
+          .squares = r.squaredNorm(),
+          .n = y.size(),
           .degrees = static_cast<double>(y.size() - p.size())};
   for (std::size_t a = 0; a < p.size(); ++a) {
     for (std::size_t b = 0; b < p.size(); ++b)
-      fit.covariance.push_back((*inverse)(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b)) * fit.squares / fit.degrees);
+      fit.covariance.push_back((*inverse)(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b)) *
+                               fit.squares / fit.degrees);
   }
   return fit;
 }
@@ -144,24 +158,33 @@ double correlationOfResiduals(const Model& model, Column y, const Fit& fit) {
   if (!(squares > 0.0)) return 0.0;
   const double rho = r.head(r.size() - 1).dot(r.tail(r.size() - 1)) / squares;
   const double n = static_cast<double>(y.size()), k = static_cast<double>(fit.at.size());
-  // Each parameter takes about 1/n of correlation away (M. G. Kendall, Biometrika 41 (1954) 403, for the mean).
+  // Each parameter takes about 1/n of correlation away (M. G. Kendall, Biometrika 41 (1954) 403, for the
+  // mean).
   const double corrected = rho + k * (1.0 + rho) / n;
   return corrected > 2.0 / std::sqrt(n) ? std::min(corrected, 0.95) : 0.0;
 }
 
 Trait meanTrait(std::string name, std::string unit, Column values, double scale) {
   const Summary summary = summarise(values);
-  const double half = summary.n < 2 ? std::nan("") : studentT(static_cast<double>(summary.n - 1)) * summary.standard_error;
-  return {.name = std::move(name), .unit = std::move(unit), .value = scale * summary.mean,
-          .low = scale * (summary.mean - half), .high = scale * (summary.mean + half), .n = summary.n};
+  const double half =
+      summary.n < 2 ? std::nan("") : studentT(static_cast<double>(summary.n - 1)) * summary.standard_error;
+  return {.name = std::move(name),
+          .unit = std::move(unit),
+          .value = scale * summary.mean,
+          .low = scale * (summary.mean - half),
+          .high = scale * (summary.mean + half),
+          .n = summary.n};
 }
 
 Trait shareTrait(std::string name, std::size_t k, std::size_t n) {
   using Beta = boost::math::beta_distribution<>;
   const double events = static_cast<double>(k), others = static_cast<double>(n - k);
-  return {.name = std::move(name), .unit = "1", .value = n == 0 ? std::nan("") : events / static_cast<double>(n),
+  return {.name = std::move(name),
+          .unit = "1",
+          .value = n == 0 ? std::nan("") : events / static_cast<double>(n),
           .low = k == 0 ? 0.0 : boost::math::quantile(Beta{events + 0.5, others + 0.5}, 0.025),
-          .high = k == n ? 1.0 : boost::math::quantile(Beta{events + 0.5, others + 0.5}, 0.975), .n = n};
+          .high = k == n ? 1.0 : boost::math::quantile(Beta{events + 0.5, others + 0.5}, 0.975),
+          .n = n};
 }
 
 Result<std::vector<std::vector<double>>> finiteRows(std::initializer_list<Column> columns, std::size_t least,
@@ -169,7 +192,8 @@ Result<std::vector<std::vector<double>>> finiteRows(std::initializer_list<Column
   const std::size_t rows = columns.begin()->size();
   for (const Column& column : columns) {
     if (column.size() != rows)
-      return Error{Error::Code::InvalidArgument, fmt::format("{}: one column has {} rows, another {}", of_what, rows, column.size())};
+      return Error{Error::Code::InvalidArgument,
+                   fmt::format("{}: one column has {} rows, another {}", of_what, rows, column.size())};
   }
   std::vector<std::vector<double>> kept(columns.size());
   for (std::size_t i = 0; i < rows; ++i) {
@@ -182,8 +206,8 @@ Result<std::vector<std::vector<double>>> finiteRows(std::initializer_list<Column
     }
   }
   if (kept.front().size() < least) {
-    return Error{Error::Code::InvalidArgument, fmt::format("{}: {} of {} rows are finite, and it takes {}", of_what,
-                                                           kept.front().size(), rows, least)};
+    return Error{Error::Code::InvalidArgument, fmt::format("{}: {} of {} rows are finite, and it takes {}",
+                                                           of_what, kept.front().size(), rows, least)};
   }
   return kept;
 }

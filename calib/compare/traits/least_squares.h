@@ -25,29 +25,33 @@ struct Fit {
 
   [[nodiscard]] double error(std::size_t parameter) const;
   /// Of a parameter, or of any function of them (delta method), with Student's quantile.
-  [[nodiscard]] Trait trait(std::string name, std::string unit, std::size_t parameter, double scale = 1.0) const;
+  [[nodiscard]] Trait trait(std::string name, std::string unit, std::size_t parameter,
+                            double scale = 1.0) const;
   [[nodiscard]] Trait trait(std::string name, std::string unit,
                             const std::function<double(std::span<const double>)>& of) const;
-  /// Successive rows that err alike, residuals with correlation ρ from one to the next, leave n (1 − ρ)/(1 + ρ)
-  /// independent ones (G. V. Bayley, J. M. Hammersley, J. R. Stat. Soc. Suppl. 8 (1946) 184).
+  /// Successive rows that err alike, residuals with correlation ρ from one to the next, leave n (1 − ρ)/(1 +
+  /// ρ) independent ones (G. V. Bayley, J. M. Hammersley, J. R. Stat. Soc. Suppl. 8 (1946) 184).
   void heedCorrelation(double rho);
 };
 
-/// Levenberg and Marquardt with a numeric Jacobian. Nothing if it does not converge, if n ≤ k, or if the rows leave a
-/// parameter undetermined.
+/// Levenberg and Marquardt with a numeric Jacobian. Nothing if it does not converge, if n ≤ k, or if the rows
+/// leave a parameter undetermined.
 std::optional<Fit> fitLeastSquares(const Model& model, Column y, std::vector<double> start);
-/// Correlation of successive residuals, corrected for the k parameters that were fitted; 0 unless it is above 2/√n.
+/// Correlation of successive residuals, corrected for the k parameters that were fitted; 0 unless it is above
+/// 2/√n.
 double correlationOfResiduals(const Model& model, Column y, const Fit& fit);
 
 /// Student's 97.5 % quantile.
 double studentT(double degrees);
 /// Mean of independent values with its interval.
 Trait meanTrait(std::string name, std::string unit, Column values, double scale = 1.0);
-/// Share k of n independent trials, Jeffreys' interval (L. D. Brown, T. T. Cai, A. DasGupta, Stat. Sci. 16 (2001) 101):
-/// it holds 95 % on average over shares, where Clopper and Pearson's holds at least that and 98 % of small ones.
+/// Share k of n independent trials, Jeffreys' interval (L. D. Brown, T. T. Cai, A. DasGupta, Stat. Sci. 16
+/// (2001) 101): it holds 95 % on average over shares, where Clopper and Pearson's holds at least that and 98
+/// % of small ones.
 Trait shareTrait(std::string name, std::size_t k, std::size_t n);
 
-/// Rows of several columns in which all are finite; Error if the columns differ in length or fewer than `least` are left.
+/// Rows of several columns in which all are finite; Error if the columns differ in length or fewer than
+/// `least` are left.
 Result<std::vector<std::vector<double>>> finiteRows(std::initializer_list<Column> columns, std::size_t least,
                                                     const char* of_what);
 /// "it cannot be told from these rows", for what a fit did not give.

@@ -13,11 +13,14 @@ namespace toftwin::compare {
 
 Traits maskTraits(std::span<const Image<std::uint8_t>> a, std::span<const Image<std::uint8_t>> b) {
   if (a.size() != b.size() || a.size() < 2)
-    return Error{Error::Code::InvalidArgument, fmt::format("mask agreement: {} masks of A and {} of B; it takes two pairs", a.size(), b.size())};
+    return Error{
+        Error::Code::InvalidArgument,
+        fmt::format("mask agreement: {} masks of A and {} of B; it takes two pairs", a.size(), b.size())};
   std::vector<double> agreement, overlap, kappa;
   for (std::size_t pair = 0; pair < a.size(); ++pair) {
     if (a[pair].size() != b[pair].size() || a[pair].empty())
-      return Error{Error::Code::InvalidArgument, fmt::format("mask agreement: pair {} is of different sizes", pair + 1)};
+      return Error{Error::Code::InvalidArgument,
+                   fmt::format("mask agreement: pair {} is of different sizes", pair + 1)};
     double both = 0.0, only_a = 0.0, only_b = 0.0;
     const double n = static_cast<double>(a[pair].size());
     for (std::size_t i = 0; i < a[pair].size(); ++i) {
@@ -26,7 +29,8 @@ Traits maskTraits(std::span<const Image<std::uint8_t>> a, std::span<const Image<
       only_a += in_a && !in_b ? 1.0 : 0.0;
       only_b += in_b && !in_a ? 1.0 : 0.0;
     }
-    const double agree = 1.0 - (only_a + only_b) / n, share_a = (both + only_a) / n, share_b = (both + only_b) / n;
+    const double agree = 1.0 - (only_a + only_b) / n, share_a = (both + only_a) / n,
+                 share_b = (both + only_b) / n;
     // What two masks of these sizes agree by chance (J. Cohen, Educ. Psychol. Meas. 20 (1960) 37).
     const double chance = share_a * share_b + (1.0 - share_a) * (1.0 - share_b);
     agreement.push_back(agree);
@@ -44,7 +48,8 @@ Traits timingTraits(Column start_s) {
   const auto& starts = rows->front();
   std::vector<double> intervals;
   for (std::size_t i = 1; i < starts.size(); ++i) intervals.push_back(starts[i] - starts[i - 1]);
-  if (std::ranges::min(intervals) <= 0.0) return undetermined("frame timing", "frames must start one after the other");
+  if (std::ranges::min(intervals) <= 0.0)
+    return undetermined("frame timing", "frames must start one after the other");
   const double usual = quantile(intervals, 0.5);
   std::vector<double> whole;
   std::size_t lost = 0;
@@ -56,10 +61,12 @@ Traits timingTraits(Column start_s) {
   const Summary summary = summarise(whole);
   const double degrees = static_cast<double>(summary.n - 1);
   const boost::math::chi_squared spread{std::max(1.0, degrees)};
-  Trait jitter{.name = "jitter", .unit = "ms", .value = 1e3 * summary.sd, .low = 0.0, .high = 0.0, .n = summary.n};
+  Trait jitter{
+      .name = "jitter", .unit = "ms", .value = 1e3 * summary.sd, .low = 0.0, .high = 0.0, .n = summary.n};
   jitter.low = jitter.value * std::sqrt(degrees / boost::math::quantile(spread, 0.975));
   jitter.high = jitter.value * std::sqrt(degrees / boost::math::quantile(spread, 0.025));
-  return std::vector{meanTrait("interval", "ms", whole, 1e3), jitter, shareTrait("lost", lost, starts.size() + lost)};
+  return std::vector{meanTrait("interval", "ms", whole, 1e3), jitter,
+                     shareTrait("lost", lost, starts.size() + lost)};
 }
 
 }  // namespace toftwin::compare

@@ -14,8 +14,11 @@ Traits cornerTraits(Column distance_to_edge_m, Column error_mm) {
   if (!rows) return rows.error();
   const auto &x = (*rows)[0], &e = (*rows)[1];
   const double reach = std::ranges::max(x);
-  if (!(reach > 0.0) || std::ranges::min(x) < 0.0) return undetermined("corner", "distances to the edge must not be negative");
-  const Model model = [&](std::span<const double> p, std::size_t i) { return p[0] + p[1] * std::exp(-x[i] / (reach * std::exp(p[2]))); };
+  if (!(reach > 0.0) || std::ranges::min(x) < 0.0)
+    return undetermined("corner", "distances to the edge must not be negative");
+  const Model model = [&](std::span<const double> p, std::size_t i) {
+    return p[0] + p[1] * std::exp(-x[i] / (reach * std::exp(p[2])));
+  };
   std::optional<Fit> fit;
   for (const double share : {0.1, 0.3, 1.0}) {
     auto tried = fitLeastSquares(model, e, {0.0, 1.0, std::log(share)});
@@ -27,7 +30,8 @@ Traits cornerTraits(Column distance_to_edge_m, Column error_mm) {
   return std::vector{fit->trait("at the edge", "mm", 1), length, fit->trait("far from it", "mm", 0)};
 }
 
-Traits scatterTraits(Column own_range_m, Column plate_range_m, Column plate_over_own, Column error_mm, double frequency_hz) {
+Traits scatterTraits(Column own_range_m, Column plate_range_m, Column plate_over_own, Column error_mm,
+                     double frequency_hz) {
   const auto rows = finiteRows({own_range_m, plate_range_m, plate_over_own, error_mm}, 3, "lens scatter");
   if (!rows) return rows.error();
   if (!(frequency_hz > 0.0)) return undetermined("lens scatter", "the modulation frequency must be positive");

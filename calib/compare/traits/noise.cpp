@@ -16,7 +16,7 @@ constexpr int kBlocks = 4;  ///< along each side
 
 /// Sums over the pixels of one block.
 struct Block {
-  double squares = 0.0, count = 0.0;          ///< of residuals from each pixel's mean
+  double squares = 0.0, count = 0.0;  ///< of residuals from each pixel's mean
   double along_x = 0.0, along_x_squares = 0.0, along_y = 0.0, along_y_squares = 0.0, in_time = 0.0;
   Running means{};
 };
@@ -27,7 +27,8 @@ struct Residuals {
 };
 
 Residuals residualsOf(std::span<const Image<float>> frames) {
-  Residuals r{.frames = {frames.begin(), frames.end()}, .mean = Image<float>(frames[0].width(), frames[0].height())};
+  Residuals r{.frames = {frames.begin(), frames.end()},
+              .mean = Image<float>(frames[0].width(), frames[0].height())};
   const auto n = static_cast<double>(frames.size());
   for (std::size_t i = 0; i < r.mean.size(); ++i) {
     double sum = 0.0;
@@ -71,7 +72,8 @@ double varianceOfMean(double rho, double n) {
 }
 
 /// What Σ eₜ eₜ₊₁ / Σ eₜ² is on the mean for residuals from the mean of n such values:
-///   ( (n − 1) ρ − (n + 1) v + 2 c ) / ( n − n v ),   c = (1 − ρⁿ) / (n (1 − ρ)), the first value's covariance with the mean
+///   ( (n − 1) ρ − (n + 1) v + 2 c ) / ( n − n v ),   c = (1 − ρⁿ) / (n (1 − ρ)), the first value's
+///   covariance with the mean
 double expectedRatio(double rho, double n) {
   const double v = varianceOfMean(rho, n), c = (1.0 - std::pow(rho, n)) / (n * (1.0 - rho));
   return ((n - 1.0) * rho - (n + 1.0) * v + 2.0 * c) / (n - n * v);
@@ -97,7 +99,9 @@ Trait rootTrait(const char* name, Column squares) {
 }  // namespace
 
 Traits noiseTraits(std::span<const Image<float>> frames_mm) {
-  const auto refuse = [](std::string why) { return Error{Error::Code::InvalidArgument, "noise: " + std::move(why)}; };
+  const auto refuse = [](std::string why) {
+    return Error{Error::Code::InvalidArgument, "noise: " + std::move(why)};
+  };
   if (frames_mm.size() < 8) return refuse(fmt::format("{} frames; it takes eight", frames_mm.size()));
   const int width = frames_mm[0].width(), height = frames_mm[0].height();
   for (const auto& frame : frames_mm) {
@@ -128,7 +132,8 @@ Traits noiseTraits(std::span<const Image<float>> frames_mm) {
   }
   if (temporal.size() < 4) return refuse("fewer than four of 16 blocks of the image are valid and noisy");
   return std::vector{rootTrait("temporal noise", temporal), rootTrait("fixed pattern", fixed),
-                     meanTrait("correlation along x", "1", along_x), meanTrait("correlation along y", "1", along_y),
+                     meanTrait("correlation along x", "1", along_x),
+                     meanTrait("correlation along y", "1", along_y),
                      meanTrait("correlation in time", "1", in_time)};
 }
 

@@ -24,7 +24,8 @@ Traits noiseLawTraits(Column signal, Column sigma_mm) {
   std::optional<Fit> fit;
   for (const double share : {1.0, 0.1, 0.01}) {
     const double floor = std::log(0.6 * least_sigma);
-    auto tried = fitLeastSquares(model, log_sigma, {floor, floor + 0.5 * std::log(share), floor + std::log(share)});
+    auto tried =
+        fitLeastSquares(model, log_sigma, {floor, floor + 0.5 * std::log(share), floor + std::log(share)});
     if (tried && (!fit || tried->squares < fit->squares)) fit = std::move(tried);
   }
   if (!fit) return undetermined("noise law", "a part of it does not show in this range of signals");

@@ -10,7 +10,8 @@ namespace {
 
 /// y = p₀ + p₁ x.
 std::optional<Fit> line(const std::vector<double>& x, const std::vector<double>& y) {
-  return fitLeastSquares([&](std::span<const double> p, std::size_t i) { return p[0] + p[1] * x[i]; }, y, {0.0, 0.0});
+  return fitLeastSquares([&](std::span<const double> p, std::size_t i) { return p[0] + p[1] * x[i]; }, y,
+                         {0.0, 0.0});
 }
 
 }  // namespace
@@ -19,7 +20,8 @@ Traits amplitudeTraits(Column amplitude, Column error_mm) {
   auto rows = finiteRows({amplitude, error_mm}, 4, "amplitude-related error");
   if (!rows) return rows.error();
   auto& x = (*rows)[0];
-  if (std::ranges::min(x) <= 0.0) return undetermined("amplitude-related error", "amplitudes must be positive");
+  if (std::ranges::min(x) <= 0.0)
+    return undetermined("amplitude-related error", "amplitudes must be positive");
   for (double& one : x) one = std::log10(one);
   const auto fit = line(x, (*rows)[1]);
   if (!fit) return undetermined("amplitude-related error", "all amplitudes are alike");

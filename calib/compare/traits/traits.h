@@ -9,10 +9,10 @@
 #include <toftwin/image.h>
 #include <toftwin/result.h>
 
-/// Characteristics of a camera's errors from series, tables and frames, each with the interval that holds it with
-/// 95 %. docs/characteristics.md has the formulas, their sources, and how often the intervals held. Columns of one
-/// table are of equal length; rows with a value that is not finite are left out. Error InvalidArgument: too few rows,
-/// or rows that cannot tell it.
+/// Characteristics of a camera's errors from series, tables and frames, each with the interval that holds it
+/// with 95 %. docs/characteristics.md has the formulas, their sources, and how often the intervals held.
+/// Columns of one table are of equal length; rows with a value that is not finite are left out. Error
+/// InvalidArgument: too few rows, or rows that cannot tell it.
 namespace toftwin::compare {
 
 /// One number of a characteristic.
@@ -28,18 +28,20 @@ using Column = std::span<const double>;
 enum class DriftModel { Constant, Ramp, OneExponential, TwoExponentials, Step };
 struct DriftTraits {
   DriftModel model = DriftModel::Constant;
-  /// "drift" (last minus first; of a constant, what a ramp could hide), and of the model "time constant", "slope",
-  /// "step"
+  /// "drift" (last minus first; of a constant, what a ramp could hide), and of the model "time constant",
+  /// "slope", "step"
   std::vector<Trait> traits{};
 };
-/// value(t): constant; + s t; + Σ aᵢ e^(−t/τᵢ); + h (t > t₀). Errors that go on from row to row widen the intervals.
+/// value(t): constant; + s t; + Σ aᵢ e^(−t/τᵢ); + h (t > t₀). Errors that go on from row to row widen the
+/// intervals.
 Result<DriftTraits> driftTraits(Column time_s, Column value_mm);
 
 /// error(d) = c + s d + Σ aₖ cos 2πk·2fd/c + bₖ sin …: "f MHz, k per period": √(a² + b²), and "residual".
 Traits harmonicTraits(Column distance_m, Column error_mm, std::span<const double> frequency_hz,
                       std::span<const int> orders);
 
-/// σ(I) = √(a² + b²/I + c²/I²) in ln σ, I relative to the largest: "floor" a, "shot" b, "read" c at that signal.
+/// σ(I) = √(a² + b²/I + c²/I²) in ln σ, I relative to the largest: "floor" a, "shot" b, "read" c at that
+/// signal.
 Traits noiseLawTraits(Column signal, Column sigma_mm);
 
 /// Range is off by a whole number of periods: "wrapped" share.
@@ -48,21 +50,21 @@ Traits wrapTraits(Column error_m, double period_m);
 /// error(x) = c + A e^(−x/L), x from the corner's edge: "at the edge" A, "reach" L, "far from it" c.
 Traits cornerTraits(Column distance_to_edge_m, Column error_mm);
 
-/// A veil that adds the share s of a plate's light: error = arg(1 + s q e^(−iΔφ)) / −Δφ per metre …: "veil" s.
-/// `plate_over_own`: the plate's light over the pixel's own.
+/// A veil that adds the share s of a plate's light: error = arg(1 + s q e^(−iΔφ)) / −Δφ per metre …: "veil"
+/// s. `plate_over_own`: the plate's light over the pixel's own.
 Traits scatterTraits(Column own_range_m, Column plate_range_m, Column plate_over_own, Column error_mm,
                      double frequency_hz);
 
-/// Of steps in the rows of one image: "flying" share of the crossings with a pixel in between, "offset" where it hangs
-/// from near (0) to far (1), "near side" share of those nearer to the foreground.
+/// Of steps in the rows of one image: "flying" share of the crossings with a pixel in between, "offset" where
+/// it hangs from near (0) to far (1), "near side" share of those nearer to the foreground.
 Traits flyingTraits(const Image<float>& range_m);
 
-/// y(x) = near + step Φ((x − x₀)/w): "edge" x₀, "width" w, "10-90 width", and "resolution": the spatial frequency
-/// whose contrast is a half, √(ln 2 / 2) / (π w).
+/// y(x) = near + step Φ((x − x₀)/w): "edge" x₀, "width" w, "10-90 width", and "resolution": the spatial
+/// frequency whose contrast is a half, √(ln 2 / 2) / (π w).
 Traits edgeTraits(Column x_px, Column value);
 
-/// Invalid pixels to the left and right of a near object in rows that show one: "left", "right", and "asymmetry",
-/// right minus left, which a light beside the lens makes.
+/// Invalid pixels to the left and right of a near object in rows that show one: "left", "right", and
+/// "asymmetry", right minus left, which a light beside the lens makes.
 Traits shadowTraits(const Image<float>& range_m, double split_m);
 
 /// "at 1" c and "per decade" s of error = c + s log₁₀(amplitude).
@@ -76,14 +78,15 @@ Traits lagTraits(Column frames_after, Column value);
 /// measured(t) = reference(t − τ) + c: "latency" τ; the reference is linear between its rows.
 Traits latencyTraits(Column time_s, Column measured, Column reference_time_s, Column reference);
 
-/// Over pairs of masks (1: valid), one pair for each pose or frame: "agreement", "overlap" (both / either), "kappa".
+/// Over pairs of masks (1: valid), one pair for each pose or frame: "agreement", "overlap" (both / either),
+/// "kappa".
 Traits maskTraits(std::span<const Image<std::uint8_t>> a, std::span<const Image<std::uint8_t>> b);
 
 /// "interval", "jitter" (sd of intervals that are not gaps), "lost" share of frames.
 Traits timingTraits(Column start_s);
 
-/// Of frames of one place: "temporal noise", "fixed pattern", "correlation along x", "… along y", "… in time" at one
-/// pixel or frame. Intervals over blocks of the image, which must have 8 × 8 pixels or more.
+/// Of frames of one place: "temporal noise", "fixed pattern", "correlation along x", "… along y", "… in time"
+/// at one pixel or frame. Intervals over blocks of the image, which must have 8 × 8 pixels or more.
 Traits noiseTraits(std::span<const Image<float>> frames_mm);
 
 }  // namespace toftwin::compare
