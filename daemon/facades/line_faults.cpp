@@ -23,7 +23,12 @@ std::string_view LineFaults::nameOf(Kind kind) {
 }
 
 LineFaults::LineFaults(const LineFaultKeys& keys, std::string name, std::filesystem::path log)
-    : keys_(keys), name_(std::move(name)), log_path_(std::move(log)) {}
+    : keys_(keys), name_(std::move(name)), log_path_(std::move(log)) {
+  if (log_path_.empty()) return;
+  log_.open(log_path_);
+  log_ << "packet,kind,what\n" << std::flush;
+  if (!log_) logging::error("{}: the log of faults {} cannot be written", name_, log_path_.string());
+}
 
 bool LineFaults::isNone() const {
   return keys_.loss <= 0.0 && keys_.duplicate <= 0.0 && keys_.reorder <= 0.0;
@@ -56,11 +61,6 @@ void LineFaults::note(std::uint64_t packet, Kind kind, std::string_view what) {
     logging::info("{}: packets are struck by faults on purpose; the first: {} of {}", name_, nameOf(kind),
                   what);
   if (log_path_.empty()) return;
-  if (!log_.is_open()) {
-    log_.open(log_path_);
-    log_ << "packet,kind,what\n";
-    if (!log_) logging::error("{}: the log of faults {} cannot be written", name_, log_path_.string());
-  }
   log_ << fmt::format("{},{},{}\n", packet, nameOf(kind), what) << std::flush;
 }
 

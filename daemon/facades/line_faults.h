@@ -54,7 +54,7 @@ class LineFaults {
   const LineFaultKeys keys_;
   const std::string name_;
   const std::filesystem::path log_path_;
-  std::ofstream log_;  ///< from the first fault on
+  std::ofstream log_;  ///< has its heading from the start, so that none struck is seen too
   std::uint64_t packets_ = 0;
   bool is_told_ = false;
 };

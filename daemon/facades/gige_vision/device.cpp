@@ -35,6 +35,12 @@ void show(Memory& memory, Item item, const std::optional<SourceNumber>& number) 
                    can_be_set ? std::min(kMost, number->most) : number->value);
 }
 
+/// That one register and nothing beside it.
+bool asksWhoControls(const Request& request) {
+  return request.command == Command::kReadRegister && request.data.size() == 4 &&
+         numberAt(request.data, 0, 4) == rowOf(Item::ControlPrivilege).address;
+}
+
 }  // namespace
 
 Device::Device(const Identity& identity)
@@ -87,8 +93,6 @@ void Device::setConstants(const Identity& id) {
 }
 
 void Device::update(const SourceFacts& facts) {
-  const bool is_other_size =
-      facts.camera.width != facts_.camera.width || facts.camera.height != facts_.camera.height;
   facts_ = facts;
   const auto set = [this](Item item, std::uint64_t value) { memory_.setNumber(item, value); };
   memory_.setText(Item::Model, facts.model.empty() ? "unknown" : facts.model);
@@ -96,11 +100,15 @@ void Device::update(const SourceFacts& facts) {
              height = static_cast<std::uint64_t>(std::max(0, facts.camera.height));
   set(Item::SensorWidth, width);
   set(Item::SensorHeight, height);
-  if (is_other_size) {
+  // A source that is away for a moment comes back with the region that was set.
+  const std::array size{width, height};
+  if (width > 0 && height > 0 && size != size_) {
+    size_ = size;
     set(Item::Width, width);
     set(Item::Height, height);
     set(Item::OffsetX, 0);
     set(Item::OffsetY, 0);
+    is_streaming_ = false;  // clients have buffers of the size that was
   }
   set(Item::HasRange, facts.has_range);
   set(Item::HasIntensity, facts.has_intensity);
@@ -208,10 +216,12 @@ Device::Outcome Device::take(const Peer& from, std::span<const std::byte> datagr
     if (controller_ == from) heard_at_ = now;
     return {.answer = last_.answer};
   }
+  const bool had_control = controller_ == from;
   Outcome outcome = obey(from, *request);
   if (controller_ == from) heard_at_ = now;
   if (!request->wantsAnswer()) outcome.answer.clear();
-  if (is_write)
+  // Others' writes are refused however often they come, and must not take the controller's place here.
+  if (is_write && (had_control || controller_ == from))
     last_ = {from, Bytes(datagram.begin(), datagram.end()), outcome.mustWait() ? Bytes{} : outcome.answer,
              now};
   return outcome;
@@ -231,7 +241,6 @@ Device::Outcome Device::obey(const Peer& from, const Request& request) {
     outcome.answer = encodeAnswer(request, Status::kInvalidHeader, {});
     return outcome;
   }
-  const bool reads = request.command == Command::kReadRegister || request.command == Command::kReadMemory;
   switch (request.command) {
     case Command::kDiscovery:
       outcome.answer = discovered(request);
@@ -242,9 +251,7 @@ Device::Outcome Device::obey(const Peer& from, const Request& request) {
       return outcome;
     case Command::kReadRegister:
     case Command::kReadMemory: {
-      const bool asks_who = reads && request.data.size() >= 4 &&
-                            numberAt(request.data, 0, 4) == rowOf(Item::ControlPrivilege).address;
-      if (isClosedTo(from) && !asks_who) {
+      if (isClosedTo(from) && !asksWhoControls(request)) {
         outcome.answer = encodeAnswer(request, Status::kAccessDenied, {});
       } else {
         outcome.answer =

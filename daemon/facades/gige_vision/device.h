@@ -88,6 +88,7 @@ class Device {
 
   explicit Device(const Identity& identity);
 
+  /// An image of another size sets the region to all of it, and ends the stream.
   void update(const SourceFacts& facts);
   Outcome take(const Peer& from, std::span<const std::byte> datagram, Time now);
   /// The answer to a command whose changes failed, or nothing where none is wanted.
@@ -145,6 +146,7 @@ class Device {
 
   Memory memory_;
   SourceFacts facts_;
+  std::array<std::uint64_t, 2> size_{};  ///< of the source's last image
   double scale_mm_, amplitude_per_count_;
   std::optional<Peer> controller_;
   Time heard_at_{};

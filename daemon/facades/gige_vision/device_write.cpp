@@ -63,7 +63,8 @@ std::uint16_t Device::write(const Peer& from, std::uint64_t address, std::span<c
   const auto element = Memory::elementAt(address);
   if (!element) return Status::kInvalidAddress;
   if (element->row->access == Access::ReadOnly) return Status::kWriteProtect;
-  if (element->row->item != Item::ControlPrivilege && controller_ != from) return Status::kAccessDenied;
+  const bool is_open = !controller_ && element->row->item == Item::ControlPrivilege;
+  if (controller_ != from && !is_open) return Status::kAccessDenied;
   const std::size_t at = address - element->address, end = at + bytes.size();
   Bytes whole = half_ && half_->element.address == element->address
                     ? half_->bytes
@@ -145,7 +146,7 @@ std::uint16_t Device::setBootstrap(const Memory::Element& element, std::uint64_t
       return keep(word & 0xFFFF);
     case Item::PacketSize: {
       const std::uint32_t size = word & 0xFFFF;
-      if (size < kLeastPacket || size > kMostPacket) return Status::kInvalidParameter;
+      if (size < kLeastPacket || size > kMostPacket || size % 4 != 0) return Status::kInvalidParameter;
       outcome.is_test_packet = (word & kTestPacketBit) != 0;
       return keep(size | kWholeBit);
     }
@@ -190,8 +191,6 @@ std::uint16_t Device::setFeature(const Memory::Element& element, std::uint64_t v
       const std::uint64_t state = !is_on ? kDisabled : facts_.clock_uncertainty_ns ? kSlave : kListening;
       memory_.setNumber(Item::PtpStatus, state);
       memory_.setNumber(Item::PtpClockStatus, state);
-      memory_.setNumber(Item::PtpOffset,
-                        static_cast<std::uint64_t>(facts_.clock_uncertainty_ns.value_or(-1)));
       return Status::kSuccess;
     }
     default:
@@ -219,7 +218,6 @@ std::uint16_t Device::start() {
 
 std::uint16_t Device::setControl(const Peer& from, std::uint32_t value) {
   constexpr std::uint32_t kExclusive = 1, kControl = 2;
-  if (controller_ && *controller_ != from) return Status::kAccessDenied;
   if ((value & ~(kExclusive | kControl)) != 0) return Status::kInvalidParameter;  // no switch-over
   if (value == 0) {
     release();

@@ -360,7 +360,7 @@ void addRest(std::vector<Row>& rows) {
         .name = "PtpOffsetFromMaster",
         .category = kPtp,
         .size = 8,
-        .meaning = "standard deviation of the relation; -1: not known",
+        .meaning = "0: time stamps are of the daemon's clock already",
         .unit = "ns"}});
 }
 

@@ -159,7 +159,12 @@ class GigeVisionFacade final : public Facade {
     });
   }
 
-  void refresh() { device_->update(watch_.facts(link_.describe(), device_->stream().uses_host_clock)); }
+  void refresh() {
+    const bool was_streaming = device_->isStreaming();
+    device_->update(watch_.facts(link_.describe(), device_->stream().uses_host_clock));
+    if (was_streaming && !device_->isStreaming())
+      logging::warn("{}: the source's image has another size; the stream has ended", name_);
+  }
 
   // ---- frames ------------------------------------------------------------------------------------
 
@@ -170,7 +175,7 @@ class GigeVisionFacade final : public Facade {
   void takeFrame(const Frame& frame) {
     watch_.note(frame);
     refresh();
-    if (!device_->isStreaming()) return;
+    if (!device_->isStreaming()) return followStreaming();
     const StreamSetup setup = device_->stream();
     if (!rays_ || rays_->camera != frame.camera) rays_ = raysOf(frame.camera);
     const std::int64_t stamp_ns = stampOf(frame, setup.uses_host_clock);
@@ -184,7 +189,7 @@ class GigeVisionFacade final : public Facade {
                                                              .is_multipart = setup.is_multipart,
                                                              .has_long_ids = setup.has_long_ids},
                                                *std::move(payload));
-    if (!sender_->send(std::move(block))) noteLost();
+    if (!sender_->send(std::move(block))) return noteLost();
     if (setup.frames > 0 && ++sent_ >= setup.frames) {
       device_->stopStreaming();
       was_streaming_ = false;  // what waits is still sent

@@ -28,7 +28,7 @@ Sender::Sender(boost::asio::io_context& io, boost::asio::ip::udp::socket socket,
                std::size_t bytes_kept, std::string name)
     : socket_(std::move(socket)),
       timer_(io),
-      faults_(std::move(faults)),
+      line_(std::move(faults), [this](const Bytes& packet) { return put(packet); }),
       bytes_kept_(bytes_kept),
       name_(std::move(name)) {
   error_code ignored;
@@ -89,7 +89,7 @@ void Sender::clear() {
   again_.clear();
   sent_.clear();
   sent_bytes_ = 0;
-  late_.reset();
+  line_.clear();
 }
 
 void Sender::pump() {
@@ -98,7 +98,7 @@ void Sender::pump() {
   due_ = std::max(due_, now - kMostBehind);
   for (int i = 0; due_ <= now; ++i) {
     if (waiting_.empty() && again_.empty()) {
-      if (late_) put(*std::exchange(late_, std::nullopt));
+      if (!line_.finish()) wake(now + kFull);
       return;
     }
     if (i == kBatch) break;
@@ -117,27 +117,15 @@ void Sender::wake(steady_clock::time_point when) {
 }
 
 bool Sender::sendNext() {
+  if (!line_.flush()) return false;
   auto& queue = again_.empty() ? waiting_ : again_;
   Waiting& front = queue.front();
-  if (!sendStruck(*front.block, front.next, front.is_again)) return false;
+  const Block& block = *front.block;
+  line_.take(block.packet(front.next, front.is_again), [&] {
+    return fmt::format("block {} packet {}{}", block.id(), front.next, front.is_again ? " again" : "");
+  });
   if (front.next++ == front.last) queue.pop_front();
-  return true;
-}
-
-bool Sender::sendStruck(const Block& block, std::uint32_t number, bool is_again) {
-  Bytes packet = block.packet(number, is_again);
-  if (faults_.isNone()) return put(packet);
-  const auto fate =
-      faults_.next(fmt::format("block {} packet {}{}", block.id(), number, is_again ? " again" : ""));
-  if (fate.is_lost) return true;
-  if (fate.is_late && !late_) {
-    late_ = std::move(packet);
-    return true;
-  }
-  put(packet);
-  if (fate.is_doubled) put(packet);
-  if (late_) put(*std::exchange(late_, std::nullopt));
-  return true;
+  return line_.flush();
 }
 
 bool Sender::put(const Bytes& packet) {

@@ -13,6 +13,7 @@
 #include <utility>  // before asio: Boost 1.74 uses std::exchange without it
 
 #include "daemon/facades/gige_vision/gvsp.h"
+#include "daemon/facades/gige_vision/struck_line.h"
 #include "daemon/facades/line_faults.h"
 
 namespace toftwin::daemon::gige_vision {
@@ -50,12 +51,11 @@ class Sender {
   void wake(std::chrono::steady_clock::time_point when);
   /// False if the socket takes no more now.
   bool sendNext();
-  bool sendStruck(const Block& block, std::uint32_t number, bool is_again);
   bool put(const Bytes& packet);
 
   boost::asio::ip::udp::socket socket_;
   boost::asio::steady_timer timer_;
-  LineFaults faults_;
+  StruckLine line_;
   const std::size_t bytes_kept_;
   const std::string name_;
   Endpoint to_;
@@ -64,7 +64,6 @@ class Sender {
   std::deque<Waiting> waiting_, again_;
   std::deque<std::shared_ptr<const Block>> sent_;
   std::size_t sent_bytes_ = 0;
-  std::optional<Bytes> late_;  ///< leaves after the next one
   bool is_pumping_ = false, is_too_large_told_ = false;
   /// Shared with handlers that may come when this is gone.
   const std::shared_ptr<bool> is_alive_ = std::make_shared<bool>(true);

@@ -47,7 +47,14 @@ TEST(GigeVisionDevice, IsSetByItsControllerAlone) {
   EXPECT_EQ(camera.value(Item::PacketDelay), 5U);
   EXPECT_EQ(camera.write(Item::ControlPrivilege, kExclusive), Status::kSuccess);
   EXPECT_EQ(camera.read(rowOf(Item::PacketDelay).address, kOther), Status::kAccessDenied);
-  EXPECT_EQ(camera.read(rowOf(Item::ControlPrivilege).address, kOther), Status::kSuccess);
+  const std::uint32_t who = rowOf(Item::ControlPrivilege).address;
+  EXPECT_EQ(camera.read(who, kOther), Status::kSuccess);
+  for (const Bytes& more :
+       {commandOf(Command::kReadRegister, 90, words({who, rowOf(Item::PacketDelay).address})),
+        commandOf(Command::kReadMemory, 91, words({who, 536}))}) {
+    EXPECT_EQ(Camera::statusOf(camera.take(kOther, more).answer), Status::kAccessDenied);
+    EXPECT_EQ(Camera::statusOf(camera.take(kOwner, more).answer), Status::kSuccess);
+  }
   EXPECT_EQ(camera.write(Item::ControlPrivilege, 0), Status::kSuccess);
   EXPECT_EQ(camera.write(Item::ControlPrivilege, kControl, kFar), Status::kSuccess);
 }
@@ -120,7 +127,10 @@ TEST(GigeVisionDevice, DoesWhatIsRepeatedForWantOfAnAnswerOnce) {
   EXPECT_FALSE(early.is_trigger);
   EXPECT_TRUE(early.answer.empty());
   camera.device.noteAnswer(trigger, first.answer);
-  EXPECT_EQ(camera.take(kOwner, trigger).answer, first.answer);
+  EXPECT_EQ(camera.write(Item::PacketDelay, 6, kOther), Status::kAccessDenied);  // changes nothing in that
+  const auto again = camera.take(kOwner, trigger);
+  EXPECT_EQ(again.answer, first.answer);
+  EXPECT_FALSE(again.is_trigger);
   const auto next = camera.take(
       kOwner, commandOf(Command::kWriteRegister, 78, words({rowOf(Item::TriggerSoftware).address, 1})));
   EXPECT_TRUE(next.is_trigger);
@@ -140,6 +150,7 @@ TEST(GigeVisionDevice, TurnsNumbersIntoChangesOfTheSourceWithinItsBounds) {
   EXPECT_EQ(camera.write(rowOf(Item::ExposureTime).address, static_cast<std::uint32_t>(bits >> 32U)),
             Status::kSuccess);
   EXPECT_TRUE(camera.last.changes.empty());
+  EXPECT_EQ(camera.write(Item::ControlPrivilege, kControl, kOther), Status::kAccessDenied);  // between them
   EXPECT_EQ(camera.write(rowOf(Item::ExposureTime).address + 4, static_cast<std::uint32_t>(bits)),
             Status::kSuccess);
   EXPECT_EQ(camera.last.changes, (SourceChanges{{"exposure_us", 800.0}}));
@@ -176,6 +187,35 @@ TEST(GigeVisionDevice, KeepsRegionsInsideTheImageAndThePayloadsSizeTrue) {
   larger.camera.width = 32;
   camera.device.update(larger);
   EXPECT_EQ(camera.value(Item::Width), 32U);
+}
+
+TEST(GigeVisionDevice, KeepsItsRegionWhileItsSourceIsAwayAndEndsTheStreamWhereTheSizeIsAnother) {
+  Camera camera;
+  camera.write(Item::ControlPrivilege, kControl);
+  EXPECT_EQ(camera.write(Item::Width, 10), Status::kSuccess);
+  EXPECT_EQ(camera.write(Item::OffsetX, 6), Status::kSuccess);
+  EXPECT_EQ(camera.write(Item::AcquisitionStart, 1), Status::kSuccess);
+  camera.device.update({});
+  EXPECT_EQ(camera.value(Item::PayloadSize), 0U);
+  camera.device.update(smallCamera());
+  EXPECT_EQ(camera.value(Item::Width), 10U);
+  EXPECT_EQ(camera.value(Item::OffsetX), 6U);
+  EXPECT_TRUE(camera.device.isStreaming());
+  SourceFacts larger = smallCamera();
+  larger.camera.width = 32;
+  camera.device.update({});
+  camera.device.update(larger);
+  EXPECT_EQ(camera.value(Item::Width), 32U);
+  EXPECT_FALSE(camera.device.isStreaming());
+}
+
+TEST(GigeVisionDevice, TakesSizesOfPacketsThatTheXmlAllows) {
+  Camera camera;
+  camera.write(Item::ControlPrivilege, kControl);
+  for (const std::uint32_t size : {576U, 1500U, 16'112U})
+    EXPECT_EQ(camera.write(Item::PacketSize, size), Status::kSuccess) << size;
+  for (const std::uint32_t size : {572U, 1501U, 1502U, 16'116U})
+    EXPECT_EQ(camera.write(Item::PacketSize, size), Status::kInvalidParameter) << size;
 }
 
 TEST(GigeVisionDevice, SendsNoFrameWhereItsSourceHasNoneOfItsImages) {

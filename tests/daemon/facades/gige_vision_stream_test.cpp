@@ -1,12 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // Packets of frames, and what goes wrong with packets on purpose.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <array>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <random>
+#include <set>
 
 #include "daemon/facades/gige_vision/gvsp.h"
+#include "daemon/facades/gige_vision/struck_line.h"
 #include "daemon/facades/line_faults.h"
 
 namespace toftwin::daemon::gige_vision {
@@ -70,6 +76,53 @@ TEST(GigeVisionStream, PacketsHoldThePayloadWholeAndOnce) {
       }
     }
   }
+}
+
+/// A socket that takes a packet at every third try must lose, double and swap those alone that the log names.
+TEST(GigeVisionStream, AFullSocketLosesNoPacketBesideThePlan) {
+  constexpr int kPackets = 2000;
+  const auto log = std::filesystem::path{::testing::TempDir()} / fmt::format("struck_{}.csv", ::getpid());
+  std::ofstream{log} << "of the last run\n";
+  std::vector<std::uint64_t> got;
+  int lost = 0, doubled = 0, late = 0;
+  {
+    int tries = 0;
+    StruckLine line{
+        LineFaults{{.loss = 0.1, .duplicate = 0.1, .reorder = 0.1, .seed = 9, .log = {}}, "test", log},
+        [&](const Bytes& packet) {
+          if (++tries % 3 != 0) return false;
+          got.push_back(numberAt(packet, 0, 4));
+          return true;
+        }};
+    std::ifstream heading{log};
+    std::string first;
+    EXPECT_TRUE(std::getline(heading, first));
+    EXPECT_EQ(first, "packet,kind,what");  // anew, before anything is struck
+    for (std::uint64_t i = 0; i < kPackets; ++i) {
+      Bytes packet;
+      append(packet, i, 4);
+      line.take(packet, [&] { return std::to_string(i); });
+      while (!line.flush()) {
+      }
+    }
+    while (!line.finish()) {
+    }
+  }
+  std::set<std::uint64_t> missing;
+  for (std::uint64_t i = 0; i < kPackets; ++i) missing.insert(i);
+  for (const std::uint64_t i : got) missing.erase(i);
+  std::ifstream lines{log};
+  for (std::string one; std::getline(lines, one);) {
+    if (one.find(",loss,") != std::string::npos) {
+      ++lost;
+      EXPECT_EQ(missing.count(std::stoull(one)), 1U) << one;
+    }
+    doubled += one.find(",duplicate,") == std::string::npos ? 0 : 1;
+    late += one.find(",reorder,") == std::string::npos ? 0 : 1;
+  }
+  EXPECT_GT(std::min({lost, doubled, late}), 100);
+  EXPECT_EQ(missing.size(), static_cast<std::size_t>(lost));
+  std::filesystem::remove(log);
 }
 
 TEST(GigeVisionStream, IdsOfSixteenBitsLeaveOutZero) {

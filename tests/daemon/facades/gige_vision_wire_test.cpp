@@ -111,6 +111,31 @@ TEST_F(GigeVisionWire, StopsByItselfAfterAsManyFramesAsWereWanted) {
   EXPECT_TRUE(hear(stream, 200).empty());
 }
 
+TEST_F(GigeVisionWire, FramesThatAreLostForWantOfTimeAreNotAmongThoseThatWereWanted) {
+  startGige(kSmallSim);
+  udp::socket control = socketOn("127.0.0.1"), stream = socketOn("127.0.0.1");
+  EXPECT_EQ(write(control, Item::ControlPrivilege, 2), Status::kSuccess);
+  EXPECT_EQ(write(control, Item::Destination, 0x7F000001), Status::kSuccess);
+  EXPECT_EQ(write(control, Item::HostPort, stream.local_endpoint().port()), Status::kSuccess);
+  EXPECT_EQ(write(control, Item::HeartbeatTimeout, 60'000), Status::kSuccess);
+  // 46 kB in 85 packets a millisecond apart, of images that come every 50 ms; three wait at most.
+  EXPECT_EQ(write(control, Item::PacketSize, 576), Status::kSuccess);
+  EXPECT_EQ(write(control, Item::PacketDelay, 1'000'000), Status::kSuccess);
+  EXPECT_EQ(write(control, Item::AcquisitionMode, 2), Status::kSuccess);
+  EXPECT_EQ(write(control, Item::AcquisitionFrameCount, 12), Status::kSuccess);
+  EXPECT_EQ(write(control, Item::AcquisitionStart, 1), Status::kSuccess);
+  int trailers = 0;
+  std::uint64_t last_id = 0;
+  while (trailers < 12) {
+    const Bytes packet = hear(stream);
+    ASSERT_GE(packet.size(), 8U);
+    if (numberAt(packet, 4, 1) != 2) continue;
+    ++trailers;
+    last_id = numberAt(packet, 2, 2);
+  }
+  EXPECT_GT(last_id, 12U);  // some were lost
+}
+
 TEST_F(GigeVisionWire, SendsPacketsAgainAndSaysWhichItHasNotAnyMore) {
   startGige(kSmallSim);
   udp::socket control = socketOn("127.0.0.1"), stream = socketOn("127.0.0.1");
