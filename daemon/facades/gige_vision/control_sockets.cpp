@@ -94,7 +94,12 @@ void ControlSockets::receive(const std::shared_ptr<Ear>& ear) {
   ear->socket.async_receive_from(boost::asio::buffer(ear->datagram), ear->from,
                                  [this, ear, alive = is_alive_](error_code error, std::size_t size) {
                                    if (!*alive || error == boost::asio::error::operation_aborted) return;
-                                   if (!error) hear(*ear, size);
+                                   try {
+                                     if (!error) hear(*ear, size);
+                                   } catch (...) {  // which the thread logs; it must not go deaf for that
+                                     receive(ear);
+                                     throw;
+                                   }
                                    receive(ear);
                                  });
 }

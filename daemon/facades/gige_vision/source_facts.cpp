@@ -63,12 +63,21 @@ SourceFacts SourceWatch::facts(const Result<wire::SourceDescription>& descriptio
     facts.is_triggered = description->can_trigger;
     facts.can_choose_trigger = numberOf(*description, {"triggered"}).has_value();
   }
+  using std::chrono::system_clock, std::chrono::nanoseconds;
+  const auto host_ns =
+      std::chrono::duration_cast<nanoseconds>(system_clock::now().time_since_epoch()).count();
+  if (on_host_clock) facts.now_ns = host_ns;
   if (!seen_) return facts;
   if (!facts.exposure_us) facts.exposure_us = SourceNumber{.value = seen_->exposure_us};
   facts.temperatures_c = seen_->temperatures_c;
-  const std::chrono::nanoseconds since = steady_clock::now() - seen_->at;
-  facts.now_ns = seen_->device_ns + since.count() + (on_host_clock ? seen_->clock.host_minus_device_ns : 0);
-  if (seen_->clock.uncertainty_ns >= 0) facts.clock_uncertainty_ns = seen_->clock.uncertainty_ns;
+  if (seen_->clock.uncertainty_ns >= 0) {
+    facts.clock_uncertainty_ns = seen_->clock.uncertainty_ns;
+    if (!on_host_clock) facts.now_ns = std::max<std::int64_t>(0, host_ns - seen_->clock.host_minus_device_ns);
+  } else {
+    // No relation is known: behind by how long the frame took to come.
+    const nanoseconds since = steady_clock::now() - seen_->at;
+    facts.now_ns = seen_->device_ns + since.count() + (on_host_clock ? seen_->clock.host_minus_device_ns : 0);
+  }
   return facts;
 }
 

@@ -7,6 +7,7 @@
 #include <regex>
 #include <set>
 
+#include "daemon/facades/gige_vision/source_facts.h"
 #include "gige_vision_commands.h"
 
 namespace toftwin::daemon::gige_vision {
@@ -207,6 +208,28 @@ TEST(GigeVisionDevice, KeepsItsRegionWhileItsSourceIsAwayAndEndsTheStreamWhereTh
   camera.device.update(larger);
   EXPECT_EQ(camera.value(Item::Width), 32U);
   EXPECT_FALSE(camera.device.isStreaming());
+}
+
+TEST(GigeVisionDevice, KnowsTheTimeHoweverLateItsFramesCome) {
+  using std::chrono::nanoseconds, std::chrono::system_clock;
+  constexpr std::int64_t kSecond_ns = 1'000'000'000, kHostMinusDevice_ns = 900 * kSecond_ns;
+  const auto host = [] { return nanoseconds{system_clock::now().time_since_epoch()}.count(); };
+  const Result<wire::SourceDescription> away{Error{Error::Code::NotFound, "away"}};
+  for (const bool is_known : {true, false}) {
+    SourceWatch watch;
+    Frame frame;
+    const std::int64_t before = host(), start = before - kHostMinusDevice_ns - 3 * kSecond_ns;
+    frame.moment.exposures = {{{start}, 1_ms, 20_MHz}};
+    frame.moment.clock = {kHostMinusDevice_ns, is_known ? 1000 : -1};
+    watch.note(frame);  // three seconds after its exposure began
+    const std::int64_t device_now = watch.facts(away, false).now_ns,
+                       host_now = watch.facts(away, true).now_ns;
+    const std::int64_t after = host(), late = is_known ? 0 : 3 * kSecond_ns;
+    EXPECT_GE(device_now, before - kHostMinusDevice_ns - late);
+    EXPECT_LE(device_now, after - kHostMinusDevice_ns - late);
+    EXPECT_GE(host_now, before - late);
+    EXPECT_LE(host_now, after - late);
+  }
 }
 
 TEST(GigeVisionDevice, TakesSizesOfPacketsThatTheXmlAllows) {
