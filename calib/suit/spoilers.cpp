@@ -105,7 +105,7 @@ Spoiler spoilerOf(const RequirementSpec& requirement, std::size_t r, const std::
   const double together = without.together.empty() ? without.repeats[r].front() : without.together[r];
   const bool is_met_without = verdictOf(requirement, exactly(together)).is_met;
   return {.what = name,
-          .gain = gains.empty() ? untold : estimateOf(gains, std::nullopt, false),
+          .gain = gains.empty() ? untold : estimateOf(gains, std::nullopt),
           .is_met_without = is_met_without,
           .is_valid_only_without =
               hidden == 0 && (revealed == whole.repeats[r].size() || (revealed > 0 && is_met_without))};

@@ -97,15 +97,13 @@ std::string misfitOf(const Case& use, const std::vector<RequirementResult>& resu
 Estimate estimateAt(const RequirementSpec& requirement, const ConditionValues& values, std::size_t r) {
   const auto& repeats = values.repeats[r];
   if (requirement.kind == Kind::Pixels) return exactly(static_cast<double>(values.pixels[r]));
-  if (requirement.kind == Kind::Missed) {
-    if (values.pixels[r] == 0) return exactly(1.0);
-    double missed = 0.0;
-    for (const double share : repeats) missed += share * static_cast<double>(values.frames);
-    return shareOf(static_cast<std::size_t>(std::lround(missed)), repeats.size() * values.frames);
-  }
+  if (requirement.kind == Kind::Missed)
+    return values.pixels[r] == 0 ? exactly(1.0) : missedEstimateOf(repeats, values.frames);
   const std::optional<double> together =
       values.together.empty() ? std::nullopt : std::optional{values.together[r]};
-  return estimateOf(repeats, together, isShare(requirement.kind));
+  if (isShare(requirement.kind))
+    return shareEstimateOf(repeats, together, {.pixels = values.pixels[r], .frames = values.frames});
+  return estimateOf(repeats, together);
 }
 
 RequirementResult resultOf(const Case& use, std::size_t r, const std::vector<ConditionValues>& conditions) {

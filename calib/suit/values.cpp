@@ -2,13 +2,12 @@
 #include "calib/suit/values.h"
 
 #include <algorithm>
-#include <boost/math/distributions/beta.hpp>
 #include <boost/math/distributions/chi_squared.hpp>
-#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <limits>
 
 #include "calib/compare/statistics.h"
+#include "calib/compare/traits/least_squares.h"
 
 namespace toftwin::suit {
 namespace {
@@ -121,33 +120,48 @@ double valueOf(const RequirementSpec& requirement, const Seen& seen, std::span<c
   return kNaN;
 }
 
-Estimate estimateOf(std::span<const double> repeats, std::optional<double> together, bool is_share) {
+Estimate estimateOf(std::span<const double> repeats, std::optional<double> together) {
   const compare::Summary summary = compare::summarise(repeats);
   Estimate estimate{.value = together.value_or(summary.mean), .low = 0.0, .high = 0.0, .repeats = summary.n};
   double half = std::numeric_limits<double>::infinity();
   if (summary.n >= 2) {
     const double degrees = static_cast<double>(summary.n - 1);
-    half = boost::math::quantile(boost::math::students_t{degrees}, 0.975) * summary.standard_error;
+    half = compare::studentT(degrees) * summary.standard_error;
     if (together) half += std::abs(summary.mean - *together) / degrees;
   }
   estimate.low = estimate.value - half;
   estimate.high = estimate.value + half;
-  if (is_share) {
-    estimate.low = std::max(0.0, estimate.low);
-    estimate.high = std::min(1.0, estimate.high);
-  }
   return estimate;
 }
 
-Estimate shareOf(std::size_t k, std::size_t n) {
-  if (n == 0) return {.value = kNaN, .low = 0.0, .high = 1.0, .repeats = 0};
-  const double events = static_cast<double>(k), others = static_cast<double>(n - k);
-  const double tail = k == 0 || k == n ? 0.05 : 0.025;
-  using Beta = boost::math::beta_distribution<>;
-  return {.value = events / static_cast<double>(n),
-          .low = k == 0 ? 0.0 : boost::math::quantile(Beta{events, others + 1.0}, tail),
-          .high = k == n ? 1.0 : boost::math::quantile(Beta{events + 1.0, others}, 1.0 - tail),
-          .repeats = n};
+Estimate shareEstimateOf(std::span<const double> repeats, std::optional<double> together, Counted counted) {
+  Estimate estimate = estimateOf(repeats, together);
+  if (std::isnan(estimate.value)) return estimate;
+  const bool are_alike = std::ranges::all_of(repeats, [&](double one) { return one == repeats.front(); });
+  const std::size_t each =
+      are_alike ? std::min(counted.pixels, counted.frames) : counted.pixels * counted.frames;
+  const double trials = static_cast<double>(repeats.size() * each);
+  const auto floor =
+      compare::shareInterval(estimate.value * trials, trials, compare::ShareRule::ClopperPearson);
+  estimate.low = std::max(0.0, std::min(estimate.low, floor.low));
+  estimate.high = std::min(1.0, std::max(estimate.high, floor.high));
+  return estimate;
+}
+
+Estimate missedEstimateOf(std::span<const double> repeats, std::size_t frames) {
+  const compare::Summary summary = compare::summarise(repeats);
+  const double share = summary.mean, count = static_cast<double>(summary.n);
+  double trials = count * static_cast<double>(frames);
+  if (summary.n == 0 || frames == 0) return {.value = kNaN, .low = 0.0, .high = 1.0, .repeats = summary.n};
+  if (share == 0.0 || share == 1.0) {
+    trials = count;
+  } else if (summary.n >= 2 && summary.sd > 0.0) {
+    const double quantiles = compare::studentT(trials - 1.0) / compare::studentT(count - 1.0);
+    trials =
+        std::min(trials, share * (1.0 - share) * count / (summary.sd * summary.sd) * quantiles * quantiles);
+  }
+  const auto [low, high] = compare::shareInterval(share * trials, trials, compare::ShareRule::ClopperPearson);
+  return {.value = share, .low = low, .high = high, .repeats = summary.n};
 }
 
 Estimate exactly(double value) { return {.value = value, .low = value, .high = value, .repeats = 1}; }

@@ -46,11 +46,24 @@ struct Estimate {
 /// From independent repeats θ_r and, where there is one, the value θ_P of all repeats' light together:
 ///   θ_P ± ( t(0.975, R − 1) sd(θ_r)/√R + |mean θ_r − θ_P| / (R − 1) )
 /// The second term is what the tracer's own noise, which falls as one over the number of paths, still moves
-/// θ_P by. Without θ_P the mean of the repeats stands for it. Shares are cut to 0 … 1.
-Estimate estimateOf(std::span<const double> repeats, std::optional<double> together, bool is_share);
-/// Of k events in n independent trials (Clopper and Pearson, Biometrika 26 (1934) 404); at k = 0 or n
-/// one-sided, with 95 %.
-Estimate shareOf(std::size_t k, std::size_t n);
+/// θ_P by. Without θ_P the mean of the repeats stands for it.
+Estimate estimateOf(std::span<const double> repeats, std::optional<double> together);
+
+/// What a repeat counts to get a share.
+struct Counted {
+  std::size_t pixels = 0, frames = 0;
+};
+/// The same of a share of pixels and frames, cut to 0 … 1, and never narrower than counting leaves it:
+/// Clopper and Pearson's interval of so many events in all pixels and frames; where all repeats are alike, so
+/// that they say nothing of how they scatter, in min(pixels, frames) trials of each. More are not independent
+/// where whole frames fail, or always the same pixels.
+Estimate shareEstimateOf(std::span<const double> repeats, std::optional<double> together, Counted counted);
+/// Of the shares of missed frames in each repeat. Frames of one repeat share its light and its fixed pattern,
+/// so that a repeat, not a frame, is what is independent: with the share p, Clopper and Pearson's interval of
+///   n* = min( R F, p (1 − p) R / sd²(p_r) · (t(R F − 1) / t(R − 1))² )
+/// trials (E. L. Korn, B. I. Graubard, Surv. Methodol. 24 (1998) 193), and of R trials where none or all are
+/// missed.
+Estimate missedEstimateOf(std::span<const double> repeats, std::size_t frames);
 /// A number that nothing makes uncertain.
 Estimate exactly(double value);
 

@@ -176,14 +176,26 @@ Trait meanTrait(std::string name, std::string unit, Column values, double scale)
           .n = summary.n};
 }
 
-Trait shareTrait(std::string name, std::size_t k, std::size_t n) {
+ShareInterval shareInterval(double events, double trials, ShareRule rule) {
   using Beta = boost::math::beta_distribution<>;
-  const double events = static_cast<double>(k), others = static_cast<double>(n - k);
+  const double others = trials - events;
+  if (!(trials > 0.0)) return {};
+  const double low_more = rule == ShareRule::Jeffreys ? 0.5 : 0.0,
+               high_more = rule == ShareRule::Jeffreys ? 0.5 : 1.0;
+  ShareInterval interval;
+  if (events > 0.0) interval.low = boost::math::quantile(Beta{events + low_more, others + high_more}, 0.025);
+  if (others > 0.0) interval.high = boost::math::quantile(Beta{events + high_more, others + low_more}, 0.975);
+  return interval;
+}
+
+Trait shareTrait(std::string name, std::size_t k, std::size_t n) {
+  const double events = static_cast<double>(k), trials = static_cast<double>(n);
+  const auto [low, high] = shareInterval(events, trials, ShareRule::Jeffreys);
   return {.name = std::move(name),
           .unit = "1",
-          .value = n == 0 ? std::nan("") : events / static_cast<double>(n),
-          .low = k == 0 ? 0.0 : boost::math::quantile(Beta{events + 0.5, others + 0.5}, 0.025),
-          .high = k == n ? 1.0 : boost::math::quantile(Beta{events + 0.5, others + 0.5}, 0.975),
+          .value = n == 0 ? std::nan("") : events / trials,
+          .low = low,
+          .high = high,
           .n = n};
 }
 

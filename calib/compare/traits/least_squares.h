@@ -45,6 +45,14 @@ double correlationOfResiduals(const Model& model, Column y, const Fit& fit);
 double studentT(double degrees);
 /// Mean of independent values with its interval.
 Trait meanTrait(std::string name, std::string unit, Column values, double scale = 1.0);
+/// The interval of a share that holds it with 95 %, from k events in n independent trials, which need not be
+/// whole numbers. Jeffreys' holds 95 % on average over shares, Clopper and Pearson's (Biometrika 26 (1934)
+/// 404) at least 95 % of every share.
+enum class ShareRule { Jeffreys, ClopperPearson };
+struct ShareInterval {
+  double low = 0.0, high = 1.0;
+};
+ShareInterval shareInterval(double events, double trials, ShareRule rule);
 /// Share k of n independent trials, Jeffreys' interval (L. D. Brown, T. T. Cai, A. DasGupta, Stat. Sci. 16
 /// (2001) 101): it holds 95 % on average over shares, where Clopper and Pearson's holds at least that and 98
 /// % of small ones.
