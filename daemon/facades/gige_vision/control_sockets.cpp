@@ -4,6 +4,10 @@
 #include <fmt/format.h>
 #include <ifaddrs.h>
 #include <netinet/in.h>
+#include <sys/socket.h>
+
+#include <cerrno>
+#include <cstring>
 
 #include "drivers/logging.h"
 
@@ -14,22 +18,27 @@ using boost::asio::ip::address_v4;
 using boost::asio::ip::udp;
 using boost::system::error_code;
 
-/// Of the interface that has that address; of a small network where that is not told.
-std::uint32_t netmaskOf(address_v4 address) {
+/// Netmask and interface that has that address; of a small network where that is not told.
+LocalPlace placeOf(address_v4 address) {
   constexpr std::uint32_t kLoopback = 0xFF00'0000, kSmall = 0xFFFF'FF00;
-  if (address.is_loopback()) return kLoopback;
+  LocalPlace place{address, address.is_loopback() ? kLoopback : kSmall};
   ifaddrs* all = nullptr;
-  if (::getifaddrs(&all) != 0) return kSmall;
-  std::uint32_t netmask = kSmall;
+  if (::getifaddrs(&all) != 0) return place;
   for (const ifaddrs* one = all; one != nullptr; one = one->ifa_next) {
     if (one->ifa_addr == nullptr || one->ifa_netmask == nullptr || one->ifa_addr->sa_family != AF_INET)
       continue;
-    const auto* own = reinterpret_cast<const sockaddr_in*>(one->ifa_addr);
-    if (ntohl(own->sin_addr.s_addr) != address.to_uint()) continue;
-    netmask = ntohl(reinterpret_cast<const sockaddr_in*>(one->ifa_netmask)->sin_addr.s_addr);
+    const auto addressOf = [](const sockaddr* of) {
+      return ntohl(reinterpret_cast<const sockaddr_in*>(of)->sin_addr.s_addr);
+    };
+    // All of 127/8 is the loopback interface's, whatever address of it that names.
+    const std::uint32_t own = addressOf(one->ifa_addr);
+    if (address.is_loopback() ? !address_v4{own}.is_loopback() : own != address.to_uint()) continue;
+    if (!address.is_loopback()) place.netmask = addressOf(one->ifa_netmask);
+    const std::string name = one->ifa_name;
+    place.interface_name = name.substr(0, name.find(':'));  // an address may have a label
   }
   ::freeifaddrs(all);
-  return netmask;
+  return place;
 }
 
 }  // namespace
@@ -43,15 +52,23 @@ Result<LocalPlace> localPlace(const std::string& address) {
                              "computer's",
                              address)};
   }
-  return LocalPlace{own, netmaskOf(own)};
+  return placeOf(own);
 }
 
 Result<udp::socket> udpSocket(boost::asio::io_context& io, address_v4 address, std::uint16_t port,
-                              bool is_shared) {
+                              const std::string& interface) {
   udp::socket socket{io};
   error_code error;
   socket.open(udp::v4(), error);
-  if (!error && is_shared) socket.set_option(udp::socket::reuse_address{true}, error);
+  if (!error && !interface.empty()) {
+    socket.set_option(udp::socket::reuse_address{true}, error);
+    if (::setsockopt(socket.native_handle(), SOL_SOCKET, SO_BINDTODEVICE, interface.c_str(),
+                     static_cast<socklen_t>(interface.size())) != 0) {
+      return Error{Error::Code::Unsupported,
+                   fmt::format("a socket cannot be bound to the interface {} alone: {}", interface,
+                               std::strerror(errno))};
+    }
+  }
   if (!error) socket.bind({address, port}, error);
   if (!error) return socket;
   return Error{Error::Code::Busy,
@@ -68,10 +85,14 @@ Result<std::unique_ptr<ControlSockets>> ControlSockets::open(boost::asio::io_con
   sockets->ears_.push_back(std::make_shared<Ear>(*std::move(own)));
   sockets->ears_.front()->takes_all = true;
   // A socket that is bound to an address hears no broadcasts; one that is bound to the broadcast address
-  // does.
+  // does, of every interface unless it is bound to one.
+  if (place.interface_name.empty())
+    logging::warn("gige_vision: it is not found by broadcasts: no interface has the address {}",
+                  place.address.to_string());
   for (const address_v4& one :
        {address_v4{place.address.to_uint() | ~place.netmask}, address_v4::broadcast()}) {
-    auto ear = udpSocket(io, one, kControlPort, true);
+    if (place.interface_name.empty()) break;
+    auto ear = udpSocket(io, one, kControlPort, place.interface_name);
     if (ear) {
       sockets->ears_.push_back(std::make_shared<Ear>(*std::move(ear)));
     } else {

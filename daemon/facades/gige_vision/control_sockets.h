@@ -23,13 +23,14 @@ inline constexpr std::uint16_t kControlPort = 3956;
 struct LocalPlace {
   boost::asio::ip::address_v4 address;
   std::uint32_t netmask = 0;
+  std::string interface_name{};  ///< empty: not told
 };
 Result<LocalPlace> localPlace(const std::string& address);
 
-/// Bound; `is_shared` with others on that port.
+/// Bound; with an `interface`, to what comes in there alone, and shared with others on that port.
 Result<boost::asio::ip::udp::socket> udpSocket(boost::asio::io_context& io,
                                                boost::asio::ip::address_v4 address, std::uint16_t port,
-                                               bool is_shared = false);
+                                               const std::string& interface = {});
 
 /// Where commands come in: the facade's own address, and broadcasts, of which only searches are taken. Used
 /// on the facade's thread only.

@@ -172,6 +172,30 @@ TEST_F(GigeVisionWire, SendsPacketsAgainAndSaysWhichItHasNotAnyMore) {
   }
 }
 
+TEST(GigeVisionControl, HearsBroadcastsOfItsOwnInterfaceAlone) {
+  boost::asio::io_context io;
+  const auto place = localPlace("127.0.0.77");
+  ASSERT_TRUE(place.ok());
+  const auto sockets = ControlSockets::open(io, *place, [](const Peer&, std::span<const std::byte>) {});
+  ASSERT_TRUE(sockets.ok()) << sockets.error().message;
+  EXPECT_TRUE((*sockets)->hearsBroadcasts());
+  int ears = 0;
+  for (int file = 0; file < 1024; ++file) {
+    sockaddr_in bound{};
+    socklen_t size = sizeof bound;
+    if (::getsockname(file, reinterpret_cast<sockaddr*>(&bound), &size) != 0 || bound.sin_family != AF_INET ||
+        ntohs(bound.sin_port) != kControlPort || ntohl(bound.sin_addr.s_addr) == place->address.to_uint())
+      continue;
+    ++ears;
+    std::array<char, 64> name{};
+    size = name.size();
+    EXPECT_EQ(::getsockopt(file, SOL_SOCKET, SO_BINDTODEVICE, name.data(), &size), 0);
+    EXPECT_EQ(name.data(), place->interface_name);
+    EXPECT_STRNE(name.data(), "");
+  }
+  EXPECT_EQ(ears, 2);
+}
+
 TEST(GigeVisionControl, HearsTheNextCommandAfterOneThatFailed) {
   boost::asio::io_context io;
   const auto pid = static_cast<unsigned>(::getpid());
