@@ -108,6 +108,18 @@ std::vector<Planted> overDistance() {
          const std::vector<int> orders{1, 2, 4};
          return harmonicTraits(d, e, f, orders);
        }});
+  // Amplitudes err by 2 mm · √(2/240) = 0.183 mm: one that is not there, and one as small as its own error.
+  rows.push_back({"small harmonics",
+                  {{"30 MHz, 1 per period", 0.183}, {"30 MHz, 2 per period", 0.0}},
+                  [](Noise& noise) {
+                    const Columns d = spaced(0.5, 6.5, 240);
+                    const double k = 4.0 * std::numbers::pi * 30e6 / 299'792'458.0;
+                    const Columns e =
+                        noisy(d, 2.0, noise, [&](double x) { return 3.0 + 0.183 * std::cos(k * x + 1.0); });
+                    const std::vector<double> f{30e6};
+                    const std::vector<int> orders{1, 2, 4};
+                    return harmonicTraits(d, e, f, orders);
+                  }});
   rows.push_back({"noise law", {{"floor", 2.0}, {"shot", 3.0}, {"read", 0.4}}, [](Noise& noise) {
                     // σ of 60 frames each: √(1/118) of itself uncertain. Relative to the largest signal,
                     // 1000.
@@ -340,7 +352,7 @@ std::map<std::string, int> heldBy(const Planted& planted) {
 class Coverage : public testing::TestWithParam<std::size_t> {};
 
 /// 90 to 98.5 % of 200 runs. The goal is 98; but what holds exactly 95 % exceeds 98 in 0.9 % of all choices
-/// of 200 seeds, and two of these 48 rows do. The seeds are fixed, so the test does not waver. What holds 85
+/// of 200 seeds, and two of these 50 rows do. The seeds are fixed, so the test does not waver. What holds 85
 /// % fails in 97 %.
 TEST_P(Coverage, OfIntervalsIs90To98Percent) {
   const Planted planted = allPlanted()[GetParam()];

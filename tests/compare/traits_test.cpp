@@ -82,6 +82,18 @@ TEST(Traits, SayWhatRowsCannotTell) {
   EXPECT_FALSE(noiseLawTraits(same, same));
 }
 
+/// A clean step in eight rows: none flies of eight crossings, and where none flies there is no side to hang on.
+TEST(Traits, OfFlyingPixelsSayNothingOfASideWhereNoneFlies) {
+  Image<float> range(16, 8, 2.0f);
+  for (int y = 0; y < 8; ++y) {
+    for (int x = 0; x < 8; ++x) range(x, y) = 1.0f;
+  }
+  const auto traits = flyingTraits(range);
+  ASSERT_TRUE(traits);
+  ASSERT_EQ(traits->size(), 1u);
+  EXPECT_EQ(traits->front().value, 0.0);
+}
+
 TEST(Traits, LeaveOutRowsThatAreNotFinite) {
   std::vector<double> speed, error;
   for (int i = 0; i < 10; ++i) {

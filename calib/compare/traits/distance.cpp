@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <boost/math/distributions/non_central_f.hpp>
 #include <cmath>
 #include <numbers>
 
@@ -29,6 +30,33 @@ std::vector<Wave> wavesOf(std::span<const double> frequency_hz, std::span<const 
   return waves;
 }
 
+/// A = √(a² + b²) of two parameters from `first` on, which err alike by σ. A²/2σ² is of a noncentral F
+/// distribution with 2 and ν degrees and noncentrality A₀²/σ²: its inversion, as √ is not straight near 0,
+/// and an A₀ of 0 is seen as 1.25 σ on the mean. From ten σ on the delta method is as good.
+Trait amplitudeTrait(const Fit& fit, const std::string& name, std::size_t first) {
+  const auto amplitudeOf = [first](std::span<const double> p) { return std::hypot(p[first], p[first + 1]); };
+  Trait trait = fit.trait(name, "mm", amplitudeOf);
+  const double sigma = std::sqrt(0.5 * (std::pow(fit.error(first), 2) + std::pow(fit.error(first + 1), 2)));
+  const double seen = trait.value / sigma;
+  if (!(sigma > 0.0) || seen > 10.0) return trait;
+  // The A₀/σ of which so large a share of runs show less than `at`; 0 where even that of none does not.
+  const auto invert = [&](double at, double share) {
+    const auto below = [&](double wanted) {
+      return boost::math::cdf(boost::math::non_central_f{2.0, fit.degrees, wanted * wanted}, 0.5 * at * at);
+    };
+    double low = 0.0, high = at + 10.0;
+    for (int i = 0; i < 50; ++i) {
+      const double middle = 0.5 * (low + high);
+      (below(std::max(middle, 1e-9)) > share ? low : high) = middle;
+    }
+    return low;
+  };
+  trait.low = sigma * invert(seen, 0.975);
+  // Less than noise alone shows on the mean does not prove that there is less than nothing.
+  trait.high = sigma * invert(std::max(seen, std::sqrt(0.5 * std::numbers::pi)), 0.025);
+  return trait;
+}
+
 }  // namespace
 
 Traits harmonicTraits(Column distance_m, Column error_mm, std::span<const double> frequency_hz,
@@ -49,12 +77,7 @@ Traits harmonicTraits(Column distance_m, Column error_mm, std::span<const double
     return undetermined("harmonics", "the distances span too little of a period, or two orders coincide");
   std::vector<Trait> traits;
   for (std::size_t w = 0; w < waves.size(); ++w) {
-    // At a zero amplitude the direction has no derivative: a small number keeps it finite, and the interval
-    // ends at 0.
-    Trait one = fit->trait(waves[w].name, "mm",
-                           [w](std::span<const double> p) { return std::hypot(p[2 + 2 * w], p[3 + 2 * w]); });
-    one.low = std::max(0.0, one.low);
-    traits.push_back(std::move(one));
+    traits.push_back(amplitudeTrait(*fit, waves[w].name, 2 + 2 * w));
   }
   traits.push_back(fit->trait("scale", "mm/m", 1));
   const double sd = std::sqrt(fit->squares / fit->degrees), half = 1.96 / std::sqrt(2.0 * fit->degrees);

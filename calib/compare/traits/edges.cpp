@@ -58,8 +58,13 @@ Traits flyingTraits(const Image<float>& range_m) {
   }
   if (crossings < 4)
     return undetermined("flying pixels", "fewer than four rows cross an edge between two surfaces");
-  return std::vector{shareTrait("flying", flying, crossings), meanTrait("offset", "1", offsets),
-                     shareTrait("near side", near_side, std::max<std::size_t>(1, flying))};
+  std::vector<Trait> traits{shareTrait("flying", flying, crossings)};
+  // What does not fly hangs nowhere; of one pixel there is no interval.
+  if (flying > 1) {
+    traits.push_back(meanTrait("offset", "1", offsets));
+    traits.push_back(shareTrait("near side", near_side, flying));
+  }
+  return traits;
 }
 
 Traits edgeTraits(Column x_px, Column value) {

@@ -56,7 +56,7 @@ Traits scatterTraits(Column own_range_m, Column plate_range_m, Column plate_over
                      double frequency_hz);
 
 /// Of steps in the rows of one image: "flying" share of the crossings with a pixel in between, "offset" where
-/// it hangs from near (0) to far (1), "near side" share of those nearer to the foreground.
+/// it hangs from near (0) to far (1), "near side" share of those nearer to the foreground; the last two where two fly or more.
 Traits flyingTraits(const Image<float>& range_m);
 
 /// y(x) = near + step Φ((x − x₀)/w): "edge" x₀, "width" w, "10-90 width", and "resolution": the spatial
@@ -85,7 +85,8 @@ Traits maskTraits(std::span<const Image<std::uint8_t>> a, std::span<const Image<
 /// "interval", "jitter" (sd of intervals that are not gaps), "lost" share of frames.
 Traits timingTraits(Column start_s);
 
-/// Of frames of one place: "temporal noise", "fixed pattern", "correlation along x", "… along y", "… in time"
+/// Of errors (range less the true one: ranges themselves have the scene as their pattern) in frames of one place:
+/// "temporal noise", "fixed pattern", "correlation along x", "… along y", "… in time"
 /// at one pixel or frame. Intervals over blocks of the image, which must have 8 × 8 pixels or more.
 Traits noiseTraits(std::span<const Image<float>> frames_mm);
 
