@@ -9,6 +9,8 @@
 #include <limits>
 #include <span>
 
+#include "daemon/facades/frame_views.h"
+
 namespace toftwin::daemon::gige_vision {
 namespace {
 
@@ -34,14 +36,6 @@ struct Cursor {
 std::uint32_t countOf(double value, double most) {
   const double count = std::round(value);
   return count >= 0.0 && count <= most ? static_cast<std::uint32_t>(count) : 0U;
-}
-
-const Plane* planeOf(const Frame& frame, PlaneKind kind, ElementType type) {
-  const Plane* plane = frame.find(kind);
-  return plane != nullptr && plane->type == type && plane->width == frame.camera.width &&
-                 plane->height == frame.camera.height
-             ? plane
-             : nullptr;
 }
 
 /// Calls `take(index)` for each pixel of the region.
@@ -200,16 +194,7 @@ std::uint32_t payloadSizeOf(const ImageSetup& setup) {
 }
 
 Rays raysOf(const CameraInfo& camera) {
-  Rays rays{camera, {}};
-  rays.unit_vectors.reserve(3 * static_cast<std::size_t>(camera.width) *
-                            static_cast<std::size_t>(camera.height));
-  for (int v = 0; v < camera.height; ++v) {
-    for (int u = 0; u < camera.width; ++u) {
-      const Vec3d ray = rayThroughPixel(camera, u, v).v;
-      for (const double e : {ray.x, ray.y, ray.z}) rays.unit_vectors.push_back(static_cast<float>(e));
-    }
-  }
-  return rays;
+  return {camera, unitVectorsOf(camera)};
 }
 
 Result<Payload> payloadOf(const Frame& frame, const Rays& rays, const ImageSetup& setup,

@@ -6,6 +6,7 @@
 #include <limits>
 #include <set>
 
+#include "daemon/facades/frame_views.h"
 #include "daemon/facades/o3d303/inverse_lens.h"
 #include "drivers/o3d303/wire/confidence.h"
 
@@ -21,14 +22,6 @@ constexpr std::size_t kMostExposures = 3;
 /// 0 for what is no number, or does not fit.
 std::uint16_t countsOf(double value) {
   return value > 0.0 && value <= kMost ? static_cast<std::uint16_t>(std::lround(value)) : std::uint16_t{0};
-}
-
-const Plane* planeOf(const Frame& frame, PlaneKind kind, ElementType type) {
-  const Plane* plane = frame.find(kind);
-  return plane != nullptr && plane->type == type && plane->width == frame.camera.width &&
-                 plane->height == frame.camera.height
-             ? plane
-             : nullptr;
 }
 
 Result<std::vector<std::uint16_t>> distancesOf(const Frame& frame, const LensChunks& lens) {
@@ -71,15 +64,7 @@ FrameFacts factsOf(const Frame& frame) {
 }
 
 LensChunks lensChunksOf(const CameraInfo& camera) {
-  LensChunks lens{camera, {}, {}, {}};
-  lens.unit_vectors.reserve(3 * static_cast<std::size_t>(camera.width) *
-                            static_cast<std::size_t>(camera.height));
-  for (int v = 0; v < camera.height; ++v) {
-    for (int u = 0; u < camera.width; ++u) {
-      const Vec3d ray = rayThroughPixel(camera, u, v).v;
-      for (const double e : {ray.x, ray.y, ray.z}) lens.unit_vectors.push_back(static_cast<float>(e));
-    }
-  }
+  LensChunks lens{camera, unitVectorsOf(camera), {}, {}};
   // fx fy mx my alpha k1 k2 k5 k3 k4, then the optics against the housing: none.
   const auto chunkOf = [&](const std::array<double, 5>& d) {
     std::array<float, 16> chunk{};

@@ -7,6 +7,8 @@
 #include <cstring>
 #include <limits>
 
+#include "daemon/facades/frame_views.h"
+
 namespace toftwin::daemon::ros2 {
 namespace {
 
@@ -15,17 +17,7 @@ static_assert(std::endian::native == std::endian::little);
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 constexpr double kMillimetres = 1000.0, kMost16 = 65'535.0;
 
-const Plane* planeOf(const Frame& frame, PlaneKind kind) {
-  const Plane* plane = frame.find(kind);
-  return plane != nullptr && plane->channels == 1 && plane->width == frame.camera.width &&
-                 plane->height == frame.camera.height
-             ? plane
-             : nullptr;
-}
-const Plane* floatsOf(const Frame& frame, PlaneKind kind) {
-  const Plane* plane = planeOf(frame, kind);
-  return plane != nullptr && plane->type == ElementType::F32 ? plane : nullptr;
-}
+const Plane* floatsOf(const Frame& frame, PlaneKind kind) { return planeOf(frame, kind, ElementType::F32); }
 
 template <class T>
 std::vector<std::uint8_t> bytesOf(std::span<const T> values) {

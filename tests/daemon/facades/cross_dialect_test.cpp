@@ -7,7 +7,6 @@
 #include <boost/asio/read.hpp>
 #include <boost/asio/write.hpp>
 #include <cmath>
-#include <map>
 
 #include "drivers/o3d303/wire/confidence.h"
 #include "facade_testing.h"
@@ -72,22 +71,16 @@ TEST_F(CrossDialect, TheO3d303sFramesAreTheNativeOnesBitForBitWithTheirTimeStamp
   auto native_stream = native_client.subscribe("cam", {.policy = Policy::Queue, .queue = 64});
   ASSERT_TRUE(native_stream.ok()) << native_stream.error().message;
   ASSERT_TRUE((*driver)->start().ok());
-  std::map<std::int64_t, Frame> natives;  // by device time
+  Natives natives{*std::move(native_stream), deviceTimeOf};
   int compared = 0;
   for (int i = 0; i < 60 && compared < 5; ++i) {
     const auto through = nextFrame(**driver);
     ASSERT_TRUE(through.ok()) << through.error().message;
-    const std::int64_t stamp = through->moment.exposures.at(0).start.ns;
-    while (natives.empty() || natives.rbegin()->first < stamp) {
-      auto native = native_stream->next(kSoon);
-      ASSERT_TRUE(native.ok()) << native.error().message;
-      const std::int64_t start = native->moment.exposures.at(0).start.ns;
-      natives.insert_or_assign(start, *std::move(native));
-    }
-    const auto same = natives.find(stamp);
-    if (same == natives.end()) continue;  // from before the native subscription
-    ASSERT_NO_FATAL_FAILURE(expectSame(same->second, *through));
-    EXPECT_EQ(through->moment.exposures.at(0).duration, same->second.moment.exposures.at(0).duration);
+    const auto native = natives.at(deviceTimeOf(*through));
+    ASSERT_TRUE(native.ok()) << native.error().message;
+    if (*native == nullptr) continue;
+    ASSERT_NO_FATAL_FAILURE(expectSame(**native, *through));
+    EXPECT_EQ(through->moment.exposures.at(0).duration, (*native)->moment.exposures.at(0).duration);
     ++compared;
   }
   EXPECT_EQ(compared, 5);

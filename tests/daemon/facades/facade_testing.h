@@ -9,6 +9,8 @@
 #include <boost/asio/ip/tcp.hpp>
 
 #include <cstdint>
+#include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <utility>
@@ -60,5 +62,30 @@ inline Result<Frame> nextFrame(drivers::Source& source) {
   }
   return Error{Error::Code::Timeout, "no frame for long"};
 }
+
+/// The native frame with a time stamp: what a facade's frame is compared with.
+class Natives {
+ public:
+  using StampOf = std::function<std::int64_t(const Frame&)>;
+  Natives(Subscription stream, StampOf stamp_of) : stream_(std::move(stream)), stamp_of_(std::move(stamp_of)) {}
+
+  /// Null: it was before the subscription. Errors are those of the subscription.
+  Result<const Frame*> at(std::int64_t stamp) {
+    while (frames_.empty() || frames_.rbegin()->first < stamp) {
+      auto native = stream_.next(kSoon);
+      if (!native) return native.error();
+      const std::int64_t is_at = stamp_of_(*native);
+      frames_.insert_or_assign(is_at, *std::move(native));
+    }
+    const auto same = frames_.find(stamp);
+    return same == frames_.end() ? nullptr : &same->second;
+  }
+
+ private:
+  Subscription stream_;
+  StampOf stamp_of_;
+  std::map<std::int64_t, Frame> frames_;
+};
+inline std::int64_t deviceTimeOf(const Frame& frame) { return frame.moment.exposures.at(0).start.ns; }
 
 }  // namespace toftwin::daemon::test

@@ -4,7 +4,6 @@
 
 #include <cmath>
 #include <fstream>
-#include <map>
 
 #include "drivers/aravis/aravis.h"
 #include "drivers/compliance.h"
@@ -32,21 +31,15 @@ class GigeVisionCross : public RunningGigeVision {
     auto native_stream = native_client.subscribe("cam", {.policy = Policy::Queue, .queue = 64});
     ASSERT_TRUE(native_stream.ok()) << native_stream.error().message;
     ASSERT_TRUE((*driver)->start().ok());
-    std::map<std::int64_t, Frame> natives;  // by device time
+    Natives natives{*std::move(native_stream), deviceTimeOf};
     int compared = 0;
     for (int i = 0; i < 60 && compared < 4; ++i) {
       const auto through = nextFrame(**driver);
       ASSERT_TRUE(through.ok()) << through.error().message;
-      const std::int64_t stamp = through->moment.exposures.at(0).start.ns;
-      while (natives.empty() || natives.rbegin()->first < stamp) {
-        auto native = native_stream->next(kSoon);
-        ASSERT_TRUE(native.ok()) << native.error().message;
-        const std::int64_t start = native->moment.exposures.at(0).start.ns;
-        natives.insert_or_assign(start, *std::move(native));
-      }
-      const auto same = natives.find(stamp);
-      if (same == natives.end()) continue;  // from before the native subscription
-      ASSERT_NO_FATAL_FAILURE(compare_frames(same->second, *through));
+      const auto native = natives.at(deviceTimeOf(*through));
+      ASSERT_TRUE(native.ok()) << native.error().message;
+      if (*native == nullptr) continue;
+      ASSERT_NO_FATAL_FAILURE(compare_frames(**native, *through));
       ++compared;
     }
     EXPECT_EQ(compared, 4);

@@ -3,7 +3,6 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <map>
 
 #include "ros2_testing.h"
 
@@ -25,24 +24,18 @@ class Ros2Cross : public RunningRos2 {
     auto native_client = client();
     auto stream = native_client.subscribe("cam", {.policy = Policy::Queue, .queue = 64});
     ASSERT_TRUE(stream.ok()) << stream.error().message;
-    std::map<std::int64_t, Frame> natives;
+    Natives natives{*std::move(stream), rosTimeOf};
     int compared = 0;
     for (int i = 0; i < 60 && compared < 3; ++i) {
       auto message = nextOf(reader);
       ASSERT_TRUE(message);
       CdrReader head{*message};
-      const std::int64_t stamp = readHeader(head);
-      while (natives.empty() || natives.rbegin()->first < stamp) {
-        auto native = stream->next(kSoon);
-        ASSERT_TRUE(native.ok()) << native.error().message;
-        const std::int64_t at = rosTimeOf(*native);
-        natives.insert_or_assign(at, *std::move(native));
-      }
-      const auto same = natives.find(stamp);
-      if (same == natives.end()) continue;  // from before the native subscription
+      const auto native = natives.at(readHeader(head));
+      ASSERT_TRUE(native.ok()) << native.error().message;
+      if (*native == nullptr) continue;
       CdrReader cdr{*std::move(message)};
       readHeader(cdr);
-      ASSERT_NO_FATAL_FAILURE(compare_one(same->second, cdr));
+      ASSERT_NO_FATAL_FAILURE(compare_one(**native, cdr));
       EXPECT_LT(cdr.left(), 4U);  // messages are filled up to a multiple of 4 bytes
       ++compared;
     }
