@@ -153,6 +153,21 @@ std::vector<std::string> warningsOf(const RunFiles& files, const std::map<std::s
     warnings.emplace_back(
         "A person took a camera to its poses: that both stood where the plan says is taken on trust.");
   }
+  double place_mm = 0.0, turn_deg = 0.0;
+  std::size_t seen = 0;
+  for (const CaptureRecord& one : taken) {
+    if (!one.pose_half_widths) continue;
+    const auto& h = *one.pose_half_widths;
+    place_mm = std::max(place_mm, 1e3 * std::hypot(h[3], h[4], h[5]));
+    turn_deg = std::max(turn_deg, 57.29577951308232 * std::hypot(h[0], h[1], h[2]));
+    ++seen;
+  }
+  if (seen > 0) {
+    warnings.push_back(
+        fmt::format("{} of {} poses are by what the cameras saw, known to {:.2f} mm and {:.3f}° (95 %, the worst "
+                    "of them): errors of range that are as small may be the pose's.",
+                    seen, taken.size(), place_mm, turn_deg));
+  }
   warnings.insert(warnings.end(), notes.begin(), notes.end());
   const auto moving = std::ranges::count_if(index, [](const auto& one) { return !standsStill(one.second); });
   if (moving > 0) warnings.push_back(fmt::format("{} captures of a moving plate are left out here.", moving));

@@ -86,6 +86,23 @@ void checkPlaces(const BlockSpec& block, Table& table) {
   }
 }
 
+/// What a block's poses are to be told by must be there.
+void checkPoseFrom(const Plan& plan, const BlockSpec& block, Table& table) {
+  const bool needs_board = block.pose_from == PoseFrom::Board || block.pose_from == PoseFrom::BoardAndRig;
+  if (needs_board && plan.board.corners.empty())
+    table.complain("pose_from", "needs a [board] that says what the board is and where it stands");
+  if (needs_board && !plan.board.corners.empty() && plan.board.square == Length{})
+    table.complain("pose_from", "needs board.square_mm: how large the board's squares are");
+  if (block.pose_from == PoseFrom::Planes && plan.planes.size() < 3)
+    table.complain("pose_from", "needs three [[plane]]s or more: fewer leave the camera free to slide");
+  if (block.pose_from != PoseFrom::Command && block.kind == Kind::Dark)
+    table.complain("pose_from", "has no meaning for kind = \"dark\": nothing is seen there");
+  for (const PlaneSpec& plane : plan.planes) {
+    if (std::hypot(plane.normal[0], plane.normal[1], plane.normal[2]) < 1e-9)
+      table.complain("pose_from", "needs planes whose normal has a length other than 0");
+  }
+}
+
 /// What each kind needs so that it can do what it is for.
 void checkKind(const BlockSpec& block, Table& table) {
   const std::size_t distances = different(block.distance_m), angles = different(block.angle_deg);
@@ -214,6 +231,7 @@ Result<Plan> read(Table table, const std::vector<std::string>& skip) {
   checkNames(plan, tables);
   for (std::size_t i = 0; i < plan.blocks.size(); ++i) {
     checkPlaces(plan.blocks[i], tables[i]);
+    checkPoseFrom(plan, plan.blocks[i], tables[i]);
     checkKind(plan.blocks[i], tables[i]);
     checkMeaning(plan.blocks[i], tables[i]);
     checkRepeats(plan, i, tables[i]);

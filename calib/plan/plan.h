@@ -13,6 +13,7 @@
 #include <toftwin/units.h>
 
 #include "calib/compare/poses.h"
+#include "calib/plan/pose_source.h"
 
 /// What two cameras are to be captured at, in which order, and whether that order lets effects be told apart.
 namespace toftwin::plan {
@@ -50,6 +51,7 @@ struct BlockSpec {
   std::vector<double> angle_deg{};
   std::vector<double> target_m{};
   std::vector<double> target_normal{};
+  PoseFrom pose_from = PoseFrom::Command;
   std::vector<Duration> exposures{};
   std::vector<Illuminance> ambients{};
   Order order = Order::Random;
@@ -89,6 +91,13 @@ struct BlockSpec {
               "with distance_m: angles from the target's normal, about the vertical; none: 0");
     v.numbers("target_m", target_m, {-1e6, 1e6}, "three numbers: another target than the plan's");
     v.numbers("target_normal", target_normal, {-1e6, 1e6}, "three numbers: the same for its normal");
+    v.choice("pose_from", pose_from,
+             {{"command", PoseFrom::Command},
+              {"board", PoseFrom::Board},
+              {"planes", PoseFrom::Planes},
+              {"board_and_rig", PoseFrom::BoardAndRig}},
+             "what says where the cameras stood: who put them there; the [board] or the [[plane]]s that they "
+             "see; the rig, with the camera's place on it from the captures that saw the board");
     v.quantities("exposure", exposures, microsecond, {0.1, 1e7},
                  "exposure times to go through; none: the plan's");
     v.quantities("ambient", ambients, kilolux, {0.0, 200.0}, "ambient light to go through; none: the plan's");
@@ -122,6 +131,8 @@ struct Plan {
   Duration pose_time = 10_s;
   Duration setup_time = 120_s;
   Duration warm_up_time = 900_s;
+  BoardSpec board{};
+  std::vector<PlaneSpec> planes{};
   std::vector<BlockSpec> blocks{};
 
   template <class Visitor>
@@ -142,6 +153,8 @@ struct Plan {
                "what a person takes for the setup of a block");
     v.quantity("warm_up_time", warm_up_time, second, {1.0, 1e6},
                "time constant of the camera's warm-up, for the check of what goes with it");
+    v.group("board", board, "for blocks whose poses are taken from it");
+    v.group("plane", planes, "for blocks whose poses are taken from them");
     v.group("block", blocks, "one after the other");
   }
 };

@@ -13,6 +13,7 @@
 
 #include "calib/compare/json.h"
 #include "calib/compare/json_parse.h"
+#include "calib/plan/place.h"
 
 namespace toftwin::plan {
 namespace {
@@ -104,6 +105,10 @@ std::optional<CaptureRecord> recordOf(const Json& json) {
   one.distance_m = members.number("distance_m"), one.angle_deg = members.number("angle_deg");
   one.exposure_us = members.number("exposure_us"), one.ambient_klx = members.number("ambient_klx");
   one.pose = poseOf(json.find("pose")), one.pose_by = members.text("pose_by");
+  if (const Json* widths = json.find("pose_half_widths_rad_m"); widths != nullptr && widths->size() == 6) {
+    one.pose_half_widths.emplace();
+    for (std::size_t i = 0; i < 6; ++i) (*one.pose_half_widths)[i] = widths->at(i).number();
+  }
   const auto a = fileOf(json.find("a")), b = fileOf(json.find("b"));
   if (!a || !b || !members.is_whole) return std::nullopt;
   one.a = *a, one.b = *b;
@@ -118,16 +123,27 @@ std::optional<CaptureRecord> recordOf(const Json& json) {
 std::string lineOf(const Plan& plan, const PlannedCapture& planned, const Taken& taken, const RecordedFile& a,
                    const RecordedFile& b) {
   const BlockSpec& block = plan.blocks[planned.block];
+  Sight sight{planned.distance_m, planned.angle_deg};
+  if (taken.seen) {
+    compare::PoseSpec seen;
+    const Vec3d& t = taken.pose->translation_m;
+    seen.position_m = {t.x, t.y, t.z}, seen.rotation_wxyz = taken.pose->rotation_wxyz;
+    sight = sightOf(targetOf(plan, block), seen);
+  }
   const Duration exposure = taken.a.exposure.value_or(planned.exposure);
   Json json = Json::object();
   json.set("number", planned.number).set("block", block.name).set("kind", std::string{nameOf(block.kind)});
   json.set("name", planned.name).set("condition", planned.condition).set("repeat", planned.repeat);
   json.set("locked", planned.is_locked ? 1 : 0).set("again", planned.again ? Json{*planned.again} : Json{});
   json.set("start_s", planned.start.in(second)).set("began_ns", taken.began_ns);
-  json.set("distance_m", planned.distance_m).set("angle_deg", planned.angle_deg);
+  json.set("distance_m", sight.distance_m).set("angle_deg", sight.angle_deg);
   json.set("exposure_us", exposure.in(microsecond)).set("ambient_klx", planned.ambient.in(kilolux));
   json.set("corner_deg", block.corner_deg).set("speed_m_per_s", block.speed_m_per_s);
   json.set("pose", toJson(taken.pose)).set("pose_by", taken.pose_by);
+  if (taken.seen) {
+    json.set("pose_seen", taken.seen->what)
+        .set("pose_half_widths_rad_m", Json::arrayOf(taken.seen->half_widths));
+  }
   json.set("a", toJson(a, taken.a)).set("b", toJson(b, taken.b));
   json.set("rig", taken.rig).set("notes", Json::arrayOf(taken.notes));
   return json.line();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -48,6 +49,8 @@ struct CaptureRecord {
   double ambient_klx = 0.0;
   std::optional<Transform<World, Camera>> pose{};
   std::string pose_by{};
+  /// 95 % half widths of a pose that was seen: turns (rad), then place (m).
+  std::optional<std::array<double, 6>> pose_half_widths{};
   RecordedFile a{}, b{};
   std::vector<std::string> notes{};
 };

@@ -48,6 +48,12 @@ Error naming(const PlannedCapture& planned, const Error& error) {
 
 }  // namespace
 
+/// The pose of a camera's frames: as it says itself, which is not always what was seen.
+std::optional<Transform<World, Camera>> Taker::saidBy(const Feed& feed, const Taken& taken) const {
+  const auto found = says_.find(&feed);
+  return found == says_.end() ? taken.pose : found->second;
+}
+
 compare::CaptureOptions Taker::captureOptions() const {
   compare::CaptureOptions options;
   options.timeout = options_.timeout;
@@ -105,6 +111,7 @@ Result<> Taker::stand(const PlannedCapture& planned, Feed& a, Feed& b, Taken& ta
   if (!planned.pose) return {};
   taken.pose = planned.pose->world_from_camera();
   taken.pose_by = "camera";
+  says_.clear();
   if (options_.carrier != nullptr) {
     auto reached = options_.carrier->go(*planned.pose);
     if (!reached) return Error{reached.error().code, "nothing was captured: " + reached.error().message};
@@ -144,7 +151,7 @@ Result<> Taker::setUp(const PlannedCapture& planned, Feed& feed, const std::stri
 /// The first frame of a subscription in lockstep is made at once, perhaps before what is set next.
 Result<> Taker::dropFirst(Feed& feed, const Taken& taken) {
   if (!feed.details().can_lockstep || !known_.insert(&feed).second) return {};
-  const auto early = compare::nextFrameAt(feed, taken.pose, captureOptions());
+  const auto early = compare::nextFrameAt(feed, saidBy(feed, taken), captureOptions());
   return early ? Result<>{} : early.error();
 }
 
@@ -155,7 +162,7 @@ Result<TakenBy> Taker::framesOf(const PlannedCapture& planned, Feed& feed, const
   TakenBy by{.source = nameOf(feed), .model = feed.details().entry.model};
   const auto options = captureOptions();
   for (int stale = 0; by.frames < static_cast<std::uint64_t>(planned.frames);) {
-    auto frame = compare::nextFrameAt(feed, taken.pose, options);
+    auto frame = compare::nextFrameAt(feed, saidBy(feed, taken), options);
     if (!frame) return frame.error();
     if (has(feed, kExposure) && !isExposedAsPlanned(*frame, planned.exposure)) {
       if (++stale <= kStaleFrames && by.frames == 0) continue;
@@ -164,7 +171,8 @@ Result<TakenBy> Taker::framesOf(const PlannedCapture& planned, Feed& feed, const
           fmt::format("{} was set to an exposure of {:.6g} us, but its frames say {:.6g} us", nameOf(feed),
                       planned.exposure.in(microsecond), longestExposure(*frame)->in(microsecond))};
     }
-    if (!frame->moment.world_from_camera) frame->moment.world_from_camera = taken.pose;
+    // What the cameras saw counts for more than what one says of itself.
+    if (!frame->moment.world_from_camera || taken.seen) frame->moment.world_from_camera = taken.pose;
     if (!frame->moment.since_power_on) frame->moment.since_power_on = since_power_on;
     if (by.frames == 0) {
       by.since_power_on = frame->moment.since_power_on, by.temperatures = frame->moment.temperatures;
@@ -218,6 +226,7 @@ Result<Taken> Taker::take(const PlannedCapture& planned, Feed& a, Feed& b, const
   for (Feed* feed : {&a, &b}) {
     if (auto done = dropFirst(*feed, taken); !done) return naming(planned, done.error());
   }
+  if (auto done = lookAround(planned, a, b, taken); !done) return naming(planned, done.error());
   if (auto done = waitForTurn(planned, a); !done) return naming(planned, done.error());
   taken.began_ns = std::chrono::duration_cast<std::chrono::nanoseconds>(
                        std::chrono::system_clock::now().time_since_epoch())

@@ -16,6 +16,7 @@
 #include "calib/compare/capture.h"
 #include "calib/plan/captures.h"
 #include "calib/plan/plan.h"
+#include "calib/plan/pose_finder.h"
 
 namespace toftwin::plan {
 
@@ -55,7 +56,9 @@ struct TakenBy {
 /// What was captured, and how.
 struct Taken {
   std::optional<Transform<World, Camera>> pose{};
-  std::string pose_by{};  ///< "camera", "rig", "person", or "" where they were left
+  /// "camera", "rig", "person", "board", "planes", "rig with the board's help"; "" where they were left
+  std::string pose_by{};
+  std::optional<SeenPose> seen{};  ///< what the pose was told from, where a camera saw it
   std::int64_t began_ns = 0;
   TakenBy a{}, b{};
   compare::Json rig{};
@@ -65,7 +68,8 @@ struct Taken {
 /// Takes the captures of a plan, one after the other; remembers what it set and what a person did.
 class Taker {
  public:
-  Taker(const Plan& plan, TakeOptions options) : plan_(plan), options_(std::move(options)) {}
+  Taker(const Plan& plan, TakeOptions options)
+      : plan_(plan), options_(std::move(options)), finder_a_(plan), finder_b_(plan) {}
 
   /// Frames go to the sinks as they come. A first: then B, where it can, is set to what A's first frame says
   /// of the moment: time since power-on, ambient light, room temperature, exposure. Errors say what could not
@@ -80,6 +84,9 @@ class Taker {
   Result<> waitForTurn(const PlannedCapture& planned, compare::Feed& a);
   Result<> prepare(const PlannedCapture& planned);
   Result<> stand(const PlannedCapture& planned, compare::Feed& a, compare::Feed& b, Taken& taken);
+  Result<> lookAround(const PlannedCapture& planned, compare::Feed& a, compare::Feed& b, Taken& taken);
+  Result<SeenPose> seenBy(const PlannedCapture& planned, compare::Feed& feed, PoseFinder& finder,
+                          const Taken& taken);
   Result<> standBy(const compare::PoseSpec& pose, compare::Feed& feed, Taken& taken);
   Result<> setUp(const PlannedCapture& planned, compare::Feed& feed, const std::string& ambient_told);
   Result<> dropFirst(compare::Feed& feed, const Taken& taken);
@@ -89,6 +96,8 @@ class Taker {
   Result<> follow(const PlannedCapture& planned, const Frame& leader, compare::Feed& feed, Taken& taken);
   Result<> tell(const std::string& about, const std::string& what);
   [[nodiscard]] compare::CaptureOptions captureOptions() const;
+  [[nodiscard]] std::optional<Transform<World, Camera>> saidBy(const compare::Feed& feed,
+                                                               const Taken& taken) const;
 
   Plan plan_;
   TakeOptions options_;
@@ -96,6 +105,8 @@ class Taker {
   std::map<std::string, std::string> told_;                   ///< what a person did last, by what it is about
   std::map<std::string, std::map<std::string, double>> set_;  ///< parameters, by source
   std::set<const compare::Feed*> known_;  ///< whose first frame was seen
+  PoseFinder finder_a_, finder_b_;
+  std::map<const compare::Feed*, std::optional<Transform<World, Camera>>> says_;  ///< pose that its frames say, if any
   std::optional<std::chrono::steady_clock::time_point> began_, last_began_;
 };
 

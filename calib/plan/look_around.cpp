@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where the cameras stand, by what they see.
+#include <fmt/format.h>
+
+#include "calib/plan/take.h"
+
+namespace toftwin::plan {
+namespace {
+
+using compare::Feed;
+
+const std::string& sourceOf(const Feed& feed) { return feed.details().entry.name; }
+
+}  // namespace
+
+Result<SeenPose> Taker::seenBy(const PlannedCapture& planned, Feed& feed, PoseFinder& finder,
+                               const Taken& taken) {
+  if (auto begun = feed.beginAnew(); !begun) return begun.error();
+  std::vector<Frame> frames;
+  while (frames.size() < static_cast<std::size_t>(plan_.board.frames)) {
+    auto frame = compare::nextFrameAt(feed, saidBy(feed, taken), captureOptions());
+    if (!frame) return frame.error();
+    frames.push_back(*std::move(frame));
+  }
+  auto seen = finder.find(plan_.blocks[planned.block].pose_from, frames, taken.pose);
+  if (seen) return seen;
+  return Error{seen.error().code,
+               fmt::format("where {} stands is not seen: {}", sourceOf(feed), seen.error().message)};
+}
+
+/// A sees where it stands. A twin that takes poses is put there; another camera must see the same place.
+Result<> Taker::lookAround(const PlannedCapture& planned, Feed& a, Feed& b, Taken& taken) {
+  const PoseFrom from = plan_.blocks[planned.block].pose_from;
+  if (from == PoseFrom::Command) return {};
+  if (from == PoseFrom::BoardAndRig && options_.carrier == nullptr)
+    return Error{Error::Code::InvalidArgument,
+                 "pose_from = \"board_and_rig\", but there is no rig: --rig names it"};
+  const bool was_put = taken.pose_by == "camera" || taken.pose_by == "rig";
+  auto seen = seenBy(planned, a, finder_a_, taken);
+  if (!seen) return seen.error();
+  // Where the camera sits on the rig is what the board is to tell.
+  if (taken.pose && was_put && from != PoseFrom::BoardAndRig) {
+    const std::string off = disagreement(*seen, *taken.pose, {}, plan_.board);
+    if (!off.empty())
+      return Error{Error::Code::InvalidArgument,
+                   fmt::format("poses disagree: {} by what {} sees ({}) and by the {} are {}", planned.name,
+                               sourceOf(a), seen->what, taken.pose_by, off)};
+  }
+  const auto commanded = taken.pose;
+  if (!b.details().can_set_pose) {
+    const auto by_b = seenBy(planned, b, finder_b_, taken);
+    if (!by_b) {
+      return Error{by_b.error().code, fmt::format("{} sees where it stands ({}), the other does not: {}",
+                                                  sourceOf(a), seen->what, by_b.error().message)};
+    }
+    const std::string off = disagreement(*seen, by_b->world_from_camera, by_b->half_widths, plan_.board);
+    if (!off.empty())
+      return Error{Error::Code::InvalidArgument, fmt::format("poses disagree: {} and {} stand at places {}",
+                                                             sourceOf(a), sourceOf(b), off)};
+  } else if (auto put = b.setPose(seen->world_from_camera); !put) {
+    return put.error();
+  }
+  says_[&a] = commanded, says_[&b] = b.details().can_set_pose ? seen->world_from_camera : commanded;
+  taken.pose = seen->world_from_camera, taken.pose_by = seen->by, taken.seen = *std::move(seen);
+  return {};
+}
+
+}  // namespace toftwin::plan
