@@ -117,6 +117,8 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   daemon::keepFreedMemory();
+  // Where our plug-in for OpenNI2 is installed, the driver openni2 would show a daemon its own sources.
+  ::setenv("TOFTWIN_OPENNI2", "off", 1);  // NOLINT(concurrency-mt-unsafe): there is no other thread yet
   try {
     return run(argc, argv);
   } catch (const std::exception& e) {

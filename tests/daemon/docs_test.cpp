@@ -9,6 +9,7 @@
 
 #include "daemon/config.h"
 #include "daemon/facades/facade.h"
+#include "daemon/facades/openni2/keys.h"
 #include "drivers/rig/rig_file.h"
 #include "drivers/source.h"
 #include "protocol/settings/describe.h"
@@ -47,6 +48,10 @@ TEST(Docs, OfEveryFacadeHaveAllItsKeysAndARowInTheTable) {
     expectIn(fmt::format("facades/{}.md", facade.name), facade.document());
     expectIn("daemon.md", fmt::format("| [{0}](facades/{0}.md) | {1} |\n", facade.name, facade.summary));
   }
+}
+
+TEST(Docs, OfThePlugInForOpenNI2HaveAllItsKeys) {
+  expectIn("facades/openni2.md", settings::markdownTable(settings::keysOf<openni2::Keys>()));
 }
 
 TEST(Docs, OfTheRigHaveAllItsKeys) {

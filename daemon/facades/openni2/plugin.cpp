@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "daemon/facades/openni2/device.h"
+#include "daemon/facades/openni2/discovery.h"
+#include "daemon/facades/openni2/guarded.h"
+#include "daemon/facades/openni2/keys.h"
+
+namespace toftwin::openni2 {
+namespace {
+
+/// What OpenNI2 creates once when it starts and destroys when it ends.
+class Driver final : public oni::driver::DriverBase {
+ public:
+  explicit Driver(OniDriverServices* services) noexcept : DriverBase(services) {}
+
+  OniStatus initialize(oni::driver::DeviceConnectedCallback connected,
+                       oni::driver::DeviceDisconnectedCallback disconnected,
+                       oni::driver::DeviceStateChangedCallback changed, void* cookie) override {
+    return guarded(ONI_STATUS_ERROR, [&] {
+      const OniStatus status = DriverBase::initialize(connected, disconnected, changed, cookie);
+      configuration_ = std::make_unique<Result<Configuration>>(configurationHere());
+      // What is wrong with it is told to who opens a device of ours, not to every program that starts OpenNI2.
+      if (!*configuration_ || (*configuration_)->is_off) return status;
+      discovery_ = std::make_unique<Discovery>(
+          (*configuration_)->keys.addresses,
+          Discovery::Events{[this](const OniDeviceInfo& info) { deviceConnected(&info); },
+                            [this](const OniDeviceInfo& info) { deviceDisconnected(&info); },
+                            [this](const OniDeviceInfo& info, OniDeviceState state) {
+                              deviceStateChanged(&info, state);
+                            }});
+      return status;
+    });
+  }
+
+  void shutdown() override {
+    guarded([&] {
+      if (discovery_ != nullptr && !discovery_->finish()) static_cast<void>(discovery_.release());
+      discovery_.reset();
+    });
+  }
+
+  OniStatus tryDevice(const char* uri) override {
+    return guarded(ONI_STATUS_ERROR, [&] {
+      if (uri == nullptr || !isOurs(uri) || configuration_ == nullptr) return ONI_STATUS_ERROR;
+      if (!*configuration_) return statusOf(configuration_->error(), complain());
+      if (discovery_ == nullptr) return ONI_STATUS_ERROR;
+      return statusOf(discovery_->find(uri), complain());
+    });
+  }
+
+  oni::driver::DeviceBase* deviceOpen(const char* uri, const char* /*mode*/) override {
+    return guarded(static_cast<oni::driver::DeviceBase*>(nullptr), [&]() -> oni::driver::DeviceBase* {
+      if (uri == nullptr || discovery_ == nullptr) return nullptr;
+      const Configuration& configuration = **configuration_;
+      auto place = placeOf(uri, configuration.firstAddress());
+      if (!place) {
+        complain()(place.error().message);
+        return nullptr;
+      }
+      auto device = Device::open(
+          *std::move(place), configuration.keys,
+          {.complain = complain(),
+           .state = [this, name = std::string{uri}](OniDeviceState state) { discovery_->post(name, state); }});
+      if (!device) {
+        complain()(device.error().message);
+        return nullptr;
+      }
+      return (*device).release();
+    });
+  }
+
+  void deviceClose(oni::driver::DeviceBase* device) override {
+    guarded([&] {
+      std::unique_ptr<Device> ours{dynamic_cast<Device*>(device)};
+      if (ours != nullptr && !ours->finish()) static_cast<void>(ours.release());
+    });
+  }
+
+  /// All images of a device are made of the same frames, one after another, with the same numbers.
+  void* enableFrameSync(oni::driver::StreamBase** streams, int count) override {
+    return guarded(static_cast<void*>(nullptr), [&]() -> void* {
+      if (streams == nullptr || count <= 0) return nullptr;
+      const Device* device = nullptr;
+      for (int i = 0; i < count; ++i) {
+        const auto* stream = dynamic_cast<Stream*>(streams[i]);
+        if (stream == nullptr || (device != nullptr && device != &stream->device())) return nullptr;
+        device = &stream->device();
+      }
+      return this;
+    });
+  }
+
+ private:
+  Complain complain() {
+    return [this](std::string_view what) {
+      getServices().errorLoggerAppend("%.*s", static_cast<int>(what.size()), what.data());
+    };
+  }
+
+  std::unique_ptr<Result<Configuration>> configuration_;
+  std::unique_ptr<Discovery> discovery_;
+};
+
+}  // namespace
+}  // namespace toftwin::openni2
+
+using ToftwinDriver = toftwin::openni2::Driver;
+ONI_EXPORT_DRIVER(ToftwinDriver)
