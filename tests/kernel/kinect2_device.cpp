@@ -9,6 +9,9 @@
 namespace toftwin::kernel_test {
 namespace {
 
+using daemon::usb_camera::stall;
+using daemon::usb_camera::Writer;
+
 constexpr std::uint8_t kCommands = 0x02, kAnswers = 0x81, kStream = 0x84;
 constexpr unsigned kBulkPacket = 1024, kStreamPacket = 1024, kBurst = 11, kMult = 3;
 

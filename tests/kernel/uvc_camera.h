@@ -1,25 +1,36 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <atomic>
+#include <chrono>
 #include <optional>
 
-#include "usb_device.h"
+#include "daemon/facades/usb_camera/uvc_device.h"
 
 namespace toftwin::kernel_test {
 
-/// A USB depth camera as uvcvideo knows them: Z16 in one or two streams (the
-/// second is Y16 infrared), a gain and an exposure time. [USB Video Class 1.0]
-class UvcCamera final : public UsbDevice {
+using daemon::usb_camera::Answer;
+using daemon::usb_camera::Bytes;
+using daemon::usb_camera::Setup;
+using daemon::usb_camera::SteadyTime;
+using daemon::usb_camera::Transfer;
+using daemon::usb_camera::UsbDevice;
+using daemon::usb_camera::UsbSpeed;
+using daemon::usb_camera::Writer;
+
+/// A USB depth camera as uvcvideo knows them: Z16 in one or two streams (the second is Y16 infrared), a gain
+/// and an exposure time. It is the facade's, with pictures that tests know and faults that they ask for.
+class UvcCamera final : public daemon::usb_camera::UvcDevice {
  public:
-  enum class Endpoint { Bulk, Isochronous };
+  using Endpoint = daemon::usb_camera::Endpoint;
   struct Options {
     Endpoint endpoint = Endpoint::Bulk;
     UsbSpeed speed = UsbSpeed::High;
     bool has_infrared = false;
     std::chrono::microseconds interval{33'333};
   };
-  static constexpr std::uint32_t kWidth = 160, kHeight = 120;
+  static constexpr std::uint16_t kWidth = 160, kHeight = 120;
   static constexpr const char* kName = "Emulated Depth Camera";
   static constexpr const char* kSerial = "TT-0001";
   static constexpr std::uint16_t kGain = 7, kMostGain = 30;
@@ -29,48 +40,32 @@ class UvcCamera final : public UsbDevice {
 
   /// The code at a pixel of picture number `frame` of a stream (0: depth).
   /// Pixel (0, 0) tells the number.
-  static std::uint16_t codeAt(std::uint32_t frame, int stream, std::uint32_t x, std::uint32_t y);
+  static std::uint16_t codeAt(std::uint32_t frame, std::size_t stream, std::uint32_t x, std::uint32_t y);
   static std::uint32_t frameOf(std::uint16_t first_code) { return first_code - 1U; }
 
   // Faults, from any thread.
   void truncate(int pictures) { truncated_ = pictures; }
   void damage(int pictures) { damaged_ = pictures; }
   void hang(bool hangs) { hangs_ = hangs; }
-  [[nodiscard]] std::uint16_t gain() const { return gain_; }
+  [[nodiscard]] std::uint16_t gain() const { return static_cast<std::uint16_t>(gain_); }
   [[nodiscard]] std::uint32_t exposure_100us() const { return exposure_; }
 
-  [[nodiscard]] UsbSpeed speed() const override { return options_.speed; }
-  [[nodiscard]] Bytes deviceDescriptor() const override;
-  [[nodiscard]] Bytes configurationDescriptor() const override;
-  [[nodiscard]] std::string text(int index) const override;
-  Answer control(const Setup& setup, std::span<const std::byte> out) override;
-  void onInterface(int number, int alternate) override;
-  void onClearHalt(std::uint8_t endpoint) override;
-  bool serve(Transfer& transfer, SteadyTime now) override;
-  [[nodiscard]] SteadyTime due() const override;
-
  private:
-  struct Stream {
-    std::uint32_t frame = 0;
-    Bytes picture;  ///< being sent
-    std::size_t sent = 0;
-    bool is_toggled = false, is_damaged = false;
-    std::optional<SteadyTime> next_picture,
-        next_transfer;  ///< none: not streaming
-  };
-  [[nodiscard]] Answer probe(const Setup& setup, std::span<const std::byte> out);
-  [[nodiscard]] Answer exposureControl(const Setup& setup, std::span<const std::byte> out);
-  [[nodiscard]] Answer gainControl(const Setup& setup, std::span<const std::byte> out);
-  bool begin(Stream& stream, int index, SteadyTime now);
-  std::uint32_t putPayload(Stream& stream, Bytes& out, std::size_t most);
-  bool serveIsochronous(Stream& stream, int index, Transfer& transfer, SteadyTime now);
+  [[nodiscard]] std::uint32_t number(Number which) const override {
+    return which == Number::Gain ? gain_.load() : exposure_.load();
+  }
+  Answer setNumber(Number which, std::uint32_t value) override;
+  std::optional<daemon::usb_camera::Picture> nextPicture(std::size_t stream, SteadyTime now) override;
+  [[nodiscard]] SteadyTime nextPictureDue(std::size_t stream) const override;
+  void onReset(std::size_t stream) override { next_.at(stream).reset(); }
+  [[nodiscard]] std::uint32_t clockNow(SteadyTime now) const override;
 
-  Options options_;
-  std::vector<Stream> streams_;
+  const Options options_;
+  std::array<std::uint32_t, 2> frames_{};            // that the streams have sent
+  std::array<std::optional<SteadyTime>, 2> next_{};  // none: not streaming
   std::atomic<int> truncated_{0}, damaged_{0};
   std::atomic<bool> hangs_{false};
-  std::atomic<std::uint16_t> gain_{kGain};
-  std::atomic<std::uint32_t> exposure_{kExposure_100us};
+  std::atomic<std::uint32_t> gain_{kGain}, exposure_{kExposure_100us};
 };
 
 }  // namespace toftwin::kernel_test

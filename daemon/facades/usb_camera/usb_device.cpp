@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "usb_device.h"
+#include "daemon/facades/usb_camera/usb_device.h"
 
 #include <linux/usb/ch9.h>
 
 #include <algorithm>
 #include <cerrno>
 
-namespace toftwin::kernel_test {
+namespace toftwin::daemon::usb_camera {
 namespace {
 
 constexpr unsigned kEnglish = 0x0409;
@@ -14,15 +14,12 @@ constexpr unsigned kEnglish = 0x0409;
 Bytes stringDescriptor(const UsbDevice& device, int index) {
   Writer body;
   if (index == 0) body.u16(kEnglish);
-  const std::string text = index == 0 ? std::string{} : device.text(index);
+  constexpr std::size_t kMost = 126;  // a descriptor's length is one byte
+  const std::string text = index == 0 ? std::string{} : device.text(index).substr(0, kMost);
   for (const char c : text) body.u16(static_cast<unsigned char>(c));
   const Bytes content = body.done();
   if (content.empty()) return {};
-  return Writer{}
-      .u8(static_cast<unsigned>(content.size()) + 2)
-      .u8(USB_DT_STRING)
-      .bytes(content)
-      .done();
+  return Writer{}.u8(static_cast<unsigned>(content.size()) + 2).u8(USB_DT_STRING).bytes(content).done();
 }
 
 Answer descriptor(const UsbDevice& device, const Setup& setup) {
@@ -87,4 +84,4 @@ Writer& Writer::bytes(std::span<const std::byte> all) {
   return *this;
 }
 
-}  // namespace toftwin::kernel_test
+}  // namespace toftwin::daemon::usb_camera

@@ -4,13 +4,14 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
-/// USB devices that are programs: whatever class they are of, the kernel's own drivers see them
-/// through a UsbIpPort as if they were plugged in.
-namespace toftwin::kernel_test {
+/// USB devices that are programs: whatever class they are of, a kernel's own drivers see them over USB/IP as
+/// if they were plugged in.
+namespace toftwin::daemon::usb_camera {
 
 using SteadyTime = std::chrono::steady_clock::time_point;
 using Bytes = std::vector<std::byte>;
@@ -26,6 +27,7 @@ struct Setup {
 struct Answer {
   int status = 0;
   Bytes data{};
+  bool comes_later = false;  ///< the host waits until UsbDevice::lateAnswer() has it
 };
 Answer stall();
 
@@ -36,17 +38,17 @@ struct Transfer {
     int status = 0;
   };
   std::uint32_t number = 0;
-  std::uint8_t endpoint = 0;  ///< with the direction bit
-  std::uint32_t length = 0;   ///< most bytes that the host takes
-  Bytes data;                 ///< of an OUT transfer; to be filled for an IN transfer, without gaps
+  std::uint8_t endpoint = 0;    ///< with the direction bit
+  std::uint32_t length = 0;     ///< most bytes that the host takes
+  Bytes data;                   ///< of an OUT transfer; to be filled for an IN transfer, without gaps
   std::vector<Packet> packets;  ///< of an isochronous one
   int status = 0;
   [[nodiscard]] bool isIn() const { return (endpoint & 0x80U) != 0; }
 };
 
-enum class UsbSpeed { High = 3, Super = 5 };
+enum class UsbSpeed { High = 3, Super = 5 };  // the numbers of the kernel and of USB/IP
 
-/// A device. Its port's thread makes all calls.
+/// A device. One thread makes all calls.
 class UsbDevice {
  public:
   virtual ~UsbDevice() = default;
@@ -54,11 +56,15 @@ class UsbDevice {
   [[nodiscard]] virtual UsbSpeed speed() const { return UsbSpeed::High; }
   [[nodiscard]] virtual Bytes deviceDescriptor() const = 0;
   [[nodiscard]] virtual Bytes configurationDescriptor() const = 0;
-  /// Empty if there is no such string; they count from 1.
+  /// Empty if there is no such string; they count from 1. ASCII.
   [[nodiscard]] virtual std::string text(int index) const = 0;
 
   /// Class and vendor requests on endpoint 0; `out` are the bytes that came along.
   virtual Answer control(const Setup& setup, std::span<const std::byte> out) = 0;
+  /// Of the one request whose answer comes later, once it has come.
+  virtual std::optional<Answer> lateAnswer() { return std::nullopt; }
+  /// A host has it from now on; what was before is forgotten.
+  virtual void onAttach() {}
   virtual void onInterface(int /*number*/, int /*alternate*/) {}
   /// Of interface 0's function. [USB 3.1, 9.4.9]
   virtual void onFunctionSuspend(bool /*is_suspended*/) {}
@@ -86,4 +92,4 @@ class Writer {
   Bytes bytes_;
 };
 
-}  // namespace toftwin::kernel_test
+}  // namespace toftwin::daemon::usb_camera

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <boost/asio/steady_timer.hpp>
+#include <chrono>
+#include <memory>
+#include <optional>
+
+#include "daemon/facades/event_thread.h"
+#include "daemon/facades/source_link.h"
+#include "daemon/facades/usb_camera/keys.h"
+#include "daemon/facades/usb_camera/live_camera.h"
+#include "daemon/facades/usb_camera/server.h"
+#include "drivers/logging.h"
+#include "protocol/settings/describe.h"
+
+namespace toftwin::daemon::usb_camera {
+namespace {
+
+constexpr std::chrono::milliseconds kTick{100};
+
+class UsbCameraFacade final : public Facade {
+ public:
+  UsbCameraFacade(Keys keys, const FacadePlace& place)
+      : keys_(std::move(keys)),
+        place_(place),
+        name_("facade usb_camera of " + place.keys.source),
+        thread_(name_),
+        link_(thread_, place.hub,
+              {.source = place.keys.source,
+               .planes = {PlaneKind::Range, PlaneKind::Depth, PlaneKind::Amplitude}},
+              [this](const Frame& frame) { takeFrame(frame); }),
+        tick_(thread_.io()) {}
+
+  ~UsbCameraFacade() override { thread_.stop(); }
+
+  Result<> open() {
+    auto listener = listenFor(thread_.io(), place_.keys, static_cast<std::uint16_t>(keys_.port), "port");
+    if (!listener) return listener.error();
+    server_.emplace(*std::move(listener), name_);
+    where_ = fmt::format("USB/IP on {} port {}", place_.keys.address, server_->port());
+    tick();
+    thread_.start();
+    return {};
+  }
+  [[nodiscard]] std::string where() const override { return where_; }
+
+ private:
+  void tick() {
+    followSource();
+    pump();
+    tick_.expires_after(kTick);
+    tick_.async_wait([this](boost::system::error_code cancelled) {
+      if (!cancelled) tick();
+    });
+  }
+
+  /// The camera is plugged in while its source is there, and as it is described.
+  void followSource() {
+    const auto description = link_.describe();
+    if (!description) return unplug(description.error().message);
+    if (!description->summary.problem.empty()) return unplug(description->summary.problem);
+    auto layout = layoutOf(keys_, place_.keys.source, *description);
+    if (!layout) return unplug(layout.error().message);
+    if (camera_ && isSameCamera(camera_->layout(), *layout)) return;
+    unplug("the source has become another one");
+    camera_ = std::make_unique<LiveCamera>(*std::move(layout), *description,
+                                           ShortImages::Scale{keys_.depth_unit_mm, keys_.amplitude_per_count},
+                                           place_.clock, hooks());
+    server_->plug(*camera_);
+    last_problem_.clear();
+    logging::info("{}: the camera is plugged in: {} {}", name_, camera_->layout().model,
+                  camera_->layout().serial);
+  }
+
+  void unplug(const std::string& why) {
+    if (camera_ || why != last_problem_) logging::info("{}: there is no camera: {}", name_, why);
+    last_problem_ = why;
+    server_->unplug();
+    camera_.reset();
+    link_.want(false);
+  }
+
+  LiveCamera::Hooks hooks() {
+    return {.parameter = [this](const std::string& name) -> std::optional<double> {
+              const auto description = link_.describe();
+              if (!description) return std::nullopt;
+              for (const Parameter& one : description->parameters) {
+                if (one.name == name) return one.value;
+              }
+              return std::nullopt;
+            },
+            .set =
+                [this](const std::string& name, double value, LiveCamera::Done done) {
+                  link_.post(
+                      [name, value](drivers::Source& source) { return source.setParameter(name, value); },
+                      [this, done = std::move(done)](const Result<>& outcome) {
+                        if (!outcome) logging::info("{}: {}", name_, outcome.error().message);
+                        done(outcome);
+                        pump();
+                      });
+                }};
+  }
+
+  void takeFrame(const Frame& frame) {
+    if (!camera_) return;
+    if (auto taken = camera_->take(frame); !taken && taken.error().message != last_complaint_) {
+      last_complaint_ = taken.error().message;
+      logging::warn("{}: {}", name_, last_complaint_);
+    }
+    pump();
+  }
+
+  void pump() {
+    server_->pump();
+    if (!camera_) return;
+    link_.want(camera_->wantsFrames(std::chrono::steady_clock::now()));
+    if (camera_->lost() > 0 && !std::exchange(has_told_loss_, true))
+      logging::warn("{}: the host takes images more slowly than they come; some are lost", name_);
+  }
+
+  const Keys keys_;
+  const FacadePlace place_;
+  const std::string name_;
+  std::string where_, last_problem_, last_complaint_;
+  EventThread thread_;
+  SourceLink link_;
+  boost::asio::steady_timer tick_;
+  std::unique_ptr<LiveCamera> camera_;  ///< none: its source is not there
+  std::optional<Server> server_;        ///< goes first: it has the camera
+  bool has_told_loss_ = false;
+};
+
+FacadeKind::Start read(settings::Table& table) {
+  Keys keys;
+  table.read(keys);
+  return [keys](const FacadePlace& place) -> Result<std::unique_ptr<Facade>> {
+    auto facade = std::make_unique<UsbCameraFacade>(keys, place);
+    if (auto opened = facade->open(); !opened) return opened.error();
+    return std::unique_ptr<Facade>{std::move(facade)};
+  };
+}
+
+}  // namespace
+
+FacadeKind facade() {
+  return {.name = "usb_camera",
+          .summary = "a USB depth camera (UVC, Z16 and Y16), which Linux machines plug in over USB/IP",
+          .read = read,
+          .document = [] { return settings::markdownTable(settings::keysOf<Keys>()); }};
+}
+
+}  // namespace toftwin::daemon::usb_camera
