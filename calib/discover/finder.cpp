@@ -112,8 +112,8 @@ class Search {
     if (effect.gain.mean <= 2.0 * effect.gain.error || isWhatACurveLeaves(effect)) return false;
     effect.p = p;
     const auto same = std::ranges::find_if(finding_.effects, [&](const Effect& known) {
-      return known.covariates == effect.covariates && known.is_catalogue == effect.is_catalogue &&
-             !known.fit && !effect.fit;
+      return alongOf(known) == alongOf(effect) && known.is_catalogue == effect.is_catalogue && !known.fit &&
+             !effect.fit;
     });
     if (same == finding_.effects.end()) {
       finding_.effects.push_back(std::move(effect));
@@ -125,6 +125,15 @@ class Search {
     }
     estimate(*context_.source, context_.scales, finding_.effects);
     return true;
+  }
+
+  /// The covariates along which it goes, without what light does there: what moves the range and dims the light
+  /// along the same covariate is one effect.
+  [[nodiscard]] std::vector<std::string> alongOf(const Effect& effect) const {
+    std::vector<std::string> along;
+    for (const std::string& name : effect.covariates)
+      if (infoOf(context_, name) != nullptr) along.push_back(name);
+    return along.empty() ? effect.covariates : along;
   }
 
   /// A curve without a formula is known to some per cent, since between its knots it is straight: what little is
@@ -164,6 +173,7 @@ class Search {
   /// What is left goes with the covariates of an effect that is known: its shape was not it. Another single
   /// shape, if one does as well as both together; else their sum.
   void reshape(Effect& effect, const Effect& more) {
+    if (effect.covariates != more.covariates) return addPart(effect, more);
     std::vector<Effect> others;
     for (const Effect& one : finding_.effects)
       if (&one != &effect) others.push_back(one);
@@ -182,7 +192,16 @@ class Search {
         return;
       }
     }
+    addPart(effect, more);
+  }
+
+  static void addPart(Effect& effect, const Effect& more) {
     effect.parts.insert(effect.parts.end(), more.parts.begin(), more.parts.end());
+    for (const std::string& name : more.covariates)
+      if (std::ranges::count(effect.covariates, name) == 0) effect.covariates.push_back(name);
+    std::ranges::sort(effect.covariates);
+    // No effect on ranges changes amplitudes.
+    if (effect.stage != more.stage) effect.stage = Stage::Light;
     const std::string along = fmt::format("{}", fmt::join(effect.covariates, " and "));
     effect.name = isFormula(effect) ? effect.name + " + " + more.name : "smooth in " + along;
   }

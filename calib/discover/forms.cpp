@@ -145,7 +145,14 @@ std::vector<double> usablePowers(const CovariateInfo& x) {
 
 }  // namespace
 
-TermGroup built(const Form& form, std::span<const double> inner) { return form.build(form, inner); }
+TermGroup built(const Form& form, std::span<const double> inner) {
+  TermGroup group = form.build(form, inner);
+  for (Term& term : group.terms) {
+    term.carrier = form.carrier;
+    if (form.stage) term.stage = form.stage;
+  }
+  return group;
+}
 
 std::vector<Form> formsIn(const CovariateInfo& x) {
   std::vector<Form> forms;

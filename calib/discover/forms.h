@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -26,6 +27,8 @@ struct Form {
   TermGroup (*build)(const Form& form, std::span<const double> inner) = nullptr;
   std::vector<double> fixed{};  ///< what build needs besides: powers, origins
   std::vector<CovariateInfo> of{};
+  std::optional<Stage> stage{};  ///< where its terms act; none: where its covariates say
+  std::string carrier{};         ///< what its terms are multiplied with (see Term)
 };
 TermGroup built(const Form& form, std::span<const double> inner);
 

@@ -4,13 +4,18 @@
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
+
 #include "calib/discover/shape_choice.h"
 
 namespace toftwin::discover {
 namespace {
 
-/// What no number of a fit accounts for: χ² of one number at two standard errors.
-constexpr double kSlack = 4.0;
+/// The best of M explanations is better than it is by about 2 ln M in χ², by chance alone (D. P. Foster,
+/// E. I. George, Ann. Stat. 22 (1994) 1947). At least that of one number at two standard errors.
+double luckOfTheBestOf(std::size_t tried) {
+  return std::max(4.0, 2.0 * std::log(static_cast<double>(std::max<std::size_t>(1, tried))));
+}
 
 /// In-sample χ² of each catalogue group on top of what is known.
 std::vector<std::pair<double, std::string>> byStatistic(const Context& context) {
@@ -92,7 +97,9 @@ void fitCatalogue(const Context& context, std::vector<Explanation>& all) {
 std::optional<std::size_t> chooseNamed(const Context& context, std::vector<Explanation>& all) {
   std::optional<std::size_t> generic;
   std::vector<std::size_t> named;
+  std::size_t curves = 0;
   for (const std::size_t i : eligible(all)) {
+    curves += all[i].is_catalogue ? 0 : 1;
     if (all[i].is_catalogue)
       named.push_back(i);
     else if (!generic || all[i].gain.total > all[*generic].gain.total)
@@ -103,18 +110,22 @@ std::optional<std::size_t> chooseNamed(const Context& context, std::vector<Expla
   for (const std::size_t i : named) {
     Explanation& one = all[i];
     const Difference gain = against0(one.gain);
-    const auto isWorseThan = [&](const Explanation& other) {
+    const auto isWorseThan = [&](const Explanation& other, std::size_t tried) {
       return other.gain.total - one.gain.total >
-             std::max(2.0 * difference(other.gain, one.gain).error, kSlack);
+             std::max(2.0 * difference(other.gain, one.gain).error, luckOfTheBestOf(tried));
+    };
+    const auto by = [&](const Explanation& other) {
+      return fmt::format(" explains more, by {:.0f} ± {:.0f} in χ²", other.gain.total - one.gain.total,
+                         difference(other.gain, one.gain).error);
     };
     if (one.named->is_at_bound)
       one.refused = "it would have to be stronger than it can be";
     else if (gain.mean <= 2.0 * gain.error)
       one.refused = "it does not predict other captures";
-    else if (generic && isWorseThan(all[*generic]))
-      one.refused = "a curve that goes with " + all[*generic].name + " explains more";
-    else if (chosen && isWorseThan(all[*chosen]))
-      one.refused = all[*chosen].name + " explains more";
+    else if (generic && isWorseThan(all[*generic], curves))
+      one.refused = "a curve that goes with " + all[*generic].name + by(all[*generic]);
+    else if (chosen && isWorseThan(all[*chosen], named.size()))
+      one.refused = all[*chosen].name + by(all[*chosen]);
     else if (leavesSomething(context, one))
       one.refused = "what it leaves still goes with its covariates";
     if (!one.refused.empty()) continue;

@@ -21,10 +21,36 @@ Set sorted(Set names) {
   return names;
 }
 
+/// What a curve of this set of covariates is multiplied with, if it is the same for all of its terms.
+const Term* carrierOf(const Context& context, const Set& set) {
+  for (const TermGroup& group : context.generic) {
+    if (group.terms.empty() || sorted(covariatesOf(group)) != set) continue;
+    const Term& first = group.terms.front();
+    const bool is_one = std::ranges::all_of(
+        group.terms, [&](const Term& term) { return term.carrier == first.carrier && !term.factors.empty(); });
+    if (is_one && !first.carrier.empty()) return &first;
+  }
+  return nullptr;
+}
+
+/// The formulas of a covariate, for what light does along it: as likely as for the range.
+std::vector<Form> carriedForms(const Context& context, const Set& set) {
+  const Term* carried = carrierOf(context, set);
+  const auto covariate = std::ranges::find_if(
+      set, [&](const std::string& name) { return infoOf(context, name) != nullptr; });
+  if (carried == nullptr || set.size() != 2 || covariate == set.end()) return {};
+  std::vector<Form> forms = formsIn(*infoOf(context, *covariate));
+  for (Form& form : forms) {
+    form.name = fmt::format("{}: {}", carried->carrier, form.name);
+    form.stage = carried->stage, form.carrier = carried->carrier;
+  }
+  return forms;
+}
+
 std::vector<Form> formsOf(const Context& context, const Set& set) {
   std::vector<const CovariateInfo*> infos;
   for (const std::string& name : set) infos.push_back(infoOf(context, name));
-  if (std::ranges::find(infos, nullptr) != infos.end()) return {};
+  if (std::ranges::find(infos, nullptr) != infos.end()) return carriedForms(context, set);
   if (infos.size() == 1) return formsIn(*infos[0]);
   return infos.size() == 2 ? formsIn(*infos[0], *infos[1]) : std::vector<Form>{};
 }
@@ -258,7 +284,7 @@ std::vector<std::size_t> eligible(const std::vector<Explanation>& all) {
   std::vector<std::size_t> places;
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (all[i].is_sum) continue;
-    if (!all[i].is_catalogue && all[i].covariates.size() == 2) {
+    if (!all[i].is_catalogue && all[i].covariates.size() == 2 && all[i].carrier().empty()) {
       const auto [at, is_new] = together.try_emplace(all[i].covariates, false);
       if (is_new) at->second = actsTogether(all, all[i].covariates);
       if (!at->second) continue;

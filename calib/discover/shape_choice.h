@@ -26,6 +26,11 @@ struct Explanation {
   Gain gain{};
   std::shared_ptr<const NamedFit> named{};  ///< an effect of the catalogue that was fitted as itself
   std::string refused{};  ///< why such an effect is not named; empty: it may be
+
+  /// What its terms are multiplied with: a covariate's function then is one of one covariate, not of two.
+  [[nodiscard]] std::string carrier() const {
+    return fitted.group.terms.empty() ? "" : fitted.group.terms.front().carrier;
+  }
 };
 
 /// Everything that a choice needs to know.

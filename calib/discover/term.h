@@ -35,6 +35,7 @@ struct Factor {
   Shape shape = Shape::Power;
   std::vector<double> numbers{};
   [[nodiscard]] double at(double x) const;
+  bool operator==(const Factor&) const = default;
 };
 
 /// One column: a product of factors, acting at a stage. In the unit of the measured value per unit of its

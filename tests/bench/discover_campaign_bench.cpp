@@ -5,6 +5,7 @@
 //   discover_campaign_bench [--cases a,b] [--seeds 1:5] [--lambda 150,600,3000] [--absent no|yes|both]
 //                           [--null plain,noise,pose,tails,bump] [--threads 1] [--large] [--scores]
 //   discover_campaign_bench --table FILE...
+//   discover_campaign_bench --references FOLDER...     (each as tests/reference_device/reference_campaign leaves it)
 //
 // Prints one line of comma-separated values for each search, so that slices can run side by side; --table puts
 // such lines together. Without --cases and --null: all effects; with --null alone: no effects. --large: 106
@@ -46,7 +47,7 @@ struct Options {
   std::size_t threads = 0;
   bool present = true, absent = false, large = false, scores = false;
   std::vector<std::string> cases{}, nulls{};
-  std::vector<std::filesystem::path> tables{};
+  std::vector<std::filesystem::path> tables{}, references{};
 };
 
 std::filesystem::path folder() {
@@ -117,19 +118,40 @@ struct Setting {
   sim::SensorModel declared = orEnd(sim::SensorModel::parse(camera, "camera.toml"));
 };
 
-/// χ² that the hidden effect costs the declared model, poses and light integrated out.
-double lambdaOf(const Setting& world, const sim::SensorModel& truth) {
-  const Campaign campaign = orEnd(readCampaign(folder(), Side::A));
-  const Declared declared{world.declared, world.scene};
-  const auto traced = orEnd(traceAll(declared, campaign.captures, kTrace));
-  const Lit lit{campaign.captures, traced, traced};
-  const auto deviance = [&](const std::vector<sim::AnyEffect>& effects) {
-    const Marginal marginal =
-        marginalise(orEnd(residualEvidence({declared, lit, {}}, effects)), {});
+/// A campaign in which nothing is hidden: how well its captures know what an effect would change.
+class Unspoilt {
+ public:
+  explicit Unspoilt(const Setting& world)
+      : campaign_(orEnd(readCampaign(folder(), Side::A))),
+        declared_{world.declared, world.scene},
+        traced_(orEnd(traceAll(declared_, campaign_.captures, kTrace))) {}
+
+  /// λ: χ² of what the effect changes, free of noise, poses and light integrated out.
+  [[nodiscard]] double lambdaOf(const sim::SensorModel& truth) const {
+    const auto as_declared = orEnd(NoiselessCamera::make(
+        declared_.model, effectsWithoutNoise(declared_.model), campaign_.captures));
+    const auto hiding =
+        orEnd(NoiselessCamera::make(declared_.model, effectsWithoutNoise(truth), campaign_.captures));
+    Evidence evidence{commonGroups(), {}};
+    for (std::size_t c = 0; c < traced_.size(); ++c) {
+      const MeasuredCapture& capture = campaign_.captures[c];
+      const TracedCapture& traced = *traced_[c];
+      const Reading from = as_declared.read(capture, traced.light), to = hiding.read(capture, traced.light);
+      const Cells cells{capture, traced, from};
+      WhitenedCapture whitened{cells, kCommon};
+      whitened.putCommon(cells, traced);
+      whitened.putResidual(cells, whitened.residual, to, from);  // to − from
+      evidence.captures.push_back(whitened.evidence(capture.record.name, capture.record.block));
+    }
+    const Marginal marginal = marginalise(evidence, {});
     return fit(marginal, nuisanceColumns(marginal)).deviance;
-  };
-  return deviance(effectsWithoutNoise(world.declared)) - deviance(effectsWithoutNoise(truth));
-}
+  }
+
+ private:
+  Campaign campaign_;
+  Declared declared_;
+  std::vector<std::shared_ptr<const TracedCapture>> traced_;
+};
 
 void simulate(const Setting& world, const sim::SensorModel& camera, std::uint64_t seed,
               const std::string& null = {}) {
@@ -174,27 +196,32 @@ void report(const Options& options, const bench::Case& of, const sim::AnyEffect*
   fmt::print("{}", bench::lineOf(bench::scoreOf(of, hidden, finding)));
   for (const SeenGroup& one : seenFirst(finding, options.scores ? 10 : 0))
     fmt::print("# {}: z {:.1f}, T {:.1f} of {}\n", one.name, one.z, one.statistic, one.rank);
+  for (const FoundEffect& one : finding.effects)
+    for (const std::string& why : options.scores ? one.found.refused : std::vector<std::string>{})
+      fmt::print("# not {}\n", why);
   std::fflush(stdout);
 }
 
 /// Hides the effect, made as strong as λ wants, and searches.
-void hide(const Setting& world, const sim::AnyEffect& none, const sim::AnyEffect& defaults,
-          const Options& options, double wanted, std::uint64_t seed) {
+void hide(const Setting& world, const Unspoilt& unspoilt, const sim::AnyEffect& none,
+          const sim::AnyEffect& defaults, const Options& options, double wanted, std::uint64_t seed) {
   bench::Case of{.hidden = discover::nameOf(defaults), .wanted = wanted, .seed = seed};
-  double factor = 1.0;
-  for (int pass = 0; pass < 4; ++pass) {
-    const sim::SensorModel truth = world.declared.withEffects(
+  const auto hiding = [&](double factor) {
+    return world.declared.withEffects(
         withInserted(world.declared.effects(), scaled(none, defaults, factor)));
-    simulate(world, truth, seed);
-    of.lambda = lambdaOf(world, truth);
-    if (!(of.lambda > 4.0) || std::abs(of.lambda / wanted - 1.0) < 0.15) break;
-    factor *= std::sqrt(wanted / of.lambda);
+  };
+  double factor = 1.0;
+  for (int pass = 0; pass < 12; ++pass) {
+    of.lambda = unspoilt.lambdaOf(hiding(factor));
+    if (!(of.lambda > 1e-3) || std::abs(of.lambda / wanted - 1.0) < 0.03) break;
+    factor *= std::clamp(std::sqrt(wanted / of.lambda), 0.02, 50.0);
   }
-  if (!(of.lambda > 0.5 * wanted)) {
+  if (!(of.lambda > 0.5 * wanted && of.lambda < 2.0 * wanted)) {
     fmt::print("unseen,{},{:.0f},{:.1f},{}\n", of.hidden, wanted, of.lambda, seed);
     std::fflush(stdout);
     return;
   }
+  simulate(world, hiding(factor), seed);
   for (const bool is_absent : {false, true}) {
     if (!(is_absent ? options.absent : options.present)) continue;
     of.is_absent = is_absent;
@@ -221,7 +248,7 @@ std::vector<std::string> partsOf(const std::string& list) {
   fmt::print(stderr,
              "discover_campaign_bench: {} is not understood; it takes --cases a,b, --seeds 1:5, --lambda 150,600, "
              "--absent no|yes|both, --null plain,noise,pose,tails,bump, --threads N, --large, --scores, or "
-             "--table FILE...\n",
+             "--table FILE... or --references FOLDER...\n",
              word);
   std::exit(2);
 }
@@ -257,6 +284,8 @@ Options optionsOf(int argc, char** argv) {
       options.large = true;
     } else if (word == "--scores") {
       options.scores = true;
+    } else if (word == "--references") {
+      while (i + 1 < argc) options.references.emplace_back(argv[++i]);
     } else if (word == "--table") {
       while (i + 1 < argc) options.tables.emplace_back(argv[++i]);
     } else {
@@ -267,12 +296,29 @@ Options optionsOf(int argc, char** argv) {
 }
 
 void searchNulls(const Setting& world, const Options& options) {
+  std::uint64_t first = 0;
   for (const std::string& null : options.nulls) {
+    first += 1000;  // no two nulls have noise in common
     for (std::uint64_t seed = options.first_seed; seed <= options.last_seed; ++seed) {
-      simulate(world, world.declared, seed + 1000, null);
+      simulate(world, world.declared, seed + first, null);
       report(options, {.hidden = "nothing: " + null, .seed = seed}, nullptr, search(world, {}));
     }
   }
+}
+
+/// Searches what reference_campaign left in a folder; the locked captures stay closed.
+void searchReference(const std::filesystem::path& output) {
+  CampaignJob job{.run = output / "run",
+                  .model = (output / "declared" / "camera.toml").string(),
+                  .scene = output / "declared" / "wall.toml"};
+  for (const char* block : {"checkerboard", "bright-dark", "foreground", "corner-60", "corner-90", "corner-120"})
+    job.scene_of_block[block] = output / "declared" / (std::string{block} + ".toml");
+  job.trace.max_surfaces = 16, job.open_locked = false;
+  compare::Progress silent{std::getenv("TOFTWIN_BENCH_PROGRESS") != nullptr ? stderr : nullptr};
+  const CampaignFinding finding = orEnd(searchCampaign(job, silent));
+  fmt::print("reference,{},{:.4g},{:.1f},{}\n", output.filename().string(), finding.finding.first_p,
+             finding.seconds, bench::inWords(finding));
+  std::fflush(stdout);
 }
 
 }  // namespace
@@ -285,9 +331,14 @@ int main(int argc, char** argv) {
   }
   std::optional<tbb::global_control> control;
   if (options.threads > 0) control.emplace(tbb::global_control::max_allowed_parallelism, options.threads);
+  for (const auto& run : options.references) searchReference(run);
+  if (!options.references.empty()) return 0;
   const Setting world{options.large};
   fmt::print("{}", bench::header());
   searchNulls(world, options);
+  if (options.cases.empty() && !options.nulls.empty()) return std::filesystem::remove_all(folder()), 0;
+  simulate(world, world.declared, 1);
+  const Unspoilt unspoilt{world};
   sim::AllEffects::forEach([&]<class E>() {
     const std::string name{E::about.name};
     const bool is_asked = std::ranges::find(options.cases, name) != options.cases.end();
@@ -295,7 +346,7 @@ int main(int argc, char** argv) {
     if (isNoise(sim::AnyEffect{E{}}) || name == "learned_range" || name == "delay") return;
     for (const double lambda : options.lambdas) {
       for (std::uint64_t seed = options.first_seed; seed <= options.last_seed; ++seed)
-        hide(world, sim::AnyEffect{E::none()}, sim::AnyEffect{E{}}, options, lambda, seed);
+        hide(world, unspoilt, sim::AnyEffect{E::none()}, sim::AnyEffect{E{}}, options, lambda, seed);
     }
   });
   std::filesystem::remove_all(folder());

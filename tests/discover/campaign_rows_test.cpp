@@ -9,6 +9,7 @@
 #include <filesystem>
 
 #include "calib/discover/campaign/catalogue.h"
+#include "calib/discover/campaign/refit.h"
 #include "calib/discover/campaign/rows.h"
 #include "calib/discover/marginal.h"
 #include "tests/discover/simulated_run.h"
@@ -27,10 +28,10 @@ class Rows : public testing::Test {
   Rows() : folder_(std::filesystem::temp_directory_path() / fmt::format("toftwin-rows-{}", ::getpid())) {}
   ~Rows() override { std::filesystem::remove_all(folder_); }
 
-  Made make(const std::string& hidden) {
+  Made make(const std::string& hidden, const std::string& of_camera = smallCamera()) {
     const auto plan = plan::parsePlan(smallPlan(), "plan.toml");
-    const auto camera = sim::SensorModel::parse(smallCamera(hidden), "camera.toml");
-    const auto declared = sim::SensorModel::parse(smallCamera(), "camera.toml");
+    const auto camera = sim::SensorModel::parse(of_camera + hidden, "camera.toml");
+    const auto declared = sim::SensorModel::parse(of_camera, "camera.toml");
     const auto scene = sim::Scene::parse(smallScene(), "scene.toml");
     if (!plan || !camera || !declared || !scene)
       throw std::runtime_error("the small campaign's files are wrong");
@@ -79,6 +80,24 @@ TEST_F(Rows, NothingIsLeftButNoiseWhereNothingIsHidden) {
   EXPECT_GT(plain.dispersion(), 0.75);
 }
 
+/// Nobody knows where the light's zero lies. With square waves a delay of 8 mm in the light is an offset of the
+/// range and a change of the cyclic error: both are free.
+TEST_F(Rows, ADelayOfTheLightIsNoMoreAnEffectThanAnOffset) {
+  std::string square = smallCamera();
+  square.replace(square.find("contrast = 0.5"), 14,
+                 "contrast = 0.5\nemitted = 'square'\ndemodulated = 'square'");
+  square.replace(square.find("taps = 2"), 8, "taps = 2\nharmonics = 7");
+  const Made made = make("[[effect]]\ntype = 'frequency_offset'\nfirst_rad = 0.01\n", square);
+  const Marginal marginal = marginalise(made.rows.evidence({}), {});
+  const auto delay = std::ranges::find(marginal.groups, "delay of the light", &Group::name);
+  ASSERT_NE(delay, marginal.groups.end());
+  const Fit all = fit(marginal, nuisanceColumns(marginal));
+  EXPECT_LT(all.dispersion(), 1.05);
+  Columns others = nuisanceColumns(marginal);
+  std::erase(others, static_cast<Eigen::Index>(delay->first));
+  EXPECT_GT(fit(marginal, others).deviance - all.deviance, 100.0);  // ten standard errors: it is there
+}
+
 TEST_F(Rows, EveryEffectOfTheCatalogueThatShowsIsACandidateAndNoiseIsNot) {
   const Made made = make("");
   std::vector<std::string> names;
@@ -96,6 +115,16 @@ TEST(Catalogue, NumbersOfAnEffectAreSetByTheirKeysAndStayWithinBounds) {
   EXPECT_DOUBLE_EQ(std::get<sim::WarmUp>(withNumber(effect, "fast_mm", 1e9)).fast.in(millimetre), 1000.0);
   EXPECT_EQ(std::get<sim::SampleOffset>(withNumber(sim::AnyEffect{sim::SampleOffset{}}, "step", 2.4)).step,
             2);
+}
+
+TEST(Catalogue, AWeakStrengthIsNotAtItsBoundForBoundsBeingWide) {
+  const std::vector<std::string> keys{"radiance_w_per_m2_sr"};
+  const auto reflecting = [](double radiance) {
+    return withNumber(sim::AnyEffect{sim::InternalReflection{}}, "radiance_w_per_m2_sr", radiance);
+  };
+  EXPECT_FALSE(isAtBound(reflecting(2e-4), keys));  // the default, of 0 to 1000
+  EXPECT_TRUE(isAtBound(reflecting(1e9), keys));
+  EXPECT_TRUE(isAtBound(reflecting(-1.0), keys));
 }
 
 TEST(Catalogue, AnEffectIsInsertedWhereLightMeetsIt) {

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <numbers>
 #include <stdexcept>
 
 #include "calib/discover/campaign/discover_campaign.h"
@@ -25,7 +26,7 @@ class Searched : public testing::Test {
   Searched()
       : folder_(std::filesystem::temp_directory_path() / fmt::format("toftwin-campaign-{}", ::getpid())) {
     std::filesystem::create_directories(folder_);
-    write("camera.toml", smallCamera());
+    write("camera.toml", tinyCamera());
     write("scene.toml", smallScene());
   }
   ~Searched() override { std::filesystem::remove_all(folder_); }
@@ -38,7 +39,7 @@ class Searched : public testing::Test {
   void simulate(const std::string& hidden, const Spoil& spoil = {}, bool with_poses = true,
                 int frames = 0) const {
     auto plan = plan::parsePlan(smallPlan(), "plan.toml");
-    const auto camera = sim::SensorModel::parse(smallCamera(hidden), "camera.toml");
+    const auto camera = sim::SensorModel::parse(tinyCamera(hidden), "camera.toml");
     const auto scene = sim::Scene::parse(smallScene(), "scene.toml");
     if (!plan || !camera || !scene) throw std::runtime_error("the small campaign's files are wrong");
     SimulatedRun run{
@@ -81,20 +82,20 @@ TEST_F(Searched, NothingIsFoundWhereNothingIsHidden) {
 }
 
 TEST_F(Searched, AHiddenEffectOfTheCatalogueIsNamedFittedAndAdded) {
-  simulate("[[effect]]\ntype = 'lens_scatter'\nveil = 0.004\nhalo = 0.006\n");
+  simulate("[[effect]]\ntype = 'vignetting'\nexponent = 0.4\n");
   compare::Progress silent{nullptr};
   std::string verdict;
   const auto page = discoverCampaign(job(), silent, &verdict);
   ASSERT_TRUE(page) << page.error().message;
-  EXPECT_THAT(verdict, HasSubstr("The model lacks lens_scatter"));
+  EXPECT_THAT(verdict, HasSubstr("The model lacks vignetting"))
+      << std::ifstream{folder_ / "out" / "report.md"}.rdbuf();
   const auto model = sim::SensorModel::load(folder_ / "out" / "model.toml");
   ASSERT_TRUE(model) << model.error().message;
   const auto effects = model->effects();
-  const auto scatter = std::ranges::find_if(
-      effects, [](const auto& any) { return std::holds_alternative<sim::LensScatter>(any); });
-  ASSERT_NE(scatter, effects.end());
-  const auto& found = std::get<sim::LensScatter>(*scatter);
-  EXPECT_GT(found.veil + found.halo, 0.0);
+  const auto added = std::ranges::find_if(
+      effects, [](const auto& any) { return std::holds_alternative<sim::Vignetting>(any); });
+  ASSERT_NE(added, effects.end());
+  EXPECT_NEAR(std::get<sim::Vignetting>(*added).exponent, 0.4, 0.1);
   EXPECT_TRUE(std::filesystem::exists(folder_ / "out" / "report.json"));
   // Opened once, and no more.
   EXPECT_TRUE(std::filesystem::exists(folder_ / "run" / plan::kOpenedFile));
@@ -128,9 +129,26 @@ TEST_F(Searched, AnEffectOfNoCatalogueIsCalledUndeclaredAndNamedByWhatItGoesWith
   EXPECT_THAT(model->effectNames(), Contains("learned_range"));
 }
 
+/// A wave over the rows, in the range and in the brightness: two changes, but one place and one cause.
+TEST_F(Searched, WhatMovesTheRangeAndDimsTheLightAlongOneCovariateIsOneEffect) {
+  simulate("", [](sim::RangeImage& image, const Moment&, const CameraInfo&, std::uint64_t) {
+    for (int y = 0; y < image.range_m.height(); ++y) {
+      const auto wave = static_cast<float>(std::sin(2.0 * std::numbers::pi * y / image.range_m.height()));
+      for (int x = 0; x < image.range_m.width(); ++x)
+        image.range_m(x, y) += 6e-3F * wave, image.amplitude(x, y) *= 1.0F + 0.03F * wave;
+    }
+  });
+  const CampaignFinding finding = search(job());
+  ASSERT_THAT(namesOf(finding), ElementsAre("undeclared")) << verdictOf(finding);
+  const Effect& effect = finding.effects.front().found;
+  EXPECT_THAT(effect.covariates, ElementsAre("gain", "row")) << verdictOf(finding);
+  EXPECT_EQ(effect.stage, Stage::Light) << "no error of a range changes amplitudes";
+  EXPECT_TRUE(finding.effects.front().fitted) << "what it does to the range can be written";
+}
+
 TEST_F(Searched, AWrongNumberOfADeclaredEffectIsAnUpdateAndNoNewEffect) {
   simulate("[[effect]]\ntype = 'clock_scale'\nppm = 5000.0\n");
-  write("camera.toml", smallCamera("[[effect]]\ntype = 'clock_scale'\nppm = 1000.0\n"));
+  write("camera.toml", tinyCamera("[[effect]]\ntype = 'clock_scale'\nppm = 1000.0\n"));
   const CampaignFinding finding = search(job());
   EXPECT_TRUE(finding.effects.empty()) << verdictOf(finding);
   ASSERT_EQ(finding.updates.size(), 1u) << verdictOf(finding);
@@ -167,6 +185,7 @@ TEST_F(Searched, AFormulaIsNotCalledATable) {
 /// smooth noise must not seem to explain anything, nor must pixels of rare paths count less.
 TEST_F(Searched, WhatTracingHasByChanceIsNoEffectOfTheCamera) {
   write("scene.toml", cornerScene());
+  write("camera.toml", smallCamera());
   const auto plan = plan::parsePlan(cornerPlan(), "plan.toml");
   const auto camera = sim::SensorModel::parse(smallCamera(), "camera.toml");
   const auto scene = sim::Scene::parse(cornerScene(), "scene.toml");
@@ -192,7 +211,7 @@ TEST_F(Searched, WhatDoesWorseOnLockedCapturesIsNotWritten) {
   EXPECT_TRUE(finding.is_worse) << verdictOf(finding);
   EXPECT_THAT(verdictOf(finding), HasSubstr("model.toml is the camera file as it was"));
   const auto model = sim::SensorModel::parse(finding.model_toml, "model.toml");
-  const auto declared = sim::SensorModel::parse(smallCamera(), "camera.toml");
+  const auto declared = sim::SensorModel::parse(tinyCamera(), "camera.toml");
   ASSERT_TRUE(model && declared);
   EXPECT_EQ(model->effectNames(), declared->effectNames());
 }
@@ -205,7 +224,7 @@ TEST_F(Searched, SaysWhatIsMissingOrWrong) {
   other = job();
   other.model = (folder_ / "no.toml").string();
   EXPECT_THAT(errorOf(other), HasSubstr("--model takes a camera file or one of the presets"));
-  write("camera.toml", smallCamera("[[effect]]\ntype = 'clock_scale'\nppmm = 1\n"));
+  write("camera.toml", tinyCamera("[[effect]]\ntype = 'clock_scale'\nppmm = 1\n"));
   EXPECT_THAT(errorOf(job()), HasSubstr("ppmm"));
 }
 
@@ -215,12 +234,12 @@ TEST_F(Searched, SaysWhyARunCannotBeSearched) {
   simulate("", {}, true, 1);
   EXPECT_THAT(errorOf(job()), HasSubstr("without repeats nothing is known of the noise"));
   simulate("", {}, true, 2);
-  std::string small = smallCamera();
-  small.replace(small.find("width = 44"), 10, "width = 40");
+  std::string small = tinyCamera();
+  small.replace(small.find("width = 28"), 10, "width = 24");
   write("camera.toml", small);
   EXPECT_THAT(errorOf(job()),
-              HasSubstr("the run's images have 44 x 33 pixels, the camera file's camera has 40 x 33"));
-  write("camera.toml", smallCamera());
+              HasSubstr("the run's images have 28 x 21 pixels, the camera file's camera has 24 x 21"));
+  write("camera.toml", tinyCamera());
   CampaignJob with_block = job();
   with_block.scene_of_block["corner"] = folder_ / "scene.toml";
   EXPECT_THAT(errorOf(with_block), HasSubstr("the run has no such block; there are: warm-up"));

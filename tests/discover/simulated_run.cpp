@@ -9,6 +9,8 @@
 #include <numbers>
 #include <random>
 #include <stdexcept>
+#include <string_view>
+#include <utility>
 
 #include "calib/plan/captures.h"
 #include "calib/plan/run_index.h"
@@ -157,6 +159,15 @@ type = "shot_noise"
 type = "read_noise"
 sigma_electrons = 30.0
 )" + effects;
+}
+
+std::string tinyCamera(const std::string& effects) {
+  std::string text = smallCamera(effects);
+  for (const auto& [old, by] : {std::pair{"width = 44", "width = 28"}, {"height = 33", "height = 21"},
+                                {"fx = 42.0", "fx = 26.7"}, {"fy = 42.0", "fy = 26.7"},
+                                {"cx = 21.5", "cx = 13.5"}, {"cy = 16.0", "cy = 10.0"}})
+    text.replace(text.find(old), std::string_view{old}.size(), by);
+  return text;
 }
 
 std::string smallScene() {

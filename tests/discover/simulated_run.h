@@ -35,6 +35,8 @@ void write(const SimulatedRun& run, const std::filesystem::path& folder);
 
 /// A small camera of 44 × 33 pixels with two frequencies, as text; `effects` are appended to it.
 std::string smallCamera(const std::string& effects = {});
+/// The same with 28 × 21 pixels: whole searches in a few seconds.
+std::string tinyCamera(const std::string& effects = {});
 /// A wall with a bright plate before it, and a floor: something to see from everywhere.
 std::string smallScene();
 /// Two bright boards that meet at a right angle: half of their light has been at both.

@@ -101,12 +101,14 @@ sim::AnyEffect delayInLight(const sim::SensorModel& model, double millimetres) {
   return offset;
 }
 
-bool isNoOffset(const Reading& change) {
+bool isNoOffset(std::span<const Reading> changes) {
   double sum = 0.0, squares = 0.0, n = 0.0;
-  for (const float value : change.range_m.pixels()) {
-    if (!std::isfinite(value)) continue;
-    sum += static_cast<double>(value), squares += static_cast<double>(value) * static_cast<double>(value);
-    n += 1.0;
+  for (const Reading& change : changes) {
+    for (const float value : change.range_m.pixels()) {
+      if (!std::isfinite(value)) continue;
+      sum += static_cast<double>(value), squares += static_cast<double>(value) * static_cast<double>(value);
+      n += 1.0;
+    }
   }
   return n > 0.0 && squares / n - sum * sum / (n * n) > 0.02 * 0.02 * squares / n;
 }
@@ -138,8 +140,6 @@ std::vector<TermGroup> carrierGroups(std::span<const CovariateInfo> covariates, 
     for (const std::string_view carrier : {kGain, kDelayCarrier}) {
       if (carrier == kDelayCarrier && !has_delay) continue;
       TermGroup of_light = smoothIn(covariate, kSmoothKnots);
-      // The place of the first hat is taken by a constant: a gain is free, a delay of the light is not.
-      if (carrier == kDelayCarrier && !of_light.terms.empty()) of_light.terms.emplace_back();
       of_light.name = fmt::format("a {} that is {}", carrier, of_light.name);
       for (Term& term : of_light.terms) term.stage = Stage::Light, term.carrier = carrier;
       if (!of_light.terms.empty()) groups.push_back(std::move(of_light));

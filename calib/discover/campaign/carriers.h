@@ -32,8 +32,8 @@ std::vector<TermGroup> carrierGroups(std::span<const CovariateInfo> covariates, 
 inline constexpr std::string_view kDelayCarrier = "delay";
 /// That delay as an effect.
 sim::AnyEffect delayInLight(const sim::SensorModel& model, double millimetres);
-/// Whether it can be told from an offset of the range: its change varies by more than 2 % of itself.
-bool isNoOffset(const Reading& change);
+/// Whether it can be told from an offset of the range: its changes vary by more than 2 % of themselves.
+bool isNoOffset(std::span<const Reading> changes);
 
 /// What effects of the catalogue call a carrier; empty: it is none.
 std::string_view wordOfCarrier(std::string_view carrier);

@@ -36,6 +36,8 @@ struct Gatherer {
                       static_cast<Eigen::Index>(columns.size()));
     for (std::size_t i = 0; i < columns.size(); ++i)
       all.values.col(static_cast<Eigen::Index>(i)) = columns[i];
+    for (const Eigen::VectorXf& column : columns)
+      all.is_same.push_back(column.size() == 0 || (column.array() == column[0]).all());
     return std::move(all);
   }
 };

@@ -149,6 +149,8 @@ Inserted insertFound(const CampaignRows& rows, const Declared& declared,
     } else if (const auto learned = learnedEffectOf(effect, covariates)) {
       insert(inserted, *learned);
       found.fitted = FittedEffect{*learned, {}};
+      if (effect.stage == Stage::Light && std::ranges::count(effect.covariates, "gain") > 0)
+        finding.notes.push_back(effect.name + ": what it does to the range is in model.toml, to the amplitude is not.");
     }
     finding.effects.push_back(std::move(found));
   }

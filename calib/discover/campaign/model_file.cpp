@@ -50,11 +50,17 @@ std::vector<double> knotsOf(const CovariateInfo& covariate, std::size_t even) {
   return knots;
 }
 
+/// A delay of the light is nearly the same error of the range; what differs, the cyclic error, stays.
+bool movesRange(const Term& term) {
+  return term.carrier == kDelayCarrier ||
+         (term.carrier.empty() && term.stage.value_or(Stage::Range) == Stage::Range);
+}
+
 double valueAt(const Effect& effect, const std::function<double(const std::string&)>& covariate) {
   double sum = 0.0;
   const std::vector<Term> terms = termsOf(effect);
   for (std::size_t i = 0; i < std::min(terms.size(), effect.coefficient.size()); ++i)
-    sum += effect.coefficient[i] * terms[i].at(covariate);
+    if (movesRange(terms[i])) sum += effect.coefficient[i] * terms[i].at(covariate);
   return sum;
 }
 
@@ -89,10 +95,11 @@ std::string trimmed(const std::string& line) {
 std::optional<sim::AnyEffect> learnedEffectOf(const Effect& found,
                                               std::span<const CovariateInfo> covariates) {
   Effect effect = found;
-  // A delay of the light is nearly the same error of the range; what differs, the cyclic error, stays.
-  if (std::erase(effect.covariates, std::string{kDelayCarrier}) > 0) effect.stage = Stage::Range;
+  const std::vector<Term> terms = termsOf(effect);
+  if (std::ranges::none_of(terms, movesRange)) return std::nullopt;
+  for (const Term& term : terms)
+    if (!term.carrier.empty()) std::erase(effect.covariates, term.carrier);
   if (effect.covariates.empty() || effect.covariates.size() > 2) return std::nullopt;
-  if (effect.stage && *effect.stage != Stage::Range) return std::nullopt;
   const CovariateInfo* x = find(covariates, effect.covariates[0]);
   const CovariateInfo* y =
       effect.covariates.size() > 1 ? find(covariates, effect.covariates[1]) : nullptr;

@@ -10,14 +10,6 @@
 namespace toftwin::discover {
 namespace {
 
-bool isAtBound(const sim::AnyEffect& effect, const std::vector<std::string>& keys) {
-  return std::ranges::any_of(numbersOf(effect), [&](const EffectNumber& number) {
-    if (!isStrength(effect, number.key) || std::ranges::count(keys, number.key) == 0) return false;
-    const double near = 1e-6 * (number.high - number.low);
-    return number.value - number.low < near || number.high - number.value < near;
-  });
-}
-
 /// The list with one more, and its place.
 struct Inserted {
   std::vector<sim::AnyEffect> effects;
@@ -45,6 +37,18 @@ Gain gainOf(const std::vector<double>& before, const Marginal& after) {
 }
 
 }  // namespace
+
+/// Not by a share of the bounds' distance: a millionth of what a window may reflect at most is five times what
+/// windows do.
+bool isAtBound(const sim::AnyEffect& effect, const std::vector<std::string>& keys) {
+  const auto is_at = [](double value, double bound) {  // units make them differ by rounding
+    return std::abs(value - bound) <= 1e-12 * std::abs(bound);
+  };
+  return std::ranges::any_of(numbersOf(effect), [&](const EffectNumber& number) {
+    return isStrength(effect, number.key) && std::ranges::count(keys, number.key) > 0 &&
+           (is_at(number.value, number.low) || is_at(number.value, number.high));
+  });
+}
 
 const CampaignFit& campaignFitOf(const NamedFit& fit) {
   return *std::any_cast<CampaignFit>(&fit.effect);
@@ -121,7 +125,7 @@ std::shared_ptr<const RowSource> CampaignRows::including(
     for (const FreeNumber& one : freeNumbersOf(with.effects, {with.place}))
       if (std::ranges::count(keys, one.key) > 0) free.push_back(one);
   }
-  std::size_t declared_columns = kCommon;
+  std::size_t declared_columns = all->common_columns_;
   for (const Group& group : all->groups_)
     if (group.kind == Kind::Declared) declared_columns = std::max(declared_columns, group.first + group.count);
   const auto here = cameraWith(all->effects_);

@@ -40,6 +40,8 @@ struct Judged {
 Result<Evidence> residualEvidence(const Judged& judged, const std::vector<sim::AnyEffect>& effects);
 
 double valueOf(const sim::AnyEffect& effect, const std::string& key);
+/// Whether a strength of the effect, one of these numbers, was fitted to a bound of it.
+bool isAtBound(const sim::AnyEffect& effect, const std::vector<std::string>& keys);
 std::vector<sim::AnyEffect> moved(std::vector<sim::AnyEffect> effects, const FreeNumber& free,
                                   double by);
 /// Whether any of the effects acts on light.

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <optional>
 #include <variant>
 
 #include <fmt/format.h>
@@ -186,6 +187,41 @@ double periodOf(const sim::SensorModel& model) {
   return highest > 0_MHz ? unambiguousRange(highest).in(metre) : 0.0;
 }
 
+constexpr double kDelay_mm = 5.0;
+
+/// What a millimetre of delay in the light changes.
+Reading delayed(const Base& base, const Variant& late) {
+  Reading delay = base.with(late);
+  for (std::size_t i = 0; i < delay.range_m.size(); ++i) {
+    delay.range_m[i] = (delay.range_m[i] - base.reading.range_m[i]) / static_cast<float>(kDelay_mm);
+    delay.log_amplitude[i] =
+        (delay.log_amplitude[i] - base.reading.log_amplitude[i]) / static_cast<float>(kDelay_mm);
+  }
+  return delay;
+}
+
+/// The camera with a delay in its light, where that is another thing than an offset of the range.
+Result<std::optional<Variant>> lateOf(const Declared& declared, const std::vector<sim::AnyEffect>& effects,
+                                      const std::vector<MeasuredCapture>& captures,
+                                      const std::vector<const Base*>& probed) {
+  if (!(periodOf(declared.model) > 0.0)) return std::optional<Variant>{};
+  auto camera = NoiselessCamera::make(
+      declared.model, withInserted(effects, delayInLight(declared.model, kDelay_mm)), captures);
+  if (!camera) return camera.error();
+  std::optional<Variant> late{{*std::move(camera), true}};
+  std::vector<Reading> changes;
+  for (const Base* base : probed) changes.push_back(delayed(*base, *late));
+  if (!isNoOffset(changes)) late.reset();
+  return late;
+}
+
+/// Where zero lies nobody knows, neither of the poses nor of the light's start: what a delay of the light does
+/// beyond an offset, which is free already.
+Group delayGroup() {
+  return {.name = "delay of the light", .kind = Kind::Nuisance, .stage = Stage::Light, .first = kCommon,
+          .count = 1, .numbers = 1};
+}
+
 }  // namespace
 
 void CampaignRows::fillFixed(std::size_t c, const Reading& declared, Fixed& fixed) const {
@@ -197,11 +233,16 @@ void CampaignRows::fillFixed(std::size_t c, const Reading& declared, Fixed& fixe
       covariatesOf(capture, varied, fixed.varied, declared_->model.camera(), fixed.cells);
   for (const auto& [name, change] :
        carriersOf(declared_->model, fixed.varied, std::max(period_m_, 1e-3))) {
-    PerChannel& columns = fixed.carriers[name];
-    columns[kRange] = fixed.cells.whitened(Channel::Range, change.range_m);
-    if (fixed.cells.has(Channel::LogAmplitude))
-      columns[kLog] = fixed.cells.whitened(Channel::LogAmplitude, change.log_amplitude);
+    fixed.carriers[name] = fixed.whitened(change);
   }
+}
+
+CampaignRows::PerChannel CampaignRows::Fixed::whitened(const Reading& change) const {
+  PerChannel columns;
+  columns[kRange] = cells.whitened(Channel::Range, change.range_m);
+  if (cells.has(Channel::LogAmplitude))
+    columns[kLog] = cells.whitened(Channel::LogAmplitude, change.log_amplitude);
+  return columns;
 }
 
 Reading CampaignRows::read(const NoiselessCamera& camera, std::size_t c, bool acts_on_light) const {
@@ -230,11 +271,15 @@ Result<CampaignRows> CampaignRows::make(const Declared& declared, const Lit& lit
   for (const Base& base : probed) probed_at.push_back(&base);
   auto varied = varyAll(declared, effects, lit.captures, probed_at, options.left_out);
   if (!varied) return varied.error();
+  const auto late = lateOf(declared, effects, lit.captures, probed_at);
+  if (!late) return late.error();
 
   CampaignRows all;
   all.declared_ = &declared, all.lit_ = std::make_shared<const Lit>(lit), all.effects_ = effects;
   all.groups_ = commonGroups();
-  std::size_t next = kCommon;
+  all.has_delay_ = late->has_value();
+  if (all.has_delay_) all.groups_.push_back(delayGroup()), ++all.common_columns_;
+  std::size_t next = all.common_columns_;
   for (std::size_t i = 0; i < varied->effects.size(); ++i) {
     VariedEffect& effect = varied->effects[i];
     effect.group.first = next, next += effect.group.count;
@@ -244,14 +289,9 @@ Result<CampaignRows> CampaignRows::make(const Declared& declared, const Lit& lit
     else
       all.candidates_.push_back(std::move(varied->candidates[i]));
   }
-  all.base_columns_ = std::max(all.base_columns_, kCommon);
+  all.base_columns_ = std::max(all.base_columns_, all.common_columns_);
   all.period_m_ = periodOf(declared.model);
-  constexpr double kDelay_mm = 5.0;
-  const auto late = NoiselessCamera::make(
-      declared.model, withInserted(effects, delayInLight(declared.model, kDelay_mm)), lit.captures);
-  if (!late) return late.error();
   all.rows_.resize(lit.captures.size());
-  std::atomic<bool> has_delay{false};
   std::atomic<std::size_t> done{0};
   sim::inParallel(static_cast<int>(lit.captures.size()), 1, [&](int first, int last) {
     for (auto c = static_cast<std::size_t>(first); c < static_cast<std::size_t>(last); ++c) {
@@ -269,18 +309,11 @@ Result<CampaignRows> CampaignRows::make(const Declared& declared, const Lit& lit
                             base.with(effect.variants[i]));
         }
       }
-      if (all.period_m_ > 0.0) {
-        Reading delay = base.with({*late, true});
-        for (std::size_t i = 0; i < delay.range_m.size(); ++i) {
-          delay.range_m[i] = (delay.range_m[i] - base.reading.range_m[i]) / static_cast<float>(kDelay_mm);
-          delay.log_amplitude[i] =
-              (delay.log_amplitude[i] - base.reading.log_amplitude[i]) / static_cast<float>(kDelay_mm);
-        }
-        if (isNoOffset(delay)) has_delay = true;
-        PerChannel& carrier = fixed->carriers[std::string{kDelayCarrier}];
-        carrier[kRange] = fixed->cells.whitened(Channel::Range, delay.range_m);
-        if (fixed->cells.has(Channel::LogAmplitude))
-          carrier[kLog] = fixed->cells.whitened(Channel::LogAmplitude, delay.log_amplitude);
+      if (*late) {
+        const PerChannel& carrier = fixed->carriers[std::string{kDelayCarrier}] =
+            fixed->whitened(delayed(base, **late));
+        columns.columns[kRange].col(kCommon) = carrier[kRange] - columns.columns[kRange].col(0);
+        if (carrier[kLog].size() != 0) columns.columns[kLog].col(kCommon) = carrier[kLog];
       }
       CaptureRows& rows = all.rows_[c];
       const auto in_base = static_cast<Eigen::Index>(all.base_columns_);
@@ -299,7 +332,6 @@ Result<CampaignRows> CampaignRows::make(const Declared& declared, const Lit& lit
         options.tell(static_cast<double>(++done) / static_cast<double>(lit.captures.size()));
     }
   });
-  all.has_delay_ = has_delay;
   return all;
 }
 

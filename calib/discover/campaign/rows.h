@@ -84,6 +84,7 @@ struct WhitenedCapture {
 struct CaptureCovariates {
   std::vector<std::string> names{};
   Eigen::MatrixXf values{};  ///< cells × names
+  std::vector<bool> is_same{};  ///< by name: the same in all cells
 };
 
 /// A number of an effect of a list that is fitted, and by how much it is changed for its derivative.
@@ -153,20 +154,32 @@ class CampaignRows final : public RowSource, public NamedEffects {
     sim::Samples collected;  ///< by the declared model, of the light on which effects are varied
     Reading varied;          ///< what it says of that light
     PerChannel residual;     ///< of the declared model
+
+    [[nodiscard]] PerChannel whitened(const Reading& change) const;
   };
   struct CaptureRows {
     std::shared_ptr<const Fixed> fixed;  ///< shared by sources that include different effects
     WhitenedCapture base;                ///< common columns, then numbers of effects
     CaptureEvidence evidence{};          ///< of the base's columns and the catalogue's
   };
+  /// Columns of terms in one capture. A covariate that is the same all over the capture only makes a column
+  /// stronger, so that terms share columns: those of a curve along time are one column, times a number each.
   struct Terms {
-    std::array<Eigen::MatrixXf, kChannels> columns{};
-    Eigen::Index count = 0;
+    struct Shared {
+      Eigen::MatrixXf columns{};
+      std::vector<Eigen::Index> of{};  ///< of each term; −1: nothing
+    };
+    std::array<Shared, kChannels> channels{};
+    Eigen::VectorXd scale{};  ///< of each term
+
+    [[nodiscard]] Eigen::Index count() const { return scale.size(); }
+    /// What is known of the shared columns (one row or column each), for all terms.
+    [[nodiscard]] Eigen::MatrixXd columnsFor(std::size_t channel, const Eigen::MatrixXd& shared) const;
   };
   void fillFixed(std::size_t capture, const Reading& declared, Fixed& fixed) const;
-  /// What a term of coefficient 1 adds to a capture: millimetres of range, per cent of light, or
-  /// of its carrier.
-  static PerChannel columnsOf(const Fixed& fixed, const Term& term);
+  /// What terms of coefficient 1 add to a capture: millimetres of range, per cent of light, or of their
+  /// carriers.
+  static PerChannel columnsOf(const Fixed& fixed, const Term& term, const Eigen::VectorXf& values);
   static Terms termsOf(const Fixed& fixed, std::span<const TermGroup> groups);
   static CaptureEvidence ownEvidence(const CaptureRows& rows);
   [[nodiscard]] Evidence evidenceWith(std::span<const TermGroup> extra, bool with_catalogue) const;
@@ -182,7 +195,8 @@ class CampaignRows final : public RowSource, public NamedEffects {
   std::vector<Candidate> candidates_;  ///< in the order of the catalogue's groups
   std::vector<sim::AnyEffect> effects_;
   std::vector<Group> groups_;  ///< of the base, then of the catalogue
-  std::size_t base_columns_ = 0;
+  /// Of groups that are common to all lists of effects, and of these and the effects' numbers.
+  std::size_t common_columns_ = kCommon, base_columns_ = 0;
   std::vector<CaptureRows> rows_;
   double period_m_ = 0.0;
   bool has_delay_ = false;  ///< a delay of the light is another thing than an error of the range

@@ -2,6 +2,8 @@
 // What terms of covariates add to a campaign's rows.
 #include <algorithm>
 #include <cmath>
+#include <deque>
+#include <optional>
 #include <set>
 
 #include "calib/discover/campaign/carriers.h"
@@ -16,25 +18,81 @@ namespace {
 constexpr std::size_t kRange = static_cast<std::size_t>(Channel::Range);
 constexpr std::size_t kLog = static_cast<std::size_t>(Channel::LogAmplitude);
 
-/// A term at each cell; 0 where a covariate of it is not known.
-Eigen::VectorXf valuesOf(const Term& term, const CaptureCovariates& covariates) {
-  Eigen::VectorXf values = Eigen::VectorXf::Ones(covariates.values.rows());
-  for (const Factor& factor : term.factors) {
-    const auto found = std::ranges::find(covariates.names, factor.covariate);
-    if (found == covariates.names.end()) return Eigen::VectorXf::Zero(covariates.values.rows());
-    const auto column = covariates.values.col(found - covariates.names.begin());
-    for (Eigen::Index i = 0; i < values.size(); ++i) {
-      const double value = factor.at(static_cast<double>(column[i]));
-      values[i] *= std::isfinite(value) ? static_cast<float>(value) : 0.0F;
+/// Values of factors at a capture's cells, each computed once.
+class Factors {
+ public:
+  explicit Factors(const CaptureCovariates& covariates) : covariates_(covariates) {}
+
+  /// A term without those of its factors that are the same in all cells, and what these come to; 0 where a
+  /// covariate is not known.
+  [[nodiscard]] std::pair<Term, double> split(const Term& term) const {
+    Term rest{{}, term.stage, term.carrier};
+    double scale = 1.0;
+    for (const Factor& factor : term.factors) {
+      const auto place = placeOf(factor);
+      if (!place) return {rest, 0.0};
+      if (covariates_.is_same[*place])
+        scale *= known(factor.at(static_cast<double>(column(*place)[0])));
+      else
+        rest.factors.push_back(factor);
     }
+    return {std::move(rest), scale};
   }
-  return values;
+
+  /// What varies of a term.
+  [[nodiscard]] Eigen::VectorXf of(const Term& rest) {
+    Eigen::VectorXf product = Eigen::VectorXf::Ones(covariates_.values.rows());
+    for (const Factor& factor : rest.factors) product = product.cwiseProduct(valuesOf(factor));
+    return product;
+  }
+
+ private:
+  static double known(double value) { return std::isfinite(value) ? value : 0.0; }
+  [[nodiscard]] std::optional<std::size_t> placeOf(const Factor& factor) const {
+    const auto found = std::ranges::find(covariates_.names, factor.covariate);
+    if (found == covariates_.names.end() || covariates_.values.rows() == 0) return std::nullopt;
+    return static_cast<std::size_t>(found - covariates_.names.begin());
+  }
+  [[nodiscard]] Eigen::MatrixXf::ConstColXpr column(std::size_t place) const {
+    return covariates_.values.col(static_cast<Eigen::Index>(place));
+  }
+  const Eigen::VectorXf& valuesOf(const Factor& factor) {
+    for (const auto& [other, values] : known_)
+      if (other == factor) return values;
+    const auto x = column(*placeOf(factor));
+    Eigen::VectorXf values(x.size());
+    for (Eigen::Index i = 0; i < values.size(); ++i)
+      values[i] = static_cast<float>(known(factor.at(static_cast<double>(x[i]))));
+    return known_.emplace_back(factor, std::move(values)).second;
+  }
+
+  const CaptureCovariates& covariates_;
+  std::deque<std::pair<Factor, Eigen::VectorXf>> known_{};
+};
+
+bool isSame(const Term& a, const Term& b) {
+  return a.carrier == b.carrier && a.stage == b.stage && a.factors == b.factors;
+}
+
+Eigen::MatrixXd squared(const Eigen::MatrixXf& columns) {
+  Eigen::MatrixXf squares = Eigen::MatrixXf::Zero(columns.cols(), columns.cols());
+  squares.selfadjointView<Eigen::Lower>().rankUpdate(columns.transpose());
+  return Eigen::MatrixXf{squares.selfadjointView<Eigen::Lower>()}.cast<double>();
 }
 
 }  // namespace
 
-CampaignRows::PerChannel CampaignRows::columnsOf(const Fixed& fixed, const Term& term) {
-  const Eigen::VectorXf values = valuesOf(term, fixed.covariates);
+Eigen::MatrixXd CampaignRows::Terms::columnsFor(std::size_t channel, const Eigen::MatrixXd& shared) const {
+  Eigen::MatrixXd all = Eigen::MatrixXd::Zero(shared.rows(), count());
+  for (Eigen::Index j = 0; j < count(); ++j) {
+    const Eigen::Index at = channels[channel].of[static_cast<std::size_t>(j)];
+    if (at >= 0) all.col(j) = scale[j] * shared.col(at);
+  }
+  return all;
+}
+
+CampaignRows::PerChannel CampaignRows::columnsOf(const Fixed& fixed, const Term& term,
+                                                 const Eigen::VectorXf& values) {
   PerChannel columns;  // empty: nothing is added
   if (!term.carrier.empty()) {
     const auto carrier = fixed.carriers.find(term.carrier);
@@ -52,21 +110,39 @@ CampaignRows::PerChannel CampaignRows::columnsOf(const Fixed& fixed, const Term&
 }
 
 CampaignRows::Terms CampaignRows::termsOf(const Fixed& fixed, std::span<const TermGroup> groups) {
-  Terms terms;
-  for (const TermGroup& group : groups) terms.count += static_cast<Eigen::Index>(group.terms.size());
-  Eigen::Index next = 0;
+  Factors factors{fixed.covariates};
+  std::vector<double> scale;
+  std::vector<std::optional<std::size_t>> place;  ///< of each term among the parts that vary
+  std::vector<Term> parts;
   for (const TermGroup& group : groups) {
     for (const Term& term : group.terms) {
-      const PerChannel columns = columnsOf(fixed, term);
-      for (std::size_t c = 0; c < kChannels; ++c) {
-        if (columns[c].size() == 0) continue;
-        if (terms.columns[c].size() == 0)
-          terms.columns[c] =
-              Eigen::MatrixXf::Zero(static_cast<Eigen::Index>(fixed.cells.size()), terms.count);
-        terms.columns[c].col(next) = columns[c];
-      }
-      ++next;
+      auto [rest, by] = factors.split(term);
+      scale.push_back(by);
+      place.emplace_back();
+      if (by == 0.0) continue;
+      const auto same = std::ranges::find_if(parts, [&](const Term& other) { return isSame(other, rest); });
+      place.back() = static_cast<std::size_t>(same - parts.begin());
+      if (same == parts.end()) parts.push_back(std::move(rest));
     }
+  }
+  std::array<std::vector<Eigen::VectorXf>, kChannels> columns;
+  std::array<std::vector<Eigen::Index>, kChannels> of_part;
+  for (const Term& part : parts) {
+    PerChannel both = columnsOf(fixed, part, factors.of(part));
+    for (std::size_t c = 0; c < kChannels; ++c) {
+      of_part[c].push_back(both[c].size() == 0 ? -1 : static_cast<Eigen::Index>(columns[c].size()));
+      if (both[c].size() != 0) columns[c].push_back(std::move(both[c]));
+    }
+  }
+  Terms terms;
+  terms.scale = Eigen::Map<Eigen::VectorXd>(scale.data(), static_cast<Eigen::Index>(scale.size()));
+  for (std::size_t c = 0; c < kChannels; ++c) {
+    Terms::Shared& shared = terms.channels[c];
+    for (const auto& at : place) shared.of.push_back(at ? of_part[c][*at] : -1);
+    shared.columns.resize(static_cast<Eigen::Index>(fixed.cells.size()),
+                          static_cast<Eigen::Index>(columns[c].size()));
+    for (std::size_t i = 0; i < columns[c].size(); ++i)
+      shared.columns.col(static_cast<Eigen::Index>(i)) = columns[c][i];
   }
   return terms;
 }
@@ -88,7 +164,7 @@ CaptureEvidence CampaignRows::evidenceOf(const CaptureRows& rows, std::span<cons
   const auto in_base = static_cast<Eigen::Index>(base_columns_);
   const Eigen::Index old = with_catalogue ? rows.evidence.gram.rows() : in_base;
   const Terms terms = termsOf(*rows.fixed, extra);
-  const Eigen::Index added = terms.count;
+  const Eigen::Index added = terms.count();
   CaptureEvidence evidence{.gram = Eigen::MatrixXd::Zero(old + added, old + added),
                            .moment = Eigen::VectorXd::Zero(old + added),
                            .energy = rows.evidence.energy,
@@ -98,21 +174,20 @@ CaptureEvidence CampaignRows::evidenceOf(const CaptureRows& rows, std::span<cons
   evidence.gram.topLeftCorner(old, old) = rows.evidence.gram.topLeftCorner(old, old);
   evidence.moment.head(old) = rows.evidence.moment.head(old);
   for (std::size_t c = 0; c < kChannels; ++c) {
-    const Eigen::MatrixXf& own = terms.columns[c];
-    if (own.size() == 0) continue;
-    Eigen::MatrixXd cross(old, added);
+    const Eigen::MatrixXf& own = terms.channels[c].columns;
+    if (own.cols() == 0 || rows.base.columns[c].size() == 0) continue;
+    Eigen::MatrixXd cross(old, own.cols());
     cross.topRows(in_base) = (rows.base.columns[c].transpose() * own).cast<double>();
     if (with_catalogue)
       cross.bottomRows(old - in_base) =
           (rows.fixed->catalogue[c].transpose() * own).cast<double>();
-    evidence.gram.topRightCorner(old, added) += cross;
-    evidence.gram.bottomLeftCorner(added, old) += cross.transpose();
-    Eigen::MatrixXf squares = Eigen::MatrixXf::Zero(added, added);
-    squares.selfadjointView<Eigen::Lower>().rankUpdate(own.transpose());
-    evidence.gram.bottomRightCorner(added, added) +=
-        Eigen::MatrixXf{squares.selfadjointView<Eigen::Lower>()}.cast<double>();
-    evidence.moment.tail(added) += (own.transpose() * rows.base.residual[c]).cast<double>();
+    evidence.gram.topRightCorner(old, added) += terms.columnsFor(c, cross);
+    const Eigen::MatrixXd half = terms.columnsFor(c, squared(own));  // shared × terms
+    evidence.gram.bottomRightCorner(added, added) += terms.columnsFor(c, half.transpose()).transpose();
+    const Eigen::MatrixXd moment = (rows.base.residual[c].transpose() * own).cast<double>();
+    evidence.moment.tail(added) += terms.columnsFor(c, moment).transpose();
   }
+  evidence.gram.bottomLeftCorner(added, old) = evidence.gram.topRightCorner(old, added).transpose();
   return evidence;
 }
 
@@ -167,7 +242,7 @@ Result<Evidence> CampaignRows::evidenceLeft(const Left& left) const {
   }
   const bool on_light = actsOnLight(left.effects);
   Evidence evidence;
-  const std::size_t own = left.with_numbers ? base_columns_ : kCommon;
+  const std::size_t own = left.with_numbers ? base_columns_ : common_columns_;
   for (const Group& group : groups_)
     if (group.first < own) evidence.groups.push_back(group);
   appendTerms(left.terms, own, evidence.groups);
@@ -191,8 +266,8 @@ Result<Evidence> CampaignRows::evidenceLeft(const Left& left) const {
         if (whitened.columns[k].size() == 0) continue;
         const auto in_base = static_cast<Eigen::Index>(own);
         whitened.columns[k].leftCols(in_base) = rows_[c].base.columns[k].leftCols(in_base);
-        if (terms.columns[k].size() != 0)
-          whitened.columns[k].middleCols(in_base, terms.count) = terms.columns[k];
+        whitened.columns[k].middleCols(in_base, terms.count()) =
+            terms.columnsFor(k, terms.channels[k].columns.cast<double>()).cast<float>();
       }
       for (std::size_t i = 0; i < left.free.size(); ++i)
         whitened.putChange(fixed.cells, first_free + i, reading, read(cameras[i], c, on_light));
