@@ -12,48 +12,29 @@
 #include <iterator>
 #include <map>
 
-#include "../daemon/running_daemon.h"
-#include "v4l2_cameras.h"
+#include "facade_frames.h"
 
 namespace toftwin::kernel_test {
 namespace {
 
 using daemon::test::eventually;
 using daemon::test::kSoon;
-using Codes = std::vector<std::uint16_t>;
 
 constexpr std::uint16_t kUsbipPort = 3240;
-constexpr std::size_t kFacadeWidth = 64, kFacadeHeight = 48, kFacadePixels = kFacadeWidth * kFacadeHeight;
-const std::string kFacadePattern =
-    fmt::format("[[source]]\nname = 'cam'\ndriver = 'pattern'\nwidth = {}\nheight = {}\nframe_rate_hz = 10\n",
-                kFacadeWidth, kFacadeHeight);
-
-/// What docs/facades/usb_camera.md says becomes of a frame.
-Codes codesOf(const Frame& frame, PlaneKind kind) {
-  Codes codes;
-  for (const float value : frame.find(kind)->as<float>()) {
-    const double count = std::round(static_cast<double>(value) * (kind == PlaneKind::Depth ? 1000.0 : 1.0));
-    const bool is_depth_beyond = kind == PlaneKind::Depth && count > 65'535.0;
-    codes.push_back(std::isnan(count) || is_depth_beyond
-                        ? std::uint16_t{0}
-                        : static_cast<std::uint16_t>(std::min(count, 65'535.0)));
-  }
-  return codes;
-}
 
 bool hasTool(const std::string& name) { return std::filesystem::exists("/bin/" + name); }
 
-class UsbCamera : public daemon::test::RunningDaemon {
+class UsbCamera : public FacadeFrames {
  protected:
   void SetUp() override {
     run("ip link set lo up; mkdir -p /var/run");
-    RunningDaemon::SetUp();
+    FacadeFrames::SetUp();
   }
   void TearDown() override {
     stop();
     EXPECT_TRUE(eventually([] { return drivers::v4l2::row().list().empty(); }))
         << "it is unplugged with the daemon";
-    RunningDaemon::TearDown();
+    FacadeFrames::TearDown();
   }
 
   void startCamera(const std::string& source, const std::string& facade = {}) {
@@ -87,31 +68,6 @@ class UsbCamera : public daemon::test::RunningDaemon {
   static void waitForNode() {
     ASSERT_TRUE(eventually([] { return !drivers::v4l2::row().list().empty(); }));
   }
-
-  /// All frames from now on, by their depth.
-  void collect() {
-    native_ = client();
-    auto stream = native_->subscribe("cam", {.policy = SubscribeOptions::Policy::Queue, .queue = 1000});
-    ASSERT_TRUE(stream.ok()) << stream.error().message;
-    natives_.emplace(*std::move(stream));
-  }
-  /// The place among the native frames of the one with those codes; -1: there is none.
-  int placeOf(const Codes& codes) {
-    const auto same = std::ranges::find_if(
-        seen_, [&](const Frame& frame) { return codesOf(frame, PlaneKind::Depth) == codes; });
-    if (same != seen_.end()) return static_cast<int>(same - seen_.begin());
-    for (int i = 0; i < 100; ++i) {
-      auto next = natives_->next(kSoon);
-      if (!next) break;
-      seen_.push_back(*std::move(next));
-      if (codesOf(seen_.back(), PlaneKind::Depth) == codes) return static_cast<int>(seen_.size()) - 1;
-    }
-    return -1;
-  }
-
-  std::optional<Client> native_;
-  std::optional<Subscription> natives_;
-  std::vector<Frame> seen_;
 };
 
 /// In millimetres, 0 where there is none: what the driver made metres of.
@@ -198,15 +154,11 @@ TEST_F(UsbCamera, StockToolsListAttachAndStreamItWithTheNativeFramesAndTimeStamp
       "v4l2-ctl -d /dev/video0 --list-formats-ext && "
       "v4l2-ctl -d /dev/video0 -v pixelformat='Z16 ' --stream-mmap=4 --stream-count=12 "
       "--stream-to=/tmp/depth.raw");
-  std::ifstream in{"/tmp/depth.raw", std::ios::binary};
-  const std::string bytes{std::istreambuf_iterator<char>{in}, {}};
-  ASSERT_EQ(bytes.size(), kCount * kFacadePixels * 2);
+  const auto images = imagesIn("/tmp/depth.raw");
+  ASSERT_EQ(images.size(), std::size_t{kCount});
   int first = -1;
   for (int i = 0; i < kCount; ++i) {
-    Codes codes(kFacadePixels);
-    std::memcpy(codes.data(), bytes.data() + static_cast<std::size_t>(i) * kFacadePixels * 2,
-                kFacadePixels * 2);
-    const int place = placeOf(codes);
+    const int place = placeOf(images[static_cast<std::size_t>(i)]);
     ASSERT_GE(place, 0) << "image " << i << " is none of the native frames";
     if (first < 0) first = place;
     EXPECT_EQ(place, first + i);

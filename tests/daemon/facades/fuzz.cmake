@@ -26,3 +26,6 @@ toftwin_fuzz_facade(modbus ${facades}/modbus/registers.cpp ${facades}/modbus/req
 set(gige_vision bootstrap_registers.cpp device.cpp device_write.cpp features.cpp genicam_xml.cpp gvcp.cpp gvsp.cpp images.cpp memory.cpp)
 list(TRANSFORM gige_vision PREPEND ${facades}/gige_vision/)
 toftwin_fuzz_facade(gige_vision ${gige_vision})
+set(usb_camera operations.cpp transfers.cpp usb_device.cpp uvc_descriptors.cpp uvc_device.cpp)
+list(TRANSFORM usb_camera PREPEND ${facades}/usb_camera/)
+toftwin_fuzz_facade(usb_camera ${usb_camera})

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // libFuzzer's entry for what facades read: cmake --preset fuzz, then fuzz_o3d303_facade,
-// fuzz_modbus_facade or fuzz_gige_vision_facade.
+// fuzz_modbus_facade, fuzz_gige_vision_facade or fuzz_usb_camera_facade.
 #include <cstdint>
 #include <span>
 
