@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 
 #include "daemon/facades/openni2/device.h"
@@ -12,7 +11,6 @@
 namespace toftwin::openni2 {
 namespace {
 
-constexpr std::chrono::seconds kPatience{1};
 constexpr std::array<int, 4> kOfTheCamera{ONI_STREAM_PROPERTY_AUTO_WHITE_BALANCE, ONI_STREAM_PROPERTY_AUTO_EXPOSURE,
                                   ONI_STREAM_PROPERTY_EXPOSURE, ONI_STREAM_PROPERTY_GAIN};
 
@@ -34,12 +32,12 @@ bool Stream::isMirrored() {
 // ---- frames ------------------------------------------------------------------------------------
 
 void Stream::deliver(const Frame& frame, const std::vector<double>& depth_per_range, int index) {
-  const std::unique_lock lock{delivery_};
+  const std::scoped_lock lock{delivery_};
   if (!is_running_) return;
   OniFrame* out = getServices().acquireFrame();
   if (out == nullptr) return;
   if (fill(frame, depth_per_range, index, *out)) raiseNewFrame(out);
-  if (!is_abandoned_) getServices().releaseFrame(out);
+  getServices().releaseFrame(out);
 }
 
 bool Stream::fill(const Frame& frame, const std::vector<double>& depth_per_range, int index, OniFrame& out) {
@@ -78,11 +76,9 @@ void Stream::stop() {
   });
 }
 
-bool Stream::finish() {
+void Stream::finish() {
   is_running_ = false;
-  const std::unique_lock lock{delivery_, kPatience};
-  if (!lock.owns_lock()) is_abandoned_ = true;
-  return lock.owns_lock();
+  const std::scoped_lock one_under_way{delivery_};
 }
 
 int Stream::getRequiredFrameSize() {

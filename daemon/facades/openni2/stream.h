@@ -26,8 +26,8 @@ class Stream final : public oni::driver::StreamBase {
   void noteRate(int rate_hz);
 
   void deliver(const Frame& frame, const std::vector<double>& depth_per_range, int index);
-  /// No frame comes any more, even one under way. False: it is held up in OpenNI2 (Worker).
-  bool finish();
+  /// No frame comes any more, even one under way.
+  void finish();
 
   OniBool isPropertySupported(int property) override;
   OniStatus getProperty(int property, void* data, int* size) override;
@@ -51,8 +51,8 @@ class Stream final : public oni::driver::StreamBase {
   OniSensorType sensor_;
   std::mutex settings_mutex_;
   StreamSettings settings_;
-  std::timed_mutex delivery_;  ///< held while a frame is handed over
-  std::atomic<bool> is_running_{false}, is_abandoned_{false};
+  std::mutex delivery_;  ///< held while a frame is handed over
+  std::atomic<bool> is_running_{false};
 };
 
 }  // namespace toftwin::openni2

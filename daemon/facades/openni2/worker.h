@@ -31,9 +31,9 @@ class Worker {
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
 
-  /// Asks it to stop and waits. False: it is held up where it calls OpenNI2, which may hold the lock that it wants
-  /// while it waits for us (Context::shutdown does, of 2.2.0.33). Then it is left behind, and this module stays in
-  /// memory: what the thread uses must not be freed.
+  /// Asks it to stop and waits. False: it is the caller itself (a program's callback, which ends what called it), or
+  /// held up where it calls OpenNI2, which may hold the lock that it wants while it waits for us (Context::shutdown
+  /// does, of 2.2.0.33). Then it is left behind, and this module stays in memory: what it uses must not be freed.
   bool finish();
 
  private:

@@ -461,6 +461,15 @@ int entriesOf(const char* folder) {
   return static_cast<int>(std::distance(begin(all), end(all)));
 }
 
+TEST(OpenNI2PluginModule, ExportsWhatOpenNI2LooksUpAndNothingElse) {
+  void* plugin = ::dlopen(TOFTWIN_ONI_PLUGIN, RTLD_NOW | RTLD_LOCAL);
+  ASSERT_NE(plugin, nullptr) << ::dlerror();
+  EXPECT_NE(::dlsym(plugin, "oniDriverCreate"), nullptr);
+  EXPECT_EQ(::dlsym(plugin, "g_pDriver"), nullptr) << "of OpenNI2's header, which does not hide it";
+  EXPECT_EQ(::dlsym(plugin, "_ZN7toftwin17defaultSocketPathB5cxx11Ev"), nullptr) << "of the client";
+  ::dlclose(plugin);
+}
+
 TEST_F(OpenNI2Plugin, NothingIsLeftWhenTheLibraryEnds) {
   startWith(kPattern);
   shutdown();
@@ -475,6 +484,7 @@ TEST_F(OpenNI2Plugin, NothingIsLeftWhenTheLibraryEnds) {
       oniStreamStop(stream.get());
     }
     shutdown();
+    EXPECT_EQ(::dlopen(TOFTWIN_ONI_PLUGIN, RTLD_NOW | RTLD_NOLOAD), nullptr) << "it is still in memory";
   }
   EXPECT_TRUE(eventually([&] { return entriesOf("/proc/self/task") <= threads; })) << "the daemon's session ends late";
   EXPECT_TRUE(eventually([&] { return entriesOf("/proc/self/fd") <= files; }));
