@@ -19,21 +19,29 @@ Error ofCapture(const CaptureRecord& record, const Error& error) {
   return {error.code, fmt::format("capture {} (\"{}\"): {}", record.number, record.name, error.message)};
 }
 
-Result<Stack> stackOf(const std::filesystem::path& run, const RecordedFile& file) {
+struct Read {
+  Stack stack;
+  std::vector<ReadFrame> frames;
+};
+
+Result<Read> readCamera(const std::filesystem::path& run, const RecordedFile& file) {
   const auto path = run / file.file;
   if (auto checked = checkHash(run, file); !checked) return checked.error();
   auto reader = record::Reader::open(path);
   if (!reader) return reader.error();
-  Stack stack;
+  Read read;
   while (true) {
     auto frame = reader->next();
     if (!frame && frame.error().code == Error::Code::EndOfStream) break;
     if (!frame) return frame.error();
-    if (auto added = stack.add(*frame); !added) return added.error();
+    if (auto added = read.stack.add(*frame); !added) return added.error();
+    auto one = readOf(*frame);
+    if (!one) return one.error();
+    read.frames.push_back(*std::move(one));
   }
-  if (stack.frames() == file.frames) return stack;
+  if (read.stack.frames() == file.frames) return read;
   return Error{Error::Code::Malformed, fmt::format("{}: has {} frames, not the {} of the index",
-                                                   path.string(), stack.frames(), file.frames)};
+                                                   path.string(), read.stack.frames(), file.frames)};
 }
 
 template <class T>
@@ -105,18 +113,22 @@ Result<> checkHash(const std::filesystem::path& run, const RecordedFile& file) {
                            (run / file.file).string())};
 }
 
-Result<ComparedCapture> compareCapture(const std::filesystem::path& run, const CaptureRecord& record,
-                                       int stride, PoseComparison* whole) {
-  const auto a = stackOf(run, record.a);
+Result<ComparedCapture> compareCapture(const std::filesystem::path& run, const Plan& plan,
+                                       const CaptureRecord& record, const CompareHow& how,
+                                       PoseComparison* whole) {
+  const auto a = readCamera(run, record.a);
   if (!a) return ofCapture(record, a.error());
-  const auto b = stackOf(run, record.b);
+  const auto b = readCamera(run, record.b);
   if (!b) return ofCapture(record, b.error());
-  auto compared = compare::comparePose(*a, *b);
-  if (!compared) return ofCapture(record, compared.error());
   ComparedCapture one;
   one.record = record;
+  one.seen = {seenOf(plan, record, a->stack, a->frames, how.shortest_period_m),
+              seenOf(plan, record, b->stack, b->frames, how.shortest_period_m)};
+  if (record.kind == nameOf(Kind::Moving)) return one;
+  auto compared = compare::comparePose(a->stack, b->stack);
+  if (!compared) return ofCapture(record, compared.error());
   summarise(*compared, one);
-  one.thinned = thinned(*compared, stride);
+  one.thinned = thinned(*compared, how.stride);
   if (whole != nullptr) *whole = *std::move(compared);
   return one;
 }

@@ -94,11 +94,13 @@ Result<FirstFrame> firstFrameOf(const std::filesystem::path& run, const std::vec
 }
 
 /// Two captures at a time; each is read, compared and thinned before the next.
-Result<ComparedRun> compareAll(const CompareRunJob& job, const std::vector<CaptureRecord>& records,
-                               compare::Progress& progress) {
+Result<ComparedRun> compareAll(const CompareRunJob& job, const Plan& plan,
+                               const std::vector<CaptureRecord>& records, compare::Progress& progress) {
   const auto first = firstFrameOf(job.run, records);
   if (!first) return first.error();
   const auto shown = examplesOf(records);
+  CompareHow how{.stride = first->stride};
+  if (!first->frequency_hz.empty()) how.shortest_period_m = 299'792'458.0 / 2.0 / std::ranges::max(first->frequency_hz);
   const unsigned workers = std::clamp(std::thread::hardware_concurrency(), 1u, 4u);
   std::vector<std::optional<Result<ComparedCapture>>> results(records.size());
   std::vector<compare::PoseComparison> wholes(records.size());
@@ -107,7 +109,7 @@ Result<ComparedRun> compareAll(const CompareRunJob& job, const std::vector<Captu
   const auto work = [&] {
     for (std::size_t i = next++; i < records.size() && !gives_up; i = next++) {
       const bool is_shown = shown.contains(records[i].number);
-      results[i] = compareCapture(job.run, records[i], first->stride, is_shown ? &wholes[i] : nullptr);
+      results[i] = compareCapture(job.run, plan, records[i], how, is_shown ? &wholes[i] : nullptr);
       if (!*results[i]) gives_up = true;
       ++done;
     }
@@ -129,7 +131,7 @@ Result<ComparedRun> compareAll(const CompareRunJob& job, const std::vector<Captu
     if (results[i] && !*results[i]) return results[i]->error();
     if (!results[i]) continue;  // after an error, which another one has
     if (shown.contains(records[i].number)) run.examples.emplace_back(records[i].name, std::move(wholes[i]));
-    run.captures.push_back(**std::move(results[i]));
+    (standsStill(records[i]) ? run.captures : run.moving).push_back(**std::move(results[i]));
   }
   return run;
 }
@@ -170,7 +172,7 @@ std::vector<std::string> warningsOf(const RunFiles& files, const std::map<std::s
   }
   warnings.insert(warnings.end(), notes.begin(), notes.end());
   const auto moving = std::ranges::count_if(index, [](const auto& one) { return !standsStill(one.second); });
-  if (moving > 0) warnings.push_back(fmt::format("{} captures of a moving plate are left out here.", moving));
+  if (moving > 0) warnings.push_back(fmt::format("{} captures of a moving plate are not compared pixel by pixel.", moving));
   return warnings;
 }
 
@@ -215,7 +217,7 @@ Result<std::filesystem::path> compareRun(const CompareRunJob& job, compare::Prog
   if (!index) return index.error();
   std::vector<CaptureRecord> records;
   for (const auto& [number, one] : *index) {
-    if (one.is_locked == job.locked && standsStill(one)) records.push_back(one);
+    if (one.is_locked == job.locked) records.push_back(one);
   }
   if (records.empty()) {
     return Error{Error::Code::InvalidArgument, fmt::format("{}: there are no {}captures to compare",
@@ -232,7 +234,7 @@ Result<std::filesystem::path> compareRun(const CompareRunJob& job, compare::Prog
   }
   progress.plan(fmt::format("{} captures", records.size()), 0.3 * static_cast<double>(records.size()));
   progress.plan("report", 3.0);
-  auto run = compareAll(job, records, progress);
+  auto run = compareAll(job, files->plan, records, progress);
   if (!run) return run.error();
   run->plan = files->plan.name, run->is_locked = job.locked;
   run->warnings = warningsOf(*files, *index, records);

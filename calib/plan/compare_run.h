@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -10,7 +11,9 @@
 
 #include "calib/compare/characteristics.h"
 #include "calib/compare/progress.h"
+#include "calib/plan/plan.h"
 #include "calib/plan/run_index.h"
+#include "calib/plan/seen.h"
 
 namespace toftwin::plan {
 
@@ -26,13 +29,19 @@ struct ComparedCapture {
   double valid_a = 0.0, valid_b = 0.0, masks_agree = 0.0;  ///< shares of the pixels
   /// Every so-manieth pixel of each row and column, for what is told of all captures together.
   compare::PoseComparison thinned;
+  std::array<CameraSeen, 2> seen{};  ///< of A and B, each by itself
 };
 
 /// Reads both recordings of a capture and compares them pixel by pixel. Errors name the capture: a file that
 /// is missing, damaged or not the one that the index names, poses that disagree, fields of view that do not
-/// overlap. `whole`: also gives the comparison of all pixels.
-Result<ComparedCapture> compareCapture(const std::filesystem::path& run, const CaptureRecord& record,
-                                       int stride, compare::PoseComparison* whole = nullptr);
+/// overlap. `whole`: also gives the comparison of all pixels. A plate that moves is not compared pixel by pixel.
+struct CompareHow {
+  int stride = 1;
+  double shortest_period_m = 0.0;  ///< half a wavelength of the highest frequency; 0: not known
+};
+Result<ComparedCapture> compareCapture(const std::filesystem::path& run, const Plan& plan,
+                                       const CaptureRecord& record, const CompareHow& how,
+                                       compare::PoseComparison* whole = nullptr);
 
 /// Error where a recording is missing or not the one that was captured.
 Result<> checkHash(const std::filesystem::path& run, const RecordedFile& file);

@@ -16,6 +16,7 @@ namespace toftwin::plan {
 struct ComparedRun {
   std::string plan;  ///< its name
   std::vector<ComparedCapture> captures;
+  std::vector<ComparedCapture> moving{};  ///< of a plate that moves: not compared pixel by pixel
   std::vector<std::pair<std::string, compare::PoseComparison>>
       examples;  ///< whole images, a capture of each block
   std::vector<double> frequency_hz;  ///< A's modulation frequencies; empty: none is told

@@ -10,6 +10,8 @@
 #include <fmt/format.h>
 
 #include "calib/compare/live_report.h"
+#include "calib/compare/statistics.h"
+#include "calib/plan/frame_traits.h"
 
 namespace toftwin::plan {
 namespace {
@@ -19,6 +21,26 @@ using Captures = std::vector<const ComparedCapture*>;
 
 /// Rows for each parameter of a fit; fewer tell little more than themselves.
 constexpr std::size_t kRowsPerParameter = 3;
+
+/// Which kind of block tells what; docs/characteristics.md has the same.
+struct Feeds {
+  const char* kind;
+  const char* what;
+};
+constexpr std::array kFeeds{Feeds{"warm_up", "drift"},
+                            Feeds{"distance", "harmonics"},
+                            Feeds{"distance", "wraps"},
+                            Feeds{"distance", "noise of frames"},
+                            Feeds{"exposure", "error over amplitude"},
+                            Feeds{"ambient", "ambient light"},
+                            Feeds{"bright_dark", "lag"},
+                            Feeds{"foreground", "lens scatter"},
+                            Feeds{"foreground", "flying pixels"},
+                            Feeds{"foreground", "emitter shadow"},
+                            Feeds{"foreground", "edge width and lateral resolution"},
+                            Feeds{"corner", "multipath in a corner over the distance to its edge"},
+                            Feeds{"moving", "motion"},
+                            Feeds{"moving", "latency"}};
 
 Captures capturesOf(const ComparedRun& run, std::string_view kind) {
   Captures chosen;
@@ -38,6 +60,10 @@ std::vector<double> differencesOf(const Captures& captures) {
   return column(captures, [](const auto& one) { return one.difference_mm; });
 }
 
+double meanOf(const std::vector<double>& values) {
+  return values.empty() ? std::nan("") : compare::summarise(values).mean;
+}
+
 /// A camera, and how its own numbers are got from a capture.
 struct Side {
   const char* name;
@@ -55,21 +81,6 @@ constexpr std::array kSides{Side{"A", [](const ComparedCapture& c) { return c.ra
                                  [](const ComparedCapture& c) { return c.amplitude_b; },
                                  [](const ComparedCapture& c) { return c.record.b.since_power_on_s; }}};
 
-class Collector {
- public:
-  void add(const std::string& what, const char* of, const compare::Traits& traits) {
-    if (!traits) {
-      found_.untold.push_back(fmt::format("{} of {}: {}", what, of, traits.error().message));
-      return;
-    }
-    for (const Trait& trait : *traits) found_.traits.push_back({what, of, trait});
-  }
-  RunTraits found() && { return std::move(found_); }
-
- private:
-  RunTraits found_;
-};
-
 const char* nameOf(compare::DriftModel model) {
   switch (model) {
     case compare::DriftModel::Constant:
@@ -86,7 +97,7 @@ const char* nameOf(compare::DriftModel model) {
   return "";
 }
 
-void addDrift(const ComparedRun& run, Collector& all) {
+void addDrift(const ComparedRun& run, TraitCollector& all) {
   const Captures captures = capturesOf(run, "warm_up");
   if (captures.empty()) return;
   for (const Side& side : kSides) {
@@ -102,7 +113,7 @@ void addDrift(const ComparedRun& run, Collector& all) {
 
 /// As many of four, three, two and one wave per period as the rows allow: cameras of four and three steps
 /// have the first of these.
-void addHarmonics(const ComparedRun& run, Collector& all) {
+void addHarmonics(const ComparedRun& run, TraitCollector& all) {
   const Captures captures = capturesOf(run, "distance");
   if (captures.empty() || run.frequency_hz.empty()) return;
   std::vector<int> orders;
@@ -121,12 +132,25 @@ void addHarmonics(const ComparedRun& run, Collector& all) {
   const auto distance = column(captures, [](const auto& one) { return one.range_a_mm / 1000.0; });
   all.add("harmonics", "B − A",
           compare::harmonicTraits(distance, differencesOf(captures), run.frequency_hz, orders));
+  for (std::size_t camera : {std::size_t{0}, std::size_t{1}}) {
+    const auto at = column(captures, [&](const auto& one) { return meanOf(one.seen[camera].wall_range_m); });
+    const auto error = column(captures, [&](const auto& one) { return meanOf(one.seen[camera].wall_error_mm); });
+    if (std::ranges::any_of(error, [](double e) { return std::isfinite(e); }))
+      all.add("harmonics, against the plan's wall", kSides[camera].name,
+              compare::harmonicTraits(at, error, run.frequency_hz, orders));
+  }
 }
 
-void addAmplitudeAndAmbient(const ComparedRun& run, Collector& all) {
+void addAmplitudeAndAmbient(const ComparedRun& run, TraitCollector& all) {
   if (const Captures captures = capturesOf(run, "exposure"); !captures.empty()) {
     all.add("error over amplitude", "B − A",
             compare::amplitudeTraits(column(captures, kSides[0].amplitude), differencesOf(captures)));
+    for (std::size_t camera : {std::size_t{0}, std::size_t{1}}) {
+      const auto error = column(captures, [&](const auto& one) { return meanOf(one.seen[camera].wall_error_mm); });
+      if (std::ranges::any_of(error, [](double e) { return std::isfinite(e); }))
+        all.add("error over amplitude, against the plan's wall", kSides[camera].name,
+                compare::amplitudeTraits(column(captures, kSides[camera].amplitude), error));
+    }
   }
   const Captures captures = capturesOf(run, "ambient");
   if (captures.empty()) return;
@@ -137,8 +161,10 @@ void addAmplitudeAndAmbient(const ComparedRun& run, Collector& all) {
   }
 }
 
-void addNoiseLaw(const ComparedRun& run, Collector& all) {
-  const Captures captures = capturesOf(run, "");
+void addNoiseLaw(const ComparedRun& run, TraitCollector& all) {
+  Captures captures = capturesOf(run, "");
+  // Other light makes noise of its own.
+  std::erase_if(captures, [](const ComparedCapture* one) { return one->record.ambient_klx > 0.0; });
   for (const Side& side : kSides) {
     const auto amplitude = column(captures, side.amplitude);
     if (std::ranges::none_of(amplitude, [](double a) { return std::isfinite(a); }))
@@ -147,7 +173,7 @@ void addNoiseLaw(const ComparedRun& run, Collector& all) {
   }
 }
 
-void addMasks(const ComparedRun& run, Collector& all) {
+void addMasks(const ComparedRun& run, TraitCollector& all) {
   const auto maskOf = [](const Image<float>& share, const Image<float>& looked_at) {
     Image<std::uint8_t> mask{share.width(), share.height()};
     for (std::size_t i = 0; i < mask.size(); ++i)
@@ -165,27 +191,47 @@ void addMasks(const ComparedRun& run, Collector& all) {
 }  // namespace
 
 RunTraits traitsOf(const ComparedRun& run) {
-  Collector all;
+  TraitCollector all;
   addDrift(run, all);
   addHarmonics(run, all);
   addAmplitudeAndAmbient(run, all);
   addNoiseLaw(run, all);
   addMasks(run, all);
+  addFrameTraits(run, all);
+  for (const Feeds& one : kFeeds) {
+    const auto isIt = [&](const ComparedCapture& capture) { return capture.record.kind == one.kind; };
+    if (std::ranges::none_of(run.captures, isIt) && std::ranges::none_of(run.moving, isIt))
+      all.untold(fmt::format("{}: the run has no block of kind {}", one.what, one.kind));
+  }
   return std::move(all).found();
 }
 
 compare::TableBlock traitTable(const RunTraits& traits) {
   compare::TableBlock table{
-      "Characteristics over the captures, with the intervals that are to hold them with 95 %: see "
-      "docs/characteristics.md",
-      {"characteristic", "of", "number", "value", "95 % from", "to", "unit", "rows"},
+      "Characteristics, with the intervals that are to hold them with 95 % and, behind a #, the number of rows, frames or "
+      "blocks they are from: see docs/characteristics.md",
+      {"characteristic", "number", "unit", "A", "B", "B − A, or both"},
       {}};
+  std::vector<std::pair<std::string, std::string>> keys;
   for (const auto& [what, of, trait] : traits.traits) {
-    table.rows.push_back({what, of, trait.name, fmt::format("{:.4g}", trait.value),
-                          fmt::format("{:.4g}", trait.low), fmt::format("{:.4g}", trait.high), trait.unit,
-                          std::to_string(trait.n)});
+    const std::pair key{what, trait.name};
+    auto row = static_cast<std::size_t>(std::ranges::find(keys, key) - keys.begin());
+    if (row == keys.size()) {
+      keys.push_back(key);
+      table.rows.push_back({what, trait.name, trait.unit, "", "", ""});
+    }
+    table.rows[row][of == "A" ? 3 : of == "B" ? 4 : 5] =
+        fmt::format("{:.4g} ({:.4g} to {:.4g}) #{}", trait.value, trait.low, trait.high, trait.n);
   }
   return table;
+}
+
+std::vector<std::string> feedsOf(std::string_view kind) {
+  std::vector<std::string> told;
+  for (const Feeds& one : kFeeds) {
+    if (one.kind == kind) told.emplace_back(one.what);
+  }
+  return told;
 }
 
 compare::Json toJson(const RunTraits& traits) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "calib/compare/report.h"
@@ -10,8 +11,8 @@
 
 namespace toftwin::plan {
 
-/// A characteristic over a run's captures, each of which is a row: its mean over the pixels that both cameras
-/// see. As nobody knows the true range of a real scene, errors are B − A, and drift is each camera's own.
+/// A characteristic of a run. Over captures each is a row: its mean over the pixels that both cameras see. Errors of a
+/// camera by itself are against the surfaces that the plan puts before it.
 struct RunTrait {
   std::string what{};  ///< "drift, ramp"
   std::string of{};    ///< "A", "B" or "B − A"
@@ -25,6 +26,9 @@ struct RunTraits {
 /// Of the blocks of each kind that can tell it: drift (warm_up), harmonics (distance), error over amplitude
 /// (exposure), error and noise over ambient light (ambient); of all captures the noise's law and the masks.
 RunTraits traitsOf(const ComparedRun& run);
+
+/// What blocks of a kind tell that others do not: "drift" of warm_up.
+std::vector<std::string> feedsOf(std::string_view kind);
 
 compare::TableBlock traitTable(const RunTraits& traits);
 compare::Json toJson(const RunTraits& traits);

@@ -148,9 +148,13 @@ Result<> Taker::setUp(const PlannedCapture& planned, Feed& feed, const std::stri
               fmt::format("Set the exposure of {} to {:.6g} us", nameOf(feed), exposure));
 }
 
-/// The first frame of a subscription in lockstep is made at once, perhaps before what is set next.
-Result<> Taker::dropFirst(Feed& feed, const Taken& taken) {
-  if (!feed.details().can_lockstep || !known_.insert(&feed).second) return {};
+/// The first frame of a subscription in lockstep is made at once, perhaps before what is set next. And a camera that
+/// is put elsewhere in no time has what it saw there before still in its pixels, which one that is carried has
+/// long forgotten: that shows where it is meant to, in blocks of kind bright_dark.
+Result<> Taker::dropFirst(const PlannedCapture& planned, Feed& feed, const Taken& taken) {
+  if (!feed.details().can_lockstep) return {};
+  const bool is_new = known_.insert(&feed).second;
+  if (!is_new && plan_.blocks[planned.block].kind == Kind::BrightDark) return {};
   const auto early = compare::nextFrameAt(feed, saidBy(feed, taken), captureOptions());
   return early ? Result<>{} : early.error();
 }
@@ -224,7 +228,7 @@ Result<Taken> Taker::take(const PlannedCapture& planned, Feed& a, Feed& b, const
       return naming(planned, done.error());
   }
   for (Feed* feed : {&a, &b}) {
-    if (auto done = dropFirst(*feed, taken); !done) return naming(planned, done.error());
+    if (auto done = dropFirst(planned, *feed, taken); !done) return naming(planned, done.error());
   }
   if (auto done = lookAround(planned, a, b, taken); !done) return naming(planned, done.error());
   if (auto done = waitForTurn(planned, a); !done) return naming(planned, done.error());

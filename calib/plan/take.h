@@ -89,7 +89,7 @@ class Taker {
                           const Taken& taken);
   Result<> standBy(const compare::PoseSpec& pose, compare::Feed& feed, Taken& taken);
   Result<> setUp(const PlannedCapture& planned, compare::Feed& feed, const std::string& ambient_told);
-  Result<> dropFirst(compare::Feed& feed, const Taken& taken);
+  Result<> dropFirst(const PlannedCapture& planned, compare::Feed& feed, const Taken& taken);
   Result<TakenBy> framesOf(const PlannedCapture& planned, compare::Feed& feed, const Taken& taken,
                            const Sink& sink, const std::optional<Duration>& since_power_on,
                            std::optional<Frame>* first);

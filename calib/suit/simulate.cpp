@@ -285,7 +285,8 @@ class PoseRun {
   }
 
   [[nodiscard]] std::uint64_t noiseOf(int repeat) const {
-    return (static_cast<std::uint64_t>(pose_) << 32u) + static_cast<std::uint64_t>(repeat) * 100'000u;
+    const std::size_t number = use_.pose_numbers.empty() ? pose_ : use_.pose_numbers[pose_];
+    return (static_cast<std::uint64_t>(number) << 32u) + static_cast<std::uint64_t>(repeat) * 100'000u;
   }
   const Case& use_;
   const sim::Scene& scene_;

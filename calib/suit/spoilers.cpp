@@ -70,6 +70,7 @@ Case onlyFailures(const Case& use, const std::vector<RequirementResult>& results
   Case part = use;
   part.spec.poses.clear();
   part.spec.lightings.clear();
+  part.pose_numbers.assign(poses.begin(), poses.end());
   for (const std::size_t pose : poses) part.spec.poses.push_back(use.spec.poses[pose]);
   for (const std::size_t lighting : lightings) part.spec.lightings.push_back(use.spec.lightings[lighting]);
   return part;
@@ -89,26 +90,27 @@ double marginOf(const RequirementSpec& requirement, double value) {
 
 /// A repeat in which nothing is valid has no margin: what is met without the effect, and without a value in
 /// some repeats with it, is spoiled by it without a gain that could be told.
+/// `level`: of the gain's interval.
 Spoiler spoilerOf(const RequirementSpec& requirement, std::size_t r, const std::string& name,
-                  const ConditionValues& whole, const ConditionValues& without) {
+                  const ConditionValues& whole, const ConditionValues& without, double level) {
   std::vector<double> gains;
   std::size_t revealed = 0, hidden = 0;
   for (std::size_t i = 0; i < whole.repeats[r].size(); ++i) {
     const double with = marginOf(requirement, whole.repeats[r][i]),
-                 then = marginOf(requirement, without.repeats[r][i]);
-    revealed += std::isnan(with) && !std::isnan(then) ? 1 : 0;
-    hidden += !std::isnan(with) && std::isnan(then) ? 1 : 0;
-    if (!std::isnan(with) && !std::isnan(then)) gains.push_back(then - with);
+                 left = marginOf(requirement, without.repeats[r][i]);
+    revealed += std::isnan(with) && !std::isnan(left) ? 1 : 0;
+    hidden += !std::isnan(with) && std::isnan(left) ? 1 : 0;
+    if (!std::isnan(with) && !std::isnan(left)) gains.push_back(left - with);
   }
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   const Estimate untold{.value = kNaN, .low = kNaN, .high = kNaN, .repeats = 0};
-  const double together = without.together.empty() ? without.repeats[r].front() : without.together[r];
-  const bool is_met_without = verdictOf(requirement, exactly(together)).is_met;
+  const Verdict then = verdictOf(requirement, estimateAt(requirement, without, r));
   return {.what = name,
-          .gain = gains.empty() ? untold : estimateOf(gains, std::nullopt),
-          .is_met_without = is_met_without,
+          .gain = gains.empty() ? untold : estimateOf(gains, std::nullopt, level),
+          .is_met_without = then.is_met,
+          .is_certain_without = then.is_certain,
           .is_valid_only_without =
-              hidden == 0 && (revealed == whole.repeats[r].size() || (revealed > 0 && is_met_without))};
+              hidden == 0 && (revealed == whole.repeats[r].size() || (revealed > 0 && then.is_met))};
 }
 
 /// What gives a value at all is before what gains, and of it what is met; what cannot be told (nothing valid
@@ -130,14 +132,21 @@ Result<std::vector<std::vector<Spoiler>>> spoilersOf(const Case& use, const sim:
   const std::vector<Variant> variants = variantsOf(use, scene, variant);
   const auto values = simulate(part, scene, variants, {.first = 0, .count = use.spec.repeats}, watch);
   if (!values) return values.error();
+  const auto isLookedInto = [](const RequirementResult& one) {
+    return one.is_judged && !one.verdict.is_met && !one.conditions.empty();
+  };
+  // As many gains are looked at: all of their intervals together hold with 95 % (Šidák).
+  const auto gains = static_cast<double>(variants.size() - 1) *
+                     static_cast<double>(std::ranges::count_if(results, isLookedInto));
+  const double level = std::pow(0.95, 1.0 / gains);
   for (std::size_t r = 0; r < results.size(); ++r) {
     const RequirementResult& result = results[r];
-    if (!result.is_judged || result.verdict.is_met || result.conditions.empty()) continue;
+    if (!isLookedInto(result)) continue;
     const AtCondition& worst = result.conditions[result.worst];
     const auto& requirement = use.spec.requirements[r];
     for (std::size_t v = 1; v < variants.size(); ++v) {
       spoilers[r].push_back(spoilerOf(requirement, r, variants[v].name, at(part, use, worst, values->front()),
-                                      at(part, use, worst, (*values)[v])));
+                                      at(part, use, worst, (*values)[v]), level));
     }
     // "all of these" keeps its place at the end.
     std::ranges::stable_sort(spoilers[r].begin(), spoilers[r].end() - 1, {}, rankOf);

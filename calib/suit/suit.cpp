@@ -94,18 +94,6 @@ std::string misfitOf(const Case& use, const std::vector<RequirementResult>& resu
   return {};
 }
 
-Estimate estimateAt(const RequirementSpec& requirement, const ConditionValues& values, std::size_t r) {
-  const auto& repeats = values.repeats[r];
-  if (requirement.kind == Kind::Pixels) return exactly(static_cast<double>(values.pixels[r]));
-  if (requirement.kind == Kind::Missed)
-    return values.pixels[r] == 0 ? exactly(1.0) : missedEstimateOf(repeats, values.frames);
-  const std::optional<double> together =
-      values.together.empty() ? std::nullopt : std::optional{values.together[r]};
-  if (isShare(requirement.kind))
-    return shareEstimateOf(repeats, together, {.pixels = values.pixels[r], .frames = values.frames});
-  return estimateOf(repeats, together);
-}
-
 RequirementResult resultOf(const Case& use, std::size_t r, const std::vector<ConditionValues>& conditions) {
   const auto& requirement = use.spec.requirements[r];
   RequirementResult result;
@@ -213,6 +201,18 @@ auto rankOf(const CameraResult& camera) {
 }
 
 }  // namespace
+
+Estimate estimateAt(const RequirementSpec& requirement, const ConditionValues& values, std::size_t r) {
+  const auto& repeats = values.repeats[r];
+  if (requirement.kind == Kind::Pixels) return exactly(static_cast<double>(values.pixels[r]));
+  if (requirement.kind == Kind::Missed)
+    return values.pixels[r] == 0 ? exactly(1.0) : missedEstimateOf(repeats, values.frames);
+  const std::optional<double> together =
+      values.together.empty() ? std::nullopt : std::optional{values.together[r]};
+  if (isShare(requirement.kind))
+    return shareEstimateOf(repeats, together, {.pixels = values.pixels[r], .frames = values.frames});
+  return estimateOf(repeats, together);
+}
 
 std::vector<RequirementResult> resultsOf(const Case& use, const std::vector<ConditionValues>& conditions,
                                          double frame_rate_hz) {

@@ -34,8 +34,10 @@ struct RequirementResult {
 /// What a requirement gains in margin, at its worst condition, when this is left out of the simulation.
 struct Spoiler {
   std::string what{};
-  Estimate gain{};  ///< in the unit of valueOf(); more is better without it
+  /// In the unit of valueOf(); more is better without it. All gains of a camera hold together with 95 %.
+  Estimate gain{};
   bool is_met_without = false;
+  bool is_certain_without = false;     ///< of that verdict: its interval is on one side of the limit
   bool is_valid_only_without = false;  ///< with it there is no value to gain from: nothing is valid
   [[nodiscard]] bool isSpoiling() const { return is_valid_only_without || gain.low > 0.0; }
 };
@@ -85,6 +87,9 @@ Result<Suit> judge(const Case& use, const SuitOptions& options, compare::Progres
 /// Verdicts of all requirements from their values; `frame_rate_hz` NaN: not known.
 std::vector<RequirementResult> resultsOf(const Case& use, const std::vector<ConditionValues>& conditions,
                                          double frame_rate_hz);
+
+/// Of one requirement at one condition, by the rule for its kind.
+Estimate estimateAt(const RequirementSpec& requirement, const ConditionValues& values, std::size_t r);
 
 /// Fills in what the ranking goes by.
 void sumUp(const Case& use, CameraResult& camera);

@@ -174,16 +174,18 @@ TableBlock cameraTable(const Suit& suit, const CameraResult& camera) {
 /// Those that spoil, and always the last: without all of them.
 TableBlock spoilerTable(const RequirementSpec& requirement, const std::vector<Spoiler>& spoilers) {
   TableBlock table{
-      .caption = fmt::format("What spoils “{}”: gain in margin when it is left out of the simulation",
+      .caption = fmt::format("What spoils “{}”: gain in margin when it is left out of the simulation. All such "
+                             "intervals of this camera hold together with 95 %",
                              requirement.name),
-      .header = {"left out", "gain", "95 % interval", "then"}};
+      .header = {"left out", "gain", "interval", "then"}};
   for (const Spoiler& one : spoilers) {
     if (!one.isSpoiling() && &one != &spoilers.back()) continue;
     const bool has_gain = !std::isnan(one.gain.value) && !one.is_valid_only_without;
     const std::string untold = one.is_valid_only_without ? "nothing is valid with it" : "–";
     table.rows.push_back({one.what, has_gain ? valueText(requirement.kind, one.gain.value) : untold,
                           has_gain ? intervalText(requirement.kind, one.gain) : "–",
-                          one.is_met_without ? "met" : "still not met"});
+                          (one.is_met_without ? std::string{"met"} : std::string{"still not met"}) +
+                              (one.is_certain_without ? "" : ", not certainly")});
   }
   return table;
 }
@@ -348,7 +350,8 @@ Json toJson(const Case& use, const CameraResult& camera, std::size_t r) {
                       .set("high", one.gain.high * scale)
                       .set("spoils", one.isSpoiling())
                       .set("valid_only_without", one.is_valid_only_without)
-                      .set("met_without", one.is_met_without));
+                      .set("met_without", one.is_met_without)
+                      .set("certain_without", one.is_certain_without));
   }
   json.set("conditions", std::move(conditions)).set("spoilers", std::move(spoilers));
   return json;

@@ -172,6 +172,8 @@ struct Case {
   std::vector<std::string> object_names{};        ///< of the scene, in its order
   std::vector<std::string> camera_places{};       ///< "file.toml:12" of each camera; empty for presets
   std::vector<std::string> requirement_places{};  ///< of each requirement
+  /// Of a part of a use case: which of its poses these are, so that they meet the same noise; empty: all.
+  std::vector<std::size_t> pose_numbers{};
 
   /// A path as the file means it.
   [[nodiscard]] std::filesystem::path resolve(const std::string& path) const;

@@ -120,13 +120,13 @@ double valueOf(const RequirementSpec& requirement, const Seen& seen, std::span<c
   return kNaN;
 }
 
-Estimate estimateOf(std::span<const double> repeats, std::optional<double> together) {
+Estimate estimateOf(std::span<const double> repeats, std::optional<double> together, double level) {
   const compare::Summary summary = compare::summarise(repeats);
   Estimate estimate{.value = together.value_or(summary.mean), .low = 0.0, .high = 0.0, .repeats = summary.n};
   double half = std::numeric_limits<double>::infinity();
   if (summary.n >= 2) {
     const double degrees = static_cast<double>(summary.n - 1);
-    half = compare::studentT(degrees) * summary.standard_error;
+    half = compare::studentT(degrees, level) * summary.standard_error;
     if (together) half += std::abs(summary.mean - *together) / degrees;
   }
   estimate.low = estimate.value - half;

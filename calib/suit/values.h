@@ -47,7 +47,8 @@ struct Estimate {
 ///   θ_P ± ( t(0.975, R − 1) sd(θ_r)/√R + |mean θ_r − θ_P| / (R − 1) )
 /// The second term is what the tracer's own noise, which falls as one over the number of paths, still moves
 /// θ_P by. Without θ_P the mean of the repeats stands for it.
-Estimate estimateOf(std::span<const double> repeats, std::optional<double> together);
+/// `level`: what the interval is to hold with.
+Estimate estimateOf(std::span<const double> repeats, std::optional<double> together, double level = 0.95);
 
 /// What a repeat counts to get a share.
 struct Counted {

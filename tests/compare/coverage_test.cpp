@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
+#include <boost/math/distributions/binomial.hpp>
 #include <cmath>
 #include <fstream>
 #include <functional>
@@ -138,6 +139,12 @@ std::vector<Planted> overDistance() {
                       e.push_back((noise.chance(0.02) ? 1.5 : 0.0) + noise(0.02));
                     return wrapTraits(e, 1.5);
                   }});
+  rows.push_back({"wraps of whole patches", {{"wrapped", 0.02}}, [](Noise& noise) {
+                    // In one of 25 cells of an image half of the pixels wrap together.
+                    Columns shares;
+                    for (int i = 0; i < 2000; ++i) shares.push_back(noise.chance(0.04) ? 0.5 : 0.0);
+                    return wrapTraits(shares);
+                  }});
   return rows;
 }
 
@@ -161,6 +168,23 @@ std::vector<Planted> otherWays() {
                                       noise(3.0));
                     }
                     return scatterTraits(own, plate, ratio, error, 30e6);
+                  }});
+  rows.push_back({"lens scatter behind a plate", {{"veil", 0.015}}, [](Noise& noise) {
+                    // Three frequencies, whose ranges are weighted by f²; the camera is off by 4 mm besides.
+                    const std::vector<double> f{16e6, 80e6, 120e6};
+                    Columns own, plate, ratio, error;
+                    for (int i = 0; i < 120; ++i) {
+                      own.push_back(1.6 + 0.01 * i);
+                      plate.push_back(0.9);
+                      ratio.push_back(noise.uniform(0.2, 0.9));
+                      double sum = 0.0, weights = 0.0;
+                      for (const double one : f) {
+                        const double k = 4.0 * std::numbers::pi * one / 299'792'458.0;
+                        sum += one * one * std::sin(k * (plate.back() - own.back())) / k, weights += one * one;
+                      }
+                      error.push_back(4.0 + 15.0 * ratio.back() * sum / weights + noise(1.0));
+                    }
+                    return veilTraits(own, plate, ratio, error, f);
                   }});
   rows.push_back({"amplitude", {{"at 1", 12.0}, {"per decade", -4.0}}, [](Noise& noise) {
                     Columns a, e;
@@ -197,6 +221,14 @@ std::vector<Planted> overTime() {
                       }
                     }
                     return lagTraits(k, y);
+                  }});
+  rows.push_back({"lag of the first frame", {{"left behind", 0.05}}, [](Noise& noise) {
+                    Columns first, rest, before;
+                    for (int i = 0; i < 6; ++i) {
+                      rest.push_back(i % 2 == 0 ? 1000.0 : 100.0), before.push_back(i % 2 == 0 ? 100.0 : 1000.0);
+                      first.push_back(rest.back() + 0.05 * (before.back() - rest.back()) + noise(3.0));
+                    }
+                    return afterImageTraits(first, rest, before);
                   }});
   rows.push_back(
       {"latency", {{"latency", 83.0}}, [](Noise& noise) {
@@ -351,19 +383,37 @@ std::map<std::string, int> heldBy(const Planted& planted) {
 
 class Coverage : public testing::TestWithParam<std::size_t> {};
 
-/// 90 to 98.5 % of 200 runs. The goal is 98; but what holds exactly 95 % exceeds 98 in 0.9 % of all choices
-/// of 200 seeds, and two of these 50 rows do. The seeds are fixed, so the test does not waver. What holds 85
-/// % fails in 97 %.
-TEST_P(Coverage, OfIntervalsIs90To98Percent) {
-  const Planted planted = allPlanted()[GetParam()];
+/// Intervals of exactly 95 % are held in Bin(200, 0.95) runs. A row fails outside of the counts that all rows
+/// together leave with 5 % (Šidák: each with 1 − 0.95^(1/rows), half of it at either end). The seeds are fixed, so
+/// that the test does not waver; what holds 85 % fails in 97 %.
+struct Bounds {
+  int least = 0, most = 0;
+};
+Bounds boundsFor(std::size_t rows) {
+  const double each = 1.0 - std::pow(0.95, 1.0 / static_cast<double>(rows));
+  const boost::math::binomial runs{kRuns, 0.95};
+  Bounds bounds{0, kRuns};
+  while (boost::math::cdf(runs, bounds.least) < 0.5 * each) ++bounds.least;
+  while (boost::math::cdf(boost::math::complement(runs, bounds.most - 1)) < 0.5 * each) --bounds.most;
+  return bounds;
+}
+
+TEST_P(Coverage, OfIntervalsIsWhat200RunsOf95PercentAllow) {
+  const auto all = allPlanted();
+  std::size_t rows = 0;
+  for (const Planted& one : all) rows += one.truth.size();
+  const Bounds bounds = boundsFor(rows);
+  const Planted& planted = all[GetParam()];
   std::stringstream page;
   page << std::ifstream{TOFTWIN_SOURCE_DIR "/docs/characteristics.md"}.rdbuf();
+  EXPECT_THAT(page.str(), testing::HasSubstr(fmt::format("{} rows: {:.1f} to {:.1f} %", rows, bounds.least / 2.0,
+                                                         bounds.most / 2.0)));
   for (const auto& [name, held] : heldBy(planted)) {
-    EXPECT_GE(held, 180) << planted.name << ": " << name;
-    EXPECT_LE(held, 197) << planted.name << ": " << name;
+    EXPECT_GE(held, bounds.least) << planted.name << ": " << name;
+    EXPECT_LE(held, bounds.most) << planted.name << ": " << name;
     const std::string row =
         fmt::format("| {} | {} | {:.6g} | {:.1f} |", planted.name, name, planted.truth.at(name), held / 2.0);
-    EXPECT_THAT(page.str(), testing::HasSubstr(row));
+    EXPECT_THAT(page.str(), testing::HasSubstr(row)) << "ROW" << row;
   }
 }
 

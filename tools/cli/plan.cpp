@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "calib/plan/check.h"
+#include "calib/plan/run_traits.h"
 #include "tools/cli/command.h"
 #include "tools/cli/options.h"
 #include "tools/cli/plan_words.h"
@@ -38,6 +39,8 @@ void showBlocks(const plan::Plan& plan, const plan::Schedule& schedule) {
     fmt::print("{:<28} {:<13} {:>8} {:>8} {:>10}\n", spec.name, nameOf(spec.kind), captures, locked,
                timeLeft(begin));
     if (!spec.setup.empty()) fmt::print("    prepare: {}\n", spec.setup);
+    const auto told = plan::feedsOf(nameOf(spec.kind));
+    if (!told.empty()) fmt::print("    tells: {}\n", fmt::join(told, ", "));
   }
 }
 

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "calib/compare/statistics.h"
 #include "calib/compare/traits/least_squares.h"
 
 namespace toftwin::compare {
@@ -98,6 +99,18 @@ Traits wrapTraits(Column error_m, double period_m) {
   const auto wrapped =
       std::ranges::count_if(errors, [&](double e) { return std::round(e / period_m) != 0.0; });
   return std::vector{shareTrait("wrapped", static_cast<std::size_t>(wrapped), errors.size())};
+}
+
+Traits wrapTraits(Column shares) {
+  const auto rows = finiteRows({shares}, 2, "wraps");
+  if (!rows) return rows.error();
+  const Summary all = summarise(rows->front());
+  const double n = static_cast<double>(all.n), p = all.mean;
+  // Effective number of trials (E. L. Korn, B. I. Graubard, Surv. Methodol. 24 (1998) 193); where all parts are
+  // alike, their scatter says nothing, and each of them is a trial.
+  const double trials = all.sd > 0.0 ? p * (1.0 - p) * n / (all.sd * all.sd) : n;
+  const auto interval = shareInterval(p * trials, trials, ShareRule::Jeffreys);
+  return std::vector{Trait{"wrapped", "1", p, interval.low, interval.high, all.n}};
 }
 
 }  // namespace toftwin::compare

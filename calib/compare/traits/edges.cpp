@@ -130,8 +130,14 @@ Traits shadowTraits(const Image<float>& range_m, double split_m) {
   }
   if (left.size() < 4)
     return undetermined("emitter shadow", "fewer than four rows show an object before a background");
-  return std::vector{meanTrait("left", "px", left), meanTrait("right", "px", right),
-                     meanTrait("asymmetry", "px", difference)};
+  std::vector<Trait> traits{meanTrait("left", "px", left), meanTrait("right", "px", right),
+                            meanTrait("asymmetry", "px", difference)};
+  // Rows that all count the same say nothing within the pixel that they are counted in.
+  for (Trait& one : traits) {
+    const double least = &one == &traits.back() ? one.value - 0.5 : std::max(0.0, one.value - 0.5);
+    if (one.low == one.high) one.low = least, one.high = one.value + 0.5;
+  }
+  return traits;
 }
 
 }  // namespace toftwin::compare

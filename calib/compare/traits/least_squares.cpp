@@ -63,8 +63,8 @@ std::optional<MatrixXd> inverseOfNormal(const MatrixXd& j) {
 
 }  // namespace
 
-double studentT(double degrees) {
-  return boost::math::quantile(boost::math::students_t{std::max(1.0, degrees)}, 0.975);
+double studentT(double degrees, double level) {
+  return boost::math::quantile(boost::math::students_t{std::max(1.0, degrees)}, 0.5 + 0.5 * level);
 }
 
 double Fit::error(std::size_t parameter) const { return std::sqrt(covariance[parameter * (at.size() + 1)]); }

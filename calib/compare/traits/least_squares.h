@@ -41,8 +41,8 @@ std::optional<Fit> fitLeastSquares(const Model& model, Column y, std::vector<dou
 /// 2/√n.
 double correlationOfResiduals(const Model& model, Column y, const Fit& fit);
 
-/// Student's 97.5 % quantile.
-double studentT(double degrees);
+/// Student's quantile of a two-sided interval that holds with `level`: 97.5 % for 95 %.
+double studentT(double degrees, double level = 0.95);
 /// Mean of independent values with its interval.
 Trait meanTrait(std::string name, std::string unit, Column values, double scale = 1.0);
 /// The interval of a share that holds it with 95 %, from k events in n independent trials, which need not be

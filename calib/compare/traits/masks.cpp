@@ -39,15 +39,27 @@ Traits maskTraits(std::span<const Image<std::uint8_t>> a, std::span<const Image<
   }
   std::vector<Trait> traits{meanTrait("agreement", "1", agreement), meanTrait("overlap", "1", overlap)};
   if (kappa.size() > 1) traits.push_back(meanTrait("kappa", "1", kappa));
+  // Pairs that all agree alike do not say how they scatter: as many trials, none of which failed (or held).
+  for (Trait& one : traits) {
+    if (one.low < one.high || (one.value > 0.0 && one.value < 1.0)) continue;
+    const double n = static_cast<double>(one.n);
+    const auto interval = shareInterval(one.value * n, n, ShareRule::ClopperPearson);
+    one.low = interval.low, one.high = interval.high;
+  }
   return traits;
 }
 
-Traits timingTraits(Column start_s) {
-  auto rows = finiteRows({start_s}, 4, "frame timing");
-  if (!rows) return rows.error();
-  const auto& starts = rows->front();
+Traits timingTraits(std::span<const std::vector<double>> starts_s) {
   std::vector<double> intervals;
-  for (std::size_t i = 1; i < starts.size(); ++i) intervals.push_back(starts[i] - starts[i - 1]);
+  std::size_t frames = 0;
+  for (const auto& series : starts_s) {
+    const auto rows = finiteRows({series}, 1, "frame timing");
+    if (!rows) continue;
+    const auto& starts = rows->front();
+    frames += starts.size();
+    for (std::size_t i = 1; i < starts.size(); ++i) intervals.push_back(starts[i] - starts[i - 1]);
+  }
+  if (intervals.size() < 3) return undetermined("frame timing", "fewer than four frames say when they began");
   if (std::ranges::min(intervals) <= 0.0)
     return undetermined("frame timing", "frames must start one after the other");
   const double usual = quantile(intervals, 0.5);
@@ -58,6 +70,7 @@ Traits timingTraits(Column start_s) {
     if (periods == 1.0) whole.push_back(one);
     lost += static_cast<std::size_t>(periods) - 1;
   }
+  if (whole.size() < 2) return undetermined("frame timing", "hardly two frames follow each other without a gap");
   const Summary summary = summarise(whole);
   const double degrees = static_cast<double>(summary.n - 1);
   const boost::math::chi_squared spread{std::max(1.0, degrees)};
@@ -66,7 +79,12 @@ Traits timingTraits(Column start_s) {
   jitter.low = jitter.value * std::sqrt(degrees / boost::math::quantile(spread, 0.975));
   jitter.high = jitter.value * std::sqrt(degrees / boost::math::quantile(spread, 0.025));
   return std::vector{meanTrait("interval", "ms", whole, 1e3), jitter,
-                     shareTrait("lost", lost, starts.size() + lost)};
+                     shareTrait("lost", lost, frames + lost)};
+}
+
+Traits timingTraits(Column start_s) {
+  const std::vector<std::vector<double>> one{{start_s.begin(), start_s.end()}};
+  return timingTraits(one);
 }
 
 }  // namespace toftwin::compare

@@ -46,4 +46,27 @@ Traits scatterTraits(Column own_range_m, Column plate_range_m, Column plate_over
   return std::vector{fit->trait("veil", "1", 0)};
 }
 
+Traits veilTraits(Column own_range_m, Column plate_range_m, Column plate_over_own, Column error_mm,
+                  std::span<const double> frequency_hz) {
+  const auto rows = finiteRows({own_range_m, plate_range_m, plate_over_own, error_mm}, 8, "lens scatter");
+  if (!rows) return rows.error();
+  if (frequency_hz.empty() || !(std::ranges::min(frequency_hz) > 0.0))
+    return undetermined("lens scatter", "the frames say no modulation frequency");
+  const auto &own = (*rows)[0], &plate = (*rows)[1], &ratio = (*rows)[2], &error = (*rows)[3];
+  std::vector<double> slope_mm;
+  for (std::size_t i = 0; i < own.size(); ++i) {
+    double sum = 0.0, weights = 0.0;
+    for (const double f : frequency_hz) {
+      const double radians_per_m = 4.0 * std::numbers::pi * f / 299'792'458.0;
+      sum += f * f * std::sin(radians_per_m * (plate[i] - own[i])) / radians_per_m;
+      weights += f * f;
+    }
+    slope_mm.push_back(1e3 * ratio[i] * sum / weights);
+  }
+  const auto fit = fitLeastSquares(
+      [&](std::span<const double> p, std::size_t i) { return p[0] + p[1] * slope_mm[i]; }, error, {0.0, 0.0});
+  if (!fit) return undetermined("lens scatter", "the plate adds no light whose share could be told");
+  return std::vector{fit->trait("veil", "1", 1)};
+}
+
 }  // namespace toftwin::compare

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "calib/compare/traits/least_squares.h"
@@ -13,25 +14,39 @@ Traits noiseLawTraits(Column signal, Column sigma_mm) {
   if (std::ranges::min(intensity) <= 0.0 || std::ranges::min(sigma) <= 0.0)
     return undetermined("noise law", "signals and standard deviations must be positive");
   const double most = std::ranges::max(intensity), least_sigma = std::ranges::min(sigma);
+  if (!(most > 1.05 * std::ranges::min(intensity)))
+    return undetermined("noise law", "all signals are alike");
   std::vector<double> log_sigma;
   for (double& one : intensity) one /= most;
   for (const double one : sigma) log_sigma.push_back(std::log(one));
-  // Parameters are ln a, ln b, ln c: every part stays positive, and their intervals too.
-  const Model model = [&](std::span<const double> p, std::size_t i) {
-    const double x = intensity[i];
-    return 0.5 * std::log(std::exp(2.0 * p[0]) + std::exp(2.0 * p[1]) / x + std::exp(2.0 * p[2]) / (x * x));
-  };
+  // All three parts, else the best of two of them, else of one: a part that does not show in this range of
+  // signals has no logarithm, and is not told.
   std::optional<Fit> fit;
-  for (const double share : {1.0, 0.1, 0.01}) {
-    const double floor = std::log(0.6 * least_sigma);
-    auto tried =
-        fitLeastSquares(model, log_sigma, {floor, floor + 0.5 * std::log(share), floor + std::log(share)});
-    if (tried && (!fit || tried->squares < fit->squares)) fit = std::move(tried);
+  std::vector<int> parts;
+  for (const auto& tried_parts :
+       {std::vector<std::vector<int>>{{0, 1, 2}}, {{0, 1}, {0, 2}, {1, 2}}, {{0}, {1}, {2}}}) {
+    for (const std::vector<int>& of : tried_parts) {
+      // Parameters are logarithms: every part stays positive, and so does its interval.
+      const Model model = [&](std::span<const double> p, std::size_t i) {
+        double sum = 0.0;
+        for (std::size_t k = 0; k < of.size(); ++k)
+          sum += std::exp(2.0 * p[k]) / std::pow(intensity[i], of[k]);
+        return 0.5 * std::log(sum);
+      };
+      for (const double share : {1.0, 0.1, 0.01}) {
+        std::vector<double> start;
+        for (const int part : of) start.push_back(std::log(0.6 * least_sigma) + 0.5 * part * std::log(share));
+        auto tried = fitLeastSquares(model, log_sigma, start);
+        if (tried && (!fit || tried->squares < fit->squares)) fit = std::move(tried), parts = of;
+      }
+    }
+    if (fit) break;
   }
   if (!fit) return undetermined("noise law", "a part of it does not show in this range of signals");
+  constexpr std::array kParts{"floor", "shot", "read"};
   std::vector<Trait> traits;
-  for (const auto& [name, k] : {std::pair{"floor", 0u}, {"shot", 1u}, {"read", 2u}}) {
-    Trait one = fit->trait(name, "mm", k);
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    Trait one = fit->trait(kParts[static_cast<std::size_t>(parts[k])], "mm", k);
     for (double* value : {&one.value, &one.low, &one.high}) *value = std::exp(*value);
     traits.push_back(std::move(one));
   }

@@ -46,6 +46,9 @@ Traits noiseLawTraits(Column signal, Column sigma_mm);
 
 /// Range is off by a whole number of periods: "wrapped" share.
 Traits wrapTraits(Column error_m, double period_m);
+/// The same from shares of parts of images, within which pixels wrap together: "wrapped", with the interval of
+/// as many independent trials as the shares' scatter leaves.
+Traits wrapTraits(Column shares);
 
 /// error(x) = c + A e^(−x/L), x from the corner's edge: "at the edge" A, "reach" L, "far from it" c.
 Traits cornerTraits(Column distance_to_edge_m, Column error_mm);
@@ -54,6 +57,10 @@ Traits cornerTraits(Column distance_to_edge_m, Column error_mm);
 /// s. `plate_over_own`: the plate's light over the pixel's own.
 Traits scatterTraits(Column own_range_m, Column plate_range_m, Column plate_over_own, Column error_mm,
                      double frequency_hz);
+/// The same of a small veil and a range that is made of several frequencies, by weights f²: error = c + s q Σ f²
+/// sin(Δφ_f) c/4πf / Σ f². The constant c is what else the camera is off by.
+Traits veilTraits(Column own_range_m, Column plate_range_m, Column plate_over_own, Column error_mm,
+                  std::span<const double> frequency_hz);
 
 /// Of steps in the rows of one image: "flying" share of the crossings with a pixel in between, "offset" where
 /// it hangs from near (0) to far (1), "near side" share of those nearer to the foreground; the last two where two fly or more.
@@ -75,6 +82,9 @@ Traits ambientTraits(Column ambient_klx, Column error_mm, Column sigma_mm);
 Traits motionTraits(Column speed_m_per_s, Column error_mm);
 /// y(k) = rest + h λᵏ, k frames after the light changed: "lag" λ, "rest".
 Traits lagTraits(Column frames_after, Column value);
+/// Of changes of light, one a row: what the first frame after it has of what was before, (first − rest)/(before −
+/// rest): "left behind".
+Traits afterImageTraits(Column first, Column rest, Column before);
 /// measured(t) = reference(t − τ) + c: "latency" τ; the reference is linear between its rows.
 Traits latencyTraits(Column time_s, Column measured, Column reference_time_s, Column reference);
 
@@ -84,6 +94,8 @@ Traits maskTraits(std::span<const Image<std::uint8_t>> a, std::span<const Image<
 
 /// "interval", "jitter" (sd of intervals that are not gaps), "lost" share of frames.
 Traits timingTraits(Column start_s);
+/// Of several series, between which nothing is known.
+Traits timingTraits(std::span<const std::vector<double>> starts_s);
 
 /// Of errors (range less the true one: ranges themselves have the scene as their pattern) in frames of one place:
 /// "temporal noise", "fixed pattern", "correlation along x", "… along y", "… in time"

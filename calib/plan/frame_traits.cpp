@@ -1,0 +1,283 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/plan/frame_traits.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include <fmt/format.h>
+
+#include "calib/compare/statistics.h"
+#include "calib/compare/traits/least_squares.h"
+
+namespace toftwin::plan {
+namespace {
+
+using Captures = std::vector<const ComparedCapture*>;
+constexpr std::array kNames{"A", "B"};
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+Captures ofKind(const ComparedRun& run, std::string_view kind) {
+  Captures chosen;
+  for (const ComparedCapture& one : run.captures) {
+    if (one.record.kind == kind) chosen.push_back(&one);
+  }
+  for (const ComparedCapture& one : run.moving) {
+    if (one.record.kind == kind) chosen.push_back(&one);
+  }
+  return chosen;
+}
+
+void append(std::vector<double>& to, const std::vector<double>& from) {
+  to.insert(to.end(), from.begin(), from.end());
+}
+
+/// What a camera is off by at a range, from its own wall at several distances: corners and plates are judged
+/// beside it.
+class OwnError {
+ public:
+  OwnError(const Captures& walls, std::size_t camera) {
+    std::map<long, compare::Running> bins;
+    for (const ComparedCapture* one : walls) {
+      const CameraSeen& seen = one->seen[camera];
+      for (std::size_t i = 0; i < seen.wall_range_m.size(); ++i)
+        bins[std::lround(seen.wall_range_m[i] / kBin_m)].add(seen.wall_error_mm[i]);
+    }
+    for (const auto& [bin, errors] : bins)
+      range_m_.push_back(kBin_m * static_cast<double>(bin)), error_mm_.push_back(errors.mean());
+  }
+  /// Linear between bins; the nearest one's at most three bins beyond; NaN farther away.
+  [[nodiscard]] double at(double range_m) const {
+    const auto after = std::ranges::lower_bound(range_m_, range_m);
+    const auto i = static_cast<std::size_t>(after - range_m_.begin());
+    const auto isNear = [&](std::size_t k) { return std::abs(range_m_[k] - range_m) <= 3.0 * kBin_m; };
+    const bool has_low = i > 0 && isNear(i - 1), has_high = i < range_m_.size() && isNear(i);
+    if (has_low && has_high) {
+      const double share = (range_m - range_m_[i - 1]) / (range_m_[i] - range_m_[i - 1]);
+      return error_mm_[i - 1] + share * (error_mm_[i] - error_mm_[i - 1]);
+    }
+    return has_low ? error_mm_[i - 1] : has_high ? error_mm_[i] : kNaN;
+  }
+  [[nodiscard]] bool isKnown() const { return range_m_.size() > 1; }
+
+ private:
+  static constexpr double kBin_m = 0.025;
+  std::vector<double> range_m_, error_mm_;
+};
+
+void addTiming(const ComparedRun& run, std::size_t camera, TraitCollector& all) {
+  std::vector<std::vector<double>> series;
+  for (const auto* captures : {&run.captures, &run.moving}) {
+    for (const ComparedCapture& one : *captures) series.push_back(one.seen[camera].starts_s);
+  }
+  all.add("frame timing", kNames[camera], compare::timingTraits(series));
+}
+
+/// The noise at the capture whose wall is nearest to the middle of the others'.
+void addNoise(const Captures& walls, std::size_t camera, TraitCollector& all) {
+  std::vector<double> distances;
+  for (const ComparedCapture* one : walls) {
+    if (!one->seen[camera].noise.empty()) distances.push_back(one->record.distance_m);
+  }
+  if (distances.empty()) {
+    all.untold(
+        fmt::format("noise of frames of {}: it takes eight frames of a wall in a block of kind distance or "
+                    "warm_up, 8 × 8 pixels or more",
+                    kNames[camera]));
+    return;
+  }
+  const double middle = compare::quantile(distances, 0.5);
+  const ComparedCapture* best = nullptr;
+  for (const ComparedCapture* one : walls) {
+    if (one->seen[camera].noise.empty()) continue;
+    if (best == nullptr ||
+        std::abs(one->record.distance_m - middle) < std::abs(best->record.distance_m - middle))
+      best = one;
+  }
+  all.add(fmt::format("noise of frames at {:.3g} m", best->record.distance_m), kNames[camera],
+          best->seen[camera].noise);
+}
+
+void addWraps(const Captures& walls, std::size_t camera, TraitCollector& all) {
+  std::vector<double> shares;
+  for (const ComparedCapture* one : walls) append(shares, one->seen[camera].wall_wrapped);
+  all.add("wraps", kNames[camera], compare::wrapTraits(shares));
+}
+
+/// Means over bands of the distance to the edge, from its steps.
+void addBands(const std::string& name, const std::vector<double>& place_m,
+              const std::vector<double>& error_mm, std::size_t camera, TraitCollector& all) {
+  constexpr std::array<std::pair<double, double>, 3> kBands{{{0.0, 0.1}, {0.1, 0.3}, {0.3, 0.9}}};
+  std::vector<compare::Trait> traits;
+  for (const auto& [from, to] : kBands) {
+    std::vector<double> within;
+    for (std::size_t i = 0; i < place_m.size(); ++i) {
+      if (place_m[i] >= from && place_m[i] < to) within.push_back(error_mm[i]);
+    }
+    if (within.size() > 1)
+      traits.push_back(
+          compare::meanTrait(fmt::format("{:g} to {:g} m from the edge", from, to), "mm", within));
+  }
+  if (traits.empty()) {
+    all.untold(fmt::format("{} of {}: no wall is seen where the plan puts it (within 300 mm)", name,
+                           kNames[camera]));
+    return;
+  }
+  all.add(name, kNames[camera], traits);
+}
+
+/// Distances to the edge in steps of 2.5 cm: pixels of one step are not independent rows.
+void addCorners(const ComparedRun& run, const OwnError& own, std::size_t camera, TraitCollector& all) {
+  constexpr double kStep_m = 0.025;
+  std::map<std::string, std::map<long, compare::Running>> blocks;
+  for (const ComparedCapture* one : ofKind(run, "corner")) {
+    const CameraSeen& seen = one->seen[camera];
+    auto& steps = blocks[one->record.block];
+    for (std::size_t i = 0; i < seen.corner_place_m.size(); ++i) {
+      const double usual = own.isKnown() ? own.at(seen.corner_range_m[i]) : 0.0;
+      if (std::isfinite(usual))
+        steps[std::lround(seen.corner_place_m[i] / kStep_m)].add(seen.corner_error_mm[i] - usual);
+    }
+  }
+  for (const auto& [name, steps] : blocks) {
+    std::vector<double> place, error;
+    for (const auto& [step, errors] : steps) {
+      if (errors.n() >= 4)
+        place.push_back(kStep_m * static_cast<double>(step)), error.push_back(errors.mean());
+    }
+    addBands(name, place, error, camera, all);
+    // The fall from the edge as one exponential, where it is one: at the very edge both ways are equally
+    // long.
+    if (const auto fall = compare::cornerTraits(place, error)) all.add(name, kNames[camera], fall);
+  }
+}
+
+void addPlates(const ComparedRun& run, const OwnError& own, std::size_t camera, TraitCollector& all) {
+  const Captures captures = ofKind(run, "foreground");
+  if (captures.empty()) return;
+  int width = 1, height = 0;
+  std::vector<double> range, plate, ratio, error, place, value;
+  for (const ComparedCapture* one : captures) {
+    const CameraSeen& seen = one->seen[camera];
+    width = std::max(width, seen.over_split.width()), height += seen.over_split.height() + 1;
+    append(place, seen.edge_place_px), append(value, seen.edge_value);
+    append(range, seen.wall_range_m), append(plate, seen.plate_range_m), append(ratio, seen.plate_over_own);
+    for (std::size_t i = 0; i < seen.wall_range_m.size(); ++i)
+      error.push_back(seen.wall_error_mm[i] - (own.isKnown() ? own.at(seen.wall_range_m[i]) : 0.0));
+  }
+  // All captures below each other, a row of nothing between them: both look along rows.
+  Image<float> together(width, std::max(1, height), std::numeric_limits<float>::quiet_NaN());
+  int top = 0;
+  for (const ComparedCapture* one : captures) {
+    const Image<float>& image = one->seen[camera].over_split;
+    for (int y = 0; y < image.height(); ++y) {
+      for (int x = 0; x < image.width(); ++x) together(x, top + y) = image(x, y);
+    }
+    top += image.height() + 1;
+  }
+  all.add("flying pixels", kNames[camera], compare::flyingTraits(together));
+  all.add("emitter shadow", kNames[camera], compare::shadowTraits(together, 1.0));
+  all.add("edge in the amplitude", kNames[camera], compare::edgeTraits(place, value));
+  all.add("lens scatter", kNames[camera], compare::veilTraits(range, plate, ratio, error, run.frequency_hz));
+}
+
+/// The first frame after each turn from bright to dark or back, against the frames that follow.
+void addLag(const ComparedRun& run, std::size_t camera, TraitCollector& all) {
+  const Captures captures = ofKind(run, "bright_dark");
+  if (captures.empty()) return;
+  std::vector<double> first, rest, before;
+  double previous = kNaN;
+  for (const ComparedCapture* one : captures) {
+    const auto& values = one->seen[camera].brightness;
+    if (values.size() < 3) continue;
+    compare::Running later;
+    for (std::size_t i = 2; i < values.size(); ++i) later.add(values[i]);
+    first.push_back(values.front()), rest.push_back(later.mean()), before.push_back(previous);
+    previous = later.mean();
+  }
+  all.add("lag of the first frame recorded", kNames[camera], compare::afterImageTraits(first, rest, before));
+}
+
+/// A plate's path: its middle over time; speeds are differences of successive frames.
+void addMotion(const ComparedRun& run, std::size_t camera, TraitCollector& all) {
+  std::vector<double> speed, turn;
+  for (const ComparedCapture* one : ofKind(run, "moving")) {
+    const CameraSeen& seen = one->seen[camera];
+    for (std::size_t i = 1; i < seen.plate_time_s.size(); ++i) {
+      const double passed = seen.plate_time_s[i] - seen.plate_time_s[i - 1];
+      if (!(passed > 0.0)) continue;
+      speed.push_back((seen.plate_place_m[i] - seen.plate_place_m[i - 1]) / passed);
+      turn.push_back(0.5 * (seen.plate_turn_mm[i] + seen.plate_turn_mm[i - 1]));
+    }
+  }
+  if (!speed.empty())
+    all.add("motion, right end − left end", kNames[camera], compare::motionTraits(speed, turn));
+}
+
+/// Independent values by their intervals: weights 1/h². A's places, which stand for the path, err as B's do:
+/// √2.
+compare::Trait together(const std::vector<compare::Trait>& parts) {
+  double weights = 0.0, sum = 0.0;
+  compare::Trait all{.name = parts.front().name, .unit = parts.front().unit};
+  for (const compare::Trait& one : parts) {
+    const double half = std::max(1e-9, 0.5 * (one.high - one.low)), weight = 1.0 / (half * half);
+    weights += weight, sum += weight * one.value, all.n += one.n;
+  }
+  all.value = sum / weights;
+  all.low = all.value - std::sqrt(2.0 / weights), all.high = all.value + std::sqrt(2.0 / weights);
+  return all;
+}
+
+/// How much later B sees the plate where A saw it, where both say the scene's own time: of simulated cameras.
+void addLatency(const ComparedRun& run, TraitCollector& all) {
+  std::vector<compare::Trait> rows;
+  const Captures captures = ofKind(run, "moving");
+  bool is_shared = !captures.empty();
+  for (const ComparedCapture* one : captures) {
+    const CameraSeen &a = one->seen[0], &b = one->seen[1];
+    is_shared = is_shared && a.is_simulated && b.is_simulated;
+    const auto traits =
+        compare::latencyTraits(b.plate_time_s, b.plate_place_m, a.plate_time_s, a.plate_place_m);
+    if (traits) rows.push_back(traits->front());
+  }
+  if (captures.empty()) return;
+  if (!is_shared) {
+    all.untold(
+        "latency: the two cameras see the plate one after the other, and a real one does not say where it "
+        "was "
+        "meanwhile; it takes the plate's own path over time (compare::latencyTraits)");
+  } else if (rows.empty()) {
+    all.untold("latency: the plate is seen whole in too few frames of a capture");
+  } else {
+    all.add("latency", "B − A", std::vector{together(rows)});
+  }
+}
+
+}  // namespace
+
+void TraitCollector::add(const std::string& what, const char* of, const compare::Traits& traits) {
+  if (!traits) {
+    found_.untold.push_back(fmt::format("{} of {}: {}", what, of, traits.error().message));
+    return;
+  }
+  for (const compare::Trait& trait : *traits) found_.traits.push_back({what, of, trait});
+}
+
+void addFrameTraits(const ComparedRun& run, TraitCollector& all) {
+  Captures walls = ofKind(run, "distance");
+  if (walls.empty()) walls = ofKind(run, "warm_up");
+  for (std::size_t camera : {std::size_t{0}, std::size_t{1}}) {
+    const OwnError own{walls, camera};
+    addTiming(run, camera, all);
+    if (!walls.empty()) addNoise(walls, camera, all), addWraps(walls, camera, all);
+    addCorners(run, own, camera, all);
+    addPlates(run, own, camera, all);
+    addLag(run, camera, all);
+    addMotion(run, camera, all);
+  }
+  addLatency(run, all);
+}
+
+}  // namespace toftwin::plan

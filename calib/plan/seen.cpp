@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/plan/seen.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "calib/intrinsics/brightness.h"
+#include "calib/plan/place.h"
+#include "calib/plan/seen_plate.h"
+
+namespace toftwin::plan {
+namespace {
+
+constexpr float kNaNf = std::numeric_limits<float>::quiet_NaN();
+constexpr int kCell = 8;                 ///< pixels along a side
+constexpr double kGross_mm = 300.0;      ///< as in comparing: another surface, or another period
+constexpr int kMiddle = 96;              ///< pixels along a side that the noise is taken from
+constexpr double kBoardReach_m = 0.9;    ///< of a corner's boards, which are 1 m or wider
+constexpr double kBoardHeight_m = 0.35;  ///< to either side of the middle
+
+const BlockSpec* blockOf(const Plan& plan, const CaptureRecord& record) {
+  const auto found = std::ranges::find(plan.blocks, record.block, &BlockSpec::name);
+  return found == plan.blocks.end() ? nullptr : &*found;
+}
+
+/// Cells of the wall that are valid in most pixels and not gross.
+void addWall(const compare::Stack& stack, const Image<float>& expected_m, double period_m, CameraSeen& seen) {
+  const Image<float> range = stack.meanRange_m(), amplitude = stack.meanAmplitude();
+  for (int top = 0; top < range.height(); top += kCell) {
+    for (int left = 0; left < range.width(); left += kCell) {
+      double e_sum = 0.0, r_sum = 0.0, a_sum = 0.0, count = 0.0, wrapped = 0.0, there = 0.0, all = 0.0;
+      for (int y = top; y < std::min(top + kCell, range.height()); ++y) {
+        for (int x = left; x < std::min(left + kCell, range.width()); ++x) {
+          ++all;
+          const double e = 1e3 * static_cast<double>(range(x, y) - expected_m(x, y));
+          if (!std::isfinite(e)) continue;
+          ++there;
+          if (period_m > 0.0 && std::round(e / (1e3 * period_m)) != 0.0) ++wrapped;
+          if (std::abs(e) > kGross_mm) continue;
+          e_sum += e, r_sum += static_cast<double>(expected_m(x, y)), ++count;
+          a_sum += amplitude.empty() ? 0.0 : static_cast<double>(amplitude(x, y));
+        }
+      }
+      if (2.0 * there < all || count < 4.0) continue;
+      seen.wall_range_m.push_back(r_sum / count), seen.wall_error_mm.push_back(e_sum / count);
+      seen.wall_amplitude.push_back(amplitude.empty() ? std::nan("") : a_sum / count);
+      seen.wall_wrapped.push_back(wrapped / there);
+    }
+  }
+}
+
+void addNoise(const std::vector<ReadFrame>& frames, const Image<float>& expected_m, CameraSeen& seen) {
+  const int width = std::min(kMiddle, expected_m.width()), height = std::min(kMiddle, expected_m.height());
+  const int left = (expected_m.width() - width) / 2, top = (expected_m.height() - height) / 2;
+  std::vector<Image<float>> errors;
+  for (const ReadFrame& frame : frames) {
+    Image<float>& error = errors.emplace_back(width, height);
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x)
+        error(x, y) = 1e3F * (frame.range_m(left + x, top + y) - expected_m(left + x, top + y));
+    }
+  }
+  if (const auto traits = compare::noiseTraits(errors)) seen.noise = *traits;
+}
+
+/// Ranges against two walls that meet at the target's point, in the vertical, and open towards the cameras.
+void addCorner(const Plan& plan, const BlockSpec& block, const Transform<World, Camera>& pose,
+               const compare::Stack& stack, CameraSeen& seen) {
+  const Target target = targetOf(plan, block);
+  const Vec3d up{0.0, -1.0, 0.0};
+  const Image<float> range = stack.meanRange_m();
+  for (const double side : {-0.5, 0.5}) {
+    const Vec3d along =
+        rotation<World, World>(up, side * block.corner_deg * std::numbers::pi / 180.0).rotate(target.normal);
+    const Vec3d normal = cross(along, up);
+    for (int y = 0; y < range.height(); ++y) {
+      for (int x = 0; x < range.width(); ++x) {
+        const auto ray = pose * rayThroughPixel(stack.camera(), x, y);
+        const double expected = dot(normal, target.point_m - pose.translation_m) / dot(normal, ray.v);
+        if (!(expected > 0.0) || !std::isfinite(range(x, y))) continue;
+        const Vec3d from_edge = pose.translation_m + expected * ray.v - target.point_m;
+        const double place = dot(from_edge, along), e = 1e3 * (static_cast<double>(range(x, y)) - expected);
+        if (place < 0.02 || place > kBoardReach_m || std::abs(dot(from_edge, up)) > kBoardHeight_m) continue;
+        if (std::abs(e) > kGross_mm) continue;
+        seen.corner_place_m.push_back(place), seen.corner_range_m.push_back(expected);
+        seen.corner_error_mm.push_back(e);
+      }
+    }
+  }
+}
+
+}  // namespace
+
+Image<float> wallRange_m(const Plan& plan, const BlockSpec& block, const CameraInfo& camera,
+                         const Transform<World, Camera>& pose) {
+  const Target target = targetOf(plan, block);
+  Image<float> range(camera.width, camera.height, kNaNf);
+  const double away = dot(target.normal, target.point_m - pose.translation_m);
+  for (int y = 0; y < camera.height; ++y) {
+    for (int x = 0; x < camera.width; ++x) {
+      const double along = dot(target.normal, (pose * rayThroughPixel(camera, x, y)).v);
+      if (away / along > 0.0) range(x, y) = static_cast<float>(away / along);
+    }
+  }
+  return range;
+}
+
+Result<ReadFrame> readOf(const Frame& frame) {
+  auto range = compare::rangeOf(frame);
+  if (!range) return range.error();
+  ReadFrame read{.range_m = *std::move(range)};
+  if (!frame.moment.exposures.empty())
+    read.start_s = 1e-9 * static_cast<double>(frame.moment.exposures[0].start.ns);
+  if (frame.moment.since_power_on) read.since_power_on_s = frame.moment.since_power_on->in(second);
+  const auto amplitude = intrinsics::brightnessOf(frame);
+  if (!amplitude) return read;
+  const int width = amplitude->width(), height = amplitude->height();
+  double sum = 0.0, count = 0.0;
+  for (int y = 3 * height / 8; y < 5 * height / 8; ++y) {
+    for (int x = 3 * width / 8; x < 5 * width / 8; ++x) {
+      if (!std::isfinite((*amplitude)(x, y))) continue;
+      sum += static_cast<double>((*amplitude)(x, y)), ++count;
+    }
+  }
+  read.brightness = count > 0.0 ? sum / count : std::nan("");
+  return read;
+}
+
+CameraSeen seenOf(const Plan& plan, const CaptureRecord& record, const compare::Stack& stack,
+                  const std::vector<ReadFrame>& frames, double shortest_period_m) {
+  CameraSeen seen;
+  seen.is_simulated = stack.provenance().kind == FrameKind::Simulated;
+  for (const ReadFrame& frame : frames) {
+    if (frame.start_s) seen.starts_s.push_back(*frame.start_s);
+    seen.brightness.push_back(frame.brightness);
+  }
+  if (seen.starts_s.size() < frames.size()) seen.starts_s.clear();
+  const BlockSpec* block = blockOf(plan, record);
+  if (block == nullptr || !stack.pose()) return seen;
+  switch (block->kind) {
+    case Kind::WarmUp:
+    case Kind::Distance:
+    case Kind::Exposure:
+    case Kind::Tilt: {
+      const auto expected = wallRange_m(plan, *block, stack.camera(), *stack.pose());
+      addWall(stack, expected, shortest_period_m, seen);
+      if (block->kind == Kind::WarmUp || block->kind == Kind::Distance) addNoise(frames, expected, seen);
+      break;
+    }
+    case Kind::Corner:
+      addCorner(plan, *block, *stack.pose(), stack, seen);
+      break;
+    case Kind::Foreground:
+      addPlate(wallRange_m(plan, *block, stack.camera(), *stack.pose()), stack, seen);
+      break;
+    case Kind::Moving:
+      addMovingPlate(wallRange_m(plan, *block, stack.camera(), *stack.pose()), stack.camera(), frames, seen);
+      break;
+    default:
+      break;
+  }
+  return seen;
+}
+
+}  // namespace toftwin::plan

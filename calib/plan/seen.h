@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <toftwin/frame.h>
+#include <toftwin/image.h>
+#include <toftwin/result.h>
+
+#include "calib/compare/stack.h"
+#include "calib/compare/traits/traits.h"
+#include "calib/plan/plan.h"
+#include "calib/plan/run_index.h"
+
+namespace toftwin::plan {
+
+/// What one camera's frames of a capture say by themselves, against the surfaces that the plan puts before
+/// it: the plane through the target, or the walls of a corner. Columns of one kind are of equal length.
+struct CameraSeen {
+  std::vector<double> starts_s{};    ///< of each frame, device clock; empty where unknown
+  std::vector<double> brightness{};  ///< mean amplitude of the image's middle, frame by frame
+  /// Cells of 8 × 8 pixels of a wall: expected range, error, amplitude, and the share of pixels that wrapped.
+  std::vector<double> wall_range_m{}, wall_error_mm{}, wall_amplitude{}, wall_wrapped{};
+  std::vector<compare::Trait> noise{};  ///< of the frames' errors at the middle of the image
+  std::vector<double> corner_place_m{}, corner_range_m{}, corner_error_mm{};
+  /// Of a plate before the wall: the image scaled so that 1 lies halfway between, its light over that of one
+  /// pixel of the wall, its range.
+  Image<float> over_split{};
+  std::vector<double> plate_range_m{}, plate_over_own{};  ///< beside the wall's columns
+  std::vector<double> edge_place_px{}, edge_value{};      ///< across the plate's left and right edges
+  std::vector<double> plate_time_s{}, plate_place_m{},
+      plate_turn_mm{};  ///< frame by frame, of a moving plate
+  bool is_simulated = false;
+};
+
+/// One frame as it was read.
+struct ReadFrame {
+  std::optional<double> start_s{};
+  std::optional<double> since_power_on_s{};
+  Image<float> range_m{};
+  double brightness = 0.0;
+};
+
+/// What of a frame seenOf() needs.
+Result<ReadFrame> readOf(const Frame& frame);
+/// What such blocks give; NaN and empty columns where the plan does not say what stands there.
+CameraSeen seenOf(const Plan& plan, const CaptureRecord& record, const compare::Stack& stack,
+                  const std::vector<ReadFrame>& frames, double shortest_period_m);
+
+/// Range to the target's plane along each pixel's ray; NaN where it is not before the camera.
+Image<float> wallRange_m(const Plan& plan, const BlockSpec& block, const CameraInfo& camera,
+                         const Transform<World, Camera>& pose);
+
+}  // namespace toftwin::plan
