@@ -18,6 +18,7 @@
 #include "calib/compare/json_parse.h"
 #include "calib/compare/live_report.h"
 #include "calib/plan/captures.h"
+#include "calib/plan/run_log.h"
 #include "calib/plan/run_report.h"
 #include "protocol/record/recording.h"
 #include "protocol/settings/settings.h"
@@ -37,6 +38,7 @@ std::string today() {
 struct RunFiles {
   Plan plan;
   Schedule schedule;
+  std::string camera_a, camera_b;  ///< source, model and serial number
 };
 
 Result<RunFiles> readRun(const std::filesystem::path& folder) {
@@ -55,7 +57,8 @@ Result<RunFiles> readRun(const std::filesystem::path& folder) {
   if (!plan) return plan.error();
   auto schedule = scheduleOf(*plan);
   if (!schedule) return schedule.error();
-  return RunFiles{*std::move(plan), *std::move(schedule)};
+  return RunFiles{*std::move(plan), *std::move(schedule), table->text("a").value_or(""),
+                  table->text("b").value_or("")};
 }
 
 /// A moving plate is at another place in each frame; a mean over frames says nothing of it.
@@ -210,6 +213,31 @@ Result<> openLocked(const CompareRunJob& job, const std::vector<CaptureRecord>& 
                fmt::format("{}: cannot be written, so the locked captures stay closed", file.string())};
 }
 
+namespace {
+
+std::string utcOf(std::time_t time) { return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(time)); }
+
+Result<> putIntoLog(const CompareRunJob& job, const RunFiles& files, const ComparedRun& run,
+                    const CaptureRecord& first) {
+  auto log = RunLog::open(job.log);
+  if (!log) return log.error();
+  auto hash = sha256Of(job.run / kIndexFile);
+  if (!hash) return hash.error();
+  LoggedRun entry{.judged = utcOf(std::time(nullptr)),
+                  .began = utcOf(static_cast<std::time_t>(first.began_ns / 1'000'000'000)),
+                  .folder = std::filesystem::absolute(job.run).string(),
+                  .plan = files.plan.name,
+                  .camera_a = files.camera_a,
+                  .camera_b = files.camera_b,
+                  .software = "toftwin " TOFTWIN_VERSION,
+                  .note = job.note,
+                  .index_sha256 = *std::move(hash),
+                  .is_locked = job.locked};
+  return log->add(entry, traitsOf(run));
+}
+
+}  // namespace
+
 Result<std::filesystem::path> compareRun(const CompareRunJob& job, compare::Progress& progress) {
   const auto files = readRun(job.run);
   if (!files) return files.error();
@@ -241,7 +269,10 @@ Result<std::filesystem::path> compareRun(const CompareRunJob& job, compare::Prog
   progress.begin();
   auto finding = judgeRun(*run);
   if (!finding) return finding.error();
-  progress.end();
+    progress.end();
+  if (!job.log.empty()) {
+    if (auto logged = putIntoLog(job, *files, *run, records.front()); !logged) return logged.error();
+  }
   compare::Report report{.title = "Comparison of time-of-flight cameras"};
   report.subtitle =
       fmt::format("{} against {}: {} {}captures of the plan \"{}\"", records.front().b.source,

@@ -52,6 +52,7 @@ struct CompareRunJob {
   std::filesystem::path output;
   bool locked = false;  ///< judge on the locked captures, which can be done once
   std::string note;
+  std::filesystem::path log{};  ///< a RunLog that the result is put into; empty: none
   std::function<bool()> interrupted{};
 };
 

@@ -94,7 +94,8 @@ TEST_F(StandardPlan, TellsEveryCharacteristicOfBothCameras) {
   const Ran measured =
       run(fmt::format("measure {}standard.toml cam twin -o {} --prepared", kPlans, path("run")));
   ASSERT_EQ(measured.status, 0) << measured.err;
-  const Ran compared = toftwin(fmt::format("compare {} -o {}", path("run"), path("report")));
+  const Ran compared =
+      toftwin(fmt::format("compare {} -o {} --log {}", path("run"), path("report"), path("lab.sqlite")));
   ASSERT_EQ(compared.status, 0) << compared.err;
   const compare::Json told = characteristics();
   std::map<std::string, compare::Json> found;
@@ -147,6 +148,13 @@ TEST_F(StandardPlan, TellsEveryCharacteristicOfBothCameras) {
   EXPECT_NEAR(value("B: lag of the first frame recorded: left behind"), 0.0, 2e-3);
   EXPECT_NEAR(value("A: lens scatter: veil"), kVeil, 0.01);
   EXPECT_NEAR(value("B: lens scatter: veil"), 0.0, 0.01);
+  EXPECT_THAT(toftwin("log " + path("lab.sqlite")).out, testing::HasSubstr("standard"));
+  const Ran trend = toftwin("trend " + path("lab.sqlite") + " --camera cam --characteristic 'lens scatter'");
+  EXPECT_THAT(trend.out, testing::AllOf(testing::HasSubstr("lens scatter: veil [1], A cam"),
+                                        testing::HasSubstr("the first")));
+  EXPECT_THAT(toftwin("trend " + path("lab.sqlite") + " --camera nobody").err,
+              testing::HasSubstr("nothing of a camera"));
+  EXPECT_THAT(toftwin("log " + path("none.sqlite")).err, testing::HasSubstr("there is no such log"));
 }
 
 }  // namespace

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <array>
 
-#include "tools/cli/command.h"
+#include "tools/cli/log.h"
 
 namespace toftwin::cli {
 
@@ -9,7 +9,7 @@ std::span<const Command> commands() {
   static const std::array kCommands{
       listCommand(),      infoCommand(), grabCommand(),    recordCommand(),     replayCommand(),
       poseCommand(),      rigCommand(),  setCommand(),     triggerCommand(),    renderCommand(),
-      calibrateCommand(), planCommand(), measureCommand(), compareCommand(),    discoverCommand(), suitCommand(), locateCommand(),
+      calibrateCommand(), planCommand(), measureCommand(), compareCommand(),    discoverCommand(), suitCommand(), logCommand(), trendCommand(), locateCommand(),
       usbCommand(),
       doctorCommand(),    complianceCommand(), completionCommand(),
   };

@@ -36,7 +36,7 @@ struct Options {
   std::string rig;
   std::string data;
   std::string output = "report";
-  std::string note;
+  std::string note, log;
   int frames = 30;
   double frame_timeout_s = 120.0;
   double effort = 1.0;
@@ -172,6 +172,7 @@ Result<Exit> compareRun(const Options& options) {
                                       .output = options.output,
                                       .locked = options.locked,
                                       .note = options.note,
+                                      .log = options.log,
                                       .interrupted = interrupted},
                                      progress);
   if (!page) return page.error();
@@ -250,6 +251,8 @@ Run add(Arguments& args) {
       .showsDefault();
   args.flag("--locked", options->locked,
             "of a run: judge on the captures that were held back, which can be done once");
+  args.option("--log", options->log,
+              "of a run: an SQLite database that its characteristics are put into, for toftwin log and trend");
   args.option("-o,--output", options->output, "folder of the report").showsDefault();
   args.option("--note", options->note, "for the report's foot, such as a commit");
   args.check([options]() -> Result<> {
@@ -264,6 +267,9 @@ Run add(Arguments& args) {
     if (options->isRun() && is_live) {
       return Error{Error::Code::InvalidArgument,
                    "a run is compared as it was captured: --poses, --rig, --data and --address-b mean nothing for it"};
+    }
+    if (!options->log.empty() && !options->isRun()) {
+      return Error{Error::Code::InvalidArgument, "--log is for the folder of a run"};
     }
     if (options->locked && !options->isRun()) {
       return Error{Error::Code::InvalidArgument, "--locked is for the folder of a run"};

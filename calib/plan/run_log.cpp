@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/plan/run_log.h"
+
+#include <fmt/format.h>
+#include <sqlite3.h>
+
+#include <array>
+#include <cmath>
+#include <functional>
+#include <limits>
+
+namespace toftwin::plan {
+namespace {
+
+constexpr int kVersion = 1;
+/// What brings a log from one version to the next; the first makes it.
+constexpr std::array kMigrations{
+    "CREATE TABLE run (id INTEGER PRIMARY KEY, judged TEXT NOT NULL, began TEXT NOT NULL, folder TEXT NOT "
+    "NULL,"
+    " plan TEXT NOT NULL, camera_a TEXT NOT NULL, camera_b TEXT NOT NULL, software TEXT NOT NULL, note TEXT "
+    "NOT NULL,"
+    " index_sha256 TEXT NOT NULL, locked INTEGER NOT NULL, UNIQUE (index_sha256, locked));"
+    "CREATE TABLE characteristic (run INTEGER NOT NULL REFERENCES run (id) ON DELETE CASCADE, of TEXT NOT "
+    "NULL,"
+    " what TEXT NOT NULL, name TEXT NOT NULL, unit TEXT NOT NULL, value REAL, low REAL, high REAL, n INTEGER "
+    "NOT NULL,"
+    " PRIMARY KEY (run, of, what, name));"
+    "CREATE TABLE untold (run INTEGER NOT NULL REFERENCES run (id) ON DELETE CASCADE, why TEXT NOT NULL);"};
+static_assert(kMigrations.size() == kVersion);
+
+Error failure(sqlite3* database, const std::string& what) {
+  return {Error::Code::Malformed, fmt::format("the log: {}: {}", what, sqlite3_errmsg(database))};
+}
+
+Result<> execute(sqlite3* database, const char* sql) {
+  return sqlite3_exec(database, sql, nullptr, nullptr, nullptr) == SQLITE_OK ? Result<>{}
+                                                                             : failure(database, "SQL");
+}
+
+/// One prepared statement: values are bound one after the other, columns read one after the other.
+class Statement {
+ public:
+  Statement(sqlite3* database, const std::string& sql) : database_(database) {
+    sqlite3_prepare_v2(database, sql.c_str(), -1, &statement_, nullptr);
+  }
+  ~Statement() { sqlite3_finalize(statement_); }
+  Statement(const Statement&) = delete;
+  Statement& operator=(const Statement&) = delete;
+
+  Statement& bind(const std::string& text) {
+    sqlite3_bind_text(statement_, ++bound_, text.c_str(), static_cast<int>(text.size()), SQLITE_TRANSIENT);
+    return *this;
+  }
+  Statement& bind(std::int64_t number) {
+    sqlite3_bind_int64(statement_, ++bound_, number);
+    return *this;
+  }
+  /// What is not finite is NULL.
+  Statement& bindReal(double number) {
+    ++bound_;
+    if (std::isfinite(number)) sqlite3_bind_double(statement_, bound_, number);
+    return *this;
+  }
+  Result<> each(const std::function<void(Statement&)>& row) {
+    if (statement_ == nullptr) return failure(database_, "a statement");
+    int state = SQLITE_ROW;
+    while ((state = sqlite3_step(statement_)) == SQLITE_ROW) {
+      column_ = 0;
+      row(*this);
+    }
+    return state == SQLITE_DONE ? Result<>{} : failure(database_, "a statement");
+  }
+  Result<> run() {
+    return each([](Statement&) {});
+  }
+  std::string text() {
+    const auto* value = sqlite3_column_text(statement_, column_++);
+    return value == nullptr ? std::string{} : std::string{reinterpret_cast<const char*>(value)};
+  }
+  std::int64_t number() { return sqlite3_column_int64(statement_, column_++); }
+  double real() {
+    const int at = column_++;
+    return sqlite3_column_type(statement_, at) == SQLITE_NULL ? std::numeric_limits<double>::quiet_NaN()
+                                                              : sqlite3_column_double(statement_, at);
+  }
+
+ private:
+  sqlite3* database_;
+  sqlite3_stmt* statement_ = nullptr;
+  int bound_ = 0, column_ = 0;
+};
+
+constexpr const char* kRunColumns =
+    "run.id, judged, began, folder, plan, camera_a, camera_b, software, note, index_sha256, locked";
+
+LoggedRun runFrom(Statement& row) {
+  LoggedRun run;
+  run.id = row.number(), run.judged = row.text(), run.began = row.text(), run.folder = row.text();
+  run.plan = row.text(), run.camera_a = row.text(), run.camera_b = row.text(), run.software = row.text();
+  run.note = row.text(), run.index_sha256 = row.text(), run.is_locked = row.number() != 0;
+  return run;
+}
+
+Result<> write(sqlite3* database, const LoggedRun& run, const RunTraits& traits) {
+  Statement remove{database, "DELETE FROM run WHERE index_sha256 = ? AND locked = ?"};
+  if (auto done = remove.bind(run.index_sha256).bind(std::int64_t{run.is_locked}).run(); !done) return done;
+  Statement insert{
+      database,
+      "INSERT INTO run (judged, began, folder, plan, camera_a, camera_b, software, note, index_sha256, "
+      "locked) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)"};
+  for (const std::string* text : {&run.judged, &run.began, &run.folder, &run.plan, &run.camera_a,
+                                  &run.camera_b, &run.software, &run.note, &run.index_sha256})
+    insert.bind(*text);
+  if (auto done = insert.bind(std::int64_t{run.is_locked}).run(); !done) return done;
+  const std::int64_t id = sqlite3_last_insert_rowid(database);
+  for (const auto& [what, of, trait] : traits.traits) {
+    Statement row{database, "INSERT OR REPLACE INTO characteristic VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)"};
+    row.bind(id).bind(of).bind(what).bind(trait.name).bind(trait.unit);
+    row.bindReal(trait.value).bindReal(trait.low).bindReal(trait.high);
+    if (auto done = row.bind(static_cast<std::int64_t>(trait.n)).run(); !done) return done;
+  }
+  for (const std::string& why : traits.untold) {
+    Statement row{database, "INSERT INTO untold VALUES (?, ?)"};
+    if (auto done = row.bind(id).bind(why).run(); !done) return done;
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<RunLog> RunLog::open(const std::filesystem::path& file) {
+  sqlite3* raw = nullptr;
+  const int opened = sqlite3_open(file.c_str(), &raw);
+  RunLog log{std::shared_ptr<sqlite3>{raw, [](sqlite3* one) { sqlite3_close(one); }}};
+  const auto refuse = [&](const std::string& why) {
+    return Error{Error::Code::InvalidArgument, fmt::format("{}: {}", file.string(), why)};
+  };
+  if (opened != SQLITE_OK) return refuse(fmt::format("cannot be opened as a log: {}", sqlite3_errmsg(raw)));
+  sqlite3_busy_timeout(raw, 5000);
+  std::int64_t version = -1, tables = 0;
+  Statement asked{raw, "PRAGMA user_version"};
+  if (auto done = asked.each([&](Statement& row) { version = row.number(); }); !done)
+    return refuse(fmt::format("is no SQLite database: {}", sqlite3_errmsg(raw)));
+  Statement counted{raw, "SELECT count(*) FROM sqlite_master"};
+  if (auto done = counted.each([&](Statement& row) { tables = row.number(); }); !done) return done.error();
+  if (version > kVersion)
+    return refuse(
+        fmt::format("is of version {}, which a newer toftwin made; this one knows {}", version, kVersion));
+  if (version == 0 && tables > 0) return refuse("is a database of something else");
+  if (auto done = execute(raw, "PRAGMA foreign_keys = ON"); !done) return done.error();
+  for (std::int64_t from = version; from < kVersion; ++from) {
+    const std::string sql = fmt::format("BEGIN; {} PRAGMA user_version = {}; COMMIT;",
+                                        kMigrations[static_cast<std::size_t>(from)], from + 1);
+    if (auto done = execute(raw, sql.c_str()); !done) return done.error();
+  }
+  return log;
+}
+
+Result<> RunLog::add(const LoggedRun& run, const RunTraits& traits) {
+  if (auto begun = execute(database_.get(), "BEGIN IMMEDIATE"); !begun) return begun;
+  auto done = write(database_.get(), run, traits);
+  if (auto ended = execute(database_.get(), done ? "COMMIT" : "ROLLBACK"); done && !ended) return ended;
+  return done;
+}
+
+Result<std::vector<LoggedRun>> RunLog::runs() {
+  std::vector<LoggedRun> all;
+  Statement asked{database_.get(), fmt::format("SELECT {} FROM run ORDER BY began, id", kRunColumns)};
+  if (auto done = asked.each([&](Statement& row) { all.push_back(runFrom(row)); }); !done)
+    return done.error();
+  return all;
+}
+
+Result<std::vector<LoggedTrait>> RunLog::traits(const std::string& camera, const std::string& what,
+                                                const std::string& name) {
+  std::vector<LoggedTrait> all;
+  Statement asked{
+      database_.get(),
+      fmt::format("SELECT {}, of, what, name, unit, value, low, high, n FROM characteristic JOIN run ON "
+                  "run = run.id WHERE substr(what, 1, length(?1)) = ?1 AND substr(name, 1, length(?2)) = "
+                  "?2 ORDER BY what, name, of, began, run.id",
+                  kRunColumns)};
+  asked.bind(what).bind(name);
+  const auto done = asked.each([&](Statement& row) {
+    LoggedTrait one{.run = runFrom(row), .trait = {}};
+    one.trait.of = row.text(), one.trait.what = row.text();
+    auto& trait = one.trait.trait;
+    trait.name = row.text(), trait.unit = row.text();
+    trait.value = row.real(), trait.low = row.real(), trait.high = row.real();
+    trait.n = static_cast<std::size_t>(row.number());
+    const bool is_of = (one.trait.of != "B" && one.run.camera_a.starts_with(camera)) ||
+                       (one.trait.of != "A" && one.run.camera_b.starts_with(camera));
+    if (is_of) all.push_back(std::move(one));
+  });
+  if (!done) return done.error();
+  return all;
+}
+
+}  // namespace toftwin::plan

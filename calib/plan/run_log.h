@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <toftwin/result.h>
+
+#include "calib/plan/run_traits.h"
+
+struct sqlite3;
+
+namespace toftwin::plan {
+
+/// A run that was judged, as the log keeps it.
+struct LoggedRun {
+  std::int64_t id = 0;
+  std::string judged{};  ///< when, UTC
+  std::string began{};   ///< the first capture, UTC
+  std::string folder{}, plan{}, camera_a{}, camera_b{}, software{}, note{};
+  std::string
+      index_sha256{};  ///< of its index.jsonl: the same captures judged again take the old entry's place
+  bool is_locked = false;
+};
+
+/// One number of one run.
+struct LoggedTrait {
+  LoggedRun run{};
+  RunTrait trait{};
+};
+
+/// The log of runs: an SQLite database, whose schema docs/log.md documents.
+class RunLog {
+ public:
+  /// Made if it is not there, brought to this version's schema if it is older. Errors: a file that is no such
+  /// log, or one of a newer version.
+  static Result<RunLog> open(const std::filesystem::path& file);
+  Result<> add(const LoggedRun& run, const RunTraits& traits);
+  /// By when they began.
+  Result<std::vector<LoggedRun>> runs();
+  /// All numbers whose characteristic and name begin so (empty: all) and whose camera, A's or B's, is called
+  /// so.
+  Result<std::vector<LoggedTrait>> traits(const std::string& camera, const std::string& what,
+                                          const std::string& name);
+
+ private:
+  explicit RunLog(std::shared_ptr<sqlite3> database) : database_(std::move(database)) {}
+  std::shared_ptr<sqlite3> database_;
+};
+
+}  // namespace toftwin::plan
