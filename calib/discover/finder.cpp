@@ -136,12 +136,16 @@ class Search {
     return along.empty() ? effect.covariates : along;
   }
 
-  /// A curve without a formula is known to some per cent, since between its knots it is straight: what little is
-  /// left beside it is not called another effect.
+  /// A curve without a formula is known to some per cent, since between its knots it is straight, and so is what
+  /// light does, since it is added to first order: what little is left beside it is not called another effect.
+  static bool isOfLight(const Effect& effect) {
+    return std::ranges::any_of(termsOf(effect), [](const Term& term) { return !term.carrier.empty(); });
+  }
   bool isWhatACurveLeaves(const Effect& effect) const {
     constexpr double kKnown = 0.05;
     return std::ranges::any_of(finding_.effects, [&](const Effect& known) {
-      return !known.is_catalogue && !isFormula(known) && known.covariates != effect.covariates &&
+      return !known.is_catalogue && (!isFormula(known) || isOfLight(known)) &&
+             alongOf(known) != alongOf(effect) &&
              effect.gain.mean < kKnown * known.gain.mean;
     });
   }

@@ -82,6 +82,23 @@ Explanation sumOf(const CovariateInfo& a, const CovariateInfo& b) {
   return out;
 }
 
+/// Smooth curves of more knots, which may be what light does along the covariate.
+std::vector<TermGroup> finerCurves(const CovariateInfo& covariate, const Term* carried) {
+  std::vector<TermGroup> all;
+  for (const auto& [knots, name] :
+       {std::pair{2 * kSmoothKnots - 1, "finer "}, {4 * kSmoothKnots - 3, "finest "}}) {
+    TermGroup finer = smoothIn(covariate, knots);
+    if (finer.terms.size() < kSmoothKnots) continue;
+    if (carried != nullptr) {
+      finer.name = fmt::format("a {} that is {}", carried->carrier, finer.name);
+      for (Term& term : finer.terms) term.stage = carried->stage, term.carrier = carried->carrier;
+    }
+    finer.name = name + finer.name;
+    all.push_back(std::move(finer));
+  }
+  return all;
+}
+
 /// Explanations without their gains, for some sets of covariates.
 std::vector<Explanation> explanationsFor(const Context& context, const std::vector<Set>& sets) {
   std::vector<Explanation> all;
@@ -91,17 +108,15 @@ std::vector<Explanation> explanationsFor(const Context& context, const std::vect
     for (const TermGroup& group : context.generic) {
       if (sorted(covariatesOf(group)) == set) all.push_back(curve(group));
     }
-    const bool has_carrier = std::ranges::any_of(
-        set, [&](const std::string& name) { return infoOf(context, name) == nullptr; });
-    if (has_carrier) continue;
-    if (set.size() == 1) {
-      for (const auto& [knots, name] :
-           {std::pair{2 * kSmoothKnots - 1, "finer "}, {4 * kSmoothKnots - 3, "finest "}}) {
-        TermGroup finer = smoothIn(*infoOf(context, set[0]), knots);
-        finer.name = name + finer.name;
-        if (finer.terms.size() >= kSmoothKnots) all.push_back(curve(std::move(finer)));
-      }
-    } else {
+    std::vector<const CovariateInfo*> infos;
+    for (const std::string& name : set)
+      if (const CovariateInfo* info = infoOf(context, name)) infos.push_back(info);
+    const bool has_carrier = infos.size() < set.size();
+    const Term* carried = has_carrier ? carrierOf(context, set) : nullptr;
+    if (has_carrier && carried == nullptr) continue;
+    if (infos.size() == 1) {
+      for (TermGroup& finer : finerCurves(*infos[0], carried)) all.push_back(curve(std::move(finer)));
+    } else if (!has_carrier) {
       all.push_back(sumOf(*infoOf(context, set[0]), *infoOf(context, set[1])));
     }
   }

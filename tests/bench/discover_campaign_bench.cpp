@@ -196,6 +196,8 @@ void report(const Options& options, const bench::Case& of, const sim::AnyEffect*
   fmt::print("{}", bench::lineOf(bench::scoreOf(of, hidden, finding)));
   for (const SeenGroup& one : seenFirst(finding, options.scores ? 10 : 0))
     fmt::print("# {}: z {:.1f}, T {:.1f} of {}\n", one.name, one.z, one.statistic, one.rank);
+  for (const FoundEffect& one : options.scores ? finding.effects : std::vector<FoundEffect>{})
+    fmt::print("# found {}: gain {:.0f} ± {:.0f}\n", one.found.name, one.found.gain.mean, one.found.gain.error);
   for (const FoundEffect& one : finding.effects)
     for (const std::string& why : options.scores ? one.found.refused : std::vector<std::string>{})
       fmt::print("# not {}\n", why);
