@@ -2,16 +2,16 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <limits>
 #include <numbers>
 #include <vector>
+
+#include <toftwin/nan.h>
 
 #include "daemon/faults.h"
 
 namespace toftwin::daemon {
 namespace {
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr unsigned kBlind =
     static_cast<unsigned>(PixelFlag::Invalid) | static_cast<unsigned>(PixelFlag::LowAmplitude);
 constexpr float kThroughDirt = 0.05F;  ///< of the amplitude: light passes the spot twice

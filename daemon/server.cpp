@@ -15,7 +15,7 @@ namespace toftwin::daemon {
 namespace {
 
 namespace asio = boost::asio;
-constexpr std::chrono::milliseconds kPause{100};
+constexpr std::chrono::milliseconds kAcceptPause{100};
 
 }  // namespace
 
@@ -79,7 +79,7 @@ void Server::accept(Acceptor& acceptor, Accepting& accepting) {
     if (is_shut_ || fault == asio::error::operation_aborted) return;
     if (fault) {
       logging::warn("cannot accept a client: {}; trying again", fault.message());
-      accepting.pause.expires_after(kPause);
+      accepting.pause.expires_after(kAcceptPause);
       accepting.pause.async_wait([this, &acceptor, &accepting, pausing = UnderWay{accepting}](
                                      boost::system::error_code stopped) mutable {
         pausing.end();

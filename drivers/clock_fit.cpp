@@ -12,7 +12,7 @@ namespace {
 constexpr double kTuning = 4.685;
 constexpr double kSdPerMad = 1.4826;  // of a normal distribution
 constexpr double kLeastNoise_ns = 1.0;
-constexpr int kRounds = 20;
+constexpr int kReweightings = 20;
 constexpr int kBehindIsAStep = 8;
 
 double median(std::vector<double> values) {
@@ -108,7 +108,7 @@ std::optional<ClockFit::Estimate> ClockFit::estimate() const {
   }
   Line line = startingLine(x, y);
   const double s = noiseOf(line, x, y);
-  for (int i = 0; i < kRounds; ++i) line = reweighted(line, s, x, y);
+  for (int i = 0; i < kReweightings; ++i) line = reweighted(line, s, x, y);
   const Spread spread = spreadOf(line, s, x, y);
   return Estimate{.host_minus_device_ns = newest.host_minus_device_ns + std::llround(line.a),
                   .offset_sd_ns = spread.a,

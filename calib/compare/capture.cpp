@@ -4,13 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <limits>
 #include <optional>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include <toftwin/names.h>
+#include <toftwin/nan.h>
 
 #include "calib/compare/characteristics.h"
 #include "calib/compare/statistics.h"
@@ -18,8 +18,6 @@
 
 namespace toftwin::compare {
 namespace {
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 class ClientFeed final : public Feed {
  public:

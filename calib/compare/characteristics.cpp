@@ -5,15 +5,13 @@
 #include <array>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <numeric>
 
 #include <fmt/format.h>
+#include <toftwin/nan.h>
 
 namespace toftwin::compare {
 namespace {
-
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 bool isValidInBoth(const PoseComparison& pose, std::size_t pixel) {
   return pose.valid_a[pixel] >= 0.5F && pose.valid_b[pixel] >= 0.5F;  // false for NaN

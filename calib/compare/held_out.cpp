@@ -13,10 +13,10 @@
 namespace toftwin::compare {
 namespace {
 
-using Matrix = std::vector<std::vector<double>>;
+using SquareMatrix = std::vector<std::vector<double>>;
 
 /// Solves the symmetric positive system a x = b by Cholesky's factors.
-std::vector<double> solvePositive(Matrix a, std::vector<double> b) {
+std::vector<double> solvePositive(SquareMatrix a, std::vector<double> b) {
   const std::size_t n = b.size();
   for (std::size_t i = 0; i < n; ++i) {
     for (std::size_t j = 0; j <= i; ++j) {
@@ -41,7 +41,7 @@ std::vector<double> solvePositive(Matrix a, std::vector<double> b) {
 std::vector<double> solveRows(std::span<const double> y, std::span<const Term> terms,
                               const std::function<bool(std::size_t)>& uses) {
   const std::size_t n = terms.size();
-  Matrix normal(n, std::vector<double>(n));
+  SquareMatrix normal(n, std::vector<double>(n));
   std::vector<double> right(n);
   for (std::size_t row = 0; row < y.size(); ++row) {
     if (!uses(row)) continue;
@@ -147,7 +147,7 @@ std::vector<double> minimise(std::span<const double> y, std::span<const Bounded>
         slope.column[row] = (slope.column[row] - prediction[row]) / step;
       slopes.push_back(std::move(slope));
     }
-    Matrix normal(numbers.size(), std::vector<double>(numbers.size()));
+    SquareMatrix normal(numbers.size(), std::vector<double>(numbers.size()));
     std::vector<double> right(numbers.size());
     for (std::size_t row = 0; row < y.size(); ++row) {
       if (!uses(row)) continue;

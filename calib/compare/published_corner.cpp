@@ -12,7 +12,7 @@
 namespace toftwin::compare {
 namespace {
 
-constexpr double kAlbedo = 0.9;
+constexpr double kBoardAlbedo = 0.9;
 constexpr std::size_t kEveryRay = 8;
 
 struct Variant {
@@ -48,10 +48,10 @@ Result<OwnLine> ours(double effort, int max_surfaces) {
   const SymmetricCorner corner;
   const double z = 1e3 * corner.depth_m, x = 1e3 * corner.board_m / std::sqrt(2.0);
   const double height = 1e3 * corner.height_m;
-  const auto scene = sim::Scene::parse(materialToml("board", kAlbedo) +
-                                           wallToml({-x, z - x, 0.0, z, height, "board"}) +
-                                           wallToml({0.0, z, x, z - x, height, "board"}),
-                                       "corner.toml");
+  const auto scene =
+      sim::Scene::parse(materialToml("board", kBoardAlbedo) + wallToml({-x, z - x, 0.0, z, height, "board"}) +
+                            wallToml({0.0, z, x, z - x, height, "board"}),
+                        "corner.toml");
   if (!scene) return scene.error();
   sim::TraceRequest request = publishedCamera(16.0 * effort);
   request.pixel_extent = 0.0;
@@ -83,7 +83,7 @@ Result<OwnLine> ours(double effort, int max_surfaces) {
 
 CornerTrace traceOf(const Variant& variant, double effort) {
   CornerTrace trace;
-  trace.material = {.albedo = kAlbedo, .roughness = variant.roughness};
+  trace.material = {.albedo = kBoardAlbedo, .roughness = variant.roughness};
   trace.max_surfaces = variant.max_surfaces;
   trace.paths = std::max(64, static_cast<int>(16384 * effort));
   return trace;

@@ -8,14 +8,13 @@
 #include <numeric>
 
 #include <fmt/format.h>
+#include <toftwin/nan.h>
 
 #include "calib/compare/csv.h"
 #include "calib/compare/statistics.h"
 
 namespace toftwin::compare {
 namespace {
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// Orthogonal regression in two dimensions: the direction of largest variance is the line's.
 PlanarLine totalLeastSquares(const std::vector<double>& x, const std::vector<double>& z) {

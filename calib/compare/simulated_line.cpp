@@ -4,18 +4,16 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <limits>
 #include <numbers>
 
 #include <fmt/format.h>
+#include <toftwin/nan.h>
 
 #include "calib/compare/statistics.h"
 #include "sim/tracer/trace.h"
 
 namespace toftwin::compare {
 namespace {
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// So many rows above and below its own does a camera's decoder look at: its filters and their edge test.
 constexpr int kRowsBeside = 2;

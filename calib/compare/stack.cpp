@@ -3,14 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include <fmt/format.h>
+#include <toftwin/nan.h>
 
 namespace toftwin::compare {
 namespace {
-
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 Image<float> rangePerDepth(const CameraInfo& camera) {
   Image<float> factor(camera.width, camera.height);

@@ -3,11 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+
+#include <toftwin/nan.h>
 
 namespace toftwin::compare {
 namespace {
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// The largest clusteredError over blocks of 1, 2, 4, … in each direction of an image of that width.
 double blockedError(std::span<const double> values, std::size_t width) {

@@ -22,9 +22,9 @@ namespace {
 constexpr std::size_t kFewestRows = 20, kMostWords = 12;
 
 /// Reads columns of a CsvTable; errors name file and line.
-class Columns {
+class NamedColumns {
  public:
-  Columns(const CsvTable& table, const std::filesystem::path& file) : table_(table), file_(file) {}
+  NamedColumns(const CsvTable& table, const std::filesystem::path& file) : table_(table), file_(file) {}
 
   [[nodiscard]] std::optional<std::size_t> find(const std::string& name) const {
     const auto at = std::ranges::find(table_.header, name);
@@ -84,7 +84,7 @@ std::vector<int> numbered(const std::vector<std::string>& words, std::vector<std
   return numbers;
 }
 
-Result<> readErrors(const Columns& columns, const Roles& roles, TableData& data) {
+Result<> readErrors(const NamedColumns& columns, const Roles& roles, TableData& data) {
   if (!roles.error.empty()) {
     auto error = columns.numbers(roles.error);
     if (!error) return error.error();
@@ -108,7 +108,8 @@ Result<> readErrors(const Columns& columns, const Roles& roles, TableData& data)
   return {};
 }
 
-Result<> readCovariate(const Columns& columns, const std::string& name, MapNature said, TableData& data) {
+Result<> readCovariate(const NamedColumns& columns, const std::string& name, MapNature said,
+                       TableData& data) {
   if (!columns.find(name)) return columns.missing(name);
   TableCovariate covariate{name, natureOf(name, said), {}, {}};
   const bool is_text = columns.isText(name);
@@ -179,7 +180,7 @@ double periodIn(Frequency modulation, const std::string& unit) {
   return metres * (found == per_metre.end() ? 1.0 : found->second);
 }
 
-Result<> readGroups(const Columns& columns, const Roles& roles, TableData& data) {
+Result<> readGroups(const NamedColumns& columns, const Roles& roles, TableData& data) {
   if (!roles.sigma.empty()) {
     auto sigma = columns.numbers(roles.sigma);
     if (!sigma) return sigma.error();
@@ -221,7 +222,7 @@ void note(const Roles& roles, std::size_t before, TableData& data) {
 }  // namespace
 
 Result<TableData> readTable(const CsvTable& table, const TableMap& map, const std::filesystem::path& file) {
-  const Columns columns{table, file};
+  const NamedColumns columns{table, file};
   const auto roles = rolesOf(table.header, map, file);
   if (!roles) return roles.error();
   TableData data;

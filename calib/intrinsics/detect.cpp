@@ -12,18 +12,12 @@
 #include <span>
 
 #include "calib/intrinsics/charuco.h"
+#include "calib/intrinsics/median.h"
 
 namespace toftwin::intrinsics {
 namespace {
 
 using Pixels = std::vector<Pixel>;
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// How an image is shown to the search: brightness to the power `gamma`, enlarged.
 struct Look {

@@ -6,16 +6,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calib/intrinsics/median.h"
 #include "calib/intrinsics/model_choice.h"
 
 namespace toftwin::intrinsics {
 namespace {
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// The views that still count, with their place among the sightings.
 struct Working {

@@ -9,7 +9,7 @@
 namespace toftwin::intrinsics {
 namespace {
 
-constexpr int kFewest = 3, kMost = 100;  // fewer corners do not tell lines from chance
+constexpr int kFewestCorners = 3, kMostCorners = 100;  // fewer corners do not tell lines from chance
 
 std::optional<int> numberOf(std::string_view text) {
   int value = 0;
@@ -31,10 +31,11 @@ Result<Target> targetOf(std::string_view columns_by_rows, Length square) {
                              "for 9 x 6 squares",
                              columns_by_rows)};
   }
-  if (*columns < kFewest || *rows < kFewest || *columns > kMost || *rows > kMost) {
+  if (*columns < kFewestCorners || *rows < kFewestCorners || *columns > kMostCorners ||
+      *rows > kMostCorners) {
     return Error{Error::Code::InvalidArgument,
                  fmt::format("the board has {} x {} inner corners, but needs {} to {} each way", *columns,
-                             *rows, kFewest, kMost)};
+                             *rows, kFewestCorners, kMostCorners)};
   }
   if (!(square > 0_mm)) {
     return Error{Error::Code::InvalidArgument,

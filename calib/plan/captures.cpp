@@ -9,13 +9,13 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <toftwin/nan.h>
 
 #include "calib/plan/place.h"
 
 namespace toftwin::plan {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 /// A drawn order in which nothing goes with time by more is good enough; else the best of so many.
 constexpr double kGoodOrder = 0.2;
 constexpr int kOrders = 500;

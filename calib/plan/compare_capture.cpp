@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include <fmt/format.h>
+#include <toftwin/nan.h>
 
 #include "calib/compare/stack.h"
 #include "calib/plan/compare_run.h"
@@ -87,7 +87,6 @@ void summarise(const PoseComparison& all, ComparedCapture& one) {
     if (all.amplitude_ratio.empty() || !std::isfinite(all.amplitude_ratio[i])) continue;
     amplitude_b.push_back(amplitude_a.back() * static_cast<double>(all.amplitude_ratio[i]));
   }
-  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   const bool has_any = difference.n() > 0;
   one.pixels = difference.n();
   one.difference_mm = has_any ? difference.mean() : kNaN, one.range_a_mm = has_any ? range.mean() : kNaN;

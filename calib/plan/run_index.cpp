@@ -6,10 +6,10 @@
 #include <array>
 #include <cmath>
 #include <fstream>
-#include <limits>
 #include <memory>
 
 #include <fmt/format.h>
+#include <toftwin/nan.h>
 
 #include "calib/compare/json.h"
 #include "calib/compare/json_parse.h"
@@ -19,8 +19,6 @@ namespace toftwin::plan {
 namespace {
 
 using compare::Json;
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 Json toJson(const RecordedFile& file, const TakenBy& by) {
   Json temperatures = Json::object();

@@ -6,6 +6,8 @@
 #include <limits>
 #include <numbers>
 
+#include <toftwin/nan.h>
+
 #include "drivers/sim/view.h"
 #include "sim/sensor/collect_moving.h"
 #include "sim/tracer/objects.h"
@@ -15,8 +17,6 @@ namespace toftwin::suit {
 namespace {
 
 using drivers::simulator::View;
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 sim::Motion motionOf(const StationSpec& pose, double sign) {
   constexpr double kRadian = std::numbers::pi / 180.0;

@@ -3,8 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <set>
+
+#include <toftwin/nan.h>
 
 #include "calib/suit/suit.h"
 
@@ -102,7 +103,6 @@ Spoiler spoilerOf(const RequirementSpec& requirement, std::size_t r, const std::
     hidden += !std::isnan(with) && std::isnan(left) ? 1 : 0;
     if (!std::isnan(with) && !std::isnan(left)) gains.push_back(left - with);
   }
-  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   const Estimate untold{.value = kNaN, .low = kNaN, .high = kNaN, .repeats = 0};
   const Verdict then = verdictOf(requirement, estimateAt(requirement, without, r));
   return {.what = name,
@@ -115,7 +115,7 @@ Spoiler spoilerOf(const RequirementSpec& requirement, std::size_t r, const std::
 
 /// What gives a value at all is before what gains, and of it what is met; what cannot be told (nothing valid
 /// in either) is last.
-double rankOf(const Spoiler& one) {
+double spoilerRank(const Spoiler& one) {
   if (one.is_valid_only_without) return one.is_met_without ? -2e300 : -1e300;
   return std::isnan(one.gain.value) ? 1e300 : -one.gain.value;
 }
@@ -149,7 +149,7 @@ Result<std::vector<std::vector<Spoiler>>> spoilersOf(const Case& use, const sim:
                                       at(part, use, worst, (*values)[v]), level));
     }
     // "all of these" keeps its place at the end.
-    std::ranges::stable_sort(spoilers[r].begin(), spoilers[r].end() - 1, {}, rankOf);
+    std::ranges::stable_sort(spoilers[r].begin(), spoilers[r].end() - 1, {}, spoilerRank);
   }
   return spoilers;
 }

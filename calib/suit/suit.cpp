@@ -10,10 +10,11 @@
 #include <numbers>
 #include <tuple>
 
+#include <toftwin/nan.h>
+
 namespace toftwin::suit {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 /// Numbers of the simulations that choose exposure and mode; those that judge have others.
 constexpr int kFirstTry = 1000;
 
@@ -196,7 +197,7 @@ Result<std::vector<std::size_t>> chosenCameras(const Case& use, const std::vecto
   return chosen;
 }
 
-auto rankOf(const CameraResult& camera) {
+auto cameraRank(const CameraResult& camera) {
   return std::tuple{!camera.cannot.empty(), camera.failed + camera.unknown, camera.shortfall, -camera.worst};
 }
 
@@ -279,7 +280,7 @@ Result<Suit> judge(const Case& use, const SuitOptions& options, compare::Progres
     return Error{Error::Code::InvalidArgument, fmt::format("{}: no camera can be judged. {}: {}",
                                                            use.file.string(), first.name, first.cannot)};
   }
-  std::ranges::stable_sort(suit.cameras, {}, rankOf);
+  std::ranges::stable_sort(suit.cameras, {}, cameraRank);
   return suit;
 }
 

@@ -6,13 +6,13 @@
 #include <cmath>
 #include <limits>
 
+#include <toftwin/nan.h>
+
 #include "calib/compare/statistics.h"
 #include "calib/compare/traits/least_squares.h"
 
 namespace toftwin::suit {
 namespace {
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 bool isInside(const RegionSpec& region, Vec3f point) {
   const std::array at{static_cast<double>(point.x), static_cast<double>(point.y),

@@ -16,7 +16,7 @@
 namespace toftwin::daemon {
 namespace {
 
-constexpr std::chrono::seconds kPause{1};
+constexpr std::chrono::seconds kStartPause{1};
 
 std::string nameOf(const FacadeKeys& keys) { return fmt::format("facade {} of {}", keys.kind, keys.source); }
 
@@ -86,7 +86,7 @@ void Facades::startThoseThatAreNot() {
     is_one_missing |= !one.facade;
   }
   if (!is_one_missing) return;
-  pause_.expires_after(kPause);
+  pause_.expires_after(kStartPause);
   pause_.async_wait([this](boost::system::error_code cancelled) {
     if (!cancelled) startThoseThatAreNot();
   });

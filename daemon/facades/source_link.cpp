@@ -8,7 +8,7 @@
 namespace toftwin::daemon {
 namespace {
 
-constexpr std::chrono::milliseconds kPause{200};
+constexpr std::chrono::milliseconds kLinkPause{200};
 
 }  // namespace
 
@@ -95,7 +95,7 @@ void SourceLink::unsubscribe() {
 }
 
 void SourceLink::tryAgain() {
-  pause_.expires_after(kPause);
+  pause_.expires_after(kLinkPause);
   pause_.async_wait([this, alive = is_alive_](boost::system::error_code cancelled) {
     if (!cancelled && *alive) subscribe();
   });

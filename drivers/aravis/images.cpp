@@ -13,7 +13,7 @@ namespace {
 
 using Element = PixelFormat::Element;
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
-constexpr std::int64_t kLargestSide = 65'535;  // of any part, so that products fit 64 bits
+constexpr std::int64_t kLargestPartSide = 65'535;  // of any part, so that products fit 64 bits
 
 constexpr unsigned bit(PixelFlag flag) { return static_cast<unsigned>(flag); }
 
@@ -42,9 +42,9 @@ std::uint64_t bytesNeeded(const Part& part, const PixelFormat& format) {
 }
 
 Result<> checkBytes(const Part& part, const PixelFormat& format) {
-  const bool has_sides = part.width > 0 && part.height > 0 && part.width <= kLargestSide &&
-                         part.height <= kLargestSide && part.row_padding >= 0 &&
-                         part.row_padding <= kLargestSide;
+  const bool has_sides = part.width > 0 && part.height > 0 && part.width <= kLargestPartSide &&
+                         part.height <= kLargestPartSide && part.row_padding >= 0 &&
+                         part.row_padding <= kLargestPartSide;
   if (!has_sides) {
     return Error{Error::Code::Malformed,
                  fmt::format("aravis: an image of {} x {} pixels with {} bytes after each row",

@@ -24,7 +24,7 @@ using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
 constexpr milliseconds kSlice{10};    ///< the library's wait cannot be interrupted
-constexpr milliseconds kAnswer{300};  ///< a camera that does not answer so soon is gone
+constexpr milliseconds kAliveWithin{300};  ///< a camera that does not answer so soon is gone
 constexpr milliseconds kLeastSilence{
     400};                                 ///< until a camera that streams is asked whether it lives
 constexpr int kMostBadFrames = 10;        ///< in a row, until the camera is opened anew
@@ -258,7 +258,7 @@ class AravisSource final : public Source {
     const auto silence = std::max<std::chrono::duration<double>>(kLeastSilence, 4.0 * interval);
     if (!connection_.isLost() && now - asked_at_ < silence) return std::nullopt;
     asked_at_ = now;
-    auto alive = connection_.check(kAnswer);
+    auto alive = connection_.check(kAliveWithin);
     if (!alive) return alive.error();
     return std::nullopt;
   }

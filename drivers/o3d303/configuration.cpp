@@ -113,7 +113,7 @@ Result<Configuration> configureBy(Rpc& rpc, const std::string& password,
   return readAll(*session);
 }
 
-std::string textOf(const std::map<std::string, std::string>& texts, const char* name) {
+std::string valueOf(const std::map<std::string, std::string>& texts, const char* name) {
   const auto found = texts.find(name);
   return found == texts.end() ? std::string{} : found->second;
 }
@@ -161,7 +161,7 @@ Wanted changesFor(const Keys& keys, const Configuration& now) {
   }
   // The type first: what else there is to set depends on it.
   if (keys.measuring_range != MeasuringRange::AsSet || keys.exposures != Exposures::AsSet) {
-    all.imager.emplace_back("Type", imagerType(keys, textOf(now.imager, "Type")));
+    all.imager.emplace_back("Type", imagerType(keys, valueOf(now.imager, "Type")));
   }
   if (keys.exposure > 0_us) {
     all.imager.emplace_back("ExposureTime", fmt::format("{:.0f}", keys.exposure.in(microsecond)));
@@ -172,10 +172,10 @@ Wanted changesFor(const Keys& keys, const Configuration& now) {
   if (keys.channel >= 0) all.imager.emplace_back("Channel", std::to_string(keys.channel));
   // What is as wanted already is not written: writing wears the camera's memory out.
   std::erase_if(all.application, [&](const auto& change) {
-    return textOf(now.application, change.first.c_str()) == change.second;
+    return valueOf(now.application, change.first.c_str()) == change.second;
   });
   std::erase_if(all.imager, [&](const auto& change) {
-    return textOf(now.imager, change.first.c_str()) == change.second;
+    return valueOf(now.imager, change.first.c_str()) == change.second;
   });
   return all;
 }

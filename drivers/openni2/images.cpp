@@ -7,13 +7,12 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
-#include <limits>
 #include <utility>
+
+#include <toftwin/nan.h>
 
 namespace toftwin::drivers::openni2 {
 namespace {
-
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 int bytesPerPixel(int format) {
   return format == ONI_PIXEL_FORMAT_GRAY8 ? 1 : format == ONI_PIXEL_FORMAT_RGB888 ? 3 : 2;

@@ -5,18 +5,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include <toftwin/image.h>
 #include <toftwin/names.h>
+#include <toftwin/nan.h>
 
 #include "protocol/settings/describe.h"
 
 namespace toftwin::drivers::pattern {
 namespace {
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr auto kInvalidFlags = static_cast<std::uint8_t>(
     static_cast<unsigned>(PixelFlag::Invalid) | static_cast<unsigned>(PixelFlag::LowAmplitude));
 constexpr int kMostSpeed_px = 64;

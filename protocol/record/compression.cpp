@@ -12,7 +12,7 @@
 namespace toftwin::record {
 namespace {
 
-Error malformed(std::string what) { return {Error::Code::Malformed, std::move(what)}; }
+Error malformedChunk(std::string what) { return {Error::Code::Malformed, std::move(what)}; }
 
 /// What one step of a decoder did.
 struct Step {
@@ -42,11 +42,11 @@ Result<std::vector<std::byte>> decodeStepwise(std::span<const std::byte> bytes, 
     done = did->done;
     const bool can_grow = filled == out.size() && filled < size;
     if (!done && did->consumed == 0 && did->produced == 0 && !can_grow) {
-      return malformed(bytes.empty() ? "ends early" : "holds more than it says");
+      return malformedChunk(bytes.empty() ? "ends early" : "holds more than it says");
     }
   }
   if (filled != size || !bytes.empty()) {
-    return malformed(fmt::format("holds {} bytes, but says {}", filled, size));
+    return malformedChunk(fmt::format("holds {} bytes, but says {}", filled, size));
   }
   return out;
 }
@@ -61,8 +61,7 @@ Result<std::vector<std::byte>> decompressZstd(std::span<const std::byte> bytes,
         ZSTD_inBuffer from{in.data(), in.size(), 0};
         ZSTD_outBuffer to{out.data(), out.size(), 0};
         const std::size_t hint = ZSTD_decompressStream(context.get(), &to, &from);
-        if (ZSTD_isError(hint) != 0)
-          return malformed(fmt::format("zstd: {}", ZSTD_getErrorName(hint)));
+        if (ZSTD_isError(hint) != 0) return malformedChunk(fmt::format("zstd: {}", ZSTD_getErrorName(hint)));
         // More frames may follow in one chunk; the end is where the input ends.
         return Step{from.pos, to.pos, hint == 0 && from.pos == in.size()};
       });
@@ -80,8 +79,7 @@ Result<std::vector<std::byte>> decompressLz4(std::span<const std::byte> bytes, s
         std::size_t consumed = in.size(), produced = out.size();
         const std::size_t hint =
             LZ4F_decompress(context.get(), out.data(), &produced, in.data(), &consumed, nullptr);
-        if (LZ4F_isError(hint) != 0)
-          return malformed(fmt::format("lz4: {}", LZ4F_getErrorName(hint)));
+        if (LZ4F_isError(hint) != 0) return malformedChunk(fmt::format("lz4: {}", LZ4F_getErrorName(hint)));
         return Step{consumed, produced, hint == 0 && consumed == in.size()};
       });
 }
@@ -112,7 +110,7 @@ Result<std::vector<std::byte>> decompress(std::string_view compression,
                              compression.substr(0, 32))};
   }
   if (bytes.size() != size) {
-    return malformed(fmt::format("holds {} bytes, but says {}", bytes.size(), size));
+    return malformedChunk(fmt::format("holds {} bytes, but says {}", bytes.size(), size));
   }
   return std::vector<std::byte>(bytes.begin(), bytes.end());
 }

@@ -10,7 +10,7 @@
 namespace toftwin::wire {
 namespace {
 
-Error malformed(std::string what) {
+Error malformedHeader(std::string what) {
   return {Error::Code::Malformed, "malformed message: " + std::move(what)};
 }
 
@@ -205,13 +205,13 @@ Buffer aligned(Buffer body) {
 /// What the header says, with a frame's planes without their data.
 Result<Message> readHeader(Checks& checks, const fb::Header& header, std::uint64_t body_bytes) {
   const auto message_id = static_cast<std::size_t>(header.message_type());
-  if (message_id == 0 || header.message() == nullptr) return malformed("it holds no message");
+  if (message_id == 0 || header.message() == nullptr) return malformedHeader("it holds no message");
   if (message_id > kReaders.size()) {
     return Error{Error::Code::Unsupported,
                  "message id " + std::to_string(message_id) + " is not known to this side"};
   }
   const bool is_frame = header.message_type() == fb::Body::Frame;
-  if (!is_frame && body_bytes != 0) return malformed("a body follows a message that has none");
+  if (!is_frame && body_bytes != 0) return malformedHeader("a body follows a message that has none");
   Message message = is_frame ? readFrame(checks, *header.message_as_Frame(), body_bytes)
                              : kReaders[message_id - 1](checks, header);
   if (checks.failed()) return checks.error();
@@ -239,25 +239,25 @@ Result<Message> decode(const Preamble& preamble, std::span<const std::byte> head
 Result<Message> decode(const Preamble& preamble, std::span<const std::byte> header, Buffer body,
                        std::uint32_t body_crc32c) {
   if (header.size() != preamble.header_bytes || body.size() != preamble.body_bytes) {
-    return malformed("header or body do not have the announced length");
+    return malformedHeader("header or body do not have the announced length");
   }
-  if (crc32c(header) != preamble.header_crc32c) return malformed("the header's checksum is wrong");
-  if (body_crc32c != preamble.body_crc32c) return malformed("the body's checksum is wrong");
+  if (crc32c(header) != preamble.header_crc32c) return malformedHeader("the header's checksum is wrong");
+  if (body_crc32c != preamble.body_crc32c) return malformedHeader("the body's checksum is wrong");
   const AlignedHeader aligned_header{header};
   const fb::Header* root = aligned_header.verified();
-  if (!root) return malformed("the header is not what the schema says");
+  if (!root) return malformedHeader("the header is not what the schema says");
   return readMessage(*root, std::move(body));
 }
 
 Result<Message> decode(Buffer bytes, const Limits& limits) {
-  if (bytes.size() < kPreambleSize) return malformed("it ends within the preamble");
+  if (bytes.size() < kPreambleSize) return malformedHeader("it ends within the preamble");
   const auto preamble = decodePreamble(bytes.bytes().first<kPreambleSize>(), limits);
   if (!preamble) return preamble.error();
-  if (preamble->body_place != BodyPlace::Inline) return malformed("its body is elsewhere");
+  if (preamble->body_place != BodyPlace::Inline) return malformedHeader("its body is elsewhere");
   const std::uint64_t expected = kPreambleSize + preamble->header_bytes + preamble->body_bytes;
   if (bytes.size() != expected) {
-    return malformed("it has " + std::to_string(bytes.size()) + " bytes, not the announced " +
-                     std::to_string(expected));
+    return malformedHeader("it has " + std::to_string(bytes.size()) + " bytes, not the announced " +
+                           std::to_string(expected));
   }
   return decode(*preamble, bytes.bytes().subspan(kPreambleSize, preamble->header_bytes),
                 bytes.part(kPreambleSize + preamble->header_bytes, preamble->body_bytes));

@@ -158,7 +158,7 @@ std::uint64_t idOf(const M& message) {
   return 0;
 }
 
-Error tooLarge(const std::string& part, std::uint64_t bytes, std::uint64_t limit) {
+Error tooLargeToSend(const std::string& part, std::uint64_t bytes, std::uint64_t limit) {
   return {Error::Code::TooLarge, "this message cannot be sent: its " + part + " has " +
                                      std::to_string(bytes) + " bytes, the limit is " +
                                      std::to_string(limit)};
@@ -168,13 +168,14 @@ Error tooLarge(const std::string& part, std::uint64_t bytes, std::uint64_t limit
 template <class M>
 Result<Encoded> encodeAs(std::uint8_t message_id, const M& message, Body body) {
   constexpr Limits kLimits;
-  if (body.bytes > kLimits.body_bytes) return tooLarge("body", body.bytes, kLimits.body_bytes);
+  if (body.bytes > kLimits.body_bytes) return tooLargeToSend("body", body.bytes, kLimits.body_bytes);
   Builder builder{1024};
   const auto table = write(builder, message);
   FinishHeaderBuffer(builder, fb::CreateHeader(builder, idOf(message),
                                                static_cast<fb::Body>(message_id), table.Union()));
   const std::size_t header_bytes = paddedToAlignment(builder.GetSize());
-  if (header_bytes > kLimits.header_bytes) return tooLarge("header", header_bytes, kLimits.header_bytes);
+  if (header_bytes > kLimits.header_bytes)
+    return tooLargeToSend("header", header_bytes, kLimits.header_bytes);
   Encoded encoded{std::vector<std::byte>(kPreambleSize + header_bytes), std::move(body)};
   std::memcpy(encoded.head.data() + kPreambleSize, builder.GetBufferPointer(), builder.GetSize());
   const auto header = std::span{encoded.head}.subspan(kPreambleSize);

@@ -33,7 +33,7 @@ void store(std::span<std::byte, kPreambleSize> bytes, std::size_t at, T value) {
   std::memcpy(bytes.data() + at, &value, sizeof value);
 }
 
-Error malformed(std::string what) {
+Error malformedPreamble(std::string what) {
   return {Error::Code::Malformed, "not a toftwin message: " + std::move(what)};
 }
 
@@ -63,7 +63,7 @@ std::array<std::byte, kPreambleSize> encodePreamble(const Preamble& preamble) {
 Result<Preamble> decodePreamble(std::span<const std::byte, kPreambleSize> bytes,
                                 const Limits& limits) {
   if (std::memcmp(bytes.data(), kMagic.data(), kMagic.size()) != 0) {
-    return malformed("the magic is missing; is the other side a toftwin program?");
+    return malformedPreamble("the magic is missing; is the other side a toftwin program?");
   }
   Preamble preamble;
   preamble.major = load<std::uint16_t>(bytes, kMajorAt);
@@ -75,7 +75,7 @@ Result<Preamble> decodePreamble(std::span<const std::byte, kPreambleSize> bytes,
                      std::to_string(kVersionMajor) + ".x: update the older of the two"};
   }
   if (load<std::uint32_t>(bytes, kPreambleCrcAt) != crc32c(bytes.first<kPreambleCrcAt>())) {
-    return malformed("the preamble's checksum is wrong");
+    return malformedPreamble("the preamble's checksum is wrong");
   }
   preamble.header_bytes = load<std::uint32_t>(bytes, kHeaderBytesAt);
   preamble.body_bytes = load<std::uint64_t>(bytes, kBodyBytesAt);
@@ -83,20 +83,20 @@ Result<Preamble> decodePreamble(std::span<const std::byte, kPreambleSize> bytes,
   preamble.body_crc32c = load<std::uint32_t>(bytes, kBodyCrcAt);
   const auto place = load<std::uint32_t>(bytes, kBodyPlaceAt);
   if (place > static_cast<std::uint32_t>(BodyPlace::Memfd)) {
-    return malformed("the body's place is " + std::to_string(place) + ", which is not known");
+    return malformedPreamble("the body's place is " + std::to_string(place) + ", which is not known");
   }
   preamble.body_place = static_cast<BodyPlace>(place);
   const auto reserved = bytes.subspan(kReservedAt, kPreambleCrcAt - kReservedAt);
   if (std::ranges::any_of(reserved, [](std::byte b) { return b != std::byte{0}; })) {
-    return malformed("a reserved byte of the preamble is not zero");
+    return malformedPreamble("a reserved byte of the preamble is not zero");
   }
   if (preamble.header_bytes == 0 || preamble.header_bytes % kAlignment != 0) {
-    return malformed("a header of " + std::to_string(preamble.header_bytes) +
-                     " bytes is not a multiple of 64 above 0");
+    return malformedPreamble("a header of " + std::to_string(preamble.header_bytes) +
+                             " bytes is not a multiple of 64 above 0");
   }
   if (preamble.body_bytes % kAlignment != 0) {
-    return malformed("a body of " + std::to_string(preamble.body_bytes) +
-                     " bytes is not a multiple of 64");
+    return malformedPreamble("a body of " + std::to_string(preamble.body_bytes) +
+                             " bytes is not a multiple of 64");
   }
   if (preamble.header_bytes > limits.header_bytes) {
     return tooLarge("header", preamble.header_bytes, limits.header_bytes);

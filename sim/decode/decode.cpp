@@ -3,9 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include <toftwin/frame.h>
+#include <toftwin/nan.h>
 
 #include "sim/decode/decode_steps.h"
 #include "sim/decode/demodulate.h"
@@ -17,7 +17,6 @@
 namespace toftwin::sim {
 namespace {
 
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 /// Decodes row by row; holds what all rows share.
 class Decoder {
  public:
@@ -68,7 +67,7 @@ class Decoder {
       raise(flags, PixelFlag::Asymmetric);
     const double range_m = measure(cycles, amplitudes, x, y, flags);
     if (std::isnan(range_m)) raise(flags, PixelFlag::Invalid);
-    result_.range_m(x, y) = has(flags, PixelFlag::Invalid) ? kNan : static_cast<float>(range_m);
+    result_.range_m(x, y) = has(flags, PixelFlag::Invalid) ? kNaN : static_cast<float>(range_m);
     result_.amplitude(x, y) = static_cast<float>(mean_amplitude);
     result_.flags(x, y) = flags;
   }
@@ -81,7 +80,7 @@ class Decoder {
     if (has(flags, PixelFlag::Saturated)) raise(flags, PixelFlag::Invalid);
     if (!(weakest > 0.0 && weakest >= settings_.minimum_amplitude)) {
       reject(flags, PixelFlag::LowAmplitude);
-      return static_cast<double>(kNan);
+      return static_cast<double>(kNaN);
     }
     const Unwrapped joined = unwrap_(cycles, amplitudes);
     if (joined.deviation_rad > settings_.unwrap_threshold.in(radian)) {

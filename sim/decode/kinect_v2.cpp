@@ -4,8 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <vector>
+
+#include <toftwin/nan.h>
 
 #include "sim/decode/decode_steps.h"
 #include "sim/decode/demodulate.h"
@@ -16,7 +17,6 @@ namespace toftwin::sim {
 namespace {
 
 constexpr std::size_t kFrequencies = 3;
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
 /// Holds what the steps hand on to each other.
 class KinectDecoder {
@@ -113,8 +113,7 @@ class KinectDecoder {
       std::uint8_t flags = samples_.flags.empty() ? std::uint8_t{0} : samples_.flags(column, y);
       const double range_m = measure(phase, counts, column, y, flags);
       if (std::isnan(range_m)) raise(flags, PixelFlag::Invalid);
-      result_.range_m(column, y) =
-          has(flags, PixelFlag::Invalid) ? kNan : static_cast<float>(range_m);
+      result_.range_m(column, y) = has(flags, PixelFlag::Invalid) ? kNaN : static_cast<float>(range_m);
       result_.flags(column, y) = flags;
       brightness_(column, y) = static_cast<float>(counts[0] + counts[1] + counts[2]);
     }
@@ -129,7 +128,7 @@ class KinectDecoder {
     if (!(weakest > 0.0 && weakest >= kinect_.least_counts &&
           counts[0] + counts[1] + counts[2] >= kinect_.least_sum_counts)) {
       reject(flags, PixelFlag::LowAmplitude);
-      return static_cast<double>(kNan);
+      return static_cast<double>(kNaN);
     }
     const Unwrapped joined = unwrapKinectV2(cycles[0], cycles[1], cycles[2], unit_m_);
     if (joined.deviation_rad > allowedDeviation(joined.deviation_rad, strongest)) {
@@ -167,7 +166,7 @@ class KinectDecoder {
     for (std::size_t i = 0; i < drops.size(); ++i) {
       if (drops[i] == 0) continue;
       reject(result_.flags[i], PixelFlag::Mixed);
-      result_.range_m[i] = kNan;
+      result_.range_m[i] = kNaN;
     }
   }
 

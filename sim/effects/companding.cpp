@@ -26,7 +26,7 @@ inline float changeOf(float difference, float counts_per_electron, float electro
   return std::copysign(kept, counts) * electrons_per_count - difference;
 }
 
-constexpr auto kSaturated = static_cast<std::uint8_t>(PixelFlag::Saturated);
+constexpr auto kSaturatedBit = static_cast<std::uint8_t>(PixelFlag::Saturated);
 
 /// Converts one row of two taps. What conversion takes off the difference goes to both alike, so that
 /// their sum stays.
@@ -36,7 +36,7 @@ TOFTWIN_SIMD void convertTwo(float* __restrict first, float* __restrict second, 
   for (int x = 0; x < width; ++x) {
     bool is_saturated = false;
     const float change = changeOf(first[x] - second[x], counts_per_electron, electrons_per_count, is_saturated);
-    flags[x] = static_cast<std::uint8_t>(flags[x] | (is_saturated ? kSaturated : 0));
+    flags[x] = static_cast<std::uint8_t>(flags[x] | (is_saturated ? kSaturatedBit : 0));
     first[x] += 0.5F * change;
     second[x] -= 0.5F * change;
   }
@@ -48,7 +48,7 @@ TOFTWIN_SIMD void convertOne(float* __restrict first, std::uint8_t* __restrict f
   for (int x = 0; x < width; ++x) {
     bool is_saturated = false;
     first[x] += changeOf(first[x], counts_per_electron, electrons_per_count, is_saturated);
-    flags[x] = static_cast<std::uint8_t>(flags[x] | (is_saturated ? kSaturated : 0));
+    flags[x] = static_cast<std::uint8_t>(flags[x] | (is_saturated ? kSaturatedBit : 0));
   }
 }
 

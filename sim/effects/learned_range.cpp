@@ -3,15 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+
+#include <toftwin/nan.h>
 
 #include "sim/effects/temperature.h"
 #include "sim/images/rows.h"
 
 namespace toftwin::sim {
 namespace {
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 bool ascends(const std::vector<double>& knots) {
   return std::ranges::adjacent_find(knots, std::greater_equal<>{}) == knots.end();

@@ -8,11 +8,11 @@ namespace toftwin::sim {
 namespace {
 
 TOFTWIN_SIMD void cut(float* __restrict electrons, std::uint8_t* __restrict flags, int width, float well) {
-  constexpr auto kSaturated = static_cast<std::uint8_t>(PixelFlag::Saturated);
+  constexpr auto kFull = static_cast<std::uint8_t>(PixelFlag::Saturated);
   for (int x = 0; x < width; ++x) {
     const bool is_full = electrons[x] > well;
     electrons[x] = is_full ? well : electrons[x];
-    flags[x] = static_cast<std::uint8_t>(flags[x] | (is_full ? kSaturated : 0));
+    flags[x] = static_cast<std::uint8_t>(flags[x] | (is_full ? kFull : 0));
   }
 }
 

@@ -3,13 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
+
+#include <toftwin/nan.h>
 
 namespace toftwin::sim {
 namespace {
 
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr double kJump = 0.05;  ///< share of the depth from which neighbours are two surfaces
 constexpr double kHidden =
     0.02;  ///< share of the depth; libfreenect2 takes 0.01 and spots slanted surfaces
@@ -103,7 +103,7 @@ float nearestAround(const Image<float>& depth_m, int u, int v) {
 
 Image<float> depthInColor(const LensPair& lenses, const DecodeRays& rays,
                           const Image<float>& range_m) {
-  Image<float> nearest_m{lenses.color.width, lenses.color.height, kNan};
+  Image<float> nearest_m{lenses.color.width, lenses.color.height, kNaN};
   SeenRow above = projectRow(lenses, rays, range_m, 0);
   for (int y = 1; y < range_m.height(); ++y) {
     SeenRow below = projectRow(lenses, rays, range_m, y);

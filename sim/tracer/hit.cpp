@@ -255,8 +255,6 @@ TrianglePlane planeOf(Vec3d v0, Vec3d v1, Vec3d v2) {
 
 namespace {
 
-Vec3d at(const Vec3Lanes& lanes, std::size_t i) { return {lanes.x[i], lanes.y[i], lanes.z[i]}; }
-
 /// Quadrics, and triangles next to their edges; in the object's frame if it moves.
 Contact contactByHand(const Scene::Impl& scene, const Packet& packet, const RTCRayHit16& rays, double distance,
                       std::size_t i) {

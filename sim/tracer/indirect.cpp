@@ -10,7 +10,6 @@
 namespace toftwin::sim {
 namespace {
 
-constexpr int kStep = CoarseGrid::kStep;
 /// Most samples in a coarse point's means; what moves in a scene leaves its light behind for so long.
 constexpr float kMostSamples = 128.0f, kMostWhereThingsMove = 64.0f;
 constexpr float kFewestSamples = 8.0f;
@@ -25,10 +24,10 @@ constexpr double kCellShare = 1.0 / 64.0;
 /// this many coarse points away at most, and faces the same way to this cosine.
 constexpr double kSamePlane = 0.005, kSamePlace = 2.0, kSameFacing = 0.8;
 
-int coarse(int size) { return (size + kStep - 2) / kStep + 1; }
+int coarse(int size) { return (size + CoarseGrid::kStep - 2) / CoarseGrid::kStep + 1; }
 
 /// Sums of a tile at (i, j) become means of the grid.
-void store(const Tile& tile, int i, int j, int samples, CoarseGrid& grid) {
+void store(const CoarseTile& tile, int i, int j, int samples, CoarseGrid& grid) {
   for (std::size_t lane = 0; lane < kLaneCount; ++lane) {
     const int u = i + static_cast<int>(lane % 4), v = j + static_cast<int>(lane / 4);
     if (u >= grid.width || v >= grid.height) continue;
@@ -104,15 +103,15 @@ class Past {
       if (!(place.z > 0.0)) return false;
       const auto [x, y] = pixelOfPoint(camera_, {place});
       if (!(std::abs(x) < 1e6) || !(std::abs(y) < 1e6)) return false;
-      old_u = static_cast<int>(std::lround(x / kStep));
-      old_v = static_cast<int>(std::lround(y / kStep));
+      old_u = static_cast<int>(std::lround(x / CoarseGrid::kStep));
+      old_v = static_cast<int>(std::lround(y / CoarseGrid::kStep));
     }
     if (old_u < 0 || old_v < 0 || old_u >= grid_.width || old_v >= grid_.height) return false;
     if (grid_.samples(old_u, old_v) == 0.0f) return false;
     const double range = norm(place);
     const Vec3d apart = placeOf(grid_, old_u, old_v) - place;
     return std::abs(dot(apart, normal)) <= kSamePlane * range &&
-           norm(apart) <= kSamePlace * kStep * range / camera_.fx &&
+           norm(apart) <= kSamePlace * CoarseGrid::kStep * range / camera_.fx &&
            dot(normalOf(grid_, old_u, old_v), normal) >= kSameFacing;
   }
 

@@ -11,7 +11,6 @@
 namespace toftwin::sim {
 namespace {
 
-constexpr int kStep = CoarseGrid::kStep;
 constexpr int kRadius = 3;       // of the smoothing, in coarse points
 constexpr float kSigma = 2.5f;   // of its Gaussian
 /// So far off a plane, and so far away at all, as shares of the range, weights are a quarter. The latter
@@ -150,8 +149,8 @@ void weighCorner(const CoarseGrid& grid, const BlockGeometry& pixels, int right,
   Lanes<float> weight;
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     const auto lane = static_cast<int>(i);
-    const float across = static_cast<float>(lane & 3) * (1.0f / kStep);
-    const float down = static_cast<float>(lane >> 2) * (1.0f / kStep);
+    const float across = static_cast<float>(lane & 3) * (1.0f / CoarseGrid::kStep);
+    const float down = static_cast<float>(lane >> 2) * (1.0f / CoarseGrid::kStep);
     const float linear = (right != 0 ? across : 1.0f - across) * (below != 0 ? down : 1.0f - down);
     const Facet p{pixels.x[i],        pixels.y[i],        pixels.z[i],
                   pixels.normal_x[i], pixels.normal_y[i], pixels.normal_z[i]};
@@ -195,7 +194,7 @@ IndirectLight::Spread::Spread(const Channels& channels, std::size_t frequencies)
 
 void IndirectLight::spread(const Tracing& tracing, int left, int top, const BlockGeometry& pixels,
                            Spread& out) const {
-  const int u = left / kStep, v = top / kStep;
+  const int u = left / CoarseGrid::kStep, v = top / CoarseGrid::kStep;
   const int right = std::min(u + 1, smooth_.width - 1), below = std::min(v + 1, smooth_.height - 1);
   std::array<Corner, 4> corners;
   Lanes<float> total, scale, scale2, one;

@@ -11,7 +11,6 @@
 namespace toftwin::sim {
 namespace {
 
-constexpr int kStep = CoarseGrid::kStep;
 /// Random dimensions of their own, beyond those of trace().
 constexpr std::uint32_t kBounce = 0x10000;
 
@@ -21,8 +20,8 @@ void prepareTile(const Tracing& tracing, int i, int j, Block& block) {
   Lanes<int> columns, rows;
   for (std::size_t lane = 0; lane < kLaneCount; ++lane) {
     const int l = static_cast<int>(lane);
-    columns[lane] = std::min((i + l % 4) * kStep, camera.width - 1);
-    rows[lane] = std::min((j + l / 4) * kStep, camera.height - 1);
+    columns[lane] = std::min((i + l % 4) * CoarseGrid::kStep, camera.width - 1);
+    rows[lane] = std::min((j + l / 4) * CoarseGrid::kStep, camera.height - 1);
     block.is_inside[lane] = -1;
     block.first_sample[lane] = 0;
     const PixelKey key = pixelKey(tracing.seed, static_cast<std::uint32_t>(columns[lane]),

@@ -14,7 +14,7 @@ struct CellUpdate {
 };
 
 /// Sixteen coarse points, 4 × 4.
-struct Tile {
+struct CoarseTile {
   Lanes<int> valid;
   Lanes<float> x, y, z, normal_x, normal_y, normal_z;
   std::vector<Lanes<double>> sums;     ///< by channel
@@ -29,7 +29,7 @@ class TileGatherer {
   /// The tile whose first point is (i, j): `samples` of each point, numbered from `first_sample` on; the
   /// first of them also looks further, for the cells.
   void gather(int i, int j, std::uint32_t first_sample, int samples, CellUpdate& update);
-  [[nodiscard]] const Tile& tile() const { return tile_; }
+  [[nodiscard]] const CoarseTile& tile() const { return tile_; }
 
  private:
   void lookFromCamera(int i, int j, Packet& camera_rays);
@@ -43,7 +43,7 @@ class TileGatherer {
   const Tracing& tracing_;
   const IrradianceCells& cells_;
   const Channels& channels_;
-  Tile tile_;
+  CoarseTile tile_;
   LaneSums sums_, further_;
   std::vector<Lanes<float>> found_;
   Hits hits_;

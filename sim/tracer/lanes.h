@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include <toftwin/geometry.h>
+
 #include "sim/tracer/embree.h"
 
 // A function whose loops over lanes are compiled for several generations of x86-64; the loader picks
@@ -47,6 +49,7 @@ TOFTWIN_INLINE double perNumber(double x) {
 struct Vec3Lanes {
   Lanes<double> x, y, z;
 };
+inline Vec3d at(const Vec3Lanes& lanes, std::size_t i) { return {lanes.x[i], lanes.y[i], lanes.z[i]}; }
 struct Vec3fLanes {
   Lanes<float> x, y, z;
 };

@@ -9,21 +9,21 @@
 namespace toftwin::sim {
 namespace {
 
-constexpr double kUnitRoundoff = 0x1p-24;  // of single precision
+constexpr double kHalfUlp = 0x1p-24;  // of single precision
 
 /// Stands for a quadric among the triangles: every ray counts as next to its edge, where the tracer
 /// looks more closely.
 constexpr TrianglePlane kNoTriangle{
     .normal = {0, 0, 1}, .level = 0.0, .offset = 0.0f, .margin = 0.0f, .margin_share = INFINITY};
 
-double largest(Vec3d v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); }
+double largestSize(Vec3d v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); }
 
 /// cast.cpp takes a ray that starts at p into an object's frame with Rᵀ (p − t), in single precision. Let
 /// D ≥ |p − t| for p on the object. t is rounded and the difference again: u (|t|∞ + D) per component. R's
 /// entries are rounded, and a component of the result sums three products: 4 u D more. As a distance:
 ///   √3 (√3 u (|t|∞ + D) + 4 u D) < 10 u D + 3 u |t|∞,    here with a fifth more.
 double blurOf(double reach, Vec3d translation) {
-  return kUnitRoundoff * (12.0 * std::sqrt(3.0) * reach + 4.0 * largest(translation));
+  return kHalfUlp * (12.0 * std::sqrt(3.0) * reach + 4.0 * largestSize(translation));
 }
 
 }  // namespace
@@ -45,7 +45,7 @@ void addPlanes(BuiltObject& object) {
 
 double reachOf(const BuiltObject& own) {
   double reach = own.quadric.radius + own.quadric.half_height;
-  for (const Vec3d& v : own.vertices) reach = std::max(reach, largest(v));
+  for (const Vec3d& v : own.vertices) reach = std::max(reach, largestSize(v));
   return reach;
 }
 

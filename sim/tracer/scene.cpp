@@ -92,8 +92,6 @@ Result<Image<float>> pictureOf(const NamedFile& file) {
   return picture;
 }
 
-Vec3d vectorOf(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
-
 }  // namespace
 
 Scene::Impl::~Impl() {
@@ -190,12 +188,12 @@ struct SceneBuilder {
       for (float& value : map.pixels()) value *= static_cast<float>(ambient.map_radiance);
       hash.add(map.pixels().data(), map.size() * sizeof(float));
     }
-    const Vec3d up = normalised(vectorOf(ambient.up)), ahead = vectorOf(ambient.ahead);
+    const Vec3d up = normalised(vec3Of(ambient.up)), ahead = vec3Of(ambient.ahead);
     Environment environment{
         std::move(map),
         up,
         normalised(ahead - up * dot(up, ahead)),
-        {normalised(vectorOf(ambient.sun_towards)), ambient.sun.in(kilolux)*ambient.sun_irradiance_per_klx}};
+        {normalised(vec3Of(ambient.sun_towards)), ambient.sun.in(kilolux)*ambient.sun_irradiance_per_klx}};
     if (!environment.isDark())
       scene->environment = std::make_shared<const Environment>(std::move(environment));
     scene->is_matt = scene->models.empty() && scene->textures.empty() && scene->environment == nullptr;

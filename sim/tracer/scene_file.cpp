@@ -37,10 +37,8 @@ Transform<World, Object> poseOf(const Spec& object, bool from_euler) {
   return pose;
 }
 
-Vec3d vectorOf(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
-
 void checkDirection(Table& table, const char* key, const std::array<double, 3>& direction) {
-  if (norm(vectorOf(direction)) < 1e-6) table.complain(key, "is zero, which is no direction");
+  if (norm(vec3Of(direction)) < 1e-6) table.complain(key, "is zero, which is no direction");
 }
 
 void checkOrientation(Table& table, const std::array<double, 4>& q) {
@@ -134,8 +132,8 @@ void readMaterials(Table& root, SceneFile& file) {
 
 /// How the object moves, by its steady rates or by its keyframes.
 Motion readMotion(Table& table, const ObjectSpec& object) {
-  Motion motion{.velocity_m_per_s = vectorOf(object.velocity_m_per_s),
-                .rotation_rad_per_s = vectorOf(object.rotation_rate_deg_per_s) * degree.in_si,
+  Motion motion{.velocity_m_per_s = vec3Of(object.velocity_m_per_s),
+                .rotation_rad_per_s = vec3Of(object.rotation_rate_deg_per_s) * degree.in_si,
                 .keys = {},
                 .period_s = object.period.in(second)};
   if (!table.has("keyframe")) {
@@ -175,8 +173,8 @@ void readAmbient(Table& root, SceneFile& file) {
   checkDirection(*table, "up", ambient.up);
   checkDirection(*table, "ahead", ambient.ahead);
   checkDirection(*table, "sun_towards", ambient.sun_towards);
-  const Vec3d across = cross(vectorOf(ambient.up), vectorOf(ambient.ahead));
-  if (norm(across) < 1e-3 * norm(vectorOf(ambient.up)) * norm(vectorOf(ambient.ahead))) {
+  const Vec3d across = cross(vec3Of(ambient.up), vec3Of(ambient.ahead));
+  if (norm(across) < 1e-3 * norm(vec3Of(ambient.up)) * norm(vec3Of(ambient.ahead))) {
     table->complain("ahead", "points along `up`: the map would have no direction");
   }
   for (const char* key : {"map_radiance_w_per_m2_sr", "up", "ahead"}) {

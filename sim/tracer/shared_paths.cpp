@@ -24,8 +24,8 @@ struct Starts {
 
 /// A part of the light that leaves a surface: what came to it from one direction. Phasors are of lengths from
 /// the surface on; the reflection's shape (material.h), which depends on where the light goes, is left out.
-struct Part {
-  explicit Part(std::size_t terms) : light(terms) {}
+struct LightPart {
+  explicit LightPart(std::size_t terms) : light(terms) {}
   Vec3Lanes from{};
   LaneSums light;
 };
@@ -33,12 +33,12 @@ struct Part {
 /// Where the paths arrived from the first surfaces, and the light that leaves these places. Lambertian
 /// surfaces don't care where light comes from: where all are, one part has it all.
 struct Ends {
-  Ends(std::size_t terms, std::size_t parts_count) : parts(parts_count, Part{terms}) {}
+  Ends(std::size_t terms, std::size_t parts_count) : parts(parts_count, LightPart{terms}) {}
   Lanes<int> valid{};
   Vec3Lanes position{}, normal{};
   Vec3fLanes start{};
   Lanes<float> emission{}, shape_a{}, shape_b{};
-  std::vector<Part> parts;  ///< of each emitter and, last, of all other surfaces; or one
+  std::vector<LightPart> parts;  ///< of each emitter and, last, of all other surfaces; or one
 };
 
 /// One of them.
@@ -167,7 +167,7 @@ bool isDark(const LaneSums& light, std::size_t lane) {
 
 bool isDark(const Ends& ends, std::size_t lane) {
   return ends.emission[lane] == 0.0f &&
-         std::ranges::all_of(ends.parts, [&](const Part& part) { return isDark(part.light, lane); });
+         std::ranges::all_of(ends.parts, [&](const LightPart& part) { return isDark(part.light, lane); });
 }
 
 /// The first surfaces of the block's sample: their own light, and who goes on from there.
@@ -209,7 +209,7 @@ void followInParts(const Tracing& tracing, Packet& packet, RTCRayHit16& rays, Hi
     }
   }
   const int surfaces = tracing.request.max_surfaces;
-  Part& rest = ends.parts.back();
+  LightPart& rest = ends.parts.back();
   if (surfaces == 2 && tracing.scene.ambient_radiance == 0.0f) return;
   bounce(hits, dimensions.bounce(1), 1 < kEvenBounces, packet);
   rest.from = packet.direction;
@@ -247,7 +247,7 @@ void follow(const Tracing& tracing, const Tile& tile, int sample, int block, con
     packet.throughput[i] = 1.0f;
     packet.length[i] = -hits.distance[i];
   }
-  for (Part& part : ends.parts) clearSums(part.light);
+  for (LightPart& part : ends.parts) clearSums(part.light);
   ends.emission = {};
   if (ends.parts.size() == 1) {
     followFrom(tracing, 1, packet, rays, hits, ends.parts[0].light);
@@ -304,7 +304,7 @@ void share(const Tracing& tracing, const Tiles& starts, const Ends& ends, std::s
     weigh(to[b], 1.0 / density, weight);
     for (std::size_t lane = 0; lane < kLaneCount; ++lane)
       lanes.ambient[lane] += weight[lane] * ends.emission[i];
-    for (const Part& part : ends.parts) {
+    for (const LightPart& part : ends.parts) {
       if (isDark(part.light, i)) continue;
       Lanes<float> shaped = weight;
       if (ends.parts.size() > 1)

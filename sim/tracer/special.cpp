@@ -13,7 +13,6 @@
 namespace toftwin::sim {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
 /// Further than any scene reaches: where shadow rays to the surroundings end.
 constexpr double kFarAway = 1e6;
 /// What the paths carry besides a Packet.
@@ -49,7 +48,6 @@ RandomPair drawn(const Packet& packet, std::size_t i, std::uint32_t dimension, b
                  : independentPair(packet.key(i), packet.index[i], dimension);
 }
 
-Vec3d at(const Vec3Lanes& lanes, std::size_t i) { return {lanes.x[i], lanes.y[i], lanes.z[i]}; }
 void put(Vec3d v, std::size_t i, Vec3Lanes& lanes) {
   lanes.x[i] = v.x;
   lanes.y[i] = v.y;
@@ -133,7 +131,7 @@ void addSeenEmitters(const Tracing& tracing, const Packet& packet, const RTCRayH
       const Vec3d beside = o + d * t - emitter.position;
       const bool is_hidden =
           rays.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID && t > static_cast<double>(rays.ray.tfar[i]);
-      if (!(t > 0.0) || is_hidden || dot(beside, beside) > emitter.area / kPi) continue;
+      if (!(t > 0.0) || is_hidden || dot(beside, beside) > emitter.area / std::numbers::pi) continue;
       const double radiance =
           emitter.intensity(lobe_cosine) / (emitter.area * std::max(1e-9, std::abs(lobe_cosine)));
       const double weight =
@@ -209,7 +207,7 @@ void gatherDirectLight(const Tracing& tracing, const Packet& packet, const Hits&
       const double distance = norm(way);
       const Towards towards = scatteredTowards(tracing, packet, hits, course, i, way / distance);
       const double cosine = dot(way, at(hits.normal, i)) / distance;
-      double factor = kPi * towards.value / cosine;
+      double factor = std::numbers::pi * towards.value / cosine;
       if (emitter.is_disc) {
         const double density = discDensity(emitter, distance, -dot(way, emitter.axis) / distance);
         factor *= heuristic(density, towards.density);
@@ -304,7 +302,7 @@ void bounceAll(const Tracing& tracing, const Hits& hits, int surface, Packet& pa
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     if (is_special[i] == 0) {
       course.way[i] = 0.0;
-      course.density[i] = std::max(0.0, dot(at(packet.direction, i), at(hits.normal, i))) / kPi;
+      course.density[i] = std::max(0.0, dot(at(packet.direction, i), at(hits.normal, i))) / std::numbers::pi;
       course.sees_emitters[i] = 0;
       continue;
     }

@@ -8,11 +8,10 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <toftwin/nan.h>
 
 namespace toftwin::compare {
 namespace {
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 TEST(Summary, OfFourNumbersIsWhatPaperGives) {
   // mean 2.5, Σ(v − 2.5)² = 5, so sd = √(5/3); mean square = 30/4.

@@ -22,7 +22,7 @@ using std::chrono::milliseconds;
 using Clock = std::chrono::steady_clock;
 
 // The controller's first port, and its first port of SuperSpeed.
-constexpr const char *kUri = "v4l2:usb-vhci_hcd.0-1", *kSuperUri = "v4l2:usb-vhci_hcd.0-9";
+constexpr const char *kUvcUri = "v4l2:usb-vhci_hcd.0-1", *kSuperUri = "v4l2:usb-vhci_hcd.0-9";
 
 bool isThere(const std::string& uri) {
   return std::ranges::count(drivers::v4l2::row().list(), uri) > 0;
@@ -38,7 +38,7 @@ void waitUntil(const std::string& uri, bool there) {
 /// A camera in its port.
 struct Plugged {
   explicit Plugged(UvcCamera::Options options = {})
-      : uri(options.speed == UsbSpeed::Super ? kSuperUri : kUri),
+      : uri(options.speed == UsbSpeed::Super ? kSuperUri : kUvcUri),
         camera(std::make_shared<UvcCamera>(options)),
         port(std::make_unique<UsbIpPort>(0, camera)) {
     waitUntil(uri, true);
@@ -54,7 +54,7 @@ struct Plugged {
   std::unique_ptr<UsbIpPort> port;
 };
 
-std::string keys(const std::string& more = {}, const std::string& uri = kUri) {
+std::string keys(const std::string& more = {}, const std::string& uri = kUvcUri) {
   return fmt::format("uri = '{}'\n{}", uri, more);
 }
 
@@ -79,8 +79,8 @@ std::uint32_t expectExact(const Frame& frame) {
 
 TEST(Uvc, IsCompliantWithItsUriAlone) {
   const Plugged plugged;
-  EXPECT_EQ(drivers::v4l2::row().list(), std::vector<std::string>{kUri});
-  expectCompliant(kUri);
+  EXPECT_EQ(drivers::v4l2::row().list(), std::vector<std::string>{kUvcUri});
+  expectCompliant(kUvcUri);
 }
 
 TEST(Uvc, PicturesAreWhatTheCameraSentOneAfterTheOther) {

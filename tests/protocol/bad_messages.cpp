@@ -8,6 +8,8 @@
 #include <functional>
 #include <limits>
 
+#include <toftwin/nan.h>
+
 #include "protocol/wire/bounds.h"
 #include "protocol/wire/codec.h"
 #include "protocol/wire/crc32c.h"
@@ -19,8 +21,7 @@ using Bytes = std::vector<std::byte>;
 using Builder = flatbuffers::FlatBufferBuilder;
 using Union = flatbuffers::Offset<void>;
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
 /// A message with lengths and checksums that fit.
 Bytes sealed(
@@ -172,7 +173,7 @@ void addHeaders(std::vector<BadMessage>& all) {
   add("pose-infinite",
       messageOf(fb::Body::SetPose,
                 [](Builder& b) {
-                  const fb::Pose pose{1, 0, 0, 0, kInfinity, 0, 0};
+                  const fb::Pose pose{1, 0, 0, 0, kInfinite, 0, 0};
                   return fb::CreateSetPoseDirect(b, "k", &pose).Union();
                 }),
       "pose.x_m is not a finite number");

@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include <toftwin/nan.h>
+
 #include "example_messages.h"
 #include "message_json.h"
 #include "protocol/wire/bounds.h"
@@ -19,7 +21,6 @@ namespace {
 
 using testing::HasSubstr;
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::uint64_t kSeed = 20'261;
 

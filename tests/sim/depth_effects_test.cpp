@@ -3,14 +3,13 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
-#include <limits>
+
+#include <toftwin/nan.h>
 
 #include "tests/sim/camera_testing.h"
 
 namespace toftwin::sim {
 namespace {
-
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
 RangeImage imageOfRanges(int width, int height, const std::function<double(int, int)>& range_m) {
   RangeImage image{.range_m = {width, height},
@@ -130,7 +129,7 @@ TEST(LearnedRange, SaysWhatIsWrongWithItsTable) {
 
 TEST(LowAmplitudeFilter, RejectsWhatIsBelowItsMinimumAndSaysWhy) {
   RangeImage image = imageOfRanges(3, 1, [](int, int) { return 2.0; });
-  image.amplitude[0] = 299.0F, image.amplitude[1] = 300.0F, image.amplitude[2] = kNan;
+  image.amplitude[0] = 299.0F, image.amplitude[1] = 300.0F, image.amplitude[2] = kNaN;
   image = applied(LowAmplitudeFilter{}, image);
   const unsigned why = static_cast<unsigned>(PixelFlag::Invalid) |
                        static_cast<unsigned>(PixelFlag::LowAmplitude);
@@ -232,7 +231,7 @@ TEST(TemporalFilter, LagsBehindMotionAndTakesAJumpAtOnce) {
   EXPECT_NEAR(2.6 - given.range_m[0], 0.01 * 0.6 / 0.4, 1e-5);  // (1 − α)/α frames
   EXPECT_EQ(applied(filter, at(3.0), {}, {.range = &given}).range_m[0], 3.0F);
   RangeImage hole = given;
-  hole.range_m[0] = kNan;
+  hole.range_m[0] = kNaN;
   EXPECT_EQ(applied(filter, at(2.61), {}, {.range = &hole}).range_m[0], 2.61F);
   EXPECT_EQ(applied(filter, at(2.61)).range_m[0], 2.61F);  // a first frame
 }

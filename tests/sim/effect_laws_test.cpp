@@ -6,6 +6,8 @@
 #include <cstring>
 #include <set>
 
+#include <toftwin/nan.h>
+
 #include "protocol/settings/describe.h"
 #include "sim/effects/effects.h"
 #include "tests/sim/scale_example.h"
@@ -436,17 +438,16 @@ TYPED_TEST(EffectLaws, SaysWhatItIs) {
 
 // Light has no invalid pixels: a ray that meets nothing brings no light, which is a number.
 TYPED_TEST(EffectLaws, InvalidPixelsStayInvalid) {
-  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
   auto image = imageOf<ImageOf<TypeParam>>({});
   if constexpr (std::is_same_v<ImageOf<TypeParam>, Samples>) {
-    for (auto& electrons : image.electrons) electrons(kProbeX, kProbeY) = kNan;
+    for (auto& electrons : image.electrons) electrons(kProbeX, kProbeY) = kNaN;
     image.flags = {kWidth, kHeight, static_cast<std::uint8_t>(PixelFlag::Saturated)};
     const Samples after = applied(TypeParam{}, image, {});
     for (const auto& electrons : after.electrons)
       EXPECT_TRUE(std::isnan(electrons(kProbeX, kProbeY)));
     EXPECT_TRUE(after.flags(kProbeX, kProbeY) & static_cast<unsigned>(PixelFlag::Saturated));
   } else if constexpr (std::is_same_v<ImageOf<TypeParam>, RangeImage>) {
-    image.range_m(kProbeX, kProbeY) = kNan;
+    image.range_m(kProbeX, kProbeY) = kNaN;
     image.flags(kProbeX, kProbeY) = static_cast<std::uint8_t>(PixelFlag::Invalid);
     const RangeImage after = applied(TypeParam{}, image, {});
     EXPECT_TRUE(std::isnan(after.range_m(kProbeX, kProbeY)));

@@ -10,7 +10,7 @@ namespace toftwin::sim {
 namespace {
 
 // Phasors and samples are floats: 6e-8 of 3000 electrons against an amplitude of 1000.
-constexpr double kRounding = 4e-6;
+constexpr double kEmissionRounding = 4e-6;
 
 std::string harmonics(const std::string& keys) {
   return "[[effect]]\ntype = 'harmonics'\nthird = 0\n" + keys + "\n";
@@ -24,25 +24,26 @@ std::string third(double h) {
 TEST(Harmonics, ThirdGivesFourStepsAFourCycleErrorOfItsOwnSizeAtAnyAmplitude) {
   for (double amplitude : {1000.0, 250.0}) {
     const Turn turn = turnOf({.amplitude = amplitude, .effects = third(0.05)});
-    EXPECT_NEAR(turn.errorCycles(4), 0.05, 4.0 * kRounding) << amplitude;
-    EXPECT_NEAR(turn.errorCycles(8), 0.05 * 0.05 / 2.0, 4.0 * kRounding);
+    EXPECT_NEAR(turn.errorCycles(4), 0.05, 4.0 * kEmissionRounding) << amplitude;
+    EXPECT_NEAR(turn.errorCycles(8), 0.05 * 0.05 / 2.0, 4.0 * kEmissionRounding);
     EXPECT_NEAR(turn.peak(), std::asin(0.05), 1e-4);  // the grid of one degree misses the top by 1e-3
-    EXPECT_LT(turn.otherCycles({4, 8, 12}), 4.0 * kRounding);
-    EXPECT_LT(turn.closureCycles(0) + turn.closureCycles(2), 4.0 * kRounding);  // the free channel is blind
+    EXPECT_LT(turn.otherCycles({4, 8, 12}), 4.0 * kEmissionRounding);
+    EXPECT_LT(turn.closureCycles(0) + turn.closureCycles(2),
+              4.0 * kEmissionRounding);  // the free channel is blind
   }
 }
 
 TEST(Harmonics, ThreeStepsDoNotSeeTheThirdButTheSecond) {
-  EXPECT_LT(turnOf({.steps = 3, .effects = third(0.05)}).peak(), kRounding * 4.0);
+  EXPECT_LT(turnOf({.steps = 3, .effects = third(0.05)}).peak(), kEmissionRounding * 4.0);
   const Turn turn = turnOf({.steps = 3, .effects = harmonics("second = 0.02")});
-  EXPECT_NEAR(turn.errorCycles(3), 0.02, kRounding);
-  EXPECT_LT(turn.otherCycles({3, 6}), kRounding);
+  EXPECT_NEAR(turn.errorCycles(3), 0.02, kEmissionRounding);
+  EXPECT_LT(turn.otherCycles({3, 6}), kEmissionRounding);
 }
 
 TEST(Harmonics, EvenOnesShowInTheClosureOfFourStepsAlone) {
   const Turn turn = turnOf({.effects = harmonics("second = 0.02")});
-  EXPECT_NEAR(turn.closureCycles(2), 4.0 * 0.02, 4.0 * kRounding);
-  EXPECT_LT(turn.peak(), kRounding * 2.0);
+  EXPECT_NEAR(turn.closureCycles(2), 4.0 * 0.02, 4.0 * kEmissionRounding);
+  EXPECT_LT(turn.peak(), kEmissionRounding * 2.0);
 }
 
 TEST(Harmonics, ThatAreNotTracedAreAnErrorThatSaysSo) {
@@ -84,7 +85,7 @@ TEST(RiseDrift, MakesTheCameraThatTheFileWouldDescribeWithTheOtherRiseTime) {
 TEST(RiseDrift, AndDutyDriftDoNothingWhereTheTemperatureIsUnknown) {
   const Turn turn = turnOf({.effects = "[[effect]]\ntype = 'rise_drift'\n[[effect]]\ntype = "
                                        "'duty_drift'\n[[effect]]\ntype = 'thermal_delay'\n"});
-  EXPECT_LT(turn.peak() + std::abs(turn.mean()), kRounding);
+  EXPECT_LT(turn.peak() + std::abs(turn.mean()), kEmissionRounding);
 }
 
 // By numeric correlation in time: duty 1/3 kills the third harmonic and leaves the fifth and seventh.
@@ -174,7 +175,7 @@ TEST(StepPhase, OfOneDegreeIsAnOffsetATwoCycleErrorAndAClosureOfOneCycle) {
   EXPECT_NEAR(turn.mean(), -quarter, 2e-5);  // a late reference makes the light look early
   EXPECT_NEAR(turn.errorCycles(2), quarter, 2e-5);
   EXPECT_LT(turn.otherCycles({2, 4}), 2e-5);
-  EXPECT_NEAR(turn.closureCycles(1), 0.0174533, 4.0 * kRounding);
+  EXPECT_NEAR(turn.closureCycles(1), 0.0174533, 4.0 * kEmissionRounding);
 }
 
 }  // namespace

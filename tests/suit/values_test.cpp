@@ -7,13 +7,13 @@
 #include <cmath>
 #include <random>
 
+#include <toftwin/nan.h>
+
 #include "calib/compare/traits/least_squares.h"
 #include "cases.h"
 
 namespace toftwin::suit {
 namespace {
-
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 struct Row {
   Seen seen;

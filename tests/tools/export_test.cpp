@@ -8,9 +8,10 @@
 #include <cmath>
 #include <csignal>
 #include <cstring>
-#include <limits>
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
+
+#include <toftwin/nan.h>
 
 #include "tests/record/record_testing.h"
 #include "tools/cli/export/atomic_file.h"
@@ -22,7 +23,6 @@ using record::bytesOf;
 using record::Folder;
 using testing::HasSubstr;
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr int kWidth = 20, kHeight = 12;
 constexpr std::size_t kPixels = kWidth * kHeight;
 

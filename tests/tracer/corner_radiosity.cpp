@@ -8,7 +8,6 @@
 namespace toftwin::sim::testing {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
 constexpr double kLength = 1.0, kHalfHeight = 0.5;
 /// Light that starts nearer to the edge than this, 0.1 mm, is left out: it is less than the share
 /// (0.1 mm / u)², 3e-5 at u = 2 cm.
@@ -21,7 +20,7 @@ struct Gauss {
   std::vector<double> x, w;
   explicit Gauss(int n) {
     for (int i = 0; i < n; ++i) {
-      double at = std::cos(kPi * (i + 0.75) / (n + 0.5)), slope = 1.0;
+      double at = std::cos(std::numbers::pi * (i + 0.75) / (n + 0.5)), slope = 1.0;
       for (int step = 0; step < 100; ++step) {
         double before = 1.0, value = at;
         for (int m = 2; m <= n; ++m) {
@@ -51,7 +50,7 @@ CornerRadiosity::CornerRadiosity(double wavenumber, Grid grid) : k_(wavenumber),
   const double from = std::log(kNearest), to = std::log(kLength);
   for (int i = 0; i < grid.along; ++i) log_x_.push_back(from + (to - from) * i / (grid.along - 1));
   for (int j = 0; j < grid.across; ++j) {
-    z_.push_back(kHalfHeight * std::cos(kPi * j / (grid.across - 1)));
+    z_.push_back(kHalfHeight * std::cos(std::numbers::pi * j / (grid.across - 1)));
     const bool is_end = j == 0 || j == grid.across - 1;
     z_weights_.push_back((j % 2 == 0 ? 1.0 : -1.0) * (is_end ? 0.5 : 1.0));
   }
@@ -102,7 +101,7 @@ std::vector<CornerRadiosity::Complex> CornerRadiosity::row(double x, double z) c
         const double t = (low + high + (high - low) * angles.x[a]) / 2.0;
         const double d = q * std::cosh(t);
         const double measure = panel.w[g] * step / 2.0 * y * angles.w[a] * (high - low) / 2.0 * d;
-        const Complex share = x * y / (kPi * d * d * d * d) * measure * std::polar(1.0, -k_ * d);
+        const Complex share = x * y / (std::numbers::pi * d * d * d * d) * measure * std::polar(1.0, -k_ * d);
         const Weights weights = weightsAt(log_y, z + q * std::sinh(t));
         for (std::size_t n = 0; n < 4; ++n) {
           const std::size_t start = (weights.first_along + n) * z_.size();

@@ -15,7 +15,7 @@ namespace {
 constexpr int kBlocks = 4;  ///< along each side
 
 /// Sums over the pixels of one block.
-struct Block {
+struct PixelBlock {
   double squares = 0.0, count = 0.0;  ///< of residuals from each pixel's mean
   double along_x = 0.0, along_x_squares = 0.0, along_y = 0.0, along_y_squares = 0.0, in_time = 0.0;
   Running means{};
@@ -40,7 +40,7 @@ Residuals residualsOf(std::span<const Image<float>> frames) {
 }
 
 /// A pixel's own squares, and its products with its right and lower neighbour and with its next frame.
-void add(const Residuals& r, int x, int y, Block& block) {
+void add(const Residuals& r, int x, int y, PixelBlock& block) {
   const auto value = [&](std::size_t f, int px, int py) { return static_cast<double>(r.frames[f](px, py)); };
   if (std::isnan(r.mean(x, y))) return;
   block.means.add(static_cast<double>(r.mean(x, y)));
@@ -109,20 +109,20 @@ Traits noiseTraits(std::span<const Image<float>> frames_mm) {
   }
   if (std::min(width, height) < 2 * kBlocks) return refuse("an image of less than 8 x 8 pixels");
   const Residuals r = residualsOf(frames_mm);
-  std::array<Block, kBlocks * kBlocks> blocks;
+  std::array<PixelBlock, kBlocks * kBlocks> blocks;
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x)
       add(r, x, y, blocks[static_cast<std::size_t>(y * kBlocks / height * kBlocks + x * kBlocks / width)]);
   }
   const double n = static_cast<double>(frames_mm.size());
   std::vector<double> temporal, fixed, along_x, along_y, in_time;
-  const auto isUsed = [](const Block& block) { return block.count >= 4.0 && block.squares > 0.0; };
-  for (const Block& block : blocks) {
+  const auto isUsed = [](const PixelBlock& block) { return block.count >= 4.0 && block.squares > 0.0; };
+  for (const PixelBlock& block : blocks) {
     if (isUsed(block)) in_time.push_back(correlationFrom(block.in_time / block.squares, n));
   }
   // Values that go with each other scatter less about their own mean, and their mean scatters more.
   const double of_mean = varianceOfMean(summarise(in_time).mean, n);
-  for (const Block& block : blocks) {
+  for (const PixelBlock& block : blocks) {
     if (!isUsed(block)) continue;
     const double variance = block.squares / (block.count * n * (1.0 - of_mean));
     temporal.push_back(variance);

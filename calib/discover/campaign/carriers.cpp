@@ -6,10 +6,10 @@
 #include <cmath>
 #include <complex>
 #include <functional>
-#include <limits>
 #include <numbers>
 
 #include <fmt/format.h>
+#include <toftwin/nan.h>
 
 #include "calib/discover/campaign/smoothed.h"
 #include "calib/discover/candidates.h"
@@ -41,7 +41,6 @@ Reading changeBy(const Image<std::complex<float>>& share, double period_m) {
 
 /// Light's phasor exp(−iφ) of what the pixels would read.
 Image<std::complex<float>> phasorOf(const Reading& reading, double period_m) {
-  constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
   Image<std::complex<float>> z(reading.range_m.width(), reading.range_m.height(), {kNaN, kNaN});
   for (std::size_t i = 0; i < z.size(); ++i) {
     const double phase = 2.0 * std::numbers::pi * static_cast<double>(reading.range_m[i]) / period_m;

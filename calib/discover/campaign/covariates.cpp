@@ -4,15 +4,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
+
+#include <toftwin/nan.h>
 
 #include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/smoothed.h"
 
 namespace toftwin::discover {
 namespace {
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 struct Gatherer {
   const Cells& cells;
@@ -140,7 +139,7 @@ CovariateInfo describe(const std::string& name) {
     if (known.name == name)
       info.unit = known.unit, info.nature = known.nature, info.stage = known.stage;
   }
-  if (name.starts_with("temperature_")) info.unit = "c", info.stage = Stage::Range;
+  if (name.starts_with("temperature_")) info.unit = std::string{"c"}, info.stage = Stage::Range;
   info.word = wordOf(name);
   return info;
 }

@@ -6,6 +6,8 @@
 #include <limits>
 #include <random>
 
+#include <toftwin/nan.h>
+
 #include "calib/compare/statistics.h"
 #include "calib/discover/campaign/reading.h"
 #include "calib/discover/marginal.h"
@@ -13,13 +15,11 @@
 namespace toftwin::discover {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-
 /// χ² of each capture under a model with fixed offset and gain, poses and light integrated out.
 struct ByCapture {
   std::vector<double> energy{}, rows{};
 };
-Result<ByCapture> energiesOf(const Judged& judged, const JudgedModel& model) {
+Result<ByCapture> energiesOf(const JudgedCampaign& judged, const JudgedModel& model) {
   const auto evidence = residualEvidence(judged, model.effects);
   if (!evidence) return evidence.error();
   const Marginal marginal = marginalise(*evidence, judged.scales);
@@ -127,7 +127,7 @@ struct Totals {
 
 }  // namespace
 
-Result<Judgement> judge(const Judged& judged, const JudgedModel& before, const JudgedModel& after,
+Result<Judgement> judge(const JudgedCampaign& judged, const JudgedModel& before, const JudgedModel& after,
                         double dispersion) {
   const auto camera_before =
       NoiselessCamera::make(judged.declared.model, before.effects, judged.lit.captures);

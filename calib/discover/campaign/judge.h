@@ -45,7 +45,7 @@ struct Judgement {
 
 /// `dispersion`: the noise's χ² per row, as the open captures say. Error: an exposure that a model
 /// cannot have.
-Result<Judgement> judge(const Judged& judged, const JudgedModel& before, const JudgedModel& after,
+Result<Judgement> judge(const JudgedCampaign& judged, const JudgedModel& before, const JudgedModel& after,
                         double dispersion);
 
 }  // namespace toftwin::discover

@@ -2,10 +2,10 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <limits>
 #include <thread>
 
 #include <fmt/format.h>
+#include <toftwin/nan.h>
 
 #include "calib/compare/stack.h"
 #include "calib/compare/statistics.h"
@@ -16,8 +16,6 @@
 
 namespace toftwin::discover {
 namespace {
-
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 /// Means and noise of an image that comes again and again. Noise is that of the differences between
 /// successive frames, which a drift within the capture does not enlarge (von Neumann 1941); that of

@@ -3,15 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <variant>
 
 #include <fmt/format.h>
+#include <toftwin/nan.h>
 
 namespace toftwin::discover {
 namespace {
-
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 Reading readingOf(const sim::RangeImage& image) {
   Reading reading{image.range_m, Image<float>(image.range_m.width(), image.range_m.height(), kNaN)};

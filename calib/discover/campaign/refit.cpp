@@ -242,8 +242,7 @@ std::vector<FreeNumber> freeNumbersOf(const std::vector<sim::AnyEffect>& effects
   return all;
 }
 
-Result<Evidence> residualEvidence(const Judged& judged,
-                                  const std::vector<sim::AnyEffect>& effects) {
+Result<Evidence> residualEvidence(const JudgedCampaign& judged, const std::vector<sim::AnyEffect>& effects) {
   const Lit& lit = judged.lit;
   const auto declared = NoiselessCamera::make(
       judged.declared.model, effectsWithoutNoise(judged.declared.model), lit.captures);

@@ -28,7 +28,7 @@ struct FittedEffect {
 };
 
 /// A campaign on which models are judged: what is needed of it again and again.
-struct Judged {
+struct JudgedCampaign {
   const Declared& declared;
   const Lit& lit;
   std::vector<double> scales{};  ///< of poses and light, as estimated
@@ -37,7 +37,7 @@ struct Judged {
 
 /// What a list of effects, noise not among them, leaves of the measurement. Error: an exposure that
 /// the model cannot have.
-Result<Evidence> residualEvidence(const Judged& judged, const std::vector<sim::AnyEffect>& effects);
+Result<Evidence> residualEvidence(const JudgedCampaign& judged, const std::vector<sim::AnyEffect>& effects);
 
 double valueOf(const sim::AnyEffect& effect, const std::string& key);
 /// Whether a strength of the effect, one of these numbers, was fitted to a bound of it.

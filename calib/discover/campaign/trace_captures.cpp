@@ -5,6 +5,8 @@
 #include <memory>
 #include <numbers>
 
+#include <toftwin/nan.h>
+
 #include "calib/compare/stack.h"
 #include "calib/compare/statistics.h"
 #include "calib/discover/campaign/campaign.h"
@@ -13,8 +15,6 @@
 
 namespace toftwin::discover {
 namespace {
-
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 /// A share of the measurement's own noise that tracing may add; less where captures share their
 /// light, since what is the same in all of them does not average out.

@@ -6,17 +6,17 @@
 #include <algorithm>
 #include <cmath>
 
+#include "daemon/facades/gige_vision/register_bits.h"
+
 namespace toftwin::daemon::gige_vision {
 namespace {
 
-constexpr std::size_t kDiscoveryBytes = 0xF8, kMostBytesRead = 536, kMostRegisters = 135;
+constexpr std::size_t kDiscoveryBytes = 0xF8, kMostBytesRead = 536, kMostRead = 135;
 constexpr std::chrono::seconds kRepeats{3};  ///< within which the same command again is the same command
-constexpr std::uint32_t kPendingBit = 0x2;
 /// User's name, serial number, link speed, application's port and address, IEEE 1588, pending answers,
 /// resending, writing memory, several registers at once.
 constexpr std::uint32_t kControlCapability =
     0x80000000 | 0x40000000 | 0x10000000 | 0x08000000 | 0x00080000 | 0x20 | 0x4 | 0x2 | 0x1;
-constexpr std::uint32_t kMultipartBit = 0x40, kLongIdsBit = 0x40000000;
 
 std::uint64_t numberOf(const std::array<std::uint8_t, 6>& mac) {
   std::uint64_t number = 0;
@@ -279,7 +279,7 @@ Bytes Device::discovered(const Request& request) const {
 
 Bytes Device::readRegisters(const Request& request) const {
   const std::size_t count = request.data.size() / 4;
-  if (count == 0 || count > kMostRegisters || request.data.size() % 4 != 0)
+  if (count == 0 || count > kMostRead || request.data.size() % 4 != 0)
     return encodeAnswer(request, Status::kInvalidParameter, {});
   Bytes data;
   for (std::size_t i = 0; i < count; ++i) {

@@ -5,12 +5,12 @@
 #include <cmath>
 
 #include "daemon/facades/gige_vision/device.h"
+#include "daemon/facades/gige_vision/register_bits.h"
 
 namespace toftwin::daemon::gige_vision {
 namespace {
 
-constexpr std::size_t kMostRegisters = 67;
-constexpr std::uint32_t kMultipartBit = 0x40, kLongIdsBit = 0x4000'0000, kPendingBit = 0x2;
+constexpr std::size_t kMostWritten = 67;
 constexpr std::uint32_t kTestPacketBit = 0x8000'0000, kWholeBit = 0x4000'0000, kLatchBit = 0x2;
 constexpr std::uint32_t kLeastPacket = 576, kMostPacket = 16'112;
 
@@ -25,7 +25,7 @@ Bytes written(const Request& request, std::uint16_t status, std::size_t done) {
 
 Bytes Device::writeRegisters(const Peer& from, const Request& request, Outcome& outcome) {
   const std::size_t count = request.data.size() / 8;
-  if (count == 0 || count > kMostRegisters || request.data.size() % 8 != 0)
+  if (count == 0 || count > kMostWritten || request.data.size() % 8 != 0)
     return written(request, Status::kInvalidParameter, 0);
   for (std::size_t i = 0; i < count; ++i) {
     const std::uint64_t address = numberAt(request.data, 8 * i, 4);

@@ -11,6 +11,8 @@
 #include <memory>
 #include <optional>
 
+#include <toftwin/nan.h>
+
 #include "daemon/facades/event_thread.h"
 #include "daemon/facades/modbus/keys.h"
 #include "daemon/facades/modbus/server.h"
@@ -23,7 +25,6 @@ namespace {
 using std::chrono::steady_clock;
 
 constexpr double kMapVersion = 1.0;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 struct Setting {
   std::string name;

@@ -11,7 +11,7 @@
 namespace toftwin::openni2 {
 namespace {
 
-constexpr std::chrono::seconds kPatience{6};  // longer than a client waits for an answer
+constexpr std::chrono::seconds kWorkPatience{6};  // longer than a client waits for an answer
 
 /// The code of a thread that is left behind must stay where it is.
 void keepModule() {
@@ -43,7 +43,7 @@ bool Worker::finish() {
   if (!thread_.joinable()) return true;
   stop_.request_stop();
   const bool is_itself = thread_.get_id() == std::this_thread::get_id();
-  if (!is_itself && ended_.wait_for(kPatience) == std::future_status::ready) {
+  if (!is_itself && ended_.wait_for(kWorkPatience) == std::future_status::ready) {
     thread_.join();
     return true;
   }

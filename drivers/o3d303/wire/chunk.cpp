@@ -17,7 +17,7 @@ constexpr std::size_t kHeaderSizeV1 = 40, kHeaderSizeV2 = 48;
 constexpr std::uint32_t kMostPixelsPerSide = 8192;
 constexpr std::size_t kMostHeader = 65'536;
 
-Error malformed(std::string what) { return {Error::Code::Malformed, "chunk: " + std::move(what)}; }
+Error malformedChunk(std::string what) { return {Error::Code::Malformed, "chunk: " + std::move(what)}; }
 
 ChunkHeader readHeader(std::span<const std::byte> bytes, std::size_t header_size) {
   const auto at = [&](std::size_t place) { return numberAt<std::uint32_t>(bytes, place); };
@@ -45,27 +45,27 @@ std::size_t sizeOf(ElementFormat format) {
 }
 
 Result<ChunkInBytes> readChunk(std::span<const std::byte> bytes) {
-  if (bytes.size() < kHeaderSizeV1) return malformed("its header is cut off");
+  if (bytes.size() < kHeaderSizeV1) return malformedChunk("its header is cut off");
   const auto chunk_size = numberAt<std::uint32_t>(bytes, kChunkSize);
   const auto header_size = numberAt<std::uint32_t>(bytes, kHeaderSize);
   const auto version = numberAt<std::uint32_t>(bytes, kVersion);
   const std::size_t least = version >= 2 ? kHeaderSizeV2 : kHeaderSizeV1;
   if (version < 1 || header_size < least || header_size > kMostHeader || header_size > chunk_size ||
       chunk_size > bytes.size()) {
-    return malformed(
-        fmt::format("a header of version {} and {} bytes in a chunk of {}, of which {} are there",
-                    version, header_size, chunk_size, bytes.size()));
+    return malformedChunk(
+        fmt::format("a header of version {} and {} bytes in a chunk of {}, of which {} are there", version,
+                    header_size, chunk_size, bytes.size()));
   }
   Chunk chunk{.header = readHeader(bytes, header_size),
               .data = bytes.subspan(header_size, chunk_size - header_size)};
   const ChunkHeader& header = chunk.header;
   const std::size_t element = sizeOf(header.format);
   if (element == 0) {
-    return malformed(fmt::format("elements of the unknown format {}",
-                                 static_cast<std::uint32_t>(header.format)));
+    return malformedChunk(
+        fmt::format("elements of the unknown format {}", static_cast<std::uint32_t>(header.format)));
   }
   if (header.width > kMostPixelsPerSide || header.height > kMostPixelsPerSide) {
-    return malformed(fmt::format("an image of {} x {}", header.width, header.height));
+    return malformedChunk(fmt::format("an image of {} x {}", header.width, header.height));
   }
   // The newest firmware gives its info chunk the image's width and height although it is no image;
   // so whether the data holds as many elements is checked where it is read as an image

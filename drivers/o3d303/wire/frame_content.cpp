@@ -13,24 +13,24 @@ namespace {
 constexpr std::size_t kMostChunks = 64;
 constexpr float kMetresPerMillimetre = 1e-3F;
 
-Error malformed(std::string what) { return {Error::Code::Malformed, "frame: " + std::move(what)}; }
+Error malformedFrame(std::string what) { return {Error::Code::Malformed, "frame: " + std::move(what)}; }
 
 /// Width times height, if the image has pixels and the data has as many elements.
 Result<std::size_t> pixelsOf(const Chunk& chunk) {
   const auto& [header, data] = chunk;
   const std::size_t pixels = std::size_t{header.width} * header.height;
   if (pixels == 0 || data.size() / sizeOf(header.format) < pixels) {
-    return malformed(fmt::format("chunk {}: {} bytes do not hold {} x {} elements of {} bytes",
-                                 static_cast<std::uint32_t>(header.type), data.size(), header.width,
-                                 header.height, sizeOf(header.format)));
+    return malformedFrame(fmt::format("chunk {}: {} bytes do not hold {} x {} elements of {} bytes",
+                                      static_cast<std::uint32_t>(header.type), data.size(), header.width,
+                                      header.height, sizeOf(header.format)));
   }
   return pixels;
 }
 
 Error unexpectedFormat(const Chunk& chunk) {
-  return malformed(fmt::format("chunk {} has elements of format {}, which it cannot have",
-                               static_cast<std::uint32_t>(chunk.header.type),
-                               static_cast<std::uint32_t>(chunk.header.format)));
+  return malformedFrame(fmt::format("chunk {} has elements of format {}, which it cannot have",
+                                    static_cast<std::uint32_t>(chunk.header.type),
+                                    static_cast<std::uint32_t>(chunk.header.format)));
 }
 
 template <class T>
@@ -46,7 +46,7 @@ Result<bool> readMarked(std::string_view marker, std::span<const std::byte>& res
                         std::optional<Numbers>& numbers) {
   if (!textOf(rest).starts_with(marker)) return false;
   if (rest.size() < marker.size() + sizeof(Numbers)) {
-    return malformed(fmt::format("no number after \"{}\"", marker));
+    return malformedFrame(fmt::format("no number after \"{}\"", marker));
   }
   numbers = numberAt<Numbers>(rest, marker.size());
   rest = rest.subspan(marker.size() + sizeof(Numbers));
@@ -63,8 +63,7 @@ const Chunk* FrameContent::find(ChunkType type) const {
 
 Result<FrameContent> readFrameContent(std::span<const std::byte> content) {
   FrameContent frame;
-  if (!textOf(content).starts_with(kFrameBegin))
-    return malformed("it does not begin with \"star\"");
+  if (!textOf(content).starts_with(kFrameBegin)) return malformedFrame("it does not begin with \"star\"");
   auto rest = content.subspan(kFrameBegin.size());
   while (textOf(rest) != kFrameEnd) {
     const auto exposures = readMarked(kExposuresMarker, rest, frame.exposures_us);
@@ -73,8 +72,8 @@ Result<FrameContent> readFrameContent(std::span<const std::byte> content) {
     if (!illumination) return illumination.error();
     if (*exposures || *illumination) continue;
     auto read = readChunk(rest);
-    if (!read) return malformed("not \"stop\", nor a whole chunk: " + read.error().message);
-    if (frame.chunks.size() == kMostChunks) return malformed("too many chunks");
+    if (!read) return malformedFrame("not \"stop\", nor a whole chunk: " + read.error().message);
+    if (frame.chunks.size() == kMostChunks) return malformedFrame("too many chunks");
     rest = rest.subspan(read->size);
     frame.chunks.push_back(std::move(read->chunk));
   }

@@ -17,7 +17,7 @@ namespace {
 using Type = SchemaElement::Type;
 
 constexpr std::size_t kLongest = 65'536;
-constexpr int kDeepest = 8;  // the JSON reader recurses: deeper texts would end on the stack
+constexpr int kDeepestBracket = 8;  // the JSON reader recurses: deeper texts would end on the stack
 constexpr std::array<std::pair<Type, std::string_view>, 4> kTypes{{{Type::Text, "string"},
                                                                    {Type::Blob, "blob"},
                                                                    {Type::UInt32, "uint32"},
@@ -40,7 +40,7 @@ std::optional<Type> typeNamed(std::string_view name) {
 bool isTooDeep(std::string_view json) {
   int depth = 0;
   for (const char c : json) {
-    if ((c == '{' || c == '[') && ++depth > kDeepest) return true;
+    if ((c == '{' || c == '[') && ++depth > kDeepestBracket) return true;
     if (c == '}' || c == ']') --depth;
   }
   return false;

@@ -11,7 +11,7 @@
 namespace toftwin::o3d303 {
 namespace {
 
-constexpr int kDeepest = 16;  // arrays within arrays; the camera has two
+constexpr int kDeepestValue = 16;  // arrays within arrays; the camera has two
 
 template <class... Fs>
 struct Overloaded : Fs... {
@@ -58,18 +58,16 @@ std::string toText(const pugi::xml_document& document) {
 
 // ---- reading -----------------------------------------------------------------------------------
 
-Error malformed(std::string what) {
-  return {Error::Code::Malformed, "XML-RPC: " + std::move(what)};
-}
+Error malformedXml(std::string what) { return {Error::Code::Malformed, "XML-RPC: " + std::move(what)}; }
 
 Result<pugi::xml_node> rootOf(pugi::xml_document& document, std::string_view xml,
                               const char* name) {
   // Text of white space alone is a value, too; entities of the document's own are never resolved.
   const auto parsed = document.load_buffer(xml.data(), xml.size(),
                                            pugi::parse_default | pugi::parse_ws_pcdata_single);
-  if (!parsed) return malformed(parsed.description());
+  if (!parsed) return malformedXml(parsed.description());
   const pugi::xml_node root = document.child(name);
-  if (!root) return malformed(fmt::format("there is no <{}>", name));
+  if (!root) return malformedXml(fmt::format("there is no <{}>", name));
   return root;
 }
 
@@ -79,7 +77,7 @@ Result<XmlRpcValue> readNumber(std::string_view text) {
   if (text.starts_with('+')) text.remove_prefix(1);
   Number number{};
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (error != std::errc{}) return malformed(fmt::format("\"{}\" is not a number", text));
+  if (error != std::errc{}) return malformedXml(fmt::format("\"{}\" is not a number", text));
   return XmlRpcValue{number};
 }
 
@@ -106,8 +104,8 @@ Result<XmlRpcValue> readStruct(const pugi::xml_node& typed, int depth) {
 }
 
 Result<XmlRpcValue> readValue(const pugi::xml_node& value, int depth) {
-  if (!value) return malformed("a <value> is missing");
-  if (depth > kDeepest) return malformed("values nested too deeply");
+  if (!value) return malformedXml("a <value> is missing");
+  if (depth > kDeepestValue) return malformedXml("values nested too deeply");
   pugi::xml_node typed;
   for (const pugi::xml_node& child : value.children()) {
     if (child.type() == pugi::node_element) typed = child;
@@ -169,7 +167,7 @@ Result<XmlRpcCall> readXmlRpcCall(std::string_view xml) {
   const auto root = rootOf(document, xml, "methodCall");
   if (!root) return root.error();
   XmlRpcCall call{root->child("methodName").text().get(), {}};
-  if (call.method.empty()) return malformed("the call names no method");
+  if (call.method.empty()) return malformedXml("the call names no method");
   for (const pugi::xml_node& param : root->child("params").children("param")) {
     auto value = readValue(param.child("value"), 0);
     if (!value) return value.error();
@@ -188,7 +186,7 @@ Result<XmlRpcAnswer> readXmlRpcAnswer(std::string_view xml) {
   if (!value) return value.error();
   if (!fault) return XmlRpcAnswer{*std::move(value)};
   const auto code = readNumber<int>(value->textAt("faultCode"));
-  if (!code) return malformed("a fault without a code");
+  if (!code) return malformedXml("a fault without a code");
   return XmlRpcAnswer{XmlRpcFault{std::get<int>(code->value), value->textAt("faultString")}};
 }
 

@@ -23,6 +23,12 @@ struct Vec3 {
 using Vec3d = Vec3<double>;
 using Vec3f = Vec3<float>;
 
+/// The three numbers of a file or a message as one.
+template <class T>
+constexpr Vec3<T> vec3Of(const std::array<T, 3>& v) {
+  return {v[0], v[1], v[2]};
+}
+
 template <class T>
 constexpr T dot(Vec3<T> a, Vec3<T> b) {
   return a.x * b.x + a.y * b.y + a.z * b.z;

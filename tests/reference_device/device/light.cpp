@@ -3,15 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numbers>
+
+#include "tests/reference_device/device/constants.h"
 
 namespace toftwin::reference {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-constexpr double kSpeedOfLight_m_per_s = 299'792'458.0;
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 /// Of a pixel in which an edge or a shadow's edge lies: the additive recurrence of the plastic number, whose
 /// shares of areas are right within about 3 / kEdgeSamples.
 constexpr int kEdgeSamples = 2400;

@@ -10,12 +10,12 @@
 
 #include <toftwin/frame.h>
 
+#include "tests/reference_device/device/constants.h"
+
 namespace toftwin::reference {
 namespace {
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
-constexpr double kSpeedOfLight_m_per_s = 299'792'458.0;
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
 void raise(std::uint8_t& flags, PixelFlag flag) {
   flags = static_cast<std::uint8_t>(flags | static_cast<unsigned>(flag));

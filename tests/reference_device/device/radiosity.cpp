@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
+
+#include "tests/reference_device/device/constants.h"
 
 namespace toftwin::reference {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
 /// Farther than this many times its size a patch is as good as a point: relative error below 1/(6 · 64).
 constexpr double kFarSquare = 64.0;
 /// Paper on a board: what is between them is dark.

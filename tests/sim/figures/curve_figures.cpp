@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <limits>
 #include <optional>
+
+#include <toftwin/nan.h>
 
 #include "tests/sim/camera_testing.h"
 #include "tests/sim/figures/canvas.h"
@@ -13,8 +14,6 @@ using compare::Curve;
 using compare::Ink;
 using compare::Plot;
 using compare::Stroke;
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 std::string effect(const std::string& type, const std::string& keys = {}) {
   return "[[effect]]\ntype = '" + type + "'\n" + keys + "\n";
@@ -65,9 +64,9 @@ Measured measure(const std::string& effects, const Scene& scene, int rows = 1, c
       const double error_mm = 1e3 * (static_cast<double>(image.range_m(x, y)) - scene(x).range_m);
       sum += error_mm, squares += error_mm * error_mm, count += 1.0;
     }
-    const double mean = count > 0.0 ? sum / count : kNan;
+    const double mean = count > 0.0 ? sum / count : kNaN;
     measured.mean.push_back(mean);
-    measured.sigma.push_back(count > 1.0 ? std::sqrt(std::max(0.0, squares / count - mean * mean)) : kNan);
+    measured.sigma.push_back(count > 1.0 ? std::sqrt(std::max(0.0, squares / count - mean * mean)) : kNaN);
     measured.valid.push_back(100.0 * count / rows);
   }
   return measured;
@@ -227,7 +226,7 @@ std::string ambientSuppression() {
           measure(effects, [](int) { return Column{2.0, 0.01}; }, 20, {}, sun);
       double sum = 0.0;
       for (double value : measured.sigma) sum += value / kColumns;
-      sigma.push_back(measured.valid[0] < 50.0 ? kNan : sum);
+      sigma.push_back(measured.valid[0] < 50.0 ? kNaN : sum);
     }
     return sigma;
   };

@@ -17,13 +17,13 @@ std::vector<std::byte> bytesOf(std::string_view text) {
   return {bytes.begin(), bytes.end()};
 }
 
-struct Column {
+struct TextColumn {
   std::string name;
   std::vector<float> values;
 };
 
 /// The planes that were asked for, or all whose pixels are the image's.
-Result<std::vector<Column>> columnsOf(const Frame& frame, const ExportOptions& options) {
+Result<std::vector<TextColumn>> columnsOf(const Frame& frame, const ExportOptions& options) {
   std::vector<const Plane*> planes;
   if (options.planes.empty()) {
     for (const Plane& plane : frame.planes) {
@@ -36,7 +36,7 @@ Result<std::vector<Column>> columnsOf(const Frame& frame, const ExportOptions& o
     if (!plane) return plane.error();
     planes.push_back(*plane);
   }
-  std::vector<Column> columns;
+  std::vector<TextColumn> columns;
   for (const Plane* plane : planes) {
     auto picture = pictureOf(*plane, plane->channels > 1 ? options.channel : 0);
     if (!picture) return picture.error();
@@ -99,12 +99,12 @@ Result<Exported> toCsv(const Frame& frame, const ExportOptions& options) {
                  fmt::format("the image has the rows 0 to {}, not {}", height - 1, *options.row)};
   }
   std::string text = "x_px,y_px";
-  for (const Column& column : *columns) text += "," + column.name;
+  for (const TextColumn& column : *columns) text += "," + column.name;
   text += '\n';
   for (int y = options.row.value_or(0); y < (options.row ? *options.row + 1 : height); ++y) {
     for (int x = 0; x < width; ++x) {
       fmt::format_to(std::back_inserter(text), "{},{}", x, y);
-      for (const Column& column : *columns) {
+      for (const TextColumn& column : *columns) {
         const float value =
             column.values[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
                           static_cast<std::size_t>(x)];
