@@ -30,6 +30,7 @@ const Parameter* gainOf(const wire::SourceDescription& of) { return parameterOf(
 const Parameter* frameRateOf(const wire::SourceDescription& of) {
   return parameterOf(of, {"frame_rate_hz", "AcquisitionFrameRate"});
 }
+Bounds boundsOf(const Parameter* parameter) { return parameter != nullptr ? parameter->bounds : Bounds{}; }
 std::string nameOf(const Parameter* parameter) {
   return parameter != nullptr ? parameter->name : std::string{};
 }
@@ -125,6 +126,7 @@ LiveCamera::LiveCamera(UvcLayout layout, const wire::SourceDescription& descript
                        const Clock& clock, Hooks hooks)
     : UvcDevice(std::move(layout)),
       names_{nameOf(exposureOf(description)), nameOf(gainOf(description)), nameOf(frameRateOf(description))},
+      rate_bounds_(boundsOf(frameRateOf(description))),
       images_(scale),
       clock_(clock),
       hooks_(std::move(hooks)) {}
@@ -143,12 +145,14 @@ Answer LiveCamera::setNumber(Number which, std::uint32_t value) {
                                : setLater(names_.exposure, kExposureUnit_us * value);
 }
 
-/// Only if it is another one: what the host has not chosen stays as it is, to the last digit.
+/// Only if it is another one: what the host has not chosen stays as it is, to the last digit. 30 Hz are
+/// 333,333 units, and those 30.00003 Hz, which a source that has 30 as its most would refuse.
 Answer LiveCamera::setInterval(std::uint32_t interval_100ns) {
   if (names_.frame_rate.empty()) return {};
   const auto rate_hz = hooks_.parameter(names_.frame_rate);
   if (rate_hz && intervalOf(*rate_hz) == interval_100ns) return {};
-  return setLater(names_.frame_rate, kUnitsPerSecond / interval_100ns);
+  const double wanted_hz = kUnitsPerSecond / std::max(interval_100ns, 1U);
+  return setLater(names_.frame_rate, std::max(rate_bounds_.min, std::min(rate_bounds_.max, wanted_hz)));
 }
 
 Answer LiveCamera::setLater(const std::string& name, double value) {

@@ -67,6 +67,7 @@ class LiveCamera final : public UvcDevice {
     std::string exposure, gain, frame_rate;
   };
   const Names names_;  ///< of the source's parameters; empty: it has none
+  const Bounds rate_bounds_;
   ShortImages images_;
   const Clock& clock_;
   const Hooks hooks_;
