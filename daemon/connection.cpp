@@ -4,15 +4,12 @@
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/post.hpp>
 
-#include <netinet/in.h>
-#include <netinet/tcp.h>
-#include <sys/socket.h>
-
 #include <fmt/format.h>
 
 #include <algorithm>
 
 #include "daemon/thrown.h"
+#include "daemon/vanished_peer.h"
 #include "drivers/logging.h"
 
 namespace toftwin::daemon {
@@ -42,22 +39,6 @@ wire::Encoded encodeOrFailure(const wire::Message& answer) {
       },
       answer);
   return *wire::encode(wire::Failure{id, {Error::Code::Internal, encoded.error().message}});
-}
-
-/// A peer whose machine or cable went away says nothing. The kernel asks it while nothing is sent, and breaks
-/// the connection after so long without an answer, be it to that or to what was sent. Without the second a
-/// frame on its way would be sent again for a quarter of an hour.
-void noticeVanishedPeer(Socket& socket, std::chrono::milliseconds patience) {
-  const int fd = socket.native_handle();
-  const auto set = [fd](int level, int option, int value) {
-    ::setsockopt(fd, level, option, &value,
-                 sizeof value);  // fails on a Unix socket, which needs none
-  };
-  const auto seconds = static_cast<int>(std::max<std::int64_t>(patience.count() / 1000, 1));
-  set(SOL_SOCKET, SO_KEEPALIVE, 1);
-  set(IPPROTO_TCP, TCP_KEEPIDLE, std::min(seconds, 5));
-  set(IPPROTO_TCP, TCP_KEEPINTVL, std::min(seconds, 2));
-  set(IPPROTO_TCP, TCP_USER_TIMEOUT, static_cast<int>(patience.count()));  // instead of TCP_KEEPCNT
 }
 
 }  // namespace
@@ -104,7 +85,7 @@ Connection::Connection(Socket socket, Hub& hub, Options options, std::string nam
 
 void Connection::start() {
   transport::setNoDelay(socket_.socket());
-  if (!socket_.isLocal()) noticeVanishedPeer(socket_.socket(), options_.patience);
+  if (!socket_.isLocal()) noticeVanishedPeer(socket_.socket().native_handle(), options_.patience);
   // Not in the constructor: the waker holds this connection weakly, which needs one that is owned.
   session_ = std::make_unique<Session>(*hub_, sessionOptions(options_, socket_.isLocal()), waker());
   giveUpAfter(options_.handshake, [this] {
@@ -158,7 +139,7 @@ void Connection::take(Result<wire::Message> message) {
   if (message) {
     const auto* subscribe = std::get_if<wire::Subscribe>(&*message);
     if (subscribe != nullptr && subscribe->policy == wire::Policy::Lockstep) {
-      noticeVanishedPeer(socket_.socket(), options_.lockstep_patience);  // it holds others up
+      noticeVanishedPeer(socket_.socket().native_handle(), options_.lockstep_patience);  // it holds others up
     }
     for (wire::Message& answer : session_->handle(*message)) answers_.push_back(std::move(answer));
     if (session_->isOver()) is_last_ = true;

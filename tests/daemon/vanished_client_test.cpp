@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// Clients over TCP whose machine or cable is gone, in a network of the test's own that goes down.
+// Clients and hosts over TCP whose machine or cable is gone, in a network of the test's own that goes down.
 #include <gtest/gtest.h>
 #include <net/if.h>
 #include <sched.h>
 #include <sys/ioctl.h>
 #include <sys/wait.h>
 
+#include <atomic>
 #include <fstream>
 
+#include "daemon/facades/usb_camera/server.h"
 #include "daemon/server.h"
+#include "facades/usb_host.h"
 #include "running_daemon.h"
 
 namespace toftwin::daemon {
@@ -105,6 +108,63 @@ TEST(VanishedClient, IsNoticedWhileAFrameIsOnItsWay) { expectNoticed(kImpatient,
 
 TEST(VanishedClient, IsNoticedSoonerWhereASourceWaitsForIt) {
   expectNoticed(kImpatientInLockstep, Policy::Lockstep, false);
+}
+
+/// Nothing but a stream that has something to say once `has_bytes`.
+class Stub final : public usb_camera::UsbDevice {
+ public:
+  [[nodiscard]] usb_camera::Bytes deviceDescriptor() const override { return usb_camera::Bytes(18); }
+  [[nodiscard]] usb_camera::Bytes configurationDescriptor() const override { return usb_camera::Bytes(9); }
+  [[nodiscard]] std::string text(int) const override { return {}; }
+  usb_camera::Answer control(const usb_camera::Setup&, std::span<const std::byte>) override {
+    return usb_camera::stall();
+  }
+  bool serve(usb_camera::Transfer& transfer, SteadyTime) override {
+    if (has_bytes) transfer.data.resize(transfer.length);
+    return has_bytes;
+  }
+  [[nodiscard]] SteadyTime due() const override { return SteadyTime::max(); }
+  std::atomic<bool> has_bytes{false};
+};
+
+/// The line is cut while bytes are on their way, and comes back when the host's time is over.
+void loseUsbHost() {
+  namespace asio = boost::asio;
+  constexpr std::chrono::milliseconds kPatience = 1000ms;
+  asio::io_context io{1};
+  asio::ip::tcp::acceptor acceptor{io, {asio::ip::address_v4::loopback(), 0}};
+  Stub device;
+  usb_camera::Server server{std::move(acceptor), "test", kPatience};
+  server.plug(device);
+  std::thread thread{[&io] { io.run(); }};
+  UsbHost host{server.port()};
+  EXPECT_EQ(host.import(), 0u);
+  host.ask(1, 512);
+  EXPECT_EQ(UsbHost{server.port()}.import(), 2u) << "busy; what was asked for has arrived";
+  EXPECT_TRUE(setLoopback(false));
+  asio::post(io, [&] {
+    device.has_bytes = true;
+    server.pump();
+  });
+  std::this_thread::sleep_for(4 * kPatience);
+  EXPECT_TRUE(setLoopback(true));
+  EXPECT_EQ(UsbHost{server.port()}.import(), 0u) << "the device is free again";
+  io.stop();
+  thread.join();
+}
+
+TEST(VanishedUsbHost, GivesTheCameraBackWhileAnImageIsOnItsWay) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    if (!enterNetwork() || !setLoopback(true)) ::_exit(kImpossibleHere);
+    loseUsbHost();
+    ::_exit(testing::Test::HasFailure() ? 1 : 0);
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status));
+  if (WEXITSTATUS(status) == kImpossibleHere) GTEST_SKIP() << "this user may not make a network of their own";
+  EXPECT_EQ(WEXITSTATUS(status), 0);
 }
 
 }  // namespace

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/facades/usb_camera/server.h"
 
-#include <netinet/in.h>
-#include <netinet/tcp.h>
-
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/write.hpp>
 
@@ -15,6 +12,7 @@
 
 #include "daemon/facades/usb_camera/operations.h"
 #include "daemon/facades/usb_camera/transfers.h"
+#include "daemon/vanished_peer.h"
 #include "drivers/logging.h"
 
 namespace toftwin::daemon::usb_camera {
@@ -26,14 +24,6 @@ using boost::system::error_code;
 constexpr std::size_t kMostHosts = 16, kPieceBytes = 16U << 10U;
 constexpr std::chrono::seconds kPatience{10};          // with one that has not imported the device
 constexpr std::chrono::milliseconds kShortestWait{1};  // of a timer, so that no device can make it spin
-
-/// A host that has vanished without a word is found out within half a minute, and the device is free again.
-void keepAlive(tcp::socket& socket) {
-  error_code ignored;
-  socket.set_option(boost::asio::socket_base::keep_alive{true}, ignored);
-  for (const auto& [option, value] : {std::pair{TCP_KEEPIDLE, 10}, {TCP_KEEPINTVL, 5}, {TCP_KEEPCNT, 3}})
-    ::setsockopt(socket.native_handle(), IPPROTO_TCP, option, &value, sizeof value);
-}
 
 }  // namespace
 
@@ -48,7 +38,7 @@ class Server::Connection : public std::enable_shared_from_this<Connection> {
     const auto peer = socket_.remote_endpoint(ignored);
     peer_ = fmt::format("{} port {}", peer.address().to_string(ignored), peer.port());
     socket_.set_option(tcp::no_delay{true}, ignored);
-    keepAlive(socket_);
+    noticeVanishedPeer(socket_.native_handle(), server_.patience_);
   }
 
   void begin() {
@@ -192,8 +182,9 @@ class Server::Connection : public std::enable_shared_from_this<Connection> {
   bool is_last_ = false;  ///< what is being written; then it is closed
 };
 
-Server::Server(tcp::acceptor acceptor, std::string name)
+Server::Server(tcp::acceptor acceptor, std::string name, std::chrono::milliseconds patience)
     : name_(std::move(name)),
+      patience_(patience),
       accepting_(std::move(acceptor), [this](tcp::socket socket) { take(std::move(socket)); }) {}
 
 Server::~Server() {

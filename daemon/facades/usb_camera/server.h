@@ -5,6 +5,7 @@
 
 #include <boost/asio/ip/tcp.hpp>
 
+#include <chrono>
 #include <memory>
 #include <set>
 #include <string>
@@ -18,8 +19,10 @@ namespace toftwin::daemon::usb_camera {
 /// one that stalls or does not read costs nobody else. Used on the facade's thread only.
 class Server {
  public:
-  /// `name` of the facade, for the log.
-  Server(boost::asio::ip::tcp::acceptor acceptor, std::string name);
+  /// `name` of the facade, for the log. A host that has vanished without a word is found out within
+  /// `patience`, and the device is free again.
+  Server(boost::asio::ip::tcp::acceptor acceptor, std::string name,
+         std::chrono::milliseconds patience = std::chrono::seconds{25});
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
@@ -38,6 +41,7 @@ class Server {
   void remove(const std::shared_ptr<Connection>& connection);
 
   const std::string name_;
+  const std::chrono::milliseconds patience_;
   UsbDevice* device_ = nullptr;
   std::set<std::shared_ptr<Connection>> connections_;  // shared with their handlers
   std::weak_ptr<Connection> host_;                     // that has the device
