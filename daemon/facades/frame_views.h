@@ -9,11 +9,11 @@
 
 namespace toftwin::daemon {
 
-/// The frame's plane of one channel and the camera's size; null where there is none.
+/// The frame's plane of one channel and the camera's size, with all of its bytes; null where there is none.
 inline const Plane* planeOf(const Frame& frame, PlaneKind kind) {
   const Plane* plane = frame.find(kind);
   return plane != nullptr && plane->channels == 1 && plane->width == frame.camera.width &&
-                 plane->height == frame.camera.height
+                 plane->height == frame.camera.height && plane->data.size() == plane->byteSize()
              ? plane
              : nullptr;
 }

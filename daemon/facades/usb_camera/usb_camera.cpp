@@ -63,7 +63,7 @@ class UsbCameraFacade final : public Facade {
     auto layout = layoutOf(keys_, place_.keys.source, *description);
     if (!layout) return unplug(layout.error().message);
     if (camera_ && isSameCamera(camera_->layout(), *layout)) return;
-    unplug("the source has become another one");
+    if (camera_) unplug("the source has become another one");
     camera_ = std::make_unique<LiveCamera>(*std::move(layout), *description,
                                            ShortImages::Scale{keys_.depth_unit_mm, keys_.amplitude_per_count},
                                            place_.clock, hooks());

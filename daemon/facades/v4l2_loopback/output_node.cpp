@@ -132,14 +132,19 @@ Result<Format> OutputNode::tryFormat(std::uint32_t code, std::uint32_t width, st
   return Format{wish.fmt.pix.pixelformat, wish.fmt.pix.width, wish.fmt.pix.height};
 }
 
-/// The module says nothing when it does not know a format: it takes another one.
+/// The module says nothing when it does not know a format: it takes another one. Some of its versions, and
+/// other drivers, refuse it; any other error is none of the format's.
 Result<> OutputNode::setFormat(std::span<const std::uint32_t> codes, std::uint32_t width,
                                std::uint32_t height, double rate_hz) {
   format_.reset();
   std::vector<std::string> refused;
   for (const std::uint32_t code : codes) {
     const auto made = tryFormat(code, width, height);
-    if (!made) return made.error();
+    if (!made && made.error().code != Error::Code::InvalidArgument) return made.error();
+    if (!made) {
+      refused.push_back(fmt::format("{} is refused", lettersOf(code)));
+      continue;
+    }
     if (*made == Format{code, width, height}) {
       format_ = *made;
       break;

@@ -156,6 +156,8 @@ TEST_F(UsbCameraFacade, SetsTheSimulatedCameraAndSaysWhatItRefuses) {
 
 TEST_F(UsbCameraFacade, OneHostHasItAtATimeAndTheNextWhenThatLeaves) {
   startCamera(kPattern);
+  EXPECT_EQ(log_->count("the camera is plugged in"), 1);
+  EXPECT_EQ(log_->count("has become another one"), 0) << "it is the first one";
   {
     UsbHost first{port_};
     ASSERT_EQ(first.import(), 0u);

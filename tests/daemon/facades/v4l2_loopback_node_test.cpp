@@ -31,6 +31,8 @@ class FakeNode final : public System {
     }
     if (request != VIDIOC_S_FMT) return 0;
     auto& pix = static_cast<v4l2_format*>(argument)->fmt.pix;
+    ++tried;
+    if (pix.pixelformat == V4L2_PIX_FMT_Z16 && refuses_z16) return -EINVAL;
     if (pix.pixelformat == V4L2_PIX_FMT_Z16 && !knows_z16) pix.pixelformat = V4L2_PIX_FMT_BGR32;
     pix.width = std::min(pix.width, most_width);
     return set_result;
@@ -38,10 +40,10 @@ class FakeNode final : public System {
   std::int64_t write(int, std::span<const std::byte> bytes) override {
     return write_result != 0 ? write_result : static_cast<std::int64_t>(bytes.size());
   }
-  int open_result = 7, query_result = 0, set_result = 0, closed = 0;
+  int open_result = 7, query_result = 0, set_result = 0, closed = 0, tried = 0;
   std::int64_t write_result = 0;
   std::uint32_t caps = V4L2_CAP_VIDEO_OUTPUT | V4L2_CAP_READWRITE, most_width = 8192;
-  bool knows_z16 = false;
+  bool knows_z16 = false, refuses_z16 = false;
 };
 
 constexpr std::array<std::uint32_t, 2> kDepthCodes{V4L2_PIX_FMT_Z16, V4L2_PIX_FMT_Y16};
@@ -70,6 +72,23 @@ TEST(LoopbackNode, AFormatOrSizeThatBecomesAnotherOneIsRefused) {
   const auto wide = node->setFormat(kDepthCodes, 8, 4, 0.0);
   ASSERT_FALSE(wide.ok());
   EXPECT_THAT(wide.error().message, HasSubstr("of 4 x 4"));
+}
+
+TEST(LoopbackNode, AFormatThatIsRefusedIsFollowedByTheNextOneAndOtherErrorsAreNot) {
+  FakeNode fake;
+  fake.refuses_z16 = true;
+  auto node = OutputNode::open(fake, "/dev/video10");
+  ASSERT_TRUE(node->setFormat(kDepthCodes, 8, 4, 0.0).ok());
+  EXPECT_EQ(node->format()->code, V4L2_PIX_FMT_Y16);
+  const auto z16 = node->setFormat(std::span{kDepthCodes}.first(1), 8, 4, 0.0);
+  ASSERT_FALSE(z16.ok());
+  EXPECT_THAT(z16.error().message, HasSubstr("Z16  is refused"));
+  EXPECT_FALSE(node->format().has_value());
+  FakeNode busy;
+  busy.set_result = -EBUSY;
+  auto other = OutputNode::open(busy, "/dev/video10");
+  EXPECT_FALSE(other->setFormat(kDepthCodes, 8, 4, 0.0).ok());
+  EXPECT_EQ(busy.tried, 1);
 }
 
 TEST(LoopbackNode, EachErrorSaysWhatToDo) {
