@@ -123,7 +123,7 @@ class Stub final : public usb_camera::UsbDevice {
     if (has_bytes) transfer.data.resize(transfer.length);
     return has_bytes;
   }
-  [[nodiscard]] SteadyTime due() const override { return SteadyTime::max(); }
+  [[nodiscard]] SteadyTime due(std::uint8_t) const override { return SteadyTime::max(); }
   std::atomic<bool> has_bytes{false};
 };
 

@@ -100,7 +100,7 @@ void Kinect2Device::onInterface(int number, int alternate) {
   next_frame_ = {};
 }
 
-SteadyTime Kinect2Device::due() const {
+SteadyTime Kinect2Device::due(std::uint8_t) const {
   const auto now = std::chrono::steady_clock::now();
   const auto soon = now + std::chrono::milliseconds{20};
   if (!camera_.isStreaming()) return soon;

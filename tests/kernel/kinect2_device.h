@@ -40,7 +40,7 @@ class Kinect2Device final : public UsbDevice {
   void onFunctionSuspend(bool is_suspended) override { camera_.suspend(is_suspended); }
   void onInterface(int number, int alternate) override;
   bool serve(Transfer& transfer, SteadyTime now) override;
-  [[nodiscard]] SteadyTime due() const override;
+  [[nodiscard]] SteadyTime due(std::uint8_t endpoint) const override;
 
  private:
   bool serveAnswer(Transfer& transfer);

@@ -69,11 +69,11 @@ UsbIpPort::~UsbIpPort() {
 
 void UsbIpPort::run(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
-    std::int64_t wait_ms = 1000;
-    if (transfers_.isWaiting()) {
-      const auto left = std::chrono::ceil<std::chrono::milliseconds>(device_->due() - Clock::now());
-      wait_ms = std::clamp<std::int64_t>(left.count(), 0, wait_ms);
-    }
+    constexpr std::chrono::milliseconds kLongest{1000};
+    const auto now = Clock::now();
+    const auto due = std::min(transfers_.due(), now + kLongest);
+    const std::int64_t wait_ms =
+        std::max<std::int64_t>(std::chrono::ceil<std::chrono::milliseconds>(due - now).count(), 0);
     pollfd file{socket_, POLLIN, 0};
     if (::poll(&file, 1, static_cast<int>(wait_ms)) > 0 && !readCommand()) return;
     transfers_.serve(Clock::now());

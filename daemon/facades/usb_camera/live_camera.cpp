@@ -185,6 +185,7 @@ std::int64_t LiveCamera::stampOf(const Frame& frame) const {
 Result<> LiveCamera::take(const Frame& frame) {
   came_ = clock_.steady();
   device_ns_ = stampOf(frame);
+  has_device_time_ = !frame.moment.exposures.empty();
   relation_ = frame.moment.clock;
   for (std::size_t i = 0; i < layout().streams.size(); ++i) {
     const UvcLayout::Stream& stream = layout().streams[i];
@@ -212,10 +213,12 @@ std::optional<Picture> LiveCamera::nextPicture(std::size_t stream, SteadyTime no
 
 void LiveCamera::onReset(std::size_t stream) { waiting_.at(stream) = {}; }
 
-/// By the clocks' relation, or, where that is not known, by how long ago the last frame came.
+/// On the clock that the last frame's stamp is of: the host's, or the device's by the clocks' relation, or,
+/// where that is not known, by how long ago the frame came.
 std::uint32_t LiveCamera::clockNow(SteadyTime) const {
   const std::chrono::nanoseconds since = clock_.steady() - came_;
-  const std::int64_t now_ns = relation_.uncertainty_ns >= 0
+  const std::int64_t now_ns = !has_device_time_ ? clock_.wall().ns
+                              : relation_.uncertainty_ns >= 0
                                   ? clock_.wall().ns - relation_.host_minus_device_ns
                                   : device_ns_ + since.count();
   return static_cast<std::uint32_t>(now_ns / kTick_ns);

@@ -72,8 +72,9 @@ class LiveCamera final : public UvcDevice {
   const Clock& clock_;
   const Hooks hooks_;
   std::array<Waiting, kMostStreams> waiting_;
-  std::shared_ptr<Late> late_;  // shared with who tells how it ended, perhaps when this is gone
-  std::int64_t device_ns_ = 0;  ///< of the last frame
+  std::shared_ptr<Late> late_;    // shared with who tells how it ended, perhaps when this is gone
+  std::int64_t device_ns_ = 0;    ///< stamp of the last frame, which is
+  bool has_device_time_ = false;  ///< of the device's clock, else of the host's
   SteadyTime came_{};
   ClockRelation relation_;
   std::uint64_t lost_ = 0;

@@ -126,8 +126,7 @@ class Server::Connection : public std::enable_shared_from_this<Connection> {
   }
 
   void setTimer() {
-    if (!transfers_->isWaiting()) return;
-    const SteadyTime due = server_.device_->due();
+    const SteadyTime due = transfers_->due();
     if (due == SteadyTime::max() || timer_due_ == due) return;
     timer_due_ = due;
     timer_.expires_at(std::max(due, std::chrono::steady_clock::now() + kShortestWait));

@@ -105,16 +105,34 @@ void Transfers::unlinked(std::uint32_t number, std::uint32_t wanted) {
   appendHeader(output_, {kUnlinked, number, 0, 0, 0, gone > 0 ? static_cast<std::uint32_t>(-ECONNRESET) : 0});
 }
 
+/// The endpoints take turns, so that one that always has something leaves the others their part of a slow
+/// line.
 void Transfers::serve(SteadyTime now) {
   serveControl();
-  for (auto& [endpoint, queue] : waiting_) {
-    while (!queue.empty() && !isFull() && device_.serve(queue.front(), now)) {
-      const Transfer done = std::move(queue.front());
-      queue.pop_front();
-      --waiting_count_;
-      answer(done);
-    }
+  for (std::size_t in_vain = 0; in_vain < waiting_.size() && !isFull();) {
+    auto turn = waiting_.upper_bound(served_last_);
+    if (turn == waiting_.end()) turn = waiting_.begin();
+    served_last_ = turn->first;
+    in_vain = serveFirst(turn->second, now) ? 0 : in_vain + 1;
   }
+}
+
+bool Transfers::serveFirst(std::deque<Transfer>& queue, SteadyTime now) {
+  if (queue.empty() || !device_.serve(queue.front(), now)) return false;
+  const Transfer done = std::move(queue.front());
+  queue.pop_front();
+  --waiting_count_;
+  answer(done);
+  return true;
+}
+
+SteadyTime Transfers::due() const {
+  SteadyTime next = SteadyTime::max();
+  if (isFull()) return next;  // it is the host's turn
+  for (const auto& [endpoint, queue] : waiting_) {
+    if (!queue.empty()) next = std::min(next, device_.due(endpoint));
+  }
+  return next;
 }
 
 /// One after the other, as endpoint 0 does it.

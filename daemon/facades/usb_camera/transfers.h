@@ -38,8 +38,8 @@ class Transfers {
   Bytes& output() { return output_; }
   /// Nothing more is to be read before the host has read.
   [[nodiscard]] bool isFull() const { return output_.size() > kMostOutput; }
-  /// Whether the device must be asked again at its due().
-  [[nodiscard]] bool isWaiting() const { return waiting_count_ > 0; }
+  /// When to serve() again, for the transfers that wait; the end of time: not before something else happens.
+  [[nodiscard]] SteadyTime due() const;
 
  private:
   static constexpr std::size_t kMostOutput = 1U << 20U;
@@ -53,6 +53,7 @@ class Transfers {
   Result<> submitted(std::span<const std::uint32_t> words, std::span<const std::byte> rest);
   void unlinked(std::uint32_t number, std::uint32_t wanted);
   void serveControl();
+  bool serveFirst(std::deque<Transfer>& queue, SteadyTime now);
   void answerControl(const Control& control, const Answer& answer);
   void answer(const Transfer& transfer);
 
@@ -60,6 +61,7 @@ class Transfers {
   Bytes output_;
   std::map<std::uint8_t, std::deque<Transfer>> waiting_;  ///< by endpoint
   std::size_t waiting_count_ = 0;
+  std::uint8_t served_last_ = 0;  ///< endpoint, after which it is the next one's turn
   std::deque<Control> controls_;  ///< the first may be waiting for the device's late answer
   bool is_late_ = false, is_abandoned_ = false;
 };

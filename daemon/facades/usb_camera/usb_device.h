@@ -72,8 +72,8 @@ class UsbDevice {
 
   /// Does the transfer that is first in its endpoint's queue if that can be done now.
   virtual bool serve(Transfer& transfer, SteadyTime now) = 0;
-  /// When to ask serve() again.
-  [[nodiscard]] virtual SteadyTime due() const = 0;
+  /// When to ask serve() again for that endpoint, of which a transfer waits.
+  [[nodiscard]] virtual SteadyTime due(std::uint8_t endpoint) const = 0;
 };
 
 /// Any request on endpoint 0: the standard ones are answered from the descriptors.

@@ -144,11 +144,10 @@ void UvcDevice::reset(std::size_t number) {
 
 void UvcDevice::onClearHalt(std::uint8_t address) { onInterface(static_cast<int>(address & 0x7FU), 0); }
 
-SteadyTime UvcDevice::due() const {
-  SteadyTime next = SteadyTime::max();
-  for (std::size_t i = 0; i < streams_.size(); ++i)
-    next = std::min(next, streams_[i].next_transfer.value_or(nextPictureDue(i)));
-  return next;
+SteadyTime UvcDevice::due(std::uint8_t endpoint) const {
+  const std::size_t number = (endpoint & 0x7FU) - 1U;
+  if (number >= streams_.size()) return SteadyTime::max();  // its transfers are done as they come
+  return streams_[number].next_transfer.value_or(nextPictureDue(number));
 }
 
 bool UvcDevice::begin(std::size_t number, SteadyTime now) {

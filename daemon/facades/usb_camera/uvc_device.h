@@ -34,7 +34,7 @@ class UvcDevice : public UsbDevice {
   void onInterface(int number, int alternate) final;
   void onClearHalt(std::uint8_t endpoint) final;
   bool serve(Transfer& transfer, SteadyTime now) final;
-  [[nodiscard]] SteadyTime due() const final;
+  [[nodiscard]] SteadyTime due(std::uint8_t endpoint) const final;
 
  protected:
   enum class Number { Exposure_100us, Gain };
