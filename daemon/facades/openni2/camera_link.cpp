@@ -16,7 +16,10 @@ using std::chrono::milliseconds;
 constexpr milliseconds kAnswer{2000};  ///< longest wait for a daemon
 constexpr milliseconds kSlice{50};     ///< after which a thread that waits for a frame looks around
 constexpr milliseconds kAgain{300};    ///< between two tries to get a lost source back
-constexpr std::uint32_t kQueue = 16;   ///< frames that may wait for a program that is slow for a moment
+constexpr std::uint32_t kQueue = 16;   ///< frames that may wait for this thread; OpenNI2 keeps the newest
+/// After which a triggered frame counts as lost: the longer of the two.
+constexpr std::chrono::seconds kTriggerPatience{1};
+constexpr double kTriggerPatience_intervals = 4.0;
 constexpr std::uint64_t kMostIndex = 0x7FFF'FFFF;
 
 bool covers(const std::vector<PlaneKind>& has, const std::vector<PlaneKind>& wanted) {
@@ -44,6 +47,7 @@ struct CameraLink::State {
   std::uint64_t starts = 0;  ///< how often frames were wanted after none were
   bool is_subscribed = false;
   enum class Trigger { None, Wanted, Sent } trigger = Trigger::None;
+  std::chrono::steady_clock::time_point trigger_sent{};
 
   std::shared_ptr<Client> connection() {
     const std::scoped_lock lock{mutex};
@@ -54,10 +58,21 @@ struct CameraLink::State {
       const std::scoped_lock lock{mutex};
       if (trigger != Trigger::Wanted || !is_subscribed) return;
       trigger = Trigger::Sent;
+      trigger_sent = std::chrono::steady_clock::now();
     }
     if (to.trigger(place.source)) return;
     const std::scoped_lock lock{mutex};
     if (trigger == Trigger::Sent) trigger = Trigger::Wanted;
+  }
+
+  /// The frame of a trigger may be lost on its way, and the program would wait for ever.
+  void forgetLostTrigger() {
+    const std::chrono::duration<double> slow{
+        kTriggerPatience_intervals * details.frame_interval.value_or(Duration{}).in(second)};
+    const std::chrono::duration<double> patience = std::max<std::chrono::duration<double>>(kTriggerPatience, slow);
+    const std::scoped_lock lock{mutex};
+    if (trigger == Trigger::Sent && std::chrono::steady_clock::now() - trigger_sent > patience)
+      trigger = Trigger::Wanted;
   }
 
   // Of the link's thread alone:
@@ -147,6 +162,7 @@ void CameraLink::State::stream(const std::stop_token& stop, Client& from, const 
       const std::scoped_lock lock{mutex};
       if (wanted.empty() || !covers(planes, wanted)) break;
     }
+    forgetLostTrigger();
     sendTrigger(from);
     const Result<Frame> frame = frames->next(kSlice);
     if (frame) {

@@ -66,17 +66,36 @@ Result<std::vector<Discovery::Change>> Discovery::State::look(Daemon& daemon) co
   return changes;
 }
 
-std::vector<Discovery::Change> Discovery::State::lookEverywhere() {
+std::vector<Discovery::Change> Discovery::State::lookEverywhere(const std::stop_token& stop) {
   const std::scoped_lock lock{mutex};
   std::vector<Change> all;
   for (Daemon& daemon : daemons) {
+    if (stop.stop_requested()) break;
     if (auto changes = look(daemon)) all.insert(all.end(), changes->begin(), changes->end());
   }
   return all;
 }
 
-void Discovery::State::tell(const std::vector<Change>& changes) const {
-  for (const Change& change : changes) (change.has_come ? events.connected : events.disconnected)(change.info);
+/// What is told may end us: then nobody is there for the rest.
+void Discovery::State::tell(const std::vector<Change>& changes, const std::stop_token& stop) const {
+  for (const Change& change : changes) {
+    if (stop.stop_requested()) return;
+    (change.has_come ? events.connected : events.disconnected)(change.info);
+  }
+}
+
+void Discovery::State::tellPosted(const std::stop_token& stop) {
+  decltype(posted) news;
+  {
+    std::unique_lock lock{posted_mutex};
+    posted_changed.wait_for(lock, stop, kInterval, [&] { return !posted.empty(); });
+    news.swap(posted);
+  }
+  for (const auto& [uri, state] : news) {
+    const auto info = infoOf(uri);
+    if (stop.stop_requested()) return;
+    if (info) events.state(*info, state);
+  }
 }
 
 std::optional<OniDeviceInfo> Discovery::State::infoOf(const std::string& uri) {
@@ -91,18 +110,9 @@ std::optional<OniDeviceInfo> Discovery::State::infoOf(const std::string& uri) {
 
 void Discovery::State::run(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
-    decltype(posted) news;
-    {
-      std::unique_lock lock{posted_mutex};
-      posted_changed.wait_for(lock, stop, kInterval, [&] { return !posted.empty(); });
-      news.swap(posted);
-    }
-    if (stop.stop_requested()) return;
     try {
-      for (const auto& [uri, state] : news) {
-        if (const auto info = infoOf(uri)) events.state(*info, state);
-      }
-      tell(lookEverywhere());
+      tellPosted(stop);
+      tell(lookEverywhere(stop), stop);
     } catch (...) {  // NOLINT(bugprone-empty-catch): no memory now; perhaps at the next look
     }
   }
@@ -117,7 +127,7 @@ Discovery::Discovery(const std::vector<std::string>& addresses, Events events)
         state->events = std::move(events);
         if (addresses.empty()) state->daemons.emplace_back();
         for (const std::string& address : addresses) state->daemons.push_back({.address = address});
-        state->tell(state->lookEverywhere());
+        state->tell(state->lookEverywhere({}), {});
         return state;
       }()),
       worker_([shared = state_](const std::stop_token& stop) { shared->run(stop); }) {}
@@ -147,17 +157,19 @@ Result<> Discovery::find(const std::string& uri) {
     if (!is_there) daemon->named.erase(place->source);
     if (is_new && !is_there) daemons.erase(daemon);
   }
-  state_->tell(changes);
+  state_->tell(changes, {});
   if (!is_there) return problem;
   return {};
 }
 
-void Discovery::post(const std::string& uri, OniDeviceState state) {
-  {
-    const std::scoped_lock lock{state_->posted_mutex};
-    state_->posted.emplace_back(uri, state);
-  }
-  state_->posted_changed.notify_all();
+std::function<void(const std::string&, OniDeviceState)> Discovery::poster() const {
+  return [shared = state_](const std::string& uri, OniDeviceState state) {
+    {
+      const std::scoped_lock lock{shared->posted_mutex};
+      shared->posted.emplace_back(uri, state);
+    }
+    shared->posted_changed.notify_all();
+  };
 }
 
 bool Discovery::finish() { return worker_.finish(); }

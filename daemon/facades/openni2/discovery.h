@@ -12,6 +12,7 @@
 #include <mutex>
 #include <optional>
 #include <set>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -35,9 +36,11 @@ class Discovery {
 
   /// Looks for one source that a program names, on the program's thread, and keeps an eye on it from then on.
   Result<> find(const std::string& uri);
-  /// Tells of a device's state on our own thread, where the program may close that device.
-  void post(const std::string& uri, OniDeviceState state);
+  /// Tells of a device's state on our own thread, where the program may close that device. It may be called for as
+  /// long as it is kept.
+  [[nodiscard]] std::function<void(const std::string& uri, OniDeviceState state)> poster() const;
 
+  /// False: the thread is left behind (Worker). It tells of nothing that it was not telling of already.
   bool finish();
 
  private:
@@ -64,8 +67,9 @@ class Discovery {
 
     void run(const std::stop_token& stop);
     Result<std::vector<Change>> look(Daemon& daemon) const;
-    std::vector<Change> lookEverywhere();
-    void tell(const std::vector<Change>& changes) const;
+    std::vector<Change> lookEverywhere(const std::stop_token& stop);
+    void tell(const std::vector<Change>& changes, const std::stop_token& stop) const;
+    void tellPosted(const std::stop_token& stop);
     std::optional<OniDeviceInfo> infoOf(const std::string& uri);
   };
 

@@ -11,10 +11,35 @@
 namespace toftwin::openni2 {
 namespace {
 
+/// The way to something that may be gone: for threads that are left behind (Worker::finish). Nothing is locked while
+/// it is used, so a user that OpenNI2 holds up holds up no other.
+template <class T>
+class WayTo {
+ public:
+  explicit WayTo(T* end) : end_(end) {}
+  /// What began before may go on, in a thread that is held up in OpenNI2 or is the caller; nothing begins any more.
+  void close() {
+    const std::scoped_lock lock{mutex_};
+    end_ = nullptr;
+  }
+  template <class Use>
+  void with(Use use) {
+    if (T* const end = now()) use(*end);
+  }
+
+ private:
+  T* now() {
+    const std::scoped_lock lock{mutex_};
+    return end_;
+  }
+  std::mutex mutex_;
+  T* end_;
+};
+
 /// What OpenNI2 creates once when it starts and destroys when it ends.
 class Driver final : public oni::driver::DriverBase {
  public:
-  explicit Driver(OniDriverServices* services) noexcept : DriverBase(services) {}
+  explicit Driver(OniDriverServices* services) : DriverBase(services) {}
 
   OniStatus initialize(oni::driver::DeviceConnectedCallback connected,
                        oni::driver::DeviceDisconnectedCallback disconnected,
@@ -26,10 +51,14 @@ class Driver final : public oni::driver::DriverBase {
       if (!*configuration_ || (*configuration_)->is_off) return status;
       discovery_ = std::make_unique<Discovery>(
           (*configuration_)->keys.addresses,
-          Discovery::Events{[this](const OniDeviceInfo& info) { deviceConnected(&info); },
-                            [this](const OniDeviceInfo& info) { deviceDisconnected(&info); },
-                            [this](const OniDeviceInfo& info, OniDeviceState state) {
-                              deviceStateChanged(&info, state);
+          Discovery::Events{[way = way_](const OniDeviceInfo& info) {
+                              way->with([&](Driver& it) { it.deviceConnected(&info); });
+                            },
+                            [way = way_](const OniDeviceInfo& info) {
+                              way->with([&](Driver& it) { it.deviceDisconnected(&info); });
+                            },
+                            [way = way_](const OniDeviceInfo& info, OniDeviceState state) {
+                              way->with([&](Driver& it) { it.deviceStateChanged(&info, state); });
                             }});
       return status;
     });
@@ -37,7 +66,9 @@ class Driver final : public oni::driver::DriverBase {
 
   void shutdown() override {
     guarded([&] {
-      if (discovery_ != nullptr && !discovery_->finish()) static_cast<void>(discovery_.release());
+      // A thread that is left behind tells of nothing more (Discovery), and would find nobody to tell.
+      if (discovery_ != nullptr) discovery_->finish();
+      way_->close();
       discovery_.reset();
     });
   }
@@ -63,7 +94,9 @@ class Driver final : public oni::driver::DriverBase {
       auto device = Device::open(
           *std::move(place), configuration.keys,
           {.complain = complain(),
-           .state = [this, name = std::string{uri}](OniDeviceState state) { discovery_->post(name, state); }});
+           .state = [post = discovery_->poster(), name = std::string{uri}](OniDeviceState state) {
+             post(name, state);
+           }});
       if (!device) {
         complain()(device.error().message);
         return nullptr;
@@ -95,11 +128,14 @@ class Driver final : public oni::driver::DriverBase {
 
  private:
   Complain complain() {
-    return [this](std::string_view what) {
-      getServices().errorLoggerAppend("%.*s", static_cast<int>(what.size()), what.data());
+    return [way = way_](std::string_view what) {
+      way->with([&](Driver& it) {
+        it.getServices().errorLoggerAppend("%.*s", static_cast<int>(what.size()), what.data());
+      });
     };
   }
 
+  std::shared_ptr<WayTo<Driver>> way_ = std::make_shared<WayTo<Driver>>(this);
   std::unique_ptr<Result<Configuration>> configuration_;
   std::unique_ptr<Discovery> discovery_;
 };

@@ -326,6 +326,20 @@ TEST_F(OpenNI2Plugin, ASourceThatWaitsForTriggersGivesAFrameToEachThatIsWaitedFo
   EXPECT_LE(health->sources.at(0).frames, 6u) << "no more than were waited for, and one at the start";
 }
 
+TEST_F(OpenNI2Plugin, ATriggeredFrameThatIsLostIsTriggeredAgain) {
+  startWith(kSmallSim + "pace = 'trigger'\n[[source.fault]]\nkind = 'loss'\nfirst = 2\nframes = 2\n");
+  const auto device = openDevice("toftwin:cam");
+  const auto stream = createStream(device, ONI_SENSOR_DEPTH);
+  ASSERT_EQ(oniStreamStart(stream.get()), ONI_STATUS_OK);
+  for (int last = 0; last < 6;) {
+    const auto frame = readFrame(stream);
+    ASSERT_NE(frame, nullptr) << "after " << last;
+    EXPECT_GT(frame->frameIndex, last);
+    last = frame->frameIndex;
+    EXPECT_TRUE(last < 3 || last > 4) << "the third and fourth frame were lost";
+  }
+}
+
 TEST_F(OpenNI2Plugin, LostFramesAreMissingInTheFrameIndex) {
   startWith(kPattern + "[[source.fault]]\nkind = 'loss'\nfirst = 3\nframes = 2\n");
   const auto device = openDevice("toftwin:cam");
@@ -488,6 +502,48 @@ TEST_F(OpenNI2Plugin, NothingIsLeftWhenTheLibraryEnds) {
   }
   EXPECT_TRUE(eventually([&] { return entriesOf("/proc/self/task") <= threads; })) << "the daemon's session ends late";
   EXPECT_TRUE(eventually([&] { return entriesOf("/proc/self/fd") <= files; }));
+}
+
+/// The plug-in without OpenNI2: what it is told in whatever order, and destroyed where a program may do so.
+struct Host {
+  void (*destroy)() = nullptr;
+  std::atomic<int> told{0};
+  std::atomic<bool> is_over{false};
+
+  static void ONI_CALLBACK_TYPE connected(const OniDeviceInfo*, void* self) {
+    auto& it = *static_cast<Host*>(self);
+    if (it.told++ == 0) it.destroy();
+    it.is_over = true;
+  }
+  static void ONI_CALLBACK_TYPE disconnected(const OniDeviceInfo*, void*) {}
+  static void ONI_CALLBACK_TYPE changed(const OniDeviceInfo*, OniDeviceState, void*) {}
+};
+
+// Last: the plug-in stays in memory, as its thread may still be in it.
+TEST_F(OpenNI2Plugin, EndedByWhatItTellsItTellsNothingMore) {
+  start("[[source]]\nname = 'left'\n" + kPattern + "[[source]]\nname = 'right'\n" + kPattern);
+  ::setenv("TOFTWIN_OPENNI2_CONFIG", "/dev/null", 1);
+  ::setenv("TOFTWIN_OPENNI2", ("unix:" + daemon_->socketPath()).c_str(), 1);
+  stop();
+  void* plugin = ::dlopen(TOFTWIN_ONI_PLUGIN, RTLD_NOW | RTLD_LOCAL);
+  ASSERT_NE(plugin, nullptr) << ::dlerror();
+  const auto create = reinterpret_cast<void (*)(OniDriverServices*)>(::dlsym(plugin, "oniDriverCreate"));
+  const auto begin = reinterpret_cast<OniStatus (*)(decltype(&Host::connected), decltype(&Host::disconnected),
+                                                    decltype(&Host::changed), void*)>(
+      ::dlsym(plugin, "oniDriverInitialize"));
+  Host host{.destroy = reinterpret_cast<void (*)()>(::dlsym(plugin, "oniDriverDestroy"))};
+  ASSERT_TRUE(create != nullptr && begin != nullptr && host.destroy != nullptr);
+  const int threads = entriesOf("/proc/self/task");
+  OniDriverServices services{};
+  create(&services);
+  ASSERT_EQ(begin(Host::connected, Host::disconnected, Host::changed, &host), ONI_STATUS_OK);
+  ASSERT_EQ(host.told, 0) << "nobody is there yet";
+  start(options());  // both sources come at once, and the plug-in's thread tells of one and is ended
+  EXPECT_TRUE(eventually([&] { return host.is_over.load(); }));
+  stop();
+  EXPECT_TRUE(eventually([&] { return entriesOf("/proc/self/task") <= threads; })) << "its thread has not ended";
+  EXPECT_EQ(host.told, 1);
+  ::dlclose(plugin);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 
 #include <dlfcn.h>
 #include <gtest/gtest.h>
+#include <openni2/Driver/OniDriverTypes.h>
 #include <openni2/OniCAPI.h>
 
 #include <cstdlib>
