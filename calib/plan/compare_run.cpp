@@ -217,23 +217,52 @@ namespace {
 
 std::string utcOf(std::time_t time) { return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(time)); }
 
-Result<> putIntoLog(const CompareRunJob& job, const RunFiles& files, const ComparedRun& run,
-                    const CaptureRecord& first) {
+/// A log that a run's numbers can be put into, and what it says of the run.
+struct OpenLog {
+  RunLog log;
+  LoggedRun run;
+};
+
+/// All that can fail about the log and can be known beforehand: locked captures are judged only once.
+Result<std::optional<OpenLog>> openLog(const CompareRunJob& job, const RunFiles& files,
+                                       const CaptureRecord& first) {
+  if (job.log.empty()) return std::optional<OpenLog>{};
   auto log = RunLog::open(job.log);
   if (!log) return log.error();
+  if (auto writable = log->checkWritable(); !writable) {
+    return Error{writable.error().code,
+                 fmt::format("{}: cannot be written: {}", job.log.string(), writable.error().message)};
+  }
   auto hash = sha256Of(job.run / kIndexFile);
   if (!hash) return hash.error();
-  LoggedRun entry{.judged = utcOf(std::time(nullptr)),
-                  .began = utcOf(static_cast<std::time_t>(first.began_ns / 1'000'000'000)),
-                  .folder = std::filesystem::absolute(job.run).string(),
-                  .plan = files.plan.name,
-                  .camera_a = files.camera_a,
-                  .camera_b = files.camera_b,
-                  .software = "toftwin " TOFTWIN_VERSION,
-                  .note = job.note,
-                  .index_sha256 = *std::move(hash),
-                  .is_locked = job.locked};
-  return log->add(entry, traitsOf(run));
+  LoggedRun run{.began = utcOf(static_cast<std::time_t>(first.began_ns / 1'000'000'000)),
+                .folder = std::filesystem::absolute(job.run).string(),
+                .plan = files.plan.name,
+                .camera_a = files.camera_a,
+                .camera_b = files.camera_b,
+                .software = "toftwin " TOFTWIN_VERSION,
+                .note = job.note,
+                .index_sha256 = *std::move(hash),
+                .is_locked = job.locked};
+  return std::optional<OpenLog>{OpenLog{*std::move(log), std::move(run)}};
+}
+
+compare::Report reportOf(const CompareRunJob& job, const RunFiles& files,
+                         const std::vector<CaptureRecord>& records, compare::Finding finding) {
+  compare::Report report{.title = "Comparison of time-of-flight cameras"};
+  report.subtitle = fmt::format("{} against {}: {} {}captures of the plan \"{}\"", records.front().b.source,
+                                records.front().a.source, records.size(), job.locked ? "locked " : "",
+                                files.plan.name);
+  report.verdict = finding.headline + ".";
+  report.tone = finding.section.tone;
+  report.cards = std::move(finding.cards);
+  report.data.set(finding.section.id, std::move(finding.data));
+  report.sections.push_back(std::move(finding.section));
+  report.colophon =
+      fmt::format("toftwin {}, {}{}{}", TOFTWIN_VERSION, today(), job.note.empty() ? "" : ", ", job.note);
+  report.data.set("software", "toftwin " TOFTWIN_VERSION).set("date", today()).set("note", job.note);
+  report.data.set("verdict", report.verdict).set("folder", job.run.string()).set("locked", job.locked);
+  return report;
 }
 
 }  // namespace
@@ -251,14 +280,16 @@ Result<std::filesystem::path> compareRun(const CompareRunJob& job, compare::Prog
     return Error{Error::Code::InvalidArgument, fmt::format("{}: there are no {}captures to compare",
                                                            job.run.string(), job.locked ? "locked " : "")};
   }
-  if (job.locked) {
-    if (auto opened = openLocked(job, records); !opened) return opened.error();
-  }
+  auto log = openLog(job, *files, records.front());
+  if (!log) return log.error();
   std::error_code failed;
   std::filesystem::create_directories(job.output, failed);
   if (failed) {
     return Error{Error::Code::StorageFull, fmt::format("{}: cannot make the report's folder: {}",
                                                        job.output.string(), failed.message())};
+  }
+  if (job.locked) {
+    if (auto opened = openLocked(job, records); !opened) return opened.error();
   }
   progress.plan(fmt::format("{} captures", records.size()), 0.3 * static_cast<double>(records.size()));
   progress.plan("report", 3.0);
@@ -269,24 +300,16 @@ Result<std::filesystem::path> compareRun(const CompareRunJob& job, compare::Prog
   progress.begin();
   auto finding = judgeRun(*run);
   if (!finding) return finding.error();
-    progress.end();
-  if (!job.log.empty()) {
-    if (auto logged = putIntoLog(job, *files, *run, records.front()); !logged) return logged.error();
+  progress.end();
+  auto page = compare::write(reportOf(job, *files, records, *std::move(finding)), job.output);
+  if (!page || !*log) return page;
+  (*log)->run.judged = utcOf(std::time(nullptr));
+  if (auto logged = (*log)->log.add((*log)->run, traitsOf(*run)); !logged) {
+    return Error{logged.error().code,
+                 fmt::format("{} is written, with all numbers in report.json beside it, but they are not in {}: {}",
+                             page->string(), job.log.string(), logged.error().message)};
   }
-  compare::Report report{.title = "Comparison of time-of-flight cameras"};
-  report.subtitle =
-      fmt::format("{} against {}: {} {}captures of the plan \"{}\"", records.front().b.source,
-                  records.front().a.source, records.size(), job.locked ? "locked " : "", files->plan.name);
-  report.verdict = finding->headline + ".";
-  report.tone = finding->section.tone;
-  report.cards = std::move(finding->cards);
-  report.data.set(finding->section.id, std::move(finding->data));
-  report.sections.push_back(std::move(finding->section));
-  report.colophon =
-      fmt::format("toftwin {}, {}{}{}", TOFTWIN_VERSION, today(), job.note.empty() ? "" : ", ", job.note);
-  report.data.set("software", "toftwin " TOFTWIN_VERSION).set("date", today()).set("note", job.note);
-  report.data.set("verdict", report.verdict).set("folder", job.run.string()).set("locked", job.locked);
-  return compare::write(report, job.output);
+  return page;
 }
 
 }  // namespace toftwin::plan

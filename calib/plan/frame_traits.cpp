@@ -96,8 +96,8 @@ void addNoise(const Captures& walls, std::size_t camera, TraitCollector& all) {
         std::abs(one->record.distance_m - middle) < std::abs(best->record.distance_m - middle))
       best = one;
   }
-  all.add(fmt::format("noise of frames at {:.3g} m", best->record.distance_m), kNames[camera],
-          best->seen[camera].noise);
+  all.add("noise of frames", kNames[camera], best->seen[camera].noise,
+          fmt::format("at {:.3g} m", best->record.distance_m));
 }
 
 void addWraps(const Captures& walls, std::size_t camera, TraitCollector& all) {
@@ -264,12 +264,13 @@ void addLatency(const ComparedRun& run, TraitCollector& all) {
 
 }  // namespace
 
-void TraitCollector::add(const std::string& what, const char* of, const compare::Traits& traits) {
+void TraitCollector::add(const std::string& what, const char* of, const compare::Traits& traits,
+                         const std::string& detail) {
   if (!traits) {
     found_.untold.push_back(fmt::format("{} of {}: {}", what, of, traits.error().message));
     return;
   }
-  for (const compare::Trait& trait : *traits) found_.traits.push_back({what, of, trait});
+  for (const compare::Trait& trait : *traits) found_.traits.push_back({what, detail, of, trait});
 }
 
 void addFrameTraits(const ComparedRun& run, TraitCollector& all) {

@@ -8,7 +8,8 @@ namespace toftwin::plan {
 /// Gathers what blocks tell, and why others do not.
 class TraitCollector {
  public:
-  void add(const std::string& what, const char* of, const compare::Traits& traits);
+  void add(const std::string& what, const char* of, const compare::Traits& traits,
+           const std::string& detail = {});
   /// What no block of the run tells, and which would.
   void untold(std::string why) { found_.untold.push_back(std::move(why)); }
   RunTraits found() && { return std::move(found_); }

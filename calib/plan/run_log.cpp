@@ -13,6 +13,7 @@ namespace toftwin::plan {
 namespace {
 
 constexpr int kVersion = 1;
+constexpr std::int64_t kApplicationId = 0x746F6674;  ///< "toft": what says that a database is such a log
 /// What brings a log from one version to the next; the first makes it.
 constexpr std::array kMigrations{
     "CREATE TABLE run (id INTEGER PRIMARY KEY, judged TEXT NOT NULL, began TEXT NOT NULL, folder TEXT NOT "
@@ -22,8 +23,8 @@ constexpr std::array kMigrations{
     " index_sha256 TEXT NOT NULL, locked INTEGER NOT NULL, UNIQUE (index_sha256, locked));"
     "CREATE TABLE characteristic (run INTEGER NOT NULL REFERENCES run (id) ON DELETE CASCADE, of TEXT NOT "
     "NULL,"
-    " what TEXT NOT NULL, name TEXT NOT NULL, unit TEXT NOT NULL, value REAL, low REAL, high REAL, n INTEGER "
-    "NOT NULL,"
+    " what TEXT NOT NULL, detail TEXT NOT NULL, name TEXT NOT NULL, unit TEXT NOT NULL, value REAL, low REAL,"
+    " high REAL, n INTEGER NOT NULL,"
     " PRIMARY KEY (run, of, what, name));"
     "CREATE TABLE untold (run INTEGER NOT NULL REFERENCES run (id) ON DELETE CASCADE, why TEXT NOT NULL);"};
 static_assert(kMigrations.size() == kVersion);
@@ -113,9 +114,9 @@ Result<> write(sqlite3* database, const LoggedRun& run, const RunTraits& traits)
     insert.bind(*text);
   if (auto done = insert.bind(std::int64_t{run.is_locked}).run(); !done) return done;
   const std::int64_t id = sqlite3_last_insert_rowid(database);
-  for (const auto& [what, of, trait] : traits.traits) {
-    Statement row{database, "INSERT OR REPLACE INTO characteristic VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)"};
-    row.bind(id).bind(of).bind(what).bind(trait.name).bind(trait.unit);
+  for (const auto& [what, detail, of, trait] : traits.traits) {
+    Statement row{database, "INSERT OR REPLACE INTO characteristic VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)"};
+    row.bind(id).bind(of).bind(what).bind(detail).bind(trait.name).bind(trait.unit);
     row.bindReal(trait.value).bindReal(trait.low).bindReal(trait.high);
     if (auto done = row.bind(static_cast<std::int64_t>(trait.n)).run(); !done) return done;
   }
@@ -124,6 +125,59 @@ Result<> write(sqlite3* database, const LoggedRun& run, const RunTraits& traits)
     if (auto done = row.bind(id).bind(why).run(); !done) return done;
   }
   return {};
+}
+
+Result<std::int64_t> numberOf(sqlite3* database, const std::string& question) {
+  std::int64_t number = 0;
+  Statement asked{database, question};
+  if (auto done = asked.each([&](Statement& row) { number = row.number(); }); !done) return done.error();
+  return number;
+}
+
+/// The log's version: 0 of an empty database. Why it is no log of ours, as an Error.
+Result<std::int64_t> versionOf(sqlite3* database) {
+  const auto id = numberOf(database, "PRAGMA application_id");
+  if (!id) {
+    return Error{Error::Code::InvalidArgument,
+                 fmt::format("is no SQLite database that can be read: {}", sqlite3_errmsg(database))};
+  }
+  const auto version = numberOf(database, "PRAGMA user_version");
+  if (!version) return version.error();
+  const auto tables = numberOf(database, "SELECT count(*) FROM sqlite_master");
+  if (!tables) return tables.error();
+  const bool is_empty = *id == 0 && *version == 0 && *tables == 0;
+  if (*id != kApplicationId && !is_empty)
+    return Error{Error::Code::InvalidArgument, "is a database of something else"};
+  if (*version > kVersion) {
+    return Error{Error::Code::InvalidArgument,
+                 fmt::format("is of version {}, which a newer toftwin made; this one knows {}", *version, kVersion)};
+  }
+  if (*version < 0 || (*version == 0 && !is_empty)) {
+    return Error{Error::Code::InvalidArgument,
+                 fmt::format("is of version {}, which no toftwin makes: the file is damaged", *version)};
+  }
+  return version;
+}
+
+/// Brings it to this version; to be called within a transaction that nobody else can write in.
+Result<> migrate(sqlite3* database) {
+  const auto version = versionOf(database);
+  if (!version) return version.error();
+  for (std::int64_t from = *version; from < kVersion; ++from) {
+    const std::string sql = fmt::format("{} PRAGMA application_id = {}; PRAGMA user_version = {};",
+                                        kMigrations[static_cast<std::size_t>(from)], kApplicationId, from + 1);
+    if (auto done = execute(database, sql.c_str()); !done) return done;
+  }
+  return {};
+}
+
+/// Does it all, or nothing of it.
+Result<> within(sqlite3* database, const char* begin, const std::function<Result<>()>& work) {
+  if (auto begun = execute(database, begin); !begun) return begun;
+  auto done = work();
+  if (done) done = execute(database, "COMMIT");
+  if (!done) static_cast<void>(execute(database, "ROLLBACK"));
+  return done;
 }
 
 }  // namespace
@@ -137,30 +191,29 @@ Result<RunLog> RunLog::open(const std::filesystem::path& file) {
   };
   if (opened != SQLITE_OK) return refuse(fmt::format("cannot be opened as a log: {}", sqlite3_errmsg(raw)));
   sqlite3_busy_timeout(raw, 5000);
-  std::int64_t version = -1, tables = 0;
-  Statement asked{raw, "PRAGMA user_version"};
-  if (auto done = asked.each([&](Statement& row) { version = row.number(); }); !done)
-    return refuse(fmt::format("is no SQLite database: {}", sqlite3_errmsg(raw)));
-  Statement counted{raw, "SELECT count(*) FROM sqlite_master"};
-  if (auto done = counted.each([&](Statement& row) { tables = row.number(); }); !done) return done.error();
-  if (version > kVersion)
-    return refuse(
-        fmt::format("is of version {}, which a newer toftwin made; this one knows {}", version, kVersion));
-  if (version == 0 && tables > 0) return refuse("is a database of something else");
-  if (auto done = execute(raw, "PRAGMA foreign_keys = ON"); !done) return done.error();
-  for (std::int64_t from = version; from < kVersion; ++from) {
-    const std::string sql = fmt::format("BEGIN; {} PRAGMA user_version = {}; COMMIT;",
-                                        kMigrations[static_cast<std::size_t>(from)], from + 1);
-    if (auto done = execute(raw, sql.c_str()); !done) return done.error();
+  // A log of this version is only read here, so that one which may not be written can be looked at.
+  std::int64_t version = 0;
+  const auto looked = within(raw, "BEGIN", [&]() -> Result<> {
+    const auto there = versionOf(raw);
+    if (!there) return there.error();
+    version = *there;
+    return {};
+  });
+  if (!looked) return refuse(looked.error().message);
+  if (version < kVersion) {
+    if (auto done = within(raw, "BEGIN IMMEDIATE", [&] { return migrate(raw); }); !done)
+      return refuse(done.error().message);
   }
+  if (auto done = execute(raw, "PRAGMA foreign_keys = ON"); !done) return done.error();
   return log;
 }
 
+Result<> RunLog::checkWritable() {
+  return within(database_.get(), "BEGIN IMMEDIATE", [] { return Result<>{}; });
+}
+
 Result<> RunLog::add(const LoggedRun& run, const RunTraits& traits) {
-  if (auto begun = execute(database_.get(), "BEGIN IMMEDIATE"); !begun) return begun;
-  auto done = write(database_.get(), run, traits);
-  if (auto ended = execute(database_.get(), done ? "COMMIT" : "ROLLBACK"); done && !ended) return ended;
-  return done;
+  return within(database_.get(), "BEGIN IMMEDIATE", [&] { return write(database_.get(), run, traits); });
 }
 
 Result<std::vector<LoggedRun>> RunLog::runs() {
@@ -176,14 +229,14 @@ Result<std::vector<LoggedTrait>> RunLog::traits(const std::string& camera, const
   std::vector<LoggedTrait> all;
   Statement asked{
       database_.get(),
-      fmt::format("SELECT {}, of, what, name, unit, value, low, high, n FROM characteristic JOIN run ON "
+      fmt::format("SELECT {}, of, what, detail, name, unit, value, low, high, n FROM characteristic JOIN run ON "
                   "run = run.id WHERE substr(what, 1, length(?1)) = ?1 AND substr(name, 1, length(?2)) = "
                   "?2 ORDER BY what, name, of, began, run.id",
                   kRunColumns)};
   asked.bind(what).bind(name);
   const auto done = asked.each([&](Statement& row) {
     LoggedTrait one{.run = runFrom(row), .trait = {}};
-    one.trait.of = row.text(), one.trait.what = row.text();
+    one.trait.of = row.text(), one.trait.what = row.text(), one.trait.detail = row.text();
     auto& trait = one.trait.trait;
     trait.name = row.text(), trait.unit = row.text();
     trait.value = row.real(), trait.low = row.real(), trait.high = row.real();

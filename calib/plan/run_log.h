@@ -38,6 +38,8 @@ class RunLog {
   /// Made if it is not there, brought to this version's schema if it is older. Errors: a file that is no such
   /// log, or one of a newer version.
   static Result<RunLog> open(const std::filesystem::path& file);
+  /// Error where nothing can be added now: no right to write, or somebody else writes for more than 5 s.
+  Result<> checkWritable();
   Result<> add(const LoggedRun& run, const RunTraits& traits);
   /// By when they began.
   Result<std::vector<LoggedRun>> runs();

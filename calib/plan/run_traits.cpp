@@ -104,7 +104,7 @@ void addDrift(const ComparedRun& run, TraitCollector& all) {
     const auto drift =
         compare::driftTraits(column(captures, side.since_power_on_s), column(captures, side.range_mm));
     if (drift) {
-      all.add(fmt::format("drift, {}", nameOf(drift->model)), side.name, drift->traits);
+      all.add("drift", side.name, drift->traits, nameOf(drift->model));
     } else {
       all.add("drift", side.name, drift.error());
     }
@@ -213,7 +213,7 @@ compare::TableBlock traitTable(const RunTraits& traits) {
       {"characteristic", "number", "unit", "A", "B", "B − A, or both"},
       {}};
   std::vector<std::pair<std::string, std::string>> keys;
-  for (const auto& [what, of, trait] : traits.traits) {
+  for (const auto& [what, detail, of, trait] : traits.traits) {
     const std::pair key{what, trait.name};
     auto row = static_cast<std::size_t>(std::ranges::find(keys, key) - keys.begin());
     if (row == keys.size()) {
@@ -221,7 +221,8 @@ compare::TableBlock traitTable(const RunTraits& traits) {
       table.rows.push_back({what, trait.name, trait.unit, "", "", ""});
     }
     table.rows[row][of == "A" ? 3 : of == "B" ? 4 : 5] =
-        fmt::format("{:.4g} ({:.4g} to {:.4g}) #{}", trait.value, trait.low, trait.high, trait.n);
+        fmt::format("{:.4g} ({:.4g} to {:.4g}) #{}{}{}", trait.value, trait.low, trait.high, trait.n,
+                    detail.empty() ? "" : ", ", detail);
   }
   return table;
 }
@@ -236,9 +237,9 @@ std::vector<std::string> feedsOf(std::string_view kind) {
 
 compare::Json toJson(const RunTraits& traits) {
   compare::Json rows = compare::Json::array(), untold = compare::Json::array();
-  for (const auto& [what, of, trait] : traits.traits) {
+  for (const auto& [what, detail, of, trait] : traits.traits) {
     compare::Json row = compare::Json::object();
-    row.set("characteristic", what).set("of", of).set("name", trait.name).set("unit", trait.unit);
+    row.set("characteristic", what).set("detail", detail).set("of", of).set("name", trait.name).set("unit", trait.unit);
     row.set("value", trait.value).set("low", trait.low).set("high", trait.high).set("n", trait.n);
     rows.push(std::move(row));
   }

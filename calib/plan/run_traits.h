@@ -14,8 +14,9 @@ namespace toftwin::plan {
 /// A characteristic of a run. Over captures each is a row: its mean over the pixels that both cameras see. Errors of a
 /// camera by itself are against the surfaces that the plan puts before it.
 struct RunTrait {
-  std::string what{};  ///< "drift, ramp"
-  std::string of{};    ///< "A", "B" or "B − A"
+  std::string what{};    ///< "drift"
+  std::string detail{};  ///< what may be another in the next run: the model that was chosen, "at 1.5 m"
+  std::string of{};      ///< "A", "B" or "B − A"
   compare::Trait trait{};
 };
 struct RunTraits {

@@ -3,6 +3,7 @@
 #include "calib/plan/run_log.h"
 
 #include <gmock/gmock.h>
+#include <sqlite3.h>
 #include <unistd.h>
 
 #include <cmath>
@@ -10,6 +11,8 @@
 #include <fstream>
 
 #include <fmt/format.h>
+
+#include "calib/plan/trend.h"
 
 namespace toftwin::plan {
 namespace {
@@ -35,11 +38,21 @@ class Log : public testing::Test {
   }
   static RunTraits drifts(double a, double b) {
     RunTraits all;
-    all.traits = {{"drift, ramp", "A", {"drift", "mm", a, a - 1.0, a + 1.0, 14}},
-                  {"drift, ramp", "B", {"drift", "mm", b, b - 0.5, std::nan(""), 12}},
-                  {"masks", "A and B", {"kappa", "1", 0.9, 0.8, 1.0, 80}}};
+    all.traits = {{"drift", "ramp", "A", {"drift", "mm", a, a - 1.0, a + 1.0, 14}},
+                  {"drift", "ramp", "B", {"drift", "mm", b, b - 0.5, std::nan(""), 12}},
+                  {"masks", "", "A and B", {"kappa", "1", 0.9, 0.8, 1.0, 80}}};
     all.untold = {"latency: nothing moves"};
     return all;
+  }
+  void sql(const std::string& text) const {
+    sqlite3* raw = nullptr;
+    EXPECT_EQ(sqlite3_open(file_.c_str(), &raw), SQLITE_OK);
+    EXPECT_EQ(sqlite3_exec(raw, text.c_str(), nullptr, nullptr, nullptr), SQLITE_OK) << sqlite3_errmsg(raw);
+    sqlite3_close(raw);
+  }
+  std::string refusal() const {
+    const auto log = RunLog::open(file_);
+    return log ? "it was opened" : log.error().message;
   }
   fs::path folder_ = fs::temp_directory_path() / fmt::format("toftwin_log_{}", getpid());
   fs::path file_ = folder_ / "log.sqlite";
@@ -64,6 +77,7 @@ TEST_F(Log, GivesWhatWasPutInByTheRunsBeginning) {
   EXPECT_EQ(of_b->back().trait.trait.value, 4.0);
   EXPECT_TRUE(std::isnan(of_b->front().trait.trait.high));
   EXPECT_EQ(of_b->front().trait.trait.n, 12u);
+  EXPECT_EQ(of_b->front().trait.detail, "ramp");
   EXPECT_EQ(again->traits("", "", "")->size(), 6u);
   EXPECT_TRUE(again->traits("nobody", "", "")->empty());
 }
@@ -83,6 +97,98 @@ TEST_F(Log, RefusesWhatIsNone) {
   std::ofstream{file_} << std::string(5000, 'x');
   EXPECT_THAT(RunLog::open(file_).error().message, HasSubstr("is no SQLite database"));
   EXPECT_THAT(RunLog::open(folder_ / "none" / "log").error().message, HasSubstr("cannot be opened"));
+}
+
+TEST_F(Log, RefusesADatabaseOfSomethingElse) {
+  sql("CREATE TABLE bird (name TEXT); PRAGMA user_version = 1");
+  EXPECT_THAT(refusal(), HasSubstr("is a database of something else"));
+  sql("PRAGMA user_version = 0");
+  EXPECT_THAT(refusal(), HasSubstr("is a database of something else"));
+  sql("PRAGMA user_version = -1");
+  EXPECT_THAT(refusal(), HasSubstr("is a database of something else"));
+}
+
+TEST_F(Log, RefusesAVersionThatItDoesNotKnow) {
+  ASSERT_TRUE(RunLog::open(file_));
+  EXPECT_EQ(refusal(), "it was opened");
+  sql("PRAGMA user_version = 2");
+  EXPECT_THAT(refusal(), HasSubstr("is of version 2, which a newer toftwin made"));
+  for (const char* version : {"-1", "-2147483648", "0"}) {
+    sql(fmt::format("PRAGMA user_version = {}", version));
+    EXPECT_THAT(refusal(), HasSubstr(fmt::format("is of version {}, which no toftwin makes", version)));
+  }
+}
+
+TEST_F(Log, AddsAllOfARunOrNothing) {
+  auto log = RunLog::open(file_);
+  ASSERT_TRUE(log);
+  sql("CREATE TRIGGER no BEFORE INSERT ON untold BEGIN SELECT RAISE(FAIL, 'the disk is full'); END");
+  const auto refused = log->add(run("2026-11-01T00:00:00Z", "aa"), drifts(1.0, 2.0));
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().message, HasSubstr("the disk is full"));
+  EXPECT_TRUE(log->runs()->empty());
+  EXPECT_TRUE(log->checkWritable());
+}
+
+/// Runs 1 and 3 are of one camera, run 2, in between, of another.
+TEST_F(Log, HoldsEachCameraAgainstItsOwnFirstRun) {
+  auto log = RunLog::open(file_);
+  ASSERT_TRUE(log);
+  ASSERT_TRUE(log->add(run("2026-11-01T00:00:00Z", "aa"), drifts(1.0, 2.0)));
+  LoggedRun other = run("2026-11-02T00:00:00Z", "bb");
+  other.camera_a = "kinect, Kinect v2 2";
+  ASSERT_TRUE(log->add(other, drifts(30.0, 2.0)));
+  RunTraits last = drifts(7.0, 2.0);
+  last.traits[0].detail = "one exponential";
+  ASSERT_TRUE(log->add(run("2026-11-03T00:00:00Z", "cc"), last));
+  const auto trends = trendsOf(*log->traits("kinect", "drift", "drift"));
+  ASSERT_EQ(trends.size(), 2u);
+  EXPECT_EQ(trends[0].title, "drift: drift [mm], A kinect, Kinect v2 1, plan \"standard\"");
+  ASSERT_EQ(trends[0].rows.size(), 2u);
+  EXPECT_TRUE(trends[0].rows[0].is_first);
+  EXPECT_FALSE(trends[0].rows[0].isChanged());
+  EXPECT_EQ(trends[0].rows[1].change, 6.0);
+  EXPECT_TRUE(trends[0].rows[1].isChanged());
+  ASSERT_EQ(trends[1].rows.size(), 1u);
+  // B alone is the same camera in all three; another plan or locked captures are a series of their own.
+  EXPECT_EQ(trendsOf(*log->traits("twin", "drift", "")).size(), 1u);
+  LoggedRun locked = run("2026-11-04T00:00:00Z", "cc"), planned = run("2026-11-04T00:00:00Z", "dd");
+  locked.is_locked = true, planned.plan = "short";
+  ASSERT_TRUE(log->add(locked, drifts(7.0, 2.0)) && log->add(planned, drifts(7.0, 2.0)));
+  EXPECT_EQ(trendsOf(*log->traits("twin", "drift", "")).size(), 3u);
+}
+
+/// Intervals with a long and a short side: what counts are the sides that face each other.
+TEST(Trend, UsesTheSidesThatFaceEachOther) {
+  const auto of = [](std::string began, double value, double low, double high) {
+    LoggedTrait one{.run = {.began = std::move(began)}, .trait = {}};
+    one.trait = {"drift", "", "A", {"time constant", "s", value, low, high, 9}};
+    return one;
+  };
+  const LoggedTrait first = of("1", 10.0, 9.0, 18.0);
+  const auto one = [&](const LoggedTrait& now) { return trendsOf({first, now}).front().rows[1]; };
+  // Below: 10 − 9 and 7.5 − 7 face each other.
+  EXPECT_TRUE(one(of("2", 7.0, 1.0, 7.5)).isChanged());
+  EXPECT_DOUBLE_EQ(one(of("2", 7.0, 1.0, 7.5)).high, -3.0 + std::hypot(0.5, 1.0));
+  // Above: 18 − 10 faces 16 − 15.5; half widths (4.5 and 0.5) would call it changed.
+  EXPECT_FALSE(one(of("2", 16.0, 15.5, 16.5)).isChanged());
+  EXPECT_DOUBLE_EQ(one(of("2", 16.0, 15.5, 16.5)).low, 6.0 - std::hypot(0.5, 8.0));
+  EXPECT_FALSE(one(of("2", 16.0, std::nan(""), std::nan(""))).isChanged());
+}
+
+/// The normal quantile of 0.95^(1/2), two-sided, is 2.2365; of 0.95, 1.9600 (tables of Šidák's method).
+TEST(Trend, WidensByHowManyChangesThereAre) {
+  std::vector<LoggedTrait> runs;
+  for (const auto& [began, value] : {std::pair{"1", 0.0}, {"2", 1.5}, {"3", 0.0}}) {
+    LoggedTrait& one = runs.emplace_back();
+    one.run.began = began;
+    one.trait = {"drift", "", "A", {"drift", "mm", value, value - 1.0, value + 1.0, 9}};
+  }
+  EXPECT_FALSE(trendsOf(runs).front().rows[1].isChanged());
+  EXPECT_NEAR(trendsOf(runs).front().rows[1].low, 1.5 - 2.2365 / 1.9600 * std::sqrt(2.0), 1e-4);
+  runs.pop_back();
+  EXPECT_TRUE(trendsOf(runs).front().rows[1].isChanged());
+  EXPECT_TRUE(trendsOf({}).empty());
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "calib/plan/run_log.h"
+#include "calib/plan/trend.h"
 #include "tools/cli/log.h"
 
 namespace toftwin::cli {
@@ -39,12 +40,12 @@ Result<Exit> showLog(const Options& options) {
     const auto all = log->traits("", "", "");
     if (!all) return all.error();
     fmt::print(
-        "run,began,judged,plan,locked,camera_a,camera_b,of,characteristic,number,unit,value,low,high,n,"
+        "run,began,judged,plan,locked,camera_a,camera_b,of,characteristic,detail,number,unit,value,low,high,n,"
         "folder\n");
     for (const auto& [run, one] : *all) {
-      fmt::print("{},{},{},{},{},{},{},{},{},{},{},{:.9g},{:.9g},{:.9g},{},{}\n", run.id, run.began,
+      fmt::print("{},{},{},{},{},{},{},{},{},{},{},{},{:.9g},{:.9g},{:.9g},{},{}\n", run.id, run.began,
                  run.judged, quoted(run.plan), run.is_locked ? 1 : 0, quoted(run.camera_a),
-                 quoted(run.camera_b), quoted(one.of), quoted(one.what), quoted(one.trait.name),
+                 quoted(run.camera_b), quoted(one.of), quoted(one.what), quoted(one.detail), quoted(one.trait.name),
                  quoted(one.trait.unit), one.trait.value, one.trait.low, one.trait.high, one.trait.n,
                  quoted(run.folder));
     }
@@ -57,8 +58,17 @@ Result<Exit> showLog(const Options& options) {
   return Exit::Ok;
 }
 
-/// Values over the runs, each against the first of the same number: both intervals are 95 %, so a difference
-/// beyond √(h² + h₁²) is one that chance makes in one of twenty.
+std::string verdictOn(const plan::TrendRow& row, const std::string& first_detail) {
+  if (row.is_first) return "the first";
+  std::string verdict = std::isfinite(row.low) && std::isfinite(row.high)
+                            ? fmt::format("{:+.4g} ({:+.4g} to {:+.4g}){}", row.change, row.low, row.high,
+                                          row.isChanged() ? ": changed" : "")
+                            : fmt::format("{:+.4g}, not known how surely", row.change);
+  if (row.at.trait.detail != first_detail) verdict += fmt::format("; the first was {}", first_detail);
+  return verdict;
+}
+
+/// Values over the runs, each against the first of the same number.
 Result<Exit> showTrend(const Options& options) {
   auto log = openExisting(options.file);
   if (!log) return log.error();
@@ -69,27 +79,15 @@ Result<Exit> showTrend(const Options& options) {
                  fmt::format("{}: nothing of a camera \"{}\", a characteristic \"{}\" and a number \"{}\"",
                              options.file, options.camera, options.characteristic, options.number)};
   }
-  const plan::LoggedTrait* first = nullptr;
-  std::string title;
-  for (const plan::LoggedTrait& one : *all) {
-    const auto& [what, of, trait] = one.trait;
-    const std::string& camera = of == "B" ? one.run.camera_b : one.run.camera_a;
-    const std::string now = fmt::format("{}: {} [{}], {} {}", what, trait.name, trait.unit, of,
-                                        of == "A" || of == "B" ? camera : "");
-    if (now != title) {
-      fmt::print("{}\n", now);
-      title = now, first = &one;
+  for (const plan::TrendSeries& series : plan::trendsOf(*all)) {
+    fmt::print("{}\n", series.title);
+    for (const plan::TrendRow& row : series.rows) {
+      const compare::Trait& trait = row.at.trait.trait;
+      const std::string& detail = row.at.trait.detail;
+      fmt::print("  run {:>4}  {:<20}  {:>11.5g}  ({:.5g} to {:.5g}) #{}{}{}  {}\n", row.at.run.id, row.at.run.began,
+                 trait.value, trait.low, trait.high, trait.n, detail.empty() ? "" : ", ", detail,
+                 verdictOn(row, series.rows.front().at.trait.detail));
     }
-    const double half = 0.5 * (trait.high - trait.low),
-                 half_first = 0.5 * (first->trait.trait.high - first->trait.trait.low);
-    const double change = trait.value - first->trait.trait.value, most = std::hypot(half, half_first);
-    const std::string verdict = &one == first          ? "the first"
-                                : !std::isfinite(most) ? fmt::format("{:+.4g}, not known how surely", change)
-                                : std::abs(change) > most
-                                    ? fmt::format("{:+.4g} ± {:.2g}: changed", change, most)
-                                    : fmt::format("{:+.4g} ± {:.2g}", change, most);
-    fmt::print("  run {:>4}  {:<20}  {:>11.5g}  ({:.5g} to {:.5g}) #{}  {}\n", one.run.id, one.run.began,
-               trait.value, trait.low, trait.high, trait.n, verdict);
   }
   return Exit::Ok;
 }
