@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <spawn.h>
+#include <sqlite3.h>
 #include <sys/wait.h>
 
 #include <chrono>
@@ -17,6 +18,7 @@
 #include <thread>
 
 #include "calib/plan/run_index.h"
+#include "calib/plan/run_log.h"
 #include "protocol/record/recording.h"
 #include "tests/tools/with_daemon.h"
 
@@ -326,6 +328,30 @@ TEST_F(Judged, OpensLockedCapturesOnce) {
   const Ran second = compare("--locked");
   EXPECT_EQ(second.status, 4);
   EXPECT_THAT(second.err, HasSubstr("the locked captures were opened on 20"));
+}
+
+/// What can go wrong with the log or the report's folder is known before; what cannot, after the report is written.
+TEST_F(Judged, LosesNoJudgementOfLockedCapturesToALog) {
+  write("none.sqlite", std::string(5000, 'x'));
+  const Ran refused = compare("--locked --log " + path("none.sqlite"));
+  EXPECT_NE(refused.status, 0);
+  EXPECT_THAT(refused.err, HasSubstr("is no SQLite database"));
+  const Ran nowhere = toftwin(fmt::format("compare {} -o {}/inside --locked", path("run"), path("none.sqlite")));
+  EXPECT_THAT(nowhere.err, HasSubstr("cannot make the report's folder"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "run" / plan::kOpenedFile));
+  {
+    ASSERT_TRUE(plan::RunLog::open(folder_ / "lab.sqlite"));
+    sqlite3* raw = nullptr;
+    ASSERT_EQ(sqlite3_open((folder_ / "lab.sqlite").c_str(), &raw), SQLITE_OK);
+    EXPECT_EQ(sqlite3_exec(raw, "CREATE TRIGGER no BEFORE INSERT ON run BEGIN SELECT RAISE(FAIL, 'it is full'); END",
+                           nullptr, nullptr, nullptr),
+              SQLITE_OK);
+    sqlite3_close(raw);
+  }
+  const Ran judged = compare("--locked --log " + path("lab.sqlite"));
+  EXPECT_NE(judged.status, 0);
+  EXPECT_THAT(judged.err, testing::AllOf(HasSubstr("it is full"), HasSubstr("is written, with all numbers in report.json")));
+  EXPECT_THAT(bytesOf("report/report.md"), HasSubstr("Locked captures"));
 }
 
 TEST_F(Judged, SaysWhichFileIsNotTheOneThatWasCaptured) {
