@@ -75,35 +75,47 @@ std::set<std::size_t> examplesOf(const std::vector<CaptureRecord>& records) {
   return numbers;
 }
 
-/// What the first frame of A says.
-struct FirstFrame {
-  int stride = 1;  ///< how far apart the pixels are that are kept, by the image's size
-  std::vector<double> frequency_hz{};
+/// What the first frames say.
+struct FirstFrames {
+  int stride = 1;  ///< how far apart the pixels are that are kept, by the size of A's image
+  std::array<std::vector<double>, 2> frequency_hz{};
 };
 
-Result<FirstFrame> firstFrameOf(const std::filesystem::path& run, const std::vector<CaptureRecord>& records) {
-  auto reader = record::Reader::open(run / records.front().a.file);
+Result<Frame> firstFrameIn(const std::filesystem::path& file) {
+  auto reader = record::Reader::open(file);
   if (!reader) return reader.error();
-  const auto frame = reader->next();
-  if (!frame) return frame.error();
-  const double pixels =
-      static_cast<double>(frame->camera.width) * frame->camera.height * static_cast<double>(records.size());
-  FirstFrame first{.stride = static_cast<int>(std::ceil(std::sqrt(std::max(1.0, pixels / kPixelsKept))))};
-  for (const Exposure& exposure : frame->moment.exposures) {
-    const double f = exposure.modulation.in(hertz);
-    if (f > 0.0 && std::ranges::find(first.frequency_hz, f) == first.frequency_hz.end()) first.frequency_hz.push_back(f);
+  return reader->next();
+}
+
+std::vector<double> frequenciesOf(const Frame& frame) {
+  std::set<double> all;
+  for (const Exposure& exposure : frame.moment.exposures) {
+    if (const double f = exposure.modulation.in(hertz); f > 0.0) all.insert(f);
   }
-  return first;
+  return {all.begin(), all.end()};
+}
+
+Result<FirstFrames> firstFramesOf(const std::filesystem::path& run, const std::vector<CaptureRecord>& records) {
+  const auto a = firstFrameIn(run / records.front().a.file), b = firstFrameIn(run / records.front().b.file);
+  if (!a) return a.error();
+  if (!b) return b.error();
+  const double pixels =
+      static_cast<double>(a->camera.width) * a->camera.height * static_cast<double>(records.size());
+  return FirstFrames{.stride = static_cast<int>(std::ceil(std::sqrt(std::max(1.0, pixels / kPixelsKept)))),
+                     .frequency_hz = {frequenciesOf(*a), frequenciesOf(*b)}};
 }
 
 /// Two captures at a time; each is read, compared and thinned before the next.
 Result<ComparedRun> compareAll(const CompareRunJob& job, const Plan& plan,
                                const std::vector<CaptureRecord>& records, compare::Progress& progress) {
-  const auto first = firstFrameOf(job.run, records);
+  const auto first = firstFramesOf(job.run, records);
   if (!first) return first.error();
   const auto shown = examplesOf(records);
   CompareHow how{.stride = first->stride};
-  if (!first->frequency_hz.empty()) how.shortest_period_m = 299'792'458.0 / 2.0 / std::ranges::max(first->frequency_hz);
+  for (const std::size_t camera : {std::size_t{0}, std::size_t{1}}) {
+    const auto& all = first->frequency_hz[camera];
+    if (!all.empty()) how.shortest_period_m[camera] = 299'792'458.0 / 2.0 / all.back();
+  }
   const unsigned workers = std::clamp(std::thread::hardware_concurrency(), 1u, 4u);
   std::vector<std::optional<Result<ComparedCapture>>> results(records.size());
   std::vector<compare::PoseComparison> wholes(records.size());

@@ -37,7 +37,8 @@ struct ComparedCapture {
 /// overlap. `whole`: also gives the comparison of all pixels. A plate that moves is not compared pixel by pixel.
 struct CompareHow {
   int stride = 1;
-  double shortest_period_m = 0.0;  ///< half a wavelength of the highest frequency; 0: not known
+  /// Of A and B: half a wavelength of the highest frequency; 0: not known
+  std::array<double, 2> shortest_period_m{};
 };
 Result<ComparedCapture> compareCapture(const std::filesystem::path& run, const Plan& plan,
                                        const CaptureRecord& record, const CompareHow& how,

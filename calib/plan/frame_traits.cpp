@@ -133,6 +133,7 @@ void addCorners(const ComparedRun& run, const OwnError& own, std::size_t camera,
   constexpr double kStep_m = 0.025;
   std::map<std::string, std::map<long, compare::Running>> blocks;
   for (const ComparedCapture* one : ofKind(run, "corner")) {
+    if (isPoseFromPlanes(one->record)) continue;
     const CameraSeen& seen = one->seen[camera];
     auto& steps = blocks[one->record.block];
     for (std::size_t i = 0; i < seen.corner_place_m.size(); ++i) {
@@ -181,13 +182,14 @@ void addPlates(const ComparedRun& run, const OwnError& own, std::size_t camera, 
   all.add("emitter shadow", kNames[camera], compare::shadowTraits(together, 1.0));
   all.add("edge in the amplitude", kNames[camera], compare::edgeTraits(place, value));
   // How a camera weighs its frequencies is its own: by f², 1.5 % planted in a Kinect v2 read −0.3 %.
-  if (run.frequency_hz.size() > 1) {
+  if (std::ranges::all_of(captures, [](const auto* one) { return isPoseFromPlanes(one->record); })) return;
+  if (run.frequency_hz[camera].size() > 1) {
     all.untold(fmt::format("lens scatter of {}: it pulls each of {} frequencies another way, and how the camera "
                            "weighs them is not known",
-                           kNames[camera], run.frequency_hz.size()));
+                           kNames[camera], run.frequency_hz[camera].size()));
     return;
   }
-  all.add("lens scatter", kNames[camera], compare::veilTraits(range, plate, ratio, error, run.frequency_hz));
+  all.add("lens scatter", kNames[camera], compare::veilTraits(range, plate, ratio, error, run.frequency_hz[camera]));
 }
 
 /// The first frame after each turn from bright to dark or back, against the frames that follow.
@@ -209,8 +211,9 @@ void addLag(const ComparedRun& run, std::size_t camera, TraitCollector& all) {
 
 /// A plate's path: its middle over time; speeds are differences of successive frames.
 void addMotion(const ComparedRun& run, std::size_t camera, TraitCollector& all) {
+  const Captures captures = ofKind(run, "moving");
   std::vector<double> speed, turn;
-  for (const ComparedCapture* one : ofKind(run, "moving")) {
+  for (const ComparedCapture* one : captures) {
     const CameraSeen& seen = one->seen[camera];
     for (std::size_t i = 1; i < seen.plate_time_s.size(); ++i) {
       const double passed = seen.plate_time_s[i] - seen.plate_time_s[i - 1];
@@ -219,8 +222,13 @@ void addMotion(const ComparedRun& run, std::size_t camera, TraitCollector& all) 
       turn.push_back(0.5 * (seen.plate_turn_mm[i] + seen.plate_turn_mm[i - 1]));
     }
   }
-  if (!speed.empty())
-    all.add("motion, right end − left end", kNames[camera], compare::motionTraits(speed, turn));
+  if (captures.empty()) return;
+  if (speed.empty()) {
+    all.untold(fmt::format("motion of {}: in none of {} captures do two frames with a time of their own show the plate whole",
+                           kNames[camera], captures.size()));
+    return;
+  }
+  all.add("motion, right end − left end", kNames[camera], compare::motionTraits(speed, turn));
 }
 
 /// Independent values by their intervals: weights 1/h². A's places, which stand for the path, err as B's do:

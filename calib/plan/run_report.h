@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <string>
 #include <utility>
 #include <vector>
@@ -19,7 +20,8 @@ struct ComparedRun {
   std::vector<ComparedCapture> moving{};  ///< of a plate that moves: not compared pixel by pixel
   std::vector<std::pair<std::string, compare::PoseComparison>>
       examples;  ///< whole images, a capture of each block
-  std::vector<double> frequency_hz;  ///< A's modulation frequencies; empty: none is told
+  /// Modulation frequencies of A and B, by the first capture's frames; empty: none is told.
+  std::array<std::vector<double>, 2> frequency_hz{};
   std::vector<std::string> warnings;
   bool is_locked = false;  ///< of the locked captures
 };

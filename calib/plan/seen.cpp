@@ -91,7 +91,15 @@ void addCorner(const Plan& plan, const BlockSpec& block, const Transform<World, 
   }
 }
 
+void leaveOutErrors(CameraSeen& seen) {
+  for (auto* column : {&seen.wall_range_m, &seen.wall_error_mm, &seen.wall_amplitude, &seen.corner_place_m,
+                       &seen.corner_range_m, &seen.corner_error_mm, &seen.plate_range_m, &seen.plate_over_own})
+    column->clear();
+}
+
 }  // namespace
+
+bool isPoseFromPlanes(const CaptureRecord& record) { return record.pose_by == "planes"; }
 
 Image<float> wallRange_m(const Plan& plan, const BlockSpec& block, const CameraInfo& camera,
                          const Transform<World, Camera>& pose) {
@@ -161,6 +169,7 @@ CameraSeen seenOf(const Plan& plan, const CaptureRecord& record, const compare::
     default:
       break;
   }
+  if (isPoseFromPlanes(record)) leaveOutErrors(seen);
   return seen;
 }
 

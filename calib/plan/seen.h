@@ -43,9 +43,13 @@ struct ReadFrame {
   double brightness = 0.0;
 };
 
+/// Whether the pose was fitted to A's own ranges of the plan's planes: a wall's errors along its normal are in the pose then,
+/// and what is left of them says nothing of the camera.
+bool isPoseFromPlanes(const CaptureRecord& record);
 /// What of a frame seenOf() needs.
 Result<ReadFrame> readOf(const Frame& frame);
-/// What such blocks give; NaN and empty columns where the plan does not say what stands there.
+/// What such blocks give; NaN and empty columns where the plan does not say what stands there. Where
+/// isPoseFromPlanes(), no errors against walls: their columns are empty but for wall_wrapped, which is off by periods.
 CameraSeen seenOf(const Plan& plan, const CaptureRecord& record, const compare::Stack& stack,
                   const std::vector<ReadFrame>& frames, double shortest_period_m);
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "calib/compare/statistics.h"
 
@@ -134,6 +135,14 @@ void addBehind(const Image<float>& range_m, const Image<float>& wall_m, const Im
   }
 }
 
+/// Simulated cameras share the time since power-on, which the latency is told by. A real one's is of some clock
+/// beside it, and may be the same for all frames: its frames are apart by their exposures' starts.
+std::optional<double> timeOf(const ReadFrame& frame, bool is_simulated) {
+  const auto& [first, second] = is_simulated ? std::pair{frame.since_power_on_s, frame.start_s}
+                                             : std::pair{frame.start_s, frame.since_power_on_s};
+  return first ? first : second;
+}
+
 }  // namespace
 
 void addPlate(const Image<float>& wall_m, const compare::Stack& stack, CameraSeen& seen) {
@@ -153,7 +162,7 @@ void addPlate(const Image<float>& wall_m, const compare::Stack& stack, CameraSee
 void addMovingPlate(const Image<float>& wall_m, const CameraInfo& camera,
                     const std::vector<ReadFrame>& frames, CameraSeen& seen) {
   for (const ReadFrame& frame : frames) {
-    const auto time = frame.since_power_on_s ? frame.since_power_on_s : frame.start_s;
+    const auto time = timeOf(frame, seen.is_simulated);
     const auto plate = time ? plateIn(frame.range_m, wall_m) : std::nullopt;
     if (!plate) continue;
     // Depth over x, by least squares: motion pulls the two edges to different sides.

@@ -36,6 +36,12 @@ std::optional<Duration> longestExposure(const Frame& frame) {
   return longest;
 }
 
+/// ns, of the camera's own clock.
+std::optional<std::int64_t> startOf(const Frame& frame) {
+  if (frame.moment.exposures.empty()) return std::nullopt;
+  return frame.moment.exposures.front().start.ns;
+}
+
 bool isExposedAsPlanned(const Frame& frame, Duration wanted) {
   const auto there = longestExposure(frame);
   return !there || wanted == Duration{} ||
@@ -162,7 +168,8 @@ Result<> Taker::dropFirst(const PlannedCapture& planned, Feed& feed, const Taken
 Result<TakenBy> Taker::framesOf(const PlannedCapture& planned, Feed& feed, const Taken& taken,
                                 const Sink& sink, const std::optional<Duration>& since_power_on,
                                 std::optional<Frame>* first) {
-  if (auto begun = feed.beginAnew(); !begun) return begun.error();
+  if (auto anew = feed.beginAnew(); !anew) return anew.error();
+  std::optional<std::int64_t> begun;  // where the camera says no time since power-on: the first frame's start
   TakenBy by{.source = nameOf(feed), .model = feed.details().entry.model};
   const auto options = captureOptions();
   for (int stale = 0; by.frames < static_cast<std::uint64_t>(planned.frames);) {
@@ -177,7 +184,13 @@ Result<TakenBy> Taker::framesOf(const PlannedCapture& planned, Feed& feed, const
     }
     // What the cameras saw counts for more than what one says of itself.
     if (!frame->moment.world_from_camera || taken.seen) frame->moment.world_from_camera = taken.pose;
-    if (!frame->moment.since_power_on) frame->moment.since_power_on = since_power_on;
+    if (!frame->moment.since_power_on && since_power_on) {
+      const auto start = startOf(*frame);
+      if (!begun) begun = start;
+      const bool is_known = start && begun && *start >= *begun;
+      const std::int64_t passed_ns = is_known ? *start - *begun : 0;
+      frame->moment.since_power_on = *since_power_on + 1e-9 * static_cast<double>(passed_ns) * second;
+    }
     if (by.frames == 0) {
       by.since_power_on = frame->moment.since_power_on, by.temperatures = frame->moment.temperatures;
       by.ambient = frame->moment.ambient, by.exposure = longestExposure(*frame);

@@ -29,6 +29,8 @@ class FakeCamera final : public compare::Feed {
     frame.source = details_.entry.name;
     if (stale_frames > 0) --stale_frames, frame.moment.exposures = {Exposure{{}, 1_us, 20_MHz}};
     if (details_.can_set_pose) frame.moment.world_from_camera = pose_;
+    for (Exposure& one : frame.moment.exposures) one.start.ns += frames_ * frame_apart_ns;
+    ++frames_;
     return frame;
   }
   Result<> setPose(const Transform<World, Camera>& pose) override {
@@ -52,12 +54,14 @@ class FakeCamera final : public compare::Feed {
 
   Frame makes{};
   int stale_frames = 0;
+  std::int64_t frame_apart_ns = 0;
   std::string refuses{};
 
  private:
   Story& story_;
   SourceDetails details_;
   Transform<World, Camera> pose_;
+  std::int64_t frames_ = 0;
 };
 
 class FakePerson final : public Person {
@@ -171,6 +175,17 @@ TEST_F(Take, NotesThatACameraDoesNotSayHowLongItWasOn) {
   EXPECT_THAT(told->notes, IsEmpty());
   EXPECT_GE(told->a.since_power_on->in(second), 500.0);
   EXPECT_EQ(b_frames_[0].moment.since_power_on, told->a.since_power_on);
+}
+
+TEST_F(Take, GivesEachFrameItsOwnTimeSincePowerOnByItsExposure) {
+  realAndTwin();
+  a_.makes.moment.exposures = {Exposure{{.ns = 7'000'000'000}, 200_us, 20_MHz}};
+  a_.frame_apart_ns = 40'000'000;
+  begin(kTwoBlocks, 500_s);
+  ASSERT_TRUE(take(2));
+  ASSERT_EQ(a_frames_.size(), 2u);
+  EXPECT_NEAR(a_frames_[1].moment.since_power_on->in(second) - a_frames_[0].moment.since_power_on->in(second), 0.04,
+              1e-9);
 }
 
 const std::string kSettings =

@@ -8,6 +8,9 @@
 #include <numbers>
 #include <random>
 
+#include "calib/plan/seen_plate.h"
+#include "plans.h"
+
 namespace toftwin::plan {
 namespace {
 
@@ -20,7 +23,7 @@ ComparedRun plantedRun() {
   std::mt19937_64 random{kSeed};
   std::normal_distribution<double> error{0.0, 0.1};
   ComparedRun run;
-  run.frequency_hz = {kFrequency_hz};
+  run.frequency_hz = {std::vector{kFrequency_hz}, std::vector{kFrequency_hz}};
   for (int i = 0; i < 100; ++i) {
     const bool is_warming = i < 60;
     ComparedCapture one;
@@ -81,6 +84,92 @@ TEST(RunTraits, SayWhatTheyCannotTellAndWhy) {
   EXPECT_EQ(find(all, "harmonics", "B − A", "30 MHz, 4 per period"), nullptr);
   EXPECT_THAT(all.untold,
               testing::Contains(testing::HasSubstr("5 captures over distance for 1 frequencies; 12 are")));
+}
+
+/// B has another wave of its own, 3 mm four times per period of its frequency.
+TEST(RunTraits, TakeEachCamerasHarmonicsByItsOwnFrequencies) {
+  ComparedRun run = plantedRun();
+  const double other_hz = 40e6, period_m = 299'792'458.0 / 2.0 / other_hz;
+  run.frequency_hz[1] = {other_hz};
+  std::mt19937_64 random{kSeed};
+  std::normal_distribution<double> error{0.0, 0.1};
+  for (ComparedCapture& one : run.captures) {
+    const double d_m = one.range_a_mm / 1000.0;
+    one.seen[0].wall_range_m = one.seen[1].wall_range_m = {d_m};
+    one.seen[0].wall_error_mm = {2.0 * std::cos(8.0 * std::numbers::pi * d_m / kPeriod_m) + error(random)};
+    one.seen[1].wall_error_mm = {3.0 * std::cos(8.0 * std::numbers::pi * d_m / period_m) + error(random)};
+  }
+  const RunTraits all = traitsOf(run);
+  expectNear(find(all, "harmonics, against", "A", "30 MHz, 4 per period"), 2.0);
+  expectNear(find(all, "harmonics, against", "B", "40 MHz, 4 per period"), 3.0);
+  EXPECT_EQ(find(all, "harmonics", "B − A", "30 MHz, 4 per period"), nullptr);
+  EXPECT_THAT(all.untold, testing::Contains(testing::HasSubstr(
+                              "harmonics of B − A: A is modulated at 30 MHz, B at 40 MHz")));
+  run.frequency_hz[1] = {kFrequency_hz * 1.0005};
+  EXPECT_NE(find(traitsOf(run), "harmonics", "B − A", "30 MHz, 4 per period"), nullptr);
+}
+
+TEST(RunTraits, SayThatNoFrameShowsAPlateMove) {
+  ComparedRun run = plantedRun();
+  run.moving.emplace_back().record.kind = "moving";
+  EXPECT_THAT(traitsOf(run).untold, testing::Contains(testing::HasSubstr("motion of A: in none of 1 captures")));
+}
+
+/// A plate of 8 × 8 pixels one metre before a wall at 2 m goes one pixel, 1/20 of its metre, per frame of 0.1 s.
+TEST(MovingPlate, IsTimedByItsExposuresWhereAllFramesHaveOneTimeSincePowerOn) {
+  CameraInfo camera;
+  camera.width = 32, camera.height = 16, camera.fx = camera.fy = 20.0, camera.cx = 15.5, camera.cy = 7.5;
+  std::vector<ReadFrame> frames(3);
+  for (int i = 0; i < 3; ++i) {
+    ReadFrame& frame = frames[static_cast<std::size_t>(i)];
+    frame.range_m = Image<float>(32, 16, 2.0F);
+    for (int y = 4; y < 12; ++y) {
+      for (int x = 10 + i; x < 18 + i; ++x) frame.range_m(x, y) = 1.0F;
+    }
+    frame.start_s = 7.0 + 0.1 * i, frame.since_power_on_s = 500.0;
+  }
+  CameraSeen seen;
+  addMovingPlate(Image<float>(32, 16, 2.0F), camera, frames, seen);
+  ASSERT_EQ(seen.plate_time_s.size(), 3u);
+  EXPECT_NEAR(seen.plate_time_s[2] - seen.plate_time_s[0], 0.2, 1e-9);
+  CameraSeen simulated;
+  simulated.is_simulated = true;
+  for (std::size_t i = 0; i < 3; ++i) frames[i].since_power_on_s = 600.0 + 0.05 * static_cast<double>(i);
+  addMovingPlate(Image<float>(32, 16, 2.0F), camera, frames, simulated);
+  EXPECT_EQ(simulated.plate_time_s, (std::vector{600.0, 600.05, 600.1}));
+}
+
+/// The same wall, 5 mm off, before a camera whose pose the rig said and before one whose pose was fitted to it.
+TEST(Seen, LeavesErrorsOutWhereThePoseWasFittedToTheCamerasOwnPlanes) {
+  const Plan plan = planOf(
+      "[[plane]]\npoint_m = [0, 0, 2]\nnormal = [0, 0, -1]\n[[plane]]\npoint_m = [1, 0, 0]\nnormal = [-1, 0, 0]\n"
+      "[[plane]]\npoint_m = [0, 1, 0]\nnormal = [0, -1, 0]\n"
+      "[[block]]\nname = 'b'\nkind = 'distance'\npose_from = 'planes'\ndistance_m = [1, 1.5, 2]\n");
+  Frame frame;
+  frame.camera.width = 32, frame.camera.height = 16;
+  frame.camera.fx = frame.camera.fy = 20.0, frame.camera.cx = 15.5, frame.camera.cy = 7.5;
+  frame.moment.world_from_camera = Transform<World, Camera>{};
+  Image<float> range(32, 16);
+  for (int y = 0; y < 16; ++y) {
+    for (int x = 0; x < 32; ++x)
+      range(x, y) = static_cast<float>(2.0 / rayThroughPixel(frame.camera, x, y).v.z + 0.005);
+  }
+  frame.planes = {toPlane(PlaneKind::Range, std::move(range))};
+  compare::Stack stack;
+  ASSERT_TRUE(stack.add(frame));
+  CaptureRecord record{.block = "b", .kind = "distance"};
+  record.pose_by = "rig";
+  const CameraSeen by_rig = seenOf(plan, record, stack, {}, 5.0);
+  ASSERT_FALSE(by_rig.wall_error_mm.empty());
+  EXPECT_NEAR(by_rig.wall_error_mm.front(), 5.0, 0.01);
+  record.pose_by = "planes";
+  const CameraSeen by_planes = seenOf(plan, record, stack, {}, 5.0);
+  EXPECT_TRUE(by_planes.wall_error_mm.empty() && by_planes.wall_range_m.empty());
+  EXPECT_EQ(by_planes.wall_wrapped, by_rig.wall_wrapped);
+  ComparedRun run = plantedRun();
+  run.captures.front().record.pose_by = "planes";
+  EXPECT_THAT(traitsOf(run).untold,
+              testing::Contains(testing::HasSubstr("errors against the plan's walls at 1 captures")));
 }
 
 }  // namespace
