@@ -5,17 +5,9 @@
 #include <deque>
 
 #include "../drivers/emulated_kinect2.h"
-#include "daemon/facades/usb_camera/usb_device.h"
+#include "usb_names.h"
 
 namespace toftwin::kernel_test {
-
-using daemon::usb_camera::Answer;
-using daemon::usb_camera::Bytes;
-using daemon::usb_camera::Setup;
-using daemon::usb_camera::SteadyTime;
-using daemon::usb_camera::Transfer;
-using daemon::usb_camera::UsbDevice;
-using daemon::usb_camera::UsbSpeed;
 
 /// An emulated Kinect v2 as a USB 3 device: commands over bulk endpoints, the stream over an isochronous one
 /// with packets of up to 33792 bytes, which only its alternate setting 1 has.

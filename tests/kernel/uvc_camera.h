@@ -7,16 +7,10 @@
 #include <optional>
 
 #include "daemon/facades/usb_camera/uvc_device.h"
+#include "usb_names.h"
 
 namespace toftwin::kernel_test {
 
-using daemon::usb_camera::Answer;
-using daemon::usb_camera::Bytes;
-using daemon::usb_camera::Setup;
-using daemon::usb_camera::SteadyTime;
-using daemon::usb_camera::Transfer;
-using daemon::usb_camera::UsbDevice;
-using daemon::usb_camera::UsbSpeed;
 using daemon::usb_camera::Writer;
 
 /// A USB depth camera as uvcvideo knows them: Z16 in one or two streams (the second is Y16 infrared), a gain
