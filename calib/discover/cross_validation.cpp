@@ -107,4 +107,9 @@ Difference against0(const Gain& gain) {
   return difference(gain, {gain.group, 0.0, std::vector<double>(gain.by_capture.size())});
 }
 
+bool holds(const Difference& gain) {
+  if (gain.mean > 2.0 * gain.error) return true;
+  return gain.mean > std::sqrt(3.0) * gain.error && gain.mean > 2.0 * 2.0 * std::sqrt(std::max(0.0, gain.mean));
+}
+
 }  // namespace toftwin::discover

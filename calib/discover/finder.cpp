@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include <fmt/format.h>
 
@@ -42,6 +43,7 @@ class Search {
     if (finding_.effects.size() > 1) {
       revise();
       prune();
+      if (context_.original->named() != nullptr) markRests();
     }
     finding_.nuisances = estimate(*context_.source, context_.scales, finding_.effects);
     finding_.scales = context_.scales;
@@ -109,10 +111,11 @@ class Search {
     const auto chosen = chosenOf(context_, explanations);
     if (!chosen) return false;
     Effect effect = effectOf(context_, explanations, *chosen);
-    if (effect.gain.mean <= 2.0 * effect.gain.error || isWhatACurveLeaves(effect)) return false;
+    if (!holds(effect.gain) || isWhatACurveLeaves(effect)) return false;
+    settle(effect);
     effect.p = p;
     const auto same = std::ranges::find_if(finding_.effects, [&](const Effect& known) {
-      return alongOf(known) == alongOf(effect) && known.is_catalogue == effect.is_catalogue && !known.fit &&
+      return goAlongTheSame(known, effect) && known.is_catalogue == effect.is_catalogue && !known.fit &&
              !effect.fit;
     });
     if (same == finding_.effects.end()) {
@@ -134,6 +137,41 @@ class Search {
     for (const std::string& name : effect.covariates)
       if (infoOf(context_, name) != nullptr) along.push_back(name);
     return along.empty() ? effect.covariates : along;
+  }
+
+  /// What effects of the catalogue call that along which it goes.
+  [[nodiscard]] std::set<std::string> wordsOf(const Effect& effect) const {
+    std::set<std::string> words;
+    for (const std::string& name : alongOf(effect)) {
+      const CovariateInfo* info = infoOf(context_, name);
+      words.insert(info != nullptr ? info->word : context_.source->wordOfCarrier(name));
+    }
+    return words;
+  }
+  /// A carrier without a covariate stands for all that its word means: light from neighbours for how bright the
+  /// surroundings are, a pattern of pixels for columns and rows.
+  [[nodiscard]] bool goAlongTheSame(const Effect& a, const Effect& b) const {
+    const auto along_a = alongOf(a), along_b = alongOf(b);
+    if (along_a == along_b) return true;
+    const auto isCarrier = [&](const std::vector<std::string>& along) {
+      return std::ranges::all_of(along, [&](const std::string& name) { return infoOf(context_, name) == nullptr; });
+    };
+    return (isCarrier(along_a) || isCarrier(along_b)) && !wordsOf(a).contains("") && wordsOf(a) == wordsOf(b);
+  }
+
+  /// Its terms as they are written once they are known. What was estimated from all captures has had its share of
+  /// their noise, so that it competes no more.
+  void settle(Effect& effect) {
+    for (FittedForm& part : effect.parts) {
+      for (Term& term : part.group.terms) {
+        const std::string carrier = term.carrier;
+        term = context_.source->settled(std::move(term));
+        if (term.carrier == carrier) continue;
+        std::erase_if(context_.generic, [&](const TermGroup& group) {
+          return !group.terms.empty() && group.terms.front().carrier == carrier;
+        });
+      }
+    }
   }
 
   /// A curve without a formula is known to some per cent, since between its knots it is straight, and so is what
@@ -191,6 +229,7 @@ class Search {
       const Difference worse = difference(both, explanations[*chosen].gain);
       if (both.total - explanations[*chosen].gain.total < worse.error) {
         Effect again = effectOf(without, explanations, *chosen);
+        settle(again);
         again.p = effect.p;
         effect = std::move(again);
         return;
@@ -250,6 +289,7 @@ class Search {
       const Explanation& now = explanations[*chosen];
       if (now.is_catalogue ? !now.named : now.covariates != effect.covariates) continue;
       Effect again = effectOf(without, explanations, *chosen);
+      settle(again);
       again.p = effect.p;
       effect = std::move(again);
       if (effect.fit) include();
@@ -272,6 +312,33 @@ class Search {
       finding_.effects.erase(finding_.effects.begin() + static_cast<std::ptrdiff_t>(least));
       include();
     }
+  }
+
+  /// One cause, one effect. A form without a name describes its cause to first order and along its own covariates
+  /// alone. What that leaves goes with something else, and needs no cause of its own while it is less than a quarter
+  /// of what the form explains: it stays in the model, as the rest of that effect. An effect that is named for certain
+  /// describes itself, and leaves nothing.
+  void markRests() {
+    constexpr double kRest = 0.25;
+    const auto mayBeUndeclared = [](const Effect& effect) {
+      return !effect.is_catalogue ||
+             std::ranges::any_of(effect.alternatives, [](const Alternative& other) { return !other.group.terms.empty(); });
+    };
+    const auto isApproximate = [&](const Effect& effect) {
+      return effect.is_catalogue ? mayBeUndeclared(effect) : !isFormula(effect) || isOfLight(effect);
+    };
+    std::vector<double> gains;
+    for (std::size_t i = 0; i < finding_.effects.size(); ++i) {
+      Effect& effect = finding_.effects[i];
+      gains.push_back(effect.is_catalogue && !effect.fit ? effect.gain.mean : gainAmongOthers(i).mean);
+    }
+    for (std::size_t i = 0; i < gains.size(); ++i) {
+      for (std::size_t k = 0; k < gains.size(); ++k) {
+        if (i == k || !mayBeUndeclared(finding_.effects[i]) || !isApproximate(finding_.effects[k])) continue;
+        if (gains[i] < kRest * gains[k]) finding_.effects[i].is_rest = true;
+      }
+    }
+    std::ranges::stable_sort(finding_.effects, {}, &Effect::is_rest);  // behind what they are the rest of
   }
 
   Difference gainAmongOthers(std::size_t which) {

@@ -70,6 +70,8 @@ struct Effect {
   std::vector<Alternative> alternatives{};
   std::vector<std::string> refused{};  ///< effects of the catalogue that were fitted and not named, and why
   std::optional<Experiment> experiment{};
+  /// What the form of a stronger effect leaves, which goes with something else: in the model, but no cause of its own.
+  bool is_rest = false;
 };
 
 struct Finding {

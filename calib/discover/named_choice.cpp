@@ -17,6 +17,14 @@ double luckOfTheBestOf(std::size_t tried) {
   return std::max(4.0, 2.0 * std::log(static_cast<double>(std::max<std::size_t>(1, tried))));
 }
 
+/// How many shapes were tried for it: every place of a step, every time constant.
+std::size_t triedFor(const Explanation& one) {
+  if (one.is_catalogue) return 0;
+  std::size_t tried = 1;
+  for (const Inner& inner : one.fitted.form.inner) tried *= std::max<std::size_t>(1, inner.grid.size());
+  return tried;
+}
+
 /// In-sample χ² of each catalogue group on top of what is known.
 std::vector<std::pair<double, std::string>> byStatistic(const Context& context) {
   const Part part = prepare(context, {}, true);
@@ -75,7 +83,7 @@ bool leavesSomething(const Context& context, const Explanation& effect) {
 void fitCatalogue(const Context& context, std::vector<Explanation>& all) {
   // Columns explain about as much as the effect does, and more where they are freer than it.
   constexpr double kWorthIt = 0.7;
-  constexpr std::size_t kMost = 6;
+  constexpr std::size_t kMost = 8;
   const NamedEffects* named = context.source->named();
   if (named == nullptr) return;
   std::vector<std::string> names;
@@ -97,9 +105,9 @@ void fitCatalogue(const Context& context, std::vector<Explanation>& all) {
 std::optional<std::size_t> chooseNamed(const Context& context, std::vector<Explanation>& all) {
   std::optional<std::size_t> generic;
   std::vector<std::size_t> named;
-  std::size_t curves = 0;
+  std::size_t curves = context.generic.size();  // those that were not on the shortlist were tried, too
+  for (const Explanation& one : all) curves += triedFor(one);
   for (const std::size_t i : eligible(all)) {
-    curves += all[i].is_catalogue ? 0 : 1;
     if (all[i].is_catalogue)
       named.push_back(i);
     else if (!generic || all[i].gain.total > all[*generic].gain.total)
@@ -120,7 +128,7 @@ std::optional<std::size_t> chooseNamed(const Context& context, std::vector<Expla
     };
     if (one.named->is_at_bound)
       one.refused = "it would have to be stronger than it can be";
-    else if (gain.mean <= 2.0 * gain.error)
+    else if (!holds(gain))
       one.refused = "it does not predict other captures";
     else if (generic && isWorseThan(all[*generic], curves))
       one.refused = "a curve that goes with " + all[*generic].name + by(all[*generic]);

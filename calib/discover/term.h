@@ -106,6 +106,9 @@ class RowSource {
                                         std::span<const double> scales) const;
   /// Explanations that are no function of covariates alone.
   [[nodiscard]] virtual std::vector<TermGroup> ownGroups() const { return {}; }
+  /// How a term is written once it is known. Some carriers are estimated from other captures while they
+  /// compete, so that no capture explains itself, and from all once they are chosen.
+  [[nodiscard]] virtual Term settled(Term term) const { return term; }
   /// What effects of the catalogue call a carrier; empty: nothing.
   [[nodiscard]] virtual std::string wordOfCarrier(const std::string&) const { return {}; }
   /// Its catalogue, where it can be fitted as it is.

@@ -121,7 +121,7 @@ std::string inWords(const CampaignFinding& finding) {
     std::string word = one.found.is_catalogue ? one.found.name : undeclared(one.found.covariates);
     for (const Alternative& other : one.found.alternatives)
       word += " or " + (isOfCatalogue(other) ? other.name : undeclared(other.covariates));
-    words.push_back(std::move(word));
+    words.push_back(one.found.is_rest ? "(rest: " + word + ")" : std::move(word));
   }
   for (const FittedEffect& one : finding.updates) words.push_back("update " + nameOf(one.effect));
   return words.empty() ? "nothing" : fmt::format("{}", fmt::join(words, " + "));
@@ -135,10 +135,12 @@ Score scoreOf(const Case& of, const sim::AnyEffect* hidden, const CampaignFindin
     score.removed = finding.judgement->removed;
     score.before_mm = finding.judgement->before.rms_mm, score.after_mm = finding.judgement->after.rms_mm;
   }
-  score.spurious = static_cast<int>(finding.effects.size() + finding.updates.size());
+  score.spurious = static_cast<int>(finding.updates.size());
+  for (const FoundEffect& one : finding.effects) score.spurious += one.found.is_rest ? 0 : 1;
   if (hidden == nullptr) return score;
   bool is_met = false;
   for (const FoundEffect& one : finding.effects) {
+    if (one.found.is_rest) continue;
     const Answer answer = answerOf(one.found, *hidden, of.hidden);
     const bool is_it = of.is_absent ? answer.has_covariates : answer.has_name || answer.has_covariates;
     score.is_right = score.is_right || answer.has_name;

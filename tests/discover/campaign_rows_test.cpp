@@ -10,8 +10,10 @@
 
 #include "calib/discover/campaign/catalogue.h"
 #include "calib/discover/campaign/refit.h"
+#include "protocol/record/recording.h"
 #include "calib/discover/campaign/rows.h"
 #include "calib/discover/marginal.h"
+#include "calib/discover/significance.h"
 #include "tests/discover/simulated_run.h"
 
 namespace toftwin::discover {
@@ -98,6 +100,63 @@ TEST_F(Rows, ADelayOfTheLightIsNoMoreAnEffectThanAnOffset) {
   EXPECT_GT(fit(marginal, others).deviance - all.deviance, 100.0);  // ten standard errors: it is there
 }
 
+/// What a delay of 32 mm does to the cyclic error is not proportional to it.
+TEST_F(Rows, ADelayOfTheLightIsFoundHoweverLargeItIs) {
+  std::string square = tinyCamera();
+  square.replace(square.find("contrast = 0.5"), 14, "contrast = 0.5\nemitted = 'square'\ndemodulated = 'square'");
+  square.replace(square.find("taps = 2"), 8, "taps = 2\nharmonics = 7");
+  const Made made = make("[[effect]]\ntype = 'frequency_offset'\nfirst_rad = 0.04\n", square);
+  const auto declared = sim::SensorModel::parse(square, "camera.toml");
+  const auto scene = sim::Scene::parse(smallScene(), "scene.toml");
+  const Declared as_declared{*declared, *scene};
+  const auto delay_mm = delayThatFits({as_declared, {made.campaign.captures, made.traced, made.traced}, {}});
+  ASSERT_TRUE(delay_mm) << delay_mm.error().message;
+  EXPECT_NEAR(*delay_mm, 0.04 * 795.77, 2.0);
+  const auto once = withDelay(*declared, effectsWithoutNoise(*declared), *delay_mm);
+  EXPECT_EQ(once.size(), effectsWithoutNoise(*declared).size() + 1);
+  const auto twice = withDelay(*declared, once, -*delay_mm);
+  ASSERT_EQ(twice.size(), once.size()) << "one frequency_offset is enough";
+  double left_rad = 1.0;
+  for (const sim::AnyEffect& effect : twice)
+    if (const auto* offset = std::get_if<sim::FrequencyOffset>(&effect)) left_rad = offset->first.in(radian);
+  EXPECT_NEAR(left_rad, 0.0, 1e-12);
+}
+
+TEST_F(Rows, WithoutACyclicErrorADelayIsAnOffset) {
+  const Made made = make("[[effect]]\ntype = 'frequency_offset'\nfirst_rad = 0.04\n", tinyCamera());
+  const auto declared = sim::SensorModel::parse(tinyCamera(), "camera.toml");
+  const auto scene = sim::Scene::parse(smallScene(), "scene.toml");
+  const Declared as_declared{*declared, *scene};
+  const auto delay_mm = delayThatFits({as_declared, {made.campaign.captures, made.traced, made.traced}, {}});
+  ASSERT_TRUE(delay_mm) << delay_mm.error().message;
+  EXPECT_EQ(*delay_mm, 0.0);
+}
+
+/// Of a camera whose pattern no default of the catalogue has. z is a normal deviate; the best of some 150 groups
+/// exceeds 4.5 by chance in 5e-4.
+TEST_F(Rows, APatternThatStaysAtItsPixelsIsSeenWhereverTheyLook) {
+  const auto seen = [](const Made& made) {
+    double most = 0.0;
+    discover::Test test{{.draws = 300}};
+    const Marginal marginal = marginalise(made.rows.withoutCatalogue(made.rows.ownGroups()), {});
+    test.add(marginal, nuisanceColumns(marginal));
+    for (const GroupScore& score : test.result().scores)
+      if (test.names()[score.group].starts_with("a pattern of pixels")) most = std::max(most, score.z);
+    return most;
+  };
+  EXPECT_GT(seen(make("[[effect]]\ntype = 'fixed_pattern_phase'\nsigma_rad = 0.002\ndevice = 4711\n", tinyCamera())), 4.5);
+  EXPECT_LT(seen(make("", tinyCamera())), 4.5);
+}
+
+TEST_F(Rows, APatternOfPixelsIsWhatItIsByItsPlaceWithinTheImage) {
+  const Made made = make("[[effect]]\ntype = 'fixed_pattern_phase'\nsigma_rad = 0.01\ndevice = 4711\n", tinyCamera());
+  const PixelPattern* pattern = made.rows.patternOf("pixel:range");
+  ASSERT_NE(pattern, nullptr);
+  EXPECT_EQ(pattern->grid.size(), 28U * 21U);
+  EXPECT_NEAR(pattern->deviation, 0.01 * 795.8, 1.5);  // mm: a radian at 30 MHz is 0.7958 m
+  EXPECT_EQ(made.rows.patternOf("neighbours:1px"), nullptr);
+}
+
 TEST_F(Rows, EveryEffectOfTheCatalogueThatShowsIsACandidateAndNoiseIsNot) {
   const Made made = make("");
   std::vector<std::string> names;
@@ -107,6 +166,74 @@ TEST_F(Rows, EveryEffectOfTheCatalogueThatShowsIsACandidateAndNoiseIsNot) {
     EXPECT_THAT(names, testing::Contains(shows));
   for (const char* does_not : {"shot_noise", "read_noise", "range_noise", "delay", "learned_range"})
     EXPECT_THAT(names, testing::Not(testing::Contains(does_not)));
+}
+
+/// The frames of all captures of a run, one after the other, as a camera's own recording.
+class Recording : public Rows {
+ protected:
+  Recording() {
+    const auto plan = plan::parsePlan(smallPlan(), "plan.toml");
+    const auto camera = sim::SensorModel::parse(tinyCamera(), "camera.toml");
+    const auto scene = sim::Scene::parse(smallScene(), "scene.toml");
+    if (!plan || !camera || !scene) throw std::runtime_error("the small campaign's files are wrong");
+    SimulatedRun run{.plan = *plan, .camera = *camera, .scene = *scene};
+    run.frames = 3;
+    write(run, folder_);
+    joinWith(true, folder_ / "with.mcap");
+    joinWith(false, folder_ / "without.mcap");
+  }
+  void joinWith(bool has_poses, const std::filesystem::path& to) const {
+    std::vector<std::filesystem::path> files;
+    for (const auto& entry : std::filesystem::directory_iterator{folder_ / plan::kOpenFolder}) files.push_back(entry.path());
+    std::ranges::sort(files);
+    auto writer = record::Writer::create(to);
+    for (const auto& file : files) {
+      auto reader = record::Reader::open(file);
+      while (true) {
+        auto frame = reader->next();
+        if (!frame) break;
+        if (!has_poses) frame->moment.world_from_camera.reset();
+        if (auto written = writer->write(*frame); !written) throw std::runtime_error(written.error().message);
+      }
+    }
+    if (auto closed = writer->close(); !closed) throw std::runtime_error(closed.error().message);
+  }
+};
+
+TEST_F(Recording, IsCutWhereTheCameraMovesOrIsSetOtherwise) {
+  const auto run = readCampaign(folder_, Side::A);
+  const auto campaign = readRecording(folder_ / "with.mcap", {});
+  ASSERT_TRUE(run) << run.error().message;
+  ASSERT_TRUE(campaign) << campaign.error().message;
+  // Repeats at one pose follow each other and become captures of more frames.
+  const std::size_t captures = campaign->captures.size() + campaign->put_aside.size();
+  EXPECT_GE(captures, 20U);
+  EXPECT_LE(captures, run->captures.size());
+  EXPECT_EQ(campaign->put_aside.size(), (captures + 2) / 5);
+  EXPECT_EQ(campaign->locked.size(), campaign->put_aside.size());
+  std::size_t frames = 0, of_run = 0;
+  for (const auto* all : {&campaign->captures, &campaign->put_aside})
+    for (const MeasuredCapture& one : *all) frames += one.frames;
+  for (const MeasuredCapture& one : run->captures) of_run += one.frames;
+  EXPECT_EQ(frames, of_run);
+  const auto locked = readLocked(*campaign);
+  ASSERT_TRUE(locked);
+  EXPECT_EQ(locked->size(), campaign->put_aside.size());
+}
+
+TEST_F(Recording, TakesPosesFromAnotherOne) {
+  const auto without = readRecording(folder_ / "without.mcap", {});
+  ASSERT_FALSE(without);
+  EXPECT_THAT(without.error().message, testing::HasSubstr("frame 1 has no pose; what a camera sees"));
+  EXPECT_THAT(without.error().message, testing::HasSubstr("give --poses"));
+  const auto own = readRecording(folder_ / "with.mcap", {});
+  const auto others = readRecording(folder_ / "without.mcap", folder_ / "with.mcap");
+  ASSERT_TRUE(own && others) << (others ? "" : others.error().message);
+  ASSERT_EQ(others->captures.size(), own->captures.size());
+  EXPECT_EQ(others->captures.back().moment.world_from_camera, own->captures.back().moment.world_from_camera);
+  const auto neither = readRecording(folder_ / "without.mcap", folder_ / "without.mcap");
+  ASSERT_FALSE(neither);
+  EXPECT_THAT(neither.error().message, testing::HasSubstr("has none, either"));
 }
 
 TEST(Catalogue, NumbersOfAnEffectAreSetByTheirKeysAndStayWithinBounds) {

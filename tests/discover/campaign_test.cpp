@@ -37,14 +37,14 @@ class Searched : public testing::Test {
 
   using Spoil = decltype(SimulatedRun::spoil);
   void simulate(const std::string& hidden, const Spoil& spoil = {}, bool with_poses = true,
-                int frames = 0) const {
+                int frames = 0, std::uint64_t seed = 1) const {
     auto plan = plan::parsePlan(smallPlan(), "plan.toml");
     const auto camera = sim::SensorModel::parse(tinyCamera(hidden), "camera.toml");
     const auto scene = sim::Scene::parse(smallScene(), "scene.toml");
     if (!plan || !camera || !scene) throw std::runtime_error("the small campaign's files are wrong");
     SimulatedRun run{
         .plan = *plan, .camera = *camera, .scene = *scene, .spoil = spoil, .with_poses = with_poses};
-    run.frames = frames;
+    run.frames = frames, run.seed = seed;
     discover::write(run, folder_ / "run");
   }
   [[nodiscard]] CampaignJob job() const {
@@ -169,6 +169,82 @@ TEST_F(Searched, AnEffectThatTheCatalogueLacksIsNotBlamedOnAnother) {
   ASSERT_THAT(namesOf(finding), ElementsAre("undeclared")) << verdictOf(finding);
   EXPECT_THAT(finding.effects.front().found.covariates, ElementsAre("neighbours")) << verdictOf(finding);
   EXPECT_THAT(finding.effects.front().found.refused, testing::Not(testing::IsEmpty())) << "nothing was tried";
+}
+
+/// The pattern of one camera out of 2³²: not one of those that the catalogue's effect is tried with.
+TEST_F(Searched, APatternOfPixelsIsNamedByWhereItIs) {
+  simulate("[[effect]]\ntype = 'fixed_pattern_phase'\nsigma_rad = 0.01\ndevice = 4711\n");
+  const CampaignFinding finding = search(job());
+  ASSERT_THAT(namesOf(finding), ElementsAre("undeclared")) << verdictOf(finding);
+  EXPECT_THAT(finding.effects.front().found.covariates, ElementsAre("pixel")) << verdictOf(finding);
+}
+
+/// It is light: not a charge that happens to go with the exposure.
+TEST_F(Searched, TheSameLightInAllPixelsIsStrayLight) {
+  simulate("[[effect]]\ntype = 'internal_reflection'\nradiance_w_per_m2_sr = 0.003\n");
+  CampaignJob without = job();
+  without.left_out = {"internal_reflection"};
+  const CampaignFinding finding = search(without);
+  ASSERT_THAT(namesOf(finding), ElementsAre("undeclared")) << verdictOf(finding);
+  EXPECT_THAT(finding.effects.front().found.covariates, ElementsAre("stray")) << verdictOf(finding);
+  EXPECT_EQ(finding.effects.front().found.stage, Stage::Light);
+}
+
+/// Only a cold camera shows it, and only a few captures are of a cold camera. What else goes with the warm-up is
+/// named beside it.
+TEST_F(Searched, WhatOnlyTheFirstCapturesShowIsNamedWithWhatLooksAlike) {
+  simulate("[[effect]]\ntype = 'residual_drift'\nper_degree_mm = 0.4\n", {}, true, 0, 2);
+  const CampaignFinding finding = search(job());
+  ASSERT_EQ(finding.effects.size(), 1U) << verdictOf(finding);
+  std::vector<std::string> answers = namesOf(finding);
+  for (const Alternative& other : finding.effects.front().found.alternatives) answers.push_back(other.name);
+  EXPECT_THAT(answers, testing::IsSupersetOf({"residual_drift", "thermal_delay", "warm_up"}))
+      << verdictOf(finding) << testing::PrintToString(finding.effects.front().found.refused);
+}
+
+/// With square waves a delay of the light moves the cyclic error, which no offset does: locked captures are judged
+/// with it, and model.toml has it.
+TEST_F(Searched, ADelayOfTheLightIsInTheModelThatIsJudged) {
+  std::string square = tinyCamera();
+  square.replace(square.find("contrast = 0.5"), 14, "contrast = 0.5\nemitted = 'square'\ndemodulated = 'square'");
+  square.replace(square.find("taps = 2"), 8, "taps = 2\nharmonics = 7");
+  write("camera.toml", square);
+  const auto plan = plan::parsePlan(smallPlan(), "plan.toml");
+  const auto camera =
+      sim::SensorModel::parse(square + "[[effect]]\ntype = 'frequency_offset'\nfirst_rad = 0.04\n", "camera.toml");
+  const auto scene = sim::Scene::parse(smallScene(), "scene.toml");
+  ASSERT_TRUE(plan && camera && scene);
+  discover::write({.plan = *plan, .camera = *camera, .scene = *scene}, folder_ / "run");
+  const CampaignFinding finding = search(job());
+  EXPECT_THAT(namesOf(finding), testing::IsEmpty()) << verdictOf(finding);
+  ASSERT_TRUE(finding.judgement);
+  EXPECT_LT(finding.judgement->after.per_row, 1.2);
+  const auto model = sim::SensorModel::parse(finding.model_toml, "model.toml");
+  ASSERT_TRUE(model) << model.error().message;
+  double found_rad = 0.0;
+  for (const sim::AnyEffect& effect : model->effects())
+    if (const auto* offset = std::get_if<sim::FrequencyOffset>(&effect)) found_rad = offset->first.in(radian);
+  EXPECT_NEAR(found_rad, 0.04, 0.01);
+}
+
+/// A gain that goes with the range, and one along the columns that changes far less (0.03 of it beside 0.025 at the edge): too little to
+/// be told from what a form of first order leaves.
+TEST_F(Searched, WhatAFormLeavesIsNoEffectOfItsOwn) {
+  simulate("", [](sim::RangeImage& image, const Moment&, const CameraInfo&, std::uint64_t) {
+    for (int y = 0; y < image.range_m.height(); ++y) {
+      for (int x = 0; x < image.range_m.width(); ++x) {
+        const auto by = static_cast<float>(x) / static_cast<float>(image.range_m.width());
+        const float range_m = image.range_m(x, y);
+        image.amplitude(x, y) *= 1.0F + 0.03F * std::sin(4.0F * range_m) + 0.025F * by * by;
+      }
+    }
+  });
+  const CampaignFinding finding = search(job());
+  ASSERT_FALSE(finding.effects.empty()) << verdictOf(finding);
+  EXPECT_FALSE(finding.effects.front().found.is_rest);
+  EXPECT_EQ(std::ranges::count_if(finding.effects, [](const FoundEffect& one) { return !one.found.is_rest; }), 1)
+      << verdictOf(finding);
+  EXPECT_EQ(finding.effects.size(), 2U) << verdictOf(finding);
 }
 
 /// A table with a knob for each half metre can look like a scale, too.

@@ -112,5 +112,19 @@ TEST(Finder, OffersBothOfTwoCovariatesThatGoTogether) {
   EXPECT_NE(effect.experiment->vary, effect.experiment->hold);
 }
 
+/// What few captures can show holds if three carry it; two may have been bumped.
+TEST(CrossValidation, AGainHoldsIfItIsOfManyCapturesOrOfThreeThatSayMuch) {
+  const auto gain = [](std::size_t captures, double each, std::size_t of) {
+    Gain all{0, 0.0, std::vector<double>(of)};
+    for (std::size_t c = 0; c < captures; ++c) all.by_capture[c] = each;
+    return against0(all);
+  };
+  EXPECT_TRUE(holds(gain(20, 2.0, 45)));
+  EXPECT_TRUE(holds(gain(3, 100.0, 45)));
+  EXPECT_FALSE(holds(gain(2, 1000.0, 45)));
+  EXPECT_FALSE(holds(gain(3, 2.0, 45))) << "6 in χ² is what noise gives";
+  EXPECT_FALSE(holds(gain(45, -1.0, 45)));
+}
+
 }  // namespace
 }  // namespace toftwin::discover

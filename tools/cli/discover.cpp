@@ -17,8 +17,10 @@ struct Options {
   std::string data, map, output = "discovery";
   CampaignOptions campaign;
 
-  /// The folder of a run of `toftwin measure`, not a table.
-  [[nodiscard]] bool isRun() const { return std::filesystem::is_directory(data); }
+  /// The folder of a run of `toftwin measure`, or a recording, not a table.
+  [[nodiscard]] bool isRun() const {
+    return std::filesystem::is_directory(data) || std::filesystem::path{data}.extension() == ".mcap";
+  }
 };
 
 Result<Exit> act(const Options& options) {
@@ -42,8 +44,8 @@ Run add(Arguments& args) {
   const auto options = std::make_shared<Options>();
   args.option("DATA", options->data,
               "a CSV file with a line of headers: measured values, their reference, and what may "
-              "matter; or the folder of "
-              "a run of toftwin measure")
+              "matter; the folder of "
+              "a run of toftwin measure; or a recording (.mcap) whose frames have poses")
       .required();
   args.option("--map", options->map,
               "of a table: TOML file that says what the columns are; without it the headers do");
@@ -52,11 +54,11 @@ Run add(Arguments& args) {
   options->campaign.add(args);
   args.check([options]() -> Result<> {
     if (options->isRun() && !options->map.empty()) {
-      return Error{Error::Code::InvalidArgument, "--map is for a table, not for the folder of a run"};
+      return Error{Error::Code::InvalidArgument, "--map is for a table, not for a run or a recording"};
     }
     if (!options->isRun() && options->campaign.isGiven()) {
       return Error{Error::Code::InvalidArgument,
-                   fmt::format("{} is no folder: --model, --scene and their like are for the folder of a run",
+                   fmt::format("{} is no folder and no recording (.mcap): --model, --scene and their like are for these",
                                options->data)};
     }
     return {};
@@ -71,7 +73,8 @@ Command discoverCommand() {
           "  toftwin discover warmup.csv -o out                  headers say what the columns are\n"
           "  toftwin discover distances.csv --map map.toml -o out\n"
           "  toftwin discover run --model camera.toml --scene wall.toml -o out   what toftwin "
-          "measure captured\n",
+          "measure captured\n"
+          "  toftwin discover kinect.mcap --model camera.toml --scene wall.toml -o out\n",
           add};
 }
 

@@ -13,12 +13,17 @@ Result<discover::CampaignJob> jobOf(const std::string& run, const std::string& o
                                     const CampaignOptions& options) {
   if (options.model.empty() || options.scene.empty()) {
     return Error{Error::Code::InvalidArgument,
-                 fmt::format("{} is the folder of a run: that takes --model, the camera file that "
+                 fmt::format("{} is the folder of a run, or a recording: that takes --model, the camera file that "
                              "is to be mended, and "
                              "--scene, what the camera looked at",
                              run)};
   }
   discover::CampaignJob job{.run = run, .model = options.model, .scene = options.scene, .output = output};
+  job.poses_of = options.poses;
+  if (!options.poses.empty() && std::filesystem::is_directory(run)) {
+    return Error{Error::Code::InvalidArgument,
+                 "--poses is for a recording: a run's captures have the poses of their plan or rig"};
+  }
   for (const std::string& one : options.scenes_of) {
     const auto equals = one.find('=');
     if (equals == std::string::npos || equals == 0 || equals + 1 == one.size()) {
@@ -48,8 +53,9 @@ Result<discover::CampaignJob> jobOf(const std::string& run, const std::string& o
 }  // namespace
 
 void CampaignOptions::add(Arguments& args) {
-  args.option("--model", model, "of a run: the camera file that is to be mended, or a preset");
-  args.option("--scene", scene, "of a run: the scene file of what the camera looked at");
+  args.option("--model", model, "of a run or a recording: the camera file that is to be mended, or a preset");
+  args.option("--scene", scene, "of a run or a recording: the scene file of what the camera looked at");
+  args.option("--poses", poses, "of a recording: another one, whose frames say where the camera stood");
   args.option("--scene-of", scenes_of,
               "of a run: BLOCK=FILE, another scene in a block of the plan; as often as needed")
       .oneAtATime();
@@ -68,7 +74,7 @@ void CampaignOptions::add(Arguments& args) {
 }
 
 bool CampaignOptions::isGiven() const {
-  return !model.empty() || !scene.empty() || !scenes_of.empty() || is_b || keep_locked || !without.empty();
+  return !model.empty() || !poses.empty() || !scene.empty() || !scenes_of.empty() || is_b || keep_locked || !without.empty();
 }
 
 Result<Exit> discoverRun(const std::string& run, const std::string& output, const CampaignOptions& options) {

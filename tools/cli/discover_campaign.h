@@ -9,9 +9,9 @@
 
 namespace toftwin::cli {
 
-/// What `toftwin discover` asks for where it searches a run of `toftwin measure`.
+/// What `toftwin discover` asks for where it searches a run of `toftwin measure`, or a recording.
 struct CampaignOptions {
-  std::string model, scene;
+  std::string model, scene, poses;
   std::vector<std::string> scenes_of;
   bool is_b = false;
   bool keep_locked = false;

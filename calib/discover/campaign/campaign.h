@@ -53,12 +53,17 @@ struct Campaign {
   CameraInfo camera{};
   std::vector<MeasuredCapture> captures{};    ///< open ones that can be compared pixel by pixel
   std::vector<plan::CaptureRecord> locked{};  ///< unopened
+  std::vector<MeasuredCapture> put_aside{};   ///< of a bare recording: its locked ones
   std::vector<std::string> notes{};           ///< what was left out and why
 };
 
 /// Reads the open captures. Errors name capture and file: no run, one that is damaged, without
 /// poses, without repeats, without ranges.
 Result<Campaign> readCampaign(const std::filesystem::path& folder, Side side);
+/// Reads a recording that no plan was behind: frames of one pose, exposure and ambient light after each other are a
+/// capture, and one in five is put aside. Poses are the frames' own, or, where given, those of another recording's
+/// frames. Errors: frames without poses, too few that belong together.
+Result<Campaign> readRecording(const std::filesystem::path& file, const std::filesystem::path& poses_of);
 /// Reads captures that were locked; their hashes are checked. The caller has written that they are
 /// opened.
 Result<std::vector<MeasuredCapture>> readLocked(const Campaign& campaign);

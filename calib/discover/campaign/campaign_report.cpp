@@ -22,9 +22,17 @@ std::string stageOf(const Effect& effect) {
 }
 
 std::string titleOf(const Effect& effect) {
+  if (effect.is_rest)
+    return fmt::format("what the form above leaves: {} ({})", effect.name, fmt::join(effect.covariates, ", "));
   return effect.is_catalogue
              ? effect.name
              : fmt::format("undeclared: {} ({})", effect.name, fmt::join(effect.covariates, ", "));
+}
+
+/// Effects with a cause of their own.
+std::size_t countOf(const CampaignFinding& finding) {
+  const auto rests = std::ranges::count_if(finding.effects, [](const FoundEffect& one) { return one.found.is_rest; });
+  return finding.effects.size() - static_cast<std::size_t>(rests);
 }
 
 /// Its title, and what else it may be.
@@ -182,6 +190,7 @@ Json toJson(const FoundEffect& one) {
   Json json = Json::object(), numbers = Json::array();
   json.set("name", one.found.name).set("kind", one.found.is_catalogue ? "catalogue" : "undeclared");
   json.set("stage", stageOf(one.found)).set("covariates", Json::arrayOf(one.found.covariates));
+  json.set("is_rest", one.found.is_rest);
   json.set("p", one.found.p)
       .set("gain", one.found.gain.mean)
       .set("gain_error", one.found.gain.error);
@@ -227,7 +236,7 @@ Json dataOf(const CampaignJob& job, const CampaignFinding& finding) {
 
 std::vector<compare::Card> cardsOf(const CampaignFinding& finding) {
   std::vector<compare::Card> cards{
-      {"effects found", std::to_string(finding.effects.size() + finding.updates.size()),
+      {"effects found", std::to_string(countOf(finding) + finding.updates.size()),
        fmt::format("{} captures, {} frames", finding.captures, finding.frames)},
       {"p of nothing being there", fmt::format("{:.3g}", finding.finding.first_p),
        fmt::format("of what is left: {:.3g}", finding.finding.last_p)}};
@@ -272,7 +281,8 @@ std::string verdictOf(const CampaignFinding& finding) {
                      finding.finding.first_p);
   }
   std::vector<std::string> names;
-  for (const FoundEffect& one : finding.effects) names.push_back(answerOf(one.found));
+  for (const FoundEffect& one : finding.effects)
+    if (!one.found.is_rest) names.push_back(answerOf(one.found));
   for (const FittedEffect& one : finding.updates)
     names.push_back("parameter update: " + nameOf(one.effect));
   std::string verdict = fmt::format("The model lacks {}", fmt::join(names, "; "));

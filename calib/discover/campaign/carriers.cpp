@@ -18,7 +18,7 @@
 namespace toftwin::discover {
 namespace {
 
-constexpr std::string_view kNeighbours = "neighbours", kCharge = "charge", kGain = "gain";
+constexpr std::string_view kNeighbours = "neighbours", kCharge = "charge", kGain = "gain", kStray = "stray";
 /// Half widths of the squares; the last one is the whole image.
 constexpr std::array kReaches{1, 3, 7, 15, 31, 1'000'000};
 
@@ -64,7 +64,7 @@ Image<std::complex<float>> over(const Image<std::complex<float>>& z,
 }  // namespace
 
 std::map<std::string, Reading> carriersOf(const sim::SensorModel& model, const Reading& declared,
-                                          double period_m) {
+                                          double period_m, double exposure_us) {
   std::map<std::string, Reading> all;
   const Image<std::complex<float>> z = phasorOf(declared, period_m);
   Image<float> real(z.width(), z.height()), imaginary = real;
@@ -81,10 +81,14 @@ std::map<std::string, Reading> carriersOf(const sim::SensorModel& model, const R
   }
   const double steps = std::max<double>(1.0, static_cast<double>(model.exposures({}).size()));
   const auto electron = static_cast<float>(2.0 / steps);
-  all.emplace(fmt::format("{}:in_phase", kCharge),
-              changeBy(over(z, [&](std::size_t) { return std::complex{electron, 0.0F}; }), period_m));
-  all.emplace(fmt::format("{}:quadrature", kCharge),
-              changeBy(over(z, [&](std::size_t) { return std::complex{0.0F, electron}; }), period_m));
+  const auto add = [&](std::string_view carrier, float electrons) {
+    all.emplace(fmt::format("{}:in_phase", carrier),
+                changeBy(over(z, [&](std::size_t) { return std::complex{electrons, 0.0F}; }), period_m));
+    all.emplace(fmt::format("{}:quadrature", carrier),
+                changeBy(over(z, [&](std::size_t) { return std::complex{0.0F, electrons}; }), period_m));
+  };
+  add(kCharge, electron);
+  add(kStray, electron * static_cast<float>(exposure_us * 1e-3));  // of a millisecond
   Reading& gain = all[std::string{kGain}];
   gain.range_m = gain.log_amplitude = Image<float>(z.width(), z.height());
   for (float& change : gain.log_amplitude.pixels()) change = 0.01F;
@@ -117,6 +121,11 @@ std::vector<TermGroup> carrierGroups(std::span<const CovariateInfo> covariates, 
   TermGroup light{"light from neighbours", Kind::Generic, {}, 0};
   for (const int reach : kReaches) light.terms.push_back({{}, Stage::Light, neighbourName(reach)});
   groups.push_back(std::move(light));
+  groups.push_back({"stray light, the same in all pixels",
+                    Kind::Generic,
+                    {{{}, Stage::Light, fmt::format("{}:in_phase", kStray)},
+                     {{}, Stage::Light, fmt::format("{}:quadrature", kStray)}},
+                    0});
   const auto add = [&](std::string name, const std::vector<Term>& factors) {
     TermGroup charge{std::move(name), Kind::Generic, {}, 0};
     for (const char* part : {"in_phase", "quadrature"}) {
@@ -147,9 +156,24 @@ std::vector<TermGroup> carrierGroups(std::span<const CovariateInfo> covariates, 
   return groups;
 }
 
+std::vector<TermGroup> pixelGroups(bool has_delay, std::size_t numbers) {
+  std::vector<TermGroup> groups;
+  const auto add = [&](std::string_view of, Stage stage) {
+    groups.push_back({fmt::format("a pattern of pixels, in the {}", of),
+                      Kind::Generic,
+                      {{{}, stage, fmt::format("{}:{}", kPixelCarrier, of)}},
+                      static_cast<int>(numbers)});
+  };
+  add("range", Stage::Range);
+  add("gain", Stage::Light);
+  if (has_delay) add("delay", Stage::Light);
+  return groups;
+}
+
 std::string_view wordOfCarrier(std::string_view carrier) {
   if (carrier == kNeighbours) return "neighbours";
-  return carrier == kCharge ? "amplitude" : "";
+  if (carrier == kPixelCarrier) return "position";
+  return carrier == kCharge || carrier == kStray ? "amplitude" : "";
 }
 
 }  // namespace toftwin::discover

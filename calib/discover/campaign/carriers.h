@@ -18,9 +18,10 @@ namespace toftwin::discover {
 ///     δ ln|z| = Re(δz/z),   δr = −(R/2π) Im(δz/z)
 /// for light from a square of neighbours (δz = 1 % of its mean z), and for an electron more in the correlation's
 /// real or imaginary part (δz = 2/N or 2i/N, N raw exposures).
-/// And a gain of 1 % of the amplitude.
+/// A gain of 1 % of the amplitude. And stray light, the same in all pixels: electrons in phase or in quadrature
+/// like those of a charge, but as many more as the exposure is longer.
 std::map<std::string, Reading> carriersOf(const sim::SensorModel& model, const Reading& declared,
-                                          double period_m);
+                                          double period_m, double exposure_us);
 
 /// What is looked for with them: a kernel of squares of light; charge that is constant or goes with exposure,
 /// ambient light or temperature; a gain that goes with any covariate.
@@ -34,6 +35,11 @@ inline constexpr std::string_view kDelayCarrier = "delay";
 sim::AnyEffect delayInLight(const sim::SensorModel& model, double millimetres);
 /// Whether it can be told from an offset of the range: its changes vary by more than 2 % of themselves.
 bool isNoOffset(std::span<const Reading> changes);
+
+/// What stays the same at each pixel: "pixel:range", "pixel:gain", "pixel:delay".
+inline constexpr std::string_view kPixelCarrier = "pixel";
+/// For each of them a group of one term; `numbers`: how many places a pattern has.
+std::vector<TermGroup> pixelGroups(bool has_delay, std::size_t numbers);
 
 /// What effects of the catalogue call a carrier; empty: it is none.
 std::string_view wordOfCarrier(std::string_view carrier);

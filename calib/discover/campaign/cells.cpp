@@ -58,6 +58,8 @@ Cells::Cells(const MeasuredCapture& capture, const TracedCapture& traced, const 
     counts[i] = 1;
   }
   const CellSize size = cellSizeOf(width, height, most);
+  grid_ = {size.width, size.height, (width + size.width - 1) / size.width,
+           (height + size.height - 1) / size.height};
   for (int top = 0; top < height; top += size.height) {
     for (int left = 0; left < width; left += size.width) {
       std::vector<std::uint32_t> cell;
@@ -67,7 +69,10 @@ Cells::Cells(const MeasuredCapture& capture, const TracedCapture& traced, const 
           if (counts[i] != 0) cell.push_back(i);
         }
       }
-      if (!cell.empty()) cells_.push_back(std::move(cell));
+      if (cell.empty()) continue;
+      cells_.push_back(std::move(cell));
+      places_.push_back(static_cast<std::size_t>(top / size.height) * static_cast<std::size_t>(grid_.columns) +
+                        static_cast<std::size_t>(left / size.width));
     }
   }
   for (std::size_t c = 0; c < kChannels; ++c) {

@@ -16,6 +16,8 @@
 namespace toftwin::discover {
 namespace {
 
+bool isRecording(const CampaignJob& job) { return std::filesystem::is_regular_file(job.run); }
+
 struct DeclaredFiles {
   Declared declared;
   std::string text;  ///< of the camera file
@@ -157,8 +159,7 @@ Inserted insertFound(const CampaignRows& rows, const Declared& declared,
   return inserted;
 }
 
-void takeFitted(const Refitted& refitted, const Declared& declared, CampaignFinding& finding) {
-  const auto before = effectsWithoutNoise(declared.model);
+void takeFitted(const Refitted& refitted, CampaignFinding& finding) {
   for (const FittedEffect& one : refitted.fitted) {
     const auto found = std::ranges::find_if(finding.effects, [&](const FoundEffect& effect) {
       return effect.found.is_catalogue && effect.found.name == nameOf(one.effect);
@@ -169,15 +170,39 @@ void takeFitted(const Refitted& refitted, const Declared& declared, CampaignFind
       finding.updates.push_back(one);
   }
   finding.offset_mm = refitted.offset_mm, finding.offset_error_mm = refitted.offset_error_mm;
+  finding.zero = zeroOf(refitted);
   finding.dispersion = refitted.dispersion;
-  static_cast<void>(before);
+}
+
+/// A delay of the light that is another thing than an offset: in the file's frequency_offset, in the one that was
+/// found, or in one more.
+void addDelay(const sim::SensorModel& model, double delay_mm, std::vector<std::optional<FittedEffect>>& updates,
+              std::vector<FittedEffect>& added) {
+  if (delay_mm == 0.0) return;
+  const auto later = [&](const sim::AnyEffect& effect) { return withDelay(model, {effect}, delay_mm).front(); };
+  const auto isOffset = [](const sim::AnyEffect& effect) {
+    return std::holds_alternative<sim::FrequencyOffset>(effect);
+  };
+  for (std::size_t i = 0; i < updates.size(); ++i) {
+    if (!isOffset(model.effects()[i])) continue;
+    FittedEffect known = updates[i].value_or(FittedEffect{model.effects()[i], {}});
+    known.effect = later(known.effect);
+    updates[i] = std::move(known);
+    return;
+  }
+  for (FittedEffect& one : added) {
+    if (!isOffset(one.effect)) continue;
+    one.effect = later(one.effect);
+    return;
+  }
+  added.push_back({withDelay(model, {}, delay_mm).front(), {}});
 }
 
 /// The camera file with what was found. An offset that is no chance goes in as a delay, unless
 /// there is one.
-std::string modelText(const std::string& text, const Declared& declared,
+std::string modelText(const std::string& text, const sim::SensorModel& in_file,
                       const CampaignFinding& finding) {
-  const auto& effects = declared.model.effects();
+  const auto& effects = in_file.effects();
   std::vector<std::optional<FittedEffect>> updates(effects.size());
   for (std::size_t i = 0; i < effects.size(); ++i) {
     for (const FittedEffect& one : finding.updates) {
@@ -190,10 +215,11 @@ std::string modelText(const std::string& text, const Declared& declared,
   }
   const bool has_delay =
       std::ranges::any_of(effects, [](const auto& effect) { return nameOf(effect) == "delay"; });
-  if (!has_delay && std::abs(finding.offset_mm) > 3.0 * finding.offset_error_mm) {
-    added.push_back({sim::Delay{.offset = finding.offset_mm * millimetre},
-                     {{"offset_mm", finding.offset_mm, finding.offset_error_mm}}});
+  if (!has_delay && std::abs(finding.zero.offset_mm) > 3.0 * finding.offset_error_mm) {
+    added.push_back({sim::Delay{.offset = finding.zero.offset_mm * millimetre},
+                     {{"offset_mm", finding.zero.offset_mm, finding.offset_error_mm}}});
   }
+  addDelay(in_file, finding.zero.delay_mm, updates, added);
   return withEffects(text, effects, updates, added,
                      fmt::format("Written by toftwin discover from {} captures of {}.",
                                  finding.captures, finding.plan.empty() ? "a run" : finding.plan));
@@ -202,11 +228,11 @@ std::string modelText(const std::string& text, const Declared& declared,
 Result<> judgeLocked(const CampaignJob& job, const Campaign& campaign, const Declared& declared,
                      const JudgedModel& before, const JudgedModel& after,
                      CampaignFinding& finding) {
-  if (auto opened =
-          plan::openLocked({.run = job.run, .output = job.output, .locked = true, .note = job.note},
-                           campaign.locked);
-      !opened)
-    return opened;
+  if (!isRecording(job)) {
+    const auto opened = plan::openLocked(
+        {.run = job.run, .output = job.output, .locked = true, .note = job.note}, campaign.locked);
+    if (!opened) return opened;
+  }
   const auto captures = readLocked(campaign);
   if (!captures) return captures.error();
   TraceOptions options = job.trace;
@@ -254,7 +280,7 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
   progress.plan("fit", 8.0);
   progress.plan("judge", 5.0);
   progress.begin();
-  const auto campaign = readCampaign(job.run, job.side);
+  const auto campaign = isRecording(job) ? readRecording(job.run, job.poses_of) : readCampaign(job.run, job.side);
   if (!campaign) return campaign.error();
   CampaignFinding finding;
   finding.notes = campaign->notes;
@@ -272,6 +298,10 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
   const auto tell = [&](double share) { progress.at(share); };
   const auto at_poses = traceAll(declared, campaign->captures, job.trace, tell);
   if (!at_poses) return at_poses.error();
+  const sim::SensorModel in_file = declared.model;
+  const auto late = delayThatFits({declared, {campaign->captures, *at_poses, *at_poses}, {}});
+  if (!late) return late.error();
+  declared.model = in_file.withEffects(withDelay(in_file, in_file.effects(), *late));
   progress.begin();
   const auto traced = traceWhereTheyStood(declared, campaign->captures, *at_poses, job.trace, tell);
   if (!traced) return traced.error();
@@ -296,12 +326,16 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
   const auto refitted = refit(*rows, inserted.effects, inserted.fitted,
                               {.scales = finding.finding.scales, .only = inserted.only});
   if (!refitted) return refitted.error();
-  takeFitted(*refitted, declared, finding);
-  finding.model_toml = modelText(files->text, declared, finding);
+  takeFitted(*refitted, finding);
+  finding.zero.delay_mm += *late;
+  finding.model_toml = modelText(files->text, in_file, finding);
   progress.begin();
   if (job.open_locked && !campaign->locked.empty()) {
-    const JudgedModel before{as_declared, plain->offset_mm, plain->gain_percent};
-    const JudgedModel after{refitted->effects, refitted->offset_mm, refitted->gain_percent};
+    const auto judged = [&](const Refitted& of, const std::vector<sim::AnyEffect>& effects) {
+      const Zero zero = zeroOf(of);
+      return JudgedModel{withDelay(declared.model, effects, zero.delay_mm), zero.offset_mm, of.gain_percent};
+    };
+    const JudgedModel before = judged(*plain, as_declared), after = judged(*refitted, refitted->effects);
     if (auto done = judgeLocked(job, *campaign, declared, before, after, finding); !done)
       return done.error();
     keepIfWorse(files->text, finding);

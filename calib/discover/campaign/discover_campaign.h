@@ -18,7 +18,8 @@ namespace toftwin::discover {
 
 /// What a campaign is to be searched with.
 struct CampaignJob {
-  std::filesystem::path run;
+  std::filesystem::path run;  ///< a run's folder, or a recording
+  std::filesystem::path poses_of{};  ///< of a recording: another one, whose frames have the poses
   std::string model;  ///< a camera file, or the name of a preset
   std::filesystem::path scene;
   std::map<std::string, std::filesystem::path> scene_of_block{};
@@ -45,6 +46,7 @@ struct CampaignFinding {
   std::vector<FoundEffect> effects{};
   std::vector<FittedEffect> updates{};  ///< declared effects whose numbers were wrong
   double offset_before_mm = 0.0, offset_mm = 0.0, offset_error_mm = 0.0;
+  Zero zero{};  ///< with what was found
   double dispersion = 1.0;
   std::optional<Judgement> judgement{};  ///< on the locked captures
   std::string model_toml{};

@@ -171,6 +171,7 @@ std::shared_ptr<const RowSource> CampaignRows::including(
           with_catalogue ? ownEvidence(rows) : rows.base.evidence(fixed.name, fixed.block);
     }
   });
+  all->findPatterns();
   return all;
 }
 

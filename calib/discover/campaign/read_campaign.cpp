@@ -5,199 +5,15 @@
 #include <thread>
 
 #include <fmt/format.h>
-#include <toftwin/nan.h>
 
-#include "calib/compare/stack.h"
-#include "calib/compare/statistics.h"
 #include "calib/discover/campaign/campaign.h"
+#include "calib/discover/campaign/gather_capture.h"
 #include "calib/plan/compare_run.h"
 #include "calib/plan/plan.h"
 #include "protocol/record/recording.h"
 
 namespace toftwin::discover {
 namespace {
-
-/// Means and noise of an image that comes again and again. Noise is that of the differences between
-/// successive frames, which a drift within the capture does not enlarge (von Neumann 1941); that of
-/// neighbouring frames may be alike, which the ratio to the plain variance tells.
-class Repeats {
- public:
-  void add(const Image<float>& image) {
-    if (sum_.empty()) begin(image);
-    if (!before_.empty()) addDifference(image);
-    for (std::size_t i = 0; i < image.size(); ++i) {
-      if (std::isfinite(image[i])) sum_[i].add(static_cast<double>(image[i]));
-    }
-    before_ = image;
-    ++frames_;
-  }
-
-  /// `like`: pixels with similar values of it have similar noise.
-  [[nodiscard]] Repeated repeated(const Image<float>& like) const {
-    Repeated result{Image<float>(sum_.width(), sum_.height(), kNaN), {}, clumping()};
-    for (std::size_t i = 0; i < sum_.size(); ++i) {
-      if (2 * sum_[i].n() >= frames_ && sum_[i].n() > 0)
-        result.mean[i] = static_cast<float>(sum_[i].mean());
-    }
-    result.variance = pooled(like.empty() ? result.mean : like);
-    return result;
-  }
-
- private:
-  void begin(const Image<float>& image) {
-    sum_ = Image<compare::Running>(image.width(), image.height());
-    squares_ = Image<double>(image.width(), image.height());
-    pairs_ = Image<int>(image.width(), image.height());
-  }
-
-  void addDifference(const Image<float>& image) {
-    constexpr int kBlock = 4;
-    for (std::size_t i = 0; i < image.size(); ++i) {
-      const auto step = static_cast<double>(image[i] - before_[i]);
-      if (std::isfinite(step)) squares_[i] += step * step, ++pairs_[i];
-    }
-    for (int y = 0; y + kBlock <= image.height(); y += kBlock) {
-      for (int x = 0; x + kBlock <= image.width(); x += kBlock) {
-        double sum = 0.0, squares = 0.0;
-        for (int j = 0; j < kBlock; ++j) {
-          for (int i = 0; i < kBlock; ++i) {
-            const auto step = static_cast<double>(image(x + i, y + j) - before_(x + i, y + j));
-            sum += step, squares += step * step;
-          }
-        }
-        if (!std::isfinite(sum)) continue;
-        block_ratios_ += squares > 0.0 ? sum * sum / squares : 1.0;
-        ++blocks_;
-      }
-    }
-  }
-
-  /// (Σd)² / Σd² over blocks is 1 where pixels err independently and 16 where a block errs as one.
-  [[nodiscard]] double clumping() const {
-    return blocks_ < 32 ? 1.0 : std::max(1.0, block_ratios_ / static_cast<double>(blocks_));
-  }
-
-  /// Variance of the mean over the frames: of single frames pooled over pixels that are alike in
-  /// `like`, times (1 + ρ)/(1 − ρ)/n for frames that err like the one before by ρ.
-  [[nodiscard]] Image<float> pooled(const Image<float>& like) const {
-    constexpr std::size_t kBins = 24;
-    std::vector<std::pair<float, std::size_t>> order;
-    double steps = 0.0, plain = 0.0;
-    for (std::size_t i = 0; i < sum_.size(); ++i) {
-      if (pairs_[i] == 0 || !std::isfinite(like[i])) continue;
-      order.emplace_back(like[i], i);
-      steps += 0.5 * squares_[i] / pairs_[i], plain += sum_[i].variance();
-    }
-    Image<float> variance(sum_.width(), sum_.height(), kNaN);
-    if (order.empty()) return variance;
-    const double rho =
-        plain > 0.0 && frames_ >= 4 ? std::clamp(1.0 - steps / plain, 0.0, 0.9) : 0.0;
-    const double of_mean = (1.0 + rho) / (1.0 - rho) / (1.0 - rho) / static_cast<double>(frames_);
-    std::ranges::sort(order);
-    const std::size_t per_bin = std::max<std::size_t>(1, order.size() / kBins);
-    for (std::size_t first = 0; first < order.size(); first += per_bin) {
-      const std::size_t last =
-          first + 2 * per_bin > order.size() ? order.size() : first + per_bin;  // no small rest
-      double sum = 0.0;
-      for (std::size_t i = first; i < last; ++i) {
-        const std::size_t pixel = order[i].second;
-        sum += 0.5 * squares_[pixel] / pairs_[pixel];
-      }
-      const auto mean = static_cast<float>(of_mean * sum / static_cast<double>(last - first));
-      for (std::size_t i = first; i < last; ++i) variance[order[i].second] = mean;
-      if (last == order.size()) break;
-    }
-    return variance;
-  }
-
-  std::size_t frames_ = 0;
-  Image<compare::Running> sum_;
-  Image<double> squares_;
-  Image<int> pairs_;
-  Image<float> before_;
-  double block_ratios_ = 0.0;
-  std::size_t blocks_ = 0;
-};
-
-Image<float> logAmplitudeOf(const Frame& frame, const Image<float>& range_m) {
-  const Plane* plane = frame.find(PlaneKind::Amplitude);
-  if (plane == nullptr || plane->type != ElementType::F32 ||
-      plane->as<float>().size() != range_m.size())
-    return {};
-  Image<float> log(range_m.width(), range_m.height(), kNaN);
-  const auto values = plane->as<float>();
-  for (std::size_t i = 0; i < log.size(); ++i) {
-    if (std::isfinite(range_m[i]) && values[i] > 0.0F) log[i] = std::log(values[i]);
-  }
-  return log;
-}
-
-/// Mean over the image of one frame, to tell frames apart.
-double meanOf(const Image<float>& range_m, const Image<float>& about) {
-  double sum = 0.0;
-  std::size_t n = 0;
-  for (std::size_t i = 0; i < range_m.size(); ++i) {
-    const auto value = static_cast<double>(range_m[i] - about[i]);
-    if (std::isfinite(value)) sum += value, ++n;
-  }
-  return n == 0 ? 0.0 : sum / static_cast<double>(n);
-}
-
-void compareParity(const std::vector<double>& means, MeasuredCapture& capture) {
-  compare::Running even, odd;
-  for (std::size_t k = 0; k < means.size(); ++k) (k % 2 == 0 ? even : odd).add(means[k]);
-  if (even.n() < 2 || odd.n() < 2) return;
-  capture.parity_m = even.mean() - odd.mean();
-  capture.parity_error_m = std::sqrt(even.variance() / static_cast<double>(even.n()) +
-                                     odd.variance() / static_cast<double>(odd.n()));
-}
-
-Error ofCapture(const plan::CaptureRecord& record, const std::string& message,
-                Error::Code code = Error::Code::Malformed) {
-  return {code, fmt::format("capture {} (\"{}\"): {}", record.number, record.name, message)};
-}
-
-/// What is gathered while a capture's frames are read.
-struct Gathered {
-  MeasuredCapture capture;
-  CameraInfo camera;
-  Repeats range, amplitude;
-  Image<float> first;
-  std::vector<double> means;
-  Image<float> valid;
-  bool has_amplitude = true;
-
-  Result<> add(const Frame& frame) {
-    if (capture.frames == 0) camera = frame.camera, capture.moment = frame.moment;
-    if (!(frame.camera == camera))
-      return ofCapture(capture.record, "its camera model changes between frames");
-    auto range_m = compare::rangeOf(frame);
-    if (!range_m) return ofCapture(capture.record, range_m.error().message, range_m.error().code);
-    if (capture.frames == 0)
-      first = *range_m, valid = Image<float>(range_m->width(), range_m->height());
-    for (std::size_t i = 0; i < valid.size(); ++i)
-      valid[i] += std::isfinite((*range_m)[i]) ? 1.0F : 0.0F;
-    range.add(*range_m);
-    means.push_back(meanOf(*range_m, first));
-    const Image<float> log = logAmplitudeOf(frame, *range_m);
-    has_amplitude = has_amplitude && !log.empty();
-    if (has_amplitude) amplitude.add(log);
-    ++capture.frames;
-    return {};
-  }
-
-  MeasuredCapture finish() {
-    if (has_amplitude) {
-      capture.log_amplitude = amplitude.repeated({});
-      capture.log_amplitude.variance = amplitude.repeated(capture.log_amplitude.mean).variance;
-    }
-    capture.range_m = range.repeated(capture.log_amplitude.mean);
-    for (float& share : valid.pixels()) share /= static_cast<float>(capture.frames);
-    capture.valid_share = std::move(valid);
-    compareParity(means, capture);
-    return std::move(capture);
-  }
-};
 
 struct ReadOne {
   MeasuredCapture capture;
@@ -211,24 +27,24 @@ Result<ReadOne> readOne(const std::filesystem::path& folder, Side side,
     return ofCapture(record, checked.error().message, checked.error().code);
   auto reader = record::Reader::open(folder / file.file);
   if (!reader) return ofCapture(record, reader.error().message, reader.error().code);
-  Gathered gathered;
-  gathered.capture.record = record;
+  CaptureGatherer gathered{record};
   while (true) {
     auto frame = reader->next();
     if (!frame && frame.error().code == Error::Code::EndOfStream) break;
     if (!frame) return ofCapture(record, frame.error().message, frame.error().code);
     if (auto added = gathered.add(*frame); !added) return added.error();
   }
-  if (gathered.capture.frames < 2) {
+  if (gathered.frames() < 2) {
     return ofCapture(
         record,
         fmt::format("has {} frame(s): without repeats nothing is known of the noise; measure with "
                     "frames = 8 or more",
-                    gathered.capture.frames),
+                    gathered.frames()),
         Error::Code::InvalidArgument);
   }
-  if (auto& pose = gathered.capture.moment.world_from_camera; !pose) pose = record.pose;
-  return ReadOne{gathered.finish(), gathered.camera};
+  ReadOne one{gathered.finish(), gathered.camera()};
+  if (auto& pose = one.capture.moment.world_from_camera; !pose) pose = record.pose;
+  return one;
 }
 
 Result<std::vector<ReadOne>> readThem(const std::filesystem::path& folder, Side side,
@@ -302,6 +118,7 @@ Result<Campaign> readCampaign(const std::filesystem::path& folder, Side side) {
 }
 
 Result<std::vector<MeasuredCapture>> readLocked(const Campaign& campaign) {
+  if (!campaign.put_aside.empty()) return campaign.put_aside;
   auto read = readThem(campaign.folder, campaign.side, campaign.locked);
   if (!read) return read.error();
   std::vector<MeasuredCapture> captures;

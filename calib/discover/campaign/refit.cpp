@@ -5,6 +5,7 @@
 #include <cmath>
 #include <set>
 
+#include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/reading.h"
 #include "sim/images/rows.h"
 
@@ -298,8 +299,62 @@ Result<Refitted> refit(const CampaignRows& rows, std::vector<sim::AnyEffect> eff
   }
   result.offset_mm = at.others.coefficient[0], result.gain_percent = at.others.coefficient[1];
   result.offset_error_mm = std::sqrt(std::max(0.0, at.others.inverse(0, 0)) * size);
+  if (rows.hasDelay()) {  // behind offset and gain, poses and light being integrated out
+    constexpr Eigen::Index kDelay = 2;
+    result.delay_mm = at.others.coefficient[kDelay];
+    result.delay_error_mm = std::sqrt(std::max(0.0, at.others.inverse(kDelay, kDelay)) * size);
+  }
   result.marginal = std::move(state.marginal);
   return result;
+}
+
+Zero zeroOf(const Refitted& refitted) {
+  const bool is_told = std::abs(refitted.delay_mm) > 3.0 * refitted.delay_error_mm;
+  // The column of the delay is what it does beyond an offset.
+  return is_told ? Zero{refitted.offset_mm - refitted.delay_mm, refitted.delay_mm} : Zero{refitted.offset_mm, 0.0};
+}
+
+std::vector<sim::AnyEffect> withDelay(const sim::SensorModel& model, std::vector<sim::AnyEffect> effects,
+                                      double millimetres) {
+  if (millimetres == 0.0) return effects;
+  const auto more = std::get<sim::FrequencyOffset>(delayInLight(model, millimetres));
+  for (sim::AnyEffect& effect : effects) {
+    if (auto* own = std::get_if<sim::FrequencyOffset>(&effect)) {
+      own->first += more.first, own->second += more.second, own->third += more.third;
+      return effects;
+    }
+  }
+  return withInserted(std::move(effects), more);
+}
+
+Result<double> delayThatFits(const JudgedCampaign& judged) {
+  constexpr double kStep_mm = 2.0, kMost_mm = 100.0, kDone_mm = 0.1;
+  const sim::SensorModel& model = judged.declared.model;
+  if (model.traceRequest().frequencies.empty()) return 0.0;  // a pulsed camera's gates know no cyclic error
+  const auto as_declared = effectsWithoutNoise(model);
+  const auto stepAt = [&](double delay_mm) -> Result<Step> {
+    const auto evidence = residualEvidence(judged, withDelay(model, as_declared, delay_mm));
+    if (!evidence) return evidence.error();
+    return stepOf(marginalise(*evidence, judged.scales), 0);
+  };
+  const auto start = stepAt(0.0);
+  if (!start) return start.error();
+  double delay_mm = 0.0, deviance = start->deviance;
+  for (int k = 0; k < 6; ++k) {
+    const auto before = stepAt(delay_mm - kStep_mm), behind = stepAt(delay_mm + kStep_mm);
+    if (!before || !behind) return before ? behind.error() : before.error();
+    const double slope = 0.5 * (behind->deviance - before->deviance) / kStep_mm;
+    const double bend = (behind->deviance + before->deviance - 2.0 * deviance) / (kStep_mm * kStep_mm);
+    if (!(bend > 1e-9 * deviance)) break;
+    const double by = std::clamp(-slope / bend, -kMost_mm, kMost_mm);
+    const auto next = stepAt(delay_mm + by);
+    if (!next) return next.error();
+    if (!(next->deviance < deviance)) break;
+    delay_mm += by, deviance = next->deviance;
+    if (std::abs(by) < kDone_mm) break;
+  }
+  const double dispersion = std::max(1.0, deviance / std::max(1.0, start->freedom));
+  return start->deviance - deviance > 9.0 * dispersion ? delay_mm : 0.0;
 }
 
 Result<std::vector<std::shared_ptr<const TracedCapture>>> traceWhereTheyStood(

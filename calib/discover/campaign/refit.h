@@ -71,9 +71,25 @@ struct Refitted {
   double deviance = 0.0, dispersion = 1.0;
   double offset_mm = 0.0, offset_error_mm = 0.0;
   double gain_percent = 0.0;
+  /// Of the light, beyond an offset of the range; 0 where that is the same.
+  double delay_mm = 0.0, delay_error_mm = 0.0;
 };
 Result<Refitted> refit(const CampaignRows& rows, std::vector<sim::AnyEffect> effects,
                        const std::vector<std::size_t>& places, const RefitOptions& options);
+
+/// What a campaign says of where zero lies: an offset of the range, and a delay of the light where that is another
+/// thing and no chance (3 standard errors).
+struct Zero {
+  double offset_mm = 0.0, delay_mm = 0.0;
+};
+Zero zeroOf(const Refitted& refitted);
+/// The effects with that delay in the light: in a frequency_offset of theirs, or in one more.
+std::vector<sim::AnyEffect> withDelay(const sim::SensorModel& model, std::vector<sim::AnyEffect> effects,
+                                      double millimetres);
+
+/// The delay of the light that fits best, offset and gain being free, in millimetres: what it does to the cyclic error
+/// is not proportional to it. 0 where it is an offset of the range and nothing else, or no more than chance.
+Result<double> delayThatFits(const JudgedCampaign& judged);
 
 /// Light traced again where the cameras probably stood: what a place off the pose changes is then
 /// known to second order, which counts where a thousand pixels say the same.

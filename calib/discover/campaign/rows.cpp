@@ -11,6 +11,7 @@
 
 #include <fmt/format.h>
 
+#include "calib/compare/stack.h"
 #include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/covariates.h"
 #include "sim/images/rows.h"
@@ -222,17 +223,32 @@ Group delayGroup() {
           .count = 1, .numbers = 1};
 }
 
+double exposureUsOf(const MeasuredCapture& capture) {
+  const auto& exposures = capture.moment.exposures;
+  return exposures.empty() ? capture.record.exposure_us : exposures.front().duration.in(microsecond);
+}
+
+/// The first capture of the same scene and pose.
+std::size_t siteOf(const std::vector<MeasuredCapture>& captures, std::size_t c) {
+  const auto same = std::ranges::find_if(captures, [&](const MeasuredCapture& other) {
+    return other.record.block == captures[c].record.block &&
+           compare::samePose(*other.moment.world_from_camera, *captures[c].moment.world_from_camera);
+  });
+  return static_cast<std::size_t>(same - captures.begin());
+}
+
 }  // namespace
 
 void CampaignRows::fillFixed(std::size_t c, const Reading& declared, Fixed& fixed) const {
   const MeasuredCapture& capture = lit_->captures[c];
   const TracedCapture& varied = *lit_->varied[c];
   fixed.name = capture.record.name, fixed.block = capture.record.block;
+  fixed.site = siteOf(lit_->captures, c);
   fixed.cells = Cells{capture, *lit_->traced[c], declared};
   fixed.covariates =
       covariatesOf(capture, varied, fixed.varied, declared_->model.camera(), fixed.cells);
   for (const auto& [name, change] :
-       carriersOf(declared_->model, fixed.varied, std::max(period_m_, 1e-3))) {
+       carriersOf(declared_->model, fixed.varied, std::max(period_m_, 1e-3), exposureUsOf(capture))) {
     fixed.carriers[name] = fixed.whitened(change);
   }
 }
@@ -332,6 +348,7 @@ Result<CampaignRows> CampaignRows::make(const Declared& declared, const Lit& lit
         options.tell(static_cast<double>(++done) / static_cast<double>(lit.captures.size()));
     }
   });
+  all.findPatterns();
   return all;
 }
 

@@ -27,6 +27,15 @@ namespace toftwin::discover {
 enum class Channel { Range, LogAmplitude };
 inline constexpr std::size_t kChannels = 2;
 
+/// How an image is divided into cells.
+struct CellGrid {
+  int cell_width = 1, cell_height = 1;
+  int columns = 0, rows = 0;
+  [[nodiscard]] std::size_t size() const {
+    return static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
+  }
+};
+
 /// Which pixels of a capture count, summed up into cells whose pixels lie below each other, so that
 /// patterns of columns stay. A cell's value is  Σ w x / √Σ w  with w = 1/variance: noise of
 /// variance 1, whatever the cell.
@@ -38,6 +47,10 @@ class Cells {
         int most = 2000);
 
   [[nodiscard]] std::size_t size() const { return cells_.size(); }
+  /// Where a cell lies in the grid of all cells that there could be, row after row: the same in all
+  /// captures of a camera.
+  [[nodiscard]] std::size_t placeOf(std::size_t cell) const { return places_[cell]; }
+  [[nodiscard]] const CellGrid& grid() const { return grid_; }
   [[nodiscard]] bool has(Channel channel) const { return !weight_[at(channel)].empty(); }
   /// The image as whitened cells; NaN counts as 0.
   [[nodiscard]] Eigen::VectorXf whitened(Channel channel, const Image<float>& image) const;
@@ -51,6 +64,8 @@ class Cells {
  private:
   static std::size_t at(Channel channel) { return static_cast<std::size_t>(channel); }
   std::vector<std::vector<std::uint32_t>> cells_;     ///< numbers of their pixels
+  std::vector<std::size_t> places_;                   ///< of the cells in the grid
+  CellGrid grid_;
   std::array<std::vector<float>, kChannels> weight_;  ///< by pixel
   std::array<Eigen::VectorXf, kChannels> root_;
 };
@@ -101,6 +116,14 @@ struct CampaignFit {
 };
 const CampaignFit& campaignFitOf(const NamedFit& fit);
 
+/// What stays the same at each place of the image while it moves over the scene, in units of its carrier.
+struct PixelPattern {
+  std::string carrier{};        ///< what it acts on: "" for the range, "gain", "delay"
+  CellGrid grid{};
+  std::vector<double> value{};  ///< by place in the grid; 0 where nothing is known
+  double deviation = 0.0;       ///< of the pattern over the image, as estimated; 0: there is none
+};
+
 /// A campaign's rows: measured − simulated over noise, and what each thing that could be missing
 /// would add.
 class CampaignRows final : public RowSource, public NamedEffects {
@@ -125,8 +148,13 @@ class CampaignRows final : public RowSource, public NamedEffects {
                                                std::span<const double> scales) const override;
   [[nodiscard]] std::shared_ptr<const RowSource> including(
       std::span<const NamedFit* const> fits, bool with_catalogue) const override;
+  [[nodiscard]] Term settled(Term term) const override;
+  /// The pattern behind a term's carrier "pixel:range", "pixel:gain" or "pixel:delay"; null: there is none.
+  [[nodiscard]] const PixelPattern* patternOf(const std::string& carrier) const;
 
   [[nodiscard]] const std::vector<Candidate>& candidates() const { return candidates_; }
+  /// Whether a delay of the light is another thing than an offset of the range, and a nuisance like it.
+  [[nodiscard]] bool hasDelay() const { return has_delay_; }
   [[nodiscard]] const std::vector<Group>& baseGroups() const { return groups_; }
   /// Declared effects without noise, and those that were included.
   [[nodiscard]] const std::vector<sim::AnyEffect>& effects() const { return effects_; }
@@ -147,6 +175,7 @@ class CampaignRows final : public RowSource, public NamedEffects {
   /// What stays the same whatever is included.
   struct Fixed {
     std::string name{}, block{};
+    std::size_t site = 0;  ///< captures of one scene and pose have the same: their pixels do not move
     Cells cells;
     CaptureCovariates covariates;
     std::map<std::string, PerChannel> carriers{};
@@ -160,6 +189,7 @@ class CampaignRows final : public RowSource, public NamedEffects {
   struct CaptureRows {
     std::shared_ptr<const Fixed> fixed;  ///< shared by sources that include different effects
     WhitenedCapture base;                ///< common columns, then numbers of effects
+    std::map<std::string, PerChannel> patterns{};  ///< carriers of what stays the same at each pixel
     CaptureEvidence evidence{};          ///< of the base's columns and the catalogue's
   };
   /// Columns of terms in one capture. A covariate that is the same all over the capture only makes a column
@@ -179,8 +209,12 @@ class CampaignRows final : public RowSource, public NamedEffects {
   void fillFixed(std::size_t capture, const Reading& declared, Fixed& fixed) const;
   /// What terms of coefficient 1 add to a capture: millimetres of range, per cent of light, or of their
   /// carriers.
-  static PerChannel columnsOf(const Fixed& fixed, const Term& term, const Eigen::VectorXf& values);
-  static Terms termsOf(const Fixed& fixed, std::span<const TermGroup> groups);
+  static PerChannel columnsOf(const CaptureRows& rows, const Term& term, const Eigen::VectorXf& values);
+  static Terms termsOf(const CaptureRows& rows, std::span<const TermGroup> groups);
+  /// What the base leaves of each capture, whitened; poses as they probably were.
+  [[nodiscard]] std::vector<PerChannel> whatIsLeft() const;
+  void findPatterns();
+  void putPattern(const std::string& carrier, const std::vector<PerChannel>& left);
   static CaptureEvidence ownEvidence(const CaptureRows& rows);
   [[nodiscard]] Evidence evidenceWith(std::span<const TermGroup> extra, bool with_catalogue) const;
   [[nodiscard]] CaptureEvidence evidenceOf(const CaptureRows& rows,
@@ -198,6 +232,7 @@ class CampaignRows final : public RowSource, public NamedEffects {
   /// Of groups that are common to all lists of effects, and of these and the effects' numbers.
   std::size_t common_columns_ = kCommon, base_columns_ = 0;
   std::vector<CaptureRows> rows_;
+  std::map<std::string, PixelPattern> patterns_{};  ///< by the carrier that is made of them
   double period_m_ = 0.0;
   bool has_delay_ = false;  ///< a delay of the light is another thing than an error of the range
 };

@@ -91,14 +91,17 @@ Eigen::MatrixXd CampaignRows::Terms::columnsFor(std::size_t channel, const Eigen
   return all;
 }
 
-CampaignRows::PerChannel CampaignRows::columnsOf(const Fixed& fixed, const Term& term,
+CampaignRows::PerChannel CampaignRows::columnsOf(const CaptureRows& rows, const Term& term,
                                                  const Eigen::VectorXf& values) {
   PerChannel columns;  // empty: nothing is added
+  const Fixed& fixed = *rows.fixed;
   if (!term.carrier.empty()) {
     const auto carrier = fixed.carriers.find(term.carrier);
-    if (carrier == fixed.carriers.end()) return columns;
+    const auto pattern = rows.patterns.find(term.carrier);
+    if (carrier == fixed.carriers.end() && pattern == rows.patterns.end()) return columns;
+    const PerChannel& by = carrier == fixed.carriers.end() ? pattern->second : carrier->second;
     for (std::size_t c = 0; c < kChannels; ++c) {
-      if (carrier->second[c].size() != 0) columns[c] = values.cwiseProduct(carrier->second[c]);
+      if (by[c].size() != 0) columns[c] = values.cwiseProduct(by[c]);
     }
     return columns;
   }
@@ -109,7 +112,8 @@ CampaignRows::PerChannel CampaignRows::columnsOf(const Fixed& fixed, const Term&
   return columns;
 }
 
-CampaignRows::Terms CampaignRows::termsOf(const Fixed& fixed, std::span<const TermGroup> groups) {
+CampaignRows::Terms CampaignRows::termsOf(const CaptureRows& rows, std::span<const TermGroup> groups) {
+  const Fixed& fixed = *rows.fixed;
   Factors factors{fixed.covariates};
   std::vector<double> scale;
   std::vector<std::optional<std::size_t>> place;  ///< of each term among the parts that vary
@@ -128,7 +132,7 @@ CampaignRows::Terms CampaignRows::termsOf(const Fixed& fixed, std::span<const Te
   std::array<std::vector<Eigen::VectorXf>, kChannels> columns;
   std::array<std::vector<Eigen::Index>, kChannels> of_part;
   for (const Term& part : parts) {
-    PerChannel both = columnsOf(fixed, part, factors.of(part));
+    PerChannel both = columnsOf(rows, part, factors.of(part));
     for (std::size_t c = 0; c < kChannels; ++c) {
       of_part[c].push_back(both[c].size() == 0 ? -1 : static_cast<Eigen::Index>(columns[c].size()));
       if (both[c].size() != 0) columns[c].push_back(std::move(both[c]));
@@ -163,7 +167,7 @@ CaptureEvidence CampaignRows::evidenceOf(const CaptureRows& rows, std::span<cons
                                          bool with_catalogue) const {
   const auto in_base = static_cast<Eigen::Index>(base_columns_);
   const Eigen::Index old = with_catalogue ? rows.evidence.gram.rows() : in_base;
-  const Terms terms = termsOf(*rows.fixed, extra);
+  const Terms terms = termsOf(rows, extra);
   const Eigen::Index added = terms.count();
   CaptureEvidence evidence{.gram = Eigen::MatrixXd::Zero(old + added, old + added),
                            .moment = Eigen::VectorXd::Zero(old + added),
@@ -260,7 +264,7 @@ Result<Evidence> CampaignRows::evidenceLeft(const Left& left) const {
       const Fixed& fixed = *rows_[c].fixed;
       WhitenedCapture whitened{fixed.cells, first_free + left.free.size()};
       const Reading reading = read(*here, c, on_light);
-      const Terms terms = termsOf(fixed, left.terms);
+      const Terms terms = termsOf(rows_[c], left.terms);
       whitened.putResidual(fixed.cells, fixed.residual, fixed.varied, reading);
       for (std::size_t k = 0; k < kChannels; ++k) {
         if (whitened.columns[k].size() == 0) continue;
@@ -312,6 +316,11 @@ std::string CampaignRows::wordOfCarrier(const std::string& carrier) const {
   return std::string{discover::wordOfCarrier(carrier)};
 }
 
-std::vector<TermGroup> CampaignRows::ownGroups() const { return carrierGroups(covariates(), has_delay_); }
+std::vector<TermGroup> CampaignRows::ownGroups() const {
+  std::vector<TermGroup> groups = carrierGroups(covariates(), has_delay_);
+  for (TermGroup& group : pixelGroups(has_delay_, rows_.empty() ? 0 : rows_.front().fixed->cells.grid().size()))
+    groups.push_back(std::move(group));
+  return groups;
+}
 
 }  // namespace toftwin::discover

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <string>
+
+#include <toftwin/result.h>
+
+#include "calib/discover/campaign/campaign.h"
+
+namespace toftwin::discover {
+
+/// An error that names its capture.
+Error ofCapture(const plan::CaptureRecord& record, const std::string& message,
+                Error::Code code = Error::Code::Malformed);
+
+/// Frames of one thing in one place, one after the other: their means and their noise.
+class CaptureGatherer {
+ public:
+  explicit CaptureGatherer(const plan::CaptureRecord& record);
+  CaptureGatherer(CaptureGatherer&&) noexcept;
+  CaptureGatherer& operator=(CaptureGatherer&&) noexcept;
+  ~CaptureGatherer();
+
+  /// Errors name the capture: no range, another camera than the frames before it.
+  Result<> add(const Frame& frame);
+  [[nodiscard]] std::size_t frames() const;
+  [[nodiscard]] const CameraInfo& camera() const;
+  /// The capture; two frames at least must have been added, and none may be from now on.
+  MeasuredCapture finish();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace toftwin::discover

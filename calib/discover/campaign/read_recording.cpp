@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+// A campaign out of a bare recording: frames that belong together are a capture.
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+
+#include <fmt/format.h>
+#include <toftwin/nan.h>
+
+#include "calib/compare/stack.h"
+#include "calib/discover/campaign/campaign.h"
+#include "calib/discover/campaign/gather_capture.h"
+#include "protocol/record/recording.h"
+
+namespace toftwin::discover {
+namespace {
+
+constexpr std::size_t kMostCaptures = 150;     ///< of frames that all belong together: so many captures
+constexpr std::size_t kFewestFrames = 16;      ///< that such a capture has
+constexpr std::size_t kEachLocked = 5;         ///< one in five captures is put aside
+constexpr std::int64_t kSameTime_ns = 100'000'000;  ///< a pose of that much earlier or later is not this frame's
+
+using Pose = Transform<World, Camera>;
+
+/// What a frame says without its pixels.
+struct Stamp {
+  std::int64_t received_ns = 0;
+  std::optional<Pose> pose{};
+};
+
+Result<std::vector<Stamp>> stampsOf(const std::filesystem::path& file) {
+  auto reader = record::Reader::open(file);
+  if (!reader) return reader.error();
+  std::vector<Stamp> stamps;
+  while (true) {
+    const auto frame = reader->next();
+    if (!frame && frame.error().code == Error::Code::EndOfStream) break;
+    if (!frame) return frame.error();
+    stamps.push_back({frame->moment.received.ns, frame->moment.world_from_camera});
+  }
+  return stamps;
+}
+
+Error withoutPose(const std::filesystem::path& file, std::size_t frame, const std::string& why) {
+  return {Error::Code::InvalidArgument,
+          fmt::format("{}: frame {} has no pose{}; what a camera sees can be simulated only from where it stood: "
+                      "record with a rig or a pose in the daemon's configuration, or give --poses, a recording whose "
+                      "frames have them",
+                      file.string(), frame, why)};
+}
+
+/// Each frame's pose: its own, else the reference's: frame by frame where both have as many, else the one that was
+/// received next to it.
+Result<std::vector<Pose>> posesOf(const std::filesystem::path& file, const std::filesystem::path& reference) {
+  const auto own = stampsOf(file);
+  if (!own) return own.error();
+  std::vector<Stamp> other;
+  if (!reference.empty()) {
+    auto stamps = stampsOf(reference);
+    if (!stamps) return stamps.error();
+    other = *std::move(stamps);
+  }
+  std::vector<Pose> poses;
+  for (std::size_t k = 0; k < own->size(); ++k) {
+    const Stamp& frame = (*own)[k];
+    if (frame.pose && other.empty()) {
+      poses.push_back(*frame.pose);
+      continue;
+    }
+    if (other.empty()) return withoutPose(file, k + 1, "");
+    const auto nearest = other.size() == own->size()
+                             ? other.begin() + static_cast<std::ptrdiff_t>(k)
+                             : std::ranges::min_element(other, {}, [&](const Stamp& one) {
+                                 return std::abs(one.received_ns - frame.received_ns);
+                               });
+    const bool is_near = other.size() == own->size() ||
+                         std::abs(nearest->received_ns - frame.received_ns) <= kSameTime_ns;
+    if (!is_near) return withoutPose(file, k + 1, fmt::format(": none in {} was received within 0.1 s of it", reference.string()));
+    if (!nearest->pose) return withoutPose(file, k + 1, fmt::format(", and that in {} has none, either", reference.string()));
+    poses.push_back(*nearest->pose);
+  }
+  return poses;
+}
+
+/// Whether two frames are of one thing, from one place, taken alike.
+bool belongTogether(const Moment& a, const Moment& b) {
+  return compare::samePose(*a.world_from_camera, *b.world_from_camera) && a.exposures.size() == b.exposures.size() &&
+         std::ranges::equal(a.exposures, b.exposures,
+                            [](const Exposure& x, const Exposure& y) {
+                              return std::abs((x.duration - y.duration).in(microsecond)) < 1e-3;
+                            }) &&
+         a.ambient == b.ambient;
+}
+
+plan::CaptureRecord recordOf(std::size_t number, const Frame& frame, const std::string& file) {
+  plan::CaptureRecord record{.number = number, .block = "recording", .kind = "recording"};
+  record.name = fmt::format("{} from frame {}", file, frame.sequence);
+  record.distance_m = record.angle_deg = kNaN;
+  record.pose = frame.moment.world_from_camera;
+  if (!frame.moment.exposures.empty())
+    record.exposure_us = frame.moment.exposures.front().duration.in(microsecond);
+  record.a.since_power_on_s = frame.moment.since_power_on ? frame.moment.since_power_on->in(second) : kNaN;
+  return record;
+}
+
+/// Captures as they are cut out of a stream of frames.
+class Cutter {
+ public:
+  Cutter(std::string file, std::size_t most_frames) : file_(std::move(file)), most_frames_(most_frames) {}
+
+  Result<> add(const Frame& frame) {
+    if (gathered_ && (!belongTogether(moment_, frame.moment) || gathered_->frames() >= most_frames_)) finish();
+    if (!gathered_) gathered_.emplace(recordOf(++number_, frame, file_)), moment_ = frame.moment;
+    return gathered_->add(frame);
+  }
+  void finish() {
+    if (gathered_ && gathered_->frames() >= 2) {
+      camera = gathered_->camera();
+      captures.push_back(gathered_->finish());
+    } else if (gathered_) {
+      ++alone;
+    }
+    gathered_.reset();
+  }
+  std::vector<MeasuredCapture> captures{};
+  CameraInfo camera{};
+  std::size_t alone = 0;  ///< frames that belong to no other
+
+ private:
+  std::string file_;
+  std::size_t most_frames_;
+  std::size_t number_ = 0;
+  std::optional<CaptureGatherer> gathered_{};
+  Moment moment_{};
+};
+
+Result<Cutter> cut(const std::filesystem::path& file, const std::vector<Pose>& poses) {
+  auto reader = record::Reader::open(file);
+  if (!reader) return reader.error();
+  Cutter cutter{file.filename().string(), std::max(kFewestFrames, poses.size() / kMostCaptures)};
+  std::optional<std::int64_t> began_ns;
+  for (const Pose& pose : poses) {
+    auto frame = reader->next();
+    if (!frame) return frame.error();
+    frame->moment.world_from_camera = pose;
+    if (!began_ns) began_ns = frame->moment.received.ns;
+    // A camera that does not say when it was switched on: by then, or later.
+    if (!frame->moment.since_power_on)
+      frame->moment.since_power_on = static_cast<double>(frame->moment.received.ns - *began_ns) * nanosecond;
+    if (auto added = cutter.add(*frame); !added)
+      return Error{added.error().code, fmt::format("{}: {}", file.string(), added.error().message)};
+  }
+  cutter.finish();
+  return cutter;
+}
+
+}  // namespace
+
+Result<Campaign> readRecording(const std::filesystem::path& file, const std::filesystem::path& poses_of) {
+  const auto poses = posesOf(file, poses_of);
+  if (!poses) return poses.error();
+  auto cutter = cut(file, *poses);
+  if (!cutter) return cutter.error();
+  Campaign campaign{.folder = file, .name = file.filename().string(), .camera = cutter->camera};
+  if (cutter->alone > 0)
+    campaign.notes.push_back(fmt::format("{} frames that were taken where no other was are left out: without repeats "
+                                         "nothing is known of their noise", cutter->alone));
+  if (cutter->captures.size() < 3) {
+    return Error{Error::Code::InvalidArgument,
+                 fmt::format("{}: its {} frames make {} captures, that is, two frames or more of one pose, exposure and "
+                             "ambient light after each other; a search takes 3 at least, and says something from "
+                             "about 20 on",
+                             file.string(), poses->size(), cutter->captures.size())};
+  }
+  const bool locks = cutter->captures.size() >= 2 * kEachLocked;
+  for (std::size_t c = 0; c < cutter->captures.size(); ++c) {
+    MeasuredCapture& capture = cutter->captures[c];
+    const bool is_locked = locks && c % kEachLocked == kEachLocked / 2;
+    if (is_locked) capture.record.is_locked = true, campaign.locked.push_back(capture.record);
+    (is_locked ? campaign.put_aside : campaign.captures).push_back(std::move(capture));
+  }
+  if (locks)
+    campaign.notes.push_back(fmt::format("{} of the recording's captures, one in five, were put aside before the search "
+                                         "and are judged as the locked ones; nothing keeps a second search from "
+                                         "being judged on them again.", campaign.put_aside.size()));
+  return campaign;
+}
+
+}  // namespace toftwin::discover
