@@ -1,16 +1,32 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <span>
 #include <string>
 #include <string_view>
 
 namespace toftwin::daemon {
 
-/// What goes wrong on purpose between a facade and its clients, for any facade that sends packets: each is
-/// struck by chance, which is a function of seed and packet alone.
+/// How often what goes wrong on a line, and the seed of the chance.
+struct LineShares {
+  double loss = 0.0, duplicate = 0.0, reorder = 0.0, delay = 0.0, corruption = 0.0, disconnect = 0.0;
+  std::uint64_t seed = 1;
+};
+
+/// The keys that all lines have. What is struck are packets, frames or answers, as the facade sends them;
+/// whether by chance, which is a function of seed and number alone.
+template <class Visitor>
+void visitSeedAndLog(Visitor& v, std::uint64_t& seed, std::string& log) {
+  v.number("seed", seed, {0, 9'007'199'254'740'991.0}, "of the chance");
+  v.text("log", log,
+         "a file, relative to this one, that is written anew: a line of CSV for every one that was struck");
+}
+
+/// What goes wrong on purpose between a facade and its clients, for any facade that sends packets.
 struct LineFaultKeys {
   double loss = 0.0, duplicate = 0.0, reorder = 0.0;
   std::uint64_t seed = 1;
@@ -21,37 +37,42 @@ struct LineFaultKeys {
     v.number("loss", loss, {0.0, 1.0}, "share of the packets that do not leave");
     v.number("duplicate", duplicate, {0.0, 1.0}, "share that leaves twice");
     v.number("reorder", reorder, {0.0, 1.0}, "share that leaves after the next one");
-    v.number("seed", seed, {0, 9'007'199'254'740'991.0}, "of the chance");
-    v.text(
-        "log", log,
-        "a file, relative to this one, that is written anew: a line of CSV for every packet that was struck");
+    visitSeedAndLog(v, seed, log);
+  }
+  operator LineShares() const {  // NOLINT(google-explicit-constructor): the same in fewer words
+    return {.loss = loss, .duplicate = duplicate, .reorder = reorder, .seed = seed};
   }
 };
 
 /// The faults of one line. Used on one thread.
 class LineFaults {
  public:
-  enum class Kind : std::uint8_t { Loss, Duplicate, Reorder };
+  enum class Kind : std::uint8_t { Loss, Duplicate, Reorder, Delay, Corruption, Disconnect };
   static std::string_view nameOf(Kind kind);
   /// What becomes of a packet.
   struct Fate {
     bool is_lost = false, is_doubled = false, is_late = false;
+    bool is_delayed = false, is_corrupted = false;
+    bool is_cut = false;      ///< the line is, instead of sending it
+    std::uint64_t noise = 0;  ///< of what is corrupted: which bit is another one
     bool operator==(const Fate&) const = default;
   };
 
   /// `log`: where the lines go; empty: nowhere. `name` of the facade, for the daemon's log.
-  LineFaults(const LineFaultKeys& keys, std::string name, std::filesystem::path log);
+  LineFaults(const LineShares& shares, std::string name, std::filesystem::path log);
 
   [[nodiscard]] bool isNone() const;
   /// Of the next packet, which `what` names in the log: "block 7 packet 3".
   Fate next(std::string_view what);
-  /// A function of the keys and the packet's number alone.
-  static Fate fateOf(const LineFaultKeys& keys, std::uint64_t packet);
+  /// A function of the shares and the packet's number alone.
+  static Fate fateOf(const LineShares& shares, std::uint64_t packet);
+  /// One bit of the bytes becomes another.
+  static void corrupt(std::span<std::byte> bytes, std::uint64_t noise);
 
  private:
   void note(std::uint64_t packet, Kind kind, std::string_view what);
 
-  const LineFaultKeys keys_;
+  const LineShares shares_;
   const std::string name_;
   const std::filesystem::path log_path_;
   std::ofstream log_;  ///< has its heading from the start, so that none struck is seen too

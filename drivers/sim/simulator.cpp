@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "drivers/sim/chosen.h"
+#include "drivers/sim/operating.h"
 #include "drivers/sim/view.h"
 #include "protocol/settings/describe.h"
 #include "sim/sensor/collect_moving.h"
@@ -59,6 +60,7 @@ SourceInfo describe(const Keys& keys, const sim::SensorModel& model,
   info.parameters = model.parameterNames();
   for (std::string_view name : {kAmbient, kSincePowerOn, kTemperature, kFrameRate, kTriggered})
     info.parameters.emplace_back(name);
+  for (const Parameter& one : Operating::of(model).parameters(model)) info.parameters.push_back(one.name);
   return info;
 }
 
@@ -67,7 +69,9 @@ class SimulatedSource final : public Source {
  public:
   SimulatedSource(Chosen chosen, View view)
       : keys_(std::move(chosen.keys)),
-        model_(std::move(chosen.model)),
+        base_(std::move(chosen.model)),
+        model_(base_),
+        operating_(Operating::of(base_)),
         info_(describe(keys_, model_, std::move(chosen.planes))),
         view_(std::move(view)),
         color_(std::move(chosen.color)),
@@ -85,6 +89,7 @@ class SimulatedSource final : public Source {
     made_ = 0;
     last_collected_.reset();
     last_range_.reset();
+    filters_.forget();
     return {};
   }
   void stop() override {}
@@ -110,6 +115,7 @@ class SimulatedSource final : public Source {
       return stopped;
     }
     frame.provenance = sim::provenanceOf(model_, view_.scene().id(), keys_.seed);
+    operating_.note(frame.provenance);
     frame.camera = info_.camera;
     frame.planes = expose(frame.moment);
     pacer_.advance();
@@ -119,6 +125,9 @@ class SimulatedSource final : public Source {
 
   [[nodiscard]] SourceState state() const override {
     SourceState state{model_.parameters(), view_.pose()};
+    // Of several exposures it is the longest that is set.
+    Parameter& exposure = state.parameters.front();
+    if (!exposure.value) exposure.value = longestOf(model_.exposures({}));
     state.parameters.push_back({std::string{kAmbient}, ambient_.in(kilolux), kAmbientBounds_klx});
     // Goes on by itself; every frame says it.
     state.parameters.push_back({std::string{kSincePowerOn}, {}, kSincePowerOnBounds_s});
@@ -127,6 +136,7 @@ class SimulatedSource final : public Source {
     state.parameters.push_back(
         {std::string{kFrameRate}, 1.0 / info_.frame_interval->in(second), kFrameRateBounds_hz});
     state.parameters.push_back({std::string{kTriggered}, info_.can_trigger ? 1.0 : 0.0, kTriggeredBounds});
+    for (Parameter& one : operating_.parameters(base_)) state.parameters.push_back(std::move(one));
     return state;
   }
 
@@ -166,7 +176,10 @@ class SimulatedSource final : public Source {
     }
     if (name == kFrameRate) return setFrameRate(value);
     if (name == kTriggered) return setTriggered(value);
-    auto changed = model_.with(name, value);
+    auto operating = operating_.with(base_, name, value);
+    if (operating) return change(base_, *std::move(operating));
+    if (operating.error().code != Error::Code::NotFound) return operating.error();
+    auto changed = base_.with(name, value);
     if (!changed) {
       return changed.error().code != Error::Code::NotFound
                  ? changed.error()
@@ -174,10 +187,7 @@ class SimulatedSource final : public Source {
                          fmt::format("this camera has no parameter \"{}\"; it has: {}", name,
                                      fmt::join(info_.parameters, ", "))};
     }
-    if (auto fits = exposuresFit(*changed, *info_.frame_interval); !fits) return fits;
-    model_ = *std::move(changed);
-    collected_.reset();
-    return {};
+    return change(*std::move(changed), operating_);
   }
 
   Result<> trigger() override {
@@ -196,6 +206,29 @@ class SimulatedSource final : public Source {
                                unit.suffix, settings::describe(bounds), unit.suffix)};
     }
     quantity = value * unit;
+    collected_.reset();
+    return {};
+  }
+
+  static double longestOf(const std::vector<Exposure>& exposures) {
+    double longest_us = 0.0;
+    for (const Exposure& one : exposures) longest_us = std::max(longest_us, one.duration.in(microsecond));
+    return longest_us;
+  }
+
+  /// Another model, or the same run otherwise. What remembers begins anew.
+  Result<> change(sim::SensorModel base, Operating operating) {
+    sim::SensorModel changed = operating.apply(base);
+    if (auto fits = exposuresFit(changed, *info_.frame_interval); !fits) return fits;
+    if (operating.operation != operating_.operation) {
+      last_collected_.reset();
+      last_range_.reset();
+    }
+    if (operating.filters != operating_.filters) filters_.forget();
+    base_ = std::move(base);
+    model_ = std::move(changed);
+    operating_ = std::move(operating);
+    view_.setFrequencies(model_.traceRequest().frequencies, model_.hasPhasors() ? model_.correlatedTerms() : std::vector<std::uint8_t>{});
     collected_.reset();
     return {};
   }
@@ -261,12 +294,22 @@ class SimulatedSource final : public Source {
       last_collected_ = *collected_;
       last_range_ = exposed.range;
     }
+    filters_.apply(operating_.filters, exposed.range);
     std::optional<Plane> color;
     if (color_) color = color_->over(model_.rays(), exposed.range.range_m);
     const bool is_of_middle = !view_.isRealtime() && view_.changesWithTime();
     auto planes = sim::planesOf(model_, std::move(exposed), is_of_middle ? truth_of_middle_ : view_.light().truth,
-                                info_.planes);
+                                planesNow());
     if (color) planes.push_back(*std::move(color));
+    return planes;
+  }
+
+  /// Those of the configuration, and if it names none, which exposure was taken where there are several by now.
+  [[nodiscard]] std::vector<PlaneKind> planesNow() const {
+    std::vector<PlaneKind> planes = info_.planes;
+    const auto exposure = std::ranges::find(planes, PlaneKind::Exposure);
+    if (model_.exposureCount() == 1 && exposure != planes.end()) planes.erase(exposure);
+    if (model_.exposureCount() > 1 && base_.exposureCount() == 1 && keys_.planes.empty()) planes.push_back(PlaneKind::Exposure);
     return planes;
   }
 
@@ -287,7 +330,10 @@ class SimulatedSource final : public Source {
   }
 
   Keys keys_;
-  sim::SensorModel model_;
+  sim::SensorModel base_;   ///< as its file says, but for numbers that were set
+  sim::SensorModel model_;  ///< that one as it is operated
+  Operating operating_;
+  ImageFilters filters_;
   SourceInfo info_;
   View view_;
   std::optional<ColorView> color_;  ///< if its plane is wanted

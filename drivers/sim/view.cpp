@@ -27,6 +27,16 @@ void View::setPose(const Transform<World, Camera>& world_from_camera) {
   forget();
 }
 
+void View::setFrequencies(std::vector<Frequency> frequencies, std::vector<std::uint8_t> wanted) {
+  if (frequencies == request_.frequencies) return;
+  request_.frequencies = std::move(frequencies);
+  own_ = {};
+  foreign_.assign(foreign_.size(), {});
+  if (!realtime_) return;
+  realtime_light_ = nullptr;
+  goRealtime(std::move(wanted));
+}
+
 void View::moveTo(Duration time, std::uint64_t number) {
   if (!moves()) return;
   constexpr std::uint64_t kGolden = 0x9e3779b97f4a7c15u;  // 2⁶⁴ / golden ratio

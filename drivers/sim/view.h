@@ -33,6 +33,9 @@ class View {
   }
   void setPose(const Transform<World, Camera>& world_from_camera);
 
+  /// Looks with those frequencies from now on, of which those phasors are wanted in real time.
+  void setFrequencies(std::vector<Frequency> frequencies, std::vector<std::uint8_t> wanted);
+
   /// Whether raw exposures see different light: scene or camera move, or another camera's light beats.
   [[nodiscard]] bool changesWithTime() const { return moves() || !scene_.foreignEmitters().empty(); }
   /// Makes complete() trace what is seen at a time since device time 0, if anything moves; with a rolling shutter

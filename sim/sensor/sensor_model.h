@@ -24,6 +24,15 @@
 
 namespace toftwin::sim {
 
+/// How a camera that demodulates takes its frames: what a device's own firmware may be told while it runs.
+struct Operation {
+  int frequencies = 1;                        ///< one to three
+  std::vector<double> exposure_factors{1.0};  ///< as in a camera file
+  double minimum_amplitude_electrons = 0.0;
+  double asymmetry_threshold = 0.4;
+  bool operator==(const Operation&) const = default;
+};
+
 /// A camera as data: lens, emitters, modulation or pulse, pixel, and the ordered list of its effects. Read
 /// from a camera file (docs/camera-file.md); the presets lie in sim/cameras/. An invariant-free
 /// aggregate is not enough here because the effect list is open; see camera_file.h for the file's
@@ -108,6 +117,16 @@ class SensorModel {
   [[nodiscard]] Result<SensorModel> with(std::string_view parameter, double value) const;
   /// The same camera with other effects, in the order in which they act within each stage.
   [[nodiscard]] SensorModel withEffects(std::vector<AnyEffect> effects) const;
+
+  /// As the file says; of a camera that demodulates and decodes by "n_phase", which alone can be operated.
+  [[nodiscard]] std::optional<Operation> operation() const;
+  /// The most frequencies that it can be operated with: the file's, or three where the first one's thirtieth is
+  /// whole kilohertz.
+  [[nodiscard]] int mostFrequencies() const;
+  /// The same camera taking its frames so. Frequencies beyond the file's are each a thirtieth of the first lower than
+  /// the one before, and otherwise like it. With another number of them than the file's, ranges are valid up to
+  /// where they repeat, with two of them up to 30 m. Precondition: it can be operated, and so.
+  [[nodiscard]] SensorModel operated(const Operation& operation) const;
 
   /// The same camera with a lens that was calibrated, and its id.
   [[nodiscard]] SensorModel withLens(const CameraInfo& lens) const;

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <numeric>
 #include <utility>
 #include <variant>
 
@@ -21,7 +23,54 @@ Result<> firstProblem(const NumberSetter& setter, std::string_view parameter, do
                                                          parameter, value, setter.problem)};
 }
 
+std::int64_t kilohertzOf(const CameraFile::Modulation& modulation) {
+  return std::llround(modulation.frequency.in(hertz) / 1e3);
+}
+
+/// Where the ranges of those frequencies together begin anew: c / 2 gcd(f).
+Length repeatsAfter(const std::vector<CameraFile::Modulation>& modulations, double speed_of_light) {
+  std::int64_t common_khz = 0;
+  for (const auto& one : modulations) common_khz = std::gcd(common_khz, kilohertzOf(one));
+  return (speed_of_light / (2e3 * static_cast<double>(common_khz))) * metre;
+}
+
 }  // namespace
+
+std::optional<Operation> SensorModel::operation() const {
+  const CameraFile& file = impl_->file;
+  if (file.isPulsed() || file.decoder.algorithm != DecodeSettings::Algorithm::NPhase) return std::nullopt;
+  return Operation{static_cast<int>(file.modulations.size()), file.sampling.exposure_factors,
+                   file.decoder.minimum_amplitude, file.decoder.asymmetry_threshold};
+}
+
+int SensorModel::mostFrequencies() const {
+  const auto& own = impl_->file.modulations;
+  const bool can_be_more = !own.empty() && own.size() < 3 && kilohertzOf(own.front()) % 30 == 0;
+  return can_be_more ? 3 : static_cast<int>(own.size());
+}
+
+SensorModel SensorModel::operated(const Operation& operation) const {
+  Impl changed = *impl_;
+  changed.decoder = {};
+  CameraFile& file = changed.file;
+  auto& modulations = file.modulations;
+  const auto count = static_cast<std::size_t>(operation.frequencies);
+  if (count != modulations.size()) {
+    const Frequency step = modulations.front().frequency / 30.0;
+    if (count < modulations.size()) modulations.erase(modulations.begin() + static_cast<std::ptrdiff_t>(count), modulations.end());
+    while (modulations.size() < count) {
+      modulations.push_back(modulations.back());
+      modulations.back().frequency = modulations.back().frequency - step;
+    }
+    constexpr Length kTwoReach = 30_m;
+    const Length repeats = repeatsAfter(modulations, file.decoder.speed_of_light);
+    file.decoder.farthest = count == 2 ? std::min(repeats, kTwoReach) : repeats;
+  }
+  file.sampling.exposure_factors = operation.exposure_factors;
+  file.decoder.minimum_amplitude = operation.minimum_amplitude_electrons;
+  file.decoder.asymmetry_threshold = operation.asymmetry_threshold;
+  return SensorModel{build(std::move(changed))};
+}
 
 std::vector<Parameter> SensorModel::parameters() const {
   const std::vector<Exposure> exposures = this->exposures({});

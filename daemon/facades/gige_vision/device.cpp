@@ -121,8 +121,6 @@ void Device::update(const SourceFacts& facts) {
     memory_.setFloat(Item::Temperature, facts.temperatures_c[i], i);
   const CameraInfo& camera = facts.camera;
   memory_.setFloat(Item::FocalLength, camera.fx);
-  memory_.setFloat(Item::PrincipalPointU, camera.cx);
-  memory_.setFloat(Item::PrincipalPointV, camera.cy);
   memory_.setFloat(Item::AspectRatio, camera.fx > 0.0 ? camera.fy / camera.fx : 1.0);
   for (std::uint32_t i = 0; i < camera.distortion.size(); ++i)
     memory_.setFloat(Item::Distortion, camera.distortion[i], i);
@@ -139,6 +137,9 @@ void Device::refresh() {
   memory_.setNumber(Item::HeightMax, left(Item::SensorHeight, Item::OffsetY));
   memory_.setNumber(Item::OffsetXMax, left(Item::SensorWidth, Item::Width));
   memory_.setNumber(Item::OffsetYMax, left(Item::SensorHeight, Item::Height));
+  // As SFNC has it, of the part of the image that is sent.
+  memory_.setFloat(Item::PrincipalPointU, facts_.camera.cx - static_cast<double>(number(Item::OffsetX)));
+  memory_.setFloat(Item::PrincipalPointV, facts_.camera.cy - static_cast<double>(number(Item::OffsetY)));
   const auto format = static_cast<std::uint32_t>(number(Item::PixelFormat, Component::kRange));
   memory_.setNumber(Item::OutputMode, format == Pixel::kAbc16 || format == Pixel::kAbc32f);
   for (std::uint32_t i = 0; i < 3; ++i) {

@@ -8,6 +8,7 @@
 #include <toftwin/units.h>
 
 #include "daemon/facades/facade.h"
+#include "daemon/facades/line_faults.h"
 
 /// A source for a PLC: Modbus TCP.
 namespace toftwin::daemon::modbus {
@@ -36,6 +37,34 @@ struct PoseKeys {
   }
 };
 
+/// What goes wrong on purpose with the answers. A client has one request at a time, so none overtakes
+/// another.
+struct AnswerLineKeys {
+  double loss = 0.0, duplicate = 0.0, delay = 0.0, corruption = 0.0, disconnect = 0.0;
+  Duration delay_time = 100_ms;
+  std::uint64_t seed = 1;
+  std::string log;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.number("loss", loss, {0.0, 1.0}, "share of the answers that do not leave");
+    v.number("duplicate", duplicate, {0.0, 1.0}, "share that leaves twice");
+    v.number("delay", delay, {0.0, 1.0}, "share that leaves later");
+    v.quantity("delay_time", delay_time, millisecond, {0.0, 10'000.0}, "by how much");
+    v.number("corruption", corruption, {0.0, 1.0}, "share that leaves with one bit changed");
+    v.number("disconnect", disconnect, {0.0, 1.0}, "share instead of which the connection is closed");
+    visitSeedAndLog(v, seed, log);
+  }
+  operator LineShares() const {  // NOLINT(google-explicit-constructor): the same in fewer words
+    return {.loss = loss,
+            .duplicate = duplicate,
+            .delay = delay,
+            .corruption = corruption,
+            .disconnect = disconnect,
+            .seed = seed};
+  }
+};
+
 /// The keys of a [[facade]] table with kind = "modbus".
 struct Keys {
   int port = 502;
@@ -45,6 +74,7 @@ struct Keys {
   double least_valid = 0.0;
   std::vector<RecipeKeys> recipes;
   std::vector<PoseKeys> poses;
+  AnswerLineKeys line;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -61,6 +91,7 @@ struct Keys {
              "alarm \"few_valid\": a smaller share of the pixels is valid");
     v.group("recipe", recipes, "settings that are selected by number");
     v.group("pose", poses, "places of a simulated camera that are selected by number");
+    v.group("line", line, "what goes wrong on purpose with the answers");
   }
 };
 

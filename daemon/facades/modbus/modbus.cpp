@@ -7,6 +7,7 @@
 #include <charconv>
 #include <chrono>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -100,13 +101,15 @@ FrameFacts factsOf(const Frame& frame) {
 
 class ModbusFacade final : public Facade {
  public:
-  ModbusFacade(Keys keys, std::vector<Recipe> recipes, const FacadePlace& place)
+  ModbusFacade(Keys keys, std::vector<Recipe> recipes, const std::filesystem::path& line_log,
+               const FacadePlace& place)
       : keys_(std::move(keys)),
         recipes_(std::move(recipes)),
         place_(place),
         thread_("facade modbus of " + place.keys.source),
         link_(thread_, place.hub, {.source = place.keys.source, .planes = {PlaneKind::Range}, .queue = 1},
-              [this](const Frame& frame) { takeFrame(frame); }) {
+              [this](const Frame& frame) { takeFrame(frame); }),
+        line_(keys_.line, "facade modbus of " + place.keys.source, line_log) {
     registers_.set(Item::Stream, keys_.streams ? 1.0 : 0.0);
     registers_.set(Item::MapVersion, kMapVersion);
   }
@@ -122,7 +125,9 @@ class ModbusFacade final : public Facade {
                           [this](std::size_t count) {
                             connections_ = count;
                             adjust();
-                          }});
+                          },
+                      .fate = [this] { return line_.isNone() ? LineFaults::Fate{} : line_.next("answer"); },
+                      .delay = keys_.line.delay_time});
     where_ = fmt::format("Modbus TCP on {} port {}", place_.keys.address, server_->port());
     thread_.start();
     return {};
@@ -332,6 +337,7 @@ class ModbusFacade final : public Facade {
   std::string where_;
   EventThread thread_;
   SourceLink link_;
+  LineFaults line_;
   std::optional<Server> server_;
   Registers registers_;
   std::size_t connections_ = 0;
@@ -357,8 +363,10 @@ FacadeKind::Start read(settings::Table& table) {
       }
     }
   }
-  return [keys, recipes](const FacadePlace& place) -> Result<std::unique_ptr<Facade>> {
-    auto facade = std::make_unique<ModbusFacade>(keys, recipes, place);
+  const std::filesystem::path log =
+      keys.line.log.empty() ? std::filesystem::path{} : table.resolve(keys.line.log);
+  return [keys, recipes, log](const FacadePlace& place) -> Result<std::unique_ptr<Facade>> {
+    auto facade = std::make_unique<ModbusFacade>(keys, recipes, log, place);
     if (auto opened = facade->open(); !opened) return opened.error();
     return std::unique_ptr<Facade>{std::move(facade)};
   };

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/facades/modbus/server.h"
 
+#include <boost/asio/steady_timer.hpp>
 #include <boost/asio/write.hpp>
 
 #include <array>
+#include <chrono>
 
 namespace toftwin::daemon::modbus {
 namespace {
@@ -18,7 +20,10 @@ constexpr std::size_t kMostConnections = 16;
 class Server::Connection : public std::enable_shared_from_this<Connection> {
  public:
   Connection(Server& server, tcp::socket socket)
-      : server_(server), alive_(server.is_alive_), socket_(std::move(socket)) {
+      : server_(server),
+        alive_(server.is_alive_),
+        socket_(std::move(socket)),
+        later_(socket_.get_executor()) {
     error_code ignored;
     socket_.set_option(tcp::no_delay{true}, ignored);
     socket_.set_option(boost::asio::socket_base::keep_alive{true}, ignored);
@@ -31,19 +36,39 @@ class Server::Connection : public std::enable_shared_from_this<Connection> {
     if (!size || bytes.size() < *size) return read();
     answer_ = server_.hooks_.answer(bytes.first(*size));
     received_.erase(received_.begin(), received_.begin() + static_cast<std::ptrdiff_t>(*size));
+    send(server_.hooks_.fate());
+  }
+  void close() {
+    error_code ignored;
+    socket_.close(ignored);
+    later_.cancel();
+    if (*alive_) server_.remove(shared_from_this());
+  }
+
+ private:
+  /// The answer as the line lets it through, and on to the next request.
+  void send(const LineFaults::Fate& fate) {
+    if (fate.is_cut) return close();
+    if (fate.is_lost) return goOn();
+    if (fate.is_corrupted) LineFaults::corrupt(answer_, fate.noise);
+    if (fate.is_doubled) {
+      const Bytes once = answer_;
+      answer_.insert(answer_.end(), once.begin(), once.end());
+    }
+    if (!fate.is_delayed) return write();
+    const std::chrono::duration<double> delay{server_.hooks_.delay.in(second)};
+    later_.expires_after(std::chrono::duration_cast<std::chrono::steady_clock::duration>(delay));
+    later_.async_wait([self = shared_from_this()](error_code cancelled) {
+      if (!cancelled && *self->alive_) self->write();
+    });
+  }
+  void write() {
     boost::asio::async_write(socket_, boost::asio::buffer(answer_),
                              [self = shared_from_this()](error_code error, std::size_t) {
                                if (error || !*self->alive_) return self->close();
                                self->goOn();
                              });
   }
-  void close() {
-    error_code ignored;
-    socket_.close(ignored);
-    if (*alive_) server_.remove(shared_from_this());
-  }
-
- private:
   void read() {
     socket_.async_read_some(
         boost::asio::buffer(piece_), [self = shared_from_this()](error_code error, std::size_t size) {
@@ -57,6 +82,7 @@ class Server::Connection : public std::enable_shared_from_this<Connection> {
   Server& server_;
   const std::shared_ptr<bool> alive_;
   tcp::socket socket_;
+  boost::asio::steady_timer later_;
   std::array<std::byte, 512> piece_{};
   Bytes received_;  ///< less than a message and a piece
   Bytes answer_;

@@ -9,7 +9,10 @@
 #include <memory>
 #include <set>
 
+#include <toftwin/units.h>
+
 #include "daemon/facades/accepting.h"
+#include "daemon/facades/line_faults.h"
 #include "daemon/facades/modbus/requests.h"
 
 namespace toftwin::daemon::modbus {
@@ -21,6 +24,8 @@ class Server {
   struct Hooks {
     std::function<Bytes(std::span<const std::byte> message)> answer;
     std::function<void(std::size_t)> connections;  ///< how many, whenever that changed
+    std::function<LineFaults::Fate()> fate;        ///< of the next answer
+    Duration delay = 100_ms;                       ///< of one that is delayed
   };
   Server(boost::asio::ip::tcp::acceptor acceptor, Hooks hooks);
   ~Server();

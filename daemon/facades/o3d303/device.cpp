@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The objects that anybody may ask, and sessions; what is changed in edit mode is in device_edit.cpp.
+// The objects that anybody may ask, and sessions. The other device_*.cpp: what is changed in edit mode, what
+// the source has, and what is exported.
 #include "daemon/facades/o3d303/device.h"
 
 #include <fmt/format.h>
@@ -7,9 +8,9 @@
 #include <algorithm>
 #include <charconv>
 #include <random>
+#include <utility>
 
 #include "daemon/facades/o3d303/answers.h"
-#include "daemon/facades/o3d303/defaults.h"
 
 namespace toftwin::daemon::o3d303 {
 namespace {
@@ -18,7 +19,6 @@ using toftwin::o3d303::XmlRpcCall;
 using toftwin::o3d303::XmlRpcValue;
 
 constexpr std::string_view kMain = "/api/rpc/v1/com.ifm.efector";
-constexpr double kSecondsPerHour = 3600.0;
 constexpr int kShortestTimeout_s = 5, kLongestTimeout_s = 300;
 
 std::string anySessionId() {
@@ -33,33 +33,21 @@ bool isSessionId(std::string_view id) {
   return id.size() == 32 && id.find_first_not_of("0123456789abcdefABCDEF") == std::string_view::npos;
 }
 
-std::string typeOf(const SourceFacts& facts) {
-  const int range = std::clamp(facts.frequencies, 1, 3);
-  const auto exposures = std::clamp<std::size_t>(facts.exposures_us.size(), 1, 3);
-  return fmt::format("{}_{}",
-                     range == 1   ? "under5m"
-                     : range == 2 ? "upto30m"
-                                  : "morethan30m",
-                     exposures == 1   ? "low"
-                     : exposures == 2 ? "moderate"
-                                      : "high");
-}
-
 }  // namespace
 
-Device::Device(Identity identity) : identity_(std::move(identity)), password_(identity_.password) {
-  device_ = defaultDevice();
+Device::Device(Identity identity)
+    : identity_(std::move(identity)),
+      device_(initialOf(deviceRules())),
+      network_(initialOf(networkRules())),
+      time_(initialOf(timeRules())),
+      password_(identity_.password) {
   device_["Name"] = identity_.name;
   device_["PcicTcpPort"] = std::to_string(identity_.pcic_port);
   device_["PasswordActivated"] = password_.empty() ? "false" : "true";
-  createApplication(1);
-}
-
-void Device::createApplication(int index) {
-  Application fresh{defaultApplication(), defaultImager()};
-  show(fresh);
-  applications_[index] = std::move(fresh);
-  refreshSchema();
+  network_["StaticIPv4Address"] = identity_.address;
+  live_ = freshApplication();
+  createApplication(live_);
+  refreshActive();
 }
 
 Device::Outcome Device::answer(std::string_view path, const XmlRpcCall& call, SteadyTime now) {
@@ -79,16 +67,7 @@ Device::Outcome Device::answer(std::string_view path, const XmlRpcCall& call, St
 Device::Outcome Device::onMain(const XmlRpcCall& call, SteadyTime now) {
   if (call.method == "getParameter" || call.method == "getAllParameters") return {look(device_, call)};
   if (call.method == "requestSession") return requestSession(call, now);
-  if (call.method == "getSWVersion") {
-    return {structOf({{"Algorithm_Version", "2.0.45"},
-                      {"Calibration_Device", identity_.mac},
-                      {"Calibration_Version", "0.9.0"},
-                      {"Diagnostic_Controller", "1.0.69"},
-                      {"ELDK", "toftwin " TOFTWIN_VERSION},
-                      {"IFM_Software", "1.30.6153"},
-                      {"Linux", "toftwin " TOFTWIN_VERSION},
-                      {"Main_Application", "1.0.69"}})};
-  }
+  if (call.method == "getSWVersion") return {structOf(versions())};
   if (call.method == "getHWInfo") {
     return {structOf({{"Connector", "toftwin"},
                       {"Diagnose", "toftwin"},
@@ -98,19 +77,37 @@ Device::Outcome Device::onMain(const XmlRpcCall& call, SteadyTime now) {
                       {"Mainboard", "toftwin"},
                       {"MiraSerial", identity_.mac}})};
   }
-  if (call.method == "getApplicationList") {
-    XmlRpcValue::Array list;
-    for (const auto& [index, one] : applications_) {
-      list.push_back(XmlRpcValue::Struct{{"Index", index},
-                                         {"Id", 10'000 + index},
-                                         {"Name", one.application.at("Name")},
-                                         {"Description", one.application.at("Description")}});
-    }
-    return {XmlRpcValue{std::move(list)}};
-  }
+  if (call.method == "getApplicationList") return {applicationList()};
   if (call.method == "getTraceLogs") return {XmlRpcValue{XmlRpcValue::Array{}}};
-  if (call.method == "reboot") return {.answer = nothing(), .is_reboot = true};
+  if (call.method == "reboot") return reboot(call);
   return {noSuchMethod(call)};
+}
+
+Parameters Device::versions() const {
+  return {{"Algorithm_Version", "2.0.45"},       {"Calibration_Device", identity_.mac},
+          {"Calibration_Version", "0.9.0"},      {"Diagnostic_Controller", "1.0.69"},
+          {"ELDK", "toftwin " TOFTWIN_VERSION},  {"IFM_Software", "1.30.6153"},
+          {"Linux", "toftwin " TOFTWIN_VERSION}, {"Main_Application", "1.0.69"}};
+}
+
+XmlRpcValue Device::applicationList() const {
+  XmlRpcValue::Array list;
+  for (const auto& [index, one] : applications_) {
+    list.push_back(XmlRpcValue::Struct{{"Index", index},
+                                       {"Id", 10'000 + index},
+                                       {"Name", one.application.at("Name")},
+                                       {"Description", one.application.at("Description")}});
+  }
+  return XmlRpcValue{std::move(list)};
+}
+
+Device::Outcome Device::reboot(const XmlRpcCall& call) {
+  constexpr int kProductive = 0, kRecovery = 1;
+  const auto mode = numberIn(paramText(call, 0));
+  if (!call.params.empty() && !mode) return {fault(Fault::kWrongType, "the mode of reboot is a number")};
+  if (mode.value_or(kProductive) == kProductive) return {.answer = nothing(), .is_reboot = true};
+  return {fault(Fault::kNoReboot, *mode == kRecovery ? "there is no firmware to recover; reboot with 0"
+                                                     : "the mode of reboot is 0")};
 }
 
 Device::Outcome Device::requestSession(const XmlRpcCall& call, SteadyTime now) {
@@ -126,17 +123,24 @@ Device::Outcome Device::requestSession(const XmlRpcCall& call, SteadyTime now) {
 }
 
 Device::Outcome Device::onSession(const XmlRpcCall& call, SteadyTime now) {
-  if (call.method == "heartbeat") {
-    const int wanted = numberIn(paramText(call, 0)).value_or(kShortestTimeout_s);
-    const int granted = std::clamp(wanted, kShortestTimeout_s, kLongestTimeout_s);
-    session_->timeout = std::chrono::seconds{granted};
-    session_->ends = now + session_->timeout;
-    return {XmlRpcValue{granted}};
-  }
+  if (call.method == "heartbeat") return heartbeat(call, now);
   if (call.method == "cancelSession") return cancelSession();
   if (call.method == "setOperatingMode") return setMode(call);
   if (call.method == "setTemporaryApplicationParameters") return setTemporarily(call);
+  if (call.method == "exportApplication") return exportApplication(call);
+  if (call.method == "importApplication") return importApplication(call);
+  if (call.method == "exportConfig") return exportConfiguration();
+  if (call.method == "importConfig") return importConfiguration(call);
   return {noSuchMethod(call)};
+}
+
+Device::Outcome Device::heartbeat(const XmlRpcCall& call, SteadyTime now) {
+  const auto wanted = numberIn(paramText(call, 0));
+  if (!wanted) return {fault(Fault::kWrongType, "heartbeat wants a number of seconds")};
+  const int granted = std::clamp(*wanted, kShortestTimeout_s, kLongestTimeout_s);
+  session_->timeout = std::chrono::seconds{granted};
+  session_->ends = now + session_->timeout;
+  return {XmlRpcValue{granted}};
 }
 
 Device::Outcome Device::inSession(std::string_view object, const XmlRpcCall& call, SteadyTime now) {
@@ -150,10 +154,10 @@ Device::Outcome Device::inSession(std::string_view object, const XmlRpcCall& cal
   if (!edited_) return {fault(Fault::kNoApplicationInEdit, "no application is being edited")};
   if (object == "edit/application") return onApplication(call);
   if (object == "edit/application/imager_001") return onImager(call);
-  if (object == "edit/application/imager_001/spatialfilter" ||
-      object == "edit/application/imager_001/temporalfilter") {
-    return {look({}, call)};  // both are off, and what is off has no parameters
-  }
+  if (object == "edit/application/imager_001/spatialfilter")
+    return onFilter(call, Binding::Object::SpatialFilter);
+  if (object == "edit/application/imager_001/temporalfilter")
+    return onFilter(call, Binding::Object::TemporalFilter);
   return {fault(Fault::kNoSuchObject, "no such object")};
 }
 
@@ -164,19 +168,18 @@ Device::Outcome Device::setMode(const XmlRpcCall& call) {
   device_["OperatingMode"] = mode;
   edited_.reset();
   edited_device_ = device_;
-  return {nothing()};
+  edited_network_ = network_;
+  edited_time_ = time_;
+  edited_password_ = password_;
+  if (!is_editing_) return {nothing()};
+  return {.answer = nothing(), .changes = std::exchange(session_->before, {})};  // temporary is until here
 }
 
 /// What it set for itself is undone, what it did not save is forgotten.
 Device::Outcome Device::cancelSession() {
-  SourceChanges changes;
-  if (session_ && !session_->before.empty()) {
-    Application as_before = applications_.at(activeApplication());
-    for (const auto& [name, value] : session_->before) as_before.imager[name] = value;
-    changes = changesTo(as_before);
-  }
+  SourceChanges undone = session_ ? std::move(session_->before) : SourceChanges{};
   restart();
-  return {.answer = nothing(), .changes = std::move(changes)};
+  return {.answer = nothing(), .changes = std::move(undone)};
 }
 
 void Device::restart() {
@@ -191,78 +194,41 @@ SourceChanges Device::expire(SteadyTime now) {
   return cancelSession().changes;
 }
 
+/// What is out of range is taken to the nearest that is not, as the camera does here alone.
 Device::Outcome Device::setTemporarily(const XmlRpcCall& call) {
   const auto* wanted =
       call.params.empty() ? nullptr : std::get_if<XmlRpcValue::Struct>(&call.params[0].value);
   if (wanted == nullptr) return {fault(Fault::kWrongType, "a struct of parameters is wanted")};
-  Application changed = applications_.at(activeApplication());
-  Parameters before;
+  if (is_editing_) return {fault(Fault::kApplicationInEdit, "nothing is set for a while in edit mode")};
+  SourceChanges changes, before;
   for (const auto& [path, value] : *wanted) {
     constexpr std::string_view kImager = "imager_001/";
-    if (!path.starts_with(kImager)) return {fault(Fault::kNoSuchParameter, "no parameter " + path)};
+    if (!path.starts_with(kImager)) return {noSuchParameter(path)};
     const std::string name = path.substr(kImager.size());
-    if (const auto found = changed.imager.find(name); found != changed.imager.end()) before.insert(*found);
-    if (auto refused = setImagerParameter(changed.imager, name, value.text())) return {*std::move(refused)};
-  }
-  session_->before.merge(before);  // what was first is what is put back
-  return {.answer = nothing(), .changes = changesTo(changed)};
-}
-
-// ---- what the source says ------------------------------------------------------------------------
-
-void Device::update(const SourceFacts& facts) {
-  facts_ = facts;
-  device_["TemperatureIllu"] = facts.illumination_c ? fmt::format("{:.1f}", *facts.illumination_c) : "3276.7";
-  device_["UpTime"] = fmt::format("{:.6f}", facts.since_power_on_s / kSecondsPerHour);
-  device_["ImageTimestampReference"] = std::to_string(facts.device_s);
-  show(applications_.at(activeApplication()));
-}
-
-void Device::show(Application& one) const {
-  Parameters& imager = one.imager;
-  if (facts_.frame_rate_hz) imager["FrameRate"] = fmt::format("{:g}", *facts_.frame_rate_hz);
-  if (!facts_.exposures_us.empty()) {
-    imager["ExposureTime"] = std::to_string(facts_.exposures_us.back());
-    imager["ExposureTimeList"] = fmt::format("{}", fmt::join(facts_.exposures_us, ";"));
-  }
-  for (const Binding& binding : imagerBindings()) {
-    const Parameter* parameter = parameterOf(binding.source_name);
-    if (parameter == nullptr || !parameter->value) continue;
-    imager[std::string{binding.name}] = binding.is_integral ? fmt::format("{:.0f}", *parameter->value)
-                                                            : fmt::format("{:g}", *parameter->value);
-  }
-  one.application["TriggerMode"] = facts_.can_trigger ? "2" : "1";
-  imager["Type"] = typeOf(facts_);
-  imager["Resolution"] = facts_.width >= 352 ? "1" : "0";
-  imager["ClippingRight"] = std::to_string(facts_.width - 1);
-  imager["ClippingBottom"] = std::to_string(facts_.height - 1);
-}
-
-const Parameter* Device::parameterOf(std::string_view source_name) const {
-  const auto found = std::ranges::find(facts_.parameters, source_name, &Parameter::name);
-  return found == facts_.parameters.end() ? nullptr : &*found;
-}
-
-SourceChanges Device::changesTo(const Application& wanted) const {
-  const Application& now = applications_.at(activeApplication());
-  SourceChanges changes;
-  for (const Binding& binding : imagerBindings()) {
-    const std::string name{binding.name};
-    const auto value = realIn(wanted.imager.at(name));
-    if (parameterOf(binding.source_name) == nullptr || !value ||
-        wanted.imager.at(name) == now.imager.at(name)) {
-      continue;
+    if (name != "ExposureTime" && name != "ExposureTimeRatio" && name != "Channel")
+      return {noSuchParameter(name)};
+    const auto number = numberIn(value.text());
+    if (!number) return {fault(Fault::kWrongType, name + " is a whole number")};
+    const auto bound = boundOf(Binding::Object::Imager, name);
+    if (!bound || !bound->parameter->value) {
+      if (live_.imager.contains(name) && live_.imager.at(name) == value.text()) continue;
+      return {readOnly(name)};
     }
-    changes.emplace_back(binding.source_name, *value);
+    const Bounds own = ruleOf(imagerRules(), name)->bounds, sources = bound->bounds();
+    const double least = std::max(own.min, sources.min),
+                 most = std::max(least, std::min(own.max, sources.max));
+    const double clamped = std::clamp(static_cast<double>(*number), least, most);
+    changes.emplace_back(bound->binding->source_name, bound->toSource(clamped));
+    before.emplace_back(bound->binding->source_name, *bound->parameter->value);
   }
-  if (parameterOf(kTriggered) != nullptr &&
-      wanted.application.at("TriggerMode") != now.application.at("TriggerMode")) {
-    changes.emplace_back(kTriggered, wanted.application.at("TriggerMode") == "2" ? 1.0 : 0.0);
+  for (auto& one : before) {  // what was first is what is put back
+    const auto is_same = [&](const auto& other) { return other.first == one.first; };
+    if (std::ranges::none_of(session_->before, is_same)) session_->before.push_back(std::move(one));
   }
-  return changes;
+  return {.answer = nothing(), .changes = std::move(changes)};
 }
 
-int Device::activeApplication() const { return numberIn(device_.at("ActiveApplication")).value_or(1); }
+int Device::activeApplication() const { return numberIn(device_.at("ActiveApplication")).value_or(0); }
 
 std::vector<int> Device::applications() const {
   std::vector<int> all;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
@@ -13,12 +14,13 @@
 #include <toftwin/result.h>
 
 #include "daemon/clock.h"
+#include "daemon/facades/o3d303/bindings.h"
+#include "daemon/facades/o3d303/clipping.h"
+#include "daemon/facades/o3d303/rules.h"
 #include "drivers/o3d303/wire/schema.h"
 #include "drivers/o3d303/wire/xmlrpc.h"
 
 namespace toftwin::daemon::o3d303 {
-
-using Parameters = std::map<std::string, std::string>;
 
 /// Faults, by the vendor's numbers.
 struct Fault {
@@ -31,13 +33,18 @@ struct Fault {
   static constexpr int kReadOnly = 101'003;
   static constexpr int kSessionExists = 101'004;
   static constexpr int kWrongPassword = 101'005;
+  static constexpr int kNoReboot = 101'007;
   static constexpr int kWrongFormat = 101'010;
+  static constexpr int kWrongImportFlags = 101'012;
   static constexpr int kNoSuchApplication = 101'013;
   static constexpr int kApplicationInEdit = 101'014;
   static constexpr int kTooManyApplications = 101'015;
   static constexpr int kNoApplicationInEdit = 101'016;
   static constexpr int kWrongImagerType = 101'027;
   static constexpr int kWrongApplicationType = 101'028;
+  static constexpr int kFilterAgainstTrigger = 101'036;
+  static constexpr int kWrongNetwork = 101'051;
+  static constexpr int kNoAutoExposure = 101'056;
 };
 
 /// What the camera's parameters stand for, as it is now.
@@ -62,6 +69,7 @@ class Device {
   struct Identity {
     std::string name, password, mac, address;
     int xmlrpc_port = 80, pcic_port = 50'010;
+    double electrons_per_count = 6.0;
   };
   /// What a call comes to. The changes are to be made before the answer is given; if the source refuses them,
   /// the answer is a fault instead, and the parameters show what the source has.
@@ -83,66 +91,123 @@ class Device {
   /// As after switching off and on: no session, nothing that was not saved.
   void restart();
 
-  /// While a client edits, the camera takes no frames.
+  /// While a client edits, and while no application is active, the camera takes no frames.
+  [[nodiscard]] bool isIdle() const { return is_editing_ || !applications_.contains(activeApplication()); }
   [[nodiscard]] bool isEditing() const { return is_editing_; }
   /// What connections get that have asked for nothing yet.
   [[nodiscard]] const toftwin::o3d303::Schema& defaultSchema() const { return default_schema_; }
   [[nodiscard]] std::array<float, 3> translation_mm() const;
+  /// Of the active application.
+  [[nodiscard]] const Clipping& clipping() const { return clipping_; }
+  /// By how much a client has set the camera's clock, against the source's.
+  [[nodiscard]] std::int64_t clockShift_s() const { return clock_shift_s_; }
+  /// Whether the clock is to be that of the network, which here is this machine's.
+  [[nodiscard]] bool isSynchronised() const { return time_.at("SynchronizationActivated") == "true"; }
+  /// 0: none.
   [[nodiscard]] int activeApplication() const;
   [[nodiscard]] std::vector<int> applications() const;
   [[nodiscard]] const Parameters& parameters() const { return device_; }
 
  private:
+  static constexpr int kMostApplications = 32;
   struct Application {
-    Parameters application, imager;
+    Parameters application, imager, spatial, temporal;
+    int width = 176, height = 132;  ///< that the clipping is of
   };
   struct Session {
     std::string id;
     std::chrono::seconds timeout;
     SteadyTime ends;
-    Parameters before;  ///< of the imager: what was set for the session only
+    SourceChanges before;  ///< what was set for the session only, as it was
   };
   using Answer = toftwin::o3d303::XmlRpcAnswer;
   using Call = toftwin::o3d303::XmlRpcCall;
+  using Value = toftwin::o3d303::XmlRpcValue;
+  using Refusal = std::optional<Answer>;
 
+  // device.cpp: objects that anybody may ask, and sessions
   Outcome onMain(const Call& call, SteadyTime now);
   Outcome onSession(const Call& call, SteadyTime now);
-  Outcome onEdit(const Call& call);
-  Outcome onDeviceParameters(const Call& call);
-  Outcome onNetwork(const Call& call);
-  Outcome onTime(const Call& call) const;
-  Outcome onApplication(const Call& call);
-  Outcome onImager(const Call& call);
   Outcome inSession(std::string_view object, const Call& call, SteadyTime now);
   Outcome requestSession(const Call& call, SteadyTime now);
+  Outcome heartbeat(const Call& call, SteadyTime now);
   Outcome setTemporarily(const Call& call);
   Outcome cancelSession();
   Outcome setMode(const Call& call);
-  Outcome saveApplication();
+  static Outcome reboot(const Call& call);
+  [[nodiscard]] Value applicationList() const;
+  [[nodiscard]] Parameters versions() const;
+
+  // device_edit.cpp: edit mode, and the device's own parameters
+  Outcome onEdit(const Call& call);
+  Outcome addApplication(const Call& call);
+  Outcome deleteApplication(int index);
+  Outcome factoryReset();
+  Outcome onDeviceParameters(const Call& call);
+  Outcome onNetwork(const Call& call);
+  Outcome onTime(const Call& call);
+  Outcome setClock(const Call& call);
+  Refusal setDeviceParameter(const std::string& name, std::string value);
+  Refusal setNetworkParameter(const std::string& name, std::string value);
+  Refusal setTimeParameter(const std::string& name, std::string value);
   Outcome saveDevice();
   Outcome activate(int index);
-  std::optional<Answer> setDeviceParameter(const std::string& name, const std::string& value);
-  std::optional<Answer> setApplicationParameter(const std::string& name, const std::string& value);
-  std::optional<Answer> setImagerParameter(Parameters& imager, const std::string& name,
-                                           const std::string& value);
-  std::optional<Answer> checkBound(std::string_view source_name, const std::string& value,
-                                   bool is_integral) const;
+  int createApplication(Application made);
+  [[nodiscard]] Application freshApplication() const;
+  [[nodiscard]] Parameters shownNetwork() const;
+  [[nodiscard]] Parameters shownTime() const;
+
+  // device_application.cpp: the application that is edited, its imager and filters
+  Outcome onApplication(const Call& call);
+  Outcome onImager(const Call& call);
+  Outcome onFilter(const Call& call, Binding::Object object);
+  Outcome saveApplication();
+  [[nodiscard]] Refusal setApplicationParameter(Application& of, const std::string& name,
+                                                std::string value) const;
+  [[nodiscard]] Refusal setImagerParameter(Application& of, const std::string& name, std::string value) const;
+  [[nodiscard]] Refusal setFilterParameter(Application& of, Binding::Object object, const std::string& name,
+                                           std::string value) const;
+  [[nodiscard]] Refusal setBound(Parameters& all, Binding::Object object, const Rule& rule,
+                                 std::string value) const;
+  [[nodiscard]] Refusal setType(Application& of, std::string_view text) const;
+  [[nodiscard]] std::vector<std::string> availableTypes() const;
+  [[nodiscard]] std::map<std::string, Bounds> boundsOf(const Parameters& all, Binding::Object object,
+                                                       std::span<const Rule> rules) const;
+  static const Parameters& of(const Application& application, Binding::Object object);
+  static Parameters& of(Application& application, Binding::Object object) {
+    return const_cast<Parameters&>(of(std::as_const(application), object));
+  }
+  void fitExposures(Application& application) const;
+
+  // device_source.cpp: what the source has, and what is to become of it
   [[nodiscard]] const Parameter* parameterOf(std::string_view source_name) const;
+  [[nodiscard]] std::optional<Bound> boundOf(Binding::Object object, std::string_view name) const;
   [[nodiscard]] SourceChanges changesTo(const Application& wanted) const;
   void show(Application& application) const;
-  void createApplication(int index);
-  [[nodiscard]] int freeIndex() const;
-  void refreshSchema();
+  void refreshActive();
+  [[nodiscard]] Clipping clippingOf(const Application& application) const;
+
+  // device_transfer.cpp: whole applications and configurations as bytes
+  Outcome exportApplication(const Call& call) const;
+  Outcome importApplication(const Call& call);
+  Outcome exportConfiguration() const;
+  Outcome importConfiguration(const Call& call);
+  [[nodiscard]] static Value valueOf(const Application& application);
+  [[nodiscard]] std::variant<Application, Answer> applicationOf(const Value& value) const;
 
   const Identity identity_;
   SourceFacts facts_;
-  Parameters device_, edited_device_;
+  Parameters device_, edited_device_, network_, edited_network_, time_, edited_time_;
   std::map<int, Application> applications_;
+  Application live_;                    ///< what the source has now
+  std::optional<Application> factory_;  ///< what it had when it was first seen
   std::optional<std::pair<int, Application>> edited_;
   std::optional<Session> session_;
   bool is_editing_ = false;
-  std::string password_;
+  std::string password_, edited_password_;
+  std::int64_t clock_shift_s_ = 0;
   toftwin::o3d303::Schema default_schema_;
+  Clipping clipping_;
 };
 
 }  // namespace toftwin::daemon::o3d303

@@ -52,6 +52,8 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
  private:
   void ask() {
     const auto& request = parser_->get();
+    if (request.method() == http::verb::get || request.method() == http::verb::head)
+      return answer(http::status::not_found, "there are no files here: XML-RPC is asked by POST\n");
     if (request.method() != http::verb::post) return answer(http::status::method_not_allowed, "only POST\n");
     const auto target = request.target();
     server_.ask_(

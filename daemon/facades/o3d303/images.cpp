@@ -133,4 +133,25 @@ Result<CameraImages> imagesOf(const Frame& frame, const LensChunks& lens, double
   return images;
 }
 
+void clip(const Clipping& clipping, CameraImages& images) {
+  constexpr auto kGone =
+      static_cast<unsigned>(Confidence::Invalid) | static_cast<unsigned>(Confidence::Clipped);
+  const auto width = static_cast<std::size_t>(images.wire.width);
+  const auto& t = images.wire.extrinsics;
+  for (std::size_t i = 0; i < images.distance_mm.size(); ++i) {
+    bool stays = clipping.hasPixel(static_cast<int>(i % width), static_cast<int>(i / width));
+    if (stays && images.distance_mm[i] != 0) {
+      const auto p_m = [&](std::size_t axis) {
+        return (static_cast<double>(images.wire.unit_vectors[3 * i + axis]) * images.distance_mm[i] +
+                static_cast<double>(t[axis])) /
+               kMillimetres;
+      };
+      stays = clipping.hasPoint({p_m(2), -p_m(0), -p_m(1)});  // X forward, Y left, Z up
+    }
+    if (stays) continue;
+    images.distance_mm[i] = 0;
+    images.confidence[i] = static_cast<std::uint8_t>(images.confidence[i] | kGone);
+  }
+}
+
 }  // namespace toftwin::daemon::o3d303

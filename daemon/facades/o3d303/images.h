@@ -8,6 +8,7 @@
 #include <toftwin/frame.h>
 #include <toftwin/result.h>
 
+#include "daemon/facades/o3d303/clipping.h"
 #include "drivers/o3d303/wire/frame_writer.h"
 
 namespace toftwin::daemon::o3d303 {
@@ -42,5 +43,9 @@ LensChunks lensChunksOf(const CameraInfo& camera);
 /// `lens` must be of the frame's camera and outlive the result. Unsupported: the frame has neither range nor
 /// depth.
 Result<CameraImages> imagesOf(const Frame& frame, const LensChunks& lens, double electrons_per_count);
+
+/// What lies beside the clipping becomes invalid, and clipped in the confidence. Points are where the
+/// extrinsics in `images.wire` put them.
+void clip(const Clipping& clipping, CameraImages& images);
 
 }  // namespace toftwin::daemon::o3d303

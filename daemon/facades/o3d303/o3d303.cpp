@@ -33,6 +33,7 @@ using toftwin::o3d303::XmlRpcFault;
 
 constexpr std::chrono::seconds kTick{1}, kTriggerLost{10};
 constexpr std::size_t kMostHeldBack = 64;
+constexpr std::int64_t kNanoseconds = 1'000'000'000;  // in a second
 constexpr int kApplicationChanged = 500'000;
 constexpr double kCooled_k = 2.0;  ///< below the limit, until it may be too hot anew
 
@@ -47,6 +48,36 @@ XmlRpcFault faultOf(const Error& error) {
                    : error.code == Code::NotFound || error.code == Code::Unsupported ? Fault::kReadOnly
                                                                                      : Fault::kInternal;
   return {code, error.message};
+}
+
+/// One may be possible only after another, as a longer exposure after a slower frame rate; so what is refused
+/// is tried again as long as something else could be done. If something stays refused, all is as before.
+Result<> setAll(drivers::Source& source, SourceChanges changes) {
+  const auto before = source.state().parameters;
+  SourceChanges done;
+  while (!changes.empty()) {
+    SourceChanges refused;
+    Result<> first_refusal;
+    for (auto& [name, value] : changes) {
+      auto set = source.setParameter(name, value);
+      if (set) {
+        done.emplace_back(name, value);
+        continue;
+      }
+      if (first_refusal) first_refusal = set;
+      refused.emplace_back(name, value);
+    }
+    if (refused.size() == changes.size()) {
+      std::ranges::reverse(done);
+      for (const auto& [name, value] : done) {
+        const auto was = std::ranges::find(before, name, &Parameter::name);
+        if (was != before.end() && was->value) static_cast<void>(source.setParameter(name, *was->value));
+      }
+      return first_refusal;
+    }
+    changes = std::move(refused);
+  }
+  return {};
 }
 
 class O3d303Facade final : public Facade {
@@ -81,7 +112,8 @@ class O3d303Facade final : public Facade {
                                      .mac = textOf(mac),
                                      .address = place_.keys.address,
                                      .xmlrpc_port = xmlrpc_port,
-                                     .pcic_port = pcic_port});
+                                     .pcic_port = pcic_port,
+                                     .electrons_per_count = keys_.electrons_per_count});
     http_.emplace(*std::move(xmlrpc), [this](std::string path, std::string body, HttpServer::Answer answer) {
       ask(path, body, std::move(answer));
     });
@@ -121,7 +153,8 @@ class O3d303Facade final : public Facade {
     triggered_at_.reset();
     facts_ = factsOf(frame);
     has_seen_frame_ = true;
-    device_s_ = frame.moment.exposures.empty() ? 0 : frame.moment.exposures.front().start.ns / 1'000'000'000;
+    device_s_ = frame.moment.exposures.empty() ? 0 : frame.moment.exposures.front().start.ns / kNanoseconds;
+    device_s_at_ = steady_clock::now();
     if (frame.moment.since_power_on) {
       powered_on_ =
           steady_clock::now() - std::chrono::duration_cast<steady_clock::duration>(
@@ -129,7 +162,7 @@ class O3d303Facade final : public Facade {
     }
     watchTemperature();
     noteConnections(connections_);
-    if (connections_ == 0 || device_->isEditing()) return;
+    if (connections_ == 0 || device_->isIdle()) return;
     if (!lens_ || lens_->camera != frame.camera) {
       lens_ = std::make_shared<const LensChunks>(lensChunksOf(frame.camera));
     }
@@ -137,9 +170,24 @@ class O3d303Facade final : public Facade {
     if (!images) return complainOnce(images.error());
     const auto t = device_->translation_mm();
     images->wire.extrinsics = {t[0], t[1], t[2], 0.0F, 0.0F, 0.0F};
+    if (device_->clipping() != Clipping{}) clip(device_->clipping(), *images);
+    setClock(frame, images->wire);
     if (unevenness_.isNone()) return pcic_->publish(images->wire);
     holdBack({steady_clock::now() + unevenness_.delay(taken_++),
               std::make_shared<const CameraImages>(*std::move(images)), lens_});
+  }
+
+  /// The camera's clock is the source's until a client sets it, or has it follow the network's.
+  void setClock(const Frame& frame, toftwin::o3d303::CameraFrame& wire) const {
+    const ClockRelation& clock = frame.moment.clock;
+    std::int64_t shift_ns = device_->clockShift_s() * kNanoseconds;
+    if (device_->isSynchronised() && clock.uncertainty_ns >= 0) shift_ns = clock.host_minus_device_ns;
+    if (shift_ns == 0) return;
+    const std::int64_t ns = std::max<std::int64_t>(
+        0, std::int64_t{wire.time.seconds} * kNanoseconds + wire.time.nanoseconds + shift_ns);
+    wire.time = {static_cast<std::uint32_t>(ns / kNanoseconds),
+                 static_cast<std::uint32_t>(ns % kNanoseconds)};
+    wire.time_us = static_cast<std::uint32_t>(ns / 1000);
   }
 
   void complainOnce(const Error& error) {
@@ -167,7 +215,7 @@ class O3d303Facade final : public Facade {
       const HeldBack next = std::move(held_back_.front());
       held_back_.pop_front();
       if (!held_back_.empty()) letLeave();
-      if (!device_->isEditing()) pcic_->publish(next.images->wire);
+      if (!device_->isIdle()) pcic_->publish(next.images->wire);
     });
   }
 
@@ -189,7 +237,7 @@ class O3d303Facade final : public Facade {
 
   void trigger(std::function<void(int)> done) {
     refresh();
-    if (device_->isEditing() || !can_trigger_) return done(PcicError::kNoTriggerAllowed);
+    if (device_->isIdle() || !can_trigger_) return done(PcicError::kNoTriggerAllowed);
     const auto now = steady_clock::now();
     if (triggered_at_ && now - *triggered_at_ < kTriggerLost) return done(PcicError::kTriggerOverrun);
     triggered_at_ = now;
@@ -223,14 +271,7 @@ class O3d303Facade final : public Facade {
   }
 
   void change(const SourceChanges& changes, SourceLink::Done done) {
-    link_.post(
-        [changes](drivers::Source& source) -> Result<> {
-          for (const auto& [name, value] : changes) {
-            if (auto set = source.setParameter(name, value); !set) return set;
-          }
-          return {};
-        },
-        std::move(done));
+    link_.post([changes](drivers::Source& source) { return setAll(source, changes); }, std::move(done));
   }
 
   /// What the source has now is what clients read.
@@ -251,7 +292,9 @@ class O3d303Facade final : public Facade {
     facts.illumination_c = facts_.illumination_c;
     facts.since_power_on_s =
         std::chrono::duration<double>{steady_clock::now() - powered_on_.value_or(began_)}.count();
-    facts.device_s = device_s_;
+    facts.device_s =
+        device_s_ +
+        std::chrono::duration_cast<std::chrono::seconds>(steady_clock::now() - device_s_at_).count();
     device_->update(facts);
   }
 
@@ -320,7 +363,8 @@ class O3d303Facade final : public Facade {
   std::size_t connections_ = 0;
   bool has_seen_frame_ = false, can_trigger_ = false, is_too_hot_ = false;
   FrameFacts facts_;
-  std::int64_t device_s_ = 0;
+  std::int64_t device_s_ = 0;  ///< of the last frame, which came
+  steady_clock::time_point device_s_at_ = steady_clock::now();
   std::optional<steady_clock::time_point> powered_on_, triggered_at_;
   std::shared_ptr<const LensChunks> lens_;  // shared with frames that are held back
   std::deque<HeldBack> held_back_;

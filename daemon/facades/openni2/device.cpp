@@ -88,6 +88,8 @@ void Device::destroyStream(oni::driver::StreamBase* stream) {
 
 /// What is subscribed to is what all streams need, so that one that starts a little later disturbs no other.
 void Device::streamsChanged() {
+  // Two streams that change at once: what is wanted last must be what was found last.
+  const std::scoped_lock one_after_the_other{wanting_};
   std::vector<PlaneKind> planes;
   bool is_any_running = false;
   {
@@ -106,6 +108,7 @@ void Device::show(const Frame& frame, int index) {
     const std::scoped_lock lock{mutex_};
     streams = streams_;
   }
+  is_registered_ = kNotAsked;
   for (const auto& stream : streams) stream->deliver(frame, depth_per_range_, index);
 }
 
@@ -130,6 +133,7 @@ std::optional<int> Device::parameter(const std::string& name) {
 }
 
 OniStatus Device::setParameter(const std::string& name, double value) {
+  is_registered_ = kNotAsked;
   return statusOf(link_->setParameter(name, value), services_.complain);
 }
 
@@ -148,9 +152,14 @@ OniStatus Device::setRate(int rate_hz) {
 
 // ---- properties --------------------------------------------------------------------------------
 
+/// Programs convert pixel by pixel: the daemon is asked once a frame.
 bool Device::isRegistered() {
   const std::string& name = facts_.parameters.registration;
-  return name.empty() || parameter(name).value_or(0) != 0;
+  if (name.empty()) return true;
+  if (const int known = is_registered_; known != kNotAsked) return known != 0;
+  const auto now = parameter(name);
+  if (now) is_registered_ = *now == 0 ? 0 : 1;
+  return now.value_or(0) != 0;
 }
 
 OniBool Device::isImageRegistrationModeSupported(OniImageRegistrationMode mode) {

@@ -62,6 +62,9 @@ class Device final : public oni::driver::DeviceBase {
   std::vector<std::vector<OniVideoMode>> modes_;
   std::vector<OniSensorInfo> sensors_;
   std::atomic<int> registration_{ONI_IMAGE_REGISTRATION_DEPTH_TO_COLOR};
+  static constexpr int kNotAsked = -1;
+  std::atomic<int> is_registered_{kNotAsked};  ///< as the source last said, until the next frame
+  std::mutex wanting_;                         ///< held from looking at the streams until the link knows
   std::mutex mutex_;
   int rate_hz_ = 0;
   std::vector<std::shared_ptr<Stream>> streams_;  // shared with a frame under way

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "daemon/facades/facade.h"
+#include "daemon/facades/struck_frames.h"
 
 /// A source as a camera of ROS 2, without ROS: its messages and names over DDS.
 namespace toftwin::daemon::ros2 {
@@ -30,6 +31,7 @@ struct Keys {
   PoseType pose_type = PoseType::PoseStamped;
   bool trigger_on_pose = false;
   std::vector<std::string> peers;
+  FrameLineKeys line;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -64,6 +66,7 @@ struct Keys {
            "whether each pose also asks for a frame: in lockstep with a source that waits for triggers");
     v.texts("peers", peers,
             "IP addresses of machines whose programs are looked for, where multicast does not reach them");
+    v.group("line", line, "what goes wrong on purpose with a frame's messages");
   }
 };
 

@@ -7,8 +7,10 @@
 #include <algorithm>
 #include <cctype>
 #include <chrono>
+#include <filesystem>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "daemon/facades/event_thread.h"
 #include "daemon/facades/ros2/keys.h"
@@ -16,6 +18,7 @@
 #include "daemon/facades/ros2/pose.h"
 #include "daemon/facades/ros2/topics.h"
 #include "daemon/facades/source_link.h"
+#include "daemon/facades/struck_frames.h"
 #include "drivers/logging.h"
 
 namespace toftwin::daemon::ros2 {
@@ -25,7 +28,7 @@ constexpr std::chrono::milliseconds kTick{100};
 
 class Ros2Facade final : public Facade {
  public:
-  Ros2Facade(Keys keys, const FacadePlace& place)
+  Ros2Facade(Keys keys, const std::filesystem::path& line_log, const FacadePlace& place)
       : keys_(std::move(keys)),
         place_(place),
         name_("facade ros2 of " + place.keys.source),
@@ -34,6 +37,8 @@ class Ros2Facade final : public Facade {
               {.source = place.keys.source,
                .planes = {PlaneKind::Range, PlaneKind::Depth, PlaneKind::Amplitude}},
               [this](const Frame& frame) { takeFrame(frame); }),
+        line_(thread_.io(), LineFaults{keys_.line, name_, line_log}, keys_.line.delay_time,
+              [this](const Frame& frame) { publish(frame); }),
         tick_(thread_.io()) {}
 
   // First nobody works with DDS any more, then it goes, and then what its callbacks reach.
@@ -68,15 +73,35 @@ class Ros2Facade final : public Facade {
  private:
   /// One frame at the start says where the camera is.
   void tick() {
-    link_.want(!has_seen_frame_ || topics_->hasReaders());
+    const bool is_wanted = !has_seen_frame_ || topics_->hasReaders();
+    link_.want(is_wanted);
+    if (!is_wanted) tellPose();
     tick_.expires_after(kTick);
     tick_.async_wait([this](boost::system::error_code cancelled) {
       if (!cancelled) tick();
     });
   }
 
+  [[nodiscard]] std::optional<Transform<World, Camera>> describedPose() const {
+    const auto description = link_.describe();
+    return description ? description->world_from_camera : std::nullopt;
+  }
+
+  /// Frames tell it themselves, each of its own time; without any, what was set is where the camera is. One
+  /// that moves by itself is elsewhere than it was put, so only what is put anew is told.
+  void tellPose() {
+    const auto now = describedPose();
+    if (!now || now == described_) return;
+    if (std::exchange(described_, now) == std::nullopt) return;
+    if (auto told = topics_->tellPose(*now, place_.clock.wall()); !told) complainOnce(told.error().message);
+  }
+
   void takeFrame(const Frame& frame) {
     has_seen_frame_ = true;
+    described_ = describedPose();
+    line_.take(frame);
+  }
+  void publish(const Frame& frame) {
     if (auto published = topics_->publish(frame); !published) complainOnce(published.error().message);
   }
 
@@ -126,12 +151,13 @@ class Ros2Facade final : public Facade {
   std::string where_, last_complaint_;
   EventThread thread_;
   SourceLink link_;
+  StruckFrames line_;
   boost::asio::steady_timer tick_;
   std::unique_ptr<Participant> participant_;
   std::optional<Topics> topics_;
   dds_entity_t pose_reader_ = 0;
   bool has_seen_frame_ = false, is_setting_ = false;
-  std::optional<Transform<World, Camera>> wanted_;
+  std::optional<Transform<World, Camera>> wanted_, described_;
 };
 
 /// Names of ROS 2: words of letters, digits and "_", of which none begins with a digit, between "/".
@@ -186,14 +212,16 @@ FacadeKind::Start read(settings::Table& table) {
   Keys keys;
   table.read(keys);
   check(table, keys);
-  return [keys](const FacadePlace& place) -> Result<std::unique_ptr<Facade>> {
+  const std::filesystem::path log =
+      keys.line.log.empty() ? std::filesystem::path{} : table.resolve(keys.line.log);
+  return [keys, log](const FacadePlace& place) -> Result<std::unique_ptr<Facade>> {
     Keys named = keys;
     if (named.name.empty()) named.name = nameOf(place.keys.source);
     if (named.frame_id.empty()) {
       named.frame_id = named.name + "_optical_frame";
       std::ranges::replace(named.frame_id, '/', '_');
     }
-    auto facade = std::make_unique<Ros2Facade>(named, place);
+    auto facade = std::make_unique<Ros2Facade>(named, log, place);
     if (auto opened = facade->open(); !opened) return opened.error();
     return std::unique_ptr<Facade>{std::move(facade)};
   };

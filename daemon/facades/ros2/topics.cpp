@@ -151,7 +151,7 @@ Result<> Topics::publish(const Frame& frame) {
   const auto note = [&](const Result<>& one) {
     if (outcome && !one) outcome = one;
   };
-  note(publishTransform(frame, stamp_ns));
+  note(publishTransform(frame.moment.world_from_camera, stamp_ns));
   if ((depth_.hasReaders() || points_.hasReaders()) && (!rays_ || rays_->camera != frame.camera))
     rays_ = raysOf(frame.camera);
   if (depth_info_.hasReaders()) note(writeInfo(depth_info_, header, frame.camera));
@@ -169,8 +169,13 @@ Result<> Topics::publish(const Frame& frame) {
   return outcome;
 }
 
-Result<> Topics::publishTransform(const Frame& frame, std::int64_t stamp_ns) {
-  const auto& pose = frame.moment.world_from_camera;
+Result<> Topics::tellPose(const Transform<World, Camera>& world_from_camera, HostTime now) {
+  if (keys_.transform != TransformKind::Static || latched_ == world_from_camera) return {};
+  return publishTransform(world_from_camera, now.ns);
+}
+
+Result<> Topics::publishTransform(const std::optional<Transform<World, Camera>>& pose,
+                                  std::int64_t stamp_ns) {
   const bool is_static = keys_.transform == TransformKind::Static;
   if (!pose || keys_.transform == TransformKind::None || (is_static && latched_ == pose)) return {};
   const auto& [w, x, y, z] = pose->rotation_wxyz;

@@ -24,10 +24,13 @@ class Topics {
   [[nodiscard]] bool hasReaders() const;
   /// Makes and writes those messages that are read. The first error; the others are written all the same.
   Result<> publish(const Frame& frame);
+  /// Tells where the camera is, if /tf_static has not told yet: a pose that was set is told also where nobody reads
+  /// images, so that no frame comes to tell it.
+  Result<> tellPose(const Transform<World, Camera>& world_from_camera, HostTime now);
 
  private:
   explicit Topics(const Keys& keys) : keys_(keys) {}
-  Result<> publishTransform(const Frame& frame, std::int64_t stamp_ns);
+  Result<> publishTransform(const std::optional<Transform<World, Camera>>& pose, std::int64_t stamp_ns);
 
   Keys keys_;
   Writer depth_, depth_info_, amplitude_, amplitude_info_, points_, transform_;

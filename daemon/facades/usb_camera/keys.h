@@ -4,6 +4,7 @@
 #include <string>
 
 #include "daemon/facades/facade.h"
+#include "daemon/facades/struck_frames.h"
 #include "daemon/facades/usb_camera/uvc_descriptors.h"
 
 /// Any source as a USB depth camera (UVC), which Linux machines plug in over USB/IP.
@@ -19,6 +20,7 @@ struct Keys {
   Endpoint transfers = Endpoint::Bulk;
   double depth_unit_mm = 1.0;
   double amplitude_per_count = 1.0;
+  FrameLineKeys line;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -39,6 +41,7 @@ struct Keys {
              "of one count of the depth image, in millimetres: 1 reaches to 65.5 m");
     v.number("amplitude_per_count", amplitude_per_count, {1e-6, 1e9},
              "what one count of the infrared image stands for in the source's unit");
+    v.group("line", line, "what goes wrong on purpose with a frame's images");
   }
 };
 

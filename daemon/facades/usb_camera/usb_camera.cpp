@@ -3,11 +3,13 @@
 
 #include <boost/asio/steady_timer.hpp>
 #include <chrono>
+#include <filesystem>
 #include <memory>
 #include <optional>
 
 #include "daemon/facades/event_thread.h"
 #include "daemon/facades/source_link.h"
+#include "daemon/facades/struck_frames.h"
 #include "daemon/facades/usb_camera/keys.h"
 #include "daemon/facades/usb_camera/live_camera.h"
 #include "daemon/facades/usb_camera/server.h"
@@ -21,7 +23,7 @@ constexpr std::chrono::milliseconds kTick{100};
 
 class UsbCameraFacade final : public Facade {
  public:
-  UsbCameraFacade(Keys keys, const FacadePlace& place)
+  UsbCameraFacade(Keys keys, const std::filesystem::path& line_log, const FacadePlace& place)
       : keys_(std::move(keys)),
         place_(place),
         name_("facade usb_camera of " + place.keys.source),
@@ -29,6 +31,8 @@ class UsbCameraFacade final : public Facade {
         link_(thread_, place.hub,
               {.source = place.keys.source,
                .planes = {PlaneKind::Range, PlaneKind::Depth, PlaneKind::Amplitude}},
+              [this](const Frame& frame) { line_.take(frame); }),
+        line_(thread_.io(), LineFaults{keys_.line, name_, line_log}, keys_.line.delay_time,
               [this](const Frame& frame) { takeFrame(frame); }),
         tick_(thread_.io()) {}
 
@@ -125,6 +129,7 @@ class UsbCameraFacade final : public Facade {
   std::string where_, last_problem_, last_complaint_;
   EventThread thread_;
   SourceLink link_;
+  StruckFrames line_;
   boost::asio::steady_timer tick_;
   std::unique_ptr<LiveCamera> camera_;  ///< none: its source is not there
   std::optional<Server> server_;        ///< goes first: it has the camera
@@ -134,8 +139,10 @@ class UsbCameraFacade final : public Facade {
 FacadeKind::Start read(settings::Table& table) {
   Keys keys;
   table.read(keys);
-  return [keys](const FacadePlace& place) -> Result<std::unique_ptr<Facade>> {
-    auto facade = std::make_unique<UsbCameraFacade>(keys, place);
+  const std::filesystem::path log =
+      keys.line.log.empty() ? std::filesystem::path{} : table.resolve(keys.line.log);
+  return [keys, log](const FacadePlace& place) -> Result<std::unique_ptr<Facade>> {
+    auto facade = std::make_unique<UsbCameraFacade>(keys, log, place);
     if (auto opened = facade->open(); !opened) return opened.error();
     return std::unique_ptr<Facade>{std::move(facade)};
   };

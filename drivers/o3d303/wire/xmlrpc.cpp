@@ -30,6 +30,7 @@ void write(pugi::xml_node parent, const XmlRpcValue& value) {
           [&](int i) { node.append_child("int").text() = i; },
           [&](bool b) { node.append_child("boolean").text() = b ? "1" : "0"; },
           [&](double d) { node.append_child("double").text() = fmt::format("{}", d).c_str(); },
+          [&](const Base64& b) { node.append_child("base64").text() = b.text.c_str(); },
           [&](const XmlRpcValue::Array& array) {
             pugi::xml_node data = node.append_child("array").append_child("data");
             for (const XmlRpcValue& one : array) write(data, one);
@@ -118,7 +119,8 @@ Result<XmlRpcValue> readValue(const pugi::xml_node& value, int depth) {
   if (type == "boolean") return XmlRpcValue{std::string_view{text} == "1"};
   if (type == "array") return readArray(typed, depth);
   if (type == "struct") return readStruct(typed, depth);
-  return XmlRpcValue{std::string{text}};  // string, base64, dateTime.iso8601, nil
+  if (type == "base64") return XmlRpcValue{Base64{text}};
+  return XmlRpcValue{std::string{text}};  // string, dateTime.iso8601, nil
 }
 
 }  // namespace
@@ -128,7 +130,7 @@ std::string XmlRpcValue::text() const {
       Overloaded{[](const std::string& s) { return s; }, [](int i) { return std::to_string(i); },
                  [](bool b) { return std::string{b ? "true" : "false"}; },
                  [](double d) { return fmt::format("{}", d); },
-                 [](const auto&) { return std::string{}; }},
+                 [](const Base64& b) { return b.text; }, [](const auto&) { return std::string{}; }},
       value);
 }
 

@@ -13,16 +13,23 @@
 /// XML-RPC's messages as text: what the camera is configured with. No sockets here.
 namespace toftwin::o3d303 {
 
-/// A value of a call or an answer. Dates and base64 come as the text they are written as.
+/// Bytes, as the text in base64 that they are written as (base64.h).
+struct Base64 {
+  std::string text;
+  bool operator==(const Base64&) const = default;
+};
+
+/// A value of a call or an answer. Dates come as the text they are written as.
 struct XmlRpcValue {
   using Array = std::vector<XmlRpcValue>;
   using Struct = std::vector<std::pair<std::string, XmlRpcValue>>;  ///< in the order written
-  std::variant<std::string, int, bool, double, Array, Struct> value;
+  std::variant<std::string, int, bool, double, Array, Struct, Base64> value;
 
   XmlRpcValue() = default;
   template <class T>
   requires(std::same_as<T, std::string> || std::same_as<T, int> || std::same_as<T, bool> ||
-           std::same_as<T, double> || std::same_as<T, Array> || std::same_as<T, Struct>)
+           std::same_as<T, double> || std::same_as<T, Array> || std::same_as<T, Struct> ||
+           std::same_as<T, Base64>)
       XmlRpcValue(T held)
       : value(std::move(held)) {}  // NOLINT(google-explicit-constructor)
   XmlRpcValue(const char* text)
@@ -31,7 +38,7 @@ struct XmlRpcValue {
   bool operator==(const XmlRpcValue&) const = default;
   /// The member of that name as text (numbers too), empty if there is none.
   [[nodiscard]] std::string textAt(std::string_view member) const;
-  /// A text, or a number written as one; empty for the rest.
+  /// A text, a number written as one, or base64; empty for the rest.
   [[nodiscard]] std::string text() const;
 };
 

@@ -19,7 +19,8 @@ function(toftwin_fuzz_facade name)
   set_tests_properties(fuzz_${name}_facade PROPERTIES TIMEOUT 120)
 endfunction()
 
-set(o3d303 answers.cpp commands.cpp defaults.cpp device.cpp device_edit.cpp discovery.cpp)
+set(o3d303 answers.cpp bindings.cpp clipping.cpp commands.cpp device.cpp device_application.cpp device_edit.cpp
+           device_source.cpp device_transfer.cpp discovery.cpp rules.cpp)
 list(TRANSFORM o3d303 PREPEND ${facades}/o3d303/)
 toftwin_fuzz_facade(o3d303 ${o3d303})
 toftwin_fuzz_facade(modbus ${facades}/modbus/registers.cpp ${facades}/modbus/requests.cpp)

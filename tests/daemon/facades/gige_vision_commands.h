@@ -83,6 +83,11 @@ class Camera {
     EXPECT_EQ(read(rowOf(item).address), Status::kSuccess);
     return static_cast<std::uint32_t>(numberAt(last.answer, 8, 4));
   }
+  double real(Item item) {
+    last = take(kOwner, commandOf(Command::kReadMemory, ++number, words({rowOf(item).address, 8})));
+    EXPECT_EQ(statusOf(last.answer), Status::kSuccess);
+    return std::bit_cast<double>(numberAt(last.answer, 12, 8));
+  }
   static std::uint16_t statusOf(const Bytes& answer) {
     return answer.size() < 8 ? std::uint16_t{0xFFFF} : static_cast<std::uint16_t>(numberAt(answer, 0, 2));
   }

@@ -173,7 +173,9 @@ TEST(GigeVisionDevice, KeepsRegionsInsideTheImageAndThePayloadsSizeTrue) {
   EXPECT_EQ(camera.value(Item::PayloadSize), 16U * 12U * 6U);
   EXPECT_EQ(camera.write(Item::OffsetX, 1), Status::kInvalidParameter);
   EXPECT_EQ(camera.write(Item::Width, 10), Status::kSuccess);
+  const double whole = camera.real(Item::PrincipalPointU);
   EXPECT_EQ(camera.write(Item::OffsetX, 6), Status::kSuccess);
+  EXPECT_EQ(camera.real(Item::PrincipalPointU), whole - 6.0) << "SFNC: from the region's first pixel on";
   EXPECT_EQ(camera.write(Item::OffsetX, 7), Status::kInvalidParameter);
   EXPECT_EQ(camera.write(Item::Width, 11), Status::kInvalidParameter);
   EXPECT_EQ(camera.write(Item::Width, 0), Status::kInvalidParameter);

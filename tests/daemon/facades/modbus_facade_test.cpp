@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <fstream>
+#include <optional>
 #include <set>
 #include <thread>
 
@@ -211,6 +213,37 @@ TEST_F(ModbusFacade, AStalledClientHoldsUpNobody) {
   const std::uint8_t half[] = {0, 1, 0};
   ASSERT_EQ(::send(modbus_get_socket(stalled.line()), half, sizeof half, 0), 3);
   for (int i = 0; i < 200; ++i) ASSERT_EQ(lively.number(Item::MapVersion), 1.0);
+}
+
+TEST_F(ModbusFacade, ALineThatIsCutOnPurposeSaysEachTimeInItsLog) {
+  startModbus(kPattern, "[facade.line]\ndisconnect = 0.3\nseed = 4\nlog = 'line.csv'\n");
+  int cut = 0;
+  std::optional<Plc> plc{port_};
+  for (int i = 0; i < 60; ++i) {
+    std::uint16_t word = 0;
+    if (modbus_read_input_registers(plc->line(), 0, 1, &word) == 1) continue;
+    ++cut;
+    plc.emplace(port_);
+  }
+  std::ifstream log{folder_ / "line.csv"};
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(log, line);) lines.push_back(line);
+  ASSERT_FALSE(lines.empty());
+  EXPECT_EQ(lines.front(), "packet,kind,what");
+  EXPECT_EQ(static_cast<int>(lines.size()) - 1, cut);
+  // 60 answers at 0.3 are 18 with a deviation of 3.5; the seed makes it the same number each time.
+  EXPECT_NEAR(cut, 18, 14);
+  EXPECT_NE(lines.at(1).find(",disconnect,answer"), std::string::npos) << lines.at(1);
+}
+
+TEST_F(ModbusFacade, AnAnswerThatIsLostIsTheOnlyOne) {
+  startModbus(kPattern, "[facade.line]\nloss = 1.0\n");
+  Plc plc{port_};
+  modbus_set_response_timeout(plc.line(), 0, 50'000);
+  std::uint16_t word = 0;
+  errno = 0;
+  EXPECT_EQ(modbus_read_input_registers(plc.line(), 0, 1, &word), -1);
+  EXPECT_EQ(errno, ETIMEDOUT);
 }
 
 TEST_F(ModbusFacade, OurOwnRigsBusReadsAndSetsIt) {

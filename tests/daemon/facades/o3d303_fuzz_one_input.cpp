@@ -9,6 +9,7 @@
 #include "daemon/facades/o3d303/commands.h"
 #include "daemon/facades/o3d303/device.h"
 #include "daemon/facades/o3d303/discovery.h"
+#include "drivers/o3d303/wire/base64.h"
 #include "drivers/o3d303/wire/frame_writer.h"
 #include "drivers/o3d303/wire/pcic.h"
 #include "fuzz_one_input.h"
@@ -34,7 +35,7 @@ constexpr std::array<std::string_view, 9> kObjects{"",
                                                    "edit/application/",
                                                    "edit/application/imager_001/",
                                                    "edit/application/imager_001/spatialfilter"};
-constexpr std::array<std::string_view, 29> kMethods{"requestSession",
+constexpr std::array<std::string_view, 34> kMethods{"requestSession",
                                                     "setOperatingMode",
                                                     "editApplication",
                                                     "setParameter",
@@ -62,13 +63,29 @@ constexpr std::array<std::string_view, 29> kMethods{"requestSession",
                                                     "availableTypes",
                                                     "changeType",
                                                     "expire",
-                                                    "nonsense"};
+                                                    "nonsense",
+                                                    "exportApplication",
+                                                    "importApplication",
+                                                    "exportConfig",
+                                                    "importConfig",
+                                                    "getAllParameterLimits"};
 
 SourceFacts facts() {
   SourceFacts facts;
   facts.parameters = {{"exposure_us", 1000.0, {1.0, 20'000.0}},
                       {"frame_rate_hz", 10.0, {0.1, 30.0}},
-                      {"triggered", 0.0, {0.0, 1.0}}};
+                      {"triggered", 0.0, {0.0, 1.0}},
+                      {"frequencies", 1.0, {1.0, 3.0}},
+                      {"exposures", 1.0, {1.0, 3.0}},
+                      {"exposure_ratio", 40.0, {2.0, 50.0}},
+                      {"minimum_amplitude_electrons", 252.0, {0.0, 1e9}},
+                      {"asymmetry_threshold", 0.4, {0.0, 1e9}},
+                      {"spatial_filter", 0.0, {0.0, 3.0}},
+                      {"spatial_filter_reach", 1.0, {1.0, 2.0}},
+                      {"temporal_filter", 0.0, {0.0, 2.0}},
+                      {"temporal_filter_images", 2.0, {2.0, 25.0}},
+                      {"filters_range", 1.0, {0.0, 1.0}},
+                      {"filters_amplitude", 1.0, {0.0, 1.0}}};
   facts.frame_rate_hz = 10.0;
   facts.exposures_us = {40, 1000};
   return facts;
@@ -85,14 +102,29 @@ void checkChanges(const SourceChanges& changes) {
   }
 }
 
+/// Made once: the tables of parameters and the schema take longer than most inputs do.
+const Device& freshDevice() {
+  static const Device kDevice = [] {
+    Device device{{.name = "fuzz", .password = "", .mac = "02:00:00:00:00:00", .address = "127.0.0.1"}};
+    device.update(facts());
+    return device;
+  }();
+  return kDevice;
+}
+
 /// Lines: a byte for the object, one for the method, then two texts, with a '\t' between them.
 void playCalls(std::string_view text) {
-  Device device{{.name = "fuzz", .password = "", .mac = "02:00:00:00:00:00", .address = "127.0.0.1"}};
-  device.update(facts());
+  Device device = freshDevice();
   SteadyTime now{};
-  while (text.size() >= 2) {
+  constexpr int kMostCalls = 48;  // so that many short plays are tried instead of few long ones
+  for (int calls = 0; text.size() >= 2 && calls < kMostCalls; ++calls) {
     const auto object = static_cast<unsigned char>(text[0]) % kObjects.size();
-    const auto method = static_cast<unsigned char>(text[1]) % kMethods.size();
+    // A letter is one of the first; what came later has the other half of the bytes, so that old inputs say
+    // what they said.
+    constexpr std::size_t kLetters = 29;
+    const auto byte = static_cast<unsigned char>(text[1]);
+    const std::size_t method =
+        byte < 0x80U ? byte % kLetters : kLetters + (byte - 0x80U) % (kMethods.size() - kLetters);
     std::string_view line =
         text.substr(2, text.find('\n', 2) == std::string_view::npos ? text.size() : text.find('\n', 2) - 2);
     text.remove_prefix(std::min(text.size(), 2 + line.size() + 1));
@@ -104,6 +136,9 @@ void playCalls(std::string_view text) {
       call.params = {XmlRpcValue{""}, XmlRpcValue{"0123456789abcdef0123456789abcdef"}};
     } else if (call.method == "setTemporaryApplicationParameters") {
       call.params = {XmlRpcValue{XmlRpcValue::Struct{{first, XmlRpcValue{second}}}}};
+    } else if (call.method.starts_with("import")) {
+      call.params = {XmlRpcValue{toftwin::o3d303::Base64{toftwin::o3d303::toBase64(first)}},
+                     XmlRpcValue{second}};
     } else {
       call.params = {XmlRpcValue{first}, XmlRpcValue{second}};
     }
@@ -120,8 +155,8 @@ void playCalls(std::string_view text) {
     const auto outcome = device.answer(path, call, now);
     checkChanges(outcome.changes);
     static_cast<void>(encodeXmlRpc(outcome.answer));
-    device.update(facts());
-    demand(isServed(device.defaultSchema()));
+    if (outcome.has_saved) demand(isServed(device.defaultSchema()));
+    if (!outcome.changes.empty()) device.update(facts());
     for (const float t : device.translation_mm()) demand(std::isfinite(t));
   }
 }
@@ -147,7 +182,7 @@ void fuzzOneInput(std::span<const std::byte> bytes) {
   static_cast<void>(readSearch(bytes));
   playCalls(text);
   if (const auto call = toftwin::o3d303::readXmlRpcCall(text)) {
-    Device device{{.name = "fuzz", .password = "x", .mac = "02:00:00:00:00:00", .address = "127.0.0.1"}};
+    Device device = freshDevice();
     static_cast<void>(device.answer("/api/rpc/v1/com.ifm.efector/", *call, {}));
     static_cast<void>(device.answer(text.substr(0, 200), *call, {}));
   }

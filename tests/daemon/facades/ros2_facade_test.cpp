@@ -8,7 +8,9 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <iterator>
 #include <limits>
+#include <map>
 #include <random>
 
 #include "gige_vision_testing.h"
@@ -81,6 +83,35 @@ TEST_F(Ros2Facade, AReaderThatComesLateGetsTheStaticTransform) {
   auto again = nextOf(late.read("/tf_static", kTransforms, Asks::Latched));
   ASSERT_TRUE(again);
   EXPECT_EQ(readTransform(*std::move(again)).numbers, first.numbers);
+}
+
+TEST_F(Ros2Facade, APoseThatIsSetIsToldWhereNobodyReadsImages) {
+  startRos2(kSmallSim + "position_m = [0.5, 0.25, -1.0]\n");
+  auto* transforms = program_->read("/tf_static", kTransforms, Asks::Latched);
+  ASSERT_TRUE(nextOf(transforms)) << "the first frame's";
+  const Transform<World, Camera> expected{{0.8, 0.0, 0.0, 0.6}, {0.5, 0.25, -0.75}};
+  ASSERT_TRUE(client().setPose("cam", expected).ok());
+  ReadTransform seen{};
+  while (seen.numbers != numbersOf(expected)) {
+    auto message = nextOf(transforms);
+    ASSERT_TRUE(message);
+    seen = readTransform(*std::move(message));
+  }
+  EXPECT_EQ(seen.child, "cam_optical_frame");
+}
+
+TEST_F(Ros2Facade, AFrameThatIsDoubledOnPurposeComesTwice) {
+  startRos2(kSmallSim, "reliability = 'reliable'\nkeep_last = 50\n[facade.line]\nduplicate = 1.0\n");
+  auto* images = program_->read("/cam/amplitude/image_raw", kImage, Asks::Reliable);
+  std::map<std::int64_t, int> times;  // of each stamp
+  while (times.size() < 5) {
+    auto message = nextOf(images);
+    ASSERT_TRUE(message);
+    CdrReader cdr{*std::move(message)};
+    ++times[readHeader(cdr)];
+  }
+  // The first may have begun before the reader was known, the last is not over.
+  for (auto one = std::next(times.begin()); one != std::prev(times.end()); ++one) EXPECT_EQ(one->second, 2);
 }
 
 TEST_F(Ros2Facade, ATransformMovesTheCameraAndTransformsComeWithEachFrame) {

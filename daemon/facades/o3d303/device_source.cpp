@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the source has is what the parameters show, and what is saved is what it gets.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "daemon/facades/o3d303/answers.h"
+#include "daemon/facades/o3d303/device.h"
+
+namespace toftwin::daemon::o3d303 {
+namespace {
+
+constexpr double kSecondsPerHour = 3600.0;
+
+}  // namespace
+
+void Device::update(const SourceFacts& facts) {
+  facts_ = facts;
+  device_["TemperatureIllu"] = facts.illumination_c ? fmt::format("{:.1f}", *facts.illumination_c) : "3276.7";
+  device_["UpTime"] = fmt::format("{:.6f}", facts.since_power_on_s / kSecondsPerHour);
+  device_["ImageTimestampReference"] = std::to_string(facts.device_s + clock_shift_s_);
+  show(live_);
+  if (!factory_ && !facts.parameters.empty()) {
+    factory_ = live_;
+    for (auto& [index, one] : applications_) show(one);  // those made before the source was seen
+  }
+  const auto active = applications_.find(activeApplication());
+  if (active == applications_.end()) return;
+  show(active->second);
+  clipping_ = clippingOf(active->second);
+}
+
+const Parameter* Device::parameterOf(std::string_view source_name) const {
+  const auto found = std::ranges::find(facts_.parameters, source_name, &Parameter::name);
+  return found == facts_.parameters.end() ? nullptr : &*found;
+}
+
+std::optional<Bound> Device::boundOf(Binding::Object object, std::string_view name) const {
+  for (const Binding& binding : bindings()) {
+    if (binding.object != object || binding.name != name) continue;
+    const Parameter* parameter = parameterOf(binding.source_name);
+    if (parameter == nullptr) continue;
+    return Bound{&binding, parameter, binding.is_electrons ? identity_.electrons_per_count : 1.0};
+  }
+  return std::nullopt;
+}
+
+const Parameters& Device::of(const Application& application, Binding::Object object) {
+  switch (object) {
+    case Binding::Object::SpatialFilter:
+      return application.spatial;
+    case Binding::Object::TemporalFilter:
+      return application.temporal;
+    case Binding::Object::Imager:
+      break;
+  }
+  return application.imager;
+}
+
+void Device::show(Application& one) const {
+  Parameters& imager = one.imager;
+  ImagerType type{facts_.frequencies, std::max(1, static_cast<int>(facts_.exposures_us.size()))};
+  if (const auto* p = parameterOf(kFrequencies); p != nullptr && p->value)
+    type.frequencies = static_cast<int>(*p->value);
+  if (const auto* p = parameterOf(kExposures); p != nullptr && p->value)
+    type.exposures = static_cast<int>(*p->value);
+  imager["Type"] = type.text();
+  if (facts_.frame_rate_hz) imager["FrameRate"] = fmt::format("{:g}", *facts_.frame_rate_hz);
+  if (!facts_.exposures_us.empty()) imager["ExposureTime"] = std::to_string(facts_.exposures_us.back());
+  for (const Binding& binding : bindings()) {
+    const auto bound = boundOf(binding.object, binding.name);
+    if (!bound || !bound->parameter->value) continue;
+    of(one, binding.object)[std::string{binding.name}] = bound->text(*bound->parameter->value);
+  }
+  fitExposures(one);
+  if (parameterOf(kExposures) == nullptr && !facts_.exposures_us.empty())
+    imager["ExposureTimeList"] = fmt::format("{}", fmt::join(facts_.exposures_us, ";"));
+  one.application["TriggerMode"] = facts_.can_trigger ? "2" : "1";
+  imager["Resolution"] = facts_.width >= 352 ? "1" : "0";
+  const auto fitClipping = [&](const char* name, int before, int now) {
+    const int last = numberIn(imager.at(name)).value_or(before - 1);
+    imager[name] = std::to_string(last == before - 1 ? now - 1 : std::min(last, now - 1));
+  };
+  fitClipping("ClippingRight", one.width, facts_.width);
+  fitClipping("ClippingBottom", one.height, facts_.height);
+  one.width = facts_.width;
+  one.height = facts_.height;
+}
+
+/// What the real camera lists depends on its type: with three exposures none can be set, with one there is no
+/// ratio.
+void Device::fitExposures(Application& one) const {
+  Parameters& imager = one.imager;
+  const int exposures = ImagerType::of(imager.at("Type")).value_or(ImagerType{}).exposures;
+  const auto bound = boundOf(Binding::Object::Imager, "ExposureTime");
+  const std::string longest = imager.contains("ExposureTime")    ? imager.at("ExposureTime")
+                              : bound && bound->parameter->value ? bound->text(*bound->parameter->value)
+                                                                 : "1000";
+  const double time_us = realIn(longest).value_or(1000.0);
+  if (exposures == 1) {
+    imager["ExposureTime"] = longest;
+    imager.erase("ExposureTimeRatio");
+    imager["ExposureTimeList"] = longest;
+  } else if (exposures == 2) {
+    imager["ExposureTime"] = longest;
+    const auto ratio_bound = boundOf(Binding::Object::Imager, "ExposureTimeRatio");
+    imager.emplace("ExposureTimeRatio", ratio_bound && ratio_bound->parameter->value
+                                            ? ratio_bound->text(*ratio_bound->parameter->value)
+                                            : "40");
+    const double ratio = realIn(imager.at("ExposureTimeRatio")).value_or(40.0);
+    imager["ExposureTimeList"] = fmt::format("{:.0f};{}", time_us / ratio, longest);
+  } else {
+    imager.erase("ExposureTime");
+    imager.erase("ExposureTimeRatio");
+    imager["ExposureTimeList"] = fmt::format("{:.0f};{:.0f};{:.0f}", time_us / 50.0, time_us / 5.0, time_us);
+  }
+}
+
+SourceChanges Device::changesTo(const Application& wanted) const {
+  SourceChanges changes;
+  const auto type = ImagerType::of(wanted.imager.at("Type")), now = ImagerType::of(live_.imager.at("Type"));
+  const auto count = [&](std::string_view name, int ImagerType::*of) {
+    if (parameterOf(name) == nullptr || !type || !now || (*type).*of == (*now).*of) return;
+    changes.emplace_back(name, (*type).*of);
+  };
+  count(kFrequencies, &ImagerType::frequencies);
+  count(kExposures, &ImagerType::exposures);
+  for (const Binding& binding : bindings()) {
+    const auto bound = boundOf(binding.object, binding.name);
+    if (!bound || bound->binding != &binding) continue;
+    const std::string name{binding.name};
+    const Parameters &before = of(live_, binding.object), &after = of(wanted, binding.object);
+    if (!after.contains(name) || (before.contains(name) && before.at(name) == after.at(name))) continue;
+    const std::string& text = after.at(name);
+    const auto value = text == "true" ? 1.0 : text == "false" ? 0.0 : realIn(text);
+    if (value) changes.emplace_back(binding.source_name, bound->toSource(*value));
+  }
+  if (parameterOf(kTriggered) != nullptr &&
+      wanted.application.at("TriggerMode") != live_.application.at("TriggerMode")) {
+    changes.emplace_back(kTriggered, wanted.application.at("TriggerMode") == "2" ? 1.0 : 0.0);
+  }
+  return changes;
+}
+
+void Device::refreshActive() {
+  const auto active = applications_.find(activeApplication());
+  if (active == applications_.end()) return;
+  if (auto schema = toftwin::o3d303::readSchema(active->second.application.at("PcicTcpResultSchema"))) {
+    default_schema_ = *std::move(schema);
+  }
+  clipping_ = clippingOf(active->second);
+}
+
+Clipping Device::clippingOf(const Application& application) const {
+  const auto whole = [&](const char* name, int otherwise) {
+    return numberIn(application.imager.at(name)).value_or(otherwise);
+  };
+  const Clipping none;
+  Clipping clipping{.left = whole("ClippingLeft", 0),
+                    .top = whole("ClippingTop", 0),
+                    .right = whole("ClippingRight", none.right),
+                    .bottom = whole("ClippingBottom", none.bottom)};
+  static_cast<void>(
+      readCuboid(application.imager.at("ClippingCuboid"), clipping));  // checked when it was set
+  return clipping;
+}
+
+}  // namespace toftwin::daemon::o3d303
