@@ -228,7 +228,8 @@ class SimulatedSource final : public Source {
     base_ = std::move(base);
     model_ = std::move(changed);
     operating_ = std::move(operating);
-    view_.setFrequencies(model_.traceRequest().frequencies, model_.hasPhasors() ? model_.correlatedTerms() : std::vector<std::uint8_t>{});
+    view_.setFrequencies(model_.traceRequest().frequencies,
+                         model_.hasPhasors() ? model_.correlatedTerms() : std::vector<std::uint8_t>{});
     collected_.reset();
     return {};
   }
@@ -309,7 +310,8 @@ class SimulatedSource final : public Source {
     std::vector<PlaneKind> planes = info_.planes;
     const auto exposure = std::ranges::find(planes, PlaneKind::Exposure);
     if (model_.exposureCount() == 1 && exposure != planes.end()) planes.erase(exposure);
-    if (model_.exposureCount() > 1 && base_.exposureCount() == 1 && keys_.planes.empty()) planes.push_back(PlaneKind::Exposure);
+    if (model_.exposureCount() > 1 && base_.exposureCount() == 1 && keys_.planes.empty())
+      planes.push_back(PlaneKind::Exposure);
     return planes;
   }
 
