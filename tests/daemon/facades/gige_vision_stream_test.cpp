@@ -88,7 +88,7 @@ TEST(GigeVisionStream, AFullSocketLosesNoPacketBesideThePlan) {
   {
     int tries = 0;
     StruckLine line{
-        LineFaults{{.loss = 0.1, .duplicate = 0.1, .reorder = 0.1, .seed = 9, .log = {}}, "test", log},
+        LineFaults{{.loss = 0.1, .duplicate = 0.1, .reorder = 0.1, .seed = 9}, "test", log},
         [&](const Bytes& packet) {
           if (++tries % 3 != 0) return false;
           got.push_back(numberAt(packet, 0, 4));
