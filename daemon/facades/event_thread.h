@@ -5,7 +5,9 @@
 
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
+#include <boost/asio/steady_timer.hpp>
 
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -53,6 +55,27 @@ class EventThread {
   boost::asio::executor_work_guard<boost::asio::io_context::executor_type> stay_{io_.get_executor()};
   const std::shared_ptr<Door> door_ = std::make_shared<Door>(io_);
   std::jthread thread_;
+};
+
+/// Work that a facade's thread does again and again. It must not outlast what the work uses, and the thread
+/// is stopped before it goes.
+class Repeating {
+ public:
+  Repeating(boost::asio::io_context& io, std::chrono::milliseconds interval, std::function<void()> work)
+      : timer_(io), interval_(interval), work_(std::move(work)) {}
+  /// The first time now; what throws is done again all the same.
+  void start() {
+    timer_.expires_after(interval_);
+    timer_.async_wait([this](boost::system::error_code cancelled) {
+      if (!cancelled) start();
+    });
+    work_();
+  }
+
+ private:
+  boost::asio::steady_timer timer_;
+  const std::chrono::milliseconds interval_;
+  const std::function<void()> work_;
 };
 
 }  // namespace toftwin::daemon

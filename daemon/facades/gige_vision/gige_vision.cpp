@@ -16,6 +16,7 @@
 #include "daemon/facades/gige_vision/source_facts.h"
 #include "daemon/facades/mac_address.h"
 #include "daemon/facades/source_link.h"
+#include "daemon/facades/unevenness.h"
 #include "drivers/logging.h"
 #include "protocol/settings/describe.h"
 
@@ -37,7 +38,7 @@ std::uint16_t statusOf(const Error& error) {
 
 class GigeVisionFacade final : public Facade {
  public:
-  GigeVisionFacade(Keys keys, std::filesystem::path line_log, const FacadePlace& place)
+  GigeVisionFacade(Keys keys, Unevenness unevenness, std::filesystem::path line_log, const FacadePlace& place)
       : keys_(std::move(keys)),
         line_log_(std::move(line_log)),
         place_(place),
@@ -47,7 +48,8 @@ class GigeVisionFacade final : public Facade {
               {.source = place.keys.source,
                .planes = {PlaneKind::Range, PlaneKind::Depth, PlaneKind::Amplitude, PlaneKind::Flags}},
               [this](const Frame& frame) { takeFrame(frame); }),
-        tick_(thread_.io()) {}
+        uneven_(thread_.io(), std::move(unevenness), [this](const Frame& frame) { send(frame); }),
+        tick_(thread_.io(), kTick, [this] { tick(); }) {}
 
   ~GigeVisionFacade() override { thread_.stop(); }
 
@@ -79,7 +81,7 @@ class GigeVisionFacade final : public Facade {
                          .amplitude_per_count = keys_.amplitude_per_count});
     where_ = fmt::format("GigE Vision on {} port {}{}", place_.keys.address, kControlPort,
                          control_->hearsBroadcasts() ? ", found by broadcasts" : "");
-    tick();
+    tick_.start();
     thread_.start();
     return {};
   }
@@ -149,14 +151,9 @@ class GigeVisionFacade final : public Facade {
   }
 
   void tick() {
-    tick_.expires_after(kTick);
-    tick_.async_wait([this](boost::system::error_code cancelled) {
-      if (cancelled) return;
-      tick();
-      if (!device_->expire(steady_clock::now())) return;
-      logging::info("{}: the controller has been silent for too long, and has lost the camera", name_);
-      followStreaming();
-    });
+    if (!device_->expire(steady_clock::now())) return;
+    logging::info("{}: the controller has been silent for too long, and has lost the camera", name_);
+    followStreaming();
   }
 
   void refresh() {
@@ -176,6 +173,11 @@ class GigeVisionFacade final : public Facade {
     watch_.note(frame);
     refresh();
     if (!device_->isStreaming()) return followStreaming();
+    uneven_.take(frame);
+  }
+
+  void send(const Frame& frame) {
+    if (!device_->isStreaming()) return;
     const StreamSetup setup = device_->stream();
     if (!rays_ || rays_->camera != frame.camera) rays_ = raysOf(frame.camera);
     const std::int64_t stamp_ns = stampOf(frame, setup.uses_host_clock);
@@ -230,7 +232,8 @@ class GigeVisionFacade final : public Facade {
   std::string where_, last_complaint_;
   EventThread thread_;
   SourceLink link_;
-  boost::asio::steady_timer tick_;
+  UnevenFrames uneven_;
+  Repeating tick_;
   std::unique_ptr<ControlSockets> control_;
   std::optional<Sender> sender_;
   std::optional<Device> device_;
@@ -255,8 +258,9 @@ FacadeKind::Start read(settings::Table& table) {
   if (keys.packet_size % 4 != 0) table.complain("packet_size", "must be a multiple of 4");
   const std::filesystem::path log =
       keys.line.log.empty() ? std::filesystem::path{} : table.resolve(keys.line.log);
-  return [keys, log](const FacadePlace& place) -> Result<std::unique_ptr<Facade>> {
-    auto facade = std::make_unique<GigeVisionFacade>(keys, log, place);
+  const Unevenness unevenness = Unevenness::read(table, keys.intervals);
+  return [keys, unevenness, log](const FacadePlace& place) -> Result<std::unique_ptr<Facade>> {
+    auto facade = std::make_unique<GigeVisionFacade>(keys, unevenness, log, place);
     if (auto opened = facade->open(); !opened) return opened.error();
     return std::unique_ptr<Facade>{std::move(facade)};
   };

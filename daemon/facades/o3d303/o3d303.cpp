@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <deque>
 #include <memory>
 #include <optional>
 
@@ -18,8 +17,8 @@
 #include "daemon/facades/o3d303/images.h"
 #include "daemon/facades/o3d303/keys.h"
 #include "daemon/facades/o3d303/pcic_server.h"
-#include "daemon/facades/o3d303/unevenness.h"
 #include "daemon/facades/source_link.h"
+#include "daemon/facades/unevenness.h"
 #include "drivers/logging.h"
 #include "protocol/settings/describe.h"
 
@@ -32,7 +31,6 @@ using toftwin::o3d303::XmlRpcAnswer;
 using toftwin::o3d303::XmlRpcFault;
 
 constexpr std::chrono::seconds kTick{1}, kTriggerLost{10};
-constexpr std::size_t kMostHeldBack = 64;
 constexpr std::int64_t kNanoseconds = 1'000'000'000;  // in a second
 constexpr int kApplicationChanged = 500'000;
 constexpr double kCooled_k = 2.0;  ///< below the limit, until it may be too hot anew
@@ -84,7 +82,6 @@ class O3d303Facade final : public Facade {
  public:
   O3d303Facade(Keys keys, Unevenness unevenness, const FacadePlace& place)
       : keys_(std::move(keys)),
-        unevenness_(std::move(unevenness)),
         place_(place),
         thread_("facade o3d303 of " + place.keys.source),
         link_(thread_, place.hub,
@@ -92,8 +89,8 @@ class O3d303Facade final : public Facade {
                .planes = {PlaneKind::Range, PlaneKind::Depth, PlaneKind::Amplitude, PlaneKind::Flags,
                           PlaneKind::Exposure}},
               [this](const Frame& frame) { takeFrame(frame); }),
-        tick_(thread_.io()),
-        leave_(thread_.io()),
+        uneven_(thread_.io(), std::move(unevenness), [this](const Frame& frame) { publish(frame); }),
+        tick_(thread_.io(), kTick, [this] { tick(); }),
         began_(steady_clock::now()) {}
 
   ~O3d303Facade() override { thread_.stop(); }
@@ -140,7 +137,7 @@ class O3d303Facade final : public Facade {
         "XML-RPC on {} port {}, PCIC on port {}{}", place_.keys.address, xmlrpc_port, pcic_port,
         discovery_ ? fmt::format(", found by searches on UDP port {}", keys_.discovery_port) : "");
     link_.want(true);  // one frame, which says what kind of camera it is
-    tick();
+    tick_.start();
     thread_.start();
     return {};
   }
@@ -162,9 +159,13 @@ class O3d303Facade final : public Facade {
     }
     watchTemperature();
     noteConnections(connections_);
-    if (connections_ == 0 || device_->isIdle()) return;
+    if (connections_ > 0 && !device_->isIdle()) uneven_.take(frame);
+  }
+
+  void publish(const Frame& frame) {
+    if (device_->isIdle()) return;
     if (!lens_ || lens_->camera != frame.camera) {
-      lens_ = std::make_shared<const LensChunks>(lensChunksOf(frame.camera));
+      lens_ = lensChunksOf(frame.camera);
     }
     auto images = imagesOf(frame, *lens_, keys_.electrons_per_count);
     if (!images) return complainOnce(images.error());
@@ -172,9 +173,7 @@ class O3d303Facade final : public Facade {
     images->wire.extrinsics = {t[0], t[1], t[2], 0.0F, 0.0F, 0.0F};
     if (device_->clipping() != Clipping{}) clip(device_->clipping(), *images);
     setClock(frame, images->wire);
-    if (unevenness_.isNone()) return pcic_->publish(images->wire);
-    holdBack({steady_clock::now() + unevenness_.delay(taken_++),
-              std::make_shared<const CameraImages>(*std::move(images)), lens_});
+    pcic_->publish(images->wire);
   }
 
   /// The camera's clock is the source's until a client sets it, or has it follow the network's.
@@ -194,29 +193,6 @@ class O3d303Facade final : public Facade {
     if (error.message != last_complaint_)
       logging::warn("facade o3d303 of {}: {}", place_.keys.source, error.message);
     last_complaint_ = error.message;
-  }
-
-  /// A frame that waits until a real camera's would leave.
-  struct HeldBack {
-    steady_clock::time_point leaves;
-    std::shared_ptr<const CameraImages> images;
-    std::shared_ptr<const LensChunks> lens;  ///< shared with the images, which refer to it
-  };
-  void holdBack(HeldBack frame) {
-    if (held_back_.size() >= kMostHeldBack) return;
-    if (!held_back_.empty()) frame.leaves = std::max(frame.leaves, held_back_.back().leaves);
-    held_back_.push_back(std::move(frame));
-    if (held_back_.size() == 1) letLeave();
-  }
-  void letLeave() {
-    leave_.expires_at(held_back_.front().leaves);
-    leave_.async_wait([this](boost::system::error_code cancelled) {
-      if (cancelled || held_back_.empty()) return;
-      const HeldBack next = std::move(held_back_.front());
-      held_back_.pop_front();
-      if (!held_back_.empty()) letLeave();
-      if (!device_->isIdle()) pcic_->publish(next.images->wire);
-    });
   }
 
   void noteConnections(std::size_t count) {
@@ -299,15 +275,10 @@ class O3d303Facade final : public Facade {
   }
 
   void tick() {
-    tick_.expires_after(kTick);
-    tick_.async_wait([this](boost::system::error_code cancelled) {
-      if (cancelled) return;
-      tick();
-      const SourceChanges undone = device_->expire(steady_clock::now());
-      if (undone.empty()) return;
-      change(undone, [this](const Result<>& done) {
-        if (!done) complainOnce(done.error());
-      });
+    const SourceChanges undone = device_->expire(steady_clock::now());
+    if (undone.empty()) return;
+    change(undone, [this](const Result<>& done) {
+      if (!done) complainOnce(done.error());
     });
   }
 
@@ -348,7 +319,6 @@ class O3d303Facade final : public Facade {
   }
 
   const Keys keys_;
-  const Unevenness unevenness_;
   const FacadePlace place_;
   std::string where_;
   EventThread thread_;
@@ -357,7 +327,8 @@ class O3d303Facade final : public Facade {
   std::optional<HttpServer> http_;
   std::optional<PcicServer> pcic_;
   std::unique_ptr<Discovery> discovery_;
-  boost::asio::steady_timer tick_, leave_;
+  UnevenFrames uneven_;
+  Repeating tick_;
   const steady_clock::time_point began_;
 
   std::size_t connections_ = 0;
@@ -366,21 +337,14 @@ class O3d303Facade final : public Facade {
   std::int64_t device_s_ = 0;  ///< of the last frame, which came
   steady_clock::time_point device_s_at_ = steady_clock::now();
   std::optional<steady_clock::time_point> powered_on_, triggered_at_;
-  std::shared_ptr<const LensChunks> lens_;  // shared with frames that are held back
-  std::deque<HeldBack> held_back_;
-  std::uint64_t taken_ = 0;
+  std::optional<LensChunks> lens_;
   std::string last_complaint_;
 };
 
 FacadeKind::Start read(settings::Table& table) {
   Keys keys;
   table.read(keys);
-  Unevenness unevenness;
-  if (!keys.intervals.empty()) {
-    auto loaded = Unevenness::load(table.resolve(keys.intervals));
-    if (!loaded) table.complain("intervals", "= " + loaded.error().message);
-    if (loaded) unevenness = *std::move(loaded);
-  }
+  const Unevenness unevenness = Unevenness::read(table, keys.intervals);
   return [keys, unevenness](const FacadePlace& place) -> Result<std::unique_ptr<Facade>> {
     auto facade = std::make_unique<O3d303Facade>(keys, unevenness, place);
     if (auto opened = facade->open(); !opened) return opened.error();

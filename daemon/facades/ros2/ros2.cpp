@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <boost/asio/ip/address.hpp>
-#include <boost/asio/steady_timer.hpp>
 
 #include <fmt/format.h>
 
@@ -39,7 +38,7 @@ class Ros2Facade final : public Facade {
               [this](const Frame& frame) { takeFrame(frame); }),
         line_(thread_.io(), LineFaults{keys_.line, name_, line_log}, keys_.line.delay_time,
               [this](const Frame& frame) { publish(frame); }),
-        tick_(thread_.io()) {}
+        tick_(thread_.io(), kTick, [this] { tick(); }) {}
 
   // First nobody works with DDS any more, then it goes, and then what its callbacks reach.
   ~Ros2Facade() override {
@@ -64,7 +63,7 @@ class Ros2Facade final : public Facade {
     where_ = fmt::format(
         "ROS 2 topics /{0}/depth/image_raw, /{0}/amplitude/image_raw, /{0}/points on {1}, domain {2}",
         keys_.name, place_.keys.address, keys_.domain);
-    tick();
+    tick_.start();
     thread_.start();
     return {};
   }
@@ -76,10 +75,6 @@ class Ros2Facade final : public Facade {
     const bool is_wanted = !has_seen_frame_ || topics_->hasReaders();
     link_.want(is_wanted);
     if (!is_wanted) tellPose();
-    tick_.expires_after(kTick);
-    tick_.async_wait([this](boost::system::error_code cancelled) {
-      if (!cancelled) tick();
-    });
   }
 
   [[nodiscard]] std::optional<Transform<World, Camera>> describedPose() const {
@@ -152,7 +147,7 @@ class Ros2Facade final : public Facade {
   EventThread thread_;
   SourceLink link_;
   StruckFrames line_;
-  boost::asio::steady_timer tick_;
+  Repeating tick_;
   std::unique_ptr<Participant> participant_;
   std::optional<Topics> topics_;
   dds_entity_t pose_reader_ = 0;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
-#include <boost/asio/steady_timer.hpp>
 #include <chrono>
 #include <filesystem>
 #include <memory>
@@ -34,7 +33,7 @@ class UsbCameraFacade final : public Facade {
               [this](const Frame& frame) { line_.take(frame); }),
         line_(thread_.io(), LineFaults{keys_.line, name_, line_log}, keys_.line.delay_time,
               [this](const Frame& frame) { takeFrame(frame); }),
-        tick_(thread_.io()) {}
+        tick_(thread_.io(), kTick, [this] { tick(); }) {}
 
   ~UsbCameraFacade() override { thread_.stop(); }
 
@@ -43,7 +42,7 @@ class UsbCameraFacade final : public Facade {
     if (!listener) return listener.error();
     server_.emplace(*std::move(listener), name_);
     where_ = fmt::format("USB/IP on {} port {}", place_.keys.address, server_->port());
-    tick();
+    tick_.start();
     thread_.start();
     return {};
   }
@@ -53,10 +52,6 @@ class UsbCameraFacade final : public Facade {
   void tick() {
     followSource();
     pump();
-    tick_.expires_after(kTick);
-    tick_.async_wait([this](boost::system::error_code cancelled) {
-      if (!cancelled) tick();
-    });
   }
 
   /// The camera is plugged in while its source is there, and as it is described.
@@ -130,7 +125,7 @@ class UsbCameraFacade final : public Facade {
   EventThread thread_;
   SourceLink link_;
   StruckFrames line_;
-  boost::asio::steady_timer tick_;
+  Repeating tick_;
   std::unique_ptr<LiveCamera> camera_;  ///< none: its source is not there
   std::optional<Server> server_;        ///< goes first: it has the camera
   bool has_told_loss_ = false;

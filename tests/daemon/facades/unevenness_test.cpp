@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/facades/o3d303/unevenness.h"
+#include "daemon/facades/unevenness.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include <numeric>
 #include <vector>
 
-namespace toftwin::daemon::o3d303 {
+namespace toftwin::daemon {
 namespace {
 
 // Evenly spaced frames that are held back so leave at the intervals that were measured on a real one.
@@ -39,5 +39,29 @@ TEST(Unevenness, GivesARealCamerasIntervals) {
   EXPECT_EQ(least_ms, 0.0) << "no frame leaves before it is there";
 }
 
+// In 1 + 21 ms the first is late by nothing, the second early by ten: it alone leaves at once.
+TEST(UnevenFrames, LeaveInOrderAndNoneIsLost) {
+  boost::asio::io_context io;
+  std::vector<std::uint64_t> order;
+  UnevenFrames line{io, Unevenness{{std::chrono::milliseconds{1}, std::chrono::milliseconds{21}}},
+                    [&](const Frame& frame) { order.push_back(frame.sequence); }};
+  for (std::uint64_t i = 0; i < 6; ++i) {
+    Frame frame;
+    frame.sequence = i;
+    line.take(frame);
+  }
+  EXPECT_TRUE(order.empty()) << "the first is held back by ten milliseconds, and those behind it with it";
+  io.run();
+  EXPECT_EQ(order, (std::vector<std::uint64_t>{0, 1, 2, 3, 4, 5}));
+}
+
+TEST(UnevenFrames, WithoutIntervalsTheyLeaveAtOnce) {
+  boost::asio::io_context io;
+  int left = 0;
+  UnevenFrames line{io, {}, [&](const Frame&) { ++left; }};
+  line.take({});
+  EXPECT_EQ(left, 1);
+}
+
 }  // namespace
-}  // namespace toftwin::daemon::o3d303
+}  // namespace toftwin::daemon

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/facades/o3d303/unevenness.h"
+#include "daemon/facades/unevenness.h"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 #include <fstream>
 #include <numeric>
 
-namespace toftwin::daemon::o3d303 {
+namespace toftwin::daemon {
 
 /// Frame i left at the sum of the intervals before it, evenly spaced ones leave at i times their mean; the
 /// earliest against that is held back by nothing.
@@ -46,4 +46,34 @@ Result<Unevenness> Unevenness::load(const std::filesystem::path& file) {
   return Unevenness{intervals};
 }
 
-}  // namespace toftwin::daemon::o3d303
+Unevenness Unevenness::read(settings::Table& table, const std::string& intervals) {
+  if (intervals.empty()) return {};
+  auto loaded = load(table.resolve(intervals));
+  if (loaded) return *std::move(loaded);
+  table.complain("intervals", "= " + loaded.error().message);
+  return {};
+}
+
+/// Where more are held than any camera is late by, they are lost.
+void UnevenFrames::take(const Frame& frame) {
+  constexpr std::size_t kMostHeld = 64;
+  if (unevenness_.isNone()) return put_(frame);
+  if (held_.size() >= kMostHeld) return;
+  auto leaves = std::chrono::steady_clock::now() + unevenness_.delay(taken_++);
+  if (!held_.empty()) leaves = std::max(leaves, held_.back().leaves);
+  held_.push_back({leaves, frame});
+  if (held_.size() == 1) wait();
+}
+
+void UnevenFrames::wait() {
+  timer_.expires_at(held_.front().leaves);
+  timer_.async_wait([this](boost::system::error_code cancelled) {
+    if (cancelled || held_.empty()) return;
+    const Held next = std::move(held_.front());
+    held_.pop_front();
+    if (!held_.empty()) wait();
+    put_(next.frame);
+  });
+}
+
+}  // namespace toftwin::daemon
