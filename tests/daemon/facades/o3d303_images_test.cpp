@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a client of the O3D303 facade sets is seen in the images, here and natively.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <vector>
+
+#include "facade_testing.h"
+#include "o3d303_client.h"
+
+namespace toftwin::daemon {
+namespace {
+
+using namespace test;
+
+class O3d303Images : public RunningFacade {
+ protected:
+  O3d303Client camera() { return O3d303Client{xmlrpc_}; }
+};
+
+TEST_F(O3d303Images, TheTypeOfTheImagerSetsTheCamerasFrequenciesAndExposures) {
+  startO3d303("driver = 'sim'\nuri = 'sim:o3d303_binned'\nsamples_per_pixel = 1\nmax_surfaces = 1\n");
+  auto rpc = camera();
+  const auto setType = [&](const char* type) {
+    rpc.edit();
+    rpc.call(rpc.imager(), "changeType", {type});
+    rpc.call(rpc.session("edit/application/"), "save", {});
+    rpc.endSession();
+  };
+  setType("upto30m_moderate");
+  auto native = client();
+  auto frames = native.subscribe("cam", {});
+  ASSERT_TRUE(frames.ok()) << frames.error().message;
+  const auto frame = frames->next(kSoon);
+  ASSERT_TRUE(frame.ok()) << frame.error().message;
+  std::set<double> frequencies_mhz, exposures_us;
+  for (const Exposure& one : frame->moment.exposures) {
+    frequencies_mhz.insert(std::round(one.modulation.in(megahertz)));
+    exposures_us.insert(std::round(one.duration.in(microsecond)));
+  }
+  EXPECT_THAT(frequencies_mhz, testing::ElementsAre(29.0, 30.0));
+  EXPECT_THAT(exposures_us, testing::ElementsAre(25.0, 1000.0)) << "a fortieth, as the camera has it";
+  PcicClient watches{rpc.pcicPort()};
+  EXPECT_EQ(watches.setSchema({o3d303::kConfidenceBlob}), "*");
+  const auto sent = watches.frame();
+  const auto confidence = sent.find(o3d303::ChunkType::Confidence)->data;
+  const auto isOfLongest = [](std::byte one) { return (std::to_integer<unsigned>(one) & 0x30U) == 0x30U; };
+  EXPECT_GT(std::ranges::count_if(confidence, isOfLongest), 176 * 132 / 2)
+      << "most pixels are of the longer one";
+  setType("under5m_low");
+  const auto details = native.describe("cam");
+  for (const Parameter& one : details->parameters) {
+    if (one.name == "frequencies" || one.name == "exposures") {
+      EXPECT_EQ(one.value, 1.0) << one.name;
+    }
+  }
+}
+
+/// How much a pixel differs from the next one in its row, and from itself a frame later: medians over the
+/// image.
+struct Roughness {
+  double in_image_mm, in_time_mm;
+};
+Roughness roughnessOf(const Frame& first, const Frame& second) {
+  const auto a = first.find(PlaneKind::Range)->as<float>(), b = second.find(PlaneKind::Range)->as<float>();
+  std::vector<double> in_image, in_time;
+  for (std::size_t i = 0; i + 1 < a.size(); ++i) {
+    if (std::isfinite(a[i]) && std::isfinite(a[i + 1])) in_image.push_back(std::abs(1e3 * (a[i + 1] - a[i])));
+    if (std::isfinite(a[i]) && std::isfinite(b[i])) in_time.push_back(std::abs(1e3 * (b[i] - a[i])));
+  }
+  const auto medianOf = [](std::vector<double>& values) {
+    std::ranges::nth_element(values, values.begin() + std::ssize(values) / 2);
+    return values.at(values.size() / 2);
+  };
+  return {medianOf(in_image), medianOf(in_time)};
+}
+
+TEST_F(O3d303Images, FiltersSmoothTheSimulatedCamerasImagesForAll) {
+  startO3d303(kSmallSim);
+  auto rpc = camera();
+  const auto roughness = [&] {
+    auto native = client();
+    auto frames = native.subscribe("cam", {});
+    Frame last;
+    for (int i = 0;; ++i) {
+      auto next = frames->next(kSoon);
+      EXPECT_TRUE(next.ok());
+      if (!next) return Roughness{};
+      if (i == 7) return roughnessOf(last, *next);  // the filter over frames is full
+      last = *std::move(next);
+    }
+  };
+  const auto set = [&](const std::string& object, const char* name, const char* value) {
+    rpc.edit();
+    rpc.call(object, "setParameter", {name, value});
+    rpc.call(rpc.session("edit/application/"), "save", {});
+    rpc.endSession();
+  };
+  const Roughness plain = roughness();
+  set(rpc.imager(), "SpatialFilterType", "2");
+  const Roughness mean = roughness();
+  // Means of nine share six of them with their neighbour's: differences have sqrt(6/81 / 2) = 0.19 of the
+  // noise.
+  EXPECT_LT(mean.in_image_mm, 0.5 * plain.in_image_mm);
+  EXPECT_LT(mean.in_time_mm, 0.5 * plain.in_time_mm) << "1/3 of the noise";
+  set(rpc.imager(), "SpatialFilterType", "0");
+  set(rpc.imager(), "TemporalFilterType", "1");
+  set(rpc.imager() + "temporalfilter", "NumberOfImages", "4");
+  const Roughness running = roughness();
+  EXPECT_LT(running.in_time_mm, 0.5 * plain.in_time_mm) << "means of four share three: 1/4";
+  set(rpc.imager(), "TemporalFilterType", "0");
+  EXPECT_NEAR(roughness().in_time_mm, plain.in_time_mm, 0.1 * plain.in_time_mm) << "off again";
+}
+
+TEST_F(O3d303Images, AHigherMinimumAmplitudeLeavesNoPixelValid) {
+  startO3d303(kSmallSim);
+  auto rpc = camera();
+  rpc.edit();
+  rpc.call(rpc.imager(), "setParameter", {"MinimumAmplitude", "65535"});
+  rpc.call(rpc.session("edit/application/"), "save", {});
+  rpc.endSession();
+  auto native = client();
+  auto frames = native.subscribe("cam", {});
+  const auto frame = frames->next(kSoon);
+  ASSERT_TRUE(frame.ok());
+  const auto range = frame->find(PlaneKind::Range)->as<float>();
+  const auto flags = frame->find(PlaneKind::Flags)->as<std::uint8_t>();
+  EXPECT_TRUE(std::ranges::none_of(range, [](float r) { return std::isfinite(r); }));
+  const auto isDark = [](std::uint8_t f) {
+    return (f & static_cast<unsigned>(PixelFlag::LowAmplitude)) != 0;
+  };
+  EXPECT_GT(std::ranges::count_if(flags, isDark), 176 * 132 / 2);
+}
+
+TEST_F(O3d303Images, WhatIsClippedIsInvalidInItsImagesAndSaysWhy) {
+  startO3d303(kSmallSim);
+  auto rpc = camera();
+  rpc.edit();
+  rpc.call(rpc.imager(), "setParameter", {"ClippingLeft", "88"});
+  rpc.call(rpc.imager(), "setParameter", {"ClippingCuboid", R"({"ZMax": 0})"});
+  rpc.call(rpc.session("edit/application/"), "save", {});
+  rpc.endSession();
+  PcicClient watches{rpc.pcicPort()};
+  EXPECT_EQ(watches.setSchema({o3d303::kDistanceBlob, o3d303::kConfidenceBlob, o3d303::kZBlob}), "*");
+  const auto frame = watches.frame();
+  const auto distance = frame.find(o3d303::ChunkType::RadialDistance)->data;
+  const auto confidence = frame.find(o3d303::ChunkType::Confidence)->data;
+  const auto z = frame.find(o3d303::ChunkType::Z)->data;
+  int clipped = 0, left = 0;
+  for (std::size_t i = 0; i < confidence.size(); ++i) {
+    const bool is_clipped = (std::to_integer<unsigned>(confidence[i]) & 0x40U) != 0;
+    const bool has_distance = distance[2 * i] != std::byte{0} || distance[2 * i + 1] != std::byte{0};
+    const bool is_above = z[2 * i + 1] == std::byte{0} && z[2 * i] != std::byte{0};  // up to 255 mm, or more:
+    EXPECT_FALSE(is_clipped && has_distance);
+    EXPECT_TRUE(is_clipped || i % 176 >= 88);
+    EXPECT_FALSE(has_distance && is_above);
+    clipped += is_clipped ? 1 : 0;
+    left += has_distance ? 1 : 0;
+  }
+  EXPECT_GT(left, 2000) << "a quarter of the image or so";
+  EXPECT_GT(clipped, 176 * 132 / 2);
+}
+
+TEST_F(O3d303Images, ASetClockIsThatOfTheFrames) {
+  startO3d303(kPattern);
+  auto rpc = camera();
+  rpc.beginSession();
+  rpc.call(rpc.session(""), "setOperatingMode", {1});
+  rpc.call(rpc.session("edit/device/time/"), "setCurrentTime", {1'600'000'000});
+  rpc.endSession();
+  PcicClient watches{rpc.pcicPort()};
+  const auto time = watches.frame().chunks.at(0).header.time;
+  ASSERT_TRUE(time.has_value());
+  EXPECT_NEAR(static_cast<double>(time->seconds), 1.6e9, 60.0);
+}
+
+}  // namespace
+}  // namespace toftwin::daemon
