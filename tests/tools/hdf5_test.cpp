@@ -12,6 +12,7 @@
 #include "program.h"
 #include "tests/record/record_testing.h"
 #include "tools/cli/export/hdf5_id.h"
+#include "tools/cli/export/hdf5_table.h"
 
 namespace toftwin::cli {
 namespace {
@@ -248,6 +249,24 @@ TEST_F(Hdf5, WithoutItsNameNothingIsLeft) {
   EXPECT_TRUE(std::filesystem::is_empty(file_.parent_path()));
   EXPECT_THAT(Hdf5File::create("/no/such/folder/a.h5", frameAt(0), {}).error().message,
               HasSubstr("is there such a folder"));
+}
+
+TEST_F(Hdf5, ATableIsReadByH5py) {
+  const std::string python = "/usr/bin/python3";
+  if (runShell(python + " -c 'import h5py'").status != 0) GTEST_SKIP() << "there is no h5py (python3-h5py)";
+  const std::vector<TableColumn> columns{{"/run", std::vector<std::int64_t>{7, -8}},
+                                         {"/of/value", std::vector<double>{0.1, std::nan("")}},
+                                         {"/of/name", std::vector<std::string>{"", "B \u2212 A, \"x\""}}};
+  ASSERT_TRUE(writeHdf5Table(file_, columns, {{"content", "numbers"}}));
+  const Ran read = runShell(python + " -c \"import h5py; f = h5py.File('" + file_.string() +
+                            "'); print(f['run'][:].tolist(), f['of/value'][:].tolist(), [t.decode() for t in f['of/name']], "
+                            "f.attrs['content'])\"");
+  EXPECT_EQ(read.out, "[7, -8] [0.1, nan] ['', 'B \u2212 A, \"x\"'] b'numbers'\n") << read.err;
+  // Nothing half-written stays, and what was there does.
+  EXPECT_THAT(writeHdf5Table("/no/such/folder/a.h5", columns, {}).error().message, HasSubstr("is there such a folder"));
+  EXPECT_FALSE(writeHdf5Table(file_, {{"/a", std::vector<double>{}}, {"/a", std::vector<double>{}}}, {}));
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator{file_.parent_path()}, {}), 1);
+  EXPECT_EQ(runShell("h5dump -d /run '" + file_.string() + "'").status, 0);
 }
 
 }  // namespace

@@ -5,16 +5,19 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <type_traits>
+#include <vector>
 
 #include "calib/plan/run_log.h"
 #include "calib/plan/trend.h"
+#include "tools/cli/export/hdf5_table.h"
 #include "tools/cli/log.h"
 
 namespace toftwin::cli {
 namespace {
 
 struct Options {
-  std::string file, camera, characteristic, number;
+  std::string file, camera, characteristic, number, hdf5;
   bool csv = false;
 };
 
@@ -31,26 +34,76 @@ Result<plan::RunLog> openExisting(const std::string& file) {
                fmt::format("{}: there is no such log; `toftwin compare RUN --log {}` makes it", file, file)};
 }
 
+/// All numbers of all runs.
+using Numbers = std::vector<plan::LoggedTrait>;
+
+void printCsv(const Numbers& all) {
+  fmt::print(
+      "run,began,judged,plan,locked,camera_a,camera_b,of,characteristic,detail,number,unit,value,low,high,n,"
+      "folder\n");
+  for (const auto& [run, one] : all) {
+    fmt::print("{},{},{},{},{},{},{},{},{},{},{},{},{:.9g},{:.9g},{:.9g},{},{}\n", run.id, run.began, run.judged,
+               quoted(run.plan), run.is_locked ? 1 : 0, quoted(run.camera_a), quoted(run.camera_b), quoted(one.of),
+               quoted(one.what), quoted(one.detail), quoted(one.trait.name), quoted(one.trait.unit),
+               one.trait.value, one.trait.low, one.trait.high, one.trait.n, quoted(run.folder));
+  }
+}
+
+template <class Number>
+auto columnOf(const Numbers& all, Number number) {
+  std::vector<std::decay_t<decltype(number(all.front().run, all.front().trait))>> column;
+  for (const auto& [run, one] : all) column.push_back(number(run, one));
+  return column;
+}
+
+/// The columns of the CSV, each a dataset.
+Result<Exit> writeHdf5(const Numbers& all, const Options& options) {
+  using plan::LoggedRun, plan::RunTrait, std::int64_t;
+  const auto texts = [&](auto number) { return columnOf(all, [&](auto&... of) -> std::string { return number(of...); }); };
+  const auto doubles = [&](double compare::Trait::*number) {
+    return columnOf(all, [&](const LoggedRun&, const RunTrait& one) { return one.trait.*number; });
+  };
+  const auto runs = [&](std::string LoggedRun::*text) {
+    return texts([&](const LoggedRun& run, const RunTrait&) { return run.*text; });
+  };
+  const std::vector<TableColumn> columns{
+      {"/run", columnOf(all, [](const LoggedRun& run, const RunTrait&) { return int64_t{run.id}; })},
+      {"/began", runs(&LoggedRun::began)},
+      {"/judged", runs(&LoggedRun::judged)},
+      {"/plan", runs(&LoggedRun::plan)},
+      {"/locked", columnOf(all, [](const LoggedRun& run, const RunTrait&) { return int64_t{run.is_locked}; })},
+      {"/camera_a", runs(&LoggedRun::camera_a)},
+      {"/camera_b", runs(&LoggedRun::camera_b)},
+      {"/of", texts([](const LoggedRun&, const RunTrait& one) { return one.of; })},
+      {"/characteristic", texts([](const LoggedRun&, const RunTrait& one) { return one.what; })},
+      {"/detail", texts([](const LoggedRun&, const RunTrait& one) { return one.detail; })},
+      {"/number", texts([](const LoggedRun&, const RunTrait& one) { return one.trait.name; })},
+      {"/unit", texts([](const LoggedRun&, const RunTrait& one) { return one.trait.unit; })},
+      {"/value", doubles(&compare::Trait::value)},
+      {"/low", doubles(&compare::Trait::low)},
+      {"/high", doubles(&compare::Trait::high)},
+      {"/n", columnOf(all, [](const LoggedRun&, const RunTrait& one) { return static_cast<int64_t>(one.trait.n); })},
+      {"/folder", runs(&LoggedRun::folder)}};
+  auto written = writeHdf5Table(options.hdf5, columns,
+                                {{"content", "a row for each number of each run; 95 % intervals; of a log of toftwin compare"},
+                                 {"software", fmt::format("toftwin {}", TOFTWIN_VERSION)}});
+  if (!written) return written.error();
+  fmt::print("{}: {} numbers\n", options.hdf5, all.size());
+  return Exit::Ok;
+}
+
 Result<Exit> showLog(const Options& options) {
   auto log = openExisting(options.file);
   if (!log) return log.error();
-  const auto runs = log->runs();
-  if (!runs) return runs.error();
-  if (options.csv) {
+  if (options.csv || !options.hdf5.empty()) {
     const auto all = log->traits("", "", "");
     if (!all) return all.error();
-    fmt::print(
-        "run,began,judged,plan,locked,camera_a,camera_b,of,characteristic,detail,number,unit,value,low,high,n,"
-        "folder\n");
-    for (const auto& [run, one] : *all) {
-      fmt::print("{},{},{},{},{},{},{},{},{},{},{},{},{:.9g},{:.9g},{:.9g},{},{}\n", run.id, run.began,
-                 run.judged, quoted(run.plan), run.is_locked ? 1 : 0, quoted(run.camera_a),
-                 quoted(run.camera_b), quoted(one.of), quoted(one.what), quoted(one.detail), quoted(one.trait.name),
-                 quoted(one.trait.unit), one.trait.value, one.trait.low, one.trait.high, one.trait.n,
-                 quoted(run.folder));
-    }
+    if (!options.hdf5.empty()) return writeHdf5(*all, options);
+    printCsv(*all);
     return Exit::Ok;
   }
+  const auto runs = log->runs();
+  if (!runs) return runs.error();
   fmt::print("{:>4}  {:<20}  {:<14}  {:<28}  {:<28}  {}\n", "run", "began", "plan", "A", "B", "folder");
   for (const plan::LoggedRun& run : *runs)
     fmt::print("{:>4}  {:<20}  {:<14}  {:<28}  {:<28}  {}{}\n", run.id, run.began, run.plan, run.camera_a,
@@ -96,6 +149,7 @@ Run addLog(Arguments& args) {
   const auto options = std::make_shared<Options>();
   args.option("FILE", options->file, "log that toftwin compare RUN --log wrote").required();
   args.flag("--csv", options->csv, "all numbers of all runs as CSV");
+  args.option("--hdf5", options->hdf5, "write all numbers of all runs into this HDF5 file");
   return [options] { return showLog(*options); };
 }
 
@@ -115,7 +169,8 @@ Command logCommand() {
   return {"log", "runs that were judged, and all their numbers",
           "  toftwin compare run -o report --log lab.sqlite\n"
           "  toftwin log lab.sqlite\n"
-          "  toftwin log lab.sqlite --csv > numbers.csv\n",
+          "  toftwin log lab.sqlite --csv > numbers.csv\n"
+          "  toftwin log lab.sqlite --hdf5 numbers.h5\n",
           addLog};
 }
 

@@ -7,13 +7,13 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstdlib>
 #include <cstring>
 #include <optional>
 
 #include "tools/cli/export/atomic_file.h"
 #include "tools/cli/export/hdf5_columns.h"
 #include "tools/cli/export/hdf5_id.h"
+#include "tools/cli/export/hdf5_library.h"
 
 namespace toftwin::cli {
 namespace {
@@ -21,17 +21,6 @@ namespace {
 constexpr const char* kChecksum = "/frames/crc32";
 constexpr hsize_t kRowsPerChunk = 64;  // of columns of a few numbers
 constexpr unsigned kDeflateLevel = 1;  // higher ones gain some per cent and take several times as long
-
-/// The library prints nothing by itself, and at the end of the program it does not touch files that could
-/// not be closed.
-void prepareLibrary() {
-  static const bool kDone = [] {
-    H5dont_atexit();
-    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-    return true;
-  }();
-  static_cast<void>(kDone);
-}
 
 hid_t typeOf(CellType type) {
   switch (type) {
@@ -51,41 +40,6 @@ hid_t typeOf(CellType type) {
       return H5T_IEEE_F64LE;
   }
   return H5I_INVALID_HID;
-}
-
-/// What the library's stack of errors says: the innermost line, and the system's number of it, or 0.
-struct LibraryError {
-  std::string text = "no reason given";
-  int number = 0;
-};
-
-LibraryError libraryError() {
-  LibraryError error;
-  const auto look = [](unsigned place, const H5E_error2_t* line, void* out) -> herr_t {
-    auto& found = *static_cast<LibraryError*>(out);
-    if (line->desc == nullptr) return 0;
-    if (place == 0) found.text = line->desc;
-    if (const char* number = std::strstr(line->desc, "errno = "); number != nullptr && found.number == 0)
-      found.number = std::atoi(number + std::strlen("errno = "));
-    return 0;
-  };
-  H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, look, &error);
-  return error;
-}
-
-Error cannot(const std::filesystem::path& file, const char* doing) {
-  const LibraryError why = libraryError();
-  if (why.number != 0) return cannotWrite(file, why.number);
-  return {Error::Code::Internal, fmt::format("{}: HDF5 cannot {}: {}", file.string(), doing, why.text)};
-}
-
-bool setText(hid_t of, const std::string& name, const std::string& text) {
-  const Hdf5Id type{H5Tcopy(H5T_C_S1), H5Tclose}, space{H5Screate(H5S_SCALAR), H5Sclose};
-  H5Tset_cset(type.get(), H5T_CSET_UTF8);
-  H5Tset_size(type.get(), text.size() + 1);  // an empty text takes one byte
-  const Hdf5Id attribute{H5Acreate2(of, name.c_str(), type.get(), space.get(), H5P_DEFAULT, H5P_DEFAULT),
-                         H5Aclose};
-  return attribute && H5Awrite(attribute.get(), type.get(), text.c_str()) >= 0;
 }
 
 bool setNumbers(hid_t of, const std::string& name, const std::vector<double>& numbers) {
@@ -201,7 +155,7 @@ Result<Old> openOld(const std::filesystem::path& file, const std::vector<Column>
                  fmt::format("{}: {}, so none of its frames can be kept; --overwrite begins anew",
                              file.string(), what)};
   };
-  if (!old.file) return damaged(fmt::format("damaged, or no HDF5 file ({})", libraryError().text));
+  if (!old.file) return damaged(fmt::format("damaged, or no HDF5 file ({})", hdf5Error().text));
   std::uint64_t fewest = UINT64_MAX;
   for (const Column& column : columns) {
     Hdf5Id& set = old.sets.emplace_back(H5Dopen2(old.file.get(), column.path.c_str(), H5P_DEFAULT), H5Dclose);
@@ -231,7 +185,7 @@ struct Hdf5File::State {
     const Hdf5Id access{H5Pcreate(H5P_FILE_ACCESS), H5Pclose};
     H5Pset_libver_bounds(access.get(), H5F_LIBVER_V110, H5F_LIBVER_V110);  // SWMR
     file = {H5Fcreate(beside.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access.get()), H5Fclose};
-    if (!file) return cannot(path, "create the file");
+    if (!file) return cannotHdf5(path, "create the file");
     bool all = true;
     for (const auto& [name, text] : textsOf(like)) all = all && setText(file.get(), name, text);
     for (const auto& [name, text] : options.about) all = all && setText(file.get(), name, text);
@@ -239,7 +193,7 @@ struct Hdf5File::State {
     for (const char* group : {"/planes", "/frames"})
       all = all && Hdf5Id{H5Gcreate2(file.get(), group, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose};
     for (const Column& column : columns) all = all && sets.emplace_back(createDataset(file.get(), column));
-    return all ? Result<>{} : cannot(path, "lay the file out");
+    return all ? Result<>{} : cannotHdf5(path, "lay the file out");
   }
 
   Result<> write(const Row& row) {
@@ -252,7 +206,7 @@ struct Hdf5File::State {
 
   /// As if the program had been killed here: the file is whole up to its last flush.
   Error failed(const char* doing) {
-    Error error = cannot(path, doing);
+    Error error = cannotHdf5(path, doing);
     for (Hdf5Id& set : sets) set.abandon();
     sets.clear();
     file.abandon();
@@ -268,7 +222,7 @@ std::uint64_t Hdf5File::frames() const { return state_->frames; }
 
 Result<Hdf5File> Hdf5File::create(const std::filesystem::path& file, const Frame& like,
                                   const Hdf5Options& options) {
-  prepareLibrary();
+  prepareHdf5();
   auto columns = columnsFor(like, options.planes);
   if (!columns) return columns.error();
   columns->push_back({kChecksum,
