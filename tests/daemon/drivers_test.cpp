@@ -30,7 +30,10 @@ std::vector<Listed> everyCamera() {
 class EveryCamera : public testing::TestWithParam<Listed> {};
 
 TEST_P(EveryCamera, IsCompliant) {
-  for (const Finding& finding : checkCompliance(listedCamera(*GetParam().driver, GetParam().uri))) {
+  Candidate camera = listedCamera(*GetParam().driver, GetParam().uri);
+  // How much light is gathered is not what is checked, and would be most of the test's time.
+  if (camera.driver->name == "sim") camera.keys += "\nsamples_per_pixel = 1";
+  for (const Finding& finding : checkCompliance(camera)) {
     EXPECT_NE(finding.outcome, Finding::Outcome::Failed)
         << finding.check << ", because " << finding.because << "\n  " << finding.detail;
   }

@@ -8,7 +8,7 @@ target_link_options(fuzz_o3d303 PRIVATE -fsanitize=fuzzer)
 add_dependencies(fuzzers fuzz_o3d303)
 file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/fuzz_o3d303_corpus)
 add_test(NAME fuzz_o3d303
-         COMMAND fuzz_o3d303 -max_total_time=10 -max_len=4096 -print_final_stats=1
+         COMMAND fuzz_o3d303 -max_total_time=3 -max_len=4096 -print_final_stats=1
                  ${CMAKE_BINARY_DIR}/fuzz_o3d303_corpus ${folder}/o3d303_corpus)
 set_tests_properties(fuzz_o3d303 PROPERTIES TIMEOUT 120)
 
@@ -22,7 +22,7 @@ target_link_options(fuzz_kinect2 PRIVATE -fsanitize=fuzzer)
 add_dependencies(fuzzers fuzz_kinect2)
 file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/fuzz_kinect2_corpus)
 add_test(NAME fuzz_kinect2
-         COMMAND fuzz_kinect2 -max_total_time=10 -max_len=512 -print_final_stats=1
+         COMMAND fuzz_kinect2 -max_total_time=3 -max_len=512 -print_final_stats=1
                  ${CMAKE_BINARY_DIR}/fuzz_kinect2_corpus)
 set_tests_properties(fuzz_kinect2 PROPERTIES TIMEOUT 120)
 
@@ -36,6 +36,6 @@ target_link_options(fuzz_aravis PRIVATE -fsanitize=fuzzer)
 add_dependencies(fuzzers fuzz_aravis)
 file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/fuzz_aravis_corpus)
 add_test(NAME fuzz_aravis
-         COMMAND fuzz_aravis -max_total_time=10 -max_len=512 -print_final_stats=1
+         COMMAND fuzz_aravis -max_total_time=3 -max_len=512 -print_final_stats=1
                  ${CMAKE_BINARY_DIR}/fuzz_aravis_corpus)
 set_tests_properties(fuzz_aravis PROPERTIES TIMEOUT 120)

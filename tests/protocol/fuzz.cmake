@@ -10,6 +10,6 @@ target_link_options(fuzz_decode PRIVATE -fsanitize=fuzzer)
 add_dependencies(fuzzers fuzz_decode)
 file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/fuzz_corpus)
 add_test(NAME fuzz_decode
-         COMMAND fuzz_decode -max_total_time=10 -max_len=8192 -print_final_stats=1
+         COMMAND fuzz_decode -max_total_time=3 -max_len=8192 -print_final_stats=1
                  ${CMAKE_BINARY_DIR}/fuzz_corpus ${folder}/conformance)
 set_tests_properties(fuzz_decode PROPERTIES TIMEOUT 120)

@@ -14,7 +14,7 @@ function(toftwin_fuzz_facade name)
   add_dependencies(fuzzers fuzz_${name}_facade)
   file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/fuzz_${name}_facade_corpus)
   add_test(NAME fuzz_${name}_facade
-           COMMAND fuzz_${name}_facade -max_total_time=10 -max_len=4096 -print_final_stats=1
+           COMMAND fuzz_${name}_facade -max_total_time=3 -max_len=4096 -print_final_stats=1
                    ${CMAKE_BINARY_DIR}/fuzz_${name}_facade_corpus ${folder}/${name}_facade_corpus)
   set_tests_properties(fuzz_${name}_facade PROPERTIES TIMEOUT 120)
 endfunction()
