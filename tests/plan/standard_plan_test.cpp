@@ -149,7 +149,8 @@ TEST_F(StandardPlan, TellsEveryCharacteristicOfBothCameras) {
   EXPECT_NEAR(value("A: lens scatter: veil"), kVeil, 0.01);
   EXPECT_NEAR(value("B: lens scatter: veil"), 0.0, 0.01);
   EXPECT_THAT(toftwin("log " + path("lab.sqlite")).out, testing::HasSubstr("standard"));
-  EXPECT_THAT(toftwin("log " + path("lab.sqlite") + " --hdf5 " + path("numbers.h5")).out, testing::HasSubstr(" numbers"));
+  EXPECT_THAT(toftwin("log " + path("lab.sqlite") + " --hdf5 " + path("numbers.h5")).out,
+              testing::HasSubstr(" numbers"));
   const Ran trend = toftwin("trend " + path("lab.sqlite") + " --camera cam --characteristic 'lens scatter'");
   EXPECT_THAT(trend.out, testing::AllOf(testing::HasSubstr("lens scatter: veil [1], A cam"),
                                         testing::HasSubstr("the first")));

@@ -258,12 +258,14 @@ TEST_F(Hdf5, ATableIsReadByH5py) {
                                          {"/of/value", std::vector<double>{0.1, std::nan("")}},
                                          {"/of/name", std::vector<std::string>{"", "B \u2212 A, \"x\""}}};
   ASSERT_TRUE(writeHdf5Table(file_, columns, {{"content", "numbers"}}));
-  const Ran read = runShell(python + " -c \"import h5py; f = h5py.File('" + file_.string() +
-                            "'); print(f['run'][:].tolist(), f['of/value'][:].tolist(), [t.decode() for t in f['of/name']], "
-                            "f.attrs['content'])\"");
+  const Ran read = runShell(
+      python + " -c \"import h5py; f = h5py.File('" + file_.string() +
+      "'); print(f['run'][:].tolist(), f['of/value'][:].tolist(), [t.decode() for t in f['of/name']], "
+      "f.attrs['content'])\"");
   EXPECT_EQ(read.out, "[7, -8] [0.1, nan] ['', 'B \u2212 A, \"x\"'] b'numbers'\n") << read.err;
   // Nothing half-written stays, and what was there does.
-  EXPECT_THAT(writeHdf5Table("/no/such/folder/a.h5", columns, {}).error().message, HasSubstr("is there such a folder"));
+  EXPECT_THAT(writeHdf5Table("/no/such/folder/a.h5", columns, {}).error().message,
+              HasSubstr("is there such a folder"));
   EXPECT_FALSE(writeHdf5Table(file_, {{"/a", std::vector<double>{}}, {"/a", std::vector<double>{}}}, {}));
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator{file_.parent_path()}, {}), 1);
   EXPECT_EQ(runShell("h5dump -d /run '" + file_.string() + "'").status, 0);

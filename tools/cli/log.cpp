@@ -42,10 +42,11 @@ void printCsv(const Numbers& all) {
       "run,began,judged,plan,locked,camera_a,camera_b,of,characteristic,detail,number,unit,value,low,high,n,"
       "folder\n");
   for (const auto& [run, one] : all) {
-    fmt::print("{},{},{},{},{},{},{},{},{},{},{},{},{:.9g},{:.9g},{:.9g},{},{}\n", run.id, run.began, run.judged,
-               quoted(run.plan), run.is_locked ? 1 : 0, quoted(run.camera_a), quoted(run.camera_b), quoted(one.of),
-               quoted(one.what), quoted(one.detail), quoted(one.trait.name), quoted(one.trait.unit),
-               one.trait.value, one.trait.low, one.trait.high, one.trait.n, quoted(run.folder));
+    fmt::print("{},{},{},{},{},{},{},{},{},{},{},{},{:.9g},{:.9g},{:.9g},{},{}\n", run.id, run.began,
+               run.judged, quoted(run.plan), run.is_locked ? 1 : 0, quoted(run.camera_a),
+               quoted(run.camera_b), quoted(one.of), quoted(one.what), quoted(one.detail),
+               quoted(one.trait.name), quoted(one.trait.unit), one.trait.value, one.trait.low, one.trait.high,
+               one.trait.n, quoted(run.folder));
   }
 }
 
@@ -59,7 +60,9 @@ auto columnOf(const Numbers& all, Number number) {
 /// The columns of the CSV, each a dataset.
 Result<Exit> writeHdf5(const Numbers& all, const Options& options) {
   using plan::LoggedRun, plan::RunTrait, std::int64_t;
-  const auto texts = [&](auto number) { return columnOf(all, [&](auto&... of) -> std::string { return number(of...); }); };
+  const auto texts = [&](auto number) {
+    return columnOf(all, [&](auto&... of) -> std::string { return number(of...); });
+  };
   const auto doubles = [&](double compare::Trait::*number) {
     return columnOf(all, [&](const LoggedRun&, const RunTrait& one) { return one.trait.*number; });
   };
@@ -71,7 +74,8 @@ Result<Exit> writeHdf5(const Numbers& all, const Options& options) {
       {"/began", runs(&LoggedRun::began)},
       {"/judged", runs(&LoggedRun::judged)},
       {"/plan", runs(&LoggedRun::plan)},
-      {"/locked", columnOf(all, [](const LoggedRun& run, const RunTrait&) { return int64_t{run.is_locked}; })},
+      {"/locked",
+       columnOf(all, [](const LoggedRun& run, const RunTrait&) { return int64_t{run.is_locked}; })},
       {"/camera_a", runs(&LoggedRun::camera_a)},
       {"/camera_b", runs(&LoggedRun::camera_b)},
       {"/of", texts([](const LoggedRun&, const RunTrait& one) { return one.of; })},
@@ -82,11 +86,13 @@ Result<Exit> writeHdf5(const Numbers& all, const Options& options) {
       {"/value", doubles(&compare::Trait::value)},
       {"/low", doubles(&compare::Trait::low)},
       {"/high", doubles(&compare::Trait::high)},
-      {"/n", columnOf(all, [](const LoggedRun&, const RunTrait& one) { return static_cast<int64_t>(one.trait.n); })},
+      {"/n", columnOf(all, [](const LoggedRun&,
+                              const RunTrait& one) { return static_cast<int64_t>(one.trait.n); })},
       {"/folder", runs(&LoggedRun::folder)}};
-  auto written = writeHdf5Table(options.hdf5, columns,
-                                {{"content", "a row for each number of each run; 95 % intervals; of a log of toftwin compare"},
-                                 {"software", fmt::format("toftwin {}", TOFTWIN_VERSION)}});
+  auto written = writeHdf5Table(
+      options.hdf5, columns,
+      {{"content", "a row for each number of each run; 95 % intervals; of a log of toftwin compare"},
+       {"software", fmt::format("toftwin {}", TOFTWIN_VERSION)}});
   if (!written) return written.error();
   fmt::print("{}: {} numbers\n", options.hdf5, all.size());
   return Exit::Ok;

@@ -9,8 +9,8 @@
 
 namespace toftwin::cli {
 
-/// Before anything else of the library: it prints nothing by itself then, and at the end of the program it does not
-/// touch files that could not be closed.
+/// Before anything else of the library: it prints nothing by itself then, and at the end of the program it
+/// does not touch files that could not be closed.
 void prepareHdf5();
 
 /// What the library's stack of errors says: the innermost line, and the system's number of it, or 0.

@@ -14,12 +14,16 @@
 namespace toftwin::cli {
 namespace {
 
-bool writeValues(hid_t file, const std::string& path, hid_t stored, hid_t held, std::size_t count, const void* values) {
+bool writeValues(hid_t file, const std::string& path, hid_t stored, hid_t held, std::size_t count,
+                 const void* values) {
   const hsize_t rows = count;
-  const Hdf5Id space{H5Screate_simple(1, &rows, nullptr), H5Sclose}, links{H5Pcreate(H5P_LINK_CREATE), H5Pclose};
+  const Hdf5Id space{H5Screate_simple(1, &rows, nullptr), H5Sclose},
+      links{H5Pcreate(H5P_LINK_CREATE), H5Pclose};
   H5Pset_create_intermediate_group(links.get(), 1);
-  Hdf5Id set{H5Dcreate2(file, path.c_str(), stored, space.get(), links.get(), H5P_DEFAULT, H5P_DEFAULT), H5Dclose};
-  return set && (count == 0 || H5Dwrite(set.get(), held, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0) && set.close();
+  Hdf5Id set{H5Dcreate2(file, path.c_str(), stored, space.get(), links.get(), H5P_DEFAULT, H5P_DEFAULT),
+             H5Dclose};
+  return set && (count == 0 || H5Dwrite(set.get(), held, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0) &&
+         set.close();
 }
 
 struct Write {
@@ -52,7 +56,8 @@ Result<> writeHdf5Table(const std::filesystem::path& file, const std::vector<Tab
   if (!made) return cannotHdf5(file, "create the file");
   bool all = true;
   for (const auto& [name, text] : about) all = all && setText(made.get(), name, text);
-  for (const TableColumn& column : columns) all = all && std::visit(Write{made.get(), column.path}, column.values);
+  for (const TableColumn& column : columns)
+    all = all && std::visit(Write{made.get(), column.path}, column.values);
   if (!all || !made.close()) {
     Error error = cannotHdf5(file, "write the table");
     ::unlink(beside.c_str());

@@ -18,8 +18,8 @@ struct TableColumn {
   std::variant<std::vector<double>, std::vector<std::int64_t>, std::vector<std::string>> values;
 };
 
-/// Writes an HDF5 file, whole or not at all: numbers of 64 bits, texts in UTF-8 of variable length; `about` as
-/// attributes of the file. Errors as of files.
+/// Writes an HDF5 file, whole or not at all: numbers of 64 bits, texts in UTF-8 of variable length; `about`
+/// as attributes of the file. Errors as of files.
 Result<> writeHdf5Table(const std::filesystem::path& file, const std::vector<TableColumn>& columns,
                         const std::vector<std::pair<std::string, std::string>>& about);
 
