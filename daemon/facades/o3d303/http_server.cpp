@@ -17,7 +17,7 @@ namespace http = boost::beast::http;
 using boost::asio::ip::tcp;
 using boost::system::error_code;
 
-constexpr std::size_t kMostConnections = 16;
+constexpr std::size_t kMostHttpConnections = 16;
 constexpr std::uint64_t kLongestBody = 1 << 20;
 constexpr std::uint32_t kLongestHeader = 8192;
 constexpr std::chrono::seconds kPatience{30};
@@ -109,7 +109,7 @@ void HttpServer::setOpen(bool is_open) {
 }
 
 void HttpServer::take(tcp::socket socket) {
-  if (!is_open_ || connections_.size() >= kMostConnections) return;
+  if (!is_open_ || connections_.size() >= kMostHttpConnections) return;
   auto connection = std::make_shared<Connection>(*this, std::move(socket));
   connections_.insert(connection);
   connection->read();

@@ -21,7 +21,7 @@ using boost::system::error_code;
 using toftwin::o3d303::Bytes;
 using toftwin::o3d303::Schema;
 
-constexpr std::size_t kMostConnections = 16;
+constexpr std::size_t kMostPcicConnections = 16;
 constexpr std::size_t kLongestCommand = 128 << 10;
 constexpr std::size_t kMostFramesWaiting = 3;     ///< for one connection; more are lost
 constexpr std::size_t kMostMessagesWaiting = 64;  ///< one that asks and never reads is closed
@@ -161,7 +161,7 @@ void PcicServer::setOpen(bool is_open) {
 
 void PcicServer::take(tcp::socket socket) {
   if (!is_open_) return;
-  if (connections_.size() >= kMostConnections) return tellError(PcicError::kTooManyConnections);
+  if (connections_.size() >= kMostPcicConnections) return tellError(PcicError::kTooManyConnections);
   auto connection = std::make_shared<Connection>(*this, std::move(socket));
   connections_.push_back(connection);
   hooks_.connections(connections_.size());

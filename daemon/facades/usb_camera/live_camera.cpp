@@ -12,7 +12,7 @@
 namespace toftwin::daemon::usb_camera {
 namespace {
 
-constexpr double kExposureUnit_us = 100.0, kUnitsPerSecond = 1e7;  // of 100 ns
+constexpr double kExposureUnit_us = 100.0;
 constexpr std::int64_t kTick_ns = 1'000'000'000 / kClockHz;
 constexpr double kMost32 = 4'294'967'295.0, kMost16 = 65'535.0;
 
@@ -49,7 +49,7 @@ std::optional<ControlRange> rangeOf(const Parameter* parameter, double unit, dou
                       wholeOf(*parameter->value / unit, min, max)};
 }
 
-std::uint32_t intervalOf(double rate_hz) { return wholeOf(kUnitsPerSecond / rate_hz, 1.0, kMost32); }
+std::uint32_t intervalOf(double rate_hz) { return wholeOf(kIntervalUnitsPerSecond / rate_hz, 1.0, kMost32); }
 
 Intervals intervalsOf(const wire::SourceDescription& description) {
   Intervals intervals;
@@ -151,7 +151,7 @@ Answer LiveCamera::setInterval(std::uint32_t interval_100ns) {
   if (names_.frame_rate.empty()) return {};
   const auto rate_hz = hooks_.parameter(names_.frame_rate);
   if (rate_hz && intervalOf(*rate_hz) == interval_100ns) return {};
-  const double wanted_hz = kUnitsPerSecond / std::max(interval_100ns, 1U);
+  const double wanted_hz = kIntervalUnitsPerSecond / std::max(interval_100ns, 1U);
   return setLater(names_.frame_rate, std::max(rate_bounds_.min, std::min(rate_bounds_.max, wanted_hz)));
 }
 

@@ -14,7 +14,6 @@ constexpr unsigned kClassInterface = USB_DT_CS_INTERFACE, kVersion = 0x0110;
 constexpr unsigned kHighBulkPacket = 512, kIsochronousPacket = 1024;
 constexpr unsigned kHighPackets = 3, kSuperPackets = 12;  // in a microframe: 24 and 98 MB/s
 constexpr std::uint32_t kBulkPayload = 16384;  // a transfer of uvcvideo has 32 packets of at least 512 bytes
-constexpr double kUnitsPerSecond = 1e7;        // of 100 ns
 
 bool isSuper(const UvcLayout& layout) { return layout.speed == UsbSpeed::Super; }
 unsigned isochronousPackets(const UvcLayout& layout) {
@@ -77,7 +76,7 @@ Bytes controlInterface(const UvcLayout& layout) {
 }
 
 std::uint32_t bitRateOf(const UvcLayout::Stream& stream, std::uint32_t interval_100ns) {
-  const double rate = 8.0 * stream.pictureBytes() * kUnitsPerSecond / std::max(interval_100ns, 1U);
+  const double rate = 8.0 * stream.pictureBytes() * kIntervalUnitsPerSecond / std::max(interval_100ns, 1U);
   return static_cast<std::uint32_t>(
       std::min(rate, static_cast<double>(std::numeric_limits<std::uint32_t>::max())));
 }

@@ -44,6 +44,7 @@ struct UvcLayout {
 };
 
 constexpr std::uint32_t kClockHz = 1'000'000;  ///< of the times in payloads' headers
+constexpr double kIntervalUnitsPerSecond = 1e7;  ///< frame intervals are in units of 100 ns
 constexpr unsigned kFirstStreaming = 1;        ///< number of the first stream's interface
 constexpr unsigned kSensor = 1, kProcessing = 2, kFirstOutput = 3;  ///< entities within the camera
 
