@@ -83,7 +83,7 @@ Result<CsvTable> parseCsv(std::string_view text, const std::filesystem::path& na
     text.remove_prefix(std::min(end + 1, text.size()));
     ++number;
     if (trimmed(line).empty() || line.front() == '#') continue;
-    if (table.header.empty()) separator = separatorOf(line);
+    if (table.header.empty()) table.separator = separator = separatorOf(line);
     auto fields = fieldsOf(line, separator);
     if (!fields) return malformed(name, number, "a quote is opened and not closed on the same line");
     if (table.header.empty()) {

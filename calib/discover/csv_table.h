@@ -13,6 +13,7 @@ namespace toftwin::discover {
 
 /// A text table as it stands in the file.
 struct CsvTable {
+  char separator = ',';
   std::vector<std::string> header{};
   std::vector<std::vector<std::string>> columns{};  ///< of text, without blanks around it
   std::vector<std::size_t> line{};                  ///< of the file, for each row

@@ -2,9 +2,9 @@
 #include "calib/discover/table_data.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <map>
 #include <optional>
 #include <random>
@@ -15,6 +15,7 @@
 #include <fmt/format.h>
 
 #include "calib/discover/headers.h"
+#include "calib/discover/table_field.h"
 
 namespace toftwin::discover {
 namespace {
@@ -38,33 +39,46 @@ class NamedColumns {
   [[nodiscard]] const std::vector<std::string>& text(const std::string& name) const {
     return table_.columns[*find(name)];
   }
-  /// NaN where a field is empty or says nan.
+  /// NaN where a field says that there is none. Times become seconds since the first of them.
   [[nodiscard]] Result<std::vector<double>> numbers(const std::string& name) const {
     const auto at = find(name);
     if (!at) return missing(name);
+    const bool is_time = isTime(name);
     std::vector<double> values;
     for (std::size_t row = 0; row < table_.rows(); ++row) {
-      const auto value = toNumber(table_.columns[*at][row]);
+      const std::string& field = table_.columns[*at][row];
+      const auto number = toNumber(field), value = number || !is_time ? number : secondsIn(field);
       if (!value) {
         return Error{Error::Code::Malformed,
                      fmt::format("{}:{}: \"{}\" in column \"{}\" is not a number", file_.string(),
-                                 table_.line[row], table_.columns[*at][row].substr(0, 40), name)};
+                                 table_.line[row], field.substr(0, 40), name)};
       }
       values.push_back(*value);
     }
+    if (is_time) {
+      double first = std::numeric_limits<double>::infinity();
+      for (const double value : values) first = std::fmin(first, value);
+      for (double& value : values) value -= first;
+    }
     return values;
   }
-  static std::optional<double> toNumber(std::string_view field) {
-    if (field.empty() || field == "nan" || field == "NaN" || field == "NA") return std::nan("");
-    if (field.front() == '+') field.remove_prefix(1);
-    double value = 0.0;
-    const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
-    if (error != std::errc{} || end != field.data() + field.size()) return std::nullopt;
-    // Squares of what is larger overflow before anything can be said about it.
-    return std::isfinite(value) && std::abs(value) < 1e100 ? value : std::nan("");
+  [[nodiscard]] std::optional<double> toNumber(std::string_view field) const {
+    return numberIn(field, table_.separator != ',');
   }
   [[nodiscard]] bool isText(const std::string& name) const {
-    return std::ranges::any_of(text(name), [](const std::string& field) { return !toNumber(field); });
+    return !isTime(name) &&
+           std::ranges::any_of(text(name), [&](const std::string& field) { return !toNumber(field); });
+  }
+  /// Times of day or dates, but for fields that say nothing.
+  [[nodiscard]] bool isTime(const std::string& name) const {
+    bool has_any = false;
+    for (const std::string& field : text(name)) {
+      if (secondsIn(field))
+        has_any = true;
+      else if (const auto value = toNumber(field); !value || !std::isnan(*value))
+        return false;
+    }
+    return has_any;
   }
 
  private:
@@ -130,6 +144,7 @@ Result<> readCovariate(const NamedColumns& columns, const std::string& name, Map
     auto values = columns.numbers(name);
     if (!values) return values.error();
     covariate.values = *std::move(values);
+    if (said == MapNature::Guessed && columns.isTime(name)) covariate.nature = Nature::Time;
   }
   data.covariates.push_back(std::move(covariate));
   return {};

@@ -80,19 +80,22 @@ std::string LearnedRange::problem() const {
   if ((and_over == Over::Nothing) != and_knots.empty())
     return "has and_over without and_knots, or and_knots without and_over";
   const std::size_t needed = knots.size() * std::max<std::size_t>(1, and_knots.size());
-  if (offsets_mm.size() == needed) return "";
-  return "has " + std::to_string(offsets_mm.size()) + " offsets_mm for " + std::to_string(needed) +
-         " knots: one for each, or for each pair of knots and and_knots";
+  const auto isWrong = [&](const std::vector<double>& table) { return !table.empty() && table.size() != needed; };
+  const bool is_gain = !isWrong(offsets_mm) && isWrong(gains_percent);
+  if (isWrong(offsets_mm) || is_gain || (needed > 0 && offsets_mm.empty() && gains_percent.empty()))
+    return "has " + std::to_string(is_gain ? gains_percent.size() : offsets_mm.size()) +
+           (is_gain ? " gains_percent for " : " offsets_mm for ") + std::to_string(needed) +
+           " knots: one for each, or for each pair of knots and and_knots";
+  return over == Over::Nothing && needed > 0 ? "has knots over nothing: `over` says what they are of" : "";
 }
 
-double LearnedRange::offset_mm(double x, double y) const {
-  if (knots.empty()) return 0.0;
+double LearnedRange::between(const std::vector<double>& table, double x, double y) const {
+  if (knots.empty() || table.empty()) return 0.0;
   if (std::isnan(x) || std::isnan(y)) return kNaN;
   const Place i = placeIn(knots, x), j = placeIn(and_knots, y);
   const std::size_t stride = std::max<std::size_t>(1, and_knots.size());
   const auto along_y = [&](std::size_t row) {
-    return std::lerp(offsets_mm[row * stride + j.below], offsets_mm[row * stride + j.above],
-                     j.share);
+    return std::lerp(table[row * stride + j.below], table[row * stride + j.above], j.share);
   };
   return std::lerp(along_y(i.below), along_y(i.above), i.share);
 }
@@ -103,8 +106,11 @@ RangeImage LearnedRange::apply(RangeImage image, const Conditions& now, const Ra
   forRows(image.range_m.height(), [&](int first_row, int last_row) {
     for (int y = first_row; y < last_row; ++y) {
       for (int x = 0; x < image.range_m.width(); ++x) {
-        const double offset = offset_mm(along.at(x, y), and_along.at(x, y));
-        if (!std::isnan(offset)) image.range_m(x, y) += static_cast<float>(1e-3 * offset);
+        const double at_x = along.at(x, y), at_y = and_along.at(x, y);  // of the image as it came
+        const double offset = offset_mm(at_x, at_y), gain = gain_percent(at_x, at_y);
+        if (std::isnan(offset) || std::isnan(gain)) continue;
+        image.range_m(x, y) += static_cast<float>(1e-3 * offset);
+        if (gain != 0.0) image.amplitude(x, y) *= static_cast<float>(1.0 + 1e-2 * gain);
       }
     }
   });

@@ -177,6 +177,10 @@ TEST_F(Searched, APatternOfPixelsIsNamedByWhereItIs) {
   const CampaignFinding finding = search(job());
   ASSERT_THAT(namesOf(finding), ElementsAre("undeclared")) << verdictOf(finding);
   EXPECT_THAT(finding.effects.front().found.covariates, ElementsAre("pixel")) << verdictOf(finding);
+  EXPECT_GT(finding.judgement->removed, 0.5);
+  const auto model = sim::SensorModel::parse(finding.model_toml, "model.toml");
+  ASSERT_TRUE(model) << model.error().message;
+  EXPECT_THAT(model->effectNames(), Contains("learned_range"));
 }
 
 /// It is light: not a charge that happens to go with the exposure.
@@ -188,6 +192,11 @@ TEST_F(Searched, TheSameLightInAllPixelsIsStrayLight) {
   ASSERT_THAT(namesOf(finding), ElementsAre("undeclared")) << verdictOf(finding);
   EXPECT_THAT(finding.effects.front().found.covariates, ElementsAre("stray")) << verdictOf(finding);
   EXPECT_EQ(finding.effects.front().found.stage, Stage::Light);
+  ASSERT_TRUE(finding.effects.front().fitted) << "the simulator has a form for it";
+  const auto* form = std::get_if<sim::InternalReflection>(&finding.effects.front().fitted->effect);
+  ASSERT_NE(form, nullptr);
+  EXPECT_NEAR(form->radiance, 0.003, 0.0006);
+  EXPECT_TRUE(finding.updates.empty());
 }
 
 /// Only a cold camera shows it, and only a few captures are of a cold camera. What else goes with the warm-up is

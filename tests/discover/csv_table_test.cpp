@@ -8,6 +8,7 @@
 
 #include "calib/discover/discover_table.h"
 #include "calib/discover/headers.h"
+#include "calib/discover/table_field.h"
 
 namespace toftwin::discover {
 namespace {
@@ -144,6 +145,28 @@ TEST(ReadTable, SurvivesAnyBytes) {
   }
   EXPECT_GT(answers, 20)
       << "some of the damaged tables must still be tables, or nothing behind the parser is tested";
+}
+
+TEST(TableField, IsANumberATextOrSaysThatThereIsNone) {
+  EXPECT_EQ(numberIn("+1.5", false), 1.5);
+  for (const char* none : {"", "NaN", "NA", "n/a", "NULL", "-", "?", "inf", "1e300"})
+    EXPECT_TRUE(numberIn(none, false) && std::isnan(*numberIn(none, false))) << none;
+  EXPECT_FALSE(numberIn("warm", false));
+  EXPECT_FALSE(numberIn("1,5", false)) << "a comma may part thousands";
+  EXPECT_EQ(numberIn("1,5", true), 1.5);
+  EXPECT_FALSE(numberIn("1.234,5", true));
+  EXPECT_FALSE(numberIn("1,234,567", true));
+}
+
+TEST(TableField, TimesAreSeconds) {
+  EXPECT_EQ(secondsIn("10:15:30.25"), 36'930.25);
+  EXPECT_EQ(secondsIn("10:15"), 36'900.0);
+  EXPECT_EQ(secondsIn("1970-01-02T00:00:01"), 86'401.0);
+  EXPECT_EQ(secondsIn("1970-01-02 00:00:01Z"), 86'401.0);
+  EXPECT_EQ(secondsIn("1970-01-01T02:00:00+02:00"), 0.0);
+  for (const char* no : {"", "10", "10:", "24:00:00", "10:60", "10:00:00x", "1970-13-01T00:00:00", "1970-01-01",
+                         "1970-01-01T00:00:00+0200"})
+    EXPECT_FALSE(secondsIn(no)) << no;
 }
 
 }  // namespace

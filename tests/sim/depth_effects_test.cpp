@@ -109,6 +109,16 @@ TEST(LearnedRange, OverTwoThingsIsBilinear) {
   EXPECT_NEAR(table.offset_mm(1.5, 15.0), 70.0, 1e-12);
 }
 
+TEST(LearnedRange, ChangesTheAmplitudeAsItsGainsSay) {
+  const LearnedRange darker{.over = LearnedRange::Over::Column, .knots = {0.0, 2.0}, .offsets_mm = {}, .gains_percent = {0.0, -20.0}};
+  EXPECT_EQ(darker.problem(), "");
+  const RangeImage before = imageOfRanges(3, 1, [](int, int) { return 2.0; }), image = applied(darker, before);
+  for (std::size_t x = 0; x < 3; ++x) {
+    EXPECT_EQ(image.range_m[x], before.range_m[x]);
+    EXPECT_NEAR(image.amplitude[x], before.amplitude[x] * (1.0 - 0.1 * static_cast<double>(x)), 1e-4 * before.amplitude[x]) << x;
+  }
+}
+
 TEST(LearnedRange, AddsNothingWhereAFrameDoesNotSayWhatItGoesWith) {
   const LearnedRange over_temperature{
       .over = LearnedRange::Over::Illumination, .knots = {0.0, 50.0}, .offsets_mm = {5.0, 9.0}};
@@ -123,6 +133,9 @@ TEST(LearnedRange, SaysWhatIsWrongWithItsTable) {
               testing::HasSubstr("must have knots and and_knots that ascend"));
   EXPECT_THAT(errorOf(plainCamera(4, 2, 0.5, effect + "knots = [1, 2]\n")),
               testing::HasSubstr("has 3 offsets_mm for 2 knots"));
+  EXPECT_THAT(errorOf(plainCamera(4, 2, 0.5, effect + "gains_percent = [1, 2]\n")),
+              testing::HasSubstr("has 2 gains_percent for 3 knots"));
+  EXPECT_THAT(errorOf(plainCamera(4, 2, 0.5, effect + "over = 'nothing'\n")), testing::HasSubstr("has knots over nothing"));
   EXPECT_THAT(errorOf(plainCamera(4, 2, 0.5, effect + "and_over = 'time_s'\n")),
               testing::HasSubstr("and_over without and_knots"));
 }

@@ -43,10 +43,17 @@ std::string answerOf(const Effect& effect) {
   return effect.alternatives.empty() ? answer : answer + " (these captures do not tell them apart)";
 }
 
+/// Of all its forms; where there are several of one kind, in their order.
+std::vector<FittedNumber> numbersIn(const FoundEffect& one) {
+  std::vector<FittedNumber> numbers = one.fitted ? one.fitted->numbers : std::vector<FittedNumber>{};
+  for (const FittedEffect& more : one.more) numbers.insert(numbers.end(), more.numbers.begin(), more.numbers.end());
+  return numbers;
+}
+
 std::string numbersOf(const FoundEffect& one) {
   if (!one.fitted) return "the simulator has no form for it; it is not in model.toml";
   std::vector<std::string> words;
-  for (const FittedNumber& number : one.fitted->numbers)
+  for (const FittedNumber& number : numbersIn(one))
     words.push_back(fmt::format("{} = {:.4g} ± {:.2g}", number.key, number.value, number.error));
   if (!words.empty()) return fmt::format("{}", fmt::join(words, "; "));
   for (const Estimate& number : one.found.numbers)
@@ -195,12 +202,10 @@ Json toJson(const FoundEffect& one) {
       .set("gain", one.found.gain.mean)
       .set("gain_error", one.found.gain.error);
   json.set("frequency", one.found.frequency).set("in_model", one.fitted.has_value());
-  if (one.fitted) {
-    for (const FittedNumber& number : one.fitted->numbers) {
-      Json each = Json::object();
-      each.set("key", number.key).set("value", number.value).set("error", number.error);
-      numbers.push(std::move(each));
-    }
+  for (const FittedNumber& number : numbersIn(one)) {
+    Json each = Json::object();
+    each.set("key", number.key).set("value", number.value).set("error", number.error);
+    numbers.push(std::move(each));
   }
   json.set("numbers", std::move(numbers));
   Json others = Json::array();

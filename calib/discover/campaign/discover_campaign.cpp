@@ -139,7 +139,11 @@ std::size_t insert(Inserted& inserted, const sim::AnyEffect& effect) {
 Inserted insertFound(const CampaignRows& rows, const Declared& declared,
                      const std::vector<std::size_t>& updates, CampaignFinding& finding) {
   Inserted inserted{effectsWithoutNoise(declared.model), updates};
-  const std::vector<CovariateInfo> covariates = rows.covariates();
+  std::vector<const NamedFit*> fits;
+  for (const Effect& effect : finding.finding.effects)
+    if (effect.fit) fits.push_back(effect.fit.get());
+  const auto included = rows.including(fits, false);
+  const auto& with_found = dynamic_cast<const CampaignRows&>(*included);
   for (const Effect& effect : finding.finding.effects) {
     FoundEffect found{effect, {}};
     if (effect.fit) {
@@ -148,24 +152,41 @@ Inserted insertFound(const CampaignRows& rows, const Declared& declared,
       inserted.fitted.push_back(place);
       inserted.only[place] = fit.keys;
       found.fitted = FittedEffect{fit.effect, {}};
-    } else if (const auto learned = learnedEffectOf(effect, covariates)) {
-      insert(inserted, *learned);
-      found.fitted = FittedEffect{*learned, {}};
-      if (effect.stage == Stage::Light && std::ranges::count(effect.covariates, "gain") > 0)
-        finding.notes.push_back(effect.name + ": what it does to the range is in model.toml, to the amplitude is not.");
+    } else {
+      for (const LearnedEffect& learned : learnedEffectsOf(effect, with_found, declared.model)) {
+        const std::size_t place = insert(inserted, learned.effect);
+        if (!learned.free.empty()) inserted.fitted.push_back(place), inserted.only[place] = learned.free;
+        (found.fitted ? found.more.emplace_back(FittedEffect{learned.effect, {}})
+                      : found.fitted.emplace(FittedEffect{learned.effect, {}}));
+      }
     }
     finding.effects.push_back(std::move(found));
   }
   return inserted;
 }
 
+/// Whether two are of one kind, and of one raw exposure where there are several.
+bool isSameForm(const sim::AnyEffect& a, const sim::AnyEffect& b) {
+  if (a.index() != b.index()) return false;
+  const auto* x = std::get_if<sim::SampleOffset>(&a);
+  const auto* y = std::get_if<sim::SampleOffset>(&b);
+  return x == nullptr || (x->step == y->step && x->tap == y->tap);
+}
+
+/// The form of a found effect that was fitted; null: it is of a declared one.
+FittedEffect* formOf(const FittedEffect& fitted, CampaignFinding& finding) {
+  for (FoundEffect& found : finding.effects) {
+    if (found.fitted && isSameForm(found.fitted->effect, fitted.effect)) return &*found.fitted;
+    for (FittedEffect& more : found.more)
+      if (isSameForm(more.effect, fitted.effect)) return &more;
+  }
+  return nullptr;
+}
+
 void takeFitted(const Refitted& refitted, CampaignFinding& finding) {
   for (const FittedEffect& one : refitted.fitted) {
-    const auto found = std::ranges::find_if(finding.effects, [&](const FoundEffect& effect) {
-      return effect.found.is_catalogue && effect.found.name == nameOf(one.effect);
-    });
-    if (found != finding.effects.end())
-      found->fitted = one;
+    if (FittedEffect* form = formOf(one, finding))
+      *form = one;
     else
       finding.updates.push_back(one);
   }
@@ -212,6 +233,7 @@ std::string modelText(const std::string& text, const sim::SensorModel& in_file,
   std::vector<FittedEffect> added;
   for (const FoundEffect& one : finding.effects) {
     if (one.fitted) added.push_back(*one.fitted);
+    added.insert(added.end(), one.more.begin(), one.more.end());
   }
   const bool has_delay =
       std::ranges::any_of(effects, [](const auto& effect) { return nameOf(effect) == "delay"; });

@@ -36,6 +36,7 @@ struct CampaignJob {
 struct FoundEffect {
   Effect found;
   std::optional<FittedEffect> fitted{};  ///< none: the simulator has no form for it
+  std::vector<FittedEffect> more{};      ///< where one form is not enough
 };
 
 /// All that is known when a campaign was searched.

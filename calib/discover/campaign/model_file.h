@@ -8,15 +8,21 @@
 #include <vector>
 
 #include "calib/discover/campaign/refit.h"
+#include "calib/discover/campaign/rows.h"
 #include "calib/discover/finder.h"
 
 namespace toftwin::discover {
 
-/// An effect that the finder named by its covariates, as one that the simulator knows: a table over
-/// them. Nothing where it goes with more than two covariates, or with one that a camera cannot know
-/// of itself.
-std::optional<sim::AnyEffect> learnedEffectOf(const Effect& effect,
-                                              std::span<const CovariateInfo> covariates);
+/// A form of the simulator's for something without a name; `free`: its numbers that are fitted through the simulator.
+struct LearnedEffect {
+  sim::AnyEffect effect;
+  std::vector<std::string> free{};
+};
+/// An effect that the finder named by its covariates, in forms that the simulator knows: tables over one or two
+/// covariates that a camera knows of itself, a pattern of pixels, constant charges in raw exposures, stray light. Nothing
+/// where there is no form. `rows`: with everything in their model that was found by name.
+std::vector<LearnedEffect> learnedEffectsOf(const Effect& effect, const CampaignRows& rows,
+                                            const sim::SensorModel& model);
 
 /// [[effect]] with its keys, as a camera file has it, and what is known of its numbers as comments.
 std::string tomlOf(const FittedEffect& effect, const std::string& why);

@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+// What was found without a name, in forms that the simulator has.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <set>
+#include <utility>
+
+#include "calib/discover/campaign/carriers.h"
+#include "calib/discover/campaign/model_file.h"
+
+namespace toftwin::discover {
+namespace {
+
+using Over = sim::LearnedRange::Over;
+
+constexpr std::array kOvers{
+    std::pair{std::string_view{"time_s"}, Over::Time},
+    std::pair{std::string_view{"temperature_illumination_c"}, Over::Illumination},
+    std::pair{std::string_view{"temperature_sensor_c"}, Over::Sensor},
+    std::pair{std::string_view{"ambient_klx"}, Over::Ambient},
+    std::pair{std::string_view{"exposure_us"}, Over::Exposure},
+    std::pair{std::string_view{"range_m"}, Over::Range},
+    std::pair{std::string_view{"amplitude_e"}, Over::Amplitude},
+    std::pair{std::string_view{"column"}, Over::Column},
+    std::pair{std::string_view{"row"}, Over::Row},
+    std::pair{std::string_view{"radius_px"}, Over::Radius}};
+
+std::optional<Over> overOf(const std::string& covariate) {
+  for (const auto& [word, over] : kOvers) {
+    if (word == covariate) return over;
+  }
+  return std::nullopt;
+}
+
+/// Where the table has knots: the covariate's levels, or evenly over it and where its values lie.
+std::vector<double> knotsOf(const CovariateInfo& covariate, std::size_t even) {
+  if (!covariate.levels.empty()) return covariate.levels;
+  std::vector<double> knots = covariate.quantiles;
+  const double low = knots.front(), high = knots.back();
+  for (std::size_t i = 1; i < even; ++i)
+    knots.push_back(low + (high - low) * static_cast<double>(i) / static_cast<double>(even));
+  std::ranges::sort(knots);
+  const auto same = [&](double a, double b) { return b - a < 1e-6 * (high - low); };
+  knots.erase(std::unique(knots.begin(), knots.end(), same), knots.end());
+  return knots;
+}
+
+const CovariateInfo* find(std::span<const CovariateInfo> covariates, const std::string& name) {
+  const auto found = std::ranges::find(covariates, name, &CovariateInfo::name);
+  return found == covariates.end() ? nullptr : &*found;
+}
+
+/// A delay of the light is nearly the same error of the range; what differs, the cyclic error, stays.
+bool movesRange(const Term& term) {
+  return term.carrier == kDelayCarrier ||
+         (term.carrier.empty() && term.stage.value_or(Stage::Range) == Stage::Range);
+}
+bool changesGain(const Term& term) {
+  return term.carrier == "gain" || (term.carrier.empty() && term.stage.value_or(Stage::Range) != Stage::Range);
+}
+
+/// The terms of an effect that go with the same covariates, with their coefficients.
+struct Along {
+  std::vector<std::string> covariates{};
+  std::vector<std::pair<Term, double>> terms{};
+
+  [[nodiscard]] double sum(bool (*which)(const Term&), const std::function<double(const std::string&)>& value) const {
+    double all = 0.0;
+    for (const auto& [term, coefficient] : terms)
+      if (which(term)) all += coefficient * term.at(value);
+    return all;
+  }
+};
+
+std::vector<Along> alongOf(const Effect& effect) {
+  std::vector<Along> all;
+  const std::vector<Term> terms = termsOf(effect);
+  for (std::size_t i = 0; i < std::min(terms.size(), effect.coefficient.size()); ++i) {
+    std::set<std::string> names;
+    for (const Factor& factor : terms[i].factors) names.insert(factor.covariate);
+    const std::vector<std::string> covariates(names.begin(), names.end());
+    auto found = std::ranges::find(all, covariates, &Along::covariates);
+    if (found == all.end()) found = all.insert(all.end(), Along{covariates});
+    found->terms.emplace_back(terms[i], effect.coefficient[i]);
+  }
+  return all;
+}
+
+/// A table over one or two covariates that a camera knows of itself.
+std::optional<sim::AnyEffect> tableOf(const Along& along, std::span<const CovariateInfo> covariates) {
+  const bool moves = std::ranges::any_of(along.terms, [](const auto& one) { return movesRange(one.first); });
+  const bool dims = std::ranges::any_of(along.terms, [](const auto& one) { return changesGain(one.first); });
+  if (along.covariates.empty() || along.covariates.size() > 2 || !(moves || dims)) return std::nullopt;
+  std::array<const CovariateInfo*, 2> info{};
+  std::array<Over, 2> over{};
+  for (std::size_t i = 0; i < along.covariates.size(); ++i) {
+    info[i] = find(covariates, along.covariates[i]);
+    const auto known = overOf(along.covariates[i]);
+    if (info[i] == nullptr || !known) return std::nullopt;
+    over[i] = *known;
+  }
+  const bool has_two = along.covariates.size() == 2;
+  sim::LearnedRange learned{.over = over[0], .knots = knotsOf(*info[0], has_two ? 24 : 256), .offsets_mm = {}};
+  if (has_two) learned.and_over = over[1], learned.and_knots = knotsOf(*info[1], 24);
+  for (const double x : learned.knots) {
+    for (const double y : has_two ? learned.and_knots : std::vector{0.0}) {
+      const auto at = [&](const std::string& name) { return name == along.covariates[0] ? x : y; };
+      const auto within = [](double value, double least, double most) {
+        return std::isfinite(value) ? std::clamp(value, least, most) : 0.0;
+      };
+      if (moves) learned.offsets_mm.push_back(within(along.sum(movesRange, at), -1e4, 1e4));
+      if (dims) learned.gains_percent.push_back(within(along.sum(changesGain, at), -100.0, 1e4));
+    }
+  }
+  return learned;
+}
+
+/// A pattern of pixels, as a table over columns and rows with a knot in the middle of each cell.
+sim::AnyEffect tableOf(const PixelPattern& pattern) {
+  sim::LearnedRange learned{.over = Over::Column, .knots = {}, .and_over = Over::Row, .and_knots = {}, .offsets_mm = {}};
+  const CellGrid& grid = pattern.grid;
+  for (int i = 0; i < grid.columns; ++i) learned.knots.push_back(i * grid.cell_width + 0.5 * (grid.cell_width - 1));
+  for (int i = 0; i < grid.rows; ++i) learned.and_knots.push_back(i * grid.cell_height + 0.5 * (grid.cell_height - 1));
+  std::vector<double>& table = pattern.carrier == "gain" ? learned.gains_percent : learned.offsets_mm;
+  for (int column = 0; column < grid.columns; ++column)
+    for (int row = 0; row < grid.rows; ++row)
+      table.push_back(pattern.value[static_cast<std::size_t>(row * grid.columns + column)]);
+  return learned;
+}
+
+/// Coefficients of a carrier's two parts, where all of its terms are constant.
+std::optional<std::pair<double, double>> inBothPhases(const std::vector<Along>& all, const std::string& carrier) {
+  double in_phase = 0.0, quadrature = 0.0;
+  bool is_there = false;
+  for (const Along& along : all) {
+    for (const auto& [term, coefficient] : along.terms) {
+      if (!term.carrier.starts_with(carrier + ":")) continue;
+      if (!term.factors.empty()) return std::nullopt;
+      is_there = true;
+      (term.carrier.ends_with(":in_phase") ? in_phase : quadrature) += coefficient;
+    }
+  }
+  return is_there ? std::optional{std::pair{in_phase, quadrature}} : std::nullopt;
+}
+
+/// A charge in the correlation's real and imaginary part, as charges of the first raw exposure and the one a quarter
+/// of a turn later. Where no raw exposure is there: nothing.
+std::vector<sim::AnyEffect> chargesOf(const sim::SensorModel& model, double in_phase, double quadrature) {
+  const auto steps = static_cast<int>(model.exposures({}).size()) /
+                     std::max(1, static_cast<int>(model.traceRequest().frequencies.size()));
+  if (steps < 4 || steps % 4 != 0) return {};
+  return {sim::SampleOffset{.step = 0, .electrons = in_phase},
+          sim::SampleOffset{.step = steps / 4, .electrons = quadrature}};
+}
+
+/// Stray light as a reflection within the housing, which has its form: exp(−iφ) with φ = 4π f r₀/c. How strong it is,
+/// the simulator says.
+sim::AnyEffect reflectionOf(const sim::SensorModel& model, double in_phase, double quadrature) {
+  sim::InternalReflection reflection;
+  Frequency highest = 0_MHz;
+  for (const Frequency frequency : model.traceRequest().frequencies) highest = std::max(highest, frequency);
+  if (!(highest > 0_MHz)) return reflection;
+  const double turn = std::atan2(-quadrature, in_phase) / (2.0 * std::numbers::pi);
+  const double half_way_m = (turn - std::floor(turn)) * unambiguousRange(highest).in(metre);
+  reflection.half_way = std::min(half_way_m, 10.0) * metre;
+  return reflection;
+}
+
+}  // namespace
+
+std::vector<LearnedEffect> learnedEffectsOf(const Effect& effect, const CampaignRows& rows,
+                                            const sim::SensorModel& model) {
+  std::vector<LearnedEffect> learned;
+  const std::vector<CovariateInfo> covariates = rows.covariates();
+  const std::vector<Along> all = alongOf(effect);
+  for (const Along& along : all)
+    if (const auto table = tableOf(along, covariates)) learned.push_back({*table});
+  for (const Term& term : termsOf(effect))
+    if (const PixelPattern* pattern = rows.patternOf(term.carrier)) learned.push_back({tableOf(*pattern)});
+  if (const auto charge = inBothPhases(all, "charge"))
+    for (const sim::AnyEffect& one : chargesOf(model, charge->first, charge->second)) learned.push_back({one, {"electrons"}});
+  if (const auto stray = inBothPhases(all, "stray"))
+    learned.push_back({reflectionOf(model, stray->first, stray->second), {"radiance_w_per_m2_sr", "half_way_mm"}});
+  return learned;
+}
+
+}  // namespace toftwin::discover
