@@ -18,6 +18,10 @@ class Random {
   Random(std::uint64_t seed, std::uint64_t frame, std::uint64_t effect)
       : key_(mix(mix(mix(seed + kGolden) ^ (frame + kGolden)) ^ (effect + kGolden))) {}
 
+  struct Two {
+    float first, second;
+  };
+
   /// The generator of one draw: all pixels of one image.
   class Draw {
    public:
@@ -38,6 +42,14 @@ class Random {
     }
     /// Standard normal. Tails end at ±5.4, where the 32 bits do (a share of 6e-8 lies beyond).
     [[nodiscard]] float normal(std::uint32_t pixel) const { return normalFromBits(bits(pixel)); }
+    /// Two standard normals, independent of each other and of normal(), for less than the price of one.
+    [[nodiscard]] Two two(std::uint32_t pixel) const {
+      const std::uint32_t first = bits(pixel);
+      // One more round, keyed: the angle is as good as independent of the radius.
+      std::uint32_t x = (first ^ key_b_) * 0x9E3779B1u;
+      x = (x ^ (x >> 15)) * 0x7FEB352Du;
+      return twoFromBits(first, x ^ (x >> 16));
+    }
     /// The same, or NaN in the tails.
     [[nodiscard]] float centralNormal(std::uint32_t pixel) const { return centralNormalFromBits(bits(pixel)); }
 
@@ -66,6 +78,22 @@ class Random {
     const Deviate d = deviateOf(bits);
     // Added, not chosen: a choice between numbers that are still to be computed would be a branch.
     return 1.41421356F * d.u * central(d.w) + (d.w < kTail ? 0.0F : std::numeric_limits<float>::quiet_NaN());
+  }
+
+  /// Box and Muller's pair, r cos φ and r sin φ with r = √(−2 ln u): radius and angle of 32 bits each. One
+  /// number's distribution function is right within 1e-5 of what lies beyond; ends at 6.7.
+  static Two twoFromBits(std::uint32_t radius, std::uint32_t angle) {
+    const float u = (static_cast<float>(static_cast<std::int32_t>(radius >> 1)) + 0.5F) * 0x1p-31F;
+    const float r = squareRoot(-2.0F * roughLogarithm(u));
+    // An eighth of a turn to either side, as the lower 30 bits say. Which axis it lies along and on which side
+    // of it the upper two say: sign and order, so that the whole turn is even.
+    const float a = static_cast<float>(static_cast<std::int32_t>(angle << 2)) * (0x1p-31F * 0.785398163F);
+    const float a2 = a * a;
+    const float sine = a * (0.99999857F + a2 * (-0.16662480F + a2 * 0.00815163558F));
+    const float cosine = 0.99999997F + a2 * (-0.49999857F + a2 * (0.0416550269F + a2 * -0.00135859085F));
+    const float far = (angle & 0x40000000U) != 0 ? -r * cosine : r * cosine, near = r * sine;
+    const bool is_across = (angle & 0x80000000U) != 0;
+    return {is_across ? near : far, is_across ? far : near};
   }
 
   static constexpr std::uint64_t kGolden = 0x9E3779B97F4A7C15u;
@@ -127,6 +155,19 @@ class Random {
     const float series =
         2.0F * s * (1.0F + s2 * (1.0F / 3.0F + s2 * (0.2F + s2 * (1.0F / 7.0F + s2 / 9.0F))));
     return exponent * 0.693147181F + series;
+  }
+  /// The same without a quotient: a polynomial of the least largest error, 2e-6 of ln x or absolute.
+  static float roughLogarithm(float x) {
+    const std::uint32_t shifted = std::bit_cast<std::uint32_t>(x) - 0x3F3504F3U;
+    const auto exponent = static_cast<float>(static_cast<std::int32_t>(shifted) >> 23);
+    const float f = std::bit_cast<float>((shifted & 0x007FFFFFU) + 0x3F3504F3U) - 1.0F;
+    float sum = -0.14337535F;
+    sum = 0.22314669F + sum * f;
+    sum = -0.25464324F + sum * f;
+    sum = 0.33228027F + sum * f;
+    sum = -0.49985583F + sum * f;
+    sum = 1.000012F + sum * f;
+    return exponent * 0.693147181F + f * sum;
   }
   /// √x for x ≥ 0 without the call that std::sqrt makes for errno, which would stop vectorisation.
   static float squareRoot(float x) { return __builtin_sqrtf(x); }

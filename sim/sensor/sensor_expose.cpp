@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // From light to samples to ranges: what a sensor model does with each frame.
+#include <algorithm>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 #include <variant>
 
+#include "sim/effects/charge_noise.h"
+#include "sim/images/rows.h"
 #include "sim/sensor/correlate.h"
 #include "sim/sensor/exposures.h"
 #include "sim/sensor/sensor_model_impl.h"
@@ -11,23 +15,78 @@
 namespace toftwin::sim {
 namespace {
 
-/// Applies those effects that act on this type of image, in their order. Each of several exposures has noise of
-/// its own.
+constexpr std::size_t kMostEffects = 1000;
+
+/// Applies those effects that act on this type of image, in their order.
 template <class Of>
 Of applyAll(Of image, const std::vector<AnyEffect>& effects, const Conditions& now,
-            std::uint64_t seed, std::uint64_t frame, std::size_t exposure = 0) {
-  constexpr std::size_t kMostEffects = 1000;
+            std::uint64_t seed, std::uint64_t frame) {
   for (std::size_t place = 0; place < effects.size(); ++place) {
     std::visit(
         [&]<class E>(const E& effect) {
           if constexpr (std::is_same_v<ImageOf<E>, Of>) {
             image = effect.apply(std::move(image), now,
-                                 Random{seed, frame, effectKey(E::about.name, place + kMostEffects * exposure)});
+                                 Random{seed, frame, effectKey(E::about.name, place)});
           }
         },
         effects[place]);
   }
   return image;
+}
+
+/// The same of samples, of which each of several exposures has noise of its own. What can be done together is
+/// done in one pass.
+Samples applyOnSamples(Samples samples, const std::vector<AnyEffect>& effects, const Conditions& now,
+                       std::uint64_t seed, std::uint64_t frame, std::size_t exposure) {
+  for (std::size_t place = 0; place < effects.size(); ++place) {
+    const auto randomOf = [&](std::string_view name, std::size_t at) {
+      return Random{seed, frame, effectKey(name, at + kMostEffects * exposure)};
+    };
+    if (const auto joint = ChargeNoise::from(effects, place)) {
+      samples = joint->apply(std::move(samples), now, randomOf(ShotNoise::about.name, place),
+                             randomOf(ReadNoise::about.name, joint->read_place));
+      place = joint->read_place;
+      continue;
+    }
+    std::visit(
+        [&]<class E>(const E& effect) {
+          if constexpr (std::is_same_v<ImageOf<E>, Samples>)
+            samples = effect.apply(std::move(samples), now, randomOf(E::about.name, place));
+        },
+        effects[place]);
+  }
+  return samples;
+}
+
+/// Effects on samples look at one pixel at a time: strip by strip, samples stay in the processor's cache
+/// from the first effect to the last.
+Samples applyInStrips(Samples samples, const std::vector<AnyEffect>& effects, const Conditions& now,
+                      std::uint64_t seed, std::uint64_t frame, std::size_t exposure) {
+  constexpr int kRows = 16;
+  const int width = samples.width(), height = samples.height();
+  const bool was_flagged = !samples.flags.empty();
+  Image<std::uint8_t> flags = was_flagged ? std::move(samples.flags) : Image<std::uint8_t>{width, height};
+  std::vector<std::uint8_t> is_flagged(static_cast<std::size_t>(height));
+  const auto strip = [&](int top, int rows) {
+    const auto count = static_cast<std::ptrdiff_t>(width) * rows;
+    Samples part{.frequencies = samples.frequencies, .steps = samples.steps, .taps = samples.taps};
+    for (const Image<float>& image : samples.electrons)
+      std::copy_n(&image(0, top), count, &part.electrons.emplace_back(width, rows)(0, 0));
+    if (was_flagged) std::copy_n(&flags(0, top), count, &(part.flags = Image<std::uint8_t>{width, rows})(0, 0));
+    Conditions here = now;
+    here.top += top;
+    part = applyOnSamples(std::move(part), effects, here, seed, frame, exposure);
+    for (std::size_t i = 0; i < part.electrons.size(); ++i)
+      std::copy_n(&part.electrons[i](0, 0), count, &samples.electrons[i](0, top));
+    if (part.flags.empty()) return;
+    std::copy_n(&part.flags(0, 0), count, &flags(0, top));
+    is_flagged[static_cast<std::size_t>(top)] = 1;
+  };
+  inParallel((height + kRows - 1) / kRows, 1, [&](int first, int last) {
+    for (int i = first; i < last; ++i) strip(i * kRows, std::min(kRows, height - i * kRows));
+  });
+  if (was_flagged || std::ranges::count(is_flagged, 1) > 0) samples.flags = std::move(flags);
+  return samples;
 }
 
 bool anyActsOnLight(const std::vector<AnyEffect>& effects) {
@@ -129,7 +188,9 @@ SensorModel::Exposed SensorModel::readOut(Samples collected, const Moment& momen
 SensorModel::Exposed SensorModel::readOutOne(Samples collected, std::size_t exposure,
                                              const Conditions& now, std::uint64_t seed,
                                              std::uint64_t frame) const {
-  Samples counted = applyAll(std::move(collected), impl_->effects, now, seed, frame, exposure);
+  // What remembers looks at whole images.
+  const auto apply = remembers() ? applyOnSamples : applyInStrips;
+  Samples counted = apply(std::move(collected), impl_->effects, now, seed, frame, exposure);
   const bool is_whole =
       counted.width() == impl_->camera.width && counted.height() == impl_->camera.height;
   RangeImage range = is_whole ? decode(counted, impl_->decoder, impl_->rays)

@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <vector>
 
 namespace toftwin::sim {
@@ -47,22 +49,57 @@ TEST(Random, WholeRowsAreTheSameBitsAsSinglePixels) {
   for (std::uint32_t i = 0; i < row.size(); ++i) ASSERT_EQ(row[i], draw.normal(77 + i)) << i;
 }
 
-// Kolmogorov–Smirnov against the normal distribution, n = 1e6, false alarm 1e-6: √n D < 2.69.
+/// √n D of Kolmogorov and Smirnov, n = 1e6, against the normal distribution: false alarm 1e-6 above 2.69.
+double deviationFromNormal(std::vector<float> z) {
+  std::sort(z.begin(), z.end());
+  double largest = 0.0;
+  const double n = static_cast<double>(z.size());
+  for (std::size_t i = 0; i < z.size(); ++i) {
+    const double expected = normalDistribution(static_cast<double>(z[i]));
+    largest = std::max({largest, std::abs(expected - static_cast<double>(i) / n),
+                        std::abs(expected - static_cast<double>(i + 1) / n)});
+  }
+  return largest * std::sqrt(n);
+}
+
 TEST(Random, NormalsOfAnImagePassKolmogorovSmirnov) {
   for (std::uint64_t seed : {1u, 2u, 3u}) {
     const Random::Draw draw = Random{seed, 7, 9}.draw(0);
     std::vector<float> z(1'000'000);
     for (std::uint32_t i = 0; i < z.size(); ++i) z[i] = draw.normal(i);
-    std::sort(z.begin(), z.end());
-    double largest = 0.0;
-    for (std::size_t i = 0; i < z.size(); ++i) {
-      const double n = static_cast<double>(z.size());
-      const double expected = normalDistribution(static_cast<double>(z[i]));
-      largest = std::max({largest, std::abs(expected - static_cast<double>(i) / n),
-                          std::abs(expected - static_cast<double>(i + 1) / n)});
-    }
-    EXPECT_LT(largest * 1e3, 2.69) << "seed " << seed;
+    EXPECT_LT(deviationFromNormal(std::move(z)), 2.69) << "seed " << seed;
   }
+}
+
+/// The second number, the sum and the difference of both, too: in all directions alike, as only independent
+/// normals are.
+TEST(Random, BothOfTwoPassKolmogorovSmirnovInEveryDirection) {
+  for (std::uint64_t seed : {1u, 2u, 3u}) {
+    const Random::Draw draw = Random{seed, 7, 9}.draw(0);
+    std::array<std::vector<float>, 4> z;
+    for (std::uint32_t i = 0; i < 1'000'000; ++i) {
+      const Random::Two two = draw.two(i);
+      z[0].push_back(two.first);
+      z[1].push_back(two.second);
+      z[2].push_back((two.first + two.second) * 0.70710678F);
+      z[3].push_back((two.first - two.second) * 0.70710678F);
+    }
+    for (std::size_t i = 0; i < z.size(); ++i)
+      EXPECT_LT(deviationFromNormal(std::move(z[i])), 2.69) << "seed " << seed << ", direction " << i;
+  }
+}
+
+/// r² / 2 of bits is −ln u, to what the polynomials promise, and the angle is that of its bits.
+TEST(Random, TwoLieOnTheCircleOfTheirBits) {
+  for (std::uint64_t i = 0; i < (1u << 18); ++i) {
+    const auto bits = static_cast<std::uint32_t>(i * 16381 + 3);
+    const Random::Two z = Random::twoFromBits(bits, static_cast<std::uint32_t>(i * 40503 * 65537));
+    const double r2 = std::pow(static_cast<double>(z.first), 2) + std::pow(static_cast<double>(z.second), 2);
+    const double u = (static_cast<double>(bits >> 1) + 0.5) * 0x1p-31;
+    ASSERT_NEAR(r2, -2.0 * std::log(u), 1e-5 + 4e-6 * r2) << bits;
+  }
+  EXPECT_GT(Random::twoFromBits(0, 0).first, 6.6F);
+  EXPECT_TRUE(std::isfinite(Random::twoFromBits(0xFFFFFFFFu, 0xFFFFFFFFu).second));
 }
 
 /// Correlation of n pairs; with independent normals its standard deviation is 1/√n.
@@ -94,6 +131,33 @@ TEST(Random, NeighboursFramesEffectsSeedsAndDrawsAreIndependent) {
                                    [&](std::uint32_t i) { return base.normal(i + step); })),
               bound)
         << step << " pixels on";
+  }
+}
+
+/// Of products of standard normals: 5 standard errors, 6e-7 each. The squares' correlation has (z² − 1)/√2.
+TEST(Random, TwoAreIndependentOfEachOtherOfTheirNeighboursAndOfOtherDraws) {
+  constexpr std::uint32_t kPixels = 1'000'000;
+  const double bound = 5.0 / std::sqrt(static_cast<double>(kPixels));
+  const Random::Draw base = Random{1, 1, 1}.draw(0), other = Random{1, 2, 1}.draw(0);
+  const auto first = [&](std::uint32_t i) { return base.two(i).first; };
+  const auto second = [&](std::uint32_t i) { return base.two(i).second; };
+  const auto squared = [](const auto& of) {
+    return [of](std::uint32_t i) { return (of(i) * of(i) - 1.0F) * 0.70710678F; };
+  };
+  const auto correlates = [&](const auto& a, const auto& b) { return std::abs(correlation(kPixels, a, b)); };
+  EXPECT_LT(correlates(first, second), bound);
+  EXPECT_LT(correlates(squared(first), squared(second)), bound);
+  EXPECT_LT(correlates(first, squared(second)), bound);
+  EXPECT_LT(correlates(first, [&](std::uint32_t i) { return base.normal(i); }), bound);
+  EXPECT_LT(correlates(first, [&](std::uint32_t i) { return other.two(i).first; }), bound);
+  EXPECT_LT(correlates(second, [&](std::uint32_t i) { return other.two(i).second; }), bound);
+  for (std::uint32_t step : {1u, 2u, 512u}) {
+    const auto first_there = [&](std::uint32_t i) { return base.two(i + step).first; };
+    const auto second_there = [&](std::uint32_t i) { return base.two(i + step).second; };
+    EXPECT_LT(correlates(first, first_there), bound) << step << " pixels on";
+    EXPECT_LT(correlates(second, second_there), bound) << step << " pixels on";
+    EXPECT_LT(correlates(first, second_there), bound) << step << " pixels on";
+    EXPECT_LT(correlates(squared(first), squared(first_there)), bound) << step << " pixels on";
   }
 }
 
