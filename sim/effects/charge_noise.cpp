@@ -13,7 +13,7 @@
 namespace toftwin::sim {
 namespace {
 
-constexpr auto kFull = static_cast<std::uint8_t>(PixelFlag::Saturated);
+constexpr auto kFullWell = static_cast<std::uint8_t>(PixelFlag::Saturated);
 
 /// Mean charges from `lower` on may be cut or not, from `upper` on all are.
 struct Levels {
@@ -73,7 +73,7 @@ float stepByStep(float mean, const Levels& levels, const Random::Draw& of_shot, 
   charge *= levels.fano;
   if (charge > levels.well) {
     charge = levels.well;
-    flags = static_cast<std::uint8_t>(flags | kFull);
+    flags = static_cast<std::uint8_t>(flags | kFullWell);
   }
   return charge + std::sqrt(levels.variance) * of_read.normal(pixel);
 }
@@ -85,7 +85,7 @@ void finishFull(const float* mean, float* noisy, const Levels& levels, const Ran
     const std::uint32_t pixel = chunk.first_pixel + static_cast<std::uint32_t>(i);
     if (levels.areClose(mean[i]))
       noisy[i] = stepByStep(mean[i], levels, of_shot, of_read, pixel, chunk.flags[i]);
-    if (mean[i] >= levels.upper) chunk.flags[i] = static_cast<std::uint8_t>(chunk.flags[i] | kFull);
+    if (mean[i] >= levels.upper) chunk.flags[i] = static_cast<std::uint8_t>(chunk.flags[i] | kFullWell);
   }
 }
 

@@ -6,16 +6,18 @@
 
 #include "sim/images/rows.h"
 #include "sim/tracer/indirect_tile.h"
+#include "sim/tracer/lit_points.h"
 
 namespace toftwin::sim {
 namespace {
 
 /// Most samples in a coarse point's means; what moves in a scene leaves its light behind for so long.
-constexpr float kMostSamples = 128.0f, kMostWhereThingsMove = 64.0f;
+constexpr float kMostSamples = 128.0f, kMostWhereThingsMove = 16.0f;
 constexpr float kFewestSamples = 8.0f;
-constexpr int kCellsPerPoints = 2;
+/// Cells remember so many times the samples.
+constexpr int kCellsPerPoints = 2, kCellsWhereThingsMove = 4;
 /// Light is remembered for so much of the camera's way: its emitters move with it, which turns phasors.
-constexpr double kMemory_m = 0.06;
+constexpr double kMemory_m = 0.03;
 /// A turn counts as a way, by what the light then falls on.
 constexpr double kMetresPerRadian = 0.5;
 /// Cells of indirect light have this share of the scene's diagonal.
@@ -56,13 +58,13 @@ Vec3d normalOf(const CoarseGrid& grid, int u, int v) {
 }
 
 /// Takes every coarse point's samples; what they found for the cells comes back tile by tile.
-std::vector<CellUpdate> gatherTiles(const Tracing& tracing, const IrradianceCells& cells, const Channels& channels,
-                                    std::uint32_t first_sample, int samples, CoarseGrid& grid) {
+std::vector<CellUpdate> gatherTiles(const Tracing& tracing, const IrradianceCells& cells, const LitPoints& lights,
+                                    const Channels& channels, std::uint32_t first_sample, int samples, CoarseGrid& grid) {
   const int columns = (grid.width + 3) / 4, rows = (grid.height + 3) / 4;
   std::vector<CellUpdate> updates(static_cast<std::size_t>(columns * rows));
   inParallel(columns * rows, 8, [&](int begin, int end) {
     const FlushDenormals flush;
-    TileGatherer gatherer{tracing, cells, channels};
+    TileGatherer gatherer{tracing, cells, lights, channels};
     for (int t = begin; t != end; ++t) {
       const int i = t % columns * 4, j = t / columns * 4;
       gatherer.gather(i, j, first_sample, samples, updates[static_cast<std::size_t>(t)]);
@@ -168,8 +170,14 @@ IndirectLight::Memory IndirectLight::memoryFor(const Tracing& tracing, int sampl
   const auto points = way * static_cast<double>(most) > allowed
                           ? std::max(kFewestSamples, static_cast<float>(allowed / way))
                           : most;
-  return {points, kCellsPerPoints * static_cast<int>(points)};
+  const int per_point = !tracing.scene.poses.empty() ? kCellsWhereThingsMove : kCellsPerPoints;
+  return {points, per_point * static_cast<int>(points)};
 }
+
+IndirectLight::IndirectLight() : lights_(std::make_unique<LitPoints>()) {}
+IndirectLight::IndirectLight(IndirectLight&&) noexcept = default;
+IndirectLight& IndirectLight::operator=(IndirectLight&&) noexcept = default;
+IndirectLight::~IndirectLight() = default;
 
 void IndirectLight::gather(const Tracing& tracing, const Channels& channels, int samples) {
   const TraceRequest& request = tracing.request;
@@ -186,7 +194,13 @@ void IndirectLight::gather(const Tracing& tracing, const Channels& channels, int
   std::swap(before_, grid_);
   grid_.resize(width, height, channels.count(), request.frequencies.size());
   const Memory memory = memoryFor(tracing, samples);
-  update(gatherTiles(tracing, *cells_, channels_, samples_done_, samples, grid_), memory.cells, channels_.count(),
+  // Special surfaces send light on in ways of their own.
+  if (tracing.scene.is_matt) {
+    lights_->take(tracing, channels_, samples_done_ / static_cast<std::uint32_t>(samples));
+  } else {
+    lights_->clear();
+  }
+  update(gatherTiles(tracing, *cells_, *lights_, channels_, samples_done_, samples, grid_), memory.cells, channels_.count(),
          *cells_);
   samples_done_ += static_cast<std::uint32_t>(samples);
   takeHistory(before_, request.world_from_camera, request.camera, memory.points);

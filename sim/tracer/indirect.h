@@ -66,11 +66,18 @@ struct BlockGeometry {
   Lanes<double> range_m;
 };
 
+class LitPoints;
+
 /// Light that reaches surfaces over other surfaces, kept over frames. Means are of incoming radiance,
 /// weighted with the cosine and without the way to the camera: neither albedo nor place of the camera
 /// is in them, so they are as smooth as the light is.
 class IndirectLight {
  public:
+  IndirectLight();
+  IndirectLight(IndirectLight&&) noexcept;
+  IndirectLight& operator=(IndirectLight&&) noexcept;
+  ~IndirectLight();
+
   /// Takes `samples` more for each coarse point.
   void gather(const Tracing& tracing, const Channels& channels, int samples);
   /// Share of coarse points on a surface that had nothing to go on from earlier calls.
@@ -104,6 +111,7 @@ class IndirectLight {
   CoarseGrid smooth_;  ///< `squares` holds variances of the means
   Transform<World, Camera> pose_;
   std::unique_ptr<IrradianceCells> cells_;
+  std::unique_ptr<LitPoints> lights_;
   std::uint32_t samples_done_ = 0;
   double share_of_new_ = 1.0;
 };

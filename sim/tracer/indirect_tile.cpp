@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "sim/tracer/cast.h"
 #include "sim/tracer/hit.h"
 #include "sim/tracer/phasor.h"
 #include "sim/tracer/shade.h"
@@ -12,7 +13,9 @@ namespace toftwin::sim {
 namespace {
 
 /// Random dimensions of their own, beyond those of trace().
-constexpr std::uint32_t kBounce = 0x10000;
+constexpr std::uint32_t kBounce = 0x10000, kPick = kBounce + 2;
+/// Rays to a light end before its surface by this share of their way.
+constexpr float kShortOfIt = 0.002f;
 
 void prepareTile(const Tracing& tracing, int i, int j, Block& block) {
   const CameraInfo& camera = tracing.request.camera;
@@ -83,12 +86,15 @@ void addTurned(const Tracing& tracing, const Channels& channels, const Lanes<flo
   }
 }
 
-TileGatherer::TileGatherer(const Tracing& tracing, const IrradianceCells& cells, const Channels& channels)
+TileGatherer::TileGatherer(const Tracing& tracing, const IrradianceCells& cells, const LitPoints& lights,
+                           const Channels& channels)
     : tracing_(tracing),
       cells_(cells),
+      lights_(lights),
       channels_(channels),
       sums_(tracing.turns_per_metre.size() * tracing.orders.size()),
       further_(sums_.re.size()),
+      fallen_(sums_.re.size()),
       found_(channels.count()) {
   tile_.sums.resize(channels.count());
   tile_.squares.resize(tracing.turns_per_metre.size());
@@ -103,16 +109,48 @@ void TileGatherer::gather(int i, int j, std::uint32_t first_sample, int samples,
   update.values.resize(channels_.count());
   if (!isAny(camera_rays.valid)) return;
   const Hits seen = hits_;
+  normals_ = seen.normal;
+  samples_ = samples;
+  lookAtLights(camera_rays);
   for (int s = 0; s < samples; ++s) {
     Packet packet = camera_rays;
     for (std::size_t lane = 0; lane < kLaneCount; ++lane) {
       packet.index[lane] = first_sample + static_cast<std::uint32_t>(s);
     }
     hits_ = seen;
-    clearSums(sums_);
+    sums_ = fallen_;
+    if (lights_.areAny()) takeOffBlocked(packet, seen);
     follow(packet, s == 0 ? &update : nullptr);
     keepSums(camera_rays.valid);
   }
+}
+
+/// The light that falls from lit points onto the coarse points.
+void TileGatherer::lookAtLights(const Packet& camera_rays) {
+  clearSums(fallen_);
+  if (!lights_.areAny()) return;
+  lights_.weigh({hits_.position, normals_, camera_rays.valid}, samples_, shares_);
+  lights_.add(tracing_, channels_, shares_, fallen_);
+}
+
+/// One of the lit points, picked by its share, says whether they are seen from here.
+void TileGatherer::takeOffBlocked(const Packet& packet, const Hits& seen) {
+  Lanes<float> draws;
+  for (std::size_t i = 0; i < kLaneCount; ++i) draws[i] = randomPair(packet.key(i), packet.index[i], kPick).u;
+  Lanes<int> picked, valid, is_blocked;
+  lights_.pick(shares_, draws, picked);
+  Vec3Lanes places;
+  lights_.placesOf(picked, places);
+  RTCRay16 rays;
+  setShadowRays(seen, places, rays);
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    valid[i] = (packet.valid[i] != 0) & (picked[i] >= 0) ? -1 : 0;
+    rays.tfar[i] *= 1.0f - kShortOfIt;
+  }
+  if (!isAny(valid)) return;
+  castShadowRays(tracing_.scene, valid.v, rays, false);
+  for (std::size_t i = 0; i < kLaneCount; ++i) is_blocked[i] = (valid[i] != 0) & (rays.tfar[i] < 0.0f) ? -1 : 0;
+  if (isAny(is_blocked)) lights_.takeOff(tracing_, channels_, shares_, picked, is_blocked, sums_);
 }
 
 /// Finds the coarse points themselves.
@@ -165,8 +203,25 @@ bool TileGatherer::meet(Packet& packet, int surface, LaneSums& sums) {
   findHits(tracing_.scene, packet, rays, hits_);
   applyTextures(tracing_.scene, rays, packet, hits_);
   addEmission(packet, hits_, sums.ambient);
-  gatherDirectLight(tracing_, packet, hits_, surface, false, sums);
+  if (surface == 1 && lights_.areAny()) {
+    addDirect(packet, sums);
+  } else {
+    gatherDirectLight(tracing_, packet, hits_, surface, false, sums);
+  }
   return true;
+}
+
+/// Direct light of the hits, less what they send as lit points.
+void TileGatherer::addDirect(const Packet& packet, LaneSums& sums) {
+  Vec3Lanes places;
+  DirectLight light;
+  Lanes<float> weight;
+  for (std::size_t e = 0; e < tracing_.emitters.size(); ++e) {
+    if (!findLightOf(tracing_, e, packet, hits_, 1, false, places, light)) continue;
+    lights_.leave(tracing_.emitters[e], packet, normals_, hits_, samples_, weight);
+    for (std::size_t i = 0; i < kLaneCount; ++i) light.weight[i] *= weight[i];
+    addLight(tracing_, light, sums);
+  }
 }
 
 /// One sample of the light that falls onto the present hits, into `further_`.

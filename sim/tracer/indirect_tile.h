@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "sim/tracer/indirect.h"
+#include "sim/tracer/lit_points.h"
 
 namespace toftwin::sim {
 
@@ -24,7 +25,8 @@ struct CoarseTile {
 /// Samples the light that falls onto coarse points, tile by tile. One for each thread.
 class TileGatherer {
  public:
-  TileGatherer(const Tracing& tracing, const IrradianceCells& cells, const Channels& channels);
+  TileGatherer(const Tracing& tracing, const IrradianceCells& cells, const LitPoints& lights,
+               const Channels& channels);
 
   /// The tile whose first point is (i, j): `samples` of each point, numbered from `first_sample` on; the
   /// first of them also looks further, for the cells.
@@ -33,8 +35,11 @@ class TileGatherer {
 
  private:
   void lookFromCamera(int i, int j, Packet& camera_rays);
+  void lookAtLights(const Packet& camera_rays);
+  void takeOffBlocked(const Packet& packet, const Hits& seen);
   void follow(Packet& packet, CellUpdate* update);
   bool meet(Packet& packet, int surface, LaneSums& sums);
+  void addDirect(const Packet& packet, LaneSums& sums);
   void lookFurther(const Packet& at);
   Lanes<int> addFromCells(const Packet& packet, Lanes<IrradianceCells::Key>& keys, LaneSums& sums);
   void keepGeometry(const Packet& camera_rays);
@@ -42,9 +47,13 @@ class TileGatherer {
 
   const Tracing& tracing_;
   const IrradianceCells& cells_;
+  const LitPoints& lights_;
   const Channels& channels_;
   CoarseTile tile_;
-  LaneSums sums_, further_;
+  LaneSums sums_, further_, fallen_;  ///< fallen: from all lit points, whatever is in its way
+  LitPoints::Shares shares_;
+  Vec3Lanes normals_;  ///< of the coarse points
+  int samples_ = 1;    ///< of each in this frame
   std::vector<Lanes<float>> found_;
   Hits hits_;
 };

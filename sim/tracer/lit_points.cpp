@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim/tracer/lit_points.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "sim/images/rows.h"
+#include "sim/tracer/hit.h"
+#include "sim/tracer/phasor.h"
+#include "sim/tracer/shade.h"
+
+namespace toftwin::sim {
+namespace {
+
+/// So many of each emitter for one receiver: a power of two, which Sobol's sequence spreads evenly.
+constexpr std::uint32_t kPoints = 32;
+constexpr std::uint32_t kLeaving = 0x20000;  // random dimension, beyond those of paths
+/// A column of pixels that no image has, for random numbers that belong to none.
+constexpr std::uint32_t kNoPixel = 0xfffffff0u;
+
+/// The cosine that an emitter's directions begin at, and their density per sr.
+double leastCosine(const PlacedEmitter& emitter) {
+  if (emitter.is_isotropic) return -1.0;
+  const double limit = emitter.pattern.empty() ? emitter.cos_limit : std::cos(emitter.pattern_limit);
+  return std::clamp(limit, 0.0, 0.999999);
+}
+double perSteradian(const PlacedEmitter& emitter) {
+  return 1.0 / (2.0 * std::numbers::pi * (1.0 - leastCosine(emitter)));
+}
+
+/// Ray `number` of an emitter for each lane.
+void leaveEmitter(const Tracing& tracing, std::size_t e, std::uint32_t frame, std::uint32_t number, Packet& packet) {
+  const PlacedEmitter& emitter = tracing.emitters[e];
+  const PixelKey key = pixelKey(tracing.seed, kNoPixel + static_cast<std::uint32_t>(e), frame);
+  const Basis basis = basisAround(emitter.axis);
+  const double least = leastCosine(emitter);
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    const std::uint32_t index = static_cast<std::uint32_t>(i) * kPoints + number;
+    const RandomPair draw = randomPair(key, index, kLeaving);
+    const double cosine = 1.0 - (1.0 - least) * static_cast<double>(draw.u);
+    const double sine = std::sqrt(std::max(0.0, 1.0 - cosine * cosine));
+    const CosSin around = cosSinOfTurns(static_cast<double>(draw.v));
+    const Vec3d direction = normalised(basis.x * (sine * static_cast<double>(around.cos)) +
+                                       basis.y * (sine * static_cast<double>(around.sin)) + emitter.axis * cosine);
+    const RandomPair at_disc = randomPair(key, index, kLeaving + 1);
+    const Vec3d from = emitter.is_disc ? emitter.place(static_cast<double>(at_disc.u), static_cast<double>(at_disc.v))
+                                       : emitter.position;
+    packet.origin.x[i] = from.x;
+    packet.origin.y[i] = from.y;
+    packet.origin.z[i] = from.z;
+    packet.start.x[i] = static_cast<float>(from.x);
+    packet.start.y[i] = static_cast<float>(from.y);
+    packet.start.z[i] = static_cast<float>(from.z);
+    packet.direction.x[i] = direction.x;
+    packet.direction.y[i] = direction.y;
+    packet.direction.z[i] = direction.z;
+    packet.valid[i] = -1;
+    packet.throughput[i] = 1.0f;
+    packet.length[i] = 0.0;
+  }
+}
+
+/// How many points per m² a receiver has at a squared distance, where light falls in with this cosine.
+TOFTWIN_INLINE double pointsPerArea(double per_steradian, double cosine, double square) {
+  return kPoints * per_steradian * cosine / square;
+}
+
+}  // namespace
+
+void LitPoints::take(const Tracing& tracing, const Channels& channels, std::uint32_t frame) {
+  places_.assign(tracing.emitters.size() * kPoints, Place{});
+  inParallel(static_cast<int>(tracing.emitters.size() * kPoints), 8, [&](int first, int last) {
+    const FlushDenormals flush;
+    for (int p = first; p < last; ++p) takeOf(tracing, channels, static_cast<std::size_t>(p), frame);
+  });
+}
+
+void LitPoints::takeOf(const Tracing& tracing, const Channels& channels, std::size_t number, std::uint32_t frame) {
+  const std::size_t e = number / kPoints;
+  const PlacedEmitter& emitter = tracing.emitters[e];
+  Place& place = places_[number];
+  place.radiance.assign(channels.count(), Lanes<float>{});
+  Packet packet;
+  leaveEmitter(tracing, e, frame, static_cast<std::uint32_t>(number % kPoints), packet);
+  RTCRayHit16 rays;
+  Hits hits;
+  Lanes<float> unused{};
+  intersect(tracing, packet, rays, false);
+  endMissed(0.0f, rays, packet, unused);
+  findHits(tracing.scene, packet, rays, hits);
+  place.position = hits.position;
+  place.normal = hits.normal;
+  Lanes<float> radiance{};
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    place.density[i] = 1.0f;
+    if (packet.valid[i] == 0) continue;
+    const Vec3d direction = at(packet.direction, i), normal = at(hits.normal, i);
+    const double square = hits.distance[i] * hits.distance[i], cosine = std::max(1e-9, -dot(direction, normal));
+    const double lit = emitter.intensity(dot(direction, emitter.axis)) * cosine / square;  // W/m²
+    // Seen from the emitter's middle, from where directions' shares are told.
+    const Vec3d middle = emitter.position - at(hits.position, i);
+    const double from_middle = std::max(1e-9, dot(middle, normal) / norm(middle));
+    const double density = pointsPerArea(perSteradian(emitter), from_middle, dot(middle, middle));
+    place.density[i] = static_cast<float>(density);
+    radiance[i] = static_cast<float>(static_cast<double>(hits.albedo[i]) / std::numbers::pi * lit * density /
+                                     pointsPerArea(perSteradian(emitter), cosine, square));
+  }
+  LaneSums sums{tracing.turns_per_metre.size() * tracing.orders.size()};
+  Lanes<double> length;
+  for (std::size_t i = 0; i < kLaneCount; ++i) length[i] = hits.distance[i] + emitter.delay_m;
+  clearSums(sums);
+  addPhasors(tracing.turns_per_metre, tracing.orders, radiance, length, sums);
+  place.radiance[Channels::kSteady] = radiance;
+  for (std::size_t k = 0; k < channels.lanes().size(); ++k) {
+    place.radiance[Channels::re(k)] = sums.re[channels.lanes()[k]];
+    place.radiance[Channels::im(k)] = sums.im[channels.lanes()[k]];
+  }
+}
+
+namespace {
+
+TOFTWIN_VECTOR
+void weighOne(const LitPoints::Receivers& receivers, const Vec3Lanes& position, const Vec3Lanes& normal,
+              const Lanes<float>& density, const Lanes<float>& steady, float directions, Lanes<float>& share,
+              Lanes<float>& way, Lanes<float>& total) {
+  const Vec3Lanes &p = receivers.position, &n = receivers.normal;
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    const auto dx = static_cast<float>(position.x[i] - p.x[i]), dy = static_cast<float>(position.y[i] - p.y[i]),
+               dz = static_cast<float>(position.z[i] - p.z[i]);
+    const float square = dx * dx + dy * dy + dz * dz + 1e-12f;
+    const float here = dx * static_cast<float>(n.x[i]) + dy * static_cast<float>(n.y[i]) + dz * static_cast<float>(n.z[i]);
+    const float there = -(dx * static_cast<float>(normal.x[i]) + dy * static_cast<float>(normal.y[i]) +
+                          dz * static_cast<float>(normal.z[i]));
+    const bool is_seen = (here > 0.0f) & (there > 0.0f) & (receivers.valid[i] != 0);
+    const float g = here * there / (3.14159265f * square * square);
+    share[i] = is_seen ? g / (density[i] + directions * g) : 0.0f;
+    total[i] += share[i] * steady[i];
+    way[i] = __builtin_sqrtf(square);
+  }
+}
+
+TOFTWIN_VECTOR
+void pickBy(const Lanes<float>& share, const Lanes<float>& steady, int number, Lanes<float>& left,
+            Lanes<int>& picked) {
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    const float part = share[i] * steady[i];
+    const bool is_open = left[i] > 0.0f;
+    left[i] -= is_open ? part : 0.0f;
+    picked[i] = is_open & (part > 0.0f) ? number : picked[i];
+  }
+}
+
+}  // namespace
+
+void LitPoints::weigh(const Receivers& receivers, int directions, Shares& shares) const {
+  shares.share.resize(places_.size());
+  shares.way.resize(places_.size());
+  shares.total = {};
+  for (std::size_t k = 0; k < places_.size(); ++k) {
+    const Place& p = places_[k];
+    weighOne(receivers, p.position, p.normal, p.density, p.radiance[Channels::kSteady],
+             static_cast<float>(directions), shares.share[k], shares.way[k], shares.total);
+  }
+}
+
+namespace {
+
+/// Adds share · radiance · exp(−i 2π n f way/c) to the sums of one frequency's wanted harmonics, whose phasors begin
+/// with number `first`: addTurned() without the harmonics that other frequencies want.
+TOFTWIN_VECTOR
+void addFrequency(double turns_per_metre, std::size_t first, std::size_t count, const int* orders,
+                  const std::size_t* terms, const Lanes<float>& share, const Lanes<float>& way,
+                  const std::vector<Lanes<float>>& radiance, LaneSums& sums) {
+  Lanes<float> cosine, sine, re, im, next;
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    const CosSin z = cosSinOfTurns(static_cast<double>(way[i]) * turns_per_metre);
+    cosine[i] = z.cos;
+    sine[i] = -z.sin;
+  }
+  for (std::size_t i = 0; i < kLaneCount; ++i) re[i] = share[i] * cosine[i];
+  for (std::size_t i = 0; i < kLaneCount; ++i) im[i] = share[i] * sine[i];
+  int order = 1;
+  for (std::size_t k = 0; k < count; ++k) {
+    for (; order < orders[k]; ++order) {
+      for (std::size_t i = 0; i < kLaneCount; ++i) next[i] = re[i] * cosine[i] - im[i] * sine[i];
+      for (std::size_t i = 0; i < kLaneCount; ++i) im[i] = re[i] * sine[i] + im[i] * cosine[i];
+      re = next;
+    }
+    const Lanes<float>&a = radiance[Channels::re(first + k)], &b = radiance[Channels::im(first + k)];
+    Lanes<float> sum = sums.re[terms[k]];
+    for (std::size_t i = 0; i < kLaneCount; ++i) sum[i] += a[i] * re[i] - b[i] * im[i];
+    sums.re[terms[k]] = sum;
+    sum = sums.im[terms[k]];
+    for (std::size_t i = 0; i < kLaneCount; ++i) sum[i] += a[i] * im[i] + b[i] * re[i];
+    sums.im[terms[k]] = sum;
+  }
+}
+
+}  // namespace
+
+void LitPoints::add(const Tracing& tracing, const Channels& channels, const Shares& shares, LaneSums& sums) const {
+  const auto harmonics = static_cast<std::size_t>(tracing.request.harmonics);
+  std::vector<int> orders;
+  for (const std::size_t term : channels.terms()) orders.push_back(static_cast<int>(term % harmonics) + 1);
+  for (std::size_t i = 0; i < kLaneCount; ++i) sums.steady[i] += shares.total[i];
+  for (std::size_t f = 0; f < tracing.turns_per_metre.size(); ++f) {
+    const std::size_t first = channels.first(f);
+    const std::size_t last = f + 1 < tracing.turns_per_metre.size() ? channels.first(f + 1) : orders.size();
+    for (std::size_t k = 0; k < places_.size(); ++k) {
+      addFrequency(tracing.turns_per_metre[f], first, last - first, &orders[first], &channels.lanes()[first], shares.share[k],
+                   shares.way[k], places_[k].radiance, sums);
+    }
+  }
+}
+
+void LitPoints::pick(const Shares& shares, const Lanes<float>& draws, Lanes<int>& picked) const {
+  Lanes<float> left;
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    // Not quite the total, so that rounding cannot leave the last of them out.
+    left[i] = draws[i] * shares.total[i] * 0.999999f + 1e-30f;
+    picked[i] = -1;
+  }
+  for (std::size_t k = 0; k < places_.size(); ++k)
+    pickBy(shares.share[k], places_[k].radiance[Channels::kSteady], static_cast<int>(k), left, picked);
+}
+
+void LitPoints::placesOf(const Lanes<int>& picked, Vec3Lanes& places) const {
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    const Vec3Lanes& from = places_[static_cast<std::size_t>(std::max(0, picked[i]))].position;
+    places.x[i] = from.x[i];
+    places.y[i] = from.y[i];
+    places.z[i] = from.z[i];
+  }
+}
+
+void LitPoints::takeOff(const Tracing& tracing, const Channels& channels, const Shares& shares,
+                        const Lanes<int>& picked, const Lanes<int>& is_blocked, LaneSums& sums) const {
+  Lanes<float> weight{};
+  Lanes<double> way{};
+  std::vector<Lanes<float>> radiance(channels.count());
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    if (picked[i] < 0 || is_blocked[i] == 0) continue;
+    const auto k = static_cast<std::size_t>(picked[i]);
+    weight[i] = -shares.total[i] / places_[k].radiance[Channels::kSteady][i];
+    way[i] = static_cast<double>(shares.way[k][i]);
+    for (std::size_t c = 0; c < radiance.size(); ++c) radiance[c][i] = places_[k].radiance[c][i];
+  }
+  addTurned(tracing, channels, weight, way, radiance, sums);
+}
+
+TOFTWIN_VECTOR
+void LitPoints::leave(const PlacedEmitter& emitter, const Packet& packet, const Vec3Lanes& normals, const Hits& hits,
+                      int directions, Lanes<float>& weight) const {
+  const Vec3d from = emitter.position, axis = emitter.axis;
+  const double per_steradian = perSteradian(emitter), n = directions, limit = leastCosine(emitter);
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    const double dx = packet.direction.x[i], dy = packet.direction.y[i], dz = packet.direction.z[i];
+    const double here = dx * normals.x[i] + dy * normals.y[i] + dz * normals.z[i];
+    const double there = -(dx * hits.normal.x[i] + dy * hits.normal.y[i] + dz * hits.normal.z[i]);
+    const double g = n * here * there / (3.14159265358979 * hits.distance[i] * hits.distance[i] + 1e-12);
+    const double mx = from.x - hits.position.x[i], my = from.y - hits.position.y[i], mz = from.z - hits.position.z[i];
+    const double square = mx * mx + my * my + mz * mz + 1e-12, per_way = perRoot(square);
+    const double cosine = (mx * hits.normal.x[i] + my * hits.normal.y[i] + mz * hits.normal.z[i]) * per_way;
+    const double lobe = -(mx * axis.x + my * axis.y + mz * axis.z) * per_way;
+    const double q = pointsPerArea(per_steradian, cosine, square);
+    // A disc also lights what its middle does not: that is the directions' alone.
+    const bool is_shared = (cosine > 1e-9) & (lobe >= limit);
+    weight[i] = is_shared ? static_cast<float>(g / (q + g)) : 1.0f;
+  }
+}
+
+}  // namespace toftwin::sim
