@@ -33,7 +33,6 @@ class KinectDecoder {
         // 80 MHz is three units of 240 MHz.
         unit_m_(settings.speed_of_light / (6.0 * samples.frequencies[0].in(hertz))),
         brightness_(width_, height_),
-        depth_m_(width_, height_),
         is_edge_(width_, height_) {
     for (std::size_t f = 0; f < kFrequencies; ++f) {
       counts_[f] = kinect_.counts_per_electron * kinect_.amplitude_multipliers[f];
@@ -49,12 +48,15 @@ class KinectDecoder {
     forRows(height_, [&](int first, int last) {
       for (int y = first; y < last; ++y) demodulate(y);
     });
-    forRows(height_, [&](int first, int last) { measureRows(first, last); });
-    if (kinect_.edge_filter) {
-      forRows(height_, [&](int first, int last) {
-        for (int y = first; y < last; ++y) dropEdges(y);
-      });
+    if (kinect_.bilateral_filter) {
+      for (std::size_t f = 0; f < kFrequencies; ++f) filter(f);
+    } else {
+      filtered_ = result_.phasors;
     }
+    forRows(height_, [&](int first, int last) {
+      for (int y = first; y < last; ++y) measureRow(y);
+    });
+    if (kinect_.edge_filter) dropEdges();
     return std::move(result_);
   }
 
@@ -75,58 +77,37 @@ class KinectDecoder {
     unmodulatedRow(samples_, y, &result_.ambient(0, y));
   }
 
-  /// Filters and measures. Saturated pixels have no phase that others could take.
-  void measureRows(int first, int last) {
-    const auto columns = static_cast<std::size_t>(width_);
-    std::vector<BilateralRows> filters;
-    for (std::size_t f = 0; f < kFrequencies && kinect_.bilateral_filter; ++f) {
-      const auto least = static_cast<float>(kinect_.bilateral_threshold_counts / counts_[f]);
-      filters.emplace_back(result_.phasors[f], samples_.flags, least, first);
+  /// Saturated pixels have no phase that others could take.
+  void filter(std::size_t f) {
+    const auto least = static_cast<float>(kinect_.bilateral_threshold_counts / counts_[f]);
+    Image<std::complex<float>> clean = result_.phasors[f];
+    for (std::size_t i = 0; i < samples_.flags.size(); ++i) {
+      if (has(samples_.flags[i], PixelFlag::Saturated)) clean[i] = 0.0F;
     }
-    std::vector<std::complex<float>> filtered(columns);
-    std::vector<float> unlikeness(columns);
-    PolarRows polar;
-    for (int y = first; y < last; ++y) {
-      for (std::size_t f = 0; f < kFrequencies; ++f) {
-        const std::complex<float>* phasors = &result_.phasors[f](0, y);
-        if (kinect_.bilateral_filter) {
-          filters[f].next(filtered.data(), unlikeness.data());
-          phasors = filtered.data();
-          markEdges(unlikeness, y);
-        }
-        takePolar(phasors, f, polar);
-      }
-      measureRow(polar, y);
+    FilteredPhasors filtered = bilateralFilter(clean, least);
+    for (std::size_t i = 0; i < is_edge_.size(); ++i) {
+      if (filtered.unlikeness[i] >= static_cast<float>(kinect_.edge_unlikeness)) is_edge_[i] = 1;
     }
+    filtered_.push_back(std::move(filtered.phasors));
   }
 
-  struct PolarRows {
+  void measureRow(int y) {
+    const auto columns = static_cast<std::size_t>(width_);
     std::array<std::vector<float>, kFrequencies> cycles, amplitudes;
-  };
-
-  void takePolar(const std::complex<float>* phasors, std::size_t f, PolarRows& polar) const {
-    const auto columns = static_cast<std::size_t>(width_);
-    polar.cycles[f].resize(columns);
-    polar.amplitudes[f].resize(columns);
-    polarRow(phasors, columns, zero_cycles_[f], polar.cycles[f].data(), polar.amplitudes[f].data());
-    if (f < settings_.true_cycles.size() && settings_.true_cycles[f].size() > 1)
-      linearise(settings_.true_cycles[f], polar.cycles[f]);
-  }
-
-  void markEdges(const std::vector<float>& unlikeness, int y) {
-    const auto least = static_cast<float>(kinect_.edge_unlikeness);
-    std::uint8_t* is_edge = &is_edge_(0, y);
-    for (std::size_t x = 0; x < unlikeness.size(); ++x)
-      is_edge[x] = static_cast<std::uint8_t>(is_edge[x] | (unlikeness[x] >= least ? 1 : 0));
-  }
-
-  void measureRow(const PolarRows& polar, int y) {
-    const auto columns = static_cast<std::size_t>(width_);
+    for (std::size_t f = 0; f < kFrequencies; ++f) {
+      cycles[f].resize(columns);
+      amplitudes[f].resize(columns);
+      polarRow(&filtered_[f](0, y), columns, zero_cycles_[f], cycles[f].data(),
+               amplitudes[f].data());
+      if (f < settings_.true_cycles.size() && settings_.true_cycles[f].size() > 1) {
+        linearise(settings_.true_cycles[f], cycles[f]);
+      }
+    }
     for (std::size_t x = 0; x < columns; ++x) {
       std::array<double, kFrequencies> phase{}, counts{};
       for (std::size_t f = 0; f < kFrequencies; ++f) {
-        phase[f] = static_cast<double>(polar.cycles[f][x]);
-        counts[f] = static_cast<double>(polar.amplitudes[f][x]) * counts_[f];
+        phase[f] = static_cast<double>(cycles[f][x]);
+        counts[f] = static_cast<double>(amplitudes[f][x]) * counts_[f];
       }
       const int column = static_cast<int>(x);
       std::uint8_t flags = samples_.flags.empty() ? std::uint8_t{0} : samples_.flags(column, y);
@@ -135,7 +116,6 @@ class KinectDecoder {
       result_.range_m(column, y) = has(flags, PixelFlag::Invalid) ? kNaN : static_cast<float>(range_m);
       result_.flags(column, y) = flags;
       brightness_(column, y) = static_cast<float>(counts[0] + counts[1] + counts[2]);
-      depth_m_(column, y) = result_.range_m(column, y) * static_cast<float>(rayZ(column, y));
     }
   }
 
@@ -176,13 +156,17 @@ class KinectDecoder {
     return rays_.z.empty() ? 1.0 : static_cast<double>(rays_.z(x, y));
   }
 
-  void dropEdges(int y) {
-    std::vector<std::uint8_t> drops(static_cast<std::size_t>(width_));
-    findDropped(depth_m_, is_edge_, brightness_, y, drops.data());
-    for (int x = 0; x < width_; ++x) {
-      if (drops[static_cast<std::size_t>(x)] == 0) continue;
-      reject(result_.flags(x, y), PixelFlag::Mixed);
-      result_.range_m(x, y) = kNaN;
+  void dropEdges() {
+    Image<float> depth_m{width_, height_};
+    for (int y = 0; y < height_; ++y) {
+      for (int x = 0; x < width_; ++x)
+        depth_m(x, y) = result_.range_m(x, y) * static_cast<float>(rayZ(x, y));
+    }
+    const Image<std::uint8_t> drops = edgePixels(depth_m, is_edge_, brightness_);
+    for (std::size_t i = 0; i < drops.size(); ++i) {
+      if (drops[i] == 0) continue;
+      reject(result_.flags[i], PixelFlag::Mixed);
+      result_.range_m[i] = kNaN;
     }
   }
 
@@ -196,8 +180,8 @@ class KinectDecoder {
   double unit_m_;
   std::array<double, kFrequencies> counts_{};  ///< of the device per electron of amplitude
   RangeImage result_;
+  std::vector<Image<std::complex<float>>> filtered_;
   Image<float> brightness_;  ///< sum of the amplitudes in counts
-  Image<float> depth_m_;
   Image<std::uint8_t> is_edge_;
 };
 

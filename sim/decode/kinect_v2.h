@@ -1,11 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
-#include <complex>
-#include <cstddef>
 #include <cstdint>
-#include <vector>
 
 #include <toftwin/image.h>
 
@@ -41,39 +37,6 @@ struct FilteredPhasors {
 /// without signal and the image's border stay as they are.
 FilteredPhasors bilateralFilter(const Image<std::complex<float>>& phasors, float least_amplitude);
 
-/// The same filter row by row from `first` on, for those who need the rows in the cache. Pixels that the flags
-/// call saturated count as without signal, and come out as zero; no flags: none. The images stay the caller's.
-class BilateralRows {
- public:
-  BilateralRows(const Image<std::complex<float>>& phasors, const Image<std::uint8_t>& flags, float least_amplitude,
-                int first);
-  /// The next row, a whole one.
-  void next(std::complex<float>* filtered, float* unlikeness);
-
-  /// One row of phasors as separate arrays: the phasor, its direction, its squared length.
-  struct Row {
-    explicit Row(std::size_t width);
-    std::vector<float> re, im, u, v, square;
-  };
-  /// What is gathered for one row of the result.
-  struct Sums {
-    explicit Sums(std::size_t width);
-    std::vector<float> re, im, weight, unlikeness;
-  };
-
- private:
-  void split(int y);
-  [[nodiscard]] std::size_t columns() const { return static_cast<std::size_t>(phasors_.width()); }
-  Row& rowOf(int y) { return rows_[static_cast<std::size_t>(y % 3)]; }
-
-  const Image<std::complex<float>>& phasors_;
-  const Image<std::uint8_t>& flags_;
-  float least_square_;
-  int next_;
-  std::array<Row, 3> rows_;  ///< the one above, the next one, the one below, by y modulo 3
-  Sums sums_;
-};
-
 /// Pixels that the edge filter drops: `depth_m` along the optical axis, NaN where invalid already;
 /// `is_edge` from the bilateral filter (unlikeness of 2.5 or more at any frequency); `brightness`
 /// is the sum of the frequencies' amplitudes in counts. A pixel at an edge is dropped, and one that
@@ -82,8 +45,5 @@ class BilateralRows {
 /// are not looked at.
 Image<std::uint8_t> edgePixels(const Image<float>& depth_m, const Image<std::uint8_t>& is_edge,
                                const Image<float>& brightness);
-/// The same of row `y`: 1 where a pixel is dropped.
-void findDropped(const Image<float>& depth_m, const Image<std::uint8_t>& is_edge, const Image<float>& brightness,
-                 int y, std::uint8_t* drops);
 
 }  // namespace toftwin::sim

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <vector>
 
-#include "sim/decode/decode_steps.h"
 #include "sim/decode/kinect_v2.h"
 #include "sim/images/rows.h"
 #include "sim/images/simd.h"
@@ -16,8 +15,11 @@ namespace {
 constexpr float kFalloff = 1.442695F * 5.0F;
 constexpr float kMiddle = 0.1195716F, kBeside = 0.1131098F, kDiagonal = 0.1069973F;
 
-using Row = BilateralRows::Row;
-using Sums = BilateralRows::Sums;
+/// One row of phasors as separate arrays: the phasor, its direction, its squared length.
+struct Row {
+  explicit Row(std::size_t width) : re(width), im(width), u(width), v(width), square(width) {}
+  std::vector<float> re, im, u, v, square;
+};
 
 TOFTWIN_SIMD void splitRow(const std::complex<float>* phasors, std::size_t width, float* __restrict re,
                            float* __restrict im, float* __restrict u, float* __restrict v,
@@ -35,14 +37,26 @@ TOFTWIN_SIMD void splitRow(const std::complex<float>* phasors, std::size_t width
   }
 }
 
-/// eˣ for x in [−7.3, 0], relative error below 6e-6: (polynomial of x/16)^16, that of the least largest error.
+void split(const Image<std::complex<float>>& phasors, int y, Row& row) {
+  splitRow(&phasors(0, y), row.re.size(), row.re.data(), row.im.data(), row.u.data(), row.v.data(),
+           row.square.data());
+}
+
+/// What is gathered for one row of the result.
+struct Sums {
+  explicit Sums(std::size_t width) : re(width), im(width), weight(width), unlikeness(width) {}
+  std::vector<float> re, im, weight, unlikeness;
+};
+
+/// eˣ for x in [−7.3, 0], relative error below 2e-5: (Taylor series of x/16)^16.
 inline float decay(float x) {
   const float t = x * (1.0F / 16.0F);
-  float e = 0.0330958486F;
-  e = 0.163300961F + t * e;
-  e = 0.499443955F + t * e;
-  e = 0.999967097F + t * e;
-  e = 0.999999679F + t * e;
+  float e = 1.0F + t * (1.0F / 6.0F);
+  e = 1.0F + t * (1.0F / 5.0F) * e;
+  e = 1.0F + t * (1.0F / 4.0F) * e;
+  e = 1.0F + t * (1.0F / 3.0F) * e;
+  e = 1.0F + t * (1.0F / 2.0F) * e;
+  e = 1.0F + t * e;
   e *= e;
   e *= e;
   e *= e;
@@ -74,7 +88,6 @@ TOFTWIN_SIMD void addNeighbour(const Row& own, const Row& other, int shift, floa
   }
 }
 
-/// Pixels without signal stay as they are.
 TOFTWIN_SIMD void finishRow(const Row& own, const Sums& sums, std::complex<float>* phasors,
                             float* __restrict unlikeness) {
   auto* __restrict parts = reinterpret_cast<float*>(phasors);
@@ -85,9 +98,9 @@ TOFTWIN_SIMD void finishRow(const Row& own, const Sums& sums, std::complex<float
   for (std::size_t x = 1; x < last; ++x) {
     const bool is_signal = square[x] > 0.0F;  // not NaN
     const float weight = 1.0F / (total[x] + kMiddle);
-    parts[2 * x] = is_signal ? (re[x] + kMiddle * own_re[x]) * weight : own_re[x];
-    parts[2 * x + 1] = is_signal ? (im[x] + kMiddle * own_im[x]) * weight : own_im[x];
-    unlikeness[x] = is_signal ? unlike[x] : 0.0F;
+    parts[2 * x] = is_signal ? (re[x] + kMiddle * own_re[x]) * weight : parts[2 * x];
+    parts[2 * x + 1] = is_signal ? (im[x] + kMiddle * own_im[x]) * weight : parts[2 * x + 1];
+    unlikeness[x] = is_signal ? unlike[x] : unlikeness[x];
   }
 }
 
@@ -117,119 +130,60 @@ Surroundings lookAround(const Image<float>& depth_m, const Image<std::uint8_t>& 
   return seen;
 }
 
-constexpr float kNear_m = 0.050F, kFar_m = 0.030F;
-
 bool hangsBetween(float depth_m, const Surroundings& seen) {
-  constexpr float kLargest_m = 0.100F;
+  constexpr float kNear_m = 0.050F, kFar_m = 0.030F, kLargest_m = 0.100F;
   constexpr float kLeastMean = 50.0F, kVariation = 0.05F;
   const float nearer = depth_m - seen.nearest_m, farther = seen.farthest_m - depth_m;
   return nearer > kNear_m && farther > kFar_m && std::max(nearer, farther) > kLargest_m &&
          seen.deviation >= kVariation * std::max(seen.mean, kLeastMean);
 }
 
-/// Marks the pixels of a row that edgePixels() may drop: at an edge, or between a nearer and a farther
-/// neighbour, whether those count or not.
-TOFTWIN_SIMD void markDoubtful(const float* above, const float* here, const float* below, const std::uint8_t* is_edge,
-                               int width, std::uint8_t* __restrict marks) {
-  for (int x = 1; x < width - 1; ++x) {
-    const float depth = here[x];
-    float nearest = depth, farthest = depth;
-    for (const float* row : {above, here, below}) {
-      for (int u = -1; u <= 1; ++u) {
-        const float other = row[x + u];
-        nearest = (other > 0.0F) & (other < nearest) ? other : nearest;
-        farthest = other > farthest ? other : farthest;
-      }
-    }
-    const bool is_between = (depth - nearest > kNear_m) & (farthest - depth > kFar_m);
-    marks[x] = (depth == depth) & ((is_edge[x] != 0) | is_between) ? 1 : 0;  // not NaN
-  }
-}
-
 }  // namespace
-
-BilateralRows::Row::Row(std::size_t width) : re(width), im(width), u(width), v(width), square(width) {}
-BilateralRows::Sums::Sums(std::size_t width) : re(width), im(width), weight(width), unlikeness(width) {}
-
-BilateralRows::BilateralRows(const Image<std::complex<float>>& phasors, const Image<std::uint8_t>& flags,
-                             float least_amplitude, int first)
-    : phasors_(phasors),
-      flags_(flags),
-      least_square_(least_amplitude * least_amplitude),
-      next_(first),
-      rows_{Row{columns()}, Row{columns()}, Row{columns()}},
-      sums_(columns()) {
-  for (int y = std::max(0, first - 1); y <= first; ++y) split(y);
-}
-
-void BilateralRows::split(int y) {
-  Row& row = rowOf(y);
-  splitRow(&phasors_(0, y), columns(), row.re.data(), row.im.data(), row.u.data(), row.v.data(), row.square.data());
-  if (flags_.empty()) return;
-  const std::uint8_t* flags = &flags_(0, y);
-  for (std::size_t x = 0; x < columns(); ++x) {
-    if (has(flags[x], PixelFlag::Saturated)) row.re[x] = row.im[x] = row.u[x] = row.v[x] = row.square[x] = 0.0F;
-  }
-}
-
-void BilateralRows::next(std::complex<float>* filtered, float* unlikeness) {
-  const int y = next_++, height = phasors_.height();
-  if (y + 1 < height) split(y + 1);
-  const Row& own = rowOf(y);
-  const std::size_t width = columns();
-  const bool is_inside = y > 0 && y + 1 < height && width >= 3;
-  for (std::size_t x = 0; x < width; x += is_inside ? width - 1 : 1) {
-    filtered[x] = {own.re[x], own.im[x]};
-    unlikeness[x] = 0.0F;
-  }
-  if (!is_inside) return;
-  for (std::vector<float>* sum : {&sums_.re, &sums_.im, &sums_.weight, &sums_.unlikeness})
-    std::fill(sum->begin(), sum->end(), 0.0F);
-  for (int shift : {-1, 0, 1}) {
-    const float gauss = shift == 0 ? kBeside : kDiagonal;
-    addNeighbour(own, rowOf(y - 1), shift, gauss, least_square_, sums_);
-    if (shift != 0) addNeighbour(own, own, shift, kBeside, least_square_, sums_);
-    addNeighbour(own, rowOf(y + 1), shift, gauss, least_square_, sums_);
-  }
-  finishRow(own, sums_, filtered, unlikeness);
-}
 
 FilteredPhasors bilateralFilter(const Image<std::complex<float>>& phasors, float least_amplitude) {
   const int width = phasors.width(), height = phasors.height();
-  FilteredPhasors result{Image<std::complex<float>>{width, height}, Image<float>{width, height}};
-  const Image<std::uint8_t> no_flags;
-  forRows(height, [&](int first, int last) {
-    BilateralRows rows{phasors, no_flags, least_amplitude, first};
-    for (int y = first; y < last; ++y) rows.next(&result.phasors(0, y), &result.unlikeness(0, y));
+  FilteredPhasors result{phasors, Image<float>{width, height}};
+  if (width < 3 || height < 3) return result;
+  const float least_square = least_amplitude * least_amplitude;
+  forRows(height - 2, [&](int first, int last) {
+    const auto columns = static_cast<std::size_t>(width);
+    std::array<Row, 3> rows{Row{columns}, Row{columns}, Row{columns}};  // y − 1, y, y + 1, in turns
+    split(phasors, first, rows[0]);
+    split(phasors, first + 1, rows[1]);
+    for (int y = first + 1; y <= last; ++y) {
+      const auto place = [&](int row) -> Row& {
+        return rows[static_cast<std::size_t>((row - first) % 3)];
+      };
+      split(phasors, y + 1, place(y + 1));
+      const Row &above = place(y - 1), &own = place(y), &below = place(y + 1);
+      Sums sums{columns};
+      for (int shift : {-1, 0, 1}) {
+        const float gauss = shift == 0 ? kBeside : kDiagonal;
+        addNeighbour(own, above, shift, gauss, least_square, sums);
+        if (shift != 0) addNeighbour(own, own, shift, kBeside, least_square, sums);
+        addNeighbour(own, below, shift, gauss, least_square, sums);
+      }
+      finishRow(own, sums, &result.phasors(0, y), &result.unlikeness(0, y));
+    }
   });
   return result;
 }
 
-namespace {
-
-bool isDropped(const Image<float>& depth_m, const Image<std::uint8_t>& is_edge, const Image<float>& brightness,
-               int x, int y) {
-  return is_edge(x, y) != 0 || hangsBetween(depth_m(x, y), lookAround(depth_m, is_edge, brightness, x, y));
-}
-
-}  // namespace
-
-void findDropped(const Image<float>& depth_m, const Image<std::uint8_t>& is_edge, const Image<float>& brightness,
-                 int y, std::uint8_t* drops) {
-  const int width = depth_m.width();
-  std::fill_n(drops, width, std::uint8_t{0});
-  if (width < 3 || y < 1 || y + 1 >= depth_m.height()) return;
-  markDoubtful(&depth_m(0, y - 1), &depth_m(0, y), &depth_m(0, y + 1), &is_edge(0, y), width, drops);
-  for (int x = 1; x < width - 1; ++x) {
-    if (drops[x] != 0 && !isDropped(depth_m, is_edge, brightness, x, y)) drops[x] = 0;
-  }
-}
-
 Image<std::uint8_t> edgePixels(const Image<float>& depth_m, const Image<std::uint8_t>& is_edge,
                                const Image<float>& brightness) {
-  Image<std::uint8_t> drops{depth_m.width(), depth_m.height()};
-  forRows(drops.height(), [&](int first, int last) {
-    for (int y = first; y < last; ++y) findDropped(depth_m, is_edge, brightness, y, &drops(0, y));
+  const int width = depth_m.width(), height = depth_m.height();
+  Image<std::uint8_t> drops{width, height};
+  if (width < 3 || height < 3) return drops;
+  forRows(height - 2, [&](int first, int last) {
+    for (int y = first + 1; y <= last; ++y) {
+      for (int x = 1; x < width - 1; ++x) {
+        if (std::isnan(depth_m(x, y))) continue;
+        if (is_edge(x, y) != 0 ||
+            hangsBetween(depth_m(x, y), lookAround(depth_m, is_edge, brightness, x, y))) {
+          drops(x, y) = 1;
+        }
+      }
+    }
   });
   return drops;
 }
