@@ -15,7 +15,8 @@ namespace {
 bool saysNothing(std::string_view field) {
   constexpr std::array kWords{"", "nan", "na", "n/a", "null", "none", "-", "--", "?"};
   std::string lower{field};
-  std::ranges::transform(lower, lower.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  std::ranges::transform(lower, lower.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return std::ranges::find(kWords, lower) != kWords.end();
 }
 
@@ -62,7 +63,8 @@ std::optional<double> dayOf(std::string_view& text) {
   if (!month || !takes(text, '-')) return std::nullopt;
   const auto day = taken(text, 2);
   if (!day) return std::nullopt;
-  const std::chrono::year_month_day date{std::chrono::year{*year}, std::chrono::month{static_cast<unsigned>(*month)},
+  const std::chrono::year_month_day date{std::chrono::year{*year},
+                                         std::chrono::month{static_cast<unsigned>(*month)},
                                          std::chrono::day{static_cast<unsigned>(*day)}};
   if (!date.ok()) return std::nullopt;
   return static_cast<double>(std::chrono::sys_days{date}.time_since_epoch().count());

@@ -16,17 +16,16 @@ namespace {
 
 using Over = sim::LearnedRange::Over;
 
-constexpr std::array kOvers{
-    std::pair{std::string_view{"time_s"}, Over::Time},
-    std::pair{std::string_view{"temperature_illumination_c"}, Over::Illumination},
-    std::pair{std::string_view{"temperature_sensor_c"}, Over::Sensor},
-    std::pair{std::string_view{"ambient_klx"}, Over::Ambient},
-    std::pair{std::string_view{"exposure_us"}, Over::Exposure},
-    std::pair{std::string_view{"range_m"}, Over::Range},
-    std::pair{std::string_view{"amplitude_e"}, Over::Amplitude},
-    std::pair{std::string_view{"column"}, Over::Column},
-    std::pair{std::string_view{"row"}, Over::Row},
-    std::pair{std::string_view{"radius_px"}, Over::Radius}};
+constexpr std::array kOvers{std::pair{std::string_view{"time_s"}, Over::Time},
+                            std::pair{std::string_view{"temperature_illumination_c"}, Over::Illumination},
+                            std::pair{std::string_view{"temperature_sensor_c"}, Over::Sensor},
+                            std::pair{std::string_view{"ambient_klx"}, Over::Ambient},
+                            std::pair{std::string_view{"exposure_us"}, Over::Exposure},
+                            std::pair{std::string_view{"range_m"}, Over::Range},
+                            std::pair{std::string_view{"amplitude_e"}, Over::Amplitude},
+                            std::pair{std::string_view{"column"}, Over::Column},
+                            std::pair{std::string_view{"row"}, Over::Row},
+                            std::pair{std::string_view{"radius_px"}, Over::Radius}};
 
 std::optional<Over> overOf(const std::string& covariate) {
   for (const auto& [word, over] : kOvers) {
@@ -59,7 +58,8 @@ bool movesRange(const Term& term) {
          (term.carrier.empty() && term.stage.value_or(Stage::Range) == Stage::Range);
 }
 bool changesGain(const Term& term) {
-  return term.carrier == "gain" || (term.carrier.empty() && term.stage.value_or(Stage::Range) != Stage::Range);
+  return term.carrier == "gain" ||
+         (term.carrier.empty() && term.stage.value_or(Stage::Range) != Stage::Range);
 }
 
 /// The terms of an effect that go with the same covariates, with their coefficients.
@@ -67,7 +67,8 @@ struct Along {
   std::vector<std::string> covariates{};
   std::vector<std::pair<Term, double>> terms{};
 
-  [[nodiscard]] double sum(bool (*which)(const Term&), const std::function<double(const std::string&)>& value) const {
+  [[nodiscard]] double sum(bool (*which)(const Term&),
+                           const std::function<double(const std::string&)>& value) const {
     double all = 0.0;
     for (const auto& [term, coefficient] : terms)
       if (which(term)) all += coefficient * term.at(value);
@@ -103,7 +104,8 @@ std::optional<sim::AnyEffect> tableOf(const Along& along, std::span<const Covari
     over[i] = *known;
   }
   const bool has_two = along.covariates.size() == 2;
-  sim::LearnedRange learned{.over = over[0], .knots = knotsOf(*info[0], has_two ? 24 : 256), .offsets_mm = {}};
+  sim::LearnedRange learned{
+      .over = over[0], .knots = knotsOf(*info[0], has_two ? 24 : 256), .offsets_mm = {}};
   if (has_two) learned.and_over = over[1], learned.and_knots = knotsOf(*info[1], 24);
   for (const double x : learned.knots) {
     for (const double y : has_two ? learned.and_knots : std::vector{0.0}) {
@@ -120,10 +122,13 @@ std::optional<sim::AnyEffect> tableOf(const Along& along, std::span<const Covari
 
 /// A pattern of pixels, as a table over columns and rows with a knot in the middle of each cell.
 sim::AnyEffect tableOf(const PixelPattern& pattern) {
-  sim::LearnedRange learned{.over = Over::Column, .knots = {}, .and_over = Over::Row, .and_knots = {}, .offsets_mm = {}};
+  sim::LearnedRange learned{
+      .over = Over::Column, .knots = {}, .and_over = Over::Row, .and_knots = {}, .offsets_mm = {}};
   const CellGrid& grid = pattern.grid;
-  for (int i = 0; i < grid.columns; ++i) learned.knots.push_back(i * grid.cell_width + 0.5 * (grid.cell_width - 1));
-  for (int i = 0; i < grid.rows; ++i) learned.and_knots.push_back(i * grid.cell_height + 0.5 * (grid.cell_height - 1));
+  for (int i = 0; i < grid.columns; ++i)
+    learned.knots.push_back(i * grid.cell_width + 0.5 * (grid.cell_width - 1));
+  for (int i = 0; i < grid.rows; ++i)
+    learned.and_knots.push_back(i * grid.cell_height + 0.5 * (grid.cell_height - 1));
   std::vector<double>& table = pattern.carrier == "gain" ? learned.gains_percent : learned.offsets_mm;
   for (int column = 0; column < grid.columns; ++column)
     for (int row = 0; row < grid.rows; ++row)
@@ -132,7 +137,8 @@ sim::AnyEffect tableOf(const PixelPattern& pattern) {
 }
 
 /// Coefficients of a carrier's two parts, where all of its terms are constant.
-std::optional<std::pair<double, double>> inBothPhases(const std::vector<Along>& all, const std::string& carrier) {
+std::optional<std::pair<double, double>> inBothPhases(const std::vector<Along>& all,
+                                                      const std::string& carrier) {
   double in_phase = 0.0, quadrature = 0.0;
   bool is_there = false;
   for (const Along& along : all) {
@@ -146,8 +152,8 @@ std::optional<std::pair<double, double>> inBothPhases(const std::vector<Along>& 
   return is_there ? std::optional{std::pair{in_phase, quadrature}} : std::nullopt;
 }
 
-/// A charge in the correlation's real and imaginary part, as charges of the first raw exposure and the one a quarter
-/// of a turn later. Where no raw exposure is there: nothing.
+/// A charge in the correlation's real and imaginary part, as charges of the first raw exposure and the one a
+/// quarter of a turn later. Where no raw exposure is there: nothing.
 std::vector<sim::AnyEffect> chargesOf(const sim::SensorModel& model, double in_phase, double quadrature) {
   const auto steps = static_cast<int>(model.exposures({}).size()) /
                      std::max(1, static_cast<int>(model.traceRequest().frequencies.size()));
@@ -156,8 +162,8 @@ std::vector<sim::AnyEffect> chargesOf(const sim::SensorModel& model, double in_p
           sim::SampleOffset{.step = steps / 4, .electrons = quadrature}};
 }
 
-/// Stray light as a reflection within the housing, which has its form: exp(−iφ) with φ = 4π f r₀/c. How strong it is,
-/// the simulator says.
+/// Stray light as a reflection within the housing, which has its form: exp(−iφ) with φ = 4π f r₀/c. How
+/// strong it is, the simulator says.
 sim::AnyEffect reflectionOf(const sim::SensorModel& model, double in_phase, double quadrature) {
   sim::InternalReflection reflection;
   Frequency highest = 0_MHz;
@@ -181,9 +187,11 @@ std::vector<LearnedEffect> learnedEffectsOf(const Effect& effect, const Campaign
   for (const Term& term : termsOf(effect))
     if (const PixelPattern* pattern = rows.patternOf(term.carrier)) learned.push_back({tableOf(*pattern)});
   if (const auto charge = inBothPhases(all, "charge"))
-    for (const sim::AnyEffect& one : chargesOf(model, charge->first, charge->second)) learned.push_back({one, {"electrons"}});
+    for (const sim::AnyEffect& one : chargesOf(model, charge->first, charge->second))
+      learned.push_back({one, {"electrons"}});
   if (const auto stray = inBothPhases(all, "stray"))
-    learned.push_back({reflectionOf(model, stray->first, stray->second), {"radiance_w_per_m2_sr", "half_way_mm"}});
+    learned.push_back(
+        {reflectionOf(model, stray->first, stray->second), {"radiance_w_per_m2_sr", "half_way_mm"}});
   return learned;
 }
 

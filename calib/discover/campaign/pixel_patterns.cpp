@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // What stays the same at each pixel while it moves over the scene.
 //
-// With e the whitened residual of a cell, b what one unit of the pattern would be there (both for each channel), its
-// value t is known from captures k as
+// With e the whitened residual of a cell, b what one unit of the pattern would be there (both for each
+// channel), its value t is known from captures k as
 //     t = Σ b e / (Σ b² + 1/τ²),
-// τ² the pattern's variance over the image: of captures k, l at different places of the scene Σ b e of the one times
-// that of the other is on average Σ b² Σ b² τ². Captures at one place say nothing by themselves: there the scene
-// stands still, too.
+// τ² the pattern's variance over the image: of captures k, l at different places of the scene Σ b e of the
+// one times that of the other is on average Σ b² Σ b² τ². Captures at one place say nothing by themselves:
+// there the scene stands still, too.
 //
 // In a capture the pattern of those before it stands, at other places: noise then has no part in its own
-// explanation, the column's product with the residual is a sum of martingale differences, and its variance the
-// column's square, as if the column had been known beforehand.
+// explanation, the column's product with the residual is a sum of martingale differences, and its variance
+// the column's square, as if the column had been known beforehand.
 #include <cmath>
 #include <optional>
 
@@ -125,8 +125,8 @@ void CampaignRows::putPattern(const std::string& name, const std::vector<PerChan
       for (Eigen::Index i = 0; i < channel.size(); ++i)
         channel[i] *= static_cast<float>(values[cells.placeOf(static_cast<std::size_t>(i))]);
   };
-  PixelPattern& pattern = patterns_[name] = {on == "range" ? "" : on, grid, shrunk(all, *prior),
-                                             1.0 / std::sqrt(*prior)};
+  PixelPattern& pattern =
+      patterns_[name] = {on == "range" ? "" : on, grid, shrunk(all, *prior), 1.0 / std::sqrt(*prior)};
   Sums before{grid.size()};
   std::map<std::size_t, Sums> before_by_site;
   for (std::size_t c = 0; c < rows_.size(); ++c) {

@@ -16,10 +16,11 @@
 namespace toftwin::discover {
 namespace {
 
-constexpr std::size_t kMostCaptures = 150;     ///< of frames that all belong together: so many captures
-constexpr std::size_t kFewestFrames = 16;      ///< that such a capture has
-constexpr std::size_t kEachLocked = 5;         ///< one in five captures is put aside
-constexpr std::int64_t kSameTime_ns = 100'000'000;  ///< a pose of that much earlier or later is not this frame's
+constexpr std::size_t kMostCaptures = 150;  ///< of frames that all belong together: so many captures
+constexpr std::size_t kFewestFrames = 16;   ///< that such a capture has
+constexpr std::size_t kEachLocked = 5;      ///< one in five captures is put aside
+constexpr std::int64_t kSameTime_ns =
+    100'000'000;  ///< a pose of that much earlier or later is not this frame's
 
 using Pose = Transform<World, Camera>;
 
@@ -44,14 +45,15 @@ Result<std::vector<Stamp>> stampsOf(const std::filesystem::path& file) {
 
 Error withoutPose(const std::filesystem::path& file, std::size_t frame, const std::string& why) {
   return {Error::Code::InvalidArgument,
-          fmt::format("{}: frame {} has no pose{}; what a camera sees can be simulated only from where it stood: "
-                      "record with a rig or a pose in the daemon's configuration, or give --poses, a recording whose "
-                      "frames have them",
-                      file.string(), frame, why)};
+          fmt::format(
+              "{}: frame {} has no pose{}; what a camera sees can be simulated only from where it stood: "
+              "record with a rig or a pose in the daemon's configuration, or give --poses, a recording whose "
+              "frames have them",
+              file.string(), frame, why)};
 }
 
-/// Each frame's pose: its own, else the reference's: frame by frame where both have as many, else the one that was
-/// received next to it.
+/// Each frame's pose: its own, else the reference's: frame by frame where both have as many, else the one
+/// that was received next to it.
 Result<std::vector<Pose>> posesOf(const std::filesystem::path& file, const std::filesystem::path& reference) {
   const auto own = stampsOf(file);
   if (!own) return own.error();
@@ -74,10 +76,13 @@ Result<std::vector<Pose>> posesOf(const std::filesystem::path& file, const std::
                              : std::ranges::min_element(other, {}, [&](const Stamp& one) {
                                  return std::abs(one.received_ns - frame.received_ns);
                                });
-    const bool is_near = other.size() == own->size() ||
-                         std::abs(nearest->received_ns - frame.received_ns) <= kSameTime_ns;
-    if (!is_near) return withoutPose(file, k + 1, fmt::format(": none in {} was received within 0.1 s of it", reference.string()));
-    if (!nearest->pose) return withoutPose(file, k + 1, fmt::format(", and that in {} has none, either", reference.string()));
+    const bool is_near =
+        other.size() == own->size() || std::abs(nearest->received_ns - frame.received_ns) <= kSameTime_ns;
+    if (!is_near)
+      return withoutPose(file, k + 1,
+                         fmt::format(": none in {} was received within 0.1 s of it", reference.string()));
+    if (!nearest->pose)
+      return withoutPose(file, k + 1, fmt::format(", and that in {} has none, either", reference.string()));
     poses.push_back(*nearest->pose);
   }
   return poses;
@@ -85,7 +90,8 @@ Result<std::vector<Pose>> posesOf(const std::filesystem::path& file, const std::
 
 /// Whether two frames are of one thing, from one place, taken alike.
 bool belongTogether(const Moment& a, const Moment& b) {
-  return compare::samePose(*a.world_from_camera, *b.world_from_camera) && a.exposures.size() == b.exposures.size() &&
+  return compare::samePose(*a.world_from_camera, *b.world_from_camera) &&
+         a.exposures.size() == b.exposures.size() &&
          std::ranges::equal(a.exposures, b.exposures,
                             [](const Exposure& x, const Exposure& y) {
                               return std::abs((x.duration - y.duration).in(microsecond)) < 1e-3;
@@ -110,7 +116,8 @@ class Cutter {
   Cutter(std::string file, std::size_t most_frames) : file_(std::move(file)), most_frames_(most_frames) {}
 
   Result<> add(const Frame& frame) {
-    if (gathered_ && (!belongTogether(moment_, frame.moment) || gathered_->frames() >= most_frames_)) finish();
+    if (gathered_ && (!belongTogether(moment_, frame.moment) || gathered_->frames() >= most_frames_))
+      finish();
     if (!gathered_) gathered_.emplace(recordOf(++number_, frame, file_)), moment_ = frame.moment;
     return gathered_->add(frame);
   }
@@ -164,14 +171,18 @@ Result<Campaign> readRecording(const std::filesystem::path& file, const std::fil
   if (!cutter) return cutter.error();
   Campaign campaign{.folder = file, .name = file.filename().string(), .camera = cutter->camera};
   if (cutter->alone > 0)
-    campaign.notes.push_back(fmt::format("{} frames that were taken where no other was are left out: without repeats "
-                                         "nothing is known of their noise", cutter->alone));
+    campaign.notes.push_back(
+        fmt::format("{} frames that were taken where no other was are left out: without repeats "
+                    "nothing is known of their noise",
+                    cutter->alone));
   if (cutter->captures.size() < 3) {
-    return Error{Error::Code::InvalidArgument,
-                 fmt::format("{}: its {} frames make {} captures, that is, two frames or more of one pose, exposure and "
-                             "ambient light after each other; a search takes 3 at least, and says something from "
-                             "about 20 on",
-                             file.string(), poses->size(), cutter->captures.size())};
+    return Error{
+        Error::Code::InvalidArgument,
+        fmt::format(
+            "{}: its {} frames make {} captures, that is, two frames or more of one pose, exposure and "
+            "ambient light after each other; a search takes 3 at least, and says something from "
+            "about 20 on",
+            file.string(), poses->size(), cutter->captures.size())};
   }
   const bool locks = cutter->captures.size() >= 2 * kEachLocked;
   for (std::size_t c = 0; c < cutter->captures.size(); ++c) {
@@ -181,9 +192,11 @@ Result<Campaign> readRecording(const std::filesystem::path& file, const std::fil
     (is_locked ? campaign.put_aside : campaign.captures).push_back(std::move(capture));
   }
   if (locks)
-    campaign.notes.push_back(fmt::format("{} of the recording's captures, one in five, were put aside before the search "
-                                         "and are judged as the locked ones; nothing keeps a second search from "
-                                         "being judged on them again.", campaign.put_aside.size()));
+    campaign.notes.push_back(
+        fmt::format("{} of the recording's captures, one in five, were put aside before the search "
+                    "and are judged as the locked ones; nothing keeps a second search from "
+                    "being judged on them again.",
+                    campaign.put_aside.size()));
   return campaign;
 }
 
