@@ -143,11 +143,12 @@ void weighOne(const LitPoints::Receivers& receivers, const Vec3Lanes& position, 
 TOFTWIN_VECTOR
 void pickBy(const Lanes<float>& share, const Lanes<float>& steady, int number, Lanes<float>& left,
             Lanes<int>& picked) {
+#pragma GCC unroll 1
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     const float part = share[i] * steady[i];
     const bool is_open = left[i] > 0.0f;
     left[i] -= is_open ? part : 0.0f;
-    picked[i] = is_open & (part > 0.0f) ? number : picked[i];
+    picked[i] = (is_open & (part > 0.0f)) ? number : picked[i];
   }
 }
 
@@ -167,31 +168,39 @@ void LitPoints::weigh(const Receivers& receivers, int directions, Shares& shares
 namespace {
 
 /// Adds share · radiance · exp(−i 2π n f way/c) to the sums of one frequency's wanted harmonics, whose phasors begin
-/// with number `first`: addTurned() without the harmonics that other frequencies want.
+/// with number `first`: addTurned() without the harmonics that other frequencies want. GCC would unroll its loops into
+/// scalar code before it looks for vectors; told not to, it makes vectors of them.
 TOFTWIN_VECTOR
 void addFrequency(double turns_per_metre, std::size_t first, std::size_t count, const int* orders,
                   const std::size_t* terms, const Lanes<float>& share, const Lanes<float>& way,
                   const std::vector<Lanes<float>>& radiance, LaneSums& sums) {
   Lanes<float> cosine, sine, re, im, next;
+#pragma GCC unroll 1
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     const CosSin z = cosSinOfTurns(static_cast<double>(way[i]) * turns_per_metre);
     cosine[i] = z.cos;
     sine[i] = -z.sin;
   }
+#pragma GCC unroll 1
   for (std::size_t i = 0; i < kLaneCount; ++i) re[i] = share[i] * cosine[i];
+#pragma GCC unroll 1
   for (std::size_t i = 0; i < kLaneCount; ++i) im[i] = share[i] * sine[i];
   int order = 1;
   for (std::size_t k = 0; k < count; ++k) {
     for (; order < orders[k]; ++order) {
+#pragma GCC unroll 1
       for (std::size_t i = 0; i < kLaneCount; ++i) next[i] = re[i] * cosine[i] - im[i] * sine[i];
+#pragma GCC unroll 1
       for (std::size_t i = 0; i < kLaneCount; ++i) im[i] = re[i] * sine[i] + im[i] * cosine[i];
       re = next;
     }
     const Lanes<float>&a = radiance[Channels::re(first + k)], &b = radiance[Channels::im(first + k)];
     Lanes<float> sum = sums.re[terms[k]];
+#pragma GCC unroll 1
     for (std::size_t i = 0; i < kLaneCount; ++i) sum[i] += a[i] * re[i] - b[i] * im[i];
     sums.re[terms[k]] = sum;
     sum = sums.im[terms[k]];
+#pragma GCC unroll 1
     for (std::size_t i = 0; i < kLaneCount; ++i) sum[i] += a[i] * im[i] + b[i] * re[i];
     sums.im[terms[k]] = sum;
   }
