@@ -175,9 +175,12 @@ void SourceHost::adopt(Result<std::unique_ptr<drivers::Source>> opened) {
   source_ = *std::move(opened);
   noteState();
   recovery_.opened(*info, state_);
-  if (!restoreSettings()) return;
+  {
+    const std::scoped_lock lock{mutex_};
+    info_ = *std::move(info);
+  }
+  if (!restoreSettings()) return;  // it may change what the source says of itself, which noteState() takes over
   const std::scoped_lock lock{mutex_};
-  info_ = *std::move(info);
   is_there_ = true;
 }
 

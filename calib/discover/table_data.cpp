@@ -55,12 +55,46 @@ class NamedColumns {
       }
       values.push_back(*value);
     }
+    if (const auto row = thousandOrNot(*at)) {
+      return Error{Error::Code::Malformed,
+                   fmt::format("{}:{}: \"{}\" in column \"{}\" may be a thousand or a fraction, beside whole numbers; "
+                               "write it without the comma, or all with decimals",
+                               file_.string(), table_.line[*row], table_.columns[*at][*row], name)};
+    }
     if (is_time) {
+      overMidnight(values);
       double first = std::numeric_limits<double>::infinity();
       for (const double value : values) first = std::fmin(first, value);
       for (double& value : values) value -= first;
     }
     return values;
+  }
+  /// The first "1,020" in a column with "950", where commas may be those of decimals: none is guessed.
+  [[nodiscard]] std::optional<std::size_t> thousandOrNot(std::size_t column) const {
+    if (table_.separator == ',') return std::nullopt;
+    bool has_whole = false;
+    std::optional<std::size_t> first;
+    for (std::size_t row = 0; row < table_.rows(); ++row) {
+      std::string_view field = table_.columns[column][row];
+      if (!field.empty() && (field.front() == '-' || field.front() == '+')) field.remove_prefix(1);
+      const bool is_number = !field.empty() && field.find_first_not_of("0123456789,") == std::string_view::npos;
+      const std::size_t comma = field.find(',');
+      if (is_number && comma == std::string_view::npos) has_whole = true;
+      if (is_number && comma != std::string_view::npos && comma + 4 == field.size() && field.front() != '0' && !first)
+        first = row;
+    }
+    return has_whole ? first : std::nullopt;
+  }
+  /// Times of day that fall by more than half a day are those of the next one. Dates do not fall so.
+  static void overMidnight(std::vector<double>& seconds) {
+    constexpr double kDay = 86'400.0;
+    double days = 0.0, before = std::nan("");
+    for (double& value : seconds) {
+      if (std::isnan(value) || value > kDay) continue;
+      if (value < before - 0.5 * kDay) days += kDay;
+      before = value;
+      value += days;
+    }
   }
   [[nodiscard]] std::optional<double> toNumber(std::string_view field) const {
     return numberIn(field, table_.separator != ',');

@@ -101,6 +101,8 @@ void LitPoints::takeOf(const Tracing& tracing, const Channels& channels, std::si
     // Seen from the emitter's middle, from where directions' shares are told.
     const Vec3d middle = emitter.position - at(hits.position, i);
     const double from_middle = std::max(1e-9, dot(middle, normal) / norm(middle));
+    // leave() leaves such places to the other samples: what only a side of the emitter lights.
+    if (-dot(middle, emitter.axis) < leastCosine(emitter) * norm(middle)) continue;
     const double density = pointsPerArea(perSteradian(emitter), from_middle, dot(middle, middle));
     place.density[i] = static_cast<float>(density);
     radiance[i] = static_cast<float>(static_cast<double>(hits.albedo[i]) / std::numbers::pi * lit * density /

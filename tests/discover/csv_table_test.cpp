@@ -97,6 +97,27 @@ TEST(ReadTable, LeavesOutRowsWithoutAValueAndSaysHowMany) {
   EXPECT_THAT(data->doubts, testing::Contains(HasSubstr("one session only")));
 }
 
+TEST(ReadTable, GuessesNoThousandsAndGoesOnOverMidnight) {
+  const auto table = [](const std::string& first) {
+    std::string text = "measured_mm;reference_mm;time\n";
+    for (int i = 0; i < 30; ++i) {
+      const int minute = 23 * 60 + 50 + i;
+      text += (i == 0 ? first : "1,02" + std::to_string(i % 10)) + ";1;" +
+              std::to_string(minute / 60 % 24 / 10) + std::to_string(minute / 60 % 24 % 10) + ":" +
+              std::to_string(minute % 60 / 10) + std::to_string(minute % 10) + "\n";
+    }
+    return text;
+  };
+  EXPECT_THAT(dataOf(table("950")).error().message,
+              HasSubstr("t.csv:3: \"1,021\" in column \"measured_mm\" may be a thousand or a fraction"));
+  const auto data = dataOf(table("0,950"));
+  ASSERT_TRUE(data) << data.error().message;
+  EXPECT_NEAR(data->error[1], 0.021, 1e-12);
+  ASSERT_EQ(data->covariates.size(), 1u);
+  EXPECT_EQ(data->covariates[0].values.front(), 0.0);
+  EXPECT_EQ(data->covariates[0].values.back(), 29 * 60.0);
+}
+
 TEST(ReadTable, RefusesTextAmongNumbersTooFewRowsAndNothingToGoWith) {
   EXPECT_THAT(dataOf(linear(30, "x7,1000,5,on\n")).error().message,
               HasSubstr("t.csv:32: \"x7\" in column \"measured_mm\" is not a number"));

@@ -177,16 +177,16 @@ Device::Outcome Device::setMode(const XmlRpcCall& call) {
 
 /// What it set for itself is undone, what it did not save is forgotten.
 Device::Outcome Device::cancelSession() {
-  SourceChanges undone = session_ ? std::move(session_->before) : SourceChanges{};
-  restart();
-  return {.answer = nothing(), .changes = std::move(undone)};
+  return {.answer = nothing(), .changes = restart()};
 }
 
-void Device::restart() {
+SourceChanges Device::restart() {
+  SourceChanges undone = session_ ? std::move(session_->before) : SourceChanges{};
   session_.reset();
   is_editing_ = false;
   device_["OperatingMode"] = "0";
   edited_.reset();
+  return undone;
 }
 
 SourceChanges Device::expire(SteadyTime now) {

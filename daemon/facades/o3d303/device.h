@@ -89,7 +89,7 @@ class Device {
   /// Ends a session that has not been heard of for too long. What it had set for itself is undone.
   SourceChanges expire(SteadyTime now);
   /// As after switching off and on: no session, nothing that was not saved.
-  void restart();
+  SourceChanges restart();
 
   /// While a client edits, and while no application is active, the camera takes no frames.
   [[nodiscard]] bool isIdle() const { return is_editing_ || !applications_.contains(activeApplication()); }

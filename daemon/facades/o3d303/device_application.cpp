@@ -183,7 +183,7 @@ Device::Refusal Device::setBound(Parameters& all, Binding::Object object, const 
   const bool is_whole = bound->binding->form == Binding::Form::Whole;
   if (auto refused = checkNumber(rule.name, value, rule.bounds, is_whole)) return refused;
   if (auto refused = checkNumber(rule.name, value, bound->bounds(), is_whole)) return refused;
-  now = is_whole ? fmt::format("{:.0f}", realIn(value).value_or(0.0)) : std::move(value);
+  now = std::move(value);
   return std::nullopt;
 }
 

@@ -231,10 +231,14 @@ class O3d303Facade final : public Facade {
     const auto call = toftwin::o3d303::readXmlRpcCall(body);
     if (!call) return answer(encodeXmlRpc(XmlRpcAnswer{XmlRpcFault{kNoXmlRpc, call.error().message}}));
     refresh();
+    const auto before = std::make_shared<const Device>(*device_);
     Device::Outcome outcome = device_->answer(path, *call, steady_clock::now());
     if (outcome.is_reboot) reboot();
     if (outcome.changes.empty()) return finish(outcome, {}, answer);
-    change(outcome.changes, [this, outcome, answer](const Result<>& done) { finish(outcome, done, answer); });
+    change(outcome.changes, [this, before, outcome, answer](const Result<>& done) {
+      if (!done) device_.emplace(*before);  // all of it or nothing
+      finish(outcome, done, answer);
+    });
   }
 
   void finish(const Device::Outcome& outcome, const Result<>& done, const HttpServer::Answer& answer) {
@@ -275,7 +279,11 @@ class O3d303Facade final : public Facade {
   }
 
   void tick() {
-    const SourceChanges undone = device_->expire(steady_clock::now());
+    undo(device_->expire(steady_clock::now()));
+  }
+
+  /// What was set for a while.
+  void undo(const SourceChanges& undone) {
     if (undone.empty()) return;
     change(undone, [this](const Result<>& done) {
       if (!done) complainOnce(done.error());
@@ -295,7 +303,7 @@ class O3d303Facade final : public Facade {
         std::chrono::duration<double>{keys_.boot_time.in(second)});
     auto timer = std::make_shared<boost::asio::steady_timer>(thread_.io(), kAnswerFirst);
     timer->async_wait([this, timer, boot](boost::system::error_code) {
-      device_->restart();
+      undo(device_->restart());
       setOpen(false);
       timer->expires_after(boot);
       timer->async_wait([this, timer](boost::system::error_code) { setOpen(true); });

@@ -177,14 +177,17 @@ XmlRpcAnswer noSuchParameter(std::string_view name) {
   return fault(Fault::kNoSuchParameter, fmt::format("there is no parameter {}", name));
 }
 
-std::optional<XmlRpcAnswer> checkNumber(std::string_view name, std::string_view value, Bounds bounds,
+std::optional<XmlRpcAnswer> checkNumber(std::string_view name, std::string& value, Bounds bounds,
                                         bool is_integral) {
   const auto number = realIn(std::string{value});
   if (!number || (is_integral && *number != std::floor(*number))) {
     return fault(Fault::kWrongType,
                  fmt::format("{}: \"{}\" is not {} number", name, value, is_integral ? "a whole" : "a"));
   }
-  if (bounds.contains(*number)) return std::nullopt;
+  if (bounds.contains(*number)) {
+    if (is_integral) value = fmt::format("{:.0f}", *number);  // "8.0" is what Python says for 8
+    return std::nullopt;
+  }
   return fault(Fault::kOutOfRange, fmt::format("{} = {} is out of range: {} to {} is possible", name, value,
                                                bounds.min, bounds.max));
 }

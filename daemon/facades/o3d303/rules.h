@@ -46,7 +46,7 @@ const Rule* ruleOf(std::span<const Rule> rules, std::string_view name);
 /// Puts the value into the form in which the camera keeps it ("1" of a switch is "true"), or says why it will
 /// not do. Nothing: it will. For the kinds from Fixed to Switch.
 std::optional<toftwin::o3d303::XmlRpcAnswer> check(const Rule& rule, std::string& value);
-std::optional<toftwin::o3d303::XmlRpcAnswer> checkNumber(std::string_view name, std::string_view value,
+std::optional<toftwin::o3d303::XmlRpcAnswer> checkNumber(std::string_view name, std::string& value,
                                                          Bounds bounds, bool is_integral);
 toftwin::o3d303::XmlRpcAnswer readOnly(std::string_view name);
 toftwin::o3d303::XmlRpcAnswer noSuchParameter(std::string_view name);

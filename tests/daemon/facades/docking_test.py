@@ -6,6 +6,7 @@ import pathlib
 import re
 import shutil
 import socket
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -33,21 +34,23 @@ with tempfile.TemporaryDirectory() as folder:
                 break
             except ConnectionRefusedError:
                 time.sleep(0.05)
-        said = subprocess.run([sys.executable, example / "dock.py", "--json", "--starts", "1", "--ports",
+        said = subprocess.run([sys.executable, example / "dock.py", "--json", "--starts", "3", "--ports",
                                f"{ports['50010']},{ports['5020']}", "--real-ports", f"{ports['50011']},{ports['5021']}"],
                               check=True, stdout=subprocess.PIPE).stdout
     finally:
         daemon.terminate()
         assert daemon.wait(20) == 0, "the daemon ends well"
 
-ideal, real = (json.loads(said)[name][0] for name in ("ideal", "real"))
-for name, run in (("ideal", ideal), ("real", real)):
-    print(name, {key: value for key, value in run.items() if key != "way"})
-assert ideal["docked"] and real["docked"]
+ideal, real = (json.loads(said)[name] for name in ("ideal", "real"))
+for name, runs in (("ideal", ideal), ("real", real)):
+    for run in runs:
+        print(name, {key: value for key, value in run.items() if key != "way"})
+assert all(run["docked"] for run in ideal + real)
 # The last step before the stop is at most 20 mm/s · 0.2 s beyond it; some 300 points of a few millimetres' noise each
 # leave less than 1 mm.
-assert -4.0 - 3.0 < ideal["too_far_mm"] < 3.0
+assert all(-4.0 - 3.0 < run["too_far_mm"] < 3.0 for run in ideal)
 # Light by way of floor and shelf takes longer, so the pallet seems farther, and the robot drives on. Two stops by the same
-# rule differ by a last step of 4 mm and that noise, 5 mm at most; what is beyond is the light's.
-assert real["too_far_mm"] < ideal["too_far_mm"] - 5.0
+# rule differ by a last step, even in 0 to 4 mm (σ 1.2), and that noise: σ 2 mm, 1.2 mm of the mean of three starts.
+mean = {name: statistics.mean(run["too_far_mm"] for run in runs) for name, runs in (("ideal", ideal), ("real", real))}
+assert mean["real"] < mean["ideal"] - 3.5, mean
 print("docked with both, and too near with multipath and scatter")

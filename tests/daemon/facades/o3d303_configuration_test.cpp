@@ -189,6 +189,9 @@ TEST_F(O3d303Configuration, TheImagerRefusesByTheVendorsNumbers) {
   EXPECT_EQ(faultOf(kImager, "setParameter", {"ExposureTimeRatio", "5"}), Fault::kNoSuchParameter)
       << "of one exposure";
   EXPECT_EQ(faultOf(kImager, "setParameter", {"ClippingLeft", "176"}), Fault::kOutOfRange);
+  EXPECT_EQ(faultOf(kImager, "setParameter", {"ClippingLeft", "8.5"}), Fault::kWrongType);
+  EXPECT_EQ(faultOf(kImager, "setParameter", {"ClippingLeft", "8.0"}), 0);
+  EXPECT_EQ(call(kImager, "getParameter", {"ClippingLeft"}).text(), "8") << "as it acts";
   EXPECT_EQ(faultOf(kImager, "setParameter", {"ClippingLeft", "-1"}), Fault::kOutOfRange);
   EXPECT_EQ(faultOf(kImager, "setParameter", {"ClippingCuboid", "{\"XMin\": \"near\"}"}),
             Fault::kWrongFormat);

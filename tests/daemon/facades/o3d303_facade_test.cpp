@@ -78,11 +78,13 @@ TEST_F(O3d303Facade, WhatTheSourceRefusesAtTheEndIsRefusedToo) {
   // 4 exposures of 10 ms with 1 ms after each do not fit into 40 ms, which only the source knows.
   EXPECT_EQ(rpc.fault(rpc.imager(), "setParameter", {"ExposureTime", "10000"}), 0);
   EXPECT_EQ(rpc.fault(rpc.imager(), "setParameter", {"FrameRate", "25"}), 0);
+  EXPECT_EQ(rpc.fault(rpc.session("edit/application/"), "setParameter", {"Name", "another"}), 0);
   EXPECT_EQ(rpc.fault(rpc.session("edit/application/"), "save", {}), 101'002);
   rpc.endSession();
   rpc.edit();
   EXPECT_EQ(rpc.call(rpc.imager(), "getParameter", {"ExposureTime"}).text(), "1000");
   EXPECT_EQ(rpc.call(rpc.imager(), "getParameter", {"FrameRate"}).text(), "20") << "none of it, or all";
+  EXPECT_NE(rpc.call(rpc.session("edit/application/"), "getParameter", {"Name"}).text(), "another");
 }
 
 TEST_F(O3d303Facade, WhatIsPossibleOnlyTogetherIsSetTogether) {
