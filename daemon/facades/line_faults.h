@@ -9,6 +9,10 @@
 #include <string>
 #include <string_view>
 
+#include <toftwin/units.h>
+
+#include "protocol/settings/settings.h"
+
 namespace toftwin::daemon {
 
 /// How often what goes wrong on a line, and the seed of the chance.
@@ -17,30 +21,34 @@ struct LineShares {
   std::uint64_t seed = 1;
 };
 
-/// The keys that all lines have. What is struck are packets, frames or answers, as the facade sends them;
-/// whether by chance, which is a function of seed and number alone.
-template <class Visitor>
-void visitSeedAndLog(Visitor& v, std::uint64_t& seed, std::string& log) {
-  v.number("seed", seed, {0, 9'007'199'254'740'991.0}, "of the chance");
-  v.text("log", log,
-         "a file, relative to this one, that is written anew: a line of CSV for every one that was struck");
-}
-
-/// What goes wrong on purpose between a facade and its clients, for any facade that sends packets.
-struct LineFaultKeys {
-  double loss = 0.0, duplicate = 0.0, reorder = 0.0;
-  std::uint64_t seed = 1;
+/// The keys of a line. A facade's own type visits those of what can happen to what it sends (packets, frames,
+/// answers); the others stay 0. Whether something is struck is by chance, a function of seed and number alone.
+struct LineKeys : LineShares {
+  Duration delay_time = 100_ms;
   std::string log;
 
+  /// Where the log's lines go; empty: nowhere.
+  [[nodiscard]] std::filesystem::path logIn(const settings::Table& table) const {
+    return log.empty() ? std::filesystem::path{} : table.resolve(log);
+  }
+
+ protected:
+  template <class Visitor>
+  void visitSeedAndLog(Visitor& v) {
+    v.number("seed", seed, {0, 9'007'199'254'740'991.0}, "of the chance");
+    v.text("log", log,
+           "a file, relative to this one, that is written anew: a line of CSV for every one that was struck");
+  }
+};
+
+/// What goes wrong on purpose between a facade and its clients, for any facade that sends packets.
+struct LineFaultKeys : LineKeys {
   template <class Visitor>
   void visit(Visitor& v) {
     v.number("loss", loss, {0.0, 1.0}, "share of the packets that do not leave");
     v.number("duplicate", duplicate, {0.0, 1.0}, "share that leaves twice");
     v.number("reorder", reorder, {0.0, 1.0}, "share that leaves after the next one");
-    visitSeedAndLog(v, seed, log);
-  }
-  operator LineShares() const {  // NOLINT(google-explicit-constructor): the same in fewer words
-    return {.loss = loss, .duplicate = duplicate, .reorder = reorder, .seed = seed};
+    visitSeedAndLog(v);
   }
 };
 

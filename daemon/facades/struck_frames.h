@@ -19,12 +19,7 @@ namespace toftwin::daemon {
 
 /// What goes wrong on purpose on the line of a facade that sends whole frames: what is made of one has its
 /// fate.
-struct FrameLineKeys {
-  double loss = 0.0, duplicate = 0.0, reorder = 0.0, delay = 0.0, corruption = 0.0;
-  Duration delay_time = 100_ms;
-  std::uint64_t seed = 1;
-  std::string log;
-
+struct FrameLineKeys : LineKeys {
   template <class Visitor>
   void visit(Visitor& v) {
     v.number("loss", loss, {0.0, 1.0}, "share of the frames that do not leave");
@@ -33,15 +28,7 @@ struct FrameLineKeys {
     v.number("delay", delay, {0.0, 1.0}, "share that leaves later");
     v.quantity("delay_time", delay_time, millisecond, {0.0, 10'000.0}, "by how much");
     v.number("corruption", corruption, {0.0, 1.0}, "share that leaves with one bit of each image changed");
-    visitSeedAndLog(v, seed, log);
-  }
-  operator LineShares() const {  // NOLINT(google-explicit-constructor): the same in fewer words
-    return {.loss = loss,
-            .duplicate = duplicate,
-            .reorder = reorder,
-            .delay = delay,
-            .corruption = corruption,
-            .seed = seed};
+    visitSeedAndLog(v);
   }
 };
 

@@ -256,8 +256,7 @@ FacadeKind::Start read(settings::Table& table) {
   checkText(table, "serial", keys.serial);
   checkText(table, "user_name", keys.user_name);
   if (keys.packet_size % 4 != 0) table.complain("packet_size", "must be a multiple of 4");
-  const std::filesystem::path log =
-      keys.line.log.empty() ? std::filesystem::path{} : table.resolve(keys.line.log);
+  const std::filesystem::path log = keys.line.logIn(table);
   const Unevenness unevenness = Unevenness::read(table, keys.intervals);
   return [keys, unevenness, log](const FacadePlace& place) -> Result<std::unique_ptr<Facade>> {
     auto facade = std::make_unique<GigeVisionFacade>(keys, unevenness, log, place);

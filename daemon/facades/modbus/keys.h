@@ -39,12 +39,7 @@ struct PoseKeys {
 
 /// What goes wrong on purpose with the answers. A client has one request at a time, so none overtakes
 /// another.
-struct AnswerLineKeys {
-  double loss = 0.0, duplicate = 0.0, delay = 0.0, corruption = 0.0, disconnect = 0.0;
-  Duration delay_time = 100_ms;
-  std::uint64_t seed = 1;
-  std::string log;
-
+struct AnswerLineKeys : LineKeys {
   template <class Visitor>
   void visit(Visitor& v) {
     v.number("loss", loss, {0.0, 1.0}, "share of the answers that do not leave");
@@ -53,15 +48,7 @@ struct AnswerLineKeys {
     v.quantity("delay_time", delay_time, millisecond, {0.0, 10'000.0}, "by how much");
     v.number("corruption", corruption, {0.0, 1.0}, "share that leaves with one bit changed");
     v.number("disconnect", disconnect, {0.0, 1.0}, "share instead of which the connection is closed");
-    visitSeedAndLog(v, seed, log);
-  }
-  operator LineShares() const {  // NOLINT(google-explicit-constructor): the same in fewer words
-    return {.loss = loss,
-            .duplicate = duplicate,
-            .delay = delay,
-            .corruption = corruption,
-            .disconnect = disconnect,
-            .seed = seed};
+    visitSeedAndLog(v);
   }
 };
 

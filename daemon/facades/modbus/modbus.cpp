@@ -363,8 +363,7 @@ FacadeKind::Start read(settings::Table& table) {
       }
     }
   }
-  const std::filesystem::path log =
-      keys.line.log.empty() ? std::filesystem::path{} : table.resolve(keys.line.log);
+  const std::filesystem::path log = keys.line.logIn(table);
   return [keys, recipes, log](const FacadePlace& place) -> Result<std::unique_ptr<Facade>> {
     auto facade = std::make_unique<ModbusFacade>(keys, recipes, log, place);
     if (auto opened = facade->open(); !opened) return opened.error();

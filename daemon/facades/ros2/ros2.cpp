@@ -207,8 +207,7 @@ FacadeKind::Start read(settings::Table& table) {
   Keys keys;
   table.read(keys);
   check(table, keys);
-  const std::filesystem::path log =
-      keys.line.log.empty() ? std::filesystem::path{} : table.resolve(keys.line.log);
+  const std::filesystem::path log = keys.line.logIn(table);
   return [keys, log](const FacadePlace& place) -> Result<std::unique_ptr<Facade>> {
     Keys named = keys;
     if (named.name.empty()) named.name = nameOf(place.keys.source);

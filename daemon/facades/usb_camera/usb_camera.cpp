@@ -134,8 +134,7 @@ class UsbCameraFacade final : public Facade {
 FacadeKind::Start read(settings::Table& table) {
   Keys keys;
   table.read(keys);
-  const std::filesystem::path log =
-      keys.line.log.empty() ? std::filesystem::path{} : table.resolve(keys.line.log);
+  const std::filesystem::path log = keys.line.logIn(table);
   return [keys, log](const FacadePlace& place) -> Result<std::unique_ptr<Facade>> {
     auto facade = std::make_unique<UsbCameraFacade>(keys, log, place);
     if (auto opened = facade->open(); !opened) return opened.error();

@@ -133,7 +133,7 @@ TEST(GigeVisionStream, IdsOfSixteenBitsLeaveOutZero) {
 }
 
 TEST(LineFaults, StrikeAsManyAsWasSaidAndTheSameOnesForTheSameSeed) {
-  LineFaultKeys keys{.loss = 0.02, .duplicate = 0.1, .reorder = 0.5, .seed = 3, .log = {}};
+  LineShares keys{.loss = 0.02, .duplicate = 0.1, .reorder = 0.5, .seed = 3};
   constexpr int kPackets = 100'000;
   std::array<double, 3> struck{};
   for (std::uint64_t i = 0; i < kPackets; ++i) {
@@ -149,7 +149,7 @@ TEST(LineFaults, StrikeAsManyAsWasSaidAndTheSameOnesForTheSameSeed) {
     const double sd = std::sqrt(kPackets * share[i] * (1.0 - share[i]));
     EXPECT_NEAR(struck[i], kPackets * share[i], 6.0 * sd) << i;
   }
-  LineFaultKeys other = keys;
+  LineShares other = keys;
   other.seed = 4;
   int different = 0;
   for (std::uint64_t i = 0; i < 1000; ++i)

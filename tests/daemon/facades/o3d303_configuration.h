@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "daemon/facades/o3d303/device.h"
+#include "o3d303_operable.h"
 
 namespace toftwin::daemon::o3d303 {
 
@@ -27,25 +28,7 @@ class O3d303Configuration : public testing::Test {
   static constexpr const char* kSpatial = "edit/application/imager_001/spatialfilter";
   static constexpr const char* kTemporal = "edit/application/imager_001/temporalfilter";
 
-  O3d303Configuration() {
-    facts_.parameters = {{"exposure_us", 1000.0, {1.0, 20'000.0}},
-                         {"frame_rate_hz", 10.0, {0.001, 1000.0}},
-                         {"triggered", 0.0, {0.0, 1.0}},
-                         {"frequencies", 1.0, {1.0, 3.0}},
-                         {"exposures", 1.0, {1.0, 3.0}},
-                         {"exposure_ratio", 40.0, {2.0, 50.0}},
-                         {"minimum_amplitude_electrons", 252.0, {0.0, 1e9}},
-                         {"asymmetry_threshold", 0.4, {0.0, 1e9}},
-                         {"spatial_filter", 0.0, {0.0, 3.0}},
-                         {"spatial_filter_reach", 1.0, {1.0, 2.0}},
-                         {"temporal_filter", 0.0, {0.0, 2.0}},
-                         {"temporal_filter_images", 2.0, {2.0, 25.0}},
-                         {"filters_range", 1.0, {0.0, 1.0}},
-                         {"filters_amplitude", 1.0, {0.0, 1.0}}};
-    facts_.frame_rate_hz = 10.0;
-    facts_.exposures_us = {1000};
-    device_.update(facts_);
-  }
+  O3d303Configuration() { device_.update(facts_); }
 
   double& source(std::string_view name) {
     return *std::ranges::find(facts_.parameters, name, &Parameter::name)->value;
@@ -122,7 +105,7 @@ class O3d303Configuration : public testing::Test {
   }
 
   Device device_{{.name = "test", .password = "", .mac = "02:00:00:00:00:01", .address = "127.0.0.1"}};
-  SourceFacts facts_;
+  SourceFacts facts_ = operableFacts({0.001, 1000.0});
   SteadyTime now_{};
 };
 

@@ -13,6 +13,7 @@
 #include "drivers/o3d303/wire/frame_writer.h"
 #include "drivers/o3d303/wire/pcic.h"
 #include "fuzz_one_input.h"
+#include "o3d303_operable.h"
 
 namespace toftwin::daemon {
 namespace {
@@ -71,22 +72,7 @@ constexpr std::array<std::string_view, 34> kMethods{"requestSession",
                                                     "getAllParameterLimits"};
 
 SourceFacts facts() {
-  SourceFacts facts;
-  facts.parameters = {{"exposure_us", 1000.0, {1.0, 20'000.0}},
-                      {"frame_rate_hz", 10.0, {0.1, 30.0}},
-                      {"triggered", 0.0, {0.0, 1.0}},
-                      {"frequencies", 1.0, {1.0, 3.0}},
-                      {"exposures", 1.0, {1.0, 3.0}},
-                      {"exposure_ratio", 40.0, {2.0, 50.0}},
-                      {"minimum_amplitude_electrons", 252.0, {0.0, 1e9}},
-                      {"asymmetry_threshold", 0.4, {0.0, 1e9}},
-                      {"spatial_filter", 0.0, {0.0, 3.0}},
-                      {"spatial_filter_reach", 1.0, {1.0, 2.0}},
-                      {"temporal_filter", 0.0, {0.0, 2.0}},
-                      {"temporal_filter_images", 2.0, {2.0, 25.0}},
-                      {"filters_range", 1.0, {0.0, 1.0}},
-                      {"filters_amplitude", 1.0, {0.0, 1.0}}};
-  facts.frame_rate_hz = 10.0;
+  SourceFacts facts = operableFacts({0.1, 30.0});
   facts.exposures_us = {40, 1000};
   return facts;
 }

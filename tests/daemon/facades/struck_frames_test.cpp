@@ -31,13 +31,13 @@ Frame numbered(std::uint64_t sequence) {
 
 /// What leaves of `count` frames, in the order in which it does, and the log.
 struct Struck {
-  explicit Struck(FrameLineKeys keys, std::uint64_t count = 1000) {
+  explicit Struck(const LineShares& shares, std::uint64_t count = 1000) {
     const auto log =
         std::filesystem::temp_directory_path() / ("struck_frames_" + std::to_string(::getpid()) + ".csv");
     {
       boost::asio::io_context io;
       StruckFrames line{
-          io, LineFaults{keys, "test", log}, keys.delay_time, [&](const Frame& frame) {
+          io, LineFaults{shares, "test", log}, 1_ms, [&](const Frame& frame) {
             order.push_back(frame.sequence);
             const auto bytes = frame.planes.at(0).data.bytes();
             unsigned differ = 0;
@@ -70,29 +70,29 @@ TEST(StruckFrames, WithoutFaultsAllLeaveInOrder) {
 // 1000 frames at a share of 0.1 are 100 with a deviation of 9.5; the chance is a function of the seed, so
 // this one is met or not for ever.
 TEST(StruckFrames, LossAndDuplicatesAreThoseOfTheLog) {
-  const Struck lossy{{.loss = 0.1, .seed = 5, .log = {}}};
+  const Struck lossy{{.loss = 0.1, .seed = 5}};
   EXPECT_NEAR(lossy.logged.at("loss"), 100, 40);
   EXPECT_EQ(lossy.order.size(), 1000u - static_cast<unsigned>(lossy.logged.at("loss")));
-  const Struck doubled{{.duplicate = 0.1, .seed = 5, .log = {}}};
+  const Struck doubled{{.duplicate = 0.1, .seed = 5}};
   EXPECT_EQ(doubled.order.size(), 1000u + static_cast<unsigned>(doubled.logged.at("duplicate")));
-  const Struck again{{.loss = 0.1, .seed = 5, .log = {}}};
+  const Struck again{{.loss = 0.1, .seed = 5}};
   EXPECT_EQ(lossy.order, again.order) << "the same seed, the same frames";
 }
 
 TEST(StruckFrames, AReorderedOneLeavesAfterTheNext) {
-  const Struck all{{.reorder = 1.0, .seed = 1, .log = {}}, 4};
+  const Struck all{{.reorder = 1.0, .seed = 1}, 4};
   EXPECT_THAT(all.order, testing::ElementsAre(1, 0, 3, 2));
 }
 
 TEST(StruckFrames, ADelayedOneLeavesLater) {
-  const Struck all{{.delay = 1.0, .delay_time = 1_ms, .seed = 1, .log = {}}, 3};
+  const Struck all{{.delay = 1.0, .seed = 1}, 3};
   EXPECT_EQ(all.before_later, 0u);
   EXPECT_THAT(all.order, testing::UnorderedElementsAre(0, 1, 2));
   EXPECT_EQ(all.logged.at("delay"), 3);
 }
 
 TEST(StruckFrames, ACorruptedOneHasOneBitOfEachImageChanged) {
-  const Struck all{{.corruption = 0.5, .seed = 1, .log = {}}, 200};
+  const Struck all{{.corruption = 0.5, .seed = 1}, 200};
   const auto changed = std::ranges::count(all.bits_changed, 1U);
   EXPECT_EQ(changed, all.logged.at("corruption"));
   EXPECT_EQ(changed + std::ranges::count(all.bits_changed, 0U), 200);
