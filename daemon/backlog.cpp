@@ -25,11 +25,11 @@ Error neverFits(std::uint64_t bytes, std::uint64_t byte_limit) {
 
 }  // namespace
 
-std::shared_ptr<const transport::SharedBody> PreparedFrame::sharedBody() const {
+std::shared_ptr<const transport::SharedBody> PreparedFrame::sharedBody(transport::SharedBodies& maker) const {
   if (body.bytes < kSmallestSharedBody) return nullptr;
   const std::scoped_lock lock{mutex_};
   if (auto shared = shared_.lock()) return shared;
-  const auto made = transport::SharedBody::create(body);
+  const auto made = maker.make(body);
   if (!made) return nullptr;
   shared_ = *made;
   return *made;

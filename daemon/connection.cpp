@@ -184,7 +184,7 @@ void Connection::send(const Session::Outgoing& outgoing) {
     logging::error("{}: {}; closing", name_, encoded.error().message);
     return close();
   }
-  if (auto shared = in_shared_memory ? delivery.frame->sharedBody() : nullptr) {
+  if (auto shared = in_shared_memory ? delivery.frame->sharedBody(hub_->sharedBodies()) : nullptr) {
     return socket_.asyncWrite(*std::move(encoded), std::move(shared), sent);
   }
   socket_.asyncWrite(*std::move(encoded), sent);

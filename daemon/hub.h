@@ -14,6 +14,7 @@
 #include "daemon/clock.h"
 #include "daemon/recorder.h"
 #include "daemon/source_host.h"
+#include "protocol/transport/memfd.h"
 #include "protocol/wire/messages.h"
 
 namespace toftwin::daemon {
@@ -56,12 +57,16 @@ class Hub {
   void startRecording(const std::string& source, std::string_view file, RecordDone done);
   void stopRecording(const std::string& source, RecordDone done);
 
+  /// Of all streams to clients on this machine.
+  [[nodiscard]] transport::SharedBodies& sharedBodies() const { return *shared_bodies_; }
+
   std::atomic<std::uint32_t> sessions{0};  ///< for health; counted by the sessions themselves
 
  private:
   const Clock& clock_;
   mutable std::mutex mutex_;
   Options options_;
+  const std::shared_ptr<transport::SharedBodies> shared_bodies_ = std::make_shared<transport::SharedBodies>();
   const std::shared_ptr<Budget> budget_;  // shared with subscriptions, which may outlive this
   const SteadyTime began_;
   std::map<std::string, std::shared_ptr<SourceHost>> sources_;  // shared with calls in progress

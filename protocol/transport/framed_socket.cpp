@@ -226,13 +226,11 @@ void FramedSocket::asyncWrite(wire::Encoded message, std::shared_ptr<const Share
   output_ = std::move(message);
   output_body_ = std::move(body);
   wire::setBodyPlace(output_, wire::BodyPlace::Memfd);
-  asio::post(socket_.get_executor(), [this, handler = std::move(handler)]() mutable {
-    sendDescriptor(std::move(handler));
-  });
+  sendDescriptor(std::move(handler));
 }
 
-/// The head with the file descriptor beside its first byte. What the kernel does not take at once
-/// follows as plain bytes.
+/// The head with the file descriptor beside its first byte, at once. What the kernel does not take follows as plain
+/// bytes. The handler is called later in any case.
 void FramedSocket::sendDescriptor(WriteHandler handler) {
   iovec bytes{output_.head.data(), output_.head.size()};
   Control control{};
@@ -255,7 +253,10 @@ void FramedSocket::sendDescriptor(WriteHandler handler) {
     return writeRest(0, std::move(handler));
   }
   if (errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR) {
-    return wrote(disconnected(error_code{errno, boost::system::system_category()}), handler);
+    const error_code fault{errno, boost::system::system_category()};
+    return asio::post(socket_.get_executor(), [this, fault, handler = std::move(handler)] {
+      wrote(disconnected(fault), handler);
+    });
   }
   socket_.async_wait(Socket::wait_write,
                      [this, handler = std::move(handler)](error_code fault) mutable {

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <numeric>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -50,6 +51,15 @@ Result<> writePieces(int fd, const std::vector<Buffer>& pieces) {
   return {};
 }
 
+FileDescriptor newMemfd() { return FileDescriptor{::memfd_create("toftwin-body", MFD_CLOEXEC | MFD_ALLOW_SEALING)}; }
+
+Result<> fillAndSeal(const FileDescriptor& fd, const wire::Body& body) {
+  if (!fd) return systemError("memfd_create");
+  if (auto wrote = writePieces(fd.get(), body.pieces); !wrote) return wrote;
+  if (::fcntl(fd.get(), F_ADD_SEALS, kSeals | F_SEAL_SEAL) != 0) return systemError("sealing");
+  return {};
+}
+
 }  // namespace
 
 FileDescriptor& FileDescriptor::operator=(FileDescriptor&& other) noexcept {
@@ -67,11 +77,44 @@ FileDescriptor::~FileDescriptor() {
 int FileDescriptor::release() { return std::exchange(fd_, -1); }
 
 Result<std::shared_ptr<const SharedBody>> SharedBody::create(const wire::Body& body) {
-  FileDescriptor fd{::memfd_create("toftwin-body", MFD_CLOEXEC | MFD_ALLOW_SEALING)};
-  if (!fd) return systemError("memfd_create");
-  if (auto wrote = writePieces(fd.get(), body.pieces); !wrote) return wrote.error();
-  if (::fcntl(fd.get(), F_ADD_SEALS, kSeals | F_SEAL_SEAL) != 0) return systemError("sealing");
-  return std::shared_ptr<const SharedBody>{new SharedBody{std::move(fd), body.bytes}};
+  FileDescriptor fd = newMemfd();
+  if (auto filled = fillAndSeal(fd, body); !filled) return filled.error();
+  return std::shared_ptr<const SharedBody>{new SharedBody{std::move(fd), body.bytes, {}}};
+}
+
+SharedBody::~SharedBody() {
+  if (const auto maker = maker_.lock()) maker->makeSpare(size_);
+}
+
+Result<std::shared_ptr<const SharedBody>> SharedBodies::make(const wire::Body& body) {
+  FileDescriptor fd = takeSpare(body.bytes);
+  if (!fd) fd = newMemfd();
+  if (auto filled = fillAndSeal(fd, body); !filled) return filled.error();
+  return std::shared_ptr<const SharedBody>{new SharedBody{std::move(fd), body.bytes, weak_from_this()}};
+}
+
+std::uint64_t SharedBodies::ready() const {
+  const std::scoped_lock lock{mutex_};
+  return std::accumulate(spares_.begin(), spares_.end(), std::uint64_t{0},
+                         [](std::uint64_t sum, const Spare& spare) { return sum + spare.size; });
+}
+
+FileDescriptor SharedBodies::takeSpare(std::uint64_t size) {
+  const std::scoped_lock lock{mutex_};
+  const auto spare = std::ranges::find(spares_, size, &Spare::size);
+  if (spare == spares_.end()) return {};
+  return std::exchange(*spare, Spare{}).fd;
+}
+
+/// One of each size, the newest sizes only. What cannot be had now is taken when it is needed.
+void SharedBodies::makeSpare(std::uint64_t size) {
+  const std::scoped_lock lock{mutex_};
+  if (size > kLargestSpare || std::ranges::find(spares_, size, &Spare::size) != spares_.end()) return;
+  FileDescriptor fd = newMemfd();
+  if (!fd || ::fallocate(fd.get(), 0, 0, static_cast<off_t>(size)) != 0) return;
+  auto place = std::ranges::find(spares_, 0u, &Spare::size);
+  if (place == spares_.end()) place = spares_.begin() + static_cast<std::ptrdiff_t>(oldest_++ % kMostSpares);
+  *place = {size, std::move(fd)};
 }
 
 Result<Buffer> mapSharedBody(const FileDescriptor& memfd, std::uint64_t size) {

@@ -192,13 +192,14 @@ TEST(PreparedFrame, IsInSharedMemoryOnlyWhileItIsBeingSent) {
   PreparedFrame frame;
   const std::vector<std::byte> bytes(100'000, std::byte{7});
   frame.body = {.pieces = {Buffer::adopt(bytes)}, .bytes = bytes.size(), .crc32c = 0};
-  auto one = frame.sharedBody();
+  transport::SharedBodies maker;
+  auto one = frame.sharedBody(maker);
   ASSERT_NE(one, nullptr);
-  EXPECT_EQ(frame.sharedBody(), one) << "subscribers that are sent it together share it";
+  EXPECT_EQ(frame.sharedBody(maker), one) << "subscribers that are sent it together share it";
   const std::weak_ptr<const transport::SharedBody> gone = one;
   one.reset();
   EXPECT_TRUE(gone.expired());
-  EXPECT_NE(frame.sharedBody(), nullptr);
+  EXPECT_NE(frame.sharedBody(maker), nullptr);
 }
 
 TEST(Backlog, TheFirstReasonOfAnEndCounts) {

@@ -113,12 +113,15 @@ TEST_F(RunningDaemon, FramesComeInlineWhenFilesRanOut) {
   start("[[source]]\nname = 'cam'\ndriver = 'pattern'\npace = 'trigger'\nwidth = 160\n"
         "height = 120\n");  // large enough for shared memory
   auto client = this->client(), inline_from_the_start = this->client(true);
-  auto stream = client.subscribe("cam", {.policy = Policy::Queue, .queue = 4});
-  // UBSan looks at a type it meets for the first time through a pipe, and there will be none.
+  // UBSan looks at a type it meets for the first time through a pipe, and there will be none. Memory is ready then for
+  // another frame of that size, and so the frame that is tested is larger.
+  auto smaller = client.subscribe("cam", {.width = 160, .height = 118, .policy = Policy::Queue, .queue = 4});
   auto other = inline_from_the_start.subscribe("cam", {.policy = Policy::Queue, .queue = 4});
   ASSERT_TRUE(client.trigger("cam").ok());
-  ASSERT_TRUE(stream->next(kSoon).ok());
+  ASSERT_TRUE(smaller->next(kSoon).ok());
   ASSERT_TRUE(other->next(kSoon).ok());
+  smaller = Error{Error::Code::Stopped, "no longer wanted"};
+  auto stream = client.subscribe("cam", {.policy = Policy::Queue, .queue = 4});
   rlimit before{};
   ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &before), 0);
   const rlimit none{.rlim_cur = 0, .rlim_max = before.rlim_max};

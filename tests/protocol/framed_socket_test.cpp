@@ -23,6 +23,7 @@
 
 #include "example_messages.h"
 #include "message_json.h"
+#include "protocol/wire/crc32c.h"
 
 namespace toftwin::transport {
 namespace {
@@ -352,6 +353,37 @@ TEST(SharedBodyTest, CannotBeChangedByAnyone) {
   EXPECT_EQ(::pwrite((*shared)->fd(), "x", 1, 0), -1);
   EXPECT_EQ(::ftruncate((*shared)->fd(), 0), -1);
   EXPECT_EQ(::mmap(nullptr, 64, PROT_WRITE, MAP_SHARED, (*shared)->fd(), 0), MAP_FAILED);
+}
+
+TEST(SharedBodies, KeepMemoryReadyForTheNextBodyOfASize) {
+  const auto bodies = std::make_shared<SharedBodies>();
+  const auto sizeOf = [](int width) { return wire::encodeBody(wire::exampleFrame(width, 4).planes); };
+  const wire::Body small = sizeOf(4), large = sizeOf(64);
+  { const auto first = bodies->make(small); }
+  EXPECT_EQ(bodies->ready(), small.bytes);
+  {
+    const auto other = bodies->make(large);
+    EXPECT_EQ(bodies->ready(), small.bytes) << "another size needs other memory";
+    const auto next = bodies->make(small), beside = bodies->make(small);
+    EXPECT_EQ(bodies->ready(), 0u);
+    ASSERT_TRUE(next);
+    const auto mapped = mapSharedBody(FileDescriptor{::dup((*next)->fd())}, small.bytes);
+    ASSERT_TRUE(mapped) << mapped.error().message;
+    EXPECT_EQ(wire::crc32c(mapped->bytes(), 0), small.crc32c);
+    EXPECT_EQ(::pwrite((*next)->fd(), "x", 1, 0), -1);
+  }
+  EXPECT_EQ(bodies->ready(), small.bytes + large.bytes) << "one of each size";
+}
+
+TEST(SharedBodies, KeepTheNewestSizes) {
+  const auto bodies = std::make_shared<SharedBodies>();
+  std::uint64_t newest = 0;
+  for (int i = 1; i <= 7; ++i) {
+    const wire::Body body = wire::encodeBody(wire::exampleFrame(16 * i, 4).planes);
+    const auto made = bodies->make(body);
+    if (i > 3) newest += body.bytes;
+  }
+  EXPECT_EQ(bodies->ready(), newest);
 }
 
 TEST(SharedBodyTest, AnUnsealedMemfdIsRefused) {
