@@ -19,7 +19,7 @@
 #include "tools/cli/terminal.h"
 
 namespace toftwin::cli {
-namespace {
+namespace calibrate_command {
 
 using namespace intrinsics;
 namespace fs = std::filesystem;
@@ -51,8 +51,8 @@ struct Options {
   bool is_flat = false;
 };
 
-Result<Target> targetFrom(const Options& options) {
-  auto target = targetOf(options.board, options.square_mm * millimetre);
+Result<intrinsics::Target> targetFrom(const Options& options) {
+  auto target = intrinsics::targetOf(options.board, options.square_mm * millimetre);
   if (!target || options.marker_mm == 0.0) return target;
   return charucoOf(*std::move(target), options.marker_mm * millimetre, options.dictionary);
 }
@@ -259,9 +259,10 @@ Run add(Arguments& args) {
   return [options] { return run(*options); };
 }
 
-}  // namespace
+}  // namespace calibrate_command
 
 Command calibrateCommand() {
+  using namespace calibrate_command;
   return {"calibrate", "a camera's lens from images of a checkerboard or ChArUco board", kExamples, add};
 }
 

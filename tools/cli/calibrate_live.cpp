@@ -10,7 +10,7 @@
 #include "tools/cli/terminal.h"
 
 namespace toftwin::cli {
-namespace {
+namespace live_calibration {
 
 using namespace intrinsics;
 
@@ -64,10 +64,11 @@ Guidance guidanceFor(const Collector& collector) {
   return guide(collector.target(), collector.sightings(), collector.size(), lens ? &*lens : nullptr);
 }
 
-}  // namespace
+}  // namespace live_calibration
 
-Result<> collectLive(const DaemonOptions& daemon, const LiveOptions& live, Collector& collector,
+Result<> collectLive(const DaemonOptions& daemon, const LiveOptions& live, intrinsics::Collector& collector,
                      const OnView& on_view) {
+  using namespace live_calibration;
   auto client = daemon.connect();
   if (!client) return client.error();
   const auto plane = planeOf(*client, live.source);

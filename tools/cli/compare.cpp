@@ -18,7 +18,7 @@
 #include "tools/cli/terminal.h"
 
 namespace toftwin::cli {
-namespace {
+namespace compare_command {
 
 constexpr const char* kExamples =
     "  toftwin compare kinect stand-in --poses poses.toml -o report   two cameras of one daemon\n"
@@ -287,9 +287,10 @@ Run add(Arguments& args) {
   return [options] { return compareThem(*options); };
 }
 
-}  // namespace
+}  // namespace compare_command
 
 Command compareCommand() {
+  using namespace compare_command;
   return {"compare",
           "compare two cameras, and the simulator with real measurements, and leave a report",
           kExamples, add};

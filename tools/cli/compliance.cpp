@@ -13,7 +13,7 @@
 #include "tools/cli/terminal.h"
 
 namespace toftwin::cli {
-namespace {
+namespace compliance_command {
 
 using Outcome = drivers::Finding::Outcome;
 
@@ -120,9 +120,10 @@ Result<Exit> run(const Options& options) {
   return failed == 0 ? Exit::Ok : Exit::Incomplete;
 }
 
-}  // namespace
+}  // namespace compliance_command
 
 Command complianceCommand() {
+  using namespace compliance_command;
   return {"compliance", "check that a camera keeps what every driver promises; no daemon needed",
           "  toftwin compliance sim:kinect_v2\n"
           "  toftwin compliance sim:o3d303 --keys 'samples_per_pixel = 1'\n"

@@ -11,7 +11,7 @@
 #include "tools/cli/discover_campaign.h"
 
 namespace toftwin::cli {
-namespace {
+namespace discover_command {
 
 struct Options {
   std::string data, map, output = "discovery";
@@ -66,9 +66,10 @@ Run add(Arguments& args) {
   return [options] { return act(*options); };
 }
 
-}  // namespace
+}  // namespace discover_command
 
 Command discoverCommand() {
+  using namespace discover_command;
   return {"discover", "find what measured errors go with, and how much of them that explains",
           "  toftwin discover warmup.csv -o out                  headers say what the columns are\n"
           "  toftwin discover distances.csv --map map.toml -o out\n"

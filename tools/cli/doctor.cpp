@@ -7,7 +7,7 @@
 #include "tools/cli/options.h"
 
 namespace toftwin::cli {
-namespace {
+namespace doctor_command {
 
 struct Options {
   DaemonOptions daemon;
@@ -46,9 +46,10 @@ Result<Exit> run(const Options& options) {
   return is_good ? Exit::Ok : Exit::Incomplete;
 }
 
-}  // namespace
+}  // namespace doctor_command
 
 Command doctorCommand() {
+  using namespace doctor_command;
   return {"doctor", "finds out why something does not work, and says how to mend it",
           "  toftwin doctor\n"
           "  toftwin doctor --address 192.168.0.7:47800 --json\n",

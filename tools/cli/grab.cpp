@@ -9,7 +9,7 @@
 #include "tools/cli/terminal.h"
 
 namespace toftwin::cli {
-namespace {
+namespace grab_command {
 
 struct Options {
   DaemonOptions daemon;
@@ -122,9 +122,10 @@ Result<Exit> run(Options& options) {
   return Exit::Ok;
 }
 
-}  // namespace
+}  // namespace grab_command
 
 Command grabCommand() {
+  using namespace grab_command;
   return {"grab", "frames of a camera as PNG, PLY, NPY, CSV or HDF5",
           "  toftwin grab kinect -o range.png                16-bit, 1 count = 1 mm, 0 = invalid\n"
           "  toftwin grab kinect -o look.png --color --plane amplitude\n"

@@ -11,7 +11,7 @@
 #include "tools/cli/terminal.h"
 
 namespace toftwin::cli {
-namespace {
+namespace info_command {
 
 using compare::Json;
 
@@ -196,9 +196,10 @@ Result<Exit> run(const Options& options) {
   return describeSource(options);
 }
 
-}  // namespace
+}  // namespace info_command
 
 Command infoCommand() {
+  using namespace info_command;
   return {"info", "all that is known of a camera, a recording or a camera file",
           "  toftwin info kinect\n"
           "  toftwin info monday.mcap --json\n"

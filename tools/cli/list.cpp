@@ -10,7 +10,7 @@
 #include "tools/cli/options.h"
 
 namespace toftwin::cli {
-namespace {
+namespace list_command {
 
 using compare::Json;
 
@@ -85,9 +85,10 @@ Result<Exit> run(const Options& options) {
   return Exit::Ok;
 }
 
-}  // namespace
+}  // namespace list_command
 
 Command listCommand() {
+  using namespace list_command;
   return {"list", "the cameras of a daemon, or the drivers of this build",
           "  toftwin list\n"
           "  toftwin list --address 192.168.0.7:47800 --json\n"

@@ -17,7 +17,7 @@
 #include "tools/cli/export/atomic_file.h"
 
 namespace toftwin::cli {
-namespace {
+namespace locate_command {
 
 using namespace intrinsics;
 
@@ -33,14 +33,14 @@ struct Located {
   BoardSighting board;
 };
 
-Result<Target> targetFrom(const Options& options) {
-  auto target = targetOf(options.board, options.square_mm * millimetre);
+Result<intrinsics::Target> targetFrom(const Options& options) {
+  auto target = intrinsics::targetOf(options.board, options.square_mm * millimetre);
   if (!target || options.marker_mm == 0.0) return target;
   return charucoOf(*std::move(target), options.marker_mm * millimetre, options.dictionary);
 }
 
 /// All images in which the board is; the others are said and left out, unless a rig's poses need each.
-Result<std::vector<Located>> locateAll(const Options& options, const Target& target,
+Result<std::vector<Located>> locateAll(const Options& options, const intrinsics::Target& target,
                                        const CameraInfo& camera) {
   std::vector<Located> all;
   const auto take = [&](NamedImage image) -> Result<> {
@@ -163,9 +163,10 @@ Run add(Arguments& args) {
   return [options] { return act(*options); };
 }
 
-}  // namespace
+}  // namespace locate_command
 
 Command locateCommand() {
+  using namespace locate_command;
   return {"locate", "where a camera stood, from a board that it saw: a pose file",
           "  toftwin locate shots/*.png --board 8x5 --square 32 --calibration lens.toml -o poses.toml\n"
           "  toftwin locate shots/*.png --board 8x5 --square 32 --calibration lens.toml --rig rig.toml -o "

@@ -14,7 +14,7 @@
 #include "tools/cli/log.h"
 
 namespace toftwin::cli {
-namespace {
+namespace log_command {
 
 struct Options {
   std::string file, camera, characteristic, number, hdf5;
@@ -169,9 +169,10 @@ Run addTrend(Arguments& args) {
   return [options] { return showTrend(*options); };
 }
 
-}  // namespace
+}  // namespace log_command
 
 Command logCommand() {
+  using namespace log_command;
   return {"log", "runs that were judged, and all their numbers",
           "  toftwin compare run -o report --log lab.sqlite\n"
           "  toftwin log lab.sqlite\n"
@@ -181,6 +182,7 @@ Command logCommand() {
 }
 
 Command trendCommand() {
+  using namespace log_command;
   return {"trend", "how a camera's characteristics changed from run to run",
           "  toftwin trend lab.sqlite --camera kinect --characteristic drift\n", addTrend};
 }

@@ -22,7 +22,7 @@
 #include "tools/cli/terminal.h"
 
 namespace toftwin::cli {
-namespace {
+namespace measure_command {
 
 constexpr const char* kExamples =
     "  toftwin measure standard.toml kinect twin -o run            asks for what a person must prepare\n"
@@ -278,9 +278,10 @@ Run add(Arguments& args) {
   return [options] { return measure(*options); };
 }
 
-}  // namespace
+}  // namespace measure_command
 
 Command measureCommand() {
+  using namespace measure_command;
   return {"measure", "carry a plan out: capture two cameras at its poses and settings", kExamples, add};
 }
 

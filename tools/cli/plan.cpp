@@ -16,7 +16,7 @@
 #include "tools/cli/terminal.h"
 
 namespace toftwin::cli {
-namespace {
+namespace plan_command {
 
 struct Options {
   std::string action, file;
@@ -121,9 +121,10 @@ Run add(Arguments& args) {
   return [options] { return act(*options); };
 }
 
-}  // namespace
+}  // namespace plan_command
 
 Command planCommand() {
+  using namespace plan_command;
   return {"plan", "check what is to be measured with two cameras, and how long it takes",
           "  toftwin plan check docs/examples/plans/standard.toml\n"
           "  toftwin plan show standard.toml --skip moving\n"

@@ -7,7 +7,7 @@
 #include "tools/cli/pose.h"
 
 namespace toftwin::cli {
-namespace {
+namespace pose_command {
 
 struct Options {
   DaemonOptions daemon;
@@ -51,9 +51,10 @@ Result<Exit> run(const Options& options) {
   return Exit::Ok;
 }
 
-}  // namespace
+}  // namespace pose_command
 
 Command poseCommand() {
+  using namespace pose_command;
   return {
       "pose", "show or set where a simulated camera stands",
       "  toftwin pose kinect                                    shows it\n"

@@ -14,7 +14,7 @@
 #include "tools/cli/terminal.h"
 
 namespace toftwin::cli {
-namespace {
+namespace record_command {
 
 struct Options {
   DaemonOptions daemon;
@@ -177,9 +177,10 @@ Result<Exit> run(const Options& options) {
   return options.on_daemon || options.stop ? recordOnDaemon(options) : recordHere(options);
 }
 
-}  // namespace
+}  // namespace record_command
 
 Command recordCommand() {
+  using namespace record_command;
   return {
       "record", "record cameras into an MCAP file",
       "  toftwin record kinect -o monday.mcap            until Ctrl-C; the file is whole at "

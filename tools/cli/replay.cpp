@@ -15,7 +15,7 @@
 #include "tools/cli/terminal.h"
 
 namespace toftwin::cli {
-namespace {
+namespace replay_command {
 
 struct Options {
   OutputOptions output;
@@ -178,9 +178,10 @@ Result<Exit> run(Options& options) {
   });
 }
 
-}  // namespace
+}  // namespace replay_command
 
 Command replayCommand() {
+  using namespace replay_command;
   return {"replay", "the frames of a recording: list them, export them, or serve them to clients",
           "  toftwin replay monday.mcap                      a line per frame\n"
           "  toftwin replay monday.mcap -o frame.npy         every frame: frame-0000.npy, "

@@ -17,7 +17,7 @@
 #include "tools/cli/terminal.h"
 
 namespace toftwin::cli {
-namespace {
+namespace rig_command {
 
 using compare::Json;
 
@@ -192,9 +192,10 @@ Run add(Arguments& args) {
   return [options, action] { return act(*options, *action); };
 }
 
-}  // namespace
+}  // namespace rig_command
 
 Command rigCommand() {
+  using namespace rig_command;
   return {"rig", "move the cameras with a linear axis, a turntable or a robot",
           "  toftwin rig stop rig.toml                     first of all\n"
           "  toftwin rig home rig.toml\n"

@@ -8,7 +8,7 @@
 #include "tools/cli/options.h"
 
 namespace toftwin::cli {
-namespace {
+namespace set_command {
 
 struct Options {
   DaemonOptions daemon;
@@ -47,9 +47,10 @@ Result<Exit> run(const Options& options) {
   return Exit::Ok;
 }
 
-}  // namespace
+}  // namespace set_command
 
 Command setCommand() {
+  using namespace set_command;
   return {"set", "show or set a camera's parameters while it runs",
           "  toftwin set kinect                             all, with their values and bounds\n"
           "  toftwin set kinect ambient_klx 20\n"

@@ -12,7 +12,7 @@
 #include "tools/cli/terminal.h"
 
 namespace toftwin::cli {
-namespace {
+namespace suit_command {
 
 struct Options {
   std::string file, output = "suit", note;
@@ -61,9 +61,10 @@ Run add(Arguments& args) {
   return [options] { return act(*options); };
 }
 
-}  // namespace
+}  // namespace suit_command
 
 Command suitCommand() {
+  using namespace suit_command;
   return {"suit", "find out which camera does what a use case requires, and what spoils the others",
           "  toftwin suit docs/examples/suit/pallet.toml -o out\n"
           "  toftwin suit person.toml --camera o3d303,kinect_v2\n"

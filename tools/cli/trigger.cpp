@@ -10,7 +10,7 @@
 #include "tools/cli/terminal.h"
 
 namespace toftwin::cli {
-namespace {
+namespace trigger_command {
 
 struct Options {
   DaemonOptions daemon;
@@ -51,9 +51,10 @@ Result<Exit> run(const Options& options) {
   return Exit::Ok;
 }
 
-}  // namespace
+}  // namespace trigger_command
 
 Command triggerCommand() {
+  using namespace trigger_command;
   return {"trigger", "make a camera whose pace is \"trigger\" take one frame",
           "  toftwin record rig -o run.mcap &\n"
           "  toftwin trigger rig                            one frame into that recording\n"

@@ -12,7 +12,7 @@
 #include "tools/cli/terminal.h"
 
 namespace toftwin::cli {
-namespace {
+namespace usb_command {
 
 using compare::Json;
 
@@ -76,9 +76,10 @@ Result<Exit> run(const Options& options) {
   return Exit::Interrupted;
 }
 
-}  // namespace
+}  // namespace usb_command
 
 Command usbCommand() {
+  using namespace usb_command;
   return {
       "usb", "lists depth cameras on USB with port and speed, watches them, resets one that hangs",
       "  toftwin usb                list\n"

@@ -17,9 +17,9 @@ namespace {
 
 constexpr std::chrono::minutes kLogEvery{1};
 
-class Run {
+class CampaignRun {
  public:
-  Run(FrameMaker& maker, Sink& sink, const MemoryFiles& memory, std::vector<bool> done)
+  CampaignRun(FrameMaker& maker, Sink& sink, const MemoryFiles& memory, std::vector<bool> done)
       : maker_(maker),
         sink_(sink),
         memory_(memory),
@@ -147,7 +147,7 @@ Result<CampaignReport> runCampaign(FrameMaker& maker, Sink& sink, const std::vec
   removeLeftovers(files);
   auto done = sink.open(maker.example());
   if (!done) return done.error();
-  return Run{maker, sink, files.memory, *std::move(done)}.all();
+  return CampaignRun{maker, sink, files.memory, *std::move(done)}.all();
 }
 
 }  // namespace toftwin::cli
