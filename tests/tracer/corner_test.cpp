@@ -137,31 +137,44 @@ TEST(Corner, DirectLightAloneHasNoError) {
   }
 }
 
+/// Two surfaces, D = 1.5 m: the published errors in mm at kTablePlaces.
+struct TwoBounceRow {
+  double albedo;
+  Frequency f;
+  std::vector<double> error_mm;
+};
+const std::vector<double> kTablePlaces{0.001, 0.005, 0.02, 0.1, 0.2, 0.3, 0.5, 1.0};
+const std::vector<TwoBounceRow> kTwoBounces{{0.8, 16_MHz, {0.995, 4.286, 14.51, 52.93, 82.80, 99.93, 109.76, 89.81}},
+                                            {0.8, 80_MHz, {0.849, 3.566, 11.75, 40.83, 60.18, 66.54, 54.29, 7.61}},
+                                            {0.8, 120_MHz, {0.785, 3.254, 10.55, 35.22, 48.57, 47.66, 22.41, -9.92}},
+                                            {0.5, 80_MHz, {0.594, 2.500, 8.246, 28.31, 40.63, 43.59, 33.81, 4.62}},
+                                            {0.2, 80_MHz, {0.270, 1.138, 3.758, 12.69, 17.61, 18.24, 13.44, 1.80}}};
+
 TEST(CornerQuadrature, AgreesWithItselfAtHalfTheStepAndWithTheTable) {
-  const Corner corner;
-  for (const double s : {0.001, 0.1, 1.0}) {
-    EXPECT_NEAR(twoBounceError(corner, s, 80_MHz), twoBounceError(corner, s, 80_MHz, 0.05), 1e-6);
+  for (const TwoBounceRow& row : kTwoBounces) {
+    Corner corner;
+    corner.albedo = row.albedo;
+    for (std::size_t i = 0; i < kTablePlaces.size(); ++i) {
+      const double error = twoBounceError(corner, kTablePlaces[i], row.f);
+      EXPECT_NEAR(error, twoBounceError(corner, kTablePlaces[i], row.f, 0.05), 1e-6);
+      const double last_digit_mm = kTablePlaces[i] < 0.01 ? 1e-3 : 1e-2;  // of the published value
+      EXPECT_NEAR(error * 1e3, row.error_mm[i], last_digit_mm)
+          << "albedo " << row.albedo << ", f " << row.f.in(megahertz) << " MHz, s " << kTablePlaces[i];
+    }
   }
-  EXPECT_NEAR(twoBounceError(corner, 0.001, 80_MHz) * 1e3, 0.849, 1e-3);
-  EXPECT_NEAR(twoBounceError(corner, 0.3, 16_MHz) * 1e3, 99.93, 1e-2);
-  EXPECT_NEAR(twoBounceError(corner, 1.0, 120_MHz) * 1e3, -9.92, 1e-2);
 }
 
 TEST(Corner, TwoBouncesAgreeWithQuadrature) {
-  const std::vector<Frequency> frequencies{16_MHz, 80_MHz, 120_MHz};
   Judge judge{"two bounces"};
-  for (const double albedo : {0.8, 0.2}) {
+  for (const TwoBounceRow& row : kTwoBounces) {
     Corner corner;
-    corner.albedo = albedo;
+    corner.albedo = row.albedo;
     const Scene scene = corner.scene();
-    for (const double s : {0.001, 0.005, 0.02, 0.1, 0.3, 1.0}) {
-      std::vector<double> expected;
-      for (const Frequency f : frequencies) expected.push_back(twoBounceError(corner, s, f));
-      const auto seen = traceError(corner, scene, s, frequencies, 2, expected);
-      for (std::size_t f = 0; f < 3; ++f) {
-        judge.check(seen[f], expected[f],
-                    "albedo " + std::to_string(albedo) + ", s " + std::to_string(s) + ", frequency " + std::to_string(f));
-      }
+    for (const double s : kTablePlaces) {
+      const double expected = twoBounceError(corner, s, row.f);
+      judge.check(traceError(corner, scene, s, {row.f}, 2, {expected})[0], expected,
+                  "albedo " + std::to_string(row.albedo) + ", f " + std::to_string(row.f.in(megahertz)) + ", s " +
+                      std::to_string(s));
     }
   }
 }
@@ -169,7 +182,6 @@ TEST(Corner, TwoBouncesAgreeWithQuadrature) {
 /// Sixteen surfaces, D = 1.5 m; mm. The reference's own Monte-Carlo error, 0.05 to 0.25 mm, and the
 /// rounding of its digits have to fit into the tolerance.
 TEST(Corner, SixteenSurfacesAgreeWithTheTable) {
-  const std::vector<double> places{0.001, 0.005, 0.02, 0.1, 0.2, 0.3, 0.5, 1.0};
   struct Row {
     double albedo;
     Frequency f;
@@ -185,12 +197,12 @@ TEST(Corner, SixteenSurfacesAgreeWithTheTable) {
     Corner corner;
     corner.albedo = row.albedo;
     const Scene scene = corner.scene();
-    for (std::size_t i = 0; i < places.size(); ++i) {
+    for (std::size_t i = 0; i < kTablePlaces.size(); ++i) {
       const double expected = row.error_mm[i] * 1e-3;
-      const auto seen = traceError(corner, scene, places[i], {row.f}, 16, {expected});
+      const auto seen = traceError(corner, scene, kTablePlaces[i], {row.f}, 16, {expected});
       judge.check(seen[0], expected,
                   "albedo " + std::to_string(row.albedo) + ", f " + std::to_string(row.f.in(megahertz)) + ", s " +
-                      std::to_string(places[i]));
+                      std::to_string(kTablePlaces[i]));
     }
   }
 }
@@ -220,16 +232,17 @@ TEST(Corner, KeepsItsValueNextToTheEdgeFarFromTheOrigin) {
 struct FiniteRow {
   double distance, albedo;
   std::vector<double> at_30_mm, at_120_mm;  ///< published, from 40 patches a side, one decimal
+  double one_bounce_mm;                     ///< the same of two surfaces alone, at 30 MHz, 30 cm from the edge
 };
 const std::vector<double> kPlaces{0.02, 0.10, 0.30, 0.60, 0.90};
 const std::vector<FiniteRow> kFiniteCorner{
-    {1.5, 0.1, {1.9, 6.1, 8.3, 5.8, 3.5}, {1.8, 5.3, 5.7, 1.7, -0.1}},
-    {1.5, 0.3, {6.9, 19.4, 25.8, 17.9, 10.7}, {6.1, 16.4, 17.3, 5.2, -0.3}},
-    {1.5, 0.5, {13.5, 34.4, 44.4, 30.9, 18.5}, {11.5, 28.0, 29.2, 8.5, -0.6}},
-    {1.5, 0.8, {27.5, 60.8, 74.9, 52.3, 31.3}, {21.7, 46.9, 47.6, 13.3, -1.2}},
-    {1.5, 0.9, {33.5, 70.8, 86.0, 60.0, 35.9}, {25.8, 53.7, 54.0, 14.9, -1.5}},
-    {1.0, 0.5, {14.9, 36.7, 42.0, 26.4, 19.5}, {12.3, 29.0, 25.9, 7.0, 0.8}},
-    {2.5, 0.5, {12.0, 30.9, 42.7, 33.5, 20.8}, {10.5, 25.9, 29.4, 9.8, -1.4}}};
+    {1.5, 0.1, {1.9, 6.1, 8.3, 5.8, 3.5}, {1.8, 5.3, 5.7, 1.7, -0.1}, 8.0},
+    {1.5, 0.3, {6.9, 19.4, 25.8, 17.9, 10.7}, {6.1, 16.4, 17.3, 5.2, -0.3}, 22.7},
+    {1.5, 0.5, {13.5, 34.4, 44.4, 30.9, 18.5}, {11.5, 28.0, 29.2, 8.5, -0.6}, 36.0},
+    {1.5, 0.8, {27.5, 60.8, 74.9, 52.3, 31.3}, {21.7, 46.9, 47.6, 13.3, -1.2}, 53.5},
+    {1.5, 0.9, {33.5, 70.8, 86.0, 60.0, 35.9}, {25.8, 53.7, 54.0, 14.9, -1.5}, 58.8},
+    {1.0, 0.5, {14.9, 36.7, 42.0, 26.4, 19.5}, {12.3, 29.0, 25.9, 7.0, 0.8}, 34.3},
+    {2.5, 0.5, {12.0, 30.9, 42.7, 33.5, 20.8}, {10.5, 25.9, 29.4, 9.8, -1.4}, 34.3}};
 constexpr CornerRadiosity::Grid kGrid{};
 
 /// From 10 cm on the published table has the error that it states, 0.1 mm and half of its last digit.
@@ -265,6 +278,19 @@ TEST(FiniteCorner, AgreesWithRadiosity) {
       judge.check(seen[0], expected[0], where + ", 30 MHz");
       judge.check(seen[1], expected[1], where + ", 120 MHz");
     }
+  }
+}
+
+TEST(FiniteCorner, OneBounceAgreesWithThePublishedTable) {
+  Judge judge{"finite corner, one bounce"};
+  constexpr double kPlace = 0.3;
+  for (const FiniteRow& row : kFiniteCorner) {
+    const Corner corner{.distance = row.distance, .wall_length = 1.0, .wall_height = 1.0, .albedo = row.albedo,
+                        .shift = {}, .more = {}};
+    const Scene scene = corner.scene();
+    const double expected = row.one_bounce_mm * 1e-3;
+    judge.check(traceError(corner, scene, kPlace, {30_MHz}, 2, {expected})[0], expected,
+                "D " + std::to_string(row.distance) + ", albedo " + std::to_string(row.albedo));
   }
 }
 
