@@ -7,6 +7,8 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <deque>
+#include <iterator>
 #include <optional>
 #include <utility>
 
@@ -43,7 +45,11 @@ void heat(Frame& frame, Temperature temperature) {
   frame.moment.temperatures.push_back({"illumination", temperature});
 }
 
-/// A source with its plan before it: all calls go through, frames do not always.
+/// A source with its plan before it: all calls go through, frames do not always. A fault is noted when it has
+/// happened; where several strike one frame, those happen that can:
+///   - what does not come has no other fault but the clock's; a device that goes away loses no frame besides
+///   - the pixels are those that are frozen first, damaged then
+///   - delays add up, doubles do not; while one waits for the next to overtake it, no other does
 class FaultySource final : public drivers::Source {
  public:
   FaultySource(std::shared_ptr<FaultPlan> plan, std::unique_ptr<Source> inner)
@@ -52,7 +58,9 @@ class FaultySource final : public drivers::Source {
   [[nodiscard]] const drivers::SourceInfo& info() const override { return inner_->info(); }
   Result<> start() override { return inner_->start(); }
   void stop() override {
-    waiting_.reset();
+    for (const Waiting& one : leaving_) noteAll(one, "the source was stopped before it came");
+    leaving_.clear();
+    late_.clear();
     inner_->stop();
   }
   [[nodiscard]] drivers::SourceState state() const override { return inner_->state(); }
@@ -64,117 +72,169 @@ class FaultySource final : public drivers::Source {
 
   Result<Frame> next(std::stop_token stop, bool lockstep) override {
     while (true) {
-      if (waiting_) return takeWaiting(stop);
+      if (!leaving_.empty()) return takeLeaving(stop);
       Result<Frame> frame = inner_->next(stop, lockstep);
-      if (!frame) return frame;
-      const FaultPlan::Strike strike = plan_->next();
-      if (auto away = apply(strike, *frame); !away) return away.error();
-      if (is_lost_) {
-        waiting_.reset();
+      if (!frame && frame.error().code == Error::Code::EndOfStream && !late_.empty()) {
+        release();  // nothing comes that could overtake it
         continue;
       }
+      if (!frame) return frame;
+      const FaultPlan::Strike strike = plan_->next();
+      stepClock(strike, *frame);
+      if (const auto gone = goes(strike)) {
+        const std::int64_t device_ns = startOf(*frame);
+        if (plan_->fault(*gone).kind == FaultKind::Disconnect) return disconnect(strike, *gone, device_ns);
+        ++lost_;
+        plan_->note(strike.frame, *gone, device_ns, "not given");
+        continue;
+      }
+      damage(strike, *frame);
       frame->dropped_by_device += std::exchange(lost_, 0);
-      if (!waiting_) return frame;
-      waiting_->frame = *std::move(frame);
-      if (!waiting_->due) return std::as_const(*waiting_).frame;  // and once more
+      send(strike, *std::move(frame));
     }
   }
 
  private:
+  struct Note {
+    std::size_t fault;
+    std::string detail;
+  };
+  /// A frame on its way out, and what is true of it when it leaves.
   struct Waiting {
+    std::uint64_t index = 0;
     Frame frame;
-    std::optional<drivers::SteadyTime> due;  ///< none: the second of a pair
+    Duration delay;
+    std::optional<drivers::SteadyTime> due{};
+    std::vector<Note> notes{};
   };
 
-  Result<Frame> takeWaiting(const std::stop_token& stop) {
+  Result<Frame> takeLeaving(const std::stop_token& stop) {
+    Waiting& one = leaving_.front();
+    if (one.delay > 0_s && !one.due) one.due = steady_clock::now() + steadyOf(one.delay);
     // What is interrupted loses no frame.
-    if (waiting_->due && !drivers::sleepUntil(*waiting_->due, stop))
-      return Error{Error::Code::Stopped, "asked to stop"};
-    Frame frame = std::move(waiting_->frame);
-    if (!waiting_->due) {
-      frame.dropped_by_device = 0;
-      markAs(frame, FaultKind::Duplicate);
-    }
-    waiting_.reset();
+    if (one.due && !drivers::sleepUntil(*one.due, stop)) return Error{Error::Code::Stopped, "asked to stop"};
+    noteAll(one);
+    Frame frame = std::move(one.frame);
+    leaving_.pop_front();
     return frame;
   }
 
-  /// Error Disconnected if the device goes away with this frame.
-  Result<> apply(const FaultPlan::Strike& strike, Frame& frame) {
-    is_lost_ = false;
+  void noteAll(const Waiting& one, std::string_view instead = {}) {
+    for (const auto& [fault, detail] : one.notes)
+      plan_->note(one.index, fault, startOf(one.frame), instead.empty() ? detail : instead);
+  }
+
+  /// With all that it becomes, into the order in which frames leave.
+  void send(const FaultPlan::Strike& strike, Frame frame) {
+    Waiting one{strike.frame, std::move(frame), 0_s};
+    std::optional<std::size_t> doubled, reordered;
+    for (const std::size_t number : strike.faults) {
+      const FaultKeys& fault = plan_->fault(number);
+      if (fault.kind == FaultKind::Duplicate && !doubled) doubled = number;
+      if (fault.kind == FaultKind::Reorder && late_.empty() && !reordered) reordered = number;
+      if (fault.kind != FaultKind::Delay) continue;
+      markAs(one.frame, fault.kind);
+      one.delay = one.delay + fault.delay;
+      one.notes.push_back({number, fmt::format("{:g} ms", fault.delay.in(millisecond))});
+    }
+    auto& way = reordered ? late_ : leaving_;
+    way.push_back(one);
+    if (doubled) {
+      Waiting again{strike.frame, std::move(one.frame), 0_s};
+      again.frame.dropped_by_device = 0;
+      markAs(again.frame, FaultKind::Duplicate);
+      again.notes.push_back({*doubled, "given twice"});
+      way.push_back(std::move(again));
+    }
+    if (reordered) {
+      late_by_ = *reordered;
+    } else if (!late_.empty()) {
+      late_.front().notes.push_back({late_by_, fmt::format("given after frame {}", strike.frame)});
+      for (Waiting& late : late_) markAs(late.frame, FaultKind::Reorder);
+      release();
+    }
+  }
+  void release() {
+    std::ranges::move(late_, std::back_inserter(leaving_));
+    late_.clear();
+  }
+
+  void stepClock(const FaultPlan::Strike& strike, Frame& frame) {
     for (Exposure& one : frame.moment.exposures) one.start.ns += plan_->clockStep_ns();
     for (const std::size_t number : strike.faults) {
       const FaultKeys& fault = plan_->fault(number);
-      const std::string detail = applyOne(fault, number, strike.frame, frame);
-      plan_->note(strike, number, startOf(frame), detail);
-      if (fault.kind == FaultKind::Disconnect) {
-        return Error{Error::Code::Disconnected,
-                     fmt::format("the fault plan disconnected it at frame {}", strike.frame)};
-      }
+      if (fault.kind != FaultKind::ClockStep) continue;
+      plan_->stepClock(fault.step);
+      for (Exposure& one : frame.moment.exposures) one.start.ns += nanosecondsOf(fault.step);
+      markAs(frame, fault.kind);
+      plan_->note(strike.frame, number, startOf(frame), fmt::format("{:g} s", fault.step.in(second)));
     }
-    if (!isStruckBy(strike, FaultKind::Freeze)) frozen_ = frame.planes;
-    return {};
   }
 
-  [[nodiscard]] bool isStruckBy(const FaultPlan::Strike& strike, FaultKind kind) const {
-    return std::ranges::any_of(strike.faults,
-                               [&](std::size_t number) { return plan_->fault(number).kind == kind; });
+  /// The fault that keeps the frame from coming.
+  [[nodiscard]] std::optional<std::size_t> goes(const FaultPlan::Strike& strike) const {
+    for (const FaultKind kind : {FaultKind::Disconnect, FaultKind::Loss}) {
+      const auto found = std::ranges::find_if(
+          strike.faults, [&](std::size_t number) { return plan_->fault(number).kind == kind; });
+      if (found != strike.faults.end()) return *found;
+    }
+    return std::nullopt;
   }
 
-  std::string applyOne(const FaultKeys& fault, std::size_t number, std::uint64_t index, Frame& frame) {
-    switch (fault.kind) {
-      case FaultKind::Loss:
-        is_lost_ = true;
-        ++lost_;
-        return "not given";
-      case FaultKind::Duplicate:
-        if (!waiting_) waiting_.emplace();
-        return "given twice";
-      case FaultKind::Delay:
-        markAs(frame, fault.kind);
-        waiting_.emplace().due = steady_clock::now() + steadyOf(fault.delay);
-        return fmt::format("{:g} ms", fault.delay.in(millisecond));
-      case FaultKind::ClockStep: {
-        plan_->stepClock(fault.step);
-        const std::int64_t step_ns = nanosecondsOf(fault.step);
-        for (Exposure& one : frame.moment.exposures) one.start.ns += step_ns;
-        markAs(frame, fault.kind);
-        return fmt::format("{:g} s", fault.step.in(second));
-      }
-      case FaultKind::Freeze:
-        if (!frozen_.empty()) frame.planes = frozen_;
-        markAs(frame, fault.kind);
-        return "the pixels of the frame before";
-      case FaultKind::Disconnect:
-        plan_->sendAway(fault.outage);
-        return fmt::format("{:g} s", fault.outage.in(second));
-      case FaultKind::OverTemperature:
-        heat(frame, fault.temperature);
-        markAs(frame, fault.kind);
-        return fmt::format("{:g} degrees", fault.temperature.in(celsius));
-      case FaultKind::Corruption:
-      case FaultKind::StuckPixels:
-      case FaultKind::Dirt:
-        markAs(frame, fault.kind);
-        return fmt::format("{} pixels", damagePixels(frame, fault, index, number));
+  Error disconnect(const FaultPlan::Strike& strike, std::size_t number, std::int64_t device_ns) {
+    const Duration outage = plan_->fault(number).outage;
+    plan_->sendAway(outage);
+    plan_->note(strike.frame, number, device_ns, fmt::format("{:g} s", outage.in(second)));
+    return {Error::Code::Disconnected,
+            fmt::format("the fault plan disconnected it at frame {}", strike.frame)};
+  }
+
+  /// What is wrong with what the frame holds.
+  void damage(const FaultPlan::Strike& strike, Frame& frame) {
+    const auto note = [&](std::size_t number, std::string_view detail) {
+      markAs(frame, plan_->fault(number).kind);
+      plan_->note(strike.frame, number, startOf(frame), detail);
+    };
+    const auto freezes = std::ranges::find_if(
+        strike.faults, [&](std::size_t number) { return plan_->fault(number).kind == FaultKind::Freeze; });
+    if (freezes != strike.faults.end() && !good_.empty()) {
+      frame.planes = good_;
+      note(*freezes, "the pixels of the last good frame");
+    } else {
+      good_ = frame.planes;
     }
-    return {};
+    for (const std::size_t number : strike.faults) {
+      const FaultKeys& fault = plan_->fault(number);
+      switch (fault.kind) {
+        case FaultKind::OverTemperature:
+          heat(frame, fault.temperature);
+          note(number, fmt::format("{:g} degrees", fault.temperature.in(celsius)));
+          break;
+        case FaultKind::Corruption:
+        case FaultKind::StuckPixels:
+        case FaultKind::Dirt:
+          note(number, fmt::format("{} pixels", damagePixels(frame, fault, strike.frame, number)));
+          break;
+        default:
+          break;
+      }
+    }
   }
 
   const std::shared_ptr<FaultPlan> plan_;  // shared with the source's next opening
   const std::unique_ptr<Source> inner_;
-  std::optional<Waiting> waiting_;
-  std::vector<Plane> frozen_;
+  std::deque<Waiting> leaving_, late_;  ///< late: until the next one has left
+  std::size_t late_by_ = 0;             ///< the fault
+  std::vector<Plane> good_;             ///< what a frozen camera gives
   std::uint64_t lost_ = 0;
-  bool is_lost_ = false;
 };
 
 }  // namespace
 
 std::string_view nameOf(FaultKind kind) {
-  constexpr std::array<std::string_view, 10> kNames{
-      "loss",       "duplicate",        "delay",        "corruption", "clock_step", "freeze",
-      "disconnect", "over_temperature", "stuck_pixels", "dirt"};
+  constexpr std::array<std::string_view, 11> kNames{
+      "loss",   "duplicate",  "reorder",          "delay",        "corruption", "clock_step",
+      "freeze", "disconnect", "over_temperature", "stuck_pixels", "dirt"};
   return kNames[static_cast<std::size_t>(kind)];
 }
 
@@ -210,14 +270,14 @@ FaultPlan::Strike FaultPlan::next() {
   return strike;
 }
 
-void FaultPlan::note(const Strike& strike, std::size_t number, std::int64_t device_ns,
+void FaultPlan::note(std::uint64_t frame, std::size_t number, std::int64_t device_ns,
                      std::string_view detail) {
   const FaultKeys& fault = faults_[number];
-  const bool goes_on = strike.frame > 0 && strike.frame == next_in_row_[number];
-  next_in_row_[number] = strike.frame + 1;
+  const bool goes_on = frame > 0 && frame == next_in_row_[number];
+  next_in_row_[number] = frame + 1;
   if (!goes_on) {
     logging::info("{}: fault {} ({}) at frame {}, device time {} ns: {}", source_, number, nameOf(fault.kind),
-                  strike.frame, device_ns, detail);
+                  frame, device_ns, detail);
   }
   if (log_path_.empty()) return;
   if (!log_.is_open()) {
@@ -225,8 +285,7 @@ void FaultPlan::note(const Strike& strike, std::size_t number, std::int64_t devi
     log_ << "frame,device_ns,fault,kind,detail\n";
     if (!log_) logging::error("{}: the log of faults {} cannot be written", source_, log_path_.string());
   }
-  log_ << fmt::format("{},{},{},{},{}\n", strike.frame, device_ns, number, nameOf(fault.kind), detail)
-       << std::flush;
+  log_ << fmt::format("{},{},{},{},{}\n", frame, device_ns, number, nameOf(fault.kind), detail) << std::flush;
 }
 
 void FaultPlan::sendAway(Duration outage) { away_until_ = steady_clock::now() + steadyOf(outage); }

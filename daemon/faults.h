@@ -22,6 +22,7 @@ namespace toftwin::daemon {
 enum class FaultKind {
   Loss,
   Duplicate,
+  Reorder,
   Delay,
   Corruption,
   ClockStep,
@@ -52,6 +53,7 @@ struct FaultKeys {
     v.choice("kind", kind,
              {{"loss", FaultKind::Loss},
               {"duplicate", FaultKind::Duplicate},
+              {"reorder", FaultKind::Reorder},
               {"delay", FaultKind::Delay},
               {"corruption", FaultKind::Corruption},
               {"clock_step", FaultKind::ClockStep},
@@ -99,7 +101,7 @@ class FaultPlan {
   [[nodiscard]] const FaultKeys& fault(std::size_t number) const { return faults_[number]; }
   /// A line of the file, which proves the fault: frame, device time, kind, detail. The first of a row is told
   /// in the daemon's log, too.
-  void note(const Strike& strike, std::size_t number, std::int64_t device_ns, std::string_view detail);
+  void note(std::uint64_t frame, std::size_t number, std::int64_t device_ns, std::string_view detail);
   void sendAway(Duration outage);
   void stepClock(Duration step);
   [[nodiscard]] std::int64_t clockStep_ns() const { return clock_step_ns_; }

@@ -7,6 +7,9 @@
 #include <cmath>
 #include <fstream>
 #include <sstream>
+#include <thread>
+
+#include <fmt/format.h>
 
 #include "daemon/faults.h"
 #include "drivers/pattern/pattern.h"
@@ -98,6 +101,78 @@ TEST(Faults, ADelayThatIsInterruptedLosesNothing) {
   EXPECT_EQ(frame->provenance.kind, FrameKind::Faulted);
   EXPECT_GE(std::chrono::steady_clock::now() - began, 50ms);
   EXPECT_EQ(startOf(*source.next()), kInterval_ns);
+}
+
+TEST(Faults, AReorderedFrameComesAfterTheNextAndSaysSo) {
+  Faulty source{{fault(FaultKind::Reorder, 1, 2)}};  // 1 waits for 2, which has none to wait for
+  std::vector<std::int64_t> indices;
+  std::vector<bool> is_faulted;
+  for (int i = 0; i < 4; ++i) {
+    const auto frame = source.next();
+    indices.push_back(startOf(*frame) / kInterval_ns);
+    is_faulted.push_back(frame->provenance.kind == FrameKind::Faulted);
+  }
+  EXPECT_THAT(indices, ElementsAre(0, 2, 1, 3));
+  EXPECT_THAT(is_faulted, ElementsAre(false, false, true, false));
+}
+
+/// frame,device_ns,fault,kind,detail of the lines but the first, without the time.
+std::vector<std::string> linesOf(const std::filesystem::path& log) {
+  std::vector<std::string> lines;
+  std::ifstream file{log};
+  std::string line;
+  for (std::getline(file, line); std::getline(file, line);) {
+    const auto first = line.find(','), second = line.find(',', first + 1);
+    lines.push_back(line.substr(0, first) + line.substr(second));
+  }
+  return lines;
+}
+
+/// Several faults strike each frame: the log has those that happened, and no other.
+TEST(Faults, WhereSeveralMeetTheLogHasWhatHappened) {
+  const auto log = std::filesystem::path{testing::TempDir()} / fmt::format("faults_{}.csv", ::getpid());
+  auto brief = fault(FaultKind::Delay, 1);
+  brief.delay = 5_ms;
+  auto away = fault(FaultKind::Disconnect, 5);
+  away.outage = 0_s;
+  {
+    Faulty source{{brief, fault(FaultKind::Duplicate, 1), fault(FaultKind::Duplicate, 1),
+                   fault(FaultKind::Loss, 2), fault(FaultKind::Dirt, 2), fault(FaultKind::Reorder, 3, 2),
+                   fault(FaultKind::Freeze, 0), away, fault(FaultKind::Loss, 5)},
+                  log};
+    std::vector<std::int64_t> indices;
+    std::chrono::steady_clock::time_point before{}, after{};
+    for (int i = 0; i < 5; ++i) {
+      if (i == 1) before = std::chrono::steady_clock::now();
+      const auto frame = source.next();
+      ASSERT_TRUE(frame.ok());
+      if (i == 1) after = std::chrono::steady_clock::now();
+      indices.push_back(startOf(*frame) / kInterval_ns);
+      EXPECT_EQ(frame->dropped_by_device, i == 4 ? 1u : 0u) << "the one before 3";
+    }
+    EXPECT_THAT(indices, ElementsAre(0, 1, 1, 4, 3));
+    EXPECT_GE(after - before, 5ms);
+    EXPECT_EQ(source.next().error().code, Error::Code::Disconnected);
+  }
+  EXPECT_THAT(linesOf(log), ElementsAre("1,0,delay,5 ms", "1,1,duplicate,given twice", "2,3,loss,not given",
+                                        "3,5,reorder,given after frame 4", "5,7,disconnect,0 s"));
+  std::filesystem::remove(log);
+}
+
+TEST(Faults, ADelayedFrameThatAStopTookIsNotSaidToHaveCome) {
+  const auto log = std::filesystem::path{testing::TempDir()} / fmt::format("stopped_{}.csv", ::getpid());
+  auto delayed = fault(FaultKind::Delay, 0);
+  delayed.delay = 60_s;
+  Faulty source{{delayed}, log};
+  std::jthread stops;
+  std::stop_source interrupt;
+  stops = std::jthread{[&] { std::this_thread::sleep_for(50ms), interrupt.request_stop(); }};
+  EXPECT_EQ(source.next(interrupt.get_token()).error().code, Error::Code::Stopped);
+  source.source_->stop();
+  EXPECT_THAT(linesOf(log), ElementsAre("0,0,delay,the source was stopped before it came"));
+  ASSERT_TRUE(source.source_->start().ok());
+  EXPECT_TRUE(source.next().ok());
+  std::filesystem::remove(log);
 }
 
 TEST(Faults, AClockThatStepsGoesOnFromThere) {
