@@ -217,6 +217,7 @@ void SourceHost::noteState() {
   const std::scoped_lock lock{mutex_};
   state_ = *std::move(state);
   if (!info_) return;
+  info_->planes = std::move(info->planes);
   info_->frame_interval = info->frame_interval;
   info_->can_trigger = info->can_trigger;
 }

@@ -48,7 +48,10 @@ wire::SourceHealth SourceLink::health() const {
 void SourceLink::post(SourceHost::Command command, Done done) {
   const auto host = hub_.find(wants_.source);
   if (!host) return done(host.error());
-  (*host)->post(std::move(command), onThread(std::move(done)));
+  (*host)->post(std::move(command), onThread([this, done = std::move(done)](const Result<>& result) {
+                  follow();
+                  done(result);
+                }));
 }
 
 void SourceLink::trigger(Done done) {
@@ -70,22 +73,46 @@ void SourceLink::subscribe() {
   auto host = hub_.find(wants_.source);
   const auto description = host ? (*host)->describe() : Result<wire::SourceDescription>{host.error()};
   if (!description) return tryAgain();
-  Wish wish;
+  auto subscribed = subscribeTo(**host, *description);
+  if (!subscribed) return tryAgain();
+  host_ = *std::move(host);
+  subscriber_ = *std::move(subscribed);
+}
+
+std::vector<PlaneKind> SourceLink::planesOf(const wire::SourceDescription& description) const {
+  std::vector<PlaneKind> planes;
   for (const PlaneKind kind : wants_.planes) {
-    if (std::ranges::count(description->planes, kind) > 0) wish.selection.planes.push_back(kind);
+    if (std::ranges::count(description.planes, kind) > 0) planes.push_back(kind);
   }
+  return planes;
+}
+
+Result<SubscriberPtr> SourceLink::subscribeTo(SourceHost& host, const wire::SourceDescription& description) {
+  planes_ = planesOf(description);
+  Wish wish;
+  wish.selection.planes = planes_;
   wish.backlog = {.policy = wire::Policy::Queue,
                   .depth = wants_.queue,
                   .byte_limit = hub_.options().backlog_bytes,
                   .budget = hub_.budget()};
-  auto subscribed = (*host)->subscribe(std::move(wish), [this, door = door_, alive = is_alive_] {
+  return host.subscribe(std::move(wish), [this, door = door_, alive = is_alive_] {
     door->post([this, alive] {
       if (*alive) takeAll();
     });
   });
-  if (!subscribed) return tryAgain();
-  host_ = *std::move(host);
-  subscriber_ = *std::move(subscribed);
+}
+
+/// The new subscription before the old one ends, so that a source on demand goes on.
+void SourceLink::follow() {
+  if (!subscriber_) return;
+  const auto description = host_->describe();
+  if (!description || planesOf(*description) == planes_) return;
+  auto subscribed = subscribeTo(*host_, *description);
+  if (!subscribed) {
+    unsubscribe();
+    return tryAgain();
+  }
+  host_->unsubscribe(std::exchange(subscriber_, *std::move(subscribed)));
 }
 
 void SourceLink::unsubscribe() {
@@ -104,7 +131,7 @@ void SourceLink::tryAgain() {
 void SourceLink::takeAll() {
   while (subscriber_) {
     auto item = subscriber_->backlog.take();
-    if (!item) return;
+    if (!item) return follow();
     if (const auto* delivery = std::get_if<Backlog::Delivery>(&*item)) {
       take_(delivery->frame->frame);
       continue;

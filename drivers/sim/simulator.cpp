@@ -72,7 +72,8 @@ class SimulatedSource final : public Source {
         base_(std::move(chosen.model)),
         model_(base_),
         operating_(Operating::of(base_)),
-        info_(describe(keys_, model_, std::move(chosen.planes))),
+        planes_(std::move(chosen.planes)),
+        info_(describe(keys_, model_, planesNow())),
         view_(std::move(view)),
         color_(std::move(chosen.color)),
         pacer_(keys_.pace, *info_.frame_interval),
@@ -230,6 +231,7 @@ class SimulatedSource final : public Source {
     operating_ = std::move(operating);
     view_.setFrequencies(model_.traceRequest().frequencies,
                          model_.hasPhasors() ? model_.correlatedTerms() : std::vector<std::uint8_t>{});
+    info_.planes = planesNow();
     collected_.reset();
     return {};
   }
@@ -299,15 +301,15 @@ class SimulatedSource final : public Source {
     std::optional<Plane> color;
     if (color_) color = color_->over(model_.rays(), exposed.range.range_m);
     const bool is_of_middle = !view_.isRealtime() && view_.changesWithTime();
-    auto planes = sim::planesOf(model_, std::move(exposed), is_of_middle ? truth_of_middle_ : view_.light().truth,
-                                planesNow());
+    auto planes = sim::planesOf(model_, std::move(exposed),
+                                is_of_middle ? truth_of_middle_ : view_.light().truth, info_.planes);
     if (color) planes.push_back(*std::move(color));
     return planes;
   }
 
   /// Those of the configuration, and if it names none, which exposure was taken where there are several by now.
   [[nodiscard]] std::vector<PlaneKind> planesNow() const {
-    std::vector<PlaneKind> planes = info_.planes;
+    std::vector<PlaneKind> planes = planes_;
     const auto exposure = std::ranges::find(planes, PlaneKind::Exposure);
     if (model_.exposureCount() == 1 && exposure != planes.end()) planes.erase(exposure);
     if (model_.exposureCount() > 1 && base_.exposureCount() == 1 && keys_.planes.empty())
@@ -336,6 +338,7 @@ class SimulatedSource final : public Source {
   sim::SensorModel model_;  ///< that one as it is operated
   Operating operating_;
   ImageFilters filters_;
+  const std::vector<PlaneKind> planes_;  ///< of the configuration
   SourceInfo info_;
   View view_;
   std::optional<ColorView> color_;  ///< if its plane is wanted
