@@ -45,7 +45,8 @@ LineFaults::Fate LineFaults::fateOf(const LineShares& shares, std::uint64_t pack
   };
   constexpr std::uint64_t kOther = 0x9e3779b97f4a7c15U;  // whether it strikes says nothing of where
   const bool is_corrupted = strikes(Kind::Corruption, shares.corruption);
-  return {.is_lost = strikes(Kind::Loss, shares.loss),
+  return {.packet = packet,
+          .is_lost = strikes(Kind::Loss, shares.loss),
           .is_doubled = strikes(Kind::Duplicate, shares.duplicate),
           .is_late = strikes(Kind::Reorder, shares.reorder),
           .is_delayed = strikes(Kind::Delay, shares.delay),
@@ -59,21 +60,10 @@ void LineFaults::corrupt(std::span<std::byte> bytes, std::uint64_t noise) {
   bytes[(noise >> 3U) % bytes.size()] ^= std::byte{1} << (noise & 7U);
 }
 
-LineFaults::Fate LineFaults::next(std::string_view what) {
-  const std::uint64_t packet = packets_++;
-  const Fate fate = fateOf(shares_, packet);
-  if (fate.is_cut) {
-    note(packet, Kind::Disconnect, what);
-    return {.is_cut = true};  // nothing else can happen to it
-  }
-  if (fate.is_lost) {
-    note(packet, Kind::Loss, what);
-    return {.is_lost = true};
-  }
-  if (fate.is_doubled) note(packet, Kind::Duplicate, what);
-  if (fate.is_late) note(packet, Kind::Reorder, what);
-  if (fate.is_delayed) note(packet, Kind::Delay, what);
-  if (fate.is_corrupted) note(packet, Kind::Corruption, what);
+LineFaults::Fate LineFaults::next() {
+  const Fate fate = fateOf(shares_, packets_++);
+  if (fate.is_cut) return {.packet = fate.packet, .is_cut = true};
+  if (fate.is_lost) return {.packet = fate.packet, .is_lost = true};
   return fate;
 }
 

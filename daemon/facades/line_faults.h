@@ -57,8 +57,9 @@ class LineFaults {
  public:
   enum class Kind : std::uint8_t { Loss, Duplicate, Reorder, Delay, Corruption, Disconnect };
   static std::string_view nameOf(Kind kind);
-  /// What becomes of a packet.
+  /// What is to become of a packet. Who sends it does that as far as it can be done, and notes what was.
   struct Fate {
+    std::uint64_t packet = 0;
     bool is_lost = false, is_doubled = false, is_late = false;
     bool is_delayed = false, is_corrupted = false;
     bool is_cut = false;      ///< the line is, instead of sending it
@@ -70,16 +71,16 @@ class LineFaults {
   LineFaults(const LineShares& shares, std::string name, std::filesystem::path log);
 
   [[nodiscard]] bool isNone() const;
-  /// Of the next packet, which `what` names in the log: "block 7 packet 3".
-  Fate next(std::string_view what);
+  /// Of the next packet. One that is lost or cut has no other fate.
+  Fate next();
+  /// It happened: a line of the log, where `what` names the packet: "block 7 packet 3".
+  void note(std::uint64_t packet, Kind kind, std::string_view what);
   /// A function of the shares and the packet's number alone.
   static Fate fateOf(const LineShares& shares, std::uint64_t packet);
   /// One bit of the bytes becomes another.
   static void corrupt(std::span<std::byte> bytes, std::uint64_t noise);
 
  private:
-  void note(std::uint64_t packet, Kind kind, std::string_view what);
-
   const LineShares shares_;
   const std::string name_;
   const std::filesystem::path log_path_;

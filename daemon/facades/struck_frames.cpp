@@ -1,56 +1,71 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/facades/struck_frames.h"
 
-#include <boost/asio/steady_timer.hpp>
-
 #include <fmt/format.h>
 
 #include <chrono>
-#include <vector>
 
 namespace toftwin::daemon {
 namespace {
 
+using Kind = LineFaults::Kind;
+
 /// That wait for their time; more of them leave at once.
 constexpr std::size_t kMostWaitingFrames = 64;
-
-Frame corrupted(Frame frame, std::uint64_t noise) {
-  for (Plane& plane : frame.planes) {
-    const auto bytes = plane.data.bytes();
-    std::vector<std::byte> changed(bytes.begin(), bytes.end());
-    LineFaults::corrupt(changed, noise);
-    plane.data = Buffer::adopt(std::move(changed));
-  }
-  return frame;
-}
+/// A late one waits so long for the next.
+constexpr std::chrono::seconds kLatePatience{2};
 
 }  // namespace
 
 void StruckFrames::take(const Frame& frame) {
-  if (faults_.isNone()) return put_(frame);
-  const auto fate = faults_.next(fmt::format("frame {}", frame.sequence));
-  if (fate.is_lost) return;
-  Frame leaves = fate.is_corrupted ? corrupted(frame, fate.noise) : frame;
-  if (fate.is_late && !late_) {
-    late_ = std::move(leaves);
-    return;
-  }
-  leave(leaves, fate.is_delayed);
-  if (fate.is_doubled) leave(leaves, fate.is_delayed);
-  if (late_) leave(*std::exchange(late_, std::nullopt), false);
+  if (faults_.isNone()) return put_(frame, {});
+  Struck one{frame, faults_.next(), fmt::format("frame {}", frame.sequence)};
+  if (one.fate.is_lost) return note(one, Kind::Loss);
+  if (one.fate.is_late && !late_) return hold(std::move(one));
+  leave(one);
 }
 
-void StruckFrames::leave(const Frame& frame, bool is_delayed) {
-  if (!is_delayed || waiting_ >= kMostWaitingFrames) return put_(frame);
+void StruckFrames::hold(Struck late) {
+  late_ = std::move(late);
+  patience_.expires_after(kLatePatience);
+  patience_.async_wait([this, alive = is_alive_](boost::system::error_code cancelled) {
+    if (cancelled || !*alive || !late_) return;
+    leave(*std::exchange(late_, std::nullopt));
+  });
+}
+
+void StruckFrames::leave(const Struck& one) {
+  if (!one.fate.is_delayed || waiting_ >= kMostWaitingFrames) return put(one);
   const std::chrono::duration<double> time{delay_.in(second)};
   auto timer = std::make_shared<boost::asio::steady_timer>(
       io_, std::chrono::duration_cast<std::chrono::steady_clock::duration>(time));
   ++waiting_;
-  timer->async_wait([this, timer, frame, alive = is_alive_](boost::system::error_code cancelled) {
+  timer->async_wait([this, timer, one, alive = is_alive_](boost::system::error_code cancelled) {
     if (!*alive) return;
     --waiting_;
-    if (!cancelled) put_(frame);
+    if (cancelled) return;
+    note(one, Kind::Delay);
+    put(one);
   });
+}
+
+/// The only way out. What was late comes behind the first that is after it.
+void StruckFrames::put(const Struck& one) {
+  if (one.fate.is_cut) note(one, Kind::Disconnect);
+  if (one.fate.is_corrupted) note(one, Kind::Corruption);
+  Damage damage;
+  damage.is_cut = one.fate.is_cut;
+  if (one.fate.is_corrupted) damage.noise = one.fate.noise;
+  put_(one.frame, damage);
+  if (one.fate.is_doubled) {
+    note(one, Kind::Duplicate);
+    put_(one.frame, damage);
+  }
+  if (!late_ || late_->fate.packet > one.fate.packet) return;
+  patience_.cancel();
+  const Struck late = *std::exchange(late_, std::nullopt);
+  note(late, Kind::Reorder);
+  leave(late);
 }
 
 }  // namespace toftwin::daemon

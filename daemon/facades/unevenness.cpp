@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <numeric>
 
@@ -54,12 +55,18 @@ Unevenness Unevenness::read(settings::Table& table, const std::string& intervals
   return {};
 }
 
+UnevenFrames::UnevenFrames(boost::asio::io_context& io, Unevenness unevenness, Duration latency, Put put)
+    : unevenness_(std::move(unevenness)),
+      latency_(std::llround(latency.in(nanosecond))),
+      put_(std::move(put)),
+      timer_(io) {}
+
 /// Where more are held than any camera is late by, they are lost.
 void UnevenFrames::take(const Frame& frame) {
   constexpr std::size_t kMostHeld = 64;
-  if (unevenness_.isNone()) return put_(frame);
+  if (unevenness_.isNone() && latency_.count() == 0) return put_(frame);
   if (held_.size() >= kMostHeld) return;
-  auto leaves = std::chrono::steady_clock::now() + unevenness_.delay(taken_++);
+  auto leaves = std::chrono::steady_clock::now() + latency_ + unevenness_.delay(taken_++);
   if (!held_.empty()) leaves = std::max(leaves, held_.back().leaves);
   held_.push_back({leaves, frame});
   if (held_.size() == 1) wait();

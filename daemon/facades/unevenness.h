@@ -16,6 +16,7 @@
 
 #include <toftwin/frame.h>
 #include <toftwin/result.h>
+#include <toftwin/units.h>
 
 #include "protocol/settings/settings.h"
 
@@ -45,13 +46,12 @@ class Unevenness {
   std::vector<Time> delays_;
 };
 
-/// Frames on their way to a facade's clients, each held back until a real camera's would leave. Used on the
-/// thread of the io_context.
+/// Frames on their way to a facade's clients, each held back until a real camera's would leave: by the
+/// latency, and as unevenly. Used on the thread of the io_context.
 class UnevenFrames {
  public:
   using Put = std::function<void(const Frame&)>;
-  UnevenFrames(boost::asio::io_context& io, Unevenness unevenness, Put put)
-      : unevenness_(std::move(unevenness)), put_(std::move(put)), timer_(io) {}
+  UnevenFrames(boost::asio::io_context& io, Unevenness unevenness, Duration latency, Put put);
   void take(const Frame& frame);
 
  private:
@@ -61,6 +61,7 @@ class UnevenFrames {
     Frame frame;
   };
   const Unevenness unevenness_;
+  const std::chrono::nanoseconds latency_;
   const Put put_;
   boost::asio::steady_timer timer_;
   std::deque<Held> held_;

@@ -2,8 +2,6 @@
 #include "daemon/facades/gige_vision/control_sockets.h"
 
 #include <fmt/format.h>
-#include <ifaddrs.h>
-#include <netinet/in.h>
 #include <sys/socket.h>
 
 #include <cerrno>
@@ -12,36 +10,10 @@
 #include "drivers/logging.h"
 
 namespace toftwin::daemon::gige_vision {
-namespace {
 
 using boost::asio::ip::address_v4;
 using boost::asio::ip::udp;
 using boost::system::error_code;
-
-/// Netmask and interface that has that address; of a small network where that is not told.
-LocalPlace placeOf(address_v4 address) {
-  constexpr std::uint32_t kLoopback = 0xFF00'0000, kSmall = 0xFFFF'FF00;
-  LocalPlace place{address, address.is_loopback() ? kLoopback : kSmall};
-  ifaddrs* all = nullptr;
-  if (::getifaddrs(&all) != 0) return place;
-  for (const ifaddrs* one = all; one != nullptr; one = one->ifa_next) {
-    if (one->ifa_addr == nullptr || one->ifa_netmask == nullptr || one->ifa_addr->sa_family != AF_INET)
-      continue;
-    const auto addressOf = [](const sockaddr* of) {
-      return ntohl(reinterpret_cast<const sockaddr_in*>(of)->sin_addr.s_addr);
-    };
-    // All of 127/8 is the loopback interface's, whatever address of it that names.
-    const std::uint32_t own = addressOf(one->ifa_addr);
-    if (address.is_loopback() ? !address_v4{own}.is_loopback() : own != address.to_uint()) continue;
-    if (!address.is_loopback()) place.netmask = addressOf(one->ifa_netmask);
-    const std::string name = one->ifa_name;
-    place.interface_name = name.substr(0, name.find(':'));  // an address may have a label
-  }
-  ::freeifaddrs(all);
-  return place;
-}
-
-}  // namespace
 
 Result<LocalPlace> localPlace(const std::string& address) {
   error_code error;
@@ -89,8 +61,7 @@ Result<std::unique_ptr<ControlSockets>> ControlSockets::open(boost::asio::io_con
   if (place.interface_name.empty())
     logging::warn("gige_vision: it is not found by broadcasts: no interface has the address {}",
                   place.address.to_string());
-  for (const address_v4& one :
-       {address_v4{place.address.to_uint() | ~place.netmask}, address_v4::broadcast()}) {
+  for (const address_v4& one : {place.broadcast(), address_v4::broadcast()}) {
     if (place.interface_name.empty()) break;
     auto ear = udpSocket(io, one, kControlPort, place.interface_name);
     if (ear) {

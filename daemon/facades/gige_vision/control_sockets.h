@@ -14,17 +14,13 @@
 #include <vector>
 
 #include "daemon/facades/gige_vision/device.h"
+#include "daemon/facades/local_place.h"
 
 namespace toftwin::daemon::gige_vision {
 
 inline constexpr std::uint16_t kControlPort = 3956;
 
-/// An IPv4 address of this computer and the network behind it.
-struct LocalPlace {
-  boost::asio::ip::address_v4 address;
-  std::uint32_t netmask = 0;
-  std::string interface_name{};  ///< empty: not told
-};
+/// One of this computer's, or localhost.
 Result<LocalPlace> localPlace(const std::string& address);
 
 /// Bound; with an `interface`, to what comes in there alone, and shared with others on that port.

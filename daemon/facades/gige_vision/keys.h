@@ -22,6 +22,7 @@ struct Keys {
   double packet_delay_us = 10.0;
   int resend_mb = 64;
   std::string intervals;
+  Duration latency = 0_s;
   LineFaultKeys line;
 
   template <class Visitor>
@@ -42,6 +43,9 @@ struct Keys {
            "a file with the intervals between a real camera's frames, one number in milliseconds per line, "
            "relative "
            "to this file: frames leave as unevenly as those; empty: as they come");
+    v.quantity(
+        "latency", latency, millisecond, {0.0, 10'000.0},
+        "by how much later than the source's every frame leaves, as if the camera had taken that long");
     v.group("line", line, "what goes wrong on purpose with the packets of frames");
   }
 };

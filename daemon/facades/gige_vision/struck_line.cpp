@@ -3,15 +3,26 @@
 
 namespace toftwin::daemon::gige_vision {
 
-void StruckLine::strike(Bytes packet, const LineFaults::Fate& fate) {
-  if (fate.is_lost) return;
+void StruckLine::strike(Bytes packet, std::string what) {
+  const auto fate = faults_.next();
+  if (fate.is_lost) return faults_.note(fate.packet, LineFaults::Kind::Loss, what);
   if (fate.is_late && !late_) {
-    late_ = std::move(packet);
+    late_ = Late{std::move(packet), std::move(what), fate};
     return;
   }
-  if (fate.is_doubled) out_.push_back(packet);
+  leave(std::move(packet), what, fate);
+  if (!late_) return;
+  const Late late = *std::exchange(late_, std::nullopt);
+  faults_.note(late.fate.packet, LineFaults::Kind::Reorder, late.what);
+  leave(late.packet, late.what, late.fate);
+}
+
+void StruckLine::leave(Bytes packet, const std::string& what, const LineFaults::Fate& fate) {
+  if (fate.is_doubled) {
+    faults_.note(fate.packet, LineFaults::Kind::Duplicate, what);
+    out_.push_back(packet);
+  }
   out_.push_back(std::move(packet));
-  if (late_) out_.push_back(*std::exchange(late_, std::nullopt));
 }
 
 bool StruckLine::flush() {
@@ -22,7 +33,10 @@ bool StruckLine::flush() {
 }
 
 bool StruckLine::finish() {
-  if (late_) out_.push_back(*std::exchange(late_, std::nullopt));
+  if (late_) {  // nothing came that it could have left after
+    const Late late = *std::exchange(late_, std::nullopt);
+    leave(late.packet, late.what, late.fate);
+  }
   return flush();
 }
 

@@ -13,7 +13,8 @@
 namespace toftwin::daemon::gige_vision {
 
 /// Packets on their way to a socket. Each is struck once, however often the socket must be asked to take it,
-/// so that those which are missing are those of the log. Used on one thread.
+/// and the log has what was done to it. Of two that are to leave after the next one while one waits already,
+/// the second leaves in its turn. Used on one thread.
 class StruckLine {
  public:
   /// False where the socket takes none now.
@@ -26,7 +27,7 @@ class StruckLine {
     if (faults_.isNone()) {
       out_.push_back(std::move(packet));
     } else {
-      strike(std::move(packet), faults_.next(what()));
+      strike(std::move(packet), what());
     }
   }
   /// False while some cannot leave yet.
@@ -36,12 +37,18 @@ class StruckLine {
   void clear();
 
  private:
-  void strike(Bytes packet, const LineFaults::Fate& fate);
+  struct Late {
+    Bytes packet;
+    std::string what;
+    LineFaults::Fate fate;
+  };
+  void strike(Bytes packet, std::string what);
+  void leave(Bytes packet, const std::string& what, const LineFaults::Fate& fate);
 
   LineFaults faults_;
   const Put put_;
   std::deque<Bytes> out_;
-  std::optional<Bytes> late_;  ///< leaves after the next one
+  std::optional<Late> late_;  ///< leaves after the next one
 };
 
 }  // namespace toftwin::daemon::gige_vision

@@ -126,7 +126,9 @@ class ModbusFacade final : public Facade {
                             connections_ = count;
                             adjust();
                           },
-                      .fate = [this] { return line_.isNone() ? LineFaults::Fate{} : line_.next("answer"); },
+                      .fate = [this] { return line_.isNone() ? LineFaults::Fate{} : line_.next(); },
+                      .note = [this](const LineFaults::Fate& fate,
+                                     LineFaults::Kind kind) { line_.note(fate.packet, kind, "answer"); },
                       .delay = keys_.line.delay_time});
     where_ = fmt::format("Modbus TCP on {} port {}", place_.keys.address, server_->port());
     thread_.start();

@@ -18,6 +18,8 @@ constexpr std::size_t kMostConnections = 16;
 }  // namespace
 
 class Server::Connection : public std::enable_shared_from_this<Connection> {
+  using Kind = LineFaults::Kind;
+
  public:
   Connection(Server& server, tcp::socket socket)
       : server_(server),
@@ -48,27 +50,34 @@ class Server::Connection : public std::enable_shared_from_this<Connection> {
  private:
   /// The answer as the line lets it through, and on to the next request.
   void send(const LineFaults::Fate& fate) {
-    if (fate.is_cut) return close();
-    if (fate.is_lost) return goOn();
-    if (fate.is_corrupted) LineFaults::corrupt(answer_, fate.noise);
+    if (fate.is_cut) return note(fate, Kind::Disconnect), close();
+    if (fate.is_lost) return note(fate, Kind::Loss), goOn();
+    if (!fate.is_delayed) return write(fate);
+    const std::chrono::duration<double> delay{server_.hooks_.delay.in(second)};
+    later_.expires_after(std::chrono::duration_cast<std::chrono::steady_clock::duration>(delay));
+    later_.async_wait([self = shared_from_this(), fate](error_code cancelled) {
+      if (cancelled || !*self->alive_) return;
+      self->note(fate, Kind::Delay);
+      self->write(fate);
+    });
+  }
+  void write(const LineFaults::Fate& fate) {
+    if (fate.is_corrupted) {
+      note(fate, Kind::Corruption);
+      LineFaults::corrupt(answer_, fate.noise);
+    }
     if (fate.is_doubled) {
+      note(fate, Kind::Duplicate);
       const Bytes once = answer_;
       answer_.insert(answer_.end(), once.begin(), once.end());
     }
-    if (!fate.is_delayed) return write();
-    const std::chrono::duration<double> delay{server_.hooks_.delay.in(second)};
-    later_.expires_after(std::chrono::duration_cast<std::chrono::steady_clock::duration>(delay));
-    later_.async_wait([self = shared_from_this()](error_code cancelled) {
-      if (!cancelled && *self->alive_) self->write();
-    });
-  }
-  void write() {
     boost::asio::async_write(socket_, boost::asio::buffer(answer_),
                              [self = shared_from_this()](error_code error, std::size_t) {
                                if (error || !*self->alive_) return self->close();
                                self->goOn();
                              });
   }
+  void note(const LineFaults::Fate& fate, Kind kind) { server_.hooks_.note(fate, kind); }
   void read() {
     socket_.async_read_some(
         boost::asio::buffer(piece_), [self = shared_from_this()](error_code error, std::size_t size) {

@@ -25,6 +25,7 @@ class Server {
     std::function<Bytes(std::span<const std::byte> message)> answer;
     std::function<void(std::size_t)> connections;  ///< how many, whenever that changed
     std::function<LineFaults::Fate()> fate;        ///< of the next answer
+    std::function<void(const LineFaults::Fate&, LineFaults::Kind)> note;  ///< it happened
     Duration delay = 100_ms;                       ///< of one that is delayed
   };
   Server(boost::asio::ip::tcp::acceptor acceptor, Hooks hooks);

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/facades/o3d303/commands.h"
 
+#include <charconv>
+
 #include "drivers/o3d303/wire/frame_writer.h"
 #include "drivers/o3d303/wire/pcic.h"
 
 namespace toftwin::daemon::o3d303 {
 namespace {
 
-constexpr std::string_view kHexDigits = "0123456789abcdef";
 constexpr std::size_t kMostElements = 64;
 
 Command schemaCommand(std::string_view content) {
@@ -33,9 +34,13 @@ Command readCommand(std::string_view content) {
   if (content == "t") return {.kind = Command::Kind::Trigger};
   if (content == "E?") return {.kind = Command::Kind::AskError};
   if (content.starts_with('p')) {
-    const auto digit = content.size() == 2 ? kHexDigits.find(content[1]) : std::string_view::npos;
-    if (digit == std::string_view::npos) return {.kind = Command::Kind::Refused};
-    return {.kind = Command::Kind::SetOutput, .output = static_cast<unsigned>(digit)};
+    constexpr int kHexadecimal = 16;
+    unsigned mask = 0;
+    const char* end = content.data() + content.size();
+    const auto read = std::from_chars(content.data() + 1, end, mask, kHexadecimal);
+    if (content.size() != 2 || read.ec != std::errc{} || read.ptr != end)
+      return {.kind = Command::Kind::Refused};
+    return {.kind = Command::Kind::SetOutput, .output = mask};
   }
   return {};
 }

@@ -55,9 +55,10 @@ struct SourceFacts {
   int width = 176, height = 132;
   std::vector<std::uint32_t> exposures_us;  ///< the different ones, shortest first
   int frequencies = 1;
-  std::optional<double> illumination_c;
+  std::optional<double> illumination_c, housing_c, processor_c;
   double since_power_on_s = 0.0;
-  std::int64_t device_s = 0;  ///< the clock of the frames
+  std::int64_t device_s = 0;           ///< the clock of the frames
+  std::optional<std::int64_t> host_s;  ///< this machine's, where the relation of the two is known
 };
 
 /// What a client's wish makes of the source: its parameters' names and values.
@@ -113,6 +114,12 @@ class Device {
   struct Application {
     Parameters application, imager, spatial, temporal;
     int width = 176, height = 132;  ///< that the clipping is of
+    /// What the source had when the parameter was shown with that text, which may be rounded.
+    struct Shown {
+      std::string text;
+      double number = 0.0;
+    };
+    std::map<std::string_view, Shown> shown{};  ///< by the source's name of it
   };
   struct Session {
     std::string id;
@@ -156,6 +163,7 @@ class Device {
   [[nodiscard]] Application freshApplication() const;
   [[nodiscard]] Parameters shownNetwork() const;
   [[nodiscard]] Parameters shownTime() const;
+  [[nodiscard]] std::int64_t clockNow_s() const;
 
   // device_application.cpp: the application that is edited, its imager and filters
   Outcome onApplication(const Call& call);
@@ -178,11 +186,13 @@ class Device {
     return const_cast<Parameters&>(of(std::as_const(application), object));
   }
   void fitExposures(Application& application) const;
+  [[nodiscard]] static Refusal checkFilter(const Application& application);
 
   // device_source.cpp: what the source has, and what is to become of it
   [[nodiscard]] const Parameter* parameterOf(std::string_view source_name) const;
   [[nodiscard]] std::optional<Bound> boundOf(Binding::Object object, std::string_view name) const;
   [[nodiscard]] SourceChanges changesTo(const Application& wanted) const;
+  [[nodiscard]] std::optional<double> numberOf(const Application& application, const Bound& bound) const;
   void show(Application& application) const;
   void refreshActive();
   [[nodiscard]] Clipping clippingOf(const Application& application) const;

@@ -72,11 +72,15 @@ Device::Refusal Device::setApplicationParameter(Application& one, const std::str
   return refused;
 }
 
+Device::Refusal Device::checkFilter(const Application& application) {
+  if (application.imager.at("TemporalFilterType") == "0" || application.application.at("TriggerMode") == "1")
+    return std::nullopt;
+  return fault(Fault::kFilterAgainstTrigger, "a temporal filter needs free run (TriggerMode 1)");
+}
+
 Device::Outcome Device::saveApplication() {
   const auto& [index, wanted] = *edited_;
-  if (wanted.imager.at("TemporalFilterType") != "0" && wanted.application.at("TriggerMode") != "1") {
-    return {fault(Fault::kFilterAgainstTrigger, "a temporal filter needs free run (TriggerMode 1)")};
-  }
+  if (auto refused = checkFilter(wanted)) return {*std::move(refused)};
   const bool is_active = index == activeApplication();
   Outcome outcome{.answer = nothing(),
                   .changes = is_active ? changesTo(wanted) : SourceChanges{},

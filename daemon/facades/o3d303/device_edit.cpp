@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 #include "daemon/facades/o3d303/answers.h"
@@ -98,13 +99,19 @@ Device::Outcome Device::deleteApplication(int index) {
   return {nothing()};
 }
 
+namespace {
+
+/// What is measured, or as it is whatever is saved.
+constexpr std::array<const char*, 6> kOfNow{"OperatingMode",   "TemperatureIllu", "TemperatureFront1",
+                                            "TemperatureIMX6", "UpTime",          "ImageTimestampReference"};
+
+}  // namespace
+
 Device::Outcome Device::factoryReset() {
   edited_.reset();
   const Parameters now = std::exchange(device_, initialOf(deviceRules()));
-  for (const char* kept :
-       {"PcicTcpPort", "OperatingMode", "TemperatureIllu", "UpTime", "ImageTimestampReference"}) {
-    device_[kept] = now.at(kept);
-  }
+  for (const char* of_now : kOfNow) device_[of_now] = now.at(of_now);
+  device_["PcicTcpPort"] = now.at("PcicTcpPort");
   device_["Name"] = identity_.name;
   password_ = edited_password_ = identity_.password;
   device_["PasswordActivated"] = password_.empty() ? "false" : "true";
@@ -158,18 +165,15 @@ Device::Refusal Device::setDeviceParameter(const std::string& name, std::string 
 
 Device::Outcome Device::saveDevice() {
   const int before = activeApplication();
+  const int wanted = numberIn(edited_device_.at("ActiveApplication")).value_or(before);
+  if (wanted != before && !applications_.contains(wanted))  // it was deleted since
+    return {fault(Fault::kNoSuchApplication, "there is no such application")};
   Parameters saved = edited_device_;
   saved["ActiveApplication"] = device_["ActiveApplication"];
-  for (const char* of_now : {"TemperatureIllu", "UpTime", "ImageTimestampReference", "OperatingMode"}) {
-    saved[of_now] = device_.at(of_now);
-  }
-  const int wanted = numberIn(edited_device_.at("ActiveApplication")).value_or(before);
+  for (const char* of_now : kOfNow) saved[of_now] = device_.at(of_now);
   device_ = std::move(saved);
   password_ = edited_password_;
-  if (wanted == before) return {nothing()};
-  if (!applications_.contains(wanted))
-    return {fault(Fault::kNoSuchApplication, "there is no such application")};
-  return activate(wanted);
+  return wanted == before ? Outcome{nothing()} : activate(wanted);
 }
 
 Device::Outcome Device::activate(int index) {
@@ -217,7 +221,7 @@ Device::Refusal Device::setNetworkParameter(const std::string& name, std::string
 
 Parameters Device::shownTime() const {
   Parameters all = edited_time_;
-  all["CurrentTime"] = std::to_string(facts_.device_s + clock_shift_s_);
+  all["CurrentTime"] = std::to_string(clockNow_s());
   return all;
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "daemon/facades/o3d303/answers.h"
 #include "daemon/facades/o3d303/device.h"
@@ -16,9 +17,14 @@ constexpr double kSecondsPerHour = 3600.0;
 
 void Device::update(const SourceFacts& facts) {
   facts_ = facts;
-  device_["TemperatureIllu"] = facts.illumination_c ? fmt::format("{:.1f}", *facts.illumination_c) : "3276.7";
+  const auto degrees = [](std::optional<double> value_c) {
+    return value_c ? fmt::format("{:.1f}", *value_c) : "3276.7";  // there is no such sensor
+  };
+  device_["TemperatureIllu"] = degrees(facts.illumination_c);
+  device_["TemperatureFront1"] = degrees(facts.housing_c);
+  device_["TemperatureIMX6"] = degrees(facts.processor_c);
   device_["UpTime"] = fmt::format("{:.6f}", facts.since_power_on_s / kSecondsPerHour);
-  device_["ImageTimestampReference"] = std::to_string(facts.device_s + clock_shift_s_);
+  device_["ImageTimestampReference"] = std::to_string(clockNow_s());
   show(live_);
   if (!factory_ && !facts.parameters.empty()) {
     factory_ = live_;
@@ -28,6 +34,11 @@ void Device::update(const SourceFacts& facts) {
   if (active == applications_.end()) return;
   show(active->second);
   clipping_ = clippingOf(active->second);
+}
+
+/// As the frames' time stamps have it.
+std::int64_t Device::clockNow_s() const {
+  return isSynchronised() && facts_.host_s ? *facts_.host_s : facts_.device_s + clock_shift_s_;
 }
 
 const Parameter* Device::parameterOf(std::string_view source_name) const {
@@ -70,7 +81,9 @@ void Device::show(Application& one) const {
   for (const Binding& binding : bindings()) {
     const auto bound = boundOf(binding.object, binding.name);
     if (!bound || !bound->parameter->value) continue;
-    of(one, binding.object)[std::string{binding.name}] = bound->text(*bound->parameter->value);
+    const std::string text = bound->text(*bound->parameter->value);
+    of(one, binding.object)[std::string{binding.name}] = text;
+    one.shown[binding.source_name] = {text, *bound->parameter->value};
   }
   fitExposures(one);
   if (parameterOf(kExposures) == nullptr && !facts_.exposures_us.empty())
@@ -116,6 +129,17 @@ void Device::fitExposures(Application& one) const {
   }
 }
 
+/// Of the source; none where the application does not say it.
+std::optional<double> Device::numberOf(const Application& application, const Bound& bound) const {
+  const auto& all = of(application, bound.binding->object);
+  const auto text = all.find(std::string{bound.binding->name});
+  if (text == all.end()) return std::nullopt;
+  const auto shown = application.shown.find(bound.binding->source_name);
+  if (shown != application.shown.end() && shown->second.text == text->second) return shown->second.number;
+  const auto value = text->second == "true" ? 1.0 : text->second == "false" ? 0.0 : realIn(text->second);
+  return value ? std::optional{bound.toSource(*value)} : std::nullopt;
+}
+
 SourceChanges Device::changesTo(const Application& wanted) const {
   SourceChanges changes;
   const auto type = ImagerType::of(wanted.imager.at("Type")), now = ImagerType::of(live_.imager.at("Type"));
@@ -128,12 +152,10 @@ SourceChanges Device::changesTo(const Application& wanted) const {
   for (const Binding& binding : bindings()) {
     const auto bound = boundOf(binding.object, binding.name);
     if (!bound || bound->binding != &binding) continue;
-    const std::string name{binding.name};
-    const Parameters &before = of(live_, binding.object), &after = of(wanted, binding.object);
-    if (!after.contains(name) || (before.contains(name) && before.at(name) == after.at(name))) continue;
-    const std::string& text = after.at(name);
-    const auto value = text == "true" ? 1.0 : text == "false" ? 0.0 : realIn(text);
-    if (value) changes.emplace_back(binding.source_name, bound->toSource(*value));
+    const auto after = numberOf(wanted, *bound), before = numberOf(live_, *bound);
+    constexpr double kRounding = 1e-9;  // of a number that goes through another unit
+    const bool is_same = after && before && std::abs(*after - *before) <= kRounding * std::abs(*before);
+    if (after && !is_same) changes.emplace_back(binding.source_name, *after);
   }
   if (parameterOf(kTriggered) != nullptr &&
       wanted.application.at("TriggerMode") != live_.application.at("TriggerMode")) {

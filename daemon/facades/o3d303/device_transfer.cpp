@@ -25,6 +25,8 @@ using Members = XmlRpcValue::Struct;
 
 constexpr std::string_view kExportFormat = "toftwin o3d303", kApplicationFile = "application",
                            kWholeFile = "configuration";
+/// Four thirds of it, in base64, fit into a call (http_server.cpp).
+constexpr std::size_t kLongestExport = std::size_t{5} << 20;
 constexpr unsigned kDeviceFlag = 0x1, kNetworkFlag = 0x2, kApplicationsFlag = 0x10;
 
 /// A parameter's name and value.
@@ -40,6 +42,11 @@ XmlRpcAnswer packed(std::string_view kind, Members content) {
   content.emplace_back("format", XmlRpcValue{std::string{kExportFormat}});
   content.emplace_back("content", XmlRpcValue{std::string{kind}});
   const std::string xml = encodeXmlRpc(XmlRpcAnswer{XmlRpcValue{std::move(content)}});
+  if (xml.size() > kLongestExport) {
+    return fault(Fault::kInternal, fmt::format("the {} takes {} bytes, of {} that could be imported again; "
+                                               "shorten schemas, LogicGraph and TemplateInfo",
+                                               kind, xml.size(), kLongestExport));
+  }
   return XmlRpcValue{Base64{toftwin::o3d303::toBase64(xml)}};
 }
 
@@ -125,6 +132,7 @@ std::variant<Device::Application, XmlRpcAnswer> Device::applicationOf(const XmlR
     refused = setEach(entriesOf(value, "spatialfilter"), setFilter(Binding::Object::SpatialFilter));
   if (!refused)
     refused = setEach(entriesOf(value, "temporalfilter"), setFilter(Binding::Object::TemporalFilter));
+  if (!refused) refused = checkFilter(made);
   if (refused) return *std::move(refused);
   return made;
 }

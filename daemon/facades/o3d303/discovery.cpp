@@ -2,8 +2,12 @@
 #include "daemon/facades/o3d303/discovery.h"
 
 #include <fmt/format.h>
+#include <sys/socket.h>
 
 #include <algorithm>
+#include <cerrno>
+
+#include "daemon/facades/local_place.h"
 
 namespace toftwin::daemon::o3d303 {
 namespace {
@@ -26,6 +30,14 @@ void appendText(std::vector<std::byte>& bytes, const std::string& text, std::siz
   for (std::size_t i = 0; i < size; ++i) {
     bytes.push_back(i + 1 < size && i < text.size() ? static_cast<std::byte>(text[i]) : std::byte{0});
   }
+}
+
+/// It hears that interface alone; all where there is none of a name.
+error_code keepTo(const std::string& interface, udp::socket& socket) {
+  if (interface.empty() || ::setsockopt(socket.native_handle(), SOL_SOCKET, SO_BINDTODEVICE,
+                                        interface.c_str(), static_cast<socklen_t>(interface.size())) == 0)
+    return {};
+  return {errno, boost::system::system_category()};
 }
 
 }  // namespace
@@ -60,18 +72,20 @@ Result<std::unique_ptr<Discovery>> Discovery::listen(boost::asio::io_context& io
   error_code error;
   const auto own = ip::make_address_v4(address == "localhost" ? "127.0.0.1" : address, error);
   if (error) return Error{Error::Code::Unsupported, "searches are answered on IPv4 addresses only"};
+  const LocalPlace place = placeOf(own);
   announcement.address = own.to_bytes();
-  announcement.netmask = own.is_loopback() ? std::array<std::uint8_t, 4>{255, 0, 0, 0}
-                                           : std::array<std::uint8_t, 4>{255, 255, 255, 0};
+  announcement.netmask = ip::address_v4{place.netmask}.to_bytes();
   std::unique_ptr<Discovery> discovery{new Discovery{encode(announcement)}};
   // A socket that is bound to an address hears no broadcasts; one that is bound to the broadcast address
-  // does.
-  std::vector<ip::address_v4> addresses{ip::address_v4::any()};
-  if (own.is_loopback()) addresses = {own, ip::make_address_v4("127.255.255.255")};
+  // does, of every interface unless it is bound to one.
+  std::vector<ip::address_v4> addresses{own};
+  if (!own.is_unspecified()) addresses.push_back(place.broadcast());
+  if (!own.is_unspecified() && !own.is_loopback()) addresses.push_back(ip::address_v4::broadcast());
   for (const auto& one : addresses) {
     auto ear = std::make_shared<Ear>(io);
     ear->socket.open(udp::v4(), error);
     if (!error) ear->socket.set_option(udp::socket::reuse_address{true}, error);
+    if (!error && one != own) error = keepTo(place.interface_name, ear->socket);
     if (!error) ear->socket.bind({one, port}, error);
     if (error) {
       return Error{Error::Code::Busy,

@@ -29,10 +29,11 @@ std::vector<std::byte> encode(const Announcement& announcement);
 /// The port that a search wants its answer on. Nothing for whatever is no search.
 std::optional<std::uint16_t> readSearch(std::span<const std::byte> datagram);
 
-/// Answers searches on the broadcast addresses of where the facade listens. Used on the facade's thread only.
+/// Answers searches at the address where the facade listens, and on its broadcast addresses. Used on the
+/// facade's thread only.
 class Discovery {
  public:
-  /// On loopback, the addresses of this machine alone.
+  /// At that address and by broadcasts of its interface; at 0.0.0.0, of all.
   static Result<std::unique_ptr<Discovery>> listen(boost::asio::io_context& io, const std::string& address,
                                                    std::uint16_t port, Announcement announcement);
   ~Discovery() { *is_alive_ = false; }

@@ -18,7 +18,7 @@ using boost::asio::ip::tcp;
 using boost::system::error_code;
 
 constexpr std::size_t kMostHttpConnections = 16;
-constexpr std::uint64_t kLongestBody = 1 << 20;
+constexpr std::uint64_t kLongestBody = 8 << 20;  // the longest that is exported, with what is around it
 constexpr std::uint32_t kLongestHeader = 8192;
 constexpr std::chrono::seconds kPatience{30};
 

@@ -59,6 +59,9 @@ FrameFacts factsOf(const Frame& frame) {
   facts.frequencies = std::clamp(static_cast<int>(modulations.size()), 1, 3);
   for (const NamedTemperature& one : frame.moment.temperatures) {
     if (one.where == "illumination") facts.illumination_c = one.value.in(celsius);
+    if (one.where == "processor") facts.processor_c = one.value.in(celsius);
+    if (one.where == "housing" || (one.where == "sensor" && !facts.housing_c))
+      facts.housing_c = one.value.in(celsius);  // of a camera that tells its imager's alone
   }
   return facts;
 }

@@ -24,7 +24,7 @@ struct CameraImages {
 struct FrameFacts {
   std::vector<std::uint32_t> exposures_us;  ///< the different ones, shortest first, at most three
   int frequencies = 1;                      ///< one to three
-  std::optional<double> illumination_c;
+  std::optional<double> illumination_c, housing_c, processor_c;
 };
 FrameFacts factsOf(const Frame& frame);
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <filesystem>
 #include <memory>
 #include <optional>
 
@@ -80,17 +81,23 @@ Result<> setAll(drivers::Source& source, SourceChanges changes) {
 
 class O3d303Facade final : public Facade {
  public:
-  O3d303Facade(Keys keys, Unevenness unevenness, const FacadePlace& place)
+  O3d303Facade(Keys keys, Unevenness unevenness, const std::filesystem::path& line_log,
+               const FacadePlace& place)
       : keys_(std::move(keys)),
         place_(place),
-        thread_("facade o3d303 of " + place.keys.source),
+        name_("facade o3d303 of " + place.keys.source),
+        thread_(name_),
         link_(thread_, place.hub,
               {.source = place.keys.source,
                .planes = {PlaneKind::Range, PlaneKind::Depth, PlaneKind::Amplitude, PlaneKind::Flags,
                           PlaneKind::Exposure}},
               [this](const Frame& frame) { takeFrame(frame); }),
-        uneven_(thread_.io(), std::move(unevenness), [this](const Frame& frame) { publish(frame); }),
+        line_(thread_.io(), LineFaults{keys_.line, name_, line_log}, keys_.line.delay_time,
+              [this](const Frame& frame, const Damage& damage) { publish(frame, damage); }),
+        uneven_(thread_.io(), std::move(unevenness), keys_.latency,
+                [this](const Frame& frame) { line_.take(frame); }),
         tick_(thread_.io(), kTick, [this] { tick(); }),
+        boot_(thread_.io()),
         began_(steady_clock::now()) {}
 
   ~O3d303Facade() override { thread_.stop(); }
@@ -128,14 +135,13 @@ class O3d303Facade final : public Facade {
                                           .device_name = keys_.name});
       // Who knows the address needs no search, and another camera of this machine may be the one that is
       // found.
-      if (!discovery)
-        logging::warn("facade o3d303 of {}: it cannot be searched for: {}", place_.keys.source,
-                      discovery.error().message);
+      if (!discovery) logging::warn("{}: it cannot be searched for: {}", name_, discovery.error().message);
       if (discovery) discovery_ = *std::move(discovery);
     }
     where_ = fmt::format(
         "XML-RPC on {} port {}, PCIC on port {}{}", place_.keys.address, xmlrpc_port, pcic_port,
         discovery_ ? fmt::format(", found by searches on UDP port {}", keys_.discovery_port) : "");
+    if (keys_.boot_time > 0_s) boot();
     link_.want(true);  // one frame, which says what kind of camera it is
     tick_.start();
     thread_.start();
@@ -152,6 +158,7 @@ class O3d303Facade final : public Facade {
     has_seen_frame_ = true;
     device_s_ = frame.moment.exposures.empty() ? 0 : frame.moment.exposures.front().start.ns / kNanoseconds;
     device_s_at_ = steady_clock::now();
+    is_clock_known_ = frame.moment.clock.uncertainty_ns >= 0;
     if (frame.moment.since_power_on) {
       powered_on_ =
           steady_clock::now() - std::chrono::duration_cast<steady_clock::duration>(
@@ -162,7 +169,7 @@ class O3d303Facade final : public Facade {
     if (connections_ > 0 && !device_->isIdle()) uneven_.take(frame);
   }
 
-  void publish(const Frame& frame) {
+  void publish(const Frame& frame, const Damage& damage) {
     if (device_->isIdle()) return;
     if (!lens_ || lens_->camera != frame.camera) {
       lens_ = lensChunksOf(frame.camera);
@@ -173,7 +180,7 @@ class O3d303Facade final : public Facade {
     images->wire.extrinsics = {t[0], t[1], t[2], 0.0F, 0.0F, 0.0F};
     if (device_->clipping() != Clipping{}) clip(device_->clipping(), *images);
     setClock(frame, images->wire);
-    pcic_->publish(images->wire);
+    pcic_->publish(images->wire, damage);
   }
 
   /// The camera's clock is the source's until a client sets it, or has it follow the network's.
@@ -190,8 +197,7 @@ class O3d303Facade final : public Facade {
   }
 
   void complainOnce(const Error& error) {
-    if (error.message != last_complaint_)
-      logging::warn("facade o3d303 of {}: {}", place_.keys.source, error.message);
+    if (error.message != last_complaint_) logging::warn("{}: {}", name_, error.message);
     last_complaint_ = error.message;
   }
 
@@ -270,8 +276,11 @@ class O3d303Facade final : public Facade {
     facts.exposures_us = facts_.exposures_us;
     facts.frequencies = facts_.frequencies;
     facts.illumination_c = facts_.illumination_c;
-    facts.since_power_on_s =
-        std::chrono::duration<double>{steady_clock::now() - powered_on_.value_or(began_)}.count();
+    facts.housing_c = facts_.housing_c;
+    facts.processor_c = facts_.processor_c;
+    const auto up_since = booted_ ? *booted_ : powered_on_.value_or(began_);
+    facts.since_power_on_s = std::chrono::duration<double>{steady_clock::now() - up_since}.count();
+    if (is_clock_known_) facts.host_s = place_.clock.wall().ns / kNanoseconds;
     facts.device_s =
         device_s_ +
         std::chrono::duration_cast<std::chrono::seconds>(steady_clock::now() - device_s_at_).count();
@@ -299,14 +308,22 @@ class O3d303Facade final : public Facade {
   /// After the answer is out.
   void reboot() {
     constexpr milliseconds kAnswerFirst{100};
-    const auto boot = std::chrono::duration_cast<steady_clock::duration>(
-        std::chrono::duration<double>{keys_.boot_time.in(second)});
-    auto timer = std::make_shared<boost::asio::steady_timer>(thread_.io(), kAnswerFirst);
-    timer->async_wait([this, timer, boot](boost::system::error_code) {
+    boot_.expires_after(kAnswerFirst);
+    boot_.async_wait([this](boost::system::error_code cancelled) {
+      if (cancelled) return;
       undo(device_->restart());
-      setOpen(false);
-      timer->expires_after(boot);
-      timer->async_wait([this, timer](boost::system::error_code) { setOpen(true); });
+      boot();
+    });
+  }
+
+  /// Nobody answers for the boot time, from which UpTime counts.
+  void boot() {
+    booted_ = steady_clock::now();
+    setOpen(false);
+    boot_.expires_after(std::chrono::duration_cast<steady_clock::duration>(
+        std::chrono::duration<double>{keys_.boot_time.in(second)}));
+    boot_.async_wait([this](boost::system::error_code cancelled) {
+      if (!cancelled) setOpen(true);
     });
   }
 
@@ -328,6 +345,7 @@ class O3d303Facade final : public Facade {
 
   const Keys keys_;
   const FacadePlace place_;
+  const std::string name_;
   std::string where_;
   EventThread thread_;
   SourceLink link_;
@@ -335,16 +353,18 @@ class O3d303Facade final : public Facade {
   std::optional<HttpServer> http_;
   std::optional<PcicServer> pcic_;
   std::unique_ptr<Discovery> discovery_;
+  StruckFrames line_;
   UnevenFrames uneven_;
   Repeating tick_;
+  boost::asio::steady_timer boot_;
   const steady_clock::time_point began_;
 
   std::size_t connections_ = 0;
-  bool has_seen_frame_ = false, can_trigger_ = false, is_too_hot_ = false;
+  bool has_seen_frame_ = false, can_trigger_ = false, is_too_hot_ = false, is_clock_known_ = false;
   FrameFacts facts_;
   std::int64_t device_s_ = 0;  ///< of the last frame, which came
   steady_clock::time_point device_s_at_ = steady_clock::now();
-  std::optional<steady_clock::time_point> powered_on_, triggered_at_;
+  std::optional<steady_clock::time_point> powered_on_, booted_, triggered_at_;
   std::optional<LensChunks> lens_;
   std::string last_complaint_;
 };
@@ -353,8 +373,9 @@ FacadeKind::Start read(settings::Table& table) {
   Keys keys;
   table.read(keys);
   const Unevenness unevenness = Unevenness::read(table, keys.intervals);
-  return [keys, unevenness](const FacadePlace& place) -> Result<std::unique_ptr<Facade>> {
-    auto facade = std::make_unique<O3d303Facade>(keys, unevenness, place);
+  const std::filesystem::path log = keys.line.logIn(table);
+  return [keys, unevenness, log](const FacadePlace& place) -> Result<std::unique_ptr<Facade>> {
+    auto facade = std::make_unique<O3d303Facade>(keys, unevenness, log, place);
     if (auto opened = facade->open(); !opened) return opened.error();
     return std::unique_ptr<Facade>{std::move(facade)};
   };

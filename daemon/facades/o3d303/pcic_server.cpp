@@ -23,7 +23,8 @@ using toftwin::o3d303::Schema;
 
 constexpr std::size_t kMostPcicConnections = 16;
 constexpr std::size_t kLongestCommand = 128 << 10;
-constexpr std::size_t kMostFramesWaiting = 3;     ///< for one connection; more are lost
+/// For one connection; more are lost. Two that the line doubles may leave at once.
+constexpr std::size_t kMostFramesWaiting = 6;
 constexpr std::size_t kMostMessagesWaiting = 64;  ///< one that asks and never reads is closed
 /// Shared by the connections that send them.
 using SharedBytes = std::shared_ptr<const Bytes>;
@@ -59,11 +60,16 @@ class PcicServer::Connection : public std::enable_shared_from_this<Connection> {
                             });
   }
   void send(SharedBytes bytes, bool is_frame) {
+    if (is_ending_) return;
     if (is_frame && frames_waiting_ >= kMostFramesWaiting) return;
     if (queue_.size() >= kMostMessagesWaiting) return close();
     frames_waiting_ += is_frame ? 1 : 0;
     queue_.push_back({std::move(bytes), is_frame});
     if (queue_.size() == 1) write();
+  }
+  void endWhenSent() {
+    is_ending_ = true;
+    if (queue_.empty()) close();
   }
   void close() {
     closeHard(socket_);
@@ -128,7 +134,8 @@ class PcicServer::Connection : public std::enable_shared_from_this<Connection> {
                                if (error || !*self->alive_) return self->close();
                                self->frames_waiting_ -= self->queue_.front().is_frame ? 1 : 0;
                                self->queue_.pop_front();
-                               if (!self->queue_.empty()) self->write();
+                               if (!self->queue_.empty()) return self->write();
+                               if (self->is_ending_) self->close();
                              });
   }
 
@@ -141,6 +148,7 @@ class PcicServer::Connection : public std::enable_shared_from_this<Connection> {
   unsigned output_ = Output::kAll;
   std::deque<Waiting> queue_;
   std::size_t frames_waiting_ = 0;
+  bool is_ending_ = false;  ///< takes no more
 };
 
 PcicServer::PcicServer(tcp::acceptor acceptor, Hooks hooks)
@@ -174,7 +182,7 @@ void PcicServer::remove(const std::shared_ptr<Connection>& connection) {
   if (connections_.size() != before) hooks_.connections(connections_.size());
 }
 
-void PcicServer::publish(const toftwin::o3d303::CameraFrame& frame) {
+void PcicServer::publish(const toftwin::o3d303::CameraFrame& frame, const Damage& damage) {
   std::vector<std::pair<Schema, SharedBytes>> made;
   const auto all = connections_;  // sending may close one
   for (const auto& connection : all) {
@@ -185,11 +193,14 @@ void PcicServer::publish(const toftwin::o3d303::CameraFrame& frame) {
       const auto content = writeFrameContent(*schema, frame);
       if (!content) continue;  // no schema comes here that was not checked
       const std::span<const std::byte> bytes{*content};
-      made.emplace_back(*schema, std::make_shared<const Bytes>(
-                                     toftwin::o3d303::encodePcic(toftwin::o3d303::kFrameTicket, bytes)));
+      Bytes message = toftwin::o3d303::encodePcic(toftwin::o3d303::kFrameTicket, bytes);
+      damage.corrupt(message);
+      if (damage.is_cut) message.resize(message.size() / 2);
+      made.emplace_back(*schema, std::make_shared<const Bytes>(std::move(message)));
       found = made.end() - 1;
     }
     connection->send(found->second, true);
+    if (damage.is_cut) connection->endWhenSent();
   }
 }
 

@@ -12,6 +12,7 @@
 #include <string_view>
 
 #include "daemon/facades/accepting.h"
+#include "daemon/facades/struck_frames.h"
 #include "drivers/o3d303/wire/frame_writer.h"
 #include "drivers/o3d303/wire/pcic.h"
 
@@ -47,7 +48,8 @@ class PcicServer {
   [[nodiscard]] std::uint16_t port() const { return accepting_.port(); }
   void setOpen(bool is_open);
   /// To every connection that wants frames, in its own schema; those with equal schemas share the bytes.
-  void publish(const toftwin::o3d303::CameraFrame& frame);
+  /// Where the line is cut, half of the message leaves, and the connection ends with it.
+  void publish(const toftwin::o3d303::CameraFrame& frame, const Damage& damage = {});
   void tellError(int code);
   void tellNotification(int code, std::string_view json);
   /// Since the last such error, for the command "E?".

@@ -37,7 +37,7 @@ class Ros2Facade final : public Facade {
                .planes = {PlaneKind::Range, PlaneKind::Depth, PlaneKind::Amplitude}},
               [this](const Frame& frame) { takeFrame(frame); }),
         line_(thread_.io(), LineFaults{keys_.line, name_, line_log}, keys_.line.delay_time,
-              [this](const Frame& frame) { publish(frame); }),
+              [this](const Frame& frame, const Damage& damage) { publish(frame, damage); }),
         tick_(thread_.io(), kTick, [this] { tick(); }) {}
 
   // First nobody works with DDS any more, then it goes, and then what its callbacks reach.
@@ -70,34 +70,39 @@ class Ros2Facade final : public Facade {
   [[nodiscard]] std::string where() const override { return where_; }
 
  private:
-  /// One frame at the start says where the camera is.
+  /// One frame at the start says where the camera is; one that waits for its first trigger is where it was
+  /// put.
   void tick() {
+    const auto description = link_.describe();
     const bool is_wanted = !has_seen_frame_ || topics_->hasReaders();
     link_.want(is_wanted);
-    if (!is_wanted) tellPose();
-  }
-
-  [[nodiscard]] std::optional<Transform<World, Camera>> describedPose() const {
-    const auto description = link_.describe();
-    return description ? description->world_from_camera : std::nullopt;
+    const bool waits = !has_seen_frame_ && description && description->can_trigger;
+    if (!description) return;
+    if (!has_seen_frame_ && !put_at_frame_) put_at_frame_ = description->world_from_camera;
+    if (!is_wanted || waits) tellPose(description->world_from_camera);
   }
 
   /// Frames tell it themselves, each of its own time; without any, what was set is where the camera is. One
   /// that moves by itself is elsewhere than it was put, so only what is put anew is told.
-  void tellPose() {
-    const auto now = describedPose();
-    if (!now || now == described_) return;
-    if (std::exchange(described_, now) == std::nullopt) return;
-    if (auto told = topics_->tellPose(*now, place_.clock.wall()); !told) complainOnce(told.error().message);
+  void tellPose(const std::optional<Transform<World, Camera>>& put) {
+    if (!put || put == told_put_) return;
+    told_put_ = put;
+    if (auto told = topics_->tellPose(*put, place_.clock.wall()); !told) complainOnce(told.error().message);
   }
 
+  /// The frame tells what is described, unless that was put after the frame was made: then the two differ,
+  /// and what is described is another than at the frame before.
   void takeFrame(const Frame& frame) {
     has_seen_frame_ = true;
-    described_ = describedPose();
+    const auto description = link_.describe();
+    const auto put = description ? description->world_from_camera : std::nullopt;
+    if (put == frame.moment.world_from_camera || put == put_at_frame_) put_of_frame_ = put;
+    put_at_frame_ = put;
     line_.take(frame);
   }
-  void publish(const Frame& frame) {
-    if (auto published = topics_->publish(frame); !published) complainOnce(published.error().message);
+  void publish(const Frame& frame, const Damage& damage) {
+    told_put_ = put_of_frame_;
+    if (auto published = topics_->publish(frame, damage); !published) complainOnce(published.error().message);
   }
 
   // ---- poses in ----------------------------------------------------------------------------------
@@ -152,7 +157,9 @@ class Ros2Facade final : public Facade {
   std::optional<Topics> topics_;
   dds_entity_t pose_reader_ = 0;
   bool has_seen_frame_ = false, is_setting_ = false;
-  std::optional<Transform<World, Camera>> wanted_, described_;
+  std::optional<Transform<World, Camera>> wanted_;
+  /// Where the camera was put: as it was told last, as the last frame tells it, as it was described then.
+  std::optional<Transform<World, Camera>> told_put_, put_of_frame_, put_at_frame_;
 };
 
 /// Names of ROS 2: words of letters, digits and "_", of which none begins with a digit, between "/".

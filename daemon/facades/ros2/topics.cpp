@@ -144,27 +144,36 @@ bool Topics::hasReaders() const {
          (keys_.transform == TransformKind::Moving && transform_.hasReaders());
 }
 
-Result<> Topics::publish(const Frame& frame) {
+Result<> Topics::publish(const Frame& frame, const Damage& damage) {
   const std::int64_t stamp_ns = stampOf(frame, keys_.clock);
   const Header header = headerOf(stamp_ns, keys_.frame_id);
   Result<> outcome;
   const auto note = [&](const Result<>& one) {
     if (outcome && !one) outcome = one;
   };
+  const auto strike = [&](auto& made) { damage.corrupt(std::as_writable_bytes(std::span{made.data})); };
   note(publishTransform(frame.moment.world_from_camera, stamp_ns));
   if ((depth_.hasReaders() || points_.hasReaders()) && (!rays_ || rays_->camera != frame.camera))
     rays_ = raysOf(frame.camera);
   if (depth_info_.hasReaders()) note(writeInfo(depth_info_, header, frame.camera));
   if (amplitude_info_.hasReaders()) note(writeInfo(amplitude_info_, header, frame.camera));
   if (depth_.hasReaders()) {
-    if (auto pixels = depthOf(frame, *rays_, keys_.depth_format))
+    if (auto pixels = depthOf(frame, *rays_, keys_.depth_format)) {
+      strike(*pixels);
       note(writeImage(depth_, header, *std::move(pixels)));
+    }
   }
   if (amplitude_.hasReaders()) {
-    if (auto pixels = amplitudeOf(frame)) note(writeImage(amplitude_, header, *std::move(pixels)));
+    if (auto pixels = amplitudeOf(frame)) {
+      strike(*pixels);
+      note(writeImage(amplitude_, header, *std::move(pixels)));
+    }
   }
   if (points_.hasReaders()) {
-    if (auto points = pointsOf(frame, *rays_)) note(writePoints(points_, header, *std::move(points)));
+    if (auto points = pointsOf(frame, *rays_)) {
+      strike(*points);
+      note(writePoints(points_, header, *std::move(points)));
+    }
   }
   return outcome;
 }

@@ -182,7 +182,7 @@ std::int64_t LiveCamera::stampOf(const Frame& frame) const {
   return frame.moment.exposures.empty() ? frame.moment.received.ns : frame.moment.exposures.front().start.ns;
 }
 
-Result<> LiveCamera::take(const Frame& frame) {
+Result<> LiveCamera::take(const Frame& frame, const Damage& damage) {
   came_ = clock_.steady();
   device_ns_ = stampOf(frame);
   has_device_time_ = !frame.moment.exposures.empty();
@@ -200,6 +200,7 @@ Result<> LiveCamera::take(const Frame& frame) {
                       frame.camera.height, is_depth ? "depth" : "amplitude", stream.width, stream.height)};
     }
     if (waiting.picture) ++lost_;
+    damage.corrupt(*pixels);
     waiting.picture = {*std::move(pixels), static_cast<std::uint32_t>(device_ns_ / kTick_ns), false};
   }
   return {};

@@ -37,7 +37,7 @@ class LiveCamera final : public UvcDevice {
 
   /// A host that is too slow loses frames; it is never waited for. Unsupported: the frame has another size,
   /// or lacks an image.
-  Result<> take(const Frame& frame);
+  Result<> take(const Frame& frame, const Damage& damage);
   /// Whether the host has asked for pictures within the last second.
   [[nodiscard]] bool wantsFrames(SteadyTime now) const;
   /// Of the pictures that a host asked for.

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "daemon/facades/facade.h"
+#include "daemon/facades/struck_frames.h"
 
 /// Any source as a camera of this machine, written into a node of the kernel module v4l2loopback.
 namespace toftwin::daemon::v4l2_loopback {
@@ -18,6 +19,7 @@ struct Keys {
   WantedFormat format = WantedFormat::Any;
   double depth_unit_mm = 1.0;
   double amplitude_per_count = 1.0;
+  FrameLineKeys line;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -32,6 +34,7 @@ struct Keys {
              "of one count of the depth image, in millimetres: 1 reaches to 65.5 m");
     v.number("amplitude_per_count", amplitude_per_count, {1e-6, 1e9},
              "what one count of the amplitude image stands for in the source's unit");
+    v.group("line", line, "what goes wrong on purpose with the images");
   }
 };
 

@@ -4,6 +4,7 @@
 
 #include <boost/asio/steady_timer.hpp>
 #include <chrono>
+#include <filesystem>
 #include <memory>
 #include <optional>
 
@@ -30,7 +31,7 @@ std::vector<std::uint32_t> codesOf(const Keys& keys) {
 
 class LoopbackFacade final : public Facade {
  public:
-  LoopbackFacade(Keys keys, const FacadePlace& place)
+  LoopbackFacade(Keys keys, const std::filesystem::path& line_log, const FacadePlace& place)
       : keys_(std::move(keys)),
         name_("facade v4l2_loopback of " + place.keys.source),
         images_({keys_.depth_unit_mm, keys_.amplitude_per_count}),
@@ -39,7 +40,9 @@ class LoopbackFacade final : public Facade {
               {.source = place.keys.source,
                .planes = keys_.image == Shown::Depth ? std::vector{PlaneKind::Range, PlaneKind::Depth}
                                                      : std::vector{PlaneKind::Amplitude}},
-              [this](const Frame& frame) { takeFrame(frame); }) {}
+              [this](const Frame& frame) { line_.take(frame); }),
+        line_(thread_.io(), LineFaults{keys_.line, name_, line_log}, keys_.line.delay_time,
+              [this](const Frame& frame, const Damage& damage) { takeFrame(frame, damage); }) {}
 
   ~LoopbackFacade() override { thread_.stop(); }
 
@@ -57,11 +60,11 @@ class LoopbackFacade final : public Facade {
 
  private:
   /// A node that has gone, or was taken by another program, is tried again every second.
-  void takeFrame(const Frame& frame) {
+  void takeFrame(const Frame& frame, const Damage& damage) {
     const auto now = steady_clock::now();
     if (next_try_ && now < *next_try_) return;
     next_try_.reset();
-    if (const auto shown = show(frame); !shown) {
+    if (const auto shown = show(frame, damage); !shown) {
       if (shown.error().message != last_complaint_) logging::warn("{}: {}", name_, shown.error().message);
       last_complaint_ = shown.error().message;
       node_.reset();
@@ -71,7 +74,7 @@ class LoopbackFacade final : public Facade {
     }
   }
 
-  Result<> show(const Frame& frame) {
+  Result<> show(const Frame& frame, const Damage& damage) {
     auto image = keys_.image == Shown::Depth ? images_.depthOf(frame) : images_.amplitudeOf(frame);
     if (!image)
       return Error{Error::Code::Unsupported, "the source has no such image; choose another one (image)"};
@@ -94,6 +97,7 @@ class LoopbackFacade final : public Facade {
       logging::info("{}: {} x {} as {}", name_, width, height,
                     node_->format()->code == V4L2_PIX_FMT_Z16 ? "Z16" : "Y16");
     }
+    damage.corrupt(*image);
     return node_->write(*image);
   }
 
@@ -103,6 +107,7 @@ class LoopbackFacade final : public Facade {
   ShortImages images_;
   EventThread thread_;
   SourceLink link_;
+  StruckFrames line_;
   std::optional<OutputNode> node_;
   std::optional<steady_clock::time_point> next_try_;
 };
@@ -112,8 +117,9 @@ FacadeKind::Start read(settings::Table& table) {
   table.read(keys);
   if (keys.image == Shown::Amplitude && keys.format == WantedFormat::Z16)
     table.complain("format", "is Z16, which is for depth; an amplitude is Y16");
-  return [keys](const FacadePlace& place) -> Result<std::unique_ptr<Facade>> {
-    auto facade = std::make_unique<LoopbackFacade>(keys, place);
+  const std::filesystem::path log = keys.line.logIn(table);
+  return [keys, log](const FacadePlace& place) -> Result<std::unique_ptr<Facade>> {
+    auto facade = std::make_unique<LoopbackFacade>(keys, log, place);
     if (auto opened = facade->open(); !opened) return opened.error();
     return std::unique_ptr<Facade>{std::move(facade)};
   };

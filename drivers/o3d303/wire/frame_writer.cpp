@@ -41,6 +41,11 @@ std::vector<std::int16_t> coordinate(const CameraFrame& frame, ChunkType type) {
   return image;
 }
 
+/// What the camera's application made of the frame: one of type "Camera" only takes it.
+std::string modelOf(const CameraFrame& frame) {
+  return fmt::format(R"({{"Type":"Camera","FrameCount":{}}})", frame.frame_count);
+}
+
 bool appendBlob(Bytes& bytes, std::string_view id, const CameraFrame& f) {
   using enum ChunkType;
   using Format = ElementFormat;
@@ -65,6 +70,7 @@ bool appendBlob(Bytes& bytes, std::string_view id, const CameraFrame& f) {
   if (id == kInverseIntrinsicsBlob) {
     return appendImage(bytes, f, InverseIntrinsics, Format::F32, f.inverse_intrinsics, false), true;
   }
+  if (id == kJsonBlob) return appendImage(bytes, f, Json, Format::U8, modelOf(f), false), true;
   return false;
 }
 

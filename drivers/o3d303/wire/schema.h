@@ -24,12 +24,12 @@ inline constexpr std::string_view kDistanceBlob = "distance_image",
                                   kAmplitudeBlob = "normalized_amplitude_image",
                                   kRawAmplitudeBlob = "amplitude_image", kXBlob = "x_image",
                                   kYBlob = "y_image", kZBlob = "z_image",
-                                  kConfidenceBlob = "confidence_image",
-                                  kDiagnosticBlob = "diagnostic_data",
+                                  kConfidenceBlob = "confidence_image", kDiagnosticBlob = "diagnostic_data",
                                   kUnitVectorsBlob = "all_unit_vector_matrices",
                                   kExtrinsicsBlob = "extrinsic_calibration",
                                   kIntrinsicsBlob = "intrinsic_calibration",
-                                  kInverseIntrinsicsBlob = "inverse_intrinsic_calibration";
+                                  kInverseIntrinsicsBlob = "inverse_intrinsic_calibration",
+                                  kJsonBlob = "json_model";
 
 /// Those blobs between "star" and "stop", with exposure times and illumination temperature.
 Schema schemaOf(const std::vector<std::string_view>& blobs);

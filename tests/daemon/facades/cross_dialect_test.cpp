@@ -9,7 +9,9 @@
 #include <cmath>
 
 #include "drivers/o3d303/wire/confidence.h"
+#include "drivers/sim/simulator.h"
 #include "facade_testing.h"
+#include "protocol/record/recording.h"
 
 namespace toftwin::daemon {
 namespace {
@@ -17,23 +19,21 @@ namespace {
 using namespace test;
 using Policy = SubscribeOptions::Policy;
 
-constexpr double kElectronsPerCount = 6.0;  // the facade's default
-
 /// What docs/facades/o3d303.md says becomes of a pixel, and what the driver makes of that.
 struct Converted {
   float range_m, amplitude;
   unsigned flags;
 };
-Converted convert(float range_m, float amplitude, unsigned flags) {
+Converted convert(float range_m, float amplitude, unsigned flags, double electrons_per_count) {
   const double mm = std::round(1000.0 * static_cast<double>(range_m));
   const bool has_range = mm >= 1.0 && mm <= 65'535.0 && (flags & 1U) == 0;
-  const double counts = std::min(65'535.0, std::round(static_cast<double>(amplitude) / kElectronsPerCount));
+  const double counts = std::min(65'535.0, std::round(static_cast<double>(amplitude) / electrons_per_count));
   const unsigned kept = o3d303::flagsOf(o3d303::confidenceOf(static_cast<std::uint8_t>(flags)));
   return {has_range ? static_cast<float>(mm) * 1e-3F : std::nanf(""),
           std::isnan(amplitude) ? 0.0F : static_cast<float>(counts), has_range ? kept : kept | 1U};
 }
 
-void expectSame(const Frame& native, const Frame& through) {
+void expectSame(const Frame& native, const Frame& through, double electrons_per_count) {
   const auto range_m = native.find(PlaneKind::Range)->as<float>();
   const auto amplitude = native.find(PlaneKind::Amplitude)->as<float>();
   const auto flags = native.find(PlaneKind::Flags)->as<std::uint8_t>();
@@ -44,7 +44,7 @@ void expectSame(const Frame& native, const Frame& through) {
   ASSERT_EQ(range_got.size(), range_m.size());
   std::size_t with_value = 0;
   for (std::size_t i = 0; i < range_m.size(); ++i) {
-    const Converted expected = convert(range_m[i], amplitude[i], flags[i]);
+    const Converted expected = convert(range_m[i], amplitude[i], flags[i], electrons_per_count);
     ASSERT_EQ(flags_got[i], expected.flags) << i;
     ASSERT_EQ(amplitude_got[i], expected.amplitude) << i;
     ASSERT_EQ(std::isnan(range_got[i]), std::isnan(expected.range_m)) << i;
@@ -60,31 +60,76 @@ void expectSame(const Frame& native, const Frame& through) {
   EXPECT_GT(with_value, range_m.size() / 2);
 }
 
-class CrossDialect : public RunningFacade {};
+class CrossDialect : public RunningFacade {
+ protected:
+  /// Five frames of the source, read natively and by our driver from the O3D303 facade before it.
+  void expectOneTruth(const std::string& source, FrameKind kind) {
+    auto native_client = client();
+    Result<std::unique_ptr<drivers::Source>> driver = Error{};
+    ASSERT_TRUE(eventually([&] { return (driver = openDriver()).ok(); })) << driver.error().message;
+    EXPECT_EQ((*driver)->info().camera.width, 176);
+    auto native_stream = native_client.subscribe(source, {.policy = Policy::Queue, .queue = 64});
+    ASSERT_TRUE(native_stream.ok()) << native_stream.error().message;
+    ASSERT_TRUE((*driver)->start().ok());
+    Natives natives{*std::move(native_stream), deviceTimeOf};
+    int compared = 0;
+    for (int i = 0; i < 60 && compared < 5; ++i) {
+      const auto through = nextFrame(**driver);
+      ASSERT_TRUE(through.ok()) << through.error().message;
+      const auto native = natives.at(deviceTimeOf(*through));
+      ASSERT_TRUE(native.ok()) << native.error().message;
+      if (*native == nullptr) continue;
+      EXPECT_EQ((*native)->provenance.kind, kind);
+      ASSERT_NO_FATAL_FAILURE(expectSame(**native, *through, electrons_per_count_));
+      EXPECT_EQ(through->moment.exposures.at(0).duration, (*native)->moment.exposures.at(0).duration);
+      ++compared;
+    }
+    EXPECT_EQ(compared, 5);
+    (*driver)->stop();
+  }
+
+  double electrons_per_count_ = 6.0;  // the facade's default
+};
 
 TEST_F(CrossDialect, TheO3d303sFramesAreTheNativeOnesBitForBitWithTheirTimeStamps) {
   startO3d303(kSmallSim);
-  auto native_client = client();
-  auto driver = openDriver();
-  ASSERT_TRUE(driver.ok()) << driver.error().message;
-  EXPECT_EQ((*driver)->info().camera.width, 176);
-  auto native_stream = native_client.subscribe("cam", {.policy = Policy::Queue, .queue = 64});
-  ASSERT_TRUE(native_stream.ok()) << native_stream.error().message;
-  ASSERT_TRUE((*driver)->start().ok());
-  Natives natives{*std::move(native_stream), deviceTimeOf};
-  int compared = 0;
-  for (int i = 0; i < 60 && compared < 5; ++i) {
-    const auto through = nextFrame(**driver);
-    ASSERT_TRUE(through.ok()) << through.error().message;
-    const auto native = natives.at(deviceTimeOf(*through));
-    ASSERT_TRUE(native.ok()) << native.error().message;
-    if (*native == nullptr) continue;
-    ASSERT_NO_FATAL_FAILURE(expectSame(**native, *through));
-    EXPECT_EQ(through->moment.exposures.at(0).duration, (*native)->moment.exposures.at(0).duration);
-    ++compared;
+  expectOneTruth("cam", FrameKind::Simulated);
+}
+
+TEST_F(CrossDialect, SoAreThoseOfARecording) {
+  auto recorded = record::Writer::create(folder_ / "run.mcap");
+  ASSERT_TRUE(recorded.ok()) << recorded.error().message;
+  auto keys = settings::Table::parse(
+      "uri = 'sim:o3d303_binned'\nsamples_per_pixel = 1\nmax_surfaces = 1\nframe_interval_ms = 50\n"
+      "pace = 'fast'",
+      "sim.toml");
+  auto camera = drivers::simulator::row().open(*keys);
+  ASSERT_TRUE(camera.ok() && (*camera)->start().ok());
+  for (int i = 0; i < 20; ++i) {
+    Frame frame = *(*camera)->next({}, false);
+    frame.source = "cam";
+    frame.sequence = static_cast<std::uint64_t>(i);
+    frame.moment.received.ns = 1'700'000'000'000'000'000 + i * 50'000'000;
+    ASSERT_TRUE(recorded->write(frame).ok());
   }
-  EXPECT_EQ(compared, 5);
-  (*driver)->stop();
+  ASSERT_TRUE(recorded->close().ok());
+  startO3d303("driver = 'replay'\nfile = 'run.mcap'\nloop = true\n");
+  expectOneTruth("cam", FrameKind::Replayed);
+}
+
+/// The driver of a real camera, behind whose own facade there is one more.
+TEST_F(CrossDialect, SoAreThoseOfACamerasDriver) {
+  const std::uint16_t camera = freePort();
+  xmlrpc_ = freePort();
+  start(fmt::format(
+      "[[source]]\nname = 'sim'\n{}\n[[facade]]\nkind = 'o3d303'\nsource = 'sim'\nxmlrpc_port = {}\n"
+      "pcic_port = 0\ndiscoverable = false\n"
+      "[[source]]\nname = 'cam'\ndriver = 'o3d303'\nuri = 'o3d303:127.0.0.1:{}'\n"
+      "[[facade]]\nkind = 'o3d303'\nsource = 'cam'\nxmlrpc_port = {}\npcic_port = 0\n"
+      "discoverable = false\nelectrons_per_count = 1.0\n",
+      kSmallSim, camera, camera, xmlrpc_));
+  electrons_per_count_ = 1.0;  // the source has counts already
+  expectOneTruth("cam", FrameKind::Real);
 }
 
 TEST_F(CrossDialect, ThePlcsRangesAreTheNativeFloatsWithTheirTimeStamp) {

@@ -76,6 +76,8 @@ class PcicClient {
   [[nodiscard]] int framesSoFar() const;
   void forgetFrames();
   bool isClosedByPeer();
+  /// Whether it has a part of a message whose rest did not come.
+  [[nodiscard]] bool isWithinMessage() const { return reader_.isWithinMessage(); }
 
  private:
   bool readSome();

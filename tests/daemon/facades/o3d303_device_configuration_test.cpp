@@ -128,6 +128,55 @@ TEST_F(O3d303Configuration, FactoryResetPutsAllBackAlsoTheSource) {
   EXPECT_EQ(dump("edit/device/time/").at("WaitSyncTries"), "2");
 }
 
+/// 250 electrons are 41.7 counts, which the camera writes as 42; the 252 that it has at first are 42, too.
+TEST_F(O3d303Configuration, WhatATextRoundsComesBackAsItWas) {
+  source("minimum_amplitude_electrons") = 250.0;  // a native client
+  device_.update(facts_);
+  editApplication();
+  EXPECT_EQ(all(kImager).at("MinimumAmplitude"), "42");
+  call("edit/", "stopEditingApplication");
+  call("edit/", "copyApplication", {1});
+  call("edit/", "editApplication", {1});
+  call(kImager, "setParameter", {"MinimumAmplitude", "100"});
+  call(kApplication, "save");
+  EXPECT_EQ(source("minimum_amplitude_electrons"), 600.0);
+  call("edit/", "stopEditingApplication");
+  call("edit/device/", "setParameter", {"ActiveApplication", "2"});
+  call("edit/device/", "save");
+  EXPECT_EQ(source("minimum_amplitude_electrons"), 250.0) << "of the copy";
+  call("edit/device/", "setParameter", {"ActiveApplication", "1"});
+  call("edit/device/", "save");
+  EXPECT_EQ(source("minimum_amplitude_electrons"), 600.0);
+  source("minimum_amplitude_electrons") = 250.0;
+  device_.update(facts_);
+  call("edit/", "factoryReset");
+  EXPECT_EQ(source("minimum_amplitude_electrons"), 252.0) << "not what has the same text";
+}
+
+TEST_F(O3d303Configuration, TheTemperaturesAreThoseOfTheSource) {
+  facts_.housing_c = 31.5;
+  facts_.processor_c = 55.0;
+  device_.update(facts_);
+  EXPECT_EQ(all("/").at("TemperatureFront1"), "31.5");
+  EXPECT_EQ(all("/").at("TemperatureIMX6"), "55.0");
+  EXPECT_EQ(all("/").at("TemperatureIllu"), "3276.7") << "there is none";
+  edit();
+  facts_.housing_c = 32.0;
+  device_.update(facts_);
+  call("edit/device/", "save");
+  EXPECT_EQ(all("/").at("TemperatureFront1"), "32.0") << "what is measured is not saved";
+}
+
+TEST_F(O3d303Configuration, ASaveThatIsRefusedSavesNothing) {
+  edit();
+  call("edit/", "copyApplication", {1});
+  call("edit/device/", "setParameter", {"ActiveApplication", "2"});
+  call("edit/device/", "setParameter", {"Name", "half"});
+  call("edit/", "deleteApplication", {2});
+  EXPECT_EQ(faultOf("edit/device/", "save"), Fault::kNoSuchApplication);
+  EXPECT_EQ(all("/").at("Name"), "test");
+}
+
 // ---- network and time ----------------------------------------------------------------------------
 
 TEST_F(O3d303Configuration, TheNetworkIsKeptAndSavingItEndsTheSession) {
@@ -200,6 +249,48 @@ TEST_F(O3d303Configuration, AnApplicationComesBackAsItWasExported) {
   EXPECT_EQ(of[0], of[1]);
   EXPECT_EQ(of[1].at(kImager).at("ClippingLeft"), "7");
   EXPECT_EQ(of[1].at(kSpatial).at("MaskSize"), "1");
+}
+
+TEST_F(O3d303Configuration, ATimeThatIsOfTheNetworkIsThisMachines) {
+  facts_.device_s = 1000;
+  facts_.host_s = 1'700'000'000;
+  device_.update(facts_);
+  EXPECT_EQ(all("/").at("ImageTimestampReference"), "1000");
+  edit();
+  call("edit/device/time/", "setParameter", {"SynchronizationActivated", "true"});
+  call("edit/device/time/", "saveAndActivateConfig");
+  EXPECT_EQ(all("edit/device/time/").at("CurrentTime"), "1700000000");
+  EXPECT_EQ(all("/").at("ImageTimestampReference"), "1700000000");
+}
+
+TEST_F(O3d303Configuration, AnApplicationThatCannotBeSavedIsNotImported) {
+  begin();
+  const std::string file = call("", "exportApplication", {1}).text();
+  std::string xml = fromBase64(file).value();
+  const auto replace = [&](const std::string& name, const std::string& from, const std::string& to) {
+    const auto at = xml.find(from, xml.find(name));
+    ASSERT_NE(at, std::string::npos) << name;
+    xml.replace(at, from.size(), to);
+  };
+  replace("<name>TriggerMode</name>", ">1<", ">2<");
+  replace("<name>TemporalFilterType</name>", ">0<", ">1<");
+  EXPECT_EQ(faultOf("", "importApplication", {toftwin::o3d303::toBase64(xml)}), Fault::kFilterAgainstTrigger);
+  EXPECT_THAT(applicationIndices(), ElementsAre(1));
+}
+
+/// What is exported can be imported again, or it is refused.
+TEST_F(O3d303Configuration, AnExportThatWouldNotFitIntoACallIsRefused) {
+  editApplication();
+  const std::string longest(65'536, '&');  // each is five bytes there
+  for (const char* name : {"LogicGraph", "TemplateInfo", "PcicEipResultSchema"})
+    call(kApplication, "setParameter", {name, longest});
+  call(kApplication, "save");
+  call("edit/", "stopEditingApplication");
+  for (int i = 0; i < 4; ++i) call("edit/", "copyApplication", {1});
+  EXPECT_EQ(faultOf("", "exportApplication", {1}), 0);
+  EXPECT_EQ(faultOf("", "exportConfig"), 0) << "five of 0.98 MB";
+  call("edit/", "copyApplication", {1});
+  EXPECT_EQ(faultOf("", "exportConfig"), Fault::kInternal) << "six";
 }
 
 TEST_F(O3d303Configuration, AWholeConfigurationComesBackByItsFlags) {

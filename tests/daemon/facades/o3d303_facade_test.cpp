@@ -3,8 +3,17 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <bit>
 #include <cmath>
+#include <deque>
+#include <fstream>
+#include <map>
+#include <set>
+#include <sstream>
 #include <thread>
+
+#include <boost/property_tree/json_parser.hpp>
 
 #include "facade_testing.h"
 #include "o3d303_client.h"
@@ -20,6 +29,7 @@ using testing::HasSubstr;
 class O3d303Facade : public RunningFacade {
  protected:
   O3d303Client camera() { return O3d303Client{xmlrpc_}; }
+  bool answers() { return camera().tryCall("", "getParameter", {"DeviceType"}); }
 };
 
 TEST_F(O3d303Facade, AppliesWhatADriverSetsToTheSimulatedCamera) {
@@ -148,6 +158,69 @@ TEST_F(O3d303Facade, EveryConnectionHasASchemaOfItsOwn) {
   EXPECT_EQ(distance.command("V?"), "03 01 04");
 }
 
+TEST_F(O3d303Facade, TheModelOfAFrameIsJson) {
+  startO3d303(kPattern);
+  PcicClient one{camera().pcicPort()};
+  EXPECT_EQ(one.setSchema({o3d303::kAmplitudeBlob, o3d303::kJsonBlob}), "*");
+  const auto frame = one.frame();
+  const auto* model = frame.find(o3d303::ChunkType::Json);
+  ASSERT_NE(model, nullptr);
+  EXPECT_EQ(model->header.format, o3d303::ElementFormat::U8);
+  EXPECT_EQ(model->header.width * model->header.height, model->data.size());
+  std::istringstream text{std::string{o3d303::textOf(model->data)}};
+  boost::property_tree::ptree json;
+  boost::property_tree::read_json(text, json);
+  EXPECT_EQ(json.get<std::uint32_t>("FrameCount"), model->header.frame_count);
+}
+
+/// All that a client of the vendor's sees of the line's faults is what the log says.
+TEST_F(O3d303Facade, ItsLineLosesAndDoublesTheFramesOfTheLog) {
+  startO3d303(kPattern,
+              "[facade.line]\nloss = 0.2\nduplicate = 0.2\nreorder = 0.2\nseed = 3\nlog = 'line.csv'");
+  PcicClient one{camera().pcicPort()};
+  EXPECT_EQ(one.setSchema({o3d303::kDistanceBlob}), "*");
+  std::vector<std::uint32_t> came;
+  while (came.size() < 100) came.push_back(one.frame().chunks.at(0).header.frame_count);
+  std::map<std::string, std::set<std::uint32_t>> logged;
+  std::ifstream lines{folder_ / "line.csv"};
+  std::string text;
+  for (std::getline(lines, text); std::getline(lines, text);) {
+    const auto first = text.find(','), second = text.rfind(',');
+    logged[text.substr(first + 1, second - first - 1)].insert(
+        static_cast<std::uint32_t>(std::stoul(text.substr(second + 7))));
+  }
+  // The ends are left out: what is there may have its twin beyond them.
+  for (std::uint32_t i = came.front() + 3; i < came.at(90); ++i) {
+    const auto times = std::ranges::count(came, i);
+    EXPECT_EQ(times, logged["loss"].contains(i) ? 0 : logged["duplicate"].contains(i) ? 2 : 1) << i;
+  }
+  EXPECT_GT(logged["loss"].size(), 5u);
+  EXPECT_GT(logged["reorder"].size(), 5u);
+}
+
+TEST_F(O3d303Facade, ACutLineEndsTheConnectionInTheMiddleOfAMessage) {
+  startO3d303(kPattern, "[facade.line]\ndisconnect = 0.1\nseed = 2\nlog = 'line.csv'");
+  PcicClient one{camera().pcicPort()};
+  EXPECT_TRUE(one.isClosedByPeer());
+  EXPECT_TRUE(one.isWithinMessage());
+  PcicClient again{camera().pcicPort()};  // and the camera is there as before
+  EXPECT_EQ(again.command("V?"), "03 01 04");
+}
+
+/// The seed is one whose first bits are all within the images, so that messages stay messages.
+TEST_F(O3d303Facade, ACorruptMessageHasOneBitWrong) {
+  startO3d303(kPattern, "[facade.line]\ncorruption = 1.0\nseed = 1");
+  PcicClient one{camera().pcicPort()};
+  EXPECT_EQ(one.setSchema({o3d303::kUnitVectorsBlob}), "*");
+  constexpr std::size_t kImageAt = 4 + 48, kImageSize = std::size_t{64} * 48 * 12;
+  const std::string first = one.nextOf("0000").substr(kImageAt, kImageSize),
+                    second = one.nextOf("0000").substr(kImageAt, kImageSize);
+  int bits = 0;
+  for (std::size_t i = 0; i < kImageSize; ++i)
+    bits += std::popcount(static_cast<unsigned char>(first.at(i) ^ second.at(i)));
+  EXPECT_EQ(bits, 2) << "unit vectors are the same in each frame, and each has a wrong bit of its own";
+}
+
 // A real camera's message of these images at 176 x 132 was measured to be 209414 bytes behind its first line,
 // the ticket and the line end among them.
 TEST_F(O3d303Facade, AFrameIsAsLongAsTheRealCameras) {
@@ -182,6 +255,32 @@ TEST_F(O3d303Facade, InFreeRunATriggerIsRefusedAndTheErrorTold) {
   EXPECT_EQ(asks.command("t"), "!");
   EXPECT_EQ(asks.nextOf("0001"), "100001000");
   EXPECT_EQ(asks.command("E?"), "100001000");
+}
+
+TEST_F(O3d303Facade, ATriggerBeforeTheLastOnesFrameIsAnError) {
+  // The light of the first frame takes longer than the second command.
+  startO3d303("driver = 'sim'\nuri = 'sim:o3d303_binned'\npace = 'trigger'\nsamples_per_pixel = 64\n");
+  PcicClient asks{camera().pcicPort()}, listens{camera().pcicPort()};
+  EXPECT_EQ(asks.command("t"), "*");
+  EXPECT_EQ(asks.command("t"), "!");
+  EXPECT_EQ(listens.nextOf("0001"), "110001006");
+}
+
+TEST_F(O3d303Facade, TheSeventeenthConnectionIsRefusedAndTheOthersAreTold) {
+  startO3d303(kPattern);
+  const auto port = camera().pcicPort();
+  std::deque<PcicClient> all;
+  for (int i = 0; i < 16; ++i) EXPECT_EQ(all.emplace_back(port).command("P2"), "?");
+  PcicClient one_too_many{port};
+  EXPECT_EQ(all.front().nextOf("0001"), "100000001");
+  EXPECT_TRUE(one_too_many.isClosedByPeer());
+}
+
+TEST_F(O3d303Facade, TheOutputIsAHexadecimalDigitInEitherCase) {
+  startO3d303(kPattern);
+  PcicClient one{camera().pcicPort()};
+  for (const char* good : {"p0", "p7", "pf", "pF", "pA"}) EXPECT_EQ(one.command(good), "*") << good;
+  for (const char* bad : {"p", "pg", "p-", "p+", "p17"}) EXPECT_EQ(one.command(bad), "!") << bad;
 }
 
 TEST_F(O3d303Facade, ADriverSwitchesItToTriggersAndBack) {
@@ -234,13 +333,17 @@ TEST_F(O3d303Facade, AStalledClientHoldsUpNobody) {
 }
 
 TEST_F(O3d303Facade, ARebootDropsEveryoneAndComesBack) {
-  startO3d303(kPattern, "boot_time_s = 0.2");
+  startO3d303(kSmallSim + "powered_on_before_s = 3600\n", "boot_time_s = 0.2");
+  ASSERT_TRUE(eventually([&] { return answers(); })) << "it boots at the start, too";
   PcicClient connected{camera().pcicPort()};
   auto rpc = camera();
   rpc.beginSession();
   rpc.call("", "reboot", {0});
   EXPECT_TRUE(connected.isClosedByPeer());
-  EXPECT_TRUE(eventually([&] { return camera().tryCall("", "getParameter", {"DeviceType"}); }));
+  EXPECT_TRUE(eventually([&] { return answers(); }));
+  EXPECT_LT(std::stod(camera().call("", "getParameter", {"UpTime"}).text()) * 3600.0,
+            static_cast<double>(kSoon.count()))
+      << "from the boot on, not from when the source was switched on";
   EXPECT_EQ(rpc.fault(rpc.session(""), "heartbeat", {5}), 100'000) << "the session is gone";
 }
 

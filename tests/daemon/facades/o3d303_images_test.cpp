@@ -4,11 +4,15 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <map>
 #include <set>
 #include <vector>
 
+#include "daemon/facades/unevenness.h"
 #include "facade_testing.h"
+#include "measured_intervals.h"
 #include "o3d303_client.h"
 
 namespace toftwin::daemon {
@@ -47,9 +51,14 @@ TEST_F(O3d303Images, TheTypeOfTheImagerSetsTheCamerasFrequenciesAndExposures) {
   EXPECT_EQ(watches.setSchema({o3d303::kConfidenceBlob}), "*");
   const auto sent = watches.frame();
   const auto confidence = sent.find(o3d303::ChunkType::Confidence)->data;
-  const auto isOfLongest = [](std::byte one) { return (std::to_integer<unsigned>(one) & 0x30U) == 0x30U; };
-  EXPECT_GT(std::ranges::count_if(confidence, isOfLongest), 176 * 132 / 2)
-      << "most pixels are of the longer one";
+  const auto isOf = [](unsigned exposure) {
+    return [exposure](std::byte one) { return (std::to_integer<unsigned>(one) & 0x30U) == exposure; };
+  };
+  const auto longest = std::ranges::count_if(confidence, isOf(0x30U)),
+             shorter = std::ranges::count_if(confidence, isOf(0x20U));
+  EXPECT_GT(longest, 176 * 132 / 2) << "most pixels are of the longer one";
+  EXPECT_GT(shorter, 0) << "those that saturate in it are of the shorter one";
+  EXPECT_EQ(longest + shorter, 176 * 132);
   setType("under5m_low");
   const auto details = native.describe("cam");
   for (const Parameter& one : details->parameters) {
@@ -162,6 +171,46 @@ TEST_F(O3d303Images, WhatIsClippedIsInvalidInItsImagesAndSaysWhy) {
   }
   EXPECT_GT(left, 2000) << "a quarter of the image or so";
   EXPECT_GT(clipped, 176 * 132 / 2);
+}
+
+/// Each frame comes to a client when the real camera's would have, or later on a busy machine; never earlier.
+TEST_F(O3d303Images, ComeAsUnevenlyAsARealCamerasDid) {
+  const auto file = measuredIntervals("libo3d3xx_jitter-2000-30-8.txt");
+  if (file.empty()) GTEST_SKIP() << "no ifm-frame-timing in $TOFTWIN_DATA or ../shared/data";
+  constexpr int kFrames = 60;
+  constexpr double kLatency_ms = 10.0;
+  // 37.9 ms is the file's mean: evenly spaced frames at that are what the file's are late against.
+  startO3d303("driver = 'pattern'\nwidth = 64\nheight = 48\nframe_rate_hz = 26.4\n",
+              fmt::format("intervals = '{}'\nlatency_ms = {}", file.string(), kLatency_ms));
+  auto native = client();
+  auto stream = native.subscribe("cam", {.policy = SubscribeOptions::Policy::Queue, .queue = 4 * kFrames});
+  ASSERT_TRUE(stream.ok()) << stream.error().message;
+  PcicClient watches{camera().pcicPort()};
+  std::map<std::uint64_t, std::int64_t> arrived_ns;  // by frame count
+  for (int i = 0; i < kFrames; ++i) {
+    const std::uint64_t count = watches.frame().chunks.at(0).header.frame_count;
+    arrived_ns[count] = std::chrono::nanoseconds{std::chrono::system_clock::now().time_since_epoch()}.count();
+  }
+  const auto uneven = Unevenness::load(file);
+  ASSERT_TRUE(uneven.ok()) << uneven.error().message;
+  const std::uint64_t first = arrived_ns.begin()->first;
+  double least_late_ms = 1e9;
+  int compared = 0;
+  while (compared < kFrames) {
+    const auto frame = stream->next(kSoon);
+    ASSERT_TRUE(frame.ok()) << frame.error().message;
+    if (frame->sequence > arrived_ns.rbegin()->first) break;
+    const auto arrived = arrived_ns.find(frame->sequence);
+    if (arrived == arrived_ns.end()) continue;
+    const double took_ms = static_cast<double>(arrived->second - frame->moment.received.ns) * 1e-6;
+    const double held_ms =
+        kLatency_ms + static_cast<double>(uneven->delay(frame->sequence - first).count()) * 1e-6;
+    EXPECT_GE(took_ms, held_ms - 0.01) << "frame " << frame->sequence;  // the two clocks tick differently
+    least_late_ms = std::min(least_late_ms, took_ms - held_ms);
+    ++compared;
+  }
+  EXPECT_GT(compared, kFrames / 2);
+  EXPECT_LT(least_late_ms, 10.0) << "some come in time on any machine";
 }
 
 TEST_F(O3d303Images, ASetClockIsThatOfTheFrames) {

@@ -100,6 +100,22 @@ TEST_F(Ros2Facade, APoseThatIsSetIsToldWhereNobodyReadsImages) {
   EXPECT_EQ(seen.child, "cam_optical_frame");
 }
 
+TEST_F(Ros2Facade, ThePoseIsToldAlsoWhereTheFirstFrameIsLost) {
+  startRos2(kSmallSim + "position_m = [0.5, 0.25, -1.0]\n", "[facade.line]\nloss = 1.0\n");
+  auto message = nextOf(program_->read("/tf_static", kTransforms, Asks::Latched));
+  ASSERT_TRUE(message);
+  EXPECT_EQ(readTransform(*std::move(message)).numbers,
+            numbersOf(*client().describe("cam")->world_from_camera));
+}
+
+TEST_F(Ros2Facade, ACameraThatWaitsForItsFirstTriggerIsWhereItWasPut) {
+  startRos2(kSmallSim + "position_m = [0.5, 0.25, -1.0]\npace = 'trigger'\n");
+  auto message = nextOf(program_->read("/tf_static", kTransforms, Asks::Latched));
+  ASSERT_TRUE(message);
+  EXPECT_EQ(readTransform(*std::move(message)).numbers,
+            numbersOf(*client().describe("cam")->world_from_camera));
+}
+
 TEST_F(Ros2Facade, AFrameThatIsDoubledOnPurposeComesTwice) {
   startRos2(kSmallSim, "reliability = 'reliable'\nkeep_last = 50\n[facade.line]\nduplicate = 1.0\n");
   auto* images = program_->read("/cam/amplitude/image_raw", kImage, Asks::Reliable);

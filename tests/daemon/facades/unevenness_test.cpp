@@ -4,21 +4,19 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstdlib>
-#include <filesystem>
 #include <fstream>
 #include <numeric>
 #include <vector>
+
+#include "measured_intervals.h"
 
 namespace toftwin::daemon {
 namespace {
 
 // Evenly spaced frames that are held back so leave at the intervals that were measured on a real one.
 TEST(Unevenness, GivesARealCamerasIntervals) {
-  const char* set = std::getenv("TOFTWIN_DATA");
-  const std::filesystem::path data = set != nullptr ? set : TOFTWIN_SOURCE_DIR "/../shared/data";
-  const auto file = data / "ifm-frame-timing/libo3d3xx_jitter-2000-30-8.txt";
-  if (!std::filesystem::exists(file)) GTEST_SKIP() << "the measurements are not there: " << file;
+  const auto file = test::measuredIntervals("libo3d3xx_jitter-2000-30-8.txt");
+  if (file.empty()) GTEST_SKIP() << "no ifm-frame-timing in $TOFTWIN_DATA or ../shared/data";
   std::vector<double> intervals_ms;
   std::ifstream in{file};
   for (double ms = 0.0; in >> ms;) intervals_ms.push_back(ms);
@@ -43,7 +41,7 @@ TEST(Unevenness, GivesARealCamerasIntervals) {
 TEST(UnevenFrames, LeaveInOrderAndNoneIsLost) {
   boost::asio::io_context io;
   std::vector<std::uint64_t> order;
-  UnevenFrames line{io, Unevenness{{std::chrono::milliseconds{1}, std::chrono::milliseconds{21}}},
+  UnevenFrames line{io, Unevenness{{std::chrono::milliseconds{1}, std::chrono::milliseconds{21}}}, 0_s,
                     [&](const Frame& frame) { order.push_back(frame.sequence); }};
   for (std::uint64_t i = 0; i < 6; ++i) {
     Frame frame;
@@ -58,9 +56,20 @@ TEST(UnevenFrames, LeaveInOrderAndNoneIsLost) {
 TEST(UnevenFrames, WithoutIntervalsTheyLeaveAtOnce) {
   boost::asio::io_context io;
   int left = 0;
-  UnevenFrames line{io, {}, [&](const Frame&) { ++left; }};
+  UnevenFrames line{io, {}, 0_s, [&](const Frame&) { ++left; }};
   line.take({});
   EXPECT_EQ(left, 1);
+}
+
+TEST(UnevenFrames, WithALatencyTheyLeaveThatMuchLater) {
+  boost::asio::io_context io;
+  const auto begin = std::chrono::steady_clock::now();
+  auto left = begin;
+  UnevenFrames line{io, {}, 20_ms, [&](const Frame&) { left = std::chrono::steady_clock::now(); }};
+  line.take({});
+  EXPECT_EQ(left, begin);
+  io.run();
+  EXPECT_GE(left - begin, std::chrono::milliseconds{20});
 }
 
 }  // namespace

@@ -107,7 +107,7 @@ TEST(UsbCameraDevice, StampAndSourceClockAreOfTheSameClock) {
   const auto timesAfter3ms = [&](const Frame& frame) {
     Transfer ask = depthTransfer(16'384);
     EXPECT_FALSE(plugged.camera->serve(ask, plugged.clock.steady()));
-    EXPECT_TRUE(plugged.camera->take(frame).ok());
+    EXPECT_TRUE(plugged.camera->take(frame, {}).ok());
     plugged.clock.advance(3ms);
     EXPECT_TRUE(plugged.camera->serve(ask, plugged.clock.steady()));
     return timesOf(ask.data);
@@ -131,10 +131,10 @@ TEST(UsbCameraDevice, AFrameThatLacksBytesIsRefused) {
   EXPECT_FALSE(plugged.camera->serve(ask, plugged.clock.steady()));
   Frame frame = depthFrame();
   frame.planes[0].data = frame.planes[0].data.part(0, frame.planes[0].data.size() - 4);
-  const auto taken = plugged.camera->take(frame);
+  const auto taken = plugged.camera->take(frame, {});
   ASSERT_FALSE(taken.ok());
   EXPECT_THAT(taken.error().message, testing::HasSubstr("has no depth"));
-  EXPECT_TRUE(plugged.camera->take(depthFrame()).ok());
+  EXPECT_TRUE(plugged.camera->take(depthFrame(), {}).ok());
 }
 
 TEST(UsbCameraDevice, AnIsochronousStreamThatHasBegunIsNotDueForTheOtherOne) {
