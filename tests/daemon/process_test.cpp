@@ -279,6 +279,39 @@ TEST_F(Toftwind, ReplaysARecordingBitForBit) {
   EXPECT_EQ(found, seen.size());
 }
 
+/// A busy machine can make a frame late, never early: each comes no sooner after the subscription than it was recorded
+/// after the first.
+TEST_F(Toftwind, ReplaysAtTheRecordedTimes) {
+  configure(kPattern);
+  const std::vector<std::chrono::milliseconds> recorded{0ms, 250ms, 300ms, 700ms};
+  {
+    Process daemon{arguments(), path("log")};
+    ASSERT_TRUE(daemon.says("source cam: driver pattern")) << daemon.said();
+    auto client = this->client();
+    auto frame = client->subscribe("cam", {})->next(kSoon);
+    ASSERT_TRUE(frame.ok()) << frame.error().message;
+    auto writer = record::Writer::create(path("run.mcap"));
+    const std::int64_t began_ns = frame->moment.received.ns;
+    for (const auto after : recorded) {
+      frame->moment.received.ns = began_ns + std::chrono::nanoseconds{after}.count();
+      ASSERT_TRUE(writer->write(*frame).ok());
+      ++frame->sequence;
+    }
+    ASSERT_TRUE(writer->close().ok());
+  }
+  configure("[[source]]\nname = 'again'\ndriver = 'replay'\nfile = 'run.mcap'\npace = 'exact'\n");
+  Process daemon{arguments(), path("log")};
+  ASSERT_TRUE(daemon.says("source again: driver replay")) << daemon.said();
+  auto client = this->client();
+  const auto subscribed = std::chrono::steady_clock::now();
+  auto stream = client->subscribe("again", {.policy = Policy::Lossless});
+  for (const auto after : recorded) {
+    const auto frame = stream->next(kSoon);
+    ASSERT_TRUE(frame.ok()) << frame.error().message;
+    EXPECT_GE(std::chrono::steady_clock::now() - subscribed, after);
+  }
+}
+
 TEST_F(Toftwind, AFullDiskEndsTheRecordingKeepsWhatWasWrittenAndSaysSo) {
   configure(
       "recording_folder = '.'\n[[source]]\nname = 'cam'\ndriver = 'pattern'\npace = 'fast'\n");
