@@ -78,7 +78,7 @@ double correlationOf(const Part& prepared, const Group& a, const Group& b) {
   return aa > 0.0 && bb > 0.0 ? fa.dot(left(of_a, of_b) * fb) / std::sqrt(aa * bb) : 0.0;
 }
 
-double valueOf(const TermGroup& group, const std::vector<double>& coefficient,
+double curveAt(const TermGroup& group, const std::vector<double>& coefficient,
                const std::map<std::string, double>& at) {
   double sum = 0.0;
   for (std::size_t t = 0; t < group.terms.size(); ++t) {
@@ -111,8 +111,8 @@ std::optional<Experiment> experimentOf(const Context& context, const Effect& eff
         auto low = middle, high = middle;
         low[vary] = q[k], high[vary] = q[i];
         const double difference =
-            (valueOf(mine, effect.coefficient, high) - valueOf(mine, effect.coefficient, low)) -
-            (valueOf(other.group, other.coefficient, high) - valueOf(other.group, other.coefficient, low));
+            (curveAt(mine, effect.coefficient, high) - curveAt(mine, effect.coefficient, low)) -
+            (curveAt(other.group, other.coefficient, high) - curveAt(other.group, other.coefficient, low));
         if (best && std::abs(difference) <= std::abs(best->difference)) continue;
         std::string hold;
         double held_at = 0.0;

@@ -20,7 +20,7 @@ double stepOf(const Inner& inner, double value) {
   return 0.2 * (inner.grid.back() - inner.grid.front()) / n;
 }
 
-TermGroup moved(const FittedForm& part, std::size_t which) {
+TermGroup withInnerMoved(const FittedForm& part, std::size_t which) {
   std::vector<double> inner = part.inner;
   inner[which] += stepOf(part.form.inner[which], inner[which]);
   return built(part.form, inner);
@@ -191,7 +191,7 @@ std::vector<TermGroup> tangentsOf(std::span<const Effect> effects) {
   std::vector<TermGroup> groups;
   for (const Effect& effect : effects)
     for (const FittedForm& part : effect.parts)
-      for (std::size_t i = 0; i < part.inner.size(); ++i) groups.push_back(moved(part, i));
+      for (std::size_t i = 0; i < part.inner.size(); ++i) groups.push_back(withInnerMoved(part, i));
   return groups;
 }
 

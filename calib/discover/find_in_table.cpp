@@ -6,7 +6,7 @@
 namespace toftwin::discover {
 namespace {
 
-std::vector<Term> termsOf(const Finding& finding) {
+std::vector<Term> allTermsOf(const Finding& finding) {
   std::vector<Term> all;
   for (const Effect& effect : finding.effects)
     for (Term& term : termsOf(effect)) all.push_back(std::move(term));
@@ -27,7 +27,7 @@ Finding findInTable(TableSource& source, const FinderOptions& options) {
   const double first_p = finding.first_p;
   for (int round = 0; round < 2 && !finding.effects.empty(); ++round) {
     const double before = source.noise().typical;
-    source.learn(termsOf(finding));
+    source.learn(allTermsOf(finding));
     const bool is_quieter = source.noise().typical < 0.97 * before;
     Finding again = find(source, options);
     const bool is_same = namesOf(again) == namesOf(finding);

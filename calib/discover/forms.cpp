@@ -37,7 +37,7 @@ Term powerOrLog(const CovariateInfo& x, double power) {
   return power == 0.0 ? term(x, Shape::Log, {}) : term(x, Shape::Power, {power});
 }
 
-std::string wordOf(const CovariateInfo& x, double power) { return inWords(powerOrLog(x, power)); }
+std::string powerInWords(const CovariateInfo& x, double power) { return inWords(powerOrLog(x, power)); }
 
 Form form(std::string name, std::vector<CovariateInfo> of,
           TermGroup (*build)(const Form&, std::span<const double>), std::vector<Inner> inner = {},
@@ -166,9 +166,9 @@ std::vector<Form> formsIn(const CovariateInfo& x) {
   }
   for (const double power : kPowers) {
     if ((power < 0.0 || power == 0.5) && !isPositive(x) && !(power == 0.5 && least(x) >= 0.0)) continue;
-    forms.push_back(form(wordOf(x, power), {x}, powers, {}, {power}));
+    forms.push_back(form(powerInWords(x, power), {x}, powers, {}, {power}));
   }
-  if (isPositive(x)) forms.push_back(form(wordOf(x, 0.0), {x}, powers, {}, {0.0}));
+  if (isPositive(x)) forms.push_back(form(powerInWords(x, 0.0), {x}, powers, {}, {0.0}));
   forms.push_back(form(fmt::format("parabola in {}", x.name), {x}, powers, {}, {1.0, 2.0}));
   const double origin = least(x) >= 0.0 && least(x) < span(x) ? 0.0 : least(x);
   forms.push_back(form(fmt::format("exponential in {}", x.name), {x}, decay,
@@ -196,17 +196,17 @@ std::vector<Form> formsIn(const CovariateInfo& a, const CovariateInfo& b) {
   if (isNamed(a) || isNamed(b)) {
     const CovariateInfo &names = isNamed(a) ? a : b, &x = isNamed(a) ? b : a;
     for (const double power : usablePowers(x))
-      forms.push_back(form(fmt::format("{} for each {}", wordOf(x, power), names.name), {names, x}, switched,
+      forms.push_back(form(fmt::format("{} for each {}", powerInWords(x, power), names.name), {names, x}, switched,
                            {}, {power}));
     return forms;
   }
   for (const double p : usablePowers(a)) {
     for (const double q : usablePowers(b)) {
-      const std::string name = wordOf(a, p) + " · " + wordOf(b, q);
+      const std::string name = powerInWords(a, p) + " · " + powerInWords(b, q);
       forms.push_back(form(name, {a, b}, product, {}, {p, q, 0.0, 0.0}));
       if (p != 1.0 || q != 1.0) continue;
-      forms.push_back(form(name + " + " + wordOf(b, q), {a, b}, product, {}, {p, q, 0.0, 1.0}));
-      forms.push_back(form(name + " + " + wordOf(a, p), {a, b}, product, {}, {p, q, 1.0, 0.0}));
+      forms.push_back(form(name + " + " + powerInWords(b, q), {a, b}, product, {}, {p, q, 0.0, 1.0}));
+      forms.push_back(form(name + " + " + powerInWords(a, p), {a, b}, product, {}, {p, q, 1.0, 0.0}));
       forms.push_back(form(name + " + both", {a, b}, product, {}, {p, q, 1.0, 1.0}));
     }
   }
@@ -214,7 +214,7 @@ std::vector<Form> formsIn(const CovariateInfo& a, const CovariateInfo& b) {
     if (x.nature != Nature::Time) continue;
     const double origin = least(x) >= 0.0 && least(x) < span(x) ? 0.0 : least(x);
     for (const double q : usablePowers(y)) {
-      forms.push_back(form(fmt::format("exponential in {} · {}", x.name, wordOf(y, q)), {x, y}, decayTimes,
+      forms.push_back(form(fmt::format("exponential in {} · {}", x.name, powerInWords(y, q)), {x, y}, decayTimes,
                            {{geometric(span(x) / 20.0, 2.0 * span(x), 8), true, 1}}, {origin, q}));
     }
   }

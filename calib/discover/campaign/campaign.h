@@ -105,6 +105,9 @@ struct TracedCapture {
   Image<std::uint8_t> is_edge;  ///< next to a jump of range, or of what is painted on it
 };
 
+/// What differs by more is another surface or another period of the phase: a matter of the masks.
+inline constexpr float kGross_m = 0.3F;
+
 inline constexpr double kPosePrior_m = 1e-3, kPosePrior_deg = 0.1, kGainPrior = 0.01;
 
 /// Captures with light of their scenes, traced twice.

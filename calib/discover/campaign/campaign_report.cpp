@@ -17,7 +17,7 @@ namespace {
 using compare::Json;
 using compare::shown;
 
-std::string stageOf(const Effect& effect) {
+std::string stageInWords(const Effect& effect) {
   return effect.stage ? std::string{discover::nameOf(*effect.stage)} : "not told";
 }
 
@@ -50,7 +50,7 @@ std::vector<FittedNumber> numbersIn(const FoundEffect& one) {
   return numbers;
 }
 
-std::string numbersOf(const FoundEffect& one) {
+std::string numbersInWords(const FoundEffect& one) {
   if (!one.fitted) return "the simulator has no form for it; it is not in model.toml";
   std::vector<std::string> words;
   for (const FittedNumber& number : numbersIn(one))
@@ -70,8 +70,8 @@ compare::TableBlock effectTable(const CampaignFinding& finding) {
       {"effect", "acts on", "goes with", "numbers", "gain", "again"},
       {}};
   for (const FoundEffect& one : finding.effects) {
-    table.rows.push_back({titleOf(one.found), stageOf(one.found),
-                          fmt::format("{}", fmt::join(one.found.covariates, ", ")), numbersOf(one),
+    table.rows.push_back({titleOf(one.found), stageInWords(one.found),
+                          fmt::format("{}", fmt::join(one.found.covariates, ", ")), numbersInWords(one),
                           compare::shownWithError(one.found.gain.mean, one.found.gain.error, 0),
                           compare::shownPercent(one.found.frequency)});
   }
@@ -196,7 +196,7 @@ Json toJson(const RangeErrors& errors) {
 Json toJson(const FoundEffect& one) {
   Json json = Json::object(), numbers = Json::array();
   json.set("name", one.found.name).set("kind", one.found.is_catalogue ? "catalogue" : "undeclared");
-  json.set("stage", stageOf(one.found)).set("covariates", Json::arrayOf(one.found.covariates));
+  json.set("stage", stageInWords(one.found)).set("covariates", Json::arrayOf(one.found.covariates));
   json.set("is_rest", one.found.is_rest);
   json.set("p", one.found.p)
       .set("gain", one.found.gain.mean)

@@ -94,7 +94,7 @@ constexpr double kNothing = 1e-3;
 
 /// Takes a variation in if it shows, and if none so far shows the same; its step is made smaller
 /// until the change is small.
-struct Gatherer {
+struct VariationGatherer {
   const Sensitivity& probe;
   std::vector<Variation> kept{};
   std::vector<std::vector<double>> directions{};  ///< of the kept ones, orthonormal
@@ -173,13 +173,13 @@ bool isNoise(const sim::AnyEffect& effect) {
 }
 
 /// An effect's numbers by what they are for.
-struct Roles {
+struct NumberRoles {
   std::vector<EffectNumber> strengths, others, choosing;
   std::vector<double> typical;  ///< of the strengths, in the defaults
 };
 
-Roles rolesOf(const sim::AnyEffect& none, const sim::AnyEffect& defaults) {
-  Roles roles;
+NumberRoles numberRolesOf(const sim::AnyEffect& none, const sim::AnyEffect& defaults) {
+  NumberRoles roles;
   const auto off = numbersOf(none), on = numbersOf(defaults);
   for (const EffectNumber& number : off) {
     const auto found = std::ranges::find(on, number.key, &EffectNumber::key);
@@ -200,7 +200,7 @@ Roles rolesOf(const sim::AnyEffect& none, const sim::AnyEffect& defaults) {
 
 /// The defaults with all their strengths at 0, where `none` lacks a list that they have.
 sim::AnyEffect quiet(const sim::AnyEffect& none, const sim::AnyEffect& defaults,
-                     const Roles& roles) {
+                     const NumberRoles& roles) {
   const auto off = numbersOf(none);
   const bool lacks = std::ranges::any_of(roles.strengths, [&](const EffectNumber& number) {
     return std::ranges::find(off, number.key, &EffectNumber::key) == off.end();
@@ -211,10 +211,10 @@ sim::AnyEffect quiet(const sim::AnyEffect& none, const sim::AnyEffect& defaults,
   return effect;
 }
 
-void addStrength(Gatherer& gatherer, const sim::AnyEffect& off, const EffectNumber& strength,
+void addStrength(VariationGatherer& gatherer, const sim::AnyEffect& off, const EffectNumber& strength,
                  double typical, const std::vector<EffectNumber>& shapes) {
   // A list's number that is 0 in the defaults is as good as its neighbours.
-  const double from = Gatherer::numberNamed(off, strength.key).value;
+  const double from = VariationGatherer::numberNamed(off, strength.key).value;
   double step = typical - from;
   if (step == 0.0) step = 1.0;
   const auto add = [&](const sim::AnyEffect& base) {
@@ -234,8 +234,8 @@ void addStrength(Gatherer& gatherer, const sim::AnyEffect& off, const EffectNumb
 Candidate candidateOf(const sim::AnyEffect& none, const sim::AnyEffect& defaults,
                       const Sensitivity& probe) {
   Candidate candidate{defaults};
-  const Roles roles = rolesOf(none, defaults);
-  Gatherer gatherer{probe};
+  const NumberRoles roles = numberRolesOf(none, defaults);
+  VariationGatherer gatherer{probe};
   for (const sim::AnyEffect& off : choicesOf(quiet(none, defaults, roles), roles.choosing)) {
     std::vector<EffectNumber> shapes;
     for (const EffectNumber& other : roles.others) {
@@ -269,7 +269,7 @@ sim::AnyEffect withNumber(const sim::AnyEffect& effect, const std::string& key, 
 bool isStrength(const sim::AnyEffect& effect, const std::string& key) {
   return std::visit(
       [&]<class E>(const E&) {
-        const Roles roles = rolesOf(sim::AnyEffect{E::none()}, sim::AnyEffect{E{}});
+        const NumberRoles roles = numberRolesOf(sim::AnyEffect{E::none()}, sim::AnyEffect{E{}});
         if (std::ranges::find(roles.strengths, key, &EffectNumber::key) != roles.strengths.end()) return true;
         // A list may be longer than in the defaults.
         return key.ends_with("]") && std::ranges::any_of(roles.strengths, [&](const EffectNumber& number) {
@@ -325,7 +325,7 @@ std::vector<Candidate> candidatesOf(const Sensitivity& probe,
 Candidate declaredCandidate(const sim::AnyEffect& effect, const Sensitivity& probe) {
   Candidate candidate{effect};
   if (isNoise(effect)) return candidate;
-  Gatherer gatherer{probe};
+  VariationGatherer gatherer{probe};
   for (const EffectNumber& number : numbersOf(effect)) {
     if (number.is_whole) continue;
     double step = number.value != 0.0 ? 0.1 * number.value : stepWithin(number);

@@ -9,8 +9,6 @@ namespace {
 
 /// Noise is never taken for less: rounding, and what a model of a lens knows.
 constexpr double kLeastRange_m = 2e-5, kLeastLog = 2e-4;
-/// What differs by more is another surface or another period of the phase: a matter of the masks.
-constexpr float kGross_m = 0.3F;
 
 struct CellSize {
   int width = 1, height = 1;

@@ -13,7 +13,7 @@
 namespace toftwin::discover {
 namespace {
 
-struct Gatherer {
+struct CovariateGatherer {
   const Cells& cells;
   CaptureCovariates all{};
   std::vector<Eigen::VectorXf> columns{};
@@ -41,7 +41,7 @@ struct Gatherer {
   }
 };
 
-void addMoment(const MeasuredCapture& capture, Gatherer& gatherer) {
+void addMoment(const MeasuredCapture& capture, CovariateGatherer& gatherer) {
   const Moment& moment = capture.moment;
   const auto known = [](const auto& value, auto unit) { return value ? value->in(unit) : kNaN; };
   gatherer.add("time_s", known(moment.since_power_on, second));
@@ -55,7 +55,7 @@ void addMoment(const MeasuredCapture& capture, Gatherer& gatherer) {
                                   : moment.exposures.front().duration.in(microsecond));
 }
 
-void addPlaces(const CameraInfo& camera, const sim::Truth& truth, Gatherer& gatherer) {
+void addPlaces(const CameraInfo& camera, const sim::Truth& truth, CovariateGatherer& gatherer) {
   Image<float> column(camera.width, camera.height), row = column, radius = column,
                                                     incidence = column;
   for (int y = 0; y < camera.height; ++y) {
@@ -77,7 +77,7 @@ void addPlaces(const CameraInfo& camera, const sim::Truth& truth, Gatherer& gath
 
 /// How much brighter than itself a pixel's surroundings are, at three scales: what scatters in the
 /// lens.
-void addSurroundings(const Reading& declared, Gatherer& gatherer) {
+void addSurroundings(const Reading& declared, CovariateGatherer& gatherer) {
   Image<float> amplitude = declared.log_amplitude;
   for (float& value : amplitude.pixels()) value = std::exp(value);
   const auto add = [&](std::string name, int reach) {
@@ -91,30 +91,30 @@ void addSurroundings(const Reading& declared, Gatherer& gatherer) {
   add("surround_all", std::max(amplitude.width(), amplitude.height()));
 }
 
-struct Known {
+struct KnownCovariate {
   std::string_view name, word, unit;
   Nature nature;
   Stage stage;
 };
-constexpr std::array kKnown{Known{"time_s", "time", "s", Nature::Time, Stage::Range},
-                            Known{"ambient_klx", "ambient", "klx", Nature::Plain, Stage::Range},
-                            Known{"exposure_us", "exposure", "us", Nature::Plain, Stage::Range},
-                            Known{"range_m", "range", "m", Nature::Distance, Stage::Range},
-                            Known{"amplitude_e", "amplitude", "e", Nature::Plain, Stage::Range},
-                            Known{"column", "position", "px", Nature::Plain, Stage::Range},
-                            Known{"row", "position", "px", Nature::Plain, Stage::Range},
-                            Known{"radius_px", "position", "px", Nature::Plain, Stage::Range},
-                            Known{"incidence", "incidence", "", Nature::Plain, Stage::Range},
-                            Known{"surround_4px", "neighbours", "", Nature::Plain, Stage::Range},
-                            Known{"surround_16px", "neighbours", "", Nature::Plain, Stage::Range},
-                            Known{"surround_all", "neighbours", "", Nature::Plain, Stage::Range}};
+constexpr std::array kKnownCovariates{KnownCovariate{"time_s", "time", "s", Nature::Time, Stage::Range},
+                            KnownCovariate{"ambient_klx", "ambient", "klx", Nature::Plain, Stage::Range},
+                            KnownCovariate{"exposure_us", "exposure", "us", Nature::Plain, Stage::Range},
+                            KnownCovariate{"range_m", "range", "m", Nature::Distance, Stage::Range},
+                            KnownCovariate{"amplitude_e", "amplitude", "e", Nature::Plain, Stage::Range},
+                            KnownCovariate{"column", "position", "px", Nature::Plain, Stage::Range},
+                            KnownCovariate{"row", "position", "px", Nature::Plain, Stage::Range},
+                            KnownCovariate{"radius_px", "position", "px", Nature::Plain, Stage::Range},
+                            KnownCovariate{"incidence", "incidence", "", Nature::Plain, Stage::Range},
+                            KnownCovariate{"surround_4px", "neighbours", "", Nature::Plain, Stage::Range},
+                            KnownCovariate{"surround_16px", "neighbours", "", Nature::Plain, Stage::Range},
+                            KnownCovariate{"surround_all", "neighbours", "", Nature::Plain, Stage::Range}};
 
 }  // namespace
 
 CaptureCovariates covariatesOf(const MeasuredCapture& capture, const TracedCapture& traced,
                                const Reading& declared, const CameraInfo& camera,
                                const Cells& cells) {
-  Gatherer gatherer{cells};
+  CovariateGatherer gatherer{cells};
   addMoment(capture, gatherer);
   gatherer.add("range_m", declared.range_m);
   Image<float> amplitude = declared.log_amplitude;
@@ -127,7 +127,7 @@ CaptureCovariates covariatesOf(const MeasuredCapture& capture, const TracedCaptu
 
 std::string_view wordOf(std::string_view covariate) {
   if (const auto word = wordOfCarrier(covariate); !word.empty()) return word;
-  for (const Known& known : kKnown) {
+  for (const KnownCovariate& known : kKnownCovariates) {
     if (known.name == covariate) return known.word;
   }
   return covariate.starts_with("temperature_") ? "temperature" : covariate;
@@ -135,7 +135,7 @@ std::string_view wordOf(std::string_view covariate) {
 
 CovariateInfo describe(const std::string& name) {
   CovariateInfo info{.name = name};
-  for (const Known& known : kKnown) {
+  for (const KnownCovariate& known : kKnownCovariates) {
     if (known.name == name)
       info.unit = known.unit, info.nature = known.nature, info.stage = known.stage;
   }

@@ -117,13 +117,13 @@ std::vector<std::size_t> wrongNumbers(const Evidence& evidence, const Finding& f
 }
 
 /// The effects without noise, with what was found in them.
-struct Inserted {
+struct WithFound {
   std::vector<sim::AnyEffect> effects;
   std::vector<std::size_t> fitted;  ///< places of those whose numbers are to be fitted
   std::map<std::size_t, std::vector<std::string>> only{};  ///< of those that were found, the numbers
 };
 
-std::size_t insert(Inserted& inserted, const sim::AnyEffect& effect) {
+std::size_t insert(WithFound& inserted, const sim::AnyEffect& effect) {
   const auto behind = std::ranges::find_if(inserted.effects, [&](const sim::AnyEffect& other) {
     return placeOf(other) > placeOf(effect);
   });
@@ -136,9 +136,9 @@ std::size_t insert(Inserted& inserted, const sim::AnyEffect& effect) {
   return place;
 }
 
-Inserted insertFound(const CampaignRows& rows, const Declared& declared,
+WithFound insertFound(const CampaignRows& rows, const Declared& declared,
                      const std::vector<std::size_t>& updates, CampaignFinding& finding) {
-  Inserted inserted{effectsWithoutNoise(declared.model), updates};
+  WithFound inserted{effectsWithoutNoise(declared.model), updates};
   std::vector<const NamedFit*> fits;
   for (const Effect& effect : finding.finding.effects)
     if (effect.fit) fits.push_back(effect.fit.get());
@@ -344,7 +344,7 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
     if (!effect.is_catalogue) terms.push_back({effect.name, Kind::Generic, termsOf(effect), 0});
   }
   const auto updates = wrongNumbers(rows->evidence(terms), finding.finding, as_declared);
-  Inserted inserted = insertFound(*rows, declared, updates, finding);
+  WithFound inserted = insertFound(*rows, declared, updates, finding);
   const auto refitted = refit(*rows, inserted.effects, inserted.fitted,
                               {.scales = finding.finding.scales, .only = inserted.only});
   if (!refitted) return refitted.error();

@@ -80,7 +80,6 @@ struct Errors {
 };
 Errors errorsOf(const MeasuredCapture& capture, const TracedCapture& traced,
                 const Reading& simulated, double offset_mm) {
-  constexpr float kGross_m = 0.3F;
   Errors errors;
   const int width = simulated.range_m.width(), height = simulated.range_m.height();
   Image<float> left(width, height, std::numeric_limits<float>::quiet_NaN());

@@ -35,7 +35,7 @@ std::optional<Over> overOf(const std::string& covariate) {
 }
 
 /// Where the table has knots: the covariate's levels, or evenly over it and where its values lie.
-std::vector<double> knotsOf(const CovariateInfo& covariate, std::size_t even) {
+std::vector<double> tableKnotsOf(const CovariateInfo& covariate, std::size_t even) {
   if (!covariate.levels.empty()) return covariate.levels;
   std::vector<double> knots = covariate.quantiles;
   const double low = knots.front(), high = knots.back();
@@ -47,7 +47,7 @@ std::vector<double> knotsOf(const CovariateInfo& covariate, std::size_t even) {
   return knots;
 }
 
-const CovariateInfo* find(std::span<const CovariateInfo> covariates, const std::string& name) {
+const CovariateInfo* infoNamed(std::span<const CovariateInfo> covariates, const std::string& name) {
   const auto found = std::ranges::find(covariates, name, &CovariateInfo::name);
   return found == covariates.end() ? nullptr : &*found;
 }
@@ -98,15 +98,15 @@ std::optional<sim::AnyEffect> tableOf(const Along& along, std::span<const Covari
   std::array<const CovariateInfo*, 2> info{};
   std::array<Over, 2> over{};
   for (std::size_t i = 0; i < along.covariates.size(); ++i) {
-    info[i] = find(covariates, along.covariates[i]);
+    info[i] = infoNamed(covariates, along.covariates[i]);
     const auto known = overOf(along.covariates[i]);
     if (info[i] == nullptr || !known) return std::nullopt;
     over[i] = *known;
   }
   const bool has_two = along.covariates.size() == 2;
   sim::LearnedRange learned{
-      .over = over[0], .knots = knotsOf(*info[0], has_two ? 24 : 256), .offsets_mm = {}};
-  if (has_two) learned.and_over = over[1], learned.and_knots = knotsOf(*info[1], 24);
+      .over = over[0], .knots = tableKnotsOf(*info[0], has_two ? 24 : 256), .offsets_mm = {}};
+  if (has_two) learned.and_over = over[1], learned.and_knots = tableKnotsOf(*info[1], 24);
   for (const double x : learned.knots) {
     for (const double y : has_two ? learned.and_knots : std::vector{0.0}) {
       const auto at = [&](const std::string& name) { return name == along.covariates[0] ? x : y; };

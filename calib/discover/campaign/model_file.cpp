@@ -27,7 +27,7 @@ std::vector<std::string> linesOf(std::string_view text) {
   return lines;
 }
 
-std::string trimmed(const std::string& line) {
+std::string withoutIndent(const std::string& line) {
   const auto first = line.find_first_not_of(" \t");
   return first == std::string::npos ? "" : line.substr(first);
 }
@@ -63,7 +63,7 @@ std::string withEffects(std::string_view camera_file, const std::vector<sim::Any
     }
   };
   for (const std::string& line : linesOf(camera_file)) {
-    const std::string word = trimmed(line);
+    const std::string word = withoutIndent(line);
     if (word.starts_with("[[effect]]")) {
       if (effect < declared.size()) writeBefore(placeOf(declared[effect]));
       is_replaced = effect < updates.size() && updates[effect].has_value();

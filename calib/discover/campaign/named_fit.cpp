@@ -32,8 +32,8 @@ Columns allBut(const Marginal& marginal, std::size_t last) {
 
 /// By cross-validation, with the numbers' derivatives where the fit is: each fold moves them to where
 /// the other folds want them.
-Gain gainOf(const std::vector<double>& before, const Marginal& after) {
-  return discover::gainOf(before, heldOut(after, allBut(after, 0)));
+Gain gainBeyond(const std::vector<double>& before, const Marginal& after) {
+  return gainOf(before, heldOut(after, allBut(after, 0)));
 }
 
 }  // namespace
@@ -103,7 +103,7 @@ std::vector<NamedFit> CampaignRows::fitNamed(std::span<const std::string> names,
       fitted.keys.push_back(number.key);
     }
     fit.is_at_bound = isAtBound(fitted.effect, fitted.keys);
-    fit.gain = gainOf(before, refitted->marginal);
+    fit.gain = gainBeyond(before, refitted->marginal);
     fit.effect = std::move(fitted);
     fits.push_back(std::move(fit));
   }

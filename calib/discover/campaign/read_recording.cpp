@@ -16,7 +16,7 @@
 namespace toftwin::discover {
 namespace {
 
-constexpr std::size_t kMostCaptures = 150;  ///< of frames that all belong together: so many captures
+constexpr std::size_t kMostOfARecording = 150;  ///< of frames that all belong together: so many captures
 constexpr std::size_t kFewestFrames = 16;   ///< that such a capture has
 constexpr std::size_t kEachLocked = 5;      ///< one in five captures is put aside
 constexpr std::int64_t kSameTime_ns =
@@ -145,7 +145,7 @@ class Cutter {
 Result<Cutter> cut(const std::filesystem::path& file, const std::vector<Pose>& poses) {
   auto reader = record::Reader::open(file);
   if (!reader) return reader.error();
-  Cutter cutter{file.filename().string(), std::max(kFewestFrames, poses.size() / kMostCaptures)};
+  Cutter cutter{file.filename().string(), std::max(kFewestFrames, poses.size() / kMostOfARecording)};
   std::optional<std::int64_t> began_ns;
   for (const Pose& pose : poses) {
     auto frame = reader->next();

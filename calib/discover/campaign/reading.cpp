@@ -11,7 +11,7 @@
 namespace toftwin::discover {
 namespace {
 
-Reading readingOf(const sim::RangeImage& image) {
+Reading asReading(const sim::RangeImage& image) {
   Reading reading{image.range_m, Image<float>(image.range_m.width(), image.range_m.height(), kNaN)};
   for (std::size_t i = 0; i < image.range_m.size(); ++i) {
     if (!(image.range_m[i] > 0.0F)) reading.range_m[i] = kNaN;
@@ -109,7 +109,7 @@ Reading NoiselessCamera::read(const MeasuredCapture& capture, const sim::Samples
     const sim::RangeImage before = std::move(exposed.range);
     exposed = model.readOut(collected, moment, 0, 0, 0, 0, {&collected, &before});
   }
-  return readingOf(exposed.range);
+  return asReading(exposed.range);
 }
 
 }  // namespace toftwin::discover

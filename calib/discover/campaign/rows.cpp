@@ -19,9 +19,6 @@
 namespace toftwin::discover {
 namespace {
 
-constexpr std::size_t kRange = static_cast<std::size_t>(Channel::Range);
-constexpr std::size_t kLog = static_cast<std::size_t>(Channel::LogAmplitude);
-
 /// What the simulation says with other effects than the declared ones.
 struct Variant {
   NoiselessCamera camera;

@@ -26,6 +26,8 @@ namespace toftwin::discover {
 /// down.
 enum class Channel { Range, LogAmplitude };
 inline constexpr std::size_t kChannels = 2;
+inline constexpr auto kRange = static_cast<std::size_t>(Channel::Range),
+                      kLog = static_cast<std::size_t>(Channel::LogAmplitude);
 
 /// How an image is divided into cells.
 struct CellGrid {

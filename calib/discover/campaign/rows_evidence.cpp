@@ -15,9 +15,6 @@
 namespace toftwin::discover {
 namespace {
 
-constexpr std::size_t kRange = static_cast<std::size_t>(Channel::Range);
-constexpr std::size_t kLog = static_cast<std::size_t>(Channel::LogAmplitude);
-
 /// Values of factors at a capture's cells, each computed once.
 class Factors {
  public:

@@ -21,7 +21,7 @@ namespace {
 constexpr double kQuieter = 0.3;
 
 /// Where the camera is if it stands that much off.
-Transform<World, Camera> moved(const Transform<World, Camera>& world_from_camera,
+Transform<World, Camera> movedBy(const Transform<World, Camera>& world_from_camera,
                                const Stood& stood) {
   constexpr double kTurn = kPosePrior_deg * std::numbers::pi / 180.0;
   Transform<Camera, Camera> by = rotation<Camera, Camera>({1.0, 0.0, 0.0}, kTurn * stood[3]) *
@@ -102,7 +102,7 @@ void addMoves(const sim::Scene& scene, const sim::TraceRequest& request, TracedC
   for (std::size_t way = 0; way < traced.range_m.size(); ++way) {
     Stood one{};
     one[way] = 1.0;
-    const sim::Light there = directLight(scene, request, moved(request.world_from_camera, one));
+    const sim::Light there = directLight(scene, request, movedBy(request.world_from_camera, one));
     Image<float> range_m(here.width(), here.height()), log(here.width(), here.height());
     for (std::size_t i = 0; i < range_m.size(); ++i) {
       range_m[i] = there.truth.range_m[i] - here.truth.range_m[i];
@@ -157,7 +157,7 @@ Result<std::vector<std::shared_ptr<const TracedCapture>>> traceAll(
     const sim::Scene& scene = declared.sceneOf(capture.record.block);
     sim::TraceRequest request = declared.model.traceRequest();
     const Stood here = stood.empty() ? Stood{} : stood[sites[s].first];
-    request.world_from_camera = moved(*capture.moment.world_from_camera, here);
+    request.world_from_camera = movedBy(*capture.moment.world_from_camera, here);
     request.sampler =
         sim::Sampler::Even;  // what tiles share would look like a pattern of the camera
     request.samples_per_pixel = options.samples_per_pixel;

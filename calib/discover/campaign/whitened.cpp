@@ -6,11 +6,9 @@
 namespace toftwin::discover {
 namespace {
 
-constexpr std::size_t kRange = static_cast<std::size_t>(Channel::Range);
-constexpr std::size_t kLog = static_cast<std::size_t>(Channel::LogAmplitude);
 constexpr float kMillimetre = 1e-3F, kPercent = 1e-2F;
 
-Image<float> difference(const Image<float>& a, const Image<float>& b) {
+Image<float> minus(const Image<float>& a, const Image<float>& b) {
   Image<float> result = a;
   for (std::size_t i = 0; i < result.size(); ++i) result[i] -= b[i];
   return result;
@@ -51,7 +49,7 @@ void WhitenedCapture::put(const Cells& cells, std::size_t column, const Reading&
 void WhitenedCapture::putChange(const Cells& cells, std::size_t column, const Reading& from,
                                 const Reading& to) {
   put(cells, column,
-      {difference(to.range_m, from.range_m), difference(to.log_amplitude, from.log_amplitude)});
+      {minus(to.range_m, from.range_m), minus(to.log_amplitude, from.log_amplitude)});
 }
 
 void WhitenedCapture::putCommon(const Cells& cells, const TracedCapture& traced) {
@@ -68,10 +66,10 @@ void WhitenedCapture::putCommon(const Cells& cells, const TracedCapture& traced)
 void WhitenedCapture::putResidual(const Cells& cells, const MeasuredCapture& capture,
                                   const TracedCapture& traced, const Reading& simulated) {
   residual[kRange] =
-      cells.whitened(Channel::Range, difference(capture.range_m.mean, simulated.range_m));
+      cells.whitened(Channel::Range, minus(capture.range_m.mean, simulated.range_m));
   if (cells.has(Channel::LogAmplitude)) {
     residual[kLog] = cells.whitened(
-        Channel::LogAmplitude, difference(capture.log_amplitude.mean, simulated.log_amplitude));
+        Channel::LogAmplitude, minus(capture.log_amplitude.mean, simulated.log_amplitude));
   }
   for (std::size_t c = 0; c < kChannels; ++c) {
     if (!cells.has(static_cast<Channel>(c))) continue;
@@ -85,11 +83,11 @@ void WhitenedCapture::putResidual(
     const Cells& cells, const std::array<Eigen::VectorXf, kChannels>& residual_before,
     const Reading& from, const Reading& to) {
   residual[kRange] = residual_before[kRange] -
-                     cells.whitened(Channel::Range, difference(to.range_m, from.range_m));
+                     cells.whitened(Channel::Range, minus(to.range_m, from.range_m));
   if (cells.has(Channel::LogAmplitude))
     residual[kLog] = residual_before[kLog] -
                      cells.whitened(Channel::LogAmplitude,
-                                    difference(to.log_amplitude, from.log_amplitude));
+                                    minus(to.log_amplitude, from.log_amplitude));
 }
 
 CaptureEvidence WhitenedCapture::evidence(std::string name, std::string block) const {
