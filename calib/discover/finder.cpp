@@ -212,6 +212,11 @@ class Search {
     return context_.original->named()->including(plain, true);
   }
 
+  /// The same of some of those that are included.
+  std::shared_ptr<const RowSource> sourceOf(const std::vector<std::shared_ptr<const NamedFit>>& some) const {
+    return some.size() == context_.included.size() ? context_.source : sourceWith(some);
+  }
+
   /// What is left goes with the covariates of an effect that is known: its shape was not it. Another single
   /// shape, if one does as well as both together; else their sum.
   void reshape(Effect& effect, const Effect& more) {
@@ -304,7 +309,7 @@ class Search {
       double smallest = 2.0;
       for (std::size_t i = 0; i < finding_.effects.size(); ++i) {
         if (finding_.effects[i].is_catalogue && !finding_.effects[i].fit) continue;
-        const Difference gain = gainAmongOthers(i);
+        const Difference gain = against0(gainBeside(i, {i}));
         const double z = gain.mean / std::max(gain.error, 1e-9);
         if (gain.mean < 4.0 || z < smallest) smallest = std::min(z, smallest), least = i;
       }
@@ -316,8 +321,8 @@ class Search {
 
   /// One cause, one effect. A form without a name describes its cause to first order and along its own covariates
   /// alone. What that leaves goes with something else, and needs no cause of its own while it is less than a quarter
-  /// of what the form explains: it stays in the model, as the rest of that effect. An effect that is named for certain
-  /// describes itself, and leaves nothing.
+  /// of what the form explains and both share a part: it stays in the model, as the rest of that effect. An effect that
+  /// is named for certain describes itself, and leaves nothing.
   void markRests() {
     constexpr double kRest = 0.25;
     const auto mayBeUndeclared = [](const Effect& effect) {
@@ -329,35 +334,48 @@ class Search {
     };
     std::vector<double> gains;
     for (std::size_t i = 0; i < finding_.effects.size(); ++i) {
-      Effect& effect = finding_.effects[i];
-      gains.push_back(effect.is_catalogue && !effect.fit ? effect.gain.mean : gainAmongOthers(i).mean);
+      const Effect& effect = finding_.effects[i];
+      gains.push_back(effect.is_catalogue && !effect.fit ? effect.gain.mean : gainBeside(i, {i}).total);
     }
     for (std::size_t i = 0; i < gains.size(); ++i) {
       for (std::size_t k = 0; k < gains.size(); ++k) {
         if (i == k || !mayBeUndeclared(finding_.effects[i]) || !isApproximate(finding_.effects[k])) continue;
-        if (gains[i] < kRest * gains[k]) finding_.effects[i].is_rest = true;
+        if (gains[i] < kRest * gains[k] && shareAPart(i, k)) finding_.effects[i].is_rest = true;
       }
     }
     std::ranges::stable_sort(finding_.effects, {}, &Effect::is_rest);  // behind what they are the rest of
   }
 
-  Difference gainAmongOthers(std::size_t which) {
-    std::vector<Effect> others = finding_.effects;
-    others.erase(others.begin() + static_cast<std::ptrdiff_t>(which));
-    Context without = context_;
-    without.known = groupsOf(others);
-    if (finding_.effects[which].fit) {
+  /// Whether the stronger one takes from the other what both explain: on captures that it was not fitted to, the
+  /// other predicts more without it than beside it. What has a cause of its own loses nothing.
+  [[nodiscard]] bool shareAPart(std::size_t weaker, std::size_t stronger) const {
+    const Difference lost = difference(gainBeside(weaker, {weaker, stronger}), gainBeside(weaker, {weaker}));
+    return lost.mean > 2.0 * lost.error;
+  }
+
+  /// What an effect explains of held-out captures beside all but those at `without`.
+  [[nodiscard]] Gain gainBeside(std::size_t which, const std::set<std::size_t>& without) const {
+    std::vector<Effect> others;
+    for (std::size_t i = 0; i < finding_.effects.size(); ++i)
+      if (!without.contains(i)) others.push_back(finding_.effects[i]);
+    Context beside = context_;
+    beside.known = groupsOf(others);
+    auto fits = fitsOf(others);
+    beside.source = sourceOf(fits);
+    const Effect& effect = finding_.effects[which];
+    if (effect.fit) {
       const auto left = [&](const RowSource& source) {
-        const Marginal marginal = marginalise(source.withoutCatalogue(without.known), without.scales);
-        return heldOut(marginal, modelOf(without, marginal, without.known.size()));
+        const Marginal marginal = marginalise(source.withoutCatalogue(beside.known), beside.scales);
+        return heldOut(marginal, modelOf(beside, marginal, beside.known.size()));
       };
-      return against0(gainOf(left(*sourceWith(fitsOf(others))), left(*context_.source)));
+      const auto before = left(*beside.source);
+      fits.push_back(effect.fit);
+      return gainOf(before, left(*sourceOf(fits)));
     }
-    std::vector<TermGroup> extra = without.known;
-    extra.push_back({"this", Kind::Generic, termsOf(finding_.effects[which]), 0});
-    const Marginal marginal = marginalise(evidenceOf(without, extra), without.scales);
-    const Columns model = modelOf(without, marginal, extra.size());
-    return against0(crossValidate(marginal, model, {marginal.groups.size() - 1}).front());
+    std::vector<TermGroup> extra = beside.known;
+    extra.push_back({"this", Kind::Generic, termsOf(effect), 0});
+    const Marginal marginal = marginalise(evidenceOf(beside, extra), beside.scales);
+    return crossValidate(marginal, modelOf(beside, marginal, extra.size()), {marginal.groups.size() - 1}).front();
   }
 
   double dispersionNow() const {

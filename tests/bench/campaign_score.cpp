@@ -61,7 +61,7 @@ std::vector<std::string> fieldsOf(const std::string& line) {
   return fields;
 }
 
-constexpr std::size_t kFields = 18;
+constexpr std::size_t kFields = 19;
 
 std::optional<Score> readScore(const std::string& line) {
   const auto fields = fieldsOf(line);
@@ -72,8 +72,9 @@ std::optional<Score> readScore(const std::string& line) {
   score.p = number(6), score.is_detected = number(7) > 0.5, score.is_right = number(8) > 0.5;
   score.is_alone = number(9) > 0.5, score.is_blamed = number(10) > 0.5;
   score.has_covariates = number(11) > 0.5, score.has_stage = number(12) > 0.5;
-  score.spurious = static_cast<int>(number(13)), score.removed = number(14);
-  score.before_mm = number(15), score.after_mm = number(16), score.seconds = number(17);
+  score.spurious = static_cast<int>(number(13)), score.rests = static_cast<int>(number(14));
+  score.removed = number(15);
+  score.before_mm = number(16), score.after_mm = number(17), score.seconds = number(18);
   for (std::size_t i = kFields; i < fields.size(); ++i)
     score.found += (i > kFields ? "," : "") + fields[i];
   return score;
@@ -85,21 +86,21 @@ double shareOf(const std::vector<Score>& scores, bool Score::*of) {
 }
 
 std::string rowOf(const std::string& what, const std::vector<Score>& scores, bool is_null, bool is_absent) {
-  double spurious = 0.0;
+  double spurious = 0.0, rests = 0.0;
   std::vector<double> removed;
   for (const Score& one : scores) {
-    spurious += one.spurious;
+    spurious += one.spurious, rests += one.rests;
     if (std::isfinite(one.removed)) removed.push_back(one.removed);
   }
   const auto n = static_cast<double>(scores.size());
   const auto share = [](double value) { return fmt::format("{:.2f}", value); };
   const bool has_removed = !is_null && !is_absent && !removed.empty();
-  return fmt::format("| {} | {} | {} | {} | {} | {} | {} | {:.2f} | {} | {} |\n", what, scores.size(),
+  return fmt::format("| {} | {} | {} | {} | {} | {} | {} | {:.2f} | {:.2f} | {} | {} |\n", what, scores.size(),
                      fmt::format("{:.3f}", shareOf(scores, &Score::is_detected)),
                      is_null || is_absent ? "" : share(shareOf(scores, &Score::is_right)),
                      is_null || is_absent ? "" : share(shareOf(scores, &Score::is_alone)),
                      is_absent ? share(1.0 - shareOf(scores, &Score::is_blamed)) : "",
-                     is_absent ? share(shareOf(scores, &Score::has_covariates)) : "", spurious / n,
+                     is_absent ? share(shareOf(scores, &Score::has_covariates)) : "", spurious / n, rests / n,
                      has_removed ? share(compare::quantile(removed, 0.5)) : "",
                      has_removed ? share(compare::quantile(removed, 0.1)) : "");
 }
@@ -136,7 +137,7 @@ Score scoreOf(const Case& of, const sim::AnyEffect* hidden, const CampaignFindin
     score.before_mm = finding.judgement->before.rms_mm, score.after_mm = finding.judgement->after.rms_mm;
   }
   score.spurious = static_cast<int>(finding.updates.size());
-  for (const FoundEffect& one : finding.effects) score.spurious += one.found.is_rest ? 0 : 1;
+  for (const FoundEffect& one : finding.effects) ++score.spurious, score.rests += one.found.is_rest ? 1 : 0;
   if (hidden == nullptr) return score;
   bool is_met = false;
   for (const FoundEffect& one : finding.effects) {
@@ -157,16 +158,16 @@ Score scoreOf(const Case& of, const sim::AnyEffect* hidden, const CampaignFindin
 
 std::string header() {
   return "row,hidden,lambda_wanted,lambda,seed,absent,p,detected,named,named_first,blamed,covariates,stage,"
-         "spurious,removed,rms_before_mm,rms_after_mm,seconds,found\n";
+         "spurious,rests,removed,rms_before_mm,rms_after_mm,seconds,found\n";
 }
 
 std::string lineOf(const Score& one) {
   const auto yes = [](bool value) { return value ? 1 : 0; };
-  return fmt::format("score,{},{:.0f},{:.1f},{},{},{:.4g},{},{},{},{},{},{},{},{:.4f},{:.4f},{:.4f},{:.1f},{}\n",
+  return fmt::format("score,{},{:.0f},{:.1f},{},{},{:.4g},{},{},{},{},{},{},{},{},{:.4f},{:.4f},{:.4f},{:.1f},{}\n",
                      one.of.hidden, one.of.wanted, one.of.lambda, one.of.seed, yes(one.of.is_absent), one.p,
                      yes(one.is_detected), yes(one.is_right), yes(one.is_alone), yes(one.is_blamed),
-                     yes(one.has_covariates), yes(one.has_stage), one.spurious, one.removed, one.before_mm,
-                     one.after_mm, one.seconds, one.found);
+                     yes(one.has_covariates), yes(one.has_stage), one.spurious, one.rests, one.removed,
+                     one.before_mm, one.after_mm, one.seconds, one.found);
 }
 
 std::string tableOf(const std::vector<std::filesystem::path>& files) {
@@ -192,14 +193,14 @@ std::string tableOf(const std::vector<std::filesystem::path>& files) {
   }
   std::string table =
       "| hidden | runs | detected | named | named first | absent: none blamed | absent: covariates right | "
-      "spurious a run | removed, median | worst tenth |\n|---|---|---|---|---|---|---|---|---|---|\n";
+      "spurious a run | of these rests | removed, median | worst tenth |\n|---|---|---|---|---|---|---|---|---|---|---|\n";
   for (const auto& [key, scores] : groups) {
     const auto& [wanted, is_absent, name] = key;
     table += rowOf(wanted == 0.0 ? name : fmt::format("λ = {:.0f}{}", wanted, is_absent ? ", absent" : ""),
                    scores, wanted == 0.0, is_absent);
   }
-  table += "\nBy effect, all λ:\n\n| hidden | runs | detected | named | named first | | | spurious | removed, "
-           "median | worst tenth |\n|---|---|---|---|---|---|---|---|---|---|\n";
+  table += "\nBy effect, all λ:\n\n| hidden | runs | detected | named | named first | | | spurious | rests | "
+           "removed, median | worst tenth |\n|---|---|---|---|---|---|---|---|---|---|---|\n";
   for (const auto& [name, scores] : by_effect) table += rowOf(name, scores, false, false);
   table += "\nMisses:\n\n| hidden | λ | seed | absent | p | found | removed |\n|---|---|---|---|---|---|---|\n";
   for (const Score& one : misses)

@@ -28,7 +28,8 @@ struct Score {
   bool is_blamed = false;    ///< another effect of the catalogue, without saying that it may be none of it
   bool has_covariates = false;  ///< an undeclared effect that goes with what the hidden one goes with
   bool has_stage = false;
-  int spurious = 0;
+  int spurious = 0;  ///< effects too many, rests of others among them
+  int rests = 0;     ///< what is called the rest of another effect
   double removed = 0.0, before_mm = 0.0, after_mm = 0.0, seconds = 0.0;
   std::string found{};
 };

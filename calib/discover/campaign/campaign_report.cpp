@@ -169,7 +169,8 @@ compare::Section foundSection(const CampaignFinding& finding) {
       "them{}; of what is left p = {:.3g}. Offset of the device against its poses: {}.",
       finding.finding.first_p, finding.finding.score_names.size(), finding.finding.draws,
       finding.finding.by_sign_flips ? " (sign flips of captures)" : "", finding.finding.last_p,
-      compare::shownWithError(finding.offset_mm, finding.offset_error_mm, 2) + " mm")});
+      compare::shownWithError(finding.offset_mm, finding.offset_error_mm, 2) + " mm" +
+          (finding.zero.delay_mm == 0.0 ? "" : fmt::format("; delay of its light: {:.2f} mm", finding.zero.delay_mm)))});
   section.blocks.emplace_back(seenTable(finding));
   if (finding.finding.scales.size() >= 2) {
     section.blocks.emplace_back(compare::Paragraph{
@@ -222,6 +223,7 @@ Json dataOf(const CampaignJob& job, const CampaignFinding& finding) {
       .set("locked", finding.locked);
   data.set("p", finding.finding.first_p).set("p_left", finding.finding.last_p);
   data.set("offset_mm", finding.offset_mm).set("offset_error_mm", finding.offset_error_mm);
+  data.set("delay_of_light_mm", finding.zero.delay_mm);
   data.set("scales", Json::arrayOf(finding.finding.scales)).set("chi2_per_row", finding.dispersion);
   for (const FoundEffect& one : finding.effects) effects.push(toJson(one));
   for (const FittedEffect& one : finding.updates) updates.push(nameOf(one.effect));

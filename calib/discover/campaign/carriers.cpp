@@ -12,13 +12,14 @@
 #include <toftwin/nan.h>
 
 #include "calib/discover/campaign/smoothed.h"
+#include "calib/discover/campaign/catalogue.h"
 #include "calib/discover/candidates.h"
 #include "sim/effects/effects.h"
 
 namespace toftwin::discover {
 namespace {
 
-constexpr std::string_view kNeighbours = "neighbours", kCharge = "charge", kGain = "gain", kStray = "stray";
+constexpr std::string_view kNeighbours = "neighbours";
 /// Half widths of the squares; the last one is the whole image.
 constexpr std::array kReaches{1, 3, 7, 15, 31, 1'000'000};
 
@@ -87,9 +88,9 @@ std::map<std::string, Reading> carriersOf(const sim::SensorModel& model, const R
     all.emplace(fmt::format("{}:quadrature", carrier),
                 changeBy(over(z, [&](std::size_t) { return std::complex{0.0F, electrons}; }), period_m));
   };
-  add(kCharge, electron);
-  add(kStray, electron * static_cast<float>(exposure_us * 1e-3));  // of a millisecond
-  Reading& gain = all[std::string{kGain}];
+  add(kChargeCarrier, electron);
+  add(kStrayCarrier, electron * static_cast<float>(exposure_us * 1e-3));  // of a millisecond
+  Reading& gain = all[std::string{kGainCarrier}];
   gain.range_m = gain.log_amplitude = Image<float>(z.width(), z.height());
   for (float& change : gain.log_amplitude.pixels()) change = 0.01F;
   return all;
@@ -102,6 +103,28 @@ sim::AnyEffect delayInLight(const sim::SensorModel& model, double millimetres) {
   for (std::size_t f = 0; f < std::min(each.size(), frequencies.size()); ++f)
     *each[f] = 2.0 * std::numbers::pi * millimetres * 1e-3 / unambiguousRange(frequencies[f]).in(metre) * radian;
   return offset;
+}
+
+std::vector<sim::AnyEffect> withDelay(const sim::SensorModel& model, std::vector<sim::AnyEffect> effects,
+                                      double millimetres) {
+  if (millimetres == 0.0) return effects;
+  const auto more = std::get<sim::FrequencyOffset>(delayInLight(model, millimetres));
+  for (sim::AnyEffect& effect : effects) {
+    if (auto* own = std::get_if<sim::FrequencyOffset>(&effect)) {
+      own->first += more.first, own->second += more.second, own->third += more.third;
+      return effects;
+    }
+  }
+  return withInserted(std::move(effects), more);
+}
+
+std::vector<sim::AnyEffect> declaredEffects(const Declared& declared) {
+  return withDelay(declared.model, effectsWithoutNoise(declared.model), declared.delay_mm);
+}
+
+bool isOnlyDelay(const Declared& declared, const sim::AnyEffect& effect) {
+  const auto isOffset = [](const sim::AnyEffect& any) { return std::holds_alternative<sim::FrequencyOffset>(any); };
+  return isOffset(effect) && std::ranges::none_of(declared.model.effects(), isOffset);
 }
 
 bool isNoOffset(std::span<const Reading> changes) {
@@ -123,14 +146,14 @@ std::vector<TermGroup> carrierGroups(std::span<const CovariateInfo> covariates, 
   groups.push_back(std::move(light));
   groups.push_back({"stray light, the same in all pixels",
                     Kind::Generic,
-                    {{{}, Stage::Light, fmt::format("{}:in_phase", kStray)},
-                     {{}, Stage::Light, fmt::format("{}:quadrature", kStray)}},
+                    {{{}, Stage::Light, fmt::format("{}:in_phase", kStrayCarrier)},
+                     {{}, Stage::Light, fmt::format("{}:quadrature", kStrayCarrier)}},
                     0});
   const auto add = [&](std::string name, const std::vector<Term>& factors) {
     TermGroup charge{std::move(name), Kind::Generic, {}, 0};
     for (const char* part : {"in_phase", "quadrature"}) {
       for (Term term : factors) {
-        term.stage = Stage::Samples, term.carrier = fmt::format("{}:{}", kCharge, part);
+        term.stage = Stage::Samples, term.carrier = fmt::format("{}:{}", kChargeCarrier, part);
         charge.terms.push_back(std::move(term));
       }
     }
@@ -145,7 +168,7 @@ std::vector<TermGroup> carrierGroups(std::span<const CovariateInfo> covariates, 
     add("a charge that goes with " + covariate.name, factors);
   }
   for (const CovariateInfo& covariate : covariates) {
-    for (const std::string_view carrier : {kGain, kDelayCarrier}) {
+    for (const std::string_view carrier : {kGainCarrier, kDelayCarrier}) {
       if (carrier == kDelayCarrier && !has_delay) continue;
       TermGroup of_light = smoothIn(covariate, kSmoothKnots);
       of_light.name = fmt::format("a {} that is {}", carrier, of_light.name);
@@ -173,7 +196,7 @@ std::vector<TermGroup> pixelGroups(bool has_delay, std::size_t numbers) {
 std::string_view wordOfCarrier(std::string_view carrier) {
   if (carrier == kNeighbours) return "neighbours";
   if (carrier == kPixelCarrier) return "position";
-  return carrier == kCharge || carrier == kStray ? "amplitude" : "";
+  return carrier == kChargeCarrier || carrier == kStrayCarrier ? "amplitude" : "";
 }
 
 }  // namespace toftwin::discover

@@ -28,11 +28,20 @@ std::map<std::string, Reading> carriersOf(const sim::SensorModel& model, const R
 /// `has_delay`: and a delay of the light, where that is another thing than an error of the range.
 std::vector<TermGroup> carrierGroups(std::span<const CovariateInfo> covariates, bool has_delay);
 
+/// Of a gain, of a charge and of stray light; the latter two have the parts ":in_phase" and ":quadrature".
+inline constexpr std::string_view kGainCarrier = "gain", kChargeCarrier = "charge", kStrayCarrier = "stray";
 /// The carrier of a delay in the light, 1 mm of range: it is late before the waveform's harmonics bend the phase,
 /// so that it also moves the cyclic error.
 inline constexpr std::string_view kDelayCarrier = "delay";
 /// That delay as an effect.
 sim::AnyEffect delayInLight(const sim::SensorModel& model, double millimetres);
+/// The effects with a delay more in the light: in a frequency_offset of theirs, or in one more.
+std::vector<sim::AnyEffect> withDelay(const sim::SensorModel& model, std::vector<sim::AnyEffect> effects,
+                                      double millimetres);
+/// What is compared with the measurement: the camera file's effects but noise, with the delay of the light.
+std::vector<sim::AnyEffect> declaredEffects(const Declared& declared);
+/// Whether an effect of that list is nothing but the delay: the camera file has no frequency_offset.
+bool isOnlyDelay(const Declared& declared, const sim::AnyEffect& effect);
 /// Whether it can be told from an offset of the range: its changes vary by more than 2 % of themselves.
 bool isNoOffset(std::span<const Reading> changes);
 

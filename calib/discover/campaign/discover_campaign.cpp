@@ -9,6 +9,8 @@
 
 #include <fmt/format.h>
 
+#include "calib/discover/campaign/carriers.h"
+#include "calib/discover/campaign/found_model.h"
 #include "calib/discover/campaign/model_file.h"
 #include "calib/discover/marginal.h"
 #include "calib/plan/compare_run.h"
@@ -138,7 +140,7 @@ std::size_t insert(WithFound& inserted, const sim::AnyEffect& effect) {
 
 WithFound insertFound(const CampaignRows& rows, const Declared& declared,
                      const std::vector<std::size_t>& updates, CampaignFinding& finding) {
-  WithFound inserted{effectsWithoutNoise(declared.model), updates};
+  WithFound inserted{declaredEffects(declared), updates};
   std::vector<const NamedFit*> fits;
   for (const Effect& effect : finding.finding.effects)
     if (effect.fit) fits.push_back(effect.fit.get());
@@ -195,56 +197,15 @@ void takeFitted(const Refitted& refitted, CampaignFinding& finding) {
   finding.dispersion = refitted.dispersion;
 }
 
-/// A delay of the light that is another thing than an offset: in the file's frequency_offset, in the one that was
-/// found, or in one more.
-void addDelay(const sim::SensorModel& model, double delay_mm, std::vector<std::optional<FittedEffect>>& updates,
-              std::vector<FittedEffect>& added) {
-  if (delay_mm == 0.0) return;
-  const auto later = [&](const sim::AnyEffect& effect) { return withDelay(model, {effect}, delay_mm).front(); };
-  const auto isOffset = [](const sim::AnyEffect& effect) {
-    return std::holds_alternative<sim::FrequencyOffset>(effect);
-  };
-  for (std::size_t i = 0; i < updates.size(); ++i) {
-    if (!isOffset(model.effects()[i])) continue;
-    FittedEffect known = updates[i].value_or(FittedEffect{model.effects()[i], {}});
-    known.effect = later(known.effect);
-    updates[i] = std::move(known);
-    return;
-  }
-  for (FittedEffect& one : added) {
-    if (!isOffset(one.effect)) continue;
-    one.effect = later(one.effect);
-    return;
-  }
-  added.push_back({withDelay(model, {}, delay_mm).front(), {}});
-}
-
-/// The camera file with what was found. An offset that is no chance goes in as a delay, unless
-/// there is one.
-std::string modelText(const std::string& text, const sim::SensorModel& in_file,
-                      const CampaignFinding& finding) {
-  const auto& effects = in_file.effects();
-  std::vector<std::optional<FittedEffect>> updates(effects.size());
-  for (std::size_t i = 0; i < effects.size(); ++i) {
-    for (const FittedEffect& one : finding.updates) {
-      if (nameOf(one.effect) == nameOf(effects[i])) updates[i] = one;
-    }
-  }
-  std::vector<FittedEffect> added;
-  for (const FoundEffect& one : finding.effects) {
-    if (one.fitted) added.push_back(*one.fitted);
-    added.insert(added.end(), one.more.begin(), one.more.end());
-  }
-  const bool has_delay =
-      std::ranges::any_of(effects, [](const auto& effect) { return nameOf(effect) == "delay"; });
-  if (!has_delay && std::abs(finding.zero.offset_mm) > 3.0 * finding.offset_error_mm) {
-    added.push_back({sim::Delay{.offset = finding.zero.offset_mm * millimetre},
-                     {{"offset_mm", finding.zero.offset_mm, finding.offset_error_mm}}});
-  }
-  addDelay(in_file, finding.zero.delay_mm, updates, added);
-  return withEffects(text, effects, updates, added,
-                     fmt::format("Written by toftwin discover from {} captures of {}.",
-                                 finding.captures, finding.plan.empty() ? "a run" : finding.plan));
+/// The camera file as it is, and what its device's offset and gain then are.
+Result<JudgedModel> asItIs(const JudgedCampaign& judged) {
+  JudgedModel model{effectsWithoutNoise(judged.declared.model)};
+  const auto evidence = residualEvidence(judged, model.effects);
+  if (!evidence) return evidence.error();
+  const Marginal marginal = marginalise(*evidence, judged.scales);
+  const Fit common = fit(marginal, nuisanceColumns(marginal));  // offset, gain
+  model.offset_mm = common.coefficient[0], model.gain_percent = common.coefficient[1];
+  return model;
 }
 
 Result<> judgeLocked(const CampaignJob& job, const Campaign& campaign, const Declared& declared,
@@ -320,10 +281,9 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
   const auto tell = [&](double share) { progress.at(share); };
   const auto at_poses = traceAll(declared, campaign->captures, job.trace, tell);
   if (!at_poses) return at_poses.error();
-  const sim::SensorModel in_file = declared.model;
   const auto late = delayThatFits({declared, {campaign->captures, *at_poses, *at_poses}, {}});
   if (!late) return late.error();
-  declared.model = in_file.withEffects(withDelay(in_file, in_file.effects(), *late));
+  declared.delay_mm = *late;
   progress.begin();
   const auto traced = traceWhereTheyStood(declared, campaign->captures, *at_poses, job.trace, tell);
   if (!traced) return traced.error();
@@ -334,31 +294,26 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
   progress.begin();
   finding.finding = find(*rows, job.finder);
   progress.begin();
-  const auto as_declared = effectsWithoutNoise(declared.model);
-  const RefitOptions fitting{.scales = finding.finding.scales};
-  const auto plain = refit(*rows, as_declared, {}, fitting);
-  if (!plain) return plain.error();
-  finding.offset_before_mm = plain->offset_mm;
   std::vector<TermGroup> terms;
   for (const Effect& effect : finding.finding.effects) {
     if (!effect.is_catalogue) terms.push_back({effect.name, Kind::Generic, termsOf(effect), 0});
   }
-  const auto updates = wrongNumbers(rows->evidence(terms), finding.finding, as_declared);
+  const auto updates = wrongNumbers(rows->evidence(terms), finding.finding, declaredEffects(declared));
   WithFound inserted = insertFound(*rows, declared, updates, finding);
   const auto refitted = refit(*rows, inserted.effects, inserted.fitted,
                               {.scales = finding.finding.scales, .only = inserted.only});
   if (!refitted) return refitted.error();
   takeFitted(*refitted, finding);
+  const Zero beyond = finding.zero;
   finding.zero.delay_mm += *late;
-  finding.model_toml = modelText(files->text, in_file, finding);
+  finding.model_toml = modelText(files->text, declared, finding);
   progress.begin();
   if (job.open_locked && !campaign->locked.empty()) {
-    const auto judged = [&](const Refitted& of, const std::vector<sim::AnyEffect>& effects) {
-      const Zero zero = zeroOf(of);
-      return JudgedModel{withDelay(declared.model, effects, zero.delay_mm), zero.offset_mm, of.gain_percent};
-    };
-    const JudgedModel before = judged(*plain, as_declared), after = judged(*refitted, refitted->effects);
-    if (auto done = judgeLocked(job, *campaign, declared, before, after, finding); !done)
+    const auto before = asItIs({declared, lit, finding.finding.scales});
+    if (!before) return before.error();
+    const JudgedModel after{withDelay(declared.model, refitted->effects, beyond.delay_mm), beyond.offset_mm,
+                            refitted->gain_percent};
+    if (auto done = judgeLocked(job, *campaign, declared, *before, after, finding); !done)
       return done.error();
     keepIfWorse(files->text, finding);
   } else {

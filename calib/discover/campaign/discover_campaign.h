@@ -46,8 +46,8 @@ struct CampaignFinding {
   Finding finding{};
   std::vector<FoundEffect> effects{};
   std::vector<FittedEffect> updates{};  ///< declared effects whose numbers were wrong
-  double offset_before_mm = 0.0, offset_mm = 0.0, offset_error_mm = 0.0;
-  Zero zero{};  ///< with what was found
+  double offset_mm = 0.0, offset_error_mm = 0.0;
+  Zero zero{};  ///< with what was found; its delay whole
   double dispersion = 1.0;
   std::optional<Judgement> judgement{};  ///< on the locked captures
   std::string model_toml{};

@@ -58,7 +58,7 @@ bool movesRange(const Term& term) {
          (term.carrier.empty() && term.stage.value_or(Stage::Range) == Stage::Range);
 }
 bool changesGain(const Term& term) {
-  return term.carrier == "gain" ||
+  return term.carrier == kGainCarrier ||
          (term.carrier.empty() && term.stage.value_or(Stage::Range) != Stage::Range);
 }
 
@@ -120,8 +120,9 @@ std::optional<sim::AnyEffect> tableOf(const Along& along, std::span<const Covari
   return learned;
 }
 
-/// A pattern of pixels, as a table over columns and rows with a knot in the middle of each cell.
-sim::AnyEffect tableOf(const PixelPattern& pattern) {
+/// A pattern of pixels, as a table over columns and rows with a knot in the middle of each cell. `strength`: the
+/// pattern's coefficient beside everything else that was found.
+sim::AnyEffect tableOf(const PixelPattern& pattern, double strength) {
   sim::LearnedRange learned{
       .over = Over::Column, .knots = {}, .and_over = Over::Row, .and_knots = {}, .offsets_mm = {}};
   const CellGrid& grid = pattern.grid;
@@ -129,21 +130,21 @@ sim::AnyEffect tableOf(const PixelPattern& pattern) {
     learned.knots.push_back(i * grid.cell_width + 0.5 * (grid.cell_width - 1));
   for (int i = 0; i < grid.rows; ++i)
     learned.and_knots.push_back(i * grid.cell_height + 0.5 * (grid.cell_height - 1));
-  std::vector<double>& table = pattern.carrier == "gain" ? learned.gains_percent : learned.offsets_mm;
+  std::vector<double>& table = pattern.carrier == kGainCarrier ? learned.gains_percent : learned.offsets_mm;
   for (int column = 0; column < grid.columns; ++column)
     for (int row = 0; row < grid.rows; ++row)
-      table.push_back(pattern.value[static_cast<std::size_t>(row * grid.columns + column)]);
+      table.push_back(strength * pattern.value[static_cast<std::size_t>(row * grid.columns + column)]);
   return learned;
 }
 
 /// Coefficients of a carrier's two parts, where all of its terms are constant.
 std::optional<std::pair<double, double>> inBothPhases(const std::vector<Along>& all,
-                                                      const std::string& carrier) {
+                                                      std::string_view carrier) {
   double in_phase = 0.0, quadrature = 0.0;
   bool is_there = false;
   for (const Along& along : all) {
     for (const auto& [term, coefficient] : along.terms) {
-      if (!term.carrier.starts_with(carrier + ":")) continue;
+      if (term.carrier.substr(0, term.carrier.find(':')) != carrier) continue;
       if (!term.factors.empty()) return std::nullopt;
       is_there = true;
       (term.carrier.ends_with(":in_phase") ? in_phase : quadrature) += coefficient;
@@ -184,12 +185,14 @@ std::vector<LearnedEffect> learnedEffectsOf(const Effect& effect, const Campaign
   const std::vector<Along> all = alongOf(effect);
   for (const Along& along : all)
     if (const auto table = tableOf(along, covariates)) learned.push_back({*table});
-  for (const Term& term : termsOf(effect))
-    if (const PixelPattern* pattern = rows.patternOf(term.carrier)) learned.push_back({tableOf(*pattern)});
-  if (const auto charge = inBothPhases(all, "charge"))
+  for (const Along& along : all)
+    for (const auto& [term, coefficient] : along.terms)
+      if (const PixelPattern* pattern = rows.patternOf(term.carrier))
+        learned.push_back({tableOf(*pattern, coefficient)});
+  if (const auto charge = inBothPhases(all, kChargeCarrier))
     for (const sim::AnyEffect& one : chargesOf(model, charge->first, charge->second))
       learned.push_back({one, {"electrons"}});
-  if (const auto stray = inBothPhases(all, "stray"))
+  if (const auto stray = inBothPhases(all, kStrayCarrier))
     learned.push_back(
         {reflectionOf(model, stray->first, stray->second), {"radiance_w_per_m2_sr", "half_way_mm"}});
   return learned;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/refit.h"
 #include "calib/discover/campaign/rows.h"
 #include "sim/images/rows.h"
@@ -116,7 +117,7 @@ std::shared_ptr<const RowSource> CampaignRows::including(
   // Declared numbers' columns stay, those of what was included before go.
   std::erase_if(all->groups_, [](const Group& group) { return group.name.starts_with("included "); });
   std::vector<FreeNumber> free;
-  all->effects_ = effectsWithoutNoise(declared_->model);
+  all->effects_ = declaredEffects(*declared_);
   for (const NamedFit* fit : fits) {
     const auto& [effect, keys] = campaignFitOf(*fit);
     const Inserted with = inserted(all->effects_, effect);

@@ -10,7 +10,8 @@
 //
 // In a capture the pattern of those before it stands, at other places: noise then has no part in its own
 // explanation, the column's product with the residual is a sum of martingale differences, and its variance
-// the column's square, as if the column had been known beforehand.
+// the column's square, as if the column had been known beforehand. Once it is chosen, the pattern of all captures at
+// other places stands there: how strong it is, is fitted to captures that it was not learned from.
 #include <cmath>
 #include <optional>
 
@@ -21,7 +22,7 @@
 namespace toftwin::discover {
 namespace {
 
-constexpr std::string_view kFromAll = ":all";
+constexpr std::string_view kFromOthers = ":others";
 
 using Values = std::vector<double>;  ///< by place in the grid
 
@@ -125,8 +126,7 @@ void CampaignRows::putPattern(const std::string& name, const std::vector<PerChan
       for (Eigen::Index i = 0; i < channel.size(); ++i)
         channel[i] *= static_cast<float>(values[cells.placeOf(static_cast<std::size_t>(i))]);
   };
-  PixelPattern& pattern =
-      patterns_[name] = {on == "range" ? "" : on, grid, shrunk(all, *prior), 1.0 / std::sqrt(*prior)};
+  patterns_[name] = {on == "range" ? "" : on, grid, shrunk(all, *prior), 1.0 / std::sqrt(*prior)};
   Sums before{grid.size()};
   std::map<std::size_t, Sums> before_by_site;
   for (std::size_t c = 0; c < rows_.size(); ++c) {
@@ -134,18 +134,20 @@ void CampaignRows::putPattern(const std::string& name, const std::vector<PerChan
     Sums elsewhere = before;
     elsewhere.add(here, -1.0);
     put(c, name, shrunk(elsewhere, *prior));
-    put(c, name + std::string{kFromAll}, pattern.value);
+    Sums others = all;
+    others.add(by_site.at(rows_[c].fixed->site), -1.0);
+    put(c, name + std::string{kFromOthers}, shrunk(others, *prior));
     before.add(own[c]), here.add(own[c]);
   }
 }
 
 Term CampaignRows::settled(Term term) const {
-  if (patterns_.contains(term.carrier)) term.carrier += kFromAll;
+  if (patterns_.contains(term.carrier)) term.carrier += kFromOthers;
   return term;
 }
 
 const PixelPattern* CampaignRows::patternOf(const std::string& carrier) const {
-  const std::size_t end = carrier.ends_with(kFromAll) ? carrier.size() - kFromAll.size() : carrier.size();
+  const std::size_t end = carrier.ends_with(kFromOthers) ? carrier.size() - kFromOthers.size() : carrier.size();
   const auto found = patterns_.find(carrier.substr(0, end));
   return found == patterns_.end() ? nullptr : &found->second;
 }

@@ -162,6 +162,50 @@ Result<Cutter> cut(const std::filesystem::path& file, const std::vector<Pose>& p
   return cutter;
 }
 
+/// Which captures are put aside, and whether nothing else was taken from their places.
+struct Locking {
+  std::vector<bool> is_locked{};
+  bool is_by_place = false;
+};
+
+/// For each capture the first one from its place: within a centimetre and 0.01 rad, a rig's errors are shared.
+std::vector<std::size_t> placesOf(const std::vector<MeasuredCapture>& captures) {
+  constexpr double kNear_m = 0.01, kNear_rad = 0.01;
+  const auto isNear = [&](std::size_t a, std::size_t b) {
+    const auto by = captures[a].moment.world_from_camera->inverse() * *captures[b].moment.world_from_camera;
+    const auto& q = by.rotation_wxyz;
+    return norm(by.translation_m) < kNear_m && 2.0 * std::hypot(q[1], q[2], q[3]) < kNear_rad;
+  };
+  std::vector<std::size_t> places;
+  for (std::size_t c = 0; c < captures.size(); ++c) {
+    std::size_t first = 0;
+    while (first < c && (places[first] != first || !isNear(first, c))) ++first;
+    places.push_back(first);
+  }
+  return places;
+}
+
+/// Every fifth place with all that was taken there, where there are ten: what was found must hold elsewhere. A place
+/// with more than a fifth of all captures, as of a warm-up, stays open, since nothing else may say what it says. Else
+/// every fifth capture.
+Locking lockingOf(const std::vector<MeasuredCapture>& captures) {
+  Locking locking{std::vector<bool>(captures.size())};
+  const std::vector<std::size_t> places = placesOf(captures);
+  std::vector<std::size_t> choices;
+  for (std::size_t c = 0; c < captures.size(); ++c) {
+    if (places[c] == c && static_cast<std::size_t>(std::ranges::count(places, c)) * kEachLocked <= captures.size())
+      choices.push_back(c);
+  }
+  locking.is_by_place = choices.size() >= 2 * kEachLocked;
+  for (std::size_t c = 0; c < captures.size(); ++c) {
+    const auto choice = std::ranges::find(choices, places[c]);
+    const auto turn = locking.is_by_place ? static_cast<std::size_t>(choice - choices.begin()) : c;
+    const bool may_be = locking.is_by_place ? choice != choices.end() : captures.size() >= 2 * kEachLocked;
+    locking.is_locked[c] = may_be && turn % kEachLocked == kEachLocked / 2;
+  }
+  return locking;
+}
+
 }  // namespace
 
 Result<Campaign> readRecording(const std::filesystem::path& file, const std::filesystem::path& poses_of) {
@@ -184,19 +228,21 @@ Result<Campaign> readRecording(const std::filesystem::path& file, const std::fil
             "about 20 on",
             file.string(), poses->size(), cutter->captures.size())};
   }
-  const bool locks = cutter->captures.size() >= 2 * kEachLocked;
+  const Locking locking = lockingOf(cutter->captures);
   for (std::size_t c = 0; c < cutter->captures.size(); ++c) {
     MeasuredCapture& capture = cutter->captures[c];
-    const bool is_locked = locks && c % kEachLocked == kEachLocked / 2;
+    const bool is_locked = locking.is_locked[c];
     if (is_locked) capture.record.is_locked = true, campaign.locked.push_back(capture.record);
     (is_locked ? campaign.put_aside : campaign.captures).push_back(std::move(capture));
   }
-  if (locks)
+  if (!campaign.put_aside.empty())
     campaign.notes.push_back(
-        fmt::format("{} of the recording's captures, one in five, were put aside before the search "
-                    "and are judged as the locked ones; nothing keeps a second search from "
-                    "being judged on them again.",
-                    campaign.put_aside.size()));
+        fmt::format("{} of the recording's captures, {}, were put aside before the search and are judged as the "
+                    "locked ones; nothing keeps a second search from being judged on them again.",
+                    campaign.put_aside.size(),
+                    locking.is_by_place ? "all of one place in five"
+                                        : "one in five, from places that the search sees, too: they say how well "
+                                          "what was found holds at other times, not at other places"));
   return campaign;
 }
 

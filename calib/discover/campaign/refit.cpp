@@ -245,8 +245,8 @@ std::vector<FreeNumber> freeNumbersOf(const std::vector<sim::AnyEffect>& effects
 
 Result<Evidence> residualEvidence(const JudgedCampaign& judged, const std::vector<sim::AnyEffect>& effects) {
   const Lit& lit = judged.lit;
-  const auto declared = NoiselessCamera::make(
-      judged.declared.model, effectsWithoutNoise(judged.declared.model), lit.captures);
+  const auto declared =
+      NoiselessCamera::make(judged.declared.model, declaredEffects(judged.declared), lit.captures);
   if (!declared) return declared.error();
   const auto here = NoiselessCamera::make(judged.declared.model, effects, lit.captures);
   if (!here) return here.error();
@@ -314,19 +314,6 @@ Zero zeroOf(const Refitted& refitted) {
   return is_told ? Zero{refitted.offset_mm - refitted.delay_mm, refitted.delay_mm} : Zero{refitted.offset_mm, 0.0};
 }
 
-std::vector<sim::AnyEffect> withDelay(const sim::SensorModel& model, std::vector<sim::AnyEffect> effects,
-                                      double millimetres) {
-  if (millimetres == 0.0) return effects;
-  const auto more = std::get<sim::FrequencyOffset>(delayInLight(model, millimetres));
-  for (sim::AnyEffect& effect : effects) {
-    if (auto* own = std::get_if<sim::FrequencyOffset>(&effect)) {
-      own->first += more.first, own->second += more.second, own->third += more.third;
-      return effects;
-    }
-  }
-  return withInserted(std::move(effects), more);
-}
-
 Result<double> delayThatFits(const JudgedCampaign& judged) {
   constexpr double kStep_mm = 2.0, kMost_mm = 100.0, kDone_mm = 0.1;
   const sim::SensorModel& model = judged.declared.model;
@@ -364,7 +351,7 @@ Result<std::vector<std::shared_ptr<const TracedCapture>>> traceWhereTheyStood(
   constexpr Eigen::Index kOwn = 6;  // pose and light
   const Lit lit{captures, traced, traced};
   const auto evidence =
-      residualEvidence({declared, lit, {}}, effectsWithoutNoise(declared.model));
+      residualEvidence({declared, lit, {}}, declaredEffects(declared));
   if (!evidence) return evidence.error();
   const Eigen::VectorXd common = stepOf(marginalise(*evidence, {}), 0).others.coefficient;
   std::vector<Stood> stood;

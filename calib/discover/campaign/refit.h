@@ -83,9 +83,6 @@ struct Zero {
   double offset_mm = 0.0, delay_mm = 0.0;
 };
 Zero zeroOf(const Refitted& refitted);
-/// The effects with that delay in the light: in a frequency_offset of theirs, or in one more.
-std::vector<sim::AnyEffect> withDelay(const sim::SensorModel& model, std::vector<sim::AnyEffect> effects,
-                                      double millimetres);
 
 /// The delay of the light that fits best, offset and gain being free, in millimetres: what it does to the cyclic error
 /// is not proportional to it. 0 where it is an offset of the range and nothing else, or no more than chance.

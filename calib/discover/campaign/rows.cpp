@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <optional>
@@ -163,6 +164,7 @@ Result<Varied> varyAll(const Declared& declared, const std::vector<sim::AnyEffec
     return {};
   };
   for (std::size_t place = 0; place < effects.size(); ++place) {
+    if (isOnlyDelay(declared, effects[place])) continue;  // a nuisance already
     Candidate candidate = declaredCandidate(
         effects[place], [&](const Variation& variation) { return probe(variation, place); });
     if (candidate.variations.empty()) continue;
@@ -225,13 +227,44 @@ double exposureUsOf(const MeasuredCapture& capture) {
   return exposures.empty() ? capture.record.exposure_us : exposures.front().duration.in(microsecond);
 }
 
-/// The first capture of the same scene and pose.
-std::size_t siteOf(const std::vector<MeasuredCapture>& captures, std::size_t c) {
-  const auto same = std::ranges::find_if(captures, [&](const MeasuredCapture& other) {
-    return other.record.block == captures[c].record.block &&
-           compare::samePose(*other.moment.world_from_camera, *captures[c].moment.world_from_camera);
-  });
-  return static_cast<std::size_t>(same - captures.begin());
+/// How far what a camera sees lies from there in the image of another one, at most, in pixels: looked at on a grid
+/// over the image. Infinite where nothing is seen.
+double shiftOf(const CameraInfo& camera, const Image<float>& range_m, const Transform<Camera, Camera>& other_from_camera) {
+  constexpr int kSteps = 8;
+  double most = -1.0;
+  for (int j = 0; j <= kSteps; ++j) {
+    for (int i = 0; i <= kSteps; ++i) {
+      const int x = i * (camera.width - 1) / kSteps, y = j * (camera.height - 1) / kSteps;
+      if (!std::isfinite(range_m(x, y))) continue;
+      const Vec3d seen = static_cast<double>(range_m(x, y)) * rayThroughPixel(camera, x, y).v;
+      const Point<Camera> there{other_from_camera.rotate(seen) + other_from_camera.translation_m};
+      if (!(there.m.z > 0.0)) return std::numeric_limits<double>::infinity();
+      const auto [u, v] = pixelOfPoint(camera, there);
+      most = std::max(most, std::hypot(u - x, v - y));
+    }
+  }
+  return most < 0.0 ? std::numeric_limits<double>::infinity() : most;
+}
+
+/// For each capture the first one of the same scene and place, whatever their blocks are: less than half a pixel
+/// away, the scene's own patterns stay in their pixels.
+std::vector<std::size_t> sitesOf(const Declared& declared, const Lit& lit) {
+  constexpr double kOnePlace_px = 0.5;
+  const auto isOfOnePlace = [&](std::size_t a, std::size_t b) {
+    const MeasuredCapture &one = lit.captures[a], &other = lit.captures[b];
+    const auto &here = *one.moment.world_from_camera, &there = *other.moment.world_from_camera;
+    return &declared.sceneOf(one.record.block) == &declared.sceneOf(other.record.block) &&
+           (compare::samePose(here, there) ||
+            shiftOf(declared.model.camera(), lit.traced[a]->light.truth.range_m, there.inverse() * here) <
+                kOnePlace_px);
+  };
+  std::vector<std::size_t> sites;
+  for (std::size_t c = 0; c < lit.captures.size(); ++c) {
+    std::size_t first = 0;
+    while (first < c && (sites[first] != first || !isOfOnePlace(c, first))) ++first;
+    sites.push_back(first);
+  }
+  return sites;
 }
 
 }  // namespace
@@ -240,7 +273,6 @@ void CampaignRows::fillFixed(std::size_t c, const Reading& declared, Fixed& fixe
   const MeasuredCapture& capture = lit_->captures[c];
   const TracedCapture& varied = *lit_->varied[c];
   fixed.name = capture.record.name, fixed.block = capture.record.block;
-  fixed.site = siteOf(lit_->captures, c);
   fixed.cells = Cells{capture, *lit_->traced[c], declared};
   fixed.covariates =
       covariatesOf(capture, varied, fixed.varied, declared_->model.camera(), fixed.cells);
@@ -269,7 +301,7 @@ Result<NoiselessCamera> CampaignRows::cameraWith(std::vector<sim::AnyEffect> eff
 
 Result<CampaignRows> CampaignRows::make(const Declared& declared, const Lit& lit,
                                         const Options& options) {
-  const std::vector<sim::AnyEffect> effects = effectsWithoutNoise(declared.model);
+  const std::vector<sim::AnyEffect> effects = declaredEffects(declared);
   const auto camera = NoiselessCamera::make(declared.model, effects, lit.captures);
   if (!camera) return camera.error();
   const auto baseOf = [&](std::size_t c) {
@@ -305,13 +337,14 @@ Result<CampaignRows> CampaignRows::make(const Declared& declared, const Lit& lit
   all.base_columns_ = std::max(all.base_columns_, all.common_columns_);
   all.period_m_ = periodOf(declared.model);
   all.rows_.resize(lit.captures.size());
+  const std::vector<std::size_t> sites = sitesOf(declared, lit);
   std::atomic<std::size_t> done{0};
   sim::inParallel(static_cast<int>(lit.captures.size()), 1, [&](int first, int last) {
     for (auto c = static_cast<std::size_t>(first); c < static_cast<std::size_t>(last); ++c) {
       Base base = baseOf(c);
       const Reading declared_reading = camera->read(lit.captures[c], lit.traced[c]->light);
       auto fixed = std::make_shared<Fixed>();
-      fixed->varied = base.reading;
+      fixed->varied = base.reading, fixed->site = sites[c];
       all.fillFixed(c, declared_reading, *fixed);
       WhitenedCapture columns{fixed->cells, next};
       columns.putCommon(fixed->cells, *lit.traced[c]);

@@ -177,7 +177,7 @@ class CampaignRows final : public RowSource, public NamedEffects {
   /// What stays the same whatever is included.
   struct Fixed {
     std::string name{}, block{};
-    std::size_t site = 0;  ///< captures of one scene and pose have the same: their pixels do not move
+    std::size_t site = 0;  ///< captures of one scene and place have the same: their pixels do not move
     Cells cells;
     CaptureCovariates covariates;
     std::map<std::string, PerChannel> carriers{};
