@@ -172,6 +172,7 @@ Effect effectOf(const Context& context, const std::vector<Explanation>& all, std
                             other.fitted.group,
                             plain(coefficients(prepared, *in_marginal[s])),
                             difference(mine.gain, other.gain),
+                            other.named,
                             correlationOf(prepared, *in_marginal[0], *in_marginal[s])};
     effect.alternatives.push_back(std::move(alternative));
   }

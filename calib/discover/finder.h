@@ -32,6 +32,7 @@ struct Alternative {
   TermGroup group{};  ///< empty terms: an effect of the catalogue
   std::vector<double> coefficient{};
   Difference worse{};        ///< held-out gain of the chosen one minus this one's
+  std::shared_ptr<const NamedFit> named{};  ///< an effect of the catalogue that was fitted as itself
   double correlation = 0.0;  ///< of the two fitted curves over the captures, after the nuisances
 };
 

@@ -7,9 +7,11 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 
 #include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/catalogue.h"
+#include "calib/discover/campaign/discover_campaign.h"
 #include "calib/discover/campaign/model_file.h"
 #include "calib/discover/campaign/refit.h"
 #include "protocol/record/recording.h"
@@ -251,9 +253,11 @@ TEST_F(Rows, EveryEffectOfTheCatalogueThatShowsIsACandidateAndNoiseIsNot) {
 /// The frames of all captures of a run, one after the other, as a camera's own recording.
 class Recording : public Rows {
  protected:
-  Recording() {
+  Recording() { record(""); }
+  void record(const std::string& hidden) const {
+    std::filesystem::remove_all(folder_);
     const auto plan = plan::parsePlan(smallPlan(), "plan.toml");
-    const auto camera = sim::SensorModel::parse(tinyCamera(), "camera.toml");
+    const auto camera = sim::SensorModel::parse(tinyCamera(hidden), "camera.toml");
     const auto scene = sim::Scene::parse(smallScene(), "scene.toml");
     if (!plan || !camera || !scene) throw std::runtime_error("the small campaign's files are wrong");
     SimulatedRun run{.plan = *plan, .camera = *camera, .scene = *scene};
@@ -322,6 +326,26 @@ TEST_F(Recording, TakesPosesFromAnotherOne) {
   const auto neither = readRecording(folder_ / "without.mcap", folder_ / "without.mcap");
   ASSERT_FALSE(neither);
   EXPECT_THAT(neither.error().message, testing::HasSubstr("has none, either"));
+}
+
+/// A camera is carried about and recorded; nothing else is known but where it was.
+TEST_F(Recording, IsSearchedForWhatTheCameraFileLacks) {
+  record("[[effect]]\ntype = 'clock_scale'\nppm = 5000.0\n");
+  std::ofstream{folder_ / "camera.toml"} << tinyCamera();
+  std::ofstream{folder_ / "scene.toml"} << smallScene();
+  CampaignJob job{.run = folder_ / "with.mcap",
+                  .model = (folder_ / "camera.toml").string(),
+                  .scene = folder_ / "scene.toml",
+                  .output = folder_ / "out"};
+  job.trace.max_surfaces = 1;
+  compare::Progress silent{nullptr};
+  const auto finding = searchCampaign(job, silent);
+  ASSERT_TRUE(finding) << finding.error().message;
+  ASSERT_EQ(finding->effects.size(), 1U) << verdictOf(*finding);
+  EXPECT_EQ(finding->effects.front().found.name, "clock_scale") << verdictOf(*finding);
+  EXPECT_THAT(finding->notes, testing::Contains(testing::HasSubstr("all of one place in five")));
+  ASSERT_TRUE(finding->judgement);
+  EXPECT_LT(finding->judgement->after.rms_mm, finding->judgement->before.rms_mm);
 }
 
 TEST(Catalogue, NumbersOfAnEffectAreSetByTheirKeysAndStayWithinBounds) {

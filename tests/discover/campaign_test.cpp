@@ -209,6 +209,10 @@ TEST_F(Searched, WhatOnlyTheFirstCapturesShowIsNamedWithWhatLooksAlike) {
   for (const Alternative& other : finding.effects.front().found.alternatives) answers.push_back(other.name);
   EXPECT_THAT(answers, testing::IsSupersetOf({"residual_drift", "thermal_delay", "warm_up"}))
       << verdictOf(finding) << testing::PrintToString(finding.effects.front().found.refused);
+  // They differ where a camera's time and its temperatures do not go together.
+  ASSERT_TRUE(finding.effects.front().next);
+  EXPECT_GT(finding.effects.front().next->chi2, 9.0) << "the captures that were taken tell them apart by less";
+  EXPECT_THAT(finding.effects.front().next->change, testing::AnyOf(HasSubstr("switching"), HasSubstr("warmer")));
 }
 
 /// A camera of square waves.

@@ -141,6 +141,11 @@ compare::TableBlock seenTable(const CampaignFinding& finding) {
   return table;
 }
 
+std::string adviceOf(const NextCapture& next) {
+  return fmt::format("take capture \"{}\" again{}; there {} would differ by {:.3g} in χ²", next.like,
+                     next.change.empty() ? "" : " " + next.change, next.other, next.chi2);
+}
+
 compare::Section foundSection(const CampaignFinding& finding) {
   compare::Section section{
       .id = "effects", .title = "What was found", .verdict = verdictOf(finding)};
@@ -157,10 +162,12 @@ compare::Section foundSection(const CampaignFinding& finding) {
       section.blocks.emplace_back(compare::Paragraph{
           fmt::format("Fitted and not named. {}.", fmt::join(one.found.refused, "; ")), true});
     }
-    if (const auto& next = one.found.experiment) {
+    if (const auto& next = one.next) {
+      section.blocks.emplace_back(compare::Paragraph{"Next experiment: " + adviceOf(*next) + "."});
+    } else if (const auto& change = one.found.experiment) {
       section.blocks.emplace_back(compare::Paragraph{
           fmt::format("Next experiment: hold {} at {:.4g} and change {} from {:.4g} to {:.4g}.",
-                      next->hold, next->held_at, next->vary, next->from, next->to)});
+                      change->hold, change->held_at, change->vary, change->from, change->to)});
     }
   }
   section.blocks.emplace_back(compare::Paragraph{fmt::format(
@@ -212,6 +219,7 @@ Json toJson(const FoundEffect& one) {
   Json others = Json::array();
   for (const Alternative& other : one.found.alternatives) others.push(other.name);
   json.set("or", std::move(others)).set("refused", Json::arrayOf(one.found.refused));
+  if (one.next) json.set("next_experiment", adviceOf(*one.next)).set("next_experiment_chi2", one.next->chi2);
   return json;
 }
 

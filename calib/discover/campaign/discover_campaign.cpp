@@ -12,6 +12,7 @@
 #include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/found_model.h"
 #include "calib/discover/campaign/model_file.h"
+#include "calib/discover/campaign/next_capture.h"
 #include "calib/discover/marginal.h"
 #include "calib/plan/compare_run.h"
 
@@ -46,13 +47,13 @@ Result<DeclaredFiles> loadDeclared(const CampaignJob& job) {
   if (!model) return model.error();
   auto scene = sim::Scene::load(job.scene);
   if (!scene) return scene.error();
-  DeclaredFiles files{{*std::move(model), *std::move(scene)}, *std::move(text)};
+  std::map<std::string, sim::Scene> scene_of_block;
   for (const auto& [block, file] : job.scene_of_block) {
     auto other = sim::Scene::load(file);
     if (!other) return other.error();
-    files.declared.scene_of_block.emplace(block, *std::move(other));
+    scene_of_block.emplace(block, *std::move(other));
   }
-  return files;
+  return DeclaredFiles{{*std::move(model), *std::move(scene), std::move(scene_of_block)}, *std::move(text)};
 }
 
 /// The measured camera's lens, if the camera file's has the same size.
@@ -304,6 +305,7 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
                               {.scales = finding.finding.scales, .only = inserted.only});
   if (!refitted) return refitted.error();
   takeFitted(*refitted, finding);
+  addNextCaptures({declared, lit, finding.finding.scales}, *rows, finding.effects);
   const Zero beyond = finding.zero;
   finding.zero.delay_mm += *late;
   finding.model_toml = modelText(files->text, declared, finding);

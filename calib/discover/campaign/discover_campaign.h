@@ -32,11 +32,20 @@ struct CampaignJob {
   std::string note{};
 };
 
+/// A capture that would tell an effect from something else that it may be.
+struct NextCapture {
+  std::string other{};   ///< that it tells the effect from
+  std::string like{};    ///< the name of a capture that was taken
+  std::string change{};  ///< how to take it again; empty: as it was
+  double chi2 = 0.0;     ///< by which the two differ in it
+};
+
 /// What an effect that was found became in the model.
 struct FoundEffect {
   Effect found;
   std::optional<FittedEffect> fitted{};  ///< none: the simulator has no form for it
   std::vector<FittedEffect> more{};      ///< where one form is not enough
+  std::optional<NextCapture> next{};     ///< where these captures do not tell it from something else
 };
 
 /// All that is known when a campaign was searched.
