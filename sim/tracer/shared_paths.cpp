@@ -123,40 +123,47 @@ void shapePart(const Connections& to, const End& end, Vec3d from, Lanes<float>& 
   }
 }
 
-/// Adds a part of the end's light to the starts', phase and all.
+/// Adds a part of the end's light to the starts', phase and all. As in lit_points.cpp, its loops are told to stay loops,
+/// so that GCC makes vectors of them.
 TOFTWIN_VECTOR
 void addShared(const Tracing& tracing, const Connections& to, const Lanes<float>& weight,
                const LaneSums& light, std::size_t lane, LaneSums& sums) {
   const float steady = light.steady[lane], ambient = light.ambient[lane];
-  for (std::size_t i = 0; i < kLaneCount; ++i) {
-    sums.steady[i] += weight[i] * steady;
-    sums.ambient[i] += weight[i] * ambient;
-  }
+#pragma GCC unroll 1
+  for (std::size_t i = 0; i < kLaneCount; ++i) sums.steady[i] += weight[i] * steady;
+#pragma GCC unroll 1
+  for (std::size_t i = 0; i < kLaneCount; ++i) sums.ambient[i] += weight[i] * ambient;
   const auto harmonics = static_cast<std::size_t>(tracing.request.harmonics);
   for (std::size_t f = 0; f < tracing.turns_per_metre.size(); ++f) {
     const double turns = tracing.turns_per_metre[f];
-    Lanes<float> cosine, sine, re, im;
+    Lanes<float> cosine, sine, re, im, next;
+#pragma GCC unroll 1
     for (std::size_t i = 0; i < kLaneCount; ++i) {
       const CosSin z = cosSinOfTurns(to.length[i] * turns);
       cosine[i] = z.cos;
       sine[i] = -z.sin;
-      re[i] = weight[i] * z.cos;
-      im[i] = weight[i] * -z.sin;
     }
+#pragma GCC unroll 1
+    for (std::size_t i = 0; i < kLaneCount; ++i) re[i] = weight[i] * cosine[i];
+#pragma GCC unroll 1
+    for (std::size_t i = 0; i < kLaneCount; ++i) im[i] = weight[i] * sine[i];
     for (std::size_t n = 0;; ++n) {
       const std::size_t term = f * harmonics + n;
       const float light_re = light.re[term][lane], light_im = light.im[term][lane];
-      float *to_re = sums.re[term].v, *to_im = sums.im[term].v;
-      for (std::size_t i = 0; i < kLaneCount; ++i) {
-        to_re[i] += re[i] * light_re - im[i] * light_im;
-        to_im[i] += re[i] * light_im + im[i] * light_re;
-      }
+      Lanes<float> sum = sums.re[term];
+#pragma GCC unroll 1
+      for (std::size_t i = 0; i < kLaneCount; ++i) sum[i] += re[i] * light_re - im[i] * light_im;
+      sums.re[term] = sum;
+      sum = sums.im[term];
+#pragma GCC unroll 1
+      for (std::size_t i = 0; i < kLaneCount; ++i) sum[i] += re[i] * light_im + im[i] * light_re;
+      sums.im[term] = sum;
       if (n + 1 == harmonics) break;
-      for (std::size_t i = 0; i < kLaneCount; ++i) {
-        const float next = re[i] * cosine[i] - im[i] * sine[i];
-        im[i] = re[i] * sine[i] + im[i] * cosine[i];
-        re[i] = next;
-      }
+#pragma GCC unroll 1
+      for (std::size_t i = 0; i < kLaneCount; ++i) next[i] = re[i] * cosine[i] - im[i] * sine[i];
+#pragma GCC unroll 1
+      for (std::size_t i = 0; i < kLaneCount; ++i) im[i] = re[i] * sine[i] + im[i] * cosine[i];
+      re = next;
     }
   }
 }
