@@ -2,6 +2,7 @@
 #include "calib/compare/capture.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <optional>
@@ -69,6 +70,11 @@ class RecordingFeed final : public Feed {
   }
   Result<> setPose(const Transform<World, Camera>&) override {
     return Error{Error::Code::Unsupported, "a recording cannot be moved"};
+  }
+  [[nodiscard]] std::string warning() const override {
+    const std::string& damage = reader_.summary().damage;
+    return damage.empty() ? "" : fmt::format("The recording of {} is damaged: {}. Only what can be read of it is compared.",
+                                             details_.entry.name, damage);
   }
 
  private:
@@ -197,6 +203,11 @@ Result<> capturePose(Feed& a, Feed& b, const CaptureOptions& options, Progress& 
     const auto& [frame_a, frame_b] = *pair;
     if (auto added = captured.a.add(frame_a); !added) return added;
     if (auto added = captured.b.add(frame_b); !added) return added;
+    if (i == 0 && result.poses.empty()) {
+      for (const Feed* feed : {&a, &b}) result.warnings.push_back(feed->warning());
+      for (const Frame* frame : {&frame_a, &frame_b}) result.warnings.push_back(clockWarning(*frame));
+      std::erase(result.warnings, "");
+    }
     result.log.push_back(logEntry(frame_a, captured.name, "A"));
     result.log.push_back(logEntry(frame_b, captured.name, "B"));
     result.pairs.push_back({result.poses.size(), powerOn(frame_a), powerOn(frame_b),
@@ -211,6 +222,19 @@ Result<> capturePose(Feed& a, Feed& b, const CaptureOptions& options, Progress& 
 
 Result<> Feed::setParameter(std::string_view name, double) {
   return Error{Error::Code::Unsupported, fmt::format("{}: has no parameter {}", details().entry.name, name)};
+}
+
+std::string clockWarning(const Frame& frame) {
+  using std::chrono::nanoseconds, std::chrono::system_clock;
+  const bool is_recorded = frame.provenance.kind == FrameKind::Replayed;
+  if (is_recorded || frame.moment.received.ns == 0) return {};
+  const auto ours = std::chrono::duration_cast<nanoseconds>(system_clock::now().time_since_epoch()).count();
+  const double ahead_s = 1e-9 * static_cast<double>(frame.moment.received.ns - ours);
+  if (std::abs(ahead_s) <= 1.0) return {};
+  // To one digit, so that what is said of many captures is said once.
+  return fmt::format("The clock of the daemon that {} comes from is about {:.1g} s {} ours: times of its frames are not those of "
+                     "other machines. Let both follow one clock (NTP)",
+                     frame.source, std::abs(ahead_s), ahead_s > 0.0 ? "ahead of" : "behind");
 }
 
 Result<Frame> nextFrameAt(Feed& feed, const std::optional<Transform<World, Camera>>& pose,

@@ -30,6 +30,8 @@ class Feed {
   virtual Result<> setParameter(std::string_view name, double value);
   /// Forgets frames that are under way: the next one is taken from now on.
   virtual Result<> beginAnew() { return {}; }
+  /// What a reader must know of it, or nothing: that a recording is damaged.
+  [[nodiscard]] virtual std::string warning() const { return {}; }
 };
 
 /// What takes the cameras from pose to pose, where they cannot be put there by a command.
@@ -91,6 +93,10 @@ struct CaptureOptions {
 /// say which camera could not follow and why. At the end each camera is put back to where it stood.
 Result<Capture> capture(Feed& a, Feed& b, const CaptureOptions& options, Progress& progress);
 void planCapture(Progress& progress, const CaptureOptions& options);
+
+/// What a reader must know of the clock of the daemon that a frame has just come from: that it is over a second off ours.
+/// Nothing of frames that were recorded.
+std::string clockWarning(const Frame& frame);
 
 /// The next frame of that pose; frames that say another one are skipped. Stopped soon after the user
 /// wants to end.

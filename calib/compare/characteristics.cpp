@@ -208,7 +208,16 @@ Result<PoseComparison> comparePose(const Stack& a, const Stack& b) {
             "the cameras share {} of {} rays: too few to compare. Are both camera models right?",
             shared, result.difference_mm.size())};
   }
+  result.shared_rays = static_cast<double>(shared) / static_cast<double>(result.difference_mm.size());
+  result.camera = a.camera();
   return result;
+}
+
+std::string resamplingNote(const PoseComparison& pose) {
+  if (!pose.resampled) return {};
+  return fmt::format("The cameras have different lenses or resolutions: B is interpolated to A's rays, of which it shares {:.0f} %. "
+                     "What B alone looks at is not compared.",
+                     100.0 * pose.shared_rays);
 }
 
 Pixels pixelsOf(const std::vector<PoseComparison>& poses) {

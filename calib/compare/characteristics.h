@@ -27,6 +27,8 @@ struct PoseComparison {
   Image<std::uint8_t> edge;       ///< 1 within two pixels of a jump in A's range
   Image<std::uint8_t> flying_a, flying_b;  ///< B's along A's rays
   bool resampled = false;         ///< B had another camera model and was interpolated
+  double shared_rays = 1.0;       ///< of A's rays the share that B looks along, too
+  CameraInfo camera{};            ///< of these images: A's
   /// Where the cameras stood; nothing if neither says it.
   std::optional<Transform<World, Camera>> pose;
 };
@@ -34,6 +36,9 @@ struct PoseComparison {
 /// Error where they cannot be compared: known poses that differ, or fields of view that share less
 /// than one pixel in a hundred.
 Result<PoseComparison> comparePose(const Stack& a, const Stack& b);
+
+/// That B was interpolated to A's rays, and how many of them it has; empty where both have the same camera model.
+std::string resamplingNote(const PoseComparison& pose);
 
 /// Pixels beside which the range jumps by more than `jump` of itself between neighbours, widened by
 /// `radius`: 1. Invalid pixels are no jump.

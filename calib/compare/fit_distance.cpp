@@ -38,14 +38,12 @@ Cause cyclic(const std::string& what, Frequency f, int cycles, const std::vector
 
 std::vector<Cause> causesOf(const std::string& camera, const std::vector<double>& d_mm) {
   const bool kinect = camera == "kinect_v2";
-  const std::vector<double> frequencies_mhz =
-      kinect ? std::vector{80.0, 16.0, 120.0} : std::vector{30.0};
   std::vector<double> metres, squares;
   for (const double d : d_mm) metres.push_back(1e-3 * d), squares.push_back(1e-6 * d * d);
   std::vector<Cause> causes{{"clock scale, ∝ d", {{"d", metres}}},
                             {"intensity, ∝ 1/amplitude ∝ d²", {{"d²", squares}}}};
-  for (const double mhz : frequencies_mhz) {
-    const Frequency f{mhz, megahertz};
+  for (const double hz : frequenciesOf(camera)) {
+    const Frequency f{hz, hertz};
     causes.push_back(cyclic("gain of the samples", f, 1, d_mm));
     Cause offset = cyclic("offset of the samples or inner reflection, growing as d²", f, 1, d_mm);
     for (Term& term : offset.terms) term.column = times(term.column, squares);
@@ -74,6 +72,10 @@ double floorOf(const std::vector<double>& d_mm, const std::vector<double>& error
 }
 
 }  // namespace
+
+std::vector<double> frequenciesOf(const std::string& camera) {
+  return camera == "kinect_v2" ? std::vector{80e6, 16e6, 120e6} : std::vector{30e6};
+}
 
 void addDistanceFit(const RealCamera& camera, const std::vector<double>& reference_mm,
                     const std::vector<double>& error_mm, const std::vector<double>& simulated_mm,

@@ -138,25 +138,6 @@ Figure trendFigure(const std::vector<double>& x, const Pixels& pixels, std::stri
                      .compact = true})};
 }
 
-Figure histogramFigure(const Pixels& pixels) {
-  const double reach = std::max(
-                   1.0, 1.3 * quantile({pixels.difference_mm.begin(), pixels.difference_mm.end()},
-                                       0.99)),
-               low = std::min(
-                   -1.0, 1.3 * quantile({pixels.difference_mm.begin(), pixels.difference_mm.end()},
-                                        0.01));
-  std::vector<double> surface, edge;
-  for (std::size_t i = 0; i < pixels.difference_mm.size(); ++i)
-    (pixels.edge[i] ? edge : surface).push_back(pixels.difference_mm[i]);
-  return {"How often each difference occurs; what lies outside is counted in the outermost bins.",
-          toSvg(Plot{.title = "Histogram of B − A",
-                     .x_label = "B − A [mm]",
-                     .y_label = "pixels",
-                     .curves = {histogram(surface, low, reach, 80, "surfaces", Ink::Simulated),
-                                histogram(edge, low, reach, 80, "edges", Ink::Published)},
-                     .compact = true})};
-}
-
 /// The difference over time since power-on of B, each pose a series of its own.
 std::optional<Figure> timeFigure(const Capture& capture) {
   Curve curve{.name = "median over the image, one dot a pair of frames",
@@ -226,6 +207,25 @@ TableBlock maskTable(const Characteristics& c) {
   return table;
 }
 
+Figure histogramFigure(const Pixels& pixels) {
+  const double reach = std::max(
+                   1.0, 1.3 * quantile({pixels.difference_mm.begin(), pixels.difference_mm.end()},
+                                       0.99)),
+               low = std::min(
+                   -1.0, 1.3 * quantile({pixels.difference_mm.begin(), pixels.difference_mm.end()},
+                                        0.01));
+  std::vector<double> surface, edge;
+  for (std::size_t i = 0; i < pixels.difference_mm.size(); ++i)
+    (pixels.edge[i] ? edge : surface).push_back(pixels.difference_mm[i]);
+  return {"How often each difference occurs; what lies outside is counted in the outermost bins.",
+          toSvg(Plot{.title = "Histogram of B − A",
+                     .x_label = "B − A [mm]",
+                     .y_label = "pixels",
+                     .curves = {histogram(surface, low, reach, 80, "surfaces", Ink::Simulated),
+                                histogram(edge, low, reach, 80, "edges", Ink::Published)},
+                     .compact = true})};
+}
+
 double roundUp(double value) {
   const double power = std::pow(10.0, std::floor(std::log10(value)));
   for (const double step : {1.0, 2.0, 5.0, 10.0}) {
@@ -257,9 +257,11 @@ FigureRow mapsOf(const std::string& name, const PoseComparison& comparison, doub
                            .diverging = true})}}};
 }
 
-Tone toneOfDifference(const Summary& difference) {
-  if (std::abs(difference.mean) <= 1.0 && difference.p95_abs <= 10.0) return Tone::Good;
-  return std::abs(difference.mean) <= 10.0 ? Tone::Fair : Tone::Bad;
+Tone toneOfDifference(const Region& region) {
+  const double bias = std::abs(region.difference_mm.mean), noise = region.noise_a_mm;
+  if (!(noise > 0.0)) return Tone::Neutral;
+  if (bias <= noise && region.difference_mm.p95_abs <= 3.0 * std::hypot(noise, region.noise_b_mm)) return Tone::Good;
+  return bias <= 3.0 * noise ? Tone::Fair : Tone::Bad;
 }
 
 Result<Finding> judgeLive(const Capture& capture) {
@@ -290,7 +292,7 @@ Result<Finding> judgeLive(const Capture& capture) {
   finding.section = {
       .id = "live",
       .title = fmt::format("{} (B) against {} (A)", capture.b.entry.name, capture.a.entry.name)};
-  finding.section.tone = toneOfDifference(all);
+  finding.section.tone = toneOfDifference(main);
   finding.section.verdict = fmt::format(
       "On surfaces B reads {} than A, averaged over {} pixels at {}; 95 % of them agree "
       "within {} mm. Temporal noise: A {} mm, B {} mm (median). "
@@ -302,9 +304,13 @@ Result<Finding> judgeLive(const Capture& capture) {
   auto& blocks = finding.section.blocks;
   for (const std::string& warning : capture.warnings)
     blocks.push_back(Paragraph{"Note: " + warning});
+  if (const std::string note = resamplingNote(poses.front()); !note.empty())
+    blocks.push_back(Paragraph{"Note: " + note});
   const double reach = roundUp(std::max(0.5, quantile(magnitudes, 0.97)));
   for (std::size_t i = 0; i < poses.size() && i < 2; ++i)
     blocks.push_back(mapsOf(capture.poses[i].name, poses[i], reach));
+  if (auto cloud = pointCloudOf(capture.poses.front().name, poses.front()); !cloud.a.empty())
+    blocks.push_back(std::move(cloud));
   blocks.push_back(regionTable(c));
   FigureRow trends{{histogramFigure(pixels),
                     trendFigure(pixels.range_mm, pixels, "range of A [mm]",

@@ -16,10 +16,13 @@ TableBlock regionTable(const Characteristics& characteristics);
 TableBlock maskTable(const Characteristics& characteristics);
 /// What A sees at a pose, and B − A there on a scale that reaches so far.
 FigureRow mapsOf(const std::string& name, const PoseComparison& comparison, double reach_mm);
+/// How often each difference occurs, on surfaces and at edges.
+Figure histogramFigure(const Pixels& pixels);
 /// The region that headlines are of: surfaces, where there are any.
 const Region& mainRegionOf(const Characteristics& characteristics);
-/// By size alone: a difference that is not significant is not small for that.
-Tone toneOfDifference(const Summary& difference);
+/// Against A's noise in a single frame: good where the bias is within it and 95 % of the pixels within three of both
+/// cameras' noise; bad where the bias is over three of it. Neutral where no noise is known.
+Tone toneOfDifference(const Region& region);
 /// The next 1, 2 or 5 times a power of ten, for the reach of a scale.
 double roundUp(double value);
 

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/compare/real_data.h"
 
+#include <algorithm>
+
+#include "calib/compare/trait_verdict.h"
+
 namespace toftwin::compare {
 
 std::vector<std::string> explainedRow(const std::string& name, const Explained& e) {
@@ -11,6 +15,20 @@ std::vector<std::string> explainedRow(const std::string& name, const Explained& 
           shown(e.best_offset),
           shown(e.residual_sd),
           shownPercent(e.fraction_centred)};
+}
+
+void addCharacteristics(const NamedTraits& traits, Finding& finding) {
+  const auto verdicts = verdictsOf(traits);
+  if (!verdicts.empty()) finding.section.blocks.push_back(verdictTable(verdicts));
+  const bool has_b = std::ranges::any_of(traits.traits, [](const NamedTrait& one) { return one.of == "B"; });
+  TableBlock table = traitTable(traits, "A, measured", has_b ? "B, simulated" : "");
+  if (!has_b) {
+    table.header.pop_back();
+    for (auto& row : table.rows) row.pop_back();
+  }
+  finding.section.blocks.push_back(std::move(table));
+  if (!traits.untold.empty()) finding.section.blocks.push_back(Details{"What these data cannot tell", traits.untold});
+  finding.data.set("characteristics", toJson(traits)).set("verdicts", toJson(verdicts));
 }
 
 Tone toneOf(double explained_fraction) {

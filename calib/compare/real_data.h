@@ -8,6 +8,7 @@
 
 #include <toftwin/result.h>
 
+#include "calib/compare/named_traits.h"
 #include "calib/compare/progress.h"
 #include "calib/compare/report.h"
 #include "calib/compare/scan_line.h"
@@ -80,6 +81,10 @@ Section summarySection(const std::vector<Finding>& findings);
 /// All of them, in the report's order. The plan is added to the job's progress by `planRealData`.
 void planRealData(Progress& progress, double effort);
 Result<std::vector<Finding>> judgeRealData(const RealDataJob& job);
+
+/// The traits of measured data (A) and, where there are any, of simulated ones (B), as a run has them: their table, and which
+/// of them differ.
+void addCharacteristics(const NamedTraits& traits, Finding& finding);
 
 /// Rows "prediction, RMS left, shape left, explained" for tables.
 std::vector<std::string> explainedRow(const std::string& name, const Explained& explained);

@@ -41,6 +41,23 @@ double errorAt(const std::vector<WallReading>& readings, double reference_mm) {
   return std::nan("");
 }
 
+/// Waves, scale and residual, measured and simulated, at the frequencies that the camera is known to have.
+NamedTraits wavesOf(const RealCamera& camera, const ErrorTable& measured, const std::vector<WallReading>& readings) {
+  const std::vector<double> frequency_hz = frequenciesOf(camera.name);
+  const auto add = [&](const char* of, std::vector<double> distance, const std::vector<double>& error,
+                       TraitCollector& all) {
+    for (double& d : distance) d *= 1e-3;
+    all.add("harmonics", of, harmonicTraits(distance, error, frequency_hz));
+  };
+  ErrorTable simulated;
+  for (const WallReading& r : readings)
+    simulated.reference_mm.push_back(r.truth_mm), simulated.error_mm.push_back(r.range_mm - r.truth_mm);
+  TraitCollector all;
+  add("A", measured.reference_mm, measured.error_mm, all);
+  add("B", simulated.reference_mm, simulated.error_mm, all);
+  return std::move(all).found();
+}
+
 std::vector<std::vector<std::string>> bins(const ErrorTable& table,
                                            const std::vector<double>& simulated) {
   std::vector<std::vector<std::string>> rows;
@@ -154,6 +171,7 @@ Result<Finding> judgeDistance(const RealDataJob& job, RealCamera& camera) {
       .set("rows_of_another_session", other.error_mm.size())
       .set("constant_mm", sim.best_offset);
   addDistanceFit(camera, table.reference_mm, table.error_mm, simulated, finding);
+  addCharacteristics(wavesOf(camera, table, *readings), finding);
   finding.headline = fmt::format("{} distance error: {} mm spread, {} mm left", camera.title,
                                  shown(none.residual_sd), shown(sim.residual_sd));
   finding.cards.push_back({camera.title + " distance", shown(sim.residual_sd) + " mm",

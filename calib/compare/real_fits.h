@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "calib/compare/held_out.h"
@@ -8,6 +9,9 @@
 
 /// What the judges of real data fit on one half and judge on the other.
 namespace toftwin::compare {
+
+/// Modulation frequencies of a camera of the set, Hz.
+std::vector<double> frequenciesOf(const std::string& camera);
 
 /// Cyclic errors, intensity, scale and a constant over the distance table. Rows in step.
 void addDistanceFit(const RealCamera& camera, const std::vector<double>& reference_mm,

@@ -195,6 +195,9 @@ Result<Finding> judgeNoise(const RealDataJob& job, const RealCamera& camera) {
                             "Simulated: {} readings of 16 pixels each.",
                             gain, 300),
                 true}};
+  TraitCollector traits;
+  traits.add("noise law", "A", noiseLawTraits((*over_intensity)[0], (*over_intensity)[1]));
+  addCharacteristics(std::move(traits).found(), finding);
   finding.data.set("law_a_mm", measured.a_mm)
       .set("law_b", measured.b)
       .set("law_c", measured.c)

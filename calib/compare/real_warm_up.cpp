@@ -165,6 +165,9 @@ Result<Finding> judgeWarmUp(const RealDataJob& job, const RealCamera& camera) {
                                      "row is a check of the preset and no test."
                                    : "The preset of this camera has no warm-up effect."),
                 true}};
+  TraitCollector traits;
+  traits.add("drift", "A", driftTraits(all.time_s, all.depth_mm));
+  addCharacteristics(std::move(traits).found(), finding);
   finding.data.set("drift_mm", drift).set("jitter_mm", floor).set("samples", all.time_s.size());
   const std::string ahead = camera.title + ", warm-up, second half from the first";
   finding.outcomes.push_back(

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/compare/report.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <cerrno>
@@ -153,7 +154,11 @@ std::string toHtml(const Report& report) {
   }
   out += "</nav></header>";
   for (const Section& section : report.sections) out += html(section);
-  return out + fmt::format("<footer>{}</footer></main></body></html>\n", escaped(report.colophon));
+  out += fmt::format("<footer>{}</footer></main>", escaped(report.colophon));
+  const auto isCloud = [](const Block& block) { return std::holds_alternative<PointCloud>(block); };
+  if (std::ranges::any_of(report.sections, [&](const Section& one) { return std::ranges::any_of(one.blocks, isCloud); }))
+    out += cloudScript();
+  return out + "</body></html>\n";
 }
 
 Result<std::filesystem::path> write(const Report& report, const std::filesystem::path& folder) {

@@ -10,6 +10,7 @@
 
 #include "calib/compare/json.h"
 #include "calib/compare/plot.h"
+#include "calib/compare/point_cloud.h"
 
 namespace toftwin::compare {
 
@@ -49,7 +50,7 @@ struct Details {
   std::string summary{};
   std::vector<std::string> paragraphs{};
 };
-using Block = std::variant<Paragraph, TableBlock, Figure, FigureRow, Details>;
+using Block = std::variant<Paragraph, TableBlock, Figure, FigureRow, Details, PointCloud>;
 
 struct Section {
   std::string id{};  ///< anchor
@@ -73,7 +74,8 @@ struct Report {
   std::string written_by = "toftwin compare", explained_in = "docs/compare.md";
 };
 
-/// The page: one HTML text that needs nothing else, no network, no script.
+/// The page: one HTML text that needs nothing else, no network. Its script, where there is a point cloud to turn, is in it;
+/// without it the page shows the same.
 std::string toHtml(const Report& report);
 
 /// The words and tables of the page as Markdown, without its pictures.

@@ -64,7 +64,7 @@ PoseComparison thinned(const PoseComparison& all, int stride) {
   few.amplitude_ratio = thinned(all.amplitude_ratio, stride);
   few.edge = thinned(all.edge, stride);
   few.flying_a = thinned(all.flying_a, stride), few.flying_b = thinned(all.flying_b, stride);
-  few.resampled = all.resampled, few.pose = all.pose;
+  few.resampled = all.resampled, few.shared_rays = all.shared_rays, few.pose = all.pose;
   return few;
 }
 
@@ -122,7 +122,7 @@ Result<ComparedCapture> compareCapture(const std::filesystem::path& run, const P
   ComparedCapture one;
   one.record = record;
   one.seen = {seenOf(plan, record, a->stack, a->frames, how.shortest_period_m[0]),
-              seenOf(plan, record, b->stack, b->frames, how.shortest_period_m[1])};
+              seenOf(plan, record, b->stack, b->frames, how.shortest_period_m[1], record.pose_of_b)};
   if (record.kind == nameOf(Kind::Moving)) return one;
   auto compared = compare::comparePose(a->stack, b->stack);
   if (!compared) return ofCapture(record, compared.error());

@@ -79,6 +79,7 @@ std::set<std::size_t> examplesOf(const std::vector<CaptureRecord>& records) {
 struct FirstFrames {
   int stride = 1;  ///< how far apart the pixels are that are kept, by the size of A's image
   std::array<std::vector<double>, 2> frequency_hz{};
+  std::array<Frame, 2> frames{};
 };
 
 Result<Frame> firstFrameIn(const std::filesystem::path& file) {
@@ -102,11 +103,12 @@ Result<FirstFrames> firstFramesOf(const std::filesystem::path& run, const std::v
   const double pixels =
       static_cast<double>(a->camera.width) * a->camera.height * static_cast<double>(records.size());
   return FirstFrames{.stride = static_cast<int>(std::ceil(std::sqrt(std::max(1.0, pixels / kPixelsKept)))),
-                     .frequency_hz = {frequenciesOf(*a), frequenciesOf(*b)}};
+                     .frequency_hz = {frequenciesOf(*a), frequenciesOf(*b)},
+                     .frames = {*a, *b}};
 }
 
 /// Two captures at a time; each is read, compared and thinned before the next.
-Result<ComparedRun> compareAll(const CompareRunJob& job, const Plan& plan,
+Result<ComparedRun> compareAll(const CompareRunJob& job, const RunFiles& files,
                                const std::vector<CaptureRecord>& records, compare::Progress& progress) {
   const auto first = firstFramesOf(job.run, records);
   if (!first) return first.error();
@@ -124,7 +126,7 @@ Result<ComparedRun> compareAll(const CompareRunJob& job, const Plan& plan,
   const auto work = [&] {
     for (std::size_t i = next++; i < records.size() && !gives_up; i = next++) {
       const bool is_shown = shown.contains(records[i].number);
-      results[i] = compareCapture(job.run, plan, records[i], how, is_shown ? &wholes[i] : nullptr);
+      results[i] = compareCapture(job.run, files.plan, records[i], how, is_shown ? &wholes[i] : nullptr);
       if (!*results[i]) gives_up = true;
       ++done;
     }
@@ -142,6 +144,8 @@ Result<ComparedRun> compareAll(const CompareRunJob& job, const Plan& plan,
   if (job.interrupted && job.interrupted()) return Error{Error::Code::Stopped, "interrupted"};
   ComparedRun run;
   run.frequency_hz = first->frequency_hz;
+  run.settings = settingsOf("A", files.camera_a, first->frames[0]);
+  for (RunSetting& one : settingsOf("B", files.camera_b, first->frames[1])) run.settings.push_back(std::move(one));
   for (std::size_t i = 0; i < results.size(); ++i) {
     if (results[i] && !*results[i]) return results[i]->error();
     if (!results[i]) continue;  // after an error, which another one has
@@ -237,7 +241,7 @@ struct OpenLog {
 
 /// All that can fail about the log and can be known beforehand: locked captures are judged only once.
 Result<std::optional<OpenLog>> openLog(const CompareRunJob& job, const RunFiles& files,
-                                       const CaptureRecord& first) {
+                                       const CaptureRecord& first, const std::string& index_sha256) {
   if (job.log.empty()) return std::optional<OpenLog>{};
   auto log = RunLog::open(job.log);
   if (!log) return log.error();
@@ -245,8 +249,6 @@ Result<std::optional<OpenLog>> openLog(const CompareRunJob& job, const RunFiles&
     return Error{writable.error().code,
                  fmt::format("{}: cannot be written: {}", job.log.string(), writable.error().message)};
   }
-  auto hash = sha256Of(job.run / kIndexFile);
-  if (!hash) return hash.error();
   LoggedRun run{.began = utcOf(static_cast<std::time_t>(first.began_ns / 1'000'000'000)),
                 .folder = std::filesystem::absolute(job.run).string(),
                 .plan = files.plan.name,
@@ -254,7 +256,7 @@ Result<std::optional<OpenLog>> openLog(const CompareRunJob& job, const RunFiles&
                 .camera_b = files.camera_b,
                 .software = "toftwin " TOFTWIN_VERSION,
                 .note = job.note,
-                .index_sha256 = *std::move(hash),
+                .index_sha256 = index_sha256,
                 .is_locked = job.locked};
   return std::optional<OpenLog>{OpenLog{*std::move(log), std::move(run)}};
 }
@@ -292,7 +294,9 @@ Result<std::filesystem::path> compareRun(const CompareRunJob& job, compare::Prog
     return Error{Error::Code::InvalidArgument, fmt::format("{}: there are no {}captures to compare",
                                                            job.run.string(), job.locked ? "locked " : "")};
   }
-  auto log = openLog(job, *files, records.front());
+  const auto hash = sha256Of(job.run / kIndexFile);
+  if (!hash) return hash.error();
+  auto log = openLog(job, *files, records.front(), *hash);
   if (!log) return log.error();
   std::error_code failed;
   std::filesystem::create_directories(job.output, failed);
@@ -305,16 +309,23 @@ Result<std::filesystem::path> compareRun(const CompareRunJob& job, compare::Prog
   }
   progress.plan(fmt::format("{} captures", records.size()), 0.3 * static_cast<double>(records.size()));
   progress.plan("report", 3.0);
-  auto run = compareAll(job, files->plan, records, progress);
+  auto run = compareAll(job, *files, records, progress);
   if (!run) return run.error();
   run->plan = files->plan.name, run->is_locked = job.locked;
+  auto made_with = settingsOf(files->plan, records, *hash);
+  run->settings.insert(run->settings.begin(), made_with.begin(), made_with.end());
   run->warnings = warningsOf(*files, *index, records);
   progress.begin();
   auto finding = judgeRun(*run);
   if (!finding) return finding.error();
   progress.end();
-  auto page = compare::write(reportOf(job, *files, records, *std::move(finding)), job.output);
+  auto report = reportOf(job, *files, records, *std::move(finding));
+  report.sections.push_back(
+      {.id = "provenance", .title = "Provenance", .blocks = {provenanceTable(run->settings)}});
+  report.data.set("provenance", toJson(run->settings));
+  auto page = compare::write(report, job.output);
   if (!page || !*log) return page;
+  (*log)->run.settings = run->settings;
   (*log)->run.judged = utcOf(std::time(nullptr));
   if (auto logged = (*log)->log.add((*log)->run, traitsOf(*run)); !logged) {
     return Error{logged.error().code,

@@ -10,11 +10,12 @@
 #include <fmt/format.h>
 
 #include "calib/compare/statistics.h"
-#include "calib/compare/traits/least_squares.h"
+#include "calib/compare/traits/clusters.h"
 
 namespace toftwin::plan {
 namespace {
 
+using compare::TraitCollector;
 using Captures = std::vector<const ComparedCapture*>;
 constexpr std::array kNames{"A", "B"};
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
@@ -100,25 +101,45 @@ void addNoise(const Captures& walls, std::size_t camera, TraitCollector& all) {
           fmt::format("at {:.3g} m", best->record.distance_m));
 }
 
+/// Pixels of a capture wrap together: each capture is a row.
 void addWraps(const Captures& walls, std::size_t camera, TraitCollector& all) {
   std::vector<double> shares;
-  for (const ComparedCapture* one : walls) append(shares, one->seen[camera].wall_wrapped);
+  for (const ComparedCapture* one : walls) {
+    const auto& cells = one->seen[camera].wall_wrapped;
+    if (!cells.empty()) shares.push_back(compare::summarise(cells).mean);
+  }
   all.add("wraps", kNames[camera], compare::wrapTraits(shares));
 }
 
-/// Means over bands of the distance to the edge, from its steps.
-void addBands(const std::string& name, const std::vector<double>& place_m,
-              const std::vector<double>& error_mm, std::size_t camera, TraitCollector& all) {
+/// A corner's errors in steps of the distance to its edge, each of one capture.
+struct Steps {
+  std::vector<double> place_m{}, error_mm{};
+  std::vector<std::size_t> capture{};
+};
+
+/// Of all captures together: place and error of each step.
+std::pair<std::vector<double>, std::vector<double>> meansOf(const Steps& steps) {
+  std::map<double, compare::Running> all;
+  for (std::size_t i = 0; i < steps.place_m.size(); ++i) all[steps.place_m[i]].add(steps.error_mm[i]);
+  std::pair<std::vector<double>, std::vector<double>> means;
+  for (const auto& [place, errors] : all) means.first.push_back(place), means.second.push_back(errors.mean());
+  return means;
+}
+
+/// Means over bands of the distance to the edge: steps of one capture err alike, so a row is a capture's mean.
+void addBands(const std::string& name, const Steps& steps, std::size_t camera, TraitCollector& all) {
   constexpr std::array<std::pair<double, double>, 3> kBands{{{0.0, 0.1}, {0.1, 0.3}, {0.3, 0.9}}};
   std::vector<compare::Trait> traits;
   for (const auto& [from, to] : kBands) {
     std::vector<double> within;
-    for (std::size_t i = 0; i < place_m.size(); ++i) {
-      if (place_m[i] >= from && place_m[i] < to) within.push_back(error_mm[i]);
+    std::vector<std::size_t> captures;
+    for (std::size_t i = 0; i < steps.place_m.size(); ++i) {
+      if (steps.place_m[i] >= from && steps.place_m[i] < to)
+        within.push_back(steps.error_mm[i]), captures.push_back(steps.capture[i]);
     }
-    if (within.size() > 1)
-      traits.push_back(
-          compare::meanTrait(fmt::format("{:g} to {:g} m from the edge", from, to), "mm", within));
+    if (!within.empty())
+      traits.push_back(compare::meanTrait(fmt::format("{:g} to {:g} m from the edge", from, to), "mm",
+                                          compare::clusterMeans(within, captures)));
   }
   if (traits.empty()) {
     all.untold(fmt::format("{} of {}: no wall is seen where the plan puts it (within 300 mm)", name,
@@ -131,26 +152,28 @@ void addBands(const std::string& name, const std::vector<double>& place_m,
 /// Distances to the edge in steps of 2.5 cm: pixels of one step are not independent rows.
 void addCorners(const ComparedRun& run, const OwnError& own, std::size_t camera, TraitCollector& all) {
   constexpr double kStep_m = 0.025;
-  std::map<std::string, std::map<long, compare::Running>> blocks;
+  std::map<std::string, Steps> blocks;
   for (const ComparedCapture* one : ofKind(run, "corner")) {
     if (isPoseFromPlanes(one->record)) continue;
     const CameraSeen& seen = one->seen[camera];
-    auto& steps = blocks[one->record.block];
+    std::map<long, compare::Running> steps;
     for (std::size_t i = 0; i < seen.corner_place_m.size(); ++i) {
       const double usual = own.isKnown() ? own.at(seen.corner_range_m[i]) : 0.0;
       if (std::isfinite(usual))
         steps[std::lround(seen.corner_place_m[i] / kStep_m)].add(seen.corner_error_mm[i] - usual);
     }
+    for (const auto& [step, errors] : steps) {
+      if (errors.n() < 4) continue;
+      Steps& of = blocks[one->record.block];
+      of.place_m.push_back(kStep_m * static_cast<double>(step)), of.error_mm.push_back(errors.mean());
+      of.capture.push_back(one->record.number);
+    }
   }
   for (const auto& [name, steps] : blocks) {
-    std::vector<double> place, error;
-    for (const auto& [step, errors] : steps) {
-      if (errors.n() >= 4)
-        place.push_back(kStep_m * static_cast<double>(step)), error.push_back(errors.mean());
-    }
-    addBands(name, place, error, camera, all);
+    addBands(name, steps, camera, all);
     // The fall from the edge as one exponential, where it is one: at the very edge both ways are equally
-    // long.
+    // long. Of each step over all captures.
+    const auto [place, error] = meansOf(steps);
     if (const auto fall = compare::cornerTraits(place, error)) all.add(name, kNames[camera], fall);
   }
 }
@@ -160,11 +183,13 @@ void addPlates(const ComparedRun& run, const OwnError& own, std::size_t camera, 
   if (captures.empty()) return;
   int width = 1, height = 0;
   std::vector<double> range, plate, ratio, error, place, value;
+  std::vector<std::size_t> number;
   for (const ComparedCapture* one : captures) {
     const CameraSeen& seen = one->seen[camera];
     width = std::max(width, seen.over_split.width()), height += seen.over_split.height() + 1;
     append(place, seen.edge_place_px), append(value, seen.edge_value);
     append(range, seen.wall_range_m), append(plate, seen.plate_range_m), append(ratio, seen.plate_over_own);
+    number.resize(range.size(), one->record.number);
     for (std::size_t i = 0; i < seen.wall_range_m.size(); ++i)
       error.push_back(seen.wall_error_mm[i] - (own.isKnown() ? own.at(seen.wall_range_m[i]) : 0.0));
   }
@@ -189,7 +214,7 @@ void addPlates(const ComparedRun& run, const OwnError& own, std::size_t camera, 
                            kNames[camera], run.frequency_hz[camera].size()));
     return;
   }
-  all.add("lens scatter", kNames[camera], compare::veilTraits(range, plate, ratio, error, run.frequency_hz[camera]));
+  all.add("lens scatter", kNames[camera], compare::veilTraits(range, plate, ratio, error, run.frequency_hz[camera], number));
 }
 
 /// The first frame after each turn from bright to dark or back, against the frames that follow.
@@ -209,13 +234,13 @@ void addLag(const ComparedRun& run, std::size_t camera, TraitCollector& all) {
   all.add("lag of the first frame recorded", kNames[camera], compare::afterImageTraits(first, rest, before));
 }
 
-/// A plate's path: its middle over time; speeds are differences of successive frames.
+/// A plate's path: its middle over time; speeds are differences of two frames, each of which is in one of them.
 void addMotion(const ComparedRun& run, std::size_t camera, TraitCollector& all) {
   const Captures captures = ofKind(run, "moving");
   std::vector<double> speed, turn;
   for (const ComparedCapture* one : captures) {
     const CameraSeen& seen = one->seen[camera];
-    for (std::size_t i = 1; i < seen.plate_time_s.size(); ++i) {
+    for (std::size_t i = 1; i < seen.plate_time_s.size(); i += 2) {
       const double passed = seen.plate_time_s[i] - seen.plate_time_s[i - 1];
       if (!(passed > 0.0)) continue;
       speed.push_back((seen.plate_place_m[i] - seen.plate_place_m[i - 1]) / passed);
@@ -271,15 +296,6 @@ void addLatency(const ComparedRun& run, TraitCollector& all) {
 }
 
 }  // namespace
-
-void TraitCollector::add(const std::string& what, const char* of, const compare::Traits& traits,
-                         const std::string& detail) {
-  if (!traits) {
-    found_.untold.push_back(fmt::format("{} of {}: {}", what, of, traits.error().message));
-    return;
-  }
-  for (const compare::Trait& trait : *traits) found_.traits.push_back({what, detail, of, trait});
-}
 
 void addFrameTraits(const ComparedRun& run, TraitCollector& all) {
   Captures walls = ofKind(run, "distance");

@@ -48,7 +48,7 @@ Result<> Taker::lookAround(const PlannedCapture& planned, Feed& a, Feed& b, Take
   }
   const auto commanded = taken.pose;
   if (!b.details().can_set_pose) {
-    const auto by_b = seenBy(planned, b, finder_b_, taken);
+    auto by_b = seenBy(planned, b, finder_b_, taken);
     if (!by_b) {
       return Error{by_b.error().code, fmt::format("{} sees where it stands ({}), the other does not: {}",
                                                   sourceOf(a), seen->what, by_b.error().message)};
@@ -57,6 +57,7 @@ Result<> Taker::lookAround(const PlannedCapture& planned, Feed& a, Feed& b, Take
     if (!off.empty())
       return Error{Error::Code::InvalidArgument, fmt::format("poses disagree: {} and {} stand at places {}",
                                                              sourceOf(a), sourceOf(b), off)};
+    taken.seen_by_b = *std::move(by_b);
   } else if (auto put = b.setPose(seen->world_from_camera); !put) {
     return put.error();
   }

@@ -107,6 +107,7 @@ std::optional<CaptureRecord> recordOf(const Json& json) {
     one.pose_half_widths.emplace();
     for (std::size_t i = 0; i < 6; ++i) (*one.pose_half_widths)[i] = widths->at(i).number();
   }
+  one.pose_of_b = poseOf(json.find("pose_of_b"));
   const auto a = fileOf(json.find("a")), b = fileOf(json.find("b"));
   if (!a || !b || !members.is_whole) return std::nullopt;
   one.a = *a, one.b = *b;
@@ -141,6 +142,10 @@ std::string lineOf(const Plan& plan, const PlannedCapture& planned, const Taken&
   if (taken.seen) {
     json.set("pose_seen", taken.seen->what)
         .set("pose_half_widths_rad_m", Json::arrayOf(taken.seen->half_widths));
+  }
+  if (taken.seen_by_b) {
+    json.set("pose_of_b", toJson(std::optional{taken.seen_by_b->world_from_camera}))
+        .set("pose_of_b_half_widths_rad_m", Json::arrayOf(taken.seen_by_b->half_widths));
   }
   json.set("a", toJson(a, taken.a)).set("b", toJson(b, taken.b));
   json.set("rig", taken.rig).set("notes", Json::arrayOf(taken.notes));

@@ -51,6 +51,8 @@ struct CaptureRecord {
   std::string pose_by{};
   /// 95 % half widths of a pose that was seen: turns (rad), then place (m).
   std::optional<std::array<double, 6>> pose_half_widths{};
+  /// Where B saw itself; none where it was put to `pose` or took it on trust.
+  std::optional<Transform<World, Camera>> pose_of_b{};
   RecordedFile a{}, b{};
   std::vector<std::string> notes{};
 };

@@ -12,7 +12,7 @@
 namespace toftwin::plan {
 namespace {
 
-constexpr int kVersion = 1;
+constexpr int kVersion = 2;
 constexpr std::int64_t kApplicationId = 0x746F6674;  ///< "toft": what says that a database is such a log
 /// What brings a log from one version to the next; the first makes it.
 constexpr std::array kMigrations{
@@ -26,7 +26,11 @@ constexpr std::array kMigrations{
     " what TEXT NOT NULL, detail TEXT NOT NULL, name TEXT NOT NULL, unit TEXT NOT NULL, value REAL, low REAL,"
     " high REAL, n INTEGER NOT NULL,"
     " PRIMARY KEY (run, of, what, name));"
-    "CREATE TABLE untold (run INTEGER NOT NULL REFERENCES run (id) ON DELETE CASCADE, why TEXT NOT NULL);"};
+    "CREATE TABLE untold (run INTEGER NOT NULL REFERENCES run (id) ON DELETE CASCADE, why TEXT NOT NULL);",
+    "CREATE TABLE camera (name TEXT PRIMARY KEY, source TEXT NOT NULL, model TEXT NOT NULL, serial TEXT NOT "
+    "NULL);"
+    "CREATE TABLE setting (run INTEGER NOT NULL REFERENCES run (id) ON DELETE CASCADE, of TEXT NOT NULL,"
+    " name TEXT NOT NULL, value TEXT NOT NULL, PRIMARY KEY (run, of, name));"};
 static_assert(kMigrations.size() == kVersion);
 
 Error failure(sqlite3* database, const std::string& what) {
@@ -102,6 +106,24 @@ LoggedRun runFrom(Statement& row) {
   return run;
 }
 
+/// A camera is called the same in `run`.
+Result<> writeCamera(sqlite3* database, const std::string& text) {
+  const CameraName name = cameraNameOf(text);
+  Statement row{database, "INSERT OR IGNORE INTO camera VALUES (?, ?, ?, ?)"};
+  return row.bind(text).bind(name.source).bind(name.model).bind(name.serial).run();
+}
+
+Result<> writeSettings(sqlite3* database, std::int64_t id, const LoggedRun& run) {
+  for (const std::string* camera : {&run.camera_a, &run.camera_b}) {
+    if (auto done = writeCamera(database, *camera); !done) return done;
+  }
+  for (const RunSetting& one : run.settings) {
+    Statement row{database, "INSERT OR REPLACE INTO setting VALUES (?, ?, ?, ?)"};
+    if (auto done = row.bind(id).bind(one.of).bind(one.name).bind(one.value).run(); !done) return done;
+  }
+  return {};
+}
+
 Result<> write(sqlite3* database, const LoggedRun& run, const RunTraits& traits) {
   Statement remove{database, "DELETE FROM run WHERE index_sha256 = ? AND locked = ?"};
   if (auto done = remove.bind(run.index_sha256).bind(std::int64_t{run.is_locked}).run(); !done) return done;
@@ -114,6 +136,7 @@ Result<> write(sqlite3* database, const LoggedRun& run, const RunTraits& traits)
     insert.bind(*text);
   if (auto done = insert.bind(std::int64_t{run.is_locked}).run(); !done) return done;
   const std::int64_t id = sqlite3_last_insert_rowid(database);
+  if (auto done = writeSettings(database, id, run); !done) return done;
   for (const auto& [what, detail, of, trait] : traits.traits) {
     Statement row{database, "INSERT OR REPLACE INTO characteristic VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)"};
     row.bind(id).bind(of).bind(what).bind(detail).bind(trait.name).bind(trait.unit);
@@ -159,6 +182,17 @@ Result<std::int64_t> versionOf(sqlite3* database) {
   return version;
 }
 
+/// The cameras of runs that a log of version 1 has.
+Result<> fillCameras(sqlite3* database) {
+  std::vector<std::string> names;
+  Statement asked{database, "SELECT camera_a FROM run UNION SELECT camera_b FROM run"};
+  if (auto done = asked.each([&](Statement& row) { names.push_back(row.text()); }); !done) return done;
+  for (const std::string& name : names) {
+    if (auto done = writeCamera(database, name); !done) return done;
+  }
+  return {};
+}
+
 /// Brings it to this version; to be called within a transaction that nobody else can write in.
 Result<> migrate(sqlite3* database) {
   const auto version = versionOf(database);
@@ -167,6 +201,9 @@ Result<> migrate(sqlite3* database) {
     const std::string sql = fmt::format("{} PRAGMA application_id = {}; PRAGMA user_version = {};",
                                         kMigrations[static_cast<std::size_t>(from)], kApplicationId, from + 1);
     if (auto done = execute(database, sql.c_str()); !done) return done;
+    if (from == 1) {
+      if (auto done = fillCameras(database); !done) return done;
+    }
   }
   return {};
 }
@@ -221,6 +258,28 @@ Result<std::vector<LoggedRun>> RunLog::runs() {
   Statement asked{database_.get(), fmt::format("SELECT {} FROM run ORDER BY began, id", kRunColumns)};
   if (auto done = asked.each([&](Statement& row) { all.push_back(runFrom(row)); }); !done)
     return done.error();
+  return all;
+}
+
+Result<std::vector<CameraName>> RunLog::cameras() {
+  std::vector<CameraName> all;
+  Statement asked{database_.get(), "SELECT source, model, serial FROM camera ORDER BY name"};
+  const auto done = asked.each([&](Statement& row) {
+    CameraName& one = all.emplace_back();
+    one.source = row.text(), one.model = row.text(), one.serial = row.text();
+  });
+  if (!done) return done.error();
+  return all;
+}
+
+Result<std::vector<RunSetting>> RunLog::settings(std::int64_t run) {
+  std::vector<RunSetting> all;
+  Statement asked{database_.get(), "SELECT of, name, value FROM setting WHERE run = ? ORDER BY rowid"};
+  const auto done = asked.bind(run).each([&](Statement& row) {
+    RunSetting& one = all.emplace_back();
+    one.of = row.text(), one.name = row.text(), one.value = row.text();
+  });
+  if (!done) return done.error();
   return all;
 }
 

@@ -9,6 +9,7 @@
 
 #include <toftwin/result.h>
 
+#include "calib/plan/run_settings.h"
 #include "calib/plan/run_traits.h"
 
 struct sqlite3;
@@ -24,6 +25,7 @@ struct LoggedRun {
   std::string
       index_sha256{};  ///< of its index.jsonl: the same captures judged again take the old entry's place
   bool is_locked = false;
+  std::vector<RunSetting> settings{};  ///< written with it; settings() reads them
 };
 
 /// One number of one run.
@@ -43,6 +45,10 @@ class RunLog {
   Result<> add(const LoggedRun& run, const RunTraits& traits);
   /// By when they began.
   Result<std::vector<LoggedRun>> runs();
+  /// The cameras of all runs, each once.
+  Result<std::vector<CameraName>> cameras();
+  /// What a run was made with; nothing of runs that a log of version 1 had.
+  Result<std::vector<RunSetting>> settings(std::int64_t run);
   /// All numbers whose characteristic and name begin so (empty: all) and whose camera, A's or B's, is called
   /// so.
   Result<std::vector<LoggedTrait>> traits(const std::string& camera, const std::string& what,

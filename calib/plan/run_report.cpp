@@ -11,6 +11,9 @@
 #include <fmt/format.h>
 
 #include "calib/compare/live_report.h"
+#include "calib/compare/trait_verdict.h"
+#include "calib/compare/traits/least_squares.h"
+#include "calib/plan/run_figures.h"
 #include "calib/plan/run_traits.h"
 
 namespace toftwin::plan {
@@ -185,9 +188,13 @@ void addFigures(const ComparedRun& run, std::vector<Block>& blocks) {
   for (const TrendOf& trend : kTrends) {
     if (auto figure = figureOf(run, trend)) row.figures.push_back(*std::move(figure));
   }
-  if (!row.figures.empty()) blocks.push_back(std::move(row));
+  row.figures.push_back(histogramFigure(pixelsOf(imagesOf(run, [](const ComparedCapture&) { return true; }))));
+  blocks.push_back(std::move(row));
   const double reach = reachOf(run);
-  for (const auto& [name, image] : run.examples) blocks.push_back(mapsOf(name, image, reach));
+  for (const auto& [name, image] : run.examples) {
+    blocks.push_back(mapsOf(name, image, reach));
+    if (auto cloud = pointCloudOf(name, image); !cloud.a.empty()) blocks.push_back(std::move(cloud));
+  }
 }
 
 std::string signedMm(const Summary& difference) {
@@ -201,13 +208,41 @@ std::vector<Card> cardsOf(const Characteristics& c) {
   const Region& main = mainRegionOf(c);
   const Summary& all = main.difference_mm;
   return {{"Bias, B − A", withError(all.mean, all.standard_error) + " mm",
-           fmt::format("± standard error over {} different poses", c.places), toneOfDifference(all)},
+           fmt::format("± standard error over {} different poses", c.places), toneOfDifference(main)},
           {"95 % agree within", shown(all.p95_abs) + " mm", fmt::format("RMS {} mm", shown(all.rms)),
            Tone::Neutral},
           {"Noise, A | B", fmt::format("{} | {} mm", shown(main.noise_a_mm, 2), shown(main.noise_b_mm, 2)),
            "temporal, median over pixels", Tone::Neutral},
           {"Masks agree", shown(100.0 * c.mask_agreement, 1) + " %", "where both are valid or both are not",
            c.mask_agreement > 0.98 ? Tone::Good : Tone::Fair}};
+}
+
+/// Over different poses, each of which is one draw of it.
+NamedTrait biasOf(const Characteristics& c) {
+  const Summary& all = mainRegionOf(c).difference_mm;
+  const double half = c.places > 1 ? studentT(static_cast<double>(c.places - 1)) * all.standard_error : std::nan("");
+  return {.what = "bias on surfaces",
+          .of = "B − A",
+          .trait = {"bias on surfaces", "mm", all.mean, all.mean - half, all.mean + half, c.places}};
+}
+
+std::vector<TraitVerdict> verdictsOf(const RunTraits& traits, const Characteristics& c) {
+  RunTraits all = traits;
+  all.traits.push_back(biasOf(c));
+  return compare::verdictsOf(all);
+}
+
+/// Good only where no number differs; bad where the bias is far beyond A's noise.
+Tone toneOf(const std::vector<TraitVerdict>& verdicts, const Region& main) {
+  if (std::ranges::none_of(verdicts, &TraitVerdict::differs)) return Tone::Good;
+  return toneOfDifference(main) == Tone::Bad ? Tone::Bad : Tone::Fair;
+}
+
+std::vector<Card> cardsOf(const Characteristics& c, const std::vector<TraitVerdict>& verdicts) {
+  std::vector<Card> cards = compare::cardsOf(verdicts);
+  const auto more = cardsOf(c);
+  cards.insert(cards.end(), more.begin(), more.end());
+  return cards;
 }
 
 }  // namespace
@@ -222,23 +257,28 @@ Result<Finding> judgeRun(const ComparedRun& run) {
   }
   const Region& main = mainRegionOf(c);
   Finding finding;
+  const RunTraits traits = traitsOf(run);
+  const std::vector<TraitVerdict> verdicts = verdictsOf(traits, c);
   finding.headline = fmt::format(
-      "On surfaces B ({}) reads {} than A ({}) over {} captures; 95 % of the pixels agree within "
+      "{}. On surfaces B ({}) reads {} than A ({}) over {} captures; 95 % of the pixels agree within "
       "{} mm; B's temporal noise is {} times A's",
-      run.captures.front().record.b.source, signedMm(main.difference_mm),
+      headlineOf(verdicts), run.captures.front().record.b.source, signedMm(main.difference_mm),
       run.captures.front().record.a.source, run.captures.size(), shown(main.difference_mm.p95_abs),
       shown(c.noise_ratio.median, 2));
-  finding.cards = cardsOf(c);
+  finding.cards = cardsOf(c, verdicts);
   finding.section = {.id = run.is_locked ? "locked" : "run",
                      .title = run.is_locked ? "Locked captures" : "The plan's captures",
                      .verdict = finding.headline + ".",
-                     .tone = toneOfDifference(main.difference_mm)};
+                     .tone = toneOf(verdicts, main)};
   auto& blocks = finding.section.blocks;
   for (const std::string& warning : run.warnings) blocks.push_back(Paragraph{"Note: " + warning});
+  const auto seen = std::ranges::find_if(run.captures, isSeen);
+  if (const std::string note = resamplingNote(seen->thinned); !note.empty()) blocks.push_back(Paragraph{"Note: " + note});
+  blocks.push_back(verdictTable(verdicts));
   blocks.push_back(blockTable(run));
+  if (auto figures = characteristicFigures(run, traits); !figures.empty()) blocks.push_back(FigureRow{std::move(figures)});
   addFigures(run, blocks);
   if (auto again = againTable(run); !again.rows.empty()) blocks.push_back(std::move(again));
-  const RunTraits traits = traitsOf(run);
   if (!traits.traits.empty()) blocks.push_back(traitTable(traits));
   if (!traits.untold.empty()) blocks.push_back(Details{"What these captures cannot tell", traits.untold});
   blocks.push_back(regionTable(c));
@@ -250,6 +290,7 @@ Result<Finding> judgeRun(const ComparedRun& run) {
       true});
   finding.data = toJson(c);
   finding.data.set("captures", captureJson(run)).set("characteristics", toJson(traits));
+  finding.data.set("verdicts", toJson(verdicts));
   return finding;
 }
 

@@ -10,6 +10,7 @@
 
 #include "calib/compare/real_data.h"
 #include "calib/plan/compare_run.h"
+#include "calib/plan/run_settings.h"
 
 namespace toftwin::plan {
 
@@ -23,6 +24,7 @@ struct ComparedRun {
   /// Modulation frequencies of A and B, by the first capture's frames; empty: none is told.
   std::array<std::vector<double>, 2> frequency_hz{};
   std::vector<std::string> warnings;
+  std::vector<RunSetting> settings{};  ///< what it was made with
   bool is_locked = false;  ///< of the locked captures
 };
 

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <map>
 #include <utility>
 
 #include <fmt/format.h>
@@ -16,11 +17,8 @@
 namespace toftwin::plan {
 namespace {
 
-using compare::Trait;
+using compare::TraitCollector;
 using Captures = std::vector<const ComparedCapture*>;
-
-/// Rows for each parameter of a fit; fewer tell little more than themselves.
-constexpr std::size_t kRowsPerParameter = 3;
 
 /// Which kind of block tells what; docs/characteristics.md has the same.
 struct Feeds {
@@ -81,33 +79,12 @@ constexpr std::array kSides{Side{"A", [](const ComparedCapture& c) { return c.ra
                                  [](const ComparedCapture& c) { return c.amplitude_b; },
                                  [](const ComparedCapture& c) { return c.record.b.since_power_on_s; }}};
 
-const char* nameOf(compare::DriftModel model) {
-  switch (model) {
-    case compare::DriftModel::Constant:
-      return "none";
-    case compare::DriftModel::Ramp:
-      return "ramp";
-    case compare::DriftModel::OneExponential:
-      return "one exponential";
-    case compare::DriftModel::TwoExponentials:
-      return "two exponentials";
-    case compare::DriftModel::Step:
-      return "step";
-  }
-  return "";
-}
-
 void addDrift(const ComparedRun& run, TraitCollector& all) {
   const Captures captures = capturesOf(run, "warm_up");
   if (captures.empty()) return;
   for (const Side& side : kSides) {
-    const auto drift =
-        compare::driftTraits(column(captures, side.since_power_on_s), column(captures, side.range_mm));
-    if (drift) {
-      all.add("drift", side.name, drift->traits, nameOf(drift->model));
-    } else {
-      all.add("drift", side.name, drift.error());
-    }
+    all.add("drift", side.name,
+            compare::driftTraits(column(captures, side.since_power_on_s), column(captures, side.range_mm)));
   }
 }
 
@@ -124,22 +101,37 @@ std::string wordsOf(const std::vector<double>& frequency_hz) {
   return words.empty() ? "no frequency that its frames say" : words + " MHz";
 }
 
-/// As many of four, three, two and one wave per period as the rows allow: cameras of four and three steps
-/// have the first of these.
-void addWaves(const std::string& what, const char* of, const std::vector<double>& distance_m,
-              const std::vector<double>& error_mm, const std::vector<double>& frequency_hz, TraitCollector& all) {
-  std::vector<int> orders;
-  for (const int order : {4, 3, 2, 1}) {
-    const std::size_t parameters = 2 + 2 * frequency_hz.size() * (orders.size() + 1);
-    if (distance_m.size() >= kRowsPerParameter * parameters) orders.push_back(order);
+/// Errors over distance: a wall's parts in steps of range, capture by capture. Over a wide wall ranges differ by much of
+/// a wave, so that a whole image's mean would lose the short ones.
+struct OverDistance {
+  std::vector<double> distance_m{}, error_mm{};
+  std::vector<std::size_t> capture{};
+
+  void add(std::size_t number, const std::vector<double>& at_m, const std::vector<double>& of_mm) {
+    constexpr double kStep_m = 0.025;
+    std::map<long, std::pair<compare::Running, compare::Running>> steps;
+    for (std::size_t i = 0; i < at_m.size(); ++i) {
+      if (!std::isfinite(of_mm[i]) || !std::isfinite(at_m[i])) continue;
+      auto& [at, of] = steps[std::lround(at_m[i] / kStep_m)];
+      at.add(at_m[i]), of.add(of_mm[i]);
+    }
+    for (const auto& [step, means] : steps) {
+      distance_m.push_back(means.first.mean()), error_mm.push_back(means.second.mean());
+      capture.push_back(number);
+    }
   }
-  if (!orders.empty()) {
-    all.add(what, of, compare::harmonicTraits(distance_m, error_mm, frequency_hz, orders));
-    return;
+};
+
+/// B − A of a capture's compared pixels over A's range.
+void addDifference(const ComparedCapture& one, OverDistance& rows) {
+  const Image<float> difference = compare::comparedDifference_mm(one.thinned);
+  std::vector<double> at, of;
+  for (std::size_t i = 0; i < difference.size(); ++i) {
+    at.push_back(1e-3 * static_cast<double>(one.thinned.range_a_mm[i]));
+    of.push_back(static_cast<double>(difference[i]));
   }
-  all.untold(fmt::format("{} of {}: {} captures over distance for {} frequencies; {} are needed", what, of,
-                         distance_m.size(), frequency_hz.size(),
-                         kRowsPerParameter * (2 + 2 * frequency_hz.size())));
+  if (difference.empty()) at.push_back(1e-3 * one.range_a_mm), of.push_back(one.difference_mm);
+  rows.add(one.record.number, at, of);
 }
 
 void addHarmonics(const ComparedRun& run, TraitCollector& all) {
@@ -151,15 +143,21 @@ void addHarmonics(const ComparedRun& run, TraitCollector& all) {
                            "both have the same frequencies",
                            wordsOf(of_a), wordsOf(of_b)));
   } else {
-    const auto distance = column(captures, [](const auto& one) { return one.range_a_mm / 1000.0; });
-    addWaves("harmonics", "B − A", distance, differencesOf(captures), of_a, all);
+    OverDistance rows;
+    for (const ComparedCapture* one : captures) addDifference(*one, rows);
+    all.add("harmonics", "B − A", compare::harmonicTraits(rows.distance_m, rows.error_mm, of_a, rows.capture));
   }
   for (std::size_t camera : {std::size_t{0}, std::size_t{1}}) {
-    const auto at = column(captures, [&](const auto& one) { return meanOf(one.seen[camera].wall_range_m); });
-    const auto error = column(captures, [&](const auto& one) { return meanOf(one.seen[camera].wall_error_mm); });
-    if (run.frequency_hz[camera].empty() || std::ranges::none_of(error, [](double e) { return std::isfinite(e); }))
+    OverDistance rows;
+    for (const ComparedCapture* one : captures)
+      rows.add(one->record.number, one->seen[camera].wall_range_m, one->seen[camera].wall_error_mm);
+    if (rows.distance_m.empty()) continue;  // no wall, or a pose by planes: said elsewhere
+    if (run.frequency_hz[camera].empty()) {
+      all.untold(fmt::format("harmonics of {}: its frames say no modulation frequency", kSides[camera].name));
       continue;
-    addWaves("harmonics, against the plan's wall", kSides[camera].name, at, error, run.frequency_hz[camera], all);
+    }
+    all.add("harmonics, against the plan's wall", kSides[camera].name,
+            compare::harmonicTraits(rows.distance_m, rows.error_mm, run.frequency_hz[camera], rows.capture));
   }
 }
 
@@ -201,8 +199,10 @@ void addNoiseLaw(const ComparedRun& run, TraitCollector& all) {
   std::erase_if(captures, [](const ComparedCapture* one) { return one->record.ambient_klx > 0.0; });
   for (const Side& side : kSides) {
     const auto amplitude = column(captures, side.amplitude);
-    if (std::ranges::none_of(amplitude, [](double a) { return std::isfinite(a); }))
-      continue;  // it gives none
+    if (std::ranges::none_of(amplitude, [](double a) { return std::isfinite(a); })) {
+      all.untold(fmt::format("noise law of {}: its frames have no amplitude", side.name));
+      continue;
+    }
     all.add("noise law", side.name, compare::noiseLawTraits(amplitude, column(captures, side.noise_mm)));
   }
 }
@@ -241,47 +241,12 @@ RunTraits traitsOf(const ComparedRun& run) {
   return std::move(all).found();
 }
 
-compare::TableBlock traitTable(const RunTraits& traits) {
-  compare::TableBlock table{
-      "Characteristics, with the intervals that are to hold them with 95 % and, behind a #, the number of rows, frames or "
-      "blocks they are from: see docs/characteristics.md",
-      {"characteristic", "number", "unit", "A", "B", "B − A, or both"},
-      {}};
-  std::vector<std::pair<std::string, std::string>> keys;
-  for (const auto& [what, detail, of, trait] : traits.traits) {
-    const std::pair key{what, trait.name};
-    auto row = static_cast<std::size_t>(std::ranges::find(keys, key) - keys.begin());
-    if (row == keys.size()) {
-      keys.push_back(key);
-      table.rows.push_back({what, trait.name, trait.unit, "", "", ""});
-    }
-    table.rows[row][of == "A" ? 3 : of == "B" ? 4 : 5] =
-        fmt::format("{:.4g} ({:.4g} to {:.4g}) #{}{}{}", trait.value, trait.low, trait.high, trait.n,
-                    detail.empty() ? "" : ", ", detail);
-  }
-  return table;
-}
-
 std::vector<std::string> feedsOf(std::string_view kind) {
   std::vector<std::string> told;
   for (const Feeds& one : kFeeds) {
     if (one.kind == kind) told.emplace_back(one.what);
   }
   return told;
-}
-
-compare::Json toJson(const RunTraits& traits) {
-  compare::Json rows = compare::Json::array(), untold = compare::Json::array();
-  for (const auto& [what, detail, of, trait] : traits.traits) {
-    compare::Json row = compare::Json::object();
-    row.set("characteristic", what).set("detail", detail).set("of", of).set("name", trait.name).set("unit", trait.unit);
-    row.set("value", trait.value).set("low", trait.low).set("high", trait.high).set("n", trait.n);
-    rows.push(std::move(row));
-  }
-  for (const std::string& text : traits.untold) untold.push(text);
-  compare::Json json = compare::Json::object();
-  json.set("rows", std::move(rows)).set("untold", std::move(untold));
-  return json;
 }
 
 }  // namespace toftwin::plan

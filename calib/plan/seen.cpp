@@ -137,7 +137,8 @@ Result<ReadFrame> readOf(const Frame& frame) {
 }
 
 CameraSeen seenOf(const Plan& plan, const CaptureRecord& record, const compare::Stack& stack,
-                  const std::vector<ReadFrame>& frames, double shortest_period_m) {
+                  const std::vector<ReadFrame>& frames, double shortest_period_m,
+                  const std::optional<Transform<World, Camera>>& own_pose) {
   CameraSeen seen;
   seen.is_simulated = stack.provenance().kind == FrameKind::Simulated;
   for (const ReadFrame& frame : frames) {
@@ -146,25 +147,26 @@ CameraSeen seenOf(const Plan& plan, const CaptureRecord& record, const compare::
   }
   if (seen.starts_s.size() < frames.size()) seen.starts_s.clear();
   const BlockSpec* block = blockOf(plan, record);
-  if (block == nullptr || !stack.pose()) return seen;
+  const auto& pose = own_pose ? own_pose : stack.pose();
+  if (block == nullptr || !pose) return seen;
   switch (block->kind) {
     case Kind::WarmUp:
     case Kind::Distance:
     case Kind::Exposure:
     case Kind::Tilt: {
-      const auto expected = wallRange_m(plan, *block, stack.camera(), *stack.pose());
+      const auto expected = wallRange_m(plan, *block, stack.camera(), *pose);
       addWall(stack, expected, shortest_period_m, seen);
       if (block->kind == Kind::WarmUp || block->kind == Kind::Distance) addNoise(frames, expected, seen);
       break;
     }
     case Kind::Corner:
-      addCorner(plan, *block, *stack.pose(), stack, seen);
+      addCorner(plan, *block, *pose, stack, seen);
       break;
     case Kind::Foreground:
-      addPlate(wallRange_m(plan, *block, stack.camera(), *stack.pose()), stack, seen);
+      addPlate(wallRange_m(plan, *block, stack.camera(), *pose), stack, seen);
       break;
     case Kind::Moving:
-      addMovingPlate(wallRange_m(plan, *block, stack.camera(), *stack.pose()), stack.camera(), frames, seen);
+      addMovingPlate(wallRange_m(plan, *block, stack.camera(), *pose), stack.camera(), frames, seen);
       break;
     default:
       break;

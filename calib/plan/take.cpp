@@ -194,6 +194,7 @@ Result<TakenBy> Taker::framesOf(const PlannedCapture& planned, Feed& feed, const
     if (by.frames == 0) {
       by.since_power_on = frame->moment.since_power_on, by.temperatures = frame->moment.temperatures;
       by.ambient = frame->moment.ambient, by.exposure = longestExposure(*frame);
+      by.note = compare::clockWarning(*frame);
       if (first != nullptr) *first = *frame;
     }
     if (auto done = sink(*frame); !done) return done.error();
@@ -260,6 +261,9 @@ Result<Taken> Taker::take(const PlannedCapture& planned, Feed& a, Feed& b, const
   auto by_b = framesOf(planned, b, taken, to_b, taken.a.since_power_on, nullptr);
   if (!by_b) return naming(planned, by_b.error());
   taken.b = *std::move(by_b);
+  for (const TakenBy* by : {&taken.a, &taken.b}) {
+    if (!by->note.empty()) taken.notes.push_back(by->note);
+  }
   if (options_.carrier == nullptr || !planned.pose) return taken;
   taken.rig = options_.carrier->log();
   if (auto there = options_.carrier->stillThere(); !there) return naming(planned, there.error());

@@ -51,6 +51,7 @@ struct TakenBy {
   std::vector<NamedTemperature> temperatures{};
   std::optional<Illuminance> ambient{};
   std::optional<Duration> exposure{};  ///< the longest of the first frame's
+  std::string note{};                  ///< what a reader must know of it, or nothing
 };
 
 /// What was captured, and how.
@@ -59,6 +60,7 @@ struct Taken {
   /// "camera", "rig", "person", "board", "planes", "rig with the board's help"; "" where they were left
   std::string pose_by{};
   std::optional<SeenPose> seen{};  ///< what the pose was told from, where a camera saw it
+  std::optional<SeenPose> seen_by_b{};  ///< where B saw itself, where it did
   std::int64_t began_ns = 0;
   TakenBy a{}, b{};
   compare::Json rig{};

@@ -2,19 +2,15 @@
 #include "calib/plan/trend.h"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 #include <tuple>
 
 #include <fmt/format.h>
 
-#include "calib/compare/traits/least_squares.h"
+#include "calib/compare/traits/difference.h"
 
 namespace toftwin::plan {
 namespace {
-
-constexpr double kLevel = 0.95;
-constexpr double kManyDegrees = 1e6;  ///< Student's quantile is the normal one there
 
 std::string camerasOf(const LoggedTrait& one) {
   if (one.trait.of == "A") return one.run.camera_a;
@@ -34,11 +30,8 @@ std::string titleOf(const LoggedTrait& one) {
 }
 
 TrendRow heldAgainst(const LoggedTrait& first, const LoggedTrait& now, double wider) {
-  const compare::Trait &v1 = first.trait.trait, &v = now.trait.trait;
-  TrendRow row{.at = now, .change = v.value - v1.value};
-  row.low = row.change - wider * std::hypot(v.value - v.low, v1.high - v1.value);
-  row.high = row.change + wider * std::hypot(v.high - v.value, v1.value - v1.low);
-  return row;
+  const auto change = compare::differenceOf(first.trait.trait, now.trait.trait, wider);
+  return {.at = now, .change = change.value, .low = change.low, .high = change.high};
 }
 
 }  // namespace
@@ -46,9 +39,7 @@ TrendRow heldAgainst(const LoggedTrait& first, const LoggedTrait& now, double wi
 std::vector<TrendSeries> trendsOf(const std::vector<LoggedTrait>& traits) {
   std::map<decltype(keyOf(traits.front())), std::vector<const LoggedTrait*>> series;
   for (const LoggedTrait& one : traits) series[keyOf(one)].push_back(&one);
-  const double changes = std::max(1.0, static_cast<double>(traits.size() - series.size()));
-  const double wider = compare::studentT(kManyDegrees, std::pow(kLevel, 1.0 / changes)) /
-                       compare::studentT(kManyDegrees, kLevel);
+  const double wider = compare::widenedFor(traits.size() - series.size());
   std::vector<TrendSeries> all;
   for (auto& [key, numbers] : series) {
     std::ranges::stable_sort(numbers, {}, [](const LoggedTrait* one) { return one->run.began; });

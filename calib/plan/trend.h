@@ -24,9 +24,7 @@ struct TrendSeries {
   std::vector<TrendRow> rows{};
 };
 
-/// Series of what a log's traits() gave. Intervals of changes are MOVER's (G. Y. Zou, A. Donner, Stat. Med. 27 (2008)
-/// 1693): d − √((v − l)² + (u₁ − v₁)²) to d + √((u − v)² + (v₁ − l₁)²). Over the m changes of all series they are
-/// widened to Šidák's level 0.95^(1/m), as normal ones are.
+/// Series of what a log's traits() gave. Changes are compare::differenceOf(), widened for those of all series together.
 std::vector<TrendSeries> trendsOf(const std::vector<LoggedTrait>& traits);
 
 }  // namespace toftwin::plan

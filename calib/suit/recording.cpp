@@ -36,6 +36,7 @@ struct Taken {
   std::map<std::size_t, AtPose> poses;  ///< by number in the use case
   std::vector<double> starts_s;
   std::size_t elsewhere = 0, unplaced = 0, near_several = 0;
+  std::string damage;  ///< of the recording, or empty
 };
 
 struct Match {
@@ -116,6 +117,7 @@ Result<Taken> readAll(const Case& use, const CameraSpec& spec, const std::string
                   fmt::format("it holds the sources {}; name one as FILE#SOURCE", fmt::join(sources, ", "))});
   }
   Taken taken;
+  taken.damage = reader->summary().damage;
   while (true) {
     if (!watch(0.2)) return Error{Error::Code::Stopped, "interrupted"};
     auto frame = reader->next(source);
@@ -196,6 +198,8 @@ Result<CameraResult> judgeRecording(const Case& use, const sim::Scene& scene, co
         "pose = … does)",
         taken->starts_s.size(), taken->elsewhere, taken->unplaced);
   }
+  if (!taken->damage.empty())
+    camera.notes.push_back(fmt::format("its recording is damaged, and judged as far as it can be read: {}", taken->damage));
   if (taken->elsewhere > 0)
     camera.notes.push_back(
         fmt::format("{} frames were taken at no pose of the use case and left out", taken->elsewhere));

@@ -121,6 +121,26 @@ std::vector<Planted> overDistance() {
                     const std::vector<int> orders{1, 2, 4};
                     return harmonicTraits(d, e, f, orders);
                   }});
+  rows.push_back({"harmonics of cells",
+                  {{"16 MHz, 4 per period", 1.0}, {"80 MHz, 4 per period", 3.0}, {"120 MHz, 4 per period", 0.0}, {"scale", 0.7}},
+                  [](Noise& noise) {
+                    // Eighteen captures of a wall, whose ranges are up to 1.2 times its distance; each capture is off by
+                    // 1 mm of its own, each cell by 0.5 mm.
+                    const std::vector<double> f{16e6, 80e6, 120e6};
+                    const auto k = [&](double one) { return 16.0 * std::numbers::pi * one / 299'792'458.0; };
+                    Columns d, e;
+                    std::vector<std::size_t> capture;
+                    for (std::size_t c = 0; c < 18; ++c) {
+                      const double distance = 0.6 * std::pow(4.0 / 0.6, static_cast<double>(c / 2) / 8.0), own = noise(1.0);
+                      for (double at = distance; at < 1.2 * distance; at += 0.025) {
+                        d.push_back(at), capture.push_back(c);
+                        e.push_back(2.0 + 0.7 * at + std::cos(k(f[0]) * at + 1.0) + 3.0 * std::sin(k(f[1]) * at) + own +
+                                    noise(0.5));
+                      }
+                    }
+                    const std::vector<int> orders{4};
+                    return harmonicTraits(d, e, f, orders, capture);
+                  }});
   rows.push_back({"noise law", {{"floor", 2.0}, {"shot", 3.0}, {"read", 0.4}}, [](Noise& noise) {
                     // σ of 60 frames each: √(1/118) of itself uncertain. Relative to the largest signal,
                     // 1000.
@@ -185,6 +205,22 @@ std::vector<Planted> otherWays() {
                       error.push_back(4.0 + 15.0 * ratio.back() * sum / weights + noise(1.0));
                     }
                     return veilTraits(own, plate, ratio, error, f);
+                  }});
+  rows.push_back({"lens scatter, four captures", {{"veil", 0.015}}, [](Noise& noise) {
+                    // Each is off by 2 mm of its own, and has its own plate.
+                    const std::vector<double> f{30e6};
+                    const double k = 4.0 * std::numbers::pi * f[0] / 299'792'458.0;
+                    Columns own, plate, ratio, error;
+                    std::vector<std::size_t> capture;
+                    for (std::size_t c = 0; c < 4; ++c) {
+                      const double offset = noise(2.0), at = 0.5 + 0.2 * static_cast<double>(c);
+                      for (int i = 0; i < 60; ++i) {
+                        own.push_back(2.0 + 0.01 * i), plate.push_back(at), capture.push_back(c);
+                        ratio.push_back(noise.uniform(0.5, 3.0));
+                        error.push_back(offset + 15.0 * ratio.back() * std::sin(k * (at - own.back())) / k + noise(1.0));
+                      }
+                    }
+                    return veilTraits(own, plate, ratio, error, f, capture);
                   }});
   rows.push_back({"amplitude", {{"at 1", 12.0}, {"per decade", -4.0}}, [](Noise& noise) {
                     Columns a, e;

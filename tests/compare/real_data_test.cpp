@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <unistd.h>
+
 #include <algorithm>
 #include <cmath>
+#include <fstream>
+#include <sstream>
 
 #include <gtest/gtest.h>
 
+#include "calib/compare/compare.h"
 #include "calib/compare/csv.h"
 #include "calib/compare/fits.h"
 #include "calib/compare/real_box.h"
@@ -204,6 +209,31 @@ TEST_F(RealData, SimulatorExplainsMostOfTheKinectsCorner) {
   const auto at = text.find("\"fraction_raw\": ", text.find("simulated_with_constant"));
   ASSERT_NE(at, std::string::npos);
   EXPECT_GT(std::stod(text.substr(at + 16)), 0.9) << text;
+}
+
+/// The whole comparison with the measurements, as `toftwin compare --data` makes it, with little effort.
+TEST_F(RealData, MakesAPageOfAllSections) {
+  const auto output = std::filesystem::temp_directory_path() / ("toftwin_real_report_" + std::to_string(getpid()));
+  Progress silent{nullptr};
+  CompareJob job;
+  job.data = folder, job.effort = 0.02, job.output = output;
+  const auto written = compareAndReport(job, silent);
+  ASSERT_TRUE(written.ok()) << written.error().message;
+  std::stringstream text;
+  text << std::ifstream{*written}.rdbuf();
+  const std::string page = text.str();
+  EXPECT_EQ(written->filename(), "index.html");
+  for (const char* id : {"distance-kinect_v2", "corner-kinect_v2", "warm-up-kinect_v2", "noise-kinect_v2", "distance-o3d303",
+                         "corner-o3d303", "warm-up-o3d303", "noise-o3d303", "box-kinect_v2", "edge", "published"})
+    EXPECT_NE(page.find("<section id='" + std::string{id} + "'"), std::string::npos) << id;
+  // The traits that a run is judged by, of the same data: six tables of characteristics.
+  std::size_t tables = 0;
+  for (std::size_t at = 0; (at = page.find("A, measured", at)) != std::string::npos; ++at) ++tables;
+  EXPECT_EQ(tables, 6u);
+  for (const char* number : {"drift", "shot", "30 MHz, 4 per period", "120 MHz, 4 per period"})
+    EXPECT_NE(page.find(number), std::string::npos) << number;
+  EXPECT_TRUE(std::filesystem::exists(output / "report.json") && std::filesystem::exists(output / "report.md"));
+  std::filesystem::remove_all(output);
 }
 
 TEST_F(RealData, AMissingFileIsNamed) {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "calib/compare/characteristics.h"
 #include "calib/compare/progress.h"
 #include "calib/compare/real_data.h"
 #include "calib/compare/report.h"
@@ -55,6 +56,32 @@ TEST(Report, NeedsNothingButItself) {
     EXPECT_TRUE(target.starts_with("#") || target.starts_with("data:")) << target;
   }
   EXPECT_EQ(seen, 3);  // one anchor, the map and its colour bar
+}
+
+/// A wall of 8 × 4 pixels that B sees 10 mm farther.
+PoseComparison wall() {
+  PoseComparison pose;
+  pose.camera.width = 8, pose.camera.height = 4;
+  pose.camera.fx = pose.camera.fy = 8.0, pose.camera.cx = 3.5, pose.camera.cy = 1.5;
+  pose.range_a_mm = Image<float>(8, 4, 1000.0F), pose.difference_mm = Image<float>(8, 4, 10.0F);
+  pose.valid_a = pose.valid_b = Image<float>(8, 4, 1.0F);
+  pose.difference_mm(2, 1) = std::nanf("");
+  return pose;
+}
+
+TEST(Report, HasAPointCloudThatOneCanTurnAndAStillOfIt) {
+  const PointCloud cloud = pointCloudOf("wall", wall());
+  ASSERT_EQ(cloud.a.size(), 31u) << "all but the pixel that is not compared";
+  const auto length = [](const std::array<float, 3>& p) { return std::hypot(p[0], std::hypot(p[1], p[2])); };
+  EXPECT_NEAR(length(cloud.a[0]), 1.0F, 1e-5F);
+  EXPECT_NEAR(length(cloud.b[0]), 1.01F, 1e-5F);
+  Report report = example();
+  report.sections[0].blocks.push_back(cloud);
+  const std::string page = toHtml(report);
+  EXPECT_THAT(page, HasSubstr("<figure class='cloud' data-a='"));
+  EXPECT_THAT(page, HasSubstr("<path class='dots simulated' d='M"));
+  EXPECT_THAT(page, HasSubstr("<script>\n"));
+  for (const char* elsewhere : {"http", "src=", "<link", "@import", "fetch("}) EXPECT_THAT(page, Not(HasSubstr(elsewhere)));
 }
 
 TEST(Report, EscapesWhatItIsGiven) {

@@ -103,6 +103,19 @@ TEST_F(Index, ReadsWhatWasWritten) {
   EXPECT_FALSE(one.again);
 }
 
+TEST_F(Index, KeepsWhereBSawItself) {
+  PlannedCapture planned = schedule_.captures.at(0);
+  Taken taken;
+  taken.pose = planned.pose->world_from_camera(), taken.pose_by = "board";
+  taken.seen_by_b.emplace();
+  taken.seen_by_b->world_from_camera = schedule_.captures.at(1).pose->world_from_camera();
+  const auto records = read(lineOf(plan_, planned, taken, {.file = "a", .sha256 = "aa"}, {.file = "b", .sha256 = "bb"}) + "\n");
+  ASSERT_TRUE(records) << records.error().message;
+  EXPECT_EQ(records->at(0).pose_of_b, taken.seen_by_b->world_from_camera);
+  EXPECT_EQ(records->at(0).pose, taken.pose);
+  EXPECT_FALSE(read(line(1))->at(1).pose_of_b);
+}
+
 TEST_F(Index, LeavesOutALineThatAKillCut) {
   const std::string whole = line(0), cut = line(1);
   for (std::size_t length = 0; length < cut.size() - 1; ++length) {

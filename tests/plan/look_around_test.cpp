@@ -182,6 +182,13 @@ TEST_F(LookAround, TwoCamerasMustSeeTheSamePlace) {
   const auto same = take();
   ASSERT_TRUE(same) << same.error().message;
   EXPECT_EQ(b_frames_[0].moment.world_from_camera, same->pose);
+  // Where B saw itself is kept beside, for what B is off by by itself.
+  ASSERT_TRUE(same->seen_by_b);
+  EXPECT_NE(same->seen_by_b->world_from_camera, *same->pose);
+  const auto off = between(same->seen_by_b->world_from_camera, b_.stands);
+  for (std::size_t k = 0; k < 6; ++k) EXPECT_LE(std::abs(off[k]), 3.0 * same->seen_by_b->half_widths[k]) << k;
+  const std::string line = lineOf(plan_, schedule_.captures[0], *same, {}, {});
+  EXPECT_THAT(line, AllOf(HasSubstr("\"pose_of_b\""), HasSubstr("pose_of_b_half_widths_rad_m")));
   b_.stands = tilted(0.37, 0.01, 0.62);
   const auto apart = take();
   ASSERT_FALSE(apart);

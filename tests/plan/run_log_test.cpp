@@ -111,12 +111,56 @@ TEST_F(Log, RefusesADatabaseOfSomethingElse) {
 TEST_F(Log, RefusesAVersionThatItDoesNotKnow) {
   ASSERT_TRUE(RunLog::open(file_));
   EXPECT_EQ(refusal(), "it was opened");
-  sql("PRAGMA user_version = 2");
-  EXPECT_THAT(refusal(), HasSubstr("is of version 2, which a newer toftwin made"));
+  sql("PRAGMA user_version = 3");
+  EXPECT_THAT(refusal(), HasSubstr("is of version 3, which a newer toftwin made"));
   for (const char* version : {"-1", "-2147483648", "0"}) {
     sql(fmt::format("PRAGMA user_version = {}", version));
     EXPECT_THAT(refusal(), HasSubstr(fmt::format("is of version {}, which no toftwin makes", version)));
   }
+}
+
+TEST_F(Log, KeepsTheCamerasAndWhatTheyWereSetTo) {
+  auto log = RunLog::open(file_);
+  ASSERT_TRUE(log);
+  LoggedRun one = run("2026-11-01T00:00:00Z", "aa");
+  one.settings = {{"", "exposure_us", "100, 1000"}, {"A", "frequency_mhz", "16, 80, 120"}, {"B", "seed", "7"}};
+  ASSERT_TRUE(log->add(one, drifts(1.0, 2.0)));
+  ASSERT_TRUE(log->add(run("2026-11-02T00:00:00Z", "bb"), drifts(1.0, 2.0)));
+  const auto cameras = log->cameras();
+  ASSERT_TRUE(cameras);
+  ASSERT_EQ(cameras->size(), 2u) << "each once, of two runs";
+  EXPECT_EQ(cameras->front().source, "kinect");
+  EXPECT_EQ(cameras->front().model, "Kinect v2");
+  EXPECT_EQ(cameras->front().serial, "1");
+  EXPECT_EQ(cameras->back().serial, "");
+  EXPECT_EQ(log->settings(log->runs()->front().id).value(), one.settings);
+  // Judged again, the old settings go with the old entry.
+  one.settings.pop_back();
+  ASSERT_TRUE(log->add(one, drifts(1.0, 2.0)));
+  EXPECT_EQ(log->settings(log->runs()->front().id).value(), one.settings);
+}
+
+/// Made by the statements of toftwin before there was a version 2.
+TEST_F(Log, BringsALogOfVersion1ToThisOne) {
+  sql("CREATE TABLE run (id INTEGER PRIMARY KEY, judged TEXT NOT NULL, began TEXT NOT NULL, folder TEXT NOT NULL, plan TEXT "
+      "NOT NULL, camera_a TEXT NOT NULL, camera_b TEXT NOT NULL, software TEXT NOT NULL, note TEXT NOT NULL, index_sha256 "
+      "TEXT NOT NULL, locked INTEGER NOT NULL, UNIQUE (index_sha256, locked));"
+      "CREATE TABLE characteristic (run INTEGER NOT NULL REFERENCES run (id) ON DELETE CASCADE, of TEXT NOT NULL, what TEXT "
+      "NOT NULL, detail TEXT NOT NULL, name TEXT NOT NULL, unit TEXT NOT NULL, value REAL, low REAL, high REAL, n INTEGER "
+      "NOT NULL, PRIMARY KEY (run, of, what, name));"
+      "CREATE TABLE untold (run INTEGER NOT NULL REFERENCES run (id) ON DELETE CASCADE, why TEXT NOT NULL);"
+      "INSERT INTO run VALUES (4, 'j', 'b', 'f', 'standard', 'kinect, Kinect v2 0815', 'twin, Kinect v2 ', 's', 'n', 'aa', 0);"
+      "INSERT INTO characteristic VALUES (4, 'A', 'drift', 'ramp', 'drift', 'mm', 1.5, 1, 2, 9);"
+      "PRAGMA application_id = 0x746F6674; PRAGMA user_version = 1");
+  auto log = RunLog::open(file_);
+  ASSERT_TRUE(log) << log.error().message;
+  ASSERT_EQ(log->runs()->size(), 1u);
+  EXPECT_EQ(log->traits("kinect", "", "")->front().trait.trait.value, 1.5);
+  EXPECT_TRUE(log->settings(4)->empty());
+  ASSERT_EQ(log->cameras()->size(), 2u);
+  EXPECT_EQ(log->cameras()->front().serial, "0815");
+  EXPECT_TRUE(log->add(run("2026-11-02T00:00:00Z", "bb"), drifts(1.0, 2.0)));
+  EXPECT_TRUE(RunLog::open(file_)) << "once, not each time";
 }
 
 TEST_F(Log, AddsAllOfARunOrNothing) {

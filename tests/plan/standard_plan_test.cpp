@@ -148,6 +148,19 @@ TEST_F(StandardPlan, TellsEveryCharacteristicOfBothCameras) {
   EXPECT_NEAR(value("B: lag of the first frame recorded: left behind"), 0.0, 2e-3);
   EXPECT_NEAR(value("A: lens scatter: veil"), kVeil, 0.01);
   EXPECT_NEAR(value("B: lens scatter: veil"), 0.0, 0.01);
+  // What was planted in A alone is among what the page begins with, and where it is from is at its end.
+  std::stringstream text;
+  text << std::ifstream{folder_ / "report" / "index.html"}.rdbuf();
+  const std::string page = text.str();
+  const auto verdicts = page.find("B against A, number by number"), lag = page.find("left behind</td><td>differs, ");
+  EXPECT_LT(verdicts, page.find("B − A by block"));
+  EXPECT_NE(lag, std::string::npos);
+  EXPECT_NE(page.find("Drift of A and of B while warming up"), std::string::npos);
+  EXPECT_NE(page.find("<figure class='cloud'"), std::string::npos);
+  EXPECT_NE(page.find("<td>plan_seed</td><td class='number'>2026</td>", page.find("id='provenance'")), std::string::npos);
+  EXPECT_THAT(toftwin("log " + path("lab.sqlite") + " --settings 1").out,
+              testing::AllOf(testing::HasSubstr("frequency_mhz"), testing::HasSubstr("250, 500, 750, 1000, 1250, 1500"),
+                             testing::HasSubstr("lens_scatter, lag")));
   EXPECT_THAT(toftwin("log " + path("lab.sqlite")).out, testing::HasSubstr("standard"));
   EXPECT_THAT(toftwin("log " + path("lab.sqlite") + " --hdf5 " + path("numbers.h5")).out,
               testing::HasSubstr(" numbers"));

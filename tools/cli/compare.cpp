@@ -13,6 +13,7 @@
 #include "calib/plan/compare_run.h"
 #include "protocol/record/recording.h"
 #include "tools/cli/command.h"
+#include "tools/cli/compare_tables.h"
 #include "tools/cli/options.h"
 #include "tools/cli/rig_carrier.h"
 #include "tools/cli/terminal.h"
@@ -26,11 +27,13 @@ constexpr const char* kExamples =
     "  toftwin compare kinect cam --address-b lab:47800 -o report     two daemons\n"
     "  toftwin compare kinect twin --poses poses.toml --rig rig.toml  a rig moves the real one\n"
     "  toftwin compare run -o report                                  what toftwin measure captured\n"
+    "  toftwin compare --table drift.csv --kind drift -o report       a measured or published series\n"
     "  toftwin compare --data ../shared/data -o report                the simulator and real "
     "measurements\n";
 
 struct Options {
   DaemonOptions daemon, daemon_b;
+  TableOptions tables;
   std::vector<std::string> sources;
   std::string poses;
   std::string rig;
@@ -182,6 +185,7 @@ Result<Exit> compareRun(const Options& options) {
 
 Result<Exit> compareThem(const Options& options) {
   if (options.isRun()) return compareRun(options);
+  if (options.tables.areGiven()) return compareTables(options.tables, options.output, options.note);
   auto job = jobOf(options);
   if (!job) return job.error();
   catchInterrupts();
@@ -253,6 +257,7 @@ Run add(Arguments& args) {
             "of a run: judge on the captures that were held back, which can be done once");
   args.option("--log", options->log,
               "of a run: an SQLite database that its characteristics are put into, for toftwin log and trend");
+  options->tables.add(args);
   args.option("-o,--output", options->output, "folder of the report").showsDefault();
   args.option("--note", options->note, "for the report's foot, such as a commit");
   args.check([options]() -> Result<> {
@@ -260,6 +265,10 @@ Run add(Arguments& args) {
       return Error{Error::Code::InvalidArgument,
                    fmt::format("--data {}: there is no folder tof-thesis-2018 in it, nor is it one",
                                options->data)};
+    }
+    if (auto checked = options->tables.check(); !checked) return checked;
+    if (options->tables.areGiven() && (!options->sources.empty() || !options->poses.empty() || !options->data.empty())) {
+      return Error{Error::Code::InvalidArgument, "--table is judged by itself: without sources, --poses and --data"};
     }
     if (isRefused(*options)) return sameTwice(options->sources[0]);
     const bool is_live = !options->poses.empty() || !options->rig.empty() || !options->data.empty() ||

@@ -19,6 +19,7 @@ namespace log_command {
 struct Options {
   std::string file, camera, characteristic, number, hdf5;
   bool csv = false;
+  int settings_of = 0;
 };
 
 /// As CSV has it: quotes doubled, within quotes.
@@ -98,9 +99,22 @@ Result<Exit> writeHdf5(const Numbers& all, const Options& options) {
   return Exit::Ok;
 }
 
+/// What a run was made with.
+Result<Exit> showSettings(plan::RunLog& log, const Options& options) {
+  const auto settings = log.settings(options.settings_of);
+  if (!settings) return settings.error();
+  if (settings->empty()) {
+    return Error{Error::Code::NotFound, fmt::format("{}: knows no settings of run {}; without --settings it lists its runs",
+                                                    options.file, options.settings_of)};
+  }
+  for (const plan::RunSetting& one : *settings) fmt::print("{:<3}  {:<16}  {}\n", one.of, one.name, one.value);
+  return Exit::Ok;
+}
+
 Result<Exit> showLog(const Options& options) {
   auto log = openExisting(options.file);
   if (!log) return log.error();
+  if (options.settings_of > 0) return showSettings(*log, options);
   if (options.csv || !options.hdf5.empty()) {
     const auto all = log->traits("", "", "");
     if (!all) return all.error();
@@ -156,6 +170,8 @@ Run addLog(Arguments& args) {
   args.option("FILE", options->file, "log that toftwin compare RUN --log wrote").required();
   args.flag("--csv", options->csv, "all numbers of all runs as CSV");
   args.option("--hdf5", options->hdf5, "write all numbers of all runs into this HDF5 file");
+  args.option("--settings", options->settings_of, "what the run of this number was made with: cameras, settings, ids")
+      .within(1, 1'000'000'000);
   return [options] { return showLog(*options); };
 }
 
@@ -177,6 +193,7 @@ Command logCommand() {
           "  toftwin compare run -o report --log lab.sqlite\n"
           "  toftwin log lab.sqlite\n"
           "  toftwin log lab.sqlite --csv > numbers.csv\n"
+          "  toftwin log lab.sqlite --settings 1\n"
           "  toftwin log lab.sqlite --hdf5 numbers.h5\n",
           addLog};
 }

@@ -8,12 +8,16 @@
 #include <numbers>
 
 #include "calib/compare/statistics.h"
-#include "calib/compare/traits/least_squares.h"
+#include "calib/compare/traits/clusters.h"
 
 namespace toftwin::compare {
 namespace {
 
 constexpr double kLight_m_per_s = 299'792'458.0;
+/// Fewer rows for each parameter of a fit tell little more than themselves.
+constexpr std::size_t kRowsPerParameter = 3;
+
+constexpr double kSameWave = 1e-3;  ///< over 8 m of a wave of 0.3 m, 0.2 rad
 
 struct Wave {
   double per_m = 0.0;  ///< radians per metre of distance
@@ -24,8 +28,12 @@ std::vector<Wave> wavesOf(std::span<const double> frequency_hz, std::span<const 
   std::vector<Wave> waves;
   for (const double f : frequency_hz) {
     for (const int k : orders) {
-      waves.push_back({2.0 * std::numbers::pi * k * 2.0 * f / kLight_m_per_s,
-                       fmt::format("{:.6g} MHz, {} per period", f * 1e-6, k)});
+      const Wave one{2.0 * std::numbers::pi * k * 2.0 * f / kLight_m_per_s,
+                     fmt::format("{:.6g} MHz, {} per period", f * 1e-6, k)};
+      const auto same = std::ranges::find_if(
+          waves, [&](const Wave& there) { return std::abs(there.per_m - one.per_m) < kSameWave * one.per_m; });
+      if (same == waves.end()) waves.push_back(one);
+      else same->name += " = " + one.name;  // 3 of 80 MHz and 2 of 120 MHz are one wave
     }
   }
   return waves;
@@ -58,6 +66,29 @@ Trait amplitudeTrait(const Fit& fit, const std::string& name, std::size_t first)
   return trait;
 }
 
+std::vector<Trait> traitsOf(const Fit& fit, const std::vector<Wave>& waves) {
+  std::vector<Trait> traits;
+  for (std::size_t w = 0; w < waves.size(); ++w) {
+    traits.push_back(amplitudeTrait(fit, waves[w].name, 2 + 2 * w));
+  }
+  traits.push_back(fit.trait("scale", "mm/m", 1));
+  const double free = static_cast<double>(fit.n - fit.at.size());
+  const double sd = std::sqrt(fit.squares / free), half = 1.96 / std::sqrt(2.0 * free);
+  traits.push_back({.name = "residual",
+                    .unit = "mm",
+                    .value = sd,
+                    .low = sd * std::exp(-half),
+                    .high = sd * std::exp(half),
+                    .n = fit.n});
+  return traits;
+}
+
+/// Each amplitude's interval is shorter than the four standard deviations that one row's would have.
+bool areToldApart(const std::vector<Trait>& traits) {
+  const double sd = traits.back().value;  // "residual"
+  return std::all_of(traits.begin(), traits.end() - 2, [&](const Trait& one) { return one.high - one.low < 4.0 * sd; });
+}
+
 }  // namespace
 
 Traits harmonicTraits(Column distance_m, Column error_mm, std::span<const double> frequency_hz,
@@ -76,19 +107,46 @@ Traits harmonicTraits(Column distance_m, Column error_mm, std::span<const double
   const auto fit = fitLeastSquares(model, e, std::vector<double>(2 + 2 * waves.size(), 0.0));
   if (!fit)
     return undetermined("harmonics", "the distances span too little of a period, or two orders coincide");
-  std::vector<Trait> traits;
-  for (std::size_t w = 0; w < waves.size(); ++w) {
-    traits.push_back(amplitudeTrait(*fit, waves[w].name, 2 + 2 * w));
+  return traitsOf(*fit, waves);
+}
+
+Traits harmonicTraits(Column distance_m, Column error_mm, std::span<const double> frequency_hz,
+                      std::span<const int> orders, std::span<const std::size_t> cluster) {
+  const std::vector<Wave> waves = wavesOf(frequency_hz, orders);
+  if (waves.empty()) return undetermined("harmonics", "no frequency or order was given");
+  std::vector<double> numbers(cluster.begin(), cluster.end());
+  const auto rows = finiteRows({distance_m, error_mm, numbers}, 2 * waves.size() + 4, "harmonics");
+  if (!rows) return rows.error();
+  const auto& d = (*rows)[0];
+  std::vector<std::vector<double>> columns{std::vector<double>(d.size(), 1.0), d};
+  for (const Wave& wave : waves) {
+    std::vector<double> even, odd;
+    for (const double one : d) even.push_back(std::cos(wave.per_m * one)), odd.push_back(std::sin(wave.per_m * one));
+    columns.push_back(std::move(even)), columns.push_back(std::move(odd));
   }
-  traits.push_back(fit->trait("scale", "mm/m", 1));
-  const double sd = std::sqrt(fit->squares / fit->degrees), half = 1.96 / std::sqrt(2.0 * fit->degrees);
-  traits.push_back({.name = "residual",
-                    .unit = "mm",
-                    .value = sd,
-                    .low = sd * std::exp(-half),
-                    .high = sd * std::exp(half),
-                    .n = fit->n});
-  return traits;
+  const std::vector<std::size_t> captures((*rows)[2].begin(), (*rows)[2].end());
+  const auto fit = fitInClusters(columns, (*rows)[1], captures);
+  if (!fit)
+    return undetermined("harmonics", "the distances span too little of a period, or are of one capture only");
+  return traitsOf(*fit, waves);
+}
+
+Traits harmonicTraits(Column distance_m, Column error_mm, std::span<const double> frequency_hz,
+                      std::span<const std::size_t> cluster) {
+  const std::size_t least = kRowsPerParameter * (2 + 2 * frequency_hz.size());
+  const auto rows = finiteRows({distance_m, error_mm}, least, "harmonics");
+  if (!rows) return rows.error();
+  std::vector<int> orders;
+  for (const int order : {4, 3, 2, 1}) {
+    const std::size_t parameters = 2 + 2 * frequency_hz.size() * (orders.size() + 1);
+    if (rows->front().size() >= kRowsPerParameter * parameters) orders.push_back(order);
+  }
+  for (; !orders.empty(); orders.pop_back()) {
+    auto traits = cluster.empty() ? harmonicTraits(distance_m, error_mm, frequency_hz, orders)
+                                  : harmonicTraits(distance_m, error_mm, frequency_hz, orders, cluster);
+    if (orders.size() == 1 || (traits && areToldApart(*traits))) return traits;
+  }
+  return undetermined("harmonics", "no frequency was given");
 }
 
 Traits wrapTraits(Column error_m, double period_m) {

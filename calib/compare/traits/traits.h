@@ -39,6 +39,14 @@ Result<DriftTraits> driftTraits(Column time_s, Column value_mm);
 /// error(d) = c + s d + Σ aₖ cos 2πk·2fd/c + bₖ sin …: "f MHz, k per period": √(a² + b²), and "residual".
 Traits harmonicTraits(Column distance_m, Column error_mm, std::span<const double> frequency_hz,
                       std::span<const int> orders);
+/// The same of rows in clusters, such as cells of one capture, that share an error: one-way random effects.
+Traits harmonicTraits(Column distance_m, Column error_mm, std::span<const double> frequency_hz,
+                      std::span<const int> orders, std::span<const std::size_t> cluster);
+/// Of as many of four, three, two and one wave per period (cameras of four and three steps have the first of these) as there
+/// are three rows for each parameter, and as the rows tell apart: each amplitude better than one row's scatter. Without
+/// clusters: rows are independent.
+Traits harmonicTraits(Column distance_m, Column error_mm, std::span<const double> frequency_hz,
+                      std::span<const std::size_t> cluster = {});
 
 /// σ(I) = √(a² + b²/I + c²/I²) in ln σ, I relative to the largest: "floor" a, "shot" b, "read" c at that
 /// signal.
@@ -61,6 +69,9 @@ Traits scatterTraits(Column own_range_m, Column plate_range_m, Column plate_over
 /// sin(Δφ_f) c/4πf / Σ f². The constant c is what else the camera is off by.
 Traits veilTraits(Column own_range_m, Column plate_range_m, Column plate_over_own, Column error_mm,
                   std::span<const double> frequency_hz);
+/// The same of rows in clusters that share an error: the interval is a jackknife over clusters, of three or more.
+Traits veilTraits(Column own_range_m, Column plate_range_m, Column plate_over_own, Column error_mm,
+                  std::span<const double> frequency_hz, std::span<const std::size_t> cluster);
 
 /// Of steps in the rows of one image: "flying" share of the crossings with a pixel in between, "offset" where
 /// it hangs from near (0) to far (1), "near side" share of those nearer to the foreground; the last two where two fly or more.

@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/compare/trait_verdict.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include <fmt/format.h>
+
+#include "calib/compare/traits/difference.h"
+
+namespace toftwin::compare {
+namespace {
+
+constexpr std::size_t kShownFirst = 3;  ///< differences that headline and cards name
+
+/// What is left of a fit, and an intercept far from all rows, are of B − A but no difference of two numbers.
+bool isDifference(const NamedTrait& one) {
+  return one.of == "B − A" && one.trait.name != "residual" && one.trait.name != "at 1";
+}
+
+std::string number(double value) {
+  const std::string text = fmt::format("{:.3g}", value);
+  return text.starts_with('-') ? "−" + text.substr(1) : text;
+}
+
+std::string withSign(double value) { return (value > 0.0 ? "+" : "") + number(value); }
+
+std::string unitOf(const TraitVerdict& one) {
+  return one.difference.unit.empty() || one.difference.unit == "1" ? "" : " " + one.difference.unit;
+}
+
+std::string nameOf(const TraitVerdict& one) {
+  return one.what == one.difference.name ? one.what : one.what + ": " + one.difference.name;
+}
+
+std::string intervalOf(const Trait& one) {
+  return fmt::format("{} ({} to {})", number(one.value), number(one.low), number(one.high));
+}
+
+std::string shownOf(const std::optional<NamedTrait>& one) {
+  if (!one) return "";
+  return number(one->trait.value) + (one->detail.empty() ? "" : ", " + one->detail);
+}
+
+double timesFloor(const TraitVerdict& one) { return std::abs(one.difference.value) / one.floor(); }
+
+std::string farBeyond(const TraitVerdict& one) {
+  if (!(one.floor() > 0.0)) return "without a floor";
+  return fmt::format("{:.{}f} × the floor", timesFloor(one), timesFloor(one) < 10.0 ? 1 : 0);
+}
+
+std::string verdictOf(const TraitVerdict& one) {
+  if (!one.isTold()) return "not told: an end of an interval is not known";
+  if (one.differs()) return "differs, " + farBeyond(one);
+  const double most = std::max(std::abs(one.difference.low), std::abs(one.difference.high));
+  return fmt::format("same, within {}{}", number(most), unitOf(one));
+}
+
+std::size_t countOf(const std::vector<TraitVerdict>& all, bool differs) {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(all, [&](const auto& one) { return one.isTold() && one.differs() == differs; }));
+}
+
+}  // namespace
+
+bool TraitVerdict::isTold() const {
+  return std::isfinite(difference.value) && std::isfinite(difference.low) && std::isfinite(difference.high);
+}
+
+double TraitVerdict::floor() const {
+  return difference.value < 0.0 ? difference.high - difference.value : difference.value - difference.low;
+}
+
+std::vector<TraitVerdict> verdictsOf(const NamedTraits& traits) {
+  using Key = std::pair<std::string, std::string>;
+  std::map<Key, const NamedTrait*> of_a;
+  for (const NamedTrait& one : traits.traits) {
+    if (one.of == "A") of_a[{one.what, one.trait.name}] = &one;
+  }
+  std::vector<TraitVerdict> all;
+  for (const NamedTrait& one : traits.traits) {
+    if (isDifference(one)) all.push_back({.what = one.what, .difference = one.trait});
+    const auto a = of_a.find({one.what, one.trait.name});
+    if (one.of == "B" && a != of_a.end()) all.push_back({.what = one.what, .a = *a->second, .b = one});
+  }
+  const double wider = widenedFor(all.size());
+  for (TraitVerdict& one : all)
+    one.difference = one.b ? differenceOf(one.a->trait, one.b->trait, wider) : widened(one.difference, wider);
+  // Those that are not told come last; where a floor is 0, what differs is infinitely far beyond it.
+  const auto rank = [](const TraitVerdict& one) {
+    return !one.isTold() ? 1.0 : one.differs() ? -timesFloor(one) : 0.0;
+  };
+  std::ranges::stable_sort(all, {}, rank);
+  return all;
+}
+
+std::string inWords(const TraitVerdict& one) {
+  return fmt::format("{} {}{} ({} to {}), {}", nameOf(one), withSign(one.difference.value), unitOf(one),
+                     number(one.difference.low), number(one.difference.high), farBeyond(one));
+}
+
+std::string headlineOf(const std::vector<TraitVerdict>& all) {
+  const std::size_t differ = countOf(all, true), same = countOf(all, false);
+  if (differ + same == 0) return "No characteristic is known of both cameras";
+  if (differ == 0)
+    return fmt::format("In none of {} numbers does B differ from A by more than the noise floor", same);
+  std::string words = fmt::format("{} of {} numbers of B differ from A's by more than the noise floor (B − A, 95 % for "
+                                  "all together): ",
+                                  differ, differ + same);
+  for (std::size_t i = 0; i < std::min(differ, kShownFirst); ++i) words += (i > 0 ? "; " : "") + inWords(all[i]);
+  if (differ > kShownFirst) words += fmt::format("; and {} more", differ - kShownFirst);
+  return words;
+}
+
+TableBlock verdictTable(const std::vector<TraitVerdict>& all) {
+  TableBlock table{
+      "B against A, number by number. The floor is what B − A is uncertain by: a smaller difference does not show. "
+      "Intervals of B − A hold with 95 % for all rows together",
+      {"characteristic", "verdict", "B − A", "floor", "A", "B"},
+      {}};
+  for (const TraitVerdict& one : all) {
+    const std::string unit = unitOf(one).empty() ? "" : fmt::format(" [{}]", one.difference.unit);
+    table.rows.push_back({nameOf(one) + unit, verdictOf(one), intervalOf(one.difference), number(one.floor()),
+                          shownOf(one.a), shownOf(one.b)});
+  }
+  return table;
+}
+
+std::vector<Card> cardsOf(const std::vector<TraitVerdict>& all) {
+  const std::size_t differ = countOf(all, true), told = differ + countOf(all, false);
+  if (told == 0) return {};
+  std::vector<Card> cards{{"Same as A", fmt::format("{} of {}", told - differ, told),
+                           "numbers of B within the noise floor", differ == 0 ? Tone::Good : Tone::Fair}};
+  for (std::size_t i = 0; i < std::min(differ, kShownFirst); ++i) {
+    const TraitVerdict& one = all[i];
+    cards.push_back({nameOf(one), withSign(one.difference.value) + unitOf(one),
+                     fmt::format("B − A, {} to {}; {}", number(one.difference.low), number(one.difference.high),
+                                 farBeyond(one)),
+                     Tone::Fair});
+  }
+  return cards;
+}
+
+Json toJson(const std::vector<TraitVerdict>& all) {
+  Json rows = Json::array();
+  for (const TraitVerdict& one : all) {
+    Json row = Json::object();
+    row.set("characteristic", one.what).set("name", one.difference.name).set("unit", one.difference.unit);
+    row.set("difference", one.difference.value).set("low", one.difference.low).set("high", one.difference.high);
+    row.set("floor", one.floor()).set("verdict", !one.isTold() ? "not told" : one.differs() ? "differs" : "same");
+    rows.push(std::move(row));
+  }
+  return rows;
+}
+
+}  // namespace toftwin::compare

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calib/compare/named_traits.h"
+
+namespace toftwin::compare {
+
+/// One number of two cameras: how far B is from A, against what the data could tell.
+struct TraitVerdict {
+  std::string what{};
+  std::optional<NamedTrait> a{}, b{};  ///< none where B − A was told directly
+  /// B − A. The intervals of all verdicts hold together with 95 %; an end may be NaN: not known.
+  Trait difference{};
+
+  [[nodiscard]] bool isTold() const;
+  /// 0 is not in the interval.
+  [[nodiscard]] bool differs() const { return difference.low > 0.0 || difference.high < 0.0; }
+  /// The noise floor: what B − A is uncertain by, towards 0. A smaller difference would not show.
+  [[nodiscard]] double floor() const;
+};
+
+/// Of each number that both cameras have, and of those told of B − A that are 0 for equal cameras (so not what is left
+/// of a fit). Those that differ come first, the farthest beyond its floor before the others.
+std::vector<TraitVerdict> verdictsOf(const NamedTraits& traits);
+
+/// "drift: drift −7.9 mm (−8.3 to −7.5), 18 × the floor".
+std::string inWords(const TraitVerdict& verdict);
+/// How many of how many differ, and the first of them: a sentence without its full stop.
+std::string headlineOf(const std::vector<TraitVerdict>& verdicts);
+TableBlock verdictTable(const std::vector<TraitVerdict>& verdicts);
+/// How many are the same, and one card for each of the first that differ.
+std::vector<Card> cardsOf(const std::vector<TraitVerdict>& verdicts);
+Json toJson(const std::vector<TraitVerdict>& verdicts);
+
+}  // namespace toftwin::compare
