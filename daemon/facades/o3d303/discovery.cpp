@@ -85,7 +85,8 @@ Result<std::unique_ptr<Discovery>> Discovery::listen(boost::asio::io_context& io
     auto ear = std::make_shared<Ear>(io);
     ear->socket.open(udp::v4(), error);
     if (!error) ear->socket.set_option(udp::socket::reuse_address{true}, error);
-    if (!error && one != own) error = keepTo(place.interface_name, ear->socket);
+    const bool is_of_one_interface = one == own || own.is_loopback();
+    if (!error && !is_of_one_interface) error = keepTo(place.interface_name, ear->socket);
     if (!error) ear->socket.bind({one, port}, error);
     if (error) {
       return Error{Error::Code::Busy,
