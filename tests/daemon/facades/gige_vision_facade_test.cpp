@@ -18,7 +18,7 @@ class GigeVision : public RunningGigeVision {
   void SetUp() override {
     RunningGigeVision::SetUp();
     if (!hasProgram("arv-tool-0.8") || !hasProgram("arv-camera-test-0.8"))
-      GTEST_SKIP() << "aravis-tools-cli is not installed (tools/install-dependencies --for test)";
+      GTEST_SKIP() << "aravis-tools-cli and aravis-tools are not both installed (tools/install-dependencies --for test)";
   }
   Ran control(const std::string& what) {
     return run(fmt::format("arv-tool-0.8 -a {} control {}", address_, what));
