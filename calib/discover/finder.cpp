@@ -319,10 +319,10 @@ class Search {
     }
   }
 
-  /// One cause, one effect. A form without a name describes its cause to first order and along its own covariates
-  /// alone. What that leaves goes with something else, and needs no cause of its own while it is less than a quarter
-  /// of what the form explains and both share a part: it stays in the model, as the rest of that effect. An effect that
-  /// is named for certain describes itself, and leaves nothing.
+  /// One cause, one effect. A form without a name describes its cause to first order and along its own
+  /// covariates alone. What that leaves goes with something else, and needs no cause of its own while it is
+  /// less than a quarter of what the form explains and both share a part: it stays in the model, as the rest
+  /// of that effect. An effect that is named for certain describes itself, and leaves nothing.
   void markRests() {
     constexpr double kRest = 0.25;
     const auto mayBeUndeclared = [](const Effect& effect) {
@@ -346,8 +346,8 @@ class Search {
     std::ranges::stable_sort(finding_.effects, {}, &Effect::is_rest);  // behind what they are the rest of
   }
 
-  /// Whether the stronger one takes from the other what both explain: on captures that it was not fitted to, the
-  /// other predicts more without it than beside it. What has a cause of its own loses nothing.
+  /// Whether the stronger one takes from the other what both explain: on captures that it was not fitted to,
+  /// the other predicts more without it than beside it. What has a cause of its own loses nothing.
   [[nodiscard]] bool shareAPart(std::size_t weaker, std::size_t stronger) const {
     const Difference lost = difference(gainBeside(weaker, {weaker, stronger}), gainBeside(weaker, {weaker}));
     return lost.mean > 2.0 * lost.error;
@@ -375,7 +375,8 @@ class Search {
     std::vector<TermGroup> extra = beside.known;
     extra.push_back({"this", Kind::Generic, termsOf(effect), 0});
     const Marginal marginal = marginalise(evidenceOf(beside, extra), beside.scales);
-    return crossValidate(marginal, modelOf(beside, marginal, extra.size()), {marginal.groups.size() - 1}).front();
+    return crossValidate(marginal, modelOf(beside, marginal, extra.size()), {marginal.groups.size() - 1})
+        .front();
   }
 
   double dispersionNow() const {

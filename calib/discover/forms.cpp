@@ -196,8 +196,8 @@ std::vector<Form> formsIn(const CovariateInfo& a, const CovariateInfo& b) {
   if (isNamed(a) || isNamed(b)) {
     const CovariateInfo &names = isNamed(a) ? a : b, &x = isNamed(a) ? b : a;
     for (const double power : usablePowers(x))
-      forms.push_back(form(fmt::format("{} for each {}", powerInWords(x, power), names.name), {names, x}, switched,
-                           {}, {power}));
+      forms.push_back(form(fmt::format("{} for each {}", powerInWords(x, power), names.name), {names, x},
+                           switched, {}, {power}));
     return forms;
   }
   for (const double p : usablePowers(a)) {
@@ -214,8 +214,9 @@ std::vector<Form> formsIn(const CovariateInfo& a, const CovariateInfo& b) {
     if (x.nature != Nature::Time) continue;
     const double origin = least(x) >= 0.0 && least(x) < span(x) ? 0.0 : least(x);
     for (const double q : usablePowers(y)) {
-      forms.push_back(form(fmt::format("exponential in {} · {}", x.name, powerInWords(y, q)), {x, y}, decayTimes,
-                           {{geometric(span(x) / 20.0, 2.0 * span(x), 8), true, 1}}, {origin, q}));
+      forms.push_back(form(fmt::format("exponential in {} · {}", x.name, powerInWords(y, q)), {x, y},
+                           decayTimes, {{geometric(span(x) / 20.0, 2.0 * span(x), 8), true, 1}},
+                           {origin, q}));
     }
   }
   return forms;

@@ -95,8 +95,8 @@ std::string rowOf(const std::string& what, const std::vector<Score>& scores, boo
   const auto n = static_cast<double>(scores.size());
   const auto share = [](double value) { return fmt::format("{:.2f}", value); };
   const bool has_removed = !is_null && !is_absent && !removed.empty();
-  return fmt::format("| {} | {} | {} | {} | {} | {} | {} | {:.2f} | {:.2f} | {} | {} |\n", what, scores.size(),
-                     fmt::format("{:.3f}", shareOf(scores, &Score::is_detected)),
+  return fmt::format("| {} | {} | {} | {} | {} | {} | {} | {:.2f} | {:.2f} | {} | {} |\n", what,
+                     scores.size(), fmt::format("{:.3f}", shareOf(scores, &Score::is_detected)),
                      is_null || is_absent ? "" : share(shareOf(scores, &Score::is_right)),
                      is_null || is_absent ? "" : share(shareOf(scores, &Score::is_alone)),
                      is_absent ? share(1.0 - shareOf(scores, &Score::is_blamed)) : "",
@@ -163,11 +163,12 @@ std::string header() {
 
 std::string lineOf(const Score& one) {
   const auto yes = [](bool value) { return value ? 1 : 0; };
-  return fmt::format("score,{},{:.0f},{:.1f},{},{},{:.4g},{},{},{},{},{},{},{},{},{:.4f},{:.4f},{:.4f},{:.1f},{}\n",
-                     one.of.hidden, one.of.wanted, one.of.lambda, one.of.seed, yes(one.of.is_absent), one.p,
-                     yes(one.is_detected), yes(one.is_right), yes(one.is_alone), yes(one.is_blamed),
-                     yes(one.has_covariates), yes(one.has_stage), one.spurious, one.rests, one.removed,
-                     one.before_mm, one.after_mm, one.seconds, one.found);
+  return fmt::format(
+      "score,{},{:.0f},{:.1f},{},{},{:.4g},{},{},{},{},{},{},{},{},{:.4f},{:.4f},{:.4f},{:.1f},{}\n",
+      one.of.hidden, one.of.wanted, one.of.lambda, one.of.seed, yes(one.of.is_absent), one.p,
+      yes(one.is_detected), yes(one.is_right), yes(one.is_alone), yes(one.is_blamed), yes(one.has_covariates),
+      yes(one.has_stage), one.spurious, one.rests, one.removed, one.before_mm, one.after_mm, one.seconds,
+      one.found);
 }
 
 std::string tableOf(const std::vector<std::filesystem::path>& files) {
@@ -193,14 +194,16 @@ std::string tableOf(const std::vector<std::filesystem::path>& files) {
   }
   std::string table =
       "| hidden | runs | detected | named | named first | absent: none blamed | absent: covariates right | "
-      "spurious a run | of these rests | removed, median | worst tenth |\n|---|---|---|---|---|---|---|---|---|---|---|\n";
+      "spurious a run | of these rests | removed, median | worst tenth "
+      "|\n|---|---|---|---|---|---|---|---|---|---|---|\n";
   for (const auto& [key, scores] : groups) {
     const auto& [wanted, is_absent, name] = key;
     table += rowOf(wanted == 0.0 ? name : fmt::format("λ = {:.0f}{}", wanted, is_absent ? ", absent" : ""),
                    scores, wanted == 0.0, is_absent);
   }
-  table += "\nBy effect, all λ:\n\n| hidden | runs | detected | named | named first | | | spurious | rests | "
-           "removed, median | worst tenth |\n|---|---|---|---|---|---|---|---|---|---|---|\n";
+  table +=
+      "\nBy effect, all λ:\n\n| hidden | runs | detected | named | named first | | | spurious | rests | "
+      "removed, median | worst tenth |\n|---|---|---|---|---|---|---|---|---|---|---|\n";
   for (const auto& [name, scores] : by_effect) table += rowOf(name, scores, false, false);
   table += "\nMisses:\n\n| hidden | λ | seed | absent | p | found | removed |\n|---|---|---|---|---|---|---|\n";
   for (const Score& one : misses)

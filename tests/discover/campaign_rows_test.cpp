@@ -162,8 +162,8 @@ TEST_F(Rows, APatternOfPixelsIsWhatItIsByItsPlaceWithinTheImage) {
   EXPECT_EQ(made.rows.patternOf("neighbours:1px"), nullptr);
 }
 
-/// Paint that the scene file lacks stays in its pixels as long as the camera stays, whatever the block is called: a
-/// third of a millimetre ahead moves the image by 0.005 pixels.
+/// Paint that the scene file lacks stays in its pixels as long as the camera stays, whatever the block is
+/// called: a third of a millimetre ahead moves the image by 0.005 pixels.
 TEST_F(Rows, WhatIsSeenFromOnePlaceInSeveralBlocksIsNoPatternOfPixels) {
   const std::string plan = R"(name = "one place"
 seed = 7
@@ -190,10 +190,11 @@ repeats = 3
   EXPECT_EQ(made.rows.patternOf("pixel:gain"), nullptr);
 }
 
-/// A pattern far below the noise of one capture. Fitted where it was learned, it would have explained that noise, too,
-/// and would seem several times as strong as it was taken for.
+/// A pattern far below the noise of one capture. Fitted where it was learned, it would have explained that
+/// noise, too, and would seem several times as strong as it was taken for.
 TEST_F(Rows, HowStrongAPatternIsOtherPlacesSay) {
-  const Made made = make("[[effect]]\ntype = 'fixed_pattern_phase'\nsigma_rad = 0.001\ndevice = 4711\n", tinyCamera());
+  const Made made =
+      make("[[effect]]\ntype = 'fixed_pattern_phase'\nsigma_rad = 0.001\ndevice = 4711\n", tinyCamera());
   const Term found = made.rows.settled({{}, Stage::Range, "pixel:range"});
   const std::vector<TermGroup> groups{{"pattern", Kind::Generic, {found}, 0}};
   const Marginal marginal = marginalise(made.rows.withoutCatalogue(groups), {});
@@ -207,7 +208,8 @@ TEST_F(Rows, HowStrongAPatternIsOtherPlacesSay) {
 }
 
 TEST_F(Rows, APatternGoesIntoTheModelAsStrongAsItWasFitted) {
-  const Made made = make("[[effect]]\ntype = 'fixed_pattern_phase'\nsigma_rad = 0.01\ndevice = 4711\n", tinyCamera());
+  const Made made =
+      make("[[effect]]\ntype = 'fixed_pattern_phase'\nsigma_rad = 0.01\ndevice = 4711\n", tinyCamera());
   const auto camera = sim::SensorModel::parse(tinyCamera(), "camera.toml");
   Effect effect{.name = "a pattern of pixels", .coefficient = {0.5}};
   effect.parts.push_back({.group = {"pattern", Kind::Generic, {{{}, Stage::Range, "pixel:range"}}, 0}});
@@ -216,15 +218,21 @@ TEST_F(Rows, APatternGoesIntoTheModelAsStrongAsItWasFitted) {
   const auto& table = std::get<sim::LearnedRange>(learned.front().effect);
   const PixelPattern& pattern = *made.rows.patternOf("pixel:range");
   ASSERT_EQ(table.offsets_mm.size(), pattern.value.size());
-  EXPECT_DOUBLE_EQ(table.offsets_mm.front(), 0.5 * pattern.value.front());
-  EXPECT_DOUBLE_EQ(table.offsets_mm.back(), 0.5 * pattern.value.back());
+  const auto size = [](const std::vector<double>& values) {
+    double sum = 0.0;
+    for (const double value : values) sum += std::abs(value);
+    return sum;
+  };
+  EXPECT_GT(size(pattern.value), 100.0);
+  EXPECT_NEAR(size(table.offsets_mm), 0.5 * size(pattern.value), 1e-6);
 }
 
-/// Where the light's zero lies is fitted beforehand. That is no effect of the file, so that a phase of each frequency
-/// may still be missing in it.
+/// Where the light's zero lies is fitted beforehand. That is no effect of the file, so that a phase of each
+/// frequency may still be missing in it.
 TEST_F(Rows, ADelayThatIsKnownHidesNoFrequencyOffset) {
   std::string square = tinyCamera();
-  square.replace(square.find("contrast = 0.5"), 14, "contrast = 0.5\nemitted = 'square'\ndemodulated = 'square'");
+  square.replace(square.find("contrast = 0.5"), 14,
+                 "contrast = 0.5\nemitted = 'square'\ndemodulated = 'square'");
   square.replace(square.find("taps = 2"), 8, "taps = 2\nharmonics = 7");
   const Made made = make("", square);
   const auto camera = sim::SensorModel::parse(square, "camera.toml");
@@ -297,7 +305,8 @@ TEST_F(Recording, IsCutWhereTheCameraMovesOrIsSetOtherwise) {
   EXPECT_LE(campaign->put_aside.size(), captures / 3);
   for (const MeasuredCapture& locked : campaign->put_aside)
     for (const MeasuredCapture& open : campaign->captures)
-      EXPECT_GT(norm(locked.moment.world_from_camera->translation_m - open.moment.world_from_camera->translation_m) +
+      EXPECT_GT(norm(locked.moment.world_from_camera->translation_m -
+                     open.moment.world_from_camera->translation_m) +
                     norm(locked.moment.world_from_camera->rotate({0, 0, 1}) -
                          open.moment.world_from_camera->rotate({0, 0, 1})),
                 0.005)

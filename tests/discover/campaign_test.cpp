@@ -211,8 +211,10 @@ TEST_F(Searched, WhatOnlyTheFirstCapturesShowIsNamedWithWhatLooksAlike) {
       << verdictOf(finding) << testing::PrintToString(finding.effects.front().found.refused);
   // They differ where a camera's time and its temperatures do not go together.
   ASSERT_TRUE(finding.effects.front().next);
-  EXPECT_GT(finding.effects.front().next->chi2, 9.0) << "the captures that were taken tell them apart by less";
-  EXPECT_THAT(finding.effects.front().next->change, testing::AnyOf(HasSubstr("switching"), HasSubstr("warmer")));
+  EXPECT_GT(finding.effects.front().next->chi2, 9.0)
+      << "the captures that were taken tell them apart by less";
+  EXPECT_THAT(finding.effects.front().next->change,
+              testing::AnyOf(HasSubstr("switching"), HasSubstr("warmer")));
 }
 
 /// A camera of square waves.
@@ -220,7 +222,8 @@ class OfSquareWaves : public Searched {
  protected:
   static std::string square(const std::string& effects) {
     std::string text = tinyCamera(effects);
-    text.replace(text.find("contrast = 0.5"), 14, "contrast = 0.5\nemitted = 'square'\ndemodulated = 'square'");
+    text.replace(text.find("contrast = 0.5"), 14,
+                 "contrast = 0.5\nemitted = 'square'\ndemodulated = 'square'");
     text.replace(text.find("taps = 2"), 8, "taps = 2\nharmonics = 7");
     return text;
   }
@@ -235,8 +238,8 @@ class OfSquareWaves : public Searched {
   }
 };
 
-/// With square waves a delay of the light moves the cyclic error, which no offset does: locked captures are judged
-/// with it, and without it before; model.toml has it.
+/// With square waves a delay of the light moves the cyclic error, which no offset does: locked captures are
+/// judged with it, and without it before; model.toml has it.
 TEST_F(OfSquareWaves, ADelayOfTheLightIsInTheModelThatIsJudged) {
   const CampaignFinding finding = searchFor("[[effect]]\ntype = 'frequency_offset'\nfirst_rad = 0.04\n", "");
   EXPECT_THAT(namesOf(finding), testing::IsEmpty()) << verdictOf(finding);
@@ -252,12 +255,13 @@ TEST_F(OfSquareWaves, ADelayOfTheLightIsInTheModelThatIsJudged) {
   EXPECT_NEAR(found_rad, 0.04, 0.01);
 }
 
-/// A radian is 795.8 mm. The two say nearly the same of the range, so that it is their sum that the poses know: 30 of
-/// them, each 1 mm off, to 0.2 mm.
+/// A radian is 795.8 mm. The two say nearly the same of the range, so that it is their sum that the poses
+/// know: 30 of them, each 1 mm off, to 0.2 mm.
 TEST_F(OfSquareWaves, WhereZeroLiesIsAddedOnceToWhatTheFileSaysOfIt) {
   const auto zero = [](double delay_mm, double offset_rad) {
-    return fmt::format("[[effect]]\ntype = 'frequency_offset'\nfirst_rad = {}\n[[effect]]\ntype = 'delay'\noffset_mm = {}\n",
-                       offset_rad, delay_mm);
+    return fmt::format(
+        "[[effect]]\ntype = 'frequency_offset'\nfirst_rad = {}\n[[effect]]\ntype = 'delay'\noffset_mm = {}\n",
+        offset_rad, delay_mm);
   };
   const CampaignFinding finding = searchFor(zero(30.0, 0.05), zero(10.0, 0.01));
   EXPECT_THAT(namesOf(finding), testing::IsEmpty()) << verdictOf(finding);
@@ -265,7 +269,8 @@ TEST_F(OfSquareWaves, WhereZeroLiesIsAddedOnceToWhatTheFileSaysOfIt) {
   ASSERT_TRUE(model) << model.error().message;
   std::vector<double> delays_mm, offsets_rad;
   for (const sim::AnyEffect& effect : model->effects()) {
-    if (const auto* delay = std::get_if<sim::Delay>(&effect)) delays_mm.push_back(delay->offset.in(millimetre));
+    if (const auto* delay = std::get_if<sim::Delay>(&effect))
+      delays_mm.push_back(delay->offset.in(millimetre));
     if (const auto* offset = std::get_if<sim::FrequencyOffset>(&effect))
       offsets_rad.push_back(offset->first.in(radian));
   }
@@ -275,8 +280,8 @@ TEST_F(OfSquareWaves, WhereZeroLiesIsAddedOnceToWhatTheFileSaysOfIt) {
   EXPECT_NEAR(delays_mm.front() + 795.8 * offsets_rad.front(), 30.0 + 795.8 * 0.05, 1.5);
 }
 
-/// A gain that goes with the range, and one along the columns that changes far less: neither takes anything from the
-/// other, so that the weaker is no rest of the stronger.
+/// A gain that goes with the range, and one along the columns that changes far less: neither takes anything
+/// from the other, so that the weaker is no rest of the stronger.
 TEST_F(Searched, AFaintSecondCauseIsAnEffectOfItsOwn) {
   simulate("", [](sim::RangeImage& image, const Moment&, const CameraInfo&, std::uint64_t) {
     for (int y = 0; y < image.range_m.height(); ++y) {

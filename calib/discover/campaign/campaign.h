@@ -73,8 +73,8 @@ struct Declared {
   sim::SensorModel model;
   sim::Scene scene;
   std::map<std::string, sim::Scene> scene_of_block{};
-  /// Of the light, as the captures say: where its zero lies no camera file knows, so that it is no effect. The model
-  /// is without it; see declaredEffects.
+  /// Of the light, as the captures say: where its zero lies no camera file knows, so that it is no effect.
+  /// The model is without it; see declaredEffects.
   double delay_mm = 0.0;
 
   [[nodiscard]] const sim::Scene& sceneOf(const std::string& block) const {

@@ -166,8 +166,8 @@ compare::Section foundSection(const CampaignFinding& finding) {
       section.blocks.emplace_back(compare::Paragraph{"Next experiment: " + adviceOf(*next) + "."});
     } else if (const auto& change = one.found.experiment) {
       section.blocks.emplace_back(compare::Paragraph{
-          fmt::format("Next experiment: hold {} at {:.4g} and change {} from {:.4g} to {:.4g}.",
-                      change->hold, change->held_at, change->vary, change->from, change->to)});
+          fmt::format("Next experiment: hold {} at {:.4g} and change {} from {:.4g} to {:.4g}.", change->hold,
+                      change->held_at, change->vary, change->from, change->to)});
     }
   }
   section.blocks.emplace_back(compare::Paragraph{fmt::format(
@@ -177,7 +177,9 @@ compare::Section foundSection(const CampaignFinding& finding) {
       finding.finding.first_p, finding.finding.score_names.size(), finding.finding.draws,
       finding.finding.by_sign_flips ? " (sign flips of captures)" : "", finding.finding.last_p,
       compare::shownWithError(finding.offset_mm, finding.offset_error_mm, 2) + " mm" +
-          (finding.zero.delay_mm == 0.0 ? "" : fmt::format("; delay of its light: {:.2f} mm", finding.zero.delay_mm)))});
+          (finding.zero.delay_mm == 0.0
+               ? ""
+               : fmt::format("; delay of its light: {:.2f} mm", finding.zero.delay_mm)))});
   section.blocks.emplace_back(seenTable(finding));
   if (finding.finding.scales.size() >= 2) {
     section.blocks.emplace_back(compare::Paragraph{

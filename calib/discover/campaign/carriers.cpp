@@ -123,7 +123,9 @@ std::vector<sim::AnyEffect> declaredEffects(const Declared& declared) {
 }
 
 bool isOnlyDelay(const Declared& declared, const sim::AnyEffect& effect) {
-  const auto isOffset = [](const sim::AnyEffect& any) { return std::holds_alternative<sim::FrequencyOffset>(any); };
+  const auto isOffset = [](const sim::AnyEffect& any) {
+    return std::holds_alternative<sim::FrequencyOffset>(any);
+  };
   return isOffset(effect) && std::ranges::none_of(declared.model.effects(), isOffset);
 }
 

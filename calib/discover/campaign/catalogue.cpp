@@ -199,8 +199,7 @@ NumberRoles numberRolesOf(const sim::AnyEffect& none, const sim::AnyEffect& defa
 }
 
 /// The defaults with all their strengths at 0, where `none` lacks a list that they have.
-sim::AnyEffect quiet(const sim::AnyEffect& none, const sim::AnyEffect& defaults,
-                     const NumberRoles& roles) {
+sim::AnyEffect quiet(const sim::AnyEffect& none, const sim::AnyEffect& defaults, const NumberRoles& roles) {
   const auto off = numbersOf(none);
   const bool lacks = std::ranges::any_of(roles.strengths, [&](const EffectNumber& number) {
     return std::ranges::find(off, number.key, &EffectNumber::key) == off.end();

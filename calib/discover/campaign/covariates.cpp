@@ -96,18 +96,19 @@ struct KnownCovariate {
   Nature nature;
   Stage stage;
 };
-constexpr std::array kKnownCovariates{KnownCovariate{"time_s", "time", "s", Nature::Time, Stage::Range},
-                            KnownCovariate{"ambient_klx", "ambient", "klx", Nature::Plain, Stage::Range},
-                            KnownCovariate{"exposure_us", "exposure", "us", Nature::Plain, Stage::Range},
-                            KnownCovariate{"range_m", "range", "m", Nature::Distance, Stage::Range},
-                            KnownCovariate{"amplitude_e", "amplitude", "e", Nature::Plain, Stage::Range},
-                            KnownCovariate{"column", "position", "px", Nature::Plain, Stage::Range},
-                            KnownCovariate{"row", "position", "px", Nature::Plain, Stage::Range},
-                            KnownCovariate{"radius_px", "position", "px", Nature::Plain, Stage::Range},
-                            KnownCovariate{"incidence", "incidence", "", Nature::Plain, Stage::Range},
-                            KnownCovariate{"surround_4px", "neighbours", "", Nature::Plain, Stage::Range},
-                            KnownCovariate{"surround_16px", "neighbours", "", Nature::Plain, Stage::Range},
-                            KnownCovariate{"surround_all", "neighbours", "", Nature::Plain, Stage::Range}};
+constexpr std::array kKnownCovariates{
+    KnownCovariate{"time_s", "time", "s", Nature::Time, Stage::Range},
+    KnownCovariate{"ambient_klx", "ambient", "klx", Nature::Plain, Stage::Range},
+    KnownCovariate{"exposure_us", "exposure", "us", Nature::Plain, Stage::Range},
+    KnownCovariate{"range_m", "range", "m", Nature::Distance, Stage::Range},
+    KnownCovariate{"amplitude_e", "amplitude", "e", Nature::Plain, Stage::Range},
+    KnownCovariate{"column", "position", "px", Nature::Plain, Stage::Range},
+    KnownCovariate{"row", "position", "px", Nature::Plain, Stage::Range},
+    KnownCovariate{"radius_px", "position", "px", Nature::Plain, Stage::Range},
+    KnownCovariate{"incidence", "incidence", "", Nature::Plain, Stage::Range},
+    KnownCovariate{"surround_4px", "neighbours", "", Nature::Plain, Stage::Range},
+    KnownCovariate{"surround_16px", "neighbours", "", Nature::Plain, Stage::Range},
+    KnownCovariate{"surround_all", "neighbours", "", Nature::Plain, Stage::Range}};
 
 }  // namespace
 

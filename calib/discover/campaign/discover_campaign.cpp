@@ -140,7 +140,7 @@ std::size_t insert(WithFound& inserted, const sim::AnyEffect& effect) {
 }
 
 WithFound insertFound(const CampaignRows& rows, const Declared& declared,
-                     const std::vector<std::size_t>& updates, CampaignFinding& finding) {
+                      const std::vector<std::size_t>& updates, CampaignFinding& finding) {
   WithFound inserted{declaredEffects(declared), updates};
   std::vector<const NamedFit*> fits;
   for (const Effect& effect : finding.finding.effects)

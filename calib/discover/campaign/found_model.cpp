@@ -14,8 +14,9 @@
 namespace toftwin::discover {
 namespace {
 
-/// A delay of the light that is another thing than an offset: in the file's frequency_offset, in the one that was
-/// found, or in one more. `beyond_mm`: what the last fit said more than `declared`'s, with which all fits began.
+/// A delay of the light that is another thing than an offset: in the file's frequency_offset, in the one that
+/// was found, or in one more. `beyond_mm`: what the last fit said more than `declared`'s, with which all fits
+/// began.
 void addDelay(const Declared& declared, double beyond_mm, std::vector<std::optional<FittedEffect>>& updates,
               std::vector<FittedEffect>& added) {
   const sim::SensorModel& model = declared.model;
@@ -49,7 +50,8 @@ void addOffset(const sim::SensorModel& model, const CampaignFinding& finding,
   if (!(std::abs(finding.zero.offset_mm) > 3.0 * finding.offset_error_mm)) return;
   const auto farther = [&](Length own) {
     const Length offset = own + finding.zero.offset_mm * millimetre;
-    return FittedEffect{sim::Delay{.offset = offset}, {{"offset_mm", offset.in(millimetre), finding.offset_error_mm}}};
+    return FittedEffect{sim::Delay{.offset = offset},
+                        {{"offset_mm", offset.in(millimetre), finding.offset_error_mm}}};
   };
   for (std::size_t i = 0; i < updates.size(); ++i) {
     const auto* own = std::get_if<sim::Delay>(&model.effects()[i]);
@@ -78,8 +80,8 @@ std::string modelText(const std::string& text, const Declared& declared, const C
   addOffset(declared.model, finding, updates, added);
   addDelay(declared, finding.zero.delay_mm - declared.delay_mm, updates, added);
   return withEffects(text, effects, updates, added,
-                     fmt::format("Written by toftwin discover from {} captures of {}.",
-                                 finding.captures, finding.plan.empty() ? "a run" : finding.plan));
+                     fmt::format("Written by toftwin discover from {} captures of {}.", finding.captures,
+                                 finding.plan.empty() ? "a run" : finding.plan));
 }
 
 }  // namespace toftwin::discover

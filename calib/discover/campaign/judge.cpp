@@ -78,8 +78,8 @@ struct Errors {
   double agree = 0.0, looked_at = 0.0;
   double neighbours = 0.0, squares = 0.0;
 };
-Errors errorsOf(const MeasuredCapture& capture, const TracedCapture& traced,
-                const Reading& simulated, double offset_mm) {
+Errors errorsOf(const MeasuredCapture& capture, const TracedCapture& traced, const Reading& simulated,
+                double offset_mm) {
   Errors errors;
   const int width = simulated.range_m.width(), height = simulated.range_m.height();
   Image<float> left(width, height, std::numeric_limits<float>::quiet_NaN());

@@ -120,8 +120,8 @@ std::optional<sim::AnyEffect> tableOf(const Along& along, std::span<const Covari
   return learned;
 }
 
-/// A pattern of pixels, as a table over columns and rows with a knot in the middle of each cell. `strength`: the
-/// pattern's coefficient beside everything else that was found.
+/// A pattern of pixels, as a table over columns and rows with a knot in the middle of each cell. `strength`:
+/// the pattern's coefficient beside everything else that was found.
 sim::AnyEffect tableOf(const PixelPattern& pattern, double strength) {
   sim::LearnedRange learned{
       .over = Over::Column, .knots = {}, .and_over = Over::Row, .and_knots = {}, .offsets_mm = {}};

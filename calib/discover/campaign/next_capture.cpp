@@ -77,7 +77,8 @@ class Differing {
   [[nodiscard]] std::vector<CaptureEvidence> in(const std::vector<MeasuredCapture>& captures,
                                                 const std::vector<std::size_t>& places) const {
     const sim::SensorModel& model = judged_.declared.model;
-    const auto here = NoiselessCamera::make(model, one_, captures), there = NoiselessCamera::make(model, other_, captures);
+    const auto here = NoiselessCamera::make(model, one_, captures),
+               there = NoiselessCamera::make(model, other_, captures);
     if (!here || !there) return {};
     std::vector<CaptureEvidence> all;
     for (std::size_t i = 0; i < captures.size(); ++i) {
@@ -101,13 +102,15 @@ class Differing {
   const std::vector<sim::AnyEffect>&one_, &other_;
 };
 
-std::vector<sim::AnyEffect> with(std::vector<sim::AnyEffect> effects, const std::vector<sim::AnyEffect>& more) {
+std::vector<sim::AnyEffect> with(std::vector<sim::AnyEffect> effects,
+                                 const std::vector<sim::AnyEffect>& more) {
   for (const sim::AnyEffect& one : more) effects = withInserted(std::move(effects), one);
   return effects;
 }
 
 /// What the simulator says of it; nothing where it has no form, or one whose strength is still to be fitted.
-std::vector<sim::AnyEffect> formsOf(const Effect& effect, const CampaignRows& rows, const sim::SensorModel& model) {
+std::vector<sim::AnyEffect> formsOf(const Effect& effect, const CampaignRows& rows,
+                                    const sim::SensorModel& model) {
   if (effect.fit) return {campaignFitOf(*effect.fit).effect};
   std::vector<sim::AnyEffect> forms;
   for (const LearnedEffect& learned : learnedEffectsOf(effect, rows, model)) {
@@ -143,13 +146,15 @@ std::optional<NextCapture> nextCapture(const JudgedCampaign& judged, const std::
     for (const CaptureEvidence& capture : marginal.captures) {
       const double chi2 =
           capture.energy - 2.0 * common.dot(capture.moment) + common.dot(capture.gram * common);
-      if (!best || chi2 > best->chi2) best = NextCapture{.like = capture.name, .change = again.words, .chi2 = chi2};
+      if (!best || chi2 > best->chi2)
+        best = NextCapture{.like = capture.name, .change = again.words, .chi2 = chi2};
     }
   }
   return best;
 }
 
-void addNextCaptures(const JudgedCampaign& judged, const CampaignRows& rows, std::vector<FoundEffect>& effects) {
+void addNextCaptures(const JudgedCampaign& judged, const CampaignRows& rows,
+                     std::vector<FoundEffect>& effects) {
   const sim::SensorModel& model = judged.declared.model;
   for (FoundEffect& found : effects) {
     const auto own = formsOf(found.found, rows, model);

@@ -10,8 +10,9 @@
 //
 // In a capture the pattern of those before it stands, at other places: noise then has no part in its own
 // explanation, the column's product with the residual is a sum of martingale differences, and its variance
-// the column's square, as if the column had been known beforehand. Once it is chosen, the pattern of all captures at
-// other places stands there: how strong it is, is fitted to captures that it was not learned from.
+// the column's square, as if the column had been known beforehand. Once it is chosen, the pattern of all
+// captures at other places stands there: how strong it is, is fitted to captures that it was not learned
+// from.
 #include <cmath>
 #include <optional>
 
@@ -147,7 +148,8 @@ Term CampaignRows::settled(Term term) const {
 }
 
 const PixelPattern* CampaignRows::patternOf(const std::string& carrier) const {
-  const std::size_t end = carrier.ends_with(kFromOthers) ? carrier.size() - kFromOthers.size() : carrier.size();
+  const std::size_t end =
+      carrier.ends_with(kFromOthers) ? carrier.size() - kFromOthers.size() : carrier.size();
   const auto found = patterns_.find(carrier.substr(0, end));
   return found == patterns_.end() ? nullptr : &found->second;
 }

@@ -168,7 +168,8 @@ struct Locking {
   bool is_by_place = false;
 };
 
-/// For each capture the first one from its place: within a centimetre and 0.01 rad, a rig's errors are shared.
+/// For each capture the first one from its place: within a centimetre and 0.01 rad, a rig's errors are
+/// shared.
 std::vector<std::size_t> placesOf(const std::vector<MeasuredCapture>& captures) {
   constexpr double kNear_m = 0.01, kNear_rad = 0.01;
   const auto isNear = [&](std::size_t a, std::size_t b) {
@@ -185,15 +186,16 @@ std::vector<std::size_t> placesOf(const std::vector<MeasuredCapture>& captures) 
   return places;
 }
 
-/// Every fifth place with all that was taken there, where there are ten: what was found must hold elsewhere. A place
-/// with more than a fifth of all captures, as of a warm-up, stays open, since nothing else may say what it says. Else
-/// every fifth capture.
+/// Every fifth place with all that was taken there, where there are ten: what was found must hold elsewhere.
+/// A place with more than a fifth of all captures, as of a warm-up, stays open, since nothing else may say
+/// what it says. Else every fifth capture.
 Locking lockingOf(const std::vector<MeasuredCapture>& captures) {
   Locking locking{std::vector<bool>(captures.size())};
   const std::vector<std::size_t> places = placesOf(captures);
   std::vector<std::size_t> choices;
   for (std::size_t c = 0; c < captures.size(); ++c) {
-    if (places[c] == c && static_cast<std::size_t>(std::ranges::count(places, c)) * kEachLocked <= captures.size())
+    if (places[c] == c &&
+        static_cast<std::size_t>(std::ranges::count(places, c)) * kEachLocked <= captures.size())
       choices.push_back(c);
   }
   locking.is_by_place = choices.size() >= 2 * kEachLocked;
@@ -236,13 +238,13 @@ Result<Campaign> readRecording(const std::filesystem::path& file, const std::fil
     (is_locked ? campaign.put_aside : campaign.captures).push_back(std::move(capture));
   }
   if (!campaign.put_aside.empty())
-    campaign.notes.push_back(
-        fmt::format("{} of the recording's captures, {}, were put aside before the search and are judged as the "
-                    "locked ones; nothing keeps a second search from being judged on them again.",
-                    campaign.put_aside.size(),
-                    locking.is_by_place ? "all of one place in five"
-                                        : "one in five, from places that the search sees, too: they say how well "
-                                          "what was found holds at other times, not at other places"));
+    campaign.notes.push_back(fmt::format(
+        "{} of the recording's captures, {}, were put aside before the search and are judged as the "
+        "locked ones; nothing keeps a second search from being judged on them again.",
+        campaign.put_aside.size(),
+        locking.is_by_place ? "all of one place in five"
+                            : "one in five, from places that the search sees, too: they say how well "
+                              "what was found holds at other times, not at other places"));
   return campaign;
 }
 

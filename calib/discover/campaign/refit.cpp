@@ -350,8 +350,7 @@ Result<std::vector<std::shared_ptr<const TracedCapture>>> traceWhereTheyStood(
     const std::function<void(double)>& tell) {
   constexpr Eigen::Index kOwn = 6;  // pose and light
   const Lit lit{captures, traced, traced};
-  const auto evidence =
-      residualEvidence({declared, lit, {}}, declaredEffects(declared));
+  const auto evidence = residualEvidence({declared, lit, {}}, declaredEffects(declared));
   if (!evidence) return evidence.error();
   const Eigen::VectorXd common = stepOf(marginalise(*evidence, {}), 0).others.coefficient;
   std::vector<Stood> stood;

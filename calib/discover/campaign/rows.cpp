@@ -227,9 +227,10 @@ double exposureUsOf(const MeasuredCapture& capture) {
   return exposures.empty() ? capture.record.exposure_us : exposures.front().duration.in(microsecond);
 }
 
-/// How far what a camera sees lies from there in the image of another one, at most, in pixels: looked at on a grid
-/// over the image. Infinite where nothing is seen.
-double shiftOf(const CameraInfo& camera, const Image<float>& range_m, const Transform<Camera, Camera>& other_from_camera) {
+/// How far what a camera sees lies from there in the image of another one, at most, in pixels: looked at on a
+/// grid over the image. Infinite where nothing is seen.
+double shiftOf(const CameraInfo& camera, const Image<float>& range_m,
+               const Transform<Camera, Camera>& other_from_camera) {
   constexpr int kSteps = 8;
   double most = -1.0;
   for (int j = 0; j <= kSteps; ++j) {
@@ -246,8 +247,8 @@ double shiftOf(const CameraInfo& camera, const Image<float>& range_m, const Tran
   return most < 0.0 ? std::numeric_limits<double>::infinity() : most;
 }
 
-/// For each capture the first one of the same scene and place, whatever their blocks are: less than half a pixel
-/// away, the scene's own patterns stay in their pixels.
+/// For each capture the first one of the same scene and place, whatever their blocks are: less than half a
+/// pixel away, the scene's own patterns stay in their pixels.
 std::vector<std::size_t> sitesOf(const Declared& declared, const Lit& lit) {
   constexpr double kOnePlace_px = 0.5;
   const auto isOfOnePlace = [&](std::size_t a, std::size_t b) {

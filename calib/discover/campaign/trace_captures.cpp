@@ -21,8 +21,7 @@ namespace {
 constexpr double kQuieter = 0.3;
 
 /// Where the camera is if it stands that much off.
-Transform<World, Camera> movedBy(const Transform<World, Camera>& world_from_camera,
-                               const Stood& stood) {
+Transform<World, Camera> movedBy(const Transform<World, Camera>& world_from_camera, const Stood& stood) {
   constexpr double kTurn = kPosePrior_deg * std::numbers::pi / 180.0;
   Transform<Camera, Camera> by = rotation<Camera, Camera>({1.0, 0.0, 0.0}, kTurn * stood[3]) *
                                  rotation<Camera, Camera>({0.0, 1.0, 0.0}, kTurn * stood[4]);

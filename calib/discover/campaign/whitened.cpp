@@ -48,8 +48,7 @@ void WhitenedCapture::put(const Cells& cells, std::size_t column, const Reading&
 
 void WhitenedCapture::putChange(const Cells& cells, std::size_t column, const Reading& from,
                                 const Reading& to) {
-  put(cells, column,
-      {minus(to.range_m, from.range_m), minus(to.log_amplitude, from.log_amplitude)});
+  put(cells, column, {minus(to.range_m, from.range_m), minus(to.log_amplitude, from.log_amplitude)});
 }
 
 void WhitenedCapture::putCommon(const Cells& cells, const TracedCapture& traced) {
@@ -65,11 +64,10 @@ void WhitenedCapture::putCommon(const Cells& cells, const TracedCapture& traced)
 
 void WhitenedCapture::putResidual(const Cells& cells, const MeasuredCapture& capture,
                                   const TracedCapture& traced, const Reading& simulated) {
-  residual[kRange] =
-      cells.whitened(Channel::Range, minus(capture.range_m.mean, simulated.range_m));
+  residual[kRange] = cells.whitened(Channel::Range, minus(capture.range_m.mean, simulated.range_m));
   if (cells.has(Channel::LogAmplitude)) {
-    residual[kLog] = cells.whitened(
-        Channel::LogAmplitude, minus(capture.log_amplitude.mean, simulated.log_amplitude));
+    residual[kLog] =
+        cells.whitened(Channel::LogAmplitude, minus(capture.log_amplitude.mean, simulated.log_amplitude));
   }
   for (std::size_t c = 0; c < kChannels; ++c) {
     if (!cells.has(static_cast<Channel>(c))) continue;
@@ -82,12 +80,11 @@ void WhitenedCapture::putResidual(const Cells& cells, const MeasuredCapture& cap
 void WhitenedCapture::putResidual(
     const Cells& cells, const std::array<Eigen::VectorXf, kChannels>& residual_before,
     const Reading& from, const Reading& to) {
-  residual[kRange] = residual_before[kRange] -
-                     cells.whitened(Channel::Range, minus(to.range_m, from.range_m));
+  residual[kRange] =
+      residual_before[kRange] - cells.whitened(Channel::Range, minus(to.range_m, from.range_m));
   if (cells.has(Channel::LogAmplitude))
     residual[kLog] = residual_before[kLog] -
-                     cells.whitened(Channel::LogAmplitude,
-                                    minus(to.log_amplitude, from.log_amplitude));
+                     cells.whitened(Channel::LogAmplitude, minus(to.log_amplitude, from.log_amplitude));
 }
 
 CaptureEvidence WhitenedCapture::evidence(std::string name, std::string block) const {
