@@ -113,10 +113,6 @@ ConfiguredSource readSource(settings::Table table, std::span<const drivers::Driv
   } else {
     source.faults = std::make_shared<FaultPlan>(source.keys.faults, source.keys.name, log);
     source.opened = FaultPlan::open(source.faults, openGuarded(*driver, source.table));
-    // What is wrong in another file is told at the source that names it.
-    if (!source.opened && source.opened.error().code == Error::Code::InvalidArgument &&
-        source.table.check())
-      source.table.complain("", source.opened.error().message);
   }
   return source;
 }

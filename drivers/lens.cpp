@@ -38,7 +38,7 @@ Result<Lens> lensFor(const LensKeys& keys, int width, int height, std::string_vi
   const bool has_size = keys.width > 0;
   const double scale = has_size ? static_cast<double>(width) / keys.width : 1.0;
   if (has_size && std::lround(scale * keys.height) != height) {
-    return Error{Error::Code::InvalidArgument,
+    return Error{Error::Code::Incompatible,
                  fmt::format("{}: the lens is described for {} x {} pixels, which is not the "
                              "shape of the depth image, {} x {}",
                              driver, keys.width, keys.height, width, height)};

@@ -14,7 +14,7 @@
 namespace toftwin::drivers {
 
 /// The row of a driver that this build lacks: its keys are documented as ever, it lists no camera,
-/// and whoever opens one reads how to get it. `What` has name, summary, remedy ("install
+/// and whoever opens one reads how to get it; that is no mistake of the file, and the daemon's other sources run. `What` has name, summary, remedy ("install
 /// libopenni2-dev and configure again") and Keys.
 template <class What>
 Driver notBuilt() {
@@ -24,9 +24,9 @@ Driver notBuilt() {
           .list = [] { return std::vector<std::string>{}; },
           .open = [](settings::Table& table) -> Result<std::unique_ptr<Source>> {
             table.acceptAll();
-            table.complain(table.has("driver") ? "driver" : "",
-                           fmt::format("= \"{}\" was {}", What::name, why));
-            return table.check().error();
+            return Error{Error::Code::Unsupported,
+                         fmt::format("{}: the driver \"{}\" was {}",
+                                     table.place(table.has("driver") ? "driver" : ""), What::name, why)};
           },
           .document = [] { return settings::markdownTable(settings::keysOf<typename What::Keys>()); },
           .not_built = why};

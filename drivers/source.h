@@ -77,7 +77,8 @@ struct Driver {
   /// driver that lists cameras reads the key `uri`, and opens each with that key alone.
   std::vector<std::string> (*list)();
   /// Opens a camera by the keys of its [[source]] table; the driver reads its own keys and thereby
-  /// ticks them off, so that what is left over is an unknown key.
+  /// ticks them off, so that what is left over is an unknown key. What it complains about to `keys` makes the
+  /// daemon refuse the file; any error alone is a camera that is not there, and is tried again.
   Result<std::unique_ptr<Source>> (*open)(settings::Table& keys);
   /// The driver's keys as a Markdown table, for the documents.
   std::string (*document)();

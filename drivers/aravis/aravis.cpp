@@ -28,6 +28,11 @@ Result<> checkKeys(const Keys& keys, settings::Table& table) {
                                       "aravis:192.168.0.20 or aravis:any",
                                       keys.uri));
   }
+  if (!keys.pixel_format.empty() && pixelFormatNamed(keys.pixel_format) == nullptr) {
+    table.complain("pixel_format",
+                   fmt::format("= \"{}\" cannot be read here; it must be one of: {}, {}", keys.pixel_format,
+                               pixelFormatNames(Role::Range), pixelFormatNames(Role::Intensity)));
+  }
   for (const std::string& one : keys.set) {
     if (!assignmentOf(one))
       table.complain("set", fmt::format("has \"{}\"; write \"ExposureTime = 1000\"", one));

@@ -42,7 +42,7 @@ Result<> setTrigger(const Connection& connection, const Features& features, cons
     const auto there = features.entries("TriggerSource");
     if (std::ranges::find(there, source) == there.end()) {
       return Error{
-          Error::Code::InvalidArgument,
+          Error::Code::Incompatible,
           fmt::format("aravis: the camera cannot be triggered by \"{}\"; it has: {}", source,
                       there.empty() ? "none" : fmt::format("{}", fmt::join(there, ", ")))};
     }
@@ -57,7 +57,7 @@ Result<> setComponents(const Connection& connection, const Features& features, c
   const auto there = features.entries("ComponentSelector");
   for (const std::string& one : keys.components) {
     if (std::ranges::find(there, one) != there.end()) continue;
-    return Error{Error::Code::InvalidArgument,
+    return Error{Error::Code::Incompatible,
                  fmt::format("aravis: the camera has no component \"{}\"; it has: {}", one,
                              there.empty() ? "none" : fmt::format("{}", fmt::join(there, ", ")))};
   }
@@ -89,13 +89,6 @@ Result<> setPixelFormat(const Features& features, const Keys& keys) {
   if (std::ranges::find(components, "Range") != components.end()) {
     if (auto set = features.setText("ComponentSelector", "Range"); !set) return set;
   }
-  if (pixelFormatNamed(keys.pixel_format) == nullptr) {
-    return Error{Error::Code::InvalidArgument,
-                 fmt::format("aravis: pixel_format = \"{}\" cannot be read here; it must be one "
-                             "of: {}, {}",
-                             keys.pixel_format, pixelFormatNames(Role::Range),
-                             pixelFormatNames(Role::Intensity))};
-  }
   return features.setText("PixelFormat", keys.pixel_format);
 }
 
@@ -112,7 +105,7 @@ Result<> setChunksAndClock(const Connection& connection, const Features& feature
   if (keys.ptp) {
     const auto name = firstOf(features, {"PtpEnable", "GevIEEE1588"});
     if (!name) {
-      return Error{Error::Code::InvalidArgument,
+      return Error{Error::Code::Incompatible,
                    "aravis: the camera's clock cannot follow the network's; leave out ptp"};
     }
     if (auto set = features.setNumber(*name, 1.0); !set) return set;

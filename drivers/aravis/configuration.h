@@ -29,8 +29,8 @@ struct Setup {
 /// "ExposureTime = 1000"; nothing if it is no assignment.
 std::optional<std::pair<std::string, std::string>> assignmentOf(const std::string& text);
 
-/// Sets the camera up as the keys say, and reads what came of it. InvalidArgument or NotFound where
-/// the camera cannot do what is wanted, Incompatible where it sends nothing that can be read.
+/// Sets the camera up as the keys say, and reads what came of it. Incompatible, InvalidArgument or NotFound where
+/// the camera cannot do what is wanted, Incompatible also where it sends nothing that can be read.
 Result<Setup> configure(const Connection& connection, const Keys& keys);
 
 }  // namespace toftwin::drivers::aravis

@@ -161,6 +161,7 @@ Result<> set(const Device& device, const Control& control, double value) {
                       "first",
                       device.node(), control.name)};
     }
+    if (said.code == Error::Code::Incompatible) said.code = Error::Code::InvalidArgument;
     return said;
   }
   return {};

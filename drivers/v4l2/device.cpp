@@ -74,7 +74,7 @@ Error failure(const std::string& node, std::string_view what, int negative_errno
     case ESHUTDOWN:
       return {Code::Disconnected, said};
     case EINVAL:
-      return {Code::InvalidArgument, said};
+      return {Code::Incompatible, said};
     default:
       return {Code::Internal, said};
   }
@@ -181,7 +181,7 @@ Result<Layout> setLayout(const Device& device, const PixelFormat& format, Size w
   }
   // The kernel may set something else and call it success.
   if (pix.pixelformat != format.fourcc) {
-    return Error{Error::Code::InvalidArgument,
+    return Error{Error::Code::Incompatible,
                  fmt::format("v4l2: {} has no format {}; it has: {}", device.node(), format.name,
                              offers(device))};
   }
@@ -190,7 +190,7 @@ Result<Layout> setLayout(const Device& device, const PixelFormat& format, Size w
       (wanted != Size{} && got != wanted)) {
     std::vector<std::string> known;
     for (const Size& size : sizes) known.push_back(fmt::format("{} x {}", size.width, size.height));
-    return Error{Error::Code::InvalidArgument,
+    return Error{Error::Code::Incompatible,
                  fmt::format("v4l2: {} has no {} images of {} x {}; it has: {}", device.node(),
                              format.name, wanted.width, wanted.height, fmt::join(known, ", "))};
   }
@@ -220,7 +220,7 @@ Result<Duration> setFrameRate(const Device& device, const Layout& layout, Freque
     }
     if (!has_rate || std::abs(perSecond(interval) / rate_hz - 1.0) > kTolerance) {
       return Error{
-          Error::Code::InvalidArgument,
+          Error::Code::Incompatible,
           fmt::format("v4l2: {} has no {:g} frames per second at {} x {}; it has: {}",
                       device.node(), rate_hz, layout.width, layout.height,
                       frameRatesOf(device, layout.format.fourcc, {layout.width, layout.height}))};

@@ -60,7 +60,7 @@ Result<Node> nodeWith(const CameraNodes& camera, int index, const PixelFormat& f
   for (const Node& node : camera.nodes) {
     if (offers(node, format)) return node;
   }
-  return Error{Error::Code::InvalidArgument,
+  return Error{Error::Code::Incompatible,
                fmt::format("v4l2: the camera \"{}\" has no format {}; it has: {}",
                            camera.nodes.front().card, format.name, formatsOf(camera))};
 }
@@ -101,7 +101,7 @@ Result<CameraNodes> findCamera(System& system, const std::string& uri, const std
     if (camera.named || !isNamedBy(node, selector)) continue;
     if (bus_info && *bus_info != node.bus_info) {
       return Error{
-          Error::Code::InvalidArgument,
+          Error::Code::Incompatible,
           fmt::format("{}: there are several cameras {}: one at {}, one at {}; name one of "
                       "these instead",
                       place, uri, *bus_info, node.bus_info)};
@@ -114,24 +114,32 @@ Result<CameraNodes> findCamera(System& system, const std::string& uri, const std
   return camera;
 }
 
-Result<Description> describe(const Keys& keys, const settings::Table& table, const Node& node) {
+std::optional<Description> describedBy(const Keys& keys, settings::Table& table) {
+  if (keys.camera.empty()) return std::nullopt;
   std::string known;
-  for (const Preset& preset : presets()) {
-    const std::string file = std::string{preset.name} + ".toml";
-    if (preset.name == keys.camera) return parseDescription(preset.text, file);
-    known += (known.empty() ? "" : ", ") + std::string{preset.name};
-    if (!keys.camera.empty()) continue;
-    auto description = parseDescription(preset.text, file);
-    if (!description || matches(*description, node.usb_ids, node.card)) return description;
-  }
-  if (keys.camera.empty()) return Description{};
   const auto file = table.resolve(keys.camera);
-  if (std::filesystem::exists(file)) return loadDescription(file);
-  return Error{
-      Error::Code::InvalidArgument,
-      fmt::format("{}: there is no description {}: neither a file {}, nor one that comes with "
-                  "toftwin ({})",
-                  table.place("camera"), keys.camera, file.string(), known)};
+  Result<Description> description = Error{Error::Code::NotFound, {}};
+  for (const Preset& preset : presets()) {
+    if (preset.name == keys.camera) description = parseDescription(preset.text, keys.camera + ".toml");
+    known += (known.empty() ? "" : ", ") + std::string{preset.name};
+  }
+  if (!description && std::filesystem::exists(file)) description = loadDescription(file);
+  if (description) return *std::move(description);
+  table.complain("camera", fmt::format("= \"{}\": {}", keys.camera,
+                                       !description.error().message.empty()
+                                           ? description.error().message
+                                           : fmt::format("there is neither a file {}, nor a description of that "
+                                                         "name that comes with toftwin ({})",
+                                                         file.string(), known)));
+  return std::nullopt;
+}
+
+Description descriptionFor(const Node& node) {
+  for (const Preset& preset : presets()) {
+    auto description = parseDescription(preset.text, std::string{preset.name} + ".toml");
+    if (description && matches(*description, node.usb_ids, node.card)) return *std::move(description);
+  }
+  return {};
 }
 
 Result<Choice> choose(const CameraNodes& camera, const Description& description, bool infrared) {
@@ -143,7 +151,7 @@ Result<Choice> choose(const CameraNodes& camera, const Description& description,
                             : pixelFormatNamed(description.depth.format);
   if (choice.depth_format == nullptr) {
     return Error{
-        Error::Code::InvalidArgument,
+        Error::Code::Incompatible,
         fmt::format("v4l2: the camera \"{}\" has no format that is depth by itself ({}); say "
                     "in a description which one is: camera = \"my_camera.toml\", "
                     "docs/drivers/v4l2.md",
@@ -160,7 +168,7 @@ Result<Choice> choose(const CameraNodes& camera, const Description& description,
   if (!node) return node.error();
   if (node->path == choice.depth.path) {
     return Error{
-        Error::Code::InvalidArgument,
+        Error::Code::Incompatible,
         fmt::format("v4l2: the description takes depth and infrared from the same node, {}, "
                     "which gives one image at a time",
                     node->path)};

@@ -20,8 +20,10 @@ struct CameraNodes {
 };
 Result<CameraNodes> findCamera(System& system, const std::string& uri, const std::string& place);
 
-/// The description that the keys name, or that matches; without either an empty one.
-Result<Description> describe(const Keys& keys, const settings::Table& table, const Node& node);
+/// The description that the keys name; nothing if they name none, or after complaining about the key `camera`.
+std::optional<Description> describedBy(const Keys& keys, settings::Table& table);
+/// The description that comes along and matches the camera, or an empty one.
+Description descriptionFor(const Node& node);
 
 /// Where its images come from. Infrared has no node of its own if the depth's format has it.
 struct Choice {

@@ -65,7 +65,7 @@ Result<std::optional<Channel>> openInfrared(System& system, const Choice& choice
   if (!channel) return channel.error();
   if (Size{channel->layout.width, channel->layout.height} != size) {
     return Error{
-        Error::Code::InvalidArgument,
+        Error::Code::Incompatible,
         fmt::format("v4l2: {} gives infrared of {} x {}, but depth has {} x {}; they must be "
                     "of one size",
                     choice.infrared->path, channel->layout.width, channel->layout.height,
@@ -136,14 +136,14 @@ Result<std::unique_ptr<Source>> openOn(System& system, settings::Table& table) {
   Keys keys;
   table.read(keys);
   const auto calibrated = calibrationAt(table, keys.calibration);
+  const auto described = describedBy(keys, table);
   if (auto checked = checkKeys(keys, table); !checked) return checked.error();
   const auto camera = findCamera(system, keys.uri, table.place("uri"));
   if (!camera) return camera.error();
-  const auto description = describe(keys, table, camera->nodes.front());
-  if (!description) return description.error();
-  const auto choice = choose(*camera, *description, keys.infrared);
+  const Description description = described ? *described : descriptionFor(camera->nodes.front());
+  const auto choice = choose(*camera, description, keys.infrared);
   if (!choice) return choice.error();
-  return assemble(system, keys, *description, *choice, calibrated);
+  return assemble(system, keys, description, *choice, calibrated);
 }
 
 Driver row() {

@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <fmt/format.h>
+
 #include "daemon/recorder.h"
+#include "drivers/not_built.h"
 #include "drivers/source.h"
 
 namespace toftwin::daemon {
@@ -49,6 +52,57 @@ TEST(Config, ADriverThatThrowsWhenOpenedIsACameraThatIsNotThere) {
   ASSERT_TRUE(config.ok()) << config.error().message;
   ASSERT_FALSE(config->sources.at(0).opened.ok());
   EXPECT_SAYS(config->sources[0].opened.error().message, "the driver threw something");
+}
+
+constexpr const char* kAlsoAGoodOne = "[[source]]\nname = 'good'\ndriver = 'pattern'\n";
+
+TEST(Config, WhatADeviceAnswersKeepsNoOtherSourceAway) {
+  const drivers::Driver answering{
+      .name = "answering",
+      .summary = "",
+      .list = [] { return std::vector<std::string>{}; },
+      .open = [](settings::Table& table) -> Result<std::unique_ptr<drivers::Source>> {
+        const auto code = table.number("code", {0, 14}, {}, true);
+        return Error{static_cast<Error::Code>(*code), "the camera has no 640 x 480 on USB 2"};
+      },
+      .document = [] { return std::string{}; }};
+  std::vector<drivers::Driver> drivers{drivers::allDrivers().begin(), drivers::allDrivers().end()};
+  drivers.push_back(answering);
+  for (int code = 0; code <= 14; ++code) {
+    const auto config = parseConfig(
+        fmt::format("[[source]]\nname = 'a'\ndriver = 'answering'\ncode = {}\n{}", code, kAlsoAGoodOne), "d.toml",
+        drivers);
+    ASSERT_TRUE(config.ok()) << code << ": " << config.error().message;
+    ASSERT_FALSE(config->sources.at(0).opened.ok());
+    EXPECT_SAYS(config->sources[0].opened.error().message, "no 640 x 480");
+    EXPECT_TRUE(config->sources.at(1).opened.ok());
+  }
+}
+
+struct LidarKeys {
+  std::string uri;
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.text("uri", uri, "which");
+  }
+};
+struct AboutLidar {
+  static constexpr std::string_view name = "lidar", summary = "", remedy = "install liblidar-dev";
+  using Keys = LidarKeys;
+};
+
+TEST(Config, ADriverThatWasNotBuiltKeepsNoOtherSourceAway) {
+  std::vector<drivers::Driver> drivers{drivers::allDrivers().begin(), drivers::allDrivers().end()};
+  drivers.push_back(drivers::notBuilt<AboutLidar>());
+  const auto config = parseConfig(
+      fmt::format("[[source]]\nname = 'a'\ndriver = 'lidar'\nuri = 'lidar:1'\n{}", kAlsoAGoodOne), "d.toml",
+      drivers);
+  ASSERT_TRUE(config.ok()) << config.error().message;
+  ASSERT_FALSE(config->sources.at(0).opened.ok());
+  EXPECT_EQ(config->sources[0].opened.error().code, Error::Code::Unsupported);
+  EXPECT_SAYS(config->sources[0].opened.error().message,
+              "d.toml:3: the driver \"lidar\" was not built: install liblidar-dev");
+  EXPECT_TRUE(config->sources.at(1).opened.ok());
 }
 
 TEST(Config, ErrorsNameFileLineKeyBoundAndUnit) {

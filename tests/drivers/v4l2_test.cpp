@@ -231,6 +231,7 @@ TEST(V4l2, ErrorsSayWhatToDo) {
        {Case{0, EACCES, Error::Code::PermissionDenied, "group \"video\""},
         Case{VIDIOC_S_FMT, EBUSY, Error::Code::Busy, "another program"},
         Case{VIDIOC_S_FMT, ENODEV, Error::Code::Disconnected, "/dev/video0"},
+        Case{VIDIOC_S_FMT, EINVAL, Error::Code::Incompatible, "cannot be set to Z16"},
         Case{VIDIOC_STREAMON, ENOSPC, Error::Code::Busy, "bandwidth"},
         Case{VIDIOC_EXPBUF, ENOTTY, Error::Code::Unsupported, "memory = \"mmap\""}}) {
     EmulatedV4l2 system{{{}}};
@@ -252,18 +253,33 @@ TEST(V4l2, WhatTheCameraLacksIsSaidTogetherWithWhatItHas) {
   struct Case {
     std::string keys;
     const char* says;
+    Error::Code code = Error::Code::Incompatible;  // with the keys: on another port it may have them
   };
   for (const Case& one :
        {Case{"", "description"}, Case{z16.key(), "Y16"}, Case{z16_there.key(), "has no format Z16"},
         Case{y16.key() + "width = 640\nheight = 480", "16 x 8"},
         Case{y16.key() + "frame_rate_hz = 17", "200"},
-        Case{y16.key() + "set = ['shine = 1']", "no parameter"},
-        Case{"camera = 'nobody'", "xtion_2"}}) {
+        Case{y16.key() + "set = ['shine = 1']", "no parameter", Error::Code::NotFound}}) {
     const auto opened = openWith(system, one.keys);
     ASSERT_FALSE(opened.ok()) << one.keys;
+    EXPECT_EQ(opened.error().code, one.code) << opened.error().message;
     EXPECT_NE(opened.error().message.find(one.says), std::string::npos) << opened.error().message;
   }
   EXPECT_TRUE(openWith(system, y16.key()).ok());
+}
+
+// Whatever camera is there, and if none is.
+TEST(V4l2, ADescriptionThatIsMissingOrWrongIsAMistakeOfTheFile) {
+  EmulatedV4l2 system{{}};
+  const DescriptionFile wrong{"[depth]\nformat = 'Z17'\n"};
+  for (const auto& [keys, says] : {std::pair<std::string, const char*>{"camera = 'nobody'", "xtion_2"},
+                                   std::pair<std::string, const char*>{wrong.key(), "Z17"}}) {
+    const auto opened = openWith(system, keys);
+    ASSERT_FALSE(opened.ok()) << keys;
+    EXPECT_EQ(opened.error().code, Error::Code::InvalidArgument);
+    EXPECT_NE(opened.error().message.find("v4l2.toml:2: camera = "), std::string::npos) << opened.error().message;
+    EXPECT_NE(opened.error().message.find(says), std::string::npos) << opened.error().message;
+  }
 }
 
 TEST(V4l2, EveryMistakeInADescriptionIsToldWithItsPlace) {
