@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "drivers/logging.h"
+#include "drivers/loss_reasons.h"
 
 namespace toftwin::daemon {
 namespace {
@@ -89,7 +90,7 @@ class FaultySource final : public drivers::Source {
         continue;
       }
       damage(strike, *frame);
-      frame->dropped_by_device += std::exchange(lost_, 0);
+      drivers::addLost(*frame, std::exchange(lost_, 0), "a fault on purpose");
       send(strike, *std::move(frame));
     }
   }
@@ -142,6 +143,7 @@ class FaultySource final : public drivers::Source {
     if (doubled) {
       Waiting again{strike.frame, std::move(one.frame), 0_s};
       again.frame.dropped_by_device = 0;
+      again.frame.dropped_because.clear();
       markAs(again.frame, FaultKind::Duplicate);
       again.notes.push_back({*doubled, "given twice"});
       way.push_back(std::move(again));

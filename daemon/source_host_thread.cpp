@@ -180,6 +180,7 @@ void SourceHost::adopt(Result<std::unique_ptr<drivers::Source>> opened) {
     info_ = *std::move(info);
   }
   if (!restoreSettings()) return;  // it may change what the source says of itself, which noteState() takes over
+  lost_because_.clear();
   const std::scoped_lock lock{mutex_};
   is_there_ = true;
 }
@@ -333,7 +334,7 @@ void SourceHost::onError(const Error& error, std::uint64_t next_subscriber) {
 
 /// Opening the camera anew is the best that can be done, whatever went wrong; subscribers stay.
 void SourceHost::lose(const Error& error) {
-  recovery_.lost(clock_.steady());
+  recovery_.lost(clock_.steady(), error.message);
   stopSource();
   source_.reset();
   {
@@ -342,6 +343,7 @@ void SourceHost::lose(const Error& error) {
     ++reconnects_;
   }
   noteError(error, true);
+  lost_because_ = error.message;
 }
 
 /// Ends the subscriptions with smaller numbers; for others the stream begins anew.
@@ -363,12 +365,14 @@ void SourceHost::endAll(const Error& reason, std::uint64_t before) {
   }
 }
 
+/// What comes while the camera is away does not push out why it was lost.
 void SourceHost::noteError(const Error& error, bool is_loss) {
+  const bool is_away = !is_loss && !lost_because_.empty() && error.message != lost_because_;
+  const std::string text = is_away ? fmt::format("{}; since then: {}", lost_because_, error.message) : error.message;
   const std::scoped_lock lock{mutex_};
   // A camera that is away is tried several times a second: said once, it is enough.
-  if (is_loss || is_there_ || error.message != last_error_)
-    logging::warn("{}: {}", name_, error.message);
-  last_error_ = error.message;
+  if (is_loss || is_there_ || text != last_error_) logging::warn("{}: {}", name_, error.message);
+  last_error_ = text;
 }
 
 }  // namespace toftwin::daemon

@@ -134,7 +134,10 @@ DeviceTime DeviceClock::read(std::int64_t stamp_ns, SteadyTime arrived) {
     const bool is_back = time_ns <= last_->ns;
     // A frame may come late, but never early: a stamp from the future is a clock that was set. One
     // from the past is that if it stays so.
-    if (ahead > tolerance_ns_ || is_back) {
+    if (ahead > tolerance_ns_ && options_.follows_steps_ahead) {
+      fit_.clear();
+      step(0);
+    } else if (ahead > tolerance_ns_ || is_back) {
       step(-ahead);
       time_ns = expected;
     } else if (ahead < -tolerance_ns_) {

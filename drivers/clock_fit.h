@@ -57,6 +57,9 @@ class DeviceClock {
     std::int64_t wraps_after_ns = 0;  ///< 0: it does not
     Duration tolerance = 500_ms;      ///< what deviates more than that may be a step of the clock
     std::size_t window = 256;         ///< frames that the relation is estimated from
+    /// A clock that follows a master is set to the master's time some seconds after it began to: then steps ahead
+    /// are not evened out, so that devices of one master have one time. Steps back are, for device time increases.
+    bool follows_steps_ahead = false;
   };
   explicit DeviceClock(Options options)
       : options_(options),

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <stop_token>
+#include <string_view>
 
 #include <toftwin/clock.h>
 #include <toftwin/result.h>
@@ -28,6 +29,9 @@ ClockRelation relateToHost(DeviceTime device, SteadyTime at);
 
 /// What sets the pace of a source that makes its frames itself.
 enum class Pace { RealTime, Fast, Trigger };
+
+/// Why a frame that Pacer counts as lost was.
+inline constexpr std::string_view kNotInTime = "not made in time";
 
 /// Counts the frames of such a source and waits for the turn of the next. Device time is derived from
 /// the count, which is never set back, so it goes on increasing over a stop and a start.

@@ -51,6 +51,8 @@ void Recovery::frame(Frame& frame, SteadyTime now) {
   retry_after_ = options_.first_retry;
   if (gap_since_) {
     frame.dropped_by_device = std::max(frame.dropped_by_device, framesWithin(now - *gap_since_));
+    if (!frame.dropped_because.empty()) gap_because_ += ", then " + frame.dropped_because;
+    frame.dropped_because = std::exchange(gap_because_, {});
     gap_since_.reset();
   }
   if (frame.provenance.kind == FrameKind::Real && !frame.moment.exposures.empty()) {
@@ -82,9 +84,12 @@ std::optional<Error> Recovery::timedOut(SteadyTime now) const {
                            duration_cast<std::chrono::milliseconds>(silence).count())};
 }
 
-void Recovery::lost(SteadyTime now) {
+void Recovery::lost(SteadyTime now, std::string_view why) {
   is_present_ = false;
-  if (waiting_since_ && !gap_since_) gap_since_ = waiting_since_;
+  if (waiting_since_ && !gap_since_) {
+    gap_since_ = waiting_since_;
+    gap_because_ = why;
+  }
   waiting_since_.reset();
   retryLater(now);
 }

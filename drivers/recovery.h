@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <toftwin/frame.h>
@@ -41,7 +42,10 @@ class Recovery {
   void openFailed(SteadyTime now);
   /// Frames are wanted from now on, or no longer: what is lost then costs nobody a frame.
   void started(SteadyTime now) { waiting_since_ = now; }
-  void unwanted() { waiting_since_ = gap_since_ = std::nullopt; }
+  void unwanted() {
+    waiting_since_ = gap_since_ = std::nullopt;
+    gap_because_.clear();
+  }
   /// A command is done: what has changed is remembered, to be set again when the camera comes back.
   void changed(const SourceState& state);
   /// What to set on the camera that has just been opened again.
@@ -51,12 +55,13 @@ class Recovery {
   };
   [[nodiscard]] Restore settings() const;
 
-  /// Fills in what the frame says of a gap before it, and keeps a real camera's device time
+  /// Fills in what the frame says of a gap before it, and why there is one, and keeps a real camera's device time
   /// increasing if its clock began anew.
   void frame(Frame& frame, SteadyTime now);
   /// The driver waited in vain. An error if the camera must have come to a standstill: it is lost.
   [[nodiscard]] std::optional<Error> timedOut(SteadyTime now) const;
-  void lost(SteadyTime now);
+  /// `why`, in words, is for the first frame that comes again.
+  void lost(SteadyTime now, std::string_view why);
 
  private:
   void retryLater(SteadyTime now);
@@ -73,6 +78,7 @@ class Recovery {
   std::optional<Transform<World, Camera>> pose_;
 
   std::optional<SteadyTime> gap_since_;
+  std::string gap_because_;  ///< the first loss of it, whatever keeps the camera away after that
   std::optional<SteadyTime> last_frame_;
   std::optional<SteadyTime> waiting_since_;  ///< since the start or the last frame; none: stopped
   std::optional<DeviceTime> last_device_time_;

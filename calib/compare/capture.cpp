@@ -104,6 +104,7 @@ Json logEntry(const Frame& frame, const std::string& pose, const char* role) {
             frame.moment.since_power_on ? frame.moment.since_power_on->in(second) : kNaN);
   entry.set("dropped_before", frame.dropped_before)
       .set("dropped_by_device", frame.dropped_by_device);
+  if (!frame.dropped_because.empty()) entry.set("dropped_because", frame.dropped_because);
   entry.set("ids", std::move(ids)).set("effects", Json::arrayOf(frame.provenance.effects));
   Json temperatures = Json::object();
   for (const auto& t : frame.moment.temperatures) temperatures.set(t.where, t.value.in(celsius));

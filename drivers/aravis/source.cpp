@@ -5,7 +5,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <map>
 #include <stop_token>
 #include <utility>
 
@@ -16,6 +15,7 @@
 #include "drivers/aravis/stream.h"
 #include "drivers/clock_fit.h"
 #include "drivers/logging.h"
+#include "drivers/loss_reasons.h"
 
 namespace toftwin::drivers::aravis {
 namespace {
@@ -43,7 +43,7 @@ class AravisSource final : public Source {
         images_(std::move(camera.images)),
         interval_(info_.frame_interval.value_or(kUnknownInterval)),
         stream_(keys_),
-        clock_(DeviceClock::Options{}) {
+        clock_(DeviceClock::Options{.follows_steps_ahead = keys_.ptp}) {
     if (keys_.chunks) chunks_.reset(arv_camera_create_chunk_parser(connection_.camera()));
   }
   ~AravisSource() override { stop(); }
@@ -54,8 +54,9 @@ class AravisSource final : public Source {
     stop();
     last_id_.reset();
     triggered_at_.reset();
-    bad_ = bad_in_a_row_ = 0;
+    losses_.clear();
     reported_ = {};
+    underruns_ = 0;
     exposure_ = exposureNow();
     auto started = stream_.start(connection_);
     if (!started) return lost(started.error());
@@ -147,44 +148,45 @@ class AravisSource final : public Source {
     frame.camera = info_.camera;
     frame.provenance.kind = info_.kind;
     frame.provenance.calibration_id = info_.camera.calibration_id;
-    const auto bad = static_cast<std::uint64_t>(std::exchange(bad_, 0));
     const auto last = std::exchange(last_id_, filled.frame_id);
-    frame.dropped_by_device = last ? lostBetween(*last, filled.frame_id, bad) : bad;
-    lost_frames_ += frame.dropped_by_device;
+    accountFor(last ? lostBetween(*last, filled.frame_id, losses_.frames()) : 0);
+    unreported_.add(losses_);
+    losses_.tell(frame);
     frame.moment = momentOf(filled);
-    bad_in_a_row_ = 0;
     triggered_at_.reset();
     reportLosses(false);
     return frame;
   }
 
+  /// Frames that their ids leave out: the library counts those that found no buffer, and of the others nothing came.
+  void accountFor(std::uint64_t lost) {
+    if (lost <= losses_.frames()) return;
+    const std::uint64_t underruns = stream_.counts().underruns;
+    const std::uint64_t without_buffer = underruns - std::exchange(underruns_, underruns);
+    losses_.add("no buffer was free for it", std::min(lost - losses_.frames(), without_buffer));
+    losses_.account(lost, "nothing of it came");
+  }
+
   Error badFrame(const std::string& why) {
-    constexpr std::size_t kMostReasons = 10;
-    const bool is_known = reasons_.contains(why) || reasons_.size() < kMostReasons;
-    ++reasons_[is_known ? why : "something else"];
-    ++bad_;
-    if (++bad_in_a_row_ < kMostBadFrames) return {Error::Code::Malformed, "aravis: " + why};
+    losses_.add(why);
+    if (losses_.frames() < kMostBadFrames) return {Error::Code::Malformed, "aravis: " + why};
     return {Error::Code::Disconnected, fmt::format("aravis: {}: {} frames in a row are lost: {}",
-                                                   info_.serial, bad_in_a_row_, why)};
+                                                   info_.serial, losses_.frames(), why)};
   }
 
   /// What was lost, and why, at most every ten seconds.
   void reportLosses(bool at_end) {
     const PacketCounts now = stream_.counts();
-    const bool is_new = lost_frames_ > 0 || now.missing > reported_.missing ||
-                        now.asked_again > reported_.asked_again;
+    if (at_end) unreported_.add(std::exchange(losses_, {}));
+    const std::uint64_t lost = unreported_.frames();
+    const bool is_new = lost > 0 || now.missing > reported_.missing || now.asked_again > reported_.asked_again;
     if (!is_new || (!at_end && Clock::now() - reported_at_ < kReportEvery)) return;
-    std::string why;
-    for (const auto& [reason, count] : reasons_) why += fmt::format("; {} times {}", count, reason);
-    logging::warn(
-        "{}: {} frames lost{}; {} packets were asked for again, {} never came; {} frames found no "
-        "buffer",
-        info_.serial, lost_frames_, why, now.asked_again - reported_.asked_again,
-        now.missing - reported_.missing, now.underruns - reported_.underruns);
+    logging::warn("{}: {} frames lost{}{}; {} packets were asked for again, {} never came", info_.serial, lost,
+                  lost > 0 ? ": " : "", unreported_.text(), now.asked_again - reported_.asked_again,
+                  now.missing - reported_.missing);
     reported_ = now;
     reported_at_ = Clock::now();
-    lost_frames_ = 0;
-    reasons_.clear();
+    unreported_.clear();
   }
 
   // ---- time ------------------------------------------------------------------------------------
@@ -277,11 +279,10 @@ class AravisSource final : public Source {
   SteadyTime asked_at_{}, kept_alive_at_{};
   std::optional<SteadyTime> triggered_at_;
   std::optional<std::uint64_t> last_id_;
-  int bad_ = 0, bad_in_a_row_ = 0;  // since the last good frame
+  LossReasons losses_;           // since the last good frame
+  std::uint64_t underruns_ = 0;  // of the stream, that losses were told of
   bool is_gone_ = false;
-  // Since the last report:
-  std::uint64_t lost_frames_ = 0;
-  std::map<std::string, std::uint64_t> reasons_;
+  LossReasons unreported_;  // of frames that came, and of the stream's end
   PacketCounts reported_;
   SteadyTime reported_at_{};
 };

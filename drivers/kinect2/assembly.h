@@ -21,13 +21,6 @@ constexpr std::size_t kImageBytes = kPixels * 11 / 8;
 /// the image, and 32 words of unknown meaning.
 constexpr std::size_t kFooterBytes = 38 * 4;
 
-struct RawFrame {
-  std::uint32_t number = 0;  ///< counts up to 65535 and then from 0
-  std::uint32_t stamp = 0;   ///< of its first image, in 125 µs
-  Bytes images;              ///< the used ones, one after the other
-  SteadyTime arrived;        ///< of its last packet
-};
-
 /// What did not become a frame, and why.
 struct Losses {
   std::uint64_t packets = 0;     ///< that the bus did not deliver
@@ -39,6 +32,14 @@ struct Losses {
   std::uint64_t late = 0;        ///< frames that nobody fetched in time
   bool operator==(const Losses&) const = default;
 };
+struct RawFrame {
+  std::uint32_t number = 0;  ///< counts up to 65535 and then from 0
+  std::uint32_t stamp = 0;   ///< of its first image, in 125 µs
+  Bytes images;              ///< the used ones, one after the other
+  SteadyTime arrived;        ///< of its last packet
+  Losses losses;             ///< from the start until then
+};
+
 /// "3 frames of which images are missing, 1 packet that the bus did not deliver"; empty if there are none.
 std::string describe(const Losses& losses);
 Losses operator-(const Losses& now, const Losses& before);

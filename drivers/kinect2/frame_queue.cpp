@@ -20,6 +20,7 @@ void FrameQueue::packet(std::span<const std::byte> bytes) {
     frames_.pop_front();
     ++late_;
   }
+  frame->losses = assembler_.losses();
   frames_.push_back(*std::move(frame));
   changed_.notify_one();
 }
@@ -50,6 +51,7 @@ Result<RawFrame> FrameQueue::next(const std::stop_token& stop, SteadyTime until)
   if (!frames_.empty()) {
     RawFrame frame = std::move(frames_.front());
     frames_.pop_front();
+    frame.losses.late += late_;  // all of them were before it
     return frame;
   }
   if (end_) return *end_;

@@ -110,7 +110,7 @@ class Kinect2Source final : public Source {
   Result<> start() override {
     stop();
     queue_.clear();
-    told_ = {};
+    told_ = frame_losses_ = {};
     last_number_.reset();
     told_at_ = Clock::now();
     auto tables = session_->start(queue_, keys_.transfers);
@@ -141,6 +141,8 @@ class Kinect2Source final : public Source {
     frame.moment = momentOf(*raw);
     const auto before = std::exchange(last_number_, raw->number);
     if (before) frame.dropped_by_device = framesBetween(*before, raw->number);
+    const Losses since = raw->losses - std::exchange(frame_losses_, raw->losses);
+    if (frame.dropped_by_device > 0) frame.dropped_because = kinect2::describe(since);
     return frame;
   }
 
@@ -195,7 +197,8 @@ class Kinect2Source final : public Source {
   sim::DecodeSettings settings_;
   DeviceClock clock_{DeviceClock::Options{.wraps_after_ns = (std::int64_t{1} << 32U) * kStamp_ns}};
   std::optional<std::uint32_t> last_number_;
-  Losses told_;
+  Losses frame_losses_;  // that came before the last frame
+  Losses told_;          // in the log
   SteadyTime told_at_;
   FrameQueue queue_;
   std::unique_ptr<CameraSession> session_;  // the last, and so ended first: its thread uses the queue

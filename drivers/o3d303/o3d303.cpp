@@ -12,6 +12,7 @@
 
 #include "drivers/clock_fit.h"
 #include "drivers/logging.h"
+#include "drivers/loss_reasons.h"
 #include "drivers/o3d303/calibration.h"
 #include "drivers/o3d303/configuration.h"
 #include "drivers/o3d303/frame_images.h"
@@ -82,7 +83,7 @@ class O3d303Source final : public Source {
 
   Result<> start() override {
     last_count_.reset();
-    bad_frames_ = 0;
+    losses_.clear();
     triggered_at_.reset();
     waiting_since_.reset();
     const std::string_view amplitude =
@@ -195,7 +196,8 @@ class O3d303Source final : public Source {
     if (!planes) return badFrame(planes.error());
     Frame frame;
     const ChunkHeader& header = content->find(ChunkType::RadialDistance)->header;
-    frame.dropped_by_device = lostBefore(header.frame_count);
+    losses_.account(skippedBefore(header.frame_count), "the camera counted it and did not send it");
+    losses_.tell(frame);
     frame.planes = *std::move(planes);
     frame.camera = info_.camera;
     frame.provenance.kind = info_.kind;
@@ -208,18 +210,17 @@ class O3d303Source final : public Source {
 
   Error badFrame(const Error& error) {
     logging::warn("{}: a frame that cannot be read: {}", info_.serial, error.message);
-    if (++bad_frames_ < kMostBadFrames) return error;
+    losses_.add(fmt::format("it could not be read: {}", error.message));
+    if (losses_.frames() < kMostBadFrames) return error;
     return {Error::Code::Disconnected, fmt::format("o3d303: {} frames in a row cannot be read: {}",
-                                                   bad_frames_, error.message)};
+                                                   losses_.frames(), error.message)};
   }
 
   /// Frames that the camera counted but that did not come, or not whole, since the last good one.
-  std::uint64_t lostBefore(std::uint32_t count) {
-    const auto bad = static_cast<std::uint64_t>(std::exchange(bad_frames_, 0));
+  std::uint64_t skippedBefore(std::uint32_t count) {
     const auto last = std::exchange(last_count_, count);
-    if (!last) return bad;
-    const std::uint32_t steps = count - *last;  // modulo 2³²: the count may wrap
-    return std::max<std::uint64_t>(bad, steps > 1 && steps < kMostLost ? steps - 1 : 0);
+    const std::uint32_t steps = count - last.value_or(count);  // modulo 2³²: the count may wrap
+    return steps > 1 && steps < kMostLost ? steps - 1 : 0;
   }
 
   Moment momentOf(const FrameContent& content, const ChunkHeader& header, SteadyTime arrived) {
@@ -300,7 +301,7 @@ class O3d303Source final : public Source {
   PcicStream stream_;
   std::optional<DeviceClock> clock_;  // from the first frame on: only frames say whether it wraps
   std::optional<std::uint32_t> last_count_;
-  int bad_frames_ = 0;  // since the last good one
+  LossReasons losses_;  // since the last good frame
   std::optional<SteadyTime> triggered_at_, waiting_since_;
 };
 

@@ -13,6 +13,7 @@
 
 #include "drivers/clock_fit.h"
 #include "drivers/logging.h"
+#include "drivers/loss_reasons.h"
 #include "drivers/openni2/device.h"
 #include "drivers/openni2/images.h"
 #include "drivers/openni2/library.h"
@@ -65,7 +66,7 @@ class OpenNISource final : public Source {
     last_index_.reset();
     paced_.reset();
     bad_frames_ = 0;
-    lost_ = 0;
+    losses_.clear();
     return device_.start();
   }
   void stop() override { device_.stop(); }
@@ -207,7 +208,8 @@ class OpenNISource final : public Source {
     const auto last = std::exchange(last_index_, index);
     if (!last) return;
     const std::int64_t steps = std::int64_t{index} - *last;
-    if (steps > 1 && steps < kMostLost) lost_ += static_cast<std::uint64_t>(steps - 1);
+    if (steps > 1 && steps < kMostLost)
+      losses_.add("the device counted it and did not give it", static_cast<std::uint64_t>(steps - 1));
   }
 
   /// The library says that a file ends before it has given the last frames.
@@ -230,11 +232,11 @@ class OpenNISource final : public Source {
   /// The next frame, into waiting_, if all its images are there.
   Result<> make() {
     auto set = pairing_.take();
-    lost_ += pairing_.takeLost();
+    losses_.add("no image of another stream was taken with it", pairing_.takeLost());
     if (!set) return {};
     auto planes = planesOf(*set);
     if (!planes) {
-      ++lost_;
+      losses_.add(fmt::format("it could not be read: {}", planes.error().message));
       logging::warn("{}: a frame that cannot be read: {}", info_.serial, planes.error().message);
       if (++bad_frames_ < kMostBadFrames) return planes.error();
       return Error{Error::Code::Disconnected,
@@ -248,7 +250,7 @@ class OpenNISource final : public Source {
     frame.camera = info_.camera;
     frame.provenance.kind = info_.kind;
     frame.provenance.calibration_id = info_.camera.calibration_id;
-    frame.dropped_by_device = std::exchange(lost_, 0);
+    losses_.tell(frame);
     frame.moment = isFile(uri_) ? momentInFile(set->depth.stamp_us) : momentOf(set->depth);
     waiting_ = std::move(frame);
     return {};
@@ -356,7 +358,7 @@ class OpenNISource final : public Source {
   DeviceClock clock_{DeviceClock::Options{}};
   std::optional<Frame> waiting_;
   std::optional<int> last_index_;
-  std::uint64_t lost_ = 0;
+  LossReasons losses_;  // since the last frame
   int bad_frames_ = 0;
   // Of files:
   bool was_started_ = false, is_anything_played_ = false;

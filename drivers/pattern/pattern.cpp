@@ -11,6 +11,7 @@
 #include <toftwin/names.h>
 #include <toftwin/nan.h>
 
+#include "drivers/loss_reasons.h"
 #include "protocol/settings/describe.h"
 
 namespace toftwin::drivers::pattern {
@@ -111,7 +112,7 @@ class PatternSource final : public Source {
     Frame frame;
     const auto lost = pacer_.waitForTurn(stop, lockstep);
     if (!lost) return lost.error();
-    frame.dropped_by_device = *lost;
+    addLost(frame, *lost, kNotInTime);
     shift_ += *lost * speed_px_;
     frame.moment = momentOfFrame();
     frame.provenance.kind = info_.kind;

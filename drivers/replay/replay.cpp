@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "drivers/logging.h"
+#include "drivers/loss_reasons.h"
 #include "drivers/pace.h"
 #include "protocol/record/recording.h"
 #include "protocol/settings/describe.h"
@@ -161,7 +162,7 @@ class ReplaySource final : public Source {
     if (!frame) return frame;
     if (std::exchange(damage_before_next_, false) && last_sequence_ &&
         frame->sequence > *last_sequence_) {
-      frame->dropped_by_device += frame->sequence - *last_sequence_ - 1;
+      addLost(*frame, frame->sequence - *last_sequence_ - 1, "the recording is damaged there");
     }
     last_sequence_ = frame->sequence;
     return frame;

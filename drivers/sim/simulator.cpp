@@ -8,6 +8,7 @@
 #include <cmath>
 #include <utility>
 
+#include "drivers/loss_reasons.h"
 #include "drivers/sim/chosen.h"
 #include "drivers/sim/operating.h"
 #include "drivers/sim/view.h"
@@ -108,7 +109,7 @@ class SimulatedSource final : public Source {
     Frame frame;
     const auto lost = pacer_.waitForTurn(stop, lockstep);
     if (!lost) return lost.error();
-    frame.dropped_by_device = *lost;
+    addLost(frame, *lost, kNotInTime);
     frame.moment = momentOfFrame();
     if (view_.isRealtime()) {
       gatherInRealtime(frame.moment);

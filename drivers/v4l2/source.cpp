@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "drivers/clock_fit.h"
+#include "drivers/loss_reasons.h"
 #include "drivers/v4l2/pairing.h"
 
 namespace toftwin::drivers::v4l2 {
@@ -71,7 +72,8 @@ class V4l2Source final : public Source {
     if (wake_.file() < 0) return Error{Error::Code::Internal, "v4l2: no file descriptors are left"};
     pairing_ = Pairing{std::llround(interval_.in(nanosecond) / 2.0)};
     last_sequence_.reset();
-    unusable_ = bad_in_a_row_ = 0;
+    losses_.clear();
+    bad_in_a_row_ = 0;
     if (infrared_) {
       if (auto started = infrared_->start(); !started) return started;
     }
@@ -138,7 +140,7 @@ class V4l2Source final : public Source {
       if (*infrared) pairing_.addInfrared(**infrared);
       const auto pair = pairing_.take();
       for (const auto& one : pairing_.takeLonelyDepth()) {
-        ++unusable_;
+        losses_.add("no infrared picture was taken with it");
         if (auto given = depth_.giveBack(one); !given) return given.error();
       }
       for (const auto& one : pairing_.takeLonelyInfrared()) {
@@ -153,15 +155,15 @@ class V4l2Source final : public Source {
   Result<std::optional<Stream::Picture>> takeWhole(Stream& stream) {
     while (true) {
       auto taken = stream.take();
-      if (!taken || !*taken || (**taken).is_whole) return taken;
+      if (!taken || !*taken || (**taken).why_not_whole.empty()) return taken;
+      const std::string_view why = (**taken).why_not_whole;
       if (auto given = stream.giveBack(**taken); !given) return given.error();
-      if (&stream == &depth_) ++unusable_;
+      if (&stream == &depth_) losses_.add(why);
       if (++bad_in_a_row_ >= kMostBadPictures) {
-        return Error{
-            Error::Code::Disconnected,
-            fmt::format("v4l2: {}: {} pictures in a row came damaged or short; is the cable "
-                        "good, and the bus fast enough?",
-                        stream.device().node(), bad_in_a_row_)};
+        return Error{Error::Code::Disconnected,
+                     fmt::format("v4l2: {}: {} pictures in a row are lost, the last one because {}; is the cable "
+                                 "good, and the bus fast enough?",
+                                 stream.device().node(), bad_in_a_row_, why)};
       }
     }
   }
@@ -180,7 +182,8 @@ class V4l2Source final : public Source {
       if (auto given = infrared_->giveBack(*infrared); !given) return given.error();
     }
     if (!codes) return std::optional<Frame>{};  // cannot be: takeWhole() looked at the size
-    frame.dropped_by_device = lostBefore(depth.sequence);
+    losses_.account(skippedBefore(depth.sequence), "the kernel had no buffer free for it, or threw it away");
+    losses_.tell(frame);
     frame.moment = momentOf(depth);
     frame.provenance.kind = parts_.info.kind;
     frame.provenance.calibration_id = parts_.info.camera.calibration_id;
@@ -191,12 +194,10 @@ class V4l2Source final : public Source {
   }
 
   /// Pictures that the kernel counted, or gave and could not be used, since the last frame.
-  std::uint64_t lostBefore(std::uint32_t sequence) {
-    const auto unusable = static_cast<std::uint64_t>(std::exchange(unusable_, 0));
+  std::uint64_t skippedBefore(std::uint32_t sequence) {
     const auto last = std::exchange(last_sequence_, sequence);
-    if (!last) return unusable;
-    const std::uint32_t steps = sequence - *last;  // modulo 2³²: the count may wrap
-    return std::max<std::uint64_t>(unusable, steps > 1 && steps < kMostLost ? steps - 1 : 0);
+    const std::uint32_t steps = sequence - last.value_or(sequence);  // modulo 2³²: the count may wrap
+    return steps > 1 && steps < kMostLost ? steps - 1 : 0;
   }
 
   // ---- time ------------------------------------------------------------------------------------
@@ -283,7 +284,7 @@ class V4l2Source final : public Source {
   DeviceClock clock_;
   Wake wake_;
   std::optional<std::uint32_t> last_sequence_;
-  int unusable_ = 0;      // since the last frame
+  LossReasons losses_;    // since the last frame
   int bad_in_a_row_ = 0;  // of either node
   SteadyTime heard_at_;
 };

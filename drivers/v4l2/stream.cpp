@@ -15,6 +15,7 @@ namespace {
 
 constexpr std::uint32_t kCapture = V4L2_BUF_TYPE_VIDEO_CAPTURE;
 constexpr std::uint32_t kFewestBuffers = 2;  // one is filled while the other is read
+constexpr std::string_view kDamaged = "its data came damaged, says the kernel", kShort = "bytes of it did not come";
 
 v4l2_buffer bufferAt(std::uint32_t index) {
   v4l2_buffer buffer{};
@@ -164,7 +165,7 @@ Result<std::optional<Stream::Picture>> Stream::take() {
       .stamp_ns = nanosecondsOf(buffer),
       .is_host_clock =
           (buffer.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC,
-      .is_whole = (buffer.flags & V4L2_BUF_FLAG_ERROR) == 0 && used >= least,
+      .why_not_whole = (buffer.flags & V4L2_BUF_FLAG_ERROR) != 0 ? kDamaged : used < least ? kShort : "",
       .bytes = mapping.bytes.first(used),
       .arrived = std::chrono::steady_clock::now()}};
 }

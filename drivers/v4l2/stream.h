@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include <toftwin/result.h>
@@ -39,7 +40,7 @@ class Stream {
     std::uint32_t sequence = 0;
     std::int64_t stamp_ns = 0;
     bool is_host_clock = false;  ///< the stamp is said to be of this host's monotonic clock
-    bool is_whole = false;       ///< no error flag, and all bytes are there
+    std::string_view why_not_whole{};  ///< in words; empty: no error flag, and all bytes are there
     std::span<const std::byte> bytes;
     SteadyTime arrived;
   };

@@ -117,6 +117,7 @@ FrameMessage readFrame(Checks& checks, const fb::Frame& table, std::uint64_t bod
   frame.sequence = table.sequence();
   frame.dropped_before = table.dropped_before();
   frame.dropped_by_device = table.dropped_by_device();
+  frame.dropped_because = checks.text(table.dropped_because(), kMaxText, "frame.dropped_because");
   frame.moment = readMoment(checks, table.moment());
   frame.provenance = readProvenance(checks, table.provenance());
   frame.camera = readCamera(checks, table.camera());

@@ -109,9 +109,10 @@ Offset<fb::Frame> writeFrame(Builder& builder, const FrameMessage& message) {
   const auto provenance = writeProvenance(builder, frame.provenance);
   const auto camera = writeCamera(builder, frame.camera);
   const auto planes = writePlanes(builder, frame.planes);
+  const auto dropped_because = writeText(builder, frame.dropped_because);
   return fb::CreateFrame(builder, message.subscription, source, frame.sequence,
                          frame.dropped_before, frame.dropped_by_device, moment, provenance, camera,
-                         planes);
+                         planes, dropped_because);
 }
 
 }  // namespace toftwin::wire

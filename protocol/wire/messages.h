@@ -16,7 +16,7 @@
 namespace toftwin::wire {
 
 inline constexpr std::uint16_t kVersionMajor = 1;
-inline constexpr std::uint16_t kVersionMinor = 0;
+inline constexpr std::uint16_t kVersionMinor = 1;
 
 /// The first message of either side.
 struct Hello {

@@ -25,8 +25,13 @@ struct Rig {
                               .recovery = {.first_retry = std::chrono::milliseconds{1},
                                            .longest_retry = std::chrono::milliseconds{1}}};
 
+  std::atomic<int> refused = 0;  ///< that so many openings fail
+
   void start() {
-    const auto open = test::opener(remote);
+    const SourceHost::Open open = [this, there = test::opener(remote)]() -> Result<std::unique_ptr<drivers::Source>> {
+      if (refused > 0 && refused-- > 0) return Error{Error::Code::NotFound, "no such device"};
+      return there();
+    };
     host = std::make_unique<SourceHost>("cam", open, open(), options, clock);
   }
   SubscriberPtr subscribe(Taker& taker,
@@ -188,10 +193,31 @@ TEST(SourceHost, ALostCameraGetsItsPoseBackAndTheNextFrameSaysWhatHappened) {
   const Frame& frame = std::get<Backlog::Delivery>(*item).frame->frame;
   EXPECT_EQ(frame.moment.world_from_camera, pose);
   EXPECT_EQ(frame.dropped_by_device, 9u);
+  EXPECT_EQ(frame.dropped_because, "unplugged");
   EXPECT_EQ(rig.host->health().last_error, "unplugged");
   const auto next = taker.next(subscriber->backlog);
   ASSERT_TRUE(next.has_value());
   EXPECT_EQ(std::get<Backlog::Delivery>(*next).frame->frame.dropped_by_device, 0u);
+}
+
+TEST(SourceHost, WhatKeepsALostCameraAwayDoesNotPushOutWhyItWasLost) {
+  Rig rig;
+  rig.start();
+  Taker taker;
+  const auto subscriber = rig.subscribe(taker);
+  rig.remote->give();
+  ASSERT_EQ(taker.nextSequence(subscriber->backlog), 0);
+  rig.refused = 2;
+  rig.remote->give({Error::Code::Disconnected, "unplugged"});
+  while (rig.remote->opened.count() < 2) {
+    rig.clock.advance(std::chrono::milliseconds{2});
+    std::this_thread::yield();
+  }
+  EXPECT_EQ(rig.host->health().last_error, "unplugged; since then: no such device");
+  rig.remote->give();
+  const auto item = taker.next(subscriber->backlog);
+  ASSERT_TRUE(item.has_value());
+  EXPECT_EQ(std::get<Backlog::Delivery>(*item).frame->frame.dropped_because, "unplugged");
 }
 
 TEST(SourceHost, EndsItsSubscriptionsWithTheStreamAndStartsAnewForTheNext) {

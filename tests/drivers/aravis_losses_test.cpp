@@ -56,6 +56,8 @@ TEST_F(AravisLosses, WithoutResendingTheyAreLostFramesAndCounted) {
     const auto frame = nextFrame(*source);
     ASSERT_TRUE(frame.ok()) << frame.error().message;
     lost += frame->dropped_by_device;
+    EXPECT_EQ(frame->dropped_because.find("packets of it did not come (") == 0, frame->dropped_by_device > 0)
+        << frame->dropped_because;
   }
   EXPECT_GT(lost, 2u);
   EXPECT_EQ(camera_.resent, 0);
@@ -71,6 +73,7 @@ TEST_F(AravisLosses, FramesThatTheCameraLeftOutAreCounted) {
     const auto frame = nextFrame(*source);
     ASSERT_TRUE(frame.ok()) << frame.error().message;
     lost = frame->dropped_by_device;
+    EXPECT_EQ(frame->dropped_because, lost == 0 ? "" : "nothing of it came (3)");
   }
   EXPECT_EQ(lost, 3u);
 }

@@ -167,6 +167,22 @@ TEST(DeviceClock, AClockThatIsSetKeepsItsPaceAndItsRelation) {
   }
 }
 
+// As with PTP: the camera counts from its start until it has found the master.
+TEST(DeviceClock, AClockThatFollowsAMasterTakesItsTimeOver) {
+  Camera camera{.clock = DeviceClock{{.follows_steps_ahead = true}}};
+  camera.frames(50);
+  EXPECT_EQ(camera.last->ns, camera.true_ns + camera.set_by_ns);
+  camera.set_by_ns += 1'700'000'000'000'000'000;
+  camera.frames(20);
+  EXPECT_EQ(camera.last->ns, camera.true_ns + camera.set_by_ns) << "two cameras of one master would not have one time";
+  EXPECT_EQ(camera.clock.steps(), 1u);
+  EXPECT_GE(camera.clock.relation(0_ms, 0_ms).uncertainty_ns, 0) << "the relation is learnt anew";
+  const DeviceTime before = *camera.last;
+  camera.set_by_ns -= 3'600'000'000'000;
+  camera.frames(20);
+  EXPECT_GT(camera.last->ns, before.ns) << "device time increases all the same";
+}
+
 TEST(DeviceClock, AStepBackByLessThanThePauseBeforeItIsFoundToo) {
   Camera camera{.clock = DeviceClock{{}}};
   camera.frames(200);

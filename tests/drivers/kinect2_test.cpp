@@ -186,6 +186,7 @@ TEST(Kinect2, WhatIsLostIsCountedInTheNextFrame) {
   ASSERT_TRUE(frame.ok());
   std::uint32_t last = numberOf(*frame);
   std::uint64_t lost = 0, steps = 0;
+  std::string because;
   bus.device().losePackets(2);
   for (int i = 0; i < 12; ++i) {
     if (i == 3) bus.device().shortenImages(1);
@@ -194,11 +195,15 @@ TEST(Kinect2, WhatIsLostIsCountedInTheNextFrame) {
     ASSERT_TRUE(frame.ok()) << frame.error().message;
     const std::uint32_t number = numberOf(*frame);
     lost += frame->dropped_by_device;
+    because += frame->dropped_because + ";";
+    EXPECT_EQ(frame->dropped_because.empty(), frame->dropped_by_device == 0) << frame->dropped_because;
     // 65535 is followed by 0, the codes 535 by 0.
     steps += number > last ? number - last - 1 : number + 536 - last - 1;
     last = number;
   }
   EXPECT_EQ(lost, steps);
+  for (const char* why : {"2 packets that the bus did not deliver", "1 image of another length", "frames that never came"})
+    EXPECT_NE(because.find(why), std::string::npos) << why << " is not in " << because;
   EXPECT_GE(lost, 6u) << "one for the packets, one for the short image, four that never came";
 }
 

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "drivers/loss_reasons.h"
+
 namespace toftwin::drivers {
 namespace {
 
@@ -32,7 +34,7 @@ struct Life {
     recovery.frame(frame, now);
     return frame;
   }
-  void lose() { recovery.lost(now); }
+  void lose(std::string_view why = "unplugged") { recovery.lost(now, why); }
 };
 
 TEST(Recovery, TriesSoonThenAtMostAsRarelyAsAllowed) {
@@ -57,16 +59,43 @@ TEST(Recovery, AGapIsCountedOnce) {
   life.open();
   life.recovery.started(life.now);
   life.now += milliseconds{30};
-  life.lose();
+  life.lose("the cable is out");
   life.recovery.openFailed(life.now);
+  life.lose("it does not start");
   life.now += milliseconds{970};
   life.open();
   life.recovery.started(life.now);
   const Frame frame = life.frame(1'000'000'000);
   EXPECT_EQ(frame.dropped_by_device, 19u) << "of 20 intervals, the last one ends with this frame";
+  EXPECT_EQ(frame.dropped_because, "the cable is out");
   life.now += milliseconds{50};
   const Frame next = life.frame(1'050'000'000);
   EXPECT_EQ(next.dropped_by_device, 0u);
+  EXPECT_EQ(next.dropped_because, "");
+}
+
+TEST(LossReasons, TellHowManyFramesEachReasonCost) {
+  LossReasons losses;
+  losses.add("a");
+  losses.add("b", 2);
+  losses.add("a");
+  losses.account(3, "nothing of it came");
+  EXPECT_EQ(losses.text(), "a (2), b (2)") << "all that the numbers leave out is accounted for";
+  losses.account(7, "nothing of it came");
+  Frame frame;
+  losses.tell(frame);
+  EXPECT_EQ(frame.dropped_by_device, 7u);
+  EXPECT_EQ(frame.dropped_because, "a (2), b (2), nothing of it came (3)");
+  EXPECT_EQ(losses.frames(), 0u);
+  losses.tell(frame);
+  EXPECT_EQ(frame.dropped_because, "a (2), b (2), nothing of it came (3)");
+}
+
+TEST(LossReasons, DoNotGrowWithWordsThatNeverRepeat) {
+  LossReasons losses;
+  for (int i = 0; i < 10'000; ++i) losses.add("byte " + std::to_string(i));
+  EXPECT_EQ(losses.frames(), 10'000u);
+  EXPECT_NE(losses.text().find("byte 7 (1), other reasons (9992)"), std::string::npos) << losses.text();
 }
 
 TEST(Recovery, WhatIsLostWhileNobodyLooksIsNoGap) {
@@ -83,6 +112,7 @@ TEST(Recovery, WhatIsLostWhileNobodyLooksIsNoGap) {
     life.recovery.started(life.now);
     const Frame frame = life.frame(life.now.time_since_epoch().count());
     EXPECT_EQ(frame.dropped_by_device, 0u) << is_lost_first;
+    EXPECT_EQ(frame.dropped_because, "") << is_lost_first;
   }
 }
 

@@ -31,12 +31,13 @@ using test::started;
 
 // ---- losses ------------------------------------------------------------------------------------
 
-std::uint64_t lostIn(Source& source, int frames) {
+std::uint64_t lostIn(Source& source, int frames, std::string* because = nullptr) {
   std::uint64_t lost = 0;
   for (int i = 0; i < frames; ++i) {
     const auto frame = source.next({}, false);
     EXPECT_TRUE(frame.ok()) << frame.error().message;
     if (frame) lost += frame->dropped_by_device;
+    if (frame && because != nullptr) *because += frame->dropped_because;
   }
   return lost;
 }
@@ -48,7 +49,9 @@ TEST(V4l2, PicturesThatTheKernelDroppedAreCountedAlsoWhereItsCountWraps) {
   ASSERT_NE(source, nullptr);
   EXPECT_EQ(lostIn(*source, 5), 0u);
   system.lose(0, 3);
-  EXPECT_EQ(lostIn(*source, 5), 3u);
+  std::string because;
+  EXPECT_EQ(lostIn(*source, 5, &because), 3u);
+  EXPECT_EQ(because, "the kernel had no buffer free for it, or threw it away (3)");
 }
 
 TEST(V4l2, DamagedAndShortPicturesAreCountedAndNotShown) {
@@ -57,9 +60,12 @@ TEST(V4l2, DamagedAndShortPicturesAreCountedAndNotShown) {
   ASSERT_NE(source, nullptr);
   EXPECT_EQ(lostIn(*source, 2), 0u);
   system.damage(0, 2);
-  EXPECT_EQ(lostIn(*source, 3), 2u);
+  std::string damaged, shortened;
+  EXPECT_EQ(lostIn(*source, 3, &damaged), 2u);
+  EXPECT_EQ(damaged, "its data came damaged, says the kernel (2)");
   system.shorten(0, 3);
-  EXPECT_EQ(lostIn(*source, 3), 3u);
+  EXPECT_EQ(lostIn(*source, 3, &shortened), 3u);
+  EXPECT_EQ(shortened, "bytes of it did not come (3)");
 }
 
 TEST(V4l2, AStreamOfDamagedPicturesIsOpenedAnew) {
@@ -336,6 +342,13 @@ TEST(V4l2, AStopEndsTheWaitAndLosesNoFrame) {
   stop.request_stop();
   EXPECT_EQ(waiting.get().error().code, Error::Code::Stopped);
   EXPECT_EQ(lostIn(*source, 2), 0u);
+}
+
+TEST(V4l2, TenThousandStartsAndStopsKeepNoMemory) {
+  EmulatedV4l2 system{{{}}};
+  const auto opened = openWith(system);
+  ASSERT_TRUE(opened.ok()) << opened.error().message;
+  toftwin::test::expectNothingKept("v4l2", **opened, 1000);
 }
 
 TEST(V4l2, TenThousandStartsAndStopsLeakNothing) {

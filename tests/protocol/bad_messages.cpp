@@ -91,7 +91,7 @@ void addPreambles(std::vector<BadMessage>& all) {
   all.push_back({"empty", {}, malformed, "ends within the preamble"});
   all.push_back({"short-preamble", {good.begin(), good.begin() + 63}, malformed, "ends within"});
   all.push_back({"magic", withByte(good, 6, 'M'), malformed, "the magic is missing"});
-  all.push_back({"major-version", withByte(good, 8, 9), Error::Code::Incompatible, "version 9.0"});
+  all.push_back({"major-version", withByte(good, 8, 9), Error::Code::Incompatible, "version 9.1"});
   Bytes sum = good;
   sum[61] ^= std::byte{1};
   all.push_back({"preamble-checksum", sum, malformed, "preamble's checksum"});
@@ -154,6 +154,13 @@ void addHeaders(std::vector<BadMessage>& all) {
                   return fb::CreateTriggerDirect(b, std::string(256, 'k').c_str()).Union();
                 }),
       "longer than 255 bytes");
+  add("long-reason",
+      messageOf(fb::Body::Frame,
+                [](Builder& b) {
+                  const std::string reason(4097, 'x');
+                  return fb::CreateFrameDirect(b, 7, "k", 1, 0, 1, 0, 0, 0, nullptr, reason.c_str()).Union();
+                }),
+      "frame.dropped_because is longer than 4096 bytes");
   add("many-names",
       messageOf(fb::Body::Hello,
                 [](Builder& b) {

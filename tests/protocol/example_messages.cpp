@@ -54,6 +54,7 @@ Frame richFrame() {
   frame.provenance = fullProvenance();
   frame.dropped_before = 3;
   frame.dropped_by_device = 1;
+  frame.dropped_because = "packets of it did not come (1)";
   frame.planes.push_back(toPlane(PlaneKind::Ambient, Image<std::uint16_t>{3, 2, 513}));
   std::vector<float> normals(18);
   for (std::size_t i = 0; i < normals.size(); ++i) normals[i] = 0.5f * static_cast<float>(i);

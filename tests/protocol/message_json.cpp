@@ -275,6 +275,7 @@ class Renderer {
     field("sequence", m.frame.sequence);
     field("dropped_before", m.frame.dropped_before);
     field("dropped_by_device", m.frame.dropped_by_device);
+    field("dropped_because", m.frame.dropped_because);
     field("moment", m.frame.moment);
     field("provenance", m.frame.provenance);
     field("camera", m.frame.camera);

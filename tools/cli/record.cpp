@@ -34,6 +34,7 @@ struct Recording {
   record::Writer writer;
   std::uint64_t dropped = 0;    // between the camera and this file
   std::uint64_t lost = 0;       // by the device
+  std::string lost_because;     // the last of them
   std::optional<Error> error;  // the first
   std::atomic<bool> ended = false;
 };
@@ -53,6 +54,7 @@ void recordSource(Recording& recording, Subscription frames, std::uint64_t count
     const std::lock_guard lock{recording.mutex};
     recording.dropped += frame->dropped_before;
     recording.lost += frame->dropped_by_device;
+    if (!frame->dropped_because.empty()) recording.lost_because = frame->dropped_because;
     if (auto wrote = recording.writer.write(*frame); !wrote) {
       if (!recording.error) recording.error = wrote.error();
       recording.ended = true;
@@ -115,13 +117,16 @@ Result<Exit> recordHere(const Options& options) {
     return Error{is_place ? Code::StorageFull : code, writer.error().message};
   }
   catchInterrupts();
-  Recording recording{.mutex = {}, .writer = std::move(writer).value(), .dropped = 0, .lost = 0, .error = {}};
+  Recording recording{.mutex = {}, .writer = std::move(writer).value(), .dropped = 0, .lost = 0, .lost_because = {}, .error = {}};
   const auto recorded = recordAll(options, *client, recording);
   const auto closed = recording.writer.close();
   const std::uint64_t unwritten = recording.writer.lost();
   fmt::print("{}: {} frames, {} dropped{}{}\n", options.file, recording.writer.frames(),
              recording.dropped,
-             recording.lost > 0 ? fmt::format(", {} lost by the device", recording.lost) : "",
+             recording.lost > 0 ? fmt::format(", {} lost by the device{}{}", recording.lost,
+                                              recording.lost_because.empty() ? "" : ", the last ones because: ",
+                                              recording.lost_because)
+                                : "",
              unwritten > 0 ? fmt::format(", {} that could not be written", unwritten) : "");
   if (!recorded) return recorded.error();
   if (recording.error) return *recording.error;

@@ -32,15 +32,19 @@ void printLine(const Frame& frame, std::int64_t first_ns, bool as_json) {
   const double seconds = 1e-9 * static_cast<double>(frame.moment.received.ns - first_ns);
   const std::uint64_t dropped = frame.dropped_before + frame.dropped_by_device;
   if (as_json) {
-    std::string source = compare::Json{frame.source}.text();
-    source.pop_back();  // its line break
-    fmt::print(R"({{"source":{},"sequence":{},"received_ns":{},"dropped":{},"kind":"{}"}})"
+    const auto quoted = [](const std::string& text) {
+      std::string json = compare::Json{text}.text();
+      json.pop_back();  // its line break
+      return json;
+    };
+    fmt::print(R"({{"source":{},"sequence":{},"received_ns":{},"dropped":{},"dropped_because":{},"kind":"{}"}})"
                "\n",
-               source, frame.sequence, frame.moment.received.ns, dropped,
+               quoted(frame.source), frame.sequence, frame.moment.received.ns, dropped, quoted(frame.dropped_because),
                nameOf(frame.provenance.kind));
   } else {
-    fmt::print("{:>10.6f} s  {:<12} frame {:<8} {}{}\n", seconds, frame.source, frame.sequence,
-               planesOf(frame), dropped > 0 ? fmt::format(", {} dropped before", dropped) : "");
+    const std::string& because = frame.dropped_because;
+    fmt::print("{:>10.6f} s  {:<12} frame {:<8} {}{}{}{}\n", seconds, frame.source, frame.sequence, planesOf(frame),
+               dropped > 0 ? fmt::format(", {} dropped before", dropped) : "", because.empty() ? "" : ": ", because);
   }
 }
 

@@ -149,6 +149,7 @@ struct Frame {
   std::uint64_t sequence = 0;            ///< counts up by one per source, without gaps
   std::uint64_t dropped_before = 0;      ///< frames of this subscription dropped since the last one
   std::uint64_t dropped_by_device = 0;   ///< lost between device and daemon since the last one
+  std::string dropped_because;           ///< why those of the device were lost, for people; empty: not said
   Moment moment;
   Provenance provenance;
   CameraInfo camera;  ///< of the planes as they are: region and decimation applied

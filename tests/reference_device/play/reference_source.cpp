@@ -9,6 +9,7 @@
 
 #include <toftwin/image.h>
 
+#include "drivers/loss_reasons.h"
 #include "drivers/pace.h"
 #include "protocol/settings/describe.h"
 #include "tests/reference_device/device/device.h"
@@ -96,7 +97,7 @@ class ReferenceSource final : public drivers::Source {
     if (!lost) return lost.error();
     const State state = stateNow();
     Frame frame;
-    frame.dropped_by_device = *lost;
+    drivers::addLost(frame, *lost, drivers::kNotInTime);
     frame.moment = momentOf(state);
     frame.provenance.kind = FrameKind::Real;
     frame.camera = info_.camera;
