@@ -248,6 +248,28 @@ Result<Scan3d> scanOf(const Features& features, const Keys& keys, const Layout& 
   return scan;
 }
 
+int pixelsOf(const Features& features, const char* name, double otherwise = 0.0) {
+  return static_cast<int>(std::clamp(features.number(name).value_or(otherwise), 0.0, kLargestSide));
+}
+
+/// One side of the whole image, binned as now. WidthMax is what a region may have, of some cameras from OffsetX on.
+int fullSide(const Features& features, const std::string& side, const std::string& direction, int offset, int sent) {
+  const int sensor = pixelsOf(features, ("Sensor" + side).c_str());
+  const int most = pixelsOf(features, (side + "Max").c_str());
+  const int binning = std::max(1, pixelsOf(features, ("Binning" + direction).c_str(), 1.0));
+  const int decimation = std::max(1, pixelsOf(features, ("Decimation" + direction).c_str(), 1.0));
+  if (sensor > 0) return sensor / binning / decimation;
+  return most > 0 && offset + sent > most ? most + offset : most;
+}
+
+Region regionOf(const Features& features, int width, int height) {
+  Region region{.x = pixelsOf(features, "OffsetX"), .y = pixelsOf(features, "OffsetY")};
+  region.full_width = fullSide(features, "Width", "Horizontal", region.x, width);
+  region.full_height = fullSide(features, "Height", "Vertical", region.y, height);
+  region.skips_pixels = pixelsOf(features, "DecimationHorizontal", 1.0) > 1 || pixelsOf(features, "DecimationVertical", 1.0) > 1;
+  return region;
+}
+
 std::optional<LensKeys> lensOf(const Features& features) {
   const auto focal = features.number("Scan3dFocalLength");
   const auto u = features.number("Scan3dPrincipalPointU"),
@@ -336,6 +358,7 @@ Result<Setup> configure(const Connection& connection, const Keys& keys) {
   }
   setup.width = static_cast<int>(width);
   setup.height = static_cast<int>(height);
+  setup.region = regionOf(features, setup.width, setup.height);
   auto scan = scanOf(features, keys, *layout);
   if (!scan) return scan.error();
   setup.scan = *scan;

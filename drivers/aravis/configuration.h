@@ -14,9 +14,17 @@
 
 namespace toftwin::drivers::aravis {
 
+/// Which part of its image a camera sends: where that begins, and how large the whole would be, in pixels as they are
+/// sent (binned). 0: the camera does not say.
+struct Region {
+  int x = 0, y = 0, full_width = 0, full_height = 0;
+  bool skips_pixels = false;  ///< decimation: neither cut off nor binned
+};
+
 /// What a camera will send, as it is set up now.
 struct Setup {
   int width = 0, height = 0;
+  Region region;
   Layout layout;
   Scan3d scan;
   std::optional<LensKeys> lens;  ///< as the camera says it

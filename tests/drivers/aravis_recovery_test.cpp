@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <csignal>
 
 #include "aravis_testing.h"
@@ -67,8 +68,9 @@ TEST(AravisRecovery, AHungCameraIsBackWithinASecond) {
 /// In a process of its own, on 127.0.0.1, which one test at a time may use.
 class LibraryCamera {
  public:
-  LibraryCamera()
-      : lock_(::open("/tmp/toftwin_gige_camera.lock", O_CREAT | O_RDWR | O_CLOEXEC, 0666)) {
+  /// `nodes`: a file of GenICam nodes that make it a 3D camera, or none for the grey one that it is.
+  explicit LibraryCamera(const char* nodes = nullptr)
+      : nodes_(nodes), lock_(::open("/tmp/toftwin_gige_camera.lock", O_CREAT | O_RDWR | O_CLOEXEC, 0666)) {
     ::flock(lock_, LOCK_EX);
     start();
   }
@@ -87,7 +89,7 @@ class LibraryCamera {
   void start() {
     process_ = ::fork();
     if (process_ == 0) {
-      ::execl(TOFTWIN_LIBRARY_CAMERA, TOFTWIN_LIBRARY_CAMERA, nullptr);
+      ::execl(TOFTWIN_LIBRARY_CAMERA, TOFTWIN_LIBRARY_CAMERA, nodes_, nullptr);
       ::_exit(127);
     }
   }
@@ -104,9 +106,61 @@ class LibraryCamera {
   }
 
  private:
+  const char* nodes_;
   int lock_;
   pid_t process_ = -1;
 };
+
+void expectCompliant(const std::string& keys) {
+  const drivers::Driver driver = drivers::aravis::row();
+  const drivers::Candidate candidate{.driver = &driver,
+                                     .keys = "uri = 'aravis:127.0.0.1'\n" + keys,
+                                     .absent_keys = "uri = 'aravis:127.0.0.77'",
+                                     .absent_name = "aravis:127.0.0.77"};
+  for (const drivers::Finding& finding : drivers::checkCompliance(candidate)) {
+    EXPECT_NE(finding.outcome, drivers::Finding::Outcome::Failed)
+        << finding.check << ", because " << finding.because << "\n  " << finding.detail;
+  }
+}
+
+const std::string k3dKeys = fmt::format("{}pixel_format = 'Coord3D_C16'\n", LibraryCamera::kKeys);
+
+TEST(AravisLibrary, ItsOwnCameraWithADescriptionOf3dGivesItsDepthExactly) {
+  LibraryCamera camera{TOFTWIN_LIBRARY_CAMERA_3D};
+  ASSERT_TRUE(camera.waitFor().ok());
+  const auto opened = openWith("127.0.0.1", k3dKeys);
+  ASSERT_TRUE(opened.ok()) << opened.error().message;
+  EXPECT_EQ((*opened)->info().camera.fx, 120.0);
+  ASSERT_TRUE((*opened)->start().ok());
+  for (int i = 0; i < 5; ++i) {
+    auto frame = (*opened)->next({}, false);
+    for (int n = 0; n < 20 && !frame; ++n) frame = (*opened)->next({}, false);
+    ASSERT_TRUE(frame.ok()) << frame.error().message;
+    const auto depth_m = frame->find(PlaneKind::Depth)->as<float>(), range_m = frame->find(PlaneKind::Range)->as<float>();
+    ASSERT_EQ(depth_m.size(), 128u * 96u);
+    // library_gige_camera.c: the frame's number is in every pixel, so any but the diagonal says it.
+    const long of_frame = std::lround((static_cast<double>(depth_m[1]) * 1e3 - 100.0) / 0.25) - 1004;
+    EXPECT_TRUE(of_frame % 7 == 0 && of_frame >= 0 && of_frame < 7 * 64) << of_frame;
+    for (int y = 0; y < 96; ++y) {
+      for (int x = 0; x < 128; ++x) {
+        const auto at = static_cast<std::size_t>(y) * 128 + static_cast<std::size_t>(x);
+        ASSERT_EQ(std::isnan(depth_m[at]), x == y) << x << " " << y;
+        if (x == y) continue;
+        const double z_m = 1e-3 * (100.0 + 0.25 * static_cast<double>(1000 + 4 * x + 16 * y + of_frame));
+        ASSERT_EQ(depth_m[at], static_cast<float>(z_m)) << x << " " << y;
+        const double a = (x - 63.5) / 120.0, b = (y - 47.5) / 120.0;
+        ASSERT_NEAR(range_m[at], z_m * std::sqrt(1.0 + a * a + b * b), 2e-7 * z_m) << "three floats";
+      }
+    }
+  }
+  (*opened)->stop();
+}
+
+TEST(AravisLibrary, ItsOwnCameraWithADescriptionOf3dIsCompliant) {
+  LibraryCamera camera{TOFTWIN_LIBRARY_CAMERA_3D};
+  ASSERT_TRUE(camera.waitFor().ok());
+  expectCompliant(k3dKeys);
+}
 
 TEST(AravisLibrary, ItsOwnCameraIsCompliantAndTriggered) {
   LibraryCamera camera;
@@ -118,17 +172,8 @@ TEST(AravisLibrary, ItsOwnCameraIsCompliantAndTriggered) {
     ASSERT_TRUE((*opened)->setParameter("ExposureTimeAbs", 5000).ok());
     EXPECT_EQ((*opened)->state().parameters.at(0).value, 5000.0);
   }
-  const drivers::Driver driver = drivers::aravis::row();
   for (const char* trigger : {"", "trigger = 'software'\n"}) {
-    const drivers::Candidate candidate{
-        .driver = &driver,
-        .keys = fmt::format("uri = 'aravis:127.0.0.1'\n{}{}", LibraryCamera::kKeys, trigger),
-        .absent_keys = "uri = 'aravis:127.0.0.77'",
-        .absent_name = "aravis:127.0.0.77"};
-    for (const drivers::Finding& finding : drivers::checkCompliance(candidate)) {
-      EXPECT_NE(finding.outcome, drivers::Finding::Outcome::Failed)
-          << finding.check << ", because " << finding.because << "\n  " << finding.detail;
-    }
+    expectCompliant(fmt::format("{}{}", LibraryCamera::kKeys, trigger));
   }
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <fstream>
 
+#include "calib/file/calibration_file.h"
 #include "drivers/aravis/aravis.h"
 #include "drivers/compliance.h"
 #include "gige_vision_testing.h"
@@ -143,6 +144,62 @@ TEST_F(GigeVisionCross, DepthIsTheNativeOneBitForBit) {
               ASSERT_EQ(depth_got[i], rangeThroughC32f(depth_m[i])) << i;
             }
           });
+}
+
+constexpr int kX = 40, kY = 24, kWidth = 88, kHeight = 66;  // half of 176 x 132, and not its middle
+const std::string kRegion = fmt::format("'Width = {}', 'Height = {}', 'OffsetX = {}', 'OffsetY = {}'", kWidth, kHeight, kX, kY);
+
+/// A lens of the whole image, as a person calibrated it.
+std::filesystem::path calibrationOf(const CameraInfo& camera, const std::filesystem::path& file) {
+  calibration::CalibrationFile made;
+  made.lens = {camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy, camera.distortion};
+  std::ofstream{file} << calibration::toText(made);
+  return file;
+}
+
+TEST_F(GigeVisionCross, OfARegionTheLensIsThatPartOfIt) {
+  startGige(kSmallSim);
+  const CameraInfo whole = client().describe("cam")->camera;
+  const auto file = calibrationOf(whole, folder_ / "lens.toml");
+  const std::string table = fmt::format("lens.width = {}\nlens.height = {}\nlens.fx = {}\nlens.cx = {}\nlens.cy = {}\n",
+                                        whole.width, whole.height, whole.fx, whole.cx, whole.cy);
+  for (const std::string& lens : {std::string{}, fmt::format("calibration = '{}'\n", file.string()), table}) {
+    SCOPED_TRACE(lens.empty() ? "as the camera says it" : lens);
+    const auto driver =
+        openDriver(fmt::format("{}components = ['Range']\npixel_format = 'Coord3D_C32f'\nset = [{}]", lens, kRegion));
+    ASSERT_TRUE(driver.ok()) << driver.error().message;
+    const CameraInfo got = (*driver)->info().camera;
+    EXPECT_EQ(got.width, kWidth);
+    EXPECT_EQ(got.height, kHeight);
+    EXPECT_NEAR(got.fx, whole.fx, 1e-4) << "a crop magnifies nothing";
+    EXPECT_NEAR(got.cx, whole.cx - kX, 1e-4);
+    EXPECT_NEAR(got.cy, whole.cy - kY, 1e-4);
+    EXPECT_EQ(got.calibration_id.size(), 32u);
+  }
+  // Ranges that the driver makes of depth by that lens are the native ones of those pixels.
+  compare(fmt::format("calibration = '{}'\ncomponents = ['Range']\npixel_format = 'Coord3D_C32f'\nset = [{}]",
+                      file.string(), kRegion),
+          [](const Frame& native, const Frame& through) {
+            const auto range_m = native.find(PlaneKind::Range)->as<float>();
+            const auto range_got = through.find(PlaneKind::Range)->as<float>();
+            ASSERT_EQ(range_got.size(), std::size_t{kWidth} * kHeight);
+            for (std::size_t i = 0; i < range_got.size(); ++i) {
+              const double m = static_cast<double>(range_m[(kY + i / kWidth) * 176 + kX + i % kWidth]);
+              ASSERT_EQ(std::isnan(range_got[i]), std::isnan(m)) << i;
+              if (std::isnan(m)) continue;
+              ASSERT_NEAR(static_cast<double>(range_got[i]), m, 4e-7 * m) << i;  // floats, as above
+            }
+          });
+}
+
+TEST_F(GigeVisionCross, OfARegionALensOfAnotherSizeIsRefused) {
+  startGige(kSmallSim);
+  // Of the same shape: taken for binning, it would halve the focal length.
+  const auto driver = openDriver(fmt::format("lens.width = 352\nlens.height = 264\nlens.fx = 300\nset = [{}]", kRegion));
+  ASSERT_FALSE(driver.ok());
+  EXPECT_EQ(driver.error().code, Error::Code::Incompatible);
+  EXPECT_NE(driver.error().message.find("88 x 66 from (40, 24) on of 176 x 132"), std::string::npos)
+      << driver.error().message;
 }
 
 TEST_F(GigeVisionCross, IsCompliantThroughOurDriver) {
