@@ -320,7 +320,9 @@ TEST(O3d303, TenThousandStartsAndStopsLeakNeitherFilesNorThreadsNorMemory) {
   for (int i = -100; i < 10'000; ++i) {
     const auto begun = source.start();
     ASSERT_TRUE(begun.ok()) << "start " << i << ": " << begun.error().message;
-    if (i == 9'999) EXPECT_TRUE(nextFrame(source).ok());
+    if (i == 9'999) {
+      EXPECT_TRUE(nextFrame(source).ok());
+    }
     source.stop();
     if (i != -1) continue;  // caches are warm
     waitForConnections(camera, 0);

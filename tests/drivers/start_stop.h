@@ -52,10 +52,9 @@ inline void startAndStop(drivers::Source& source, int cycles, int frame_every, H
 /// more than `most_kept_bytes` from 500 cycles on; TOFTWIN_CYCLES=10000 runs more of them. Larger where frames that nobody fetched wait for the next start.
 inline void expectNothingKept(std::string_view name, drivers::Source& source, int frame_every, int cycles = 10'000,
                               std::int64_t most_kept_bytes = 8'000) {
-  constexpr int kWarmUp = 100;
   if (const char* asked = std::getenv("TOFTWIN_CYCLES"); asked != nullptr) cycles = std::max(cycles, std::atoi(asked));
   Held before, after;
-  startAndStop(source, kWarmUp, frame_every, before);
+  startAndStop(source, std::clamp(cycles / 2, 50, 100), frame_every, before);
   startAndStop(source, cycles, frame_every, after);
   fmt::print("{}: {} bytes more on the heap after {} starts and stops\n", name,
              after.heap_bytes - before.heap_bytes, cycles);
