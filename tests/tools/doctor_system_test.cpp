@@ -50,6 +50,37 @@ TEST(DoctorOfTheSystem, SaysWhatAUsbCameraLacksAndTheCommandThatMendsIt) {
   EXPECT_EQ(findingOf(findings, "usb memory").state, Finding::State::Good);
 }
 
+TEST(DoctorOfTheSystem, SaysWhichCamerasAreTooManyForTheirBus) {
+  const test::FakeRoot root;
+  root.plugIn("2-1", "045e", "02c4", "5000");
+  root.plugIn("1-1", "1d27", "0601", "480");
+  EXPECT_EQ(findingOf(checkSystem(root.path()), "usb bus").state, Finding::State::Good);
+  root.plugIn("1-2", "1d27", "0609", "480");
+  const Finding shared = findingOf(checkSystem(root.path()), "usb bus");
+  EXPECT_EQ(shared.state, Finding::State::Warning);
+  EXPECT_THAT(shared.found, HasSubstr("share bus 1: together they need 960 Mbit/s, and it has 480"));
+  EXPECT_THAT(shared.mend, HasSubstr("another controller"));
+}
+
+TEST(DoctorOfTheSystem, SaysHowFastTheNetworkIs) {
+  const test::FakeRoot root;
+  const auto card = [&](const std::string& name, const char* speed, const char* packet, const char* state = "up") {
+    for (const auto& [file, text] : {std::pair{"device/vendor", "0x8086"}, {"speed", speed}, {"mtu", packet}, {"operstate", state}})
+      root.write("sys/class/net/" + name + "/" + file, text);
+  };
+  card("eth0", "1000", "1500");
+  card("eth1", "-1", "1500", "down");
+  root.write("sys/class/net/lo/mtu", "65536");
+  auto findings = checkSystem(root.path());
+  EXPECT_EQ(findingOf(findings, "ethernet").state, Finding::State::Good);
+  EXPECT_THAT(findingOf(findings, "ethernet").found, HasSubstr("eth0: 1000 Mbit/s, packets of 1500 bytes; larger ones"));
+  EXPECT_EQ(std::ranges::count(findings, "ethernet", &Finding::check), 1);
+  card("eth0", "100", "1500");
+  findings = checkSystem(root.path());
+  EXPECT_EQ(findingOf(findings, "ethernet").state, Finding::State::Warning);
+  EXPECT_THAT(findingOf(findings, "ethernet").mend, HasSubstr("sudo ethtool -s eth0 autoneg on"));
+}
+
 TEST(DoctorOfTheSystem, SaysWhatMayNotBeOpened) {
   const test::FakeRoot root;
   root.plugIn("2-1", "1d27", "0601", "480");
@@ -86,6 +117,10 @@ TEST(DoctorOfTheSystem, SaysWhatDropsPackets) {
               HasSubstr("net.ipv4.conf.eth1.rp_filter=2"));
   EXPECT_THAT(findingOf(findings, "reverse path").found, Not(HasSubstr("eth0")));
   EXPECT_THAT(findingOf(findings, "firewall").mend, HasSubstr("sudo ufw allow"));
+  root.write("etc/ufw/ufw.conf", "ENABLED=no");
+  root.write("etc/systemd/system/sysinit.target.wants/nftables.service", "");
+  EXPECT_THAT(findingOf(checkSystem(root.path()), "firewall").mend, HasSubstr("sudo nft insert rule inet filter input"));
+  std::filesystem::remove(root.path() / "etc/systemd/system/sysinit.target.wants/nftables.service");
   root.write("proc/sys/net/ipv4/conf/all/rp_filter", "2");  // loose wins over strict
   root.write("proc/sys/net/core/rmem_max", "33554432");
   root.write("etc/ufw/ufw.conf", "ENABLED=no");

@@ -6,6 +6,7 @@
 namespace toftwin::cli {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 
@@ -96,7 +97,27 @@ TEST(ComplianceCommand, SaysWhatWasChecked) {
   EXPECT_EQ(good.status, 0) << good.out << good.err;
   EXPECT_THAT(good.out, HasSubstr("ok   device time strictly increases"));
   EXPECT_THAT(good.out, HasSubstr("pattern:0: 0 of"));
-  EXPECT_THAT(toftwin("compliance pattern:0 --json").out, HasSubstr("\"outcome\": \"passed\""));
+  EXPECT_THAT(toftwin("compliance pattern:0 --json").out,
+              AllOf(HasSubstr("\"outcome\": \"passed\""), HasSubstr("\"planes\": ["), HasSubstr("\"kernel\": \"Linux ")));
+}
+
+TEST(ComplianceCommand, SaysOfWhichCameraOnWhichMachine) {
+  const std::string out = toftwin("compliance pattern:0 --keys 'width = 32'").out;
+  for (const char* line : {"toftwin           0.", "kernel            Linux ", "keys              width = 32", "model             ",
+                           "planes            [\"range\"", "nominal_rate_hz   "}) {
+    EXPECT_THAT(out, HasSubstr(line));
+  }
+  const auto at = out.find("measured_rate_hz  ");
+  ASSERT_NE(at, std::string::npos) << out;
+  EXPECT_GT(std::stod(out.substr(at + 18)), 1.0) << "its frames come at 30 Hz";
+}
+
+TEST(ComplianceCommand, ACameraThatDoesNotOpenGivesAReportToo) {
+  const Ran text = toftwin("compliance pattern:9");
+  EXPECT_EQ(text.status, 4);
+  EXPECT_THAT(text.out, AllOf(HasSubstr("kernel            Linux "), HasSubstr("FAIL it opens"), HasSubstr("pattern:9")));
+  EXPECT_THAT(toftwin("compliance pattern:9 --json").out,
+              AllOf(HasSubstr("\"camera\": \"pattern:9\""), HasSubstr("\"check\": \"it opens\"")));
 }
 
 TEST(ComplianceCommand, ACameraThatIsNotThereOrAWrongKeyIsStatus4) {

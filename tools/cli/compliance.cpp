@@ -5,10 +5,13 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <iterator>
+#include <memory>
 
 #include "calib/compare/json.h"
 #include "protocol/settings/describe.h"
 #include "tools/cli/command.h"
+#include "tools/cli/compliance_header.h"
 #include "tools/cli/options.h"
 #include "tools/cli/terminal.h"
 
@@ -79,25 +82,61 @@ void print(const drivers::Finding& finding) {
 }
 
 /// Whether the camera can be opened at all: if not, every check would say the same.
-Result<> opens(const Options& options, const drivers::Candidate& candidate) {
+Result<std::unique_ptr<drivers::Source>> open(const Options& options, const drivers::Candidate& candidate) {
   // Keys that the user gave are the first lines, so that the lines in errors are theirs.
   auto table = settings::Table::parse(candidate.keys, options.keys.empty() ? options.camera : "--keys");
   if (!table) return table.error();
-  const auto opened = candidate.driver->open(*table);
-  if (!opened) return opened.error();
-  return table->check();
+  auto opened = candidate.driver->open(*table);
+  if (auto checked = table->check(); opened && !checked) return checked.error();
+  return opened;
+}
+
+compare::Json toJson(const ReportHeader& header, compare::Json checks) {
+  compare::Json report = compare::Json::object();
+  for (const auto& [what, value] : header) report.set(what, value);
+  return report.set("checks", std::move(checks));
+}
+
+void print(const ReportHeader& header) {
+  for (const auto& [what, value] : header) {
+    fmt::print("{:<18}{}\n", what, value.isText() ? value.words() : value.line());
+  }
+  std::fflush(stdout);
+}
+
+/// What can be attached to a report on a camera that is there and does not open.
+void reportUnopened(const Options& options, const ReportHeader& header, const Error& why) {
+  if (!options.json) {
+    print(header);
+    return print(drivers::Finding{.check = "it opens",
+                                  .because = "without it nothing else can be checked",
+                                  .outcome = Outcome::Failed,
+                                  .detail = why.message});
+  }
+  const auto check =
+      compare::Json::object().set("check", "it opens").set("outcome", "failed").set("detail", why.message);
+  fmt::print("{}", toJson(header, compare::Json::array().push(check)).text());
 }
 
 Result<Exit> run(const Options& options) {
   const auto candidate = candidateFor(options);
   if (!candidate) return candidate.error();
-  if (auto opened = opens(options, *candidate); !opened) return opened.error();
   drivers::ComplianceOptions how;
   how.frame_timeout =
       std::chrono::milliseconds{static_cast<std::int64_t>(options.frame_timeout_s * 1000.0)};
-  if (!options.json) how.report = print;
+  if (!options.json) how.report = [](const drivers::Finding& finding) { print(finding); };
   how.interrupted = interrupted;
   catchInterrupts();
+  auto opened = open(options, *candidate);
+  ReportHeader header = headerOfMachine(options.camera, options.keys);
+  if (!opened) {
+    // What is wrong with the command line is told there, and is nothing to report.
+    if (opened.error().code != Error::Code::InvalidArgument) reportUnopened(options, header, opened.error());
+    return opened.error();
+  }
+  std::ranges::move(headerOfCamera(**opened, how.frame_timeout), std::back_inserter(header));
+  opened->reset();
+  if (!options.json) print(header);
   compare::Json all = compare::Json::array();
   int failed = 0;
   const std::vector<drivers::Finding> findings = drivers::checkCompliance(*candidate, how);
@@ -113,7 +152,7 @@ Result<Exit> run(const Options& options) {
                  .set("because", std::string{finding.because}));
   }
   if (options.json) {
-    fmt::print("{}", all.text());
+    fmt::print("{}", toJson(header, std::move(all)).text());
   } else {
     fmt::print("{}: {} of {} checks failed\n", options.camera, failed, findings.size());
   }

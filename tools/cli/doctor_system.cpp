@@ -3,11 +3,13 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <charconv>
 #include <fstream>
+#include <map>
 #include <optional>
 #include <string>
 
@@ -22,6 +24,7 @@ using State = Finding::State;
 
 constexpr long kUsbMemory_mb = 256;  // two Kinect v2: 2 × 3 transfers of several MB, and reserve
 constexpr long kReceiveBuffer = 16 << 20;  // bytes: a tenth of a second of a full gigabit link
+constexpr long kGigabit_mbit_s = 1000, kJumboPacket = 9000;
 constexpr const char* kRules = "60-toftwin.rules";
 
 std::string lineOf(const fs::path& file) {
@@ -92,6 +95,25 @@ std::vector<Finding> checkUsbCameras(const fs::path& root) {
   return findings;
 }
 
+Finding checkUsbShares(const fs::path& root) {
+  std::map<std::string, std::vector<std::string>> on_bus;
+  std::map<std::string, double> needed_mbit_s, has_mbit_s;
+  for (const usb::Device& device : usb::list(root)) {
+    const std::string bus = device.port.substr(0, device.port.find('-'));
+    on_bus[bus].push_back(fmt::format("{} at {}", device.camera->name, device.port));
+    needed_mbit_s[bus] += std::min(device.camera->least_mbit_s, device.mbit_s);
+    has_mbit_s[bus] = std::max(has_mbit_s[bus], device.mbit_s);
+  }
+  for (const auto& [bus, cameras] : on_bus) {
+    if (cameras.size() < 2 || needed_mbit_s[bus] <= has_mbit_s[bus]) continue;
+    return {State::Warning, "usb bus",
+            fmt::format("{} share bus {}: together they need {:g} Mbit/s, and it has {:g}", fmt::join(cameras, ", "), bus,
+                        needed_mbit_s[bus], has_mbit_s[bus]),
+            "plug one of them into a port of another controller (lsusb -t shows them), or choose a lower rate or a smaller image"};
+  }
+  return {State::Good, "usb bus", "no two cameras share one that is too slow for both", ""};
+}
+
 Finding checkUdevRules(const fs::path& root) {
   for (const char* folder : {"etc/udev/rules.d", "usr/lib/udev/rules.d", "lib/udev/rules.d",
                              "usr/local/lib/udev/rules.d", "run/udev/rules.d"}) {
@@ -150,6 +172,33 @@ Finding checkSocketBuffers(const fs::path& root) {
               kReceiveBuffer)};
 }
 
+std::vector<Finding> checkEthernet(const fs::path& root) {
+  std::vector<Finding> findings;
+  const fs::path folder = root / "sys/class/net";
+  for (const std::string& name : namesIn(folder)) {
+    // Of a card, with a cable in; what is no card has no device.
+    if (!isThere(folder / name / "device") || lineOf(folder / name / "operstate") != "up") continue;
+    const long mbit_s = numberIn(folder / name / "speed").value_or(0), packet = numberIn(folder / name / "mtu").value_or(0);
+    if (mbit_s <= 0 || packet <= 0) continue;  // a radio does not say
+    const std::string found = fmt::format("{}: {} Mbit/s, packets of {} bytes", name, mbit_s, packet);
+    if (mbit_s < kGigabit_mbit_s) {
+      findings.push_back({State::Warning, "ethernet", found + ": too slow for a GigE Vision camera's full rate",
+                          fmt::format("use a gigabit port and a cable with all four pairs (Cat 5e or better), then "
+                                      "sudo ethtool -s {} autoneg on",
+                                      name)});
+    } else if (packet < kJumboPacket) {
+      findings.push_back({State::Good, "ethernet",
+                          fmt::format("{}; larger ones (sudo ip link set {} mtu {}, and a switch that passes them) spare "
+                                      "processor time",
+                                      found, name, kJumboPacket),
+                          ""});
+    } else {
+      findings.push_back({State::Good, "ethernet", found, ""});
+    }
+  }
+  return findings;
+}
+
 Finding checkReversePath(const fs::path& root) {
   const fs::path folder = root / "proc/sys/net/ipv4/conf";
   // The kernel takes the stricter of "all" and the interface: 1 is strict, 2 is loose.
@@ -202,18 +251,21 @@ Finding checkFirewall(const fs::path& root) {
   }
   if (isThere(root / "etc/systemd/system/sysinit.target.wants/nftables.service")) {
     return warn("nftables",
-                "add \"iifname INTERFACE accept\" (the camera's) to the input chain of "
-                "/etc/nftables.conf, then sudo systemctl reload nftables");
+                "sudo nft insert rule inet filter input iifname INTERFACE accept (the camera's; the table and chain of "
+                "Debian's file, else those that sudo nft list chains shows); for good: the rule iifname INTERFACE accept "
+                "in that chain of /etc/nftables.conf");
   }
   return {State::Good, "firewall", "neither ufw nor firewalld nor nftables is enabled", ""};
 }
 
 std::vector<Finding> checkSystem(const fs::path& root) {
   std::vector<Finding> findings = checkUsbCameras(root);
+  findings.push_back(checkUsbShares(root));
   findings.push_back(checkUdevRules(root));
   findings.push_back(checkUsbMemory(root));
   for (Finding& finding : checkVideoNodes(root)) findings.push_back(std::move(finding));
   findings.push_back(checkSocketBuffers(root));
+  for (Finding& finding : checkEthernet(root)) findings.push_back(std::move(finding));
   findings.push_back(checkReversePath(root));
   findings.push_back(checkFirewall(root));
   return findings;

@@ -13,6 +13,8 @@ namespace toftwin::cli {
 
 /// The cameras on USB: slow links, no driver, no permission.
 std::vector<Finding> checkUsbCameras(const std::filesystem::path& root);
+/// Whether cameras on one bus need more than it has.
+Finding checkUsbShares(const std::filesystem::path& root);
 /// Whether our udev rules are installed; asked for where there are cameras that need them.
 Finding checkUdevRules(const std::filesystem::path& root);
 /// What the kernel lends to USB transfers of all cameras together.
@@ -21,6 +23,8 @@ Finding checkUsbMemory(const std::filesystem::path& root);
 std::vector<Finding> checkVideoNodes(const std::filesystem::path& root);
 /// The largest receive buffer that a GigE Vision stream gets.
 Finding checkSocketBuffers(const std::filesystem::path& root);
+/// Each network card with a cable in: its speed and its largest packet.
+std::vector<Finding> checkEthernet(const std::filesystem::path& root);
 /// Interfaces that drop packets of cameras of another network (reverse-path filter).
 Finding checkReversePath(const std::filesystem::path& root);
 /// A firewall that drops what a GigE Vision camera sends.
