@@ -73,8 +73,10 @@ class RecordingFeed final : public Feed {
   }
   [[nodiscard]] std::string warning() const override {
     const std::string& damage = reader_.summary().damage;
-    return damage.empty() ? "" : fmt::format("The recording of {} is damaged: {}. Only what can be read of it is compared.",
-                                             details_.entry.name, damage);
+    return damage.empty()
+               ? ""
+               : fmt::format("The recording of {} is damaged: {}. Only what can be read of it is compared.",
+                             details_.entry.name, damage);
   }
 
  private:
@@ -232,10 +234,11 @@ std::string clockWarning(const Frame& frame) {
   const auto ours = std::chrono::duration_cast<nanoseconds>(system_clock::now().time_since_epoch()).count();
   const double ahead_s = 1e-9 * static_cast<double>(frame.moment.received.ns - ours);
   if (std::abs(ahead_s) <= 1.0) return {};
-  // To one digit, so that what is said of many captures is said once.
-  return fmt::format("The clock of the daemon that {} comes from is about {:.1g} s {} ours: times of its frames are not those of "
-                     "other machines. Let both follow one clock (NTP)",
-                     frame.source, std::abs(ahead_s), ahead_s > 0.0 ? "ahead of" : "behind");
+  // In whole seconds, so that what is said of many captures is said once.
+  return fmt::format(
+      "The clock of the daemon that {} comes from is about {:.0f} s {} ours: times of its frames are not "
+      "those of other machines. Let both follow one clock (NTP)",
+      frame.source, std::abs(ahead_s), ahead_s > 0.0 ? "ahead of" : "behind");
 }
 
 Result<Frame> nextFrameAt(Feed& feed, const std::optional<Transform<World, Camera>>& pose,

@@ -94,8 +94,8 @@ struct CaptureOptions {
 Result<Capture> capture(Feed& a, Feed& b, const CaptureOptions& options, Progress& progress);
 void planCapture(Progress& progress, const CaptureOptions& options);
 
-/// What a reader must know of the clock of the daemon that a frame has just come from: that it is over a second off ours.
-/// Nothing of frames that were recorded.
+/// What a reader must know of the clock of the daemon that a frame has just come from: that it is over a
+/// second off ours. Nothing of frames that were recorded.
 std::string clockWarning(const Frame& frame);
 
 /// The next frame of that pose; frames that say another one are skipped. Stopped soon after the user

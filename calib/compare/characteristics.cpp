@@ -215,9 +215,11 @@ Result<PoseComparison> comparePose(const Stack& a, const Stack& b) {
 
 std::string resamplingNote(const PoseComparison& pose) {
   if (!pose.resampled) return {};
-  return fmt::format("The cameras have different lenses or resolutions: B is interpolated to A's rays, of which it shares {:.0f} %. "
-                     "What B alone looks at is not compared.",
-                     100.0 * pose.shared_rays);
+  return fmt::format(
+      "The cameras have different lenses or resolutions: B is interpolated to A's rays, of which it shares "
+      "{:.0f} %. "
+      "What B alone looks at is not compared.",
+      100.0 * pose.shared_rays);
 }
 
 Pixels pixelsOf(const std::vector<PoseComparison>& poses) {

@@ -37,7 +37,8 @@ struct PoseComparison {
 /// than one pixel in a hundred.
 Result<PoseComparison> comparePose(const Stack& a, const Stack& b);
 
-/// That B was interpolated to A's rays, and how many of them it has; empty where both have the same camera model.
+/// That B was interpolated to A's rays, and how many of them it has; empty where both have the same camera
+/// model.
 std::string resamplingNote(const PoseComparison& pose);
 
 /// Pixels beside which the range jumps by more than `jump` of itself between neighbours, widened by

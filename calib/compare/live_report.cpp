@@ -209,11 +209,9 @@ TableBlock maskTable(const Characteristics& c) {
 
 Figure histogramFigure(const Pixels& pixels) {
   const double reach = std::max(
-                   1.0, 1.3 * quantile({pixels.difference_mm.begin(), pixels.difference_mm.end()},
-                                       0.99)),
+                   1.0, 1.3 * quantile({pixels.difference_mm.begin(), pixels.difference_mm.end()}, 0.99)),
                low = std::min(
-                   -1.0, 1.3 * quantile({pixels.difference_mm.begin(), pixels.difference_mm.end()},
-                                        0.01));
+                   -1.0, 1.3 * quantile({pixels.difference_mm.begin(), pixels.difference_mm.end()}, 0.01));
   std::vector<double> surface, edge;
   for (std::size_t i = 0; i < pixels.difference_mm.size(); ++i)
     (pixels.edge[i] ? edge : surface).push_back(pixels.difference_mm[i]);
@@ -260,7 +258,8 @@ FigureRow mapsOf(const std::string& name, const PoseComparison& comparison, doub
 Tone toneOfDifference(const Region& region) {
   const double bias = std::abs(region.difference_mm.mean), noise = region.noise_a_mm;
   if (!(noise > 0.0)) return Tone::Neutral;
-  if (bias <= noise && region.difference_mm.p95_abs <= 3.0 * std::hypot(noise, region.noise_b_mm)) return Tone::Good;
+  if (bias <= noise && region.difference_mm.p95_abs <= 3.0 * std::hypot(noise, region.noise_b_mm))
+    return Tone::Good;
   return bias <= 3.0 * noise ? Tone::Fair : Tone::Bad;
 }
 

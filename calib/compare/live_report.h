@@ -20,8 +20,8 @@ FigureRow mapsOf(const std::string& name, const PoseComparison& comparison, doub
 Figure histogramFigure(const Pixels& pixels);
 /// The region that headlines are of: surfaces, where there are any.
 const Region& mainRegionOf(const Characteristics& characteristics);
-/// Against A's noise in a single frame: good where the bias is within it and 95 % of the pixels within three of both
-/// cameras' noise; bad where the bias is over three of it. Neutral where no noise is known.
+/// Against A's noise in a single frame: good where the bias is within it and 95 % of the pixels within three
+/// of both cameras' noise; bad where the bias is over three of it. Neutral where no noise is known.
 Tone toneOfDifference(const Region& region);
 /// The next 1, 2 or 5 times a power of ten, for the reach of a scale.
 double roundUp(double value);

@@ -8,7 +8,8 @@
 
 namespace toftwin::compare {
 
-void TraitCollector::add(const std::string& what, const char* of, const Traits& traits, const std::string& detail) {
+void TraitCollector::add(const std::string& what, const char* of, const Traits& traits,
+                         const std::string& detail) {
   if (!traits) {
     found_.untold.push_back(fmt::format("{} of {}: {}", what, of, traits.error().message));
     return;
@@ -39,7 +40,8 @@ const char* nameOf(DriftModel model) {
 
 TableBlock traitTable(const NamedTraits& traits, const std::string& a, const std::string& b) {
   TableBlock table{
-      "Characteristics, with the intervals that are to hold them with 95 % and, behind a #, the number of rows, frames or "
+      "Characteristics, with the intervals that are to hold them with 95 % and, behind a #, the number of "
+      "rows, frames or "
       "blocks they are from: see docs/characteristics.md",
       {"characteristic", "number", "unit", a, b, "B − A, or both"},
       {}};
@@ -55,7 +57,9 @@ TableBlock traitTable(const NamedTraits& traits, const std::string& a, const std
       table.rows.push_back({what, trait.name, trait.unit, "", ""});
       if (has_both) table.rows.back().emplace_back();
     }
-    table.rows[row][of == "A" ? 3 : of == "B" ? 4 : 5] =
+    table.rows[row][of == "A"   ? 3
+                    : of == "B" ? 4
+                                : 5] =
         fmt::format("{:.4g} ({:.4g} to {:.4g}) #{}{}{}", trait.value, trait.low, trait.high, trait.n,
                     detail.empty() ? "" : ", ", detail);
   }
@@ -66,7 +70,11 @@ Json toJson(const NamedTraits& traits) {
   Json rows = Json::array(), untold = Json::array();
   for (const auto& [what, detail, of, trait] : traits.traits) {
     Json row = Json::object();
-    row.set("characteristic", what).set("detail", detail).set("of", of).set("name", trait.name).set("unit", trait.unit);
+    row.set("characteristic", what)
+        .set("detail", detail)
+        .set("of", of)
+        .set("name", trait.name)
+        .set("unit", trait.unit);
     row.set("value", trait.value).set("low", trait.low).set("high", trait.high).set("n", trait.n);
     rows.push(std::move(row));
   }

@@ -15,7 +15,7 @@ namespace {
 
 using Points = std::vector<std::array<float, 3>>;
 
-constexpr std::size_t kMostPoints = 4000;  ///< of each camera: 32 kB of a page
+constexpr std::size_t kMostPoints = 4000;   ///< of each camera: 32 kB of a page
 constexpr double kYaw = 0.5, kPitch = 0.3;  ///< of the still, rad; where the script begins, too
 constexpr int kWidth = 720, kHeight = 420;
 
@@ -42,7 +42,8 @@ std::string packed(const Points& points, const std::array<float, 3>& middle) {
     for (std::size_t k = 0; k < 3; ++k) {
       const float mm = std::clamp(1e3F * (p[k] - middle[k]), -32767.0F, 32767.0F);
       const auto word = static_cast<std::uint16_t>(static_cast<std::int16_t>(std::lround(mm)));
-      bytes.push_back(static_cast<unsigned char>(word & 0xFF)), bytes.push_back(static_cast<unsigned char>(word >> 8));
+      bytes.push_back(static_cast<unsigned char>(word & 0xFF)),
+          bytes.push_back(static_cast<unsigned char>(word >> 8));
     }
   }
   return base64(bytes);
@@ -53,9 +54,11 @@ std::string still(const Points& points, const std::array<float, 3>& middle, doub
   std::string path;
   for (const auto& p : points) {
     const double x = p[0] - middle[0], y = p[1] - middle[1], z = p[2] - middle[2];
-    const double across = x * std::cos(kYaw) + z * std::sin(kYaw), ahead = z * std::cos(kYaw) - x * std::sin(kYaw);
+    const double across = x * std::cos(kYaw) + z * std::sin(kYaw),
+                 ahead = z * std::cos(kYaw) - x * std::sin(kYaw);
     const double down = y * std::cos(kPitch) + ahead * std::sin(kPitch);
-    path += fmt::format("M{:.0f} {:.0f}h2v2h-2z", 0.5 * kWidth + scale * across, 0.5 * kHeight + scale * down);
+    path +=
+        fmt::format("M{:.0f} {:.0f}h2v2h-2z", 0.5 * kWidth + scale * across, 0.5 * kHeight + scale * down);
   }
   return fmt::format("<path class='dots {}' d='{}'/>", ink, path);
 }
@@ -72,7 +75,8 @@ PointCloud pointCloudOf(const std::string& name, const PoseComparison& pose) {
   PointCloud cloud{.caption = fmt::format("{}: what A and B see in space, in A's frame of reference.", name)};
   const Image<float> difference = comparedDifference_mm(pose);
   if (pose.camera.width != difference.width() || pose.camera.height != difference.height()) return cloud;
-  const auto stride = std::max(1, static_cast<int>(std::ceil(std::sqrt(static_cast<double>(difference.size()) / kMostPoints))));
+  const auto stride = std::max(
+      1, static_cast<int>(std::ceil(std::sqrt(static_cast<double>(difference.size()) / kMostPoints))));
   for (int y = stride / 2; y < difference.height(); y += stride) {
     for (int x = stride / 2; x < difference.width(); x += stride) {
       if (!std::isfinite(difference(x, y))) continue;
@@ -95,13 +99,16 @@ std::string html(const PointCloud& cloud) {
   const double reach = reachOf(cloud.a, middle), scale = 0.48 * kHeight / reach;
   const std::size_t thin = 1 + cloud.a.size() / 1000;
   return fmt::format(
-      "<figure class='cloud' data-a='{}' data-b='{}' data-reach='{:.0f}'><div class='plot'><svg viewBox='0 0 {} {}' "
-      "role='img' aria-label='{}'>{}{}</svg></div><div class='legend'><label class='inkA'><input type='checkbox' checked "
+      "<figure class='cloud' data-a='{}' data-b='{}' data-reach='{:.0f}'><div class='plot'><svg viewBox='0 0 "
+      "{} {}' "
+      "role='img' aria-label='{}'>{}{}</svg></div><div class='legend'><label class='inkA'><input "
+      "type='checkbox' checked "
       "data-set='0'>A</label><label class='inkB'><input type='checkbox' checked data-set='1'>B</label><span "
-      "class='hint'>drag or use the arrow keys to turn; wheel, + and − to zoom</span></div><figcaption>{}</figcaption></figure>",
+      "class='hint'>drag or use the arrow keys to turn; wheel, + and − to "
+      "zoom</span></div><figcaption>{}</figcaption></figure>",
       packed(cloud.a, middle), packed(cloud.b, middle), 1e3 * reach, kWidth, kHeight, escaped(cloud.caption),
-      still(everyNth(cloud.a, thin), middle, scale, "measured"), still(everyNth(cloud.b, thin), middle, scale, "simulated"),
-      escaped(cloud.caption));
+      still(everyNth(cloud.a, thin), middle, scale, "measured"),
+      still(everyNth(cloud.b, thin), middle, scale, "simulated"), escaped(cloud.caption));
 }
 
 std::string cloudScript() {

@@ -9,8 +9,8 @@ namespace toftwin::compare {
 
 struct PoseComparison;
 
-/// Points that both cameras see at a pose, in A's frame of reference. A page shows them so that one can turn them; without
-/// script, or printed, as a still.
+/// Points that both cameras see at a pose, in A's frame of reference. A page shows them so that one can turn
+/// them; without script, or printed, as a still.
 struct PointCloud {
   std::string caption{};
   std::vector<std::array<float, 3>> a{}, b{};  ///< metres, x right, y down, z ahead

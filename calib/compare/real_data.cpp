@@ -27,7 +27,8 @@ void addCharacteristics(const NamedTraits& traits, Finding& finding) {
     for (auto& row : table.rows) row.pop_back();
   }
   finding.section.blocks.push_back(std::move(table));
-  if (!traits.untold.empty()) finding.section.blocks.push_back(Details{"What these data cannot tell", traits.untold});
+  if (!traits.untold.empty())
+    finding.section.blocks.push_back(Details{"What these data cannot tell", traits.untold});
   finding.data.set("characteristics", toJson(traits)).set("verdicts", toJson(verdicts));
 }
 

@@ -82,8 +82,8 @@ Section summarySection(const std::vector<Finding>& findings);
 void planRealData(Progress& progress, double effort);
 Result<std::vector<Finding>> judgeRealData(const RealDataJob& job);
 
-/// The traits of measured data (A) and, where there are any, of simulated ones (B), as a run has them: their table, and which
-/// of them differ.
+/// The traits of measured data (A) and, where there are any, of simulated ones (B), as a run has them: their
+/// table, and which of them differ.
 void addCharacteristics(const NamedTraits& traits, Finding& finding);
 
 /// Rows "prediction, RMS left, shape left, explained" for tables.

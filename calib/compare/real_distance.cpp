@@ -42,7 +42,8 @@ double errorAt(const std::vector<WallReading>& readings, double reference_mm) {
 }
 
 /// Waves, scale and residual, measured and simulated, at the frequencies that the camera is known to have.
-NamedTraits wavesOf(const RealCamera& camera, const ErrorTable& measured, const std::vector<WallReading>& readings) {
+NamedTraits wavesOf(const RealCamera& camera, const ErrorTable& measured,
+                    const std::vector<WallReading>& readings) {
   const std::vector<double> frequency_hz = frequenciesOf(camera.name);
   const auto add = [&](const char* of, std::vector<double> distance, const std::vector<double>& error,
                        TraitCollector& all) {

@@ -156,7 +156,8 @@ std::string toHtml(const Report& report) {
   for (const Section& section : report.sections) out += html(section);
   out += fmt::format("<footer>{}</footer></main>", escaped(report.colophon));
   const auto isCloud = [](const Block& block) { return std::holds_alternative<PointCloud>(block); };
-  if (std::ranges::any_of(report.sections, [&](const Section& one) { return std::ranges::any_of(one.blocks, isCloud); }))
+  if (std::ranges::any_of(report.sections,
+                          [&](const Section& one) { return std::ranges::any_of(one.blocks, isCloud); }))
     out += cloudScript();
   return out + "</body></html>\n";
 }

@@ -74,8 +74,8 @@ struct Report {
   std::string written_by = "toftwin compare", explained_in = "docs/compare.md";
 };
 
-/// The page: one HTML text that needs nothing else, no network. Its script, where there is a point cloud to turn, is in it;
-/// without it the page shows the same.
+/// The page: one HTML text that needs nothing else, no network. Its script, where there is a point cloud to
+/// turn, is in it; without it the page shows the same.
 std::string toHtml(const Report& report);
 
 /// The words and tables of the page as Markdown, without its pictures.

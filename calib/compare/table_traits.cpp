@@ -24,27 +24,30 @@ struct Unit {
   char quantity;
   double in_base;
 };
-constexpr std::array kUnits{Unit{"_m", 'l', 1.0},   Unit{"_cm", 'l', 1e-2}, Unit{"_mm", 'l', 1e-3},
-                            Unit{"_um", 'l', 1e-6}, Unit{"_s", 't', 1.0},   Unit{"_ms", 't', 1e-3},
-                            Unit{"_us", 't', 1e-6}, Unit{"_klx", 'e', 1.0}, Unit{"_lx", 'e', 1e-3},
+constexpr std::array kUnits{Unit{"_m", 'l', 1.0},       Unit{"_cm", 'l', 1e-2},       Unit{"_mm", 'l', 1e-3},
+                            Unit{"_um", 'l', 1e-6},     Unit{"_s", 't', 1.0},         Unit{"_ms", 't', 1e-3},
+                            Unit{"_us", 't', 1e-6},     Unit{"_klx", 'e', 1.0},       Unit{"_lx", 'e', 1e-3},
                             Unit{"_m_per_s", 'v', 1.0}, Unit{"_mm_per_s", 'v', 1e-3}, Unit{"_px", 'p', 1.0}};
 
 /// The longest suffix that fits: "_m_per_s" before "_s".
 const Unit* unitOf(std::string_view column) {
   const Unit* best = nullptr;
   for (const Unit& unit : kUnits) {
-    if (column.ends_with(unit.suffix) && (best == nullptr || unit.suffix.size() > best->suffix.size())) best = &unit;
+    if (column.ends_with(unit.suffix) && (best == nullptr || unit.suffix.size() > best->suffix.size()))
+      best = &unit;
   }
   return best;
 }
 
-/// What values of `there` are multiplied by to be in `wanted`'s unit. A name without a unit is taken as it is.
+/// What values of `there` are multiplied by to be in `wanted`'s unit. A name without a unit is taken as it
+/// is.
 Result<double> factorOf(std::string_view there, std::string_view wanted) {
   const Unit *from = unitOf(there), *to = unitOf(wanted);
   if (from == nullptr || to == nullptr) return 1.0;
   if (from->quantity == to->quantity) return from->in_base / to->in_base;
-  return Error{Error::Code::InvalidArgument,
-               fmt::format("column \"{}\" cannot stand for {}: its unit is of another quantity", there, wanted)};
+  return Error{
+      Error::Code::InvalidArgument,
+      fmt::format("column \"{}\" cannot stand for {}: its unit is of another quantity", there, wanted)};
 }
 
 Error ofTable(const TableJob& job, const Error& error) {
@@ -57,7 +60,8 @@ Image<float> imageOf(const std::vector<double>& line, const std::vector<double>&
   for (std::size_t i = 0; i < line.size(); ++i) rows[line[i]].push_back(static_cast<float>(range_m[i]));
   std::size_t width = 0;
   for (const auto& [number, row] : rows) width = std::max(width, row.size());
-  Image<float> image(static_cast<int>(width), static_cast<int>(rows.size()), std::numeric_limits<float>::quiet_NaN());
+  Image<float> image(static_cast<int>(width), static_cast<int>(rows.size()),
+                     std::numeric_limits<float>::quiet_NaN());
   int y = 0;
   for (const auto& [number, row] : rows) {
     for (std::size_t x = 0; x < row.size(); ++x) image(static_cast<int>(x), y) = row[x];
@@ -68,7 +72,8 @@ Image<float> imageOf(const std::vector<double>& line, const std::vector<double>&
 
 /// Of one frequency exactly, of several for a small veil.
 Traits scatterOf(const std::vector<std::vector<double>>& c, const std::vector<double>& f) {
-  return f.size() == 1 ? scatterTraits(c[0], c[1], c[2], c[3], f.front()) : veilTraits(c[0], c[1], c[2], c[3], f);
+  return f.size() == 1 ? scatterTraits(c[0], c[1], c[2], c[3], f.front())
+                       : veilTraits(c[0], c[1], c[2], c[3], f);
 }
 
 Curve curveOf(const TableColumns& table, std::string name, Ink ink) {
@@ -86,7 +91,10 @@ Curve curveOf(const TableColumns& table, std::string name, Ink ink) {
 const std::vector<TableKind>& tableKinds() {
   static const std::vector<TableKind> kinds{
       {"drift", "warm-up drift and its model", {"time_s", "value_mm"}},
-      {"harmonics", "error over distance: waves per period, scale, residual", {"distance_m", "error_mm"}, true},
+      {"harmonics",
+       "error over distance: waves per period, scale, residual",
+       {"distance_m", "error_mm"},
+       true},
       {"noise_law", "floor, shot noise and read noise", {"signal", "sigma_mm"}},
       {"wraps", "share of errors of whole periods", {"error_m"}, true},
       {"corner", "multipath's fall from the edge", {"distance_to_edge_m", "error_mm"}},
@@ -122,8 +130,8 @@ Result<TableColumns> loadTable(const TableJob& job) {
   if (names.empty()) names.assign(wanted.begin(), wanted.end());
   if (names.size() != wanted.size()) {
     return Error{Error::Code::InvalidArgument,
-                 fmt::format("{} takes {} columns ({}), not {}", job.kind, wanted.size(), fmt::join(wanted, ", "),
-                             names.size())};
+                 fmt::format("{} takes {} columns ({}), not {}", job.kind, wanted.size(),
+                             fmt::join(wanted, ", "), names.size())};
   }
   for (std::size_t i = 0; i < names.size(); ++i) {
     const bool is_negated = names[i].starts_with('-');
@@ -170,12 +178,14 @@ Result<Report> judgeTables(const std::vector<TableJob>& jobs) {
     if (!table) return table.error();
     kind = table->kind;
     addTraits(*table, jobs[i].frequency_hz, kOf[i], all);
-    files.push_back(fmt::format("{} ({}, {} rows)", kOf[i], jobs[i].file.filename().string(), table->values[0].size()));
+    files.push_back(
+        fmt::format("{} ({}, {} rows)", kOf[i], jobs[i].file.filename().string(), table->values[0].size()));
     plot.curves.push_back(curveOf(*table, files.back(), kInks[i]));
   }
   if (kind == nullptr) return Error{Error::Code::InvalidArgument, "no table is named"};
   const NamedTraits traits = std::move(all).found();
-  if (traits.traits.empty()) return Error{Error::Code::InvalidArgument, fmt::format("{}", fmt::join(traits.untold, "; "))};
+  if (traits.traits.empty())
+    return Error{Error::Code::InvalidArgument, fmt::format("{}", fmt::join(traits.untold, "; "))};
   const auto verdicts = verdictsOf(traits);
   plot.title = kind->tells;
   plot.x_label = kind->columns.size() > 1 ? kind->columns[0] : "row";
@@ -188,10 +198,13 @@ Result<Report> judgeTables(const std::vector<TableJob>& jobs) {
   Section section{.id = "table", .title = kind->tells, .verdict = report.verdict};
   if (!verdicts.empty()) section.blocks.push_back(verdictTable(verdicts));
   section.blocks.push_back(traitTable(traits));
-  if (!traits.untold.empty()) section.blocks.push_back(Details{"What these tables cannot tell", traits.untold});
+  if (!traits.untold.empty())
+    section.blocks.push_back(Details{"What these tables cannot tell", traits.untold});
   section.blocks.push_back(Figure{"The tables' rows.", toSvg(plot)});
   report.sections.push_back(std::move(section));
-  report.data.set("kind", kind->name).set("characteristics", toJson(traits)).set("verdicts", toJson(verdicts));
+  report.data.set("kind", kind->name)
+      .set("characteristics", toJson(traits))
+      .set("verdicts", toJson(verdicts));
   report.explained_in = "docs/characteristics.md";
   return report;
 }

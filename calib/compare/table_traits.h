@@ -7,14 +7,15 @@
 
 #include "calib/compare/named_traits.h"
 
-/// Characteristics of tables: measured scan lines and series, published ones too, through the same code as a run's frames.
+/// Characteristics of tables: measured scan lines and series, published ones too, through the same code as a
+/// run's frames.
 namespace toftwin::compare {
 
 /// What of a table is a characteristic, by name: "drift".
 struct TableKind {
   const char* name;
-  const char* tells;                  ///< "warm-up drift and its model"
-  std::vector<const char*> columns;   ///< with their units: "time_s", "value_mm"
+  const char* tells;                 ///< "warm-up drift and its model"
+  std::vector<const char*> columns;  ///< with their units: "time_s", "value_mm"
   bool needs_frequency = false;
 };
 const std::vector<TableKind>& tableKinds();
@@ -24,8 +25,8 @@ const TableKind* findTableKind(const std::string& name);
 struct TableJob {
   std::filesystem::path file;  ///< CSV with a header
   std::string kind{};
-  /// The file's names of the kind's columns, in their order; empty: the kind's own. "-" before a name changes the sign; a
-  /// name that ends in another unit of the same quantity ("_mm" for "_m") is converted.
+  /// The file's names of the kind's columns, in their order; empty: the kind's own. "-" before a name changes
+  /// the sign; a name that ends in another unit of the same quantity ("_mm" for "_m") is converted.
   std::vector<std::string> columns{};
   std::vector<double> frequency_hz{};  ///< of modulation, where the kind needs it
 };
@@ -37,7 +38,8 @@ struct TableColumns {
 };
 /// Errors: an unknown kind, a column that the file lacks or whose unit is of another quantity, no frequency.
 Result<TableColumns> loadTable(const TableJob& job);
-void addTraits(const TableColumns& table, const std::vector<double>& frequency_hz, const char* of, TraitCollector& all);
+void addTraits(const TableColumns& table, const std::vector<double>& frequency_hz, const char* of,
+               TraitCollector& all);
 
 /// One table, or two of which the second is held against the first: a page with verdict, numbers and plot.
 Result<Report> judgeTables(const std::vector<TableJob>& jobs);

@@ -105,17 +105,20 @@ std::string headlineOf(const std::vector<TraitVerdict>& all) {
   if (differ + same == 0) return "No characteristic is known of both cameras";
   if (differ == 0)
     return fmt::format("In none of {} numbers does B differ from A by more than the noise floor", same);
-  std::string words = fmt::format("{} of {} numbers of B differ from A's by more than the noise floor (B − A, 95 % for "
-                                  "all together): ",
-                                  differ, differ + same);
-  for (std::size_t i = 0; i < std::min(differ, kShownFirst); ++i) words += (i > 0 ? "; " : "") + inWords(all[i]);
+  std::string words = fmt::format(
+      "{} of {} numbers of B differ from A's by more than the noise floor (B − A, 95 % for "
+      "all together): ",
+      differ, differ + same);
+  for (std::size_t i = 0; i < std::min(differ, kShownFirst); ++i)
+    words += (i > 0 ? "; " : "") + inWords(all[i]);
   if (differ > kShownFirst) words += fmt::format("; and {} more", differ - kShownFirst);
   return words;
 }
 
 TableBlock verdictTable(const std::vector<TraitVerdict>& all) {
   TableBlock table{
-      "B against A, number by number. The floor is what B − A is uncertain by: a smaller difference does not show. "
+      "B against A, number by number. The floor is what B − A is uncertain by: a smaller difference does not "
+      "show. "
       "Intervals of B − A hold with 95 % for all rows together",
       {"characteristic", "verdict", "B − A", "floor", "A", "B"},
       {}};
@@ -135,8 +138,8 @@ std::vector<Card> cardsOf(const std::vector<TraitVerdict>& all) {
   for (std::size_t i = 0; i < std::min(differ, kShownFirst); ++i) {
     const TraitVerdict& one = all[i];
     cards.push_back({nameOf(one), withSign(one.difference.value) + unitOf(one),
-                     fmt::format("B − A, {} to {}; {}", number(one.difference.low), number(one.difference.high),
-                                 farBeyond(one)),
+                     fmt::format("B − A, {} to {}; {}", number(one.difference.low),
+                                 number(one.difference.high), farBeyond(one)),
                      Tone::Fair});
   }
   return cards;
@@ -147,8 +150,13 @@ Json toJson(const std::vector<TraitVerdict>& all) {
   for (const TraitVerdict& one : all) {
     Json row = Json::object();
     row.set("characteristic", one.what).set("name", one.difference.name).set("unit", one.difference.unit);
-    row.set("difference", one.difference.value).set("low", one.difference.low).set("high", one.difference.high);
-    row.set("floor", one.floor()).set("verdict", !one.isTold() ? "not told" : one.differs() ? "differs" : "same");
+    row.set("difference", one.difference.value)
+        .set("low", one.difference.low)
+        .set("high", one.difference.high);
+    row.set("floor", one.floor())
+        .set("verdict", !one.isTold()   ? "not told"
+                        : one.differs() ? "differs"
+                                        : "same");
     rows.push(std::move(row));
   }
   return rows;

@@ -23,8 +23,8 @@ struct TraitVerdict {
   [[nodiscard]] double floor() const;
 };
 
-/// Of each number that both cameras have, and of those told of B − A that are 0 for equal cameras (so not what is left
-/// of a fit). Those that differ come first, the farthest beyond its floor before the others.
+/// Of each number that both cameras have, and of those told of B − A that are 0 for equal cameras (so not
+/// what is left of a fit). Those that differ come first, the farthest beyond its floor before the others.
 std::vector<TraitVerdict> verdictsOf(const NamedTraits& traits);
 
 /// "drift: drift −7.9 mm (−8.3 to −7.5), 18 × the floor".

@@ -145,7 +145,8 @@ Result<ComparedRun> compareAll(const CompareRunJob& job, const RunFiles& files,
   ComparedRun run;
   run.frequency_hz = first->frequency_hz;
   run.settings = settingsOf("A", files.camera_a, first->frames[0]);
-  for (RunSetting& one : settingsOf("B", files.camera_b, first->frames[1])) run.settings.push_back(std::move(one));
+  for (RunSetting& one : settingsOf("B", files.camera_b, first->frames[1]))
+    run.settings.push_back(std::move(one));
   for (std::size_t i = 0; i < results.size(); ++i) {
     if (results[i] && !*results[i]) return results[i]->error();
     if (!results[i]) continue;  // after an error, which another one has

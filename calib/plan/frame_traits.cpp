@@ -126,7 +126,8 @@ std::pair<std::vector<double>, std::vector<double>> meansOf(const Steps& steps) 
   return means;
 }
 
-/// Means over bands of the distance to the edge: steps of one capture err alike, so a row is a capture's mean.
+/// Means over bands of the distance to the edge: steps of one capture err alike, so a row is a capture's
+/// mean.
 void addBands(const std::string& name, const Steps& steps, std::size_t camera, TraitCollector& all) {
   constexpr std::array<std::pair<double, double>, 3> kBands{{{0.0, 0.1}, {0.1, 0.3}, {0.3, 0.9}}};
   std::vector<compare::Trait> traits;
@@ -214,7 +215,8 @@ void addPlates(const ComparedRun& run, const OwnError& own, std::size_t camera, 
                            kNames[camera], run.frequency_hz[camera].size()));
     return;
   }
-  all.add("lens scatter", kNames[camera], compare::veilTraits(range, plate, ratio, error, run.frequency_hz[camera], number));
+  all.add("lens scatter", kNames[camera],
+          compare::veilTraits(range, plate, ratio, error, run.frequency_hz[camera], number));
 }
 
 /// The first frame after each turn from bright to dark or back, against the frames that follow.
@@ -234,7 +236,8 @@ void addLag(const ComparedRun& run, std::size_t camera, TraitCollector& all) {
   all.add("lag of the first frame recorded", kNames[camera], compare::afterImageTraits(first, rest, before));
 }
 
-/// A plate's path: its middle over time; speeds are differences of two frames, each of which is in one of them.
+/// A plate's path: its middle over time; speeds are differences of two frames, each of which is in one of
+/// them.
 void addMotion(const ComparedRun& run, std::size_t camera, TraitCollector& all) {
   const Captures captures = ofKind(run, "moving");
   std::vector<double> speed, turn;

@@ -21,7 +21,8 @@ constexpr std::array kOf{"A", "B"};
 constexpr std::array kInkOf{Ink::Measured, Ink::Simulated};
 constexpr int kCurvePoints = 80;
 
-const RunTrait* traitOf(const RunTraits& traits, std::string_view what, std::string_view of, std::string_view name) {
+const RunTrait* traitOf(const RunTraits& traits, std::string_view what, std::string_view of,
+                        std::string_view name) {
   const auto found = std::ranges::find_if(traits.traits, [&](const RunTrait& one) {
     return one.what == what && one.of == of && one.trait.name == name;
   });
@@ -47,8 +48,8 @@ Curve curveThrough(const Curve& dots, std::size_t camera, const std::function<do
   return curve;
 }
 
-/// The law through the dots' mean: traits say how it changes, and not from where. Nothing for models that they do not say in
-/// full.
+/// The law through the dots' mean: traits say how it changes, and not from where. Nothing for models that
+/// they do not say in full.
 std::optional<Curve> driftCurve(const RunTraits& traits, const Curve& dots, std::size_t camera) {
   const RunTrait* drift = traitOf(traits, "drift", kOf[camera], "drift");
   if (drift == nullptr || dots.x.empty()) return std::nullopt;
@@ -60,7 +61,8 @@ std::optional<Curve> driftCurve(const RunTraits& traits, const Curve& dots, std:
   if (drift->detail == "ramp") law = [=](double t) { return drift->trait.value * (t - begin) / length; };
   if (drift->detail == "one exponential" && tau != nullptr) {
     law = [=](double t) {
-      return drift->trait.value * std::expm1(-(t - begin) / tau->trait.value) / std::expm1(-length / tau->trait.value);
+      return drift->trait.value * std::expm1(-(t - begin) / tau->trait.value) /
+             std::expm1(-length / tau->trait.value);
     };
   }
   if (!law) return std::nullopt;
@@ -90,8 +92,9 @@ std::optional<compare::Figure> driftFigure(const ComparedRun& run, const RunTrai
     if (auto curve = driftCurve(traits, dots, camera)) plot.curves.push_back(*std::move(curve));
     plot.curves.push_back(std::move(dots));
   }
-  return compare::Figure{"Drift of A and of B while warming up: a dot for each capture, and the model that was chosen.",
-                         toSvg(plot)};
+  return compare::Figure{
+      "Drift of A and of B while warming up: a dot for each capture, and the model that was chosen.",
+      toSvg(plot)};
 }
 
 /// Means of a capture's wall in steps of range.
@@ -114,8 +117,9 @@ std::optional<compare::Figure> distanceFigure(const ComparedRun& run) {
     if (dots.x.size() < 3) return std::nullopt;
     plot.curves.push_back(std::move(dots));
   }
-  return compare::Figure{"Error of A and of B over distance: cells of 8 × 8 pixels of the wall, a hundred of each capture.",
-                         toSvg(plot)};
+  return compare::Figure{
+      "Error of A and of B over distance: cells of 8 × 8 pixels of the wall, a hundred of each capture.",
+      toSvg(plot)};
 }
 
 /// floor² + shot²/I + read²/I², I relative to the largest signal; parts that do not show are 0.
@@ -129,7 +133,8 @@ std::optional<compare::Figure> noiseFigure(const ComparedRun& run, const RunTrai
     Curve dots = dotsOf(camera);
     for (const ComparedCapture& one : run.captures) {
       if (one.pixels == 0 || one.record.ambient_klx > 0.0) continue;
-      add(dots, std::log10(camera == 0 ? one.amplitude_a : one.amplitude_b), camera == 0 ? one.noise_a_mm : one.noise_b_mm);
+      add(dots, std::log10(camera == 0 ? one.amplitude_a : one.amplitude_b),
+          camera == 0 ? one.noise_a_mm : one.noise_b_mm);
     }
     if (dots.x.size() < 3) return std::nullopt;
     const double most = std::ranges::max(dots.x);
@@ -147,8 +152,8 @@ std::optional<compare::Figure> noiseFigure(const ComparedRun& run, const RunTrai
     }
     plot.curves.push_back(std::move(dots));
   }
-  return compare::Figure{"Temporal noise of A and of B over amplitude: a dot for each capture, and the noise law.",
-                         toSvg(plot)};
+  return compare::Figure{
+      "Temporal noise of A and of B over amplitude: a dot for each capture, and the noise law.", toSvg(plot)};
 }
 
 }  // namespace

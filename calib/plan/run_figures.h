@@ -7,8 +7,8 @@
 
 namespace toftwin::plan {
 
-/// A and B by themselves beside each other, with the curves that their traits say: drift over time, error over distance
-/// against the plan's wall, noise over amplitude. Those that the run has rows for.
+/// A and B by themselves beside each other, with the curves that their traits say: drift over time, error
+/// over distance against the plan's wall, noise over amplitude. Those that the run has rows for.
 std::vector<compare::Figure> characteristicFigures(const ComparedRun& run, const RunTraits& traits);
 
 }  // namespace toftwin::plan

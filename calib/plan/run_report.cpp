@@ -188,7 +188,8 @@ void addFigures(const ComparedRun& run, std::vector<Block>& blocks) {
   for (const TrendOf& trend : kTrends) {
     if (auto figure = figureOf(run, trend)) row.figures.push_back(*std::move(figure));
   }
-  row.figures.push_back(histogramFigure(pixelsOf(imagesOf(run, [](const ComparedCapture&) { return true; }))));
+  row.figures.push_back(
+      histogramFigure(pixelsOf(imagesOf(run, [](const ComparedCapture&) { return true; }))));
   blocks.push_back(std::move(row));
   const double reach = reachOf(run);
   for (const auto& [name, image] : run.examples) {
@@ -220,7 +221,8 @@ std::vector<Card> cardsOf(const Characteristics& c) {
 /// Over different poses, each of which is one draw of it.
 NamedTrait biasOf(const Characteristics& c) {
   const Summary& all = mainRegionOf(c).difference_mm;
-  const double half = c.places > 1 ? studentT(static_cast<double>(c.places - 1)) * all.standard_error : std::nan("");
+  const double half =
+      c.places > 1 ? studentT(static_cast<double>(c.places - 1)) * all.standard_error : std::nan("");
   return {.what = "bias on surfaces",
           .of = "B − A",
           .trait = {"bias on surfaces", "mm", all.mean, all.mean - half, all.mean + half, c.places}};
@@ -273,10 +275,12 @@ Result<Finding> judgeRun(const ComparedRun& run) {
   auto& blocks = finding.section.blocks;
   for (const std::string& warning : run.warnings) blocks.push_back(Paragraph{"Note: " + warning});
   const auto seen = std::ranges::find_if(run.captures, isSeen);
-  if (const std::string note = resamplingNote(seen->thinned); !note.empty()) blocks.push_back(Paragraph{"Note: " + note});
+  if (const std::string note = resamplingNote(seen->thinned); !note.empty())
+    blocks.push_back(Paragraph{"Note: " + note});
   blocks.push_back(verdictTable(verdicts));
   blocks.push_back(blockTable(run));
-  if (auto figures = characteristicFigures(run, traits); !figures.empty()) blocks.push_back(FigureRow{std::move(figures)});
+  if (auto figures = characteristicFigures(run, traits); !figures.empty())
+    blocks.push_back(FigureRow{std::move(figures)});
   addFigures(run, blocks);
   if (auto again = againTable(run); !again.rows.empty()) blocks.push_back(std::move(again));
   if (!traits.traits.empty()) blocks.push_back(traitTable(traits));

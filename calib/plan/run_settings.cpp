@@ -85,9 +85,10 @@ std::vector<RunSetting> settingsOf(const char* of, const std::string& camera, co
 }
 
 compare::TableBlock provenanceTable(const std::vector<RunSetting>& settings) {
-  compare::TableBlock table{"What was compared, with what, and how; of the cameras as their first frames say it",
-                            {"", "A", "B"},
-                            {}};
+  compare::TableBlock table{
+      "What was compared, with what, and how; of the cameras as their first frames say it",
+      {"", "A", "B"},
+      {}};
   for (const RunSetting& one : settings) {
     if (one.value.empty()) continue;
     auto row = std::ranges::find_if(table.rows, [&](const auto& there) { return there[0] == one.name; });
@@ -100,7 +101,8 @@ compare::TableBlock provenanceTable(const std::vector<RunSetting>& settings) {
 
 compare::Json toJson(const std::vector<RunSetting>& settings) {
   compare::Json a = compare::Json::object(), b = compare::Json::object(), run = compare::Json::object();
-  for (const RunSetting& one : settings) (one.of == "A" ? a : one.of == "B" ? b : run).set(one.name, one.value);
+  for (const RunSetting& one : settings)
+    (one.of == "A" ? a : one.of == "B" ? b : run).set(one.name, one.value);
   compare::Json json = compare::Json::object();
   json.set("run", std::move(run)).set("a", std::move(a)).set("b", std::move(b));
   return json;

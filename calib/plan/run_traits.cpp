@@ -101,8 +101,8 @@ std::string wordsOf(const std::vector<double>& frequency_hz) {
   return words.empty() ? "no frequency that its frames say" : words + " MHz";
 }
 
-/// Errors over distance: a wall's parts in steps of range, capture by capture. Over a wide wall ranges differ by much of
-/// a wave, so that a whole image's mean would lose the short ones.
+/// Errors over distance: a wall's parts in steps of range, capture by capture. Over a wide wall ranges differ
+/// by much of a wave, so that a whole image's mean would lose the short ones.
 struct OverDistance {
   std::vector<double> distance_m{}, error_mm{};
   std::vector<std::size_t> capture{};
@@ -145,7 +145,8 @@ void addHarmonics(const ComparedRun& run, TraitCollector& all) {
   } else {
     OverDistance rows;
     for (const ComparedCapture* one : captures) addDifference(*one, rows);
-    all.add("harmonics", "B − A", compare::harmonicTraits(rows.distance_m, rows.error_mm, of_a, rows.capture));
+    all.add("harmonics", "B − A",
+            compare::harmonicTraits(rows.distance_m, rows.error_mm, of_a, rows.capture));
   }
   for (std::size_t camera : {std::size_t{0}, std::size_t{1}}) {
     OverDistance rows;

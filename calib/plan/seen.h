@@ -49,8 +49,8 @@ bool isPoseFromPlanes(const CaptureRecord& record);
 /// What of a frame seenOf() needs.
 Result<ReadFrame> readOf(const Frame& frame);
 /// What such blocks give; NaN and empty columns where the plan does not say what stands there. Where
-/// isPoseFromPlanes(), no errors against walls: their columns are empty but for wall_wrapped, which is off by periods.
-/// `own_pose`: where the camera saw itself, if that is not the pose that its frames say.
+/// isPoseFromPlanes(), no errors against walls: their columns are empty but for wall_wrapped, which is off by
+/// periods. `own_pose`: where the camera saw itself, if that is not the pose that its frames say.
 CameraSeen seenOf(const Plan& plan, const CaptureRecord& record, const compare::Stack& stack,
                   const std::vector<ReadFrame>& frames, double shortest_period_m,
                   const std::optional<Transform<World, Camera>>& own_pose = std::nullopt);

@@ -24,7 +24,8 @@ struct TrendSeries {
   std::vector<TrendRow> rows{};
 };
 
-/// Series of what a log's traits() gave. Changes are compare::differenceOf(), widened for those of all series together.
+/// Series of what a log's traits() gave. Changes are compare::differenceOf(), widened for those of all series
+/// together.
 std::vector<TrendSeries> trendsOf(const std::vector<LoggedTrait>& traits);
 
 }  // namespace toftwin::plan

@@ -199,7 +199,8 @@ Result<CameraResult> judgeRecording(const Case& use, const sim::Scene& scene, co
         taken->starts_s.size(), taken->elsewhere, taken->unplaced);
   }
   if (!taken->damage.empty())
-    camera.notes.push_back(fmt::format("its recording is damaged, and judged as far as it can be read: {}", taken->damage));
+    camera.notes.push_back(
+        fmt::format("its recording is damaged, and judged as far as it can be read: {}", taken->damage));
   if (taken->elsewhere > 0)
     camera.notes.push_back(
         fmt::format("{} frames were taken at no pose of the use case and left out", taken->elsewhere));

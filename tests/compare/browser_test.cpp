@@ -29,8 +29,10 @@ class Browser : public testing::Test {
   std::string chromium(const std::string& arguments) const {
     const auto out = folder_ / "out";
     const std::string command = fmt::format(
-        "timeout 60 chromium --headless --no-sandbox --disable-gpu --no-first-run --disable-background-networking "
-        "--disable-component-update --disable-sync --user-data-dir={0}/profile {1} file://{0}/index.html > {2} 2> {0}/err",
+        "timeout 60 chromium --headless --no-sandbox --disable-gpu --no-first-run "
+        "--disable-background-networking "
+        "--disable-component-update --disable-sync --user-data-dir={0}/profile {1} file://{0}/index.html > "
+        "{2} 2> {0}/err",
         folder_.string(), arguments, out.string());
     EXPECT_EQ(std::system(command.c_str()), 0) << command;
     std::stringstream text;
@@ -54,10 +56,11 @@ PointCloud walls() {
 
 TEST_F(Browser, TurnsThePointCloudsAndPrintsThePage) {
   Report report{.title = "A page", .subtitle = "of a test", .verdict = "fine"};
-  report.sections.push_back({.id = "one",
-                             .title = "One",
-                             .verdict = "fine",
-                             .blocks = {Paragraph{"words"}, walls(), Details{"more", {"what is closed on the screen"}}}});
+  report.sections.push_back(
+      {.id = "one",
+       .title = "One",
+       .verdict = "fine",
+       .blocks = {Paragraph{"words"}, walls(), Details{"more", {"what is closed on the screen"}}}});
   ASSERT_TRUE(write(report, folder_));
   const std::string page = chromium("--dump-dom");
   // The script comes to its end: the still is a canvas then, and the cloud says that it turns.

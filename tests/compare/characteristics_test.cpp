@@ -121,6 +121,7 @@ TEST(Comparison, OfDifferentCamerasInterpolatesAlongTheSameRay) {
   const auto pose = comparePose(a, b);
   ASSERT_TRUE(pose.ok()) << pose.error().message;
   EXPECT_TRUE(pose->resampled);
+  EXPECT_NE(resamplingNote(*pose).find("B is interpolated to A's rays"), std::string::npos);
   const Characteristics c = characterise({*pose});
   EXPECT_GT(c.pixels, static_cast<std::size_t>(kWidth * kHeight) / 2);
   // Inverse depth is linear on a plane: only float rounding remains.

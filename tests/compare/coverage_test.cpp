@@ -122,20 +122,24 @@ std::vector<Planted> overDistance() {
                     return harmonicTraits(d, e, f, orders);
                   }});
   rows.push_back({"harmonics of cells",
-                  {{"16 MHz, 4 per period", 1.0}, {"80 MHz, 4 per period", 3.0}, {"120 MHz, 4 per period", 0.0}, {"scale", 0.7}},
+                  {{"16 MHz, 4 per period", 1.0},
+                   {"80 MHz, 4 per period", 3.0},
+                   {"120 MHz, 4 per period", 0.0},
+                   {"scale", 0.7}},
                   [](Noise& noise) {
-                    // Eighteen captures of a wall, whose ranges are up to 1.2 times its distance; each capture is off by
-                    // 1 mm of its own, each cell by 0.5 mm.
+                    // Eighteen captures of a wall, whose ranges are up to 1.2 times its distance; each
+                    // capture is off by 1 mm of its own, each cell by 0.5 mm.
                     const std::vector<double> f{16e6, 80e6, 120e6};
                     const auto k = [&](double one) { return 16.0 * std::numbers::pi * one / 299'792'458.0; };
                     Columns d, e;
                     std::vector<std::size_t> capture;
                     for (std::size_t c = 0; c < 18; ++c) {
-                      const double distance = 0.6 * std::pow(4.0 / 0.6, static_cast<double>(c / 2) / 8.0), own = noise(1.0);
+                      const double distance = 0.6 * std::pow(4.0 / 0.6, static_cast<double>(c / 2) / 8.0),
+                                   own = noise(1.0);
                       for (double at = distance; at < 1.2 * distance; at += 0.025) {
                         d.push_back(at), capture.push_back(c);
-                        e.push_back(2.0 + 0.7 * at + std::cos(k(f[0]) * at + 1.0) + 3.0 * std::sin(k(f[1]) * at) + own +
-                                    noise(0.5));
+                        e.push_back(2.0 + 0.7 * at + std::cos(k(f[0]) * at + 1.0) +
+                                    3.0 * std::sin(k(f[1]) * at) + own + noise(0.5));
                       }
                     }
                     const std::vector<int> orders{4};
@@ -217,7 +221,8 @@ std::vector<Planted> otherWays() {
                       for (int i = 0; i < 60; ++i) {
                         own.push_back(2.0 + 0.01 * i), plate.push_back(at), capture.push_back(c);
                         ratio.push_back(noise.uniform(0.5, 3.0));
-                        error.push_back(offset + 15.0 * ratio.back() * std::sin(k * (at - own.back())) / k + noise(1.0));
+                        error.push_back(offset + 15.0 * ratio.back() * std::sin(k * (at - own.back())) / k +
+                                        noise(1.0));
                       }
                     }
                     return veilTraits(own, plate, ratio, error, f, capture);

@@ -213,7 +213,8 @@ TEST_F(RealData, SimulatorExplainsMostOfTheKinectsCorner) {
 
 /// The whole comparison with the measurements, as `toftwin compare --data` makes it, with little effort.
 TEST_F(RealData, MakesAPageOfAllSections) {
-  const auto output = std::filesystem::temp_directory_path() / ("toftwin_real_report_" + std::to_string(getpid()));
+  const auto output =
+      std::filesystem::temp_directory_path() / ("toftwin_real_report_" + std::to_string(getpid()));
   Progress silent{nullptr};
   CompareJob job;
   job.data = folder, job.effort = 0.02, job.output = output;
@@ -223,8 +224,9 @@ TEST_F(RealData, MakesAPageOfAllSections) {
   text << std::ifstream{*written}.rdbuf();
   const std::string page = text.str();
   EXPECT_EQ(written->filename(), "index.html");
-  for (const char* id : {"distance-kinect_v2", "corner-kinect_v2", "warm-up-kinect_v2", "noise-kinect_v2", "distance-o3d303",
-                         "corner-o3d303", "warm-up-o3d303", "noise-o3d303", "box-kinect_v2", "edge", "published"})
+  for (const char* id :
+       {"distance-kinect_v2", "corner-kinect_v2", "warm-up-kinect_v2", "noise-kinect_v2", "distance-o3d303",
+        "corner-o3d303", "warm-up-o3d303", "noise-o3d303", "box-kinect_v2", "edge", "published"})
     EXPECT_NE(page.find("<section id='" + std::string{id} + "'"), std::string::npos) << id;
   // The traits that a run is judged by, of the same data: six tables of characteristics.
   std::size_t tables = 0;
@@ -232,7 +234,8 @@ TEST_F(RealData, MakesAPageOfAllSections) {
   EXPECT_EQ(tables, 6u);
   for (const char* number : {"drift", "shot", "30 MHz, 4 per period", "120 MHz, 4 per period"})
     EXPECT_NE(page.find(number), std::string::npos) << number;
-  EXPECT_TRUE(std::filesystem::exists(output / "report.json") && std::filesystem::exists(output / "report.md"));
+  EXPECT_TRUE(std::filesystem::exists(output / "report.json") &&
+              std::filesystem::exists(output / "report.md"));
   std::filesystem::remove_all(output);
 }
 

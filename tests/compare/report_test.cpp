@@ -81,7 +81,8 @@ TEST(Report, HasAPointCloudThatOneCanTurnAndAStillOfIt) {
   EXPECT_THAT(page, HasSubstr("<figure class='cloud' data-a='"));
   EXPECT_THAT(page, HasSubstr("<path class='dots simulated' d='M"));
   EXPECT_THAT(page, HasSubstr("<script>\n"));
-  for (const char* elsewhere : {"http", "src=", "<link", "@import", "fetch("}) EXPECT_THAT(page, Not(HasSubstr(elsewhere)));
+  for (const char* elsewhere : {"http", "src=", "<link", "@import", "fetch("})
+    EXPECT_THAT(page, Not(HasSubstr(elsewhere)));
 }
 
 TEST(Report, EscapesWhatItIsGiven) {

@@ -36,7 +36,8 @@ class Table : public testing::Test {
   fs::path folder_ = fs::temp_directory_path() / fmt::format("toftwin_table_{}", getpid());
 };
 
-/// 10 mm, then 3 mm less after a warm-up with 200 s; times in minutes would have no unit of ours, these are in ms.
+/// 10 mm, then 3 mm less after a warm-up with 200 s; times in minutes would have no unit of ours, these are
+/// in ms.
 std::string driftOf(double depth_mm) {
   std::string text = "t_ms,too_near_mm\n";
   for (int i = 0; i < 120; ++i)
@@ -46,7 +47,8 @@ std::string driftOf(double depth_mm) {
 }
 
 TEST_F(Table, ConvertsItsColumnsUnitsAndSigns) {
-  const auto table = loadTable({.file = write("a.csv", driftOf(3.0)), .kind = "drift", .columns = {"t_ms", "-too_near_mm"}});
+  const auto table =
+      loadTable({.file = write("a.csv", driftOf(3.0)), .kind = "drift", .columns = {"t_ms", "-too_near_mm"}});
   ASSERT_TRUE(table) << table.error().message;
   EXPECT_DOUBLE_EQ(table->values[0][2], 20.0);
   EXPECT_NEAR(table->values[1][0], 13.01, 1e-9);
@@ -60,7 +62,8 @@ TEST_F(Table, ConvertsItsColumnsUnitsAndSigns) {
 }
 
 TEST_F(Table, TwoAreHeldAgainstEachOther) {
-  const TableJob a{.file = write("a.csv", driftOf(3.0)), .kind = "drift", .columns = {"t_ms", "-too_near_mm"}};
+  const TableJob a{
+      .file = write("a.csv", driftOf(3.0)), .kind = "drift", .columns = {"t_ms", "-too_near_mm"}};
   TableJob b = a;
   b.file = write("b.csv", driftOf(5.0));
   const auto same = judgeTables({a, a}), other = judgeTables({a, b});
@@ -76,7 +79,8 @@ TEST_F(Table, OfEveryKindSaysWhatItLacks) {
   for (const TableKind& kind : tableKinds()) {
     const auto refused = loadTable({.file = file, .kind = kind.name, .frequency_hz = {20e6}});
     ASSERT_FALSE(refused) << kind.name;
-    EXPECT_THAT(refused.error().message, HasSubstr(fmt::format("has no column \"{}\"", kind.columns.front())));
+    EXPECT_THAT(refused.error().message,
+                HasSubstr(fmt::format("has no column \"{}\"", kind.columns.front())));
   }
   const auto refusal = [&](const TableJob& job) { return loadTable(job).error().message; };
   EXPECT_THAT(refusal({.file = file, .kind = "harmonics"}), HasSubstr("--frequency-mhz"));
@@ -95,7 +99,8 @@ TEST_F(Table, OfEveryKindIsJudged) {
   for (const TableKind& kind : tableKinds()) {
     std::vector<std::string> columns{"a", "b", "c", "d"};
     columns.resize(kind.columns.size());
-    const auto table = loadTable({.file = file, .kind = kind.name, .columns = columns, .frequency_hz = {20e6}});
+    const auto table =
+        loadTable({.file = file, .kind = kind.name, .columns = columns, .frequency_hz = {20e6}});
     ASSERT_TRUE(table) << table.error().message;
     TraitCollector all;
     addTraits(*table, {20e6}, "A", all);
@@ -122,8 +127,9 @@ TEST_F(Table, OfScanLinesTellsFlyingPixels) {
 TEST_F(Table, OfAPublishedSeriesTellsItsDrift) {
   const auto data = findThesisData();
   if (!data) GTEST_SKIP() << "no tof-thesis-2018 in $TOFTWIN_DATA or ../shared/data";
-  const auto report = judgeTables(
-      {{.file = *data / "warmup_drift" / "kinect_v2.csv", .kind = "drift", .columns = {"time_s", "depth_mm"}}});
+  const auto report = judgeTables({{.file = *data / "warmup_drift" / "kinect_v2.csv",
+                                    .kind = "drift",
+                                    .columns = {"time_s", "depth_mm"}}});
   ASSERT_TRUE(report) << report.error().message;
   const Json& drift = report->data.find("characteristics")->find("rows")->at(0);
   EXPECT_EQ(drift.find("name")->words(), "drift");

@@ -19,9 +19,10 @@ NamedTrait of(const char* whose, const char* what, double value, double low, dou
 }
 
 TEST(Verdict, PutsWhatIsFarthestBeyondItsFloorFirst) {
-  const auto all = verdictsOf({.traits = {of("A", "same", 1.0, 0.0, 2.0), of("B", "same", 1.5, 0.5, 2.5),
-                                          of("A", "small", 1.0, 0.99, 1.01), of("B", "small", 1.5, 1.49, 1.51),
-                                          of("A", "large", 0.0, -1.0, 1.0), of("B", "large", 9.0, 8.0, 10.0)}});
+  const auto all =
+      verdictsOf({.traits = {of("A", "same", 1.0, 0.0, 2.0), of("B", "same", 1.5, 0.5, 2.5),
+                             of("A", "small", 1.0, 0.99, 1.01), of("B", "small", 1.5, 1.49, 1.51),
+                             of("A", "large", 0.0, -1.0, 1.0), of("B", "large", 9.0, 8.0, 10.0)}});
   ASSERT_EQ(all.size(), 3u);
   EXPECT_EQ(all[0].what, "small");
   EXPECT_EQ(all[1].what, "large");
@@ -38,9 +39,9 @@ TEST(Verdict, PutsWhatIsFarthestBeyondItsFloorFirst) {
 }
 
 TEST(Verdict, CallsNothingDifferentWhoseIntervalIsNotKnown) {
-  const auto all = verdictsOf(
-      {.traits = {of("A", "drift", 1.0, 0.9, std::nan("")), of("B", "drift", 5.0, 4.9, 5.1),
-                  of("B", "alone", 5.0, 4.9, 5.1), of("A and B", "masks", 0.9, 0.8, 0.95)}});
+  const auto all =
+      verdictsOf({.traits = {of("A", "drift", 1.0, 0.9, std::nan("")), of("B", "drift", 5.0, 4.9, 5.1),
+                             of("B", "alone", 5.0, 4.9, 5.1), of("A and B", "masks", 0.9, 0.8, 0.95)}});
   ASSERT_EQ(all.size(), 1u);
   EXPECT_FALSE(all[0].isTold());
   EXPECT_THAT(verdictTable(all).rows[0][1], HasSubstr("not told"));
@@ -57,8 +58,8 @@ TEST(Verdict, TakesWhatWasToldOfTheDifferenceAsItIs) {
   EXPECT_DOUBLE_EQ(all[0].floor(), 1.0);
 }
 
-/// Two equal cameras with 20 numbers each, 2000 times: 5 % of them are called different in any number. Four standard
-/// errors of that share are 2 %.
+/// Two equal cameras with 20 numbers each, 2000 times: 5 % of them are called different in any number. Four
+/// standard errors of that share are 2 %.
 TEST(Verdict, NamesADifferenceInOneOfTwentyRunsOfEqualCameras) {
   constexpr unsigned kSeed = 5;
   RecordProperty("seed", kSeed);

@@ -109,7 +109,8 @@ TEST_F(Index, KeepsWhereBSawItself) {
   taken.pose = planned.pose->world_from_camera(), taken.pose_by = "board";
   taken.seen_by_b.emplace();
   taken.seen_by_b->world_from_camera = schedule_.captures.at(1).pose->world_from_camera();
-  const auto records = read(lineOf(plan_, planned, taken, {.file = "a", .sha256 = "aa"}, {.file = "b", .sha256 = "bb"}) + "\n");
+  const auto records = read(
+      lineOf(plan_, planned, taken, {.file = "a", .sha256 = "aa"}, {.file = "b", .sha256 = "bb"}) + "\n");
   ASSERT_TRUE(records) << records.error().message;
   EXPECT_EQ(records->at(0).pose_of_b, taken.seen_by_b->world_from_camera);
   EXPECT_EQ(records->at(0).pose, taken.pose);

@@ -123,7 +123,8 @@ TEST_F(Log, KeepsTheCamerasAndWhatTheyWereSetTo) {
   auto log = RunLog::open(file_);
   ASSERT_TRUE(log);
   LoggedRun one = run("2026-11-01T00:00:00Z", "aa");
-  one.settings = {{"", "exposure_us", "100, 1000"}, {"A", "frequency_mhz", "16, 80, 120"}, {"B", "seed", "7"}};
+  one.settings = {
+      {"", "exposure_us", "100, 1000"}, {"A", "frequency_mhz", "16, 80, 120"}, {"B", "seed", "7"}};
   ASSERT_TRUE(log->add(one, drifts(1.0, 2.0)));
   ASSERT_TRUE(log->add(run("2026-11-02T00:00:00Z", "bb"), drifts(1.0, 2.0)));
   const auto cameras = log->cameras();
@@ -142,14 +143,19 @@ TEST_F(Log, KeepsTheCamerasAndWhatTheyWereSetTo) {
 
 /// Made by the statements of toftwin before there was a version 2.
 TEST_F(Log, BringsALogOfVersion1ToThisOne) {
-  sql("CREATE TABLE run (id INTEGER PRIMARY KEY, judged TEXT NOT NULL, began TEXT NOT NULL, folder TEXT NOT NULL, plan TEXT "
-      "NOT NULL, camera_a TEXT NOT NULL, camera_b TEXT NOT NULL, software TEXT NOT NULL, note TEXT NOT NULL, index_sha256 "
+  sql("CREATE TABLE run (id INTEGER PRIMARY KEY, judged TEXT NOT NULL, began TEXT NOT NULL, folder TEXT NOT "
+      "NULL, plan TEXT "
+      "NOT NULL, camera_a TEXT NOT NULL, camera_b TEXT NOT NULL, software TEXT NOT NULL, note TEXT NOT NULL, "
+      "index_sha256 "
       "TEXT NOT NULL, locked INTEGER NOT NULL, UNIQUE (index_sha256, locked));"
-      "CREATE TABLE characteristic (run INTEGER NOT NULL REFERENCES run (id) ON DELETE CASCADE, of TEXT NOT NULL, what TEXT "
-      "NOT NULL, detail TEXT NOT NULL, name TEXT NOT NULL, unit TEXT NOT NULL, value REAL, low REAL, high REAL, n INTEGER "
+      "CREATE TABLE characteristic (run INTEGER NOT NULL REFERENCES run (id) ON DELETE CASCADE, of TEXT NOT "
+      "NULL, what TEXT "
+      "NOT NULL, detail TEXT NOT NULL, name TEXT NOT NULL, unit TEXT NOT NULL, value REAL, low REAL, high "
+      "REAL, n INTEGER "
       "NOT NULL, PRIMARY KEY (run, of, what, name));"
       "CREATE TABLE untold (run INTEGER NOT NULL REFERENCES run (id) ON DELETE CASCADE, why TEXT NOT NULL);"
-      "INSERT INTO run VALUES (4, 'j', 'b', 'f', 'standard', 'kinect, Kinect v2 0815', 'twin, Kinect v2 ', 's', 'n', 'aa', 0);"
+      "INSERT INTO run VALUES (4, 'j', 'b', 'f', 'standard', 'kinect, Kinect v2 0815', 'twin, Kinect v2 ', "
+      "'s', 'n', 'aa', 0);"
       "INSERT INTO characteristic VALUES (4, 'A', 'drift', 'ramp', 'drift', 'mm', 1.5, 1, 2, 9);"
       "PRAGMA application_id = 0x746F6674; PRAGMA user_version = 1");
   auto log = RunLog::open(file_);

@@ -152,14 +152,17 @@ TEST_F(StandardPlan, TellsEveryCharacteristicOfBothCameras) {
   std::stringstream text;
   text << std::ifstream{folder_ / "report" / "index.html"}.rdbuf();
   const std::string page = text.str();
-  const auto verdicts = page.find("B against A, number by number"), lag = page.find("left behind</td><td>differs, ");
+  const auto verdicts = page.find("B against A, number by number"),
+             lag = page.find("left behind</td><td>differs, ");
   EXPECT_LT(verdicts, page.find("B − A by block"));
   EXPECT_NE(lag, std::string::npos);
   EXPECT_NE(page.find("Drift of A and of B while warming up"), std::string::npos);
   EXPECT_NE(page.find("<figure class='cloud'"), std::string::npos);
-  EXPECT_NE(page.find("<td>plan_seed</td><td class='number'>2026</td>", page.find("id='provenance'")), std::string::npos);
+  EXPECT_NE(page.find("<td>plan_seed</td><td class='number'>2026</td>", page.find("id='provenance'")),
+            std::string::npos);
   EXPECT_THAT(toftwin("log " + path("lab.sqlite") + " --settings 1").out,
-              testing::AllOf(testing::HasSubstr("frequency_mhz"), testing::HasSubstr("250, 500, 750, 1000, 1250, 1500"),
+              testing::AllOf(testing::HasSubstr("frequency_mhz"),
+                             testing::HasSubstr("250, 500, 750, 1000, 1250, 1500"),
                              testing::HasSubstr("lens_scatter, lag")));
   EXPECT_THAT(toftwin("log " + path("lab.sqlite")).out, testing::HasSubstr("standard"));
   EXPECT_THAT(toftwin("log " + path("lab.sqlite") + " --hdf5 " + path("numbers.h5")).out,

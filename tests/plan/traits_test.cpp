@@ -83,8 +83,8 @@ TEST(RunTraits, SayWhatTheyCannotTellAndWhy) {
   run.captures.resize(10);
   const RunTraits all = traitsOf(run);
   EXPECT_EQ(find(all, "harmonics", "B − A", "30 MHz, 4 per period"), nullptr);
-  EXPECT_THAT(all.untold,
-              testing::Contains(testing::HasSubstr("harmonics of B − A: harmonics: 5 of 5 rows are finite, and it takes 12")));
+  EXPECT_THAT(all.untold, testing::Contains(testing::HasSubstr(
+                              "harmonics of B − A: harmonics: 5 of 5 rows are finite, and it takes 12")));
 }
 
 /// B has another wave of its own, 3 mm four times per period of its frequency.
@@ -110,8 +110,8 @@ TEST(RunTraits, TakeEachCamerasHarmonicsByItsOwnFrequencies) {
   EXPECT_NE(find(traitsOf(run), "harmonics", "B − A", "30 MHz, 4 per period"), nullptr);
 }
 
-/// The open captures of the standard plan before a wall that fills 60° of a Kinect v2's image: enough for its three
-/// frequencies, and for a wave of 0.31 m that whole images' means would lose.
+/// The open captures of the standard plan before a wall that fills 60° of a Kinect v2's image: enough for its
+/// three frequencies, and for a wave of 0.31 m that whole images' means would lose.
 TEST(RunTraits, OfTheStandardPlanTellThreeFrequencies) {
   const auto plan = loadPlan(TOFTWIN_SOURCE_DIR "/docs/examples/plans/standard.toml");
   ASSERT_TRUE(plan);
@@ -131,7 +131,8 @@ TEST(RunTraits, OfTheStandardPlanTellThreeFrequencies) {
       const double d = planned.distance_m * std::hypot(1.0, tangent);
       for (CameraSeen& seen : one.seen) {
         seen.wall_range_m.push_back(d);
-        seen.wall_error_mm.push_back(4.0 * std::sin(16.0 * std::numbers::pi * 120e6 / 299'792'458.0 * d) + own + error(random));
+        seen.wall_error_mm.push_back(4.0 * std::sin(16.0 * std::numbers::pi * 120e6 / 299'792'458.0 * d) +
+                                     own + error(random));
       }
     }
   }

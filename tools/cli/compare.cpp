@@ -267,8 +267,10 @@ Run add(Arguments& args) {
                                options->data)};
     }
     if (auto checked = options->tables.check(); !checked) return checked;
-    if (options->tables.areGiven() && (!options->sources.empty() || !options->poses.empty() || !options->data.empty())) {
-      return Error{Error::Code::InvalidArgument, "--table is judged by itself: without sources, --poses and --data"};
+    if (options->tables.areGiven() &&
+        (!options->sources.empty() || !options->poses.empty() || !options->data.empty())) {
+      return Error{Error::Code::InvalidArgument,
+                   "--table is judged by itself: without sources, --poses and --data"};
     }
     if (isRefused(*options)) return sameTwice(options->sources[0]);
     const bool is_live = !options->poses.empty() || !options->rig.empty() || !options->data.empty() ||

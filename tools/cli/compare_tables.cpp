@@ -25,15 +25,18 @@ std::string columnsOfKinds() {
 
 void TableOptions::add(Arguments& args) {
   args.option("--table", tables,
-              "CSV file of measured scan lines or a series, judged instead of cameras; given twice: the second is held "
+              "CSV file of measured scan lines or a series, judged instead of cameras; given twice: the "
+              "second is held "
               "against the first")
       .oneAtATime();
   args.option("--kind", kind, "what a table is of, and its columns: " + columnsOfKinds()).oneOf(kindNames());
   args.option("--columns", columns,
-              "the table's own names of these columns, in their order; a - before one changes its sign, another unit at "
+              "the table's own names of these columns, in their order; a - before one changes its sign, "
+              "another unit at "
               "its end (_mm for _m) is converted")
       .separatedBy(',');
-  args.option("--frequency-mhz", frequency_mhz, "of modulation, for harmonics, wraps and lens_scatter").separatedBy(',');
+  args.option("--frequency-mhz", frequency_mhz, "of modulation, for harmonics, wraps and lens_scatter")
+      .separatedBy(',');
 }
 
 Result<> TableOptions::check() const {
@@ -43,7 +46,8 @@ Result<> TableOptions::check() const {
   if (areGiven() && kind.empty()) return refuse("--table needs --kind: what the table is of");
   if (tables.size() > 2) return refuse("two tables are compared at most: give --table once or twice");
   for (const double mhz : frequency_mhz) {
-    if (!(mhz > 0.0 && mhz < 1e6)) return refuse("--frequency-mhz: a frequency of modulation must be over 0 and below 1e6 MHz");
+    if (!(mhz > 0.0 && mhz < 1e6))
+      return refuse("--frequency-mhz: a frequency of modulation must be over 0 and below 1e6 MHz");
   }
   return {};
 }

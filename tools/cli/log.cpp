@@ -104,10 +104,12 @@ Result<Exit> showSettings(plan::RunLog& log, const Options& options) {
   const auto settings = log.settings(options.settings_of);
   if (!settings) return settings.error();
   if (settings->empty()) {
-    return Error{Error::Code::NotFound, fmt::format("{}: knows no settings of run {}; without --settings it lists its runs",
-                                                    options.file, options.settings_of)};
+    return Error{Error::Code::NotFound,
+                 fmt::format("{}: knows no settings of run {}; without --settings it lists its runs",
+                             options.file, options.settings_of)};
   }
-  for (const plan::RunSetting& one : *settings) fmt::print("{:<3}  {:<16}  {}\n", one.of, one.name, one.value);
+  for (const plan::RunSetting& one : *settings)
+    fmt::print("{:<3}  {:<16}  {}\n", one.of, one.name, one.value);
   return Exit::Ok;
 }
 
@@ -170,7 +172,8 @@ Run addLog(Arguments& args) {
   args.option("FILE", options->file, "log that toftwin compare RUN --log wrote").required();
   args.flag("--csv", options->csv, "all numbers of all runs as CSV");
   args.option("--hdf5", options->hdf5, "write all numbers of all runs into this HDF5 file");
-  args.option("--settings", options->settings_of, "what the run of this number was made with: cameras, settings, ids")
+  args.option("--settings", options->settings_of,
+              "what the run of this number was made with: cameras, settings, ids")
       .within(1, 1'000'000'000);
   return [options] { return showLog(*options); };
 }

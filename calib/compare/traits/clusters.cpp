@@ -18,9 +18,9 @@ using Eigen::VectorXd;
 
 /// Rows whose last column is y, and the means of each cluster.
 struct ClusteredRows {
-  MatrixXd rows{}, means{};   ///< n × (k + 1), G × (k + 1)
-  std::vector<Index> of{};    ///< each row's cluster
-  std::vector<double> size{}; ///< of each cluster
+  MatrixXd rows{}, means{};    ///< n × (k + 1), G × (k + 1)
+  std::vector<Index> of{};     ///< each row's cluster
+  std::vector<double> size{};  ///< of each cluster
 };
 
 ClusteredRows clusteredRowsOf(const std::vector<std::vector<double>>& columns, Column y,
@@ -57,7 +57,8 @@ Transformed transformed(const ClusteredRows& all, double lambda) {
   for (const double size : all.size) log_volume += std::log1p(lambda * size);
   for (Index i = 0; i < n; ++i) {
     const Index g = all.of[static_cast<std::size_t>(i)];
-    rows.row(i) -= (1.0 - 1.0 / std::sqrt(1.0 + lambda * all.size[static_cast<std::size_t>(g)])) * all.means.row(g);
+    rows.row(i) -=
+        (1.0 - 1.0 / std::sqrt(1.0 + lambda * all.size[static_cast<std::size_t>(g)])) * all.means.row(g);
   }
   const auto x = rows.leftCols(k);
   Transformed one{.normal = Eigen::LDLT<MatrixXd>{x.transpose() * x}};
@@ -68,8 +69,8 @@ Transformed transformed(const ClusteredRows& all, double lambda) {
   return one;
 }
 
-/// Satterthwaite's degrees of freedom of the parameter that depends most on how clusters differ, the constant apart: of a
-/// variance whose share s comes from u, which G clusters tell, (s²/(G − 1) + (1 − s)²/(n − k))⁻¹.
+/// Satterthwaite's degrees of freedom of the parameter that depends most on how clusters differ, the constant
+/// apart: of a variance whose share s comes from u, which G clusters tell, (s²/(G − 1) + (1 − s)²/(n − k))⁻¹.
 double degreesOf(const ClusteredRows& all, const MatrixXd& inverse, double lambda, double free) {
   const Index k = inverse.cols();
   MatrixXd means = all.means.leftCols(k);
@@ -102,8 +103,9 @@ std::optional<Fit> fitInClusters(const std::vector<std::vector<double>>& columns
   all.means.leftCols(k) *= scale.cwiseInverse().asDiagonal();
   const Transformed without = transformed(all, 0.0);
   if (!(without.normal.rcond() > 1e-9) || !(without.squares > 0.0)) return std::nullopt;
-  const double at = minimum1d([&](double log_lambda) { return transformed(all, std::exp(log_lambda)).restricted; },
-                              std::log(1e-5), std::log(1e5));
+  const double at =
+      minimum1d([&](double log_lambda) { return transformed(all, std::exp(log_lambda)).restricted; },
+                std::log(1e-5), std::log(1e5));
   const Transformed with = transformed(all, std::exp(at));
   const bool has_shared = with.restricted < without.restricted;
   const Transformed& best = has_shared ? with : without;

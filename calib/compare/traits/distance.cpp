@@ -30,10 +30,13 @@ std::vector<Wave> wavesOf(std::span<const double> frequency_hz, std::span<const 
     for (const int k : orders) {
       const Wave one{2.0 * std::numbers::pi * k * 2.0 * f / kLight_m_per_s,
                      fmt::format("{:.6g} MHz, {} per period", f * 1e-6, k)};
-      const auto same = std::ranges::find_if(
-          waves, [&](const Wave& there) { return std::abs(there.per_m - one.per_m) < kSameWave * one.per_m; });
-      if (same == waves.end()) waves.push_back(one);
-      else same->name += " = " + one.name;  // 3 of 80 MHz and 2 of 120 MHz are one wave
+      const auto same = std::ranges::find_if(waves, [&](const Wave& there) {
+        return std::abs(there.per_m - one.per_m) < kSameWave * one.per_m;
+      });
+      if (same == waves.end())
+        waves.push_back(one);
+      else
+        same->name += " = " + one.name;  // 3 of 80 MHz and 2 of 120 MHz are one wave
     }
   }
   return waves;
@@ -86,7 +89,8 @@ std::vector<Trait> traitsOf(const Fit& fit, const std::vector<Wave>& waves) {
 /// Each amplitude's interval is shorter than the four standard deviations that one row's would have.
 bool areToldApart(const std::vector<Trait>& traits) {
   const double sd = traits.back().value;  // "residual"
-  return std::all_of(traits.begin(), traits.end() - 2, [&](const Trait& one) { return one.high - one.low < 4.0 * sd; });
+  return std::all_of(traits.begin(), traits.end() - 2,
+                     [&](const Trait& one) { return one.high - one.low < 4.0 * sd; });
 }
 
 }  // namespace
@@ -121,7 +125,8 @@ Traits harmonicTraits(Column distance_m, Column error_mm, std::span<const double
   std::vector<std::vector<double>> columns{std::vector<double>(d.size(), 1.0), d};
   for (const Wave& wave : waves) {
     std::vector<double> even, odd;
-    for (const double one : d) even.push_back(std::cos(wave.per_m * one)), odd.push_back(std::sin(wave.per_m * one));
+    for (const double one : d)
+      even.push_back(std::cos(wave.per_m * one)), odd.push_back(std::sin(wave.per_m * one));
     columns.push_back(std::move(even)), columns.push_back(std::move(odd));
   }
   const std::vector<std::size_t> captures((*rows)[2].begin(), (*rows)[2].end());

@@ -74,8 +74,8 @@ std::optional<Fit> veilFit(const std::vector<double>& slope_mm, const std::vecto
   for (std::size_t i = 0; i < captures.size(); ++i) {
     if (captures[i] != left_out) slopes.push_back(slope_mm[i]), errors.push_back(error_mm[i]);
   }
-  return fitLeastSquares([&](std::span<const double> p, std::size_t i) { return p[0] + p[1] * slopes[i]; }, errors,
-                         {0.0, 0.0});
+  return fitLeastSquares([&](std::span<const double> p, std::size_t i) { return p[0] + p[1] * slopes[i]; },
+                         errors, {0.0, 0.0});
 }
 
 }  // namespace

@@ -42,9 +42,9 @@ Traits harmonicTraits(Column distance_m, Column error_mm, std::span<const double
 /// The same of rows in clusters, such as cells of one capture, that share an error: one-way random effects.
 Traits harmonicTraits(Column distance_m, Column error_mm, std::span<const double> frequency_hz,
                       std::span<const int> orders, std::span<const std::size_t> cluster);
-/// Of as many of four, three, two and one wave per period (cameras of four and three steps have the first of these) as there
-/// are three rows for each parameter, and as the rows tell apart: each amplitude better than one row's scatter. Without
-/// clusters: rows are independent.
+/// Of as many of four, three, two and one wave per period (cameras of four and three steps have the first of
+/// these) as there are three rows for each parameter, and as the rows tell apart: each amplitude better than
+/// one row's scatter. Without clusters: rows are independent.
 Traits harmonicTraits(Column distance_m, Column error_mm, std::span<const double> frequency_hz,
                       std::span<const std::size_t> cluster = {});
 
@@ -69,7 +69,8 @@ Traits scatterTraits(Column own_range_m, Column plate_range_m, Column plate_over
 /// sin(Δφ_f) c/4πf / Σ f². The constant c is what else the camera is off by.
 Traits veilTraits(Column own_range_m, Column plate_range_m, Column plate_over_own, Column error_mm,
                   std::span<const double> frequency_hz);
-/// The same of rows in clusters that share an error: the interval is a jackknife over clusters, of three or more.
+/// The same of rows in clusters that share an error: the interval is a jackknife over clusters, of three or
+/// more.
 Traits veilTraits(Column own_range_m, Column plate_range_m, Column plate_over_own, Column error_mm,
                   std::span<const double> frequency_hz, std::span<const std::size_t> cluster);
 

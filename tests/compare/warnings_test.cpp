@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// What spoils a comparison without ending it, and is said.
+#include <gmock/gmock.h>
+
+#include <chrono>
+
+#include "calib/compare/capture.h"
+#include "protocol/record/recording.h"
+#include "tests/record/record_testing.h"
+
+namespace toftwin::compare {
+namespace {
+
+using testing::HasSubstr;
+
+/// A frame that its daemon had so long ago by our clock.
+Frame frameFrom(std::chrono::milliseconds ago) {
+  Frame frame;
+  frame.source = "kinect";
+  frame.camera.width = 8, frame.camera.height = 4;
+  frame.camera.fx = frame.camera.fy = 8.0, frame.camera.cx = 3.5, frame.camera.cy = 1.5;
+  const auto then = std::chrono::system_clock::now() - ago;
+  frame.moment.received.ns =
+      std::chrono::duration_cast<std::chrono::nanoseconds>(then.time_since_epoch()).count();
+  frame.planes = {toPlane(PlaneKind::Range, Image<float>(8, 4, 1.0F))};
+  return frame;
+}
+
+TEST(Warnings, TellOfADaemonWhoseClockIsOff) {
+  using std::chrono::milliseconds;
+  EXPECT_EQ(clockWarning(frameFrom(milliseconds{100})), "");
+  EXPECT_THAT(clockWarning(frameFrom(milliseconds{20'400})), HasSubstr("kinect comes from is about 20 s behind ours"));
+  EXPECT_THAT(clockWarning(frameFrom(milliseconds{-3'200})), HasSubstr("about 3 s ahead of ours"));
+  Frame recorded = frameFrom(milliseconds{20'400});
+  recorded.provenance.kind = FrameKind::Replayed;
+  EXPECT_EQ(clockWarning(recorded), "") << "its time is that of the recording";
+}
+
+TEST(Warnings, TellOfARecordingThatWasCutOff) {
+  const record::Folder folder;
+  const auto file = folder / "a.mcap";
+  {
+    auto writer = record::Writer::create(file, {});
+    ASSERT_TRUE(writer) << writer.error().message;
+    for (std::uint64_t i = 0; i < 40; ++i) {
+      Frame frame = frameFrom(std::chrono::milliseconds{0});
+      frame.sequence = i;
+      ASSERT_TRUE(writer->write(frame));
+    }
+    ASSERT_TRUE(writer->close());
+  }
+  const auto whole = openRecording(file.string());
+  ASSERT_TRUE(whole) << whole.error().message;
+  EXPECT_EQ((*whole)->warning(), "");
+  const auto bytes = record::bytesOf(file);
+  record::writeBytes(file, std::span{bytes}.first(bytes.size() - 100));
+  const auto cut = openRecording(file.string());
+  ASSERT_TRUE(cut) << cut.error().message;
+  EXPECT_THAT((*cut)->warning(), HasSubstr("The recording of kinect is damaged: "));
+}
+
+}  // namespace
+}  // namespace toftwin::compare
