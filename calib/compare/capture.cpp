@@ -208,7 +208,8 @@ Result<> capturePose(Feed& a, Feed& b, const CaptureOptions& options, Progress& 
     if (auto added = captured.b.add(frame_b); !added) return added;
     if (i == 0 && result.poses.empty()) {
       for (const Feed* feed : {&a, &b}) result.warnings.push_back(feed->warning());
-      for (const Frame* frame : {&frame_a, &frame_b}) result.warnings.push_back(clockWarning(*frame));
+      result.warnings.push_back(clockWarning(frame_a, a.opened()));
+      result.warnings.push_back(clockWarning(frame_b, b.opened()));
       std::erase(result.warnings, "");
     }
     result.log.push_back(logEntry(frame_a, captured.name, "A"));
@@ -227,18 +228,19 @@ Result<> Feed::setParameter(std::string_view name, double) {
   return Error{Error::Code::Unsupported, fmt::format("{}: has no parameter {}", details().entry.name, name)};
 }
 
-std::string clockWarning(const Frame& frame) {
+std::string clockWarning(const Frame& frame, std::chrono::system_clock::time_point opened) {
   using std::chrono::nanoseconds, std::chrono::system_clock;
   const bool is_recorded = frame.provenance.kind == FrameKind::Replayed;
   if (is_recorded || frame.moment.received.ns == 0) return {};
-  const auto ours = std::chrono::duration_cast<nanoseconds>(system_clock::now().time_since_epoch()).count();
-  const double ahead_s = 1e-9 * static_cast<double>(frame.moment.received.ns - ours);
-  if (std::abs(ahead_s) <= 1.0) return {};
+  const system_clock::time_point received{nanoseconds{frame.moment.received.ns}};
+  // How long a frame was under way is not known, as it waits for the other camera's, which may take seconds to make.
+  const std::chrono::duration<double> ahead = received - system_clock::now(), behind = opened - received;
+  if (std::max(ahead, behind) <= std::chrono::seconds{1}) return {};
   // In whole seconds, so that what is said of many captures is said once.
   return fmt::format(
-      "The clock of the daemon that {} comes from is about {:.0f} s {} ours: times of its frames are not "
+      "The clock of the daemon that {} comes from is {:.0f} s or more {} ours: times of its frames are not "
       "those of other machines. Let both follow one clock (NTP)",
-      frame.source, std::abs(ahead_s), ahead_s > 0.0 ? "ahead of" : "behind");
+      frame.source, std::max(ahead, behind).count(), ahead > behind ? "ahead of" : "behind");
 }
 
 Result<Frame> nextFrameAt(Feed& feed, const std::optional<Transform<World, Camera>>& pose,

@@ -32,6 +32,11 @@ class Feed {
   virtual Result<> beginAnew() { return {}; }
   /// What a reader must know of it, or nothing: that a recording is damaged.
   [[nodiscard]] virtual std::string warning() const { return {}; }
+  /// By our clock. Frames of a daemon are made after that.
+  [[nodiscard]] std::chrono::system_clock::time_point opened() const { return opened_; }
+
+ private:
+  std::chrono::system_clock::time_point opened_ = std::chrono::system_clock::now();
 };
 
 /// What takes the cameras from pose to pose, where they cannot be put there by a command.
@@ -94,9 +99,9 @@ struct CaptureOptions {
 Result<Capture> capture(Feed& a, Feed& b, const CaptureOptions& options, Progress& progress);
 void planCapture(Progress& progress, const CaptureOptions& options);
 
-/// What a reader must know of the clock of the daemon that a frame has just come from: that it is over a
-/// second off ours. Nothing of frames that were recorded.
-std::string clockWarning(const Frame& frame);
+/// What a reader must know of the clock of the daemon that a frame has come from: that by it the frame is from before
+/// the feed was opened, or from the future, by more than a second. Nothing of frames that were recorded.
+std::string clockWarning(const Frame& frame, std::chrono::system_clock::time_point opened);
 
 /// The next frame of that pose; frames that say another one are skipped. Stopped soon after the user
 /// wants to end.

@@ -194,7 +194,7 @@ Result<TakenBy> Taker::framesOf(const PlannedCapture& planned, Feed& feed, const
     if (by.frames == 0) {
       by.since_power_on = frame->moment.since_power_on, by.temperatures = frame->moment.temperatures;
       by.ambient = frame->moment.ambient, by.exposure = longestExposure(*frame);
-      by.note = compare::clockWarning(*frame);
+      by.note = compare::clockWarning(*frame, feed.opened());
       if (first != nullptr) *first = *frame;
     }
     if (auto done = sink(*frame); !done) return done.error();

@@ -28,12 +28,15 @@ Frame frameFrom(std::chrono::milliseconds ago) {
 
 TEST(Warnings, TellOfADaemonWhoseClockIsOff) {
   using std::chrono::milliseconds;
-  EXPECT_EQ(clockWarning(frameFrom(milliseconds{100})), "");
-  EXPECT_THAT(clockWarning(frameFrom(milliseconds{20'400})), HasSubstr("kinect comes from is about 20 s behind ours"));
-  EXPECT_THAT(clockWarning(frameFrom(milliseconds{-3'200})), HasSubstr("about 3 s ahead of ours"));
+  const auto now = std::chrono::system_clock::now(), long_ago = now - std::chrono::minutes{5};
+  EXPECT_EQ(clockWarning(frameFrom(milliseconds{100}), now), "");
+  EXPECT_THAT(clockWarning(frameFrom(milliseconds{20'400}), now),
+              HasSubstr("kinect comes from is 20 s or more behind ours"));
+  EXPECT_EQ(clockWarning(frameFrom(milliseconds{20'400}), long_ago), "") << "it waited for the other camera's";
+  EXPECT_THAT(clockWarning(frameFrom(milliseconds{-3'200}), long_ago), HasSubstr("3 s or more ahead of ours"));
   Frame recorded = frameFrom(milliseconds{20'400});
   recorded.provenance.kind = FrameKind::Replayed;
-  EXPECT_EQ(clockWarning(recorded), "") << "its time is that of the recording";
+  EXPECT_EQ(clockWarning(recorded, now), "") << "its time is that of the recording";
 }
 
 TEST(Warnings, TellOfARecordingThatWasCutOff) {
