@@ -48,7 +48,8 @@ void heat(Frame& frame, Temperature temperature) {
 
 /// A source with its plan before it: all calls go through, frames do not always. A fault is noted when it has
 /// happened; where several strike one frame, those happen that can:
-///   - what does not come has no other fault but the clock's; a device that goes away loses no frame besides
+///   - what does not come has no other fault but the clock's; a device that goes away loses no frame besides,
+///     but for one that waits for the next to overtake it
 ///   - the pixels are those that are frozen first, damaged then
 ///   - delays add up, doubles do not; while one waits for the next to overtake it, no other does
 class FaultySource final : public drivers::Source {
@@ -59,9 +60,7 @@ class FaultySource final : public drivers::Source {
   [[nodiscard]] const drivers::SourceInfo& info() const override { return inner_->info(); }
   Result<> start() override { return inner_->start(); }
   void stop() override {
-    for (const Waiting& one : leaving_) noteAll(one, "the source was stopped before it came");
-    leaving_.clear();
-    late_.clear();
+    loseWaiting("the source was stopped before it came");
     inner_->stop();
   }
   [[nodiscard]] drivers::SourceState state() const override { return inner_->state(); }
@@ -156,6 +155,13 @@ class FaultySource final : public drivers::Source {
       release();
     }
   }
+  /// Those that wait do not come any more, and the log says so.
+  void loseWaiting(std::string_view why) {
+    if (!late_.empty()) late_.front().notes.push_back({late_by_, {}});
+    release();
+    for (const Waiting& one : leaving_) noteAll(one, why);
+    leaving_.clear();
+  }
   void release() {
     std::ranges::move(late_, std::back_inserter(leaving_));
     late_.clear();
@@ -185,6 +191,7 @@ class FaultySource final : public drivers::Source {
 
   Error disconnect(const FaultPlan::Strike& strike, std::size_t number, std::int64_t device_ns) {
     const Duration outage = plan_->fault(number).outage;
+    loseWaiting("the device went before it came");
     plan_->sendAway(outage);
     plan_->note(strike.frame, number, device_ns, fmt::format("{:g} s", outage.in(second)));
     return {Error::Code::Disconnected,
@@ -244,7 +251,7 @@ FaultPlan::FaultPlan(std::vector<FaultKeys> faults, std::string source, std::fil
     : faults_(std::move(faults)),
       source_(std::move(source)),
       log_path_(std::move(log)),
-      next_in_row_(faults_.size()) {}
+      rows_(faults_.size()) {}
 
 Result<> FaultPlan::mayOpen() const {
   if (steady_clock::now() >= away_until_) return {};
@@ -267,7 +274,11 @@ FaultPlan::Strike FaultPlan::next() {
     if (fault.frames > 0 && within >= fault.frames) continue;
     const double chance =
         static_cast<double>(faultBits(fault.seed, number, strike.frame, ~0ULL) >> 11) * 0x1p-53;
-    if (chance < fault.probability) strike.faults.push_back(number);
+    if (chance >= fault.probability) continue;
+    strike.faults.push_back(number);
+    Row& row = rows_[number];
+    if (strike.frame != row.next) row.is_told = false;
+    row.next = strike.frame + 1;
   }
   return strike;
 }
@@ -275,9 +286,7 @@ FaultPlan::Strike FaultPlan::next() {
 void FaultPlan::note(std::uint64_t frame, std::size_t number, std::int64_t device_ns,
                      std::string_view detail) {
   const FaultKeys& fault = faults_[number];
-  const bool goes_on = frame > 0 && frame == next_in_row_[number];
-  next_in_row_[number] = frame + 1;
-  if (!goes_on) {
+  if (!std::exchange(rows_[number].is_told, true)) {
     logging::info("{}: fault {} ({}) at frame {}, device time {} ns: {}", source_, number, nameOf(fault.kind),
                   frame, device_ns, detail);
   }

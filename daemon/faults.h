@@ -111,7 +111,12 @@ class FaultPlan {
   const std::string source_;
   const std::filesystem::path log_path_;
   std::ofstream log_;  ///< from the first fault on: a plan that is only checked writes nothing
-  std::vector<std::uint64_t> next_in_row_;  ///< of each fault: the frame after the last that it struck
+  /// The frames that a fault strikes one after another, whether or not it happens to each of them.
+  struct Row {
+    std::uint64_t next = 0;
+    bool is_told = false;
+  };
+  std::vector<Row> rows_;  ///< of each fault
   std::uint64_t frames_ = 0;
   std::int64_t clock_step_ns_ = 0;
   drivers::SteadyTime away_until_{};

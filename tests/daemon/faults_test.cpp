@@ -175,6 +175,25 @@ TEST(Faults, ADelayedFrameThatAStopTookIsNotSaidToHaveCome) {
   std::filesystem::remove(log);
 }
 
+TEST(Faults, AFrameThatWaitsForTheNextWhenNoneComesAnyMoreIsSaidToBeLost) {
+  const auto log = std::filesystem::path{testing::TempDir()} / fmt::format("waiting_{}.csv", ::getpid());
+  auto delayed = fault(FaultKind::Delay, 1);
+  delayed.delay = 60_s;
+  Faulty source{{fault(FaultKind::Reorder, 0), fault(FaultKind::Reorder, 2), fault(FaultKind::Disconnect, 3),
+                 delayed},
+                log};
+  std::stop_source interrupt;
+  const std::jthread stops{[&] { std::this_thread::sleep_for(50ms), interrupt.request_stop(); }};
+  EXPECT_EQ(source.next(interrupt.get_token()).error().code, Error::Code::Stopped);
+  source.source_->stop();
+  ASSERT_TRUE(source.source_->start().ok());
+  EXPECT_EQ(source.next().error().code, Error::Code::Disconnected) << "2 waits for 3, which does not come";
+  EXPECT_THAT(linesOf(log), ElementsAre("1,3,delay,the source was stopped before it came",
+                                        "0,0,reorder,the source was stopped before it came",
+                                        "2,1,reorder,the device went before it came", "3,2,disconnect,1 s"));
+  std::filesystem::remove(log);
+}
+
 TEST(Faults, AClockThatStepsGoesOnFromThere) {
   Faulty source{{fault(FaultKind::ClockStep, 2)}};
   std::vector<std::int64_t> starts;
@@ -294,6 +313,13 @@ TEST(Faults, AProbabilityIsKept) {
 }
 
 class FaultsInTheDaemon : public RunningDaemon {};
+
+TEST_F(FaultsInTheDaemon, ALastingOneIsToldOnceThoughNotEachFrameCanHaveIt) {
+  Faulty source{{fault(FaultKind::Reorder, 0, 0), fault(FaultKind::Dirt, 2, 2, 10)}};
+  for (int i = 0; i < 30; ++i) ASSERT_TRUE(source.next().ok());
+  EXPECT_EQ(log_->count("(reorder)"), 1);
+  EXPECT_EQ(log_->count("(dirt)"), 3) << "in each row";
+}
 
 TEST_F(FaultsInTheDaemon, AreToldByTheFramesTheLogAndTheFile) {
   start(
