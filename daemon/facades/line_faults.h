@@ -62,7 +62,7 @@ class LineFaults {
     std::uint64_t packet = 0;
     bool is_lost = false, is_doubled = false, is_late = false;
     bool is_delayed = false, is_corrupted = false;
-    bool is_cut = false;      ///< the line is, instead of sending it
+    bool is_cut = false;      ///< the line is, before all of it was sent
     std::uint64_t noise = 0;  ///< of what is corrupted: which bit is another one
     bool operator==(const Fate&) const = default;
   };

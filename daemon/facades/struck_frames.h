@@ -13,6 +13,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include <toftwin/frame.h>
 #include <toftwin/units.h>
@@ -57,7 +58,8 @@ struct Damage {
 /// leaves alone after 2 s. Used on the thread of the io_context.
 class StruckFrames {
  public:
-  using Put = std::function<void(const Frame&, const Damage&)>;
+  /// Whether anything of it went to anybody: what did not is not struck.
+  using Put = std::function<bool(const Frame&, const Damage&)>;
   StruckFrames(boost::asio::io_context& io, LineFaults faults, Duration delay, Put put)
       : io_(io), patience_(io), faults_(std::move(faults)), delay_(delay), put_(std::move(put)) {}
   ~StruckFrames() { *is_alive_ = false; }
@@ -71,10 +73,12 @@ class StruckFrames {
     Frame frame;
     LineFaults::Fate fate;
     std::string what;
+    std::vector<LineFaults::Kind> on_its_way{};  ///< noted when it has left
   };
   void hold(Struck late);
   void leave(const Struck& one);
   void put(const Struck& one);
+  bool putStruck(const Struck& one);
   void note(const Struck& one, LineFaults::Kind kind) { faults_.note(one.fate.packet, kind, one.what); }
 
   boost::asio::io_context& io_;

@@ -179,9 +179,9 @@ TEST(Faults, AFrameThatWaitsForTheNextWhenNoneComesAnyMoreIsSaidToBeLost) {
   const auto log = std::filesystem::path{testing::TempDir()} / fmt::format("waiting_{}.csv", ::getpid());
   auto delayed = fault(FaultKind::Delay, 1);
   delayed.delay = 60_s;
-  Faulty source{{fault(FaultKind::Reorder, 0), fault(FaultKind::Reorder, 2), fault(FaultKind::Disconnect, 3),
-                 delayed},
-                log};
+  Faulty source{
+      {fault(FaultKind::Reorder, 0), fault(FaultKind::Reorder, 2), fault(FaultKind::Disconnect, 3), delayed},
+      log};
   std::stop_source interrupt;
   const std::jthread stops{[&] { std::this_thread::sleep_for(50ms), interrupt.request_stop(); }};
   EXPECT_EQ(source.next(interrupt.get_token()).error().code, Error::Code::Stopped);

@@ -48,7 +48,7 @@ class GigeVisionFacade final : public Facade {
               {.source = place.keys.source,
                .planes = {PlaneKind::Range, PlaneKind::Depth, PlaneKind::Amplitude, PlaneKind::Flags}},
               [this](const Frame& frame) { takeFrame(frame); }),
-        uneven_(thread_.io(), std::move(unevenness), keys_.latency,
+        uneven_(thread_.io(), name_, std::move(unevenness), keys_.latency,
                 [this](const Frame& frame) { send(frame); }),
         tick_(thread_.io(), kTick, [this] { tick(); }) {}
 

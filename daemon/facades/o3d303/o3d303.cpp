@@ -93,9 +93,9 @@ class O3d303Facade final : public Facade {
                           PlaneKind::Exposure}},
               [this](const Frame& frame) { takeFrame(frame); }),
         line_(thread_.io(), LineFaults{keys_.line, name_, line_log}, keys_.line.delay_time,
-              [this](const Frame& frame, const Damage& damage) { publish(frame, damage); }),
-        uneven_(thread_.io(), std::move(unevenness), keys_.latency,
-                [this](const Frame& frame) { line_.take(frame); }),
+              [this](const Frame& frame, const Damage& damage) { return publish(frame, damage); }),
+        uneven_(thread_.io(), name_, std::move(unevenness), keys_.latency,
+                [this](const Frame& frame) { leave(frame); }),
         tick_(thread_.io(), kTick, [this] { tick(); }),
         boot_(thread_.io()),
         began_(steady_clock::now()) {}
@@ -153,7 +153,6 @@ class O3d303Facade final : public Facade {
   // ---- frames ------------------------------------------------------------------------------------
 
   void takeFrame(const Frame& frame) {
-    triggered_at_.reset();
     facts_ = factsOf(frame);
     has_seen_frame_ = true;
     device_s_ = frame.moment.exposures.empty() ? 0 : frame.moment.exposures.front().start.ns / kNanoseconds;
@@ -166,21 +165,29 @@ class O3d303Facade final : public Facade {
     }
     watchTemperature();
     noteConnections(connections_);
-    if (connections_ > 0 && !device_->isIdle()) uneven_.take(frame);
+    if (connections_ == 0 || device_->isIdle()) return triggered_at_.reset();
+    uneven_.take(frame);
   }
 
-  void publish(const Frame& frame, const Damage& damage) {
-    if (device_->isIdle()) return;
+  /// Until then a camera is busy with it, and takes no other trigger.
+  void leave(const Frame& frame) {
+    triggered_at_.reset();
+    line_.take(frame);
+  }
+
+  /// Whether it went to anybody.
+  bool publish(const Frame& frame, const Damage& damage) {
+    if (device_->isIdle()) return false;
     if (!lens_ || lens_->camera != frame.camera) {
       lens_ = lensChunksOf(frame.camera);
     }
     auto images = imagesOf(frame, *lens_, keys_.electrons_per_count);
-    if (!images) return complainOnce(images.error());
+    if (!images) return complainOnce(images.error()), false;
     const auto t = device_->translation_mm();
     images->wire.extrinsics = {t[0], t[1], t[2], 0.0F, 0.0F, 0.0F};
     if (device_->clipping() != Clipping{}) clip(device_->clipping(), *images);
     setClock(frame, images->wire);
-    pcic_->publish(images->wire, damage);
+    return pcic_->publish(images->wire, damage);
   }
 
   /// The camera's clock is the source's until a client sets it, or has it follow the network's.

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/facades/o3d303/pcic_server.h"
 
+#include <boost/asio/steady_timer.hpp>
 #include <boost/asio/write.hpp>
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <deque>
 #include <optional>
 #include <vector>
@@ -26,6 +28,7 @@ constexpr std::size_t kLongestCommand = 128 << 10;
 /// For one connection; more are lost. Two that the line doubles may leave at once.
 constexpr std::size_t kMostFramesWaiting = 6;
 constexpr std::size_t kMostMessagesWaiting = 64;  ///< one that asks and never reads is closed
+constexpr std::chrono::seconds kCutPatience{1};   ///< with a client that does not take the half that is left
 /// Shared by the connections that send them.
 using SharedBytes = std::shared_ptr<const Bytes>;
 
@@ -39,7 +42,7 @@ void closeHard(tcp::socket& socket) {
 class PcicServer::Connection : public std::enable_shared_from_this<Connection> {
  public:
   Connection(PcicServer& server, tcp::socket socket)
-      : server_(server), alive_(server.is_alive_), socket_(std::move(socket)) {
+      : server_(server), alive_(server.is_alive_), socket_(std::move(socket)), ends_(socket_.get_executor()) {
     error_code ignored;
     socket_.set_option(tcp::no_delay{true}, ignored);
     socket_.set_option(boost::asio::socket_base::keep_alive{true}, ignored);
@@ -55,23 +58,36 @@ class PcicServer::Connection : public std::enable_shared_from_this<Connection> {
     socket_.async_read_some(boost::asio::buffer(piece_),
                             [self = shared_from_this()](error_code error, std::size_t size) {
                               if (error || !*self->alive_) return self->close();
+                              if (self->is_ending_) return self->read();
                               self->reader_.feed(std::span{self->piece_}.first(size));
                               if (self->obeyAll()) self->read();
                             });
   }
-  void send(SharedBytes bytes, bool is_frame) {
-    if (is_ending_) return;
-    if (is_frame && frames_waiting_ >= kMostFramesWaiting) return;
-    if (queue_.size() >= kMostMessagesWaiting) return close();
+  /// False if it takes no more.
+  bool send(SharedBytes bytes, bool is_frame) {
+    if (is_ending_) return false;
+    if (is_frame && frames_waiting_ >= kMostFramesWaiting) return false;
+    if (queue_.size() >= kMostMessagesWaiting) return close(), false;
     frames_waiting_ += is_frame ? 1 : 0;
     queue_.push_back({std::move(bytes), is_frame});
     if (queue_.size() == 1) write();
+    return true;
   }
-  void endWhenSent() {
+  /// What is under way, then these bytes, and the connection ends, whether or not the client takes them.
+  bool endWith(SharedBytes bytes) {
+    if (is_ending_) return false;
     is_ending_ = true;
-    if (queue_.empty()) close();
+    if (queue_.size() > 1) queue_.erase(queue_.begin() + 1, queue_.end());
+    queue_.push_back({std::move(bytes), false});
+    if (queue_.size() == 1) write();
+    ends_.expires_after(kCutPatience);
+    ends_.async_wait([self = shared_from_this()](error_code cancelled) {
+      if (!cancelled) self->close();
+    });
+    return true;
   }
   void close() {
+    ends_.cancel();
     closeHard(socket_);
     if (*alive_) server_.remove(shared_from_this());
   }
@@ -142,13 +158,14 @@ class PcicServer::Connection : public std::enable_shared_from_this<Connection> {
   PcicServer& server_;
   const std::shared_ptr<bool> alive_;
   tcp::socket socket_;
+  boost::asio::steady_timer ends_;
   toftwin::o3d303::PcicReader reader_{kLongestCommand};
   std::array<std::byte, 4096> piece_{};
   std::optional<Schema> schema_;
   unsigned output_ = Output::kAll;
   std::deque<Waiting> queue_;
   std::size_t frames_waiting_ = 0;
-  bool is_ending_ = false;  ///< takes no more
+  bool is_ending_ = false;  ///< takes no more, and obeys no more
 };
 
 PcicServer::PcicServer(tcp::acceptor acceptor, Hooks hooks)
@@ -182,9 +199,10 @@ void PcicServer::remove(const std::shared_ptr<Connection>& connection) {
   if (connections_.size() != before) hooks_.connections(connections_.size());
 }
 
-void PcicServer::publish(const toftwin::o3d303::CameraFrame& frame, const Damage& damage) {
+bool PcicServer::publish(const toftwin::o3d303::CameraFrame& frame, const Damage& damage) {
   std::vector<std::pair<Schema, SharedBytes>> made;
   const auto all = connections_;  // sending may close one
+  bool has_left = false;
   for (const auto& connection : all) {
     const auto schema = connection->wanted();
     if (!schema) continue;
@@ -199,9 +217,9 @@ void PcicServer::publish(const toftwin::o3d303::CameraFrame& frame, const Damage
       made.emplace_back(*schema, std::make_shared<const Bytes>(std::move(message)));
       found = made.end() - 1;
     }
-    connection->send(found->second, true);
-    if (damage.is_cut) connection->endWhenSent();
+    has_left |= damage.is_cut ? connection->endWith(found->second) : connection->send(found->second, true);
   }
+  return has_left;
 }
 
 void PcicServer::tellError(int code) {

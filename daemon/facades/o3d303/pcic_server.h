@@ -48,8 +48,9 @@ class PcicServer {
   [[nodiscard]] std::uint16_t port() const { return accepting_.port(); }
   void setOpen(bool is_open);
   /// To every connection that wants frames, in its own schema; those with equal schemas share the bytes.
-  /// Where the line is cut, half of the message leaves, and the connection ends with it.
-  void publish(const toftwin::o3d303::CameraFrame& frame, const Damage& damage = {});
+  /// Where the line is cut, half of the message leaves, and the connection ends with it. Whether it went to
+  /// any.
+  bool publish(const toftwin::o3d303::CameraFrame& frame, const Damage& damage = {});
   void tellError(int code);
   void tellNotification(int code, std::string_view json);
   /// Since the last such error, for the command "E?".

@@ -37,7 +37,7 @@ class Ros2Facade final : public Facade {
                .planes = {PlaneKind::Range, PlaneKind::Depth, PlaneKind::Amplitude}},
               [this](const Frame& frame) { takeFrame(frame); }),
         line_(thread_.io(), LineFaults{keys_.line, name_, line_log}, keys_.line.delay_time,
-              [this](const Frame& frame, const Damage& damage) { publish(frame, damage); }),
+              [this](const Frame& frame, const Damage& damage) { return publish(frame, damage); }),
         tick_(thread_.io(), kTick, [this] { tick(); }) {}
 
   // First nobody works with DDS any more, then it goes, and then what its callbacks reach.
@@ -98,11 +98,15 @@ class Ros2Facade final : public Facade {
     const auto put = description ? description->world_from_camera : std::nullopt;
     if (put == frame.moment.world_from_camera || put == put_at_frame_) put_of_frame_ = put;
     put_at_frame_ = put;
+    newest_ = frame.sequence;
     line_.take(frame);
   }
-  void publish(const Frame& frame, const Damage& damage) {
-    told_put_ = put_of_frame_;
-    if (auto published = topics_->publish(frame, damage); !published) complainOnce(published.error().message);
+  /// Whether anybody reads of it. One that was overtaken on its way tells where the camera was.
+  bool publish(const Frame& frame, const Damage& damage) {
+    told_put_ = frame.sequence == newest_ ? put_of_frame_ : std::nullopt;
+    const auto published = topics_->publish(frame, damage);
+    if (!published) complainOnce(published.error().message);
+    return published && *published;
   }
 
   // ---- poses in ----------------------------------------------------------------------------------
@@ -157,6 +161,7 @@ class Ros2Facade final : public Facade {
   std::optional<Topics> topics_;
   dds_entity_t pose_reader_ = 0;
   bool has_seen_frame_ = false, is_setting_ = false;
+  std::uint64_t newest_ = 0;  ///< frame that was taken
   std::optional<Transform<World, Camera>> wanted_;
   /// Where the camera was put: as it was told last, as the last frame tells it, as it was described then.
   std::optional<Transform<World, Camera>> told_put_, put_of_frame_, put_at_frame_;

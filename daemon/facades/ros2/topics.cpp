@@ -144,15 +144,16 @@ bool Topics::hasReaders() const {
          (keys_.transform == TransformKind::Moving && transform_.hasReaders());
 }
 
-Result<> Topics::publish(const Frame& frame, const Damage& damage) {
+Result<bool> Topics::publish(const Frame& frame, const Damage& damage) {
   const std::int64_t stamp_ns = stampOf(frame, keys_.clock);
   const Header header = headerOf(stamp_ns, keys_.frame_id);
-  Result<> outcome;
+  bool is_read = keys_.transform == TransformKind::Moving && transform_.hasReaders();
+  Result<> outcome = publishTransform(frame.moment.world_from_camera, stamp_ns);
   const auto note = [&](const Result<>& one) {
     if (outcome && !one) outcome = one;
+    is_read = true;
   };
   const auto strike = [&](auto& made) { damage.corrupt(std::as_writable_bytes(std::span{made.data})); };
-  note(publishTransform(frame.moment.world_from_camera, stamp_ns));
   if ((depth_.hasReaders() || points_.hasReaders()) && (!rays_ || rays_->camera != frame.camera))
     rays_ = raysOf(frame.camera);
   if (depth_info_.hasReaders()) note(writeInfo(depth_info_, header, frame.camera));
@@ -175,7 +176,8 @@ Result<> Topics::publish(const Frame& frame, const Damage& damage) {
       note(writePoints(points_, header, *std::move(points)));
     }
   }
-  return outcome;
+  if (!outcome) return outcome.error();
+  return is_read;
 }
 
 Result<> Topics::tellPose(const Transform<World, Camera>& world_from_camera, HostTime now) {

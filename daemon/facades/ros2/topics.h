@@ -22,9 +22,9 @@ class Topics {
 
   /// Whether anybody reads what comes with each frame.
   [[nodiscard]] bool hasReaders() const;
-  /// Makes and writes those messages that are read, with the damage in the pixels of each. The first error;
-  /// the others are written all the same.
-  Result<> publish(const Frame& frame, const Damage& damage);
+  /// Makes and writes those messages that are read, with the damage in the pixels of each. Whether there were
+  /// any, or the first error; the others are written all the same.
+  Result<bool> publish(const Frame& frame, const Damage& damage);
   /// Tells where the camera is, if /tf_static has not told yet: a pose that was set is told also where nobody
   /// reads images, so that no frame comes to tell it.
   Result<> tellPose(const Transform<World, Camera>& world_from_camera, HostTime now);

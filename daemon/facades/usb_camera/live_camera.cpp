@@ -182,11 +182,12 @@ std::int64_t LiveCamera::stampOf(const Frame& frame) const {
   return frame.moment.exposures.empty() ? frame.moment.received.ns : frame.moment.exposures.front().start.ns;
 }
 
-Result<> LiveCamera::take(const Frame& frame, const Damage& damage) {
+Result<bool> LiveCamera::take(const Frame& frame, const Damage& damage) {
   came_ = clock_.steady();
   device_ns_ = stampOf(frame);
   has_device_time_ = !frame.moment.exposures.empty();
   relation_ = frame.moment.clock;
+  bool is_wanted = false;
   for (std::size_t i = 0; i < layout().streams.size(); ++i) {
     const UvcLayout::Stream& stream = layout().streams[i];
     Waiting& waiting = waiting_.at(i);
@@ -202,8 +203,9 @@ Result<> LiveCamera::take(const Frame& frame, const Damage& damage) {
     if (waiting.picture) ++lost_;
     damage.corrupt(*pixels);
     waiting.picture = {*std::move(pixels), static_cast<std::uint32_t>(device_ns_ / kTick_ns), false};
+    is_wanted = true;
   }
-  return {};
+  return is_wanted;
 }
 
 std::optional<Picture> LiveCamera::nextPicture(std::size_t stream, SteadyTime now) {

@@ -35,9 +35,9 @@ class LiveCamera final : public UvcDevice {
   LiveCamera(UvcLayout layout, const wire::SourceDescription& description, ShortImages::Scale scale,
              const Clock& clock, Hooks hooks);
 
-  /// A host that is too slow loses frames; it is never waited for. Unsupported: the frame has another size,
-  /// or lacks an image.
-  Result<> take(const Frame& frame, const Damage& damage);
+  /// A host that is too slow loses frames; it is never waited for. Whether it asked for any image.
+  /// Unsupported: the frame has another size, or lacks an image.
+  Result<bool> take(const Frame& frame, const Damage& damage);
   /// Whether the host has asked for pictures within the last second.
   [[nodiscard]] bool wantsFrames(SteadyTime now) const;
   /// Of the pictures that a host asked for.

@@ -32,7 +32,7 @@ class UsbCameraFacade final : public Facade {
                .planes = {PlaneKind::Range, PlaneKind::Depth, PlaneKind::Amplitude}},
               [this](const Frame& frame) { line_.take(frame); }),
         line_(thread_.io(), LineFaults{keys_.line, name_, line_log}, keys_.line.delay_time,
-              [this](const Frame& frame, const Damage& damage) { takeFrame(frame, damage); }),
+              [this](const Frame& frame, const Damage& damage) { return takeFrame(frame, damage); }),
         tick_(thread_.io(), kTick, [this] { tick(); }) {}
 
   ~UsbCameraFacade() override { thread_.stop(); }
@@ -101,13 +101,16 @@ class UsbCameraFacade final : public Facade {
                 }};
   }
 
-  void takeFrame(const Frame& frame, const Damage& damage) {
-    if (!camera_) return;
-    if (auto taken = camera_->take(frame, damage); !taken && taken.error().message != last_complaint_) {
+  /// Whether the host gets anything of it.
+  bool takeFrame(const Frame& frame, const Damage& damage) {
+    if (!camera_) return false;
+    const auto taken = camera_->take(frame, damage);
+    if (!taken && taken.error().message != last_complaint_) {
       last_complaint_ = taken.error().message;
       logging::warn("{}: {}", name_, last_complaint_);
     }
     pump();
+    return taken && *taken;
   }
 
   void pump() {

@@ -42,7 +42,7 @@ class LoopbackFacade final : public Facade {
                                                      : std::vector{PlaneKind::Amplitude}},
               [this](const Frame& frame) { line_.take(frame); }),
         line_(thread_.io(), LineFaults{keys_.line, name_, line_log}, keys_.line.delay_time,
-              [this](const Frame& frame, const Damage& damage) { takeFrame(frame, damage); }) {}
+              [this](const Frame& frame, const Damage& damage) { return takeFrame(frame, damage); }) {}
 
   ~LoopbackFacade() override { thread_.stop(); }
 
@@ -59,19 +59,21 @@ class LoopbackFacade final : public Facade {
   }
 
  private:
-  /// A node that has gone, or was taken by another program, is tried again every second.
-  void takeFrame(const Frame& frame, const Damage& damage) {
+  /// Whether the node has it. One that has gone, or was taken by another program, is tried again every
+  /// second.
+  bool takeFrame(const Frame& frame, const Damage& damage) {
     const auto now = steady_clock::now();
-    if (next_try_ && now < *next_try_) return;
+    if (next_try_ && now < *next_try_) return false;
     next_try_.reset();
     if (const auto shown = show(frame, damage); !shown) {
       if (shown.error().message != last_complaint_) logging::warn("{}: {}", name_, shown.error().message);
       last_complaint_ = shown.error().message;
       node_.reset();
       next_try_ = now + kNextTry;
-    } else {
-      last_complaint_.clear();
+      return false;
     }
+    last_complaint_.clear();
+    return true;
   }
 
   Result<> show(const Frame& frame, const Damage& damage) {

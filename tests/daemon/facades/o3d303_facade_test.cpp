@@ -173,54 +173,6 @@ TEST_F(O3d303Facade, TheModelOfAFrameIsJson) {
   EXPECT_EQ(json.get<std::uint32_t>("FrameCount"), model->header.frame_count);
 }
 
-/// All that a client of the vendor's sees of the line's faults is what the log says.
-TEST_F(O3d303Facade, ItsLineLosesAndDoublesTheFramesOfTheLog) {
-  startO3d303(kPattern,
-              "[facade.line]\nloss = 0.2\nduplicate = 0.2\nreorder = 0.2\nseed = 3\nlog = 'line.csv'");
-  PcicClient one{camera().pcicPort()};
-  EXPECT_EQ(one.setSchema({o3d303::kDistanceBlob}), "*");
-  std::vector<std::uint32_t> came;
-  while (came.size() < 100) came.push_back(one.frame().chunks.at(0).header.frame_count);
-  std::map<std::string, std::set<std::uint32_t>> logged;
-  std::ifstream lines{folder_ / "line.csv"};
-  std::string text;
-  for (std::getline(lines, text); std::getline(lines, text);) {
-    const auto first = text.find(','), second = text.rfind(',');
-    logged[text.substr(first + 1, second - first - 1)].insert(
-        static_cast<std::uint32_t>(std::stoul(text.substr(second + 7))));
-  }
-  // The ends are left out: what is there may have its twin beyond them.
-  for (std::uint32_t i = came.front() + 3; i < came.at(90); ++i) {
-    const auto times = std::ranges::count(came, i);
-    EXPECT_EQ(times, logged["loss"].contains(i) ? 0 : logged["duplicate"].contains(i) ? 2 : 1) << i;
-  }
-  EXPECT_GT(logged["loss"].size(), 5u);
-  EXPECT_GT(logged["reorder"].size(), 5u);
-}
-
-TEST_F(O3d303Facade, ACutLineEndsTheConnectionInTheMiddleOfAMessage) {
-  startO3d303(kPattern, "[facade.line]\ndisconnect = 0.1\nseed = 2\nlog = 'line.csv'");
-  PcicClient one{camera().pcicPort()};
-  EXPECT_TRUE(one.isClosedByPeer());
-  EXPECT_TRUE(one.isWithinMessage());
-  PcicClient again{camera().pcicPort()};  // and the camera is there as before
-  EXPECT_EQ(again.command("V?"), "03 01 04");
-}
-
-/// The seed is one whose first bits are all within the images, so that messages stay messages.
-TEST_F(O3d303Facade, ACorruptMessageHasOneBitWrong) {
-  startO3d303(kPattern, "[facade.line]\ncorruption = 1.0\nseed = 1");
-  PcicClient one{camera().pcicPort()};
-  EXPECT_EQ(one.setSchema({o3d303::kUnitVectorsBlob}), "*");
-  constexpr std::size_t kImageAt = 4 + 48, kImageSize = std::size_t{64} * 48 * 12;
-  const std::string first = one.nextOf("0000").substr(kImageAt, kImageSize),
-                    second = one.nextOf("0000").substr(kImageAt, kImageSize);
-  int bits = 0;
-  for (std::size_t i = 0; i < kImageSize; ++i)
-    bits += std::popcount(static_cast<unsigned char>(first.at(i) ^ second.at(i)));
-  EXPECT_EQ(bits, 2) << "unit vectors are the same in each frame, and each has a wrong bit of its own";
-}
-
 // A real camera's message of these images at 176 x 132 was measured to be 209414 bytes behind its first line,
 // the ticket and the line end among them.
 TEST_F(O3d303Facade, AFrameIsAsLongAsTheRealCameras) {
@@ -264,6 +216,20 @@ TEST_F(O3d303Facade, ATriggerBeforeTheLastOnesFrameIsAnError) {
   EXPECT_EQ(asks.command("t"), "*");
   EXPECT_EQ(asks.command("t"), "!");
   EXPECT_EQ(listens.nextOf("0001"), "110001006");
+}
+
+TEST_F(O3d303Facade, ATriggerBeforeALateFrameHasLeftIsAnError) {
+  startO3d303(kPattern + "pace = 'trigger'\n", "latency_ms = 2000");
+  auto native = client();
+  auto stream = native.subscribe("cam");
+  ASSERT_TRUE(stream.ok()) << stream.error().message;
+  PcicClient asks{camera().pcicPort()};
+  EXPECT_EQ(asks.command("t"), "*");
+  ASSERT_TRUE(stream->next(kSoon).ok()) << "the source has made it";
+  std::this_thread::sleep_for(50ms);
+  EXPECT_EQ(asks.command("t"), "!") << "but the camera has not";
+  asks.nextOf("0000");
+  EXPECT_EQ(asks.command("t"), "*");
 }
 
 TEST_F(O3d303Facade, TheSeventeenthConnectionIsRefusedAndTheOthersAreTold) {

@@ -28,7 +28,7 @@ Frame numbered(std::uint64_t sequence) {
 
 /// What leaves of `count` frames, in the order in which it does, and the log.
 struct Struck {
-  explicit Struck(const LineShares& shares, std::uint64_t count = 1000) {
+  explicit Struck(const LineShares& shares, std::uint64_t count = 1000, bool is_there = true) {
     const auto log =
         std::filesystem::temp_directory_path() / ("struck_frames_" + std::to_string(::getpid()) + ".csv");
     {
@@ -43,6 +43,7 @@ struct Struck {
                             differ += std::popcount(std::to_integer<unsigned>(one));
                           bits_changed.push_back(differ);
                           cuts += damage.is_cut ? 1 : 0;
+                          return is_there;
                         }};
       for (std::uint64_t i = 0; i < count; ++i) line.take(numbered(i));
       before_later = order.size();
@@ -111,6 +112,13 @@ TEST(StruckFrames, ACorruptedOneHasOneBitOfEachImageChanged) {
   EXPECT_EQ(static_cast<std::size_t>(changed), all.logged.at("corruption").size());
   EXPECT_EQ(changed + std::ranges::count(all.bits_changed, 0), 200);
   EXPECT_GT(changed, 50);
+}
+
+TEST(StruckFrames, WhatNobodyGetsIsNotStruck) {
+  const LineShares shares{
+      .duplicate = 0.5, .reorder = 0.5, .delay = 0.05, .corruption = 0.5, .disconnect = 0.1};
+  EXPECT_TRUE(Struck(shares, 200, false).logged.empty());
+  EXPECT_EQ(Struck(shares, 200, true).logged.size(), 5u);
 }
 
 /// With all at once, what left says of each frame what the log does.

@@ -41,8 +41,8 @@ TEST(Unevenness, GivesARealCamerasIntervals) {
 TEST(UnevenFrames, LeaveInOrderAndNoneIsLost) {
   boost::asio::io_context io;
   std::vector<std::uint64_t> order;
-  UnevenFrames line{io, Unevenness{{std::chrono::milliseconds{1}, std::chrono::milliseconds{21}}}, 0_s,
-                    [&](const Frame& frame) { order.push_back(frame.sequence); }};
+  UnevenFrames line{io, "test", Unevenness{{std::chrono::milliseconds{1}, std::chrono::milliseconds{21}}},
+                    0_s, [&](const Frame& frame) { order.push_back(frame.sequence); }};
   for (std::uint64_t i = 0; i < 6; ++i) {
     Frame frame;
     frame.sequence = i;
@@ -56,7 +56,7 @@ TEST(UnevenFrames, LeaveInOrderAndNoneIsLost) {
 TEST(UnevenFrames, WithoutIntervalsTheyLeaveAtOnce) {
   boost::asio::io_context io;
   int left = 0;
-  UnevenFrames line{io, {}, 0_s, [&](const Frame&) { ++left; }};
+  UnevenFrames line{io, "test", {}, 0_s, [&](const Frame&) { ++left; }};
   line.take({});
   EXPECT_EQ(left, 1);
 }
@@ -65,11 +65,31 @@ TEST(UnevenFrames, WithALatencyTheyLeaveThatMuchLater) {
   boost::asio::io_context io;
   const auto begin = std::chrono::steady_clock::now();
   auto left = begin;
-  UnevenFrames line{io, {}, 20_ms, [&](const Frame&) { left = std::chrono::steady_clock::now(); }};
+  UnevenFrames line{io, "test", {}, 20_ms, [&](const Frame&) { left = std::chrono::steady_clock::now(); }};
   line.take({});
   EXPECT_EQ(left, begin);
   io.run();
   EXPECT_GE(left - begin, std::chrono::milliseconds{20});
+}
+
+/// Ten seconds of a small image at 100 Hz all wait; of 64 MB each, seven are less than half a gigabyte.
+TEST(UnevenFrames, ThatWaitAreBoundedByTheirBytes) {
+  Plane large;
+  large.data = Buffer::adopt(std::vector<std::byte>(64U << 20U));
+  Frame heavy;
+  heavy.planes = {large};
+  for (const auto& [frame, taken, leave] : {std::tuple{Frame{}, 1000, 1000}, std::tuple{heavy, 10, 7}}) {
+    boost::asio::io_context io;
+    int left = 0;
+    UnevenFrames line{io, "test", {}, 20_ms, [&](const Frame&) { ++left; }};
+    for (int i = 0; i < taken; ++i) line.take(frame);
+    io.run();
+    EXPECT_EQ(left, leave);
+    line.take(frame);
+    io.restart();
+    io.run();
+    EXPECT_EQ(left, leave + 1) << "those that left make room";
+  }
 }
 
 }  // namespace
