@@ -17,6 +17,7 @@ void Recovery::opened(const SourceInfo& info, const SourceState& state) {
   info_ = info;
   state_ = state;
   device_shift_ns_.reset();
+  is_shift_ending_ = false;
 }
 
 void Recovery::openFailed(SteadyTime now) {
@@ -57,19 +58,32 @@ void Recovery::frame(Frame& frame, SteadyTime now) {
   }
   if (frame.provenance.kind == FrameKind::Real && !frame.moment.exposures.empty()) {
     auto& exposures = frame.moment.exposures;
+    const std::int64_t start_ns = exposures.front().start.ns;
     if (!device_shift_ns_) {
       device_shift_ns_ = 0;
-      if (last_device_time_ && exposures.front().start <= *last_device_time_) {
+      if (last_device_time_ && start_ns <= last_device_time_->ns) {
         const nanoseconds since = now - last_frame_.value_or(now);
-        device_shift_ns_ = last_device_time_->ns + std::max<std::int64_t>(1, since.count()) -
-                           exposures.front().start.ns;
+        device_shift_ns_ = last_device_time_->ns + std::max<std::int64_t>(1, since.count()) - start_ns;
       }
+    } else {
+      device_shift_ns_ = shiftStillDue(start_ns + *device_shift_ns_ - last_device_time_->ns);
     }
     for (Exposure& exposure : exposures) exposure.start.ns += *device_shift_ns_;
     frame.moment.clock.host_minus_device_ns -= *device_shift_ns_;
     last_device_time_ = exposures.back().start;
   }
   last_frame_ = waiting_since_ = now;
+}
+
+/// A clock that follows a master begins anew with the camera and is set to the master's time some seconds later. Then
+/// the frame continues the last one better without the shift, and `advance_ns`, its time since then with the shift, is
+/// absurd. What is left, for the shift was as exact as a frame's arrival, goes at half the speed of time.
+std::int64_t Recovery::shiftStillDue(std::int64_t advance_ns) {
+  const std::int64_t shift_ns = *device_shift_ns_;
+  if (shift_ns == 0 || advance_ns <= 0) return shift_ns;
+  if (is_shift_ending_) return std::max<std::int64_t>(0, shift_ns - advance_ns / 2);
+  is_shift_ending_ = std::abs(advance_ns - shift_ns) < advance_ns;
+  return is_shift_ending_ ? std::max<std::int64_t>(0, shift_ns - advance_ns + 1) : shift_ns;
 }
 
 std::optional<Error> Recovery::timedOut(SteadyTime now) const {

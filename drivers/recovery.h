@@ -65,6 +65,7 @@ class Recovery {
 
  private:
   void retryLater(SteadyTime now);
+  [[nodiscard]] std::int64_t shiftStillDue(std::int64_t advance_ns);
   [[nodiscard]] std::uint64_t framesWithin(std::chrono::nanoseconds time) const;
 
   Options options_;
@@ -82,7 +83,8 @@ class Recovery {
   std::optional<SteadyTime> last_frame_;
   std::optional<SteadyTime> waiting_since_;  ///< since the start or the last frame; none: stopped
   std::optional<DeviceTime> last_device_time_;
-  std::optional<std::int64_t> device_shift_ns_;  ///< decided by the first frame after an opening
+  bool is_shift_ending_ = false;
+  std::optional<std::int64_t> device_shift_ns_;  ///< decided by the first frame after an opening; never grows
 };
 
 }  // namespace toftwin::drivers

@@ -3,12 +3,14 @@
 
 #include <gtest/gtest.h>
 
+#include "drivers/clock_fit.h"
 #include "drivers/loss_reasons.h"
 
 namespace toftwin::drivers {
 namespace {
 
 using std::chrono::milliseconds;
+using std::chrono::nanoseconds;
 using std::chrono::seconds;
 
 /// A camera's life, told to a Recovery at times that the test chooses.
@@ -26,12 +28,13 @@ struct Life {
     info.frame_interval = 50_ms;
   }
   void open() { recovery.opened(info, state); }
-  Frame frame(std::int64_t device_ns = 0) {
+  Frame frame(std::int64_t device_ns = 0) { return frame(device_ns, now); }
+  Frame frame(std::int64_t device_ns, SteadyTime arrived) {
     Frame frame;
     frame.provenance.kind = info.kind;
     frame.moment.exposures = {{{device_ns}, 1_ms, 30_MHz}, {{device_ns + 10}, 1_ms, 30_MHz}};
     frame.moment.clock = {.host_minus_device_ns = 5000 - device_ns, .uncertainty_ns = 1};
-    recovery.frame(frame, now);
+    recovery.frame(frame, arrived);
     return frame;
   }
   void lose(std::string_view why = "unplugged") { recovery.lost(now, why); }
@@ -172,6 +175,36 @@ TEST(Recovery, DeviceTimeGoesOnWhenTheCamerasClockBeginsAnew) {
   life.now += milliseconds{50};
   const Frame next = life.frame(50'000'100);
   EXPECT_EQ(next.moment.exposures[0].start.ns - after.moment.exposures[0].start.ns, 50'000'000);
+}
+
+// The camera's clock begins at 0 with each boot, and is the master's after ten frames. Of the first frame after a boot
+// the network makes the arrival later or earlier than others, so that device time runs a little ahead or behind.
+TEST(Recovery, DeviceTimeIsTheMastersAgainAfterEachReboot) {
+  constexpr std::int64_t kEpoch_ns = 1'790'000'000'000'000'000, kInterval_ns = 50'000'000;
+  for (const int late_ms : {0, 3, 70, 200, -3}) {
+    Life life;
+    const SteadyTime began = life.now;
+    std::int64_t last_ns = -1;
+    for (int boot = 0; boot < 5; ++boot) {
+      DeviceClock clock{DeviceClock::Options{.follows_steps_ahead = true}};
+      life.open();
+      life.recovery.started(life.now);
+      const SteadyTime booted = life.now;
+      for (int i = 0; i < 40; ++i, life.now += nanoseconds{kInterval_ns}) {
+        const std::int64_t master_ns = kEpoch_ns + nanoseconds{life.now - began}.count();
+        const std::int64_t stamp_ns = i < 10 ? nanoseconds{life.now - booted}.count() : master_ns;
+        const SteadyTime arrived = life.now + milliseconds{boot > 0 && i == 0 ? late_ms : 0};
+        const std::int64_t time_ns = life.frame(clock.read(stamp_ns, arrived).ns, arrived).moment.exposures[0].start.ns;
+        ASSERT_GT(time_ns, last_ns) << late_ms << ": boot " << boot << ", frame " << i;
+        if (i >= 20) {
+          ASSERT_EQ(time_ns, master_ns) << late_ms << ": boot " << boot << ", frame " << i;
+        }
+        last_ns = time_ns;
+      }
+      life.lose();
+      life.now += seconds{4};
+    }
+  }
 }
 
 TEST(Recovery, ASimulatedFramesTimeIsLeftAlone) {
