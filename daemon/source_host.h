@@ -120,7 +120,7 @@ class SourceHost {
   std::unique_ptr<drivers::Source> source_;
   bool is_started_ = false;
   drivers::Recovery recovery_;
-  std::string lost_because_;  ///< empty once it was opened again
+  std::string lost_because_;  ///< empty once a frame came again
 
   std::mutex delivering_;     // held from the choice of a frame's takers until all have it
   mutable std::mutex mutex_;  // guards all below

@@ -180,7 +180,6 @@ void SourceHost::adopt(Result<std::unique_ptr<drivers::Source>> opened) {
     info_ = *std::move(info);
   }
   if (!restoreSettings()) return;  // it may change what the source says of itself, which noteState() takes over
-  lost_because_.clear();
   const std::scoped_lock lock{mutex_};
   is_there_ = true;
 }
@@ -288,6 +287,7 @@ void SourceHost::makeFrame(const std::stop_token& stop) {
 void SourceHost::publish(Frame frame) {
   const SteadyTime now = clock_.steady();
   recovery_.frame(frame, now);
+  lost_because_.clear();
   if (frame.provenance.kind != FrameKind::Replayed) frame.moment.received = clock_.wall();
   frame.source = name_;
   frame.dropped_before = 0;
@@ -343,7 +343,7 @@ void SourceHost::lose(const Error& error) {
     ++reconnects_;
   }
   noteError(error, true);
-  lost_because_ = error.message;
+  if (lost_because_.empty()) lost_because_ = error.message;
 }
 
 /// Ends the subscriptions with smaller numbers; for others the stream begins anew.
@@ -365,9 +365,9 @@ void SourceHost::endAll(const Error& reason, std::uint64_t before) {
   }
 }
 
-/// What comes while the camera is away does not push out why it was lost.
+/// What comes until there are frames again does not push out why the camera was lost.
 void SourceHost::noteError(const Error& error, bool is_loss) {
-  const bool is_away = !is_loss && !lost_because_.empty() && error.message != lost_because_;
+  const bool is_away = !lost_because_.empty() && error.message != lost_because_;
   const std::string text = is_away ? fmt::format("{}; since then: {}", lost_because_, error.message) : error.message;
   const std::scoped_lock lock{mutex_};
   // A camera that is away is tried several times a second: said once, it is enough.

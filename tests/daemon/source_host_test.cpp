@@ -214,10 +214,23 @@ TEST(SourceHost, WhatKeepsALostCameraAwayDoesNotPushOutWhyItWasLost) {
     std::this_thread::yield();
   }
   EXPECT_EQ(rig.host->health().last_error, "unplugged; since then: no such device");
+  // That it opens is not enough.
+  for (int opened = 3; const std::string why : {"it does not start", "it hangs"}) {
+    rig.remote->give({Error::Code::Disconnected, why});
+    for (; rig.remote->opened.count() < opened; std::this_thread::yield()) rig.clock.advance(std::chrono::milliseconds{2});
+    EXPECT_EQ(rig.host->health().last_error, "unplugged; since then: " + why);
+    ++opened;
+  }
   rig.remote->give();
   const auto item = taker.next(subscriber->backlog);
   ASSERT_TRUE(item.has_value());
   EXPECT_EQ(std::get<Backlog::Delivery>(*item).frame->frame.dropped_because, "unplugged");
+  rig.remote->give({Error::Code::Disconnected, "unplugged again"});
+  while (rig.remote->opened.count() < 5) {
+    rig.clock.advance(std::chrono::milliseconds{2});
+    std::this_thread::yield();
+  }
+  EXPECT_EQ(rig.host->health().last_error, "unplugged again") << "of a new loss";
 }
 
 TEST(SourceHost, EndsItsSubscriptionsWithTheStreamAndStartsAnewForTheNext) {
