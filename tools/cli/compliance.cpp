@@ -81,16 +81,6 @@ void print(const drivers::Finding& finding) {
   std::fflush(stdout);
 }
 
-/// Whether the camera can be opened at all: if not, every check would say the same.
-Result<std::unique_ptr<drivers::Source>> open(const Options& options, const drivers::Candidate& candidate) {
-  // Keys that the user gave are the first lines, so that the lines in errors are theirs.
-  auto table = settings::Table::parse(candidate.keys, options.keys.empty() ? options.camera : "--keys");
-  if (!table) return table.error();
-  auto opened = candidate.driver->open(*table);
-  if (auto checked = table->check(); opened && !checked) return checked.error();
-  return opened;
-}
-
 compare::Json toJson(const ReportHeader& header, compare::Json checks) {
   compare::Json report = compare::Json::object();
   for (const auto& [what, value] : header) report.set(what, value);
@@ -127,11 +117,15 @@ Result<Exit> run(const Options& options) {
   if (!options.json) how.report = [](const drivers::Finding& finding) { print(finding); };
   how.interrupted = interrupted;
   catchInterrupts();
-  auto opened = open(options, *candidate);
+  // Keys that the user gave are the first lines, so that the lines in errors are theirs.
+  auto table = settings::Table::parse(candidate->keys, options.keys.empty() ? options.camera : "--keys");
+  if (!table) return table.error();
+  // If it cannot be opened at all, every check would say the same.
+  auto opened = candidate->driver->open(*table);
+  if (auto checked = table->check(); !checked) return checked.error();  // the user's, and nothing to report
   ReportHeader header = headerOfMachine(options.camera, options.keys);
   if (!opened) {
-    // What is wrong with the command line is told there, and is nothing to report.
-    if (opened.error().code != Error::Code::InvalidArgument) reportUnopened(options, header, opened.error());
+    reportUnopened(options, header, opened.error());
     return opened.error();
   }
   std::ranges::move(headerOfCamera(**opened, how.frame_timeout), std::back_inserter(header));
