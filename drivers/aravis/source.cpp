@@ -56,7 +56,7 @@ class AravisSource final : public Source {
     triggered_at_.reset();
     losses_.clear();
     reported_ = {};
-    underruns_ = 0;
+    underruns_ = {};
     exposure_ = exposureNow();
     auto started = stream_.start(connection_);
     if (!started) return lost(started.error());
@@ -160,9 +160,10 @@ class AravisSource final : public Source {
 
   /// Frames that their ids leave out: the library counts those that found no buffer, and of the others nothing came.
   void accountFor(std::uint64_t lost) {
-    if (lost <= losses_.frames()) return;
-    const std::uint64_t underruns = stream_.counts().underruns;
-    const std::uint64_t without_buffer = underruns - std::exchange(underruns_, underruns);
+    const bool is_gap = lost > losses_.frames();
+    const std::uint64_t counted = stream_.counts().underruns;  // before the look at what waits
+    const std::uint64_t without_buffer = underruns_.before(is_gap, counted, !stream_.hasWaiting());
+    if (!is_gap) return;
     losses_.add("no buffer was free for it", std::min(lost - losses_.frames(), without_buffer));
     losses_.account(lost, "nothing of it came");
   }
@@ -280,7 +281,7 @@ class AravisSource final : public Source {
   std::optional<SteadyTime> triggered_at_;
   std::optional<std::uint64_t> last_id_;
   LossReasons losses_;           // since the last good frame
-  std::uint64_t underruns_ = 0;  // of the stream, that losses were told of
+  Underruns underruns_;
   bool is_gone_ = false;
   LossReasons unreported_;  // of frames that came, and of the stream's end
   PacketCounts reported_;

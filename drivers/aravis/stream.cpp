@@ -165,6 +165,12 @@ void Stream::giveBack(Filled filled) {
   if (stream_ != nullptr) arv_stream_push_buffer(stream_.get(), filled.buffer.release());
 }
 
+bool Stream::hasWaiting() const {
+  gint empty = 0, filled = 0;
+  if (stream_ != nullptr) arv_stream_get_n_buffers(stream_.get(), &empty, &filled);
+  return filled > 0;
+}
+
 PacketCounts Stream::counts() const {
   PacketCounts counts;
   if (stream_ == nullptr) return counts;

@@ -48,6 +48,8 @@ class Stream {
   /// The next buffer that was filled, waiting so long for it.
   std::optional<Filled> take(std::chrono::microseconds wait);
   void giveBack(Filled filled);
+  /// Another one is filled already.
+  [[nodiscard]] bool hasWaiting() const;
   [[nodiscard]] PacketCounts counts() const;
 
  private:

@@ -26,6 +26,33 @@ TEST(AravisLost, FramesAreCountedByTheirIds) {
   EXPECT_EQ(lostBetween(5, 1ULL << 40, 0), 0u) << "no such gap is believed";
 }
 
+TEST(AravisLost, WhatFoundNoBufferIsOfTheNextGapOnly) {
+  Underruns underruns;
+  // Two frames wait while no buffer is free: the gap comes behind them.
+  EXPECT_EQ(underruns.before(true, 3, false), 3u);
+  underruns.before(false, 20, false);
+  underruns.before(false, 20, true);
+  EXPECT_EQ(underruns.before(true, 20, true), 17u);
+  // A frame whose first packets found none came after all: what the camera leaves out later is not for want of buffers.
+  underruns.before(false, 25, true);
+  underruns.before(false, 25, true);
+  EXPECT_EQ(underruns.before(true, 25, true), 0u);
+}
+
+TEST_F(AravisLosses, FramesThatNobodyMadeRoomForSayWhy) {
+  const auto source = started("buffers = 4");
+  ASSERT_NE(source, nullptr);
+  ASSERT_TRUE(nextFrame(*source).ok());
+  std::this_thread::sleep_for(milliseconds{300});
+  std::string why;
+  for (int i = 0; i < 10 && why.empty(); ++i) {
+    const auto frame = nextFrame(*source);
+    ASSERT_TRUE(frame.ok()) << frame.error().message;
+    why = frame->dropped_because;
+  }
+  EXPECT_EQ(why.find("no buffer was free for it ("), 0u) << why;
+}
+
 TEST_F(AravisLosses, LostPacketsAreAskedForAgainAndNoFrameIsLost) {
   // Of few packets the library would ask for a quarter only, if it was not told otherwise.
   for (const auto& [packet_size, drop_every] : {std::pair{576, 9}, {9000, 3}}) {
