@@ -36,7 +36,7 @@ class EditSession {
     std::from_chars(active->data(), active->data() + active->size(), index);
     if (index < 1) {
       return Error{
-          Error::Code::InvalidArgument,
+          Error::Code::Incompatible,
           "o3d303: the camera has no active application; make one active with the vendor's tool"};
     }
     static_cast<void>(rpc.call(sessionPath(), "cancelSession", {}));  // left behind by a lost line
