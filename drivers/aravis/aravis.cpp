@@ -9,6 +9,7 @@
 
 #include "drivers/aravis/configuration.h"
 #include "drivers/aravis/connection.h"
+#include "drivers/aravis/region.h"
 #include "drivers/aravis/source.h"
 #include "drivers/aravis/stream.h"
 #include "drivers/logging.h"
@@ -77,44 +78,11 @@ std::optional<CameraInfo> lensFromPoints(Connection& connection, const Keys& key
   return camera;
 }
 
-/// The lens of the region that is sent, from one of the whole image or of this very region. Images that are binned are
-/// left to lensFor(), which scales. `Camera`: LensKeys or CameraInfo, which name the same things alike.
-template <class Camera>
-Result<Camera> ofRegion(Camera lens, const Setup& setup) {
-  const Region& region = setup.region;
-  const bool is_sent = lens.width == setup.width && lens.height == setup.height;
-  if (lens.width == 0 || is_sent) return lens;
-  const bool is_of_whole = lens.width == region.full_width && lens.height == region.full_height;
-  if (is_of_whole && !region.skips_pixels) {
-    lens.cx -= region.x;
-    lens.cy -= region.y;
-    lens.width = setup.width;
-    lens.height = setup.height;
-    return lens;
-  }
-  const bool is_cut = region.x > 0 || region.y > 0 || (region.full_width > 0 && region.full_width != setup.width) ||
-                      (region.full_height > 0 && region.full_height != setup.height);
-  if (!is_cut && !region.skips_pixels) return lens;
-  return Error{Error::Code::Incompatible,
-               fmt::format("aravis: the lens is described for {} x {} pixels, but the camera sends {} x {} from ({}, {}) on of "
-                           "{} x {}{}: which of its pixels these are cannot be told; describe the lens for the whole "
-                           "image or for this region",
-                           lens.width, lens.height, setup.width, setup.height, region.x, region.y, region.full_width,
-                           region.full_height, region.skips_pixels ? ", leaving pixels out (decimation)" : "")};
-}
-
-template <class Camera>
-Result<Lens> lensOfRegion(const Camera& lens, const Setup& setup) {
-  const auto sent = ofRegion(lens, setup);
-  if (!sent) return sent.error();
-  return lensFor(*sent, setup.width, setup.height, About::name);
-}
-
 /// What was calibrated, or a person wrote, or the camera says, or its points say.
 Result<Lens> findLens(Connection& connection, const Keys& keys, const Setup& setup,
                       const std::optional<CameraInfo>& calibrated) {
-  if (calibrated) return lensOfRegion(*calibrated, setup);
-  auto lens = lensOfRegion(keys.lens, setup);
+  if (calibrated) return lensOfRegion(*calibrated, setup.region);
+  auto lens = lensOfRegion(keys.lens, setup.region);
   if (!lens || lens->is_known) return lens;
   if (setup.lens) return lensFor(*setup.lens, setup.width, setup.height, About::name);
   if (setup.layout.has_points && (!setup.is_triggered || setup.can_trigger)) {

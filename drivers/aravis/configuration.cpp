@@ -252,21 +252,17 @@ int pixelsOf(const Features& features, const char* name, double otherwise = 0.0)
   return static_cast<int>(std::clamp(features.number(name).value_or(otherwise), 0.0, kLargestSide));
 }
 
-/// One side of the whole image, binned as now. WidthMax is what a region may have, of some cameras from OffsetX on.
-int fullSide(const Features& features, const std::string& side, const std::string& direction, int offset, int sent) {
-  const int sensor = pixelsOf(features, ("Sensor" + side).c_str());
-  const int most = pixelsOf(features, (side + "Max").c_str());
-  const int binning = std::max(1, pixelsOf(features, ("Binning" + direction).c_str(), 1.0));
-  const int decimation = std::max(1, pixelsOf(features, ("Decimation" + direction).c_str(), 1.0));
-  if (sensor > 0) return sensor / binning / decimation;
-  return most > 0 && offset + sent > most ? most + offset : most;
-}
-
 Region regionOf(const Features& features, int width, int height) {
-  Region region{.x = pixelsOf(features, "OffsetX"), .y = pixelsOf(features, "OffsetY")};
-  region.full_width = fullSide(features, "Width", "Horizontal", region.x, width);
-  region.full_height = fullSide(features, "Height", "Vertical", region.y, height);
-  region.skips_pixels = pixelsOf(features, "DecimationHorizontal", 1.0) > 1 || pixelsOf(features, "DecimationVertical", 1.0) > 1;
+  Region region{.x = pixelsOf(features, "OffsetX"), .y = pixelsOf(features, "OffsetY"), .width = width, .height = height};
+  const auto whole = [&](const std::string& side, const std::string& direction, int offset, int sent) {
+    const int binning = std::max(1, pixelsOf(features, ("Binning" + direction).c_str(), 1.0));
+    const int decimation = std::max(1, pixelsOf(features, ("Decimation" + direction).c_str(), 1.0));
+    region.skips_pixels = region.skips_pixels || decimation > 1;
+    return wholeSide(pixelsOf(features, ("Sensor" + side).c_str()) / binning / decimation,
+                     pixelsOf(features, (side + "Max").c_str()), offset, sent);
+  };
+  region.whole_width = whole("Width", "Horizontal", region.x, width);
+  region.whole_height = whole("Height", "Vertical", region.y, height);
   return region;
 }
 

@@ -11,15 +11,9 @@
 #include "drivers/aravis/connection.h"
 #include "drivers/aravis/features.h"
 #include "drivers/aravis/images.h"
+#include "drivers/aravis/region.h"
 
 namespace toftwin::drivers::aravis {
-
-/// Which part of its image a camera sends: where that begins, and how large the whole would be, in pixels as they are
-/// sent (binned). 0: the camera does not say.
-struct Region {
-  int x = 0, y = 0, full_width = 0, full_height = 0;
-  bool skips_pixels = false;  ///< decimation: neither cut off nor binned
-};
 
 /// What a camera will send, as it is set up now.
 struct Setup {

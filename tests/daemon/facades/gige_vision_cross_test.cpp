@@ -176,6 +176,15 @@ TEST_F(GigeVisionCross, OfARegionTheLensIsThatPartOfIt) {
     EXPECT_NEAR(got.cy, whole.cy - kY, 1e-4);
     EXPECT_EQ(got.calibration_id.size(), 32u);
   }
+  {
+    const auto driver = openDriver(
+        fmt::format("lens.width = {}\nlens.height = {}\nlens.field_of_view_deg = 60\nset = [{}]", whole.width, whole.height, kRegion));
+    ASSERT_TRUE(driver.ok()) << driver.error().message;
+    const CameraInfo got = (*driver)->info().camera;
+    EXPECT_NEAR(got.fx, whole.width / 2.0 / std::tan((30_deg).in(radian)), 1e-9) << "of the whole image";
+    EXPECT_NEAR(got.cx, (whole.width - 1) / 2.0 - kX, 1e-9);
+    EXPECT_NEAR(got.cy, (whole.height - 1) / 2.0 - kY, 1e-9);
+  }
   // Ranges that the driver makes of depth by that lens are the native ones of those pixels.
   compare(fmt::format("calibration = '{}'\ncomponents = ['Range']\npixel_format = 'Coord3D_C32f'\nset = [{}]",
                       file.string(), kRegion),
