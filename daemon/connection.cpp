@@ -176,7 +176,7 @@ void Connection::send(const Session::Outgoing& outgoing) {
   if (const auto* message = std::get_if<wire::Message>(&outgoing)) {
     return socket_.asyncWrite(encodeOrFailure(*message), sent);
   }
-  const auto& [subscription, delivery, in_shared_memory] = std::get<Session::FrameOut>(outgoing);
+  const auto& [subscription, delivery, bodies] = std::get<Session::FrameOut>(outgoing);
   wire::FrameMessage message{subscription, delivery.frame->frame};
   message.frame.dropped_before = delivery.dropped_before;
   auto encoded = wire::encode(message, delivery.frame->body);
@@ -184,7 +184,7 @@ void Connection::send(const Session::Outgoing& outgoing) {
     logging::error("{}: {}; closing", name_, encoded.error().message);
     return close();
   }
-  if (auto shared = in_shared_memory ? delivery.frame->sharedBody(hub_->sharedBodies()) : nullptr) {
+  if (auto shared = bodies ? delivery.frame->sharedBody(*bodies) : nullptr) {
     return socket_.asyncWrite(*std::move(encoded), std::move(shared), sent);
   }
   socket_.asyncWrite(*std::move(encoded), sent);

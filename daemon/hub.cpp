@@ -25,6 +25,13 @@ Hub::Options Hub::options() const {
   return options_;
 }
 
+std::shared_ptr<transport::SharedBodies> Hub::sharedBodies() {
+  const std::scoped_lock lock{mutex_};
+  auto bodies = shared_bodies_.lock();
+  if (!bodies) shared_bodies_ = bodies = std::make_shared<transport::SharedBodies>();
+  return bodies;
+}
+
 void Hub::add(std::shared_ptr<SourceHost> source) {
   const std::scoped_lock lock{mutex_};
   const std::string name = source->name();

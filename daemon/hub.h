@@ -57,8 +57,8 @@ class Hub {
   void startRecording(const std::string& source, std::string_view file, RecordDone done);
   void stopRecording(const std::string& source, RecordDone done);
 
-  /// Of all streams to clients on this machine.
-  [[nodiscard]] transport::SharedBodies& sharedBodies() const { return *shared_bodies_; }
+  /// Of all streams to clients on this machine, for as long as one of them keeps it.
+  [[nodiscard]] std::shared_ptr<transport::SharedBodies> sharedBodies();
 
   std::atomic<std::uint32_t> sessions{0};  ///< for health; counted by the sessions themselves
 
@@ -66,7 +66,7 @@ class Hub {
   const Clock& clock_;
   mutable std::mutex mutex_;
   Options options_;
-  const std::shared_ptr<transport::SharedBodies> shared_bodies_ = std::make_shared<transport::SharedBodies>();
+  std::weak_ptr<transport::SharedBodies> shared_bodies_;  ///< while a subscription has it
   const std::shared_ptr<Budget> budget_;  // shared with subscriptions, which may outlive this
   const SteadyTime began_;
   std::map<std::string, std::shared_ptr<SourceHost>> sources_;  // shared with calls in progress

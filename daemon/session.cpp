@@ -106,7 +106,7 @@ std::optional<Session::Outgoing> Session::next() {
 }
 
 std::optional<Session::Outgoing> Session::nextOf(Subscriptions::iterator at) {
-  auto& [source, subscriber, window, on_way] = at->second;
+  auto& [source, subscriber, window, bodies, on_way] = at->second;
   if (window > 0 && on_way.size() >= window) return std::nullopt;
   // Room for the first was reserved. Without any for another, the next acknowledgement is waited for.
   Share share;
@@ -121,7 +121,7 @@ std::optional<Session::Outgoing> Session::nextOf(Subscriptions::iterator at) {
   if (auto* delivery = std::get_if<Backlog::Delivery>(&*item)) {
     last_served_ = id;
     if (window > 0) on_way.push_back({delivery->frame->frame.sequence, std::move(share)});
-    return FrameOut{id, std::move(*delivery), subscriber->wish.in_shared_memory};
+    return FrameOut{id, std::move(*delivery), bodies};
   }
   source->unsubscribe(subscriber);
   subscriptions_.erase(at);
@@ -173,14 +173,14 @@ Session::Answers Session::on(const wire::Subscribe& request) {
   if (!source) return {failure(request.id, source.error())};
   auto backlog = backlogFor(request, hub_.options().backlog_bytes, hub_.budget());
   if (!backlog) return {failure(request.id, backlog.error())};
-  const Wish wish{{request.planes, request.region, request.decimation},
-                  *backlog,
-                  request.window > 0 && usesSharedMemory()};
+  const Wish wish{{request.planes, request.region, request.decimation}, *backlog};
+  const bool in_shared_memory = request.window > 0 && usesSharedMemory();
   const bool is_lockstep = request.policy == wire::Policy::Lockstep;
   const std::uint64_t id = ++last_subscription_;
   Answers answer{wire::Subscribed{request.id, id}};
   Subscriptions made;  // all memory first: a source must not feed a subscriber that nobody knows
-  made.emplace(id, Subscription{*source, nullptr, is_lockstep ? 1 : request.window});
+  made.emplace(id, Subscription{*source, nullptr, is_lockstep ? 1 : request.window,
+                                in_shared_memory ? hub_.sharedBodies() : nullptr});
   auto subscriber = (*source)->subscribe(wish, wake_);
   if (!subscriber) return {failure(request.id, subscriber.error())};
   made.begin()->second.subscriber = *std::move(subscriber);

@@ -42,7 +42,7 @@ class Session {
   struct FrameOut {
     std::uint64_t subscription = 0;
     Backlog::Delivery delivery;
-    bool in_shared_memory = false;  ///< if it has a shared body
+    std::shared_ptr<transport::SharedBodies> bodies;  ///< that makes its shared body; null: it has none
   };
   using Outgoing = std::variant<wire::Message, FrameOut>;
 
@@ -72,6 +72,7 @@ class Session {
     std::shared_ptr<SourceHost> source;  // shared with the hub
     SubscriberPtr subscriber;
     std::uint32_t window = 0;  ///< frames that may be unacknowledged; 0: any number
+    std::shared_ptr<transport::SharedBodies> bodies;  // shared by all that take bodies that way
     struct OnWay {
       std::uint64_t sequence = 0;
       Share share;  ///< of the budget

@@ -19,7 +19,6 @@ namespace toftwin::daemon {
 struct Wish {
   Selection selection;
   Backlog::Settings backlog;
-  bool in_shared_memory = false;  ///< takes bodies that way, where that is worth while
 };
 
 /// One subscriber of a source.

@@ -106,15 +106,17 @@ FileDescriptor SharedBodies::takeSpare(std::uint64_t size) {
   return std::exchange(*spare, Spare{}).fd;
 }
 
-/// One of each size, the newest sizes only. What cannot be had now is taken when it is needed.
+/// One of each size; where all places are taken, the one that has waited longest goes. What cannot be had now
+/// is taken when it is needed.
 void SharedBodies::makeSpare(std::uint64_t size) {
   const std::scoped_lock lock{mutex_};
   if (size > kLargestSpare || std::ranges::find(spares_, size, &Spare::size) != spares_.end()) return;
   FileDescriptor fd = newMemfd();
   if (!fd || ::fallocate(fd.get(), 0, 0, static_cast<off_t>(size)) != 0) return;
   auto place = std::ranges::find(spares_, 0u, &Spare::size);
-  if (place == spares_.end()) place = spares_.begin() + static_cast<std::ptrdiff_t>(oldest_++ % kMostSpares);
-  *place = {size, std::move(fd)};
+  if (place == spares_.end()) place = spares_.begin();
+  std::rotate(place, place + 1, spares_.end());
+  spares_.back() = {size, std::move(fd)};
 }
 
 Result<Buffer> mapSharedBody(const FileDescriptor& memfd, std::uint64_t size) {

@@ -56,8 +56,9 @@ class SharedBody {
 };
 
 /// Makes bodies of streams. When a body goes, because all have it, memory is made ready for the next of its
-/// size: to take fresh pages from the kernel takes two thirds of the time that a body of 2 MB needs (0.55 → 0.20 ms),
-/// and a frame would wait for it. May be used on any thread.
+/// size: to take fresh pages from the kernel takes two thirds of the time that a body of 2 MB needs (0.55 →
+/// 0.20 ms), and a frame would wait for it. Shared by the subscriptions that want bodies, so that this memory
+/// goes with the last of them. May be used on any thread.
 class SharedBodies : public std::enable_shared_from_this<SharedBodies> {
  public:
   static constexpr std::size_t kMostSpares = 4;                  ///< sizes: streams with other planes
@@ -77,8 +78,7 @@ class SharedBodies : public std::enable_shared_from_this<SharedBodies> {
   void makeSpare(std::uint64_t size);
 
   mutable std::mutex mutex_;
-  std::array<Spare, kMostSpares> spares_;
-  std::size_t oldest_ = 0;
+  std::array<Spare, kMostSpares> spares_;  ///< the newest last
 };
 
 /// A received memfd as read-only memory that is unmapped when the last Buffer goes. It must be a

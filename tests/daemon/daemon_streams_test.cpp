@@ -122,6 +122,21 @@ TEST_F(RunningDaemon, FramesThatWaitForAStalledClientHoldNoFileDescriptors) {
   EXPECT_LE(openSharedBodies(), 3);
 }
 
+TEST_F(RunningDaemon, WithTheLastSubscriptionInSharedMemoryItsMemoryGoes) {
+  start("[[source]]\nname = 'cam'\ndriver = 'pattern'\npace = 'fast'\nwidth = 160\nheight = 120\n");
+  {
+    auto one = client();
+    auto stream = one.subscribe("cam", {.policy = Policy::Queue, .queue = 4});
+    ASSERT_TRUE(stream.ok());
+    for (int i = 0; i < 3; ++i) ASSERT_TRUE(stream->next(kSoon).ok());
+    EXPECT_GT(openSharedBodies(), 0);
+  }
+  const auto soon = std::chrono::steady_clock::now() + kSoon;
+  while (openSharedBodies() > 0 && std::chrono::steady_clock::now() < soon)
+    std::this_thread::sleep_for(std::chrono::milliseconds{10});
+  EXPECT_EQ(openSharedBodies(), 0);
+}
+
 /// The patience of the kernel with silent peers, one entry for each TCP socket of this process that has one.
 std::vector<unsigned> patienceOfSockets() {
   std::vector<unsigned> all;

@@ -386,6 +386,18 @@ TEST(SharedBodies, KeepTheNewestSizes) {
   EXPECT_EQ(bodies->ready(), newest);
 }
 
+TEST(SharedBodies, ASizeThatWasUsedAgainIsNewerThanTheOthers) {
+  const auto bodies = std::make_shared<SharedBodies>();
+  const auto use = [&](int size) {
+    return bodies->make(wire::encodeBody(wire::exampleFrame(16 * size, 4).planes)).ok();
+  };
+  for (const int size : {1, 2, 3, 4, 1, 5}) ASSERT_TRUE(use(size));
+  const std::uint64_t before = bodies->ready();
+  const wire::Body first = wire::encodeBody(wire::exampleFrame(16, 4).planes);
+  const auto held = bodies->make(first);
+  EXPECT_EQ(bodies->ready(), before - first.bytes) << "2 went, and 1 is still there";
+}
+
 TEST(SharedBodyTest, AnUnsealedMemfdIsRefused) {
   const FileDescriptor memfd{::memfd_create("test", MFD_CLOEXEC | MFD_ALLOW_SEALING)};
   ASSERT_EQ(::ftruncate(memfd.get(), 64), 0);
