@@ -19,8 +19,8 @@
 
 namespace toftwin::drivers {
 
-/// What an opened camera is and can do. Constant while it is open, but for frame_interval and can_trigger where
-/// parameters set them.
+/// What an opened camera is and can do. Constant while it is open, but for planes, frame_interval and can_trigger
+/// where parameters set them.
 struct SourceInfo {
   std::string driver;  ///< name of the driver's row
   std::string model;   ///< "Microsoft Kinect v2 (simulated)"
