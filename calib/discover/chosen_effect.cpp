@@ -127,6 +127,13 @@ std::optional<Experiment> experimentOf(const Context& context, const Effect& eff
 
 }  // namespace
 
+double correlationOf(const Context& context, const TermGroup& a, const TermGroup& b) {
+  const TermGroup both[]{a, b};
+  const Part prepared = prepare(context, both, false);
+  return correlationOf(prepared, prepared.marginal.groups[prepared.first],
+                       prepared.marginal.groups[prepared.first + 1]);
+}
+
 Effect effectOf(const Context& context, const std::vector<Explanation>& all, std::size_t chosen) {
   const Explanation& mine = all[chosen];
   std::vector<TermGroup> groups;

@@ -231,6 +231,12 @@ std::vector<Estimate> estimate(const RowSource& source, std::span<const double> 
       }
     }
     effect.covariance = covariance(which, which);
+    const std::vector<Term> terms = termsOf(effect);
+    for (std::size_t t = 0; t < terms.size(); ++t) {
+      const double factor = source.errorFactor(terms[t]);
+      effect.covariance.row(static_cast<Index>(t)) *= factor;
+      effect.covariance.col(static_cast<Index>(t)) *= factor;
+    }
     for (std::size_t i = 0; i < which.size(); ++i) {
       effect.numbers[i].error =
           std::sqrt(std::max(0.0, effect.covariance(static_cast<Index>(i), static_cast<Index>(i))));

@@ -28,4 +28,18 @@ const Group* Evidence::find(std::string_view name) const {
   return found == groups.end() ? nullptr : &*found;
 }
 
+std::vector<CaptureEvidence> joined(std::vector<CaptureEvidence> captures, const std::vector<std::size_t>& unit) {
+  std::vector<CaptureEvidence> all;
+  for (std::size_t c = 0; c < captures.size(); ++c) {
+    if (unit[c] == all.size()) {
+      all.push_back(std::move(captures[c]));
+      continue;
+    }
+    CaptureEvidence& one = all[unit[c]];
+    one.gram += captures[c].gram, one.moment += captures[c].moment;
+    one.energy += captures[c].energy, one.rows += captures[c].rows;
+  }
+  return all;
+}
+
 }  // namespace toftwin::discover

@@ -59,4 +59,8 @@ struct Evidence {
   [[nodiscard]] const Group* find(std::string_view name) const;
 };
 
+/// Captures that are one: what is drawn anew for each capture is drawn once for all with the same number of `unit`,
+/// and they are in one fold. Numbers rise from 0 in the order in which they first appear.
+std::vector<CaptureEvidence> joined(std::vector<CaptureEvidence> captures, const std::vector<std::size_t>& unit);
+
 }  // namespace toftwin::discover

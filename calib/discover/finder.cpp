@@ -346,11 +346,27 @@ class Search {
     std::ranges::stable_sort(finding_.effects, {}, &Effect::is_rest);  // behind what they are the rest of
   }
 
-  /// Whether the stronger one takes from the other what both explain: on captures that it was not fitted to,
-  /// the other predicts more without it than beside it. What has a cause of its own loses nothing.
+  /// Whether much of the weaker one's curve is the stronger one's, too, whatever its sign: more of it, ρ², than
+  /// covariates that have nothing to do with each other have over so many captures, |ρ| > 2/√n. What has a
+  /// cause of its own goes its own way.
   [[nodiscard]] bool shareAPart(std::size_t weaker, std::size_t stronger) const {
-    const Difference lost = difference(gainBeside(weaker, {weaker, stronger}), gainBeside(weaker, {weaker}));
-    return lost.mean > 2.0 * lost.error;
+    std::vector<Effect> others;
+    for (std::size_t i = 0; i < finding_.effects.size(); ++i)
+      if (i != weaker && i != stronger) others.push_back(finding_.effects[i]);
+    Context beside = context_;
+    beside.known = groupsOf(others);
+    beside.source = sourceOf(fitsOf(others));
+    const double shared =
+        correlationOf(beside, curveOf(finding_.effects[weaker]), curveOf(finding_.effects[stronger]));
+    const auto captures = static_cast<double>(beside.source->withoutCatalogue({}).captures.size());
+    return shared * shared * captures > 4.0;
+  }
+  /// Its terms; of an effect of the catalogue those of the curve that it is not told from.
+  static TermGroup curveOf(const Effect& effect) {
+    TermGroup curve{effect.name, Kind::Generic, termsOf(effect), 0};
+    for (const Alternative& other : effect.alternatives)
+      if (curve.terms.empty()) curve = other.group;
+    return curve;
   }
 
   /// What an effect explains of held-out captures beside all but those at `without`.

@@ -87,6 +87,10 @@ void fitCatalogue(const Context& context, std::vector<Explanation>& explanations
 /// with fewer numbers is as good.
 std::optional<std::size_t> chooseNamed(const Context& context, std::vector<Explanation>& explanations);
 
+/// Correlation of two fitted curves over the captures, the context's model projected out of both: its square is the
+/// share of one that the other explains, too.
+double correlationOf(const Context& context, const TermGroup& a, const TermGroup& b);
+
 /// Its place among `explanations` and what else explains as much, the next experiment, how often it is best.
 Effect effectOf(const Context& context, const std::vector<Explanation>& explanations, std::size_t chosen);
 

@@ -109,6 +109,8 @@ class RowSource {
   /// How a term is written once it is known. Some carriers are estimated from other captures while they
   /// compete, so that no capture explains itself, and from all once they are chosen.
   [[nodiscard]] virtual Term settled(Term term) const { return term; }
+  /// What the error of such a term's coefficient is multiplied with.
+  [[nodiscard]] virtual double errorFactor(const Term&) const { return 1.0; }
   /// What effects of the catalogue call a carrier; empty: nothing.
   [[nodiscard]] virtual std::string wordOfCarrier(const std::string&) const { return {}; }
   /// Its catalogue, where it can be fitted as it is.

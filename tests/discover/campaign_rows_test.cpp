@@ -6,8 +6,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <filesystem>
 #include <fstream>
+#include <numbers>
+#include <set>
 
 #include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/catalogue.h"
@@ -16,6 +19,7 @@
 #include "calib/discover/campaign/refit.h"
 #include "protocol/record/recording.h"
 #include "calib/discover/campaign/rows.h"
+#include "calib/discover/campaign/sites.h"
 #include "calib/discover/marginal.h"
 #include "calib/discover/significance.h"
 #include "tests/discover/simulated_run.h"
@@ -24,8 +28,8 @@ namespace toftwin::discover {
 namespace {
 
 struct Made {
-  Campaign campaign;
-  std::vector<std::shared_ptr<const TracedCapture>> traced;
+  const Campaign& campaign;
+  const std::vector<std::shared_ptr<const TracedCapture>>& traced;
   CampaignRows rows;
 };
 
@@ -45,14 +49,22 @@ class Rows : public testing::Test {
     write(SimulatedRun{.plan = *plan, .camera = *camera, .scene = *scene, .spoil = spoil}, folder_);
     auto campaign = readCampaign(folder_, Side::A);
     if (!campaign) throw std::runtime_error(campaign.error().message);
-    const Declared as_declared{*declared, *scene};
-    auto traced = traceAll(as_declared, campaign->captures, {.max_surfaces = 1});
+    auto traced = traceAll({*declared, *scene}, campaign->captures, {.max_surfaces = 1});
     if (!traced) throw std::runtime_error(traced.error().message);
-    const Lit lit{campaign->captures, *traced, *traced};
-    auto rows = CampaignRows::make(as_declared, lit, {});
+    const Kept& kept = kept_.emplace_back(Declared{*declared, *scene}, *std::move(campaign), *std::move(traced));
+    auto rows = CampaignRows::make(kept.declared, {kept.campaign.captures, kept.traced, kept.traced}, {});
     if (!rows) throw std::runtime_error(rows.error().message);
-    return {*std::move(campaign), *std::move(traced), *std::move(rows)};
+    return {kept.campaign, kept.traced, *std::move(rows)};
   }
+  /// What rows refer to.
+  struct Kept {
+    Kept(Declared of, Campaign taken, std::vector<std::shared_ptr<const TracedCapture>> light)
+        : declared(std::move(of)), campaign(std::move(taken)), traced(std::move(light)) {}
+    Declared declared;
+    Campaign campaign;
+    std::vector<std::shared_ptr<const TracedCapture>> traced;
+  };
+  std::deque<Kept> kept_{};
   std::filesystem::path folder_;
 };
 
@@ -127,6 +139,29 @@ TEST_F(Rows, ADelayOfTheLightIsFoundHoweverLargeItIs) {
   EXPECT_NEAR(left_rad, 0.0, 1e-12);
 }
 
+/// Offset 5, delay −1 mm beyond what is known; variances 0.01 and 1, covariance 0.05.
+Refitted withDelayOfOne() {
+  Refitted fitted{.offset_mm = 5.0, .delay_mm = -1.0};
+  fitted.common_covariance(0, 0) = 0.01, fitted.common_covariance(2, 2) = 1.0;
+  fitted.common_covariance(0, 2) = fitted.common_covariance(2, 0) = 0.05;
+  return fitted;
+}
+
+TEST(Zero, ADelayThatIsNoMoreThanChanceWithWhatIsKnownIsTakenBack) {
+  const Zero zero = zeroOf(withDelayOfOne(), 2.0);
+  EXPECT_EQ(zero.delay_mm, -2.0);
+  EXPECT_NEAR(zero.offset_mm, 5.0 - 0.05 + 2.0, 1e-12);
+  EXPECT_NEAR(zero.offset_error_mm, std::sqrt(0.01 - 0.05 * 0.05), 1e-12);
+}
+
+TEST(Zero, TheOffsetBesideADelayIsAsUncertainAsBoth) {
+  const Zero zero = zeroOf(withDelayOfOne(), 20.0);
+  EXPECT_EQ(zero.delay_mm, -1.0);
+  EXPECT_NEAR(zero.offset_mm, 6.0, 1e-12);
+  EXPECT_NEAR(zero.offset_error_mm, std::sqrt(0.01 + 1.0 - 2.0 * 0.05), 1e-12);
+  EXPECT_TRUE(zero.hasOffset());
+}
+
 TEST_F(Rows, WithoutACyclicErrorADelayIsAnOffset) {
   const Made made = make("[[effect]]\ntype = 'frequency_offset'\nfirst_rad = 0.04\n", tinyCamera());
   const auto declared = sim::SensorModel::parse(tinyCamera(), "camera.toml");
@@ -190,6 +225,43 @@ repeats = 3
   EXPECT_EQ(made.rows.patternOf("pixel:gain"), nullptr);
 }
 
+/// A distance of 3.3 % more moves what is 9 pixels from the middle by a third of one.
+TEST_F(Rows, SitesAreLinkedFromNeighbourToNeighbourAndAsWideAsACell) {
+  const auto sites = [this](const std::string& distances_m, const CellGrid& grid,
+                            const std::map<std::string, sim::Scene>& scene_of_block = {}) {
+    const std::string plan = R"(name = "sites"
+seed = 7
+frames = 4
+exposure_us = 500.0
+[[block]]
+name = "first"
+kind = "warm_up"
+distance_m = [1.5]
+repeats = 3
+interval_s = 80.0
+[[block]]
+name = "other"
+kind = "distance"
+repeats = 2
+)";
+    const Made made = make("", tinyCamera(), plan + "distance_m = " + distances_m + "\n");
+    const auto camera = sim::SensorModel::parse(tinyCamera(), "camera.toml");
+    const auto scene = sim::Scene::parse(smallScene(), "scene.toml");
+    const auto all = sitesOf({*camera, *scene, scene_of_block},
+                             {made.campaign.captures, made.traced, made.traced}, grid);
+    return std::set<std::size_t>(all.begin(), all.end()).size();
+  };
+  const CellGrid pixels{1, 1, 28, 21}, large{14, 8, 2, 3};
+  EXPECT_EQ(sites("[1.55, 1.6, 1.65, 1.7, 1.75, 1.8, 1.85, 1.9, 1.95, 2.0]", pixels), 1U);
+  EXPECT_EQ(sites("[2.0, 2.001, 2.002]", pixels), 2U) << "without those between them";
+  EXPECT_EQ(sites("[2.0, 2.001, 2.002]", large), 1U) << "in cells of 14 x 8 pixels nothing moves into the next";
+  const auto again = sim::Scene::parse(smallScene(), "again.toml"),
+             corner = sim::Scene::parse(cornerScene(), "corner.toml");
+  ASSERT_TRUE(again && corner);
+  EXPECT_EQ(sites("[1.55, 1.551, 1.552]", pixels, {{"other", *again}}), 1U) << "another copy of the same scene";
+  EXPECT_EQ(sites("[1.55, 1.551, 1.552]", pixels, {{"other", *corner}}), 2U);
+}
+
 /// A pattern far below the noise of one capture. Fitted where it was learned, it would have explained that
 /// noise, too, and would seem several times as strong as it was taken for.
 TEST_F(Rows, HowStrongAPatternIsOtherPlacesSay) {
@@ -202,7 +274,9 @@ TEST_F(Rows, HowStrongAPatternIsOtherPlacesSay) {
   append(columns, marginal.groups.back());
   const Fit with = fit(marginal, columns);
   const Eigen::Index last = with.coefficient.size() - 1;
-  const double error = std::sqrt(with.inverse(last, last) * std::max(1.0, with.dispersion()));
+  const double error =
+      made.rows.errorFactor(found) * std::sqrt(with.inverse(last, last) * std::max(1.0, with.dispersion()));
+  EXPECT_EQ(made.rows.errorFactor(found), std::numbers::sqrt2) << "each two places are counted twice";
   EXPECT_LT(error, 0.2);
   EXPECT_NEAR(with.coefficient[last], 1.0, 4.0 * error);
 }
@@ -312,6 +386,21 @@ TEST_F(Recording, IsCutWhereTheCameraMovesOrIsSetOtherwise) {
                 0.005)
           << locked.record.name << " was judged where " << open.record.name << " was searched";
   EXPECT_EQ(campaign->locked.size(), campaign->put_aside.size());
+  // What was taken without moving the camera is one, with one deviation of its pose, unless that is more than
+  // a fifth of all.
+  const std::vector<std::size_t> stands = standsOf(campaign->captures);
+  ASSERT_EQ(stands.size(), campaign->captures.size());
+  for (std::size_t a = 0; a < stands.size(); ++a) {
+    for (std::size_t b = 0; b < a; ++b) {
+      if (stands[a] != stands[b]) continue;
+      EXPECT_LT(norm(campaign->captures[a].moment.world_from_camera->translation_m -
+                     campaign->captures[b].moment.world_from_camera->translation_m),
+                0.01);
+    }
+  }
+  EXPECT_LT(*std::ranges::max_element(stands) + 1, stands.size()) << "nothing is joined";
+  for (const std::size_t stand : stands)
+    EXPECT_LE(static_cast<std::size_t>(std::ranges::count(stands, stand)) * 5, captures + 4);
   std::size_t frames = 0, of_run = 0;
   for (const auto* all : {&campaign->captures, &campaign->put_aside})
     for (const MeasuredCapture& one : *all) frames += one.frames;
@@ -355,6 +444,24 @@ TEST_F(Recording, IsSearchedForWhatTheCameraFileLacks) {
   EXPECT_THAT(finding->notes, testing::Contains(testing::HasSubstr("all of one place in five")));
   ASSERT_TRUE(finding->judgement);
   EXPECT_LT(finding->judgement->after.rms_mm, finding->judgement->before.rms_mm);
+}
+
+/// Two captures with one deviation of 2 between them: each alone would have to explain its own.
+TEST(Evidence, CapturesOfOneStandHaveOneDeviation) {
+  const auto capture = [](double deviation) {
+    return CaptureEvidence{.gram = Eigen::MatrixXd::Constant(1, 1, 100.0),
+                           .moment = Eigen::VectorXd::Constant(1, 100.0 * deviation),
+                           .energy = 100.0 * deviation * deviation,
+                           .rows = 100.0};
+  };
+  const std::vector<Group> groups{{.name = "pose", .kind = Kind::PerCapture, .first = 0, .count = 1}};
+  const std::vector<CaptureEvidence> captures{capture(2.0), capture(2.0), capture(-1.0)};
+  const auto all = joined(captures, {0, 0, 1});
+  ASSERT_EQ(all.size(), 2U);
+  EXPECT_EQ(all[0].rows, 200.0);
+  // yᵀ(I + ZZᵀ)⁻¹y of n rows of 2 is 4n/(1 + n).
+  EXPECT_NEAR(marginalise({groups, all}, {}).energy, 800.0 / 201.0 + 100.0 / 101.0, 1e-9);
+  EXPECT_NEAR(marginalise({groups, captures}, {}).energy, 900.0 / 101.0, 1e-9);
 }
 
 TEST(Catalogue, NumbersOfAnEffectAreSetByTheirKeysAndStayWithinBounds) {

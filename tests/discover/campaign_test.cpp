@@ -211,8 +211,8 @@ TEST_F(Searched, WhatOnlyTheFirstCapturesShowIsNamedWithWhatLooksAlike) {
       << verdictOf(finding) << testing::PrintToString(finding.effects.front().found.refused);
   // They differ where a camera's time and its temperatures do not go together.
   ASSERT_TRUE(finding.effects.front().next);
-  EXPECT_GT(finding.effects.front().next->chi2, 9.0)
-      << "the captures that were taken tell them apart by less";
+  EXPECT_GT(finding.effects.front().next->chi2, 9.0);
+  EXPECT_LT(finding.effects.front().next->taken_chi2, finding.effects.front().next->chi2);
   EXPECT_THAT(finding.effects.front().next->change,
               testing::AnyOf(HasSubstr("switching"), HasSubstr("warmer")));
 }
@@ -246,7 +246,10 @@ TEST_F(OfSquareWaves, ADelayOfTheLightIsInTheModelThatIsJudged) {
   ASSERT_TRUE(finding.judgement);
   EXPECT_LT(finding.judgement->after.per_row, 1.2);
   EXPECT_GT(finding.judgement->before.per_row, 2.0 * finding.judgement->after.per_row);
-  EXPECT_GT(finding.judgement->removed, 0.9);
+  // That is the delay's merit, and said to be.
+  EXPECT_GT(finding.judgement->removed_by_zero, 0.9);
+  EXPECT_NEAR(finding.judgement->after.per_row, finding.judgement->with_zero.per_row, 0.1);
+  EXPECT_THAT(verdictOf(finding), HasSubstr("delay of the light"));
   const auto model = sim::SensorModel::parse(finding.model_toml, "model.toml");
   ASSERT_TRUE(model) << model.error().message;
   double found_rad = 0.0;

@@ -35,12 +35,18 @@ struct Repeated {
 struct MeasuredCapture {
   plan::CaptureRecord record;
   Moment moment;  ///< of the first frame
+  /// Captures with the same one, unless it is empty, were taken without moving the camera: the pose is off by the same
+  /// in all of them, and they are held out together.
+  std::string stand{};
   std::size_t frames = 0;
   Repeated range_m, log_amplitude;  ///< the latter empty where the camera gives none
   Image<float> valid_share;
   /// Even minus odd frames, means over the image of the range: what goes with the frame's number.
   double parity_m = 0.0, parity_error_m = 0.0;
 };
+
+/// For each capture the number of its stand, from 0 on as they first appear; one without a name is its own.
+std::vector<std::size_t> standsOf(const std::vector<MeasuredCapture>& captures);
 
 /// Which camera of a run, and which of its captures.
 enum class Side { A, B };

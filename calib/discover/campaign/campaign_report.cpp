@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <ctime>
 #include <functional>
@@ -86,7 +87,26 @@ compare::TableBlock effectTable(const CampaignFinding& finding) {
   return table;
 }
 
-compare::TableBlock lockedTable(const Judgement& judgement) {
+std::string capitalised(std::string sentence) {
+  sentence.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(sentence.front())));
+  return sentence;
+}
+
+bool hasDelay(const CampaignFinding& finding) { return finding.zero.delay_mm != 0.0; }
+
+/// What model.toml has that is no effect, and what of the locked captures' error it is; empty: nothing.
+std::string delayInWords(const CampaignFinding& finding) {
+  if (!hasDelay(finding)) return "";
+  std::string words = fmt::format("a delay of the light of {:.2f} mm, which the camera file lacks", finding.zero.delay_mm);
+  if (const auto& judged = finding.judgement)
+    words += fmt::format(", removes {} of what can be explained", compare::shownPercent(judged->removed_by_zero));
+  else
+    words += ", is in model.toml";
+  return words;
+}
+
+compare::TableBlock lockedTable(const CampaignFinding& finding) {
+  const Judgement& judgement = *finding.judgement;
   compare::TableBlock table{"Measured − simulated on the locked captures, edges left out",
                             {"model", "bias [mm]", "RMS [mm]", "95 % within [mm]", "χ² per row",
                              "neighbours alike", "masks agree"},
@@ -98,6 +118,7 @@ compare::TableBlock lockedTable(const Judgement& judgement) {
                           compare::shownPercent(errors.masks_agree)});
   };
   row("as declared", judgement.before);
+  if (hasDelay(finding)) row("as declared, with the light's delay", judgement.with_zero);
   row("with what was found", judgement.after);
   return table;
 }
@@ -142,8 +163,9 @@ compare::TableBlock seenTable(const CampaignFinding& finding) {
 }
 
 std::string adviceOf(const NextCapture& next) {
-  return fmt::format("take capture \"{}\" again{}; there {} would differ by {:.3g} in χ²", next.like,
-                     next.change.empty() ? "" : " " + next.change, next.other, next.chi2);
+  return fmt::format("take capture \"{}\" again{}; there {} would differ by {:.3g} in χ², in those that were taken by "
+                     "{:.3g} at most",
+                     next.like, next.change.empty() ? "" : " " + next.change, next.other, next.chi2, next.taken_chi2);
 }
 
 compare::Section foundSection(const CampaignFinding& finding) {
@@ -176,7 +198,7 @@ compare::Section foundSection(const CampaignFinding& finding) {
       "them{}; of what is left p = {:.3g}. Offset of the device against its poses: {}.",
       finding.finding.first_p, finding.finding.score_names.size(), finding.finding.draws,
       finding.finding.by_sign_flips ? " (sign flips of captures)" : "", finding.finding.last_p,
-      compare::shownWithError(finding.offset_mm, finding.offset_error_mm, 2) + " mm" +
+      compare::shownWithError(finding.zero.offset_mm, finding.zero.offset_error_mm, 2) + " mm" +
           (finding.zero.delay_mm == 0.0
                ? ""
                : fmt::format("; delay of its light: {:.2f} mm", finding.zero.delay_mm)))});
@@ -232,7 +254,7 @@ Json dataOf(const CampaignJob& job, const CampaignFinding& finding) {
       .set("frames", finding.frames)
       .set("locked", finding.locked);
   data.set("p", finding.finding.first_p).set("p_left", finding.finding.last_p);
-  data.set("offset_mm", finding.offset_mm).set("offset_error_mm", finding.offset_error_mm);
+  data.set("offset_mm", finding.zero.offset_mm).set("offset_error_mm", finding.zero.offset_error_mm);
   data.set("delay_of_light_mm", finding.zero.delay_mm);
   data.set("scales", Json::arrayOf(finding.finding.scales)).set("chi2_per_row", finding.dispersion);
   for (const FoundEffect& one : finding.effects) effects.push(toJson(one));
@@ -241,6 +263,7 @@ Json dataOf(const CampaignJob& job, const CampaignFinding& finding) {
   if (const auto& judged = finding.judgement) {
     Json locked = Json::object();
     locked.set("before", toJson(judged->before)).set("after", toJson(judged->after));
+    locked.set("with_zero", toJson(judged->with_zero)).set("removed_by_zero", judged->removed_by_zero);
     locked.set("removed", judged->removed).set("removed_low", judged->removed_low);
     locked.set("removed_high", judged->removed_high).set("explainable_chi2", judged->explainable);
     data.set("locked_captures", std::move(locked));
@@ -289,13 +312,13 @@ std::vector<SeenGroup> seenFirst(const CampaignFinding& finding, std::size_t mos
 
 std::string verdictOf(const CampaignFinding& finding) {
   if (finding.effects.empty() && finding.updates.empty()) {
-    return finding.finding.first_p > 0.01
-               ? fmt::format("Nothing is left above the noise (p = {:.2g})",
-                             finding.finding.first_p)
-               : fmt::format(
-                     "Something is left (p = {:.2g}), but nothing that holds on captures it was "
-                     "not fitted to",
-                     finding.finding.first_p);
+    const std::string beside = hasDelay(finding) ? ", beside it," : "";
+    const std::string rest =
+        finding.finding.first_p > 0.01
+            ? fmt::format("nothing{} is left above the noise (p = {:.2g})", beside, finding.finding.first_p)
+            : fmt::format("something{} is left (p = {:.2g}), but nothing that holds on captures it was not fitted to",
+                          beside, finding.finding.first_p);
+    return capitalised(hasDelay(finding) ? delayInWords(finding) + "; " + rest : rest);
   }
   std::vector<std::string> names;
   for (const FoundEffect& one : finding.effects)
@@ -305,11 +328,12 @@ std::string verdictOf(const CampaignFinding& finding) {
   std::string verdict = fmt::format("The model lacks {}", fmt::join(names, "; "));
   if (finding.effects.empty())
     verdict = fmt::format("The model has wrong numbers: {}", fmt::join(names, "; "));
+  if (hasDelay(finding)) verdict += ". " + capitalised(delayInWords(finding));
   if (const auto& judged = finding.judgement) {
     verdict += fmt::format(
-        ". On the locked captures: RMS {} → {} mm, {} of what can be explained is removed",
+        ". On the locked captures: RMS {} → {} mm, {} of what {} is removed",
         shown(judged->before.rms_mm, 2), shown(judged->after.rms_mm, 2),
-        compare::shownPercent(judged->removed));
+        compare::shownPercent(judged->removed), hasDelay(finding) ? "the delay leaves" : "can be explained");
     if (finding.is_worse) verdict += "; since that is worse than before, model.toml is the camera file as it was";
   }
   return verdict;
@@ -324,11 +348,12 @@ Result<std::filesystem::path> writeReport(const CampaignJob& job, const Campaign
   report.sections.push_back(foundSection(finding));
   if (finding.judgement) {
     compare::Section section{.id = "locked", .title = "Before and after, on locked captures"};
-    section.verdict = fmt::format("χ² above the noise falls by {} (95 %: {} to {}).",
+    section.verdict = fmt::format("{}χ² above the noise falls by {} (95 %: {} to {}).",
+                                  hasDelay(finding) ? capitalised(delayInWords(finding)) + ". By what was found, " : "",
                                   compare::shownPercent(finding.judgement->removed),
                                   compare::shownPercent(finding.judgement->removed_low),
                                   compare::shownPercent(finding.judgement->removed_high));
-    section.blocks.emplace_back(lockedTable(*finding.judgement));
+    section.blocks.emplace_back(lockedTable(finding));
     section.blocks.emplace_back(
         compare::FigureRow{{figureOver(*finding.judgement, "time since power-on [s]",
                                        [](const JudgedCapture& c) { return c.since_power_on_s; }),

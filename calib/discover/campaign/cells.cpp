@@ -26,6 +26,12 @@ CellSize cellSizeOf(int width, int height, int most) {
 
 }  // namespace
 
+CellGrid Cells::gridOf(int width, int height, int most) {
+  const CellSize size = cellSizeOf(width, height, most);
+  return {size.width, size.height, (width + size.width - 1) / size.width,
+          (height + size.height - 1) / size.height};
+}
+
 Cells::Cells(const MeasuredCapture& capture, const TracedCapture& traced, const Reading& declared,
              int most) {
   const Image<float>& range_m = capture.range_m.mean;
@@ -55,9 +61,8 @@ Cells::Cells(const MeasuredCapture& capture, const TracedCapture& traced, const 
         weight(capture.range_m, i, traced.tracing_variance_m2[i], kLeastRange_m);
     counts[i] = 1;
   }
-  const CellSize size = cellSizeOf(width, height, most);
-  grid_ = {size.width, size.height, (width + size.width - 1) / size.width,
-           (height + size.height - 1) / size.height};
+  grid_ = gridOf(width, height, most);
+  const CellSize size{grid_.cell_width, grid_.cell_height};
   for (int top = 0; top < height; top += size.height) {
     for (int left = 0; left < width; left += size.width) {
       std::vector<std::uint32_t> cell;

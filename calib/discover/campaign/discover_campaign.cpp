@@ -186,21 +186,21 @@ FittedEffect* formOf(const FittedEffect& fitted, CampaignFinding& finding) {
   return nullptr;
 }
 
-void takeFitted(const Refitted& refitted, CampaignFinding& finding) {
+void takeFitted(const Refitted& refitted, double known_delay_mm, CampaignFinding& finding) {
   for (const FittedEffect& one : refitted.fitted) {
     if (FittedEffect* form = formOf(one, finding))
       *form = one;
     else
       finding.updates.push_back(one);
   }
-  finding.offset_mm = refitted.offset_mm, finding.offset_error_mm = refitted.offset_error_mm;
-  finding.zero = zeroOf(refitted);
+  finding.zero = zeroOf(refitted, known_delay_mm);
   finding.dispersion = refitted.dispersion;
 }
 
-/// The camera file as it is, and what its device's offset and gain then are.
-Result<JudgedModel> asItIs(const JudgedCampaign& judged) {
-  JudgedModel model{effectsWithoutNoise(judged.declared.model)};
+/// The camera file with a delay of the light, and what its device's offset and gain then are.
+Result<JudgedModel> fileWith(const JudgedCampaign& judged, double delay_mm) {
+  const sim::SensorModel& file = judged.declared.model;
+  JudgedModel model{withDelay(file, effectsWithoutNoise(file), delay_mm)};
   const auto evidence = residualEvidence(judged, model.effects);
   if (!evidence) return evidence.error();
   const Marginal marginal = marginalise(*evidence, judged.scales);
@@ -210,8 +210,7 @@ Result<JudgedModel> asItIs(const JudgedCampaign& judged) {
 }
 
 Result<> judgeLocked(const CampaignJob& job, const Campaign& campaign, const Declared& declared,
-                     const JudgedModel& before, const JudgedModel& after,
-                     CampaignFinding& finding) {
+                     const JudgedModels& models, CampaignFinding& finding) {
   if (!isRecording(job)) {
     const auto opened = plan::openLocked(
         {.run = job.run, .output = job.output, .locked = true, .note = job.note}, campaign.locked);
@@ -231,7 +230,7 @@ Result<> judgeLocked(const CampaignJob& job, const Campaign& campaign, const Dec
   // What an imperfect fit leaves of the open captures is no noise.
   constexpr double kMostNoise = 1.1;
   const Lit lit{*captures, *traced, *at_poses};
-  auto judgement = judge({declared, lit, finding.finding.scales, kMostCells}, before, after,
+  auto judgement = judge({declared, lit, finding.finding.scales, kMostCells}, models,
                          std::min(kMostNoise, finding.dispersion));
   if (!judgement) return judgement.error();
   finding.judgement = *std::move(judgement);
@@ -304,18 +303,21 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
   const auto refitted = refit(*rows, inserted.effects, inserted.fitted,
                               {.scales = finding.finding.scales, .only = inserted.only});
   if (!refitted) return refitted.error();
-  takeFitted(*refitted, finding);
+  takeFitted(*refitted, *late, finding);
   addNextCaptures({declared, lit, finding.finding.scales}, *rows, finding.effects);
   const Zero beyond = finding.zero;
   finding.zero.delay_mm += *late;
   finding.model_toml = modelText(files->text, declared, finding);
   progress.begin();
   if (job.open_locked && !campaign->locked.empty()) {
-    const auto before = asItIs({declared, lit, finding.finding.scales});
+    const JudgedCampaign searched{declared, lit, finding.finding.scales};
+    const auto before = fileWith(searched, 0.0);
     if (!before) return before.error();
-    const JudgedModel after{withDelay(declared.model, refitted->effects, beyond.delay_mm), beyond.offset_mm,
-                            refitted->gain_percent};
-    if (auto done = judgeLocked(job, *campaign, declared, *before, after, finding); !done)
+    const auto with_zero = fileWith(searched, finding.zero.delay_mm);
+    if (!with_zero) return with_zero.error();
+    const JudgedModel after{withDelay(declared.model, refitted->effects, beyond.delay_mm),
+                            beyond.hasOffset() ? beyond.offset_mm : 0.0, beyond.gain_percent};
+    if (auto done = judgeLocked(job, *campaign, declared, {*before, *with_zero, after}, finding); !done)
       return done.error();
     keepIfWorse(files->text, finding);
   } else {

@@ -38,6 +38,7 @@ struct NextCapture {
   std::string like{};    ///< the name of a capture that was taken
   std::string change{};  ///< how to take it again; empty: as it was
   double chi2 = 0.0;     ///< by which the two differ in it
+  double taken_chi2 = 0.0;  ///< and at most in one that was taken
 };
 
 /// What an effect that was found became in the model.
@@ -55,7 +56,6 @@ struct CampaignFinding {
   Finding finding{};
   std::vector<FoundEffect> effects{};
   std::vector<FittedEffect> updates{};  ///< declared effects whose numbers were wrong
-  double offset_mm = 0.0, offset_error_mm = 0.0;
   Zero zero{};  ///< with what was found; its delay whole
   double dispersion = 1.0;
   std::optional<Judgement> judgement{};  ///< on the locked captures

@@ -47,11 +47,11 @@ void addDelay(const Declared& declared, double beyond_mm, std::vector<std::optio
 /// An offset of the range that is no chance: in the file's delay, or in one more.
 void addOffset(const sim::SensorModel& model, const CampaignFinding& finding,
                std::vector<std::optional<FittedEffect>>& updates, std::vector<FittedEffect>& added) {
-  if (!(std::abs(finding.zero.offset_mm) > 3.0 * finding.offset_error_mm)) return;
+  if (!finding.zero.hasOffset()) return;
   const auto farther = [&](Length own) {
     const Length offset = own + finding.zero.offset_mm * millimetre;
     return FittedEffect{sim::Delay{.offset = offset},
-                        {{"offset_mm", offset.in(millimetre), finding.offset_error_mm}}};
+                        {{"offset_mm", offset.in(millimetre), finding.zero.offset_error_mm}}};
   };
   for (std::size_t i = 0; i < updates.size(); ++i) {
     const auto* own = std::get_if<sim::Delay>(&model.effects()[i]);

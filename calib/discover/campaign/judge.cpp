@@ -44,7 +44,14 @@ double removedShare(const ByCapture& before, const ByCapture& after,
   return all > 0.0 ? 1.0 - left / all : kNaN;
 }
 
-void addRemoved(const ByCapture& before, const ByCapture& after, double dispersion,
+double perRow(const ByCapture& by_capture) {
+  double energy = 0.0, rows = 0.0;
+  for (const double one : by_capture.energy) energy += one;
+  for (const double one : by_capture.rows) rows += one;
+  return energy / rows;
+}
+
+void addRemoved(const ByCapture& before, const ByCapture& with_zero, const ByCapture& after, double dispersion,
                 Judgement& judgement) {
   constexpr int kDraws = 2000;
   constexpr std::uint64_t kSeed = 20'262;
@@ -52,24 +59,23 @@ void addRemoved(const ByCapture& before, const ByCapture& after, double dispersi
   std::vector<std::size_t> all(count);
   for (std::size_t c = 0; c < count; ++c) {
     all[c] = c;
-    judgement.explainable += before.energy[c] - dispersion * before.rows[c];
+    judgement.explainable += with_zero.energy[c] - dispersion * with_zero.rows[c];
   }
-  judgement.removed = removedShare(before, after, all, dispersion);
+  judgement.removed_by_zero = removedShare(before, with_zero, all, dispersion);
+  judgement.removed = removedShare(with_zero, after, all, dispersion);
   std::mt19937_64 engine{kSeed};
   std::uniform_int_distribution<std::size_t> any{0, count - 1};
   std::vector<double> shares;
   for (int k = 0; k < kDraws; ++k) {
     std::vector<std::size_t> drawn(count);
     for (std::size_t& c : drawn) c = any(engine);
-    const double share = removedShare(before, after, drawn, dispersion);
+    const double share = removedShare(with_zero, after, drawn, dispersion);
     if (std::isfinite(share)) shares.push_back(share);
   }
   judgement.removed_low = compare::quantile(shares, 0.025);
   judgement.removed_high = compare::quantile(std::move(shares), 0.975);
-  double energy_before = 0.0, energy_after = 0.0, rows = 0.0;
-  for (std::size_t c = 0; c < count; ++c)
-    energy_before += before.energy[c], energy_after += after.energy[c], rows += before.rows[c];
-  judgement.before.per_row = energy_before / rows, judgement.after.per_row = energy_after / rows;
+  judgement.before.per_row = perRow(before), judgement.with_zero.per_row = perRow(with_zero);
+  judgement.after.per_row = perRow(after);
 }
 
 /// Errors of one capture's pixels.
@@ -126,16 +132,19 @@ struct Totals {
 
 }  // namespace
 
-Result<Judgement> judge(const JudgedCampaign& judged, const JudgedModel& before, const JudgedModel& after,
-                        double dispersion) {
+Result<Judgement> judge(const JudgedCampaign& judged, const JudgedModels& models, double dispersion) {
+  const auto& [before, with_zero, after] = models;
   const auto camera_before =
       NoiselessCamera::make(judged.declared.model, before.effects, judged.lit.captures);
   if (!camera_before) return camera_before.error();
+  const auto camera_with_zero =
+      NoiselessCamera::make(judged.declared.model, with_zero.effects, judged.lit.captures);
+  if (!camera_with_zero) return camera_with_zero.error();
   const auto camera_after =
       NoiselessCamera::make(judged.declared.model, after.effects, judged.lit.captures);
   if (!camera_after) return camera_after.error();
   Judgement judgement;
-  Totals all_before, all_after;
+  Totals all_before, all_with_zero, all_after;
   for (std::size_t c = 0; c < judged.lit.captures.size(); ++c) {
     const MeasuredCapture& capture = judged.lit.captures[c];
     const TracedCapture& traced = *judged.lit.traced[c];
@@ -147,16 +156,21 @@ Result<Judgement> judge(const JudgedCampaign& judged, const JudgedModel& before,
     const Errors then = errors(*camera_before, before.offset_mm),
                  now = errors(*camera_after, after.offset_mm);
     all_before.add(then), all_after.add(now);
+    all_with_zero.add(errors(*camera_with_zero, with_zero.offset_mm));
     const compare::Summary s = compare::summarise(then.all_mm), t = compare::summarise(now.all_mm);
     judgement.captures.push_back({capture.record.name, capture.record.block, s.mean, t.mean, s.rms,
                                   t.rms, capture.record.a.since_power_on_s,
                                   capture.record.distance_m});
   }
   all_before.into(judgement.before), all_after.into(judgement.after);
-  const auto energy_before = energiesOf(judged, before), energy_after = energiesOf(judged, after);
+  all_with_zero.into(judgement.with_zero);
+  const auto energy_before = energiesOf(judged, before), energy_with_zero = energiesOf(judged, with_zero),
+             energy_after = energiesOf(judged, after);
   if (!energy_before) return energy_before.error();
+  if (!energy_with_zero) return energy_with_zero.error();
   if (!energy_after) return energy_after.error();
-  if (!judged.lit.captures.empty()) addRemoved(*energy_before, *energy_after, dispersion, judgement);
+  if (!judged.lit.captures.empty())
+    addRemoved(*energy_before, *energy_with_zero, *energy_after, dispersion, judgement);
   return judgement;
 }
 

@@ -34,18 +34,24 @@ struct JudgedModel {
   double offset_mm = 0.0, gain_percent = 0.0;
 };
 
+/// The camera file as it is, with where zero lies, and with all that was found.
+struct JudgedModels {
+  JudgedModel before{}, with_zero{}, after{};
+};
+
 struct Judgement {
-  RangeErrors before{}, after{};
+  RangeErrors before{}, with_zero{}, after{};
   std::vector<JudgedCapture> captures{};
-  /// 1 − (χ²_after − noise)/(χ²_before − noise), and its 95 % interval from captures drawn anew
-  /// with replacement.
+  /// The share of what can be explained that where zero lies removes: 1 − (χ²_zero − noise)/(χ²_before − noise).
+  double removed_by_zero = 0.0;
+  /// What was found removes of the rest: 1 − (χ²_after − noise)/(χ²_zero − noise), and its 95 % interval from
+  /// captures drawn anew with replacement.
   double removed = 0.0, removed_low = 0.0, removed_high = 0.0;
-  double explainable = 0.0;  ///< χ²_before − noise
+  double explainable = 0.0;  ///< χ²_zero − noise
 };
 
 /// `dispersion`: the noise's χ² per row, as the open captures say. Error: an exposure that a model
 /// cannot have.
-Result<Judgement> judge(const JudgedCampaign& judged, const JudgedModel& before, const JudgedModel& after,
-                        double dispersion);
+Result<Judgement> judge(const JudgedCampaign& judged, const JudgedModels& models, double dispersion);
 
 }  // namespace toftwin::discover

@@ -11,10 +11,10 @@
 
 namespace toftwin::discover {
 
-/// Of the campaign's captures, as they were taken or with another exposure, ambient light, room or start of
-/// the camera, the one in which two models, lists of effects without noise, differ most. The offset and gain
-/// by which they differ over the campaign are taken out, poses and light are integrated out. Nothing where
-/// neither can be simulated there.
+/// Of the campaign's captures, as they were taken or in another room or after another start of the camera, the
+/// one in which two models, lists of effects without noise, differ most. The offset and gain by which they
+/// differ over the campaign are taken out, poses and light are integrated out. Nothing where neither can be
+/// simulated there, and where they differ by less than 9 in χ².
 std::optional<NextCapture> nextCapture(const JudgedCampaign& judged, const std::vector<sim::AnyEffect>& one,
                                        const std::vector<sim::AnyEffect>& other);
 

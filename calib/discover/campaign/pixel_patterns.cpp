@@ -12,8 +12,10 @@
 // explanation, the column's product with the residual is a sum of martingale differences, and its variance
 // the column's square, as if the column had been known beforehand. Once it is chosen, the pattern of all
 // captures at other places stands there: how strong it is, is fitted to captures that it was not learned
-// from.
+// from. What two places have in common then counts twice, once in each one's column: the coefficient's
+// variance is twice what least squares says.
 #include <cmath>
+#include <numbers>
 #include <optional>
 
 #include "calib/discover/campaign/carriers.h"
@@ -72,8 +74,9 @@ std::vector<CampaignRows::PerChannel> CampaignRows::whatIsLeft() const {
       common[static_cast<Eigen::Index>(group.first + i)] = fixed.coefficient[next++];
   }
   std::vector<PerChannel> left(rows_.size());
+  const std::vector<std::size_t> stands = standsOf(lit_->captures);
   for (std::size_t c = 0; c < rows_.size(); ++c) {
-    const CaptureEvidence& one = evidence.captures[c];
+    const CaptureEvidence& one = evidence.captures[stands[c]];
     Eigen::MatrixXd own = one.gram(random, random);
     own.diagonal().array() += 1.0;  // deviations of 1 beforehand
     const Eigen::VectorXd moment = one.moment - one.gram * common;
@@ -145,6 +148,10 @@ void CampaignRows::putPattern(const std::string& name, const std::vector<PerChan
 Term CampaignRows::settled(Term term) const {
   if (patterns_.contains(term.carrier)) term.carrier += kFromOthers;
   return term;
+}
+
+double CampaignRows::errorFactor(const Term& term) const {
+  return term.carrier.ends_with(kFromOthers) ? std::numbers::sqrt2 : 1.0;
 }
 
 const PixelPattern* CampaignRows::patternOf(const std::string& carrier) const {

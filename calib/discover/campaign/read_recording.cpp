@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <map>
 #include <optional>
 
 #include <fmt/format.h>
@@ -186,29 +187,61 @@ std::vector<std::size_t> placesOf(const std::vector<MeasuredCapture>& captures) 
   return places;
 }
 
+/// A place with more than a fifth of all captures, as of a warm-up, makes several stands, which take turns: a fold
+/// that held all of it would leave nothing to learn it from.
+void putStands(const std::vector<std::size_t>& places, std::vector<MeasuredCapture>& captures) {
+  std::map<std::size_t, std::size_t> seen;
+  for (std::size_t c = 0; c < captures.size(); ++c) {
+    const auto there = static_cast<std::size_t>(std::ranges::count(places, places[c]));
+    const std::size_t stands = (there * kEachLocked + captures.size() - 1) / captures.size();
+    captures[c].stand = fmt::format("{}.{}", places[c], seen[places[c]]++ % stands);
+  }
+}
+
 /// Every fifth place with all that was taken there, where there are ten: what was found must hold elsewhere.
 /// A place with more than a fifth of all captures, as of a warm-up, stays open, since nothing else may say
-/// what it says. Else every fifth capture.
-Locking lockingOf(const std::vector<MeasuredCapture>& captures) {
+/// what it says. Else, and where that is less than a tenth of all captures, every fifth capture.
+Locking lockingOf(const std::vector<std::size_t>& places, const std::vector<MeasuredCapture>& captures) {
+  constexpr std::size_t kFewestLocked = 10;  // one in so many captures
   Locking locking{std::vector<bool>(captures.size())};
-  const std::vector<std::size_t> places = placesOf(captures);
   std::vector<std::size_t> choices;
   for (std::size_t c = 0; c < captures.size(); ++c) {
     if (places[c] == c &&
         static_cast<std::size_t>(std::ranges::count(places, c)) * kEachLocked <= captures.size())
       choices.push_back(c);
   }
-  locking.is_by_place = choices.size() >= 2 * kEachLocked;
-  for (std::size_t c = 0; c < captures.size(); ++c) {
+  const auto chosen = [&](std::size_t c) {
     const auto choice = std::ranges::find(choices, places[c]);
-    const auto turn = locking.is_by_place ? static_cast<std::size_t>(choice - choices.begin()) : c;
-    const bool may_be = locking.is_by_place ? choice != choices.end() : captures.size() >= 2 * kEachLocked;
-    locking.is_locked[c] = may_be && turn % kEachLocked == kEachLocked / 2;
+    return choice != choices.end() &&
+           static_cast<std::size_t>(choice - choices.begin()) % kEachLocked == kEachLocked / 2;
+  };
+  std::size_t by_place = 0;
+  for (std::size_t c = 0; c < captures.size(); ++c) by_place += chosen(c) ? 1 : 0;
+  locking.is_by_place = choices.size() >= 2 * kEachLocked && by_place * kFewestLocked >= captures.size();
+  for (std::size_t c = 0; c < captures.size(); ++c) {
+    const bool in_turn = captures.size() >= 2 * kEachLocked && c % kEachLocked == kEachLocked / 2;
+    locking.is_locked[c] = locking.is_by_place ? chosen(c) : in_turn;
   }
   return locking;
 }
 
 }  // namespace
+
+std::vector<std::size_t> standsOf(const std::vector<MeasuredCapture>& captures) {
+  std::map<std::string, std::size_t> known;
+  std::vector<std::size_t> stands;
+  std::size_t next = 0;
+  for (const MeasuredCapture& capture : captures) {
+    if (capture.stand.empty()) {
+      stands.push_back(next++);
+      continue;
+    }
+    const auto [at, is_new] = known.try_emplace(capture.stand, next);
+    if (is_new) ++next;
+    stands.push_back(at->second);
+  }
+  return stands;
+}
 
 Result<Campaign> readRecording(const std::filesystem::path& file, const std::filesystem::path& poses_of) {
   const auto poses = posesOf(file, poses_of);
@@ -230,7 +263,9 @@ Result<Campaign> readRecording(const std::filesystem::path& file, const std::fil
             "about 20 on",
             file.string(), poses->size(), cutter->captures.size())};
   }
-  const Locking locking = lockingOf(cutter->captures);
+  const std::vector<std::size_t> places = placesOf(cutter->captures);
+  const Locking locking = lockingOf(places, cutter->captures);
+  putStands(places, cutter->captures);
   for (std::size_t c = 0; c < cutter->captures.size(); ++c) {
     MeasuredCapture& capture = cutter->captures[c];
     const bool is_locked = locking.is_locked[c];

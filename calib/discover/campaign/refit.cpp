@@ -267,6 +267,7 @@ Result<Evidence> residualEvidence(const JudgedCampaign& judged, const std::vecto
       evidence.captures[c] = whitened.evidence(capture.record.name, capture.record.block);
     }
   });
+  evidence.captures = joined(std::move(evidence.captures), standsOf(lit.captures));
   return evidence;
 }
 
@@ -298,20 +299,31 @@ Result<Refitted> refit(const CampaignRows& rows, std::vector<sim::AnyEffect> eff
     result.fitted.push_back(std::move(one));
   }
   result.offset_mm = at.others.coefficient[0], result.gain_percent = at.others.coefficient[1];
-  result.offset_error_mm = std::sqrt(std::max(0.0, at.others.inverse(0, 0)) * size);
-  if (rows.hasDelay()) {  // behind offset and gain, poses and light being integrated out
-    constexpr Eigen::Index kDelay = 2;
-    result.delay_mm = at.others.coefficient[kDelay];
-    result.delay_error_mm = std::sqrt(std::max(0.0, at.others.inverse(kDelay, kDelay)) * size);
-  }
+  // Behind offset and gain, poses and light being integrated out.
+  const Eigen::Index common = rows.hasDelay() ? 3 : 2;
+  if (rows.hasDelay()) result.delay_mm = at.others.coefficient[2];
+  result.common_covariance.topLeftCorner(common, common) =
+      size * at.others.inverse.topLeftCorner(common, common);
   result.marginal = std::move(state.marginal);
   return result;
 }
 
-Zero zeroOf(const Refitted& refitted) {
-  const bool is_told = std::abs(refitted.delay_mm) > 3.0 * refitted.delay_error_mm;
+Zero zeroOf(const Refitted& refitted, double known_mm) {
+  constexpr Eigen::Index kOffset = 0, kGain = 1, kDelay = 2;
+  Eigen::Matrix3d covariance = refitted.common_covariance;
+  Eigen::Vector3d at{refitted.offset_mm, refitted.gain_percent, refitted.delay_mm};
+  const double variance = covariance(kDelay, kDelay);
+  if (variance > 0.0 && std::abs(known_mm + at[kDelay]) <= 3.0 * std::sqrt(variance)) {
+    // Offset and gain where the delay is known to be none.
+    const Eigen::Vector3d with_delay = covariance.col(kDelay) / variance;
+    at += with_delay * (-known_mm - at[kDelay]);
+    covariance -= variance * with_delay * with_delay.transpose();
+    at[kDelay] = -known_mm;
+  }
   // The column of the delay is what it does beyond an offset.
-  return is_told ? Zero{refitted.offset_mm - refitted.delay_mm, refitted.delay_mm} : Zero{refitted.offset_mm, 0.0};
+  const double offset_variance =
+      covariance(kOffset, kOffset) + covariance(kDelay, kDelay) - 2.0 * covariance(kOffset, kDelay);
+  return {at[kOffset] - at[kDelay], std::sqrt(std::max(0.0, offset_variance)), at[kDelay], at[kGain]};
 }
 
 Result<double> delayThatFits(const JudgedCampaign& judged) {
@@ -354,8 +366,8 @@ Result<std::vector<std::shared_ptr<const TracedCapture>>> traceWhereTheyStood(
   if (!evidence) return evidence.error();
   const Eigen::VectorXd common = stepOf(marginalise(*evidence, {}), 0).others.coefficient;
   std::vector<Stood> stood;
-  for (std::size_t c = 0; c < captures.size(); ++c) {
-    const CaptureEvidence& one = evidence->captures[c];
+  for (const std::size_t stand : standsOf(captures)) {
+    const CaptureEvidence& one = evidence->captures[stand];
     const Eigen::MatrixXd gram = one.gram.block<kOwn, kOwn>(2, 2) +
                                  Eigen::MatrixXd::Identity(kOwn, kOwn);  // prior deviations of 1
     const Eigen::VectorXd own =

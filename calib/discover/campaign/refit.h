@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cmath>
 #include <map>
 #include <span>
 #include <string>
@@ -69,10 +70,9 @@ struct Refitted {
   std::vector<FreeNumber> free{};      ///< what was fitted
   Marginal marginal{};                 ///< of what is left, the free numbers' columns last
   double deviance = 0.0, dispersion = 1.0;
-  double offset_mm = 0.0, offset_error_mm = 0.0;
-  double gain_percent = 0.0;
-  /// Of the light, beyond an offset of the range; 0 where that is the same.
-  double delay_mm = 0.0, delay_error_mm = 0.0;
+  double offset_mm = 0.0, gain_percent = 0.0;
+  double delay_mm = 0.0;  ///< of the light, beyond an offset of the range; 0 where that is the same
+  Eigen::Matrix3d common_covariance = Eigen::Matrix3d::Zero();  ///< of offset, gain and delay
 };
 Result<Refitted> refit(const CampaignRows& rows, std::vector<sim::AnyEffect> effects,
                        const std::vector<std::size_t>& places, const RefitOptions& options);
@@ -80,9 +80,15 @@ Result<Refitted> refit(const CampaignRows& rows, std::vector<sim::AnyEffect> eff
 /// What a campaign says of where zero lies: an offset of the range, and a delay of the light where that is another
 /// thing and no chance (3 standard errors).
 struct Zero {
-  double offset_mm = 0.0, delay_mm = 0.0;
+  double offset_mm = 0.0, offset_error_mm = 0.0;
+  double delay_mm = 0.0;
+  double gain_percent = 0.0;
+  /// Whether the offset is no chance, so that it is written.
+  [[nodiscard]] bool hasOffset() const { return std::abs(offset_mm) > 3.0 * offset_error_mm; }
 };
-Zero zeroOf(const Refitted& refitted);
+/// `known_mm`: the delay that the fitted effects have already. It is tested with what was fitted beyond it, and taken
+/// back where both together are no more than chance. The zero's delay is the one beyond it.
+Zero zeroOf(const Refitted& refitted, double known_mm);
 
 /// The delay of the light that fits best, offset and gain being free, in millimetres: what it does to the cyclic error
 /// is not proportional to it. 0 where it is an offset of the range and nothing else, or no more than chance.

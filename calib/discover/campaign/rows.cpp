@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <numbers>
 #include <optional>
@@ -12,9 +11,9 @@
 
 #include <fmt/format.h>
 
-#include "calib/compare/stack.h"
 #include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/covariates.h"
+#include "calib/discover/campaign/sites.h"
 #include "sim/images/rows.h"
 
 namespace toftwin::discover {
@@ -227,47 +226,6 @@ double exposureUsOf(const MeasuredCapture& capture) {
   return exposures.empty() ? capture.record.exposure_us : exposures.front().duration.in(microsecond);
 }
 
-/// How far what a camera sees lies from there in the image of another one, at most, in pixels: looked at on a
-/// grid over the image. Infinite where nothing is seen.
-double shiftOf(const CameraInfo& camera, const Image<float>& range_m,
-               const Transform<Camera, Camera>& other_from_camera) {
-  constexpr int kSteps = 8;
-  double most = -1.0;
-  for (int j = 0; j <= kSteps; ++j) {
-    for (int i = 0; i <= kSteps; ++i) {
-      const int x = i * (camera.width - 1) / kSteps, y = j * (camera.height - 1) / kSteps;
-      if (!std::isfinite(range_m(x, y))) continue;
-      const Vec3d seen = static_cast<double>(range_m(x, y)) * rayThroughPixel(camera, x, y).v;
-      const Point<Camera> there{other_from_camera.rotate(seen) + other_from_camera.translation_m};
-      if (!(there.m.z > 0.0)) return std::numeric_limits<double>::infinity();
-      const auto [u, v] = pixelOfPoint(camera, there);
-      most = std::max(most, std::hypot(u - x, v - y));
-    }
-  }
-  return most < 0.0 ? std::numeric_limits<double>::infinity() : most;
-}
-
-/// For each capture the first one of the same scene and place, whatever their blocks are: less than half a
-/// pixel away, the scene's own patterns stay in their pixels.
-std::vector<std::size_t> sitesOf(const Declared& declared, const Lit& lit) {
-  constexpr double kOnePlace_px = 0.5;
-  const auto isOfOnePlace = [&](std::size_t a, std::size_t b) {
-    const MeasuredCapture &one = lit.captures[a], &other = lit.captures[b];
-    const auto &here = *one.moment.world_from_camera, &there = *other.moment.world_from_camera;
-    return &declared.sceneOf(one.record.block) == &declared.sceneOf(other.record.block) &&
-           (compare::samePose(here, there) ||
-            shiftOf(declared.model.camera(), lit.traced[a]->light.truth.range_m, there.inverse() * here) <
-                kOnePlace_px);
-  };
-  std::vector<std::size_t> sites;
-  for (std::size_t c = 0; c < lit.captures.size(); ++c) {
-    std::size_t first = 0;
-    while (first < c && (sites[first] != first || !isOfOnePlace(c, first))) ++first;
-    sites.push_back(first);
-  }
-  return sites;
-}
-
 }  // namespace
 
 void CampaignRows::fillFixed(std::size_t c, const Reading& declared, Fixed& fixed) const {
@@ -338,7 +296,8 @@ Result<CampaignRows> CampaignRows::make(const Declared& declared, const Lit& lit
   all.base_columns_ = std::max(all.base_columns_, all.common_columns_);
   all.period_m_ = periodOf(declared.model);
   all.rows_.resize(lit.captures.size());
-  const std::vector<std::size_t> sites = sitesOf(declared, lit);
+  const std::vector<std::size_t> sites =
+      sitesOf(declared, lit, Cells::gridOf(declared.model.camera().width, declared.model.camera().height));
   std::atomic<std::size_t> done{0};
   sim::inParallel(static_cast<int>(lit.captures.size()), 1, [&](int first, int last) {
     for (auto c = static_cast<std::size_t>(first); c < static_cast<std::size_t>(last); ++c) {

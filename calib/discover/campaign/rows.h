@@ -43,10 +43,13 @@ struct CellGrid {
 /// variance 1, whatever the cell.
 class Cells {
  public:
+  static constexpr int kMostCells = 2000;
   Cells() = default;
   /// `most`: so many cells; enough to tell shapes, few enough that all columns fit into memory.
   Cells(const MeasuredCapture& capture, const TracedCapture& traced, const Reading& declared,
-        int most = 2000);
+        int most = kMostCells);
+  /// Cells of an image of this size.
+  [[nodiscard]] static CellGrid gridOf(int width, int height, int most = kMostCells);
 
   [[nodiscard]] std::size_t size() const { return cells_.size(); }
   /// Where a cell lies in the grid of all cells that there could be, row after row: the same in all
@@ -151,6 +154,7 @@ class CampaignRows final : public RowSource, public NamedEffects {
   [[nodiscard]] std::shared_ptr<const RowSource> including(
       std::span<const NamedFit* const> fits, bool with_catalogue) const override;
   [[nodiscard]] Term settled(Term term) const override;
+  [[nodiscard]] double errorFactor(const Term& term) const override;
   /// The pattern behind a term's carrier "pixel:range", "pixel:gain" or "pixel:delay"; null: there is none.
   [[nodiscard]] const PixelPattern* patternOf(const std::string& carrier) const;
 

@@ -222,6 +222,7 @@ Evidence CampaignRows::evidenceWith(std::span<const TermGroup> extra, bool with_
     for (auto c = static_cast<std::size_t>(first); c < static_cast<std::size_t>(last); ++c)
       evidence.captures[c] = evidenceOf(rows_[c], extra, with_catalogue);
   });
+  evidence.captures = joined(std::move(evidence.captures), standsOf(lit_->captures));
   return evidence;
 }
 
@@ -275,6 +276,7 @@ Result<Evidence> CampaignRows::evidenceLeft(const Left& left) const {
       evidence.captures[c] = whitened.evidence(fixed.name, fixed.block);
     }
   });
+  evidence.captures = joined(std::move(evidence.captures), standsOf(lit_->captures));
   return evidence;
 }
 
