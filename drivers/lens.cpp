@@ -37,7 +37,12 @@ CameraInfo fromFieldOfView(Angle horizontal, int width, int height) {
 LensKeys inPixels(const LensKeys& keys) {
   if (keys.fx > 0.0 || keys.field_of_view <= 0_deg || keys.width == 0) return keys;
   const CameraInfo camera = fromFieldOfView(keys.field_of_view, keys.width, keys.height);
-  return {.width = keys.width, .height = keys.height, .fx = camera.fx, .fy = camera.fy, .cx = camera.cx, .cy = camera.cy};
+  return {.width = keys.width,
+          .height = keys.height,
+          .fx = camera.fx,
+          .fy = camera.fy,
+          .cx = camera.cx,
+          .cy = camera.cy};
 }
 
 Result<Lens> lensFor(const LensKeys& keys, int width, int height, std::string_view driver) {

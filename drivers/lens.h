@@ -38,8 +38,8 @@ struct LensKeys {
   }
 };
 
-/// With the field of view, if that is what is known, turned into fx, fy, cx and cy at width and height; as it is without
-/// these. For whoever cuts an image: only what is in pixels can be cut.
+/// With the field of view, if that is what is known, turned into fx, fy, cx and cy at width and height; as it
+/// is without these. For whoever cuts an image: only what is in pixels can be cut.
 LensKeys inPixels(const LensKeys& keys);
 
 /// The lens for an image of that size, if its numbers are known.

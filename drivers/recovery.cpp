@@ -75,9 +75,10 @@ void Recovery::frame(Frame& frame, SteadyTime now) {
   last_frame_ = waiting_since_ = now;
 }
 
-/// A clock that follows a master begins anew with the camera and is set to the master's time some seconds later. Then
-/// the frame continues the last one better without the shift, and `advance_ns`, its time since then with the shift, is
-/// absurd. What is left, for the shift was as exact as a frame's arrival, goes at half the speed of time.
+/// A clock that follows a master begins anew with the camera and is set to the master's time some seconds
+/// later. Then the frame continues the last one better without the shift, and `advance_ns`, its time since
+/// then with the shift, is absurd. What is left, for the shift was as exact as a frame's arrival, goes at
+/// half the speed of time.
 std::int64_t Recovery::shiftStillDue(std::int64_t advance_ns) {
   const std::int64_t shift_ns = *device_shift_ns_;
   if (shift_ns == 0 || advance_ns <= 0) return shift_ns;

@@ -253,7 +253,10 @@ int pixelsOf(const Features& features, const char* name, double otherwise = 0.0)
 }
 
 Region regionOf(const Features& features, int width, int height) {
-  Region region{.x = pixelsOf(features, "OffsetX"), .y = pixelsOf(features, "OffsetY"), .width = width, .height = height};
+  Region region{.x = pixelsOf(features, "OffsetX"),
+                .y = pixelsOf(features, "OffsetY"),
+                .width = width,
+                .height = height};
   const auto whole = [&](const std::string& side, const std::string& direction, int offset, int sent) {
     const int binning = std::max(1, pixelsOf(features, ("Binning" + direction).c_str(), 1.0));
     const int decimation = std::max(1, pixelsOf(features, ("Decimation" + direction).c_str(), 1.0));

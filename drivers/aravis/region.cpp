@@ -8,8 +8,8 @@
 namespace toftwin::drivers::aravis {
 namespace {
 
-/// Images that are binned are left to lensFor(), which scales. `Camera`: LensKeys or CameraInfo, which name the same
-/// things alike.
+/// Images that are binned are left to lensFor(), which scales. `Camera`: LensKeys or CameraInfo, which name
+/// the same things alike.
 template <class Camera>
 Result<Camera> ofRegion(Camera lens, const Region& region) {
   const bool is_sent = lens.width == region.width && lens.height == region.height;
@@ -26,12 +26,14 @@ Result<Camera> ofRegion(Camera lens, const Region& region) {
   const bool is_cut = region.x > 0 || region.y > 0 || (whole_width > 0 && whole_width != region.width) ||
                       (whole_height > 0 && whole_height != region.height);
   if (!is_cut && !region.skips_pixels) return lens;
-  return Error{Error::Code::Incompatible,
-               fmt::format("aravis: the lens is described for {} x {} pixels, but the camera sends {} x {} from ({}, {}) on of "
-                           "{} x {}{}: which of its pixels these are cannot be told; describe the lens for the whole "
-                           "image or for this region",
-                           lens.width, lens.height, region.width, region.height, region.x, region.y, whole_width,
-                           whole_height, region.skips_pixels ? ", leaving pixels out (decimation)" : "")};
+  return Error{
+      Error::Code::Incompatible,
+      fmt::format("aravis: the lens is described for {} x {} pixels, but the camera sends {} x {} from ({}, "
+                  "{}) on of "
+                  "{} x {}{}: which of its pixels these are cannot be told; describe the lens for the whole "
+                  "image or for this region",
+                  lens.width, lens.height, region.width, region.height, region.x, region.y, whole_width,
+                  whole_height, region.skips_pixels ? ", leaving pixels out (decimation)" : "")};
 }
 
 template <class Camera>
@@ -48,7 +50,11 @@ WholeSide wholeSide(int sensor, int most, int offset, int sent) {
   return {offset + sent > most ? most + offset : most, most + offset};
 }
 
-Result<Lens> lensOfRegion(const LensKeys& lens, const Region& region) { return sentLens(inPixels(lens), region); }
-Result<Lens> lensOfRegion(const CameraInfo& calibrated, const Region& region) { return sentLens(calibrated, region); }
+Result<Lens> lensOfRegion(const LensKeys& lens, const Region& region) {
+  return sentLens(inPixels(lens), region);
+}
+Result<Lens> lensOfRegion(const CameraInfo& calibrated, const Region& region) {
+  return sentLens(calibrated, region);
+}
 
 }  // namespace toftwin::drivers::aravis

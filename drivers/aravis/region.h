@@ -15,9 +15,9 @@ struct WholeSide {
   int otherwise = 0;  ///< where the camera leaves two readings open
   [[nodiscard]] bool is(int side) const { return side == pixels || side == otherwise; }
 };
-/// `sensor`: SensorWidth by binning and decimation. `most`: WidthMax, which is what a region may have at all, of some
-/// cameras from `offset` on. The sensor says which, unless it has a border that is never sent, or pixels that are binned
-/// without a word. 0: not said.
+/// `sensor`: SensorWidth by binning and decimation. `most`: WidthMax, which is what a region may have at all,
+/// of some cameras from `offset` on. The sensor says which, unless it has a border that is never sent, or
+/// pixels that are binned without a word. 0: not said.
 WholeSide wholeSide(int sensor, int most, int offset, int sent);
 
 /// Which part of its image a camera sends, in pixels as they are sent (binned).
@@ -27,8 +27,8 @@ struct Region {
   bool skips_pixels = false;  ///< decimation: neither cut off nor binned
 };
 
-/// The lens of the region, from one of the whole image or of this very region; of another size, if it is scaled by
-/// binning alone. Incompatible if which of the lens's pixels are sent cannot be told.
+/// The lens of the region, from one of the whole image or of this very region; of another size, if it is
+/// scaled by binning alone. Incompatible if which of the lens's pixels are sent cannot be told.
 Result<Lens> lensOfRegion(const LensKeys& lens, const Region& region);
 Result<Lens> lensOfRegion(const CameraInfo& calibrated, const Region& region);
 

@@ -217,7 +217,8 @@ TEST(SourceHost, WhatKeepsALostCameraAwayDoesNotPushOutWhyItWasLost) {
   // That it opens is not enough.
   for (int opened = 3; const std::string why : {"it does not start", "it hangs"}) {
     rig.remote->give({Error::Code::Disconnected, why});
-    for (; rig.remote->opened.count() < opened; std::this_thread::yield()) rig.clock.advance(std::chrono::milliseconds{2});
+    for (; rig.remote->opened.count() < opened; std::this_thread::yield())
+      rig.clock.advance(std::chrono::milliseconds{2});
     EXPECT_EQ(rig.host->health().last_error, "unplugged; since then: " + why);
     ++opened;
   }

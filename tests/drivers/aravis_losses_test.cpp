@@ -33,7 +33,8 @@ TEST(AravisLost, WhatFoundNoBufferIsOfTheNextGapOnly) {
   underruns.before(false, 20, false);
   underruns.before(false, 20, true);
   EXPECT_EQ(underruns.before(true, 20, true), 17u);
-  // A frame whose first packets found none came after all: what the camera leaves out later is not for want of buffers.
+  // A frame whose first packets found none came after all: what the camera leaves out later is not for want
+  // of buffers.
   underruns.before(false, 25, true);
   underruns.before(false, 25, true);
   EXPECT_EQ(underruns.before(true, 25, true), 0u);

@@ -177,8 +177,9 @@ TEST(Recovery, DeviceTimeGoesOnWhenTheCamerasClockBeginsAnew) {
   EXPECT_EQ(next.moment.exposures[0].start.ns - after.moment.exposures[0].start.ns, 50'000'000);
 }
 
-// The camera's clock begins at 0 with each boot, and is the master's after ten frames. Of the first frame after a boot
-// the network makes the arrival later or earlier than others, so that device time runs a little ahead or behind.
+// The camera's clock begins at 0 with each boot, and is the master's after ten frames. Of the first frame
+// after a boot the network makes the arrival later or earlier than others, so that device time runs a little
+// ahead or behind.
 TEST(Recovery, DeviceTimeIsTheMastersAgainAfterEachReboot) {
   constexpr std::int64_t kEpoch_ns = 1'790'000'000'000'000'000, kInterval_ns = 50'000'000;
   for (const int late_ms : {0, 3, 70, 200, -3}) {
@@ -194,7 +195,8 @@ TEST(Recovery, DeviceTimeIsTheMastersAgainAfterEachReboot) {
         const std::int64_t master_ns = kEpoch_ns + nanoseconds{life.now - began}.count();
         const std::int64_t stamp_ns = i < 10 ? nanoseconds{life.now - booted}.count() : master_ns;
         const SteadyTime arrived = life.now + milliseconds{boot > 0 && i == 0 ? late_ms : 0};
-        const std::int64_t time_ns = life.frame(clock.read(stamp_ns, arrived).ns, arrived).moment.exposures[0].start.ns;
+        const std::int64_t time_ns =
+            life.frame(clock.read(stamp_ns, arrived).ns, arrived).moment.exposures[0].start.ns;
         ASSERT_GT(time_ns, last_ns) << late_ms << ": boot " << boot << ", frame " << i;
         if (i >= 20) {
           ASSERT_EQ(time_ns, master_ns) << late_ms << ": boot " << boot << ", frame " << i;

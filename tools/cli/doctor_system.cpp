@@ -107,9 +107,11 @@ Finding checkUsbShares(const fs::path& root) {
     // What a camera sends is not known here, only that it is not more than its link carries.
     const long bus_mbit_s = numberIn(root / "sys/bus/usb/devices" / ("usb" + bus) / "speed").value_or(0);
     if (cameras.size() < 2 || links_mbit_s[bus] <= static_cast<double>(bus_mbit_s)) continue;
-    return {State::Warning, "usb bus",
-            fmt::format("{} share bus {}, and may be too much for it together", fmt::join(cameras, ", "), bus),
-            "if frames are lost: plug one of them into a port of another controller (lsusb -t shows them), or choose a lower rate or a smaller image"};
+    return {
+        State::Warning, "usb bus",
+        fmt::format("{} share bus {}, and may be too much for it together", fmt::join(cameras, ", "), bus),
+        "if frames are lost: plug one of them into a port of another controller (lsusb -t shows them), or "
+        "choose a lower rate or a smaller image"};
   }
   return {State::Good, "usb bus", "no cameras share one that may be too slow for them together", ""};
 }
@@ -185,10 +187,11 @@ std::vector<Finding> checkEthernet(const fs::path& root) {
       findings.push_back({State::Good, "ethernet",
                           found + ": enough for an O3D303, too slow for GigE Vision at full rate", ""});
     } else if (mbit_s < kGigabit_mbit_s) {
-      findings.push_back({State::Warning, "ethernet", found + ": too slow for a camera's full rate",
-                          fmt::format("use a gigabit port and a cable with all four pairs (Cat 5e or better), then "
-                                      "sudo ethtool -s {} autoneg on",
-                                      name)});
+      findings.push_back(
+          {State::Warning, "ethernet", found + ": too slow for a camera's full rate",
+           fmt::format("use a gigabit port and a cable with all four pairs (Cat 5e or better), then "
+                       "sudo ethtool -s {} autoneg on",
+                       name)});
     } else if (packet < kJumboPacket) {
       findings.push_back({State::Good, "ethernet",
                           fmt::format("{}; larger ones (sudo ip link set {} mtu {}, and a switch that passes them) spare "

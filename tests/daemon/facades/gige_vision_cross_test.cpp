@@ -177,8 +177,9 @@ TEST_F(GigeVisionCross, OfARegionTheLensIsThatPartOfIt) {
     EXPECT_EQ(got.calibration_id.size(), 32u);
   }
   {
-    const auto driver = openDriver(
-        fmt::format("lens.width = {}\nlens.height = {}\nlens.field_of_view_deg = 60\nset = [{}]", whole.width, whole.height, kRegion));
+    const auto driver =
+        openDriver(fmt::format("lens.width = {}\nlens.height = {}\nlens.field_of_view_deg = 60\nset = [{}]",
+                               whole.width, whole.height, kRegion));
     ASSERT_TRUE(driver.ok()) << driver.error().message;
     const CameraInfo got = (*driver)->info().camera;
     EXPECT_NEAR(got.fx, whole.width / 2.0 / std::tan((30_deg).in(radian)), 1e-9) << "of the whole image";
