@@ -97,7 +97,7 @@ std::optional<compare::Figure> driftFigure(const ComparedRun& run, const RunTrai
       toSvg(plot)};
 }
 
-/// Means of a capture's wall in steps of range.
+/// Cells of the wall, as many of each capture as a page holds.
 std::optional<compare::Figure> distanceFigure(const ComparedRun& run) {
   compare::Plot plot{.title = "Error over distance",
                      .x_label = "distance [m]",
@@ -109,7 +109,7 @@ std::optional<compare::Figure> distanceFigure(const ComparedRun& run) {
     for (const ComparedCapture& one : run.captures) {
       if (one.record.kind != "distance") continue;
       const CameraSeen& seen = one.seen[camera];
-      // Every so-manieth cell: what is drawn must fit a page.
+      // Every n-th cell: what is drawn must fit a page.
       const std::size_t stride = 1 + seen.wall_range_m.size() / 100;
       for (std::size_t i = 0; i < seen.wall_range_m.size(); i += stride)
         add(dots, seen.wall_range_m[i], seen.wall_error_mm[i]);

@@ -7,22 +7,10 @@
 
 #include <fmt/format.h>
 
+#include <toftwin/names.h>
+
 namespace toftwin::plan {
 namespace {
-
-const char* nameOfKind(FrameKind kind) {
-  switch (kind) {
-    case FrameKind::Real:
-      return "real";
-    case FrameKind::Simulated:
-      return "simulated";
-    case FrameKind::Replayed:
-      return "replayed";
-    case FrameKind::Faulted:
-      return "with faults on purpose";
-  }
-  return "";
-}
 
 /// The different values, ascending; those that are not known are left out.
 std::string valuesOf(const std::set<double>& values) {
@@ -74,7 +62,7 @@ std::vector<RunSetting> settingsOf(const char* of, const std::string& camera, co
   return {{of, "source", name.source},
           {of, "model", name.model},
           {of, "serial", name.serial},
-          {of, "frames", nameOfKind(from.kind)},
+          {of, "frames", std::string{nameOf(from.kind)}},
           {of, "resolution_px", fmt::format("{} × {}", first.camera.width, first.camera.height)},
           {of, "frequency_mhz", valuesOf(frequencies)},
           {of, "calibration_id", from.calibration_id},
