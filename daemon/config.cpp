@@ -142,23 +142,26 @@ FacadeKeys readFacadeKeys(settings::Table& table, const std::set<std::string>& s
   return keys;
 }
 
-ConfiguredFacade readFacade(settings::Table& table, const std::set<std::string>& sources) {
-  const auto facades = allFacades();
+ConfiguredFacade readFacade(settings::Table& table, std::span<const FacadeKind> facades,
+                            const std::set<std::string>& sources) {
   FacadeKeys keys = readFacadeKeys(table, sources);
   std::string fingerprint = table.resolve("").string() + "\n" + table.canonicalText() + "\n" + stampsOf(table);
   const auto kind = std::ranges::find(facades, std::string_view{keys.kind}, &FacadeKind::name);
-  FacadeKind::Start start;
+  ConfiguredFacade facade{std::move(keys), std::move(fingerprint), {}};
   if (kind != facades.end() && kind->not_built.empty()) {
-    start = kind->read(table);
+    facade.start = kind->read(table);
+    return facade;
+  }
+  if (kind != facades.end()) {
+    facade.not_built = fmt::format("{}: it was {}", table.place("kind"), kind->not_built);
   } else {
     table.complain(table.has("kind") ? "kind" : "",
-                   kind != facades.end() ? fmt::format("= \"{}\" is {}", keys.kind, kind->not_built)
-                   : table.has("kind")
-                       ? fmt::format("= \"{}\" is no facade; there are: {}", keys.kind, namesOf(facades))
+                   table.has("kind")
+                       ? fmt::format("= \"{}\" is no facade; there are: {}", facade.keys.kind, namesOf(facades))
                        : fmt::format("kind is missing: it must be one of {}", namesOf(facades)));
-    table.acceptAll();  // whose keys the others are cannot be told
   }
-  return {std::move(keys), std::move(fingerprint), std::move(start)};
+  table.acceptAll();  // whose keys the others are cannot be told
+  return facade;
 }
 
 std::filesystem::path recordingFolder(const DaemonKeys& keys, const settings::Table& table) {
@@ -170,7 +173,7 @@ std::filesystem::path recordingFolder(const DaemonKeys& keys, const settings::Ta
 }
 
 Result<Config> readConfig(settings::Table& table, std::span<const drivers::Driver> drivers,
-                          const std::vector<std::string>& running) {
+                          const std::vector<std::string>& running, std::span<const FacadeKind> facades) {
   Config config;
   table.read(config.keys);
   if (auto listen = table.table("listen")) {
@@ -187,7 +190,7 @@ Result<Config> readConfig(settings::Table& table, std::span<const drivers::Drive
     config.sources.push_back(readSource(below, drivers, running, names));
   }
   for (settings::Table& below : table.tables("facade")) {
-    config.facades.push_back(readFacade(below, names));
+    config.facades.push_back(readFacade(below, facades, names));
   }
   if (auto checked = table.check(); !checked) return checked.error();
   config.recording_folder = recordingFolder(config.keys, table);
@@ -201,15 +204,15 @@ Result<Config> loadConfig(const std::filesystem::path& file,
                           const std::vector<std::string>& running) {
   auto table = settings::Table::load(file);
   if (!table) return table.error();
-  return readConfig(*table, drivers, running);
+  return readConfig(*table, drivers, running, allFacades());
 }
 
 Result<Config> parseConfig(std::string_view toml, const std::filesystem::path& name,
                            std::span<const drivers::Driver> drivers,
-                           const std::vector<std::string>& running) {
+                           const std::vector<std::string>& running, std::span<const FacadeKind> facades) {
   auto table = settings::Table::parse(toml, name);
   if (!table) return table.error();
-  return readConfig(*table, drivers, running);
+  return readConfig(*table, drivers, running, facades);
 }
 
 Result<> checkListen(const ListenKeys& listen) {

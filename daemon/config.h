@@ -153,7 +153,8 @@ struct ConfiguredSource {
 struct ConfiguredFacade {
   FacadeKeys keys;
   std::string fingerprint;  ///< equal for those that need not be started anew on a reload
-  FacadeKind::Start start;
+  FacadeKind::Start start;  ///< empty: this build lacks it
+  std::string not_built{};  ///< where it is asked for and how to get it, if this build lacks it
 };
 
 struct Config {
@@ -164,15 +165,16 @@ struct Config {
 };
 
 /// Reads a configuration and opens its sources, except those whose fingerprint is in `running`. A
-/// camera that is not there is no error: it is tried again while the daemon runs. Error: everything
-/// that is wrong in the file, with file and line.
+/// camera that is not there is no error: it is tried again while the daemon runs. Nor is a facade that this
+/// build lacks. Error: everything that is wrong in the file, with file and line.
 Result<Config> loadConfig(const std::filesystem::path& file,
                           std::span<const drivers::Driver> drivers,
                           const std::vector<std::string>& running = {});
 /// From text, for tests; `name` stands for the file.
 Result<Config> parseConfig(std::string_view toml, const std::filesystem::path& name,
                            std::span<const drivers::Driver> drivers,
-                           const std::vector<std::string>& running = {});
+                           const std::vector<std::string>& running = {},
+                           std::span<const FacadeKind> facades = allFacades());
 
 /// Whether the daemon may listen there: a non-loopback address needs `allow_remote`.
 Result<> checkListen(const ListenKeys& listen);

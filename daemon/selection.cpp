@@ -128,7 +128,7 @@ Result<> checkFrameBytes(std::uint64_t bytes) {
 Result<> checkSelection(const Selection& selection, const CameraInfo& camera,
                         const std::vector<PlaneKind>& planes) {
   for (const PlaneKind kind : selection.planes) {
-    if (std::ranges::find(planes, kind) == planes.end()) {
+    if (!selection.those_it_has && std::ranges::find(planes, kind) == planes.end()) {
       std::string known;
       for (const PlaneKind has : planes) {
         known += (known.empty() ? "" : ", ") + std::string{nameOf(has)};

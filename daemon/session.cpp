@@ -173,7 +173,11 @@ Session::Answers Session::on(const wire::Subscribe& request) {
   if (!source) return {failure(request.id, source.error())};
   auto backlog = backlogFor(request, hub_.options().backlog_bytes, hub_.budget());
   if (!backlog) return {failure(request.id, backlog.error())};
-  const Wish wish{{request.planes, request.region, request.decimation}, *backlog};
+  Wish wish;  // filled one by one: GCC 12 warns of nested braces here, without a cause
+  wish.selection.planes = request.planes;
+  wish.selection.region = request.region;
+  wish.selection.decimation = request.decimation;
+  wish.backlog = *std::move(backlog);
   const bool in_shared_memory = request.window > 0 && usesSharedMemory();
   const bool is_lockstep = request.policy == wire::Policy::Lockstep;
   const std::uint64_t id = ++last_subscription_;
@@ -181,7 +185,7 @@ Session::Answers Session::on(const wire::Subscribe& request) {
   Subscriptions made;  // all memory first: a source must not feed a subscriber that nobody knows
   made.emplace(id, Subscription{*source, nullptr, is_lockstep ? 1 : request.window,
                                 in_shared_memory ? hub_.sharedBodies() : nullptr});
-  auto subscriber = (*source)->subscribe(wish, wake_);
+  auto subscriber = (*source)->subscribe(std::move(wish), wake_);
   if (!subscriber) return {failure(request.id, subscriber.error())};
   made.begin()->second.subscriber = *std::move(subscriber);
   subscriptions_.merge(made);

@@ -41,6 +41,10 @@ void Facades::apply(std::vector<ConfiguredFacade> configured) {
   std::vector<Running> before = std::exchange(running_, {});
   std::vector<Running> wanted;
   for (ConfiguredFacade& one : configured) {
+    if (!one.start) {
+      logging::error("{} is not there: {}", nameOf(one.keys), one.not_built);
+      continue;
+    }
     const auto same = std::ranges::find_if(
         before, [&](const Running& running) { return running.configured.fingerprint == one.fingerprint; });
     if (same != before.end()) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/facades/source_link.h"
 
-#include <algorithm>
 #include <chrono>
 #include <utility>
 
@@ -48,10 +47,7 @@ wire::SourceHealth SourceLink::health() const {
 void SourceLink::post(SourceHost::Command command, Done done) {
   const auto host = hub_.find(wants_.source);
   if (!host) return done(host.error());
-  (*host)->post(std::move(command), onThread([this, done = std::move(done)](const Result<>& result) {
-                  follow();
-                  done(result);
-                }));
+  (*host)->post(std::move(command), onThread(std::move(done)));
 }
 
 void SourceLink::trigger(Done done) {
@@ -71,26 +67,17 @@ SourceLink::Done SourceLink::onThread(Done done) const {
 void SourceLink::subscribe() {
   if (!is_wanted_ || subscriber_) return;
   auto host = hub_.find(wants_.source);
-  const auto description = host ? (*host)->describe() : Result<wire::SourceDescription>{host.error()};
-  if (!description) return tryAgain();
-  auto subscribed = subscribeTo(**host, *description);
+  if (!host) return tryAgain();
+  auto subscribed = subscribeTo(**host);
   if (!subscribed) return tryAgain();
   host_ = *std::move(host);
   subscriber_ = *std::move(subscribed);
 }
 
-std::vector<PlaneKind> SourceLink::planesOf(const wire::SourceDescription& description) const {
-  std::vector<PlaneKind> planes;
-  for (const PlaneKind kind : wants_.planes) {
-    if (std::ranges::count(description.planes, kind) > 0) planes.push_back(kind);
-  }
-  return planes;
-}
-
-Result<SubscriberPtr> SourceLink::subscribeTo(SourceHost& host, const wire::SourceDescription& description) {
-  planes_ = planesOf(description);
+Result<SubscriberPtr> SourceLink::subscribeTo(SourceHost& host) {
   Wish wish;
-  wish.selection.planes = planes_;
+  wish.selection.planes = wants_.planes;
+  wish.selection.those_it_has = true;
   wish.backlog = {.policy = wire::Policy::Queue,
                   .depth = wants_.queue,
                   .byte_limit = hub_.options().backlog_bytes,
@@ -100,19 +87,6 @@ Result<SubscriberPtr> SourceLink::subscribeTo(SourceHost& host, const wire::Sour
       if (*alive) takeAll();
     });
   });
-}
-
-/// The new subscription before the old one ends, so that a source on demand goes on.
-void SourceLink::follow() {
-  if (!subscriber_) return;
-  const auto description = host_->describe();
-  if (!description || planesOf(*description) == planes_) return;
-  auto subscribed = subscribeTo(*host_, *description);
-  if (!subscribed) {
-    unsubscribe();
-    return tryAgain();
-  }
-  host_->unsubscribe(std::exchange(subscriber_, *std::move(subscribed)));
 }
 
 void SourceLink::unsubscribe() {
@@ -131,7 +105,7 @@ void SourceLink::tryAgain() {
 void SourceLink::takeAll() {
   while (subscriber_) {
     auto item = subscriber_->backlog.take();
-    if (!item) return follow();
+    if (!item) return;
     if (const auto* delivery = std::get_if<Backlog::Delivery>(&*item)) {
       take_(delivery->frame->frame);
       continue;

@@ -43,11 +43,7 @@ class SourceLink {
 
  private:
   void subscribe();
-  /// To those of the wanted planes that the description has.
-  Result<SubscriberPtr> subscribeTo(SourceHost& host, const wire::SourceDescription& description);
-  [[nodiscard]] std::vector<PlaneKind> planesOf(const wire::SourceDescription& description) const;
-  /// What was set may have given the source other planes.
-  void follow();
+  Result<SubscriberPtr> subscribeTo(SourceHost& host);
   void unsubscribe();
   void tryAgain();
   void takeAll();
@@ -61,7 +57,6 @@ class SourceLink {
   bool is_wanted_ = false;
   std::shared_ptr<SourceHost> host_;  // shared with the hub, which may let go of it first
   SubscriberPtr subscriber_;
-  std::vector<PlaneKind> planes_;  ///< that it gets
   /// Shared with handlers that are posted and may come when this is gone.
   const std::shared_ptr<bool> is_alive_ = std::make_shared<bool>(true);
 };

@@ -105,6 +105,22 @@ TEST(Config, ADriverThatWasNotBuiltKeepsNoOtherSourceAway) {
   EXPECT_TRUE(config->sources.at(1).opened.ok());
 }
 
+TEST(Config, AFacadeThatWasNotBuiltKeepsNothingElseAway) {
+  const FacadeKind lacking{.name = "telegraph",
+                           .summary = "",
+                           .read = nullptr,
+                           .document = [] { return std::string{}; },
+                           .not_built = "not built: install libmorse-dev"};
+  const auto config = parseConfig(
+      fmt::format("{}[[facade]]\nkind = 'telegraph'\nsource = 'good'\nspeed = 3\n", kAlsoAGoodOne), "d.toml",
+      drivers::allDrivers(), {}, {&lacking, 1});
+  ASSERT_TRUE(config.ok()) << config.error().message;
+  EXPECT_TRUE(config->sources.at(0).opened.ok());
+  ASSERT_EQ(config->facades.size(), 1u);
+  EXPECT_FALSE(config->facades[0].start);
+  EXPECT_EQ(config->facades[0].not_built, "d.toml:5: it was not built: install libmorse-dev");
+}
+
 TEST(Config, ErrorsNameFileLineKeyBoundAndUnit) {
   const std::string error = errorOf("[limits]\nhandshake_s = 0\nsesions = 3");
   EXPECT_SAYS(

@@ -6,6 +6,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -135,7 +136,17 @@ class FakeSource final : public drivers::Source {
     next->provenance.kind = remote_->info.kind;
     next->planes = {toPlane(PlaneKind::Range, Image<float>{4, 2, static_cast<float>(time_)}),
                     toPlane(PlaneKind::Flags, Image<std::uint8_t>{4, 2, 0})};
+    if (has_amplitude_) next->planes.push_back(toPlane(PlaneKind::Amplitude, Image<float>{4, 2, 1}));
     return next;
+  }
+  /// "amplitude", as other settings of cameras do, gives it a plane more from the next frame on.
+  Result<> setParameter(std::string_view name, double value) override {
+    if (name != "amplitude") return Source::setParameter(name, value);
+    std::vector<PlaneKind>& planes = remote_->info.planes;
+    std::erase(planes, PlaneKind::Amplitude);
+    has_amplitude_ = value != 0;
+    if (has_amplitude_) planes.push_back(PlaneKind::Amplitude);
+    return {};
   }
   [[nodiscard]] drivers::SourceState state() const override {
     return {.parameters = {}, .world_from_camera = pose_};
@@ -148,6 +159,7 @@ class FakeSource final : public drivers::Source {
  private:
   std::shared_ptr<Remote> remote_;  // shared with the test
   std::int64_t time_ = 0;
+  bool has_amplitude_ = false;
   Transform<World, Camera> pose_;
 };
 

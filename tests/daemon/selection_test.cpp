@@ -74,6 +74,18 @@ TEST(Selection, MovesTheCameraWithThePixels) {
   }
 }
 
+TEST(Selection, OfThoseItHasLeavesOutTheOthersButCountsRoomForThem) {
+  const Frame frame = numbered();
+  const std::vector<PlaneKind> planes{PlaneKind::Range, PlaneKind::Samples};
+  const Selection wanted{.planes = {PlaneKind::Range, PlaneKind::Depth}, .region = {}, .those_it_has = true};
+  EXPECT_TRUE(checkSelection(wanted, frame.camera, planes).ok());
+  const auto some = select(frame, wanted);
+  ASSERT_TRUE(some.ok());
+  ASSERT_EQ(some->planes.size(), 1u);
+  EXPECT_EQ(some->planes[0].kind, PlaneKind::Range);
+  EXPECT_EQ(bytesOf(wanted, frame.camera, planes, {}), 2 * sizeof(float) * 5 * 4);
+}
+
 TEST(Selection, RefusesWhatIsNotThere) {
   const Frame frame = numbered();
   const std::vector<PlaneKind> planes{PlaneKind::Range, PlaneKind::Samples};

@@ -34,6 +34,29 @@ TEST(GigeVisionDevice, DoesNotAnswerWhatIsNoCommand) {
   EXPECT_EQ(Camera::statusOf(camera.take(kOwner, commandOf(0x1234, 1, {})).answer), Status::kNotImplemented);
 }
 
+// Both are options of GigE Vision; whoever reads what the camera has must be able to trust it.
+TEST(GigeVisionDevice, DeclaresNeitherEventsNorActionsAndRefusesThem) {
+  constexpr std::uint32_t kEvents = 1U << 3, kEventsWithData = 1U << 4, kActions = 1U << 6,
+                          kUnconditionalActions = 1U << 20, kScheduledActions = 1U << 17;
+  constexpr std::uint16_t kEvent = 0x00C0, kEventWithData = 0x00C2, kAction = 0x0100;
+  constexpr std::uint32_t kMessagePort = 0x0B00, kActionGroupKey = 0x9800;
+  Camera camera;
+  EXPECT_EQ(camera.value(Item::ControlCapability) & (kEvents | kEventsWithData | kActions | kUnconditionalActions |
+                                                     kScheduledActions),
+            0U);
+  EXPECT_EQ(camera.value(Item::MessageChannels), 0U);
+  EXPECT_EQ(camera.value(Item::ActionSignals), 0U);
+  EXPECT_EQ(camera.value(Item::MessageCapability), 0U);
+  EXPECT_EQ(camera.write(Item::ControlPrivilege, kControl), Status::kSuccess);
+  for (const std::uint32_t address : {kMessagePort, kActionGroupKey})
+    EXPECT_EQ(camera.write(address, 5000), Status::kInvalidAddress) << address;
+  const Bytes keys = words({1, 1, 1});  // an action's device key, group key and group mask
+  for (const std::uint16_t command : {kEvent, kEventWithData, kAction}) {
+    EXPECT_EQ(Camera::statusOf(camera.take(kOwner, commandOf(command, 7, keys)).answer), Status::kNotImplemented);
+    EXPECT_TRUE(camera.take(kOwner, commandOf(command, 8, keys, 0)).answer.empty()) << "none was asked for";
+  }
+}
+
 TEST(GigeVisionDevice, IsSetByItsControllerAlone) {
   Camera camera;
   EXPECT_EQ(camera.write(Item::PacketDelay, 5), Status::kAccessDenied);  // nobody controls it

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/facades/source_link.h"
+
+#include <gtest/gtest.h>
+
+#include <future>
+#include <mutex>
+#include <utility>
+
+#include "../fakes.h"
+
+namespace toftwin::daemon {
+namespace {
+
+using test::Remote;
+
+/// A source that somebody else sets, too, and what a facade gets of it.
+class LinkedSource : public testing::Test {
+ protected:
+  void SetUp() override {
+    hub_.add(host_);
+    thread_.start();
+    thread_.door()->post([this] { link_.want(true); });
+    ASSERT_TRUE(remote_->asked.reaches(1));
+  }
+  void TearDown() override { thread_.stop(); }
+
+  void take(const Frame& frame) {
+    {
+      const std::scoped_lock lock{mutex_};
+      frames_.push_back(frame);
+    }
+    taken_.add();
+  }
+  /// Of the frame with that number, once it came.
+  std::vector<PlaneKind> planesOf(std::size_t number) {
+    if (!taken_.reaches(static_cast<int>(number) + 1)) return {};
+    const std::scoped_lock lock{mutex_};
+    EXPECT_EQ(frames_.at(number).sequence, number) << "none is lost";
+    std::vector<PlaneKind> kinds;
+    for (const Plane& plane : frames_[number].planes) kinds.push_back(plane.kind);
+    return kinds;
+  }
+  Result<> set(double amplitude) {
+    std::promise<Result<>> done;
+    host_->post([amplitude](drivers::Source& source) { return source.setParameter("amplitude", amplitude); },
+                [&](const Result<>& result) { done.set_value(result); });
+    return done.get_future().get();
+  }
+
+  std::mutex mutex_;
+  std::vector<Frame> frames_;
+  test::Counter taken_;
+  test::FakeClock clock_;
+  std::shared_ptr<Remote> remote_ = std::make_shared<Remote>();  // shared with its source
+  Hub hub_{Hub::Options{}, clock_};
+  std::shared_ptr<SourceHost> host_ = std::make_shared<SourceHost>(
+      "cam", test::opener(remote_), test::opener(remote_)(), SourceHost::Options{}, clock_);
+  EventThread thread_{"test"};
+  SourceLink link_{thread_,
+                   hub_,
+                   {.source = "cam", .planes = {PlaneKind::Amplitude, PlaneKind::Range}},
+                   [this](const Frame& frame) { take(frame); }};
+};
+
+TEST_F(LinkedSource, GivesTheFirstFrameAfterAnothersChangeWithThePlaneThatItBrought) {
+  const std::vector<PlaneKind> without{PlaneKind::Range}, with{PlaneKind::Amplitude, PlaneKind::Range};
+  remote_->give();
+  EXPECT_EQ(planesOf(0), without);
+  ASSERT_TRUE(set(1).ok());
+  remote_->give(2);
+  EXPECT_EQ(planesOf(1), with);
+  EXPECT_EQ(planesOf(2), with);
+  ASSERT_TRUE(set(0).ok());
+  remote_->give();
+  EXPECT_EQ(planesOf(3), without);
+}
+
+}  // namespace
+}  // namespace toftwin::daemon
