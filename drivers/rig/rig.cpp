@@ -44,18 +44,20 @@ std::string worstOf(const RigFile& file, const Positions& is, const Positions& t
 /// Notices when no axis has moved by its tolerance for a while.
 class StallWatch {
  public:
-  StallWatch(const RigFile& file, Clock::time_point now) : file_(file), since_(now) {}
+  StallWatch(const RigFile& file, Duration stall_time, Clock::time_point now)
+      : file_(file), stall_time_(toChrono(stall_time)), since_(now) {}
   bool hasStalled(const Positions& is, Clock::time_point now) {
     bool has_moved = mark_.empty();
     for (std::size_t i = 0; i < mark_.size(); ++i) {
       has_moved = has_moved || std::abs(is[i] - mark_[i]) > file_.axes[i].tolerance;
     }
     if (has_moved) mark_ = is, since_ = now;
-    return now - since_ > toChrono(file_.stall_time);
+    return now - since_ > stall_time_;
   }
 
  private:
   const RigFile& file_;
+  const std::chrono::nanoseconds stall_time_;
   Positions mark_;
   Clock::time_point since_;
 };
@@ -227,6 +229,7 @@ Result<RigState> Rig::home(const Interrupted& interrupted) {
 
 Result<RigState> Rig::watchHoming(const Interrupted& interrupted) {
   const auto began = Clock::now();
+  StallWatch stall{file_, file_.home_stall_time, began};
   bool has_begun = false;
   while (true) {
     std::this_thread::sleep_for(toChrono(file_.poll));
@@ -236,6 +239,12 @@ Result<RigState> Rig::watchHoming(const Interrupted& interrupted) {
     // moment.
     has_begun = has_begun || !state->is_homed || Clock::now() - began > toChrono(file_.settle);
     if (has_begun && state->is_homed) return state;
+    if (file_.home_stall_time > 0_s && stall.hasStalled(state->positions, Clock::now())) {
+      return halt({Error::Code::Timeout,
+                   fmt::format("the rig has stalled while it looked for its home: no axis has moved by its "
+                               "tolerance for {:.6g} s (home_stall_time_ms)",
+                               file_.home_stall_time.in(second))});
+    }
     if (Clock::now() - began > toChrono(file_.home_time)) {
       return halt(
           {Error::Code::Timeout, fmt::format("the rig has not found its home within {:.6g} s",
@@ -288,7 +297,7 @@ Result<> Rig::launch(const Positions& targets) {
 Result<RigState> Rig::watch(const Positions& targets, const Interrupted& interrupted) {
   const auto began = Clock::now();
   std::optional<Clock::time_point> there_since;
-  StallWatch stall{file_, began};
+  StallWatch stall{file_, file_.stall_time, began};
   while (true) {
     std::this_thread::sleep_for(toChrono(file_.poll));
     auto state = look(interrupted);

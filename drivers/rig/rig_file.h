@@ -114,6 +114,7 @@ struct RigFile {
   Duration stall_time = 1_s;
   Duration move_time = 60_s;
   Duration home_time = 120_s;
+  Duration home_stall_time = 5_s;
   Length pose_tolerance = 0.1_mm;
   std::array<double, 3> mount_position_m{};
   std::array<double, 3> mount_euler_deg{};
@@ -136,6 +137,10 @@ struct RigFile {
         "an axis that is not there and has not moved by its tolerance for so long has stalled");
     v.quantity("move_time", move_time, second, {0.1, 86'400}, "a motion takes at most");
     v.quantity("home_time", home_time, second, {0.1, 86'400}, "homing takes at most");
+    v.quantity(
+        "home_stall_time", home_stall_time, millisecond, {0, 600'000},
+        "a rig that homes and of which no axis has moved by its tolerance for so long has stalled; 0: not "
+        "watched, for a controller that tells no positions until it is homed");
     v.quantity("pose_tolerance", pose_tolerance, millimetre, {1e-4, 1e3},
                "by which the camera, and a point 1 m before it, may miss a pose that is asked for");
     v.numbers("mount_position_m", mount_position_m, {-1e3, 1e3},

@@ -169,6 +169,36 @@ TEST_P(RigMishap, StopsTheMotionAndIsReported) {
   EXPECT_LT(emulated.load(0), 250.0) << "it went on";
 }
 
+TEST(Rig, ThatStallsWhileItHomesIsStoppedAndReported) {
+  EmulatedRig emulated;
+  const auto rig = openRig(emulated, "home_stall_time_ms = 150");
+  ASSERT_NE(rig, nullptr);
+  ASSERT_TRUE(rig->moveAxes({300.0, 0.0}).ok());
+  emulated.stallAt(0.0);  // where it stands, that is
+  const auto homed = rig->home();
+  ASSERT_FALSE(homed.ok());
+  EXPECT_EQ(homed.error().code, Error::Code::Timeout);
+  EXPECT_NE(homed.error().message.find("has stalled while it looked for its home"), std::string::npos)
+      << homed.error().message;
+  EXPECT_NE(homed.error().message.find("The rig was told to stop"), std::string::npos)
+      << homed.error().message;
+  EXPECT_TRUE(emulated.isStopped());
+}
+
+TEST(Rig, ThatTellsNoPositionsUntilItIsHomedCanBeLeftUnwatched) {
+  EmulatedRig emulated;
+  const auto rig = openRig(emulated, "home_stall_time_ms = 0");
+  ASSERT_NE(rig, nullptr);
+  ASSERT_TRUE(rig->moveAxes({300.0, 0.0}).ok());
+  emulated.stallAt(0.0);
+  std::jthread later{[&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds{300});
+    emulated.stallAt(1e9);
+  }};
+  const auto homed = rig->home();
+  EXPECT_TRUE(homed.ok()) << homed.error().message;
+}
+
 TEST(Rig, WhoeverInterruptsStopsIt) {
   EmulatedRig emulated;
   const auto rig = openRig(emulated);
