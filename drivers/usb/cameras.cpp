@@ -30,13 +30,36 @@ std::optional<Number> numberOf(const std::string& text, int base) {
   return number;
 }
 
+/// Whether one of the interfaces, which are folders like 2-1.4:1.0, says so.
+bool hasUsb3Vision(const std::filesystem::path& folder) {
+  const std::string prefix = folder.filename().string() + ":";
+  std::error_code ignored;
+  for (const auto& entry : std::filesystem::directory_iterator{folder, ignored}) {
+    if (!entry.path().filename().string().starts_with(prefix)) continue;
+    const auto number = [&](const char* file) { return numberOf<unsigned>(lineOf(entry.path() / file), 16); };
+    const auto of_class = number("bInterfaceClass"), subclass = number("bInterfaceSubClass"),
+               protocol = number("bInterfaceProtocol");
+    if (of_class && subclass && protocol && isUsb3Vision(*of_class, *subclass, *protocol)) return true;
+  }
+  return false;
+}
+
+std::string nameOf(const Device& device) {
+  return device.product.empty() ? std::string{device.camera->name}
+                                : fmt::format("{} ({})", device.camera->name, device.product);
+}
+
 std::optional<Device> deviceAt(const std::filesystem::path& folder) {
   const auto vendor = numberOf<std::uint16_t>(lineOf(folder / "idVendor"), 16);
   const auto product = numberOf<std::uint16_t>(lineOf(folder / "idProduct"), 16);
   if (!vendor || !product) return std::nullopt;
   Device device;
   device.camera = find(*vendor, *product);
-  if (device.camera == nullptr) return std::nullopt;
+  if (device.camera == nullptr) {
+    if (!hasUsb3Vision(folder)) return std::nullopt;
+    device.camera = &usb3VisionCamera();
+    device.product = lineOf(folder / "product");
+  }
   device.port = folder.filename().string();
   device.serial = lineOf(folder / "serial");
   // "1.5" of a low-speed device would be read as 1, which is slow enough.
@@ -78,6 +101,16 @@ const KnownCamera* find(std::uint16_t vendor, std::uint16_t product) {
   return found == cameras.end() ? nullptr : &*found;
 }
 
+const KnownCamera& usb3VisionCamera() {
+  static constexpr KnownCamera kCamera{0, 0, "USB3 Vision camera", "aravis", kUsb3};
+  return kCamera;
+}
+
+bool isUsb3Vision(unsigned interface_class, unsigned subclass, unsigned protocol) {
+  constexpr unsigned kMiscellaneous = 0xEF, kUsb3Vision = 0x05, kControl = 0x00;
+  return interface_class == kMiscellaneous && subclass == kUsb3Vision && protocol == kControl;
+}
+
 std::vector<Device> list(const std::filesystem::path& root) {
   std::vector<Device> devices;
   std::error_code ignored;
@@ -94,15 +127,14 @@ std::string warningOf(const Device& device) {
   return fmt::format(
       "{} at {} is a USB 3 camera on a link of {:.0f} Mbit/s: it needs {:.0f}. Use a blue or SS "
       "port and a USB 3 cable of at most 3 m, without a hub",
-      device.camera->name, device.port, device.mbit_s, device.camera->least_mbit_s);
+      nameOf(device), device.port, device.mbit_s, device.camera->least_mbit_s);
 }
 
 std::string describe(const Device& device) {
-  return fmt::format("{} at {}, {:.0f} Mbit/s{}{}, {}", device.camera->name, device.port,
-                     device.mbit_s, device.serial.empty() ? "" : ", serial ", device.serial,
-                     device.camera->driver.empty()
-                         ? std::string{"for which there is no driver yet"}
-                         : fmt::format("for driver {}", device.camera->driver));
+  return fmt::format("{} at {}, {:.0f} Mbit/s{}{}, {}", nameOf(device), device.port, device.mbit_s,
+                     device.serial.empty() ? "" : ", serial ", device.serial,
+                     device.camera->driver.empty() ? std::string{"for which there is no driver yet"}
+                                                   : fmt::format("for driver {}", device.camera->driver));
 }
 
 }  // namespace toftwin::usb

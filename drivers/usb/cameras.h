@@ -22,12 +22,16 @@ struct KnownCamera {
 std::span<const KnownCamera> knownCameras();
 /// Null if nobody knows it.
 const KnownCamera* find(std::uint16_t vendor, std::uint16_t product);
+/// Any maker's camera that speaks USB3 Vision: it is known by what one of its interfaces is for.
+const KnownCamera& usb3VisionCamera();
+bool isUsb3Vision(unsigned interface_class, unsigned subclass, unsigned protocol);
 
 struct Device {
   const KnownCamera* camera = nullptr;
   std::string port;     ///< where it is plugged in: "2-1.4" is bus 2, port 1, port 4 of a hub there
   double mbit_s = 0.0;  ///< of the link, as negotiated
   std::string serial;
+  std::string product;         ///< as it calls itself, where it is known by an interface alone
   std::filesystem::path node;  ///< "/dev/bus/usb/002/005"
 };
 

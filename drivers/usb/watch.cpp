@@ -5,6 +5,7 @@
 #include <libusb.h>
 #include <sys/time.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "drivers/usb/libusb_parts.h"
@@ -17,10 +18,26 @@ Error failed(const char* doing, int error) {
           fmt::format("usb: {}: {}", doing, libusb_strerror(static_cast<libusb_error>(error)))};
 }
 
+/// By the first configuration, which libusb keeps: also of one that has left.
+bool hasUsb3Vision(libusb_device* device) {
+  libusb_config_descriptor* configuration = nullptr;
+  if (libusb_get_config_descriptor(device, 0, &configuration) != 0) return false;
+  const auto speaks = [](const libusb_interface& one) {
+    return one.num_altsetting > 0 &&
+           isUsb3Vision(one.altsetting[0].bInterfaceClass, one.altsetting[0].bInterfaceSubClass,
+                        one.altsetting[0].bInterfaceProtocol);
+  };
+  const bool is =
+      std::any_of(configuration->interface, configuration->interface + configuration->bNumInterfaces, speaks);
+  libusb_free_config_descriptor(configuration);
+  return is;
+}
+
 const KnownCamera* cameraOf(libusb_device* device) {
   libusb_device_descriptor about{};
   if (libusb_get_device_descriptor(device, &about) != 0) return nullptr;
-  return find(about.idVendor, about.idProduct);
+  const KnownCamera* known = find(about.idVendor, about.idProduct);
+  return known == nullptr && hasUsb3Vision(device) ? &usb3VisionCamera() : known;
 }
 
 Result<> resetDevice(libusb_device* device, const KnownCamera& camera, const std::string& port) {

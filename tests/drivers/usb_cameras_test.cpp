@@ -42,6 +42,29 @@ TEST(UsbCameras, AUsb3CameraOnUsb2IsWarnedOfAndAUsb2CameraIsNot) {
   EXPECT_EQ(warningOf(devices[2]), "");
 }
 
+TEST(UsbCameras, Usb3VisionIsKnownByItsInterfaceWhoeverMadeIt) {
+  const test::FakeRoot root;
+  const auto interface = [&](const std::string& port, int number, const std::string& subclass,
+                             const std::string& protocol) {
+    const std::string folder = fmt::format("sys/bus/usb/devices/{0}/{0}:1.{1}/", port, number);
+    root.write(folder + "bInterfaceClass", "ef");
+    root.write(folder + "bInterfaceSubClass", subclass);
+    root.write(folder + "bInterfaceProtocol", protocol);
+  };
+  root.plugIn("2-1", "1234", "5678", "480");
+  root.write("sys/bus/usb/devices/2-1/product", "Example ToF 640");
+  interface("2-1", 0, "05", "02");  // its stream alone would be none
+  interface("2-1", 1, "05", "00");
+  root.plugIn("2-2", "1234", "5679", "5000");
+  interface("2-2", 0, "02", "00");  // the same class, but for pairs of interfaces
+  const auto devices = list(root.path());
+  ASSERT_EQ(devices.size(), 1u);
+  EXPECT_EQ(describe(devices[0]),
+            "USB3 Vision camera (Example ToF 640) at 2-1, 480 Mbit/s, serial A02-1, for driver aravis");
+  EXPECT_NE(warningOf(devices[0]).find("(Example ToF 640) at 2-1 is a USB 3 camera on a link of 480"),
+            std::string::npos);
+}
+
 TEST(UsbCameras, EachHasItsUdevRule) {
   std::ostringstream rules;
   rules << std::ifstream{std::string{TOFTWIN_SOURCE_DIR} + "/systemd/60-toftwin.rules"}.rdbuf();

@@ -22,37 +22,39 @@ class WatchTest : public testing::Test {
     ASSERT_TRUE(umockdev_in_mock_environment()) << "run it as: umockdev-wrapper usb_watch_test";
     plugIn("usb1", 1, 0x1d, 0x6b, 0x02, 0x00);
   }
-  /// A device with one configuration without interfaces, as the kernel shows it.
+  /// A device with one configuration, as the kernel shows it; without interfaces, or with that one.
   void plugIn(const char* name, int number, int vendor_high, int vendor_low, int product_low,
-              int product_high, const char* parent = nullptr) {
+              int product_high, const char* parent = nullptr,
+              const std::vector<unsigned char>& interface = {}) {
     // The device descriptor (18 bytes) and that of the configuration (9), both little-endian.
-    const unsigned char bytes[] = {18,
-                                   1,
-                                   0,
-                                   2,
-                                   0,
-                                   0,
-                                   0,
-                                   64,
-                                   static_cast<unsigned char>(vendor_low),
-                                   static_cast<unsigned char>(vendor_high),
-                                   static_cast<unsigned char>(product_low),
-                                   static_cast<unsigned char>(product_high),
-                                   0,
-                                   1,
-                                   0,
-                                   0,
-                                   0,
-                                   1,
-                                   9,
-                                   2,
-                                   9,
-                                   0,
-                                   0,
-                                   1,
-                                   0,
-                                   0x80,
-                                   50};
+    std::vector<unsigned char> bytes = {18,
+                                        1,
+                                        0,
+                                        2,
+                                        0,
+                                        0,
+                                        0,
+                                        64,
+                                        static_cast<unsigned char>(vendor_low),
+                                        static_cast<unsigned char>(vendor_high),
+                                        static_cast<unsigned char>(product_low),
+                                        static_cast<unsigned char>(product_high),
+                                        0,
+                                        1,
+                                        0,
+                                        0,
+                                        0,
+                                        1,
+                                        9,
+                                        2,
+                                        static_cast<unsigned char>(9 + interface.size()),
+                                        0,
+                                        static_cast<unsigned char>(interface.empty() ? 0 : 1),
+                                        1,
+                                        0,
+                                        0x80,
+                                        50};
+    bytes.insert(bytes.end(), interface.begin(), interface.end());
     const std::string busnum = "1", devnum = std::to_string(number);
     const std::string devname = "bus/usb/001/00" + devnum;
     const char* attributes[] = {"busnum", busnum.c_str(),        "devnum", devnum.c_str(), "speed",
@@ -65,8 +67,8 @@ class WatchTest : public testing::Test {
                                                const_cast<gchar**>(attributes),
                                                const_cast<gchar**>(properties));
     ASSERT_NE(path, nullptr);
-    umockdev_testbed_set_attribute_binary(testbed_.get(), path, "descriptors",
-                                          const_cast<guint8*>(bytes), sizeof bytes);
+    umockdev_testbed_set_attribute_binary(testbed_.get(), path, "descriptors", bytes.data(),
+                                          static_cast<gint>(bytes.size()));
     paths_.emplace_back(path);
     g_free(path);
   }
@@ -104,6 +106,23 @@ TEST_F(WatchTest, TellsOfKnownCamerasThatAreThereComeAndGo) {
   ASSERT_EQ(seen_.size(), 3u);
   EXPECT_FALSE(seen_[2].has_arrived);
   EXPECT_EQ(seen_[2].camera->name, "ASUS Xtion Pro Live");
+}
+
+TEST_F(WatchTest, TellsOfUsb3VisionCamerasWhoeverMadeThem) {
+  const std::vector<unsigned char> control{9, 4, 0, 0, 0, 0xEF, 0x05, 0x00, 0},
+      other{9, 4, 0, 0, 0, 0xEF, 0x02, 0x00, 0};
+  plugIn("1-2", 3, 0x12, 0x34, 0x78, 0x56, paths_[0].c_str(), other);
+  plugIn("1-3", 4, 0x12, 0x34, 0x79, 0x56, paths_[0].c_str(), control);
+  auto watch = Watch::begin([this](const Watch::Event& event) { seen_.push_back(event); });
+  ASSERT_TRUE(watch.ok()) << watch.error().message;
+  waitFor(**watch, 1);
+  ASSERT_EQ(seen_.size(), 1u);
+  EXPECT_EQ(seen_[0].port, "1-3");
+  EXPECT_EQ(seen_[0].camera->driver, "aravis");
+  unplug(paths_[2]);
+  waitFor(**watch, 2);
+  ASSERT_EQ(seen_.size(), 2u);
+  EXPECT_FALSE(seen_[1].has_arrived);
 }
 
 TEST_F(WatchTest, WhatIsNotThereIsNotReset) {
