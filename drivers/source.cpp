@@ -13,6 +13,11 @@ Error unsupported(const SourceInfo& info, std::string_view what) {
 
 }  // namespace
 
+Error answerAtOpening(Error error) {
+  if (error.code == Error::Code::InvalidArgument) error.code = Error::Code::Incompatible;
+  return error;
+}
+
 SourceState Source::state() const {
   SourceState state;
   for (const std::string& name : info().parameters) state.parameters.push_back({.name = name});

@@ -69,6 +69,10 @@ class Source {
   virtual Result<> trigger();
 };
 
+/// For what goes wrong at opening a device once the keys were checked: that it does not take a value is its
+/// answer and no mistake of the file, which InvalidArgument would say. Incompatible instead.
+Error answerAtOpening(Error error);
+
 /// One row of the driver table.
 struct Driver {
   std::string_view name;

@@ -133,11 +133,11 @@ Result<std::unique_ptr<Source>> open(settings::Table& table) {
   const auto calibrated = calibrationAt(table, keys.calibration);
   if (auto checked = checkKeys(keys, table); !checked) return checked.error();
   auto connection = Connection::open(keys.uri.substr(kScheme.size()));
-  if (!connection) return connection.error();
+  if (!connection) return answerAtOpening(connection.error());
   const auto setup = configure(*connection, keys);
   if (!setup) {
     if (setup.error().code == Error::Code::Disconnected) connection->giveUp();
-    return setup.error();
+    return answerAtOpening(setup.error());
   }
   const auto lens = findLens(*connection, keys, *setup, calibrated);
   if (!lens) return lens.error();

@@ -12,6 +12,7 @@
 #include "drivers/aravis/discovery.h"
 #include "drivers/aravis/features.h"
 #include "drivers/aravis/frame_ids.h"
+#include "drivers/aravis/ptp.h"
 #include "drivers/aravis/stream.h"
 #include "drivers/clock_fit.h"
 #include "drivers/logging.h"
@@ -198,6 +199,7 @@ class AravisSource final : public Source {
     moment.exposures = {{time, chunkExposure(filled).value_or(exposure_), 0_Hz}};
     moment.clock = relation(filled.arrived);
     keepAlive();
+    if (keys_.ptp) ptp_.look(Features{connection_.device()}, info_.serial, filled.arrived);
     if (filled.arrived - temperature_at_ > kTemperatureEvery) {
       temperature_at_ = filled.arrived;
       temperature_c_ = Features{connection_.device()}.number("DeviceTemperature");
@@ -274,6 +276,7 @@ class AravisSource final : public Source {
   Object<ArvChunkParser> chunks_;
   Stream stream_;
   DeviceClock clock_;
+  PtpWatch ptp_;
   Duration exposure_ = 0_s;
   std::optional<double> temperature_c_;
   SteadyTime temperature_at_{};

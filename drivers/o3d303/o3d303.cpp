@@ -348,16 +348,12 @@ Result<Identity> identify(Rpc& rpc, const Endpoint& xmlrpc) {
                   hardware->textAt("MACAddress"), Endpoint{xmlrpc.address(), port}};
 }
 
-Result<std::unique_ptr<Source>> open(settings::Table& table) {
-  Keys keys;
-  table.read(keys);
-  const auto calibrated = calibrationAt(table, keys.calibration);
-  if (auto checked = table.check(); !checked) return checked.error();
-  const auto xmlrpc = endpointOf(keys, table);
-  if (!xmlrpc) return xmlrpc.error();
+/// By keys that were checked.
+Result<std::unique_ptr<Source>> openCamera(const Endpoint& xmlrpc, Keys keys,
+                                           const std::optional<CameraInfo>& calibrated) {
   auto loop = std::make_unique<EventLoop>();
-  Rpc rpc{*loop, *xmlrpc};
-  auto identity = identify(rpc, *xmlrpc);
+  Rpc rpc{*loop, xmlrpc};
+  auto identity = identify(rpc, xmlrpc);
   if (!identity) return identity.error();
   auto configuration = configure(rpc, keys);
   if (!configuration) return configuration.error();
@@ -376,9 +372,21 @@ Result<std::unique_ptr<Source>> open(settings::Table& table) {
   }
   auto health = askHealth(rpc, {});
   if (!health) return health.error();
-  return std::unique_ptr<Source>{std::make_unique<O3d303Source>(
-      std::move(loop), *xmlrpc, *std::move(identity), std::move(keys), *std::move(configuration),
-      *std::move(calibration), *std::move(health))};
+  return std::unique_ptr<Source>{std::make_unique<O3d303Source>(std::move(loop), xmlrpc, *std::move(identity),
+                                                                std::move(keys), *std::move(configuration),
+                                                                *std::move(calibration), *std::move(health))};
+}
+
+Result<std::unique_ptr<Source>> open(settings::Table& table) {
+  Keys keys;
+  table.read(keys);
+  const auto calibrated = calibrationAt(table, keys.calibration);
+  if (auto checked = table.check(); !checked) return checked.error();
+  const auto xmlrpc = endpointOf(keys, table);
+  if (!xmlrpc) return xmlrpc.error();
+  auto opened = openCamera(*xmlrpc, std::move(keys), calibrated);
+  if (!opened) return answerAtOpening(opened.error());
+  return opened;
 }
 
 }  // namespace

@@ -1,8 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // The driver with the real library: what it makes of an emulated camera's frames and features.
+#include <spdlog/sinks/base_sink.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <map>
+#include <mutex>
+#include <string>
+#include <vector>
 
 #include "aravis_testing.h"
 #include "drivers/compliance.h"
@@ -210,6 +217,41 @@ TEST_F(AravisDriver, PtpIsSwitchedOnAsAsked) {
   EXPECT_EQ(camera_.reg(Emulated::kPtp), 1u);
 }
 
+/// Counts the lines of the log with some text in them.
+class LogLines final : public spdlog::sinks::base_sink<std::mutex> {
+ public:
+  int count(std::string_view part) {
+    const std::scoped_lock lock{mutex_};
+    return static_cast<int>(std::ranges::count_if(
+        lines_, [&](const std::string& line) { return line.find(part) != std::string::npos; }));
+  }
+
+ private:
+  void sink_it_(const spdlog::details::log_msg& message) override {
+    lines_.emplace_back(message.payload.begin(), message.payload.end());
+  }
+  void flush_() override {}
+  std::vector<std::string> lines_;
+};
+
+TEST_F(AravisDriver, ThatItsClockFollowsNoOtherIsSaidOnceAndThatItDoes) {
+  const auto log = std::make_shared<LogLines>();  // shared with spdlog
+  const auto before = spdlog::default_logger();
+  spdlog::set_default_logger(std::make_shared<spdlog::logger>("test", log));
+  constexpr std::uint32_t kListening = 1, kSlave = 2;
+  camera_.setReg(Emulated::kPtpStatus, kListening);
+  const auto source = started("ptp = true");
+  ASSERT_NE(source, nullptr);
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(nextFrame(*source).ok());
+  EXPECT_EQ(camera_.reg(Emulated::kPtpLatch), 1u) << "the status is that of the last latch";
+  EXPECT_EQ(log->count("PtpStatus is Listening; device time is of its own clock"), 1);
+  camera_.setReg(Emulated::kPtpStatus, kSlave);
+  for (int i = 0; i < 1000 && log->count("PtpStatus is Slave") == 0; ++i)
+    ASSERT_TRUE(nextFrame(*source).ok());
+  EXPECT_EQ(log->count("its clock is the network's: PtpStatus is Slave"), 1);
+  spdlog::set_default_logger(before);
+}
+
 // ---- triggers ----------------------------------------------------------------------------------
 
 TEST_F(AravisDriver, ASoftwareTriggerMakesOneFrame) {
@@ -320,6 +362,10 @@ TEST_F(AravisDriver, WrongKeysSayWhatThereIs) {
         {"lens.fx = 1\nlens.field_of_view_deg = 2", "leave one out"},
         {"buffers = 1", "buffers"}}) {
     expectRefused(keys, says);
+  }
+  // The file is as it must be, and another camera may take it.
+  for (const char* refused : {"set = ['Gain = 99']", "set = ['Gain = loud']", "pixel_format = 'RGB8'"}) {
+    EXPECT_EQ(open(refused).error().code, Error::Code::Incompatible) << refused;
   }
   for (const auto& [uri, says] :
        {std::pair{"nobody", "aravis:nobody"}, {"127.0.0.77", "aravis:127.0.0.77"}}) {

@@ -62,11 +62,11 @@ class EmulatedGige {
   [[nodiscard]] double floatReg(std::uint32_t address) const;
   void setFloatReg(std::uint32_t address, double value);
   // Its registers that tests look at:
-  static constexpr std::uint32_t kWidthReg = 0x10000, kExposure = 0x10030, kRate = 0x10038,
-                                 kGain = 0x10040, kFilter = 0x10044, kSystem = 0x10058,
-                                 kDistanceUnit = 0x10054, kFocal = 0x10060, kEnable = 0x10120,
-                                 kFormat = 0x10140, kControl = 0x0A00, kHeartbeat = 0x0938,
-                                 kActivation = 0x10024, kInvalid = 0x10240, kPtp = 0x100A0,
+  static constexpr std::uint32_t kWidthReg = 0x10000, kExposure = 0x10030, kRate = 0x10038, kGain = 0x10040,
+                                 kFilter = 0x10044, kSystem = 0x10058, kDistanceUnit = 0x10054,
+                                 kFocal = 0x10060, kEnable = 0x10120, kFormat = 0x10140, kControl = 0x0A00,
+                                 kHeartbeat = 0x0938, kActivation = 0x10024, kInvalid = 0x10240,
+                                 kPtp = 0x100A0, kPtpStatus = 0x100A4, kPtpLatch = 0x100A8,
                                  kMultipartAble = 0x0D20, kUserText = 0x100B0;
 
   // What it sends in frame n:

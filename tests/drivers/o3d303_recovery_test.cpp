@@ -3,8 +3,14 @@
 #include <gtest/gtest.h>
 
 #include <fmt/format.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
+#include <charconv>
 #include <functional>
+#include <vector>
 
 #include "drivers/o3d303/o3d303.h"
 #include "emulated_o3d303.h"
@@ -71,6 +77,77 @@ INSTANTIATE_TEST_SUITE_P(
         Loss{"LineDropped", [](auto& c) { c.dropLine(); }, [](auto&) {}, milliseconds{0}},
         Loss{"Corrupted", [](auto& c) { c.corrupt(1, true); }, [](auto&) {}, milliseconds{0}}),
     [](const auto& test) { return std::string{test.param.name}; });
+
+/// A port of loopback whose SYNs nobody answers, as behind a cable that is out: its queue of connections is
+/// full.
+class SilentPort {
+ public:
+  explicit SilentPort(std::uint16_t port) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    address.sin_port = htons(port);
+    const auto* at = reinterpret_cast<const sockaddr*>(&address);
+    const int listener = make();
+    const int yes = 1;
+    EXPECT_EQ(::setsockopt(listener, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes), 0);
+    EXPECT_EQ(::bind(listener, at, sizeof address), 0);
+    EXPECT_EQ(::listen(listener, 0), 0);
+    constexpr int kLongest_ms = 200;
+    for (bool is_answered = true; is_answered && sockets_.size() < 10;) {
+      pollfd caller{make(), POLLOUT, 0};
+      (void)::connect(caller.fd, at, sizeof address);
+      is_answered = ::poll(&caller, 1, kLongest_ms) > 0;
+    }
+    EXPECT_LT(sockets_.size(), 10u) << "somebody answers";
+  }
+  ~SilentPort() {
+    for (const int one : sockets_) ::close(one);
+  }
+  SilentPort(const SilentPort&) = delete;
+  SilentPort& operator=(const SilentPort&) = delete;
+
+ private:
+  int make() {
+    return sockets_.emplace_back(::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+  }
+  std::vector<int> sockets_;
+};
+
+std::uint16_t portOf(const std::string& uri) {
+  std::uint16_t port = 0;
+  const char* end = uri.data() + uri.size();
+  EXPECT_EQ(std::from_chars(uri.data() + uri.rfind(':') + 1, end, port).ptr, end);
+  return port;
+}
+
+// What the kernel alone would take two minutes to tell.
+TEST(O3d303Silence, ACameraThatAnswersNoSynsIsSaidToBeAwayAndIsTakenUpAgain) {
+  EmulatedO3d303 camera;
+  RecoveryRig rig{[uri = camera.uri()]() -> Result<std::unique_ptr<drivers::Source>> {
+    auto table = settings::Table::parse(fmt::format("uri = '{}'", uri), "t.toml");
+    return drivers::o3d303::row().open(*table);
+  }};
+  ASSERT_TRUE(rig.isSubscribed());
+  ASSERT_TRUE(rig.next().has_value());
+  camera.unplug();
+  {
+    const SilentPort silent{portOf(camera.uri())};
+    for (int tried = 0; rig.host().health().last_error.find("took more than 300 ms") == std::string::npos;
+         ++tried) {
+      ASSERT_LT(tried, 3000) << rig.host().health().last_error;
+      std::this_thread::sleep_for(milliseconds{10});
+    }
+    EXPECT_NE(rig.host().summary().problem.find("is the camera powered, its cable in"), std::string::npos)
+        << rig.host().summary().problem;
+    EXPECT_GT(rig.host().health().reconnects, 0u);
+  }
+  rig.drain();
+  camera.plugIn();
+  const auto back = rig.next();
+  ASSERT_TRUE(back.has_value());
+  EXPECT_FALSE(back->dropped_because.empty());
+}
 
 // Frames, unit vectors, identities and configurations, whichever is under way: the daemon opens the
 // camera as often as it takes, and goes on when it talks sense again.

@@ -271,6 +271,16 @@ TEST(O3d303, AnAddressThatIsNoneIsComplainedAboutBeforeAnythingIsOpened) {
   }
 }
 
+TEST(O3d303, WhatTheCameraRefusesAtOpeningIsNoMistakeOfTheFile) {
+  EmulatedO3d303 camera{fast()};
+  camera.withDevice([](O3d303Device& device) { device.device.erase("DeviceType"); });
+  const auto opened = openWith(camera);
+  ASSERT_FALSE(opened.ok());
+  EXPECT_EQ(opened.error().code, Error::Code::Incompatible) << opened.error().message;
+  EXPECT_NE(opened.error().message.find("unknown parameter (101000)"), std::string::npos)
+      << opened.error().message;
+}
+
 // ---- clocks ------------------------------------------------------------------------------------
 
 TEST(O3d303, ItsClocksOffsetIsFoundAndASetClockDoesNotShow) {

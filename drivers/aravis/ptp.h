@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "drivers/aravis/features.h"
+#include "drivers/clock_fit.h"
+
+namespace toftwin::drivers::aravis {
+
+/// Tells the log whether the camera's clock follows the network's (IEEE 1588): until it does, device time is
+/// of the camera's own. Asked every second until then, and every ten seconds afterwards.
+class PtpWatch {
+ public:
+  void look(const Features& features, const std::string& camera, SteadyTime now);
+
+ private:
+  std::optional<SteadyTime> asked_at_;
+  std::string told_;  ///< the status that the log has
+  bool is_synchronised_ = false;
+};
+
+}  // namespace toftwin::drivers::aravis
