@@ -155,10 +155,11 @@ ConfiguredFacade readFacade(settings::Table& table, std::span<const FacadeKind> 
   if (kind != facades.end()) {
     facade.not_built = fmt::format("{}: it was {}", table.place("kind"), kind->not_built);
   } else {
-    table.complain(table.has("kind") ? "kind" : "",
-                   table.has("kind")
-                       ? fmt::format("= \"{}\" is no facade; there are: {}", facade.keys.kind, namesOf(facades))
-                       : fmt::format("kind is missing: it must be one of {}", namesOf(facades)));
+    table.complain(
+        table.has("kind") ? "kind" : "",
+        table.has("kind")
+            ? fmt::format("= \"{}\" is no facade; there are: {}", facade.keys.kind, namesOf(facades))
+            : fmt::format("kind is missing: it must be one of {}", namesOf(facades)));
   }
   table.acceptAll();  // whose keys the others are cannot be told
   return facade;
@@ -208,8 +209,8 @@ Result<Config> loadConfig(const std::filesystem::path& file,
 }
 
 Result<Config> parseConfig(std::string_view toml, const std::filesystem::path& name,
-                           std::span<const drivers::Driver> drivers,
-                           const std::vector<std::string>& running, std::span<const FacadeKind> facades) {
+                           std::span<const drivers::Driver> drivers, const std::vector<std::string>& running,
+                           std::span<const FacadeKind> facades) {
   auto table = settings::Table::parse(toml, name);
   if (!table) return table.error();
   return readConfig(*table, drivers, running, facades);

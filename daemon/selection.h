@@ -18,7 +18,8 @@ struct Selection {
   std::vector<PlaneKind> planes;  ///< in the order wanted; empty: all
   wire::Region region;            ///< width 0: the whole image
   std::uint32_t decimation = 1;
-  /// Of `planes`, whichever a frame has: what is set may give a source others. Else the source must have them all.
+  /// Of `planes`, whichever a frame has: what is set may give a source others. Else the source must have them
+  /// all.
   bool those_it_has = false;
   bool operator==(const Selection&) const = default;
 };
@@ -26,8 +27,9 @@ struct Selection {
 /// Bytes of each kind of plane for one pixel, as its source's last frame had them.
 using PixelBytes = std::map<PlaneKind, std::uint64_t>;
 
-/// What the planes of one frame have in all, at most: also those that it may come to have. Of a kind that is not among the known ones: by its element
-/// type and the fewest channels that it can have, which is exact for all but samples and phasors.
+/// What the planes of one frame have in all, at most: also those that it may come to have. Of a kind that is
+/// not among the known ones: by its element type and the fewest channels that it can have, which is exact for
+/// all but samples and phasors.
 std::uint64_t bytesOf(const Selection& selection, const CameraInfo& camera,
                       const std::vector<PlaneKind>& planes, const PixelBytes& known);
 

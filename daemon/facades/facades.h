@@ -16,8 +16,8 @@
 namespace toftwin::daemon {
 
 /// The facades of a running daemon. One that cannot start, because its port is in use, say, is told in the
-/// log and tried again, one that this build lacks is told; the daemon serves its other clients meanwhile. Used
-/// on the thread of the io_context only.
+/// log and tried again, one that this build lacks is told; the daemon serves its other clients meanwhile.
+/// Used on the thread of the io_context only.
 class Facades {
  public:
   Facades(boost::asio::io_context& io, Hub& hub, const Clock& clock) : hub_(hub), clock_(clock), pause_(io) {}

@@ -60,7 +60,9 @@ class Changing final : public Source {
   }
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
   [[nodiscard]] SourceState state() const override { return {camera_->state().parameters, {}}; }
-  Result<> setParameter(std::string_view name, double value) override { return camera_->setParameter(name, value); }
+  Result<> setParameter(std::string_view name, double value) override {
+    return camera_->setParameter(name, value);
+  }
   Result<> start() override { return camera_->start(); }
   void stop() override { camera_->stop(); }
   Result<Frame> next(std::stop_token stop, bool lockstep) override {
@@ -104,7 +106,8 @@ TEST(Compliance, PlanesMayChangeWhileTheCameraIsOpen) {
 
 TEST(Compliance, ALensMustNot) {
   const auto findings = checkChanging<true>();
-  const auto constant = std::ranges::find(findings, std::string_view{"what it says of itself is constant"}, &Finding::check);
+  const auto constant =
+      std::ranges::find(findings, std::string_view{"what it says of itself is constant"}, &Finding::check);
   ASSERT_NE(constant, findings.end());
   EXPECT_EQ(constant->outcome, Finding::Outcome::Failed);
 }

@@ -41,8 +41,8 @@ TEST(GigeVisionDevice, DeclaresNeitherEventsNorActionsAndRefusesThem) {
   constexpr std::uint16_t kEvent = 0x00C0, kEventWithData = 0x00C2, kAction = 0x0100;
   constexpr std::uint32_t kMessagePort = 0x0B00, kActionGroupKey = 0x9800;
   Camera camera;
-  EXPECT_EQ(camera.value(Item::ControlCapability) & (kEvents | kEventsWithData | kActions | kUnconditionalActions |
-                                                     kScheduledActions),
+  EXPECT_EQ(camera.value(Item::ControlCapability) &
+                (kEvents | kEventsWithData | kActions | kUnconditionalActions | kScheduledActions),
             0U);
   EXPECT_EQ(camera.value(Item::MessageChannels), 0U);
   EXPECT_EQ(camera.value(Item::ActionSignals), 0U);
@@ -52,7 +52,8 @@ TEST(GigeVisionDevice, DeclaresNeitherEventsNorActionsAndRefusesThem) {
     EXPECT_EQ(camera.write(address, 5000), Status::kInvalidAddress) << address;
   const Bytes keys = words({1, 1, 1});  // an action's device key, group key and group mask
   for (const std::uint16_t command : {kEvent, kEventWithData, kAction}) {
-    EXPECT_EQ(Camera::statusOf(camera.take(kOwner, commandOf(command, 7, keys)).answer), Status::kNotImplemented);
+    EXPECT_EQ(Camera::statusOf(camera.take(kOwner, commandOf(command, 7, keys)).answer),
+              Status::kNotImplemented);
     EXPECT_TRUE(camera.take(kOwner, commandOf(command, 8, keys, 0)).answer.empty()) << "none was asked for";
   }
 }
