@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <iterator>
@@ -21,12 +22,17 @@ namespace {
 
 using namespace test;
 using Policy = SubscribeOptions::Policy;
+using testing::AllOf, testing::AnyOf, testing::Ge, testing::Le;
 
 CdrWriter poseMessage(const std::array<double, 7>& numbers, const std::string& frame = "world") {
   CdrWriter cdr;
   cdr.number<std::int32_t>(5).number<std::uint32_t>(6).text(frame);
   for (const double one : numbers) cdr.number(one);
   return cdr;
+}
+
+std::int64_t wallNow() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
 class Ros2Facade : public RunningRos2 {};
@@ -49,6 +55,7 @@ TEST_F(Ros2Facade, APoseThatIsSentIsWhereTheNextFrameIsFrom) {
   ASSERT_TRUE(log_->waitFor("1e+300", 1));
   send({0, 0, 0, 0, 0, 0, 1}, "map");
   ASSERT_TRUE(log_->waitFor("not in \"world\"", 1));
+  const std::int64_t sent_ns = wallNow();
   send({0.25, -0.125, -0.5, 0.0, 0.6, 0.0, 0.8});
   const auto frame = stream->next(kSoon);
   ASSERT_TRUE(frame.ok()) << frame.error().message;
@@ -66,7 +73,8 @@ TEST_F(Ros2Facade, APoseThatIsSentIsWhereTheNextFrameIsFrom) {
     seen = readTransform(*std::move(message));
   } while (seen.numbers != numbersOf(expected));
   EXPECT_EQ(seen.child, "cam_optical_frame");
-  EXPECT_EQ(seen.stamp_ns, rosTimeOf(*frame));
+  // The frame's time; or, where the frame is slow, when the pose was set, which is told before it.
+  EXPECT_THAT(seen.stamp_ns, AnyOf(rosTimeOf(*frame), AllOf(Ge(sent_ns), Le(wallNow()))));
 }
 
 TEST_F(Ros2Facade, AReaderThatComesLateGetsTheStaticTransform) {
@@ -144,12 +152,15 @@ TEST_F(Ros2Facade, ATransformMovesTheCameraAndTransformsComeWithEachFrame) {
     cdr.number<std::int32_t>(0).number<std::uint32_t>(0).text("world").text(child);
     for (const double one : numbersOf(expected)) cdr.number(child == "tof" ? one : std::nan(""));
   }
-  ASSERT_TRUE(poses->write(&cdr.bytes()));
   auto native_client = client();
-  auto stream = native_client.subscribe("cam", {.policy = Policy::Queue, .queue = 64});
+  auto stream = native_client.subscribe("cam", {.policy = Policy::Lossless});
   ASSERT_TRUE(stream.ok());
   ReadTransform seen{};
   for (int i = 0; i < 200 && seen.numbers != numbersOf(expected); ++i) {
+    // Again and again: a reader that this writer knows may not know the writer yet.
+    if (i % 20 == 0) {
+      ASSERT_TRUE(poses->write(&cdr.bytes()));
+    }
     auto message = nextOf(transforms);
     ASSERT_TRUE(message);
     if (*message != cdr.bytes()) seen = readTransform(*std::move(message));  // it hears itself, too

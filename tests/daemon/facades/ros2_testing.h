@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <sys/socket.h>
+#include <sys/un.h>
 #include <unistd.h>
 
 #include <cstdint>
+#include <cstring>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "facade_testing.h"
+#include "protocol/transport/memfd.h"
 #include "ros2_reader.h"
 
 /// A daemon with a facade ros2, and a program of ROS 2 beside it.
@@ -55,6 +59,29 @@ inline std::vector<double> numbersOf(const Transform<World, Camera>& pose) {
   return {t.x, t.y, t.z, x, y, z, w};
 }
 
+/// A DDS domain that no other test of this machine has: tests run side by side, and those of one domain hear each
+/// other. It is kept by an abstract Unix socket, which goes with the process.
+class OwnDomain {
+ public:
+  OwnDomain() {
+    for (int i = 0; i < kDomains; ++i) {
+      number_ = 1 + (::getpid() + i) % kDomains;
+      sockaddr_un address{.sun_family = AF_UNIX, .sun_path = {}};
+      const std::string name = fmt::format("toftwin-test-dds-domain-{}", number_);
+      std::memcpy(address.sun_path + 1, name.data(), name.size());
+      const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + name.size());
+      if (::bind(kept_.get(), reinterpret_cast<const sockaddr*>(&address), size) == 0) return;
+    }
+    ADD_FAILURE() << "all DDS domains from 1 to " << kDomains << " are taken by tests";
+  }
+  [[nodiscard]] int number() const { return number_; }
+
+ private:
+  static constexpr int kDomains = 90;
+  transport::FileDescriptor kept_{::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0)};
+  int number_ = 0;
+};
+
 class RunningRos2 : public RunningFacade {
  protected:
   std::string facadeTable(const std::string& keys) const {
@@ -76,7 +103,8 @@ class RunningRos2 : public RunningFacade {
     return status.current_count >= writers;
   }
 
-  const int domain_ = 1 + ::getpid() % 90;  // where nobody else should be; tests run side by side
+  const OwnDomain own_domain_;
+  const int domain_ = own_domain_.number();
   std::optional<RosProgram> program_;
 };
 
