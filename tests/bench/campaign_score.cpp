@@ -12,9 +12,12 @@
 #include <set>
 #include <tuple>
 
+#include <toftwin/nan.h>
+
 #include "calib/compare/statistics.h"
 #include "calib/discover/campaign/catalogue.h"
 #include "calib/discover/campaign/covariates.h"
+#include "calib/discover/campaign/refit.h"
 
 namespace toftwin::discover::bench {
 namespace {
@@ -61,7 +64,7 @@ std::vector<std::string> fieldsOf(const std::string& line) {
   return fields;
 }
 
-constexpr std::size_t kFields = 19;
+constexpr std::size_t kFields = 25;
 
 std::optional<Score> readScore(const std::string& line) {
   const auto fields = fieldsOf(line);
@@ -73,8 +76,10 @@ std::optional<Score> readScore(const std::string& line) {
   score.is_alone = number(9) > 0.5, score.is_blamed = number(10) > 0.5;
   score.has_covariates = number(11) > 0.5, score.has_stage = number(12) > 0.5;
   score.spurious = static_cast<int>(number(13)), score.rests = static_cast<int>(number(14));
-  score.removed = number(15);
-  score.before_mm = number(16), score.after_mm = number(17), score.seconds = number(18);
+  score.explainable = number(15), score.removed = number(16);
+  score.stated = number(17), score.stated_low = number(18), score.stated_high = number(19);
+  score.numbers = static_cast<int>(number(20)), score.numbers_in = static_cast<int>(number(21));
+  score.before_mm = number(22), score.after_mm = number(23), score.seconds = number(24);
   for (std::size_t i = kFields; i < fields.size(); ++i)
     score.found += (i > kFields ? "," : "") + fields[i];
   return score;
@@ -87,28 +92,45 @@ double shareOf(const std::vector<Score>& scores, bool Score::*of) {
 
 std::string rowOf(const std::string& what, const std::vector<Score>& scores, bool is_null, bool is_absent) {
   double spurious = 0.0, rests = 0.0;
+  int numbers = 0, numbers_in = 0, stated = 0, stated_in = 0;
   std::vector<double> removed;
   for (const Score& one : scores) {
     spurious += one.spurious, rests += one.rests;
-    if (std::isfinite(one.removed)) removed.push_back(one.removed);
+    numbers += one.numbers, numbers_in += one.numbers_in;
+    if (!std::isfinite(one.removed)) continue;
+    removed.push_back(one.removed);
+    if (!std::isfinite(one.stated_low + one.stated_high)) continue;
+    ++stated, stated_in += one.removed >= one.stated_low && one.removed <= one.stated_high ? 1 : 0;
   }
+  const auto of = [](int in, int all) { return all == 0 ? "" : fmt::format("{} of {}", in, all); };
   const auto n = static_cast<double>(scores.size());
   const auto share = [](double value) { return fmt::format("{:.2f}", value); };
-  const bool has_removed = !is_null && !is_absent && !removed.empty();
-  return fmt::format("| {} | {} | {} | {} | {} | {} | {} | {:.2f} | {:.2f} | {} | {} |\n", what,
+  const bool has_removed = !is_null && !removed.empty();
+  return fmt::format("| {} | {} | {} | {} | {} | {} | {} | {:.2f} | {:.2f} | {} | {} | {} | {} |\n", what,
                      scores.size(), fmt::format("{:.3f}", shareOf(scores, &Score::is_detected)),
                      is_null || is_absent ? "" : share(shareOf(scores, &Score::is_right)),
                      is_null || is_absent ? "" : share(shareOf(scores, &Score::is_alone)),
                      is_absent ? share(1.0 - shareOf(scores, &Score::is_blamed)) : "",
                      is_absent ? share(shareOf(scores, &Score::has_covariates)) : "", spurious / n, rests / n,
                      has_removed ? share(compare::quantile(removed, 0.5)) : "",
-                     has_removed ? share(compare::quantile(removed, 0.1)) : "");
+                     has_removed ? share(compare::quantile(removed, 0.1)) : "", of(numbers_in, numbers),
+                     of(stated_in, stated));
 }
 
 bool isMiss(const Score& one) {
   if (one.of.wanted == 0.0) return one.is_detected;
   return !one.is_detected || one.spurious > 0 || one.is_blamed ||
          (one.of.is_absent ? !one.has_covariates : !one.is_right);
+}
+
+/// Of the effect that was hidden, found by its name.
+void countNumbers(const FoundEffect& one, const sim::AnyEffect& hidden, Score& score) {
+  if (!one.fitted || one.fitted->effect.index() != hidden.index()) return;
+  for (const FittedNumber& number : one.fitted->numbers) {
+    if (!(number.error > 0.0)) continue;
+    ++score.numbers;
+    score.numbers_in += std::abs(number.value - valueOf(hidden, number.key)) <= 1.96 * number.error ? 1 : 0;
+  }
 }
 
 }  // namespace
@@ -128,28 +150,36 @@ std::string inWords(const CampaignFinding& finding) {
   return words.empty() ? "nothing" : fmt::format("{}", fmt::join(words, " + "));
 }
 
-Score scoreOf(const Case& of, const sim::AnyEffect* hidden, const CampaignFinding& finding) {
-  Score score{.of = of, .p = finding.finding.first_p};
+Score scoreOf(const Case& of, const CampaignFinding& finding) {
+  Score score{.of = of, .p = finding.finding.first_p, .removed = kNaN};
   score.is_detected = score.p <= 0.01;
   score.seconds = finding.seconds, score.found = inWords(finding);
-  if (finding.judgement) {
-    score.removed = finding.judgement->removed;
-    score.before_mm = finding.judgement->before.rms_mm, score.after_mm = finding.judgement->after.rms_mm;
+  if (const auto& judged = finding.judgement) {
+    score.stated = judged->removed;
+    score.stated_low = judged->removed_low, score.stated_high = judged->removed_high;
+    score.before_mm = judged->before.rms_mm, score.after_mm = judged->after.rms_mm;
   }
   score.spurious = static_cast<int>(finding.updates.size());
   for (const FoundEffect& one : finding.effects) ++score.spurious, score.rests += one.found.is_rest ? 1 : 0;
-  if (hidden == nullptr) return score;
+  return score;
+}
+
+Score scoreOf(const Case& of, const sim::AnyEffect& hidden, const Removed& removed,
+              const CampaignFinding& finding) {
+  Score score = scoreOf(of, finding);
+  score.explainable = removed.explainable, score.removed = removed.share;
   bool is_met = false;
   for (const FoundEffect& one : finding.effects) {
     if (one.found.is_rest) continue;
-    const Answer answer = answerOf(one.found, *hidden, of.hidden);
+    const Answer answer = answerOf(one.found, hidden, of.hidden);
     const bool is_it = of.is_absent ? answer.has_covariates : answer.has_name || answer.has_covariates;
     score.is_right = score.is_right || answer.has_name;
     score.is_alone = score.is_alone || (one.found.is_catalogue && one.found.name == of.hidden);
     score.has_covariates = score.has_covariates || answer.has_covariates;
     score.is_blamed = score.is_blamed || (!answer.has_name && !answer.has_undeclared);
-    score.has_stage = score.has_stage || (is_it && one.found.stage == stageOf(*hidden));
+    score.has_stage = score.has_stage || (is_it && one.found.stage == stageOf(hidden));
     if (is_it && !is_met) is_met = true, --score.spurious;
+    countNumbers(one, hidden, score);
   }
   // One wrong name in the right one's place is a wrong name, not an effect too many.
   if (!is_met && score.spurious > 0) --score.spurious;
@@ -158,17 +188,20 @@ Score scoreOf(const Case& of, const sim::AnyEffect* hidden, const CampaignFindin
 
 std::string header() {
   return "row,hidden,lambda_wanted,lambda,seed,absent,p,detected,named,named_first,blamed,covariates,stage,"
-         "spurious,rests,removed,rms_before_mm,rms_after_mm,seconds,found\n";
+         "spurious,rests,explainable,removed,stated,stated_low,stated_high,numbers,numbers_in,rms_before_mm,"
+         "rms_after_mm,seconds,found\n";
 }
 
 std::string lineOf(const Score& one) {
   const auto yes = [](bool value) { return value ? 1 : 0; };
   return fmt::format(
-      "score,{},{:.0f},{:.1f},{},{},{:.4g},{},{},{},{},{},{},{},{},{:.4f},{:.4f},{:.4f},{:.1f},{}\n",
+      "score,{},{:.0f},{:.1f},{},{},{:.4g},{},{},{},{},{},{},{},{},{:.1f},{:.4f},{:.4f},{:.4f},{:.4f},{},{},{"
+      ":.4f},"
+      "{:.4f},{:.1f},{}\n",
       one.of.hidden, one.of.wanted, one.of.lambda, one.of.seed, yes(one.of.is_absent), one.p,
       yes(one.is_detected), yes(one.is_right), yes(one.is_alone), yes(one.is_blamed), yes(one.has_covariates),
-      yes(one.has_stage), one.spurious, one.rests, one.removed, one.before_mm, one.after_mm, one.seconds,
-      one.found);
+      yes(one.has_stage), one.spurious, one.rests, one.explainable, one.removed, one.stated, one.stated_low,
+      one.stated_high, one.numbers, one.numbers_in, one.before_mm, one.after_mm, one.seconds, one.found);
 }
 
 std::string tableOf(const std::vector<std::filesystem::path>& files) {
@@ -194,8 +227,9 @@ std::string tableOf(const std::vector<std::filesystem::path>& files) {
   }
   std::string table =
       "| hidden | runs | detected | named | named first | absent: none blamed | absent: covariates right | "
-      "spurious a run | of these rests | removed, median | worst tenth "
-      "|\n|---|---|---|---|---|---|---|---|---|---|---|\n";
+      "spurious a run | of these rests | removed, median | worst tenth | numbers in their 95 % | removed in "
+      "its 95 % "
+      "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
   for (const auto& [key, scores] : groups) {
     const auto& [wanted, is_absent, name] = key;
     table += rowOf(wanted == 0.0 ? name : fmt::format("λ = {:.0f}{}", wanted, is_absent ? ", absent" : ""),
@@ -203,7 +237,8 @@ std::string tableOf(const std::vector<std::filesystem::path>& files) {
   }
   table +=
       "\nBy effect, all λ:\n\n| hidden | runs | detected | named | named first | | | spurious | rests | "
-      "removed, median | worst tenth |\n|---|---|---|---|---|---|---|---|---|---|---|\n";
+      "removed, median | worst tenth | numbers | removed "
+      "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
   for (const auto& [name, scores] : by_effect) table += rowOf(name, scores, false, false);
   table += "\nMisses:\n\n| hidden | λ | seed | absent | p | found | removed |\n|---|---|---|---|---|---|---|\n";
   for (const Score& one : misses)

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "calib/discover/campaign/discover_campaign.h"
+#include "tests/bench/campaign_truth.h"
 
 /// How right a search of a campaign was, as a line of comma-separated values, and such lines as a table.
 namespace toftwin::discover::bench {
@@ -30,12 +31,23 @@ struct Score {
   bool has_stage = false;
   int spurious = 0;  ///< effects too many, rests of others among them
   int rests = 0;     ///< what is called the rest of another effect
-  double removed = 0.0, before_mm = 0.0, after_mm = 0.0, seconds = 0.0;
+  /// Free of noise, on the locked captures: χ² of what the light's delay leaves of the hidden effect, and the
+  /// share of it that the model found removes; NaN where nothing shows there, or nothing was hidden.
+  double explainable = 0.0, removed = 0.0;
+  /// The share that the report states, from noisy captures, and its 95 % interval.
+  double stated = 0.0, stated_low = 0.0, stated_high = 0.0;
+  int numbers = 0,
+      numbers_in = 0;  ///< fitted numbers of the hidden effect, and those whose 95 % interval has the truth
+  double before_mm = 0.0, after_mm = 0.0, seconds = 0.0;
   std::string found{};
 };
 
 std::string inWords(const CampaignFinding& finding);
-Score scoreOf(const Case& of, const sim::AnyEffect* hidden, const CampaignFinding& finding);
+/// `hidden`: as it was, with its numbers.
+Score scoreOf(const Case& of, const sim::AnyEffect& hidden, const Removed& removed,
+              const CampaignFinding& finding);
+/// Nothing was hidden.
+Score scoreOf(const Case& of, const CampaignFinding& finding);
 
 std::string header();
 std::string lineOf(const Score& score);

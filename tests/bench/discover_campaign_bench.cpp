@@ -27,8 +27,9 @@
 
 #include "calib/discover/campaign/discover_campaign.h"
 #include "calib/discover/campaign/model_file.h"
-#include "calib/discover/marginal.h"
+#include "calib/discover/campaign/reading.h"
 #include "tests/bench/campaign_score.h"
+#include "tests/bench/campaign_truth.h"
 #include "tests/discover/simulated_run.h"
 
 namespace {
@@ -115,42 +116,7 @@ struct Setting {
   plan::Plan plan;
   std::string camera;
   sim::Scene scene = orEnd(sim::Scene::parse(smallScene(), "scene.toml"));
-  sim::SensorModel declared = orEnd(sim::SensorModel::parse(camera, "camera.toml"));
-};
-
-/// A campaign in which nothing is hidden: how well its captures know what an effect would change.
-class Unspoilt {
- public:
-  explicit Unspoilt(const Setting& world)
-      : campaign_(orEnd(readCampaign(folder(), Side::A))),
-        declared_{world.declared, world.scene},
-        traced_(orEnd(traceAll(declared_, campaign_.captures, kTrace))) {}
-
-  /// λ: χ² of what the effect changes, free of noise, poses and light integrated out.
-  [[nodiscard]] double lambdaOf(const sim::SensorModel& truth) const {
-    const auto as_declared = orEnd(NoiselessCamera::make(
-        declared_.model, effectsWithoutNoise(declared_.model), campaign_.captures));
-    const auto hiding =
-        orEnd(NoiselessCamera::make(declared_.model, effectsWithoutNoise(truth), campaign_.captures));
-    Evidence evidence{commonGroups(), {}};
-    for (std::size_t c = 0; c < traced_.size(); ++c) {
-      const MeasuredCapture& capture = campaign_.captures[c];
-      const TracedCapture& traced = *traced_[c];
-      const Reading from = as_declared.read(capture, traced.light), to = hiding.read(capture, traced.light);
-      const Cells cells{capture, traced, from};
-      WhitenedCapture whitened{cells, kCommon};
-      whitened.putCommon(cells, traced);
-      whitened.putResidual(cells, whitened.residual, to, from);  // to − from
-      evidence.captures.push_back(whitened.evidence(capture.record.name, capture.record.block));
-    }
-    const Marginal marginal = marginalise(evidence, {});
-    return fit(marginal, nuisanceColumns(marginal)).deviance;
-  }
-
- private:
-  Campaign campaign_;
-  Declared declared_;
-  std::vector<std::shared_ptr<const TracedCapture>> traced_;
+  Declared declared{orEnd(sim::SensorModel::parse(camera, "camera.toml")), scene};
 };
 
 void simulate(const Setting& world, const sim::SensorModel& camera, std::uint64_t seed,
@@ -191,9 +157,16 @@ CampaignFinding search(const Setting& world, const std::vector<std::string>& lef
   return orEnd(searchCampaign(job, silent));
 }
 
-void report(const Options& options, const bench::Case& of, const sim::AnyEffect* hidden,
-            const CampaignFinding& finding) {
-  fmt::print("{}", bench::lineOf(bench::scoreOf(of, hidden, finding)));
+void report(const Options& options, const bench::Score& score, const CampaignFinding& finding) {
+  fmt::print("{}", bench::lineOf(score));
+  if (options.scores && finding.judgement) {
+    const Judgement& judged = *finding.judgement;
+    fmt::print(
+        "# judged: χ² per row {:.4f} before, {:.4f} with the delay, {:.4f} after, noise {:.4f}; explainable "
+        "{:.1f}; {} cells\n",
+        judged.before.per_row, judged.with_zero.per_row, judged.after.per_row, judged.noise,
+        judged.explainable, judged.cells);
+  }
   for (const SeenGroup& one : seenFirst(finding, options.scores ? 10 : 0))
     fmt::print("# {}: z {:.1f}, T {:.1f} of {}\n", one.name, one.z, one.statistic, one.rank);
   for (const FoundEffect& one : options.scores ? finding.effects : std::vector<FoundEffect>{})
@@ -205,16 +178,17 @@ void report(const Options& options, const bench::Case& of, const sim::AnyEffect*
 }
 
 /// Hides the effect, made as strong as λ wants, and searches.
-void hide(const Setting& world, const Unspoilt& unspoilt, const sim::AnyEffect& none,
+void hide(const Setting& world, const bench::KnownCaptures& unspoilt, const sim::AnyEffect& none,
           const sim::AnyEffect& defaults, const Options& options, double wanted, std::uint64_t seed) {
   bench::Case of{.hidden = discover::nameOf(defaults), .wanted = wanted, .seed = seed};
   const auto hiding = [&](double factor) {
-    return world.declared.withEffects(
-        withInserted(world.declared.effects(), scaled(none, defaults, factor)));
+    return world.declared.model.withEffects(
+        withInserted(world.declared.model.effects(), scaled(none, defaults, factor)));
   };
   double factor = 1.0;
   for (int pass = 0; pass < 12; ++pass) {
-    of.lambda = unspoilt.lambdaOf(hiding(factor));
+    of.lambda =
+        unspoilt.between(effectsWithoutNoise(world.declared.model), effectsWithoutNoise(hiding(factor)));
     if (!(of.lambda > 1e-3) || std::abs(of.lambda / wanted - 1.0) < 0.03) break;
     factor *= std::clamp(std::sqrt(wanted / of.lambda), 0.02, 50.0);
   }
@@ -223,13 +197,19 @@ void hide(const Setting& world, const Unspoilt& unspoilt, const sim::AnyEffect& 
     std::fflush(stdout);
     return;
   }
-  simulate(world, hiding(factor), seed);
+  const sim::SensorModel truth = hiding(factor);
+  const sim::AnyEffect hidden = scaled(none, defaults, factor);
+  simulate(world, truth, seed);
   for (const bool is_absent : {false, true}) {
     if (!(is_absent ? options.absent : options.present)) continue;
     of.is_absent = is_absent;
     std::filesystem::remove(folder() / plan::kOpenedFile);
-    report(options, of, &defaults,
-           search(world, is_absent ? std::vector<std::string>{of.hidden} : std::vector<std::string>{}));
+    const CampaignFinding finding =
+        search(world, is_absent ? std::vector<std::string>{of.hidden} : std::vector<std::string>{});
+    const auto locked = bench::KnownCaptures::locked(folder(), world.declared, kTrace);
+    report(options,
+           bench::scoreOf(of, hidden, bench::removedFrom(locked, world.declared, truth, finding), finding),
+           finding);
   }
 }
 
@@ -302,8 +282,9 @@ void searchNulls(const Setting& world, const Options& options) {
   for (const std::string& null : options.nulls) {
     first += 1000;  // no two nulls have noise in common
     for (std::uint64_t seed = options.first_seed; seed <= options.last_seed; ++seed) {
-      simulate(world, world.declared, seed + first, null);
-      report(options, {.hidden = "nothing: " + null, .seed = seed}, nullptr, search(world, {}));
+      simulate(world, world.declared.model, seed + first, null);
+      const CampaignFinding finding = search(world, {});
+      report(options, bench::scoreOf({.hidden = "nothing: " + null, .seed = seed}, finding), finding);
     }
   }
 }
@@ -339,8 +320,8 @@ int main(int argc, char** argv) {
   fmt::print("{}", bench::header());
   searchNulls(world, options);
   if (options.cases.empty() && !options.nulls.empty()) return std::filesystem::remove_all(folder()), 0;
-  simulate(world, world.declared, 1);
-  const Unspoilt unspoilt{world};
+  simulate(world, world.declared.model, 1);
+  const auto unspoilt = bench::KnownCaptures::open(folder(), world.declared, kTrace);
   sim::AllEffects::forEach([&]<class E>() {
     const std::string name{E::about.name};
     const bool is_asked = std::ranges::find(options.cases, name) != options.cases.end();

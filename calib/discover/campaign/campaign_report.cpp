@@ -266,6 +266,7 @@ Json dataOf(const CampaignJob& job, const CampaignFinding& finding) {
     locked.set("with_zero", toJson(judged->with_zero)).set("removed_by_zero", judged->removed_by_zero);
     locked.set("removed", judged->removed).set("removed_low", judged->removed_low);
     locked.set("removed_high", judged->removed_high).set("explainable_chi2", judged->explainable);
+    locked.set("cells", judged->cells).set("noise_chi2_per_row", judged->noise);
     data.set("locked_captures", std::move(locked));
   }
   data.set("notes", Json::arrayOf(finding.notes)).set("seconds", finding.seconds);

@@ -209,8 +209,9 @@ Result<JudgedModel> fileWith(const JudgedCampaign& judged, double delay_mm) {
   return model;
 }
 
-Result<> judgeLocked(const CampaignJob& job, const Campaign& campaign, const Declared& declared,
+Result<> judgeLocked(const CampaignJob& job, const Campaign& campaign, const JudgedCampaign& searched,
                      const JudgedModels& models, CampaignFinding& finding) {
+  const Declared& declared = searched.declared;
   if (!isRecording(job)) {
     const auto opened = plan::openLocked(
         {.run = job.run, .output = job.output, .locked = true, .note = job.note}, campaign.locked);
@@ -225,13 +226,8 @@ Result<> judgeLocked(const CampaignJob& job, const Campaign& campaign, const Dec
   if (!at_poses) return at_poses.error();
   const auto traced = traceWhereTheyStood(declared, *captures, *at_poses, options);
   if (!traced) return traced.error();
-  // Few large cells: what noise leaves of the explainable share is the smaller the fewer they are.
-  constexpr int kMostCells = 96;
-  // What an imperfect fit leaves of the open captures is no noise.
-  constexpr double kMostNoise = 1.1;
   const Lit lit{*captures, *traced, *at_poses};
-  auto judgement = judge({declared, lit, finding.finding.scales, kMostCells}, models,
-                         std::min(kMostNoise, finding.dispersion));
+  auto judgement = judge({declared, lit, finding.finding.scales}, searched, models);
   if (!judgement) return judgement.error();
   finding.judgement = *std::move(judgement);
   return {};
@@ -317,7 +313,7 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
     if (!with_zero) return with_zero.error();
     const JudgedModel after{withDelay(declared.model, refitted->effects, beyond.delay_mm),
                             beyond.hasOffset() ? beyond.offset_mm : 0.0, beyond.gain_percent};
-    if (auto done = judgeLocked(job, *campaign, declared, {*before, *with_zero, after}, finding); !done)
+    if (auto done = judgeLocked(job, *campaign, searched, {*before, *with_zero, after}, finding); !done)
       return done.error();
     keepIfWorse(files->text, finding);
   } else {

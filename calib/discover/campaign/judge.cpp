@@ -4,79 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <random>
-
-#include <toftwin/nan.h>
 
 #include "calib/compare/statistics.h"
+#include "calib/discover/campaign/explained.h"
 #include "calib/discover/campaign/reading.h"
-#include "calib/discover/marginal.h"
 
 namespace toftwin::discover {
 namespace {
-
-/// χ² of each capture under a model with fixed offset and gain, poses and light integrated out.
-struct ByCapture {
-  std::vector<double> energy{}, rows{};
-};
-Result<ByCapture> energiesOf(const JudgedCampaign& judged, const JudgedModel& model) {
-  const auto evidence = residualEvidence(judged, model.effects);
-  if (!evidence) return evidence.error();
-  const Marginal marginal = marginalise(*evidence, judged.scales);
-  const Eigen::Vector2d known{model.offset_mm, model.gain_percent};
-  ByCapture all;
-  for (const CaptureEvidence& capture : marginal.captures) {
-    const Eigen::Matrix2d gram = capture.gram.topLeftCorner<2, 2>();
-    all.energy.push_back(capture.energy - 2.0 * known.dot(capture.moment.head<2>()) +
-                         known.dot(gram * known));
-    all.rows.push_back(capture.rows);
-  }
-  return all;
-}
-
-double removedShare(const ByCapture& before, const ByCapture& after,
-                    const std::vector<std::size_t>& drawn, double dispersion) {
-  double all = 0.0, left = 0.0;
-  for (const std::size_t c : drawn) {
-    all += before.energy[c] - dispersion * before.rows[c];
-    left += after.energy[c] - dispersion * after.rows[c];
-  }
-  return all > 0.0 ? 1.0 - left / all : kNaN;
-}
-
-double perRow(const ByCapture& by_capture) {
-  double energy = 0.0, rows = 0.0;
-  for (const double one : by_capture.energy) energy += one;
-  for (const double one : by_capture.rows) rows += one;
-  return energy / rows;
-}
-
-void addRemoved(const ByCapture& before, const ByCapture& with_zero, const ByCapture& after, double dispersion,
-                Judgement& judgement) {
-  constexpr int kDraws = 2000;
-  constexpr std::uint64_t kSeed = 20'262;
-  const std::size_t count = before.energy.size();
-  std::vector<std::size_t> all(count);
-  for (std::size_t c = 0; c < count; ++c) {
-    all[c] = c;
-    judgement.explainable += with_zero.energy[c] - dispersion * with_zero.rows[c];
-  }
-  judgement.removed_by_zero = removedShare(before, with_zero, all, dispersion);
-  judgement.removed = removedShare(with_zero, after, all, dispersion);
-  std::mt19937_64 engine{kSeed};
-  std::uniform_int_distribution<std::size_t> any{0, count - 1};
-  std::vector<double> shares;
-  for (int k = 0; k < kDraws; ++k) {
-    std::vector<std::size_t> drawn(count);
-    for (std::size_t& c : drawn) c = any(engine);
-    const double share = removedShare(with_zero, after, drawn, dispersion);
-    if (std::isfinite(share)) shares.push_back(share);
-  }
-  judgement.removed_low = compare::quantile(shares, 0.025);
-  judgement.removed_high = compare::quantile(std::move(shares), 0.975);
-  judgement.before.per_row = perRow(before), judgement.with_zero.per_row = perRow(with_zero);
-  judgement.after.per_row = perRow(after);
-}
 
 /// Errors of one capture's pixels.
 struct Errors {
@@ -132,7 +66,8 @@ struct Totals {
 
 }  // namespace
 
-Result<Judgement> judge(const JudgedCampaign& judged, const JudgedModels& models, double dispersion) {
+Result<Judgement> judge(const JudgedCampaign& judged, const JudgedCampaign& open,
+                        const JudgedModels& models) {
   const auto& [before, with_zero, after] = models;
   const auto camera_before =
       NoiselessCamera::make(judged.declared.model, before.effects, judged.lit.captures);
@@ -164,13 +99,8 @@ Result<Judgement> judge(const JudgedCampaign& judged, const JudgedModels& models
   }
   all_before.into(judgement.before), all_after.into(judgement.after);
   all_with_zero.into(judgement.with_zero);
-  const auto energy_before = energiesOf(judged, before), energy_with_zero = energiesOf(judged, with_zero),
-             energy_after = energiesOf(judged, after);
-  if (!energy_before) return energy_before.error();
-  if (!energy_with_zero) return energy_with_zero.error();
-  if (!energy_after) return energy_after.error();
-  if (!judged.lit.captures.empty())
-    addRemoved(*energy_before, *energy_with_zero, *energy_after, dispersion, judgement);
+  if (judged.lit.captures.empty()) return judgement;
+  if (auto added = addExplained(judged, open, models, judgement); !added) return added.error();
   return judgement;
 }
 

@@ -42,16 +42,18 @@ struct JudgedModels {
 struct Judgement {
   RangeErrors before{}, with_zero{}, after{};
   std::vector<JudgedCapture> captures{};
-  /// The share of what can be explained that where zero lies removes: 1 − (χ²_zero − noise)/(χ²_before − noise).
+  /// The share of what can be explained that where zero lies removes: of χ²_before over noise what χ²_zero is
+  /// less by.
   double removed_by_zero = 0.0;
-  /// What was found removes of the rest: 1 − (χ²_after − noise)/(χ²_zero − noise), and its 95 % interval from
-  /// captures drawn anew with replacement.
+  /// What was found removes of the rest, χ²_zero over noise, what is left taken as not negative; and the 95 %
+  /// of it that noise in these captures allows.
   double removed = 0.0, removed_low = 0.0, removed_high = 0.0;
   double explainable = 0.0;  ///< χ²_zero − noise
+  int cells = 0;             ///< of each capture, at most, in these χ²
+  double noise = 1.0;        ///< χ² of noise per row, as the open captures say
 };
 
-/// `dispersion`: the noise's χ² per row, as the open captures say. Error: an exposure that a model
-/// cannot have.
-Result<Judgement> judge(const JudgedCampaign& judged, const JudgedModels& models, double dispersion);
+/// `open`: the captures that the models were found on. Error: an exposure that a model cannot have.
+Result<Judgement> judge(const JudgedCampaign& judged, const JudgedCampaign& open, const JudgedModels& models);
 
 }  // namespace toftwin::discover

@@ -32,7 +32,9 @@ CdrWriter poseMessage(const std::array<double, 7>& numbers, const std::string& f
 }
 
 std::int64_t wallNow() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch()).count();
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
 }
 
 class Ros2Facade : public RunningRos2 {};

@@ -59,8 +59,8 @@ inline std::vector<double> numbersOf(const Transform<World, Camera>& pose) {
   return {t.x, t.y, t.z, x, y, z, w};
 }
 
-/// A DDS domain that no other test of this machine has: tests run side by side, and those of one domain hear each
-/// other. It is kept by an abstract Unix socket, which goes with the process.
+/// A DDS domain that no other test of this machine has: tests run side by side, and those of one domain hear
+/// each other. It is kept by an abstract Unix socket, which goes with the process.
 class OwnDomain {
  public:
   OwnDomain() {
