@@ -220,10 +220,11 @@ Result<RigState> Rig::home(const Interrupted& interrupted) {
   if (!before) return before.error();
   if (auto may = mayMove(*before); !may) return may.error();
   if (auto released = release(); !released) return halt(released.error());
-  if (auto begun = bus_->set(file_.home, true, "home"); !begun) return halt(begun.error());
-  auto homed = watchHoming(interrupted);
-  if (!homed) return homed;
-  if (auto ended = bus_->set(file_.home, false, "home"); !ended) return halt(ended.error());
+  const auto begun = bus_->set(file_.home, true, "home");
+  auto homed = begun ? watchHoming(interrupted) : Result<RigState>{halt(begun.error())};
+  // Taken back also after a stop: else the rig would home by itself when the stop is released, or see no new order.
+  const auto ended = bus_->set(file_.home, false, "home");
+  if (homed && !ended) return halt(ended.error());
   return homed;
 }
 

@@ -46,7 +46,16 @@ void checkAxis(Table& table, const AxisSpec& axis, std::set<std::string>& names)
   checkSignal(table, "position", axis.position, true, false);
 }
 
+/// A rig that is looked at once within the time would always have stalled.
+void checkStallTime(Table& table, const char* key, Duration time, const RigFile& file) {
+  if (time == 0_s || time > file.poll) return;
+  table.complain(key, fmt::format("= {:.6g} must be above poll_ms = {:.6g}", time.in(millisecond),
+                                  file.poll.in(millisecond)));
+}
+
 void checkAll(Table& table, const RigFile& file) {
+  checkStallTime(table, "stall_time_ms", file.stall_time, file);
+  checkStallTime(table, "home_stall_time_ms", file.home_stall_time, file);
   if (file.host.empty()) table.complain("", "has no host: write the controller's address");
   checkSignal(table, "stop", file.stop, true, true);
   const std::pair<const char*, const Signal*> written[] = {{"home", &file.home},

@@ -300,6 +300,10 @@ bool EmulatedRig::isStopped() {
   const std::scoped_lock lock{impl_->mutex_};
   return impl_->mapping_->tab_bits[Stop] != 0;
 }
+bool EmulatedRig::isHoming() {
+  const std::scoped_lock lock{impl_->mutex_};
+  return impl_->is_homing_;
+}
 int EmulatedRig::departures() {
   const std::scoped_lock lock{impl_->mutex_};
   return impl_->departures_;

@@ -36,6 +36,7 @@ class EmulatedRig {
   [[nodiscard]] double load(int axis);
   [[nodiscard]] bool isMoving();
   [[nodiscard]] bool isStopped();
+  [[nodiscard]] bool isHoming();  ///< told to, and not yet otherwise
   /// How often motion began.
   [[nodiscard]] int departures();
   [[nodiscard]] bool isCaptured();

@@ -169,13 +169,33 @@ TEST_P(RigMishap, StopsTheMotionAndIsReported) {
   EXPECT_LT(emulated.load(0), 250.0) << "it went on";
 }
 
-TEST(Rig, ThatStallsWhileItHomesIsStoppedAndReported) {
+/// With times that a busy machine keeps, too.
+RigFile patientFileOf(const EmulatedRig& emulated) {
+  auto file = fileOf(emulated);
+  EXPECT_TRUE(file.ok()) << file.error().message;
+  file->answer_time = 10_s;
+  file->stall_time = file->home_stall_time = 30_s;
+  file->move_time = file->home_time = 60_s;
+  return *file;
+}
+
+/// Away from its home, and then held where it stands.
+void moveAndHold(EmulatedRig& emulated) {
+  const auto rig = Rig::open(patientFileOf(emulated));
+  ASSERT_TRUE(rig.ok()) << rig.error().message;
+  const auto moved = (*rig)->moveAxes({300.0, 0.0});
+  ASSERT_TRUE(moved.ok()) << moved.error().message;
+  emulated.stallAt(0.0);
+}
+
+TEST(Rig, ThatStallsWhileItHomesIsStoppedAndReportedAndHomesWhenItIsFree) {
   EmulatedRig emulated;
-  const auto rig = openRig(emulated, "home_stall_time_ms = 150");
-  ASSERT_NE(rig, nullptr);
-  ASSERT_TRUE(rig->moveAxes({300.0, 0.0}).ok());
-  emulated.stallAt(0.0);  // where it stands, that is
-  const auto homed = rig->home();
+  moveAndHold(emulated);
+  RigFile file = patientFileOf(emulated);
+  file.home_stall_time = 150_ms;
+  const auto rig = Rig::open(file);
+  ASSERT_TRUE(rig.ok()) << rig.error().message;
+  const auto homed = (*rig)->home();
   ASSERT_FALSE(homed.ok());
   EXPECT_EQ(homed.error().code, Error::Code::Timeout);
   EXPECT_NE(homed.error().message.find("has stalled while it looked for its home"), std::string::npos)
@@ -183,19 +203,28 @@ TEST(Rig, ThatStallsWhileItHomesIsStoppedAndReported) {
   EXPECT_NE(homed.error().message.find("The rig was told to stop"), std::string::npos)
       << homed.error().message;
   EXPECT_TRUE(emulated.isStopped());
+  EXPECT_FALSE(emulated.isHoming()) << "whoever releases the stop would send it home";
+  emulated.stallAt(1e9);
+  const auto freed = Rig::open(patientFileOf(emulated));
+  ASSERT_TRUE(freed.ok()) << freed.error().message;
+  const auto again = (*freed)->home();
+  EXPECT_TRUE(again.ok()) << again.error().message;
 }
 
 TEST(Rig, ThatTellsNoPositionsUntilItIsHomedCanBeLeftUnwatched) {
   EmulatedRig emulated;
-  const auto rig = openRig(emulated, "home_stall_time_ms = 0");
-  ASSERT_NE(rig, nullptr);
-  ASSERT_TRUE(rig->moveAxes({300.0, 0.0}).ok());
-  emulated.stallAt(0.0);
-  std::jthread later{[&] {
-    std::this_thread::sleep_for(std::chrono::milliseconds{300});
+  moveAndHold(emulated);
+  RigFile file = patientFileOf(emulated);
+  file.stall_time = 150_ms;
+  file.home_stall_time = 0_s;
+  const auto rig = Rig::open(file);
+  ASSERT_TRUE(rig.ok()) << rig.error().message;
+  std::jthread later{[&](const std::stop_token& stop) {
+    while (!emulated.isHoming() && !stop.stop_requested()) std::this_thread::sleep_for(std::chrono::milliseconds{1});
+    std::this_thread::sleep_for(std::chrono::milliseconds{500});  // more than three times that of a motion
     emulated.stallAt(1e9);
   }};
-  const auto homed = rig->home();
+  const auto homed = (*rig)->home();
   EXPECT_TRUE(homed.ok()) << homed.error().message;
 }
 
@@ -327,6 +356,9 @@ std::string errorOf(const std::string& toml) {
 
 TEST(RigFile, WhatCannotBeARigIsNamed) {
   const std::string error = errorOf(R"(
+poll_ms = 20
+stall_time_ms = 20
+home_stall_time_ms = 1
 stop = {memory = "discrete", address = 0}
 home = {memory = "coil", address = 1}
 [[axis]]
@@ -341,7 +373,8 @@ name = "x"
 max = 1
 )");
   for (const char* said :
-       {"has no host", "stop is written", "belong together", "min = 5 must be below max",
+       {"stall_time_ms = 20 must be above poll_ms = 20", "home_stall_time_ms = 1 must be above poll_ms = 20",
+        "has no host", "stop is written", "belong together", "min = 5 must be below max",
         "direction has no length", "target is written", "scale 0", "comes twice",
         "target must be there", "position must be there"}) {
     EXPECT_NE(error.find(said), std::string::npos) << said << "\n" << error;
