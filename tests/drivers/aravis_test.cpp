@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // The driver with the real library: what it makes of an emulated camera's frames and features.
-#include <spdlog/sinks/base_sink.h>
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <map>
-#include <mutex>
+#include <memory>
 #include <string>
 #include <vector>
 
+#include "../kept_log.h"
 #include "aravis_testing.h"
 #include "drivers/compliance.h"
 
@@ -217,39 +215,25 @@ TEST_F(AravisDriver, PtpIsSwitchedOnAsAsked) {
   EXPECT_EQ(camera_.reg(Emulated::kPtp), 1u);
 }
 
-/// Counts the lines of the log with some text in them.
-class LogLines final : public spdlog::sinks::base_sink<std::mutex> {
- public:
-  int count(std::string_view part) {
-    const std::scoped_lock lock{mutex_};
-    return static_cast<int>(std::ranges::count_if(
-        lines_, [&](const std::string& line) { return line.find(part) != std::string::npos; }));
-  }
+constexpr std::uint32_t kListening = 1, kSlave = 2, kMaster = 3;
 
- private:
-  void sink_it_(const spdlog::details::log_msg& message) override {
-    lines_.emplace_back(message.payload.begin(), message.payload.end());
-  }
-  void flush_() override {}
-  std::vector<std::string> lines_;
-};
-
-TEST_F(AravisDriver, ThatItsClockFollowsNoOtherIsSaidOnceAndThatItDoes) {
-  const auto log = std::make_shared<LogLines>();  // shared with spdlog
-  const auto before = spdlog::default_logger();
-  spdlog::set_default_logger(std::make_shared<spdlog::logger>("test", log));
-  constexpr std::uint32_t kListening = 1, kSlave = 2;
+TEST_F(AravisDriver, WhatItsClockFollowsIsSaidOnceForEachStatus) {
+  const auto log = std::make_shared<toftwin::test::KeptLog>();  // shared with spdlog
+  const toftwin::test::LoggingTo kept{log};
   camera_.setReg(Emulated::kPtpStatus, kListening);
   const auto source = started("ptp = true");
   ASSERT_NE(source, nullptr);
   for (int i = 0; i < 3; ++i) ASSERT_TRUE(nextFrame(*source).ok());
   EXPECT_EQ(camera_.reg(Emulated::kPtpLatch), 1u) << "the status is that of the last latch";
   EXPECT_EQ(log->count("PtpStatus is Listening; device time is of its own clock"), 1);
+  const auto goOnUntil = [&](const std::string& text) {
+    for (int i = 0; i < 1000 && log->count(text) == 0; ++i) ASSERT_TRUE(nextFrame(*source).ok());
+    EXPECT_EQ(log->count(text), 1) << text;
+  };
+  camera_.setReg(Emulated::kPtpStatus, kMaster);
+  goOnUntil("it is itself the master: PtpStatus is Master");
   camera_.setReg(Emulated::kPtpStatus, kSlave);
-  for (int i = 0; i < 1000 && log->count("PtpStatus is Slave") == 0; ++i)
-    ASSERT_TRUE(nextFrame(*source).ok());
-  EXPECT_EQ(log->count("its clock is the network's: PtpStatus is Slave"), 1);
-  spdlog::set_default_logger(before);
+  goOnUntil("its clock is the network's: PtpStatus is Slave");
 }
 
 // ---- triggers ----------------------------------------------------------------------------------
