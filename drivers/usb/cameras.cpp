@@ -7,6 +7,7 @@
 #include <array>
 #include <charconv>
 #include <fstream>
+#include <iterator>
 #include <optional>
 
 namespace toftwin::usb {
@@ -30,23 +31,24 @@ std::optional<Number> numberOf(const std::string& text, int base) {
   return number;
 }
 
-/// Whether one of the interfaces, which are folders like 2-1.4:1.0, says so.
+/// Whether an interface of the first configuration says so, by the descriptors that the device gave: they are
+/// there as soon as its folder is, while those of its interfaces come later.
 bool hasUsb3Vision(const std::filesystem::path& folder) {
-  const std::string prefix = folder.filename().string() + ":";
-  std::error_code ignored;
-  for (const auto& entry : std::filesystem::directory_iterator{folder, ignored}) {
-    if (!entry.path().filename().string().starts_with(prefix)) continue;
-    const auto number = [&](const char* file) { return numberOf<unsigned>(lineOf(entry.path() / file), 16); };
-    const auto of_class = number("bInterfaceClass"), subclass = number("bInterfaceSubClass"),
-               protocol = number("bInterfaceProtocol");
-    if (of_class && subclass && protocol && isUsb3Vision(*of_class, *subclass, *protocol)) return true;
+  constexpr std::size_t kInterfaceBytes = 9;
+  constexpr unsigned char kConfiguration = 2, kInterface = 4;
+  std::ifstream in{folder / "descriptors", std::ios::binary};
+  const std::vector<unsigned char> all(std::istreambuf_iterator<char>{in}, std::istreambuf_iterator<char>{});
+  int configurations = 0;
+  std::span<const unsigned char> rest{all};
+  while (rest.size() >= 2 && rest[0] >= 2 && rest[0] <= rest.size()) {  // each begins with its length and kind
+    const auto one = rest.first(rest[0]);
+    rest = rest.subspan(one.size());
+    configurations += one[1] == kConfiguration ? 1 : 0;
+    if (configurations > 1) return false;
+    if (one[1] != kInterface || one.size() < kInterfaceBytes) continue;
+    if (isUsb3Vision(one[5], one[6], one[7])) return true;
   }
   return false;
-}
-
-std::string nameOf(const Device& device) {
-  return device.product.empty() ? std::string{device.camera->name}
-                                : fmt::format("{} ({})", device.camera->name, device.product);
 }
 
 std::optional<Device> deviceAt(const std::filesystem::path& folder) {
@@ -120,6 +122,11 @@ std::vector<Device> list(const std::filesystem::path& root) {
   }
   std::ranges::sort(devices, {}, &Device::port);
   return devices;
+}
+
+std::string nameOf(const Device& device) {
+  return device.product.empty() ? std::string{device.camera->name}
+                                : fmt::format("{} ({})", device.camera->name, device.product);
 }
 
 std::string warningOf(const Device& device) {

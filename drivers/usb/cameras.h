@@ -38,6 +38,8 @@ struct Device {
 /// The known cameras that are plugged in, by port. `root` stands for "/" in the tests.
 std::vector<Device> list(const std::filesystem::path& root = "/");
 
+/// "Microsoft Kinect v2", "USB3 Vision camera (Example ToF 640)"
+std::string nameOf(const Device& device);
 /// What is wrong with the link and what to do, or nothing: a USB 3 camera on USB 2.
 std::string warningOf(const Device& device);
 /// "Microsoft Kinect v2 at 2-1.4, 5000 Mbit/s, serial 123, for driver kinect2"

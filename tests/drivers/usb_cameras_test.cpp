@@ -44,19 +44,22 @@ TEST(UsbCameras, AUsb3CameraOnUsb2IsWarnedOfAndAUsb2CameraIsNot) {
 
 TEST(UsbCameras, Usb3VisionIsKnownByItsInterfaceWhoeverMadeIt) {
   const test::FakeRoot root;
-  const auto interface = [&](const std::string& port, int number, const std::string& subclass,
-                             const std::string& protocol) {
-    const std::string folder = fmt::format("sys/bus/usb/devices/{0}/{0}:1.{1}/", port, number);
-    root.write(folder + "bInterfaceClass", "ef");
-    root.write(folder + "bInterfaceSubClass", subclass);
-    root.write(folder + "bInterfaceProtocol", protocol);
+  const std::string device("\x12\x01", 2), configuration("\x09\x02", 2);
+  const auto padded = [](std::string begin, std::size_t size) { return begin.resize(size), begin; };
+  const auto interface = [](char subclass, char protocol) {
+    return std::string{9, 4, 0, 0, 0, '\xEF', subclass, protocol, 0};
   };
-  root.plugIn("2-1", "1234", "5678", "480");
+  const auto plugIn = [&](const std::string& port, const std::string& interfaces) {
+    root.plugIn(port, "1234", "5678", port == "2-1" ? "480" : "5000");
+    root.write("sys/bus/usb/devices/" + port + "/descriptors",
+               padded(device, 18) + padded(configuration, 9) + interfaces);
+  };
+  plugIn("2-1", interface(5, 2) + interface(5, 0));  // its stream alone would be none
   root.write("sys/bus/usb/devices/2-1/product", "Example ToF 640");
-  interface("2-1", 0, "05", "02");  // its stream alone would be none
-  interface("2-1", 1, "05", "00");
-  root.plugIn("2-2", "1234", "5679", "5000");
-  interface("2-2", 0, "02", "00");  // the same class, but for pairs of interfaces
+  plugIn("2-2", interface(2, 0));  // the same class, but for pairs of interfaces
+  plugIn("2-3", interface(5, 2) + padded(configuration, 9) + interface(5, 0));  // not in its first configuration
+  plugIn("2-4", std::string(1, '\0') + interface(5, 0));                        // a descriptor of no length
+  plugIn("2-5", interface(5, 0).substr(0, 6));                                  // cut short
   const auto devices = list(root.path());
   ASSERT_EQ(devices.size(), 1u);
   EXPECT_EQ(describe(devices[0]),

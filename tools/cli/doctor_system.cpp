@@ -100,7 +100,7 @@ Finding checkUsbShares(const fs::path& root) {
   std::map<std::string, double> links_mbit_s;
   for (const usb::Device& device : usb::list(root)) {
     const std::string bus = device.port.substr(0, device.port.find('-'));
-    on_bus[bus].push_back(fmt::format("{} at {}", device.camera->name, device.port));
+    on_bus[bus].push_back(fmt::format("{} at {}", usb::nameOf(device), device.port));
     links_mbit_s[bus] += device.mbit_s;
   }
   for (const auto& [bus, cameras] : on_bus) {

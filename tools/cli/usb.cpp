@@ -27,7 +27,7 @@ void listAll(bool as_json) {
   for (const usb::Device& device : devices) {
     const std::string warning = usb::warningOf(device);
     all.push(Json::object()
-                 .set("camera", std::string{device.camera->name})
+                 .set("camera", usb::nameOf(device))
                  .set("driver", std::string{device.camera->driver})
                  .set("port", device.port)
                  .set("mbit_s", device.mbit_s)
