@@ -44,7 +44,7 @@ void PtpWatch::look(const Features& features, const std::string& camera, SteadyT
     logging::info("{}: its clock is the network's: {} is {}", camera, status->feature, status->value);
   } else if (status->value == "Master") {
     logging::warn(
-        "{}: its clock follows no other's, for it is itself the master: {} is {}; device time is of its own clock",
+        "{}: its clock follows no other's, for it is itself the master: {} is {}; device time is of its own",
         camera, status->feature, status->value);
   } else {
     logging::warn("{}: its clock follows no other's: {} is {}; device time is of its own clock until it does",

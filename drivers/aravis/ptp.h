@@ -11,7 +11,7 @@
 namespace toftwin::drivers::aravis {
 
 /// Tells the log whether the camera's clock follows the network's (IEEE 1588): until it does, device time is
-/// of the camera's own. Asked every second until then, and every ten seconds afterwards, or if the camera does
+/// of the camera's own. Asked every second until then, every ten seconds afterwards, or if the camera does
 /// not tell.
 class PtpWatch {
  public:

@@ -222,7 +222,7 @@ Result<RigState> Rig::home(const Interrupted& interrupted) {
   if (auto released = release(); !released) return halt(released.error());
   const auto begun = bus_->set(file_.home, true, "home");
   auto homed = begun ? watchHoming(interrupted) : Result<RigState>{halt(begun.error())};
-  // Taken back also after a stop: else the rig would home by itself when the stop is released, or see no new order.
+  // Taken back behind a stop, too: else the rig would home by itself when that is released, or see no new order.
   const auto ended = bus_->set(file_.home, false, "home");
   if (homed && !ended) return halt(ended.error());
   return homed;

@@ -40,7 +40,7 @@ bool hasUsb3Vision(const std::filesystem::path& folder) {
   const std::vector<unsigned char> all(std::istreambuf_iterator<char>{in}, std::istreambuf_iterator<char>{});
   int configurations = 0;
   std::span<const unsigned char> rest{all};
-  while (rest.size() >= 2 && rest[0] >= 2 && rest[0] <= rest.size()) {  // each begins with its length and kind
+  while (rest.size() >= 2 && rest[0] >= 2 && rest[0] <= rest.size()) {  // each begins with length and kind
     const auto one = rest.first(rest[0]);
     rest = rest.subspan(one.size());
     configurations += one[1] == kConfiguration ? 1 : 0;

@@ -220,8 +220,9 @@ TEST(Rig, ThatTellsNoPositionsUntilItIsHomedCanBeLeftUnwatched) {
   const auto rig = Rig::open(file);
   ASSERT_TRUE(rig.ok()) << rig.error().message;
   std::jthread later{[&](const std::stop_token& stop) {
-    while (!emulated.isHoming() && !stop.stop_requested()) std::this_thread::sleep_for(std::chrono::milliseconds{1});
-    std::this_thread::sleep_for(std::chrono::milliseconds{500});  // more than three times that of a motion
+    using std::chrono::milliseconds;
+    while (!emulated.isHoming() && !stop.stop_requested()) std::this_thread::sleep_for(milliseconds{1});
+    std::this_thread::sleep_for(milliseconds{500});  // more than three times that of a motion
     emulated.stallAt(1e9);
   }};
   const auto homed = (*rig)->home();

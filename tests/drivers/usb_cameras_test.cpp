@@ -57,7 +57,7 @@ TEST(UsbCameras, Usb3VisionIsKnownByItsInterfaceWhoeverMadeIt) {
   plugIn("2-1", interface(5, 2) + interface(5, 0));  // its stream alone would be none
   root.write("sys/bus/usb/devices/2-1/product", "Example ToF 640");
   plugIn("2-2", interface(2, 0));  // the same class, but for pairs of interfaces
-  plugIn("2-3", interface(5, 2) + padded(configuration, 9) + interface(5, 0));  // not in its first configuration
+  plugIn("2-3", interface(5, 2) + padded(configuration, 9) + interface(5, 0));  // in its second configuration
   plugIn("2-4", std::string(1, '\0') + interface(5, 0));                        // a descriptor of no length
   plugIn("2-5", interface(5, 0).substr(0, 6));                                  // cut short
   const auto devices = list(root.path());
