@@ -22,6 +22,10 @@ UvcLayout layoutOf(const UvcCamera::Options& options) {
                    .intervals = {interval, interval, interval},
                    .exposure_100us = {{1, UvcCamera::kMostExposure_100us, UvcCamera::kExposure_100us}},
                    .gain = {{0, UvcCamera::kMostGain, UvcCamera::kGain}}};
+  if (options.says_invz) {  // [Linux, UVC_GUID_FORMAT_INVZ]
+    layout.streams[0].fourcc = "INVZ";
+    layout.streams[0].guid_tail = {0x90, 0x2D, 0x58, 0x4A, 0x92, 0x0B, 0x77, 0x3F, 0x1F, 0x2C, 0x55, 0x6B};
+  }
   if (options.has_infrared) layout.streams.push_back({"Y16 ", UvcCamera::kWidth, UvcCamera::kHeight});
   return layout;
 }

@@ -22,6 +22,7 @@ class UvcCamera final : public daemon::usb_camera::UvcDevice {
     Endpoint endpoint = Endpoint::Bulk;
     UsbSpeed speed = UsbSpeed::High;
     bool has_infrared = false;
+    bool says_invz = false;  ///< as Intel's cameras call Z16 on the bus
     std::chrono::microseconds interval{33'333};
   };
   static constexpr std::uint16_t kWidth = 160, kHeight = 120;

@@ -109,6 +109,17 @@ TEST(Uvc, PicturesAreWhatTheCameraSentOneAfterTheOther) {
   }
 }
 
+TEST(Uvc, WhatTheBusCallsInvzIsDepthAsItIs) {
+  const Plugged plugged{{.says_invz = true}};
+  const auto source = started(keys());
+  ASSERT_NE(source, nullptr);
+  for (int i = 0; i < 3; ++i) {
+    const auto frame = nextFrame(*source);
+    ASSERT_TRUE(frame.ok()) << frame.error().message;
+    expectExact(*frame);
+  }
+}
+
 TEST(Uvc, TwoNodesAreDepthAndInfrared) {
   const Plugged plugged{{.has_infrared = true}};
   std::ofstream{"/tmp/two.toml"} << "[depth]\nformat = 'Z16'\n[infrared]\nformat = 'Y16'\n"

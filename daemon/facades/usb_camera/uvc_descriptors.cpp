@@ -20,12 +20,10 @@ unsigned isochronousPackets(const UvcLayout& layout) {
   return isSuper(layout) ? kSuperPackets : kHighPackets;
 }
 
-/// The four letters and the tail that all such codes share.
-Bytes guidOf(const std::string& fourcc) {
+Bytes guidOf(const UvcLayout::Stream& stream) {
   Writer writer;
-  for (std::size_t i = 0; i < 4; ++i) writer.u8(static_cast<unsigned char>(fourcc[i]));
-  writer.u16(0x0000).u16(0x0010);
-  for (const unsigned byte : {0x80U, 0x00U, 0x00U, 0xAAU, 0x00U, 0x38U, 0x9BU, 0x71U}) writer.u8(byte);
+  for (std::size_t i = 0; i < 4; ++i) writer.u8(static_cast<unsigned char>(stream.fourcc[i]));
+  for (const std::uint8_t byte : stream.guid_tail) writer.u8(byte);
   return writer.done();
 }
 
@@ -88,7 +86,7 @@ Bytes streamFormats(const UvcLayout& layout, std::size_t number) {
   const bool is_fixed = intervals.min == intervals.max;
   Writer format;
   format.u8(27).u8(kClassInterface).u8(UVC_VS_FORMAT_UNCOMPRESSED).u8(1).u8(1);
-  format.bytes(guidOf(stream.fourcc)).u8(16).u8(1).u8(0).u8(0).u8(0).u8(0);
+  format.bytes(guidOf(stream)).u8(16).u8(1).u8(0).u8(0).u8(0).u8(0);
   format.u8(is_fixed ? 30 : 38).u8(kClassInterface).u8(UVC_VS_FRAME_UNCOMPRESSED).u8(1).u8(0);
   format.u16(stream.width).u16(stream.height);
   format.u32(bitRateOf(stream, intervals.max)).u32(bitRateOf(stream, intervals.min));

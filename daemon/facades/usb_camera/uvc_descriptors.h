@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -30,6 +31,8 @@ struct UvcLayout {
   struct Stream {
     std::string fourcc;  ///< "Z16 " or "Y16 "
     std::uint16_t width = 0, height = 0;
+    std::array<std::uint8_t, 12> guid_tail{0x00, 0x00, 0x10, 0x00, 0x80, 0x00,
+                                           0x00, 0xAA, 0x00, 0x38, 0x9B, 0x71};  ///< that most codes share
     [[nodiscard]] std::uint32_t pictureBytes() const { return std::uint32_t{2} * width * height; }
     bool operator==(const Stream&) const = default;
   };
