@@ -88,6 +88,8 @@ struct Driver {
   std::string (*document)();
   /// Empty, or why this build lacks it and what to do: "not built: install libopenni2-dev and …".
   std::string_view not_built = {};
+  /// What a listed camera can be set to, a line each, for people; null: the driver does not know.
+  std::vector<std::string> (*formats)(const std::string& uri) = nullptr;
 };
 
 /// All drivers of this build, in the order of the documents.

@@ -8,6 +8,7 @@
 #include <charconv>
 
 #include "drivers/logging.h"
+#include "drivers/v4l2/formats.h"
 #include "drivers/v4l2/selection.h"
 #include "drivers/v4l2/source.h"
 #include "protocol/settings/describe.h"
@@ -156,7 +157,8 @@ Driver row() {
                 return settings::markdownTable(settings::keysOf<Keys>()) +
                        "\nA description has these keys:\n\n" +
                        settings::markdownTable(settings::keysOf<Description>());
-              }};
+              },
+          .formats = [](const std::string& uri) { return formatLines(kernel(), uri); }};
 }
 
 }  // namespace toftwin::drivers::v4l2

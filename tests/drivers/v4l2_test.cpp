@@ -13,6 +13,7 @@
 
 #include "drivers/compliance.h"
 #include "drivers/v4l2/description.h"
+#include "drivers/v4l2/formats.h"
 #include "drivers/v4l2/pixel_format.h"
 #include "v4l2_testing.h"
 
@@ -185,6 +186,23 @@ TEST(V4l2, ListsCamerasWithDepthByTheirPortAndNoWebcams) {
                         .bus_info = "usb-c",
                         .caps = V4L2_CAP_META_CAPTURE | V4L2_CAP_STREAMING}}};
   EXPECT_EQ(listOn(system), std::vector<std::string>{"v4l2:usb-b"});
+}
+
+TEST(V4l2, SaysForAPersonWhatACameraCanBeSetTo) {
+  EmulatedV4l2 system{
+      {{.path = "/dev/video0", .bus_info = "usb-a", .formats = {V4L2_PIX_FMT_Z16, V4L2_PIX_FMT_YUYV}},
+       {.path = "/dev/video1", .bus_info = "usb-b"},
+       {.path = "/dev/video2",
+        .bus_info = "usb-a",
+        .formats = {V4L2_PIX_FMT_Y16},
+        .width = 640,
+        .height = 480,
+        .interval = std::chrono::microseconds{33'333}}}};
+  const std::vector<std::string> expected{"/dev/video0: Z16, 16 x 8, 200 Hz",
+                                          "/dev/video0: YUYV (not read by this driver), 16 x 8, 200 Hz",
+                                          "/dev/video2: Y16, 640 x 480, 30.0003 Hz"};
+  EXPECT_EQ(formatLines(system, "v4l2:usb-a"), expected);
+  EXPECT_TRUE(formatLines(system, "v4l2:usb-z").empty());
 }
 
 TEST(V4l2, ACameraIsFoundByNodePortNameSerialAndIds) {

@@ -111,6 +111,9 @@ TEST(Uvc, PicturesAreWhatTheCameraSentOneAfterTheOther) {
 
 TEST(Uvc, WhatTheBusCallsInvzIsDepthAsItIs) {
   const Plugged plugged{{.says_invz = true}};
+  const auto formats = drivers::v4l2::row().formats(kUvcUri);
+  ASSERT_FALSE(formats.empty());
+  EXPECT_NE(formats[0].find("Z16, 160 x 120, 30"), std::string::npos) << formats[0];
   const auto source = started(keys());
   ASSERT_NE(source, nullptr);
   for (int i = 0; i < 3; ++i) {

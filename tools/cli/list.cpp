@@ -17,23 +17,37 @@ using compare::Json;
 struct Options {
   DaemonOptions daemon;
   bool drivers = false;
+  bool formats = false;
   bool names = false;
   bool json = false;
 };
 
-Exit listDrivers(bool as_json) {
+std::vector<std::string> formatsOf(const drivers::Driver& driver, const std::string& camera) {
+  return driver.formats == nullptr ? std::vector<std::string>{} : driver.formats(camera);
+}
+
+Exit listDrivers(bool with_formats, bool as_json) {
   Json all = Json::array();
   for (const drivers::Driver& driver : drivers::allDrivers()) {
     const std::vector<std::string> cameras = driver.list();
-    all.push(Json::object()
-                 .set("name", std::string{driver.name})
-                 .set("summary", std::string{driver.summary})
-                 .set("cameras", Json::arrayOf(cameras))
-                 .set("not_built", std::string{driver.not_built}));
-    if (as_json) continue;
-    fmt::print("{:<10} {}\n", driver.name, driver.summary);
-    if (!driver.not_built.empty()) fmt::print("{:<10} {}\n", "", driver.not_built);
-    for (const std::string& camera : cameras) fmt::print("{:<10} {}\n", "", camera);
+    Json formats = Json::object();
+    if (!as_json) fmt::print("{:<10} {}\n", driver.name, driver.summary);
+    if (!as_json && !driver.not_built.empty()) fmt::print("{:<10} {}\n", "", driver.not_built);
+    for (const std::string& camera : cameras) {
+      const auto lines = with_formats ? formatsOf(driver, camera) : std::vector<std::string>{};
+      formats.set(camera, Json::arrayOf(lines));
+      if (!as_json) fmt::print("{:<10} {}\n", "", camera);
+      for (const std::string& line : lines) {
+        if (!as_json) fmt::print("{:<12} {}\n", "", line);
+      }
+    }
+    Json one = Json::object();
+    one.set("name", std::string{driver.name})
+        .set("summary", std::string{driver.summary})
+        .set("cameras", Json::arrayOf(cameras))
+        .set("not_built", std::string{driver.not_built});
+    if (with_formats) one.set("formats", std::move(formats));
+    all.push(std::move(one));
   }
   if (as_json) fmt::print("{}", all.text());
   return Exit::Ok;
@@ -58,7 +72,7 @@ void printTable(const std::vector<SourceEntry>& sources) {
 }
 
 Result<Exit> run(const Options& options) {
-  if (options.drivers) return listDrivers(options.json);
+  if (options.drivers || options.formats) return listDrivers(options.formats, options.json);
   auto client = options.daemon.connect();
   if (!client) return client.error();
   const auto sources = client->sources();
@@ -92,12 +106,16 @@ Command listCommand() {
   return {"list", "the cameras of a daemon, or the drivers of this build",
           "  toftwin list\n"
           "  toftwin list --address 192.168.0.7:47800 --json\n"
-          "  toftwin list --drivers                     no daemon needed\n",
+          "  toftwin list --drivers                     no daemon needed\n"
+          "  toftwin list --formats                     what the cameras can be set to\n",
           [](Arguments& args) -> Run {
             const auto options = std::make_shared<Options>();
             options->daemon.add(args);
             args.flag("--drivers", options->drivers,
                       "the drivers of this build and the cameras they see now");
+            args.flag(
+                "--formats", options->formats,
+                "--drivers, with the formats, sizes and frame rates of the cameras that tell them (v4l2)");
             args.flag("--names", options->names, "only the names, one a line");
             args.flag("--json", options->json, "as JSON");
             return [options] { return run(*options); };
