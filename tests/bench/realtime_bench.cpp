@@ -440,11 +440,18 @@ void costs(const Files& files) {
   TraceRequest direct = kinect.request;
   direct.harmonics = 1;
   direct.max_surfaces = direct.samples_per_pixel = 1;
+  fmt::print("Nine raw exposures, each with the sphere in its own place: {:.2f} ms to pose; direct light for each:\n", nine);
   Light light;
-  const double wall = wallMs();
-  for (int exposure = 0; exposure < 18; ++exposure) light = trace(kinect.scene.at(++posed * 3.7_ms), direct, std::move(light));
-  fmt::print("Nine raw exposures, each with the sphere in its own place: {:.2f} ms to pose; {:.1f} frames/s with direct light for each\n", nine,
-             2e3 / (wallMs() - wall));
+  const auto reposed = [&](const char* how, const std::function<void(const Scene&)>& expose) {
+    expose(kinect.scene);
+    const double wall = wallMs(), processor = processorMs();
+    for (int exposure = 0; exposure < 45; ++exposure) expose(kinect.scene.at(++posed * 3.7_ms));
+    fmt::print("  {}: {:.1f} frames/s, {:.1f} ms of processor time an exposure\n", how, 5e3 / (wallMs() - wall),
+               (processorMs() - processor) / 45.0);
+  };
+  reposed("trace(), one sample a pixel", [&](const Scene& scene) { light = trace(scene, direct, std::move(light)); });
+  reposed("RealtimeTracer, pixels' centres and footprints where depth jumps",
+          [&](const Scene& scene) { kinect.tracer.next(scene, direct); });
   TraceRequest what = direct;
   fmt::print("\nUnbiased, processor time relative to the first row (proportion expected):\n\n| pixels | samples | surfaces | time | work |\n"
              "| --- | --- | --- | --- | --- |\n");

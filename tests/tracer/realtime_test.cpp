@@ -140,6 +140,37 @@ TEST(Realtime, KeepsOnlyDirectLightThatStaysTheSame) {
   }
 }
 
+/// What images hold of earlier frames is used again where it is the same; what was asked for in between, or of other
+/// frequencies, must leave nothing behind.
+TEST(Realtime, IsTheSameWhateverWasAskedForInBetween) {
+  const Scene moving = sceneOf(room(0.0, "velocity_m_per_s = [0.9, 0.4, -0.5]") +
+                               "\n[[object]]\nshape = 'sphere'\nradius_m = 0.2\nposition_m = [-0.8, 0.4, 1.8]\nmaterial = 'white'\n");
+  TraceRequest whole = roomRequest(), direct = whole;
+  direct.max_surfaces = 1;
+  TraceRequest centres = direct, other = direct;
+  centres.pixel_extent = 0.0;
+  other.frequencies = {16_MHz};
+  RealtimeTracer whole_alone, mixed;
+  for (const Duration time : {0_ms, 33_ms, 66_ms}) {
+    const Scene scene = moving.at(time);
+    RealtimeTracer anew;
+    const Light &a = mixed.next(scene, direct), &b = anew.next(scene, direct);
+    EXPECT_EQ(a.steady, b.steady);
+    EXPECT_EQ(a.phasors, b.phasors);
+    EXPECT_EQ(a.variance, b.variance);
+    const Light &c = mixed.next(scene, whole), &d = whole_alone.next(scene, whole);
+    EXPECT_EQ(c.steady, d.steady);
+    EXPECT_EQ(c.ambient, d.ambient);
+    EXPECT_EQ(c.phasors, d.phasors);
+    EXPECT_EQ(c.variance, d.variance);
+    mixed.next(scene, direct);
+    RealtimeTracer of_centres, of_other;
+    EXPECT_EQ(mixed.next(scene, centres).phasors, of_centres.next(scene, centres).phasors);
+    mixed.next(scene, direct);
+    EXPECT_EQ(mixed.next(scene, other).phasors, of_other.next(scene, other).phasors);
+  }
+}
+
 TEST(Realtime, FollowsTheCamera) {
   const Scene scene = sceneOf(room(0.2));
   TraceRequest request = roomRequest();
