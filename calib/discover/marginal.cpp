@@ -52,8 +52,8 @@ CaptureEvidence integratedOut(const CaptureEvidence& capture, const Split& split
   Eigen::MatrixXd inner = s * Eigen::MatrixXd(capture.gram(split.random, split.random)) * s;
   inner.diagonal().array() += 1.0;
   const Eigen::LLT<Eigen::MatrixXd> factor(inner);
-  const Eigen::MatrixXd half =
-      factor.matrixL().solve(s * Eigen::MatrixXd(capture.gram(split.random, split.kept)));
+  Eigen::MatrixXd half = s * Eigen::MatrixXd(capture.gram(split.random, split.kept));
+  if (half.size() > 0) factor.matrixL().solveInPlace(half);  // Eigen's solver refers to the first number
   const Eigen::VectorXd half_y = factor.matrixL().solve(s * Eigen::VectorXd(capture.moment(split.random)));
   out.gram -= half.transpose() * half;
   out.moment -= half.transpose() * half_y;
