@@ -4,7 +4,6 @@
 
 #include <gmock/gmock.h>
 #include <sqlite3.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
@@ -13,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "calib/plan/trend.h"
+#include "tests/record/record_testing.h"
 
 namespace toftwin::plan {
 namespace {
@@ -22,8 +22,6 @@ namespace fs = std::filesystem;
 
 class Log : public testing::Test {
  protected:
-  void SetUp() override { fs::create_directories(folder_); }
-  void TearDown() override { fs::remove_all(folder_); }
   static LoggedRun run(const std::string& began, const std::string& hash) {
     return {.judged = "2026-11-22T03:00:00Z",
             .began = began,
@@ -54,7 +52,7 @@ class Log : public testing::Test {
     const auto log = RunLog::open(file_);
     return log ? "it was opened" : log.error().message;
   }
-  fs::path folder_ = fs::temp_directory_path() / fmt::format("toftwin_log_{}", getpid());
+  record::Folder folder_;
   fs::path file_ = folder_ / "log.sqlite";
 };
 
