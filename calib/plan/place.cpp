@@ -30,9 +30,21 @@ Transform<World, Camera> lookingAlong(Vec3d z) {
 }  // namespace
 
 Target targetOf(const Plan& plan, const BlockSpec& block) {
-  return {
+  Target target{
       block.target_m.empty() ? vectorOf(plan.target_m) : vectorOf(block.target_m),
       normalised(block.target_normal.empty() ? vectorOf(plan.target_normal) : vectorOf(block.target_normal))};
+  const auto& size_m = block.target_size_m.empty() ? plan.target_size_m : block.target_size_m;
+  if (!size_m.empty()) target.half_width_m = 0.5 * size_m[0], target.half_height_m = 0.5 * size_m[1];
+  return target;
+}
+
+bool isOnWall(const Target& target, Vec3d point_m) {
+  const Vec3d from = point_m - target.point_m;
+  // Level along the wall; of one that lies on the floor, x.
+  const Vec3d level = cross(kUp, target.normal);
+  const Vec3d along = norm(level) > 1e-6 ? normalised(level) : Vec3d{1.0, 0.0, 0.0};
+  return std::abs(dot(from, along)) <= target.half_width_m &&
+         std::abs(dot(from, cross(target.normal, along))) <= target.half_height_m;
 }
 
 compare::PoseSpec poseBefore(const Target& target, double distance_m, double angle_deg) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <limits>
+
 #include <toftwin/geometry.h>
 
 #include "calib/plan/plan.h"
@@ -11,8 +13,15 @@ namespace toftwin::plan {
 struct Target {
   Vec3d point_m;
   Vec3d normal;  ///< unit, towards the cameras
+  /// Of the wall in it, to either side of the point: level along it, and up it. Infinite where the plan does
+  /// not say.
+  double half_width_m = std::numeric_limits<double>::infinity();
+  double half_height_m = std::numeric_limits<double>::infinity();
 };
 Target targetOf(const Plan& plan, const BlockSpec& block);
+
+/// Whether a point of the target's plane is on the wall.
+bool isOnWall(const Target& target, Vec3d point_m);
 
 /// A camera at that distance from the target's point, turned about the vertical by an angle from the normal,
 /// that looks at the point, upright (the world's y is down).

@@ -72,6 +72,8 @@ void checkPlaces(const BlockSpec& block, Table& table) {
        {std::pair{"target_m", &block.target_m}, {"target_normal", &block.target_normal}}) {
     if (!values->empty() && values->size() != 3) table.complain(key, "must be three numbers");
   }
+  if (!block.target_size_m.empty() && block.target_size_m.size() != 2)
+    table.complain("target_size_m", "must be two numbers, width and height");
   if (block.target_normal.size() == 3 &&
       std::hypot(block.target_normal[0], block.target_normal[1], block.target_normal[2]) < 1e-9) {
     table.complain("target_normal", "has length 0 and points nowhere");
@@ -215,6 +217,8 @@ void checkWhole(const Plan& plan, Table& table, std::vector<Table>& tables) {
   if (std::hypot(plan.target_normal[0], plan.target_normal[1], plan.target_normal[2]) < 1e-9) {
     table.complain("target_normal", "has length 0 and points nowhere");
   }
+  if (!plan.target_size_m.empty() && plan.target_size_m.size() != 2)
+    table.complain("target_size_m", "must be two numbers, width and height");
   for (std::size_t i = 0; i < plan.blocks.size(); ++i) {
     if (plan.blocks[i].exposures.empty() || plan.exposure > Duration{}) continue;
     tables[i].complain("exposure_us",

@@ -51,6 +51,7 @@ struct BlockSpec {
   std::vector<double> angle_deg{};
   std::vector<double> target_m{};
   std::vector<double> target_normal{};
+  std::vector<double> target_size_m{};
   PoseFrom pose_from = PoseFrom::Command;
   std::vector<Duration> exposures{};
   std::vector<Illuminance> ambients{};
@@ -91,6 +92,7 @@ struct BlockSpec {
               "with distance_m: angles from the target's normal, about the vertical; none: 0");
     v.numbers("target_m", target_m, {-1e6, 1e6}, "three numbers: another target than the plan's");
     v.numbers("target_normal", target_normal, {-1e6, 1e6}, "three numbers: the same for its normal");
+    v.numbers("target_size_m", target_size_m, {0.01, 1e4}, "two numbers: another size than the plan's");
     v.choice("pose_from", pose_from,
              {{"command", PoseFrom::Command},
               {"board", PoseFrom::Board},
@@ -128,6 +130,7 @@ struct Plan {
   Illuminance ambient{};
   std::array<double, 3> target_m{0.0, 0.0, 2.0};
   std::array<double, 3> target_normal{0.0, 0.0, -1.0};
+  std::vector<double> target_size_m{};
   Duration pose_time = 10_s;
   Duration setup_time = 120_s;
   Duration warm_up_time = 900_s;
@@ -147,6 +150,10 @@ struct Plan {
     v.numbers("target_m", target_m, {-1e6, 1e6}, "the point in the world that distances are measured to");
     v.numbers("target_normal", target_normal, {-1e6, 1e6},
               "of the target, towards the cameras; any length but 0");
+    v.numbers("target_size_m", target_size_m, {0.01, 1e4},
+              "width and height of the wall around the target's point; what is seen beside it is not judged "
+              "against "
+              "it. Empty: it has no end");
     v.quantity("pose_time", pose_time, second, {0.0, 86'400.0},
                "what it takes from one pose to the next, to tell how long the plan takes");
     v.quantity("setup_time", setup_time, second, {0.0, 86'400.0},

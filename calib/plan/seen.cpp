@@ -108,8 +108,10 @@ Image<float> wallRange_m(const Plan& plan, const BlockSpec& block, const CameraI
   const double away = dot(target.normal, target.point_m - pose.translation_m);
   for (int y = 0; y < camera.height; ++y) {
     for (int x = 0; x < camera.width; ++x) {
-      const double along = dot(target.normal, (pose * rayThroughPixel(camera, x, y)).v);
-      if (away / along > 0.0) range(x, y) = static_cast<float>(away / along);
+      const auto ray = pose * rayThroughPixel(camera, x, y);
+      const double along = away / dot(target.normal, ray.v);
+      if (along > 0.0 && isOnWall(target, pose.translation_m + along * ray.v))
+        range(x, y) = static_cast<float>(along);
     }
   }
   return range;
@@ -156,7 +158,7 @@ CameraSeen seenOf(const Plan& plan, const CaptureRecord& record, const compare::
     case Kind::Tilt: {
       const auto expected = wallRange_m(plan, *block, stack.camera(), *pose);
       addWall(stack, expected, shortest_period_m, seen);
-      if (block->kind == Kind::WarmUp || block->kind == Kind::Distance) addNoise(frames, expected, seen);
+      if (block->kind != Kind::Tilt) addNoise(frames, expected, seen);
       break;
     }
     case Kind::Corner:

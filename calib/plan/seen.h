@@ -55,7 +55,7 @@ CameraSeen seenOf(const Plan& plan, const CaptureRecord& record, const compare::
                   const std::vector<ReadFrame>& frames, double shortest_period_m,
                   const std::optional<Transform<World, Camera>>& own_pose = std::nullopt);
 
-/// Range to the target's plane along each pixel's ray; NaN where it is not before the camera.
+/// Range to the target's wall along each pixel's ray; NaN where it is not before the camera, or ends.
 Image<float> wallRange_m(const Plan& plan, const BlockSpec& block, const CameraInfo& camera,
                          const Transform<World, Camera>& pose);
 

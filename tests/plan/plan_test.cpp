@@ -2,6 +2,7 @@
 // Plan files: what they say, their captures and the order of these.
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <fstream>
 #include <map>
 #include <set>
@@ -10,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "calib/plan/place.h"
+#include "calib/plan/seen.h"
 #include "plans.h"
 
 namespace toftwin::plan {
@@ -101,6 +103,46 @@ TEST(Plan, StandsAtItsDistanceAndAngleAndLooksAtTheTarget) {
   // About the vertical the angle to the normal is the one asked for where the normal lies level.
   const Target level{{0.0, 0.0, 2.0}, {0.0, 0.0, -1.0}};
   EXPECT_NEAR(sightOf(level, poseBefore(level, 1.5, -40.0)).angle_deg, 40.0, 1e-9);
+}
+
+TEST(Target, EndsWhereThePlanSays) {
+  const Plan plan = planOf(
+      "target_m = [1, 0, 2]\ntarget_size_m = [2.0, 1.0]\n[[block]]\nname = 'a'\nkind = 'distance'\n"
+      "distance_m = [1, 2, 3]\n[[block]]\nname = 'b'\nkind = 'distance'\ndistance_m = [1, 2, 3]\n"
+      "target_size_m = [0.5, 4.0]\ntarget_normal = [-1, 0, 0]\n");
+  const Target wide = targetOf(plan, plan.blocks[0]), tall = targetOf(plan, plan.blocks[1]);
+  EXPECT_TRUE(isOnWall(wide, {1.99, 0.49, 2.0}));
+  EXPECT_FALSE(isOnWall(wide, {2.01, 0.0, 2.0}));
+  EXPECT_FALSE(isOnWall(wide, {1.0, -0.51, 2.0}));
+  EXPECT_TRUE(isOnWall(tall, {1.0, 1.9, 2.24}));
+  EXPECT_FALSE(isOnWall(tall, {1.0, 0.0, 2.26}));
+  const Plan endless = planOf("[[block]]\nname = 'a'\nkind = 'distance'\ndistance_m = [1, 2, 3]\n");
+  EXPECT_TRUE(isOnWall(targetOf(endless, endless.blocks[0]), {1e6, 1e6, 2.0}));
+  const auto wrong = parsePlan(
+      "target_size_m = [1]\n[[block]]\nname = 'a'\nkind = 'distance'\ndistance_m = [1, 2, 3]\n", "p.toml");
+  ASSERT_FALSE(wrong);
+  EXPECT_THAT(wrong.error().message, HasSubstr("must be two numbers, width and height"));
+}
+
+/// A camera 1 m before a wall of 1 × 0.5 m: its image shows where the wall ends.
+TEST(Target, IsNotExpectedBesideTheWall) {
+  const Plan plan = planOf(
+      "target_m = [0, 0, 1]\ntarget_size_m = [1.0, 0.5]\n[[block]]\nname = 'a'\nkind = 'distance'\n"
+      "distance_m = [1, 2, 3]\n");
+  const CameraInfo camera{.width = 101,
+                          .height = 101,
+                          .fx = 50,
+                          .fy = 50,
+                          .cx = 50,
+                          .cy = 50,
+                          .distortion = {},
+                          .calibration_id = {}};
+  const auto range = wallRange_m(plan, plan.blocks[0], camera, {});
+  EXPECT_NEAR(range(50, 50), 1.0F, 1e-6F);
+  EXPECT_NEAR(range(74, 50), std::hypot(1.0, 24.0 / 50.0), 1e-6);  // 25 pixels are 0.5 m
+  EXPECT_TRUE(std::isnan(range(76, 50)));
+  EXPECT_TRUE(std::isfinite(range(50, 62)));
+  EXPECT_TRUE(std::isnan(range(50, 63)));
 }
 
 TEST(Plan, LocksConditionsWithAllTheirRepeatsAndRepeatsNoLockedOne) {
