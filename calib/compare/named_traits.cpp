@@ -2,13 +2,14 @@
 #include "calib/compare/named_traits.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include <fmt/format.h>
 
 namespace toftwin::compare {
 
-void TraitCollector::add(const std::string& what, const char* of, const Traits& traits,
+void TraitCollector::add(const std::string& what, const std::string& of, const Traits& traits,
                          const std::string& detail) {
   if (!traits) {
     found_.untold.push_back(fmt::format("{} of {}: {}", what, of, traits.error().message));
@@ -17,25 +18,28 @@ void TraitCollector::add(const std::string& what, const char* of, const Traits& 
   for (const Trait& trait : *traits) found_.traits.push_back({what, detail, of, trait});
 }
 
-void TraitCollector::add(const std::string& what, const char* of, const Result<DriftTraits>& drift) {
-  if (drift) return add(what, of, drift->traits, nameOf(drift->model));
-  add(what, of, Traits{drift.error()});
+void TraitCollector::draw(NamedRows rows) {
+  NamedRows kept{rows.what, rows.of, {}, {}, {}, std::move(rows.curve)};
+  for (std::size_t i = 0; i < rows.x.size(); ++i) {
+    if (!std::isfinite(rows.x[i]) || !std::isfinite(rows.y[i])) continue;
+    kept.x.push_back(rows.x[i]), kept.y.push_back(rows.y[i]);
+    if (!rows.condition.empty()) kept.condition.push_back(rows.condition[i]);
+  }
+  found_.rows.push_back(std::move(kept));
 }
 
-const char* nameOf(DriftModel model) {
-  switch (model) {
-    case DriftModel::Constant:
-      return "none";
-    case DriftModel::Ramp:
-      return "ramp";
-    case DriftModel::OneExponential:
-      return "one exponential";
-    case DriftModel::TwoExponentials:
-      return "two exponentials";
-    case DriftModel::Step:
-      return "step";
-  }
-  return "";
+void TraitCollector::add(NamedRows rows, const Result<FittedTraits>& fitted) {
+  add(rows.what, rows.of, fitted ? Traits{fitted->traits} : Traits{fitted.error()});
+  if (fitted) rows.curve = fitted->curve;
+  for (std::size_t i = 0; fitted && i < fitted->besides.size(); ++i) rows.y[i] -= fitted->besides[i];
+  draw(std::move(rows));
+}
+
+void TraitCollector::add(NamedRows rows, const Result<DriftTraits>& drift) {
+  add(rows.what, rows.of, drift ? Traits{drift->traits} : Traits{drift.error()},
+      drift ? nameOf(drift->model) : "");
+  if (drift) rows.curve = drift->curve;
+  draw(std::move(rows));
 }
 
 TableBlock traitTable(const NamedTraits& traits, const std::string& a, const std::string& b) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "calib/compare/report.h"
@@ -16,25 +17,37 @@ struct NamedTrait {
   std::string of{};      ///< "A", "B", "B − A" or "A and B"
   Trait trait{};
 };
+/// The rows that a characteristic is told from, and the curve through them.
+struct NamedRows {
+  std::string what{}, of{};  ///< as of NamedTrait
+  std::vector<double> x{}, y{};
+  /// Rows of A and B that have the same one are of the same condition; empty: none is known to be.
+  std::vector<std::size_t> condition{};
+  FittedCurve curve{};
+};
 struct NamedTraits {
   std::vector<NamedTrait> traits{};
+  std::vector<NamedRows> rows{};
   std::vector<std::string> untold{};  ///< what the data cannot tell, and why
 };
 
 /// Gathers what data tell, and why others do not.
 class TraitCollector {
  public:
-  void add(const std::string& what, const char* of, const Traits& traits, const std::string& detail = {});
-  void add(const std::string& what, const char* of, const Result<DriftTraits>& drift);
+  void add(const std::string& what, const std::string& of, const Traits& traits,
+           const std::string& detail = {});
+  /// With the rows for a plot, less what in them goes with other things than x, and the curve where one could
+  /// be fitted.
+  void add(NamedRows rows, const Result<FittedTraits>& fitted);
+  void add(NamedRows rows, const Result<DriftTraits>& drift);
+  /// Rows for a plot alone; those that are not finite are left out.
+  void draw(NamedRows rows);
   void untold(std::string why) { found_.untold.push_back(std::move(why)); }
   NamedTraits found() && { return std::move(found_); }
 
  private:
   NamedTraits found_;
 };
-
-/// How a drift's model is called: "one exponential"; "none" of a constant.
-const char* nameOf(DriftModel model);
 
 /// A row for each number, A, B and B − A beside each other. `a` and `b` say whose they are.
 TableBlock traitTable(const NamedTraits& traits, const std::string& a = "A", const std::string& b = "B");

@@ -11,6 +11,7 @@ namespace toftwin::compare {
 namespace {
 
 constexpr double kLeft = 68, kRight = 14, kTop = 12, kBottom = 54;
+constexpr double kBelow = 130, kGap = 14;  ///< what a second panel adds, and what parts the two
 
 /// Style sheet classes; the order is Ink's.
 constexpr std::array kInkClass{"measured", "simulated", "published", "baseline", "extra", "alert"};
@@ -33,7 +34,19 @@ struct Extent {
     low = std::min(low, v);
     high = std::max(high, v);
   }
+  void add(const std::vector<double>& values, bool log) {
+    for (const double v : values) add(v, log);
+  }
 };
+
+/// Of curves and bands, upwards.
+Extent extentOf(const std::vector<Curve>& curves, bool log) {
+  Extent extent;
+  for (const Curve& curve : curves) {
+    for (const auto* values : {&curve.y, &curve.low, &curve.high}) extent.add(*values, log);
+  }
+  return extent;
+}
 
 std::pair<double, double> padded(Extent e, double share, bool log) {
   if (!(e.low <= e.high)) return {log ? 1.0 : 0.0, log ? 10.0 : 1.0};
@@ -69,42 +82,51 @@ std::vector<std::pair<double, std::string>> labelled(const std::vector<double>& 
   return all;
 }
 
-std::string grid(const Plot& plot, const Axis& x, const Axis& y, double height) {
+std::vector<double> ticksOf(const Axis& axis, int count) {
+  return axis.log ? logTicks(axis.low, axis.high) : roundTicks(axis.low, axis.high, count);
+}
+
+/// Lines and labels of a panel; what the abscissa says stands below the lowest one only.
+std::string grid(const Axis& x, const Axis& y, int x_ticks, bool is_lowest) {
   std::string svg;
-  for (const auto& [v, label] : labelled(roundTicks(x.low, x.high, plot.compact ? 5 : 8))) {
+  for (const auto& [v, label] : labelled(ticksOf(x, x_ticks))) {
     svg += fmt::format("<line class='grid' x1='{0:.1f}' x2='{0:.1f}' y1='{1:.1f}' y2='{2:.1f}'/>",
                        x.place(v), y.from, y.to);
+    if (!is_lowest) continue;
     svg += fmt::format("<text class='tick' x='{:.1f}' y='{:.1f}' text-anchor='middle'>{}</text>",
                        x.place(v), y.from + 20, label);
   }
-  for (const auto& [v, label] :
-       labelled(y.log ? logTicks(y.low, y.high) : roundTicks(y.low, y.high, 6))) {
+  for (const auto& [v, label] : labelled(ticksOf(y, y.from - y.to > 150.0 ? 6 : 3))) {
     svg += fmt::format("<line class='grid' x1='{1:.1f}' x2='{2:.1f}' y1='{0:.1f}' y2='{0:.1f}'/>",
                        y.place(v), x.from, x.to);
     svg += fmt::format("<text class='tick' x='{:.1f}' y='{:.1f}' text-anchor='end'>{}</text>",
                        x.from - 8, y.place(v) + 5, label);
   }
-  if (plot.zero_line && y.low < 0.0 && y.high > 0.0) {
-    svg += fmt::format("<line class='zero' x1='{1:.1f}' x2='{2:.1f}' y1='{0:.1f}' y2='{0:.1f}'/>",
-                       y.place(0.0), x.from, x.to);
-  }
-  svg += fmt::format("<text class='label' x='{:.1f}' y='{:.1f}' text-anchor='middle'>{}</text>",
-                     (x.from + x.to) / 2, height - 10, escaped(plot.x_label));
-  svg += fmt::format(
-      "<text class='label' x='0' y='0' text-anchor='middle' transform='translate(18 {:.1f}) "
-      "rotate(-90)'>{}</text>",
-      (y.from + y.to) / 2, escaped(plot.y_label));
   return svg;
 }
 
-bool drawable(const Curve& curve, std::size_t i, const Axis& y) {
-  return std::isfinite(curve.x[i]) && std::isfinite(curve.y[i]) && (!y.log || curve.y[i] > 0.0);
+std::string lineAt(double value, const Axis& x, const Axis& y) {
+  if (!(y.low < value && value < y.high)) return "";
+  return fmt::format("<line class='zero' x1='{1:.1f}' x2='{2:.1f}' y1='{0:.1f}' y2='{0:.1f}'/>",
+                     y.place(value), x.from, x.to);
+}
+
+std::string labelOf(const std::string& y_label, const Axis& y) {
+  return fmt::format(
+      "<text class='label' x='0' y='0' text-anchor='middle' transform='translate(18 {:.1f}) "
+      "rotate(-90)'>{}</text>",
+      (y.from + y.to) / 2, escaped(y_label));
+}
+
+bool drawable(const Curve& curve, std::size_t i, const Axis& x, const Axis& y) {
+  const auto isOn = [](double v, const Axis& axis) { return std::isfinite(v) && (!axis.log || v > 0.0); };
+  return isOn(curve.x[i], x) && isOn(curve.y[i], y);
 }
 
 std::string dots(const Curve& curve, const Axis& x, const Axis& y) {
   std::string svg = fmt::format("<g class='dots {}'>", classOf(curve.ink));
-  for (std::size_t i = 0; i < curve.x.size(); ++i) {
-    if (!drawable(curve, i, y)) continue;
+  for (std::size_t i = 0; i < curve.y.size(); ++i) {
+    if (!drawable(curve, i, x, y)) continue;
     svg += fmt::format("<circle cx='{:.1f}' cy='{:.1f}' r='2.2'/>", x.place(curve.x[i]),
                        y.place(curve.y[i]));
   }
@@ -114,8 +136,8 @@ std::string dots(const Curve& curve, const Axis& x, const Axis& y) {
 std::string path(const Curve& curve, const Axis& x, const Axis& y) {
   std::string d;
   bool down = false;
-  for (std::size_t i = 0; i < curve.x.size(); ++i) {
-    if (!drawable(curve, i, y)) {
+  for (std::size_t i = 0; i < curve.y.size(); ++i) {
+    if (!drawable(curve, i, x, y)) {
       down = false;
       continue;
     }
@@ -150,13 +172,29 @@ std::string band(const Curve& curve, const Axis& x, const Axis& y) {
   return fmt::format("<path class='band {}' d='{}'/>", classOf(curve.ink), d);
 }
 
+/// Bands, then curves over them, then the panel's frame.
+std::string drawn(const std::vector<Curve>& curves, const Axis& x, const Axis& y) {
+  // An inner svg clips at its box, without an id that other plots of the page could share.
+  std::string svg = fmt::format("<svg x='{0}' y='{1}' width='{2}' height='{3}' viewBox='{0} {1} {2} {3}'>",
+                                x.from, y.to, x.to - x.from, y.from - y.to);
+  for (const Curve& curve : curves) {
+    if (!curve.low.empty()) svg += band(curve, x, y);
+  }
+  for (const Curve& curve : curves) {
+    if (!curve.y.empty()) svg += curve.stroke == Stroke::Dots ? dots(curve, x, y) : path(curve, x, y);
+  }
+  return svg + fmt::format("</svg><rect class='frame' x='{}' y='{}' width='{}' height='{}'/>", x.from, y.to,
+                           x.to - x.from, y.from - y.to);
+}
+
 /// HTML beside the SVG: wraps at any width and stays readable on a phone.
-std::string legend(const Plot& plot) {
+std::string legend(const std::vector<Curve>& curves) {
   std::string html = "<div class='legend'>";
-  for (const Curve& curve : plot.curves) {
+  for (const Curve& curve : curves) {
     if (curve.name.empty()) continue;
     const std::string mark =
-        curve.stroke == Stroke::Dots
+        curve.y.empty() ? fmt::format("<path class='band {}' d='M1 1H27V11H1Z'/>", classOf(curve.ink))
+        : curve.stroke == Stroke::Dots
             ? fmt::format(
                   "<g class='dots {}'><circle cx='8' cy='6' r='2.5'/><circle cx='18' cy='6' "
                   "r='2.5'/></g>",
@@ -235,34 +273,40 @@ std::vector<std::string> tickLabels(const std::vector<double>& ticks) {
 }
 
 std::string toSvg(const Plot& plot) {
-  Extent ex, ey;
-  for (const Curve& curve : plot.curves) {
-    for (const double v : curve.x) ex.add(v, false);
-    for (const auto* values : {&curve.y, &curve.low, &curve.high}) {
-      for (const double v : *values) ey.add(v, plot.log_y);
-    }
+  const double width = plot.compact ? 450.0 : 640.0, main = plot.compact ? 310.0 : 360.0;
+  const double height = main + (plot.below ? kBelow : 0.0);
+  Extent ex;
+  for (const Curve& curve : plot.curves) ex.add(curve.x, plot.log_x);
+  if (plot.below) {
+    for (const Curve& curve : plot.below->curves) ex.add(curve.x, plot.log_x);
   }
-  const auto [x_low, x_high] = plot.x_range.value_or(padded(ex, 0.02, false));
-  const auto [y_low, y_high] = plot.y_range.value_or(padded(ey, 0.06, plot.log_y));
-  const double width = plot.compact ? 450.0 : 640.0, height = plot.compact ? 310.0 : 360.0;
-  const Axis x{x_low, x_high, kLeft, width - kRight},
-      y{y_low, y_high, height - kBottom, kTop, plot.log_y};
+  const auto [x_low, x_high] = plot.x_range.value_or(padded(ex, 0.02, plot.log_x));
+  const Axis x{x_low, x_high, kLeft, width - kRight, plot.log_x};
+  const auto ordinate = [](const std::vector<Curve>& curves, bool log,
+                           const std::optional<std::pair<double, double>>& wanted, double from, double to) {
+    const auto [low, high] = wanted.value_or(padded(extentOf(curves, log), 0.06, log));
+    return Axis{low, high, from, to, log};
+  };
+  const int x_ticks = plot.compact ? 5 : 8;
+  const Axis y = ordinate(plot.curves, plot.log_y, plot.y_range, main - kBottom, kTop);
   std::string svg =
       fmt::format("<div class='plot'><svg viewBox='0 0 {} {}' role='img' aria-label='{}'>", width,
                   height, escaped(plot.title));
-  svg += grid(plot, x, y, height);
-  // An inner svg clips at its box, without an id that other plots of the page could share.
-  svg += fmt::format("<svg x='{0}' y='{1}' width='{2}' height='{3}' viewBox='{0} {1} {2} {3}'>",
-                     x.from, y.to, x.to - x.from, y.from - y.to);
-  for (const Curve& curve : plot.curves) {
-    if (!curve.low.empty()) svg += band(curve, x, y);
+  svg +=
+      grid(x, y, x_ticks, !plot.below) + (plot.zero_line ? lineAt(0.0, x, y) : "") + labelOf(plot.y_label, y);
+  svg += drawn(plot.curves, x, y);
+  std::vector<Curve> named = plot.curves;
+  if (plot.below) {
+    const Axis rest = ordinate(plot.below->curves, plot.below->log_y, plot.below->y_range, height - kBottom,
+                               main - kBottom + kGap);
+    svg +=
+        grid(x, rest, x_ticks, true) + lineAt(plot.below->zero, x, rest) + labelOf(plot.below->y_label, rest);
+    svg += drawn(plot.below->curves, x, rest);
+    named.insert(named.end(), plot.below->curves.begin(), plot.below->curves.end());
   }
-  for (const Curve& curve : plot.curves)
-    svg += curve.stroke == Stroke::Dots ? dots(curve, x, y) : path(curve, x, y);
-  svg += "</svg>";
-  svg += fmt::format("<rect class='frame' x='{}' y='{}' width='{}' height='{}'/></svg></div>",
-                     x.from, y.to, x.to - x.from, y.from - y.to);
-  return svg + legend(plot);
+  svg += fmt::format("<text class='label' x='{:.1f}' y='{:.1f}' text-anchor='middle'>{}</text></svg></div>",
+                     (x.from + x.to) / 2, height - 10, escaped(plot.x_label));
+  return svg + legend(named);
 }
 
 Curve histogram(std::span<const double> values, double low, double high, int bins, std::string name,

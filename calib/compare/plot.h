@@ -29,6 +29,15 @@ struct Curve {
   std::vector<double> low{}, high{};
 };
 
+/// Curves that are drawn below a plot, over the same abscissa: what is left of it.
+struct Panel {
+  std::string y_label{};
+  std::vector<Curve> curves{};
+  bool log_y = false;
+  double zero = 0.0;  ///< where nothing is left: a line; 1 of ratios
+  std::optional<std::pair<double, double>> y_range{};
+};
+
 struct Plot {
   std::string title{};    ///< read out by screen readers; the visible title is the figure's caption
   std::string x_label{};  ///< with its unit
@@ -38,6 +47,8 @@ struct Plot {
   bool zero_line = false;
   bool log_y = false;
   bool compact = false;  ///< drawn smaller, for two beside each other
+  bool log_x = false;
+  std::optional<Panel> below{};
 };
 
 /// The plot as inline SVG that scales to its box and takes its colours from the report's style

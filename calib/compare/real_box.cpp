@@ -7,6 +7,7 @@
 #include "calib/compare/real_box.h"
 #include "calib/compare/real_data.h"
 #include "calib/compare/real_fits.h"
+#include "calib/compare/residual.h"
 
 namespace toftwin::compare {
 namespace {
@@ -304,26 +305,25 @@ Result<Finding> judgeBox(const RealDataJob& job) {
     json.push(std::move(row));
   }
   const auto plot = [&](std::pair<double, double> x_range, std::pair<double, double> y_range) {
-    return toSvg(Plot{.title = "Change that a box makes",
-                      .x_label = "place on the wall, x [mm]",
-                      .y_label = "range with box − without [mm]",
-                      .curves = {{.name = "measured", .x = x, .y = change, .ink = Ink::Measured},
-                                 {.name = "simulated, preset (emitter at +x)",
-                                  .x = x,
-                                  .y = *preset,
-                                  .ink = Ink::Simulated},
-                                 {.name = "simulated, emitter at −x",
-                                  .x = x,
-                                  .y = *other_side,
-                                  .ink = Ink::Extra,
-                                  .stroke = Stroke::Dashed},
-                                 {.name = "published simulator",
-                                  .x = published->x_mm,
-                                  .y = published->change_mm,
-                                  .ink = Ink::Published}},
-                      .x_range = x_range,
-                      .y_range = y_range,
-                      .zero_line = true});
+    return toSvg(Plot{
+        .title = "Change that a box makes",
+        .x_label = "place on the wall, x [mm]",
+        .y_label = "range with box − without [mm]",
+        .curves = {{.name = "measured", .x = x, .y = change, .ink = Ink::Measured},
+                   {.name = "simulated, preset (emitter at +x)", .x = x, .y = *preset, .ink = Ink::Simulated},
+                   {.name = "simulated, emitter at −x",
+                    .x = x,
+                    .y = *other_side,
+                    .ink = Ink::Extra,
+                    .stroke = Stroke::Dashed},
+                   {.name = "published simulator",
+                    .x = published->x_mm,
+                    .y = published->change_mm,
+                    .ink = Ink::Published}},
+        .x_range = x_range,
+        .y_range = y_range,
+        .zero_line = true,
+        .below = measuredLess(x, change, *preset)});
   };
   const double step = box->depthMm();
   const int flying_measured = flyingPixels(place, change, step),

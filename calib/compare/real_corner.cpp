@@ -6,6 +6,7 @@
 
 #include "calib/compare/real_data.h"
 #include "calib/compare/real_fits.h"
+#include "calib/compare/residual.h"
 #include "calib/compare/scan_line.h"
 #include "calib/compare/simulated_line.h"
 
@@ -152,12 +153,9 @@ Result<Finding> judgeCorner(const RealDataJob& job, const RealCamera& camera) {
       .y_label = "range − reference [mm]",
       .curves =
           {{.name = "measured", .x = rows.place_mm, .y = rows.measured_mm, .ink = Ink::Measured},
-           {.name = "simulated, preset",
-            .x = rows.place_mm,
-            .y = rows.simulated_mm,
-            .ink = Ink::Simulated},
-           {.name = fmt::format("simulated + {} mm (constant from the distance table)",
-                                shown(camera.delay_mm)),
+           {.name = "simulated, preset", .x = rows.place_mm, .y = rows.simulated_mm, .ink = Ink::Simulated},
+           {.name =
+                fmt::format("simulated + {} mm (constant from the distance table)", shown(camera.delay_mm)),
             .x = rows.place_mm,
             .y = plus(rows.simulated_mm, camera.delay_mm),
             .ink = Ink::Simulated,
@@ -167,7 +165,8 @@ Result<Finding> judgeCorner(const RealDataJob& job, const RealCamera& camera) {
             .y = rows.plane_mm,
             .ink = Ink::Baseline,
             .stroke = Stroke::Dotted}},
-      .zero_line = true};
+      .zero_line = true,
+      .below = measuredLess(rows.place_mm, rows.measured_mm, plus(rows.simulated_mm, camera.delay_mm))};
   CornerLines lines{.t = rows.t,
                     .truth_mm = {},
                     .measured_mm = rows.measured_mm,
@@ -218,37 +217,34 @@ Result<Finding> judgeCorner(const RealDataJob& job, const RealCamera& camera) {
   finding.section.blocks = {
       Figure{"Error along each ray, one camera row. Each error is against its own truth: the "
              "measured line against the structured-light reference, the simulated one against the "
-             "two planes fitted to it.",
+             "two planes fitted to it. Below: measured less simulated with the constant.",
              toSvg(plot)},
-      TableBlock{"What is left of the measured error",
-                 kExplainedHeader,
-                 {explainedRow("no simulation (the reference itself)", none),
-                  explainedRow("simulated, preset", raw),
-                  explainedRow("simulated + constant from the distance table", delayed)}},
       TableBlock{
-          "By region, mean errors in mm",
-          {"region", "n", "measured", "simulated", "difference", "… after the constant", "… RMS"},
-          region_table},
-      Paragraph{
-          fmt::format("The published simulator's output is of another corner (edge {} mm before "
-                      "its camera and {} mm beside the axis, here {} and {} mm), and multipath "
-                      "depends on both, so it is not a third curve of this figure but has its "
-                      "own section beside our simulation of that corner:",
-                      shown(published->edge_z_mm, 0), shown(std::abs(published->edge_x_mm), 0),
-                      shown(corner->edge_z_mm, 0), shown(std::abs(corner->edge_x_mm), 0)),
-          false, kPublishedSection, kPublishedTitle},
+          "What is left of the measured error",
+          kExplainedHeader,
+          {explainedRow("no simulation (the reference itself)", none), explainedRow("simulated, preset", raw),
+           explainedRow("simulated + constant from the distance table", delayed)}},
+      TableBlock{"By region, mean errors in mm",
+                 {"region", "n", "measured", "simulated", "difference", "… after the constant", "… RMS"},
+                 region_table},
+      Paragraph{fmt::format("The published simulator's output is of another corner (edge {} mm before "
+                            "its camera and {} mm beside the axis, here {} and {} mm), and multipath "
+                            "depends on both, so it is not a third curve of this figure but has its "
+                            "own section beside our simulation of that corner:",
+                            shown(published->edge_z_mm, 0), shown(std::abs(published->edge_x_mm), 0),
+                            shown(corner->edge_z_mm, 0), shown(std::abs(corner->edge_x_mm), 0)),
+                false, kPublishedSection, kPublishedTitle},
       Figure{"The same from above.", toSvg(plan)},
       Paragraph{
-          fmt::format(
-              "Geometry from the reference line: edge at x {} mm, z {} mm; boards {} and {} mm "
-              "long, opening {}°, planes fit it to {} and {} mm RMS. "
-              "Assumed, not measured: boards Lambertian with albedo {}, {} mm tall with the camera "
-              "at half height, nothing else in the room. "
-              "Monte-Carlo and sensor noise of the simulated line: {} mm (median standard error).",
-              shown(corner->edge_x_mm), shown(corner->edge_z_mm), shown(corner->left_length_mm, 0),
-              shown(corner->right_length_mm, 0), shown(corner->opening_deg, 2),
-              shown(corner->left.rms_mm, 2), shown(corner->right.rms_mm, 2), kAlbedo, kHeight_mm,
-              shown(simulated->median_error_mm, 2)),
+          fmt::format("Geometry from the reference line: edge at x {} mm, z {} mm; boards {} and {} mm "
+                      "long, opening {}°, planes fit it to {} and {} mm RMS. "
+                      "Assumed, not measured: boards Lambertian with albedo {}, {} mm tall with the camera "
+                      "at half height, nothing else in the room. "
+                      "Monte-Carlo and sensor noise of the simulated line: {} mm (median standard error).",
+                      shown(corner->edge_x_mm), shown(corner->edge_z_mm), shown(corner->left_length_mm, 0),
+                      shown(corner->right_length_mm, 0), shown(corner->opening_deg, 2),
+                      shown(corner->left.rms_mm, 2), shown(corner->right.rms_mm, 2), kAlbedo, kHeight_mm,
+                      shown(simulated->median_error_mm, 2)),
           true}};
   finding.data.set("no_simulation", toJson(none))
       .set("simulated", toJson(raw))

@@ -7,6 +7,7 @@
 #include "calib/compare/csv.h"
 #include "calib/compare/real_data.h"
 #include "calib/compare/real_fits.h"
+#include "calib/compare/residual.h"
 #include "calib/compare/simulated_line.h"
 
 namespace toftwin::compare {
@@ -57,6 +58,11 @@ NamedTraits wavesOf(const RealCamera& camera, const ErrorTable& measured,
   add("A", measured.reference_mm, measured.error_mm, all);
   add("B", simulated.reference_mm, simulated.error_mm, all);
   return std::move(all).found();
+}
+
+std::vector<double> shifted(std::vector<double> values, double by) {
+  for (double& one : values) one += by;
+  return values;
 }
 
 std::vector<std::vector<std::string>> bins(const ErrorTable& table,
@@ -125,7 +131,8 @@ Result<Finding> judgeDistance(const RealDataJob& job, RealCamera& camera) {
                         .y = table.error_mm,
                         .ink = Ink::Measured,
                         .stroke = Stroke::Dots}},
-            .zero_line = true};
+            .zero_line = true,
+            .below = measuredLess(table.reference_mm, table.error_mm, shifted(simulated, sim.best_offset))};
   if (!other.error_mm.empty()) {
     plot.curves.push_back({.name = "measured, another session (not judged)",
                            .x = other.reference_mm,
@@ -147,7 +154,8 @@ Result<Finding> judgeDistance(const RealDataJob& job, RealCamera& camera) {
   finding.section.tone = toneOf(sim.fraction_centred);
   finding.section.blocks = {
       Figure{"Flat target moved away slowly; positive: reads too far. The reference comes from "
-             "printed markers whose own noise grows with distance.",
+             "printed markers whose own noise grows with distance. Below: measured less simulated, moved by "
+             "the constant.",
              toSvg(plot)},
       TableBlock{"What is left of the measured error",
                  kExplainedHeader,
@@ -157,15 +165,14 @@ Result<Finding> judgeDistance(const RealDataJob& job, RealCamera& camera) {
                  "distances",
                  {"distance", "n", "measured [mm]", "simulated [mm]", "difference [mm]"},
                  bins(table, simulated)},
-      Paragraph{fmt::format(
-                    "Assumed: target square to the axis, Lambertian, albedo 0.8, no ambient light, "
-                    "warm camera. The constant, {} mm, was fitted to this table; "
-                    "it is used below on the corner, which did not help to fit it.{}",
-                    shown(sim.best_offset),
-                    other.error_mm.empty() ? ""
-                                           : fmt::format(" {} rows of another session, which read "
-                                                         "too near, are shown but not judged.",
-                                                         other.error_mm.size())),
+      Paragraph{fmt::format("Assumed: target square to the axis, Lambertian, albedo 0.8, no ambient light, "
+                            "warm camera. The constant, {} mm, was fitted to this table; "
+                            "it is used below on the corner, which did not help to fit it.{}",
+                            shown(sim.best_offset),
+                            other.error_mm.empty() ? ""
+                                                   : fmt::format(" {} rows of another session, which read "
+                                                                 "too near, are shown but not judged.",
+                                                                 other.error_mm.size())),
                 true}};
   finding.data.set("no_simulation", toJson(none))
       .set("simulated", toJson(sim))

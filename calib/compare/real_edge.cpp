@@ -10,6 +10,7 @@
 #include "calib/compare/published_model.h"
 #include "calib/compare/real_data.h"
 #include "calib/compare/real_published.h"
+#include "calib/compare/residual.h"
 #include "calib/compare/scatter_laws.h"
 #include "calib/compare/simulated_line.h"
 
@@ -220,7 +221,8 @@ Result<> addRealEdge(const RealDataJob& job, const ScatterCamera& camera, Findin
                                       .x_label = "from the edge along the boards [mm]",
                                       .y_label = "range − reference [mm]",
                                       .curves = {measured, exact, blurred},
-                                      .compact = true})});
+                                      .compact = true,
+                                      .below = measuredLess(measured.x, measured.y, exact.y)})});
   Json json = Json::object();
   Json points = Json::array();
   for (std::size_t i = 0; i < measured.x.size(); ++i) {

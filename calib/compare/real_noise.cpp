@@ -7,6 +7,7 @@
 #include "calib/compare/csv.h"
 #include "calib/compare/fits.h"
 #include "calib/compare/real_data.h"
+#include "calib/compare/residual.h"
 #include "calib/compare/simulated_line.h"
 
 namespace toftwin::compare {
@@ -157,13 +158,16 @@ Result<Finding> judgeNoise(const RealDataJob& job, const RealCamera& camera) {
                  sorted((*over_distance)[0], distance->predicted, "simulated, albedo 0.8 (white)",
                         Ink::Simulated, Stroke::Line)},
       .log_y = true,
-      .compact = true};
-  const Plot by_intensity{.title = camera.title + " noise over intensity",
-                          .x_label = "log10 of the infrared image's counts",
-                          .y_label = "standard deviation [mm]",
-                          .curves = {intensity_dots, law_curve, simulated_curve},
-                          .log_y = true,
-                          .compact = true};
+      .compact = true,
+      .below = measuredLess((*over_distance)[0], (*over_distance)[1], distance->predicted, Rest::Ratio)};
+  const Plot by_intensity{
+      .title = camera.title + " noise over intensity",
+      .x_label = "log10 of the infrared image's counts",
+      .y_label = "standard deviation [mm]",
+      .curves = {intensity_dots, law_curve, simulated_curve},
+      .log_y = true,
+      .compact = true,
+      .below = measuredLess(intensity_dots.x, (*over_intensity)[1], from_simulation, Rest::Ratio)};
 
   finding.section = {.id = "noise-" + camera.name, .title = camera.title + ": noise"};
   finding.section.verdict = fmt::format(

@@ -10,6 +10,7 @@
 #include "calib/compare/csv.h"
 #include "calib/compare/held_out.h"
 #include "calib/compare/real_data.h"
+#include "calib/compare/residual.h"
 #include "calib/compare/scatter_laws.h"
 
 namespace toftwin::compare {
@@ -123,6 +124,7 @@ Result<> addCamera(const RealDataJob& job, const ScatterCamera& camera, Finding&
                                shown(s)});
   }
   plot.curves = {measured, simulated};
+  plot.below = measuredLess(measured.x, measured.y, simulated.y);
   figures.figures.push_back({camera.title + ".", toSvg(plot)});
   const double ideal = summarise(judged).rms;
   table.rows.push_back({camera.title, std::to_string(fit.judged_n), shown(ideal),

@@ -8,6 +8,7 @@
 #include "calib/compare/csv.h"
 #include "calib/compare/fits.h"
 #include "calib/compare/real_data.h"
+#include "calib/compare/residual.h"
 #include "sim/sensor/sensor_model.h"
 
 namespace toftwin::compare {
@@ -137,10 +138,12 @@ Result<Finding> judgeWarmUp(const RealDataJob& job, const RealCamera& camera) {
                               .ink = Ink::Measured,
                               .stroke = Stroke::Dots},
                              curveOf(flat, all, "flat model", Ink::Baseline, Stroke::Dashed),
-                             curveOf(shown_fit, all, "warm-up effect, fitted on even minutes",
-                                     Ink::Simulated, Stroke::Line),
+                             curveOf(shown_fit, all, "warm-up effect, fitted on even minutes", Ink::Simulated,
+                                     Stroke::Line),
                              curveOf(extrapolated, all, "warm-up effect, fitted on the first half",
-                                     Ink::Extra, Stroke::Dotted)}};
+                                     Ink::Extra, Stroke::Dotted)},
+                  .below = measuredLess(all.time_s, all.depth_mm,
+                                        curveOf(shown_fit, all, "", Ink::Simulated, Stroke::Line).y)};
   const double explained = 1.0 - drift_rms * drift_rms / (flat_rms * flat_rms);
   finding.section.verdict = fmt::format(
       "From the first to the last minute the reading moves by {} mm. On minutes it was not fitted "
@@ -150,23 +153,23 @@ Result<Finding> judgeWarmUp(const RealDataJob& job, const RealCamera& camera) {
       shown(drift), shown(drift_rms, 2), shown(flat_rms, 2), shown(floor, 2));
   finding.section.tone = drift_rms < 1.3 * floor ? Tone::Good : toneOf(explained);
   finding.section.blocks = {
-      Figure{"Cold start before a fixed wall, centre pixel. Dots: measured, one a second.",
+      Figure{"Cold start before a fixed wall, centre pixel. Dots: measured, one a second. Below: "
+             "less the effect fitted on even minutes.",
              toSvg(plot)},
       table,
-      Paragraph{fmt::format("The effect fitted on the even minutes: {} mm with {} s and {} mm with "
-                            "{} s. {}. {}. {}",
-                            shown(shown_fit.effect.fast.in(millimetre), 2),
-                            shown(shown_fit.effect.fast_time.in(second), 0),
-                            shown(shown_fit.effect.slow.in(millimetre), 2),
-                            shown(shown_fit.effect.slow_time.in(second), 0),
-                            std::string{"Interpolation: "} + splits[0].how,
-                            std::string{"Extrapolation: "} + splits[1].how,
-                            preset ? "The preset's own warm-up was taken from this series, so its "
-                                     "row is a check of the preset and no test."
-                                   : "The preset of this camera has no warm-up effect."),
-                true}};
+      Paragraph{
+          fmt::format(
+              "The effect fitted on the even minutes: {} mm with {} s and {} mm with "
+              "{} s. {}. {}. {}",
+              shown(shown_fit.effect.fast.in(millimetre), 2), shown(shown_fit.effect.fast_time.in(second), 0),
+              shown(shown_fit.effect.slow.in(millimetre), 2), shown(shown_fit.effect.slow_time.in(second), 0),
+              std::string{"Interpolation: "} + splits[0].how, std::string{"Extrapolation: "} + splits[1].how,
+              preset ? "The preset's own warm-up was taken from this series, so its "
+                       "row is a check of the preset and no test."
+                     : "The preset of this camera has no warm-up effect."),
+          true}};
   TraitCollector traits;
-  traits.add("drift", "A", driftTraits(all.time_s, all.depth_mm));
+  traits.add({"drift", "A", all.time_s, all.depth_mm}, driftTraits(all.time_s, all.depth_mm));
   addCharacteristics(std::move(traits).found(), finding);
   finding.data.set("drift_mm", drift).set("jitter_mm", floor).set("samples", all.time_s.size());
   const std::string ahead = camera.title + ", warm-up, second half from the first";

@@ -56,14 +56,14 @@ figcaption{font-size:.9rem;color:var(--soft);margin-top:6px;max-width:90ch}
 table{border-collapse:collapse;font-size:.92rem;min-width:min(100%,480px);background:var(--panel);border:1px solid var(--line)}
 caption{text-align:left;color:var(--soft);font-size:.9rem;padding:0 0 6px}
 th,td{padding:5px 12px;border-bottom:1px solid var(--line);text-align:left;vertical-align:top}
-th{font-weight:600;vertical-align:bottom}td:first-child:not(.number){min-width:13em}th.number,td.number{text-align:right}td.number{font-variant-numeric:tabular-nums;white-space:nowrap}
+th{font-weight:600;vertical-align:bottom}td:first-child:not(.number){min-width:13em}td:nth-child(2):not(.number){min-width:8.5em}th.number,td.number{text-align:right}td.number{font-variant-numeric:tabular-nums;white-space:nowrap}
 footer{margin-top:40px;padding-top:12px;border-top:1px solid var(--line);color:var(--soft);font-size:.85rem}
 @media(max-width:520px){main{padding:18px 12px 40px}.cards{grid-template-columns:1fr 1fr}.card{padding:8px 10px}.value{font-size:1.02rem}h1{font-size:1.4rem}}
 .cloud canvas{display:block;width:100%;height:420px;touch-action:none;cursor:grab}.cloud .hint,.cloud input{display:none}
 .cloud.turns .hint{display:inline;color:var(--soft)}.cloud.turns input{display:inline}.inkA{color:var(--measured)}.inkB{color:var(--simulated)}
 @media print{nav,.cloud .hint,.cloud input{display:none!important}body{background:#fff;font-size:11pt}main{max-width:none;padding:0}
 figure,.card,tr,h2+p{break-inside:avoid}h2{break-after:avoid}.scroll,.plot{overflow:visible}.plot svg{min-width:0}
-table{font-size:8pt;width:100%}th,td{padding:2px 5px}td.number{white-space:normal}td:first-child:not(.number){min-width:0}
+table{font-size:8pt;width:100%}th,td{padding:2px 5px}td.number{white-space:normal}td:first-child:not(.number),td:nth-child(2):not(.number){min-width:0}
 details::details-content{content-visibility:visible;height:auto}summary{list-style:none}}
 )css";
 

@@ -6,6 +6,7 @@
 #include <functional>
 #include <limits>
 #include <map>
+#include <numeric>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -13,6 +14,7 @@
 #include <toftwin/units.h>
 
 #include "calib/compare/csv.h"
+#include "calib/compare/fitted_figure.h"
 #include "calib/compare/trait_verdict.h"
 
 namespace toftwin::compare {
@@ -76,14 +78,36 @@ Traits scatterOf(const std::vector<std::vector<double>>& c, const std::vector<do
                        : veilTraits(c[0], c[1], c[2], c[3], f);
 }
 
-Curve curveOf(const TableColumns& table, std::string name, Ink ink) {
+/// A table's rows for the plot.
+NamedRows rowsOf(const TableColumns& table, const char* of) {
+  NamedRows rows{table.kind->name, of};
   const bool has_two = table.values.size() > 1;
-  Curve curve{.name = std::move(name), .ink = ink, .stroke = Stroke::Dots};
-  for (std::size_t i = 0; i < table.values[0].size(); ++i) {
-    curve.x.push_back(has_two ? table.values[0][i] : static_cast<double>(i));
-    curve.y.push_back(table.values[has_two ? 1 : 0][i]);
+  rows.y = table.values[has_two ? 1 : 0];
+  for (std::size_t i = 0; i < rows.y.size(); ++i)
+    rows.x.push_back(has_two ? table.values[0][i] : static_cast<double>(i));
+  return rows;
+}
+
+/// Rows are of the same condition where both tables have the same x, row by row.
+void pairRows(NamedTraits& traits) {
+  if (traits.rows.size() != 2 || traits.rows[0].x != traits.rows[1].x) return;
+  for (NamedRows& rows : traits.rows) {
+    rows.condition.resize(rows.x.size());
+    std::iota(rows.condition.begin(), rows.condition.end(), std::size_t{0});
   }
-  return curve;
+}
+
+Figure figureOf(const NamedTraits& traits, const TableKind& kind) {
+  const bool has_two = kind.columns.size() > 1, is_law = std::string_view{kind.name} == "noise_law";
+  auto figure = fittedFigure(traits, kind.name,
+                             {.title = kind.tells,
+                              .caption = "The tables' rows, and what was fitted to them.",
+                              .x_label = has_two ? kind.columns[0] : "row",
+                              .y_label = kind.columns[has_two ? 1 : 0],
+                              .log_x = is_law,
+                              .log_y = is_law,
+                              .compact = false});
+  return figure.value_or(Figure{"Too few rows to draw."});
 }
 
 }  // namespace
@@ -149,10 +173,12 @@ Result<TableColumns> loadTable(const TableJob& job) {
 void addTraits(const TableColumns& table, const std::vector<double>& f, const char* of, TraitCollector& all) {
   const auto& c = table.values;
   const std::string kind = table.kind->name;
-  if (kind == "drift") return all.add(kind, of, driftTraits(c[0], c[1]));
+  NamedRows rows = rowsOf(table, of);
+  if (kind == "drift") return all.add(std::move(rows), driftTraits(c[0], c[1]));
+  if (kind == "harmonics") return all.add(std::move(rows), fittedHarmonics(c[0], c[1], f));
+  if (kind == "noise_law") return all.add(std::move(rows), fittedNoiseLaw(c[0], c[1]));
+  all.draw(std::move(rows));
   const std::map<std::string, std::function<Traits()>> rest{
-      {"harmonics", [&] { return harmonicTraits(c[0], c[1], f); }},
-      {"noise_law", [&] { return noiseLawTraits(c[0], c[1]); }},
       {"wraps", [&] { return wrapTraits(c[0], unambiguousRange(std::ranges::max(f) * hertz).in(metre)); }},
       {"corner", [&] { return cornerTraits(c[0], c[1]); }},
       {"lens_scatter", [&] { return scatterOf(c, f); }},
@@ -168,9 +194,7 @@ void addTraits(const TableColumns& table, const std::vector<double>& f, const ch
 
 Result<Report> judgeTables(const std::vector<TableJob>& jobs) {
   constexpr std::array kOf{"A", "B"};
-  constexpr std::array kInks{Ink::Measured, Ink::Simulated};
   TraitCollector all;
-  Plot plot;
   std::vector<std::string> files;
   const TableKind* kind = nullptr;
   for (std::size_t i = 0; i < std::min(jobs.size(), kOf.size()); ++i) {
@@ -180,16 +204,13 @@ Result<Report> judgeTables(const std::vector<TableJob>& jobs) {
     addTraits(*table, jobs[i].frequency_hz, kOf[i], all);
     files.push_back(
         fmt::format("{} ({}, {} rows)", kOf[i], jobs[i].file.filename().string(), table->values[0].size()));
-    plot.curves.push_back(curveOf(*table, files.back(), kInks[i]));
   }
   if (kind == nullptr) return Error{Error::Code::InvalidArgument, "no table is named"};
-  const NamedTraits traits = std::move(all).found();
+  NamedTraits traits = std::move(all).found();
+  pairRows(traits);
   if (traits.traits.empty())
     return Error{Error::Code::InvalidArgument, fmt::format("{}", fmt::join(traits.untold, "; "))};
   const auto verdicts = verdictsOf(traits);
-  plot.title = kind->tells;
-  plot.x_label = kind->columns.size() > 1 ? kind->columns[0] : "row";
-  plot.y_label = kind->columns[kind->columns.size() > 1 ? 1 : 0];
   Report report{.title = fmt::format("Characteristics of tables: {}", kind->name),
                 .subtitle = fmt::format("{}", fmt::join(files, " and "))};
   report.verdict = verdicts.empty() ? fmt::format("{} numbers told: {}.", traits.traits.size(), kind->tells)
@@ -197,10 +218,10 @@ Result<Report> judgeTables(const std::vector<TableJob>& jobs) {
   report.cards = cardsOf(verdicts);
   Section section{.id = "table", .title = kind->tells, .verdict = report.verdict};
   if (!verdicts.empty()) section.blocks.push_back(verdictTable(verdicts));
+  section.blocks.push_back(figureOf(traits, *kind));
   section.blocks.push_back(traitTable(traits));
   if (!traits.untold.empty())
     section.blocks.push_back(Details{"What these tables cannot tell", traits.untold});
-  section.blocks.push_back(Figure{"The tables' rows.", toSvg(plot)});
   report.sections.push_back(std::move(section));
   report.data.set("kind", kind->name)
       .set("characteristics", toJson(traits))

@@ -130,6 +130,14 @@ TableBlock verdictTable(const std::vector<TraitVerdict>& all) {
   return table;
 }
 
+std::pair<TableBlock, TableBlock> verdictTables(const std::vector<TraitVerdict>& all) {
+  const auto differs = [](const TraitVerdict& one) { return one.isTold() && one.differs(); };
+  const auto first_same = std::ranges::find_if_not(all, differs);  // those that differ come first
+  auto differ = verdictTable({all.begin(), first_same}), rest = verdictTable({first_same, all.end()});
+  rest.caption = "The other numbers: B is the same as A within the noise floor, or it is not told";
+  return {std::move(differ), std::move(rest)};
+}
+
 std::vector<Card> cardsOf(const std::vector<TraitVerdict>& all) {
   const std::size_t differ = countOf(all, true), told = differ + countOf(all, false);
   if (told == 0) return {};

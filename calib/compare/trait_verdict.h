@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "calib/compare/named_traits.h"
@@ -32,6 +33,8 @@ std::string inWords(const TraitVerdict& verdict);
 /// How many of how many differ, and the first of them: a sentence without its full stop.
 std::string headlineOf(const std::vector<TraitVerdict>& verdicts);
 TableBlock verdictTable(const std::vector<TraitVerdict>& verdicts);
+/// The same in two: what differs, and the rest, for a page on which figures stand between.
+std::pair<TableBlock, TableBlock> verdictTables(const std::vector<TraitVerdict>& verdicts);
 /// How many are the same, and one card for each of the first that differ.
 std::vector<Card> cardsOf(const std::vector<TraitVerdict>& verdicts);
 Json toJson(const std::vector<TraitVerdict>& verdicts);

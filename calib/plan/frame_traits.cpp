@@ -76,31 +76,6 @@ void addTiming(const ComparedRun& run, std::size_t camera, TraitCollector& all) 
   all.add("frame timing", kNames[camera], compare::timingTraits(series));
 }
 
-/// The noise at the capture whose wall is nearest to the middle of the others'.
-void addNoise(const Captures& walls, std::size_t camera, TraitCollector& all) {
-  std::vector<double> distances;
-  for (const ComparedCapture* one : walls) {
-    if (!one->seen[camera].noise.empty()) distances.push_back(one->record.distance_m);
-  }
-  if (distances.empty()) {
-    all.untold(
-        fmt::format("noise of frames of {}: it takes eight frames of a wall in a block of kind distance or "
-                    "warm_up, 8 × 8 pixels or more",
-                    kNames[camera]));
-    return;
-  }
-  const double middle = compare::quantile(distances, 0.5);
-  const ComparedCapture* best = nullptr;
-  for (const ComparedCapture* one : walls) {
-    if (one->seen[camera].noise.empty()) continue;
-    if (best == nullptr ||
-        std::abs(one->record.distance_m - middle) < std::abs(best->record.distance_m - middle))
-      best = one;
-  }
-  all.add("noise of frames", kNames[camera], best->seen[camera].noise,
-          fmt::format("at {:.3g} m", best->record.distance_m));
-}
-
 /// Pixels of a capture wrap together: each capture is a row.
 void addWraps(const Captures& walls, std::size_t camera, TraitCollector& all) {
   std::vector<double> shares;
@@ -306,7 +281,7 @@ void addFrameTraits(const ComparedRun& run, TraitCollector& all) {
   for (std::size_t camera : {std::size_t{0}, std::size_t{1}}) {
     const OwnError own{walls, camera};
     addTiming(run, camera, all);
-    if (!walls.empty()) addNoise(walls, camera, all), addWraps(walls, camera, all);
+    if (!walls.empty()) addWraps(walls, camera, all);
     addCorners(run, own, camera, all);
     addPlates(run, own, camera, all);
     addLag(run, camera, all);

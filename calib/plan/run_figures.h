@@ -7,8 +7,9 @@
 
 namespace toftwin::plan {
 
-/// A and B by themselves beside each other, with the curves that their traits say: drift over time, error
-/// over distance against the plan's wall, noise over amplitude. Those that the run has rows for.
-std::vector<compare::Figure> characteristicFigures(const ComparedRun& run, const RunTraits& traits);
+/// A and B by themselves beside each other, the curves that were fitted to them, and B − A below: drift over
+/// time, error over distance against the plan's wall, noise over amplitude and distance. Those that the run
+/// has rows for.
+std::vector<compare::Block> characteristicFigures(const RunTraits& traits);
 
 }  // namespace toftwin::plan

@@ -277,11 +277,12 @@ Result<Finding> judgeRun(const ComparedRun& run) {
   const auto seen = std::ranges::find_if(run.captures, isSeen);
   if (const std::string note = resamplingNote(seen->thinned); !note.empty())
     blocks.push_back(Paragraph{"Note: " + note});
-  blocks.push_back(verdictTable(verdicts));
-  blocks.push_back(blockTable(run));
-  if (auto figures = characteristicFigures(run, traits); !figures.empty())
-    blocks.push_back(FigureRow{std::move(figures)});
+  auto [differ, rest] = verdictTables(verdicts);
+  if (!differ.rows.empty()) blocks.push_back(std::move(differ));
+  for (Block& block : characteristicFigures(traits)) blocks.push_back(std::move(block));
   addFigures(run, blocks);
+  blocks.push_back(blockTable(run));
+  if (!rest.rows.empty()) blocks.push_back(std::move(rest));
   if (auto again = againTable(run); !again.rows.empty()) blocks.push_back(std::move(again));
   if (!traits.traits.empty()) blocks.push_back(traitTable(traits));
   if (!traits.untold.empty()) blocks.push_back(Details{"What these captures cannot tell", traits.untold});

@@ -13,6 +13,7 @@
 #include "calib/compare/live_report.h"
 #include "calib/compare/statistics.h"
 #include "calib/plan/frame_traits.h"
+#include "calib/plan/noise_traits.h"
 
 namespace toftwin::plan {
 namespace {
@@ -29,6 +30,7 @@ constexpr std::array kFeeds{Feeds{"warm_up", "drift"},
                             Feeds{"distance", "harmonics"},
                             Feeds{"distance", "wraps"},
                             Feeds{"distance", "noise of frames"},
+                            Feeds{"distance", "temporal noise and fixed pattern over distance"},
                             Feeds{"exposure", "error over amplitude"},
                             Feeds{"ambient", "ambient light"},
                             Feeds{"bright_dark", "lag"},
@@ -58,6 +60,12 @@ std::vector<double> differencesOf(const Captures& captures) {
   return column(captures, [](const auto& one) { return one.difference_mm; });
 }
 
+std::vector<std::size_t> numbersOf(const Captures& captures) {
+  std::vector<std::size_t> numbers;
+  for (const ComparedCapture* one : captures) numbers.push_back(one->record.number);
+  return numbers;
+}
+
 double meanOf(const std::vector<double>& values) {
   return values.empty() ? std::nan("") : compare::summarise(values).mean;
 }
@@ -83,8 +91,13 @@ void addDrift(const ComparedRun& run, TraitCollector& all) {
   const Captures captures = capturesOf(run, "warm_up");
   if (captures.empty()) return;
   for (const Side& side : kSides) {
-    all.add("drift", side.name,
-            compare::driftTraits(column(captures, side.since_power_on_s), column(captures, side.range_mm)));
+    // Less the first capture's range, on which no number of a drift depends.
+    const double first_mm = side.range_mm(*captures.front());
+    compare::NamedRows rows{kDrift, side.name, column(captures, side.since_power_on_s),
+                            column(captures, [&](const auto& one) { return side.range_mm(one) - first_mm; }),
+                            numbersOf(captures)};
+    const auto drift = compare::driftTraits(rows.x, rows.y);
+    all.add(std::move(rows), drift);
   }
 }
 
@@ -105,11 +118,11 @@ std::string wordsOf(const std::vector<double>& frequency_hz) {
 /// by much of a wave, so that a whole image's mean would lose the short ones.
 struct OverDistance {
   std::vector<double> distance_m{}, error_mm{};
-  std::vector<std::size_t> capture{};
+  std::vector<std::size_t> capture{}, condition{};  ///< condition: capture and step
 
   void add(std::size_t number, const std::vector<double>& at_m, const std::vector<double>& of_mm) {
     constexpr double kStep_m = 0.025;
-    std::map<long, std::pair<compare::Running, compare::Running>> steps;
+    std::map<long, std::pair<compare::Running, compare::Running>> steps;  // ranges are positive
     for (std::size_t i = 0; i < at_m.size(); ++i) {
       if (!std::isfinite(of_mm[i]) || !std::isfinite(at_m[i])) continue;
       auto& [at, of] = steps[std::lround(at_m[i] / kStep_m)];
@@ -117,9 +130,12 @@ struct OverDistance {
     }
     for (const auto& [step, means] : steps) {
       distance_m.push_back(means.first.mean()), error_mm.push_back(means.second.mean());
-      capture.push_back(number);
+      capture.push_back(number), condition.push_back(kMostSteps * number + static_cast<std::size_t>(step));
     }
   }
+
+ private:
+  static constexpr std::size_t kMostSteps = 1'000'000;  ///< 25 km of them
 };
 
 /// B − A of a capture's compared pixels over A's range.
@@ -157,8 +173,9 @@ void addHarmonics(const ComparedRun& run, TraitCollector& all) {
       all.untold(fmt::format("harmonics of {}: its frames say no modulation frequency", kSides[camera].name));
       continue;
     }
-    all.add("harmonics, against the plan's wall", kSides[camera].name,
-            compare::harmonicTraits(rows.distance_m, rows.error_mm, run.frequency_hz[camera], rows.capture));
+    const auto fitted =
+        compare::fittedHarmonics(rows.distance_m, rows.error_mm, run.frequency_hz[camera], rows.capture);
+    all.add({kHarmonicsOfWall, kSides[camera].name, rows.distance_m, rows.error_mm, rows.condition}, fitted);
   }
 }
 
@@ -194,20 +211,6 @@ void sayWhatPlanesHide(const ComparedRun& run, TraitCollector& all) {
       hidden));
 }
 
-void addNoiseLaw(const ComparedRun& run, TraitCollector& all) {
-  Captures captures = capturesOf(run, "");
-  // Other light makes noise of its own.
-  std::erase_if(captures, [](const ComparedCapture* one) { return one->record.ambient_klx > 0.0; });
-  for (const Side& side : kSides) {
-    const auto amplitude = column(captures, side.amplitude);
-    if (std::ranges::none_of(amplitude, [](double a) { return std::isfinite(a); })) {
-      all.untold(fmt::format("noise law of {}: its frames have no amplitude", side.name));
-      continue;
-    }
-    all.add("noise law", side.name, compare::noiseLawTraits(amplitude, column(captures, side.noise_mm)));
-  }
-}
-
 void addMasks(const ComparedRun& run, TraitCollector& all) {
   const auto maskOf = [](const Image<float>& share, const Image<float>& looked_at) {
     Image<std::uint8_t> mask{share.width(), share.height()};
@@ -230,8 +233,8 @@ RunTraits traitsOf(const ComparedRun& run) {
   addDrift(run, all);
   addHarmonics(run, all);
   addAmplitudeAndAmbient(run, all);
-  addNoiseLaw(run, all);
   addMasks(run, all);
+  addNoiseTraits(run, all);
   addFrameTraits(run, all);
   sayWhatPlanesHide(run, all);
   for (const Feeds& one : kFeeds) {

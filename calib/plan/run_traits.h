@@ -15,6 +15,12 @@ namespace toftwin::plan {
 using RunTrait = compare::NamedTrait;
 using RunTraits = compare::NamedTraits;
 
+/// Characteristics that a page draws.
+inline constexpr const char *kDrift = "drift", *kHarmonicsOfWall = "harmonics, against the plan's wall",
+                            *kNoiseLaw = "noise law", *kNoiseOverDistance = "temporal noise over distance",
+                            *kPatternOverDistance = "fixed pattern over distance",
+                            *kPatternOverAmplitude = "fixed pattern over amplitude";
+
 /// Of the blocks of each kind that can tell it: drift (warm_up), harmonics (distance), error over amplitude
 /// (exposure), error and noise over ambient light (ambient); of all captures the noise's law and the masks.
 RunTraits traitsOf(const ComparedRun& run);

@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <random>
 
 #include "calib/compare/traits/least_squares.h"
@@ -35,6 +36,33 @@ TEST(DriftTraits, ChooseTheConstantOnFlatData) {
   }
   EXPECT_LE(wrong, 10);
   EXPECT_GE(held, 180);
+}
+
+/// The curves through the rows are those that the numbers are of: without noise, they are what was planted.
+TEST(FittedCurves, GoThroughTheRows) {
+  std::vector<double> t, two, d, wave, signal, sigma;
+  for (int i = 0; i < 200; ++i) {
+    t.push_back(100.0 + 18.0 * i);
+    two.push_back(1500.0 + 9.0 * std::exp(-18.0 * i / 100.0) + 6.0 * std::exp(-18.0 * i / 1200.0));
+    d.push_back(0.5 + 0.03 * i);
+    wave.push_back(3.0 + 0.7 * d.back() +
+                   4.0 * std::cos(4.0 * std::numbers::pi * 30e6 / 299'792'458.0 * d.back()));
+    signal.push_back(40.0 * std::pow(1.03, i));
+    sigma.push_back(std::sqrt(4.0 + 9e3 / signal.back() + 1e4 / (signal.back() * signal.back())));
+  }
+  const std::vector<double> f{30e6};
+  const auto drift = driftTraits(t, two);
+  const auto harmonics = fittedHarmonics(d, wave, f);
+  const auto law = fittedNoiseLaw(signal, sigma);
+  ASSERT_TRUE(drift && harmonics && law);
+  EXPECT_STREQ(nameOf(drift->model), "two exponentials");
+  EXPECT_EQ(drift->curve.name, "two exponentials");
+  for (std::size_t i = 0; i < t.size(); ++i) {
+    EXPECT_NEAR(drift->curve.at(t[i]), two[i], 1e-3);
+    EXPECT_NEAR(harmonics->curve.at(d[i]), wave[i], 1e-3);
+    EXPECT_NEAR(law->curve.at(signal[i]), sigma[i], 1e-3 * sigma[i]);
+  }
+  EXPECT_NEAR(drift->curve.at(t.back()) - drift->curve.at(t.front()), drift->traits.front().value, 1e-9);
 }
 
 /// y = 2 + 3 x exactly at five places but for ±1 that is orthogonal to both: s² = 4/3, var(slope) = s²/Σx² =

@@ -154,7 +154,13 @@ TEST_F(StandardPlan, TellsEveryCharacteristicOfBothCameras) {
   const std::string page = text.str();
   const auto verdicts = page.find("B against A, number by number"),
              lag = page.find("left behind</td><td>differs, ");
-  EXPECT_LT(verdicts, page.find("B − A by block"));
+  EXPECT_LT(verdicts, page.find("Drift of A and of B while warming up"));
+  EXPECT_LT(page.find("Drift of A and of B while warming up"), page.find("B − A by block"));
+  EXPECT_LT(page.find("B − A by block"), page.find("The other numbers: B is the same as A"));
+  for (const char* drawn :
+       {"Error over distance", "Temporal noise over amplitude", "Temporal noise over distance",
+        "Fixed pattern over distance", "Fixed pattern over amplitude"})
+    EXPECT_NE(page.find(std::string{"aria-label='"} + drawn), std::string::npos) << drawn;
   EXPECT_NE(lag, std::string::npos);
   EXPECT_NE(page.find("Drift of A and of B while warming up"), std::string::npos);
   EXPECT_NE(page.find("<figure class='cloud'"), std::string::npos);

@@ -4,6 +4,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -75,6 +76,36 @@ TEST(RunTraits, FindWhatWasPlanted) {
   expectNear(find(all, "drift", "A", "drift"), 0.0);
   expectNear(find(all, "harmonics", "B − A", "30 MHz, 4 per period"), 5.0);
   expectNear(find(all, "masks", "A and B", "agreement"), 15.0 / 16.0);
+}
+
+/// σ² = 1² + 2² d² and a pattern of 0.5 mm at all distances; amplitude falls with d². B has half of it.
+TEST(RunTraits, TellNoiseAndPatternOverDistanceAndAmplitude) {
+  std::mt19937_64 random{kSeed};
+  std::normal_distribution<double> error{0.0, 0.02};
+  ComparedRun run = plantedRun();
+  for (ComparedCapture& one : run.captures) {
+    one.record.distance_m = 1e-3 * one.range_a_mm;
+    const double d = one.record.distance_m, sigma = std::sqrt(1.0 + 4.0 * d * d);
+    for (const std::size_t camera : {std::size_t{0}, std::size_t{1}}) {
+      const double share = camera == 0 ? 1.0 : 0.5;
+      one.seen[camera].noise = {{"temporal noise", "mm", share * sigma * (1.0 + error(random))},
+                                {"fixed pattern", "mm", share * 0.5 * (1.0 + error(random))}};
+      one.seen[camera].brightness = {1000.0 / (d * d)};
+    }
+  }
+  run.captures.back().seen[0].noise[1].value = 0.0;  // too weak to be told: no row
+  const RunTraits all = traitsOf(run);
+  const double nearest = 0.5;
+  for (const auto& [of, share] : {std::pair{"A", 1.0}, {"B", 0.5}}) {
+    expectNear(find(all, kNoiseOverDistance, of, "floor"), share * 1.0);
+    expectNear(find(all, kNoiseOverDistance, of, "shot"), share * 2.0 * nearest);
+    expectNear(find(all, kPatternOverDistance, of, "floor"), share * 0.5);
+    expectNear(find(all, kPatternOverAmplitude, of, "floor"), share * 0.5);
+  }
+  const auto rows = std::ranges::find(all.rows, kPatternOverDistance, &compare::NamedRows::what);
+  ASSERT_NE(rows, all.rows.end());
+  EXPECT_EQ(rows->x.size(), 39u);
+  EXPECT_NEAR(rows->curve.at(2.0), 0.5, 0.02);
 }
 
 TEST(RunTraits, SayWhatTheyCannotTellAndWhy) {

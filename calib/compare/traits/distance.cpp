@@ -3,9 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <boost/math/distributions/non_central_f.hpp>
 #include <cmath>
+#include <map>
 #include <numbers>
+#include <numeric>
 
 #include "calib/compare/statistics.h"
 #include "calib/compare/traits/clusters.h"
@@ -86,6 +89,20 @@ std::vector<Trait> traitsOf(const Fit& fit, const std::vector<Wave>& waves) {
   return traits;
 }
 
+/// c + s d + Σ a cos + b sin, for a distance in metres.
+double seriesAt(std::span<const double> p, const std::vector<Wave>& waves, double d) {
+  double sum = p[0] + p[1] * d;
+  for (std::size_t w = 0; w < waves.size(); ++w)
+    sum += p[2 + 2 * w] * std::cos(waves[w].per_m * d) + p[3 + 2 * w] * std::sin(waves[w].per_m * d);
+  return sum;
+}
+
+FittedTraits fittedOf(const Fit& fit, const std::vector<Wave>& waves) {
+  return {.traits = traitsOf(fit, waves),
+          .curve = {fmt::format("a line and {} waves", waves.size()),
+                    [=, p = fit.at](double d) { return seriesAt(p, waves, d); }}};
+}
+
 /// Each amplitude's interval is shorter than the four standard deviations that one row's would have.
 bool areToldApart(const std::vector<Trait>& traits) {
   const double sd = traits.back().value;  // "residual"
@@ -95,29 +112,51 @@ bool areToldApart(const std::vector<Trait>& traits) {
 
 }  // namespace
 
-Traits harmonicTraits(Column distance_m, Column error_mm, std::span<const double> frequency_hz,
-                      std::span<const int> orders) {
-  const std::vector<Wave> waves = wavesOf(frequency_hz, orders);
-  if (waves.empty()) return undetermined("harmonics", "no frequency or order was given");
+namespace {
+
+/// Rows by themselves.
+Result<FittedTraits> fitRows(Column distance_m, Column error_mm, const std::vector<Wave>& waves) {
   const auto rows = finiteRows({distance_m, error_mm}, 2 * waves.size() + 4, "harmonics");
   if (!rows) return rows.error();
   const auto &d = (*rows)[0], &e = (*rows)[1];
-  const Model model = [&](std::span<const double> p, std::size_t i) {
-    double sum = p[0] + p[1] * d[i];
-    for (std::size_t w = 0; w < waves.size(); ++w)
-      sum += p[2 + 2 * w] * std::cos(waves[w].per_m * d[i]) + p[3 + 2 * w] * std::sin(waves[w].per_m * d[i]);
-    return sum;
-  };
+  const Model model = [&](std::span<const double> p, std::size_t i) { return seriesAt(p, waves, d[i]); };
   const auto fit = fitLeastSquares(model, e, std::vector<double>(2 + 2 * waves.size(), 0.0));
   if (!fit)
     return undetermined("harmonics", "the distances span too little of a period, or two orders coincide");
-  return traitsOf(*fit, waves);
+  return fittedOf(*fit, waves);
 }
 
-Traits harmonicTraits(Column distance_m, Column error_mm, std::span<const double> frequency_hz,
-                      std::span<const int> orders, std::span<const std::size_t> cluster) {
-  const std::vector<Wave> waves = wavesOf(frequency_hz, orders);
-  if (waves.empty()) return undetermined("harmonics", "no frequency or order was given");
+/// How far to the side of a wall each row is, u, and its capture's nearest row, d₀. What a camera errs by its
+/// place in the image (a veil, the light's reach) would else be told as a slope over distance: within a
+/// capture both go alike.
+struct Sideways {
+  std::vector<double> u{}, nearest_m{};
+  static constexpr std::size_t kColumns = 4;
+
+  Sideways(Column distance_m, std::span<const std::size_t> cluster) {
+    std::map<std::size_t, double> nearest;
+    for (std::size_t i = 0; i < distance_m.size(); ++i) {
+      const double d = distance_m[i];
+      if (const auto [at, is_new] = nearest.try_emplace(cluster[i], d); !is_new)
+        at->second = std::fmin(at->second, d);
+    }
+    for (std::size_t i = 0; i < distance_m.size(); ++i) {
+      nearest_m.push_back(nearest[cluster[i]]);
+      u.push_back(distance_m[i] / nearest_m.back() - 1.0);
+    }
+  }
+  /// Less tells no slope of its own.
+  [[nodiscard]] bool isWide() const {
+    return std::ranges::any_of(u, [](double one) { return one >= 0.05; });
+  }
+  [[nodiscard]] std::array<double, kColumns> at(std::size_t i) const {
+    return {u[i], u[i] * u[i], nearest_m[i] * u[i], nearest_m[i] * u[i] * u[i]};
+  }
+};
+
+/// Rows in clusters that share an error.
+Result<FittedTraits> fitClusters(Column distance_m, Column error_mm, const std::vector<Wave>& waves,
+                                 std::span<const std::size_t> cluster) {
   std::vector<double> numbers(cluster.begin(), cluster.end());
   const auto rows = finiteRows({distance_m, error_mm, numbers}, 2 * waves.size() + 4, "harmonics");
   if (!rows) return rows.error();
@@ -130,14 +169,51 @@ Traits harmonicTraits(Column distance_m, Column error_mm, std::span<const double
     columns.push_back(std::move(even)), columns.push_back(std::move(odd));
   }
   const std::vector<std::size_t> captures((*rows)[2].begin(), (*rows)[2].end());
+  const Sideways sideways{d, captures};
+  const std::size_t first = columns.size();
+  if (sideways.isWide()) {
+    columns.resize(first + Sideways::kColumns, std::vector<double>(d.size()));
+    for (std::size_t i = 0; i < d.size(); ++i) {
+      for (std::size_t k = 0; k < Sideways::kColumns; ++k) columns[first + k][i] = sideways.at(i)[k];
+    }
+  }
   const auto fit = fitInClusters(columns, (*rows)[1], captures);
   if (!fit)
     return undetermined("harmonics", "the distances span too little of a period, or are of one capture only");
-  return traitsOf(*fit, waves);
+  FittedTraits fitted = fittedOf(*fit, waves);
+  if (!sideways.isWide()) return fitted;
+  const Sideways of_all{distance_m, cluster};
+  for (std::size_t i = 0; i < distance_m.size(); ++i) {
+    const auto at = of_all.at(i);
+    fitted.besides.push_back(
+        std::inner_product(at.begin(), at.end(), fit->at.begin() + static_cast<long>(first), 0.0));
+  }
+  return fitted;
 }
 
+Result<FittedTraits> fitOrders(Column distance_m, Column error_mm, std::span<const double> frequency_hz,
+                               std::span<const int> orders, std::span<const std::size_t> cluster) {
+  const std::vector<Wave> waves = wavesOf(frequency_hz, orders);
+  if (waves.empty()) return undetermined("harmonics", "no frequency or order was given");
+  return cluster.empty() ? fitRows(distance_m, error_mm, waves)
+                         : fitClusters(distance_m, error_mm, waves, cluster);
+}
+
+/// The numbers alone.
+Traits numbersOf(Result<FittedTraits> fitted) {
+  if (!fitted) return fitted.error();
+  return std::move(fitted->traits);
+}
+
+}  // namespace
+
 Traits harmonicTraits(Column distance_m, Column error_mm, std::span<const double> frequency_hz,
-                      std::span<const std::size_t> cluster) {
+                      std::span<const int> orders, std::span<const std::size_t> cluster) {
+  return numbersOf(fitOrders(distance_m, error_mm, frequency_hz, orders, cluster));
+}
+
+Result<FittedTraits> fittedHarmonics(Column distance_m, Column error_mm, std::span<const double> frequency_hz,
+                                     std::span<const std::size_t> cluster) {
   const std::size_t least = kRowsPerParameter * (2 + 2 * frequency_hz.size());
   const auto rows = finiteRows({distance_m, error_mm}, least, "harmonics");
   if (!rows) return rows.error();
@@ -147,11 +223,15 @@ Traits harmonicTraits(Column distance_m, Column error_mm, std::span<const double
     if (rows->front().size() >= kRowsPerParameter * parameters) orders.push_back(order);
   }
   for (; !orders.empty(); orders.pop_back()) {
-    auto traits = cluster.empty() ? harmonicTraits(distance_m, error_mm, frequency_hz, orders)
-                                  : harmonicTraits(distance_m, error_mm, frequency_hz, orders, cluster);
-    if (orders.size() == 1 || (traits && areToldApart(*traits))) return traits;
+    auto fitted = fitOrders(distance_m, error_mm, frequency_hz, orders, cluster);
+    if (orders.size() == 1 || (fitted && areToldApart(fitted->traits))) return fitted;
   }
   return undetermined("harmonics", "no frequency was given");
+}
+
+Traits harmonicTraits(Column distance_m, Column error_mm, std::span<const double> frequency_hz,
+                      std::span<const std::size_t> cluster) {
+  return numbersOf(fittedHarmonics(distance_m, error_mm, frequency_hz, cluster));
 }
 
 Traits wrapTraits(Column error_m, double period_m) {

@@ -11,42 +11,45 @@ namespace {
 
 constexpr const char* kName = "drift";
 
+using Row = std::span<const double>;
+/// What a model with parameters p says at a time.
+using Shape = std::function<double(Row p, double t)>;
+
 /// A model of the series, ready to be fitted. Times are relative to the series' length, so that numbers are
 /// of order 1.
 struct Candidate {
   DriftModel kind = DriftModel::Constant;
-  Model model{};
+  Shape shape{};
   std::vector<std::vector<double>> starts{};
   double cost = 0.0;  ///< parameters, as BIC counts them
+
+  [[nodiscard]] Model over(Column t) const {
+    return [shape = shape, t](Row p, std::size_t i) { return shape(p, t[i]); };
+  }
 };
 
-using Row = std::span<const double>;
-
 Candidate constant() {
-  return {DriftModel::Constant, [](Row p, std::size_t) { return p[0]; }, {{0.0}}, 1.0};
+  return {DriftModel::Constant, [](Row p, double) { return p[0]; }, {{0.0}}, 1.0};
 }
 
-Candidate ramp(Column t) {
-  return {DriftModel::Ramp, [t](Row p, std::size_t i) { return p[0] + p[1] * t[i]; }, {{0.0, 0.0}}, 2.0};
+Candidate ramp() {
+  return {DriftModel::Ramp, [](Row p, double t) { return p[0] + p[1] * t; }, {{0.0, 0.0}}, 2.0};
 }
 
 double decay(double t, double log_tau) { return std::exp(-t / std::exp(log_tau)); }
 
-Candidate oneExponential(Column t) {
-  Candidate one{DriftModel::OneExponential,
-                [t](Row p, std::size_t i) { return p[0] + p[1] * decay(t[i], p[2]); },
-                {},
-                3.0};
+Candidate oneExponential() {
+  Candidate one{
+      DriftModel::OneExponential, [](Row p, double t) { return p[0] + p[1] * decay(t, p[2]); }, {}, 3.0};
   for (const double tau : {0.03, 0.1, 0.3, 1.0}) one.starts.push_back({0.0, 1.0, std::log(tau)});
   return one;
 }
 
-Candidate twoExponentials(Column t) {
-  Candidate two{
-      DriftModel::TwoExponentials,
-      [t](Row p, std::size_t i) { return p[0] + p[1] * decay(t[i], p[2]) + p[3] * decay(t[i], p[4]); },
-      {},
-      5.0};
+Candidate twoExponentials() {
+  Candidate two{DriftModel::TwoExponentials,
+                [](Row p, double t) { return p[0] + p[1] * decay(t, p[2]) + p[3] * decay(t, p[4]); },
+                {},
+                5.0};
   for (const auto& [fast, slow] : {std::pair{0.03, 0.3}, {0.1, 0.5}, {0.05, 1.0}})
     two.starts.push_back({0.0, 1.0, std::log(fast), 0.5, std::log(slow)});
   return two;
@@ -69,15 +72,16 @@ Candidate step(Column t, Column y) {
   }
   const double place = 0.5 * (t[at - 1] + t[at]);
   return {DriftModel::Step,
-          [t, place](Row p, std::size_t i) { return p[0] + (t[i] > place ? p[1] : 0.0); },
+          [place](Row p, double time) { return p[0] + (time > place ? p[1] : 0.0); },
           {{0.0, 0.0}},
           4.0};
 }
 
-std::optional<Fit> bestFit(const Candidate& candidate, Column y) {
+std::optional<Fit> bestFit(const Candidate& candidate, Column t, Column y) {
   std::optional<Fit> best;
+  const Model model = candidate.over(t);
   for (const auto& start : candidate.starts) {
-    auto fit = fitLeastSquares(candidate.model, y, start);
+    auto fit = fitLeastSquares(model, y, start);
     if (fit && (!best || fit->squares < best->squares)) best = std::move(fit);
   }
   return best;
@@ -112,6 +116,22 @@ void addDetails(DriftModel kind, const Fit& fit, double length_s, std::vector<Tr
 
 }  // namespace
 
+const char* nameOf(DriftModel model) {
+  switch (model) {
+    case DriftModel::Constant:
+      return "none";
+    case DriftModel::Ramp:
+      return "ramp";
+    case DriftModel::OneExponential:
+      return "one exponential";
+    case DriftModel::TwoExponentials:
+      return "two exponentials";
+    case DriftModel::Step:
+      return "step";
+  }
+  return "";
+}
+
 Result<DriftTraits> driftTraits(Column time_s, Column value_mm) {
   auto rows = finiteRows({time_s, value_mm}, 12, kName);
   if (!rows) return rows.error();
@@ -121,17 +141,17 @@ Result<DriftTraits> driftTraits(Column time_s, Column value_mm) {
   for (double& one : t) one = (one - begin) / length;
   for (double& one : y) one -= first;
   const double n = static_cast<double>(y.size());
-  const std::array candidates{constant(), ramp(t), oneExponential(t), twoExponentials(t), step(t, y)};
+  const std::array candidates{constant(), ramp(), oneExponential(), twoExponentials(), step(t, y)};
   double least = std::numeric_limits<double>::infinity(), rho = 0.0;
   // Errors that go on look like structure: what they are is taken from the richest model, which leaves the
   // least of it.
-  if (const auto rich = bestFit(candidates[3], y))
-    rho = correlationOfResiduals(candidates[3].model, y, *rich);
+  if (const auto rich = bestFit(candidates[3], t, y))
+    rho = correlationOfResiduals(candidates[3].over(t), y, *rich);
   const double effective = n * (1.0 - rho) / (1.0 + rho);
   const Candidate* chosen = nullptr;
   std::optional<Fit> fit;
   for (const Candidate& candidate : candidates) {
-    auto tried = bestFit(candidate, y);
+    auto tried = bestFit(candidate, t, y);
     if (!tried || !isPlausible(candidate, *tried, t)) continue;
     const double bic =
         effective * std::log(std::max(tried->squares, 1e-18 * n) / n) + candidate.cost * std::log(effective);
@@ -141,18 +161,21 @@ Result<DriftTraits> driftTraits(Column time_s, Column value_mm) {
     fit = std::move(tried);
   }
   if (!fit) return undetermined(kName, "no model can be fitted");
-  DriftTraits result{.model = chosen->kind, .traits = {}};
+  DriftTraits result{.model = chosen->kind};
+  result.curve = {nameOf(chosen->kind), [=, shape = chosen->shape, p = fit->at](double at_s) {
+                    return first + shape(p, (at_s - begin) / length);
+                  }};
   // Where no drift can be told, "drift" is what a ramp could still be: not known to be exactly nothing.
   if (chosen->kind == DriftModel::Constant) {
     chosen = &candidates[1];
-    if (auto hidden = bestFit(*chosen, y))
+    if (auto hidden = bestFit(*chosen, t, y))
       fit = std::move(hidden);
     else
       return undetermined(kName, "no ramp can be fitted");
   }
-  fit->heedCorrelation(correlationOfResiduals(chosen->model, y, *fit));
+  fit->heedCorrelation(correlationOfResiduals(chosen->over(t), y, *fit));
   result.traits.push_back(fit->trait("drift", "mm", [&](std::span<const double> p) {
-    return chosen->model(p, y.size() - 1) - chosen->model(p, 0);
+    return chosen->shape(p, t.back()) - chosen->shape(p, t.front());
   }));
   addDetails(result.model, *fit, length, result.traits);
   return result;

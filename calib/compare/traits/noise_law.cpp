@@ -3,11 +3,13 @@
 #include <array>
 #include <cmath>
 
+#include <fmt/format.h>
+
 #include "calib/compare/traits/least_squares.h"
 
 namespace toftwin::compare {
 
-Traits noiseLawTraits(Column signal, Column sigma_mm) {
+Result<FittedTraits> fittedNoiseLaw(Column signal, Column sigma_mm) {
   auto rows = finiteRows({signal, sigma_mm}, 6, "noise law");
   if (!rows) return rows.error();
   auto &intensity = (*rows)[0], &sigma = (*rows)[1];
@@ -44,13 +46,29 @@ Traits noiseLawTraits(Column signal, Column sigma_mm) {
   }
   if (!fit) return undetermined("noise law", "a part of it does not show in this range of signals");
   constexpr std::array kParts{"floor", "shot", "read"};
-  std::vector<Trait> traits;
+  constexpr std::array kPowers{"", "/I", "/I²"};
+  FittedTraits fitted;
+  std::array<double, 3> at{};
+  std::string terms;
   for (std::size_t k = 0; k < parts.size(); ++k) {
-    Trait one = fit->trait(kParts[static_cast<std::size_t>(parts[k])], "mm", k);
+    const auto part = static_cast<std::size_t>(parts[k]);
+    Trait one = fit->trait(kParts[part], "mm", k);
     for (double* value : {&one.value, &one.low, &one.high}) *value = std::exp(*value);
-    traits.push_back(std::move(one));
+    at[part] = one.value;
+    terms += fmt::format("{}{:.2g}²{}", terms.empty() ? "" : " + ", one.value, kPowers[part]);
+    fitted.traits.push_back(std::move(one));
   }
-  return traits;
+  fitted.curve = {"√(" + terms + ") mm", [at, most](double of_signal) {
+                    const double i = of_signal / most;
+                    return std::sqrt(at[0] * at[0] + at[1] * at[1] / i + at[2] * at[2] / (i * i));
+                  }};
+  return fitted;
+}
+
+Traits noiseLawTraits(Column signal, Column sigma_mm) {
+  auto fitted = fittedNoiseLaw(signal, sigma_mm);
+  if (!fitted) return fitted.error();
+  return std::move(fitted->traits);
 }
 
 }  // namespace toftwin::compare

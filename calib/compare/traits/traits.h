@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -24,6 +25,18 @@ struct Trait {
 using Traits = Result<std::vector<Trait>>;
 using Column = std::span<const double>;
 
+/// A curve that was fitted, for a plot through the rows.
+struct FittedCurve {
+  std::string name{};                  ///< the model: "one exponential"
+  std::function<double(double)> at{};  ///< empty where nothing was fitted
+};
+struct FittedTraits {
+  std::vector<Trait> traits{};
+  FittedCurve curve{};
+  /// What of each row goes with something else than the abscissa and is in the model, too; empty: nothing.
+  std::vector<double> besides{};
+};
+
 /// Which model a drift follows. Chosen by BIC; a step's place costs two parameters.
 enum class DriftModel { Constant, Ramp, OneExponential, TwoExponentials, Step };
 struct DriftTraits {
@@ -31,26 +44,34 @@ struct DriftTraits {
   /// "drift" (last minus first; of a constant, what a ramp could hide), and of the model "time constant",
   /// "slope", "step"
   std::vector<Trait> traits{};
+  FittedCurve curve{};  ///< of the model; of a constant, their mean
 };
+/// "one exponential"; "none" of a constant.
+const char* nameOf(DriftModel model);
 /// value(t): constant; + s t; + Σ aᵢ e^(−t/τᵢ); + h (t > t₀). Errors that go on from row to row widen the
 /// intervals.
 Result<DriftTraits> driftTraits(Column time_s, Column value_mm);
 
 /// error(d) = c + s d + Σ aₖ cos 2πk·2fd/c + bₖ sin …: "f MHz, k per period": √(a² + b²), and "residual".
+/// Of rows in clusters, such as cells of one capture, that share an error: one-way random effects; and err by
+/// their place in the image, u = d/d₀ − 1 over the cluster's nearest row d₀: by a polynomial (a + b d₀) u +
+/// (…) u², where u reaches 5 %. Without clusters: rows are independent.
 Traits harmonicTraits(Column distance_m, Column error_mm, std::span<const double> frequency_hz,
-                      std::span<const int> orders);
-/// The same of rows in clusters, such as cells of one capture, that share an error: one-way random effects.
-Traits harmonicTraits(Column distance_m, Column error_mm, std::span<const double> frequency_hz,
-                      std::span<const int> orders, std::span<const std::size_t> cluster);
+                      std::span<const int> orders, std::span<const std::size_t> cluster = {});
 /// Of as many of four, three, two and one wave per period (cameras of four and three steps have the first of
 /// these) as there are three rows for each parameter, and as the rows tell apart: each amplitude better than
-/// one row's scatter. Without clusters: rows are independent.
+/// one row's scatter.
 Traits harmonicTraits(Column distance_m, Column error_mm, std::span<const double> frequency_hz,
                       std::span<const std::size_t> cluster = {});
+/// The same with the curve.
+Result<FittedTraits> fittedHarmonics(Column distance_m, Column error_mm, std::span<const double> frequency_hz,
+                                     std::span<const std::size_t> cluster = {});
 
 /// σ(I) = √(a² + b²/I + c²/I²) in ln σ, I relative to the largest: "floor" a, "shot" b, "read" c at that
 /// signal.
 Traits noiseLawTraits(Column signal, Column sigma_mm);
+/// The same with the curve, over the signal itself.
+Result<FittedTraits> fittedNoiseLaw(Column signal, Column sigma_mm);
 
 /// Range is off by a whole number of periods: "wrapped" share.
 Traits wrapTraits(Column error_m, double period_m);
@@ -69,8 +90,7 @@ Traits scatterTraits(Column own_range_m, Column plate_range_m, Column plate_over
 /// sin(Δφ_f) c/4πf / Σ f². The constant c is what else the camera is off by.
 Traits veilTraits(Column own_range_m, Column plate_range_m, Column plate_over_own, Column error_mm,
                   std::span<const double> frequency_hz);
-/// The same of rows in clusters that share an error: the interval is a jackknife over clusters, of three or
-/// more.
+/// The same of rows in clusters that share an error, three or more: the interval is by how clusters scatter.
 Traits veilTraits(Column own_range_m, Column plate_range_m, Column plate_over_own, Column error_mm,
                   std::span<const double> frequency_hz, std::span<const std::size_t> cluster);
 
