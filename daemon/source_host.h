@@ -89,6 +89,7 @@ class SourceHost {
   bool reopen(const std::stop_token& stop);
   void adopt(Result<std::unique_ptr<drivers::Source>> opened);
   void noteState();
+  bool hasOtherPlanes();
   void noteTriggered();
   bool restoreSettings();
   void adjustStreaming();

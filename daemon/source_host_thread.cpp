@@ -281,7 +281,15 @@ void SourceHost::makeFrame(const std::stop_token& stop) {
     if (!frame && !is_spared_) triggered_ = 0;
   }
   if (!frame) return onError(frame.error(), next_subscriber);
+  if (hasOtherPlanes()) noteState();  // before the frame, so that whoever asks after it sees the change
   publish(*std::move(frame));
+}
+
+/// Whether the source says so: another program may have set the camera.
+bool SourceHost::hasOtherPlanes() {
+  const auto is_so =
+      inDriver([&]() -> Result<bool> { return info_ && source_->info().planes != info_->planes; });
+  return is_so.ok() && *is_so;
 }
 
 void SourceHost::publish(Frame frame) {

@@ -20,7 +20,7 @@
 namespace toftwin::drivers {
 
 /// What an opened camera is and can do. Constant while it is open, but for planes, frame_interval and can_trigger
-/// where parameters set them.
+/// where parameters set them, and for planes where another program does: from the frame on that has them.
 struct SourceInfo {
   std::string driver;  ///< name of the driver's row
   std::string model;   ///< "Microsoft Kinect v2 (simulated)"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <condition_variable>
 #include <deque>
 #include <memory>
@@ -72,6 +73,7 @@ class Remote {
  public:
   drivers::SourceInfo info;
   Counter opened, started, stopped, asked;
+  std::atomic<bool> is_set_elsewhere = false;  ///< the next frame has an amplitude: another program set it
 
   Remote() {
     info.driver = "fake";
@@ -130,6 +132,7 @@ class FakeSource final : public drivers::Source {
   Result<Frame> next(std::stop_token stop, bool) override {
     Result<Frame> next = remote_->take(stop);
     if (!next) return next;
+    if (remote_->is_set_elsewhere.exchange(false)) (void)setParameter("amplitude", 1);
     next->camera = remote_->info.camera;
     next->moment.exposures = {{{++time_}, 1_ms, 80_MHz}};
     next->moment.world_from_camera = pose_;

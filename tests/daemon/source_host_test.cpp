@@ -64,6 +64,21 @@ TEST(SourceHost, NumbersFramesWithoutGapsAndStampsThem) {
   EXPECT_EQ(rig.host->health().frames, 3u);
 }
 
+TEST(SourceHost, SaysWhichPlanesItHasOnceAnotherProgramSetTheCamera) {
+  Rig rig;
+  rig.start();
+  Taker taker;
+  const auto subscriber = rig.subscribe(taker);
+  rig.remote->give();
+  ASSERT_EQ(taker.nextSequence(subscriber->backlog), 0);
+  EXPECT_EQ(rig.host->describe()->planes, (std::vector{PlaneKind::Range, PlaneKind::Flags}));
+  rig.remote->is_set_elsewhere = true;
+  rig.remote->give();
+  ASSERT_EQ(taker.nextSequence(subscriber->backlog), 1);
+  EXPECT_EQ(rig.host->describe()->planes,
+            (std::vector{PlaneKind::Range, PlaneKind::Flags, PlaneKind::Amplitude}));
+}
+
 TEST(SourceHost, OnDemandRunsOnlyWhileSomebodySubscribes) {
   Rig rig;
   rig.start();
