@@ -90,7 +90,9 @@ std::string stampsOf(const settings::Table& table, const std::filesystem::path& 
 Result<std::unique_ptr<drivers::Source>> openGuarded(const drivers::Driver& driver,
                                                      settings::Table& table) {
   try {
-    return driver.open(table);
+    auto opened = driver.open(table);
+    if (!opened && table.check()) return drivers::answerAtOpening(opened.error());
+    return opened;
   } catch (...) {
     return thrownError("the driver");
   }

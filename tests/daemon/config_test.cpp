@@ -105,6 +105,19 @@ TEST(Config, ADriverThatWasNotBuiltKeepsNoOtherSourceAway) {
   EXPECT_TRUE(config->sources.at(1).opened.ok());
 }
 
+TEST(Config, WhatADeviceDoesNotTakeIsItsAnswerWhateverItsDriverCallsIt) {
+  const drivers::Driver picky{.name = "picky",
+                              .summary = "",
+                              .list = [] { return std::vector<std::string>{}; },
+                              .open = [](settings::Table&) -> Result<std::unique_ptr<drivers::Source>> {
+                                return Error{Error::Code::InvalidArgument, "gain = 3: it must be 0 to 2"};
+                              },
+                              .document = [] { return std::string{}; }};
+  const auto config = parseConfig("[[source]]\nname = 'cam'\ndriver = 'picky'\n", "d.toml", {&picky, 1});
+  ASSERT_TRUE(config.ok()) << config.error().message;
+  EXPECT_EQ(config->sources.at(0).opened.error().code, Error::Code::Incompatible);
+}
+
 TEST(Config, AFacadeThatWasNotBuiltKeepsNothingElseAway) {
   const FacadeKind lacking{.name = "telegraph",
                            .summary = "",
