@@ -109,6 +109,7 @@ std::uint64_t bytesOf(const Selection& selection, const CameraInfo& camera,
   if (!part || selection.decimation == 0) return 0;
   std::uint64_t of_pixel = 0;
   for (const PlaneKind kind : selection.planes.empty() ? planes : selection.planes) {
+    if (std::ranges::find(planes, kind) == planes.end()) continue;
     const auto found = known.find(kind);
     of_pixel += found == known.end() ? fewestPixelBytes(kind) : found->second;
   }

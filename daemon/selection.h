@@ -27,8 +27,8 @@ struct Selection {
 /// Bytes of each kind of plane for one pixel, as its source's last frame had them.
 using PixelBytes = std::map<PlaneKind, std::uint64_t>;
 
-/// What the planes of one frame have in all, at most: also those that it may come to have. Of a kind that is
-/// not among the known ones: by its element type and the fewest channels that it can have, which is exact for
+/// What the planes of one frame have in all: those that the source has, for what it may come to have keeps no
+/// memory from others. Of a kind not among the known: by element type and fewest channels, which is exact for
 /// all but samples and phasors.
 std::uint64_t bytesOf(const Selection& selection, const CameraInfo& camera,
                       const std::vector<PlaneKind>& planes, const PixelBytes& known);

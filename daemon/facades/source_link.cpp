@@ -4,6 +4,8 @@
 #include <chrono>
 #include <utility>
 
+#include "drivers/logging.h"
+
 namespace toftwin::daemon {
 namespace {
 
@@ -69,9 +71,21 @@ void SourceLink::subscribe() {
   auto host = hub_.find(wants_.source);
   if (!host) return tryAgain();
   auto subscribed = subscribeTo(**host);
-  if (!subscribed) return tryAgain();
+  if (!subscribed) {
+    noteRefused(subscribed.error());
+    return tryAgain();
+  }
+  refused_.clear();
   host_ = *std::move(host);
   subscriber_ = *std::move(subscribed);
+}
+
+/// Said once, though it is tried several times a second. A source that is not there tells the log itself.
+void SourceLink::noteRefused(const Error& why) {
+  using Code = Error::Code;
+  if (why.code == Code::Disconnected || why.code == Code::Stopped || why.message == refused_) return;
+  refused_ = why.message;
+  logging::warn("a facade of {} gets no frames, and tries again: {}", wants_.source, refused_);
 }
 
 Result<SubscriberPtr> SourceLink::subscribeTo(SourceHost& host) {

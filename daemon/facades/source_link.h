@@ -44,6 +44,7 @@ class SourceLink {
  private:
   void subscribe();
   Result<SubscriberPtr> subscribeTo(SourceHost& host);
+  void noteRefused(const Error& why);
   void unsubscribe();
   void tryAgain();
   void takeAll();
@@ -57,6 +58,7 @@ class SourceLink {
   bool is_wanted_ = false;
   std::shared_ptr<SourceHost> host_;  // shared with the hub, which may let go of it first
   SubscriberPtr subscriber_;
+  std::string refused_;  ///< why, as the log has it; empty once there was a subscription
   /// Shared with handlers that are posted and may come when this is gone.
   const std::shared_ptr<bool> is_alive_ = std::make_shared<bool>(true);
 };

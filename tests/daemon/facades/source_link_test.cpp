@@ -7,6 +7,7 @@
 #include <mutex>
 #include <utility>
 
+#include "../../kept_log.h"
 #include "../fakes.h"
 
 namespace toftwin::daemon {
@@ -74,6 +75,32 @@ TEST_F(LinkedSource, GivesTheFirstFrameAfterAnothersChangeWithThePlaneThatItBrou
   ASSERT_TRUE(set(0).ok());
   remote_->give();
   EXPECT_EQ(planesOf(3), without);
+}
+
+TEST(SourceLink, ThatThereIsNoMemoryForItsFramesIsSaidOnceAndTriedAgain) {
+  const auto log = std::make_shared<toftwin::test::KeptLog>();  // shared with spdlog
+  const toftwin::test::LoggingTo kept{log};
+  const test::FakeClock clock;
+  const auto remote = std::make_shared<Remote>();  // shared with its source
+  Hub hub{{.recording_folder = {}, .recording = {}, .total_bytes = 1}, clock};
+  const auto host = std::make_shared<SourceHost>("cam", test::opener(remote), test::opener(remote)(),
+                                                 SourceHost::Options{}, clock);
+  hub.add(host);
+  EventThread thread{"test"};
+  SourceLink link{thread, hub, {.source = "cam", .planes = {PlaneKind::Range}}, [](const Frame&) {}};
+  thread.start();
+  std::promise<void> was_tried;
+  thread.door()->post([&] {
+    link.want(true);
+    link.want(false);
+    link.want(true);
+    was_tried.set_value();
+  });
+  was_tried.get_future().wait();
+  EXPECT_EQ(log->count("a facade of cam gets no frames, and tries again: "), 1);
+  hub.setOptions({});
+  EXPECT_TRUE(remote->asked.reaches(1));
+  thread.stop();
 }
 
 }  // namespace
