@@ -45,6 +45,10 @@ int check(const Arguments& arguments) {
                source.opened ? (*source.opened)->info().model
                              : "not there now: " + source.opened.error().message);
   }
+  for (const auto& facade : config->facades) {
+    fmt::print("facade {} of {}: {}\n", facade.keys.kind, facade.keys.source,
+               facade.start ? "good" : "not there: " + facade.not_built);
+  }
   if (config->sources.empty()) {
     fmt::print("{} is good, but has no [[source]]: clients would see nothing\n", arguments.config);
     return kOk;

@@ -12,6 +12,7 @@
 #include <cstdlib>
 #include <fstream>
 
+#include "daemon/facades/facades.h"
 #include "daemon/server.h"
 #include "running_daemon.h"
 
@@ -42,6 +43,20 @@ TEST_F(RunningDaemon, AReloadKeepsWhatIsAsBeforeAndChangesTheRest) {
   EXPECT_EQ(client.describe("other")->camera.width, 64);
   ASSERT_TRUE(client.trigger("cam").ok());
   EXPECT_EQ(kept->next(kSoon)->sequence, 1u) << "the source that was kept began anew";
+}
+
+TEST_F(RunningDaemon, AFacadeThatThisBuildLacksIsToldInTheLog) {
+  boost::asio::io_context io;
+  Hub hub{Hub::Options{}, clock_};
+  Facades facades{io, hub, clock_};
+  facades.apply({{.keys = {.kind = "telegraph", .source = "cam"},
+                  .fingerprint = "",
+                  .start = {},
+                  .not_built = "d.toml:5: it was not built: install libmorse-dev"}});
+  EXPECT_EQ(log_->count("facade telegraph of cam is not there: d.toml:5: it was not built: install libmorse-dev"),
+            1);
+  io.run();  // ends at once: nothing is tried again
+  EXPECT_EQ(log_->count("telegraph"), 1);
 }
 
 TEST_F(RunningDaemon, ASecondSignalIsNotCaughtWhileItStops) {

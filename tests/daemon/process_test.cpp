@@ -362,6 +362,10 @@ TEST_F(Toftwind, CheckSaysWhetherTheConfigurationIsGood) {
   EXPECT_EQ(good.wait(), 0);
   EXPECT_THAT(good.said(), HasSubstr("cam: toftwin test pattern"));
   EXPECT_THAT(good.said(), HasSubstr("is good: 1 source\n"));
+  configure(kPattern + "[[facade]]\nkind = 'o3d303'\nsource = 'cam'\n");
+  Process facade{{"--check", "--config", path("d.toml")}, path("facade")};
+  EXPECT_EQ(facade.wait(), 0);
+  EXPECT_THAT(facade.said(), HasSubstr("facade o3d303 of cam: good\n"));
   configure("");
   Process empty{{"--check", "--config", path("d.toml")}, path("empty")};
   EXPECT_EQ(empty.wait(), 0);

@@ -2,8 +2,6 @@
 #pragma once
 
 #include <gtest/gtest.h>
-#include <spdlog/sinks/base_sink.h>
-#include <spdlog/spdlog.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 
@@ -21,6 +19,7 @@
 
 #include <toftwin/client.h>
 
+#include "../kept_log.h"
 #include "daemon/daemon.h"
 #include "fakes.h"
 #include "protocol/transport/memfd.h"
@@ -31,37 +30,10 @@ namespace toftwin::daemon::test {
 
 inline constexpr std::chrono::seconds kSoon{30};  // only a broken daemon needs that long
 
-/// Keeps what the daemon logs.
-class Log final : public spdlog::sinks::base_sink<std::mutex> {
- public:
-  Counter lines;
-  int count(const std::string& part) {
-    const std::scoped_lock lock{mutex_};
-    return static_cast<int>(std::ranges::count_if(
-        texts_, [&](const std::string& text) { return text.find(part) != std::string::npos; }));
-  }
-  /// Waits until so many lines with that part were logged.
-  bool waitFor(const std::string& part, int wanted) {
-    for (int seen = lines.count(); count(part) < wanted; seen = lines.count()) {
-      if (!lines.reaches(seen + 1)) return false;
-    }
-    return true;
-  }
-
- private:
-  void sink_it_(const spdlog::details::log_msg& message) override {
-    texts_.emplace_back(message.payload.begin(), message.payload.end());
-    lines.add();
-  }
-  void flush_() override {}
-  std::vector<std::string> texts_;
-};
-
 /// A folder of its own for a test, and a daemon in it.
 class RunningDaemon : public testing::Test {
  protected:
   void SetUp() override {
-    spdlog::set_default_logger(std::make_shared<spdlog::logger>("test", log_));
     std::string pattern = testing::TempDir() + "toftwindXXXXXX";
     ASSERT_NE(::mkdtemp(pattern.data()), nullptr);
     folder_ = pattern;
@@ -99,7 +71,9 @@ class RunningDaemon : public testing::Test {
   }
 
   FakeClock clock_;  // for the test that wants it; outlives the daemon
-  std::shared_ptr<Log> log_ = std::make_shared<Log>();  // shared with spdlog
+  std::shared_ptr<toftwin::test::KeptLog> log_ =
+      std::make_shared<toftwin::test::KeptLog>();  // shared with spdlog
+  toftwin::test::LoggingTo logging_{log_};
   std::filesystem::path folder_;
   std::unique_ptr<Daemon> daemon_;
   std::thread thread_;
