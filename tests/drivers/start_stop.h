@@ -7,11 +7,13 @@
 #include <malloc.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
 #include <iterator>
 #include <string_view>
+#include <thread>
 
 #include "drivers/source.h"
 
@@ -19,6 +21,14 @@ namespace toftwin::test {
 
 inline std::ptrdiff_t entriesOf(const char* folder) {
   return std::distance(std::filesystem::directory_iterator{folder}, {});
+}
+
+/// Whether a folder has so many, soon: the other side of a connection closes its end when it comes to it.
+inline bool comesTo(const char* folder, std::ptrdiff_t entries) {
+  const auto soon = std::chrono::steady_clock::now() + std::chrono::seconds{10};
+  while (entriesOf(folder) != entries && std::chrono::steady_clock::now() < soon)
+    std::this_thread::sleep_for(std::chrono::milliseconds{10});
+  return entriesOf(folder) == entries;
 }
 
 /// What this process holds.
