@@ -38,7 +38,8 @@ Curve curveThrough(const NamedRows& rows, std::size_t camera, bool log_x) {
 }
 
 /// Rows of A and B at the same condition, at A's x; without conditions B's rows and A's curve.
-std::optional<Panel> panelBelow(const NamedRows& a, const NamedRows& b, bool is_ratio) {
+std::optional<Panel> panelBelow(const NamedRows& a, const NamedRows& b, const FigureWords& words) {
+  const bool is_ratio = words.log_y;
   std::vector<double> x, rest;
   const auto add = [&](double at, double of_a, double of_b) {
     x.push_back(at), rest.push_back(is_ratio ? of_b / of_a : of_b - of_a);
@@ -55,7 +56,9 @@ std::optional<Panel> panelBelow(const NamedRows& a, const NamedRows& b, bool is_
   }
   if (x.size() < kFewestDrawn) return std::nullopt;
   const std::string left = is_ratio ? "B / A" : by_curve ? "B − A's curve" : "B − A";
-  return restPanel(is_ratio ? left : left + " [mm]", x, rest, is_ratio ? Rest::Ratio : Rest::Difference);
+  const bool has_unit = !is_ratio && !words.rest_unit.empty();
+  return restPanel(has_unit ? fmt::format("{} [{}]", left, words.rest_unit) : left, x, rest,
+                   is_ratio ? Rest::Ratio : Rest::Difference);
 }
 
 }  // namespace
@@ -84,7 +87,7 @@ std::optional<Figure> fittedFigure(const NamedTraits& traits, const std::string&
     if (rows[camera] != nullptr && rows[camera]->curve.at)
       plot.curves.push_back(curveThrough(*rows[camera], camera, words.log_x));
   }
-  if (rows[0] != nullptr && rows[1] != nullptr) plot.below = panelBelow(*rows[0], *rows[1], words.log_y);
+  if (rows[0] != nullptr && rows[1] != nullptr) plot.below = panelBelow(*rows[0], *rows[1], words);
   return Figure{words.caption, toSvg(plot)};
 }
 

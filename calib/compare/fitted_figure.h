@@ -14,6 +14,7 @@ struct FigureWords {
   std::string title{}, caption{}, x_label{}, y_label{};
   bool log_x = false, log_y = false;  ///< log_y: below are ratios
   bool compact = true;
+  std::string rest_unit = "mm";  ///< of the rows, for what is left; empty: not said
 };
 
 /// The rows of a characteristic, of A and B beside each other, with the curves that were fitted to them, and

@@ -88,13 +88,21 @@ NamedRows rowsOf(const TableColumns& table, const char* of) {
   return rows;
 }
 
-/// Rows are of the same condition where both tables have the same x, row by row.
-void pairRows(NamedTraits& traits) {
-  if (traits.rows.size() != 2 || traits.rows[0].x != traits.rows[1].x) return;
+/// Rows are of the same condition where both tables have the same x, row by row; a row's number is no condition.
+void pairRows(NamedTraits& traits, const TableKind& kind) {
+  if (kind.columns.size() < 2 || traits.rows.size() != 2 || traits.rows[0].x != traits.rows[1].x) return;
   for (NamedRows& rows : traits.rows) {
     rows.condition.resize(rows.x.size());
     std::iota(rows.condition.begin(), rows.condition.end(), std::size_t{0});
   }
+}
+
+/// "mm" of "error_mm"; of others empty.
+std::string unitIn(std::string_view column) {
+  for (const char* unit : {"mm", "m", "s"}) {
+    if (column.ends_with(fmt::format("_{}", unit))) return unit;
+  }
+  return {};
 }
 
 Figure figureOf(const NamedTraits& traits, const TableKind& kind) {
@@ -106,7 +114,8 @@ Figure figureOf(const NamedTraits& traits, const TableKind& kind) {
                               .y_label = kind.columns[has_two ? 1 : 0],
                               .log_x = is_law,
                               .log_y = is_law,
-                              .compact = false});
+                              .compact = false,
+                              .rest_unit = unitIn(kind.columns[has_two ? 1 : 0])});
   return figure.value_or(Figure{"Too few rows to draw."});
 }
 
@@ -207,7 +216,7 @@ Result<Report> judgeTables(const std::vector<TableJob>& jobs) {
   }
   if (kind == nullptr) return Error{Error::Code::InvalidArgument, "no table is named"};
   NamedTraits traits = std::move(all).found();
-  pairRows(traits);
+  pairRows(traits, *kind);
   if (traits.traits.empty())
     return Error{Error::Code::InvalidArgument, fmt::format("{}", fmt::join(traits.untold, "; "))};
   const auto verdicts = verdictsOf(traits);

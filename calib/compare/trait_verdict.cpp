@@ -134,7 +134,7 @@ std::pair<TableBlock, TableBlock> verdictTables(const std::vector<TraitVerdict>&
   const auto differs = [](const TraitVerdict& one) { return one.isTold() && one.differs(); };
   const auto first_same = std::ranges::find_if_not(all, differs);  // those that differ come first
   auto differ = verdictTable({all.begin(), first_same}), rest = verdictTable({first_same, all.end()});
-  rest.caption = "The other numbers: B is the same as A within the noise floor, or it is not told";
+  if (!differ.rows.empty()) rest.caption = "The other numbers: B is the same as A within the noise floor, or it is not told";
   return {std::move(differ), std::move(rest)};
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 
 #include <fmt/format.h>
 
@@ -15,6 +16,7 @@ namespace {
 using compare::NamedRows;
 using compare::TraitCollector;
 constexpr std::array kCameras{"A", "B"};
+constexpr const char* kPattern = "fixed pattern";
 
 /// A number of the frames' noise by its name; nothing where it is none: a pattern too weak to be told from
 /// the noise left in the means.
@@ -22,6 +24,21 @@ std::optional<double> noiseOf(const ComparedCapture& one, std::size_t camera, st
   const auto& noise = one.seen[camera].noise;
   const auto found = std::ranges::find(noise, name, &compare::Trait::name);
   return found == noise.end() || !(found->value > 0.0) ? std::nullopt : std::optional{found->value};
+}
+
+/// Captures without other light, which makes noise of its own, of which both cameras tell this noise: a law's numbers
+/// are those at the largest signal, which must be the same for both. Where the other camera tells none at all, those of
+/// this one.
+std::vector<const ComparedCapture*> toldBy(const ComparedRun& run, std::size_t camera, std::string_view name,
+                                           std::string_view kind = {}) {
+  std::vector<const ComparedCapture*> own, both;
+  for (const ComparedCapture& one : run.captures) {
+    if (one.record.ambient_klx > 0.0 || (!kind.empty() && one.record.kind != kind) || !noiseOf(one, camera, name))
+      continue;
+    own.push_back(&one);
+    if (noiseOf(one, 1 - camera, name)) both.push_back(&one);
+  }
+  return both.empty() ? own : both;
 }
 
 /// The noise at the capture whose wall is nearest to the middle of the others'.
@@ -58,15 +75,24 @@ Result<compare::FittedTraits> fittedOverDistance(const NamedRows& rows) {
   return fitted;
 }
 
+/// Light is 1/d² at one exposure only.
+void keepMostCommonExposure(std::vector<const ComparedCapture*>& captures) {
+  std::map<double, int> count;
+  for (const ComparedCapture* one : captures) ++count[one->record.exposure_us];
+  const auto most = std::ranges::max_element(count, {}, &std::pair<const double, int>::second);
+  std::erase_if(captures, [&](const ComparedCapture* one) { return one->record.exposure_us != most->first; });
+}
+
 void addOverDistance(const ComparedRun& run, std::size_t camera, TraitCollector& all) {
   for (const auto& [what, name] :
-       {std::pair{kNoiseOverDistance, "temporal noise"}, std::pair{kPatternOverDistance, "fixed pattern"}}) {
+       {std::pair{kNoiseOverDistance, "temporal noise"}, std::pair{kPatternOverDistance, kPattern}}) {
     NamedRows rows{what, kCameras[camera]};
-    for (const ComparedCapture& one : run.captures) {
-      const auto noise = noiseOf(one, camera, name);
-      if (one.record.kind != "distance" || !noise || !(one.record.distance_m > 0.0)) continue;
-      rows.x.push_back(one.record.distance_m), rows.y.push_back(*noise);
-      rows.condition.push_back(one.record.number);
+    auto captures = toldBy(run, camera, name, "distance");
+    keepMostCommonExposure(captures);
+    for (const ComparedCapture* one : captures) {
+      if (!(one->record.distance_m > 0.0)) continue;
+      rows.x.push_back(one->record.distance_m), rows.y.push_back(*noiseOf(*one, camera, name));
+      rows.condition.push_back(one->record.number);
     }
     if (rows.x.empty()) continue;  // said of the noise of frames
     const auto fitted = fittedOverDistance(rows);
@@ -90,11 +116,11 @@ void addLaw(NamedRows rows, TraitCollector& all) {
 /// Of the wall's middle, where the pattern is told.
 void addPatternOverAmplitude(const ComparedRun& run, std::size_t camera, TraitCollector& all) {
   NamedRows rows{kPatternOverAmplitude, kCameras[camera]};
-  for (const ComparedCapture& one : run.captures) {
-    const auto pattern = noiseOf(one, camera, "fixed pattern");
-    const double amplitude = compare::summarise(one.seen[camera].brightness).mean;
-    if (!pattern || !(amplitude > 0.0)) continue;
-    rows.x.push_back(amplitude), rows.y.push_back(*pattern), rows.condition.push_back(one.record.number);
+  for (const ComparedCapture* one : toldBy(run, camera, kPattern)) {
+    const double amplitude = compare::summarise(one->seen[camera].brightness).mean;
+    if (!(amplitude > 0.0)) continue;
+    rows.x.push_back(amplitude), rows.y.push_back(*noiseOf(*one, camera, kPattern));
+    rows.condition.push_back(one->record.number);
   }
   if (!rows.x.empty()) addLaw(std::move(rows), all);
 }

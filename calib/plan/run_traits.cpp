@@ -122,13 +122,16 @@ struct OverDistance {
 
   void add(std::size_t number, const std::vector<double>& at_m, const std::vector<double>& of_mm) {
     constexpr double kStep_m = 0.025;
+    constexpr double kFewest = 0.01;  // of all pixels: fewer are beside the wall, or wrapped
+    double all = 0.0;
     std::map<long, std::pair<compare::Running, compare::Running>> steps;  // ranges are positive
     for (std::size_t i = 0; i < at_m.size(); ++i) {
       if (!std::isfinite(of_mm[i]) || !std::isfinite(at_m[i])) continue;
       auto& [at, of] = steps[std::lround(at_m[i] / kStep_m)];
-      at.add(at_m[i]), of.add(of_mm[i]);
+      at.add(at_m[i]), of.add(of_mm[i]), ++all;
     }
     for (const auto& [step, means] : steps) {
+      if (static_cast<double>(means.first.n()) < kFewest * all) continue;
       distance_m.push_back(means.first.mean()), error_mm.push_back(means.second.mean());
       capture.push_back(number), condition.push_back(kMostSteps * number + static_cast<std::size_t>(step));
     }

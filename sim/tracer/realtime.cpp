@@ -322,6 +322,8 @@ void RealtimeTracer::Impl::storeWithSpread(const Part& at, const IndirectLight::
 void RealtimeTracer::Impl::makeFrame(const Scene& scene, const TraceRequest& request) {
   resize(request);
   const TraceRequest direct = directOnly(request, 1);
+  // Indirect light is added to all pixels, so that none may keep what was refined for another frame.
+  if (request.max_surfaces != 1) kept.forgetImages();
   traceDirect(Tracing{scene.impl(), direct, nullptr, channels.orders()}, request.max_surfaces == 1);
   refineJumps(scene, request);
   if (request.max_surfaces == 1) return;

@@ -6,7 +6,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <random>
+#include <regex>
+#include <string>
 
 #include "calib/compare/fitted_figure.h"
 
@@ -89,7 +92,11 @@ NamedTraits rowsOf(std::vector<std::size_t> of_a, std::vector<std::size_t> of_b)
 TEST(FittedFigure, PairsRowsOfTheSameCondition) {
   const auto paired = fittedFigure(rowsOf({1, 2, 3, 4}, {4, 3, 2, 1}), "drift", {.title = "d"});
   ASSERT_TRUE(paired);
-  // All four are 0.5: one height.
+  // All four are +0.5, so that the lower axis is about it: pairs by the row's number would be 3.5, 1.5, −0.5 and −2.5.
+  std::map<std::string, int> heights;
+  const std::regex dot{"<circle[^>]*cy='([0-9.]+)'"};
+  for (std::sregex_iterator at{paired->svg.begin(), paired->svg.end(), dot}, end; at != end; ++at) ++heights[(*at)[1]];
+  EXPECT_TRUE(std::ranges::any_of(heights, [](const auto& one) { return one.second >= 4; }));
   EXPECT_EQ(count(paired->svg, "<circle"), 4 + 4 + 4 + 2 * 3) << "and two in each of three legends";
   const auto others = fittedFigure(rowsOf({1, 2, 3, 4}, {5, 6, 7, 8}), "drift", {.title = "d"});
   ASSERT_TRUE(others);

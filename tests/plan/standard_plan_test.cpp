@@ -156,6 +156,7 @@ TEST_F(StandardPlan, TellsEveryCharacteristicOfBothCameras) {
              lag = page.find("left behind</td><td>differs, ");
   EXPECT_LT(verdicts, page.find("Drift of A and of B while warming up"));
   EXPECT_LT(page.find("Drift of A and of B while warming up"), page.find("B − A by block"));
+  ASSERT_NE(page.find("The other numbers: B is the same as A"), std::string::npos);
   EXPECT_LT(page.find("B − A by block"), page.find("The other numbers: B is the same as A"));
   for (const char* drawn :
        {"Error over distance", "Temporal noise over amplitude", "Temporal noise over distance",

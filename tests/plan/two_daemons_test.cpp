@@ -115,7 +115,7 @@ TEST_F(TwoDaemons, SayWhichOneLacksTheSourceOrIsGone) {
   const Ran swapped =
       run("compare twin cam --poses " + path("poses.toml") + " --no-data -o " + path("r") + both());
   EXPECT_NE(swapped.status, 0);
-  EXPECT_THAT(swapped.err, HasSubstr("twin"));
+  EXPECT_THAT(swapped.err, HasSubstr("no source \"twin\""));
   other_->end(SIGTERM);
   const Ran gone =
       run("compare cam twin --poses " + path("poses.toml") + " --no-data -o " + path("r") + both());

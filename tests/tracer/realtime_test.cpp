@@ -150,7 +150,9 @@ TEST(Realtime, IsTheSameWhateverWasAskedForInBetween) {
   TraceRequest centres = direct, other = direct;
   centres.pixel_extent = 0.0;
   other.frequencies = {16_MHz};
-  RealtimeTracer whole_alone, mixed;
+  TraceRequest whole_of_centres = whole;
+  whole_of_centres.pixel_extent = 0.0;
+  RealtimeTracer whole_alone, mixed, centres_alone, refined_before;
   for (const Duration time : {0_ms, 33_ms, 66_ms}) {
     const Scene scene = moving.at(time);
     RealtimeTracer anew;
@@ -163,6 +165,9 @@ TEST(Realtime, IsTheSameWhateverWasAskedForInBetween) {
     EXPECT_EQ(c.ambient, d.ambient);
     EXPECT_EQ(c.phasors, d.phasors);
     EXPECT_EQ(c.variance, d.variance);
+    refined_before.next(scene, direct);
+    EXPECT_EQ(refined_before.next(scene, whole_of_centres).phasors,
+              centres_alone.next(scene, whole_of_centres).phasors);
     mixed.next(scene, direct);
     RealtimeTracer of_centres, of_other;
     EXPECT_EQ(mixed.next(scene, centres).phasors, of_centres.next(scene, centres).phasors);
