@@ -349,6 +349,8 @@ TEST(O3d303, TenThousandStartsAndStopsLeakNeitherFilesNorThreadsNorMemory) {
 
 TEST(O3d303, OpeningAndClosingLeaksNeitherFilesNorThreads) {
   EmulatedO3d303 camera{fast()};
+  ASSERT_NE(started(camera), nullptr);  // what the process opens once
+  waitForConnections(camera, 0);
   const auto files = test::entriesOf("/proc/self/fd"), threads = test::entriesOf("/proc/self/task");
   for (int i = 0; i < 50; ++i) ASSERT_NE(started(camera), nullptr);
   waitForConnections(camera, 0);
