@@ -14,7 +14,7 @@ inline constexpr const char* kReportStyle = R"css(
 --good:#4fd1a5;--fair:#e6b04c;--bad:#ff8a80;--neutral:#aab8c6;--hatch:#2a2d31}}
 *{box-sizing:border-box}
 body{margin:0;background:var(--page);color:var(--ink);font:16px/1.5 system-ui,-apple-system,"Segoe UI",Roboto,"DejaVu Sans",sans-serif}
-main{max-width:960px;margin:0 auto;padding:28px 20px 60px}
+main{max-width:1120px;margin:0 auto;padding:28px 20px 60px}
 h1{font-size:1.75rem;line-height:1.2;margin:0 0 4px}
 h2{font-size:1.3rem;margin:0 0 8px;line-height:1.25}
 .subtitle{color:var(--soft);margin:0 0 16px}
@@ -23,7 +23,7 @@ h2{font-size:1.3rem;margin:0 0 8px;line-height:1.25}
 .verdict.good,.finding.good{border-left-color:var(--good)}
 .verdict.fair,.finding.fair{border-left-color:var(--fair)}
 .verdict.bad,.finding.bad{border-left-color:var(--bad)}
-.cards{display:grid;grid-template-columns:repeat(auto-fill,minmax(200px,1fr));gap:12px;margin-bottom:18px}
+.cards{display:grid;grid-template-columns:repeat(auto-fill,minmax(240px,1fr));gap:12px;margin-bottom:18px}
 .card{background:var(--panel);border:1px solid var(--line);border-top:4px solid var(--neutral);border-radius:6px;padding:10px 14px}
 .card.good{border-top-color:var(--good)}.card.fair{border-top-color:var(--fair)}.card.bad{border-top-color:var(--bad)}
 .cardlabel{font-size:.86rem;color:var(--soft)}
