@@ -97,16 +97,9 @@ void pairRows(NamedTraits& traits, const TableKind& kind) {
   }
 }
 
-/// "mm" of "error_mm"; of others empty.
-std::string unitIn(std::string_view column) {
-  for (const char* unit : {"mm", "m", "s"}) {
-    if (column.ends_with(fmt::format("_{}", unit))) return unit;
-  }
-  return {};
-}
-
 Figure figureOf(const NamedTraits& traits, const TableKind& kind) {
   const bool has_two = kind.columns.size() > 1, is_law = std::string_view{kind.name} == "noise_law";
+  const Unit* unit = unitOf(kind.columns[has_two ? 1 : 0]);
   auto figure = fittedFigure(traits, kind.name,
                              {.title = kind.tells,
                               .caption = "The tables' rows, and what was fitted to them.",
@@ -115,7 +108,7 @@ Figure figureOf(const NamedTraits& traits, const TableKind& kind) {
                               .log_x = is_law,
                               .log_y = is_law,
                               .compact = false,
-                              .rest_unit = unitIn(kind.columns[has_two ? 1 : 0])});
+                              .rest_unit = std::string{unit == nullptr ? "" : unit->suffix.substr(1)}});
   return figure.value_or(Figure{"Too few rows to draw."});
 }
 

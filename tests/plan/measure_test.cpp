@@ -20,6 +20,7 @@
 #include "calib/plan/run_index.h"
 #include "calib/plan/run_log.h"
 #include "protocol/record/recording.h"
+#include "tests/plan/tiny_camera.h"
 #include "tests/tools/with_daemon.h"
 
 extern char** environ;
@@ -31,31 +32,8 @@ using plan::CaptureRecord;
 using testing::HasSubstr;
 using testing::Not;
 
-constexpr const char* kCamera = R"(model = "Tiny {0}"
-[lens]
-width = 24
-height = 18
-fx = 60.0
-fy = 60.0
-cx = 11.5
-cy = 8.5
-[[emitter]]
-power_w = 2000.0
-[[modulation]]
-frequency_mhz = 20.0
-exposure_us = 1000.0
-[sampling]
-steps = 4
-[decoder]
-algorithm = "n_phase"
-nearest_m = 0.1
-farthest_m = 7.4
-[[effect]]
-type = "shot_noise"
-[[effect]]
-type = "delay"
-offset_mm = {1:.1f}
-[[effect]]
+/// Beside what the tiny camera has.
+constexpr const char* kWarmUp = R"([[effect]]
 type = "warm_up"
 )";
 
@@ -100,7 +78,7 @@ class Measure : public WithDaemon {
   std::string moreSources() const override {
     std::string all;
     for (const auto& [name, seed, offset_mm] : {std::tuple{"cam", 1, 10.0}, {"twin", 2, 0.0}}) {
-      write(fmt::format("{}.toml", name), fmt::format(kCamera, name, offset_mm));
+      write(fmt::format("{}.toml", name), fmt::format(kTinyCamera, name, offset_mm) + kWarmUp);
       for (const char* block : {"", ".dark-wall"}) {
         all += fmt::format(
             "[[source]]\nname = '{0}{1}'\ndriver = 'sim'\ncamera = '{0}.toml'\nscene = 'wall{1}.toml'\n"

@@ -8,6 +8,7 @@
 
 #include "calib/compare/json_parse.h"
 #include "calib/plan/run_index.h"
+#include "tests/plan/tiny_camera.h"
 #include "tests/tools/with_daemon.h"
 
 namespace toftwin::cli {
@@ -15,32 +16,6 @@ namespace {
 
 using testing::HasSubstr;
 
-/// {0}: name, {1}: what it reads too far, mm.
-constexpr const char* kCameraOfOne = R"(model = "Tiny {0}"
-[lens]
-width = 24
-height = 18
-fx = 60.0
-fy = 60.0
-cx = 11.5
-cy = 8.5
-[[emitter]]
-power_w = 2000.0
-[[modulation]]
-frequency_mhz = 20.0
-exposure_us = 1000.0
-[sampling]
-steps = 4
-[decoder]
-algorithm = "n_phase"
-nearest_m = 0.1
-farthest_m = 7.4
-[[effect]]
-type = "shot_noise"
-[[effect]]
-type = "delay"
-offset_mm = {1:.1f}
-)";
 constexpr double kOffset_mm = 10.0;
 
 class TwoDaemons : public WithDaemon {
@@ -62,7 +37,7 @@ class TwoDaemons : public WithDaemon {
         << "toftwind did not start";
   }
   std::string source(const std::string& name, int seed, double offset_mm) const {
-    write(name + ".toml", fmt::format(kCameraOfOne, name, offset_mm));
+    write(name + ".toml", fmt::format(kTinyCamera, name, offset_mm));
     return fmt::format(
         "[[source]]\nname = '{0}'\ndriver = 'sim'\ncamera = '{0}.toml'\nscene = 'wall.toml'\nmax_surfaces = "
         "1\n"
