@@ -6,6 +6,8 @@
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/local/stream_protocol.hpp>
 
+#include <array>
+#include <cstdint>
 #include <optional>
 #include <string>
 
@@ -50,22 +52,31 @@ Result<transport::Socket> dialUnix(asio::io_context& io, const transport::UnixAd
   return transport::Socket{std::move(socket)};
 }
 
+/// What "localhost" always means (RFC 6761, 6.3), also where no hosts file says so.
+std::array<asio::ip::tcp::endpoint, 2> loopback(std::uint16_t port) {
+  return {asio::ip::tcp::endpoint{asio::ip::address_v4::loopback(), port},
+          asio::ip::tcp::endpoint{asio::ip::address_v6::loopback(), port}};
+}
+
 Result<transport::Socket> dialTcp(asio::io_context& io, const transport::TcpAddress& address,
                                   std::chrono::milliseconds timeout) {
   std::optional<error_code> outcome;
   asio::ip::tcp::socket socket{io};
   asio::ip::tcp::resolver resolver{io};
-  resolver.async_resolve(
-      address.host, std::to_string(address.port),
-      [&](error_code fault, const asio::ip::tcp::resolver::results_type& endpoints) {
-        if (fault) {
-          outcome = fault;
-          return;
-        }
-        asio::async_connect(
-            socket, endpoints,
-            [&](error_code result, const asio::ip::tcp::endpoint&) { outcome = result; });
-      });
+  const auto connect = [&](const auto& endpoints) {
+    asio::async_connect(socket, endpoints,
+                        [&](error_code result, const asio::ip::tcp::endpoint&) { outcome = result; });
+  };
+  resolver.async_resolve(address.host, std::to_string(address.port),
+                         [&](error_code fault, const asio::ip::tcp::resolver::results_type& endpoints) {
+                           if (!fault) {
+                             connect(endpoints);
+                           } else if (address.host == "localhost") {
+                             connect(loopback(address.port));
+                           } else {
+                             outcome = fault;
+                           }
+                         });
   const bool in_time = waitFor(io, outcome, timeout);
   if (!in_time) {  // the handlers refer to this function's variables: let them finish
     resolver.cancel();

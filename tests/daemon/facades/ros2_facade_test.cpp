@@ -13,6 +13,8 @@
 #include <limits>
 #include <map>
 #include <random>
+#include <set>
+#include <thread>
 
 #include "gige_vision_testing.h"
 #include "ros2_testing.h"
@@ -51,23 +53,31 @@ TEST_F(Ros2Facade, APoseThatIsSentIsWhereTheNextFrameIsFrom) {
   const auto send = [&](const std::array<double, 7>& numbers, const std::string& frame = "world") {
     ASSERT_TRUE(poses->write(&poseMessage(numbers, frame).bytes()));
   };
-  send({0, 0, 0, 0, 0, 0, std::nan("")});
-  ASSERT_TRUE(log_->waitFor("unit quaternion", 1));
+  // Again and again: a reader that this writer knows may not know the writer yet.
+  ASSERT_TRUE(eventually([&] {
+    send({0, 0, 0, 0, 0, 0, std::nan("")});
+    std::this_thread::sleep_for(std::chrono::milliseconds{50});
+    return log_->count("unit quaternion") > 0;
+  }));
   send({1e300, 0, 0, 0.9, 0, 0, 0.9});
   ASSERT_TRUE(log_->waitFor("1e+300", 1));
   send({0, 0, 0, 0, 0, 0, 1}, "map");
   ASSERT_TRUE(log_->waitFor("not in \"world\"", 1));
   const std::int64_t sent_ns = wallNow();
-  send({0.25, -0.125, -0.5, 0.0, 0.6, 0.0, 0.8});
-  const auto frame = stream->next(kSoon);
-  ASSERT_TRUE(frame.ok()) << frame.error().message;
   const Transform<World, Camera> expected{{0.8, 0.0, 0.6, 0.0}, {0.25, -0.125, -0.5}};
-  ASSERT_TRUE(frame->moment.world_from_camera);
-  EXPECT_EQ(*frame->moment.world_from_camera, expected);
+  std::set<std::int64_t> frame_times;
+  const auto isImageHere = [&] {
+    send({0.25, -0.125, -0.5, 0.0, 0.6, 0.0, 0.8});
+    const auto frame = stream->next(kSoon);
+    EXPECT_TRUE(frame.ok() && frame->moment.world_from_camera == expected);
+    if (frame.ok()) frame_times.insert(rosTimeOf(*frame));
+    return images->wait_for_unread_message({1, 0});
+  };
+  ASSERT_TRUE(eventually(isImageHere));  // likewise
   const auto image = nextOf(images);
   ASSERT_TRUE(image);
   CdrReader cdr{*image};
-  EXPECT_EQ(readHeader(cdr), rosTimeOf(*frame));
+  EXPECT_THAT(frame_times, testing::Contains(readHeader(cdr)));
   ReadTransform seen{};
   do {
     auto message = nextOf(transforms);
@@ -76,7 +86,7 @@ TEST_F(Ros2Facade, APoseThatIsSentIsWhereTheNextFrameIsFrom) {
   } while (seen.numbers != numbersOf(expected));
   EXPECT_EQ(seen.child, "cam_optical_frame");
   // The frame's time; or, where the frame is slow, when the pose was set, which is told before it.
-  EXPECT_THAT(seen.stamp_ns, AnyOf(rosTimeOf(*frame), AllOf(Ge(sent_ns), Le(wallNow()))));
+  EXPECT_THAT(seen.stamp_ns, AnyOf(*frame_times.begin(), AllOf(Ge(sent_ns), Le(wallNow()))));
 }
 
 TEST_F(Ros2Facade, AReaderThatComesLateGetsTheStaticTransform) {
