@@ -21,9 +21,11 @@ import time
 
 STOP_M = 0.45            # the lens stands so far before the pallet's front when it is docked
 BAND_M = (-0.225, -0.13)  # of the blocks' fronts above the lens, without the floor and the deck
-WIDTH_M, GAP_M = 0.8, 0.28  # of the pallet; wider than its pockets
-ON_LINE_M = 0.015
+WIDTH_M, BLOCK_M, GAP_M = 0.8, 0.145, 0.28  # of the pallet, of its widest block, wider than its pockets
+ON_LINE_M = 0.012        # three times the noise of a point
+BORDER_PX = 3            # an end so near to the image's is none: the pallet goes on outside
 STEP_S, SPEED_M_S, TURN_RAD_S = 0.2, 0.35, 0.5
+CLOSE_M = 0.001          # so near to where it shall stop the robot stays
 TRUST = 0.2              # in a single look, against what the wheels say
 
 
@@ -46,7 +48,7 @@ class Camera:
         self.line = socket.create_connection((host, port), timeout=30)
 
     def frame(self):
-        """Points in metres, x ahead, y to the left, z up: a list of (x, y, z) of valid pixels."""
+        """Points in metres, x ahead, y to the left, z up: (x, y, z, columns to the image's border) of valid pixels."""
         self.line.sendall(b"1000L000000007\r\n1000t\r\n")
         while True:
             size = int(receive(self.line, 16)[5:14])
@@ -67,7 +69,8 @@ class Camera:
                 images[self.IMAGES[kind]] = struct.unpack_from(f"<{width * height}{form}", content, at + header)
             at += max(size, 24)
         every = zip(images["x"], images["y"], images["z"], images["confidence"])
-        return [(x / 1000, y / 1000, z / 1000) for x, y, z, confidence in every if not confidence & 1]
+        return [(x / 1000, y / 1000, z / 1000, min(i % width, width - 1 - i % width))
+                for i, (x, y, z, confidence) in enumerate(every) if not confidence & 1]
 
 
 class World:
@@ -94,26 +97,36 @@ class World:
             raise SystemExit(f"dock: the camera could not be put there: result {result}")
 
 
+def least_squares(points):
+    """x = a + b y: (a, b)."""
+    n = len(points)
+    mean_x, mean_y = sum(p[0] for p in points) / n, sum(p[1] for p in points) / n
+    b = sum((p[0] - mean_x) * (p[1] - mean_y) for p in points) / sum((p[1] - mean_y) ** 2 for p in points)
+    return mean_x - b * mean_y, b
+
+
 def fit_line(points):
-    """x = a + b y: of lines through two points the one that most points lie on, then least squares on these."""
+    """x = a + b y and the points on it. Of lines through two points the one from which the squared distances, none
+    counted as more than ON_LINE_M, are least; then least squares. To count the points within ON_LINE_M alone would tilt
+    the line towards a pocket's side, where some lie by chance."""
     if len(points) < 20:
         return None
     chance, some = random.Random(1), points[::max(1, len(points) // 400)]
-    best, most = [], -1
+    best, least = None, math.inf
     for _ in range(80):
-        (x1, y1), (x2, y2) = chance.sample(some, 2)
-        if abs(y2 - y1) < 0.1 or abs(x2 - x1) > abs(y2 - y1):
+        (x1, y1, *_), (x2, y2, *_) = chance.sample(some, 2)
+        if abs(y2 - y1) < 0.05 or abs(x2 - x1) > abs(y2 - y1):
             continue
-        slope = (x2 - x1) / (y2 - y1)
-        count = sum(abs(x - x1 - slope * (y - y1)) < ON_LINE_M for x, y in some)
-        if count > most:
-            most, best = count, [p for p in points if abs(p[0] - x1 - slope * (p[1] - y1)) < ON_LINE_M]
-    if len(best) < 20:
-        return None
-    n = len(best)
-    mean_x, mean_y = sum(p[0] for p in best) / n, sum(p[1] for p in best) / n
-    b = sum((p[0] - mean_x) * (p[1] - mean_y) for p in best) / sum((p[1] - mean_y) ** 2 for p in best)
-    return mean_x - b * mean_y, b, best
+        b = (x2 - x1) / (y2 - y1)
+        cost = sum(min((p[0] - x1 - b * (p[1] - y1)) ** 2, ON_LINE_M ** 2) for p in some)
+        if cost < least:
+            best, least = (x1 - b * y1, b), cost
+    for _ in range(4):
+        if best is None:
+            return None
+        kept = [p for p in points if abs(p[0] - best[0] - best[1] * p[1]) < ON_LINE_M]
+        best = least_squares(kept) if len(kept) >= 20 else None
+    return None if best is None else (*best, kept)
 
 
 def widest_group(points):
@@ -128,22 +141,24 @@ def widest_group(points):
 
 
 def find_pallet(points, near):
-    """The pallet's front about `near` ahead: how far its middle is ahead, how far to the left of the way (None where
-    an end is out of sight), and how far the robot is turned to the right against the pallet's axis."""
-    front = [(x, y) for x, y, z in points if BAND_M[0] < z < BAND_M[1] and abs(x - near) < 0.1 + 0.1 * abs(y)]
+    """The pallet's front about `near` ahead: how far the robot is from it, how far its middle is to the left of the way
+    (None where an end is out of sight), and how far the robot is turned to the right against the pallet's axis (None
+    where a single block is in sight: too short to tell)."""
+    front = [p for p in points if BAND_M[0] < p[2] < BAND_M[1] and abs(p[0] - near) < 0.1 + 0.1 * abs(p[1])]
     line = fit_line(front)
     if line is None:
         return None
     a, b, kept = line
-    along = [y for _, y in widest_group(kept)]
-    ends = along[0], along[-1]
-    middle = (ends[0] + ends[1]) / 2 if abs(math.hypot(1, b) * (ends[1] - ends[0]) - WIDTH_M) < 0.04 else None
-    return (a if middle is None else a + b * middle), middle, -math.atan(b)
+    along = widest_group(kept)
+    (_, right, _, right_px), (_, left, _, left_px) = along[0], along[-1]
+    is_whole = min(right_px, left_px) >= BORDER_PX and abs(math.hypot(1, b) * (left - right) - WIDTH_M) < 0.04
+    is_long = left - right > 1.5 * BLOCK_M
+    return a / math.hypot(1, b), (right + left) / 2 if is_whole else None, -math.atan(b) if is_long else None
 
 
 def dock(camera, world, x, z, heading, steps=80):
     """Drives from (x, z, heading) until the camera says that the robot is there. The pallet's front is z = 0."""
-    way, waits, near, aside, turned, trust = [(x, z, heading)], [], None, 0.0, 0.0, 1.0
+    way, waits, near, middle, turned, trust = [(x, z, heading)], [], None, None, 0.0, 1.0
     for _ in range(steps):
         begun = time.monotonic()
         world.stand(x, z, heading)
@@ -157,25 +172,30 @@ def dock(camera, world, x, z, heading, steps=80):
         seen = find_pallet(points, near)
         if seen is None:
             break
-        near, middle, heading_seen = seen
-        if near <= STOP_M:
-            return way, waits, True
-        # The robot against the pallet's axis: to the right of it, turned to the right. Each look corrects a part of what
-        # the wheels say; aside can be seen while both ends of the pallet can.
-        turned += (heading_seen - turned) * trust
-        if middle is not None:
-            aside += (middle * math.cos(turned) - near * math.sin(turned) - aside) * trust
+        near_seen, middle_seen, turned_seen = seen
+        # Where the pallet is for the robot: its front ahead, its middle to the left; and how far the robot is turned
+        # to the right against its axis. Each look corrects a part of what the wheels say.
+        near += (near_seen - near) * trust
+        if turned_seen is not None:
+            turned += (turned_seen - turned) * trust
+        if middle_seen is not None:
+            middle = middle_seen if middle is None else middle + (middle_seen - middle) * trust
         trust = TRUST
-        wanted = max(-0.35, min(0.35, -1.5 * aside / max(near - STOP_M, 0.3)))  # heading against the pallet's axis
+        if near - STOP_M < CLOSE_M:
+            return way, waits, True
+        # To the right of the axis; heading against it that is wanted.
+        aside = 0.0 if middle is None else (middle - near * math.sin(turned)) / math.cos(turned)
+        wanted = max(-0.35, min(0.35, -1.5 * aside / max(near - STOP_M, 0.3)))
         turn = max(-TURN_RAD_S, min(TURN_RAD_S, 2.0 * (wanted - turned))) * STEP_S
-        go = min(SPEED_M_S, near - STOP_M + 0.02)
+        go = min(SPEED_M_S * STEP_S, 0.5 * (near - STOP_M))
         heading += turn
-        turned += turn
-        x += go * STEP_S * math.sin(heading)
-        z += go * STEP_S * math.cos(heading)
-        aside += go * STEP_S * math.sin(turned)
-        near -= go * STEP_S
+        x += go * math.sin(heading)
+        z += go * math.cos(heading)
         way.append((x, z, heading))
+        turned += turn
+        near -= go * math.cos(turned)
+        if middle is not None:
+            middle = (aside + go * math.sin(turned)) * math.cos(turned) + near * math.sin(turned)
     return way, waits, False
 
 
