@@ -165,7 +165,7 @@ std::vector<Row> bootstrapRows() {
        .category = kTransport,
        .address = 0x0D08,
        .access = A::ReadWrite,
-       .meaning = "pause between two packets",
+       .meaning = "pause between two packets, at least",
        .unit = "ns",
        .bounds = {{0, 1'000'000, 1}}},
       {.item = Destination,

@@ -167,7 +167,8 @@ class GigeVisionFacade final : public Facade {
   // ---- frames ------------------------------------------------------------------------------------
 
   void aim(const StreamSetup& setup) {
-    sender_->aim({boost::asio::ip::address_v4{setup.to.address}, setup.to.port}, setup.packet_delay);
+    sender_->aim({boost::asio::ip::address_v4{setup.to.address}, setup.to.port}, setup.packet_size,
+                 setup.packet_delay);
   }
 
   void takeFrame(const Frame& frame) {

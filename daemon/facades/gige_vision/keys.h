@@ -37,7 +37,7 @@ struct Keys {
     v.number("packet_size", packet_size, {576, 16'112},
              "bytes of a packet with all headers, until a client sets another (GevSCPSPacketSize)");
     v.number("packet_delay_us", packet_delay_us, {0.0, 1000.0},
-             "between two packets, until a client sets another (GevSCPD): small buffers are not overrun");
+             "at least, between two packets, until a client sets another (GevSCPD); 0: at once");
     v.number("resend_mb", resend_mb, {1, 4096}, "of frames that were sent are kept, to be sent once more");
     v.text("intervals", intervals,
            "a file with the intervals between a real camera's frames, one number in milliseconds per line, "

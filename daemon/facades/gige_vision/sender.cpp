@@ -6,6 +6,7 @@
 #include <sys/socket.h>
 
 #include <algorithm>
+#include <bit>
 
 #include "drivers/logging.h"
 
@@ -17,12 +18,25 @@ using std::chrono::steady_clock;
 
 constexpr std::size_t kMostBlocks = 3, kMostAgain = 4096, kLeastKept = 2;
 constexpr int kBatch = 64;  ///< packets in one go, so that commands are answered in between
-constexpr std::chrono::microseconds kFull{200};        ///< until a socket that was full is tried again
-constexpr std::chrono::microseconds kMostBehind{800};  ///< that is caught up by sending faster
+constexpr std::chrono::microseconds kFull{200};  ///< until a socket that was full is tried again
+constexpr std::chrono::nanoseconds kMostSpread = std::chrono::milliseconds{10};
 constexpr int kSocketBytes = 4 << 20;
 constexpr std::uint32_t kMostUnavailable = 64;
 
 }  // namespace
+
+std::chrono::nanoseconds pauseBetween(std::uint32_t packets, std::chrono::nanoseconds delay,
+                                      std::chrono::nanoseconds since_last_block) {
+  if (delay.count() == 0) return delay;
+  return std::max(delay, std::min(kMostSpread, since_last_block / 2) / packets);
+}
+
+int packetsAtOnce(std::uint32_t packet_size) {
+  constexpr std::uint32_t kThird = 212'992 / 3;              // of net.core.rmem_default
+  constexpr std::uint32_t kAllocated = 384, kCounted = 256;  // beside a datagram's own bytes
+  const std::uint32_t taken = std::bit_ceil(packet_size + kAllocated) + kCounted;  // as kmalloc gives them
+  return static_cast<int>(std::max(1U, kThird / taken));
+}
 
 Sender::Sender(boost::asio::io_context& io, boost::asio::ip::udp::socket socket, LineFaults faults,
                std::size_t bytes_kept, std::string name)
@@ -39,8 +53,9 @@ Sender::Sender(boost::asio::io_context& io, boost::asio::ip::udp::socket socket,
   ::setsockopt(socket_.native_handle(), IPPROTO_IP, IP_MTU_DISCOVER, &never, sizeof never);
 }
 
-void Sender::aim(const Endpoint& to, std::chrono::nanoseconds delay) {
+void Sender::aim(const Endpoint& to, std::uint32_t packet_size, std::chrono::nanoseconds delay) {
   to_ = to;
+  at_once_ = packetsAtOnce(packet_size);
   delay_ = delay;
 }
 
@@ -52,8 +67,10 @@ bool Sender::send(std::shared_ptr<const Block> block) {
     sent_bytes_ -= sent_.front()->size();
     sent_.pop_front();
   }
+  const auto now = steady_clock::now();
+  const auto pause = pauseBetween(block->packets(), delay_, now - std::exchange(last_block_, now));
   const std::uint32_t last = block->packets() - 1;
-  waiting_.push_back({std::move(block), 0, last, false});
+  waiting_.push_back({std::move(block), 0, last, false, pause});
   if (!is_pumping_) pump();
   return true;
 }
@@ -74,7 +91,7 @@ void Sender::sendAgain(const Resend& asked) {
     if (one.block == *block) end = std::min<std::uint64_t>(end, one.next);  // those come anyway
   }
   if (asked.first >= end || again_.size() >= kMostAgain) return;
-  again_.push_back({*block, asked.first, static_cast<std::uint32_t>(end - 1), true});
+  again_.push_back({*block, asked.first, static_cast<std::uint32_t>(end - 1), true, {}});
   if (!is_pumping_) pump();
 }
 
@@ -95,17 +112,23 @@ void Sender::clear() {
 void Sender::pump() {
   is_pumping_ = false;
   const auto now = steady_clock::now();
-  due_ = std::max(due_, now - kMostBehind);
+  due_ = std::max(due_, now - at_once_ * pause());
   for (int i = 0; due_ <= now; ++i) {
     if (waiting_.empty() && again_.empty()) {
       if (!line_.finish()) wake(now + kFull);
       return;
     }
     if (i == kBatch) break;
+    const auto pause_after = pause();
     if (!sendNext()) return wake(now + kFull);
-    due_ += delay_;
+    due_ += pause_after;
   }
   wake(due_);
+}
+
+/// Blocks that wait must not wait long, nor packets that were lost.
+std::chrono::nanoseconds Sender::pause() const {
+  return again_.empty() && waiting_.size() == 1 ? waiting_.front().pause : delay_;
 }
 
 void Sender::wake(steady_clock::time_point when) {

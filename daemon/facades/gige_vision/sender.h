@@ -18,8 +18,18 @@
 
 namespace toftwin::daemon::gige_vision {
 
-/// Sends blocks packet by packet at the pace that is set, and those that were lost once more. Used on the
-/// facade's thread only.
+/// How long after one packet of a block the next one leaves: `delay` or, where that is more, as long as
+/// spreads the block evenly over half the time between two blocks or 10 ms, whichever is less. So long a
+/// client has to read before its socket is full, yet there is far less silence than the 20 ms after which
+/// libaravis asks for all that has not come. A delay of 0: at once.
+std::chrono::nanoseconds pauseBetween(std::uint32_t packets, std::chrono::nanoseconds delay,
+                                      std::chrono::nanoseconds since_last_block);
+/// How many packets of that size take a third of what a client's socket has room for, by Linux' default 208
+/// kB with the kernel's own bytes: 30 of 1500 bytes, 4 of 9000.
+int packetsAtOnce(std::uint32_t packet_size);
+
+/// Sends blocks packet by packet at an even pace, and those that were lost once more. Where it begins, or
+/// comes late, it sends no more than packetsAtOnce without a pause. Used on the facade's thread only.
 class Sender {
  public:
   using Endpoint = boost::asio::ip::udp::endpoint;
@@ -30,7 +40,7 @@ class Sender {
   Sender(const Sender&) = delete;
   Sender& operator=(const Sender&) = delete;
 
-  void aim(const Endpoint& to, std::chrono::nanoseconds delay);
+  void aim(const Endpoint& to, std::uint32_t packet_size, std::chrono::nanoseconds delay);
   /// False where too many blocks wait already; this one is lost then.
   bool send(std::shared_ptr<const Block> block);
   void sendAgain(const Resend& asked);
@@ -46,9 +56,11 @@ class Sender {
     std::shared_ptr<const Block> block;  // shared with those that are kept
     std::uint32_t next = 0, last = 0;
     bool is_again = false;
+    std::chrono::nanoseconds pause{};
   };
   void pump();
   void wake(std::chrono::steady_clock::time_point when);
+  [[nodiscard]] std::chrono::nanoseconds pause() const;
   /// False if the socket takes no more now.
   bool sendNext();
   bool put(const Bytes& packet);
@@ -60,7 +72,8 @@ class Sender {
   const std::string name_;
   Endpoint to_;
   std::chrono::nanoseconds delay_{};
-  std::chrono::steady_clock::time_point due_{};
+  int at_once_ = 1;
+  std::chrono::steady_clock::time_point due_{}, last_block_{};
   std::deque<Waiting> waiting_, again_;
   std::deque<std::shared_ptr<const Block>> sent_;
   std::size_t sent_bytes_ = 0;

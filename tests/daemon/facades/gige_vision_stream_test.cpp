@@ -2,16 +2,24 @@
 // Packets of frames, and what goes wrong with packets on purpose.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <poll.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
+#include <cstring>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <random>
 #include <set>
 
 #include "daemon/facades/gige_vision/gvsp.h"
+#include "daemon/facades/gige_vision/sender.h"
 #include "daemon/facades/gige_vision/struck_line.h"
 #include "daemon/facades/line_faults.h"
 
@@ -129,6 +137,89 @@ TEST(GigeVisionStream, AFullSocketLosesNoPacketBesideThePlan) {
   EXPECT_EQ(overtaken, logged["reorder"]);
   EXPECT_GT(std::min({logged["loss"].size(), logged["duplicate"].size(), overtaken.size()}), 100u);
   std::filesystem::remove(log);
+}
+
+TEST(GigeVisionStream, APausesLengthSpreadsABlockOverHalfTheTimeBetweenTwoAndTenMillisecondsAtMost) {
+  using std::chrono::milliseconds, std::chrono::microseconds;
+  EXPECT_EQ(pauseBetween(100, microseconds{10}, milliseconds{100}), microseconds{100});
+  EXPECT_EQ(pauseBetween(100, microseconds{10}, milliseconds{10}), microseconds{50});
+  EXPECT_EQ(pauseBetween(2000, microseconds{10}, milliseconds{33}), microseconds{10});  // as was set
+  EXPECT_EQ(pauseBetween(100, microseconds{0}, milliseconds{100}), microseconds{0});    // at once
+}
+
+/// 208 kB is room for 92 packets of 1500 bytes and for 12 of 9000 as loopback was seen to deliver them.
+TEST(GigeVisionStream, AtOnceGoesAThirdOfWhatAClientsSocketHasRoomFor) {
+  EXPECT_EQ(packetsAtOnce(576), 55);
+  EXPECT_EQ(packetsAtOnce(1500), 30);
+  EXPECT_EQ(packetsAtOnce(9000), 4);
+  EXPECT_EQ(packetsAtOnce(16'112), 2);
+}
+
+/// A socket that tells when the kernel got each datagram.
+class StampedSocket {
+ public:
+  StampedSocket() {
+    socket.set_option(boost::asio::socket_base::receive_buffer_size{1 << 20});
+    const int on = 1;
+    ::setsockopt(socket.native_handle(), SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof on);
+    // The kernel begins to stamp some time later; what came before has the time when it was read.
+    for (bool is_stamped = false; !is_stamped;) {
+      socket.send_to(boost::asio::buffer("x"), socket.local_endpoint());
+      ::usleep(1000);
+      timespec now{};
+      ::clock_gettime(CLOCK_REALTIME, &now);
+      is_stamped = next() < nanoseconds(now);
+    }
+  }
+  /// In nanoseconds; nothing if none came for 10 s.
+  std::optional<std::int64_t> next() {
+    pollfd ready{socket.native_handle(), POLLIN, 0};
+    alignas(cmsghdr) std::array<char, 64> control{};
+    msghdr message{};
+    message.msg_control = control.data();
+    message.msg_controllen = control.size();
+    if (::poll(&ready, 1, 10'000) != 1 || ::recvmsg(socket.native_handle(), &message, 0) < 0) return {};
+    timespec at{};
+    std::memcpy(&at, CMSG_DATA(CMSG_FIRSTHDR(&message)), sizeof at);
+    return nanoseconds(at);
+  }
+  boost::asio::io_context io;
+  boost::asio::ip::udp::socket socket{io, {boost::asio::ip::address_v4::loopback(), 0}};
+
+ private:
+  static std::int64_t nanoseconds(const timespec& at) {
+    return std::int64_t{at.tv_sec} * 1'000'000'000 + at.tv_nsec;
+  }
+};
+
+/// The bound holds however late the computer lets the sender come: what leaves in one go is bounded, and
+/// where that is interrupted, once more after it; beside those goes one packet per pause.
+TEST(GigeVisionStream, NoMillisecondOfABlockOverrunsAClientsSocket) {
+  StampedSocket client;
+  std::mt19937 random{1};
+  const Payload payload = payloadOfSizes({176 * 132 * 2, 176 * 132 * 2, 176 * 132 * 2}, random);
+  for (const std::uint32_t size : {1500U, 9000U}) {
+    Sender sender{client.io,
+                  boost::asio::ip::udp::socket{client.io, {boost::asio::ip::address_v4::loopback(), 0}},
+                  LineFaults{{}, "test", {}}, 0, "test"};
+    sender.aim(client.socket.local_endpoint(), size, std::chrono::microseconds{10});
+    const auto block = std::make_shared<const Block>(
+        Block::Header{.packet_size = size, .is_multipart = true, .has_long_ids = true}, payload);
+    ASSERT_TRUE(sender.send(block));
+    client.io.restart();
+    client.io.run();
+    std::vector<std::int64_t> times;
+    while (times.size() < block->packets()) {
+      const auto at = client.next();
+      ASSERT_TRUE(at) << "after " << times.size() << " packets";
+      times.push_back(*at);
+    }
+    const std::int64_t window_ns = 1'000'000, pause_ns = 10'000'000 / block->packets();
+    std::ptrdiff_t most = 0;
+    for (auto first = times.begin(); first != times.end(); ++first)
+      most = std::max(most, std::upper_bound(first, times.end(), *first + window_ns) - first);
+    EXPECT_LE(most, 2 * (packetsAtOnce(size) + 1) + window_ns / pause_ns + 1) << size;
+  }
 }
 
 TEST(GigeVisionStream, IdsOfSixteenBitsLeaveOutZero) {
