@@ -4,9 +4,10 @@
 #include <cmath>
 
 #include <fmt/format.h>
-#include <opencv2/imgcodecs.hpp>
+#include <opencv2/core.hpp>
 
 #include "calib/compare/plot.h"
+#include "sim/pictures/png.h"
 
 namespace toftwin::compare {
 namespace {
@@ -44,9 +45,9 @@ Rgb colour(const ImageMap& map, double share) {
 }
 
 std::string png(const cv::Mat& bgra) {
-  std::vector<unsigned char> bytes;
-  cv::imencode(".png", bgra, bytes, {cv::IMWRITE_PNG_COMPRESSION, 9});
-  return "data:image/png;base64," + base64(bytes);
+  const std::vector<std::byte> bytes = pictures::encodePng(bgra, {}, 9);
+  return "data:image/png;base64," +
+         base64({reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()});
 }
 
 cv::Vec4b pixel(Rgb rgb) {

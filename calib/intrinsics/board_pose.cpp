@@ -29,10 +29,10 @@ BoardPose mirrored(const Surface& surface, const Observed& view, const BoardPose
   for (const Corner& corner : view.corners) middle += surface.at(corner.index);
   middle /= static_cast<double>(view.corners.size());
   const Eigen::Vector3d there = pose.rotation * middle + pose.translation_mm, sight = there.normalized();
-  const Eigen::Vector3d normal = pose.rotation.col(2);
-  const Eigen::Vector3d other = 2.0 * sight.dot(normal) * sight - normal;
+  const Eigen::Vector3d normal = pose.rotation.col(2), across = normal.cross(sight);
+  const Eigen::AngleAxisd over{2.0 * std::atan2(across.norm(), normal.dot(sight)), across.normalized()};
   BoardPose result;
-  result.rotation = Eigen::Quaterniond::FromTwoVectors(normal, other).toRotationMatrix() * pose.rotation;
+  result.rotation = over.toRotationMatrix() * pose.rotation;
   result.translation_mm = there - result.rotation * middle;
   return result;
 }

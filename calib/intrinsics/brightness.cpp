@@ -2,12 +2,12 @@
 #include "calib/intrinsics/brightness.h"
 
 #include <fmt/format.h>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include <vector>
 
 #include "protocol/record/recording.h"
+#include "sim/pictures/read.h"
 
 namespace toftwin::intrinsics {
 namespace {
@@ -17,13 +17,8 @@ Result<cv::Mat> decode(const std::filesystem::path& file) {
   if (!std::filesystem::is_regular_file(file, fault)) {
     return Error{Error::Code::NotFound, fmt::format("{}: there is no such image file", file.string())};
   }
-  cv::Mat image;
-  try {
-    image = cv::imread(file.string(), cv::IMREAD_UNCHANGED);
-  } catch (const cv::Exception&) {
-    image.release();  // OpenCV throws for some damaged files, and for others returns nothing
-  }
-  if (!image.empty()) return image;
+  auto image = pictures::read(file);
+  if (!image || !image->empty()) return image;
   return Error{Error::Code::Malformed,
                fmt::format("{}: this is no image that can be read (PNG, PGM, TIFF of 8 or 16 bits); is it "
                            "damaged?",

@@ -2,11 +2,12 @@
 #include "calib/intrinsics/overlay.h"
 
 #include <fmt/format.h>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include <algorithm>
 #include <cmath>
+
+#include "sim/pictures/png.h"
 
 namespace toftwin::intrinsics {
 namespace {
@@ -76,10 +77,7 @@ std::vector<std::byte> overlayPng(const Calibrated& calibrated, std::size_t inde
                                kMagnification),
           0);
   }
-  std::vector<std::uint8_t> bytes;
-  cv::imencode(".png", picture, bytes);
-  const auto* first = reinterpret_cast<const std::byte*>(bytes.data());
-  return {first, first + bytes.size()};
+  return pictures::encodePng(picture);
 }
 
 }  // namespace toftwin::intrinsics

@@ -6,7 +6,8 @@
 #include <cmath>
 
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
+
+#include "sim/pictures/read.h"
 
 namespace toftwin::sim {
 namespace {
@@ -14,15 +15,6 @@ namespace {
 double scaleOf(int depth) {
   if (depth == CV_8U) return 1.0 / 255.0;
   return depth == CV_16U ? 1.0 / 65535.0 : 1.0;
-}
-
-/// imread throws where a picture is larger than OpenCV's limit, and returns nothing for other mistakes.
-cv::Mat decoded(const std::filesystem::path& file) {
-  try {
-    return cv::imread(file.string(), cv::IMREAD_UNCHANGED);
-  } catch (const cv::Exception&) {
-    return {};
-  }
 }
 
 }  // namespace
@@ -33,7 +25,9 @@ Result<Image<float>> loadGrey(const std::filesystem::path& file) {
         Error::Code::NotFound,
         fmt::format("picture {}: no such file; paths are relative to the scene file", file.string())};
   }
-  cv::Mat picture = decoded(file);
+  const auto read = pictures::read(file);
+  if (!read) return read.error();
+  cv::Mat picture = *read;
   const int depth = picture.depth();
   if (picture.empty() || (depth != CV_8U && depth != CV_16U && depth != CV_32F)) {
     return Error{

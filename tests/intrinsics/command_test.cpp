@@ -4,12 +4,14 @@
 
 #include <cstdio>
 #include <filesystem>
-#include <opencv2/imgcodecs.hpp>
+#include <opencv2/core.hpp>
 #include <regex>
 
 #include "calib/file/calibration_file.h"
 #include "calib/intrinsics/detect.h"
 #include "protocol/record/recording.h"
+#include "sim/pictures/png.h"
+#include "sim/pictures/read.h"
 #include "synthetic.h"
 #include "tests/tools/program.h"
 #include "tests/tools/with_daemon.h"
@@ -47,7 +49,7 @@ void writePng(const std::filesystem::path& file, const Image<float>& image) {
   for (int v = 0; v < image.height(); ++v) {
     for (int u = 0; u < image.width(); ++u) counts.at<std::uint16_t>(v, u) = static_cast<std::uint16_t>(100 * image(u, v));
   }
-  ASSERT_TRUE(cv::imwrite(file.string(), counts));
+  record::writeBytes(file, pictures::encodePng(counts));
 }
 
 void writeRecording(const std::filesystem::path& file, const std::vector<Image<float>>& images,
@@ -99,7 +101,7 @@ TEST(CalibrateCommand, MakesAFileOfImagesAndKeepsItByItsId) {
   EXPECT_EQ(shown.status, 0) << shown.err;
   EXPECT_THAT(shown.out, HasSubstr("id = \"" + id + "\""));
   EXPECT_EQ(cli::toftwin("calibrate --show 00" + store).status, 4);
-  const cv::Mat picture = cv::imread(folder / "seen/000-a0.png.png");
+  const cv::Mat picture = *pictures::read(folder / "seen/000-a0.png.png");
   EXPECT_GT(picture.cols, 1000);
 }
 

@@ -6,12 +6,14 @@
 
 #include <filesystem>
 #include <fstream>
-#include <opencv2/imgcodecs.hpp>
+#include <opencv2/core.hpp>
 
 #include "calib/compare/poses.h"
 #include "calib/file/calibration_file.h"
 #include "program.h"
+#include "sim/pictures/png.h"
 #include "synthetic.h"
+#include "tests/record/record_testing.h"
 
 namespace toftwin::intrinsics {
 namespace {
@@ -51,7 +53,7 @@ class Locate : public ::testing::Test {
       for (int x = 0; x < image.width(); ++x)
         grey.at<unsigned char>(y, x) = static_cast<unsigned char>(image(x, y));
     }
-    cv::imwrite((folder_ / name).string(), grey);
+    record::writeBytes(folder_ / name, pictures::encodePng(grey));
     return pose;
   }
   cli::Ran locate(const std::string& rest) {
@@ -81,7 +83,7 @@ TEST_F(Locate, SaysWhatIsMissing) {
   const auto other = locate(fmt::format("{}/a.png --rig {}/rig.toml", folder_.string(), folder_.string()));
   EXPECT_NE(other.status, 0);
   EXPECT_THAT(other.err, HasSubstr("has 2 poses of the rig, but there are 1 images"));
-  cv::imwrite((folder_ / "grey.png").string(), cv::Mat(212, 256, CV_8U, cv::Scalar{90}));
+  record::writeBytes(folder_ / "grey.png", pictures::encodePng(cv::Mat(212, 256, CV_8U, cv::Scalar{90})));
   const auto none = locate((folder_ / "grey.png").string());
   EXPECT_NE(none.status, 0);
   EXPECT_THAT(none.err, ::testing::AllOf(HasSubstr("left out"), HasSubstr("found in none of the images")));

@@ -6,11 +6,12 @@
 #include <unistd.h>
 
 #include <cmath>
-#include <opencv2/imgcodecs.hpp>
+#include <opencv2/core.hpp>
 #include <sstream>
 
 #include "program.h"
 #include "protocol/record/recording.h"
+#include "sim/pictures/read.h"
 #include "tests/protocol/example_messages.h"
 #include "tests/record/record_testing.h"
 #include "tools/cli/doctor_checks.h"
@@ -170,7 +171,7 @@ TEST_F(Recorded, ReplayExportsFrames) {
   const Ran one =
       toftwin("replay " + path("a.mcap") + " -o " + path("at.png") + " --from 1.25 --count 1");
   ASSERT_EQ(one.status, 0) << one.err;
-  const cv::Mat image = cv::imread(folder_ / "at.png", cv::IMREAD_UNCHANGED);
+  const cv::Mat image = *pictures::read(folder_ / "at.png");
   ASSERT_EQ(image.size(), cv::Size(16, 8));
   EXPECT_EQ(image.at<std::uint16_t>(0, 0), 1130);  // frame 13, at 1.3 s
   const Ran all = toftwin("replay " + path("a.mcap") + " --source o3d -o " + path("f.npy"));
@@ -284,7 +285,7 @@ class Render : public testing::Test {
 TEST_F(Render, GivesTheTrueRangeOfAWall) {
   const Ran ran = render("--plane truth_range -o '" + (folder_ / "a.png").string() + "'");
   ASSERT_EQ(ran.status, 0) << ran.err;
-  const cv::Mat image = cv::imread(folder_ / "a.png", cv::IMREAD_UNCHANGED);
+  const cv::Mat image = *pictures::read(folder_ / "a.png");
   double least = 0;
   cv::minMaxLoc(image, &least);
   EXPECT_NEAR(least, 2000,

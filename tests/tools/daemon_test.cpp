@@ -7,13 +7,14 @@
 #include <cmath>
 #include <csignal>
 #include <cstring>
-#include <opencv2/imgcodecs.hpp>
+#include <opencv2/core.hpp>
 #include <thread>
 
 #include "drivers/pattern/pattern.h"
 #include "program.h"
 #include "with_daemon.h"
 #include "protocol/record/recording.h"
+#include "sim/pictures/read.h"
 #include "tests/record/record_testing.h"
 
 namespace toftwin::cli {
@@ -56,7 +57,7 @@ TEST_F(WithDaemon, GrabWritesThePatternToTheMillimetre) {
   const Ran ran = run("grab pattern -o " + path("a.png"));
   ASSERT_EQ(ran.status, 0) << ran.err;
   EXPECT_THAT(ran.out, HasSubstr("1 count = 1 mm"));
-  const cv::Mat image = cv::imread(folder_ / "a.png", cv::IMREAD_UNCHANGED);
+  const cv::Mat image = *pictures::read(folder_ / "a.png");
   ASSERT_EQ(image.size(), cv::Size(kWidth, kHeight));
   EXPECT_TRUE(shiftOf(image)) << "no position of the pattern looks like this";
 }
@@ -74,7 +75,7 @@ TEST_F(WithDaemon, GrabOfSeveralFramesLeavesNoneOut) {
   std::vector<std::uint64_t> shifts;
   for (int i = 0; i < 5; ++i) {
     const auto file = folder_ / ("a-000" + std::to_string(i) + ".png");
-    shifts.push_back(shiftOf(cv::imread(file, cv::IMREAD_UNCHANGED)).value_or(1000));
+    shifts.push_back(shiftOf(*pictures::read(file)).value_or(1000));
   }
   for (std::size_t i = 1; i < 5; ++i) EXPECT_EQ(shifts[i], (shifts[i - 1] + 1) % 256) << i;
 }

@@ -8,11 +8,12 @@
 #include <cmath>
 #include <csignal>
 #include <cstring>
-#include <opencv2/imgcodecs.hpp>
+#include <opencv2/core.hpp>
 #include <sstream>
 
 #include <toftwin/nan.h>
 
+#include "sim/pictures/read.h"
 #include "tests/record/record_testing.h"
 #include "tools/cli/export/atomic_file.h"
 
@@ -66,9 +67,7 @@ class Export : public testing::Test {
     EXPECT_FALSE(std::filesystem::exists(folder_ / name));
     return note ? "" : note.error().message;
   }
-  cv::Mat image(const std::string& name) {
-    return cv::imread(folder_ / name, cv::IMREAD_UNCHANGED);
-  }
+  cv::Mat image(const std::string& name) { return *pictures::read(folder_ / name); }
 
   Folder folder_;
   Frame frame_ = frameForExport();

@@ -2,9 +2,7 @@
 // PNG: 16-bit counts with a stated scale (8-bit for flags), or 8-bit colours. The scale stands in
 // the file too, as a tEXt chunk "Description".
 #include <fmt/format.h>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
-#include <zlib.h>
 
 #include <algorithm>
 #include <cmath>
@@ -14,34 +12,15 @@
 
 #include <toftwin/names.h>
 
+#include "sim/pictures/png.h"
 #include "tools/cli/export/export.h"
 
 namespace toftwin::cli {
 namespace {
 
-/// Encodes the image and puts `description` behind the IHDR chunk, which is always 25 bytes after
-/// the 8 bytes of the signature.
 Result<std::vector<std::byte>> encode(const cv::Mat& image, const std::string& description) {
-  std::vector<unsigned char> png;
-  try {
-    if (!cv::imencode(".png", image, png))
-      return Error{Error::Code::Internal, "OpenCV cannot encode this PNG"};
-  } catch (const cv::Exception& error) {
-    return Error{Error::Code::Internal,
-                 std::string{"OpenCV cannot encode this PNG: "} + error.what()};
-  }
-  const auto append32 = [](std::string& out, std::size_t value) {
-    for (int shift = 24; shift >= 0; shift -= 8) out += static_cast<char>((value >> shift) & 0xff);
-  };
-  const std::string keyword{"tEXtDescription\0", 16};
-  const std::string body = keyword + description;
-  std::string chunk;
-  append32(chunk, body.size() - 4);
-  chunk += body;
-  append32(chunk, ::crc32_z(0, reinterpret_cast<const Bytef*>(body.data()), body.size()));
-  png.insert(png.begin() + 33, chunk.begin(), chunk.end());
-  const auto bytes = std::as_bytes(std::span{png});
-  return std::vector<std::byte>{bytes.begin(), bytes.end()};
+  if (image.empty()) return Error{Error::Code::Malformed, "an image without pixels cannot be a PNG"};
+  return pictures::encodePng(image, description);
 }
 
 /// A picture that is nearly all invalid looks like a mistake of this program; it seldom is.
