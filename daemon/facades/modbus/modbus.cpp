@@ -12,9 +12,8 @@
 #include <memory>
 #include <optional>
 
-#include <toftwin/nan.h>
-
 #include "daemon/facades/event_thread.h"
+#include "daemon/facades/modbus/frame_facts.h"
 #include "daemon/facades/modbus/keys.h"
 #include "daemon/facades/modbus/server.h"
 #include "daemon/facades/source_link.h"
@@ -61,44 +60,6 @@ Transform<World, Camera> poseAt(const std::array<double, 3>& position_m,
   return pose;
 }
 
-/// What the registers tell of a frame.
-struct FrameFacts {
-  double valid = 0.0, centre_m = kNaN, nearest_m = kNaN;  ///< valid: a share
-  double illumination_c = kNaN, sensor_c = kNaN, housing_c = kNaN, room_c = kNaN;
-  double powered_on_s = 0.0;
-  std::int64_t device_ns = 0;
-  steady_clock::time_point came;
-};
-
-FrameFacts factsOf(const Frame& frame) {
-  FrameFacts facts;
-  facts.came = steady_clock::now();
-  for (const NamedTemperature& one : frame.moment.temperatures) {
-    const double value_c = one.value.in(celsius);
-    if (one.where == "illumination") facts.illumination_c = value_c;
-    if (one.where == "sensor") facts.sensor_c = value_c;
-    if (one.where == "housing") facts.housing_c = value_c;
-    if (one.where == "room") facts.room_c = value_c;
-  }
-  if (frame.moment.since_power_on) facts.powered_on_s = frame.moment.since_power_on->in(second);
-  if (!frame.moment.exposures.empty())
-    facts.device_ns = std::max<std::int64_t>(0, frame.moment.exposures[0].start.ns);
-  const Plane* range = frame.find(PlaneKind::Range);
-  if (range == nullptr || range->type != ElementType::F32) return facts;
-  const auto metres = range->as<float>();
-  std::size_t valid = 0;
-  for (const float one : metres) {
-    if (!std::isfinite(one)) continue;
-    ++valid;
-    facts.nearest_m = std::fmin(facts.nearest_m, static_cast<double>(one));
-  }
-  facts.valid = metres.empty() ? 0.0 : static_cast<double>(valid) / static_cast<double>(metres.size());
-  const auto centre = static_cast<std::size_t>(range->height / 2) * static_cast<std::size_t>(range->width) +
-                      static_cast<std::size_t>(range->width / 2);
-  if (centre < metres.size()) facts.centre_m = static_cast<double>(metres[centre]);
-  return facts;
-}
-
 class ModbusFacade final : public Facade {
  public:
   ModbusFacade(Keys keys, std::vector<Recipe> recipes, const std::filesystem::path& line_log,
@@ -107,7 +68,8 @@ class ModbusFacade final : public Facade {
         recipes_(std::move(recipes)),
         place_(place),
         thread_("facade modbus of " + place.keys.source),
-        link_(thread_, place.hub, {.source = place.keys.source, .planes = {PlaneKind::Range}, .queue = 1},
+        link_(thread_, place.hub,
+              {.source = place.keys.source, .planes = {PlaneKind::Range, PlaneKind::Depth}, .queue = 1},
               [this](const Frame& frame) { takeFrame(frame); }),
         line_(keys_.line, "facade modbus of " + place.keys.source, line_log) {
     registers_.set(Item::Stream, keys_.streams ? 1.0 : 0.0);
@@ -143,7 +105,7 @@ class ModbusFacade final : public Facade {
   }
 
   void takeFrame(const Frame& frame) {
-    facts_ = factsOf(frame);
+    facts_ = watch_.factsOf(frame);
     if (triggered_at_) registers_.set(Item::Trigger, 0.0);
     triggered_at_.reset();
   }
@@ -346,6 +308,7 @@ class ModbusFacade final : public Facade {
   int under_way_ = 0;
   bool has_failed_ = false;
   std::uint64_t lost_acknowledged_ = 0;
+  FrameWatch watch_;
   std::optional<FrameFacts> facts_;
   std::optional<steady_clock::time_point> triggered_at_, wanted_since_;
 };

@@ -79,6 +79,13 @@ constexpr std::array kMap{
 };
 static_assert(kMap.size() == static_cast<std::size_t>(Item::kCount));
 
+/// PLCs read whole bytes of bits and blocks of registers.
+constexpr std::array<std::size_t, 4> kSizes{16, 16, 64, 128};
+static_assert(std::ranges::all_of(kMap, [](const Row& row) {
+  return row.address + static_cast<std::size_t>(wordsOf(row.kind)) <=
+         kSizes[static_cast<std::size_t>(row.memory)];
+}));
+
 const Row& rowOf(Item item) { return kMap[static_cast<std::size_t>(item)]; }
 
 double nearest(double value, double low, double high) {
@@ -125,14 +132,16 @@ std::string documentRegisters() {
     text += fmt::format("| {} | {} | `{}` | {} | {} | {} |\n", nameOf(row.memory), row.address, row.name,
                         nameOf(row.kind), row.unit, row.meaning);
   }
+  text += fmt::format(
+      "\nAddresses count from 0. There are {} coils, {} discrete inputs, {} holding and {} input registers: "
+      "those of "
+      "no row read as 0 and cannot be written (exception 2).\n",
+      kSizes[0], kSizes[1], kSizes[2], kSizes[3]);
   return text;
 }
 
 Registers::Registers() {
-  for (const Row& row : kMap) {
-    auto& all = words(row.memory);
-    all.resize(std::max<std::size_t>(all.size(), row.address + static_cast<std::size_t>(wordsOf(row.kind))));
-  }
+  for (std::size_t memory = 0; memory < words_.size(); ++memory) words_[memory].resize(kSizes[memory]);
 }
 
 void Registers::set(Item item, double value) {

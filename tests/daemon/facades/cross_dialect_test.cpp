@@ -7,6 +7,9 @@
 #include <boost/asio/read.hpp>
 #include <boost/asio/write.hpp>
 #include <cmath>
+#include <functional>
+#include <utility>
+#include <vector>
 
 #include "drivers/o3d303/wire/confidence.h"
 #include "drivers/sim/simulator.h"
@@ -88,6 +91,9 @@ class CrossDialect : public RunningFacade {
     (*driver)->stop();
   }
 
+  void expectPlcsRanges(const std::string& source_keys,
+                        const std::function<std::vector<float>(const Frame&)>& rangesOf);
+
   double electrons_per_count_ = 6.0;  // the facade's default
 };
 
@@ -132,26 +138,29 @@ TEST_F(CrossDialect, SoAreThoseOfACamerasDriver) {
   expectOneTruth("cam", FrameKind::Real);
 }
 
-TEST_F(CrossDialect, ThePlcsRangesAreTheNativeFloatsWithTheirTimeStamp) {
+/// Frames of the source as a PLC reads them; `rangesOf` makes ranges of what the source has.
+void CrossDialect::expectPlcsRanges(const std::string& source_keys,
+                                    const std::function<std::vector<float>(const Frame&)>& rangesOf) {
   const std::uint16_t port = freePort();
   start(
       fmt::format("[[source]]\nname = 'cam'\n{}pace = 'trigger'\n[[facade]]\nkind = 'modbus'\nsource = "
-                  "'cam'\nport = {}\n",
-                  kSmallSim, port));
+                  "'cam'\nport = {}\nleast_valid = 0.1\n",
+                  source_keys, port));
   boost::asio::io_context io;
   boost::asio::ip::tcp::socket plc{io};
   plc.connect({boost::asio::ip::address_v4::loopback(), port});
-  // Input registers 30 to 37: centre and nearest range, device time.
-  const std::array<std::uint8_t, 12> request{0, 7, 0, 0, 0, 6, 1, 4, 0, 30, 0, 8};
-  const auto ask = [&] {
-    std::array<std::uint8_t, 25> answer{};
+  // Input registers: a word or, from 30 to 37, centre and nearest range, device time.
+  const auto ask = [&](std::uint8_t first, std::uint8_t count) {
+    const std::array<std::uint8_t, 12> request{0, 7, 0, 0, 0, 6, 1, 4, 0, first, 0, count};
+    std::vector<std::uint8_t> answer(9U + 2U * count);
     boost::asio::write(plc, boost::asio::buffer(request));
     boost::asio::read(plc, boost::asio::buffer(answer));
-    std::array<std::uint32_t, 4> numbers{};
-    for (std::size_t i = 0; i < 16; ++i) numbers[i / 4] = numbers[i / 4] << 8 | answer[9 + i];
+    std::vector<std::uint32_t> numbers((count + 1U) / 2U);
+    for (std::size_t i = 9; i < answer.size(); ++i)
+      numbers[(i - 9) / 4] = numbers[(i - 9) / 4] << 8 | answer[i];
     return numbers;
   };
-  ask();  // now it is connected, and wants frames
+  ask(30, 8);  // now it is connected, and wants frames
   auto native = client();
   auto stream = native.subscribe("cam");
   ASSERT_TRUE(stream.ok()) << stream.error().message;
@@ -159,17 +168,42 @@ TEST_F(CrossDialect, ThePlcsRangesAreTheNativeFloatsWithTheirTimeStamp) {
     ASSERT_TRUE(native.trigger("cam").ok());
     const auto frame = stream->next(kSoon);
     ASSERT_TRUE(frame.ok()) << frame.error().message;
-    const auto range = frame->find(PlaneKind::Range)->as<float>();
+    const std::vector<float> range_m = rangesOf(*frame);
     const auto ns = static_cast<std::uint64_t>(frame->moment.exposures.at(0).start.ns);
-    EXPECT_TRUE(eventually([&] { return ask()[3] == ns % 1'000'000'000 && (ns == 0 || ask()[0] != 0); }));
-    const auto numbers = ask();
+    EXPECT_TRUE(
+        eventually([&] { return ask(30, 8)[3] == ns % 1'000'000'000 && (ns == 0 || ask(30, 8)[0] != 0); }));
+    const auto numbers = ask(30, 8);
     EXPECT_EQ(numbers[2], ns / 1'000'000'000);
     float nearest = std::nanf("");
-    for (const float one : range) nearest = std::fmin(nearest, one);
+    for (const float one : range_m) nearest = std::fmin(nearest, one);
     if (i == 0) continue;  // before the first frame the device time is 0, too
-    EXPECT_EQ(numbers[0], std::bit_cast<std::uint32_t>(range[static_cast<std::size_t>(66 * 176 + 88)]));
+    const auto& [width, height] = std::pair{frame->camera.width, frame->camera.height};
+    EXPECT_EQ(numbers[0], std::bit_cast<std::uint32_t>(
+                              range_m[static_cast<std::size_t>(height / 2 * width + width / 2)]));
     EXPECT_EQ(numbers[1], std::bit_cast<std::uint32_t>(nearest));
+    EXPECT_EQ(ask(1, 1)[0], 0U) << "an alarm";
   }
+}
+
+TEST_F(CrossDialect, ThePlcsRangesAreTheNativeFloatsWithTheirTimeStamp) {
+  expectPlcsRanges(kSmallSim, [](const Frame& frame) {
+    const auto range_m = frame.find(PlaneKind::Range)->as<float>();
+    return std::vector<float>(range_m.begin(), range_m.end());
+  });
+}
+
+TEST_F(CrossDialect, OfASourceThatHasDepthAloneTheyFollowFromThePixelsRay) {
+  expectPlcsRanges(
+      "driver = 'pattern'\nwidth = 64\nheight = 48\nplanes = ['depth']\n", [](const Frame& frame) {
+        std::vector<float> range_m;
+        for (const float depth_m : frame.find(PlaneKind::Depth)->as<float>()) {
+          const auto i = static_cast<int>(range_m.size());
+          const double z = rayThroughPixel(frame.camera, i % 64, i / 64).v.z;
+          range_m.push_back(
+              static_cast<float>(static_cast<double>(depth_m) / static_cast<double>(static_cast<float>(z))));
+        }
+        return range_m;
+      });
 }
 
 }  // namespace

@@ -205,6 +205,27 @@ TEST_F(ModbusFacade, WhatIsNotInTheMapIsRefused) {
   EXPECT_EQ(modbus_report_slave_id(plc.line(), 8, reinterpret_cast<std::uint8_t*>(words)), -1);
   EXPECT_EQ(errno, EMBXILFUN);
   EXPECT_EQ(modbus_read_input_registers(plc.line(), 0, 38, words), 38) << "the whole map at once";
+  EXPECT_EQ(modbus_read_input_registers(plc.line(), 127, 2, words), -1) << "beyond the end";
+}
+
+/// As PLCs do: whole bytes of bits, and blocks of registers.
+TEST_F(ModbusFacade, BlocksThatReachBeyondTheRowsAreReadAndPaddedWithZeros) {
+  startModbus(kPattern);
+  Plc plc{port_};
+  std::uint8_t bits[16] = {};
+  std::uint16_t words[125] = {};
+  std::ranges::fill(bits, std::uint8_t{9});
+  std::ranges::fill(words, std::uint16_t{9});
+  EXPECT_EQ(modbus_read_input_bits(plc.line(), 0, 16, bits), 16);
+  EXPECT_EQ(bits[15], 0);
+  EXPECT_EQ(modbus_read_bits(plc.line(), 0, 8, bits), 8);
+  EXPECT_EQ(bits[7], 0);
+  EXPECT_EQ(modbus_read_registers(plc.line(), 0, 64, words), 64);
+  EXPECT_EQ(words[63], 0);
+  EXPECT_EQ(modbus_read_input_registers(plc.line(), 0, 125, words), 125);
+  EXPECT_EQ(words[40], 0);
+  EXPECT_EQ(modbus_write_register(plc.line(), 40, 1), -1) << "of no row";
+  EXPECT_EQ(errno, EMBXILADD);
 }
 
 TEST_F(ModbusFacade, AStalledClientHoldsUpNobody) {
