@@ -14,6 +14,7 @@
 #include "sim/pictures/read.h"
 #include "tests/protocol/example_messages.h"
 #include "tests/record/record_testing.h"
+#include "tools/cli/command.h"
 #include "tools/cli/doctor_checks.h"
 #include "tools/cli/pose.h"
 
@@ -88,6 +89,33 @@ TEST(Toftwin, HelpAndVersionAreStatus0) {
   }
 }
 
+TEST(Toftwin, AStandardOutputThatIsFullIsStatus6) {
+  const std::string full = " > /dev/full";
+  for (const Command& command : commands()) {
+    const Ran ran = toftwin(std::string{command.name} + " --help" + full);
+    EXPECT_EQ(ran.status, 6) << command.name;
+    EXPECT_EQ(ran.err,
+              "toftwin: the standard output cannot be written: No space left on device; "
+              "what it shows is not whole\n")
+        << command.name;
+  }
+  for (const std::string arguments : {"list --drivers", "list --drivers --json", "usb", "usb --json",
+                                      "doctor", "doctor --json", "completion bash", "completion manual"}) {
+    EXPECT_EQ(toftwin(arguments + full).status, 6) << arguments;
+  }
+}
+
+TEST(Toftwin, AReaderThatIsGoneIsStatus6WithoutAWord) {
+  const Folder folder;
+  const std::string fifo = "'" + (folder / "fifo").string() + "'";
+  for (const Command& command : commands()) {  // 3 lets 4 open without a reader; then it is gone
+    const Ran ran = runShell("mkfifo " + fifo + "; exec 3<>" + fifo + " 4>" + fifo + " 3<&-; rm " + fifo +
+                             "; '" TOFTWIN_PROGRAM "' " + command.name + " --help >&4");
+    EXPECT_EQ(ran.status, 6) << command.name;
+    EXPECT_EQ(ran.err, "") << command.name;
+  }
+}
+
 TEST(Toftwin, ADaemonThatIsNotThereIsStatus3) {
   for (const char* arguments : {"list", "info kinect", "grab kinect -o /tmp/never.png",
                                 "record kinect -o /tmp/never.mcap"}) {
@@ -158,6 +186,12 @@ TEST_F(Recorded, ReplayListsOneLinePerFrame) {
   EXPECT_THAT(one.out, HasSubstr("0.700000 s  o3d"));
   EXPECT_THAT(toftwin("replay --json --count 1 " + path("a.mcap")).out,
               HasSubstr(R"({"source":"kinect","sequence":0,"received_ns":1760000000000000000,)"));
+}
+
+TEST_F(Recorded, AListThatCannotBeWrittenIsStatus6) {
+  const Ran full = runShell("'" TOFTWIN_PROGRAM "' replay " + path("a.mcap") + " --json > /dev/full");
+  EXPECT_EQ(full.status, 6);
+  EXPECT_THAT(full.err, HasSubstr("the standard output cannot be written: No space left on device"));
 }
 
 TEST_F(Recorded, ReplayMakesOneHdf5FileOfARecording) {

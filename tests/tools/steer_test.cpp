@@ -57,6 +57,29 @@ TEST_F(Steered, ParametersAreShownWithTheirBoundsAndSet) {
   EXPECT_EQ(run("set pattern speed_px fast").status, 2);
 }
 
+TEST_F(Steered, AParameterIsSetByOneWordAsRecipesHaveIt) {
+  const Ran set = run("set pattern speed_px=5");
+  EXPECT_EQ(set.status, 0) << set.err;
+  EXPECT_THAT(set.out, HasSubstr("speed_px  5 "));
+  EXPECT_EQ(run("set pattern speed_px=65").status, 4);
+  for (const std::string wrong : {"speed_px=", "speed_px=fast", "speed_px=3mm", "=3", "speed_px=3 4"}) {
+    const Ran ran = run("set pattern " + wrong);
+    EXPECT_EQ(ran.status, 2) << wrong;
+    EXPECT_THAT(ran.err, HasSubstr("KEY=VALUE")) << wrong;
+  }
+  EXPECT_THAT(run("set pattern speed_px").out, HasSubstr("speed_px  5 "));
+}
+
+TEST_F(Steered, AStandardOutputThatIsFullIsStatus6) {
+  for (const std::string arguments : {"list", "list --json", "info pattern", "info pattern --json",
+                                      "pose pattern", "set pattern", "set pattern --json", "doctor"}) {
+    EXPECT_EQ(runShell("'" TOFTWIN_PROGRAM "' " + arguments + " --address unix:" + socket() + " > /dev/full")
+                  .status,
+              6)
+        << arguments;
+  }
+}
+
 TEST_F(Steered, ATriggerMakesOneFrame) {
   std::optional<Ran> grabbed;
   std::thread grabbing{[&] { grabbed = run("grab asked --timeout 30 -o " + path("a.png")); }};

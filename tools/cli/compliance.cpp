@@ -78,7 +78,7 @@ void print(const drivers::Finding& finding) {
   fmt::print("{:<5}{}\n", wordOf(finding.outcome), finding.check);
   if (!finding.detail.empty()) fmt::print("     {}\n", finding.detail);
   if (finding.outcome == Outcome::Failed) fmt::print("     why it matters: {}\n", finding.because);
-  std::fflush(stdout);
+  flushOutput();
 }
 
 compare::Json toJson(const ReportHeader& header, compare::Json checks) {
@@ -91,7 +91,7 @@ void print(const ReportHeader& header) {
   for (const auto& [what, value] : header) {
     fmt::print("{:<18}{}\n", what, value.isText() ? value.words() : value.line());
   }
-  std::fflush(stdout);
+  flushOutput();
 }
 
 /// What can be attached to a report on a camera that is there and does not open.

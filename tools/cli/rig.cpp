@@ -123,7 +123,7 @@ Result<> follow(rig::Rig& mover, const Options& options) {
       if (!frame) return frame.error();
       if (auto told = mover.setCaptured(true); !told) return told.error();
       fmt::print("capture {}: frame {} of {}\n", ++done, frame->sequence, options.source);
-      std::fflush(stdout);
+      flushOutput();
     }
     if (!*is_set && was_set) {
       if (auto told = mover.setCaptured(false); !told) return told.error();

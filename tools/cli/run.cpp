@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <sstream>
 #include <string>
 #include <string_view>
 
@@ -82,7 +83,9 @@ int run(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) {  // --help, --version
-      app.exit(error);
+      std::ostringstream text;
+      app.exit(error, text, text);
+      fmt::print("{}", text.str());
       return static_cast<int>(Exit::Ok);
     }
     const std::string command = argc > 1 && argv[1][0] != '-' ? std::string{" "} + argv[1] : "";

@@ -2,6 +2,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
+#include <string_view>
 
 #include "tools/cli/command.h"
 #include "tools/cli/describe.h"
@@ -17,6 +19,24 @@ struct Options {
   std::optional<double> value;
   bool json = false;
 };
+
+/// KEY=VALUE in one word, as recipes have it, becomes the two.
+Result<> split(Options& options) {
+  const std::size_t equals = options.key.find('=');
+  if (equals == std::string::npos) return {};
+  const auto wrong = [&](std::string_view what) {
+    return Error{Error::Code::InvalidArgument, fmt::format("{}: {}", options.key, what)};
+  };
+  if (options.value) return wrong("a second value follows; give one, as KEY VALUE or KEY=VALUE");
+  const std::string number = options.key.substr(equals + 1);
+  const char* end = number.data() + number.size();
+  double value = 0.0;
+  const auto [read, error] = std::from_chars(number.data(), end, value);
+  if (equals == 0 || error != std::errc{} || read != end) return wrong("write KEY=VALUE with a number");
+  options.value = value;
+  options.key.resize(equals);
+  return {};
+}
 
 /// All parameters of the source, or the one that is asked for.
 Result<std::vector<Parameter>> parametersOf(Client& client, const Options& options) {
@@ -54,13 +74,15 @@ Command setCommand() {
   return {"set", "show or set a camera's parameters while it runs",
           "  toftwin set kinect                             all, with their values and bounds\n"
           "  toftwin set kinect ambient_klx 20\n"
+          "  toftwin set kinect ambient_klx=20              the same\n"
           "  toftwin set kinect exposure_us                 shows this one\n",
           [](Arguments& args) -> Run {
             const auto options = std::make_shared<Options>();
             args.option("SOURCE", options->source, "name of the camera").required();
-            args.option("KEY", options->key, "the parameter; its name ends in its unit");
+            args.option("KEY", options->key, "the parameter; its name ends in its unit; KEY=VALUE sets it");
             args.option("VALUE", options->value, "a number; without it the present one is shown");
             args.flag("--json", options->json, "as JSON");
+            args.check([options] { return split(*options); });
             options->daemon.add(args);
             return [options] { return run(*options); };
           }};

@@ -6,9 +6,11 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cerrno>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
+#include <system_error>
 
 namespace toftwin::cli {
 namespace {
@@ -67,6 +69,10 @@ void Progress::show(std::uint64_t done, double share_of_next, std::string_view e
   drawn_at_ = now;
   fmt::print(stderr, "\r\033[K{}", line(all, extra));
   std::fflush(stderr);
+}
+
+void flushOutput() {
+  if (std::fflush(stdout) != 0) throw std::system_error{errno, std::generic_category(), "standard output"};
 }
 
 void catchInterrupts() {

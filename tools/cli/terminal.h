@@ -38,6 +38,9 @@ class Progress {
   std::chrono::steady_clock::time_point began_, drawn_at_;
 };
 
+/// Shows what was printed now. Throws std::system_error where it cannot be written, as fmt::print does.
+void flushOutput();
+
 /// From now on Ctrl-C and SIGTERM do not end the program, but make `interrupted` true.
 void catchInterrupts();
 bool interrupted();

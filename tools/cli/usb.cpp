@@ -56,7 +56,7 @@ void tell(const usb::Watch::Event& event) {
         fmt::print("  {}\n", warning);
     }
   }
-  std::fflush(stdout);
+  flushOutput();
 }
 
 Result<Exit> run(const Options& options) {
