@@ -9,18 +9,13 @@
 
 namespace toftwin::compare {
 
-/// A camera of the lens-scatter runs. `modulation`: frequencies and their weights in the decoded
-/// range; empty for a pulsed camera.
+/// A camera of the lens-scatter runs, by its preset's name. `modulation`: frequencies and their weights in the
+/// decoded range, empty for a pulsed camera. `runs` show a plate before the background.
 struct ScatterCamera {
   std::string name, title;
   std::vector<std::pair<Frequency, double>> modulation;
   std::vector<int> runs;
 };
 std::vector<ScatterCamera> scatterCameras();
-
-/// Range error of a surface at `background_mm` to whose light that of a surface at `plate_mm` is
-/// added with `eta` times its strength: phasors for a modulated camera, charge for a pulsed one.
-/// [mm]
-double veilError_mm(const ScatterCamera& camera, double eta, double background_mm, double plate_mm);
 
 }  // namespace toftwin::compare

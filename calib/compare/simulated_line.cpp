@@ -5,6 +5,9 @@
 #include <cmath>
 #include <complex>
 #include <numbers>
+#include <type_traits>
+#include <utility>
+#include <variant>
 
 #include <fmt/format.h>
 #include <toftwin/nan.h>
@@ -72,7 +75,38 @@ std::vector<double> meanRange(const sim::SensorModel& camera, const sim::Light& 
   return result;
 }
 
+bool isNoise(const sim::AnyEffect& effect) {
+  return std::visit(
+      []<class E>(const E&) {
+        return std::is_same_v<E, sim::ShotNoise> || std::is_same_v<E, sim::ReadNoise> ||
+               std::is_same_v<E, sim::RangeNoise>;
+      },
+      effect);
+}
+
 }  // namespace
+
+TracedLine traceLine(const sim::SensorModel& camera, const sim::Scene& scene, int samples) {
+  sim::TraceRequest request = middleRowOnly(camera.traceRequest());
+  request.samples_per_pixel = samples;
+  request.max_surfaces = 1;
+  TracedLine line{.light = sim::trace(scene, request), .row = request.region_y, .t = {}};
+  for (int x = 0; x < line.light.width(); ++x) {
+    const Vec3d ray = rayThroughPixel(request.camera, static_cast<double>(x), line.row).v;
+    line.t.push_back(ray.x / ray.z);
+  }
+  return line;
+}
+
+ScanLine readLine(const sim::SensorModel& camera, const TracedLine& line) {
+  return {line.t, meanRange(camera, line.light, {.frames = 1}, line.row, 0)};
+}
+
+sim::SensorModel withoutNoise(const sim::SensorModel& camera) {
+  std::vector<sim::AnyEffect> effects = camera.effects();
+  std::erase_if(effects, isNoise);
+  return camera.withEffects(std::move(effects));
+}
 
 Result<SimulatedLine> simulateLine(const sim::SensorModel& camera, const sim::Scene& scene,
                                    const LineEffort& effort,

@@ -36,6 +36,20 @@ Result<SimulatedLine> simulateLine(const sim::SensorModel& camera, const sim::Sc
                                    const LineEffort& effort,
                                    const std::function<void(double)>& progress = {});
 
+/// The light of the middle row before a scene, traced once: for fits that change the camera's effects again and
+/// again.
+struct TracedLine {
+  sim::Light light;
+  int row = 0;
+  std::vector<double> t;
+};
+/// Light that comes straight from the emitters, of so many samples a pixel.
+TracedLine traceLine(const sim::SensorModel& camera, const sim::Scene& scene, int samples);
+/// One frame of it; NaN where the camera calls a pixel invalid.
+ScanLine readLine(const sim::SensorModel& camera, const TracedLine& line);
+/// A camera of which one frame is the mean of many: its noise is switched off, all else acts.
+sim::SensorModel withoutNoise(const sim::SensorModel& camera);
+
 /// A few pixels around the optical axis before a flat wall square to it, as the distance and noise
 /// tables were taken: each pixel read `frames` times.
 struct WallReading {
