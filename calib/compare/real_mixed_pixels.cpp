@@ -80,8 +80,15 @@ Result<Finding> judgeMixedPixels(const RealDataJob& job) {
                           shown(summarise(ideal).rms), shown(box.judged_rms), shown(fit.judged_rms),
                           shown(fit.value[0], 2), shown(100.0 * fit.value[1], 0)});
     const std::string data = std::string{title} + ", edges of an object";
-    finding.outcomes.push_back({data, fit.judged_n, summarise(ideal).rms, summarise(ideal).rms,
-                                std::nan(""), box.judged_rms, fit.judged_rms});
+    const double none = std::nan("");
+    finding.outcomes.push_back({.data = data,
+                                .judged = fit.judged_n,
+                                .ideal_mm = summarise(ideal).rms,
+                                .constant_mm = summarise(ideal).rms,
+                                .published_mm = none,
+                                .as_is_mm = none,
+                                .fitted_mm = fit.judged_rms,
+                                .is_by_law = true});
     finding.ablations.push_back({"blur of the lens", data, fit.judged_rms, box.judged_rms});
     finding.ablations.push_back(
         {"extent of the pixel and blur", data, fit.judged_rms, summarise(ideal).rms});

@@ -174,7 +174,7 @@ Result<Finding> judgeWarmUp(const RealDataJob& job, const RealCamera& camera) {
   finding.data.set("drift_mm", drift).set("jitter_mm", floor).set("samples", all.time_s.size());
   const std::string ahead = camera.title + ", warm-up, second half from the first";
   finding.outcomes.push_back(
-      {ahead, judged_ahead, flat_ahead, flat_ahead, std::nan(""), std::nan(""), drift_ahead});
+      {ahead, judged_ahead, flat_ahead, flat_ahead, std::nan(""), std::nan(""), drift_ahead, true});
   finding.ablations.push_back({"warm_up", ahead, drift_ahead, flat_ahead});
   // A flat model at the jitter leaves nothing that the effect could be good at.
   const bool is_flat = flat_ahead < 1.3 * floor;

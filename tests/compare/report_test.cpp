@@ -234,7 +234,7 @@ TEST(Summary, NamesTheEffectsThatCount) {
   a.ablations = {{"multipath", "corner", 4.0, 10.0}, {"delay", "corner", 4.0, 5.9}};
   b.ablations = {{"multipath", "box", 2.0, 3.0}, {"scatter", "plate", 1.0, 5.0}};
   const Section section = summarySection({a, b});
-  EXPECT_THAT(std::get<Paragraph>(section.blocks.at(1)).text,
+  EXPECT_THAT(std::get<Paragraph>(section.blocks.at(2)).text,
               HasSubstr("(from 1.5 on): multipath (corner 2.5; box 1.5), scatter (plate 5.0)."));
 }
 
