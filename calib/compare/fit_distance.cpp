@@ -128,8 +128,7 @@ void addDistanceFit(const RealCamera& camera, const std::vector<double>& referen
       for (std::size_t i = 0; i < left.size(); ++i)
         if (isJudged(blocks[i])) e.push_back(error_mm[i]), p.push_back(left[i]);
       finding.outcomes.push_back({camera.title + ", distance error", fit.judged_n, summarise(e).rms,
-                                  ideal.judged_rms, std::nan(""), summarise(p).rms,
-                                  fit.judged_rms, true});
+                                  ideal.judged_rms, std::nan(""), summarise(p).rms, fit.judged_rms, true});
       std::vector<Term> rest(terms.begin() + 1, terms.end());
       finding.ablations.push_back({"constant delay", camera.title + ", distance error",
                                    fit.judged_rms, fitLinear(left, rest, blocks).judged_rms});

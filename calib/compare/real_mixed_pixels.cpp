@@ -24,12 +24,11 @@ Result<Finding> judgeMixedPixels(const RealDataJob& job) {
       "Depth across the object's edges as the mean of two surfaces, weighted by what the pixel "
       "sees of each. "
       "Fitted on the left edge, judged on the right one; RMS in mm",
-      {"camera", "n judged", "step [mm]", "ideal camera", "box pixel alone", "with blur",
-       "blur σ [px]", "wide part [%]"},
+      {"camera", "n judged", "step [mm]", "ideal camera", "box pixel alone", "with blur", "blur σ [px]",
+       "wide part [%]"},
       {}};
   FigureRow figures;
-  for (const auto& [name, title] :
-       {std::pair{"kinect_v2", "Kinect v2"}, std::pair{"o3d303", "O3D303"}}) {
+  for (const auto& [name, title] : {std::pair{"kinect_v2", "Kinect v2"}, std::pair{"o3d303", "O3D303"}}) {
     const auto columns = loadColumns(job.folder / "mixed_pixels" / (std::string{name} + ".csv"),
                                      {"x_mm", "z_mm", "background_z_mm"});
     if (!columns) return columns.error();
@@ -44,8 +43,7 @@ Result<Finding> judgeMixedPixels(const RealDataJob& job) {
     Blocks blocks;
     double left_edge = std::nan(""), right_edge = std::nan("");
     for (std::size_t i = 1; i < depth.size(); ++i) {
-      const double at =
-          static_cast<double>(i - 1) + (half - depth[i - 1]) / (depth[i] - depth[i - 1]);
+      const double at = static_cast<double>(i - 1) + (half - depth[i - 1]) / (depth[i] - depth[i - 1]);
       if (depth[i - 1] < half && depth[i] >= half && std::isnan(left_edge)) left_edge = at;
       if (depth[i - 1] >= half && depth[i] < half) right_edge = at;
     }
@@ -54,8 +52,7 @@ Result<Finding> judgeMixedPixels(const RealDataJob& job) {
                    fmt::format("mixed_pixels/{}.csv shows no object before the wall", name)};
     for (const bool right : {false, true}) {
       for (std::size_t i = 0; i < depth.size(); ++i) {
-        const double n =
-            right ? right_edge - static_cast<double>(i) : static_cast<double>(i) - left_edge;
+        const double n = right ? right_edge - static_cast<double>(i) : static_cast<double>(i) - left_edge;
         if (std::abs(n) > 8.0 || std::isnan(depth[i])) continue;
         offset.push_back(n), y.push_back(depth[i]), blocks.push_back(right ? 1 : 0);
       }
@@ -70,8 +67,7 @@ Result<Finding> judgeMixedPixels(const RealDataJob& job) {
     const Bounded numbers[] = {{0.8, 0.289, 4.0}, {0.05, 0.0, 0.5}, {top, 0.5 * top, 1.5 * top}};
     const CurveFit fit = fitCurve(y, numbers, model, blocks);
     // A pixel that sees exactly one pixel's width has σ = 1/√12; the ideal camera no width at all.
-    const Bounded narrow[] = {
-        {0.289, 0.289, 0.2891}, {0.0, 0.0, 1e-9}, {top, 0.5 * top, 1.5 * top}};
+    const Bounded narrow[] = {{0.289, 0.289, 0.2891}, {0.0, 0.0, 1e-9}, {top, 0.5 * top, 1.5 * top}};
     const CurveFit box = fitCurve(y, narrow, model, blocks);
     std::vector<double> ideal;
     for (std::size_t i = 0; i < y.size(); ++i)
@@ -90,8 +86,7 @@ Result<Finding> judgeMixedPixels(const RealDataJob& job) {
                                 .fitted_mm = fit.judged_rms,
                                 .is_by_law = true});
     finding.ablations.push_back({"blur of the lens", data, fit.judged_rms, box.judged_rms});
-    finding.ablations.push_back(
-        {"extent of the pixel and blur", data, fit.judged_rms, summarise(ideal).rms});
+    finding.ablations.push_back({"extent of the pixel and blur", data, fit.judged_rms, summarise(ideal).rms});
     Curve left{.name = "left edge (fitted)", .ink = Ink::Baseline, .stroke = Stroke::Dots},
         right{.name = "right edge (judged)", .ink = Ink::Measured, .stroke = Stroke::Dots},
         line{.name = "fitted to the left edge", .ink = Ink::Simulated};
@@ -100,12 +95,11 @@ Result<Finding> judgeMixedPixels(const RealDataJob& job) {
       dots.x.push_back(offset[i]), dots.y.push_back(y[i]);
       if (!isJudged(blocks[i])) line.x.push_back(offset[i]), line.y.push_back(fit.prediction[i]);
     }
-    figures.figures.push_back(
-        {fmt::format("{}.", title), toSvg(Plot{.title = title,
-                                               .x_label = "pixels from the edge",
-                                               .y_label = "depth before the wall [mm]",
-                                               .curves = {left, right, line},
-                                               .compact = true})});
+    figures.figures.push_back({fmt::format("{}.", title), toSvg(Plot{.title = title,
+                                                                     .x_label = "pixels from the edge",
+                                                                     .y_label = "depth before the wall [mm]",
+                                                                     .curves = {left, right, line},
+                                                                     .compact = true})});
     Json json = Json::object();
     json.set("blur_px", fit.value[0])
         .set("judged_rms_mm", fit.judged_rms)

@@ -33,7 +33,8 @@ namespace {
 /// Of the plate as of all else: what is fitted is the veil times the ratio of both.
 constexpr double kAlbedo = 0.5, kHeight_mm = 4000.0;
 
-/// One run: the background's change beside the plate, what the plate is, and the row's light with and without it.
+/// One run: the background's change beside the plate, what the plate is, and the row's light with and without
+/// it.
 struct Run {
   std::vector<double> t, change_mm;
   double plate_mm = 0.0, covered = 0.0;
@@ -56,7 +57,8 @@ std::string backgroundToml(std::span<const double> t, std::span<const double> ba
     const double z = quantile(depth[part], 0.5);
     const double at = first + (static_cast<double>(part) + 0.5) * (last - first) / kParts;
     const std::pair here{at * z, z};
-    if (before) toml += wallToml({before->first, before->second, here.first, here.second, kHeight_mm, "wall"});
+    if (before)
+      toml += wallToml({before->first, before->second, here.first, here.second, kHeight_mm, "wall"});
     before = here;
   }
   return toml;
@@ -88,7 +90,8 @@ std::optional<Run> toRun(const std::vector<std::vector<double>>& columns, const 
     run.t.push_back(t[i]), run.change_mm.push_back(z[i] - background[i]);
   }
   const std::string empty = materialToml("wall", kAlbedo) + backgroundToml(background_t, background_mm);
-  const Wall upright{edge * run.plate_mm, run.plate_mm, last * run.plate_mm, run.plate_mm, kHeight_mm, "wall"};
+  const Wall upright{edge * run.plate_mm, run.plate_mm, last * run.plate_mm,
+                     run.plate_mm,        kHeight_mm,   "wall"};
   constexpr int kSamples = 16;
   run.without = traceLine(camera, *sim::Scene::parse(empty, "background.toml"), kSamples);
   run.with = traceLine(camera, *sim::Scene::parse(empty + wallToml(upright), "plate.toml"), kSamples);
@@ -176,11 +179,9 @@ Result<> addCamera(const RealDataJob& job, const ScatterCamera& camera, Finding&
   figures.figures.push_back({camera.title + ".", toSvg(plot)});
   const double ideal = summarise(judged).rms, preset_rms = summarise(left_as_is).rms;
   table.rows.push_back({camera.title, std::to_string(fit.judged_n), shown(ideal), shown(preset_rms),
-                        shown(fit.judged_rms),
-                        shownFitted(1e2 * fit.value[0], 1e2 * fit.error[0], 2)});
+                        shown(fit.judged_rms), shownFitted(1e2 * fit.value[0], 1e2 * fit.error[0], 2)});
   const std::string data = camera.title + ", dark wall beside a bright plate";
-  finding.outcomes.push_back(
-      {data, fit.judged_n, ideal, ideal, std::nan(""), preset_rms, fit.judged_rms});
+  finding.outcomes.push_back({data, fit.judged_n, ideal, ideal, std::nan(""), preset_rms, fit.judged_rms});
   finding.ablations.push_back({"lens_scatter, veil", data, fit.judged_rms, preset_rms});
   Json json = Json::object();
   json.set("veil_times_albedo_ratio", fit.value[0])
@@ -246,16 +247,18 @@ Result<Finding> judgeScatter(const RealDataJob& job) {
       "One number per camera, lens_scatter's even veil, leaves {} of {} mm RMS over the three cameras' runs "
       "that it was not "
       "fitted to ({} explained), the Kinect's change of sign included.",
-      shown(std::sqrt(with / 3.0)), shown(std::sqrt(without / 3.0)),
-      shownPercent(1.0 - with / without));
+      shown(std::sqrt(with / 3.0)), shown(std::sqrt(without / 3.0)), shownPercent(1.0 - with / without));
   finding.section.tone = toneOf(1.0 - with / without);
   finding.section.blocks = {
       figures, table, runs, profile,
-      Paragraph{"Simulated: the row's background as it was measured without the plate, and an upright plate as far as the "
-                "row shows it; direct light, the camera's samples and decoder, no noise. The change is that of two "
-                "such rows. The albedos were not measured and the plate's height is not known (here: as the background, and "
-                "over the whole image): s alone cannot be had from this.",
-                true}};
+      Paragraph{
+          "Simulated: the row's background as it was measured without the plate, and an upright plate as far "
+          "as the "
+          "row shows it; direct light, the camera's samples and decoder, no noise. The change is that of two "
+          "such rows. The albedos were not measured and the plate's height is not known (here: as the "
+          "background, and "
+          "over the whole image): s alone cannot be had from this.",
+          true}};
   return finding;
 }
 

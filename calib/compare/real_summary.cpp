@@ -59,7 +59,8 @@ Section summarySection(const std::vector<Finding>& findings) {
   for (const Finding& finding : findings) {
     for (const Outcome& o : finding.outcomes) {
       left.rows.push_back({o.data, std::to_string(o.judged), cell(o.ideal_mm), cell(o.constant_mm),
-                           cell(o.published_mm), cell(o.as_is_mm), cell(o.fitted_mm) + (o.is_by_law ? " *" : "")});
+                           cell(o.published_mm), cell(o.as_is_mm),
+                           cell(o.fitted_mm) + (o.is_by_law ? " *" : "")});
       ++all, better += o.fitted_mm < 0.8 * o.constant_mm ? 1 : 0;
     }
     for (const Ablation& a : finding.ablations)
@@ -71,10 +72,11 @@ Section summarySection(const std::vector<Finding>& findings) {
       "does, on "
       "the half that it was not fitted to.",
       better, all);
-  section.blocks = {left,
-                    Paragraph{"* Fitted: the effects' laws in closed form, beside the preset's simulation or in its "
-                              "place. All else is simulated: light, samples, decoder."},
-                    Paragraph{whatCounts(findings)}, worth};
+  section.blocks = {
+      left,
+      Paragraph{"* Fitted: the effects' laws in closed form, beside the preset's simulation or in its "
+                "place. All else is simulated: light, samples, decoder."},
+      Paragraph{whatCounts(findings)}, worth};
   return section;
 }
 

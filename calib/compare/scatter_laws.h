@@ -9,8 +9,8 @@
 
 namespace toftwin::compare {
 
-/// A camera of the lens-scatter runs, by its preset's name. `modulation`: frequencies and their weights in the
-/// decoded range, empty for a pulsed camera. `runs` show a plate before the background.
+/// A camera of the lens-scatter runs, by its preset's name. `modulation`: frequencies and their weights in
+/// the decoded range, empty for a pulsed camera. `runs` show a plate before the background.
 struct ScatterCamera {
   std::string name, title;
   std::vector<std::pair<Frequency, double>> modulation;

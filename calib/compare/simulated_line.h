@@ -36,8 +36,8 @@ Result<SimulatedLine> simulateLine(const sim::SensorModel& camera, const sim::Sc
                                    const LineEffort& effort,
                                    const std::function<void(double)>& progress = {});
 
-/// The light of the middle row before a scene, traced once: for fits that change the camera's effects again and
-/// again.
+/// The light of the middle row before a scene, traced once: for fits that change the camera's effects again
+/// and again.
 struct TracedLine {
   sim::Light light;
   int row = 0;
