@@ -37,14 +37,18 @@ struct Ends {
   Lanes<int> valid{};
   Vec3Lanes position{}, normal{};
   Vec3fLanes start{};
+  Vec3Lanes direction{};     ///< of the path that arrived
+  Lanes<double> distance{};  ///< from its first surface
+  Lanes<float> weight{};     ///< of its reflection there: albedo and shape
   Lanes<float> emission{}, shape_a{}, shape_b{};
   std::vector<LightPart> parts;  ///< of each emitter and, last, of all other surfaces; or one
 };
 
 /// One of them.
 struct End {
-  Vec3d position, normal, start;
-  float shape_a, shape_b;
+  Vec3d position, normal, start, direction;
+  double distance;
+  float weight, shape_a, shape_b;
   std::size_t lane;
 };
 
@@ -240,6 +244,8 @@ void follow(const Tracing& tracing, const Tile& tile, int sample, int block, con
     packet.index[i] = static_cast<std::uint32_t>(first) + static_cast<std::uint32_t>(i);
   }
   bounce(starts.hits, dimensions.bounce(0), true, packet);
+  ends.direction = packet.direction;
+  ends.weight = packet.throughput;
   RTCRayHit16 rays;
   intersect(tracing, packet, rays, false);
   endMissed(tracing.scene.ambient_radiance, rays, packet, sums.ambient);
@@ -250,6 +256,7 @@ void follow(const Tracing& tracing, const Tile& tile, int sample, int block, con
   ends.position = hits.position;
   ends.normal = hits.normal;
   ends.start = hits.start;
+  ends.distance = hits.distance;
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     packet.throughput[i] = 1.0f;
     packet.length[i] = -hits.distance[i];
@@ -268,12 +275,32 @@ End endOf(const Ends& ends, std::size_t i) {
   return {{ends.position.x[i], ends.position.y[i], ends.position.z[i]},
           {ends.normal.x[i], ends.normal.y[i], ends.normal.z[i]},
           {wide(ends.start.x[i]), wide(ends.start.y[i]), wide(ends.start.z[i])},
+          {ends.direction.x[i], ends.direction.y[i], ends.direction.z[i]},
+          ends.distance[i],
+          ends.weight[i],
           ends.shape_a[i],
           ends.shape_b[i],
           i};
 }
 
 using Tiles = std::array<Starts, Tile::kBlocks>;
+
+/// From a pixel on the very edge of two walls a path arrives on the other wall after no way at all: both ends
+/// are the same place to rounding, and their difference has no direction. Its density is without bounds
+/// there, next to which that of every other pixel is nothing: the end is this pixel's alone. Without this its
+/// neighbours, which see that end as well as any, would take it for one of theirs.
+void keepOwn(const Starts& starts, const End& end, Connections& to) {
+  constexpr double kUnbounded = 1e30;
+  const std::size_t i = end.lane;
+  if (to.density[i] > 0.0) return;
+  to.density[i] = kUnbounded;
+  to.shape[i] = end.weight;
+  to.direction.x[i] = end.direction.x;
+  to.direction.y[i] = end.direction.y;
+  to.direction.z[i] = end.direction.z;
+  to.far_cosine[i] = -dot(end.direction, end.normal);
+  to.length[i] = starts.hits.distance[i] + end.distance;
+}
 
 /// Connects all starts of the tile to the end, whose own pixel is lane `end.lane` of block `own`. Returns Σ π
 /// p_k.
@@ -284,7 +311,10 @@ double connectAll(const Tracing& tracing, const Tiles& starts, const End& end, s
   for (std::size_t b = 0; b < to.size(); ++b) {
     connect(starts[b], end, to[b]);
     // The path came this way: no shadow ray may doubt it.
-    if (b == own) to[b].valid[end.lane] = 0;
+    if (b == own) {
+      to[b].valid[end.lane] = 0;
+      keepOwn(starts[b], end, to[b]);
+    }
     if (isAny(to[b].valid)) {
       record(tracing.log, to[b].valid, to[b].rays, is_coherent, true);
       castShadowRays(tracing.scene, to[b].valid.v, to[b].rays, is_coherent);

@@ -47,36 +47,6 @@ TEST(Wall, HasExactlyItsRangeAndRadianceAtEveryTilt) {
   }
 }
 
-/// The integrating sphere with camera and light in its centre (closed form):
-///   P = ρI/(πR²) · e^{−2ikR} · (1 − (ρΦ)^N) / (1 − ρΦ),  Φ = [(1 + 2ikR) e^{−2ikR} − 1] / (2k²R²)
-TEST(IntegratingSphere, GivesTheClosedFormOfAllBounces) {
-  for (const double albedo : {0.5, 0.8}) {
-    const Scene scene = sceneOf("[[material]]\nname = 'm'\nalbedo = " + std::to_string(albedo) +
-                                "\n[[object]]\nshape = 'sphere'\nradius_m = 1\nmaterial = 'm'\n");
-    TraceRequest request = requestFor(4, 4, 4.0, {16_MHz, 80_MHz, 120_MHz});
-    request.samples_per_pixel = 4096;
-    for (const int surfaces : {1, 2, 5, 60}) {
-      request.max_surfaces = surfaces;
-      const Light light = trace(scene, request);
-      for (std::size_t f = 0; f < 3; ++f) {
-        const double k = wavenumber(light.frequencies[f]);
-        const Complex i{0.0, 1.0}, turn = std::polar(1.0, -2.0 * k);
-        const Complex phi = ((1.0 + 2.0 * i * k) * turn - 1.0) / (2.0 * k * k);
-        const Complex exact = albedo / kPi * turn * (1.0 - std::pow(albedo * phi, surfaces)) / (1.0 - albedo * phi);
-        Complex mean;
-        double variance = 0.0;
-        for (int p = 0; p < 16; ++p) {
-          mean += phasorAt(light, f, p % 4, p / 4) / 16.0;
-          variance += static_cast<double>(light.variance[f](p % 4, p / 4)) / 256.0;
-        }
-        EXPECT_LT(std::abs(mean - exact), 3.5 * std::sqrt(2.0 * variance) + 1e-6)
-            << "albedo " << albedo << " surfaces " << surfaces << " f " << f << " exact " << exact << " is " << mean
-            << " sigma " << std::sqrt(variance);
-      }
-    }
-  }
-}
-
 /// LED beside the lens: the light's way is (|p − L| + |p|), on the axis z + √(z² + b²); bias
 /// (√(z² + b²) − z)/2 = 1.2469 mm at z = 0.5 m, 0.3125 mm at 2 m for b = 5 cm.
 TEST(Emitter, BesideTheLensMakesNearThingsSeemFurther) {

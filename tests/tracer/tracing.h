@@ -56,4 +56,27 @@ inline double rangeSigma(const Light& light, std::size_t frequency, int x, int y
          std::abs(phasorAt(light, frequency, x, y)) / (2.0 * wavenumber(light.frequencies[frequency]));
 }
 
+/// The mean over all pixels of one frequency, and what the pixels' spread says of it: the standard deviation
+/// of a component, and of the component across the mean, which turns the phase. Even sampling makes the
+/// spread of pixels smaller than that of samples, which Light::variance states.
+struct PixelMean {
+  Complex phasor;
+  double sigma = 0.0, sigma_across = 0.0;
+};
+inline PixelMean meanOfPixels(const Light& light, std::size_t frequency) {
+  const auto& phasors = light.phasors[frequency].pixels();
+  const double pixels = static_cast<double>(phasors.size());
+  PixelMean mean;
+  for (const auto& z : phasors) mean.phasor += Complex{z} / pixels;
+  const Complex along = mean.phasor / std::abs(mean.phasor);
+  double squares = 0.0, across = 0.0;
+  for (const auto& z : phasors) {
+    squares += std::norm(Complex{z} - mean.phasor);
+    across += std::pow((Complex{z} * std::conj(along)).imag(), 2);
+  }
+  mean.sigma = std::sqrt(squares / (2.0 * pixels * (pixels - 1.0)));
+  mean.sigma_across = std::sqrt(across / (pixels * (pixels - 1.0)));
+  return mean;
+}
+
 }  // namespace toftwin::sim::testing
