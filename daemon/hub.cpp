@@ -79,13 +79,22 @@ wire::Health Hub::health() const {
   const std::scoped_lock lock{mutex_};
   for (const auto& [name, source] : sources_) {
     health.sources.push_back(source->health());
+    std::string& last_error = health.sources.back().last_error;
+    if (const auto facade = facade_problems_.find(name); facade != facade_problems_.end()) {
+      last_error = facade->second + (last_error.empty() ? "" : "; camera: " + last_error);
+    }
     const auto recorder = recorders_.find(name);
     if (recorder == recorders_.end()) continue;
     if (std::string problem = recorder->second->problem(); !problem.empty()) {
-      health.sources.back().last_error = "recording: " + problem;
+      last_error = "recording: " + problem;
     }
   }
   return health;
+}
+
+void Hub::setFacadeProblems(std::map<std::string, std::string> problem_of) {
+  const std::scoped_lock lock{mutex_};
+  facade_problems_ = std::move(problem_of);
 }
 
 void Hub::startRecording(const std::string& source, std::string_view file, RecordDone done) {

@@ -52,6 +52,9 @@ class Hub {
   [[nodiscard]] Result<std::shared_ptr<SourceHost>> find(const std::string& name) const;
   [[nodiscard]] std::vector<std::shared_ptr<SourceHost>> sources() const;
   [[nodiscard]] wire::Health health() const;
+  /// For health: why facades of these sources are not there, by the source's name. Replaces what was told
+  /// before.
+  void setFacadeProblems(std::map<std::string, std::string> problem_of);
 
   /// `done` gets the path of the file; it may be called on another thread.
   void startRecording(const std::string& source, std::string_view file, RecordDone done);
@@ -71,6 +74,7 @@ class Hub {
   const SteadyTime began_;
   std::map<std::string, std::shared_ptr<SourceHost>> sources_;  // shared with calls in progress
   std::map<std::string, std::shared_ptr<Recorder>> recorders_;  // shared with calls in progress
+  std::map<std::string, std::string> facade_problems_;
 };
 
 }  // namespace toftwin::daemon

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <map>
 #include <utility>
 
 #include "daemon/listen.h"
@@ -41,17 +42,15 @@ void Facades::apply(std::vector<ConfiguredFacade> configured) {
   std::vector<Running> before = std::exchange(running_, {});
   std::vector<Running> wanted;
   for (ConfiguredFacade& one : configured) {
-    if (!one.start) {
-      logging::error("{} is not there: {}", nameOf(one.keys), one.not_built);
-      continue;
-    }
     const auto same = std::ranges::find_if(
         before, [&](const Running& running) { return running.configured.fingerprint == one.fingerprint; });
     if (same != before.end()) {
       wanted.push_back(std::move(*same));
       before.erase(same);
     } else {
-      wanted.push_back({std::move(one), nullptr, {}});
+      if (!one.start) logging::error("{} is not there: {}", nameOf(one.keys), one.not_built);
+      std::string why = one.not_built;
+      wanted.push_back({std::move(one), nullptr, std::move(why)});
     }
   }
   before.clear();  // their ports are free before the new ones want them
@@ -86,14 +85,27 @@ void Facades::start(Running& one) {
 void Facades::startThoseThatAreNot() {
   bool is_one_missing = false;
   for (Running& one : running_) {
-    if (!one.facade) start(one);
+    if (one.facade || !one.configured.start) continue;
+    start(one);
     is_one_missing |= !one.facade;
   }
+  tellHealth();
   if (!is_one_missing) return;
   pause_.expires_after(kStartPause);
   pause_.async_wait([this](boost::system::error_code cancelled) {
     if (!cancelled) startThoseThatAreNot();
   });
+}
+
+void Facades::tellHealth() {
+  std::map<std::string, std::string> problem_of;
+  for (const Running& one : running_) {
+    if (one.facade) continue;
+    std::string& told = problem_of[one.configured.keys.source];
+    told +=
+        fmt::format("{}facade {}: {}", told.empty() ? "" : "; ", one.configured.keys.kind, one.last_error);
+  }
+  hub_.setFacadeProblems(std::move(problem_of));
 }
 
 }  // namespace toftwin::daemon

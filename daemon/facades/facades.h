@@ -17,7 +17,7 @@ namespace toftwin::daemon {
 
 /// The facades of a running daemon. One that cannot start, because its port is in use, say, is told in the
 /// log and tried again, one that this build lacks is told; the daemon serves its other clients meanwhile.
-/// Used on the thread of the io_context only.
+/// Health says of the source which are missing, and why. Used on the thread of the io_context only.
 class Facades {
  public:
   Facades(boost::asio::io_context& io, Hub& hub, const Clock& clock) : hub_(hub), clock_(clock), pause_(io) {}
@@ -30,11 +30,12 @@ class Facades {
  private:
   struct Running {
     ConfiguredFacade configured;
-    std::unique_ptr<Facade> facade;  ///< null: to be tried again
-    std::string last_error;
+    std::unique_ptr<Facade> facade;  ///< null: to be tried again, unless this build lacks it
+    std::string last_error;          ///< why it is not there
   };
   void start(Running& one);
   void startThoseThatAreNot();
+  void tellHealth();
 
   Hub& hub_;
   const Clock& clock_;

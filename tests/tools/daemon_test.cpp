@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The real `toftwin` against a real `toftwind` with the pattern source, whose every value is known.
 #include <gmock/gmock.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -9,6 +12,7 @@
 #include <cstring>
 #include <opencv2/core.hpp>
 #include <thread>
+#include <utility>
 
 #include "drivers/pattern/pattern.h"
 #include "program.h"
@@ -265,6 +269,47 @@ TEST_F(WithLittleRoom, DoctorFindsARecordingThatEndedUntilSomebodyWasTold) {
   EXPECT_THAT(ran.out, testing::Not(HasSubstr("tries again by itself")));
   EXPECT_EQ(run("record pattern --on-daemon --stop").status, 6);
   EXPECT_EQ(run("doctor --folder " + path(".")).status, 0);
+}
+
+/// A facade whose port another program has.
+class WithoutItsPort : public WithDaemon {
+ protected:
+  void SetUp() override {
+    sockaddr_in any{};
+    any.sin_family = AF_INET;
+    any.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t size = sizeof any;
+    auto* const address = reinterpret_cast<sockaddr*>(&any);
+    ASSERT_EQ(::bind(other_, address, size), 0);
+    ASSERT_EQ(::listen(other_, 1), 0);
+    ASSERT_EQ(::getsockname(other_, address, &size), 0);
+    port_ = std::to_string(ntohs(any.sin_port));
+    WithDaemon::SetUp();
+  }
+  void TearDown() override { free(); }
+  std::string moreSources() const override {
+    return "[[facade]]\nkind = 'modbus'\nsource = 'short'\nport = " + port_ + "\n";
+  }
+  void free() {
+    if (other_ >= 0) ::close(std::exchange(other_, -1));
+  }
+
+  std::string port_;
+
+ private:
+  int other_ = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+};
+
+TEST_F(WithoutItsPort, DoctorFindsAFacadeThatIsNotThereUntilItIs) {
+  Ran ran;
+  ASSERT_TRUE(eventually([&] { return (ran = run("doctor --folder " + path("."))).status == 7; })) << ran.out;
+  EXPECT_THAT(ran.out, HasSubstr("facade modbus: "));
+  EXPECT_THAT(ran.out, HasSubstr(port_));
+  EXPECT_THAT(ran.out, HasSubstr("BAD  short"));
+  EXPECT_THAT(ran.out, HasSubstr("ok   pattern"));
+  EXPECT_THAT(ran.out, HasSubstr("mend it: free what the error names"));
+  free();  // the daemon tries again every second
+  EXPECT_TRUE(eventually([&] { return (ran = run("doctor --folder " + path("."))).status == 0; })) << ran.out;
 }
 
 TEST_F(WithDaemon, DoctorFindsNothing) {

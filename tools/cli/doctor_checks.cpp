@@ -52,6 +52,11 @@ Finding checkProcessor() {
 
 std::string mendSource(const SourceHealthEntry& source) {
   if (source.last_error.empty()) return "";
+  if (source.last_error.starts_with("facade ")) {
+    return "free what the error names, or set another port of the [[facade]]; the daemon tries again every "
+           "second, "
+           "unless its build lacks the facade";
+  }
   if (!source.last_error.starts_with("recording: "))
     return "see the last error; the daemon tries again by itself";
   return fmt::format("it has ended, and what was written stays: mend what the error says, confirm it with "
@@ -173,13 +178,17 @@ std::vector<Finding> checkDaemon(const DaemonOptions& daemon) {
   }
   for (const SourceHealthEntry& source : health->sources) {
     const bool is_well = source.last_error.empty();
-    const bool is_recording = source.last_error.starts_with("recording: ");
-    findings.push_back({is_well ? State::Good : is_recording ? State::Bad : State::Warning, source.name,
-                        fmt::format("{}, {} frames, {} lost by the device, {} reconnects{}{}",
-                                    source.streaming ? "streaming" : "idle", source.frames,
-                                    source.dropped_by_device, source.reconnects,
-                                    is_well ? "" : ": ", source.last_error),
-                        mendSource(source)});
+    const bool is_bad =
+        source.last_error.starts_with("recording: ") || source.last_error.starts_with("facade ");
+    findings.push_back(
+        {is_well  ? State::Good
+         : is_bad ? State::Bad
+                  : State::Warning,
+         source.name,
+         fmt::format("{}, {} frames, {} lost by the device, {} reconnects{}{}",
+                     source.streaming ? "streaming" : "idle", source.frames, source.dropped_by_device,
+                     source.reconnects, is_well ? "" : ": ", source.last_error),
+         mendSource(source)});
   }
   return findings;
 }
