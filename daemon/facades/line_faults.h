@@ -48,6 +48,10 @@ struct LineFaultKeys : LineKeys {
     v.number("loss", loss, {0.0, 1.0}, "share of the packets that do not leave");
     v.number("duplicate", duplicate, {0.0, 1.0}, "share that leaves twice");
     v.number("reorder", reorder, {0.0, 1.0}, "share that leaves after the next one");
+    v.number("delay", delay, {0.0, 1.0}, "share that leaves later");
+    v.quantity("delay_time", delay_time, millisecond, {0.0, 10'000.0}, "by how much");
+    v.number("corruption", corruption, {0.0, 1.0},
+             "share of which one bit is another, of headers as of payload");
     visitSeedAndLog(v);
   }
 };

@@ -66,7 +66,7 @@ class GigeVisionFacade final : public Facade {
     if (!stream) return stream.error();
     const std::uint16_t source_port = stream->local_endpoint().port();
     sender_.emplace(thread_.io(), *std::move(stream), LineFaults{keys_.line, name_, line_log_},
-                    static_cast<std::size_t>(keys_.resend_mb) * kMegabyte, name_);
+                    keys_.line.delay_time, static_cast<std::size_t>(keys_.resend_mb) * kMegabyte, name_);
     device_.emplace(
         Device::Identity{.address = place->address.to_uint(),
                          .netmask = place->netmask,

@@ -39,10 +39,10 @@ int packetsAtOnce(std::uint32_t packet_size) {
 }
 
 Sender::Sender(boost::asio::io_context& io, boost::asio::ip::udp::socket socket, LineFaults faults,
-               std::size_t bytes_kept, std::string name)
+               Duration late, std::size_t bytes_kept, std::string name)
     : socket_(std::move(socket)),
       timer_(io),
-      line_(std::move(faults), [this](const Bytes& packet) { return put(packet); }),
+      line_(std::move(faults), late, [this](const Bytes& packet) { return put(packet); }),
       bytes_kept_(bytes_kept),
       name_(std::move(name)) {
   error_code ignored;

@@ -12,6 +12,8 @@
 #include <string>
 #include <utility>  // before asio: Boost 1.74 uses std::exchange without it
 
+#include <toftwin/units.h>
+
 #include "daemon/facades/gige_vision/gvsp.h"
 #include "daemon/facades/gige_vision/struck_line.h"
 #include "daemon/facades/line_faults.h"
@@ -33,8 +35,8 @@ int packetsAtOnce(std::uint32_t packet_size);
 class Sender {
  public:
   using Endpoint = boost::asio::ip::udp::endpoint;
-  /// A socket that packets come from.
-  Sender(boost::asio::io_context& io, boost::asio::ip::udp::socket socket, LineFaults faults,
+  /// A socket that packets come from; those that `faults` delays leave `late` later.
+  Sender(boost::asio::io_context& io, boost::asio::ip::udp::socket socket, LineFaults faults, Duration late,
          std::size_t bytes_kept, std::string name);
   ~Sender() { *is_alive_ = false; }
   Sender(const Sender&) = delete;

@@ -138,9 +138,13 @@ class O3d303Facade final : public Facade {
       if (!discovery) logging::warn("{}: it cannot be searched for: {}", name_, discovery.error().message);
       if (discovery) discovery_ = *std::move(discovery);
     }
+    boost::system::error_code no_number;  // "localhost", which is loopback
+    const auto own = boost::asio::ip::make_address(place_.keys.address, no_number);
+    // A client's broadcast goes to the network, never to loopback.
+    const std::string to = no_number || own.is_loopback() ? " that are sent to this address" : "";
     where_ = fmt::format(
         "XML-RPC on {} port {}, PCIC on port {}{}", place_.keys.address, xmlrpc_port, pcic_port,
-        discovery_ ? fmt::format(", found by searches on UDP port {}", keys_.discovery_port) : "");
+        discovery_ ? fmt::format(", found by searches on UDP port {}{}", keys_.discovery_port, to) : "");
     if (keys_.boot_time > 0_s) boot();
     link_.want(true);  // one frame, which says what kind of camera it is
     tick_.start();

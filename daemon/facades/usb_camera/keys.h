@@ -10,6 +10,18 @@
 /// Any source as a USB depth camera (UVC), which Linux machines plug in over USB/IP.
 namespace toftwin::daemon::usb_camera {
 
+/// What goes wrong on purpose with a frame's images, and with the cable.
+struct CableKeys : FrameLineKeys {
+  template <class Visitor>
+  void visit(Visitor& v) {
+    visitFrames(v);
+    v.number(
+        "disconnect", disconnect, {0.0, 1.0},
+        "share instead of which the cable is pulled; a tenth of a second later the camera is there again");
+    visitSeedAndLog(v);
+  }
+};
+
 /// The keys of a [[facade]] table with kind = "usb_camera".
 struct Keys {
   int port = 3240;
@@ -20,7 +32,7 @@ struct Keys {
   Endpoint transfers = Endpoint::Bulk;
   double depth_unit_mm = 1.0;
   double amplitude_per_count = 1.0;
-  FrameLineKeys line;
+  CableKeys line;
 
   template <class Visitor>
   void visit(Visitor& v) {

@@ -104,6 +104,11 @@ class UsbCameraFacade final : public Facade {
   /// Whether the host gets anything of it.
   bool takeFrame(const Frame& frame, const Damage& damage) {
     if (!camera_) return false;
+    if (damage.is_cut) {
+      const bool has_host = camera_->wantsFrames(std::chrono::steady_clock::now());
+      if (has_host) unplug("its cable is pulled on purpose");
+      return has_host;
+    }
     const auto taken = camera_->take(frame, damage);
     if (!taken && taken.error().message != last_complaint_) {
       last_complaint_ = taken.error().message;

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <chrono>
 #include <cmath>
 #include <cstring>
@@ -96,7 +97,7 @@ TEST(GigeVisionStream, AFullSocketLosesNoPacketBesideThePlan) {
   std::map<std::string, std::set<std::uint64_t>> logged;
   {
     int tries = 0;
-    StruckLine line{LineFaults{{.loss = 0.1, .duplicate = 0.4, .reorder = 0.4, .seed = 9}, "test", log},
+    StruckLine line{LineFaults{{.loss = 0.1, .duplicate = 0.4, .reorder = 0.4, .seed = 9}, "test", log}, 0_s,
                     [&](const Bytes& packet) {
                       if (++tries % 3 != 0) return false;
                       got.push_back(numberAt(packet, 0, 4));
@@ -136,6 +137,55 @@ TEST(GigeVisionStream, AFullSocketLosesNoPacketBesideThePlan) {
   }
   EXPECT_EQ(overtaken, logged["reorder"]);
   EXPECT_GT(std::min({logged["loss"].size(), logged["duplicate"].size(), overtaken.size()}), 100u);
+  std::filesystem::remove(log);
+}
+
+/// What is delayed leaves later and none sooner, what is corrupted has one bit changed, and the log names
+/// each.
+TEST(GigeVisionStream, APacketIsDelayedOrCorruptedOnPurpose) {
+  using std::chrono::steady_clock;
+  constexpr std::uint64_t kPackets = 400;
+  const auto log = std::filesystem::path{::testing::TempDir()} / fmt::format("delayed_{}.csv", ::getpid());
+  const LineShares shares{.delay = 0.2, .corruption = 0.2, .seed = 6};
+  std::vector<steady_clock::time_point> taken;
+  std::vector<std::pair<Bytes, steady_clock::time_point>> got;
+  {
+    StruckLine line{LineFaults{shares, "test", log}, 20_ms, [&](const Bytes& packet) {
+                      got.emplace_back(packet, steady_clock::now());
+                      return true;
+                    }};
+    for (std::uint64_t i = 0; i < kPackets; ++i) {
+      taken.push_back(steady_clock::now());
+      Bytes packet;
+      for (int copy = 0; copy < 3; ++copy) append(packet, i, 8);
+      line.take(std::move(packet), [&] { return std::to_string(i); });
+      line.flush();
+    }
+    while (!line.finish()) ::usleep(100);
+  }
+  ASSERT_EQ(got.size(), kPackets);
+  std::set<std::uint64_t> delayed, corrupted;
+  for (const auto& [packet, at] : got) {
+    const std::array copies{numberAt(packet, 0, 8), numberAt(packet, 8, 8), numberAt(packet, 16, 8)};
+    const std::uint64_t number = (copies[0] & copies[1]) | (copies[1] & copies[2]) | (copies[0] & copies[2]);
+    int changed = 0;
+    for (const std::uint64_t copy : copies) changed += std::popcount(copy ^ number);
+    const auto fate = LineFaults::fateOf(shares, number);
+    EXPECT_EQ(changed, fate.is_corrupted ? 1 : 0) << number;
+    if (fate.is_corrupted) corrupted.insert(number);
+    if (!fate.is_delayed) continue;
+    delayed.insert(number);
+    EXPECT_GE(at - taken[number], std::chrono::milliseconds{20}) << number;
+  }
+  std::map<std::string, std::set<std::uint64_t>> logged;
+  std::ifstream lines{log};
+  std::string one;
+  std::getline(lines, one);
+  while (std::getline(lines, one))
+    logged[one.substr(one.find(',') + 1, one.rfind(',') - one.find(',') - 1)].insert(std::stoull(one));
+  EXPECT_EQ(logged["delay"], delayed);
+  EXPECT_EQ(logged["corruption"], corrupted);
+  EXPECT_GT(std::min(delayed.size(), corrupted.size()), 40u);
   std::filesystem::remove(log);
 }
 
@@ -201,7 +251,10 @@ TEST(GigeVisionStream, NoMillisecondOfABlockOverrunsAClientsSocket) {
   for (const std::uint32_t size : {1500U, 9000U}) {
     Sender sender{client.io,
                   boost::asio::ip::udp::socket{client.io, {boost::asio::ip::address_v4::loopback(), 0}},
-                  LineFaults{{}, "test", {}}, 0, "test"};
+                  LineFaults{{}, "test", {}},
+                  0_s,
+                  0,
+                  "test"};
     sender.aim(client.socket.local_endpoint(), size, std::chrono::microseconds{10});
     const auto block = std::make_shared<const Block>(
         Block::Header{.packet_size = size, .is_multipart = true, .has_long_ids = true}, payload);

@@ -4,9 +4,13 @@
 #include <gtest/gtest.h>
 #include <linux/usb/video.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
+#include <fstream>
+#include <iterator>
+#include <optional>
 
 #include "facade_testing.h"
 #include "usb_host.h"
@@ -165,6 +169,27 @@ TEST_F(UsbCameraFacade, OneHostHasItAtATimeAndTheNextWhenThatLeaves) {
     EXPECT_EQ(UsbHost{port_}.list(), 1u);
   }
   EXPECT_TRUE(eventually([&] { return UsbHost{port_}.import() == 0; }));
+}
+
+TEST_F(UsbCameraFacade, ACableThatIsPulledOnPurposeIsPluggedInAgain) {
+  startCamera(kPattern, "[facade.line]\ndisconnect = 0.2\nseed = 2\nlog = 'cable.csv'\n");
+  for (int pulled = 0; pulled < 2; ++pulled) {
+    std::optional<UsbHost> host;
+    ASSERT_TRUE(eventually([&] { return host.emplace(port_).import() == 0; }));
+    int transfers = 0;
+    for (bool is_there = true; is_there && transfers < 2000; ++transfers) {
+      host->ask(kDepthEndpoint, 16'384);
+      is_there = host->reply().has_value();
+    }
+    EXPECT_LT(transfers, 2000) << "after 600 images with a fifth of them cut";
+  }
+  std::string text;  // is written after the host has seen it
+  EXPECT_TRUE(eventually([&] {
+    std::ifstream log{folder_ / "cable.csv"};
+    text.assign(std::istreambuf_iterator<char>{log}, {});
+    return std::ranges::count(text, '\n') == 3;
+  })) << text;
+  EXPECT_NE(text.find(",disconnect,"), std::string::npos) << text;
 }
 
 TEST_F(UsbCameraFacade, UnlinkedTransfersAreNotAnsweredAndUnknownOnesAreNoError) {
