@@ -12,10 +12,11 @@ namespace toftwin::intrinsics {
 namespace {
 
 // With p the pixel's centre, c the corner, and n_A, n_B the normals of the two edges through it:
-//   s_A = n_A (p − c) / (√2 σ)      s_B likewise      E = erf(s_A) erf(s_B)      d = (p − c) / reach
-//   I(p) = min(saturation, m + g d + E (a + h d))
-// Turning by 180° about c leaves E as it is, so whatever the edges do to each other near the corner
-// (light that spreads from bright squares, a checker that meets only at an angle) does not move c.
+//   s_A = n_A (p − c) / (√2 σ)      s_B likewise      E = (k + erf(s_A)) (k + erf(s_B))      d = (p − c) /
+//   reach I(p) = min(saturation, m + g d + E (a + h d))
+// k = 0 where four squares meet; k = 1 at the outer corner of one, into which both normals point.
+// For k = 0, turning by 180° about c leaves E as it is, so whatever the edges do to each other near the
+// corner (light that spreads from bright squares, a checker that meets only at an angle) does not move c.
 enum Parameter { U, V, AngleA, AngleB, LogBlur, Level, SlopeX, SlopeY, Half, HalfX, HalfY, Count };
 using Vector = Eigen::Matrix<double, Count, 1>;
 using Matrix = Eigen::Matrix<double, Count, Count>;
@@ -32,6 +33,7 @@ struct Window {
   std::vector<Sample> samples;
   double reach = 1.0;  ///< pixels
   double saturation = 0.0;
+  double k = 0.0;
 };
 
 double length(const std::array<double, 2>& v) { return std::hypot(v[0], v[1]); }
@@ -49,7 +51,10 @@ Window windowAround(const Image<float>& image, const CornerGuess& guess, float s
   const auto& a = guess.along;
   const auto& b = guess.across;
   const double determinant = a[0] * b[1] - a[1] * b[0];
-  Window window{.samples = {}, .reach = 0.5 * std::max(length(a), length(b)), .saturation = saturation};
+  Window window{.samples = {},
+                .reach = 0.5 * std::max(length(a), length(b)),
+                .saturation = saturation,
+                .k = guess.is_outer ? 1.0 : 0.0};
   const double short_side = std::min(length(a), length(b));
   const double share = std::max(guess.reach, kLeastReach_px / std::max(short_side, 1.0));
   const int half = static_cast<int>(std::ceil(share * (length(a) + length(b))));
@@ -77,7 +82,8 @@ double model(const Vector& x, const Window& window, const Sample& at, Vector* sl
   const double cos_b = std::cos(x[AngleB]), sin_b = std::sin(x[AngleB]);
   const double s = (-sin_a * du + cos_a * dv) * scale;
   const double t = (-sin_b * du + cos_b * dv) * scale;
-  const double erf_s = std::erf(s), erf_t = std::erf(t), edges = erf_s * erf_t;
+  const double beside_a = window.k + std::erf(s), beside_b = window.k + std::erf(t),
+               edges = beside_a * beside_b;
   const double dx = du / window.reach, dy = dv / window.reach;
   const double half = x[Half] + x[HalfX] * dx + x[HalfY] * dy;
   const double value = x[Level] + x[SlopeX] * dx + x[SlopeY] * dy + edges * half;
@@ -86,8 +92,8 @@ double model(const Vector& x, const Window& window, const Sample& at, Vector* sl
     slope->setZero();  // however bright: the pixel says the same
     return window.saturation;
   }
-  const double by_s = half * erf_t * kTwoOverRootPi * std::exp(-s * s);
-  const double by_t = half * erf_s * kTwoOverRootPi * std::exp(-t * t);
+  const double by_s = half * beside_b * kTwoOverRootPi * std::exp(-s * s);
+  const double by_t = half * beside_a * kTwoOverRootPi * std::exp(-t * t);
   const double by_x = (x[SlopeX] + edges * x[HalfX]) / window.reach;
   const double by_y = (x[SlopeY] + edges * x[HalfY]) / window.reach;
   (*slope)[U] = (by_s * sin_a + by_t * sin_b) * scale - by_x;
@@ -135,13 +141,16 @@ Vector start(const CornerGuess& guess, const Window& window) {
   x[V] = guess.at.v;
   x[AngleA] = std::atan2(guess.along[1], guess.along[0]);
   x[AngleB] = std::atan2(guess.across[1], guess.across[0]);
+  // Of the normals, for which AngleA and AngleB stand, one points out of the square between along and across.
+  const bool is_left_handed = guess.along[0] * guess.across[1] < guess.along[1] * guess.across[0];
+  if (guess.is_outer) x[is_left_handed ? AngleA : AngleB] += std::numbers::pi;
   x[LogBlur] = std::log(1.0);
   double level = 0.0, half = 0.0, weight = 0.0;
   for (const Sample& sample : window.samples) level += sample.value;
   level /= static_cast<double>(window.samples.size());
   Vector slope;
   x[Half] = 1.0;  // so that the derivative by Half is the pattern itself
-  const Window unbounded{.samples = {}, .reach = window.reach, .saturation = HUGE_VAL};
+  const Window unbounded{.samples = {}, .reach = window.reach, .saturation = HUGE_VAL, .k = window.k};
   for (const Sample& sample : window.samples) {
     model(x, unbounded, sample, &slope);
     half += slope[Half] * (sample.value - level);

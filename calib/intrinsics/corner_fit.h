@@ -10,12 +10,14 @@
 
 namespace toftwin::intrinsics {
 
-/// Where a corner of four squares is about, and how its neighbours lie.
+/// Where a corner of four squares is about, and how its neighbours lie; or the outer corner of one dark
+/// square.
 struct CornerGuess {
   Pixel at{};
   std::array<double, 2> along{};   ///< from here to the next corner in the row, pixels
   std::array<double, 2> across{};  ///< to the next corner in the column
   double reach = 0.55;             ///< of a square: how far around nothing but the four squares is seen
+  bool is_outer = false;           ///< of one dark square between `along` and `across`, all else bright
 };
 
 struct FittedCorner {
@@ -25,9 +27,9 @@ struct FittedCorner {
   double contrast = 0.0;  ///< half of bright minus dark; negative: the first quadrant is dark
 };
 
-/// Fits the meeting of four squares, blurred, unevenly lit and perhaps cut at `saturation`, to the pixels
-/// within half a square around (see the source for the formula). Nothing if that does not converge near
-/// the guess.
+/// Fits the meeting of four squares (or the corner of one), blurred, unevenly lit and perhaps cut at
+/// `saturation`, to the pixels within half a square around (see the source for the formula). Nothing if that
+/// does not converge near the guess.
 std::optional<FittedCorner> fitCorner(const Image<float>& image, const CornerGuess& guess,
                                       float saturation);
 

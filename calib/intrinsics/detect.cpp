@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 #include <opencv2/calib3d.hpp>
-#include <opencv2/imgproc.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -11,81 +10,14 @@
 #include <numbers>
 #include <span>
 
-#include "calib/intrinsics/charuco.h"
+#include "calib/intrinsics/looks.h"
+#include "calib/intrinsics/markers.h"
 #include "calib/intrinsics/median.h"
 
 namespace toftwin::intrinsics {
 namespace {
 
 using Pixels = std::vector<Pixel>;
-
-/// How an image is shown to the search: brightness to the power `gamma`, enlarged.
-struct Look {
-  double gamma;
-  int scale;
-  bool evened;  ///< contrast evened out locally (CLAHE)
-};
-// Ordered by how often each finds what those before it did not.
-constexpr Look kLooks[] = {{1.0, 1, false}, {0.5, 2, false}, {1.0, 2, true},  {0.5, 1, true},
-                           {0.25, 2, true}, {1.0, 3, false}, {0.5, 3, true}, {2.0, 2, false}};
-constexpr std::size_t kQuickLooks = 2, kSlowLooks = 4;
-
-/// Brightness between which an image's pixels lie, but for a few; black borders are left out.
-struct Span {
-  float low = 0.0F, high = 1.0F;
-};
-Span spanOf(const Image<float>& image) {
-  std::vector<float> values;
-  for (const float value : image.pixels()) {
-    if (std::isfinite(value) && value > 0.0F) values.push_back(value);
-  }
-  if (values.size() < 16) return {};
-  std::ranges::sort(values);
-  const auto at = [&](double share) { return values[static_cast<std::size_t>(share * double(values.size() - 1))]; };
-  return {at(0.005), at(0.995)};
-}
-
-/// Pixels without a value (0 or NaN) among pixels with one get their neighbours' median.
-Image<float> mended(const Image<float>& image) {
-  constexpr std::size_t kMost = 6;  // of eight neighbours
-  Image<float> result = image;
-  for (int v = 1; v + 1 < image.height(); ++v) {
-    for (int u = 1; u + 1 < image.width(); ++u) {
-      if (image(u, v) > 0.0F) continue;
-      std::vector<double> around;
-      for (int k = 0; k < 9; ++k) {
-        const float value = image(u - 1 + k % 3, v - 1 + k / 3);
-        if (value > 0.0F) around.push_back(value);
-      }
-      if (around.size() >= kMost) result(u, v) = static_cast<float>(median(std::move(around)));
-    }
-  }
-  return result;
-}
-
-cv::Mat show(const Image<float>& image, const Span& span, const Look& look) {
-  cv::Mat shown(image.height(), image.width(), CV_8U);
-  const double width = std::max(1e-12F, span.high - span.low);
-  for (int v = 0; v < image.height(); ++v) {
-    for (int u = 0; u < image.width(); ++u) {
-      const float value = image(u, v);
-      const double share = std::isfinite(value) ? std::clamp((value - span.low) / width, 0.0, 1.0) : 0.0;
-      shown.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(std::lround(255.0 * std::pow(share, look.gamma)));
-    }
-  }
-  if (look.evened) cv::createCLAHE(4.0, {8, 8})->apply(shown, shown);
-  if (look.scale > 1) cv::resize(shown, shown, {}, look.scale, look.scale, cv::INTER_CUBIC);
-  return shown;
-}
-
-/// Pixel centres of an enlarged copy in the original's coordinates.
-Pixels shrunk(const std::vector<cv::Point2f>& points, int scale) {
-  Pixels result;
-  for (const cv::Point2f& point : points) {
-    result.push_back({(point.x + 0.5) / scale - 0.5, (point.y + 0.5) / scale - 0.5});
-  }
-  return result;
-}
 
 std::optional<Pixels> search(const Image<float>& image, const Target& target, bool is_thorough) {
   const Span span = spanOf(image);
@@ -109,18 +41,45 @@ std::optional<Pixels> search(const Image<float>& image, const Target& target, bo
   return std::nullopt;
 }
 
+/// Of the corners of a column or row: those beside number i, or the two of its own tag.
+struct Beside {
+  int before, after;
+};
+Beside beside(int i, int count, Target::Kind kind) {
+  if (kind == Target::Kind::Tags) return {i - i % 2, i - i % 2 + 1};
+  return {std::max(0, i - 1), std::min(count - 1, i + 1)};
+}
+
+/// How far around a corner nothing but what meets there is seen, in squares or sides of a tag.
+double reachOf(const Target& target) {
+  switch (target.kind) {
+    case Target::Kind::Checkerboard:
+      return CornerGuess{}.reach;
+    case Target::Kind::Charuco:
+      return 0.5 * (1.0 - target.marker / target.square);
+    case Target::Kind::Tags:
+      return 0.8 / target.cells;  // its border; the gap is no less (target.h)
+  }
+  return 0.0;
+}
+
 /// Of a grid of corners: where the neighbours lie.
 CornerGuess guessAt(const Pixels& grid, const Target& target, int column, int row) {
   const auto at = [&](int c, int r) {
     return grid[static_cast<std::size_t>(r) * static_cast<std::size_t>(target.columns) +
                 static_cast<std::size_t>(c)];
   };
-  const int left = std::max(0, column - 1), right = std::min(target.columns - 1, column + 1);
-  const int top = std::max(0, row - 1), bottom = std::min(target.rows - 1, row + 1);
+  const auto [left, right] = beside(column, target.columns, target.kind);
+  const auto [top, bottom] = beside(row, target.rows, target.kind);
   const Pixel l = at(left, row), r = at(right, row), t = at(column, top), b = at(column, bottom);
+  const bool is_tag = target.kind == Target::Kind::Tags;
+  const double inward_u = is_tag && column % 2 == 1 ? -1.0 : 1.0,
+               inward_v = is_tag && row % 2 == 1 ? -1.0 : 1.0;
   return {.at = at(column, row),
-          .along = {(r.u - l.u) / (right - left), (r.v - l.v) / (right - left)},
-          .across = {(b.u - t.u) / (bottom - top), (b.v - t.v) / (bottom - top)}};
+          .along = {inward_u * (r.u - l.u) / (right - left), inward_u * (r.v - l.v) / (right - left)},
+          .across = {inward_v * (b.u - t.u) / (bottom - top), inward_v * (b.v - t.v) / (bottom - top)},
+          .reach = reachOf(target),
+          .is_outer = is_tag};
 }
 
 /// Turned so that columns and rows are as on the board seen from its front, and, where turning by 180°
@@ -138,18 +97,18 @@ Pixels inOrder(Pixels grid, const Target& target, bool first_is_bright) {
   return grid;
 }
 
-/// The whole grid by a homography from those corners of a ChArUco board that were found, in the image as it is.
+/// The whole grid by a homography from those corners that markers told, in the image as it is.
 struct PartialGrid {
   Pixels grid;
   std::vector<bool> is_found;
 };
-std::optional<PartialGrid> searchMarkers(const Image<float>& image, const Target& target, bool is_thorough) {
+std::optional<PartialGrid> searchInPart(const Image<float>& image, const Target& target, bool is_thorough) {
   const Span span = spanOf(image);
   const std::span looks{kLooks, is_thorough ? std::size(kLooks) : kQuickLooks};
-  std::vector<CharucoCorner> best;
+  std::vector<MarkerCorner> best;
   int scale = 1;
   for (const Look& look : looks) {
-    auto found = searchCharuco(show(image, span, look), target);
+    auto found = searchMarkers(show(image, span, look), target);
     if (found.size() <= best.size()) continue;
     best = std::move(found);
     scale = look.scale;
@@ -157,11 +116,11 @@ std::optional<PartialGrid> searchMarkers(const Image<float>& image, const Target
   }
   if (best.size() < 4) return std::nullopt;
   std::vector<cv::Point2f> on_board, seen, all, everywhere;
-  const auto columns = static_cast<std::size_t>(target.columns);
   const auto place = [&](std::size_t i) {
-    return cv::Point2f{static_cast<float>(i % columns), static_cast<float>(i / columns)};
+    return cv::Point2f{static_cast<float>(target.x(i) / target.square),
+                       static_cast<float>(target.y(i) / target.square)};
   };
-  for (const CharucoCorner& corner : best) {
+  for (const MarkerCorner& corner : best) {
     on_board.push_back(place(corner.index));
     seen.push_back(corner.at);
   }
@@ -170,7 +129,7 @@ std::optional<PartialGrid> searchMarkers(const Image<float>& image, const Target
   for (std::size_t i = 0; i < target.corners(); ++i) all.push_back(place(i));
   cv::perspectiveTransform(all, everywhere, homography);
   PartialGrid partial{shrunk(everywhere, scale), std::vector<bool>(target.corners(), false)};
-  for (const CharucoCorner& corner : best) {
+  for (const MarkerCorner& corner : best) {
     partial.grid[corner.index] = shrunk({corner.at}, scale).front();
     partial.is_found[corner.index] = true;
   }
@@ -192,8 +151,7 @@ Fitted fitAll(const Image<float>& image, const Target& target, const Pixels& gri
     for (int column = 0; column < target.columns; ++column) {
       const auto index = static_cast<std::size_t>(row * target.columns + column);
       if (!wanted.empty() && !wanted[index]) continue;
-      CornerGuess guess = guessAt(grid, target, column, row);
-      if (target.kind == Target::Kind::Charuco) guess.reach = 0.5 * (1.0 - target.marker / target.square);
+      const CornerGuess guess = guessAt(grid, target, column, row);
       const double along = std::hypot(guess.along[0], guess.along[1]);
       const double across = std::hypot(guess.across[0], guess.across[1]);
       const double area = std::abs(guess.along[0] * guess.across[1] - guess.along[1] * guess.across[0]);
@@ -213,21 +171,28 @@ void judge(Sighting& sighting, const Target& target, const DetectOptions& option
     sighting.rejection = reason;
     sighting.detail = std::move(detail);
   };
-  const bool is_charuco = target.kind == Target::Kind::Charuco;
-  const double lost = is_charuco ? (sighting.corners.size() < options.fewest_corners ? 1.0 : 0.0) : 1.0 - static_cast<double>(sighting.corners.size()) / static_cast<double>(target.corners());
-  if (sighting.square_px < options.least_square_px) {
-    reject(Rejection::TooSmall, fmt::format("squares of {:.1f} px, {:g} are needed", sighting.square_px,
-                                            options.least_square_px));
+  const auto corners = static_cast<double>(sighting.corners.size()),
+             all = static_cast<double>(target.corners());
+  const bool is_enough = target.kind == Target::Kind::Checkerboard
+                             ? 1.0 - corners / all <= options.most_lost
+                             : sighting.corners.size() >= options.fewest_corners;
+  const bool is_tags = target.kind == Target::Kind::Tags;
+  const double pattern_px = is_tags ? sighting.square_px / target.cells : sighting.square_px;
+  const double least_px = is_tags ? options.least_cell_px : options.least_square_px;
+  const char* const pattern = is_tags ? "cells of tags" : "squares";
+  if (pattern_px < least_px) {
+    reject(Rejection::TooSmall,
+           fmt::format("{} of {:.1f} px, {:g} are needed", pattern, pattern_px, least_px));
   } else if (sighting.tilt_deg > options.most_tilt_deg) {
     reject(Rejection::TooOblique, fmt::format("tilted by {:.0f} degrees, at most {:g}", sighting.tilt_deg,
                                               options.most_tilt_deg));
-  } else if (lost > options.most_lost) {
+  } else if (!is_enough) {
     reject(Rejection::CornerOutliers, fmt::format("{} of {} corners could be fitted", sighting.corners.size(),
                                                   target.corners()));
-  } else if (sighting.blur_px > options.most_blur * sighting.square_px) {
-    reject(Rejection::Blurred, fmt::format("edges are blurred by {:.2f} px (standard deviation) with squares of "
-                                           "{:.1f} px",
-                                           sighting.blur_px, sighting.square_px));
+  } else if (sighting.blur_px > options.most_blur * pattern_px) {
+    reject(Rejection::Blurred,
+           fmt::format("edges are blurred by {:.2f} px (standard deviation) with {} of {:.1f} px",
+                       sighting.blur_px, pattern, pattern_px));
   }
 }
 
@@ -269,12 +234,15 @@ void keep(Sighting& sighting, Fitted fitted) {
   sighting.tilt_deg = std::acos(std::clamp(fitted.flattest, 0.0, 1.0)) * 180.0 / std::numbers::pi;
 }
 
-Sighting findCharuco(const Image<float>& image, const Target& target, const DetectOptions& options) {
+Sighting findMarkers(const Image<float>& image, const Target& target, const DetectOptions& options) {
   Sighting sighting;
-  const auto found = searchMarkers(mended(image), target, options.is_thorough);
+  const auto found = searchInPart(mended(image), target, options.is_thorough);
   if (!found) {
     sighting.rejection = Rejection::NotFound;
-    sighting.detail = fmt::format("no markers of {} with corners between them", target.dictionary);
+    sighting.detail = target.kind == Target::Kind::Tags
+                          ? fmt::format("no two tags of {} that lie row by row, number 0 at the top left",
+                                        target.dictionary)
+                          : fmt::format("no markers of {} with corners between them", target.dictionary);
     return sighting;
   }
   const float saturation = saturationOf(image).value_or(std::numeric_limits<float>::infinity());
@@ -286,7 +254,7 @@ Sighting findCharuco(const Image<float>& image, const Target& target, const Dete
 }  // namespace
 
 Sighting findBoard(const Image<float>& image, const Target& target, const DetectOptions& options) {
-  if (target.kind == Target::Kind::Charuco) return findCharuco(image, target, options);
+  if (target.kind != Target::Kind::Checkerboard) return findMarkers(image, target, options);
   Sighting sighting;
   const auto found = search(mended(image), target, options.is_thorough);
   if (!found) {

@@ -44,7 +44,7 @@ struct Sighting {
   std::string name{};           ///< of the image
   std::vector<Corner> corners{};
   double blur_px = 0.0;         ///< median over the corners
-  double square_px = 0.0;       ///< the least side of a square, over the image of the board
+  double square_px = 0.0;       ///< the least side of a square (or a tag), over the image of the board
   double tilt_deg = 0.0;        ///< of the board against the image, about; from its outline
   Rejection rejection = Rejection::None;
   std::string detail{};         ///< of the rejection: the number that decided
@@ -53,10 +53,12 @@ struct Sighting {
 };
 
 struct DetectOptions {
-  double most_blur = 0.30;          ///< of the least side of a square
+  double most_blur = 0.30;          ///< of the least side of a square, or of a tag's cell
   double most_lost = 0.25;          ///< share of corners
   double least_square_px = 4.0;
-  std::size_t fewest_corners = 12;  ///< of a ChArUco board, which need not be seen whole
+  double least_cell_px =
+      2.5;  ///< of a tag: smaller ones leave too few pixels between its corner and its cells
+  std::size_t fewest_corners = 12;  ///< of a board with markers, which need not be seen whole
   double most_tilt_deg = 75.0;
   bool is_thorough = true;  ///< false: fewer copies are searched, for live images
 };

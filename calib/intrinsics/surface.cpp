@@ -8,10 +8,8 @@
 namespace toftwin::intrinsics {
 namespace {
 
-/// Number `index` of `count` corners, as −1 … 1.
-double scaled(std::size_t index, int count) {
-  return 2.0 * static_cast<double>(index) / static_cast<double>(count - 1) - 1.0;
-}
+/// A place along an edge of that length, as −1 … 1.
+double scaled(Length at, Length length) { return 2.0 * (at / length) - 1.0; }
 
 }  // namespace
 
@@ -19,6 +17,7 @@ Surface::Surface(const Target& target, int degree) {
   const auto corners = static_cast<Eigen::Index>(target.corners());
   grid_.resize(corners, 2);
   std::vector<Eigen::VectorXd> terms;
+  const std::size_t last = target.corners() - 1;
   for (std::size_t i = 0; i < target.corners(); ++i) {
     grid_.row(static_cast<Eigen::Index>(i)) << target.x(i).in(millimetre), target.y(i).in(millimetre);
   }
@@ -29,10 +28,9 @@ Surface::Surface(const Target& target, int degree) {
       degree_ = sum;
       Eigen::VectorXd term(corners);
       for (std::size_t i = 0; i < target.corners(); ++i) {
-        const auto columns = static_cast<std::size_t>(target.columns);
         term[static_cast<Eigen::Index>(i)] =
-            std::legendre(static_cast<unsigned>(in_x), scaled(i % columns, target.columns)) *
-            std::legendre(static_cast<unsigned>(in_y), scaled(i / columns, target.rows));
+            std::legendre(static_cast<unsigned>(in_x), scaled(target.x(i), target.x(last))) *
+            std::legendre(static_cast<unsigned>(in_y), scaled(target.y(i), target.y(last)));
       }
       terms.push_back(std::move(term));
     }

@@ -215,9 +215,7 @@ calibration::CalibrationFile fileOf(const Calibrated& calibrated, const std::str
   about.made = made;
   about.software = "toftwin " TOFTWIN_VERSION;
   about.camera = calibrated.camera;
-  about.board = fmt::format("{} {}x{}, squares of {:g} mm",
-                            target.kind == Target::Kind::Charuco ? "ChArUco" : "checkerboard", target.columns,
-                            target.rows, target.square.in(millimetre));
+  about.board = inWords(target);
   about.lens_model = nameOf(estimate.bundle.model);
   about.views = static_cast<int>(estimate.used.size());
   about.rejected = static_cast<int>(calibrated.sightings.size() - estimate.used.size());

@@ -91,10 +91,12 @@ void checkPlaces(const BlockSpec& block, Table& table) {
 /// What a block's poses are to be told by must be there.
 void checkPoseFrom(const Plan& plan, const BlockSpec& block, Table& table) {
   const bool needs_board = block.pose_from == PoseFrom::Board || block.pose_from == PoseFrom::BoardAndRig;
-  if (needs_board && plan.board.corners.empty())
+  if (needs_board && !plan.board.isThere())
     table.complain("pose_from", "needs a [board] that says what the board is and where it stands");
-  if (needs_board && !plan.board.corners.empty() && plan.board.square == Length{})
-    table.complain("pose_from", "needs board.square_mm: how large the board's squares are");
+  if (needs_board && plan.board.isThere()) {
+    if (const auto board = intrinsics::targetOf(plan.board.words()); !board)
+      table.complain("pose_from", fmt::format("needs another [board]: {}", board.error().message));
+  }
   if (block.pose_from == PoseFrom::Planes && plan.planes.size() < 3)
     table.complain("pose_from", "needs three [[plane]]s or more: fewer leave the camera free to slide");
   if (block.pose_from != PoseFrom::Command && block.kind == Kind::Dark)

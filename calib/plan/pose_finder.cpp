@@ -81,12 +81,6 @@ Result<Image<float>> meanOf(std::span<const Frame> frames,
   return mean;
 }
 
-Result<intrinsics::Target> targetOf(const BoardSpec& board) {
-  auto target = intrinsics::targetOf(board.corners, board.square);
-  if (!target || board.marker == Length{}) return target;
-  return intrinsics::charucoOf(*std::move(target), board.marker, board.dictionary);
-}
-
 /// The pixels of each plane: those that should see it, as its neighbours do, and whose range is near enough.
 std::vector<std::vector<std::uint32_t>> pixelsOfPlanes(const Plan& plan, const Image<float>& range_m,
                                                        const CameraInfo& camera,
@@ -170,7 +164,7 @@ Result<SeenPose> PoseFinder::find(PoseFrom from, std::span<const Frame> frames,
                    "which plane is which is told by where the camera stands, about: the capture has no pose"};
     return byPlanes(plan_, frames, *about);
   }
-  const auto target = targetOf(plan_.board);
+  const auto target = intrinsics::targetOf(plan_.board.words());
   if (!target) return target.error();
   const auto amplitude = meanOf(frames, [](const Frame& frame) { return intrinsics::brightnessOf(frame); });
   if (!amplitude) return amplitude.error();

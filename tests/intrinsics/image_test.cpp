@@ -8,9 +8,9 @@
 #include <filesystem>
 #include <limits>
 
-#include "calib/intrinsics/charuco.h"
 #include "calib/intrinsics/collector.h"
 #include "calib/intrinsics/corner_fit.h"
+#include "calib/intrinsics/markers.h"
 #include "calib/intrinsics/verdict.h"
 #include "synthetic.h"
 
@@ -179,7 +179,7 @@ TEST(Charuco, IsFoundInPartWithTheRightIndices) {
   ASSERT_TRUE(target.ok()) << target.error().message;
   // Drawn square to the image, shrunk fourfold by averaging: corner (column, row) lies at 30 (column + 1) - 0.5.
   constexpr int kLarge = 120, kSmall = 30, kShrink = kLarge / kSmall, kMargin = 20;
-  const cv::Mat drawn = drawCharuco(*target, kLarge);
+  const cv::Mat drawn = drawMarkers(*target, kLarge);
   Image<float> image{9 * kSmall + 2 * kMargin, 6 * kSmall + 2 * kMargin, 200.0F};
   for (int v = 0; v < 6 * kSmall; ++v) {
     for (int u = 0; u < 9 * kSmall; ++u) {

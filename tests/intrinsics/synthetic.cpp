@@ -31,7 +31,7 @@ bool isInside(const Truth& truth, const Surface& surface, const BoardPose& pose)
   return true;
 }
 
-/// Bright or dark there, in squares from the first corner; 0.5 on the white rim, 0 beyond it.
+/// Bright or dark there, in squares from the first corner; -1 beyond the white rim.
 double reflectanceAt(const Target& target, double x, double y) {
   constexpr double kRim = 0.4;  // squares
   const double right = target.columns, bottom = target.rows;
@@ -114,6 +114,14 @@ std::vector<Sighting> drawViews(const Truth& truth, const Surface& surface, std:
 
 Image<float> render(const Truth& truth, const Target& target, const BoardPose& pose, const Exposure& exposure,
                     std::mt19937_64& random) {
+  const double square = target.square.in(millimetre);
+  return render(
+      truth, [&](double x, double y) { return reflectanceAt(target, x / square, y / square); }, pose,
+      exposure, random);
+}
+
+Image<float> render(const Truth& truth, const Print& print, const BoardPose& pose, const Exposure& exposure,
+                    std::mt19937_64& random) {
   constexpr int kRays = 4;
   const CameraInfo camera{.width = truth.size.width,
                           .height = truth.size.height,
@@ -125,7 +133,6 @@ Image<float> render(const Truth& truth, const Target& target, const BoardPose& p
                           .calibration_id = {}};
   const Eigen::Matrix3d back = pose.rotation.transpose();
   const Eigen::Vector3d lens = -back * pose.translation_mm;  // where the lens is, on the board
-  const double square = target.square.in(millimetre);
   Image<float> image{camera.width, camera.height};
   for (int v = 0; v < camera.height; ++v) {
     for (int u = 0; u < camera.width; ++u) {
@@ -137,7 +144,7 @@ Image<float> render(const Truth& truth, const Target& target, const BoardPose& p
         const Eigen::Vector3d along = back * Eigen::Vector3d{ray.x, ray.y, ray.z};
         const double way = -lens.z() / along.z();
         const Eigen::Vector3d hit = lens + way * along;
-        const double share = way > 0.0 ? reflectanceAt(target, hit.x() / square, hit.y() / square) : -1.0;
+        const double share = way > 0.0 ? print(hit.x(), hit.y()) : -1.0;
         sum += share < 0.0 ? 0.0 : exposure.dark + share * (exposure.bright - exposure.dark);
       }
       image(u, v) = static_cast<float>(sum / (kRays * kRays));

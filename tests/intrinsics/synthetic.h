@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <random>
 #include <vector>
 
@@ -45,8 +46,14 @@ struct Exposure {
   double most = 255.0;        ///< cut there and rounded
   double shading = 0.3;       ///< dimmer by this share at the corners of the image
 };
+/// What is printed at a place of a board's plane, mm from its first corner: 0 dark to 1 bright; less than 0:
+/// no board.
+using Print = std::function<double(double x_mm, double y_mm)>;
 /// An image of the board: each pixel's rays are traced back through the distortion to the board's plane, 4 × 4 a
 /// pixel, so edges and distortion are exact to 1/8 px before the blur; then blur, shading, noise, rounding.
+Image<float> render(const Truth& truth, const Print& print, const BoardPose& pose, const Exposure& exposure,
+                    std::mt19937_64& random);
+/// Of a checkerboard.
 Image<float> render(const Truth& truth, const Target& target, const BoardPose& pose, const Exposure& exposure,
                     std::mt19937_64& random);
 

@@ -268,7 +268,7 @@ TEST_F(LookAround, SaysWhatIsMissing) {
   const std::string block = "[[block]]\nname = 'b'\nkind = 'locked'\npose_from = 'board'\n" + kPoses;
   EXPECT_THAT(parsePlan(block, "p.toml").error().message, HasSubstr("needs a [board]"));
   EXPECT_THAT(parsePlan("[board]\ncorners = '8x5'\n" + block, "p.toml").error().message,
-              HasSubstr("needs board.square_mm"));
+              HasSubstr("squares are 0 mm"));
   EXPECT_THAT(parsePlan("[[block]]\nname = 'b'\nkind = 'locked'\npose_from = 'planes'\n" + kPoses, "p.toml")
                   .error()
                   .message,

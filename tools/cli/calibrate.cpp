@@ -13,6 +13,7 @@
 
 #include "calib/intrinsics/overlay.h"
 #include "calib/intrinsics/verdict.h"
+#include "tools/cli/board_options.h"
 #include "tools/cli/command.h"
 #include "tools/cli/export/atomic_file.h"
 #include "tools/cli/options.h"
@@ -29,6 +30,7 @@ constexpr const char* kExamples =
     "  toftwin calibrate walk.mcap --board 8x5 --square 32 -o camera.toml    frames of a recording\n"
     "  toftwin calibrate --source kinect --board 8x5 --square 32 -o camera.toml    live; it says what "
     "is missing\n"
+    "  toftwin calibrate shots/*.png --tags 5x4 --square 75 --marker 60 -o camera.toml    AprilTags\n"
     "  toftwin calibrate shots/*.png --board 8x5 --square 32 -o camera.toml --overlay seen    pictures of "
     "what was found\n"
     "  toftwin calibrate --show 3f2a...    a calibration by the id that frames name\n";
@@ -37,10 +39,7 @@ struct Options {
   DaemonOptions daemon;
   LiveOptions live;
   std::vector<std::string> images;
-  std::string board;
-  double square_mm = 0.0;
-  double marker_mm = 0.0;
-  std::string dictionary = "DICT_4X4_50";
+  BoardOptions board;
   std::string model = "auto";
   std::string output;
   std::string overlay;
@@ -50,12 +49,6 @@ struct Options {
   bool no_store = false;
   bool is_flat = false;
 };
-
-Result<intrinsics::Target> targetFrom(const Options& options) {
-  auto target = intrinsics::targetOf(options.board, options.square_mm * millimetre);
-  if (!target || options.marker_mm == 0.0) return target;
-  return charucoOf(*std::move(target), options.marker_mm * millimetre, options.dictionary);
-}
 
 std::optional<LensModel> modelFrom(const std::string& name) {
   for (const LensModel model : kLensModels) {
@@ -161,7 +154,7 @@ Result<Exit> show(const Options& options) {
 
 Result<Exit> run(const Options& options) {
   if (!options.shown_id.empty()) return show(options);
-  const auto target = targetFrom(options);
+  const auto target = intrinsics::targetOf(options.board.words());
   if (!target) return target.error();
   catchInterrupts();
   Collector collector{*target};
@@ -207,23 +200,13 @@ Result<> check(const Options& options) {
   if (options.images.empty() == options.live.source.empty()) {
     return usage("give images or recordings, or else --source with the name of a camera");
   }
-  if (options.board.empty() || options.square_mm == 0.0) return usage("give --board and --square");
+  if (auto said = options.board.check(); !said) return said;
   if (options.output.empty()) return usage("give -o, the file that the calibration is written to");
   if (options.model == nameOf(LensModel::Rational)) {
     return usage("a camera file holds five terms of distortion; rational is only compared");
   }
-  const auto target = targetFrom(options);
+  const auto target = intrinsics::targetOf(options.board.words());
   return target ? Result<>{} : target.error();
-}
-
-void addBoard(Arguments& args, Options& options) {
-  args.option("--board", options.board, "inner corners as COLSxROWS: 8x5 for 9 × 6 squares");
-  args.option("--square", options.square_mm, "side of a square, mm").within(0.1, 10'000.0);
-  args.option("--marker", options.marker_mm,
-              "side of a ChArUco board's markers, mm; 0: a checkerboard")
-      .within(0.0, 10'000.0);
-  args.option("--dictionary", options.dictionary, "of the markers, as OpenCV names it")
-      .showsDefault();
 }
 
 Run add(Arguments& args) {
@@ -232,7 +215,7 @@ Run add(Arguments& args) {
               "grey images (PNG, 8 or 16 bits, …) or recordings (FILE.mcap, FILE.mcap#SOURCE), "
               "whose amplitude is "
               "taken; all of one size");
-  addBoard(args, *options);
+  options->board.add(args);
   args.option("-o,--output", options->output, "the calibration, TOML");
   std::vector<std::string> models{"auto"};
   for (const LensModel model : kLensModels) models.emplace_back(nameOf(model));
@@ -263,7 +246,8 @@ Run add(Arguments& args) {
 
 Command calibrateCommand() {
   using namespace calibrate_command;
-  return {"calibrate", "a camera's lens from images of a checkerboard or ChArUco board", kExamples, add};
+  return {"calibrate", "a camera's lens from images of a checkerboard, ChArUco board or AprilTags", kExamples,
+          add};
 }
 
 }  // namespace toftwin::cli

@@ -13,6 +13,7 @@
 #include "calib/intrinsics/brightness.h"
 #include "calib/intrinsics/hand_eye.h"
 #include "protocol/settings/describe.h"
+#include "tools/cli/board_options.h"
 #include "tools/cli/command.h"
 #include "tools/cli/export/atomic_file.h"
 
@@ -23,8 +24,8 @@ using namespace intrinsics;
 
 struct Options {
   std::vector<std::string> images;
-  std::string board, dictionary = "DICT_4X4_50", calibration, rig, output;
-  double square_mm = 0.0, marker_mm = 0.0;
+  BoardOptions board;
+  std::string calibration, rig, output;
   int every = 1;
 };
 
@@ -32,12 +33,6 @@ struct Located {
   std::string name;
   BoardSighting board;
 };
-
-Result<intrinsics::Target> targetFrom(const Options& options) {
-  auto target = intrinsics::targetOf(options.board, options.square_mm * millimetre);
-  if (!target || options.marker_mm == 0.0) return target;
-  return charucoOf(*std::move(target), options.marker_mm * millimetre, options.dictionary);
-}
 
 /// All images in which the board is; the others are said and left out, unless a rig's poses need each.
 Result<std::vector<Located>> locateAll(const Options& options, const intrinsics::Target& target,
@@ -113,7 +108,7 @@ std::string textOf(const HandEye& known) {
 }
 
 Result<Exit> act(const Options& options) {
-  const auto target = targetFrom(options);
+  const auto target = intrinsics::targetOf(options.board.words());
   if (!target) return target.error();
   const auto lens = calibration::load(options.calibration);
   if (!lens) return lens.error();
@@ -122,8 +117,7 @@ Result<Exit> act(const Options& options) {
   std::string file =
       options.rig.empty()
           ? "# Where a camera stood, by toftwin locate. The world is the board: its origin is the first "
-            "inner corner, x runs "
-            "along\n# its columns, y along its rows, z away from the camera.\n"
+            "corner, x runs along\n# its columns, y along its rows, z away from the camera.\n"
           : "# Where a camera stood, by toftwin locate: the rig's poses and the camera's place on it.\n";
   if (options.rig.empty()) {
     for (const Located& one : *all) file += entryOf(one, one.board.camera_from_board.pose.inverse());
@@ -145,13 +139,7 @@ Run add(Arguments& args) {
   args.option("IMAGES", options->images,
               "grey images or recordings (FILE.mcap, FILE.mcap#SOURCE), whose amplitude is taken")
       .required();
-  args.option("--board", options->board, "inner corners as COLSxROWS: 8x5 for 9 × 6 squares").required();
-  args.option("--square", options->square_mm, "side of a square, mm").required().within(0.1, 10'000.0);
-  args.option("--marker", options->marker_mm, "side of a ChArUco board's markers, mm; 0: a checkerboard")
-      .within(0.0, 10'000.0);
-  args.option("--dictionary", options->dictionary,
-              "of the markers, as OpenCV names it; AprilTags: DICT_APRILTAG_36h11")
-      .showsDefault();
+  options->board.add(args);
   args.option("--calibration", options->calibration, "the lens: a file of toftwin calibrate").required();
   args.option("--rig", options->rig,
               "pose file with where the rig stood in each image: gives the camera's place on the rig and "
@@ -160,6 +148,7 @@ Run add(Arguments& args) {
       .within(1, 1'000'000)
       .showsDefault();
   args.option("-o,--output", options->output, "pose file").required();
+  args.check([options] { return options->board.check(); });
   return [options] { return act(*options); };
 }
 
@@ -167,11 +156,13 @@ Run add(Arguments& args) {
 
 Command locateCommand() {
   using namespace locate_command;
-  return {"locate", "where a camera stood, from a board that it saw: a pose file",
-          "  toftwin locate shots/*.png --board 8x5 --square 32 --calibration lens.toml -o poses.toml\n"
-          "  toftwin locate shots/*.png --board 8x5 --square 32 --calibration lens.toml --rig rig.toml -o "
-          "poses.toml\n",
-          add};
+  return {
+      "locate", "where a camera stood, from a board that it saw: a pose file",
+      "  toftwin locate shots/*.png --board 8x5 --square 32 --calibration lens.toml -o poses.toml\n"
+      "  toftwin locate shots/*.png --board 8x5 --square 32 --calibration lens.toml --rig rig.toml -o "
+      "poses.toml\n"
+      "  toftwin locate walk.mcap --tags 5x4 --square 75 --marker 60 --calibration lens.toml -o poses.toml\n",
+      add};
 }
 
 }  // namespace toftwin::cli

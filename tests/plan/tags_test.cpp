@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+// toftwin measure where a grid of AprilTags in the simulator's amplitude says where the cameras stand.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <fstream>
+
+#include "calib/intrinsics/markers.h"
+#include "calib/plan/run_index.h"
+#include "sim/pictures/png.h"
+#include "tests/plan/tiny_camera.h"
+#include "tests/record/record_testing.h"
+#include "tests/tools/with_daemon.h"
+
+namespace toftwin::cli {
+namespace {
+
+using testing::HasSubstr;
+
+/// Two cameras of 256 × 212 pixels before a board of 4 × 3 tags of 80 mm, whose first corner is at (−0.19,
+/// −0.14, 0.8).
+class MeasureByTags : public WithDaemon {
+ protected:
+  void SetUp() override {
+    const auto tags = tagsToPrint();
+    if (!tags && tags.error().code == Error::Code::Unsupported) GTEST_SKIP() << tags.error().message;
+    WithDaemon::SetUp();
+  }
+  static Result<intrinsics::Target> tagsToPrint() {
+    return intrinsics::tagsOf("4x3", 100_mm, 80_mm, "DICT_APRILTAG_36h11");
+  }
+  std::string moreSources() const override {
+    record::writeBytes(folder_ / "tags.png",
+                       pictures::encodePng(intrinsics::drawMarkers(*tagsToPrint(), 200)));
+    std::ofstream{folder_ / "scene.toml"}
+        << "[[material]]\nname = 'print'\nalbedo = 0.8\ntexture = 'tags.png'\n"
+           "[[object]]\nshape = 'rectangle'\nsize_m = [0.4, 0.3, 0]\nposition_m = [0, 0, 0.8]\nmaterial = "
+           "'print'\n";
+    std::string camera = fmt::format(kTinyCamera, "large", 0.0);
+    camera.replace(camera.find("width"), camera.find("[[emitter]]") - camera.find("width"),
+                   "width = 256\nheight = 212\nfx = 180.0\nfy = 180.0\ncx = 127.5\ncy = 105.5\n");
+    std::ofstream{folder_ / "camera.toml"} << camera;
+    std::string all;
+    for (const char* name : {"cam", "twin"})
+      all += fmt::format(
+          "[[source]]\nname = '{}'\ndriver = 'sim'\ncamera = 'camera.toml'\nscene = 'scene.toml'\n"
+          "max_surfaces = 1\n",
+          name);
+    return all;
+  }
+  Ran measure(double first_corner_x_m) const {
+    std::ofstream{folder_ / "plan.toml"} << fmt::format(
+        "frames = 2\n[board]\ntags = '4x3'\nsquare_mm = 100\nmarker_mm = 80\nposition_m = [{}, -0.14, "
+        "0.8]\nframes = 1\n"
+        "[[block]]\nname = 'b'\nkind = 'locked'\npose_from = 'board'\n"
+        "repeats = 2\n[[block.pose]]\nposition_m = [0.2, 0.0, 0.35]\neuler_deg = [0, -24, 0]\n",
+        first_corner_x_m);
+    return run(fmt::format("measure {} cam twin -o {}", path("plan.toml"), path("run")));
+  }
+};
+
+TEST_F(MeasureByTags, TellsThePosesFromTheAmplitude) {
+  const Ran ran = measure(-0.19);
+  ASSERT_EQ(ran.status, 0) << ran.err;
+  const auto records = plan::readIndex(folder_ / "run" / plan::kIndexFile);
+  ASSERT_TRUE(records) << records.error().message;
+  ASSERT_EQ(records->size(), 2u);
+  for (const auto& [number, one] : *records) {
+    EXPECT_EQ(one.pose_by, "board");
+    ASSERT_TRUE(one.pose && one.pose_half_widths);
+    const Vec3d at = one.pose->translation_m;
+    const Vec3d stands{0.2, 0.0, 0.35};
+    fmt::print("{}: off by {:.2f}, {:.2f}, {:.2f} mm\n", one.name, 1e3 * (at.x - stands.x),
+               1e3 * (at.y - stands.y), 1e3 * (at.z - stands.z));
+    EXPECT_LT(norm(at - stands), 3e-3) << one.name;
+  }
+}
+
+TEST_F(MeasureByTags, RefusesABoardThatStandsElsewhereThanThePlanSays) {
+  const Ran ran = measure(-0.13);
+  EXPECT_EQ(ran.status, 4);
+  EXPECT_THAT(ran.err, HasSubstr("poses disagree"));
+}
+
+}  // namespace
+}  // namespace toftwin::cli
