@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <filesystem>
 #include <optional>
 #include <utility>
 
@@ -14,75 +13,11 @@
 #include <toftwin/nan.h>
 
 #include "calib/compare/characteristics.h"
+#include "calib/compare/follow.h"
 #include "calib/compare/statistics.h"
-#include "protocol/record/recording.h"
 
 namespace toftwin::compare {
 namespace {
-
-class ClientFeed final : public Feed {
- public:
-  ClientFeed(Client& client, std::string source, SourceDetails details, SubscribeOptions options,
-             Subscription subscription)
-      : client_(client),
-        source_(std::move(source)),
-        details_(std::move(details)),
-        options_(std::move(options)),
-        subscription_(std::move(subscription)) {}
-  [[nodiscard]] const SourceDetails& details() const override { return details_; }
-  Result<Frame> next(std::chrono::milliseconds timeout) override {
-    auto frame = subscription_.next(timeout);
-    // It may have been in the making when the subscription began.
-    if (frame && std::exchange(is_first_dubious_, false)) frame = subscription_.next(timeout);
-    return frame;
-  }
-  Result<> beginAnew() override {
-    if (details_.can_lockstep) return {};  // makes a frame when we ask, and not before
-    auto again = client_.subscribe(source_, options_);
-    if (!again) return again.error();
-    subscription_ = *std::move(again);
-    is_first_dubious_ = true;
-    return {};
-  }
-  Result<> setPose(const Transform<World, Camera>& pose) override {
-    return client_.setPose(source_, pose);
-  }
-  Result<> setParameter(std::string_view name, double value) override {
-    return client_.setParameter(source_, name, value);
-  }
-
- private:
-  Client& client_;
-  std::string source_;
-  SourceDetails details_;
-  SubscribeOptions options_;
-  Subscription subscription_;
-  bool is_first_dubious_ = false;
-};
-
-class RecordingFeed final : public Feed {
- public:
-  RecordingFeed(record::Reader reader, SourceDetails details)
-      : reader_(std::move(reader)), details_(std::move(details)) {}
-  [[nodiscard]] const SourceDetails& details() const override { return details_; }
-  Result<Frame> next(std::chrono::milliseconds) override {
-    return reader_.next(details_.entry.name);
-  }
-  Result<> setPose(const Transform<World, Camera>&) override {
-    return Error{Error::Code::Unsupported, "a recording cannot be moved"};
-  }
-  [[nodiscard]] std::string warning() const override {
-    const std::string& damage = reader_.summary().damage;
-    return damage.empty()
-               ? ""
-               : fmt::format("The recording of {} is damaged: {}. Only what can be read of it is compared.",
-                             details_.entry.name, damage);
-  }
-
- private:
-  record::Reader reader_;
-  SourceDetails details_;
-};
 
 Error named(const Feed& feed, const Error& error, const std::string& doing) {
   return {error.code, fmt::format("{}: {}: {}", feed.details().entry.name, doing, error.message)};
@@ -104,6 +39,9 @@ Json logEntry(const Frame& frame, const std::string& pose, const char* role) {
                                    : Json{frame.moment.exposures.front().start.ns});
   entry.set("since_power_on_s",
             frame.moment.since_power_on ? frame.moment.since_power_on->in(second) : kNaN);
+  const auto exposure = longestExposure(frame);
+  entry.set("exposure_us", exposure ? exposure->in(microsecond) : kNaN)
+      .set("ambient_klx", frame.moment.ambient ? frame.moment.ambient->in(kilolux) : kNaN);
   entry.set("dropped_before", frame.dropped_before)
       .set("dropped_by_device", frame.dropped_by_device);
   if (!frame.dropped_because.empty()) entry.set("dropped_because", frame.dropped_because);
@@ -137,6 +75,11 @@ Result<Frame> nextAt(Feed& feed, const std::optional<Transform<World, Camera>>& 
                      const CaptureOptions& options) {
   for (int skipped = 0; skipped <= options.most_skipped; ++skipped) {
     auto frame = nextFrame(feed, options);
+    if (!frame && frame.error().code == Error::Code::EndOfStream && skipped > 0)
+      return named(feed, frame.error(),
+                   fmt::format("none of its last {} frames was taken at the pose asked for; it "
+                               "must have been recorded with the same pose file",
+                               skipped));
     if (!frame) return named(feed, frame.error(), "waiting for a frame");
     auto& there = frame->moment.world_from_camera;
     if (pose && !there && options.carrier != nullptr) there = pose;  // the rig knows
@@ -164,6 +107,27 @@ Result<std::pair<Frame, Frame>> nextPair(Feed& a, Feed& b,
   return std::pair{*std::move(first), *std::move(second)};
 }
 
+/// The first pair at a pose: the camera's frame tells the twin its moment.
+Result<std::pair<Frame, Frame>> firstPair(Feed& a, Feed& b, Follower& follower,
+                                          const std::optional<Transform<World, Camera>>& pose,
+                                          const CaptureOptions& options, Capture& result) {
+  const bool is_a_twin = &follower.twin() == &a;
+  // A subscription in lockstep has a frame from before at first, and that of another moment.
+  if (result.poses.empty() && follower.twin().details().can_lockstep) {
+    if (auto early = nextAt(follower.twin(), pose, options); !early) return early.error();
+  }
+  auto leading = nextAt(is_a_twin ? b : a, pose, options);
+  if (!leading) return leading.error();
+  for (std::string& note : follower.follow(*leading, options.carrier)) {
+    if (std::ranges::find(result.warnings, note) == result.warnings.end())
+      result.warnings.push_back(std::move(note));
+  }
+  auto following = nextAt(follower.twin(), pose, options);
+  if (!following) return following.error();
+  if (is_a_twin) std::swap(*leading, *following);
+  return std::pair{*std::move(leading), *std::move(following)};
+}
+
 double medianDifference_mm(const Frame& a, const Frame& b) {
   if (a.camera.width != b.camera.width || a.camera.height != b.camera.height ||
       a.camera.fx != b.camera.fx || a.camera.fy != b.camera.fy || a.camera.cx != b.camera.cx ||
@@ -185,9 +149,16 @@ double powerOn(const Frame& frame) {
   return frame.moment.since_power_on ? frame.moment.since_power_on->in(second) : kNaN;
 }
 
+/// What a comparison would read of a frame, but the camera does not give.
+std::string missingPlanes(const Frame& frame) {
+  if (frame.find(PlaneKind::Amplitude) != nullptr) return {};
+  return fmt::format("{} gives no amplitude: its ratio, and whatever goes with amplitude, is not told.",
+                     frame.source);
+}
+
 /// N pairs of frames at one pose.
-Result<> capturePose(Feed& a, Feed& b, const CaptureOptions& options, Progress& progress,
-                     CapturedPose& captured, Capture& result) {
+Result<> capturePose(Feed& a, Feed& b, std::optional<Follower>& follower, const CaptureOptions& options,
+                     Progress& progress, CapturedPose& captured, Capture& result) {
   const auto& pose = captured.asked;
   for (Feed* feed : {&a, &b}) {
     if (!pose) continue;
@@ -201,13 +172,15 @@ Result<> capturePose(Feed& a, Feed& b, const CaptureOptions& options, Progress& 
   }
   for (int i = 0; i < options.frames; ++i) {
     progress.at(static_cast<double>(i) / options.frames);
-    auto pair = nextPair(a, b, pose, options);
+    auto pair = i == 0 && follower ? firstPair(a, b, *follower, pose, options, result)
+                                   : nextPair(a, b, pose, options);
     if (!pair) return pair.error();
     const auto& [frame_a, frame_b] = *pair;
     if (auto added = captured.a.add(frame_a); !added) return added;
     if (auto added = captured.b.add(frame_b); !added) return added;
     if (i == 0 && result.poses.empty()) {
       for (const Feed* feed : {&a, &b}) result.warnings.push_back(feed->warning());
+      for (const Frame* frame : {&frame_a, &frame_b}) result.warnings.push_back(missingPlanes(*frame));
       result.warnings.push_back(clockWarning(frame_a, a.opened()));
       result.warnings.push_back(clockWarning(frame_b, b.opened()));
       std::erase(result.warnings, "");
@@ -223,10 +196,6 @@ Result<> capturePose(Feed& a, Feed& b, const CaptureOptions& options, Progress& 
 }
 
 }  // namespace
-
-Result<> Feed::setParameter(std::string_view name, double) {
-  return Error{Error::Code::Unsupported, fmt::format("{}: has no parameter {}", details().entry.name, name)};
-}
 
 std::string clockWarning(const Frame& frame, std::chrono::system_clock::time_point opened) {
   using std::chrono::nanoseconds, std::chrono::system_clock;
@@ -246,63 +215,6 @@ std::string clockWarning(const Frame& frame, std::chrono::system_clock::time_poi
 Result<Frame> nextFrameAt(Feed& feed, const std::optional<Transform<World, Camera>>& pose,
                           const CaptureOptions& options) {
   return nextAt(feed, pose, options);
-}
-
-Result<std::unique_ptr<Feed>> openFeed(Client& client, const std::string& source,
-                                       const std::vector<PlaneKind>& more) {
-  auto details = client.describe(source);
-  if (!details) return details.error();
-  SubscribeOptions options;
-  // Not Lossless: a fast camera's frames would pile up while the other one traces a pose, end with
-  // Overrun at the daemon's memory limit, and before that be seconds old when they are paired.
-  options.policy = details->can_lockstep ? SubscribeOptions::Policy::Lockstep
-                                         : SubscribeOptions::Policy::Latest;
-  // What the comparison reads; raw samples and phasors would only cost bandwidth.
-  for (const PlaneKind kind : details->planes) {
-    if (kind == PlaneKind::Range || kind == PlaneKind::Depth || kind == PlaneKind::Amplitude ||
-        kind == PlaneKind::Flags || std::ranges::find(more, kind) != more.end())
-      options.planes.push_back(kind);
-  }
-  const auto isRange = [](PlaneKind kind) { return kind == PlaneKind::Range || kind == PlaneKind::Depth; };
-  if (std::ranges::none_of(options.planes, isRange)) {
-    return Error{
-        Error::Code::Unsupported,
-        fmt::format("{}: gives neither range nor depth, so there is nothing to compare", source)};
-  }
-  auto subscription = client.subscribe(source, options);
-  if (!subscription) return subscription.error();
-  return std::unique_ptr<Feed>{
-      std::make_unique<ClientFeed>(client, source, *std::move(details), std::move(options), *std::move(subscription))};
-}
-
-Result<std::unique_ptr<Feed>> openRecording(const std::string& file_and_source) {
-  const std::size_t hash = file_and_source.rfind('#');
-  const std::string file = file_and_source.substr(0, hash);
-  std::string source = hash == std::string::npos ? "" : file_and_source.substr(hash + 1);
-  auto reader = record::Reader::open(file);
-  if (!reader) return reader.error();
-  const auto& sources = reader->summary().frames_per_source;
-  std::string known;
-  for (const auto& [name, frames] : sources) known += (known.empty() ? "" : ", ") + name;
-  if (source.empty() && sources.size() == 1) source = sources.begin()->first;
-  if (!sources.contains(source)) {
-    return Error{Error::Code::InvalidArgument,
-                 fmt::format("{} holds the sources {}; name one as {}#SOURCE", file,
-                             known.empty() ? "(none)" : known, file)};
-  }
-  auto first = reader->next(source);
-  if (!first) return first.error();
-  reader->rewind();
-  SourceDetails details;
-  details.entry = {
-      .name = source,
-      .model = fmt::format("recording {}", std::filesystem::path{file}.filename().string()),
-      .serial = {},
-      .kind = FrameKind::Replayed};
-  details.driver = "recording";
-  details.camera = first->camera;
-  return std::unique_ptr<Feed>{
-      std::make_unique<RecordingFeed>(*std::move(reader), std::move(details))};
 }
 
 void planCapture(Progress& progress, const CaptureOptions& options) {
@@ -327,7 +239,8 @@ Result<Transform<World, Camera>> reach(const PoseSpec& pose, const CaptureOption
                                                  reached.error().message)};
 }
 
-Result<Capture> captureAll(Feed& a, Feed& b, const CaptureOptions& options, Progress& progress) {
+Result<Capture> captureAll(Feed& a, Feed& b, std::optional<Follower>& follower, const CaptureOptions& options,
+                           Progress& progress) {
   Capture result{
       .a = a.details(), .b = b.details(), .poses = {}, .pairs = {}, .log = {}, .warnings = {}};
   const std::size_t count = std::max<std::size_t>(1, options.poses.size());
@@ -344,7 +257,7 @@ Result<Capture> captureAll(Feed& a, Feed& b, const CaptureOptions& options, Prog
       if (!reached) return reached.error();
       captured.asked = *reached;
     }
-    if (auto done = capturePose(a, b, options, progress, captured, result); !done)
+    if (auto done = capturePose(a, b, follower, options, progress, captured, result); !done)
       return done.error();
     unknown_pose = unknown_pose || !captured.a.pose() || !captured.b.pose();
     result.poses.push_back(std::move(captured));
@@ -375,7 +288,12 @@ std::string putBack(Feed& feed) {
 }  // namespace
 
 Result<Capture> capture(Feed& a, Feed& b, const CaptureOptions& options, Progress& progress) {
-  auto result = captureAll(a, b, options, progress);
+  std::optional<Follower> follower;
+  if (options.twin != nullptr) follower.emplace(*options.twin);
+  auto result = captureAll(a, b, follower, options, progress);
+  for (std::string& why : follower ? follower->putBack() : std::vector<std::string>{}) {
+    if (result) result->warnings.push_back(std::move(why));
+  }
   if (options.poses.empty()) return result;
   for (Feed* feed : {&a, &b}) {
     if (std::string why = putBack(*feed); !why.empty() && result)

@@ -49,6 +49,8 @@ class Carrier {
   virtual Result<> stillThere() = 0;
   /// What the log says of the pose, such as axes and temperatures.
   [[nodiscard]] virtual Json log() const = 0;
+  /// Where it measures any: "room" among them.
+  [[nodiscard]] virtual std::vector<NamedTemperature> temperatures() const { return {}; }
 };
 
 /// A source of a daemon: in LOCKSTEP where it can, so that no frame is made or lost without us,
@@ -91,11 +93,15 @@ struct CaptureOptions {
   int most_skipped = 10'000;                  ///< frames of other poses before it is given up
   std::function<bool()> interrupted{};        ///< asked between frames
   Carrier* carrier = nullptr;                 ///< moves the cameras, if they cannot move themselves
+  /// A or B, which at each pose is set to the moment that the other one's first frame there tells; null:
+  /// neither.
+  Feed* twin = nullptr;
 };
 
 /// Captures both cameras at the same poses. A pose is set on each camera that can; frames that say
 /// another pose are skipped (they were made before, or a recording has not reached it yet). Errors
-/// say which camera could not follow and why. At the end each camera is put back to where it stood.
+/// say which camera could not follow and why. At the end each camera is put back to where it stood, and the
+/// twin to what it was set to.
 Result<Capture> capture(Feed& a, Feed& b, const CaptureOptions& options, Progress& progress);
 void planCapture(Progress& progress, const CaptureOptions& options);
 

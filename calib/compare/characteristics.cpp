@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <functional>
 #include <numeric>
 
@@ -158,12 +159,14 @@ Image<std::uint8_t> flyingPixelsOf(const Image<float>& range, double jump) {
 Result<PoseComparison> comparePose(const Stack& a, const Stack& b) {
   if (a.pose() && b.pose() && !samePose(*a.pose(), *b.pose())) {
     const Vec3d shift = b.pose()->translation_m - a.pose()->translation_m;
+    const auto &p = a.pose()->rotation_wxyz, &q = b.pose()->rotation_wxyz;
+    const double half_turn = std::inner_product(p.begin(), p.end(), q.begin(), 0.0);  // its cosine
     return Error{
         Error::Code::InvalidArgument,
         fmt::format(
-            "the cameras did not look from the same pose: B is {:.3f} mm away from A or turned "
-            "against it. Only ranges along the same ray can be compared; set both to one pose.",
-            1e3 * norm(shift))};
+            "the cameras did not look from the same pose: B is {:.3f} mm away from A and turned by "
+            "{:.3f}° against it. Only ranges along the same ray can be compared; set both to one pose.",
+            1e3 * norm(shift), 360.0 / std::numbers::pi * std::acos(std::min(1.0, std::abs(half_turn))))};
   }
   PoseComparison result;
   result.pose = a.pose() ? a.pose() : b.pose();

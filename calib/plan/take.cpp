@@ -7,34 +7,24 @@
 
 #include <fmt/format.h>
 
+#include "calib/compare/follow.h"
+
 namespace toftwin::plan {
 namespace {
 
 using compare::Feed;
 
-constexpr const char* kSincePowerOn = "since_power_on_s";
-constexpr const char* kExposure = "exposure_us";
-constexpr const char* kAmbient = "ambient_klx";
-constexpr const char* kRoom = "room_temperature_c";
+using compare::kAmbient;
+using compare::kExposure;
+using compare::kSincePowerOn;
+using compare::longestExposure;
+using compare::takes;
 /// A camera may round an exposure to what its clock can do.
 constexpr double kExposureTolerance = 0.05;
 /// So many frames may still have the exposure from before.
 constexpr int kStaleFrames = 100;
 
-bool has(const Feed& feed, std::string_view parameter) {
-  const auto& all = feed.details().parameters;
-  return std::ranges::find(all, parameter, &Parameter::name) != all.end();
-}
-
 const std::string& nameOf(const Feed& feed) { return feed.details().entry.name; }
-
-std::optional<Duration> longestExposure(const Frame& frame) {
-  std::optional<Duration> longest;
-  for (const Exposure& one : frame.moment.exposures) {
-    if (one.duration > Duration{} && (!longest || one.duration > *longest)) longest = one.duration;
-  }
-  return longest;
-}
 
 /// ns, of the camera's own clock.
 std::optional<std::int64_t> startOf(const Frame& frame) {
@@ -90,7 +80,7 @@ Result<> Taker::prepare(const PlannedCapture& planned) {
 /// A simulated camera's clock is set to the plan's; for a real one we wait.
 Result<> Taker::waitForTurn(const PlannedCapture& planned, Feed& a) {
   if (!began_) began_ = options_.now();
-  if (has(a, kSincePowerOn)) {
+  if (takes(a, kSincePowerOn)) {
     const Duration on = options_.powered_on_for.value_or(Duration{}) + planned.start;
     return a.setParameter(kSincePowerOn, on.in(second));
   }
@@ -143,13 +133,13 @@ Result<> Taker::setUp(const PlannedCapture& planned, Feed& feed, const std::stri
     return {};
   };
   const double exposure = planned.exposure.in(microsecond), ambient = planned.ambient.in(kilolux);
-  if (has(feed, kAmbient)) {
+  if (takes(feed, kAmbient)) {
     if (auto done = command(kAmbient, ambient); !done) return done;
   } else if (!ambient_told.empty()) {
     if (auto done = tell("ambient", ambient_told); !done) return done;
   }
   if (planned.exposure == Duration{}) return {};
-  if (has(feed, kExposure)) return command(kExposure, exposure);
+  if (takes(feed, kExposure)) return command(kExposure, exposure);
   return tell("exposure of " + nameOf(feed),
               fmt::format("Set the exposure of {} to {:.6g} us", nameOf(feed), exposure));
 }
@@ -175,7 +165,7 @@ Result<TakenBy> Taker::framesOf(const PlannedCapture& planned, Feed& feed, const
   for (int stale = 0; by.frames < static_cast<std::uint64_t>(planned.frames);) {
     auto frame = compare::nextFrameAt(feed, saidBy(feed, taken), options);
     if (!frame) return frame.error();
-    if (has(feed, kExposure) && !isExposedAsPlanned(*frame, planned.exposure)) {
+    if (takes(feed, kExposure) && !isExposedAsPlanned(*frame, planned.exposure)) {
       if (++stale <= kStaleFrames && by.frames == 0) continue;
       return Error{
           Error::Code::InvalidArgument,
@@ -205,27 +195,18 @@ Result<TakenBy> Taker::framesOf(const PlannedCapture& planned, Feed& feed, const
 
 /// The twin at the moment of the camera that it is held against.
 Result<> Taker::follow(const PlannedCapture& planned, const Frame& leader, Feed& feed, Taken& taken) {
-  const Moment& moment = leader.moment;
-  const auto set = [&](const char* name, double value) {
-    if (!has(feed, name)) return;
-    if (auto done = feed.setParameter(name, value); !done) {
+  for (const auto& [parameter, value] : compare::settingsOf(leader, options_.carrier)) {
+    const bool is_planned = std::string_view{parameter} == kExposure && planned.exposure != Duration{};
+    if (is_planned || !takes(feed, parameter)) continue;
+    if (auto done = feed.setParameter(parameter, value); !done)
       taken.notes.push_back(fmt::format("{} did not follow: {}", nameOf(feed), done.error().message));
-    } else {
-      set_[nameOf(feed)][name] = value;
-    }
-  };
-  if (moment.since_power_on) set(kSincePowerOn, moment.since_power_on->in(second));
-  if (!moment.since_power_on && has(feed, kSincePowerOn)) {
+    else
+      set_[nameOf(feed)][parameter] = value;
+  }
+  if (!leader.moment.since_power_on && takes(feed, kSincePowerOn))
     taken.notes.push_back(
         fmt::format("{} does not say how long it has been on, so {} is not told; --powered-on-for says it",
                     leader.source, nameOf(feed)));
-  }
-  if (moment.ambient) set(kAmbient, moment.ambient->in(kilolux));
-  for (const NamedTemperature& one : moment.temperatures) {
-    if (one.where == "room") set(kRoom, one.value.in(celsius));
-  }
-  const auto exposure = longestExposure(leader);
-  if (exposure && planned.exposure == Duration{}) set(kExposure, exposure->in(microsecond));
   return {};
 }
 

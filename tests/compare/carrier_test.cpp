@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "calib/compare/capture.h"
+#include "calib/compare/follow.h"
 
 namespace toftwin::compare {
 namespace {
@@ -31,7 +32,8 @@ class FakeFeed final : public Feed {
                     .cy = 0.5,
                     .distortion = {},
                     .calibration_id = {}};
-    frame.planes = {toPlane(PlaneKind::Range, Image<float>{4, 2, 1.0F})};
+    frame.planes = {toPlane(PlaneKind::Range, Image<float>{4, 2, 1.0F}),
+                    toPlane(PlaneKind::Amplitude, Image<float>{4, 2, 1.0F})};
     return frame;
   }
   Result<> setPose(const Transform<World, Camera>&) override {
@@ -63,6 +65,7 @@ class FakeCarrier final : public Carrier {
     return {};
   }
   [[nodiscard]] Json log() const override { return Json::object(); }
+  [[nodiscard]] std::vector<NamedTemperature> temperatures() const override { return {{"room", 18_degC}}; }
 
   std::string stalls_at;
   bool moves = false;
@@ -100,6 +103,20 @@ TEST(Carried, EachPoseIsCapturedWhenItIsReachedAndLookedAtAgainAfterwards) {
   ASSERT_EQ(captured->poses.size(), 2u);
   EXPECT_DOUBLE_EQ(captured->poses[0].a.pose()->translation_m.x, 1e-3) << "where it really stood";
   EXPECT_TRUE(captured->warnings.empty());
+}
+
+TEST(Carried, TheRigsRoomTemperatureCountsWhereTheCameraKnowsNone) {
+  Rig rig;
+  const auto roomOf = [&](const Frame& frame) {
+    for (const auto& [parameter, value] : settingsOf(frame, &rig.carrier)) {
+      if (std::string{parameter} == kRoom) return value;
+    }
+    return 0.0;
+  };
+  Frame frame;
+  EXPECT_DOUBLE_EQ(roomOf(frame), 18.0);
+  frame.moment.temperatures = {{"sensor", 44_degC}, {"room", 25_degC}};
+  EXPECT_DOUBLE_EQ(roomOf(frame), 25.0);
 }
 
 TEST(Carried, NothingIsCapturedAtAPoseThatWasNotReached) {

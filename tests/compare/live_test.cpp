@@ -10,6 +10,7 @@
 
 #include "calib/compare/characteristics.h"
 #include "calib/compare/compare.h"
+#include "calib/compare/follow.h"
 #include "calib/compare/live_report.h"
 #include "drivers/source.h"
 #include "protocol/settings/describe.h"
@@ -40,6 +41,9 @@ class SourceFeed final : public Feed {
     details_.entry.model = source_->info().model;
     details_.camera = source_->info().camera;
     details_.can_set_pose = source_->info().can_set_pose;
+    details_.entry.kind = FrameKind::Simulated;
+    details_.parameters = source_->state().parameters;
+    details_.world_from_camera = source_->state().world_from_camera;
   }
   [[nodiscard]] const SourceDetails& details() const override { return details_; }
   Result<Frame> next(std::chrono::milliseconds) override {
@@ -48,17 +52,29 @@ class SourceFeed final : public Feed {
     frame->source = details_.entry.name;
     frame->sequence = sequence_++;
     if (!says_its_pose_) frame->moment.world_from_camera.reset();
+    if (!says_its_time_) frame->moment.since_power_on.reset();
     return frame;
   }
   Result<> setPose(const Transform<World, Camera>& pose) override { return source_->setPose(pose); }
+  Result<> setParameter(std::string_view name, double value) override {
+    set.emplace_back(name, value);
+    return source_->setParameter(name, value);
+  }
+  void pretendItIsReal() {
+    details_.entry.kind = FrameKind::Real;
+    details_.parameters.clear();
+  }
+  std::vector<std::pair<std::string, double>> set{};  ///< in the order in which it was told
+
   void pretendItCannotMove() { details_.can_set_pose = false; }
   void keepItsPoseToItself() { says_its_pose_ = false; }
+  void forgetsItsTime() { says_its_time_ = false; }
 
  private:
   std::unique_ptr<drivers::Source> source_;
   SourceDetails details_;
   std::uint64_t sequence_ = 0;
-  bool says_its_pose_ = true;
+  bool says_its_pose_ = true, says_its_time_ = true;
 };
 
 /// A small camera: fast, and noisy enough for statistics. One wall, so no light comes twice.
@@ -169,6 +185,23 @@ TEST_F(Live, APoseVisitedAgainIsKnownAlsoWhereNoCameraSaysIt) {
   EXPECT_THAT(finding->data.text(), HasSubstr("\"places\": 2"));
 }
 
+TEST_F(Live, ACameraWithoutAmplitudeIsNamed) {
+  SourceFeed a{"a", sourceToml(1, 0.0)}, b{"deaf", sourceToml(2, 0.0) + "planes = [\"range\"]\n"};
+  const auto captured = capture(a, b, {.frames = 2}, silent);
+  ASSERT_TRUE(captured.ok()) << captured.error().message;
+  EXPECT_THAT(captured->warnings, testing::ElementsAre(HasSubstr("deaf gives no amplitude")));
+}
+
+TEST_F(Live, CamerasThatLookOtherwiseAreSaidByHowMuch) {
+  SourceFeed a{"a", sourceToml(1, 0.0)}, b{"b", sourceToml(2, 0.0) + "euler_deg = [0, 3, 0]\n"};
+  const auto captured = capture(a, b, {.frames = 2}, silent);
+  ASSERT_TRUE(captured.ok()) << captured.error().message;
+  const auto compared = comparePose(captured->poses[0].a, captured->poses[0].b);
+  ASSERT_FALSE(compared);
+  EXPECT_THAT(compared.error().message,
+              HasSubstr("B is 0.000 mm away from A and turned by 3.000° against it"));
+}
+
 TEST_F(Live, OnePoseHasNoErrorInTheHeadline) {
   SourceFeed a{"a", sourceToml(1, 0.0)}, b{"b", sourceToml(2, 10.0)};
   const auto captured = capture(a, b, {.poses = {twoPoses()[1]}, .frames = 2}, silent);
@@ -177,6 +210,59 @@ TEST_F(Live, OnePoseHasNoErrorInTheHeadline) {
   ASSERT_TRUE(finding.ok()) << finding.error().message;
   EXPECT_THAT(finding->headline, testing::Not(HasSubstr("±")));
   EXPECT_THAT(finding->section.verdict, HasSubstr("at 1 pose;"));
+}
+
+/// What a frame's line in the log says.
+std::string logged(const Capture& captured, std::size_t line, const char* key) {
+  const std::string text = captured.log.at(line).line();
+  const auto at = text.find(fmt::format("\"{}\": ", key)) + std::string{key}.size() + 4;
+  return text.substr(at, text.find_first_of(",}", at) - at);
+}
+
+TEST_F(Live, TheTwinRendersAtTheCamerasMoment) {
+  SourceFeed a{"camera",
+               sourceToml(1, 0.0) + "powered_on_before_s = 70\nroom_temperature_c = 31\nambient_klx = 4\n"};
+  SourceFeed b{"twin", sourceToml(2, 0.0)};
+  ASSERT_TRUE(a.setParameter("exposure_us", 77.0).ok());
+  a.pretendItIsReal();
+  ASSERT_EQ(twinOf(a, b), &b);
+  ASSERT_EQ(twinOf(b, a), &b);
+  const auto before = b.details().parameters;
+  const auto captured = capture(a, b, {.poses = twoPoses(), .frames = 2, .twin = twinOf(a, b)}, silent);
+  ASSERT_TRUE(captured.ok()) << captured.error().message;
+  ASSERT_EQ(captured->log.size(), 8U);  // 2 poses, 2 frames; A and B in turns
+  for (std::size_t line = 0; line < 8; line += 2) {
+    for (const char* key : {"exposure_us", "ambient_klx", "room"})
+      EXPECT_EQ(logged(*captured, line + 1, key), logged(*captured, line, key)) << key << " of line " << line;
+    // Each camera makes its frames at its own rate, which is the same; the twin has none between being told
+    // and its next.
+    EXPECT_NEAR(std::stod(logged(*captured, line + 1, "since_power_on_s")),
+                std::stod(logged(*captured, line, "since_power_on_s")), 0.1);
+  }
+  EXPECT_EQ(logged(*captured, 1, "exposure_us").substr(0, 2), "77");
+  EXPECT_THAT(captured->warnings, testing::IsEmpty());
+  // And then it is put back to what it was.
+  EXPECT_THAT(b.set, testing::IsSupersetOf(
+                         {std::pair<std::string, double>{"ambient_klx", 0.0}, {"room_temperature_c", 23.0}}));
+  for (const Parameter& one : before) {
+    if (one.name != "exposure_us") continue;
+    EXPECT_THAT(b.set, testing::Contains(std::pair{one.name, *one.value}));
+  }
+}
+
+TEST_F(Live, OfTwoSimulatedCamerasNeitherIsTheTwin) {
+  SourceFeed a{"a", sourceToml(1, 0.0)}, b{"b", sourceToml(2, 0.0)};
+  EXPECT_EQ(twinOf(a, b), nullptr);
+  ASSERT_TRUE(capture(a, b, {.frames = 2}, silent).ok());
+  EXPECT_THAT(b.set, testing::IsEmpty());
+}
+
+TEST_F(Live, ACameraThatDoesNotSayHowLongItHasBeenOnIsNamedOnce) {
+  SourceFeed a{"camera", sourceToml(1, 0.0)}, b{"twin", sourceToml(2, 0.0)};
+  a.pretendItIsReal(), a.forgetsItsTime();
+  const auto captured = capture(a, b, {.poses = twoPoses(), .frames = 2, .twin = &b}, silent);
+  ASSERT_TRUE(captured.ok()) << captured.error().message;
+  EXPECT_THAT(captured->warnings, testing::ElementsAre(HasSubstr("does not say how long it has been on")));
 }
 
 TEST_F(Live, ACameraThatNeverReachesThePoseIsNamed) {

@@ -60,6 +60,34 @@ TEST(Warnings, TellOfARecordingThatWasCutOff) {
   const auto cut = openRecording(file.string());
   ASSERT_TRUE(cut) << cut.error().message;
   EXPECT_THAT((*cut)->warning(), HasSubstr("The recording of kinect is damaged: "));
+  record::writeBytes(file, std::span{bytes}.first(100));
+  const auto nothing = openRecording(file.string());
+  ASSERT_FALSE(nothing);
+  EXPECT_THAT(nothing.error().message, HasSubstr("a.mcap: no frame of it can be read: "));
+}
+
+TEST(Warnings, TellOfARecordingOfOtherPoses) {
+  const record::Folder folder;
+  const auto file = folder / "a.mcap";
+  {
+    auto writer = record::Writer::create(file, {});
+    ASSERT_TRUE(writer) << writer.error().message;
+    for (std::uint64_t i = 0; i < 4; ++i) {
+      Frame frame = frameFrom(std::chrono::milliseconds{0});
+      frame.sequence = i;
+      frame.moment.world_from_camera = Transform<World, Camera>{};
+      ASSERT_TRUE(writer->write(frame));
+    }
+    ASSERT_TRUE(writer->close());
+  }
+  const auto a = openRecording(file.string()), b = openRecording(file.string());
+  ASSERT_TRUE(a && b);
+  Progress silent{nullptr};
+  const auto captured = capture(
+      **a, **b, {.poses = {{.name = "elsewhere", .position_m = {0.0, 0.0, 0.1}}}, .frames = 2}, silent);
+  ASSERT_FALSE(captured);
+  EXPECT_THAT(captured.error().message,
+              HasSubstr("kinect: none of its last 4 frames was taken at the pose asked for"));
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "calib/compare/csv.h"
+#include "calib/compare/follow.h"
 #include "calib/compare/real_data.h"
 #include "calib/plan/compare_run.h"
 #include "protocol/record/recording.h"
@@ -39,7 +40,7 @@ struct Options {
   std::string rig;
   std::string data;
   std::string output = "report";
-  std::string note, log;
+  std::string note, log, twin = "auto";
   int frames = 30;
   double frame_timeout_s = 120.0;
   double effort = 1.0;
@@ -168,6 +169,11 @@ Result<compare::CompareJob> jobOf(const Options& options) {
   return job;
 }
 
+compare::Feed* twinFrom(const std::string& word, compare::Feed& a, compare::Feed& b) {
+  if (word == "auto") return compare::twinOf(a, b);
+  return word == "a" ? &a : word == "b" ? &b : nullptr;
+}
+
 Result<Exit> compareRun(const Options& options) {
   catchInterrupts();
   compare::Progress progress{stderr};
@@ -207,6 +213,7 @@ Result<Exit> compareThem(const Options& options) {
     if (auto opened = openBoth(options, a, b); !opened) return opened.error();
     job->a = a.feed.get();
     job->b = b.feed.get();
+    job->capture.twin = twinFrom(options.twin, *a.feed, *b.feed);
   }
   compare::Progress progress{stderr};
   const auto page = compare::compareAndReport(*job, progress);
@@ -240,6 +247,12 @@ Run add(Arguments& args) {
       "--rig", options->rig,
       "rig file; the rig takes the cameras to each pose, and nothing is captured at one that it "
       "did not reach");
+  args.option("--twin", options->twin,
+              "which of both is set at each pose to the other one's exposure, ambient light, room "
+              "temperature and time "
+              "since power-on, as far as it takes them; auto: the simulated one, if the other is not")
+      .oneOf({"auto", "a", "b", "none"})
+      .showsDefault();
   args.option("--frames", options->frames, "frames of each camera at each pose")
       .within(2, 100'000)
       .showsDefault();

@@ -56,6 +56,7 @@ class RigCarrier final : public compare::Carrier {
     entry.set("axes", std::move(axes)).set("temperatures_c", std::move(temperatures));
     return entry;
   }
+  [[nodiscard]] std::vector<NamedTemperature> temperatures() const override { return reached_.temperatures; }
 
  private:
   std::unique_ptr<rig::Rig> mover_;
