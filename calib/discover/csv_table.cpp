@@ -2,6 +2,7 @@
 #include "calib/discover/csv_table.h"
 
 #include <algorithm>
+#include <array>
 #include <fstream>
 #include <optional>
 #include <set>
@@ -23,6 +24,57 @@ std::string trimmed(std::string_view text) {
   while (!text.empty() && isBlank(text.front())) text.remove_prefix(1);
   while (!text.empty() && isBlank(text.back())) text.remove_suffix(1);
   return std::string{text};
+}
+
+/// Whether all bytes are UTF-8 as RFC 3629 has it.
+bool isUtf8(std::string_view text) {
+  for (std::size_t i = 0; i < text.size();) {
+    const auto byte = static_cast<unsigned char>(text[i]);
+    const std::size_t more = byte < 0x80                   ? 0
+                             : byte >= 0xC2 && byte < 0xE0 ? 1
+                             : byte >= 0xE0 && byte < 0xF0 ? 2
+                             : byte >= 0xF0 && byte < 0xF5 ? 3
+                                                           : 4;
+    if (more == 4 || i + more >= text.size()) return false;
+    for (std::size_t k = 1; k <= more; ++k)
+      if ((static_cast<unsigned char>(text[i + k]) & 0xC0U) != 0x80U) return false;
+    const auto second = more == 0 ? 0U : static_cast<unsigned char>(text[i + 1]);
+    const bool is_overlong = (byte == 0xE0 && second < 0xA0) || (byte == 0xF0 && second < 0x90);
+    if (is_overlong || (byte == 0xED && second > 0x9F) || (byte == 0xF4 && second > 0x8F)) return false;
+    i += more + 1;
+  }
+  return true;
+}
+
+/// Windows-1252, as WHATWG's Encoding Standard has it: the five bytes that mean nothing are the controls of
+/// Latin-1.
+std::string fromWindows1252(std::string_view text) {
+  constexpr std::array<unsigned, 32> kHigh{0x20AC, 0x81,   0x201A, 0x0192, 0x201E, 0x2026, 0x2020, 0x2021,
+                                           0x02C6, 0x2030, 0x0160, 0x2039, 0x0152, 0x8D,   0x017D, 0x8F,
+                                           0x90,   0x2018, 0x2019, 0x201C, 0x201D, 0x2022, 0x2013, 0x2014,
+                                           0x02DC, 0x2122, 0x0161, 0x203A, 0x0153, 0x9D,   0x017E, 0x0178};
+  std::string out;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    const unsigned point = byte >= 0x80 && byte < 0xA0 ? kHigh[byte - 0x80U] : byte;
+    if (point < 0x80) {
+      out += static_cast<char>(point);
+    } else if (point < 0x800) {
+      out += static_cast<char>(0xC0U | point >> 6U), out += static_cast<char>(0x80U | (point & 0x3FU));
+    } else {
+      out += static_cast<char>(0xE0U | point >> 12U), out += static_cast<char>(0x80U | (point >> 6U & 0x3FU));
+      out += static_cast<char>(0x80U | (point & 0x3FU));
+    }
+  }
+  return out;
+}
+
+/// Excel's first line: "sep=;".
+std::optional<char> saidSeparator(std::string_view line) {
+  const std::string text =
+      line.find('\t') == std::string_view::npos ? trimmed(line) : std::string{line.substr(0, 5)};
+  if (text.size() != 5 || !text.starts_with("sep=")) return std::nullopt;
+  return text[4] == ',' || text[4] == ';' || text[4] == '\t' ? std::optional{text[4]} : std::nullopt;
 }
 
 char separatorOf(std::string_view header) {
@@ -70,12 +122,13 @@ Result<> takeHeader(CsvTable& table, const std::filesystem::path& name, std::siz
 
 }  // namespace
 
-Result<CsvTable> parseCsv(std::string_view text, const std::filesystem::path& name) {
+static Result<CsvTable> parseUtf8(std::string_view text, const std::filesystem::path& name) {
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
   if (text.find('\0') != std::string_view::npos)
     return malformed(name, 1, "holds zero bytes: this is no text table");
   CsvTable table;
   char separator = ',';
+  std::optional<char> said;
   std::size_t number = 0;
   while (!text.empty()) {
     const std::size_t end = std::min(text.find('\n'), text.size());
@@ -83,7 +136,8 @@ Result<CsvTable> parseCsv(std::string_view text, const std::filesystem::path& na
     text.remove_prefix(std::min(end + 1, text.size()));
     ++number;
     if (trimmed(line).empty() || line.front() == '#') continue;
-    if (table.header.empty()) table.separator = separator = separatorOf(line);
+    if (number == 1 && (said = saidSeparator(line))) continue;
+    if (table.header.empty()) table.separator = separator = said.value_or(separatorOf(line));
     auto fields = fieldsOf(line, separator);
     if (!fields) return malformed(name, number, "a quote is opened and not closed on the same line");
     if (table.header.empty()) {
@@ -102,6 +156,13 @@ Result<CsvTable> parseCsv(std::string_view text, const std::filesystem::path& na
   }
   if (table.header.empty()) return malformed(name, 1, "is empty: a line of headers and rows are needed");
   if (table.rows() == 0) return malformed(name, number, "has a header but no rows");
+  return table;
+}
+
+Result<CsvTable> parseCsv(std::string_view text, const std::filesystem::path& name) {
+  if (isUtf8(text)) return parseUtf8(text, name);
+  auto table = parseUtf8(fromWindows1252(text), name);
+  if (table) table->is_from_windows = true;
   return table;
 }
 

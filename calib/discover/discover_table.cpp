@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <fstream>
 #include <system_error>
 
@@ -42,6 +43,23 @@ void addConfounded(TableData& data) {
   }
 }
 
+/// What is said of rows that err alike.
+void addAlike(const TableSource& source, const Judged& judged, TableData& data) {
+  constexpr double kAlike = 0.2;
+  if (!source.runsOf().empty()) {
+    data.doubts.push_back(
+        fmt::format("rows that follow each other with the same {} err alike: they are taken for one "
+                    "capture ({} of them); a column that names captures says it better",
+                    source.runsOf(), source.captures()));
+  }
+  if (source.hasCaptures() || source.noise().correlation_rows > 1.5) return;
+  if (judged.lag1_after < std::max(kAlike, 3.0 / std::sqrt(static_cast<double>(judged.rows)))) return;
+  data.doubts.push_back(
+      fmt::format("locked rows that follow each other err alike (correlation {:.2f}) although the others "
+                  "did not show it: p and intervals promise too much; name the captures in a column",
+                  judged.lag1_after));
+}
+
 std::vector<double> left(const TableData& rows, const std::vector<double>& prediction) {
   std::vector<double> out;
   for (std::size_t i = 0; i < rows.rows(); ++i) out.push_back(rows.error[i] - prediction[i]);
@@ -77,6 +95,7 @@ Result<TableDiscovery> discoverTable(const std::filesystem::path& file, const Ta
   // Everything is decided: now the locked rows.
   out.judged = judgeLocked(source, out.locked, out.plain, out.finding);
   out.judged.sha256 = sha256;
+  addAlike(source, out.judged, out.open);
   return out;
 }
 

@@ -39,18 +39,25 @@ bool hasWord(const std::string& header, const Known& known) {
   });
 }
 
-const Known kMeasured{"measured", "measurement", "value", "reading", "output", "observed"};
-const Known kReference{"reference", "ref",      "truth",   "true",  "groundtruth",
-                       "ground",    "expected", "nominal", "actual"};
-const Known kError{"error", "residual", "deviation", "bias", "difference", "minus"};
-const Known kSigma{"sigma", "std", "stddev", "sd", "noise", "uncertainty", "stdev"};
-const Known kSession{"session", "run", "series", "campaign", "day"};
-const Known kCapture{"capture", "pose", "shot", "burst"};
-const Known kLocked{"locked", "held", "heldout", "holdout"};
-const Known kLength{"depth", "range", "distance", "z"};
-const Known kTime{"time", "timestamp", "t", "uptime", "elapsed", "age", "minutes", "seconds"};
-const Known kDistance{"distance", "range", "depth", "z", "dist", "d"};
-const Known kIndex{"frame", "index", "number", "sequence", "seq", "counter", "count", "n", "row"};
+// English and German; of the groups the likelier word first.
+const Known kMeasured{"measured", "measurement", "value",    "reading", "output",
+                      "observed", "messwert",    "gemessen", "istwert", "ist"};
+const Known kReference{"reference", "ref",     "truth",  "true",     "groundtruth", "ground",
+                       "expected",  "nominal", "actual", "referenz", "soll",        "sollwert"};
+const Known kError{"error", "residual", "deviation",  "bias",     "difference",
+                   "minus", "fehler",   "abweichung", "differenz"};
+const Known kSigma{"sigma",       "std",   "stddev",   "sd",       "noise",
+                   "uncertainty", "stdev", "rauschen", "streuung", "standardabweichung"};
+const Known kSession{"session", "sitzung", "run", "lauf", "series", "messreihe", "campaign", "day"};
+const Known kCapture{"capture", "aufnahme", "pose", "shot", "burst"};
+const Known kLocked{"locked", "held", "heldout", "holdout", "gesperrt"};
+const Known kLength{"depth", "range", "distance", "z", "tiefe", "abstand", "entfernung"};
+const Known kTime{"time",    "timestamp", "t",    "uptime",      "elapsed", "age",   "minutes",
+                  "seconds", "date",      "zeit", "zeitstempel", "uhrzeit", "datum", "alter"};
+const Known kDistance{"distance", "range", "depth", "z", "dist", "d", "tiefe", "abstand", "entfernung"};
+const Known kIndex{"frame", "index", "number", "sequence", "seq",        "counter",
+                   "count", "n",     "row",    "bild",     "bildnummer", "zeile"};
+const Known kLabel{"id", "name", "number", "nr", "no", "index", "label"};
 
 /// The one column whose header has one of these words; nothing if there are none or several.
 std::string onlyOne(const std::vector<std::string>& header, const Known& known,
@@ -60,6 +67,22 @@ std::string onlyOne(const std::vector<std::string>& header, const Known& known,
     if (taken.contains(name) || !hasWord(name, known)) continue;
     if (!found.empty()) return {};
     found = name;
+  }
+  return found;
+}
+
+/// Columns without a role that name a group by this word; "run_time_s" is a time. `is_all`: a header that
+/// says nothing else ("session", "session_id").
+std::vector<std::string> groupsNamed(const std::vector<std::string>& header, std::string_view word,
+                                     bool is_all, const std::set<std::string>& taken) {
+  std::vector<std::string> found;
+  for (const std::string& name : header) {
+    const auto isOther = [&](const std::string& one) {
+      return one != word && std::ranges::find(kLabel, one) == kLabel.end();
+    };
+    const bool says_more = std::ranges::any_of(wordsOf(name), isOther);
+    if (!taken.contains(name) && unitOf(name).empty() && hasWord(name, {word}) && !(is_all && says_more))
+      found.push_back(name);
   }
   return found;
 }
@@ -88,6 +111,35 @@ class Assignment {
     if (!role.empty()) return;
     role = onlyOne(header_, known, taken_);
     if (!role.empty()) taken_.insert(role);
+  }
+  /// A group's column: the likeliest word decides, and of those that have it the one that says nothing else.
+  /// Of sessions every test depends, so that none is left to chance.
+  Result<> guessGroup(std::string& role, const Known& known, std::string_view key, bool is_needed) {
+    if (!role.empty()) return {};
+    for (const std::string_view word : known) {
+      auto found = groupsNamed(header_, word, true, taken_);
+      if (found.empty()) found = groupsNamed(header_, word, false, taken_);
+      if (found.empty()) continue;
+      const bool is_plain = groupsNamed(header_, word, true, taken_).size() == found.size();
+      if (found.size() > 1 && !is_plain) {
+        if (!is_needed) return {};
+        return badMap(
+            file_, fmt::format("which column names the {}: {}? Write a map: {} = \"…\", or ignore = [\"…\"] "
+                               "(docs/discover.md)",
+                               key, fmt::join(found, ", "), key));
+      }
+      role = found.front(), taken_.insert(role);
+      return {};
+    }
+    return {};
+  }
+  /// Columns that could name sessions, too.
+  [[nodiscard]] std::vector<std::string> otherGroups() const {
+    std::vector<std::string> others;
+    for (const std::string_view word : kSession)
+      for (std::string& name : groupsNamed(header_, word, true, taken_))
+        if (std::ranges::find(others, name) == others.end()) others.push_back(std::move(name));
+    return others;
   }
   [[nodiscard]] bool isTaken(const std::string& name) const { return taken_.contains(name); }
 
@@ -158,13 +210,20 @@ std::string Roles::inWords() const {
   }
   std::string list;
   for (const auto& [name, nature] : covariates) list += (list.empty() ? "" : ", ") + name;
-  return words + "; covariates: " + (list.empty() ? "none" : list);
+  words += "; covariates: " + (list.empty() ? "none" : list);
+  return left_out.empty() ? words : words + fmt::format("; left out: {}", fmt::join(left_out, ", "));
 }
 
 std::string unitOf(const std::string& header) {
   const auto words = wordsOf(header);
   if (words.size() < 2) return {};
   return std::ranges::find(kUnits, words.back()) == kUnits.end() ? std::string{} : words.back();
+}
+
+bool isPixelNumber(const std::string& header) {
+  const bool is_plain = unitOf(header).empty() || wordsOf(header).back() == "px";
+  return is_plain &&
+         hasWord(header, {"pixel", "column", "col", "row", "u", "v", "x", "y", "spalte", "zeile"});
 }
 
 Nature natureOf(const std::string& header, MapNature said) {
@@ -212,8 +271,9 @@ Result<Roles> rolesOf(const std::vector<std::string>& header, const TableMap& ma
     (void)guesses.name(ignored, name, "ignore");
   }
   guesses.guess(roles.locked, kLocked);
-  guesses.guess(roles.session, kSession);
-  guesses.guess(roles.capture, kCapture);
+  if (auto done = guesses.guessGroup(roles.session, kSession, "session", true); !done) return done.error();
+  if (auto done = guesses.guessGroup(roles.capture, kCapture, "capture", false); !done) return done.error();
+  if (map.covariates.empty()) roles.other_groups = guesses.otherGroups();
   guessValues(roles, guesses, !map.measured.empty() || !map.error.empty());
   guesses.guess(roles.sigma, kSigma);
   if (roles.error.empty() && roles.measured.empty()) {

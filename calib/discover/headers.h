@@ -18,6 +18,9 @@ struct Roles {
   std::string measured{}, reference{}, error{}, sigma{}, session{}, capture{}, locked{};
   bool is_reversed = false;  ///< error is reference − measured
   std::vector<std::pair<std::string, MapNature>> covariates{};
+  /// Covariates whose header could name the session, too: finer than it, they name captures.
+  std::vector<std::string> other_groups{};
+  std::vector<std::string> left_out{};  ///< columns that have no part
   /// "error = depth_mm − reference_mm; covariates time_s, temperature_c".
   [[nodiscard]] std::string inWords() const;
 };
@@ -30,6 +33,9 @@ Result<Roles> rolesOf(const std::vector<std::string>& header, const TableMap& ma
 /// The unit that a header ends in: "depth_mm" → "mm"; "depth [mm]" and "depth (mm)", too. Empty: none is
 /// known.
 std::string unitOf(const std::string& header);
+
+/// "pixel_column", "u", "row": with whole numbers they count, and odd ones may differ from even ones.
+bool isPixelNumber(const std::string& header);
 
 Nature natureOf(const std::string& header, MapNature said);
 

@@ -2,6 +2,7 @@
 #include "calib/discover/table_data.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -9,12 +10,15 @@
 #include <optional>
 #include <random>
 #include <set>
+#include <utility>
 
 #include <openssl/evp.h>
 
 #include <fmt/format.h>
 
 #include "calib/discover/headers.h"
+#include "calib/discover/row_checks.h"
+#include "calib/discover/rows_alike.h"
 #include "calib/discover/table_field.h"
 
 namespace toftwin::discover {
@@ -49,9 +53,11 @@ class NamedColumns {
       const std::string& field = table_.columns[*at][row];
       const auto number = toNumber(field), value = number || !is_time ? number : secondsIn(field);
       if (!value) {
-        return Error{Error::Code::Malformed,
-                     fmt::format("{}:{}: \"{}\" in column \"{}\" is not a number", file_.string(),
-                                 table_.line[row], field.substr(0, 40), name)};
+        return Error{
+            Error::Code::Malformed,
+            fmt::format("{}:{}: \"{}\" in column \"{}\" is not a number{}", file_.string(), table_.line[row],
+                        field.substr(0, 40), name,
+                        hasThousandsPoint(field) ? ": write it without the points that part thousands" : "")};
       }
       values.push_back(*value);
     }
@@ -132,6 +138,15 @@ std::vector<int> numbered(const std::vector<std::string>& words, std::vector<std
   return numbers;
 }
 
+const std::map<std::string, double, std::less<>> kPerMetre{{"m", 1.0}, {"cm", 1e2}, {"mm", 1e3}, {"um", 1e6}};
+
+/// What a reference is multiplied with to be in the unit of what was measured; 1 where a header tells no
+/// length.
+double lengthFactor(const std::string& from, const std::string& to) {
+  const auto a = kPerMetre.find(from), b = kPerMetre.find(to);
+  return a == kPerMetre.end() || b == kPerMetre.end() ? 1.0 : b->second / a->second;
+}
+
 Result<> readErrors(const NamedColumns& columns, const Roles& roles, TableData& data) {
   if (!roles.error.empty()) {
     auto error = columns.numbers(roles.error);
@@ -151,9 +166,18 @@ Result<> readErrors(const NamedColumns& columns, const Roles& roles, TableData& 
     if (!measured) return measured.error();
     data.error = *std::move(measured);
     data.unit = unitOf(roles.measured);
-    for (std::size_t i = 0; i < data.reference.size(); ++i) data.error[i] -= data.reference[i];
+    const std::string unit = unitOf(roles.reference);
+    const double factor = lengthFactor(unit, data.unit);
+    if (factor != 1.0)
+      data.notes.push_back(
+          fmt::format("the reference is in {}, what was measured in {}: converted", unit, data.unit));
+    for (std::size_t i = 0; i < data.reference.size(); ++i) data.error[i] -= factor * data.reference[i];
   }
   return {};
+}
+
+bool areWhole(const std::vector<double>& values) {
+  return std::ranges::all_of(values, [](double v) { return !std::isfinite(v) || v == std::floor(v); });
 }
 
 Result<> readCovariate(const NamedColumns& columns, const std::string& name, MapNature said,
@@ -179,6 +203,8 @@ Result<> readCovariate(const NamedColumns& columns, const std::string& name, Map
     if (!values) return values.error();
     covariate.values = *std::move(values);
     if (said == MapNature::Guessed && columns.isTime(name)) covariate.nature = Nature::Time;
+    if (said == MapNature::Guessed && isPixelNumber(name) && areWhole(covariate.values))
+      covariate.nature = Nature::Index;
   }
   data.covariates.push_back(std::move(covariate));
   return {};
@@ -224,12 +250,26 @@ void dropSparse(TableData& data) {
 double periodIn(Frequency modulation, const std::string& unit) {
   if (!(modulation > Frequency{})) return 0.0;
   const double metres = 299'792'458.0 / (2.0 * modulation.in(hertz));
-  const std::map<std::string, double> per_metre{{"m", 1.0}, {"cm", 1e2}, {"mm", 1e3}, {"um", 1e6}};
-  const auto found = per_metre.find(unit);
-  return metres * (found == per_metre.end() ? 1.0 : found->second);
+  const auto found = kPerMetre.find(unit);
+  return metres * (found == kPerMetre.end() ? 1.0 : found->second);
 }
 
-Result<> readGroups(const NamedColumns& columns, const Roles& roles, TableData& data) {
+/// A column that could name sessions, beside one that does, and that names at least two groups in each: rows
+/// of such a run may err alike. Then it is no covariate.
+void takeFinerGroup(const NamedColumns& columns, Roles& roles, TableData& data) {
+  for (const std::string& name : roles.other_groups) {
+    if (!roles.capture.empty()) return;
+    std::vector<std::string> names;
+    const auto runs = numbered(columns.text(name), names);
+    std::set<std::pair<int, int>> groups;
+    for (std::size_t i = 0; i < runs.size(); ++i) groups.emplace(data.session[i], runs[i]);
+    if (groups.size() < 2 * data.session_names.size() || 2 * groups.size() > data.rows()) continue;
+    roles.capture = name, data.capture = runs;
+    std::erase_if(roles.covariates, [&](const auto& one) { return one.first == name; });
+  }
+}
+
+Result<> readGroups(const NamedColumns& columns, Roles& roles, TableData& data) {
   if (!roles.sigma.empty()) {
     auto sigma = columns.numbers(roles.sigma);
     if (!sigma) return sigma.error();
@@ -244,6 +284,7 @@ Result<> readGroups(const NamedColumns& columns, const Roles& roles, TableData& 
   }
   std::vector<std::string> ignored;
   if (!roles.capture.empty()) data.capture = numbered(columns.text(roles.capture), ignored);
+  takeFinerGroup(columns, roles, data);
   data.locked.assign(data.rows(), false);
   if (roles.locked.empty()) return {};
   auto locked = columns.numbers(roles.locked);
@@ -253,12 +294,22 @@ Result<> readGroups(const NamedColumns& columns, const Roles& roles, TableData& 
   return {};
 }
 
-void note(const Roles& roles, std::size_t before, TableData& data) {
-  data.notes.push_back(roles.inWords());
-  if (data.rows() < before) {
-    data.doubts.push_back(fmt::format("{} of {} rows have an empty, infinite or impossible value: left out",
-                                      before - data.rows(), before));
+/// Columns that have no part, or none any more.
+void listLeftOut(const CsvTable& table, const TableData& data, Roles& roles) {
+  std::erase_if(roles.covariates, [&](const auto& one) {
+    return std::ranges::find(data.covariates, one.first, &TableCovariate::name) == data.covariates.end();
+  });
+  for (const std::string& name : table.header) {
+    const std::array used{roles.measured, roles.reference, roles.error, roles.sigma,
+                          roles.session,  roles.capture,   roles.locked};
+    const auto isIt = [&](const auto& one) { return one.first == name; };
+    if (std::ranges::find(used, name) == used.end() && std::ranges::none_of(roles.covariates, isIt))
+      roles.left_out.push_back(name);
   }
+}
+
+void note(const Roles& roles, TableData& data) {
+  data.notes.insert(data.notes.begin(), roles.inWords());
   if (data.session_names.size() == 1) {
     data.doubts.push_back("one session only: what is found may be of this session; measure another to know");
   }
@@ -272,7 +323,7 @@ void note(const Roles& roles, std::size_t before, TableData& data) {
 
 Result<TableData> readTable(const CsvTable& table, const TableMap& map, const std::filesystem::path& file) {
   const NamedColumns columns{table, file};
-  const auto roles = rolesOf(table.header, map, file);
+  auto roles = rolesOf(table.header, map, file);
   if (!roles) return roles.error();
   TableData data;
   data.file = file, data.line = table.line;
@@ -283,18 +334,27 @@ Result<TableData> readTable(const CsvTable& table, const TableMap& map, const st
   dropSparse(data);
   const std::size_t before = data.rows();
   data = rowsOf(data, complete(data));
+  if (data.rows() < before) {
+    data.doubts.push_back(fmt::format("{} of {} rows have an empty, infinite or impossible value: left out",
+                                      before - data.rows(), before));
+  }
+  data.period = periodIn(map.modulation, unitOf(roles->reference.empty() ? roles->error : roles->reference));
+  const double scale = lengthFactor(unitOf(roles->reference), data.unit);
+  setInvalidAside(data, scale);
   if (data.rows() < kFewestRows) {
     return Error{Error::Code::InvalidArgument, fmt::format("{}: has {} usable rows; at least {} are needed",
                                                            file.string(), data.rows(), kFewestRows)};
   }
   dropConstant(data);
+  dropCopies(data, scale);
   if (data.covariates.empty()) {
     return Error{Error::Code::InvalidArgument,
                  fmt::format("{}: has no column that changes and that the error could go with, besides {}",
                              file.string(), roles->inWords())};
   }
-  data.period = periodIn(map.modulation, unitOf(roles->reference.empty() ? roles->error : roles->reference));
-  note(*roles, before, data);
+  listLeftOut(table, data, *roles);
+  note(*roles, data);
+  if (table.is_from_windows) data.notes.push_back("the file is no UTF-8: read as Windows-1252 (Latin-1)");
   return data;
 }
 
@@ -313,6 +373,21 @@ TableData rowsOf(const TableData& data, const std::vector<bool>& wanted) {
   return out;
 }
 
+/// Number of each row's capture, in the order in which they first stand there; the same name in two sessions
+/// is two. Where no column names them, runs of equal values may be some.
+static std::vector<int> capturesInOrder(const TableData& data) {
+  if (data.capture.empty()) {
+    auto runs = runsOfEqualValues(data);
+    return runs.empty() ? std::vector<int>{} : std::move(runs.front().run);
+  }
+  std::map<std::pair<int, int>, int> known;
+  std::vector<int> numbers;
+  for (std::size_t i = 0; i < data.capture.size(); ++i)
+    numbers.push_back(
+        known.try_emplace({data.session[i], data.capture[i]}, static_cast<int>(known.size())).first->second);
+  return numbers;
+}
+
 void lock(TableData& data, const TableMap& map) {
   if (data.has_locked_column) return;
   std::mt19937_64 random{map.seed + 77};
@@ -328,18 +403,19 @@ void lock(TableData& data, const TableMap& map) {
     data.notes.push_back(fmt::format("{} of {} sessions are locked", order.size(), sessions));
     return;
   }
-  // Blocks of rows that follow each other: one of every `every` is drawn.
+  // Blocks of captures, or rows, that follow each other: one of every `every` is drawn.
+  const auto capture = capturesInOrder(data);
+  const std::size_t units =
+      capture.empty() ? data.rows() : 1 + static_cast<std::size_t>(*std::ranges::max_element(capture));
   const auto every = static_cast<std::size_t>(std::lround(1.0 / map.locked_share));
-  const std::size_t size = std::max<std::size_t>(1, data.rows() / (8 * every));
-  for (std::size_t first = 0; first < data.rows(); first += size * every) {
-    const std::size_t begin = first + size * (random() % every);
-    for (std::size_t i = begin; i < std::min(begin + size, data.rows()); ++i) data.locked[i] = true;
+  const std::size_t size = std::max<std::size_t>(1, units / (8 * every));
+  std::vector<bool> is_drawn(units, false);
+  for (std::size_t first = 0; first < units; first += size * every) {
+    const std::size_t begin = first + size * (random() % std::min(every, units));
+    for (std::size_t i = begin; i < std::min(begin + size, units); ++i) is_drawn[i] = true;
   }
-  // Rows of one capture stay together.
-  std::set<int> captures;
-  for (std::size_t i = 0; i < data.capture.size(); ++i)
-    if (data.locked[i]) captures.insert(data.capture[i]);
-  for (std::size_t i = 0; i < data.capture.size(); ++i) data.locked[i] = captures.contains(data.capture[i]);
+  for (std::size_t i = 0; i < data.rows(); ++i)
+    data.locked[i] = is_drawn[capture.empty() ? i : static_cast<std::size_t>(capture[i])];
   data.doubts.push_back(
       "locked rows are of the same sessions as the others, because there are fewer than five");
 }

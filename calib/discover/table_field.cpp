@@ -55,19 +55,25 @@ std::optional<double> timeOfDay(std::string_view& text) {
   return seconds;
 }
 
-/// "2026-05-01", in days since 1970.
-std::optional<double> dayOf(std::string_view& text) {
-  const auto year = taken(text, 4);
-  if (!year || !takes(text, '-')) return std::nullopt;
-  const auto month = taken(text, 2);
-  if (!month || !takes(text, '-')) return std::nullopt;
-  const auto day = taken(text, 2);
-  if (!day) return std::nullopt;
-  const std::chrono::year_month_day date{std::chrono::year{*year},
-                                         std::chrono::month{static_cast<unsigned>(*month)},
-                                         std::chrono::day{static_cast<unsigned>(*day)}};
+std::optional<double> daysSince1970(int year, int month, int day) {
+  const std::chrono::year_month_day date{std::chrono::year{year},
+                                         std::chrono::month{static_cast<unsigned>(month)},
+                                         std::chrono::day{static_cast<unsigned>(day)}};
   if (!date.ok()) return std::nullopt;
   return static_cast<double>(std::chrono::sys_days{date}.time_since_epoch().count());
+}
+
+/// "2026-05-01" or "01.05.2026", in days since 1970.
+std::optional<double> dayOf(std::string_view& text) {
+  const bool is_german = text.size() > 2 && text[2] == '.';
+  const char between = is_german ? '.' : '-';
+  const auto first = taken(text, is_german ? 2 : 4);
+  if (!first || !takes(text, between)) return std::nullopt;
+  const auto month = taken(text, 2);
+  if (!month || !takes(text, between)) return std::nullopt;
+  const auto last = taken(text, is_german ? 4 : 2);
+  if (!last) return std::nullopt;
+  return is_german ? daysSince1970(*last, *month, *first) : daysSince1970(*first, *month, *last);
 }
 
 /// "Z", "+02:00" or nothing: by how much local time is ahead.
@@ -95,13 +101,23 @@ std::optional<double> numberIn(std::string_view field, bool has_decimal_comma) {
   return std::isfinite(value) && std::abs(value) < 1e100 ? value : std::nan("");
 }
 
+bool hasThousandsPoint(std::string_view field) {
+  const std::size_t comma = field.find(','), first = field.find('.');
+  if (comma == std::string_view::npos || first == std::string_view::npos || comma < first) return false;
+  if (field.front() == '-' || field.front() == '+') field.remove_prefix(1);
+  return field.find_first_not_of("0123456789.,") == std::string_view::npos && field.find(',') > 3 &&
+         field[field.find(',') - 4] == '.';
+}
+
 std::optional<double> secondsIn(std::string_view field) {
   constexpr double kDay = 86'400.0;
   double days = 0.0;
-  const bool has_date = field.size() > 10 && field[4] == '-';
+  const bool has_date = field.size() >= 10 && (field[4] == '-' || (field[2] == '.' && field[5] == '.'));
   if (has_date) {
     const auto day = dayOf(field);
-    if (!day || !(takes(field, 'T') || takes(field, ' '))) return std::nullopt;
+    if (!day) return std::nullopt;
+    if (field.empty()) return *day * kDay;
+    if (!takes(field, 'T') && !takes(field, ' ')) return std::nullopt;
     days = *day;
   }
   const auto seconds = timeOfDay(field);

@@ -6,6 +6,7 @@
 
 #include "calib/discover/candidates.h"
 #include "calib/discover/marginal.h"
+#include "calib/discover/rows_alike.h"
 #include "calib/discover/table_source.h"
 
 namespace toftwin::discover {
@@ -57,6 +58,7 @@ MatrixXd flexible(const TableData& data, const std::vector<CovariateInfo>& infos
 struct Residual {
   VectorXd value;
   double freedom = 1.0;
+  MatrixXd inverse{};  ///< of the weighted normal matrix
 };
 
 Residual residualOf(const MatrixXd& x, const VectorXd& y, const VectorXd& weight) {
@@ -64,7 +66,7 @@ Residual residualOf(const MatrixXd& x, const VectorXd& y, const VectorXd& weight
   const MatrixXd wx = root.asDiagonal() * x;
   const PseudoInverse inverse = pseudoInverse(wx.transpose() * wx, 1e-8);
   const VectorXd coefficient = inverse.inverse * (wx.transpose() * root.cwiseProduct(y));
-  return {y - x * coefficient, std::max(1.0, static_cast<double>(y.size()) - inverse.rank)};
+  return {y - x * coefficient, std::max(1.0, static_cast<double>(y.size()) - inverse.rank), inverse.inverse};
 }
 
 double medianOf(std::vector<double> values) {
@@ -103,9 +105,9 @@ void findGrowth(const TableData& data, const std::vector<CovariateInfo>& infos, 
     relative(i) *= std::exp(std::clamp(chosen(i) - 0.5 * mean, -2.5, 2.5));
 }
 
-/// 1 + 2 Σ ρ_k as long as ρ_k is clearly above nothing: over so many rows that follow each other they err
-/// alike.
-double correlationRows(const TableData& data, const VectorXd& standard) {
+/// 1 + 2 Σ ρ_k of neighbours as they are, as long as ρ_k is clearly above nothing: a few rows that were
+/// bumped together are no part of a spectrum.
+double laggedRows(const TableData& data, const VectorXd& standard) {
   const auto n = static_cast<std::size_t>(standard.size());
   double sum = 1.0;
   for (std::size_t lag = 1; lag <= n / 20; ++lag) {
@@ -122,7 +124,38 @@ double correlationRows(const TableData& data, const VectorXd& standard) {
   return sum;
 }
 
+/// What is left of a fit of what is known and of each covariate's slow course, clipped at three deviations:
+/// waves and products would take what captures err by, too.
+VectorXd slowResidual(const TableData& data, const std::vector<CovariateInfo>& infos, const MatrixXd& known) {
+  constexpr std::size_t kKnots = 5;
+  MatrixXd x = known;
+  for (const CovariateInfo& info : infos) {
+    const MatrixXd columns = columnsOf(data, smoothIn(info, kKnots).terms);
+    if (x.cols() + columns.cols() > static_cast<Index>(data.rows() / 4)) break;
+    x.conservativeResize(Eigen::NoChange, x.cols() + columns.cols());
+    x.rightCols(columns.cols()) = columns;
+  }
+  const VectorXd y = Eigen::Map<const VectorXd>(data.error.data(), static_cast<Index>(data.rows()));
+  VectorXd left = residualOf(x, y, VectorXd::Ones(y.size())).value;
+  std::vector<double> magnitudes;
+  for (const double v : left) magnitudes.push_back(std::abs(v));
+  const double most = kHuber * 1.4826 * medianOf(magnitudes);
+  return most > 0.0 ? VectorXd(left.cwiseMin(most).cwiseMax(-most)) : left;
+}
+
 }  // namespace
+
+std::optional<Runs> alikeRuns(const TableData& data, const std::vector<CovariateInfo>& infos,
+                              const MatrixXd& known) {
+  std::optional<Runs> found;
+  double most = 2.5;
+  const auto candidates = runsOfEqualValues(data);
+  if (candidates.empty()) return found;
+  const VectorXd residual = slowResidual(data, infos, known);
+  for (const Runs& runs : candidates)
+    if (const double here = alikeness(runs, residual); here > most) most = here, found = runs;
+  return found;
+}
 
 TableNoise estimateNoise(const TableData& data, const std::vector<CovariateInfo>& infos,
                          const MatrixXd& known) {
@@ -154,7 +187,12 @@ TableNoise estimateNoise(const TableData& data, const std::vector<CovariateInfo>
       noise.outliers += size > kHuber * ruler;
     }
     if (round == 1 && data.sigma.empty()) findGrowth(data, infos, left.value, noise, relative);
-    if (round == 3) noise.correlation_rows = correlationRows(data, weight.cwiseSqrt().cwiseProduct(standard));
+    if (round == 3) {
+      const VectorXd root = weight.cwiseSqrt().cwiseQuotient(relative);
+      noise.correlation_rows =
+          std::max(laggedRows(data, weight.cwiseSqrt().cwiseProduct(standard)),
+                   correlationRows(root.cwiseProduct(left.value), root.asDiagonal() * x, left.inverse));
+    }
   }
   // A table without any noise (computed, or rounded to nothing) still needs a scale.
   const double smallest = 1e-9 * std::max(y.cwiseAbs().maxCoeff(), 1e-12);

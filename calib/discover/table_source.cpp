@@ -85,20 +85,32 @@ TableSource::TableSource(TableData data, bool fits_gain) : data_(std::move(data)
   // changes from session to session is seen. A few sessions' offsets are free, and only what changes within
   // them is.
   if (data_.capture.empty() && data_.session_names.size() >= kManySessions) data_.capture = data_.session;
+  has_sessions_ = data_.session_names.size() > 1 && data_.session_names.size() < kManySessions;
+  if (data_.capture.empty()) {
+    if (auto runs = alikeRuns(data_, infos_, nuisancesOf(data_)))
+      runs_of_ = std::move(runs->covariate), data_.capture = std::move(runs->run);
+  }
   std::set<int> captures(data_.capture.begin(), data_.capture.end());
   has_captures_ = !captures.empty() && 2 * captures.size() <= data_.rows();
-  has_sessions_ = data_.session_names.size() > 1 && data_.session_names.size() < kManySessions;
   learn({});
 }
 
 void TableSource::learn(std::span<const Term> known) {
+  const MatrixXd nuisances = nuisancesOf(data_);
   MatrixXd columns = columnsOf(data_, known);
-  for (const auto& [group, more] : nuisanceColumns(data_)) {
+  columns.conservativeResize(Eigen::NoChange, columns.cols() + nuisances.cols());
+  columns.rightCols(nuisances.cols()) = nuisances;
+  noise_ = estimateNoise(data_, infos_, columns);
+  makeCaptures();
+}
+
+MatrixXd TableSource::nuisancesOf(const TableData& rows) const {
+  MatrixXd columns(static_cast<Index>(rows.rows()), 0);
+  for (const auto& [group, more] : nuisanceColumns(rows)) {
     columns.conservativeResize(Eigen::NoChange, columns.cols() + more.cols());
     columns.rightCols(more.cols()) = more;
   }
-  noise_ = estimateNoise(data_, infos_, columns);
-  makeCaptures();
+  return columns;
 }
 
 std::vector<std::pair<Group, MatrixXd>> TableSource::nuisanceColumns(const TableData& rows) const {

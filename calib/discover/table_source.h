@@ -3,10 +3,12 @@
 
 #include <cstddef>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "calib/discover/rows_alike.h"
 #include "calib/discover/table_data.h"
 #include "calib/discover/term.h"
 
@@ -38,6 +40,9 @@ class TableSource : public RowSource {
   void learn(std::span<const Term> known);
   [[nodiscard]] const TableData& data() const { return data_; }
   [[nodiscard]] const TableNoise& noise() const { return noise_; }
+  /// The covariate whose runs of equal values are captures, since rows of one err alike; empty: none.
+  [[nodiscard]] const std::string& runsOf() const { return runs_of_; }
+  [[nodiscard]] bool hasCaptures() const { return has_captures_; }
   [[nodiscard]] std::size_t captures() const { return names_.size(); }
   /// Number of each row's capture.
   [[nodiscard]] const std::vector<int>& captureOf() const { return capture_; }
@@ -46,6 +51,7 @@ class TableSource : public RowSource {
 
  private:
   void makeCaptures();
+  [[nodiscard]] Eigen::MatrixXd nuisancesOf(const TableData& rows) const;
   [[nodiscard]] Evidence evidenceOf(std::span<const TermGroup> extra, const std::vector<int>& capture,
                                     std::size_t captures) const;
 
@@ -56,6 +62,7 @@ class TableSource : public RowSource {
   double reference_middle_ = 0.0, reference_spread_ = 1.0, error_spread_ = 1.0;
   std::vector<CovariateInfo> infos_;
   TableNoise noise_;
+  std::string runs_of_{};
   std::vector<int> capture_;
   std::vector<std::string> names_, blocks_;
 };
@@ -63,6 +70,11 @@ class TableSource : public RowSource {
 /// Values of terms for all rows, one column a term.
 Eigen::MatrixXd columnsOf(const TableData& data, std::span<const Term> terms);
 std::vector<CovariateInfo> infosOf(const TableData& data);
+
+/// Runs of equal values whose rows err alike beyond what is known and slow (by more than 2.5 standard
+/// deviations), the clearest ones.
+std::optional<Runs> alikeRuns(const TableData& data, const std::vector<CovariateInfo>& infos,
+                              const Eigen::MatrixXd& known);
 
 /// Noise of a table from what is left after a flexible fit of everything smooth: weights and deviations in
 /// turn (P. J. Huber, Ann. Math. Stat. 35 (1964) 73; k = 3). `known`: columns that are there for certain,

@@ -6,11 +6,12 @@
 #include <random>
 
 #include <Eigen/Dense>
+#include <fmt/format.h>
 
 namespace toftwin::discover {
 namespace {
 
-constexpr int kRows = 400, kSessions = 4;
+constexpr int kRows = 400, kCaptureRows = 20;
 
 /// Draws that are the same everywhere: the standard fixes the engine, not the distributions.
 class Draws {
@@ -65,10 +66,11 @@ double valueOf(Hidden hidden, const Row& row) {
 /// Times √(λ/χ²) of what is left after offset, gain and session offsets.
 void scaleTo(double lambda, double sigma, const std::vector<Row>& rows, const std::vector<int>& session,
              Eigen::VectorXd& effect) {
-  Eigen::MatrixXd x = Eigen::MatrixXd::Zero(effect.size(), kSessions + 1);
+  const int sessions = session.back() + 1;
+  Eigen::MatrixXd x = Eigen::MatrixXd::Zero(effect.size(), sessions + 1);
   for (Eigen::Index i = 0; i < effect.size(); ++i) {
     x(i, session[static_cast<std::size_t>(i)]) = 1.0;
-    x(i, kSessions) = rows[static_cast<std::size_t>(i)].distance;
+    x(i, sessions) = rows[static_cast<std::size_t>(i)].distance;
   }
   const Eigen::VectorXd left = effect - x * x.colPivHouseholderQr().solve(effect);
   effect *= std::sqrt(lambda / left.squaredNorm()) * sigma;
@@ -133,20 +135,22 @@ Planted plant(std::uint64_t seed, const std::vector<Hidden>& hidden, double lamb
   Planted out;
   TableData& data = out.data;
   const double exposures[]{200.0, 500.0, 1000.0, 2000.0};
-  double room[kSessions], offset[kSessions];
-  for (int s = 0; s < kSessions; ++s)
-    room[s] = draws.uniform(15.0, 30.0), offset[s] = errors.session_mm * draws.normal();
+  std::vector<double> room, offset;
+  for (int s = 0; s < errors.sessions; ++s)
+    room.push_back(draws.uniform(15.0, 30.0)), offset.push_back(errors.session_mm * draws.normal());
   for (int i = 0; i < kRows; ++i) {
-    const int session = i * kSessions / kRows;
+    const int session = i * errors.sessions / kRows;
     Row row{};
-    row.time = 15.0 * (i % (kRows / kSessions)) + draws.uniform(0.0, 10.0);
+    row.time = 15.0 * (i % (kRows / errors.sessions)) + draws.uniform(0.0, 10.0);
     row.distance = draws.uniform(0.5, 4.0);
-    row.temperature = room[session] + 12.0 * (1.0 - std::exp(-row.time / 400.0)) + draws.normal();
+    row.temperature =
+        room[static_cast<std::size_t>(session)] + 12.0 * (1.0 - std::exp(-row.time / 400.0)) + draws.normal();
     row.ambient = draws.uniform(0.0, 40.0);
     row.exposure = exposures[static_cast<int>(4.0 * draws.uniform())];
     row.amplitude = row.exposure * draws.uniform(0.1, 0.9) / (row.distance * row.distance);
     row.frame = 37.0 * i + std::floor(draws.uniform(0.0, 20.0));
     row.incidence = draws.uniform(0.0, 60.0);
+    if (errors.logged_mm > 0.0 && i % kCaptureRows != 0) row.ambient = rows.back().ambient;
     rows.push_back(row);
     data.session.push_back(session);
   }
@@ -158,12 +162,15 @@ Planted plant(std::uint64_t seed, const std::vector<Hidden>& hidden, double lamb
     scaleTo(lambda, errors.sigma_mm, rows, data.session, effect);
     sum += effect;
   }
+  double capture = 0.0, walk = 0.0;
   for (int i = 0; i < kRows; ++i) {
     const Row& row = rows[static_cast<std::size_t>(i)];
+    if (errors.logged_mm > 0.0 && i % kCaptureRows == 0) capture = errors.logged_mm * draws.normal();
+    if (errors.ar1_mm > 0.0) walk = 0.9 * walk + std::sqrt(0.19) * errors.ar1_mm * draws.normal();
     double noise = errors.sigma_mm * (errors.heavy_tails ? draws.t4() : draws.normal());
     if (errors.bumped && i >= 120 && i < 130) noise += 6.0 * errors.sigma_mm;
     data.error.push_back(3.0 + 2.0 * row.distance + offset[data.session[static_cast<std::size_t>(i)]] +
-                         sum(i) + noise);
+                         sum(i) + noise + capture + walk);
     data.reference.push_back(row.distance);
     data.line.push_back(static_cast<std::size_t>(i) + 2);
   }
@@ -182,9 +189,20 @@ Planted plant(std::uint64_t seed, const std::vector<Hidden>& hidden, double lamb
   column("frame", Nature::Index, &Row::frame);
   column("incidence_deg", Nature::Plain, &Row::incidence);
   data.reference_name = "distance_m", data.unit = "mm", data.period = 4.99654;  // c/(2 · 30 MHz)
-  data.session_names = {"1", "2", "3", "4"};
+  for (int s = 1; s <= errors.sessions; ++s) data.session_names.push_back(std::to_string(s));
   data.locked.assign(kRows, false);
   return out;
+}
+
+std::string csvOf(const TableData& data, bool has_day) {
+  std::string text = has_day ? "error_mm,session,day" : "error_mm,session";
+  for (const TableCovariate& covariate : data.covariates) text += "," + covariate.name;
+  for (std::size_t i = 0; i < data.rows(); ++i) {
+    text += fmt::format("\n{},{}", data.error[i], data.session[i]);
+    if (has_day) text += fmt::format(",{}", 3 * data.session[i] + 1);
+    for (const TableCovariate& covariate : data.covariates) text += fmt::format(",{}", covariate.values[i]);
+  }
+  return text + "\n";
 }
 
 }  // namespace toftwin::discover

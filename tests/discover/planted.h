@@ -16,6 +16,9 @@ struct Errors {
   bool heavy_tails = false;  ///< Student's t with 4 degrees of freedom, of the same variance
   bool bumped = false;       ///< rows 120 to 129 are 6 sigma off together
   double session_mm = 0.5;   ///< deviation of the sessions' offsets
+  int sessions = 4;
+  double logged_mm = 0.0;  ///< deviation of an offset of 20 rows that share one logged ambient light, if any
+  double ar1_mm = 0.0;     ///< deviation of an AR(1) process from row to row, correlation 0.9
 };
 
 enum class Hidden {
@@ -41,9 +44,11 @@ struct Planted {
   TableData data;
   std::vector<double> effect_mm;  ///< of each row: what was hidden
 };
-/// 400 rows of 4 sessions, each from switching on, distances in random order. The effects are scaled so that
-/// each has noncentrality `lambda` over the rows after offset, gain and session offsets.
+/// 400 rows of 4 sessions or as many as said, each from switching on, distances in random order. The effects
+/// are scaled so that each has noncentrality `lambda` over the rows after offset, gain and session offsets.
 Planted plant(std::uint64_t seed, const std::vector<Hidden>& hidden, double lambda,
               const Errors& errors = {});
+/// The table as a file: error_mm, session, day (of the session; if wanted) and the covariates.
+std::string csvOf(const TableData& data, bool has_day = false);
 
 }  // namespace toftwin::discover

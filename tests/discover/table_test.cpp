@@ -39,16 +39,6 @@ std::string textOf(const fs::path& file) {
   return text.str();
 }
 
-std::string csvOf(const TableData& data) {
-  std::string text = "error_mm,session";
-  for (const TableCovariate& covariate : data.covariates) text += "," + covariate.name;
-  for (std::size_t i = 0; i < data.rows(); ++i) {
-    text += fmt::format("\n{},{}", data.error[i], data.session[i]);
-    for (const TableCovariate& covariate : data.covariates) text += fmt::format(",{}", covariate.values[i]);
-  }
-  return text + "\n";
-}
-
 /// The planted tables have a gain.
 TableMap withReference() {
   TableMap map;
