@@ -8,6 +8,7 @@
 #include <cmath>
 #include <utility>
 
+#include "drivers/logging.h"
 #include "drivers/loss_reasons.h"
 #include "drivers/sim/chosen.h"
 #include "drivers/sim/operating.h"
@@ -16,6 +17,7 @@
 #include "sim/sensor/collect_moving.h"
 #include "sim/sensor/frame_assembly.h"
 #include "sim/sensor/sensor_model.h"
+#include "sim/tracer/missing_light.h"
 
 namespace toftwin::drivers::simulator {
 namespace {
@@ -360,6 +362,8 @@ Result<std::unique_ptr<Source>> open(settings::Table& table) {
   if (!chosen) return chosen.error();
   sim::TraceRequest request = chosen->model.traceRequest();
   chosen->keys.applyTo(request);
+  if (const auto missing = sim::missingLight(chosen->scene, request.emitters))
+    logging::warn("{}: {}", table.place("scene"), *missing);
   View view{std::move(chosen->scene), std::move(request), motionOf(chosen->keys), chosen->model.rowDelay()};
   if (chosen->keys.mode == Mode::RealTime) view.goRealtime(chosen->model.correlatedTerms());
   return std::unique_ptr<Source>{std::make_unique<SimulatedSource>(std::move(*chosen), std::move(view))};

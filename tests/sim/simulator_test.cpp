@@ -11,6 +11,9 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <memory>
+
+#include "../kept_log.h"
 
 namespace toftwin::drivers::simulator {
 namespace {
@@ -106,6 +109,32 @@ class Simulator : public testing::Test {
 TEST_F(Simulator, SeesTheWallWhereItIs) {
   const auto source = open();
   EXPECT_NEAR(meanRange(frameOf(*source)), 2.0, 2e-3);  // shot noise: 3 mm / √480
+}
+
+/// Light from a mirror onto a wall needs an emitter with a size (docs/scene.md); with a point it is missing.
+TEST_F(Simulator, WarnsOnceOfAMirrorThatAPointCannotBeMetBy) {
+  const auto log = std::make_shared<toftwin::test::KeptLog>();  // shared with spdlog
+  const toftwin::test::LoggingTo logging{log};
+  std::ofstream{folder_ / "mirror.toml"} << kWall << R"(
+[[material]]
+name = "mirror"
+model = "mirror"
+[[object]]
+shape = "rectangle"
+position_m = [0.5, 0, 1]
+euler_deg = [0, 90, 0]
+material = "mirror"
+)";
+  std::string disc = kCamera;
+  disc.insert(disc.find("[[emitter]]") + 12, "radius_mm = 5\n");
+  std::ofstream{folder_ / "disc.toml"} << disc;
+  const auto isOpen = [&](const std::string& camera, const std::string& scene) {
+    return tryOpen("camera = '" + camera + "'\nscene = '" + scene + "'\n").ok();
+  };
+  ASSERT_TRUE(isOpen("camera.toml", "wall.toml") && isOpen("disc.toml", "mirror.toml"));
+  EXPECT_EQ(log->count("is missing"), 0);
+  ASSERT_TRUE(isOpen("camera.toml", "mirror.toml"));
+  EXPECT_EQ(log->count("toftwind.toml:2: the scene has a mirror or thin glass"), 1);
 }
 
 TEST_F(Simulator, SameSeedSameBytes) {

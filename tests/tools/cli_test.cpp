@@ -89,6 +89,13 @@ TEST(Toftwin, HelpAndVersionAreStatus0) {
   }
 }
 
+TEST(Toftwin, HelpAsksOnceForWhatGoesByItsPlaceOrItsName) {
+  const std::string help = toftwin("render --help").out;
+  EXPECT_THAT(help, HasSubstr("  CAMERA TEXT REQUIRED"));
+  EXPECT_THAT(help, HasSubstr("  --camera TEXT  "));
+  EXPECT_THAT(help, HasSubstr("-o,--output TEXT REQUIRED"));
+}
+
 TEST(Toftwin, AStandardOutputThatIsFullIsStatus6) {
   const std::string full = " > /dev/full";
   for (const Command& command : commands()) {

@@ -139,6 +139,8 @@ TEST(ComplianceCommand, ACameraThatDoesNotOpenGivesAReportToo) {
   const Ran text = toftwin("compliance pattern:9");
   EXPECT_EQ(text.status, 4);
   EXPECT_THAT(text.out, AllOf(HasSubstr("kernel            Linux "), HasSubstr("FAIL it opens"), HasSubstr("pattern:9")));
+  EXPECT_THAT(text.out, HasSubstr("     there is no camera pattern:9"))
+      << "named as a place in a file that is not there";
   EXPECT_THAT(toftwin("compliance pattern:9 --json").out,
               AllOf(HasSubstr("\"camera\": \"pattern:9\""), HasSubstr("\"check\": \"it opens\"")));
 }

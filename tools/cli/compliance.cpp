@@ -62,6 +62,16 @@ Result<drivers::Candidate> candidateFor(const Options& options) {
   return candidate;
 }
 
+/// Errors name file and line. Keys that stand in no file, but were made of the camera's name, have no such
+/// place.
+Error withoutPlace(Error error, const Options& options) {
+  const std::string_view text = error.message;
+  if (!options.keys.empty() || !text.starts_with(options.camera + ":")) return error;
+  const std::size_t line = options.camera.size() + 1, end = text.find_first_not_of("0123456789", line);
+  if (end > line && end != text.npos && text.substr(end).starts_with(": ")) error.message.erase(0, end + 2);
+  return error;
+}
+
 const char* wordOf(Outcome outcome) {
   switch (outcome) {
     case Outcome::Passed:
@@ -122,11 +132,13 @@ Result<Exit> run(const Options& options) {
   if (!table) return table.error();
   // If it cannot be opened at all, every check would say the same.
   auto opened = candidate->driver->open(*table);
-  if (auto checked = table->check(); !checked) return checked.error();  // the user's, and nothing to report
+  if (auto checked = table->check(); !checked)
+    return withoutPlace(checked.error(), options);  // the user's, and nothing to report
   ReportHeader header = headerOfMachine(options.camera, options.keys);
   if (!opened) {
-    reportUnopened(options, header, opened.error());
-    return opened.error();
+    const Error why = withoutPlace(opened.error(), options);
+    reportUnopened(options, header, why);
+    return why;
   }
   std::ranges::move(headerOfCamera(**opened, how.frame_timeout), std::back_inserter(header));
   opened->reset();

@@ -11,6 +11,7 @@
 #include "sim/images/content_hash.h"
 #include "sim/sensor/color.h"
 #include "sim/sensor/frame_assembly.h"
+#include "sim/tracer/missing_light.h"
 #include "sim/tracer/scene.h"
 
 namespace toftwin::cli {
@@ -158,6 +159,8 @@ Result<Job> jobOf(const RenderOptions& options) {
   }
   auto scene = loadScene(options.scene);
   if (!scene) return scene.error();
+  if (const auto missing = sim::missingLight(*scene, model->traceRequest().emitters))
+    fmt::print(stderr, "toftwin: {}: warning: {}\n", options.scene, *missing);
   const auto pose = options.pose.pose();
   if (!pose) return pose.error();
   auto trajectory =

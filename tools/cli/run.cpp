@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <memory>
 #include <sstream>
 #include <string>
 #include <string_view>
@@ -29,6 +30,27 @@ std::string exitTable() {
   return table;
 }
 
+/// An option that may also go by its place is required in one of both forms: its place says so, and its name
+/// must not read as if it had to be given again.
+class HelpFormatter : public CLI::Formatter {
+ public:
+  std::string make_option_opts(const CLI::Option* option) const override {
+    std::string text = CLI::Formatter::make_option_opts(option);
+    const std::string required = " " + get_label("REQUIRED");
+    if (const auto at = text.find(required);
+        option->get_positional() && !in_positionals_ && at != std::string::npos)
+      text.erase(at, required.size());
+    return text;
+  }
+  std::string make_option(const CLI::Option* option, bool is_positional) const override {
+    in_positionals_ = is_positional;
+    return CLI::Formatter::make_option(option, is_positional);
+  }
+
+ private:
+  mutable bool in_positionals_ = false;  ///< CLI11 tells make_option alone
+};
+
 /// CLI11 takes "-1" for an unsigned number and makes 2⁶⁴ - 1 of it.
 void refuseNegativeCounts(CLI::Option& option) {
   if (!option.get_type_name().starts_with("UINT")) return;
@@ -47,6 +69,7 @@ std::vector<Run> declare(CLI::App& app) {
   app.set_help_flag("-h,--help",
                     "show this text; `toftwin COMMAND --help` shows that of a command");
   app.require_subcommand(1);
+  app.formatter(std::make_shared<HelpFormatter>());  // shared with its commands
   std::vector<Run> runs;
   for (const Command& command : commands()) {
     CLI::App* sub = app.add_subcommand(command.name, command.summary);
