@@ -20,6 +20,8 @@
 #include "sim/effects/harmonics.h"
 #include "sim/effects/internal_reflection.h"
 #include "sim/effects/lag.h"
+#include "sim/effects/learned_light.h"
+#include "sim/effects/learned_neighbours.h"
 #include "sim/effects/learned_range.h"
 #include "sim/effects/lens_ghost.h"
 #include "sim/effects/lens_scatter.h"
@@ -48,16 +50,17 @@ namespace toftwin::sim {
 /// Every effect, in the order light meets them. This list alone feeds configuration, documents, law
 /// tests and discovery.
 using AllEffects = EffectList<
-    Harmonics, RiseDrift, DutyDrift, ThermalDelay, FrequencyOffset,                  // light: emission
-    AmbientLight,                                                                    // the scene
+    Harmonics, RiseDrift, DutyDrift, ThermalDelay, FrequencyOffset,                     // light: emission
+    AmbientLight,                                                                       // the scene
     DistortionMisfit, Defocus, Vignetting, LensScatter, LensGhost, InternalReflection,  // optics
-    PropagationDelay, FixedPatternPhase, StepPhase,                                  // demodulation
-    Lag, ShotNoise, AmbientSuppression, Saturation,                                  // samples: the pixel
+    LearnedNeighbours, LearnedLight,                 // what has no name yet
+    PropagationDelay, FixedPatternPhase, StepPhase,  // demodulation
+    Lag, ShotNoise, AmbientSuppression, Saturation,  // samples: the pixel
     Nonlinearity, SampleGain, SampleOffset, ColumnComb, ReadNoise, Quantisation, Companding,  // the converter
     RangeNoise, WarmUp, TimeWalk, ClockScale, ResidualDrift, Delay, CalibrationTable,  // range: decoding
-    LearnedRange,  // what has no name yet
+    LearnedRange,                                                                      // what has no name yet
     LowAmplitudeFilter, FlyingPixelFilter, EdgeFilter, MedianFilter, BilateralFilter,
-    TemporalFilter>;                                                                 // filters
+    TemporalFilter>;  // filters
 
 /// One effect of a model.
 using AnyEffect = AllEffects::Any;

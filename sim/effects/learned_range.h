@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "sim/effects/effect.h"
+#include "sim/effects/learned_table.h"
 
 namespace toftwin::sim {
 
@@ -13,19 +14,7 @@ namespace toftwin::sim {
 /// with x and y whatever the error goes with; t and g linear (bilinear) between their knots and constant
 /// beyond them. What `toftwin discover` writes for an effect that has no name yet.
 struct LearnedRange {
-  enum class Over {
-    Nothing,
-    Time,
-    Illumination,
-    Sensor,
-    Ambient,
-    Exposure,
-    Range,
-    Amplitude,
-    Column,
-    Row,
-    Radius
-  };
+  using Over = LearnedOver;
   Over over = Over::Range;
   std::vector<double> knots{1.0, 2.0, 3.0};
   Over and_over = Over::Nothing;
@@ -52,15 +41,18 @@ struct LearnedRange {
               "g likewise: by how much the amplitude is larger; none: 0");
   }
   /// What no single key can say of what is wrong, or nothing.
-  [[nodiscard]] std::string problem() const;
+  [[nodiscard]] std::string problem() const {
+    return problemOf({knots, and_knots}, over, and_over, {"offsets_mm", offsets_mm}, gains_percent);
+  }
   /// t, in millimetres. NaN where x or y is not known.
-  [[nodiscard]] double offset_mm(double x, double y = 0.0) const { return between(offsets_mm, x, y); }
+  [[nodiscard]] double offset_mm(double x, double y = 0.0) const {
+    return LearnedKnots{knots, and_knots}.valueIn(offsets_mm, x, y);
+  }
   /// g, likewise.
-  [[nodiscard]] double gain_percent(double x, double y = 0.0) const { return between(gains_percent, x, y); }
-  [[nodiscard]] RangeImage apply(RangeImage image, const Conditions& now,
-                                 const Random& random) const;
-  /// A table's value at x and y; 0 where the table is empty.
-  [[nodiscard]] double between(const std::vector<double>& table, double x, double y) const;
+  [[nodiscard]] double gain_percent(double x, double y = 0.0) const {
+    return LearnedKnots{knots, and_knots}.valueIn(gains_percent, x, y);
+  }
+  [[nodiscard]] RangeImage apply(RangeImage image, const Conditions& now, const Random& random) const;
 
   template <class Visitor>
   static void chooseOver(Visitor& v, const char* key, Over& value, const char* meaning) {

@@ -97,6 +97,11 @@ bool anyActsOnLight(const std::vector<AnyEffect>& effects) {
   return false;
 }
 
+bool anyAsksForTheScene(const std::vector<AnyEffect>& effects) {
+  return std::ranges::any_of(effects,
+                             [](const AnyEffect& any) { return std::holds_alternative<LearnedLight>(any); });
+}
+
 template <class T>
 Image<T> cropped(const Image<T>& full, int left, int top, int width, int height) {
   Image<T> part{width, height};
@@ -154,6 +159,7 @@ Samples SensorModel::collect(const Light& light, const Moment& moment, std::uint
   const Conditions now{moment, impl_->camera, region_x, region_y};
   const bool wants_all = light.frequencies.empty() || impl_->addsHarmonics();
   Light seen = correlatedPart(light, impl_->responses, wants_all);
+  if (anyAsksForTheScene(impl_->effects)) seen.truth = light.truth;
   return samplesOf(*impl_, applyAll(std::move(seen), impl_->effects, now, seed, frame));
 }
 

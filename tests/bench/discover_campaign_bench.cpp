@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// What toftwin discover finds in simulated campaigns: each effect of the catalogue hidden in turn, at a chosen
-// difficulty λ, with the catalogue knowing it and without, and campaigns with nothing hidden.
+// What toftwin discover finds in simulated campaigns: each effect of the catalogue hidden in turn, at a
+// chosen difficulty λ, with the catalogue knowing it and without, and campaigns with nothing hidden.
 //
 //   discover_campaign_bench [--cases a,b] [--seeds 1:5] [--lambda 150,600,3000] [--absent no|yes|both]
 //                           [--null plain,noise,pose,tails,bump] [--threads 1] [--large] [--scores]
 //   discover_campaign_bench --table FILE...
-//   discover_campaign_bench --references FOLDER...     (each as tests/reference_device/reference_campaign leaves it)
+//   discover_campaign_bench --references FOLDER...     (each as tests/reference_device/reference_campaign
+//   leaves it)
 //
-// Prints one line of comma-separated values for each search, so that slices can run side by side; --table puts
-// such lines together. Without --cases and --null: all effects; with --null alone: no effects. --large: 106
-// captures of 176 × 132 pixels instead of 45 of 44 × 33, to see how long a search takes. --scores: with what
-// explains most by itself, as lines that begin with #.
+// Prints one line of comma-separated values for each search, so that slices can run side by side; --table
+// puts such lines together. Without --cases and --null: all effects; with --null alone: no effects. --large:
+// 106 captures of 176 × 132 pixels instead of 45 of 44 × 33, to see how long a search takes. --scores: with
+// what explains most by itself and fitted numbers beside the hidden ones, as lines that begin with #.
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 #include <unistd.h>
@@ -28,6 +29,7 @@
 #include "calib/discover/campaign/discover_campaign.h"
 #include "calib/discover/campaign/model_file.h"
 #include "calib/discover/campaign/reading.h"
+#include "calib/discover/campaign/refit.h"
 #include "tests/bench/campaign_score.h"
 #include "tests/bench/campaign_truth.h"
 #include "tests/discover/simulated_run.h"
@@ -177,6 +179,19 @@ void report(const Options& options, const bench::Score& score, const CampaignFin
   std::fflush(stdout);
 }
 
+/// Fitted numbers of the hidden effect beside what they were.
+void reportNumbers(const sim::AnyEffect& hidden, const CampaignFinding& finding) {
+  for (const FoundEffect& one : finding.effects) {
+    if (!one.fitted || one.fitted->effect.index() != hidden.index()) continue;
+    for (const EffectNumber& number : numbersOf(one.fitted->effect))
+      if (number.is_whole)
+        fmt::print("# {}: {}, was {}\n", number.key, number.value, valueOf(hidden, number.key));
+    for (const FittedNumber& number : one.fitted->numbers)
+      fmt::print("# {}: {:.5g} ± {:.2g}, was {:.5g}\n", number.key, number.value, number.error,
+                 valueOf(hidden, number.key));
+  }
+}
+
 /// Hides the effect, made as strong as λ wants, and searches.
 void hide(const Setting& world, const bench::KnownCaptures& unspoilt, const sim::AnyEffect& none,
           const sim::AnyEffect& defaults, const Options& options, double wanted, std::uint64_t seed) {
@@ -210,6 +225,7 @@ void hide(const Setting& world, const bench::KnownCaptures& unspoilt, const sim:
     report(options,
            bench::scoreOf(of, hidden, bench::removedFrom(locked, world.declared, truth, finding), finding),
            finding);
+    if (options.scores) reportNumbers(hidden, finding);
   }
 }
 
@@ -326,7 +342,7 @@ int main(int argc, char** argv) {
     const std::string name{E::about.name};
     const bool is_asked = std::ranges::find(options.cases, name) != options.cases.end();
     if (!is_asked && !(options.cases.empty() && options.nulls.empty())) return;
-    if (isNoise(sim::AnyEffect{E{}}) || name == "learned_range" || name == "delay") return;
+    if (isNoise(sim::AnyEffect{E{}}) || name.starts_with("learned_") || name == "delay") return;
     for (const double lambda : options.lambdas) {
       for (std::uint64_t seed = options.first_seed; seed <= options.last_seed; ++seed)
         hide(world, unspoilt, sim::AnyEffect{E::none()}, sim::AnyEffect{E{}}, options, lambda, seed);

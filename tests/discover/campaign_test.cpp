@@ -169,6 +169,27 @@ TEST_F(Searched, AnEffectThatTheCatalogueLacksIsNotBlamedOnAnother) {
   ASSERT_THAT(namesOf(finding), ElementsAre("undeclared")) << verdictOf(finding);
   EXPECT_THAT(finding.effects.front().found.covariates, ElementsAre("neighbours")) << verdictOf(finding);
   EXPECT_THAT(finding.effects.front().found.refused, testing::Not(testing::IsEmpty())) << "nothing was tried";
+  // What it does is in the model nevertheless.
+  const auto model = sim::SensorModel::parse(finding.model_toml, "model.toml");
+  ASSERT_TRUE(model) << model.error().message;
+  EXPECT_THAT(model->effectNames(), Contains("learned_neighbours"));
+  ASSERT_TRUE(finding.judgement);
+  EXPECT_GT(finding.judgement->removed, 0.7) << verdictOf(finding);
+}
+
+/// Light that goes into a surface before it comes back is the later the flatter it meets it.
+TEST_F(Searched, ADelayThatGoesWithTheIncidenceIsATableOfTheLight) {
+  simulate(
+      "[[effect]]\ntype = 'learned_light'\nover = 'incidence'\nknots = [1.0, 1.2, 1.5, 2.0]\n"
+      "delays_mm = [0.0, 4.0, 6.0, 7.0]\n");
+  const CampaignFinding finding = search(job());
+  ASSERT_THAT(namesOf(finding), ElementsAre("undeclared")) << verdictOf(finding);
+  EXPECT_THAT(finding.effects.front().found.covariates, Contains("incidence")) << verdictOf(finding);
+  const auto model = sim::SensorModel::parse(finding.model_toml, "model.toml");
+  ASSERT_TRUE(model) << model.error().message;
+  EXPECT_THAT(model->effectNames(), Contains("learned_light"));
+  ASSERT_TRUE(finding.judgement);
+  EXPECT_GT(finding.judgement->removed, 0.7) << verdictOf(finding);
 }
 
 /// The pattern of one camera out of 2³²: not one of those that the catalogue's effect is tried with.

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the way from the scene through the lens to the pixel does wrong.
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <cmath>
 
+#include "sim/effects/learned_table.h"
 #include "tests/sim/phase_rig.h"
 
 namespace toftwin::sim {
@@ -103,6 +104,97 @@ TEST(LensGhost, PutsTheMirroredPixelsShareIntoEachPixelAndKeepsAllLight) {
   double sum = 0.0;
   for (float steady : seen.steady.pixels()) sum += static_cast<double>(steady);
   EXPECT_NEAR(sum, 5.0, 1e-6);
+}
+
+// One bright pixel of phase φ among dark ones: a square of reach 2 has a 25th of it, or, where the image ends
+// after 3 × 3 of its pixels, a 9th.
+TEST(LearnedNeighbours, PutsItsShareOfASquaresMeanIntoEachPixel) {
+  const Light light = syntheticLight(11, 9, {20_MHz}, 2, [](int x, int y) {
+    return std::vector<Way>{{(x == 5 && y == 4) || (x == 0 && y == 0) ? 5.0 : 0.0, 1.3}};
+  });
+  const LearnedNeighbours square{.reaches_px = {2.0}, .shares_percent = {4.0}};
+  const Light seen = applied(square, light, cameraOfSize(11, 9));
+  EXPECT_NEAR(seen.steady(7, 6), 0.04 * 5.0 / 25.0, 1e-6);
+  EXPECT_NEAR(seen.steady(8, 6), 0.0, 1e-9) << "3 columns away";
+  EXPECT_NEAR(seen.steady(5, 4), 5.0 + 0.04 * 5.0 / 25.0, 1e-6) << "itself included";
+  EXPECT_NEAR(seen.steady(0, 0), 5.0 + 0.04 * 5.0 / 9.0, 1e-6) << "squares end at the image's edge";
+  EXPECT_NEAR(phaseOf(seen.phasor(0, 2)(7, 6)), std::remainder(2.0 * phaseAt(1.3, 20e6), 2.0 * kPi), 1e-6);
+}
+
+TEST(LearnedNeighbours, AddsUpItsSquaresOfTheLightAsItCame) {
+  const Light light = syntheticLight(30, 20, {20_MHz}, 1, [](int x, int) {
+    return std::vector<Way>{x < 10 ? Way{3.0, 0.7} : Way{1.0, 2.1}};
+  });
+  const CameraInfo camera = cameraOfSize(30, 20);
+  const Light both = applied(LearnedNeighbours{{1.0, 100.0}, {-2.0, 3.0}}, light, camera),
+              near = applied(LearnedNeighbours{{1.0}, {-2.0}}, light, camera),
+              far = applied(LearnedNeighbours{{100.0}, {3.0}}, light, camera);
+  EXPECT_NEAR(far.steady(17, 3), 1.0 + 0.03 * (10.0 * 3.0 + 20.0) / 30.0, 1e-6) << "the mean of all";
+  for (int x = 0; x < 30; ++x) {
+    const auto sum = near.phasor(0, 1)(x, 7) + far.phasor(0, 1)(x, 7) - light.phasor(0, 1)(x, 7);
+    EXPECT_NEAR(std::abs(both.phasor(0, 1)(x, 7) - sum), 0.0, 1e-6) << x;
+  }
+}
+
+TEST(LearnedNeighbours, SaysWhatIsWrongWithItsKernel) {
+  EXPECT_THAT(
+      errorOf(plainCamera(4, 2, 0.5, "[[effect]]\ntype = 'learned_neighbours'\nreaches_px = [1, 2, 3]\n")),
+      testing::HasSubstr("has 2 shares_percent for 3 reaches_px: one for each"));
+}
+
+// A surface turned by 60° about the vertical: 1/cos is 2 on the axis.
+TEST(LearnedLight, IsLaterAndDimmerAsItsTableSaysOfTheIncidence) {
+  Light light = syntheticLight(3, 1, {20_MHz}, 2, [](int, int) { return std::vector<Way>{{0.8, 1.5}}; });
+  const double turn = kPi / 3.0;
+  for (Vec3f& normal : light.truth.normal.pixels())
+    normal = {static_cast<float>(std::sin(turn)), 0.0F, static_cast<float>(-std::cos(turn))};
+  const LearnedLight learned{.over = LearnedLight::Over::Incidence,
+                             .knots = {1.0, 3.0},
+                             .delays_mm = {0.0, 20.0},
+                             .gains_percent = {0.0, -8.0}};
+  EXPECT_EQ(learned.problem(), "");
+  CameraInfo camera = cameraOfSize(3, 1);
+  camera.fx = camera.fy = 1.0, camera.cx = 1.0, camera.cy = 0.0;
+  const Light seen = applied(learned, light, camera);
+  for (int n = 1; n <= 2; ++n) {
+    EXPECT_NEAR(phaseOf(seen.phasor(0, n)(1, 0)), std::remainder(n * phaseAt(1.51, 20e6), 2.0 * kPi), 1e-5)
+        << n;
+    EXPECT_NEAR(std::abs(seen.phasor(0, n)(1, 0)), 0.96 * 0.8, 1e-5) << n;
+  }
+  EXPECT_NEAR(seen.steady(1, 0), 0.96 * 0.8, 1e-6);
+  light.truth.normal = {};
+  const Light unknown = applied(learned, light, camera);
+  EXPECT_EQ(unknown.phasor(0, 1)(1, 0), light.phasor(0, 1)(1, 0)) << "light of no scene";
+}
+
+// A pixel four times as bright as the 80 others of its square, whose mean is 84/81.
+TEST(LearnedLight, ComparesAPixelWithItsSurroundings) {
+  const Light light = syntheticLight(40, 30, {20_MHz}, 1, [](int x, int y) {
+    return std::vector<Way>{{x == 20 && y == 15 ? 4.0 : 1.0, 1.0}};
+  });
+  const LearnedLight learned{.over = LearnedLight::Over::Surround4,
+                             .knots = {-10.0, 10.0},
+                             .delays_mm = {},
+                             .gains_percent = {-100.0, 100.0}};
+  const Light seen = applied(learned, light, cameraOfSize(40, 30));
+  const double mean = 84.0 / 81.0;
+  EXPECT_NEAR(seen.steady(20, 15), 4.0 * (1.0 + 0.1 * std::log(mean / 4.0)), 1e-5);
+  EXPECT_NEAR(seen.steady(17, 12), 1.0 + 0.1 * std::log(mean), 1e-5);
+  EXPECT_NEAR(seen.steady(5, 5), 1.0, 1e-6);
+}
+
+// A camera that demodulates keeps of the light what it correlates; the scene goes with it for whom needs it.
+TEST(LearnedLight, KnowsTheSceneInAWholeCamera) {
+  const std::string effect =
+      "[[effect]]\ntype = 'learned_light'\nover = 'incidence'\nknots = [1, 20]\ndelays_mm = [0, 19]\n";
+  Light light = syntheticLight(40, 25, {80_MHz}, 1, [](int, int) { return std::vector<Way>{{1.0, 1.0}}; });
+  for (Vec3f& normal : light.truth.normal.pixels()) normal = {0.6F, 0.0F, -0.8F};
+  const auto rangeWith = [&](const std::string& effects) {
+    const SensorModel model = modelOf(plainCamera(4, 2, 0.5, effects));
+    return static_cast<double>(model.expose(light, {}, 1, 0).range.range_m(20, 12));
+  };
+  const double incidence = incidenceAt(modelOf(plainCamera(4, 2, 0.5)).camera(), {0.6F, 0.0F, -0.8F}, 20, 12);
+  EXPECT_NEAR(rangeWith(effect) - rangeWith(""), 1e-3 * (incidence - 1.0), 1e-6);
 }
 
 std::string reflection(double radiance, double half_way_mm) {

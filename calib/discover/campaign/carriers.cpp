@@ -11,10 +11,10 @@
 #include <fmt/format.h>
 #include <toftwin/nan.h>
 
-#include "calib/discover/campaign/smoothed.h"
 #include "calib/discover/campaign/catalogue.h"
 #include "calib/discover/candidates.h"
 #include "sim/effects/effects.h"
+#include "sim/images/box_mean.h"
 
 namespace toftwin::discover {
 namespace {
@@ -68,17 +68,10 @@ std::map<std::string, Reading> carriersOf(const sim::SensorModel& model, const R
                                           double period_m, double exposure_us) {
   std::map<std::string, Reading> all;
   const Image<std::complex<float>> z = phasorOf(declared, period_m);
-  Image<float> real(z.width(), z.height()), imaginary = real;
-  for (std::size_t i = 0; i < z.size(); ++i) real[i] = z[i].real(), imaginary[i] = z[i].imag();
   for (const int reach : kReaches) {
-    const int most = std::max(z.width(), z.height());
-    const Image<float> re = smoothed(real, std::min(reach, most)),
-                       im = smoothed(imaginary, std::min(reach, most));
-    all.emplace(neighbourName(reach), changeBy(over(z,
-                                                    [&](std::size_t i) {
-                                                      return 0.01F * std::complex{re[i], im[i]};
-                                                    }),
-                                               period_m));
+    const Image<std::complex<float>> mean = sim::boxMean(z, std::min(reach, std::max(z.width(), z.height())));
+    all.emplace(neighbourName(reach),
+                changeBy(over(z, [&](std::size_t i) { return 0.01F * mean[i]; }), period_m));
   }
   const double steps = std::max<double>(1.0, static_cast<double>(model.exposures({}).size()));
   const auto electron = static_cast<float>(2.0 / steps);
@@ -193,6 +186,12 @@ std::vector<TermGroup> pixelGroups(bool has_delay, std::size_t numbers) {
   add("gain", Stage::Light);
   if (has_delay) add("delay", Stage::Light);
   return groups;
+}
+
+std::optional<int> reachOfNeighbours(std::string_view carrier) {
+  for (const int reach : kReaches)
+    if (carrier == neighbourName(reach)) return reach;
+  return std::nullopt;
 }
 
 std::string_view wordOfCarrier(std::string_view carrier) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -44,6 +45,10 @@ std::vector<sim::AnyEffect> declaredEffects(const Declared& declared);
 bool isOnlyDelay(const Declared& declared, const sim::AnyEffect& effect);
 /// Whether it can be told from an offset of the range: its changes vary by more than 2 % of themselves.
 bool isNoOffset(std::span<const Reading> changes);
+
+/// Half width in pixels of the square that light comes from, of a carrier "neighbours:…"; of the whole image:
+/// more than any image has. Nothing of other carriers.
+std::optional<int> reachOfNeighbours(std::string_view carrier);
 
 /// What stays the same at each pixel: "pixel:range", "pixel:gain", "pixel:delay".
 inline constexpr std::string_view kPixelCarrier = "pixel";

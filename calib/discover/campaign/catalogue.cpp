@@ -314,7 +314,7 @@ std::vector<Candidate> candidatesOf(const Sensitivity& probe,
     const sim::AnyEffect defaults{E{}};
     const bool is_left_out = std::ranges::find(left_out, E::about.name) != left_out.end();
     // What was learned from data without a name is no explanation of other data.
-    if (is_left_out || isNoise(defaults) || E::about.name == sim::LearnedRange::about.name) return;
+    if (is_left_out || isNoise(defaults) || E::about.name.starts_with("learned_")) return;
     Candidate candidate = candidateOf(sim::AnyEffect{E::none()}, defaults, probe);
     if (!candidate.variations.empty()) all.push_back(std::move(candidate));
   });

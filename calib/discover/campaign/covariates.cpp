@@ -8,7 +8,7 @@
 #include <toftwin/nan.h>
 
 #include "calib/discover/campaign/carriers.h"
-#include "calib/discover/campaign/smoothed.h"
+#include "sim/effects/learned_table.h"
 
 namespace toftwin::discover {
 namespace {
@@ -62,11 +62,7 @@ void addPlaces(const CameraInfo& camera, const sim::Truth& truth, CovariateGathe
     for (int x = 0; x < camera.width; ++x) {
       column(x, y) = static_cast<float>(x), row(x, y) = static_cast<float>(y);
       radius(x, y) = static_cast<float>(std::hypot(x - camera.cx, y - camera.cy));
-      const Vec3d ray = rayThroughPixel(camera, x, y).v;
-      const auto& n = truth.normal(x, y);
-      const double cosine = -(ray.x * static_cast<double>(n.x) + ray.y * static_cast<double>(n.y) +
-                              ray.z * static_cast<double>(n.z));
-      incidence(x, y) = static_cast<float>(1.0 / std::max(0.05, cosine));
+      incidence(x, y) = static_cast<float>(sim::incidenceAt(camera, truth.normal(x, y), x, y));
     }
   }
   gatherer.add("radius_px", radius);
@@ -77,18 +73,13 @@ void addPlaces(const CameraInfo& camera, const sim::Truth& truth, CovariateGathe
 
 /// How much brighter than itself a pixel's surroundings are, at three scales: what scatters in the
 /// lens.
-void addSurroundings(const Reading& declared, CovariateGatherer& gatherer) {
-  Image<float> amplitude = declared.log_amplitude;
-  for (float& value : amplitude.pixels()) value = std::exp(value);
-  const auto add = [&](std::string name, int reach) {
-    Image<float> ratio = smoothed(amplitude, reach);
-    for (std::size_t i = 0; i < ratio.size(); ++i)
-      ratio[i] = std::log(ratio[i]) - declared.log_amplitude[i];
-    gatherer.add(std::move(name), ratio);
-  };
-  add("surround_4px", 4);
-  add("surround_16px", 16);
-  add("surround_all", std::max(amplitude.width(), amplitude.height()));
+void addSurroundings(const Image<float>& amplitude, CovariateGatherer& gatherer) {
+  using sim::LearnedOver;
+  for (const auto& [name, over] : {std::pair{"surround_4px", LearnedOver::Surround4},
+                                   std::pair{"surround_16px", LearnedOver::Surround16},
+                                   std::pair{"surround_all", LearnedOver::SurroundAll}})
+    gatherer.add(name,
+                 sim::surroundings(amplitude, sim::reachOf(over, amplitude.width(), amplitude.height())));
 }
 
 struct KnownCovariate {
@@ -122,7 +113,7 @@ CaptureCovariates covariatesOf(const MeasuredCapture& capture, const TracedCaptu
   for (float& value : amplitude.pixels()) value = std::exp(value);
   gatherer.add("amplitude_e", amplitude);
   addPlaces(camera, traced.light.truth, gatherer);
-  addSurroundings(declared, gatherer);
+  addSurroundings(amplitude, gatherer);
   return gatherer.finish();
 }
 

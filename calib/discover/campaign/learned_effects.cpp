@@ -8,13 +8,15 @@
 #include <set>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/model_file.h"
 
 namespace toftwin::discover {
 namespace {
 
-using Over = sim::LearnedRange::Over;
+using Over = sim::LearnedOver;
 
 constexpr std::array kOvers{std::pair{std::string_view{"time_s"}, Over::Time},
                             std::pair{std::string_view{"temperature_illumination_c"}, Over::Illumination},
@@ -25,7 +27,11 @@ constexpr std::array kOvers{std::pair{std::string_view{"time_s"}, Over::Time},
                             std::pair{std::string_view{"amplitude_e"}, Over::Amplitude},
                             std::pair{std::string_view{"column"}, Over::Column},
                             std::pair{std::string_view{"row"}, Over::Row},
-                            std::pair{std::string_view{"radius_px"}, Over::Radius}};
+                            std::pair{std::string_view{"radius_px"}, Over::Radius},
+                            std::pair{std::string_view{"incidence"}, Over::Incidence},
+                            std::pair{std::string_view{"surround_4px"}, Over::Surround4},
+                            std::pair{std::string_view{"surround_16px"}, Over::Surround16},
+                            std::pair{std::string_view{"surround_all"}, Over::SurroundAll}};
 
 std::optional<Over> overOf(const std::string& covariate) {
   for (const auto& [word, over] : kOvers) {
@@ -90,8 +96,25 @@ std::vector<Along> alongOf(const Effect& effect) {
   return all;
 }
 
-/// A table over one or two covariates that a camera knows of itself.
-std::optional<sim::AnyEffect> tableOf(const Along& along, std::span<const CovariateInfo> covariates) {
+/// Whether a decoded image no longer tells it, but the light does.
+bool onlyLightKnows(Over over) { return over >= Over::Incidence; }
+
+/// The same in the light, where a delay is nearly an error of the range. Nothing for what light does not
+/// know: electrons, and what delays a pulse.
+std::optional<sim::AnyEffect> inLight(sim::LearnedRange table, bool has_phasors) {
+  const bool needs_electrons = table.over == Over::Amplitude || table.and_over == Over::Amplitude;
+  if (needs_electrons || (!has_phasors && !table.offsets_mm.empty())) return std::nullopt;
+  return sim::LearnedLight{.over = table.over,
+                           .knots = std::move(table.knots),
+                           .and_over = table.and_over,
+                           .and_knots = std::move(table.and_knots),
+                           .delays_mm = std::move(table.offsets_mm),
+                           .gains_percent = std::move(table.gains_percent)};
+}
+
+/// A table over one or two covariates: of the decoded image where that tells them, else of the light.
+std::optional<sim::AnyEffect> tableOf(const Along& along, std::span<const CovariateInfo> covariates,
+                                      bool has_phasors) {
   const bool moves = std::ranges::any_of(along.terms, [](const auto& one) { return movesRange(one.first); });
   const bool dims = std::ranges::any_of(along.terms, [](const auto& one) { return changesGain(one.first); });
   if (along.covariates.empty() || along.covariates.size() > 2 || !(moves || dims)) return std::nullopt;
@@ -117,6 +140,7 @@ std::optional<sim::AnyEffect> tableOf(const Along& along, std::span<const Covari
       if (dims) learned.gains_percent.push_back(within(along.sum(changesGain, at), -100.0, 1e4));
     }
   }
+  if (std::ranges::any_of(over, onlyLightKnows)) return inLight(std::move(learned), has_phasors);
   return learned;
 }
 
@@ -176,6 +200,22 @@ sim::AnyEffect reflectionOf(const sim::SensorModel& model, double in_phase, doub
   return reflection;
 }
 
+/// Light from neighbours, as a kernel of squares: a carrier is 1 % of the square's mean. Its shares are
+/// fitted through the simulator, which has all frequencies and knows what comes after the light.
+std::optional<LearnedEffect> kernelOf(const Along& along, const CameraInfo& camera) {
+  sim::LearnedNeighbours kernel{.reaches_px = {}, .shares_percent = {}};
+  std::vector<std::string> shares;
+  for (const auto& [term, coefficient] : along.terms) {
+    const auto reach = reachOfNeighbours(term.carrier);
+    if (!reach || !term.factors.empty()) continue;
+    shares.push_back(fmt::format("shares_percent[{}]", shares.size()));
+    kernel.reaches_px.push_back(std::min(*reach, std::max(camera.width, camera.height)));
+    kernel.shares_percent.push_back(std::clamp(coefficient, -100.0, 100.0));
+  }
+  if (shares.empty()) return std::nullopt;
+  return LearnedEffect{std::move(kernel), std::move(shares)};
+}
+
 }  // namespace
 
 std::vector<LearnedEffect> learnedEffectsOf(const Effect& effect, const CampaignRows& rows,
@@ -184,7 +224,9 @@ std::vector<LearnedEffect> learnedEffectsOf(const Effect& effect, const Campaign
   const std::vector<CovariateInfo> covariates = rows.covariates();
   const std::vector<Along> all = alongOf(effect);
   for (const Along& along : all)
-    if (const auto table = tableOf(along, covariates)) learned.push_back({*table});
+    if (const auto table = tableOf(along, covariates, model.hasPhasors())) learned.push_back({*table});
+  for (const Along& along : all)
+    if (const auto kernel = kernelOf(along, model.camera())) learned.push_back(*kernel);
   for (const Along& along : all)
     for (const auto& [term, coefficient] : along.terms)
       if (const PixelPattern* pattern = rows.patternOf(term.carrier))

@@ -11,12 +11,15 @@
 namespace toftwin::discover {
 namespace {
 
-/// What a reader of the camera file wants to know of a number: at least where it was found.
+/// What a reader of the camera file wants to know of a number, or of those of a list: at least where it was
+/// found.
 std::string errorOf(const FittedEffect& effect, const std::string& key) {
+  std::string errors;
   for (const FittedNumber& number : effect.numbers) {
-    if (number.key == key) return fmt::format("  # ± {:.2g}", number.error);
+    if (number.key == key || number.key.starts_with(key + "["))
+      errors += fmt::format("{}{:.2g}", errors.empty() ? "  # ± " : ", ", number.error);
   }
-  return "";
+  return errors;
 }
 
 /// The lines of a camera file, each with whether an effect begins there.

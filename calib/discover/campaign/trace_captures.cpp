@@ -10,7 +10,7 @@
 #include "calib/compare/stack.h"
 #include "calib/compare/statistics.h"
 #include "calib/discover/campaign/campaign.h"
-#include "calib/discover/campaign/smoothed.h"
+#include "sim/images/box_mean.h"
 #include "sim/tracer/trace.h"
 
 namespace toftwin::discover {
@@ -52,7 +52,7 @@ void addTracingNoise(TracedCapture& traced) {
     if (power > 0.0 && traced.is_edge[i] == 0)
       relative[i] = static_cast<float>(static_cast<double>(light.variance[highest][i]) / power);
   }
-  traced.tracing_variance = smoothed(relative, kReach);
+  traced.tracing_variance = sim::boxMean(relative, kReach);
   for (std::size_t i = 0; i < phasor.size(); ++i)
     traced.tracing_variance_m2[i] =
         static_cast<float>(static_cast<double>(traced.tracing_variance[i]) * metres * metres);

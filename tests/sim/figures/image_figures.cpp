@@ -176,6 +176,28 @@ void addImageFigures(std::map<std::string, Draw>& figures) {
                              .panels = {{"ghost of 0.5 %", errorOf(effect("lens_ghost"), light)},
                                         {"of 2 %", errorOf(effect("lens_ghost", "share = 0.02"), light)}}});
   };
+  figures["learned_neighbours"] = [] {
+    const Light light = boxBeforeWall();
+    return standalone(Panels{
+        .label = "error of the range, mm",
+        .low = -80.0,
+        .high = 80.0,
+        .diverging = true,
+        .panels = {
+            {"two squares", errorOf(effect("learned_neighbours"), light)},
+            {"the wider alone",
+             errorOf(effect("learned_neighbours", "reaches_px = [15]\nshares_percent = [1]"), light)}}});
+  };
+  figures["learned_light"] = [] {
+    const Light light = boxBeforeWall();
+    return standalone(Panels{
+        .label = "error of the range, mm",
+        .low = -6.0,
+        .high = 6.0,
+        .diverging = true,
+        .panels = {{"surroundings of 16 px", errorOf(effect("learned_light"), light)},
+                   {"of the image", errorOf(effect("learned_light", "over = 'surround_all'"), light)}}});
+  };
   figures["vignetting"] = [] {
     return standalone(Panels{.label = "amplitude, ke-",
                              .low = 0.0,
