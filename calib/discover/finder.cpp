@@ -112,6 +112,8 @@ class Search {
     if (!chosen) return false;
     Effect effect = effectOf(context_, explanations, *chosen);
     if (!holds(effect.gain) || isWhatACurveLeaves(effect)) return false;
+    if (const auto part = partOfAKnown(explanations, effect))
+      effect = effectOf(context_, explanations, *part);
     settle(effect);
     effect.p = p;
     const auto same = std::ranges::find_if(finding_.effects, [&](const Effect& known) {
@@ -128,6 +130,26 @@ class Search {
     }
     estimate(*context_.source, context_.scales, finding_.effects);
     return true;
+  }
+
+  /// One cause, one effect: what cannot be told from more of an effect that is known to first order or as a
+  /// curve is more of it, whatever else may explain it as well. Its place among the explanations.
+  [[nodiscard]] std::optional<std::size_t> partOfAKnown(const std::vector<Explanation>& explanations,
+                                                        const Effect& effect) const {
+    const auto isMoreOfAKnown = [&](const Alternative& other) {
+      return std::ranges::any_of(finding_.effects, [&](const Effect& known) {
+        return !known.is_catalogue && isApproximate(known) &&
+               goAlongTheSame(known, Effect{.name = other.name, .covariates = other.covariates});
+      });
+    };
+    for (const Alternative& other : effect.alternatives) {  // the best first
+      if (other.group.terms.empty() || !isMoreOfAKnown(other)) continue;
+      const auto place = std::ranges::find_if(explanations, [&](const Explanation& one) {
+        return !one.is_catalogue && one.name == other.name && one.covariates == other.covariates;
+      });
+      if (place != explanations.end()) return static_cast<std::size_t>(place - explanations.begin());
+    }
+    return std::nullopt;
   }
 
   /// The covariates along which it goes, without what light does there: what moves the range and dims the light
@@ -182,8 +204,7 @@ class Search {
   bool isWhatACurveLeaves(const Effect& effect) const {
     constexpr double kKnown = 0.05;
     return std::ranges::any_of(finding_.effects, [&](const Effect& known) {
-      return !known.is_catalogue && (!isFormula(known) || isOfLight(known)) &&
-             alongOf(known) != alongOf(effect) &&
+      return !known.is_catalogue && isApproximate(known) && alongOf(known) != alongOf(effect) &&
              effect.gain.mean < kKnown * known.gain.mean;
     });
   }
@@ -325,13 +346,6 @@ class Search {
   /// of that effect. An effect that is named for certain describes itself, and leaves nothing.
   void markRests() {
     constexpr double kRest = 0.25;
-    const auto mayBeUndeclared = [](const Effect& effect) {
-      return !effect.is_catalogue ||
-             std::ranges::any_of(effect.alternatives, [](const Alternative& other) { return !other.group.terms.empty(); });
-    };
-    const auto isApproximate = [&](const Effect& effect) {
-      return effect.is_catalogue ? mayBeUndeclared(effect) : !isFormula(effect) || isOfLight(effect);
-    };
     std::vector<double> gains;
     for (std::size_t i = 0; i < finding_.effects.size(); ++i) {
       const Effect& effect = finding_.effects[i];
@@ -344,6 +358,16 @@ class Search {
       }
     }
     std::ranges::stable_sort(finding_.effects, {}, &Effect::is_rest);  // behind what they are the rest of
+  }
+
+  static bool mayBeUndeclared(const Effect& effect) {
+    return !effect.is_catalogue || std::ranges::any_of(effect.alternatives, [](const Alternative& other) {
+      return !other.group.terms.empty();
+    });
+  }
+  /// A curve, what light does to first order, or a name that is not certain.
+  static bool isApproximate(const Effect& effect) {
+    return effect.is_catalogue ? mayBeUndeclared(effect) : !isFormula(effect) || isOfLight(effect);
   }
 
   /// Whether much of the weaker one's curve is the stronger one's, too, whatever its sign: more of it, ρ², than
