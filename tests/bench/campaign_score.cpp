@@ -123,9 +123,19 @@ bool isMiss(const Score& one) {
          (one.of.is_absent ? !one.has_covariates : !one.is_right);
 }
 
+/// Whether two effects of one kind are of the same raw exposure, cycle or device: the numbers of others are
+/// other numbers. One raw exposure of four that is late is, to first order, the next one that is early by as
+/// much.
+bool haveSameLabels(const sim::AnyEffect& a, const sim::AnyEffect& b) {
+  return std::ranges::all_of(numbersOf(a), [&](const EffectNumber& number) {
+    return !number.is_whole || number.value == valueOf(b, number.key);
+  });
+}
+
 /// Of the effect that was hidden, found by its name.
 void countNumbers(const FoundEffect& one, const sim::AnyEffect& hidden, Score& score) {
   if (!one.fitted || one.fitted->effect.index() != hidden.index()) return;
+  if (!haveSameLabels(one.fitted->effect, hidden)) return;
   for (const FittedNumber& number : one.fitted->numbers) {
     if (!(number.error > 0.0)) continue;
     ++score.numbers;

@@ -123,7 +123,7 @@ std::vector<std::size_t> wrongNumbers(const Evidence& evidence, const Finding& f
 struct WithFound {
   std::vector<sim::AnyEffect> effects;
   std::vector<std::size_t> fitted;  ///< places of those whose numbers are to be fitted
-  std::map<std::size_t, std::vector<std::string>> only{};  ///< of those that were found, the numbers
+  std::map<std::size_t, std::vector<std::string>> only{};  ///< of those without a name, the numbers
 };
 
 std::size_t insert(WithFound& inserted, const sim::AnyEffect& effect) {
@@ -152,8 +152,8 @@ WithFound insertFound(const CampaignRows& rows, const Declared& declared,
     if (effect.fit) {
       const CampaignFit& fit = campaignFitOf(*effect.fit);
       const std::size_t place = insert(inserted, fit.effect);
+      // All of its numbers: one that was not needed is not known to be nothing.
       inserted.fitted.push_back(place);
-      inserted.only[place] = fit.keys;
       found.fitted = FittedEffect{fit.effect, {}};
     } else {
       for (const LearnedEffect& learned : learnedEffectsOf(effect, with_found, declared.model)) {
