@@ -322,6 +322,26 @@ TEST_F(Searched, AFaintSecondCauseIsAnEffectOfItsOwn) {
   for (const FoundEffect& one : finding.effects) EXPECT_FALSE(one.found.is_rest) << verdictOf(finding);
 }
 
+/// A gain that goes with the range, and a weaker one with the distance from the middle of the image, where a
+/// wall is farther away, too: the weaker one's curve is in part the stronger one's.
+TEST_F(Searched, AFaintSecondEffectThatSharesAPartWithAStrongOneIsItsRest) {
+  simulate("", [](sim::RangeImage& image, const Moment&, const CameraInfo& camera, std::uint64_t) {
+    for (int y = 0; y < image.range_m.height(); ++y) {
+      for (int x = 0; x < image.range_m.width(); ++x) {
+        const double range_m = static_cast<double>(image.range_m(x, y));
+        const double radius = std::hypot(x - camera.cx, y - camera.cy) / camera.width;
+        image.amplitude(x, y) *= static_cast<float>(1.0 + 0.02 * range_m * range_m + 0.02 * radius);
+      }
+    }
+  });
+  const CampaignFinding finding = search(job());
+  ASSERT_EQ(finding.effects.size(), 2U) << verdictOf(finding);
+  EXPECT_THAT(finding.effects[0].found.covariates, ElementsAre("gain", "range_m"));
+  EXPECT_FALSE(finding.effects[0].found.is_rest) << verdictOf(finding);
+  EXPECT_THAT(finding.effects[1].found.covariates, ElementsAre("gain", "radius_px"));
+  EXPECT_TRUE(finding.effects[1].found.is_rest) << verdictOf(finding);
+}
+
 /// A table with a knob for each half metre can look like a scale, too.
 TEST_F(Searched, AFormulaIsNotCalledATable) {
   simulate("[[effect]]\ntype = 'clock_scale'\nppm = 3000.0\n");
