@@ -9,6 +9,8 @@
 namespace toftwin::discover {
 namespace {
 
+constexpr std::size_t kStraightColumns = 7;  ///< a number in each of four states
+
 bool isOneOfFew(const CovariateInfo& covariate) {
   return covariate.nature == Nature::Category ||
          (!covariate.levels.empty() && covariate.levels.size() <= kSurfaceKnots);
@@ -138,9 +140,14 @@ std::vector<TermGroup> genericCandidates(std::span<const CovariateInfo> covariat
     if (options.captures >= 40) groups.push_back(waves(covariate, 5, 10));
     if (options.captures >= 60) groups.push_back(waves(covariate, 11, 20));
   }
-  if (options.captures < 30) return groups;
-  for (const auto& [i, j] : pairsOf(covariates, options.most_pairs))
-    groups.push_back(smoothIn(covariates[i], covariates[j], kSurfaceKnots));
+  for (const auto& [i, j] : pairsOf(covariates, options.most_pairs)) {
+    if (options.has_straight_pairs && options.captures >= 12) {
+      TermGroup straight = smoothIn(covariates[i], covariates[j], 2);
+      straight.name = fmt::format("straight in {} and {}", covariates[i].name, covariates[j].name);
+      if (straight.terms.size() <= kStraightColumns) groups.push_back(std::move(straight));
+    }
+    if (options.captures >= 30) groups.push_back(smoothIn(covariates[i], covariates[j], kSurfaceKnots));
+  }
   return groups;
 }
 

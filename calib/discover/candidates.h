@@ -14,6 +14,8 @@ namespace toftwin::discover {
 struct CandidateOptions {
   std::size_t captures = 100;   ///< that the columns are to be fitted to: few captures, few columns
   std::size_t most_pairs = 28;  ///< of covariates that act together
+  /// A plane with a twist for each pair, which few captures can show, too: a·b, a and b.
+  bool has_straight_pairs = false;
 };
 
 /// For each covariate: a smooth function of it; waves of 1 to 20 periods over its spread; for a count of

@@ -78,6 +78,8 @@ double correlationOf(const Part& prepared, const Group& a, const Group& b) {
   return aa > 0.0 && bb > 0.0 ? fa.dot(left(of_a, of_b) * fb) / std::sqrt(aa * bb) : 0.0;
 }
 
+constexpr double kAlike = 0.5;  ///< correlation of two curves that may be one
+
 double curveAt(const TermGroup& group, const std::vector<double>& coefficient,
                const std::map<std::string, double>& at) {
   double sum = 0.0;
@@ -174,13 +176,16 @@ Effect effectOf(const Context& context, const std::vector<Explanation>& all, std
   effect.frequency = stability(all, chosen, others);
   for (std::size_t s = 1; s < shown.size(); ++s) {
     const Explanation& other = all[shown[s]];
+    const double correlation = correlationOf(prepared, *in_marginal[0], *in_marginal[s]);
+    // Curves that have little in common explain different things, of which one may be nothing.
+    if (!mine.is_catalogue && !other.is_catalogue && std::abs(correlation) < kAlike) continue;
     Alternative alternative{other.name,
                             other.covariates,
                             other.fitted.group,
                             plain(coefficients(prepared, *in_marginal[s])),
                             difference(mine.gain, other.gain),
                             other.named,
-                            correlationOf(prepared, *in_marginal[0], *in_marginal[s])};
+                            correlation};
     effect.alternatives.push_back(std::move(alternative));
   }
   std::ranges::sort(effect.alternatives, {}, [](const Alternative& a) { return a.worse.mean; });

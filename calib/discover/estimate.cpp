@@ -173,6 +173,8 @@ std::string nameOfInner(const FittedForm& part, std::size_t which) {
       return fmt::format("waves per unit of {}", x);
     case Shape::Sigmoid:
       return fmt::format("{} of {}", which == 0 ? "centre" : "width", x);
+    case Shape::Hinge:
+      return fmt::format("corner in {}", x);
     default:
       return fmt::format("place in {}", x);
   }

@@ -7,6 +7,6 @@
 namespace toftwin::discover {
 
 /// The finder on a table, whose noise is estimated again with what was found, until it finds the same.
-Finding findInTable(TableSource& source, const FinderOptions& options);
+Finding findInTable(TableSource& source, FinderOptions options);
 
 }  // namespace toftwin::discover

@@ -25,7 +25,8 @@ class Search {
     context_.test = {options.null_model, options.draws, options.seed};
     context_.alpha = options.alpha;
     const std::size_t captures = source.withoutCatalogue({}).captures.size();
-    context_.generic = genericCandidates(context_.covariates, {.captures = captures});
+    context_.generic = genericCandidates(
+        context_.covariates, {.captures = captures, .has_straight_pairs = options.has_straight_pairs});
     for (TermGroup& own : source.ownGroups()) context_.generic.push_back(std::move(own));
   }
 
@@ -76,9 +77,14 @@ class Search {
       return group.kind == Kind::PerCapture || group.kind == Kind::Shared;
     });
     if (!has_random) return;
-    std::size_t columns = 0;
+    std::size_t columns = 0, knots = 5;
+    for (const CovariateInfo& covariate : context_.covariates)
+      columns += smoothIn(covariate, knots).terms.size();
+    // Few captures show a slope of each covariate rather than curves of the first ones.
+    if (options_.has_straight_pairs && columns > plain.captures.size() / 3) knots = 2;
+    columns = 0;
     for (const CovariateInfo& covariate : context_.covariates) {
-      TermGroup smooth = smoothIn(covariate, 5);
+      TermGroup smooth = smoothIn(covariate, knots);
       columns += smooth.terms.size();
       if (columns > plain.captures.size() / 3) break;
       names.push_back(smooth.name);

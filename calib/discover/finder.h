@@ -23,6 +23,7 @@ struct FinderOptions {
   int most_effects = 4;
   std::uint64_t seed = 1;
   NullModel null_model = NullModel::Automatic;
+  bool has_straight_pairs = false;  ///< see CandidateOptions
 };
 
 /// Something else that explains as much.

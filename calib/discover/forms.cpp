@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 #include <fmt/format.h>
 
@@ -11,13 +12,17 @@ namespace toftwin::discover {
 namespace {
 
 constexpr std::array kPowers{1.0, 2.0, 3.0, 0.5, -1.0, -2.0};
+constexpr std::size_t kMostSwitched = 4;  ///< names that may each have an exponential of their own
 
 double least(const CovariateInfo& x) { return x.quantiles.front(); }
 double most(const CovariateInfo& x) { return x.quantiles.back(); }
 double span(const CovariateInfo& x) { return most(x) - least(x); }
 
+/// Whether its zero means that there is nothing, which 0 °C does not.
+bool isRatio(const CovariateInfo& x) { return x.unit != "c" && x.nature != Nature::Angle; }
+
 /// Whether 1/x and ln x are what a reader takes them for: x stays away from zero.
-bool isPositive(const CovariateInfo& x) { return least(x) > 1e-4 * span(x); }
+bool isPositive(const CovariateInfo& x) { return least(x) > 1e-4 * span(x) && isRatio(x); }
 
 std::vector<double> geometric(double low, double high, int count) {
   std::vector<double> grid;
@@ -58,9 +63,27 @@ TermGroup decay(const Form& f, std::span<const double> inner) {
   return group(f, {term(f.of[0], Shape::Decay, {inner[0], f.fixed[0]})});
 }
 
+/// Of one searched frequency, or of fixed lengths.
 TermGroup wave(const Form& f, std::span<const double> inner) {
-  const double length = f.fixed.empty() ? 1.0 / inner[0] : f.fixed[0];
-  return group(f, {term(f.of[0], Shape::Sine, {length}), term(f.of[0], Shape::Cosine, {length})});
+  std::vector<Term> terms;
+  for (const double length : f.fixed.empty() ? std::vector<double>{1.0 / inner[0]} : f.fixed) {
+    terms.push_back(term(f.of[0], Shape::Sine, {length}));
+    terms.push_back(term(f.of[0], Shape::Cosine, {length}));
+  }
+  return group(f, std::move(terms));
+}
+
+/// x beyond a place, on the side that fixed[0] says.
+TermGroup hinge(const Form& f, std::span<const double> inner) {
+  return group(f, {term(f.of[0], Shape::Hinge, {inner[0], f.fixed[0]})});
+}
+
+/// fixed: radians in the angle's unit.
+TermGroup tanSquared(const Form& f, std::span<const double>) {
+  return group(f, {term(f.of[0], Shape::TanSquared, f.fixed)});
+}
+TermGroup secant(const Form& f, std::span<const double>) {
+  return group(f, {term(f.of[0], Shape::Secant, f.fixed)});
 }
 
 TermGroup step(const Form& f, std::span<const double> inner) {
@@ -106,6 +129,18 @@ TermGroup switched(const Form& f, std::span<const double>) {
   return group(f, std::move(terms));
 }
 
+/// One time constant; each value of f.of[0] has its own level and its own height of the exponential.
+TermGroup switchedDecay(const Form& f, std::span<const double> inner) {
+  std::vector<Term> terms;
+  for (std::size_t i = 0; i < f.of[0].levels.size(); ++i) {
+    Term both = term(f.of[0], Shape::Equal, {f.of[0].levels[i]});
+    if (i > 0) terms.push_back(both);
+    both.factors.push_back({f.of[1].name, Shape::Decay, {inner[0], f.fixed[0]}});
+    terms.push_back(both);
+  }
+  return group(f, std::move(terms));
+}
+
 /// exp(−x/τ) · y^q
 TermGroup decayTimes(const Form& f, std::span<const double> inner) {
   Term both = term(f.of[0], Shape::Decay, {inner[0], f.fixed[0]});
@@ -123,19 +158,64 @@ std::vector<double> stepPlaces(const CovariateInfo& x) {
   return places;
 }
 
-void addWaves(const CovariateInfo& x, std::vector<Form>& forms) {
-  if (x.period > 0.0 && span(x) > 0.15 * x.period) {
-    for (int k = 1; k <= 8; ++k) {
-      const double length = x.period / k;
-      if (span(x) < 0.6 * length) continue;
-      forms.push_back(form(k == 1 ? fmt::format("once per period over {}", x.name)
-                                  : fmt::format("{} times per period over {}", k, x.name),
-                           {x}, wave, {}, {length}));
-    }
+/// Harmonics of the modulation: each, and those that a camera has together. k samples a period leave the k-th
+/// and its double; their mismatch the first and second.
+void addHarmonics(const CovariateInfo& x, std::vector<Form>& forms) {
+  if (!(x.period > 0.0)) return;
+  const std::vector<std::vector<int>> sets{{1},    {2},    {3},    {4},    {5},    {6},    {7},         {8},
+                                           {1, 2}, {1, 4}, {2, 4}, {2, 8}, {4, 8}, {3, 6}, {1, 2, 4, 8}};
+  for (const std::vector<int>& set : sets) {
+    if (span(x) < 0.6 * x.period / set.front()) continue;
+    std::vector<double> lengths;
+    for (const int k : set) lengths.push_back(x.period / k);
+    const std::string times =
+        set == std::vector{1} ? "once" : fmt::format("{} times", fmt::join(set, " and "));
+    forms.push_back(
+        form(fmt::format("{} per period over {}", times, x.name), {x}, wave, {}, std::move(lengths)));
   }
+}
+
+void addWaves(const CovariateInfo& x, std::vector<Form>& forms) {
   Inner frequency{{}, false, 3};
   for (double turns = 0.75; turns <= 24.0; turns += 0.25) frequency.grid.push_back(turns / span(x));
   forms.push_back(form(fmt::format("wave over {}", x.name), {x}, wave, {std::move(frequency)}));
+}
+
+/// From where on, or up to where, x does something. Numbers that are spread over decades are looked through
+/// by their ratios.
+void addHinges(const CovariateInfo& x, std::vector<Form>& forms) {
+  constexpr int kPlaces = 12;
+  const auto& q = x.quantiles;
+  const double low = q[q.size() / 8], high = q[q.size() - 1 - q.size() / 8];
+  if (!(low < high)) return;
+  Inner place{{}, low > 0.0 && high > 5.0 * low, 1};
+  if (place.is_ratio) place.grid = geometric(low, high, kPlaces);
+  for (int i = 0; i < kPlaces && !place.is_ratio; ++i)
+    place.grid.push_back(low + (high - low) * i / (kPlaces - 1.0));
+  forms.push_back(form(fmt::format("rise from a place in {}", x.name), {x}, hinge, {place}, {1.0}));
+  forms.push_back(form(fmt::format("rise below a place in {}", x.name), {x}, hinge, {place}, {-1.0}));
+}
+
+/// tan² is the lengthening of a footprint's square, 1/cos that of a path through a layer.
+void addAngles(const CovariateInfo& x, std::vector<Form>& forms) {
+  constexpr double kDegree = std::numbers::pi / 180.0;
+  const double largest = std::max(std::abs(least(x)), std::abs(most(x)));
+  const bool is_in_radians = x.unit == "rad" || (x.unit.empty() && largest <= 0.5 * std::numbers::pi);
+  const double unit = is_in_radians ? 1.0 : kDegree;
+  if (x.nature != Nature::Angle || largest * unit > 88.0 * kDegree) return;  // they have no end at 90°
+  forms.push_back(form(fmt::format("tan² of {}", x.name), {x}, tanSquared, {}, {unit}));
+  forms.push_back(form(fmt::format("1/cos − 1 of {}", x.name), {x}, secant, {}, {unit}));
+}
+
+/// Where exponentials begin: at 0 if the data are near it.
+double originOf(const CovariateInfo& x) { return least(x) >= 0.0 && least(x) < span(x) ? 0.0 : least(x); }
+
+Inner timeConstant(const CovariateInfo& x, double finest, int count) {
+  return {geometric(span(x) / finest, 2.0 * span(x), count), true, 1};
+}
+
+bool isContinuous(const CovariateInfo& x) {
+  return x.levels.empty() && x.nature != Nature::Category && x.nature != Nature::Index;
 }
 
 std::vector<double> usablePowers(const CovariateInfo& x) {
@@ -165,19 +245,22 @@ std::vector<Form> formsIn(const CovariateInfo& x) {
       forms.push_back(form(fmt::format("{} modulo {}", x.name, modulus), {x}, modulo, {}, {modulus}));
   }
   for (const double power : kPowers) {
-    if ((power < 0.0 || power == 0.5) && !isPositive(x) && !(power == 0.5 && least(x) >= 0.0)) continue;
+    if (power < 0.0 && !isPositive(x)) continue;
+    if (power == 0.5 && !(isRatio(x) && least(x) >= 0.0)) continue;
     forms.push_back(form(powerInWords(x, power), {x}, powers, {}, {power}));
   }
   if (isPositive(x)) forms.push_back(form(powerInWords(x, 0.0), {x}, powers, {}, {0.0}));
   forms.push_back(form(fmt::format("parabola in {}", x.name), {x}, powers, {}, {1.0, 2.0}));
-  const double origin = least(x) >= 0.0 && least(x) < span(x) ? 0.0 : least(x);
-  forms.push_back(form(fmt::format("exponential in {}", x.name), {x}, decay,
-                       {{geometric(span(x) / 40.0, 2.0 * span(x), 20), true, 1}}, {origin}));
+  addAngles(x, forms);
+  forms.push_back(
+      form(fmt::format("exponential in {}", x.name), {x}, decay, {timeConstant(x, 40.0, 20)}, {originOf(x)}));
   if (auto places = stepPlaces(x); !places.empty()) {
     forms.push_back(form(fmt::format("step in {}", x.name), {x}, step, {{std::move(places), false, 2}}));
   }
   if (!x.levels.empty()) return forms;
+  addHarmonics(x, forms);
   addWaves(x, forms);
+  if (x.nature == Nature::Plain) addHinges(x, forms);  // over time it would stand for an exponential
   std::vector<double> centres;
   for (std::size_t i = 4; i + 4 < x.quantiles.size(); i += 4) centres.push_back(x.quantiles[i]);
   centres.erase(std::ranges::unique(centres).begin(), centres.end());
@@ -198,6 +281,10 @@ std::vector<Form> formsIn(const CovariateInfo& a, const CovariateInfo& b) {
     for (const double power : usablePowers(x))
       forms.push_back(form(fmt::format("{} for each {}", powerInWords(x, power), names.name), {names, x},
                            switched, {}, {power}));
+    if (isContinuous(x) && names.levels.size() <= kMostSwitched) {
+      forms.push_back(form(fmt::format("exponential in {} for each {}", x.name, names.name), {names, x},
+                           switchedDecay, {timeConstant(x, 40.0, 12)}, {originOf(x)}));
+    }
     return forms;
   }
   for (const double p : usablePowers(a)) {
@@ -211,12 +298,10 @@ std::vector<Form> formsIn(const CovariateInfo& a, const CovariateInfo& b) {
     }
   }
   for (const auto& [x, y] : {std::pair{a, b}, std::pair{b, a}}) {
-    if (x.nature != Nature::Time) continue;
-    const double origin = least(x) >= 0.0 && least(x) < span(x) ? 0.0 : least(x);
-    for (const double q : usablePowers(y)) {
+    if (!isContinuous(x)) continue;
+    for (const double q : x.nature == Nature::Time ? usablePowers(y) : std::vector{1.0}) {
       forms.push_back(form(fmt::format("exponential in {} · {}", x.name, powerInWords(y, q)), {x, y},
-                           decayTimes, {{geometric(span(x) / 20.0, 2.0 * span(x), 8), true, 1}},
-                           {origin, q}));
+                           decayTimes, {timeConstant(x, 20.0, 8)}, {originOf(x), q}));
     }
   }
   return forms;

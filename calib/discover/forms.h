@@ -32,8 +32,8 @@ struct Form {
 };
 TermGroup built(const Form& form, std::span<const double> inner);
 
-/// All formulas of one covariate, or of two: powers, logarithm, exponential, sine, step, harmonics of the
-/// modulation's period, and products of two of them.
+/// All formulas of one covariate, or of two: powers, logarithm, exponential, sine, step, hinge, harmonics of
+/// the modulation's period, tan² and 1/cos of an angle, and products of two of them.
 std::vector<Form> formsIn(const CovariateInfo& covariate);
 std::vector<Form> formsIn(const CovariateInfo& a, const CovariateInfo& b);
 

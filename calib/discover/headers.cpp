@@ -55,6 +55,7 @@ const Known kLength{"depth", "range", "distance", "z", "tiefe", "abstand", "entf
 const Known kTime{"time",    "timestamp", "t",    "uptime",      "elapsed", "age",   "minutes",
                   "seconds", "date",      "zeit", "zeitstempel", "uhrzeit", "datum", "alter"};
 const Known kDistance{"distance", "range", "depth", "z", "dist", "d", "tiefe", "abstand", "entfernung"};
+const Known kAngle{"angle", "incidence", "tilt", "theta", "winkel", "einfallswinkel"};
 const Known kIndex{"frame", "index", "number", "sequence", "seq",        "counter",
                    "count", "n",     "row",    "bild",     "bildnummer", "zeile"};
 const Known kLabel{"id", "name", "number", "nr", "no", "index", "label"};
@@ -234,6 +235,8 @@ Nature natureOf(const std::string& header, MapNature said) {
       return Nature::Time;
     case MapNature::Distance:
       return Nature::Distance;
+    case MapNature::Angle:
+      return Nature::Angle;
     case MapNature::Index:
       return Nature::Index;
     case MapNature::Category:
@@ -244,6 +247,7 @@ Nature natureOf(const std::string& header, MapNature said) {
   if (hasWord(header, {"exposure", "integration"})) return Nature::Plain;  // "exposure_time" is not time
   if (hasWord(header, kTime)) return Nature::Time;
   if (hasWord(header, kDistance)) return Nature::Distance;
+  if (hasWord(header, kAngle)) return Nature::Angle;
   return hasWord(header, kIndex) ? Nature::Index : Nature::Plain;
 }
 

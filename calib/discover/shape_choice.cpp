@@ -309,6 +309,22 @@ std::vector<std::size_t> eligible(const std::vector<Explanation>& all) {
   return places;
 }
 
+namespace {
+
+/// Fewer numbers; of as many, a straight line, which says least; else what explains more.
+bool isSimpler(const Explanation& one, const Explanation& other) {
+  const auto isStraight = [](const Explanation& e) {
+    const auto& terms = e.fitted.group.terms;
+    return terms.size() == 1 && terms[0].factors.size() == 1 && terms[0].factors[0].shape == Shape::Power &&
+           terms[0].factors[0].numbers[0] == 1.0;
+  };
+  if (one.numbers != other.numbers) return one.numbers < other.numbers;
+  if (isStraight(one) != isStraight(other)) return isStraight(one);
+  return one.gain.total > other.gain.total;
+}
+
+}  // namespace
+
 std::optional<std::size_t> choose(const std::vector<Explanation>& all) {
   const auto places = eligible(all);
   std::optional<std::size_t> best, catalogue;
@@ -331,10 +347,7 @@ std::optional<std::size_t> choose(const std::vector<Explanation>& all) {
     if (all[i].is_catalogue || all[i].covariates != all[*best].covariates) continue;
     const double by = all[*best].gain.total - all[i].gain.total;
     if (by > difference(all[*best].gain, all[i].gain).error) continue;
-    const bool is_simpler = all[i].numbers != all[chosen].numbers
-                                ? all[i].numbers < all[chosen].numbers
-                                : all[i].gain.total > all[chosen].gain.total;
-    if (is_simpler) chosen = i;
+    if (isSimpler(all[i], all[chosen])) chosen = i;
   }
   return chosen;
 }

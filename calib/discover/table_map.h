@@ -15,7 +15,7 @@
 
 namespace toftwin::discover {
 
-enum class MapNature { Guessed, Plain, Time, Distance, Index, Category };
+enum class MapNature { Guessed, Plain, Time, Distance, Angle, Index, Category };
 
 /// What the map says of one covariate.
 struct MappedCovariate {
@@ -30,10 +30,13 @@ struct MappedCovariate {
               {"plain", MapNature::Plain},
               {"time", MapNature::Time},
               {"distance", MapNature::Distance},
+              {"angle", MapNature::Angle},
               {"index", MapNature::Index},
               {"category", MapNature::Category}},
              "what it is: a number; time, where exponentials are looked for; a distance, where harmonics of "
-             "the modulation are; a count of frames, even or odd; names without order; or by its header");
+             "the modulation are; an angle, where tan² and 1/cos are; a count of frames, even or odd; names "
+             "without "
+             "order; or by its header");
   }
 };
 

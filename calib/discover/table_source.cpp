@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "calib/discover/headers.h"
+
 namespace toftwin::discover {
 namespace {
 
@@ -35,7 +37,7 @@ std::vector<CovariateInfo> infosOf(const TableData& data) {
   std::vector<CovariateInfo> infos;
   for (const TableCovariate& covariate : data.covariates) {
     CovariateInfo info;
-    info.name = covariate.name, info.nature = covariate.nature;
+    info.name = covariate.name, info.unit = unitOf(covariate.name), info.nature = covariate.nature;
     info.stage = std::nullopt;
     std::vector<double> sorted = covariate.values;
     std::ranges::sort(sorted);

@@ -35,6 +35,12 @@ double Factor::at(double x) const {
       return x >= number(0) ? 1.0 : 0.0;
     case Shape::Sigmoid:
       return 1.0 / (1.0 + std::exp(-(x - number(0)) / number(1)));
+    case Shape::Hinge:
+      return std::max(0.0, number(1) * (x - number(0)));
+    case Shape::TanSquared:
+      return std::pow(std::tan(number(0) * x), 2);
+    case Shape::Secant:
+      return 1.0 / std::cos(number(0) * x) - 1.0;
     case Shape::Hat:
       return hat(x, number(0), number(1), number(2));
     case Shape::Equal:
@@ -75,6 +81,13 @@ std::string inWords(const Factor& factor) {
       return fmt::format("[{} ≥ {}]", x, number(0));
     case Shape::Sigmoid:
       return fmt::format("1/(1 + exp(−({} − {})/{}))", x, number(0), number(1));
+    case Shape::Hinge:
+      return factor.numbers[1] > 0.0 ? fmt::format("max(0, {} − {})", x, number(0))
+                                     : fmt::format("max(0, {} − {})", number(0), x);
+    case Shape::TanSquared:
+      return fmt::format("tan²({})", x);
+    case Shape::Secant:
+      return fmt::format("(1/cos({}) − 1)", x);
     case Shape::Hat:
       return fmt::format("hat({}; {}, {}, {})", x, number(0), number(1), number(2));
     case Shape::Equal:

@@ -17,16 +17,19 @@
 namespace toftwin::discover {
 
 enum class Shape {
-  Power,    ///< x^p                    numbers: p
-  Log,      ///< ln x
-  Decay,    ///< exp(−(x−x₀)/τ)         numbers: τ, x₀
-  Sine,     ///< sin(2π x/Λ)            numbers: Λ
-  Cosine,   ///< cos(2π x/Λ)            numbers: Λ
-  Step,     ///< 1 where x ≥ a, else 0  numbers: a
-  Sigmoid,  ///< 1/(1 + exp(−(x−a)/w))  numbers: a, w
-  Hat,      ///< 0 at a, 1 at b, 0 at c, straight between; a = b or b = c: 1 beyond   numbers: a, b, c
-  Equal,    ///< 1 where x = a          numbers: a
-  Modulo    ///< 1 where ⌊x⌋ mod m = r  numbers: m, r
+  Power,       ///< x^p                    numbers: p
+  Log,         ///< ln x
+  Decay,       ///< exp(−(x−x₀)/τ)         numbers: τ, x₀
+  Sine,        ///< sin(2π x/Λ)            numbers: Λ
+  Cosine,      ///< cos(2π x/Λ)            numbers: Λ
+  Step,        ///< 1 where x ≥ a, else 0  numbers: a
+  Sigmoid,     ///< 1/(1 + exp(−(x−a)/w))  numbers: a, w
+  Hinge,       ///< s (x − a) where that is positive, else 0   numbers: a, s = ±1
+  TanSquared,  ///< tan² of an angle    numbers: radians in its unit
+  Secant,      ///< 1/cos − 1 of an angle  numbers: radians in its unit
+  Hat,         ///< 0 at a, 1 at b, 0 at c, straight between; a = b or b = c: 1 beyond   numbers: a, b, c
+  Equal,       ///< 1 where x = a          numbers: a
+  Modulo       ///< 1 where ⌊x⌋ mod m = r  numbers: m, r
 };
 
 /// A function of one covariate.
@@ -68,6 +71,7 @@ enum class Nature {
   Plain,
   Time,      ///< exponentials are looked for
   Distance,  ///< and where the frequency is known, harmonics of its period
+  Angle,     ///< tan² and 1/cos − 1 are looked for
   Index,     ///< counts frames: even and odd
   Category   ///< names without order
 };

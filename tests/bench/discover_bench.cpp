@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What `toftwin discover` finds in tables with hidden effects, by strength. λ is the noncentrality of the
-// hidden effect after the nuisances. Usage: discover_bench [seeds]
+// hidden effect after the nuisances. Usage: discover_bench [seeds] [loud|nulls]
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -120,10 +120,19 @@ void row(const std::string& name, const Score& s, double seconds) {
 
 int main(int argc, char** argv) {
   const int seeds = argc > 1 ? std::atoi(argv[1]) : 5;
-  const bool is_loud = argc > 2;
+  const bool is_loud = argc > 2 && std::string{argv[2]} == "loud";
   fmt::print("{:<34} {:>4} {:>8} {:>8} {:>8} {:>9} {:>8} {:>8} {:>7}\n", "tables of 400 rows", "runs",
              "detected", "named", "offered", "spurious", "removed", "worst10", "s/run");
-  const bool only_nulls = argc > 2 && std::string{argv[2]} != "loud";
+  const bool only_nulls = argc > 2 && std::string{argv[2]} == "nulls";
+  for (const int captures : only_nulls ? std::vector<int>{} : std::vector<int>{24, 44}) {
+    Score score;
+    const auto start = std::chrono::steady_clock::now();
+    for (int seed = 1; seed <= 2 * seeds; ++seed)
+      run({Hidden::AmbientTimesDistance}, 1500.0, static_cast<std::uint64_t>(seed), {.captures = captures},
+          score, is_loud);
+    row(fmt::format("{}, {} captures 1500", nameOf(Hidden::AmbientTimesDistance), captures), score,
+        Seconds{std::chrono::steady_clock::now() - start}.count());
+  }
   for (const double lambda : only_nulls ? std::vector<double>{} : std::vector<double>{150.0, 600.0, 3000.0}) {
     Score all;
     const auto begin = std::chrono::steady_clock::now();
@@ -140,7 +149,7 @@ int main(int argc, char** argv) {
     }
     row(fmt::format("ALL {:.0f}", lambda), all, Seconds{std::chrono::steady_clock::now() - begin}.count());
   }
-  for (const double lambda : {600.0, 3000.0})
+  for (const double lambda : only_nulls ? std::vector<double>{} : std::vector{600.0, 3000.0})
     coverage(Hidden::WarmUp, "exponential in time_s", 300.0, lambda, 6 * seeds);
   if (argc > 2 && std::string{argv[2]} == "coverage") return 0;
   const std::pair<const char*, Errors> nulls[]{
@@ -150,7 +159,9 @@ int main(int argc, char** argv) {
       {"nothing, noise +15 %", {.sigma_mm = 1.15}},
       {"nothing, captures without a column", {.logged_mm = 1.0}},
       {"nothing, AR(1) 0.9", {.ar1_mm = 1.0}},
-      {"nothing, two session headers", {.session_mm = 1.0, .sessions = 25}}};
+      {"nothing, two session headers", {.session_mm = 1.0, .sessions = 25}},
+      {"nothing, 24 captures", {.captures = 24}},
+      {"nothing, 44 captures", {.captures = 44}}};
   for (const auto& [name, errors] : nulls) {
     Score score;
     const auto start = std::chrono::steady_clock::now();

@@ -11,7 +11,8 @@
 namespace toftwin::discover {
 namespace {
 
-constexpr int kRows = 400, kCaptureRows = 20;
+constexpr int kRows = 400, kRowsOfACapture = 20;
+constexpr double kPeriod = 4.99654;  ///< c/(2 · 30 MHz), in metres
 
 /// Draws that are the same everywhere: the standard fixes the engine, not the distributions.
 class Draws {
@@ -44,7 +45,7 @@ double valueOf(Hidden hidden, const Row& row) {
     case Hidden::WarmUp:
       return std::exp(-row.time / 300.0);
     case Hidden::Wiggle:
-      return std::cos(2.0 * std::numbers::pi * row.distance / (4.99654 / 4.0) + 0.7);
+      return std::cos(2.0 * std::numbers::pi * row.distance / (kPeriod / 4.0) + 0.7);
     case Hidden::Temperature:
       return row.temperature;
     case Hidden::AmbientTimesDistance:
@@ -59,6 +60,14 @@ double valueOf(Hidden hidden, const Row& row) {
       return std::log(row.exposure);
     case Hidden::IncidenceSquared:
       return row.incidence * row.incidence;
+    case Hidden::TwoHarmonics: {
+      const double phase = 2.0 * std::numbers::pi * row.distance / kPeriod;
+      return std::cos(4.0 * phase + 0.7) + 0.6 * std::cos(8.0 * phase - 0.4);
+    }
+    case Hidden::TanSquared:
+      return std::pow(std::tan(row.incidence * std::numbers::pi / 180.0), 2);
+    case Hidden::Hinge:
+      return std::max(0.0, 150.0 - row.amplitude);
   }
   return 0.0;
 }
@@ -98,6 +107,12 @@ const char* nameOf(Hidden hidden) {
       return "1/amplitude";
     case Hidden::Exposure:
       return "ln exposure";
+    case Hidden::TwoHarmonics:
+      return "4 and 8 waves per period";
+    case Hidden::TanSquared:
+      return "tan^2 of incidence";
+    case Hidden::Hinge:
+      return "below amplitude 150";
     case Hidden::IncidenceSquared:
       break;
   }
@@ -110,6 +125,7 @@ std::vector<std::string> covariatesOf(Hidden hidden) {
     case Hidden::Step:
       return {"time_s"};
     case Hidden::Wiggle:
+    case Hidden::TwoHarmonics:
       return {"distance_m"};
     case Hidden::Temperature:
       return {"temperature_c"};
@@ -118,10 +134,12 @@ std::vector<std::string> covariatesOf(Hidden hidden) {
     case Hidden::Parity:
       return {"frame"};
     case Hidden::InverseAmplitude:
+    case Hidden::Hinge:
       return {"amplitude"};
     case Hidden::Exposure:
       return {"exposure_us"};
     case Hidden::IncidenceSquared:
+    case Hidden::TanSquared:
       return {"incidence_deg"};
     case Hidden::Nothing:
       break;
@@ -134,14 +152,17 @@ Planted plant(std::uint64_t seed, const std::vector<Hidden>& hidden, double lamb
   std::vector<Row> rows;
   Planted out;
   TableData& data = out.data;
+  const int count = errors.captures > 0 ? errors.captures * kRowsOfACapture : kRows;
   const double exposures[]{200.0, 500.0, 1000.0, 2000.0};
   std::vector<double> room, offset;
   for (int s = 0; s < errors.sessions; ++s)
     room.push_back(draws.uniform(15.0, 30.0)), offset.push_back(errors.session_mm * draws.normal());
-  for (int i = 0; i < kRows; ++i) {
-    const int session = i * errors.sessions / kRows;
+  double capture_distance = 0.0, capture_offset = 0.0;
+  std::vector<double> own_offset(static_cast<std::size_t>(count));
+  for (int i = 0; i < count; ++i) {
+    const int session = i * errors.sessions / count;
     Row row{};
-    row.time = 15.0 * (i % (kRows / errors.sessions)) + draws.uniform(0.0, 10.0);
+    row.time = 15.0 * (i % (count / errors.sessions)) + draws.uniform(0.0, 10.0);
     row.distance = draws.uniform(0.5, 4.0);
     row.temperature =
         room[static_cast<std::size_t>(session)] + 12.0 * (1.0 - std::exp(-row.time / 400.0)) + draws.normal();
@@ -150,27 +171,37 @@ Planted plant(std::uint64_t seed, const std::vector<Hidden>& hidden, double lamb
     row.amplitude = row.exposure * draws.uniform(0.1, 0.9) / (row.distance * row.distance);
     row.frame = 37.0 * i + std::floor(draws.uniform(0.0, 20.0));
     row.incidence = draws.uniform(0.0, 60.0);
-    if (errors.logged_mm > 0.0 && i % kCaptureRows != 0) row.ambient = rows.back().ambient;
+    if (errors.logged_mm > 0.0 && i % kRowsOfACapture != 0) row.ambient = rows.back().ambient;
+    if (errors.captures > 0) {
+      if (i % kRowsOfACapture == 0) {
+        capture_distance = row.distance, capture_offset = errors.capture_mm * draws.normal();
+      } else {
+        row.temperature = rows.back().temperature, row.ambient = rows.back().ambient;
+      }
+      row.distance = capture_distance + draws.uniform(-0.25, 0.25);
+      own_offset[static_cast<std::size_t>(i)] = capture_offset;
+      data.capture.push_back(i / kRowsOfACapture);
+    }
     rows.push_back(row);
     data.session.push_back(session);
   }
-  Eigen::VectorXd sum = Eigen::VectorXd::Zero(kRows);
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(count);
   for (const Hidden one : hidden) {
     if (one == Hidden::Nothing) continue;
-    Eigen::VectorXd effect(kRows);
-    for (int i = 0; i < kRows; ++i) effect(i) = valueOf(one, rows[static_cast<std::size_t>(i)]);
+    Eigen::VectorXd effect(count);
+    for (int i = 0; i < count; ++i) effect(i) = valueOf(one, rows[static_cast<std::size_t>(i)]);
     scaleTo(lambda, errors.sigma_mm, rows, data.session, effect);
     sum += effect;
   }
-  double capture = 0.0, walk = 0.0;
-  for (int i = 0; i < kRows; ++i) {
+  double logged = 0.0, walk = 0.0;
+  for (int i = 0; i < count; ++i) {
     const Row& row = rows[static_cast<std::size_t>(i)];
-    if (errors.logged_mm > 0.0 && i % kCaptureRows == 0) capture = errors.logged_mm * draws.normal();
+    if (errors.logged_mm > 0.0 && i % kRowsOfACapture == 0) logged = errors.logged_mm * draws.normal();
     if (errors.ar1_mm > 0.0) walk = 0.9 * walk + std::sqrt(0.19) * errors.ar1_mm * draws.normal();
     double noise = errors.sigma_mm * (errors.heavy_tails ? draws.t4() : draws.normal());
     if (errors.bumped && i >= 120 && i < 130) noise += 6.0 * errors.sigma_mm;
     data.error.push_back(3.0 + 2.0 * row.distance + offset[data.session[static_cast<std::size_t>(i)]] +
-                         sum(i) + noise + capture + walk);
+                         own_offset[static_cast<std::size_t>(i)] + sum(i) + noise + logged + walk);
     data.reference.push_back(row.distance);
     data.line.push_back(static_cast<std::size_t>(i) + 2);
   }
@@ -187,10 +218,10 @@ Planted plant(std::uint64_t seed, const std::vector<Hidden>& hidden, double lamb
   column("exposure_us", Nature::Plain, &Row::exposure);
   column("amplitude", Nature::Plain, &Row::amplitude);
   column("frame", Nature::Index, &Row::frame);
-  column("incidence_deg", Nature::Plain, &Row::incidence);
-  data.reference_name = "distance_m", data.unit = "mm", data.period = 4.99654;  // c/(2 · 30 MHz)
+  column("incidence_deg", Nature::Angle, &Row::incidence);
+  data.reference_name = "distance_m", data.unit = "mm", data.period = kPeriod;
   for (int s = 1; s <= errors.sessions; ++s) data.session_names.push_back(std::to_string(s));
-  data.locked.assign(kRows, false);
+  data.locked.assign(static_cast<std::size_t>(count), false);
   return out;
 }
 

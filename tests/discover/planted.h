@@ -19,6 +19,10 @@ struct Errors {
   int sessions = 4;
   double logged_mm = 0.0;  ///< deviation of an offset of 20 rows that share one logged ambient light, if any
   double ar1_mm = 0.0;     ///< deviation of an AR(1) process from row to row, correlation 0.9
+  /// 0, or in how many captures of 20 rows the rows were taken: ambient light and temperature stay, the
+  /// distance changes by a quarter of a metre, and each has an offset of its own. A multiple of 4.
+  int captures = 0;
+  double capture_mm = 0.5;  ///< deviation of the captures' offsets
 };
 
 enum class Hidden {
@@ -31,11 +35,23 @@ enum class Hidden {
   Parity,
   InverseAmplitude,
   Exposure,
-  IncidenceSquared
+  IncidenceSquared,
+  TwoHarmonics,
+  TanSquared,
+  Hinge
 };
-inline constexpr Hidden kHidden[]{
-    Hidden::WarmUp, Hidden::Wiggle,           Hidden::Temperature, Hidden::AmbientTimesDistance, Hidden::Step,
-    Hidden::Parity, Hidden::InverseAmplitude, Hidden::Exposure,    Hidden::IncidenceSquared};
+inline constexpr Hidden kHidden[]{Hidden::WarmUp,
+                                  Hidden::Wiggle,
+                                  Hidden::Temperature,
+                                  Hidden::AmbientTimesDistance,
+                                  Hidden::Step,
+                                  Hidden::Parity,
+                                  Hidden::InverseAmplitude,
+                                  Hidden::Exposure,
+                                  Hidden::IncidenceSquared,
+                                  Hidden::TwoHarmonics,
+                                  Hidden::TanSquared,
+                                  Hidden::Hinge};
 const char* nameOf(Hidden hidden);
 /// What it goes with, sorted.
 std::vector<std::string> covariatesOf(Hidden hidden);

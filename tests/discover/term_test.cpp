@@ -27,6 +27,11 @@ TEST(Factor, IsTheFunctionThatItsNameSays) {
   EXPECT_DOUBLE_EQ(at(Shape::Sigmoid, {2.0, 0.5}, 2.0), 0.5);
   EXPECT_EQ(at(Shape::Equal, {3.0}, 3.0), 1.0);
   EXPECT_EQ(at(Shape::Modulo, {2.0, 1.0}, -3.0), 1.0) << "a negative odd number is odd";
+  EXPECT_DOUBLE_EQ(at(Shape::Hinge, {2.0, 1.0}, 5.0), 3.0);
+  EXPECT_EQ(at(Shape::Hinge, {2.0, 1.0}, 1.0), 0.0);
+  EXPECT_DOUBLE_EQ(at(Shape::Hinge, {2.0, -1.0}, 0.5), 1.5);
+  EXPECT_NEAR(at(Shape::TanSquared, {std::numbers::pi / 180.0}, 60.0), 3.0, 1e-12);
+  EXPECT_NEAR(at(Shape::Secant, {std::numbers::pi / 180.0}, 60.0), 1.0, 1e-12);
 }
 
 TEST(Factor, HatIsOneAtItsMiddleAndBeyondAnOpenEnd) {
@@ -55,6 +60,7 @@ TEST(Term, IsTheProductOfItsFactorsInWordsToo) {
   const Term term{{{"a", Shape::Power, {1.0}}, {"b", Shape::Power, {-1.0}}}, {}};
   EXPECT_DOUBLE_EQ(term.at([](const std::string& name) { return name == "a" ? 6.0 : 4.0; }), 1.5);
   EXPECT_EQ(inWords(term), "a · 1/b");
+  EXPECT_EQ(inWords(Factor{"a", Shape::Hinge, {150.0, -1.0}}), "max(0, 150 − a)");
 }
 
 TEST(Forms, HaveHarmonicsOnlyOfDistancesThatAreLongEnoughToShowThem) {
@@ -63,7 +69,66 @@ TEST(Forms, HaveHarmonicsOnlyOfDistancesThatAreLongEnoughToShowThem) {
   d.period = 5.2;
   std::size_t harmonics = 0;
   for (const Form& form : formsIn(d)) harmonics += form.name.find("per period") != std::string::npos;
-  EXPECT_EQ(harmonics, 5u) << "a metre is less than 0.6 of a wave of 5.2/3 m, more of 5.2/4 … 5.2/8 m";
+  EXPECT_EQ(harmonics, 6u)
+      << "a metre is less than 0.6 of a wave of 5.2/3 m, more of 5.2/4 … 5.2/8 m; and 4 with 8";
+}
+
+CovariateInfo spread(const std::string& name, double low, double high) {
+  CovariateInfo x{.name = name};
+  for (int i = 0; i <= 32; ++i) x.quantiles.push_back(low + (high - low) * i / 32.0);
+  return x;
+}
+
+std::vector<std::string> namesOf(const std::vector<Form>& forms) {
+  std::vector<std::string> names;
+  for (const Form& form : forms) names.push_back(form.name);
+  return names;
+}
+
+TEST(Forms, OfAnglesHaveTanSquaredInDegreesOrRadians) {
+  CovariateInfo x = spread("x", 0.0, 60.0);
+  EXPECT_THAT(namesOf(formsIn(x)), testing::Not(testing::Contains("tan² of x")));
+  x.nature = Nature::Angle;
+  for (const auto& [unit, high] : {std::pair{"deg", 60.0}, {"", 60.0}, {"rad", 1.0}, {"", 1.0}}) {
+    x.quantiles = spread("x", 0.0, high).quantiles, x.unit = unit;
+    const auto forms = formsIn(x);
+    const auto tan = std::ranges::find(forms, "tan² of x", &Form::name);
+    const auto secant = std::ranges::find(forms, "1/cos − 1 of x", &Form::name);
+    ASSERT_TRUE(tan != forms.end() && secant != forms.end()) << unit << high;
+    const double radians = high == 60.0 ? std::numbers::pi / 3.0 : 1.0;
+    const auto value = [&](const Form& form) {
+      return built(form, {}).terms[0].at([&](const auto&) { return high; });
+    };
+    EXPECT_NEAR(value(*tan), std::pow(std::tan(radians), 2), 1e-12);
+    EXPECT_NEAR(value(*secant), 1.0 / std::cos(radians) - 1.0, 1e-12);
+  }
+  x.quantiles = spread("x", 0.0, 90.0).quantiles, x.unit = "deg";
+  EXPECT_THAT(namesOf(formsIn(x)), testing::Not(testing::Contains("tan² of x"))) << "it has no end at 90°";
+}
+
+/// 0 °C is not "no temperature", so its inverse means nothing; that of 0 V does.
+TEST(Forms, OfDegreesCelsiusHaveNoInverses) {
+  CovariateInfo x = spread("x", 15.0, 40.0);
+  EXPECT_THAT(namesOf(formsIn(x)), testing::IsSupersetOf({"1/x", "√x", "ln x", "x"}));
+  x.unit = "c";
+  for (const char* name : {"1/x", "1/x^2", "√x", "ln x"})
+    EXPECT_THAT(namesOf(formsIn(x)), testing::Not(testing::Contains(name)));
+  EXPECT_THAT(namesOf(formsIn(x)), testing::Contains("x"));
+}
+
+TEST(Candidates, OfFewCapturesHoldPairsOfThreeColumnsWhereTheyAreWanted) {
+  const std::vector<CovariateInfo> infos{spread("a", 1.0, 2.0), spread("b", 3.0, 9.0)};
+  const auto pairsWith = [&](std::size_t captures, bool straight) {
+    std::vector<std::size_t> columns;
+    for (const TermGroup& group :
+         genericCandidates(infos, {.captures = captures, .has_straight_pairs = straight}))
+      if (covariatesOf(group).size() == 2) columns.push_back(group.terms.size());
+    return columns;
+  };
+  EXPECT_THAT(pairsWith(24, true), testing::ElementsAre(3));
+  EXPECT_THAT(pairsWith(24, false), testing::IsEmpty());
+  EXPECT_THAT(pairsWith(60, true), testing::ElementsAre(3, 15));
+  EXPECT_THAT(pairsWith(60, false), testing::ElementsAre(15));
 }
 
 }  // namespace
