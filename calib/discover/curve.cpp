@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/discover/curve.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <fmt/format.h>
+
+#include "calib/discover/table_source.h"
 
 namespace toftwin::discover {
 namespace {
@@ -24,9 +28,70 @@ double partAt(const FittedForm& part, const double* coefficient, std::span<const
   return sum;
 }
 
+/// How far an inner number is moved for a slope.
+double slightly(double inner) { return 1e-4 * (std::abs(inner) + 1e-12); }
+
+Eigen::VectorXd meansOf(const TableData& rows, std::span<const Term> terms) {
+  return columnsOf(rows, terms).colwise().mean();
+}
+
 }  // namespace
 
-Point effectAt(const Effect& effect, const std::map<std::string, double>& at) {
+Level levelOf(const Effect& effect, const TableData& rows) {
+  Level level;
+  level.slope = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(effect.numbers.size()));
+  Eigen::Index term = 0, inner = static_cast<Eigen::Index>(effect.coefficient.size());
+  for (const FittedForm& part : effect.parts) {
+    const auto terms = static_cast<Eigen::Index>(part.group.terms.size());
+    const auto own = Eigen::Map<const Eigen::VectorXd>(effect.coefficient.data() + term, terms);
+    const Eigen::VectorXd mean = meansOf(rows, part.group.terms);
+    level.slope.segment(term, terms) = mean;
+    level.value += own.dot(mean);
+    for (std::size_t i = 0; i < part.inner.size(); ++i) {
+      std::vector<double> moved = part.inner;
+      moved[i] += slightly(moved[i]);
+      const Eigen::VectorXd there = meansOf(rows, built(part.form, moved).terms);
+      level.slope(inner++) = own.dot(there - mean) / slightly(part.inner[i]);
+    }
+    term += terms;
+  }
+  return level;
+}
+
+std::vector<double> effectIn(const TableData& rows, const Effect& effect) {
+  const Eigen::MatrixXd columns = columnsOf(rows, termsOf(effect));
+  const auto own = Eigen::Map<const Eigen::VectorXd>(effect.coefficient.data(), columns.cols());
+  const Eigen::VectorXd values = columns * own;
+  return {values.begin(), values.end()};
+}
+
+std::pair<double, double> rowsAround(const TableData& rows, const std::string& covariate, double place) {
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  std::pair around{-kNone, kNone};
+  const auto at = std::ranges::find(rows.covariates, covariate, &TableCovariate::name);
+  if (at == rows.covariates.end()) return {place, place};
+  for (const double x : at->values) {
+    if (x < place) around.first = std::max(around.first, x);
+    if (x >= place) around.second = std::min(around.second, x);
+  }
+  return {std::isfinite(around.first) ? around.first : place,
+          std::isfinite(around.second) ? around.second : place};
+}
+
+std::optional<std::pair<double, double>> rowsAround(const TableData& rows, const Effect& effect,
+                                                    std::size_t number) {
+  std::size_t next = effect.coefficient.size();
+  for (const FittedForm& part : effect.parts) {
+    const bool is_step = !part.group.terms.empty() && !part.group.terms[0].factors.empty() &&
+                         part.group.terms[0].factors[0].shape == Shape::Step;
+    for (std::size_t i = 0; i < part.inner.size(); ++i, ++next) {
+      if (next == number && is_step) return rowsAround(rows, part.form.covariates[0], part.inner[i]);
+    }
+  }
+  return std::nullopt;
+}
+
+Point effectAt(const Effect& effect, const std::map<std::string, double>& at, const Level& level) {
   Point point;
   const auto numbers = static_cast<Eigen::Index>(effect.numbers.size());
   Eigen::VectorXd slope = Eigen::VectorXd::Zero(numbers);
@@ -39,11 +104,13 @@ Point effectAt(const Effect& effect, const std::map<std::string, double>& at) {
       if (term < numbers) slope(term++) = termAt(one, at);
     for (std::size_t i = 0; i < part.inner.size(); ++i) {
       std::vector<double> moved = part.inner;
-      const double step = 1e-4 * (std::abs(moved[i]) + 1e-12);
+      const double step = slightly(moved[i]);
       moved[i] += step;
       if (inner < numbers) slope(inner++) = (partAt(part, coefficient, moved, at) - here) / step;
     }
   }
+  point.value -= level.value;
+  if (level.slope.size() == numbers) slope -= level.slope;
   if (effect.covariance.rows() == numbers)
     point.error = std::sqrt(std::max(0.0, slope.dot(effect.covariance * slope)));
   return point;

@@ -30,8 +30,18 @@ struct TableDiscovery {
 
 Result<TableDiscovery> discoverTable(const std::filesystem::path& file, const TableMap& map);
 
+/// The nuisances by their sessions' names; sessions without open rows have none.
+std::vector<Estimate> namedNuisances(const TableDiscovery& discovery);
+
 /// One sentence: what came out.
 std::string verdictOf(const TableDiscovery& discovery);
+/// What is left without this effect, against each of its covariates.
+compare::FigureRow figuresOf(const TableDiscovery& discovery, const Effect& effect);
+/// Means over up to 40 groups of rows that are near each other in x.
+compare::Curve binned(const std::vector<double>& x, const std::vector<double>& y, std::string name,
+                      compare::Ink ink);
+/// Its numbers.
+compare::Json dataOf(const TableDiscovery& discovery);
 compare::Report reportOf(const TableDiscovery& discovery);
 /// The model with what was learned: formula, numbers with covariance, and a table.
 std::string modelToml(const TableDiscovery& discovery);

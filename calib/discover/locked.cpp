@@ -63,6 +63,21 @@ double lag1(const std::vector<double>& values, const std::vector<int>& session) 
   return squares > 0.0 ? products / squares : 0.0;
 }
 
+/// Rows beyond five robust deviations before and after alike: bumped, wrapped or of another surface. One that
+/// only the model has put there is the model's.
+std::vector<bool> farOff(const std::vector<double>& before, const std::vector<double>& after) {
+  constexpr double kFar = 5.0;
+  const auto rulerOf = [](std::vector<double> values) {
+    for (double& value : values) value = std::abs(value);
+    return std::max(1.0, 1.4826 * compare::quantile(values, 0.5));  // rounded values may be equal in most
+  };
+  const double before_ruler = rulerOf(before), after_ruler = rulerOf(after);
+  std::vector<bool> is_far;
+  for (std::size_t i = 0; i < before.size(); ++i)
+    is_far.push_back(std::abs(before[i]) > kFar * before_ruler && std::abs(after[i]) > kFar * after_ruler);
+  return is_far;
+}
+
 struct ChiSquares {
   double before = 0.0, after = 0.0, rows = 0.0;
 };
@@ -128,9 +143,17 @@ Judged judgeLocked(const TableSource& source, const TableData& locked, const std
   const std::size_t size = std::max<std::size_t>(1, locked.rows() / 40);
   std::vector<ChiSquares> blocks;
   ChiSquares all;
+  std::vector<double> standard_before, standard_after;
+  for (std::size_t i = 0; i < locked.rows(); ++i) {
+    standard_before.push_back(judged.before_value[i] / sigma[i]);
+    standard_after.push_back(judged.after_value[i] / sigma[i]);
+  }
+  const std::vector<bool> is_far = farOff(standard_before, standard_after);
+  judged.far_off = static_cast<std::size_t>(std::ranges::count(is_far, true));
   for (std::size_t i = 0; i < locked.rows(); ++i) {
     if (i % size == 0) blocks.emplace_back();
-    const double z0 = judged.before_value[i] / sigma[i], z1 = judged.after_value[i] / sigma[i];
+    if (is_far[i]) continue;
+    const double z0 = standard_before[i], z1 = standard_after[i];
     for (ChiSquares* sums : {&blocks.back(), &all})
       sums->before += z0 * z0, sums->after += z1 * z1, sums->rows += 1.0;
   }

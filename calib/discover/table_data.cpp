@@ -45,6 +45,18 @@ class NamedColumns {
   }
   /// NaN where a field says that there is none. Times become seconds since the first of them.
   [[nodiscard]] Result<std::vector<double>> numbers(const std::string& name) const {
+    auto values = asWritten(name);
+    if (values && isTime(name))
+      for (const double first = firstOf(*values); double& value : *values) value -= first;
+    return values;
+  }
+  static double firstOf(const std::vector<double>& values) {
+    double first = std::numeric_limits<double>::infinity();
+    for (const double value : values) first = std::fmin(first, value);
+    return first;
+  }
+  /// Times are seconds since 1970, or since midnight.
+  [[nodiscard]] Result<std::vector<double>> asWritten(const std::string& name) const {
     const auto at = find(name);
     if (!at) return missing(name);
     const bool is_time = isTime(name);
@@ -67,12 +79,7 @@ class NamedColumns {
                                "write it without the comma, or all with decimals",
                                file_.string(), table_.line[*row], table_.columns[*at][*row], name)};
     }
-    if (is_time) {
-      overMidnight(values);
-      double first = std::numeric_limits<double>::infinity();
-      for (const double value : values) first = std::fmin(first, value);
-      for (double& value : values) value -= first;
-    }
+    if (is_time) overMidnight(values);
     return values;
   }
   /// The first "1,020" in a column with "950", where commas may be those of decimals: none is guessed.
@@ -202,9 +209,12 @@ Result<> readCovariate(const NamedColumns& columns, const std::string& name, Map
     auto values = columns.numbers(name);
     if (!values) return values.error();
     covariate.values = *std::move(values);
-    if (said == MapNature::Guessed && columns.isTime(name)) covariate.nature = Nature::Time;
     if (said == MapNature::Guessed && isPixelNumber(name) && areWhole(covariate.values))
       covariate.nature = Nature::Index;
+    if (columns.isTime(name)) {
+      covariate.first = NamedColumns::firstOf(*columns.asWritten(name));
+      if (said == MapNature::Guessed) covariate.nature = Nature::Time;
+    }
   }
   data.covariates.push_back(std::move(covariate));
   return {};

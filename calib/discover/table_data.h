@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,9 @@ struct TableCovariate {
   Nature nature = Nature::Plain;
   std::vector<double> values{};
   std::vector<std::string> words{};  ///< of a category: what the values 0, 1, … stand for
+  /// Of a column of dates or times of day: its first, from which the values count; seconds since 1970 or
+  /// since midnight.
+  std::optional<double> first{};
 };
 
 /// Numbers of a table, rows in the file's order.

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <ctime>
 #include <map>
+#include <set>
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include "calib/discover/curve.h"
@@ -37,84 +40,6 @@ const std::vector<double>* valuesOf(const TableData& data, const std::string& na
   return at == data.covariates.end() ? nullptr : &at->values;
 }
 
-/// Means over up to 40 groups of rows that are near each other in x, each with its standard error.
-Curve binned(const std::vector<double>& x, const std::vector<double>& y, std::string name, Ink ink) {
-  std::vector<std::size_t> order(x.size());
-  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-  std::ranges::sort(order, {}, [&](std::size_t i) { return x[i]; });
-  Curve curve{.name = std::move(name), .ink = ink, .stroke = Stroke::Dots};
-  const std::size_t size = std::max<std::size_t>(1, (x.size() + 39) / 40);
-  for (std::size_t begin = 0; begin < order.size();) {
-    std::size_t end = std::min(begin + size, order.size());
-    while (end < order.size() && x[order[end]] == x[order[end - 1]]) ++end;  // equal x stay together
-    double mean_x = 0.0, mean_y = 0.0;
-    for (std::size_t i = begin; i < end; ++i) mean_x += x[order[i]], mean_y += y[order[i]];
-    curve.x.push_back(mean_x / static_cast<double>(end - begin)),
-        curve.y.push_back(mean_y / static_cast<double>(end - begin));
-    begin = end;
-  }
-  return curve;
-}
-
-/// The effect along one of its covariates, the others in the middle, with 95 % about it.
-Curve effectCurve(const TableDiscovery& d, const Effect& effect, const std::string& along) {
-  Curve curve{.name = effect.name, .ink = Ink::Simulated};
-  std::map<std::string, double> at;
-  const CovariateInfo* info = nullptr;
-  for (const CovariateInfo& one : d.infos) {
-    at[one.name] = one.quantiles[one.quantiles.size() / 2];
-    if (one.name == along) info = &one;
-  }
-  if (info == nullptr) return curve;
-  const double low = info->quantiles.front(), high = info->quantiles.back();
-  for (int i = 0; i <= 300; ++i) {
-    at[along] = low + (high - low) * i / 300.0;
-    const Point point = effectAt(effect, at);
-    curve.x.push_back(at[along]), curve.y.push_back(point.value);
-    curve.low.push_back(point.value - 1.96 * point.error),
-        curve.high.push_back(point.value + 1.96 * point.error);
-  }
-  return curve;
-}
-
-/// Of each row.
-std::vector<double> effectValues(const TableData& rows, const Effect& effect) {
-  const Eigen::MatrixXd columns = columnsOf(rows, termsOf(effect));
-  std::vector<double> values(rows.rows());
-  for (Eigen::Index c = 0; c < columns.cols(); ++c)
-    for (std::size_t i = 0; i < values.size(); ++i)
-      values[i] += effect.coefficient[static_cast<std::size_t>(c)] * columns(static_cast<Eigen::Index>(i), c);
-  return values;
-}
-
-/// What is left without this effect, against each of its covariates.
-FigureRow figuresOf(const TableDiscovery& d, const Effect& effect) {
-  FigureRow row;
-  auto own = effectValues(d.open, effect);
-  for (std::size_t i = 0; i < own.size(); ++i) own[i] += d.after[i];
-  const auto pure = effectValues(d.open, effect);
-  for (const std::string& along : effect.covariates) {
-    const auto* x = valuesOf(d.open, along);
-    if (x == nullptr) continue;
-    std::vector<Curve> curves{binned(*x, own, "rows, averaged in groups", Ink::Measured)};
-    if (effect.covariates.size() == 1) {
-      curves.push_back(effectCurve(d, effect, along));
-    } else {
-      curves.push_back(binned(*x, pure, effect.name, Ink::Simulated));
-    }
-    row.figures.push_back(
-        {fmt::format("{} over {}: measured − reference without nuisances and other effects{}.", effect.name,
-                     along, effect.covariates.size() == 1 ? "; band: 95 %" : "; averages of the same rows"),
-         toSvg(Plot{.title = effect.name,
-                    .x_label = along,
-                    .y_label = labelled(d, "error"),
-                    .curves = std::move(curves),
-                    .zero_line = true,
-                    .compact = effect.covariates.size() > 1})});
-  }
-  return row;
-}
-
 std::string experimentInWords(const TableDiscovery& d, const Effect& effect) {
   const auto& e = *effect.experiment;
   std::string words = fmt::format("Next experiment: take {} from {:.4g} to {:.4g}", e.vary, e.from, e.to);
@@ -126,16 +51,45 @@ std::string experimentInWords(const TableDiscovery& d, const Effect& effect) {
   return words + ".";
 }
 
+/// Between the rows where it is least and most.
+std::string sizeOf(const TableDiscovery& d, const Effect& effect) {
+  const auto values = effectIn(d.open, effect);
+  const auto [least, most] = std::ranges::minmax(values);
+  return fmt::format("by up to {}{}", shown(most - least, decimalsOf(d)), unitOf(d));
+}
+
+/// A value of a covariate as its column has it: of a time the date.
+std::string placeInWords(const TableDiscovery& d, const std::string& covariate, double x) {
+  const auto at = std::ranges::find(d.open.covariates, covariate, &TableCovariate::name);
+  if (at == d.open.covariates.end() || !at->first) return significant(x);
+  constexpr double kDay = 86'400.0;
+  const double time = *at->first + x;
+  const auto then = fmt::gmtime(static_cast<std::time_t>(std::llround(time)));
+  return *at->first < kDay ? fmt::format("{:%H:%M:%S}", then) : fmt::format("{:%Y-%m-%d %H:%M:%S}", then);
+}
+
+/// " between 500 and 1000": of a step, the rows on both sides.
+std::string betweenInWords(const TableDiscovery& d, const Effect& effect) {
+  for (std::size_t i = 0; i < effect.numbers.size() && effect.parts.size() == 1; ++i) {
+    const auto around = rowsAround(d.open, effect, i);
+    if (!around) continue;
+    const auto place = [&](double x) { return placeInWords(d, effect.covariates[0], x); };
+    return fmt::format(" between {} and {}", place(around->first), place(around->second));
+  }
+  return {};
+}
+
 bool isCertain(const Effect& effect) { return effect.alternatives.empty() && effect.frequency >= 0.8; }
 
-std::string nameInWords(const Effect& effect) {
+std::string nameInWords(const TableDiscovery& d, const Effect& effect) {
   const auto shape = [](const std::string& name) {
     return name.find("smooth in") != std::string::npos ? std::string{"a curve without a short formula"}
                                                        : name;
   };
-  std::string words = effect.is_catalogue ? effect.name
-                                          : fmt::format("it goes with {} ({})", joined(effect.covariates),
-                                                        shape(effect.name));
+  std::string words = effect.is_catalogue
+                          ? effect.name
+                          : fmt::format("it goes with {} ({}), {}", joined(effect.covariates),
+                                        shape(effect.name) + betweenInWords(d, effect), sizeOf(d, effect));
   for (const Alternative& other : effect.alternatives)
     words += fmt::format(", or with {} ({})", joined(other.covariates), shape(other.name));
   return words;
@@ -147,7 +101,15 @@ TableBlock numbersTable(const TableDiscovery& d, const Effect& effect) {
       {"number", "value", "standard error", "95 % from", "to"},
       {}};
   if (!isFormula(effect)) return table;
-  for (const Estimate& one : effect.numbers) {
+  for (std::size_t i = 0; i < effect.numbers.size(); ++i) {
+    const Estimate& one = effect.numbers[i];
+    const auto around = rowsAround(d.open, effect, i);
+    if (around && one.error < 0.5 * (around->second - around->first)) {
+      table.rows.push_back({one.name, "between two rows", "–",
+                            placeInWords(d, effect.covariates[0], around->first),
+                            placeInWords(d, effect.covariates[0], around->second)});
+      continue;
+    }
     table.rows.push_back({one.name, significant(one.value), significant(one.error),
                           significant(one.value - 1.96 * one.error),
                           significant(one.value + 1.96 * one.error)});
@@ -164,8 +126,11 @@ TableBlock triedTable(const Effect& effect) {
       {}};
   for (std::size_t i = 0; i < std::min<std::size_t>(effect.tried.size(), 12); ++i) {
     const TriedShape& one = effect.tried[i];
-    table.rows.push_back({one.name, std::to_string(one.numbers), shown(one.gain.mean, 1),
-                          shown(one.worse.mean, 1) + " ± " + shown(one.worse.error, 1)});
+    const bool is_useless =
+        one.gain.mean < 0.0;  // by how much is rounding where columns are too many for the rows
+    table.rows.push_back({one.name, std::to_string(one.numbers), is_useless ? "–" : shown(one.gain.mean, 1),
+                          is_useless ? "does worse than nothing"
+                                     : shown(one.worse.mean, 1) + " ± " + shown(one.worse.error, 1)});
   }
   return table;
 }
@@ -178,16 +143,17 @@ Section effectSection(const TableDiscovery& d, const Effect& effect, std::size_t
                   {}};
   section.tone = isCertain(effect) ? Tone::Good : Tone::Fair;
   section.verdict = fmt::format(
-      "A part of the error: {}. Formula: {}. Without any effect a share of {} of data sets would look "
+      "A part of the error: {}. Formula{}: {}. Without any effect a share of {} of data sets would look "
       "like this (p; the least that {} draws can say is {}). The same is chosen in {} of 200 draws "
       "of the captures.",
-      nameInWords(effect), formulaOf(effect), significant(effect.p), d.finding.draws,
-      significant(1.0 / (d.finding.draws + 1.0)), shownPercent(effect.frequency));
+      nameInWords(d, effect), d.open.unit.empty() ? "" : " in" + unitOf(d), formulaOf(effect),
+      significant(effect.p), d.finding.draws, significant(1.0 / (d.finding.draws + 1.0)),
+      shownPercent(effect.frequency));
   section.blocks.push_back(figuresOf(d, effect));
   if (auto numbers = numbersTable(d, effect); !numbers.rows.empty())
     section.blocks.push_back(std::move(numbers));
   if (!effect.alternatives.empty()) {
-    TableBlock others{"These data cannot tell it from:",
+    TableBlock others{"These data cannot tell it from",
                       {"explanation", "covariates", "removes less by", "correlation"},
                       {}};
     for (const Alternative& other : effect.alternatives) {
@@ -202,6 +168,28 @@ Section effectSection(const TableDiscovery& d, const Effect& effect, std::size_t
   return section;
 }
 
+std::string counted(std::size_t count, const std::string& what) {
+  return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
+}
+
+/// Whether an effect is in the locked sessions' own means, which are taken out.
+bool isTakenOut(const TableDiscovery& d, const Effect& effect) {
+  constexpr double kMostOfIt = 0.9;
+  const std::set<int> seen(d.open.session.begin(), d.open.session.end());
+  const auto values = effectIn(d.locked, effect);
+  std::map<int, Running> sessions;
+  Running open;
+  for (const double value : effectIn(d.open, effect)) open.add(value);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (seen.contains(d.locked.session[i])) return false;
+    sessions[d.locked.session[i]].add(values[i]);
+  }
+  double within = 0.0;
+  for (const auto& [session, one] : sessions)
+    within += one.variance() * static_cast<double>(one.n()) / static_cast<double>(values.size());
+  return !values.empty() && within < (1.0 - kMostOfIt) * open.variance();
+}
+
 Section judgedSection(const TableDiscovery& d) {
   const Judged& j = d.judged;
   Section section{"before-after", "Before and after, on locked rows", {}, Tone::Neutral, {}};
@@ -209,17 +197,19 @@ Section judgedSection(const TableDiscovery& d) {
     section.verdict = "No rows were locked, so nothing says how well this holds.";
     return section;
   }
-  const bool is_explainable = j.explainable > 3.0 * j.explainable_error;
   if (d.finding.effects.empty()) {
     section.verdict = "Nothing was added to the model, so nothing changes.";
   } else {
     section.verdict = fmt::format(
-        "RMSE {} → {}{} on {} rows that nothing above has seen{}.", shown(j.before.rms, decimalsOf(d)),
-        shown(j.after.rms, decimalsOf(d)), unitOf(d), j.rows,
-        is_explainable
+        "RMSE {} → {}{} on {} that nothing above has seen{}{}.", shown(j.before.rms, decimalsOf(d)),
+        shown(j.after.rms, decimalsOf(d)), unitOf(d), counted(j.rows, "row"),
+        j.isTelling()
             ? fmt::format("; {} of what can be explained there is gone (95 %: {} to {})",
                           shownPercent(j.removed), shownPercent(j.removed_low), shownPercent(j.removed_high))
-            : "; what can be explained there is within what chance makes of so few rows");
+            : "; what could be explained there is too little to tell its share",
+        j.far_off == 0 ? ""
+                       : fmt::format("; {} far off before and after, in the RMSE but not in the share",
+                                     counted(j.far_off, "row") + (j.far_off == 1 ? " is" : " are")));
     section.tone = j.after.rms < j.before.rms ? Tone::Good : Tone::Bad;
   }
   const int digits = decimalsOf(d);
@@ -228,6 +218,16 @@ Section judgedSection(const TableDiscovery& d) {
         name,          shown(s.mean, digits), shown(s.rms, digits), shown(s.p95_abs, digits),
         shown(chi, 2), shown(lag, 2)};
   };
+  for (const Effect& effect : d.finding.effects)
+    if (isTakenOut(d, effect)) {
+      section.blocks.push_back(
+          Paragraph{fmt::format("{} changes from session to session and hardly within one. The locked "
+                                "sessions were never seen, so their own "
+                                "mean is taken out before and after, and most of this effect with it: they "
+                                "cannot judge it. A session of "
+                                "which a part is open and a part locked would.",
+                                joined(effect.covariates))});
+    }
   section.blocks.push_back(TableBlock{
       "Locked rows, offset, gain and session offsets removed as fitted on the others. χ²/row: 1 is noise "
       "alone. Next row: "
@@ -287,9 +287,10 @@ Section dataSection(const TableDiscovery& d) {
   Section section{"data", "The data and their noise", {}, Tone::Neutral, {}};
   section.tone = d.open.doubts.empty() ? Tone::Good : Tone::Fair;
   section.verdict =
-      fmt::format("{} rows to search in, {} locked; noise {}{} a row{}; {} rows beyond 3 σ weigh less.",
-                  d.open.rows(), d.locked.rows(), significant(d.noise.typical), unitOf(d),
-                  d.noise.grows_with.empty() ? "" : ", growing with " + d.noise.grows_with, d.noise.outliers);
+      fmt::format("{} to search in, {} locked; noise {}{} a row{}; {} beyond 3 σ weigh less.",
+                  counted(d.open.rows(), "row"), d.locked.rows(), significant(d.noise.typical), unitOf(d),
+                  d.noise.grows_with.empty() ? "" : ", growing with " + d.noise.grows_with,
+                  counted(d.noise.outliers, "row"));
   for (const auto& note : d.open.notes) section.blocks.push_back(Paragraph{"Read as: " + note});
   for (const auto& doubt : d.open.doubts) section.blocks.push_back(Paragraph{"Doubt: " + doubt});
   if (d.noise.correlation_rows > 1.5) {
@@ -299,7 +300,7 @@ Section dataSection(const TableDiscovery& d) {
   }
   TableBlock nuisances{
       "Nuisances, fitted along and never counted as effects", {"nuisance", "value", "standard error"}, {}};
-  for (const Estimate& one : d.finding.nuisances)
+  for (const Estimate& one : namedNuisances(d))
     nuisances.rows.push_back({one.name, significant(one.value), significant(one.error)});
   section.blocks.push_back(std::move(nuisances));
   TableBlock scores{
@@ -323,76 +324,40 @@ Section dataSection(const TableDiscovery& d) {
   return section;
 }
 
-Json effectJson(const Effect& effect) {
-  Json json = Json::object();
-  json.set("name", effect.name)
-      .set("covariates", Json::arrayOf(effect.covariates))
-      .set("formula", formulaOf(effect));
-  json.set("is_formula", isFormula(effect))
-      .set("stage", "range")
-      .set("p", effect.p)
-      .set("chosen_again", effect.frequency);
-  json.set("held_out_gain", effect.gain.mean).set("held_out_gain_error", effect.gain.error);
-  Json numbers = Json::array();
-  for (const Estimate& one : effect.numbers)
-    numbers.push(
-        Json::object().set("name", one.name).set("value", one.value).set("standard_error", one.error));
-  json.set("numbers", std::move(numbers));
-  Json others = Json::array();
-  for (const Alternative& other : effect.alternatives) {
-    others.push(Json::object()
-                    .set("name", other.name)
-                    .set("covariates", Json::arrayOf(other.covariates))
-                    .set("worse", other.worse.mean)
-                    .set("worse_error", other.worse.error)
-                    .set("correlation", other.correlation));
-  }
-  json.set("alternatives", std::move(others));
-  if (effect.experiment) {
-    const auto& e = *effect.experiment;
-    json.set("next_experiment", Json::object()
-                                    .set("vary", e.vary)
-                                    .set("from", e.from)
-                                    .set("to", e.to)
-                                    .set("hold", e.hold)
-                                    .set("held_at", e.held_at)
-                                    .set("difference", e.difference));
-  }
-  return json;
-}
-
-Json dataOf(const TableDiscovery& d) {
-  Json json = Json::object();
-  json.set("table", d.open.file.filename().string()).set("unit", d.open.unit).set("verdict", verdictOf(d));
-  json.set("open_rows", d.open.rows()).set("locked_rows", d.locked.rows()).set("captures", d.captures);
-  json.set("p", d.finding.first_p)
-      .set("p_left", d.finding.last_p)
-      .set("draws", d.finding.draws)
-      .set("seed", d.map.seed);
-  json.set("noise", d.noise.typical)
-      .set("noise_grows_with", d.noise.grows_with)
-      .set("correlation_rows", d.noise.correlation_rows);
-  Json effects = Json::array();
-  for (const Effect& effect : d.finding.effects) effects.push(effectJson(effect));
-  json.set("effects", std::move(effects));
-  const Judged& j = d.judged;
-  const std::string unit = d.open.unit.empty() ? "1" : d.open.unit;
-  json.set("locked", Json::object()
-                         .set("sha256", j.sha256)
-                         .set("before", toJson(j.before, unit.c_str()))
-                         .set("after", toJson(j.after, unit.c_str()))
-                         .set("removed", j.removed)
-                         .set("removed_low", j.removed_low)
-                         .set("removed_high", j.removed_high)
-                         .set("explainable_chi2", j.explainable)
-                         .set("explainable_chi2_error", j.explainable_error)
-                         .set("lag1_before", j.lag1_before)
-                         .set("lag1_after", j.lag1_after));
-  json.set("notes", Json::arrayOf(d.open.notes)).set("doubts", Json::arrayOf(d.open.doubts));
-  return json;
-}
-
 }  // namespace
+
+std::vector<Estimate> namedNuisances(const TableDiscovery& d) {
+  const std::set<int> seen(d.open.session.begin(), d.open.session.end());
+  std::vector<Estimate> named;
+  int session = 0;
+  for (Estimate one : d.finding.nuisances) {
+    if (one.name == "session") {
+      const int mine = session++;
+      if (!seen.contains(mine)) continue;
+      one.name = "offset of session " + d.open.session_names[static_cast<std::size_t>(mine)];
+    }
+    named.push_back(std::move(one));
+  }
+  return named;
+}
+
+/// What was strongest in the first test, where it predicts nothing.
+std::string withoutPrediction(const TableDiscovery& d) {
+  constexpr std::size_t kFewCaptures = 50, kNamed = 3;
+  auto order = d.finding.scores;
+  std::ranges::sort(order, std::ranges::greater{}, &GroupScore::z);
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < std::min(order.size(), kNamed); ++i)
+    names.push_back(fmt::format("{} ({:.1f} σ)", d.finding.score_names[order[i].group], order[i].z));
+  return fmt::format(
+      "There is something above the noise (p = {}), but nothing that predicts rows it was not fitted to. "
+      "Strongest: {}. "
+      "{}Measure more before believing any cause.",
+      significant(d.finding.first_p), joined(names, ", "),
+      d.captures < kFewCaptures ? fmt::format("Only {} are open, which is few to predict others from. ",
+                                              counted(d.captures, "capture"))
+                                : "");
+}
 
 std::string verdictOf(const TableDiscovery& d) {
   const auto& effects = d.finding.effects;
@@ -402,15 +367,11 @@ std::string verdictOf(const TableDiscovery& d) {
                      "Nothing above the noise: {} rows with noise of {}{} hold no effect that these columns "
                      "could show (p = {}).",
                      d.open.rows(), significant(d.noise.typical), unitOf(d), significant(d.finding.first_p))
-               : fmt::format(
-                     "There is something above the noise (p = {}), but nothing that predicts rows it was not "
-                     "fitted to: "
-                     "measure more before believing any cause.",
-                     significant(d.finding.first_p));
+               : withoutPrediction(d);
   }
   std::string words = effects.size() == 1 ? "One effect is in the error: "
                                           : fmt::format("{} effects are in the error: ", effects.size());
-  for (std::size_t i = 0; i < effects.size(); ++i) words += (i > 0 ? "; " : "") + nameInWords(effects[i]);
+  for (std::size_t i = 0; i < effects.size(); ++i) words += (i > 0 ? "; " : "") + nameInWords(d, effects[i]);
   if (d.judged.rows > 0) {
     words += fmt::format(". On locked rows the RMSE goes from {} to {}{}",
                          shown(d.judged.before.rms, decimalsOf(d)), shown(d.judged.after.rms, decimalsOf(d)),
@@ -447,7 +408,7 @@ Report reportOf(const TableDiscovery& d) {
                             fmt::format("noise {}{}", significant(d.noise.typical), unitOf(d)),
                             Tone::Neutral});
   }
-  if (!d.finding.effects.empty() && d.judged.explainable > 3.0 * d.judged.explainable_error) {
+  if (!d.finding.effects.empty() && d.judged.isTelling()) {
     report.cards.push_back({"Explainable error removed", shownPercent(d.judged.removed),
                             fmt::format("95 %: {} to {}", shownPercent(d.judged.removed_low),
                                         shownPercent(d.judged.removed_high)),

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "calib/compare/csv.h"
+#include "calib/discover/curve.h"
 #include "calib/discover/discover_table.h"
 #include "planted.h"
 #include "protocol/settings/settings.h"
@@ -63,7 +64,105 @@ TEST(DiscoverTable, WritesAReportAModelAndNumbers) {
   ASSERT_EQ(model->tables("effect").size(), 1u);
   auto table = model->tables("effect")[0].table("table");
   ASSERT_TRUE(table);
-  EXPECT_EQ(table->numbers("time_s", {-1e9, 1e9}, "", std::nullopt)->size(), 33u);
+  const auto times = *table->numbers("time_s", {-1e9, 1e9}, "", std::nullopt);
+  EXPECT_TRUE(std::ranges::is_sorted(times));
+  EXPECT_GE(times.size(), 17u);
+}
+
+/// Small amplitudes are many and near each other: the table has every corner of the curve, and 0 is its mean
+/// over the rows.
+TEST(DiscoverTable, WritesATableThatBendsWhereTheCurveDoes) {
+  Planted planted = plant(12, {Hidden::Nothing}, 0.0);
+  const auto& amplitude =
+      std::ranges::find(planted.data.covariates, "amplitude", &TableCovariate::name)->values;
+  for (std::size_t i = 0; i < planted.data.rows(); ++i)
+    planted.data.error[i] += 4.0 * std::sin(3.0 * std::log(amplitude[i]));
+  const auto discovery = discoverTable(write("skewed.csv", csvOf(planted.data)), withReference());
+  ASSERT_TRUE(discovery) << discovery.error().message;
+  ASSERT_EQ(discovery->finding.effects.size(), 1u) << verdictOf(*discovery);
+  const Effect& effect = discovery->finding.effects[0];
+  ASSERT_FALSE(isFormula(effect)) << effect.name;
+  const auto file = write("skewed.toml", modelToml(*discovery));
+  auto model = settings::Table::load(file);
+  ASSERT_TRUE(model) << model.error().message;
+  const auto points =
+      *model->tables("effect")[0].table("table")->numbers("amplitude", {-1e9, 1e9}, "", std::nullopt);
+  for (const Term& term : termsOf(effect))
+    for (const double knot : term.factors[0].numbers)
+      EXPECT_THAT(points, testing::Contains(testing::DoubleNear(knot, 1e-6 * knot))) << inWords(term);
+  const Level level = levelOf(effect, discovery->open);
+  double sum = 0.0, smallest_error = 1e9;
+  for (const double x :
+       std::ranges::find(discovery->open.covariates, "amplitude", &TableCovariate::name)->values) {
+    sum += effectAt(effect, {{"amplitude", x}}, level).value;
+    smallest_error = std::min(smallest_error, effectAt(effect, {{"amplitude", x}}, level).error);
+  }
+  EXPECT_NEAR(sum / static_cast<double>(discovery->open.rows()), 0.0, 1e-9);
+  EXPECT_LT(smallest_error, effectAt(effect, {{"amplitude", 100.0}}).error)
+      << "beside zero it has the offset's error";
+}
+
+/// Five rows are a metre off whatever is known: they are in the RMSE, not in the share.
+TEST(DiscoverTable, JudgesTheShareWithoutRowsThatAreFarOffBeforeAndAfter) {
+  const std::string text = csvOf(plant(13, {Hidden::WarmUp}, 3000.0).data);
+  std::istringstream lines{text};
+  std::string line, plain, bumped;
+  for (int i = -1; std::getline(lines, line); ++i) {
+    const std::string end = i < 0 ? ",locked\n" : i % 5 == 0 ? ",1\n" : ",0\n";
+    plain += line + end;
+    const bool is_bumped = i >= 0 && i % 75 == 0;
+    bumped += (is_bumped ? fmt::format("1000{}", line.substr(line.find(','))) : line) + end;
+  }
+  const auto a = discoverTable(write("plain.csv", plain), withReference()),
+             b = discoverTable(write("bumped.csv", bumped), withReference());
+  ASSERT_TRUE(a && b);
+  EXPECT_EQ(a->judged.far_off, 0u);
+  EXPECT_EQ(b->judged.far_off, 6u);
+  EXPECT_GT(b->judged.after.rms, 100.0);
+  EXPECT_TRUE(b->judged.isTelling());
+  EXPECT_NEAR(b->judged.removed, a->judged.removed, a->judged.removed_high - a->judged.removed_low);
+}
+
+TEST(DiscoverTable, SaysHowLargeAnEffectIsAndBetweenWhichSettingsItSteps) {
+  Planted planted = plant(14, {Hidden::Nothing}, 0.0);
+  const auto& exposure =
+      std::ranges::find(planted.data.covariates, "exposure_us", &TableCovariate::name)->values;
+  for (std::size_t i = 0; i < planted.data.rows(); ++i)
+    planted.data.error[i] += exposure[i] >= 1000.0 ? 6.0 : 0.0;
+  const auto discovery = discoverTable(write("step.csv", csvOf(planted.data)), withReference());
+  ASSERT_TRUE(discovery) << discovery.error().message;
+  ASSERT_EQ(discovery->finding.effects.size(), 1u) << verdictOf(*discovery);
+  ASSERT_EQ(discovery->finding.effects[0].name, "step in exposure_us");
+  const auto around = rowsAround(discovery->open, discovery->finding.effects[0], 1);
+  ASSERT_TRUE(around);
+  EXPECT_EQ(*around, (std::pair{500.0, 1000.0}));
+  EXPECT_FALSE(rowsAround(discovery->open, discovery->finding.effects[0], 0)) << "its height is no place";
+  const auto sizes = effectIn(discovery->open, discovery->finding.effects[0]);
+  EXPECT_NEAR(std::ranges::max(sizes) - std::ranges::min(sizes), 6.0, 4.0 * 2.0 / std::sqrt(400.0));
+  EXPECT_THAT(verdictOf(*discovery), testing::ContainsRegex("by up to [56]\\.[0-9]+ mm"));
+  EXPECT_THAT(verdictOf(*discovery), HasSubstr("step in exposure_us between 500 and 1000"));
+}
+
+TEST(DiscoverTable, TellsTheDateOfAStep) {
+  const Planted planted = plant(16, {Hidden::Nothing}, 0.0, {.session_mm = 0.0});
+  std::string text = "when,error_mm\n";
+  for (std::size_t i = 0; i < planted.data.rows(); ++i)
+    text += fmt::format("2026-05-{:02}T{:02}:30:00Z,{}\n", 1 + i / 24, i % 24,
+                        planted.data.error[i] - 2.0 * planted.data.reference[i] + (i >= 240 ? 6.0 : 0.0));
+  const auto discovery = discoverTable(write("dated.csv", text), {});
+  ASSERT_TRUE(discovery) << discovery.error().message;
+  EXPECT_THAT(verdictOf(*discovery),
+              testing::ContainsRegex("step in when between 2026-05-1[01] [0-9:]+ and 2026-05-1[01]"));
+}
+
+TEST(DiscoverTable, CallsOffsetsByTheirSessions) {
+  const auto discovery =
+      discoverTable(write("sessions.csv", csvOf(plant(15, {Hidden::Nothing}, 0.0).data)), withReference());
+  ASSERT_TRUE(discovery) << discovery.error().message;
+  std::vector<std::string> names;
+  for (const Estimate& one : namedNuisances(*discovery)) names.push_back(one.name);
+  EXPECT_THAT(names, testing::ElementsAre("gain", "offset of session 0", "offset of session 1",
+                                          "offset of session 2", "offset of session 3"));
 }
 
 TEST(DiscoverTable, SaysNothingAboveTheNoiseWhereThereIsNothing) {
