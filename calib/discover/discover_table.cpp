@@ -45,7 +45,7 @@ void addConfounded(TableData& data) {
 
 /// What is said of rows that err alike.
 void addAlike(const TableSource& source, const Judged& judged, TableData& data) {
-  constexpr double kAlike = 0.2;
+  constexpr double kErrAlike = 0.2;
   if (!source.runsOf().empty()) {
     data.doubts.push_back(
         fmt::format("rows that follow each other with the same {} err alike: they are taken for one "
@@ -53,7 +53,7 @@ void addAlike(const TableSource& source, const Judged& judged, TableData& data) 
                     source.runsOf(), source.captures()));
   }
   if (source.hasCaptures() || source.noise().correlation_rows > 1.5) return;
-  if (judged.lag1_after < std::max(kAlike, 3.0 / std::sqrt(static_cast<double>(judged.rows)))) return;
+  if (judged.lag1_after < std::max(kErrAlike, 3.0 / std::sqrt(static_cast<double>(judged.rows)))) return;
   data.doubts.push_back(
       fmt::format("locked rows that follow each other err alike (correlation {:.2f}) although the others "
                   "did not show it: p and intervals promise too much; name the captures in a column",

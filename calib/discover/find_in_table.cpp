@@ -22,8 +22,7 @@ std::vector<std::string> namesOf(const Finding& finding) {
 
 }  // namespace
 
-Finding findInTable(TableSource& source, const FinderOptions& said) {
-  FinderOptions options = said;
+Finding findInTable(TableSource& source, FinderOptions options) {
   options.has_straight_pairs = true;
   // A block of rows that err alike knows less of its own dispersion than its rows say, however many they are.
   if (source.noise().correlation_rows > 1.0) options.null_model = NullModel::SignFlips;
