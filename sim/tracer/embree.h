@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// In what Embree 3 and Embree 4 differ for us, but for the contexts of queries with filters. Only the tracer's sources include this.
+// In what Embree 3 and Embree 4 differ for us, but for the contexts of queries with filters. Only the
+// tracer's sources include this.
 #pragma once
 
 #if __has_include(<embree4/rtcore.h>) && defined(TOFTWIN_EMBREE4)
