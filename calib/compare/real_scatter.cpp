@@ -65,7 +65,8 @@ std::string backgroundToml(std::span<const double> t, std::span<const double> ba
 }
 
 /// Nothing if no plate can be seen.
-std::optional<Run> toRun(const std::vector<std::vector<double>>& columns, const sim::SensorModel& camera) {
+Result<std::optional<Run>> toRun(const std::vector<std::vector<double>>& columns,
+                                 const sim::SensorModel& camera) {
   std::vector<double> t, plate, background_t, background_mm;
   const auto& [x, z, background] = std::tie(columns[0], columns[1], columns[2]);
   for (std::size_t i = 0; i < x.size(); ++i) t.push_back(x[i] / background[i]);
@@ -74,18 +75,19 @@ std::optional<Run> toRun(const std::vector<std::vector<double>>& columns, const 
   double edge = std::nan("");
   for (std::size_t i = 0; i < x.size(); ++i)
     if (t[i] > 0.02 && isPlate(i) && !(edge <= t[i])) edge = t[i];
-  if (std::isnan(edge)) return {};
+  if (std::isnan(edge)) return std::optional<Run>{};
   for (std::size_t i = 0; i < x.size(); ++i) {
     if (t[i] > edge + 0.03 && isPlate(i)) plate.push_back(z[i]);
     if (background[i] > 300.0) background_t.push_back(t[i]), background_mm.push_back(background[i]);
   }
-  if (plate.size() < 10) return {};
+  if (plate.size() < 10) return std::optional<Run>{};
   const auto [first, last] = std::ranges::minmax(background_t);
   Run run;
   run.plate_mm = quantile(plate, 0.5);
   run.covered = (last - edge) / (last - first);
   for (std::size_t i = 0; i < x.size(); ++i) {
-    if (t[i] < -0.45 || t[i] > std::min(0.0, edge - 0.08) || std::abs(z[i] - background[i]) > 250.0)
+    if (!(background[i] > 300.0) || t[i] < -0.45 || t[i] > std::min(0.0, edge - 0.08) ||
+        std::abs(z[i] - background[i]) > 250.0)
       continue;
     run.t.push_back(t[i]), run.change_mm.push_back(z[i] - background[i]);
   }
@@ -93,9 +95,13 @@ std::optional<Run> toRun(const std::vector<std::vector<double>>& columns, const 
   const Wall upright{edge * run.plate_mm, run.plate_mm, last * run.plate_mm,
                      run.plate_mm,        kHeight_mm,   "wall"};
   constexpr int kSamples = 16;
-  run.without = traceLine(camera, *sim::Scene::parse(empty, "background.toml"), kSamples);
-  run.with = traceLine(camera, *sim::Scene::parse(empty + wallToml(upright), "plate.toml"), kSamples);
-  return run;
+  const auto without = sim::Scene::parse(empty, "background.toml");
+  if (!without) return without.error();
+  const auto with = sim::Scene::parse(empty + wallToml(upright), "plate.toml");
+  if (!with) return with.error();
+  run.without = traceLine(camera, *without, kSamples);
+  run.with = traceLine(camera, *with, kSamples);
+  return std::optional{std::move(run)};
 }
 
 /// How much farther the camera reads the background for the plate.
@@ -129,13 +135,14 @@ Result<> addCamera(const RealDataJob& job, const ScatterCamera& camera, Finding&
     const auto columns = loadColumns(file, {"x_mm", "z_mm", "background_z_mm"});
     if (!columns) return columns.error();
     auto run = toRun(*columns, preset);
-    if (!run)
+    if (!run) return run.error();
+    if (!*run)
       return Error{Error::Code::InvalidArgument,
                    fmt::format("{}: no plate before the background to the right of the axis",
                                file.string())};
-    change.insert(change.end(), run->change_mm.begin(), run->change_mm.end());
-    blocks.insert(blocks.end(), run->t.size(), static_cast<int>(i));
-    runs.push_back(*std::move(run));
+    runs.push_back(**std::move(run));
+    change.insert(change.end(), runs.back().change_mm.begin(), runs.back().change_mm.end());
+    blocks.insert(blocks.end(), runs.back().t.size(), static_cast<int>(i));
   }
   const auto changes = [&](const sim::SensorModel& model) {
     std::vector<double> line;
@@ -159,14 +166,14 @@ Result<> addCamera(const RealDataJob& job, const ScatterCamera& camera, Finding&
             .curves = {},
             .zero_line = true,
             .compact = true};
-  Curve measured{.name = "measured, median of a run", .ink = Ink::Measured},
+  Curve measured{.name = "measured, mean of a run", .ink = Ink::Measured},
       simulated{.name = "even veil, one number", .ink = Ink::Simulated, .stroke = Stroke::Dashed};
   std::size_t at = 0;
   for (std::size_t i = 0; i < runs.size(); ++i) {
-    std::vector<double> here;
+    std::vector<double> there, here;
     for (std::size_t j = 0; j < runs[i].t.size(); ++j, ++at)
-      if (blocks[at] >= 0) here.push_back(fit.prediction[at]);
-    const double m = summarise(runs[i].change_mm).mean, s = summarise(here).mean;
+      if (blocks[at] >= 0) there.push_back(change[at]), here.push_back(fit.prediction[at]);
+    const double m = summarise(there).mean, s = summarise(here).mean;
     measured.x.push_back(runs[i].plate_mm), measured.y.push_back(m);
     simulated.x.push_back(runs[i].plate_mm), simulated.y.push_back(s);
     runs_table.rows.push_back({camera.title, fmt::format("{}", camera.runs[i]),

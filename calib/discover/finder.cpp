@@ -118,8 +118,10 @@ class Search {
     if (!chosen) return false;
     Effect effect = effectOf(context_, explanations, *chosen);
     if (!holds(effect.gain) || isWhatACurveLeaves(effect)) return false;
-    if (const auto part = partOfAKnown(explanations, effect))
-      effect = effectOf(context_, explanations, *part);
+    if (const auto part = partOfAKnown(explanations, effect)) {
+      Effect more = effectOf(context_, explanations, *part);
+      if (holds(more.gain)) effect = std::move(more);
+    }
     settle(effect);
     effect.p = p;
     const auto same = std::ranges::find_if(finding_.effects, [&](const Effect& known) {

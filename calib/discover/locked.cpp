@@ -14,18 +14,18 @@ namespace {
 
 using Eigen::Index;
 
-/// Sessions that were never seen: their offset is theirs, and is taken from them before and after alike.
+/// Sessions that were never seen: their offset is theirs, and is taken from them before and after alike. It
+/// is their median: one row far off would shift all others by its share of a mean.
 void removeUnseenOffsets(const TableSource& source, const TableData& rows, std::vector<double>& values) {
   const std::set<int> seen(source.data().session.begin(), source.data().session.end());
-  std::map<int, std::pair<double, int>> sums;
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    if (seen.contains(rows.session[i])) continue;
-    sums[rows.session[i]].first += values[i], ++sums[rows.session[i]].second;
-  }
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    const auto sum = sums.find(rows.session[i]);
-    if (sum != sums.end()) values[i] -= sum->second.first / sum->second.second;
-  }
+  std::map<int, std::vector<double>> unseen;
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (!seen.contains(rows.session[i])) unseen[rows.session[i]].push_back(values[i]);
+  std::map<int, double> offsets;
+  for (const auto& [session, all] : unseen) offsets[session] = compare::quantile(all, 0.5);
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (const auto offset = offsets.find(rows.session[i]); offset != offsets.end())
+      values[i] -= offset->second;
 }
 
 /// Deviation of each row: as estimated where rows like it were seen.

@@ -264,8 +264,8 @@ double periodIn(Frequency modulation, const std::string& unit) {
   return metres * (found == kPerMetre.end() ? 1.0 : found->second);
 }
 
-/// A column that could name sessions, beside one that does, and that names at least two groups in each: rows
-/// of such a run may err alike. Then it is no covariate.
+/// A column that could name sessions, beside one that does, and that names at least two groups in each on
+/// average: rows of such a run may err alike. Then it is no covariate.
 void takeFinerGroup(const NamedColumns& columns, Roles& roles, TableData& data) {
   for (const std::string& name : roles.other_groups) {
     if (!roles.capture.empty()) return;
@@ -300,7 +300,8 @@ Result<> readGroups(const NamedColumns& columns, Roles& roles, TableData& data) 
   auto locked = columns.numbers(roles.locked);
   if (!locked) return locked.error();
   data.has_locked_column = true;
-  for (std::size_t i = 0; i < data.rows(); ++i) data.locked[i] = (*locked)[i] != 0.0;
+  for (std::size_t i = 0; i < data.rows(); ++i)
+    data.locked[i] = std::abs((*locked)[i]) > 0.0;  // not where nothing is said
   return {};
 }
 

@@ -60,7 +60,8 @@ struct TableMap {
   template <class Visitor>
   void visit(Visitor& v) {
     v.text("measured", measured, "column of the measured values");
-    v.text("reference", reference, "column of what they should be, in the same unit");
+    v.text("reference", reference,
+           "column of what they should be; where both headers have units of length, it is converted");
     v.text("error", error, "instead of both: column of their difference");
     v.choice("error_sign", error_sign,
              {{"measured_minus_reference", Sign::MeasuredMinusReference},

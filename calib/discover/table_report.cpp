@@ -172,7 +172,7 @@ std::string counted(std::size_t count, const std::string& what) {
   return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
 }
 
-/// Whether an effect is in the locked sessions' own means, which are taken out.
+/// Whether an effect is in the locked sessions' own medians, which are taken out.
 bool isTakenOut(const TableDiscovery& d, const Effect& effect) {
   constexpr double kMostOfIt = 0.9;
   const std::set<int> seen(d.open.session.begin(), d.open.session.end());

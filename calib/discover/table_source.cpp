@@ -92,7 +92,8 @@ TableSource::TableSource(TableData data, bool fits_gain) : data_(std::move(data)
     if (auto runs = alikeRuns(data_, infos_, nuisancesOf(data_)))
       runs_of_ = std::move(runs->covariate), data_.capture = std::move(runs->run);
   }
-  std::set<int> captures(data_.capture.begin(), data_.capture.end());
+  std::set<std::pair<int, int>> captures;  // one name in two sessions is two
+  for (std::size_t i = 0; i < data_.capture.size(); ++i) captures.emplace(data_.session[i], data_.capture[i]);
   has_captures_ = !captures.empty() && 2 * captures.size() <= data_.rows();
   learn({});
 }

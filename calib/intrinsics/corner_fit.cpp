@@ -12,8 +12,10 @@ namespace toftwin::intrinsics {
 namespace {
 
 // With p the pixel's centre, c the corner, and n_A, n_B the normals of the two edges through it:
-//   s_A = n_A (p − c) / (√2 σ)      s_B likewise      E = (k + erf(s_A)) (k + erf(s_B))      d = (p − c) /
-//   reach I(p) = min(saturation, m + g d + E (a + h d))
+//   s_A = n_A (p − c) / (√2 σ), s_B likewise
+//   E = (k + erf(s_A)) (k + erf(s_B))
+//   d = (p − c) / reach
+//   I(p) = min(saturation, m + g d + E (a + h d))
 // k = 0 where four squares meet; k = 1 at the outer corner of one, into which both normals point.
 // For k = 0, turning by 180° about c leaves E as it is, so whatever the edges do to each other near the
 // corner (light that spreads from bright squares, a checker that meets only at an angle) does not move c.

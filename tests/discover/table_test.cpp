@@ -102,7 +102,7 @@ TEST(DiscoverTable, WritesATableThatBendsWhereTheCurveDoes) {
       << "beside zero it has the offset's error";
 }
 
-/// Five rows are a metre off whatever is known: they are in the RMSE, not in the share.
+/// Six rows are a metre off whatever is known: they are in the RMSE, not in the share.
 TEST(DiscoverTable, JudgesTheShareWithoutRowsThatAreFarOffBeforeAndAfter) {
   const std::string text = csvOf(plant(13, {Hidden::WarmUp}, 3000.0).data);
   std::istringstream lines{text};
@@ -120,6 +120,23 @@ TEST(DiscoverTable, JudgesTheShareWithoutRowsThatAreFarOffBeforeAndAfter) {
   EXPECT_EQ(b->judged.far_off, 6u);
   EXPECT_GT(b->judged.after.rms, 100.0);
   EXPECT_TRUE(b->judged.isTelling());
+  EXPECT_NEAR(b->judged.removed, a->judged.removed, a->judged.removed_high - a->judged.removed_low);
+}
+
+/// The offset of a session that nothing was fitted to is its own: one row in fifty that is a metre off would
+/// make it 20 mm, if it were a mean.
+TEST(DiscoverTable, AFarRowOfAnUnseenSessionDoesNotShiftTheOthers) {
+  const std::string text = csvOf(plant(17, {Hidden::WarmUp}, 3000.0, {.sessions = 8}).data);
+  std::istringstream lines{text};
+  std::string line, bumped;
+  for (int i = -1; std::getline(lines, line); ++i)
+    bumped += (i % 50 == 7 ? fmt::format("1000{}", line.substr(line.find(','))) : line) + "\n";
+  const auto a = discoverTable(write("sessions.csv", text), withReference()),
+             b = discoverTable(write("bumped_sessions.csv", bumped), withReference());
+  ASSERT_TRUE(a && b);
+  ASSERT_GT(a->judged.rows, 0u);
+  EXPECT_EQ(a->judged.far_off, 0u);
+  EXPECT_EQ(b->judged.far_off, b->judged.rows / 50);
   EXPECT_NEAR(b->judged.removed, a->judged.removed, a->judged.removed_high - a->judged.removed_low);
 }
 

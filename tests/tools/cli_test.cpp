@@ -110,6 +110,8 @@ TEST(Toftwin, AStandardOutputThatIsFullIsStatus6) {
                                       "doctor", "doctor --json", "completion bash", "completion manual"}) {
     EXPECT_EQ(toftwin(arguments + full).status, 6) << arguments;
   }
+  // What is said of it may have no place either.
+  EXPECT_EQ(runShell("'" TOFTWIN_PROGRAM "' list --drivers > /dev/full 2>&1").status, 6);
 }
 
 TEST(Toftwin, AReaderThatIsGoneIsStatus6WithoutAWord) {

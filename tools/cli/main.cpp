@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <fmt/format.h>
-
 #include <cerrno>
 #include <clocale>
 #include <csignal>
@@ -19,8 +17,9 @@ namespace {
 /// it wanted, so nothing is said.
 int outputFailed(int number) {
   if (number != EPIPE) {
-    fmt::print(stderr, "toftwin: the standard output cannot be written: {}; what it shows is not whole\n",
-               std::strerror(number));
+    // Not fmt::print(): standard error may lie on the same full disk, and it throws.
+    std::fprintf(stderr, "toftwin: the standard output cannot be written: %s; what it shows is not whole\n",
+                 std::strerror(number));
   }
   return static_cast<int>(Exit::CannotWrite);
 }
@@ -33,7 +32,7 @@ int runAndFlush(int argc, char** argv) {
   } catch (const std::exception& error) {
     const auto* failed = dynamic_cast<const std::system_error*>(&error);
     if (failed != nullptr && std::ferror(stdout) != 0) return outputFailed(failed->code().value());
-    fmt::print(stderr, "toftwin: this should not happen: {}\n", error.what());
+    std::fprintf(stderr, "toftwin: this should not happen: %s\n", error.what());
     return static_cast<int>(Exit::Internal);
   }
 }
