@@ -102,7 +102,7 @@ TEST_F(Locate, FindsTheCameraByTagsInWhatTheSimulatorRenders) {
   const std::string in = folder_.string() + "/";
   const auto shot = cli::toftwin(fmt::format(
       "render {0}camera.toml --scene {0}scene.toml -o {0}shots.mcap --frames 1 --surfaces 1 --samples 16 "
-      "--position 0.2,0.05,0.35 --look-at 0,0,0.8",
+      "--position 0.15,0.05,0.4 --look-at 0,0,0.8",
       in));
   ASSERT_EQ(shot.status, 0) << shot.err;
   const auto ran = cli::toftwin(fmt::format(
@@ -113,7 +113,7 @@ TEST_F(Locate, FindsTheCameraByTagsInWhatTheSimulatorRenders) {
   ASSERT_TRUE(poses) << poses.error().message;
   ASSERT_EQ(poses->size(), 1u);
   // The first tag begins half a gap, 10 mm, from the print's edges.
-  const std::array first_corner{-0.19, -0.14, 0.8}, stands{0.2, 0.05, 0.35};
+  const std::array first_corner{-0.19, -0.14, 0.8}, stands{0.15, 0.05, 0.4};
   for (std::size_t k = 0; k < 3; ++k)
     EXPECT_NEAR((*poses)[0].position_m[k], stands[k] - first_corner[k], 2e-3) << k;
 }
