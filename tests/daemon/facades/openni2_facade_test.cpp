@@ -456,7 +456,8 @@ TEST_F(OpenNI2Plugin, AllFramesOfARecordingArePlayedBitForBit) {
     }
     return true;
   };
-  // The library's recorder writes in a thread of its own: the last that was read may have come after it stopped.
+  // The library's recorder writes in a thread of its own: the last that was read may have come after it
+  // stopped.
   const auto played = play(file, ONI_SENSOR_DEPTH, recorded - 1);
   ASSERT_EQ(static_cast<int>(played.size()), recorded - 1);
   const auto first = std::ranges::find_if(all, [&](const Frame& frame) { return isSame(played.front(), frame); });
