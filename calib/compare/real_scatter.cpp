@@ -64,9 +64,9 @@ std::string backgroundToml(std::span<const double> t, std::span<const double> ba
   return toml;
 }
 
-/// Nothing if no plate can be seen.
-Result<std::optional<Run>> toRun(const std::vector<std::vector<double>>& columns,
-                                 const sim::SensorModel& camera) {
+/// `file`, for errors, is where the columns are from.
+Result<Run> toRun(const std::vector<std::vector<double>>& columns, const sim::SensorModel& camera,
+                  const std::filesystem::path& file) {
   std::vector<double> t, plate, background_t, background_mm;
   const auto& [x, z, background] = std::tie(columns[0], columns[1], columns[2]);
   for (std::size_t i = 0; i < x.size(); ++i) t.push_back(x[i] / background[i]);
@@ -75,12 +75,14 @@ Result<std::optional<Run>> toRun(const std::vector<std::vector<double>>& columns
   double edge = std::nan("");
   for (std::size_t i = 0; i < x.size(); ++i)
     if (t[i] > 0.02 && isPlate(i) && !(edge <= t[i])) edge = t[i];
-  if (std::isnan(edge)) return std::optional<Run>{};
   for (std::size_t i = 0; i < x.size(); ++i) {
     if (t[i] > edge + 0.03 && isPlate(i)) plate.push_back(z[i]);
     if (background[i] > 300.0) background_t.push_back(t[i]), background_mm.push_back(background[i]);
   }
-  if (plate.size() < 10) return std::optional<Run>{};
+  if (plate.size() < 10) {  // none where there is no edge
+    return Error{Error::Code::InvalidArgument,
+                 fmt::format("{}: no plate before the background to the right of the axis", file.string())};
+  }
   const auto [first, last] = std::ranges::minmax(background_t);
   Run run;
   run.plate_mm = quantile(plate, 0.5);
@@ -101,7 +103,7 @@ Result<std::optional<Run>> toRun(const std::vector<std::vector<double>>& columns
   if (!with) return with.error();
   run.without = traceLine(camera, *without, kSamples);
   run.with = traceLine(camera, *with, kSamples);
-  return std::optional{std::move(run)};
+  return run;
 }
 
 /// How much farther the camera reads the background for the plate.
@@ -134,13 +136,9 @@ Result<> addCamera(const RealDataJob& job, const ScatterCamera& camera, Finding&
         job.folder / "lens_scatter" / camera.name / fmt::format("run_{:02}.csv", camera.runs[i]);
     const auto columns = loadColumns(file, {"x_mm", "z_mm", "background_z_mm"});
     if (!columns) return columns.error();
-    auto run = toRun(*columns, preset);
+    auto run = toRun(*columns, preset, file);
     if (!run) return run.error();
-    if (!*run)
-      return Error{Error::Code::InvalidArgument,
-                   fmt::format("{}: no plate before the background to the right of the axis",
-                               file.string())};
-    runs.push_back(**std::move(run));
+    runs.push_back(*std::move(run));
     change.insert(change.end(), runs.back().change_mm.begin(), runs.back().change_mm.end());
     blocks.insert(blocks.end(), runs.back().t.size(), static_cast<int>(i));
   }

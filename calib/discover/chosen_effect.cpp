@@ -191,8 +191,6 @@ Effect effectOf(const Context& context, const std::vector<Explanation>& all, std
   std::ranges::sort(effect.alternatives, {}, [](const Alternative& a) { return a.worse.mean; });
   if (!effect.alternatives.empty() && !effect.is_catalogue && !effect.alternatives[0].group.terms.empty())
     effect.experiment = experimentOf(context, effect, effect.alternatives[0]);
-  double best = mine.gain.total;
-  for (const Explanation& one : all) best = std::max(best, one.gain.total);
   for (const Explanation& one : all) {
     if (!one.refused.empty()) effect.refused.push_back(one.name + ": " + one.refused);
     if (one.covariates != mine.covariates && !one.is_catalogue) continue;
