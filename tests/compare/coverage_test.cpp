@@ -7,42 +7,16 @@
 #include <boost/math/distributions/binomial.hpp>
 #include <cmath>
 #include <fstream>
-#include <functional>
 #include <map>
 #include <numbers>
-#include <random>
 #include <sstream>
 
-#include "calib/compare/traits/traits.h"
+#include "planted.h"
 
 namespace toftwin::compare {
 namespace {
 
 constexpr int kRuns = 200;
-
-/// Normal numbers of one run.
-class Noise {
- public:
-  explicit Noise(unsigned seed) : random_(seed) {}
-  double operator()(double sigma) { return sigma * normal_(random_); }
-  double uniform(double low, double high) { return low + (high - low) * uniform_(random_); }
-  bool chance(double p) { return uniform_(random_) < p; }
-
- private:
-  std::mt19937_64 random_;
-  std::normal_distribution<double> normal_{0.0, 1.0};
-  std::uniform_real_distribution<double> uniform_{0.0, 1.0};
-};
-
-using Columns = std::vector<double>;
-using Truth = std::map<std::string, double>;
-
-/// What is planted, and what one run makes of it.
-struct Planted {
-  std::string name;
-  Truth truth;
-  std::function<Traits(Noise&)> run;
-};
 
 Columns spaced(double first, double last, int count) {
   Columns x;
@@ -180,53 +154,6 @@ std::vector<Planted> otherWays() {
          return cornerTraits(
              x, noisy(x, 2.0, noise, [](double d) { return -3.0 + 40.0 * std::exp(-d / 0.25); }));
        }});
-  rows.push_back({"lens scatter", {{"veil", 0.015}}, [](Noise& noise) {
-                    const double k = 4.0 * std::numbers::pi * 30e6 / 299'792'458.0;
-                    Columns own, plate, ratio, error;
-                    for (int i = 0; i < 80; ++i) {
-                      own.push_back(2.5);
-                      plate.push_back(0.6 + 0.015 * i);
-                      ratio.push_back(8.0 / (plate.back() * plate.back()));
-                      const double q = 0.015 * ratio.back(), phase = k * (plate.back() - own.back());
-                      error.push_back(1e3 / k * std::atan2(q * std::sin(phase), 1.0 + q * std::cos(phase)) +
-                                      noise(3.0));
-                    }
-                    return scatterTraits(own, plate, ratio, error, 30e6);
-                  }});
-  rows.push_back({"lens scatter behind a plate", {{"veil", 0.015}}, [](Noise& noise) {
-                    // Three frequencies, whose ranges are weighted by f²; the camera is off by 4 mm besides.
-                    const std::vector<double> f{16e6, 80e6, 120e6};
-                    Columns own, plate, ratio, error;
-                    for (int i = 0; i < 120; ++i) {
-                      own.push_back(1.6 + 0.01 * i);
-                      plate.push_back(0.9);
-                      ratio.push_back(noise.uniform(0.2, 0.9));
-                      double sum = 0.0, weights = 0.0;
-                      for (const double one : f) {
-                        const double k = 4.0 * std::numbers::pi * one / 299'792'458.0;
-                        sum += one * one * std::sin(k * (plate.back() - own.back())) / k, weights += one * one;
-                      }
-                      error.push_back(4.0 + 15.0 * ratio.back() * sum / weights + noise(1.0));
-                    }
-                    return veilTraits(own, plate, ratio, error, f);
-                  }});
-  rows.push_back({"lens scatter, four captures", {{"veil", 0.015}}, [](Noise& noise) {
-                    // Each is off by 2 mm of its own, and has its own plate.
-                    const std::vector<double> f{30e6};
-                    const double k = 4.0 * std::numbers::pi * f[0] / 299'792'458.0;
-                    Columns own, plate, ratio, error;
-                    std::vector<std::size_t> capture;
-                    for (std::size_t c = 0; c < 4; ++c) {
-                      const double offset = noise(2.0), at = 0.5 + 0.2 * static_cast<double>(c);
-                      for (int i = 0; i < 60; ++i) {
-                        own.push_back(2.0 + 0.01 * i), plate.push_back(at), capture.push_back(c);
-                        ratio.push_back(noise.uniform(0.5, 3.0));
-                        error.push_back(offset + 15.0 * ratio.back() * std::sin(k * (at - own.back())) / k +
-                                        noise(1.0));
-                      }
-                    }
-                    return veilTraits(own, plate, ratio, error, f, capture);
-                  }});
   rows.push_back({"amplitude", {{"at 1", 12.0}, {"per decade", -4.0}}, [](Noise& noise) {
                     Columns a, e;
                     for (int i = 0; i < 100; ++i) {
@@ -398,7 +325,8 @@ std::vector<Planted> ofFrames() {
 
 std::vector<Planted> allPlanted() {
   std::vector<Planted> all;
-  for (const auto& part : {drifts(), overDistance(), otherWays(), overTime(), atEdges(), ofFrames()})
+  for (const auto& part :
+       {drifts(), overDistance(), otherWays(), plantedScatter(), overTime(), atEdges(), ofFrames()})
     all.insert(all.end(), part.begin(), part.end());
   return all;
 }

@@ -122,6 +122,36 @@ std::optional<Fit> fitInClusters(const std::vector<std::vector<double>>& columns
   return fit;
 }
 
+std::optional<ClusterSum> sumInClusters(const std::vector<std::vector<double>>& columns, Column y,
+                                        std::span<const std::size_t> cluster, std::size_t first) {
+  if (columns.size() <= first || y.size() <= columns.size() || cluster.size() != y.size())
+    return std::nullopt;
+  ClusteredRows all = clusteredRowsOf(columns, y, cluster);
+  const Index n = all.rows.rows(), k = all.rows.cols() - 1, clusters = all.means.rows();
+  // Columns of length 1, so that what hangs on others shows.
+  const VectorXd scale = all.rows.leftCols(k).colwise().norm();
+  if (!all.rows.allFinite() || scale.minCoeff() <= 0.0) return std::nullopt;
+  const MatrixXd x = all.rows.leftCols(k) * scale.cwiseInverse().asDiagonal();
+  const Eigen::LDLT<MatrixXd> normal{x.transpose() * x};
+  if (!(normal.rcond() > 1e-9)) return std::nullopt;
+  VectorXd of = scale.cwiseInverse();
+  of.head(static_cast<Index>(first)).setZero();
+  const VectorXd at = normal.solve(x.transpose() * all.rows.col(k)), rest = all.rows.col(k) - x * at,
+                 weights = x * normal.solve(of);  // the sum is weights · y
+  // Each cluster's part of the sum's error, weights_g · e_g; of residuals it is z_g · e.
+  MatrixXd z = MatrixXd::Zero(n, clusters);
+  for (Index i = 0; i < n; ++i) z(i, all.of[static_cast<std::size_t>(i)]) = weights[i];
+  const VectorXd part = z.transpose() * rest, own = z.colwise().squaredNorm();
+  z -= x * normal.solve(x.transpose() * z);
+  const MatrixXd seen = z.transpose() * z;
+  if (!(seen.diagonal().array() > 1e-9 * own.array()).all()) return std::nullopt;
+  const VectorXd more = own.cwiseQuotient(seen.diagonal());
+  const double spread = (more * more.transpose()).cwiseProduct(seen.cwiseAbs2()).sum();
+  return ClusterSum{.value = of.dot(at),
+                    .error = std::sqrt(more.dot(part.cwiseAbs2())),
+                    .degrees = own.sum() * own.sum() / spread};
+}
+
 std::vector<double> clusterMeans(Column values, std::span<const std::size_t> cluster) {
   std::map<std::size_t, Running> all;
   for (std::size_t i = 0; i < values.size(); ++i) {

@@ -18,6 +18,17 @@ namespace toftwin::compare {
 std::optional<Fit> fitInClusters(const std::vector<std::vector<double>>& columns, Column y,
                                  std::span<const std::size_t> cluster);
 
+/// Least squares of all rows alike, and the sum of its parameters from `first` on, whose error is by how
+/// clusters scatter: each cluster's part of it from its residuals, enlarged by what fitting takes from
+/// residuals of independent rows, with Satterthwaite's degrees of freedom (R. M. Bell, D. F. McCaffrey, Surv.
+/// Methodol. 28 (2002) 169, for one number). Nothing if n ≤ k, or if the rows leave a parameter undetermined
+/// or one cluster alone determines the sum.
+struct ClusterSum {
+  double value = 0.0, error = 0.0, degrees = 0.0;
+};
+std::optional<ClusterSum> sumInClusters(const std::vector<std::vector<double>>& columns, Column y,
+                                        std::span<const std::size_t> cluster, std::size_t first);
+
 /// Mean of each cluster's values, by ascending cluster; values that are not finite are left out.
 std::vector<double> clusterMeans(Column values, std::span<const std::size_t> cluster);
 

@@ -4,10 +4,11 @@
 #include <cmath>
 #include <complex>
 #include <numbers>
+#include <numeric>
 #include <optional>
 #include <set>
 
-#include "calib/compare/statistics.h"
+#include "calib/compare/traits/clusters.h"
 #include "calib/compare/traits/least_squares.h"
 
 namespace toftwin::compare {
@@ -51,34 +52,64 @@ Traits scatterTraits(Column own_range_m, Column plate_range_m, Column plate_over
 
 namespace {
 
-/// By how much each row's range moves for a veil of 1, mm.
+/// By how much the range of one frequency moves for a small veil of 1, mm: q sin Δφ · c/4πf.
 std::vector<double> slopesOf(const std::vector<double>& own, const std::vector<double>& plate,
-                             const std::vector<double>& ratio, std::span<const double> frequency_hz) {
+                             const std::vector<double>& ratio, double frequency_hz) {
+  const double radians_per_m = 4.0 * std::numbers::pi * frequency_hz / 299'792'458.0;
   std::vector<double> slope_mm;
-  for (std::size_t i = 0; i < own.size(); ++i) {
-    double sum = 0.0, weights = 0.0;
-    for (const double f : frequency_hz) {
-      const double radians_per_m = 4.0 * std::numbers::pi * f / 299'792'458.0;
-      sum += f * f * std::sin(radians_per_m * (plate[i] - own[i])) / radians_per_m;
-      weights += f * f;
-    }
-    slope_mm.push_back(1e3 * ratio[i] * sum / weights);
-  }
+  for (std::size_t i = 0; i < own.size(); ++i)
+    slope_mm.push_back(1e3 * ratio[i] * std::sin(radians_per_m * (plate[i] - own[i])) / radians_per_m);
   return slope_mm;
 }
 
-/// error = c + s slope, of all captures but one.
-std::optional<Fit> veilFit(const std::vector<double>& slope_mm, const std::vector<double>& error_mm,
-                           const std::vector<std::size_t>& captures, std::optional<std::size_t> left_out) {
-  std::vector<double> slopes, errors;
-  for (std::size_t i = 0; i < captures.size(); ++i) {
-    if (captures[i] != left_out) slopes.push_back(slope_mm[i]), errors.push_back(error_mm[i]);
+/// The constant, and what the veil does: a column for each frequency, or where it is known what each weighs,
+/// one.
+std::vector<std::vector<double>> columnsOf(const std::vector<std::vector<double>>& rows,
+                                           std::span<const double> frequency_hz) {
+  std::vector<std::vector<double>> columns{std::vector<double>(rows[0].size(), 1.0)};
+  for (const double f : frequency_hz) columns.push_back(slopesOf(rows[0], rows[1], rows[2], f));
+  const std::vector<double> weights = rangeWeights(frequency_hz);
+  if (weights.empty()) return columns;
+  std::vector<double> joined(rows[0].size(), 0.0);
+  for (std::size_t f = 0; f < weights.size(); ++f) {
+    for (std::size_t i = 0; i < joined.size(); ++i) joined[i] += weights[f] * columns[f + 1][i];
   }
-  return fitLeastSquares([&](std::span<const double> p, std::size_t i) { return p[0] + p[1] * slopes[i]; },
-                         errors, {0.0, 0.0});
+  return {columns.front(), joined};
+}
+
+std::optional<Trait> veilByCaptures(const std::vector<std::vector<double>>& columns, Column error_mm,
+                                    std::span<const std::size_t> capture) {
+  const auto sum = sumInClusters(columns, error_mm, capture, 1);
+  if (!sum) return std::nullopt;
+  const double half = studentT(sum->degrees) * sum->error;
+  return Trait{"veil", "1", sum->value, sum->value - half, sum->value + half, error_mm.size()};
+}
+
+std::optional<Trait> veilByRows(const std::vector<std::vector<double>>& columns, Column error_mm) {
+  const Model model = [&](std::span<const double> p, std::size_t i) {
+    double e = 0.0;
+    for (std::size_t c = 0; c < p.size(); ++c) e += p[c] * columns[c][i];
+    return e;
+  };
+  const auto fit = fitLeastSquares(model, error_mm, std::vector<double>(columns.size(), 0.0));
+  if (!fit) return std::nullopt;
+  return fit->trait("veil", "1",
+                    [](std::span<const double> p) { return std::accumulate(p.begin() + 1, p.end(), 0.0); });
 }
 
 }  // namespace
+
+std::vector<double> rangeWeights(std::span<const double> frequency_hz) {
+  if (frequency_hz.size() == 1) return {1.0};
+  std::vector<double> sorted(frequency_hz.begin(), frequency_hz.end());
+  std::ranges::sort(sorted);
+  const auto isAbout = [](double ratio, double whole) { return std::abs(ratio - whole) < 1e-3 * whole; };
+  if (sorted.size() != 3 || !isAbout(sorted[1] / sorted[0], 5.0) || !isAbout(sorted[2] / sorted[0], 7.5))
+    return {};
+  std::vector<double> weights;
+  for (const double f : frequency_hz) weights.push_back(f / (sorted[0] + sorted[1] + sorted[2]));
+  return weights;
+}
 
 Traits veilTraits(Column own_range_m, Column plate_range_m, Column plate_over_own, Column error_mm,
                   std::span<const double> frequency_hz, std::span<const std::size_t> cluster) {
@@ -88,22 +119,18 @@ Traits veilTraits(Column own_range_m, Column plate_range_m, Column plate_over_ow
   if (!rows) return rows.error();
   if (frequency_hz.empty() || !(std::ranges::min(frequency_hz) > 0.0))
     return undetermined("lens scatter", "the frames say no modulation frequency");
-  const std::vector<double> slope_mm = slopesOf((*rows)[0], (*rows)[1], (*rows)[2], frequency_hz);
+  const auto columns = columnsOf(*rows, frequency_hz);
   const std::vector<std::size_t> captures((*rows)[4].begin(), (*rows)[4].end());
-  const auto fit = veilFit(slope_mm, (*rows)[3], captures, std::nullopt);
-  if (!fit) return undetermined("lens scatter", "the plate adds no light whose share could be told");
-  std::vector<double> without;
-  const std::set<std::size_t> all(captures.begin(), captures.end());
-  for (const std::size_t left_out : all) {
-    if (const auto part = veilFit(slope_mm, (*rows)[3], captures, left_out)) without.push_back(part->at[1]);
-  }
-  Trait veil = fit->trait("veil", "1", 1);
+  const Column error = (*rows)[3];
   // Fewer than three captures do not tell how captures differ.
-  if (all.size() < 3 || without.size() < all.size()) return std::vector{veil};
-  const double g = static_cast<double>(all.size()), sd = summarise(without).sd;
-  const double half = studentT(g - 1.0) * (g - 1.0) / std::sqrt(g) * sd;
-  veil.low = veil.value - half, veil.high = veil.value + half;
-  return std::vector{veil};
+  const bool is_by_captures = std::set<std::size_t>(captures.begin(), captures.end()).size() >= 3;
+  const auto veil = is_by_captures ? veilByCaptures(columns, error, captures) : veilByRows(columns, error);
+  if (!veil) {
+    return undetermined("lens scatter",
+                        "the plate adds no light whose share could be told, or the frequencies are "
+                        "too near each other");
+  }
+  return std::vector{*veil};
 }
 
 Traits veilTraits(Column own_range_m, Column plate_range_m, Column plate_over_own, Column error_mm,

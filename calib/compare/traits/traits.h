@@ -86,8 +86,13 @@ Traits cornerTraits(Column distance_to_edge_m, Column error_mm);
 /// s. `plate_over_own`: the plate's light over the pixel's own.
 Traits scatterTraits(Column own_range_m, Column plate_range_m, Column plate_over_own, Column error_mm,
                      double frequency_hz);
-/// The same of a small veil and a range that is made of several frequencies, by weights f²: error = c + s q Σ f²
-/// sin(Δφ_f) c/4πf / Σ f². The constant c is what else the camera is off by.
+/// What each frequency's own range weighs in the range r = Σ w_f r_f that a decoder joins of them, Σ w_f = 1.
+/// A Kinect v2 (16, 80 and 120 MHz) adds the unwrapped phases φ_f, r = c Σφ_f / (4π Σf), which is w_f = f /
+/// Σf. Empty where it is not known: of other cameras with several frequencies.
+std::vector<double> rangeWeights(std::span<const double> frequency_hz);
+/// The same of a small veil and of several frequencies: error = c + s q Σ w_f sin(Δφ_f) c/4πf, by
+/// rangeWeights(). Where they are not known, each frequency has a parameter s w_f of its own, and s is their
+/// sum. The constant c is what else the camera is off by.
 Traits veilTraits(Column own_range_m, Column plate_range_m, Column plate_over_own, Column error_mm,
                   std::span<const double> frequency_hz);
 /// The same of rows in clusters that share an error, three or more: the interval is by how clusters scatter.

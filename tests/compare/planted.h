@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <map>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "calib/compare/traits/traits.h"
+
+namespace toftwin::compare {
+
+/// Normal numbers of one run.
+class Noise {
+ public:
+  explicit Noise(unsigned seed) : random_(seed) {}
+  double operator()(double sigma) { return sigma * normal_(random_); }
+  double uniform(double low, double high) { return low + (high - low) * uniform_(random_); }
+  bool chance(double p) { return uniform_(random_) < p; }
+
+ private:
+  std::mt19937_64 random_;
+  std::normal_distribution<double> normal_{0.0, 1.0};
+  std::uniform_real_distribution<double> uniform_{0.0, 1.0};
+};
+
+using Columns = std::vector<double>;
+using Truth = std::map<std::string, double>;
+
+/// What is planted, and what one run makes of it.
+struct Planted {
+  std::string name;
+  Truth truth;
+  std::function<Traits(Noise&)> run;
+};
+
+/// Veils in the lens, of one frequency and of several that the cameras' own decoders join.
+std::vector<Planted> plantedScatter();
+
+}  // namespace toftwin::compare
