@@ -51,6 +51,7 @@ std::uint64_t fewestPixelBytes(PlaneKind kind) {
     case PlaneKind::Amplitude:
     case PlaneKind::Ambient:
     case PlaneKind::TruthRange:
+    case PlaneKind::LightSigma:
       return sizeof(float);
   }
   return 0;

@@ -135,6 +135,8 @@ bool Session::usesSharedMemory() const {
   return client_ && names(client_->features) && names(options_.features);
 }
 
+PlaneKind Session::lastKindOfClient() const { return wire::lastPlaneKindOf(client_->minor); }
+
 Session::Answers Session::breakOff(std::uint64_t id, Error::Code code, std::string why) {
   is_over_ = true;
   return {failure(id, {code, std::move(why)})};
@@ -158,6 +160,7 @@ Session::Answers Session::on(const wire::DescribeSource& request) {
   auto description = (*source)->describe();
   if (!description) return {failure(request.id, description.error())};
   description->id = request.id;
+  std::erase_if(description->planes, [this](PlaneKind kind) { return kind > lastKindOfClient(); });
   return {*std::move(description)};
 }
 
@@ -175,6 +178,12 @@ Session::Answers Session::on(const wire::Subscribe& request) {
   if (!backlog) return {failure(request.id, backlog.error())};
   Wish wish;  // filled one by one: GCC 12 warns of nested braces here, without a cause
   wish.selection.planes = request.planes;
+  if (request.planes.empty() &&
+      lastKindOfClient() < kLastPlaneKind) {  // all, but for those that it does not know
+    for (int kind = 0; kind <= static_cast<int>(lastKindOfClient()); ++kind)
+      wish.selection.planes.push_back(static_cast<PlaneKind>(kind));
+    wish.selection.those_it_has = true;
+  }
   wish.selection.region = request.region;
   wish.selection.decimation = request.decimation;
   wish.backlog = *std::move(backlog);

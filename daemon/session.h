@@ -96,6 +96,8 @@ class Session {
   template <class Answer>
   Answers on(const Answer& answer);
   [[nodiscard]] bool usesSharedMemory() const;
+  /// Of planes: the client's version of the protocol knows no later ones.
+  [[nodiscard]] PlaneKind lastKindOfClient() const;
   Answers breakOff(std::uint64_t id, Error::Code code, std::string why);
   Answers command(std::uint64_t id, const std::string& source, SourceHost::Command command);
   /// What puts the answer to that request into the outbox.

@@ -109,8 +109,9 @@ struct Keys {
                "reported with every frame, and shone on the scene by the effect ambient_light");
     v.texts("planes", planes,
             "which of range, depth, amplitude, ambient, flags, samples, phasors (not of pulsed cameras), "
-            "truth_range, truth_normal, exposure (of cameras with several), color (of those with a colour lens); empty: the "
-            "first five");
+            "truth_range, truth_normal, exposure (of cameras with several), light_sigma (not of pulsed "
+            "cameras), color (of "
+            "those with a colour lens); empty: the first five");
   }
 
   /// What the keys say of the light, into a camera's request.

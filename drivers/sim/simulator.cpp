@@ -281,7 +281,7 @@ class SimulatedSource final : public Source {
     collected_ = sim::collectMoving(model_, moment, keys_.seed, pacer_.index(), [&](std::size_t e) -> const sim::Light* {
       view_.moveTo(sim::middleOf(moment.exposures[e]), pacer_.index() * count + e);
       if (!view_.complete(stop)) return nullptr;
-      if (e == count / 2) truth_of_middle_ = view_.light().truth;
+      if (e == count / 2) keepOfMiddle(view_.light());
       return &view_.lightFor(moment.exposures[e]);
     });
     return collected_.has_value();
@@ -307,7 +307,19 @@ class SimulatedSource final : public Source {
     auto planes = sim::planesOf(model_, std::move(exposed),
                                 is_of_middle ? truth_of_middle_ : view_.light().truth, info_.planes);
     if (color) planes.push_back(*std::move(color));
+    if (wantsLightSigma())
+      planes.push_back(is_of_middle ? *sigma_of_middle_ : sim::lightSigmaOf(view_.light()));
     return planes;
+  }
+
+  [[nodiscard]] bool wantsLightSigma() const {
+    return std::ranges::count(planes_, PlaneKind::LightSigma) > 0;
+  }
+
+  /// What is said of the light, not made of it, is that of the middle raw exposure.
+  void keepOfMiddle(const sim::Light& light) {
+    truth_of_middle_ = light.truth;
+    if (wantsLightSigma()) sigma_of_middle_ = sim::lightSigmaOf(light);
   }
 
   /// Those of the configuration, and if it names none, which exposure was taken where there are several by now.
@@ -347,6 +359,7 @@ class SimulatedSource final : public Source {
   std::optional<ColorView> color_;  ///< if its plane is wanted
   std::optional<sim::Samples> collected_;  ///< of the present pose and parameters, free of noise
   sim::Truth truth_of_middle_;  ///< where things move: at the middle raw exposure
+  std::optional<Plane> sigma_of_middle_;  ///< the same, if it is wanted
   /// Of the frame before, where an effect remembers it.
   std::optional<sim::Samples> last_collected_;
   std::optional<sim::RangeImage> last_range_;

@@ -149,6 +149,7 @@ Result<SourceDetails> Client::describe(std::string_view source) {
 Result<Subscription> Client::subscribe(std::string_view source, SubscribeOptions options) {
   if (auto checked = checkName("source's name", source); !checked) return checked.error();
   if (auto checked = checkOptions(options); !checked) return checked.error();
+  if (auto checked = state_->connection->checkKnown(options.planes); !checked) return checked.error();
   auto subscribed = state_->connection->subscribe(toRequest(source, std::move(options)));
   if (!subscribed) return subscribed.error();
   return Subscription{std::unique_ptr<Subscription::State>{

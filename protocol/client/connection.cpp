@@ -6,6 +6,8 @@
 
 #include <algorithm>
 
+#include <toftwin/names.h>
+
 #include "protocol/client/dial.h"
 
 namespace toftwin::client {
@@ -80,7 +82,18 @@ Result<> Connection::greet() {
   const auto* hello = std::get_if<wire::Hello>(&**answer);
   if (!hello) return Error{Error::Code::Malformed, where + ": the first message was not a Hello"};
   software_ = hello->software;
+  minor_ = hello->minor;
   return {};
+}
+
+Result<> Connection::checkKnown(const std::vector<PlaneKind>& planes) const {
+  const auto newer =
+      std::ranges::find_if(planes, [this](PlaneKind kind) { return kind > wire::lastPlaneKindOf(minor_); });
+  if (newer == planes.end()) return {};
+  return Error{Error::Code::Unsupported, "toftwind at " + transport::toString(address_) +
+                                             " speaks version 1." + std::to_string(minor_) +
+                                             " of the protocol, which has no plane " +
+                                             std::string{nameOf(*newer)} + ": a newer toftwind has"};
 }
 
 Error Connection::unexpectedAnswer() const {

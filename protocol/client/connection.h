@@ -62,6 +62,8 @@ class Connection {
 
   /// What the daemon calls itself.
   [[nodiscard]] const std::string& software() const { return software_; }
+  /// Unsupported if the daemon speaks a version of the protocol that does not know one of these kinds.
+  [[nodiscard]] Result<> checkKnown(const std::vector<PlaneKind>& planes) const;
   /// Ends the connection; whoever waits gets an error.
   void stop();
 
@@ -87,6 +89,7 @@ class Connection {
   const transport::Address address_;
   const ClientOptions options_;
   std::string software_;
+  std::uint16_t minor_ = 0;  ///< of the daemon's version of the protocol
   std::atomic<std::uint64_t> next_id_{1};
 
   boost::asio::io_context io_;

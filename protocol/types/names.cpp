@@ -19,6 +19,7 @@ constexpr std::array kPlaneNames{
     std::pair{PlaneKind::TruthNormal, "truth_normal"},
     std::pair{PlaneKind::Exposure, "exposure"},
     std::pair{PlaneKind::Color, "color"},
+    std::pair{PlaneKind::LightSigma, "light_sigma"},
 };
 
 constexpr std::array kFrameNames{

@@ -38,7 +38,7 @@ std::vector<PlaneKind> readKinds(Checks& checks, const flatbuffers::Vector<std::
   checks.require(bytes->size() <= kMaxPlanes, "planes", "has more than 64 items");
   if (checks.failed()) return kinds;
   for (const std::uint8_t byte : *bytes) {
-    kinds.push_back(checks.oneOf(byte, PlaneKind::Color, "planes"));
+    kinds.push_back(checks.oneOf(byte, kLastPlaneKind, "planes"));
   }
   return kinds;
 }
@@ -246,7 +246,10 @@ Result<Message> decode(const Preamble& preamble, std::span<const std::byte> head
   const AlignedHeader aligned_header{header};
   const fb::Header* root = aligned_header.verified();
   if (!root) return malformedHeader("the header is not what the schema says");
-  return readMessage(*root, std::move(body));
+  auto message = readMessage(*root, std::move(body));
+  if (!message) return message;
+  if (auto* hello = std::get_if<Hello>(&*message)) hello->minor = preamble.minor;
+  return message;
 }
 
 Result<Message> decode(Buffer bytes, const Limits& limits) {

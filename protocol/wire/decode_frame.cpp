@@ -48,7 +48,7 @@ Provenance readProvenance(Checks& checks, const fb::Provenance* table) {
 /// A plane that lies in the body behind `end`, where the last one ended; moves `end` on.
 Plane readPlane(Checks& checks, const fb::Plane& table, std::uint64_t body_bytes, std::uint64_t& end) {
   Plane plane;
-  plane.kind = checks.oneOf(table.kind(), PlaneKind::Color, "plane.kind");
+  plane.kind = checks.oneOf(table.kind(), kLastPlaneKind, "plane.kind");
   plane.type = checks.oneOf(table.type(), ElementType::F32, "plane.type");
   checks.require(table.width() >= 1 && table.width() <= kMaxSide, "plane.width",
                  "is not 1 to 65535");

@@ -16,13 +16,19 @@
 namespace toftwin::wire {
 
 inline constexpr std::uint16_t kVersionMajor = 1;
-inline constexpr std::uint16_t kVersionMinor = 1;
+inline constexpr std::uint16_t kVersionMinor = 2;
+
+/// The last kind of plane that a peer of this minor version knows: others must not be sent to it.
+constexpr PlaneKind lastPlaneKindOf(std::uint16_t minor) {
+  return minor < 2 ? PlaneKind::Color : kLastPlaneKind;
+}
 
 /// The first message of either side.
 struct Hello {
   std::uint64_t id = 0;
   std::string software;               ///< "toftwind 0.1.0"
   std::vector<std::string> features;  ///< optional parts of the protocol that this side speaks
+  std::uint16_t minor = kVersionMinor;  ///< of the sender, from the preamble; written, it is this side's
 };
 
 struct ListSources { std::uint64_t id = 0; };

@@ -4,15 +4,16 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <utility>
 
 namespace toftwin::sim {
 namespace {
 
-constexpr std::array kAllPlanes{PlaneKind::Range,   PlaneKind::Depth,      PlaneKind::Amplitude,
-                                PlaneKind::Ambient, PlaneKind::Flags,      PlaneKind::Samples,
-                                PlaneKind::Phasors, PlaneKind::TruthRange, PlaneKind::TruthNormal,
-                                PlaneKind::Exposure, PlaneKind::Color};
+constexpr std::array kAllPlanes{PlaneKind::Range,    PlaneKind::Depth,      PlaneKind::Amplitude,
+                                PlaneKind::Ambient,  PlaneKind::Flags,      PlaneKind::Samples,
+                                PlaneKind::Phasors,  PlaneKind::TruthRange, PlaneKind::TruthNormal,
+                                PlaneKind::Exposure, PlaneKind::LightSigma, PlaneKind::Color};
 
 void rejectImpossible(RangeImage& range) {
   for (std::size_t i = 0; i < range.range_m.size(); ++i) {
@@ -84,7 +85,7 @@ std::span<const PlaneKind> allPlanes() { return kAllPlanes; }
 std::vector<PlaneKind> planesOfCamera(const SensorModel& model) {
   std::vector<PlaneKind> kinds;
   for (PlaneKind kind : kAllPlanes) {
-    if (kind == PlaneKind::Phasors && !model.hasPhasors()) continue;
+    if ((kind == PlaneKind::Phasors || kind == PlaneKind::LightSigma) && !model.hasPhasors()) continue;
     if (kind == PlaneKind::Exposure && model.exposureCount() == 1) continue;
     if (kind == PlaneKind::Color && !model.colorLens()) continue;
     kinds.push_back(kind);
@@ -140,7 +141,8 @@ std::vector<Plane> planesOf(const SensorModel& model, SensorModel::Exposed expos
         planes.push_back(toPlane(kind, range.exposure));
         break;
       case PlaneKind::Color:
-        break;  // of another lens, so not of this exposure
+      case PlaneKind::LightSigma:
+        break;  // not of this exposure: of another lens, and of the light before it
     }
   }
   return planes;
@@ -152,6 +154,26 @@ Plane planeOf(const ColorImage& color) {
   for (const Image<std::uint8_t>& channel : color)
     planar.insert(planar.end(), channel.pixels().begin(), channel.pixels().end());
   return {PlaneKind::Color, ElementType::U8, width, height, 3, Buffer::adopt(std::move(planar))};
+}
+
+/// σ = √v / |P| · c / 4πf, v the variance of one component of the first harmonic's phasor P.
+Plane lightSigmaOf(const Light& light) {
+  const std::size_t pixels = light.truth.range_m.size(), frequencies = light.frequencies.size();
+  std::vector<float> sigma_m(pixels * frequencies, std::numeric_limits<float>::quiet_NaN());
+  for (std::size_t f = 0; f < light.variance.size(); ++f) {
+    const double metre_per_radian =
+        kSpeedOfLight_m_per_s / (4.0 * std::numbers::pi * light.frequencies[f].in(hertz));
+    const Image<std::complex<float>>& phasor = light.phasor(f, 1);
+    for (std::size_t i = 0; i < phasor.size(); ++i) {
+      const float strength = std::abs(phasor[i]);
+      if (strength > 0.0F) {
+        sigma_m[f * pixels + i] =
+            std::sqrt(light.variance[f][i]) / strength * static_cast<float>(metre_per_radian);
+      }
+    }
+  }
+  return planar(PlaneKind::LightSigma, light.truth.range_m.width(), light.truth.range_m.height(),
+                static_cast<int>(frequencies), std::move(sigma_m));
 }
 
 Provenance provenanceOf(const SensorModel& model, std::string scene_id, std::uint64_t seed) {

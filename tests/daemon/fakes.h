@@ -140,6 +140,8 @@ class FakeSource final : public drivers::Source {
     next->planes = {toPlane(PlaneKind::Range, Image<float>{4, 2, static_cast<float>(time_)}),
                     toPlane(PlaneKind::Flags, Image<std::uint8_t>{4, 2, 0})};
     if (has_amplitude_) next->planes.push_back(toPlane(PlaneKind::Amplitude, Image<float>{4, 2, 1}));
+    if (std::ranges::count(remote_->info.planes, PlaneKind::LightSigma) > 0)
+      next->planes.push_back(toPlane(PlaneKind::LightSigma, Image<float>{4, 2, 0.001f}));
     return next;
   }
   /// "amplitude", as other settings of cameras do, gives it a plane more from the next frame on.

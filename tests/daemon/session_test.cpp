@@ -104,6 +104,23 @@ TEST(Session, ListsAndDescribes) {
   EXPECT_TRUE(description.can_lockstep);
 }
 
+/// A version of the protocol before 1.2 takes a plane of a later kind for damage, and closes.
+TEST(Session, SendsAClientNoPlaneThatItsVersionDoesNotKnow) {
+  for (std::uint16_t minor = 0; minor < 4; ++minor) {
+    Conversation talk{{}, {}, [](Remote& remote) { remote.info.planes.push_back(PlaneKind::LightSigma); }};
+    talk.ask(wire::Hello{1, "test", {}, minor});
+    const auto description = std::get<wire::SourceDescription>(talk.ask(wire::DescribeSource{2, "cam"}));
+    const std::ptrdiff_t expected = minor < 2 ? 0 : 1;
+    EXPECT_EQ(std::ranges::count(description.planes, PlaneKind::LightSigma), expected) << minor;
+    talk.subscribe();
+    talk.remote->give();
+    const auto out = talk.frame();
+    EXPECT_NE(out.delivery.frame->frame.find(PlaneKind::Range), nullptr);
+    EXPECT_NE(out.delivery.frame->frame.find(PlaneKind::Flags), nullptr);
+    EXPECT_EQ(out.delivery.frame->frame.find(PlaneKind::LightSigma) != nullptr, minor >= 2) << minor;
+  }
+}
+
 TEST(Session, AnUnknownSourceIsNamedWithThoseThatThereAre) {
   Conversation talk;
   talk.hello();

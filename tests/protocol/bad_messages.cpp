@@ -91,7 +91,8 @@ void addPreambles(std::vector<BadMessage>& all) {
   all.push_back({"empty", {}, malformed, "ends within the preamble"});
   all.push_back({"short-preamble", {good.begin(), good.begin() + 63}, malformed, "ends within"});
   all.push_back({"magic", withByte(good, 6, 'M'), malformed, "the magic is missing"});
-  all.push_back({"major-version", withByte(good, 8, 9), Error::Code::Incompatible, "version 9.1"});
+  all.push_back({"major-version", withByte(good, 8, 9), Error::Code::Incompatible,
+                 "version 9." + std::to_string(kVersionMinor)});
   Bytes sum = good;
   sum[61] ^= std::byte{1};
   all.push_back({"preamble-checksum", sum, malformed, "preamble's checksum"});

@@ -429,6 +429,29 @@ TEST_P(ClientOn, OffersSharedMemoryOnlyOnTheSameMachine) {
   EXPECT_EQ(offered, GetParam() == FakeDaemon::On::Unix);
 }
 
+TEST_P(ClientOn, AsksAnOlderDaemonForNoPlaneThatItDoesNotKnow) {
+  FakeDaemon daemon{GetParam(), [&](Session& session, const wire::Message& message) {
+                      if (auto* m = std::get_if<wire::Hello>(&message)) {
+                        auto bytes = wire::toBytes(*wire::encode(wire::Hello{m->id, "old", {}}));
+                        auto preamble =
+                            *wire::decodePreamble(std::span{bytes}.first<wire::kPreambleSize>(), {});
+                        preamble.minor = 1;
+                        std::ranges::copy(wire::encodePreamble(preamble), bytes.begin());
+                        session.sendBytes(std::move(bytes));
+                      } else {
+                        FakeDaemon::polite()(session, message);
+                      }
+                    }};
+  auto client = Client::connect(daemon.address());
+  ASSERT_TRUE(client) << client.error().message;
+  const auto refused = client->subscribe("kinect", {.planes = {PlaneKind::Range, PlaneKind::LightSigma}});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, Error::Code::Unsupported);
+  EXPECT_THAT(refused.error().message,
+              testing::HasSubstr("version 1.1 of the protocol, which has no plane light_sigma"));
+  EXPECT_TRUE(client->subscribe("kinect", {.planes = {PlaneKind::Range, PlaneKind::Color}}));
+}
+
 // ---- bad input of the application
 // ------------------------------------------------------------------
 

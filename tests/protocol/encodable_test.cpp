@@ -19,6 +19,9 @@
 namespace toftwin::wire {
 namespace {
 
+/// Of planes; the first number that is none.
+constexpr std::size_t kKinds = static_cast<std::size_t>(kLastPlaneKind) + 1;
+
 using testing::HasSubstr;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -45,7 +48,10 @@ std::vector<Refused> refusedFrames() {
       {with([](Frame& f) { f.camera.width = -1; }), "camera.width"},
       {with([](Frame& f) { f.moment.since_power_on = kInfinity * second; }), "since_power_on_s"},
       {with([](Frame& f) { f.moment.ambient = kNaN * kilolux; }), "ambient_klx"},
-      {with([](Frame& f) { f.moment.temperatures = {{"sensor", kNaN * celsius}}; }), "value_c"},
+      {with([](Frame& f) {
+         f.moment.temperatures = {{"sensor", kNaN * celsius}};
+       }),
+       "value_c"},
       {with([](Frame& f) { f.moment.exposures[0].duration = -1_ms; }), "exposure.duration_s"},
       {with([](Frame& f) { f.moment.exposures[0].modulation = kNaN * hertz; }), "modulation_hz"},
       {with([](Frame& f) { f.moment.clock.uncertainty_ns = -2; }), "clock_uncertainty_ns"},
@@ -59,7 +65,7 @@ std::vector<Refused> refusedFrames() {
       {with([](Frame& f) { f.provenance.effects.resize(kMaxNames + 1); }), "provenance.effects"},
       {with([&](Frame& f) { f.provenance.scene_id = long_name; }), "provenance.scene_id"},
       {with([&](Frame& f) { f.source = long_name; }), "frame.source"},
-      {with([](Frame& f) { f.planes[0].kind = static_cast<PlaneKind>(11); }), "plane.kind"},
+      {with([](Frame& f) { f.planes[0].kind = static_cast<PlaneKind>(kKinds); }), "plane.kind"},
       {with([](Frame& f) { f.planes[0].type = static_cast<ElementType>(3); }), "plane.type"},
       {with([](Frame& f) { f.planes[1].width = 0; }), "plane.width"},
       {with([](Frame& f) { f.planes[1].height = -4; }), "plane.height"},
@@ -76,7 +82,7 @@ std::vector<Refused> refusedRequests() {
   Subscribe bad_rate = subscribe, bad_policy = subscribe, bad_plane = subscribe, many_planes = subscribe;
   bad_rate.max_rate_hz = kNaN;
   bad_policy.policy = static_cast<Policy>(4);
-  bad_plane.planes = {static_cast<PlaneKind>(11)};
+  bad_plane.planes = {static_cast<PlaneKind>(kKinds)};
   many_planes.planes.resize(kMaxPlanes + 1);
   SourceDescription bad_interval, bad_value, bad_bound, long_parameter, many_parameters, bad_pose;
   bad_interval.frame_interval = -1_ms;
@@ -216,7 +222,7 @@ class Random {
   }
   std::vector<PlaneKind> kinds() {
     std::vector<PlaneKind> all(rarely(kMaxPlanes + below(2), below(4)));
-    for (auto& one : all) one = static_cast<PlaneKind>(rarely<std::size_t>(11, below(11)));
+    for (auto& one : all) one = static_cast<PlaneKind>(rarely<std::size_t>(kKinds, below(kKinds)));
     return all;
   }
   Transform<World, Camera> pose() {
@@ -252,7 +258,7 @@ class Random {
     Plane& plane = f.planes[below(3)];
     plane.width = rarely(static_cast<int>(below(70'000)), plane.width);
     plane.channels = rarely(static_cast<int>(below(3)), plane.channels);
-    plane.kind = static_cast<PlaneKind>(rarely<std::size_t>(11, below(11)));
+    plane.kind = static_cast<PlaneKind>(rarely<std::size_t>(kKinds, below(kKinds)));
     plane.type = static_cast<ElementType>(rarely<std::size_t>(3, static_cast<std::size_t>(plane.type)));
     return f;
   }

@@ -136,7 +136,7 @@ TEST(ProtocolPage, ListsEveryErrorCode) {
 }
 
 TEST(ProtocolPage, ListsEveryPlaneKindFrameKindFlagAndPolicy) {
-  for (int i = 0; i <= static_cast<int>(PlaneKind::Color); ++i) {
+  for (int i = 0; i <= static_cast<int>(kLastPlaneKind); ++i) {
     EXPECT_THAT(section("### 4.4 Planes"), HasSubstr(row(i, nameOf(static_cast<PlaneKind>(i)))));
   }
   for (int i = 0; i <= static_cast<int>(FrameKind::Faulted); ++i) {

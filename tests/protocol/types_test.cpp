@@ -63,7 +63,7 @@ TEST(Plane, AdoptsAnImageWithoutCopyingIt) {
 }
 
 TEST(Names, EveryPlaneKindComesBackFromItsName) {
-  for (int i = 0; i <= static_cast<int>(PlaneKind::Color); ++i) {
+  for (int i = 0; i <= static_cast<int>(kLastPlaneKind); ++i) {
     const auto kind = static_cast<PlaneKind>(i);
     EXPECT_EQ(planeKindNamed(nameOf(kind)), kind);
   }

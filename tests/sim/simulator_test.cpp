@@ -360,6 +360,39 @@ TEST_F(Simulator, GivesAllPlanesWhenAsked) {
   EXPECT_EQ(frame.find(PlaneKind::Samples)->channels, 4);
 }
 
+/// A corner's light over both walls is noisy in every pixel: all ways of gathering light say by how much.
+TEST_F(Simulator, SaysWithEachFrameHowUnsureTheLightIs) {
+  std::ofstream{folder_ / "corner.toml"}
+      << kWall << "[[object]]\nshape = 'rectangle'\nsize_m = [40, 40, 0]\nposition_m = [0, 0.4, 0]\n"
+      << "euler_deg = [90, 0, 0]\nmaterial = 'white'\n";
+  const auto medianOf = [&](const std::string& keys) {
+    auto source = tryOpen(
+        "camera = 'camera.toml'\nscene = 'corner.toml'\npace = 'fast'\nplanes = ['range', 'light_sigma']\n" +
+        keys);
+    if (!source) throw std::runtime_error{source.error().message};
+    EXPECT_TRUE((*source)->start());
+    const Frame frame = frameOf(**source);
+    const Plane* plane = frame.find(PlaneKind::LightSigma);
+    if (plane == nullptr) throw std::runtime_error{"no plane"};
+    EXPECT_EQ(plane->channels, 1);
+    std::vector<float> sigma_m{plane->as<float>().begin(), plane->as<float>().end()};
+    EXPECT_EQ(sigma_m.size(), 480u);
+    std::ranges::nth_element(sigma_m, sigma_m.begin() + 240);
+    return static_cast<double>(sigma_m[240]);
+  };
+  const double unbiased = medianOf("samples_per_pixel = 16\n");
+  EXPECT_GT(unbiased, 1e-4);
+  EXPECT_LT(unbiased, 0.1);
+  EXPECT_LT(medianOf("samples_per_pixel = 1024\n"), 0.5 * unbiased);  // √64 times less if independent
+  for (const char* keys :
+       {"mode = 'realtime'\n", "samples_per_pixel = 16\nvelocity_m_per_s = [0.1, 0, 0]\n"}) {
+    EXPECT_GT(medianOf(keys), 1e-4) << keys;
+    EXPECT_LT(medianOf(keys), 0.1) << keys;
+  }
+  EXPECT_TRUE(std::isnan(medianOf("samples_per_pixel = 1\n")));
+  EXPECT_THAT(errorOf("uri = 'sim:xtion_2'\nplanes = ['light_sigma']\n"), HasSubstr("which ASUS Xtion 2"));
+}
+
 /// A red wall on the left and a green one on the right, and a colour lens 0.4 m to the left. They are walls of one
 /// plane, so the depth image says where each colour lies, whatever lens saw it.
 TEST_F(Simulator, ColoursLieWhereTheirSurfacesAre) {

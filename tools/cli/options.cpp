@@ -15,7 +15,7 @@ namespace toftwin::cli {
 
 std::string planeNames() {
   std::string names;
-  for (int i = 0; i <= static_cast<int>(PlaneKind::Color); ++i) {
+  for (int i = 0; i <= static_cast<int>(kLastPlaneKind); ++i) {
     names += (i == 0 ? "" : ", ") + std::string{nameOf(static_cast<PlaneKind>(i))};
   }
   return names;

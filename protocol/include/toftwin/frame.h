@@ -56,7 +56,10 @@ enum class PlaneKind : std::uint8_t {
   TruthNormal = 8,  ///< unit normal in the camera frame, three channels
   Exposure = 9,     ///< which of several exposures a pixel is of, counted from 0, U8
   Color = 10,       ///< what a colour camera sees there: red, green, blue (sRGB), three channels of U8
+  LightSigma = 11,  ///< simulated: what the light's own noise leaves in the range, metres, NaN where not
+                    ///< known; channel = frequency
 };
+inline constexpr PlaneKind kLastPlaneKind = PlaneKind::LightSigma;
 
 enum class ElementType : std::uint8_t { U8 = 0, U16 = 1, F32 = 2 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/cli/campaign/frame_maker.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -18,11 +19,6 @@ sim::TraceRequest requestFor(const sim::SensorModel& model, const drivers::simul
 }
 
 Duration durationOf(DeviceTime time) { return static_cast<double>(time.ns) * nanosecond; }
-
-std::vector<PlaneKind> withoutColor(std::vector<PlaneKind> planes) {
-  std::erase(planes, PlaneKind::Color);
-  return planes;
-}
 
 }  // namespace
 
@@ -80,13 +76,18 @@ Frame FrameMaker::frameOf(std::uint64_t number, const Moment& moment) const {
   return frame;
 }
 
+void FrameMaker::keep(const sim::Light& light) {
+  truth_ = light.truth;
+  if (std::ranges::count(planes_, PlaneKind::LightSigma) > 0) light_sigma_ = sim::lightSigmaOf(light);
+}
+
 /// Light for each raw exposure at its own time, where anything changes with time.
 std::optional<sim::Samples> FrameMaker::gather(std::uint64_t number, const Moment& moment) {
   const std::uint64_t seed = settings_.keys.seed, noise = settings_.first_noise + number;
   const std::stop_token stop = stop_.get_token();
   if (!view_.changesWithTime()) {
     if (!view_.complete(stop)) return std::nullopt;
-    truth_ = view_.light().truth;
+    keep(view_.light());
     return model_.collect(view_.light(), moment, seed, noise);
   }
   const std::size_t count = moment.exposures.size();
@@ -94,7 +95,7 @@ std::optional<sim::Samples> FrameMaker::gather(std::uint64_t number, const Momen
     const Duration time = settings_.freeze ? sim::middleOf(moment) : sim::middleOf(moment.exposures[e]);
     if (!settings_.freeze || e == 0) view_.moveTo(time, noise * count + e);
     if (!view_.complete(stop)) return nullptr;
-    if (e == count / 2) truth_ = view_.light().truth;
+    if (e == count / 2) keep(view_.light());
     return &view_.lightFor(moment.exposures[e]);
   });
 }
@@ -120,7 +121,9 @@ Result<Frame> FrameMaker::make(std::uint64_t number, const Watch& watch) {
   auto exposed = model_.readOut(*collected, moment, settings_.keys.seed, noise, 0, 0, before);
   if (remembers()) memory_ = {.collected = std::move(collected), .range = exposed.range};
   Frame frame = frameOf(number, moment);
-  frame.planes = sim::planesOf(model_, std::move(exposed), truth_, withoutColor(planes_));
+  frame.planes = sim::planesOf(model_, std::move(exposed), truth_, planes_);
+  if (light_sigma_) frame.planes.push_back(*std::move(light_sigma_));
+  light_sigma_.reset();
   if (!visible_) return frame;
   auto color = colorOf(moment, number, watch);
   if (!color) return color.error();
@@ -154,8 +157,9 @@ Frame FrameMaker::example() {
   quick.world_from_camera = *moment.world_from_camera;
   const sim::Light light = sim::trace(view_.scene(), quick);
   Frame frame = frameOf(0, moment);
-  frame.planes =
-      sim::planesOf(model_, model_.expose(light, moment, 0, 0), light.truth, withoutColor(planes_));
+  frame.planes = sim::planesOf(model_, model_.expose(light, moment, 0, 0), light.truth, planes_);
+  if (std::ranges::count(planes_, PlaneKind::LightSigma) > 0)
+    frame.planes.push_back(sim::lightSigmaOf(light));
   if (visible_) {
     const CameraInfo lens = model_.colorLens()->color;
     const Image<std::uint8_t> black{lens.width, lens.height};

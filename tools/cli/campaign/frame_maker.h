@@ -64,6 +64,8 @@ class FrameMaker {
   [[nodiscard]] Moment momentOf(std::uint64_t number) const;
   [[nodiscard]] Frame frameOf(std::uint64_t number, const Moment& moment) const;
   void place(std::uint64_t number);
+  /// What is said of the light of this frame, not made of it.
+  void keep(const sim::Light& light);
   Result<Plane> colorOf(const Moment& moment, std::uint64_t number, const Watch& watch);
   std::optional<sim::Samples> gather(std::uint64_t number, const Moment& moment);
 
@@ -77,6 +79,7 @@ class FrameMaker {
   drivers::simulator::View view_;
   std::optional<sim::VisibleScene> visible_;
   sim::Truth truth_;
+  std::optional<Plane> light_sigma_;  ///< if it is wanted
   FrameMemory memory_;
   std::stop_source stop_;
 };

@@ -61,8 +61,8 @@ Result<Format> formatOf(const std::filesystem::path& file) {
 }
 
 std::string_view unitOf(PlaneKind kind) {
-  const bool is_metres =
-      kind == PlaneKind::Range || kind == PlaneKind::Depth || kind == PlaneKind::TruthRange;
+  const bool is_metres = kind == PlaneKind::Range || kind == PlaneKind::Depth ||
+                         kind == PlaneKind::TruthRange || kind == PlaneKind::LightSigma;
   return is_metres ? "m" : "";
 }
 

@@ -58,7 +58,7 @@ struct Picture {
 /// is.
 Result<const Plane*> choosePlane(const Frame& frame, const std::vector<PlaneKind>& wanted);
 Result<Picture> pictureOf(const Plane& plane, int channel);
-/// "m" for range, depth and true range; "" where it is the device's own.
+/// "m" for range, depth, true range and the light's sigma; "" where it is the device's own.
 std::string_view unitOf(PlaneKind kind);
 
 }  // namespace toftwin::cli

@@ -197,6 +197,10 @@ About aboutOf(PlaneKind kind) {
       return {"which of several exposures the pixel is of, counted from 0", ""};
     case PlaneKind::Color:
       return {"sRGB; channels red, green, blue", ""};
+    case PlaneKind::LightSigma:
+      return {
+          "standard deviation that the simulated light's own noise leaves in the range; channel = frequency",
+          "NaN"};
   }
   return {"", ""};
 }

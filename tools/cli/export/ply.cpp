@@ -36,7 +36,7 @@ std::string headerOf(const Frame& frame, std::size_t points, bool has_amplitude,
 Result<Exported> toPly(const Frame& frame, const ExportOptions& options) {
   const auto plane = choosePlane(frame, options.planes);
   if (!plane) return plane.error();
-  if (unitOf((*plane)->kind) != "m") {
+  if (unitOf((*plane)->kind) != "m" || (*plane)->kind == PlaneKind::LightSigma) {
     return Error{
         Error::Code::InvalidArgument,
         fmt::format("points need range, depth or truth_range, not {}", nameOf((*plane)->kind))};
