@@ -114,6 +114,33 @@ TEST_F(Searched, WhatRemainsOnLockedCapturesIsLess) {
   EXPECT_NEAR(numbers.front().value, 3000.0, 4.0 * numbers.front().error);
 }
 
+/// Steps of a third of the dimmest pixels' noise: means over frames do not show them.
+TEST_F(Searched, StepsOfTheConverterAreSeenInSingleFrames) {
+  simulate("[[effect]]\ntype = 'quantisation'\nstep_electrons = 20.0\n");
+  const CampaignFinding finding = search(job());
+  ASSERT_THAT(namesOf(finding), ElementsAre("quantisation")) << verdictOf(finding);
+  EXPECT_THAT(verdictOf(finding), HasSubstr("single frames"));
+  EXPECT_LT(finding.finding.first_p, 0.01);
+  ASSERT_TRUE(finding.effects.front().fitted);
+  const FittedNumber step = finding.effects.front().fitted->numbers.at(0);
+  EXPECT_NEAR(step.value, 20.0, 4.0 * step.error);
+  EXPECT_LT(step.error, 1e-3);
+  const auto model = sim::SensorModel::parse(finding.model_toml, "model.toml");
+  ASSERT_TRUE(model) << model.error().message;
+  EXPECT_THAT(model->effectNames(), Contains("quantisation"));
+  const auto declaring = [&](const std::string& electrons) {
+    write("camera.toml",
+          tinyCamera("[[effect]]\ntype = 'quantisation'\nstep_electrons = " + electrons + "\n"));
+    std::filesystem::remove(folder_ / "run" / plan::kOpenedFile);
+    return search(job());
+  };
+  const CampaignFinding right = declaring("20.0"), wrong = declaring("30.0");
+  EXPECT_TRUE(right.effects.empty() && right.updates.empty()) << verdictOf(right);
+  ASSERT_EQ(wrong.updates.size(), 1U) << verdictOf(wrong);
+  EXPECT_NEAR(wrong.updates.front().numbers.at(0).value, 20.0, 4.0 * step.error);
+  EXPECT_THAT(wrong.model_toml, HasSubstr("step_electrons = 20")) << "an update";
+}
+
 /// 5 mm for each e-fold of exposure, which no effect of the catalogue does.
 TEST_F(Searched, AnEffectOfNoCatalogueIsCalledUndeclaredAndNamedByWhatItGoesWith) {
   simulate("", [](sim::RangeImage& image, const Moment& moment, const CameraInfo&, std::uint64_t) {

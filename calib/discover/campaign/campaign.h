@@ -15,6 +15,7 @@
 #include <toftwin/frame.h>
 #include <toftwin/result.h>
 
+#include "calib/discover/campaign/sample_steps.h"
 #include "calib/plan/run_index.h"
 #include "sim/images/range.h"
 #include "sim/sensor/sensor_model.h"
@@ -43,6 +44,7 @@ struct MeasuredCapture {
   Image<float> valid_share;
   /// Even minus odd frames, means over the image of the range: what goes with the frame's number.
   double parity_m = 0.0, parity_error_m = 0.0;
+  std::vector<AmplitudePair> dim_pairs{};  ///< of the first two frames
 };
 
 /// For each capture the number of its stand, from 0 on as they first appear; one without a name is its own.

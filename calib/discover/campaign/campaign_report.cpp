@@ -73,8 +73,10 @@ compare::TableBlock effectTable(const CampaignFinding& finding) {
   for (const FoundEffect& one : finding.effects) {
     table.rows.push_back({titleOf(one.found), stageInWords(one.found),
                           fmt::format("{}", fmt::join(one.found.covariates, ", ")), numbersInWords(one),
-                          compare::shownWithError(one.found.gain.mean, one.found.gain.error, 0),
-                          compare::shownPercent(one.found.frequency)});
+                          one.is_of_single_frames
+                              ? "–"
+                              : compare::shownWithError(one.found.gain.mean, one.found.gain.error, 0),
+                          one.is_of_single_frames ? "–" : compare::shownPercent(one.found.frequency)});
   }
   for (const FittedEffect& one : finding.updates) {
     std::vector<std::string> words;
@@ -287,8 +289,7 @@ std::vector<compare::Card> cardsOf(const CampaignFinding& finding) {
          fmt::format("{} → {} mm", shown(judged->before.rms_mm, 2), shown(judged->after.rms_mm, 2)),
          fmt::format("bias {} → {} mm", shown(judged->before.bias_mm, 2),
                      shown(judged->after.bias_mm, 2))});
-    const bool has_any = !finding.effects.empty() || !finding.updates.empty();
-    if (has_any) {
+    if (finding.hasJudged()) {
       cards.push_back({"explainable error removed", compare::shownPercent(judged->removed),
                        fmt::format("95 %: {} to {}", compare::shownPercent(judged->removed_low),
                                    compare::shownPercent(judged->removed_high)),
@@ -329,7 +330,9 @@ std::string verdictOf(const CampaignFinding& finding) {
   std::string verdict = fmt::format("The model lacks {}", fmt::join(names, "; "));
   if (finding.effects.empty())
     verdict = fmt::format("The model has wrong numbers: {}", fmt::join(names, "; "));
+  if (!finding.hasJudged()) verdict += ", which single frames show and their means do not";
   if (hasDelay(finding)) verdict += ". " + capitalised(delayInWords(finding));
+  if (!finding.hasJudged()) return verdict;
   if (const auto& judged = finding.judgement) {
     verdict += fmt::format(
         ". On the locked captures: RMS {} → {} mm, {} of what {} is removed",

@@ -13,6 +13,7 @@
 #include "calib/discover/campaign/found_model.h"
 #include "calib/discover/campaign/model_file.h"
 #include "calib/discover/campaign/next_capture.h"
+#include "calib/discover/campaign/step_effect.h"
 #include "calib/discover/marginal.h"
 #include "calib/plan/compare_run.h"
 
@@ -234,14 +235,26 @@ Result<> judgeLocked(const CampaignJob& job, const Campaign& campaign, const Jud
 }
 
 /// What does worse on captures that it was not fitted to does not go into the model, whatever it is called.
-void keepIfWorse(const std::string& text, CampaignFinding& finding) {
+/// What single frames show stays: these captures do not judge it.
+void keepIfWorse(const std::string& text, const Declared& declared, CampaignFinding& finding) {
   if (!finding.judgement) return;
   finding.is_worse = finding.judgement->after.per_row > finding.judgement->before.per_row;
   if (!finding.is_worse) return;
-  finding.model_toml = "# Left as it was by toftwin discover: what it found does worse on the locked captures.\n" + text;
+  CampaignFinding kept{.plan = finding.plan,
+                       .captures = finding.captures,
+                       .effects = finding.effects,
+                       .updates = finding.updates};
+  std::erase_if(kept.effects, [](const FoundEffect& one) { return !one.is_of_single_frames; });
+  std::erase_if(kept.updates, [](const FittedEffect& one) { return !isOfSingleFrames(one); });
+  const bool is_as_it_was = kept.effects.empty() && kept.updates.empty();
+  finding.model_toml =
+      is_as_it_was
+          ? "# Left as it was by toftwin discover: what it found does worse on the locked captures.\n" + text
+          : modelText(text, declared, kept);
   finding.notes.emplace_back(
       "With what was found, the locked captures fit worse than before: it is not in model.toml, which is the "
-      "camera file as it was.");
+      "camera file as it was" +
+      std::string{is_as_it_was ? "." : ", but for what single frames show."});
 }
 
 }  // namespace
@@ -301,6 +314,7 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
   if (!refitted) return refitted.error();
   takeFitted(*refitted, *late, finding);
   addNextCaptures({declared, lit, finding.finding.scales}, *rows, finding.effects);
+  addSteps(job, declared.model, campaign->captures, finding);
   const Zero beyond = finding.zero;
   finding.zero.delay_mm += *late;
   finding.model_toml = modelText(files->text, declared, finding);
@@ -315,7 +329,7 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
                             beyond.hasOffset() ? beyond.offset_mm : 0.0, beyond.gain_percent};
     if (auto done = judgeLocked(job, *campaign, searched, {*before, *with_zero, after}, finding); !done)
       return done.error();
-    keepIfWorse(files->text, finding);
+    keepIfWorse(files->text, declared, finding);
   } else {
     finding.notes.emplace_back(
         campaign->locked.empty()

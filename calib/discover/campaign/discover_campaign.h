@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <filesystem>
 #include <functional>
 #include <map>
@@ -47,7 +48,14 @@ struct FoundEffect {
   std::optional<FittedEffect> fitted{};  ///< none: the simulator has no form for it
   std::vector<FittedEffect> more{};      ///< where one form is not enough
   std::optional<NextCapture> next{};     ///< where these captures do not tell it from something else
+  bool is_of_single_frames =
+      false;  ///< noise smears it where frames are averaged, as they are for the judgement
 };
+
+/// Whether it is a number that single frames said (step_effect.h).
+inline bool isOfSingleFrames(const FittedEffect& update) {
+  return std::holds_alternative<sim::Quantisation>(update.effect);
+}
 
 /// All that is known when a campaign was searched.
 struct CampaignFinding {
@@ -63,6 +71,12 @@ struct CampaignFinding {
   bool is_worse = false;  ///< on the locked captures: model_toml is the camera file as it was
   std::vector<std::string> notes{};
   double seconds = 0.0;
+
+  /// Whether anything was found that means over frames show, so that locked captures can judge it.
+  [[nodiscard]] bool hasJudged() const {
+    return !std::ranges::all_of(updates, isOfSingleFrames) ||
+           !std::ranges::all_of(effects, &FoundEffect::is_of_single_frames);
+  }
 };
 
 /// Searches the open captures, fits what was found through the simulator, and judges the model

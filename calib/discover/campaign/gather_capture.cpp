@@ -115,17 +115,18 @@ class Repeats {
   std::size_t blocks_ = 0;
 };
 
-Image<float> logAmplitudeOf(const Frame& frame, const Image<float>& range_m) {
+/// NaN without a range; empty where the camera gives none.
+Image<float> amplitudeOf(const Frame& frame, const Image<float>& range_m) {
   const Plane* plane = frame.find(PlaneKind::Amplitude);
   if (plane == nullptr || plane->type != ElementType::F32 ||
       plane->as<float>().size() != range_m.size())
     return {};
-  Image<float> log(range_m.width(), range_m.height(), kNaN);
+  Image<float> amplitude(range_m.width(), range_m.height(), kNaN);
   const auto values = plane->as<float>();
-  for (std::size_t i = 0; i < log.size(); ++i) {
-    if (std::isfinite(range_m[i]) && values[i] > 0.0F) log[i] = std::log(values[i]);
+  for (std::size_t i = 0; i < amplitude.size(); ++i) {
+    if (std::isfinite(range_m[i]) && values[i] > 0.0F) amplitude[i] = values[i];
   }
-  return log;
+  return amplitude;
 }
 
 /// Mean over the image of one frame, to tell frames apart.
@@ -158,7 +159,7 @@ struct CaptureGatherer::State {
   MeasuredCapture capture;
   CameraInfo camera;
   Repeats range, amplitude;
-  Image<float> first;
+  Image<float> first, first_amplitude;
   std::vector<double> means;
   Image<float> valid;
   bool has_amplitude = true;
@@ -175,11 +176,18 @@ struct CaptureGatherer::State {
       valid[i] += std::isfinite((*range_m)[i]) ? 1.0F : 0.0F;
     range.add(*range_m);
     means.push_back(meanOf(*range_m, first));
-    const Image<float> log = logAmplitudeOf(frame, *range_m);
-    has_amplitude = has_amplitude && !log.empty();
-    if (has_amplitude) amplitude.add(log);
+    addAmplitude(amplitudeOf(frame, *range_m));
     ++capture.frames;
     return {};
+  }
+
+  void addAmplitude(Image<float> image) {
+    has_amplitude = has_amplitude && !image.empty();
+    if (!has_amplitude) return;
+    if (capture.frames == 1) addDimmest(first_amplitude, image, capture.dim_pairs);
+    if (capture.frames == 0) first_amplitude = image;
+    for (float& value : image.pixels()) value = std::log(value);
+    amplitude.add(image);
   }
 
   MeasuredCapture finish() {

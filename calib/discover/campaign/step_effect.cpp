@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/discover/campaign/step_effect.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+namespace toftwin::discover {
+namespace {
+
+/// Of a camera with one frequency and one exposure a frame; 0: another one.
+std::size_t phaseStepsOf(const sim::SensorModel& model) {
+  const auto raw = model.exposures({});
+  const bool is_one =
+      model.hasPhasors() && model.exposureCount() == 1 && std::ranges::all_of(raw, [&](const Exposure& one) {
+        return std::abs((one.modulation - raw.front().modulation).in(hertz)) < 1.0;
+      });
+  return is_one ? raw.size() : 0;
+}
+
+const sim::Quantisation* declaredIn(const sim::SensorModel& model) {
+  for (const sim::AnyEffect& effect : model.effects())
+    if (const auto* own = std::get_if<sim::Quantisation>(&effect)) return own;
+  return nullptr;
+}
+
+Effect effectOf(const SampleSteps& steps, bool is_candidate) {
+  Effect effect{.name = std::string{sim::Quantisation::about.name}, .is_catalogue = is_candidate};
+  if (!is_candidate)
+    effect.name = fmt::format("raw exposures in whole steps of {:.4g} electrons", steps.step);
+  effect.covariates = {"amplitude_e"};
+  effect.stage = Stage::Samples;
+  effect.numbers = {{"step_electrons", steps.step, steps.error}};
+  effect.p = steps.p;
+  return effect;
+}
+
+}  // namespace
+
+void addSteps(const CampaignJob& job, const sim::SensorModel& model,
+              const std::vector<MeasuredCapture>& captures, CampaignFinding& finding) {
+  std::vector<AmplitudePair> pairs;
+  for (const MeasuredCapture& capture : captures)
+    pairs.insert(pairs.end(), capture.dim_pairs.begin(), capture.dim_pairs.end());
+  const auto steps = sampleStepsOf(pairs, phaseStepsOf(model));
+  if (!steps) return;
+  const sim::Quantisation* const declared = declaredIn(model);
+  constexpr double kSame = 1e-3;  // what a gain of the light between file and camera hides anyway
+  if (declared != nullptr && std::abs(declared->step_electrons - steps->step) < kSame * steps->step) return;
+  finding.finding.first_p = std::min(finding.finding.first_p, steps->p);
+  const FittedEffect fitted{sim::Quantisation{.step_electrons = steps->step},
+                            {{"step_electrons", steps->step, steps->error}}};
+  if (declared != nullptr) {
+    finding.updates.push_back(fitted);
+    return;
+  }
+  const bool is_candidate =
+      std::ranges::find(job.left_out, sim::Quantisation::about.name) == job.left_out.end();
+  FoundEffect found{effectOf(*steps, is_candidate)};
+  if (is_candidate) found.fitted = fitted;
+  found.is_of_single_frames = true;
+  finding.effects.push_back(std::move(found));
+}
+
+}  // namespace toftwin::discover
