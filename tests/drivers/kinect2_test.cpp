@@ -72,6 +72,9 @@ TEST(Kinect2, IsFoundByItsSerialItsPortOrAny) {
 }
 
 TEST(Kinect2, IsCompliant) {
+#if defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "so slow an emulated camera does not keep up with its own clock";
+#endif
   static EmulatedKinect2Bus bus;
   drivers::Driver driver = row();
   driver.open = [](settings::Table& table) { return openOn(bus, table); };
@@ -289,6 +292,9 @@ TEST(Kinect2, KeysThatMakeNoSenseAreNamed) {
 }
 
 TEST(Kinect2, DeviceTimeIsItsOwnClockOverAWrapOfItsStamps) {
+#if defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "so slow an emulated camera does not keep up with its own clock";
+#endif
   EmulatedKinect2::Options options;
   options.first_stamp = 0xFFFF'FFFFU - 5 * 267;
   EmulatedKinect2Bus bus{options};

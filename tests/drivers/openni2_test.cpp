@@ -369,6 +369,9 @@ class OpenNI2File : public OpenNI2 {
 };
 
 TEST_F(OpenNI2File, EveryFrameIsPlayedInOrderAndThenTheStreamEnds) {
+#if defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "so slow, OpenNI2's recorder leaves frames out";
+#endif
   const auto source = started(keys("speed = 0"));
   ASSERT_NE(source, nullptr);
   EXPECT_EQ(source->info().kind, FrameKind::Replayed);
