@@ -181,8 +181,8 @@ Result<> capturePose(Feed& a, Feed& b, std::optional<Follower>& follower, const 
     if (i == 0 && result.poses.empty()) {
       for (const Feed* feed : {&a, &b}) result.warnings.push_back(feed->warning());
       for (const Frame* frame : {&frame_a, &frame_b}) result.warnings.push_back(missingPlanes(*frame));
-      result.warnings.push_back(clockWarning(frame_a, a.opened()));
-      result.warnings.push_back(clockWarning(frame_b, b.opened()));
+      if (!a.isRecorded()) result.warnings.push_back(clockWarning(frame_a, a.opened()));
+      if (!b.isRecorded()) result.warnings.push_back(clockWarning(frame_b, b.opened()));
       std::erase(result.warnings, "");
     }
     result.log.push_back(logEntry(frame_a, captured.name, "A"));

@@ -32,6 +32,8 @@ class Feed {
   virtual Result<> beginAnew() { return {}; }
   /// What a reader must know of it, or nothing: that a recording is damaged.
   [[nodiscard]] virtual std::string warning() const { return {}; }
+  /// Its frames' times say when they were recorded, not when they are read.
+  [[nodiscard]] virtual bool isRecorded() const { return false; }
   /// By our clock. Frames of a daemon are made after that.
   [[nodiscard]] std::chrono::system_clock::time_point opened() const { return opened_; }
 

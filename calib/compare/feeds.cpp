@@ -59,6 +59,7 @@ class RecordingFeed final : public Feed {
   Result<> setPose(const Transform<World, Camera>&) override {
     return Error{Error::Code::Unsupported, "a recording cannot be moved"};
   }
+  [[nodiscard]] bool isRecorded() const override { return true; }
   [[nodiscard]] std::string warning() const override {
     const std::string& damage = reader_.summary().damage;
     return damage.empty()

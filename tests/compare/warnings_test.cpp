@@ -66,20 +66,35 @@ TEST(Warnings, TellOfARecordingThatWasCutOff) {
   EXPECT_THAT(nothing.error().message, HasSubstr("a.mcap: no frame of it can be read: "));
 }
 
+/// Four frames of so long ago from where the world begins.
+void recordFrames(const std::filesystem::path& file, std::chrono::milliseconds ago) {
+  auto writer = record::Writer::create(file, {});
+  ASSERT_TRUE(writer) << writer.error().message;
+  for (std::uint64_t i = 0; i < 4; ++i) {
+    Frame frame = frameFrom(ago);
+    frame.sequence = i;
+    frame.moment.world_from_camera = Transform<World, Camera>{};
+    ASSERT_TRUE(writer->write(frame));
+  }
+  ASSERT_TRUE(writer->close());
+}
+
+TEST(Warnings, SayNothingOfTheClockOfWhatWasRecordedLongAgo) {
+  const record::Folder folder;
+  const auto file = folder / "a.mcap";
+  recordFrames(file, std::chrono::hours{24});
+  const auto a = openRecording(file.string()), b = openRecording(file.string());
+  ASSERT_TRUE(a && b);
+  Progress silent{nullptr};
+  const auto captured = capture(**a, **b, {.poses = {{.name = "here"}}, .frames = 2}, silent);
+  ASSERT_TRUE(captured) << captured.error().message;
+  EXPECT_THAT(captured->warnings, testing::Not(testing::Contains(HasSubstr("clock"))));
+}
+
 TEST(Warnings, TellOfARecordingOfOtherPoses) {
   const record::Folder folder;
   const auto file = folder / "a.mcap";
-  {
-    auto writer = record::Writer::create(file, {});
-    ASSERT_TRUE(writer) << writer.error().message;
-    for (std::uint64_t i = 0; i < 4; ++i) {
-      Frame frame = frameFrom(std::chrono::milliseconds{0});
-      frame.sequence = i;
-      frame.moment.world_from_camera = Transform<World, Camera>{};
-      ASSERT_TRUE(writer->write(frame));
-    }
-    ASSERT_TRUE(writer->close());
-  }
+  recordFrames(file, std::chrono::milliseconds{0});
   const auto a = openRecording(file.string()), b = openRecording(file.string());
   ASSERT_TRUE(a && b);
   Progress silent{nullptr};
