@@ -182,12 +182,14 @@ void addPlates(const ComparedRun& run, const OwnError& own, std::size_t camera, 
   all.add("flying pixels", kNames[camera], compare::flyingTraits(together));
   all.add("emitter shadow", kNames[camera], compare::shadowTraits(together, 1.0));
   all.add("edge in the amplitude", kNames[camera], compare::edgeTraits(place, value));
-  // How a camera weighs its frequencies is its own: by f², 1.5 % planted in a Kinect v2 read −0.3 %.
+  // The wall's own light veils it, too, by more than the plate's where frequencies are pulled to different
+  // sides.
   if (std::ranges::all_of(captures, [](const auto* one) { return isPoseFromPlanes(one->record); })) return;
   if (run.frequency_hz[camera].size() > 1) {
-    all.untold(fmt::format("lens scatter of {}: it pulls each of {} frequencies another way, and how the camera "
-                           "weighs them is not known",
-                           kNames[camera], run.frequency_hz[camera].size()));
+    all.untold(fmt::format(
+        "lens scatter of {}: it pulls each of {} frequencies another way, and what is left of the "
+        "plate's is not told from the veil of the wall's own light",
+        kNames[camera], run.frequency_hz[camera].size()));
     return;
   }
   all.add("lens scatter", kNames[camera],
