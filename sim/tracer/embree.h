@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// In what Embree 3 and Embree 4 differ for us, but for the contexts of queries with filters. Only the
-// tracer's sources include this.
+// All in which Embree 3 and Embree 4 differ for us. Only the tracer's sources include this.
 #pragma once
 
 #if __has_include(<embree4/rtcore.h>) && defined(TOFTWIN_EMBREE4)
@@ -13,54 +12,73 @@ namespace toftwin::sim::embree {
 
 inline constexpr int kLanes = 16;  ///< rays that are traced as one packet
 
-/// Closest hit of each ray whose `valid` is −1. Coherent: the rays start or end close together.
-inline void intersect(const int* valid, RTCScene scene, RTCRayHit16& rays, bool coherent) {
 #if RTC_VERSION_MAJOR >= 4
-  RTCIntersectArguments arguments;
-  rtcInitIntersectArguments(&arguments);
-  if (coherent) arguments.flags = RTC_RAY_QUERY_FLAG_COHERENT;
-  rtcIntersect16(valid, scene, &rays, &arguments);
-#else
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  if (coherent) context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-  rtcIntersect16(valid, scene, &context, &rays);
-#endif
+
+/// What Embree hands on to the functions of geometries, as it got it.
+using QueryContext = RTCRayQueryContext;
+
+inline RTCRayQueryFlags flagsFor(bool coherent) {
+  return coherent ? RTC_RAY_QUERY_FLAG_COHERENT : RTC_RAY_QUERY_FLAG_INCOHERENT;
 }
 
-/// Sets `tfar` to −∞ for each valid ray that meets anything.
-inline void occluded(const int* valid, RTCScene scene, RTCRay16& rays, bool coherent) {
-#if RTC_VERSION_MAJOR >= 4
+inline void start(QueryContext& context) { rtcInitRayQueryContext(&context); }
+
+/// Closest hit of each ray whose `valid` is −1. Coherent: the rays start or end close together.
+inline void intersect(const int* valid, RTCScene scene, RTCRayHit16& rays, bool coherent) {
+  RTCIntersectArguments arguments;
+  rtcInitIntersectArguments(&arguments);
+  arguments.flags = flagsFor(coherent);
+  rtcIntersect16(valid, scene, &rays, &arguments);
+}
+
+/// Sets `tfar` to −∞ for each valid ray that meets anything. `context` was started.
+inline void occluded(const int* valid, RTCScene scene, RTCRay16& rays, bool coherent, QueryContext& context) {
   RTCOccludedArguments arguments;
   rtcInitOccludedArguments(&arguments);
-  if (coherent) arguments.flags = RTC_RAY_QUERY_FLAG_COHERENT;
+  arguments.flags = flagsFor(coherent);
+  arguments.context = &context;
   rtcOccluded16(valid, scene, &rays, &arguments);
-#else
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  if (coherent) context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-  rtcOccluded16(valid, scene, &context, &rays);
-#endif
 }
 
 /// The same for one ray; for comparisons.
-inline void intersect(RTCScene scene, RTCRayHit& ray) {
-#if RTC_VERSION_MAJOR >= 4
-  rtcIntersect1(scene, &ray, nullptr);
+inline void intersect(RTCScene scene, RTCRayHit& ray) { rtcIntersect1(scene, &ray, nullptr); }
+inline void occluded(RTCScene scene, RTCRay& ray) { rtcOccluded1(scene, &ray, nullptr); }
+
 #else
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
+
+using QueryContext = RTCIntersectContext;
+
+inline void start(QueryContext& context) { rtcInitIntersectContext(&context); }
+
+inline void intersect(const int* valid, RTCScene scene, RTCRayHit16& rays, bool coherent) {
+  QueryContext context;
+  start(context);
+  if (coherent) context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  rtcIntersect16(valid, scene, &context, &rays);
+}
+
+inline void occluded(const int* valid, RTCScene scene, RTCRay16& rays, bool coherent, QueryContext& context) {
+  if (coherent) context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  rtcOccluded16(valid, scene, &context, &rays);
+}
+
+inline void intersect(RTCScene scene, RTCRayHit& ray) {
+  QueryContext context;
+  start(context);
   rtcIntersect1(scene, &context, &ray);
-#endif
 }
 inline void occluded(RTCScene scene, RTCRay& ray) {
-#if RTC_VERSION_MAJOR >= 4
-  rtcOccluded1(scene, &ray, nullptr);
-#else
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
+  QueryContext context;
+  start(context);
   rtcOccluded1(scene, &context, &ray);
+}
+
 #endif
+
+inline void occluded(const int* valid, RTCScene scene, RTCRay16& rays, bool coherent) {
+  QueryContext context;
+  start(context);
+  occluded(valid, scene, rays, coherent, context);
 }
 
 }  // namespace toftwin::sim::embree

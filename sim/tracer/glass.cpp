@@ -8,7 +8,7 @@ namespace {
 
 /// Embree hands the context on to the filters as it got it.
 struct Context {
-  RTCIntersectContext embree;
+  embree::QueryContext embree;
   ThroughGlass* through;
 };
 
@@ -32,7 +32,7 @@ void filter(const RTCFilterFunctionNArguments* arguments) {
 
 }  // namespace
 
-void crossGlass(RTCIntersectContext* context, unsigned lane, const bsdf::ThinGlass& glass, double cosine) {
+void crossGlass(embree::QueryContext* context, unsigned lane, const bsdf::ThinGlass& glass, double cosine) {
   ThroughGlass& through = *reinterpret_cast<Context*>(context)->through;
   through.share[lane] *= static_cast<float>(glass.shares(cosine).transmitted);
   through.extra_m[lane] += glass.extraLength(cosine);
@@ -55,10 +55,9 @@ void startThroughGlass(RTCRay16& rays, ThroughGlass& through) {
 void occludedThroughGlass(const int* valid, RTCScene scene, RTCRay16& rays, bool coherent,
                           ThroughGlass& through) {
   Context context;
-  rtcInitIntersectContext(&context.embree);
-  if (coherent) context.embree.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  embree::start(context.embree);
   context.through = &through;
-  rtcOccluded16(valid, scene, &context.embree, &rays);
+  embree::occluded(valid, scene, rays, coherent, context.embree);
 }
 
 }  // namespace toftwin::sim

@@ -16,7 +16,7 @@ struct ThroughGlass {
 /// Makes shadow rays go through a geometry of thin glass: occludedThroughGlass() counts what that costs.
 void letShadowRaysThrough(RTCGeometry geometry, const bsdf::ThinGlass& glass);
 /// The same for one crossing of a shape that finds its crossings itself.
-void crossGlass(RTCIntersectContext* context, unsigned lane, const bsdf::ThinGlass& glass, double cosine);
+void crossGlass(embree::QueryContext* context, unsigned lane, const bsdf::ThinGlass& glass, double cosine);
 
 /// Nothing is crossed yet. The rays' ids become their lanes.
 void startThroughGlass(RTCRay16& rays, ThroughGlass& through);

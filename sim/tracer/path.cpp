@@ -268,6 +268,7 @@ Tracing::Tracing(const Scene::Impl& s, const TraceRequest& r, RayLog* l, std::ve
   pinhole = scene_from_camera.translation_m;
   camera_axes = {scene_from_camera.rotate({1, 0, 0}), scene_from_camera.rotate({0, 1, 0}), scene_from_camera.rotate({0, 0, 1})};
   for (const EmitterSpec& emitter : request.emitters) emitters.emplace_back(emitter, scene_from_camera);
+  mirrored = mirroredEmitters(scene, emitters);
   for (const Frequency f : request.frequencies) turns_per_metre.push_back(f.in(hertz) / kSpeedOfLight_m_per_s);
 }
 

@@ -11,6 +11,7 @@
 #include "sim/tracer/emitter.h"
 #include "sim/tracer/lanes.h"
 #include "sim/tracer/lens.h"
+#include "sim/tracer/mirrored_light.h"
 #include "sim/tracer/packet.h"
 #include "sim/tracer/scene_impl.h"
 #include "sim/tracer/trace.h"
@@ -65,6 +66,7 @@ struct Tracing {
   Vec3d pinhole;
   std::array<Vec3d, 3> camera_axes;  ///< x, y, z of the camera in the scene
   std::vector<PlacedEmitter> emitters;
+  std::vector<MirroredEmitter> mirrored;  ///< the points' images in flat mirrors
   std::vector<double> turns_per_metre;  ///< f / c
   std::vector<int> orders;
   TransientBins bins;                   ///< none but in transient.cpp

@@ -98,24 +98,6 @@ Towards scatteredTowards(const Tracing& tracing, const Packet& packet, const Hit
   return std::visit(towards, tracing.scene.models[static_cast<std::size_t>(course.model[i] - 1)]);
 }
 
-/// Shadow rays; what is left of the light goes into `weight` and `length`.
-void shadow(const Tracing& tracing, const Hits& hits, const Vec3Lanes& places, DirectLight& light,
-            bool coherent) {
-  RTCRay16 rays;
-  setShadowRays(hits, places, rays);
-  if (!tracing.scene.has_glass) {
-    castShadowRays(tracing.scene, light.valid.v, rays, coherent);
-  } else {
-    ThroughGlass through;
-    castShadowRays(tracing.scene, light.valid.v, rays, coherent, through);
-    for (std::size_t i = 0; i < kLaneCount; ++i) {
-      light.weight[i] *= through.share[i];
-      light.length[i] += through.extra_m[i];
-    }
-  }
-  for (std::size_t i = 0; i < kLaneCount; ++i) light.weight[i] = rays.tfar[i] < 0.0f ? 0.0f : light.weight[i];
-}
-
 /// Emitters' discs that lie on the ways of paths from special surfaces, before what they hit.
 void addSeenEmitters(const Tracing& tracing, const Packet& packet, const RTCRayHit16& rays,
                      const Course& course, LaneSums& sums) {
@@ -191,6 +173,29 @@ void meetSurfaces(const Tracing& tracing, const RTCRayHit16& rays, int surface, 
   }
 }
 
+/// Takes the place of the matt surface that lightHits() took for granted: what the models do with light from
+/// the places.
+void weighByModels(const Tracing& tracing, const Packet& packet, const Hits& hits, const Course& course,
+                   const PlacedEmitter& emitter, const Vec3Lanes& places, DirectLight& light) {
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    if (light.valid[i] == 0 || course.model[i] == 0) continue;
+    const Vec3d way = at(places, i) - at(hits.position, i);
+    const double distance = norm(way);
+    const Towards towards = scatteredTowards(tracing, packet, hits, course, i, way / distance);
+    const double cosine = dot(way, at(hits.normal, i)) / distance;
+    double factor = std::numbers::pi * towards.value / cosine;
+    if (emitter.is_disc) {
+      const double density = discDensity(emitter, distance, -dot(way, emitter.axis) / distance);
+      factor *= heuristic(density, towards.density);
+    }
+    light.weight[i] *= static_cast<float>(factor);
+    if (!(light.weight[i] > 0.0f)) {
+      light.valid[i] = 0;
+      light.weight[i] = 0.0f;
+    }
+  }
+}
+
 /// Next-event estimation: from every hit to every emitter, with what the surface's model does with it.
 void gatherDirectLight(const Tracing& tracing, const Packet& packet, const Hits& hits, const Course& course,
                        int surface, bool coherent, LaneSums& sums) {
@@ -201,25 +206,24 @@ void gatherDirectLight(const Tracing& tracing, const Packet& packet, const Hits&
     drawPlaces(packet, emitter, dimensions.emitter(surface, e), places);
     DirectLight light;
     lightHits(packet, hits, emitter, places, light);
-    for (std::size_t i = 0; i < kLaneCount; ++i) {
-      if (light.valid[i] == 0 || course.model[i] == 0) continue;
-      const Vec3d way = at(places, i) - at(hits.position, i);
-      const double distance = norm(way);
-      const Towards towards = scatteredTowards(tracing, packet, hits, course, i, way / distance);
-      const double cosine = dot(way, at(hits.normal, i)) / distance;
-      double factor = std::numbers::pi * towards.value / cosine;
-      if (emitter.is_disc) {
-        const double density = discDensity(emitter, distance, -dot(way, emitter.axis) / distance);
-        factor *= heuristic(density, towards.density);
-      }
-      light.weight[i] *= static_cast<float>(factor);
-      if (!(light.weight[i] > 0.0f)) {
-        light.valid[i] = 0;
-        light.weight[i] = 0.0f;
-      }
-    }
+    weighByModels(tracing, packet, hits, course, emitter, places, light);
     if (!isAny(light.valid)) continue;
-    shadow(tracing, hits, places, light, coherent);
+    shadowRays(tracing, hits, places, light, coherent);
+    addLight(tracing, light, sums);
+  }
+}
+
+/// The same to every image of a point in a flat mirror.
+void gatherMirroredLight(const Tracing& tracing, const Packet& packet, const Hits& hits, const Course& course,
+                         LaneSums& sums) {
+  for (const MirroredEmitter& mirrored : tracing.mirrored) {
+    Vec3Lanes places;
+    for (std::size_t i = 0; i < kLaneCount; ++i) put(mirrored.image.position, i, places);
+    DirectLight light;
+    lightHits(packet, hits, mirrored.image, places, light);
+    weighByModels(tracing, packet, hits, course, mirrored.image, places, light);
+    if (!isAny(light.valid)) continue;
+    throughMirror(tracing, packet, hits, mirrored, light);
     addLight(tracing, light, sums);
   }
 }
@@ -248,7 +252,7 @@ void gatherSurroundings(const Tracing& tracing, const Packet& packet, const Hits
                                          drawn.radiance / drawn.density * weight);
   }
   if (!isAny(light.valid)) return;
-  shadow(tracing, hits, places, light, false);
+  shadowRays(tracing, hits, places, light, false);
   for (std::size_t i = 0; i < kLaneCount; ++i)
     sums.ambient[i] += light.valid[i] != 0 ? light.weight[i] : 0.0f;
 }
@@ -332,6 +336,23 @@ TexturePlace placeOf(const BuiltObject& object, const Standing* standing, const 
 
 }  // namespace
 
+void shadowRays(const Tracing& tracing, const Hits& hits, const Vec3Lanes& places, DirectLight& light,
+                bool coherent) {
+  RTCRay16 rays;
+  setShadowRays(hits, places, rays);
+  if (!tracing.scene.has_glass) {
+    castShadowRays(tracing.scene, light.valid.v, rays, coherent);
+  } else {
+    ThroughGlass through;
+    castShadowRays(tracing.scene, light.valid.v, rays, coherent, through);
+    for (std::size_t i = 0; i < kLaneCount; ++i) {
+      light.weight[i] *= through.share[i];
+      light.length[i] += through.extra_m[i];
+    }
+  }
+  for (std::size_t i = 0; i < kLaneCount; ++i) light.weight[i] = rays.tfar[i] < 0.0f ? 0.0f : light.weight[i];
+}
+
 void applyTextures(const Scene::Impl& scene, const RTCRayHit16& rays, const Packet& packet, Hits& hits) {
   if (scene.textures.empty()) return;
   for (std::size_t i = 0; i < kLaneCount; ++i) {
@@ -363,6 +384,8 @@ void followSpecialPaths(const Tracing& tracing, Packet& packet, LaneSums& sums) 
     findHits(tracing.scene, packet, rays, hits);
     meetSurfaces(tracing, rays, surface, packet, hits, course, sums);
     gatherDirectLight(tracing, packet, hits, course, surface, is_coherent, sums);
+    if (surface + 2 <= surfaces)
+      gatherMirroredLight(tracing, packet, hits, course, sums);  // the mirror is one more
     if (environment != nullptr && environment->hasPicture())
       gatherSurroundings(tracing, packet, hits, course, surface, false, sums);
     if (environment != nullptr && environment->hasSun())

@@ -10,6 +10,10 @@ namespace toftwin::sim {
 /// scenes that need none of it never come here.
 void followSpecialPaths(const Tracing& tracing, Packet& packet, LaneSums& sums);
 
+/// Shadow rays from the hits to the places; what is left of the light goes into its weight and length.
+void shadowRays(const Tracing& tracing, const Hits& hits, const Vec3Lanes& places, DirectLight& light,
+                bool coherent);
+
 /// Multiplies the albedo of each hit with its texture.
 void applyTextures(const Scene::Impl& scene, const RTCRayHit16& rays, const Packet& packet, Hits& hits);
 

@@ -111,8 +111,9 @@ TEST_F(Simulator, SeesTheWallWhereItIs) {
   EXPECT_NEAR(meanRange(frameOf(*source)), 2.0, 2e-3);  // shot noise: 3 mm / √480
 }
 
-/// Light from a mirror onto a wall needs an emitter with a size (docs/scene.md); with a point it is missing.
-TEST_F(Simulator, WarnsOnceOfAMirrorThatAPointCannotBeMetBy) {
+/// Light from a curved mirror onto a wall needs an emitter with a size (docs/scene.md); with a point it is
+/// missing.
+TEST_F(Simulator, WarnsOnceOfACurvedMirrorThatAPointCannotBeMetBy) {
   const auto log = std::make_shared<toftwin::test::KeptLog>();  // shared with spdlog
   const toftwin::test::LoggingTo logging{log};
   std::ofstream{folder_ / "mirror.toml"} << kWall << R"(
@@ -131,10 +132,14 @@ material = "mirror"
   const auto isOpen = [&](const std::string& camera, const std::string& scene) {
     return tryOpen("camera = '" + camera + "'\nscene = '" + scene + "'\n").ok();
   };
-  ASSERT_TRUE(isOpen("camera.toml", "wall.toml") && isOpen("disc.toml", "mirror.toml"));
+  std::ofstream{folder_ / "ball.toml"}
+      << kWall << "[[material]]\nname = 'mirror'\nmodel = 'mirror'\n[[object]]\n"
+      << "shape = 'sphere'\nradius_m = 0.2\nposition_m = [0.5, 0, 1]\nmaterial = 'mirror'\n";
+  ASSERT_TRUE(isOpen("camera.toml", "wall.toml") && isOpen("disc.toml", "ball.toml"));
+  ASSERT_TRUE(isOpen("camera.toml", "mirror.toml"));  // flat: the point has an image in it
   EXPECT_EQ(log->count("is missing"), 0);
-  ASSERT_TRUE(isOpen("camera.toml", "mirror.toml"));
-  EXPECT_EQ(log->count("toftwind.toml:2: the scene has a mirror or thin glass"), 1);
+  ASSERT_TRUE(isOpen("camera.toml", "ball.toml"));
+  EXPECT_EQ(log->count("toftwind.toml:2: the scene has a curved mirror or thin glass"), 1);
 }
 
 TEST_F(Simulator, SameSeedSameBytes) {

@@ -66,6 +66,70 @@ TEST(Mirror, ShowsTheEmittersDiscButNeverAPoint) {
   EXPECT_EQ(trace(scene, request).steady(0, 0), 0.0f) << "a point has no size to be met";
 }
 
+/// A wall 2 m ahead and a mirror on the right, x = 0.5 m: the image of the point in the pinhole stands at (1,
+/// 0, 0). Light to (0, 0, 2) by the mirror goes √5 m and meets the mirror at (0.5, 0, 1). Over two surfaces
+/// there is no chance in it: what is drawn at the wall ends on the mirror.
+std::string beside(const std::string& mirror, const std::string& more = {}) {
+  return material("mirror", "model = 'mirror'\nalbedo = 0.9") + material("wall", "albedo = 0.7") +
+         rectangle("wall", "position_m = [0, 0, 2]", "0.1, 0.1") + mirror + more;
+}
+const Complex kDirect = std::polar(0.7 / kPi / 4.0, -wavenumber(80_MHz) * 4.0);
+const Complex kMirrored =
+    std::polar(0.9 * 0.7 / kPi * (2.0 / std::sqrt(5.0)) / 5.0, -wavenumber(80_MHz) * (2.0 + std::sqrt(5.0)));
+
+TEST(MirroredLight, OfAPointReachesAWallOverAFlatMirror) {
+  const std::pair<std::string, std::string> mirrors[]{
+      {"rectangle", rectangle("mirror", "position_m = [0.5, 0, 1]\neuler_deg = [0, 90, 0]", "0.5, 0.5")},
+      {"its other side",
+       rectangle("mirror", "position_m = [0.5, 0, 1]\neuler_deg = [0, -90, 0]", "0.5, 0.5")},
+      {"disc",
+       "[[object]]\nshape = 'disc'\nradius_m = 0.3\nmaterial = 'mirror'\nposition_m = [0.5, 0, 1]\neuler_deg "
+       "= [0, 90, 0]\n"},
+      {"box",
+       "[[object]]\nshape = 'box'\nsize_m = [0.2, 0.5, 0.5]\nmaterial = 'mirror'\nposition_m = [0.6, 0, "
+       "1]\n"}};
+  for (const auto& [name, mirror] : mirrors) {
+    expectPhasor(trace(sceneOf(beside(mirror)), onePixel(80_MHz, 1, 2)), kDirect + kMirrored, name);
+    expectPhasor(trace(sceneOf(beside(mirror)), onePixel(80_MHz, 1, 1)), kDirect, name + ", one surface");
+  }
+  const std::string moving =
+      rectangle("mirror", "position_m = [0.4, 0, 1]\neuler_deg = [0, 90, 0]\nvelocity_m_per_s = [0.05, 0, 0]",
+                "0.5, 0.5");
+  expectPhasor(trace(sceneOf(beside(moving)).at(2_s), onePixel(80_MHz, 1, 2)), kDirect + kMirrored, "moving");
+}
+
+TEST(MirroredLight, IsMissingWhereAnythingIsInItsWay) {
+  const auto mirrorAt = [](double z) {
+    return rectangle("mirror", "position_m = [0.5, 0, " + std::to_string(z) + "]\neuler_deg = [0, 90, 0]",
+                     "0.5, 0.5");
+  };
+  const auto plate = [](const std::string& place) {
+    return rectangle("wall", "position_m = [" + place + "]", "0.1, 0.1");
+  };
+  const std::pair<std::string, std::string> scenes[]{
+      {"the mirror ends before", beside(mirrorAt(1.5))},
+      {"between wall and mirror", beside(mirrorAt(1.0), plate("0.25, 0, 1.5"))},
+      {"between mirror and emitter", beside(mirrorAt(1.0), plate("0.25, 0, 0.5"))}};
+  for (const auto& [name, scene] : scenes)
+    expectPhasor(trace(sceneOf(scene), onePixel(80_MHz, 1, 2)), kDirect, name);
+  // In its way, but behind the mirror or beside the way.
+  expectPhasor(trace(sceneOf(beside(mirrorAt(1.0), plate("0.75, 0, 0.5") + plate("0.25, 0.2, 0.5"))),
+                     onePixel(80_MHz, 1, 2)),
+               kDirect + kMirrored, "beside");
+}
+
+/// Towards the mirror the emitter sends I(γ) with tan γ = 1/2.
+TEST(MirroredLight, HasTheEmittersPatternAndDelay) {
+  const Scene scene =
+      sceneOf(beside(rectangle("mirror", "position_m = [0.5, 0, 1]\neuler_deg = [0, 90, 0]", "0.5, 0.5")));
+  TraceRequest request = onePixel(80_MHz, 1, 2);
+  request.emitters = {EmitterSpec{.power_w = 2.0 * kPi / 3.0, .lobe_exponent = 2.0, .delay = 1_ns}};
+  const Complex late = std::polar(1.0, -wavenumber(80_MHz) * 1e-9 * kSpeedOfLight_m_per_s);
+  expectPhasor(trace(scene, request), (kDirect + kMirrored * 0.8) * late, "lobe");  // cos² γ = 4/5
+  request.emitters[0].half_angle = 20.0 * degree;
+  expectPhasor(trace(scene, request), kDirect * late, "outside of the cone");
+}
+
 struct Glossy {
   std::string keys;
   bsdf::Any model;
