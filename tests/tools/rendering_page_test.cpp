@@ -60,11 +60,11 @@ TEST(RenderingPage, ItsLinesRun) {
       EXPECT_EQ(ran.status, 0) << line << "\n" << ran.err;
     }
   }
-  EXPECT_EQ(run, 10);
-  for (const char* file :
-       {"range.png", "cloud.ply", "raw.npy", "frame.h5", "desk-color.png", "desk-infrared.png",
-        "desk-depth.png", "walk/frame-000003-flags.npy", "walk/frame-000003-range.png", "walk/frames.csv",
-        "walk.h5", "walk.mcap", "rgbd/frame-000001-color.png", "noise.h5"})
+  EXPECT_EQ(run, 11);
+  for (const char* file : {"range.png", "cloud.ply", "raw.npy", "frame.h5", "desk-color.png",
+                           "desk-infrared.png", "desk-depth.png", "corner.npy", "corner.npy.toml",
+                           "walk/frame-000003-flags.npy", "walk/frame-000003-range.png", "walk/frames.csv",
+                           "walk.h5", "walk.mcap", "rgbd/frame-000001-color.png", "noise.h5"})
     EXPECT_TRUE(std::filesystem::exists(folder / file)) << file;
 }
 

@@ -10,6 +10,7 @@
 #include "tools/cli/pose.h"
 #include "tools/cli/render_campaign.h"
 #include "tools/cli/render_images.h"
+#include "tools/cli/render_transient.h"
 #include "tools/cli/terminal.h"
 
 namespace toftwin::cli {
@@ -59,6 +60,14 @@ Result<> checkOptions(RenderOptions& options) {
                  "--overwrite has a meaning for campaigns only: one frame always "
                  "replaces what is there"};
   }
+  const bool is_for_frames = target.kind != TargetKind::Frame || options.images ||
+                             !options.output.plane_names.empty() || options.settings.keys.light_noise > 0_mm;
+  if (options.transient && (is_for_frames || !options.output.file.ends_with(".npy"))) {
+    return Error{
+        Error::Code::InvalidArgument,
+        "--transient writes one histogram into a file FILE.npy: leave out --frames, --trajectory, --images, "
+        "--plane and --light-noise-mm"};
+  }
   const bool stands = options.trajectory.empty();
   if (!stands && options.pose.isGiven())
     return Error{Error::Code::InvalidArgument,
@@ -86,6 +95,7 @@ Result<Exit> renderOne(const RenderOptions& options) {
 }
 
 Result<Exit> run(const RenderOptions& options) {
+  if (options.transient) return renderTransient(options);
   catchInterrupts();
   return targetOf(options).kind == TargetKind::Frame ? renderOne(options) : renderCampaign(options);
 }
@@ -143,6 +153,24 @@ void addSettings(Arguments& args, RenderSettings& settings) {
             "faster as there are raw exposures");
 }
 
+void addTransient(Arguments& args, RenderOptions& options) {
+  args.flag("--transient", options.transient,
+            "no frame, but the light of each pixel by the length of its way, from the emitter to the lens: "
+            "an array "
+            "bins x rows x columns (.npy), and FILE.npy.toml that says where the bins lie");
+  args.given<double>(
+          "--first-m", [&options](double m) { options.bins.first = m * metre; },
+          "with --transient: where the first bin begins, in metres of way, twice the range (default: 0)")
+      .within(0.0, 1e6);
+  args.given<double>(
+          "--bin-mm", [&options](double mm) { options.bins.width = mm * millimetre; },
+          "with --transient: how wide a bin is (default: 20)")
+      .within(1e-3, 1e6);
+  args.option("--bins", options.bins.count, "with --transient: how many there are")
+      .within(1, 100'000)
+      .showsDefault();
+}
+
 void addCampaign(Arguments& args, RenderOptions& options) {
   args.option("--trajectory", options.trajectory,
               "poses of the camera (.toml or .csv): between times it moves, without times each "
@@ -173,6 +201,7 @@ Command renderCommand() {
       "  toftwin render kinect_v2 --scene room.toml -o truth.npy --plane truth_range\n"
       "  toftwin render kinect_v2 --samples 64 -o raw.npy --plane samples\n"
       "  toftwin render kinect_v2 --scene desk.toml --samples 64 --images -o desk.png\n"
+      "  toftwin render kinect_v2 --scene desk.toml --samples 64 --transient --first-m 1 -o desk.npy\n"
       "  toftwin render o3d303 --scene room.toml --trajectory walk.csv -o walk/ --format png,ply\n"
       "  toftwin render o3d303 --scene room.toml --trajectory walk.csv -o walk.h5      resumes "
       "when it "
@@ -191,6 +220,7 @@ Command renderCommand() {
         options->pose.add(args);
         addCampaign(args, *options);
         addSettings(args, options->settings);
+        addTransient(args, *options);
         args.flag("--images", options->images,
                   "also FILE-infrared.png and FILE-depth.png as pictures to look at, and, for a "
                   "camera with a "

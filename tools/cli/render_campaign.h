@@ -6,6 +6,7 @@
 
 #include <toftwin/result.h>
 
+#include "sim/tracer/transient.h"
 #include "tools/cli/campaign/frame_maker.h"
 #include "tools/cli/campaign/target.h"
 #include "tools/cli/command.h"
@@ -27,6 +28,8 @@ struct RenderOptions {
   std::vector<Format> formats;
   bool overwrite = false;
   bool images = false;
+  bool transient = false;  ///< no frame, but light by the length of its way
+  sim::TransientBins bins{.first = 0_m, .width = 2_cm, .count = 500};
   RenderSettings settings{.since_power_on_s = drivers::simulator::Keys{}.powered_on_before.in(second),
                           .ambient_klx = drivers::simulator::Keys{}.ambient.in(kilolux),
                           .room_temperature_c = drivers::simulator::Keys{}.room_temperature.in(celsius)};

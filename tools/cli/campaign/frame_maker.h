@@ -55,6 +55,7 @@ class FrameMaker {
 
   [[nodiscard]] const Schedule& schedule() const { return schedule_; }
   [[nodiscard]] const sim::SensorModel& model() const { return model_; }
+  [[nodiscard]] const sim::Scene& scene() const { return view_.scene(); }
   [[nodiscard]] bool remembers() const { return model_.remembers(); }
   [[nodiscard]] const FrameMemory& memory() const { return memory_; }
   void remember(FrameMemory memory) { memory_ = std::move(memory); }

@@ -42,6 +42,10 @@ Result<Exported> toPly(const Frame& frame, const ExportOptions& options);
 Result<Exported> toNpy(const Frame& frame, const ExportOptions& options);
 Result<Exported> toCsv(const Frame& frame, const ExportOptions& options);
 
+/// What an NPY file of an array begins with: `type` as NumPy writes it ("<f4"), `shape` with commas ("3, 424,
+/// 512").
+std::vector<std::byte> npyHeader(std::string_view type, const std::string& shape);
+
 /// The frame in the format of the extension. Unsupported for HDF5, which is no stream of bytes.
 Result<Exported> exportBytes(const Frame& frame, const std::filesystem::path& file,
                              const ExportOptions& options);

@@ -60,6 +60,17 @@ Result<std::vector<TextColumn>> columnsOf(const Frame& frame, const ExportOption
 
 }  // namespace
 
+std::vector<std::byte> npyHeader(std::string_view type, const std::string& shape) {
+  std::string header = fmt::format("{{'descr': '{}', 'fortran_order': False, 'shape': ({}), }}", type, shape);
+  // Magic, version and length are 10 bytes; the data begins at a multiple of 64 after a line break.
+  header.append(64 - (10 + header.size() + 1) % 64, ' ');
+  header += '\n';
+  std::string start{"\x93NUMPY\x01\x00", 8};
+  start += static_cast<char>(header.size() & 0xff);
+  start += static_cast<char>(header.size() >> 8);
+  return bytesOf(start + header);
+}
+
 Result<Exported> toNpy(const Frame& frame, const ExportOptions& options) {
   const auto plane = choosePlane(frame, options.planes);
   if (!plane) return plane.error();
@@ -71,15 +82,7 @@ Result<Exported> toNpy(const Frame& frame, const ExportOptions& options) {
   const std::string shape =
       chosen.channels > 1 ? fmt::format("{}, {}, {}", chosen.channels, chosen.height, chosen.width)
                           : fmt::format("{}, {}", chosen.height, chosen.width);
-  std::string header =
-      fmt::format("{{'descr': '{}', 'fortran_order': False, 'shape': ({}), }}", type, shape);
-  // Magic, version and length are 10 bytes; the data begins at a multiple of 64 after a line break.
-  header.append(64 - (10 + header.size() + 1) % 64, ' ');
-  header += '\n';
-  std::string start{"\x93NUMPY\x01\x00", 8};
-  start += static_cast<char>(header.size() & 0xff);
-  start += static_cast<char>(header.size() >> 8);
-  Exported exported{bytesOf(start + header), {}};
+  Exported exported{npyHeader(type, shape), {}};
   const auto data = chosen.data.bytes();
   exported.bytes.insert(exported.bytes.end(), data.begin(), data.end());
   exported.note =
