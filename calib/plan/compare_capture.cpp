@@ -121,8 +121,8 @@ Result<ComparedCapture> compareCapture(const std::filesystem::path& run, const P
   if (!b) return ofCapture(record, b.error());
   ComparedCapture one;
   one.record = record;
-  one.seen = {seenOf(plan, record, a->stack, a->frames, how.shortest_period_m[0]),
-              seenOf(plan, record, b->stack, b->frames, how.shortest_period_m[1], record.pose_of_b)};
+  one.seen = {seenOf(plan, record, a->stack, a->frames, how.frequency_hz[0]),
+              seenOf(plan, record, b->stack, b->frames, how.frequency_hz[1], record.pose_of_b)};
   if (record.kind == nameOf(Kind::Moving)) return one;
   auto compared = compare::comparePose(a->stack, b->stack);
   if (!compared) return ofCapture(record, compared.error());

@@ -113,11 +113,7 @@ Result<ComparedRun> compareAll(const CompareRunJob& job, const RunFiles& files,
   const auto first = firstFramesOf(job.run, records);
   if (!first) return first.error();
   const auto shown = examplesOf(records);
-  CompareHow how{.stride = first->stride};
-  for (const std::size_t camera : {std::size_t{0}, std::size_t{1}}) {
-    const auto& all = first->frequency_hz[camera];
-    if (!all.empty()) how.shortest_period_m[camera] = 299'792'458.0 / 2.0 / all.back();
-  }
+  const CompareHow how{.stride = first->stride, .frequency_hz = first->frequency_hz};
   const unsigned workers = std::clamp(std::thread::hardware_concurrency(), 1u, 4u);
   std::vector<std::optional<Result<ComparedCapture>>> results(records.size());
   std::vector<compare::PoseComparison> wholes(records.size());

@@ -37,8 +37,8 @@ struct ComparedCapture {
 /// overlap. `whole`: also gives the comparison of all pixels. A plate that moves is not compared pixel by pixel.
 struct CompareHow {
   int stride = 1;
-  /// Of A and B: half a wavelength of the highest frequency; 0: not known
-  std::array<double, 2> shortest_period_m{};
+  std::array<std::vector<double>, 2>
+      frequency_hz{};  ///< of A's and B's modulation, ascending; empty: not known
 };
 Result<ComparedCapture> compareCapture(const std::filesystem::path& run, const Plan& plan,
                                        const CaptureRecord& record, const CompareHow& how,

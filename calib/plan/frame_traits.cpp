@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <map>
 
@@ -11,6 +12,7 @@
 
 #include "calib/compare/statistics.h"
 #include "calib/compare/traits/clusters.h"
+#include "calib/compare/traits/veil.h"
 
 namespace toftwin::plan {
 namespace {
@@ -35,19 +37,21 @@ void append(std::vector<double>& to, const std::vector<double>& from) {
   to.insert(to.end(), from.begin(), from.end());
 }
 
-/// What a camera is off by at a range, from its own wall at several distances: corners and plates are judged
-/// beside it.
-class OwnError {
+/// A column of a camera's own wall at several distances, by its range.
+class OverRange {
  public:
-  OwnError(const Captures& walls, std::size_t camera) {
+  OverRange(const Captures& walls, std::size_t camera,
+            const std::function<const std::vector<double>&(const CameraSeen&)>& column) {
     std::map<long, compare::Running> bins;
     for (const ComparedCapture* one : walls) {
       const CameraSeen& seen = one->seen[camera];
-      for (std::size_t i = 0; i < seen.wall_range_m.size(); ++i)
-        bins[std::lround(seen.wall_range_m[i] / kBin_m)].add(seen.wall_error_mm[i]);
+      for (std::size_t i = 0; i < seen.wall_range_m.size(); ++i) {
+        if (const double value = column(seen)[i]; std::isfinite(value))
+          bins[std::lround(seen.wall_range_m[i] / kBin_m)].add(value);
+      }
     }
-    for (const auto& [bin, errors] : bins)
-      range_m_.push_back(kBin_m * static_cast<double>(bin)), error_mm_.push_back(errors.mean());
+    for (const auto& [bin, values] : bins)
+      range_m_.push_back(kBin_m * static_cast<double>(bin)), mean_.push_back(values.mean());
   }
   /// Linear between bins; the nearest one's at most three bins beyond; NaN farther away.
   [[nodiscard]] double at(double range_m) const {
@@ -57,16 +61,23 @@ class OwnError {
     const bool has_low = i > 0 && isNear(i - 1), has_high = i < range_m_.size() && isNear(i);
     if (has_low && has_high) {
       const double share = (range_m - range_m_[i - 1]) / (range_m_[i] - range_m_[i - 1]);
-      return error_mm_[i - 1] + share * (error_mm_[i] - error_mm_[i - 1]);
+      return mean_[i - 1] + share * (mean_[i] - mean_[i - 1]);
     }
-    return has_low ? error_mm_[i - 1] : has_high ? error_mm_[i] : kNaN;
+    return has_low ? mean_[i - 1] : has_high ? mean_[i] : kNaN;
   }
   [[nodiscard]] bool isKnown() const { return range_m_.size() > 1; }
 
  private:
   static constexpr double kBin_m = 0.025;
-  std::vector<double> range_m_, error_mm_;
+  std::vector<double> range_m_, mean_;
 };
+
+/// What a camera is off by at a range: corners and plates are judged beside it.
+OverRange ownErrorOf(const Captures& walls, std::size_t camera) {
+  return {walls, camera, [](const CameraSeen& seen) -> const auto& {return seen.wall_error_mm;
+}
+};  // namespace
+}  // namespace toftwin::plan
 
 void addTiming(const ComparedRun& run, std::size_t camera, TraitCollector& all) {
   std::vector<std::vector<double>> series;
@@ -126,7 +137,7 @@ void addBands(const std::string& name, const Steps& steps, std::size_t camera, T
 }
 
 /// Distances to the edge in steps of 2.5 cm: pixels of one step are not independent rows.
-void addCorners(const ComparedRun& run, const OwnError& own, std::size_t camera, TraitCollector& all) {
+void addCorners(const ComparedRun& run, const OverRange& own, std::size_t camera, TraitCollector& all) {
   constexpr double kStep_m = 0.025;
   std::map<std::string, Steps> blocks;
   for (const ComparedCapture* one : ofKind(run, "corner")) {
@@ -154,22 +165,14 @@ void addCorners(const ComparedRun& run, const OwnError& own, std::size_t camera,
   }
 }
 
-void addPlates(const ComparedRun& run, const OwnError& own, std::size_t camera, TraitCollector& all) {
-  const Captures captures = ofKind(run, "foreground");
-  if (captures.empty()) return;
+/// All captures below each other, a row of nothing between them: what looks along rows takes them for one
+/// image.
+Image<float> belowEachOther(const Captures& captures, std::size_t camera) {
   int width = 1, height = 0;
-  std::vector<double> range, plate, ratio, error, place, value;
-  std::vector<std::size_t> number;
   for (const ComparedCapture* one : captures) {
-    const CameraSeen& seen = one->seen[camera];
-    width = std::max(width, seen.over_split.width()), height += seen.over_split.height() + 1;
-    append(place, seen.edge_place_px), append(value, seen.edge_value);
-    append(range, seen.wall_range_m), append(plate, seen.plate_range_m), append(ratio, seen.plate_over_own);
-    number.resize(range.size(), one->record.number);
-    for (std::size_t i = 0; i < seen.wall_range_m.size(); ++i)
-      error.push_back(seen.wall_error_mm[i] - (own.isKnown() ? own.at(seen.wall_range_m[i]) : 0.0));
+    const Image<float>& image = one->seen[camera].over_split;
+    width = std::max(width, image.width()), height += image.height() + 1;
   }
-  // All captures below each other, a row of nothing between them: both look along rows.
   Image<float> together(width, std::max(1, height), std::numeric_limits<float>::quiet_NaN());
   int top = 0;
   for (const ComparedCapture* one : captures) {
@@ -179,21 +182,51 @@ void addPlates(const ComparedRun& run, const OwnError& own, std::size_t camera, 
     }
     top += image.height() + 1;
   }
+  return together;
+}
+
+/// Errors of the wall beside the plate and what a veil would do to them, both less what they are at the same
+/// range before the wall alone: what goes with the range is the camera's own error, and the wall's light
+/// veils it, too.
+void addScatter(const Captures& plates, const Captures& walls, const std::vector<double>& frequency_hz,
+                std::size_t camera, TraitCollector& all) {
+  const OverRange own = ownErrorOf(walls, camera);
+  std::vector<OverRange> own_veil;
+  for (std::size_t f = 0; f < frequency_hz.size(); ++f)
+    own_veil.emplace_back(
+        walls, camera, [f](const CameraSeen& seen) -> const auto& { return seen.wall_veil_mm[f]; });
+  const auto beside = [](const OverRange& usual, double range_m) {
+    return usual.isKnown() ? usual.at(range_m) : 0.0;
+  };
+  std::vector<double> error_mm;
+  std::vector<std::vector<double>> veil_mm(frequency_hz.size());
+  std::vector<std::size_t> capture;
+  for (const ComparedCapture* one : plates) {
+    const CameraSeen& seen = one->seen[camera];
+    for (std::size_t i = 0; i < seen.wall_range_m.size(); ++i) {
+      error_mm.push_back(seen.wall_error_mm[i] - beside(own, seen.wall_range_m[i]));
+      for (std::size_t f = 0; f < veil_mm.size(); ++f)
+        veil_mm[f].push_back(seen.wall_veil_mm[f][i] - beside(own_veil[f], seen.wall_range_m[i]));
+      capture.push_back(one->record.number);
+    }
+  }
+  all.add("lens scatter", kNames[camera], compare::veilTraits(veil_mm, error_mm, frequency_hz, capture));
+}
+
+void addPlates(const ComparedRun& run, const Captures& walls, std::size_t camera, TraitCollector& all) {
+  const Captures captures = ofKind(run, "foreground");
+  if (captures.empty()) return;
+  std::vector<double> place, value;
+  for (const ComparedCapture* one : captures) {
+    const CameraSeen& seen = one->seen[camera];
+    append(place, seen.edge_place_px), append(value, seen.edge_value);
+  }
+  const Image<float> together = belowEachOther(captures, camera);
   all.add("flying pixels", kNames[camera], compare::flyingTraits(together));
   all.add("emitter shadow", kNames[camera], compare::shadowTraits(together, 1.0));
   all.add("edge in the amplitude", kNames[camera], compare::edgeTraits(place, value));
-  // The wall's own light veils it, too, by more than the plate's where frequencies are pulled to different
-  // sides.
   if (std::ranges::all_of(captures, [](const auto* one) { return isPoseFromPlanes(one->record); })) return;
-  if (run.frequency_hz[camera].size() > 1) {
-    all.untold(fmt::format(
-        "lens scatter of {}: it pulls each of {} frequencies another way, and what is left of the "
-        "plate's is not told from the veil of the wall's own light",
-        kNames[camera], run.frequency_hz[camera].size()));
-    return;
-  }
-  all.add("lens scatter", kNames[camera],
-          compare::veilTraits(range, plate, ratio, error, run.frequency_hz[camera], number));
+  addScatter(captures, walls, run.frequency_hz[camera], camera, all);
 }
 
 /// The first frame after each turn from bright to dark or back, against the frames that follow.
@@ -281,11 +314,10 @@ void addFrameTraits(const ComparedRun& run, TraitCollector& all) {
   Captures walls = ofKind(run, "distance");
   if (walls.empty()) walls = ofKind(run, "warm_up");
   for (std::size_t camera : {std::size_t{0}, std::size_t{1}}) {
-    const OwnError own{walls, camera};
     addTiming(run, camera, all);
     if (!walls.empty()) addWraps(walls, camera, all);
-    addCorners(run, own, camera, all);
-    addPlates(run, own, camera, all);
+    addCorners(run, ownErrorOf(walls, camera), camera, all);
+    addPlates(run, walls, camera, all);
     addLag(run, camera, all);
     addMotion(run, camera, all);
   }

@@ -26,8 +26,13 @@ const BlockSpec* blockOf(const Plan& plan, const CaptureRecord& record) {
 }
 
 /// Cells of the wall that are valid in most pixels and not gross.
-void addWall(const compare::Stack& stack, const Image<float>& expected_m, double period_m, CameraSeen& seen) {
+void addWall(const compare::Stack& stack, const Image<float>& expected_m,
+             std::span<const double> frequency_hz, CameraSeen& seen) {
   const Image<float> range = stack.meanRange_m(), amplitude = stack.meanAmplitude();
+  const double period_m =
+      frequency_hz.empty() ? 0.0 : unambiguousRange(frequency_hz.back() * hertz).in(metre);
+  const Veil veil{range, amplitude, frequency_hz};
+  seen.wall_veil_mm.resize(frequency_hz.size());
   for (int top = 0; top < range.height(); top += kCell) {
     for (int left = 0; left < range.width(); left += kCell) {
       double e_sum = 0.0, r_sum = 0.0, a_sum = 0.0, count = 0.0, wrapped = 0.0, there = 0.0, all = 0.0;
@@ -47,6 +52,7 @@ void addWall(const compare::Stack& stack, const Image<float>& expected_m, double
       seen.wall_range_m.push_back(r_sum / count), seen.wall_error_mm.push_back(e_sum / count);
       seen.wall_amplitude.push_back(amplitude.empty() ? std::nan("") : a_sum / count);
       seen.wall_wrapped.push_back(wrapped / there);
+      addVeil(veil, seen);
     }
   }
 }
@@ -93,8 +99,9 @@ void addCorner(const Plan& plan, const BlockSpec& block, const Transform<World, 
 
 void leaveOutErrors(CameraSeen& seen) {
   for (auto* column : {&seen.wall_range_m, &seen.wall_error_mm, &seen.wall_amplitude, &seen.corner_place_m,
-                       &seen.corner_range_m, &seen.corner_error_mm, &seen.plate_range_m, &seen.plate_over_own})
+                       &seen.corner_range_m, &seen.corner_error_mm})
     column->clear();
+  for (auto& column : seen.wall_veil_mm) column.clear();
 }
 
 }  // namespace
@@ -139,7 +146,7 @@ Result<ReadFrame> readOf(const Frame& frame) {
 }
 
 CameraSeen seenOf(const Plan& plan, const CaptureRecord& record, const compare::Stack& stack,
-                  const std::vector<ReadFrame>& frames, double shortest_period_m,
+                  const std::vector<ReadFrame>& frames, std::span<const double> frequency_hz,
                   const std::optional<Transform<World, Camera>>& own_pose) {
   CameraSeen seen;
   seen.is_simulated = stack.provenance().kind == FrameKind::Simulated;
@@ -157,7 +164,7 @@ CameraSeen seenOf(const Plan& plan, const CaptureRecord& record, const compare::
     case Kind::Exposure:
     case Kind::Tilt: {
       const auto expected = wallRange_m(plan, *block, stack.camera(), *pose);
-      addWall(stack, expected, shortest_period_m, seen);
+      addWall(stack, expected, frequency_hz, seen);
       if (block->kind != Kind::Tilt) addNoise(frames, expected, seen);
       break;
     }
@@ -165,7 +172,7 @@ CameraSeen seenOf(const Plan& plan, const CaptureRecord& record, const compare::
       addCorner(plan, *block, *pose, stack, seen);
       break;
     case Kind::Foreground:
-      addPlate(wallRange_m(plan, *block, stack.camera(), *pose), stack, seen);
+      addPlate(wallRange_m(plan, *block, stack.camera(), *pose), stack, frequency_hz, seen);
       break;
     case Kind::Moving:
       addMovingPlate(wallRange_m(plan, *block, stack.camera(), *pose), stack.camera(), frames, seen);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -25,10 +26,10 @@ struct CameraSeen {
   std::vector<double> wall_range_m{}, wall_error_mm{}, wall_amplitude{}, wall_wrapped{};
   std::vector<compare::Trait> noise{};  ///< of the frames' errors at the middle of the image
   std::vector<double> corner_place_m{}, corner_range_m{}, corner_error_mm{};
-  /// Of a plate before the wall: the image scaled so that 1 lies halfway between, its light over that of one
-  /// pixel of the wall, its range.
-  Image<float> over_split{};
-  std::vector<double> plate_range_m{}, plate_over_own{};  ///< beside the wall's columns
+  /// By how much a veil of 1 would move the wall's cells, a column for each frequency beside the wall's; NaN
+  /// without an amplitude.
+  std::vector<std::vector<double>> wall_veil_mm{};
+  Image<float> over_split{};  ///< of a plate before the wall: scaled so that 1 lies halfway between
   std::vector<double> edge_place_px{}, edge_value{};      ///< across the plate's left and right edges
   std::vector<double> plate_time_s{}, plate_place_m{},
       plate_turn_mm{};  ///< frame by frame, of a moving plate
@@ -50,9 +51,10 @@ bool isPoseFromPlanes(const CaptureRecord& record);
 Result<ReadFrame> readOf(const Frame& frame);
 /// What such blocks give; NaN and empty columns where the plan does not say what stands there. Where
 /// isPoseFromPlanes(), no errors against walls: their columns are empty but for wall_wrapped, which is off by
-/// periods. `own_pose`: where the camera saw itself, if that is not the pose that its frames say.
+/// periods. `frequency_hz`: of modulation, ascending; empty where it is not known. `own_pose`: where the
+/// camera saw itself, if that is not the pose that its frames say.
 CameraSeen seenOf(const Plan& plan, const CaptureRecord& record, const compare::Stack& stack,
-                  const std::vector<ReadFrame>& frames, double shortest_period_m,
+                  const std::vector<ReadFrame>& frames, std::span<const double> frequency_hz,
                   const std::optional<Transform<World, Camera>>& own_pose = std::nullopt);
 
 /// Range to the target's wall along each pixel's ray; NaN where it is not before the camera, or ends.

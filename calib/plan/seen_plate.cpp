@@ -97,15 +97,11 @@ void addEdge(const Image<float>& amplitude, const Plate& plate, bool is_left, Ca
   }
 }
 
-/// Cells of the wall that the plate is not near, with the plate's light over their own: all of it, as if it
-/// were spread evenly over the image.
+/// Cells of the wall that the plate is not near.
 void addBehind(const Image<float>& range_m, const Image<float>& wall_m, const Image<float>& amplitude,
-               const Plate& plate, CameraSeen& seen) {
-  double light = 0.0;
-  for (std::size_t i = 0; i < amplitude.size(); ++i) {
-    if (plate.is[i] != 0 && std::isfinite(amplitude[i])) light += static_cast<double>(amplitude[i]);
-  }
-  light /= static_cast<double>(amplitude.size());
+               const Plate& plate, std::span<const double> frequency_hz, CameraSeen& seen) {
+  const Veil veil{range_m, amplitude, frequency_hz};
+  seen.wall_veil_mm.resize(frequency_hz.size());
   const auto isFree = [&](int x, int y) {
     for (int dy = -kBeside; dy <= kBeside; ++dy) {
       for (int dx = -kBeside; dx <= kBeside; ++dx) {
@@ -130,7 +126,7 @@ void addBehind(const Image<float>& range_m, const Image<float>& wall_m, const Im
       if (count < 0.75 * kCells * kCells) continue;
       seen.wall_range_m.push_back(r / count), seen.wall_error_mm.push_back(e / count);
       seen.wall_amplitude.push_back(a / count), seen.wall_wrapped.push_back(0.0);
-      seen.plate_range_m.push_back(plate.range_m), seen.plate_over_own.push_back(light / (a / count));
+      addVeil(veil, seen);
     }
   }
 }
@@ -145,7 +141,13 @@ std::optional<double> timeOf(const ReadFrame& frame, bool is_simulated) {
 
 }  // namespace
 
-void addPlate(const Image<float>& wall_m, const compare::Stack& stack, CameraSeen& seen) {
+void addVeil(const Veil& veil, CameraSeen& seen) {
+  const auto slopes = veil.slopes_mm(seen.wall_range_m.back(), seen.wall_amplitude.back());
+  for (std::size_t f = 0; f < slopes.size(); ++f) seen.wall_veil_mm[f].push_back(slopes[f]);
+}
+
+void addPlate(const Image<float>& wall_m, const compare::Stack& stack, std::span<const double> frequency_hz,
+              CameraSeen& seen) {
   const Image<float> range = stack.meanRange_m(), amplitude = stack.meanAmplitude();
   const auto plate = plateIn(range, wall_m);
   if (!plate) return;
@@ -156,7 +158,7 @@ void addPlate(const Image<float>& wall_m, const compare::Stack& stack, CameraSee
   if (amplitude.empty()) return;
   addEdge(amplitude, *plate, true, seen);
   addEdge(amplitude, *plate, false, seen);
-  addBehind(range, wall_m, amplitude, *plate, seen);
+  addBehind(range, wall_m, amplitude, *plate, frequency_hz, seen);
 }
 
 void addMovingPlate(const Image<float>& wall_m, const CameraInfo& camera,

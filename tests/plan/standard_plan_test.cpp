@@ -16,7 +16,7 @@ namespace {
 
 constexpr const char* kPlans = TOFTWIN_SOURCE_DIR "/docs/examples/plans/";
 
-/// {0}: more effects.
+/// {0}: how it measures range; {1}: more effects.
 constexpr const char* kSmall = R"(model = "small"
 [lens]
 width = 96
@@ -28,18 +28,9 @@ cy = 35.5
 [[emitter]]
 position_mm = [40.0, 0.0, 0.0]
 power_w = 1.0
-[[modulation]]
-frequency_mhz = 20.0
-exposure_us = 1000.0
-[sampling]
-steps = 4
-frame_interval_ms = 33.333333
 [pixel]
 electrons_per_radiance_s = 3e9
-[decoder]
-algorithm = "n_phase"
-nearest_m = 0.1
-farthest_m = 7.4
+{}
 [[effect]]
 type = "shot_noise"
 [[effect]]
@@ -53,21 +44,50 @@ type = "low_amplitude_filter"
 minimum_electrons = 60.0
 {}
 )";
+constexpr const char* kOneFrequency = R"([[modulation]]
+frequency_mhz = 20.0
+exposure_us = 1000.0
+[sampling]
+steps = 4
+frame_interval_ms = 33.333333
+[decoder]
+algorithm = "n_phase"
+nearest_m = 0.1
+farthest_m = 7.4
+)";
+constexpr const char* kKinectV2 = R"([[modulation]]
+frequency_mhz = 80.0
+exposure_us = 1000.0
+[[modulation]]
+frequency_mhz = 16.0
+exposure_us = 1000.0
+[[modulation]]
+frequency_mhz = 120.0
+exposure_us = 1000.0
+[sampling]
+steps = 3
+frame_interval_ms = 33.333333
+[decoder]
+algorithm = "kinect_v2"
+nearest_m = 0.1
+farthest_m = 18.7
+)";
 /// What A has and the twin has not.
 constexpr double kVeil = 0.03, kLag = 0.05;
 
 class StandardPlan : public WithDaemon {
  protected:
+  virtual std::string rangesBy() const { return kOneFrequency; }
   std::string moreSources() const override {
     const auto write = [&](const std::string& name, const std::string& text) {
       std::ofstream{folder_ / name} << text;
     };
-    write(
-        "cam.toml",
-        fmt::format(kSmall, fmt::format("[[effect]]\ntype = 'lens_scatter'\nveil = {}\nhalo = 0.0\n"
-                                        "[[effect]]\ntype = 'lag'\nexposure_share = 0.0\nframe_share = {}\n",
-                                        kVeil, kLag)));
-    write("twin.toml", fmt::format(kSmall, ""));
+    write("cam.toml",
+          fmt::format(kSmall, rangesBy(),
+                      fmt::format("[[effect]]\ntype = 'lens_scatter'\nveil = {}\nhalo = 0.0\n"
+                                  "[[effect]]\ntype = 'lag'\nexposure_share = 0.0\nframe_share = {}\n",
+                                  kVeil, kLag)));
+    write("twin.toml", fmt::format(kSmall, rangesBy(), ""));
     std::string all;
     for (const auto& [name, seed] : {std::pair{"cam", 1}, {"twin", 2}}) {
       for (const char* scene : {"wall", "checkerboard", "bright-dark", "foreground", "corner-60", "corner-90",
@@ -180,6 +200,33 @@ TEST_F(StandardPlan, TellsEveryCharacteristicOfBothCameras) {
   EXPECT_THAT(toftwin("trend " + path("lab.sqlite") + " --camera nobody").err,
               testing::HasSubstr("nothing of a camera"));
   EXPECT_THAT(toftwin("log " + path("none.sqlite")).err, testing::HasSubstr("there is no such log"));
+}
+
+class StandardPlanOfAKinect : public StandardPlan {
+  std::string rangesBy() const override { return kKinectV2; }
+};
+
+/// The decoder's weights of 80, 16 and 120 MHz are what joins the frequencies' errors. What both cameras read
+/// of the plate's light that comes by the wall is not the lens's, and their difference is.
+TEST_F(StandardPlanOfAKinect, TellsLensScatterByItsDecodersWeights) {
+  const Ran measured =
+      run(fmt::format("measure {}standard.toml cam twin -o {} --prepared --skip "
+                      "warm-up,exposure,ambient,tilt,near-field,checkerboard,bright-dark,corner-60,corner-90,"
+                      "corner-120,moving,dark,"
+                      "locked,end",
+                      kPlans, path("run")));
+  ASSERT_EQ(measured.status, 0) << measured.err;
+  const Ran compared = toftwin(fmt::format("compare {} -o {}", path("run"), path("report")));
+  ASSERT_EQ(compared.status, 0) << compared.err;
+  const compare::Json told = characteristics();
+  std::map<std::string, double> veil;
+  for (std::size_t i = 0; i < told.find("rows")->size(); ++i) {
+    const compare::Json& row = told.find("rows")->at(i);
+    if (row.find("characteristic")->words() == "lens scatter")
+      veil[row.find("of")->words()] = row.find("value")->number();
+  }
+  ASSERT_EQ(veil.size(), 2u);
+  EXPECT_NEAR(veil["A"] - veil["B"], kVeil, 0.01) << "to a third, as above";
 }
 
 }  // namespace

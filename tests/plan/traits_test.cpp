@@ -226,15 +226,16 @@ TEST(Seen, LeavesErrorsOutWhereThePoseWasFittedToTheCamerasOwnPlanes) {
   ASSERT_TRUE(stack.add(frame));
   CaptureRecord record{.block = "b", .kind = "distance"};
   record.pose_by = "rig";
-  const CameraSeen by_rig = seenOf(plan, record, stack, {}, 5.0);
+  const std::vector<double> frequency_hz{kFrequency_hz};
+  const CameraSeen by_rig = seenOf(plan, record, stack, {}, frequency_hz);
   ASSERT_FALSE(by_rig.wall_error_mm.empty());
   EXPECT_NEAR(by_rig.wall_error_mm.front(), 5.0, 0.01);
   // From where it saw itself, 3 mm behind, the wall is as much farther.
   const Transform<World, Camera> behind{{1.0, 0.0, 0.0, 0.0}, {0.0, 0.0, -0.003}};
-  const CameraSeen by_itself = seenOf(plan, record, stack, {}, 5.0, behind);
+  const CameraSeen by_itself = seenOf(plan, record, stack, {}, frequency_hz, behind);
   EXPECT_NEAR(by_itself.wall_error_mm.front(), 5.0 - 3.0 / rayThroughPixel(frame.camera, 3.5, 3.5).v.z, 0.2);
   record.pose_by = "planes";
-  const CameraSeen by_planes = seenOf(plan, record, stack, {}, 5.0);
+  const CameraSeen by_planes = seenOf(plan, record, stack, {}, frequency_hz);
   EXPECT_TRUE(by_planes.wall_error_mm.empty() && by_planes.wall_range_m.empty());
   EXPECT_EQ(by_planes.wall_wrapped, by_rig.wall_wrapped);
   ComparedRun run = plantedRun();

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "calib/compare/traits/clusters.h"
+#include "calib/compare/traits/veil.h"
 #include "calib/compare/traits/least_squares.h"
 
 namespace toftwin::compare {
@@ -64,17 +65,19 @@ std::vector<double> slopesOf(const std::vector<double>& own, const std::vector<d
 
 /// The constant, and what the veil does: a column for each frequency, or where it is known what each weighs,
 /// one.
-std::vector<std::vector<double>> columnsOf(const std::vector<std::vector<double>>& rows,
+std::vector<std::vector<double>> columnsOf(std::span<const std::vector<double>> slopes_mm,
                                            std::span<const double> frequency_hz) {
-  std::vector<std::vector<double>> columns{std::vector<double>(rows[0].size(), 1.0)};
-  for (const double f : frequency_hz) columns.push_back(slopesOf(rows[0], rows[1], rows[2], f));
+  std::vector<std::vector<double>> columns{std::vector<double>(slopes_mm.front().size(), 1.0)};
   const std::vector<double> weights = rangeWeights(frequency_hz);
-  if (weights.empty()) return columns;
-  std::vector<double> joined(rows[0].size(), 0.0);
-  for (std::size_t f = 0; f < weights.size(); ++f) {
-    for (std::size_t i = 0; i < joined.size(); ++i) joined[i] += weights[f] * columns[f + 1][i];
+  if (weights.empty()) {
+    columns.insert(columns.end(), slopes_mm.begin(), slopes_mm.end());
+    return columns;
   }
-  return {columns.front(), joined};
+  std::vector<double>& joined = columns.emplace_back(slopes_mm.front().size(), 0.0);
+  for (std::size_t f = 0; f < weights.size(); ++f) {
+    for (std::size_t i = 0; i < joined.size(); ++i) joined[i] += weights[f] * slopes_mm[f][i];
+  }
+  return columns;
 }
 
 std::optional<Trait> veilByCaptures(const std::vector<std::vector<double>>& columns, Column error_mm,
@@ -111,26 +114,42 @@ std::vector<double> rangeWeights(std::span<const double> frequency_hz) {
   return weights;
 }
 
-Traits veilTraits(Column own_range_m, Column plate_range_m, Column plate_over_own, Column error_mm,
+Traits veilTraits(std::span<const std::vector<double>> slopes_mm, Column error_mm,
                   std::span<const double> frequency_hz, std::span<const std::size_t> cluster) {
-  const std::vector<double> numbers(cluster.begin(), cluster.end());
-  const auto rows =
-      finiteRows({own_range_m, plate_range_m, plate_over_own, error_mm, numbers}, 8, "lens scatter");
-  if (!rows) return rows.error();
   if (frequency_hz.empty() || !(std::ranges::min(frequency_hz) > 0.0))
     return undetermined("lens scatter", "the frames say no modulation frequency");
-  const auto columns = columnsOf(*rows, frequency_hz);
-  const std::vector<std::size_t> captures((*rows)[4].begin(), (*rows)[4].end());
-  const Column error = (*rows)[3];
+  std::vector<std::vector<double>> slopes(slopes_mm.size());
+  std::vector<double> errors;
+  std::vector<std::size_t> captures;
+  for (std::size_t i = 0; i < error_mm.size(); ++i) {
+    const auto isTold = [i](const std::vector<double>& column) { return std::isfinite(column[i]); };
+    if (!std::isfinite(error_mm[i]) || !std::ranges::all_of(slopes_mm, isTold)) continue;
+    for (std::size_t f = 0; f < slopes.size(); ++f) slopes[f].push_back(slopes_mm[f][i]);
+    errors.push_back(error_mm[i]), captures.push_back(cluster[i]);
+  }
+  if (errors.size() < 8) return undetermined("lens scatter", "fewer than eight of its rows are finite");
+  const auto columns = columnsOf(slopes, frequency_hz);
   // Fewer than three captures do not tell how captures differ.
   const bool is_by_captures = std::set<std::size_t>(captures.begin(), captures.end()).size() >= 3;
-  const auto veil = is_by_captures ? veilByCaptures(columns, error, captures) : veilByRows(columns, error);
+  const auto veil = is_by_captures ? veilByCaptures(columns, errors, captures) : veilByRows(columns, errors);
   if (!veil) {
     return undetermined("lens scatter",
                         "the plate adds no light whose share could be told, or the frequencies are "
                         "too near each other");
   }
   return std::vector{*veil};
+}
+
+Traits veilTraits(Column own_range_m, Column plate_range_m, Column plate_over_own, Column error_mm,
+                  std::span<const double> frequency_hz, std::span<const std::size_t> cluster) {
+  const std::vector<double> numbers(cluster.begin(), cluster.end());
+  const auto rows =
+      finiteRows({own_range_m, plate_range_m, plate_over_own, error_mm, numbers}, 8, "lens scatter");
+  if (!rows) return rows.error();
+  std::vector<std::vector<double>> slopes;
+  for (const double f : frequency_hz) slopes.push_back(slopesOf((*rows)[0], (*rows)[1], (*rows)[2], f));
+  const std::vector<std::size_t> captures((*rows)[4].begin(), (*rows)[4].end());
+  return veilTraits(slopes, (*rows)[3], frequency_hz, captures);
 }
 
 Traits veilTraits(Column own_range_m, Column plate_range_m, Column plate_over_own, Column error_mm,
