@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -36,6 +38,12 @@ Result<const Chunk*> chunkOf(const FrameContent& content, ChunkType type,
   return chunk;
 }
 
+bool hasSeveralExposures(const FrameContent& content) {
+  constexpr std::array<std::uint32_t, 3> kNotSaid{};
+  const auto& times_us = content.exposures_us.value_or(kNotSaid);
+  return std::ranges::count_if(times_us, [](std::uint32_t us) { return us > 0; }) > 1;
+}
+
 }  // namespace
 
 Result<std::vector<Plane>> planesOf(const FrameContent& content,
@@ -55,7 +63,9 @@ Result<std::vector<Plane>> planesOf(const FrameContent& content,
   auto flags = bytesOf(**confidence);
   if (!flags) return flags.error();
   Image<float> depth_m{range_m->width(), range_m->height()};
+  Image<std::uint8_t> exposure{range_m->width(), range_m->height()};
   for (std::size_t i = 0; i < range_m->size(); ++i) {
+    exposure[i] = toftwin::o3d303::exposureOf((*flags)[i]);
     unsigned flag = toftwin::o3d303::flagsOf((*flags)[i]);
     // The confidence decides, and a distance of zero is none, whatever it says.
     if (std::isnan((*range_m)[i])) flag |= kInvalid;
@@ -68,6 +78,7 @@ Result<std::vector<Plane>> planesOf(const FrameContent& content,
   planes.push_back(toPlane(PlaneKind::Depth, std::move(depth_m)));
   planes.push_back(toPlane(PlaneKind::Amplitude, *std::move(strength)));
   planes.push_back(toPlane(PlaneKind::Flags, *std::move(flags)));
+  if (hasSeveralExposures(content)) planes.push_back(toPlane(PlaneKind::Exposure, std::move(exposure)));
   return planes;
 }
 

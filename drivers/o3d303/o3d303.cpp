@@ -70,6 +70,9 @@ class O3d303Source final : public Source {
     info_.kind = FrameKind::Real;
     info_.camera = std::move(calibration.camera);
     info_.planes = {PlaneKind::Range, PlaneKind::Depth, PlaneKind::Amplitude, PlaneKind::Flags};
+    const auto type = configuration_.imager.find("Type");
+    if (type != configuration_.imager.end() && !type->second.ends_with("_low"))
+      info_.planes.push_back(PlaneKind::Exposure);
     info_.can_trigger = configuration_.application["TriggerMode"] != "1";
     if (!info_.can_trigger) info_.frame_interval = frameInterval();
     for (const Adjustable& one : kAdjustables) {
@@ -199,6 +202,8 @@ class O3d303Source final : public Source {
     losses_.account(skippedBefore(header.frame_count), "the camera counted it and did not send it");
     losses_.tell(frame);
     frame.planes = *std::move(planes);
+    info_.planes.clear();  // another program may have set another number of exposures
+    for (const Plane& plane : frame.planes) info_.planes.push_back(plane.kind);
     frame.camera = info_.camera;
     frame.provenance.kind = info_.kind;
     frame.provenance.calibration_id = info_.camera.calibration_id;

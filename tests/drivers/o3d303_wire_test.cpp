@@ -138,10 +138,20 @@ TEST(FrameContent, NumbersAfterTheirMarkersAreRead) {
   EXPECT_EQ(frame->exposures_us, (std::array<std::uint32_t, 3>{11, 550, 0}));
 }
 
-TEST(Confidence, ComesBackThroughTheFlagsExceptForWhichExposureItWas) {
+TEST(Confidence, ComesBackThroughTheFlagsAndTheExposure) {
   for (unsigned byte = 0; byte < 256; ++byte) {
-    EXPECT_EQ(confidenceOf(flagsOf(static_cast<std::uint8_t>(byte))), byte & 0xCFU) << byte;
+    const auto confidence = static_cast<std::uint8_t>(byte);
+    const unsigned back = confidenceOf(flagsOf(confidence)) | confidenceOfExposure(exposureOf(confidence));
+    const bool is_used = (byte & 0x30U) != 0;
+    EXPECT_EQ(back, is_used ? byte : byte | 0x30U) << byte;
   }
+}
+
+TEST(Confidence, CountsExposuresFromTheLongest) {
+  EXPECT_EQ(exposureOf(0x30), 0);
+  EXPECT_EQ(exposureOf(0x20), 1);
+  EXPECT_EQ(exposureOf(0x10), 2);
+  EXPECT_EQ(exposureOf(0x00), 0) << "not used";
 }
 
 // ---- a real frame ------------------------------------------------------------------------------

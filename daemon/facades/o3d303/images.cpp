@@ -40,9 +40,6 @@ Result<std::vector<std::uint16_t>> distancesOf(const Frame& frame, const LensChu
   return distance_mm;
 }
 
-/// 11: the longest exposure, 10: the shorter one, 01: the shortest of three (the vendor's description).
-unsigned exposureBits(unsigned index) { return (3U - std::min(index, 2U)) << 4; }
-
 }  // namespace
 
 FrameFacts factsOf(const Frame& frame) {
@@ -121,7 +118,8 @@ Result<CameraImages> imagesOf(const Frame& frame, const LensChunks& lens, double
     }
     unsigned confidence =
         flags != nullptr ? toftwin::o3d303::confidenceOf(flags->as<std::uint8_t>()[i]) : std::uint8_t{0};
-    confidence |= exposureBits(exposure != nullptr ? exposure->as<std::uint8_t>()[i] : 0U);
+    confidence |=
+        toftwin::o3d303::confidenceOfExposure(exposure != nullptr ? exposure->as<std::uint8_t>()[i] : 0U);
     if (images.distance_mm[i] == 0) confidence |= static_cast<unsigned>(Confidence::Invalid);
     if ((confidence & static_cast<unsigned>(Confidence::Invalid)) != 0) images.distance_mm[i] = 0;
     images.confidence[i] = static_cast<std::uint8_t>(confidence);

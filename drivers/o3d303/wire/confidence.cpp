@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "drivers/o3d303/wire/confidence.h"
 
+#include <algorithm>
 #include <array>
 #include <utility>
 
@@ -17,6 +18,8 @@ constexpr std::array<std::pair<Confidence, PixelFlag>, 6> kPairs{{
     {Confidence::Clipped, PixelFlag::OutOfRange},
     {Confidence::Suspect, PixelFlag::UnwrapUnreliable},
 }};
+
+constexpr unsigned kLongestExposure = 3, kExposureShift = 4;
 
 constexpr unsigned bits(auto flag) { return static_cast<unsigned>(flag); }
 
@@ -36,6 +39,16 @@ std::uint8_t confidenceOf(std::uint8_t flags) {
     if ((flags & bits(ours)) != 0) confidence |= bits(theirs);
   }
   return static_cast<std::uint8_t>(confidence);
+}
+
+std::uint8_t exposureOf(std::uint8_t confidence) {
+  const unsigned number = (confidence & bits(Confidence::Exposure)) >> kExposureShift;
+  return static_cast<std::uint8_t>(number == 0 ? 0 : kLongestExposure - number);
+}
+
+std::uint8_t confidenceOfExposure(unsigned index) {
+  return static_cast<std::uint8_t>((kLongestExposure - std::min(index, kLongestExposure - 1))
+                                   << kExposureShift);
 }
 
 }  // namespace toftwin::o3d303

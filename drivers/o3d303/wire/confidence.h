@@ -18,9 +18,16 @@ enum class Confidence : std::uint8_t {
 };
 
 /// PixelFlag bits. Clipped becomes OutOfRange and Suspect UnwrapUnreliable: what most often makes a
-/// range suspect is that it may be a period off. The exposure is lost.
+/// range suspect is that it may be a period off. The exposure is no flag.
 std::uint8_t flagsOf(std::uint8_t confidence);
 /// The other way; flags that the camera does not know are lost (a Mixed pixel is Suspect).
 std::uint8_t confidenceOf(std::uint8_t flags);
+
+/// Which exposure a pixel is of, counted from 0, the longest. In the byte 11 is the longest, 10 the shorter
+/// of two, 01 the shortest of three, and 00 is not used, and taken as the longest (ifm3d,
+/// doc/O3D_confidence.md).
+std::uint8_t exposureOf(std::uint8_t confidence);
+/// The other way, of the first three.
+std::uint8_t confidenceOfExposure(unsigned index);
 
 }  // namespace toftwin::o3d303
