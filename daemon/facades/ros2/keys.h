@@ -21,7 +21,7 @@ struct Keys {
   std::string name;
   int domain = 0;
   DepthFormat depth_format = DepthFormat::Metres;
-  Reliability reliability = Reliability::BestEffort;
+  Reliability reliability = Reliability::Reliable;
   int keep_last = 5;
   StampClock clock = StampClock::Host;
   std::string frame_id;
@@ -43,8 +43,10 @@ struct Keys {
     v.choice(
         "reliability", reliability,
         {{"best_effort", Reliability::BestEffort}, {"reliable", Reliability::Reliable}},
-        "of images, points and camera info: as ROS 2's sensor data, or sent again until read; a reader that "
-        "asks for reliable ones (rviz2 does by default) gets nothing from best_effort");
+        "of images, points and camera info: sent again until read, to those readers that ask for that; or "
+        "once, "
+        "as ROS 2's sensor data, of which a reader that asks for reliable ones (the default of rviz2 and of "
+        "subscriptions) gets nothing");
     v.number("keep_last", keep_last, {1, 100}, "messages of a topic that wait for a slow reliable reader");
     v.choice("clock", clock, {{"host", StampClock::Host}, {"device", StampClock::Device}},
              "of header.stamp, when the first exposure began: this machine's clock, as ROS time is, or the "

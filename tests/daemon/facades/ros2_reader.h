@@ -131,7 +131,8 @@ class CdrWriter {
   Cdr bytes_{0, 1, 0, 0};
 };
 
-enum class Asks { SensorData, Reliable, Latched };
+/// Nothing: as the library has a reader by default.
+enum class Asks { Nothing, SensorData, Reliable, Latched };
 
 /// A participant on the loopback interface alone.
 class RosProgram {
@@ -158,15 +159,19 @@ class RosProgram {
 
   dds::DataReader* read(const std::string& name, const char* type, Asks asks = Asks::SensorData) {
     dds::DataReaderQos qos = dds::DATAREADER_QOS_DEFAULT;
+    // Of messages without a longest one.
+    qos.endpoint().history_memory_policy = rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
+    if (asks != Asks::Nothing) choose(qos, asks);
+    return participant_->create_subscriber(dds::SUBSCRIBER_QOS_DEFAULT)
+        ->create_datareader(topic(name, type), qos);
+  }
+  static void choose(dds::DataReaderQos& qos, Asks asks) {
     qos.reliability().kind =
         asks == Asks::SensorData ? dds::BEST_EFFORT_RELIABILITY_QOS : dds::RELIABLE_RELIABILITY_QOS;
     qos.durability().kind =
         asks == Asks::Latched ? dds::TRANSIENT_LOCAL_DURABILITY_QOS : dds::VOLATILE_DURABILITY_QOS;
     qos.history().kind = dds::KEEP_LAST_HISTORY_QOS;
     qos.history().depth = 50;
-    qos.endpoint().history_memory_policy = rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
-    return participant_->create_subscriber(dds::SUBSCRIBER_QOS_DEFAULT)
-        ->create_datareader(topic(name, type), qos);
   }
   dds::DataWriter* write(const std::string& name, const char* type) {
     dds::DataWriterQos qos = dds::DATAWRITER_QOS_DEFAULT;
