@@ -149,7 +149,8 @@ ConfiguredFacade readFacade(settings::Table& table, std::span<const FacadeKind> 
   FacadeKeys keys = readFacadeKeys(table, sources);
   std::string fingerprint = table.resolve("").string() + "\n" + table.canonicalText() + "\n" + stampsOf(table);
   const auto kind = std::ranges::find(facades, std::string_view{keys.kind}, &FacadeKind::name);
-  ConfiguredFacade facade{std::move(keys), std::move(fingerprint), {}};
+  Unevenness unevenness = Unevenness::read(table, keys.intervals);
+  ConfiguredFacade facade{std::move(keys), std::move(unevenness), std::move(fingerprint), {}};
   if (kind != facades.end() && kind->not_built.empty()) {
     facade.start = kind->read(table);
     return facade;

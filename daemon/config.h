@@ -152,6 +152,7 @@ struct ConfiguredSource {
 /// A facade as configured; `start` starts it.
 struct ConfiguredFacade {
   FacadeKeys keys;
+  Unevenness unevenness;    ///< of its `intervals`
   std::string fingerprint;  ///< equal for those that need not be started anew on a reload
   FacadeKind::Start start;  ///< empty: this build lacks it
   std::string not_built{};  ///< where it is asked for and how to get it, if this build lacks it

@@ -72,17 +72,35 @@ std::vector<std::shared_ptr<SourceHost>> Hub::sources() const {
   return all;
 }
 
+namespace {
+
+/// Clients that do not know facades read it in their source's last error.
+std::string facadeProblemsOf(const std::string& source, const std::vector<wire::FacadeHealth>& facades) {
+  std::string told;
+  for (const wire::FacadeHealth& one : facades) {
+    if (one.source != source || one.state != FacadeState::NotThere) continue;
+    told += fmt::format("{}facade {}: {}", told.empty() ? "" : "; ", one.kind, one.problem);
+  }
+  return told;
+}
+
+}  // namespace
+
 wire::Health Hub::health() const {
   wire::Health health;
   health.uptime = std::chrono::duration<double>{clock_.steady() - began_}.count() * second;
   health.sessions = sessions;
   const std::scoped_lock lock{mutex_};
+  for (const ToldFacade& one : facades_) {
+    health.facades.push_back(one.health);
+    const std::int64_t clients = one.clients ? one.clients->load() : -1;
+    if (clients >= 0) health.facades.back().clients = static_cast<std::uint32_t>(clients);
+  }
   for (const auto& [name, source] : sources_) {
     health.sources.push_back(source->health());
     std::string& last_error = health.sources.back().last_error;
-    if (const auto facade = facade_problems_.find(name); facade != facade_problems_.end()) {
-      last_error = facade->second + (last_error.empty() ? "" : "; camera: " + last_error);
-    }
+    if (const std::string problem = facadeProblemsOf(name, health.facades); !problem.empty())
+      last_error = problem + (last_error.empty() ? "" : "; camera: " + last_error);
     const auto recorder = recorders_.find(name);
     if (recorder == recorders_.end()) continue;
     if (std::string problem = recorder->second->problem(); !problem.empty()) {
@@ -92,9 +110,9 @@ wire::Health Hub::health() const {
   return health;
 }
 
-void Hub::setFacadeProblems(std::map<std::string, std::string> problem_of) {
+void Hub::setFacades(std::vector<ToldFacade> facades) {
   const std::scoped_lock lock{mutex_};
-  facade_problems_ = std::move(problem_of);
+  facades_ = std::move(facades);
 }
 
 void Hub::startRecording(const std::string& source, std::string_view file, RecordDone done) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <map>
@@ -18,6 +19,16 @@
 #include "protocol/wire/messages.h"
 
 namespace toftwin::daemon {
+
+/// How many clients a facade has now; negative: its language does not tell. Counted on its thread, read on
+/// any.
+using ClientCount = std::atomic<std::int64_t>;
+
+/// A facade, for health.
+struct ToldFacade {
+  wire::FacadeHealth health;
+  std::shared_ptr<const ClientCount> clients;  ///< shared with the facade; null: it is not there
+};
 
 /// All sources of the daemon and their recordings: what sessions ask. All members may be called
 /// from any thread.
@@ -52,9 +63,8 @@ class Hub {
   [[nodiscard]] Result<std::shared_ptr<SourceHost>> find(const std::string& name) const;
   [[nodiscard]] std::vector<std::shared_ptr<SourceHost>> sources() const;
   [[nodiscard]] wire::Health health() const;
-  /// For health: why facades of these sources are not there, by the source's name. Replaces what was told
-  /// before.
-  void setFacadeProblems(std::map<std::string, std::string> problem_of);
+  /// For health. Replaces what was told before.
+  void setFacades(std::vector<ToldFacade> facades);
 
   /// `done` gets the path of the file; it may be called on another thread.
   void startRecording(const std::string& source, std::string_view file, RecordDone done);
@@ -74,7 +84,7 @@ class Hub {
   const SteadyTime began_;
   std::map<std::string, std::shared_ptr<SourceHost>> sources_;  // shared with calls in progress
   std::map<std::string, std::shared_ptr<Recorder>> recorders_;  // shared with calls in progress
-  std::map<std::string, std::string> facade_problems_;
+  std::vector<ToldFacade> facades_;
 };
 
 }  // namespace toftwin::daemon

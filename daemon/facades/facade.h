@@ -14,8 +14,10 @@
 #include <string_view>
 
 #include <toftwin/result.h>
+#include <toftwin/units.h>
 
 #include "daemon/clock.h"
+#include "daemon/facades/timing/unevenness.h"
 #include "daemon/hub.h"
 #include "protocol/settings/settings.h"
 
@@ -27,6 +29,9 @@ struct FacadeKeys {
   std::string source;
   std::string address = "127.0.0.1";
   bool allow_remote = false;
+  std::string intervals;
+  Duration latency = 0_s;
+  Duration boot_time = 0_s;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -37,6 +42,16 @@ struct FacadeKeys {
            "allows an address that other machines reach. Whatever the language is, it has no encryption and "
            "at most a password in clear text: everyone who reaches the ports sees the source and can set it. "
            "Only for a network that you trust whole");
+    v.text("intervals", intervals,
+           "a file with the intervals between a real camera's frames, one number in milliseconds per line, "
+           "relative to this file: frames leave as unevenly as those; empty: as they come");
+    v.quantity(
+        "latency", latency, millisecond, {0.0, 10'000.0},
+        "by how much later than the source's every frame leaves, as if the camera had taken that long");
+    v.quantity(
+        "boot_time", boot_time, second, {0.0, 600.0},
+        "how long nobody answers after the facade's start, and after a reboot that a client asked for, "
+        "where the language has such a thing");
   }
 };
 
@@ -46,6 +61,12 @@ class Facade {
   virtual ~Facade() = default;
   /// Where clients find it, for the log: "XML-RPC on 127.0.0.1 port 80".
   [[nodiscard]] virtual std::string where() const = 0;
+  /// For health; set by the facade, if its language tells.
+  [[nodiscard]] std::shared_ptr<const ClientCount> clients() const { return clients_; }
+
+ protected:
+  const std::shared_ptr<ClientCount> clients_ =
+      std::make_shared<ClientCount>(-1);  // shared with health, which may ask when this is gone
 };
 
 /// What a facade is started with.
@@ -53,6 +74,7 @@ struct FacadePlace {
   FacadeKeys keys;
   Hub& hub;
   const Clock& clock;
+  Unevenness unevenness{};  ///< of its `intervals`
 };
 
 /// One row of the table of facades.

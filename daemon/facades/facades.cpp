@@ -7,7 +7,8 @@
 
 #include <algorithm>
 #include <chrono>
-#include <map>
+#include <cmath>
+#include <optional>
 #include <utility>
 
 #include "daemon/listen.h"
@@ -17,7 +18,13 @@
 namespace toftwin::daemon {
 namespace {
 
+using std::chrono::steady_clock;
+
 constexpr std::chrono::seconds kStartPause{1};
+
+std::chrono::nanoseconds bootTimeOf(const FacadeKeys& keys) {
+  return std::chrono::nanoseconds{std::llround(keys.boot_time.in(nanosecond))};
+}
 
 std::string nameOf(const FacadeKeys& keys) { return fmt::format("facade {} of {}", keys.kind, keys.source); }
 
@@ -50,7 +57,8 @@ void Facades::apply(std::vector<ConfiguredFacade> configured) {
     } else {
       if (!one.start) logging::error("{} is not there: {}", nameOf(one.keys), one.not_built);
       std::string why = one.not_built;
-      wanted.push_back({std::move(one), nullptr, std::move(why)});
+      const auto boots_until = steady_clock::now() + bootTimeOf(one.keys);
+      wanted.push_back({std::move(one), boots_until, nullptr, std::move(why)});
     }
   }
   before.clear();  // their ports are free before the new ones want them
@@ -61,13 +69,14 @@ void Facades::apply(std::vector<ConfiguredFacade> configured) {
 void Facades::stop() {
   pause_.cancel();
   running_.clear();
+  tellHealth();
 }
 
 void Facades::start(Running& one) {
   const FacadeKeys& keys = one.configured.keys;
   Result<std::unique_ptr<Facade>> started = Error{};
   try {
-    started = one.configured.start({keys, hub_, clock_});
+    started = one.configured.start({keys, hub_, clock_, one.configured.unevenness});
   } catch (...) {
     started = thrownError("starting it");
   }
@@ -83,29 +92,40 @@ void Facades::start(Running& one) {
 }
 
 void Facades::startThoseThatAreNot() {
-  bool is_one_missing = false;
+  const auto now = steady_clock::now();
+  std::optional<steady_clock::time_point> next;
   for (Running& one : running_) {
     if (one.facade || !one.configured.start) continue;
-    start(one);
-    is_one_missing |= !one.facade;
+    const bool boots = now < one.boots_until;
+    if (!boots) start(one);
+    if (one.facade) continue;
+    const auto again = boots ? one.boots_until : now + kStartPause;
+    next = next ? std::min(*next, again) : again;
   }
   tellHealth();
-  if (!is_one_missing) return;
-  pause_.expires_after(kStartPause);
+  if (!next) return;
+  pause_.expires_at(*next);
   pause_.async_wait([this](boost::system::error_code cancelled) {
     if (!cancelled) startThoseThatAreNot();
   });
 }
 
 void Facades::tellHealth() {
-  std::map<std::string, std::string> problem_of;
+  std::vector<ToldFacade> told;
   for (const Running& one : running_) {
-    if (one.facade) continue;
-    std::string& told = problem_of[one.configured.keys.source];
-    told +=
-        fmt::format("{}facade {}: {}", told.empty() ? "" : "; ", one.configured.keys.kind, one.last_error);
+    const FacadeKeys& keys = one.configured.keys;
+    ToldFacade facade{{.kind = keys.kind, .source = keys.source, .place = {}}, nullptr};
+    if (one.facade) {
+      facade.clients = one.facade->clients();
+      facade.health.place = one.facade->where();
+      facade.health.state = FacadeState::Running;
+    } else {
+      facade.health.state = one.last_error.empty() ? FacadeState::Booting : FacadeState::NotThere;
+      facade.health.problem = one.last_error;
+    }
+    told.push_back(std::move(facade));
   }
-  hub_.setFacadeProblems(std::move(problem_of));
+  hub_.setFacades(std::move(told));
 }
 
 }  // namespace toftwin::daemon

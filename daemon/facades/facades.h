@@ -6,6 +6,7 @@
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/steady_timer.hpp>
 
+#include <chrono>
 #include <memory>
 #include <string>
 #include <vector>
@@ -17,7 +18,8 @@ namespace toftwin::daemon {
 
 /// The facades of a running daemon. One that cannot start, because its port is in use, say, is told in the
 /// log and tried again, one that this build lacks is told; the daemon serves its other clients meanwhile.
-/// Health says of the source which are missing, and why. Used on the thread of the io_context only.
+/// One with a boot time is started when that is over. Health says of all of them where they are, or why they
+/// are not there. Used on the thread of the io_context only.
 class Facades {
  public:
   Facades(boost::asio::io_context& io, Hub& hub, const Clock& clock) : hub_(hub), clock_(clock), pause_(io) {}
@@ -30,6 +32,7 @@ class Facades {
  private:
   struct Running {
     ConfiguredFacade configured;
+    std::chrono::steady_clock::time_point boots_until{};
     std::unique_ptr<Facade> facade;  ///< null: to be tried again, unless this build lacks it
     std::string last_error;          ///< why it is not there
   };

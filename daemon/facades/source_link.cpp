@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/facades/source_link.h"
 
+#include <fmt/format.h>
+
 #include <chrono>
+#include <cmath>
 #include <utility>
 
 #include "drivers/logging.h"
@@ -13,12 +16,16 @@ constexpr std::chrono::milliseconds kLinkPause{200};
 
 }  // namespace
 
-SourceLink::SourceLink(EventThread& thread, Hub& hub, Wants wants, TakeFrame take)
-    : hub_(hub),
+SourceLink::SourceLink(EventThread& thread, const FacadePlace& place, Wants wants, TakeFrame take)
+    : hub_(place.hub),
+      source_(place.keys.source),
       wants_(std::move(wants)),
       take_(std::move(take)),
       door_(thread.door()),
-      pause_(thread.io()) {}
+      pause_(thread.io()),
+      unevenness_(place.unevenness),
+      latency_(std::llround(place.keys.latency.in(nanosecond))),
+      held_(thread.io(), fmt::format("facade {} of {}", place.keys.kind, source_), take_) {}
 
 SourceLink::~SourceLink() {
   *is_alive_ = false;
@@ -31,29 +38,30 @@ void SourceLink::want(bool is_wanted) {
   if (is_wanted) return subscribe();
   pause_.cancel();
   unsubscribe();
+  held_.clear();
 }
 
 Result<wire::SourceDescription> SourceLink::describe() const {
-  const auto host = hub_.find(wants_.source);
+  const auto host = hub_.find(source_);
   if (!host) return host.error();
   return (*host)->describe();
 }
 
 wire::SourceHealth SourceLink::health() const {
-  const auto host = hub_.find(wants_.source);
+  const auto host = hub_.find(source_);
   wire::SourceHealth health;
-  health.name = wants_.source;
+  health.name = source_;
   return host ? (*host)->health() : health;
 }
 
 void SourceLink::post(SourceHost::Command command, Done done) {
-  const auto host = hub_.find(wants_.source);
+  const auto host = hub_.find(source_);
   if (!host) return done(host.error());
   (*host)->post(std::move(command), onThread(std::move(done)));
 }
 
 void SourceLink::trigger(Done done) {
-  const auto host = hub_.find(wants_.source);
+  const auto host = hub_.find(source_);
   if (!host) return done(host.error());
   (*host)->trigger(onThread(std::move(done)));
 }
@@ -68,7 +76,7 @@ SourceLink::Done SourceLink::onThread(Done done) const {
 
 void SourceLink::subscribe() {
   if (!is_wanted_ || subscriber_) return;
-  auto host = hub_.find(wants_.source);
+  auto host = hub_.find(source_);
   if (!host) return tryAgain();
   auto subscribed = subscribeTo(**host);
   if (!subscribed) {
@@ -85,7 +93,7 @@ void SourceLink::noteRefused(const Error& why) {
   using Code = Error::Code;
   if (why.code == Code::Disconnected || why.code == Code::Stopped || why.message == refused_) return;
   refused_ = why.message;
-  logging::warn("a facade of {} gets no frames, and tries again: {}", wants_.source, refused_);
+  logging::warn("a facade of {} gets no frames, and tries again: {}", source_, refused_);
 }
 
 Result<SubscriberPtr> SourceLink::subscribeTo(SourceHost& host) {
@@ -121,12 +129,17 @@ void SourceLink::takeAll() {
     auto item = subscriber_->backlog.take();
     if (!item) return;
     if (const auto* delivery = std::get_if<Backlog::Delivery>(&*item)) {
-      take_(delivery->frame->frame);
+      take(delivery->frame->frame);
       continue;
     }
     unsubscribe();  // it ended; the source may be back soon, or be another one of that name
     if (is_wanted_) tryAgain();
   }
+}
+
+void SourceLink::take(const Frame& frame) {
+  if (unevenness_.isNone() && latency_.count() == 0) return take_(frame);
+  held_.hold(frame, std::chrono::steady_clock::now() + latency_ + unevenness_.delay(taken_++));
 }
 
 }  // namespace toftwin::daemon

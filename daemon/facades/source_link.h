@@ -5,29 +5,33 @@
 
 #include <boost/asio/steady_timer.hpp>
 
+#include <chrono>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "daemon/facades/event_thread.h"
+#include "daemon/facades/facade.h"
+#include "daemon/facades/held_frames.h"
 #include "daemon/hub.h"
 
 namespace toftwin::daemon {
 
 /// What joins a facade to its source, by the source's name: a source that is stopped, lost or configured anew
-/// is found again. Everything here is called on the facade's thread, and calls back on it.
+/// is found again. Frames come when the facade's keys let them: `latency` later, and as unevenly as
+/// `intervals`. Everything here is called on the facade's thread, and calls back on it.
 class SourceLink {
  public:
   struct Wants {
-    std::string source;
     std::vector<PlaneKind> planes;  ///< those of them that the source has, whenever it has them
     std::size_t queue = 8;          ///< frames that may wait for the facade
   };
   using TakeFrame = std::function<void(const Frame&)>;
   using Done = std::function<void(Result<>)>;
 
-  SourceLink(EventThread& thread, Hub& hub, Wants wants, TakeFrame take);
+  SourceLink(EventThread& thread, const FacadePlace& place, Wants wants, TakeFrame take);
   ~SourceLink();
   SourceLink(const SourceLink&) = delete;
   SourceLink& operator=(const SourceLink&) = delete;
@@ -48,13 +52,19 @@ class SourceLink {
   void unsubscribe();
   void tryAgain();
   void takeAll();
+  void take(const Frame& frame);
   [[nodiscard]] Done onThread(Done done) const;
 
   Hub& hub_;
+  const std::string source_;
   const Wants wants_;
   const TakeFrame take_;
   const std::shared_ptr<EventThread::Door> door_;  // shared with what wakes
   boost::asio::steady_timer pause_;
+  const Unevenness unevenness_;
+  const std::chrono::nanoseconds latency_;
+  HeldFrames held_;
+  std::uint64_t taken_ = 0;
   bool is_wanted_ = false;
   std::shared_ptr<SourceHost> host_;  // shared with the hub, which may let go of it first
   SubscriberPtr subscriber_;

@@ -216,10 +216,14 @@ Result<std::string> Client::stopRecording(std::string_view source) {
 Result<DaemonHealth> Client::health() {
   auto answer = state_->connection->ask<wire::Health>(wire::AskHealth{});
   if (!answer) return answer.error();
-  DaemonHealth health{state_->connection->software(), answer->uptime, answer->sessions, {}};
+  DaemonHealth health{state_->connection->software(), answer->uptime, answer->sessions, {}, {}};
   for (auto& s : answer->sources) {
     health.sources.push_back({std::move(s.name), s.streaming, s.frames, s.dropped_by_device,
                               s.subscribers, s.reconnects, std::move(s.last_error)});
+  }
+  for (auto& f : answer->facades) {
+    health.facades.push_back({std::move(f.kind), std::move(f.source), std::move(f.place), f.state, f.clients,
+                              std::move(f.problem)});
   }
   return health;
 }

@@ -137,8 +137,13 @@ Done read(Checks& checks, std::uint64_t id, const fb::Done& t) {
   return {id, checks.text(t.detail(), kMaxText, "detail")};
 }
 AskHealth read(Checks&, std::uint64_t id, const fb::AskHealth&) { return {id}; }
+/// A later minor version may have more.
+FacadeState facadeStateOf(std::uint8_t state) {
+  constexpr auto kLast = static_cast<std::uint8_t>(FacadeState::NotThere);
+  return state <= kLast ? static_cast<FacadeState>(state) : FacadeState::Unknown;
+}
 Health read(Checks& checks, std::uint64_t id, const fb::Health& t) {
-  Health m{id, checks.finiteFromZero(t.uptime_s(), "uptime_s") * second, t.sessions(), {}};
+  Health m{id, checks.finiteFromZero(t.uptime_s(), "uptime_s") * second, t.sessions(), {}, {}};
   for (const auto* s : checks.items(t.sources(), kMaxSources, "sources")) {
     m.sources.push_back(
         {.name = checks.name(s->name(), "source.name"),
@@ -148,6 +153,14 @@ Health read(Checks& checks, std::uint64_t id, const fb::Health& t) {
          .subscribers = s->subscribers(),
          .reconnects = s->reconnects(),
          .last_error = checks.text(s->last_error(), kMaxText, "source.last_error")});
+  }
+  for (const auto* f : checks.items(t.facades(), kMaxSources, "facades")) {
+    m.facades.push_back({.kind = checks.name(f->kind(), "facade.kind"),
+                         .source = checks.name(f->source(), "facade.source"),
+                         .place = checks.text(f->place(), kMaxText, "facade.place"),
+                         .state = facadeStateOf(f->state()),
+                         .clients = f->clients() ? std::optional{*f->clients()} : std::nullopt,
+                         .problem = checks.text(f->problem(), kMaxText, "facade.problem")});
   }
   return m;
 }

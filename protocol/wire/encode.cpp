@@ -148,7 +148,19 @@ auto write(Builder& b, const Health& m) {
     sources.push_back(fb::CreateSourceHealth(b, name, s.streaming, s.frames, s.dropped_by_device,
                                              s.subscribers, s.reconnects, last_error));
   }
-  return fb::CreateHealth(b, m.uptime.in(second), m.sessions, b.CreateVector(sources));
+  std::vector<Offset<fb::FacadeHealth>> facades;
+  for (std::size_t i = 0; i < countOf(m.facades, kMaxSources); ++i) {
+    const FacadeHealth& f = m.facades[i];
+    const auto kind = writeName(b, f.kind);
+    const auto source = writeName(b, f.source);
+    const auto place = writeText(b, f.place);
+    const auto problem = writeText(b, f.problem);
+    const auto clients = f.clients ? flatbuffers::Optional<std::uint32_t>{*f.clients} : flatbuffers::nullopt;
+    facades.push_back(
+        fb::CreateFacadeHealth(b, kind, source, place, static_cast<std::uint8_t>(f.state), clients, problem));
+  }
+  return fb::CreateHealth(b, m.uptime.in(second), m.sessions, b.CreateVector(sources),
+                          b.CreateVector(facades));
 }
 auto write(Builder& b, const Failure& m) { return fb::CreateFailure(b, writeError(b, m.error)); }
 

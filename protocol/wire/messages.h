@@ -7,6 +7,7 @@
 #include <variant>
 #include <vector>
 
+#include <toftwin/facade_state.h>
 #include <toftwin/frame.h>
 #include <toftwin/parameter.h>
 #include <toftwin/result.h>
@@ -117,11 +118,20 @@ struct SourceHealth {
   std::uint32_t reconnects = 0;
   std::string last_error;
 };
+struct FacadeHealth {
+  std::string kind;
+  std::string source;
+  std::string place;  ///< for people
+  FacadeState state = FacadeState::Unknown;
+  std::optional<std::uint32_t> clients{};  ///< nothing: not known
+  std::string problem{};
+};
 struct Health {
   std::uint64_t id = 0;
   Duration uptime;
   std::uint32_t sessions = 0;
   std::vector<SourceHealth> sources;
+  std::vector<FacadeHealth> facades{};
 };
 
 /// A request failed (`id` of the request) or bytes could not be understood (`id` 0; the connection

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <memory>
@@ -68,6 +69,13 @@ class RunningDaemon : public testing::Test {
                                               : "unix:" + daemon_->socketPath());
     EXPECT_TRUE(connected.ok()) << connected.error().message;
     return *std::move(connected);
+  }
+
+  /// Of the only facade, as health tells them; nothing: not known.
+  std::optional<std::uint32_t> facadeClients() {
+    const auto health = client().health();
+    EXPECT_TRUE(health.ok() && health->facades.size() == 1);
+    return health.ok() && health->facades.size() == 1 ? health->facades.front().clients : std::nullopt;
   }
 
   FakeClock clock_;  // for the test that wants it; outlives the daemon

@@ -113,6 +113,7 @@ std::vector<Refused> refusedRequests() {
       {Record{1, "k", long_name}, "file"},
       {Health{1, -1_s, 0, {}}, "uptime_s"},
       {Health{1, 1_s, 0, std::vector<SourceHealth>(kMaxSources + 1)}, "sources"},
+      {Health{1, 1_s, 0, {}, std::vector<FacadeHealth>(kMaxSources + 1)}, "facades"},
   };
 }
 
@@ -191,7 +192,11 @@ class Random {
       case 3:
         return SetParameter{bits_(), name(), name(), number()};
       case 4:
-        return Health{bits_(), number() * second, 1, {{.name = name(), .last_error = name()}}};
+        return Health{bits_(),
+                      number() * second,
+                      1,
+                      {{.name = name(), .last_error = name()}},
+                      {{.kind = name(), .source = name(), .place = name(), .clients = 1, .problem = name()}}};
       case 5:
         return description();
       default:

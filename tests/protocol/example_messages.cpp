@@ -104,7 +104,9 @@ Health fullHealth() {
           .uptime = 3600.25_s,
           .sessions = 3,
           .sources = {{"kinect", true, 108'000, 2, 8, 1, ""},
-                      {"o3d", false, 0, 0, 0, 7, "no device at 192.168.0.69"}}};
+                      {"o3d", false, 0, 0, 0, 7, "no device at 192.168.0.69"}},
+          .facades = {{"o3d303", "kinect", "XML-RPC on 127.0.0.1 port 80", FacadeState::Running, 2, ""},
+                      {"modbus", "kinect", "", FacadeState::NotThere, {}, "port 502 is in use"}}};
 }
 
 }  // namespace

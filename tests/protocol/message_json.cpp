@@ -236,6 +236,14 @@ class Renderer {
     field("reconnects", m.reconnects);
     field("last_error", m.last_error);
   }
+  void fields(const FacadeHealth& m) {
+    field("kind", m.kind);
+    field("source", m.source);
+    field("place", m.place);
+    field("state", static_cast<int>(m.state));
+    if (m.clients) field("clients", *m.clients);
+    field("problem", m.problem);
+  }
 
   // Messages.
   void fields(const Hello& m) {
@@ -309,6 +317,7 @@ class Renderer {
     field("uptime_s", m.uptime.in(second));
     field("sessions", m.sessions);
     field("sources", m.sources);
+    field("facades", m.facades);
   }
   void fields(const Failure& m) { field("error", m.error); }
 

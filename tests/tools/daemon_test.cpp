@@ -40,6 +40,24 @@ TEST_F(WithDaemon, ListAndInfoSayWhatTheDaemonHas) {
   EXPECT_THAT(unknown.err, HasSubstr("kinekt"));
 }
 
+class WithFacades : public WithDaemon {
+  std::string moreSources() const override {
+    return "[[facade]]\nkind = 'modbus'\nsource = 'pattern'\nport = 0\n"
+           "[[facade]]\nkind = 'modbus'\nsource = 'pattern'\nport = 0\nboot_time_s = 600\n";
+  }
+};
+
+TEST_F(WithFacades, ListAndInfoSayWhereFacadesAre) {
+  const Ran list = run("list");
+  EXPECT_EQ(list.status, 0) << list.err;
+  EXPECT_THAT(list.out, HasSubstr("pattern as modbus running, 0 clients: Modbus TCP on 127.0.0.1 port "));
+  EXPECT_THAT(list.out, HasSubstr("pattern as modbus booting\n"));
+  EXPECT_THAT(list.out, testing::Not(HasSubstr("short as")));
+  EXPECT_THAT(run("list --json").out, HasSubstr("\"state\": \"booting\""));
+  EXPECT_THAT(run("info pattern").out, HasSubstr("facade       modbus running, 0 clients: Modbus TCP on "));
+  EXPECT_THAT(run("info pattern --json").out, HasSubstr("\"clients\": 0"));
+}
+
 /// The shift at which the pattern shows these millimetres at its first pixel.
 std::optional<std::uint64_t> shiftOf(const cv::Mat& range_mm) {
   for (std::uint64_t shift = 0; shift < 256; ++shift) {

@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <ctime>
+#include <iterator>
 #include <limits>
 
 #include <toftwin/names.h>
@@ -19,6 +20,34 @@ namespace toftwin::cli {
 std::string_view stateOf(const SourceEntry& source) {
   if (!source.problem.empty()) return "absent";
   return source.streaming ? "streaming" : "idle";
+}
+
+std::vector<FacadeHealthEntry> facadesOf(const DaemonHealth& health, const std::string& source) {
+  std::vector<FacadeHealthEntry> those;
+  std::ranges::copy_if(health.facades, std::back_inserter(those),
+                       [&](const FacadeHealthEntry& one) { return one.source == source; });
+  return those;
+}
+
+compare::Json toJson(const std::vector<FacadeHealthEntry>& facades) {
+  compare::Json all = compare::Json::array();
+  for (const FacadeHealthEntry& one : facades) {
+    all.push(compare::Json::object()
+                 .set("kind", one.kind)
+                 .set("state", std::string{nameOf(one.state)})
+                 .set("place", one.place)
+                 .set("clients", one.clients ? compare::Json{*one.clients} : compare::Json{})
+                 .set("problem", one.problem));
+  }
+  return all;
+}
+
+std::string toText(const FacadeHealthEntry& facade) {
+  const std::string clients =
+      facade.clients ? fmt::format(", {} client{}", *facade.clients, *facade.clients == 1 ? "" : "s") : "";
+  const std::string& more = facade.problem.empty() ? facade.place : facade.problem;
+  return fmt::format("{} {}{}{}{}", facade.kind, nameOf(facade.state), clients, more.empty() ? "" : ": ",
+                     more);
 }
 
 compare::Json toJson(const CameraInfo& camera) {

@@ -17,6 +17,11 @@ namespace toftwin::cli {
 
 /// "streaming", "idle" or "absent".
 std::string_view stateOf(const SourceEntry& source);
+/// Those that show the source.
+std::vector<FacadeHealthEntry> facadesOf(const DaemonHealth& health, const std::string& source);
+compare::Json toJson(const std::vector<FacadeHealthEntry>& facades);
+/// "o3d303 running, 2 clients: XML-RPC on 127.0.0.1 port 80", or why it is not there.
+std::string toText(const FacadeHealthEntry& facade);
 compare::Json toJson(const CameraInfo& camera);
 std::string toText(const CameraInfo& camera);
 compare::Json toJson(const Transform<World, Camera>& world_from_camera);

@@ -141,6 +141,9 @@ Result<Exit> describeSource(const Options& options) {
   if (!client) return client.error();
   const auto details = client->describe(options.what);
   if (!details) return details.error();
+  const auto health = client->health();
+  if (!health) return health.error();
+  const std::vector<FacadeHealthEntry> facades = facadesOf(*health, options.what);
   const SourceEntry& entry = details->entry;
   const double rate_hz = details->frame_interval ? 1.0 / details->frame_interval->in(second) : 0.0;
   if (options.json) {
@@ -159,11 +162,11 @@ Result<Exit> describeSource(const Options& options) {
                          .set("can_set_pose", details->can_set_pose)
                          .set("can_trigger", details->can_trigger)
                          .set("can_lockstep", details->can_lockstep)
-                         .set("world_from_camera", details->world_from_camera
-                                                       ? toJson(*details->world_from_camera)
-                                                       : Json{})
+                         .set("world_from_camera",
+                              details->world_from_camera ? toJson(*details->world_from_camera) : Json{})
                          .set("parameters", toJson(details->parameters))
                          .set("problem", entry.problem)
+                         .set("facades", toJson(facades))
                          .text());
     return Exit::Ok;
   }
@@ -183,6 +186,7 @@ Result<Exit> describeSource(const Options& options) {
   if (details->world_from_camera) fmt::print("{}", toText(*details->world_from_camera));
   fmt::print("parameters   {}\n{}", details->parameters.empty() ? "none" : "value, bounds",
              toText(details->parameters));
+  for (const FacadeHealthEntry& facade : facades) fmt::print("facade       {}\n", toText(facade));
   if (!entry.problem.empty()) fmt::print("not there    {}\n", entry.problem);
   return Exit::Ok;
 }

@@ -53,7 +53,7 @@ Exit listDrivers(bool with_formats, bool as_json) {
   return Exit::Ok;
 }
 
-void printTable(const std::vector<SourceEntry>& sources) {
+void printTable(const std::vector<SourceEntry>& sources, const DaemonHealth& health) {
   std::size_t name_width = 6, model_width = 5;
   for (const SourceEntry& source : sources) {
     name_width = std::max(name_width, source.name.size());
@@ -68,6 +68,8 @@ void printTable(const std::vector<SourceEntry>& sources) {
   }
   for (const SourceEntry& source : sources) {
     if (!source.problem.empty()) fmt::print("{} is absent: {}\n", source.name, source.problem);
+    for (const FacadeHealthEntry& facade : facadesOf(health, source.name))
+      fmt::print("{} as {}\n", source.name, toText(facade));
   }
 }
 
@@ -77,6 +79,8 @@ Result<Exit> run(const Options& options) {
   if (!client) return client.error();
   const auto sources = client->sources();
   if (!sources) return sources.error();
+  const auto health = client->health();
+  if (!health) return health.error();
   if (options.json) {
     Json all = Json::array();
     for (const SourceEntry& source : *sources) {
@@ -86,7 +90,8 @@ Result<Exit> run(const Options& options) {
                    .set("serial", source.serial)
                    .set("kind", std::string{nameOf(source.kind)})
                    .set("streaming", source.streaming)
-                   .set("problem", source.problem));
+                   .set("problem", source.problem)
+                   .set("facades", toJson(facadesOf(*health, source.name))));
     }
     fmt::print("{}", all.text());
   } else if (options.names) {
@@ -94,7 +99,7 @@ Result<Exit> run(const Options& options) {
   } else if (sources->empty()) {
     fmt::print("The daemon has no sources; add a [[source]] to its configuration.\n");
   } else {
-    printTable(*sources);
+    printTable(*sources, *health);
   }
   return Exit::Ok;
 }

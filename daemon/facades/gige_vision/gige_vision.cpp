@@ -16,7 +16,6 @@
 #include "daemon/facades/gige_vision/source_facts.h"
 #include "daemon/facades/mac_address.h"
 #include "daemon/facades/source_link.h"
-#include "daemon/facades/unevenness.h"
 #include "drivers/logging.h"
 #include "protocol/settings/describe.h"
 
@@ -38,18 +37,15 @@ std::uint16_t statusOf(const Error& error) {
 
 class GigeVisionFacade final : public Facade {
  public:
-  GigeVisionFacade(Keys keys, Unevenness unevenness, std::filesystem::path line_log, const FacadePlace& place)
+  GigeVisionFacade(Keys keys, std::filesystem::path line_log, const FacadePlace& place)
       : keys_(std::move(keys)),
         line_log_(std::move(line_log)),
         place_(place),
         name_("facade gige_vision of " + place.keys.source),
         thread_(name_),
-        link_(thread_, place.hub,
-              {.source = place.keys.source,
-               .planes = {PlaneKind::Range, PlaneKind::Depth, PlaneKind::Amplitude, PlaneKind::Flags}},
+        link_(thread_, place,
+              {.planes = {PlaneKind::Range, PlaneKind::Depth, PlaneKind::Amplitude, PlaneKind::Flags}},
               [this](const Frame& frame) { takeFrame(frame); }),
-        uneven_(thread_.io(), name_, std::move(unevenness), keys_.latency,
-                [this](const Frame& frame) { send(frame); }),
         tick_(thread_.io(), kTick, [this] { tick(); }) {}
 
   ~GigeVisionFacade() override { thread_.stop(); }
@@ -82,6 +78,7 @@ class GigeVisionFacade final : public Facade {
                          .amplitude_per_count = keys_.amplitude_per_count});
     where_ = fmt::format("GigE Vision on {} port {}{}", place_.keys.address, kControlPort,
                          control_->hearsBroadcasts() ? ", found by broadcasts" : "");
+    *clients_ = 0;
     tick_.start();
     thread_.start();
     return {};
@@ -135,6 +132,7 @@ class GigeVisionFacade final : public Facade {
   }
 
   void followStreaming() {
+    *clients_ = device_->controller() ? 1 : 0;
     const bool is_streaming = device_->isStreaming();
     if (is_streaming && starts_ != device_->starts()) {
       starts_ = device_->starts();
@@ -175,11 +173,10 @@ class GigeVisionFacade final : public Facade {
     watch_.note(frame);
     refresh();
     if (!device_->isStreaming()) return followStreaming();
-    uneven_.take(frame);
+    send(frame);
   }
 
   void send(const Frame& frame) {
-    if (!device_->isStreaming()) return;
     const StreamSetup setup = device_->stream();
     if (!rays_ || rays_->camera != frame.camera) rays_ = raysOf(frame.camera);
     const std::int64_t stamp_ns = stampOf(frame, setup.uses_host_clock);
@@ -234,7 +231,6 @@ class GigeVisionFacade final : public Facade {
   std::string where_, last_complaint_;
   EventThread thread_;
   SourceLink link_;
-  UnevenFrames uneven_;
   Repeating tick_;
   std::unique_ptr<ControlSockets> control_;
   std::optional<Sender> sender_;
@@ -259,9 +255,8 @@ FacadeKind::Start read(settings::Table& table) {
   checkText(table, "user_name", keys.user_name);
   if (keys.packet_size % 4 != 0) table.complain("packet_size", "must be a multiple of 4");
   const std::filesystem::path log = keys.line.logIn(table);
-  const Unevenness unevenness = Unevenness::read(table, keys.intervals);
-  return [keys, unevenness, log](const FacadePlace& place) -> Result<std::unique_ptr<Facade>> {
-    auto facade = std::make_unique<GigeVisionFacade>(keys, unevenness, log, place);
+  return [keys, log](const FacadePlace& place) -> Result<std::unique_ptr<Facade>> {
+    auto facade = std::make_unique<GigeVisionFacade>(keys, log, place);
     if (auto opened = facade->open(); !opened) return opened.error();
     return std::unique_ptr<Facade>{std::move(facade)};
   };

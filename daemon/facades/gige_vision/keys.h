@@ -21,8 +21,6 @@ struct Keys {
   int packet_size = 1500;
   double packet_delay_us = 10.0;
   int resend_mb = 64;
-  std::string intervals;
-  Duration latency = 0_s;
   LineFaultKeys line;
 
   template <class Visitor>
@@ -39,13 +37,6 @@ struct Keys {
     v.number("packet_delay_us", packet_delay_us, {0.0, 1000.0},
              "at least, between two packets, until a client sets another (GevSCPD); 0: at once");
     v.number("resend_mb", resend_mb, {1, 4096}, "of frames that were sent are kept, to be sent once more");
-    v.text("intervals", intervals,
-           "a file with the intervals between a real camera's frames, one number in milliseconds per line, "
-           "relative "
-           "to this file: frames leave as unevenly as those; empty: as they come");
-    v.quantity(
-        "latency", latency, millisecond, {0.0, 10'000.0},
-        "by how much later than the source's every frame leaves, as if the camera had taken that long");
     v.group("line", line, "what goes wrong on purpose with the packets of frames");
   }
 };

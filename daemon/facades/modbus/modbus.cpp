@@ -68,8 +68,7 @@ class ModbusFacade final : public Facade {
         recipes_(std::move(recipes)),
         place_(place),
         thread_("facade modbus of " + place.keys.source),
-        link_(thread_, place.hub,
-              {.source = place.keys.source, .planes = {PlaneKind::Range, PlaneKind::Depth}, .queue = 1},
+        link_(thread_, place, {.planes = {PlaneKind::Range, PlaneKind::Depth}, .queue = 1},
               [this](const Frame& frame) { takeFrame(frame); }),
         line_(keys_.line, "facade modbus of " + place.keys.source, line_log) {
     registers_.set(Item::Stream, keys_.streams ? 1.0 : 0.0);
@@ -86,12 +85,14 @@ class ModbusFacade final : public Facade {
                       .connections =
                           [this](std::size_t count) {
                             connections_ = count;
+                            *clients_ = static_cast<std::int64_t>(count);
                             adjust();
                           },
                       .fate = [this] { return line_.isNone() ? LineFaults::Fate{} : line_.next(); },
                       .note = [this](const LineFaults::Fate& fate,
                                      LineFaults::Kind kind) { line_.note(fate.packet, kind, "answer"); },
                       .delay = keys_.line.delay_time});
+    *clients_ = 0;
     where_ = fmt::format("Modbus TCP on {} port {}", place_.keys.address, server_->port());
     thread_.start();
     return {};

@@ -4,14 +4,31 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <sstream>
+#include <string>
+#include <vector>
 
 #include "daemon/facades/o3d303/answers.h"
 #include "daemon/facades/o3d303/device.h"
+#include "daemon/facades/o3d303/exposure_time.h"
 
 namespace toftwin::daemon::o3d303 {
 namespace {
 
 constexpr double kSecondsPerHour = 3600.0;
+
+/// With one digit, cut off, as the camera shows it.
+std::string mostLedRate(const Parameters& imager) {
+  std::vector<std::uint32_t> exposures_us;
+  std::istringstream list{imager.at("ExposureTimeList")};
+  for (std::string one; std::getline(list, one, ';');)
+    exposures_us.push_back(static_cast<std::uint32_t>(realIn(one).value_or(0.0)));
+  const int frequencies = ImagerType::of(imager.at("Type")).value_or(ImagerType{}).frequencies;
+  const double rate_hz = 1.0 / exposuresTake(frequencies, exposures_us).in(second);
+  constexpr double kRounding = 1e-9;
+  return fmt::format("{:.1f}", std::floor(rate_hz * 10.0 + kRounding) / 10.0);
+}
 
 }  // namespace
 
@@ -88,6 +105,7 @@ void Device::show(Application& one) const {
   fitExposures(one);
   if (parameterOf(kExposures) == nullptr && !facts_.exposures_us.empty())
     imager["ExposureTimeList"] = fmt::format("{}", fmt::join(facts_.exposures_us, ";"));
+  imager["MaxAllowedLEDFrameRate"] = mostLedRate(imager);
   one.application["TriggerMode"] = facts_.can_trigger ? "2" : "1";
   imager["Resolution"] = facts_.width >= 352 ? "1" : "0";
   const auto fitClipping = [&](const char* name, int before, int now) {
@@ -127,6 +145,7 @@ void Device::fitExposures(Application& one) const {
     imager.erase("ExposureTimeRatio");
     imager["ExposureTimeList"] = fmt::format("{:.0f};{:.0f};{:.0f}", time_us / 50.0, time_us / 5.0, time_us);
   }
+  imager["MaxAllowedLEDFrameRate"] = mostLedRate(imager);
 }
 
 /// Of the source; none where the application does not say it.

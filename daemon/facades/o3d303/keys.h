@@ -23,6 +23,8 @@ struct MessageLineKeys : FrameLineKeys {
   }
 };
 
+enum class Timing { Source, Camera };
+
 /// The keys of a [[facade]] table with kind = "o3d303".
 struct Keys {
   int xmlrpc_port = 80;
@@ -32,9 +34,7 @@ struct Keys {
   std::string name = "toftwin";
   std::string password;
   double electrons_per_count = 6.0;
-  std::string intervals;
-  Duration latency = 0_s;
-  Duration boot_time = 0_s;
+  Timing timing = Timing::Source;
   Temperature most_illumination = 90_degC;
   MessageLineKeys line;
 
@@ -53,17 +53,10 @@ struct Keys {
         "electrons_per_count", electrons_per_count, {1e-6, 1e9},
         "what one count of the camera's amplitude stands for in the source's unit; 6: the camera's usual "
         "MinimumAmplitude of 42 is sim:o3d303's 250 electrons; of sim:o3d303_binned 500 are 83");
-    v.text("intervals", intervals,
-           "a file with the intervals between a real camera's frames, one number in milliseconds per line, "
-           "relative "
-           "to this file: frames leave as unevenly as those; empty: as they come");
-    v.quantity(
-        "latency", latency, millisecond, {0.0, 10'000.0},
-        "by how much later than the source's every frame leaves, as if the camera had taken that long");
-    v.quantity(
-        "boot_time", boot_time, second, {0.0, 600.0},
-        "how long nobody answers after the facade's start and after a client's reboot; UpTime counts from "
-        "there");
+    v.choice(
+        "timing", timing, {{"source", Timing::Source}, {"camera", Timing::Camera}},
+        "when frames leave: as the source gives them, or as a real O3D303's did, set to these exposure "
+        "times, frequencies and this frame rate; such a camera leaves frames out when it cannot keep up");
     v.quantity("most_illumination", most_illumination, celsius, {-40.0, 200.0},
                "clients are told the error 110004000 when the illumination gets hotter than that");
     v.group("line", line, "what goes wrong on purpose with the frames' messages");

@@ -6,20 +6,22 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <optional>
 
 #include "daemon/facades/event_thread.h"
 #include "daemon/facades/mac_address.h"
+#include "daemon/facades/held_frames.h"
 #include "daemon/facades/o3d303/device.h"
 #include "daemon/facades/o3d303/discovery.h"
+#include "daemon/facades/o3d303/frame_timing.h"
 #include "daemon/facades/o3d303/http_server.h"
 #include "daemon/facades/o3d303/images.h"
 #include "daemon/facades/o3d303/keys.h"
 #include "daemon/facades/o3d303/pcic_server.h"
 #include "daemon/facades/source_link.h"
-#include "daemon/facades/unevenness.h"
 #include "drivers/logging.h"
 #include "protocol/settings/describe.h"
 
@@ -81,21 +83,18 @@ Result<> setAll(drivers::Source& source, SourceChanges changes) {
 
 class O3d303Facade final : public Facade {
  public:
-  O3d303Facade(Keys keys, Unevenness unevenness, const std::filesystem::path& line_log,
-               const FacadePlace& place)
+  O3d303Facade(Keys keys, const std::filesystem::path& line_log, const FacadePlace& place)
       : keys_(std::move(keys)),
         place_(place),
         name_("facade o3d303 of " + place.keys.source),
         thread_(name_),
-        link_(thread_, place.hub,
-              {.source = place.keys.source,
-               .planes = {PlaneKind::Range, PlaneKind::Depth, PlaneKind::Amplitude, PlaneKind::Flags,
+        link_(thread_, place,
+              {.planes = {PlaneKind::Range, PlaneKind::Depth, PlaneKind::Amplitude, PlaneKind::Flags,
                           PlaneKind::Exposure}},
               [this](const Frame& frame) { takeFrame(frame); }),
         line_(thread_.io(), LineFaults{keys_.line, name_, line_log}, keys_.line.delay_time,
               [this](const Frame& frame, const Damage& damage) { return publish(frame, damage); }),
-        uneven_(thread_.io(), name_, std::move(unevenness), keys_.latency,
-                [this](const Frame& frame) { leave(frame); }),
+        held_(thread_.io(), name_, [this](const Frame& frame) { leave(frame); }),
         tick_(thread_.io(), kTick, [this] { tick(); }),
         boot_(thread_.io()),
         began_(steady_clock::now()) {}
@@ -145,7 +144,8 @@ class O3d303Facade final : public Facade {
     where_ = fmt::format(
         "XML-RPC on {} port {}, PCIC on port {}{}", place_.keys.address, xmlrpc_port, pcic_port,
         discovery_ ? fmt::format(", found by searches on UDP port {}{}", keys_.discovery_port, to) : "");
-    if (keys_.boot_time > 0_s) boot();
+    if (place_.keys.boot_time > 0_s) booted_ = began_ - bootTime();  // the daemon has let it boot
+    *clients_ = 0;
     link_.want(true);  // one frame, which says what kind of camera it is
     tick_.start();
     thread_.start();
@@ -159,7 +159,9 @@ class O3d303Facade final : public Facade {
   void takeFrame(const Frame& frame) {
     facts_ = factsOf(frame);
     has_seen_frame_ = true;
-    device_s_ = frame.moment.exposures.empty() ? 0 : frame.moment.exposures.front().start.ns / kNanoseconds;
+    const std::int64_t device_ns =
+        frame.moment.exposures.empty() ? 0 : frame.moment.exposures.front().start.ns;
+    device_s_ = device_ns / kNanoseconds;
     device_s_at_ = steady_clock::now();
     is_clock_known_ = frame.moment.clock.uncertainty_ns >= 0;
     if (frame.moment.since_power_on) {
@@ -170,7 +172,10 @@ class O3d303Facade final : public Facade {
     watchTemperature();
     noteConnections(connections_);
     if (connections_ == 0 || device_->isIdle()) return triggered_at_.reset();
-    uneven_.take(frame);
+    if (keys_.timing == Timing::Source) return leave(frame);
+    const auto later = timing_.next({device_ns}, {facts_.frequencies, facts_.exposures_us});
+    if (!later) return triggered_at_.reset();
+    held_.hold(frame, steady_clock::now() + std::chrono::nanoseconds{std::llround(later->in(nanosecond))});
   }
 
   /// Until then a camera is busy with it, and takes no other trigger.
@@ -214,6 +219,7 @@ class O3d303Facade final : public Facade {
 
   void noteConnections(std::size_t count) {
     connections_ = count;
+    *clients_ = static_cast<std::int64_t>(count);
     link_.want(count > 0 || !has_seen_frame_);
   }
 
@@ -327,12 +333,15 @@ class O3d303Facade final : public Facade {
     });
   }
 
+  [[nodiscard]] steady_clock::duration bootTime() const {
+    return std::chrono::nanoseconds{std::llround(place_.keys.boot_time.in(nanosecond))};
+  }
+
   /// Nobody answers for the boot time, from which UpTime counts.
   void boot() {
     booted_ = steady_clock::now();
     setOpen(false);
-    boot_.expires_after(std::chrono::duration_cast<steady_clock::duration>(
-        std::chrono::duration<double>{keys_.boot_time.in(second)}));
+    boot_.expires_after(bootTime());
     boot_.async_wait([this](boost::system::error_code cancelled) {
       if (!cancelled) setOpen(true);
     });
@@ -365,7 +374,8 @@ class O3d303Facade final : public Facade {
   std::optional<PcicServer> pcic_;
   std::unique_ptr<Discovery> discovery_;
   StruckFrames line_;
-  UnevenFrames uneven_;
+  FrameTiming timing_;
+  HeldFrames held_;
   Repeating tick_;
   boost::asio::steady_timer boot_;
   const steady_clock::time_point began_;
@@ -383,10 +393,9 @@ class O3d303Facade final : public Facade {
 FacadeKind::Start read(settings::Table& table) {
   Keys keys;
   table.read(keys);
-  const Unevenness unevenness = Unevenness::read(table, keys.intervals);
   const std::filesystem::path log = keys.line.logIn(table);
-  return [keys, unevenness, log](const FacadePlace& place) -> Result<std::unique_ptr<Facade>> {
-    auto facade = std::make_unique<O3d303Facade>(keys, unevenness, log, place);
+  return [keys, log](const FacadePlace& place) -> Result<std::unique_ptr<Facade>> {
+    auto facade = std::make_unique<O3d303Facade>(keys, log, place);
     if (auto opened = facade->open(); !opened) return opened.error();
     return std::unique_ptr<Facade>{std::move(facade)};
   };

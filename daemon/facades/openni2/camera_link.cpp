@@ -5,6 +5,7 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <deque>
 #include <mutex>
 #include <utility>
 
@@ -37,6 +38,7 @@ Result<Client> connectTo(const std::string& address) {
 
 struct CameraLink::State {
   Place place;
+  Timing timing;
   Events events;
   SourceDetails details;
 
@@ -69,15 +71,21 @@ struct CameraLink::State {
   void forgetLostTrigger() {
     const std::chrono::duration<double> slow{
         kTriggerPatience_intervals * details.frame_interval.value_or(Duration{}).in(second)};
-    const std::chrono::duration<double> patience = std::max<std::chrono::duration<double>>(kTriggerPatience, slow);
+    const std::chrono::duration<double> patience =
+        std::max<std::chrono::duration<double>>(kTriggerPatience, slow) + timing.latency;
     const std::scoped_lock lock{mutex};
     if (trigger == Trigger::Sent && std::chrono::steady_clock::now() - trigger_sent > patience)
       trigger = Trigger::Wanted;
   }
 
   // Of the link's thread alone:
-  std::uint64_t index = 0, last_sequence = 0, counted_start = 0;
+  std::uint64_t index = 0, last_sequence = 0, counted_start = 0, received = 0;
   bool was_lost = false;
+  struct Held {
+    std::chrono::steady_clock::time_point leaves;
+    Frame frame;
+  };
+  std::deque<Held> held;  ///< until their time
 
   void run(const std::stop_token& stop);
   bool waitUntilWanted(const std::stop_token& stop, std::vector<PlaneKind>& planes);
@@ -85,6 +93,9 @@ struct CameraLink::State {
   void drop();
   void pause(const std::stop_token& stop, milliseconds time);
   void stream(const std::stop_token& stop, Client& from, const std::vector<PlaneKind>& planes);
+  void hold(Frame frame);
+  [[nodiscard]] milliseconds untilNextLeaves() const;
+  void giveThoseDue();
   void take(const Frame& frame);
   void say(bool is_lost);
   void waitForNewStart(const std::stop_token& stop);
@@ -156,6 +167,7 @@ void CameraLink::State::stream(const std::stop_token& stop, Client& from, const 
     is_subscribed = true;
     if (trigger == Trigger::Sent) trigger = Trigger::Wanted;  // its frame went to nobody
   }
+  held.clear();
   std::optional<Error::Code> end;
   while (!stop.stop_requested() && !end) {
     {
@@ -164,10 +176,11 @@ void CameraLink::State::stream(const std::stop_token& stop, Client& from, const 
     }
     forgetLostTrigger();
     sendTrigger(from);
-    const Result<Frame> frame = frames->next(kSlice);
+    Result<Frame> frame = frames->next(std::min(kSlice, untilNextLeaves()));
+    giveThoseDue();
     if (frame) {
       say(false);
-      take(*frame);
+      hold(*std::move(frame));
     } else if (frame.error().code != Error::Code::Timeout) {
       end = frame.error().code;
     }
@@ -177,6 +190,7 @@ void CameraLink::State::stream(const std::stop_token& stop, Client& from, const 
     is_subscribed = false;
   }
   if (end == Error::Code::EndOfStream) {
+    for (; !held.empty() && !stop.stop_requested(); giveThoseDue()) pause(stop, untilNextLeaves());
     events.state(ONI_DEVICE_STATE_EOF);
     return waitForNewStart(stop);
   }
@@ -184,6 +198,28 @@ void CameraLink::State::stream(const std::stop_token& stop, Client& from, const 
   if (end != Error::Code::Overrun) drop();
   say(true);
   pause(stop, kAgain);
+}
+
+/// One that comes when so many wait is lost, as its number tells.
+void CameraLink::State::hold(Frame frame) {
+  constexpr std::size_t kMostHeld = 1024;
+  if (timing.unevenness.isNone() && timing.latency.count() == 0) return take(frame);
+  auto leaves = std::chrono::steady_clock::now() + timing.latency + timing.unevenness.delay(received++);
+  if (!held.empty()) leaves = std::max(leaves, held.back().leaves);
+  if (held.size() < kMostHeld) held.push_back({leaves, std::move(frame)});
+}
+
+milliseconds CameraLink::State::untilNextLeaves() const {
+  if (held.empty()) return kSlice;
+  const auto left = std::chrono::ceil<milliseconds>(held.front().leaves - std::chrono::steady_clock::now());
+  return std::max(milliseconds{0}, left);
+}
+
+void CameraLink::State::giveThoseDue() {
+  while (!held.empty() && held.front().leaves <= std::chrono::steady_clock::now()) {
+    take(held.front().frame);
+    held.pop_front();
+  }
 }
 
 void CameraLink::State::take(const Frame& frame) {
@@ -208,13 +244,14 @@ void CameraLink::State::waitForNewStart(const std::stop_token& stop) {
 
 // ---- any thread --------------------------------------------------------------------------------
 
-Result<std::unique_ptr<CameraLink>> CameraLink::open(Place place, Events events) {
+Result<std::unique_ptr<CameraLink>> CameraLink::open(Place place, Timing timing, Events events) {
   auto client = connectTo(place.address);
   if (!client) return client.error();
   auto details = client->describe(place.source);
   if (!details) return details.error();
   auto state = std::make_shared<State>();
   state->place = std::move(place);
+  state->timing = std::move(timing);
   state->events = std::move(events);
   state->details = *std::move(details);
   state->client = std::make_shared<Client>(*std::move(client));

@@ -3,6 +3,7 @@
 
 #include <openni2/OniCTypes.h>
 
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -13,6 +14,7 @@
 
 #include "daemon/facades/openni2/uri.h"
 #include "daemon/facades/openni2/worker.h"
+#include "daemon/facades/timing/unevenness.h"
 
 namespace toftwin::openni2 {
 
@@ -28,8 +30,14 @@ class CameraLink {
     std::function<void(OniDeviceState)> state;
   };
 
+  /// When frames come: as unevenly as a real camera's, and so much later.
+  struct Timing {
+    daemon::Unevenness unevenness;
+    std::chrono::nanoseconds latency{0};
+  };
+
   /// Both events come on the link's thread.
-  static Result<std::unique_ptr<CameraLink>> open(Place place, Events events);
+  static Result<std::unique_ptr<CameraLink>> open(Place place, Timing timing, Events events);
 
   [[nodiscard]] const SourceDetails& details() const;
   /// What the source says of itself now.

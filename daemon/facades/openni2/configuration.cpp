@@ -45,6 +45,7 @@ Result<Configuration> readConfiguration(const std::string& file, std::string_vie
     auto table = settings::Table::load(file);
     if (!table) return table.error();
     table->read(configuration.keys);
+    configuration.unevenness = daemon::Unevenness::read(*table, configuration.keys.intervals);
     place = table->place("addresses");
     if (auto checked = table->check(); !checked) return checked.error();
   }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <utility>
 
@@ -16,11 +17,14 @@ constexpr OniVersion kVersion{ONI_TOFTWIN_MAJOR, ONI_TOFTWIN_MINOR, ONI_TOFTWIN_
 
 }  // namespace
 
-Result<std::unique_ptr<Device>> Device::open(Place place, const Keys& keys, Services services) {
+Result<std::unique_ptr<Device>> Device::open(Place place, const Configuration& configuration,
+                                             Services services) {
+  const Keys& keys = configuration.keys;
   std::unique_ptr<Device> device{new Device{keys, std::move(services)}};
   Device* const self = device.get();
   auto link = CameraLink::open(
       std::move(place),
+      {configuration.unevenness, std::chrono::nanoseconds{std::llround(keys.latency.in(nanosecond))}},
       {.frame = [self](const Frame& frame, int index) { guarded([&] { self->show(frame, index); }); },
        .state = [self](OniDeviceState state) { guarded([&] { self->services_.state(state); }); }});
   if (!link) return link.error();

@@ -23,7 +23,8 @@ class Device final : public oni::driver::DeviceBase {
     Complain complain;
     std::function<void(OniDeviceState)> state;
   };
-  static Result<std::unique_ptr<Device>> open(Place place, const Keys& keys, Services services);
+  static Result<std::unique_ptr<Device>> open(Place place, const Configuration& configuration,
+                                              Services services);
   ~Device() override;
 
   /// False: a thread is held up in OpenNI2; the device must not be freed.

@@ -8,6 +8,8 @@
 #include <toftwin/result.h>
 #include <toftwin/units.h>
 
+#include "daemon/facades/timing/unevenness.h"
+
 /// A plug-in for OpenNI2: in any program that uses that library, the sources of a daemon are devices. It is a
 /// client of the native protocol inside that program.
 namespace toftwin::openni2 {
@@ -18,6 +20,8 @@ struct Keys {
   Length max_depth = 10_m;
   double amplitude_per_count = 1.0;
   bool mirror = false;
+  std::string intervals;
+  Duration latency = 0_s;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -29,11 +33,17 @@ struct Keys {
     v.number("amplitude_per_count", amplitude_per_count, {1e-6, 1e9},
              "what one count of the infrared image stands for in the source's unit");
     v.flag("mirror", mirror, "whether images begin mirrored, as those of PrimeSense's cameras do");
+    v.text("intervals", intervals,
+           "a file with the intervals between a real camera's frames, one number in milliseconds per line, "
+           "relative to this file: frames come as unevenly as those; empty: as they come");
+    v.quantity("latency", latency, millisecond, {0.0, 10'000.0},
+               "by how much later than the source's every frame comes, as if the camera had taken that long");
   }
 };
 
 struct Configuration {
   Keys keys;
+  daemon::Unevenness unevenness;  ///< of the key `intervals`
   bool is_off = false;  ///< no device is shown
 
   /// Where sources are whose URI names no daemon.

@@ -91,12 +91,10 @@ class Driver final : public oni::driver::DriverBase {
         complain()(place.error().message);
         return nullptr;
       }
-      auto device = Device::open(
-          *std::move(place), configuration.keys,
-          {.complain = complain(),
-           .state = [post = discovery_->poster(), name = std::string{uri}](OniDeviceState state) {
-             post(name, state);
-           }});
+      auto device = Device::open(*std::move(place), configuration,
+                                 {.complain = complain(),
+                                  .state = [post = discovery_->poster(), name = std::string{uri}](
+                                               OniDeviceState state) { post(name, state); }});
       if (!device) {
         complain()(device.error().message);
         return nullptr;

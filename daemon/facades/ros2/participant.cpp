@@ -74,9 +74,9 @@ Qos qosOf(const Quality& quality) {
 
 }  // namespace
 
-bool Writer::hasReaders() const {
+std::uint32_t Writer::readers() const {
   dds_publication_matched_status_t status{};
-  return dds_get_publication_matched_status(entity_, &status) == DDS_RETCODE_OK && status.current_count > 0;
+  return dds_get_publication_matched_status(entity_, &status) == DDS_RETCODE_OK ? status.current_count : 0;
 }
 
 Result<> Writer::write(const void* message) const {

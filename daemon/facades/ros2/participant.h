@@ -31,7 +31,8 @@ class Writer {
  public:
   Writer() = default;
   explicit Writer(dds_entity_t entity) : entity_(entity) {}
-  [[nodiscard]] bool hasReaders() const;
+  [[nodiscard]] std::uint32_t readers() const;
+  [[nodiscard]] bool hasReaders() const { return readers() > 0; }
   /// `message` of the topic's type; copied.
   [[nodiscard]] Result<> write(const void* message) const;
 

@@ -32,9 +32,7 @@ class Ros2Facade final : public Facade {
         place_(place),
         name_("facade ros2 of " + place.keys.source),
         thread_(name_),
-        link_(thread_, place.hub,
-              {.source = place.keys.source,
-               .planes = {PlaneKind::Range, PlaneKind::Depth, PlaneKind::Amplitude}},
+        link_(thread_, place, {.planes = {PlaneKind::Range, PlaneKind::Depth, PlaneKind::Amplitude}},
               [this](const Frame& frame) { takeFrame(frame); }),
         line_(thread_.io(), LineFaults{keys_.line, name_, line_log}, keys_.line.delay_time,
               [this](const Frame& frame, const Damage& damage) { return publish(frame, damage); }),
@@ -74,7 +72,8 @@ class Ros2Facade final : public Facade {
   /// put.
   void tick() {
     const auto description = link_.describe();
-    const bool is_wanted = !has_seen_frame_ || topics_->hasReaders();
+    *clients_ = topics_->readers();
+    const bool is_wanted = !has_seen_frame_ || *clients_ > 0;
     link_.want(is_wanted);
     const bool waits = !has_seen_frame_ && description && description->can_trigger;
     if (!description) return;

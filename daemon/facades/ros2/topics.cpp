@@ -138,10 +138,10 @@ Result<Topics> Topics::open(const Keys& keys, Participant& participant) {
   return topics;
 }
 
-bool Topics::hasReaders() const {
-  return depth_.hasReaders() || depth_info_.hasReaders() || amplitude_.hasReaders() ||
-         amplitude_info_.hasReaders() || points_.hasReaders() ||
-         (keys_.transform == TransformKind::Moving && transform_.hasReaders());
+std::uint32_t Topics::readers() const {
+  const std::uint32_t of_transform = keys_.transform == TransformKind::Moving ? transform_.readers() : 0;
+  return std::max({depth_.readers(), depth_info_.readers(), amplitude_.readers(), amplitude_info_.readers(),
+                   points_.readers(), of_transform});
 }
 
 Result<bool> Topics::publish(const Frame& frame, const Damage& damage) {

@@ -21,7 +21,9 @@ class Topics {
   static Result<Topics> open(const Keys& keys, Participant& participant);
 
   /// Whether anybody reads what comes with each frame.
-  [[nodiscard]] bool hasReaders() const;
+  [[nodiscard]] bool hasReaders() const { return readers() > 0; }
+  /// Of the one of those topics that has the most.
+  [[nodiscard]] std::uint32_t readers() const;
   /// Makes and writes those messages that are read, with the damage in the pixels of each. Whether there were
   /// any, or the first error; the others are written all the same.
   Result<bool> publish(const Frame& frame, const Damage& damage);

@@ -32,6 +32,8 @@ class Server {
   void plug(UsbDevice& device) { device_ = &device; }
   /// Pulls the cable: the host that has the device sees it go.
   void unplug();
+  /// Whether a host has the device.
+  [[nodiscard]] bool hasHost() const { return !host_.expired(); }
   /// To be called when the device may have something for its host.
   void pump();
 

@@ -27,9 +27,7 @@ class UsbCameraFacade final : public Facade {
         place_(place),
         name_("facade usb_camera of " + place.keys.source),
         thread_(name_),
-        link_(thread_, place.hub,
-              {.source = place.keys.source,
-               .planes = {PlaneKind::Range, PlaneKind::Depth, PlaneKind::Amplitude}},
+        link_(thread_, place, {.planes = {PlaneKind::Range, PlaneKind::Depth, PlaneKind::Amplitude}},
               [this](const Frame& frame) { line_.take(frame); }),
         line_(thread_.io(), LineFaults{keys_.line, name_, line_log}, keys_.line.delay_time,
               [this](const Frame& frame, const Damage& damage) { return takeFrame(frame, damage); }),
@@ -120,6 +118,7 @@ class UsbCameraFacade final : public Facade {
 
   void pump() {
     server_->pump();
+    *clients_ = server_->hasHost() ? 1 : 0;
     if (!camera_) return;
     link_.want(camera_->wantsFrames(std::chrono::steady_clock::now()));
     if (camera_->lost() > 0 && !std::exchange(has_told_loss_, true))

@@ -36,9 +36,8 @@ class LoopbackFacade final : public Facade {
         name_("facade v4l2_loopback of " + place.keys.source),
         images_({keys_.depth_unit_mm, keys_.amplitude_per_count}),
         thread_(name_),
-        link_(thread_, place.hub,
-              {.source = place.keys.source,
-               .planes = keys_.image == Shown::Depth ? std::vector{PlaneKind::Range, PlaneKind::Depth}
+        link_(thread_, place,
+              {.planes = keys_.image == Shown::Depth ? std::vector{PlaneKind::Range, PlaneKind::Depth}
                                                      : std::vector{PlaneKind::Amplitude}},
               [this](const Frame& frame) { line_.take(frame); }),
         line_(thread_.io(), LineFaults{keys_.line, name_, line_log}, keys_.line.delay_time,

@@ -108,8 +108,10 @@ TEST(ModbusRegisters, OfTheMapDoNotOverlapAndStandInTheOrderOfTheirItems) {
 
 TEST_F(ModbusFacade, TellsOfTheSourceAndItsFrames) {
   startModbus(kSmallSim + "powered_on_before_s = 156\n");
+  EXPECT_EQ(facadeClients(), 0u);
   Plc plc{port_};
   EXPECT_TRUE(eventually([&] { return plc.number(Item::FrameAge) < 1e6; }));
+  EXPECT_EQ(facadeClients(), 1u);
   auto native = client();
   auto stream = native.subscribe("cam");
   ASSERT_TRUE(stream.ok());

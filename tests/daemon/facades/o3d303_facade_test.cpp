@@ -299,8 +299,10 @@ TEST_F(O3d303Facade, AStalledClientHoldsUpNobody) {
 }
 
 TEST_F(O3d303Facade, ARebootDropsEveryoneAndComesBack) {
+  const auto begin = std::chrono::steady_clock::now();
   startO3d303(kSmallSim + "powered_on_before_s = 3600\n", "boot_time_s = 0.2");
-  ASSERT_TRUE(eventually([&] { return answers(); })) << "it boots at the start, too";
+  ASSERT_TRUE(eventually([&] { return answers(); }));
+  EXPECT_GE(std::chrono::steady_clock::now() - begin, 200ms) << "it boots at the start, too";
   PcicClient connected{camera().pcicPort()};
   auto rpc = camera();
   rpc.beginSession();
@@ -311,6 +313,40 @@ TEST_F(O3d303Facade, ARebootDropsEveryoneAndComesBack) {
             static_cast<double>(kSoon.count()))
       << "from the boot on, not from when the source was switched on";
   EXPECT_EQ(rpc.fault(rpc.session(""), "heartbeat", {5}), 100'000) << "the session is gone";
+}
+
+TEST_F(O3d303Facade, HealthSaysWhereItIsAndHowManyClientsItHas) {
+  startO3d303(kPattern);
+  auto native = client();
+  const auto told = [&] {
+    const auto health = native.health();
+    EXPECT_TRUE(health.ok() && health->facades.size() == 1);
+    return health.ok() && !health->facades.empty() ? health->facades.front() : FacadeHealthEntry{};
+  };
+  const FacadeHealthEntry now = told();
+  EXPECT_EQ(now.kind, "o3d303");
+  EXPECT_EQ(now.source, "cam");
+  EXPECT_EQ(now.state, FacadeState::Running);
+  EXPECT_NE(now.place.find(fmt::format("XML-RPC on 127.0.0.1 port {}", xmlrpc_)), std::string::npos)
+      << now.place;
+  EXPECT_EQ(now.problem, "");
+  EXPECT_EQ(now.clients, 0u);
+  {
+    PcicClient one{camera().pcicPort()}, other{camera().pcicPort()};
+    EXPECT_TRUE(eventually([&] { return told().clients == 2u; }));
+  }
+  EXPECT_TRUE(eventually([&] { return told().clients == 0u; }));
+}
+
+TEST_F(O3d303Facade, HealthSaysThatItBoots) {
+  startO3d303(kPattern, "boot_time_s = 600");
+  const auto health = client().health();
+  ASSERT_TRUE(health.ok()) << health.error().message;
+  ASSERT_EQ(health->facades.size(), 1u);
+  EXPECT_EQ(health->facades.front().state, FacadeState::Booting);
+  EXPECT_EQ(health->facades.front().place, "");
+  EXPECT_EQ(health->facades.front().clients, std::nullopt);
+  EXPECT_EQ(health->sources.at(0).last_error, "") << "which would be a fault";
 }
 
 TEST_F(O3d303Facade, TheTemperatureOfASimulatedCameraCanBeWatchedWarmingUp) {

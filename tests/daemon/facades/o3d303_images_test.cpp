@@ -10,7 +10,7 @@
 #include <set>
 #include <vector>
 
-#include "daemon/facades/unevenness.h"
+#include "daemon/facades/timing/unevenness.h"
 #include "facade_testing.h"
 #include "measured_intervals.h"
 #include "o3d303_client.h"

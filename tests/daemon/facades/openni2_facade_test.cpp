@@ -326,6 +326,27 @@ TEST_F(OpenNI2Plugin, ASourceThatWaitsForTriggersGivesAFrameToEachThatIsWaitedFo
   EXPECT_LE(health->sources.at(0).frames, 6u) << "no more than were waited for, and one at the start";
 }
 
+TEST_F(OpenNI2Plugin, WithALatencyFramesComeThatMuchLater) {
+  constexpr double kLatency_ms = 150.0;
+  startWith(kPattern, fmt::format("latency_ms = {}\n", kLatency_ms));
+  auto native = client();
+  auto subscribed = native.subscribe("cam", {.policy = SubscribeOptions::Policy::Queue, .queue = 1000});
+  ASSERT_TRUE(subscribed.ok()) << subscribed.error().message;
+  Natives natives{*std::move(subscribed), microsecondsOf};
+  const auto device = openDevice("toftwin:cam");
+  const auto stream = createStream(device, ONI_SENSOR_DEPTH);
+  ASSERT_EQ(oniStreamStart(stream.get()), ONI_STATUS_OK);
+  for (int i = 0; i < 20; ++i) {
+    const auto frame = readFrame(stream);
+    const auto came = std::chrono::nanoseconds{std::chrono::system_clock::now().time_since_epoch()};
+    ASSERT_NE(frame, nullptr);
+    const auto same = natives.at(static_cast<std::int64_t>(frame->timestamp));
+    ASSERT_TRUE(same.ok() && *same != nullptr);
+    EXPECT_GE(static_cast<double>(came.count() - (*same)->moment.received.ns) * 1e-6, kLatency_ms - 0.01)
+        << "frame " << frame->frameIndex;  // the two clocks tick differently
+  }
+}
+
 TEST_F(OpenNI2Plugin, ATriggeredFrameThatIsLostIsTriggeredAgain) {
   startWith(kSmallSim + "pace = 'trigger'\n[[source.fault]]\nkind = 'loss'\nfirst = 2\nframes = 2\n");
   const auto device = openDevice("toftwin:cam");

@@ -89,6 +89,20 @@ TEST_F(Ros2Facade, APoseThatIsSentIsWhereTheNextFrameIsFrom) {
   EXPECT_THAT(seen.stamp_ns, AnyOf(*frame_times.begin(), AllOf(Ge(sent_ns), Le(wallNow()))));
 }
 
+/// Best effort, as Fast DDS has it, or reliable, as a subscription of ROS 2 has it.
+TEST_F(Ros2Facade, WithoutAnyKeysItIsReadByReadersThatAskForNothingSpecial) {
+  startRos2(kPattern);
+  EXPECT_TRUE(nextOf(program_->read("/cam/depth/image_raw", kImage, Asks::Nothing)));
+  EXPECT_TRUE(nextOf(program_->read("/cam/points", kPoints, Asks::Reliable)));
+}
+
+TEST_F(Ros2Facade, HealthCountsTheReadersOfItsFrames) {
+  startRos2(kPattern);
+  EXPECT_EQ(facadeClients(), 0u);
+  ASSERT_TRUE(nextOf(program_->read("/cam/depth/image_raw", kImage)));
+  EXPECT_TRUE(eventually([&] { return facadeClients() == 1u; }));
+}
+
 TEST_F(Ros2Facade, AReaderThatComesLateGetsTheStaticTransform) {
   startRos2(kSmallSim + "position_m = [0.5, 0.25, -1.0]\n");
   auto native_client = client();

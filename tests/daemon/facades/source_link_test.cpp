@@ -3,9 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <future>
 #include <mutex>
 #include <utility>
+#include <vector>
 
 #include "../../kept_log.h"
 #include "../fakes.h"
@@ -14,6 +16,12 @@ namespace toftwin::daemon {
 namespace {
 
 using test::Remote;
+
+FacadeKeys keysOfCam() {
+  FacadeKeys keys;
+  keys.source = "cam";
+  return keys;
+}
 
 /// A source that somebody else sets, too, and what a facade gets of it.
 class LinkedSource : public testing::Test {
@@ -59,8 +67,8 @@ class LinkedSource : public testing::Test {
       "cam", test::opener(remote_), test::opener(remote_)(), SourceHost::Options{}, clock_);
   EventThread thread_{"test"};
   SourceLink link_{thread_,
-                   hub_,
-                   {.source = "cam", .planes = {PlaneKind::Amplitude, PlaneKind::Range}},
+                   {keysOfCam(), hub_, clock_},
+                   {.planes = {PlaneKind::Amplitude, PlaneKind::Range}},
                    [this](const Frame& frame) { take(frame); }};
 };
 
@@ -77,6 +85,40 @@ TEST_F(LinkedSource, GivesTheFirstFrameAfterAnothersChangeWithThePlaneThatItBrou
   EXPECT_EQ(planesOf(3), without);
 }
 
+/// In 1 + 21 ms the second frame is early by ten, and the first waits for as long; both by the latency more.
+TEST(SourceLink, HoldsEveryFacadesFramesBackByItsKeys) {
+  using std::chrono::milliseconds;
+  const test::FakeClock clock;
+  const auto remote = std::make_shared<Remote>();  // shared with its source
+  Hub hub{Hub::Options{}, clock};
+  hub.add(std::make_shared<SourceHost>("cam", test::opener(remote), test::opener(remote)(),
+                                       SourceHost::Options{}, clock));
+  FacadeKeys keys = keysOfCam();
+  keys.latency = 30_ms;
+  EventThread thread{"test"};
+  std::vector<std::chrono::steady_clock::time_point> came(2);
+  test::Counter taken;
+  SourceLink link{thread,
+                  {keys, hub, clock, Unevenness{{milliseconds{1}, milliseconds{21}}}},
+                  {.planes = {PlaneKind::Range}},
+                  [&](const Frame& frame) {
+                    came.at(frame.sequence) = std::chrono::steady_clock::now();
+                    taken.add();
+                  }};
+  thread.start();
+  thread.door()->post([&] { link.want(true); });
+  ASSERT_TRUE(remote->asked.reaches(1));
+  const auto given = std::chrono::steady_clock::now();
+  remote->give();
+  ASSERT_TRUE(taken.reaches(1));
+  const auto given_again = std::chrono::steady_clock::now();
+  remote->give();
+  ASSERT_TRUE(taken.reaches(2));
+  EXPECT_GE(came[0] - given, milliseconds{40});
+  EXPECT_GE(came[1] - given_again, milliseconds{30});
+  thread.stop();
+}
+
 TEST(SourceLink, ThatThereIsNoMemoryForItsFramesIsSaidOnceAndTriedAgain) {
   const auto log = std::make_shared<toftwin::test::KeptLog>();  // shared with spdlog
   const toftwin::test::LoggingTo kept{log};
@@ -87,7 +129,7 @@ TEST(SourceLink, ThatThereIsNoMemoryForItsFramesIsSaidOnceAndTriedAgain) {
                                                  SourceHost::Options{}, clock);
   hub.add(host);
   EventThread thread{"test"};
-  SourceLink link{thread, hub, {.source = "cam", .planes = {PlaneKind::Range}}, [](const Frame&) {}};
+  SourceLink link{thread, {keysOfCam(), hub, clock}, {.planes = {PlaneKind::Range}}, [](const Frame&) {}};
   thread.start();
   std::promise<void> was_tried;
   thread.door()->post([&] {

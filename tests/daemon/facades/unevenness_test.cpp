@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/facades/unevenness.h"
+#include "daemon/facades/timing/unevenness.h"
 
 #include <gtest/gtest.h>
 
@@ -8,6 +8,7 @@
 #include <numeric>
 #include <vector>
 
+#include "daemon/facades/held_frames.h"
 #include "measured_intervals.h"
 
 namespace toftwin::daemon {
@@ -37,43 +38,42 @@ TEST(Unevenness, GivesARealCamerasIntervals) {
   EXPECT_EQ(least_ms, 0.0) << "no frame leaves before it is there";
 }
 
-// In 1 + 21 ms the first is late by nothing, the second early by ten: it alone leaves at once.
-TEST(UnevenFrames, LeaveInOrderAndNoneIsLost) {
-  boost::asio::io_context io;
-  std::vector<std::uint64_t> order;
-  UnevenFrames line{io, "test", Unevenness{{std::chrono::milliseconds{1}, std::chrono::milliseconds{21}}},
-                    0_s, [&](const Frame& frame) { order.push_back(frame.sequence); }};
-  for (std::uint64_t i = 0; i < 6; ++i) {
-    Frame frame;
-    frame.sequence = i;
-    line.take(frame);
-  }
-  EXPECT_TRUE(order.empty()) << "the first is held back by ten milliseconds, and those behind it with it";
-  io.run();
-  EXPECT_EQ(order, (std::vector<std::uint64_t>{0, 1, 2, 3, 4, 5}));
-}
-
-TEST(UnevenFrames, WithoutIntervalsTheyLeaveAtOnce) {
-  boost::asio::io_context io;
-  int left = 0;
-  UnevenFrames line{io, "test", {}, 0_s, [&](const Frame&) { ++left; }};
-  line.take({});
-  EXPECT_EQ(left, 1);
-}
-
-TEST(UnevenFrames, WithALatencyTheyLeaveThatMuchLater) {
+TEST(HeldFrames, LeaveInOrderAndNotBeforeTheirTime) {
+  using std::chrono::milliseconds;
   boost::asio::io_context io;
   const auto begin = std::chrono::steady_clock::now();
-  auto left = begin;
-  UnevenFrames line{io, "test", {}, 20_ms, [&](const Frame&) { left = std::chrono::steady_clock::now(); }};
-  line.take({});
-  EXPECT_EQ(left, begin);
+  std::vector<std::uint64_t> order;
+  std::vector<milliseconds> least{milliseconds{10}, milliseconds{10}, milliseconds{20}};
+  HeldFrames line{io, "test", [&](const Frame& frame) {
+                    EXPECT_GE(std::chrono::steady_clock::now() - begin, least.at(frame.sequence));
+                    order.push_back(frame.sequence);
+                  }};
+  std::uint64_t sequence = 0;
+  for (const int leaves_ms : {10, 1, 20}) {  // the second waits for the first
+    Frame frame;
+    frame.sequence = sequence++;
+    line.hold(frame, begin + milliseconds{leaves_ms});
+  }
+  EXPECT_TRUE(order.empty());
   io.run();
-  EXPECT_GE(left - begin, std::chrono::milliseconds{20});
+  EXPECT_EQ(order, (std::vector<std::uint64_t>{0, 1, 2}));
+}
+
+TEST(HeldFrames, ThatAreClearedDoNotLeave) {
+  boost::asio::io_context io;
+  std::vector<std::uint64_t> order;
+  HeldFrames line{io, "test", [&](const Frame& frame) { order.push_back(frame.sequence); }};
+  Frame frame;
+  line.hold(frame, std::chrono::steady_clock::now());
+  line.clear();
+  frame.sequence = 1;
+  line.hold(frame, std::chrono::steady_clock::now());
+  io.run();
+  EXPECT_EQ(order, std::vector<std::uint64_t>{1});
 }
 
 /// Ten seconds of a small image at 100 Hz all wait; of 64 MB each, seven are less than half a gigabyte.
-TEST(UnevenFrames, ThatWaitAreBoundedByTheirBytes) {
+TEST(HeldFrames, AreBoundedByTheirBytes) {
   Plane large;
   large.data = Buffer::adopt(std::vector<std::byte>(64U << 20U));
   Frame heavy;
@@ -81,14 +81,15 @@ TEST(UnevenFrames, ThatWaitAreBoundedByTheirBytes) {
   for (const auto& [frame, taken, leave] : {std::tuple{Frame{}, 1000, 1000}, std::tuple{heavy, 10, 7}}) {
     boost::asio::io_context io;
     int left = 0;
-    UnevenFrames line{io, "test", {}, 20_ms, [&](const Frame&) { ++left; }};
-    for (int i = 0; i < taken; ++i) line.take(frame);
+    HeldFrames line{io, "test", [&](const Frame&) { ++left; }};
+    const auto soon = std::chrono::steady_clock::now() + std::chrono::milliseconds{20};
+    for (int i = 0; i < taken; ++i) line.hold(frame, soon);
     io.run();
     EXPECT_EQ(left, leave);
-    line.take(frame);
+    line.hold(frame, soon);
     io.restart();
     io.run();
-    EXPECT_EQ(left, leave + 1) << "those that left make room";
+    EXPECT_EQ(left, leave + 1) << "those that left made room";
   }
 }
 

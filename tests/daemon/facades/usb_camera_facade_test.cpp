@@ -167,7 +167,9 @@ TEST_F(UsbCameraFacade, OneHostHasItAtATimeAndTheNextWhenThatLeaves) {
     ASSERT_EQ(first.import(), 0u);
     EXPECT_EQ(UsbHost{port_}.import(), 2u) << "busy";
     EXPECT_EQ(UsbHost{port_}.list(), 1u);
+    EXPECT_TRUE(eventually([&] { return facadeClients() == 1u; }));
   }
+  EXPECT_TRUE(eventually([&] { return facadeClients() == 0u; }));
   EXPECT_TRUE(eventually([&] { return UsbHost{port_}.import() == 0; }));
 }
 

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include <toftwin/facade_state.h>
 #include <toftwin/frame.h>
 #include <toftwin/parameter.h>
 #include <toftwin/result.h>
@@ -59,11 +60,21 @@ struct SourceHealthEntry {
   std::uint32_t reconnects = 0;
   std::string last_error;
 };
+/// A language in which the daemon shows a source to programs that know nothing of toftwin.
+struct FacadeHealthEntry {
+  std::string kind;
+  std::string source;
+  std::string place;  ///< where clients find it, for people
+  FacadeState state = FacadeState::Unknown;
+  std::optional<std::uint32_t> clients;  ///< now; nothing: its language does not tell
+  std::string problem;                   ///< why it is not there
+};
 struct DaemonHealth {
   std::string software;
   Duration uptime;
   std::uint32_t sessions = 0;
   std::vector<SourceHealthEntry> sources;
+  std::vector<FacadeHealthEntry> facades;
 };
 
 /// A stream of frames. Ends when it is destroyed. Belongs to its Client and must not outlive it.

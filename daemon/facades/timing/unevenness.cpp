@@ -1,26 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/facades/unevenness.h"
+#include "daemon/facades/timing/unevenness.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <fstream>
 #include <numeric>
 
-#include "drivers/logging.h"
-
 namespace toftwin::daemon {
-namespace {
-
-/// Of a frame, with what it has beside its planes, rounded up.
-std::uint64_t bytesOf(const Frame& frame) {
-  std::uint64_t bytes = 4096;
-  for (const Plane& plane : frame.planes) bytes += plane.data.size();
-  return bytes;
-}
-
-}  // namespace
 
 /// Frame i left at the sum of the intervals before it, evenly spaced ones leave at i times their mean; the
 /// earliest against that is held back by nothing.
@@ -65,45 +52,6 @@ Unevenness Unevenness::read(settings::Table& table, const std::string& intervals
   if (loaded) return *std::move(loaded);
   table.complain("intervals", "= " + loaded.error().message);
   return {};
-}
-
-UnevenFrames::UnevenFrames(boost::asio::io_context& io, std::string name, Unevenness unevenness,
-                           Duration latency, Put put)
-    : name_(std::move(name)),
-      unevenness_(std::move(unevenness)),
-      latency_(std::llround(latency.in(nanosecond))),
-      put_(std::move(put)),
-      timer_(io) {}
-
-/// They may share memory with other subscribers, and are counted as if they did not.
-void UnevenFrames::take(const Frame& frame) {
-  if (unevenness_.isNone() && latency_.count() == 0) return put_(frame);
-  const std::uint64_t bytes = bytesOf(frame);
-  if (!held_.empty() && held_bytes_ + bytes > kMostHeldBytes) return noteLost();
-  auto leaves = std::chrono::steady_clock::now() + latency_ + unevenness_.delay(taken_++);
-  if (!held_.empty()) leaves = std::max(leaves, held_.back().leaves);
-  held_.push_back({leaves, frame});
-  held_bytes_ += bytes;
-  if (held_.size() == 1) wait();
-}
-
-void UnevenFrames::wait() {
-  timer_.expires_at(held_.front().leaves);
-  timer_.async_wait([this](boost::system::error_code cancelled) {
-    if (cancelled || held_.empty()) return;
-    const Held next = std::move(held_.front());
-    held_.pop_front();
-    held_bytes_ -= bytesOf(next.frame);
-    if (!held_.empty()) wait();
-    put_(next.frame);
-  });
-}
-
-void UnevenFrames::noteLost() {
-  if (lost_++ > 0) return;
-  logging::warn(
-      "{}: {} MB of frames wait for their time, and those that come meanwhile are lost; make latency_ms less",
-      name_, kMostHeldBytes >> 20U);
 }
 
 }  // namespace toftwin::daemon
