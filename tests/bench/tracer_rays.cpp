@@ -8,94 +8,34 @@
 // tracer's own packets of sixteen.
 #include <fmt/format.h>
 #include <tbb/global_control.h>
-#include <time.h>
 #include <xmmintrin.h>
 
 #include <algorithm>
-#include <cmath>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
 #include <functional>
-#include <numbers>
 
 #include "sim/tracer/path.h"
-#include "tests/bench/sampler_efficiency.h"
+#include "tests/bench/kinect_in_room.h"
+#include "tests/bench/tracer.h"
 
+namespace toftwin::bench {
 namespace {
 
-using namespace toftwin;
-using namespace toftwin::sim;
-
-/// Processor time of this thread, which does all the work: other programs cost less than by the clock.
-double now() {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
-
 double secondsOf(const std::function<void()>& work) {
-  const double start = now();
+  const double start = threadProcessorMs();
   work();
-  return now() - start;
-}
-
-double median(std::vector<double> values) {
-  std::ranges::sort(values);
-  return values[values.size() / 2];
-}
-
-/// A sphere of radius 0.6 m with bumps, 2 × 224 × 224 ≈ 100,000 triangles, as an OBJ file.
-std::filesystem::path writeBumpySphere(const std::filesystem::path& folder) {
-  constexpr int kSteps = 224;
-  const auto file = folder / "bumpy.obj";
-  std::ofstream out{file};
-  for (int i = 0; i <= kSteps; ++i) {
-    for (int j = 0; j < kSteps; ++j) {
-      const double theta = std::numbers::pi * i / kSteps, phi = 2.0 * std::numbers::pi * j / kSteps;
-      const double r = 0.6 * (1.0 + 0.05 * std::sin(12.0 * theta) * std::sin(12.0 * phi));
-      out << fmt::format("v {:.6f} {:.6f} {:.6f}\n", r * std::sin(theta) * std::cos(phi),
-                         r * std::sin(theta) * std::sin(phi), r * std::cos(theta));
-    }
-  }
-  for (int i = 0; i < kSteps; ++i) {
-    for (int j = 0; j < kSteps; ++j) {
-      const int a = i * kSteps + j + 1, b = i * kSteps + (j + 1) % kSteps + 1;
-      out << fmt::format("f {} {} {}\nf {} {} {}\n", a, b, b + kSteps, a, b + kSteps, a + kSteps);
-    }
-  }
-  return file;
-}
-
-Scene roomScene() {
-  const auto folder = std::filesystem::temp_directory_path() / "toftwin_tracer_bench";
-  std::filesystem::create_directories(folder);
-  writeBumpySphere(folder);
-  auto scene = Scene::parse(R"(
-    [[material]]
-    name = "white"
-    albedo = 0.8
-    [[object]]
-    shape = "box"
-    size_m = [4, 2.5, 5]
-    position_m = [0, 0, 2]
-    material = "white"
-    [[object]]
-    mesh = "bumpy.obj"
-    position_m = [0.2, 0.1, 2.2]
-    material = "white")", folder / "room.toml");
-  std::filesystem::remove_all(folder);
-  if (!scene) {
-    fmt::print(stderr, "{}\n", scene.error().message);
-    std::exit(1);
-  }
-  return *std::move(scene);
+  return 1e-3 * (threadProcessorMs() - start);
 }
 
 TraceRequest request(int surfaces) {
   TraceRequest request;
-  request.camera = {.width = 512, .height = 424, .fx = 365.456, .fy = 365.456, .cx = 254.88, .cy = 205.40,
-                    .distortion = {0.0905, -0.268, 0.0, 0.0, 0.0951}, .calibration_id = {}};
+  request.camera = {.width = 512,
+                    .height = 424,
+                    .fx = 365.456,
+                    .fy = 365.456,
+                    .cx = 254.88,
+                    .cy = 205.40,
+                    .distortion = {0.0905, -0.268, 0.0, 0.0, 0.0951},
+                    .calibration_id = {}};
   EmitterSpec light;
   light.position_m = {0.05, 0.0, 0.0};
   light.isotropic = true;
@@ -108,7 +48,8 @@ TraceRequest request(int surfaces) {
 
 std::size_t raysOf(const RayLog& log) {
   std::size_t rays = 0;
-  for (const RayLog::Packet& packet : log.packets) rays += static_cast<std::size_t>(std::count(packet.valid, packet.valid + 16, -1));
+  for (const RayLog::Packet& packet : log.packets)
+    rays += static_cast<std::size_t>(std::count(packet.valid, packet.valid + 16, -1));
   return rays;
 }
 
@@ -132,9 +73,18 @@ void replayOneByOne(const RayLog& log, RTCScene scene) {
       if (packet.valid[i] == 0) continue;
       const RTCRay16& from = packet.rays;
       RTCRayHit ray;
-      ray.ray = {.org_x = from.org_x[i], .org_y = from.org_y[i], .org_z = from.org_z[i], .tnear = from.tnear[i],
-                 .dir_x = from.dir_x[i], .dir_y = from.dir_y[i], .dir_z = from.dir_z[i], .time = 0.0f,
-                 .tfar = from.tfar[i], .mask = from.mask[i], .id = 0, .flags = 0};
+      ray.ray = {.org_x = from.org_x[i],
+                 .org_y = from.org_y[i],
+                 .org_z = from.org_z[i],
+                 .tnear = from.tnear[i],
+                 .dir_x = from.dir_x[i],
+                 .dir_y = from.dir_y[i],
+                 .dir_z = from.dir_z[i],
+                 .time = 0.0f,
+                 .tfar = from.tfar[i],
+                 .mask = from.mask[i],
+                 .id = 0,
+                 .flags = 0};
       if (packet.is_shadow) {
         embree::occluded(scene, ray.ray);
       } else {
@@ -169,28 +119,36 @@ double share(const std::vector<double>& part, const std::vector<double>& whole) 
   return median(std::move(ratios));
 }
 
-void compareWithEmbree(const Scene& scene, int runs) {
-  fmt::print("One thread, processor time, medians of {} runs; Mrays/s\n", runs);
+constexpr int kRuns = 9;
+
+}  // namespace
+
+Bars compareWithEmbree(const Scene& scene) {
+  const unsigned before = _mm_getcsr();
+  _mm_setcsr(before | 0x8040);  // denormals count as zero, as in the tracer
+  const tbb::global_control one_thread{tbb::global_control::max_allowed_parallelism, 1};
+  fmt::print("\nOne thread, processor time, medians of {} runs; Mrays/s\n\n", kRuns);
   fmt::print("| surfaces | rays | tracer | Embree, one by one | share | Embree, packets of 16 | share |\n");
   fmt::print("| --- | --- | --- | --- | --- | --- | --- |\n");
+  Bars bars;
   for (const int surfaces : {1, 2, 4, 16}) {
     const TraceRequest what = request(surfaces);
     RayLog log;
     traceLogged(scene, what, &log);
-    const Rates rates = measure(scene, what, log, runs);
+    const Rates rates = measure(scene, what, log, kRuns);
+    const double of_packets = share(rates.ours, rates.packets), goal = surfaces == 1 ? 80.0 : 85.0;
     fmt::print("| {} | {:.2f} M | {:.2f} | {:.2f} | {:.0f} % | {:.2f} | {:.0f} % |\n", surfaces,
                static_cast<double>(raysOf(log)) * 1e-6, median(rates.ours), median(rates.single),
-               share(rates.ours, rates.single), median(rates.packets), share(rates.ours, rates.packets));
+               share(rates.ours, rates.single), median(rates.packets), of_packets);
+    if (surfaces == 1 || surfaces == 16) {
+      bars.push_back({fmt::format("rays of frames over {} surface{}, of Embree's packets alone", surfaces,
+                                  surfaces == 1 ? "" : "s"),
+                      fmt::format("{:.0f} %", of_packets), fmt::format("≥ {:.0f} %", goal),
+                      of_packets >= goal});
+    }
   }
+  _mm_setcsr(before);
+  return bars;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  _mm_setcsr(_mm_getcsr() | 0x8040);  // denormals count as zero, as in the tracer
-  const int runs = argc > 1 ? std::max(0, std::atoi(argv[1])) : 9;
-  const tbb::global_control one_thread{tbb::global_control::max_allowed_parallelism, 1};
-  const Scene room = roomScene();
-  if (runs > 0) compareWithEmbree(room, runs);
-  toftwin::bench::compareSamplers(room);
-}
+}  // namespace toftwin::bench
