@@ -60,7 +60,7 @@ std::vector<double> measureFrames(const Files& files, const std::string& pace, d
   double last = 0.0;
   const double end = wallMs() + 1e3 * seconds;
   for (int i = 0; wallMs() < end; ++i) {
-    const auto frame = subscription.next(5s);
+    const auto frame = subscription.next(60s);
     if (!frame) giveUp(frame.error().message);
     const double now = wallMs();
     if (i > 40) {
