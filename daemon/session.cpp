@@ -174,6 +174,9 @@ Session::Answers Session::on(const wire::Subscribe& request) {
   }
   auto source = hub_.find(request.source);
   if (!source) return {failure(request.id, source.error())};
+  if (std::ranges::any_of(request.planes, [this](PlaneKind kind) { return kind > lastKindOfClient(); }))
+    return {failure(request.id, {Error::Code::Unsupported,
+                                 "a plane was asked for that the client's version of the protocol does not have"})};
   auto backlog = backlogFor(request, hub_.options().backlog_bytes, hub_.budget());
   if (!backlog) return {failure(request.id, backlog.error())};
   Wish wish;  // filled one by one: GCC 12 warns of nested braces here, without a cause

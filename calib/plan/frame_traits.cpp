@@ -74,10 +74,9 @@ class OverRange {
 
 /// What a camera is off by at a range: corners and plates are judged beside it.
 OverRange ownErrorOf(const Captures& walls, std::size_t camera) {
-  return {walls, camera, [](const CameraSeen& seen) -> const auto& {return seen.wall_error_mm;
+  const auto errors = [](const CameraSeen& seen) -> const std::vector<double>& { return seen.wall_error_mm; };
+  return {walls, camera, errors};
 }
-};  // namespace
-}  // namespace toftwin::plan
 
 void addTiming(const ComparedRun& run, std::size_t camera, TraitCollector& all) {
   std::vector<std::vector<double>> series;

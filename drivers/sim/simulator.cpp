@@ -375,7 +375,7 @@ Result<std::unique_ptr<Source>> open(settings::Table& table) {
   if (!chosen) return chosen.error();
   sim::TraceRequest request = chosen->model.traceRequest();
   chosen->keys.applyTo(request);
-  if (const auto missing = sim::missingLight(chosen->scene, request.emitters))
+  if (const auto missing = sim::missingLight(chosen->scene, request.emitters, chosen->keys.mode == Mode::RealTime))
     logging::warn("{}: {}", table.place("scene"), *missing);
   View view{std::move(chosen->scene), std::move(request), motionOf(chosen->keys), chosen->model.rowDelay()};
   if (chosen->keys.mode == Mode::RealTime) view.goRealtime(chosen->model.correlatedTerms());

@@ -23,9 +23,8 @@ bool isMirror(const Scene::Impl& scene, std::size_t object) {
 }
 
 bool isSame(const MirrorPlane& a, const MirrorPlane& b) {
-  const double along = dot(a.normal, b.normal);
-  return 1.0 - std::abs(along) < kSamePlane &&
-         std::abs(a.level - (along > 0.0 ? b.level : -b.level)) < kSamePlane;
+  const double facing = dot(a.normal, b.normal) > 0.0 ? 1.0 : -1.0;
+  return norm(a.normal - b.normal * facing) < kSamePlane && std::abs(a.level - facing * b.level) < kSamePlane;
 }
 
 /// In the object's frame; none of one that is not flat.
@@ -121,7 +120,9 @@ void throughMirror(const Tracing& tracing, const Packet& packet, const Hits& hit
   castTowards(tracing, hits, image.position, light.valid, rays);
   Packet to;
   startTowards(packet, hits, image.position, to);
-  to.valid = light.valid;
+  // A ray that meets nothing, or something else, has no place on the mirror, and no texture there.
+  for (std::size_t i = 0; i < kLaneCount; ++i)
+    to.valid[i] = light.valid[i] != 0 && rays.hit.geomID[i] == plane.object ? -1 : 0;
   Hits on_mirror;
   findHits(tracing.scene, to, rays, on_mirror);
   applyTextures(tracing.scene, rays, to, on_mirror);
@@ -129,10 +130,10 @@ void throughMirror(const Tracing& tracing, const Packet& packet, const Hits& hit
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     const Vec3d p = at(on_mirror.position, i);
     const double reach = 1e-6 * (1.0 + std::abs(plane.level) + on_mirror.distance[i]);
-    const bool is_there = rays.hit.geomID[i] == plane.object &&
+    const bool is_there = to.valid[i] != 0 &&
                           std::abs(dot(plane.normal, p) - plane.level) < reach &&
                           dot(at(on_mirror.normal, i), plane.normal) * side > 0.0;
-    if (light.valid[i] != 0 && is_there) {
+    if (is_there) {
       light.weight[i] *= on_mirror.albedo[i];
       continue;
     }

@@ -11,8 +11,9 @@
 namespace toftwin::sim {
 
 /// What of the light tracing must leave out, in words for whoever put scene and camera together; nothing if
-/// it finds all. Light that a smooth surface (mirror, thin glass) throws onto another one is only met by
-/// paths that run from the mirror into an emitter's disc; a point has no size to be met (docs/scene.md).
-std::optional<std::string> missingLight(const Scene& scene, std::span<const EmitterSpec> emitters);
+/// it finds all. What a point throws onto a surface over one flat mirror is found; over two mirrors, a curved one or
+/// the reflection of a pane it would only be met by paths that run into the emitter, and a point has no size to be
+/// met (docs/scene.md). In real time nothing is found that comes over a mirror or the reflection of a pane.
+std::optional<std::string> missingLight(const Scene& scene, std::span<const EmitterSpec> emitters, bool in_real_time);
 
 }  // namespace toftwin::sim

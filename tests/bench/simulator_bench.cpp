@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Every goal of the simulator's speed and efficiency, measured in one run (docs/performance.md).
-//   simulator_bench [PART …]    triangles, frames, rays, samplers, furnace, stages, errors, costs; default:
-//   all simulator_bench furnace 1500    so many seconds of processor time for each albedo in place of 60
+//   simulator_bench [PART …]        triangles, frames, rays, samplers, furnace, stages, errors, costs; default: all
+//   simulator_bench furnace 1500    so many seconds of processor time for each albedo in place of 60
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 

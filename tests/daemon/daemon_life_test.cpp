@@ -49,7 +49,8 @@ TEST_F(RunningDaemon, AFacadeThatThisBuildLacksIsToldInTheLog) {
   boost::asio::io_context io;
   Hub hub{Hub::Options{}, clock_};
   Facades facades{io, hub, clock_};
-  facades.apply({{.keys = {.kind = "telegraph", .source = "cam"},
+  facades.apply({{.keys = {.kind = "telegraph", .source = "cam", .intervals = {}},
+                  .unevenness = {},
                   .fingerprint = "",
                   .start = {},
                   .not_built = "d.toml:5: it was not built: install libmorse-dev"}});

@@ -65,6 +65,8 @@ TEST(SampleSteps, AreFoundWhateverTheNoiseIs) {
     expectStep(4, step, 60.0);
     expectStep(3, step, 60.0);
   }
+  expectStep(4, 6.0, 6.0);  // single precision's own grid shows in the amplitudes
+  expectStep(3, 60.0, 600.0);
 }
 
 TEST(SampleSteps, AreNotFoundWhereThereAreNone) {

@@ -4,7 +4,10 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <fstream>
+#include <opencv2/core.hpp>
 
+#include "sim/pictures/png.h"
 #include "sim/tracer/bsdf/any.h"
 #include "sim/tracer/emitter.h"
 #include "tests/tracer/tracing.h"
@@ -116,6 +119,32 @@ TEST(MirroredLight, IsMissingWhereAnythingIsInItsWay) {
   expectPhasor(trace(sceneOf(beside(mirrorAt(1.0), plate("0.75, 0, 0.5") + plate("0.25, 0.2, 0.5"))),
                      onePixel(80_MHz, 1, 2)),
                kDirect + kMirrored, "beside");
+}
+
+/// A white picture changes nothing, a black one on the mirror takes what comes over it.
+TEST(MirroredLight, IsMultipliedByTheMirrorsPicture) {
+  const std::filesystem::path folder =
+      std::filesystem::temp_directory_path() / ("toftwin-mirror-" + std::to_string(::getpid()));
+  std::filesystem::create_directories(folder);
+  const auto picture = [&](const std::string& name, int grey) {
+    const auto png = pictures::encodePng(cv::Mat(4, 4, CV_8U, cv::Scalar{static_cast<double>(grey)}));
+    std::ofstream{folder / name, std::ios::binary}.write(reinterpret_cast<const char*>(png.data()),
+                                                         static_cast<std::streamsize>(png.size()));
+    return "\ntexture = '" + (folder / name).string() + "'";
+  };
+  const std::string white = picture("white.png", 255), black = picture("black.png", 0);
+  const auto with = [&](const std::string& on_mirror, const std::string& on_wall, double z) {
+    return trace(sceneOf(material("mirror", "model = 'mirror'\nalbedo = 0.9" + on_mirror) +
+                         material("wall", "albedo = 0.7" + on_wall) +
+                         rectangle("wall", "position_m = [0, 0, 2]", "0.1, 0.1") +
+                         rectangle("mirror", "position_m = [0.5, 0, " + std::to_string(z) + "]\neuler_deg = [0, 90, 0]",
+                                   "0.5, 0.5")),
+                 onePixel(80_MHz, 1, 2));
+  };
+  expectPhasor(with(white, white, 1.0), kDirect + kMirrored, "white");
+  expectPhasor(with(black, white, 1.0), kDirect, "black");
+  expectPhasor(with(white, white, 1.5), kDirect, "what goes past the mirror meets nothing");
+  std::filesystem::remove_all(folder);
 }
 
 /// Towards the mirror the emitter sends I(γ) with tan γ = 1/2.

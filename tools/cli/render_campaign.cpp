@@ -159,7 +159,7 @@ Result<Job> jobOf(const RenderOptions& options) {
   }
   auto scene = loadScene(options.scene);
   if (!scene) return scene.error();
-  if (const auto missing = sim::missingLight(*scene, model->traceRequest().emitters))
+  if (const auto missing = sim::missingLight(*scene, model->traceRequest().emitters, false))
     fmt::print(stderr, "toftwin: {}: warning: {}\n", options.scene, *missing);
   const auto pose = options.pose.pose();
   if (!pose) return pose.error();

@@ -118,18 +118,22 @@ void addDimmest(const Image<float>& before, const Image<float>& after, std::vect
 
 std::optional<SampleSteps> sampleStepsOf(std::span<const AmplitudePair> pairs, std::size_t phase_steps) {
   if (phase_steps != 3 && phase_steps != 4) return std::nullopt;
+  constexpr double kRounding = 0x1p-23;  // of a number in single precision, by which amplitudes are told
   std::vector<double> changes, changes_of_squares;
+  double brightest = 0.0;
   for (const AmplitudePair& pair : dimmestOf({pairs.begin(), pairs.end()}, kInAll)) {
     const auto a = static_cast<double>(pair[0]), b = static_cast<double>(pair[1]);
+    brightest = std::max({brightest, a, b});
     changes.push_back(b - a);
     changes_of_squares.push_back(b * b - a * a);
   }
   const auto comb = combOf(std::move(changes_of_squares));
-  if (!comb || combOf(std::move(changes))) return std::nullopt;
+  if (!comb) return std::nullopt;
+  // Amplitudes in single precision lie on its own grid, which says nothing of steps.
+  const auto of_amplitude = combOf(std::move(changes));
+  if (of_amplitude && of_amplitude->period > 16.0 * kRounding * brightest) return std::nullopt;
   const double steps_of_root = phase_steps == 4 ? 2.0 : 1.5;
   const double step = steps_of_root * std::sqrt(comb->period);
-  // Amplitudes are told in single precision, whose rounding is the same in all of them.
-  constexpr double kRounding = 0x1p-23;
   return SampleSteps{step, step * std::hypot(0.5 * comb->error / comb->period, kRounding), comb->p};
 }
 
