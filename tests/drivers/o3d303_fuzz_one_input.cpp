@@ -22,7 +22,7 @@ void readFrame(std::span<const std::byte> content) {
   if (!frame) return;
   static const Image<float> depth_per_range{4, 3, 1.0F};  // that of the corpus' frames
   if (const auto planes = drivers::o3d303::planesOf(*frame, depth_per_range)) {
-    demand(planes->size() == 4);
+    demand(planes->size() == 4 || planes->size() == 5);  // that of several exposures says which one each pixel is of
   }
   for (const Chunk& chunk : frame->chunks) {
     demand(chunk.data.data() >= content.data() &&
