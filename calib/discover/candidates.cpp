@@ -62,6 +62,17 @@ TermGroup waves(const CovariateInfo& covariate, int least, int most) {
   return group;
 }
 
+/// Harmonics of the modulation whose size changes straight with another covariate.
+TermGroup harmonicsTimes(const CovariateInfo& distance, const CovariateInfo& other) {
+  std::vector<Term> harmonics;
+  for (const int k : {1, 2, 4, 8}) {
+    for (const Shape shape : {Shape::Sine, Shape::Cosine})
+      harmonics.push_back(one(distance, shape, {distance.period / k}));
+  }
+  return {fmt::format("harmonics over {} that change with {}", distance.name, other.name), Kind::Generic,
+          products(harmonics, completeBasis(other, 2)), 0};
+}
+
 TermGroup parity(const CovariateInfo& covariate, int modulus) {
   TermGroup group{fmt::format("{} modulo {}", covariate.name, modulus), Kind::Generic, {}, 0};
   for (int r = 1; r < modulus; ++r)
@@ -147,6 +158,10 @@ std::vector<TermGroup> genericCandidates(std::span<const CovariateInfo> covariat
       if (straight.terms.size() <= kStraightColumns) groups.push_back(std::move(straight));
     }
     if (options.captures >= 30) groups.push_back(smoothIn(covariates[i], covariates[j], kSurfaceKnots));
+    for (const auto& [distance, other] : {std::pair{i, j}, std::pair{j, i}}) {
+      if (options.captures >= 60 && covariates[distance].period > 0.0 && !isOneOfFew(covariates[other]))
+        groups.push_back(harmonicsTimes(covariates[distance], covariates[other]));
+    }
   }
   return groups;
 }

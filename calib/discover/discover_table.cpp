@@ -52,7 +52,7 @@ void addAlike(const TableSource& source, const Judged& judged, TableData& data) 
                     "capture ({} of them); a column that names captures says it better",
                     source.runsOf(), source.captures()));
   }
-  if (source.hasCaptures() || source.noise().correlation_rows > 1.5) return;
+  if (source.hasCaptures() || (source.noise().dependence && source.noise().dependence->isClear())) return;
   if (judged.lag1_after < std::max(kErrAlike, 3.0 / std::sqrt(static_cast<double>(judged.rows)))) return;
   data.doubts.push_back(
       fmt::format("locked rows that follow each other err alike (correlation {:.2f}) although the others "

@@ -37,6 +37,8 @@ std::vector<Estimate> namedNuisances(const TableDiscovery& discovery);
 std::string verdictOf(const TableDiscovery& discovery);
 /// What is left without this effect, against each of its covariates.
 compare::FigureRow figuresOf(const TableDiscovery& discovery, const Effect& effect);
+/// All about one effect; they are counted from 1.
+compare::Section effectSection(const TableDiscovery& discovery, const Effect& effect, std::size_t number);
 /// Means over up to 40 groups of rows that are near each other in x.
 compare::Curve binned(const std::vector<double>& x, const std::vector<double>& y, std::string name,
                       compare::Ink ink);

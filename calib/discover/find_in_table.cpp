@@ -24,8 +24,6 @@ std::vector<std::string> namesOf(const Finding& finding) {
 
 Finding findInTable(TableSource& source, FinderOptions options) {
   options.has_straight_pairs = true;
-  // A block of rows that err alike knows less of its own dispersion than its rows say, however many they are.
-  if (source.noise().correlation_rows > 1.0) options.null_model = NullModel::SignFlips;
   Finding finding = find(source, options);
   const double first_p = finding.first_p;
   for (int round = 0; round < 2 && !finding.effects.empty(); ++round) {

@@ -79,7 +79,8 @@ struct Effect {
 struct Finding {
   std::vector<Effect> effects{};
   double first_p = 1.0, last_p = 1.0;  ///< of the first test, and of what is left
-  bool by_sign_flips = false;
+  NullModel null_model = NullModel::Automatic;  ///< of the first test
+  bool has_of_source = false;                   ///< the source drew, too
   int draws = 0;
   std::vector<double> scales{};  ///< of the random effects, by class
   double dispersion = 1.0;       ///< of what is left, in units of the noise's variance

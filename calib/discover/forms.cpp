@@ -73,6 +73,20 @@ TermGroup wave(const Form& f, std::span<const double> inner) {
   return group(f, std::move(terms));
 }
 
+/// Waves of fixed lengths over f.of[0], each also times y^q of f.of[1]; fixed: q, then the lengths.
+TermGroup wavesTimes(const Form& f, std::span<const double>) {
+  std::vector<Term> terms;
+  for (std::size_t i = 1; i < f.fixed.size(); ++i) {
+    for (const Shape shape : {Shape::Sine, Shape::Cosine}) {
+      terms.push_back(term(f.of[0], shape, {f.fixed[i]}));
+      Term both = terms.back();
+      both.factors.push_back(powerOrLog(f.of[1], f.fixed[0]).factors[0]);
+      terms.push_back(std::move(both));
+    }
+  }
+  return group(f, std::move(terms));
+}
+
 /// x beyond a place, on the side that fixed[0] says.
 TermGroup hinge(const Form& f, std::span<const double> inner) {
   return group(f, {term(f.of[0], Shape::Hinge, {inner[0], f.fixed[0]})});
@@ -160,18 +174,40 @@ std::vector<double> stepPlaces(const CovariateInfo& x) {
 
 /// Harmonics of the modulation: each, and those that a camera has together. k samples a period leave the k-th
 /// and its double; their mismatch the first and second.
-void addHarmonics(const CovariateInfo& x, std::vector<Form>& forms) {
-  if (!(x.period > 0.0)) return;
+struct Harmonics {
+  std::string name;
+  std::vector<double> lengths;
+};
+std::vector<Harmonics> harmonicsOf(const CovariateInfo& x) {
+  std::vector<Harmonics> all;
+  if (!(x.period > 0.0)) return all;
   const std::vector<std::vector<int>> sets{{1},    {2},    {3},    {4},    {5},    {6},    {7},         {8},
                                            {1, 2}, {1, 4}, {2, 4}, {2, 8}, {4, 8}, {3, 6}, {1, 2, 4, 8}};
   for (const std::vector<int>& set : sets) {
     if (span(x) < 0.6 * x.period / set.front()) continue;
-    std::vector<double> lengths;
-    for (const int k : set) lengths.push_back(x.period / k);
     const std::string times =
         set == std::vector{1} ? "once" : fmt::format("{} times", fmt::join(set, " and "));
-    forms.push_back(
-        form(fmt::format("{} per period over {}", times, x.name), {x}, wave, {}, std::move(lengths)));
+    all.push_back({fmt::format("{} per period over {}", times, x.name), {}});
+    for (const int k : set) all.back().lengths.push_back(x.period / k);
+  }
+  return all;
+}
+
+void addHarmonics(const CovariateInfo& x, std::vector<Form>& forms) {
+  for (Harmonics& one : harmonicsOf(x))
+    forms.push_back(form(std::move(one.name), {x}, wave, {}, std::move(one.lengths)));
+}
+
+/// Harmonics that are larger or smaller with y.
+void addChangingHarmonics(const CovariateInfo& x, const CovariateInfo& y, const std::vector<double>& powers,
+                          std::vector<Form>& forms) {
+  for (const Harmonics& one : harmonicsOf(x)) {
+    for (const double q : powers) {
+      std::vector<double> fixed{q};
+      fixed.insert(fixed.end(), one.lengths.begin(), one.lengths.end());
+      forms.push_back(form(fmt::format("{}, changing with {}", one.name, powerInWords(y, q)), {x, y},
+                           wavesTimes, {}, std::move(fixed)));
+    }
   }
 }
 
@@ -299,6 +335,7 @@ std::vector<Form> formsIn(const CovariateInfo& a, const CovariateInfo& b) {
   }
   for (const auto& [x, y] : {std::pair{a, b}, std::pair{b, a}}) {
     if (!isContinuous(x)) continue;
+    addChangingHarmonics(x, y, usablePowers(y), forms);
     for (const double q : x.nature == Nature::Time ? usablePowers(y) : std::vector{1.0}) {
       forms.push_back(form(fmt::format("exponential in {} · {}", x.name, powerInWords(y, q)), {x, y},
                            decayTimes, {timeConstant(x, 20.0, 8)}, {originOf(x), q}));

@@ -26,13 +26,4 @@ std::vector<Runs> runsOfEqualValues(const TableData& data);
 /// everything smooth.
 double alikeness(const Runs& runs, const Eigen::VectorXd& residual);
 
-/// Over how many rows that follow each other errors are alike: 1 + 2 Σ ρ_k, the spectrum at nothing over the
-/// variance, of white noise and an AR(1) process in any mixture. Whittle's likelihood (P. Whittle, Ark. Mat.
-/// 2 (1953) 423) of the periodogram, with what the fit has taken of each frequency given back; 1 unless the
-/// mixture explains it far better than white noise. Medians over seven neighbours, so that a few lines, which
-/// are effects, are no correlation. `residual`: y − Xβ of the fit, standardised; `columns`: its X; `inverse`:
-/// (XᵀX)⁻¹.
-double correlationRows(const Eigen::VectorXd& residual, const Eigen::MatrixXd& columns,
-                       const Eigen::MatrixXd& inverse);
-
 }  // namespace toftwin::discover

@@ -215,9 +215,14 @@ const CovariateInfo* infoOf(const Context& context, const std::string& name) {
   return found == context.covariates.end() ? nullptr : &*found;
 }
 
-Part prepare(const Context& context, std::span<const TermGroup> groups, bool with_catalogue) {
+std::vector<TermGroup> withKnown(const Context& context, std::span<const TermGroup> groups) {
   std::vector<TermGroup> extra = context.known;
   extra.insert(extra.end(), groups.begin(), groups.end());
+  return extra;
+}
+
+Part prepare(const Context& context, std::span<const TermGroup> groups, bool with_catalogue) {
+  const std::vector<TermGroup> extra = withKnown(context, groups);
   Part out;
   const bool needs_catalogue = with_catalogue || !context.catalogue.empty();
   out.marginal =

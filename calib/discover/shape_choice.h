@@ -56,6 +56,7 @@ Columns modelOf(const Context& context, const Marginal& marginal, std::size_t ex
 
 /// Evidence for some groups on top of what is known, some columns at a time: each part with its model and the
 /// number of its first new group. The catalogue is in the first part only.
+std::vector<TermGroup> withKnown(const Context& context, std::span<const TermGroup> groups);
 struct Part {
   Marginal marginal;
   Columns model;

@@ -3,8 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <random>
 #include <set>
+
+#include "calib/discover/draws.h"
 
 namespace toftwin::discover {
 namespace {
@@ -117,36 +118,13 @@ std::vector<std::string> oddOnes(const Marginal& marginal, const VectorXd& dispe
   return odd;
 }
 
-/// Signs from a counter-free generator whose sequence the standard fixes.
-class Signs {
- public:
-  explicit Signs(std::uint64_t seed) : bits_(seed) {}
-  VectorXd next(Index count) {
-    VectorXd signs(count);
-    std::uint64_t word = 0;
-    for (Index i = 0; i < count; ++i) {
-      if (i % 64 == 0) word = bits_();
-      signs(i) = (word >> (i % 64)) & 1U ? 1.0 : -1.0;
-    }
-    return signs;
-  }
-  double normal() {  // Box and Muller
-    const double u = (static_cast<double>(bits_() >> 11) + 0.5) * 0x1p-53;
-    const double v = (static_cast<double>(bits_() >> 11) + 0.5) * 0x1p-53;
-    return std::sqrt(-2.0 * std::log(u)) * std::cos(6.283185307179586 * v);
-  }
-
- private:
-  std::mt19937_64 bits_;
-};
-
 /// Null draws of all statistics, one column a draw.
 MatrixXd flippedDraws(const std::vector<Projected>& groups, const MatrixXd& residual, const Columns& model,
                       const TestOptions& options) {
   const Index captures = residual.cols();
   MatrixXd signs(captures, options.draws);
-  Signs random(options.seed);
-  for (int d = 0; d < options.draws; ++d) signs.col(d) = random.next(captures);
+  Draws random(options.seed);
+  for (int d = 0; d < options.draws; ++d) signs.col(d) = random.signs(captures);
   MatrixXd draws(static_cast<Index>(groups.size()), options.draws);
   for (std::size_t g = 0; g < groups.size(); ++g) {
     const MatrixXd sums = whitenedMoments(groups[g], residual, model) * signs;
@@ -155,22 +133,21 @@ MatrixXd flippedDraws(const std::vector<Projected>& groups, const MatrixXd& resi
   return draws;
 }
 
-MatrixXd noiseDraws(const Marginal& marginal, const std::vector<Projected>& groups,
-                    const VectorXd& dispersion, const Columns& model, const TestOptions& options) {
+/// Of noise that has these moments, a column for each draw.
+MatrixXd drawsOf(const std::vector<Projected>& groups, const MatrixXd& moments, const Columns& model) {
+  MatrixXd draws(static_cast<Index>(groups.size()), moments.cols());
+  for (std::size_t g = 0; g < groups.size(); ++g)
+    draws.row(static_cast<Index>(g)) = whitenedMoments(groups[g], moments, model).colwise().squaredNorm();
+  return draws;
+}
+
+MatrixXd noiseMoments(const Marginal& marginal, const VectorXd& dispersion, const TestOptions& options) {
   MatrixXd covariance = MatrixXd::Zero(marginal.gram.rows(), marginal.gram.cols());
   for (std::size_t c = 0; c < marginal.captures.size(); ++c)
     covariance += dispersion(static_cast<Index>(c)) * marginal.captures[c].gram;
   const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(covariance);
   const MatrixXd root = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
-  Signs random(options.seed);
-  MatrixXd normal(root.cols(), options.draws);
-  for (Index d = 0; d < normal.cols(); ++d)
-    for (Index i = 0; i < normal.rows(); ++i) normal(i, d) = random.normal();
-  const MatrixXd moments = root * normal;
-  MatrixXd draws(static_cast<Index>(groups.size()), options.draws);
-  for (std::size_t g = 0; g < groups.size(); ++g)
-    draws.row(static_cast<Index>(g)) = whitenedMoments(groups[g], moments, model).colwise().squaredNorm();
-  return draws;
+  return root * Draws{options.seed}.normals(root.cols(), options.draws);
 }
 
 MatrixXd residualMoments(const Marginal& marginal, const Fit& model) {
@@ -194,9 +171,10 @@ std::vector<Projected> projectedGroups(const Marginal& marginal, const Fit& mode
   return groups;
 }
 
-bool flips(const Marginal& marginal, NullModel chosen) {
-  if (chosen != NullModel::Automatic) return chosen == NullModel::SignFlips;
-  return marginal.rows < 64.0 * static_cast<double>(marginal.captures.size());
+NullModel nullModelOf(const Marginal& marginal, NullModel wanted) {
+  if (wanted != NullModel::Automatic) return wanted;
+  return marginal.rows < 64.0 * static_cast<double>(marginal.captures.size()) ? NullModel::SignFlips
+                                                                              : NullModel::Noise;
 }
 
 }  // namespace
@@ -212,9 +190,24 @@ std::vector<GroupScore> statistics(const Marginal& marginal, const Columns& mode
   return scores;
 }
 
-void Test::add(const Marginal& marginal, const Columns& model_columns) {
+double Test::Largest::take(double statistic, const VectorXd& draws) {
+  const Gauge gauge(draws);
+  if (of_draws.size() == 0) of_draws = VectorXd::Constant(draws.size(), -1e300);
+  for (Index d = 0; d < draws.size(); ++d) of_draws(d) = std::max(of_draws(d), gauge.z(draws(d)));
+  const double z = gauge.z(statistic);
+  of_data = std::max(of_data, z);
+  return z;
+}
+
+double Test::Largest::p() const {
+  const auto above = static_cast<double>((of_draws.array() >= of_data).count());
+  return (1.0 + above) / (static_cast<double>(of_draws.size()) + 1.0);
+}
+
+void Test::add(const Marginal& marginal, const Columns& model_columns, const MatrixXd& of_source) {
   out_.draws = options_.draws;
-  out_.by_sign_flips = flips(marginal, options_.null_model);
+  out_.null_model = nullModelOf(marginal, options_.null_model);
+  out_.has_of_source = of_source.size() > 0;
   if (marginal.captures.empty()) return;
   const Fit model = fit(marginal, model_columns);
   const MatrixXd residual = residualMoments(marginal, model);
@@ -222,21 +215,22 @@ void Test::add(const Marginal& marginal, const Columns& model_columns) {
   out_.odd_captures = oddOnes(marginal, dispersion);
   std::vector<Projected> groups = projectedGroups(marginal, model);
   if (groups.empty()) return;
-  if (out_.by_sign_flips) {
+  const bool is_flipped = out_.null_model == NullModel::SignFlips;
+  if (is_flipped) {
     for (Projected& group : groups) group.correction = flipCorrection(marginal, model, group);
   }
-  const MatrixXd draws = out_.by_sign_flips
+  const MatrixXd draws = is_flipped
                              ? flippedDraws(groups, residual, model_columns, options_)
-                             : noiseDraws(marginal, groups, dispersion, model_columns, options_);
-  if (largest_.size() == 0) largest_ = VectorXd::Constant(options_.draws, -1e300);
+                             : drawsOf(groups, noiseMoments(marginal, dispersion, options_), model_columns);
+  const MatrixXd source_draws = out_.has_of_source ? drawsOf(groups, of_source, model_columns) : MatrixXd{};
   for (std::size_t g = 0; g < groups.size(); ++g) {
-    const Gauge gauge(draws.row(static_cast<Index>(g)).transpose());
+    const auto row = static_cast<Index>(g);
     const double statistic =
         whitenedMoments(groups[g], residual, model_columns).rowwise().sum().squaredNorm();
-    out_.scores.push_back({names_.size(), statistic, groups[g].rank, gauge.z(statistic)});
+    double z = by_captures_.take(statistic, draws.row(row).transpose());
+    if (out_.has_of_source) z = std::min(z, by_source_.take(statistic, source_draws.row(row).transpose()));
+    out_.scores.push_back({names_.size(), statistic, groups[g].rank, z});
     names_.push_back(marginal.groups[groups[g].group].name);
-    for (int d = 0; d < options_.draws; ++d)
-      largest_(d) = std::max(largest_(d), gauge.z(draws(static_cast<Index>(g), d)));
     if (out_.scores.back().z > out_.scores[out_.best].z) out_.best = out_.scores.size() - 1;
   }
 }
@@ -244,8 +238,8 @@ void Test::add(const Marginal& marginal, const Columns& model_columns) {
 Significance Test::result() const {
   Significance out = out_;
   if (out.scores.empty()) return out;
-  const auto above = (largest_.array() >= out.scores[out.best].z).count();
-  out.p = (1.0 + static_cast<double>(above)) / (options_.draws + 1.0);
+  out.p = by_captures_.p();
+  if (out.has_of_source) out.p = std::max(out.p, by_source_.p());
   return out;
 }
 

@@ -35,16 +35,20 @@ struct GroupScore {
   std::size_t group = 0;  ///< of the Marginal, or of Test's names
   double statistic = 0.0;
   int rank = 0;
-  double z = 0.0;  ///< T against its own null draws, as a normal deviate (Wilson and Hilferty)
+  /// T against its own null draws, as a normal deviate (Wilson and Hilferty); the smaller one where the
+  /// source draws, too.
+  double z = 0.0;
 };
 
 struct Significance {
-  double p =
-      1.0;  ///< rank of the largest z among the largest of the null draws: (1 + #{null ≥ data})/(draws + 1)
+  /// Rank of the largest z among the largest of the null draws, (1 + #{null ≥ data})/(draws + 1); the larger
+  /// one where the source draws, too.
+  double p = 1.0;
   std::vector<GroupScore> scores{};
   std::size_t best = 0;  ///< of `scores`
   int draws = 0;
-  bool by_sign_flips = false;
+  NullModel null_model = NullModel::Automatic;  ///< which it was
+  bool has_of_source = false;                   ///< the source drew, too
   /// Captures whose dispersion is far from the others': moved, bumped, or wrong.
   std::vector<std::string> odd_captures{};
 };
@@ -58,15 +62,24 @@ class Test {
  public:
   explicit Test(const TestOptions& options) : options_(options) {}
   /// The groups of one part; the nuisances and the model are the same in all. `score.group` counts on through
-  /// the parts in the order of their tested groups' names.
-  void add(const Marginal& marginal, const Columns& model);
+  /// the parts in the order of their tested groups' names. `of_source`: moments of the source's own null
+  /// draws, a column for each; empty: it has none. Both kinds of draws must say that there is something.
+  void add(const Marginal& marginal, const Columns& model, const Eigen::MatrixXd& of_source = {});
   [[nodiscard]] Significance result() const;
   [[nodiscard]] const std::vector<std::string>& names() const { return names_; }
 
  private:
   TestOptions options_;
   Significance out_;
-  Eigen::VectorXd largest_;
+  /// Of one way to draw: the largest z of each draw and of the data.
+  struct Largest {
+    Eigen::VectorXd of_draws{};
+    double of_data = -1e300;
+    /// The deviate of a group's statistic, which is remembered if it is the largest.
+    double take(double statistic, const Eigen::VectorXd& draws);
+    [[nodiscard]] double p() const;
+  };
+  Largest by_captures_, by_source_;
   std::vector<std::string> names_;
 };
 

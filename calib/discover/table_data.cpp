@@ -4,134 +4,21 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
-#include <limits>
 #include <map>
 #include <optional>
-#include <random>
 #include <set>
 #include <utility>
-
-#include <openssl/evp.h>
 
 #include <fmt/format.h>
 
 #include "calib/discover/headers.h"
+#include "calib/discover/named_columns.h"
 #include "calib/discover/row_checks.h"
-#include "calib/discover/rows_alike.h"
-#include "calib/discover/table_field.h"
 
 namespace toftwin::discover {
 namespace {
 
 constexpr std::size_t kFewestRows = 20, kMostWords = 12;
-
-/// Reads columns of a CsvTable; errors name file and line.
-class NamedColumns {
- public:
-  NamedColumns(const CsvTable& table, const std::filesystem::path& file) : table_(table), file_(file) {}
-
-  [[nodiscard]] std::optional<std::size_t> find(const std::string& name) const {
-    const auto at = std::ranges::find(table_.header, name);
-    if (at == table_.header.end()) return std::nullopt;
-    return static_cast<std::size_t>(at - table_.header.begin());
-  }
-  [[nodiscard]] Error missing(const std::string& name) const {
-    return {Error::Code::NotFound, fmt::format("{}: has no column \"{}\", only: {}", file_.string(), name,
-                                               fmt::join(table_.header, ", "))};
-  }
-  [[nodiscard]] const std::vector<std::string>& text(const std::string& name) const {
-    return table_.columns[*find(name)];
-  }
-  /// NaN where a field says that there is none. Times become seconds since the first of them.
-  [[nodiscard]] Result<std::vector<double>> numbers(const std::string& name) const {
-    auto values = asWritten(name);
-    if (values && isTime(name))
-      for (const double first = firstOf(*values); double& value : *values) value -= first;
-    return values;
-  }
-  static double firstOf(const std::vector<double>& values) {
-    double first = std::numeric_limits<double>::infinity();
-    for (const double value : values) first = std::fmin(first, value);
-    return first;
-  }
-  /// Times are seconds since 1970, or since midnight.
-  [[nodiscard]] Result<std::vector<double>> asWritten(const std::string& name) const {
-    const auto at = find(name);
-    if (!at) return missing(name);
-    const bool is_time = isTime(name);
-    std::vector<double> values;
-    for (std::size_t row = 0; row < table_.rows(); ++row) {
-      const std::string& field = table_.columns[*at][row];
-      const auto number = toNumber(field), value = number || !is_time ? number : secondsIn(field);
-      if (!value) {
-        return Error{
-            Error::Code::Malformed,
-            fmt::format("{}:{}: \"{}\" in column \"{}\" is not a number{}", file_.string(), table_.line[row],
-                        field.substr(0, 40), name,
-                        hasThousandsPoint(field) ? ": write it without the points that part thousands" : "")};
-      }
-      values.push_back(*value);
-    }
-    if (const auto row = thousandOrNot(*at)) {
-      return Error{Error::Code::Malformed,
-                   fmt::format("{}:{}: \"{}\" in column \"{}\" may be a thousand or a fraction, beside whole numbers; "
-                               "write it without the comma, or all with decimals",
-                               file_.string(), table_.line[*row], table_.columns[*at][*row], name)};
-    }
-    if (is_time) overMidnight(values);
-    return values;
-  }
-  /// The first "1,020" in a column with "950", where commas may be those of decimals: none is guessed.
-  [[nodiscard]] std::optional<std::size_t> thousandOrNot(std::size_t column) const {
-    if (table_.separator == ',') return std::nullopt;
-    bool has_whole = false;
-    std::optional<std::size_t> first;
-    for (std::size_t row = 0; row < table_.rows(); ++row) {
-      std::string_view field = table_.columns[column][row];
-      if (!field.empty() && (field.front() == '-' || field.front() == '+')) field.remove_prefix(1);
-      const bool is_number = !field.empty() && field.find_first_not_of("0123456789,") == std::string_view::npos;
-      const std::size_t comma = field.find(',');
-      if (is_number && comma == std::string_view::npos) has_whole = true;
-      if (is_number && comma != std::string_view::npos && comma + 4 == field.size() && field.front() != '0' && !first)
-        first = row;
-    }
-    return has_whole ? first : std::nullopt;
-  }
-  /// Times of day that fall by more than half a day are those of the next one. Dates do not fall so.
-  static void overMidnight(std::vector<double>& seconds) {
-    constexpr double kDay = 86'400.0;
-    double days = 0.0, before = std::nan("");
-    for (double& value : seconds) {
-      if (std::isnan(value) || value > kDay) continue;
-      if (value < before - 0.5 * kDay) days += kDay;
-      before = value;
-      value += days;
-    }
-  }
-  [[nodiscard]] std::optional<double> toNumber(std::string_view field) const {
-    return numberIn(field, table_.separator != ',');
-  }
-  [[nodiscard]] bool isText(const std::string& name) const {
-    return !isTime(name) &&
-           std::ranges::any_of(text(name), [&](const std::string& field) { return !toNumber(field); });
-  }
-  /// Times of day or dates, but for fields that say nothing.
-  [[nodiscard]] bool isTime(const std::string& name) const {
-    bool has_any = false;
-    for (const std::string& field : text(name)) {
-      if (secondsIn(field))
-        has_any = true;
-      else if (const auto value = toNumber(field); !value || !std::isnan(*value))
-        return false;
-    }
-    return has_any;
-  }
-
- private:
-  const CsvTable& table_;
-  const std::filesystem::path& file_;
-};
 
 /// Numbers for names, in the order in which they first stand there.
 std::vector<int> numbered(const std::vector<std::string>& words, std::vector<std::string>& names) {
@@ -256,12 +143,31 @@ void dropSparse(TableData& data) {
   });
 }
 
-/// Speed of light over twice the frequency, in the unit of a header.
-double periodIn(Frequency modulation, const std::string& unit) {
+/// Speed of light over twice the frequency, in the unit of the reference; without one in its header in that
+/// of what was measured, from which it is subtracted as it is. 0: no header says it.
+double periodOf(Frequency modulation, const Roles& roles, TableData& data) {
   if (!(modulation > Frequency{})) return 0.0;
-  const double metres = 299'792'458.0 / (2.0 * modulation.in(hertz));
-  const auto found = kPerMetre.find(unit);
-  return metres * (found == kPerMetre.end() ? 1.0 : found->second);
+  auto per_metre = kPerMetre.find(unitOf(roles.reference));
+  if (per_metre == kPerMetre.end() && roles.error.empty()) per_metre = kPerMetre.find(data.unit);
+  if (per_metre != kPerMetre.end()) return per_metre->second * 299'792'458.0 / (2.0 * modulation.in(hertz));
+  data.doubts.push_back(
+      "`modulation_mhz` is said, but no header the reference's unit: waves of c/(2f) are not looked for; let "
+      "it "
+      "end in one, as in `reference_mm`");
+  return 0.0;
+}
+
+/// Rows were left out: sessions without any count no more.
+void dropEmptySessions(TableData& data) {
+  std::map<int, int> kept;
+  for (const int session : data.session) kept.try_emplace(session, 0);
+  std::vector<std::string> names;
+  for (auto& [before, now] : kept) {
+    now = static_cast<int>(names.size());
+    names.push_back(data.session_names[static_cast<std::size_t>(before)]);
+  }
+  for (int& session : data.session) session = kept[session];
+  data.session_names = std::move(names);
 }
 
 /// A column that could name sessions, beside one that does, and that names at least two groups in each on
@@ -349,9 +255,10 @@ Result<TableData> readTable(const CsvTable& table, const TableMap& map, const st
     data.doubts.push_back(fmt::format("{} of {} rows have an empty, infinite or impossible value: left out",
                                       before - data.rows(), before));
   }
-  data.period = periodIn(map.modulation, unitOf(roles->reference.empty() ? roles->error : roles->reference));
+  data.period = periodOf(map.modulation, *roles, data);
   const double scale = lengthFactor(unitOf(roles->reference), data.unit);
   setInvalidAside(data, scale);
+  dropEmptySessions(data);
   if (data.rows() < kFewestRows) {
     return Error{Error::Code::InvalidArgument, fmt::format("{}: has {} usable rows; at least {} are needed",
                                                            file.string(), data.rows(), kFewestRows)};
@@ -382,73 +289,6 @@ TableData rowsOf(const TableData& data, const std::vector<bool>& wanted) {
   keep(out.line);
   for (TableCovariate& covariate : out.covariates) keep(covariate.values);
   return out;
-}
-
-/// Number of each row's capture, in the order in which they first stand there; the same name in two sessions
-/// is two. Where no column names them, runs of equal values may be some.
-static std::vector<int> capturesInOrder(const TableData& data) {
-  if (data.capture.empty()) {
-    auto runs = runsOfEqualValues(data);
-    return runs.empty() ? std::vector<int>{} : std::move(runs.front().run);
-  }
-  std::map<std::pair<int, int>, int> known;
-  std::vector<int> numbers;
-  for (std::size_t i = 0; i < data.capture.size(); ++i)
-    numbers.push_back(
-        known.try_emplace({data.session[i], data.capture[i]}, static_cast<int>(known.size())).first->second);
-  return numbers;
-}
-
-void lock(TableData& data, const TableMap& map) {
-  if (data.has_locked_column) return;
-  std::mt19937_64 random{map.seed + 77};
-  const auto sessions = data.session_names.size();
-  if (sessions >= 5) {
-    std::vector<std::size_t> order(sessions);
-    for (std::size_t i = 0; i < sessions; ++i) order[i] = i;
-    for (std::size_t i = sessions - 1; i > 0; --i) std::swap(order[i], order[random() % (i + 1)]);
-    order.resize(
-        std::max<std::size_t>(1, static_cast<std::size_t>(map.locked_share * static_cast<double>(sessions))));
-    for (std::size_t i = 0; i < data.rows(); ++i)
-      data.locked[i] = std::ranges::find(order, static_cast<std::size_t>(data.session[i])) != order.end();
-    data.notes.push_back(fmt::format("{} of {} sessions are locked", order.size(), sessions));
-    return;
-  }
-  // Blocks of captures, or rows, that follow each other: one of every `every` is drawn.
-  const auto capture = capturesInOrder(data);
-  const std::size_t units =
-      capture.empty() ? data.rows() : 1 + static_cast<std::size_t>(*std::ranges::max_element(capture));
-  const auto every = static_cast<std::size_t>(std::lround(1.0 / map.locked_share));
-  const std::size_t size = std::max<std::size_t>(1, units / (8 * every));
-  std::vector<bool> is_drawn(units, false);
-  for (std::size_t first = 0; first < units; first += size * every) {
-    const std::size_t begin = first + size * (random() % std::min(every, units));
-    for (std::size_t i = begin; i < std::min(begin + size, units); ++i) is_drawn[i] = true;
-  }
-  for (std::size_t i = 0; i < data.rows(); ++i)
-    data.locked[i] = is_drawn[capture.empty() ? i : static_cast<std::size_t>(capture[i])];
-  data.doubts.push_back(
-      "locked rows are of the same sessions as the others, because there are fewer than five");
-}
-
-std::string hashOf(const TableData& data) {
-  EVP_MD_CTX* context = EVP_MD_CTX_new();
-  EVP_DigestInit_ex(context, EVP_sha256(), nullptr);
-  const auto add = [&](const auto& values) {
-    for (const auto& value : values) {
-      const double number = static_cast<double>(value);
-      EVP_DigestUpdate(context, &number, sizeof number);
-    }
-  };
-  add(data.line), add(data.error), add(data.reference), add(data.sigma), add(data.session);
-  for (const TableCovariate& covariate : data.covariates) add(covariate.values);
-  unsigned char digest[EVP_MAX_MD_SIZE];
-  unsigned length = 0;
-  EVP_DigestFinal_ex(context, digest, &length);
-  EVP_MD_CTX_free(context);
-  std::string hex;
-  for (unsigned i = 0; i < length; ++i) hex += fmt::format("{:02x}", digest[i]);
-  return hex;
 }
 
 }  // namespace toftwin::discover

@@ -58,7 +58,7 @@ compare::Json dataOf(const TableDiscovery& d) {
       .set("seed", d.map.seed);
   json.set("noise", d.noise.typical)
       .set("noise_grows_with", d.noise.grows_with)
-      .set("correlation_rows", d.noise.correlation_rows);
+      .set("correlation_rows", d.noise.correlationRows());
   Json effects = Json::array();
   for (const Effect& effect : d.finding.effects) effects.push(effectJson(effect));
   json.set("effects", std::move(effects));

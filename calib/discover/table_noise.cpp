@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include <Eigen/Dense>
 
@@ -58,7 +59,6 @@ MatrixXd flexible(const TableData& data, const std::vector<CovariateInfo>& infos
 struct Residual {
   VectorXd value;
   double freedom = 1.0;
-  MatrixXd inverse{};  ///< of the weighted normal matrix
 };
 
 Residual residualOf(const MatrixXd& x, const VectorXd& y, const VectorXd& weight) {
@@ -66,7 +66,7 @@ Residual residualOf(const MatrixXd& x, const VectorXd& y, const VectorXd& weight
   const MatrixXd wx = root.asDiagonal() * x;
   const PseudoInverse inverse = pseudoInverse(wx.transpose() * wx, 1e-8);
   const VectorXd coefficient = inverse.inverse * (wx.transpose() * root.cwiseProduct(y));
-  return {y - x * coefficient, std::max(1.0, static_cast<double>(y.size()) - inverse.rank), inverse.inverse};
+  return {y - x * coefficient, std::max(1.0, static_cast<double>(y.size()) - inverse.rank)};
 }
 
 double medianOf(std::vector<double> values) {
@@ -105,42 +105,59 @@ void findGrowth(const TableData& data, const std::vector<CovariateInfo>& infos, 
     relative(i) *= std::exp(std::clamp(chosen(i) - 0.5 * mean, -2.5, 2.5));
 }
 
-/// 1 + 2 Σ ρ_k of neighbours as they are, as long as ρ_k is clearly above nothing: a few rows that were
-/// bumped together are no part of a spectrum.
-double laggedRows(const TableData& data, const VectorXd& standard) {
-  const auto n = static_cast<std::size_t>(standard.size());
-  double sum = 1.0;
-  for (std::size_t lag = 1; lag <= n / 20; ++lag) {
-    double products = 0.0, squares = 0.0;
-    for (std::size_t i = lag; i < n; ++i) {
-      if (data.session[i] != data.session[i - lag]) continue;
-      products += standard(static_cast<Index>(i)) * standard(static_cast<Index>(i - lag));
-      squares += standard(static_cast<Index>(i)) * standard(static_cast<Index>(i));
-    }
-    const double rho = squares > 0.0 ? products / squares : 0.0;
-    if (rho < std::max(0.08, 2.5 / std::sqrt(static_cast<double>(n)))) break;
-    sum += 2.0 * rho;
+/// What is known, and each covariate's slow course by up to `most_knots` hats: waves and products would take
+/// what rows err by together, too.
+MatrixXd slowColumns(const TableData& data, const std::vector<CovariateInfo>& infos, const MatrixXd& known,
+                     std::size_t most_knots) {
+  for (std::size_t knots = most_knots;; --knots) {
+    std::vector<Term> terms;
+    for (const CovariateInfo& info : infos)
+      for (Term& term : smoothIn(info, knots).terms) terms.push_back(std::move(term));
+    if (knots > 2 && 8 * terms.size() > data.rows()) continue;
+    MatrixXd x(known.rows(), known.cols() + static_cast<Index>(terms.size()));
+    x << known, columnsOf(data, terms);
+    return x;
   }
-  return sum;
 }
 
-/// What is left of a fit of what is known and of each covariate's slow course, clipped at three deviations:
-/// waves and products would take what captures err by, too.
+/// What is left of that, clipped at three deviations.
 VectorXd slowResidual(const TableData& data, const std::vector<CovariateInfo>& infos, const MatrixXd& known) {
   constexpr std::size_t kKnots = 5;
-  MatrixXd x = known;
-  for (const CovariateInfo& info : infos) {
-    const MatrixXd columns = columnsOf(data, smoothIn(info, kKnots).terms);
-    if (x.cols() + columns.cols() > static_cast<Index>(data.rows() / 4)) break;
-    x.conservativeResize(Eigen::NoChange, x.cols() + columns.cols());
-    x.rightCols(columns.cols()) = columns;
-  }
   const VectorXd y = Eigen::Map<const VectorXd>(data.error.data(), static_cast<Index>(data.rows()));
-  VectorXd left = residualOf(x, y, VectorXd::Ones(y.size())).value;
+  VectorXd left = residualOf(slowColumns(data, infos, known, kKnots), y, VectorXd::Ones(y.size())).value;
   std::vector<double> magnitudes;
   for (const double v : left) magnitudes.push_back(std::abs(v));
   const double most = kHuber * 1.4826 * medianOf(magnitudes);
   return most > 0.0 ? VectorXd(left.cwiseMin(most).cwiseMax(-most)) : left;
+}
+
+/// A jump is no correlation, and hats cannot follow it: the one that takes most of what they leave, over all
+/// covariates.
+MatrixXd withStep(const TableData& data, const MatrixXd& x, const VectorXd& left) {
+  const Index n = left.size();
+  VectorXd best = VectorXd::Zero(n);
+  double most = 0.0;
+  const double mean = left.mean();
+  for (const TableCovariate& covariate : data.covariates) {
+    if (covariate.nature == Nature::Category) continue;
+    std::vector<Index> order(static_cast<std::size_t>(n));
+    std::iota(order.begin(), order.end(), Index{0});
+    const auto value = [&](Index row) { return covariate.values[static_cast<std::size_t>(row)]; };
+    std::ranges::stable_sort(order, {}, value);
+    double sum = 0.0;
+    for (Index k = 1; k < n; ++k) {
+      const Index row = order[static_cast<std::size_t>(k - 1)], next = order[static_cast<std::size_t>(k)];
+      sum += left(row) - mean;
+      const double gain =
+          sum * sum * static_cast<double>(n) / (static_cast<double>(k) * static_cast<double>(n - k));
+      if (gain <= most || !(value(row) < value(next))) continue;
+      most = gain;
+      for (Index i = 0; i < n; ++i) best(i) = value(i) >= value(next) ? 1.0 : 0.0;
+    }
+  }
+  MatrixXd all(n, x.cols() + 1);
+  all << x, best;
+  return all;
 }
 
 }  // namespace
@@ -158,7 +175,7 @@ std::optional<Runs> alikeRuns(const TableData& data, const std::vector<Covariate
 }
 
 TableNoise estimateNoise(const TableData& data, const std::vector<CovariateInfo>& infos,
-                         const MatrixXd& known) {
+                         const MatrixXd& known, const std::vector<RowClock>& clocks) {
   TableNoise noise;
   const auto n = static_cast<Index>(data.rows());
   const MatrixXd x = flexible(data, infos, known);
@@ -187,13 +204,13 @@ TableNoise estimateNoise(const TableData& data, const std::vector<CovariateInfo>
       noise.outliers += size > kHuber * ruler;
     }
     if (round == 1 && data.sigma.empty()) findGrowth(data, infos, left.value, noise, relative);
-    if (round == 3) {
-      const VectorXd root = weight.cwiseSqrt().cwiseQuotient(relative);
-      noise.correlation_rows =
-          std::max(laggedRows(data, weight.cwiseSqrt().cwiseProduct(standard)),
-                   correlationRows(root.cwiseProduct(left.value), root.asDiagonal() * x, left.inverse));
-    }
   }
+  const VectorXd root = weight.cwiseSqrt().cwiseQuotient(relative);
+  const MatrixXd slow = slowColumns(data, infos, known, kSmoothKnots);
+  const VectorXd standardised = root.cwiseProduct(residualOf(slow, y, root.cwiseAbs2()).value);
+  noise.dependence =
+      dependenceOf(clocks, root.cwiseProduct(y), root.asDiagonal() * withStep(data, slow, standardised));
+  if (noise.dependence) scale = std::sqrt(noise.dependence->best.variance);
   // A table without any noise (computed, or rounded to nothing) still needs a scale.
   const double smallest = 1e-9 * std::max(y.cwiseAbs().maxCoeff(), 1e-12);
   for (Index i = 0; i < n; ++i) {

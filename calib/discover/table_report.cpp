@@ -1,172 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <map>
 #include <set>
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include "calib/discover/curve.h"
-#include "calib/discover/discover_table.h"
+#include "calib/discover/table_words.h"
 
 namespace toftwin::discover {
 namespace {
 
 using namespace compare;  // this page is made of its parts
-
-std::string joined(const std::vector<std::string>& names, const char* between = " and ") {
-  std::string out;
-  for (const auto& name : names) out += (out.empty() ? "" : between) + name;
-  return out;
-}
-
-std::string unitOf(const TableDiscovery& d) { return d.open.unit.empty() ? "" : " " + d.open.unit; }
-std::string labelled(const TableDiscovery& d, const char* what) {
-  return d.open.unit.empty() ? what : fmt::format("{} [{}]", what, d.open.unit);
-}
-
-/// Digits so that a typical deviation has two.
-int decimalsOf(const TableDiscovery& d) {
-  const double size = std::max(d.noise.typical, 1e-9);
-  return std::clamp(static_cast<int>(std::ceil(1.0 - std::log10(size))), 0, 6);
-}
-
-std::string significant(double value) { return std::isfinite(value) ? fmt::format("{:.4g}", value) : "–"; }
-
-const std::vector<double>* valuesOf(const TableData& data, const std::string& name) {
-  const auto at = std::ranges::find(data.covariates, name, &TableCovariate::name);
-  return at == data.covariates.end() ? nullptr : &at->values;
-}
-
-std::string experimentInWords(const TableDiscovery& d, const Effect& effect) {
-  const auto& e = *effect.experiment;
-  std::string words = fmt::format("Next experiment: take {} from {:.4g} to {:.4g}", e.vary, e.from, e.to);
-  if (!e.hold.empty()) words += fmt::format(" while {} stays at {:.4g}", e.hold, e.held_at);
-  const double rows = std::pow(4.0 * d.noise.typical / std::max(std::abs(e.difference), 1e-12), 2);
-  words += fmt::format(". The two explanations differ there by {}{}, which {} at each end would show at 4 σ",
-                       shown(std::abs(e.difference), decimalsOf(d)), unitOf(d),
-                       rows <= 1.0 ? "one row" : fmt::format("{:.0f} rows", std::ceil(2.0 * rows)));
-  return words + ".";
-}
-
-/// Between the rows where it is least and most.
-std::string sizeOf(const TableDiscovery& d, const Effect& effect) {
-  const auto values = effectIn(d.open, effect);
-  const auto [least, most] = std::ranges::minmax(values);
-  return fmt::format("by up to {}{}", shown(most - least, decimalsOf(d)), unitOf(d));
-}
-
-/// A value of a covariate as its column has it: of a time the date.
-std::string placeInWords(const TableDiscovery& d, const std::string& covariate, double x) {
-  const auto at = std::ranges::find(d.open.covariates, covariate, &TableCovariate::name);
-  if (at == d.open.covariates.end() || !at->first) return significant(x);
-  constexpr double kDay = 86'400.0;
-  const double time = *at->first + x;
-  const auto then = fmt::gmtime(static_cast<std::time_t>(std::llround(time)));
-  return *at->first < kDay ? fmt::format("{:%H:%M:%S}", then) : fmt::format("{:%Y-%m-%d %H:%M:%S}", then);
-}
-
-/// " between 500 and 1000": of a step, the rows on both sides.
-std::string betweenInWords(const TableDiscovery& d, const Effect& effect) {
-  for (std::size_t i = 0; i < effect.numbers.size() && effect.parts.size() == 1; ++i) {
-    const auto around = rowsAround(d.open, effect, i);
-    if (!around) continue;
-    const auto place = [&](double x) { return placeInWords(d, effect.covariates[0], x); };
-    return fmt::format(" between {} and {}", place(around->first), place(around->second));
-  }
-  return {};
-}
-
-bool isCertain(const Effect& effect) { return effect.alternatives.empty() && effect.frequency >= 0.8; }
-
-std::string nameInWords(const TableDiscovery& d, const Effect& effect) {
-  const auto shape = [](const std::string& name) {
-    return name.find("smooth in") != std::string::npos ? std::string{"a curve without a short formula"}
-                                                       : name;
-  };
-  std::string words = effect.is_catalogue
-                          ? effect.name
-                          : fmt::format("it goes with {} ({}), {}", joined(effect.covariates),
-                                        shape(effect.name) + betweenInWords(d, effect), sizeOf(d, effect));
-  for (const Alternative& other : effect.alternatives)
-    words += fmt::format(", or with {} ({})", joined(other.covariates), shape(other.name));
-  return words;
-}
-
-TableBlock numbersTable(const TableDiscovery& d, const Effect& effect) {
-  TableBlock table{
-      fmt::format("Numbers of the effect{}", d.open.unit.empty() ? "" : ", coefficients in " + d.open.unit),
-      {"number", "value", "standard error", "95 % from", "to"},
-      {}};
-  if (!isFormula(effect)) return table;
-  for (std::size_t i = 0; i < effect.numbers.size(); ++i) {
-    const Estimate& one = effect.numbers[i];
-    const auto around = rowsAround(d.open, effect, i);
-    if (around && one.error < 0.5 * (around->second - around->first)) {
-      table.rows.push_back({one.name, "between two rows", "–",
-                            placeInWords(d, effect.covariates[0], around->first),
-                            placeInWords(d, effect.covariates[0], around->second)});
-      continue;
-    }
-    table.rows.push_back({one.name, significant(one.value), significant(one.error),
-                          significant(one.value - 1.96 * one.error),
-                          significant(one.value + 1.96 * one.error)});
-  }
-  return table;
-}
-
-TableBlock triedTable(const Effect& effect) {
-  TableBlock table{
-      "Shapes that were tried: deviance of held-out rows that each removes, in units of the noise's "
-      "variance, "
-      "less what its search costs; and how much less than the chosen one (± standard error)",
-      {"shape", "numbers", "removes", "less than the chosen"},
-      {}};
-  for (std::size_t i = 0; i < std::min<std::size_t>(effect.tried.size(), 12); ++i) {
-    const TriedShape& one = effect.tried[i];
-    const bool is_useless =
-        one.gain.mean < 0.0;  // by how much is rounding where columns are too many for the rows
-    table.rows.push_back({one.name, std::to_string(one.numbers), is_useless ? "–" : shown(one.gain.mean, 1),
-                          is_useless ? "does worse than nothing"
-                                     : shown(one.worse.mean, 1) + " ± " + shown(one.worse.error, 1)});
-  }
-  return table;
-}
-
-Section effectSection(const TableDiscovery& d, const Effect& effect, std::size_t number) {
-  Section section{fmt::format("effect-{}", number),
-                  fmt::format("Effect {}: {}", number, effect.name),
-                  {},
-                  Tone::Neutral,
-                  {}};
-  section.tone = isCertain(effect) ? Tone::Good : Tone::Fair;
-  section.verdict = fmt::format(
-      "A part of the error: {}. Formula{}: {}. Without any effect a share of {} of data sets would look "
-      "like this (p; the least that {} draws can say is {}). The same is chosen in {} of 200 draws "
-      "of the captures.",
-      nameInWords(d, effect), d.open.unit.empty() ? "" : " in" + unitOf(d), formulaOf(effect),
-      significant(effect.p), d.finding.draws, significant(1.0 / (d.finding.draws + 1.0)),
-      shownPercent(effect.frequency));
-  section.blocks.push_back(figuresOf(d, effect));
-  if (auto numbers = numbersTable(d, effect); !numbers.rows.empty())
-    section.blocks.push_back(std::move(numbers));
-  if (!effect.alternatives.empty()) {
-    TableBlock others{"These data cannot tell it from",
-                      {"explanation", "covariates", "removes less by", "correlation"},
-                      {}};
-    for (const Alternative& other : effect.alternatives) {
-      others.rows.push_back({other.name, joined(other.covariates),
-                             shown(other.worse.mean, 1) + " ± " + shown(other.worse.error, 1),
-                             shown(other.correlation, 2)});
-    }
-    section.blocks.push_back(std::move(others));
-    if (effect.experiment) section.blocks.push_back(Paragraph{experimentInWords(d, effect)});
-  }
-  section.blocks.push_back(triedTable(effect));
-  return section;
-}
 
 std::string counted(std::size_t count, const std::string& what) {
   return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
@@ -283,6 +129,17 @@ Section leftSection(const TableDiscovery& d) {
   return section;
 }
 
+/// What the data were compared with.
+std::string nullInWords(const TableDiscovery& d) {
+  const std::string captures =
+      d.finding.null_model == NullModel::Noise
+          ? fmt::format("Gaussian noise as large as that of each of {} captures", d.captures)
+          : fmt::format("the residuals of {} captures with random signs", d.captures);
+  if (!d.finding.has_of_source) return captures;
+  return captures +
+         ", and as often noise whose rows err alike as far as is likely; of both p, the larger one";
+}
+
 Section dataSection(const TableDiscovery& d) {
   Section section{"data", "The data and their noise", {}, Tone::Neutral, {}};
   section.tone = d.open.doubts.empty() ? Tone::Good : Tone::Fair;
@@ -293,10 +150,13 @@ Section dataSection(const TableDiscovery& d) {
                   counted(d.noise.outliers, "row"));
   for (const auto& note : d.open.notes) section.blocks.push_back(Paragraph{"Read as: " + note});
   for (const auto& doubt : d.open.doubts) section.blocks.push_back(Paragraph{"Doubt: " + doubt});
-  if (d.noise.correlation_rows > 1.5) {
+  if (d.noise.dependence && d.noise.dependence->isClear()) {
+    const RowDependence& alike = *d.noise.dependence;
     section.blocks.push_back(Paragraph{fmt::format(
-        "Doubt: rows that follow each other err alike, over about {:.0f} rows; they count as so many fewer",
-        d.noise.correlation_rows)});
+        "Doubt: rows that follow each other{} err alike: {} of the variance stays from one to the next with "
+        "correlation {:.2g}, so that rows count as {:.0f} times fewer for what is slow",
+        alike.clock.name.empty() ? "" : " in " + alike.clock.name, shownPercent(alike.best.correlation.share),
+        alike.best.correlation.neighbour, d.noise.correlationRows())});
   }
   TableBlock nuisances{
       "Nuisances, fitted along and never counted as effects", {"nuisance", "value", "standard error"}, {}};
@@ -316,11 +176,10 @@ Section dataSection(const TableDiscovery& d) {
   section.blocks.push_back(std::move(scores));
   section.blocks.push_back(
       Details{"How this was found",
-              {fmt::format("Null draws: {} times the residuals of {} captures with random signs; p is the "
-                           "rank of the largest deviate of all groups. "
+              {fmt::format("Null draws: {} times {}; p is the rank of the largest deviate of all groups. "
                            "Effects were chosen by five-fold cross-validation over captures. Formulas, "
                            "sources and limits: docs/discover.md.",
-                           d.finding.draws, d.captures)}});
+                           d.finding.draws, nullInWords(d))}});
   return section;
 }
 

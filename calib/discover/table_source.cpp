@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "calib/discover/draws.h"
 #include "calib/discover/headers.h"
 
 namespace toftwin::discover {
@@ -14,6 +15,7 @@ namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
+using Eigen::VectorXd;
 
 constexpr std::size_t kMostCaptures = 100, kMostLevels = 12, kQuantiles = 33, kManySessions = 20;
 
@@ -103,7 +105,9 @@ void TableSource::learn(std::span<const Term> known) {
   MatrixXd columns = columnsOf(data_, known);
   columns.conservativeResize(Eigen::NoChange, columns.cols() + nuisances.cols());
   columns.rightCols(nuisances.cols()) = nuisances;
-  noise_ = estimateNoise(data_, infos_, columns);
+  noise_ = estimateNoise(data_, infos_, columns, has_captures_ ? std::vector<RowClock>{} : clocksOf(data_));
+  whitening_.reset();
+  if (noise_.dependence) whitening_.emplace(noise_.dependence->clock, noise_.dependence->best.correlation);
   makeCaptures();
 }
 
@@ -140,14 +144,12 @@ void TableSource::makeCaptures() {
   const std::size_t rows = data_.rows();
   capture_.assign(rows, 0);
   std::map<std::pair<int, std::size_t>, int> known;
-  const auto size =
-      std::max<std::size_t>((rows + kMostCaptures - 1) / kMostCaptures,
-                            static_cast<std::size_t>(std::ceil(3.0 * (noise_.correlation_rows - 1.0))));
+  const std::size_t size = (rows + kMostCaptures - 1) / kMostCaptures;
   std::map<int, std::size_t> seen;  // rows of each session so far
   for (std::size_t i = 0; i < rows; ++i) {
     const int session = data_.session[i];
-    const std::size_t block = has_captures_ ? static_cast<std::size_t>(data_.capture[i])
-                                            : seen[session]++ / std::max<std::size_t>(size, 1);
+    const std::size_t block =
+        has_captures_ ? static_cast<std::size_t>(data_.capture[i]) : seen[session]++ / size;
     const auto [at, is_new] = known.try_emplace({session, block}, static_cast<int>(known.size()));
     capture_[i] = at->second;
     if (!is_new) continue;
@@ -166,18 +168,19 @@ Evidence TableSource::summed(std::span<const TermGroup> extra, std::span<const d
   return evidenceOf(extra, std::vector<int>(data_.rows(), 0), 1);
 }
 
-Evidence TableSource::evidenceOf(std::span<const TermGroup> extra, const std::vector<int>& capture_of,
-                                 std::size_t captures) const {
-  Evidence out;
+/// The columns of nuisances and `extra`, and their groups.
+MatrixXd TableSource::designOf(std::span<const TermGroup> extra, std::vector<Group>& groups) const {
+  const auto n = static_cast<Index>(data_.rows());
   std::vector<MatrixXd> parts;
+  std::size_t count = 0;
   const auto add = [&](Group group, MatrixXd columns) {
-    group.first = out.columns(), group.count = static_cast<std::size_t>(columns.cols());
-    out.groups.push_back(std::move(group));
+    group.first = count, group.count = static_cast<std::size_t>(columns.cols());
+    count += group.count;
+    groups.push_back(std::move(group));
     parts.push_back(std::move(columns));
   };
   for (auto& [group, columns] : nuisanceColumns(data_)) add(std::move(group), std::move(columns));
   if (has_captures_) {
-    const auto n = static_cast<Index>(data_.rows());
     add({.name = "capture", .kind = Kind::PerCapture, .scale_class = 0},
         MatrixXd::Constant(n, 1, error_spread_));
   }
@@ -187,30 +190,64 @@ Evidence TableSource::evidenceOf(std::span<const TermGroup> extra, const std::ve
     group.numbers = static_cast<int>(terms.terms.size()) + terms.inner_numbers;
     add(std::move(group), columnsOf(data_, terms.terms));
   }
-  MatrixXd x(static_cast<Index>(data_.rows()), static_cast<Index>(out.columns()));
+  MatrixXd x(n, static_cast<Index>(count));
   for (std::size_t g = 0; g < parts.size(); ++g)
-    x.middleCols(static_cast<Index>(out.groups[g].first), parts[g].cols()) = parts[g];
+    x.middleCols(static_cast<Index>(groups[g].first), parts[g].cols()) = parts[g];
+  return x;
+}
+
+/// Rows in units of what they err by, beyond those before them.
+MatrixXd TableSource::standardised(MatrixXd rows) const {
+  for (Index i = 0; i < rows.rows(); ++i) {
+    const auto row = static_cast<std::size_t>(i);
+    rows.row(i) *= std::sqrt(noise_.weight[row]) / noise_.sigma[row];
+  }
+  return whitening_ ? whitening_->whitened(rows) : rows;
+}
+
+Evidence TableSource::evidenceOf(std::span<const TermGroup> extra, const std::vector<int>& capture_of,
+                                 std::size_t captures) const {
+  Evidence out;
+  const MatrixXd x = standardised(designOf(extra, out.groups));
+  const VectorXd y = standardised(Eigen::Map<const VectorXd>(data_.error.data(), x.rows()));
   std::vector<std::vector<Index>> rows_of(captures);
   for (std::size_t i = 0; i < capture_of.size(); ++i)
     rows_of[static_cast<std::size_t>(capture_of[i])].push_back(static_cast<Index>(i));
   for (std::size_t c = 0; c < captures; ++c) {
-    MatrixXd own = x(rows_of[c], Eigen::all);
-    Eigen::VectorXd y(own.rows());
+    const MatrixXd own = x(rows_of[c], Eigen::all);
+    const VectorXd errors = y(rows_of[c]);
     CaptureEvidence capture;
-    for (Index i = 0; i < own.rows(); ++i) {
-      const auto row = static_cast<std::size_t>(rows_of[c][static_cast<std::size_t>(i)]);
-      const double scale = std::sqrt(noise_.weight[row]) / noise_.sigma[row];
-      own.row(i) *= scale;
-      y(i) = data_.error[row] * scale;
-      capture.rows += noise_.weight[row];
-    }
+    for (const Index row : rows_of[c]) capture.rows += noise_.weight[static_cast<std::size_t>(row)];
     capture.gram.noalias() = own.transpose() * own;
-    capture.moment.noalias() = own.transpose() * y;
-    capture.energy = y.squaredNorm();
+    capture.moment.noalias() = own.transpose() * errors;
+    capture.energy = errors.squaredNorm();
     capture.name = names_[c], capture.block = blocks_[c];
     out.captures.push_back(std::move(capture));
   }
   return out;
+}
+
+MatrixXd TableSource::nullMoments(std::span<const TermGroup> extra, int draws, std::uint64_t seed) const {
+  if (!whitening_) return {};
+  constexpr Index kAtOnce = 32;  // of as many numbers as rows
+  std::vector<Group> groups;
+  const MatrixXd x = standardised(designOf(extra, groups));
+  MatrixXd moments(x.cols(), draws);
+  Draws random(seed);
+  Index first = 0;
+  double weights = 0.0;
+  for (const LikelyCorrelation& likely : noise_.dependence->likely) {
+    weights += likely.weight;
+    const auto end = std::min<Index>(draws, std::lround(weights * draws));
+    const RowWhitening noise{noise_.dependence->clock, likely.correlation};
+    const double deviation = std::sqrt(likely.variance / noise_.dependence->best.variance);
+    for (Index count = 0; first < end; first += count) {
+      count = std::min(kAtOnce, end - first);
+      moments.middleCols(first, count).noalias() =
+          deviation * x.transpose() * whitening_->whitened(noise.coloured(random.normals(x.rows(), count)));
+    }
+  }
+  return moments;
 }
 
 }  // namespace toftwin::discover

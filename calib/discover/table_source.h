@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "calib/discover/row_dependence.h"
 #include "calib/discover/rows_alike.h"
 #include "calib/discover/table_data.h"
 #include "calib/discover/term.h"
@@ -19,13 +20,18 @@ struct TableNoise {
   std::vector<double> sigma{};    ///< of each row, in the error's unit
   std::vector<double> weight{};   ///< 1, and less for rows that lie far off (Huber's weights)
   double typical = 0.0;           ///< median of sigma
-  double correlation_rows = 1.0;  ///< over so many rows that follow each other they err alike
+  /// Of rows that follow each other; nothing where captures say which rows err together.
+  std::optional<RowDependence> dependence{};
   std::size_t outliers = 0;       ///< rows beyond three deviations
   std::string grows_with{};       ///< covariate that sigma goes with, or empty
+  /// Over so many rows that follow each other they err alike.
+  [[nodiscard]] double correlationRows() const {
+    return dependence ? dependence->best.correlation.rows() : 1.0;
+  }
 };
 
 /// A table as a source of evidence. Captures are what a column names, or blocks of rows that follow each
-/// other, longer than rows err alike.
+/// other, of which each says what it says beyond those before it.
 class TableSource : public RowSource {
  public:
   /// The rows are copied; locked ones must not be among them.
@@ -34,6 +40,9 @@ class TableSource : public RowSource {
   [[nodiscard]] Evidence evidence(std::span<const TermGroup> extra) const override;
   [[nodiscard]] Evidence summed(std::span<const TermGroup> extra,
                                 std::span<const double> scales) const override;
+  /// Noise of each correlation that the rows may have, as often as it is likely.
+  [[nodiscard]] Eigen::MatrixXd nullMoments(std::span<const TermGroup> extra, int draws,
+                                            std::uint64_t seed) const override;
   [[nodiscard]] std::vector<CovariateInfo> covariates() const override { return infos_; }
 
   /// Estimates the noise anew, with these terms beside what is smooth: what they explain is no noise.
@@ -52,6 +61,8 @@ class TableSource : public RowSource {
  private:
   void makeCaptures();
   [[nodiscard]] Eigen::MatrixXd nuisancesOf(const TableData& rows) const;
+  [[nodiscard]] Eigen::MatrixXd designOf(std::span<const TermGroup> extra, std::vector<Group>& groups) const;
+  [[nodiscard]] Eigen::MatrixXd standardised(Eigen::MatrixXd rows) const;
   [[nodiscard]] Evidence evidenceOf(std::span<const TermGroup> extra, const std::vector<int>& capture,
                                     std::size_t captures) const;
 
@@ -62,6 +73,7 @@ class TableSource : public RowSource {
   double reference_middle_ = 0.0, reference_spread_ = 1.0, error_spread_ = 1.0;
   std::vector<CovariateInfo> infos_;
   TableNoise noise_;
+  std::optional<RowWhitening> whitening_;
   std::string runs_of_{};
   std::vector<int> capture_;
   std::vector<std::string> names_, blocks_;
@@ -78,8 +90,8 @@ std::optional<Runs> alikeRuns(const TableData& data, const std::vector<Covariate
 
 /// Noise of a table from what is left after a flexible fit of everything smooth: weights and deviations in
 /// turn (P. J. Huber, Ann. Math. Stat. 35 (1964) 73; k = 3). `known`: columns that are there for certain,
-/// nuisances among them.
+/// nuisances among them. `clocks`: in which order rows may err alike; none where captures say it.
 TableNoise estimateNoise(const TableData& data, const std::vector<CovariateInfo>& infos,
-                         const Eigen::MatrixXd& known);
+                         const Eigen::MatrixXd& known, const std::vector<RowClock>& clocks);
 
 }  // namespace toftwin::discover

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <span>
@@ -108,6 +109,12 @@ class RowSource {
   /// is asked for most, once for each step of a search. As good, but less work where it is overridden.
   [[nodiscard]] virtual Evidence summed(std::span<const TermGroup> extra,
                                         std::span<const double> scales) const;
+  /// Of noise alone, the moments of the same columns as withoutCatalogue's, one column for each draw: where
+  /// the source knows how its rows err together, beyond captures. Empty: it does not.
+  [[nodiscard]] virtual Eigen::MatrixXd nullMoments(std::span<const TermGroup>, int /*draws*/,
+                                                    std::uint64_t /*seed*/) const {
+    return {};
+  }
   /// Explanations that are no function of covariates alone.
   [[nodiscard]] virtual std::vector<TermGroup> ownGroups() const { return {}; }
   /// How a term is written once it is known. Some carriers are estimated from other captures while they

@@ -257,6 +257,39 @@ TEST(RowChecks, SetWrappedRowsAsideWithAndWithoutTheFrequency) {
   EXPECT_EQ(dataOf(folded(0.0))->rows(), 200u) << "none is folded";
 }
 
+/// 299792458/(2 · 60e6) m
+TEST(ReadTable, TakesThePeriodInTheUnitOfAHeaderAndInNoneWithoutOne) {
+  TableMap map;
+  map.modulation = 60_MHz;
+  const auto table = [](const std::string& measured, const std::string& reference, double metre) {
+    std::string text = measured + "," + reference + ",t_s\n";
+    for (int i = 0; i < 30; ++i)
+      text += fmt::format("{},{},{}\n", metre * (1.0 + 0.01 * i), metre * (1.0 + 0.01 * i), i % 7);
+    return text;
+  };
+  EXPECT_NEAR(dataOf(table("measured_mm", "reference_m", 1.0), map)->period, 2.49827, 1e-5);
+  EXPECT_NEAR(dataOf(table("measured_mm", "reference", 1e3), map)->period, 2498.27, 1e-2)
+      << "subtracted as it is";
+  const auto unknown = dataOf(table("measured", "reference", 1e3), map);
+  EXPECT_EQ(unknown->period, 0.0);
+  EXPECT_THAT(unknown->doubts, testing::Contains(HasSubstr("waves of c/(2f) are not looked for")));
+  EXPECT_EQ(dataOf(table("error_mm", "reference", 1e3), map)->period, 0.0)
+      << "its reference may be in metres";
+}
+
+TEST(ReadTable, SessionsWhoseRowsWereAllSetAsideCountNoMore) {
+  std::string text = "measured_mm,reference_mm,t_s,session\n";
+  for (int i = 0; i < 200; ++i) {
+    const bool is_blind = i / 50 == 1;
+    text += fmt::format("{},{},{},{}\n", is_blind ? 0.0 : 1000.0 + 10.0 * i + 2.0 * std::sin(1.7 * i),
+                        1000.0 + 10.0 * i, i % 7, "abcd"[i / 50]);
+  }
+  const auto data = dataOf(text);
+  ASSERT_TRUE(data) << data.error().message;
+  EXPECT_THAT(data->session_names, ElementsAre("a", "c", "d"));
+  EXPECT_EQ(*std::ranges::max_element(data->session), 2);
+}
+
 /// Rows that are as far off, but not beyond their own length: an effect of something else, which is to be
 /// found.
 TEST(RowChecks, AJumpThatIsNoFoldStays) {

@@ -9,26 +9,6 @@
 namespace toftwin::discover {
 namespace {
 
-/// The spectrum at nothing over the variance: (σ² + 19 s²)/(σ² + s²) for ρ = 0.9, white σ = 1 and AR(1) s = 1
-/// give 10.
-TEST(RowsAlike, SeesThatNeighboursErrAlikeAndNotThatTheyDoNot) {
-  int seen = 0, imagined = 0;
-  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
-    const TableSource white{plant(seed, {Hidden::Nothing}, 0.0).data, true};
-    const TableSource alike{plant(seed, {Hidden::Nothing}, 0.0, {.ar1_mm = 1.0}).data, true};
-    imagined += white.noise().correlation_rows > 1.0;
-    seen += alike.noise().correlation_rows > 3.0;
-  }
-  EXPECT_EQ(imagined, 0) << "of ten tables of white noise";
-  EXPECT_GE(seen, 8) << "of ten tables with correlated noise";
-}
-
-/// A wave is a line in the spectrum, and no correlation.
-TEST(RowsAlike, AWaveIsNoCorrelation) {
-  const TableSource source{plant(3, {Hidden::Wiggle}, 3000.0).data, true};
-  EXPECT_EQ(source.noise().correlation_rows, 1.0);
-}
-
 TEST(RowsAlike, RowsOfOneLoggedValueAreACaptureOnlyWhereTheyErrAlike) {
   const TableSource alike{plant(4, {Hidden::Nothing}, 0.0, {.logged_mm = 1.0}).data, true};
   EXPECT_EQ(alike.runsOf(), "ambient_klx");

@@ -37,21 +37,22 @@ Alarms alarmsOf(const Errors& errors, int tests, std::uint64_t first_seed) {
 }
 
 /// At α = 1 % more than 4 alarms in 60 tables have probability 0.04 % if α is right, and 85 % at a rate of 12
-/// %: these catch what is badly wrong. More than 8 in all 240: 0.1 %, and 84 % at a rate of 5 %. The
+/// %: these catch what is badly wrong. More than 9 in all 300: 0.1 %, and 93 % at a rate of 5 %. The
 /// benchmark (tests/bench/discover_bench.cpp) measures the rate itself.
 TEST(FalseAlarms, AreRareWhateverTheNoiseIsLike) {
   int all = 0;
   const std::array cases{std::pair{"as declared", Errors{}},
                          std::pair{"15 % larger", Errors{.sigma_mm = 1.15}},
                          std::pair{"t4 tails", Errors{.heavy_tails = true}},
-                         std::pair{"ten rows bumped", Errors{.bumped = true}}};
+                         std::pair{"ten rows bumped", Errors{.bumped = true}},
+                         std::pair{"rows that follow each other err alike", Errors{.ar1_mm = 1.0}}};
   for (const auto& [name, errors] : cases) {
     const Alarms alarms = alarmsOf(errors, 60, 7000);
     fmt::print("{}: {} of {} (seeds from 7000)\n", name, alarms.found, alarms.tests);
     EXPECT_LE(alarms.found, 4) << name;
     all += alarms.found;
   }
-  EXPECT_LE(all, 8);
+  EXPECT_LE(all, 9);
 }
 
 }  // namespace

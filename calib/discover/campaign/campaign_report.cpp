@@ -199,7 +199,8 @@ compare::Section foundSection(const CampaignFinding& finding) {
       "in "
       "them{}; of what is left p = {:.3g}. Offset of the device against its poses: {}.",
       finding.finding.first_p, finding.finding.score_names.size(), finding.finding.draws,
-      finding.finding.by_sign_flips ? " (sign flips of captures)" : "", finding.finding.last_p,
+      finding.finding.null_model == NullModel::SignFlips ? " (sign flips of captures)" : "",
+      finding.finding.last_p,
       compare::shownWithError(finding.zero.offset_mm, finding.zero.offset_error_mm, 2) + " mm" +
           (finding.zero.delay_mm == 0.0
                ? ""

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <random>
+
+#include <Eigen/Dense>
+
+namespace toftwin::discover {
+
+/// Draws that are the same everywhere: the standard fixes the engine, not the distributions.
+class Draws {
+ public:
+  explicit Draws(std::uint64_t seed) : bits_(seed) {}
+  /// +1 or −1, each as likely.
+  Eigen::VectorXd signs(Eigen::Index count) {
+    Eigen::VectorXd signs(count);
+    std::uint64_t word = 0;
+    for (Eigen::Index i = 0; i < count; ++i) {
+      if (i % 64 == 0) word = bits_();
+      signs(i) = (word >> (i % 64)) & 1U ? 1.0 : -1.0;
+    }
+    return signs;
+  }
+  /// Of variance 1 (Box and Muller), column by column.
+  Eigen::MatrixXd normals(Eigen::Index rows, Eigen::Index columns) {
+    Eigen::MatrixXd out(rows, columns);
+    for (double& one : out.reshaped()) one = normal();
+    return out;
+  }
+
+ private:
+  double normal() {
+    const double u = (static_cast<double>(bits_() >> 11) + 0.5) * 0x1p-53;
+    const double v = (static_cast<double>(bits_() >> 11) + 0.5) * 0x1p-53;
+    return std::sqrt(-2.0 * std::log(u)) * std::cos(6.283185307179586 * v);
+  }
+
+  std::mt19937_64 bits_;
+};
+
+}  // namespace toftwin::discover

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/discover/reshape_effects.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "calib/discover/estimate.h"
+
+namespace toftwin::discover {
+namespace {
+
+std::vector<Effect> othersThan(const Found& found, const Effect& effect) {
+  std::vector<Effect> others;
+  for (const Effect& one : found.effects)
+    if (&one != &effect) others.push_back(one);
+  return others;
+}
+
+Context knowingOnly(const Found& found, const std::vector<Effect>& effects) {
+  Context context = found.context;
+  context.known = groupsOf(effects);
+  for (TermGroup& tangent : tangentsOf(effects)) context.known.push_back(std::move(tangent));
+  return context;
+}
+
+void addPart(Effect& effect, const Effect& more) {
+  effect.parts.insert(effect.parts.end(), more.parts.begin(), more.parts.end());
+  for (const std::string& name : more.covariates)
+    if (std::ranges::count(effect.covariates, name) == 0) effect.covariates.push_back(name);
+  std::ranges::sort(effect.covariates);
+  // No effect on ranges changes amplitudes.
+  if (effect.stage != more.stage) effect.stage = Stage::Light;
+  const std::string along = fmt::format("{}", fmt::join(effect.covariates, " and "));
+  effect.name = isFormula(effect) ? effect.name + " + " + more.name : "smooth in " + along;
+}
+
+Gain gainOfSum(const Context& without, const Effect& effect, const Effect& more) {
+  TermGroup sum{"sum", Kind::Generic, termsOf(effect), 0};
+  for (const Term& term : termsOf(more)) sum.terms.push_back(term);
+  std::vector<TermGroup> extra = without.known;
+  extra.push_back(std::move(sum));
+  const Marginal marginal = marginalise(evidenceOf(without, extra), without.scales);
+  const Columns model = modelOf(without, marginal, extra.size());
+  Gain gain = crossValidate(marginal, model, {marginal.groups.size() - 1}).front();
+  for (const std::vector<FittedForm>* parts : {&effect.parts, &more.parts})
+    for (const FittedForm& part : *parts)
+      for (const Inner& inner : part.form.inner) gain.total -= inner.price;
+  return gain;
+}
+
+}  // namespace
+
+void reshape(Found& found, Effect& effect, const Effect& more) {
+  if (effect.covariates != more.covariates) return addPart(effect, more);
+  const Context without = knowingOnly(found, othersThan(found, effect));
+  auto explanations = competeFor(without, effect.covariates);
+  const Gain both = gainOfSum(without, effect, more);
+  const auto chosen = choose(explanations);
+  if (chosen) {
+    const Difference worse = difference(both, explanations[*chosen].gain);
+    if (both.total - explanations[*chosen].gain.total < worse.error) {
+      Effect again = effectOf(without, explanations, *chosen);
+      settle(found, again);
+      again.p = effect.p;
+      effect = std::move(again);
+      return;
+    }
+  }
+  addPart(effect, more);
+}
+
+void revise(Found& found) {
+  for (Effect& effect : found.effects) {
+    if (effect.is_catalogue || effect.parts.size() != 1) continue;
+    const std::vector<Effect> others = othersThan(found, effect);
+    const Context without = knowingOnly(found, others);
+    // What else it could be, too: until now the other effects were among its rivals.
+    std::erase_if(effect.alternatives, [&](const Alternative& other) {
+      return std::ranges::find(others, other.covariates, &Effect::covariates) != others.end();
+    });
+    if (effect.alternatives.empty()) effect.experiment.reset();
+    auto explanations = compete(without);
+    const auto chosen = chosenOf(without, explanations);
+    if (!chosen) continue;
+    const Explanation& now = explanations[*chosen];
+    if (now.is_catalogue ? !now.named : now.covariates != effect.covariates) continue;
+    Effect again = effectOf(without, explanations, *chosen);
+    settle(found, again);
+    again.p = effect.p;
+    effect = std::move(again);
+    if (effect.fit) include(found);
+  }
+}
+
+void prune(Found& found) {
+  while (found.effects.size() > 1) {
+    std::size_t least = found.effects.size();
+    double smallest = 2.0;
+    for (std::size_t i = 0; i < found.effects.size(); ++i) {
+      if (found.effects[i].is_catalogue && !found.effects[i].fit) continue;
+      const Difference gain = against0(gainBeside(found, i));
+      const double z = gain.mean / std::max(gain.error, 1e-9);
+      if (gain.mean < 4.0 || z < smallest) smallest = std::min(z, smallest), least = i;
+    }
+    if (least == found.effects.size()) return;
+    found.effects.erase(found.effects.begin() + static_cast<std::ptrdiff_t>(least));
+    include(found);
+  }
+}
+
+}  // namespace toftwin::discover

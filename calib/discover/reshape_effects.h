@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "calib/discover/found_effects.h"
+
+namespace toftwin::discover {
+
+/// What is left goes with the covariates of an effect that is known: its shape was not it. Another single
+/// shape, if one does as well as both together; else their sum.
+void reshape(Found& found, Effect& effect, const Effect& more);
+
+/// Each effect's shape once more, now that the others no longer stand in its way.
+void revise(Found& found);
+
+/// An effect that the others explain as well was a step on the way to them: it goes, the least useful
+/// first.
+void prune(Found& found);
+
+}  // namespace toftwin::discover

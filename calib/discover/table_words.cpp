@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/discover/table_words.h"
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include "calib/discover/curve.h"
+
+namespace toftwin::discover {
+namespace {
+
+/// Between the rows where it is least and most.
+std::string sizeOf(const TableDiscovery& d, const Effect& effect) {
+  const auto values = effectIn(d.open, effect);
+  const auto [least, most] = std::ranges::minmax(values);
+  return fmt::format("by up to {}{}", compare::shown(most - least, decimalsOf(d)), unitOf(d));
+}
+
+/// " between 500 and 1000": of a step, the rows on both sides.
+std::string betweenInWords(const TableDiscovery& d, const Effect& effect) {
+  for (std::size_t i = 0; i < effect.numbers.size() && effect.parts.size() == 1; ++i) {
+    const auto around = rowsAround(d.open, effect, i);
+    if (!around) continue;
+    const auto place = [&](double x) { return placeInWords(d, effect.covariates[0], x); };
+    return fmt::format(" between {} and {}", place(around->first), place(around->second));
+  }
+  return {};
+}
+
+}  // namespace
+
+std::string joined(const std::vector<std::string>& names, const char* between) {
+  std::string out;
+  for (const auto& name : names) out += (out.empty() ? "" : between) + name;
+  return out;
+}
+
+std::string unitOf(const TableDiscovery& d) { return d.open.unit.empty() ? "" : " " + d.open.unit; }
+std::string labelled(const TableDiscovery& d, const char* what) {
+  return d.open.unit.empty() ? what : fmt::format("{} [{}]", what, d.open.unit);
+}
+
+int decimalsOf(const TableDiscovery& d) {
+  const double size = std::max(d.noise.typical, 1e-9);
+  return std::clamp(static_cast<int>(std::ceil(1.0 - std::log10(size))), 0, 6);
+}
+
+std::string significant(double value) { return std::isfinite(value) ? fmt::format("{:.4g}", value) : "–"; }
+
+const std::vector<double>* valuesOf(const TableData& data, const std::string& name) {
+  const auto at = std::ranges::find(data.covariates, name, &TableCovariate::name);
+  return at == data.covariates.end() ? nullptr : &at->values;
+}
+
+std::string placeInWords(const TableDiscovery& d, const std::string& covariate, double x) {
+  const auto at = std::ranges::find(d.open.covariates, covariate, &TableCovariate::name);
+  if (at == d.open.covariates.end() || !at->first) return significant(x);
+  constexpr double kDay = 86'400.0;
+  const double time = *at->first + x;
+  const auto then = fmt::gmtime(static_cast<std::time_t>(std::llround(time)));
+  return *at->first < kDay ? fmt::format("{:%H:%M:%S}", then) : fmt::format("{:%Y-%m-%d %H:%M:%S}", then);
+}
+
+bool isCertain(const Effect& effect) { return effect.alternatives.empty() && effect.frequency >= 0.8; }
+
+std::string nameInWords(const TableDiscovery& d, const Effect& effect) {
+  const auto shape = [](const std::string& name) {
+    return name.find("smooth in") != std::string::npos ? std::string{"a curve without a short formula"}
+                                                       : name;
+  };
+  std::string words = effect.is_catalogue
+                          ? effect.name
+                          : fmt::format("it goes with {} ({}), {}", joined(effect.covariates),
+                                        shape(effect.name) + betweenInWords(d, effect), sizeOf(d, effect));
+  for (const Alternative& other : effect.alternatives)
+    words += fmt::format(", or with {} ({})", joined(other.covariates), shape(other.name));
+  return words;
+}
+
+}  // namespace toftwin::discover

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "calib/discover/discover_table.h"
+
+/// How a page about a table says things.
+namespace toftwin::discover {
+
+std::string joined(const std::vector<std::string>& names, const char* between = " and ");
+/// " mm", or nothing.
+std::string unitOf(const TableDiscovery& discovery);
+/// "error [mm]"
+std::string labelled(const TableDiscovery& discovery, const char* what);
+/// Digits so that a typical deviation has two.
+int decimalsOf(const TableDiscovery& discovery);
+std::string significant(double value);
+/// A value of a covariate as its column has it: of a time the date.
+std::string placeInWords(const TableDiscovery& discovery, const std::string& covariate, double x);
+bool isCertain(const Effect& effect);
+/// "it goes with time_s (exponential in time_s), by up to 3.1 mm, or with …"
+std::string nameInWords(const TableDiscovery& discovery, const Effect& effect);
+/// Null: the table has no such covariate.
+const std::vector<double>* valuesOf(const TableData& data, const std::string& name);
+
+}  // namespace toftwin::discover
