@@ -266,7 +266,8 @@ void SourceHost::makeFrame(const std::stop_token& stop) {
   std::uint64_t next_subscriber = 0;
   {
     const std::scoped_lock lock{mutex_};
-    if (!commands_.empty() || stop.stop_requested()) return;
+    // Whoever left or asked since then has interrupted what was made before: the next interrupt would not tell of it.
+    if (!commands_.empty() || stop.stop_requested() || !mayMakeFrame()) return;
     if (interrupt_.stop_requested()) interrupt_ = std::stop_source{};
     interrupt = interrupt_.get_token();
     lockstep = hasLockstep();
