@@ -20,8 +20,8 @@ std::uint32_t windowOf(wire::Policy policy) {
   return 4;
 }
 
-/// Wakes when the lock is free again: whoever is woken under it runs into it and sleeps once more, which costs
-/// two more turns of the scheduler for each frame of each application.
+/// Wakes when the lock is free again: whoever is woken under it runs into it and sleeps once more, which
+/// costs two more turns of the scheduler for each frame of each application.
 Result<> Inbox::push(Frame frame) {
   {
     const std::scoped_lock lock{mutex_};
@@ -29,9 +29,8 @@ Result<> Inbox::push(Frame frame) {
       for (const Frame& missed : frames_) frame.dropped_before += missed.dropped_before + 1;
       frames_.clear();
     } else if (frames_.size() >= windowOf(policy_)) {
-      return Error{Error::Code::Overrun,
-                   "toftwind sent more frames than the subscription's window of " +
-                       std::to_string(windowOf(policy_)) + " allows"};
+      return Error{Error::Code::Overrun, "toftwind sent more frames than the subscription's window of " +
+                                             std::to_string(windowOf(policy_)) + " allows"};
     }
     frames_.push_back(std::move(frame));
   }
