@@ -2,7 +2,6 @@
 // Whole searches of small campaigns: what is hidden in them the finder is never told.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,8 +10,7 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "calib/discover/campaign/discover_campaign.h"
-#include "tests/discover/simulated_run.h"
+#include "tests/discover/searched.h"
 
 namespace toftwin::discover {
 namespace {
@@ -20,59 +18,6 @@ namespace {
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
-
-class Searched : public testing::Test {
- protected:
-  Searched()
-      : folder_(std::filesystem::temp_directory_path() / fmt::format("toftwin-campaign-{}", ::getpid())) {
-    std::filesystem::create_directories(folder_);
-    write("camera.toml", tinyCamera());
-    write("scene.toml", smallScene());
-  }
-  ~Searched() override { std::filesystem::remove_all(folder_); }
-
-  void write(const std::string& name, const std::string& text) const {
-    std::ofstream{folder_ / name} << text;
-  }
-
-  using Spoil = decltype(SimulatedRun::spoil);
-  void simulate(const std::string& hidden, const Spoil& spoil = {}, bool with_poses = true,
-                int frames = 0, std::uint64_t seed = 1) const {
-    auto plan = plan::parsePlan(smallPlan(), "plan.toml");
-    const auto camera = sim::SensorModel::parse(tinyCamera(hidden), "camera.toml");
-    const auto scene = sim::Scene::parse(smallScene(), "scene.toml");
-    if (!plan || !camera || !scene) throw std::runtime_error("the small campaign's files are wrong");
-    SimulatedRun run{
-        .plan = *plan, .camera = *camera, .scene = *scene, .spoil = spoil, .with_poses = with_poses};
-    run.frames = frames, run.seed = seed;
-    discover::write(run, folder_ / "run");
-  }
-  [[nodiscard]] CampaignJob job() const {
-    CampaignJob job{
-        .run = folder_ / "run", .model = (folder_ / "camera.toml").string(), .scene = folder_ / "scene.toml"};
-    job.output = folder_ / "out";
-    job.trace.max_surfaces = 1;
-    return job;
-  }
-  static CampaignFinding search(const CampaignJob& job) {
-    compare::Progress silent{nullptr};
-    auto finding = searchCampaign(job, silent);
-    if (!finding) throw std::runtime_error(finding.error().message);
-    return *std::move(finding);
-  }
-  static std::string errorOf(const CampaignJob& job) {
-    compare::Progress silent{nullptr};
-    const auto finding = searchCampaign(job, silent);
-    return finding ? "" : finding.error().message;
-  }
-  static std::vector<std::string> namesOf(const CampaignFinding& finding) {
-    std::vector<std::string> names;
-    for (const FoundEffect& one : finding.effects)
-      names.push_back(one.found.is_catalogue ? one.found.name : "undeclared");
-    return names;
-  }
-  std::filesystem::path folder_;
-};
 
 TEST_F(Searched, NothingIsFoundWhereNothingIsHidden) {
   simulate("");
@@ -112,33 +57,6 @@ TEST_F(Searched, WhatRemainsOnLockedCapturesIsLess) {
   const auto& numbers = finding.effects.front().fitted->numbers;
   ASSERT_EQ(numbers.size(), 1u);
   EXPECT_NEAR(numbers.front().value, 3000.0, 4.0 * numbers.front().error);
-}
-
-/// Steps of a third of the dimmest pixels' noise: means over frames do not show them.
-TEST_F(Searched, StepsOfTheConverterAreSeenInSingleFrames) {
-  simulate("[[effect]]\ntype = 'quantisation'\nstep_electrons = 20.0\n");
-  const CampaignFinding finding = search(job());
-  ASSERT_THAT(namesOf(finding), ElementsAre("quantisation")) << verdictOf(finding);
-  EXPECT_THAT(verdictOf(finding), HasSubstr("single frames"));
-  EXPECT_LT(finding.finding.first_p, 0.01);
-  ASSERT_TRUE(finding.effects.front().fitted);
-  const FittedNumber step = finding.effects.front().fitted->numbers.at(0);
-  EXPECT_NEAR(step.value, 20.0, 4.0 * step.error);
-  EXPECT_LT(step.error, 1e-3);
-  const auto model = sim::SensorModel::parse(finding.model_toml, "model.toml");
-  ASSERT_TRUE(model) << model.error().message;
-  EXPECT_THAT(model->effectNames(), Contains("quantisation"));
-  const auto declaring = [&](const std::string& electrons) {
-    write("camera.toml",
-          tinyCamera("[[effect]]\ntype = 'quantisation'\nstep_electrons = " + electrons + "\n"));
-    std::filesystem::remove(folder_ / "run" / plan::kOpenedFile);
-    return search(job());
-  };
-  const CampaignFinding right = declaring("20.0"), wrong = declaring("30.0");
-  EXPECT_TRUE(right.effects.empty() && right.updates.empty()) << verdictOf(right);
-  ASSERT_EQ(wrong.updates.size(), 1U) << verdictOf(wrong);
-  EXPECT_NEAR(wrong.updates.front().numbers.at(0).value, 20.0, 4.0 * step.error);
-  EXPECT_THAT(wrong.model_toml, HasSubstr("step_electrons = 20")) << "an update";
 }
 
 /// 5 mm for each e-fold of exposure, which no effect of the catalogue does.

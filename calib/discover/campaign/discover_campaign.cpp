@@ -120,6 +120,10 @@ std::vector<std::size_t> wrongNumbers(const Evidence& evidence, const Finding& f
   return places;
 }
 
+bool isQuantisation(const sim::AnyEffect& effect) {
+  return std::holds_alternative<sim::Quantisation>(effect);
+}
+
 /// The effects without noise, with what was found in them.
 struct WithFound {
   std::vector<sim::AnyEffect> effects;
@@ -245,7 +249,7 @@ void keepIfWorse(const std::string& text, const Declared& declared, CampaignFind
                        .effects = finding.effects,
                        .updates = finding.updates};
   std::erase_if(kept.effects, [](const FoundEffect& one) { return !one.is_of_single_frames; });
-  std::erase_if(kept.updates, [](const FittedEffect& one) { return !isOfSingleFrames(one); });
+  std::erase_if(kept.updates, [](const FittedEffect& one) { return !one.is_of_single_frames; });
   const bool is_as_it_was = kept.effects.empty() && kept.updates.empty();
   finding.model_toml =
       is_as_it_was
@@ -298,7 +302,11 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
   if (!traced) return traced.error();
   progress.begin();
   const Lit lit{campaign->captures, *traced, *at_poses};
-  const auto rows = CampaignRows::make(declared, lit, {.left_out = job.left_out});
+  // What single frames tell, means over frames need not guess.
+  const auto steps = stepsIn(declared.model, campaign->captures);
+  std::vector<std::string> left_out = job.left_out;
+  if (steps) left_out.emplace_back(sim::Quantisation::about.name);
+  const auto rows = CampaignRows::make(declared, lit, {.left_out = left_out});
   if (!rows) return rows.error();
   progress.begin();
   finding.finding = find(*rows, job.finder);
@@ -307,14 +315,17 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
   for (const Effect& effect : finding.finding.effects) {
     if (!effect.is_catalogue) terms.push_back({effect.name, Kind::Generic, termsOf(effect), 0});
   }
-  const auto updates = wrongNumbers(rows->evidence(terms), finding.finding, declaredEffects(declared));
+  auto updates = wrongNumbers(rows->evidence(terms), finding.finding, declaredEffects(declared));
+  if (steps)
+    std::erase_if(updates,
+                  [&](std::size_t place) { return isQuantisation(declaredEffects(declared)[place]); });
   WithFound inserted = insertFound(*rows, declared, updates, finding);
   const auto refitted = refit(*rows, inserted.effects, inserted.fitted,
                               {.scales = finding.finding.scales, .only = inserted.only});
   if (!refitted) return refitted.error();
   takeFitted(*refitted, *late, finding);
   addNextCaptures({declared, lit, finding.finding.scales}, *rows, finding.effects);
-  addSteps(job, declared.model, campaign->captures, finding);
+  if (steps) addSteps(job, declared.model, *steps, finding);
   const Zero beyond = finding.zero;
   finding.zero.delay_mm += *late;
   finding.model_toml = modelText(files->text, declared, finding);

@@ -48,14 +48,10 @@ struct FoundEffect {
   std::optional<FittedEffect> fitted{};  ///< none: the simulator has no form for it
   std::vector<FittedEffect> more{};      ///< where one form is not enough
   std::optional<NextCapture> next{};     ///< where these captures do not tell it from something else
-  bool is_of_single_frames =
-      false;  ///< noise smears it where frames are averaged, as they are for the judgement
+  /// Single frames say it (step_effect.h): noise smears it where frames are averaged, as they are for the
+  /// judgement.
+  bool is_of_single_frames = false;
 };
-
-/// Whether it is a number that single frames said (step_effect.h).
-inline bool isOfSingleFrames(const FittedEffect& update) {
-  return std::holds_alternative<sim::Quantisation>(update.effect);
-}
 
 /// All that is known when a campaign was searched.
 struct CampaignFinding {
@@ -74,7 +70,7 @@ struct CampaignFinding {
 
   /// Whether anything was found that means over frames show, so that locked captures can judge it.
   [[nodiscard]] bool hasJudged() const {
-    return !std::ranges::all_of(updates, isOfSingleFrames) ||
+    return !std::ranges::all_of(updates, &FittedEffect::is_of_single_frames) ||
            !std::ranges::all_of(effects, &FoundEffect::is_of_single_frames);
   }
 };

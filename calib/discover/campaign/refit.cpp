@@ -323,7 +323,8 @@ Zero zeroOf(const Refitted& refitted, double known_mm) {
   // The column of the delay is what it does beyond an offset.
   const double offset_variance =
       covariance(kOffset, kOffset) + covariance(kDelay, kDelay) - 2.0 * covariance(kOffset, kDelay);
-  return {at[kOffset] - at[kDelay], std::sqrt(std::max(0.0, offset_variance)), at[kDelay], at[kGain]};
+  return {at[kOffset] - at[kDelay], std::sqrt(std::max(0.0, offset_variance)), at[kDelay], at[kGain],
+          std::sqrt(std::max(0.0, covariance(kGain, kGain)))};
 }
 
 Result<double> delayThatFits(const JudgedCampaign& judged) {

@@ -26,6 +26,9 @@ struct FittedNumber {
 struct FittedEffect {
   sim::AnyEffect effect;
   std::vector<FittedNumber> numbers{};  ///< those that were fitted
+  /// They are of single frames, which noise smears where frames are averaged: locked captures, means over
+  /// frames, do not judge them.
+  bool is_of_single_frames = false;
 };
 
 /// A campaign on which models are judged: what is needed of it again and again.
@@ -82,7 +85,9 @@ Result<Refitted> refit(const CampaignRows& rows, std::vector<sim::AnyEffect> eff
 struct Zero {
   double offset_mm = 0.0, offset_error_mm = 0.0;
   double delay_mm = 0.0;
-  double gain_percent = 0.0;
+  double gain_percent = 0.0, gain_error_percent = 0.0;
+  /// Whether the amplitude's unit, or its light, is no chance another one than the camera file's.
+  [[nodiscard]] bool hasGain() const { return std::abs(gain_percent) > 3.0 * gain_error_percent; }
   /// Whether the offset is no chance, so that it is written.
   [[nodiscard]] bool hasOffset() const { return std::abs(offset_mm) > 3.0 * offset_error_mm; }
 };

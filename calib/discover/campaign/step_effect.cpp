@@ -25,6 +25,16 @@ const sim::Quantisation* declaredIn(const sim::SensorModel& model) {
   return nullptr;
 }
 
+/// An amplitude that is g times the file's has steps that are g times the file's. Where g is no more than
+/// chance it is 1, so that a camera that tells electrons has its steps as sharp as they are.
+SampleSteps inElectrons(SampleSteps steps, const Zero& zero) {
+  if (!zero.hasGain()) return steps;
+  const double unit = std::exp(1e-2 * zero.gain_percent);
+  steps.step /= unit;
+  steps.error = std::hypot(steps.error / unit, 1e-2 * zero.gain_error_percent * steps.step);
+  return steps;
+}
+
 Effect effectOf(const SampleSteps& steps, bool is_candidate) {
   Effect effect{.name = std::string{sim::Quantisation::about.name}, .is_catalogue = is_candidate};
   if (!is_candidate)
@@ -38,26 +48,39 @@ Effect effectOf(const SampleSteps& steps, bool is_candidate) {
 
 }  // namespace
 
-void addSteps(const CampaignJob& job, const sim::SensorModel& model,
-              const std::vector<MeasuredCapture>& captures, CampaignFinding& finding) {
+std::optional<SampleSteps> stepsIn(const sim::SensorModel& model,
+                                   const std::vector<MeasuredCapture>& captures) {
   std::vector<AmplitudePair> pairs;
   for (const MeasuredCapture& capture : captures)
     pairs.insert(pairs.end(), capture.dim_pairs.begin(), capture.dim_pairs.end());
-  const auto steps = sampleStepsOf(pairs, phaseStepsOf(model));
-  if (!steps) return;
-  const sim::Quantisation* const declared = declaredIn(model);
+  return sampleStepsOf(pairs, phaseStepsOf(model));
+}
+
+void addSteps(const CampaignJob& job, const sim::SensorModel& model, const SampleSteps& steps,
+              CampaignFinding& finding) {
   constexpr double kSame = 1e-3;  // what a gain of the light between file and camera hides anyway
-  if (declared != nullptr && std::abs(declared->step_electrons - steps->step) < kSame * steps->step) return;
-  finding.finding.first_p = std::min(finding.finding.first_p, steps->p);
-  const FittedEffect fitted{sim::Quantisation{.step_electrons = steps->step},
-                            {{"step_electrons", steps->step, steps->error}}};
+  const SampleSteps own = inElectrons(steps, finding.zero);
+  const auto is_of_means = [](const FittedEffect& one) {
+    return std::holds_alternative<sim::Quantisation>(one.effect);
+  };
+  std::erase_if(finding.updates, is_of_means);
+  std::erase_if(finding.effects,
+                [&](const FoundEffect& one) { return one.fitted && is_of_means(*one.fitted); });
+  const sim::Quantisation* const declared = declaredIn(model);
+  if (declared != nullptr &&
+      std::abs(declared->step_electrons - own.step) < std::max(kSame * own.step, 3.0 * own.error))
+    return;
+  finding.finding.first_p = std::min(finding.finding.first_p, own.p);
+  const FittedEffect fitted{.effect = sim::Quantisation{.step_electrons = own.step},
+                            .numbers = {{"step_electrons", own.step, own.error}},
+                            .is_of_single_frames = true};
   if (declared != nullptr) {
     finding.updates.push_back(fitted);
     return;
   }
   const bool is_candidate =
       std::ranges::find(job.left_out, sim::Quantisation::about.name) == job.left_out.end();
-  FoundEffect found{effectOf(*steps, is_candidate)};
+  FoundEffect found{effectOf(own, is_candidate)};
   if (is_candidate) found.fitted = fitted;
   found.is_of_single_frames = true;
   finding.effects.push_back(std::move(found));
