@@ -108,9 +108,9 @@ std::optional<OniVideoMode> companionMode(OniDeviceHandle device, OniSensorType 
 Result<Device> Device::open(const std::string& uri, const Keys& keys) {
   Device device;
   OniDeviceHandle handle = nullptr;
-  if (const OniStatus status = oniDeviceOpen(uri.c_str(), &handle); status != ONI_STATUS_OK) {
-    return failure(fmt::format("{} cannot be opened", uri), status);
-  }
+  OniStatus status = ONI_STATUS_ERROR;
+  device.reading_ = ReadingThread::startedBy([&] { status = oniDeviceOpen(uri.c_str(), &handle); });
+  if (status != ONI_STATUS_OK) return failure(fmt::format("{} cannot be opened", uri), status);
   device.handle_.reset(handle);
   if (oniDeviceGetInfo(handle, &device.info_) != ONI_STATUS_OK) device.info_ = {};
   device.readFileAsAsked();
@@ -132,6 +132,7 @@ Device& Device::operator=(Device&& other) noexcept {
   started_at_ = std::exchange(other.started_at_, std::nullopt);
   stopped_at_ = other.stopped_at_;
   rate_hz_ = other.rate_hz_;
+  reading_ = other.reading_;
   return *this;
 }
 
@@ -139,6 +140,7 @@ void Device::close() {
   if (handle_ == nullptr) return;
   stop();
   if (stopped_at_) settle(*stopped_at_);
+  if (reading_) reading_->waitUntilAsleep();
   streams_.clear();
   // At the end of a file, the library's reading thread looks at streams that are gone.
   settle(std::chrono::steady_clock::now());

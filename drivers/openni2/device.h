@@ -11,6 +11,7 @@
 
 #include "drivers/openni2/library.h"
 #include "drivers/openni2/openni2.h"
+#include "drivers/openni2/reading_thread.h"
 #include "drivers/pace.h"
 
 namespace toftwin::drivers::openni2 {
@@ -59,6 +60,7 @@ class Device {
   std::vector<Stream> streams_;
   int rate_hz_ = 30;
   std::optional<SteadyTime> started_at_, stopped_at_;
+  std::optional<ReadingThread> reading_;  ///< of a file
 };
 
 }  // namespace toftwin::drivers::openni2

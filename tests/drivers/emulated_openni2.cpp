@@ -142,8 +142,11 @@ class Stream final : public oni::driver::StreamBase {
     const std::chrono::microseconds interval{Emulated::kInterval_us};
     const auto begin = Clock::now();
     const std::int64_t first = begin.time_since_epoch() / interval;  // all streams in step
+    if (sensor_ == ONI_SENSOR_DEPTH) emulated.last_depth = first;
+    if (sensor_ == ONI_SENSOR_IR) emulated.last_infrared = first;
     for (std::int64_t n = first + 1; !stop.stop_requested(); ++n) {
       std::this_thread::sleep_until(Clock::time_point{n * interval});
+      waitForTheOther(n, stop);
       const bool is_silent =
           emulated.is_hung || (sensor_ == ONI_SENSOR_COLOR && emulated.is_color_silent);
       if (is_silent) continue;
@@ -153,6 +156,14 @@ class Stream final : public oni::driver::StreamBase {
       }
       send(n, static_cast<int>(n - first));
     }
+  }
+
+  void waitForTheOther(std::int64_t n, const std::stop_token& stop) const {
+    const auto isToWait = [&] {
+      return sensor_ == ONI_SENSOR_DEPTH ? emulated.last_infrared < n - 1 : emulated.last_depth < n;
+    };
+    while (emulated.is_in_step && isToWait() && !stop.stop_requested())
+      std::this_thread::sleep_for(std::chrono::milliseconds{1});
   }
 
   void send(std::int64_t n, int index) {
@@ -178,6 +189,8 @@ class Stream final : public oni::driver::StreamBase {
       if (const int width = emulated.wrong_width.exchange(0); width > 0) frame->width = width;
     }
     raiseNewFrame(frame);
+    if (sensor_ == ONI_SENSOR_DEPTH) emulated.last_depth = n;
+    if (sensor_ == ONI_SENSOR_IR) emulated.last_infrared = n;
     getServices().releaseFrame(frame);
   }
 

@@ -30,6 +30,9 @@ struct EmulatedOpenNI2 {
   std::atomic<std::int64_t> clock_us{0};  ///< added to its clock
   std::atomic<int> cut_bytes{0};          ///< its next depth frame is that much too short
   std::atomic<int> wrong_width{0};        ///< or so wide
+  std::atomic<std::int64_t> last_depth{0}, last_infrared{0};  ///< of the frames that it sent
+  /// An infrared image comes after the depth image of its time and before the next, however busy the machine is.
+  std::atomic<bool> is_in_step{false};
   std::atomic<int> open_streams{0}, running_streams{0};
   std::atomic<int> exposure{33};  ///< the colour stream's, as the device has it
 

@@ -336,6 +336,7 @@ TEST(OpenNI2Library, LookingForACameraThatIsAwayKeepsNoMemory) {
 class OpenNI2File : public OpenNI2 {
  protected:
   static constexpr int kFrames = 12;
+  static constexpr std::uintmax_t kImageBytes = 2 * Emulated::kWidth * Emulated::kHeight;
   static void SetUpTestSuite() {
     emulatedDevice();
     ASSERT_EQ(oniInitialize(ONI_API_VERSION), ONI_STATUS_OK);
@@ -348,10 +349,26 @@ class OpenNI2File : public OpenNI2 {
     ASSERT_EQ(oniCreateRecorder(file().c_str(), &recorder), ONI_STATUS_OK);
     oniRecorderAttachStream(recorder, depth, FALSE);
     oniRecorderAttachStream(recorder, infrared, FALSE);
+    emulatedDevice().is_in_step = true;
     oniStreamStart(depth);
     oniStreamStart(infrared);
     oniRecorderStart(recorder);
-    std::this_thread::sleep_for(milliseconds{(kFrames + 3) * 1000 / Emulated::kRate_hz});
+    // It begins when its thread comes to it; from then on it has all that the two streams send, however late.
+    const auto soon = std::chrono::steady_clock::now() + std::chrono::seconds{20};
+    const auto waitFor = [soon](auto isSo) {
+      while (!isSo() && std::chrono::steady_clock::now() < soon) std::this_thread::sleep_for(milliseconds{5});
+    };
+    waitFor([] { return std::filesystem::file_size(file()) > kImageBytes; });
+    const std::int64_t begun = std::max(emulatedDevice().last_depth, emulatedDevice().last_infrared);
+    waitFor([begun] {
+      return std::min(emulatedDevice().last_depth, emulatedDevice().last_infrared) > begun + kFrames + 2;
+    });
+    // The streams end first: a frame that is just being recorded waits for the recorder's list of streams and
+    // holds that of its stream's recorders, while a recorder that ends takes the two the other way round, and
+    // waits for ever.
+    oniStreamStop(infrared);
+    oniStreamStop(depth);
+    emulatedDevice().is_in_step = false;
     oniRecorderStop(recorder);
     oniRecorderDestroy(&recorder);
     oniStreamDestroy(infrared);
