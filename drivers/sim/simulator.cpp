@@ -272,7 +272,7 @@ class SimulatedSource final : public Source {
   /// One light for all raw exposures, of the time of the middle one.
   void gatherInRealtime(const Moment& moment) {
     view_.traceFrame(sim::middleOf(moment));
-    collected_ = model_.collect(view_.light(), moment, keys_.seed, pacer_.index());
+    if (model_.remembers()) collected_ = model_.collect(view_.light(), moment, keys_.seed, pacer_.index());
   }
 
   /// Where things move or other cameras shine: light for each raw exposure at its own time. False if asked to stop before the end.
@@ -294,8 +294,11 @@ class SimulatedSource final : public Source {
     }
     const sim::History before{last_collected_ ? &*last_collected_ : nullptr,
                               last_range_ ? &*last_range_ : nullptr};
-    auto exposed =
-        model_.readOut(*collected_, moment, keys_.seed, pacer_.index(), 0, 0, before);
+    // In real time light is new in each frame, and samples free of noise are kept only for what remembers
+    // them.
+    auto exposed = view_.isRealtime() && !model_.remembers()
+                       ? model_.expose(view_.light(), moment, keys_.seed, pacer_.index())
+                       : model_.readOut(*collected_, moment, keys_.seed, pacer_.index(), 0, 0, before);
     if (model_.remembers()) {
       last_collected_ = *collected_;
       last_range_ = exposed.range;

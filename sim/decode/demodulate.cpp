@@ -14,17 +14,31 @@ const float* tapRow(const Samples& samples, std::size_t frequency, int step, int
   return &samples.tap(frequency, step, tap)(0, y);
 }
 
+TOFTWIN_SIMD void addOne(const float* __restrict a, float weight, int width, float* __restrict sum) {
+  for (int x = 0; x < width; ++x) sum[x] += weight * a[x];
+}
+
+TOFTWIN_SIMD void addDifference(const float* __restrict a, const float* __restrict b, float weight, int width,
+                                float* __restrict sum) {
+  for (int x = 0; x < width; ++x) sum[x] += weight * (a[x] - b[x]);
+}
+
 /// sum[x] += weight · sample[x] for one step of one frequency.
-void addSample(const Samples& samples, std::size_t frequency, int step, int y, float weight,
-               float* sum) {
-  const int width = samples.width();
+void addSample(const Samples& samples, std::size_t frequency, int step, int y, float weight, float* sum) {
   const float* a = tapRow(samples, frequency, step, 0, y);
   if (samples.taps == 1) {
-    for (int x = 0; x < width; ++x) sum[x] += weight * a[x];
-    return;
+    addOne(a, weight, samples.width(), sum);
+  } else {
+    addDifference(a, tapRow(samples, frequency, step, 1, y), weight, samples.width(), sum);
   }
-  const float* b = tapRow(samples, frequency, step, 1, y);
-  for (int x = 0; x < width; ++x) sum[x] += weight * (a[x] - b[x]);
+}
+
+TOFTWIN_SIMD void interleave(const float* __restrict real, const float* __restrict imaginary,
+                             std::size_t width, float* __restrict parts) {
+  for (std::size_t x = 0; x < width; ++x) {
+    parts[2 * x] = real[x];
+    parts[2 * x + 1] = imaginary[x];
+  }
 }
 
 }  // namespace
@@ -47,7 +61,7 @@ void demodulateRow(const Samples& samples, const Steps& steps, std::size_t frequ
     addSample(samples, frequency, k, y, scale * steps.cosine[at], real.data());
     addSample(samples, frequency, k, y, -scale * steps.sine[at], imaginary.data());
   }
-  for (std::size_t x = 0; x < width; ++x) phasors[x] = {real[x], imaginary[x]};
+  interleave(real.data(), imaginary.data(), width, reinterpret_cast<float*>(phasors));
 }
 
 TOFTWIN_SIMD void polarRow(const std::complex<float>* phasors, std::size_t count, float zero_cycles,
@@ -82,10 +96,7 @@ void unmodulatedRow(const Samples& samples, int y, float* charge) {
   std::fill_n(charge, width, 0.0F);
   const auto exposures = samples.electrons.size() / static_cast<std::size_t>(samples.taps);
   const float scale = 1.0F / static_cast<float>(exposures);
-  for (const Image<float>& image : samples.electrons) {
-    const float* electrons = &image(0, y);
-    for (int x = 0; x < width; ++x) charge[x] += scale * electrons[x];
-  }
+  for (const Image<float>& image : samples.electrons) addOne(&image(0, y), scale, width, charge);
 }
 
 void asymmetryRow(const Samples& samples, int y, float* electrons) {

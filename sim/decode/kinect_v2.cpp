@@ -10,6 +10,7 @@
 
 #include "sim/decode/decode_steps.h"
 #include "sim/decode/demodulate.h"
+#include "sim/decode/kinect_v2_rows.h"
 #include "sim/decode/unwrap.h"
 #include "sim/images/rows.h"
 
@@ -42,6 +43,7 @@ class KinectDecoder {
                .ambient = Image<float>{width_, height_},
                .flags = Image<std::uint8_t>{width_, height_},
                .phasors = std::vector(kFrequencies, Image<std::complex<float>>{width_, height_})};
+    limits_ = limits();
   }
 
   RangeImage decode() && {
@@ -54,7 +56,8 @@ class KinectDecoder {
       filtered_ = result_.phasors;
     }
     forRows(height_, [&](int first, int last) {
-      for (int y = first; y < last; ++y) measureRow(y);
+      Rows rows{static_cast<std::size_t>(width_)};
+      for (int y = first; y < last; ++y) measureRow(y, rows);
     });
     if (kinect_.edge_filter) dropEdges();
     return std::move(result_);
@@ -63,16 +66,11 @@ class KinectDecoder {
  private:
   void demodulate(int y) {
     const auto columns = static_cast<std::size_t>(width_);
-    std::vector<float> unused(columns), amplitudes(columns);
     for (std::size_t f = 0; f < kFrequencies; ++f) {
       std::complex<float>* phasors = &result_.phasors[f](0, y);
       demodulateRow(samples_, steps_, f, y, phasors);
       takeOffPixelPhase(settings_, f, y, {phasors, columns});
-      polarRow(phasors, columns, 0.0F, unused.data(), amplitudes.data());
-      for (std::size_t x = 0; x < columns; ++x) {
-        result_.amplitude(static_cast<int>(x), y) +=
-            amplitudes[x] / static_cast<float>(kFrequencies);
-      }
+      addAmplitudes(phasors, static_cast<float>(kFrequencies), columns, &result_.amplitude(0, y));
     }
     unmodulatedRow(samples_, y, &result_.ambient(0, y));
   }
@@ -80,88 +78,82 @@ class KinectDecoder {
   /// Saturated pixels have no phase that others could take.
   void filter(std::size_t f) {
     const auto least = static_cast<float>(kinect_.bilateral_threshold_counts / counts_[f]);
-    Image<std::complex<float>> clean = result_.phasors[f];
-    for (std::size_t i = 0; i < samples_.flags.size(); ++i) {
-      if (has(samples_.flags[i], PixelFlag::Saturated)) clean[i] = 0.0F;
-    }
-    FilteredPhasors filtered = bilateralFilter(clean, least);
-    for (std::size_t i = 0; i < is_edge_.size(); ++i) {
-      if (filtered.unlikeness[i] >= static_cast<float>(kinect_.edge_unlikeness)) is_edge_[i] = 1;
-    }
+    FilteredPhasors filtered = bilateralFilter(result_.phasors[f], least, samples_.flags);
+    markEdges(filtered.unlikeness.pixels(), static_cast<float>(kinect_.edge_unlikeness), is_edge_.pixels());
     filtered_.push_back(std::move(filtered.phasors));
   }
 
-  void measureRow(int y) {
-    const auto columns = static_cast<std::size_t>(width_);
-    std::array<std::vector<float>, kFrequencies> cycles, amplitudes;
-    for (std::size_t f = 0; f < kFrequencies; ++f) {
-      cycles[f].resize(columns);
-      amplitudes[f].resize(columns);
-      polarRow(&filtered_[f](0, y), columns, zero_cycles_[f], cycles[f].data(),
-               amplitudes[f].data());
-      if (f < settings_.true_cycles.size() && settings_.true_cycles[f].size() > 1) {
-        linearise(settings_.true_cycles[f], cycles[f]);
-      }
-    }
-    for (std::size_t x = 0; x < columns; ++x) {
-      std::array<double, kFrequencies> phase{}, counts{};
-      for (std::size_t f = 0; f < kFrequencies; ++f) {
-        phase[f] = static_cast<double>(cycles[f][x]);
-        counts[f] = static_cast<double>(amplitudes[f][x]) * counts_[f];
-      }
-      const int column = static_cast<int>(x);
-      std::uint8_t flags = samples_.flags.empty() ? std::uint8_t{0} : samples_.flags(column, y);
-      const double range_m = measure(phase, counts, column, y, flags);
-      if (std::isnan(range_m)) raise(flags, PixelFlag::Invalid);
-      result_.range_m(column, y) = has(flags, PixelFlag::Invalid) ? kNaN : static_cast<float>(range_m);
-      result_.flags(column, y) = flags;
-      brightness_(column, y) = static_cast<float>(counts[0] + counts[1] + counts[2]);
-    }
+  [[nodiscard]] KinectLimits limits() const {
+    const double baseline_m = settings_.baseline_length.in(metre);
+    const bool is_exact = settings_.baseline == DecodeSettings::Baseline::Exact;
+    return {.counts_per_electron = counts_,
+            .least_counts = kinect_.least_counts,
+            .least_sum_counts = kinect_.least_sum_counts,
+            .unit_m = unit_m_,
+            .strong_rad = kinect_.strong_unwrap_threshold.in(radian),
+            .weak_rad = settings_.unwrap_threshold.in(radian),
+            .nearest_m = settings_.nearest.in(metre),
+            .farthest_m = settings_.farthest.in(metre),
+            .baseline_m = baseline_m,
+            .baseline_square = is_exact ? baseline_m * baseline_m : 0.0};
   }
 
-  double measure(const std::array<double, kFrequencies>& cycles,
-                 const std::array<double, kFrequencies>& counts, int x, int y,
-                 std::uint8_t& flags) const {
-    if (has(flags, PixelFlag::Saturated)) raise(flags, PixelFlag::Invalid);
-    const double weakest = *std::min_element(counts.begin(), counts.end());
-    const double strongest = *std::max_element(counts.begin(), counts.end());
-    if (!(weakest > 0.0 && weakest >= kinect_.least_counts &&
-          counts[0] + counts[1] + counts[2] >= kinect_.least_sum_counts)) {
-      reject(flags, PixelFlag::LowAmplitude);
-      return static_cast<double>(kNaN);
+  /// A row's numbers on their way from phases to range.
+  struct Rows {
+    explicit Rows(std::size_t width)
+        : zeros(width), ones(width, 1.0F), deviation(width), strongest(width), why(width) {
+      for (std::size_t f = 0; f < kFrequencies; ++f) {
+        cycles[f].resize(width);
+        amplitudes[f].resize(width);
+      }
     }
-    const Unwrapped joined = unwrapKinectV2(cycles[0], cycles[1], cycles[2], unit_m_);
-    if (joined.deviation_rad > allowedDeviation(joined.deviation_rad, strongest)) {
-      reject(flags, PixelFlag::UnwrapUnreliable);
+    std::array<std::vector<float>, kFrequencies> cycles, amplitudes;
+    std::vector<float> zeros, ones;
+    std::vector<double> deviation, strongest;
+    std::vector<std::uint32_t> why;
+  };
+
+  void measureRow(int y, Rows& rows) {
+    const auto columns = static_cast<std::size_t>(width_);
+    KinectSeen seen{.cycles = {},
+                    .amplitudes = {},
+                    .ray_x = rays_.x.empty() ? rows.zeros.data() : &rays_.x(0, y),
+                    .ray_z = rays_.z.empty() ? rows.ones.data() : &rays_.z(0, y)};
+    for (std::size_t f = 0; f < kFrequencies; ++f) {
+      std::vector<float>& cycles = rows.cycles[f];
+      polarRow(&filtered_[f](0, y), columns, zero_cycles_[f], cycles.data(), rows.amplitudes[f].data());
+      if (f < settings_.true_cycles.size() && settings_.true_cycles[f].size() > 1)
+        linearise(settings_.true_cycles[f], cycles);
+      seen.cycles[f] = cycles.data();
+      seen.amplitudes[f] = rows.amplitudes[f].data();
     }
-    const double ray_x = rays_.x.empty() ? 0.0 : static_cast<double>(rays_.x(x, y));
-    const double range_m = rangeOfWay(joined.range_m, ray_x, settings_);
-    const double depth_m = range_m * rayZ(x, y);
-    if (!(depth_m >= settings_.nearest.in(metre) && depth_m <= settings_.farthest.in(metre))) {
-      reject(flags, PixelFlag::OutOfRange);
-    }
-    return range_m;
+    const KinectFound found{&result_.range_m(0, y), &brightness_(0, y), rows.deviation.data(),
+                            rows.strongest.data(), rows.why.data()};
+    if (measureKinectRow(seen, limits_, columns, found)) settleDoubts(rows);
+    judgeRow(samples_.flags.empty() ? nullptr : &samples_.flags(0, y), rows.why.data(), columns,
+             &result_.range_m(0, y), &result_.flags(0, y));
   }
 
   /// The threshold lies between the two; only a deviation that does, too, is worth two
   /// transcendental functions.
-  [[nodiscard]] double allowedDeviation(double deviation_rad, double strongest_counts) const {
-    const double weak_rad = settings_.unwrap_threshold.in(radian);
-    const double strong_rad = kinect_.strong_unwrap_threshold.in(radian);
-    if (deviation_rad <= strong_rad || deviation_rad > weak_rad) return weak_rad;
-    return kinectV2Threshold(strongest_counts, strong_rad, weak_rad);
-  }
-
-  [[nodiscard]] double rayZ(int x, int y) const {
-    return rays_.z.empty() ? 1.0 : static_cast<double>(rays_.z(x, y));
+  void settleDoubts(Rows& rows) const {
+    for (std::size_t x = 0; x < rows.why.size(); ++x) {
+      std::uint32_t& why = rows.why[x];
+      if ((why & kDoubtful) == 0) continue;
+      why &= ~kDoubtful;
+      if (rows.deviation[x] > kinectV2Threshold(rows.strongest[x], limits_.strong_rad, limits_.weak_rad))
+        why |= kUnreliable;
+    }
   }
 
   void dropEdges() {
     Image<float> depth_m{width_, height_};
-    for (int y = 0; y < height_; ++y) {
-      for (int x = 0; x < width_; ++x)
-        depth_m(x, y) = result_.range_m(x, y) * static_cast<float>(rayZ(x, y));
-    }
+    forRows(height_, [&](int first, int last) {
+      for (int y = first; y < last; ++y) {
+        for (int x = 0; x < width_; ++x)
+          depth_m(x, y) = result_.range_m(x, y) * (rays_.z.empty() ? 1.0F : rays_.z(x, y));
+      }
+    });
     const Image<std::uint8_t> drops = edgePixels(depth_m, is_edge_, brightness_);
     for (std::size_t i = 0; i < drops.size(); ++i) {
       if (drops[i] == 0) continue;
@@ -179,6 +171,7 @@ class KinectDecoder {
   std::vector<float> zero_cycles_;
   double unit_m_;
   std::array<double, kFrequencies> counts_{};  ///< of the device per electron of amplitude
+  KinectLimits limits_{};
   RangeImage result_;
   std::vector<Image<std::complex<float>>> filtered_;
   Image<float> brightness_;  ///< sum of the amplitudes in counts

@@ -34,8 +34,10 @@ struct FilteredPhasors {
 ///     g · exp(−k (1 − cos Δφ)/2),   k = 1.442695 · 5
 /// g a Gaussian of σ = 3 pixels, Δφ the phase against the middle pixel. Neighbours weaker than
 /// `least_amplitude` do not count; in a pixel that is weaker itself all count alike (k = 0). Pixels
-/// without signal and the image's border stay as they are.
-FilteredPhasors bilateralFilter(const Image<std::complex<float>>& phasors, float least_amplitude);
+/// without signal and the image's border stay as they are. Pixels that `flags`, unless it is empty, call
+/// saturated become and count as zero.
+FilteredPhasors bilateralFilter(const Image<std::complex<float>>& phasors, float least_amplitude,
+                                const Image<std::uint8_t>& flags = {});
 
 /// Pixels that the edge filter drops: `depth_m` along the optical axis, NaN where invalid already;
 /// `is_edge` from the bilateral filter (unlikeness of 2.5 or more at any frequency); `brightness`

@@ -5,6 +5,9 @@
 #include <cmath>
 #include <vector>
 
+#include <toftwin/frame.h>
+#include <toftwin/nan.h>
+
 #include "sim/decode/kinect_v2.h"
 #include "sim/images/rows.h"
 #include "sim/images/simd.h"
@@ -21,31 +24,41 @@ struct Row {
   std::vector<float> re, im, u, v, square;
 };
 
-TOFTWIN_SIMD void splitRow(const std::complex<float>* phasors, std::size_t width, float* __restrict re,
-                           float* __restrict im, float* __restrict u, float* __restrict v,
-                           float* __restrict square) {
+/// `flags` may be null.
+TOFTWIN_SIMD void splitRow(const std::complex<float>* phasors, const std::uint8_t* flags, std::size_t width,
+                           float* __restrict re, float* __restrict im, float* __restrict u,
+                           float* __restrict v, float* __restrict square) {
   const auto* parts = reinterpret_cast<const float*>(phasors);
   for (std::size_t x = 0; x < width; ++x) {
-    const float a = parts[2 * x], b = parts[2 * x + 1];
+    re[x] = parts[2 * x];
+    im[x] = parts[2 * x + 1];
+  }
+  if (flags != nullptr) {
+    constexpr auto kSaturated = static_cast<std::uint8_t>(PixelFlag::Saturated);
+    for (std::size_t x = 0; x < width; ++x) {
+      const bool is_full = (flags[x] & kSaturated) != 0;
+      re[x] = is_full ? 0.0F : re[x];
+      im[x] = is_full ? 0.0F : im[x];
+    }
+  }
+  for (std::size_t x = 0; x < width; ++x) {
+    const float a = re[x], b = im[x];
     const float s = a * a + b * b;
     const float inverse = s > 0.0F ? 1.0F / __builtin_sqrtf(s) : 0.0F;  // NaN: no signal
-    re[x] = a;
-    im[x] = b;
     u[x] = a * inverse;
     v[x] = b * inverse;
     square[x] = s;
   }
 }
 
-void split(const Image<std::complex<float>>& phasors, int y, Row& row) {
-  splitRow(&phasors(0, y), row.re.size(), row.re.data(), row.im.data(), row.u.data(), row.v.data(),
-           row.square.data());
-}
-
 /// What is gathered for one row of the result.
 struct Sums {
   explicit Sums(std::size_t width) : re(width), im(width), weight(width), unlikeness(width) {}
   std::vector<float> re, im, weight, unlikeness;
+
+  void clear() {
+    for (auto* sum : {&re, &im, &weight, &unlikeness}) std::fill(sum->begin(), sum->end(), 0.0F);
+  }
 };
 
 /// eˣ for x in [−7.3, 0], relative error below 2e-5: (Taylor series of x/16)^16.
@@ -88,6 +101,7 @@ TOFTWIN_SIMD void addNeighbour(const Row& own, const Row& other, int shift, floa
   }
 }
 
+/// The filtered row; its ends stay as they are.
 TOFTWIN_SIMD void finishRow(const Row& own, const Sums& sums, std::complex<float>* phasors,
                             float* __restrict unlikeness) {
   auto* __restrict parts = reinterpret_cast<float*>(phasors);
@@ -98,65 +112,98 @@ TOFTWIN_SIMD void finishRow(const Row& own, const Sums& sums, std::complex<float
   for (std::size_t x = 1; x < last; ++x) {
     const bool is_signal = square[x] > 0.0F;  // not NaN
     const float weight = 1.0F / (total[x] + kMiddle);
-    parts[2 * x] = is_signal ? (re[x] + kMiddle * own_re[x]) * weight : parts[2 * x];
-    parts[2 * x + 1] = is_signal ? (im[x] + kMiddle * own_im[x]) * weight : parts[2 * x + 1];
-    unlikeness[x] = is_signal ? unlike[x] : unlikeness[x];
+    parts[2 * x] = is_signal ? (re[x] + kMiddle * own_re[x]) * weight : own_re[x];
+    parts[2 * x + 1] = is_signal ? (im[x] + kMiddle * own_im[x]) * weight : own_im[x];
+    unlikeness[x] = is_signal ? unlike[x] : 0.0F;
+  }
+  for (const std::size_t x : {std::size_t{0}, last}) {
+    parts[2 * x] = own_re[x];
+    parts[2 * x + 1] = own_im[x];
   }
 }
 
-/// What a pixel's surroundings say to the edge filter.
-struct Surroundings {
-  float nearest_m, farthest_m;
-  float mean, deviation;  ///< of the brightness over the nine pixels
+/// What the edge filter looks at in one row: brightness, and depths that count (NaN: they do not).
+struct EdgeRow {
+  explicit EdgeRow(std::size_t width) : depth_m(width) {}
+  const float* brightness = nullptr;
+  std::vector<float> depth_m;
 };
 
-Surroundings lookAround(const Image<float>& depth_m, const Image<std::uint8_t>& is_edge,
-                        const Image<float>& brightness, int x, int y) {
-  Surroundings seen{depth_m(x, y), depth_m(x, y), 0.0F, 0.0F};
-  std::array<float, 9> values{};
-  std::size_t n = 0;
-  for (int v = y - 1; v <= y + 1; ++v) {
-    for (int u = x - 1; u <= x + 1; ++u) {
-      seen.mean += brightness(u, v) / 9.0F;
-      values[n++] = brightness(u, v);
-      const float depth = depth_m(u, v);
-      if (is_edge(u, v) != 0 || !(depth > 0.0F)) continue;
-      seen.nearest_m = std::min(seen.nearest_m, depth);
-      seen.farthest_m = std::max(seen.farthest_m, depth);
-    }
-  }
-  for (float value : values) seen.deviation += (value - seen.mean) * (value - seen.mean) / 9.0F;
-  seen.deviation = std::sqrt(seen.deviation);
-  return seen;
+TOFTWIN_SIMD void takeDepths(const float* __restrict depth_m, const std::uint8_t* __restrict is_edge,
+                             std::size_t width, float* __restrict counts) {
+  for (std::size_t x = 0; x < width; ++x)
+    counts[x] = (is_edge[x] == 0) & (depth_m[x] > 0.0F) ? depth_m[x] : kNaN;
 }
 
-bool hangsBetween(float depth_m, const Surroundings& seen) {
+/// The inner pixels of a row that are at an edge or hang between two surfaces.
+TOFTWIN_SIMD void dropRow(const EdgeRow& above, const EdgeRow& own, const EdgeRow& below,
+                          const float* __restrict depth_m, const std::uint8_t* __restrict is_edge,
+                          std::uint8_t* __restrict drops) {
   constexpr float kNear_m = 0.050F, kFar_m = 0.030F, kLargest_m = 0.100F;
   constexpr float kLeastMean = 50.0F, kVariation = 0.05F;
-  const float nearer = depth_m - seen.nearest_m, farther = seen.farthest_m - depth_m;
-  return nearer > kNear_m && farther > kFar_m && std::max(nearer, farther) > kLargest_m &&
-         seen.deviation >= kVariation * std::max(seen.mean, kLeastMean);
+  const float* depths[] = {above.depth_m.data(), own.depth_m.data(), below.depth_m.data()};
+  const float* bright[] = {above.brightness, own.brightness, below.brightness};
+  const std::size_t last = own.depth_m.size() - 1;
+  for (std::size_t x = 1; x < last; ++x) {
+    const float here = depth_m[x];
+    float nearest = here, farthest = here, mean = 0.0F, square = 0.0F;
+#pragma GCC unroll 3
+    for (int row = 0; row < 3; ++row) {
+#pragma GCC unroll 3
+      for (std::size_t column = x - 1; column <= x + 1; ++column) {
+        const float depth = depths[row][column];
+        nearest = depth < nearest ? depth : nearest;  // not NaN
+        farthest = depth > farthest ? depth : farthest;
+        mean += bright[row][column] / 9.0F;
+      }
+    }
+#pragma GCC unroll 3
+    for (int row = 0; row < 3; ++row) {
+#pragma GCC unroll 3
+      for (std::size_t column = x - 1; column <= x + 1; ++column) {
+        const float off = bright[row][column] - mean;
+        square += off * off / 9.0F;
+      }
+    }
+    const float nearer = here - nearest, farther = farthest - here,
+                larger = nearer > farther ? nearer : farther;
+    const float enough = kVariation * (mean < kLeastMean ? kLeastMean : mean);
+    const bool hangs =
+        (nearer > kNear_m) & (farther > kFar_m) & (larger > kLargest_m) & (__builtin_sqrtf(square) >= enough);
+    drops[x] = (here == here) & ((is_edge[x] != 0) | hangs) ? 1 : 0;  // not NaN
+  }
 }
 
 }  // namespace
 
-FilteredPhasors bilateralFilter(const Image<std::complex<float>>& phasors, float least_amplitude) {
+FilteredPhasors bilateralFilter(const Image<std::complex<float>>& phasors, float least_amplitude,
+                                const Image<std::uint8_t>& flags) {
   const int width = phasors.width(), height = phasors.height();
-  FilteredPhasors result{phasors, Image<float>{width, height}};
-  if (width < 3 || height < 3) return result;
+  FilteredPhasors result{Image<std::complex<float>>{width, height}, Image<float>{width, height}};
   const float least_square = least_amplitude * least_amplitude;
-  forRows(height - 2, [&](int first, int last) {
+  forRows(height, [&](int first, int last) {
     const auto columns = static_cast<std::size_t>(width);
     std::array<Row, 3> rows{Row{columns}, Row{columns}, Row{columns}};  // y − 1, y, y + 1, in turns
-    split(phasors, first, rows[0]);
-    split(phasors, first + 1, rows[1]);
-    for (int y = first + 1; y <= last; ++y) {
-      const auto place = [&](int row) -> Row& {
-        return rows[static_cast<std::size_t>((row - first) % 3)];
-      };
-      split(phasors, y + 1, place(y + 1));
-      const Row &above = place(y - 1), &own = place(y), &below = place(y + 1);
-      Sums sums{columns};
+    const auto place = [&](int y) -> Row& { return rows[static_cast<std::size_t>((y + 3) % 3)]; };
+    const auto split = [&](int y) {
+      Row& row = place(y);
+      if (y >= 0 && y < height)
+        splitRow(&phasors(0, y), flags.empty() ? nullptr : &flags(0, y), columns, row.re.data(),
+                 row.im.data(), row.u.data(), row.v.data(), row.square.data());
+    };
+    split(first - 1);
+    split(first);
+    Sums sums{columns};
+    for (int y = first; y < last; ++y) {
+      split(y + 1);
+      const Row& own = place(y);
+      if (y == 0 || y == height - 1 || width < 3) {
+        for (std::size_t x = 0; x < columns; ++x)
+          result.phasors(static_cast<int>(x), y) = {own.re[x], own.im[x]};
+        continue;
+      }
+      const Row &above = place(y - 1), &below = place(y + 1);
+      sums.clear();
       for (int shift : {-1, 0, 1}) {
         const float gauss = shift == 0 ? kBeside : kDiagonal;
         addNeighbour(own, above, shift, gauss, least_square, sums);
@@ -175,14 +222,20 @@ Image<std::uint8_t> edgePixels(const Image<float>& depth_m, const Image<std::uin
   Image<std::uint8_t> drops{width, height};
   if (width < 3 || height < 3) return drops;
   forRows(height - 2, [&](int first, int last) {
+    const auto columns = static_cast<std::size_t>(width);
+    std::array<EdgeRow, 3> rows{EdgeRow{columns}, EdgeRow{columns}, EdgeRow{columns}};
+    const auto take = [&](int y) -> EdgeRow& {
+      EdgeRow& row = rows[static_cast<std::size_t>(y % 3)];
+      takeDepths(&depth_m(0, y), &is_edge(0, y), columns, row.depth_m.data());
+      row.brightness = &brightness(0, y);
+      return row;
+    };
+    take(first);
+    take(first + 1);
     for (int y = first + 1; y <= last; ++y) {
-      for (int x = 1; x < width - 1; ++x) {
-        if (std::isnan(depth_m(x, y))) continue;
-        if (is_edge(x, y) != 0 ||
-            hangsBetween(depth_m(x, y), lookAround(depth_m, is_edge, brightness, x, y))) {
-          drops(x, y) = 1;
-        }
-      }
+      const EdgeRow& below = take(y + 1);
+      dropRow(rows[static_cast<std::size_t>((y - 1) % 3)], rows[static_cast<std::size_t>(y % 3)], below,
+              &depth_m(0, y), &is_edge(0, y), &drops(0, y));
     }
   });
   return drops;

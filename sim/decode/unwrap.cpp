@@ -8,37 +8,11 @@
 #include <numbers>
 #include <numeric>
 
+#include "sim/decode/unwrap_kinect_v2.h"
+
 namespace toftwin::sim {
-namespace {
-
-/// The nearest whole number, for |x| < 2⁵¹: what 1.5·2⁵² rounds away. Baseline x86 has no
-/// instruction for it.
-double nearestWhole(double x) { return (x + 0x1.8p52) - 0x1.8p52; }
-
-/// Distance of the phases (in cycles) from the line through 0 along (10, 2, 15), in radians.
-double distanceFromLine(double k80, double k16, double k120) {
-  // |k × n|, n the unit vector along (10, 2, 15), 10² + 2² + 15² = 329
-  const double x = (k16 * 15.0 - k120 * 2.0);
-  const double y = (k120 * 10.0 - k80 * 15.0);
-  const double z = (k80 * 2.0 - k16 * 10.0);
-  return 2.0 * std::numbers::pi * std::sqrt((x * x + y * y + z * z) / 329.0);
-}
-
-}  // namespace
-
 Unwrapped unwrapKinectV2(double cycles_80, double cycles_16, double cycles_120, double unit_m) {
-  double units_80 = 3.0 * (cycles_80 + nearestWhole(5.0 * cycles_16 - cycles_80));
-  double full_16 = cycles_16;
-  const double periods_beside_120 = units_80 / 2.0 - cycles_120;
-  if (std::abs(periods_beside_120 - nearestWhole(periods_beside_120)) >
-      0.25) {  // the second 15 units
-    units_80 += 15.0;
-    full_16 += 1.0;
-  }
-  const double full_80 = units_80 / 3.0;
-  const double full_120 = cycles_120 + nearestWhole(units_80 / 2.0 - cycles_120);
-  return {.range_m = unit_m * (30.0 / 27.0) * (full_80 + full_16 + full_120),
-          .deviation_rad = distanceFromLine(full_80, full_16, full_120)};
+  return joinKinectV2(cycles_80, cycles_16, cycles_120, unit_m);
 }
 
 Unwrapper::Unwrapper(std::span<const Frequency> frequencies, double speed_of_light) {

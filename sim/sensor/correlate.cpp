@@ -14,32 +14,6 @@ namespace {
 /// A harmonic whose relative content is smaller is not there.
 constexpr double kNoContent = 1e-12;
 
-/// ½ g m ĉₙ e^(i n θₖ): what a phasor is multiplied with at one step.
-struct Weight {
-  int harmonic;
-  float real, imaginary;
-};
-
-/// The weights of frequency `f` at step `k` of `steps`.
-std::vector<Weight> weightsOf(const Response& response, const Light& light, std::size_t f, int k,
-                              int steps) {
-  double theta = 2.0 * std::numbers::pi * k / steps;
-  const auto step = static_cast<std::size_t>(k);
-  if (step < light.error.step_rad.size()) theta += static_cast<double>(light.error.step_rad[step]);
-  std::vector<Weight> weights;
-  for (std::size_t i = 0; i < response.harmonics.size(); ++i) {
-    const int n = static_cast<int>(i) + 1;
-    std::complex<double> content = response.harmonics[i];
-    const std::size_t at = f * static_cast<std::size_t>(light.harmonics) + i;
-    if (at < light.error.content.size()) content += std::complex<double>{light.error.content[at]};
-    if (std::abs(content) < kNoContent || light.phasor(f, n).empty()) continue;
-    const std::complex<double> weight = 0.5 * response.electrons_per_radiance * response.contrast *
-                                        content * std::polar(1.0, n * theta);
-    weights.push_back({n, static_cast<float>(weight.real()), static_cast<float>(weight.imag())});
-  }
-  return weights;
-}
-
 /// modulated += Re(weight · phasors), whose parts alternate.
 TOFTWIN_SIMD void addModulated(const float* __restrict phasors, float real, float imaginary, int width,
                                float* __restrict modulated) {
@@ -116,37 +90,69 @@ Light correlatedPart(const Light& light, const std::vector<Response>& responses,
   return part;
 }
 
-Samples correlate(const Light& light, const std::vector<Response>& responses, int steps, int taps) {
-  const int width = light.width(), height = light.height();
-  Samples samples{.steps = steps, .taps = taps};
-  samples.electrons.assign(responses.size() * static_cast<std::size_t>(steps * taps),
-                           Image<float>{width, height});
-  std::size_t next_image = 0;
+Correlator::Correlator(const Light& light, const std::vector<Response>& responses, int steps, int taps)
+    : light_(light), step_count_(steps), taps_(taps) {
   for (std::size_t f = 0; f < responses.size(); ++f) {
-    samples.frequencies.push_back(responses[f].frequency);
-    const auto half_gain = static_cast<float>(0.5 * responses[f].electrons_per_radiance);
+    frequencies_.push_back(responses[f].frequency);
     for (int k = 0; k < steps; ++k) {
-      const std::vector<Weight> weights = weightsOf(responses[f], light, f, k, steps);
-      Image<float>* taps_of_step = &samples.electrons[next_image];
-      next_image += static_cast<std::size_t>(taps);
-      forRows(height, [&](int first_row, int last_row) {
-        std::vector<float> modulated(static_cast<std::size_t>(width));
-        for (int y = first_row; y < last_row; ++y) {
-          std::fill(modulated.begin(), modulated.end(), 0.0F);
-          for (const Weight& weight : weights) {
-            // A complex number is an array of two.
-            const auto* parts = reinterpret_cast<const float*>(&light.phasor(f, weight.harmonic)(0, y));
-            addModulated(parts, weight.real, weight.imaginary, width, modulated.data());
-          }
-          for (int tap = 0; tap < taps; ++tap) {
-            const float sign = tap == 0 ? 1.0F : -1.0F;
-            fillTap(&light.steady(0, y), &light.ambient(0, y), modulated.data(), half_gain, sign, width,
-                    &taps_of_step[tap](0, y));
-          }
-        }
-      });
+      steps_.push_back({static_cast<float>(0.5 * responses[f].electrons_per_radiance),
+                        weightsOf(responses[f], light, f, k, steps)});
     }
   }
+}
+
+/// The weights of frequency `f` at step `k` of `steps`.
+std::vector<Correlator::Weight> Correlator::weightsOf(const Response& response, const Light& light,
+                                                      std::size_t f, int k, int steps) {
+  double theta = 2.0 * std::numbers::pi * k / steps;
+  const auto step = static_cast<std::size_t>(k);
+  if (step < light.error.step_rad.size()) theta += static_cast<double>(light.error.step_rad[step]);
+  std::vector<Weight> weights;
+  for (std::size_t i = 0; i < response.harmonics.size(); ++i) {
+    const int n = static_cast<int>(i) + 1;
+    std::complex<double> content = response.harmonics[i];
+    const std::size_t at = f * static_cast<std::size_t>(light.harmonics) + i;
+    if (at < light.error.content.size()) content += std::complex<double>{light.error.content[at]};
+    const Image<std::complex<float>>& phasors = light.phasor(f, n);
+    if (std::abs(content) < kNoContent || phasors.empty()) continue;
+    const std::complex<double> weight =
+        0.5 * response.electrons_per_radiance * response.contrast * content * std::polar(1.0, n * theta);
+    weights.push_back({&phasors, static_cast<float>(weight.real()), static_cast<float>(weight.imag())});
+  }
+  return weights;
+}
+
+Samples Correlator::rows(int count) const {
+  Samples samples{.frequencies = frequencies_, .steps = step_count_, .taps = taps_};
+  samples.electrons.assign(steps_.size() * static_cast<std::size_t>(taps_),
+                           Image<float>{light_.width(), count});
+  return samples;
+}
+
+void Correlator::collect(int top, int first, int last, Samples& samples) const {
+  const int width = light_.width();
+  std::vector<float> modulated(static_cast<std::size_t>(width));
+  for (int y = first; y < last; ++y) {
+    Image<float>* electrons = samples.electrons.data();
+    for (const Step& step : steps_) {
+      std::fill(modulated.begin(), modulated.end(), 0.0F);
+      for (const Weight& weight : step.weights) {
+        // A complex number is an array of two.
+        const auto* parts = reinterpret_cast<const float*>(&(*weight.phasors)(0, top + y));
+        addModulated(parts, weight.real, weight.imaginary, width, modulated.data());
+      }
+      for (int tap = 0; tap < taps_; ++tap, ++electrons) {
+        fillTap(&light_.steady(0, top + y), &light_.ambient(0, top + y), modulated.data(), step.half_gain,
+                tap == 0 ? 1.0F : -1.0F, width, &(*electrons)(0, y));
+      }
+    }
+  }
+}
+
+Samples correlate(const Light& light, const std::vector<Response>& responses, int steps, int taps) {
+  const Correlator correlator{light, responses, steps, taps};
+  Samples samples = correlator.rows(light.height());
+  forRows(light.height(), [&](int first, int last) { correlator.collect(0, first, last, samples); });
   return samples;
 }
 

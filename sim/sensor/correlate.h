@@ -45,4 +45,35 @@ Light correlatedPart(const Light& light, const std::vector<Response>& responses,
 /// their order and at least their harmonics; a harmonic that is an empty image is taken as dark.
 Samples correlate(const Light& light, const std::vector<Response>& responses, int steps, int taps);
 
+/// The same row by row, as if asked for rows of correlate()'s samples. Looks at the light as long as it
+/// lives.
+class Correlator {
+ public:
+  Correlator(const Light& light, const std::vector<Response>& responses, int steps, int taps);
+
+  /// Samples of so many rows, all zero.
+  [[nodiscard]] Samples rows(int count) const;
+  /// Writes the samples of rows `top`, `top` + 1, … into rows first ≤ y < last of `samples`: light's row is
+  /// top + y.
+  void collect(int top, int first, int last, Samples& samples) const;
+
+ private:
+  /// ½ g m ĉₙ e^(i n θₖ): what a phasor is multiplied with at one step.
+  struct Weight {
+    const Image<std::complex<float>>* phasors;
+    float real, imaginary;
+  };
+  struct Step {
+    float half_gain;
+    std::vector<Weight> weights;
+  };
+  static std::vector<Weight> weightsOf(const Response& response, const Light& light, std::size_t f, int k,
+                                       int steps);
+
+  const Light& light_;
+  int step_count_, taps_;
+  std::vector<Frequency> frequencies_;
+  std::vector<Step> steps_;  ///< frequency by frequency
+};
+
 }  // namespace toftwin::sim

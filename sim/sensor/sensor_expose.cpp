@@ -59,33 +59,51 @@ Samples applyOnSamples(Samples samples, const std::vector<AnyEffect>& effects, c
 }
 
 /// Effects on samples look at one pixel at a time: strip by strip, samples stay in the processor's cache
-/// from the first effect to the last.
-Samples applyInStrips(Samples samples, const std::vector<AnyEffect>& effects, const Conditions& now,
-                      std::uint64_t seed, std::uint64_t frame, std::size_t exposure) {
+/// from the first effect to the last. `fill(top, part)` writes what the rows from `top` on hold before them.
+template <class Fill>
+void countInStrips(const Fill& fill, const std::vector<AnyEffect>& effects, const Conditions& now,
+                   std::uint64_t seed, std::uint64_t frame, std::size_t exposure, Samples& samples) {
   constexpr int kRows = 16;
   const int width = samples.width(), height = samples.height();
-  const bool was_flagged = !samples.flags.empty();
-  Image<std::uint8_t> flags = was_flagged ? std::move(samples.flags) : Image<std::uint8_t>{width, height};
+  Image<std::uint8_t> flags{width, height};
   std::vector<std::uint8_t> is_flagged(static_cast<std::size_t>(height));
-  const auto strip = [&](int top, int rows) {
-    const auto count = static_cast<std::ptrdiff_t>(width) * rows;
-    Samples part{.frequencies = samples.frequencies, .steps = samples.steps, .taps = samples.taps};
-    for (const Image<float>& image : samples.electrons)
-      std::copy_n(&image(0, top), count, &part.electrons.emplace_back(width, rows)(0, 0));
-    if (was_flagged) std::copy_n(&flags(0, top), count, &(part.flags = Image<std::uint8_t>{width, rows})(0, 0));
+  const auto strip = [&](int top, Samples part) {
+    const auto count = static_cast<std::ptrdiff_t>(width) * part.height();
+    fill(top, part);
     Conditions here = now;
     here.top += top;
     part = applyOnSamples(std::move(part), effects, here, seed, frame, exposure);
     for (std::size_t i = 0; i < part.electrons.size(); ++i)
       std::copy_n(&part.electrons[i](0, 0), count, &samples.electrons[i](0, top));
-    if (part.flags.empty()) return;
+    if (part.flags.empty()) return part;
     std::copy_n(&part.flags(0, 0), count, &flags(0, top));
     is_flagged[static_cast<std::size_t>(top)] = 1;
+    return part;
   };
   inParallel((height + kRows - 1) / kRows, 1, [&](int first, int last) {
-    for (int i = first; i < last; ++i) strip(i * kRows, std::min(kRows, height - i * kRows));
+    Samples part{.frequencies = samples.frequencies, .steps = samples.steps, .taps = samples.taps};
+    for (int i = first; i < last; ++i) {
+      const int rows = std::min(kRows, height - i * kRows);
+      if (part.height() != rows) part.electrons.assign(samples.electrons.size(), Image<float>{width, rows});
+      part.flags = {};
+      part = strip(i * kRows, std::move(part));
+    }
   });
-  if (was_flagged || std::ranges::count(is_flagged, 1) > 0) samples.flags = std::move(flags);
+  if (std::ranges::count(is_flagged, 1) > 0) samples.flags = std::move(flags);
+}
+
+/// The same of samples that were collected.
+Samples applyInStrips(Samples samples, const std::vector<AnyEffect>& effects, const Conditions& now,
+                      std::uint64_t seed, std::uint64_t frame, std::size_t exposure) {
+  const auto take = [&](int top, Samples& part) {
+    const auto count = static_cast<std::ptrdiff_t>(samples.width()) * part.height();
+    for (std::size_t i = 0; i < part.electrons.size(); ++i)
+      std::copy_n(&samples.electrons[i](0, top), count, &part.electrons[i](0, 0));
+    if (samples.flags.empty()) return;
+    part.flags = Image<std::uint8_t>{part.width(), part.height()};
+    std::copy_n(&samples.flags(0, top), count, &part.flags(0, 0));
+  };
+  countInStrips(take, effects, now, seed, frame, exposure, samples);
   return samples;
 }
 
@@ -115,6 +133,12 @@ DecodeRays cropped(const DecodeRays& full, int left, int top, int width, int hei
   return {cropped(full.x, left, top, width, height), cropped(full.z, left, top, width, height)};
 }
 
+std::vector<Response> responsesFor(const SensorModel::Impl& impl, double exposure_factor) {
+  std::vector<Response> responses = impl.responses;
+  for (Response& response : responses) response.electrons_per_radiance *= exposure_factor;
+  return responses;
+}
+
 /// The charge that the light makes in one exposure, free of noise.
 Samples samplesOf(const SensorModel::Impl& impl, const Light& light, double exposure_factor) {
   if (impl.file.isPulsed()) {
@@ -123,9 +147,8 @@ Samples samplesOf(const SensorModel::Impl& impl, const Light& light, double expo
     return collectGates(light, keys.pulse, impl.file.pixel.electrons_per_radiance_s * seconds,
                         keys.open_share);
   }
-  std::vector<Response> responses = impl.responses;
-  for (Response& response : responses) response.electrons_per_radiance *= exposure_factor;
-  return correlate(light, responses, impl.file.sampling.steps, impl.file.sampling.taps);
+  return correlate(light, responsesFor(impl, exposure_factor), impl.file.sampling.steps,
+                   impl.file.sampling.taps);
 }
 
 Samples samplesOf(const SensorModel::Impl& impl, const Light& light) {
@@ -149,18 +172,39 @@ RangeImage decodeRegion(const SensorModel::Impl& impl, const Samples& samples, i
 SensorModel::Exposed SensorModel::expose(const Light& light, const Moment& moment,
                                          std::uint64_t seed, std::uint64_t frame, int region_x,
                                          int region_y, History before) const {
-  return readOut(collect(light, moment, seed, frame, region_x, region_y), moment, seed, frame,
-                 region_x, region_y, before);
+  if (impl_->file.isPulsed() || exposureCount() > 1 || remembers()) {
+    return readOut(collect(light, moment, seed, frame, region_x, region_y), moment, seed, frame, region_x,
+                   region_y, before);
+  }
+  // The same without whole images of what is collected: a strip's samples are made where its effects find
+  // them.
+  const Conditions now{moment, impl_->camera, region_x, region_y, before};
+  const bool is_changed = anyActsOnLight(impl_->effects);
+  const Light changed = is_changed ? lightAfterEffects(light, now, seed, frame) : Light{};
+  const Light& seen = is_changed ? changed : light;
+  const std::vector<Response> responses = responsesFor(*impl_, impl_->file.sampling.exposure_factors.front());
+  const Correlator correlator{seen, responses, impl_->file.sampling.steps, impl_->file.sampling.taps};
+  Samples counted = correlator.rows(seen.height());
+  countInStrips([&](int top, Samples& part) { correlator.collect(top, 0, part.height(), part); },
+                impl_->effects, now, seed, frame, 0, counted);
+  Exposed exposed = decodeCounted(std::move(counted), now);
+  exposed.range = applyAll(std::move(exposed.range), impl_->effects, now, seed, frame);
+  return exposed;
+}
+
+Light SensorModel::lightAfterEffects(const Light& light, const Conditions& now, std::uint64_t seed,
+                                     std::uint64_t frame) const {
+  const bool wants_all = light.frequencies.empty() || impl_->addsHarmonics();
+  Light seen = correlatedPart(light, impl_->responses, wants_all);
+  if (anyAsksForTheScene(impl_->effects)) seen.truth = light.truth;
+  return applyAll(std::move(seen), impl_->effects, now, seed, frame);
 }
 
 Samples SensorModel::collect(const Light& light, const Moment& moment, std::uint64_t seed,
                              std::uint64_t frame, int region_x, int region_y) const {
   if (!anyActsOnLight(impl_->effects)) return samplesOf(*impl_, light);
   const Conditions now{moment, impl_->camera, region_x, region_y};
-  const bool wants_all = light.frequencies.empty() || impl_->addsHarmonics();
-  Light seen = correlatedPart(light, impl_->responses, wants_all);
-  if (anyAsksForTheScene(impl_->effects)) seen.truth = light.truth;
-  return samplesOf(*impl_, applyAll(std::move(seen), impl_->effects, now, seed, frame));
+  return samplesOf(*impl_, lightAfterEffects(light, now, seed, frame));
 }
 
 SensorModel::Exposed SensorModel::readOut(Samples collected, const Moment& moment,
@@ -196,7 +240,10 @@ SensorModel::Exposed SensorModel::readOutOne(Samples collected, std::size_t expo
                                              std::uint64_t frame) const {
   // What remembers looks at whole images.
   const auto apply = remembers() ? applyOnSamples : applyInStrips;
-  Samples counted = apply(std::move(collected), impl_->effects, now, seed, frame, exposure);
+  return decodeCounted(apply(std::move(collected), impl_->effects, now, seed, frame, exposure), now);
+}
+
+SensorModel::Exposed SensorModel::decodeCounted(Samples counted, const Conditions& now) const {
   const bool is_whole =
       counted.width() == impl_->camera.width && counted.height() == impl_->camera.height;
   RangeImage range = is_whole ? decode(counted, impl_->decoder, impl_->rays)

@@ -137,6 +137,9 @@ class SensorModel {
   /// The samples of one of several exposures, as they leave the pixel, and what decoding makes of them.
   [[nodiscard]] Exposed readOutOne(Samples collected, std::size_t exposure, const Conditions& now,
                                    std::uint64_t seed, std::uint64_t frame) const;
+  [[nodiscard]] Exposed decodeCounted(Samples counted, const Conditions& now) const;
+  [[nodiscard]] Light lightAfterEffects(const Light& light, const Conditions& now, std::uint64_t seed,
+                                        std::uint64_t frame) const;
   explicit SensorModel(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)) {}
   static std::shared_ptr<const Impl> build(Impl impl);
   std::shared_ptr<const Impl> impl_;  // shared by copies; nobody changes it

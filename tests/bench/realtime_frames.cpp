@@ -97,7 +97,7 @@ Bars frames(const Files& files) {
 void stages(const Files& files) {
   Kinect kinect{files};
   const auto planes = allPlanes();
-  std::vector<std::vector<double>> wall(5), processor(5);
+  std::vector<std::vector<double>> wall(4), processor(4);
   for (; kinect.frame < 90; ++kinect.frame) {
     double w = wallMs(), p = processorMs(), w0 = w, p0 = p;
     const auto done = [&](std::size_t stage) {
@@ -110,23 +110,21 @@ void stages(const Files& files) {
     };
     kinect.trace();
     done(0);
-    Samples samples = kinect.collect(kinect.model);
+    auto exposed = kinect.expose();
     done(1);
-    auto exposed = kinect.readOut(kinect.model, std::move(samples), kinect.frame);
-    done(2);
     const auto made = planesOf(kinect.model, std::move(exposed), kinect.light->truth, planes.subspan(0, 5));
-    done(3);
+    done(2);
     w = w0;
     p = p0;
-    done(4);
+    done(3);
   }
   fmt::print(
       "\nWhere a frame's time goes, medians of {} frames [ms]:\n\n| stage | by the clock | processor |\n| "
       "--- | --- | --- |\n",
       wall[0].size());
-  const char* names[] = {"light: realtime tracer", "collect: scatter and correlation",
-                         "read out: noise, decoder, filters", "planes", "all"};
-  for (std::size_t i = 0; i < 5; ++i)
+  const char* names[] = {"light: realtime tracer", "sensor: scatter, correlation, noise, decoder, filters",
+                         "planes", "all"};
+  for (std::size_t i = 0; i < 4; ++i)
     fmt::print("| {} | {:.1f} | {:.1f} |\n", names[i], median(wall[i]), median(processor[i]));
 }
 

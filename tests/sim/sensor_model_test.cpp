@@ -87,6 +87,36 @@ TEST(Parameters, TwiceTheExposureIsTwiceTheSignal) {
   EXPECT_NEAR(twice, 2.0 * once, 0.01);
 }
 
+/// expose() makes samples strip by strip and never as whole images free of noise; it must be the bits of both
+/// halves.
+TEST(Exposing, IsCollectingAndReadingOut) {
+  const std::string scatter =
+      "[[effect]]\ntype = 'lens_scatter'\nveil = 0.01\nhalo = 0.02\nhalo_radius_px = 15\n";
+  for (const std::string& camera : {*SensorModel::presetText("kinect_v2") + scatter,
+                                    *SensorModel::presetText("o3d303"), plainCamera(4, 1, 0.5)}) {
+    const SensorModel model = modelOf(camera);
+    const TraceRequest request = model.traceRequest();
+    // From where it saturates to where it is too dark, with jumps; no multiple of a strip's rows.
+    const Light light = syntheticLight(37, 45, request.frequencies, request.harmonics, [](int x, int y) {
+      const double range_m = (x < 20 ? 0.3 : 2.0) + 0.11 * y;
+      return std::vector<Way>{{0.2 / (range_m * range_m), range_m}};
+    });
+    const auto whole = model.expose(light, {}, 5, 3, 11, 22);
+    const auto halves = model.readOut(model.collect(light, {}, 5, 3, 11, 22), {}, 5, 3, 11, 22);
+    EXPECT_EQ(whole.samples.electrons, halves.samples.electrons);
+    EXPECT_EQ(whole.samples.flags, halves.samples.flags);
+    EXPECT_EQ(whole.range.flags, halves.range.flags);
+    EXPECT_EQ(whole.range.phasors, halves.range.phasors);
+    int valid = 0;
+    for (std::size_t i = 0; i < whole.range.range_m.size(); ++i) {
+      if (std::isnan(halves.range.range_m[i])) continue;
+      ++valid;
+      EXPECT_EQ(whole.range.range_m[i], halves.range.range_m[i]) << i;
+    }
+    EXPECT_GT(valid, 100);
+  }
+}
+
 TEST(FrameAssembly, GivesThePlanesAskedForInOrder) {
   const SensorModel model =
       modelOf(plainCamera(4, 2, 0.5, "[[effect]]\ntype = 'delay'\noffset_mm = -1200\n"));
