@@ -14,6 +14,9 @@ namespace {
 
 /// Random dimensions of their own, beyond those of trace().
 constexpr std::uint32_t kBounce = 0x10000, kPick = kBounce + 2;
+/// One tile in so many looks a surface further in each frame, in turns: cells are larger than tiles and
+/// remember.
+constexpr std::uint32_t kFurtherEvery = 2;
 /// Rays to a light end before its surface by this share of their way.
 constexpr float kShortOfIt = 0.002f;
 
@@ -111,6 +114,9 @@ void TileGatherer::gather(int i, int j, std::uint32_t first_sample, int samples,
   const Hits seen = hits_;
   normals_ = seen.normal;
   samples_ = samples;
+  const std::uint32_t turn =
+      static_cast<std::uint32_t>(i / 4 + j / 4) + first_sample / static_cast<std::uint32_t>(samples);
+  looks_further_ = turn % kFurtherEvery == 0;
   lookAtLights(camera_rays);
   for (int s = 0; s < samples; ++s) {
     Packet packet = camera_rays;
@@ -176,13 +182,16 @@ void TileGatherer::follow(Packet& packet, CellUpdate* update) {
   Lanes<IrradianceCells::Key> keys;
   const Lanes<int> is_known = addFromCells(packet, keys, sums_);
   if (update == nullptr) return;
+  Lanes<int> is_unknown;
   Lanes<float> weight;
   Lanes<double> length;
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     // Where the cells know too little, the sample itself is the best guess.
-    weight[i] = keys[i] != 0 && is_known[i] == 0 ? packet.throughput[i] * hits_.albedo[i] : 0.0f;
+    is_unknown[i] = (keys[i] != 0) & (is_known[i] == 0) ? -1 : 0;
+    weight[i] = is_unknown[i] != 0 ? packet.throughput[i] * hits_.albedo[i] : 0.0f;
     length[i] = packet.length[i] + hits_.distance[i];
   }
+  if (!looks_further_ && !isAny(is_unknown)) return;
   lookFurther(packet);
   update->keys = keys;
   update->values[Channels::kSteady] = further_.steady;

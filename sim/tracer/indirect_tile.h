@@ -29,7 +29,7 @@ class TileGatherer {
                const Channels& channels);
 
   /// The tile whose first point is (i, j): `samples` of each point, numbered from `first_sample` on; the
-  /// first of them also looks further, for the cells.
+  /// first of them also looks further, for the cells, where they know too little or it is the tile's turn.
   void gather(int i, int j, std::uint32_t first_sample, int samples, CellUpdate& update);
   [[nodiscard]] const CoarseTile& tile() const { return tile_; }
 
@@ -54,6 +54,7 @@ class TileGatherer {
   LitPoints::Shares shares_;
   Vec3Lanes normals_;  ///< of the coarse points
   int samples_ = 1;    ///< of each in this frame
+  bool looks_further_ = true;
   std::vector<Lanes<float>> found_;
   Hits hits_;
 };

@@ -24,6 +24,9 @@ SensorModel withoutNoise(const SensorModel& model) {
   return model.withEffects(std::move(effects));
 }
 
+/// Ranges that differ by more are of different cycles.
+constexpr double kUnwrappedAlike_m = 0.1;
+
 double rangeApart(std::complex<float> a, std::complex<float> b, Frequency f) {
   const double phase = std::arg(std::complex<double>{a} * std::conj(std::complex<double>{b}));
   return std::abs(phase) * kSpeedOfLight_m_per_s / (4.0 * std::numbers::pi * f.in(hertz)) * 1e3;
@@ -100,9 +103,11 @@ Image<float> cameraNoise(const Kinect& kinect) {
   return sigma;
 }
 
+/// Of pixels that are valid in all frames and unwrapped alike.
 double correlation(const std::vector<double>& a, const std::vector<double>& b) {
   double aa = 0.0, bb = 0.0, ab = 0.0;
   for (std::size_t i = 0; i < a.size(); ++i) {
+    if (!(std::abs(a[i]) < kUnwrappedAlike_m && std::abs(b[i]) < kUnwrappedAlike_m)) continue;
     aa += a[i] * a[i];
     bb += b[i] * b[i];
     ab += a[i] * b[i];
@@ -130,8 +135,8 @@ Bars errors(const Files& files) {
       const auto y = b.readOut(model, b.collect(model), b.frame).range.range_m;
       std::vector<double> differences;
       for (std::size_t p = 0; p < x.size(); ++p) {
-        const double d = static_cast<double>(x[p]) - static_cast<double>(y[p]);
-        differences.push_back(std::abs(d) < 0.1 ? d : 0.0);  // not where unwrapping failed or nothing is
+        differences.push_back(static_cast<double>(x[p]) -
+                              static_cast<double>(y[p]));  // NaN where either is invalid
       }
       return differences;
     };
@@ -144,7 +149,8 @@ Bars errors(const Files& files) {
   double below = 0.0, seen = 0.0;
   std::vector<double> own, cameras;
   for (std::size_t p = 0; p < noise.size(); ++p) {
-    if (!(noise[p] > 0.0f)) continue;
+    // Cycles that differ are the light's own noise, and far above the camera's.
+    if (!(noise[p] > 0.0f) || std::isnan(light_apart[1][p])) continue;
     seen += 1.0;
     own.push_back(std::abs(light_apart[1][p]) / std::numbers::sqrt2 * 1e3);
     cameras.push_back(1e3 * static_cast<double>(noise[p]));
