@@ -87,15 +87,19 @@ class Look {
     Moment moment;
   };
   /// What the pixels of several cameras collect that see this light, with exposures at the same times.
-  std::vector<sim::Samples> collect(std::vector<Taker> takers, std::uint64_t noise) {
+  /// `keeper`: where this light may be already, or is to be kept.
+  struct Keeper {
+    KeptLight* kept = nullptr;
+    std::size_t pose = 0;
+    int repeat = 0;
+  };
+  std::vector<sim::Samples> collect(std::vector<Taker> takers, std::uint64_t noise, const Keeper& keeper) {
     std::vector<sim::Samples> all(takers.size());
     for (Taker& taker : takers) taker.moment.world_from_camera = view_.poseAt(sim::middleOf(taker.moment));
     const std::vector<Exposure>& exposures = takers.front().moment.exposures;
     const bool is_still = !view_.changesWithTime() || stands_still_;
     for (std::size_t e = 0; e < (is_still ? 1 : exposures.size()); ++e) {
-      if (!is_still) view_.moveTo(sim::middleOf(exposures[e]), e);
-      view_.complete({});
-      const sim::Light& light = is_still ? view_.light() : view_.lightFor(exposures[e]);
+      const sim::Light& light = lightOf(exposures[e], e, is_still, keeper);
       for (std::size_t t = 0; t < takers.size(); ++t)
         take(takers[t].model->collect(light, takers[t].moment, seed_, noise), e, exposures.size(), all[t]);
     }
@@ -107,6 +111,17 @@ class Look {
   static sim::TraceRequest seeded(sim::TraceRequest request, std::uint64_t seed) {
     request.seed = seed;
     return request;
+  }
+  const sim::Light& lightOf(const Exposure& exposure, std::size_t e, bool is_still, const Keeper& keeper) {
+    const KeptLight::Key key{keeper.pose, keeper.repeat, e};
+    if (keeper.kept != nullptr) {
+      if (const sim::Light* light = keeper.kept->find(key)) return *light;
+    }
+    if (!is_still) view_.moveTo(sim::middleOf(exposure), e);
+    view_.complete({});
+    const sim::Light& light = is_still ? view_.light() : view_.lightFor(exposure);
+    if (keeper.kept != nullptr) keeper.kept->keep(key, light);
+    return light;
   }
   /// The images of raw exposure `e`; samples lie in the order of the exposures, each with as many images as
   /// taps.
@@ -216,8 +231,15 @@ ConditionValues emptyValues(const Case& use, std::size_t pose, std::size_t light
 /// The variants of one pose, which fill in their conditions there.
 class PoseRun {
  public:
-  PoseRun(const Case& use, const sim::Scene& scene, const std::vector<Variant>& variants, std::size_t pose)
-      : use_(use), scene_(scene), variants_(variants), pose_(pose), spec_(use.spec.poses[pose]) {
+  PoseRun(const Case& use, const sim::Scene& scene, const std::vector<Variant>& variants, std::size_t pose,
+          KeptLight* kept)
+      : use_(use),
+        scene_(scene),
+        variants_(variants),
+        pose_(pose),
+        number_(use.pose_numbers.empty() ? pose : use.pose_numbers[pose]),
+        spec_(use.spec.poses[pose]),
+        kept_(kept) {
     for (const Variant& variant : variants) {
       optics_.push_back(opticsOf(use, variant));
       if (optics_.size() > 1 && seeTheSame(optics_.size() - 2, optics_.size() - 1))
@@ -271,7 +293,8 @@ class PoseRun {
                           momentOf(use_, variants_[v], spec_, use_.spec.lightings[condition.lighting])});
     }
     if (takers.empty()) return;
-    const auto collected = look.collect(takers, noise);
+    const auto collected = look.collect(
+        takers, noise, {.kept = first == 0 ? kept_ : nullptr, .pose = number_, .repeat = number});
     std::size_t next = 0;
     for (std::size_t v = first; v < end; ++v) {
       for (ConditionValues& condition : values_[v]) {
@@ -285,14 +308,14 @@ class PoseRun {
   }
 
   [[nodiscard]] std::uint64_t noiseOf(int repeat) const {
-    const std::size_t number = use_.pose_numbers.empty() ? pose_ : use_.pose_numbers[pose_];
-    return (static_cast<std::uint64_t>(number) << 32u) + static_cast<std::uint64_t>(repeat) * 100'000u;
+    return (static_cast<std::uint64_t>(number_) << 32u) + static_cast<std::uint64_t>(repeat) * 100'000u;
   }
   const Case& use_;
   const sim::Scene& scene_;
   const std::vector<Variant>& variants_;
-  std::size_t pose_;
+  std::size_t pose_, number_;  ///< of these poses, and of all
   const StationSpec& spec_;
+  KeptLight* kept_;
   std::vector<Optics> optics_;
   std::vector<Station> stations_;
   std::vector<std::vector<ConditionValues>> values_;  ///< [variant][lighting that matters]
@@ -303,7 +326,22 @@ bool isEmptyOrHas(const Names& names, const std::string& name) {
   return names.empty() || std::ranges::find(names, name) != names.end();
 }
 
+/// In memory; what is known of the scene is nothing beside its light.
+std::size_t bytesOf(const sim::Light& light) {
+  std::size_t bytes = (light.steady.size() + light.ambient.size()) * sizeof(float);
+  for (const auto& image : light.phasors) bytes += image.size() * sizeof(std::complex<float>);
+  for (const auto& image : light.variance) bytes += image.size() * sizeof(float);
+  return bytes + light.truth.range_m.size() * (2 * sizeof(float) + sizeof(Vec3f));
+}
+
 }  // namespace
+
+void KeptLight::keep(const Key& key, const sim::Light& light) {
+  const std::size_t bytes = bytesOf(light);
+  if (bytes > left_) return;
+  left_ -= bytes;
+  kept_.insert_or_assign(key, light);
+}
 
 bool concerns(const RequirementSpec& requirement, const Case& use, std::size_t pose, std::size_t lighting) {
   return requirement.kind != Kind::FrameRate && isEmptyOrHas(requirement.poses, use.spec.poses[pose].name) &&
@@ -337,13 +375,14 @@ double frameRateOf_hz(const sim::SensorModel& model) {
 
 Result<std::vector<std::vector<ConditionValues>>> simulate(const Case& use, const sim::Scene& scene,
                                                            const std::vector<Variant>& variants,
-                                                           Repeats repeats, const Watch& watch) {
+                                                           Repeats repeats, const Watch& watch,
+                                                           KeptLight* kept) {
   std::vector<std::vector<ConditionValues>> all(variants.size());
   const double steps =
       static_cast<double>(use.spec.poses.size()) * (repeats.count + (repeats.count > 1 ? 1 : 0));
   double done = 0.0;
   for (std::size_t pose = 0; pose < use.spec.poses.size(); ++pose) {
-    PoseRun run{use, scene, variants, pose};
+    PoseRun run{use, scene, variants, pose, kept};
     for (int r = 0; r < repeats.count; ++r) {
       if (!watch(done++ / steps)) return Error{Error::Code::Stopped, "interrupted"};
       run.repeat(repeats.first + r);

@@ -60,28 +60,39 @@ std::vector<Variant> variantsOf(const Case& use, const sim::Scene& scene, const 
   return variants;
 }
 
-/// The worst conditions of what failed, and nothing else.
-Case onlyFailures(const Case& use, const std::vector<RequirementResult>& results) {
+/// What failed, each requirement at its worst condition alone.
+struct Failures {
+  Case use;
+  std::vector<std::size_t> numbers{};  ///< of its requirements in the whole use case
+};
+
+Failures failuresOf(const Case& use, const std::vector<RequirementResult>& results) {
+  Failures part{.use = use};
   std::set<std::size_t> poses, lightings;
-  for (const RequirementResult& result : results) {
+  part.use.spec.requirements.clear();
+  for (std::size_t r = 0; r < results.size(); ++r) {
+    const RequirementResult& result = results[r];
     if (!result.is_judged || result.verdict.is_met || result.conditions.empty()) continue;
-    poses.insert(result.conditions[result.worst].pose);
-    lightings.insert(result.conditions[result.worst].lighting);
+    const AtCondition& worst = result.conditions[result.worst];
+    RequirementSpec& requirement = part.use.spec.requirements.emplace_back(use.spec.requirements[r]);
+    requirement.poses = {use.spec.poses[worst.pose].name};
+    requirement.lightings = {use.spec.lightings[worst.lighting].name};
+    part.numbers.push_back(r);
+    poses.insert(worst.pose), lightings.insert(worst.lighting);
   }
-  Case part = use;
-  part.spec.poses.clear();
-  part.spec.lightings.clear();
-  part.pose_numbers.assign(poses.begin(), poses.end());
-  for (const std::size_t pose : poses) part.spec.poses.push_back(use.spec.poses[pose]);
-  for (const std::size_t lighting : lightings) part.spec.lightings.push_back(use.spec.lightings[lighting]);
+  part.use.spec.poses.clear();
+  part.use.spec.lightings.clear();
+  part.use.pose_numbers.assign(poses.begin(), poses.end());
+  for (const std::size_t pose : poses) part.use.spec.poses.push_back(use.spec.poses[pose]);
+  for (const std::size_t lighting : lightings)
+    part.use.spec.lightings.push_back(use.spec.lightings[lighting]);
   return part;
 }
 
-const ConditionValues& at(const Case& part, const Case& use, const AtCondition& worst,
-                          const std::vector<ConditionValues>& values) {
+/// Of the one condition that a requirement of `part` is about.
+const ConditionValues& at(const Case& part, std::size_t r, const std::vector<ConditionValues>& values) {
   return *std::ranges::find_if(values, [&](const ConditionValues& one) {
-    return part.spec.poses[one.pose].name == use.spec.poses[worst.pose].name &&
-           part.spec.lightings[one.lighting].name == use.spec.lightings[worst.lighting].name;
+    return concerns(part.spec.requirements[r], part, one.pose, one.lighting);
   });
 }
 
@@ -104,9 +115,12 @@ Spoiler spoilerOf(const RequirementSpec& requirement, std::size_t r, const std::
     if (!std::isnan(with) && !std::isnan(left)) gains.push_back(left - with);
   }
   const Estimate untold{.value = kNaN, .low = kNaN, .high = kNaN, .repeats = 0};
+  Estimate gain = gains.empty() ? untold : estimateOf(gains, std::nullopt, level);
+  if (isShare(requirement.kind))  // more than all of it cannot be gained
+    gain.low = std::max(-1.0, gain.low), gain.high = std::min(1.0, gain.high);
   const Verdict then = verdictOf(requirement, estimateAt(requirement, without, r));
   return {.what = name,
-          .gain = gains.empty() ? untold : estimateOf(gains, std::nullopt, level),
+          .gain = gain,
           .is_met_without = then.is_met,
           .is_certain_without = then.is_certain,
           .is_valid_only_without =
@@ -125,31 +139,26 @@ double spoilerRank(const Spoiler& one) {
 Result<std::vector<std::vector<Spoiler>>> spoilersOf(const Case& use, const sim::Scene& scene,
                                                      const Variant& variant,
                                                      const std::vector<RequirementResult>& results,
-                                                     const Watch& watch) {
+                                                     const Watch& watch, KeptLight* kept) {
   std::vector<std::vector<Spoiler>> spoilers(results.size());
-  const Case part = onlyFailures(use, results);
-  if (part.spec.poses.empty()) return spoilers;
+  const Failures failures = failuresOf(use, results);
+  if (failures.numbers.empty()) return spoilers;
   const std::vector<Variant> variants = variantsOf(use, scene, variant);
-  const auto values = simulate(part, scene, variants, {.first = 0, .count = use.spec.repeats}, watch);
+  const auto values =
+      simulate(failures.use, scene, variants, {.first = 0, .count = use.spec.repeats}, watch, kept);
   if (!values) return values.error();
-  const auto isLookedInto = [](const RequirementResult& one) {
-    return one.is_judged && !one.verdict.is_met && !one.conditions.empty();
-  };
   // As many gains are looked at: all of their intervals together hold with 95 % (Šidák).
-  const auto gains = static_cast<double>(variants.size() - 1) *
-                     static_cast<double>(std::ranges::count_if(results, isLookedInto));
-  const double level = std::pow(0.95, 1.0 / gains);
-  for (std::size_t r = 0; r < results.size(); ++r) {
-    const RequirementResult& result = results[r];
-    if (!isLookedInto(result)) continue;
-    const AtCondition& worst = result.conditions[result.worst];
-    const auto& requirement = use.spec.requirements[r];
+  const double level =
+      std::pow(0.95, 1.0 / static_cast<double>((variants.size() - 1) * failures.numbers.size()));
+  for (std::size_t f = 0; f < failures.numbers.size(); ++f) {
+    auto& found = spoilers[failures.numbers[f]];
     for (std::size_t v = 1; v < variants.size(); ++v) {
-      spoilers[r].push_back(spoilerOf(requirement, r, variants[v].name, at(part, use, worst, values->front()),
-                                      at(part, use, worst, (*values)[v]), level));
+      found.push_back(spoilerOf(failures.use.spec.requirements[f], f, variants[v].name,
+                                at(failures.use, f, values->front()), at(failures.use, f, (*values)[v]),
+                                level));
     }
     // "all of these" keeps its place at the end.
-    std::ranges::stable_sort(spoilers[r].begin(), spoilers[r].end() - 1, {}, spoilerRank);
+    std::ranges::stable_sort(found.begin(), found.end() - 1, {}, spoilerRank);
   }
   return spoilers;
 }

@@ -166,15 +166,16 @@ Result<CameraResult> judgeModel(const Case& use, const sim::Scene& scene, const 
   const Variant& variant = (*settings)[camera.best].variant;
   camera.model = variant.model.model();
   camera.id = variant.model.id();
+  KeptLight kept;
   const auto values =
-      simulate(use, scene, {variant}, {.first = 0, .count = use.spec.repeats}, part(0.4, 0.7));
+      simulate(use, scene, {variant}, {.first = 0, .count = use.spec.repeats}, part(0.4, 0.7), &kept);
   if (!values) return values.error();
   camera.requirements = resultsOf(use, values->front(), frameRateOf_hz(variant.model));
   camera.cannot = misfitOf(use, camera.requirements, variant.model.camera());
   sumUp(use, camera);
   camera.spoilers.resize(camera.requirements.size());
   if (camera.failed > 0 && camera.cannot.empty() && options.find_spoilers) {
-    auto spoilers = spoilersOf(use, scene, variant, camera.requirements, part(0.7, 1.0));
+    auto spoilers = spoilersOf(use, scene, variant, camera.requirements, part(0.7, 1.0), &kept);
     if (!spoilers) return spoilers.error();
     camera.spoilers = *std::move(spoilers);
   }

@@ -95,11 +95,12 @@ Estimate estimateAt(const RequirementSpec& requirement, const ConditionValues& v
 void sumUp(const Case& use, CameraResult& camera);
 
 /// What spoils the requirements that a variant fails: each effect, light over several surfaces, mixed pixels
-/// and motion are left out one after the other, and then all of them. Same light, same noise.
+/// and motion are left out one after the other, and then all of them. Same light, same noise. `kept`: light
+/// of the simulation that the results are from.
 Result<std::vector<std::vector<Spoiler>>> spoilersOf(const Case& use, const sim::Scene& scene,
                                                      const Variant& variant,
                                                      const std::vector<RequirementResult>& results,
-                                                     const Watch& watch);
+                                                     const Watch& watch, KeptLight* kept = nullptr);
 
 /// A recording of a real camera in the place of simulations. Groups of its frames stand for repeats.
 Result<CameraResult> judgeRecording(const Case& use, const sim::Scene& scene, const CameraSpec& camera,

@@ -87,6 +87,17 @@ std::string stateOf(const CameraResult& camera) {
   return failed + (failed.empty() || open.empty() ? "" : ", ") + open;
 }
 
+/// By name: "front within a centimetre", "no phantoms".
+std::string failedOf(const Case& use, const CameraResult& camera) {
+  std::string names;
+  for (std::size_t r = 0; r < camera.requirements.size(); ++r) {
+    const auto& result = camera.requirements[r];
+    if (result.is_judged && !result.verdict.is_met)
+      names += fmt::format("{}“{}”", names.empty() ? "" : ", ", use.spec.requirements[r].name);
+  }
+  return names;
+}
+
 Tone toneOf(const CameraResult& camera) {
   if (!camera.cannot.empty() || camera.failed > 0) return Tone::Bad;
   const bool certain =
@@ -119,9 +130,11 @@ std::string worstText(const Case& use, const CameraResult& camera) {
 }
 
 TableBlock rankingTable(const Suit& suit) {
-  TableBlock table{
-      .caption = "Best first. The margin is how far the worst requirement is from its limit; + is met.",
-      .header = {"camera", "verdict", "best mode and exposure", "worst requirement and margin"}};
+  TableBlock table{.caption =
+                       "Best first: by how many requirements fail, then by what is missing, relative to what "
+                       "each lets fail. "
+                       "The margin is how far the worst one is from its limit; + is met.",
+                   .header = {"camera", "verdict", "best mode and exposure", "worst requirement and margin"}};
   for (const CameraResult& camera : suit.cameras) {
     const bool can = camera.cannot.empty();
     table.rows.push_back({camera.name, stateOf(camera), can ? settingText(camera) : "–",
@@ -202,7 +215,7 @@ std::string spoilersInWords(const RequirementSpec& requirement, const std::vecto
                        spoilers.back().is_met_without
                            ? "Without all of them it is met."
                            : "Without all of them it is still not met: what is left are lens, light, "
-                             "waveform and decoder.");
+                             "waveform and decoder, beyond whose unambiguous range all is seen too near.");
   }
   return fmt::format("“{}” is spoiled most by {}{}{}.", requirement.name, spoilers.front().what,
                      spoilers.front().is_valid_only_without ? ", with which nothing is valid" : "",
@@ -331,8 +344,9 @@ std::string inWords(const Suit& suit) {
     return fmt::format("{} of {} cameras {} what is asked, best first: {}.", count, all,
                        count == 1 ? "does" : "do", fit);
   const CameraResult& best = suit.cameras.front();
-  return fmt::format("None of {} camera{} does all that is asked. {} comes nearest: it {}.", all,
-                     all == 1 ? "" : "s", best.name, stateOf(best));
+  const std::string failed = failedOf(suit.use, best);
+  return fmt::format("None of {} camera{} does all that is asked. {} comes nearest: it {}{}{}.", all,
+                     all == 1 ? "" : "s", best.name, stateOf(best), failed.empty() ? "" : ": ", failed);
 }
 
 Result<std::filesystem::path> writeSuit(const Suit& suit, const std::filesystem::path& folder,
@@ -351,8 +365,7 @@ Result<std::filesystem::path> writeSuit(const Suit& suit, const std::filesystem:
                             .note = camera.cannot.empty() ? settingText(camera) : "see below",
                             .tone = toneOf(camera)});
   }
-  compare::Section ranking{
-      .id = "ranking", .title = "Ranking", .verdict = inWords(suit), .tone = report.tone};
+  compare::Section ranking{.id = "ranking", .title = "Ranking"};
   ranking.blocks = {rankingTable(suit), requirementTable(suit), askedTable(suit.use)};
   report.sections.push_back(std::move(ranking));
   for (std::size_t i = 0; i < suit.cameras.size(); ++i) report.sections.push_back(sectionOf(suit, i));

@@ -102,19 +102,6 @@ TEST(Planted, ALongExposureLowersTheFrameRate) {
   EXPECT_NEAR(only(*suit).requirements[0].verdict.estimate.value, 1e3 / 123.5, 1e-6);
 }
 
-TEST(Planted, CamerasAreRankedByWhatTheyMiss) {
-  const Folder folder;
-  folder.camera("ideal.toml");
-  folder.camera("a.toml", effect("delay", "offset_mm = 12"));
-  folder.camera("b.toml", effect("delay", "offset_mm = -40"));
-  const auto suit = folder.judged(kPose + kBias10 + entry("b.toml") + entry("a.toml") + entry("ideal.toml"));
-  ASSERT_TRUE(suit) << suit.error().message;
-  std::vector<std::string> order;
-  for (const auto& camera : suit->cameras) order.push_back(camera.name);
-  EXPECT_THAT(order, testing::ElementsAre("ideal.toml", "a.toml", "b.toml"));
-  EXPECT_THAT(inWords(*suit), HasSubstr("1 of 3 cameras does what is asked"));
-}
-
 /// The well holds what three times the exposure collects: four times that saturates, twice it is best.
 TEST(Planted, TheBestExposureIsTheLongestThatDoesNotSaturate) {
   const Folder folder;
