@@ -263,6 +263,28 @@ Tone toneOfDifference(const Region& region) {
   return bias <= 3.0 * noise ? Tone::Fair : Tone::Bad;
 }
 
+std::string nearnessInWords(const std::string& a, const std::string& b, const Characteristics& c) {
+  const Summary& all = mainRegionOf(c).difference_mm;
+  return fmt::format(
+      "{} (B) is within {} mm of {} (A) for 95 % of the pixels on surfaces; on average it reads {}, and its "
+      "noise is {} times A's",
+      b, shown(all.p95_abs), a, inWords(all), shown(c.noise_ratio.median, 2));
+}
+
+std::vector<Card> nearnessCards(const Characteristics& c, const std::string& bias_note, Tone tone) {
+  const Region& main = mainRegionOf(c);
+  const Summary& all = main.difference_mm;
+  const std::string bias = std::isfinite(all.standard_error) ? shownWithError(all.mean, all.standard_error, 2)
+                                                             : shown(all.mean, 2);
+  return {{"95 % agree within", shown(all.p95_abs) + " mm", fmt::format("RMS {} mm", shown(all.rms)),
+           Tone::Neutral},
+          {"Bias, B − A", bias + " mm", bias_note, tone},
+          {"Noise, A | B", fmt::format("{} | {} mm", shown(main.noise_a_mm, 2), shown(main.noise_b_mm, 2)),
+           "temporal, median over pixels", Tone::Neutral},
+          {"Masks agree", shown(100.0 * c.mask_agreement, 1) + " %", "where both are valid or both are not",
+           c.mask_agreement > 0.98 ? Tone::Good : Tone::Fair}};
+}
+
 Result<Finding> judgeLive(const Capture& capture) {
   std::vector<PoseComparison> poses;
   for (const CapturedPose& pose : capture.poses) {
@@ -293,12 +315,11 @@ Result<Finding> judgeLive(const Capture& capture) {
       .title = fmt::format("{} (B) against {} (A)", capture.b.entry.name, capture.a.entry.name)};
   finding.section.tone = toneOfDifference(main);
   finding.section.verdict = fmt::format(
-      "On surfaces B reads {} than A, averaged over {} pixels at {}; 95 % of them agree "
-      "within {} mm. Temporal noise: A {} mm, B {} mm (median). "
-      "Validity masks agree in {} % of the pixels. {} pixels differ by more than {} mm and are "
-      "counted apart.",
-      inWords(all), all.n, posesInWords(poses.size(), c.places), shown(all.p95_abs), shown(main.noise_a_mm, 2),
-      shown(main.noise_b_mm, 2), shown(100.0 * c.mask_agreement, 1), c.gross, shown(kGross_mm, 0));
+      "Averaged over {} pixels at {}. Temporal noise: A {} mm, B {} mm (median). Validity masks agree in {} "
+      "% of "
+      "the pixels. {} pixels differ by more than {} mm and are counted apart.",
+      all.n, posesInWords(poses.size(), c.places), shown(main.noise_a_mm, 2), shown(main.noise_b_mm, 2),
+      shown(100.0 * c.mask_agreement, 1), c.gross, shown(kGross_mm, 0));
   for (const Drift& drift : drifts) finding.section.verdict += " " + inWords(drift, capture);
   auto& blocks = finding.section.blocks;
   for (const std::string& warning : capture.warnings)
@@ -333,34 +354,20 @@ Result<Finding> judgeLive(const Capture& capture) {
                 "The log of all frames with their ids is log.jsonl beside this page.",
                 true});
 
-  finding.headline = fmt::format(
-      "On surfaces B ({}) reads {} than A ({}); 95 % of the pixels agree within {} mm; B's "
-      "temporal noise is {} times A's",
-      capture.b.entry.name, inWords(all), capture.a.entry.name, shown(all.p95_abs),
-      shown(c.noise_ratio.median, 2));
+  finding.headline = nearnessInWords(capture.a.entry.name, capture.b.entry.name, c);
   finding.data = toJson(c);
   finding.data.set("a", capture.a.entry.name)
       .set("b", capture.b.entry.name)
       .set("poses", poses.size())
       .set("drift", toJson(drifts))
       .set("frames_per_pose", capture.poses.front().a.frames());
-  finding.cards = {{"Bias, B − A",
-                    (std::isfinite(all.standard_error)
-                         ? shownWithError(all.mean, all.standard_error, 2)
-                         : shown(all.mean, 2)) +
-                        " mm",
+  finding.cards =
+      nearnessCards(c,
                     c.places > 1 ? fmt::format("± standard error over {} different poses", c.places)
                                  : fmt::format("{} pixels, one pose", all.n),
-                    finding.section.tone},
-                   {"95 % agree within", shown(all.p95_abs) + " mm",
-                    fmt::format("RMS {} mm", shown(all.rms)), Tone::Neutral},
-                   {"Noise, A | B",
-                    fmt::format("{} | {} mm", shown(main.noise_a_mm, 2), shown(main.noise_b_mm, 2)),
-                    "temporal, median over pixels", Tone::Neutral},
-                   {"Masks agree", shown(100.0 * c.mask_agreement, 1) + " %",
-                    fmt::format("flying pixels {} | {} %", shown(flyingPercent(c, c.flying_a), 2),
-                                shown(flyingPercent(c, c.flying_b), 2)),
-                    c.mask_agreement > 0.98 ? Tone::Good : Tone::Fair}};
+                    finding.section.tone);
+  finding.cards.back().note = fmt::format("flying pixels {} | {} %", shown(flyingPercent(c, c.flying_a), 2),
+                                          shown(flyingPercent(c, c.flying_b), 2));
   return finding;
 }
 

@@ -20,6 +20,12 @@ FigureRow mapsOf(const std::string& name, const PoseComparison& comparison, doub
 Figure histogramFigure(const Pixels& pixels);
 /// The region that headlines are of: surfaces, where there are any.
 const Region& mainRegionOf(const Characteristics& characteristics);
+/// How near B is to A, for who reads no further: a clause.
+std::string nearnessInWords(const std::string& a, const std::string& b,
+                            const Characteristics& characteristics);
+/// The same as cards.
+std::vector<Card> nearnessCards(const Characteristics& characteristics, const std::string& bias_note,
+                                Tone tone);
 /// Against A's noise in a single frame: good where the bias is within it and 95 % of the pixels within three
 /// of both cameras' noise; bad where the bias is over three of it. Neutral where no noise is known.
 Tone toneOfDifference(const Region& region);

@@ -218,7 +218,7 @@ Result<Report> judgeTables(const std::vector<TableJob>& jobs) {
   report.verdict = verdicts.empty() ? fmt::format("{} numbers told: {}.", traits.traits.size(), kind->tells)
                                     : headlineOf(verdicts) + ".";
   report.cards = cardsOf(verdicts);
-  Section section{.id = "table", .title = kind->tells, .verdict = report.verdict};
+  Section section{.id = "table", .title = kind->tells};
   if (!verdicts.empty()) section.blocks.push_back(verdictTable(verdicts));
   section.blocks.push_back(figureOf(traits, *kind));
   section.blocks.push_back(traitTable(traits));

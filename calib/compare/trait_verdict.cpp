@@ -12,7 +12,7 @@
 namespace toftwin::compare {
 namespace {
 
-constexpr std::size_t kShownFirst = 3;  ///< differences that headline and cards name
+constexpr std::size_t kShownFirst = 3;  ///< differences that have a card
 
 /// What is left of a fit, and an intercept far from all rows, are of B − A but no difference of two numbers.
 bool isDifference(const NamedTrait& one) {
@@ -32,6 +32,16 @@ std::string unitOf(const TraitVerdict& one) {
 
 std::string nameOf(const TraitVerdict& one) {
   return one.what == one.difference.name ? one.what : one.what + ": " + one.difference.name;
+}
+
+/// For who has not read how it is made; tables have the name by which a log is searched.
+std::string plainNameOf(const TraitVerdict& one) {
+  std::string what = one.what, name = one.difference.name;
+  if (what.starts_with("harmonics")) what = "error over distance";
+  if (what == "noise law") what = "noise over signal";
+  if (name == "residual") name = "what no wave explains";
+  if (name.ends_with(" per period")) name = "wave, " + name;
+  return what == name ? what : what + ": " + name;
 }
 
 std::string intervalOf(const Trait& one) {
@@ -95,24 +105,24 @@ std::vector<TraitVerdict> verdictsOf(const NamedTraits& traits) {
   return all;
 }
 
-std::string inWords(const TraitVerdict& one) {
-  return fmt::format("{} {}{} ({} to {}), {}", nameOf(one), withSign(one.difference.value), unitOf(one),
-                     number(one.difference.low), number(one.difference.high), farBeyond(one));
-}
-
 std::string headlineOf(const std::vector<TraitVerdict>& all) {
   const std::size_t differ = countOf(all, true), same = countOf(all, false);
   if (differ + same == 0) return "No characteristic is known of both cameras";
   if (differ == 0)
     return fmt::format("In none of {} numbers does B differ from A by more than the noise floor", same);
-  std::string words = fmt::format(
-      "{} of {} numbers of B differ from A's by more than the noise floor (B − A, 95 % for "
-      "all together): ",
-      differ, differ + same);
-  for (std::size_t i = 0; i < std::min(differ, kShownFirst); ++i)
-    words += (i > 0 ? "; " : "") + inWords(all[i]);
-  if (differ > kShownFirst) words += fmt::format("; and {} more", differ - kShownFirst);
-  return words;
+  // In millimetres where there is any: other units have no larger and smaller among them.
+  const TraitVerdict* largest = nullptr;
+  for (const TraitVerdict& one : all) {
+    if (!one.isTold() || !one.differs() || one.difference.unit != "mm") continue;
+    if (largest == nullptr || std::abs(one.difference.value) > std::abs(largest->difference.value))
+      largest = &one;
+  }
+  const TraitVerdict& first = largest != nullptr ? *largest : all.front();
+  return fmt::format(
+      "{} difference: {}, {}{} ({} to {}). {} of {} numbers of B differ from A's by more than the noise "
+      "floor",
+      largest != nullptr ? "Largest" : "Clearest", plainNameOf(first), withSign(first.difference.value),
+      unitOf(first), number(first.difference.low), number(first.difference.high), differ, differ + same);
 }
 
 TableBlock verdictTable(const std::vector<TraitVerdict>& all) {
@@ -145,7 +155,7 @@ std::vector<Card> cardsOf(const std::vector<TraitVerdict>& all) {
                            "numbers of B within the noise floor", differ == 0 ? Tone::Good : Tone::Fair}};
   for (std::size_t i = 0; i < std::min(differ, kShownFirst); ++i) {
     const TraitVerdict& one = all[i];
-    cards.push_back({nameOf(one), withSign(one.difference.value) + unitOf(one),
+    cards.push_back({plainNameOf(one), withSign(one.difference.value) + unitOf(one),
                      fmt::format("B − A, {} to {}; {}", number(one.difference.low),
                                  number(one.difference.high), farBeyond(one)),
                      Tone::Fair});

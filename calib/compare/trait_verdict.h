@@ -28,9 +28,8 @@ struct TraitVerdict {
 /// what is left of a fit). Those that differ come first, the farthest beyond its floor before the others.
 std::vector<TraitVerdict> verdictsOf(const NamedTraits& traits);
 
-/// "drift: drift −7.9 mm (−8.3 to −7.5), 18 × the floor".
-std::string inWords(const TraitVerdict& verdict);
-/// How many of how many differ, and the first of them: a sentence without its full stop.
+/// The largest difference in millimetres, or else the clearest one, and how many of how many differ: a
+/// sentence or two without the last full stop.
 std::string headlineOf(const std::vector<TraitVerdict>& verdicts);
 TableBlock verdictTable(const std::vector<TraitVerdict>& verdicts);
 /// The same in two: what differs, and the rest, for a page on which figures stand between.

@@ -198,26 +198,6 @@ void addFigures(const ComparedRun& run, std::vector<Block>& blocks) {
   }
 }
 
-std::string signedMm(const Summary& difference) {
-  const std::string error =
-      std::isfinite(difference.standard_error) ? " ± " + shown(difference.standard_error, 2) : "";
-  return fmt::format("{}{} mm {}", shown(std::abs(difference.mean), 2), error,
-                     difference.mean >= 0.0 ? "farther" : "nearer");
-}
-
-std::vector<Card> cardsOf(const Characteristics& c) {
-  const Region& main = mainRegionOf(c);
-  const Summary& all = main.difference_mm;
-  return {{"Bias, B − A", withError(all.mean, all.standard_error) + " mm",
-           fmt::format("± standard error over {} different poses", c.places), toneOfDifference(main)},
-          {"95 % agree within", shown(all.p95_abs) + " mm", fmt::format("RMS {} mm", shown(all.rms)),
-           Tone::Neutral},
-          {"Noise, A | B", fmt::format("{} | {} mm", shown(main.noise_a_mm, 2), shown(main.noise_b_mm, 2)),
-           "temporal, median over pixels", Tone::Neutral},
-          {"Masks agree", shown(100.0 * c.mask_agreement, 1) + " %", "where both are valid or both are not",
-           c.mask_agreement > 0.98 ? Tone::Good : Tone::Fair}};
-}
-
 /// Over different poses, each of which is one draw of it.
 NamedTrait biasOf(const Characteristics& c) {
   const Summary& all = mainRegionOf(c).difference_mm;
@@ -241,8 +221,10 @@ Tone toneOf(const std::vector<TraitVerdict>& verdicts, const Region& main) {
 }
 
 std::vector<Card> cardsOf(const Characteristics& c, const std::vector<TraitVerdict>& verdicts) {
-  std::vector<Card> cards = compare::cardsOf(verdicts);
-  const auto more = cardsOf(c);
+  std::vector<Card> cards =
+      nearnessCards(c, fmt::format("± standard error over {} different poses", c.places),
+                    toneOfDifference(mainRegionOf(c)));
+  const auto more = compare::cardsOf(verdicts);
   cards.insert(cards.end(), more.begin(), more.end());
   return cards;
 }
@@ -262,15 +244,12 @@ Result<Finding> judgeRun(const ComparedRun& run) {
   const RunTraits traits = traitsOf(run);
   const std::vector<TraitVerdict> verdicts = verdictsOf(traits, c);
   finding.headline = fmt::format(
-      "{}. On surfaces B ({}) reads {} than A ({}) over {} captures; 95 % of the pixels agree within "
-      "{} mm; B's temporal noise is {} times A's",
-      headlineOf(verdicts), run.captures.front().record.b.source, signedMm(main.difference_mm),
-      run.captures.front().record.a.source, run.captures.size(), shown(main.difference_mm.p95_abs),
-      shown(c.noise_ratio.median, 2));
+      "{}. {}",
+      nearnessInWords(run.captures.front().record.a.source, run.captures.front().record.b.source, c),
+      headlineOf(verdicts));
   finding.cards = cardsOf(c, verdicts);
   finding.section = {.id = run.is_locked ? "locked" : "run",
                      .title = run.is_locked ? "Locked captures" : "The plan's captures",
-                     .verdict = finding.headline + ".",
                      .tone = toneOf(verdicts, main)};
   auto& blocks = finding.section.blocks;
   for (const std::string& warning : run.warnings) blocks.push_back(Paragraph{"Note: " + warning});

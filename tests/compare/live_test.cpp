@@ -144,7 +144,7 @@ TEST_F(Live, APlantedTenMillimetresAreFound) {
   EXPECT_NEAR(all.mean, 10.0, 4.0 * all.sd / std::sqrt(static_cast<double>(all.n)));
   const auto finding = judgeLive(*captured);
   ASSERT_TRUE(finding.ok());
-  EXPECT_THAT(finding->section.verdict, HasSubstr("farther than A"));
+  EXPECT_THAT(finding->headline, HasSubstr(" mm farther, and its noise is "));
 }
 
 TEST_F(Live, LeavesAPageItsNumbersAndALogWithIds) {
@@ -209,7 +209,7 @@ TEST_F(Live, OnePoseHasNoErrorInTheHeadline) {
   const auto finding = judgeLive(*captured);
   ASSERT_TRUE(finding.ok()) << finding.error().message;
   EXPECT_THAT(finding->headline, testing::Not(HasSubstr("±")));
-  EXPECT_THAT(finding->section.verdict, HasSubstr("at 1 pose;"));
+  EXPECT_THAT(finding->section.verdict, HasSubstr("at 1 pose."));
 }
 
 /// What a frame's line in the log says.

@@ -68,7 +68,8 @@ TEST_F(Table, TwoAreHeldAgainstEachOther) {
   ASSERT_TRUE(same && other);
   EXPECT_THAT(same->verdict, HasSubstr("In none of 2 numbers"));
   EXPECT_THAT(other->verdict, HasSubstr("1 of 2 numbers of B differ"));
-  EXPECT_THAT(other->verdict, HasSubstr("drift −1.99 mm")) << "2 mm, of which e^(−1190/200) is still to come";
+  EXPECT_THAT(other->verdict, HasSubstr("Largest difference: drift, −1.99 mm"))
+      << "2 mm, of which e^(−1190/200) is still to come";
   EXPECT_THAT(toHtml(*other), testing::AllOf(HasSubstr("A: one exponential"), HasSubstr("B: one exponential"),
                                              HasSubstr("B − A [mm]")));
 }

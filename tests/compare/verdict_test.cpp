@@ -31,7 +31,7 @@ TEST(Verdict, PutsWhatIsFarthestBeyondItsFloorFirst) {
   // Half widths of 0.01 meet at right angles, widened for three rows.
   EXPECT_NEAR(all[0].floor(), 0.01 * std::sqrt(2.0) * widenedFor(3), 1e-12);
   EXPECT_THAT(headlineOf(all), HasSubstr("2 of 3 numbers of B differ"));
-  EXPECT_THAT(headlineOf(all), HasSubstr("small: number +0.5 mm"));
+  EXPECT_THAT(headlineOf(all), HasSubstr("Largest difference: large: number, +9 mm ("));
   const auto table = verdictTable(all);
   EXPECT_THAT(table.rows[0][1], HasSubstr("differs, "));
   EXPECT_THAT(table.rows[2][1], HasSubstr("same, within "));
