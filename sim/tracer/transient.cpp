@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim/tracer/transient.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
@@ -11,6 +12,9 @@
 
 namespace toftwin::sim {
 namespace {
+
+/// So many rows of pixels are traced before somebody is told.
+constexpr int kRowsOfBand = 16;
 
 /// The lanes' sums of each bin go to the block's pixels that lie in the image.
 void store(const Block& block, const BlockSums& sums, Transient& transient) {
@@ -53,7 +57,8 @@ void addToBins(const TransientBins& bins, const DirectLight& light, LaneSums& su
   }
 }
 
-Transient traceTransient(const Scene& scene, const TraceRequest& request, const TransientBins& bins) {
+Transient traceTransient(const Scene& scene, const TraceRequest& request, const TransientBins& bins,
+                         const std::function<bool(int)>& tell) {
   checkRequest(request);
   if (bins.count < 1 || !(bins.width > Length{}) || !std::isfinite(bins.first.in(metre))) {
     throw std::invalid_argument{"traceTransient: there must be at least one bin, wider than 0"};
@@ -66,7 +71,7 @@ Transient traceTransient(const Scene& scene, const TraceRequest& request, const 
   tracing.bins = bins;
   const BlockShape shape = BlockShape::forSamples(request.samples_per_pixel);
   const int columns = (width - 1) / shape.width + 1, rows = (height - 1) / shape.height + 1;
-  inParallel(columns * rows, 1, [&](int begin, int end) {
+  const auto traceBlocks = [&](int begin, int end) {
     const FlushDenormals flush;
     BlockSums sums{request};
     Block block;
@@ -77,7 +82,14 @@ Transient traceTransient(const Scene& scene, const TraceRequest& request, const 
       traceBlock(tracing, block, 0, request.samples_per_pixel, sums);
       store(block, sums, transient);
     }
-  });
+  };
+  const int in_band = kRowsOfBand / shape.height;  // rows of blocks
+  for (int first = 0; first < rows; first += in_band) {
+    const int last = std::min(rows, first + in_band), before = first * columns;
+    inParallel((last - first) * columns, 1,
+               [&](int begin, int end) { traceBlocks(before + begin, before + end); });
+    if (tell && !tell(std::min(height, last * shape.height))) break;
+  }
   return transient;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <complex>
+#include <functional>
 #include <vector>
 
 #include <toftwin/image.h>
@@ -33,8 +34,11 @@ struct Transient {
   [[nodiscard]] std::complex<double> phasor(Frequency f, int x, int y) const;
 };
 
-/// The paths of trace() with the same request, sorted by their lengths.
-Transient traceTransient(const Scene& scene, const TraceRequest& request, const TransientBins& bins);
+/// The paths of trace() with the same request, sorted by their lengths. `tell` is called with the number of
+/// rows that are done, again and again; where it returns false, tracing ends, and what is not traced yet
+/// stays zero.
+Transient traceTransient(const Scene& scene, const TraceRequest& request, const TransientBins& bins,
+                         const std::function<bool(int)>& tell = {});
 
 /// Adds light to LaneSums::bins, the last of which takes what is outside.
 void addToBins(const TransientBins& bins, const DirectLight& light, LaneSums& sums);

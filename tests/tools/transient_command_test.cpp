@@ -127,7 +127,7 @@ TEST_F(TransientCommand, RefusesWhatItCannotWrite) {
   for (const std::string arguments :
        {"--transient -o light.png", "--transient -o light.npy --frames 3",
         "--transient -o light.npy -p range", "--transient -o light.npy --images", "--transient -o folder/",
-        "--transient --bins 0 -o light.npy"}) {
+        "--transient --bins 0 -o light.npy", "--bins 3 -o light.npy", "--first-m 1 -o light.png"}) {
     const Ran ran = render(arguments);
     EXPECT_NE(ran.status, 0) << arguments;
     EXPECT_THAT(ran.err, HasSubstr(arguments.find("--bins") != std::string::npos ? "--bins" : "--transient"))

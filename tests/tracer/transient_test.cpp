@@ -58,6 +58,23 @@ TEST(Transient, PutsDirectLightIntoTheBinOfItsWay) {
   EXPECT_THROW(traceTransient(scene, request, {5_m, 0_cm, 3}), std::invalid_argument);
 }
 
+TEST(Transient, TellsItsRowsAndEndsWhenAskedTo) {
+  const Scene scene = sceneOf(
+      "[[material]]\nname = 'm'\nalbedo = 0.7\n[[object]]\nshape = 'rectangle'\nsize_m = [99, 99, 0]\n"
+      "position_m = [0, 0, 2]\nmaterial = 'm'\n");
+  const TraceRequest request = requestFor(3, 40, 20.0, {});
+  std::vector<int> told;
+  const Transient whole = traceTransient(scene, request, {3_m, 1_m, 9}, [&](int rows) {
+    told.push_back(rows);
+    return true;
+  });
+  EXPECT_EQ(told, (std::vector<int>{16, 32, 40}));
+  const Transient part = traceTransient(scene, request, {3_m, 1_m, 9}, [](int rows) { return rows < 16; });
+  EXPECT_EQ(part.radiance[1](1, 15), whole.radiance[1](1, 15));
+  EXPECT_GT(whole.radiance[1](1, 16), 0.0f);
+  for (const auto& image : part.radiance) EXPECT_EQ(image(1, 16), 0.0f);
+}
+
 /// A foreign light at a known place: its own way, its mean as charge, its beat as the closed form says.
 TEST(ForeignLight, BeatsWithTheCamerasOwn) {
   const Scene scene = sceneOf(

@@ -68,6 +68,14 @@ Result<> checkOptions(RenderOptions& options) {
         "--transient writes one histogram into a file FILE.npy: leave out --frames, --trajectory, --images, "
         "--plane and --light-noise-mm"};
   }
+  const sim::TransientBins plain = RenderOptions{}.bins;
+  const bool has_bins = options.bins.first.in(metre) != plain.first.in(metre) ||
+                        options.bins.width.in(metre) != plain.width.in(metre) ||
+                        options.bins.count != plain.count;
+  if (has_bins && !options.transient) {
+    return Error{Error::Code::InvalidArgument,
+                 "--first-m, --bin-mm and --bins have a meaning with --transient only, which is not there"};
+  }
   const bool stands = options.trajectory.empty();
   if (!stands && options.pose.isGiven())
     return Error{Error::Code::InvalidArgument,
@@ -95,8 +103,8 @@ Result<Exit> renderOne(const RenderOptions& options) {
 }
 
 Result<Exit> run(const RenderOptions& options) {
-  if (options.transient) return renderTransient(options);
   catchInterrupts();
+  if (options.transient) return renderTransient(options);
   return targetOf(options).kind == TargetKind::Frame ? renderOne(options) : renderCampaign(options);
 }
 

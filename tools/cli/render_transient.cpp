@@ -8,6 +8,7 @@
 
 #include "tools/cli/export/atomic_file.h"
 #include "tools/cli/export/export.h"
+#include "tools/cli/terminal.h"
 
 namespace toftwin::cli {
 namespace {
@@ -50,6 +51,16 @@ double shareOutside(const sim::Transient& transient) {
   return outside / (inside + outside);
 }
 
+/// With progress, which is gone when it ends.
+sim::Transient traceShown(const sim::Scene& scene, const sim::TraceRequest& request,
+                          const sim::TransientBins& bins) {
+  Progress progress{"rows", static_cast<std::uint64_t>(request.camera.height)};
+  return sim::traceTransient(scene, request, bins, [&](int rows) {
+    progress.show(static_cast<std::uint64_t>(rows));
+    return !interrupted();
+  });
+}
+
 std::string aboutOf(const RenderOptions& options, const FrameMaker& maker, double outside) {
   const auto& [first, width, count] = options.bins;
   const auto& keys = options.settings.keys;
@@ -86,8 +97,8 @@ Result<Exit> renderTransient(const RenderOptions& options) {
   const sim::TraceRequest request =
       transientRequest(maker->model(), options.settings.keys, *options.pose.pose());
   const sim::Scene& scene = maker->scene();
-  sim::Transient transient =
-      sim::traceTransient(scene.moves() ? scene.at(Duration{}) : scene, request, options.bins);
+  sim::Transient transient = traceShown(scene.moves() ? scene.at(Duration{}) : scene, request, options.bins);
+  if (interrupted()) return Error{Error::Code::Stopped, "interrupted; nothing was written"};
   const std::string shape =
       fmt::format("{}, {}, {}", options.bins.count, transient.outside.height(), transient.outside.width());
   const double outside = shareOutside(transient);
