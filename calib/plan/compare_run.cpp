@@ -5,7 +5,6 @@
 #include <atomic>
 #include <cmath>
 #include <ctime>
-#include <fstream>
 #include <optional>
 #include <set>
 #include <sstream>
@@ -15,9 +14,9 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
-#include "calib/compare/json_parse.h"
 #include "calib/compare/live_report.h"
 #include "calib/plan/captures.h"
+#include "calib/plan/opened.h"
 #include "calib/plan/run_log.h"
 #include "calib/plan/run_report.h"
 #include "protocol/record/recording.h"
@@ -192,42 +191,6 @@ std::vector<std::string> warningsOf(const RunFiles& files, const std::map<std::s
   return warnings;
 }
 
-}  // namespace
-
-Result<> openLocked(const CompareRunJob& job, const std::vector<CaptureRecord>& records) {
-  const auto file = job.run / kOpenedFile;
-  if (std::ifstream in{file}; in) {
-    std::stringstream text;
-    text << in.rdbuf();
-    const auto before = compare::parseJson(text.str());
-    const auto said = [&](const char* key) {
-      const compare::Json* found = before ? before->find(key) : nullptr;
-      return found == nullptr ? std::string{"(unknown)"} : found->words();
-    };
-    return Error{
-        Error::Code::InvalidArgument,
-        fmt::format(
-            "{}: the locked captures were opened on {} for {}. What is judged on them twice is fitted "
-            "to them; capture new ones",
-            job.run.string(), said("date"), said("report"))};
-  }
-  for (const CaptureRecord& one : records) {
-    for (const RecordedFile* recorded : {&one.a, &one.b}) {
-      if (auto checked = checkHash(job.run, *recorded); !checked) return checked;
-    }
-  }
-  compare::Json json = compare::Json::object();
-  json.set("date", today()).set("report", job.output.string()).set("note", job.note);
-  std::ofstream out{file};
-  out << json.text();
-  out.flush();
-  if (out) return {};
-  return Error{Error::Code::StorageFull,
-               fmt::format("{}: cannot be written, so the locked captures stay closed", file.string())};
-}
-
-namespace {
-
 std::string utcOf(std::time_t time) { return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(time)); }
 
 /// A log that a run's numbers can be put into, and what it says of the run.
@@ -302,7 +265,8 @@ Result<std::filesystem::path> compareRun(const CompareRunJob& job, compare::Prog
                                                        job.output.string(), failed.message())};
   }
   if (job.locked) {
-    if (auto opened = openLocked(job, records); !opened) return opened.error();
+    const Opening opening{.run = job.run, .report = job.output, .note = job.note};
+    if (auto opened = openLocked(opening, records); !opened) return opened.error();
   }
   progress.plan(fmt::format("{} captures", records.size()), 0.3 * static_cast<double>(records.size()));
   progress.plan("report", 3.0);

@@ -57,10 +57,6 @@ struct CompareRunJob {
   std::function<bool()> interrupted{};
 };
 
-/// Locked captures are opened once: the note of it is there before they are read. A file that is not the one that was
-/// captured is found before.
-Result<> openLocked(const CompareRunJob& job, const std::vector<CaptureRecord>& records);
-
 /// Compares the captures of a run and leaves index.html, report.json and report.md in the output folder;
 /// gives the page's path. A run that is not through is compared as far as it is, and the report says so.
 Result<std::filesystem::path> compareRun(const CompareRunJob& job, compare::Progress& progress);

@@ -21,7 +21,8 @@ namespace toftwin::plan {
 inline constexpr const char* kRunFile = "run.toml";        ///< what it was made from
 inline constexpr const char* kPlanFile = "plan.toml";      ///< a copy of the plan
 inline constexpr const char* kIndexFile = "index.jsonl";   ///< a line for each finished capture
-inline constexpr const char* kOpenedFile = "opened.json";  ///< when the locked captures were opened
+inline constexpr const char* kOpenedFile =
+    "opened.json";  ///< when the locked captures of both cameras were opened (opened.h)
 inline constexpr const char* kOpenFolder = "captures";
 inline constexpr const char* kLockedFolder = "locked";
 

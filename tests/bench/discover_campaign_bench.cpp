@@ -30,6 +30,7 @@
 #include "calib/discover/campaign/model_file.h"
 #include "calib/discover/campaign/reading.h"
 #include "calib/discover/campaign/refit.h"
+#include "calib/plan/opened.h"
 #include "tests/bench/campaign_score.h"
 #include "tests/bench/campaign_truth.h"
 #include "tests/discover/simulated_run.h"
@@ -218,7 +219,7 @@ void hide(const Setting& world, const bench::KnownCaptures& unspoilt, const sim:
   for (const bool is_absent : {false, true}) {
     if (!(is_absent ? options.absent : options.present)) continue;
     of.is_absent = is_absent;
-    std::filesystem::remove(folder() / plan::kOpenedFile);
+    std::filesystem::remove(folder() / plan::openedFile(plan::OpenedOf::A));
     const CampaignFinding finding =
         search(world, is_absent ? std::vector<std::string>{of.hidden} : std::vector<std::string>{});
     const auto locked = bench::KnownCaptures::locked(folder(), world.declared, kTrace);

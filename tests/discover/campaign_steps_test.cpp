@@ -5,6 +5,7 @@
 
 #include <gmock/gmock.h>
 
+#include "calib/plan/opened.h"
 #include "tests/discover/searched.h"
 
 namespace toftwin::discover {
@@ -31,7 +32,7 @@ TEST_F(Searched, StepsOfTheConverterAreSeenInSingleFrames) {
   const auto declaring = [&](const std::string& electrons) {
     write("camera.toml",
           tinyCamera("[[effect]]\ntype = 'quantisation'\nstep_electrons = " + electrons + "\n"));
-    std::filesystem::remove(folder_ / "run" / plan::kOpenedFile);
+    std::filesystem::remove(folder_ / "run" / plan::openedFile(plan::OpenedOf::A));
     return search(job());
   };
   const CampaignFinding right = declaring("20.0"), wrong = declaring("30.0");
@@ -67,7 +68,7 @@ TEST_F(Searched, StepsAreOfTheFilesElectronsWhateverTheAmplitudesUnit) {
   EXPECT_NEAR(step.value, 20.0, 4.0 * step.error);
   EXPECT_LT(step.error, 0.2) << "as well as the unit is known: a hundredth of light at each of 30 places";
   write("camera.toml", tinyCamera("[[effect]]\ntype = 'quantisation'\nstep_electrons = 20.0\n"));
-  std::filesystem::remove(folder_ / "run" / plan::kOpenedFile);
+  std::filesystem::remove(folder_ / "run" / plan::openedFile(plan::OpenedOf::A));
   const CampaignFinding right = search(job());
   EXPECT_TRUE(right.effects.empty() && right.updates.empty()) << verdictOf(right);
 }

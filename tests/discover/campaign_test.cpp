@@ -10,6 +10,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "calib/plan/opened.h"
 #include "tests/discover/searched.h"
 
 namespace toftwin::discover {
@@ -29,10 +30,9 @@ TEST_F(Searched, NothingIsFoundWhereNothingIsHidden) {
 TEST_F(Searched, AHiddenEffectOfTheCatalogueIsNamedFittedAndAdded) {
   simulate("[[effect]]\ntype = 'vignetting'\nexponent = 0.4\n");
   compare::Progress silent{nullptr};
-  std::string verdict;
-  const auto page = discoverCampaign(job(), silent, &verdict);
-  ASSERT_TRUE(page) << page.error().message;
-  EXPECT_THAT(verdict, HasSubstr("The model lacks vignetting"))
+  const auto answer = discoverCampaign(job(), silent);
+  ASSERT_TRUE(answer) << answer.error().message;
+  EXPECT_THAT(answer->verdict, HasSubstr("The model lacks vignetting"))
       << std::ifstream{folder_ / "out" / "report.md"}.rdbuf();
   const auto model = sim::SensorModel::load(folder_ / "out" / "model.toml");
   ASSERT_TRUE(model) << model.error().message;
@@ -43,8 +43,8 @@ TEST_F(Searched, AHiddenEffectOfTheCatalogueIsNamedFittedAndAdded) {
   EXPECT_NEAR(std::get<sim::Vignetting>(*added).exponent, 0.4, 0.1);
   EXPECT_TRUE(std::filesystem::exists(folder_ / "out" / "report.json"));
   // Opened once, and no more.
-  EXPECT_TRUE(std::filesystem::exists(folder_ / "run" / plan::kOpenedFile));
-  EXPECT_THAT(errorOf(job()), HasSubstr("the locked captures were opened on 20"));
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "run" / plan::openedFile(plan::OpenedOf::A)));
+  EXPECT_THAT(errorOf(job()), HasSubstr("the locked captures of camera A were opened on 20"));
 }
 
 TEST_F(Searched, WhatRemainsOnLockedCapturesIsLess) {

@@ -4,7 +4,9 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <system_error>
 
+#include "calib/discover/campaign/before_search.h"
 #include "calib/discover/discover_table.h"
 #include "tools/cli/arguments.h"
 #include "tools/cli/command.h"
@@ -17,13 +19,35 @@ struct Options {
   std::string data, map, output = "discovery";
   CampaignOptions campaign;
 
+  [[nodiscard]] bool isThere() const {
+    std::error_code ignored;
+    return std::filesystem::exists(data, ignored);
+  }
   /// The folder of a run of `toftwin measure`, or a recording, not a table.
   [[nodiscard]] bool isRun() const {
     return std::filesystem::is_directory(data) || std::filesystem::path{data}.extension() == ".mcap";
   }
 };
 
+/// What does not go with what DATA is. Nothing, if there is no such thing: then that is what is wrong.
+Result<> check(const Options& options) {
+  if (!options.isThere()) return {};
+  if (options.isRun()) {
+    if (!options.map.empty())
+      return Error{Error::Code::InvalidArgument, "--map is for a table, not for a run or a recording"};
+    return options.campaign.check(options.data);
+  }
+  if (!options.campaign.isGiven()) return {};
+  return Error{
+      Error::Code::InvalidArgument,
+      fmt::format("{} is no folder and no recording (.mcap): --model, --scene and their like are for these",
+                  options.data)};
+}
+
 Result<Exit> act(const Options& options) {
+  if (!options.isThere())
+    return Error{Error::Code::NotFound, fmt::format("{}: there is no such file or folder", options.data)};
+  if (auto writable = discover::checkCanWrite(options.output); !writable) return writable.error();
   if (options.isRun()) return discoverRun(options.data, options.output, options.campaign);
   discover::TableMap map;
   if (!options.map.empty()) {
@@ -52,17 +76,7 @@ Run add(Arguments& args) {
   args.option("-o,--output", options->output, "folder for the report, report.json and model.toml")
       .showsDefault();
   options->campaign.add(args);
-  args.check([options]() -> Result<> {
-    if (options->isRun() && !options->map.empty()) {
-      return Error{Error::Code::InvalidArgument, "--map is for a table, not for a run or a recording"};
-    }
-    if (!options->isRun() && options->campaign.isGiven()) {
-      return Error{Error::Code::InvalidArgument,
-                   fmt::format("{} is no folder and no recording (.mcap): --model, --scene and their like are for these",
-                               options->data)};
-    }
-    return {};
-  });
+  args.check([options] { return check(*options); });
   return [options] { return act(*options); };
 }
 

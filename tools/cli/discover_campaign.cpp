@@ -11,19 +11,8 @@ namespace {
 
 Result<discover::CampaignJob> jobOf(const std::string& run, const std::string& output,
                                     const CampaignOptions& options) {
-  if (options.model.empty() || options.scene.empty()) {
-    return Error{Error::Code::InvalidArgument,
-                 fmt::format("{} is the folder of a run, or a recording: that takes --model, the camera file that "
-                             "is to be mended, and "
-                             "--scene, what the camera looked at",
-                             run)};
-  }
   discover::CampaignJob job{.run = run, .model = options.model, .scene = options.scene, .output = output};
   job.poses_of = options.poses;
-  if (!options.poses.empty() && std::filesystem::is_directory(run)) {
-    return Error{Error::Code::InvalidArgument,
-                 "--poses is for a recording: a run's captures have the poses of their plan or rig"};
-  }
   for (const std::string& one : options.scenes_of) {
     const auto equals = one.find('=');
     if (equals == std::string::npos || equals == 0 || equals + 1 == one.size()) {
@@ -53,7 +42,8 @@ Result<discover::CampaignJob> jobOf(const std::string& run, const std::string& o
 }  // namespace
 
 void CampaignOptions::add(Arguments& args) {
-  args.option("--model", model, "of a run or a recording: the camera file that is to be mended, or a preset");
+  args.option("--model", model,
+              "of a run or a recording: the camera file that is to be mended, or a preset (preset:NAME)");
   args.option("--scene", scene, "of a run or a recording: the scene file of what the camera looked at");
   args.option("--poses", poses, "of a recording: another one, whose frames say where the camera stood");
   args.option("--scene-of", scenes_of,
@@ -73,6 +63,27 @@ void CampaignOptions::add(Arguments& args) {
   args.option("--note", note, "for the report's foot, such as a commit");
 }
 
+Result<> CampaignOptions::check(const std::string& data) const {
+  const bool is_recording = !std::filesystem::is_directory(data);
+  if (model.empty() || scene.empty()) {
+    return Error{
+        Error::Code::InvalidArgument,
+        fmt::format("{} is {}: that takes --model, the camera file that is to be mended, and --scene, what "
+                    "the camera looked at; {} missing",
+                    data, is_recording ? "a recording" : "the folder of a run",
+                    !scene.empty()   ? "--model is"
+                    : !model.empty() ? "--scene is"
+                                     : "both are")};
+  }
+  if (!is_recording && !poses.empty())
+    return Error{Error::Code::InvalidArgument,
+                 "--poses is for a recording: a run's captures have the poses of their plan or rig"};
+  if (is_recording && is_b)
+    return Error{Error::Code::InvalidArgument,
+                 fmt::format("--b is for a run, which has two cameras: {} is one camera's recording", data)};
+  return {};
+}
+
 bool CampaignOptions::isGiven() const {
   return !model.empty() || !poses.empty() || !scene.empty() || !scenes_of.empty() || is_b || keep_locked || !without.empty();
 }
@@ -81,10 +92,10 @@ Result<Exit> discoverRun(const std::string& run, const std::string& output, cons
   const auto job = jobOf(run, output, options);
   if (!job) return job.error();
   compare::Progress progress{stderr};
-  std::string verdict;
-  const auto page = discover::discoverCampaign(*job, progress, &verdict);
-  if (!page) return page.error();
-  fmt::print("{}.\n{}\n", verdict, page->string());
+  const auto answer = discover::discoverCampaign(*job, progress);
+  if (!answer) return answer.error();
+  for (const std::string& note : answer->notes) fmt::print("note: {}\n", note);
+  fmt::print("{}.\n{}\n", answer->verdict, answer->page.string());
   return Exit::Ok;
 }
 

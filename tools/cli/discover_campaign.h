@@ -19,6 +19,8 @@ struct CampaignOptions {
   std::vector<std::string> without;
   std::string note;
   void add(Arguments& args);
+  /// What is missing for this run or recording, or is for the other of the two.
+  [[nodiscard]] Result<> check(const std::string& data) const;
   /// Whether any of them was given.
   [[nodiscard]] bool isGiven() const;
 };

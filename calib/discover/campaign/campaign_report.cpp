@@ -11,6 +11,7 @@
 
 #include "calib/compare/report.h"
 #include "calib/discover/campaign/discover_campaign.h"
+#include "calib/discover/campaign/gather_capture.h"
 
 namespace toftwin::discover {
 namespace {
@@ -204,7 +205,8 @@ compare::Section foundSection(const CampaignFinding& finding) {
       compare::shownWithError(finding.zero.offset_mm, finding.zero.offset_error_mm, 2) + " mm" +
           (finding.zero.delay_mm == 0.0
                ? ""
-               : fmt::format("; delay of its light: {:.2f} mm", finding.zero.delay_mm)))});
+               : fmt::format("; delay of its light: {:.2f} mm", finding.zero.delay_mm)) +
+          ". Behind ± stands one standard error, on this page and in model.toml")});
   section.blocks.emplace_back(seenTable(finding));
   if (finding.finding.scales.size() >= 2) {
     section.blocks.emplace_back(compare::Paragraph{
@@ -281,7 +283,7 @@ Json dataOf(const CampaignJob& job, const CampaignFinding& finding) {
 std::vector<compare::Card> cardsOf(const CampaignFinding& finding) {
   std::vector<compare::Card> cards{
       {"effects found", std::to_string(countOf(finding) + finding.updates.size()),
-       fmt::format("{} captures, {} frames", finding.captures, finding.frames)},
+       fmt::format("{}, {}", howMany(finding.captures, "capture"), howMany(finding.frames, "frame"))},
       {"p of nothing being there", fmt::format("{:.3g}", finding.finding.first_p),
        fmt::format("of what is left: {:.3g}", finding.finding.last_p)}};
   if (const auto& judged = finding.judgement) {
@@ -346,8 +348,8 @@ std::string verdictOf(const CampaignFinding& finding) {
 
 Result<std::filesystem::path> writeReport(const CampaignJob& job, const CampaignFinding& finding) {
   compare::Report report{.title = "What the camera model lacks"};
-  report.subtitle = fmt::format("{}: {} open and {} locked captures of {}", finding.camera,
-                                finding.captures, finding.locked, finding.plan);
+  report.subtitle = fmt::format("{}: {} open and {} locked {} of {}", finding.camera, finding.captures,
+                                finding.locked, finding.locked == 1 ? "capture" : "captures", finding.plan);
   report.verdict = verdictOf(finding) + ".";
   report.cards = cardsOf(finding);
   report.sections.push_back(foundSection(finding));
@@ -369,6 +371,7 @@ Result<std::filesystem::path> writeReport(const CampaignJob& job, const Campaign
   report.colophon = fmt::format("toftwin {}, {}{}{}; {:.0f} s", TOFTWIN_VERSION, today(),
                                 job.note.empty() ? "" : ", ", job.note, finding.seconds);
   report.data = dataOf(job, finding);
+  report.written_by = "toftwin discover", report.explained_in = "docs/discover-campaigns.md";
   return compare::write(report, job.output);
 }
 

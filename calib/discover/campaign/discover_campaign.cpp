@@ -9,13 +9,13 @@
 
 #include <fmt/format.h>
 
+#include "calib/discover/campaign/before_search.h"
 #include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/found_model.h"
 #include "calib/discover/campaign/model_file.h"
 #include "calib/discover/campaign/next_capture.h"
 #include "calib/discover/campaign/step_effect.h"
 #include "calib/discover/marginal.h"
-#include "calib/plan/compare_run.h"
 
 namespace toftwin::discover {
 namespace {
@@ -36,15 +36,17 @@ Result<std::string> textOf(const std::filesystem::path& file) {
 }
 
 Result<DeclaredFiles> loadDeclared(const CampaignJob& job) {
+  constexpr std::string_view kPreset = "preset:";  // as `toftwin info` has it
   const auto names = sim::SensorModel::presetNames();
-  const bool is_preset = std::ranges::find(names, job.model) != names.end();
-  auto text = is_preset ? sim::SensorModel::presetText(job.model) : textOf(job.model);
+  const std::string name = job.model.starts_with(kPreset) ? job.model.substr(kPreset.size()) : job.model;
+  const bool is_preset = std::ranges::find(names, name) != names.end();
+  auto text = is_preset ? sim::SensorModel::presetText(name) : textOf(job.model);
   if (!text) {
     return Error{text.error().code,
                  fmt::format("{}; --model takes a camera file or one of the presets {}",
                              text.error().message, fmt::join(names, ", "))};
   }
-  auto model = sim::SensorModel::parse(*text, is_preset ? job.model + ".toml" : job.model);
+  auto model = sim::SensorModel::parse(*text, is_preset ? name + ".toml" : job.model);
   if (!model) return model.error();
   auto scene = sim::Scene::load(job.scene);
   if (!scene) return scene.error();
@@ -217,11 +219,7 @@ Result<JudgedModel> fileWith(const JudgedCampaign& judged, double delay_mm) {
 Result<> judgeLocked(const CampaignJob& job, const Campaign& campaign, const JudgedCampaign& searched,
                      const JudgedModels& models, CampaignFinding& finding) {
   const Declared& declared = searched.declared;
-  if (!isRecording(job)) {
-    const auto opened = plan::openLocked(
-        {.run = job.run, .output = job.output, .locked = true, .note = job.note}, campaign.locked);
-    if (!opened) return opened;
-  }
+  if (auto opened = openLockedOf(job, campaign); !opened) return opened;
   const auto captures = readLocked(campaign);
   if (!captures) return captures.error();
   TraceOptions options = job.trace;
@@ -267,6 +265,7 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
   const auto began = std::chrono::steady_clock::now();
   auto files = loadDeclared(job);
   if (!files) return files.error();
+  if (auto closed = checkStillClosed(job); !closed) return closed.error();
   Declared& declared = files->declared;
   progress.plan("read", 2.0);
   progress.plan("trace", 8.0);
@@ -278,9 +277,11 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
   progress.begin();
   const auto campaign = isRecording(job) ? readRecording(job.run, job.poses_of) : readCampaign(job.run, job.side);
   if (!campaign) return campaign.error();
+  if (auto whole = checkLockedFiles(job, *campaign); !whole) return whole.error();
   CampaignFinding finding;
   finding.notes = campaign->notes;
   if (auto taken = takeLens(*campaign, declared, finding.notes); !taken) return taken.error();
+  if (auto same = checkFrequencies(*campaign, declared.model); !same) return same.error();
   for (const auto& [block, scene] : declared.scene_of_block) {
     const auto is_of = [&](const MeasuredCapture& capture) {
       return capture.record.block == block;
@@ -352,8 +353,8 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
   return finding;
 }
 
-Result<std::filesystem::path> discoverCampaign(const CampaignJob& job, compare::Progress& progress,
-                                               std::string* verdict) {
+Result<CampaignAnswer> discoverCampaign(const CampaignJob& job, compare::Progress& progress) {
+  if (auto writable = checkCanWrite(job.output); !writable) return writable.error();
   auto finding = searchCampaign(job, progress);
   if (!finding) return finding.error();
   auto page = writeReport(job, *finding);
@@ -364,9 +365,8 @@ Result<std::filesystem::path> discoverCampaign(const CampaignJob& job, compare::
   if (!out)
     return Error{Error::Code::StorageFull,
                  fmt::format("{}: cannot be written", (job.output / "model.toml").string())};
-  if (verdict != nullptr) *verdict = verdictOf(*finding);
   progress.end();
-  return page;
+  return CampaignAnswer{*std::move(page), verdictOf(*finding), std::move(finding->notes)};
 }
 
 }  // namespace toftwin::discover

@@ -21,7 +21,7 @@ namespace toftwin::discover {
 struct CampaignJob {
   std::filesystem::path run;  ///< a run's folder, or a recording
   std::filesystem::path poses_of{};  ///< of a recording: another one, whose frames have the poses
-  std::string model;  ///< a camera file, or the name of a preset
+  std::string model;  ///< a camera file, or a preset's name with "preset:" before it or without
   std::filesystem::path scene;
   std::map<std::string, std::filesystem::path> scene_of_block{};
   std::filesystem::path output{"discovery"};
@@ -80,10 +80,14 @@ struct CampaignFinding {
 /// note that they were opened.
 Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress& progress);
 
-/// The same, and leaves index.html, report.json, report.md and model.toml in the output folder;
-/// gives the page's path.
-Result<std::filesystem::path> discoverCampaign(const CampaignJob& job, compare::Progress& progress,
-                                               std::string* verdict = nullptr);
+/// What is told where a search was asked for; the page says all.
+struct CampaignAnswer {
+  std::filesystem::path page{};
+  std::string verdict{};
+  std::vector<std::string> notes{};
+};
+/// The same, and leaves index.html, report.json, report.md and model.toml in the output folder.
+Result<CampaignAnswer> discoverCampaign(const CampaignJob& job, compare::Progress& progress);
 
 /// Groups of the first test by how much more they explain than noise would, the most first.
 struct SeenGroup {

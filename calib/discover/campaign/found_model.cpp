@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "calib/discover/campaign/carriers.h"
+#include "calib/discover/campaign/gather_capture.h"
 #include "calib/discover/campaign/model_file.h"
 
 namespace toftwin::discover {
@@ -79,9 +80,10 @@ std::string modelText(const std::string& text, const Declared& declared, const C
   }
   addOffset(declared.model, finding, updates, added);
   addDelay(declared, finding.zero.delay_mm - declared.delay_mm, updates, added);
-  return withEffects(text, effects, updates, added,
-                     fmt::format("Written by toftwin discover from {} captures of {}.", finding.captures,
-                                 finding.plan.empty() ? "a run" : finding.plan));
+  return withEffects(
+      text, effects, updates, added,
+      fmt::format("Written by toftwin discover from {} of {}.", howMany(finding.captures, "capture"),
+                  finding.plan.empty() ? "a run" : finding.plan));
 }
 
 }  // namespace toftwin::discover

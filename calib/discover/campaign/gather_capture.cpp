@@ -151,6 +151,10 @@ void compareParity(const std::vector<double>& means, MeasuredCapture& capture) {
 
 }  // namespace
 
+std::string howMany(std::size_t count, const std::string& what) {
+  return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
+}
+
 Error ofCapture(const plan::CaptureRecord& record, const std::string& message, Error::Code code) {
   return {code, fmt::format("capture {} (\"{}\"): {}", record.number, record.name, message)};
 }

@@ -15,6 +15,9 @@ namespace toftwin::discover {
 Error ofCapture(const plan::CaptureRecord& record, const std::string& message,
                 Error::Code code = Error::Code::Malformed);
 
+/// "1 capture", "2 captures".
+std::string howMany(std::size_t count, const std::string& what);
+
 /// Frames of one thing in one place, one after the other: their means and their noise.
 class CaptureGatherer {
  public:

@@ -85,7 +85,7 @@ Result<Campaign> readCampaign(const std::filesystem::path& folder, Side side) {
   if (!index) return index.error();
   Campaign campaign{.folder = folder, .name = folder.filename().string(), .side = side};
   std::vector<plan::CaptureRecord> open;
-  std::map<std::string, int> left_out;
+  std::map<std::string, std::size_t> left_out;
   for (const auto& [number, one] : *index) {
     if (const std::string why = whyNot(one); !why.empty())
       ++left_out[why];
@@ -93,17 +93,16 @@ Result<Campaign> readCampaign(const std::filesystem::path& folder, Side side) {
       (one.is_locked ? campaign.locked : open).push_back(one);
   }
   for (const auto& [why, count] : left_out)
-    campaign.notes.push_back(fmt::format("{} captures {} are left out", count, why));
+    campaign.notes.push_back(
+        fmt::format("{} {} {} left out", howMany(count, "capture"), why, count == 1 ? "is" : "are"));
   if (open.empty()) {
-    return Error{
-        Error::Code::InvalidArgument,
-        fmt::format(
-            "{}: none of its {} captures can be simulated again: that takes open captures with "
-            "poses, of things that stand still{}",
-            folder.string(), index->size(),
-            left_out.contains("without a pose")
-                ? "; give poses in the plan, or have a rig take the camera to them"
-                : "")};
+    return Error{Error::Code::InvalidArgument,
+                 fmt::format("{}: none of its {} can be simulated again: that takes open captures with "
+                             "poses, of things that stand still{}",
+                             folder.string(), howMany(index->size(), "capture"),
+                             left_out.contains("without a pose")
+                                 ? "; give poses in the plan, or have a rig take the camera to them"
+                                 : "")};
   }
   auto read = readThem(folder, side, open);
   if (!read) return read.error();

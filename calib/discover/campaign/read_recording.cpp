@@ -31,15 +31,22 @@ struct Stamp {
   std::optional<Pose> pose{};
 };
 
-Result<std::vector<Stamp>> stampsOf(const std::filesystem::path& file) {
+struct Stamps {
+  std::vector<Stamp> frames{};
+  std::string damage{};  ///< what was wrong and how much was lost, in one line, or empty
+};
+
+Result<Stamps> stampsOf(const std::filesystem::path& file) {
   auto reader = record::Reader::open(file);
   if (!reader) return reader.error();
-  std::vector<Stamp> stamps;
+  Stamps stamps{.damage = reader->summary().damage};
+  for (std::size_t at = 0; (at = stamps.damage.find('\n', at)) != std::string::npos;)
+    stamps.damage.replace(at, 1, "; ");
   while (true) {
     const auto frame = reader->next();
     if (!frame && frame.error().code == Error::Code::EndOfStream) break;
     if (!frame) return frame.error();
-    stamps.push_back({frame->moment.received.ns, frame->moment.world_from_camera});
+    stamps.frames.push_back({frame->moment.received.ns, frame->moment.world_from_camera});
   }
   return stamps;
 }
@@ -53,38 +60,52 @@ Error withoutPose(const std::filesystem::path& file, std::size_t frame, const st
               file.string(), frame, why)};
 }
 
+struct Poses {
+  std::vector<Pose> frames{};  ///< of each frame
+  std::string damage{};        ///< of the recording that is searched
+  std::vector<std::string> notes{};
+};
+
 /// Each frame's pose: its own, else the reference's: frame by frame where both have as many, else the one
 /// that was received next to it.
-Result<std::vector<Pose>> posesOf(const std::filesystem::path& file, const std::filesystem::path& reference) {
-  const auto own = stampsOf(file);
-  if (!own) return own.error();
+Result<Poses> posesOf(const std::filesystem::path& file, const std::filesystem::path& reference) {
+  const auto stamps_of_file = stampsOf(file);
+  if (!stamps_of_file) return stamps_of_file.error();
+  const std::vector<Stamp>& own = stamps_of_file->frames;
+  Poses poses{.damage = stamps_of_file->damage};
+  if (!poses.damage.empty())
+    poses.notes.push_back(
+        fmt::format("The recording is cut short or damaged, and was searched as far as it can be read "
+                    "({} frames): {}.",
+                    own.size(), poses.damage));
   std::vector<Stamp> other;
   if (!reference.empty()) {
     auto stamps = stampsOf(reference);
     if (!stamps) return stamps.error();
-    other = *std::move(stamps);
+    if (!stamps->damage.empty())
+      poses.notes.push_back(fmt::format("The poses' recording is cut short or damaged: {}.", stamps->damage));
+    other = std::move(stamps->frames);
   }
-  std::vector<Pose> poses;
-  for (std::size_t k = 0; k < own->size(); ++k) {
-    const Stamp& frame = (*own)[k];
+  for (std::size_t k = 0; k < own.size(); ++k) {
+    const Stamp& frame = own[k];
     if (frame.pose && other.empty()) {
-      poses.push_back(*frame.pose);
+      poses.frames.push_back(*frame.pose);
       continue;
     }
     if (other.empty()) return withoutPose(file, k + 1, "");
-    const auto nearest = other.size() == own->size()
+    const auto nearest = other.size() == own.size()
                              ? other.begin() + static_cast<std::ptrdiff_t>(k)
                              : std::ranges::min_element(other, {}, [&](const Stamp& one) {
                                  return std::abs(one.received_ns - frame.received_ns);
                                });
     const bool is_near =
-        other.size() == own->size() || std::abs(nearest->received_ns - frame.received_ns) <= kSameTime_ns;
+        other.size() == own.size() || std::abs(nearest->received_ns - frame.received_ns) <= kSameTime_ns;
     if (!is_near)
       return withoutPose(file, k + 1,
                          fmt::format(": none in {} was received within 0.1 s of it", reference.string()));
     if (!nearest->pose)
       return withoutPose(file, k + 1, fmt::format(", and that in {} has none, either", reference.string()));
-    poses.push_back(*nearest->pose);
+    poses.frames.push_back(*nearest->pose);
   }
   return poses;
 }
@@ -246,22 +267,25 @@ std::vector<std::size_t> standsOf(const std::vector<MeasuredCapture>& captures) 
 Result<Campaign> readRecording(const std::filesystem::path& file, const std::filesystem::path& poses_of) {
   const auto poses = posesOf(file, poses_of);
   if (!poses) return poses.error();
-  auto cutter = cut(file, *poses);
+  auto cutter = cut(file, poses->frames);
   if (!cutter) return cutter.error();
   Campaign campaign{.folder = file, .name = file.filename().string(), .camera = cutter->camera};
+  campaign.notes = poses->notes;
   if (cutter->alone > 0)
-    campaign.notes.push_back(
-        fmt::format("{} frames that were taken where no other was are left out: without repeats "
-                    "nothing is known of their noise",
-                    cutter->alone));
+    campaign.notes.push_back(fmt::format(
+        "{} that {} taken where no other was {} left out: without repeats nothing is known of the noise",
+        howMany(cutter->alone, "frame"), cutter->alone == 1 ? "was" : "were",
+        cutter->alone == 1 ? "is" : "are"));
   if (cutter->captures.size() < 3) {
     return Error{
         Error::Code::InvalidArgument,
         fmt::format(
-            "{}: its {} frames make {} captures, that is, two frames or more of one pose, exposure and "
+            "{}: its {} make {}, that is, two frames or more of one pose, exposure and "
             "ambient light after each other; a search takes 3 at least, and says something from "
-            "about 20 on",
-            file.string(), poses->size(), cutter->captures.size())};
+            "about 20 on{}",
+            file.string(), howMany(poses->frames.size(), "frame"),
+            howMany(cutter->captures.size(), "capture"),
+            poses->damage.empty() ? "" : ". The recording is cut short or damaged: " + poses->damage)};
   }
   const std::vector<std::size_t> places = placesOf(cutter->captures);
   const Locking locking = lockingOf(places, cutter->captures);
@@ -274,12 +298,13 @@ Result<Campaign> readRecording(const std::filesystem::path& file, const std::fil
   }
   if (!campaign.put_aside.empty())
     campaign.notes.push_back(fmt::format(
-        "{} of the recording's captures, {}, were put aside before the search and are judged as the "
+        "{} of the recording's captures, {}, {} put aside before the search and judged as the "
         "locked ones; nothing keeps a second search from being judged on them again.",
         campaign.put_aside.size(),
         locking.is_by_place ? "all of one place in five"
                             : "one in five, from places that the search sees, too: they say how well "
-                              "what was found holds at other times, not at other places"));
+                              "what was found holds at other times, not at other places",
+        campaign.put_aside.size() == 1 ? "was" : "were"));
   return campaign;
 }
 
