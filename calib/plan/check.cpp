@@ -209,6 +209,9 @@ constexpr std::array kBlind{
     Blind{Kind::Checkerboard, "checkerboard: errors that go with amplitude look like errors of distance"},
     Blind{Kind::BrightDark, "bright_dark: what a frame leaves to the next one is not seen"},
     Blind{Kind::Foreground, "foreground: scatter in the lens and vignetting look alike (0.96; 0.47 with it)"},
+    Blind{Kind::Scatter,
+          "scatter: the share of light that a lens scatters is known badly, of several frequencies hardly at "
+          "all"},
     Blind{Kind::Corner, "corner: light over several surfaces is not seen"},
     Blind{Kind::Tilt, "tilt: errors that go with the angle of incidence are not seen"},
     Blind{Kind::Moving, "moving: what motion within a frame does is not seen"},

@@ -212,7 +212,7 @@ void addScatter(const Captures& plates, const Captures& walls, const std::vector
   all.add("lens scatter", kNames[camera], compare::veilTraits(veil_mm, error_mm, frequency_hz, capture));
 }
 
-void addPlates(const ComparedRun& run, const Captures& walls, std::size_t camera, TraitCollector& all) {
+void addPlates(const ComparedRun& run, std::size_t camera, TraitCollector& all) {
   const Captures captures = ofKind(run, "foreground");
   if (captures.empty()) return;
   std::vector<double> place, value;
@@ -224,8 +224,14 @@ void addPlates(const ComparedRun& run, const Captures& walls, std::size_t camera
   all.add("flying pixels", kNames[camera], compare::flyingTraits(together));
   all.add("emitter shadow", kNames[camera], compare::shadowTraits(together, 1.0));
   all.add("edge in the amplitude", kNames[camera], compare::edgeTraits(place, value));
-  if (std::ranges::all_of(captures, [](const auto* one) { return isPoseFromPlanes(one->record); })) return;
-  addScatter(captures, walls, run.frequency_hz[camera], camera, all);
+}
+
+/// Before a dark wall a plate's light is far more beside the wall's own; a bright wall is the next best.
+Captures platesForScatter(const ComparedRun& run) {
+  Captures plates = ofKind(run, "scatter");
+  if (plates.empty()) plates = ofKind(run, "foreground");
+  std::erase_if(plates, [](const auto* one) { return isPoseFromPlanes(one->record); });
+  return plates;
 }
 
 /// The first frame after each turn from bright to dark or back, against the frames that follow.
@@ -316,7 +322,9 @@ void addFrameTraits(const ComparedRun& run, TraitCollector& all) {
     addTiming(run, camera, all);
     if (!walls.empty()) addWraps(walls, camera, all);
     addCorners(run, ownErrorOf(walls, camera), camera, all);
-    addPlates(run, walls, camera, all);
+    addPlates(run, camera, all);
+    if (const Captures plates = platesForScatter(run); !plates.empty())
+      addScatter(plates, walls, run.frequency_hz[camera], camera, all);
     addLag(run, camera, all);
     addMotion(run, camera, all);
   }

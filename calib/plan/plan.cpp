@@ -26,6 +26,7 @@ constexpr std::array kKinds{KindName{Kind::WarmUp, "warm_up"},
                             KindName{Kind::Checkerboard, "checkerboard"},
                             KindName{Kind::BrightDark, "bright_dark"},
                             KindName{Kind::Foreground, "foreground"},
+                            KindName{Kind::Scatter, "scatter"},
                             KindName{Kind::Corner, "corner"},
                             KindName{Kind::Tilt, "tilt"},
                             KindName{Kind::Moving, "moving"},
@@ -150,6 +151,7 @@ void checkKind(const BlockSpec& block, Table& table) {
       break;
     case Kind::Checkerboard:
     case Kind::Foreground:
+    case Kind::Scatter:
     case Kind::Dark:
     case Kind::NearField:
     case Kind::Locked:

@@ -34,6 +34,7 @@ constexpr std::array kFeeds{Feeds{"warm_up", "drift"},
                             Feeds{"exposure", "error over amplitude"},
                             Feeds{"ambient", "ambient light"},
                             Feeds{"bright_dark", "lag"},
+                            Feeds{"scatter", "lens scatter"},
                             Feeds{"foreground", "lens scatter"},
                             Feeds{"foreground", "flying pixels"},
                             Feeds{"foreground", "emitter shadow"},
@@ -229,6 +230,20 @@ void addMasks(const ComparedRun& run, TraitCollector& all) {
   all.add("masks", "A and B", compare::maskTraits(a, b));
 }
 
+/// What no block of the run feeds. What two kinds of block tell needs one of them.
+void sayWhatIsMissing(const ComparedRun& run, TraitCollector& all) {
+  std::map<std::string_view, std::pair<bool, std::string>> told;  // whether it is, and by which kinds
+  for (const Feeds& one : kFeeds) {
+    const auto isIt = [&](const ComparedCapture& capture) { return capture.record.kind == one.kind; };
+    auto& [is_told, kinds] = told[one.what];
+    is_told = is_told || std::ranges::any_of(run.captures, isIt) || std::ranges::any_of(run.moving, isIt);
+    kinds += (kinds.empty() ? "" : " or ") + std::string{one.kind};
+  }
+  for (const auto& [what, by] : told) {
+    if (!by.first) all.untold(fmt::format("{}: the run has no block of kind {}", what, by.second));
+  }
+}
+
 }  // namespace
 
 RunTraits traitsOf(const ComparedRun& run) {
@@ -240,11 +255,7 @@ RunTraits traitsOf(const ComparedRun& run) {
   addNoiseTraits(run, all);
   addFrameTraits(run, all);
   sayWhatPlanesHide(run, all);
-  for (const Feeds& one : kFeeds) {
-    const auto isIt = [&](const ComparedCapture& capture) { return capture.record.kind == one.kind; };
-    if (std::ranges::none_of(run.captures, isIt) && std::ranges::none_of(run.moving, isIt))
-      all.untold(fmt::format("{}: the run has no block of kind {}", one.what, one.kind));
-  }
+  sayWhatIsMissing(run, all);
   return std::move(all).found();
 }
 

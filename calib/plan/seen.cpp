@@ -172,6 +172,7 @@ CameraSeen seenOf(const Plan& plan, const CaptureRecord& record, const compare::
       addCorner(plan, *block, *pose, stack, seen);
       break;
     case Kind::Foreground:
+    case Kind::Scatter:
       addPlate(wallRange_m(plan, *block, stack.camera(), *pose), stack, frequency_hz, seen);
       break;
     case Kind::Moving:

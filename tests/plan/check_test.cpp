@@ -124,7 +124,7 @@ TEST(Check, NotesWhatAPlanCannotTell) {
     notes += one.what + "\n";
   }
   for (const char* kind : {"warm_up", "exposure", "ambient", "checkerboard", "bright_dark", "foreground",
-                           "corner", "tilt", "moving", "dark", "near_field", "repeats"}) {
+                           "scatter", "corner", "tilt", "moving", "dark", "near_field", "repeats"}) {
     EXPECT_THAT(notes, HasSubstr(fmt::format("no block of kind {}:", kind)));
   }
   EXPECT_THAT(notes, HasSubstr("no capture is locked"));

@@ -75,6 +75,18 @@ farthest_m = 18.7
 /// What A has and the twin has not.
 constexpr double kVeil = 0.03, kLag = 0.05;
 
+/// Within its interval, which is short enough to tell what is planted from nothing. A Kinect v2's amplitude,
+/// over which the veil's light is taken, is a mean of three that a veil changes differently: a closed form of
+/// these five captures without noise reads 0.0310 of 0.03 (and 0.0300 of 20 MHz), hence 4 %.
+void expectVeil(const std::string& whose, const compare::Json& row, double planted) {
+  const double low = row.find("low")->number(), high = row.find("high")->number();
+  testing::Test::RecordProperty(
+      "veil_" + whose, fmt::format("{:.4f} ({:.4f} to {:.4f})", row.find("value")->number(), low, high));
+  EXPECT_GE(high + 0.04 * planted, planted) << whose;
+  EXPECT_LE(low - 0.04 * planted, planted) << whose;
+  EXPECT_LT(0.5 * (high - low), 0.5 * kVeil) << low << " to " << high;
+}
+
 class StandardPlan : public WithDaemon {
  protected:
   virtual std::string rangesBy() const { return kOneFrequency; }
@@ -90,8 +102,8 @@ class StandardPlan : public WithDaemon {
     write("twin.toml", fmt::format(kSmall, rangesBy(), ""));
     std::string all;
     for (const auto& [name, seed] : {std::pair{"cam", 1}, {"twin", 2}}) {
-      for (const char* scene : {"wall", "checkerboard", "bright-dark", "foreground", "corner-60", "corner-90",
-                                "corner-120", "moving", "dark"}) {
+      for (const char* scene : {"wall", "checkerboard", "bright-dark", "foreground", "scatter", "corner-60",
+                                "corner-90", "corner-120", "moving", "dark"}) {
         const bool is_wall = std::string{scene} == "wall";
         all += fmt::format(
             "[[source]]\nname = '{0}{1}'\ndriver = 'sim'\ncamera = '{0}.toml'\nscene = '{2}scenes/{3}.toml'\n"
@@ -161,13 +173,12 @@ TEST_F(StandardPlan, TellsEveryCharacteristicOfBothCameras) {
                            "A and B: masks: kappa", "B − A: error over amplitude: per decade"})
     EXPECT_TRUE(found.contains(both)) << both << "\n" << names;
   EXPECT_EQ(told.find("untold")->size(), 0u) << names;
-  // What A has and B has not. The frame before stays with b/(1 + b) of a change. The veil is told to a third
-  // here: the plate's light also comes back from the wall, in B as in A (0.003).
+  // What A has and B has not. The frame before stays with b/(1 + b) of a change.
   const auto value = [&](const std::string& key) { return found.at(key).find("value")->number(); };
   EXPECT_NEAR(value("A: lag of the first frame recorded: left behind"), kLag / (1.0 + kLag), 2e-3);
   EXPECT_NEAR(value("B: lag of the first frame recorded: left behind"), 0.0, 2e-3);
-  EXPECT_NEAR(value("A: lens scatter: veil"), kVeil, 0.01);
-  EXPECT_NEAR(value("B: lens scatter: veil"), 0.0, 0.01);
+  expectVeil("A", found.at("A: lens scatter: veil"), kVeil);
+  expectVeil("B", found.at("B: lens scatter: veil"), 0.0);
   // What was planted in A alone is among what the page begins with, and where it is from is at its end.
   std::stringstream text;
   text << std::ifstream{folder_ / "report" / "index.html"}.rdbuf();
@@ -206,8 +217,7 @@ class StandardPlanOfAKinect : public StandardPlan {
   std::string rangesBy() const override { return kKinectV2; }
 };
 
-/// The decoder's weights of 80, 16 and 120 MHz are what joins the frequencies' errors. What both cameras read
-/// of the plate's light that comes by the wall is not the lens's, and their difference is.
+/// The decoder's weights of 80, 16 and 120 MHz are what joins the frequencies' errors.
 TEST_F(StandardPlanOfAKinect, TellsLensScatterByItsDecodersWeights) {
   const Ran measured =
       run(fmt::format("measure {}standard.toml cam twin -o {} --prepared --skip "
@@ -219,14 +229,14 @@ TEST_F(StandardPlanOfAKinect, TellsLensScatterByItsDecodersWeights) {
   const Ran compared = toftwin(fmt::format("compare {} -o {}", path("run"), path("report")));
   ASSERT_EQ(compared.status, 0) << compared.err;
   const compare::Json told = characteristics();
-  std::map<std::string, double> veil;
+  std::map<std::string, compare::Json> veil;
   for (std::size_t i = 0; i < told.find("rows")->size(); ++i) {
     const compare::Json& row = told.find("rows")->at(i);
-    if (row.find("characteristic")->words() == "lens scatter")
-      veil[row.find("of")->words()] = row.find("value")->number();
+    if (row.find("characteristic")->words() == "lens scatter") veil[row.find("of")->words()] = row;
   }
   ASSERT_EQ(veil.size(), 2u);
-  EXPECT_NEAR(veil["A"] - veil["B"], kVeil, 0.01) << "to a third, as above";
+  expectVeil("A", veil["A"], kVeil);
+  expectVeil("B", veil["B"], 0.0);
 }
 
 }  // namespace
