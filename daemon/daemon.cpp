@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/daemon.h"
+#include "daemon/daemon_loop.h"
 
 #include <boost/asio/post.hpp>
 
@@ -65,26 +65,32 @@ bool sameListen(const ListenKeys& a, const ListenKeys& b) {
 
 }  // namespace
 
+Daemon::Daemon(std::unique_ptr<Loop> loop) : loop_(std::move(loop)) {}
+Daemon::~Daemon() = default;
+
 Result<std::unique_ptr<Daemon>> Daemon::start(Options options) {
   std::optional<StartSignals> early;
   if (options.handle_signals) early.emplace();
   auto config = loadConfig(options.config, options.drivers);
   if (!config) return config.error();
-  // Sources run only once it is clear that this daemon may listen: a second one must not touch
-  // cameras.
-  std::unique_ptr<Daemon> daemon{new Daemon{std::move(options), *config}};
-  if (auto listening = daemon->listen(config->keys.listen); !listening) return listening.error();
-  if (daemon->options_.handle_signals)
-    daemon->handleSignals();  // before anyone is told that it is ready
-  daemon->apply(*std::move(config));
-  notify::ready(daemon->statusLine());
-  daemon->watch();
-  if (early && early->isReloadWanted()) daemon->reload();
-  if (early && early->isStopWanted()) daemon->stop();
-  return daemon;
+  auto loop = std::make_unique<Loop>(std::move(options), *config);
+  if (auto begun = loop->begin(*std::move(config)); !begun) return begun.error();
+  if (early && early->isReloadWanted()) loop->reload();
+  if (early && early->isStopWanted()) loop->stop();
+  return std::unique_ptr<Daemon>{new Daemon{std::move(loop)}};
 }
 
-Daemon::Daemon(Options options, const Config& config)
+void Daemon::run() { loop_->run(); }
+void Daemon::stop() { loop_->stop(); }
+void Daemon::reload() { loop_->reload(); }
+std::uint16_t Daemon::port() const { return loop_->server().port(); }
+std::string Daemon::socketPath() const { return loop_->server().socketPath(); }
+Hub& Daemon::hub() { return loop_->hub(); }
+
+// ---- the loop
+// ------------------------------------------------------------------------------------
+
+Daemon::Loop::Loop(Options options, const Config& config)
     : options_(std::move(options)),
       hub_(hubOptions(config), *options_.clock),
       server_(io_, hub_, serverOptions(config.keys.limits)),
@@ -93,11 +99,21 @@ Daemon::Daemon(Options options, const Config& config)
       watchdog_(io_),
       listen_(config.keys.listen) {}
 
-Daemon::~Daemon() {
+Daemon::Loop::~Loop() {
   if (reload_.valid()) reload_.wait();
 }
 
-Result<> Daemon::listen(ListenKeys keys) {
+/// Sources run only once it is clear that this daemon may listen: a second one must not touch cameras.
+Result<> Daemon::Loop::begin(Config config) {
+  if (auto listening = listen(config.keys.listen); !listening) return listening;
+  if (options_.handle_signals) handleSignals();  // before anyone is told that it is ready
+  apply(std::move(config));
+  notify::ready(statusLine());
+  watch();
+  return {};
+}
+
+Result<> Daemon::Loop::listen(ListenKeys keys) {
   if (options_.port) keys.port = *options_.port;
   if (options_.socket) keys.socket = *options_.socket;
   if (keys.socket.empty() && keys.address.empty()) {
@@ -119,7 +135,7 @@ Result<> Daemon::listen(ListenKeys keys) {
 
 /// A machine without a folder for "auto" (a container, su, cron) has TCP all the same; a path that
 /// somebody wrote down must work.
-Result<> Daemon::listenUnix(const ListenKeys& keys) {
+Result<> Daemon::Loop::listenUnix(const ListenKeys& keys) {
   if (keys.socket.empty()) return {};
   const bool is_auto = keys.socket == "auto";
   auto done = server_.listenUnix(is_auto ? defaultSocketPath() : keys.socket);
@@ -134,14 +150,14 @@ Result<> Daemon::listenUnix(const ListenKeys& keys) {
 // ---- configuration
 // -------------------------------------------------------------------------------
 
-std::vector<std::string> Daemon::fingerprints() const {
+std::vector<std::string> Daemon::Loop::fingerprints() const {
   std::vector<std::string> all;
   for (const Running& running : running_) all.push_back(running.fingerprint);
   return all;
 }
 
 /// Makes what runs what is configured.
-void Daemon::apply(Config config) {
+void Daemon::Loop::apply(Config config) {
   applyKeys(config);
   std::erase_if(running_, [&](const Running& running) {
     const bool stays = std::ranges::any_of(config.sources, [&](const ConfiguredSource& source) {
@@ -163,7 +179,7 @@ void Daemon::apply(Config config) {
   facades_.apply(std::move(config.facades));
 }
 
-void Daemon::applyKeys(const Config& config) {
+void Daemon::Loop::applyKeys(const Config& config) {
   spdlog::set_level(levelOf(config.keys.log_level));
   hub_.setOptions(hubOptions(config));
   server_.setOptions(serverOptions(config.keys.limits));
@@ -173,7 +189,7 @@ void Daemon::applyKeys(const Config& config) {
   }
 }
 
-void Daemon::run(ConfiguredSource source) {
+void Daemon::Loop::run(ConfiguredSource source) {
   running_.push_back({source.keys.name, source.fingerprint});
   const auto open = [driver = source.driver, table = source.table,
                      faults = source.faults]() -> Result<std::unique_ptr<drivers::Source>> {
@@ -189,11 +205,11 @@ void Daemon::run(ConfiguredSource source) {
                                         *options_.clock));
 }
 
-void Daemon::reload() {
+void Daemon::Loop::reload() {
   asio::post(io_, [this] { beginReload(); });
 }
 
-void Daemon::beginReload() {
+void Daemon::Loop::beginReload() {
   if (is_stopping_) return;
   if (reload_.valid()) {
     reload_again_ = true;
@@ -217,7 +233,7 @@ void Daemon::beginReload() {
   }
 }
 
-void Daemon::finishReload() {
+void Daemon::Loop::finishReload() {
   reload_.get();
   Result<Config> config = *std::exchange(loaded_, std::nullopt);
   if (is_stopping_) return;
@@ -233,7 +249,7 @@ void Daemon::finishReload() {
 }
 
 /// Destroys what may have to wait for a driver or a disk, without keeping clients waiting.
-void Daemon::discard(std::vector<std::shared_ptr<void>> things) {
+void Daemon::Loop::discard(std::vector<std::shared_ptr<void>> things) {
   std::erase_if(discarded_, [](const std::future<void>& one) {
     return one.wait_for(std::chrono::seconds{0}) == std::future_status::ready;
   });
@@ -241,7 +257,7 @@ void Daemon::discard(std::vector<std::shared_ptr<void>> things) {
 }
 
 /// Does it on a thread of its own; where there is none to be had, here, which keeps clients waiting.
-void Daemon::aside(std::function<void()> work) {
+void Daemon::Loop::aside(std::function<void()> work) {
   try {
     discarded_.push_back(std::async(std::launch::async, work));
   } catch (...) {
@@ -253,13 +269,13 @@ void Daemon::aside(std::function<void()> work) {
 // ---- running
 // -------------------------------------------------------------------------------------
 
-void Daemon::handleSignals() {
+void Daemon::Loop::handleSignals() {
   boost::system::error_code ignored;
   for (const int number : {SIGTERM, SIGINT, SIGHUP}) signals_.add(number, ignored);
   waitForSignal();
 }
 
-void Daemon::waitForSignal() {
+void Daemon::Loop::waitForSignal() {
   signals_.async_wait([this](boost::system::error_code fault, int number) {
     is_waiting_for_signal_ = false;
     if (fault) return;
@@ -276,7 +292,7 @@ void Daemon::waitForSignal() {
 
 /// Whatever is thrown for want of memory or threads is the matter of whom it was done for, and ends no one
 /// else's service: what listens, watches and waits for signals goes on.
-void Daemon::run() {
+void Daemon::Loop::run() {
   while (true) {
     try {
       keepGoing();
@@ -290,18 +306,18 @@ void Daemon::run() {
 }
 
 /// Arms again what a throw may have left unarmed.
-void Daemon::keepGoing() {
+void Daemon::Loop::keepGoing() {
   server_.keepAccepting();
   if (options_.handle_signals && !is_waiting_for_signal_ && !is_stopping_) waitForSignal();
   if (!is_watching_ && !is_stopping_) watch();
 }
 
-void Daemon::stop() {
+void Daemon::Loop::stop() {
   asio::post(io_, [this] { beginStop(); });
 }
 
 /// Sources and recordings end first, so that clients are told how; then the clients are let go.
-void Daemon::beginStop() {
+void Daemon::Loop::beginStop() {
   if (std::exchange(is_stopping_, true)) return;
   notify::stopping();
   watchdog_.cancel();
@@ -325,7 +341,7 @@ void Daemon::beginStop() {
 
 /// Tells systemd's watchdog that all is well: this runs, so the io thread does; and no driver has
 /// been in one call for too long.
-void Daemon::watch() {
+void Daemon::Loop::watch() {
   const auto limit = notify::watchdogLimit();
   if (!limit) return;
   std::string stuck;
@@ -347,6 +363,6 @@ void Daemon::watch() {
   is_watching_ = true;
 }
 
-std::string Daemon::statusLine() const { return fmt::format("{} sources", running_.size()); }
+std::string Daemon::Loop::statusLine() const { return fmt::format("{} sources", running_.size()); }
 
 }  // namespace toftwin::daemon

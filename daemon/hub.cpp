@@ -95,6 +95,7 @@ wire::Health Hub::health() const {
     health.facades.push_back(one.health);
     const std::int64_t clients = one.clients ? one.clients->load() : -1;
     if (clients >= 0) health.facades.back().clients = static_cast<std::uint32_t>(clients);
+    if (one.booting && *one.booting) health.facades.back().state = FacadeState::Booting;
   }
   for (const auto& [name, source] : sources_) {
     health.sources.push_back(source->health());

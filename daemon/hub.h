@@ -23,11 +23,14 @@ namespace toftwin::daemon {
 /// How many clients a facade has now; negative: its language does not tell. Counted on its thread, read on
 /// any.
 using ClientCount = std::atomic<std::int64_t>;
+/// Whether it boots, as a client asked it to. Told on its thread, read on any.
+using Booting = std::atomic<bool>;
 
 /// A facade, for health.
 struct ToldFacade {
   wire::FacadeHealth health;
   std::shared_ptr<const ClientCount> clients;  ///< shared with the facade; null: it is not there
+  std::shared_ptr<const Booting> booting;      ///< likewise
 };
 
 /// All sources of the daemon and their recordings: what sessions ask. All members may be called

@@ -10,6 +10,7 @@
 #include <optional>
 #include <string>
 
+#include "daemon/config.h"
 #include "daemon/daemon.h"
 #include "daemon/memory.h"
 #include "drivers/logging.h"

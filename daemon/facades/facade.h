@@ -1,11 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <utility>  // before asio: Boost 1.74 uses std::exchange without it
-
-#include <boost/asio/io_context.hpp>
-#include <boost/asio/ip/tcp.hpp>
-
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -63,10 +58,12 @@ class Facade {
   [[nodiscard]] virtual std::string where() const = 0;
   /// For health; set by the facade, if its language tells.
   [[nodiscard]] std::shared_ptr<const ClientCount> clients() const { return clients_; }
+  [[nodiscard]] std::shared_ptr<const Booting> booting() const { return booting_; }
 
  protected:
   const std::shared_ptr<ClientCount> clients_ =
       std::make_shared<ClientCount>(-1);  // shared with health, which may ask when this is gone
+  const std::shared_ptr<Booting> booting_ = std::make_shared<Booting>(false);  // likewise
 };
 
 /// What a facade is started with.
@@ -93,9 +90,5 @@ struct FacadeKind {
 
 /// All facades, in the order of the documents.
 std::span<const FacadeKind> allFacades();
-
-/// A TCP listener of a facade; `key` is what sets the port.
-Result<boost::asio::ip::tcp::acceptor> listenFor(boost::asio::io_context& io, const FacadeKeys& keys,
-                                                 std::uint16_t port, std::string_view key);
 
 }  // namespace toftwin::daemon

@@ -11,6 +11,7 @@
 #include <optional>
 #include <utility>
 
+#include "daemon/facades/listen_for.h"
 #include "daemon/listen.h"
 #include "daemon/thrown.h"
 #include "drivers/logging.h"
@@ -114,9 +115,10 @@ void Facades::tellHealth() {
   std::vector<ToldFacade> told;
   for (const Running& one : running_) {
     const FacadeKeys& keys = one.configured.keys;
-    ToldFacade facade{{.kind = keys.kind, .source = keys.source, .place = {}}, nullptr};
+    ToldFacade facade{{.kind = keys.kind, .source = keys.source, .place = {}}, nullptr, nullptr};
     if (one.facade) {
       facade.clients = one.facade->clients();
+      facade.booting = one.facade->booting();
       facade.health.place = one.facade->where();
       facade.health.state = FacadeState::Running;
     } else {

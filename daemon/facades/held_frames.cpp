@@ -20,6 +20,13 @@ std::uint64_t bytesOf(const Frame& frame) {
 
 }  // namespace
 
+HeldFrames::Time HeldFrames::arrivalOf(const Frame& frame, const Clock& clock) {
+  constexpr std::chrono::nanoseconds kOldest = std::chrono::seconds{1};
+  const Time now = std::chrono::steady_clock::now();  // by which they leave
+  const std::chrono::nanoseconds age{clock.wall().ns - frame.moment.received.ns};
+  return age > std::chrono::nanoseconds{0} && age <= kOldest ? now - age : now;
+}
+
 void HeldFrames::hold(const Frame& frame, Time leaves) {
   const std::uint64_t bytes = bytesOf(frame);
   if (!held_.empty() && bytes_ + bytes > kMostBytes) return noteLost();

@@ -14,6 +14,8 @@
 
 #include <toftwin/frame.h>
 
+#include "daemon/clock.h"
+
 namespace toftwin::daemon {
 
 /// Frames that wait for the time at which a real camera's would leave. They leave in order; what comes when
@@ -23,6 +25,10 @@ class HeldFrames {
   using Time = std::chrono::steady_clock::time_point;
   static constexpr std::uint64_t kMostBytes = 512ULL << 20U;
   using Put = std::function<void(const Frame&)>;
+  /// When the daemon had it: how long it has been on its way to this thread is no part of a camera's time.
+  /// Now, if the frame says that it is more than a second old (the host's clock was set, or it does not
+  /// tell), or of the future.
+  static Time arrivalOf(const Frame& frame, const Clock& clock);
   /// `name` of who holds them, for the log.
   HeldFrames(boost::asio::io_context& io, std::string name, Put put)
       : name_(std::move(name)), put_(std::move(put)), timer_(io) {}

@@ -25,6 +25,7 @@ SourceLink::SourceLink(EventThread& thread, const FacadePlace& place, Wants want
       pause_(thread.io()),
       unevenness_(place.unevenness),
       latency_(std::llround(place.keys.latency.in(nanosecond))),
+      clock_(place.clock),
       held_(thread.io(), fmt::format("facade {} of {}", place.keys.kind, source_), take_) {}
 
 SourceLink::~SourceLink() {
@@ -139,7 +140,7 @@ void SourceLink::takeAll() {
 
 void SourceLink::take(const Frame& frame) {
   if (unevenness_.isNone() && latency_.count() == 0) return take_(frame);
-  held_.hold(frame, std::chrono::steady_clock::now() + latency_ + unevenness_.delay(taken_++));
+  held_.hold(frame, HeldFrames::arrivalOf(frame, clock_) + latency_ + unevenness_.delay(taken_++));
 }
 
 }  // namespace toftwin::daemon

@@ -63,6 +63,7 @@ class SourceLink {
   boost::asio::steady_timer pause_;
   const Unevenness unevenness_;
   const std::chrono::nanoseconds latency_;
+  const Clock& clock_;
   HeldFrames held_;
   std::uint64_t taken_ = 0;
   bool is_wanted_ = false;

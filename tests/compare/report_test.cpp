@@ -7,11 +7,12 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <regex>
 #include <sstream>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "../matches.h"
 
 namespace toftwin::compare {
 namespace {
@@ -49,13 +50,10 @@ TEST(Report, NeedsNothingButItself) {
   EXPECT_THAT(page, Not(HasSubstr("<link")));
   EXPECT_THAT(page, Not(HasSubstr("@import")));
   // Every href is an anchor in the page or data in the page; every url() too.
-  const std::regex reference{"(href=|url\\()['\"]?([^'\")]{1,5})"};
-  int seen = 0;
-  for (std::sregex_iterator at{page.begin(), page.end(), reference}, end; at != end; ++at, ++seen) {
-    const std::string target = (*at)[2];
-    EXPECT_TRUE(target.starts_with("#") || target.starts_with("data:")) << target;
-  }
-  EXPECT_EQ(seen, 3);  // one anchor, the map and its colour bar
+  const auto references = test::matchesIn(page, "(href=|url\\()['\"]?([^'\")]{1,5})");
+  for (const auto& reference : references)
+    EXPECT_TRUE(reference[2].starts_with("#") || reference[2].starts_with("data:")) << reference[2];
+  EXPECT_EQ(references.size(), 3U);  // one anchor, the map and its colour bar
 }
 
 /// A wall of 8 × 4 pixels that B sees 10 mm farther.

@@ -8,9 +8,9 @@
 #include <cmath>
 #include <map>
 #include <random>
-#include <regex>
 #include <string>
 
+#include "../matches.h"
 #include "calib/compare/fitted_figure.h"
 
 namespace toftwin::compare {
@@ -94,8 +94,7 @@ TEST(FittedFigure, PairsRowsOfTheSameCondition) {
   ASSERT_TRUE(paired);
   // All four are +0.5, so that the lower axis is about it: pairs by the row's number would be 3.5, 1.5, −0.5 and −2.5.
   std::map<std::string, int> heights;
-  const std::regex dot{"<circle[^>]*cy='([0-9.]+)'"};
-  for (std::sregex_iterator at{paired->svg.begin(), paired->svg.end(), dot}, end; at != end; ++at) ++heights[(*at)[1]];
+  for (const auto& dot : test::matchesIn(paired->svg, "<circle[^>]*cy='([0-9.]+)'")) ++heights[dot[1]];
   EXPECT_TRUE(std::ranges::any_of(heights, [](const auto& one) { return one.second >= 4; }));
   EXPECT_EQ(count(paired->svg, "<circle"), 4 + 4 + 4 + 2 * 3) << "and two in each of three legends";
   const auto others = fittedFigure(rowsOf({1, 2, 3, 4}, {5, 6, 7, 8}), "drift", {.title = "d"});

@@ -7,6 +7,7 @@
 #include <sys/wait.h>
 
 #include <atomic>
+#include <boost/asio/post.hpp>
 #include <fstream>
 
 #include "daemon/facades/usb_camera/server.h"

@@ -5,7 +5,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <opencv2/core.hpp>
-#include <regex>
 
 #include "calib/file/calibration_file.h"
 #include "calib/intrinsics/detect.h"

@@ -8,10 +8,10 @@
 #include <array>
 #include <fstream>
 #include <map>
-#include <regex>
 #include <sstream>
 #include <string>
 
+#include "../matches.h"
 #include "protocol/transport/memfd.h"
 #include "protocol/wire/bounds.h"
 #include "protocol/wire/codec.h"
@@ -69,18 +69,17 @@ TEST(ProtocolPage, EveryFieldOfThePreambleIsWhereItSays) {
                                                     {"reserved", 0}};
   const auto bytes = encodePreamble(preamble);
   const std::string text = section("### 1.1 Preamble");
-  const std::regex line{"\\| (\\d+) \\| (\\d+) \\| `(\\w+)` \\|"};
   std::size_t end = 0, found = 0;
-  for (std::sregex_iterator at{text.begin(), text.end(), line}, last; at != last; ++at) {
-    const std::size_t offset = std::stoul((*at)[1]), size = std::stoul((*at)[2]);
-    EXPECT_EQ(offset, end) << "a gap before " << (*at)[3];
+  for (const auto& line : test::matchesIn(text, "\\| (\\d+) \\| (\\d+) \\| `(\\w+)` \\|")) {
+    const std::size_t offset = std::stoul(line[1]), size = std::stoul(line[2]);
+    EXPECT_EQ(offset, end) << "a gap before " << line[3];
     end = offset + size;
-    const auto known = values.find((*at)[3]);
+    const auto known = values.find(line[3]);
     if (known == values.end()) continue;
     found += 1;
     for (std::size_t i = 0; i < size; ++i) {
       const std::uint64_t expected = i < 8 ? (known->second >> (8 * i)) & 0xFFu : 0;
-      EXPECT_EQ(static_cast<std::uint64_t>(bytes.at(offset + i)), expected) << (*at)[3];
+      EXPECT_EQ(static_cast<std::uint64_t>(bytes.at(offset + i)), expected) << line[3];
     }
   }
   EXPECT_EQ(end, kPreambleSize);
@@ -99,15 +98,12 @@ TEST(ProtocolPage, ListsEveryMessageWithItsId) {
 }
 
 TEST(ProtocolPage, ExplainsEveryFieldOfTheSchema) {
-  const std::string schema =
-      std::regex_replace(read("protocol/wire/toftwin.fbs"), std::regex{"//.*"}, "");
-  const std::regex field{"(\\w+):\\s*\\[?\\w+"};
-  int fields = 0;
-  for (std::sregex_iterator at{schema.begin(), schema.end(), field}, last; at != last;
-       ++at, ++fields) {
-    EXPECT_THAT(page(), HasSubstr("`" + (*at)[1].str() + "`"));
-  }
-  EXPECT_GT(fields, 100);
+  std::string schema;
+  for (const auto& line : test::matchesIn(read("protocol/wire/toftwin.fbs"), "[^\n]*\n"))
+    schema += line[0].substr(0, line[0].find("//")) + "\n";
+  const auto fields = test::matchesIn(schema, "(\\w+):\\s*\\[?\\w+");
+  for (const auto& field : fields) EXPECT_THAT(page(), HasSubstr("`" + field[1] + "`"));
+  EXPECT_GT(fields.size(), 100U);
 }
 
 TEST(ProtocolPage, ListsEveryErrorCode) {

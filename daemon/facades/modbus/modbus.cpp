@@ -13,6 +13,7 @@
 #include <optional>
 
 #include "daemon/facades/event_thread.h"
+#include "daemon/facades/listen_for.h"
 #include "daemon/facades/modbus/frame_facts.h"
 #include "daemon/facades/modbus/keys.h"
 #include "daemon/facades/modbus/server.h"

@@ -13,6 +13,7 @@
 
 #include "daemon/facades/event_thread.h"
 #include "daemon/facades/mac_address.h"
+#include "daemon/facades/listen_for.h"
 #include "daemon/facades/held_frames.h"
 #include "daemon/facades/o3d303/device.h"
 #include "daemon/facades/o3d303/discovery.h"
@@ -175,7 +176,10 @@ class O3d303Facade final : public Facade {
     if (keys_.timing == Timing::Source) return leave(frame);
     const auto later = timing_.next({device_ns}, {facts_.frequencies, facts_.exposures_us});
     if (!later) return triggered_at_.reset();
-    held_.hold(frame, steady_clock::now() + std::chrono::nanoseconds{std::llround(later->in(nanosecond))});
+    // What the link held back has come when that let it go.
+    const bool is_held_twice = place_.keys.latency > 0_s || !place_.unevenness.isNone();
+    const auto came = is_held_twice ? steady_clock::now() : HeldFrames::arrivalOf(frame, place_.clock);
+    held_.hold(frame, came + std::chrono::nanoseconds{std::llround(later->in(nanosecond))});
   }
 
   /// Until then a camera is busy with it, and takes no other trigger.
@@ -340,10 +344,13 @@ class O3d303Facade final : public Facade {
   /// Nobody answers for the boot time, from which UpTime counts.
   void boot() {
     booted_ = steady_clock::now();
+    *booting_ = true;
     setOpen(false);
     boot_.expires_after(bootTime());
     boot_.async_wait([this](boost::system::error_code cancelled) {
-      if (!cancelled) setOpen(true);
+      if (cancelled) return;
+      setOpen(true);
+      *booting_ = false;
     });
   }
 

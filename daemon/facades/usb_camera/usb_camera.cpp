@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "daemon/facades/event_thread.h"
+#include "daemon/facades/listen_for.h"
 #include "daemon/facades/source_link.h"
 #include "daemon/facades/struck_frames.h"
 #include "daemon/facades/usb_camera/keys.h"

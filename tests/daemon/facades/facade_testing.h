@@ -5,9 +5,6 @@
 
 #include <fmt/format.h>
 
-#include <boost/asio/io_context.hpp>
-#include <boost/asio/ip/tcp.hpp>
-
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -18,15 +15,9 @@
 #include "../running_daemon.h"
 #include "drivers/o3d303/o3d303.h"
 #include "drivers/source.h"
+#include "free_port.h"
 
 namespace toftwin::daemon::test {
-
-/// A TCP port that was free just now.
-inline std::uint16_t freePort() {
-  boost::asio::io_context io;
-  boost::asio::ip::tcp::acceptor acceptor{io, {boost::asio::ip::address_v4::loopback(), 0}};
-  return acceptor.local_endpoint().port();
-}
 
 /// A daemon with a source "cam" and a facade before it.
 class RunningFacade : public RunningDaemon {

@@ -4,9 +4,9 @@
 
 #include <cmath>
 #include <map>
-#include <regex>
 #include <set>
 
+#include "../../matches.h"
 #include "daemon/facades/gige_vision/source_facts.h"
 #include "gige_vision_commands.h"
 
@@ -291,24 +291,21 @@ TEST(GigeVisionDevice, DescribesEveryRegisterThatItHasAndHasEveryOneThatItDescri
   const std::string& xml = genicamXml();
   Camera camera;
   std::map<std::string, int> nodes;
-  const std::regex node{R"re(<(\w+) Name="([\w]+)")re"};
-  for (std::sregex_iterator it{xml.begin(), xml.end(), node}, end; it != end; ++it) {
-    if ((*it)[1] != "EnumEntry" && (*it)[1] != "pVariable") ++nodes[(*it)[2]];
+  for (const auto& node : toftwin::test::matchesIn(xml, R"re(<(\w+) Name="([\w]+)")re")) {
+    if (node[1] != "EnumEntry" && node[1] != "pVariable") ++nodes[node[2]];
   }
   for (const auto& [name, count] : nodes) EXPECT_EQ(count, 1) << name;
-  const std::regex reference{R"re(<p(?!Port|Variable)(\w+)(?: \w+="\w+")?>(\w+)</p)re"};
-  int references = 0;
-  for (std::sregex_iterator it{xml.begin(), xml.end(), reference}, end; it != end; ++it, ++references)
-    EXPECT_EQ(nodes.count((*it)[2]), 1U) << (*it)[0];
-  EXPECT_GT(references, 150);
-  const std::regex address{
-      R"re(<Address>0x(\w+)</Address>(?:<pIndex[^/]*</pIndex>)?<Length>(\d+)</Length>)re"};
-  int registers = 0;
-  for (std::sregex_iterator it{xml.begin(), xml.end(), address}, end; it != end; ++it, ++registers) {
+  const auto references =
+      toftwin::test::matchesIn(xml, R"re(<p(?!Port|Variable)(\w+)(?: \w+="\w+")?>(\w+)</p)re");
+  for (const auto& reference : references) EXPECT_EQ(nodes.count(reference[2]), 1U) << reference[0];
+  EXPECT_GT(references.size(), 150U);
+  const auto registers = toftwin::test::matchesIn(
+      xml, R"re(<Address>0x(\w+)</Address>(?:<pIndex[^/]*</pIndex>)?<Length>(\d+)</Length>)re");
+  for (const auto& one : registers) {
     Bytes ignored;
-    EXPECT_TRUE(Memory{}.read(std::stoul((*it)[1], nullptr, 16), std::stoul((*it)[2]), ignored)) << (*it)[0];
+    EXPECT_TRUE(Memory{}.read(std::stoul(one[1], nullptr, 16), std::stoul(one[2]), ignored)) << one[0];
   }
-  EXPECT_GT(registers, 90);
+  EXPECT_GT(registers.size(), 90U);
   // No two registers share a byte.
   std::uint64_t free = 0;
   std::map<std::uint32_t, const Row*> by_address;

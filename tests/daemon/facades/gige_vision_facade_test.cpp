@@ -27,14 +27,13 @@ class GigeVision : public RunningGigeVision {
   Ran stream(const std::string& options) {
     // Its name begins with vendor and model.
     const Ran list = run("arv-tool-0.8");
-    std::smatch match;
-    const std::regex line{"(toftwin-[^\n]*-" + name_ + ") \\("};
-    if (!std::regex_search(list.output, match, line)) {
+    const auto found = toftwin::test::matchesIn(list.output, "(toftwin-[^\n]*-" + name_ + ") \\(");
+    if (found.empty()) {
       ADD_FAILURE() << "it was not found: " << list.output;
       return {};
     }
-    return run(
-        fmt::format("arv-camera-test-0.8 -n '{}' --no-packet-socket --duration=1 {}", match.str(1), options));
+    return run(fmt::format("arv-camera-test-0.8 -n '{}' --no-packet-socket --duration=1 {}", found.front()[1],
+                           options));
   }
 };
 

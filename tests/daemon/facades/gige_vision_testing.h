@@ -8,9 +8,9 @@
 
 #include <array>
 #include <cstdio>
-#include <regex>
 #include <string>
 
+#include "../../matches.h"
 #include "facade_testing.h"
 
 namespace toftwin::daemon::test {
@@ -21,9 +21,8 @@ struct Ran {
   std::string output;
   /// The number behind "name = ", as arv-camera-test prints it; -1 if it is not there.
   [[nodiscard]] long number(const std::string& name) const {
-    std::smatch match;
-    const std::regex pattern{name + R"(\s*=\s*(\d+))"};
-    return std::regex_search(output, match, pattern) ? std::stol(match[1]) : -1;
+    const auto found = toftwin::test::matchesIn(output, name + R"(\s*=\s*(\d+))");
+    return found.empty() ? -1 : std::stol(found.front()[1]);
   }
 };
 inline Ran run(const std::string& command) {
@@ -42,13 +41,15 @@ inline bool hasProgram(const std::string& name) { return run("which " + name).st
 /// A daemon with a GigE Vision camera on a loopback address that no other test process has at the time.
 class RunningGigeVision : public RunningDaemon {
  protected:
-  void startGige(const std::string& source_keys, const std::string& facade_keys = {}) {
+  /// `more` are tables behind it, in which {} is its address.
+  void startGige(const std::string& source_keys, const std::string& facade_keys = {},
+                 const std::string& more = {}) {
     const auto pid = static_cast<unsigned>(::getpid());
     address_ = fmt::format("127.{}.{}.9", 1 + pid % 199, pid / 199 % 251);
     start(
         fmt::format("[[source]]\nname = 'cam'\n{}\n[[facade]]\nkind = 'gige_vision'\nsource = 'cam'\n"
-                    "address = '{}'\nserial = 'T{}'\n{}\n",
-                    source_keys, address_, pid, facade_keys));
+                    "address = '{}'\nserial = 'T{}'\n{}\n{}",
+                    source_keys, address_, pid, facade_keys, fmt::format(fmt::runtime(more), address_)));
     name_ = fmt::format("T{}", pid);
     ASSERT_TRUE(log_->waitFor("GigE Vision on", 1));
   }

@@ -8,11 +8,11 @@
 #include <iterator>
 #include <numeric>
 #include <optional>
-#include <regex>
 #include <sstream>
 #include <string>
 #include <vector>
 
+#include "../../matches.h"
 #include "facade_testing.h"
 #include "measured_intervals.h"
 #include "o3d303_client.h"
@@ -37,9 +37,8 @@ std::optional<std::string> published(const std::string& name) {
 }
 
 std::string valueIn(const std::string& json, const std::string& name) {
-  std::smatch found;
-  return std::regex_search(json, found, std::regex{"\"" + name + "\"\\s*:\\s*\"([^\"]*)\""}) ? found[1].str()
-                                                                                             : "";
+  const auto found = toftwin::test::matchesIn(json, "\"" + name + "\"\\s*:\\s*\"([^\"]*)\"");
+  return found.empty() ? std::string{} : found.front()[1];
 }
 
 double meanOf(const Intervals& all) {

@@ -59,6 +59,33 @@ TEST(HeldFrames, LeaveInOrderAndNotBeforeTheirTime) {
   EXPECT_EQ(order, (std::vector<std::uint64_t>{0, 1, 2}));
 }
 
+class WallAt final : public Clock {
+ public:
+  explicit WallAt(std::int64_t ns) : wall_{ns} {}
+  [[nodiscard]] HostTime wall() const override { return wall_; }
+  [[nodiscard]] SteadyTime steady() const override { return {}; }
+
+ private:
+  HostTime wall_;
+};
+
+TEST(HeldFrames, CountFromWhenTheDaemonHadThem) {
+  using std::chrono::nanoseconds;
+  Frame frame;
+  frame.moment.received.ns = 5'000'000'000;
+  for (const auto& [age_ns, counted_ns] : {std::pair{std::int64_t{0}, std::int64_t{0}},
+                                           {30'000'000, 30'000'000},
+                                           {1'000'000'000, 1'000'000'000},
+                                           {1'000'000'001, 0},
+                                           {-1, 0}}) {  // clocks that were set
+    const auto before = std::chrono::steady_clock::now();
+    const auto arrived = HeldFrames::arrivalOf(frame, WallAt{5'000'000'000 + age_ns});
+    const auto after = std::chrono::steady_clock::now();
+    EXPECT_GE(arrived, before - nanoseconds{counted_ns}) << age_ns;
+    EXPECT_LE(arrived, after - nanoseconds{counted_ns}) << age_ns;
+  }
+}
+
 TEST(HeldFrames, ThatAreClearedDoNotLeave) {
   boost::asio::io_context io;
   std::vector<std::uint64_t> order;
