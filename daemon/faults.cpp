@@ -68,6 +68,9 @@ class FaultySource final : public drivers::Source {
   Result<> setParameter(std::string_view name, double value) override {
     return inner_->setParameter(name, value);
   }
+  Result<> setParameterText(std::string_view name, std::string_view text) override {
+    return inner_->setParameterText(name, text);
+  }
   Result<> trigger() override { return inner_->trigger(); }
 
   Result<Frame> next(std::stop_token stop, bool lockstep) override {

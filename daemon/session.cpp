@@ -236,8 +236,8 @@ Session::Answers Session::on(const wire::SetPose& request) {
 
 Session::Answers Session::on(const wire::SetParameter& request) {
   return command(request.id, request.source,
-                 [name = request.name, value = request.value](drivers::Source& source) {
-                   return source.setParameter(name, value);
+                 [name = request.name, value = request.value, text = request.text](drivers::Source& source) {
+                   return text ? source.setParameterText(name, *text) : source.setParameter(name, value);
                  });
 }
 

@@ -190,8 +190,10 @@ bool SourceHost::restoreSettings() {
   const drivers::Recovery::Restore settings = recovery_.settings();
   std::vector<Command> commands;
   for (const Parameter& one : settings.parameters) {
-    commands.emplace_back(
-        [one](drivers::Source& source) { return source.setParameter(one.name, *one.value); });
+    commands.emplace_back([one](drivers::Source& source) {
+      return one.text ? source.setParameterText(one.name, *one.text)
+                      : source.setParameter(one.name, *one.value);
+    });
   }
   if (const auto& pose = settings.world_from_camera) {
     commands.emplace_back([pose](drivers::Source& source) { return source.setPose(*pose); });

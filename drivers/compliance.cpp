@@ -225,6 +225,25 @@ Result<> poseIsThatOfTheNextFrame(Bench& bench) {
   return {};
 }
 
+/// Set to each of its choices, and at last to the text that it had, it is so. A choice may be refused beside
+/// what the others are now; what is none may not be taken.
+Result<> keepsItsText(Source& source, std::size_t place, const Parameter& parameter) {
+  const auto& [name, value, bounds, text, choices] = parameter;
+  std::vector<std::string> wanted = choices;
+  wanted.push_back(*text);
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    const Result<> set = source.setParameterText(name, wanted[i]);
+    const bool may_stay = !set && set.error().code == Error::Code::InvalidArgument && i + 1 < wanted.size();
+    if (may_stay) continue;
+    if (!set) return broken("{} = {}: {}", name, wanted[i], set.error().message);
+    if (source.state().parameters.at(place).text != wanted[i])
+      return broken("{} was set to {}, but state() says otherwise", name, wanted[i]);
+  }
+  if (!choices.empty() && source.setParameterText(name, "there is no such choice"))
+    return broken("{}: a choice that is none was accepted", name);
+  return {};
+}
+
 Result<> stateIsWhatWasSet(Bench& bench) {
   Source& source = *bench.source;
   const std::vector<Parameter> before = source.state().parameters;
@@ -233,7 +252,10 @@ Result<> stateIsWhatWasSet(Bench& bench) {
   if (names != source.info().parameters)
     return broken("state() names other parameters than info()");
   for (std::size_t i = 0; i < before.size(); ++i) {
-    const auto& [name, value, bounds] = before[i];
+    const auto& [name, value, bounds, text, choices] = before[i];
+    if (text) {
+      if (auto same = keepsItsText(source, i, before[i]); !same) return same;
+    }
     if (!value) continue;
     if (!bounds.contains(*value))
       return broken("{} = {} is outside of the bounds that state() gives", name, *value);

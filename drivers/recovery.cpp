@@ -28,8 +28,9 @@ void Recovery::openFailed(SteadyTime now) {
 void Recovery::changed(const SourceState& state) {
   // The driver's order is that of info(), so that equal places are equal parameters.
   for (std::size_t i = 0; i < std::min(state.parameters.size(), state_.parameters.size()); ++i) {
-    const Parameter& now = state.parameters[i];
-    if (now.value && now.value != state_.parameters[i].value) set_[now.name] = *now.value;
+    const Parameter &now = state.parameters[i], &before = state_.parameters[i];
+    const bool is_other = (now.value && now.value != before.value) || (now.text && now.text != before.text);
+    if (is_other) set_[now.name] = now;
   }
   if (info_ && info_->can_set_pose && state.world_from_camera &&
       state.world_from_camera != state_.world_from_camera) {
@@ -42,8 +43,9 @@ Recovery::Restore Recovery::settings() const {
   Restore restore{.parameters = {}, .world_from_camera = pose_};
   for (const Parameter& now : state_.parameters) {
     const auto found = set_.find(now.name);
-    if (found == set_.end() || found->second == now.value) continue;
-    restore.parameters.push_back({.name = now.name, .value = found->second, .bounds = now.bounds});
+    if (found == set_.end() || (found->second.value == now.value && found->second.text == now.text)) continue;
+    restore.parameters.push_back(found->second);
+    restore.parameters.back().bounds = now.bounds;
   }
   return restore;
 }

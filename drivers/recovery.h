@@ -75,7 +75,7 @@ class Recovery {
 
   std::optional<SourceInfo> info_;
   SourceState state_;
-  std::map<std::string, double> set_;  ///< what clients changed since the first opening
+  std::map<std::string, Parameter> set_;  ///< what clients changed since the first opening
   std::optional<Transform<World, Camera>> pose_;
 
   std::optional<SteadyTime> gap_since_;

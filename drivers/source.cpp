@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 namespace toftwin::drivers {
 namespace {
 
@@ -30,6 +32,13 @@ Result<> Source::setPose(const Transform<World, Camera>&) {
 
 Result<> Source::setParameter(std::string_view name, double) {
   return unsupported(info(), fmt::format("set a parameter \"{}\": it has none", name));
+}
+
+Result<> Source::setParameterText(std::string_view name, std::string_view text) {
+  if (std::ranges::find(info().parameters, name) == info().parameters.end())
+    return unsupported(info(), fmt::format("set a parameter \"{}\": it has none of that name", name));
+  return Error{Error::Code::InvalidArgument,
+               fmt::format("{} = {} cannot be set: it must be a number", name, text)};
 }
 
 Result<> Source::trigger() {

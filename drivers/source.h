@@ -32,7 +32,7 @@ struct SourceInfo {
   bool can_set_pose = false;
   bool can_trigger = false;
   bool can_lockstep = false;  ///< makes a frame only when asked: simulators and recordings
-  std::vector<std::string> parameters;  ///< names that setParameter takes
+  std::vector<std::string> parameters;  ///< names that setParameter and setParameterText take
 };
 
 /// What can be set, as it is set now.
@@ -66,6 +66,8 @@ class Source {
 
   virtual Result<> setPose(const Transform<World, Camera>& world_from_camera);
   virtual Result<> setParameter(std::string_view name, double value);
+  /// Of a parameter whose state has a text; those of most cameras are numbers.
+  virtual Result<> setParameterText(std::string_view name, std::string_view text);
   virtual Result<> trigger();
 };
 

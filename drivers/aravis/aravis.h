@@ -56,7 +56,7 @@ struct Keys {
             "features to be set whenever it is opened, in this order: \"ExposureTime = 1000\", "
             "\"TriggerActivation = FallingEdge\"");
     v.texts("parameters", parameters,
-            "the features that clients can set while it runs, by their GenICam names; empty: those "
+            "the features that clients can read and set while it runs, by their GenICam names; empty: those "
             "for exposure and gain that the camera has");
     v.choice("trigger", trigger,
              {{"as_set", Trigger::AsSet},

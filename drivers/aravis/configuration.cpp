@@ -301,11 +301,13 @@ void readTiming(const Features& features, Setup& setup) {
 Result<std::vector<std::string>> parametersOf(const Features& features, const Keys& keys) {
   std::vector<std::string> names;
   for (const std::string& one : keys.parameters) {
-    if (!features.isWritable(one) || !features.number(one)) {
-      return Error{Error::Code::NotFound,
-                   fmt::format("aravis: parameters: the camera has no feature \"{}\" that is a "
-                               "number and can be set now; arv-tool-0.8 features lists what it has",
-                               one)};
+    const Parameter now = features.parameter(one);
+    if (!features.isWritable(one) || (!now.value && !now.text)) {
+      return Error{
+          Error::Code::NotFound,
+          fmt::format("aravis: parameters: the camera has no feature \"{}\" that is a number, a switch, a "
+                      "choice or a text and can be set now; arv-tool-0.8 features lists what it has",
+                      one)};
     }
     names.push_back(one);
   }

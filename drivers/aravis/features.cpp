@@ -22,6 +22,7 @@ std::optional<double> numberIn(const std::string& text) {
 
 // Doubles count whole numbers exactly up to here.
 constexpr double kMostWhole = 9'007'199'254'740'992.0;
+constexpr std::size_t kLongestText = 4096, kMostChoices = 1024;  // those of docs/protocol.md
 
 Error wrong(const std::string& name, const std::string& value, std::string_view what) {
   return {Error::Code::InvalidArgument,
@@ -102,31 +103,43 @@ std::optional<std::string> Features::text(const std::string& name) const {
   return std::string{value};
 }
 
-Parameter Features::parameter(const std::string& name) const {
-  Parameter parameter{.name = name, .value = number(name)};
+Bounds Features::bounds(const std::string& name) const {
   ArvGcNode* of = node(name);
   Failure min_failure, max_failure;
-  if (!parameter.value) return parameter;
   if (ARV_IS_GC_ENUMERATION(of) != FALSE) {
     guint count = 0;
     const Memory<gint64> values{arv_gc_enumeration_dup_available_int_values(
         ARV_GC_ENUMERATION(of), &count, min_failure.slot())};
-    if (!min_failure && count > 0) {
-      const auto [least, most] = std::minmax_element(values.get(), values.get() + count);
-      parameter.bounds = boundsOf(static_cast<double>(*least), static_cast<double>(*most));
-    }
-  } else if (ARV_IS_GC_BOOLEAN(of) != FALSE) {
-    parameter.bounds = {0.0, 1.0};
-  } else if (ARV_IS_GC_FLOAT(of) != FALSE) {
-    const double min = arv_gc_float_get_min(ARV_GC_FLOAT(of), min_failure.slot());
-    const double max = arv_gc_float_get_max(ARV_GC_FLOAT(of), max_failure.slot());
-    if (!min_failure && !max_failure) parameter.bounds = boundsOf(min, max);
-  } else {
-    const auto min = arv_gc_integer_get_min(ARV_GC_INTEGER(of), min_failure.slot());
-    const auto max = arv_gc_integer_get_max(ARV_GC_INTEGER(of), max_failure.slot());
-    if (!min_failure && !max_failure)
-      parameter.bounds = boundsOf(static_cast<double>(min), static_cast<double>(max));
+    if (min_failure || count == 0) return {};
+    const auto [least, most] = std::minmax_element(values.get(), values.get() + count);
+    return boundsOf(static_cast<double>(*least), static_cast<double>(*most));
   }
+  if (ARV_IS_GC_BOOLEAN(of) != FALSE) return {0.0, 1.0};
+  double min = 0.0, max = 0.0;
+  if (ARV_IS_GC_FLOAT(of) != FALSE) {
+    min = arv_gc_float_get_min(ARV_GC_FLOAT(of), min_failure.slot());
+    max = arv_gc_float_get_max(ARV_GC_FLOAT(of), max_failure.slot());
+  } else {
+    min = static_cast<double>(arv_gc_integer_get_min(ARV_GC_INTEGER(of), min_failure.slot()));
+    max = static_cast<double>(arv_gc_integer_get_max(ARV_GC_INTEGER(of), max_failure.slot()));
+  }
+  return min_failure || max_failure ? Bounds{} : boundsOf(min, max);
+}
+
+Parameter Features::parameter(const std::string& name) const {
+  Parameter parameter{.name = name, .value = number(name)};
+  if (parameter.value) parameter.bounds = bounds(name);
+  ArvGcNode* of = node(name);
+  const bool is_switch = ARV_IS_GC_BOOLEAN(of) != FALSE, is_choice = ARV_IS_GC_ENUMERATION(of) != FALSE;
+  if (!is_switch && !is_choice && ARV_IS_GC_STRING(of) == FALSE) return parameter;
+  parameter.text = text(name);
+  // What the protocol could not carry is as if the camera did not tell.
+  const bool can_be_told = parameter.text && parameter.text->size() <= kLongestText &&
+                           g_utf8_validate(parameter.text->c_str(), -1, nullptr) != FALSE;
+  if (!can_be_told) parameter.text.reset();
+  if (is_switch) parameter.choices = {"false", "true"};
+  if (is_choice) parameter.choices = entries(name);
+  if (parameter.choices.size() > kMostChoices) parameter.choices.clear();
   return parameter;
 }
 
@@ -189,6 +202,9 @@ Result<> Features::setText(const std::string& name, const std::string& value) co
     if (!number) return wrong(name, value, "a number");
     return setNumber(name, *number);
   } else if (ARV_IS_GC_STRING(of) != FALSE) {
+    const gint64 most = arv_gc_string_get_max_length(ARV_GC_STRING(of), failure.slot());
+    if (!failure && most > 0 && value.size() > static_cast<std::uint64_t>(most))
+      return wrong(name, value, fmt::format("at most {} bytes long", most));
     arv_gc_string_set_value(ARV_GC_STRING(of), value.c_str(), failure.slot());
   } else {
     return wrong(name, value, "a number, a text or an entry, but this feature is none of them");

@@ -26,7 +26,7 @@ class Features {
   /// it is none of these, or cannot be read.
   [[nodiscard]] std::optional<double> number(const std::string& name) const;
   [[nodiscard]] std::optional<std::string> text(const std::string& name) const;
-  /// The number with its bounds.
+  /// The number with its bounds; a switch and an enumeration also as a text with its choices, a text as such.
   [[nodiscard]] Parameter parameter(const std::string& name) const;
   /// The names of an enumeration's entries that can be chosen now.
   [[nodiscard]] std::vector<std::string> entries(const std::string& name) const;
@@ -36,6 +36,7 @@ class Features {
   Result<> setText(const std::string& name, const std::string& value) const;
 
  private:
+  [[nodiscard]] Bounds bounds(const std::string& name) const;
   [[nodiscard]] ArvGcNode* node(const std::string& name) const;
   [[nodiscard]] Error noFeature(const std::string& name) const;
   ArvDevice* device_;

@@ -106,16 +106,12 @@ class AravisSource final : public Source {
   }
 
   Result<> setParameter(std::string_view name, double value) override {
-    if (std::ranges::find(info_.parameters, name) == info_.parameters.end()) {
-      return Error{Error::Code::NotFound,
-                   fmt::format("{} has no parameter \"{}\"; it has: {} (the key parameters adds "
-                               "others of the camera's features)",
-                               info_.model, name, fmt::join(info_.parameters, ", "))};
-    }
-    auto set = Features{connection_.device()}.setNumber(std::string{name}, value);
-    if (!set) return lost(set.error());
-    exposure_ = exposureNow();
-    return {};
+    return set(name, [&](const Features& features) { return features.setNumber(std::string{name}, value); });
+  }
+  Result<> setParameterText(std::string_view name, std::string_view text) override {
+    return set(name, [&](const Features& features) {
+      return features.setText(std::string{name}, std::string{text});
+    });
   }
 
   Result<> trigger() override {
@@ -128,6 +124,20 @@ class AravisSource final : public Source {
   }
 
  private:
+  template <class How>
+  Result<> set(std::string_view name, const How& how) {
+    if (std::ranges::find(info_.parameters, name) == info_.parameters.end()) {
+      return Error{Error::Code::NotFound,
+                   fmt::format("{} has no parameter \"{}\"; it has: {} (the key parameters adds "
+                               "others of the camera's features)",
+                               info_.model, name, fmt::join(info_.parameters, ", "))};
+    }
+    auto done = how(Features{connection_.device()});
+    if (!done) return lost(done.error());
+    exposure_ = exposureNow();
+    return {};
+  }
+
   /// Notes that the camera is gone, if that is what the error says.
   Error lost(Error error) {
     if (error.code == Error::Code::Disconnected && !std::exchange(is_gone_, true))

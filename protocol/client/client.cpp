@@ -187,6 +187,20 @@ Result<> Client::setParameter(std::string_view source, std::string_view name, do
   return {};
 }
 
+Result<> Client::setParameter(std::string_view source, std::string_view name, std::string_view text) {
+  if (auto checked = checkName("source's name", source); !checked) return checked;
+  if (auto checked = checkName("parameter's name", name); !checked) return checked;
+  if (text.size() > wire::kMaxText) {
+    return Error{Error::Code::InvalidArgument, "the text for \"" + std::string{name} + "\" is longer than " +
+                                                   std::to_string(wire::kMaxText) + " bytes"};
+  }
+  if (auto known = state_->connection->checkKnowsTexts(); !known) return known;
+  auto answer = state_->connection->ask<wire::Done>(
+      wire::SetParameter{0, std::string{source}, std::string{name}, 0.0, std::string{text}});
+  if (!answer) return answer.error();
+  return {};
+}
+
 Result<> Client::trigger(std::string_view source) {
   if (auto checked = checkName("source's name", source); !checked) return checked;
   auto answer = state_->connection->ask<wire::Done>(wire::Trigger{0, std::string{source}});

@@ -96,6 +96,16 @@ Result<> Connection::checkKnown(const std::vector<PlaneKind>& planes) const {
                                              std::string{nameOf(*newer)} + ": a newer toftwind has"};
 }
 
+/// An older one would read the number that is beside the text.
+Result<> Connection::checkKnowsTexts() const {
+  if (minor_ >= wire::kFirstMinorWithTexts) return {};
+  return Error{Error::Code::Unsupported,
+               "toftwind at " + transport::toString(address_) + " speaks version 1." +
+                   std::to_string(minor_) +
+                   " of the protocol, whose parameters are numbers: a newer toftwind's are "
+                   "texts, too"};
+}
+
 Error Connection::unexpectedAnswer() const {
   return {Error::Code::Malformed,
           "toftwind at " + transport::toString(address_) + " gave an answer of another kind"};

@@ -64,6 +64,8 @@ class Connection {
   [[nodiscard]] const std::string& software() const { return software_; }
   /// Unsupported if the daemon speaks a version of the protocol that does not know one of these kinds.
   [[nodiscard]] Result<> checkKnown(const std::vector<PlaneKind>& planes) const;
+  /// Whether the daemon takes texts for parameters.
+  [[nodiscard]] Result<> checkKnowsTexts() const;
   /// Ends the connection; whoever waits gets an error.
   void stop();
 

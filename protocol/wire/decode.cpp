@@ -55,6 +55,8 @@ std::vector<Parameter> readParameters(
       parameter.bounds.min = checks.finite(*lowest, "parameter.lowest");
     if (const auto highest = table->highest())
       parameter.bounds.max = checks.finite(*highest, "parameter.highest");
+    if (const auto* text = table->text()) parameter.text = checks.text(text, kMaxText, "parameter.text");
+    parameter.choices = checks.names(table->choices(), "parameter.choices");
   }
   return parameters;
 }
@@ -124,8 +126,10 @@ SetPose read(Checks& checks, std::uint64_t id, const fb::SetPose& t) {
   return {id, checks.name(t.source(), "source"), readPose(checks, *t.world_from_camera())};
 }
 SetParameter read(Checks& checks, std::uint64_t id, const fb::SetParameter& t) {
-  return {id, checks.name(t.source(), "source"), checks.name(t.name(), "name"),
-          checks.finite(t.value(), "value")};
+  SetParameter m{id, checks.name(t.source(), "source"), checks.name(t.name(), "name"),
+                 checks.finite(t.value(), "value")};
+  if (const auto* text = t.text()) m.text = checks.text(text, kMaxText, "text");
+  return m;
 }
 Trigger read(Checks& checks, std::uint64_t id, const fb::Trigger& t) {
   return {id, checks.name(t.source(), "source")};

@@ -47,8 +47,10 @@ Offset<flatbuffers::Vector<Offset<fb::Parameter>>> writeParameters(
     const auto name = writeName(builder, parameter.name);
     flatbuffers::Optional<double> value = flatbuffers::nullopt;
     if (parameter.value) value = *parameter.value;
+    const auto text = parameter.text ? builder.CreateString(*parameter.text) : Offset<flatbuffers::String>{};
+    const auto choices = parameter.choices.empty() ? Offset<Texts>{} : writeNames(builder, parameter.choices);
     tables.push_back(fb::CreateParameter(builder, name, value, endOf(parameter.bounds.min, -kInfinity),
-                                         endOf(parameter.bounds.max, kInfinity)));
+                                         endOf(parameter.bounds.max, kInfinity), text, choices));
   }
   return builder.CreateVector(tables);
 }
@@ -126,7 +128,8 @@ auto write(Builder& b, const SetPose& m) {
 auto write(Builder& b, const SetParameter& m) {
   const auto source = writeName(b, m.source);
   const auto name = writeName(b, m.name);
-  return fb::CreateSetParameter(b, source, name, m.value);
+  const auto text = m.text ? b.CreateString(*m.text) : Offset<flatbuffers::String>{};
+  return fb::CreateSetParameter(b, source, name, m.value, text);
 }
 auto write(Builder& b, const Trigger& m) {
   return fb::CreateTrigger(b, writeName(b, m.source));

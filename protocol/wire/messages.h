@@ -17,7 +17,10 @@
 namespace toftwin::wire {
 
 inline constexpr std::uint16_t kVersionMajor = 1;
-inline constexpr std::uint16_t kVersionMinor = 2;
+inline constexpr std::uint16_t kVersionMinor = 3;
+
+/// Peers of an older minor version know parameters that are numbers, and no others.
+inline constexpr std::uint16_t kFirstMinorWithTexts = 3;
 
 /// The last kind of plane that a peer of this minor version knows: others must not be sent to it.
 constexpr PlaneKind lastPlaneKindOf(std::uint16_t minor) {
@@ -100,7 +103,12 @@ struct Acknowledge { std::uint64_t subscription = 0; std::uint64_t sequence = 0;
 struct SubscriptionEnded { std::uint64_t subscription = 0; Error reason; };
 
 struct SetPose { std::uint64_t id = 0; std::string source; Transform<World, Camera> world_from_camera; };
-struct SetParameter { std::uint64_t id = 0; std::string source; std::string name; double value = 0.0; };
+struct SetParameter {
+  std::uint64_t id = 0;
+  std::string source, name;
+  double value = 0.0;
+  std::optional<std::string> text{};  ///< in place of the value
+};
 struct Trigger { std::uint64_t id = 0; std::string source; };
 /// Starts (or, with an empty path, stops) recording a source on the daemon's machine, into the
 /// daemon's recording folder: `file` is a bare name, never a path.

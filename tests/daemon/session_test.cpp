@@ -238,6 +238,9 @@ TEST(Session, CommandsAreAnsweredWhenTheSourceHasDoneThem) {
   const auto failure = std::get<wire::Failure>(std::get<Message>(talk.later()));
   EXPECT_EQ(failure.id, 12u);
   EXPECT_EQ(failure.error.code, Error::Code::Unsupported);
+  talk.session->handle(wire::SetParameter{13, "cam", "amplitude", 2.0, "far"});
+  EXPECT_EQ(std::get<wire::Failure>(std::get<Message>(talk.later())).error.code, Error::Code::Unsupported)
+      << "the number beside a text is not set";
 }
 
 TEST(Session, UnsubscribingStopsTheSource) {

@@ -22,11 +22,14 @@ using std::chrono::milliseconds;
 void losesAndFinds(std::string_view what, const std::function<void(EmulatedGige&)>& lose,
                    const std::function<void(EmulatedGige&)>& giveBack) {
   EmulatedGige camera{ownLoopbackAddress()};
-  RecoveryRig rig{[&] { return openWith(camera.address()); }};
+  RecoveryRig rig{[&] { return openWith(camera.address(), "parameters = ['Gain', 'TriggerActivation']"); }};
   ASSERT_TRUE(rig.isSubscribed());
   const Result<> set =
       rig.command([](drivers::Source& source) { return source.setParameter("Gain", 7.0); });
   ASSERT_TRUE(set.ok()) << set.error().message;
+  const Result<> chosen = rig.command(
+      [](drivers::Source& source) { return source.setParameterText("TriggerActivation", "FallingEdge"); });
+  ASSERT_TRUE(chosen.ok()) << chosen.error().message;
   const auto outcome = rig.loseAndFind(
       what, milliseconds{700}, [&] { lose(camera); }, [&] { giveBack(camera); });
   ASSERT_TRUE(outcome.has_value());
@@ -39,6 +42,7 @@ void losesAndFinds(std::string_view what, const std::function<void(EmulatedGige&
   EXPECT_NEAR(static_cast<double>(first.dropped_by_device + 1), gap_ms / 20.0, 2.0);
   EXPECT_GT(first.moment.exposures[0].start, last.moment.exposures[0].start);
   EXPECT_EQ(camera.reg(EmulatedGige::kGain), 7u) << "what a client had set is set again";
+  EXPECT_EQ(camera.reg(EmulatedGige::kTriggerActivation), 1u);
 }
 
 TEST(AravisRecovery, ARebootedCameraIsBackWithinASecond) {
@@ -175,6 +179,32 @@ TEST(AravisLibrary, ItsOwnCameraIsCompliantAndTriggered) {
   for (const char* trigger : {"", "trigger = 'software'\n"}) {
     expectCompliant(fmt::format("{}{}", LibraryCamera::kKeys, trigger));
   }
+}
+
+TEST(AravisLibrary, FeaturesOfItsOwnCameraAreReadAndSetByName) {
+  LibraryCamera camera;
+  ASSERT_TRUE(camera.waitFor().ok());
+  const auto source =
+      openWith("127.0.0.1", fmt::format("{}parameters = ['GainAuto', 'TestBoolean', 'TestStringReg']",
+                                        std::string{LibraryCamera::kKeys}.substr(
+                                            0, std::string_view{LibraryCamera::kKeys}.find("parameters"))));
+  ASSERT_TRUE(source.ok()) << source.error().message;
+  const auto before = (*source)->state().parameters;
+  ASSERT_EQ(before.size(), 3U);
+  EXPECT_EQ(before[0].choices, (std::vector<std::string>{"Off", "Once", "Continuous"}));
+  EXPECT_EQ(before[1].choices, (std::vector<std::string>{"false", "true"}));
+  EXPECT_TRUE(before[2].text && !before[2].value && before[2].choices.empty());
+  for (const auto& [name, text] :
+       {std::pair{"GainAuto", "Continuous"}, {"TestBoolean", "true"}, {"TestStringReg", "dock 3"}}) {
+    const Result<> set = (*source)->setParameterText(name, text);
+    EXPECT_TRUE(set.ok()) << name << ": " << set.error().message;
+  }
+  const auto after = (*source)->state().parameters;
+  EXPECT_EQ(after[0].text, "Continuous");
+  EXPECT_EQ(after[0].value, 2.0) << "the entry's own number";
+  EXPECT_EQ(after[1].text, "true");
+  EXPECT_EQ(after[1].value, 1.0);
+  EXPECT_EQ(after[2].text, "dock 3");
 }
 
 TEST(AravisLibrary, ItsOwnCameraIsBackWithinASecondAfterItsProcessWasKilled) {

@@ -313,6 +313,43 @@ TEST_F(AravisDriver, ParametersAreTheCamerasFeatures) {
   }
 }
 
+TEST_F(AravisDriver, ChoicesSwitchesAndTextsAreReadAndSetByName) {
+  const auto source = started("parameters = ['TriggerActivation', 'FlyingPixelFilter', 'UserText', 'Gain']");
+  ASSERT_NE(source, nullptr);
+  const auto before = source->state().parameters;
+  EXPECT_EQ(before.at(0).text, "RisingEdge");
+  EXPECT_EQ(before[0].choices, (std::vector<std::string>{"RisingEdge", "FallingEdge"}));
+  EXPECT_EQ(before[1].text, "false");
+  EXPECT_EQ(before[1].choices, (std::vector<std::string>{"false", "true"}));
+  EXPECT_TRUE(before[2].text && !before[2].value && before[2].choices.empty()) << "a text is no number";
+  EXPECT_FALSE(before[3].text) << "a number is no text";
+  ASSERT_TRUE(source->setParameterText("TriggerActivation", "FallingEdge").ok());
+  ASSERT_TRUE(source->setParameterText("FlyingPixelFilter", "true").ok());
+  ASSERT_TRUE(source->setParameterText("UserText", "dock 3").ok());
+  ASSERT_TRUE(source->setParameterText("Gain", "7").ok()) << "a number may come as a text";
+  EXPECT_EQ(camera_.reg(Emulated::kTriggerActivation), 1u);
+  EXPECT_EQ(camera_.reg(Emulated::kFilter), 1u);
+  EXPECT_EQ(camera_.reg(Emulated::kUserText), 0x646F636BU) << "dock";
+  EXPECT_EQ(camera_.reg(Emulated::kGain), 7u);
+  const auto after = source->state().parameters;
+  EXPECT_EQ(after[0].text, "FallingEdge");
+  EXPECT_EQ(after[0].value, 1.0);
+  EXPECT_EQ(after[1].text, "true");
+  EXPECT_EQ(after[2].text, "dock 3");
+  for (const auto& [name, wrong, says] :
+       {std::tuple{"TriggerActivation", "AnyEdge", "one of: RisingEdge, FallingEdge"},
+        {"FlyingPixelFilter", "maybe", "a number"},
+        {"UserText", "a name of more than 16 bytes", "at most 16 bytes"},
+        {"Gain", "loud", "a number"},
+        {"PixelFormat", "Mono16", "it has: TriggerActivation"}}) {
+    const auto set = source->setParameterText(name, wrong);
+    ASSERT_FALSE(set.ok()) << name;
+    EXPECT_NE(set.error().message.find(says), std::string::npos) << set.error().message;
+  }
+  EXPECT_EQ(source->state().parameters[2].text, "dock 3") << "nothing of it was written";
+  EXPECT_TRUE(nextFrame(*source).ok());
+}
+
 TEST_F(AravisDriver, ByDefaultExposureAndGainAreParameters) {
   const auto source = open();
   ASSERT_TRUE(source.ok());
@@ -342,7 +379,7 @@ TEST_F(AravisDriver, WrongKeysSayWhatThereIs) {
         {"pixel_format = 'RGB8'", "one of: Coord3D_C8"},
         {"pixel_format = 'BayerRG8'", "cannot be read"},
         {"trigger = 'hardware'\ntrigger_source = 'Line9'", "it has: Software, Line1"},
-        {"parameters = ['UserText']", "is a number"},
+        {"parameters = ['TriggerSoftware']", "is a number, a switch, a choice or a text"},
         {"lens.fx = 1\nlens.field_of_view_deg = 2", "leave one out"},
         {"buffers = 1", "buffers"}}) {
     expectRefused(keys, says);
@@ -407,7 +444,7 @@ TEST_F(AravisDriver, IsCompliantWithSeveralImages) { expectCompliant(camera_, ""
 TEST_F(AravisDriver, IsCompliantWithOneImage) {
   expectCompliant(camera_,
                   "components = ['Range']\nparameters = ['ExposureTime', 'Gain', "
-                  "'FlyingPixelFilter', 'TriggerActivation']");
+                  "'FlyingPixelFilter', 'TriggerActivation', 'UserText']");
 }
 TEST_F(AravisDriver, IsCompliantWithPoints) {
   expectCompliant(camera_, "components = ['Range']\npixel_format = 'Coord3D_ABC32f'");

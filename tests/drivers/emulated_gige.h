@@ -67,7 +67,7 @@ class EmulatedGige {
                                  kFocal = 0x10060, kEnable = 0x10120, kFormat = 0x10140, kControl = 0x0A00,
                                  kHeartbeat = 0x0938, kActivation = 0x10024, kInvalid = 0x10240,
                                  kPtp = 0x100A0, kPtpStatus = 0x100A4, kPtpLatch = 0x100A8,
-                                 kMultipartAble = 0x0D20, kUserText = 0x100B0;
+                                 kMultipartAble = 0x0D20, kUserText = 0x100B0, kTriggerActivation = 0x10024;
 
   // What it sends in frame n:
   static std::uint16_t rangeCode(std::uint64_t n, int x, int y);  ///< 0: no value

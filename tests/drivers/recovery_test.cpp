@@ -158,6 +158,21 @@ TEST(Recovery, SettingsThatClientsChangedAreSetAgainAndOnlyThose) {
   EXPECT_TRUE(life.recovery.settings().parameters.empty());
 }
 
+TEST(Recovery, AChoiceIsSetAgainByItsName) {
+  Life life;
+  life.state.parameters[1] = {.name = "gain", .value = 0.0, .text = "Low", .choices = {"Low", "High"}};
+  life.open();
+  SourceState changed = life.state;
+  changed.parameters[1].text = "High";  // and its number is not told
+  changed.parameters[1].value.reset();
+  life.recovery.changed(changed);
+  life.lose();
+  life.open();
+  const auto settings = life.recovery.settings();
+  ASSERT_EQ(settings.parameters.size(), 1u);
+  EXPECT_EQ(settings.parameters[0].text, "High");
+}
+
 TEST(Recovery, DeviceTimeGoesOnWhenTheCamerasClockBeginsAnew) {
   Life life;
   life.open();

@@ -174,6 +174,13 @@ void addHeaders(std::vector<BadMessage>& all) {
       messageOf(fb::Body::SetParameter,
                 [](Builder& b) { return fb::CreateSetParameterDirect(b, "k", "p", kNaN).Union(); }),
       "not a finite number");
+  add("parameter-text-long",
+      messageOf(fb::Body::SetParameter,
+                [](Builder& b) {
+                  const std::string text(4097, 'x');
+                  return fb::CreateSetParameterDirect(b, "k", "p", 0.0, text.c_str()).Union();
+                }),
+      "text is longer than 4096 bytes");
   add("no-pose",
       messageOf(fb::Body::SetPose,
                 [](Builder& b) { return fb::CreateSetPoseDirect(b, "k").Union(); }),

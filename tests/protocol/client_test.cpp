@@ -49,8 +49,9 @@ INSTANTIATE_TEST_SUITE_P(TcpAndUnix, ClientOn,
                          });
 
 TEST_P(ClientOn, EveryRequestGetsItsAnswer) {
+  std::atomic<bool> is_set_to_far{false};
   FakeDaemon daemon{
-      GetParam(), FakeDaemon::polite([](Session& session, const wire::Message& message) {
+      GetParam(), FakeDaemon::polite([&is_set_to_far](Session& session, const wire::Message& message) {
         const auto done = [&](std::uint64_t id, std::string detail) {
           session.send(wire::Done{id, detail});
         };
@@ -69,6 +70,7 @@ TEST_P(ClientOn, EveryRequestGetsItsAnswer) {
         } else if (auto* pose = std::get_if<wire::SetPose>(&message)) {
           done(pose->id, "");
         } else if (auto* parameter = std::get_if<wire::SetParameter>(&message)) {
+          is_set_to_far = parameter->text == "far";
           done(parameter->id, "");
         } else if (auto* trigger = std::get_if<wire::Trigger>(&message)) {
           done(trigger->id, "");
@@ -89,6 +91,9 @@ TEST_P(ClientOn, EveryRequestGetsItsAnswer) {
   EXPECT_TRUE(details->can_lockstep);
   EXPECT_TRUE(client->setPose("kinect", {}));
   EXPECT_TRUE(client->setParameter("kinect", "ambient_klx", 3.0));
+  EXPECT_FALSE(is_set_to_far);
+  EXPECT_TRUE(client->setParameter("kinect", "mode", "far"));
+  EXPECT_TRUE(is_set_to_far);
   EXPECT_TRUE(client->trigger("kinect"));
   EXPECT_EQ(*client->startRecording("kinect", "a.mcap"), "/rec/a.mcap");
   EXPECT_EQ(*client->stopRecording("kinect"), "/rec/stopped");
@@ -450,6 +455,9 @@ TEST_P(ClientOn, AsksAnOlderDaemonForNoPlaneThatItDoesNotKnow) {
   EXPECT_THAT(refused.error().message,
               testing::HasSubstr("version 1.1 of the protocol, which has no plane light_sigma"));
   EXPECT_TRUE(client->subscribe("kinect", {.planes = {PlaneKind::Range, PlaneKind::Color}}));
+  const auto text = client->setParameter("kinect", "mode", "far");
+  ASSERT_FALSE(text) << "an older daemon would set the number beside it";
+  EXPECT_EQ(text.error().code, Error::Code::Unsupported);
 }
 
 // ---- bad input of the application
@@ -465,6 +473,7 @@ TEST(Client, ArgumentsThatCannotBeRightAreRefusedAtOnce) {
   EXPECT_EQ(codeOf(client->setPose("k", {{nan, 0, 0, 0}, {}})), invalid);
   EXPECT_EQ(codeOf(client->setPose("k", {{1, 0, 0, 0}, {nan, 0, 0}})), invalid);
   EXPECT_EQ(codeOf(client->setParameter("k", "p", nan)), invalid);
+  EXPECT_EQ(codeOf(client->setParameter("k", "p", std::string(5000, 'x'))), invalid);
   EXPECT_EQ(codeOf(client->describe(std::string(300, 'k'))), invalid);
   EXPECT_EQ(codeOf(client->startRecording("k", "")), invalid);
   EXPECT_EQ(codeOf(client->subscribe("k", {.decimation = 0})), invalid);

@@ -90,6 +90,10 @@ std::vector<Refused> refusedRequests() {
   bad_bound.parameters = {{"gain", 1.0, {kInfinity, kInfinity}}};  // none is minus infinity
   long_parameter.parameters = {{long_name}};
   many_parameters.parameters.resize(kMaxNames + 1);
+  SourceDescription long_text, long_choice, many_choices;
+  long_text.parameters = {{.name = "user", .text = std::string(kMaxText + 1, 'x')}};
+  long_choice.parameters = {{.name = "mode", .text = "a", .choices = {long_name}}};
+  many_choices.parameters = {{.name = "mode", .text = "a", .choices = many}};
   bad_pose.world_from_camera = Transform<World, Camera>{{kNaN, 0, 0, 0}, {}};
   return {
       {Hello{1, long_name, {}}, "software"},
@@ -103,6 +107,9 @@ std::vector<Refused> refusedRequests() {
       {bad_bound, "parameter.lowest"},
       {long_parameter, "parameter.name"},
       {many_parameters, "parameters"},
+      {long_text, "parameter.text"},
+      {long_choice, "parameter.choices"},
+      {many_choices, "parameter.choices"},
       {bad_pose, "pose.rotation_w"},
       {bad_rate, "max_rate_hz"},
       {bad_policy, "policy"},
@@ -110,6 +117,7 @@ std::vector<Refused> refusedRequests() {
       {many_planes, "planes"},
       {SetPose{1, "k", {{1, 0, 0, kNaN}, {}}}, "pose.rotation_z"},
       {SetParameter{1, "k", "p", kInfinity}, "value"},
+      {SetParameter{1, "k", "p", 0.0, std::string(kMaxText + 1, 'x')}, "text"},
       {Record{1, "k", long_name}, "file"},
       {Health{1, -1_s, 0, {}}, "uptime_s"},
       {Health{1, 1_s, 0, std::vector<SourceHealth>(kMaxSources + 1)}, "sources"},
@@ -190,7 +198,7 @@ class Random {
       case 2:
         return SetPose{bits_(), name(), pose()};
       case 3:
-        return SetParameter{bits_(), name(), name(), number()};
+        return SetParameter{bits_(), name(), name(), number(), name()};
       case 4:
         return Health{bits_(),
                       number() * second,
@@ -244,7 +252,8 @@ class Random {
     d.camera = camera();
     d.planes = kinds();
     if (below(2) == 0) d.frame_interval = number() * second;
-    for (const auto& one : names()) d.parameters.push_back({one, number(), {-kInfinity, number()}});
+    for (const auto& one : names())
+      d.parameters.push_back({one, number(), {-kInfinity, number()}, name(), names()});
     if (below(2) == 0) d.world_from_camera = pose();
     return d;
   }

@@ -87,6 +87,20 @@ SourceDescription fullDescription() {
               Transform<World, Camera>{{0.5, -0.5, 0.5, 0.5}, {1.0, -2.0, 0.25}}};
 }
 
+SourceDescription describedTexts() {
+  SourceDescription described;
+  described.id = 4;
+  described.summary.name = "gige";
+  described.driver = "aravis";
+  described.parameters = {{.name = "TriggerActivation",
+                           .value = 1.0,
+                           .bounds = {0.0, 1.0},
+                           .text = "FallingEdge",
+                           .choices = {"RisingEdge", "FallingEdge"}},
+                          {.name = "DeviceUserID", .text = ""}};
+  return described;
+}
+
 Subscribe fullSubscribe() {
   return {.id = 5,
           .source = "kinect",
@@ -138,13 +152,15 @@ std::vector<ExampleMessage> exampleMessages() {
       {"hello", Hello{1, "toftwind 0.1.0", {"memfd"}}},
       {"hello-bare", Hello{}},
       {"list-sources", ListSources{2}},
-      {"source-list",
-       SourceList{2, {summary(), {"o3d", "O3D303", "", FrameKind::Replayed, false},
-                      {"xtion", "", "", FrameKind::Real, false, "no camera at usb:1-4"}}}},
+      {"source-list", SourceList{2,
+                                 {summary(),
+                                  {"o3d", "O3D303", "", FrameKind::Replayed, false},
+                                  {"xtion", "", "", FrameKind::Real, false, "no camera at usb:1-4"}}}},
       {"source-list-empty", SourceList{2, {}}},
       {"describe-source", DescribeSource{4, "kinect"}},
       {"source-description", fullDescription()},
       {"source-description-bare", SourceDescription{}},
+      {"source-description-texts", describedTexts()},
       {"subscribe", fullSubscribe()},
       {"subscribe-bare", Subscribe{.id = 6, .source = "kinect", .planes = {}, .region = {}}},
       {"subscribed", Subscribed{5, 77}},
@@ -152,10 +168,11 @@ std::vector<ExampleMessage> exampleMessages() {
       {"frame", FrameMessage{77, richFrame()}},
       {"frame-bare", FrameMessage{78, bareFrame()}},
       {"acknowledge", Acknowledge{77, 41}},
-      {"subscription-ended",
-       SubscriptionEnded{77, {Error::Code::EndOfStream, "the recording ended"}}},
+      {"subscription-ended", SubscriptionEnded{77, {Error::Code::EndOfStream, "the recording ended"}}},
       {"set-pose", SetPose{8, "kinect", pose()}},
       {"set-parameter", SetParameter{9, "kinect", "ambient_klx", 0.1}},
+      {"set-parameter-text", SetParameter{9, "gige", "TriggerActivation", 0.0, "FallingEdge"}},
+      {"set-parameter-empty-text", SetParameter{9, "gige", "DeviceUserID", 0.0, ""}},
       {"trigger", Trigger{10, "o3d"}},
       {"record", Record{11, "kinect", "monday.mcap"}},
       {"done", Done{11, "/var/lib/toftwin/monday.mcap"}},

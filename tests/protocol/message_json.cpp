@@ -155,6 +155,8 @@ class Renderer {
     if (m.value) field("value", *m.value);
     if (std::isfinite(m.bounds.min)) field("lowest", m.bounds.min);
     if (std::isfinite(m.bounds.max)) field("highest", m.bounds.max);
+    if (m.text) field("text", *m.text);
+    field("choices", m.choices);
   }
   void fields(const CameraInfo& m) {
     const auto& [k1, k2, p1, p2, k3] = m.distortion;
@@ -305,6 +307,7 @@ class Renderer {
     field("source", m.source);
     field("name", m.name);
     field("value", m.value);
+    if (m.text) field("text", *m.text);
   }
   void fields(const Trigger& m) { field("source", m.source); }
   void fields(const Record& m) {

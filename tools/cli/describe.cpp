@@ -102,11 +102,18 @@ compare::Json toJson(const std::vector<Parameter>& parameters) {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();  // null
   compare::Json all = compare::Json::array();
   for (const Parameter& parameter : parameters) {
-    all.push(compare::Json::object()
-                 .set("name", parameter.name)
-                 .set("value", parameter.value.value_or(kNone))
-                 .set("lowest", parameter.bounds.min)
-                 .set("highest", parameter.bounds.max));
+    compare::Json one = compare::Json::object();
+    one.set("name", parameter.name)
+        .set("value", parameter.value.value_or(kNone))
+        .set("lowest", parameter.bounds.min)
+        .set("highest", parameter.bounds.max);
+    if (parameter.text) one.set("text", *parameter.text);
+    if (!parameter.choices.empty()) {
+      compare::Json choices = compare::Json::array();
+      for (const std::string& choice : parameter.choices) choices.push(choice);
+      one.set("choices", std::move(choices));
+    }
+    all.push(std::move(one));
   }
   return all;
 }
@@ -116,8 +123,12 @@ std::string toText(const std::vector<Parameter>& parameters) {
   for (const Parameter& parameter : parameters) width = std::max(width, parameter.name.size());
   std::string text;
   for (const Parameter& parameter : parameters) {
-    const std::string bounds = settings::describe(parameter.bounds);
-    const std::string value = parameter.value ? fmt::format("{:.9g}", *parameter.value) : "-";
+    const std::string bounds = parameter.choices.empty()
+                                   ? settings::describe(parameter.bounds)
+                                   : fmt::format("one of {}", fmt::join(parameter.choices, ", "));
+    const std::string value = parameter.text    ? *parameter.text
+                              : parameter.value ? fmt::format("{:.9g}", *parameter.value)
+                                                : "-";
     text += bounds.empty() ? fmt::format("  {:<{}}  {}\n", parameter.name, width, value)
                            : fmt::format("  {:<{}}  {:<12} {}\n", parameter.name, width, value,
                                          bounds);

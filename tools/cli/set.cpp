@@ -16,7 +16,7 @@ struct Options {
   DaemonOptions daemon;
   std::string source;
   std::string key;
-  std::optional<double> value;
+  std::optional<std::string> value;
   bool json = false;
 };
 
@@ -28,14 +28,18 @@ Result<> split(Options& options) {
     return Error{Error::Code::InvalidArgument, fmt::format("{}: {}", options.key, what)};
   };
   if (options.value) return wrong("a second value follows; give one, as KEY VALUE or KEY=VALUE");
-  const std::string number = options.key.substr(equals + 1);
-  const char* end = number.data() + number.size();
-  double value = 0.0;
-  const auto [read, error] = std::from_chars(number.data(), end, value);
-  if (equals == 0 || error != std::errc{} || read != end) return wrong("write KEY=VALUE with a number");
-  options.value = value;
+  if (equals == 0) return wrong("write KEY=VALUE, with the parameter's name first");
+  options.value = options.key.substr(equals + 1);
   options.key.resize(equals);
   return {};
+}
+
+std::optional<double> numberIn(const std::string& text) {
+  const char* end = text.data() + text.size();
+  double number = 0.0;
+  const auto [read, error] = std::from_chars(text.data(), end, number);
+  if (error != std::errc{} || read != end) return std::nullopt;
+  return number;
 }
 
 /// All parameters of the source, or the one that is asked for.
@@ -53,12 +57,24 @@ Result<std::vector<Parameter>> parametersOf(Client& client, const Options& optio
                            known.empty() ? "none" : known)};
 }
 
+/// A number as such, but to a parameter that is a text alone: "7" may be what a camera is called. To one that
+/// has no text, the daemon says what it takes.
+Result<> setTo(Client& client, const Options& options) {
+  const auto number = numberIn(*options.value);
+  if (number) {
+    const auto now = parametersOf(client, options);
+    if (!now) return now.error();
+    const Parameter& parameter = now->front();
+    if (parameter.value || !parameter.text) return client.setParameter(options.source, options.key, *number);
+  }
+  return client.setParameter(options.source, options.key, *options.value);
+}
+
 Result<Exit> run(const Options& options) {
   auto client = options.daemon.connect();
   if (!client) return client.error();
   if (options.value) {
-    auto set = client->setParameter(options.source, options.key, *options.value);
-    if (!set) return set.error();
+    if (auto set = setTo(*client, options); !set) return set.error();
   }
   const auto parameters = parametersOf(*client, options);
   if (!parameters) return parameters.error();
@@ -75,12 +91,14 @@ Command setCommand() {
           "  toftwin set kinect                             all, with their values and bounds\n"
           "  toftwin set kinect ambient_klx 20\n"
           "  toftwin set kinect ambient_klx=20              the same\n"
-          "  toftwin set kinect exposure_us                 shows this one\n",
+          "  toftwin set kinect exposure_us                 shows this one\n"
+          "  toftwin set gige TriggerActivation FallingEdge  one of its choices, by name\n",
           [](Arguments& args) -> Run {
             const auto options = std::make_shared<Options>();
             args.option("SOURCE", options->source, "name of the camera").required();
             args.option("KEY", options->key, "the parameter; its name ends in its unit; KEY=VALUE sets it");
-            args.option("VALUE", options->value, "a number; without it the present one is shown");
+            args.option("VALUE", options->value,
+                        "a number, a choice or a text; without it the present one is shown");
             args.flag("--json", options->json, "as JSON");
             args.check([options] { return split(*options); });
             options->daemon.add(args);

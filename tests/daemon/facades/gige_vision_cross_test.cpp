@@ -116,6 +116,34 @@ TEST_F(GigeVisionCross, PointsAreTheNativeRangesAlongTheirRays) {
   });
 }
 
+TEST_F(GigeVisionCross, FeaturesAreReadAndSetByNameThroughTheProtocol) {
+  startGige(kSmallSim, "",
+            "[[source]]\nname = 'gige'\ndriver = 'aravis'\nuri = 'aravis:{}'\n"
+            "parameters = ['Scan3dCoordinateSystem', 'PtpEnable', 'AcquisitionFrameRate']\n");
+  auto native = client();
+  Result<SourceDetails> details = Error{Error::Code::Timeout, ""};
+  ASSERT_TRUE(eventually([&] { return (details = native.describe("gige")).ok(); }))
+      << details.error().message;
+  ASSERT_EQ(details->parameters.size(), 3U);
+  EXPECT_EQ(details->parameters[0].text, "Cartesian");
+  EXPECT_THAT(details->parameters[0].choices, testing::UnorderedElementsAre("Cartesian", "Spherical"));
+  EXPECT_EQ(details->parameters[1].text, "false");
+  EXPECT_FALSE(details->parameters[2].text);
+  for (const auto& [name, text] : {std::pair{"Scan3dCoordinateSystem", "Spherical"}, {"PtpEnable", "true"}}) {
+    const auto set = native.setParameter("gige", name, text);
+    EXPECT_TRUE(set.ok()) << set.error().message;
+  }
+  details = native.describe("gige");
+  ASSERT_TRUE(details.ok());
+  EXPECT_EQ(details->parameters[0].text, "Spherical");
+  EXPECT_EQ(details->parameters[1].text, "true");
+  EXPECT_EQ(details->parameters[1].value, 1.0);
+  const auto unknown = native.setParameter("gige", "Scan3dCoordinateSystem", "Cylindrical");
+  ASSERT_FALSE(unknown.ok());
+  EXPECT_EQ(unknown.error().code, Error::Code::InvalidArgument);
+  EXPECT_THAT(unknown.error().message, testing::HasSubstr("Spherical"));
+}
+
 TEST_F(GigeVisionCross, CountsOfPointsAreWithinHalfACountOfThem) {
   startGige(kSmallSim);
   compare("components = ['Range']\npixel_format = 'Coord3D_ABC16'",

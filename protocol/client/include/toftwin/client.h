@@ -118,6 +118,8 @@ class Client {
   Result<Subscription> subscribe(std::string_view source, SubscribeOptions options = {});
   Result<> setPose(std::string_view source, const Transform<World, Camera>& world_from_camera);
   Result<> setParameter(std::string_view source, std::string_view name, double value);
+  /// Of a parameter that has a text; of one with choices, one of these.
+  Result<> setParameter(std::string_view source, std::string_view name, std::string_view text);
   Result<> trigger(std::string_view source);
   /// Records on the daemon's side, into its recording folder; gives the path there.
   Result<std::string> startRecording(std::string_view source, std::string_view file_name);
