@@ -51,7 +51,10 @@ std::vector<double> frequenciesIn(const std::vector<Exposure>& exposures) {
 }
 
 std::string frequenciesInWords(const std::vector<double>& all) {
-  return all.empty() ? "no modulation" : fmt::format("{:.6g} MHz", fmt::join(all, ", "));
+  if (all.empty()) return "no modulation";
+  std::string words;
+  for (const double one : all) words += fmt::format("{}{:.6g}", words.empty() ? "" : ", ", one);
+  return words + " MHz";
 }
 
 }  // namespace
