@@ -21,28 +21,36 @@ Set sorted(Set names) {
   return names;
 }
 
-/// What a curve of this set of covariates is multiplied with, if it is the same for all of its terms.
-const Term* carrierOf(const Context& context, const Set& set) {
+/// What curves of this set of covariates are multiplied with, where it is the same for all terms of one: a
+/// carrier, or several of one name.
+std::vector<const Term*> carriersAlong(const Context& context, const Set& set) {
+  std::vector<const Term*> carriers;
   for (const TermGroup& group : context.generic) {
     if (group.terms.empty() || sorted(covariatesOf(group)) != set) continue;
     const Term& first = group.terms.front();
     const bool is_one = std::ranges::all_of(
         group.terms, [&](const Term& term) { return term.carrier == first.carrier && !term.factors.empty(); });
-    if (is_one && !first.carrier.empty()) return &first;
+    const bool is_new =
+        std::ranges::none_of(carriers, [&](const Term* other) { return other->carrier == first.carrier; });
+    if (is_one && is_new && !first.carrier.empty()) carriers.push_back(&first);
   }
-  return nullptr;
+  return carriers;
 }
 
 /// The formulas of a covariate, for what light does along it: as likely as for the range.
 std::vector<Form> carriedForms(const Context& context, const Set& set) {
-  const Term* carried = carrierOf(context, set);
+  const auto carriers = carriersAlong(context, set);
   const auto covariate = std::ranges::find_if(
       set, [&](const std::string& name) { return infoOf(context, name) != nullptr; });
-  if (carried == nullptr || set.size() != 2 || covariate == set.end()) return {};
-  std::vector<Form> forms = formsIn(*infoOf(context, *covariate));
-  for (Form& form : forms) {
-    form.name = fmt::format("{}: {}", carried->carrier, form.name);
-    form.stage = carried->stage, form.carrier = carried->carrier;
+  if (set.size() != 2 || covariate == set.end()) return {};
+  std::vector<Form> forms;
+  for (const Term* carried : carriers) {
+    std::vector<Form> of_one = formsIn(*infoOf(context, *covariate));
+    for (Form& form : of_one) {
+      form.name = fmt::format("{}: {}", carried->carrier, form.name);
+      form.stage = carried->stage, form.carrier = carried->carrier;
+      forms.push_back(std::move(form));
+    }
   }
   return forms;
 }
@@ -112,10 +120,11 @@ std::vector<Explanation> explanationsFor(const Context& context, const std::vect
     for (const std::string& name : set)
       if (const CovariateInfo* info = infoOf(context, name)) infos.push_back(info);
     const bool has_carrier = infos.size() < set.size();
-    const Term* carried = has_carrier ? carrierOf(context, set) : nullptr;
-    if (has_carrier && carried == nullptr) continue;
+    std::vector<const Term*> carriers{nullptr};
+    if (has_carrier) carriers = carriersAlong(context, set);
     if (infos.size() == 1) {
-      for (TermGroup& finer : finerCurves(*infos[0], carried)) all.push_back(curve(std::move(finer)));
+      for (const Term* carried : carriers)
+        for (TermGroup& finer : finerCurves(*infos[0], carried)) all.push_back(curve(std::move(finer)));
     } else if (!has_carrier) {
       all.push_back(sumOf(*infoOf(context, set[0]), *infoOf(context, set[1])));
     }

@@ -21,8 +21,10 @@
 #include "sim/effects/internal_reflection.h"
 #include "sim/effects/lag.h"
 #include "sim/effects/learned_light.h"
+#include "sim/effects/learned_mirror.h"
 #include "sim/effects/learned_neighbours.h"
 #include "sim/effects/learned_range.h"
+#include "sim/effects/learned_shift.h"
 #include "sim/effects/lens_ghost.h"
 #include "sim/effects/lens_scatter.h"
 #include "sim/effects/low_amplitude_filter.h"
@@ -53,9 +55,9 @@ using AllEffects = EffectList<
     Harmonics, RiseDrift, DutyDrift, ThermalDelay, FrequencyOffset,                     // light: emission
     AmbientLight,                                                                       // the scene
     DistortionMisfit, Defocus, Vignetting, LensScatter, LensGhost, InternalReflection,  // optics
-    LearnedNeighbours, LearnedLight,                 // what has no name yet
-    PropagationDelay, FixedPatternPhase, StepPhase,  // demodulation
-    Lag, ShotNoise, AmbientSuppression, Saturation,  // samples: the pixel
+    LearnedShift, LearnedNeighbours, LearnedMirror, LearnedLight,  // what has no name yet
+    PropagationDelay, FixedPatternPhase, StepPhase,                // demodulation
+    Lag, ShotNoise, AmbientSuppression, Saturation,                // samples: the pixel
     Nonlinearity, SampleGain, SampleOffset, ColumnComb, ReadNoise, Quantisation, Companding,  // the converter
     RangeNoise, WarmUp, TimeWalk, ClockScale, ResidualDrift, Delay, CalibrationTable,  // range: decoding
     LearnedRange,                                                                      // what has no name yet

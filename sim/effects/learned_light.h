@@ -35,10 +35,10 @@ struct LearnedLight {
 
   template <class Visitor>
   void visit(Visitor& v) {
-    chooseOver(v, "over", over,
-               "x: what it goes with; incidence is 1/cos, a surrounding ln(mean of a square/own)");
+    chooseLearnedOver<0, kLearnedOfImage>(
+        v, "over", over, "x: what it goes with; incidence is 1/cos, a surrounding ln(mean of a square/own)");
     v.numbers("knots", knots, {-1e12, 1e12}, "values of x, ascending; none: nothing is done");
-    chooseOver(v, "and_over", and_over, "y: what else it goes with");
+    chooseLearnedOver<0, kLearnedOfImage>(v, "and_over", and_over, "y: what else it goes with");
     v.numbers("and_knots", and_knots, {-1e12, 1e12}, "values of y, ascending");
     v.numbers("delays_mm", delays_mm, {-10'000.0, 10'000.0},
               "t at each knot, of range; with y: for the first x all y, then for the next x; none: 0");
@@ -50,26 +50,6 @@ struct LearnedLight {
     return problemOf({knots, and_knots}, over, and_over, {"delays_mm", delays_mm}, gains_percent);
   }
   [[nodiscard]] Light apply(Light light, const Conditions& now, const Random& random) const;
-
-  template <class Visitor>
-  static void chooseOver(Visitor& v, const char* key, Over& value, const char* meaning) {
-    v.choice(key, value,
-             {{"nothing", Over::Nothing},
-              {"time_s", Over::Time},
-              {"temperature_illumination_c", Over::Illumination},
-              {"temperature_sensor_c", Over::Sensor},
-              {"ambient_klx", Over::Ambient},
-              {"exposure_us", Over::Exposure},
-              {"range_m", Over::Range},
-              {"column", Over::Column},
-              {"row", Over::Row},
-              {"radius_px", Over::Radius},
-              {"incidence", Over::Incidence},
-              {"surround_4px", Over::Surround4},
-              {"surround_16px", Over::Surround16},
-              {"surround_all", Over::SurroundAll}},
-             meaning);
-  }
 };
 
 }  // namespace toftwin::sim

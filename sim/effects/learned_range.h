@@ -31,9 +31,10 @@ struct LearnedRange {
 
   template <class Visitor>
   void visit(Visitor& v) {
-    chooseOver(v, "over", over, "x: what the error goes with; the radius is about the principal point");
+    chooseLearnedOver<kLearnedOfLight, 0>(
+        v, "over", over, "x: what the error goes with; the radius is about the principal point");
     v.numbers("knots", knots, {-1e12, 1e12}, "values of x, ascending; none: nothing is done");
-    chooseOver(v, "and_over", and_over, "y: what else it goes with");
+    chooseLearnedOver<kLearnedOfLight, 0>(v, "and_over", and_over, "y: what else it goes with");
     v.numbers("and_knots", and_knots, {-1e12, 1e12}, "values of y, ascending");
     v.numbers("offsets_mm", offsets_mm, {-10'000.0, 10'000.0},
               "t at each knot; with y: for the first x all y, then for the next x; none: 0");
@@ -53,23 +54,6 @@ struct LearnedRange {
     return LearnedKnots{knots, and_knots}.valueIn(gains_percent, x, y);
   }
   [[nodiscard]] RangeImage apply(RangeImage image, const Conditions& now, const Random& random) const;
-
-  template <class Visitor>
-  static void chooseOver(Visitor& v, const char* key, Over& value, const char* meaning) {
-    v.choice(key, value,
-             {{"nothing", Over::Nothing},
-              {"time_s", Over::Time},
-              {"temperature_illumination_c", Over::Illumination},
-              {"temperature_sensor_c", Over::Sensor},
-              {"ambient_klx", Over::Ambient},
-              {"exposure_us", Over::Exposure},
-              {"range_m", Over::Range},
-              {"amplitude_e", Over::Amplitude},
-              {"column", Over::Column},
-              {"row", Over::Row},
-              {"radius_px", Over::Radius}},
-             meaning);
-  }
 };
 
 }  // namespace toftwin::sim

@@ -13,10 +13,6 @@
 namespace toftwin::sim {
 namespace {
 
-bool ascends(const std::vector<double>& knots) {
-  return std::ranges::adjacent_find(knots, std::greater_equal<>{}) == knots.end();
-}
-
 /// The knot at or before x, and how far x is to the next; constant beyond the ends.
 struct Place {
   std::size_t below = 0, above = 0;
@@ -81,6 +77,13 @@ int reachOf(LearnedOver surround, int width, int height) {
   return surround == LearnedOver::Surround16 ? 16 : std::max(width, height);
 }
 
+bool LearnedKnots::ascend() const {
+  const auto ascends = [](const std::vector<double>& knots) {
+    return std::ranges::adjacent_find(knots, std::greater_equal<>{}) == knots.end();
+  };
+  return ascends(x) && ascends(y);
+}
+
 double LearnedKnots::valueIn(const std::vector<double>& table, double at_x, double at_y) const {
   if (x.empty() || table.empty()) return 0.0;
   if (std::isnan(at_x) || std::isnan(at_y)) return kNaN;
@@ -95,7 +98,7 @@ double LearnedKnots::valueIn(const std::vector<double>& table, double at_x, doub
 std::string problemOf(const LearnedKnots& knots, LearnedOver over, LearnedOver and_over,
                       std::pair<std::string_view, const std::vector<double>&> offsets,
                       const std::vector<double>& gains_percent) {
-  if (!ascends(knots.x) || !ascends(knots.y)) return "must have knots and and_knots that ascend";
+  if (!knots.ascend()) return "must have knots and and_knots that ascend";
   if ((and_over == LearnedOver::Nothing) != knots.y.empty())
     return "has and_over without and_knots, or and_knots without and_over";
   const std::size_t needed = knots.x.size() * std::max<std::size_t>(1, knots.y.size());

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -35,6 +37,42 @@ enum class LearnedOver {
   SurroundAll
 };
 
+/// Their words in files: first those that light alone tells, last those that the decoded image alone does.
+struct LearnedWord {
+  const char* word;
+  LearnedOver over;
+};
+inline constexpr std::array kLearnedWords{
+    LearnedWord{"incidence", LearnedOver::Incidence},
+    LearnedWord{"surround_4px", LearnedOver::Surround4},
+    LearnedWord{"surround_16px", LearnedOver::Surround16},
+    LearnedWord{"surround_all", LearnedOver::SurroundAll},
+    LearnedWord{"nothing", LearnedOver::Nothing},
+    LearnedWord{"time_s", LearnedOver::Time},
+    LearnedWord{"temperature_illumination_c", LearnedOver::Illumination},
+    LearnedWord{"temperature_sensor_c", LearnedOver::Sensor},
+    LearnedWord{"ambient_klx", LearnedOver::Ambient},
+    LearnedWord{"exposure_us", LearnedOver::Exposure},
+    LearnedWord{"range_m", LearnedOver::Range},
+    LearnedWord{"column", LearnedOver::Column},
+    LearnedWord{"row", LearnedOver::Row},
+    LearnedWord{"radius_px", LearnedOver::Radius},
+    LearnedWord{"amplitude_e", LearnedOver::Amplitude}};
+inline constexpr std::size_t kLearnedOfLight = 4, kLearnedOfImage = 1;
+
+/// One of those but the first `without_first` and the last `without_last`, as the key of an effect.
+template <std::size_t without_first, std::size_t without_last, class Visitor>
+void chooseLearnedOver(Visitor& v, const char* key, LearnedOver& value, const char* meaning) {
+  constexpr std::size_t kCount = kLearnedWords.size() - without_first - without_last;
+  [&]<std::size_t... i>(std::index_sequence<i...>) {
+    v.choice(key, value,
+             {std::pair<const char*, LearnedOver>{kLearnedWords[without_first + i].word,
+                                                  kLearnedWords[without_first + i].over}...},
+             meaning);
+  }
+  (std::make_index_sequence<kCount>{});
+}
+
 /// What is the same in all pixels of a frame: 0 of Nothing; NaN where the frame does not say it, and of
 /// what differs from pixel to pixel.
 double ofFrame(LearnedOver over, const Moment& moment);
@@ -54,6 +92,8 @@ int reachOf(LearnedOver surround, int width, int height);
 /// Knots of a table over x, or over x and y; nothing in the second is over x alone.
 struct LearnedKnots {
   const std::vector<double>&x, &y;
+
+  [[nodiscard]] bool ascend() const;
 
   /// Values at the knots, for the first x all y, then for the next x; linear (bilinear) between them and
   /// constant beyond. 0 of an empty table, else NaN where a covariate is.

@@ -142,6 +142,58 @@ TEST(LearnedNeighbours, SaysWhatIsWrongWithItsKernel) {
       testing::HasSubstr("has 2 shares_percent for 3 reaches_px: one for each"));
 }
 
+// As the ghost does, but for the light that is missing at its source; and between pixels.
+TEST(LearnedMirror, PutsItsShareOfTheMirroredPlaceIntoEachPixel) {
+  CameraInfo camera = cameraOfSize(41, 31);
+  camera.cx = 20.0, camera.cy = 15.0;
+  const Light light = syntheticLight(41, 31, {20_MHz}, 2, [](int x, int y) {
+    return std::vector<Way>{{x == 12 && y == 10 ? 5.0 : 0.0, 1.3}};
+  });
+  const auto mirrored = [&](double reach, double right) {
+    return applied(LearnedMirror{.reaches_px = {reach}, .shares_percent = {2.0}, .right = right, .down = 0.0},
+                   light, camera);
+  };
+  const Light sharp = mirrored(0.0, 1.0);
+  EXPECT_NEAR(sharp.steady(2 * 21 - 12, 2 * 15 - 10), 0.02 * 5.0, 1e-6);
+  EXPECT_NEAR(sharp.steady(12, 10), 5.0, 1e-6);
+  EXPECT_NEAR(phaseOf(sharp.phasor(0, 2)(30, 20)), std::remainder(2.0 * phaseAt(1.3, 20e6), 2.0 * kPi), 1e-6);
+  const Light between = mirrored(0.0, 1.125);  // a quarter of a pixel farther
+  EXPECT_NEAR(between.steady(30, 20), 0.75 * 0.02 * 5.0, 1e-6);
+  EXPECT_NEAR(between.steady(31, 20), 0.25 * 0.02 * 5.0, 1e-6);
+  const Light wide = mirrored(2.0, 1.0);
+  EXPECT_NEAR(wide.steady(32, 22), 0.02 * 5.0 / 25.0, 1e-6);
+  EXPECT_NEAR(wide.steady(33, 22), 0.0, 1e-9) << "3 columns away";
+}
+
+// s = (1/(1 + ε) − 1) r is a focal length that is longer by ε.
+TEST(LearnedShift, IsALongerFocalLengthWhereItIsAShareOfTheRadius) {
+  constexpr double kLonger = 0.01;
+  CameraInfo camera = cameraOfSize(60, 40);
+  camera.fx = camera.fy = 50.0, camera.cx = 29.5, camera.cy = 19.5;
+  const Light light = syntheticLight(60, 40, {20_MHz}, 1, [](int x, int y) {
+    return std::vector<Way>{
+        {1.0 + 0.3 * std::sin(0.4 * x) + 0.1 * y, 1.0 + 0.02 * x + 0.2 * std::cos(0.3 * y)}};
+  });
+  const Light longer = applied(DistortionMisfit{.focal_error = kLonger}, light, camera);
+  const LearnedShift shift{.radii_px = {0.0, 100.0},
+                           .outward_px = {0.0, 100.0 * (1.0 / (1.0 + kLonger) - 1.0)}};
+  const Light shifted = applied(shift, light, camera);
+  for (const auto& [x, y] : {std::pair{0, 0}, {59, 39}, {3, 20}, {41, 7}}) {
+    EXPECT_NEAR(shifted.steady(x, y), longer.steady(x, y), 1e-5) << x << ' ' << y;
+    EXPECT_NEAR(std::abs(shifted.phasor(0, 1)(x, y) - longer.phasor(0, 1)(x, y)), 0.0, 1e-5) << x << ' ' << y;
+    EXPECT_GT(std::abs(shifted.steady(x, y) - light.steady(x, y)), 1e-3F) << "the picture moves";
+  }
+}
+
+TEST(LearnedShift, SaysWhatIsWrongWithItsTable) {
+  const auto wrongWith = [](const std::string& keys) {
+    return errorOf(plainCamera(4, 2, 0.5, "[[effect]]\ntype = 'learned_shift'\n" + keys + "\n"));
+  };
+  EXPECT_THAT(wrongWith("radii_px = [1, 2, 3]"),
+              testing::HasSubstr("has 2 outward_px for 3 radii_px: one for each"));
+  EXPECT_THAT(wrongWith("radii_px = [2, 1]"), testing::HasSubstr("must have radii_px that ascend"));
+}
+
 // A surface turned by 60° about the vertical: 1/cos is 2 on the axis.
 TEST(LearnedLight, IsLaterAndDimmerAsItsTableSaysOfTheIncidence) {
   Light light = syntheticLight(3, 1, {20_MHz}, 2, [](int, int) { return std::vector<Way>{{0.8, 1.5}}; });

@@ -28,6 +28,46 @@ std::string neighbourName(int reach) {
                         : fmt::format("{}:{}px", kNeighbours, reach);
 }
 
+constexpr std::string_view kMirrored = "mirrored";
+/// Of squares about the mirrored place: a second image may be sharp, and seldom is.
+constexpr std::array kMirroredReaches{0, 3, 10};
+std::string mirroredName(int reach) { return fmt::format("{}:{}px", kMirrored, reach); }
+
+using Phasors = Image<std::complex<float>>;
+
+/// Turned by half a turn about the principal point; dark beyond the image's edge.
+Phasors mirrored(const Phasors& z, const CameraInfo& camera) {
+  Phasors turned(z.width(), z.height());
+  const auto across = static_cast<int>(std::lround(2.0 * camera.cx)),
+             along = static_cast<int>(std::lround(2.0 * camera.cy));
+  for (int y = 0; y < z.height(); ++y) {
+    for (int x = 0; x < z.width(); ++x) {
+      const int from_x = across - x, from_y = along - y;
+      if (from_x >= 0 && from_x < z.width() && from_y >= 0 && from_y < z.height())
+        turned(x, y) = z(from_x, from_y);
+    }
+  }
+  return turned;
+}
+
+/// How z changes as a pixel looks one pixel farther out, or in, than before: towards the next pixels on that
+/// side, as light between pixels is interpolated.
+Phasors changeTowards(const Phasors& z, const CameraInfo& camera, double out) {
+  Phasors change(z.width(), z.height());
+  for (int y = 0; y < z.height(); ++y) {
+    for (int x = 0; x < z.width(); ++x) {
+      const double across = out * (x - camera.cx), down = out * (y - camera.cy),
+                   radius = std::hypot(across, down);
+      if (!(radius > 0.0)) continue;
+      const int beside = std::clamp(x + (across > 0.0 ? 1 : -1), 0, z.width() - 1);
+      const int below = std::clamp(y + (down > 0.0 ? 1 : -1), 0, z.height() - 1);
+      change(x, y) = static_cast<float>(std::abs(across) / radius) * (z(beside, y) - z(x, y)) +
+                     static_cast<float>(std::abs(down) / radius) * (z(x, below) - z(x, y));
+    }
+  }
+  return change;
+}
+
 /// δz/z as a change of what is read.
 Reading changeBy(const Image<std::complex<float>>& share, double period_m) {
   Reading change{Image<float>(share.width(), share.height()), {}};
@@ -72,6 +112,16 @@ std::map<std::string, Reading> carriersOf(const sim::SensorModel& model, const R
     const Image<std::complex<float>> mean = sim::boxMean(z, std::min(reach, std::max(z.width(), z.height())));
     all.emplace(neighbourName(reach),
                 changeBy(over(z, [&](std::size_t i) { return 0.01F * mean[i]; }), period_m));
+  }
+  const Phasors turned = mirrored(z, model.camera());
+  for (const int reach : kMirroredReaches) {
+    const Phasors mean = sim::boxMean(turned, reach);
+    all.emplace(mirroredName(reach),
+                changeBy(over(z, [&](std::size_t i) { return 0.01F * mean[i]; }), period_m));
+  }
+  for (const auto& [carrier, out] : {std::pair{kOutwardCarrier, 1.0}, std::pair{kInwardCarrier, -1.0}}) {
+    const Phasors change = changeTowards(z, model.camera(), out);
+    all.emplace(carrier, changeBy(over(z, [&](std::size_t i) { return change[i]; }), period_m));
   }
   const double steps = std::max<double>(1.0, static_cast<double>(model.exposures({}).size()));
   const auto electron = static_cast<float>(2.0 / steps);
@@ -139,6 +189,9 @@ std::vector<TermGroup> carrierGroups(std::span<const CovariateInfo> covariates, 
   TermGroup light{"light from neighbours", Kind::Generic, {}, 0};
   for (const int reach : kReaches) light.terms.push_back({{}, Stage::Light, neighbourName(reach)});
   groups.push_back(std::move(light));
+  TermGroup ghost{"light from the mirrored place", Kind::Generic, {}, 0};
+  for (const int reach : kMirroredReaches) ghost.terms.push_back({{}, Stage::Light, mirroredName(reach)});
+  groups.push_back(std::move(ghost));
   groups.push_back({"stray light, the same in all pixels",
                     Kind::Generic,
                     {{{}, Stage::Light, fmt::format("{}:in_phase", kStrayCarrier)},
@@ -163,10 +216,12 @@ std::vector<TermGroup> carrierGroups(std::span<const CovariateInfo> covariates, 
     add("a charge that goes with " + covariate.name, factors);
   }
   for (const CovariateInfo& covariate : covariates) {
-    for (const std::string_view carrier : {kGainCarrier, kDelayCarrier}) {
+    for (const std::string_view carrier : {kGainCarrier, kDelayCarrier, kOutwardCarrier, kInwardCarrier}) {
       if (carrier == kDelayCarrier && !has_delay) continue;
+      const bool is_shift = carrier == kOutwardCarrier || carrier == kInwardCarrier;
+      if (is_shift && covariate.name != "radius_px") continue;
       TermGroup of_light = smoothIn(covariate, kSmoothKnots);
-      of_light.name = fmt::format("a {} that is {}", carrier, of_light.name);
+      of_light.name = fmt::format("a {}{} that is {}", carrier, is_shift ? " shift" : "", of_light.name);
       for (Term& term : of_light.terms) term.stage = Stage::Light, term.carrier = carrier;
       if (!of_light.terms.empty()) groups.push_back(std::move(of_light));
     }
@@ -194,8 +249,14 @@ std::optional<int> reachOfNeighbours(std::string_view carrier) {
   return std::nullopt;
 }
 
+std::optional<int> reachOfMirrored(std::string_view carrier) {
+  for (const int reach : kMirroredReaches)
+    if (carrier == mirroredName(reach)) return reach;
+  return std::nullopt;
+}
+
 std::string_view wordOfCarrier(std::string_view carrier) {
-  if (carrier == kNeighbours) return "neighbours";
+  if (carrier == kNeighbours || carrier == kMirrored || carrier == kOutwardCarrier) return "neighbours";
   if (carrier == kPixelCarrier) return "position";
   return carrier == kChargeCarrier || carrier == kStrayCarrier ? "amplitude" : "";
 }

@@ -6,6 +6,7 @@
 #include <functional>
 #include <numbers>
 #include <set>
+#include <type_traits>
 #include <utility>
 
 #include <fmt/format.h>
@@ -18,24 +19,9 @@ namespace {
 
 using Over = sim::LearnedOver;
 
-constexpr std::array kOvers{std::pair{std::string_view{"time_s"}, Over::Time},
-                            std::pair{std::string_view{"temperature_illumination_c"}, Over::Illumination},
-                            std::pair{std::string_view{"temperature_sensor_c"}, Over::Sensor},
-                            std::pair{std::string_view{"ambient_klx"}, Over::Ambient},
-                            std::pair{std::string_view{"exposure_us"}, Over::Exposure},
-                            std::pair{std::string_view{"range_m"}, Over::Range},
-                            std::pair{std::string_view{"amplitude_e"}, Over::Amplitude},
-                            std::pair{std::string_view{"column"}, Over::Column},
-                            std::pair{std::string_view{"row"}, Over::Row},
-                            std::pair{std::string_view{"radius_px"}, Over::Radius},
-                            std::pair{std::string_view{"incidence"}, Over::Incidence},
-                            std::pair{std::string_view{"surround_4px"}, Over::Surround4},
-                            std::pair{std::string_view{"surround_16px"}, Over::Surround16},
-                            std::pair{std::string_view{"surround_all"}, Over::SurroundAll}};
-
 std::optional<Over> overOf(const std::string& covariate) {
-  for (const auto& [word, over] : kOvers) {
-    if (word == covariate) return over;
+  for (const auto& [word, over] : sim::kLearnedWords) {
+    if (word == covariate && over != Over::Nothing) return over;
   }
   return std::nullopt;
 }
@@ -200,20 +186,45 @@ sim::AnyEffect reflectionOf(const sim::SensorModel& model, double in_phase, doub
   return reflection;
 }
 
-/// Light from neighbours, as a kernel of squares: a carrier is 1 % of the square's mean. Its shares are
-/// fitted through the simulator, which has all frequencies and knows what comes after the light.
-std::optional<LearnedEffect> kernelOf(const Along& along, const CameraInfo& camera) {
-  sim::LearnedNeighbours kernel{.reaches_px = {}, .shares_percent = {}};
-  std::vector<std::string> shares;
+/// Light from neighbours or from the mirrored place, as a kernel of squares: a carrier is 1 % of the square's
+/// mean. Its shares are fitted through the simulator, which has all frequencies and knows what comes after
+/// the light.
+template <class Kernel>
+std::optional<LearnedEffect> kernelOf(const Along& along, const CameraInfo& camera,
+                                      std::optional<int> (*reach_of)(std::string_view)) {
+  Kernel kernel{.reaches_px = {}, .shares_percent = {}};
+  std::vector<std::string> free;
   for (const auto& [term, coefficient] : along.terms) {
-    const auto reach = reachOfNeighbours(term.carrier);
+    const auto reach = reach_of(term.carrier);
     if (!reach || !term.factors.empty()) continue;
-    shares.push_back(fmt::format("shares_percent[{}]", shares.size()));
+    free.push_back(fmt::format("shares_percent[{}]", free.size()));
     kernel.reaches_px.push_back(std::min(*reach, std::max(camera.width, camera.height)));
     kernel.shares_percent.push_back(std::clamp(coefficient, -100.0, 100.0));
   }
-  if (shares.empty()) return std::nullopt;
-  return LearnedEffect{std::move(kernel), std::move(shares)};
+  if (free.empty()) return std::nullopt;
+  if constexpr (std::is_same_v<Kernel, sim::LearnedMirror>) {
+    kernel.right = kernel.down = 0.0;  // where the carrier was mirrored
+    free.insert(free.end(), {"right_px", "down_px"});
+  }
+  return LearnedEffect{std::move(kernel), std::move(free)};
+}
+
+/// How much farther out pixels look, as a table over the radius.
+std::optional<sim::AnyEffect> shiftOf(const Along& along, std::span<const CovariateInfo> covariates) {
+  const auto goes_out = [](const Term& term) { return term.carrier == kOutwardCarrier; };
+  const auto goes_in = [](const Term& term) { return term.carrier == kInwardCarrier; };
+  const CovariateInfo* radius = infoNamed(covariates, "radius_px");
+  if (radius == nullptr || along.covariates != std::vector<std::string>{"radius_px"}) return std::nullopt;
+  if (std::ranges::none_of(along.terms,
+                           [&](const auto& one) { return goes_out(one.first) || goes_in(one.first); }))
+    return std::nullopt;
+  sim::LearnedShift shift{.radii_px = tableKnotsOf(*radius, 64), .outward_px = {}};
+  for (const double r : shift.radii_px) {
+    const auto at = [r](const std::string&) { return r; };
+    const double outward = along.sum(goes_out, at) - along.sum(goes_in, at);
+    shift.outward_px.push_back(std::isfinite(outward) ? std::clamp(outward, -1000.0, 1000.0) : 0.0);
+  }
+  return shift;
 }
 
 }  // namespace
@@ -226,7 +237,13 @@ std::vector<LearnedEffect> learnedEffectsOf(const Effect& effect, const Campaign
   for (const Along& along : all)
     if (const auto table = tableOf(along, covariates, model.hasPhasors())) learned.push_back({*table});
   for (const Along& along : all)
-    if (const auto kernel = kernelOf(along, model.camera())) learned.push_back(*kernel);
+    if (const auto shift = shiftOf(along, covariates)) learned.push_back({*shift});
+  for (const Along& along : all) {
+    if (const auto kernel = kernelOf<sim::LearnedNeighbours>(along, model.camera(), reachOfNeighbours))
+      learned.push_back(*kernel);
+    if (const auto kernel = kernelOf<sim::LearnedMirror>(along, model.camera(), reachOfMirrored))
+      learned.push_back(*kernel);
+  }
   for (const Along& along : all)
     for (const auto& [term, coefficient] : along.terms)
       if (const PixelPattern* pattern = rows.patternOf(term.carrier))

@@ -188,6 +188,28 @@ void addImageFigures(std::map<std::string, Draw>& figures) {
             {"the wider alone",
              errorOf(effect("learned_neighbours", "reaches_px = [15]\nshares_percent = [1]"), light)}}});
   };
+  figures["learned_mirror"] = [] {
+    const Light light = boxBeforeWall(0.25);
+    return standalone(Panels{
+        .label = "error of the range, mm",
+        .low = -80.0,
+        .high = 80.0,
+        .diverging = true,
+        .panels = {
+            {"sharp", errorOf(effect("learned_mirror", "reaches_px = [0]\nshares_percent = [1]"), light)},
+            {"within 5 px",
+             errorOf(effect("learned_mirror", "reaches_px = [5]\nshares_percent = [1]"), light)}}});
+  };
+  figures["learned_shift"] = [] {
+    const Light light = boxBeforeWall();
+    return standalone(Panels{
+        .label = "error of the range, mm",
+        .low = -20.0,
+        .high = 20.0,
+        .diverging = true,
+        .panels = {{"farther out by 1 % of the radius", errorOf(effect("learned_shift"), light)},
+                   {"farther in by 1 %", errorOf(effect("learned_shift", "outward_px = [0, -1]"), light)}}});
+  };
   figures["learned_light"] = [] {
     const Light light = boxBeforeWall();
     return standalone(Panels{

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// Light from another place of the image, of which the catalogue knows nothing.
+#include <gmock/gmock.h>
+
+#include "tests/discover/searched.h"
+
+namespace toftwin::discover {
+namespace {
+
+using testing::Contains;
+
+class OfAnotherPlace : public Searched {
+ protected:
+  [[nodiscard]] CampaignFinding searchWithout(const std::string& name, const std::string& keys) const {
+    simulate("[[effect]]\ntype = '" + name + "'\n" + keys + "\n");
+    CampaignJob without = job();
+    without.left_out = {name};
+    return search(without);
+  }
+};
+
+TEST_F(OfAnotherPlace, PixelsThatLookFartherInAreATableOverTheRadius) {
+  const CampaignFinding finding = searchWithout("distortion_misfit", "focal_error = 0.02");
+  ASSERT_FALSE(finding.effects.empty());
+  EXPECT_THAT(finding.effects.front().found.covariates, testing::ElementsAre("outward", "radius_px"))
+      << verdictOf(finding);
+  const auto model = sim::SensorModel::parse(finding.model_toml, "model.toml");
+  ASSERT_TRUE(model) << model.error().message;
+  EXPECT_THAT(model->effectNames(), Contains("learned_shift"));
+  ASSERT_TRUE(finding.judgement);
+  EXPECT_GT(finding.judgement->removed, 0.7) << verdictOf(finding);
+}
+
+TEST_F(OfAnotherPlace, ASecondImageIsAKernelAboutTheMirroredPlace) {
+  const CampaignFinding finding = searchWithout("lens_ghost", "share = 0.02\nright_px = 0.5\ndown_px = 0");
+  ASSERT_FALSE(finding.effects.empty());
+  EXPECT_THAT(finding.effects.front().found.covariates, Contains("mirrored")) << verdictOf(finding);
+  const auto model = sim::SensorModel::parse(finding.model_toml, "model.toml");
+  ASSERT_TRUE(model) << model.error().message;
+  EXPECT_THAT(model->effectNames(), Contains("learned_mirror"));
+  ASSERT_TRUE(finding.judgement);
+  EXPECT_GT(finding.judgement->removed, 0.7) << verdictOf(finding);
+}
+
+}  // namespace
+}  // namespace toftwin::discover
