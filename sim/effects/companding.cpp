@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim/effects/companding.h"
 
+#include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
+#include <numbers>
+#include <span>
 
 #include "sim/images/rows.h"
 #include "sim/images/simd.h"
@@ -52,6 +56,47 @@ TOFTWIN_SIMD void convertOne(float* __restrict first, std::uint8_t* __restrict f
   }
 }
 
+/// The mean of round(x + σ z) for a standard normal z, less x: the waves of the staircase, each damped by the
+/// noise (B. Widrow, I. Kollár, Quantization Noise, 2008, ch. 4), Σ_k (−1)^k / (πk) exp(−2π²k²σ²) sin(2πkx).
+double meanOfRounding(double x, double sigma) {
+  constexpr double kTwoPi = 2.0 * std::numbers::pi;
+  if (sigma < 0.1) return std::nearbyint(x) - x;  // too many waves, and all but nothing is damped
+  double sum = 0.0;
+  for (int k = 1; k <= 6; ++k) {
+    const double damping = std::exp(-0.5 * kTwoPi * kTwoPi * k * k * sigma * sigma);
+    if (damping < 1e-6) break;
+    sum += (k % 2 == 0 ? 1.0 : -1.0) / (std::numbers::pi * k) * damping * std::sin(kTwoPi * k * x);
+  }
+  return sum;
+}
+
+/// What conversion adds to a difference of charges in the mean over its noise, σ in electrons.
+float meanChangeOf(float difference, double sigma, double counts_per_electron) {
+  const double magnitude = std::abs(static_cast<double>(difference)) * counts_per_electron;
+  const double step = std::max(1.0, static_cast<double>(powerBelow(static_cast<float>(magnitude))) / 128.0);
+  const double change =
+      step * meanOfRounding(magnitude / step, sigma * counts_per_electron / step) / counts_per_electron;
+  return static_cast<float>(difference < 0.0F ? -change : change);
+}
+
+/// The mean over noise of one pixel's taps, in one sample. What is too large for the converter has no mean.
+void convertMean(std::span<float*> taps, std::uint8_t& flags, const Companding& by) {
+  const float difference = taps.size() == 2 ? *taps[0] - *taps[1] : *taps[0];
+  bool is_saturated = false;
+  const auto counts = static_cast<float>(by.counts_per_electron);
+  float change = changeOf(difference, counts, 1.0F / counts, is_saturated);
+  if (is_saturated) {
+    flags = static_cast<std::uint8_t>(flags | kSaturatedBit);
+  } else {
+    double variance = by.mean_over_variance * static_cast<double>(taps.size());
+    for (const float* tap : taps) variance += by.mean_over_fano * std::max(0.0, static_cast<double>(*tap));
+    change = meanChangeOf(difference, std::sqrt(variance), by.counts_per_electron);
+  }
+  const float share = taps.size() == 2 ? 0.5F : 1.0F;
+  *taps[0] += share * change;
+  if (taps.size() == 2) *taps[1] -= share * change;
+}
+
 }  // namespace
 
 Samples Companding::apply(Samples samples, const Conditions&, const Random&) const {
@@ -63,6 +108,13 @@ Samples Companding::apply(Samples samples, const Conditions&, const Random&) con
       for (int y = first_row; y < last_row; ++y) {
         float* first = &samples.electrons[i](0, y);
         std::uint8_t* flags = &samples.flags(0, y);
+        if (mean_over_fano > 0.0 || mean_over_variance > 0.0) {
+          for (int x = 0; x < samples.width(); ++x) {
+            std::array<float*, 2> both{&first[x], taps == 2 ? &samples.electrons[i + 1](x, y) : nullptr};
+            convertMean(std::span{both}.first(taps == 2 ? 2 : 1), flags[x], *this);
+          }
+          continue;
+        }
         const auto scale = static_cast<float>(counts_per_electron);
         if (taps == 2) {
           convertTwo(first, &samples.electrons[i + 1](0, y), flags, samples.width(), scale);

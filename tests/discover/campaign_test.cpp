@@ -325,7 +325,7 @@ TEST_F(Searched, WhatDoesWorseOnLockedCapturesIsNotWritten) {
   ASSERT_FALSE(finding.effects.empty());
   ASSERT_TRUE(finding.judgement);
   EXPECT_TRUE(finding.is_worse) << verdictOf(finding);
-  EXPECT_THAT(verdictOf(finding), HasSubstr("model.toml is the camera file as it was"));
+  EXPECT_THAT(verdictOf(finding), HasSubstr("it is not in model.toml"));
   const auto model = sim::SensorModel::parse(finding.model_toml, "model.toml");
   const auto declared = sim::SensorModel::parse(tinyCamera(), "camera.toml");
   ASSERT_TRUE(model && declared);

@@ -34,8 +34,12 @@ class Searched : public testing::Test {
   using Spoil = decltype(SimulatedRun::spoil);
   void simulate(const std::string& hidden, const Spoil& spoil = {}, bool with_poses = true, int frames = 0,
                 std::uint64_t seed = 1) const {
+    simulateWith(tinyCamera(hidden), spoil, with_poses, frames, seed);
+  }
+  void simulateWith(const std::string& camera_text, const Spoil& spoil = {}, bool with_poses = true,
+                    int frames = 0, std::uint64_t seed = 1) const {
     auto plan = plan::parsePlan(smallPlan(), "plan.toml");
-    const auto camera = sim::SensorModel::parse(tinyCamera(hidden), "camera.toml");
+    const auto camera = sim::SensorModel::parse(camera_text, "camera.toml");
     const auto scene = sim::Scene::parse(smallScene(), "scene.toml");
     if (!plan || !camera || !scene) throw std::runtime_error("the small campaign's files are wrong");
     SimulatedRun run{

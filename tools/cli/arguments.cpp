@@ -102,6 +102,7 @@ template Argument Arguments::option(const std::string&, std::uint64_t&, const st
 template Argument Arguments::option(const std::string&, double&, const std::string&);
 template Argument Arguments::option(const std::string&, std::optional<int>&, const std::string&);
 template Argument Arguments::option(const std::string&, std::optional<double>&, const std::string&);
+template Argument Arguments::option(const std::string&, std::optional<std::string>&, const std::string&);
 template Argument Arguments::option(const std::string&, std::vector<std::string>&, const std::string&);
 template Argument Arguments::option(const std::string&, std::vector<double>&, const std::string&);
 template Argument Arguments::option(const std::string&, std::vector<std::uint32_t>&, const std::string&);

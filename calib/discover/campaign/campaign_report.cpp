@@ -315,21 +315,49 @@ std::vector<SeenGroup> seenFirst(const CampaignFinding& finding, std::size_t mos
   return all;
 }
 
+namespace {
+
+/// How often the noise what is left is, where nobody can overlook it; empty where noise is all, or nearly.
+std::string leftInWords(const CampaignFinding& finding) {
+  constexpr double kSeen = 2.0, kAnother = 100.0;
+  if (!finding.judgement) return "";
+  const double per_row = finding.judgement->after.per_row / std::max(1.0, finding.judgement->noise);
+  if (!(per_row > kSeen)) return "";
+  const std::string left = fmt::format(
+      ". The locked captures still differ from the model by {:.3g} times the noise (χ² per row {:.3g})",
+      std::sqrt(per_row), finding.judgement->after.per_row);
+  return per_row > kAnother && !(finding.judgement->removed > 0.5)
+             ? left + ": the scene or the poses are perhaps not those of what was measured"
+             : left;
+}
+
+std::string nothingInWords(const CampaignFinding& finding) {
+  const std::string beside = hasDelay(finding) ? ", beside it," : "";
+  const std::string rest =
+      finding.finding.first_p > 0.01
+          ? fmt::format("nothing{} is left above the noise (p = {:.2g})", beside, finding.finding.first_p)
+          : fmt::format(
+                "something{} is left (p = {:.2g}), but nothing that holds on captures it was not fitted to",
+                beside, finding.finding.first_p);
+  return capitalised(hasDelay(finding) ? delayInWords(finding) + "; " + rest : rest) + leftInWords(finding);
+}
+
+}  // namespace
+
 std::string verdictOf(const CampaignFinding& finding) {
-  if (finding.effects.empty() && finding.updates.empty()) {
-    const std::string beside = hasDelay(finding) ? ", beside it," : "";
-    const std::string rest =
-        finding.finding.first_p > 0.01
-            ? fmt::format("nothing{} is left above the noise (p = {:.2g})", beside, finding.finding.first_p)
-            : fmt::format("something{} is left (p = {:.2g}), but nothing that holds on captures it was not fitted to",
-                          beside, finding.finding.first_p);
-    return capitalised(hasDelay(finding) ? delayInWords(finding) + "; " + rest : rest);
-  }
+  if (finding.effects.empty() && finding.updates.empty()) return nothingInWords(finding);
   std::vector<std::string> names;
   for (const FoundEffect& one : finding.effects)
     if (!one.found.is_rest) names.push_back(answerOf(one.found));
   for (const FittedEffect& one : finding.updates)
     names.push_back("parameter update: " + nameOf(one.effect));
+  if (finding.is_worse && finding.hasJudged())
+    return fmt::format(
+               "Something is left that looks like {}, but with it the locked captures fit worse (RMS {} → {} "
+               "mm): it is not in model.toml",
+               fmt::join(names, "; "), shown(finding.judgement->before.rms_mm, 2),
+               shown(finding.judgement->after.rms_mm, 2)) +
+           leftInWords(finding);
   std::string verdict = fmt::format("The model lacks {}", fmt::join(names, "; "));
   if (finding.effects.empty())
     verdict = fmt::format("The model has wrong numbers: {}", fmt::join(names, "; "));
@@ -337,13 +365,12 @@ std::string verdictOf(const CampaignFinding& finding) {
   if (hasDelay(finding)) verdict += ". " + capitalised(delayInWords(finding));
   if (!finding.hasJudged()) return verdict;
   if (const auto& judged = finding.judgement) {
-    verdict += fmt::format(
-        ". On the locked captures: RMS {} → {} mm, {} of what {} is removed",
-        shown(judged->before.rms_mm, 2), shown(judged->after.rms_mm, 2),
-        compare::shownPercent(judged->removed), hasDelay(finding) ? "the delay leaves" : "can be explained");
-    if (finding.is_worse) verdict += "; since that is worse than before, model.toml is the camera file as it was";
+    verdict += fmt::format(". On the locked captures: RMS {} → {} mm, {} of what {} is removed",
+                           shown(judged->before.rms_mm, 2), shown(judged->after.rms_mm, 2),
+                           compare::shownPercent(judged->removed),
+                           hasDelay(finding) ? "the delay leaves" : "can be explained");
   }
-  return verdict;
+  return verdict + leftInWords(finding);
 }
 
 Result<std::filesystem::path> writeReport(const CampaignJob& job, const CampaignFinding& finding) {

@@ -14,6 +14,7 @@
 #include "calib/discover/campaign/found_model.h"
 #include "calib/discover/campaign/model_file.h"
 #include "calib/discover/campaign/next_capture.h"
+#include "calib/discover/campaign/reading.h"
 #include "calib/discover/campaign/step_effect.h"
 #include "calib/discover/marginal.h"
 
@@ -220,8 +221,9 @@ Result<> judgeLocked(const CampaignJob& job, const Campaign& campaign, const Jud
                      const JudgedModels& models, CampaignFinding& finding) {
   const Declared& declared = searched.declared;
   if (auto opened = openLockedOf(job, campaign); !opened) return opened;
-  const auto captures = readLocked(campaign);
+  auto captures = readLocked(campaign);
   if (!captures) return captures.error();
+  takeNoiseOff(declared.model, *captures);
   TraceOptions options = job.trace;
   options.seed +=
       0x5bd1e995U;  // light of its own: what the open captures' light has by chance must not help
@@ -275,13 +277,14 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
   progress.plan("fit", 8.0);
   progress.plan("judge", 5.0);
   progress.begin();
-  const auto campaign = isRecording(job) ? readRecording(job.run, job.poses_of) : readCampaign(job.run, job.side);
+  auto campaign = isRecording(job) ? readRecording(job.run, job.poses_of) : readCampaign(job.run, job.side);
   if (!campaign) return campaign.error();
   if (auto whole = checkLockedFiles(job, *campaign); !whole) return whole.error();
   CampaignFinding finding;
   finding.notes = campaign->notes;
   if (auto taken = takeLens(*campaign, declared, finding.notes); !taken) return taken.error();
   if (auto same = checkFrequencies(*campaign, declared.model); !same) return same.error();
+  takeNoiseOff(declared.model, campaign->captures);
   for (const auto& [block, scene] : declared.scene_of_block) {
     const auto is_of = [&](const MeasuredCapture& capture) {
       return capture.record.block == block;

@@ -36,11 +36,31 @@ double exposureOf(const sim::SensorModel& model, const MeasuredCapture& capture)
 
 std::vector<sim::AnyEffect> effectsWithoutNoise(const sim::SensorModel& model) {
   std::vector<sim::AnyEffect> effects = model.effects();
+  double fano = 0.0, variance = 0.0;
+  for (const sim::AnyEffect& any : effects) {
+    if (const auto* shot = std::get_if<sim::ShotNoise>(&any)) fano += shot->fano;
+    if (const auto* read = std::get_if<sim::ReadNoise>(&any))
+      variance += read->sigma_electrons * read->sigma_electrons;
+  }
   std::erase_if(effects, [](const sim::AnyEffect& any) {
     return std::visit(
         []<class E>(const E&) { return E::about.explains.contains(sim::Covariate::Frame); }, any);
   });
+  for (sim::AnyEffect& any : effects) {
+    if (auto* companding = std::get_if<sim::Companding>(&any))
+      companding->mean_over_fano = fano, companding->mean_over_variance = variance;
+  }
   return effects;
+}
+
+void takeNoiseOff(const sim::SensorModel& model, std::vector<MeasuredCapture>& captures) {
+  const auto frequencies = static_cast<float>(model.traceRequest().frequencies.size());
+  for (MeasuredCapture& capture : captures) {
+    const float of_frames = 0.5F * (frequencies - 1.0F) * static_cast<float>(capture.frames);
+    const Image<float>& variance = capture.log_amplitude.variance;
+    for (std::size_t i = 0; i < variance.size(); ++i)
+      if (std::isfinite(variance[i])) capture.log_amplitude.mean[i] -= of_frames * variance[i];
+  }
 }
 
 Moment momentFor(const sim::SensorModel& model, const MeasuredCapture& capture) {

@@ -15,8 +15,17 @@ struct Reading {
   Image<float> range_m, log_amplitude;
 };
 
-/// The effects of a model that are not chance.
+/// The effects of a model that are not chance. What noise does to a mean stays: steps are as smeared as in
+/// the mean over frames.
 std::vector<sim::AnyEffect> effectsWithoutNoise(const sim::SensorModel& model);
+
+/// Takes off the mean of ln amplitude what noise adds to it, so that it is that of a camera without noise. Of
+/// m frequencies with amplitude a and noise s each, the mean of the amplitudes |z| has
+///     E ln A − ln a = (m − 1)/(2m) s²/a² = (m − 1)/2 var(ln A)
+/// in second order: across the phasor noise only lengthens it, and the logarithm is concave. With one
+/// frequency nothing is left of either; a pulsed camera's sum of charges, m = 0, has the logarithm's part
+/// alone.
+void takeNoiseOff(const sim::SensorModel& model, std::vector<MeasuredCapture>& captures);
 
 /// A camera model without noise, at whatever exposure a capture was taken.
 class NoiselessCamera {

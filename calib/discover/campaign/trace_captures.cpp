@@ -163,7 +163,8 @@ Result<std::vector<std::shared_ptr<const TracedCapture>>> traceAll(
     request.max_surfaces = options.max_surfaces;
     request.pixel_extent = options.pixel_extent;
     request.seed = options.seed + (s + 1) * kGolden;
-    if (std::isfinite(sites[s].noise_m))
+    // Of gates the tracer knows no range, nor how well: they get all samples.
+    if (std::isfinite(sites[s].noise_m) && !request.frequencies.empty())
       request.wanted_noise = std::max(kQuieter * sites[s].noise_m /
                                           std::sqrt(static_cast<double>(sites[s].captures.size())),
                                       1e-6) *

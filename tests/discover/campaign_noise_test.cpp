@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+// What noise does to means over frames is no effect that a camera model lacks.
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <random>
+
+#include "calib/discover/campaign/gather_capture.h"
+#include "calib/discover/campaign/reading.h"
+#include "tests/discover/searched.h"
+
+namespace toftwin::discover {
+namespace {
+
+/// Of gates the tracer knows no range: what it takes to be quiet enough cannot be asked of it.
+TEST_F(Searched, APulsedCameraIsSearchedToo) {
+  const auto pulsed = [](const std::string& more) {
+    return R"(
+model = "Small pulsed camera"
+[lens]
+width = 28
+height = 21
+fx = 26.7
+fy = 26.7
+cx = 13.5
+cy = 10.0
+[[emitter]]
+power_w = 2.0
+half_angle_deg = 50.0
+[pulse]
+scheme = "two_gate"
+width_ns = 40.0
+rise_ns = 2.0
+ambient_gate = true
+exposure_us = 4000.0
+open_share = 0.02
+[sampling]
+factory_calibration = "waveform"
+[pixel]
+electrons_per_radiance_s = 8.2e8
+[decoder]
+algorithm = "pulsed"
+minimum_amplitude_electrons = 1000.0
+nearest_m = 0.2
+farthest_m = 5.8
+[[effect]]
+type = "shot_noise"
+)" + more;
+  };
+  write("camera.toml", pulsed(""));
+  simulateWith(
+      pulsed("[[effect]]\ntype = \"time_walk\"\nper_e_fold_mm = 12.0\nreference_electrons = 20000.0\n"));
+  CampaignJob few = job();
+  few.trace.samples_per_pixel = 32;
+  EXPECT_THAT(namesOf(search(few)), testing::Contains("time_walk"));
+}
+
+Frame frameOf(const Image<float>& range_m, const Image<float>& amplitude) {
+  Frame frame;
+  frame.camera = {range_m.width(), range_m.height(), 40.0, 40.0, 31.5, 23.5, {}, ""};
+  frame.planes = {toPlane(PlaneKind::Range, Image<float>{range_m}),
+                  toPlane(PlaneKind::Amplitude, Image<float>{amplitude})};
+  return frame;
+}
+
+/// Amplitudes of 200 to 800 with noise of 60, of which a camera drops those below 250. The pixels that are
+/// left are compared with the truth in 12 groups: five standard errors of each, 7e-6 false alarms in all.
+TEST(GatherCapture, LeavesOutAmplitudesThatNoiseChose) {
+  constexpr int kWidth = 64, kHeight = 48, kFrames = 8, kGroups = 12;
+  constexpr float kNoise = 60.0F, kLeast = 250.0F;
+  std::mt19937 random{20261};
+  std::normal_distribution<float> normal;
+  const auto truth = [](std::size_t i) {
+    return 200.0F + 600.0F * static_cast<float>(i) / (kWidth * kHeight);
+  };
+  CaptureGatherer gatherer{plan::CaptureRecord{}};
+  for (int k = 0; k < kFrames; ++k) {
+    Image<float> range_m(kWidth, kHeight, std::nanf("")), amplitude(kWidth, kHeight);
+    for (std::size_t i = 0; i < range_m.size(); ++i) {
+      amplitude[i] = truth(i) + kNoise * normal(random);
+      if (amplitude[i] >= kLeast) range_m[i] = 2.0F;
+    }
+    ASSERT_TRUE(gatherer.add(frameOf(range_m, amplitude)).ok());
+  }
+  const MeasuredCapture capture = gatherer.finish();
+  std::vector<double> sums(kGroups), squares(kGroups), counts(kGroups);
+  for (std::size_t i = 0; i < capture.log_amplitude.mean.size(); ++i) {
+    if (!std::isfinite(capture.log_amplitude.mean[i])) continue;
+    // The logarithm of a number with noise is less in the mean, by half its relative variance.
+    const double a = static_cast<double>(truth(i)), relative = static_cast<double>(kNoise) / a;
+    const double error =
+        static_cast<double>(capture.log_amplitude.mean[i]) - std::log(a) + 0.5 * relative * relative;
+    const std::size_t group = i * kGroups / capture.log_amplitude.mean.size();
+    sums[group] += error, squares[group] += relative * relative / kFrames, counts[group] += 1.0;
+  }
+  EXPECT_EQ(counts[0], 0.0) << "200 to 250, below the cut";
+  EXPECT_GT(counts[kGroups - 1], 250.0);
+  for (std::size_t g = 0; g < kGroups; ++g)
+    EXPECT_LE(std::abs(sums[g]), 5.0 * std::sqrt(squares[g])) << "group " << g << " of " << counts[g];
+}
+
+/// Amplitudes of m phasors of 1 with noise of 0.1 each. 100,000 draws: the mean of ln A is known to 1.8e-4 at
+/// m = 3, and must be 0 within five of that and 1e-4 of higher orders.
+TEST(TakeNoiseOff, TheMeanOfLogarithmsIsThatWithoutNoise) {
+  constexpr int kDraws = 100'000;
+  constexpr double kNoise = 0.1;
+  std::mt19937 random{20262};
+  std::normal_distribution<double> normal;
+  for (const auto& [preset, frequencies] : {std::pair{"o3d303", 1}, {"generic_cw", 2}, {"kinect_v2", 3}}) {
+    const auto model = sim::SensorModel::preset(preset);
+    ASSERT_TRUE(model.ok()) << model.error().message;
+    double sum = 0.0, squares = 0.0;
+    for (int k = 0; k < kDraws; ++k) {
+      double a = 0.0;
+      for (int f = 0; f < frequencies; ++f)
+        a += std::hypot(1.0 + kNoise * normal(random), kNoise * normal(random)) / frequencies;
+      sum += std::log(a), squares += std::log(a) * std::log(a);
+    }
+    const double mean = sum / kDraws, variance = squares / kDraws - mean * mean;
+    std::vector<MeasuredCapture> captures(1);
+    captures[0].frames = 8;
+    captures[0].log_amplitude = {Image<float>(1, 1, static_cast<float>(mean)),
+                                 Image<float>(1, 1, static_cast<float>(variance / 8.0)), 1.0};
+    takeNoiseOff(*model, captures);
+    EXPECT_NEAR(captures[0].log_amplitude.mean[0], 0.0, 5.0 * std::sqrt(variance / kDraws) + 1e-4) << preset;
+  }
+}
+
+}  // namespace
+}  // namespace toftwin::discover
