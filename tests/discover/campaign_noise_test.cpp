@@ -51,7 +51,7 @@ type = "shot_noise"
   simulateWith(
       pulsed("[[effect]]\ntype = \"time_walk\"\nper_e_fold_mm = 12.0\nreference_electrons = 20000.0\n"));
   CampaignJob few = job();
-  few.trace.samples_per_pixel = 32;
+  few.trace.samples_per_pixel = 8;
   EXPECT_THAT(namesOf(search(few)), testing::Contains("time_walk"));
 }
 

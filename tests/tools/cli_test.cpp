@@ -69,7 +69,6 @@ TEST(Toftwin, AWrongCommandLineIsStatus2AndSaysWhatIsWrong) {
            {"compare kinect kinect", "the same source"},
            {"compare --data /no/such", "/no/such"},
            {"compare kinect", "name two sources"},
-           {"set kinect ambient_klx bright", "bright"},
            {"pose kinect --position 1,2", "--position"}}) {
     const Ran ran = toftwin(arguments);
     EXPECT_EQ(ran.status, 2) << arguments;
