@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "sim/effects/phasors.h"
-#include "sim/images/box_mean.h"
+#include "sim/effects/squares.h"
 
 namespace toftwin::sim {
 namespace {
@@ -25,24 +25,17 @@ T lightAt(const Image<T>& image, double x, double y) {
 
 }  // namespace
 
-std::string LearnedMirror::problem() const {
-  if (reaches_px.size() == shares_percent.size()) return {};
-  return "has " + std::to_string(shares_percent.size()) + " shares_percent for " +
-         std::to_string(reaches_px.size()) + " reaches_px: one for each";
-}
+std::string LearnedMirror::problem() const { return problemOfSquares(reaches_px, shares_percent); }
 
 Light LearnedMirror::apply(Light light, const Conditions& now, const Random&) const {
   const double across = 2.0 * (now.camera.cx + right - now.left),
                along = 2.0 * (now.camera.cy + down - now.top);
   forEachImage(light, [&]<class T>(Image<T>& image) {
     const Image<T> source = image;
-    for (std::size_t k = 0; k < reaches_px.size(); ++k) {
-      if (shares_percent[k] == 0.0) continue;
-      const Image<T> mean = boxMean(source, static_cast<int>(std::lround(reaches_px[k])));
-      const auto share = static_cast<float>(0.01 * shares_percent[k]);
+    forEachSquare(source, reaches_px, shares_percent, [&](const Image<T>& mean, float share) {
       for (int y = 0; y < image.height(); ++y)
         for (int x = 0; x < image.width(); ++x) image(x, y) += share * lightAt(mean, across - x, along - y);
-    }
+    });
   });
   return light;
 }
