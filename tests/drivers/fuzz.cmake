@@ -23,7 +23,7 @@ add_dependencies(fuzzers fuzz_kinect2)
 file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/fuzz_kinect2_corpus)
 add_test(NAME fuzz_kinect2
          COMMAND fuzz_kinect2 -max_total_time=3 -max_len=512 -print_final_stats=1
-                 ${CMAKE_BINARY_DIR}/fuzz_kinect2_corpus)
+                 ${CMAKE_BINARY_DIR}/fuzz_kinect2_corpus ${folder}/kinect2_corpus)
 set_tests_properties(fuzz_kinect2 PROPERTIES TIMEOUT 120)
 
 # Without libaravis: what reads bytes knows nothing of it.
@@ -37,5 +37,5 @@ add_dependencies(fuzzers fuzz_aravis)
 file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/fuzz_aravis_corpus)
 add_test(NAME fuzz_aravis
          COMMAND fuzz_aravis -max_total_time=3 -max_len=512 -print_final_stats=1
-                 ${CMAKE_BINARY_DIR}/fuzz_aravis_corpus)
+                 ${CMAKE_BINARY_DIR}/fuzz_aravis_corpus ${folder}/aravis_corpus)
 set_tests_properties(fuzz_aravis PROPERTIES TIMEOUT 120)

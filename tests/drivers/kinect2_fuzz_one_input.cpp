@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <vector>
 
 #include "drivers/kinect2/assembly.h"
 #include "drivers/kinect2/commands.h"
@@ -27,10 +28,21 @@ void readAnswers(std::span<const std::byte> bytes) {
   static_cast<void>(doneNumber(bytes));
 }
 
+constexpr unsigned kFrames = 3;
+
+/// Of three frames, each in its place; to make one anew for each byte would be most of the work.
+std::vector<Bytes> imagesWithFooters() {
+  const Bytes image(kImageBytes);
+  std::vector<Bytes> all;
+  for (unsigned i = 0; i < kFrames * kImages; ++i)
+    all.push_back(withFooter(image, 0, i / kImages, i % kImages));
+  return all;
+}
+
 /// Each byte says what comes next: a whole image with a footer of the following bytes, a part of one, a
 /// packet that is lost, an empty one, or bytes as they are.
 void assemble(std::span<const std::byte> bytes) {
-  static const Bytes image(kImageBytes);
+  static std::vector<Bytes> images = imagesWithFooters();
   Assembler assembler;
   std::uint64_t frames = 0;
   while (!bytes.empty()) {
@@ -45,11 +57,14 @@ void assemble(std::span<const std::byte> bytes) {
     } else if (what < 64) {
       assembler.packet(own, {});
     } else {
-      Bytes whole = withFooter(image, 0, what % 3, what % 10);
-      std::copy(own.begin(), own.end(), whole.begin() + static_cast<std::ptrdiff_t>(kImageBytes + 8));
+      const std::span whole{images[what % kFrames * kImages + what % kImages]};
+      const auto footer = whole.subspan(kImageBytes + 8, own.size());
+      const Bytes usual{footer.begin(), footer.end()};
+      std::ranges::copy(own, footer.begin());
       const std::size_t cut = what < 96 ? 1 + kPacketBytes * (what % 8) : whole.size();
-      assembler.packet(std::span{whole}.first(cut), {});
-      assembler.packet(std::span{whole}.subspan(cut), {});
+      assembler.packet(whole.first(cut), {});
+      assembler.packet(whole.subspan(cut), {});
+      std::ranges::copy(usual, footer.begin());
     }
     if (const auto frame = assembler.take()) {
       ++frames;
