@@ -44,14 +44,6 @@ bool isPlausible(const Lens& lens) {
 
 }  // namespace
 
-std::uint16_t u16At(std::span<const std::byte> bytes, std::size_t at) {
-  return static_cast<std::uint16_t>(std::to_integer<unsigned>(bytes[at]) |
-                                    std::to_integer<unsigned>(bytes[at + 1]) << 8U);
-}
-std::uint32_t u32At(std::span<const std::byte> bytes, std::size_t at) {
-  return u16At(bytes, at) | std::uint32_t{u16At(bytes, at + 2)} << 16U;
-}
-
 Command readFirmware() { return {Code::FirmwareVersions, 0x200}; }
 Command readHardware() { return {Code::HardwareInfo, 0x5C}; }
 Command readSerial() { return {Code::DataPage, 0x80, {kSerialPage}}; }

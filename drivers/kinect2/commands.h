@@ -83,7 +83,12 @@ Result<PhaseTables> phaseTablesIn(std::span<const std::byte> answer);
 Result<std::uint32_t> statusIn(std::span<const std::byte> answer);
 
 /// Little-endian numbers in bytes that somebody has counted.
-std::uint16_t u16At(std::span<const std::byte> bytes, std::size_t at);
-std::uint32_t u32At(std::span<const std::byte> bytes, std::size_t at);
+inline std::uint16_t u16At(std::span<const std::byte> bytes, std::size_t at) {
+  return static_cast<std::uint16_t>(std::to_integer<unsigned>(bytes[at]) |
+                                    std::to_integer<unsigned>(bytes[at + 1]) << 8U);
+}
+inline std::uint32_t u32At(std::span<const std::byte> bytes, std::size_t at) {
+  return u16At(bytes, at) | std::uint32_t{u16At(bytes, at + 2)} << 16U;
+}
 
 }  // namespace toftwin::drivers::kinect2

@@ -116,6 +116,7 @@ std::vector<Image<std::complex<float>>> turnsOf(const PhaseTables& tables) {
     return all;
   }();
   std::vector<Image<std::complex<float>>> turns;
+  turns.reserve(tables.size());
   for (const auto& table : tables) {
     Image<std::complex<float>>& image = turns.emplace_back(kWidth, kHeight);
     for (std::size_t i = 0; i < kPixels; ++i) image[i] = turn_of[table[i]];

@@ -134,7 +134,10 @@ Bytes imagesOfWall(const Lens& lens, double depth_m, double amplitude_counts) {
 }
 
 EmulatedKinect2::EmulatedKinect2(Options options)
-    : options_(std::move(options)), number_(options_.first_number), stamp_(options_.first_stamp) {
+    : options_(std::move(options)),
+      tables_(phaseTablesAnswer(options_.tables)),
+      number_(options_.first_number),
+      stamp_(options_.first_stamp) {
   if (options_.images.empty()) options_.images = imagesOfWall(options_.lens, 2.0);
 }
 
@@ -161,7 +164,7 @@ Bytes EmulatedKinect2::dataFor(Code code, std::span<const std::uint32_t> paramet
         data.resize(0x80);
         return data;
       }
-      return page == 2 ? phaseTablesAnswer(options_.tables) : page == 3 ? lensAnswer(options_.lens) : data;
+      return page == 2 ? tables_ : page == 3 ? lensAnswer(options_.lens) : data;
     default:
       return data;
   }

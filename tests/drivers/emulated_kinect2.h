@@ -86,6 +86,7 @@ class EmulatedKinect2 {
   std::vector<drivers::kinect2::Code> seen_;
   bool is_suspended_ = true, is_initialised_ = false, is_streaming_ = false, hangs_ = false;
   int alternate_ = 0;
+  const Bytes tables_;  // the answer, which is long, made once
   std::uint32_t number_, stamp_;
   int lost_packets_ = 0, short_images_ = 0, skipped_ = 0, not_ready_ = 0;
 };

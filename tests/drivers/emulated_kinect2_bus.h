@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <condition_variable>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <thread>
 
@@ -41,13 +44,15 @@ class EmulatedKinect2Bus final : public drivers::kinect2::Bus {
   [[nodiscard]] bool isOpen() const { return state_->is_open; }
   /// Between frames.
   std::atomic<std::int64_t>& interval_us() { return state_->interval_us; }
+  /// From the start until the first one; at once, if nobody says otherwise.
+  std::atomic<std::int64_t>& first_us() { return state_->first_us; }
 
  private:
   struct State {
     explicit State(EmulatedKinect2::Options options) : device(std::move(options)) {}
     EmulatedKinect2 device;
     std::atomic<bool> is_plugged{true}, is_open{false};
-    std::atomic<std::int64_t> interval_us{33'333};
+    std::atomic<std::int64_t> interval_us{33'333}, first_us{0};
   };
   static Error gone() { return {Error::Code::Disconnected, "the cable is not plugged in"}; }
 
@@ -90,14 +95,15 @@ class EmulatedKinect2Bus final : public drivers::kinect2::Bus {
     void stopPackets() override { thread_ = {}; }
 
    private:
+    using Time = std::chrono::steady_clock::time_point;
     void run(drivers::kinect2::PacketSink& sink, const std::stop_token& stop) {
+      pauseUntil(after(state_->first_us), stop);
       while (!stop.stop_requested()) {
         if (!state_->is_plugged) {
           sink.lost(gone());
           return;
         }
-        const auto due =
-            std::chrono::steady_clock::now() + std::chrono::microseconds{state_->interval_us.load()};
+        const auto due = after(state_->interval_us);
         if (state_->device.isStreaming()) {
           sink.packet({});
           for (const auto& packet : state_->device.nextFrame()) {
@@ -107,12 +113,21 @@ class EmulatedKinect2Bus final : public drivers::kinect2::Bus {
               sink.packet(packet.bytes);
           }
         }
-        while (!stop.stop_requested() && state_->is_plugged && std::chrono::steady_clock::now() < due) {
-          std::this_thread::sleep_for(std::chrono::milliseconds{1});
-        }
+        pauseUntil(due, stop);
       }
     }
+    static Time after(std::int64_t us) {
+      return std::chrono::steady_clock::now() + std::chrono::microseconds{us};
+    }
+    /// Or until it is told to stop, or the cable is pulled.
+    void pauseUntil(Time due, const std::stop_token& stop) {
+      std::unique_lock lock{pause_};
+      while (!stop.stop_requested() && state_->is_plugged && std::chrono::steady_clock::now() < due)
+        told_.wait_until(lock, stop, std::min(due, after(1000)), [] { return false; });
+    }
     std::shared_ptr<State> state_;  // the test may take the bus away first
+    std::mutex pause_;
+    std::condition_variable_any told_;
     std::jthread thread_;
   };
 

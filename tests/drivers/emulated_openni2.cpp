@@ -40,8 +40,9 @@ OniPixelFormat formatOf(OniSensorType sensor) {
                                     : ONI_PIXEL_FORMAT_RGB888;
 }
 OniVideoMode modeOf(OniSensorType sensor) {
-  return {formatOf(sensor), Emulated::kWidth, Emulated::kHeight, Emulated::kRate_hz};
+  return {formatOf(sensor), Emulated::kWidth, Emulated::kHeight, emulated.rate_hz};
 }
+std::int64_t interval_us() { return 1'000'000 / emulated.rate_hz; }
 
 class Stream final : public oni::driver::StreamBase {
  public:
@@ -139,7 +140,7 @@ class Stream final : public oni::driver::StreamBase {
   [[nodiscard]] int bytesPerPixel() const { return sensor_ == ONI_SENSOR_COLOR ? 3 : 2; }
 
   void run(const std::stop_token& stop) {
-    const std::chrono::microseconds interval{Emulated::kInterval_us};
+    const std::chrono::microseconds interval{interval_us()};
     const auto begin = Clock::now();
     const std::int64_t first = begin.time_since_epoch() / interval;  // all streams in step
     if (sensor_ == ONI_SENSOR_DEPTH) emulated.last_depth = first;
@@ -173,8 +174,8 @@ class Stream final : public oni::driver::StreamBase {
     frame->sensorType = sensor_;
     frame->frameIndex = index;
     // The other cameras expose a little later.
-    const std::int64_t lag_us = sensor_ == ONI_SENSOR_DEPTH ? 0 : 3000;
-    const std::int64_t stamp_us = n * Emulated::kInterval_us + emulated.clock_us + lag_us;
+    const std::int64_t lag_us = sensor_ == ONI_SENSOR_DEPTH ? 0 : interval_us() * 3 / 20;
+    const std::int64_t stamp_us = n * interval_us() + emulated.clock_us + lag_us;
     frame->timestamp = emulated.has_stamps ? static_cast<std::uint64_t>(stamp_us) : 0;
     frame->width = mode.resolutionX;
     frame->height = mode.resolutionY;

@@ -23,6 +23,7 @@ struct EmulatedOpenNI2 {
     return static_cast<std::uint16_t>(100 + (x + 3 * y) % 900);
   }
 
+  std::atomic<int> rate_hz{kRate_hz};  ///< of a camera that is opened from now on
   std::atomic<bool> is_hung{false};  ///< no frames, but the device answers
   std::atomic<bool> is_color_silent{false};
   std::atomic<bool> has_stamps{true};
