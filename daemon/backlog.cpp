@@ -8,8 +8,6 @@
 namespace toftwin::daemon {
 namespace {
 
-/// Smaller bodies go through the socket faster than through a file descriptor and a mapping.
-constexpr std::uint64_t kSmallestSharedBody = 64 * 1024;
 /// Of a frame beside its planes: its tables, exposures and allocations, rounded up.
 constexpr std::uint64_t kFrameOverhead = 4096;
 
@@ -26,13 +24,20 @@ Error neverFits(std::uint64_t bytes, std::uint64_t byte_limit) {
 }  // namespace
 
 std::shared_ptr<const transport::SharedBody> PreparedFrame::sharedBody(transport::SharedBodies& maker) const {
-  if (body.bytes < kSmallestSharedBody) return nullptr;
+  if (body.bytes < transport::SharedBodies::kSmallest) return nullptr;
   const std::scoped_lock lock{mutex_};
   if (auto shared = shared_.lock()) return shared;
   const auto made = maker.make(body);
   if (!made) return nullptr;
   shared_ = *made;
   return *made;
+}
+
+wire::Body PreparedFrame::summedBody() const {
+  std::call_once(is_summed_, [this] { crc32c_ = wire::crc32cOf(body); });
+  wire::Body summed = body;
+  summed.crc32c = crc32c_;
+  return summed;
 }
 
 std::uint64_t PreparedFrame::heldBytes() const { return body.bytes + kFrameOverhead; }

@@ -20,11 +20,15 @@
 
 namespace toftwin::daemon {
 
-/// A frame as a selection wants it, with its body encoded.
+/// A frame as a selection wants it, with its body laid out.
 struct PreparedFrame {
   Frame frame;
-  wire::Body body;
+  wire::Body body;  ///< without its CRC
 
+  /// The body with its CRC, which is computed once: by the source's thread as soon as subscribers know of the
+  /// frame, while theirs copies it into shared memory, or by theirs if it is first. May be called on any
+  /// thread.
+  [[nodiscard]] wire::Body summedBody() const;
   /// The body in shared memory, for clients on this machine; null if it is small or if there is no
   /// shared memory to be had. Made when it is first sent and gone when the writes that it was given
   /// to are done, so that frames that wait hold no file descriptor. May be called on any thread.
@@ -33,6 +37,8 @@ struct PreparedFrame {
   [[nodiscard]] std::uint64_t heldBytes() const;
 
  private:
+  mutable std::once_flag is_summed_;
+  mutable std::uint32_t crc32c_ = 0;
   mutable std::mutex mutex_;
   mutable std::weak_ptr<const transport::SharedBody> shared_;
 };

@@ -179,12 +179,14 @@ void Connection::send(const Session::Outgoing& outgoing) {
   const auto& [subscription, delivery, bodies] = std::get<Session::FrameOut>(outgoing);
   wire::FrameMessage message{subscription, delivery.frame->frame};
   message.frame.dropped_before = delivery.dropped_before;
-  auto encoded = wire::encode(message, delivery.frame->body);
+  // The copy before the CRC, which another thread computes meanwhile.
+  auto shared = bodies ? delivery.frame->sharedBody(*bodies) : nullptr;
+  auto encoded = wire::encode(message, delivery.frame->summedBody());
   if (!encoded) {  // it could be encoded when it was prepared, so this is a mistake in this program
     logging::error("{}: {}; closing", name_, encoded.error().message);
     return close();
   }
-  if (auto shared = bodies ? delivery.frame->sharedBody(*bodies) : nullptr) {
+  if (shared) {
     return socket_.asyncWrite(*std::move(encoded), std::move(shared), sent);
   }
   socket_.asyncWrite(*std::move(encoded), sent);

@@ -16,7 +16,7 @@ Result<PreparedFramePtr> prepare(const Frame& frame, const Selection& selection)
   std::uint64_t bytes = 0;
   for (const Plane& plane : prepared->frame.planes) bytes += plane.data.size();
   if (auto fits = checkFrameBytes(bytes); !fits) return fits.error();
-  prepared->body = wire::encodeBody(prepared->frame.planes);
+  prepared->body = wire::layOutBody(prepared->frame.planes);
   // Once here, so that a frame that cannot be sent says why to its subscribers and costs no connection.
   const auto sendable = wire::encode(wire::FrameMessage{0, prepared->frame}, prepared->body);
   if (!sendable) return Error{Error::Code::Internal, sendable.error().message};
@@ -51,18 +51,20 @@ void end(Subscriber& subscriber, const Error& reason) noexcept { give(subscriber
 
 void fanOut(const Frame& frame, const std::vector<SubscriberPtr>& takers) {
   std::vector<bool> is_served(takers.size(), false);
+  std::vector<PreparedFramePtr> given;
   for (std::size_t first = 0; first < takers.size(); ++first) {
     if (is_served[first]) continue;
     const Selection& wanted = takers[first]->wish.selection;
-    std::vector<SubscriberPtr> equals;
+    const Result<PreparedFramePtr> prepared = tryToPrepare(frame, wanted);
     for (std::size_t i = first; i < takers.size(); ++i) {
       if (is_served[i] || takers[i]->wish.selection != wanted) continue;
       is_served[i] = true;
-      equals.push_back(takers[i]);
+      give(*takers[i], prepared);
     }
-    const Result<PreparedFramePtr> prepared = tryToPrepare(frame, wanted);
-    for (const SubscriberPtr& taker : equals) give(*taker, prepared);
+    if (prepared) given.push_back(*prepared);
   }
+  // While the thread that sends copies them into shared memory.
+  for (const PreparedFramePtr& prepared : given) static_cast<void>(prepared->summedBody());
 }
 
 }  // namespace toftwin::daemon

@@ -79,44 +79,71 @@ int FileDescriptor::release() { return std::exchange(fd_, -1); }
 Result<std::shared_ptr<const SharedBody>> SharedBody::create(const wire::Body& body) {
   FileDescriptor fd = newMemfd();
   if (auto filled = fillAndSeal(fd, body); !filled) return filled.error();
-  return std::shared_ptr<const SharedBody>{new SharedBody{std::move(fd), body.bytes, {}}};
+  return std::shared_ptr<const SharedBody>{new SharedBody{std::move(fd), body.bytes}};
 }
 
-SharedBody::~SharedBody() {
-  if (const auto maker = maker_.lock()) maker->makeSpare(size_);
+/// Without a thread, for want of one, memory is taken when it is needed.
+SharedBodies::SharedBodies() {
+  try {
+    thread_ = std::jthread{[this](const std::stop_token& stop) { makeSpares(stop); }};
+  } catch (const std::system_error&) {
+  }
 }
 
 Result<std::shared_ptr<const SharedBody>> SharedBodies::make(const wire::Body& body) {
   FileDescriptor fd = takeSpare(body.bytes);
   if (!fd) fd = newMemfd();
   if (auto filled = fillAndSeal(fd, body); !filled) return filled.error();
-  return std::shared_ptr<const SharedBody>{new SharedBody{std::move(fd), body.bytes, weak_from_this()}};
+  return std::shared_ptr<const SharedBody>{new SharedBody{std::move(fd), body.bytes}};
 }
 
 std::uint64_t SharedBodies::ready() const {
   const std::scoped_lock lock{mutex_};
-  return std::accumulate(spares_.begin(), spares_.end(), std::uint64_t{0},
-                         [](std::uint64_t sum, const Spare& spare) { return sum + spare.size; });
+  return bytesOfSpares();
 }
 
 FileDescriptor SharedBodies::takeSpare(std::uint64_t size) {
-  const std::scoped_lock lock{mutex_};
-  const auto spare = std::ranges::find(spares_, size, &Spare::size);
-  if (spare == spares_.end()) return {};
-  return std::exchange(*spare, Spare{}).fd;
+  FileDescriptor fd;
+  {
+    const std::scoped_lock lock{mutex_};
+    if (const auto spare = std::ranges::find(spares_, size, &Spare::size); spare != spares_.end()) {
+      fd = std::move(spare->fd);
+      spares_.erase(spare);
+    }
+    if (size < kSmallest || size > kMostBytes / kOfASize || sparesOf(size) >= kOfASize) return fd;
+    wanted_.insert(size);
+  }
+  changed_.notify_one();
+  return fd;
 }
 
-/// One of each size; where all places are taken, the one that has waited longest goes. What cannot be had now
-/// is taken when it is needed.
-void SharedBodies::makeSpare(std::uint64_t size) {
-  const std::scoped_lock lock{mutex_};
-  if (size > kLargestSpare || std::ranges::find(spares_, size, &Spare::size) != spares_.end()) return;
-  FileDescriptor fd = newMemfd();
-  if (!fd || ::fallocate(fd.get(), 0, 0, static_cast<off_t>(size)) != 0) return;
-  auto place = std::ranges::find(spares_, 0u, &Spare::size);
-  if (place == spares_.end()) place = spares_.begin();
-  std::rotate(place, place + 1, spares_.end());
-  spares_.back() = {size, std::move(fd)};
+/// The thread. What cannot be had now is taken when it is needed.
+void SharedBodies::makeSpares(const std::stop_token& stop) {
+  std::unique_lock lock{mutex_};
+  const auto never = [] { return false; };
+  while (changed_.wait(lock, stop, [&] { return !wanted_.empty(); })) {
+    const std::uint64_t size = *wanted_.begin();
+    if (sparesOf(size) > 0) changed_.wait_for(lock, stop, kLater, never);
+    while (!stop.stop_requested() && sparesOf(size) < kOfASize) {
+      lock.unlock();  // who sends does not wait for this
+      FileDescriptor fd = newMemfd();
+      const bool is_made = fd && ::fallocate(fd.get(), 0, 0, static_cast<off_t>(size)) == 0;
+      lock.lock();
+      if (!is_made) break;
+      spares_.push_back({size, std::move(fd)});
+      while (spares_.size() > kMostReady || bytesOfSpares() > kMostBytes) spares_.pop_front();
+    }
+    wanted_.erase(size);
+  }
+}
+
+std::size_t SharedBodies::sparesOf(std::uint64_t size) const {
+  return static_cast<std::size_t>(std::ranges::count(spares_, size, &Spare::size));
+}
+
+std::uint64_t SharedBodies::bytesOfSpares() const {
+  return std::accumulate(spares_.begin(), spares_.end(), std::uint64_t{0},
+                         [](std::uint64_t sum, const Spare& spare) { return sum + spare.size; });
 }
 
 Result<Buffer> mapSharedBody(const FileDescriptor& memfd, std::uint64_t size) {

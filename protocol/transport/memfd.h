@@ -1,10 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <mutex>
+#include <set>
+#include <stop_token>
+#include <thread>
 
 #include <toftwin/result.h>
 
@@ -33,8 +39,6 @@ class FileDescriptor {
   int fd_ = -1;
 };
 
-class SharedBodies;
-
 /// A body in a memfd that nobody can change any more (sealed against writing, shrinking and
 /// growing): made once and given to every subscriber on this machine.
 class SharedBody {
@@ -42,43 +46,49 @@ class SharedBody {
   static Result<std::shared_ptr<const SharedBody>> create(const wire::Body& body);
   SharedBody(const SharedBody&) = delete;
   SharedBody& operator=(const SharedBody&) = delete;
-  ~SharedBody();
   [[nodiscard]] int fd() const { return fd_.get(); }
   [[nodiscard]] std::uint64_t size() const { return size_; }
 
  private:
   friend class SharedBodies;
-  SharedBody(FileDescriptor fd, std::uint64_t size, std::weak_ptr<SharedBodies> maker)
-      : fd_(std::move(fd)), size_(size), maker_(std::move(maker)) {}
+  SharedBody(FileDescriptor fd, std::uint64_t size) : fd_(std::move(fd)), size_(size) {}
   FileDescriptor fd_;
   std::uint64_t size_;
-  std::weak_ptr<SharedBodies> maker_;
 };
 
-/// Makes bodies of streams. When a body goes, because all have it, memory is made ready for the next of its
-/// size: to take fresh pages from the kernel takes two thirds of the time that a body of 2 MB needs (0.55 →
-/// 0.20 ms), and a frame would wait for it. Shared by the subscriptions that want bodies, so that this memory
-/// goes with the last of them. May be used on any thread.
-class SharedBodies : public std::enable_shared_from_this<SharedBodies> {
+/// Makes bodies of streams, in memory that is ready: to take fresh pages from the kernel takes two thirds of
+/// the time that a body of 2 MB needs (0.55 → 0.20 ms), and a frame would wait for it. A thread of its own
+/// makes the next ready, when those who have just been sent a body are done with their processors. Shared by
+/// the subscriptions that want bodies, so that memory and thread go with the last of them. May be used on any
+/// thread.
+class SharedBodies {
  public:
-  static constexpr std::size_t kMostSpares = 4;                  ///< sizes: streams with other planes
-  static constexpr std::uint64_t kLargestSpare = 16ull << 20;  ///< bytes
+  static constexpr std::uint64_t kSmallest = 64 << 10;  ///< bytes; for smaller ones no memory is made ready
+  static constexpr std::size_t kOfASize = 2;            ///< one while the other is being made
+  static constexpr std::size_t kMostReady = 8;
+  static constexpr std::uint64_t kMostBytes = 64ull << 20;  ///< that are ready
+  static constexpr std::chrono::milliseconds kLater{3};     ///< than a body, unless none of its size is left
 
+  SharedBodies();
   Result<std::shared_ptr<const SharedBody>> make(const wire::Body& body);
   /// Memory that is ready, in bytes.
   [[nodiscard]] std::uint64_t ready() const;
 
  private:
-  friend class SharedBody;
   struct Spare {
-    std::uint64_t size = 0;  ///< 0: none
+    std::uint64_t size = 0;
     FileDescriptor fd;
   };
   FileDescriptor takeSpare(std::uint64_t size);
-  void makeSpare(std::uint64_t size);
+  void makeSpares(const std::stop_token& stop);
+  [[nodiscard]] std::size_t sparesOf(std::uint64_t size) const;
+  [[nodiscard]] std::uint64_t bytesOfSpares() const;
 
   mutable std::mutex mutex_;
-  std::array<Spare, kMostSpares> spares_;  ///< the newest last
+  std::condition_variable_any changed_;
+  std::set<std::uint64_t> wanted_;  ///< sizes
+  std::deque<Spare> spares_;        ///< the newest last
+  std::jthread thread_;             ///< last: it ends first
 };
 
 /// A received memfd as read-only memory that is unmapped when the last Buffer goes. It must be a

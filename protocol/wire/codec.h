@@ -55,6 +55,9 @@ struct Body {
   std::uint32_t crc32c = 0;
 };
 Body encodeBody(const std::vector<Plane>& planes);
+/// The two halves of that: the pieces, which takes no time, and the CRC of all of them.
+Body layOutBody(const std::vector<Plane>& planes);
+std::uint32_t crc32cOf(const Body& body);
 
 /// A message ready to be written: `head` (preamble and header), then the body's pieces in order.
 struct Encoded {

@@ -218,19 +218,27 @@ constexpr std::uint8_t messageIdOf() {
 
 }  // namespace
 
-Body encodeBody(const std::vector<Plane>& planes) {
+Body layOutBody(const std::vector<Plane>& planes) {
   Body body;
   for (const Plane& plane : planes) {
     const std::uint64_t size = plane.data.size();
     const std::uint64_t padding = paddedToAlignment(size) - size;
     body.pieces.push_back(plane.data);
-    body.crc32c = crc32c(plane.data.bytes(), body.crc32c);
-    if (padding > 0) {
-      body.pieces.push_back(Buffer{nullptr, std::span{kZeros}.first(padding)});
-      body.crc32c = crc32c(body.pieces.back().bytes(), body.crc32c);
-    }
+    if (padding > 0) body.pieces.push_back(Buffer{nullptr, std::span{kZeros}.first(padding)});
     body.bytes += size + padding;
   }
+  return body;
+}
+
+std::uint32_t crc32cOf(const Body& body) {
+  std::uint32_t sum = 0;
+  for (const Buffer& piece : body.pieces) sum = crc32c(piece.bytes(), sum);
+  return sum;
+}
+
+Body encodeBody(const std::vector<Plane>& planes) {
+  Body body = layOutBody(planes);
+  body.crc32c = crc32cOf(body);
   return body;
 }
 

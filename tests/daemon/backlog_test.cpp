@@ -202,6 +202,21 @@ TEST(PreparedFrame, IsInSharedMemoryOnlyWhileItIsBeingSent) {
   EXPECT_NE(frame.sharedBody(maker), nullptr);
 }
 
+TEST(PreparedFrame, IsSummedOnceWhoeverAsksFirst) {
+  PreparedFrame frame;
+  std::vector<std::byte> bytes(100'000, std::byte{7});
+  frame.body = {.pieces = {Buffer{nullptr, bytes}}, .bytes = bytes.size(), .crc32c = 0};
+  const std::uint32_t sum = wire::crc32cOf(frame.body);
+  {
+    std::vector<std::jthread> askers;
+    for (int i = 0; i < 4; ++i) {
+      askers.emplace_back([&] { EXPECT_EQ(frame.summedBody().crc32c, sum); });
+    }
+  }
+  bytes[0] = std::byte{8};  // nobody does, but it shows whether the sum is computed again
+  EXPECT_EQ(frame.summedBody().crc32c, sum);
+}
+
 TEST(Backlog, TheFirstReasonOfAnEndCounts) {
   Backlog backlog = backlogWith({});
   backlog.end({Error::Code::EndOfStream, "first"});

@@ -355,47 +355,50 @@ TEST(SharedBodyTest, CannotBeChangedByAnyone) {
   EXPECT_EQ(::mmap(nullptr, 64, PROT_WRITE, MAP_SHARED, (*shared)->fd(), 0), MAP_FAILED);
 }
 
-TEST(SharedBodies, KeepMemoryReadyForTheNextBodyOfASize) {
-  const auto bodies = std::make_shared<SharedBodies>();
-  const auto sizeOf = [](int width) { return wire::encodeBody(wire::exampleFrame(width, 4).planes); };
-  const wire::Body small = sizeOf(4), large = sizeOf(64);
-  { const auto first = bodies->make(small); }
-  EXPECT_EQ(bodies->ready(), small.bytes);
-  {
-    const auto other = bodies->make(large);
-    EXPECT_EQ(bodies->ready(), small.bytes) << "another size needs other memory";
-    const auto next = bodies->make(small), beside = bodies->make(small);
-    EXPECT_EQ(bodies->ready(), 0u);
-    ASSERT_TRUE(next);
-    const auto mapped = mapSharedBody(FileDescriptor{::dup((*next)->fd())}, small.bytes);
+wire::Body bodyOfWidth(int width) { return wire::encodeBody(wire::exampleFrame(width, 256).planes); }
+
+/// Waits until so much is ready: a thread makes it so, some milliseconds later.
+void expectReady(const SharedBodies& bodies, std::uint64_t bytes) {
+  const auto soon = std::chrono::steady_clock::now() + std::chrono::seconds{10};
+  while (bodies.ready() != bytes && std::chrono::steady_clock::now() < soon)
+    std::this_thread::sleep_for(std::chrono::milliseconds{1});
+  EXPECT_EQ(bodies.ready(), bytes);
+}
+
+TEST(SharedBodies, AreMadeInMemoryThatIsReady) {
+  SharedBodies bodies;
+  const wire::Body body = bodyOfWidth(64);
+  const auto first = bodies.make(body);
+  expectReady(bodies, 2 * body.bytes);
+  const auto second = bodies.make(body);
+  expectReady(bodies, 2 * body.bytes);
+  for (const auto* made : {&first, &second}) {  // ready or not, they are alike
+    ASSERT_TRUE(*made);
+    const auto mapped = mapSharedBody(FileDescriptor{::dup((**made)->fd())}, body.bytes);
     ASSERT_TRUE(mapped) << mapped.error().message;
-    EXPECT_EQ(wire::crc32c(mapped->bytes(), 0), small.crc32c);
-    EXPECT_EQ(::pwrite((*next)->fd(), "x", 1, 0), -1);
+    EXPECT_EQ(wire::crc32c(mapped->bytes(), 0), body.crc32c);
+    EXPECT_EQ(::pwrite((**made)->fd(), "x", 1, 0), -1);
   }
-  EXPECT_EQ(bodies->ready(), small.bytes + large.bytes) << "one of each size";
 }
 
-TEST(SharedBodies, KeepTheNewestSizes) {
-  const auto bodies = std::make_shared<SharedBodies>();
-  std::uint64_t newest = 0;
-  for (int i = 1; i <= 7; ++i) {
-    const wire::Body body = wire::encodeBody(wire::exampleFrame(16 * i, 4).planes);
-    const auto made = bodies->make(body);
-    if (i > 3) newest += body.bytes;
+TEST(SharedBodies, AreReadyForTheNewestSizes) {
+  SharedBodies bodies;
+  std::uint64_t ready = 0;
+  for (int i = 1; i <= 6; ++i) {
+    const wire::Body body = bodyOfWidth(32 * i);
+    ASSERT_TRUE(bodies.make(body));
+    ready += 2 * body.bytes;
+    if (i > 4) ready -= 2 * bodyOfWidth(32 * (i - 4)).bytes;
+    expectReady(bodies, ready);
   }
-  EXPECT_EQ(bodies->ready(), newest);
 }
 
-TEST(SharedBodies, ASizeThatWasUsedAgainIsNewerThanTheOthers) {
-  const auto bodies = std::make_shared<SharedBodies>();
-  const auto use = [&](int size) {
-    return bodies->make(wire::encodeBody(wire::exampleFrame(16 * size, 4).planes)).ok();
-  };
-  for (const int size : {1, 2, 3, 4, 1, 5}) ASSERT_TRUE(use(size));
-  const std::uint64_t before = bodies->ready();
-  const wire::Body first = wire::encodeBody(wire::exampleFrame(16, 4).planes);
-  const auto held = bodies->make(first);
-  EXPECT_EQ(bodies->ready(), before - first.bytes) << "2 went, and 1 is still there";
+TEST(SharedBodies, AreNotReadyForWhatIsSentOtherwise) {
+  SharedBodies bodies;
+  ASSERT_TRUE(bodies.make(wire::encodeBody(wire::exampleFrame(4, 4).planes)));
+  const wire::Body larger = bodyOfWidth(64);
+  ASSERT_TRUE(bodies.make(larger));
+  expectReady(bodies, 2 * larger.bytes);
 }
 
 TEST(SharedBodyTest, AnUnsealedMemfdIsRefused) {
