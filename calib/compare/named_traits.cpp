@@ -28,8 +28,14 @@ void TraitCollector::draw(NamedRows rows) {
   found_.rows.push_back(std::move(kept));
 }
 
+void TraitCollector::add(const std::string& what, const std::string& of, const Result<FittedTraits>& fitted) {
+  add(what, of, fitted ? Traits{fitted->traits} : Traits{fitted.error()});
+  if (fitted && !fitted->not_told.empty())
+    found_.untold.push_back(fmt::format("{} of {}: {}", what, of, fitted->not_told));
+}
+
 void TraitCollector::add(NamedRows rows, const Result<FittedTraits>& fitted) {
-  add(rows.what, rows.of, fitted ? Traits{fitted->traits} : Traits{fitted.error()});
+  add(rows.what, rows.of, fitted);
   if (fitted) rows.curve = fitted->curve;
   for (std::size_t i = 0; fitted && i < fitted->besides.size(); ++i) rows.y[i] -= fitted->besides[i];
   draw(std::move(rows));

@@ -36,6 +36,7 @@ class TraitCollector {
  public:
   void add(const std::string& what, const std::string& of, const Traits& traits,
            const std::string& detail = {});
+  void add(const std::string& what, const std::string& of, const Result<FittedTraits>& fitted);
   /// With the rows for a plot, less what in them goes with other things than x, and the curve where one could
   /// be fitted.
   void add(NamedRows rows, const Result<FittedTraits>& fitted);

@@ -221,6 +221,30 @@ constexpr std::array kBlind{
     Blind{Kind::NearField, "near_field: the emitter's place and a delay along the columns look alike (1.00)"},
     Blind{Kind::Repeats, "repeats: whether the camera came back to where it began is not known"}};
 
+/// Of the lowest frequencies that cameras are modulated at, a period is 10 m.
+constexpr double kLongestPeriod_m = 10.0;
+
+/// Errors that go once or twice per period of the modulation are told over a whole one only; the plan does not
+/// know its cameras.
+void noteSpan(const Plan& plan, const Schedule& schedule, std::vector<Remark>& remarks) {
+  std::vector<double> distance_m;
+  for (const PlannedCapture& one : schedule.captures) {
+    if (plan.blocks[one.block].kind == Kind::Distance && one.pose && !one.is_locked)
+      distance_m.push_back(one.distance_m);
+  }
+  if (distance_m.empty()) return;
+  const auto [nearest, farthest] = std::ranges::minmax(distance_m);
+  if (!(farthest > nearest) || farthest - nearest >= kLongestPeriod_m) return;
+  constexpr double kHalfLight_m_MHz = 149.896229;  // c/2
+  remarks.push_back(
+      {false,
+       fmt::format("distances of {:.3g} to {:.3g} m are a whole period of {:.0f} MHz or more: of lower frequencies of "
+                   "modulation, waves of error of one or two per period may not be told",
+                   nearest, farthest, std::ceil(kHalfLight_m_MHz / (farthest - nearest))),
+       fmt::format("go on to {:.3g} m for 16 MHz (a Kinect v2), {:.3g} m for 30 MHz: c/2f beyond the nearest",
+                   nearest + kHalfLight_m_MHz / 16.0, nearest + kHalfLight_m_MHz / 30.0)});
+}
+
 void note(const Plan& plan, const Schedule& schedule, std::vector<Remark>& remarks) {
   for (const Blind& blind : kBlind) {
     const bool is_there =
@@ -233,6 +257,7 @@ void note(const Plan& plan, const Schedule& schedule, std::vector<Remark>& remar
         {false, "no capture is locked: there will be none to judge a model on that was not fitted to it",
          "write locked = … in the blocks, about a fifth of their conditions"});
   }
+  noteSpan(plan, schedule, remarks);
 }
 
 /// What rounding leaves of a unit vector that is a combination of others.

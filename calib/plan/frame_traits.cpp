@@ -37,16 +37,17 @@ void append(std::vector<double>& to, const std::vector<double>& from) {
   to.insert(to.end(), from.begin(), from.end());
 }
 
-/// A column of a camera's own wall at several distances, by its range.
+/// A value of the cells of a camera's own wall at several distances, by their range. Cells where it is not
+/// finite are left out.
 class OverRange {
  public:
   OverRange(const Captures& walls, std::size_t camera,
-            const std::function<const std::vector<double>&(const CameraSeen&)>& column) {
+            const std::function<double(const CameraSeen&, std::size_t)>& value_of) {
     std::map<long, compare::Running> bins;
     for (const ComparedCapture* one : walls) {
       const CameraSeen& seen = one->seen[camera];
       for (std::size_t i = 0; i < seen.wall_range_m.size(); ++i) {
-        if (const double value = column(seen)[i]; std::isfinite(value))
+        if (const double value = value_of(seen, i); std::isfinite(value))
           bins[std::lround(seen.wall_range_m[i] / kBin_m)].add(value);
       }
     }
@@ -74,8 +75,7 @@ class OverRange {
 
 /// What a camera is off by at a range: corners and plates are judged beside it.
 OverRange ownErrorOf(const Captures& walls, std::size_t camera) {
-  const auto errors = [](const CameraSeen& seen) -> const std::vector<double>& { return seen.wall_error_mm; };
-  return {walls, camera, errors};
+  return {walls, camera, [](const CameraSeen& seen, std::size_t i) { return seen.wall_error_mm[i]; }};
 }
 
 void addTiming(const ComparedRun& run, std::size_t camera, TraitCollector& all) {
@@ -184,28 +184,51 @@ Image<float> belowEachOther(const Captures& captures, std::size_t camera) {
   return together;
 }
 
+/// A wall by itself: what a camera is off by at a range, and by how much a veil of 1 would move it there. Both
+/// of the same cells: where one is not known, as that of a cell without an amplitude, the other does not count.
+class WallAlone {
+ public:
+  WallAlone(const Captures& walls, std::size_t camera, std::size_t frequencies)
+      : error_{walls, camera, [](const CameraSeen& seen, std::size_t i) {
+                 return isWhole(seen, i) ? seen.wall_error_mm[i] : kNaN;
+               }} {
+    for (std::size_t f = 0; f < frequencies; ++f) {
+      veil_.emplace_back(walls, camera, [f](const CameraSeen& seen, std::size_t i) {
+        return isWhole(seen, i) ? seen.wall_veil_mm[f][i] : kNaN;
+      });
+    }
+  }
+  /// NaN at ranges at which no wall was seen; 0 where none was seen at all.
+  [[nodiscard]] double error_mm(double range_m) const { return error_.isKnown() ? error_.at(range_m) : 0.0; }
+  [[nodiscard]] double veil_mm(std::size_t f, double range_m) const {
+    return error_.isKnown() ? veil_[f].at(range_m) : 0.0;
+  }
+
+ private:
+  static bool isWhole(const CameraSeen& seen, std::size_t i) {
+    return std::isfinite(seen.wall_error_mm[i]) &&
+           std::ranges::all_of(seen.wall_veil_mm, [i](const auto& of) { return std::isfinite(of[i]); });
+  }
+  OverRange error_;
+  std::vector<OverRange> veil_{};
+};
+
 /// Errors of the wall beside the plate and what a veil would do to them, both less what they are at the same
 /// range before the wall alone: what goes with the range is the camera's own error, and the wall's light
 /// veils it, too.
 void addScatter(const Captures& plates, const Captures& walls, const std::vector<double>& frequency_hz,
                 std::size_t camera, TraitCollector& all) {
-  const OverRange own = ownErrorOf(walls, camera);
-  std::vector<OverRange> own_veil;
-  for (std::size_t f = 0; f < frequency_hz.size(); ++f)
-    own_veil.emplace_back(
-        walls, camera, [f](const CameraSeen& seen) -> const auto& { return seen.wall_veil_mm[f]; });
-  const auto beside = [](const OverRange& usual, double range_m) {
-    return usual.isKnown() ? usual.at(range_m) : 0.0;
-  };
+  const WallAlone alone{walls, camera, frequency_hz.size()};
   std::vector<double> error_mm;
   std::vector<std::vector<double>> veil_mm(frequency_hz.size());
   std::vector<std::size_t> capture;
   for (const ComparedCapture* one : plates) {
     const CameraSeen& seen = one->seen[camera];
     for (std::size_t i = 0; i < seen.wall_range_m.size(); ++i) {
-      error_mm.push_back(seen.wall_error_mm[i] - beside(own, seen.wall_range_m[i]));
+      const double range_m = seen.wall_range_m[i];
+      error_mm.push_back(seen.wall_error_mm[i] - alone.error_mm(range_m));
       for (std::size_t f = 0; f < veil_mm.size(); ++f)
-        veil_mm[f].push_back(seen.wall_veil_mm[f][i] - beside(own_veil[f], seen.wall_range_m[i]));
+        veil_mm[f].push_back(seen.wall_veil_mm[f][i] - alone.veil_mm(f, range_m));
       capture.push_back(one->record.number);
     }
   }

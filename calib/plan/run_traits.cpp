@@ -166,7 +166,7 @@ void addHarmonics(const ComparedRun& run, TraitCollector& all) {
     OverDistance rows;
     for (const ComparedCapture* one : captures) addDifference(*one, rows);
     all.add("harmonics", "B − A",
-            compare::harmonicTraits(rows.distance_m, rows.error_mm, of_a, rows.capture));
+            compare::fittedHarmonics(rows.distance_m, rows.error_mm, of_a, rows.capture));
   }
   for (std::size_t camera : {std::size_t{0}, std::size_t{1}}) {
     OverDistance rows;

@@ -10,6 +10,7 @@
 #include <random>
 
 #include "calib/compare/traits/least_squares.h"
+#include "calib/compare/traits/veil.h"
 
 namespace toftwin::compare {
 namespace {
@@ -108,6 +109,24 @@ TEST(Traits, SayWhatRowsCannotTell) {
   EXPECT_FALSE(latencyTraits(same, same, few, few));
   EXPECT_FALSE(cornerTraits(same, same));
   EXPECT_FALSE(noiseLawTraits(same, same));
+}
+
+/// Three captures of eight rows each.
+TEST(Traits, OfLensScatterSayWhyTheyAreNotTold) {
+  const std::vector<double> kinect{16e6, 80e6, 120e6}, two{20e6, 100e6}, error(24, 1.0), nothing(24, 0.0),
+      ones(24, 1.0);
+  std::vector<double> rising, first(24, 0.0);
+  std::vector<std::size_t> capture;
+  for (std::size_t i = 0; i < 24; ++i) rising.push_back(static_cast<double>(i * i)), capture.push_back(i / 8);
+  std::fill_n(first.begin(), 8, 1.0);
+  const auto why = [&](const std::vector<std::vector<double>>& slopes, const std::vector<double>& frequency_hz) {
+    return errorOf(veilTraits(slopes, error, frequency_hz, capture));
+  };
+  EXPECT_THAT(why({nothing, nothing, nothing}, kinect), HasSubstr("adds no light"));
+  EXPECT_THAT(why({ones, ones, ones}, kinect), HasSubstr("all rows alike, as a constant does"));
+  EXPECT_THAT(why({rising, rising}, two), HasSubstr("ranges of two frequencies alike"));
+  EXPECT_THAT(why({first, first, first}, kinect), HasSubstr("one capture alone tells it"));
+  EXPECT_TRUE(veilTraits(std::vector{rising, rising, rising}, error, kinect, capture).ok());
 }
 
 /// A clean step in eight rows: none flies of eight crossings, and where none flies there is no side to hang on.

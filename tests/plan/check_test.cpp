@@ -130,6 +130,21 @@ TEST(Check, NotesWhatAPlanCannotTell) {
   EXPECT_THAT(notes, HasSubstr("no capture is locked"));
 }
 
+/// c/2 is 149.896 m MHz: 3.4 m are the period of 44.1 MHz, and 0.6 m + c/2f is 9.97 m of 16 MHz.
+TEST(Check, NotesOfWhichFrequenciesTheDistancesAreAWholePeriod) {
+  const auto spanOf = [](const char* distances) {
+    std::string notes;
+    for (const Remark& one :
+         checkOf(fmt::format("[[block]]\nname = 'd'\nkind = 'distance'\ndistance_m = [{}]\nrepeats = 4\n", distances))
+             .remarks)
+      notes += one.what + " | " + one.mend + "\n";
+    return notes;
+  };
+  EXPECT_THAT(spanOf("0.6, 1, 2, 3, 4"), testing::AllOf(HasSubstr("0.6 to 4 m are a whole period of 45 MHz or more"),
+                                                        HasSubstr("go on to 9.97 m for 16 MHz")));
+  EXPECT_THAT(spanOf("0.6, 3, 6, 9, 10.6"), testing::Not(HasSubstr("whole period")));
+}
+
 /// Every seed passes: the drawn order is drawn until it does.
 TEST(Check, PassesRandomOrdersOfEverySeed) {
   for (int seed = 0; seed < 200; ++seed) {

@@ -5,7 +5,9 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <random>
 
@@ -141,39 +143,146 @@ TEST(RunTraits, TakeEachCamerasHarmonicsByItsOwnFrequencies) {
   EXPECT_NE(find(traitsOf(run), "harmonics", "B − A", "30 MHz, 4 per period"), nullptr);
 }
 
-/// The open captures of the standard plan before a wall that fills 60° of a Kinect v2's image: enough for its
-/// three frequencies, and for a wave of 0.31 m that whole images' means would lose.
-TEST(RunTraits, OfTheStandardPlanTellThreeFrequencies) {
+const std::vector<double> kKinect_hz{16e6, 80e6, 120e6};
+
+/// The open captures of the standard plan, and two at each of `more_m`, before a wall that fills 60° of a Kinect
+/// v2's image: it errs by `wave_mm`, each capture by 0.3 mm of its own and each cell by as much.
+ComparedRun wallsOfTheStandardPlan(const std::function<double(double)>& wave_mm, const std::vector<double>& more_m = {}) {
   const auto plan = loadPlan(TOFTWIN_SOURCE_DIR "/docs/examples/plans/standard.toml");
-  ASSERT_TRUE(plan);
   const auto schedule = scheduleOf(*plan);
-  ASSERT_TRUE(schedule);
-  const std::vector<double> frequency_hz{16e6, 80e6, 120e6};
+  std::vector<double> distance_m;
+  for (const PlannedCapture& planned : schedule->captures) {
+    if (plan->blocks[planned.block].kind == Kind::Distance && !planned.is_locked)
+      distance_m.push_back(planned.distance_m);
+  }
+  for (int repeat = 0; repeat < 2; ++repeat) distance_m.insert(distance_m.end(), more_m.begin(), more_m.end());
   std::mt19937_64 random{kSeed};
   std::normal_distribution<double> error{0.0, 0.3};
   ComparedRun run;
-  run.frequency_hz = {frequency_hz, frequency_hz};
-  for (const PlannedCapture& planned : schedule->captures) {
-    if (plan->blocks[planned.block].kind != Kind::Distance || planned.is_locked) continue;
+  run.frequency_hz = {kKinect_hz, kKinect_hz};
+  for (const double middle_m : distance_m) {
     ComparedCapture& one = run.captures.emplace_back();
-    one.pixels = 1, one.record.kind = "distance", one.record.number = planned.number;
+    one.pixels = 1, one.record.kind = "distance", one.record.number = run.captures.size();
     const double own = error(random);
     for (double tangent = 0.0; tangent < 0.577; tangent += 0.01) {
-      const double d = planned.distance_m * std::hypot(1.0, tangent);
+      const double d = middle_m * std::hypot(1.0, tangent);
       for (CameraSeen& seen : one.seen) {
-        seen.wall_range_m.push_back(d);
-        seen.wall_error_mm.push_back(4.0 * std::sin(16.0 * std::numbers::pi * 120e6 / 299'792'458.0 * d) +
-                                     own + error(random));
+        seen.wall_range_m.push_back(d), seen.wall_error_mm.push_back(wave_mm(d) + own + error(random));
       }
     }
   }
-  const RunTraits all = traitsOf(run);
+  return run;
+}
+
+std::function<double(double)> wave(double amplitude_mm, int per_period, double frequency_hz) {
+  const double per_m = 4.0 * std::numbers::pi * per_period * frequency_hz / 299'792'458.0;
+  return [=](double d) { return amplitude_mm * std::sin(per_m * d); };
+}
+
+/// A wave of 0.31 m, that whole images' means would lose.
+TEST(RunTraits, OfTheStandardPlanTellThreeFrequencies) {
+  const RunTraits all = traitsOf(wallsOfTheStandardPlan(wave(4.0, 4, 120e6)));
   for (const char* of : {"A", "B"}) {
-    expectNear(find(all, "harmonics, against", of, "120 MHz, 4 per period"), 4.0);
+    expectNear(find(all, "harmonics, against", of, "80 MHz, 6 per period = 120 MHz, 4 per period"), 4.0);
     expectNear(find(all, "harmonics, against", of, "80 MHz, 4 per period"), 0.0);
     EXPECT_NE(find(all, "harmonics, against", of, "16 MHz, 4 per period"), nullptr);
   }
-  EXPECT_THAT(all.untold, testing::Not(testing::Contains(testing::HasSubstr("harmonics, against"))));
+}
+
+/// A clipped sine of 16 MHz that is seen in three steps errs six times per period.
+TEST(RunTraits, OfTheStandardPlanTellTheSixWavesOfThreeSteps) {
+  const RunTraits all = traitsOf(wallsOfTheStandardPlan(wave(1.2, 6, 16e6)));
+  expectNear(find(all, "harmonics, against", "A", "16 MHz, 6 per period"), 1.2);
+  for (const char* none : {"16 MHz, 4 per period", "16 MHz, 3 per period"})
+    expectNear(find(all, "harmonics, against", "A", none), 0.0);
+}
+
+/// The wall's rows reach 4 m · 2/√3 = 4.62 m of the 9.37 m of 16 MHz; of a wall at 10 m, 11.5 m.
+TEST(RunTraits, SayWhichWavesTheDistancesAreTooShortFor) {
+  const auto none = [](double) { return 0.0; };
+  const auto isOfWaves = testing::Contains(testing::AllOf(
+      testing::HasSubstr("harmonics, against the plan's wall of A: waves of"),
+      testing::HasSubstr("1 per period are not told"), testing::HasSubstr("of the period of 16 MHz, 9.37 m; up to 9.97 m")));
+  EXPECT_THAT(traitsOf(wallsOfTheStandardPlan(none)).untold, isOfWaves);
+  const RunTraits longer = traitsOf(wallsOfTheStandardPlan(wave(2.0, 1, 16e6), {4.7, 5.5, 6.4, 7.4, 8.6, 10.0}));
+  EXPECT_THAT(longer.untold, testing::Not(isOfWaves));
+  expectNear(find(longer, "harmonics, against", "A", "16 MHz, 1 per period"), 2.0);
+  expectNear(find(longer, "harmonics, against", "A", "16 MHz, 2 per period"), 0.0);
+}
+
+/// Cells of a wall, a row each 25 mm of range: an error of 5 sin d besides `veil` times what a veil of 1 does,
+/// w_f · v_f summed over the frequencies, w_f = f / Σ f of a Kinect v2.
+CameraSeen wallWith(double veil, double from_m, const std::function<double(double, double)>& slope_mm) {
+  const std::array frequency_mhz{16.0, 80.0, 120.0};
+  CameraSeen seen;
+  seen.wall_veil_mm.resize(frequency_mhz.size());
+  for (int i = 0; i < 40; ++i) {
+    const double d = from_m + 0.025 * i;
+    double moved_mm = 0.0;
+    for (std::size_t f = 0; f < frequency_mhz.size(); ++f) {
+      seen.wall_veil_mm[f].push_back(slope_mm(frequency_mhz[f], d));
+      moved_mm += frequency_mhz[f] / 216.0 * seen.wall_veil_mm[f].back();
+    }
+    seen.wall_range_m.push_back(d), seen.wall_error_mm.push_back(5.0 * std::sin(d) + veil * moved_mm);
+  }
+  return seen;
+}
+
+void addCapture(ComparedRun& run, const char* kind, const CameraSeen& seen, const char* pose_by = "command") {
+  ComparedCapture& one = run.captures.emplace_back();
+  one.record.number = run.captures.size(), one.record.kind = kind, one.record.pose_by = pose_by;
+  one.seen = {seen, seen};
+}
+
+/// What a wall by itself shows, its own error and its own light's veil, and a plate before it in three captures.
+ComparedRun veiledRun(double veil, const char* plates) {
+  const auto of_wall = [](double mhz, double d) { return 40.0 * std::cos(0.02 * mhz * d); };
+  ComparedRun run;
+  run.frequency_hz = {std::vector{16e6, 80e6, 120e6}, std::vector{16e6, 80e6, 120e6}};
+  addCapture(run, "distance", wallWith(veil, 1.0, of_wall)), addCapture(run, "distance", wallWith(veil, 2.0, of_wall));
+  for (const double plate_m : {0.6, 0.8, 1.1}) {
+    addCapture(run, plates, wallWith(veil, 1.5, [&](double mhz, double d) {
+                 return of_wall(mhz, d) + 300.0 * std::sin(0.04 * mhz * (d - plate_m));
+               }));
+  }
+  return run;
+}
+
+/// Rows are exact, so the share is, too: to rounding in 120 rows of some 100 mm.
+constexpr double kRounding = 1e-9;
+
+TEST(RunTraits, TellLensScatterOfAPlateBesideTheWallAlone) {
+  for (const char* kind : {"scatter", "foreground"}) {
+    const RunTraits all = traitsOf(veiledRun(0.03, kind));
+    for (const char* of : {"A", "B"}) {
+      const RunTrait* veil = find(all, "lens scatter", of, "veil");
+      ASSERT_NE(veil, nullptr) << kind;
+      EXPECT_NEAR(veil->trait.value, 0.03, kRounding) << kind;
+    }
+  }
+}
+
+TEST(RunTraits, TakeLensScatterOfTheBlocksThatAreMadeForIt) {
+  ComparedRun run = veiledRun(0.03, "scatter");
+  const ComparedRun other = veiledRun(0.5, "foreground");
+  run.captures.insert(run.captures.end(), other.captures.begin() + 2, other.captures.end());
+  EXPECT_NEAR(find(traitsOf(run), "lens scatter", "A", "veil")->trait.value, 0.03, kRounding);
+}
+
+TEST(RunTraits, TakeNoLensScatterWhereThePoseIsFittedToThePlanes) {
+  ComparedRun run = veiledRun(0.03, "scatter");
+  addCapture(run, "scatter", wallWith(0.5, 1.5, [](double mhz, double d) { return 300.0 * std::sin(0.01 * mhz * d); }),
+             "planes");
+  EXPECT_NEAR(find(traitsOf(run), "lens scatter", "A", "veil")->trait.value, 0.03, kRounding);
+}
+
+/// A cell of the wall alone without an amplitude says nothing of a veil, so its error is not what the others' is less.
+TEST(RunTraits, TakeErrorAndVeilOfTheWallAloneOfTheSameCells) {
+  ComparedRun run = veiledRun(0.03, "scatter");
+  CameraSeen dim = wallWith(0.03, 1.5, [](double, double) { return std::nan(""); });
+  for (double& error : dim.wall_error_mm) error = 40.0;
+  addCapture(run, "distance", dim);
+  EXPECT_NEAR(find(traitsOf(run), "lens scatter", "A", "veil")->trait.value, 0.03, kRounding);
 }
 
 TEST(RunTraits, SayThatNoFrameShowsAPlateMove) {

@@ -70,7 +70,9 @@ Transformed transformed(const ClusteredRows& all, double lambda) {
 }
 
 /// Satterthwaite's degrees of freedom of the parameter that depends most on how clusters differ, the constant
-/// apart: of a variance whose share s comes from u, which G clusters tell, (s²/(G − 1) + (1 − s)²/(n − k))⁻¹.
+/// apart: of a variance whose share s comes from u, (s²/ν + (1 − s)²/(n − k))⁻¹. ν is of u's own variance by
+/// REML's expected information, λ² tr (Zᵀ P Z)², with P what the parameters leave of V⁻¹: G − 1 where only a
+/// constant is fitted, and less by what of the parameters the clusters' means tell.
 double degreesOf(const ClusteredRows& all, const MatrixXd& inverse, double lambda, double free) {
   const Index k = inverse.cols();
   MatrixXd means = all.means.leftCols(k);
@@ -79,13 +81,26 @@ double degreesOf(const ClusteredRows& all, const MatrixXd& inverse, double lambd
     means.row(g) *= size / (1.0 + lambda * size);
   }
   const MatrixXd from_u = lambda * inverse * means.transpose() * means * inverse;
-  const double clusters = static_cast<double>(all.size.size()) - 1.0;
+  MatrixXd left = -means * inverse * means.transpose();
+  for (Index g = 0; g < means.rows(); ++g) {
+    const double size = all.size[static_cast<std::size_t>(g)];
+    left(g, g) += size / (1.0 + lambda * size);
+  }
+  const double clusters = std::max(1.0, lambda * lambda * left.squaredNorm());
   double least = free;
   for (Index j = k > 1 ? 1 : 0; j < k; ++j) {
     const double share = std::clamp(from_u(j, j) / inverse(j, j), 0.0, 1.0);
     least = std::min(least, 1.0 / (share * share / clusters + (1.0 - share) * (1.0 - share) / free));
   }
   return least;
+}
+
+/// Of columns of length 1. The reciprocal condition alone does not see a pivot of exactly 0, as of two equal
+/// columns: Eigen's solve() then leaves that column out.
+bool isDetermined(const Eigen::LDLT<MatrixXd>& normal) {
+  constexpr double kLeast = 1e-9;
+  const auto pivots = normal.vectorD();
+  return pivots.minCoeff() > kLeast * pivots.maxCoeff() && normal.rcond() > kLeast;
 }
 
 }  // namespace
@@ -102,7 +117,7 @@ std::optional<Fit> fitInClusters(const std::vector<std::vector<double>>& columns
   all.rows.leftCols(k) *= scale.cwiseInverse().asDiagonal();
   all.means.leftCols(k) *= scale.cwiseInverse().asDiagonal();
   const Transformed without = transformed(all, 0.0);
-  if (!(without.normal.rcond() > 1e-9) || !(without.squares > 0.0)) return std::nullopt;
+  if (!isDetermined(without.normal) || !(without.squares > 0.0)) return std::nullopt;
   const double at =
       minimum1d([&](double log_lambda) { return transformed(all, std::exp(log_lambda)).restricted; },
                 std::log(1e-5), std::log(1e5));
@@ -122,18 +137,19 @@ std::optional<Fit> fitInClusters(const std::vector<std::vector<double>>& columns
   return fit;
 }
 
-std::optional<ClusterSum> sumInClusters(const std::vector<std::vector<double>>& columns, Column y,
-                                        std::span<const std::size_t> cluster, std::size_t first) {
+std::variant<ClusterSum, NoSum> sumInClusters(const std::vector<std::vector<double>>& columns, Column y,
+                                              std::span<const std::size_t> cluster, std::size_t first) {
   if (columns.size() <= first || y.size() <= columns.size() || cluster.size() != y.size())
-    return std::nullopt;
+    return NoSum::FewRows;
   ClusteredRows all = clusteredRowsOf(columns, y, cluster);
   const Index n = all.rows.rows(), k = all.rows.cols() - 1, clusters = all.means.rows();
   // Columns of length 1, so that what hangs on others shows.
   const VectorXd scale = all.rows.leftCols(k).colwise().norm();
-  if (!all.rows.allFinite() || scale.minCoeff() <= 0.0) return std::nullopt;
+  if (!all.rows.allFinite()) return NoSum::FewRows;
+  if (scale.minCoeff() <= 0.0) return NoSum::EmptyColumn;
   const MatrixXd x = all.rows.leftCols(k) * scale.cwiseInverse().asDiagonal();
   const Eigen::LDLT<MatrixXd> normal{x.transpose() * x};
-  if (!(normal.rcond() > 1e-9)) return std::nullopt;
+  if (!isDetermined(normal)) return NoSum::ColumnsAlike;
   VectorXd of = scale.cwiseInverse();
   of.head(static_cast<Index>(first)).setZero();
   const VectorXd at = normal.solve(x.transpose() * all.rows.col(k)), rest = all.rows.col(k) - x * at,
@@ -144,7 +160,7 @@ std::optional<ClusterSum> sumInClusters(const std::vector<std::vector<double>>& 
   const VectorXd part = z.transpose() * rest, own = z.colwise().squaredNorm();
   z -= x * normal.solve(x.transpose() * z);
   const MatrixXd seen = z.transpose() * z;
-  if (!(seen.diagonal().array() > 1e-9 * own.array()).all()) return std::nullopt;
+  if (!(seen.diagonal().array() > 1e-9 * own.array()).all()) return NoSum::OneCluster;
   const VectorXd more = own.cwiseQuotient(seen.diagonal());
   const double spread = (more * more.transpose()).cwiseProduct(seen.cwiseAbs2()).sum();
   return ClusterSum{.value = of.dot(at),

@@ -103,11 +103,40 @@ FittedTraits fittedOf(const Fit& fit, const std::vector<Wave>& waves) {
                     [=, p = fit.at](double d) { return seriesAt(p, waves, d); }}};
 }
 
+/// In the order in which they are looked for: the first to be left out is the last.
+constexpr std::array kOrders{4, 3, 6, 2, 1};
+
+/// Which of kOrders are not among the first `told`, and why: the rows span too little of the longest period, or
+/// are too few, or scatter too much.
+std::string ordersNotTold(std::size_t told, const std::vector<double>& distance_m,
+                          std::span<const double> frequency_hz) {
+  if (told == kOrders.size()) return {};
+  std::string orders;
+  for (std::size_t i = told; i < kOrders.size(); ++i)
+    orders += fmt::format("{}{}", i == told ? "" : i + 1 == kOrders.size() ? " and " : ", ", kOrders[i]);
+  const double lowest_hz = std::ranges::min(frequency_hz), period_m = kLight_m_per_s / 2.0 / lowest_hz;
+  const auto [nearest, farthest] = std::ranges::minmax(distance_m);
+  const std::size_t needed = kRowsPerParameter * (2 + 2 * frequency_hz.size() * kOrders.size());
+  std::string why;
+  if (farthest - nearest < period_m) {
+    why = fmt::format("the distances, {:.3g} to {:.3g} m, are {:.2f} of the period of {:.6g} MHz, {:.3g} m; up "
+                      "to {:.3g} m they would cover it",
+                      nearest, farthest, (farthest - nearest) / period_m, lowest_hz * 1e-6, period_m,
+                      nearest + period_m);
+  } else if (distance_m.size() < needed) {
+    why = fmt::format("there are {} rows, and it takes {}", distance_m.size(), needed);
+  } else {
+    why = "their amplitudes would be less certain than one row is";
+  }
+  return fmt::format("waves of {} per period are not told, and are taken for others where they are there: {}",
+                     orders, why);
+}
+
 /// Each amplitude's interval is shorter than the four standard deviations that one row's would have.
 bool areToldApart(const std::vector<Trait>& traits) {
   const double sd = traits.back().value;  // "residual"
   return std::all_of(traits.begin(), traits.end() - 2,
-                     [&](const Trait& one) { return one.high - one.low < 4.0 * sd; });
+                     [&](const Trait& one) { return one.high - one.low <= 4.0 * sd; });
 }
 
 }  // namespace
@@ -218,12 +247,13 @@ Result<FittedTraits> fittedHarmonics(Column distance_m, Column error_mm, std::sp
   const auto rows = finiteRows({distance_m, error_mm}, least, "harmonics");
   if (!rows) return rows.error();
   std::vector<int> orders;
-  for (const int order : {4, 3, 2, 1}) {
+  for (const int order : kOrders) {
     const std::size_t parameters = 2 + 2 * frequency_hz.size() * (orders.size() + 1);
     if (rows->front().size() >= kRowsPerParameter * parameters) orders.push_back(order);
   }
   for (; !orders.empty(); orders.pop_back()) {
     auto fitted = fitOrders(distance_m, error_mm, frequency_hz, orders, cluster);
+    if (fitted) fitted->not_told = ordersNotTold(orders.size(), rows->front(), frequency_hz);
     if (orders.size() == 1 || (fitted && areToldApart(fitted->traits))) return fitted;
   }
   return undetermined("harmonics", "no frequency was given");

@@ -80,24 +80,47 @@ std::vector<std::vector<double>> columnsOf(std::span<const std::vector<double>> 
   return columns;
 }
 
-std::optional<Trait> veilByCaptures(const std::vector<std::vector<double>>& columns, Column error_mm,
-                                    std::span<const std::size_t> capture) {
-  const auto sum = sumInClusters(columns, error_mm, capture, 1);
-  if (!sum) return std::nullopt;
-  const double half = studentT(sum->degrees) * sum->error;
-  return Trait{"veil", "1", sum->value, sum->value - half, sum->value + half, error_mm.size()};
+const char* wordsOf(NoSum why, std::size_t columns) {
+  switch (why) {
+    case NoSum::FewRows:
+      return "there are fewer of them than it takes";
+    case NoSum::EmptyColumn:
+      return "the plate adds no light that would move a range";
+    case NoSum::ColumnsAlike:
+      // The first column is the constant.
+      return columns > 2 ? "the plate's light moves the ranges of two frequencies alike, or all rows alike"
+                         : "the plate's light moves the ranges of all rows alike, as a constant does";
+    case NoSum::OneCluster:
+      break;
+  }
+  return "one capture alone tells it, so that nothing says how captures differ";
 }
 
-std::optional<Trait> veilByRows(const std::vector<std::vector<double>>& columns, Column error_mm) {
+Traits veilByCaptures(const std::vector<std::vector<double>>& columns, Column error_mm,
+                      std::span<const std::size_t> capture) {
+  const auto told = sumInClusters(columns, error_mm, capture, 1);
+  if (const auto* why = std::get_if<NoSum>(&told))
+    return undetermined("lens scatter", wordsOf(*why, columns.size()));
+  const auto& sum = std::get<ClusterSum>(told);
+  const double half = studentT(sum.degrees) * sum.error;
+  return std::vector{Trait{"veil", "1", sum.value, sum.value - half, sum.value + half, error_mm.size()}};
+}
+
+Traits veilByRows(const std::vector<std::vector<double>>& columns, Column error_mm) {
   const Model model = [&](std::span<const double> p, std::size_t i) {
     double e = 0.0;
     for (std::size_t c = 0; c < p.size(); ++c) e += p[c] * columns[c][i];
     return e;
   };
   const auto fit = fitLeastSquares(model, error_mm, std::vector<double>(columns.size(), 0.0));
-  if (!fit) return std::nullopt;
-  return fit->trait("veil", "1",
-                    [](std::span<const double> p) { return std::accumulate(p.begin() + 1, p.end(), 0.0); });
+  if (!fit) {
+    return undetermined("lens scatter",
+                        "the plate adds no light whose share could be told, or the frequencies are "
+                        "too near each other");
+  }
+  return std::vector{fit->trait("veil", "1", [](std::span<const double> p) {
+    return std::accumulate(p.begin() + 1, p.end(), 0.0);
+  })};
 }
 
 }  // namespace
@@ -131,13 +154,7 @@ Traits veilTraits(std::span<const std::vector<double>> slopes_mm, Column error_m
   const auto columns = columnsOf(slopes, frequency_hz);
   // Fewer than three captures do not tell how captures differ.
   const bool is_by_captures = std::set<std::size_t>(captures.begin(), captures.end()).size() >= 3;
-  const auto veil = is_by_captures ? veilByCaptures(columns, errors, captures) : veilByRows(columns, errors);
-  if (!veil) {
-    return undetermined("lens scatter",
-                        "the plate adds no light whose share could be told, or the frequencies are "
-                        "too near each other");
-  }
-  return std::vector{*veil};
+  return is_by_captures ? veilByCaptures(columns, errors, captures) : veilByRows(columns, errors);
 }
 
 Traits veilTraits(Column own_range_m, Column plate_range_m, Column plate_over_own, Column error_mm,

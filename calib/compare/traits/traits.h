@@ -35,6 +35,7 @@ struct FittedTraits {
   FittedCurve curve{};
   /// What of each row goes with something else than the abscissa and is in the model, too; empty: nothing.
   std::vector<double> besides{};
+  std::string not_told{};  ///< what of it these rows do not tell, why, and which would; empty: all is told
 };
 
 /// Which model a drift follows. Chosen by BIC; a step's place costs two parameters.
@@ -58,9 +59,10 @@ Result<DriftTraits> driftTraits(Column time_s, Column value_mm);
 /// (…) u², where u reaches 5 %. Without clusters: rows are independent.
 Traits harmonicTraits(Column distance_m, Column error_mm, std::span<const double> frequency_hz,
                       std::span<const int> orders, std::span<const std::size_t> cluster = {});
-/// Of as many of four, three, two and one wave per period (cameras of four and three steps have the first of
-/// these) as there are three rows for each parameter, and as the rows tell apart: each amplitude better than
-/// one row's scatter.
+/// Of as many of four, three, six, two and one wave per period (cameras of four steps have four, of three
+/// steps three and six) as there are three rows for each parameter, and as the rows tell apart: each amplitude
+/// better than one row's scatter. Waves that are left out are not taken to be 0: over a part of a period,
+/// those that are there would be told as others. FittedTraits::not_told says so.
 Traits harmonicTraits(Column distance_m, Column error_mm, std::span<const double> frequency_hz,
                       std::span<const std::size_t> cluster = {});
 /// The same with the curve.
