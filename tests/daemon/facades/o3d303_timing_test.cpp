@@ -213,5 +213,29 @@ TEST_F(O3d303Timed, FramesLeaveAsTheSettingsOfAClientHaveIt) {
   }
 }
 
+/// What a network or a computer between adds, to what the camera takes.
+TEST_F(O3d303Timed, WithALatencyTheyLeaveThatMuchLater) {
+  constexpr double kLatency_ms = 300.0;
+  startO3d303(test::kSmallSim, "timing = 'camera'\nlatency_ms = 300");
+  auto native = client();
+  auto stream = native.subscribe("cam", {.policy = SubscribeOptions::Policy::Queue, .queue = 100});
+  ASSERT_TRUE(stream.ok()) << stream.error().message;
+  test::PcicClient watches{test::O3d303Client{xmlrpc_}.pcicPort()};
+  bool is_compared = false;
+  for (int i = 0; i < 100 && !is_compared; ++i) {
+    const std::uint32_t count = watches.frame().chunks.at(0).header.frame_count;
+    const auto arrived = std::chrono::nanoseconds{std::chrono::system_clock::now().time_since_epoch()};
+    Result<Frame> frame = stream->next(test::kSoon);
+    while (frame && frame->sequence < count) frame = stream->next(test::kSoon);
+    ASSERT_TRUE(frame.ok()) << frame.error().message;
+    if (frame->sequence != count) continue;  // it was before the subscription
+    const double took_ms = static_cast<double>(arrived.count() - frame->moment.received.ns) * 1e-6;
+    EXPECT_GE(took_ms, kLatency_ms + exposuresTake(1, factsOf(*frame).exposures_us).in(millisecond) + 35.8 -
+                           4.4 - 0.01);
+    is_compared = true;
+  }
+  EXPECT_TRUE(is_compared);
+}
+
 }  // namespace
 }  // namespace toftwin::daemon::o3d303

@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/facades/timing/unevenness.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <numeric>
 #include <vector>
 
+#include "daemon/facades/facade.h"
 #include "daemon/facades/held_frames.h"
 #include "measured_intervals.h"
 
@@ -36,6 +40,31 @@ TEST(Unevenness, GivesARealCamerasIntervals) {
         << i;  // whole nanoseconds
   }
   EXPECT_EQ(least_ms, 0.0) << "no frame leaves before it is there";
+}
+
+/// What the configuration says of a file with that in it, which is named relative to the configuration.
+std::string complaintAbout(const std::string& content) {
+  std::string folder = testing::TempDir() + "unevenXXXXXX";
+  if (::mkdtemp(folder.data()) == nullptr) return "no folder";
+  if (content != "none") std::ofstream{folder + "/i.txt"} << content;
+  auto table = settings::Table::parse("intervals = 'i.txt'", folder + "/d.toml");
+  FacadeKeys keys;
+  table->read(keys);
+  const Unevenness uneven = Unevenness::read(*table, keys.intervals);
+  const auto checked = table->check();
+  std::filesystem::remove_all(folder);
+  EXPECT_EQ(uneven.isNone(), !checked.ok()) << content;
+  return checked ? "" : checked.error().message;
+}
+
+TEST(Unevenness, WhatIsNoListOfIntervalsIsRefused) {
+  using testing::HasSubstr;
+  EXPECT_EQ(complaintAbout("50\n51.5\n"), "");
+  EXPECT_THAT(complaintAbout("50\n0\n"), HasSubstr("i.txt: number 2 is no interval in milliseconds"));
+  EXPECT_THAT(complaintAbout("600000\n"), HasSubstr("number 1 is no interval"));
+  for (const char* other : {"", "50 ms\n", "interval\n50\n"})
+    EXPECT_THAT(complaintAbout(other), HasSubstr("must have one interval in milliseconds per line")) << other;
+  EXPECT_THAT(complaintAbout("none"), HasSubstr("i.txt cannot be read"));
 }
 
 TEST(HeldFrames, LeaveInOrderAndNotBeforeTheirTime) {
