@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/facades/event_thread.h"
 
+#include <sys/resource.h>
+#include <unistd.h>
+
 #include <boost/asio/post.hpp>
 
 #include <chrono>
@@ -24,6 +27,15 @@ EventThread::EventThread(std::string name) : name_(std::move(name)) {}
 
 void EventThread::start() {
   thread_ = std::jthread{[this] { run(); }};
+}
+
+void EventThread::startUrgent() {
+  thread_ = std::jthread{[this] {
+    constexpr int kUrgent = -10;
+    static_cast<void>(
+        ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kUrgent));  // this thread alone
+    run();
+  }};
 }
 
 void EventThread::stop() {

@@ -44,6 +44,9 @@ class EventThread {
   /// Shared with everyone who may still want to post when the thread is gone.
   [[nodiscard]] const std::shared_ptr<Door>& door() const { return door_; }
   void start();
+  /// Before others of this computer that want its processors, if the process may have that (as root, or by
+  /// RLIMIT_NICE): for what a camera's hardware would do in time however busy the computer is.
+  void startUrgent();
   /// Waits for the handler that runs; none runs afterwards.
   void stop();
 

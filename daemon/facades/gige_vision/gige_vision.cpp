@@ -80,7 +80,7 @@ class GigeVisionFacade final : public Facade {
                          control_->hearsBroadcasts() ? ", found by broadcasts" : "");
     *clients_ = 0;
     tick_.start();
-    thread_.start();
+    thread_.startUrgent();
     return {};
   }
   [[nodiscard]] std::string where() const override { return where_; }

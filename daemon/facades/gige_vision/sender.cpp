@@ -16,7 +16,7 @@ namespace {
 using boost::system::error_code;
 using std::chrono::steady_clock;
 
-constexpr std::size_t kMostBlocks = 3, kMostAgain = 4096, kLeastKept = 2;
+constexpr std::size_t kMostBlocks = 4, kMostAgain = 4096, kLeastKept = 2;
 constexpr int kBatch = 64;  ///< packets in one go, so that commands are answered in between
 constexpr std::chrono::microseconds kFull{200};  ///< until a socket that was full is tried again
 constexpr std::chrono::nanoseconds kMostSpread = std::chrono::milliseconds{10};
@@ -26,9 +26,23 @@ constexpr std::uint32_t kMostUnavailable = 64;
 }  // namespace
 
 std::chrono::nanoseconds pauseBetween(std::uint32_t packets, std::chrono::nanoseconds delay,
-                                      std::chrono::nanoseconds since_last_block) {
-  if (delay.count() == 0) return delay;
-  return std::max(delay, std::min(kMostSpread, since_last_block / 2) / packets);
+                                      std::chrono::nanoseconds between_blocks) {
+  return std::max(delay, std::min(kMostSpread, between_blocks / 2) / packets);
+}
+
+void BlockInterval::note(std::chrono::steady_clock::time_point block) {
+  constexpr std::size_t kMost = 5;
+  if (last_) intervals_.push_back(block - *last_);
+  if (intervals_.size() > kMost) intervals_.pop_front();
+  last_ = block;
+}
+
+std::chrono::nanoseconds BlockInterval::median() const {
+  if (intervals_.empty()) return 2 * kMostSpread;
+  auto sorted = intervals_;
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::ranges::nth_element(sorted, middle);
+  return *middle;
 }
 
 int packetsAtOnce(std::uint32_t packet_size) {
@@ -67,10 +81,9 @@ bool Sender::send(std::shared_ptr<const Block> block) {
     sent_bytes_ -= sent_.front()->size();
     sent_.pop_front();
   }
-  const auto now = steady_clock::now();
-  const auto pause = pauseBetween(block->packets(), delay_, now - std::exchange(last_block_, now));
+  interval_.note(steady_clock::now());
   const std::uint32_t last = block->packets() - 1;
-  waiting_.push_back({std::move(block), 0, last, false, pause});
+  waiting_.push_back({std::move(block), 0, last, false});
   if (!is_pumping_) pump();
   return true;
 }
@@ -91,7 +104,7 @@ void Sender::sendAgain(const Resend& asked) {
     if (one.block == *block) end = std::min<std::uint64_t>(end, one.next);  // those come anyway
   }
   if (asked.first >= end || again_.size() >= kMostAgain) return;
-  again_.push_back({*block, asked.first, static_cast<std::uint32_t>(end - 1), true, {}});
+  again_.push_back({*block, asked.first, static_cast<std::uint32_t>(end - 1), true});
   if (!is_pumping_) pump();
 }
 
@@ -126,9 +139,12 @@ void Sender::pump() {
   wake(due_);
 }
 
-/// Blocks that wait must not wait long, nor packets that were lost.
+/// Half as long where the last block waits that may: the next would be lost.
 std::chrono::nanoseconds Sender::pause() const {
-  return again_.empty() && waiting_.size() == 1 ? waiting_.front().pause : delay_;
+  const auto& queue = again_.empty() ? waiting_ : again_;
+  if (queue.empty() || (again_.empty() && delay_.count() == 0)) return delay_;
+  const auto pause = pauseBetween(queue.front().block->packets(), delay_, interval_.median());
+  return waiting_.size() < kMostBlocks ? pause : std::max(delay_, pause / 2);
 }
 
 void Sender::wake(steady_clock::time_point when) {

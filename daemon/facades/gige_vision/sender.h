@@ -23,15 +23,30 @@ namespace toftwin::daemon::gige_vision {
 /// How long after one packet of a block the next one leaves: `delay` or, where that is more, as long as
 /// spreads the block evenly over half the time between two blocks or 10 ms, whichever is less. So long a
 /// client has to read before its socket is full, yet there is far less silence than the 20 ms after which
-/// libaravis asks for all that has not come. A delay of 0: at once.
+/// libaravis asks for all that has not come.
 std::chrono::nanoseconds pauseBetween(std::uint32_t packets, std::chrono::nanoseconds delay,
-                                      std::chrono::nanoseconds since_last_block);
+                                      std::chrono::nanoseconds between_blocks);
 /// How many packets of that size take a third of what a client's socket has room for, by Linux' default 208
 /// kB with the kernel's own bytes: 30 of 1500 bytes, 4 of 9000.
 int packetsAtOnce(std::uint32_t packet_size);
 
-/// Sends blocks packet by packet at an even pace, and those that were lost once more. Where it begins, or
-/// comes late, it sends no more than packetsAtOnce without a pause. Used on the facade's thread only.
+/// The time between two blocks, of the last ones: their median, for on a busy machine some come late and the
+/// next right behind them.
+class BlockInterval {
+ public:
+  void note(std::chrono::steady_clock::time_point block);
+  [[nodiscard]] std::chrono::nanoseconds median() const;  ///< long, where only one came yet
+
+ private:
+  std::optional<std::chrono::steady_clock::time_point> last_;
+  std::deque<std::chrono::nanoseconds> intervals_;
+};
+
+/// Sends blocks packet by packet at an even pace, and those that were lost once more. Blocks that come
+/// together are spread as if each came in its time: sent as they come, they would be more than a client's
+/// socket has room for. A delay of 0: at once, but for packets that are asked for again, for a socket that
+/// was full is not filled again. Where it begins, or comes late, it sends no more than packetsAtOnce without
+/// a pause. Used on the facade's thread only.
 class Sender {
  public:
   using Endpoint = boost::asio::ip::udp::endpoint;
@@ -58,7 +73,6 @@ class Sender {
     std::shared_ptr<const Block> block;  // shared with those that are kept
     std::uint32_t next = 0, last = 0;
     bool is_again = false;
-    std::chrono::nanoseconds pause{};
   };
   void pump();
   void wake(std::chrono::steady_clock::time_point when);
@@ -75,7 +89,8 @@ class Sender {
   Endpoint to_;
   std::chrono::nanoseconds delay_{};
   int at_once_ = 1;
-  std::chrono::steady_clock::time_point due_{}, last_block_{};
+  std::chrono::steady_clock::time_point due_{};
+  BlockInterval interval_;
   std::deque<Waiting> waiting_, again_;
   std::deque<std::shared_ptr<const Block>> sent_;
   std::size_t sent_bytes_ = 0;
