@@ -99,6 +99,22 @@ TEST(GatherCapture, LeavesOutAmplitudesThatNoiseChose) {
     EXPECT_LE(std::abs(sums[g]), 5.0 * std::sqrt(squares[g])) << "group " << g << " of " << counts[g];
 }
 
+/// A long capture of a camera that warms up: its mean is of the middle.
+TEST(GatherCapture, SaysTheMiddleOfItsTime) {
+  CaptureGatherer gatherer{plan::CaptureRecord{}};
+  for (int k = 0; k < 5; ++k) {
+    Frame frame = frameOf(Image<float>(8, 8, 2.0F), Image<float>(8, 8, 500.0F));
+    frame.moment.since_power_on = (100.0 + 8.0 * k) * second;
+    frame.moment.temperatures = {{"sensor", (20.0 + 0.5 * k) * celsius}};
+    ASSERT_TRUE(gatherer.add(frame).ok());
+  }
+  const MeasuredCapture capture = gatherer.finish();
+  ASSERT_TRUE(capture.moment.since_power_on);
+  EXPECT_NEAR(capture.moment.since_power_on->in(second), 116.0, 1e-9);
+  ASSERT_EQ(capture.moment.temperatures.size(), 1U);
+  EXPECT_NEAR(capture.moment.temperatures.front().value.in(celsius), 21.0, 1e-9);
+}
+
 /// Amplitudes of m phasors of 1 with noise of 0.1 each. 100,000 draws: the mean of ln A is known to 1.8e-4 at
 /// m = 3, and must be 0 within five of that and 1e-4 of higher orders.
 TEST(TakeNoiseOff, TheMeanOfLogarithmsIsThatWithoutNoise) {

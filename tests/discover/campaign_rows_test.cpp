@@ -332,6 +332,26 @@ TEST_F(Rows, EveryEffectOfTheCatalogueThatShowsIsACandidateAndNoiseIsNot) {
     EXPECT_THAT(names, testing::Not(testing::Contains(does_not)));
 }
 
+/// All that a file's numbers can do is free, the rest of one that is far off would look like an effect. A few
+/// captures are probed: at the beginning and at the end two time constants do nothing.
+TEST_F(Rows, AllNumbersOfADeclaredDriftAreFree) {
+  const Made made = make("", tinyCamera("[[effect]]\ntype = 'warm_up'\n"), R"(name = "drift"
+seed = 7
+frames = 4
+exposure_us = 500.0
+[[block]]
+name = "warm-up"
+kind = "warm_up"
+distance_m = [1.5]
+repeats = 6
+interval_s = 400.0
+)");
+  const auto& groups = made.rows.baseGroups();
+  const auto drift = std::ranges::find(groups, "warm_up", &Group::name);
+  ASSERT_NE(drift, groups.end());
+  EXPECT_EQ(drift->count, 4U) << "how much and how long, twice";
+}
+
 /// The frames of all captures of a run, one after the other, as a camera's own recording.
 class Recording : public Rows {
  protected:

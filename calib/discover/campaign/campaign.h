@@ -35,7 +35,8 @@ struct Repeated {
 /// One capture of a measured camera: what it said of its moment, and its images over the repeats.
 struct MeasuredCapture {
   plan::CaptureRecord record;
-  Moment moment;  ///< of the first frame
+  Moment moment;  ///< of the first frame, but for the time since power-on and the temperatures: means over
+                  ///< the frames
   /// Captures with the same one, unless it is empty, were taken without moving the camera: the pose is off by the same
   /// in all of them, and they are held out together.
   std::string stand{};

@@ -92,10 +92,11 @@ double dot(const std::vector<double>& a, const std::vector<double>& b) {
 /// Changes of range below a micrometre and of amplitude below 1e-5 are rounding.
 constexpr double kNothing = 1e-3;
 
-/// Takes a variation in if it shows, and if none so far shows the same; its step is made smaller
-/// until the change is small.
+/// Takes a variation in if it shows, and if none so far shows the same (at least the share `least_new` of it
+/// must be new); its step is made smaller until the change is small.
 struct VariationGatherer {
   const Sensitivity& probe;
+  double least_new = kNew;
   std::vector<Variation> kept{};
   std::vector<std::vector<double>> directions{};  ///< of the kept ones, orthonormal
 
@@ -120,9 +121,10 @@ struct VariationGatherer {
     const double left = std::sqrt(dot(rest, rest));
     const double least =
         kNothing * std::sqrt(static_cast<double>(rest.size()));  // an offset alone is nothing
-    if (whole < least || left < kNew * whole || kept.size() >= kMostVariations) return true;
-    for (double& value : rest) value /= left;
+    if (whole < least || left < least_new * whole || kept.size() >= kMostVariations) return true;
     kept.push_back(std::move(variation));
+    if (!(left > 0.0)) return true;
+    for (double& value : rest) value /= left;
     directions.push_back(std::move(rest));
     return true;
   }
@@ -324,7 +326,9 @@ std::vector<Candidate> candidatesOf(const Sensitivity& probe,
 Candidate declaredCandidate(const sim::AnyEffect& effect, const Sensitivity& probe) {
   Candidate candidate{effect};
   if (isNoise(effect)) return candidate;
-  VariationGatherer gatherer{probe};
+  // All that the file's numbers can do is free, also what the few captures that are probed do not tell apart:
+  // of two drifts that begin and end together they show one.
+  VariationGatherer gatherer{probe, 0.0};
   for (const EffectNumber& number : numbersOf(effect)) {
     if (number.is_whole) continue;
     double step = number.value != 0.0 ? 0.1 * number.value : stepWithin(number);

@@ -206,8 +206,30 @@ Error ofCapture(const plan::CaptureRecord& record, const std::string& message, E
   return {code, fmt::format("capture {} (\"{}\"): {}", record.number, record.name, message)};
 }
 
+/// What drifts while a capture is taken: the means over its frames are those of the middle, not of the first
+/// frame.
+struct MeanMoment {
+  double since_power_on_s = 0.0;
+  std::vector<double> degrees{};
+  std::size_t frames = 0;
+
+  void add(const Moment& moment) {
+    if (moment.since_power_on) since_power_on_s += moment.since_power_on->in(second);
+    degrees.resize(frames == 0 ? moment.temperatures.size()
+                               : std::min(degrees.size(), moment.temperatures.size()));
+    for (std::size_t i = 0; i < degrees.size(); ++i) degrees[i] += moment.temperatures[i].value.in(celsius);
+    ++frames;
+  }
+  void putInto(Moment& moment) const {
+    const auto n = static_cast<double>(frames);
+    if (moment.since_power_on) moment.since_power_on = since_power_on_s / n * second;
+    for (std::size_t i = 0; i < degrees.size(); ++i) moment.temperatures[i].value = degrees[i] / n * celsius;
+  }
+};
+
 struct CaptureGatherer::State {
   MeasuredCapture capture;
+  MeanMoment mean_moment;
   CameraInfo camera;
   Repeats range, amplitude;
   Image<float> first, first_amplitude;
@@ -217,6 +239,7 @@ struct CaptureGatherer::State {
 
   Result<> add(const Frame& frame) {
     if (capture.frames == 0) camera = frame.camera, capture.moment = frame.moment;
+    mean_moment.add(frame.moment);
     if (!(frame.camera == camera))
       return ofCapture(capture.record, "its camera model changes between frames");
     auto range_m = compare::rangeOf(frame);
@@ -242,6 +265,7 @@ struct CaptureGatherer::State {
   }
 
   MeasuredCapture finish() {
+    mean_moment.putInto(capture.moment);
     if (has_amplitude) {
       capture.log_amplitude = amplitude.repeated({});
       capture.log_amplitude.variance = amplitude.repeated(capture.log_amplitude.mean).variance;

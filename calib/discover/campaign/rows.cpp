@@ -95,9 +95,19 @@ std::vector<std::size_t> probedOf(const std::vector<MeasuredCapture>& captures) 
       if (std::ranges::find(chosen, number) == chosen.end()) chosen.push_back(number);
     }
   };
-  add([](const MeasuredCapture& c) {
+  const auto timeOf = [](const MeasuredCapture& c) {
     return c.moment.since_power_on ? c.moment.since_power_on->in(second) : 0.0;
-  });
+  };
+  add(timeOf);
+  // A time constant changes nothing at the beginning, and nothing at the end.
+  if (!captures.empty()) {
+    const double first = timeOf(captures[chosen.front()]), last = timeOf(captures[chosen.back()]);
+    const auto between = std::ranges::min_element(captures, {}, [&](const MeasuredCapture& c) {
+      return std::abs(timeOf(c) - (first + 0.2 * (last - first)));
+    });
+    const auto number = static_cast<std::size_t>(between - captures.begin());
+    if (std::ranges::find(chosen, number) == chosen.end()) chosen.push_back(number);
+  }
   add([](const MeasuredCapture& c) { return c.record.ambient_klx; });
   add([](const MeasuredCapture& c) { return c.record.exposure_us; });
   add([](const MeasuredCapture& c) {
