@@ -59,23 +59,45 @@ std::vector<TermGroup> ofItsCovariates(const Context& context, const Explanation
   return groups;
 }
 
-/// Whether something remains that goes with the effect's own covariates, once it is in the model.
-bool leavesSomething(const Context& context, const Explanation& effect) {
-  const std::vector<TermGroup> groups = ofItsCovariates(context, effect);
-  if (groups.empty()) return false;
+/// The source with one more effect in its model; for a look only.
+Context including(const Context& context, const Explanation& effect) {
   Context with = context;
   std::vector<const NamedFit*> fits;
   for (const auto& fit : context.included) fits.push_back(fit.get());
   fits.push_back(effect.named.get());
   with.source = context.original->named()->including(fits, false);
+  return with;
+}
+
+/// Whether something remains that goes with the effect's own covariates, once it is in the model.
+bool leavesSomething(const Context& with, const Explanation& effect) {
+  const std::vector<TermGroup> groups = ofItsCovariates(with, effect);
+  if (groups.empty()) return false;
   constexpr std::size_t kAtOnce = 4;
-  Test test{context.test};
+  Test test{with.test};
   for (std::size_t begin = 0; begin < groups.size(); begin += kAtOnce) {
     const Part part = prepare(
         with, std::span{groups}.subspan(begin, std::min(kAtOnce, groups.size() - begin)), false);
     test.add(part.marginal, part.model);
   }
-  return test.result().p < context.alpha;
+  return test.result().p < with.alpha;
+}
+
+/// Whether what would be told instead of the effect says something beyond it, once it is in the model: more
+/// than the best of so many shapes does by chance, and more than a hundredth of what the effect explains.
+/// (The light of a strong effect's simulation is not known that well. And a formula that is the effect's own
+/// leaves what it leaves.)
+bool saysMore(const Context& with, const Explanation& rival, const Explanation& effect, std::size_t tried) {
+  constexpr double kHundredth = 0.01;
+  const std::vector<TermGroup> groups{rival.fitted.group};
+  const Part part = prepare(with, groups, false);
+  const std::size_t place = part.marginal.groups.size() - 1;
+  for (const GroupScore& score : statistics(part.marginal, part.model)) {
+    if (score.group != place) continue;
+    const double by_chance = static_cast<double>(rival.numbers) + luckOfTheBestOf(tried);
+    return score.statistic > std::max(by_chance, kHundredth * effect.gain.total);
+  }
+  return false;
 }
 
 }  // namespace
@@ -114,6 +136,11 @@ std::optional<std::size_t> chooseNamed(const Context& context, std::vector<Expla
       generic = i;
   }
   std::ranges::sort(named, std::greater{}, [&](std::size_t i) { return all[i].gain.total; });
+  const auto instead = choose(all);
+  const auto leavesWhatARivalSays = [&](const Context& without, const Explanation& one, std::size_t tried) {
+    const Context with = including(without, one);
+    return leavesSomething(with, one) && (!instead || saysMore(with, all[*instead], one, tried));
+  };
   std::optional<std::size_t> chosen;
   for (const std::size_t i : named) {
     Explanation& one = all[i];
@@ -134,7 +161,7 @@ std::optional<std::size_t> chooseNamed(const Context& context, std::vector<Expla
       one.refused = "a curve that goes with " + all[*generic].name + by(all[*generic]);
     else if (chosen && isWorseThan(all[*chosen], named.size()))
       one.refused = all[*chosen].name + by(all[*chosen]);
-    else if (leavesSomething(context, one))
+    else if (leavesWhatARivalSays(context, one, curves))
       one.refused = "what it leaves still goes with its covariates";
     if (!one.refused.empty()) continue;
     const bool is_simpler =

@@ -101,7 +101,10 @@ std::optional<std::size_t> partOfAKnown(const Found& found, const std::vector<Ex
 
 bool isWhatACurveLeaves(const Found& found, const Effect& effect) {
   constexpr double kKnown = 0.05;
+  constexpr double kTwentiethOfItsSize = 0.0025;
+  const bool is_certain = effect.alternatives.empty() && (effect.is_catalogue || isFormula(effect));
   return std::ranges::any_of(found.effects, [&](const Effect& known) {
+    if (known.fit) return !is_certain && effect.gain.mean < kTwentiethOfItsSize * known.gain.mean;
     return !known.is_catalogue && isApproximate(known) &&
            alongOf(found.context, known) != alongOf(found.context, effect) &&
            effect.gain.mean < kKnown * known.gain.mean;

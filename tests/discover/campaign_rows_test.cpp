@@ -172,6 +172,21 @@ TEST_F(Rows, WithoutACyclicErrorADelayIsAnOffset) {
   EXPECT_EQ(*delay_mm, 0.0);
 }
 
+/// Beside a charge a delay is a little more than an offset: that little would be bought with millimetres.
+TEST_F(Rows, AWrongChargeIsNoDelayOfTheLight) {
+  const auto charged = [](double electrons) {
+    return fmt::format("[[effect]]\ntype = 'sample_offset'\nstep = 1\nelectrons = {}\n", electrons);
+  };
+  const Made made = make(charged(400.0), tinyCamera());
+  const auto declared = sim::SensorModel::parse(tinyCamera(charged(200.0)), "camera.toml");
+  const auto scene = sim::Scene::parse(smallScene(), "scene.toml");
+  ASSERT_TRUE(declared && scene);
+  const Declared as_declared{*declared, *scene};
+  const auto delay_mm = delayThatFits({as_declared, {made.campaign.captures, made.traced, made.traced}, {}});
+  ASSERT_TRUE(delay_mm) << delay_mm.error().message;
+  EXPECT_EQ(*delay_mm, 0.0);
+}
+
 /// Of a camera whose pattern no default of the catalogue has. z is a normal deviate; the best of some 150 groups
 /// exceeds 4.5 by chance in 5e-4.
 TEST_F(Rows, APatternThatStaysAtItsPixelsIsSeenWhereverTheyLook) {

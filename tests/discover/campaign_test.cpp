@@ -104,6 +104,30 @@ TEST_F(Searched, AWrongNumberOfADeclaredEffectIsAnUpdateAndNoNewEffect) {
   EXPECT_EQ(std::ranges::count(model->effectNames(), std::string{"clock_scale"}), 1);
 }
 
+/// A file may list a charge once for each raw exposure: that it has one is no reason not to look at the
+/// others.
+TEST_F(Searched, AChargeInAnotherRawExposureThanTheFileSaysIsNamedByItsPlace) {
+  simulate("[[effect]]\ntype = 'sample_offset'\nstep = 1\nelectrons = 400.0\n");
+  write("camera.toml", tinyCamera("[[effect]]\ntype = 'sample_offset'\nstep = 2\nelectrons = 400.0\n"));
+  const CampaignFinding finding = search(job());
+  ASSERT_THAT(namesOf(finding), ElementsAre("sample_offset")) << verdictOf(finding);
+  EXPECT_THAT(verdictOf(finding), HasSubstr("The model lacks sample_offset (step ")) << "by its place";
+  ASSERT_EQ(finding.updates.size(), 1U) << verdictOf(finding);
+  EXPECT_NEAR(finding.updates.front().numbers.front().value, 0.0, 20.0) << "the other one is not there";
+  const auto model = sim::SensorModel::parse(finding.model_toml, "model.toml");
+  ASSERT_TRUE(model) << model.error().message;
+  EXPECT_EQ(std::ranges::count(model->effectNames(), std::string{"sample_offset"}), 2);
+  EXPECT_GT(finding.judgement->removed, 0.95);
+}
+
+/// So strong that light, poses and what is left of second order show a hundred times above the noise.
+TEST_F(Searched, AStrongEffectIsNamedThoughNotAllOfItIsExplained) {
+  simulate("[[effect]]\ntype = 'vignetting'\nexponent = 2.0\n");
+  const CampaignFinding finding = search(job());
+  EXPECT_THAT(namesOf(finding), ElementsAre("vignetting")) << verdictOf(finding);
+  EXPECT_GT(finding.judgement->removed, 0.99) << verdictOf(finding);
+}
+
 /// Light from other pixels shows like nothing else. Of what is left in the catalogue a ghost image comes nearest,
 /// and a charge in some raw exposures next: neither is it.
 TEST_F(Searched, AnEffectThatTheCatalogueLacksIsNotBlamedOnAnother) {

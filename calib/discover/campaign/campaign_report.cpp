@@ -26,8 +26,9 @@ std::string stageInWords(const Effect& effect) {
 std::string titleOf(const Effect& effect) {
   if (effect.is_rest)
     return fmt::format("what the form above leaves: {} ({})", effect.name, fmt::join(effect.covariates, ", "));
+  const std::string place = effect.fit ? placeInWords(campaignFitOf(*effect.fit).effect) : "";
   return effect.is_catalogue
-             ? effect.name
+             ? effect.name + (place.empty() ? "" : fmt::format(" ({})", place))
              : fmt::format("undeclared: {} ({})", effect.name, fmt::join(effect.covariates, ", "));
 }
 

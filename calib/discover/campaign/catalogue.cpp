@@ -232,12 +232,28 @@ void addStrength(VariationGatherer& gatherer, const sim::AnyEffect& off, const E
   }
 }
 
+/// Whether both have the same kind and are at the same place.
+bool isAtPlaceOf(const sim::AnyEffect& one, const sim::AnyEffect& other,
+                 const std::vector<EffectNumber>& choosing) {
+  return one.index() == other.index() && std::ranges::all_of(choosing, [&](const EffectNumber& number) {
+           return VariationGatherer::numberNamed(one, number.key).value ==
+                  VariationGatherer::numberNamed(other, number.key).value;
+         });
+}
+
+/// `declared`: what it does at their places is said already.
 Candidate candidateOf(const sim::AnyEffect& none, const sim::AnyEffect& defaults,
-                      const Sensitivity& probe) {
+                      const std::vector<sim::AnyEffect>& declared, const Sensitivity& probe) {
   Candidate candidate{defaults};
   const NumberRoles roles = numberRolesOf(none, defaults);
   VariationGatherer gatherer{probe};
-  for (const sim::AnyEffect& off : choicesOf(quiet(none, defaults, roles), roles.choosing)) {
+  auto choices = choicesOf(quiet(none, defaults, roles), roles.choosing);
+  const auto free = std::ranges::stable_partition(choices, [&](const sim::AnyEffect& off) {
+    return std::ranges::any_of(declared,
+                               [&](const auto& one) { return isAtPlaceOf(off, one, roles.choosing); });
+  });
+  for (const sim::AnyEffect& off : choices) {
+    if (&off == free.data()) gatherer.kept.clear();
     std::vector<EffectNumber> shapes;
     for (const EffectNumber& other : roles.others) {
       const double step = stepWithin(other);
@@ -309,15 +325,37 @@ std::vector<sim::AnyEffect> withInserted(std::vector<sim::AnyEffect> effects,
   return effects;
 }
 
-std::vector<Candidate> candidatesOf(const Sensitivity& probe,
+bool choosesAPlace(const sim::AnyEffect& effect) {
+  return std::visit(
+      []<class E>(const E&) {
+        const NumberRoles roles = numberRolesOf(sim::AnyEffect{E::none()}, sim::AnyEffect{E{}});
+        return !roles.choosing.empty() && std::ranges::none_of(roles.choosing, &EffectNumber::is_label);
+      },
+      effect);
+}
+
+std::string placeInWords(const sim::AnyEffect& effect) {
+  if (!choosesAPlace(effect)) return "";
+  std::string words;
+  for (const EffectNumber& number : numbersOf(effect))
+    if (number.is_whole && !isStrength(effect, number.key))
+      words +=
+          (words.empty() ? "" : ", ") + number.key + " " + std::to_string(static_cast<long>(number.value));
+  return words;
+}
+
+std::vector<Candidate> candidatesOf(const Sensitivity& probe, const std::vector<sim::AnyEffect>& declared,
                                     const std::vector<std::string>& left_out) {
   std::vector<Candidate> all;
   sim::AllEffects::forEach([&]<class E>() {
     const sim::AnyEffect defaults{E{}};
-    const bool is_left_out = std::ranges::find(left_out, E::about.name) != left_out.end();
+    const bool is_declared = std::ranges::any_of(
+        declared, [](const sim::AnyEffect& one) { return std::holds_alternative<E>(one); });
+    const bool is_left_out = std::ranges::find(left_out, E::about.name) != left_out.end() ||
+                             (is_declared && !choosesAPlace(defaults));
     // What was learned from data without a name is no explanation of other data.
     if (is_left_out || isNoise(defaults) || E::about.name.starts_with("learned_")) return;
-    Candidate candidate = candidateOf(sim::AnyEffect{E::none()}, defaults, probe);
+    Candidate candidate = candidateOf(sim::AnyEffect{E::none()}, defaults, declared, probe);
     if (!candidate.variations.empty()) all.push_back(std::move(candidate));
   });
   return all;

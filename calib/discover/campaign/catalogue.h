@@ -56,9 +56,16 @@ struct Candidate {
   std::vector<Variation> variations{};
 };
 
-/// All effects but noise and those that `probe` cannot see. `probe` gives the changes of some
-/// pixels' readings in units of about a millimetre.
-std::vector<Candidate> candidatesOf(const Sensitivity& probe,
+/// Whether a camera may have it several times, each at another place that a number of it names: a raw
+/// exposure.
+bool choosesAPlace(const sim::AnyEffect& effect);
+/// That place: "step 1, tap 0"; empty where it names none.
+std::string placeInWords(const sim::AnyEffect& effect);
+
+/// All effects but noise, those that `probe` cannot see, and those that are declared; of one that chooses a
+/// place, the places where none is declared stay. `probe` gives the changes of some pixels' readings in units
+/// of about a millimetre.
+std::vector<Candidate> candidatesOf(const Sensitivity& probe, const std::vector<sim::AnyEffect>& declared,
                                     const std::vector<std::string>& left_out);
 /// The numbers of an effect that is there, each by a small step.
 Candidate declaredCandidate(const sim::AnyEffect& effect, const Sensitivity& probe);

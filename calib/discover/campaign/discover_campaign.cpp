@@ -15,6 +15,7 @@
 #include "calib/discover/campaign/model_file.h"
 #include "calib/discover/campaign/next_capture.h"
 #include "calib/discover/campaign/reading.h"
+#include "calib/discover/campaign/search_rounds.h"
 #include "calib/discover/campaign/step_effect.h"
 #include "calib/discover/marginal.h"
 
@@ -36,6 +37,9 @@ Result<std::string> textOf(const std::filesystem::path& file) {
   return Error{Error::Code::NotFound, fmt::format("{}: cannot be read", file.string())};
 }
 
+// GCC 12 takes the emptied map of what was moved for one that never was.
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
 Result<DeclaredFiles> loadDeclared(const CampaignJob& job) {
   constexpr std::string_view kPreset = "preset:";  // as `toftwin info` has it
   const auto names = sim::SensorModel::presetNames();
@@ -51,14 +55,15 @@ Result<DeclaredFiles> loadDeclared(const CampaignJob& job) {
   if (!model) return model.error();
   auto scene = sim::Scene::load(job.scene);
   if (!scene) return scene.error();
-  std::map<std::string, sim::Scene> scene_of_block;
+  DeclaredFiles files{{*std::move(model), *std::move(scene)}, *std::move(text)};
   for (const auto& [block, file] : job.scene_of_block) {
     auto other = sim::Scene::load(file);
     if (!other) return other.error();
-    scene_of_block.emplace(block, *std::move(other));
+    files.declared.scene_of_block.emplace(block, *std::move(other));
   }
-  return DeclaredFiles{{*std::move(model), *std::move(scene), std::move(scene_of_block)}, *std::move(text)};
+  return files;
 }
+#pragma GCC diagnostic pop
 
 /// The measured camera's lens, if the camera file's has the same size.
 Result<> takeLens(const Campaign& campaign, Declared& declared, std::vector<std::string>& notes) {
@@ -91,120 +96,6 @@ Error unknownBlock(const std::string& block, const Campaign& campaign) {
                       fmt::join(names, ", "))};
 }
 
-/// Effects of the declared model whose numbers the data move by so much that it is no chance: χ² of
-/// their columns, with everything that was found, over 25 more than their number (5 standard
-/// errors).
-std::vector<std::size_t> wrongNumbers(const Evidence& evidence, const Finding& finding,
-                                      const std::vector<sim::AnyEffect>& effects) {
-  const Marginal marginal = marginalise(evidence, finding.scales);
-  Columns columns = nuisanceColumns(marginal);
-  for (const Group& group : marginal.groups) {
-    const bool is_found = std::ranges::any_of(finding.effects, [&](const Effect& effect) {
-      return effect.is_catalogue && effect.name == group.name;
-    });
-    if (is_found || group.kind == Kind::Generic) append(columns, group);
-  }
-  const Fit all = fit(marginal, columns);
-  std::vector<std::size_t> places;
-  for (const Group& group : marginal.groups) {
-    if (group.kind != Kind::Declared) continue;
-    Columns without;
-    for (const Eigen::Index column : columns) {
-      const auto c = static_cast<std::size_t>(column);
-      if (c < group.first || c >= group.first + group.count) without.push_back(column);
-    }
-    const double gain =
-        (fit(marginal, without).deviance - all.deviance) / std::max(1.0, all.dispersion());
-    if (gain < 25.0 + static_cast<double>(group.count)) continue;
-    const auto place = std::ranges::find_if(
-        effects, [&](const auto& effect) { return nameOf(effect) == group.name; });
-    if (place != effects.end()) places.push_back(static_cast<std::size_t>(place - effects.begin()));
-  }
-  return places;
-}
-
-bool isQuantisation(const sim::AnyEffect& effect) {
-  return std::holds_alternative<sim::Quantisation>(effect);
-}
-
-/// The effects without noise, with what was found in them.
-struct WithFound {
-  std::vector<sim::AnyEffect> effects;
-  std::vector<std::size_t> fitted;  ///< places of those whose numbers are to be fitted
-  std::map<std::size_t, std::vector<std::string>> only{};  ///< of those without a name, the numbers
-};
-
-std::size_t insert(WithFound& inserted, const sim::AnyEffect& effect) {
-  const auto behind = std::ranges::find_if(inserted.effects, [&](const sim::AnyEffect& other) {
-    return placeOf(other) > placeOf(effect);
-  });
-  const auto place = static_cast<std::size_t>(behind - inserted.effects.begin());
-  inserted.effects.insert(behind, effect);
-  for (std::size_t& other : inserted.fitted) other += other >= place ? 1 : 0;
-  std::map<std::size_t, std::vector<std::string>> only;
-  for (auto& [other, keys] : inserted.only) only.emplace(other + (other >= place ? 1 : 0), std::move(keys));
-  inserted.only = std::move(only);
-  return place;
-}
-
-WithFound insertFound(const CampaignRows& rows, const Declared& declared,
-                      const std::vector<std::size_t>& updates, CampaignFinding& finding) {
-  WithFound inserted{declaredEffects(declared), updates};
-  std::vector<const NamedFit*> fits;
-  for (const Effect& effect : finding.finding.effects)
-    if (effect.fit) fits.push_back(effect.fit.get());
-  const auto included = rows.including(fits, false);
-  const auto& with_found = dynamic_cast<const CampaignRows&>(*included);
-  for (const Effect& effect : finding.finding.effects) {
-    FoundEffect found{effect, {}};
-    if (effect.fit) {
-      const CampaignFit& fit = campaignFitOf(*effect.fit);
-      const std::size_t place = insert(inserted, fit.effect);
-      // All of its numbers: one that was not needed is not known to be nothing.
-      inserted.fitted.push_back(place);
-      found.fitted = FittedEffect{fit.effect, {}};
-    } else {
-      for (const LearnedEffect& learned : learnedEffectsOf(effect, with_found, declared.model)) {
-        const std::size_t place = insert(inserted, learned.effect);
-        if (!learned.free.empty()) inserted.fitted.push_back(place), inserted.only[place] = learned.free;
-        (found.fitted ? found.more.emplace_back(FittedEffect{learned.effect, {}})
-                      : found.fitted.emplace(FittedEffect{learned.effect, {}}));
-      }
-    }
-    finding.effects.push_back(std::move(found));
-  }
-  return inserted;
-}
-
-/// Whether two are of one kind, and of one raw exposure where there are several.
-bool isSameForm(const sim::AnyEffect& a, const sim::AnyEffect& b) {
-  if (a.index() != b.index()) return false;
-  const auto* x = std::get_if<sim::SampleOffset>(&a);
-  const auto* y = std::get_if<sim::SampleOffset>(&b);
-  return x == nullptr || (x->step == y->step && x->tap == y->tap);
-}
-
-/// The form of a found effect that was fitted; null: it is of a declared one.
-FittedEffect* formOf(const FittedEffect& fitted, CampaignFinding& finding) {
-  for (FoundEffect& found : finding.effects) {
-    if (found.fitted && isSameForm(found.fitted->effect, fitted.effect)) return &*found.fitted;
-    for (FittedEffect& more : found.more)
-      if (isSameForm(more.effect, fitted.effect)) return &more;
-  }
-  return nullptr;
-}
-
-void takeFitted(const Refitted& refitted, double known_delay_mm, CampaignFinding& finding) {
-  for (const FittedEffect& one : refitted.fitted) {
-    if (FittedEffect* form = formOf(one, finding))
-      *form = one;
-    else
-      finding.updates.push_back(one);
-  }
-  finding.zero = zeroOf(refitted, known_delay_mm);
-  finding.dispersion = refitted.dispersion;
-}
-
 /// The camera file with a delay of the light, and what its device's offset and gain then are.
 Result<JudgedModel> fileWith(const JudgedCampaign& judged, double delay_mm) {
   const sim::SensorModel& file = judged.declared.model;
@@ -229,13 +120,19 @@ Result<> judgeLocked(const CampaignJob& job, const Campaign& campaign, const Jud
       0x5bd1e995U;  // light of its own: what the open captures' light has by chance must not help
   const auto at_poses = traceAll(declared, *captures, options);
   if (!at_poses) return at_poses.error();
-  const auto traced = traceWhereTheyStood(declared, *captures, *at_poses, options);
+  const auto traced = traceWhereTheyStood(declared, models.after.effects, *captures, *at_poses, options);
   if (!traced) return traced.error();
   const Lit lit{*captures, *traced, *at_poses};
   auto judgement = judge({declared, lit, finding.finding.scales}, searched, models);
   if (!judgement) return judgement.error();
   finding.judgement = *std::move(judgement);
   return {};
+}
+
+void takeFound(Round& round, CampaignFinding& finding) {
+  finding.finding = std::move(round.finding);
+  finding.effects = std::move(round.effects), finding.updates = std::move(round.updates);
+  finding.zero = round.zero, finding.dispersion = round.refitted.dispersion;
 }
 
 /// What does worse on captures that it was not fitted to does not go into the model, whatever it is called.
@@ -301,37 +198,21 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
   const auto late = delayThatFits({declared, {campaign->captures, *at_poses, *at_poses}, {}});
   if (!late) return late.error();
   declared.delay_mm = *late;
-  progress.begin();
-  const auto traced = traceWhereTheyStood(declared, campaign->captures, *at_poses, job.trace, tell);
-  if (!traced) return traced.error();
-  progress.begin();
-  const Lit lit{campaign->captures, *traced, *at_poses};
   // What single frames tell, means over frames need not guess.
   const auto steps = stepsIn(declared.model, campaign->captures);
-  std::vector<std::string> left_out = job.left_out;
-  if (steps) left_out.emplace_back(sim::Quantisation::about.name);
-  const auto rows = CampaignRows::make(declared, lit, {.left_out = left_out});
-  if (!rows) return rows.error();
-  progress.begin();
-  finding.finding = find(*rows, job.finder);
-  progress.begin();
-  std::vector<TermGroup> terms;
-  for (const Effect& effect : finding.finding.effects) {
-    if (!effect.is_catalogue) terms.push_back({effect.name, Kind::Generic, termsOf(effect), 0});
-  }
-  auto updates = wrongNumbers(rows->evidence(terms), finding.finding, declaredEffects(declared));
-  if (steps)
-    std::erase_if(updates,
-                  [&](std::size_t place) { return isQuantisation(declaredEffects(declared)[place]); });
-  WithFound inserted = insertFound(*rows, declared, updates, finding);
-  const auto refitted = refit(*rows, inserted.effects, inserted.fitted,
-                              {.scales = finding.finding.scales, .only = inserted.only});
-  if (!refitted) return refitted.error();
-  takeFitted(*refitted, *late, finding);
-  addNextCaptures({declared, lit, finding.finding.scales}, *rows, finding.effects);
+  OpenCaptures open{campaign->captures, *at_poses, job.trace, job.finder, job.left_out, steps.has_value()};
+  if (steps) open.left_out.emplace_back(sim::Quantisation::about.name);
+  const auto searched_for = searchInRounds(
+      declared, open, [&] { progress.begin(); }, tell);
+  if (!searched_for) return searched_for.error();
+  Round& round = **searched_for;
+  declared.delay_mm = round.declared.delay_mm;
+  const Lit lit{campaign->captures, round.traced, *at_poses};
+  takeFound(round, finding);
+  addNextCaptures({round.declared, lit, finding.finding.scales}, *round.rows, finding.effects);
   if (steps) addSteps(job, declared.model, *steps, finding);
   const Zero beyond = finding.zero;
-  finding.zero.delay_mm += *late;
+  finding.zero.delay_mm += declared.delay_mm;
   finding.model_toml = modelText(files->text, declared, finding);
   progress.begin();
   if (job.open_locked && !campaign->locked.empty()) {
@@ -340,7 +221,7 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
     if (!before) return before.error();
     const auto with_zero = fileWith(searched, finding.zero.delay_mm);
     if (!with_zero) return with_zero.error();
-    const JudgedModel after{withDelay(declared.model, refitted->effects, beyond.delay_mm),
+    const JudgedModel after{withDelay(declared.model, round.refitted.effects, beyond.delay_mm),
                             beyond.hasOffset() ? beyond.offset_mm : 0.0, beyond.gain_percent};
     if (auto done = judgeLocked(job, *campaign, searched, {*before, *with_zero, after}, finding); !done)
       return done.error();

@@ -70,7 +70,7 @@ std::string modelText(const std::string& text, const Declared& declared, const C
   std::vector<std::optional<FittedEffect>> updates(effects.size());
   for (std::size_t i = 0; i < effects.size(); ++i) {
     for (const FittedEffect& one : finding.updates) {
-      if (nameOf(one.effect) == nameOf(effects[i])) updates[i] = one;
+      if (one.of_file == i) updates[i] = one;
     }
   }
   std::vector<FittedEffect> added;

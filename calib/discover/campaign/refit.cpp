@@ -327,11 +327,40 @@ Zero zeroOf(const Refitted& refitted, double known_mm) {
           std::sqrt(std::max(0.0, covariance(kGain, kGain)))};
 }
 
+namespace {
+
+/// Whether a delay of the light does more to some of the captures than an offset of the range.
+Result<bool> isDelayNoOffset(const JudgedCampaign& judged, const std::vector<sim::AnyEffect>& as_declared) {
+  constexpr double kDelay_mm = 5.0;
+  constexpr std::size_t kSome = 8;
+  const sim::SensorModel& model = judged.declared.model;
+  const auto here = NoiselessCamera::make(model, as_declared, judged.lit.captures);
+  const auto late =
+      NoiselessCamera::make(model, withDelay(model, as_declared, kDelay_mm), judged.lit.captures);
+  if (!here || !late) return here ? late.error() : here.error();
+  std::vector<Reading> changes;
+  const std::size_t stride = 1 + judged.lit.captures.size() / kSome;
+  for (std::size_t c = 0; c < judged.lit.captures.size(); c += stride) {
+    const MeasuredCapture& capture = judged.lit.captures[c];
+    const sim::Light& light = judged.lit.varied[c]->light;
+    const Reading before = here->read(capture, light);
+    Reading change = late->read(capture, light);
+    for (std::size_t i = 0; i < change.range_m.size(); ++i) change.range_m[i] -= before.range_m[i];
+    changes.push_back(std::move(change));
+  }
+  return isNoOffset(changes);
+}
+
+}  // namespace
+
 Result<double> delayThatFits(const JudgedCampaign& judged) {
   constexpr double kStep_mm = 2.0, kMost_mm = 100.0, kDone_mm = 0.1;
   const sim::SensorModel& model = judged.declared.model;
   if (model.traceRequest().frequencies.empty()) return 0.0;  // a pulsed camera's gates know no cyclic error
   const auto as_declared = effectsWithoutNoise(model);
+  const auto is_told = isDelayNoOffset(judged, as_declared);
+  if (!is_told) return is_told.error();
+  if (!*is_told) return 0.0;
   const auto stepAt = [&](double delay_mm) -> Result<Step> {
     const auto evidence = residualEvidence(judged, withDelay(model, as_declared, delay_mm));
     if (!evidence) return evidence.error();
@@ -358,12 +387,13 @@ Result<double> delayThatFits(const JudgedCampaign& judged) {
 }
 
 Result<std::vector<std::shared_ptr<const TracedCapture>>> traceWhereTheyStood(
-    const Declared& declared, const std::vector<MeasuredCapture>& captures,
+    const Declared& declared, const std::vector<sim::AnyEffect>& effects,
+    const std::vector<MeasuredCapture>& captures,
     const std::vector<std::shared_ptr<const TracedCapture>>& traced, const TraceOptions& options,
     const std::function<void(double)>& tell) {
   constexpr Eigen::Index kOwn = 6;  // pose and light
   const Lit lit{captures, traced, traced};
-  const auto evidence = residualEvidence({declared, lit, {}}, declaredEffects(declared));
+  const auto evidence = residualEvidence({declared, lit, {}}, effects);
   if (!evidence) return evidence.error();
   const Eigen::VectorXd common = stepOf(marginalise(*evidence, {}), 0).others.coefficient;
   std::vector<Stood> stood;

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -29,6 +30,10 @@ struct FittedEffect {
   /// They are of single frames, which noise smears where frames are averaged: locked captures, means over
   /// frames, do not judge them.
   bool is_of_single_frames = false;
+  /// A table that was learned, whose numbers are not fitted again.
+  bool is_as_learned = false;
+  /// Of an update: the place of what it replaces among the camera file's effects.
+  std::optional<std::size_t> of_file{};
 };
 
 /// A campaign on which models are judged: what is needed of it again and again.
@@ -99,10 +104,11 @@ Zero zeroOf(const Refitted& refitted, double known_mm);
 /// is not proportional to it. 0 where it is an offset of the range and nothing else, or no more than chance.
 Result<double> delayThatFits(const JudgedCampaign& judged);
 
-/// Light traced again where the cameras probably stood: what a place off the pose changes is then
-/// known to second order, which counts where a thousand pixels say the same.
+/// Light traced again where the cameras probably stood, if these were their effects: what a place off the
+/// pose changes is then known to second order, which counts where a thousand pixels say the same.
 Result<std::vector<std::shared_ptr<const TracedCapture>>> traceWhereTheyStood(
-    const Declared& declared, const std::vector<MeasuredCapture>& captures,
+    const Declared& declared, const std::vector<sim::AnyEffect>& effects,
+    const std::vector<MeasuredCapture>& captures,
     const std::vector<std::shared_ptr<const TracedCapture>>& traced, const TraceOptions& options,
     const std::function<void(double)>& tell = {});
 

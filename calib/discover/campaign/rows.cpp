@@ -116,12 +116,6 @@ std::vector<std::size_t> probedOf(const std::vector<MeasuredCapture>& captures) 
   return chosen;
 }
 
-std::vector<std::string> namesOf(const std::vector<sim::AnyEffect>& effects) {
-  std::vector<std::string> names;
-  for (const sim::AnyEffect& effect : effects) names.push_back(nameOf(effect));
-  return names;
-}
-
 /// One effect that varies, as a group with a camera for each of its columns.
 struct VariedEffect {
   Group group;
@@ -179,11 +173,10 @@ Result<Varied> varyAll(const Declared& declared, const std::vector<sim::AnyEffec
     if (candidate.variations.empty()) continue;
     if (auto added = add(std::move(candidate), place); !added) return added.error();
   }
-  for (std::string& name : namesOf(declared.model.effects())) left_out.push_back(std::move(name));
   left_out.emplace_back("delay");  // the nuisance "offset" says the same
   for (Candidate& candidate :
        candidatesOf([&](const Variation& variation) { return probe(variation, effects.size()); },
-                    left_out)) {
+                    declared.model.effects(), left_out)) {
     if (auto added = add(std::move(candidate), effects.size()); !added) return added.error();
   }
   return all;

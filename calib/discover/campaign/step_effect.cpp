@@ -19,10 +19,13 @@ std::size_t phaseStepsOf(const sim::SensorModel& model) {
   return is_one ? raw.size() : 0;
 }
 
-const sim::Quantisation* declaredIn(const sim::SensorModel& model) {
-  for (const sim::AnyEffect& effect : model.effects())
-    if (const auto* own = std::get_if<sim::Quantisation>(&effect)) return own;
-  return nullptr;
+/// Its place among the camera file's effects.
+std::optional<std::size_t> declaredIn(const sim::SensorModel& model) {
+  const auto own = std::ranges::find_if(model.effects(), [](const sim::AnyEffect& effect) {
+    return std::holds_alternative<sim::Quantisation>(effect);
+  });
+  if (own == model.effects().end()) return std::nullopt;
+  return static_cast<std::size_t>(own - model.effects().begin());
 }
 
 /// An amplitude that is g times the file's has steps that are g times the file's. Where g is no more than
@@ -66,15 +69,16 @@ void addSteps(const CampaignJob& job, const sim::SensorModel& model, const Sampl
   std::erase_if(finding.updates, is_of_means);
   std::erase_if(finding.effects,
                 [&](const FoundEffect& one) { return one.fitted && is_of_means(*one.fitted); });
-  const sim::Quantisation* const declared = declaredIn(model);
-  if (declared != nullptr &&
-      std::abs(declared->step_electrons - own.step) < std::max(kSame * own.step, 3.0 * own.error))
+  const auto declared = declaredIn(model);
+  if (declared && std::abs(std::get<sim::Quantisation>(model.effects()[*declared]).step_electrons -
+                           own.step) < std::max(kSame * own.step, 3.0 * own.error))
     return;
   finding.finding.first_p = std::min(finding.finding.first_p, own.p);
   const FittedEffect fitted{.effect = sim::Quantisation{.step_electrons = own.step},
                             .numbers = {{"step_electrons", own.step, own.error}},
-                            .is_of_single_frames = true};
-  if (declared != nullptr) {
+                            .is_of_single_frames = true,
+                            .of_file = declared};
+  if (declared) {
     finding.updates.push_back(fitted);
     return;
   }

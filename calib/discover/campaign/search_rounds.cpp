@@ -1,0 +1,236 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/discover/campaign/search_rounds.h"
+
+#include <algorithm>
+#include <map>
+#include <variant>
+
+#include "calib/discover/campaign/carriers.h"
+#include "calib/discover/campaign/model_file.h"
+#include "calib/discover/marginal.h"
+
+namespace toftwin::discover {
+namespace {
+
+std::vector<TermGroup> termsOfUndeclared(const Finding& finding) {
+  std::vector<TermGroup> terms;
+  for (const Effect& effect : finding.effects) {
+    if (!effect.is_catalogue) terms.push_back({effect.name, Kind::Generic, termsOf(effect), 0});
+  }
+  return terms;
+}
+
+/// Effects of the declared model whose numbers the data move by so much that it is no chance: χ² of
+/// their columns, with everything that was found, over 25 more than their number (5 standard
+/// errors).
+std::vector<std::size_t> wrongNumbers(const Evidence& evidence, const Finding& finding,
+                                      const std::vector<sim::AnyEffect>& effects) {
+  const Marginal marginal = marginalise(evidence, finding.scales);
+  Columns columns = nuisanceColumns(marginal);
+  for (const Group& group : marginal.groups) {
+    const bool is_found =
+        group.kind == Kind::Catalogue && std::ranges::any_of(finding.effects, [&](const Effect& effect) {
+          return effect.is_catalogue && effect.name == group.name;
+        });
+    if (is_found || group.kind == Kind::Generic) append(columns, group);
+  }
+  const Fit all = fit(marginal, columns);
+  std::vector<std::size_t> places;
+  std::map<std::string, std::size_t> next;  // of several with one name, each has its group
+  for (const Group& group : marginal.groups) {
+    if (group.kind != Kind::Declared) continue;
+    const auto begin = effects.begin() + static_cast<std::ptrdiff_t>(next[group.name]);
+    const auto place =
+        std::find_if(begin, effects.end(), [&](const auto& effect) { return nameOf(effect) == group.name; });
+    if (place == effects.end()) continue;
+    next[group.name] = static_cast<std::size_t>(place - effects.begin()) + 1;
+    Columns without;
+    for (const Eigen::Index column : columns) {
+      const auto c = static_cast<std::size_t>(column);
+      if (c < group.first || c >= group.first + group.count) without.push_back(column);
+    }
+    const double gain = (fit(marginal, without).deviance - all.deviance) / std::max(1.0, all.dispersion());
+    if (gain >= 25.0 + static_cast<double>(group.count)) places.push_back(next[group.name] - 1);
+  }
+  return places;
+}
+
+/// For each of declaredEffects() its place in the camera file; none: the delay of the light.
+std::vector<std::optional<std::size_t>> placesInFile(const Declared& file) {
+  const auto& in_file = file.model.effects();
+  std::vector<std::optional<std::size_t>> places;
+  std::size_t next = 0;
+  for (const sim::AnyEffect& effect : declaredEffects(file)) {
+    std::size_t place = next;
+    while (place < in_file.size() && in_file[place].index() != effect.index()) ++place;
+    if (place == in_file.size()) {
+      places.emplace_back();
+      continue;
+    }
+    places.emplace_back(place);
+    next = place + 1;
+  }
+  return places;
+}
+
+/// The effects without noise, with what was found in them.
+struct WithFound {
+  std::vector<sim::AnyEffect> effects;
+  std::vector<std::size_t>
+      fitted;  ///< places of those whose numbers are to be fitted: updates, then what was found
+  std::map<std::size_t, std::vector<std::string>> only{};  ///< of those without a name, the numbers
+};
+
+std::size_t insert(WithFound& inserted, const sim::AnyEffect& effect) {
+  const auto behind = std::ranges::find_if(
+      inserted.effects, [&](const sim::AnyEffect& other) { return placeOf(other) > placeOf(effect); });
+  const auto place = static_cast<std::size_t>(behind - inserted.effects.begin());
+  inserted.effects.insert(behind, effect);
+  for (std::size_t& other : inserted.fitted) other += other >= place ? 1 : 0;
+  std::map<std::size_t, std::vector<std::string>> only;
+  for (auto& [other, keys] : inserted.only) only.emplace(other + (other >= place ? 1 : 0), std::move(keys));
+  inserted.only = std::move(only);
+  return place;
+}
+
+/// The forms of what was found, as the simulator has them.
+void putForms(const Round& round, WithFound& inserted, std::vector<FoundEffect>& effects) {
+  std::vector<const NamedFit*> fits;
+  for (const Effect& effect : round.finding.effects)
+    if (effect.fit) fits.push_back(effect.fit.get());
+  const auto included = round.rows->including(fits, false);
+  const auto& with_found = dynamic_cast<const CampaignRows&>(*included);
+  for (const Effect& effect : round.finding.effects) {
+    FoundEffect found{effect, {}};
+    if (effect.fit) {
+      const CampaignFit& fit = campaignFitOf(*effect.fit);
+      const std::size_t place = insert(inserted, fit.effect);
+      // All of its numbers: one that was not needed is not known to be nothing.
+      inserted.fitted.push_back(place);
+      found.fitted = FittedEffect{fit.effect, {}};
+    } else {
+      for (const LearnedEffect& learned : learnedEffectsOf(effect, with_found, round.declared.model)) {
+        const std::size_t place = insert(inserted, learned.effect);
+        if (!learned.free.empty()) inserted.fitted.push_back(place), inserted.only[place] = learned.free;
+        FittedEffect& form = found.fitted ? found.more.emplace_back(FittedEffect{learned.effect, {}})
+                                          : found.fitted.emplace(FittedEffect{learned.effect, {}});
+        form.is_as_learned = learned.free.empty();
+      }
+    }
+    effects.push_back(std::move(found));
+  }
+}
+
+/// What was fitted, to where it belongs: in the order in which it was inserted.
+void takeFitted(const std::vector<std::optional<std::size_t>>& updated, Round& round) {
+  std::vector<FittedEffect*> forms;
+  for (FoundEffect& found : round.effects) {
+    if (found.fitted && !found.fitted->is_as_learned) forms.push_back(&*found.fitted);
+    for (FittedEffect& more : found.more)
+      if (!more.is_as_learned) forms.push_back(&more);
+  }
+  for (std::size_t i = 0; i < round.refitted.fitted.size(); ++i) {
+    const FittedEffect& one = round.refitted.fitted[i];
+    if (i < updated.size()) {
+      round.updates.push_back(one);
+      round.updates.back().of_file = updated[i];
+    } else {
+      *forms[i - updated.size()] = one;
+    }
+  }
+}
+
+/// The camera file as far as its numbers are right, where the round starts from as far as they are not.
+Declared listedFor(const Declared& file, const Round& round, const std::vector<std::size_t>& wrong) {
+  const auto in_file = placesInFile(file);
+  std::vector<sim::AnyEffect> effects = file.model.effects();
+  for (const std::size_t place : wrong)
+    if (in_file[place]) effects[*in_file[place]] = round.declared.model.effects()[*in_file[place]];
+  Declared listed = file;
+  listed.model = file.model.withEffects(std::move(effects));
+  listed.delay_mm = round.declared.delay_mm;
+  return listed;
+}
+
+/// `file_rows`: rows that start from the camera file's own numbers; null: the round's are that.
+Result<> fitFound(const Declared& file, const CampaignRows* file_rows, const OpenCaptures& open,
+                  Round& round) {
+  const auto& of_file = file_rows != nullptr ? *file_rows : *round.rows;
+  auto wrong =
+      wrongNumbers(of_file.evidence(termsOfUndeclared(round.finding)), round.finding, declaredEffects(file));
+  const auto in_file = placesInFile(file);
+  std::erase_if(wrong, [&](std::size_t place) {
+    return !in_file[place] || (open.has_steps && std::holds_alternative<sim::Quantisation>(
+                                                     file.model.effects()[*in_file[place]]));
+  });
+  std::vector<std::optional<std::size_t>> updated;
+  for (const std::size_t place : wrong) updated.push_back(in_file[place]);
+  WithFound inserted{declaredEffects(listedFor(file, round, wrong)), wrong};
+  putForms(round, inserted, round.effects);
+  auto refitted = refit(*round.rows, inserted.effects, inserted.fitted,
+                        {.scales = round.finding.scales, .only = inserted.only});
+  if (!refitted) return refitted.error();
+  round.refitted = *std::move(refitted);
+  takeFitted(updated, round);
+  round.zero = zeroOf(round.refitted, round.declared.delay_mm);
+  return {};
+}
+
+/// Where a round ended: the numbers that were wrong as they were fitted, and the delay.
+Declared endOf(const Round& round) {
+  Declared end = round.declared;
+  std::vector<sim::AnyEffect> effects = end.model.effects();
+  for (const FittedEffect& one : round.updates) {
+    // The delay of the light, which stands in the fitted list, is told by itself.
+    const bool has_delay = std::holds_alternative<sim::FrequencyOffset>(one.effect);
+    effects[*one.of_file] =
+        has_delay ? withDelay(end.model, {one.effect}, -round.declared.delay_mm).front() : one.effect;
+  }
+  end.model = end.model.withEffects(std::move(effects));
+  end.delay_mm += round.zero.delay_mm;
+  return end;
+}
+
+Result<std::unique_ptr<Round>> search(const Declared& file, const OpenCaptures& open, const Round* before,
+                                      const std::function<void()>& begin,
+                                      const std::function<void(double)>& tell) {
+  auto round = std::make_unique<Round>(Round{before != nullptr ? endOf(*before) : file});
+  begin();
+  const auto stood_by = before != nullptr
+                            ? withDelay(file.model, before->refitted.effects, before->zero.delay_mm)
+                            : declaredEffects(file);
+  auto traced =
+      traceWhereTheyStood(round->declared, stood_by, open.captures, open.at_poses, open.trace, tell);
+  if (!traced) return traced.error();
+  round->traced = *std::move(traced);
+  begin();
+  auto rows = CampaignRows::make(round->declared, {open.captures, round->traced, open.at_poses},
+                                 {.left_out = open.left_out});
+  if (!rows) return rows.error();
+  round->rows = *std::move(rows);
+  begin();
+  round->finding = find(*round->rows, open.finder);
+  begin();
+  if (auto fitted = fitFound(file, before != nullptr ? &*before->rows : nullptr, open, *round); !fitted)
+    return fitted.error();
+  return round;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Round>> searchInRounds(const Declared& file, const OpenCaptures& open,
+                                              const std::function<void()>& begin,
+                                              const std::function<void(double)>& tell) {
+  auto first = search(file, open, nullptr, begin, tell);
+  if (!first) return first;
+  const double alpha = open.finder.alpha;
+  const Round& one = **first;
+  const bool has_both = !one.effects.empty() && !one.updates.empty();
+  if (one.things() == 0 || !(has_both || one.leavesSomething(alpha))) return first;
+  auto second = search(file, open, &one, [] {}, {});
+  if (!second) return second;
+  const bool is_better = (*second)->things() <= one.things() || !(*second)->leavesSomething(alpha);
+  return is_better ? std::move(second) : std::move(first);
+}
+
+}  // namespace toftwin::discover
