@@ -4,8 +4,11 @@
 //   frame_path_bench [SECONDS]       SECONDS per measurement, default 10
 // The daemon's part (hub, sessions, sockets) and each client are processes of their own. The source
 // costs nothing: it hands out the same frame of 512 × 424 range, amplitude and flags (1.95 MB).
-// Latency is from `received` (the daemon has the whole frame) to the return of Subscription::next.
+// Latency is from `received` (the daemon has the whole frame) to the return of Subscription::next; once as it is,
+// and once at a priority of real time, where that may be had (root), which shows the path without what else
+// the machine does.
 #include <arpa/inet.h>
+#include <sched.h>
 #include <signal.h>
 #include <sys/prctl.h>
 #include <sys/socket.h>
@@ -379,6 +382,11 @@ void compareThroughput(int clients, const std::vector<std::byte>& bytes, const s
   std::fflush(stdout);
 }
 
+bool setPriority(int policy, int priority) {
+  const sched_param parameter{.sched_priority = priority};
+  return ::sched_setscheduler(0, policy, &parameter) == 0;
+}
+
 void run(Seconds time) {
   const auto bytes = wire::toBytes(*wire::encode(wire::FrameMessage{1, constantFrame()}));
   const double mb = static_cast<double>(bytes.size()) * 1e-6;
@@ -403,6 +411,14 @@ void run(Seconds time) {
     measureLatency("toftwind, TCP", "tcp:127.0.0.1:" + std::to_string(sender.port()), time);
   }
   std::filesystem::remove(socket);
+  if (setPriority(SCHED_FIFO, 10)) {  // which those that are forked inherit
+    const Child sender{daemonWith(kPeriod)};
+    measureLatency("the former at a real-time priority", "unix:" + socket, time);
+    setPriority(SCHED_OTHER, 0);
+    std::filesystem::remove(socket);
+  } else {
+    std::printf("(no permission for a real-time priority)\n");
+  }
   {
     const Child sender{bareWith(kClients, kPeriod)};
     measureBareLatency(sender.port(), bytes.size(), time);
