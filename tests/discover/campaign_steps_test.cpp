@@ -47,7 +47,9 @@ TEST_F(Searched, StepsOfTheConverterAreSeenInSingleFrames) {
 TEST_F(Searched, TwoNumbersOfOneDeclaredEffectAreNotBothReported) {
   simulate("[[effect]]\ntype = 'quantisation'\nstep_electrons = 20.0\n");
   write("camera.toml", tinyCamera("[[effect]]\ntype = 'quantisation'\nstep_electrons = 200.0\n"));
-  const CampaignFinding finding = search(job());
+  CampaignJob few = job();
+  few.trace.samples_per_pixel = 8;  // what is found here is the converter's, whatever the light
+  const CampaignFinding finding = search(few);
   const auto steps = std::ranges::count_if(finding.updates, [](const FittedEffect& one) {
     return std::holds_alternative<sim::Quantisation>(one.effect);
   });
