@@ -23,6 +23,17 @@ Error named(const Feed& feed, const Error& error, const std::string& doing) {
   return {error.code, fmt::format("{}: {}: {}", feed.details().entry.name, doing, error.message)};
 }
 
+/// A recording that ends before the pose: what is missing of a damaged one may be why.
+Error endedBefore(const Feed& feed, const Error& end, int skipped) {
+  const std::string damage = feed.warning();
+  const std::string why = damage.empty() ? "it must have been recorded with the same pose file"
+                                         : "what is missing of it may have been";
+  Error error = named(
+      feed, end, fmt::format("none of its last {} frames was taken at the pose asked for; {}", skipped, why));
+  if (!damage.empty()) error.message += ". " + damage;
+  return error;
+}
+
 Json logEntry(const Frame& frame, const std::string& pose, const char* role) {
   Json ids = Json::object();
   ids.set("calibration", frame.provenance.calibration_id).set("scene", frame.provenance.scene_id);
@@ -76,10 +87,7 @@ Result<Frame> nextAt(Feed& feed, const std::optional<Transform<World, Camera>>& 
   for (int skipped = 0; skipped <= options.most_skipped; ++skipped) {
     auto frame = nextFrame(feed, options);
     if (!frame && frame.error().code == Error::Code::EndOfStream && skipped > 0)
-      return named(feed, frame.error(),
-                   fmt::format("none of its last {} frames was taken at the pose asked for; it "
-                               "must have been recorded with the same pose file",
-                               skipped));
+      return endedBefore(feed, frame.error(), skipped);
     if (!frame) return named(feed, frame.error(), "waiting for a frame");
     auto& there = frame->moment.world_from_camera;
     if (pose && !there && options.carrier != nullptr) there = pose;  // the rig knows

@@ -48,13 +48,21 @@ std::string html(const Paragraph& block) {
                      link);
 }
 
+/// Seven cameras' names side by side are wider than a page.
+std::string breakableAtUnderscores(const std::string& name) {
+  std::string broken;
+  for (const char letter : name) broken += letter == '_' ? std::string{"_<wbr>"} : std::string{letter};
+  return broken;
+}
+
 std::string html(const TableBlock& table) {
   std::string out = fmt::format("<div class='scroll'><table><caption>{}</caption><thead><tr>",
                                 escaped(table.caption));
   for (std::size_t i = 0; i < table.header.size(); ++i) {
     const bool numeric = !table.rows.empty() && i < table.rows.front().size() &&
                          readsAsNumber(table.rows.front()[i]);
-    out += fmt::format("<th{}>{}</th>", numeric ? " class='number'" : "", escaped(table.header[i]));
+    out += fmt::format("<th{}>{}</th>", numeric ? " class='number'" : "",
+                       breakableAtUnderscores(escaped(table.header[i])));
   }
   out += "</tr></thead><tbody>";
   for (const auto& row : table.rows) {

@@ -101,6 +101,7 @@ Result<BoardSighting> locateBoard(const Image<float>& amplitude, const Target& t
                  fmt::format("the image has {} x {} pixels, but the lens was calibrated with {} x {}",
                              amplitude.width(), amplitude.height(), camera.width, camera.height)};
   }
+  if (const auto told = tellsItsPose(target); !told) return told.error();
   return locateBoard(findBoard(amplitude, target), target, camera);
 }
 

@@ -95,8 +95,9 @@ void checkPoseFrom(const Plan& plan, const BlockSpec& block, Table& table) {
   if (needs_board && !plan.board.isThere())
     table.complain("pose_from", "needs a [board] that says what the board is and where it stands");
   if (needs_board && plan.board.isThere()) {
-    if (const auto board = intrinsics::targetOf(plan.board.words()); !board)
-      table.complain("pose_from", fmt::format("needs another [board]: {}", board.error().message));
+    const auto board = intrinsics::targetOf(plan.board.words());
+    const auto told = board ? intrinsics::tellsItsPose(*board) : Result<>{board.error()};
+    if (!told) table.complain("pose_from", fmt::format("needs another [board]: {}", told.error().message));
   }
   if (block.pose_from == PoseFrom::Planes && plan.planes.size() < 3)
     table.complain("pose_from", "needs three [[plane]]s or more: fewer leave the camera free to slide");

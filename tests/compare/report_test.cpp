@@ -89,6 +89,15 @@ TEST(Report, EscapesWhatItIsGiven) {
   EXPECT_THAT(page, Not(HasSubstr("<b>")));
 }
 
+/// Names of seven cameras beside each other are else wider than a printed page.
+TEST(Report, LetsNamesInATablesHeaderBreak) {
+  Report report = example();
+  report.sections[0].blocks.push_back(TableBlock{"", {"requirement", "azure_kinect_like"}, {{"a_b", "1"}}});
+  const std::string page = toHtml(report);
+  EXPECT_THAT(page, HasSubstr("azure_<wbr>kinect_<wbr>like</th>"));
+  EXPECT_THAT(page, HasSubstr("<td>a_b</td>"));
+}
+
 TEST(Report, IsWrittenWithItsNumbers) {
   const auto folder = std::filesystem::path{testing::TempDir()} / "report_test" / "deep";
   std::filesystem::remove_all(folder);

@@ -129,6 +129,23 @@ TEST(Traits, OfLensScatterSayWhyTheyAreNotTold) {
   EXPECT_TRUE(veilTraits(std::vector{rising, rising, rising}, error, kinect, capture).ok());
 }
 
+/// Frames of a simulated camera start at whole nanoseconds: rounding is no jitter that could change.
+TEST(Traits, OfFrameTimingKnowNothingShorterThanATick) {
+  const auto from = [](double first_s) {
+    std::vector<double> start_s;
+    for (int i = 0; i < 60; ++i) start_s.push_back(first_s + 33'333'333e-9 * i);
+    return *timingTraits(start_s);
+  };
+  const auto soon = from(0.1), later = from(3700.0);
+  for (const auto* one : {&soon, &later}) {
+    EXPECT_NEAR((*one)[0].high - (*one)[0].low, 2e-6, 1e-8);
+    EXPECT_EQ((*one)[1].low, 0.0);
+    EXPECT_GE((*one)[1].high, 1e-6);
+    EXPECT_LE((*one)[0].low, 33.333333);
+    EXPECT_GE((*one)[0].high, 33.333333);
+  }
+}
+
 /// A clean step in eight rows: none flies of eight crossings, and where none flies there is no side to hang on.
 TEST(Traits, OfFlyingPixelsSayNothingOfASideWhereNoneFlies) {
   Image<float> range(16, 8, 2.0f);

@@ -102,7 +102,23 @@ TEST(Warnings, TellOfARecordingOfOtherPoses) {
       **a, **b, {.poses = {{.name = "elsewhere", .position_m = {0.0, 0.0, 0.1}}}, .frames = 2}, silent);
   ASSERT_FALSE(captured);
   EXPECT_THAT(captured.error().message,
-              HasSubstr("kinect: none of its last 4 frames was taken at the pose asked for"));
+              HasSubstr("kinect: none of its last 4 frames was taken at the pose asked for; it must have been"));
+}
+
+TEST(Warnings, TellThatARecordingEndedBeforeThePoseForItWasCutOff) {
+  const record::Folder folder;
+  const auto whole = folder / "a.mcap", cut = folder / "b.mcap";
+  recordFrames(whole, std::chrono::milliseconds{0});
+  const auto bytes = record::bytesOf(whole);
+  record::writeBytes(cut, std::span{bytes}.first(bytes.size() - 100));
+  const auto a = openRecording(whole.string()), b = openRecording(cut.string());
+  ASSERT_TRUE(a && b);
+  Progress silent{nullptr};
+  const PoseSpec here{.name = "here"}, elsewhere{.name = "elsewhere", .position_m = {0.0, 0.0, 0.1}};
+  const auto captured = capture(**b, **a, {.poses = {elsewhere, here}, .frames = 2}, silent);
+  ASSERT_FALSE(captured);
+  EXPECT_THAT(captured.error().message,
+              testing::AllOf(HasSubstr("what is missing of it may have been"), HasSubstr("The recording of kinect is damaged: ")));
 }
 
 }  // namespace

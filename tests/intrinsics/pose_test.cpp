@@ -128,6 +128,18 @@ TEST(BoardPose, SaysWhyThereIsNone) {
               HasSubstr("128 x 106 pixels, but the lens was calibrated with 256 x 212"));
 }
 
+TEST(BoardPose, IsNotTakenOfABoardThatLooksTheSameTurnedByHalf) {
+  const CameraInfo camera = cameraOf(testing::smallCamera());
+  const Image<float> grey(256, 212, 100.0f);
+  for (const char* corners : {"7x5", "8x6"}) {
+    const auto none = locateBoard(grey, *targetOf(corners, 32_mm), camera);
+    ASSERT_FALSE(none);
+    EXPECT_THAT(none.error().message, HasSubstr("looks the same when it is turned by half")) << corners;
+  }
+  EXPECT_TRUE(tellsItsPose(*targetOf("8x5", 32_mm)));
+  EXPECT_TRUE(tellsItsPose({.kind = Target::Kind::Tags, .columns = 8, .rows = 6}));
+}
+
 /// A board of 15 pixels, 20 degrees tilted, with half a pixel of noise: either tilt explains it.
 TEST(BoardPose, RefusesABoardThatMayAsWellBeTiltedTheOtherWay) {
   const Truth truth = testing::kinectLike();

@@ -269,6 +269,8 @@ TEST_F(LookAround, SaysWhatIsMissing) {
   EXPECT_THAT(parsePlan(block, "p.toml").error().message, HasSubstr("needs a [board]"));
   EXPECT_THAT(parsePlan("[board]\ncorners = '8x5'\n" + block, "p.toml").error().message,
               HasSubstr("squares are 0 mm"));
+  EXPECT_THAT(parsePlan("[board]\ncorners = '7x5'\nsquare_mm = 30\n" + block, "p.toml").error().message,
+              HasSubstr("looks the same when it is turned by half"));
   EXPECT_THAT(parsePlan("[[block]]\nname = 'b'\nkind = 'locked'\npose_from = 'planes'\n" + kPoses, "p.toml")
                   .error()
                   .message,

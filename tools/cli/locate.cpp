@@ -110,6 +110,7 @@ std::string textOf(const HandEye& known) {
 Result<Exit> act(const Options& options) {
   const auto target = intrinsics::targetOf(options.board.words());
   if (!target) return target.error();
+  if (const auto told = intrinsics::tellsItsPose(*target); !told) return told.error();
   const auto lens = calibration::load(options.calibration);
   if (!lens) return lens.error();
   const auto all = locateAll(options, *target, calibration::cameraOf(lens->lens));

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
+#include <limits>
 
 #include "calib/compare/statistics.h"
 #include "calib/compare/traits/least_squares.h"
@@ -49,8 +50,12 @@ Traits maskTraits(std::span<const Image<std::uint8_t>> a, std::span<const Image<
   return traits;
 }
 
+/// Frames say their starts in nanoseconds; seconds since long ago are coarser than that in 53 bits.
+constexpr double kTick_s = 1e-9;
+
 Traits timingTraits(std::span<const std::vector<double>> starts_s) {
   std::vector<double> intervals;
+  double latest_s = 0.0;
   std::size_t frames = 0;
   for (const auto& series : starts_s) {
     const auto rows = finiteRows({series}, 1, "frame timing");
@@ -58,6 +63,7 @@ Traits timingTraits(std::span<const std::vector<double>> starts_s) {
     const auto& starts = rows->front();
     frames += starts.size();
     for (std::size_t i = 1; i < starts.size(); ++i) intervals.push_back(starts[i] - starts[i - 1]);
+    latest_s = std::max(latest_s, std::abs(starts.back()));
   }
   if (intervals.size() < 3) return undetermined("frame timing", "fewer than four frames say when they began");
   if (std::ranges::min(intervals) <= 0.0)
@@ -78,8 +84,13 @@ Traits timingTraits(std::span<const std::vector<double>> starts_s) {
       .name = "jitter", .unit = "ms", .value = 1e3 * summary.sd, .low = 0.0, .high = 0.0, .n = summary.n};
   jitter.low = jitter.value * std::sqrt(degrees / boost::math::quantile(spread, 0.975));
   jitter.high = jitter.value * std::sqrt(degrees / boost::math::quantile(spread, 0.025));
-  return std::vector{meanTrait("interval", "ms", whole, 1e3), jitter,
-                     shareTrait("lost", lost, frames + lost)};
+  // What is shorter than a tick is rounding, and no other rounding differs from it.
+  const double tick_ms = 1e3 * (kTick_s + latest_s * std::numeric_limits<double>::epsilon());
+  if (jitter.value < tick_ms) jitter.low = 0.0, jitter.high = std::max(jitter.high, tick_ms);
+  Trait interval = meanTrait("interval", "ms", whole, 1e3);
+  interval.low = std::min(interval.low, interval.value - tick_ms);
+  interval.high = std::max(interval.high, interval.value + tick_ms);
+  return std::vector{interval, jitter, shareTrait("lost", lost, frames + lost)};
 }
 
 Traits timingTraits(Column start_s) {
