@@ -57,6 +57,52 @@ FaultKeys fault(FaultKind kind, std::uint64_t first, std::uint64_t frames = 1, s
 std::int64_t startOf(const Frame& frame) { return frame.moment.exposures.at(0).start.ns; }
 constexpr std::int64_t kInterval_ns = 10'000'000;
 
+/// Remembers what is set of it.
+class Settable final : public drivers::Source {
+ public:
+  explicit Settable(std::string& set) : set_(set) {}
+  [[nodiscard]] const drivers::SourceInfo& info() const override { return info_; }
+  Result<> start() override { return {}; }
+  void stop() override {}
+  Result<Frame> next(std::stop_token, bool) override { return Error{Error::Code::Timeout, "none"}; }
+  Result<> setParameter(std::string_view name, double value) override {
+    set_ = fmt::format("{} = {}", name, value);
+    return {};
+  }
+  Result<> setParameterText(std::string_view name, std::string_view text) override {
+    set_ = fmt::format("{} is {}", name, text);
+    return {};
+  }
+  Result<> setPose(const Transform<World, Camera>&) override {
+    set_ = "pose";
+    return {};
+  }
+  Result<> trigger() override {
+    set_ = "trigger";
+    return {};
+  }
+
+ private:
+  drivers::SourceInfo info_;
+  std::string& set_;
+};
+
+TEST(Faults, WhatIsSetGoesThrough) {
+  std::string set;
+  const auto plan = std::make_shared<FaultPlan>(std::vector{fault(FaultKind::Loss, 1)}, "cam", "");
+  auto source =
+      FaultPlan::open(plan, Result<std::unique_ptr<drivers::Source>>{std::make_unique<Settable>(set)});
+  ASSERT_TRUE(source.ok());
+  EXPECT_TRUE((*source)->setParameter("gain", 2.0).ok());
+  EXPECT_EQ(set, "gain = 2");
+  EXPECT_TRUE((*source)->setParameterText("TriggerActivation", "FallingEdge").ok());
+  EXPECT_EQ(set, "TriggerActivation is FallingEdge");
+  EXPECT_TRUE((*source)->setPose({}).ok());
+  EXPECT_EQ(set, "pose");
+  EXPECT_TRUE((*source)->trigger().ok());
+  EXPECT_EQ(set, "trigger");
+}
+
 TEST(Faults, WithoutAPlanTheSourceIsTheDriversOwn) {
   Faulty source{{}};
   EXPECT_EQ(source.next()->provenance.kind, FrameKind::Simulated);

@@ -173,6 +173,20 @@ TEST(Recovery, AChoiceIsSetAgainByItsName) {
   EXPECT_EQ(settings.parameters[0].text, "High");
 }
 
+TEST(Recovery, ATextThatIsNoNumberIsSetAgain) {
+  Life life;
+  life.state.parameters[1] = {.name = "gain", .text = "left"};
+  life.open();
+  SourceState changed = life.state;
+  changed.parameters[1].text = "right";
+  life.recovery.changed(changed);
+  life.lose();
+  life.open();
+  const auto settings = life.recovery.settings();
+  ASSERT_EQ(settings.parameters.size(), 1u);
+  EXPECT_EQ(settings.parameters[0].text, "right");
+}
+
 TEST(Recovery, DeviceTimeGoesOnWhenTheCamerasClockBeginsAnew) {
   Life life;
   life.open();

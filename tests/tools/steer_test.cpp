@@ -3,6 +3,8 @@
 // there.
 #include "with_daemon.h"
 
+#include <fmt/format.h>
+
 namespace toftwin::cli {
 namespace {
 
@@ -73,6 +75,38 @@ TEST_F(Steered, AParameterIsSetByOneWordAsRecipesHaveIt) {
     EXPECT_EQ(run("set pattern " + wrong).status, 4) << wrong;
   EXPECT_THAT(run("set pattern speed_px").out, HasSubstr("speed_px  5 "));
 }
+
+#ifdef TOFTWIN_HAS_ARAVIS
+/// The pattern as a GigE Vision camera, and that again as a source, whose features are choices and texts.
+class SteeredFeatures : public WithDaemon {
+ protected:
+  std::string moreSources() const override {
+    const auto pid = static_cast<unsigned>(::getpid());
+    const std::string address = fmt::format("127.{}.{}.21", 1 + pid % 199, pid / 199 % 251);
+    return fmt::format(
+        "[[facade]]\nkind = 'gige_vision'\nsource = 'pattern'\naddress = '{0}'\n"
+        "[[source]]\nname = 'gige'\ndriver = 'aravis'\nuri = 'aravis:{0}'\n"
+        "parameters = ['Scan3dCoordinateSystem', 'DeviceUserID']\n",
+        address);
+  }
+};
+
+TEST_F(SteeredFeatures, AreShownWithTheirChoicesAndSetByName) {
+  ASSERT_TRUE(eventually([&] { return run("set gige").status == 0; })) << run("list").out;
+  EXPECT_THAT(run("set gige").out,
+              HasSubstr("Scan3dCoordinateSystem  Cartesian    one of Cartesian, Spherical"));
+  const Ran set = run("set gige Scan3dCoordinateSystem Spherical");
+  EXPECT_EQ(set.status, 0) << set.err;
+  EXPECT_THAT(run("info gige --json").out, AllOf(HasSubstr("\"text\": \"Spherical\""),
+                                                 HasSubstr("\"choices\": [\"Cartesian\", \"Spherical\"]")));
+  const Ran unknown = run("set gige Scan3dCoordinateSystem Cylindrical");
+  EXPECT_EQ(unknown.status, 4);
+  EXPECT_THAT(unknown.err, HasSubstr("one of: Cartesian, Spherical"));
+  const Ran number = run("set gige DeviceUserID 7");
+  EXPECT_EQ(number.status, 0) << number.err << ": what it is called may be a number";
+  EXPECT_THAT(run("set gige DeviceUserID").out, HasSubstr("DeviceUserID  7"));
+}
+#endif
 
 TEST_F(Steered, AStandardOutputThatIsFullIsStatus6) {
   for (const std::string arguments : {"list", "list --json", "info pattern", "info pattern --json",

@@ -393,9 +393,17 @@ TEST_F(O3d303Facade, APortInUseIsToldAndTriedAgainWhileTheDaemonServes) {
       "pcic_port = 0\ndiscoverable = false\n",
       kPattern, port));
   EXPECT_TRUE(log_->waitFor("is in use by", 1));
-  EXPECT_TRUE(client().sources().ok());
+  auto native = client();
+  const auto told = [&] {
+    const auto health = native.health();
+    return health.ok() && health->facades.size() == 1 ? health->facades.front() : FacadeHealthEntry{};
+  };
+  EXPECT_TRUE(eventually([&] { return told().state == FacadeState::NotThere; }));
+  EXPECT_NE(told().problem.find("is in use by"), std::string::npos) << told().problem;
   holder.reset();
   EXPECT_TRUE(log_->waitFor("facade o3d303 of cam: XML-RPC", 1));
+  EXPECT_TRUE(eventually([&] { return told().state == FacadeState::Running; }));
+  EXPECT_EQ(told().problem, "");
   EXPECT_EQ(O3d303Client{port}.call("", "getParameter", {"DeviceType"}).text(), "1:2");
 }
 
