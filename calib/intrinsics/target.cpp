@@ -115,10 +115,10 @@ Result<Target> targetOf(const BoardWords& words) {
 
 Result<> tellsItsPose(const Target& target) {
   if (target.kind != Target::Kind::Checkerboard || (target.columns + target.rows) % 2 != 0) return {};
-  return refusal(
-      fmt::format("a checkerboard of {}x{} inner corners looks the same when it is turned by half, so its pose is one of "
-                  "two: one of its numbers must be even and the other odd, as of {}x{}",
-                  target.columns, target.rows, target.columns, target.rows - 1));
+  return refusal(fmt::format(
+      "a checkerboard of {}x{} inner corners looks the same when it is turned by half, so its pose is one of "
+      "two: one of its numbers must be even and the other odd, as of {}x{}",
+      target.columns, target.rows, target.columns, target.rows - 1));
 }
 
 std::string inWords(const Target& target) {

@@ -72,7 +72,8 @@ Result<Target> tagsOf(std::string_view columns_by_rows, Length pitch, Length mar
                       const std::string& dictionary);
 
 /// Error where a board looks the same when it is turned by half, so that its pose would be one of two: a
-/// checkerboard without markers whose counts of inner corners are both even or both odd. It calibrates a lens.
+/// checkerboard without markers whose counts of inner corners are both even or both odd. It calibrates a
+/// lens.
 Result<> tellsItsPose(const Target& target);
 
 /// "checkerboard 8x5, squares of 32 mm".

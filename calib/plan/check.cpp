@@ -224,8 +224,8 @@ constexpr std::array kBlind{
 /// Of the lowest frequencies that cameras are modulated at, a period is 10 m.
 constexpr double kLongestPeriod_m = 10.0;
 
-/// Errors that go once or twice per period of the modulation are told over a whole one only; the plan does not
-/// know its cameras.
+/// Errors that go once or twice per period of the modulation are told over a whole one only; the plan does
+/// not know its cameras.
 void noteSpan(const Plan& plan, const Schedule& schedule, std::vector<Remark>& remarks) {
   std::vector<double> distance_m;
   for (const PlannedCapture& one : schedule.captures) {
@@ -238,7 +238,8 @@ void noteSpan(const Plan& plan, const Schedule& schedule, std::vector<Remark>& r
   constexpr double kHalfLight_m_MHz = 149.896229;  // c/2
   remarks.push_back(
       {false,
-       fmt::format("distances of {:.3g} to {:.3g} m are a whole period of {:.0f} MHz or more: of lower frequencies of "
+       fmt::format("distances of {:.3g} to {:.3g} m are a whole period of {:.0f} MHz or more: of lower "
+                   "frequencies of "
                    "modulation, waves of error of one or two per period may not be told",
                    nearest, farthest, std::ceil(kHalfLight_m_MHz / (farthest - nearest))),
        fmt::format("go on to {:.3g} m for 16 MHz (a Kinect v2), {:.3g} m for 30 MHz: c/2f beyond the nearest",

@@ -184,8 +184,9 @@ Image<float> belowEachOther(const Captures& captures, std::size_t camera) {
   return together;
 }
 
-/// A wall by itself: what a camera is off by at a range, and by how much a veil of 1 would move it there. Both
-/// of the same cells: where one is not known, as that of a cell without an amplitude, the other does not count.
+/// A wall by itself: what a camera is off by at a range, and by how much a veil of 1 would move it there.
+/// Both of the same cells: where one is not known, as that of a cell without an amplitude, the other does not
+/// count.
 class WallAlone {
  public:
   WallAlone(const Captures& walls, std::size_t camera, std::size_t frequencies)

@@ -119,24 +119,25 @@ std::vector<Planted> overDistance() {
                     const std::vector<int> orders{4};
                     return harmonicTraits(d, e, f, orders, capture);
                   }});
-  rows.push_back({"harmonics of cells, three steps",
-                  {{"16 MHz, 6 per period", 1.2}, {"16 MHz, 4 per period", 0.0}, {"16 MHz, 3 per period", 0.0}},
-                  [](Noise& noise) {
-                    // As above, a cell each 5 cm, with the waves that are looked for by themselves.
-                    const std::vector<double> f{16e6, 80e6, 120e6};
-                    Columns d, e;
-                    std::vector<std::size_t> capture;
-                    for (std::size_t c = 0; c < 18; ++c) {
-                      const double distance = 0.6 * std::pow(4.0 / 0.6, static_cast<double>(c / 2) / 8.0),
-                                   own = noise(0.3);
-                      for (double at = distance; at < 1.2 * distance; at += 0.05) {
-                        d.push_back(at), capture.push_back(c);
-                        e.push_back(2.0 + 1.2 * std::cos(24.0 * std::numbers::pi * f[0] / 299'792'458.0 * at + 1.0) +
-                                    own + noise(0.3));
-                      }
-                    }
-                    return harmonicTraits(d, e, f, capture);
-                  }});
+  rows.push_back(
+      {"harmonics of cells, three steps",
+       {{"16 MHz, 6 per period", 1.2}, {"16 MHz, 4 per period", 0.0}, {"16 MHz, 3 per period", 0.0}},
+       [](Noise& noise) {
+         // As above, a cell each 5 cm, with the waves that are looked for by themselves.
+         const std::vector<double> f{16e6, 80e6, 120e6};
+         Columns d, e;
+         std::vector<std::size_t> capture;
+         for (std::size_t c = 0; c < 18; ++c) {
+           const double distance = 0.6 * std::pow(4.0 / 0.6, static_cast<double>(c / 2) / 8.0),
+                        own = noise(0.3);
+           for (double at = distance; at < 1.2 * distance; at += 0.05) {
+             d.push_back(at), capture.push_back(c);
+             e.push_back(2.0 + 1.2 * std::cos(24.0 * std::numbers::pi * f[0] / 299'792'458.0 * at + 1.0) +
+                         own + noise(0.3));
+           }
+         }
+         return harmonicTraits(d, e, f, capture);
+       }});
   rows.push_back({"noise law", {{"floor", 2.0}, {"shot", 3.0}, {"read", 0.4}}, [](Noise& noise) {
                     // σ of 60 frames each: √(1/118) of itself uncertain. Relative to the largest signal,
                     // 1000.

@@ -119,7 +119,8 @@ TEST(Traits, OfLensScatterSayWhyTheyAreNotTold) {
   std::vector<std::size_t> capture;
   for (std::size_t i = 0; i < 24; ++i) rising.push_back(static_cast<double>(i * i)), capture.push_back(i / 8);
   std::fill_n(first.begin(), 8, 1.0);
-  const auto why = [&](const std::vector<std::vector<double>>& slopes, const std::vector<double>& frequency_hz) {
+  const auto why = [&](const std::vector<std::vector<double>>& slopes,
+                       const std::vector<double>& frequency_hz) {
     return errorOf(veilTraits(slopes, error, frequency_hz, capture));
   };
   EXPECT_THAT(why({nothing, nothing, nothing}, kinect), HasSubstr("adds no light"));

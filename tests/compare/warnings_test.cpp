@@ -101,8 +101,9 @@ TEST(Warnings, TellOfARecordingOfOtherPoses) {
   const auto captured = capture(
       **a, **b, {.poses = {{.name = "elsewhere", .position_m = {0.0, 0.0, 0.1}}}, .frames = 2}, silent);
   ASSERT_FALSE(captured);
-  EXPECT_THAT(captured.error().message,
-              HasSubstr("kinect: none of its last 4 frames was taken at the pose asked for; it must have been"));
+  EXPECT_THAT(
+      captured.error().message,
+      HasSubstr("kinect: none of its last 4 frames was taken at the pose asked for; it must have been"));
 }
 
 TEST(Warnings, TellThatARecordingEndedBeforeThePoseForItWasCutOff) {
@@ -117,8 +118,8 @@ TEST(Warnings, TellThatARecordingEndedBeforeThePoseForItWasCutOff) {
   const PoseSpec here{.name = "here"}, elsewhere{.name = "elsewhere", .position_m = {0.0, 0.0, 0.1}};
   const auto captured = capture(**b, **a, {.poses = {elsewhere, here}, .frames = 2}, silent);
   ASSERT_FALSE(captured);
-  EXPECT_THAT(captured.error().message,
-              testing::AllOf(HasSubstr("what is missing of it may have been"), HasSubstr("The recording of kinect is damaged: ")));
+  EXPECT_THAT(captured.error().message, testing::AllOf(HasSubstr("what is missing of it may have been"),
+                                                       HasSubstr("The recording of kinect is damaged: ")));
 }
 
 }  // namespace

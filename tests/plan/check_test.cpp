@@ -135,13 +135,15 @@ TEST(Check, NotesOfWhichFrequenciesTheDistancesAreAWholePeriod) {
   const auto spanOf = [](const char* distances) {
     std::string notes;
     for (const Remark& one :
-         checkOf(fmt::format("[[block]]\nname = 'd'\nkind = 'distance'\ndistance_m = [{}]\nrepeats = 4\n", distances))
+         checkOf(fmt::format("[[block]]\nname = 'd'\nkind = 'distance'\ndistance_m = [{}]\nrepeats = 4\n",
+                             distances))
              .remarks)
       notes += one.what + " | " + one.mend + "\n";
     return notes;
   };
-  EXPECT_THAT(spanOf("0.6, 1, 2, 3, 4"), testing::AllOf(HasSubstr("0.6 to 4 m are a whole period of 45 MHz or more"),
-                                                        HasSubstr("go on to 9.97 m for 16 MHz")));
+  EXPECT_THAT(spanOf("0.6, 1, 2, 3, 4"),
+              testing::AllOf(HasSubstr("0.6 to 4 m are a whole period of 45 MHz or more"),
+                             HasSubstr("go on to 9.97 m for 16 MHz")));
   EXPECT_THAT(spanOf("0.6, 3, 6, 9, 10.6"), testing::Not(HasSubstr("whole period")));
 }
 

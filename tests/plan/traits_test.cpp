@@ -145,9 +145,10 @@ TEST(RunTraits, TakeEachCamerasHarmonicsByItsOwnFrequencies) {
 
 const std::vector<double> kKinect_hz{16e6, 80e6, 120e6};
 
-/// The open captures of the standard plan, and two at each of `more_m`, before a wall that fills 60° of a Kinect
-/// v2's image: it errs by `wave_mm`, each capture by 0.3 mm of its own and each cell by as much.
-ComparedRun wallsOfTheStandardPlan(const std::function<double(double)>& wave_mm, const std::vector<double>& more_m = {}) {
+/// The open captures of the standard plan, and two at each of `more_m`, before a wall that fills 60° of a
+/// Kinect v2's image: it errs by `wave_mm`, each capture by 0.3 mm of its own and each cell by as much.
+ComparedRun wallsOfTheStandardPlan(const std::function<double(double)>& wave_mm,
+                                   const std::vector<double>& more_m = {}) {
   const auto plan = loadPlan(TOFTWIN_SOURCE_DIR "/docs/examples/plans/standard.toml");
   const auto schedule = scheduleOf(*plan);
   std::vector<double> distance_m;
@@ -155,7 +156,8 @@ ComparedRun wallsOfTheStandardPlan(const std::function<double(double)>& wave_mm,
     if (plan->blocks[planned.block].kind == Kind::Distance && !planned.is_locked)
       distance_m.push_back(planned.distance_m);
   }
-  for (int repeat = 0; repeat < 2; ++repeat) distance_m.insert(distance_m.end(), more_m.begin(), more_m.end());
+  for (int repeat = 0; repeat < 2; ++repeat)
+    distance_m.insert(distance_m.end(), more_m.begin(), more_m.end());
   std::mt19937_64 random{kSeed};
   std::normal_distribution<double> error{0.0, 0.3};
   ComparedRun run;
@@ -200,18 +202,20 @@ TEST(RunTraits, OfTheStandardPlanTellTheSixWavesOfThreeSteps) {
 /// The wall's rows reach 4 m · 2/√3 = 4.62 m of the 9.37 m of 16 MHz; of a wall at 10 m, 11.5 m.
 TEST(RunTraits, SayWhichWavesTheDistancesAreTooShortFor) {
   const auto none = [](double) { return 0.0; };
-  const auto isOfWaves = testing::Contains(testing::AllOf(
-      testing::HasSubstr("harmonics, against the plan's wall of A: waves of"),
-      testing::HasSubstr("1 per period are not told"), testing::HasSubstr("of the period of 16 MHz, 9.37 m; up to 9.97 m")));
+  const auto isOfWaves = testing::Contains(
+      testing::AllOf(testing::HasSubstr("harmonics, against the plan's wall of A: waves of"),
+                     testing::HasSubstr("1 per period are not told"),
+                     testing::HasSubstr("of the period of 16 MHz, 9.37 m; up to 9.97 m")));
   EXPECT_THAT(traitsOf(wallsOfTheStandardPlan(none)).untold, isOfWaves);
-  const RunTraits longer = traitsOf(wallsOfTheStandardPlan(wave(2.0, 1, 16e6), {4.7, 5.5, 6.4, 7.4, 8.6, 10.0}));
+  const RunTraits longer =
+      traitsOf(wallsOfTheStandardPlan(wave(2.0, 1, 16e6), {4.7, 5.5, 6.4, 7.4, 8.6, 10.0}));
   EXPECT_THAT(longer.untold, testing::Not(isOfWaves));
   expectNear(find(longer, "harmonics, against", "A", "16 MHz, 1 per period"), 2.0);
   expectNear(find(longer, "harmonics, against", "A", "16 MHz, 2 per period"), 0.0);
 }
 
-/// Cells of a wall, a row each 25 mm of range: an error of 5 sin d besides `veil` times what a veil of 1 does,
-/// w_f · v_f summed over the frequencies, w_f = f / Σ f of a Kinect v2.
+/// Cells of a wall, a row each 25 mm of range: an error of 5 sin d besides `veil` times what a veil of 1
+/// does, w_f · v_f summed over the frequencies, w_f = f / Σ f of a Kinect v2.
 CameraSeen wallWith(double veil, double from_m, const std::function<double(double, double)>& slope_mm) {
   const std::array frequency_mhz{16.0, 80.0, 120.0};
   CameraSeen seen;
@@ -234,12 +238,14 @@ void addCapture(ComparedRun& run, const char* kind, const CameraSeen& seen, cons
   one.seen = {seen, seen};
 }
 
-/// What a wall by itself shows, its own error and its own light's veil, and a plate before it in three captures.
+/// What a wall by itself shows, its own error and its own light's veil, and a plate before it in three
+/// captures.
 ComparedRun veiledRun(double veil, const char* plates) {
   const auto of_wall = [](double mhz, double d) { return 40.0 * std::cos(0.02 * mhz * d); };
   ComparedRun run;
   run.frequency_hz = {std::vector{16e6, 80e6, 120e6}, std::vector{16e6, 80e6, 120e6}};
-  addCapture(run, "distance", wallWith(veil, 1.0, of_wall)), addCapture(run, "distance", wallWith(veil, 2.0, of_wall));
+  addCapture(run, "distance", wallWith(veil, 1.0, of_wall)),
+      addCapture(run, "distance", wallWith(veil, 2.0, of_wall));
   for (const double plate_m : {0.6, 0.8, 1.1}) {
     addCapture(run, plates, wallWith(veil, 1.5, [&](double mhz, double d) {
                  return of_wall(mhz, d) + 300.0 * std::sin(0.04 * mhz * (d - plate_m));
@@ -271,12 +277,14 @@ TEST(RunTraits, TakeLensScatterOfTheBlocksThatAreMadeForIt) {
 
 TEST(RunTraits, TakeNoLensScatterWhereThePoseIsFittedToThePlanes) {
   ComparedRun run = veiledRun(0.03, "scatter");
-  addCapture(run, "scatter", wallWith(0.5, 1.5, [](double mhz, double d) { return 300.0 * std::sin(0.01 * mhz * d); }),
+  addCapture(run, "scatter",
+             wallWith(0.5, 1.5, [](double mhz, double d) { return 300.0 * std::sin(0.01 * mhz * d); }),
              "planes");
   EXPECT_NEAR(find(traitsOf(run), "lens scatter", "A", "veil")->trait.value, 0.03, kRounding);
 }
 
-/// A cell of the wall alone without an amplitude says nothing of a veil, so its error is not what the others' is less.
+/// A cell of the wall alone without an amplitude says nothing of a veil, so its error is not what the others'
+/// is less.
 TEST(RunTraits, TakeErrorAndVeilOfTheWallAloneOfTheSameCells) {
   ComparedRun run = veiledRun(0.03, "scatter");
   CameraSeen dim = wallWith(0.03, 1.5, [](double, double) { return std::nan(""); });

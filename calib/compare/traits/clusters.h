@@ -14,8 +14,9 @@ namespace toftwin::compare {
 /// besides their own (one-way random effects). The ratio λ of the variances of u and e is REML's (H. D.
 /// Patterson, R. Thompson, Biometrika 58 (1971) 545); given λ it is least squares of rows less θ_c of their
 /// cluster's mean, θ_c = 1 − 1/√(1 + λ n_c). The degrees of freedom are Satterthwaite's, between those of u,
-/// G − 1 or less for G clusters, and n − k. The first column is the constant. `squares` are those of the transformed rows. Nothing
-/// if n ≤ k, for fewer than two clusters, or if the rows leave a parameter undetermined.
+/// G − 1 or less for G clusters, and n − k. The first column is the constant. `squares` are those of the
+/// transformed rows. Nothing if n ≤ k, for fewer than two clusters, or if the rows leave a parameter
+/// undetermined.
 std::optional<Fit> fitInClusters(const std::vector<std::vector<double>>& columns, Column y,
                                  std::span<const std::size_t> cluster);
 

@@ -106,8 +106,8 @@ FittedTraits fittedOf(const Fit& fit, const std::vector<Wave>& waves) {
 /// In the order in which they are looked for: the first to be left out is the last.
 constexpr std::array kOrders{4, 3, 6, 2, 1};
 
-/// Which of kOrders are not among the first `told`, and why: the rows span too little of the longest period, or
-/// are too few, or scatter too much.
+/// Which of kOrders are not among the first `told`, and why: the rows span too little of the longest period,
+/// or are too few, or scatter too much.
 std::string ordersNotTold(std::size_t told, const std::vector<double>& distance_m,
                           std::span<const double> frequency_hz) {
   if (told == kOrders.size()) return {};
@@ -119,10 +119,10 @@ std::string ordersNotTold(std::size_t told, const std::vector<double>& distance_
   const std::size_t needed = kRowsPerParameter * (2 + 2 * frequency_hz.size() * kOrders.size());
   std::string why;
   if (farthest - nearest < period_m) {
-    why = fmt::format("the distances, {:.3g} to {:.3g} m, are {:.2f} of the period of {:.6g} MHz, {:.3g} m; up "
-                      "to {:.3g} m they would cover it",
-                      nearest, farthest, (farthest - nearest) / period_m, lowest_hz * 1e-6, period_m,
-                      nearest + period_m);
+    why = fmt::format(
+        "the distances, {:.3g} to {:.3g} m, are {:.2f} of the period of {:.6g} MHz, {:.3g} m; up "
+        "to {:.3g} m they would cover it",
+        nearest, farthest, (farthest - nearest) / period_m, lowest_hz * 1e-6, period_m, nearest + period_m);
   } else if (distance_m.size() < needed) {
     why = fmt::format("there are {} rows, and it takes {}", distance_m.size(), needed);
   } else {

@@ -118,9 +118,8 @@ Traits veilByRows(const std::vector<std::vector<double>>& columns, Column error_
                         "the plate adds no light whose share could be told, or the frequencies are "
                         "too near each other");
   }
-  return std::vector{fit->trait("veil", "1", [](std::span<const double> p) {
-    return std::accumulate(p.begin() + 1, p.end(), 0.0);
-  })};
+  return std::vector{fit->trait(
+      "veil", "1", [](std::span<const double> p) { return std::accumulate(p.begin() + 1, p.end(), 0.0); })};
 }
 
 }  // namespace

@@ -60,9 +60,9 @@ Result<DriftTraits> driftTraits(Column time_s, Column value_mm);
 Traits harmonicTraits(Column distance_m, Column error_mm, std::span<const double> frequency_hz,
                       std::span<const int> orders, std::span<const std::size_t> cluster = {});
 /// Of as many of four, three, six, two and one wave per period (cameras of four steps have four, of three
-/// steps three and six) as there are three rows for each parameter, and as the rows tell apart: each amplitude
-/// better than one row's scatter. Waves that are left out are not taken to be 0: over a part of a period,
-/// those that are there would be told as others. FittedTraits::not_told says so.
+/// steps three and six) as there are three rows for each parameter, and as the rows tell apart: each
+/// amplitude better than one row's scatter. Waves that are left out are not taken to be 0: over a part of a
+/// period, those that are there would be told as others. FittedTraits::not_told says so.
 Traits harmonicTraits(Column distance_m, Column error_mm, std::span<const double> frequency_hz,
                       std::span<const std::size_t> cluster = {});
 /// The same with the curve.
