@@ -76,6 +76,10 @@ TableBlock traitTable(const NamedTraits& traits, const std::string& a, const std
   return table;
 }
 
+Details whatIsNotTold(const std::string& summary, const NamedTraits& traits) {
+  return {fmt::format("{} ({})", summary, traits.untold.size()), traits.untold};
+}
+
 Json toJson(const NamedTraits& traits) {
   Json rows = Json::array(), untold = Json::array();
   for (const auto& [what, detail, of, trait] : traits.traits) {

@@ -52,6 +52,8 @@ class TraitCollector {
 
 /// A row for each number, A, B and B − A beside each other. `a` and `b` say whose they are.
 TableBlock traitTable(const NamedTraits& traits, const std::string& a = "A", const std::string& b = "B");
+/// What could not be told, closed until opened; how many there are stands outside.
+Details whatIsNotTold(const std::string& summary, const NamedTraits& traits);
 Json toJson(const NamedTraits& traits);
 
 }  // namespace toftwin::compare

@@ -28,7 +28,7 @@ void addCharacteristics(const NamedTraits& traits, Finding& finding) {
   }
   finding.section.blocks.push_back(std::move(table));
   if (!traits.untold.empty())
-    finding.section.blocks.push_back(Details{"What these data cannot tell", traits.untold});
+    finding.section.blocks.push_back(whatIsNotTold("What these data cannot tell", traits));
   finding.data.set("characteristics", toJson(traits)).set("verdicts", toJson(verdicts));
 }
 

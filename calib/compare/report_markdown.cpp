@@ -14,6 +14,12 @@ std::string markdown(const Paragraph& words) {
   return words.text + link + "\n\n";
 }
 
+std::string markdown(const Details& details) {
+  std::string out = fmt::format("{}:\n\n", details.summary);
+  for (const std::string& one : details.paragraphs) out += fmt::format("- {}\n", one);
+  return out + "\n";
+}
+
 std::string cell(std::string text) {
   for (std::size_t at = 0; (at = text.find('|', at)) != std::string::npos; at += 2)
     text.replace(at, 1, "\\|");
@@ -45,6 +51,7 @@ std::string toMarkdown(const Report& report) {
     for (const Block& block : section.blocks) {
       if (const auto* table = std::get_if<TableBlock>(&block)) out += markdown(*table);
       if (const auto* words = std::get_if<Paragraph>(&block)) out += markdown(*words);
+      if (const auto* details = std::get_if<Details>(&block)) out += markdown(*details);
     }
   }
   out.pop_back();  // one line's end is enough at the end of a file

@@ -223,7 +223,7 @@ Result<Report> judgeTables(const std::vector<TableJob>& jobs) {
   section.blocks.push_back(figureOf(traits, *kind));
   section.blocks.push_back(traitTable(traits));
   if (!traits.untold.empty())
-    section.blocks.push_back(Details{"What these tables cannot tell", traits.untold});
+    section.blocks.push_back(whatIsNotTold("What these tables cannot tell", traits));
   report.sections.push_back(std::move(section));
   report.data.set("kind", kind->name)
       .set("characteristics", toJson(traits))

@@ -264,7 +264,7 @@ Result<Finding> judgeRun(const ComparedRun& run) {
   if (!rest.rows.empty()) blocks.push_back(std::move(rest));
   if (auto again = againTable(run); !again.rows.empty()) blocks.push_back(std::move(again));
   if (!traits.traits.empty()) blocks.push_back(traitTable(traits));
-  if (!traits.untold.empty()) blocks.push_back(Details{"What these captures cannot tell", traits.untold});
+  if (!traits.untold.empty()) blocks.push_back(whatIsNotTold("What these captures cannot tell", traits));
   blocks.push_back(regionTable(c));
   blocks.push_back(maskTable(c));
   blocks.push_back(captureTable(run));

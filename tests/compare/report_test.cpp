@@ -98,6 +98,10 @@ TEST(Report, LetsNamesInATablesHeaderBreak) {
   EXPECT_THAT(page, HasSubstr("<td>a_b</td>"));
 }
 
+TEST(Report, HasInItsWordsWhatIsClosedOnThePage) {
+  EXPECT_THAT(toMarkdown(example()), HasSubstr("more:\n\n- text\n"));
+}
+
 TEST(Report, IsWrittenWithItsNumbers) {
   const auto folder = std::filesystem::path{testing::TempDir()} / "report_test" / "deep";
   std::filesystem::remove_all(folder);

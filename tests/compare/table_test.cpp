@@ -123,6 +123,21 @@ TEST_F(Table, OfScanLinesTellsFlyingPixels) {
   EXPECT_DOUBLE_EQ(rows->at(0).find("value")->number(), 0.75);
 }
 
+/// 3 m of the 9.37 m of 16 MHz.
+TEST_F(Table, SaysInItsWordsWhichWavesItsDistancesAreTooShortFor) {
+  std::string text = "distance_m,error_mm\n";
+  for (int i = 0; i < 120; ++i) text += fmt::format("{},{}\n", 0.5 + 0.0252 * i, i % 3 - 1);
+  const auto report = judgeTables({{.file = write("errors.csv", text),
+                                    .kind = "harmonics",
+                                    .columns = {"distance_m", "error_mm"},
+                                    .frequency_hz = {16e6}}});
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_THAT(toMarkdown(*report),
+              testing::ContainsRegex("What these tables cannot tell \\(1\\):\n\n- harmonics of A: "
+                                     "waves of .*1 per period are not told.* 0.32 of the period of 16 MHz, "
+                                     "9.37 m; up to 9.87 m"));
+}
+
 /// The thesis' series of a Kinect v2 that warms up: by nearly four millimetres, as its README says.
 TEST_F(Table, OfAPublishedSeriesTellsItsDrift) {
   const auto data = findThesisData();
