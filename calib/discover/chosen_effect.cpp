@@ -79,6 +79,8 @@ double correlationOf(const Part& prepared, const Group& a, const Group& b) {
 }
 
 constexpr double kAlike = 0.5;  ///< correlation of two curves that may be one
+constexpr double kTheSame =
+    1.0 - 0.0025;  ///< its square of two that are one: a twentieth of their size is not
 
 double curveAt(const TermGroup& group, const std::vector<double>& coefficient,
                const std::map<std::string, double>& at) {
@@ -179,6 +181,8 @@ Effect effectOf(const Context& context, const std::vector<Explanation>& all, std
     const double correlation = correlationOf(prepared, *in_marginal[0], *in_marginal[s]);
     // Curves that have little in common explain different things, of which one may be nothing.
     if (!mine.is_catalogue && !other.is_catalogue && std::abs(correlation) < kAlike) continue;
+    // A formula that is the effect's own is no other explanation.
+    if (mine.named && !other.is_catalogue && correlation * correlation > kTheSame) continue;
     Alternative alternative{other.name,
                             other.covariates,
                             other.fitted.group,

@@ -11,6 +11,9 @@
 namespace toftwin::discover {
 namespace {
 
+/// Of what an effect explains: the light of a strong one's simulation is not known that well.
+constexpr double kHundredth = 0.01;
+
 /// The best of M explanations is better than it is by about 2 ln M in χ², by chance alone (D. P. Foster,
 /// E. I. George, Ann. Stat. 22 (1994) 1947). At least that of one number at two standard errors.
 double luckOfTheBestOf(std::size_t tried) {
@@ -88,7 +91,6 @@ bool leavesSomething(const Context& with, const Explanation& effect) {
 /// (The light of a strong effect's simulation is not known that well. And a formula that is the effect's own
 /// leaves what it leaves.)
 bool saysMore(const Context& with, const Explanation& rival, const Explanation& effect, std::size_t tried) {
-  constexpr double kHundredth = 0.01;
   const std::vector<TermGroup> groups{rival.fitted.group};
   const Part part = prepare(with, groups, false);
   const std::size_t place = part.marginal.groups.size() - 1;
@@ -157,7 +159,8 @@ std::optional<std::size_t> chooseNamed(const Context& context, std::vector<Expla
       one.refused = "it would have to be stronger than it can be";
     else if (!holds(gain))
       one.refused = "it does not predict other captures";
-    else if (generic && isWorseThan(all[*generic], curves))
+    else if (generic && isWorseThan(all[*generic], curves) &&
+             all[*generic].gain.total - one.gain.total > kHundredth * one.gain.total)
       one.refused = "a curve that goes with " + all[*generic].name + by(all[*generic]);
     else if (chosen && isWorseThan(all[*chosen], named.size()))
       one.refused = all[*chosen].name + by(all[*chosen]);

@@ -119,6 +119,12 @@ TEST_F(BeforeSearch, AModelOfAnotherFrequencyIsNotSearchedWith) {
     ASSERT_TRUE(model) << model.error().message;
     EXPECT_EQ(static_cast<bool>(checkFrequencies(*campaign, *model)), is_same) << mhz;
   }
+  // Nor is one that measures with another besides.
+  std::string two = tinyCamera();
+  two.insert(two.find("[sampling]"),
+             "[[modulation]]\nfrequency_mhz = 80.0\ncontrast = 0.5\nexposure_us = 500.0\n");
+  write("camera.toml", two);
+  EXPECT_THAT(errorOf(job()), AllOf(HasSubstr("modulation at 30 MHz"), HasSubstr("80 MHz")));
 }
 
 TEST_F(BeforeSearch, APresetMayBeNamedAsInfoNamesIt) {

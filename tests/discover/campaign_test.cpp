@@ -91,6 +91,15 @@ TEST_F(Searched, WhatMovesTheRangeAndDimsTheLightAlongOneCovariateIsOneEffect) {
   EXPECT_TRUE(finding.effects.front().fitted) << "what it does to the range can be written";
 }
 
+/// Which is a line in ln A: not something else that it may be.
+TEST_F(Searched, AFormulaThatIsTheEffectsOwnIsNoOtherAnswer) {
+  simulate("[[effect]]\ntype = 'time_walk'\nper_e_fold_mm = 4.0\n");
+  const CampaignFinding finding = search(job());
+  ASSERT_THAT(namesOf(finding), ElementsAre("time_walk")) << verdictOf(finding);
+  for (const Alternative& other : finding.effects.front().found.alternatives)
+    EXPECT_TRUE(other.group.terms.empty()) << other.name;
+}
+
 TEST_F(Searched, AWrongNumberOfADeclaredEffectIsAnUpdateAndNoNewEffect) {
   simulate("[[effect]]\ntype = 'clock_scale'\nppm = 5000.0\n");
   write("camera.toml", tinyCamera("[[effect]]\ntype = 'clock_scale'\nppm = 1000.0\n"));
@@ -118,14 +127,6 @@ TEST_F(Searched, AChargeInAnotherRawExposureThanTheFileSaysIsNamedByItsPlace) {
   ASSERT_TRUE(model) << model.error().message;
   EXPECT_EQ(std::ranges::count(model->effectNames(), std::string{"sample_offset"}), 2);
   EXPECT_GT(finding.judgement->removed, 0.95);
-}
-
-/// So strong that light, poses and what is left of second order show a hundred times above the noise.
-TEST_F(Searched, AStrongEffectIsNamedThoughNotAllOfItIsExplained) {
-  simulate("[[effect]]\ntype = 'vignetting'\nexponent = 2.0\n");
-  const CampaignFinding finding = search(job());
-  EXPECT_THAT(namesOf(finding), ElementsAre("vignetting")) << verdictOf(finding);
-  EXPECT_GT(finding.judgement->removed, 0.99) << verdictOf(finding);
 }
 
 /// Light from other pixels shows like nothing else. Of what is left in the catalogue a ghost image comes nearest,

@@ -71,14 +71,16 @@ Result<> checkCanWrite(const std::filesystem::path& folder) {
 }
 
 Result<> checkFrequencies(const Campaign& campaign, const sim::SensorModel& model) {
-  constexpr double kSame = 1e-3;  // crystals differ by a tenth of that
+  const auto areAmong = [](const std::vector<double>& some, const std::vector<double>& all) {
+    constexpr double kSame = 1e-3;  // crystals differ by a tenth of that
+    return std::ranges::all_of(some, [&](double frequency) {
+      return std::ranges::any_of(all, [&](double one) { return std::abs(frequency - one) <= kSame * one; });
+    });
+  };
   const std::vector<double> own = frequenciesIn(model.exposures({}));
   for (const MeasuredCapture& capture : campaign.captures) {
     const std::vector<double> stated = frequenciesIn(capture.moment.exposures);
-    const bool is_own = std::ranges::all_of(stated, [&](double frequency) {
-      return std::ranges::any_of(own, [&](double one) { return std::abs(frequency - one) <= kSame * one; });
-    });
-    if (is_own) continue;
+    if (stated.empty() || (areAmong(stated, own) && areAmong(own, stated))) continue;
     return Error{
         Error::Code::InvalidArgument,
         fmt::format(
