@@ -90,8 +90,8 @@ void addTiming(const ComparedRun& run, std::size_t camera, TraitCollector& all) 
 void addWraps(const Captures& walls, std::size_t camera, TraitCollector& all) {
   std::vector<double> shares;
   for (const ComparedCapture* one : walls) {
-    const auto& cells = one->seen[camera].wall_wrapped;
-    if (!cells.empty()) shares.push_back(compare::summarise(cells).mean);
+    const CameraSeen& seen = one->seen[camera];
+    if (seen.wall_readings > 0.0) shares.push_back(seen.wall_wraps / seen.wall_readings);
   }
   all.add("wraps", kNames[camera], compare::wrapTraits(shares));
 }

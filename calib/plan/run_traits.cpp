@@ -6,9 +6,11 @@
 #include <cmath>
 #include <functional>
 #include <map>
+#include <set>
 #include <utility>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "calib/compare/live_report.h"
 #include "calib/compare/statistics.h"
@@ -154,6 +156,25 @@ void addDifference(const ComparedCapture& one, OverDistance& rows) {
   rows.add(one.record.number, at, of);
 }
 
+/// Captures of the distance block for a fit of waves. What wraps in part is told as wraps, and left out.
+Captures unwrapped(const Captures& captures, const std::string& whose,
+                   const std::function<bool(const ComparedCapture&)>& is_wrapped, TraitCollector& all) {
+  Captures chosen;
+  std::set<std::string> names;
+  for (const ComparedCapture* one : captures) {
+    if (!is_wrapped(*one))
+      chosen.push_back(one);
+    else
+      names.insert(one->record.name);
+  }
+  if (names.empty()) return chosen;
+  all.untold(fmt::format(
+      "harmonics of {} at {}: {} of {} captures are left out, in which over 1 % of the wall is off by a "
+      "whole period (see wraps)",
+      whose, fmt::join(names, "; "), captures.size() - chosen.size(), captures.size()));
+  return chosen;
+}
+
 void addHarmonics(const ComparedRun& run, TraitCollector& all) {
   const Captures captures = capturesOf(run, "distance");
   if (captures.empty()) return;
@@ -164,15 +185,20 @@ void addHarmonics(const ComparedRun& run, TraitCollector& all) {
                            wordsOf(of_a), wordsOf(of_b)));
   } else {
     OverDistance rows;
-    for (const ComparedCapture* one : captures) addDifference(*one, rows);
+    const auto eitherWraps = [](const ComparedCapture& one) {
+      return std::ranges::any_of(one.seen, isWrapped);
+    };
+    for (const ComparedCapture* one : unwrapped(captures, "B − A", eitherWraps, all))
+      addDifference(*one, rows);
     all.add("harmonics", "B − A",
             compare::fittedHarmonics(rows.distance_m, rows.error_mm, of_a, rows.capture));
   }
   for (std::size_t camera : {std::size_t{0}, std::size_t{1}}) {
     OverDistance rows;
-    for (const ComparedCapture* one : captures)
+    const auto wraps = [camera](const ComparedCapture& one) { return isWrapped(one.seen[camera]); };
+    for (const ComparedCapture* one : unwrapped(captures, kSides[camera].name, wraps, all))
       rows.add(one->record.number, one->seen[camera].wall_range_m, one->seen[camera].wall_error_mm);
-    if (rows.distance_m.empty()) continue;  // no wall, or a pose by planes: said elsewhere
+    if (rows.distance_m.empty()) continue;  // no wall, a pose by planes, or all wrapped: said elsewhere
     if (run.frequency_hz[camera].empty()) {
       all.untold(fmt::format("harmonics of {}: its frames say no modulation frequency", kSides[camera].name));
       continue;

@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <numbers>
+#include <numeric>
 
 #include "calib/intrinsics/brightness.h"
 #include "calib/plan/place.h"
@@ -16,6 +18,7 @@ namespace {
 constexpr float kNaNf = std::numeric_limits<float>::quiet_NaN();
 constexpr int kCell = 8;                 ///< pixels along a side
 constexpr double kGross_mm = 300.0;      ///< as in comparing: another surface, or another period
+constexpr double kFewWraps = 0.01;       ///< of a wall's readings; more shift the mean of the rest
 constexpr int kMiddle = 96;              ///< pixels along a side that the noise is taken from
 constexpr double kBoardReach_m = 0.9;    ///< of a corner's boards, which are 1 m or wider
 constexpr double kBoardHeight_m = 0.35;  ///< to either side of the middle
@@ -25,33 +28,82 @@ const BlockSpec* blockOf(const Plan& plan, const CaptureRecord& record) {
   return found == plan.blocks.end() ? nullptr : &*found;
 }
 
-/// Cells of the wall that are valid in most pixels and not gross.
-void addWall(const compare::Stack& stack, const Image<float>& expected_m,
-             std::span<const double> frequency_hz, CameraSeen& seen) {
+/// Lengths that a range may be off by as a whole: the shortest frequency's period, and c / 2 gcd(f), where
+/// the ranges of all frequencies together begin anew. 0 where no frequency is known.
+struct Periods {
+  double shortest_m = 0.0, common_m = 0.0;
+
+  explicit Periods(std::span<const double> frequency_hz) {
+    if (frequency_hz.empty()) return;
+    std::int64_t common_khz = 0;
+    for (const double f : frequency_hz)
+      common_khz = std::gcd(common_khz, std::int64_t{std::llround(1e-3 * f)});
+    shortest_m = unambiguousRange(frequency_hz.back() * hertz).in(metre);
+    common_m =
+        common_khz > 0 ? unambiguousRange(1e3 * static_cast<double>(common_khz) * hertz).in(metre) : 0.0;
+  }
+  static double off(double error_m, double period_m) {
+    return period_m > 0.0 ? std::round(error_m / period_m) : 0.0;
+  }
+};
+
+/// A cell's readings of all frames, by the wall that the plan puts there. Of frames, not of their mean: a
+/// pixel that wraps in some of them has a mean of no meaning.
+struct CellReadings {
+  double all = 0.0, there = 0.0, of_wall = 0.0, wrapped = 0.0, beyond = 0.0;
+
+  void add(double error_m, const Periods& periods) {
+    ++all;
+    if (!std::isfinite(error_m)) return;
+    const double turns = Periods::off(error_m, periods.common_m);
+    ++there, wrapped += Periods::off(error_m, periods.shortest_m) != 0.0, beyond += turns != 0.0;
+    of_wall += std::abs(error_m - turns * periods.common_m) <= 1e-3 * kGross_mm;
+  }
+  /// Where all is another surface, as a floor beside a wall of no size, nothing is said.
+  [[nodiscard]] bool isWall(std::size_t frames) const {
+    return 2.0 * there >= all && of_wall >= 4.0 * static_cast<double>(frames);
+  }
+};
+
+CellReadings readingsOf(const std::vector<ReadFrame>& frames, const Image<float>& expected_m, int left,
+                        int top, const Periods& periods) {
+  CellReadings cell;
+  for (const ReadFrame& frame : frames) {
+    for (int y = top; y < std::min(top + kCell, expected_m.height()); ++y) {
+      for (int x = left; x < std::min(left + kCell, expected_m.width()); ++x)
+        cell.add(static_cast<double>(frame.range_m(x, y)) - static_cast<double>(expected_m(x, y)), periods);
+    }
+  }
+  return cell;
+}
+
+/// Cells of the wall that are valid in most pixels: their wraps, and the errors of what is not gross.
+void addWall(const compare::Stack& stack, const std::vector<ReadFrame>& frames,
+             const Image<float>& expected_m, std::span<const double> frequency_hz, CameraSeen& seen) {
   const Image<float> range = stack.meanRange_m(), amplitude = stack.meanAmplitude();
-  const double period_m =
-      frequency_hz.empty() ? 0.0 : unambiguousRange(frequency_hz.back() * hertz).in(metre);
+  const Periods periods{frequency_hz};
   const Veil veil{range, amplitude, frequency_hz};
   seen.wall_veil_mm.resize(frequency_hz.size());
   for (int top = 0; top < range.height(); top += kCell) {
     for (int left = 0; left < range.width(); left += kCell) {
-      double e_sum = 0.0, r_sum = 0.0, a_sum = 0.0, count = 0.0, wrapped = 0.0, there = 0.0, all = 0.0;
+      const CellReadings cell = readingsOf(frames, expected_m, left, top, periods);
+      if (!cell.isWall(frames.size())) continue;
+      seen.wall_readings += cell.there, seen.wall_wraps += cell.wrapped, seen.wall_beyond += cell.beyond;
+      // The rest of a cell that wraps in part is what noise made too near: its mean says nothing of the
+      // camera.
+      if (cell.beyond > kFewWraps * cell.there) continue;
+      double e_sum = 0.0, r_sum = 0.0, a_sum = 0.0, count = 0.0;
       for (int y = top; y < std::min(top + kCell, range.height()); ++y) {
         for (int x = left; x < std::min(left + kCell, range.width()); ++x) {
-          ++all;
           const double e = 1e3 * static_cast<double>(range(x, y) - expected_m(x, y));
-          if (!std::isfinite(e)) continue;
-          ++there;
-          if (period_m > 0.0 && std::round(e / (1e3 * period_m)) != 0.0) ++wrapped;
-          if (std::abs(e) > kGross_mm) continue;
+          if (!(std::abs(e) <= kGross_mm)) continue;
           e_sum += e, r_sum += static_cast<double>(expected_m(x, y)), ++count;
           a_sum += amplitude.empty() ? 0.0 : static_cast<double>(amplitude(x, y));
         }
       }
-      if (2.0 * there < all || count < 4.0) continue;
+      if (count < 4.0) continue;
       seen.wall_range_m.push_back(r_sum / count), seen.wall_error_mm.push_back(e_sum / count);
       seen.wall_amplitude.push_back(amplitude.empty() ? std::nan("") : a_sum / count);
-      seen.wall_wrapped.push_back(wrapped / there);
       addVeil(veil, seen);
     }
   }
@@ -105,6 +157,8 @@ void leaveOutErrors(CameraSeen& seen) {
 }
 
 }  // namespace
+
+bool isWrapped(const CameraSeen& seen) { return seen.wall_beyond > kFewWraps * seen.wall_readings; }
 
 bool isPoseFromPlanes(const CaptureRecord& record) { return record.pose_by == "planes"; }
 
@@ -164,7 +218,7 @@ CameraSeen seenOf(const Plan& plan, const CaptureRecord& record, const compare::
     case Kind::Exposure:
     case Kind::Tilt: {
       const auto expected = wallRange_m(plan, *block, stack.camera(), *pose);
-      addWall(stack, expected, frequency_hz, seen);
+      addWall(stack, frames, expected, frequency_hz, seen);
       if (block->kind != Kind::Tilt) addNoise(frames, expected, seen);
       break;
     }

@@ -22,8 +22,11 @@ namespace toftwin::plan {
 struct CameraSeen {
   std::vector<double> starts_s{};    ///< of each frame, device clock; empty where unknown
   std::vector<double> brightness{};  ///< mean amplitude of the image's middle, frame by frame
-  /// Cells of 8 × 8 pixels of a wall: expected range, error, amplitude, and the share of pixels that wrapped.
-  std::vector<double> wall_range_m{}, wall_error_mm{}, wall_amplitude{}, wall_wrapped{};
+  /// Cells of 8 × 8 pixels of a wall: expected range, error and amplitude.
+  std::vector<double> wall_range_m{}, wall_error_mm{}, wall_amplitude{};
+  /// Readings of a wall, frame by frame: how many, and of them off by whole periods of the highest frequency,
+  /// and of all frequencies together.
+  double wall_readings = 0.0, wall_wraps = 0.0, wall_beyond = 0.0;
   std::vector<compare::Trait> noise{};  ///< of the frames' errors at the middle of the image
   std::vector<double> corner_place_m{}, corner_range_m{}, corner_error_mm{};
   /// By how much a veil of 1 would move the wall's cells, a column for each frequency beside the wall's; NaN
@@ -44,15 +47,18 @@ struct ReadFrame {
   double brightness = 0.0;
 };
 
+/// Whether so much of the wall is a period or more farther than the camera can tell that the rest of it,
+/// which noise made too near, does not stand for the camera's errors.
+bool isWrapped(const CameraSeen& seen);
 /// Whether the pose was fitted to A's own ranges of the plan's planes: a wall's errors along its normal are in the pose then,
 /// and what is left of them says nothing of the camera.
 bool isPoseFromPlanes(const CaptureRecord& record);
 /// What of a frame seenOf() needs.
 Result<ReadFrame> readOf(const Frame& frame);
 /// What such blocks give; NaN and empty columns where the plan does not say what stands there. Where
-/// isPoseFromPlanes(), no errors against walls: their columns are empty but for wall_wrapped, which is off by
-/// periods. `frequency_hz`: of modulation, ascending; empty where it is not known. `own_pose`: where the
-/// camera saw itself, if that is not the pose that its frames say.
+/// isPoseFromPlanes(), no errors against walls: their columns are empty; wall_wraps, which are off by
+/// periods, are counted nevertheless. `frequency_hz`: of modulation, ascending; empty where it is not known.
+/// `own_pose`: where the camera saw itself, if that is not the pose that its frames say.
 CameraSeen seenOf(const Plan& plan, const CaptureRecord& record, const compare::Stack& stack,
                   const std::vector<ReadFrame>& frames, std::span<const double> frequency_hz,
                   const std::optional<Transform<World, Camera>>& own_pose = std::nullopt);

@@ -125,7 +125,7 @@ void addBehind(const Image<float>& range_m, const Image<float>& wall_m, const Im
       }
       if (count < 0.75 * kCells * kCells) continue;
       seen.wall_range_m.push_back(r / count), seen.wall_error_mm.push_back(e / count);
-      seen.wall_amplitude.push_back(a / count), seen.wall_wrapped.push_back(0.0);
+      seen.wall_amplitude.push_back(a / count);
       addVeil(veil, seen);
     }
   }

@@ -344,17 +344,20 @@ TEST(Seen, LeavesErrorsOutWhereThePoseWasFittedToTheCamerasOwnPlanes) {
   CaptureRecord record{.block = "b", .kind = "distance"};
   record.pose_by = "rig";
   const std::vector<double> frequency_hz{kFrequency_hz};
-  const CameraSeen by_rig = seenOf(plan, record, stack, {}, frequency_hz);
+  const std::vector<ReadFrame> frames{*readOf(frame)};
+  const CameraSeen by_rig = seenOf(plan, record, stack, frames, frequency_hz);
+  EXPECT_GT(by_rig.wall_readings, 0.0);
   ASSERT_FALSE(by_rig.wall_error_mm.empty());
   EXPECT_NEAR(by_rig.wall_error_mm.front(), 5.0, 0.01);
   // From where it saw itself, 3 mm behind, the wall is as much farther.
   const Transform<World, Camera> behind{{1.0, 0.0, 0.0, 0.0}, {0.0, 0.0, -0.003}};
-  const CameraSeen by_itself = seenOf(plan, record, stack, {}, frequency_hz, behind);
+  const CameraSeen by_itself = seenOf(plan, record, stack, frames, frequency_hz, behind);
   EXPECT_NEAR(by_itself.wall_error_mm.front(), 5.0 - 3.0 / rayThroughPixel(frame.camera, 3.5, 3.5).v.z, 0.2);
   record.pose_by = "planes";
-  const CameraSeen by_planes = seenOf(plan, record, stack, {}, frequency_hz);
+  const CameraSeen by_planes = seenOf(plan, record, stack, frames, frequency_hz);
   EXPECT_TRUE(by_planes.wall_error_mm.empty() && by_planes.wall_range_m.empty());
-  EXPECT_EQ(by_planes.wall_wrapped, by_rig.wall_wrapped);
+  EXPECT_EQ(by_planes.wall_readings, by_rig.wall_readings);
+  EXPECT_EQ(by_planes.wall_wraps, by_rig.wall_wraps);
   ComparedRun run = plantedRun();
   run.captures.front().record.pose_by = "planes";
   EXPECT_THAT(traitsOf(run).untold,
