@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "calib/compare/traits/difference.h"
+
 namespace toftwin::compare {
 
 void TraitCollector::add(const std::string& what, const std::string& of, const Traits& traits,
@@ -48,6 +50,14 @@ void TraitCollector::add(NamedRows rows, const Result<DriftTraits>& drift) {
   draw(std::move(rows));
 }
 
+namespace {
+
+std::string endOf(const Trait& trait, double end) {
+  return isKnown(end, trait.unit) ? fmt::format("{:.4g}", end) : "not known";
+}
+
+}  // namespace
+
 TableBlock traitTable(const NamedTraits& traits, const std::string& a, const std::string& b) {
   TableBlock table{
       "Characteristics, with the intervals that are to hold them with 95 % and, behind a #, the number of "
@@ -70,8 +80,8 @@ TableBlock traitTable(const NamedTraits& traits, const std::string& a, const std
     table.rows[row][of == "A"   ? 3
                     : of == "B" ? 4
                                 : 5] =
-        fmt::format("{:.4g} ({:.4g} to {:.4g}) #{}{}{}", trait.value, trait.low, trait.high, trait.n,
-                    detail.empty() ? "" : ", ", detail);
+        fmt::format("{:.4g} ({} to {}) #{}{}{}", trait.value, endOf(trait, trait.low),
+                    endOf(trait, trait.high), trait.n, detail.empty() ? "" : ", ", detail);
   }
   return table;
 }

@@ -45,7 +45,8 @@ std::string plainNameOf(const TraitVerdict& one) {
 }
 
 std::string intervalOf(const Trait& one) {
-  return fmt::format("{} ({} to {})", number(one.value), number(one.low), number(one.high));
+  const auto end = [&](double value) { return isKnown(value, one.unit) ? number(value) : "not known"; };
+  return fmt::format("{} ({} to {})", number(one.value), end(one.low), end(one.high));
 }
 
 std::string shownOf(const std::optional<NamedTrait>& one) {
@@ -75,7 +76,8 @@ std::size_t countOf(const std::vector<TraitVerdict>& all, bool differs) {
 }  // namespace
 
 bool TraitVerdict::isTold() const {
-  return std::isfinite(difference.value) && std::isfinite(difference.low) && std::isfinite(difference.high);
+  const auto known = [&](double end) { return isKnown(end, difference.unit); };
+  return known(difference.value) && known(difference.low) && known(difference.high);
 }
 
 double TraitVerdict::floor() const {
@@ -134,8 +136,8 @@ TableBlock verdictTable(const std::vector<TraitVerdict>& all) {
       {}};
   for (const TraitVerdict& one : all) {
     const std::string unit = unitOf(one).empty() ? "" : fmt::format(" [{}]", one.difference.unit);
-    table.rows.push_back({nameOf(one) + unit, verdictOf(one), intervalOf(one.difference), number(one.floor()),
-                          shownOf(one.a), shownOf(one.b)});
+    table.rows.push_back({nameOf(one) + unit, verdictOf(one), intervalOf(one.difference),
+                          one.isTold() ? number(one.floor()) : "–", shownOf(one.a), shownOf(one.b)});
   }
   return table;
 }

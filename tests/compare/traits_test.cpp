@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Characteristics from series and frames: what no coverage shows.
+#include "planted.h"
 #include "calib/compare/traits/traits.h"
 
 #include <gmock/gmock.h>
@@ -64,6 +65,43 @@ TEST(FittedCurves, GoThroughTheRows) {
     EXPECT_NEAR(law->curve.at(signal[i]), sigma[i], 1e-3 * sigma[i]);
   }
   EXPECT_NEAR(drift->curve.at(t.back()) - drift->curve.at(t.front()), drift->traits.front().value, 1e-9);
+}
+
+/// Neither a step nor two of them, of whatever time constant; within the 5 % that BIC errs (1 to 2 %
+/// measured).
+TEST(DriftTraits, ChooseOneExponentialForOne) {
+  for (const double tau : {30.0, 40.0, 50.0, 60.0, 150.0, 600.0}) {
+    int others = 0;
+    for (unsigned seed = 1; seed <= 60; ++seed) {
+      Noise noise{seed};
+      std::vector<double> t, y;
+      for (int i = 0; i < 90; ++i) {
+        t.push_back(10.0 * i);
+        y.push_back(900.0 + 8.0 * (1.0 - std::exp(-t.back() / tau)) + noise(0.3));
+      }
+      const auto drift = driftTraits(t, y);
+      ASSERT_TRUE(drift) << tau << ' ' << seed;
+      others += drift->model != DriftModel::OneExponential;
+      EXPECT_NE(drift->model, DriftModel::Step) << tau << ' ' << seed;
+    }
+    EXPECT_LE(others, 3) << tau;
+  }
+}
+
+/// Of half a time constant nothing is known from a series so short: no end that rows cannot show is printed.
+TEST(DriftTraits, SayWhichEndOfATimeConstantIsNotKnown) {
+  std::vector<double> t, y;
+  for (int i = 0; i < 40; ++i) {
+    t.push_back(10.0 * i);
+    y.push_back(8.0 * (1.0 - std::exp(-t.back() / 800.0)) + (i % 2 == 0 ? 0.12 : -0.12));
+  }
+  const auto drift = driftTraits(t, y);
+  ASSERT_TRUE(drift);
+  for (const Trait& one : drift->traits) {
+    if (one.unit != "s") continue;
+    EXPECT_FALSE(one.low < 10.0) << one.low;
+    EXPECT_FALSE(one.high > 20.0 * 390.0) << one.high;
+  }
 }
 
 /// y = 2 + 3 x exactly at five places but for ±1 that is orthogonal to both: s² = 4/3, var(slope) = s²/Σx² =

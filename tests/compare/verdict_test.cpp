@@ -49,6 +49,30 @@ TEST(Verdict, CallsNothingDifferentWhoseIntervalIsNotKnown) {
   EXPECT_TRUE(cardsOf(all).empty());
 }
 
+TEST(Verdict, IsNotToldByAnIntervalFartherThanAnyCameraReads) {
+  const NamedTraits traits{
+      .traits = {of("A", "noise law", 0.606, 0.2, 3e23), of("B", "noise law", 0.0114, 0.0, 0.4)}};
+  const auto all = verdictsOf(traits);
+  EXPECT_FALSE(all.front().isTold());
+  EXPECT_THAT(verdictTable(all).rows[0][1], HasSubstr("not told"));
+  EXPECT_THAT(verdictTable(all).rows[0][2], HasSubstr("not known"));
+  EXPECT_THAT(traitTable(traits, "a", "b").rows[0][3], HasSubstr("0.606 (0.2 to not known)"));
+}
+
+/// A simulated camera's frames every 50 ms, whose seconds are rounded elsewhere in one of two runs.
+TEST(Verdict, CallsNoJitterDifferentThatIsRounding) {
+  NamedTraits traits;
+  for (const auto& [whose, first] : {std::pair{"A", 0.0}, {"B", 1000.0}}) {
+    std::vector<double> starts;
+    for (int i = 0; i < 60; ++i) starts.push_back(first + 0.05 * i);
+    const auto timing = timingTraits(starts);
+    ASSERT_TRUE(timing);
+    for (const Trait& one : *timing) traits.traits.push_back({"frame timing", "", whose, one});
+  }
+  for (const TraitVerdict& one : verdictsOf(traits))
+    EXPECT_TRUE(one.isTold() && !one.differs()) << one.difference.name;
+}
+
 TEST(Verdict, TakesWhatWasToldOfTheDifferenceAsItIs) {
   NamedTrait residual = of("B − A", "harmonics", 2.0, 1.9, 2.1);
   residual.trait.name = "residual";

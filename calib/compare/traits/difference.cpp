@@ -12,7 +12,13 @@ namespace {
 constexpr double kLevel = 0.95;
 constexpr double kManyDegrees = 1e6;  ///< Student's quantile is the normal one there
 
+constexpr double kFarthest_mm = 1e5;  ///< no camera reads 100 m
+
 }  // namespace
+
+bool isKnown(double end, const std::string& unit) {
+  return std::isfinite(end) && (unit != "mm" || std::abs(end) < kFarthest_mm);
+}
 
 Trait differenceOf(const Trait& first, const Trait& second, double wider) {
   Trait d{.name = second.name, .unit = second.unit, .value = second.value - first.value};

@@ -18,4 +18,8 @@ double widenedFor(std::size_t count);
 /// The interval of a number, widened on both sides.
 Trait widened(Trait one, double wider);
 
+/// Whether an end of an interval says something: a number, and of lengths no more than any of the cameras
+/// reads.
+bool isKnown(double end, const std::string& unit);
+
 }  // namespace toftwin::compare
