@@ -125,11 +125,43 @@ std::vector<std::uint32_t> placesOf(const std::vector<PoseComparison>& poses) {
   return place;
 }
 
-Image<std::uint8_t> edgesOf(const Image<float>& range, double jump, int radius) {
+Image<float> noiseOfMean(const Image<float>& temporal_noise, std::size_t frames) {
+  constexpr int kAround = 2;
+  Image<float> noise(temporal_noise.width(), temporal_noise.height(), kNaN);
+  if (frames < 2) return noise;
+  // The median, as single pixels at an edge are far noisier: that of s² is below σ² (E. B. Wilson, M. M.
+  // Hilferty, PNAS 17 (1931) 684).
+  const double freedom = static_cast<double>(frames - 1), below = std::pow(1.0 - 2.0 / (9.0 * freedom), 1.5);
+  std::vector<float> near;
+  for (int y = 0; y < noise.height(); ++y) {
+    for (int x = 0; x < noise.width(); ++x) {
+      near.clear();
+      for (int v = std::max(0, y - kAround); v <= std::min(noise.height() - 1, y + kAround); ++v) {
+        for (int u = std::max(0, x - kAround); u <= std::min(noise.width() - 1, x + kAround); ++u) {
+          if (std::isfinite(temporal_noise(u, v))) near.push_back(temporal_noise(u, v));
+        }
+      }
+      if (near.empty()) continue;
+      const auto middle = near.begin() + static_cast<std::ptrdiff_t>(near.size() / 2);
+      std::nth_element(near.begin(), middle, near.end());
+      noise(x, y) =
+          static_cast<float>(static_cast<double>(*middle) / (below * std::sqrt(static_cast<double>(frames))));
+    }
+  }
+  return noise;
+}
+
+Image<std::uint8_t> edgesOf(const Image<float>& range, const Image<float>& noise, double jump, int radius) {
+  // Each jump of noise marks up to 30 pixels: at 5 σ, 6e-7 of them.
+  constexpr double kSigmas = 5.0;
   Image<std::uint8_t> edge(range.width(), range.height());
+  const auto noiseAt = [&](int x, int y) {
+    return noise.empty() || !std::isfinite(noise(x, y)) ? 0.0 : static_cast<double>(noise(x, y));
+  };
   const auto jumps = [&](int x, int y, int x2, int y2) {
     const auto a = static_cast<double>(range(x, y)), b = static_cast<double>(range(x2, y2));
-    return std::abs(a - b) > jump * std::min(a, b);  // false where one is NaN
+    const double least = jump * std::min(a, b) + kSigmas * std::hypot(noiseAt(x, y), noiseAt(x2, y2));
+    return std::abs(a - b) > least;  // false where one is NaN
   };
   const auto mark = [&](int cx, int cy) {
     for (int y = std::max(0, cy - radius); y <= std::min(range.height() - 1, cy + radius); ++y) {
@@ -191,7 +223,7 @@ Result<PoseComparison> comparePose(const Stack& a, const Stack& b) {
   result.noise_a_mm = scaled(a.temporalNoise_m(), 1e3F);
   result.valid_a = a.validShare();
   result.amplitude_a = a.meanAmplitude();
-  result.edge = edgesOf(result.range_a_mm);
+  result.edge = edgesOf(result.range_a_mm, noiseOfMean(result.noise_a_mm, a.frames()));
   result.flying_a = flyingPixelsOf(result.range_a_mm);
   result.difference_mm = Image<float>(a.camera().width, a.camera().height, kNaN);
   if (!amplitude_b.empty() && !result.amplitude_a.empty()) {

@@ -41,9 +41,14 @@ Result<PoseComparison> comparePose(const Stack& a, const Stack& b);
 /// model.
 std::string resamplingNote(const PoseComparison& pose);
 
-/// Pixels beside which the range jumps by more than `jump` of itself between neighbours, widened by
-/// `radius`: 1. Invalid pixels are no jump.
-Image<std::uint8_t> edgesOf(const Image<float>& range, double jump = 0.03, int radius = 2);
+/// Pixels beside which the range jumps by more than `jump` of itself between neighbours, and by more than
+/// noise may make it, widened by `radius`: 1. Invalid pixels are no jump. `noise`: σ of each range; empty or
+/// NaN: not known.
+Image<std::uint8_t> edgesOf(const Image<float>& range, const Image<float>& noise = {}, double jump = 0.03,
+                            int radius = 2);
+/// σ of each pixel's mean over so many frames: of the temporal noise of all pixels around it, as its own of a
+/// few frames is not known well enough. NaN for a single frame.
+Image<float> noiseOfMean(const Image<float>& temporal_noise, std::size_t frames);
 
 /// Valid pixels that hang between a near and a far surface: in the row or the column, the ranges
 /// two pixels to either side differ by more than `jump` of themselves and the pixel lies more than

@@ -263,12 +263,21 @@ Tone toneOfDifference(const Region& region) {
   return bias <= 3.0 * noise ? Tone::Fair : Tone::Bad;
 }
 
+/// Where less than half of the pixels are told of, how many.
+std::string shareInWords(const Characteristics& c) {
+  const std::size_t all = c.regions.empty() ? 0 : c.regions.front().difference_mm.n;
+  const std::size_t told = mainRegionOf(c).difference_mm.n;
+  if (2 * told >= all) return {};
+  return fmt::format(", which are only {} of all {} pixels compared", told, all);
+}
+
 std::string nearnessInWords(const std::string& a, const std::string& b, const Characteristics& c) {
   const Summary& all = mainRegionOf(c).difference_mm;
   return fmt::format(
-      "{} (B) is within {} mm of {} (A) for 95 % of the pixels on surfaces; on average it reads {}, and its "
+      "{} (B) is within {} mm of {} (A) for 95 % of the pixels on surfaces{}; on average it reads {}, and "
+      "its "
       "noise is {} times A's",
-      b, shown(all.p95_abs), a, inWords(all), shown(c.noise_ratio.median, 2));
+      b, shown(all.p95_abs), a, shareInWords(c), inWords(all), shown(c.noise_ratio.median, 2));
 }
 
 std::vector<Card> nearnessCards(const Characteristics& c, const std::string& bias_note, Tone tone) {

@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "calib/compare/drift.h"
+#include "calib/compare/statistics.h"
 
 namespace toftwin::compare {
 namespace {
@@ -222,6 +223,43 @@ TEST(Edges, AreFoundWithinTwoPixelsOfAJumpAndNowhereElse) {
   }
   const auto edge = edgesOf(range);
   for (int x = 0; x < 20; ++x) EXPECT_EQ(edge(x, 2), x >= 7 && x <= 12 ? 1 : 0) << x;
+}
+
+/// σ = 150 mm a frame, on walls at 1.5 m and 4.5 m: more than 3 % between neighbours is noise, the step is
+/// not.
+TEST(Edges, AreNotWhatNoiseMakesOfAWall) {
+  std::mt19937_64 random{20261123};
+  std::normal_distribution<double> noise_m{0.0, 0.15};
+  for (const std::size_t frames : {std::size_t{3}, std::size_t{6}, std::size_t{30}}) {
+    Image<float> mean(64, 48), noise(64, 48);
+    for (int y = 0; y < 48; ++y) {
+      for (int x = 0; x < 64; ++x) {
+        Running one;
+        for (std::size_t i = 0; i < frames; ++i) one.add((x < 32 ? 1.5 : 4.5) + noise_m(random));
+        mean(x, y) = static_cast<float>(one.mean()),
+                noise(x, y) = static_cast<float>(std::sqrt(one.variance()));
+      }
+    }
+    const Image<float> of_mean = noiseOfMean(noise, frames);
+    std::vector<double> all;
+    for (const float sigma : of_mean.pixels()) all.push_back(static_cast<double>(sigma));
+    // The median of 25 pixels' s has a σ of 5 to 13 %, and that of thousands of them is within a few of none.
+    const double truth = 0.15 / std::sqrt(static_cast<double>(frames));
+    EXPECT_NEAR(quantile(std::move(all), 0.5), truth, 0.05 * truth) << frames;
+    const auto edge = edgesOf(mean, of_mean), by_range_alone = edgesOf(mean);
+    std::size_t missed = 0, false_edges = 0, taken_for_edges = 0;
+    for (int y = 0; y < 48; ++y) {
+      for (int x = 0; x < 64; ++x) {
+        const bool is_step = x >= 29 && x <= 34;
+        missed += is_step && edge(x, y) == 0;
+        false_edges += !is_step && edge(x, y) != 0, taken_for_edges += !is_step && by_range_alone(x, y) != 0;
+      }
+    }
+    EXPECT_EQ(missed, 0u) << frames;
+    EXPECT_EQ(false_edges, 0u) << frames;
+    EXPECT_GT(taken_for_edges, 1000u) << frames;  // the test has something to tell apart
+  }
+  EXPECT_TRUE(std::isnan(noiseOfMean(Image<float>(4, 4, 1.0F), 1)(2, 2)));
 }
 
 TEST(FlyingPixels, HangBetweenSurfacesAndSharpEdgesHaveNone) {
