@@ -175,16 +175,19 @@ Result<Working> fitRobustly(const Target& target, std::vector<Sighting>& sightin
   return working;
 }
 
-/// Views square to the axis fit any focal length: it is known if its standard error is below a fifth of it.
+/// Views square to the axis fit any focal length: it is known if its 95 % interval, the one that is printed,
+/// is narrower than ± a fifth of it.
 Result<> checkFocalLength(const Estimate& estimate) {
   constexpr double kMostShare = 0.2;
-  const double error = estimate.uncertainty.from_corners[0] / estimate.bundle.lens[0];
-  const double from_views = estimate.uncertainty.from_views[0] / estimate.bundle.lens[0];
-  if (std::isfinite(error) && std::max(error, from_views) < kMostShare) return {};
-  return Error{Error::Code::InvalidArgument,
-               fmt::format("the focal length is only known to {:.0f} %: add views with the board tilted by 30 "
-                           "to 50 degrees, to the left, right, up and down",
-                           100.0 * std::max(error, from_views))};
+  const LensUncertainty& known = estimate.uncertainty;
+  const double most = std::max({known.half_width[0], known.from_corners[0], known.from_views[0]});
+  const double share = most / estimate.bundle.lens[0];
+  if (std::isfinite(known.half_width[0]) && std::isfinite(share) && share < kMostShare) return {};
+  return Error{
+      Error::Code::InvalidArgument,
+      fmt::format("the focal length is only known to ± {:.0f} %: add views with the board tilted by 30 "
+                  "to 50 degrees, to the left, right, up and down",
+                  100.0 * share)};
 }
 
 }  // namespace

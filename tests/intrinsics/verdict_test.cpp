@@ -154,6 +154,34 @@ TEST(BadInput, BoardsSquareToTheAxisDoNotTellTheFocalLength) {
   EXPECT_THAT(errorOf(std::move(seen), truth).message, HasSubstr("tilted"));
 }
 
+/// The interval that is printed is what a focal length is known to: between boards square to the axis and
+/// boards well tilted lies a ± of a fifth.
+TEST(BadInput, FocalLengthsKnownToAFifthOnlyAreRefused) {
+  const Truth truth = twoTerms();
+  int refused = 0, told = 0;
+  for (double tilt = 0.005; tilt < 0.5; tilt *= 1.12) {
+    std::mt19937_64 random{15};
+    std::vector<Sighting> seen;
+    for (const double turn : {-1.0, -0.4, 0.6, 1.0}) {
+      BoardPose pose;
+      pose.rotation =
+          Eigen::AngleAxisd(turn * tilt, Eigen::Vector3d(1.0, turn, 0.0).normalized()).toRotationMatrix();
+      pose.translation_mm = {-90.0 + 60.0 * turn, -60.0, 500.0};
+      seen.push_back(testing::sightingAt(truth, kFlat, pose, 0.3, random));
+    }
+    const auto result =
+        estimate(checkerboard(), seen, truth.size, {.model = LensModel::K1K2, .degree = 0, .folds = 0});
+    if (!result) {
+      ++refused;
+      continue;
+    }
+    ++told;
+    EXPECT_LT(result->uncertainty.half_width[0], 0.2 * result->bundle.lens[0]) << tilt;
+  }
+  EXPECT_GT(refused, 0);
+  EXPECT_GT(told, 0);
+}
+
 TEST(BadInput, ImagesOfAnotherSizeAreNamed) {
   Collector collector{checkerboard()};
   ASSERT_TRUE(collector.add(Sighting{.name = "a.png"}, {512, 424}).ok());
