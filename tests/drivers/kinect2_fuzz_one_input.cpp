@@ -34,8 +34,8 @@ constexpr unsigned kFrames = 3;
 std::vector<Bytes> imagesWithFooters() {
   const Bytes image(kImageBytes);
   std::vector<Bytes> all;
-  for (unsigned i = 0; i < kFrames * kImages; ++i)
-    all.push_back(withFooter(image, 0, i / kImages, i % kImages));
+  for (std::uint32_t frame = 0; frame < kFrames; ++frame)
+    for (std::uint32_t i = 0; i < kImages; ++i) all.push_back(withFooter(image, 0, frame, i));
   return all;
 }
 
