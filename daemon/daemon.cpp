@@ -316,7 +316,8 @@ void Daemon::Loop::stop() {
   asio::post(io_, [this] { beginStop(); });
 }
 
-/// Sources and recordings end first, so that clients are told how; then the clients are let go.
+/// Sources and recordings end first, so that clients are told how; then the clients are let go. A source may
+/// be a camera that a facade of this daemon is, which must be there to hear that it is left.
 void Daemon::Loop::beginStop() {
   if (std::exchange(is_stopping_, true)) return;
   notify::stopping();
@@ -325,7 +326,6 @@ void Daemon::Loop::beginStop() {
   boost::system::error_code ignored;
   for (const int number : {SIGTERM, SIGINT}) signals_.remove(number, ignored);
   signals_.cancel(ignored);
-  facades_.stop();
   std::vector<std::shared_ptr<void>> all;
   for (const Running& running : running_) {
     for (auto& thing : hub_.remove(running.name)) all.push_back(std::move(thing));
@@ -334,6 +334,7 @@ void Daemon::Loop::beginStop() {
   aside([this, gone = std::make_shared<std::vector<std::shared_ptr<void>>>(std::move(all))] {
     gone->clear();
     asio::post(io_, [this] {
+      facades_.stop();
       server_.shutDown({Error::Code::Stopped, "the daemon is stopping"}, [] {});
     });
   });

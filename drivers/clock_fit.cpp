@@ -14,6 +14,9 @@ constexpr double kSdPerMad = 1.4826;  // of a normal distribution
 constexpr double kLeastNoise_ns = 1.0;
 constexpr int kReweightings = 20;
 constexpr int kBehindIsAStep = 8;
+constexpr double kMostDrift =
+    1e-3 * 1e9;  // ns per s: no crystal is worse; frames that came in one burst would say more
+constexpr double kEarlySds = 6.0;  // a normal arrival is so early once in a thousand million
 
 double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -36,7 +39,7 @@ Line startingLine(const Values& x, const Values& y) {
     if (dx > 0.0) slopes.push_back((y[i + half] - y[i]) / dx);
   }
   Line line;
-  if (!slopes.empty()) line.b = median(std::move(slopes));
+  if (!slopes.empty()) line.b = std::clamp(median(std::move(slopes)), -kMostDrift, kMostDrift);
   for (std::size_t i = 0; i < x.size(); ++i) rest.push_back(y[i] - line.b * x[i]);
   line.a = median(std::move(rest));
   return line;
@@ -63,7 +66,7 @@ Line reweighted(const Line& line, double s, const Values& x, const Values& y) {
   }
   const double determinant = w * wxx - wx * wx;
   if (!(determinant > 0.0)) return line;
-  const double b = (w * wxy - wx * wy) / determinant;
+  const double b = std::clamp((w * wxy - wx * wy) / determinant, -kMostDrift, kMostDrift);
   return {(wy - b * wx) / w, b};
 }
 
@@ -120,51 +123,67 @@ std::optional<ClockFit::Estimate> ClockFit::estimate() const {
 DeviceTime DeviceClock::read(std::int64_t stamp_ns, SteadyTime arrived) {
   const std::int64_t arrived_ns =
       std::chrono::duration_cast<std::chrono::nanoseconds>(arrived.time_since_epoch()).count();
-  std::int64_t time_ns = stamp_ns + shift_ns_;
-  bool is_ordinary = true;
+  Reading reading{.time_ns = stamp_ns + shift_ns_};
   if (last_) {
-    const std::int64_t expected = predictedStamp(arrived_ns);
-    if (const std::int64_t period = options_.wraps_after_ns; period > 0) {
-      // The turn of the counter in which the stamp comes nearest to what is expected.
-      const double turns = static_cast<double>(expected - time_ns) / static_cast<double>(period);
-      shift_ns_ += std::llround(turns) * period;
-      time_ns = stamp_ns + shift_ns_;
-    }
-    const std::int64_t ahead = time_ns - expected;
-    const bool is_back = time_ns <= last_->ns;
-    // A frame may come late, but never early: a stamp from the future is a clock that was set. One
-    // from the past is that if it stays so.
-    if (ahead > tolerance_ns_ && options_.follows_steps_ahead) {
-      fit_.clear();
-      step(0);
-    } else if (ahead > tolerance_ns_ || is_back) {
-      step(-ahead);
-      time_ns = expected;
-    } else if (ahead < -tolerance_ns_) {
-      is_ordinary = false;
-      const bool is_like_before = behind_ > 0 && std::abs(ahead - behind_by_ns_) < tolerance_ns_;
-      behind_ = is_like_before ? behind_ + 1 : 1;
-      behind_by_ns_ = ahead;
-      if (behind_ >= kBehindIsAStep) {
-        step(-ahead);
-        time_ns = expected;
-        is_ordinary = true;
-      }
-    }
-    if (is_ordinary) behind_ = 0;
-    time_ns = std::max(time_ns, last_->ns + 1);
+    reading = continued(stamp_ns, arrived_ns);
+    reading.time_ns = std::max(reading.time_ns, last_->ns + 1);
   }
-  last_ = DeviceTime{time_ns};
-  if (is_ordinary) {
+  last_ = DeviceTime{reading.time_ns};
+  if (reading.is_ordinary) {
     fit_.add(*last_, arrived_ns);
     last_arrived_ns_ = arrived_ns;
   }
   return *last_;
 }
 
-/// Continuous device time of a frame that arrives then, if nothing is out of the ordinary.
-std::int64_t DeviceClock::predictedStamp(std::int64_t arrived_ns) const {
+DeviceClock::Reading DeviceClock::continued(std::int64_t stamp_ns, std::int64_t arrived_ns) {
   const auto fitted = fit_.estimate();
+  const std::int64_t expected = predictedStamp(arrived_ns, fitted);
+  if (const std::int64_t period = options_.wraps_after_ns; period > 0) {
+    // The turn of the counter in which the stamp comes nearest to what is expected.
+    const double turns = static_cast<double>(expected - stamp_ns - shift_ns_) / static_cast<double>(period);
+    shift_ns_ += std::llround(turns) * period;
+  }
+  const std::int64_t time_ns = stamp_ns + shift_ns_, ahead = time_ns - expected;
+  const bool is_settling = settling_ > 0;
+  // After a step it may be that the frame before had too late a time, and no second step.
+  const bool is_back = time_ns <= last_->ns && !(is_settling && ahead >= -tolerance_ns_);
+  settling_ -= is_settling ? 1 : 0;
+  // A frame may come late, but never early: a stamp from the future is a clock that was set. One
+  // from the past is that if it stays so.
+  if (ahead > tolerance_ns_ && options_.follows_steps_ahead) {
+    fit_.clear();
+    step(0);
+    return {time_ns};
+  }
+  if (is_settling && fitted && static_cast<double>(ahead) > kEarlySds * fitted->noise_ns) {
+    // So much too late, then, was the frame that the step was measured by.
+    shift_ns_ -= ahead;
+    behind_ = 0;
+    return {expected};
+  }
+  if (ahead > tolerance_ns_ || is_back) {
+    step(-ahead);
+    return {expected};
+  }
+  if (ahead >= -tolerance_ns_) {
+    behind_ = 0;
+    return {time_ns};
+  }
+  const bool is_like_before = behind_ > 0 && std::abs(ahead - behind_by_ns_) < tolerance_ns_;
+  if (!is_like_before) behind_since_ns_ = arrived_ns;
+  behind_ = is_like_before ? behind_ + 1 : 1;
+  behind_by_ns_ = ahead;
+  // Frames that waited in a queue come all at once.
+  const bool stays_so = behind_ >= kBehindIsAStep && arrived_ns - behind_since_ns_ >= tolerance_ns_;
+  if (!stays_so) return {time_ns, false};
+  step(-ahead);
+  return {expected};
+}
+
+/// Continuous device time of a frame that arrives then, if nothing is out of the ordinary.
+std::int64_t DeviceClock::predictedStamp(std::int64_t arrived_ns,
+                                         const std::optional<ClockFit::Estimate>& fitted) const {
   if (!fitted) return last_->ns + (arrived_ns - last_arrived_ns_);
   // host = device + offset + drift · (device − newest), solved for device to first order.
   const auto since = static_cast<double>(arrived_ns - last_arrived_ns_);
@@ -175,6 +194,7 @@ void DeviceClock::step(std::int64_t by_ns) {
   shift_ns_ += by_ns;
   ++steps_;
   behind_ = 0;
+  settling_ = by_ns == 0 ? 0 : options_.window;
 }
 
 ClockRelation DeviceClock::relation(Duration delay, Duration delay_sd) const {

@@ -21,6 +21,7 @@ namespace toftwin::drivers {
 ///   minimise Σ ρ(noise_i / s),   ψ = ρ',   ψ(u) = u (1 − (u/c)²)² for |u| < c, else 0
 ///   s = 1.4826 median |noise|,   c = 4.685 (95 % efficient for normal noise)
 ///   var(a, b) = s² [Σψ²/(n−2)] / [Σψ'/n]² (XᵀX)⁻¹                        [Huber & Ronchetti, §7.6]
+/// |b| is at most a thousandth: so much no crystal is off.
 /// What it cannot see is the part of the delay that is always there: that belongs to the caller.
 class ClockFit {
  public:
@@ -77,7 +78,13 @@ class DeviceClock {
   [[nodiscard]] std::uint64_t steps() const { return steps_; }
 
  private:
-  [[nodiscard]] std::int64_t predictedStamp(std::int64_t arrived_ns) const;
+  struct Reading {
+    std::int64_t time_ns = 0;
+    bool is_ordinary = true;  ///< the relation may be learnt from it
+  };
+  Reading continued(std::int64_t stamp_ns, std::int64_t arrived_ns);
+  [[nodiscard]] std::int64_t predictedStamp(std::int64_t arrived_ns,
+                                            const std::optional<ClockFit::Estimate>& fitted) const;
   void step(std::int64_t by_ns);
 
   Options options_;
@@ -87,9 +94,10 @@ class DeviceClock {
   std::int64_t last_arrived_ns_ = 0;
   std::int64_t shift_ns_ = 0;  // continuous device time − stamp
   std::uint64_t steps_ = 0;
+  std::size_t settling_ = 0;  // frames in which the line still knows the time before the step
   // Frames in a row that came late, or whose clock was set back by less than the pause before them.
   int behind_ = 0;
-  std::int64_t behind_by_ns_ = 0;
+  std::int64_t behind_by_ns_ = 0, behind_since_ns_ = 0;
 };
 
 }  // namespace toftwin::drivers

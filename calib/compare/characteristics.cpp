@@ -7,6 +7,7 @@
 #include <numbers>
 #include <functional>
 #include <numeric>
+#include <set>
 
 #include <fmt/format.h>
 #include <toftwin/nan.h>
@@ -287,18 +288,22 @@ void countPixels(const std::vector<PoseComparison>& poses, Characteristics& resu
   bool is_resampled = false;
   for (const PoseComparison& pose : poses) {
     is_resampled = is_resampled || pose.resampled;
+    const std::size_t gross_before = result.gross, compared_before = result.compared;
     for (std::size_t i = 0; i < pose.difference_mm.size(); ++i) {
       if (!std::isfinite(pose.valid_b[i])) continue;
       const bool a = pose.valid_a[i] >= 0.5F, b = pose.valid_b[i] >= 0.5F;
       ++result.pixels;
       valid_a += a, valid_b += b, both += a && b, neither += !a && !b;
-      result.gross += a && b && !isCompared(pose, i);
+      const bool is_gross = a && b && !isCompared(pose, i);
+      result.gross += is_gross;
+      if (a && b && pose.edge[i] == 0) ++result.surface_pixels, result.gross_on_surfaces += is_gross;
       if (!isCompared(pose, i)) continue;
       ++result.compared;
       result.edge_pixels += pose.edge[i];
       result.flying_a += pose.flying_a[i], result.flying_b += pose.flying_b[i];
       flying_both += pose.flying_a[i] & pose.flying_b[i];
     }
+    result.poses_all_gross += result.compared == compared_before && result.gross > gross_before;
   }
   if (!is_resampled) result.flying_both = flying_both;
   const auto n = static_cast<double>(std::max<std::size_t>(1, result.pixels));
@@ -314,8 +319,7 @@ void countPixels(const std::vector<PoseComparison>& poses, Characteristics& resu
 Characteristics characterise(const std::vector<PoseComparison>& poses) {
   const Pixels pixels = pixelsOf(poses);
   Characteristics result;
-  for (const std::uint32_t place : placesOf(poses))
-    result.places = std::max<std::size_t>(result.places, place + std::size_t{1});
+  result.places = std::set<std::uint32_t>{pixels.place.begin(), pixels.place.end()}.size();
   addRegion(result.regions, pixels, "all pixels", [](std::size_t) { return true; });
   addRegion(result.regions, pixels, "surfaces (over 2 px from a jump)",
             [&](std::size_t i) { return !pixels.edge[i]; });
@@ -343,6 +347,9 @@ Json toJson(const Characteristics& c) {
   }
   Json json = Json::object();
   json.set("gross_pixels", c.gross).set("gross_limit_mm", kGross_mm);
+  json.set("gross_on_surfaces", c.gross_on_surfaces)
+      .set("surface_pixels", c.surface_pixels)
+      .set("poses_all_gross", c.poses_all_gross);
   json.set("compared_pixels", c.compared).set("places", c.places);
   json.set("regions", std::move(regions)).set("pixels", c.pixels).set("valid_share_a", c.valid_a);
   json.set("valid_share_b", c.valid_b)

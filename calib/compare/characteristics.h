@@ -83,13 +83,16 @@ struct Region {
 struct Characteristics {
   /// Pixels that differ by more than kGross_mm: a wrong period of the phase, or another surface.
   std::size_t gross = 0;
+  std::size_t gross_on_surfaces = 0;    ///< of them, more than two pixels from a jump of A's range
+  std::size_t surface_pixels = 0;       ///< there, valid in both, gross or not
+  std::size_t poses_all_gross = 0;      ///< where both see something, and all of it is gross
   std::vector<Region> regions;          ///< the first is "all pixels"
   double valid_a = 0.0, valid_b = 0.0;  ///< share of pixels valid in at least half of the frames
   double mask_agreement = 0.0;          ///< share of pixels where both are valid or both are not
   double mask_overlap = 0.0;            ///< valid in both / valid in either
   std::size_t pixels = 0;               ///< that both cameras look at, over all poses
   std::size_t compared = 0;             ///< of these, valid in both and not gross
-  std::size_t places = 0;               ///< different poses
+  std::size_t places = 0;               ///< different poses at which any are compared
   std::size_t flying_a = 0, flying_b = 0;  ///< of the compared pixels
   std::size_t edge_pixels = 0;             ///< of them too
   std::optional<std::size_t> flying_both;  ///< in the same pixel; none where B was interpolated

@@ -263,6 +263,41 @@ Tone toneOfDifference(const Region& region) {
   return bias <= 3.0 * noise ? Tone::Fair : Tone::Bad;
 }
 
+double grossShare(const Characteristics& c) {
+  return static_cast<double>(c.gross_on_surfaces) /
+         static_cast<double>(std::max<std::size_t>(1, c.surface_pixels));
+}
+
+/// More than single pixels beside jumps that were not found.
+bool isGrossNotable(const Characteristics& c) { return grossShare(c) > 0.01 || c.poses_all_gross > 0; }
+
+Tone toneOfDifference(const Characteristics& c) {
+  return isGrossNotable(c) ? Tone::Bad : toneOfDifference(mainRegionOf(c));
+}
+
+Error nothingCompared(const Characteristics& c, const std::string& where) {
+  return {Error::Code::InvalidArgument,
+          c.gross == 0
+              ? fmt::format("no pixel is valid in both cameras at any {}: there is nothing to compare. Do "
+                            "they look at something within their range?",
+                            where)
+              : fmt::format("all {} pixels that are valid in both cameras are over {:.0f} mm apart: there "
+                            "is nothing to compare. Do both look at the same scene, from the same pose, "
+                            "within the range at which neither wraps?",
+                            c.gross, kGross_mm)};
+}
+
+/// What no number of the rest has, first: it is far more than what they tell.
+std::string grossInWords(const Characteristics& c) {
+  if (!isGrossNotable(c)) return {};
+  const std::string none_left =
+      c.poses_all_gross == 0 ? ""
+                             : fmt::format("; at {} of the poses nothing else is seen", c.poses_all_gross);
+  return fmt::format(
+      "{} of what both see on surfaces is over {:.0f} mm apart, and in no number of the rest{}. ",
+      shownPercent(grossShare(c)), kGross_mm, none_left);
+}
+
 /// Where less than half of the pixels are told of, how many.
 std::string shareInWords(const Characteristics& c) {
   const std::size_t all = c.regions.empty() ? 0 : c.regions.front().difference_mm.n;
@@ -274,10 +309,11 @@ std::string shareInWords(const Characteristics& c) {
 std::string nearnessInWords(const std::string& a, const std::string& b, const Characteristics& c) {
   const Summary& all = mainRegionOf(c).difference_mm;
   return fmt::format(
-      "{} (B) is within {} mm of {} (A) for 95 % of the pixels on surfaces{}; on average it reads {}, and "
+      "{}{} (B) is within {} mm of {} (A) for 95 % of the pixels on surfaces{}; on average it reads {}, and "
       "its "
       "noise is {} times A's",
-      b, shown(all.p95_abs), a, shareInWords(c), inWords(all), shown(c.noise_ratio.median, 2));
+      grossInWords(c), b, shown(all.p95_abs), a, shareInWords(c), inWords(all),
+      shown(c.noise_ratio.median, 2));
 }
 
 std::vector<Card> nearnessCards(const Characteristics& c, const std::string& bias_note, Tone tone) {
@@ -285,13 +321,21 @@ std::vector<Card> nearnessCards(const Characteristics& c, const std::string& bia
   const Summary& all = main.difference_mm;
   const std::string bias = std::isfinite(all.standard_error) ? shownWithError(all.mean, all.standard_error, 2)
                                                              : shown(all.mean, 2);
-  return {{"95 % agree within", shown(all.p95_abs) + " mm", fmt::format("RMS {} mm", shown(all.rms)),
-           Tone::Neutral},
-          {"Bias, B − A", bias + " mm", bias_note, tone},
-          {"Noise, A | B", fmt::format("{} | {} mm", shown(main.noise_a_mm, 2), shown(main.noise_b_mm, 2)),
-           "temporal, median over pixels", Tone::Neutral},
-          {"Masks agree", shown(100.0 * c.mask_agreement, 1) + " %", "where both are valid or both are not",
-           c.mask_agreement > 0.98 ? Tone::Good : Tone::Fair}};
+  std::vector<Card> cards;
+  if (isGrossNotable(c)) {
+    cards.push_back({fmt::format("Over {:.0f} mm apart", kGross_mm), shownPercent(grossShare(c)),
+                     "of what both see on surfaces; in no other number", Tone::Bad});
+  }
+  const std::vector<Card> rest{
+      {"95 % agree within", shown(all.p95_abs) + " mm", fmt::format("RMS {} mm", shown(all.rms)),
+       Tone::Neutral},
+      {"Bias, B − A", bias + " mm", bias_note, tone},
+      {"Noise, A | B", fmt::format("{} | {} mm", shown(main.noise_a_mm, 2), shown(main.noise_b_mm, 2)),
+       "temporal, median over pixels", Tone::Neutral},
+      {"Masks agree", shown(100.0 * c.mask_agreement, 1) + " %", "where both are valid or both are not",
+       c.mask_agreement > 0.98 ? Tone::Good : Tone::Fair}};
+  cards.insert(cards.end(), rest.begin(), rest.end());
+  return cards;
 }
 
 Result<Finding> judgeLive(const Capture& capture) {
@@ -305,11 +349,7 @@ Result<Finding> judgeLive(const Capture& capture) {
     poses.push_back(*std::move(compared));
   }
   const Characteristics c = characterise(poses);
-  if (c.regions.empty()) {
-    return Error{Error::Code::InvalidArgument,
-                 "no pixel is valid in both cameras at any pose: there is nothing to compare. Do "
-                 "they look at something within their range?"};
-  }
+  if (c.regions.empty()) return nothingCompared(c, "pose");
   const Pixels pixels = pixelsOf(poses);
   const Region& main = mainRegionOf(c);
   const std::vector<Drift> drifts = driftsOf(poses);
@@ -322,7 +362,7 @@ Result<Finding> judgeLive(const Capture& capture) {
   finding.section = {
       .id = "live",
       .title = fmt::format("{} (B) against {} (A)", capture.b.entry.name, capture.a.entry.name)};
-  finding.section.tone = toneOfDifference(main);
+  finding.section.tone = toneOfDifference(c);
   finding.section.verdict = fmt::format(
       "Averaged over {} pixels at {}. Temporal noise: A {} mm, B {} mm (median). Validity masks agree in {} "
       "% of "

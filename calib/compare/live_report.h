@@ -20,7 +20,10 @@ FigureRow mapsOf(const std::string& name, const PoseComparison& comparison, doub
 Figure histogramFigure(const Pixels& pixels);
 /// The region that headlines are of: surfaces, where there are any.
 const Region& mainRegionOf(const Characteristics& characteristics);
-/// How near B is to A, for who reads no further: a clause.
+/// Of what both see on surfaces, the share that is over kGross_mm apart and thus in no number of the rest.
+double grossShare(const Characteristics& characteristics);
+/// How near B is to A, for who reads no further: a clause. Before it, in a sentence, what is no part of it:
+/// the gross pixels, where they are over 1 % or all that some poses have.
 std::string nearnessInWords(const std::string& a, const std::string& b,
                             const Characteristics& characteristics);
 /// The same as cards.
@@ -29,6 +32,10 @@ std::vector<Card> nearnessCards(const Characteristics& characteristics, const st
 /// Against A's noise in a single frame: good where the bias is within it and 95 % of the pixels within three
 /// of both cameras' noise; bad where the bias is over three of it. Neutral where no noise is known.
 Tone toneOfDifference(const Region& region);
+/// The same of its surfaces, and bad where the headline begins with gross pixels.
+Tone toneOfDifference(const Characteristics& characteristics);
+/// Why not a single pixel is compared: both see none, or all are gross. `where`: "pose".
+Error nothingCompared(const Characteristics& characteristics, const std::string& where);
 /// The next 1, 2 or 5 times a power of ten, for the reach of a scale.
 double roundUp(double value);
 

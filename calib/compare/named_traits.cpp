@@ -46,6 +46,8 @@ void TraitCollector::add(NamedRows rows, const Result<FittedTraits>& fitted) {
 void TraitCollector::add(NamedRows rows, const Result<DriftTraits>& drift) {
   add(rows.what, rows.of, drift ? Traits{drift->traits} : Traits{drift.error()},
       drift ? nameOf(drift->model) : "");
+  if (drift && !drift->not_told.empty())
+    found_.untold.push_back(fmt::format("{} of {}: {}", rows.what, rows.of, drift->not_told));
   if (drift) rows.curve = drift->curve;
   draw(std::move(rows));
 }

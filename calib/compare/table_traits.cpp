@@ -178,7 +178,7 @@ void addTraits(const TableColumns& table, const std::vector<double>& f, const ch
   NamedRows rows = rowsOf(table, of);
   if (kind == "drift") return all.add(std::move(rows), driftTraits(c[0], c[1]));
   if (kind == "harmonics") return all.add(std::move(rows), fittedHarmonics(c[0], c[1], f));
-  if (kind == "noise_law") return all.add(std::move(rows), fittedNoiseLaw(c[0], c[1]));
+  if (kind == "noise_law") return all.add(std::move(rows), fittedNoiseLaw(c[0], c[1], f));
   all.draw(std::move(rows));
   const std::map<std::string, std::function<Traits()>> rest{
       {"wraps", [&] { return wrapTraits(c[0], unambiguousRange(std::ranges::max(f) * hertz).in(metre)); }},

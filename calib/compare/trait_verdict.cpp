@@ -3,10 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include <fmt/format.h>
 
+#include <toftwin/nan.h>
+
+#include "calib/compare/traits/common_reference.h"
 #include "calib/compare/traits/difference.h"
 
 namespace toftwin::compare {
@@ -24,8 +28,6 @@ std::string number(double value) {
   return text.starts_with('-') ? "−" + text.substr(1) : text;
 }
 
-std::string withSign(double value) { return (value > 0.0 ? "+" : "") + number(value); }
-
 std::string unitOf(const TraitVerdict& one) {
   return one.difference.unit.empty() || one.difference.unit == "1" ? "" : " " + one.difference.unit;
 }
@@ -34,10 +36,22 @@ std::string nameOf(const TraitVerdict& one) {
   return one.what == one.difference.name ? one.what : one.what + ": " + one.difference.name;
 }
 
+bool isWaves(const TraitVerdict& one) { return one.what.starts_with("harmonics"); }
+
+/// Wrapped readings of the wall, a share that differs by over 1 %.
+bool isWraps(const TraitVerdict& one) {
+  return one.what == "wraps" && one.isTold() && one.differs() && std::abs(one.difference.value) > 0.01;
+}
+
+/// The amplitude of a wave of B − A: how large it is.
+bool isSize(const TraitVerdict& one) {
+  return one.is_size || (isWaves(one) && !one.b && one.difference.name.ends_with(" per period"));
+}
+
 /// For who has not read how it is made; tables have the name by which a log is searched.
 std::string plainNameOf(const TraitVerdict& one) {
   std::string what = one.what, name = one.difference.name;
-  if (what.starts_with("harmonics")) what = "error over distance";
+  if (isWaves(one)) what = one.b ? "error over distance, B's less A's" : "B − A over distance";
   if (what == "noise law") what = "noise over signal";
   if (name == "residual") name = "what no wave explains";
   if (name.ends_with(" per period")) name = "wave, " + name;
@@ -54,6 +68,11 @@ std::string shownOf(const std::optional<NamedTrait>& one) {
   return number(one->trait.value) + (one->detail.empty() ? "" : ", " + one->detail);
 }
 
+std::string sizeOf(const TraitVerdict& one) {
+  const double value = one.difference.value;
+  return (value > 0.0 && !isSize(one) ? "+" : "") + number(value) + unitOf(one);
+}
+
 double timesFloor(const TraitVerdict& one) { return std::abs(one.difference.value) / one.floor(); }
 
 std::string farBeyond(const TraitVerdict& one) {
@@ -61,16 +80,31 @@ std::string farBeyond(const TraitVerdict& one) {
   return fmt::format("{:.{}f} × the floor", timesFloor(one), timesFloor(one) < 10.0 ? 1 : 0);
 }
 
+std::string atOf(const TraitVerdict& one) { return one.at.empty() ? "" : ", both " + one.at; }
+
 std::string verdictOf(const TraitVerdict& one) {
+  if (!one.why_not.empty()) return "not told: " + one.why_not;
   if (!one.isTold()) return "not told: an end of an interval is not known";
-  if (one.differs()) return "differs, " + farBeyond(one);
+  if (one.differs()) return "differs, " + farBeyond(one) + atOf(one);
   const double most = std::max(std::abs(one.difference.low), std::abs(one.difference.high));
-  return fmt::format("same, within {}{}", number(most), unitOf(one));
+  return fmt::format("same, within {}{}{}", number(most), unitOf(one), atOf(one));
 }
 
 std::size_t countOf(const std::vector<TraitVerdict>& all, bool differs) {
   return static_cast<std::size_t>(
       std::ranges::count_if(all, [&](const auto& one) { return one.isTold() && one.differs() == differs; }));
+}
+
+void holdTogether(TraitVerdict& one, double wider) {
+  if (!one.b) {
+    one.difference = widened(one.difference, wider);
+    return;
+  }
+  const Trait &a = one.a->trait, &b = one.b->trait;
+  HeldTogether held = heldTogether(a, b, wider);
+  one.is_size = held.is_size, one.at = std::move(held.at), one.why_not = std::move(held.why_not);
+  one.difference = std::move(held.difference);
+  if (!one.why_not.empty()) one.difference = {b.name, b.unit, kNaN, kNaN, kNaN, std::min(a.n, b.n)};
 }
 
 }  // namespace
@@ -97,10 +131,11 @@ std::vector<TraitVerdict> verdictsOf(const NamedTraits& traits) {
     if (one.of == "B" && a != of_a.end()) all.push_back({.what = one.what, .a = *a->second, .b = one});
   }
   const double wider = widenedFor(all.size());
-  for (TraitVerdict& one : all)
-    one.difference = one.b ? differenceOf(one.a->trait, one.b->trait, wider) : widened(one.difference, wider);
-  // Those that are not told come last; where a floor is 0, what differs is infinitely far beyond it.
+  for (TraitVerdict& one : all) holdTogether(one, wider);
+  // Wraps come first, as what wraps is in few of the others. Those that are not told come last; where a floor
+  // is 0, what differs is infinitely far beyond it.
   const auto rank = [](const TraitVerdict& one) {
+    if (isWraps(one)) return -std::numeric_limits<double>::infinity();
     return !one.isTold() ? 1.0 : one.differs() ? -timesFloor(one) : 0.0;
   };
   std::ranges::stable_sort(all, {}, rank);
@@ -121,10 +156,10 @@ std::string headlineOf(const std::vector<TraitVerdict>& all) {
   }
   const TraitVerdict& first = largest != nullptr ? *largest : all.front();
   return fmt::format(
-      "{} difference: {}, {}{} ({} to {}). {} of {} numbers of B differ from A's by more than the noise "
+      "{} difference: {}, {} ({} to {}). {} of {} numbers of B differ from A's by more than the noise "
       "floor",
-      largest != nullptr ? "Largest" : "Clearest", plainNameOf(first), withSign(first.difference.value),
-      unitOf(first), number(first.difference.low), number(first.difference.high), differ, differ + same);
+      largest != nullptr ? "Largest" : "Clearest", plainNameOf(first), sizeOf(first),
+      number(first.difference.low), number(first.difference.high), differ, differ + same);
 }
 
 TableBlock verdictTable(const std::vector<TraitVerdict>& all) {
@@ -155,9 +190,14 @@ std::vector<Card> cardsOf(const std::vector<TraitVerdict>& all) {
   if (told == 0) return {};
   std::vector<Card> cards{{"Same as A", fmt::format("{} of {}", told - differ, told),
                            "numbers of B within the noise floor", differ == 0 ? Tone::Good : Tone::Fair}};
-  for (std::size_t i = 0; i < std::min(differ, kShownFirst); ++i) {
+  for (std::size_t i = 0; i < differ && cards.size() <= kShownFirst; ++i) {
     const TraitVerdict& one = all[i];
-    cards.push_back({plainNameOf(one), withSign(one.difference.value) + unitOf(one),
+    // What is told of waves of B − A and again of B's less A's has one card, that of what is clearer.
+    const auto isIt = [&](const TraitVerdict& before) {
+      return isWaves(before) && isWaves(one) && before.difference.name == one.difference.name;
+    };
+    if (std::any_of(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(i), isIt)) continue;
+    cards.push_back({plainNameOf(one), sizeOf(one),
                      fmt::format("B − A, {} to {}; {}", number(one.difference.low),
                                  number(one.difference.high), farBeyond(one)),
                      Tone::Fair});

@@ -16,6 +16,9 @@ struct TraitVerdict {
   std::optional<NamedTrait> a{}, b{};  ///< none where B − A was told directly
   /// B − A. The intervals of all verdicts hold together with 95 %; an end may be NaN: not known.
   Trait difference{};
+  bool is_size = false;   ///< the difference is the amplitude of a wave, which has no sign
+  std::string at{};       ///< what both are told at, where a number hangs on it: "at 1.75 m"
+  std::string why_not{};  ///< why the two cannot be held against each other
 
   [[nodiscard]] bool isTold() const;
   /// 0 is not in the interval.

@@ -95,6 +95,8 @@ class Search {
       extra.push_back(std::move(smooth));
     }
     found_.context.scales = estimateScales(evidenceOf(found_.context, extra), names);
+    if (!found_.effects.empty()) return;
+    for (double& scale : found_.context.scales) scale = std::min(scale, options_.most_scale);
   }
 
   Significance testNow(int step) {

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -24,6 +25,8 @@ struct FinderOptions {
   std::uint64_t seed = 1;
   NullModel null_model = NullModel::Automatic;
   bool has_straight_pairs = false;  ///< see CandidateOptions
+  /// Of random effects as long as nothing was found: what is an effect must not be taken for them.
+  double most_scale = std::numeric_limits<double>::infinity();
 };
 
 /// Something else that explains as much.

@@ -224,8 +224,11 @@ constexpr std::array kBlind{
 /// Of the lowest frequencies that cameras are modulated at, a period is 10 m.
 constexpr double kLongestPeriod_m = 10.0;
 
-/// Errors that go once or twice per period of the modulation are told over a whole one only; the plan does
-/// not know its cameras.
+/// Cameras of one frequency have this one or so (an O3D303's); cameras of higher ones have several.
+constexpr double kLowestSingle_MHz = 30.0;
+
+/// Errors that go once or twice per period of the modulation are told over a whole one only, and what is
+/// beyond one wraps; the plan does not know its cameras.
 void noteSpan(const Plan& plan, const Schedule& schedule, std::vector<Remark>& remarks) {
   std::vector<double> distance_m;
   for (const PlannedCapture& one : schedule.captures) {
@@ -234,8 +237,19 @@ void noteSpan(const Plan& plan, const Schedule& schedule, std::vector<Remark>& r
   }
   if (distance_m.empty()) return;
   const auto [nearest, farthest] = std::ranges::minmax(distance_m);
+  constexpr double kHalfLight_m_MHz = unambiguousRange(1_MHz).in(metre);
+  if (const double f = kHalfLight_m_MHz / farthest; f < kLowestSingle_MHz) {
+    remarks.push_back(
+        {false,
+         fmt::format(
+             "distances up to {:.3g} m are beyond c/2f of {:.3g} MHz and more: the ranges of a camera of one "
+             "such frequency, or of several that have no lower one in common, begin anew there, and what "
+             "wraps is told as wraps and left out of waves over distance",
+             farthest, f),
+         fmt::format("for such a camera end before {:.3g} m (c/2f of 30 MHz)",
+                     kHalfLight_m_MHz / kLowestSingle_MHz)});
+  }
   if (!(farthest > nearest) || farthest - nearest >= kLongestPeriod_m) return;
-  constexpr double kHalfLight_m_MHz = 149.896229;  // c/2
   remarks.push_back(
       {false,
        fmt::format("distances of {:.3g} to {:.3g} m are a whole period of {:.0f} MHz or more: of lower "

@@ -68,6 +68,28 @@ PoseComparison thinned(const PoseComparison& all, int stride) {
   return few;
 }
 
+Image<float> inMillimetres(Image<float> metres) {
+  for (std::size_t i = 0; i < metres.size(); ++i) metres[i] *= 1e3F;
+  return metres;
+}
+
+double medianOfFinite(const Image<float>& image) {
+  std::vector<double> values;
+  for (std::size_t i = 0; i < image.size(); ++i) {
+    if (std::isfinite(image[i])) values.push_back(static_cast<double>(image[i]));
+  }
+  return compare::quantile(std::move(values), 0.5);
+}
+
+OwnReading ownOf(const Stack& stack, const std::string& kind, int stride) {
+  const Image<float> noise = inMillimetres(stack.temporalNoise_m());
+  OwnReading own{.noise_mm = medianOfFinite(noise), .amplitude = medianOfFinite(stack.meanAmplitude())};
+  if (kind != nameOf(Kind::WarmUp) && kind != nameOf(Kind::Ambient)) return own;
+  own.range_mm = thinned(inMillimetres(stack.meanRange_m()), stride),
+  own.noise_each_mm = thinned(noise, stride);
+  return own;
+}
+
 void summarise(const PoseComparison& all, ComparedCapture& one) {
   compare::Running difference, range;
   std::vector<double> noise_a, noise_b, amplitude_a, amplitude_b;
@@ -124,10 +146,13 @@ Result<ComparedCapture> compareCapture(const std::filesystem::path& run, const P
   one.seen = {seenOf(plan, record, a->stack, a->frames, how.frequency_hz[0]),
               seenOf(plan, record, b->stack, b->frames, how.frequency_hz[1], record.pose_of_b)};
   if (record.kind == nameOf(Kind::Moving)) return one;
+  one.own = {ownOf(a->stack, record.kind, how.stride), ownOf(b->stack, record.kind, how.stride)};
   auto compared = compare::comparePose(a->stack, b->stack);
   if (!compared) return ofCapture(record, compared.error());
   summarise(*compared, one);
   one.thinned = thinned(*compared, how.stride);
+  if (record.kind == nameOf(Kind::Distance))
+    one.wall_range_m = thinned(wallRange_m(plan, record, a->stack), how.stride);
   if (whole != nullptr) *whole = *std::move(compared);
   return one;
 }

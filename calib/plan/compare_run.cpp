@@ -81,8 +81,9 @@ struct FirstFrames {
   std::array<Frame, 2> frames{};
 };
 
-Result<Frame> firstFrameIn(const std::filesystem::path& file) {
-  auto reader = record::Reader::open(file);
+Result<Frame> firstFrameIn(const std::filesystem::path& run, const RecordedFile& file) {
+  if (auto whole = checkHash(run, file); !whole) return whole.error();
+  auto reader = record::Reader::open(run / file.file);
   if (!reader) return reader.error();
   return reader->next();
 }
@@ -96,7 +97,7 @@ std::vector<double> frequenciesOf(const Frame& frame) {
 }
 
 Result<FirstFrames> firstFramesOf(const std::filesystem::path& run, const std::vector<CaptureRecord>& records) {
-  const auto a = firstFrameIn(run / records.front().a.file), b = firstFrameIn(run / records.front().b.file);
+  const auto a = firstFrameIn(run, records.front().a), b = firstFrameIn(run, records.front().b);
   if (!a) return a.error();
   if (!b) return b.error();
   const double pixels =

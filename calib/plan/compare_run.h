@@ -17,19 +17,31 @@
 
 namespace toftwin::plan {
 
+/// What a camera read in a capture over its own mask, whatever the other one saw.
+struct OwnReading {
+  /// Every so-manieth pixel of each row and column, of the kinds that are series (warm_up, ambient); else
+  /// empty.
+  Image<float> range_mm{}, noise_each_mm{};
+  double noise_mm = 0.0, amplitude = 0.0;  ///< medians; NaN where there is none
+};
+
 /// One capture of a run, compared.
 struct ComparedCapture {
   CaptureRecord record;
   std::size_t pixels = 0;                                  ///< compared, surfaces and edges together
   double difference_mm = 0.0;                              ///< mean of B − A over them; NaN without any
   double error_mm = 0.0;                                   ///< its standard error over the image, by blocks
-  double range_a_mm = 0.0;                                 ///< mean
+  double range_a_mm = 0.0;                                 ///< mean, over the compared pixels as all below
   double noise_a_mm = 0.0, noise_b_mm = 0.0;               ///< temporal, medians
   double amplitude_a = 0.0, amplitude_b = 0.0;             ///< medians; NaN where a camera gives none
   double valid_a = 0.0, valid_b = 0.0, masks_agree = 0.0;  ///< shares of the pixels
   /// Every so-manieth pixel of each row and column, for what is told of all captures together.
   compare::PoseComparison thinned;
+  /// Of the distance block: range to the plan's wall along the rays of `thinned`, NaN beside it; empty where
+  /// no pose is known.
+  Image<float> wall_range_m{};
   std::array<CameraSeen, 2> seen{};  ///< of A and B, each by itself
+  std::array<OwnReading, 2> own{};   ///< of A and B, each by its own mask
 };
 
 /// Reads both recordings of a capture and compares them pixel by pixel. Errors name the capture: a file that

@@ -2,6 +2,7 @@
 // Where the cameras stand, by what they see.
 #include <fmt/format.h>
 
+#include "calib/compare/follow.h"
 #include "calib/plan/take.h"
 
 namespace toftwin::plan {
@@ -26,6 +27,35 @@ Result<SeenPose> Taker::seenBy(const PlannedCapture& planned, Feed& feed, PoseFi
   if (seen) return seen;
   return Error{seen.error().code,
                fmt::format("where {} stands is not seen: {}", sourceOf(feed), seen.error().message)};
+}
+
+Result<> Taker::checkBoardOf(const PlannedCapture& planned, Feed& b) {
+  const BlockSpec& block = plan_.blocks[planned.block];
+  if (block.pose_from != PoseFrom::Board || !planned.pose || !b.details().can_set_pose) return {};
+  Taken there;
+  there.pose = planned.pose->world_from_camera();
+  if (auto put = b.setPose(*there.pose); !put) return put;
+  if (planned.exposure == Duration{} || compare::takes(b, compare::kExposure)) {
+    if (auto set = setUp(planned, b, ""); !set) return set;
+  }
+  PoseFinder finder{plan_};
+  const auto seen = seenBy(planned, b, finder, there);
+  const std::string off = seen ? disagreement(*seen, *there.pose, {}, plan_.board) : "";
+  if (seen && off.empty()) return {};
+  const auto& [x, y, z] = plan_.board.position_m;
+  return Error{
+      Error::Code::InvalidArgument,
+      fmt::format("block \"{}\" takes its poses from the board, and {}: {}. What B looks at must have the "
+                  "board where "
+                  "the plan has it, its first corner at x {:.4g}, y {:.4g}, z {:.4g} m: put it into the "
+                  "scene of {} (a "
+                  "rectangle with the board's picture as its material's texture), or into that of a source "
+                  "\"NAME.BLOCK\" for this block",
+                  block.name, seen ? "poses disagree" : fmt::format("{} does not see it", sourceOf(b)),
+                  seen ? fmt::format("{} by what {} sees ({}) and by where it was put are {}", planned.name,
+                                     sourceOf(b), seen->what, off)
+                       : seen.error().message,
+                  x, y, z, sourceOf(b))};
 }
 
 /// A sees where it stands. A twin that takes poses is put there; another camera must see the same place.

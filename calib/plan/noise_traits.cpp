@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <span>
+#include <variant>
 
 #include <fmt/format.h>
 
@@ -41,38 +43,68 @@ std::vector<const ComparedCapture*> toldBy(const ComparedRun& run, std::size_t c
   return both.empty() ? own : both;
 }
 
-/// The noise at the capture whose wall is nearest to the middle of the others'.
-void addNoiseOfFrames(const ComparedRun& run, std::size_t camera, TraitCollector& all) {
-  std::vector<const ComparedCapture*> walls;
-  std::vector<double> distances;
-  for (const std::string_view kind : {"distance", "warm_up"}) {
-    for (const ComparedCapture& one : run.captures) {
-      if (one.record.kind != kind || one.seen[camera].noise.empty()) continue;
-      walls.push_back(&one), distances.push_back(one.record.distance_m);
+/// Captures of walls of which the camera tells its frames' noise; of which both do, where the other tells
+/// any: noise goes with the distance. The distance block's, if there are any.
+struct Walls {
+  std::vector<const ComparedCapture*> chosen{};
+  bool other_has = false, has = false;
+
+  Walls(const ComparedRun& run, std::size_t camera) {
+    for (const std::string_view kind : {"distance", "warm_up"}) {
+      std::vector<const ComparedCapture*> own, both;
+      for (const ComparedCapture& one : run.captures) {
+        if (one.record.kind != kind) continue;
+        const bool is_own = !one.seen[camera].noise.empty(), is_others = !one.seen[1 - camera].noise.empty();
+        if (is_own) own.push_back(&one);
+        if (is_own && is_others) both.push_back(&one);
+        has = has || is_own, other_has = other_has || is_others;
+      }
+      if (!both.empty()) {
+        chosen = both;
+        return;
+      }
+      if (chosen.empty()) chosen = own;
     }
-    if (!walls.empty()) break;
+    if (other_has) chosen.clear();
   }
-  if (walls.empty()) {
+};
+
+/// The noise at the capture whose wall is nearest to the middle of the others', the same for both cameras.
+void addNoiseOfFrames(const ComparedRun& run, std::size_t camera, TraitCollector& all) {
+  const Walls walls{run, camera};
+  if (walls.chosen.empty()) {
     all.untold(
-        fmt::format("noise of frames of {}: it takes eight frames of a wall in a block of kind distance or "
-                    "warm_up, 8 × 8 pixels or more",
-                    kCameras[camera]));
+        fmt::format("noise of frames of {}: {}", kCameras[camera],
+                    walls.has && walls.other_has
+                        ? "A and B tell it at no capture in common, and it goes with the distance"
+                        : "it takes eight frames of a wall in a block of kind distance or warm_up, 8 × 8 "
+                          "pixels or more"));
     return;
   }
+  std::vector<double> distances;
+  for (const ComparedCapture* one : walls.chosen) distances.push_back(one->record.distance_m);
   const double middle = compare::quantile(distances, 0.5);
-  const ComparedCapture& best = **std::ranges::min_element(
-      walls, {}, [&](const ComparedCapture* one) { return std::abs(one->record.distance_m - middle); });
+  const ComparedCapture& best = **std::ranges::min_element(walls.chosen, {}, [&](const ComparedCapture* one) {
+    return std::abs(one->record.distance_m - middle);
+  });
   all.add("noise of frames", kCameras[camera], best.seen[camera].noise,
           fmt::format("at {:.3g} m", best.record.distance_m));
 }
 
 /// Light falls with the square of the distance, so the law is that over amplitude with I = 1/d².
-Result<compare::FittedTraits> fittedOverDistance(const NamedRows& rows) {
+Result<compare::FittedTraits> fittedOverDistance(const NamedRows& rows,
+                                                 std::span<const double> frequency_hz) {
   std::vector<double> light;
   for (const double d : rows.x) light.push_back(1.0 / (d * d));
-  auto fitted = compare::fittedNoiseLaw(light, rows.y);
+  auto fitted = compare::fittedNoiseLaw(light, rows.y, frequency_hz);
   if (fitted) fitted->curve.at = [law = std::move(fitted->curve.at)](double d) { return law(1.0 / (d * d)); };
   return fitted;
+}
+
+/// By which it is known up to where noise goes as 1/amplitude; a pattern that stands still is no such noise.
+std::span<const double> frequenciesOfNoise(const ComparedRun& run, std::size_t camera,
+                                           std::string_view name) {
+  return name == kPattern ? std::span<const double>{} : run.frequency_hz[camera];
 }
 
 /// Light is 1/d² at one exposure only.
@@ -95,7 +127,7 @@ void addOverDistance(const ComparedRun& run, std::size_t camera, TraitCollector&
       rows.condition.push_back(one->record.number);
     }
     if (rows.x.empty()) continue;  // said of the noise of frames
-    const auto fitted = fittedOverDistance(rows);
+    const auto fitted = fittedOverDistance(rows, frequenciesOfNoise(run, camera, name));
     all.add(std::move(rows), fitted);
   }
 }
@@ -107,14 +139,33 @@ void scaleToLargest(std::vector<double>& signal) {
   for (double& one : signal) one /= most;
 }
 
-void addLaw(NamedRows rows, TraitCollector& all) {
+/// Cameras have units of signal of their own: what both are told at is the light of the capture at which both
+/// have most.
+void relateTo(const NamedRows& other, const NamedRows& rows, std::vector<compare::Trait>& traits) {
+  double most = 0.0, at_it = std::nan("");
+  std::string unit;
+  for (std::size_t i = 0; i < rows.x.size(); ++i) {
+    const auto same = std::ranges::find(other.condition, rows.condition[i]);
+    if (same == other.condition.end()) continue;
+    const double both = rows.x[i] * other.x[static_cast<std::size_t>(same - other.condition.begin())];
+    if (both <= most) continue;
+    most = both, at_it = rows.x[i], unit = fmt::format(" of that at capture {}", rows.condition[i]);
+  }
+  for (compare::Trait& one : traits) {
+    if (auto* at = std::get_if<compare::AtSignal>(&one.refers_to)) at->most /= at_it, at->unit = unit;
+  }
+}
+
+void addLaw(NamedRows rows, const NamedRows& other, std::span<const double> frequency_hz,
+            TraitCollector& all) {
   scaleToLargest(rows.x);
-  const auto fitted = compare::fittedNoiseLaw(rows.x, rows.y);
+  auto fitted = compare::fittedNoiseLaw(rows.x, rows.y, frequency_hz);
+  if (fitted) relateTo(other, rows, fitted->traits);
   all.add(std::move(rows), fitted);
 }
 
 /// Of the wall's middle, where the pattern is told.
-void addPatternOverAmplitude(const ComparedRun& run, std::size_t camera, TraitCollector& all) {
+NamedRows patternOverAmplitude(const ComparedRun& run, std::size_t camera) {
   NamedRows rows{kPatternOverAmplitude, kCameras[camera]};
   for (const ComparedCapture* one : toldBy(run, camera, kPattern)) {
     const double amplitude = compare::summarise(one->seen[camera].brightness).mean;
@@ -122,23 +173,35 @@ void addPatternOverAmplitude(const ComparedRun& run, std::size_t camera, TraitCo
     rows.x.push_back(amplitude), rows.y.push_back(*noiseOf(*one, camera, kPattern));
     rows.condition.push_back(one->record.number);
   }
-  if (!rows.x.empty()) addLaw(std::move(rows), all);
+  return rows;
 }
 
 /// Of whole images; not in other light, which makes noise of its own.
-void addNoiseLaw(const ComparedRun& run, std::size_t camera, TraitCollector& all) {
+NamedRows noiseOverSignal(const ComparedRun& run, std::size_t camera) {
   NamedRows rows{kNoiseLaw, kCameras[camera]};
   for (const ComparedCapture& one : run.captures) {
-    const double amplitude = camera == 0 ? one.amplitude_a : one.amplitude_b;
-    if (one.pixels == 0 || one.record.ambient_klx > 0.0 || !(amplitude > 0.0)) continue;
-    rows.x.push_back(amplitude), rows.y.push_back(camera == 0 ? one.noise_a_mm : one.noise_b_mm);
+    const OwnReading& own = one.own[camera];
+    if (one.record.ambient_klx > 0.0 || !(own.amplitude > 0.0)) continue;
+    rows.x.push_back(own.amplitude), rows.y.push_back(own.noise_mm);
     rows.condition.push_back(one.record.number);
   }
+  return rows;
+}
+
+void addNoiseLaw(const ComparedRun& run, std::size_t camera, TraitCollector& all) {
+  NamedRows rows = noiseOverSignal(run, camera);
   if (rows.x.empty()) {
     all.untold(fmt::format("noise law of {}: its frames have no amplitude", kCameras[camera]));
     return;
   }
-  addLaw(std::move(rows), all);
+  if (run.frequency_hz[camera].empty()) {
+    all.untold(
+        fmt::format("up to which noise the noise law of {} holds: its frames say no modulation frequency, so "
+                    "all captures are "
+                    "fitted",
+                    kCameras[camera]));
+  }
+  addLaw(std::move(rows), noiseOverSignal(run, 1 - camera), run.frequency_hz[camera], all);
 }
 
 }  // namespace
@@ -151,7 +214,8 @@ void addNoiseTraits(const ComparedRun& run, TraitCollector& all) {
     };
     if (std::ranges::any_of(run.captures, isWall)) addNoiseOfFrames(run, camera, all);
     addOverDistance(run, camera, all);
-    addPatternOverAmplitude(run, camera, all);
+    if (NamedRows rows = patternOverAmplitude(run, camera); !rows.x.empty())
+      addLaw(std::move(rows), patternOverAmplitude(run, 1 - camera), {}, all);
   }
 }
 

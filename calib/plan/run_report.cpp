@@ -28,7 +28,7 @@ std::vector<PoseComparison> imagesOf(const ComparedRun& run,
                                      const std::function<bool(const ComparedCapture&)>& belongs) {
   std::vector<PoseComparison> images;
   for (const ComparedCapture& one : run.captures) {
-    if (isSeen(one) && belongs(one)) images.push_back(one.thinned);
+    if (!one.thinned.difference_mm.empty() && belongs(one)) images.push_back(one.thinned);
   }
   return images;
 }
@@ -42,8 +42,8 @@ TableBlock blockTable(const ComparedRun& run) {
   TableBlock table{
       "B − A by block, surfaces. ± is one standard error of the mean over different poses, where there are "
       "several; – where there is nothing to see",
-      {"block", "captures", "bias [mm]", "RMS [mm]", "95 % within [mm]", "noise A [mm]", "noise B [mm]",
-       "valid A", "valid B", "masks agree"},
+      {"block", "captures", "over 300 mm apart", "bias [mm]", "RMS [mm]", "95 % within [mm]", "noise A [mm]",
+       "noise B [mm]", "valid A", "valid B", "masks agree"},
       {}};
   std::vector<std::string> names;
   for (const ComparedCapture& one : run.captures) {
@@ -58,13 +58,17 @@ TableBlock blockTable(const ComparedRun& run) {
       const double share = 1.0 / static_cast<double>(count);
       valid_a += share * one.valid_a, valid_b += share * one.valid_b, agree += share * one.masks_agree;
     }
-    std::vector<std::string> row{name, std::to_string(count), "–", "–", "–", "–", "–"};
+    std::vector<std::string> row{name, std::to_string(count), "–", "–", "–", "–", "–", "–"};
     const auto c = characterise(imagesOf(run, belongs));
+    if (c.poses_all_gross > 0)
+      row[1] = fmt::format("of {} captures, {} have nothing within {:.0f} mm", count, c.poses_all_gross,
+                           kGross_mm);
+    if (c.surface_pixels > 0) row[2] = shownPercent(grossShare(c));
     if (!c.regions.empty()) {
       const Region& main = mainRegionOf(c);
-      row[2] = withError(main.difference_mm.mean, main.difference_mm.standard_error);
-      row[3] = shown(main.difference_mm.rms, 2), row[4] = shown(main.difference_mm.p95_abs, 2);
-      row[5] = shown(main.noise_a_mm, 2), row[6] = shown(main.noise_b_mm, 2);
+      row[3] = withError(main.difference_mm.mean, main.difference_mm.standard_error);
+      row[4] = shown(main.difference_mm.rms, 2), row[5] = shown(main.difference_mm.p95_abs, 2);
+      row[6] = shown(main.noise_a_mm, 2), row[7] = shown(main.noise_b_mm, 2);
     }
     for (const double share : {valid_a, valid_b, agree}) row.push_back(shownPercent(share));
     table.rows.push_back(std::move(row));
@@ -215,15 +219,14 @@ std::vector<TraitVerdict> verdictsOf(const RunTraits& traits, const Characterist
 }
 
 /// Good only where no number differs; bad where the bias is far beyond A's noise.
-Tone toneOf(const std::vector<TraitVerdict>& verdicts, const Region& main) {
-  if (std::ranges::none_of(verdicts, &TraitVerdict::differs)) return Tone::Good;
-  return toneOfDifference(main) == Tone::Bad ? Tone::Bad : Tone::Fair;
+Tone toneOf(const std::vector<TraitVerdict>& verdicts, const Characteristics& c) {
+  if (toneOfDifference(c) == Tone::Bad) return Tone::Bad;
+  return std::ranges::none_of(verdicts, &TraitVerdict::differs) ? Tone::Good : Tone::Fair;
 }
 
 std::vector<Card> cardsOf(const Characteristics& c, const std::vector<TraitVerdict>& verdicts) {
-  std::vector<Card> cards =
-      nearnessCards(c, fmt::format("± standard error over {} different poses", c.places),
-                    toneOfDifference(mainRegionOf(c)));
+  std::vector<Card> cards = nearnessCards(
+      c, fmt::format("± standard error over {} different poses", c.places), toneOfDifference(c));
   const auto more = compare::cardsOf(verdicts);
   cards.insert(cards.end(), more.begin(), more.end());
   return cards;
@@ -233,13 +236,7 @@ std::vector<Card> cardsOf(const Characteristics& c, const std::vector<TraitVerdi
 
 Result<Finding> judgeRun(const ComparedRun& run) {
   const Characteristics c = characterise(imagesOf(run, [](const ComparedCapture&) { return true; }));
-  if (c.regions.empty()) {
-    return Error{
-        Error::Code::InvalidArgument,
-        "no pixel is valid in both cameras at any capture: there is nothing to compare. Do they look at "
-        "something within their range?"};
-  }
-  const Region& main = mainRegionOf(c);
+  if (c.regions.empty()) return nothingCompared(c, "capture");
   Finding finding;
   const RunTraits traits = traitsOf(run);
   const std::vector<TraitVerdict> verdicts = verdictsOf(traits, c);
@@ -250,7 +247,7 @@ Result<Finding> judgeRun(const ComparedRun& run) {
   finding.cards = cardsOf(c, verdicts);
   finding.section = {.id = run.is_locked ? "locked" : "run",
                      .title = run.is_locked ? "Locked captures" : "The plan's captures",
-                     .tone = toneOf(verdicts, main)};
+                     .tone = toneOf(verdicts, c)};
   auto& blocks = finding.section.blocks;
   for (const std::string& warning : run.warnings) blocks.push_back(Paragraph{"Note: " + warning});
   const auto seen = std::ranges::find_if(run.captures, isSeen);

@@ -12,10 +12,12 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "calib/compare/characteristics.h"
 #include "calib/compare/live_report.h"
 #include "calib/compare/statistics.h"
 #include "calib/plan/frame_traits.h"
 #include "calib/plan/noise_traits.h"
+#include "calib/plan/own_series.h"
 
 namespace toftwin::plan {
 namespace {
@@ -73,32 +75,31 @@ double meanOf(const std::vector<double>& values) {
   return values.empty() ? std::nan("") : compare::summarise(values).mean;
 }
 
-/// A camera, and how its own numbers are got from a capture.
-struct Side {
-  const char* name;
-  double (*range_mm)(const ComparedCapture&);
-  double (*noise_mm)(const ComparedCapture&);
-  double (*amplitude)(const ComparedCapture&);
-  double (*since_power_on_s)(const ComparedCapture&);
-};
-constexpr std::array kSides{Side{"A", [](const ComparedCapture& c) { return c.range_a_mm; },
-                                 [](const ComparedCapture& c) { return c.noise_a_mm; },
-                                 [](const ComparedCapture& c) { return c.amplitude_a; },
-                                 [](const ComparedCapture& c) { return c.record.a.since_power_on_s; }},
-                            Side{"B", [](const ComparedCapture& c) { return c.range_a_mm + c.difference_mm; },
-                                 [](const ComparedCapture& c) { return c.noise_b_mm; },
-                                 [](const ComparedCapture& c) { return c.amplitude_b; },
-                                 [](const ComparedCapture& c) { return c.record.b.since_power_on_s; }}};
+constexpr std::array kCameras{"A", "B"};
+
+/// The camera's series, and what it is without.
+OwnSeries ownSeriesOf(const ComparedRun& run, const char* kind, std::size_t camera, const char* what,
+                      TraitCollector& all) {
+  OwnSeries series = ownSeries(run, kind, camera);
+  if (series.captures.empty()) {
+    all.untold(
+        fmt::format("{} of {}: it has no pixel in all captures of kind {}", what, kCameras[camera], kind));
+  } else if (series.left_out > 0) {
+    all.untold(fmt::format("{} of {} at {} captures, in which it lost over half of its pixels", what,
+                           kCameras[camera], series.left_out));
+  }
+  return series;
+}
 
 void addDrift(const ComparedRun& run, TraitCollector& all) {
-  const Captures captures = capturesOf(run, "warm_up");
-  if (captures.empty()) return;
-  for (const Side& side : kSides) {
-    // Less the first capture's range, on which no number of a drift depends.
-    const double first_mm = side.range_mm(*captures.front());
-    compare::NamedRows rows{kDrift, side.name, column(captures, side.since_power_on_s),
-                            column(captures, [&](const auto& one) { return side.range_mm(one) - first_mm; }),
-                            numbersOf(captures)};
+  if (capturesOf(run, "warm_up").empty()) return;
+  for (std::size_t camera : {std::size_t{0}, std::size_t{1}}) {
+    const OwnSeries series = ownSeriesOf(run, "warm_up", camera, kDrift, all);
+    if (series.captures.empty()) continue;
+    const auto since = column(series.captures, [&](const ComparedCapture& one) {
+      return (camera == 0 ? one.record.a : one.record.b).since_power_on_s;
+    });
+    compare::NamedRows rows{kDrift, kCameras[camera], since, series.range_mm, numbersOf(series.captures)};
     const auto drift = compare::driftTraits(rows.x, rows.y);
     all.add(std::move(rows), drift);
   }
@@ -144,13 +145,26 @@ struct OverDistance {
   static constexpr std::size_t kMostSteps = 1'000'000;  ///< 25 km of them
 };
 
-/// B − A of a capture's compared pixels over A's range.
+/// What A weighs in the mean of both cameras' ranges by 1/σ². Of all means of the two it is the one whose
+/// noise does not go with that of B − A: steps of A's own range would show A's noise as a slope.
+double weightOfA(const ComparedCapture& one) {
+  const double a = one.noise_a_mm * one.noise_a_mm, b = one.noise_b_mm * one.noise_b_mm;
+  return a + b > 0.0 ? b / (a + b) : 0.5;  // no noise, or not known
+}
+
+/// B − A of a capture's compared pixels over the range to the plan's wall, of those that see it; where no
+/// pose tells that, over what both cameras read.
 void addDifference(const ComparedCapture& one, OverDistance& rows) {
   const Image<float> difference = compare::comparedDifference_mm(one.thinned);
+  const double of_b = 1.0 - weightOfA(one);
   std::vector<double> at, of;
   for (std::size_t i = 0; i < difference.size(); ++i) {
-    at.push_back(1e-3 * static_cast<double>(one.thinned.range_a_mm[i]));
-    of.push_back(static_cast<double>(difference[i]));
+    const auto d_mm = static_cast<double>(difference[i]);
+    const double read_mm = static_cast<double>(one.thinned.range_a_mm[i]) + of_b * d_mm;
+    const double wall_mm =
+        one.wall_range_m.empty() ? read_mm : 1e3 * static_cast<double>(one.wall_range_m[i]);
+    if (!(std::abs(read_mm - wall_mm) <= compare::kGross_mm)) continue;
+    at.push_back(1e-3 * wall_mm), of.push_back(d_mm);
   }
   if (difference.empty()) at.push_back(1e-3 * one.range_a_mm), of.push_back(one.difference_mm);
   rows.add(one.record.number, at, of);
@@ -175,57 +189,71 @@ Captures unwrapped(const Captures& captures, const std::string& whose,
   return chosen;
 }
 
-void addHarmonics(const ComparedRun& run, TraitCollector& all) {
-  const Captures captures = capturesOf(run, "distance");
-  if (captures.empty()) return;
+void addHarmonicsOfDifference(const ComparedRun& run, const Captures& captures, TraitCollector& all) {
   const auto& [of_a, of_b] = run.frequency_hz;
   if (of_a.empty() || !areTheSame(of_a, of_b)) {
     all.untold(fmt::format("harmonics of B − A: A is modulated at {}, B at {}; their waves are told apart only where "
                            "both have the same frequencies",
                            wordsOf(of_a), wordsOf(of_b)));
-  } else {
-    OverDistance rows;
-    const auto eitherWraps = [](const ComparedCapture& one) {
-      return std::ranges::any_of(one.seen, isWrapped);
-    };
-    for (const ComparedCapture* one : unwrapped(captures, "B − A", eitherWraps, all))
-      addDifference(*one, rows);
-    all.add("harmonics", "B − A",
-            compare::fittedHarmonics(rows.distance_m, rows.error_mm, of_a, rows.capture));
+    return;
   }
+  OverDistance rows;
+  const auto eitherWraps = [](const ComparedCapture& one) {
+    return std::ranges::any_of(one.seen, isWrapped);
+  };
+  const Captures used = unwrapped(captures, "B − A", eitherWraps, all);
+  for (const ComparedCapture* one : used) addDifference(*one, rows);
+  const auto without = std::ranges::count_if(used, [](const auto* one) { return one->wall_range_m.empty(); });
+  if (without > 0) {
+    all.untold(
+        fmt::format("how far the wall was at {} of {} captures (harmonics of B − A): no pose is known; they "
+                    "are over the mean of "
+                    "what A and B read, each weighted by 1/σ² of its noise",
+                    without, used.size()));
+  }
+  all.add("harmonics", "B − A", compare::fittedHarmonics(rows.distance_m, rows.error_mm, of_a, rows.capture));
+}
+
+void addHarmonics(const ComparedRun& run, TraitCollector& all) {
+  const Captures captures = capturesOf(run, "distance");
+  if (captures.empty()) return;
+  addHarmonicsOfDifference(run, captures, all);
   for (std::size_t camera : {std::size_t{0}, std::size_t{1}}) {
     OverDistance rows;
     const auto wraps = [camera](const ComparedCapture& one) { return isWrapped(one.seen[camera]); };
-    for (const ComparedCapture* one : unwrapped(captures, kSides[camera].name, wraps, all))
+    for (const ComparedCapture* one : unwrapped(captures, kCameras[camera], wraps, all))
       rows.add(one->record.number, one->seen[camera].wall_range_m, one->seen[camera].wall_error_mm);
     if (rows.distance_m.empty()) continue;  // no wall, a pose by planes, or all wrapped: said elsewhere
     if (run.frequency_hz[camera].empty()) {
-      all.untold(fmt::format("harmonics of {}: its frames say no modulation frequency", kSides[camera].name));
+      all.untold(fmt::format("harmonics of {}: its frames say no modulation frequency", kCameras[camera]));
       continue;
     }
     const auto fitted =
         compare::fittedHarmonics(rows.distance_m, rows.error_mm, run.frequency_hz[camera], rows.capture);
-    all.add({kHarmonicsOfWall, kSides[camera].name, rows.distance_m, rows.error_mm, rows.condition}, fitted);
+    all.add({kHarmonicsOfWall, kCameras[camera], rows.distance_m, rows.error_mm, rows.condition}, fitted);
   }
 }
 
 void addAmplitudeAndAmbient(const ComparedRun& run, TraitCollector& all) {
   if (const Captures captures = capturesOf(run, "exposure"); !captures.empty()) {
     all.add("error over amplitude", "B − A",
-            compare::amplitudeTraits(column(captures, kSides[0].amplitude), differencesOf(captures)));
+            compare::amplitudeTraits(column(captures, [](const auto& one) { return one.amplitude_a; }),
+                                     differencesOf(captures)));
     for (std::size_t camera : {std::size_t{0}, std::size_t{1}}) {
       const auto error = column(captures, [&](const auto& one) { return meanOf(one.seen[camera].wall_error_mm); });
       if (std::ranges::any_of(error, [](double e) { return std::isfinite(e); }))
-        all.add("error over amplitude, against the plan's wall", kSides[camera].name,
-                compare::amplitudeTraits(column(captures, kSides[camera].amplitude), error));
+        all.add("error over amplitude, against the plan's wall", kCameras[camera],
+                compare::amplitudeTraits(
+                    column(captures, [&](const auto& one) { return one.own[camera].amplitude; }), error));
     }
   }
-  const Captures captures = capturesOf(run, "ambient");
-  if (captures.empty()) return;
-  const auto light = column(captures, [](const auto& one) { return one.record.ambient_klx; });
-  for (const Side& side : kSides) {
-    all.add("ambient light", side.name,
-            compare::ambientTraits(light, column(captures, side.range_mm), column(captures, side.noise_mm)));
+  if (capturesOf(run, "ambient").empty()) return;
+  for (std::size_t camera : {std::size_t{0}, std::size_t{1}}) {
+    const OwnSeries series = ownSeriesOf(run, "ambient", camera, "ambient light", all);
+    if (series.captures.empty()) continue;
+    const auto light = column(series.captures, [](const auto& one) { return one.record.ambient_klx; });
+    all.add("ambient light", kCameras[camera],
+            compare::ambientTraits(light, series.range_mm, series.noise_mm));
   }
 }
 

@@ -10,7 +10,8 @@
 
 namespace toftwin::plan {
 
-/// A characteristic of a run. Over captures each is a row: its mean over the pixels that both cameras see. Errors of a
+/// A characteristic of a run. Over captures each is a row: of B − A its mean over the
+/// pixels that both cameras see, of a camera by itself over its own. Errors of a
 /// camera by itself are against the surfaces that the plan puts before it.
 using RunTrait = compare::NamedTrait;
 using RunTraits = compare::NamedTraits;

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/plan/seen.h"
 
+#include <toftwin/modulation.h>
+
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <limits>
 #include <numbers>
-#include <numeric>
 
+#include "calib/compare/characteristics.h"
 #include "calib/intrinsics/brightness.h"
 #include "calib/plan/place.h"
 #include "calib/plan/seen_plate.h"
@@ -15,9 +16,9 @@
 namespace toftwin::plan {
 namespace {
 
+using compare::kGross_mm;
 constexpr float kNaNf = std::numeric_limits<float>::quiet_NaN();
 constexpr int kCell = 8;                 ///< pixels along a side
-constexpr double kGross_mm = 300.0;      ///< as in comparing: another surface, or another period
 constexpr double kFewWraps = 0.01;       ///< of a wall's readings; more shift the mean of the rest
 constexpr int kMiddle = 96;              ///< pixels along a side that the noise is taken from
 constexpr double kBoardReach_m = 0.9;    ///< of a corner's boards, which are 1 m or wider
@@ -35,12 +36,9 @@ struct Periods {
 
   explicit Periods(std::span<const double> frequency_hz) {
     if (frequency_hz.empty()) return;
-    std::int64_t common_khz = 0;
-    for (const double f : frequency_hz)
-      common_khz = std::gcd(common_khz, std::int64_t{std::llround(1e-3 * f)});
+    const Frequency common = commonFrequency(frequency_hz, [](double hz) { return hz * hertz; });
     shortest_m = unambiguousRange(frequency_hz.back() * hertz).in(metre);
-    common_m =
-        common_khz > 0 ? unambiguousRange(1e3 * static_cast<double>(common_khz) * hertz).in(metre) : 0.0;
+    common_m = common > 0_Hz ? unambiguousRange(common).in(metre) : 0.0;
   }
   static double off(double error_m, double period_m) {
     return period_m > 0.0 ? std::round(error_m / period_m) : 0.0;
@@ -176,6 +174,12 @@ Image<float> wallRange_m(const Plan& plan, const BlockSpec& block, const CameraI
     }
   }
   return range;
+}
+
+Image<float> wallRange_m(const Plan& plan, const CaptureRecord& record, const compare::Stack& stack) {
+  const BlockSpec* block = blockOf(plan, record);
+  if (block == nullptr || !stack.pose()) return {};
+  return wallRange_m(plan, *block, stack.camera(), *stack.pose());
 }
 
 Result<ReadFrame> readOf(const Frame& frame) {

@@ -66,5 +66,7 @@ CameraSeen seenOf(const Plan& plan, const CaptureRecord& record, const compare::
 /// Range to the target's wall along each pixel's ray; NaN where it is not before the camera, or ends.
 Image<float> wallRange_m(const Plan& plan, const BlockSpec& block, const CameraInfo& camera,
                          const Transform<World, Camera>& pose);
+/// The same for the block and the pose of a capture; an empty image where either is not known.
+Image<float> wallRange_m(const Plan& plan, const CaptureRecord& record, const compare::Stack& stack);
 
 }  // namespace toftwin::plan

@@ -79,6 +79,10 @@ class Taker {
   using Sink = std::function<Result<>(const Frame&)>;
   Result<Taken> take(const PlannedCapture& planned, compare::Feed& a, compare::Feed& b, const Sink& to_a,
                      const Sink& to_b);
+  /// Before a block whose poses are taken from the board: whether a B that takes poses, which is put where A
+  /// sees the board and so need not look itself, sees it, where the plan has it. Nothing of other blocks and
+  /// cameras.
+  Result<> checkBoardOf(const PlannedCapture& planned, compare::Feed& b);
   /// Puts poses and settings of a camera back to what they were before the first capture with it.
   std::vector<std::string> putBack(compare::Feed& feed);
 

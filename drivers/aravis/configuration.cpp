@@ -52,7 +52,8 @@ Result<> setTrigger(const Connection& connection, const Features& features, cons
   return {};
 }
 
-/// Which images it sends. Several in one frame need GigE's multipart, which USB has anyway.
+/// Which images it sends. Several in one frame need multipart, which the library reads from GigE cameras
+/// alone.
 Result<> setComponents(const Connection& connection, const Features& features, const Keys& keys) {
   const auto there = features.entries("ComponentSelector");
   for (const std::string& one : keys.components) {
@@ -72,11 +73,14 @@ Result<> setComponents(const Connection& connection, const Features& features, c
   }
   Failure failure;
   ArvCamera* camera = connection.camera();
-  if (arv_camera_is_gv_device(camera) == FALSE || enabled < 2) return {};
-  if (arv_camera_gv_is_multipart_supported(camera, failure.slot()) == FALSE || failure) {
-    return Error{Error::Code::Incompatible,
-                 "aravis: the camera sends several images, but not in one frame (multipart); "
-                 "choose one by components = [\"Range\"]"};
+  if (enabled < 2) return {};
+  const bool is_gige = arv_camera_is_gv_device(camera) != FALSE;
+  if (!is_gige || arv_camera_gv_is_multipart_supported(camera, failure.slot()) == FALSE || failure) {
+    return Error{
+        Error::Code::Incompatible,
+        fmt::format("aravis: the camera sends several images, but {} (multipart); "
+                    "choose one by components = [\"Range\"]",
+                    is_gige ? "not in one frame" : "libaravis reads only one of a USB camera's frame")};
   }
   arv_camera_gv_set_multipart(camera, TRUE, failure.slot());
   if (failure) return failure.toError("multipart cannot be switched on");

@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "drivers/aravis/discovery.h"
+#include "drivers/usb/cameras.h"
 
 namespace toftwin::drivers::aravis {
 namespace {
@@ -26,25 +27,43 @@ constexpr std::uint32_t kHasController = 0x3;
 
 std::mutex library_mutex;
 
-/// USB3 Vision cameras by the library's names for them.
-std::vector<std::string> usbCameras() {
-  const auto lock = lockLibrary();
-  ArvInterface* usb = arv_uv_interface_get_instance();
-  arv_interface_update_device_list(usb);
-  std::vector<std::string> names;
-  for (unsigned i = 0; i < arv_interface_get_n_devices(usb); ++i) {
-    const char* name = arv_interface_get_device_id(usb, i);
-    if (name != nullptr) names.emplace_back(name);
+/// A USB3 Vision camera by what it calls itself, in ASCII, as the library asks for it.
+struct UsbCamera {
+  std::string maker, product, serial;
+  [[nodiscard]] std::string name() const { return fmt::format("{}-{}-{}", maker, product, serial); }
+};
+
+/// Other characters than ASCII are question marks to libusb; the kernel says them in UTF-8.
+std::string asciiOf(std::string_view text) {
+  std::string ascii;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    const bool is_first = (byte & 0xC0U) != 0x80U;
+    if (is_first) ascii.push_back(byte < 0x80U ? c : '?');
   }
-  return names;
+  return ascii;
 }
 
-/// A USB camera that a user means by that: its name, or the serial number at its end.
-std::optional<std::string> usbCameraCalled(const std::string& called) {
-  for (std::string& name : usbCameras()) {
-    if (called == "any" || name == called || name.ends_with("-" + called)) return std::move(name);
+/// The library's own list knows no camera that came after it was first made, unless udev tells it: not in a
+/// container.
+std::vector<UsbCamera> usbCameras() {
+  std::vector<UsbCamera> cameras;
+  for (const usb::Device& one : usb::list()) {
+    if (one.camera == &usb::usb3VisionCamera())
+      cameras.push_back({asciiOf(one.maker), asciiOf(one.product), asciiOf(one.serial)});
   }
-  return std::nullopt;
+  return cameras;
+}
+
+/// The one that a user means by that. The library's tools have its GUID where we have its product's name.
+std::optional<UsbCamera> usbCameraCalled(const std::string& called) {
+  const auto cameras = usbCameras();
+  const auto found = std::ranges::find_if(cameras, [&](const UsbCamera& one) {
+    const bool is_name = called.starts_with(one.maker + "-") && called.ends_with("-" + one.serial);
+    return called == "any" || called == one.serial || is_name;
+  });
+  if (found == cameras.end()) return std::nullopt;
+  return *found;
 }
 
 Object<GInetAddress> inetAddress(std::uint32_t address) {
@@ -73,7 +92,7 @@ std::unique_lock<std::mutex> lockLibrary() { return std::unique_lock{library_mut
 std::vector<std::string> listCameras() {
   std::vector<std::string> names;
   for (const GigeCamera& one : discover({.wait = kDiscoveryWait})) names.push_back(one.name());
-  for (std::string& one : usbCameras()) names.push_back(std::move(one));
+  for (const UsbCamera& one : usbCameras()) names.push_back(one.name());
   std::ranges::sort(names);
   return names;
 }
@@ -104,6 +123,10 @@ std::vector<Connection::ControlSocket> Connection::socketsOn(std::uint32_t addre
 Result<Connection> Connection::open(const std::string& name) {
   if (const auto address = addressOf(name)) return openGige(*address);
   const bool is_any = name == "any" || name.empty();
+  // Looking takes no time, unlike waiting for answers from the network, and so it is done once more after
+  // that.
+  const auto onUsb = [&] { return usbCameraCalled(is_any ? "any" : name); };
+  if (const auto usb = onUsb()) return openUsb(usb->maker, usb->product, usb->serial);
   std::vector<std::string> there;
   const auto is_it = [&](const GigeCamera& one) { return is_any || one.isCalled(name); };
   for (const GigeCamera& one :
@@ -111,16 +134,17 @@ Result<Connection> Connection::open(const std::string& name) {
     if (is_it(one)) return openGige(one.address);
     there.push_back(one.name());
   }
-  if (const auto usb = usbCameraCalled(is_any ? "any" : name)) return openUsb(*usb);
-  for (std::string& one : usbCameras()) there.push_back(std::move(one));
+  if (const auto usb = onUsb()) return openUsb(usb->maker, usb->product, usb->serial);
+  for (const UsbCamera& one : usbCameras()) there.push_back(one.name());
   std::string why =
       "none answers. Is it on, and in this computer's subnet? (toftwin doctor knows what keeps "
       "answers away)";
   if (!there.empty()) why = fmt::format("there is: {}", fmt::join(there, ", "));
   if (there.empty() && !seesInterfaces()) {
     why =
-        "this process may not see its network interfaces, so it cannot look for one. Name its IP "
-        "address, or allow AF_NETLINK (systemd: RestrictAddressFamilies)";
+        "none is on USB, and this process may not see its network interfaces, so it cannot look for one "
+        "there. "
+        "Name its IP address, or allow AF_NETLINK (systemd: RestrictAddressFamilies)";
   }
   return Error{Error::Code::NotFound, fmt::format("there is no camera aravis:{}; {}", name, why)};
 }
@@ -160,18 +184,23 @@ Result<Connection> Connection::openGige(std::uint32_t address) {
   return connection;
 }
 
-Result<Connection> Connection::openUsb(const std::string& id) {
+Result<Connection> Connection::openUsb(const std::string& maker, const std::string& product,
+                                       const std::string& serial) {
   const auto lock = lockLibrary();
+  const std::string what = fmt::format("{}-{}-{} cannot be opened", maker, product, serial);
   Failure failure;
   const Object<ArvDevice> device{
-      arv_interface_open_device(arv_uv_interface_get_instance(), id.c_str(), failure.slot())};
+      arv_uv_device_new(maker.c_str(), product.c_str(), serial.c_str(), failure.slot())};
   if (failure || device == nullptr) {
-    Error error = failure.toError(fmt::format("{} cannot be opened", id));
-    error.message += "; may this user open it (udev rules), and does no other program?";
+    Error error = failure.toError(what);
+    const bool is_busy = error.message.find("LIBUSB_ERROR_BUSY") != std::string::npos;
+    if (is_busy) error.code = Error::Code::Busy;
+    error.message +=
+        is_busy ? "; another program has it, close that one" : "; may this user open it (udev rules)?";
     return error;
   }
   Object<ArvCamera> camera{arv_camera_new_with_device(device.get(), failure.slot())};
-  if (failure || camera == nullptr) return failure.toError(fmt::format("{} cannot be opened", id));
+  if (failure || camera == nullptr) return failure.toError(what);
   return Connection{std::move(camera), std::nullopt};
 }
 

@@ -56,7 +56,8 @@ class Connection {
   Connection(Object<ArvCamera> camera, std::optional<std::uint32_t> address);
   static std::vector<ControlSocket> socketsOn(std::uint32_t address);
   static Result<Connection> openGige(std::uint32_t address);
-  static Result<Connection> openUsb(const std::string& id);
+  static Result<Connection> openUsb(const std::string& maker, const std::string& product,
+                                    const std::string& serial);
 
   std::unique_ptr<std::atomic<bool>> is_lost_ = std::make_unique<std::atomic<bool>>(false);
   Object<ArvCamera> camera_;

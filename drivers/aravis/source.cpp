@@ -47,7 +47,10 @@ class AravisSource final : public Source {
         clock_(DeviceClock::Options{.follows_steps_ahead = keys_.ptp}) {
     if (keys_.chunks) chunks_.reset(arv_camera_create_chunk_parser(connection_.camera()));
   }
-  ~AravisSource() override { stop(); }
+  ~AravisSource() override {
+    stop();
+    askWhetherItLives();  // closing says goodbye, too
+  }
 
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
 
@@ -67,6 +70,7 @@ class AravisSource final : public Source {
 
   void stop() override {
     reportLosses(true);
+    if (stream_.isRunning()) askWhetherItLives();
     if (is_gone_ || connection_.isLost()) {
       connection_.giveUp();
       stream_.abandon();
@@ -210,7 +214,7 @@ class AravisSource final : public Source {
     moment.clock = relation(filled.arrived);
     keepAlive();
     if (keys_.ptp) ptp_.look(Features{connection_.device()}, info_.serial, filled.arrived);
-    if (filled.arrived - temperature_at_ > kTemperatureEvery) {
+    if (!temperature_at_ || filled.arrived - *temperature_at_ > kTemperatureEvery) {
       temperature_at_ = filled.arrived;
       temperature_c_ = Features{connection_.device()}.number("DeviceTemperature");
     }
@@ -254,6 +258,13 @@ class AravisSource final : public Source {
 
   // ---- losing it -------------------------------------------------------------------------------
 
+  /// Before the library says something to a GigE camera that nobody waits for an answer of: if the camera is
+  /// gone, it would say it for seconds.
+  void askWhetherItLives() {
+    if (is_gone_ || !connection_.address()) return;
+    if (const auto alive = connection_.check(kAliveWithin); !alive) lost(alive.error());
+  }
+
   /// The library's heartbeat comes once a second; a camera may wait for it little longer, so that
   /// it is free again soon after a cut. It has just sent a frame, so it answers.
   void keepAlive() {
@@ -289,7 +300,7 @@ class AravisSource final : public Source {
   PtpWatch ptp_;
   Duration exposure_ = 0_s;
   std::optional<double> temperature_c_;
-  SteadyTime temperature_at_{};
+  std::optional<SteadyTime> temperature_at_;
   SteadyTime asked_at_{}, kept_alive_at_{};
   std::optional<SteadyTime> triggered_at_;
   std::optional<std::uint64_t> last_id_;

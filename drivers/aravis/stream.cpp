@@ -21,7 +21,7 @@ std::string_view textOf(ArvBufferStatus status) {
     case ARV_BUFFER_STATUS_MISSING_PACKETS:
       return "packets of it did not come";
     case ARV_BUFFER_STATUS_SIZE_MISMATCH:
-      return "it was larger than the camera had said";
+      return "it was larger or smaller than the camera had said";
     case ARV_BUFFER_STATUS_WRONG_PACKET_ID:
       return "its packets were numbered wrongly";
     case ARV_BUFFER_STATUS_ABORTED:
@@ -48,7 +48,12 @@ std::vector<Part> partsOf(ArvBuffer* buffer, std::size_t allocated) {
   std::vector<Part> parts;
   std::size_t size = 0;
   const void* data = arv_buffer_get_data(buffer, &size);
-  if (data == nullptr) return parts;
+  const ArvBufferPayloadType payload = arv_buffer_get_payload_type(buffer);
+  const bool may_have_images = payload == ARV_BUFFER_PAYLOAD_TYPE_IMAGE ||
+                               payload == ARV_BUFFER_PAYLOAD_TYPE_EXTENDED_CHUNK_DATA ||
+                               payload == ARV_BUFFER_PAYLOAD_TYPE_MULTIPART;
+  // Of others the library, asked for an image's size, complains on stderr.
+  if (data == nullptr || !may_have_images) return parts;
   const auto begin = reinterpret_cast<std::uintptr_t>(data);
   const std::uint64_t received = std::min(size, allocated);
   for (guint i = 0; i < arv_buffer_get_n_parts(buffer); ++i) {

@@ -89,7 +89,8 @@ Result<PcicStream::Message> PcicStream::receive(SteadyTime deadline, const std::
   while (true) {
     auto message = reader_.next();
     if (!message) return lost(message.error().message);
-    if (*message) return Message{**std::move(message), arrived_};
+    // What is left of the last piece is the beginning of the next one.
+    if (*message) return Message{**std::move(message), std::exchange(arrived_, read_at_)};
     if (!is_reading_ && !failure_) beginRead();
     const auto end = loop_.waitUntil([this] { return !is_reading_; }, deadline, stop);
     if (end == EventLoop::End::Stopped) return Error{Error::Code::Stopped, "asked to stop"};
@@ -106,7 +107,8 @@ void PcicStream::beginRead() {
       failure_ = error;
       return;
     }
-    if (!reader_.isWithinMessage()) arrived_ = Clock::now();
+    read_at_ = Clock::now();
+    if (!reader_.isWithinMessage()) arrived_ = read_at_;
     reader_.feed(std::span{piece_}.first(size));
   });
 }

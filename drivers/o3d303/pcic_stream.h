@@ -54,7 +54,8 @@ class PcicStream {
   std::deque<Message> kept_;
   bool is_reading_ = false;
   std::optional<boost::system::error_code> failure_;
-  SteadyTime arrived_{};
+  SteadyTime read_at_{};  ///< the last piece
+  SteadyTime arrived_{};  ///< the piece with the first bytes of the message that comes next
   int next_ticket_ = 1000;
   std::array<std::byte, 65'536> piece_;
 

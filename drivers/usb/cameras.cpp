@@ -60,6 +60,7 @@ std::optional<Device> deviceAt(const std::filesystem::path& folder) {
   if (device.camera == nullptr) {
     if (!hasUsb3Vision(folder)) return std::nullopt;
     device.camera = &usb3VisionCamera();
+    device.maker = lineOf(folder / "manufacturer");
     device.product = lineOf(folder / "product");
   }
   device.port = folder.filename().string();

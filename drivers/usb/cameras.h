@@ -31,7 +31,7 @@ struct Device {
   std::string port;     ///< where it is plugged in: "2-1.4" is bus 2, port 1, port 4 of a hub there
   double mbit_s = 0.0;  ///< of the link, as negotiated
   std::string serial;
-  std::string product;         ///< as it calls itself, where it is known by an interface alone
+  std::string maker, product;  ///< as it calls itself, where it is known by an interface alone
   std::filesystem::path node;  ///< "/dev/bus/usb/002/005"
 };
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim/decode/unwrap.h"
 
+#include <toftwin/modulation.h>
+
 #include <array>
 #include <cmath>
-#include <cstdint>
 #include <limits>
 #include <numbers>
-#include <numeric>
 
 #include "sim/decode/unwrap_kinect_v2.h"
 
@@ -16,14 +16,11 @@ Unwrapped unwrapKinectV2(double cycles_80, double cycles_16, double cycles_120, 
 }
 
 Unwrapper::Unwrapper(std::span<const Frequency> frequencies, double speed_of_light) {
-  std::int64_t common_khz = 0;
   for (std::size_t i = 0; i < frequencies.size(); ++i) {
-    const double hz = frequencies[i].in(hertz);
-    period_m_.push_back(speed_of_light / (2.0 * hz));
-    common_khz = std::gcd(common_khz, static_cast<std::int64_t>(std::llround(hz / 1e3)));
+    period_m_.push_back(speed_of_light / (2.0 * frequencies[i].in(hertz)));
     if (period_m_[i] < period_m_[highest_]) highest_ = i;
   }
-  unambiguous_range_m_ = speed_of_light / (2e3 * static_cast<double>(common_khz));
+  unambiguous_range_m_ = speed_of_light / (2.0 * commonFrequency(frequencies).in(hertz));
   candidates_ = static_cast<int>(std::lround(unambiguous_range_m_ / period_m_[highest_]));
 }
 

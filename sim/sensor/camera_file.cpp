@@ -2,10 +2,10 @@
 #include "sim/sensor/camera_file.h"
 
 #include <fmt/format.h>
+#include <toftwin/modulation.h>
 
 #include <cmath>
 #include <cstdint>
-#include <numeric>
 
 #include "sim/sensor/correlate.h"
 
@@ -35,16 +35,17 @@ void readEffect(settings::Table& table, std::vector<AnyEffect>& effects) {
 }
 
 void checkFrequencies(settings::Table& table, const CameraFile& file) {
-  std::int64_t common_khz = 0, highest_khz = 0;
+  std::int64_t highest_khz = 0;
   for (const auto& modulation : file.modulations) {
     const double khz = modulation.frequency.in(hertz) / 1e3;
     if (std::abs(khz - std::round(khz)) > 1e-6) {
       table.complain("modulation",
                      fmt::format("frequency_mhz = {:.9g} must be whole kilohertz", khz / 1e3));
     }
-    common_khz = std::gcd(common_khz, std::llround(khz));
     highest_khz = std::max<std::int64_t>(highest_khz, std::llround(khz));
   }
+  const Frequency common = commonFrequency(file.modulations, &CameraFile::Modulation::frequency);
+  const std::int64_t common_khz = std::llround(common.in(hertz) / 1e3);
   constexpr std::int64_t kMostCandidates = 4096;
   if (common_khz > 0 && highest_khz / common_khz > kMostCandidates) {
     table.complain(

@@ -78,6 +78,8 @@ std::shared_ptr<const SensorModel::Impl> SensorModel::build(Impl impl) {
   if (!impl.lens_id.empty()) impl.camera.calibration_id = impl.lens_id;
   impl.id = contentHash(canonicalText(impl.file, impl.effects));
   impl.responses = responsesOf(impl.file);
+  // The table of a pulse takes 20 ms to make, and is the same for any effects and any lens.
+  std::vector<double> pulse_ranges_m = std::move(impl.decoder.pulse_ranges_m);
   impl.decoder = impl.file.decoder;
   const auto& sampling = impl.file.sampling;
   for (const Response& response : impl.responses) {
@@ -90,7 +92,8 @@ std::shared_ptr<const SensorModel::Impl> SensorModel::build(Impl impl) {
     impl.decoder.pulse_scheme = keys.pulse.scheme;
     impl.decoder.pulse_width = keys.pulse.width;
     if (sampling.factory_calibration == CameraFile::FactoryCalibration::Waveform)
-      impl.decoder.pulse_ranges_m = rangesOfRatios(keys.pulse, keys.knots);
+      impl.decoder.pulse_ranges_m =
+          pulse_ranges_m.empty() ? rangesOfRatios(keys.pulse, keys.knots) : std::move(pulse_ranges_m);
   }
   if (sampling.phase_tables) {
     impl.decoder.pixel_turns =
@@ -234,7 +237,6 @@ bool SensorModel::remembers() const {
 
 SensorModel SensorModel::withLens(const CameraInfo& lens) const {
   Impl changed = *impl_;
-  changed.decoder = {};
   changed.rays = {};
   changed.file.lens = {.width = lens.width,
                        .height = lens.height,
@@ -249,7 +251,6 @@ SensorModel SensorModel::withLens(const CameraInfo& lens) const {
 
 SensorModel SensorModel::withEffects(std::vector<AnyEffect> effects) const {
   Impl changed = *impl_;
-  changed.decoder = {};
   changed.effects = std::move(effects);
   return SensorModel{build(std::move(changed))};
 }

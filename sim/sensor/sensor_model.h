@@ -83,6 +83,11 @@ class SensorModel {
   /// in; pose, sample count, surfaces, region and seed are the caller's.
   [[nodiscard]] TraceRequest traceRequest() const;
 
+  /// By how much noise moves the mean of the ranges there, over their variance (1/m): a factory's table of a
+  /// cyclic error is not straight. E g(c + n) ≈ g + ½ g″ σ², so ½ g″/g′² of what it gives; of several
+  /// frequencies, each weighted as it is certain, the sum of theirs. 0 without such a table.
+  [[nodiscard]] double noiseShiftPerVariance(Length range) const;
+
   /// One exposure: light → effects → samples → effects → decoding → range → effects. `moment` gives
   /// the covariates (time since power-on, temperatures, ambient); `seed` and `frame` key all noise.
   /// `region_x`, `region_y` say where the light's top left pixel lies in the full image, `before` what

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // The numbers of a sensor model that can be changed while it runs.
 #include <fmt/format.h>
+#include <toftwin/modulation.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <numeric>
 #include <utility>
 #include <variant>
 
@@ -29,9 +29,8 @@ std::int64_t kilohertzOf(const CameraFile::Modulation& modulation) {
 
 /// Where the ranges of those frequencies together begin anew: c / 2 gcd(f).
 Length repeatsAfter(const std::vector<CameraFile::Modulation>& modulations, double speed_of_light) {
-  std::int64_t common_khz = 0;
-  for (const auto& one : modulations) common_khz = std::gcd(common_khz, kilohertzOf(one));
-  return (speed_of_light / (2e3 * static_cast<double>(common_khz))) * metre;
+  const Frequency common = commonFrequency(modulations, &CameraFile::Modulation::frequency);
+  return (speed_of_light / (2.0 * common.in(hertz))) * metre;
 }
 
 }  // namespace
@@ -104,7 +103,6 @@ std::vector<std::string> SensorModel::parameterNames() const {
 
 Result<SensorModel> SensorModel::with(std::string_view parameter, double value) const {
   Impl changed = *impl_;
-  changed.decoder = {};
   bool is_known = false;
   if (parameter == "exposure_us") {
     is_known = true;

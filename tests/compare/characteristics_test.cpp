@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "calib/compare/drift.h"
+#include "calib/compare/live_report.h"
 #include "calib/compare/statistics.h"
 
 namespace toftwin::compare {
@@ -260,6 +261,65 @@ TEST(Edges, AreNotWhatNoiseMakesOfAWall) {
     EXPECT_GT(taken_for_edges, 1000u) << frames;  // the test has something to tell apart
   }
   EXPECT_TRUE(std::isnan(noiseOfMean(Image<float>(4, 4, 1.0F), 1)(2, 2)));
+}
+
+/// Its numbers are those of surfaces; where those are less than half of the pixels, it says of how many.
+TEST(Headline, SaysHowManyPixelsItIsOfWhereTheyAreLessThanHalf) {
+  Characteristics c;
+  c.regions = {Region{.name = "all pixels", .difference_mm = {.n = 1000, .mean = 40.0, .p95_abs = 90.0}},
+               Region{.name = "surfaces",
+                      .difference_mm = {.n = 500, .mean = -2.5, .standard_error = 0.25, .p95_abs = 7.0}}};
+  c.noise_ratio.median = 1.5;
+  EXPECT_EQ(
+      nearnessInWords("cam", "twin", c),
+      "twin (B) is within 7.0 mm of cam (A) for 95 % of the pixels on surfaces; on average it reads 2.50 ± "
+      "0.25 mm nearer, and its noise is 1.50 times A's");
+  c.regions[1].difference_mm.n = 499, c.regions[1].difference_mm.mean = 2.5;
+  EXPECT_EQ(nearnessInWords("cam", "twin", c),
+            "twin (B) is within 7.0 mm of cam (A) for 95 % of the pixels on surfaces, which are only 499 of "
+            "all 1000 "
+            "pixels compared; on average it reads 2.50 ± 0.25 mm farther, and its noise is 1.50 times A's");
+}
+
+/// Two poses of 10 × 10 pixels, valid in both, at which B is so much farther in a part of them.
+std::vector<PoseComparison> withGrossPixels(std::size_t at_first, std::size_t at_second) {
+  std::vector<PoseComparison> poses;
+  for (const std::size_t gross : {at_first, at_second}) {
+    PoseComparison pose;
+    pose.range_a_mm = Image<float>(10, 10, 3000.0F), pose.difference_mm = Image<float>(10, 10, 2.0F);
+    pose.noise_a_mm = pose.noise_b_mm = Image<float>(10, 10, 5.0F);
+    pose.valid_a = pose.valid_b = Image<float>(10, 10, 1.0F);
+    pose.edge = pose.flying_a = pose.flying_b = Image<std::uint8_t>(10, 10);
+    for (std::size_t i = 0; i < gross; ++i) pose.difference_mm[i] = -2500.0F;
+    poses.push_back(std::move(pose));
+  }
+  return poses;
+}
+
+TEST(Headline, BeginsWithPixelsThatAreFartherApartThanWhatItTells) {
+  const Characteristics none = characterise(withGrossPixels(0, 2));
+  EXPECT_THAT(nearnessInWords("cam", "twin", none), testing::StartsWith("twin (B) is within"));
+  EXPECT_EQ(toneOfDifference(none), Tone::Good);
+  EXPECT_EQ(nearnessCards(none, "", Tone::Good).size(), 4u);
+
+  const Characteristics some = characterise(withGrossPixels(0, 4));
+  EXPECT_THAT(
+      nearnessInWords("cam", "twin", some),
+      testing::StartsWith("2 % of what both see on surfaces is over 300 mm apart, and in no number of "
+                          "the rest. twin (B) is within"));
+  EXPECT_EQ(toneOfDifference(some), Tone::Bad);
+  const auto cards = nearnessCards(some, "", Tone::Good);
+  EXPECT_EQ(cards.front().value, "2 %");
+  EXPECT_EQ(cards.front().tone, Tone::Bad);
+
+  const Characteristics half = characterise(withGrossPixels(100, 0));
+  EXPECT_THAT(
+      nearnessInWords("cam", "twin", half),
+      testing::StartsWith("50 % of what both see on surfaces is over 300 mm apart, and in no number of "
+                          "the rest; at 1 of the poses nothing else is seen. twin"));
+  EXPECT_EQ(half.places, 1U) << "a pose without a pixel compared is no draw of B − A";
+  EXPECT_THAT(nothingCompared(characterise(withGrossPixels(100, 100)), "pose").message,
+              testing::HasSubstr("all 200 pixels that are valid in both cameras are over 300 mm apart"));
 }
 
 TEST(FlyingPixels, HangBetweenSurfacesAndSharpEdgesHaveNone) {

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <numbers>
+#include <random>
 
 #include <fmt/format.h>
 
@@ -121,6 +123,85 @@ TEST_F(Table, OfScanLinesTellsFlyingPixels) {
   ASSERT_TRUE(report) << report.error().message;
   const Json* rows = report->data.find("characteristics")->find("rows");
   EXPECT_DOUBLE_EQ(rows->at(0).find("value")->number(), 0.75);
+}
+
+/// Errors over distance of −1 mm + 3 mm/m and a wave, with noise of 0.3 mm.
+std::string errorsOf(double to_m, double cosine_mm, double sine_mm, unsigned seed) {
+  std::mt19937_64 random{seed};
+  std::normal_distribution<double> error{0.0, 0.3};
+  std::string text = "distance_m,error_mm\n";
+  const double per_m = 4.0 * 4.0 * std::numbers::pi * 30e6 / 299'792'458.0;
+  for (int i = 0; i < 200; ++i) {
+    const double d = 0.5 + (to_m - 0.5) * i / 199.0;
+    text += fmt::format(
+        "{},{}\n", d,
+        -1.0 + 3.0 * d + cosine_mm * std::cos(per_m * d) + sine_mm * std::sin(per_m * d) + error(random));
+  }
+  return text;
+}
+
+TableJob harmonicsOf(fs::path file) {
+  return {.file = std::move(file), .kind = "harmonics", .frequency_hz = {30e6}};
+}
+
+/// One line, seen to 5.5 m and to 3 m: at the middles of these it is 3.75 mm apart. Of 8 numbers none differs
+/// in 95 % of seeds.
+TEST_F(Table, OfTheSameLineOverOtherDistancesHaveTheSameOffset) {
+  RecordProperty("seed", 1);
+  const auto report = judgeTables({harmonicsOf(write("far.csv", errorsOf(5.5, 0.0, 0.0, 1))),
+                                   harmonicsOf(write("near.csv", errorsOf(3.0, 0.0, 0.0, 2)))});
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_THAT(report->verdict, HasSubstr("In none of "));
+  EXPECT_THAT(toMarkdown(*report),
+              testing::ContainsRegex("harmonics: offset \\[mm\\] . same, within .*, both at 1.75 m"));
+}
+
+/// 6 mm in both, opposite: 12 mm apart. Four standard errors of the difference of two amplitudes of 200 rows
+/// are 0.17 mm.
+TEST_F(Table, OfWavesAgainstEachOtherDifferByTheirPhasors) {
+  RecordProperty("seed", 1);
+  const auto report = judgeTables({harmonicsOf(write("a.csv", errorsOf(5.5, 0.0, 6.0, 1))),
+                                   harmonicsOf(write("b.csv", errorsOf(5.5, 0.0, -6.0, 2)))});
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_THAT(report->verdict, HasSubstr("wave, 30 MHz, 4 per period, 12"));
+  const Json* rows = report->data.find("verdicts");
+  EXPECT_EQ(rows->at(0).find("name")->words(), "30 MHz, 4 per period");
+  EXPECT_NEAR(rows->at(0).find("difference")->number(), 12.0, 0.17);
+}
+
+/// σ = √(1 + 3²·4000/I) mm, and the same rows only up to a signal of 1000: shot noise at the largest is twice
+/// as much.
+TEST_F(Table, OfTheSameLawUpToOtherSignalsAreTheSame) {
+  const auto rowsUpTo = [](double most) {
+    std::string text = "signal,sigma_mm\n";
+    for (int i = 0; i < 80; ++i) {
+      const double signal = 40.0 * std::pow(100.0, i / 79.0);
+      if (signal <= most)
+        text += fmt::format("{},{}\n", signal,
+                            (1.0 + 0.01 * (i % 3 - 1)) * std::sqrt(1.0 + 9.0 * 4000.0 / signal));
+    }
+    return text;
+  };
+  const auto report = judgeTables({{.file = write("all.csv", rowsUpTo(4000.0)), .kind = "noise_law"},
+                                   {.file = write("few.csv", rowsUpTo(1000.0)), .kind = "noise_law"}});
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_THAT(report->verdict, HasSubstr("In none of "));
+  EXPECT_THAT(toMarkdown(*report),
+              testing::ContainsRegex("noise_law: shot .* same, within .*, both at a signal of 9"));
+}
+
+TEST_F(Table, OfDriftsOverOtherTimesAreNotHeldAgainstEachOther) {
+  const auto driftUpTo = [](int rows) {
+    std::string text = "time_s,value_mm\n";
+    for (int i = 0; i < rows; ++i)
+      text += fmt::format("{},{}\n", 10 * i, 0.05 * i + (i % 2 == 0 ? 0.01 : -0.01));
+    return text;
+  };
+  const auto report = judgeTables({{.file = write("long.csv", driftUpTo(181)), .kind = "drift"},
+                                   {.file = write("short.csv", driftUpTo(61)), .kind = "drift"}});
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_THAT(toMarkdown(*report), HasSubstr("not told: A's rows are over 1800 s and B's over 600 s"));
+  EXPECT_THAT(report->verdict, HasSubstr("In none of 1 numbers")) << "the slope is the same";
 }
 
 /// 3 m of the 9.37 m of 16 MHz.

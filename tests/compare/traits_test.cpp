@@ -57,6 +57,9 @@ TEST(FittedCurves, GoThroughTheRows) {
   const auto harmonics = fittedHarmonics(d, wave, f);
   const auto law = fittedNoiseLaw(signal, sigma);
   ASSERT_TRUE(drift && harmonics && law);
+  const auto offset = std::ranges::find(harmonics->traits, "offset", &Trait::name);
+  ASSERT_NE(offset, harmonics->traits.end());
+  EXPECT_NEAR(offset->value, 3.0 + 0.7 * (0.5 + 0.03 * 99.5), 1e-3) << "the line at the mean distance";
   EXPECT_STREQ(nameOf(drift->model), "two exponentials");
   EXPECT_EQ(drift->curve.name, "two exponentials");
   for (std::size_t i = 0; i < t.size(); ++i) {
@@ -65,6 +68,97 @@ TEST(FittedCurves, GoThroughTheRows) {
     EXPECT_NEAR(law->curve.at(signal[i]), sigma[i], 1e-3 * sigma[i]);
   }
   EXPECT_NEAR(drift->curve.at(t.back()) - drift->curve.at(t.front()), drift->traits.front().value, 1e-9);
+}
+
+/// √(100 + 25/I + 1/I²) mm in 40 signals over four decades. At 20 MHz 0.1 rad are 119.3 mm, which the law has
+/// at I = 0.0093; at 16, 80 and 120 MHz 16.4 mm, at I = 0.18.
+TEST(NoiseLaw, SaysUpToWhichSignalItIsNotFitted) {
+  std::vector<double> signal, sigma;
+  for (int i = 0; i < 40; ++i) {
+    signal.push_back(500.0 * std::pow(10.0, -0.1 * i));
+    const double x = signal.back() / 500.0;
+    // What there is of light below: the noise of a phase without any, π/√3 = 1.81 rad at 20 MHz.
+    sigma.push_back(std::min(std::sqrt(100.0 + 25.0 / x + 1.0 / (x * x)), 2164.0));
+  }
+  const auto all = fittedNoiseLaw(signal, sigma);
+  ASSERT_TRUE(all);
+  EXPECT_EQ(all->not_told, "");
+  for (const auto& [frequency_hz, words] :
+       {std::pair{std::vector{20e6},
+                  "19 of 40 rows are left out, of signals up to 0.0079 of the largest: there the "
+                  "phase's noise is over 0.1 rad, 119 mm of range"},
+        {std::vector{16e6, 80e6, 120e6},
+         "32 of 40 rows are left out, of signals up to 0.16 of the largest: there "
+         "the phase's noise is over 0.1 rad, 16.4 mm of range"}}) {
+    const auto law = fittedNoiseLaw(signal, sigma, frequency_hz);
+    ASSERT_TRUE(law) << law.error().message;
+    EXPECT_THAT(law->not_told, testing::HasSubstr(words));
+    ASSERT_EQ(law->traits.size(), 3u);
+    EXPECT_NEAR(law->traits[0].value, 10.0, 1e-3);  // floor, shot, read
+    EXPECT_NEAR(law->traits[1].value, 5.0, 1e-3);
+    EXPECT_NEAR(law->traits[2].value, 1.0, 1e-3);
+  }
+  const auto few = fittedNoiseLaw(signal, sigma, std::vector{1e9});
+  ASSERT_FALSE(few);
+  EXPECT_THAT(few.error().message, testing::HasSubstr("it takes 6, and 40 of 40 rows are left out"));
+}
+
+/// Four rows beside the law, as captures before something else may be, are no reason to leave others out, and
+/// they are fitted like all others.
+TEST(NoiseLaw, IsCutByTheSignalAndNotByWhatRowsShow) {
+  std::vector<double> signal, sigma;
+  for (int i = 0; i < 40; ++i) {
+    signal.push_back(std::pow(10.0, -0.03 * i));
+    sigma.push_back(std::hypot(10.0, 1.0 / signal.back()) * (i % 10 == 3 ? 40.0 : 1.0));
+  }
+  const auto law = fittedNoiseLaw(signal, sigma, std::vector{20e6});
+  ASSERT_TRUE(law) << law.error().message;
+  EXPECT_EQ(law->not_told, "");
+  EXPECT_EQ(law->traits[0].n, 40u);
+}
+
+/// An exponential with a step against it is none of the models; of 60 exponentials with independent noise
+/// none is doubted.
+TEST(DriftTraits, SayWhereTheSeriesIsOfAnotherShape) {
+  for (unsigned seed = 1; seed <= 60; ++seed) {
+    Noise noise{seed};
+    std::vector<double> t, plain, odd;
+    for (int i = 0; i < 180; ++i) {
+      t.push_back(20.0 * i);
+      plain.push_back(8.0 * (1.0 - std::exp(-t.back() / 600.0)) + noise(0.3));
+      odd.push_back(plain.back() - (i >= 90 ? 6.0 : 0.0));
+    }
+    const auto as_it_is = driftTraits(t, plain), of_two = driftTraits(t, odd);
+    ASSERT_TRUE(as_it_is && of_two) << seed;
+    EXPECT_EQ(as_it_is->not_told, "") << seed;
+    EXPECT_THAT(of_two->not_told, testing::HasSubstr("another shape")) << seed;
+    double ends = 0.0;
+    for (int i = 0; i < 18; ++i)
+      ends += (odd[odd.size() - 1 - static_cast<std::size_t>(i)] - odd[static_cast<std::size_t>(i)]) / 18.0;
+    EXPECT_THAT(of_two->not_told, testing::HasSubstr(fmt::format("is {:.3g} mm from the first", ends)));
+  }
+}
+
+/// What goes with the place in the image is taken off the dots where the distances tell it from a slope, and
+/// nowhere else: captures of a wall at nine distances do, at two they do not.
+TEST(FittedCurves, TakeOffWhatGoesSidewaysOnlyWhereItIsTold) {
+  for (const int captures : {9, 2}) {
+    Noise noise{7};
+    std::vector<double> d, e;
+    std::vector<std::size_t> cluster;
+    for (int c = 0; c < captures; ++c) {
+      const double nearest = 0.6 + 3.0 * c / (captures - 1);
+      for (int i = 0; i < 20; ++i) {
+        d.push_back(nearest * (1.0 + 0.01 * i)), cluster.push_back(static_cast<std::size_t>(c));
+        e.push_back(2.0 + noise(0.5));
+      }
+    }
+    const std::vector<double> f{30e6};
+    const auto fitted = fittedHarmonics(d, e, f, cluster);
+    ASSERT_TRUE(fitted) << captures << ": " << fitted.error().message;
+    EXPECT_EQ(fitted->besides.size(), captures == 9 ? d.size() : 0U) << captures;
+    EXPECT_EQ(static_cast<bool>(fitted->curve.at), captures == 9) << captures;
+  }
 }
 
 /// Neither a step nor two of them, of whatever time constant; within the 5 % that BIC errs (1 to 2 %

@@ -38,6 +38,19 @@ TEST(Verdict, PutsWhatIsFarthestBeyondItsFloorFirst) {
   EXPECT_EQ(cardsOf(all).front().value, "1 of 3");
 }
 
+/// What wraps is left out of most of the others.
+TEST(Verdict, PutsWrapsFirst) {
+  const auto wraps = [](const char* whose, double value) {
+    return NamedTrait{"wraps", "", whose, {"wrapped", "1", value, value - 0.004, value + 0.004, 9}};
+  };
+  NamedTraits traits{
+      .traits = {of("A", "small", 1.0, 0.999, 1.001), of("B", "small", 1.5, 1.499, 1.501), wraps("A", 0.0)}};
+  traits.traits.push_back(wraps("B", 0.02));
+  EXPECT_EQ(verdictsOf(traits).front().what, "wraps");
+  traits.traits.back() = wraps("B", 0.009);
+  EXPECT_EQ(verdictsOf(traits).front().what, "small");
+}
+
 TEST(Verdict, CallsNothingDifferentWhoseIntervalIsNotKnown) {
   const auto all =
       verdictsOf({.traits = {of("A", "drift", 1.0, 0.9, std::nan("")), of("B", "drift", 5.0, 4.9, 5.1),
@@ -80,6 +93,29 @@ TEST(Verdict, TakesWhatWasToldOfTheDifferenceAsItIs) {
   ASSERT_EQ(all.size(), 1u) << "a residual is no difference";
   EXPECT_TRUE(all[0].differs());
   EXPECT_DOUBLE_EQ(all[0].floor(), 1.0);
+}
+
+/// A has a wave of 5 mm that B has not: it is in B − A, and B's amplitude is 5 mm less. That is one thing.
+TEST(Verdict, TellsAWaveOnceAndTheAmplitudeOfADifferenceWithoutASign) {
+  const auto wave = [](const char* whose, const char* what, double value) {
+    NamedTrait one = of(whose, what, value, value - 0.1, value + 0.1);
+    one.trait.name = "30 MHz, 4 per period";
+    return one;
+  };
+  const char* by_wall = "harmonics, against the plan's wall";
+  const auto all = verdictsOf(
+      {.traits = {wave("B − A", "harmonics", 5.1), wave("A", by_wall, 5.0), wave("B", by_wall, 0.2)}});
+  ASSERT_EQ(all.size(), 2u);
+  EXPECT_THAT(headlineOf(all), HasSubstr("B − A over distance: wave, 30 MHz, 4 per period, 5.1 mm ("));
+  EXPECT_THAT(headlineOf(all), HasSubstr("2 of 2 numbers"));
+  const auto cards = cardsOf(all);
+  ASSERT_EQ(cards.size(), 2u) << "same as A, and one card for the wave";
+  EXPECT_EQ(cards.back().value, "5.1 mm");
+  // Alone, it is a difference with a sign.
+  const auto sizes = verdictsOf({.traits = {wave("A", by_wall, 5.0), wave("B", by_wall, 0.2)}});
+  EXPECT_THAT(headlineOf(sizes),
+              HasSubstr("error over distance, B's less A's: wave, 30 MHz, 4 per period, −4.8 mm ("));
+  EXPECT_EQ(cardsOf(sizes).back().value, "−4.8 mm");
 }
 
 /// Two equal cameras with 20 numbers each, 2000 times: 5 % of them are called different in any number. Four

@@ -3,10 +3,14 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <numbers>
 #include <random>
 
 #include "calib/discover/campaign/gather_capture.h"
 #include "calib/discover/campaign/reading.h"
+#include "sim/decode/decode_steps.h"
+#include "sim/sensor/factory_calibration.h"
+#include "sim/sensor/waveform.h"
 #include "tests/discover/searched.h"
 
 namespace toftwin::discover {
@@ -140,6 +144,52 @@ TEST(TakeNoiseOff, TheMeanOfLogarithmsIsThatWithoutNoise) {
     takeNoiseOff(*model, captures);
     EXPECT_NEAR(captures[0].log_amplitude.mean[0], 0.0, 5.0 * std::sqrt(variance / kDraws) + 1e-4) << preset;
   }
+}
+
+/// A factory's table of a square wave's cyclic error, ±56 mm at 30 MHz, bends the noise of a phase: by half
+/// of its second derivative times the variance, 0.6 mm at most for 0.025 rad. The mean of many readings
+/// without it is the table's own.
+TEST(TakeNoiseOff, TheMeanOfRangesIsThatWithoutNoise) {
+  constexpr int kDraws = 100'000;
+  constexpr double kNoise = 0.025 / (2.0 * std::numbers::pi);  // cycles
+  std::mt19937 random{20263};
+  std::normal_distribution<double> normal;
+  const auto model = sim::SensorModel::preset("o3d303");
+  ASSERT_TRUE(model.ok()) << model.error().message;
+  sim::Waveform square;
+  square.shape = sim::Waveform::Shape::Square;
+  const sim::Response response{.frequency = 30_MHz,
+                               .harmonics = sim::relativeHarmonics(square, square, 30_MHz, 7)};
+  const std::vector<float> table = sim::trueCyclesOf(response, 4);
+  const double turn_m = unambiguousRange(30_MHz).in(metre);
+  double largest_mm = 0.0;
+  for (double seen = 0.11; seen < 0.9; seen += 0.06) {
+    std::vector<float> given{static_cast<float>(seen)};
+    sim::linearise(table, given);
+    const double free_m = turn_m * static_cast<double>(given.front());
+    const auto offAt = [&](double noise) {
+      given.front() = static_cast<float>(seen + noise);
+      sim::linearise(table, given);
+      return turn_m * static_cast<double>(given.front()) - free_m;
+    };
+    // Each draw with its opposite: what is straight cancels, and the mean's error is of the bend's own.
+    double sum = 0.0, squares = 0.0, bend_squares = 0.0;
+    for (int k = 0; k < kDraws; ++k) {
+      const double noise = kNoise * normal(random), a = offAt(noise), b = offAt(-noise);
+      sum += 0.5 * (a + b), squares += 0.5 * (a * a + b * b), bend_squares += 0.25 * (a + b) * (a + b);
+    }
+    const double mean_m = sum / kDraws, variance = squares / kDraws - mean_m * mean_m;
+    std::vector<MeasuredCapture> captures(1);
+    captures[0].frames = 8;
+    captures[0].range_m = {Image<float>(1, 1, static_cast<float>(free_m + mean_m)),
+                           Image<float>(1, 1, static_cast<float>(variance / 8.0)), 1.0};
+    takeNoiseOff(*model, captures);
+    largest_mm = std::max(largest_mm, 1e3 * std::abs(mean_m));
+    // Five standard errors, and a tenth of the largest shift for what is beyond the second order.
+    const double error_m = std::sqrt((bend_squares / kDraws - mean_m * mean_m) / kDraws);
+    EXPECT_NEAR(static_cast<double>(captures[0].range_m.mean[0]), free_m, 5.0 * error_m + 0.06e-3) << seen;
+  }
+  EXPECT_GT(largest_mm, 0.5) << "there is something to take off";
 }
 
 }  // namespace

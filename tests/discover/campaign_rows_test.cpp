@@ -162,6 +162,14 @@ TEST(Zero, TheOffsetBesideADelayIsAsUncertainAsBoth) {
   EXPECT_TRUE(zero.hasOffset());
 }
 
+TEST(Zero, OfADelayByWhichTheLightWasMovedTheOffsetHasNothing) {
+  Refitted refitted = withDelayOfOne();
+  refitted.moved_mm = refitted.delay_mm;
+  const Zero zero = zeroOf(refitted, 20.0);
+  EXPECT_EQ(zero.delay_mm, -1.0);
+  EXPECT_NEAR(zero.offset_mm, 5.0, 1e-12);
+}
+
 TEST_F(Rows, WithoutACyclicErrorADelayIsAnOffset) {
   const Made made = make("[[effect]]\ntype = 'frequency_offset'\nfirst_rad = 0.04\n", tinyCamera());
   const auto declared = sim::SensorModel::parse(tinyCamera(), "camera.toml");

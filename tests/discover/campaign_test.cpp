@@ -274,6 +274,23 @@ TEST_F(OfSquareWaves, WhereZeroLiesIsAddedOnceToWhatTheFileSaysOfIt) {
   EXPECT_NEAR(delays_mm.front() + 795.8 * offsets_rad.front(), 30.0 + 795.8 * 0.05, 1.5);
 }
 
+/// Waves of the error as long as a capture's ranges are wide look like a place of their own for each capture:
+/// poses of 1 mm went 16 mm off to hold them, and a delay with them.
+TEST_F(OfSquareWaves, AStrongWaveIsNotTakenForPosesThatAreOff) {
+  const CampaignFinding finding = searchFor("[[effect]]\ntype = 'harmonics'\nthird = 0.05\n", "");
+  EXPECT_THAT(namesOf(finding), testing::ElementsAre("harmonics")) << verdictOf(finding);
+  EXPECT_LT(finding.finding.scales.front(), 2.0) << "poses are off by one unit";
+  EXPECT_LT(std::abs(finding.zero.delay_mm), 3.0);
+  ASSERT_TRUE(finding.judgement);
+  EXPECT_LT(finding.judgement->after.per_row, 1.2);
+  EXPECT_GT(finding.judgement->before.per_row, 10.0);
+  ASSERT_TRUE(finding.effects.front().fitted);
+  const auto& numbers = finding.effects.front().fitted->numbers;
+  const auto third = std::ranges::find(numbers, "third", &FittedNumber::key);
+  ASSERT_NE(third, numbers.end());
+  EXPECT_NEAR(third->value, 0.05, 4.0 * third->error);
+}
+
 /// A gain that goes with the range, and one along the columns that changes far less: neither takes anything
 /// from the other, so that the weaker is no rest of the stronger.
 TEST_F(Searched, AFaintSecondCauseIsAnEffectOfItsOwn) {

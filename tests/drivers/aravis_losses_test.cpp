@@ -142,6 +142,24 @@ TEST_F(AravisLosses, ALineThatIsCutIsDisconnectedAndClosingIsSoon) {
   EXPECT_EQ(absent.error().code, Error::Code::NotFound) << absent.error().message;
 }
 
+TEST_F(AravisLosses, ALineThatWasCutUnnoticedDoesNotHoldUpTheEnd) {
+  for (const bool is_streaming : {true, false}) {
+    auto opened = open();
+    ASSERT_TRUE(opened.ok()) << opened.error().message;
+    if (is_streaming) {
+      ASSERT_TRUE((*opened)->start().ok());
+      ASSERT_TRUE(nextFrame(**opened).ok());
+    }
+    camera_.is_cut = true;
+    const auto cut_at = std::chrono::steady_clock::now();
+    opened->reset();
+    const auto took = std::chrono::steady_clock::now() - cut_at;
+    EXPECT_LT(took, milliseconds{1500}) << "the library alone takes 12.5 s, or 5.0";
+    camera_.reboot();
+    camera_.is_cut = false;
+  }
+}
+
 TEST_F(AravisLosses, ACameraThatWasRestartedIsDisconnectedEvenIfItAnswers) {
   const auto source = started();
   ASSERT_NE(source, nullptr);

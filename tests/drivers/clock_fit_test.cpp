@@ -108,6 +108,13 @@ TEST(ClockFit, ExactPointsOfAnyEpochAreFittedToTheNanosecond) {
   EXPECT_NEAR(fitted.drift, 2e-9, 1e-15);
 }
 
+// All of them were read at one time: as a line they would say that the device's second is none of the host's.
+TEST(ClockFit, FramesThatWaitedInAQueueSayNoDrift) {
+  ClockFit fit;
+  for (std::int64_t i = 0; i < 16; ++i) fit.add({i * kInterval_ns}, kOffset_ns);
+  EXPECT_LE(std::abs(fit.estimate()->drift), 1e-3);
+}
+
 /// Feeds a DeviceClock with what a camera would stamp.
 struct Camera {
   DeviceClock clock;
@@ -167,6 +174,29 @@ TEST(DeviceClock, AClockThatIsSetKeepsItsPaceAndItsRelation) {
   }
 }
 
+// The frame that a step is seen at may be late, the first of a queue that is read at 10 ms apiece. The others
+// come early then by what it was late, and nothing of it may stay: of the time, as above, and of the relation
+// what the fit does not know (8 sigma: the points of the queue are where the line is).
+TEST(DeviceClock, AStepThatIsSeenAtALateFrameKeepsNothingOfItsLateness) {
+  for (const std::int64_t first_late_ns : {860'000'000, 300'000'000, 25'000'000}) {
+    for (const std::int64_t by_s : {1'700'000'000LL, -3600LL}) {
+      Camera camera{.clock = DeviceClock{{}}};
+      camera.frames(200);
+      const std::int64_t before = camera.last->ns - camera.true_ns;
+      camera.set_by_ns += by_s * 1'000'000'000;
+      for (std::int64_t late_ns = first_late_ns; late_ns > 0; late_ns -= kInterval_ns - 10'000'000)
+        camera.frame(late_ns);
+      camera.frames(20);
+      EXPECT_NEAR(static_cast<double>(camera.last->ns - camera.true_ns - before), 0.0, 3.5e6)
+          << first_late_ns;
+      EXPECT_EQ(camera.clock.steps(), 1u) << first_late_ns;
+      const auto now = *camera.clock.estimate();
+      EXPECT_NEAR(static_cast<double>(camera.last->ns + now.host_minus_device_ns),
+                  static_cast<double>(Arrivals::hostOf(camera.true_ns)), 3.5e6 + 8.0 * now.offset_sd_ns);
+    }
+  }
+}
+
 // As with PTP: the camera counts from its start until it has found the master.
 TEST(DeviceClock, AClockThatFollowsAMasterTakesItsTimeOver) {
   Camera camera{.clock = DeviceClock{{.follows_steps_ahead = true}}};
@@ -207,6 +237,19 @@ TEST(DeviceClock, FramesThatComeLateTogetherAreNoStep) {
   // The line goes on: 11 frames of drift, and five more points in the fit (6 sigma).
   EXPECT_NEAR(static_cast<double>(now.host_minus_device_ns - relation), kDrift * 11 * 40e6,
               6.0 * now.offset_sd_ns);
+}
+
+TEST(DeviceClock, AQueueThatIsReadAtOnceIsNoStep) {
+  Camera camera{.clock = DeviceClock{{}}};
+  camera.frames(200);
+  const std::int64_t before = camera.last->ns - camera.true_ns;
+  for (std::int64_t late_ns = 1'500'000'000; late_ns > 0; late_ns -= kInterval_ns - 1'000'000) {
+    camera.frame(late_ns);
+    EXPECT_EQ(camera.last->ns - camera.true_ns, before);
+  }
+  camera.frames(5);
+  EXPECT_EQ(camera.last->ns - camera.true_ns, before);
+  EXPECT_EQ(camera.clock.steps(), 0u);
 }
 
 TEST(DeviceClock, TheRelationTakesTheKnownDelayOffAndSaysItsUncertainty) {

@@ -9,11 +9,7 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
-#include <cstring>
-#include <fstream>
-#include <iterator>
-#include <limits>
+#include <cstdio>
 #include <stdexcept>
 #include <utility>
 
@@ -47,9 +43,6 @@ std::string ownLoopbackAddress() {
 
 EmulatedGige::EmulatedGige(std::string address, std::string serial)
     : address_(std::move(address)), serial_(std::move(serial)) {
-  std::ifstream file{TOFTWIN_SOURCE_DIR "/tests/drivers/aravis/tof_camera.xml"};
-  xml_.assign(std::istreambuf_iterator<char>{file}, {});
-  if (xml_.empty()) throw std::runtime_error("tof_camera.xml cannot be read");
   factorySettings();
   control_ = boundSocket(address_, kPort, false);
   broadcast_ = boundSocket("127.255.255.255", kPort, true);
@@ -65,21 +58,6 @@ EmulatedGige::~EmulatedGige() {
 
 void EmulatedGige::factorySettings() {
   registers_.clear();
-  const auto text = [this](std::uint32_t at, const std::string& value, std::size_t size) {
-    for (std::size_t i = 0; i < size; i += 4) {
-      std::uint32_t word = 0;
-      for (std::size_t k = 0; k < 4; ++k) {
-        const char c = i + k < value.size() ? value[i + k] : '\0';
-        word = word << 8U | static_cast<unsigned char>(c);
-      }
-      registers_[at + static_cast<std::uint32_t>(i)] = word;
-    }
-  };
-  const auto real = [this](std::uint32_t at, double value) {
-    const auto bits = std::bit_cast<std::uint64_t>(value);
-    registers_[at] = static_cast<std::uint32_t>(bits >> 32U);
-    registers_[at + 4] = static_cast<std::uint32_t>(bits);
-  };
   in_addr own{};
   ::inet_pton(AF_INET, address_.c_str(), &own);
   registers_ = {{0x0, 0x20000},
@@ -100,33 +78,17 @@ void EmulatedGige::factorySettings() {
                 {0xD1C, 0},
                 {0xD20, kMultipartBit},
                 {0xD24, 0}};
-  text(0x48, "toftwin", 32);
-  text(0x68, "Emulated ToF", 32);
-  text(0x88, "1", 32);
-  text(0xA8, "", 48);
-  text(0xD8, serial_, 16);
-  text(0xE8, "dock", 16);
+  setText(0x48, "toftwin", 32);
+  setText(0x68, "Emulated ToF", 32);
+  setText(0x88, "1", 32);
+  setText(0xA8, "", 48);
+  setText(0xD8, serial_, 16);
+  setText(0xE8, "dock", 16);
   std::array<char, 64> url{};
-  std::snprintf(url.data(), url.size(), "Local:tof.xml;%x;%zx", kXmlAddress, xml_.size());
-  text(0x200, url.data(), 512);
-  text(0x400, "", 512);
-  for (std::uint32_t at = 0x10000; at < 0x10300; at += 4) registers_[at] = 0;
-  registers_[kWidthReg] = kWidth;
-  registers_[0x10004] = kHeight;
-  for (std::uint32_t i = 0; i < 3; ++i) {
-    registers_[kEnable + 4 * i] = 1;
-    registers_[kIds + 4 * i] = std::array{4U, 1U, 6U}[i];
-    registers_[kFormat + 4 * i] = std::array{kC16, kMono16, kConfidence16}[i];
-    real(kScale + 8 * i, kScale_mm);
-    real(kOffset + 8 * i, i == 2 ? kOffset_mm : 0.0);
-    registers_[kInvalidFlag + 8 * i] = 1;
-  }
-  real(kExposure, 1000.0);
-  real(kRate, 50.0);
-  real(kTemperature, 41.5);
-  real(kFocal, kFocal_px);
-  real(kFocal + 8, kU_px);
-  real(kFocal + 16, kV_px);
+  std::snprintf(url.data(), url.size(), "Local:tof.xml;%x;%zx", kXmlAddress, description().size());
+  setText(0x200, url.data(), 512);
+  setText(0x400, "", 512);
+  factoryFeatures();
 }
 
 void EmulatedGige::reboot() {
@@ -138,11 +100,12 @@ void EmulatedGige::reboot() {
 }
 
 std::optional<std::uint32_t> EmulatedGige::read(std::uint32_t address) const {
-  if (address >= kXmlAddress && address - kXmlAddress < xml_.size()) {
+  const auto xml = description();
+  if (address >= kXmlAddress && address - kXmlAddress < xml.size()) {
     std::uint32_t word = 0;
     for (std::size_t i = 0; i < 4; ++i) {
       const std::size_t at = address - kXmlAddress + i;
-      word = word << 8U | (at < xml_.size() ? static_cast<unsigned char>(xml_[at]) : 0U);
+      word = word << 8U | (at < xml.size() ? static_cast<unsigned char>(xml[at]) : 0U);
     }
     return word;
   }
@@ -153,41 +116,16 @@ std::optional<std::uint32_t> EmulatedGige::read(std::uint32_t address) const {
     ::getsockname(stream_, reinterpret_cast<sockaddr*>(&own), &size);
     return ntohs(own.sin_port);
   }
-  const auto found = registers_.find(address);
-  if (found == registers_.end()) return std::nullopt;
-  return found->second;
-}
-
-std::uint32_t EmulatedGige::reg(std::uint32_t address) const {
-  const std::lock_guard lock{mutex_};
-  return read(address).value_or(0);
-}
-void EmulatedGige::setReg(std::uint32_t address, std::uint32_t value) {
-  const std::lock_guard lock{mutex_};
-  registers_[address] = value;
-}
-double EmulatedGige::floatReg(std::uint32_t address) const {
-  return std::bit_cast<double>(std::uint64_t{reg(address)} << 32U | reg(address + 4));
-}
-void EmulatedGige::setFloatReg(std::uint32_t address, double value) {
-  const auto bits = std::bit_cast<std::uint64_t>(value);
-  setReg(address, static_cast<std::uint32_t>(bits >> 32U));
-  setReg(address + 4, static_cast<std::uint32_t>(bits));
+  return EmulatedTof::read(address);
 }
 
 void EmulatedGige::write(std::uint32_t address, std::uint32_t value) {
-  registers_[address] = value;
+  EmulatedTof::write(address, value);
   if (address == kPacketSize && (value & kTestBit) != 0) {
     registers_[address] = value & ~kTestBit;
     fireTestPacket();
   }
-  if (address == kTriggerSoftware && value == 1) ++triggers_;
-  if (address == kAcquisition && value == 1) {
-    ++starts;
-    due_ = Clock::now();
-    triggers_ = 0;
-    sent_.clear();
-  }
+  if (address == kAcquisition && value == 1) sent_.clear();
 }
 
 void EmulatedGige::fireTestPacket() {

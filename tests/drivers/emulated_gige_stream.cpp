@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the emulated camera sees and how it sends it.
+// How the emulated camera sends what it sees.
 #include <sys/socket.h>
 
 #include <algorithm>
-#include <array>
-#include <bit>
-#include <limits>
 #include <utility>
 
 #include "emulated_gige.h"
@@ -14,64 +11,6 @@
 namespace toftwin::test {
 
 using namespace gige;
-
-// ---- what it sees ------------------------------------------------------------------------------
-
-std::uint16_t EmulatedGige::rangeCode(std::uint64_t n, int x, int y) {
-  if ((x + y) % 11 == 0) return 0;
-  return static_cast<std::uint16_t>(4000 + 7 * x + 13 * y + static_cast<int>(n % 64));
-}
-std::uint16_t EmulatedGige::intensity(int x, int y) {
-  return static_cast<std::uint16_t>(300 + 3 * x + y);
-}
-std::uint16_t EmulatedGige::confidence(int x, int y) {
-  return static_cast<std::uint16_t>((x * y) % 17 == 3 ? 0 : 900 + x);
-}
-
-// ---- stream ------------------------------------------------------------------------------------
-
-std::uint64_t EmulatedGige::deviceTime() const {
-  const std::chrono::nanoseconds now = Clock::now().time_since_epoch();
-  return static_cast<std::uint64_t>(now.count() + clock_ns);
-}
-
-Bytes EmulatedGige::imageBytes(std::uint32_t format) const {
-  Bytes bytes;
-  const auto real = [&](Bytes& to, double value) {
-    putLittle(to, std::bit_cast<std::uint32_t>(static_cast<float>(value)), 4);
-  };
-  std::array<Bytes, 3> planes;
-  for (int y = 0; y < kHeight; ++y) {
-    for (int x = 0; x < kWidth; ++x) {
-      const std::uint16_t code = rangeCode(frame_, x, y);
-      const std::array<double, 3> point{code * (x - kU_px) / kFocal_px,
-                                        code * (y - kV_px) / kFocal_px, static_cast<double>(code)};
-      if (format == kC16) putLittle(bytes, code, 2);
-      if (format == kC32f) real(bytes, code);
-      for (std::size_t i = 0; i < 3; ++i) {
-        const double value = code == 0 ? std::numeric_limits<double>::quiet_NaN() : point[i];
-        if (format == kABC32f) real(bytes, value);
-        if (format == kABC32fPlanar) real(planes[i], value);
-      }
-      if (format == kMono8) putLittle(bytes, intensity(x, y) % 256U, 1);
-      if (format == kMono16) putLittle(bytes, intensity(x, y), 2);
-      if (format == kConfidence8) putLittle(bytes, confidence(x, y) % 256U, 1);
-      if (format == kConfidence16) putLittle(bytes, confidence(x, y), 2);
-    }
-  }
-  for (const Bytes& plane : planes) bytes.insert(bytes.end(), plane.begin(), plane.end());
-  return bytes;
-}
-
-std::vector<EmulatedGige::Image> EmulatedGige::images() const {
-  std::vector<Image> images;
-  for (std::uint32_t i = 0; i < 3; ++i) {
-    if (registers_.at(kEnable + 4 * i) == 0) continue;
-    const std::uint32_t format = registers_.at(kFormat + 4 * i);
-    images.push_back({registers_.at(kIds + 4 * i), format, imageBytes(format)});
-  }
-  return images;
-}
 
 std::uint32_t EmulatedGige::payloadSize() const {
   std::size_t size = 64;  // chunk data
@@ -89,7 +28,7 @@ std::vector<Bytes> EmulatedGige::packetsOfImage(const Image& image) const {
     put(packet, std::uint64_t{content} << 24U | (packets.size() - 1), 4);
     return &packet;
   };
-  const bool has_chunks = registers_.at(kChunkMode) != 0 && registers_.at(kChunkEnable) != 0;
+  const bool has_chunks = hasChunks();
   Bytes data = image.bytes;
   if (has_chunks) {
     put(data, 1, 4);  // the image is a chunk too
@@ -192,21 +131,6 @@ void EmulatedGige::sendFrame() {
   if (!is_multipart && (frame_id_ & 0xFFFF) == 0) ++frame_id_;  // 0 is no id
 }
 
-bool EmulatedGige::isDue() {
-  if (is_cut || is_hung || registers_[kAcquisition] != 1 || controller_port_ == 0) return false;
-  if (registers_[kTriggerMode] == 1) {
-    if (triggers_ <= 0) return false;
-    --triggers_;
-    return true;
-  }
-  const double rate_hz =
-      std::bit_cast<double>(std::uint64_t{registers_[kRate]} << 32U | registers_[kRate + 4]);
-  const auto now = Clock::now();
-  if (now < due_) return false;
-  due_ = std::max(due_ + std::chrono::duration_cast<Clock::duration>(
-                             std::chrono::duration<double>{1.0 / rate_hz}),
-                  now);
-  return true;
-}
+bool EmulatedGige::isDue() { return !is_cut && !is_hung && controller_port_ != 0 && isFrameDue(); }
 
 }  // namespace toftwin::test

@@ -16,11 +16,6 @@ using Bytes = std::vector<std::byte>;
 
 inline constexpr std::uint16_t kPort = 3956;
 inline constexpr std::uint32_t kXmlAddress = 0x80000;
-inline constexpr std::uint32_t kPayloadReg = 0x1000C, kAcquisition = 0x10014,
-                               kTriggerMode = 0x1001C, kTriggerSource = 0x10020,
-                               kTriggerSoftware = 0x10028, kScale = 0x10200, kOffset = 0x10220,
-                               kInvalidFlag = 0x10264, kIds = 0x10160, kChunkMode = 0x10080,
-                               kChunkEnable = 0x10090, kTemperature = 0x10048;
 inline constexpr std::uint32_t kStreamPort = 0xD00, kPacketSize = 0xD04, kStreamAddress = 0xD18,
                                kSourcePort = 0xD1C, kMultipart = 0xD24;
 inline constexpr std::uint32_t kMultipartBit = 0x40, kTestBit = 0x80000000;
@@ -30,9 +25,6 @@ inline constexpr std::uint16_t kNotImplemented = 0x8001, kInvalidAddress = 0x800
 inline void put(Bytes& bytes, std::uint64_t number, unsigned size) {
   for (; size > 8; --size) bytes.push_back(std::byte{0});
   for (unsigned i = size; i-- > 0;) bytes.push_back(static_cast<std::byte>(number >> (8 * i)));
-}
-inline void putLittle(Bytes& bytes, std::uint64_t number, unsigned size) {
-  for (unsigned i = 0; i < size; ++i) bytes.push_back(static_cast<std::byte>(number >> (8 * i)));
 }
 inline std::uint64_t get(std::span<const std::byte> bytes, std::size_t at, std::size_t size) {
   std::uint64_t number = 0;

@@ -285,8 +285,14 @@ TEST(O3d303, WhatTheCameraRefusesAtOpeningIsNoMistakeOfTheFile) {
 
 TEST(O3d303, ItsClocksOffsetIsFoundAndASetClockDoesNotShow) {
   EmulatedO3d303 camera{{.schedule = test::FrameSchedule{milliseconds{10}}, .clock_skew = 50e-6}};
-  const auto source = started(camera, "delay_ms = 0.001");
+  // Triggered, for else a machine that is busier than the camera would take its frames from an ever longer
+  // queue.
+  const auto source = started(camera, "delay_ms = 0.001\ntrigger = 'software'");
   ASSERT_NE(source, nullptr);
+  const auto next = [&]() -> Result<Frame> {
+    if (auto triggered = source->trigger(); !triggered) return triggered.error();
+    return nextFrame(*source);
+  };
   const auto hostMinusStamp = [&](const Frame& frame) {
     // Frames leave the emulator when they are stamped: host time of the stamp is now, or a bit
     // before.
@@ -295,9 +301,9 @@ TEST(O3d303, ItsClocksOffsetIsFoundAndASetClockDoesNotShow) {
            frame.moment.exposures[0].start.ns;
   };
   std::optional<std::int64_t> least;
-  Result<Frame> frame = nextFrame(*source);
+  Result<Frame> frame = next();
   std::int64_t last = 0;
-  for (int i = 0; i < 60 && frame; ++i, frame = nextFrame(*source)) {
+  for (int i = 0; i < 60 && frame; ++i, frame = next()) {
     if (i == 40) camera.setClock(std::chrono::hours{-1});
     EXPECT_GT(frame->moment.exposures[0].start.ns, last);
     last = frame->moment.exposures[0].start.ns;
@@ -310,8 +316,10 @@ TEST(O3d303, ItsClocksOffsetIsFoundAndASetClockDoesNotShow) {
   }
   ASSERT_TRUE(frame.ok()) << frame.error().message;
   // The least difference seen is the true offset plus the shortest way here, which is some
-  // milliseconds on a busy machine; an error of the arithmetic would be hours.
-  EXPECT_NEAR(static_cast<double>(frame->moment.clock.host_minus_device_ns - *least), 0.0, 100e6);
+  // milliseconds on a busy machine; how much others took longer, the driver knows itself (6 sigma). An error
+  // of the arithmetic would be hours.
+  EXPECT_NEAR(static_cast<double>(frame->moment.clock.host_minus_device_ns - *least), 0.0,
+              100e6 + 6.0 * static_cast<double>(frame->moment.clock.uncertainty_ns));
 }
 
 // ---- leaks -------------------------------------------------------------------------------------

@@ -55,6 +55,7 @@ TEST(UsbCameras, Usb3VisionIsKnownByItsInterfaceWhoeverMadeIt) {
                padded(device, 18) + padded(configuration, 9) + interfaces);
   };
   plugIn("2-1", interface(5, 2) + interface(5, 0));  // its stream alone would be none
+  root.write("sys/bus/usb/devices/2-1/manufacturer", "Example");
   root.write("sys/bus/usb/devices/2-1/product", "Example ToF 640");
   plugIn("2-2", interface(2, 0));  // the same class, but for pairs of interfaces
   plugIn("2-3", interface(5, 2) + padded(configuration, 9) + interface(5, 0));  // in its second configuration
@@ -62,6 +63,7 @@ TEST(UsbCameras, Usb3VisionIsKnownByItsInterfaceWhoeverMadeIt) {
   plugIn("2-5", interface(5, 0).substr(0, 6));                                  // cut short
   const auto devices = list(root.path());
   ASSERT_EQ(devices.size(), 1u);
+  EXPECT_EQ(devices[0].maker, "Example");
   EXPECT_EQ(describe(devices[0]),
             "USB3 Vision camera (Example ToF 640) at 2-1, 480 Mbit/s, serial A02-1, for driver aravis");
   EXPECT_NE(warningOf(devices[0]).find("(Example ToF 640) at 2-1 is a USB 3 camera on a link of 480"),

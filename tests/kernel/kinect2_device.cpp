@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "descriptors.h"
+
 namespace toftwin::kernel_test {
 namespace {
 
@@ -13,32 +15,18 @@ using daemon::usb_camera::stall;
 using daemon::usb_camera::Writer;
 
 constexpr std::uint8_t kCommands = 0x02, kAnswers = 0x81, kStream = 0x84;
-constexpr unsigned kBulkPacket = 1024, kStreamPacket = 1024, kBurst = 11, kMult = 3;
-
-Bytes interface(unsigned number, unsigned alternate, unsigned endpoints) {
-  return Writer{}
-      .u8(9)
-      .u8(USB_DT_INTERFACE)
-      .u8(number)
-      .u8(alternate)
-      .u8(endpoints)
-      .u8(USB_CLASS_VENDOR_SPEC)
-      .u8(0xFF)
-      .u8(0)
-      .u8(0)
-      .done();
-}
+constexpr unsigned kStreamPacket = 1024, kBurst = 11, kMult = 3;
+constexpr ClassCode kVendors{USB_CLASS_VENDOR_SPEC, 0xFF, 0};
 
 /// With the companion that USB 3 has.
-Bytes endpoint(unsigned address, unsigned kind, UsbSpeed speed) {
-  const bool is_stream = kind == USB_ENDPOINT_XFER_ISOC;
+Bytes streamEndpoint(UsbSpeed speed) {
   const bool is_super = speed == UsbSpeed::Super;
   Writer writer;
-  writer.u8(7).u8(USB_DT_ENDPOINT).u8(address).u8(kind);
-  writer.u16(is_super ? (is_stream ? kStreamPacket : kBulkPacket) : 512).u8(is_stream ? 1 : 0);
+  writer.u8(USB_DT_ENDPOINT_SIZE).u8(USB_DT_ENDPOINT).u8(kStream).u8(USB_ENDPOINT_XFER_ISOC);
+  writer.u16(is_super ? kStreamPacket : 512).u8(1);
   if (!is_super) return writer.done();
-  writer.u8(6).u8(USB_DT_SS_ENDPOINT_COMP).u8(is_stream ? kBurst - 1 : 0).u8(is_stream ? kMult - 1 : 0);
-  return writer.u16(is_stream ? kBurst * kMult * kStreamPacket : 0).done();
+  writer.u8(USB_DT_SS_EP_COMP_SIZE).u8(USB_DT_SS_ENDPOINT_COMP).u8(kBurst - 1).u8(kMult - 1);
+  return writer.u16(kBurst * kMult * kStreamPacket).done();
 }
 
 }  // namespace
@@ -46,23 +34,7 @@ Bytes endpoint(unsigned address, unsigned kind, UsbSpeed speed) {
 Kinect2Device::Kinect2Device(Options options) : options_(std::move(options)), camera_(options_.camera) {}
 
 Bytes Kinect2Device::deviceDescriptor() const {
-  const bool is_super = options_.speed == UsbSpeed::Super;
-  return Writer{}
-      .u8(18)
-      .u8(USB_DT_DEVICE)
-      .u16(is_super ? 0x0300 : 0x0200)
-      .u8(USB_CLASS_MISC)
-      .u8(2)
-      .u8(1)
-      .u8(is_super ? 9 : 64)
-      .u16(0x045E)
-      .u16(options_.product)
-      .u16(0x0100)
-      .u8(1)
-      .u8(2)
-      .u8(3)
-      .u8(1)
-      .done();
+  return kernel_test::deviceDescriptor(options_.speed, 0x045E, options_.product);
 }
 
 std::string Kinect2Device::text(int index) const {
@@ -71,24 +43,11 @@ std::string Kinect2Device::text(int index) const {
 
 Bytes Kinect2Device::configurationDescriptor() const {
   Writer body;
-  body.bytes(interface(0, 0, 2));
-  body.bytes(endpoint(kAnswers, USB_ENDPOINT_XFER_BULK, options_.speed));
-  body.bytes(endpoint(kCommands, USB_ENDPOINT_XFER_BULK, options_.speed));
-  body.bytes(interface(1, 0, 0));
-  body.bytes(interface(1, 1, 1));
-  body.bytes(endpoint(kStream, USB_ENDPOINT_XFER_ISOC, options_.speed));
-  const Bytes all = body.done();
-  return Writer{}
-      .u8(9)
-      .u8(USB_DT_CONFIG)
-      .u16(9 + static_cast<unsigned>(all.size()))
-      .u8(2)
-      .u8(1)
-      .u8(0)
-      .u8(0x80)
-      .u8(50)
-      .bytes(all)
-      .done();
+  body.bytes(interfaceDescriptor(0, 0, 2, kVendors));
+  body.bytes(bulkEndpoint(kAnswers, options_.speed)).bytes(bulkEndpoint(kCommands, options_.speed));
+  body.bytes(interfaceDescriptor(1, 0, 0, kVendors));
+  body.bytes(interfaceDescriptor(1, 1, 1, kVendors)).bytes(streamEndpoint(options_.speed));
+  return kernel_test::configurationDescriptor(2, body.done());
 }
 
 Answer Kinect2Device::control(const Setup&, std::span<const std::byte>) { return stall(); }

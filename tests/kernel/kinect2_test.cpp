@@ -17,7 +17,7 @@
 #include "drivers/kinect2/kinect2.h"
 #include "drivers/kinect2/samples.h"
 #include "kinect2_device.h"
-#include "usbip_port.h"
+#include "plugged.h"
 
 namespace toftwin::kernel_test {
 namespace {
@@ -30,12 +30,6 @@ using test::EmulatedKinect2;
 constexpr const char* kUri = "kinect2:003370163847";
 /// The machine is slow, and what is made of the samples has nothing to do with USB.
 constexpr const char* kQuick = "planes = ['samples']\n";
-
-void waitUntil(bool there) {
-  for (int i = 0; i < 500 && row().list().empty() == there; ++i)
-    std::this_thread::sleep_for(milliseconds{10});
-  ASSERT_EQ(!row().list().empty(), there);
-}
 
 /// Any bytes are samples.
 drivers::kinect2::Bytes someImages() {
@@ -50,24 +44,16 @@ drivers::kinect2::Bytes someImages() {
   return bytes;
 }
 
+std::shared_ptr<Kinect2Device> deviceOf(Kinect2Device::Options options) {
+  static const drivers::kinect2::Bytes images = someImages();
+  options.camera.images = images;
+  return std::make_shared<Kinect2Device>(options);
+}
+
 /// A camera in its port.
-struct Plugged {
-  explicit Plugged(Kinect2Device::Options options = {}) {
-    static const drivers::kinect2::Bytes images = someImages();
-    options.camera.images = images;
-    device = std::make_shared<Kinect2Device>(options);
-    port = std::make_unique<UsbIpPort>(0, device);
-    waitUntil(true);
-  }
-  ~Plugged() {
-    port.reset();
-    waitUntil(false);
-  }
-  Plugged(const Plugged&) = delete;
-  Plugged& operator=(const Plugged&) = delete;
-  EmulatedKinect2& camera() const { return device->camera(); }
-  std::shared_ptr<Kinect2Device> device;
-  std::unique_ptr<UsbIpPort> port;
+struct Plugged : PluggedIn<Kinect2Device> {
+  explicit Plugged(Kinect2Device::Options options = {})
+      : PluggedIn<Kinect2Device>(deviceOf(options), [] { return !row().list().empty(); }) {}
 };
 
 Result<std::unique_ptr<drivers::Source>> open(const std::string& more = {}) {

@@ -145,6 +145,11 @@ TEST(Check, NotesOfWhichFrequenciesTheDistancesAreAWholePeriod) {
               testing::AllOf(HasSubstr("0.6 to 4 m are a whole period of 45 MHz or more"),
                              HasSubstr("go on to 9.97 m for 16 MHz")));
   EXPECT_THAT(spanOf("0.6, 3, 6, 9, 10.6"), testing::Not(HasSubstr("whole period")));
+  // c/2f of 30 MHz is 4.997 m.
+  EXPECT_THAT(spanOf("0.6, 1, 2, 3, 4.9"), testing::Not(HasSubstr("begin anew")));
+  EXPECT_THAT(
+      spanOf("0.6, 1, 2, 3, 6"),
+      testing::AllOf(HasSubstr("up to 6 m are beyond c/2f of 25 MHz and more"), HasSubstr("end before 5 m")));
 }
 
 /// Every seed passes: the drawn order is drawn until it does.

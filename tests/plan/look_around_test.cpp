@@ -177,6 +177,33 @@ TEST_F(LookAround, PutsTheTwinWhereTheBoardSaysThatTheCameraStands) {
   EXPECT_THAT(line, AllOf(HasSubstr("pose_half_widths_rad_m"), HasSubstr("40 corners")));
 }
 
+TEST_F(LookAround, ATwinMustSeeTheBoardBeforeAnythingIsCaptured) {
+  b_.moves();
+  begin(kBoardToml, "board");
+  const PlannedCapture& planned = schedule_.captures.at(2);
+  b_.stands = planned.pose->world_from_camera();
+  const auto sees = taker_->checkBoardOf(planned, b_);
+  EXPECT_TRUE(sees) << sees.error().message;
+  EXPECT_EQ(b_.put, b_.stands);
+  b_.stands.translation_m.x += 0.05;  // as if its scene had the board 50 mm beside
+  const auto beside = taker_->checkBoardOf(planned, b_);
+  ASSERT_FALSE(beside);
+  EXPECT_THAT(beside.error().message, AllOf(HasSubstr("block \"b\""), HasSubstr("poses disagree"),
+                                            HasSubstr("by what twin sees"), HasSubstr("board.agree_mm")));
+  b_.sees_board = false;
+  const auto none = taker_->checkBoardOf(planned, b_);
+  ASSERT_FALSE(none);
+  EXPECT_THAT(none.error().message,
+              AllOf(HasSubstr("block \"b\""), HasSubstr("twin does not see it"), HasSubstr("board not found"),
+                    HasSubstr("x -0.35, y -0.2, z 2 m"), HasSubstr("put it into the scene of twin")));
+  begin(kBoardToml, "command");
+  EXPECT_TRUE(taker_->checkBoardOf(schedule_.captures.at(2), b_));
+  SeeingCamera carried{"carried", b_.stands, 3};
+  carried.sees_board = false;
+  begin(kBoardToml, "board");
+  EXPECT_TRUE(taker_->checkBoardOf(schedule_.captures.at(2), carried));  // it must see it at each capture
+}
+
 TEST_F(LookAround, TwoCamerasMustSeeTheSamePlace) {
   begin(kBoardToml, "board");
   const auto same = take();

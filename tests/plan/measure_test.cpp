@@ -332,6 +332,14 @@ TEST_F(Judged, LosesNoJudgementOfLockedCapturesToALog) {
   EXPECT_THAT(bytesOf("report/report.md"), HasSubstr("Locked captures"));
 }
 
+TEST_F(Judged, SaysSoOfTheFirstCapturesFileToo) {
+  const auto records = index("run");
+  write("run/" + records.at(0).a.file, bytesOf("run/" + records.at(0).a.file).substr(0, 1000));
+  const Ran ran = compare();
+  EXPECT_EQ(ran.status, 4);
+  EXPECT_THAT(ran.err, HasSubstr("0000-a.mcap: is not the file that was captured"));
+}
+
 TEST_F(Judged, SaysWhichFileIsNotTheOneThatWasCaptured) {
   const auto records = index("run");
   write("run/" + records.at(2).b.file, "something else");

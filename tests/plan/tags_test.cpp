@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 
 #include "calib/intrinsics/markers.h"
@@ -42,21 +43,24 @@ class MeasureByTags : public WithDaemon {
                    "width = 256\nheight = 212\nfx = 180.0\nfy = 180.0\ncx = 127.5\ncy = 105.5\n");
     std::ofstream{folder_ / "camera.toml"} << camera;
     std::string all;
-    for (const char* name : {"cam", "twin"})
+    std::ofstream{folder_ / "bare.toml"} << "[[material]]\nname = 'wall'\nalbedo = 0.8\n[[object]]\nshape = "
+                                            "'rectangle'\nsize_m = [0.4, 0.3, 0]\n"
+                                            "position_m = [0, 0, 0.8]\nmaterial = 'wall'\n";
+    for (const auto& [name, scene] : {std::pair{"cam", "scene"}, {"twin", "scene"}, {"bare", "bare"}})
       all += fmt::format(
-          "[[source]]\nname = '{}'\ndriver = 'sim'\ncamera = 'camera.toml'\nscene = 'scene.toml'\n"
+          "[[source]]\nname = '{}'\ndriver = 'sim'\ncamera = 'camera.toml'\nscene = '{}.toml'\n"
           "max_surfaces = 1\n",
-          name);
+          name, scene);
     return all;
   }
-  Ran measure(double first_corner_x_m) const {
+  Ran measure(double first_corner_x_m, const char* b = "twin") const {
     std::ofstream{folder_ / "plan.toml"} << fmt::format(
         "frames = 2\n[board]\ntags = '4x3'\nsquare_mm = 100\nmarker_mm = 80\nposition_m = [{}, -0.14, "
         "0.8]\nframes = 1\n"
         "[[block]]\nname = 'b'\nkind = 'locked'\npose_from = 'board'\n"
         "repeats = 2\n[[block.pose]]\nposition_m = [0.2, 0.0, 0.35]\neuler_deg = [0, -24, 0]\n",
         first_corner_x_m);
-    return run(fmt::format("measure {} cam twin -o {}", path("plan.toml"), path("run")));
+    return run(fmt::format("measure {} cam {} -o {}", path("plan.toml"), b, path("run")));
   }
 };
 
@@ -81,6 +85,17 @@ TEST_F(MeasureByTags, RefusesABoardThatStandsElsewhereThanThePlanSays) {
   const Ran ran = measure(-0.13);
   EXPECT_EQ(ran.status, 4);
   EXPECT_THAT(ran.err, HasSubstr("poses disagree"));
+}
+
+/// A sees the board; a twin is put where A stands and would never look.
+TEST_F(MeasureByTags, CapturesNothingWithATwinWhoseSceneHasNoBoard) {
+  const Ran ran = measure(-0.19, "bare");
+  EXPECT_EQ(ran.status, 4);
+  EXPECT_THAT(ran.err, HasSubstr("block \"b\" takes its poses from the board, and bare does not see it"));
+  EXPECT_THAT(ran.err, HasSubstr("put it into the scene of bare"));
+  EXPECT_THAT(ran.err, HasSubstr("0 of 2 captures are there"));
+  const auto captures = folder_ / "run" / "captures";
+  EXPECT_TRUE(!std::filesystem::exists(captures) || std::filesystem::is_empty(captures));
 }
 
 }  // namespace

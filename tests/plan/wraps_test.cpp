@@ -3,10 +3,14 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <functional>
 #include <random>
+#include <vector>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include "calib/plan/run_report.h"
 #include "calib/plan/run_traits.h"
 #include "plans.h"
 
@@ -22,37 +26,64 @@ struct WallSeen {
   double readings = 0.0, wraps = 0.0;  ///< as they were made
 };
 
-WallSeen wallFrom(double distance_m, std::size_t number, bool has_size) {
+/// Six frames of it by a camera whose pixel (x, y) reads `read_m` of its truth.
+CameraSeen wallReadBy(const std::function<double(int, int, double)>& read_m, double distance_m,
+                      std::size_t number, bool has_size, const std::vector<double>& frequency_hz) {
   const Plan plan =
       planOf(std::string{"target_m = [0, 0, 2]\n"} + (has_size ? "target_size_m = [40, 40]\n" : "") +
              "[[block]]\nname = 'b'\nkind = 'distance'\ndistance_m = [1, 1.5, 2]\n");
-  std::mt19937_64 random{kWrapSeed + number};
-  std::normal_distribution<double> noise_m{0.0, 0.05};
   Frame frame;
   frame.camera.width = 64, frame.camera.height = 48;
   frame.camera.fx = frame.camera.fy = 52.0, frame.camera.cx = 31.5, frame.camera.cy = 23.5;
   frame.moment.world_from_camera =
       Transform<World, Camera>{{1.0, 0.0, 0.0, 0.0}, {0.0, 0.0, 2.0 - distance_m}};
-  WallSeen made;
   compare::Stack stack;
   std::vector<ReadFrame> frames;
   for (int i = 0; i < 6; ++i) {
     Image<float> range(64, 48);
     for (int y = 0; y < 48; ++y) {
-      for (int x = 0; x < 64; ++x) {
-        const double truth = distance_m / rayThroughPixel(frame.camera, x, y).v.z,
-                     read = truth + noise_m(random);
-        range(x, y) = static_cast<float>(read - kTurn_m * std::floor(read / kTurn_m));
-        ++made.readings, made.wraps += read >= kTurn_m;
-      }
+      for (int x = 0; x < 64; ++x)
+        range(x, y) = static_cast<float>(read_m(x, y, distance_m / rayThroughPixel(frame.camera, x, y).v.z));
     }
     frame.planes = {toPlane(PlaneKind::Range, std::move(range))};
     EXPECT_TRUE(stack.add(frame));
     frames.push_back(*readOf(frame));
   }
-  const CaptureRecord record{.number = number, .block = "b", .kind = "distance"};
-  made.seen = seenOf(plan, record, stack, frames, std::vector{kLight_hz});
+  return seenOf(plan, {.number = number, .block = "b", .kind = "distance"}, stack, frames, frequency_hz);
+}
+
+WallSeen wallFrom(double distance_m, std::size_t number, bool has_size) {
+  std::mt19937_64 random{kWrapSeed + number};
+  std::normal_distribution<double> noise_m{0.0, 0.05};
+  WallSeen made;
+  const auto read = [&](int, int, double truth) {
+    const double read_m = truth + noise_m(random);
+    ++made.readings, made.wraps += read_m >= kTurn_m;
+    return read_m - kTurn_m * std::floor(read_m / kTurn_m);
+  };
+  made.seen = wallReadBy(read, distance_m, number, has_size, {kLight_hz});
   return made;
+}
+
+/// At 20 and 60 MHz, every eighth column is a period of 60 MHz too near: wraps, from which the rest of the
+/// wall does not suffer, as all frequencies together go three times as far.
+TEST(Wraps, AreOfTheHighestFrequencyAndDoNotSpoilTheRestOfTheWall) {
+  const auto read = [](int x, int, double truth) { return x % 8 == 0 ? truth - kTurn_m / 3.0 : truth; };
+  const CameraSeen seen = wallReadBy(read, 5.0, 0, true, {kLight_hz, 3.0 * kLight_hz});
+  EXPECT_EQ(seen.wall_readings, 6.0 * 64.0 * 48.0);
+  EXPECT_EQ(seen.wall_wraps, 6.0 * 8.0 * 48.0);
+  EXPECT_EQ(seen.wall_beyond, 0.0);
+  EXPECT_FALSE(isWrapped(seen));
+}
+
+/// A box before the left half, and eight columns of which three are valid: neither says anything of the wall.
+TEST(Wraps, AreNotCountedWhereTheWallIsNotSeen) {
+  const auto read = [](int x, int, double truth) {
+    return x < 32 ? 1.0 : x >= 35 && x < 40 ? std::nan("") : truth;
+  };
+  const CameraSeen seen = wallReadBy(read, 5.0, 0, true, {kLight_hz});
+  EXPECT_EQ(seen.wall_readings, 6.0 * 24.0 * 48.0);
+  EXPECT_EQ(seen.wall_wraps, 0.0);
 }
 
 /// 6.6 m wraps in the image's corners, 9.5 m all over. A reading that noise took over 0 is not told from one
@@ -114,6 +145,43 @@ TEST(Wraps, AreNoWavesOfTheCameraAndWhatIsLeftOutIsSaid) {
                             "harmonics of B at 6.6 m; 9.5 m: 2 of 11 captures are left out",
                             "harmonics of B − A at 6.6 m; 9.5 m: 2 of 11 captures are left out"})
     EXPECT_THAT(all.untold, testing::Contains(testing::HasSubstr(whose)));
+}
+
+/// A capture of the distance block, of 20 × 20 pixels that both see; B is off by so much in all of them.
+ComparedCapture comparedOffBy(float difference_mm, std::size_t number) {
+  ComparedCapture one;
+  one.record.number = number, one.record.block = "distance", one.record.kind = "distance";
+  one.record.a.source = "cam", one.record.b.source = "twin";
+  one.pixels = compare::isGross(static_cast<double>(difference_mm)) ? 0 : 400;
+  auto& image = one.thinned;
+  image.range_a_mm = Image<float>(20, 20, 3000.0F), image.difference_mm = Image<float>(20, 20, difference_mm);
+  image.noise_a_mm = image.noise_b_mm = Image<float>(20, 20, 5.0F);
+  image.valid_a = image.valid_b = Image<float>(20, 20, 1.0F);
+  image.edge = image.flying_a = image.flying_b = Image<std::uint8_t>(20, 20);
+  return one;
+}
+
+/// At one of two distances B is a period too near all over: nothing is left there to compare.
+TEST(Wraps, AreTheFirstThingThatAReportSays) {
+  ComparedRun run;
+  run.captures = {comparedOffBy(1.0F, 0), comparedOffBy(-2498.0F, 1)};
+  const auto finding = judgeRun(run);
+  ASSERT_TRUE(finding) << finding.error().message;
+  EXPECT_THAT(
+      finding->headline,
+      testing::StartsWith("50 % of what both see on surfaces is over 300 mm apart, and in no number of the "
+                          "rest; at 1 of the poses nothing else is seen. twin (B) is within 1.0 mm"));
+  EXPECT_EQ(finding->section.tone, compare::Tone::Bad);
+  std::string row;
+  for (const compare::Block& block : finding->section.blocks) {
+    const auto* table = std::get_if<compare::TableBlock>(&block);
+    if (table != nullptr && table->header.front() == "block")
+      row = fmt::format("{}", fmt::join(table->rows[0], "|"));
+  }
+  EXPECT_THAT(row, testing::StartsWith("distance|of 2 captures, 1 have nothing within 300 mm|50 %|1.00|"));
+  run.captures.erase(run.captures.begin());
+  EXPECT_THAT(judgeRun(run).error().message,
+              testing::HasSubstr("over 300 mm apart: there is nothing to compare"));
 }
 
 }  // namespace

@@ -3,14 +3,25 @@
 #include <toftwin/camera_info.h>
 #include <toftwin/frame.h>
 #include <toftwin/geometry.h>
+#include <toftwin/modulation.h>
 #include <toftwin/names.h>
 #include <toftwin/units.h>
+
+#include <array>
+#include <span>
 
 namespace toftwin {
 namespace {
 
 TEST(Units, UnambiguousRangeOf16MHzIsTheOneOfTheTextbook) {
   EXPECT_NEAR(unambiguousRange(16_MHz).in(metre), 9.3685, 5e-5);  // c / 2f
+}
+
+TEST(Units, SeveralFrequenciesRepeatTogetherAtTheOneTheyHaveInCommon) {
+  EXPECT_DOUBLE_EQ(commonFrequency(std::array{80_MHz, 16_MHz, 120_MHz}).in(megahertz), 8.0);
+  EXPECT_DOUBLE_EQ(commonFrequency(std::array{29_MHz, 29.001_MHz}).in(hertz), 1e3);
+  EXPECT_DOUBLE_EQ(commonFrequency(std::array{30_MHz}).in(megahertz), 30.0);
+  EXPECT_DOUBLE_EQ(commonFrequency(std::span<const Frequency>{}).in(hertz), 0.0);
 }
 
 TEST(Units, LeavesInTheUnitAskedFor) {

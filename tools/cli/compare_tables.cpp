@@ -35,7 +35,8 @@ void TableOptions::add(Arguments& args) {
               "another unit at "
               "its end (_mm for _m) is converted")
       .separatedBy(',');
-  args.option("--frequency-mhz", frequency_mhz, "of modulation, for harmonics, wraps and lens_scatter")
+  args.option("--frequency-mhz", frequency_mhz,
+              "of modulation, for harmonics, noise_law, wraps and lens_scatter")
       .separatedBy(',');
 }
 

@@ -6,6 +6,7 @@
 #include <cctype>
 #include <fstream>
 #include <memory>
+#include <set>
 #include <sstream>
 
 #include <toftwin/names.h>
@@ -157,12 +158,27 @@ struct Measurement {
     return run.finish(plan, planned, *taken);
   }
 
+  /// Whether B sees the board in each block that is left, before any of them is captured.
+  Result<> checkBoards() {
+    std::set<std::size_t> looked_at;
+    for (const plan::PlannedCapture& planned : schedule.captures) {
+      const plan::BlockSpec& block = plan.blocks[planned.block];
+      if (block.pose_from != plan::PoseFrom::Board || run.done().contains(planned.number)) continue;
+      if (!looked_at.insert(planned.block).second) continue;
+      auto feed_b = b.forBlock(block.name, taker);
+      if (!feed_b) return feed_b.error();
+      if (auto sees = taker.checkBoardOf(planned, **feed_b); !sees) return sees;
+    }
+    return {};
+  }
+
   Result<std::size_t> all() {
     const std::size_t before = run.done().size();
     Progress progress{"captures", schedule.captures.size() - before, std::chrono::minutes{1}};
     std::size_t taken = 0;
-    Result<> done;
+    Result<> done = checkBoards();
     for (const plan::PlannedCapture& planned : schedule.captures) {
+      if (!done) break;
       if (run.done().contains(planned.number)) continue;
       progress.show(taken, planned.name);
       done = interrupted() ? Error{Error::Code::Stopped, "interrupted"} : takeOne(planned);

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <boost/math/distributions/non_central_f.hpp>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -12,6 +11,7 @@
 
 #include "calib/compare/statistics.h"
 #include "calib/compare/traits/clusters.h"
+#include "calib/compare/traits/phasor.h"
 
 namespace toftwin::compare {
 namespace {
@@ -45,38 +45,45 @@ std::vector<Wave> wavesOf(std::span<const double> frequency_hz, std::span<const 
   return waves;
 }
 
-/// A = √(a² + b²) of two parameters from `first` on, which err alike by σ. A²/2σ² is of a noncentral F
-/// distribution with 2 and ν degrees and noncentrality A₀²/σ²: its inversion, as √ is not straight near 0,
-/// and an A₀ of 0 is seen as 1.25 σ on the mean. From ten σ on the delta method is as good.
+/// Of two parameters from `first` on: the delta method far from 0, amplitudeOf() near it.
 Trait amplitudeTrait(const Fit& fit, const std::string& name, std::size_t first) {
-  const auto amplitudeOf = [first](std::span<const double> p) { return std::hypot(p[first], p[first + 1]); };
-  Trait trait = fit.trait(name, "mm", amplitudeOf);
   const double sigma = std::sqrt(0.5 * (std::pow(fit.error(first), 2) + std::pow(fit.error(first + 1), 2)));
-  const double seen = trait.value / sigma;
-  if (!(sigma > 0.0) || seen > 10.0) return trait;
-  // The A₀/σ of which so large a share of runs show less than `at`; 0 where even that of none does not.
-  const auto invert = [&](double at, double share) {
-    const auto below = [&](double wanted) {
-      return boost::math::cdf(boost::math::non_central_f{2.0, fit.degrees, wanted * wanted}, 0.5 * at * at);
-    };
-    double low = 0.0, high = at + 10.0;
-    for (int i = 0; i < 50; ++i) {
-      const double middle = 0.5 * (low + high);
-      (below(std::max(middle, 1e-9)) > share ? low : high) = middle;
-    }
-    return low;
-  };
-  trait.low = sigma * invert(seen, 0.975);
-  // Less than noise alone shows on the mean does not prove that there is less than nothing.
-  trait.high = sigma * invert(std::max(seen, std::sqrt(0.5 * std::numbers::pi)), 0.025);
+  const WaveParts phasor{fit.at[first], fit.at[first + 1], sigma, fit.degrees};
+  Trait trait = fit.trait(name, "mm",
+                          [first](std::span<const double> p) { return std::hypot(p[first], p[first + 1]); });
+  if (isNearNothing(phasor)) {
+    const Trait near = amplitudeOf(phasor);
+    trait.low = near.low, trait.high = near.high;
+  }
+  trait.refers_to = phasor;
   return trait;
 }
 
-std::vector<Trait> traitsOf(const Fit& fit, const std::vector<Wave>& waves) {
+OnLine lineOf(const Fit& fit, Column distance_m, double at_m) {
+  const std::size_t k = fit.at.size();
+  const double c = fit.covariance[0], both = fit.covariance[1], slope = fit.covariance[k + 1];
+  const auto [nearest, farthest] = std::ranges::minmax(distance_m);
+  return {.at_m = at_m,
+          .from_m = nearest,
+          .to_m = farthest,
+          .slope = fit.at[1],
+          .variance = c + 2.0 * at_m * both + at_m * at_m * slope,
+          .slope_variance = slope,
+          .covariance = both + at_m * slope,
+          .degrees = fit.degrees};
+}
+
+/// Waves, what is left of a line c + s d at the rows' mean distance and its slope, and what no wave explains.
+std::vector<Trait> traitsOf(const Fit& fit, const std::vector<Wave>& waves, Column distance_m) {
   std::vector<Trait> traits;
   for (std::size_t w = 0; w < waves.size(); ++w) {
     traits.push_back(amplitudeTrait(fit, waves[w].name, 2 + 2 * w));
   }
+  // Not c: nobody measured at distance 0, and c is the less certain the farther the rows are from it.
+  const double mean_m = summarise(distance_m).mean;
+  traits.push_back(
+      fit.trait("offset", "mm", [mean_m](std::span<const double> p) { return p[0] + p[1] * mean_m; }));
+  traits.back().refers_to = lineOf(fit, distance_m, mean_m);
   traits.push_back(fit.trait("scale", "mm/m", 1));
   const double free = static_cast<double>(fit.n - fit.at.size());
   const double sd = std::sqrt(fit.squares / free), half = 1.96 / std::sqrt(2.0 * free);
@@ -97,8 +104,8 @@ double seriesAt(std::span<const double> p, const std::vector<Wave>& waves, doubl
   return sum;
 }
 
-FittedTraits fittedOf(const Fit& fit, const std::vector<Wave>& waves) {
-  return {.traits = traitsOf(fit, waves),
+FittedTraits fittedOf(const Fit& fit, const std::vector<Wave>& waves, Column distance_m) {
+  return {.traits = traitsOf(fit, waves, distance_m),
           .curve = {fmt::format("a line and {} waves", waves.size()),
                     [=, p = fit.at](double d) { return seriesAt(p, waves, d); }}};
 }
@@ -135,7 +142,8 @@ std::string ordersNotTold(std::size_t told, const std::vector<double>& distance_
 /// Each amplitude's interval is shorter than the four standard deviations that one row's would have.
 bool areToldApart(const std::vector<Trait>& traits) {
   const double sd = traits.back().value;  // "residual"
-  return std::all_of(traits.begin(), traits.end() - 2,
+  constexpr auto kNoWaves = 3;            // offset, scale, residual
+  return std::all_of(traits.begin(), traits.end() - kNoWaves,
                      [&](const Trait& one) { return one.high - one.low <= 4.0 * sd; });
 }
 
@@ -152,7 +160,7 @@ Result<FittedTraits> fitRows(Column distance_m, Column error_mm, const std::vect
   const auto fit = fitLeastSquares(model, e, std::vector<double>(2 + 2 * waves.size(), 0.0));
   if (!fit)
     return undetermined("harmonics", "the distances span too little of a period, or two orders coincide");
-  return fittedOf(*fit, waves);
+  return fittedOf(*fit, waves, d);
 }
 
 /// How far to the side of a wall each row is, u, and its capture's nearest row, d₀. What a camera errs by its
@@ -209,14 +217,18 @@ Result<FittedTraits> fitClusters(Column distance_m, Column error_mm, const std::
   const auto fit = fitInClusters(columns, (*rows)[1], captures);
   if (!fit)
     return undetermined("harmonics", "the distances span too little of a period, or are of one capture only");
-  FittedTraits fitted = fittedOf(*fit, waves);
+  FittedTraits fitted = fittedOf(*fit, waves, d);
   if (!sideways.isWide()) return fitted;
   const Sideways of_all{distance_m, cluster};
+  double variance = 0.0;  // of what goes sideways, over the rows
   for (std::size_t i = 0; i < distance_m.size(); ++i) {
     const auto at = of_all.at(i);
     fitted.besides.push_back(
         std::inner_product(at.begin(), at.end(), fit->at.begin() + static_cast<long>(first), 0.0));
+    variance += fit->varianceOf(at, first) / static_cast<double>(distance_m.size());
   }
+  // Two distances do not tell it from the slope: rows less a guess would show what nobody measured.
+  if (!(variance <= fit->squares / static_cast<double>(fit->n))) fitted.besides.clear(), fitted.curve = {};
   return fitted;
 }
 

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <Eigen/Dense>
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 
+#include "calib/compare/statistics.h"
 #include "calib/compare/traits/least_squares.h"
 
 namespace toftwin::compare {
@@ -168,6 +171,23 @@ void addDetails(DriftModel kind, const Fit& fit, Column t, double length_s, std:
   tau("slow time constant", is_ordered ? 4 : 2);
 }
 
+/// Where what is left of the chosen curve goes on from row to row, the series may be of a shape that is not
+/// in the list: then the curve's numbers are those of the best such curve. What any shape has is said beside
+/// it.
+std::string whatGoesOn(double rho, Column value_mm) {
+  constexpr double kMuch = 0.6;
+  if (!(rho > kMuch)) return {};
+  const std::size_t tenth = std::max<std::size_t>(1, value_mm.size() / 10);
+  const double first = summarise(value_mm.first(tenth)).mean, last = summarise(value_mm.last(tenth)).mean;
+  return fmt::format(
+      "what is left of the chosen curve goes on from row to row (correlation {:.2f}): the camera errs so, or "
+      "its drift "
+      "has another shape than any of the list, and the numbers say nothing of it. As measured, the last "
+      "tenth of the rows is "
+      "{:.3g} mm from the first on the mean",
+      rho, last - first);
+}
+
 }  // namespace
 
 const char* nameOf(DriftModel model) {
@@ -224,6 +244,7 @@ Result<DriftTraits> driftTraits(Column time_s, Column value_mm) {
   result.curve = {nameOf(chosen->kind), [=, shape = chosen->shape, p = fit->at](double at_s) {
                     return first + shape(p, (at_s - begin) / length);
                   }};
+  result.not_told = whatGoesOn(correlationOfResiduals(chosen->over(t), y, *fit), y);
   // Where no drift can be told, "drift" is what a ramp could still be: not known to be exactly nothing.
   if (chosen->kind == DriftModel::Constant) {
     chosen = &candidates[1];
@@ -236,6 +257,7 @@ Result<DriftTraits> driftTraits(Column time_s, Column value_mm) {
   result.traits.push_back(fit->trait("drift", "mm", [&](std::span<const double> p) {
     return chosen->shape(p, t.back()) - chosen->shape(p, t.front());
   }));
+  result.traits.back().refers_to = OverSpan{length};
   addDetails(result.model, *fit, t, length, result.traits);
   return result;
 }

@@ -67,6 +67,15 @@ double studentT(double degrees, double level) {
   return boost::math::quantile(boost::math::students_t{std::max(1.0, degrees)}, 0.5 + 0.5 * level);
 }
 
+double Fit::varianceOf(std::span<const double> factor, std::size_t first) const {
+  double variance = 0.0;
+  for (std::size_t i = 0; i < factor.size(); ++i) {
+    for (std::size_t k = 0; k < factor.size(); ++k)
+      variance += factor[i] * factor[k] * covariance[(first + i) * at.size() + first + k];
+  }
+  return variance;
+}
+
 double Fit::error(std::size_t parameter) const { return std::sqrt(covariance[parameter * (at.size() + 1)]); }
 
 Trait Fit::trait(std::string name, std::string unit, std::size_t parameter, double scale) const {

@@ -24,6 +24,8 @@ struct Fit {
   double degrees = 0.0;  ///< n − k, or fewer where rows err alike
 
   [[nodiscard]] double error(std::size_t parameter) const;
+  /// Of Σ factor · parameter, from parameter number `first` on.
+  [[nodiscard]] double varianceOf(std::span<const double> factor, std::size_t first) const;
   /// Of a parameter, or of any function of them (delta method), with Student's quantile.
   [[nodiscard]] Trait trait(std::string name, std::string unit, std::size_t parameter,
                             double scale = 1.0) const;

@@ -5,6 +5,7 @@
 #include <functional>
 #include <span>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include <toftwin/image.h>
@@ -16,11 +17,34 @@
 /// InvalidArgument: too few rows, or rows that cannot tell it.
 namespace toftwin::compare {
 
+/// A number on a line over distance, told at one of them: what it takes to tell it at another.
+struct OnLine {
+  double at_m = 0.0, from_m = 0.0, to_m = 0.0;  ///< where it is told; nearest and farthest row
+  double slope = 0.0;                           ///< per metre
+  double variance = 0.0, slope_variance = 0.0, covariance = 0.0, degrees = 0.0;
+};
+/// A wave's two parts, each with the standard error `sigma`.
+struct WaveParts {
+  double cosine = 0.0, sine = 0.0, sigma = 0.0, degrees = 0.0;
+};
+/// A part of noise that goes as signal^−power, told at the signal `most`.
+struct AtSignal {
+  double most = 0.0, power = 0.0;  ///< most: NaN where the other camera's has no unit in common with it
+  std::string unit{};
+};
+/// A change from the first row to the last.
+struct OverSpan {
+  double length_s = 0.0;
+};
+/// What a number is told of, where that may be another for another camera; none: it is as it is.
+using RefersTo = std::variant<std::monostate, OnLine, WaveParts, AtSignal, OverSpan>;
+
 /// One number of a characteristic.
 struct Trait {
   std::string name{}, unit{};
   double value = 0.0, low = 0.0, high = 0.0;
   std::size_t n = 0;  ///< what the interval is made from: rows, frames, blocks
+  RefersTo refers_to{};
 };
 using Traits = Result<std::vector<Trait>>;
 using Column = std::span<const double>;
@@ -46,6 +70,8 @@ struct DriftTraits {
   /// "slope", "step"
   std::vector<Trait> traits{};
   FittedCurve curve{};  ///< of the model; of a constant, their mean
+  std::string
+      not_told{};  ///< why its shape, and what is told of it, may not be the series'; empty: nothing says so
 };
 /// "one exponential"; "none" of a constant.
 const char* nameOf(DriftModel model);
@@ -70,10 +96,12 @@ Result<FittedTraits> fittedHarmonics(Column distance_m, Column error_mm, std::sp
                                      std::span<const std::size_t> cluster = {});
 
 /// σ(I) = √(a² + b²/I + c²/I²) in ln σ, I relative to the largest: "floor" a, "shot" b, "read" c at that
-/// signal.
-Traits noiseLawTraits(Column signal, Column sigma_mm);
-/// The same with the curve, over the signal itself.
-Result<FittedTraits> fittedNoiseLaw(Column signal, Column sigma_mm);
+/// signal. `frequency_hz`, of modulation: rows are left out at signals so small that the law has the phase's
+/// noise over 0.1 rad, where σ no longer goes so; empty: all rows are fitted.
+Traits noiseLawTraits(Column signal, Column sigma_mm, std::span<const double> frequency_hz = {});
+/// The same with the curve, over the signal itself; not_told says what was left out.
+Result<FittedTraits> fittedNoiseLaw(Column signal, Column sigma_mm,
+                                    std::span<const double> frequency_hz = {});
 
 /// Range is off by a whole number of periods: "wrapped" share.
 Traits wrapTraits(Column error_m, double period_m);

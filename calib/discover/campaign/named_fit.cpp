@@ -129,8 +129,9 @@ std::shared_ptr<const RowSource> CampaignRows::including(
   std::size_t declared_columns = all->common_columns_;
   for (const Group& group : all->groups_)
     if (group.kind == Kind::Declared) declared_columns = std::max(declared_columns, group.first + group.count);
-  const auto here = cameraWith(all->effects_);
-  if (!here) return all;
+  const auto here = cameraWith(all->effects_),
+             late = cameraWith(withDelay(declared_->model, all->effects_, has_delay_ ? kDelay_mm : 0.0));
+  if (!here || !late) return all;
   std::vector<NoiselessCamera> cameras;
   for (const FreeNumber& one : free) {
     auto camera = cameraWith(moved(all->effects_, one, one.step));
@@ -166,6 +167,7 @@ std::shared_ptr<const RowSource> CampaignRows::including(
           rows.base.columns[k].conservativeResize(Eigen::NoChange, static_cast<Eigen::Index>(next));
       }
       rows.base.putResidual(fixed.cells, fixed.residual, fixed.varied, reading);
+      if (has_delay_) rows.base.putDelay(fixed.cells, reading, read(*late, c, on_light));
       for (std::size_t i = 0; i < free.size(); ++i)
         rows.base.putChange(fixed.cells, declared_columns + i, reading, read(cameras[i], c, on_light));
       rows.evidence =

@@ -60,6 +60,14 @@ void takeNoiseOff(const sim::SensorModel& model, std::vector<MeasuredCapture>& c
     const Image<float>& variance = capture.log_amplitude.variance;
     for (std::size_t i = 0; i < variance.size(); ++i)
       if (std::isfinite(variance[i])) capture.log_amplitude.mean[i] -= of_frames * variance[i];
+    Image<float>& range_m = capture.range_m.mean;
+    const Image<float>& range_variance = capture.range_m.variance;
+    for (std::size_t i = 0; i < range_m.size(); ++i) {
+      if (!std::isfinite(range_m[i]) || !std::isfinite(range_variance[i])) continue;
+      const double of_frame = static_cast<double>(capture.frames) * static_cast<double>(range_variance[i]);
+      range_m[i] -=
+          static_cast<float>(of_frame * model.noiseShiftPerVariance(static_cast<double>(range_m[i]) * metre));
+    }
   }
 }
 

@@ -24,7 +24,8 @@ std::vector<sim::AnyEffect> effectsWithoutNoise(const sim::SensorModel& model);
 ///     E ln A − ln a = (m − 1)/(2m) s²/a² = (m − 1)/2 var(ln A)
 /// in second order: across the phasor noise only lengthens it, and the logarithm is concave. With one
 /// frequency nothing is left of either; a pulsed camera's sum of charges, m = 0, has the logarithm's part
-/// alone.
+/// alone. And off the mean of the ranges what a factory's table makes of it:
+/// sim::SensorModel::noiseShiftPerVariance().
 void takeNoiseOff(const sim::SensorModel& model, std::vector<MeasuredCapture>& captures);
 
 /// A camera model without noise, at whatever exposure a capture was taken.

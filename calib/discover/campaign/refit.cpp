@@ -16,6 +16,8 @@ sim::AnyEffect defaultsOf(const sim::AnyEffect& effect) {
   return std::visit([]<class E>(const E&) { return sim::AnyEffect{E{}}; }, effect);
 }
 
+constexpr Eigen::Index kDelayColumn = 2;  ///< behind offset and gain, poses and light being integrated out
+
 using Kept = std::set<std::pair<std::size_t, std::string>>;  ///< numbers that stay as they are
 
 /// Normal equations of the free numbers, everything else eliminated.
@@ -24,6 +26,7 @@ struct Step {
   Eigen::MatrixXd gram;
   Eigen::VectorXd moment;
   Eigen::VectorXd own;  ///< squares of the free numbers' columns
+  Eigen::MatrixXd others_by_free;  ///< by how much the others' coefficients fall with the free numbers'
   double deviance = 0.0, freedom = 1.0;
 };
 
@@ -36,7 +39,8 @@ Step stepOf(const Marginal& marginal, std::size_t free) {
   step.deviance = step.others.deviance, step.freedom = step.others.freedom;
   const auto n = static_cast<Eigen::Index>(free);
   const Eigen::MatrixXd cross = marginal.gram(others, Eigen::lastN(n));
-  step.gram = marginal.gram.bottomRightCorner(n, n) - cross.transpose() * step.others.inverse * cross;
+  step.others_by_free = step.others.inverse * cross;
+  step.gram = marginal.gram.bottomRightCorner(n, n) - cross.transpose() * step.others_by_free;
   step.moment =
       marginal.moment.tail(n) - cross.transpose() * step.others.inverse * marginal.moment(others);
   step.own = marginal.gram.diagonal().tail(n);
@@ -66,6 +70,7 @@ std::vector<FreeNumber> toldApart(const std::vector<FreeNumber>& free, const Ste
 /// A list of effects while it is fitted.
 struct State {
   std::vector<sim::AnyEffect> effects;
+  double delay_mm = 0.0;  ///< of the light, besides: what it does is not proportional to it
   std::vector<FreeNumber> free{};
   Marginal marginal{};
   Step at{};
@@ -90,12 +95,17 @@ class Descent {
   Result<> descend(State& state) const {
     constexpr int kMostSteps = 10;
     constexpr double kDone = 0.1;  // of the deviance: a tenth of a standard error squared
+    constexpr double kMostDelay_mm = 20.0;  // at once
     double damping = 1e-3;
     for (int k = 0; k < kMostSteps && !state.free.empty() && damping < 1e8; ++k) {
       Eigen::MatrixXd damped = state.at.gram;
       damped.diagonal() *= 1.0 + damping;
       const Eigen::VectorXd change = pseudoInverse(damped, 1e-7).inverse * state.at.moment;
-      State next{state.effects};
+      State next{state.effects, state.delay_mm};
+      if (rows_.hasDelay())
+        next.delay_mm += std::clamp(
+            (state.at.others.coefficient - state.at.others_by_free * change)[kDelayColumn] / (1.0 + damping),
+            -kMostDelay_mm, kMostDelay_mm);
       for (std::size_t i = 0; i < state.free.size(); ++i)
         next.effects = moved(std::move(next.effects), state.free[i],
                              change[static_cast<Eigen::Index>(i)] * state.free[i].step);
@@ -144,7 +154,8 @@ class Descent {
     const auto evidence = rows_.evidenceLeft({.effects = state.effects,
                                               .free = state.free,
                                               .terms = options_.terms,
-                                              .with_numbers = options_.with_numbers});
+                                              .with_numbers = options_.with_numbers,
+                                              .delay_mm = state.delay_mm});
     if (!evidence) return evidence.error();
     state.marginal = marginalise(*evidence, options_.scales);
     state.at = stepOf(state.marginal, state.free.size());
@@ -299,9 +310,9 @@ Result<Refitted> refit(const CampaignRows& rows, std::vector<sim::AnyEffect> eff
     result.fitted.push_back(std::move(one));
   }
   result.offset_mm = at.others.coefficient[0], result.gain_percent = at.others.coefficient[1];
-  // Behind offset and gain, poses and light being integrated out.
-  const Eigen::Index common = rows.hasDelay() ? 3 : 2;
-  if (rows.hasDelay()) result.delay_mm = at.others.coefficient[2];
+  const Eigen::Index common = rows.hasDelay() ? kDelayColumn + 1 : kDelayColumn;
+  result.moved_mm = state.delay_mm;
+  if (rows.hasDelay()) result.delay_mm = state.delay_mm + at.others.coefficient[kDelayColumn];
   result.common_covariance.topLeftCorner(common, common) =
       size * at.others.inverse.topLeftCorner(common, common);
   result.marginal = std::move(state.marginal);
@@ -320,11 +331,11 @@ Zero zeroOf(const Refitted& refitted, double known_mm) {
     covariance -= variance * with_delay * with_delay.transpose();
     at[kDelay] = -known_mm;
   }
-  // The column of the delay is what it does beyond an offset.
+  // The column of the delay is what it does beyond an offset; where the light was moved by it, it is all.
   const double offset_variance =
       covariance(kOffset, kOffset) + covariance(kDelay, kDelay) - 2.0 * covariance(kOffset, kDelay);
-  return {at[kOffset] - at[kDelay], std::sqrt(std::max(0.0, offset_variance)), at[kDelay], at[kGain],
-          std::sqrt(std::max(0.0, covariance(kGain, kGain)))};
+  return {at[kOffset] - (at[kDelay] - refitted.moved_mm), std::sqrt(std::max(0.0, offset_variance)),
+          at[kDelay], at[kGain], std::sqrt(std::max(0.0, covariance(kGain, kGain)))};
 }
 
 namespace {

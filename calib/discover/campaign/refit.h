@@ -80,6 +80,7 @@ struct Refitted {
   double deviance = 0.0, dispersion = 1.0;
   double offset_mm = 0.0, gain_percent = 0.0;
   double delay_mm = 0.0;  ///< of the light, beyond an offset of the range; 0 where that is the same
+  double moved_mm = 0.0;  ///< that of it by which the light was moved when the rest was fitted
   Eigen::Matrix3d common_covariance = Eigen::Matrix3d::Zero();  ///< of offset, gain and delay
 };
 Result<Refitted> refit(const CampaignRows& rows, std::vector<sim::AnyEffect> effects,

@@ -189,17 +189,16 @@ double periodOf(const sim::SensorModel& model) {
   return highest > 0_MHz ? unambiguousRange(highest).in(metre) : 0.0;
 }
 
-constexpr double kDelay_mm = 5.0;
-
-/// What a millimetre of delay in the light changes.
-Reading delayed(const Base& base, const Variant& late) {
-  Reading delay = base.with(late);
-  for (std::size_t i = 0; i < delay.range_m.size(); ++i) {
-    delay.range_m[i] = (delay.range_m[i] - base.reading.range_m[i]) / static_cast<float>(kDelay_mm);
-    delay.log_amplitude[i] =
-        (delay.log_amplitude[i] - base.reading.log_amplitude[i]) / static_cast<float>(kDelay_mm);
+/// What a millimetre of delay in the light changes; `to`: with kDelay_mm.
+Reading delayed(const Reading& from, Reading to) {
+  const auto perMillimetre = [](float late, float before) {
+    return (late - before) / static_cast<float>(kDelay_mm);
+  };
+  for (std::size_t i = 0; i < to.range_m.size(); ++i) {
+    to.range_m[i] = perMillimetre(to.range_m[i], from.range_m[i]);
+    to.log_amplitude[i] = perMillimetre(to.log_amplitude[i], from.log_amplitude[i]);
   }
-  return delay;
+  return to;
 }
 
 /// The camera with a delay in its light, where that is another thing than an offset of the range.
@@ -212,7 +211,7 @@ Result<std::optional<Variant>> lateOf(const Declared& declared, const std::vecto
   if (!camera) return camera.error();
   std::optional<Variant> late{{*std::move(camera), true}};
   std::vector<Reading> changes;
-  for (const Base* base : probed) changes.push_back(delayed(*base, *late));
+  for (const Base* base : probed) changes.push_back(delayed(base->reading, base->with(*late)));
   if (!isNoOffset(changes)) late.reset();
   return late;
 }
@@ -319,10 +318,9 @@ Result<CampaignRows> CampaignRows::make(const Declared& declared, const Lit& lit
         }
       }
       if (*late) {
-        const PerChannel& carrier = fixed->carriers[std::string{kDelayCarrier}] =
-            fixed->whitened(delayed(base, **late));
-        columns.columns[kRange].col(kCommon) = carrier[kRange] - columns.columns[kRange].col(0);
-        if (carrier[kLog].size() != 0) columns.columns[kLog].col(kCommon) = carrier[kLog];
+        const Reading delayed_reading = base.with(**late);
+        fixed->carriers[std::string{kDelayCarrier}] = fixed->whitened(delayed(base.reading, delayed_reading));
+        columns.putDelay(fixed->cells, base.reading, delayed_reading);
       }
       CaptureRows& rows = all.rows_[c];
       const auto in_base = static_cast<Eigen::Index>(all.base_columns_);

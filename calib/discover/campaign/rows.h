@@ -79,6 +79,8 @@ class Cells {
 /// kCommon − 1.
 std::vector<Group> commonGroups();
 inline constexpr std::size_t kCommon = 8;
+/// By which the light is late to see what a delay does.
+inline constexpr double kDelay_mm = 5.0;
 
 /// Columns and residuals of one capture, whitened.
 struct WhitenedCapture {
@@ -97,6 +99,9 @@ struct WhitenedCapture {
                    const Reading& from, const Reading& to);
   void put(const Cells& cells, std::size_t column, const Reading& change);
   void putChange(const Cells& cells, std::size_t column, const Reading& from, const Reading& to);
+  /// Column kCommon: what a millimetre of delay in the light changes, beyond an offset, which is free
+  /// already. `to`: with light that is late by kDelay_mm. putCommon must have been called.
+  void putDelay(const Cells& cells, const Reading& from, const Reading& to);
   [[nodiscard]] CaptureEvidence evidence(std::string name, std::string block) const;
 };
 
@@ -165,14 +170,15 @@ class CampaignRows final : public RowSource, public NamedEffects {
   /// Declared effects without noise, and those that were included.
   [[nodiscard]] const std::vector<sim::AnyEffect>& effects() const { return effects_; }
 
-  /// What a list of effects leaves. Columns: what is common to all lists (`with_numbers`: and the
-  /// numbers of this source's effects), terms, and last the free numbers' derivatives. Error: an
-  /// exposure that the model cannot have.
+  /// What a list of effects leaves. What a delay of the light does depends on them: its column is made anew.
+  /// Columns: what is common to all lists (`with_numbers`: and the numbers of this source's effects), terms,
+  /// and last the free numbers' derivatives. Error: an exposure that the model cannot have.
   struct Left {
     const std::vector<sim::AnyEffect>& effects;
     std::span<const FreeNumber> free{};
     std::span<const TermGroup> terms{};
     bool with_numbers = false;
+    double delay_mm = 0.0;  ///< the light is so much later than in `effects`
   };
   [[nodiscard]] Result<Evidence> evidenceLeft(const Left& left) const;
 

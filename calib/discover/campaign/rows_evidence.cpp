@@ -234,11 +234,14 @@ Evidence CampaignRows::withoutCatalogue(std::span<const TermGroup> extra) const 
 }
 
 Result<Evidence> CampaignRows::evidenceLeft(const Left& left) const {
-  const auto here = cameraWith(left.effects);
-  if (!here) return here.error();
+  const auto cameraOf = [&](std::vector<sim::AnyEffect> effects, double later_mm = 0.0) {
+    return cameraWith(withDelay(declared_->model, std::move(effects), left.delay_mm + later_mm));
+  };
+  const auto here = cameraOf(left.effects), late = cameraOf(left.effects, has_delay_ ? kDelay_mm : 0.0);
+  if (!here || !late) return here ? late.error() : here.error();
   std::vector<NoiselessCamera> cameras;
   for (const FreeNumber& one : left.free) {
-    auto camera = cameraWith(moved(left.effects, one, one.step));
+    auto camera = cameraOf(moved(left.effects, one, one.step));
     if (!camera) return camera.error();
     cameras.push_back(*std::move(camera));
   }
@@ -271,6 +274,7 @@ Result<Evidence> CampaignRows::evidenceLeft(const Left& left) const {
         whitened.columns[k].middleCols(in_base, terms.count()) =
             terms.columnsFor(k, terms.channels[k].columns.cast<double>()).cast<float>();
       }
+      if (has_delay_) whitened.putDelay(fixed.cells, reading, read(*late, c, on_light));
       for (std::size_t i = 0; i < left.free.size(); ++i)
         whitened.putChange(fixed.cells, first_free + i, reading, read(cameras[i], c, on_light));
       evidence.captures[c] = whitened.evidence(fixed.name, fixed.block);

@@ -191,16 +191,28 @@ Declared endOf(const Round& round) {
   return end;
 }
 
+/// The light where the cameras stood by what the round before found, or by the camera file.
+Result<std::vector<std::shared_ptr<const TracedCapture>>> tracedFor(const Round& round, const Declared& file,
+                                                                    const OpenCaptures& open,
+                                                                    const Round* before,
+                                                                    const std::function<void(double)>& tell) {
+  if (before == nullptr && open.trusts_poses) {
+    TraceOptions again = open.trace;
+    again.seed += 0x61c88647U;  // effects are varied on at_poses, of other paths
+    return traceAll(file, open.captures, again, tell, std::vector<Stood>(open.captures.size()));
+  }
+  const auto stood_by = before != nullptr
+                            ? withDelay(file.model, before->refitted.effects, before->zero.delay_mm)
+                            : declaredEffects(file);
+  return traceWhereTheyStood(round.declared, stood_by, open.captures, open.at_poses, open.trace, tell);
+}
+
 Result<std::unique_ptr<Round>> search(const Declared& file, const OpenCaptures& open, const Round* before,
                                       const std::function<void()>& begin,
                                       const std::function<void(double)>& tell) {
   auto round = std::make_unique<Round>(Round{before != nullptr ? endOf(*before) : file});
   begin();
-  const auto stood_by = before != nullptr
-                            ? withDelay(file.model, before->refitted.effects, before->zero.delay_mm)
-                            : declaredEffects(file);
-  auto traced =
-      traceWhereTheyStood(round->declared, stood_by, open.captures, open.at_poses, open.trace, tell);
+  auto traced = tracedFor(*round, file, open, before, tell);
   if (!traced) return traced.error();
   round->traced = *std::move(traced);
   begin();
@@ -209,11 +221,35 @@ Result<std::unique_ptr<Round>> search(const Declared& file, const OpenCaptures& 
   if (!rows) return rows.error();
   round->rows = *std::move(rows);
   begin();
-  round->finding = find(*round->rows, open.finder);
+  FinderOptions finder = open.finder;
+  if (open.trusts_poses) finder.most_scale = 1.0;
+  round->finding = find(*round->rows, finder);
   begin();
   if (auto fitted = fitFound(file, before != nullptr ? &*before->rows : nullptr, open, *round); !fitted)
     return fitted.error();
   return round;
+}
+
+/// Whether much is left beside what was found, or poses came out far off: a strong effect may have gone into
+/// them before it was found. Where nothing was found, poses are what the captures say.
+bool isDoubtful(const Round& round) {
+  constexpr double kMuch = 2.0;  // times the noise's variance
+  constexpr double kFar = 2.0;   // times 1 mm and 0.1 degrees
+  const auto& scales = round.finding.scales;
+  return round.things() > 0 &&
+         (round.refitted.dispersion > kMuch || (!scales.empty() && scales.front() > kFar));
+}
+
+/// `first`, or a second round from where it ended, whichever is better.
+Result<std::unique_ptr<Round>> secondOf(std::unique_ptr<Round> first, const Declared& file,
+                                        const OpenCaptures& open) {
+  const double alpha = open.finder.alpha;
+  const bool has_both = !first->effects.empty() && !first->updates.empty();
+  if (first->things() == 0 || !(has_both || first->leavesSomething(alpha))) return first;
+  auto second = search(file, open, first.get(), [] {}, {});
+  if (!second) return second;
+  const bool is_better = (*second)->things() <= first->things() || !(*second)->leavesSomething(alpha);
+  return is_better ? std::move(second) : std::move(first);
 }
 
 }  // namespace
@@ -221,16 +257,19 @@ Result<std::unique_ptr<Round>> search(const Declared& file, const OpenCaptures& 
 Result<std::unique_ptr<Round>> searchInRounds(const Declared& file, const OpenCaptures& open,
                                               const std::function<void()>& begin,
                                               const std::function<void(double)>& tell) {
-  auto first = search(file, open, nullptr, begin, tell);
-  if (!first) return first;
-  const double alpha = open.finder.alpha;
-  const Round& one = **first;
-  const bool has_both = !one.effects.empty() && !one.updates.empty();
-  if (one.things() == 0 || !(has_both || one.leavesSomething(alpha))) return first;
-  auto second = search(file, open, &one, [] {}, {});
-  if (!second) return second;
-  const bool is_better = (*second)->things() <= one.things() || !(*second)->leavesSomething(alpha);
-  return is_better ? std::move(second) : std::move(first);
+  auto found = search(file, open, nullptr, begin, tell);
+  if (!found) return found;
+  if (isDoubtful(**found)) {
+    OpenCaptures as_stated = open;
+    as_stated.trusts_poses = true;
+    Declared without_delay = file;  // which was fitted at poses that were free
+    without_delay.delay_mm = 0.0;
+    auto stated = search(without_delay, as_stated, nullptr, [] {}, {});
+    if (!stated) return stated;
+    auto twice = secondOf(*std::move(stated), without_delay, as_stated);
+    if (!twice || !isDoubtful(**twice)) return twice;
+  }
+  return secondOf(*std::move(found), file, open);
 }
 
 }  // namespace toftwin::discover

@@ -23,6 +23,7 @@ struct OpenCaptures {
   const FinderOptions& finder;
   std::vector<std::string> left_out{};  ///< effects that are no candidates
   bool has_steps = false;               ///< single frames tell the converter's steps
+  bool trusts_poses = false;            ///< begins where the cameras were said to stand, nearly
 };
 
 /// What a search found, fitted, and from where it started: everything is linear about there.
@@ -42,8 +43,10 @@ struct Round {
 
 /// Searches, and once more from where the fit ended, if something is left beside what was found or if effects
 /// were found beside wrong numbers: poses, delay and numbers that are far off leave what is not linear in
-/// them, and that looks like an effect. `file`: the camera file, with the delay of the light as it fits
-/// without any effect. `begin` is called between the first round's phases: trace, vary, find, fit.
+/// them, and that looks like an effect. Where the first round leaves much, or poses far off, a strong effect
+/// may have gone into them before it was found: all begins again at the poses as they were stated, and that
+/// counts if it leaves neither. `file`: the camera file, with the delay of the light as it fits without any
+/// effect. `begin` is called between the first round's phases: trace, vary, find, fit.
 Result<std::unique_ptr<Round>> searchInRounds(const Declared& file, const OpenCaptures& open,
                                               const std::function<void()>& begin,
                                               const std::function<void(double)>& tell);

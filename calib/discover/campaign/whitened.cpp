@@ -51,6 +51,13 @@ void WhitenedCapture::putChange(const Cells& cells, std::size_t column, const Re
   put(cells, column, {minus(to.range_m, from.range_m), minus(to.log_amplitude, from.log_amplitude)});
 }
 
+void WhitenedCapture::putDelay(const Cells& cells, const Reading& from, const Reading& to) {
+  putChange(cells, kCommon, from, to);
+  for (auto& of_channel : columns)
+    if (of_channel.size() != 0) of_channel.col(kCommon) /= static_cast<float>(kDelay_mm);
+  columns[kRange].col(kCommon) -= columns[kRange].col(0);
+}
+
 void WhitenedCapture::putCommon(const Cells& cells, const TracedCapture& traced) {
   columns[kRange].col(0) = kMillimetre * cells.rootWeights(Channel::Range);
   if (cells.has(Channel::LogAmplitude)) {

@@ -253,6 +253,21 @@ TEST_F(GigeVisionCross, IsCompliantThroughOurDriver) {
   }
 }
 
+TEST_F(GigeVisionCross, ADaemonWhoseSourceIsItsOwnFacadeEndsAtOnce) {
+  startGige(kSmallSim, {}, "[[source]]\nname = 'again'\ndriver = 'aravis'\nuri = 'aravis:{}'\n");
+  ASSERT_TRUE(log_->waitFor("again: opened", 1));
+  {
+    auto native = client();
+    auto stream = native.subscribe("again", {});
+    ASSERT_TRUE(stream.ok()) << stream.error().message;
+    ASSERT_TRUE(stream->next(kSoon).ok());
+  }
+  const auto asked_at = std::chrono::steady_clock::now();
+  stop();
+  const auto took = std::chrono::steady_clock::now() - asked_at;
+  EXPECT_LT(took, std::chrono::milliseconds{1000}) << "the library waits 12.5 s for a camera that is gone";
+}
+
 TEST_F(GigeVisionCross, IsFoundByOurDriverBySerialNumber) {
   startGige(kSmallSim);
   auto table = settings::Table::parse(fmt::format("uri = 'aravis:{}'", name_), "driver.toml");

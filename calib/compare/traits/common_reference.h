@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "calib/compare/traits/traits.h"
+
+namespace toftwin::compare {
+
+/// Two numbers of a characteristic as they are to be held against each other: both at one distance, at one
+/// signal, over one time.
+struct HeldTogether {
+  Trait difference{};     ///< second less first; of waves the amplitude of the difference, which has no sign
+  bool is_size = false;   ///< it has no sign
+  std::string at{};       ///< what both are told at, where that is another than their own: "at 1.75 m"
+  std::string why_not{};  ///< why they cannot be held against each other; empty: they can
+};
+
+/// By what the numbers refer to (Trait::refers_to); where they refer to nothing, or to different things, as
+/// they are. `wider` is differenceOf()'s.
+HeldTogether heldTogether(const Trait& first, const Trait& second, double wider = 1.0);
+
+}  // namespace toftwin::compare
