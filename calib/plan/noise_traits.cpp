@@ -176,12 +176,14 @@ NamedRows patternOverAmplitude(const ComparedRun& run, std::size_t camera) {
   return rows;
 }
 
-/// Of whole images; not in other light, which makes noise of its own.
+/// Of whole images; not in other light, which makes noise of its own, nor with the lens covered: what is read
+/// there is noise as its signal, too.
 NamedRows noiseOverSignal(const ComparedRun& run, std::size_t camera) {
   NamedRows rows{kNoiseLaw, kCameras[camera]};
   for (const ComparedCapture& one : run.captures) {
     const OwnReading& own = one.own[camera];
-    if (one.record.ambient_klx > 0.0 || !(own.amplitude > 0.0)) continue;
+    const bool is_covered = one.record.kind == nameOf(Kind::Dark);
+    if (one.record.ambient_klx > 0.0 || is_covered || !(own.amplitude > 0.0)) continue;
     rows.x.push_back(own.amplitude), rows.y.push_back(own.noise_mm);
     rows.condition.push_back(one.record.number);
   }

@@ -135,6 +135,23 @@ TEST(RunTraits, SayUpToWhichNoiseTheLawHolds) {
   EXPECT_THAT(traitsOf(run).untold, says("up to which noise the noise law of A holds: its frames say no"));
 }
 
+/// Without a frequency nothing else would leave it out: a signal of 1/4000 of the largest, with 1.5 m of
+/// noise.
+TEST(RunTraits, TakeNoNoiseLawOfACoveredLens) {
+  ComparedRun run = plantedRun();
+  run.frequency_hz[0].clear();
+  const auto noiseOf = [](const ComparedRun& of) {
+    const RunTraits all = traitsOf(of);
+    return std::ranges::find(all.rows, kNoiseLaw, &compare::NamedRows::what)->y;
+  };
+  const auto without = noiseOf(run);
+  ComparedCapture& dark = run.captures.emplace_back();
+  dark.record.kind = "dark", dark.own[0].amplitude = 1.0, dark.own[0].noise_mm = 1500.0;
+  EXPECT_EQ(noiseOf(run), without);
+  run.captures.back().record.kind = "distance";
+  EXPECT_NE(noiseOf(run), without);
+}
+
 /// A wall from 1 m in the middle to 1.6 m at the corner, in light of 0 to 35 klx that adds 4 mm² of noise²
 /// for each and no bias; the camera loses one pixel more for each 5 klx, the farthest first.
 OwnReading inLight(double klx, double noise_mm2_per_klx, int lost, std::mt19937_64& random) {
