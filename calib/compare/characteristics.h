@@ -26,6 +26,10 @@ struct PoseComparison {
   Image<float> amplitude_ratio;   ///< B / A; empty unless both give amplitude
   Image<std::uint8_t> edge;       ///< 1 within two pixels of a jump in A's range
   Image<std::uint8_t> flying_a, flying_b;  ///< B's along A's rays
+  /// What lies over kGross_mm from here is gross: 0; or, where noise makes over a sixth of kGross_mm of the
+  /// means' difference, the mean of what is not. A cut about 0 would take more from one side than from the
+  /// other.
+  double middle_mm = 0.0;
   bool resampled = false;         ///< B had another camera model and was interpolated
   double shared_rays = 1.0;       ///< of A's rays the share that B looks along, too
   CameraInfo camera{};            ///< of these images: A's

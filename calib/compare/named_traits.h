@@ -10,6 +10,9 @@
 
 namespace toftwin::compare {
 
+/// Share of the pixels at which a camera gives a range, as NamedTrait::what.
+inline constexpr const char* kValidPixels = "valid pixels";
+
 /// A number of a characteristic, and whose it is.
 struct NamedTrait {
   std::string what{};    ///< "drift"

@@ -18,10 +18,11 @@ namespace {
 
 constexpr std::size_t kShownFirst = 3;  ///< differences that have a card
 
-/// What is left of a fit, and an intercept far from all rows, are of B − A but no difference of two numbers.
-bool isDifference(const NamedTrait& one) {
-  return one.of == "B − A" && one.trait.name != "residual" && one.trait.name != "at 1";
-}
+/// An intercept far from all rows: what a camera that nobody measured there would show.
+bool isBeyond(const NamedTrait& one) { return one.trait.name == "at 1"; }
+
+/// What is left of a fit is of B − A, but no difference of two numbers.
+bool isDifference(const NamedTrait& one) { return one.of == "B − A" && one.trait.name != "residual"; }
 
 std::string number(double value) {
   const std::string text = fmt::format("{:.3g}", value);
@@ -41,6 +42,26 @@ bool isWaves(const TraitVerdict& one) { return one.what.starts_with("harmonics")
 /// Wrapped readings of the wall, a share that differs by over 1 %.
 bool isWraps(const TraitVerdict& one) {
   return one.what == "wraps" && one.isTold() && one.differs() && std::abs(one.difference.value) > 0.01;
+}
+
+/// Valid pixels, of which the one has over 5 % fewer than the other.
+bool isMissing(const TraitVerdict& one) {
+  if (one.what != kValidPixels || !one.a || !one.b || !one.isTold() || !one.differs()) return false;
+  return std::abs(one.difference.value) > 0.05 * std::max(one.a->trait.value, one.b->trait.value);
+}
+
+/// What wraps or is missing is in few of the other numbers, so that it is said before them.
+std::string hiddenInWords(const TraitVerdict& one) {
+  const Trait& d = one.difference;
+  if (isWraps(one) && one.a && one.b)
+    return fmt::format("B reads {} of the wall whole periods off, A {}. ", shownPercent(one.b->trait.value),
+                       shownPercent(one.a->trait.value));
+  if (!isMissing(one)) return "";
+  const bool is_b = d.value < 0.0;  // that lacks them
+  const double per_cent = (is_b ? -100.0 : 100.0) / std::max(one.a->trait.value, one.b->trait.value);
+  return fmt::format("{} gives no range at {} % of the pixels at which {} does ({} to {} %). ",
+                     is_b ? "B" : "A", number(per_cent * d.value), is_b ? "A" : "B",
+                     number(per_cent * (is_b ? d.high : d.low)), number(per_cent * (is_b ? d.low : d.high)));
 }
 
 /// The amplitude of a wave of B − A: how large it is.
@@ -95,8 +116,25 @@ std::size_t countOf(const std::vector<TraitVerdict>& all, bool differs) {
       std::ranges::count_if(all, [&](const auto& one) { return one.isTold() && one.differs() == differs; }));
 }
 
+/// A camera's numbers, or those of B − A, by what they are and their name.
+class Owned {
+ public:
+  Owned(const NamedTraits& traits, std::string_view of) {
+    for (const NamedTrait& one : traits.traits) {
+      if (one.of == of) all_[{one.what, one.trait.name}] = &one;
+    }
+  }
+  [[nodiscard]] const NamedTrait* find(const NamedTrait& like) const {
+    const auto found = all_.find({like.what, like.trait.name});
+    return found == all_.end() ? nullptr : found->second;
+  }
+
+ private:
+  std::map<std::pair<std::string, std::string>, const NamedTrait*> all_;
+};
+
 void holdTogether(TraitVerdict& one, double wider) {
-  if (!one.b) {
+  if (!one.b || one.is_paired) {
     one.difference = widened(one.difference, wider);
     return;
   }
@@ -119,23 +157,24 @@ double TraitVerdict::floor() const {
 }
 
 std::vector<TraitVerdict> verdictsOf(const NamedTraits& traits) {
-  using Key = std::pair<std::string, std::string>;
-  std::map<Key, const NamedTrait*> of_a;
-  for (const NamedTrait& one : traits.traits) {
-    if (one.of == "A") of_a[{one.what, one.trait.name}] = &one;
-  }
+  const Owned of_a{traits, "A"}, of_b{traits, "B"}, of_both{traits, "B − A"};
   std::vector<TraitVerdict> all;
   for (const NamedTrait& one : traits.traits) {
-    if (isDifference(one)) all.push_back({.what = one.what, .difference = one.trait});
-    const auto a = of_a.find({one.what, one.trait.name});
-    if (one.of == "B" && a != of_a.end()) all.push_back({.what = one.what, .a = *a->second, .b = one});
+    if (isBeyond(one)) continue;
+    const NamedTrait *a = of_a.find(one), *b = of_b.find(one);
+    const bool has_both = a != nullptr && b != nullptr;
+    if (isDifference(one) && has_both)
+      all.push_back({.what = one.what, .a = *a, .b = *b, .difference = one.trait, .is_paired = true});
+    else if (isDifference(one))
+      all.push_back({.what = one.what, .difference = one.trait});
+    else if (one.of == "B" && has_both && of_both.find(one) == nullptr)
+      all.push_back({.what = one.what, .a = *a, .b = one});
   }
   const double wider = widenedFor(all.size());
   for (TraitVerdict& one : all) holdTogether(one, wider);
-  // Wraps come first, as what wraps is in few of the others. Those that are not told come last; where a floor
-  // is 0, what differs is infinitely far beyond it.
+  // Those that are not told come last; where a floor is 0, what differs is infinitely far beyond it.
   const auto rank = [](const TraitVerdict& one) {
-    if (isWraps(one)) return -std::numeric_limits<double>::infinity();
+    if (isWraps(one) || isMissing(one)) return -std::numeric_limits<double>::infinity();
     return !one.isTold() ? 1.0 : one.differs() ? -timesFloor(one) : 0.0;
   };
   std::ranges::stable_sort(all, {}, rank);
@@ -155,11 +194,14 @@ std::string headlineOf(const std::vector<TraitVerdict>& all) {
       largest = &one;
   }
   const TraitVerdict& first = largest != nullptr ? *largest : all.front();
-  return fmt::format(
-      "{} difference: {}, {} ({} to {}). {} of {} numbers of B differ from A's by more than the noise "
-      "floor",
-      largest != nullptr ? "Largest" : "Clearest", plainNameOf(first), sizeOf(first),
-      number(first.difference.low), number(first.difference.high), differ, differ + same);
+  std::string hidden;
+  for (const TraitVerdict& one : all) hidden += hiddenInWords(one);
+  return hidden +
+         fmt::format(
+             "{} difference: {}, {} ({} to {}). {} of {} numbers of B differ from A's by more than the noise "
+             "floor",
+             largest != nullptr ? "Largest" : "Clearest", plainNameOf(first), sizeOf(first),
+             number(first.difference.low), number(first.difference.high), differ, differ + same);
 }
 
 TableBlock verdictTable(const std::vector<TraitVerdict>& all) {

@@ -16,9 +16,10 @@ struct TraitVerdict {
   std::optional<NamedTrait> a{}, b{};  ///< none where B − A was told directly
   /// B − A. The intervals of all verdicts hold together with 95 %; an end may be NaN: not known.
   Trait difference{};
-  bool is_size = false;   ///< the difference is the amplitude of a wave, which has no sign
-  std::string at{};       ///< what both are told at, where a number hangs on it: "at 1.75 m"
-  std::string why_not{};  ///< why the two cannot be held against each other
+  bool is_paired = false;  ///< B − A was told row by row of what A and B were told of, too
+  bool is_size = false;    ///< the difference is the amplitude of a wave, which has no sign
+  std::string at{};        ///< what both are told at, where a number hangs on it: "at 1.75 m"
+  std::string why_not{};   ///< why the two cannot be held against each other
 
   [[nodiscard]] bool isTold() const;
   /// 0 is not in the interval.
@@ -28,11 +29,13 @@ struct TraitVerdict {
 };
 
 /// Of each number that both cameras have, and of those told of B − A that are 0 for equal cameras (so not
-/// what is left of a fit). Those that differ come first, the farthest beyond its floor before the others.
+/// what is left of a fit). Where a number is told of A, of B and of B − A, the last one is the difference.
+/// Those that differ come first, the farthest beyond its floor before the others; but before them the wall's
+/// wraps and what one camera lacks of the pixels, as what is wrapped or missing is in few of the others.
 std::vector<TraitVerdict> verdictsOf(const NamedTraits& traits);
 
 /// The largest difference in millimetres, or else the clearest one, and how many of how many differ: a
-/// sentence or two without the last full stop.
+/// few sentences without the last full stop, of which the first ones say what wraps or is missing.
 std::string headlineOf(const std::vector<TraitVerdict>& verdicts);
 TableBlock verdictTable(const std::vector<TraitVerdict>& verdicts);
 /// The same in two: what differs, and the rest, for a page on which figures stand between.

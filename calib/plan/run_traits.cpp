@@ -7,6 +7,7 @@
 #include <functional>
 #include <map>
 #include <set>
+#include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
@@ -15,6 +16,7 @@
 #include "calib/compare/characteristics.h"
 #include "calib/compare/live_report.h"
 #include "calib/compare/statistics.h"
+#include "calib/compare/traits/clusters.h"
 #include "calib/plan/frame_traits.h"
 #include "calib/plan/noise_traits.h"
 #include "calib/plan/own_series.h"
@@ -234,17 +236,33 @@ void addHarmonics(const ComparedRun& run, TraitCollector& all) {
   }
 }
 
+/// A number for each distance and angle of a block: what a camera is off by there does not go with the
+/// amplitude.
+std::vector<std::size_t> placesOf(const Captures& captures) {
+  std::map<std::tuple<std::string, double, double>, std::size_t> numbers;
+  const auto known = [](double value) { return std::isfinite(value) ? value : -1.0; };
+  std::vector<std::size_t> places;
+  for (const ComparedCapture* one : captures) {
+    const auto& record = one->record;
+    const std::tuple place{record.block, known(record.distance_m), known(record.angle_deg)};
+    places.push_back(numbers.try_emplace(place, numbers.size()).first->second);
+  }
+  return places;
+}
+
 void addAmplitudeAndAmbient(const ComparedRun& run, TraitCollector& all) {
   if (const Captures captures = capturesOf(run, "exposure"); !captures.empty()) {
+    const auto places = placesOf(captures);
     all.add("error over amplitude", "B − A",
             compare::amplitudeTraits(column(captures, [](const auto& one) { return one.amplitude_a; }),
-                                     differencesOf(captures)));
+                                     differencesOf(captures), places));
     for (std::size_t camera : {std::size_t{0}, std::size_t{1}}) {
       const auto error = column(captures, [&](const auto& one) { return meanOf(one.seen[camera].wall_error_mm); });
       if (std::ranges::any_of(error, [](double e) { return std::isfinite(e); }))
-        all.add("error over amplitude, against the plan's wall", kCameras[camera],
-                compare::amplitudeTraits(
-                    column(captures, [&](const auto& one) { return one.own[camera].amplitude; }), error));
+        all.add(
+            "error over amplitude, against the plan's wall", kCameras[camera],
+            compare::amplitudeTraits(
+                column(captures, [&](const auto& one) { return one.own[camera].amplitude; }), error, places));
     }
   }
   if (capturesOf(run, "ambient").empty()) return;
@@ -284,6 +302,43 @@ void addMasks(const ComparedRun& run, TraitCollector& all) {
   all.add("masks", "A and B", compare::maskTraits(a, b));
 }
 
+/// Shares of one capture's pixels that both cameras look at.
+struct ValidShares {
+  double a = 0.0, b = 0.0, both = 0.0, pixels = 0.0;
+
+  explicit ValidShares(const compare::PoseComparison& images) {
+    for (std::size_t i = 0; i < images.valid_a.size(); ++i) {
+      if (!std::isfinite(images.valid_b[i])) continue;
+      const bool has_a = images.valid_a[i] >= 0.5F, has_b = images.valid_b[i] >= 0.5F;
+      a += has_a, b += has_b, both += has_a && has_b, ++pixels;
+    }
+    for (double* share : {&a, &b, &both}) *share /= std::max(1.0, pixels);
+  }
+};
+
+/// Repeats of a condition have the same mask but for noise: their mean is one row. Not with the lens covered,
+/// where what is valid is noise; but where one camera has nothing at all.
+void addValidPixels(const ComparedRun& run, TraitCollector& all) {
+  std::map<std::pair<std::string, std::size_t>, std::size_t> conditions;
+  std::vector<double> a, b, both;
+  std::vector<std::size_t> condition;
+  double pixels = 0.0;
+  for (const ComparedCapture& one : run.captures) {
+    const ValidShares shares{one.thinned};
+    if (one.record.kind == nameOf(Kind::Dark) || !(shares.a + shares.b > 0.0)) continue;
+    a.push_back(shares.a), b.push_back(shares.b), both.push_back(shares.both), pixels += shares.pixels;
+    condition.push_back(
+        conditions.try_emplace({one.record.block, one.record.condition}, conditions.size()).first->second);
+  }
+  const auto means = [&](const std::vector<double>& of) { return compare::clusterMeans(of, condition); };
+  const auto valid = compare::validTraits(means(a), means(b), means(both), pixels);
+  if (!valid) return all.untold(valid.error().message);
+  all.add(compare::kValidPixels, "A", valid->a);
+  all.add(compare::kValidPixels, "B", valid->b);
+  all.add(compare::kValidPixels, "B − A", valid->difference);
+  all.add(compare::kValidPixels, "A and B", valid->both);
+}
+
 /// What no block of the run feeds. What two kinds of block tell needs one of them.
 void sayWhatIsMissing(const ComparedRun& run, TraitCollector& all) {
   std::map<std::string_view, std::pair<bool, std::string>> told;  // whether it is, and by which kinds
@@ -306,6 +361,7 @@ RunTraits traitsOf(const ComparedRun& run) {
   addHarmonics(run, all);
   addAmplitudeAndAmbient(run, all);
   addMasks(run, all);
+  addValidPixels(run, all);
   addNoiseTraits(run, all);
   addFrameTraits(run, all);
   sayWhatPlanesHide(run, all);

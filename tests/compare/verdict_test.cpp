@@ -51,6 +51,36 @@ TEST(Verdict, PutsWrapsFirst) {
   EXPECT_EQ(verdictsOf(traits).front().what, "small");
 }
 
+NamedTraits withValidPixels(double share_of_a, double share_of_b, double half) {
+  NamedTraits traits{.traits = {of("A", "large", 0.0, -1.0, 1.0), of("B", "large", 90.0, 89.0, 91.0)}};
+  const auto add = [&](const char* whose, double value, double within) {
+    traits.traits.push_back(
+        {kValidPixels, "", whose, {"share", "1", value, value - within, value + within, 9}});
+  };
+  // Captures differ far more in what each camera has than the cameras do.
+  add("A", share_of_a, 0.3), add("B", share_of_b, 0.3), add("B − A", share_of_b - share_of_a, half);
+  return traits;
+}
+
+/// B has no range at 0.05 of 0.8, 6.3 % of A's pixels: of the same captures, so it is known far better than
+/// the share of each.
+TEST(Verdict, SaysFirstWhichPixelsOneCameraLacks) {
+  const auto all = verdictsOf(withValidPixels(0.8, 0.75, 0.01));
+  ASSERT_EQ(all.size(), 2u);
+  EXPECT_EQ(all.front().what, kValidPixels);
+  EXPECT_TRUE(all.front().a && all.front().b && all.front().differs());
+  EXPECT_THAT(
+      headlineOf(all),
+      testing::StartsWith("B gives no range at 6.25 % of the pixels at which A does (4.82 to 7.68 %). "));
+  EXPECT_THAT(headlineOf(all), HasSubstr("Largest difference: large: number, +90 mm"));
+  EXPECT_THAT(cardsOf(all)[1].label, HasSubstr("valid pixels"));
+  EXPECT_THAT(headlineOf(verdictsOf(withValidPixels(0.75, 0.8, 0.01))),
+              testing::StartsWith("A gives no range at 6.25 % of the pixels at which B does ("));
+  // Fewer than 5 % of them, or by an interval that reaches 0, stand in the table alone.
+  for (const auto& [share, half] : {std::pair{0.77, 0.001}, {0.75, 0.06}})
+    EXPECT_THAT(headlineOf(verdictsOf(withValidPixels(0.8, share, half))), testing::StartsWith("Largest"));
+}
+
 TEST(Verdict, CallsNothingDifferentWhoseIntervalIsNotKnown) {
   const auto all =
       verdictsOf({.traits = {of("A", "drift", 1.0, 0.9, std::nan("")), of("B", "drift", 5.0, 4.9, 5.1),
@@ -93,6 +123,15 @@ TEST(Verdict, TakesWhatWasToldOfTheDifferenceAsItIs) {
   ASSERT_EQ(all.size(), 1u) << "a residual is no difference";
   EXPECT_TRUE(all[0].differs());
   EXPECT_DOUBLE_EQ(all[0].floor(), 1.0);
+}
+
+TEST(Verdict, IsNoneOfAnInterceptFarFromAllRows) {
+  NamedTraits traits;
+  for (const char* whose : {"A", "B", "B − A"}) {
+    traits.traits.push_back(of(whose, "error over amplitude", whose[0] == 'A' ? 0.0 : 50.0, 49.0, 51.0));
+    traits.traits.back().trait.name = "at 1";
+  }
+  EXPECT_TRUE(verdictsOf(traits).empty());
 }
 
 /// A has a wave of 5 mm that B has not: it is in B − A, and B's amplitude is 5 mm less. That is one thing.

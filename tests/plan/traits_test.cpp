@@ -82,6 +82,32 @@ TEST(RunTraits, FindWhatWasPlanted) {
   expectNear(find(all, "masks", "A and B", "agreement"), 15.0 / 16.0);
 }
 
+/// Of 16 pixels B lacks one or two by turns and has another that A lacks: 1/32 fewer on the mean of 40
+/// conditions. 60 repeats of one, in which it lacks all, are one row; and what is read in the dark is none.
+TEST(RunTraits, TellWhichPixelsOneCameraLacks) {
+  ComparedRun run = plantedRun();
+  for (ComparedCapture& one : run.captures) {
+    one.record.block = one.record.kind;
+    if (one.record.kind == "distance") one.record.condition = one.record.number;
+    one.thinned.valid_a[5] = 0.0F, one.thinned.valid_b[1] = one.record.number % 2 == 0 ? 0.0F : 1.0F;
+    if (one.record.kind == "warm_up") one.thinned.valid_b = Image<float>(4, 4, 0.0F), one.pixels = 0;
+  }
+  ComparedCapture dark = run.captures.back();
+  dark.record.kind = dark.record.block = "dark", dark.thinned.valid_b = Image<float>(4, 4, 0.0F);
+  run.captures.push_back(dark);
+  const RunTraits all = traitsOf(run);
+  const double rows = 41.0;
+  const RunTrait* less = find(all, compare::kValidPixels, "B − A", "share");
+  ASSERT_NE(less, nullptr);
+  EXPECT_EQ(less->trait.n, 41u);
+  EXPECT_NEAR(less->trait.value, (40.0 * -0.5 / 16.0 - 15.0 / 16.0) / rows, 1e-12);
+  EXPECT_NEAR(find(all, compare::kValidPixels, "A", "share")->trait.value, 15.0 / 16.0, 1e-12);
+  EXPECT_NEAR(find(all, compare::kValidPixels, "A and B", "of A alone")->trait.value,
+              (40.0 * 1.5 / 16.0 + 15.0 / 16.0) / rows, 1e-12);
+  EXPECT_NEAR(find(all, compare::kValidPixels, "A and B", "of B alone")->trait.value, 40.0 / 16.0 / rows,
+              1e-12);
+}
+
 /// σ² = 1² + 2² d² and a pattern of 0.5 mm at all distances; amplitude falls with d². B has half of it.
 TEST(RunTraits, TellNoiseAndPatternOverDistanceAndAmplitude) {
   std::mt19937_64 random{kSeed};
@@ -150,6 +176,27 @@ TEST(RunTraits, TakeNoNoiseLawOfACoveredLens) {
   EXPECT_EQ(noiseOf(run), without);
   run.captures.back().record.kind = "distance";
   EXPECT_NE(noiseOf(run), without);
+}
+
+/// B is 30 mm off at 2.2 m, where there is a fifth of the light, and not at 1 m; and 2 mm farther per decade
+/// at both. With one constant for both, the distance would be −40 mm per decade.
+TEST(RunTraits, TakeADistanceForNoAmplitude) {
+  std::mt19937_64 random{kSeed};
+  std::normal_distribution<double> error{0.0, 0.05};
+  ComparedRun run;
+  for (const double exposure : {0.25, 0.5, 0.75, 1.25, 1.5}) {
+    for (const double d_m : {1.0, 2.2}) {
+      ComparedCapture& one = run.captures.emplace_back();
+      one.pixels = 1, one.record.kind = "exposure", one.record.distance_m = d_m;
+      one.amplitude_a = 1000.0 * exposure / (d_m * d_m), one.own[1].amplitude = 0.5 * one.amplitude_a;
+      one.difference_mm = 2.0 * std::log10(one.amplitude_a) + (d_m > 2.0 ? 30.0 : 0.0) + error(random);
+      one.seen[1].wall_error_mm = {one.difference_mm};
+    }
+  }
+  const RunTraits all = traitsOf(run);
+  expectNear(find(all, "error over amplitude", "B − A", "per decade"), 2.0);
+  expectNear(find(all, "error over amplitude, against", "B", "per decade"), 2.0);
+  EXPECT_EQ(find(all, "error over amplitude", "B − A", "at 1"), nullptr);
 }
 
 /// A wall from 1 m in the middle to 1.6 m at the corner, in light of 0 to 35 klx that adds 4 mm² of noise²

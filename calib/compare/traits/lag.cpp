@@ -25,7 +25,7 @@ Traits lagTraits(Column frames_after, Column value) {
   return std::vector{fit->trait("lag", "1", 2), fit->trait("rest", "", 0)};
 }
 
-Traits afterImageTraits(Column first, Column rest, Column before) {
+Traits afterImageTraits(Column first, Column rest, Column before, const char* name) {
   const auto rows = finiteRows({first, rest, before}, 2, "lag");
   if (!rows) return rows.error();
   std::vector<double> shares;
@@ -35,7 +35,7 @@ Traits afterImageTraits(Column first, Column rest, Column before) {
     if (std::abs(change) > 0.1 * std::abs((*rows)[1][i])) shares.push_back(((*rows)[0][i] - (*rows)[1][i]) / change);
   }
   if (shares.size() < 2) return undetermined("lag", "the light hardly changed");
-  return std::vector{meanTrait("left behind", "1", shares)};
+  return std::vector{meanTrait(name, "1", shares)};
 }
 
 namespace {

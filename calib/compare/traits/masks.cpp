@@ -50,6 +50,23 @@ Traits maskTraits(std::span<const Image<std::uint8_t>> a, std::span<const Image<
   return traits;
 }
 
+Result<ValidTraits> validTraits(Column valid_a, Column valid_b, Column valid_both, double pixels) {
+  const auto rows = finiteRows({valid_a, valid_b, valid_both}, 1, "valid pixels");
+  if (!rows) return rows.error();
+  const auto &a = (*rows)[0], &b = (*rows)[1], &both = (*rows)[2];
+  std::vector<double> less, only_a, only_b;
+  for (std::size_t i = 0; i < a.size(); ++i)
+    less.push_back(b[i] - a[i]), only_a.push_back(a[i] - both[i]), only_b.push_back(b[i] - both[i]);
+  Trait difference = meanTrait("share", "1", less);
+  const double least = 0.5 / std::max(1.0, pixels);
+  difference.low = std::min(difference.low, difference.value - least);
+  difference.high = std::max(difference.high, difference.value + least);
+  return ValidTraits{.a = {meanTrait("share", "1", a)},
+                     .b = {meanTrait("share", "1", b)},
+                     .difference = {difference},
+                     .both = {meanTrait("of A alone", "1", only_a), meanTrait("of B alone", "1", only_b)}};
+}
+
 /// Frames say their starts in nanoseconds; seconds since long ago are coarser than that in 53 bits.
 constexpr double kTick_s = 1e-9;
 

@@ -2,6 +2,7 @@
 // Errors that go straight with something: amplitude, ambient light, speed.
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "calib/compare/traits/least_squares.h"
 
@@ -16,16 +17,30 @@ std::optional<Fit> line(const std::vector<double>& x, const std::vector<double>&
 
 }  // namespace
 
-Traits amplitudeTraits(Column amplitude, Column error_mm) {
-  auto rows = finiteRows({amplitude, error_mm}, 4, "amplitude-related error");
+Traits amplitudeTraits(Column amplitude, Column error_mm, std::span<const std::size_t> group) {
+  constexpr const char* kWhat = "amplitude-related error";
+  std::vector<double> of(group.begin(), group.end());
+  of.resize(amplitude.size(), 0.0);
+  auto rows = finiteRows({amplitude, error_mm, of}, 4, kWhat);
   if (!rows) return rows.error();
   auto& x = (*rows)[0];
-  if (std::ranges::min(x) <= 0.0)
-    return undetermined("amplitude-related error", "amplitudes must be positive");
+  if (std::ranges::min(x) <= 0.0) return undetermined(kWhat, "amplitudes must be positive");
   for (double& one : x) one = std::log10(one);
-  const auto fit = line(x, (*rows)[1]);
-  if (!fit) return undetermined("amplitude-related error", "all amplitudes are alike");
-  return std::vector{fit->trait("at 1", "mm", 0), fit->trait("per decade", "mm", 1)};
+  std::map<double, std::size_t> number;
+  for (const double one : (*rows)[2]) number.try_emplace(one, number.size());
+  const std::size_t groups = number.size();
+  // Each group's constant, then the slope.
+  const Model model = [&](std::span<const double> p, std::size_t i) {
+    return p[number[(*rows)[2][i]]] + p[groups] * x[i];
+  };
+  const auto fit = fitLeastSquares(model, (*rows)[1], std::vector<double>(groups + 1, 0.0));
+  if (!fit) {
+    return undetermined(kWhat, groups > 1
+                                   ? "within each distance all amplitudes are alike, or there are too few"
+                                   : "all amplitudes are alike");
+  }
+  const Trait slope = fit->trait("per decade", "mm", groups);
+  return groups > 1 ? std::vector{slope} : std::vector{fit->trait("at 1", "mm", 0), slope};
 }
 
 Traits ambientTraits(Column ambient_klx, Column error_mm, Column sigma_mm) {

@@ -45,6 +45,8 @@ struct Trait {
   double value = 0.0, low = 0.0, high = 0.0;
   std::size_t n = 0;  ///< what the interval is made from: rows, frames, blocks
   RefersTo refers_to{};
+  std::string
+      doubt{};  ///< why it may be another's, so that nothing is called different by it; empty: it is its own
 };
 using Traits = Result<std::vector<Trait>>;
 using Column = std::span<const double>;
@@ -141,23 +143,32 @@ Traits edgeTraits(Column x_px, Column value);
 /// "asymmetry", right minus left, which a light beside the lens makes.
 Traits shadowTraits(const Image<float>& range_m, double split_m);
 
-/// "at 1" c and "per decade" s of error = c + s log₁₀(amplitude).
-Traits amplitudeTraits(Column amplitude, Column error_mm);
+/// "at 1" c and "per decade" s of error = c + s log₁₀(amplitude). Of rows in groups, such as those of one
+/// distance, each has a c of its own, and "at 1" is not told.
+Traits amplitudeTraits(Column amplitude, Column error_mm, std::span<const std::size_t> group = {});
 /// "bias" per kilolux, and "noise²" per kilolux.
 Traits ambientTraits(Column ambient_klx, Column error_mm, Column sigma_mm);
 /// "per speed": of error = c + s v, v towards the camera negative.
 Traits motionTraits(Column speed_m_per_s, Column error_mm);
 /// y(k) = rest + h λᵏ, k frames after the light changed: "lag" λ, "rest".
 Traits lagTraits(Column frames_after, Column value);
-/// Of changes of light, one a row: what the first frame after it has of what was before, (first − rest)/(before −
-/// rest): "left behind".
-Traits afterImageTraits(Column first, Column rest, Column before);
+/// Of changes of light, one a row: what the first frame after it has of what was before, (first −
+/// rest)/(before − rest): "left behind". `name`: another one than "left behind".
+Traits afterImageTraits(Column first, Column rest, Column before, const char* name = "left behind");
 /// measured(t) = reference(t − τ) + c: "latency" τ; the reference is linear between its rows.
 Traits latencyTraits(Column time_s, Column measured, Column reference_time_s, Column reference);
 
 /// Over pairs of masks (1: valid), one pair for each pose or frame: "agreement", "overlap" (both / either),
 /// "kappa".
 Traits maskTraits(std::span<const Image<std::uint8_t>> a, std::span<const Image<std::uint8_t>> b);
+
+/// Of the pixels that both look at, in a row for each capture: "share" that A has, B has, and B less A,
+/// paired; and "of A alone", "of B alone". Differences that are alike in all rows are known to half a pixel
+/// of `pixels`.
+struct ValidTraits {
+  std::vector<Trait> a{}, b{}, difference{}, both{};
+};
+Result<ValidTraits> validTraits(Column valid_a, Column valid_b, Column valid_both, double pixels);
 
 /// "interval", "jitter" (sd of intervals that are not gaps), "lost" share of frames.
 Traits timingTraits(Column start_s);
