@@ -87,8 +87,7 @@ void SourceHost::turn(const std::stop_token& stop) {
   }
 }
 
-/// Starts or stops the stream as subscribers come and go. Before commands, so that a trigger that
-/// follows a subscription finds the camera started.
+/// Starts or stops the stream as subscribers come and go.
 void SourceHost::adjustStreaming() {
   bool is_wanted = false;
   {
@@ -128,10 +127,15 @@ bool SourceHost::mayMakeFrame() const {
 
 void SourceHost::runCommands() {
   while (true) {
-    Waiting next;
     {
       const std::scoped_lock lock{mutex_};
       if (commands_.empty()) return;
+    }
+    // Whoever subscribed before he asked may have done so since this turn began: a trigger finds the camera started.
+    if (source_) adjustStreaming();
+    Waiting next;
+    {
+      const std::scoped_lock lock{mutex_};
       next = std::move(commands_.front());
       commands_.pop_front();
     }

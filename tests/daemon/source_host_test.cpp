@@ -341,6 +341,54 @@ TEST(SourceHost, ATriggeredFrameIsBegunAnewOnceAtMostHoweverManySubscribersComeA
   EXPECT_EQ(taker.nextSequence(subscriber->backlog), 0);
 }
 
+/// A camera that cannot be triggered before it is started. `meanwhile` happens while it stops.
+class StoppedSource final : public drivers::Source {
+ public:
+  StoppedSource(std::shared_ptr<Remote> remote, std::function<void()> meanwhile)
+      : source_(std::move(remote)), meanwhile_(std::move(meanwhile)) {}
+  [[nodiscard]] const drivers::SourceInfo& info() const override { return source_.info(); }
+  Result<> start() override { return is_started_ = true, source_.start(); }
+  void stop() override {
+    is_started_ = false;
+    source_.stop();
+    meanwhile_();
+  }
+  Result<Frame> next(std::stop_token stop, bool lockstep) override {
+    return source_.next(std::move(stop), lockstep);
+  }
+  Result<> trigger() override {
+    if (!is_started_) return Error{Error::Code::InvalidArgument, "it is not started"};
+    return source_.trigger();
+  }
+
+ private:
+  test::FakeSource source_;
+  std::function<void()> meanwhile_;
+  bool is_started_ = false;
+};
+
+TEST(SourceHost, ATriggerRightAfterASubscriptionFindsTheCameraStartedThoughItWasJustBeingStopped) {
+  Rig rig;
+  Taker taker;
+  SubscriberPtr second;
+  std::promise<Result<>> triggered;
+  const auto subscribeAndTrigger = [&, is_first = true]() mutable {
+    if (!std::exchange(is_first, false)) return;
+    second = rig.subscribe(taker);
+    rig.host->trigger([&](Result<> result) { triggered.set_value(std::move(result)); });
+  };
+  const auto open = [&]() -> Result<std::unique_ptr<drivers::Source>> {
+    return std::unique_ptr<drivers::Source>{std::make_unique<StoppedSource>(rig.remote, subscribeAndTrigger)};
+  };
+  rig.host = std::make_unique<SourceHost>("cam", open, open(), rig.options, rig.clock);
+  const auto first = rig.subscribe(taker);
+  ASSERT_TRUE(rig.remote->asked.reaches(1));
+  rig.host->unsubscribe(first);
+  const auto result = triggered.get_future().get();
+  ASSERT_TRUE(result.ok()) << result.error().message;
+  EXPECT_EQ(taker.nextSequence(second->backlog), 0);
+}
+
 TEST(SourceHost, WhatGoesWrongWithOneSubscriberIsNobodyElsesMatter) {
   Rig rig;
   rig.start();
