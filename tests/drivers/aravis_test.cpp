@@ -93,46 +93,6 @@ TEST_F(AravisDriver, ASingleImageWithIdsThatWrapAroundLosesNothing) {
   }
 }
 
-TEST_F(AravisDriver, PointsSayRangeDepthAndTheLens) {
-  camera_.setFloatReg(Emulated::kFocal, 0.0);
-  for (std::uint32_t axis = 0; axis < 3; ++axis) {
-    camera_.setFloatReg(0x10200 + 8 * axis, 1.0);
-    camera_.setFloatReg(0x10220 + 8 * axis, 0.0);
-  }
-  for (const char* format : {"Coord3D_ABC32f", "Coord3D_ABC32f_Planar"}) {
-    const auto source = started(fmt::format("components = ['Range']\npixel_format = '{}'", format));
-    ASSERT_NE(source, nullptr);
-    // Points of exactly such a camera in floats: the fit is as exact as they are.
-    EXPECT_NEAR(source->info().camera.fx, Emulated::kFocal_px, 1e-2);
-    EXPECT_NEAR(source->info().camera.cx, Emulated::kU_px, 1e-2);
-    const auto frame = nextFrame(*source);
-    ASSERT_TRUE(frame.ok()) << frame.error().message;
-    const auto range_m = frame->find(PlaneKind::Range)->as<float>();
-    const auto depth_m = frame->find(PlaneKind::Depth)->as<float>();
-    const auto n = static_cast<std::uint64_t>(std::lround(1000.0F * depth_m[1])) -
-                   Emulated::rangeCode(0, 1, 0);
-    const std::size_t at = 20 * Emulated::kWidth + 40;
-    const double z_m = 1e-3 * Emulated::rangeCode(n, 40, 20);
-    EXPECT_NEAR(depth_m[at], z_m, 1e-6);
-    EXPECT_NEAR(range_m[at], z_m * std::hypot(1.0, 17.0 / 40.0, 4.0 / 40.0), 1e-6);
-  }
-}
-
-TEST_F(AravisDriver, FloatCoordinatesAndSphericalOnesAreRead) {
-  camera_.setReg(Emulated::kSystem, 1);
-  const auto source = started("components = ['Range']\npixel_format = 'Coord3D_C32f'");
-  ASSERT_NE(source, nullptr);
-  const auto frame = nextFrame(*source);
-  ASSERT_TRUE(frame.ok()) << frame.error().message;
-  const std::size_t at = 20 * Emulated::kWidth + 40;
-  const float range_m = frame->find(PlaneKind::Range)->as<float>()[at],
-              depth_m = frame->find(PlaneKind::Depth)->as<float>()[at];
-  EXPECT_NEAR(range_m, depth_m * std::hypot(1.0, 17.0 / 40.0, 4.0 / 40.0), 1e-6);
-  const double code =
-      (1000.0 * static_cast<double>(range_m) - Emulated::kOffset_mm) / Emulated::kScale_mm;
-  EXPECT_NEAR(code, Emulated::rangeCode(0, 40, 20) + 32, 32) << "along the ray";
-}
-
 TEST_F(AravisDriver, TheUnitIsTheCamerasOrTheUsers) {
   camera_.setReg(Emulated::kDistanceUnit, 1);
   auto inches = started("components = ['Range']");

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <limits>
 
 #include "little_endian.h"
@@ -90,6 +91,18 @@ std::uint16_t EmulatedTof::rangeCode(std::uint64_t n, int x, int y) {
   if ((x + y) % 11 == 0) return 0;
   return static_cast<std::uint16_t>(4000 + 7 * x + 13 * y + static_cast<int>(n % 64));
 }
+std::array<std::uint16_t, 3> EmulatedTof::pointCodes(std::uint64_t n, int x, int y) {
+  const std::uint16_t code = rangeCode(n, x, y);
+  if (code == 0) return {0, 0, 0};
+  const double z_mm = kScale_mm * code + kOffset_mm;
+  const auto aside = [z_mm](double pixels) {
+    return static_cast<std::uint16_t>(
+        std::lround((z_mm * pixels / kFocal_px - kOffsetAside_mm) / kScaleAside_mm));
+  };
+  std::array<std::uint16_t, 3> codes{aside(x - kU_px), aside(y - kV_px), code};
+  if ((x + 2 * y) % 13 == 5) codes[static_cast<std::size_t>(y % 2)] = 0;
+  return codes;
+}
 std::uint16_t EmulatedTof::intensity(int x, int y) { return static_cast<std::uint16_t>(300 + 3 * x + y); }
 std::uint16_t EmulatedTof::confidence(int x, int y) {
   return static_cast<std::uint16_t>((x * y) % 17 == 3 ? 0 : 900 + x);
@@ -108,7 +121,10 @@ EmulatedTof::Bytes EmulatedTof::imageBytes(std::uint32_t format) const {
                                         static_cast<double>(code)};
       if (format == kC16) putLittle(bytes, code, 2);
       if (format == kC32f) real(bytes, code);
+      const auto codes = pointCodes(frame_, x, y);
       for (std::size_t i = 0; i < 3; ++i) {
+        if (format == kABC16) putLittle(bytes, codes[i], 2);
+        if (format == kABC16Planar) putLittle(planes[i], codes[i], 2);
         const double value = code == 0 ? std::numeric_limits<double>::quiet_NaN() : point[i];
         if (format == kABC32f) real(bytes, value);
         if (format == kABC32fPlanar) real(planes[i], value);
@@ -157,7 +173,10 @@ bool EmulatedTof::isFrameDue() {
   if (now < due_) return false;
   due_ = std::max(
       due_ + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>{1.0 / rate_hz}), now);
-  return true;
+  if (skip_frames <= 0) return true;
+  --skip_frames;
+  ++left_out_;
+  return false;
 }
 
 }  // namespace toftwin::test
