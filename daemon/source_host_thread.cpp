@@ -131,7 +131,8 @@ void SourceHost::runCommands() {
       const std::scoped_lock lock{mutex_};
       if (commands_.empty()) return;
     }
-    // Whoever subscribed before he asked may have done so since this turn began: a trigger finds the camera started.
+    // Whoever subscribed before he asked may have done so since this turn began: a trigger finds the camera
+    // started.
     if (source_) adjustStreaming();
     Waiting next;
     {

@@ -291,15 +291,7 @@ void readTiming(const Features& features, Setup& setup) {
   setup.is_triggered = features.text("TriggerMode").value_or("Off") == "On";
   setup.can_trigger =
       setup.is_triggered && features.text("TriggerSource").value_or("") == "Software";
-  if (setup.is_triggered) return;
-  for (const char* name : {"ResultingFrameRate", "AcquisitionResultingFrameRate",
-                           "AcquisitionFrameRate", "AcquisitionFrameRateAbs"}) {
-    const auto rate_hz = features.number(name);
-    if (rate_hz && *rate_hz > 0.0) {
-      setup.frame_interval = (1.0 / *rate_hz) * second;
-      return;
-    }
-  }
+  if (!setup.is_triggered) setup.frame_interval = frameIntervalOf(features);
 }
 
 Result<std::vector<std::string>> parametersOf(const Features& features, const Keys& keys) {
@@ -324,6 +316,15 @@ Result<std::vector<std::string>> parametersOf(const Features& features, const Ke
 }
 
 }  // namespace
+
+std::optional<Duration> frameIntervalOf(const Features& features) {
+  for (const char* name : {"ResultingFrameRate", "AcquisitionResultingFrameRate", "AcquisitionFrameRate",
+                           "AcquisitionFrameRateAbs"}) {
+    const auto rate_hz = features.number(name);
+    if (rate_hz && *rate_hz > 0.0) return (1.0 / *rate_hz) * second;
+  }
+  return std::nullopt;
+}
 
 std::optional<std::pair<std::string, std::string>> assignmentOf(const std::string& text) {
   const auto equals = text.find('=');

@@ -1,22 +1,46 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
+#include <optional>
+
+#include <toftwin/clock.h>
+#include <toftwin/units.h>
+
+#include "drivers/pace.h"
 
 namespace toftwin::drivers::aravis {
 
-/// Frames that a camera numbered and that did not come, where `bad` came and could not be used. Ids
-/// of 16 bits wrap around from 65535 to 1, because 0 is no id.
-inline std::uint64_t lostBetween(std::uint64_t last_id, std::uint64_t id, std::uint64_t bad) {
-  constexpr std::uint64_t kMostShort = 65'535, kMostLost = 100'000;
-  std::uint64_t steps = id - last_id;
-  if (id <= last_id) {
-    const bool has_wrapped = last_id <= kMostShort && last_id - id > kMostShort / 2;
-    steps = has_wrapped ? id + kMostShort - last_id : 1;  // else: it began anew
-  }
-  return std::max<std::uint64_t>(bad, steps > 1 && steps < kMostLost ? steps - 1 : 0);
-}
+/// The numbers that a camera gives its frames, and what they say of those that did not come. A number is
+/// believed as far as the camera can have taken so many frames meanwhile:
+///   steps ≤ 1 + 1.25 · elapsed / interval
+/// One that is not believed is damaged, or the camera began anew: then the next one goes on from it.
+class FrameIds {
+ public:
+  struct Seen {
+    std::uint64_t id = 0;
+    SteadyTime arrived;
+    DeviceTime taken;
+  };
+
+  /// Of a camera that takes one so often; nothing if it does not say so, as where it waits for triggers.
+  explicit FrameIds(std::optional<Duration> interval) { setInterval(interval); }
+  void setInterval(std::optional<Duration> interval);
+  /// The next frame is the first one.
+  void restart();
+  /// Frames lost since the last good one, where `bad` came and could not be used.
+  std::uint64_t lostBefore(const Seen& now, std::uint64_t bad);
+
+ private:
+  [[nodiscard]] std::uint64_t believed(const Seen& from, const Seen& to) const;
+  void learn(double step_s);
+  void adopt(const Seen& now);
+
+  double said_s_ = 0.0, interval_s_ = 0.0;
+  std::optional<Seen> last_, doubted_;
+  std::uint64_t doubts_ = 0,
+                told_ = 0;  ///< since the last one that was believed: not believed, and told as lost
+};
 
 /// Packets that found no buffer, which the library counts for the whole stream, frame by frame: those of a gap are of
 /// the frames in it. Those of a frame that came after all, for its packets were sent again, are of no gap.

@@ -42,9 +42,9 @@ class AravisSource final : public Source {
         info_(std::move(camera.info)),
         connection_(std::move(camera.connection)),
         images_(std::move(camera.images)),
-        interval_(info_.frame_interval.value_or(kUnknownInterval)),
         stream_(keys_),
-        clock_(DeviceClock::Options{.follows_steps_ahead = keys_.ptp}) {
+        clock_(DeviceClock::Options{.follows_steps_ahead = keys_.ptp}),
+        ids_(info_.frame_interval) {
     if (keys_.chunks) chunks_.reset(arv_camera_create_chunk_parser(connection_.camera()));
   }
   ~AravisSource() override {
@@ -56,7 +56,7 @@ class AravisSource final : public Source {
 
   Result<> start() override {
     stop();
-    last_id_.reset();
+    ids_.restart();
     triggered_at_.reset();
     losses_.clear();
     reported_ = {};
@@ -139,8 +139,15 @@ class AravisSource final : public Source {
     auto done = how(Features{connection_.device()});
     if (!done) return lost(done.error());
     exposure_ = exposureNow();
+    if (info_.frame_interval) {
+      info_.frame_interval = frameIntervalOf(Features{connection_.device()});
+      ids_.setInterval(info_.frame_interval);
+    }
     return {};
   }
+
+  /// As the camera says it; until it does, or where it waits for triggers, one to wait by.
+  [[nodiscard]] Duration interval() const { return info_.frame_interval.value_or(kUnknownInterval); }
 
   /// Notes that the camera is gone, if that is what the error says.
   Error lost(Error error) {
@@ -163,11 +170,11 @@ class AravisSource final : public Source {
     frame.camera = info_.camera;
     frame.provenance.kind = info_.kind;
     frame.provenance.calibration_id = info_.camera.calibration_id;
-    const auto last = std::exchange(last_id_, filled.frame_id);
-    accountFor(last ? lostBetween(*last, filled.frame_id, losses_.frames()) : 0);
+    const DeviceTime taken = clock_.read(filled.stamp_ns, filled.arrived);
+    accountFor(ids_.lostBefore({filled.frame_id, filled.arrived, taken}, losses_.frames()));
     unreported_.add(losses_);
     losses_.tell(frame);
-    frame.moment = momentOf(filled);
+    frame.moment = momentOf(filled, taken);
     triggered_at_.reset();
     reportLosses(false);
     return frame;
@@ -207,10 +214,9 @@ class AravisSource final : public Source {
 
   // ---- time ------------------------------------------------------------------------------------
 
-  Moment momentOf(const Stream::Filled& filled) {
+  Moment momentOf(const Stream::Filled& filled, DeviceTime taken) {
     Moment moment;
-    const DeviceTime time = clock_.read(filled.stamp_ns, filled.arrived);
-    moment.exposures = {{time, chunkExposure(filled).value_or(exposure_), 0_Hz}};
+    moment.exposures = {{taken, chunkExposure(filled).value_or(exposure_), 0_Hz}};
     moment.clock = relation(filled.arrived);
     keepAlive();
     if (keys_.ptp) ptp_.look(Features{connection_.device()}, info_.serial, filled.arrived);
@@ -248,7 +254,7 @@ class AravisSource final : public Source {
   /// since the trigger.
   [[nodiscard]] ClockRelation relation(SteadyTime arrived) const {
     if (keys_.delay > 0_ms) return clock_.relation(keys_.delay, 0_ms);
-    Duration most = interval_;
+    Duration most = interval();
     if (triggered_at_) {
       const std::chrono::duration<double> since = arrived - *triggered_at_;
       most = std::max(0.0, since.count()) * second;
@@ -280,8 +286,8 @@ class AravisSource final : public Source {
   /// that lives and streams nothing is for whoever called, who knows when that is a standstill.
   [[nodiscard]] std::optional<Error> whatIsWrong() {
     const SteadyTime now = Clock::now();
-    const std::chrono::duration<double> interval{interval_.in(second)};
-    const auto silence = std::max<std::chrono::duration<double>>(kLeastSilence, 4.0 * interval);
+    const std::chrono::duration<double> usual{interval().in(second)};
+    const auto silence = std::max<std::chrono::duration<double>>(kLeastSilence, 4.0 * usual);
     if (!connection_.isLost() && now - asked_at_ < silence) return std::nullopt;
     asked_at_ = now;
     auto alive = connection_.check(kAliveWithin);
@@ -293,7 +299,6 @@ class AravisSource final : public Source {
   SourceInfo info_;
   Connection connection_;
   ImageMaker images_;
-  Duration interval_;
   Object<ArvChunkParser> chunks_;
   Stream stream_;
   DeviceClock clock_;
@@ -303,7 +308,7 @@ class AravisSource final : public Source {
   std::optional<SteadyTime> temperature_at_;
   SteadyTime asked_at_{}, kept_alive_at_{};
   std::optional<SteadyTime> triggered_at_;
-  std::optional<std::uint64_t> last_id_;
+  FrameIds ids_;
   LossReasons losses_;           // since the last good frame
   Underruns underruns_;
   bool is_gone_ = false;

@@ -310,6 +310,14 @@ TEST_F(AravisDriver, ChoicesSwitchesAndTextsAreReadAndSetByName) {
   EXPECT_TRUE(nextFrame(*source).ok());
 }
 
+TEST_F(AravisDriver, TheRateThatAClientSetsIsTheIntervalThatItTells) {
+  const auto source = started("parameters = ['AcquisitionFrameRate']");
+  ASSERT_NE(source, nullptr);
+  ASSERT_TRUE(source->setParameter("AcquisitionFrameRate", 100.0).ok());
+  EXPECT_NEAR(source->info().frame_interval->in(millisecond), 10.0, 1e-9);
+  ASSERT_TRUE(nextFrame(*source).ok());
+}
+
 TEST_F(AravisDriver, ByDefaultExposureAndGainAreParameters) {
   const auto source = open();
   ASSERT_TRUE(source.ok());

@@ -37,7 +37,6 @@ class EmulatedGige final : public EmulatedTof {
   std::atomic<bool> is_full_size_lost = false;  ///< packets beyond 1500 bytes do not come through
   std::atomic<int> drop_every = 0;  ///< of its stream's packets, the first time they are sent
   std::atomic<bool> drops_resent = false;         ///< those sent again get lost as well
-  std::atomic<int> skip_frames = 0;               ///< ids left out before the next frame
   std::atomic<bool> is_other_controller = false;  ///< another program controls it
   std::atomic<int> resent = 0, test_packets = 0, largest_packet = 0;
   /// Changes packets of the stream before they leave.

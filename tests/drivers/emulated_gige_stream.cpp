@@ -117,7 +117,7 @@ void EmulatedGige::send(Bytes packet, bool is_first_time) {
 }
 
 void EmulatedGige::sendFrame() {
-  frame_id_ += static_cast<std::uint64_t>(skip_frames.exchange(0));
+  frame_id_ += idsLeftOut();
   const bool is_multipart = (registers_[kMultipart] & kMultipartBit) != 0;
   const auto all = images();
   if (!all.empty()) {

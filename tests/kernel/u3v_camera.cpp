@@ -268,7 +268,7 @@ std::deque<U3vCamera::Bytes> U3vCamera::nextFrame() {
   if (!is_enabled || is_hung || is_mute || !isFrameDue()) return {};
   const auto all = images();
   if (all.empty()) return {};
-  block_id_ += static_cast<std::uint64_t>(skip_frames.exchange(0));
+  block_id_ += idsLeftOut();
   const Damage damage = damage_next.exchange(Damage::None);
   Bytes payload = payloadOf(all.front());
   const bool is_cut = damage == Damage::ShortImage || damage == Damage::Discarded;

@@ -27,7 +27,6 @@ class U3vCamera final : public test::EmulatedTof {
   std::atomic<bool> is_hung = false;                  ///< it answers, but sends no frames
   std::atomic<bool> is_mute = false;                  ///< it does neither
   std::atomic<Damage> damage_next = Damage::None;     ///< of the next frame
-  std::atomic<int> skip_frames = 0;                   ///< ids left out before the next frame
   std::atomic<std::chrono::milliseconds> write_time;  ///< of a feature; meanwhile it says that it is at it
   std::atomic<int> pending_answers = 0;               ///< how often it has said so
   /// Changes the transfers of the stream before they leave.

@@ -15,7 +15,8 @@
 namespace toftwin::daemon::test {
 namespace {
 
-/// Below those that Linux gives to whoever asks for any, so that none of these is given away before it is listened at.
+/// Below those that Linux gives to whoever asks for any, so that none of these is given away before it is
+/// listened at.
 constexpr std::uint16_t kFirst = 20'000, kLast = 32'767;
 
 /// A file of this user's with a byte for each port, which the process that locked it has until it ends.

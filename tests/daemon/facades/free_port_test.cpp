@@ -20,7 +20,8 @@ TEST(FreePort, IsGivenToOneProcessAloneAndOnce) {
   if (child == 0) {
     const std::uint16_t port = freePort();
     char ignored = 0;
-    const bool is_done = ::write(told[1], &port, sizeof port) == sizeof port && ::read(may_end[0], &ignored, 1) == 1;
+    const bool is_done =
+        ::write(told[1], &port, sizeof port) == sizeof port && ::read(may_end[0], &ignored, 1) == 1;
     ::_exit(is_done ? 0 : 1);
   }
   std::uint16_t of_child = 0;
