@@ -82,8 +82,9 @@ TableBlock traitTable(const NamedTraits& traits, const std::string& a, const std
     table.rows[row][of == "A"   ? 3
                     : of == "B" ? 4
                                 : 5] =
-        fmt::format("{:.4g} ({} to {}) #{}{}{}", trait.value, endOf(trait, trait.low),
-                    endOf(trait, trait.high), trait.n, detail.empty() ? "" : ", ", detail);
+        fmt::format("{:.4g} ({} to {}) #{}{}{}{}", trait.value, endOf(trait, trait.low),
+                    endOf(trait, trait.high), trait.n, detail.empty() ? "" : ", ", detail,
+                    trait.doubt.empty() ? "" : ", in doubt");
   }
   return table;
 }
@@ -102,6 +103,7 @@ Json toJson(const NamedTraits& traits) {
         .set("name", trait.name)
         .set("unit", trait.unit);
     row.set("value", trait.value).set("low", trait.low).set("high", trait.high).set("n", trait.n);
+    if (!trait.doubt.empty()) row.set("doubt", trait.doubt);
     rows.push(std::move(row));
   }
   for (const std::string& text : traits.untold) untold.push(text);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <set>
 
 #include <fmt/format.h>
 
@@ -80,6 +81,7 @@ std::string plainNameOf(const TraitVerdict& one) {
 }
 
 std::string intervalOf(const Trait& one) {
+  if (!std::isfinite(one.value)) return "–";
   const auto end = [&](double value) { return isKnown(value, one.unit) ? number(value) : "not known"; };
   return fmt::format("{} ({} to {})", number(one.value), end(one.low), end(one.high));
 }
@@ -133,21 +135,71 @@ class Owned {
   std::map<std::pair<std::string, std::string>, const NamedTrait*> all_;
 };
 
+/// Why a number may be another's, and whose it is.
+std::string doubtOf(const TraitVerdict& one) {
+  if (!one.difference.doubt.empty()) return one.difference.doubt;
+  if (one.is_paired) return "";
+  if (one.a && !one.a->trait.doubt.empty()) return "of A, " + one.a->trait.doubt;
+  return one.b && !one.b->trait.doubt.empty() ? "of B, " + one.b->trait.doubt : "";
+}
+
+/// A difference that shows by Student's interval of two rows is one; that none shows says nothing.
+constexpr std::size_t kFewestRows = 3;
+
 void holdTogether(TraitVerdict& one, double wider) {
+  const std::string doubt = doubtOf(one);
   if (!one.b || one.is_paired) {
     one.difference = widened(one.difference, wider);
-    return;
+  } else {
+    const Trait &a = one.a->trait, &b = one.b->trait;
+    HeldTogether held = heldTogether(a, b, wider);
+    one.is_size = held.is_size, one.at = std::move(held.at), one.why_not = std::move(held.why_not);
+    one.difference = std::move(held.difference);
+    if (!one.why_not.empty()) one.difference = {b.name, b.unit, kNaN, kNaN, kNaN, std::min(a.n, b.n)};
   }
-  const Trait &a = one.a->trait, &b = one.b->trait;
-  HeldTogether held = heldTogether(a, b, wider);
-  one.is_size = held.is_size, one.at = std::move(held.at), one.why_not = std::move(held.why_not);
-  one.difference = std::move(held.difference);
-  if (!one.why_not.empty()) one.difference = {b.name, b.unit, kNaN, kNaN, kNaN, std::min(a.n, b.n)};
+  if (one.why_not.empty()) one.why_not = doubt;
+  if (one.why_not.empty() && !one.differs() && one.difference.n < kFewestRows) {
+    one.why_not =
+        fmt::format("it is from {} only, and it takes {} to call it the same",
+                    one.difference.n == 1 ? "one" : fmt::format("{}", one.difference.n), kFewestRows);
+  }
+}
+
+/// Why a camera has no such number, as far as it was said when it was looked for.
+std::string whyNone(const NamedTraits& traits, const NamedTrait& like, std::string_view other) {
+  const std::string of = fmt::format("{} of {}: ", like.what, other);
+  for (const std::string& said : traits.untold) {
+    if (said.starts_with(of)) return ": " + said.substr(of.size());
+  }
+  for (const NamedTrait& one : traits.traits) {
+    if (one.of == other && one.what == like.what && !one.detail.empty())
+      return ": its is told as " + one.detail;
+  }
+  return "";
+}
+
+/// A row for each number that one camera has alone; one for all of a kind of which the other has none.
+void addAlone(const NamedTraits& traits, const Owned& of_other, std::string_view of, std::string_view other,
+              std::vector<TraitVerdict>& all) {
+  std::set<std::string> kinds;
+  for (const NamedTrait& one : traits.traits) {
+    if (one.of != of || isBeyond(one) || of_other.find(one) != nullptr) continue;
+    const auto isOthers = [&](const NamedTrait& its) { return its.of == other && its.what == one.what; };
+    const bool has_kind = std::ranges::any_of(traits.traits, isOthers);
+    if (!has_kind && !kinds.insert(one.what).second) continue;
+    TraitVerdict row{.what = one.what,
+                     .difference = {has_kind ? one.trait.name : one.what, one.trait.unit, kNaN, kNaN, kNaN},
+                     .why_not = fmt::format("{} has none{}", other, whyNone(traits, one, other))};
+    if (!has_kind) row.difference.unit.clear();
+    if (has_kind) (of == "A" ? row.a : row.b) = one;
+    all.push_back(std::move(row));
+  }
 }
 
 }  // namespace
 
 bool TraitVerdict::isTold() const {
+  if (!why_not.empty()) return false;
   const auto known = [&](double end) { return isKnown(end, difference.unit); };
   return known(difference.value) && known(difference.low) && known(difference.high);
 }
@@ -172,6 +224,7 @@ std::vector<TraitVerdict> verdictsOf(const NamedTraits& traits) {
   }
   const double wider = widenedFor(all.size());
   for (TraitVerdict& one : all) holdTogether(one, wider);
+  addAlone(traits, of_b, "A", "B", all), addAlone(traits, of_a, "B", "A", all);
   // Those that are not told come last; where a floor is 0, what differs is infinitely far beyond it.
   const auto rank = [](const TraitVerdict& one) {
     if (isWraps(one) || isMissing(one)) return -std::numeric_limits<double>::infinity();
@@ -258,7 +311,8 @@ Json toJson(const std::vector<TraitVerdict>& all) {
     row.set("floor", one.floor())
         .set("verdict", !one.isTold()   ? "not told"
                         : one.differs() ? "differs"
-                                        : "same");
+                                        : "same")
+        .set("why_not", one.why_not);
     rows.push(std::move(row));
   }
   return rows;

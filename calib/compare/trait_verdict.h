@@ -22,8 +22,8 @@ struct TraitVerdict {
   std::string why_not{};   ///< why the two cannot be held against each other
 
   [[nodiscard]] bool isTold() const;
-  /// 0 is not in the interval.
-  [[nodiscard]] bool differs() const { return difference.low > 0.0 || difference.high < 0.0; }
+  /// It is told, and 0 is not in the interval.
+  [[nodiscard]] bool differs() const { return isTold() && (difference.low > 0.0 || difference.high < 0.0); }
   /// The noise floor: what B − A is uncertain by, towards 0. A smaller difference would not show.
   [[nodiscard]] double floor() const;
 };

@@ -218,15 +218,23 @@ std::vector<TraitVerdict> verdictsOf(const RunTraits& traits, const Characterist
   return compare::verdictsOf(all);
 }
 
-/// Good only where no number differs; bad where the bias is far beyond A's noise.
+/// Good takes three different poses: how they differ is hardly known of two.
+Tone nearnessTone(const Characteristics& c) {
+  const Tone tone = toneOfDifference(c);
+  return tone == Tone::Good && c.places < 3 ? Tone::Fair : tone;
+}
+
+/// Good only where no number differs, of those that are told; bad where the bias is far beyond A's noise.
 Tone toneOf(const std::vector<TraitVerdict>& verdicts, const Characteristics& c) {
   if (toneOfDifference(c) == Tone::Bad) return Tone::Bad;
-  return std::ranges::none_of(verdicts, &TraitVerdict::differs) ? Tone::Good : Tone::Fair;
+  const bool is_same = std::ranges::any_of(verdicts, &TraitVerdict::isTold) &&
+                       std::ranges::none_of(verdicts, &TraitVerdict::differs);
+  return is_same && c.places >= 3 ? Tone::Good : Tone::Fair;
 }
 
 std::vector<Card> cardsOf(const Characteristics& c, const std::vector<TraitVerdict>& verdicts) {
-  std::vector<Card> cards = nearnessCards(
-      c, fmt::format("± standard error over {} different poses", c.places), toneOfDifference(c));
+  std::vector<Card> cards =
+      nearnessCards(c, fmt::format("± standard error over {} different poses", c.places), nearnessTone(c));
   const auto more = compare::cardsOf(verdicts);
   cards.insert(cards.end(), more.begin(), more.end());
   return cards;

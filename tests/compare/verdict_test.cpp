@@ -85,7 +85,7 @@ TEST(Verdict, CallsNothingDifferentWhoseIntervalIsNotKnown) {
   const auto all =
       verdictsOf({.traits = {of("A", "drift", 1.0, 0.9, std::nan("")), of("B", "drift", 5.0, 4.9, 5.1),
                              of("B", "alone", 5.0, 4.9, 5.1), of("A and B", "masks", 0.9, 0.8, 0.95)}});
-  ASSERT_EQ(all.size(), 1u);
+  ASSERT_EQ(all.size(), 2u);
   EXPECT_FALSE(all[0].isTold());
   EXPECT_THAT(verdictTable(all).rows[0][1], HasSubstr("not told"));
   EXPECT_EQ(headlineOf(all), "No characteristic is known of both cameras");
@@ -123,6 +123,54 @@ TEST(Verdict, TakesWhatWasToldOfTheDifferenceAsItIs) {
   ASSERT_EQ(all.size(), 1u) << "a residual is no difference";
   EXPECT_TRUE(all[0].differs());
   EXPECT_DOUBLE_EQ(all[0].floor(), 1.0);
+}
+
+TEST(Verdict, SaysWhyTheOtherCameraHasNoSuchNumber) {
+  NamedTraits traits{.traits = {of("A", "drift", 1.0, 0.9, 1.1), of("B", "drift", 1.0, 0.9, 1.1),
+                                of("A", "drift", 60.0, 50.0, 70.0), of("B", "noise", 2.0, 1.9, 2.1),
+                                of("B", "noise", 3.0, 2.9, 3.1)},
+                     .untold = {"noise of B: something else", "noise of A: it takes eight frames"}};
+  traits.traits[1].detail = "none", traits.traits[2].trait.name = "time constant";
+  traits.traits[4].trait.name = "fixed pattern";
+  const auto all = verdictsOf(traits);
+  ASSERT_EQ(all.size(), 3u) << "one row for all of A's noise";
+  const auto rows = verdictTable(all).rows;
+  EXPECT_EQ(rows[1][0], "drift: time constant [mm]");
+  EXPECT_EQ(rows[1][1], "not told: B has none: its is told as none");
+  EXPECT_EQ(rows[1][2], "–");
+  EXPECT_EQ(rows[1][4], "60");
+  EXPECT_EQ(rows[2][0], "noise");
+  EXPECT_EQ(rows[2][1], "not told: A has none: it takes eight frames");
+  EXPECT_THAT(headlineOf(all), HasSubstr("In none of 1 numbers"));
+  EXPECT_EQ(cardsOf(all).front().value, "1 of 1");
+}
+
+TEST(Verdict, CallsNothingTheSameByTwoRows) {
+  const auto by = [](std::size_t rows, double value) {
+    NamedTrait bias = of("B − A", "bias", value, value - 5.0, value + 5.0);
+    bias.trait.n = rows;
+    return verdictsOf({.traits = {bias}});
+  };
+  EXPECT_THAT(verdictTable(by(3, 1.0)).rows[0][1], HasSubstr("same, within 6 mm"));
+  EXPECT_EQ(verdictTable(by(2, 1.0)).rows[0][1],
+            "not told: it is from 2 only, and it takes 3 to call it the same");
+  EXPECT_EQ(headlineOf(by(2, 1.0)), "No characteristic is known of both cameras");
+  EXPECT_TRUE(by(2, 6.0).front().differs()) << "Student's interval of two rows holds";
+}
+
+/// Each may be another wave: neither differs, and neither is the largest difference.
+TEST(Verdict, NamesNoWaveThatMayBeAnother) {
+  NamedTraits traits{.traits = {of("B − A", "harmonics", 50.0, 49.0, 51.0),
+                                of("A", "by wall", 50.0, 49.0, 51.0), of("B", "by wall", 0.0, -1.0, 1.0),
+                                of("B − A", "bias", 3.0, 2.9, 3.1)}};
+  EXPECT_THAT(headlineOf(verdictsOf(traits)), HasSubstr("over distance: number, +50 mm"));
+  traits.traits[0].trait.doubt = traits.traits[1].trait.doubt = "it may be another";
+  const auto all = verdictsOf(traits);
+  EXPECT_THAT(headlineOf(all), testing::StartsWith("Largest difference: bias: number, +3 mm"));
+  EXPECT_THAT(headlineOf(all), HasSubstr("1 of 1 numbers"));
+  EXPECT_EQ(verdictTable(all).rows[1][1], "not told: it may be another");
+  EXPECT_EQ(verdictTable(all).rows[2][1], "not told: of A, it may be another");
+  EXPECT_THAT(traitTable(traits, "a", "b").rows[0][5], HasSubstr("in doubt"));
 }
 
 TEST(Verdict, IsNoneOfAnInterceptFarFromAllRows) {

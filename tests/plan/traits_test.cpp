@@ -376,6 +376,25 @@ TEST(RunTraits, SayWhichWavesTheDistancesAreTooShortFor) {
   expectNear(find(longer, "harmonics, against", "A", "16 MHz, 2 per period"), 0.0);
 }
 
+/// Over 4 m, those of 80 and 120 MHz are their own, and those of 16 MHz, of which 2 and 1 per period are not
+/// told, may be others; over a whole period of 16 MHz, none may.
+TEST(RunTraits, DoubtTheWavesThatMayBeOthersWhichAreNotTold) {
+  const RunTraits all = traitsOf(wallsOfTheStandardPlan(wave(4.0, 4, 120e6)));
+  const auto doubtOf = [](const RunTraits& of, const char* name) {
+    const RunTrait* found = find(of, "harmonics, against", "A", name);
+    return found == nullptr ? "it is not there" : found->trait.doubt;
+  };
+  EXPECT_EQ(doubtOf(all, "80 MHz, 6 per period = 120 MHz, 4 per period"), "");
+  EXPECT_EQ(doubtOf(all, "80 MHz, 4 per period"), "");
+  EXPECT_THAT(doubtOf(all, "16 MHz, 4 per period"),
+              testing::HasSubstr("it may be a wave of 120 MHz, 1 per period"));
+  EXPECT_THAT(doubtOf(all, "16 MHz, 3 per period"), testing::HasSubstr("these distances do not tell"));
+  const RunTraits longer =
+      traitsOf(wallsOfTheStandardPlan(wave(2.0, 1, 16e6), {4.7, 5.5, 6.4, 7.4, 8.6, 10.0}));
+  for (const char* name : {"16 MHz, 4 per period", "16 MHz, 3 per period", "16 MHz, 1 per period"})
+    EXPECT_EQ(doubtOf(longer, name), "");
+}
+
 /// Cells of a wall, a row each 25 mm of range: an error of 5 sin d besides `veil` times what a veil of 1
 /// does, w_f · v_f summed over the frequencies, w_f = f / Σ f of a Kinect v2.
 CameraSeen wallWith(double veil, double from_m, const std::function<double(double, double)>& slope_mm) {

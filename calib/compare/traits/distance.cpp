@@ -8,10 +8,12 @@
 #include <map>
 #include <numbers>
 #include <numeric>
+#include <set>
 
 #include "calib/compare/statistics.h"
 #include "calib/compare/traits/clusters.h"
 #include "calib/compare/traits/phasor.h"
+#include "calib/compare/traits/waves.h"
 
 namespace toftwin::compare {
 namespace {
@@ -19,31 +21,6 @@ namespace {
 constexpr double kLight_m_per_s = 299'792'458.0;
 /// Fewer rows for each parameter of a fit tell little more than themselves.
 constexpr std::size_t kRowsPerParameter = 3;
-
-constexpr double kSameWave = 1e-3;  ///< over 8 m of a wave of 0.3 m, 0.2 rad
-
-struct Wave {
-  double per_m = 0.0;  ///< radians per metre of distance
-  std::string name{};
-};
-
-std::vector<Wave> wavesOf(std::span<const double> frequency_hz, std::span<const int> orders) {
-  std::vector<Wave> waves;
-  for (const double f : frequency_hz) {
-    for (const int k : orders) {
-      const Wave one{2.0 * std::numbers::pi * k * 2.0 * f / kLight_m_per_s,
-                     fmt::format("{:.6g} MHz, {} per period", f * 1e-6, k)};
-      const auto same = std::ranges::find_if(waves, [&](const Wave& there) {
-        return std::abs(there.per_m - one.per_m) < kSameWave * one.per_m;
-      });
-      if (same == waves.end())
-        waves.push_back(one);
-      else
-        same->name += " = " + one.name;  // 3 of 80 MHz and 2 of 120 MHz are one wave
-    }
-  }
-  return waves;
-}
 
 /// Of two parameters from `first` on: the delta method far from 0, amplitudeOf() near it.
 Trait amplitudeTrait(const Fit& fit, const std::string& name, std::size_t first) {
@@ -139,6 +116,17 @@ std::string ordersNotTold(std::size_t told, const std::vector<double>& distance_
                      orders, why);
 }
 
+/// Waves, which are the first of the traits, that may be others that were left out.
+void doubtWaves(std::span<const int> orders, Column distance_m, std::span<const double> frequency_hz,
+                std::vector<Trait>& traits) {
+  const std::span<const int> all{kOrders};
+  auto doubts =
+      doubtsOf(wavesOf(frequency_hz, orders), wavesOf(frequency_hz, all.subspan(orders.size())), distance_m);
+  for (std::size_t w = 0; w < doubts.size(); ++w) {
+    if (!doubts[w].empty()) traits[w].doubt = std::move(doubts[w]);
+  }
+}
+
 /// Each amplitude's interval is shorter than the four standard deviations that one row's would have.
 bool areToldApart(const std::vector<Trait>& traits) {
   const double sd = traits.back().value;  // "residual"
@@ -191,6 +179,13 @@ struct Sideways {
   }
 };
 
+/// How captures differ is not known of two of them, whatever many rows each has.
+void doubtFewCaptures(std::size_t captures, std::vector<Trait>& traits) {
+  if (captures >= 3) return;
+  for (Trait& one : traits)
+    one.doubt = fmt::format("it is from {} captures only, and it takes three", captures);
+}
+
 /// Rows in clusters that share an error.
 Result<FittedTraits> fitClusters(Column distance_m, Column error_mm, const std::vector<Wave>& waves,
                                  std::span<const std::size_t> cluster) {
@@ -218,6 +213,7 @@ Result<FittedTraits> fitClusters(Column distance_m, Column error_mm, const std::
   if (!fit)
     return undetermined("harmonics", "the distances span too little of a period, or are of one capture only");
   FittedTraits fitted = fittedOf(*fit, waves, d);
+  doubtFewCaptures(std::set<std::size_t>{captures.begin(), captures.end()}.size(), fitted.traits);
   if (!sideways.isWide()) return fitted;
   const Sideways of_all{distance_m, cluster};
   double variance = 0.0;  // of what goes sideways, over the rows
@@ -265,7 +261,10 @@ Result<FittedTraits> fittedHarmonics(Column distance_m, Column error_mm, std::sp
   }
   for (; !orders.empty(); orders.pop_back()) {
     auto fitted = fitOrders(distance_m, error_mm, frequency_hz, orders, cluster);
-    if (fitted) fitted->not_told = ordersNotTold(orders.size(), rows->front(), frequency_hz);
+    if (fitted) {
+      fitted->not_told = ordersNotTold(orders.size(), rows->front(), frequency_hz);
+      doubtWaves(orders, rows->front(), frequency_hz, fitted->traits);
+    }
     if (orders.size() == 1 || (fitted && areToldApart(fitted->traits))) return fitted;
   }
   return undetermined("harmonics", "no frequency was given");
