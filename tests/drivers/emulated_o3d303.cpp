@@ -194,19 +194,22 @@ class EmulatedO3d303::Impl {
     });
   }
   void read(const ConnectionPtr& c) {
-    c->socket.async_read_some(boost::asio::buffer(c->piece),
-                              [this, c](error_code error, std::size_t size) {
-                                if (error) return connections_.remove(c), void();
-                                c->reader.feed(std::span{c->piece}.first(size));
-                                while (true) {
-                                  auto message = c->reader.next();
-                                  if (!message)
-                                    return closeHard(c->socket), connections_.remove(c), void();
-                                  if (!*message) break;
-                                  if (!is_hanging) obey(c, **message);
-                                }
-                                read(c);
-                              });
+    c->socket.async_read_some(boost::asio::buffer(c->piece), [this, c](error_code error, std::size_t size) {
+      if (error) return drop(c);
+      c->reader.feed(std::span{c->piece}.first(size));
+      while (true) {
+        auto message = c->reader.next();
+        if (!message) return drop(c);
+        if (!*message) break;
+        if (!is_hanging) obey(c, **message);
+      }
+      read(c);
+    });
+  }
+  /// Also while it is being written to, which would keep its socket open after it is none of the connections.
+  void drop(const ConnectionPtr& c) {
+    closeHard(c->socket);
+    connections_.remove(c);
   }
   void obey(const ConnectionPtr& c, const o3d303::PcicMessage& message) {
     const std::string_view command = o3d303::textOf(message.content);
