@@ -182,14 +182,11 @@ TEST(Kinect2Usb, OpeningAndClosingLeaksNothing) {
   EXPECT_EQ(files(), before);
 }
 
-/// What this machine takes to bring and unpack a first frame, 0.8 s, and as much again for its moods.
-constexpr milliseconds kSlowness{1600};
-
 /// Soon, told as a gap, and with the settings of before.
 void expectRecovered(test::RecoveryRig& rig, const std::optional<test::RecoveryRig::Outcome>& outcome,
                      milliseconds boot) {
   ASSERT_TRUE(outcome.has_value()) << "the stream did not go on";
-  EXPECT_LT(outcome->took, kSlowness + boot);
+  EXPECT_LT(outcome->took, test::kBackWithin + boot);
   EXPECT_GT(outcome->first.dropped_by_device, 0u) << "the gap has no frames";
   EXPECT_GT(outcome->first.moment.exposures[0].start, outcome->last.moment.exposures[0].start);
   const auto set = rig.command([](drivers::Source& source) -> Result<> {
