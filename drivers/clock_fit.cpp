@@ -16,6 +16,10 @@ constexpr int kReweightings = 20;
 constexpr int kBehindIsAStep = 8;
 constexpr double kMostDrift =
     1e-3 * 1e9;  // ns per s: no crystal is worse; frames that came in one burst would say more
+/// Stamps beyond are damaged: so much that sums of two of them, and of what they are shifted by, are numbers.
+constexpr std::int64_t kFarthest_ns =
+    4'300'000'000'000'000'000;  ///< 136 years: seconds since 1970 in 32 bits
+constexpr std::int64_t kFarthestBack_ns = -200'000'000'000'000'000;
 constexpr double kEarlySds = 6.0;  // a normal arrival is so early once in a thousand million
 
 double median(std::vector<double> values) {
@@ -123,6 +127,7 @@ std::optional<ClockFit::Estimate> ClockFit::estimate() const {
 DeviceTime DeviceClock::read(std::int64_t stamp_ns, SteadyTime arrived) {
   const std::int64_t arrived_ns =
       std::chrono::duration_cast<std::chrono::nanoseconds>(arrived.time_since_epoch()).count();
+  stamp_ns = std::clamp(stamp_ns, kFarthestBack_ns, kFarthest_ns);
   Reading reading{.time_ns = stamp_ns + shift_ns_};
   if (last_) {
     reading = continued(stamp_ns, arrived_ns);
@@ -151,11 +156,16 @@ DeviceClock::Reading DeviceClock::continued(std::int64_t stamp_ns, std::int64_t 
   settling_ -= is_settling ? 1 : 0;
   // A frame may come late, but never early: a stamp from the future is a clock that was set. One
   // from the past is that if it stays so.
-  if (ahead > tolerance_ns_ && options_.follows_steps_ahead) {
+  if (ahead > tolerance_ns_ && options_.follows_steps_ahead && time_ns < kFarthest_ns) {
+    // A single stamp may be damaged, and device time could never come back.
+    const bool is_like_before = ahead_by_ns_ && std::abs(ahead - *ahead_by_ns_) < tolerance_ns_;
+    ahead_by_ns_ = ahead;
+    if (!is_like_before) return {expected};
     fit_.clear();
     step(0);
     return {time_ns};
   }
+  ahead_by_ns_.reset();
   if (is_settling && fitted && static_cast<double>(ahead) > kEarlySds * fitted->noise_ns) {
     // So much too late, then, was the frame that the step was measured by.
     shift_ns_ -= ahead;
@@ -194,6 +204,7 @@ void DeviceClock::step(std::int64_t by_ns) {
   shift_ns_ += by_ns;
   ++steps_;
   behind_ = 0;
+  ahead_by_ns_.reset();
   settling_ = by_ns == 0 ? 0 : options_.window;
 }
 

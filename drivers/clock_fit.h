@@ -58,8 +58,9 @@ class DeviceClock {
     std::int64_t wraps_after_ns = 0;  ///< 0: it does not
     Duration tolerance = 500_ms;      ///< what deviates more than that may be a step of the clock
     std::size_t window = 256;         ///< frames that the relation is estimated from
-    /// A clock that follows a master is set to the master's time some seconds after it began to: then steps ahead
-    /// are not evened out, so that devices of one master have one time. Steps back are, for device time increases.
+    /// A clock that follows a master is set to the master's time some seconds after it began to: then steps
+    /// ahead that two frames agree on are not evened out, so that devices of one master have one time. Steps
+    /// back are, for device time increases.
     bool follows_steps_ahead = false;
   };
   explicit DeviceClock(Options options)
@@ -98,6 +99,7 @@ class DeviceClock {
   // Frames in a row that came late, or whose clock was set back by less than the pause before them.
   int behind_ = 0;
   std::int64_t behind_by_ns_ = 0, behind_since_ns_ = 0;
+  std::optional<std::int64_t> ahead_by_ns_;  // the last frame, of a clock whose steps ahead are followed
 };
 
 }  // namespace toftwin::drivers

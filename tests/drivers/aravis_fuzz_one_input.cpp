@@ -4,10 +4,14 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
+#include <limits>
+#include <optional>
 #include <vector>
 
 #include "drivers/aravis/discovery.h"
+#include "drivers/aravis/frame_ids.h"
 #include "drivers/aravis/images.h"
+#include "drivers/clock_fit.h"
 
 namespace toftwin::drivers::aravis {
 namespace {
@@ -78,9 +82,32 @@ void readImages(std::span<const std::byte> bytes) {
   }
 }
 
+/// Ids and stamps of frames, each of which may be anything, that arrive one after another.
+void readNumbers(std::span<const std::byte> bytes) {
+  Numbers numbers{bytes};
+  const std::uint64_t choice = numbers.take(1);
+  FrameIds ids{(choice & 1U) != 0 ? std::optional{20_ms} : std::nullopt};
+  DeviceClock clock{{.follows_steps_ahead = (choice & 2U) != 0}};
+  SteadyTime arrived{std::chrono::hours{1}};
+  DeviceTime last{std::numeric_limits<std::int64_t>::min()};
+  while (!numbers.rest().empty()) {
+    const std::uint64_t kind = numbers.take(1), id = numbers.take((kind & 1U) != 0 ? 8 : 2);
+    const auto stamp_ns = static_cast<std::int64_t>(numbers.take((kind & 2U) != 0 ? 8 : 4));
+    arrived += std::chrono::microseconds{numbers.take((kind & 4U) != 0 ? 4 : 2)};
+    const DeviceTime taken = clock.read(stamp_ns, arrived);
+    demand(taken > last);
+    last = taken;
+    const std::uint64_t bad = kind >> 6U, lost = ids.lostBefore({id, arrived, taken}, bad);
+    demand(lost >= bad);
+  }
+  static_cast<void>(clock.relation(1_ms, 1_ms));
+}
+
 }  // namespace
 
 void fuzzOneInput(std::span<const std::byte> bytes) {
+  // A bit that no choice of images has.
+  if (!bytes.empty() && (std::to_integer<unsigned>(bytes.front()) & 0x80U) != 0) return readNumbers(bytes);
   readImages(bytes);
   if (const auto camera = readDiscoveryAnswer(bytes, 1)) demand(camera->serial.size() <= 17);
 }

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <random>
 #include <vector>
 
@@ -213,6 +214,19 @@ TEST(DeviceClock, AClockThatFollowsAMasterTakesItsTimeOver) {
   EXPECT_GT(camera.last->ns, before.ns) << "device time increases all the same";
 }
 
+TEST(DeviceClock, ADamagedStampIsNoMastersTime) {
+  Camera camera{.clock = DeviceClock{{.follows_steps_ahead = true}}};
+  camera.frames(50);
+  for (const std::int64_t damage_ns : {3'600'000'000'000, 1'000'000'000'000'000'000}) {
+    camera.set_by_ns += damage_ns;
+    camera.frames(1);
+    camera.set_by_ns -= damage_ns;
+    camera.frames(3);
+    EXPECT_EQ(camera.last->ns, camera.true_ns + camera.set_by_ns) << damage_ns;
+  }
+  EXPECT_EQ(camera.clock.steps(), 0u);
+}
+
 TEST(DeviceClock, AStepBackByLessThanThePauseBeforeItIsFoundToo) {
   Camera camera{.clock = DeviceClock{{}}};
   camera.frames(200);
@@ -250,6 +264,26 @@ TEST(DeviceClock, AQueueThatIsReadAtOnceIsNoStep) {
   camera.frames(5);
   EXPECT_EQ(camera.last->ns - camera.true_ns, before);
   EXPECT_EQ(camera.clock.steps(), 0u);
+}
+
+TEST(DeviceClock, NoStampIsTooMuchForIt) {
+  std::mt19937_64 random{kSeed};
+  for (const std::int64_t wraps_after_ns : {std::int64_t{0}, std::int64_t{4'294'967'296'000}}) {
+    for (const bool follows : {false, true}) {
+      DeviceClock clock{{.wraps_after_ns = wraps_after_ns, .follows_steps_ahead = follows}};
+      SteadyTime arrived{std::chrono::hours{1}};
+      DeviceTime last{std::numeric_limits<std::int64_t>::min()};
+      for (int i = 0; i < 2000; ++i) {
+        arrived += std::chrono::milliseconds{20};
+        const std::uint64_t anything = random() >> (random() % 64);
+        const DeviceTime time =
+            clock.read(static_cast<std::int64_t>(random() % 2 == 0 ? ~anything : anything), arrived);
+        ASSERT_GT(time, last) << i << ", seed " << kSeed;
+        last = time;
+        static_cast<void>(clock.relation(1_ms, 1_ms));
+      }
+    }
+  }
 }
 
 TEST(DeviceClock, TheRelationTakesTheKnownDelayOffAndSaysItsUncertainty) {

@@ -29,8 +29,9 @@ set_tests_properties(fuzz_kinect2 PROPERTIES TIMEOUT 120)
 # Without libaravis: what reads bytes knows nothing of it.
 set(aravis ${PROJECT_SOURCE_DIR}/drivers/aravis)
 add_executable(fuzz_aravis ${folder}/fuzz_aravis.cpp ${folder}/aravis_fuzz_one_input.cpp
-               ${aravis}/images.cpp ${aravis}/pixel_format.cpp ${aravis}/discovery.cpp
-               ${PROJECT_SOURCE_DIR}/drivers/lens.cpp)
+               ${aravis}/images.cpp ${aravis}/pixel_format.cpp ${aravis}/discovery.cpp ${aravis}/frame_ids.cpp
+               ${PROJECT_SOURCE_DIR}/drivers/lens.cpp ${PROJECT_SOURCE_DIR}/drivers/clock_fit.cpp
+               ${PROJECT_SOURCE_DIR}/drivers/pace.cpp)
 target_link_libraries(fuzz_aravis PRIVATE toftwin::settings toftwin::images toftwin::calibration fmt::fmt)
 target_link_options(fuzz_aravis PRIVATE -fsanitize=fuzzer)
 add_dependencies(fuzzers fuzz_aravis)
