@@ -299,7 +299,7 @@ TEST(Usb3Vision, IsCompliant) {
   EXPECT_GE(passed, 9) << "of twelve, of which three do not apply to a camera in free run";
 }
 
-TEST(Usb3Vision, OpeningAndClosingAndStartsAndStopsLeaveNothingBehind) {
+TEST(Usb3Vision, OpeningAndClosingLeavesNothingBehind) {
   using test::entriesOf;
   const Plugged plugged;
   ASSERT_NE(started(), nullptr);
@@ -307,11 +307,20 @@ TEST(Usb3Vision, OpeningAndClosingAndStartsAndStopsLeaveNothingBehind) {
   for (int i = 0; i < 3; ++i) {
     const auto source = started();
     ASSERT_NE(source, nullptr);
-    for (int k = 0; k < 10; ++k) ASSERT_TRUE(source->start().ok());
     ASSERT_TRUE(nextFrame(*source).ok());
   }
   EXPECT_EQ(entriesOf("/proc/self/fd"), files);
   EXPECT_EQ(entriesOf("/proc/self/task"), threads);
+}
+
+// As many as this machine does in six seconds of its own. The driver's and the library's part of ten thousand
+// is AravisLosses.TenThousandStartsAndStopsKeepNothing.
+TEST(Usb3Vision, StartsAndStopsKeepNothing) {
+  const Plugged plugged;
+  const auto source = open();
+  ASSERT_TRUE(source.ok()) << source.error().message;
+  test::expectNothingKept("aravis on USB", **source, 100, 250,
+                          6'000);  // 8,000 bytes: malloc's smallest block each
 }
 
 // ---- losing it ---------------------------------------------------------------------------------
