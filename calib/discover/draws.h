@@ -23,19 +23,21 @@ class Draws {
     }
     return signs;
   }
-  /// Of variance 1 (Box and Muller), column by column.
+  /// Of variance 1 (Box and Muller, who make two of a pair), column by column.
   Eigen::MatrixXd normals(Eigen::Index rows, Eigen::Index columns) {
     Eigen::MatrixXd out(rows, columns);
-    for (double& one : out.reshaped()) one = normal();
+    auto all = out.reshaped();
+    for (Eigen::Index i = 0; i < all.size(); i += 2) {
+      const double radius = std::sqrt(-2.0 * std::log(uniform())), angle = 6.283185307179586 * uniform();
+      all(i) = radius * std::cos(angle);
+      if (i + 1 < all.size()) all(i + 1) = radius * std::sin(angle);
+    }
     return out;
   }
 
  private:
-  double normal() {
-    const double u = (static_cast<double>(bits_() >> 11) + 0.5) * 0x1p-53;
-    const double v = (static_cast<double>(bits_() >> 11) + 0.5) * 0x1p-53;
-    return std::sqrt(-2.0 * std::log(u)) * std::cos(6.283185307179586 * v);
-  }
+  /// Between 0 and 1, neither of them.
+  double uniform() { return (static_cast<double>(bits_() >> 11) + 0.5) * 0x1p-53; }
 
   std::mt19937_64 bits_;
 };
