@@ -178,10 +178,12 @@ std::string whyNone(const NamedTraits& traits, const NamedTrait& like, std::stri
   return "";
 }
 
-/// A row for each number that one camera has alone; one for all of a kind of which the other has none.
+/// A row for each number that one camera has alone; one for all of a kind of which the other has none. Nothing
+/// where there is no other.
 void addAlone(const NamedTraits& traits, const Owned& of_other, std::string_view of, std::string_view other,
               std::vector<TraitVerdict>& all) {
   std::set<std::string> kinds;
+  if (std::ranges::none_of(traits.traits, [&](const NamedTrait& its) { return its.of == other; })) return;
   for (const NamedTrait& one : traits.traits) {
     if (one.of != of || isBeyond(one) || of_other.find(one) != nullptr) continue;
     const auto isOthers = [&](const NamedTrait& its) { return its.of == other && its.what == one.what; };
