@@ -7,11 +7,13 @@
 #include <functional>
 #include <limits>
 #include <map>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "calib/compare/statistics.h"
 #include "calib/compare/traits/clusters.h"
+#include "calib/compare/traits/least_squares.h"
 #include "calib/compare/traits/veil.h"
 
 namespace toftwin::plan {
@@ -20,6 +22,7 @@ namespace {
 using compare::TraitCollector;
 using Captures = std::vector<const ComparedCapture*>;
 constexpr std::array kNames{"A", "B"};
+constexpr const char* kLagOfFirst = "lag of the first frame recorded";
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 Captures ofKind(const ComparedRun& run, std::string_view kind) {
@@ -272,7 +275,36 @@ void addLag(const ComparedRun& run, std::size_t camera, TraitCollector& all) {
     first.push_back(values.front()), rest.push_back(later.mean()), before.push_back(previous);
     previous = later.mean();
   }
-  all.add("lag of the first frame recorded", kNames[camera], compare::afterImageTraits(first, rest, before));
+  all.add(kLagOfFirst, kNames[camera], compare::afterImageTraits(first, rest, before));
+}
+
+/// The same of the range, where the camera was moved: of a filter over frames in the range itself, which leaves
+/// amplitudes as they are. Captures of one block follow each other in one scene.
+void addRangeLag(const ComparedRun& run, std::size_t camera, TraitCollector& all) {
+  std::vector<double> first, rest, before;
+  const ComparedCapture* previous = nullptr;
+  double there = kNaN;
+  for (const ComparedCapture& one : run.captures) {
+    const auto& values = one.seen[camera].middle_range_m;
+    const bool follows = previous != nullptr && previous->record.block == one.record.block &&
+                         previous->record.number + 1 == one.record.number;
+    const double then = std::exchange(there, kNaN);
+    previous = &one;
+    if (values.size() < 3) continue;
+    compare::Running later;
+    for (std::size_t i = 2; i < values.size(); ++i) later.add(values[i]);
+    there = later.mean();
+    if (!follows || !(std::abs(then - there) > 0.1 * there)) continue;
+    first.push_back(values.front()), rest.push_back(there), before.push_back(then);
+  }
+  if (first.size() < 2) {
+    all.untold(fmt::format(
+        "range left behind in the first frame recorded of {}: it takes two captures of a block by which the range "
+        "in the image's middle changes by a tenth, and three frames of each",
+        kNames[camera]));
+    return;
+  }
+  all.add(kLagOfFirst, kNames[camera], compare::afterImageTraits(first, rest, before, "range left behind"));
 }
 
 /// A plate's path: its middle over time; speeds are differences of two frames, each of which is in one of
@@ -299,17 +331,59 @@ void addMotion(const ComparedRun& run, std::size_t camera, TraitCollector& all) 
 }
 
 /// Independent values by their intervals: weights 1/h². A's places, which stand for the path, err as B's do:
-/// √2.
+/// √2. Where the parts scatter more than that, they err by more than each knows: by Student over the parts
+/// (R. T. Birge, Phys. Rev. 40 (1932) 207).
 compare::Trait together(const std::vector<compare::Trait>& parts) {
   double weights = 0.0, sum = 0.0;
   compare::Trait all{.name = parts.front().name, .unit = parts.front().unit};
+  const auto halfOf = [](const compare::Trait& one) { return std::max(1e-9, 0.5 * (one.high - one.low)); };
   for (const compare::Trait& one : parts) {
-    const double half = std::max(1e-9, 0.5 * (one.high - one.low)), weight = 1.0 / (half * half);
+    const double weight = 1.0 / (halfOf(one) * halfOf(one));
     weights += weight, sum += weight * one.value, all.n += one.n;
   }
   all.value = sum / weights;
-  all.low = all.value - std::sqrt(2.0 / weights), all.high = all.value + std::sqrt(2.0 / weights);
+  double half = std::sqrt(2.0 / weights), squares = 0.0;
+  for (const compare::Trait& one : parts) squares += std::pow((one.value - all.value) / halfOf(one), 2);
+  if (parts.size() > 1) {
+    const double degrees = static_cast<double>(parts.size() - 1);
+    half = std::max(half, compare::studentT(degrees) * std::sqrt(squares / degrees / weights));
+  }
+  all.low = all.value - half, all.high = all.value + half;
   return all;
+}
+
+/// The plate as a camera sees it, over all captures.
+struct PlateSeen {
+  compare::Running width_m{}, speed_m_per_s{};
+  double pixel_m = 0.0;
+
+  PlateSeen(const Captures& captures, std::size_t camera) {
+    for (const ComparedCapture* one : captures) {
+      const CameraSeen& seen = one->seen[camera];
+      pixel_m = std::max(pixel_m, seen.plate_pixel_m);
+      for (std::size_t i = 0; i < seen.plate_width_m.size(); ++i) {
+        width_m.add(seen.plate_width_m[i]);
+        const double passed = i == 0 ? 0.0 : seen.plate_time_s[i] - seen.plate_time_s[i - 1];
+        if (passed > 0.0)
+          speed_m_per_s.add(std::abs(seen.plate_place_m[i] - seen.plate_place_m[i - 1]) / passed);
+      }
+    }
+  }
+};
+
+/// What one camera sees less of the plate may lie at one of its ends: by half of it its middle is elsewhere.
+/// Over two pixels the cameras see different plates.
+void heedWidths(const PlateSeen& a, const PlateSeen& b, compare::Trait& latency) {
+  const double less_m = std::abs(a.width_m.mean() - b.width_m.mean());
+  if (less_m > 2.0 * std::max(a.pixel_m, b.pixel_m)) {
+    latency.doubt = fmt::format(
+        "the plate is {:.0f} mm wide in A's frames and {:.0f} mm in B's, so that where its middle is hangs on what "
+        "each sees of it",
+        1e3 * a.width_m.mean(), 1e3 * b.width_m.mean());
+  }
+  const double speed = std::max(a.speed_m_per_s.mean(), b.speed_m_per_s.mean());
+  const double late_ms = speed > 0.0 ? 1e3 * 0.5 * less_m / speed : 0.0;
+  latency.low -= late_ms, latency.high += late_ms;
 }
 
 /// How much later B sees the plate where A saw it, where both say the scene's own time: of simulated cameras.
@@ -333,7 +407,9 @@ void addLatency(const ComparedRun& run, TraitCollector& all) {
   } else if (rows.empty()) {
     all.untold("latency: the plate is seen whole in too few frames of a capture");
   } else {
-    all.add("latency", "B − A", std::vector{together(rows)});
+    compare::Trait latency = together(rows);
+    heedWidths({captures, 0}, {captures, 1}, latency);
+    all.add("latency", "B − A", std::vector{std::move(latency)});
   }
 }
 
@@ -350,6 +426,7 @@ void addFrameTraits(const ComparedRun& run, TraitCollector& all) {
     if (const Captures plates = platesForScatter(run); !plates.empty())
       addScatter(plates, walls, run.frequency_hz[camera], camera, all);
     addLag(run, camera, all);
+    addRangeLag(run, camera, all);
     addMotion(run, camera, all);
   }
   addLatency(run, all);

@@ -107,6 +107,25 @@ void addWall(const compare::Stack& stack, const std::vector<ReadFrame>& frames,
   }
 }
 
+/// A pixel that some frames have not would move the mean of the others.
+std::vector<double> middleOf(const std::vector<ReadFrame>& frames) {
+  if (frames.empty()) return {};
+  const int width = frames.front().range_m.width(), height = frames.front().range_m.height();
+  std::vector<double> sums(frames.size(), 0.0);
+  double count = 0.0;
+  for (int y = 3 * height / 8; y < 5 * height / 8; ++y) {
+    for (int x = 3 * width / 8; x < 5 * width / 8; ++x) {
+      const auto has = [&](const ReadFrame& frame) { return std::isfinite(frame.range_m(x, y)); };
+      if (!std::ranges::all_of(frames, has)) continue;
+      for (std::size_t i = 0; i < frames.size(); ++i) sums[i] += static_cast<double>(frames[i].range_m(x, y));
+      ++count;
+    }
+  }
+  if (!(count > 0.0)) return {};
+  for (double& one : sums) one /= count;
+  return sums;
+}
+
 void addNoise(const std::vector<ReadFrame>& frames, const Image<float>& expected_m, CameraSeen& seen) {
   const int width = std::min(kMiddle, expected_m.width()), height = std::min(kMiddle, expected_m.height());
   const int left = (expected_m.width() - width) / 2, top = (expected_m.height() - height) / 2;
@@ -213,6 +232,7 @@ CameraSeen seenOf(const Plan& plan, const CaptureRecord& record, const compare::
     seen.brightness.push_back(frame.brightness);
   }
   if (seen.starts_s.size() < frames.size()) seen.starts_s.clear();
+  seen.middle_range_m = middleOf(frames);
   const BlockSpec* block = blockOf(plan, record);
   const auto& pose = own_pose ? own_pose : stack.pose();
   if (block == nullptr || !pose) return seen;

@@ -139,6 +139,23 @@ std::optional<double> timeOf(const ReadFrame& frame, bool is_simulated) {
   return first ? first : second;
 }
 
+/// Not at the image's border.
+bool isWhole(const Plate& plate) {
+  const int last = plate.is.width() - 1;
+  for (int y = 0; y < plate.is.height(); ++y) {
+    if (plate.is(0, y) != 0 || plate.is(last, y) != 0) return false;
+  }
+  return true;
+}
+
+/// What hangs between plate and wall is mixed light, and moves with the plate to one side: one camera shows it,
+/// another one masks it.
+bool isPlateAlone(const Plate& plate, const Image<float>& range_m, const Image<float>& wall_m, int x, int y) {
+  constexpr double kHangs = 0.15;  // of the step, as a flying pixel
+  const double step = static_cast<double>(wall_m(x, y)) - plate.range_m;
+  return plate.is(x, y) != 0 && std::abs(static_cast<double>(range_m(x, y)) - plate.range_m) <= kHangs * step;
+}
+
 }  // namespace
 
 void addVeil(const Veil& veil, CameraSeen& seen) {
@@ -166,22 +183,25 @@ void addMovingPlate(const Image<float>& wall_m, const CameraInfo& camera,
   for (const ReadFrame& frame : frames) {
     const auto time = timeOf(frame, seen.is_simulated);
     const auto plate = time ? plateIn(frame.range_m, wall_m) : std::nullopt;
-    if (!plate) continue;
+    if (!plate || !isWhole(*plate)) continue;  // cut by the image's border: its middle is not known
     // Depth over x, by least squares: motion pulls the two edges to different sides.
     double n = 0.0, sx = 0.0, sz = 0.0, sxx = 0.0, sxz = 0.0;
-    bool is_whole = true;
+    compare::Running middles, widths;
     for (int y = 0; y < camera.height; ++y) {
+      std::optional<double> first, last;
       for (int x = 0; x < camera.width; ++x) {
-        if (plate->is(x, y) == 0) continue;
-        is_whole = is_whole && x > 0 && x + 1 < camera.width;
+        if (!isPlateAlone(*plate, frame.range_m, wall_m, x, y)) continue;
         const Vec3d at = static_cast<double>(frame.range_m(x, y)) * rayThroughPixel(camera, x, y).v;
-        if (std::abs(static_cast<double>(frame.range_m(x, y)) - plate->range_m) > kBefore_m) continue;
         n += 1.0, sx += at.x, sz += at.z, sxx += at.x * at.x, sxz += at.x * at.z;
+        if (!first) first = at.x;
+        last = at.x;
       }
+      if (first) middles.add(0.5 * (*first + *last)), widths.add(*last - *first);
     }
     const double spread = sxx - sx * sx / n;
-    if (!is_whole || !(spread > 0.0)) continue;  // cut by the image's border: its middle is not known
-    seen.plate_time_s.push_back(*time), seen.plate_place_m.push_back(sx / n);
+    if (!(spread > 0.0)) continue;
+    seen.plate_time_s.push_back(*time), seen.plate_place_m.push_back(middles.mean());
+    seen.plate_width_m.push_back(widths.mean()), seen.plate_pixel_m = plate->range_m / camera.fx;
     // By how much the plate's right end seems farther than its left: slope × width of an even plate, √(12
     // var).
     seen.plate_turn_mm.push_back(1e3 * (sxz - sx * sz / n) / spread * std::sqrt(12.0 * spread / n));

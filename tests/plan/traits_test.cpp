@@ -474,6 +474,88 @@ TEST(RunTraits, TakeErrorAndVeilOfTheWallAloneOfTheSameCells) {
   EXPECT_NEAR(find(traitsOf(run), "lens scatter", "A", "veil")->trait.value, 0.03, kRounding);
 }
 
+/// Twelve distances by turns, three more captures of another block. A's frames have 0.3 of the range of the frame
+/// before, B's none; each mean errs by 0.2 mm.
+TEST(RunTraits, TellWhatTheFirstFramesRangeHasOfTheCaptureBefore) {
+  std::mt19937_64 random{kSeed};
+  std::normal_distribution<double> error{0.0, 2e-4};
+  ComparedRun run;
+  double before_m = 1.0;
+  for (int i = 0; i < 15; ++i) {
+    ComparedCapture& one = run.captures.emplace_back();
+    one.record.number = static_cast<std::size_t>(i), one.record.block = i < 12 ? "distance" : "another";
+    const double wall_m = i < 12 ? 1.0 + 0.25 * ((5 * i) % 12) : 9.0 - 2.0 * i / 12;
+    double seen_m = i == 12 ? wall_m : before_m;  // another scene begins without a frame before
+    for (int frame = 0; frame < 10; ++frame) {
+      seen_m = wall_m + 0.3 * (seen_m - wall_m);
+      one.seen[0].middle_range_m.push_back(seen_m + error(random));
+      one.seen[1].middle_range_m.push_back(wall_m + error(random));
+    }
+    before_m = seen_m;
+  }
+  const auto toldOf = [&](const char* of) {
+    const RunTraits all = traitsOf(run);
+    const RunTrait* found = find(all, "lag of the first frame recorded", of, "range left behind");
+    return found == nullptr ? compare::Trait{} : found->trait;
+  };
+  // Of frames 2 to 9, 0.3³ and less is left: (0.3 − 0.3³/0.7/8) / (1 − …) of the change to their mean.
+  const double left = std::pow(0.3, 3) / 0.7 / 8.0, told = (0.3 - left) / (1.0 - left);
+  const compare::Trait a = toldOf("A"), b = toldOf("B");
+  EXPECT_GE(a.n, 9u);
+  EXPECT_NEAR(a.value, told, a.high - a.low);
+  EXPECT_LT(a.high - a.low, 0.01);
+  EXPECT_NEAR(b.value, 0.0, b.high - b.low);
+  for (ComparedCapture& one : run.captures) one.record.block = one.record.name = std::to_string(one.record.number);
+  EXPECT_THAT(traitsOf(run).untold,
+              testing::Contains(testing::HasSubstr("range left behind in the first frame recorded of A: it takes")));
+}
+
+/// Three captures of a plate that goes to and fro by 0.1 m in a second, at 0.4 m/s on the mean, and that two
+/// simulated cameras see alike, B `late_s` later in each of them.
+ComparedRun movingPlates(std::array<double, 3> late_s, double width_of_b_m) {
+  std::mt19937_64 random{kSeed};
+  std::normal_distribution<double> error{0.0, 2e-4};
+  ComparedRun run;
+  for (std::size_t i = 0; i < 3; ++i) {
+    ComparedCapture& one = run.moving.emplace_back();
+    one.record.kind = "moving";
+    for (std::size_t camera : {std::size_t{0}, std::size_t{1}}) {
+      CameraSeen& seen = one.seen[camera];
+      seen.is_simulated = true, seen.plate_pixel_m = 0.01;
+      for (int frame = 0; frame < 60; ++frame) {
+        const double t = 0.025 * frame + (camera == 1 ? 0.01 : 0.0), late = camera == 1 ? late_s[i] : 0.0;
+        seen.plate_time_s.push_back(t);
+        seen.plate_place_m.push_back(0.1 * std::sin(2.0 * std::numbers::pi * (t - late)) + error(random));
+        seen.plate_width_m.push_back(camera == 1 ? width_of_b_m : 0.3), seen.plate_turn_mm.push_back(0.0);
+      }
+    }
+  }
+  return run;
+}
+
+TEST(RunTraits, TellNoLatencyThatCapturesDisagreeAboutOrOfPlatesThatLookDifferent) {
+  const auto latencyOf = [](const ComparedRun& run) {
+    const RunTraits all = traitsOf(run);
+    const RunTrait* found = find(all, "latency", "B − A", "latency");
+    return found == nullptr ? compare::Trait{} : found->trait;
+  };
+  const compare::Trait alike = latencyOf(movingPlates({0.02, 0.02, 0.02}, 0.3));
+  EXPECT_NEAR(alike.value, 20.0, alike.high - alike.low);
+  EXPECT_LT(alike.high - alike.low, 2.0);
+  EXPECT_EQ(alike.doubt, "");
+  // By how captures scatter: −97 to 91 ms is no latency.
+  const compare::Trait apart = latencyOf(movingPlates({-0.097, 0.0, 0.091}, 0.3));
+  EXPECT_LT(apart.low, -50.0);
+  EXPECT_GT(apart.high, 50.0);
+  // 18 mm less, if at one end, are 9 mm of the middle, 22 ms; 30 mm are three pixels.
+  const compare::Trait narrow = latencyOf(movingPlates({0.0, 0.0, 0.0}, 0.282));
+  EXPECT_LT(narrow.low, -18.0);
+  EXPECT_GT(narrow.high, 18.0);
+  EXPECT_EQ(narrow.doubt, "");
+  EXPECT_THAT(latencyOf(movingPlates({0.0, 0.0, 0.0}, 0.27)).doubt,
+              testing::HasSubstr("the plate is 300 mm wide in A's frames and 270 mm in B's"));
+}
+
 TEST(RunTraits, SayThatNoFrameShowsAPlateMove) {
   ComparedRun run = plantedRun();
   run.moving.emplace_back().record.kind = "moving";
@@ -504,6 +586,31 @@ TEST(MovingPlate, IsTimedByItsExposuresWhereAllFramesHaveOneTimeSincePowerOn) {
   EXPECT_EQ(simulated.plate_time_s, (std::vector{600.0, 600.05, 600.1}));
 }
 
+/// Behind a plate that moves, two columns are mixed of it and the wall; one camera masks them. The plate is where
+/// it is in both.
+TEST(MovingPlate, IsWhereItIsHoweverItsEdgesAreMixedOrMasked) {
+  CameraInfo camera;
+  camera.width = 32, camera.height = 16, camera.fx = camera.fy = 20.0, camera.cx = 15.5, camera.cy = 7.5;
+  std::array<CameraSeen, 3> seen;
+  const std::array mixed_m{2.0F, 1.4F, std::nanf("")};
+  for (std::size_t k = 0; k < 3; ++k) {
+    std::vector<ReadFrame> frames(1);
+    frames[0].range_m = Image<float>(32, 16, 2.0F), frames[0].start_s = 7.0;
+    for (int y = 4; y < 12; ++y) {
+      for (int x = 10; x < 18; ++x) frames[0].range_m(x, y) = 1.0F;
+      for (int x = 8; x < 10; ++x) frames[0].range_m(x, y) = mixed_m[k];
+    }
+    addMovingPlate(Image<float>(32, 16, 2.0F), camera, frames, seen[k]);
+    ASSERT_EQ(seen[k].plate_place_m.size(), 1u);
+    EXPECT_EQ(seen[k].plate_place_m, seen[0].plate_place_m);
+    EXPECT_EQ(seen[k].plate_width_m, seen[0].plate_width_m);
+  }
+  // From pixel 10 to 17, a metre along the rays: x/√(400 + x²) of −5.5 and 1.5 in the middle's rows.
+  EXPECT_NEAR(seen[0].plate_place_m.front(), -0.095, 0.002);
+  EXPECT_NEAR(seen[0].plate_width_m.front(), 7.0 / 20.0, 0.02);
+  EXPECT_DOUBLE_EQ(seen[0].plate_pixel_m, 1.0 / 20.0);
+}
+
 /// The same wall, 5 mm off, before a camera whose pose the rig said and before one whose pose was fitted to it.
 TEST(Seen, LeavesErrorsOutWhereThePoseWasFittedToTheCamerasOwnPlanes) {
   const Plan plan = planOf(
@@ -530,6 +637,14 @@ TEST(Seen, LeavesErrorsOutWhereThePoseWasFittedToTheCamerasOwnPlanes) {
   EXPECT_GT(by_rig.wall_readings, 0.0);
   ASSERT_FALSE(by_rig.wall_error_mm.empty());
   EXPECT_NEAR(by_rig.wall_error_mm.front(), 5.0, 0.01);
+  // A pixel of the middle that a second frame has not is in neither mean.
+  std::vector<ReadFrame> two{frames[0], frames[0]};
+  for (int x = 12; x < 19; ++x) two[1].range_m(x, 7) = std::nanf("");
+  for (int x = 12; x < 19; ++x) two[0].range_m(x, 7) = 9.0F;
+  const auto middle_m = seenOf(plan, record, stack, two, frequency_hz).middle_range_m;
+  ASSERT_EQ(middle_m.size(), 2u);
+  EXPECT_EQ(middle_m[0], middle_m[1]);
+  EXPECT_NEAR(middle_m[0], 2.0 * std::hypot(1.0, 3.0 / 20.0), 0.1);
   // From where it saw itself, 3 mm behind, the wall is as much farther.
   const Transform<World, Camera> behind{{1.0, 0.0, 0.0, 0.0}, {0.0, 0.0, -0.003}};
   const CameraSeen by_itself = seenOf(plan, record, stack, frames, frequency_hz, behind);
