@@ -24,6 +24,21 @@ Image<float> scaled(Image<float> image, float factor) {
   return image;
 }
 
+/// PoseComparison::middle_mm, of pixels that both have.
+double middleOf(const PoseComparison& pose, std::size_t frames_a, std::size_t frames_b) {
+  std::vector<double> difference, noise;
+  const double a = 1.0 / std::sqrt(static_cast<double>(frames_a)),
+               b = 1.0 / std::sqrt(static_cast<double>(frames_b));
+  for (std::size_t i = 0; i < pose.difference_mm.size(); ++i) {
+    if (!isValidInBoth(pose, i) || !std::isfinite(pose.difference_mm[i])) continue;
+    difference.push_back(static_cast<double>(pose.difference_mm[i]));
+    const double sigma =
+        std::hypot(a * static_cast<double>(pose.noise_a_mm[i]), b * static_cast<double>(pose.noise_b_mm[i]));
+    if (std::isfinite(sigma)) noise.push_back(sigma);
+  }
+  return quantile(std::move(noise), 0.5) > kNoisy_mm ? meanWithin(difference, kGross_mm) : 0.0;
+}
+
 bool isFlying(const Image<float>& range, int x, int y, int dx, int dy, double jump) {
   const auto at = [&](int steps) {
     const int px = x + steps * dx, py = y + steps * dy;
@@ -101,7 +116,8 @@ Image<std::uint8_t> flyingAlongRaysOf(const CameraInfo& to, const Image<float>& 
 }  // namespace
 
 bool isCompared(const PoseComparison& pose, std::size_t pixel) {
-  return isValidInBoth(pose, pixel) && !isGross(static_cast<double>(pose.difference_mm[pixel]));
+  return isValidInBoth(pose, pixel) &&
+         !isGross(static_cast<double>(pose.difference_mm[pixel]) - pose.middle_mm);
 }
 
 Image<float> comparedDifference_mm(const PoseComparison& pose) {
@@ -246,6 +262,7 @@ Result<PoseComparison> comparePose(const Stack& a, const Stack& b) {
   }
   result.shared_rays = static_cast<double>(shared) / static_cast<double>(result.difference_mm.size());
   result.camera = a.camera();
+  result.middle_mm = middleOf(result, a.frames(), b.frames());
   return result;
 }
 

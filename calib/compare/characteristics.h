@@ -63,6 +63,9 @@ Image<std::uint8_t> flyingPixelsOf(const Image<float>& range, double jump = 0.03
 /// Larger differences are no measurement error but a wrong one of the phase's periods, or another
 /// surface seen at an edge. They are counted, and left out of all but the masks.
 inline constexpr double kGross_mm = 300.0;
+/// Where the means' noise is more of it, so much of a normal one lies beyond that a cut about 0 shifts the
+/// mean.
+inline constexpr double kNoisy_mm = kGross_mm / 6.0;
 inline bool isGross(double difference_mm) { return std::abs(difference_mm) > kGross_mm; }
 
 /// The one rule of which pixels are compared: valid in at least half of the frames of either camera,

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <toftwin/nan.h>
 
@@ -58,6 +59,22 @@ double blockedError(const Image<float>& field) {
 }
 
 double blockedError(std::span<const double> series) { return blockedError(series, series.size()); }
+
+double meanWithin(std::span<const double> values, double reach) {
+  // Where the values scatter by a reach, each step leaves two thirds of the way; by two, nine tenths.
+  constexpr int kSteps = 200;
+  constexpr double kNear = 1e-5;
+  double middle = 0.0;
+  for (int step = 0; step < kSteps; ++step) {
+    Running within;
+    for (const double one : values) {
+      if (std::abs(one - middle) <= reach) within.add(one);
+    }
+    const double before = std::exchange(middle, within.n() == 0 ? middle : within.mean());
+    if (std::abs(middle - before) <= kNear * reach) break;
+  }
+  return middle;
+}
 
 double quantile(std::vector<double> values, double q) {
   std::erase_if(values, [](double v) { return !std::isfinite(v); });

@@ -51,6 +51,11 @@ double blockedError(std::span<const double> series);
 /// The q-quantile (0 … 1), linearly interpolated between order statistics; NaN for no values.
 double quantile(std::vector<double> values, double q);
 
+/// The mean of the values that lie within `reach` of it, found from 0 on (mean shift; K. Fukunaga, L. D.
+/// Hostetler, IEEE Trans. Inf. Theory 21 (1975) 32): what is cut off lies as far to one side as to the other.
+/// 0 where none lies within `reach` of 0.
+double meanWithin(std::span<const double> values, double reach);
+
 /// How much of a measured error e a prediction p explains, over pairs where both are finite.
 ///   raw:       1 − Σ(e − p)² / Σe²                     against predicting no error at all
 ///   centred:   1 − Var(e − p) / Var(e)                 after the best constant is removed from

@@ -178,8 +178,8 @@ std::string whyNone(const NamedTraits& traits, const NamedTrait& like, std::stri
   return "";
 }
 
-/// A row for each number that one camera has alone; one for all of a kind of which the other has none. Nothing
-/// where there is no other.
+/// A row for each number that one camera has alone; one for all of a kind of which the other has none.
+/// Nothing where there is no other.
 void addAlone(const NamedTraits& traits, const Owned& of_other, std::string_view of, std::string_view other,
               std::vector<TraitVerdict>& all) {
   std::set<std::string> kinds;

@@ -64,7 +64,8 @@ PoseComparison thinned(const PoseComparison& all, int stride) {
   few.amplitude_ratio = thinned(all.amplitude_ratio, stride);
   few.edge = thinned(all.edge, stride);
   few.flying_a = thinned(all.flying_a, stride), few.flying_b = thinned(all.flying_b, stride);
-  few.resampled = all.resampled, few.shared_rays = all.shared_rays, few.pose = all.pose;
+  few.middle_mm = all.middle_mm, few.resampled = all.resampled, few.shared_rays = all.shared_rays,
+  few.pose = all.pose;
   return few;
 }
 

@@ -278,8 +278,8 @@ void addLag(const ComparedRun& run, std::size_t camera, TraitCollector& all) {
   all.add(kLagOfFirst, kNames[camera], compare::afterImageTraits(first, rest, before));
 }
 
-/// The same of the range, where the camera was moved: of a filter over frames in the range itself, which leaves
-/// amplitudes as they are. Captures of one block follow each other in one scene.
+/// The same of the range, where the camera was moved: of a filter over frames in the range itself, which
+/// leaves amplitudes as they are. Captures of one block follow each other in one scene.
 void addRangeLag(const ComparedRun& run, std::size_t camera, TraitCollector& all) {
   std::vector<double> first, rest, before;
   const ComparedCapture* previous = nullptr;
@@ -298,10 +298,11 @@ void addRangeLag(const ComparedRun& run, std::size_t camera, TraitCollector& all
     first.push_back(values.front()), rest.push_back(there), before.push_back(then);
   }
   if (first.size() < 2) {
-    all.untold(fmt::format(
-        "range left behind in the first frame recorded of {}: it takes two captures of a block by which the range "
-        "in the image's middle changes by a tenth, and three frames of each",
-        kNames[camera]));
+    all.untold(
+        fmt::format("range left behind in the first frame recorded of {}: it takes two captures of a block "
+                    "by which the range "
+                    "in the image's middle changes by a tenth, and three frames of each",
+                    kNames[camera]));
     return;
   }
   all.add(kLagOfFirst, kNames[camera], compare::afterImageTraits(first, rest, before, "range left behind"));
@@ -377,7 +378,8 @@ void heedWidths(const PlateSeen& a, const PlateSeen& b, compare::Trait& latency)
   const double less_m = std::abs(a.width_m.mean() - b.width_m.mean());
   if (less_m > 2.0 * std::max(a.pixel_m, b.pixel_m)) {
     latency.doubt = fmt::format(
-        "the plate is {:.0f} mm wide in A's frames and {:.0f} mm in B's, so that where its middle is hangs on what "
+        "the plate is {:.0f} mm wide in A's frames and {:.0f} mm in B's, so that where its middle is hangs "
+        "on what "
         "each sees of it",
         1e3 * a.width_m.mean(), 1e3 * b.width_m.mean());
   }

@@ -21,11 +21,13 @@ constexpr std::array kCameras{"A", "B"};
 constexpr const char* kPattern = "fixed pattern";
 
 /// A number of the frames' noise by its name; nothing where it is none: a pattern too weak to be told from
-/// the noise left in the means.
+/// the noise left in the means, so that its interval reaches 0. Where it does, half of the values are over 0.
 std::optional<double> noiseOf(const ComparedCapture& one, std::size_t camera, std::string_view name) {
   const auto& noise = one.seen[camera].noise;
   const auto found = std::ranges::find(noise, name, &compare::Trait::name);
-  return found == noise.end() || !(found->value > 0.0) ? std::nullopt : std::optional{found->value};
+  if (found == noise.end() || !(found->value > 0.0) || (name == kPattern && !(found->low > 0.0)))
+    return std::nullopt;
+  return found->value;
 }
 
 /// Captures without other light, which makes noise of its own, of which both cameras tell this noise: a law's numbers

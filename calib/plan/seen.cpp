@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "calib/compare/characteristics.h"
+#include "calib/compare/statistics.h"
 #include "calib/intrinsics/brightness.h"
 #include "calib/plan/place.h"
 #include "calib/plan/seen_plate.h"
@@ -75,33 +76,58 @@ CellReadings readingsOf(const std::vector<ReadFrame>& frames, const Image<float>
   return cell;
 }
 
+/// Means over the frames.
+struct WallImages {
+  Image<float> range_m{}, amplitude{}, noise_of_mean_m{};
+};
+
+/// Means over a cell's pixels that are not gross. The cut lies about the cell's own middle where noise is
+/// large: about 0 it would take more from one side than from the other.
+struct CellMeans {
+  double range_m = 0.0, error_mm = 0.0, amplitude = 0.0, count = 0.0;
+
+  CellMeans(const WallImages& images, const Image<float>& expected_m, int left, int top) {
+    std::vector<double> error, noise, expected, amplitudes;
+    for (int y = top; y < std::min(top + kCell, expected_m.height()); ++y) {
+      for (int x = left; x < std::min(left + kCell, expected_m.width()); ++x) {
+        const double e = 1e3 * static_cast<double>(images.range_m(x, y) - expected_m(x, y));
+        if (!std::isfinite(e)) continue;
+        error.push_back(e), expected.push_back(static_cast<double>(expected_m(x, y)));
+        noise.push_back(1e3 * static_cast<double>(images.noise_of_mean_m(x, y)));
+        amplitudes.push_back(images.amplitude.empty() ? 0.0 : static_cast<double>(images.amplitude(x, y)));
+      }
+    }
+    std::erase_if(noise, [](double one) { return !std::isfinite(one); });
+    const bool is_noisy = compare::quantile(std::move(noise), 0.5) > compare::kNoisy_mm;
+    const double middle_mm = is_noisy ? compare::meanWithin(error, kGross_mm) : 0.0;
+    for (std::size_t i = 0; i < error.size(); ++i) {
+      if (!(std::abs(error[i] - middle_mm) <= kGross_mm)) continue;
+      error_mm += error[i], range_m += expected[i], amplitude += amplitudes[i], ++count;
+    }
+    error_mm /= count, range_m /= count, amplitude /= count;
+  }
+};
+
 /// Cells of the wall that are valid in most pixels: their wraps, and the errors of what is not gross.
 void addWall(const compare::Stack& stack, const std::vector<ReadFrame>& frames,
              const Image<float>& expected_m, std::span<const double> frequency_hz, CameraSeen& seen) {
-  const Image<float> range = stack.meanRange_m(), amplitude = stack.meanAmplitude();
+  WallImages images{stack.meanRange_m(), stack.meanAmplitude(), stack.temporalNoise_m()};
+  for (float& one : images.noise_of_mean_m.pixels()) one /= std::sqrt(static_cast<float>(stack.frames()));
   const Periods periods{frequency_hz};
-  const Veil veil{range, amplitude, frequency_hz};
+  const Veil veil{images.range_m, images.amplitude, frequency_hz};
   seen.wall_veil_mm.resize(frequency_hz.size());
-  for (int top = 0; top < range.height(); top += kCell) {
-    for (int left = 0; left < range.width(); left += kCell) {
+  for (int top = 0; top < expected_m.height(); top += kCell) {
+    for (int left = 0; left < expected_m.width(); left += kCell) {
       const CellReadings cell = readingsOf(frames, expected_m, left, top, periods);
       if (!cell.isWall(frames.size())) continue;
       seen.wall_readings += cell.there, seen.wall_wraps += cell.wrapped, seen.wall_beyond += cell.beyond;
       // The rest of a cell that wraps in part is what noise made too near: its mean says nothing of the
       // camera.
       if (cell.beyond > kFewWraps * cell.there) continue;
-      double e_sum = 0.0, r_sum = 0.0, a_sum = 0.0, count = 0.0;
-      for (int y = top; y < std::min(top + kCell, range.height()); ++y) {
-        for (int x = left; x < std::min(left + kCell, range.width()); ++x) {
-          const double e = 1e3 * static_cast<double>(range(x, y) - expected_m(x, y));
-          if (!(std::abs(e) <= kGross_mm)) continue;
-          e_sum += e, r_sum += static_cast<double>(expected_m(x, y)), ++count;
-          a_sum += amplitude.empty() ? 0.0 : static_cast<double>(amplitude(x, y));
-        }
-      }
-      if (count < 4.0) continue;
-      seen.wall_range_m.push_back(r_sum / count), seen.wall_error_mm.push_back(e_sum / count);
-      seen.wall_amplitude.push_back(amplitude.empty() ? std::nan("") : a_sum / count);
+      const CellMeans means{images, expected_m, left, top};
+      if (means.count < 4.0) continue;
+      seen.wall_range_m.push_back(means.range_m), seen.wall_error_mm.push_back(means.error_mm);
+      seen.wall_amplitude.push_back(images.amplitude.empty() ? std::nan("") : means.amplitude);
       addVeil(veil, seen);
     }
   }

@@ -22,7 +22,8 @@ namespace toftwin::plan {
 struct CameraSeen {
   std::vector<double> starts_s{};    ///< of each frame, device clock; empty where unknown
   std::vector<double> brightness{};  ///< mean amplitude of the image's middle, frame by frame
-  /// Mean range of the image's middle, frame by frame, over the pixels that all frames have; empty where none is.
+  /// Mean range of the image's middle, frame by frame, over the pixels that all frames have; empty where none
+  /// is.
   std::vector<double> middle_range_m{};
   /// Cells of 8 × 8 pixels of a wall: expected range, error and amplitude.
   std::vector<double> wall_range_m{}, wall_error_mm{}, wall_amplitude{};
@@ -36,8 +37,8 @@ struct CameraSeen {
   std::vector<std::vector<double>> wall_veil_mm{};
   Image<float> over_split{};  ///< of a plate before the wall: scaled so that 1 lies halfway between
   std::vector<double> edge_place_px{}, edge_value{};      ///< across the plate's left and right edges
-  /// Frame by frame, of a moving plate: when it is where, the middle between the first and the last pixel that is
-  /// neither mixed with the wall nor masked; how far these are apart; and how far it seems turned.
+  /// Frame by frame, of a moving plate: when it is where, the middle between the first and the last pixel
+  /// that is neither mixed with the wall nor masked; how far these are apart; and how far it seems turned.
   std::vector<double> plate_time_s{}, plate_place_m{}, plate_width_m{}, plate_turn_mm{};
   double plate_pixel_m = 0.0;  ///< how far apart its pixels are on it
   bool is_simulated = false;

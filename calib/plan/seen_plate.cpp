@@ -148,8 +148,8 @@ bool isWhole(const Plate& plate) {
   return true;
 }
 
-/// What hangs between plate and wall is mixed light, and moves with the plate to one side: one camera shows it,
-/// another one masks it.
+/// What hangs between plate and wall is mixed light, and moves with the plate to one side: one camera shows
+/// it, another one masks it.
 bool isPlateAlone(const Plate& plate, const Image<float>& range_m, const Image<float>& wall_m, int x, int y) {
   constexpr double kHangs = 0.15;  // of the step, as a flying pixel
   const double step = static_cast<double>(wall_m(x, y)) - plate.range_m;

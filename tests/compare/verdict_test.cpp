@@ -143,7 +143,8 @@ TEST(Verdict, SaysWhyTheOtherCameraHasNoSuchNumber) {
   EXPECT_EQ(rows[2][1], "not told: A has none: it takes eight frames");
   EXPECT_THAT(headlineOf(all), HasSubstr("In none of 1 numbers"));
   EXPECT_EQ(cardsOf(all).front().value, "1 of 1");
-  EXPECT_TRUE(verdictsOf({.traits = {traits.traits[0], traits.traits[2]}}).empty()) << "there is no other camera";
+  EXPECT_TRUE(verdictsOf({.traits = {traits.traits[0], traits.traits[2]}}).empty())
+      << "there is no other camera";
 }
 
 TEST(Verdict, CallsNothingTheSameByTwoRows) {

@@ -119,11 +119,11 @@ TEST(RunTraits, TellNoiseAndPatternOverDistanceAndAmplitude) {
     for (const std::size_t camera : {std::size_t{0}, std::size_t{1}}) {
       const double share = camera == 0 ? 1.0 : 0.5;
       one.seen[camera].noise = {{"temporal noise", "mm", share * sigma * (1.0 + error(random))},
-                                {"fixed pattern", "mm", share * 0.5 * (1.0 + error(random))}};
+                                {"fixed pattern", "mm", share * 0.5 * (1.0 + error(random)), 0.1}};
       one.seen[camera].brightness = {1000.0 / (d * d)};
     }
   }
-  run.captures.back().seen[0].noise[1].value = 0.0;  // too weak to be told: no row
+  run.captures.back().seen[0].noise[1] = {"fixed pattern", "mm", 9.0, 0.0};  // too weak to be told: no row
   const RunTraits all = traitsOf(run);
   const double nearest = 0.5;
   for (const auto& [of, share] : {std::pair{"A", 1.0}, {"B", 0.5}}) {
@@ -145,7 +145,7 @@ TEST(RunTraits, SayUpToWhichNoiseTheLawHolds) {
     const double light = 1e-4 * one.amplitude_a;
     one.own[0].noise_mm = 2.0 / light, one.record.distance_m = std::sqrt(1.0 / light);
     one.seen[0].noise = {{"temporal noise", "mm", one.own[0].noise_mm},
-                         {"fixed pattern", "mm", one.own[0].noise_mm}};
+                         {"fixed pattern", "mm", one.own[0].noise_mm, 1.0}};
     one.seen[0].brightness = {one.amplitude_a};
   }
   for (ComparedCapture& one : run.captures) one.record.kind = "distance";
@@ -474,8 +474,8 @@ TEST(RunTraits, TakeErrorAndVeilOfTheWallAloneOfTheSameCells) {
   EXPECT_NEAR(find(traitsOf(run), "lens scatter", "A", "veil")->trait.value, 0.03, kRounding);
 }
 
-/// Twelve distances by turns, three more captures of another block. A's frames have 0.3 of the range of the frame
-/// before, B's none; each mean errs by 0.2 mm.
+/// Twelve distances by turns, three more captures of another block. A's frames have 0.3 of the range of the
+/// frame before, B's none; each mean errs by 0.2 mm.
 TEST(RunTraits, TellWhatTheFirstFramesRangeHasOfTheCaptureBefore) {
   std::mt19937_64 random{kSeed};
   std::normal_distribution<double> error{0.0, 2e-4};
@@ -505,9 +505,11 @@ TEST(RunTraits, TellWhatTheFirstFramesRangeHasOfTheCaptureBefore) {
   EXPECT_NEAR(a.value, told, a.high - a.low);
   EXPECT_LT(a.high - a.low, 0.01);
   EXPECT_NEAR(b.value, 0.0, b.high - b.low);
-  for (ComparedCapture& one : run.captures) one.record.block = one.record.name = std::to_string(one.record.number);
-  EXPECT_THAT(traitsOf(run).untold,
-              testing::Contains(testing::HasSubstr("range left behind in the first frame recorded of A: it takes")));
+  for (ComparedCapture& one : run.captures)
+    one.record.block = one.record.name = std::to_string(one.record.number);
+  EXPECT_THAT(
+      traitsOf(run).untold,
+      testing::Contains(testing::HasSubstr("range left behind in the first frame recorded of A: it takes")));
 }
 
 /// Three captures of a plate that goes to and fro by 0.1 m in a second, at 0.4 m/s on the mean, and that two
@@ -586,8 +588,8 @@ TEST(MovingPlate, IsTimedByItsExposuresWhereAllFramesHaveOneTimeSincePowerOn) {
   EXPECT_EQ(simulated.plate_time_s, (std::vector{600.0, 600.05, 600.1}));
 }
 
-/// Behind a plate that moves, two columns are mixed of it and the wall; one camera masks them. The plate is where
-/// it is in both.
+/// Behind a plate that moves, two columns are mixed of it and the wall; one camera masks them. The plate is
+/// where it is in both.
 TEST(MovingPlate, IsWhereItIsHoweverItsEdgesAreMixedOrMasked) {
   CameraInfo camera;
   camera.width = 32, camera.height = 16, camera.fx = camera.fy = 20.0, camera.cx = 15.5, camera.cy = 7.5;
