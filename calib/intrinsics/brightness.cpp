@@ -79,6 +79,16 @@ Result<Image<float>> brightnessOf(const Frame& frame) {
   return Error{Error::Code::Unsupported, "a plane of unknown type"};
 }
 
+namespace {
+
+Error noFrameIn(const std::string& file, const std::string& damage) {
+  return {Error::Code::Malformed, damage.empty()
+                                      ? fmt::format("{} holds no frames", file)
+                                      : fmt::format("{}: no frame of it can be read: {}", file, damage)};
+}
+
+}  // namespace
+
 bool isRecording(const std::string& name) { return name.find(".mcap") != std::string::npos; }
 
 Result<> readRecording(const std::string& file_and_source, int step,
@@ -89,6 +99,7 @@ Result<> readRecording(const std::string& file_and_source, int step,
   auto reader = record::Reader::open(file);
   if (!reader) return reader.error();
   const auto& sources = reader->summary().frames_per_source;
+  if (sources.empty()) return noFrameIn(file, reader->summary().damage);
   if (source.empty() && sources.size() > 1) {
     return Error{Error::Code::InvalidArgument,
                  fmt::format("{} holds {} sources: name one, as {}#{}", file, sources.size(), file,
@@ -99,7 +110,8 @@ Result<> readRecording(const std::string& file_and_source, int step,
   }
   for (std::int64_t i = 0;; ++i) {
     const auto frame = reader->next(source);
-    if (!frame && frame.error().code == Error::Code::EndOfStream) return {};
+    if (!frame && frame.error().code == Error::Code::EndOfStream)
+      return i > 0 ? Result<>{} : Result<>{noFrameIn(file, reader->summary().damage)};
     if (!frame) return frame.error();
     if (i % step != 0) continue;
     auto brightness = brightnessOf(*frame);

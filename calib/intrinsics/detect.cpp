@@ -166,6 +166,64 @@ Fitted fitAll(const Image<float>& image, const Target& target, const Pixels& gri
   return fitted;
 }
 
+/// A line of the grid along one of its sides, and the one before it.
+struct Side {
+  bool is_row;
+  int outer, inner;
+};
+
+/// Whether four squares meet there as they do at a corner of the board, with the other sign. Where its rim
+/// begins, squares and rim make half of that contrast.
+bool isLikeNext(const FittedCorner& there, const FittedCorner& corner) {
+  constexpr double kLeastContrast = 0.75, kMostError = 3.0;
+  const double share = -there.contrast / corner.contrast;
+  return share > kLeastContrast && share < 1.0 / kLeastContrast &&
+         there.error_px < kMostError * corner.error_px;
+}
+
+/// Whether squares go on beyond a side: then the grid is a part of a larger board, wherever the search found
+/// as many corners as it was told. At most of the places one step on that lie in the image, and at three or
+/// more.
+bool goesOn(const Image<float>& image, const Target& target, const Pixels& grid, float saturation,
+            const Side& side) {
+  constexpr double kMostAlike = 0.8;
+  constexpr int kFewestAlike = 3;
+  const int count = side.is_row ? target.columns : target.rows;
+  int inside = 0, like = 0;
+  for (int i = 0; i < count; ++i) {
+    const auto at = [&](int line) {
+      const int column = side.is_row ? i : line, row = side.is_row ? line : i;
+      return guessAt(grid, target, column, row);
+    };
+    const CornerGuess outer = at(side.outer), inner = at(side.inner);
+    CornerGuess beyond = outer;
+    beyond.at = {2.0 * outer.at.u - inner.at.u, 2.0 * outer.at.v - inner.at.v};
+    const bool is_inside = beyond.at.u > 0.0 && beyond.at.v > 0.0 && beyond.at.u < image.width() - 1.0 &&
+                           beyond.at.v < image.height() - 1.0;
+    const auto corner = is_inside ? fitCorner(image, outer, saturation) : std::nullopt;
+    if (!corner) continue;
+    ++inside;
+    const auto there = fitCorner(image, beyond, saturation);
+    like += there && isLikeNext(*there, *corner) ? 1 : 0;
+  }
+  return like >= kFewestAlike && like >= kMostAlike * inside;
+}
+
+/// What is said of a board with other counts than it was told; empty: nothing shows that.
+std::string otherCounts(const Image<float>& image, const Target& target, const Pixels& grid,
+                        float saturation) {
+  if (target.columns < 3 || target.rows < 3) return {};
+  for (const bool is_row : {false, true}) {
+    const int last = (is_row ? target.rows : target.columns) - 1;
+    for (const Side& side : {Side{is_row, 0, 1}, Side{is_row, last, last - 1}}) {
+      if (!goesOn(image, target, grid, saturation, side)) continue;
+      return fmt::format("it has more than {} x {} inner corners: another {} of them lies beyond",
+                         target.columns, target.rows, is_row ? "row" : "column");
+    }
+  }
+  return {};
+}
+
 void judge(Sighting& sighting, const Target& target, const DetectOptions& options) {
   const auto reject = [&](Rejection reason, std::string detail) {
     sighting.rejection = reason;
@@ -270,6 +328,13 @@ Sighting findBoard(const Image<float>& image, const Target& target, const Detect
   const auto first = fitCorner(image, guessAt(grid, target, 0, 0), saturation);
   grid = inOrder(std::move(grid), target, first && first->contrast > 0.0);
   fitted = fitAll(image, target, grid, saturation);
+  for (const Corner& corner : fitted.corners) grid[corner.index] = corner.at;
+  if (std::string other = otherCounts(image, target, grid, saturation); !other.empty()) {
+    sighting.rejection = Rejection::NotFound;
+    sighting.has_more = true;
+    sighting.detail = std::move(other);
+    return sighting;
+  }
   keep(sighting, std::move(fitted));
   judge(sighting, target, options);
   return sighting;

@@ -48,6 +48,7 @@ struct Sighting {
   double tilt_deg = 0.0;        ///< of the board against the image, about; from its outline
   Rejection rejection = Rejection::None;
   std::string detail{};         ///< of the rejection: the number that decided
+  bool has_more = false;        ///< squares go on beyond the corners: of a board with more than were told
 
   [[nodiscard]] bool isUsed() const { return rejection == Rejection::None; }
 };

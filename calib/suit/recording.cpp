@@ -112,6 +112,8 @@ Result<Taken> readAll(const Case& use, const CameraSpec& spec, const std::string
   if (!reader) return named(reader.error());
   std::vector<std::string> sources;
   for (const auto& [name, frames] : reader->summary().frames_per_source) sources.push_back(name);
+  if (sources.empty() && !reader->summary().damage.empty())
+    return named({Error::Code::Malformed, "no frame of it can be read: " + reader->summary().damage});
   if (source.empty() ? sources.size() != 1 : std::ranges::find(sources, source) == sources.end()) {
     return named({Error::Code::InvalidArgument,
                   fmt::format("it holds the sources {}; name one as FILE#SOURCE", fmt::join(sources, ", "))});

@@ -115,6 +115,11 @@ void FileReader::scan() {
     note(fmt::format("{}: the index at the end is damaged or cut off; scanning found {} messages",
                      path().string(), statistics_.messages));
   }
+  if (!closed && statistics_.messages == 0)
+    note(fmt::format(
+        "{}: nothing of it can be read: it ends before its first chunk is whole, and a chunk is read "
+        "whole or not at all",
+        path().string()));
   if (unnoted_ > 0) damage_ += fmt::format("\nand {} more places", unnoted_);
   statistics_.channels = static_cast<std::uint32_t>(channels_.size());
   statistics_.schemas = static_cast<std::uint16_t>(schemas_.size());

@@ -116,6 +116,27 @@ TEST(FindBoard, DoesNotTakeABoardForOneOfAnotherSize) {
   EXPECT_THAT(seen.detail, HasSubstr("9 x 7"));
 }
 
+/// A part of the board with as many corners as were told is found in many images; where it ends, squares go
+/// on. Of these 16, 6 say so and 3 are used, in which the search laid a skewed grid over the board:
+/// `calibrate` refuses where no more are used than say so.
+TEST(FindBoard, SaysThatABoardHasMoreCornersThanItWasTold) {
+  const Truth truth = smallCamera();
+  std::mt19937_64 random;
+  int views = 0, more = 0, used = 0;
+  for (const char* told : {"7x5", "8x4", "7x4", "6x5"}) {
+    for (const unsigned seed : {11U, 12U, 13U, 31U}) {
+      const BoardPose pose = poseBefore(seed, truth, random);
+      const Sighting seen =
+          findBoard(render(truth, checkerboard(), pose, {}, random), *targetOf(told, 32_mm));
+      ++views, more += seen.has_more, used += seen.isUsed();
+      EXPECT_FALSE(seen.has_more && seen.isUsed());
+    }
+  }
+  RecordProperty("of_views",
+                 std::to_string(views) + ": more " + std::to_string(more) + ", used " + std::to_string(used));
+  EXPECT_GT(more, used);
+}
+
 TEST(FindBoard, RejectsABlurThatSwallowsTheSquares) {
   const Truth truth = smallCamera();
   std::mt19937_64 random;

@@ -251,6 +251,19 @@ TEST_F(Recorded, ACutRecordingIsReadAsFarAsItGoesAndSaysSo) {
   EXPECT_EQ(toftwin("info " + path("a.mcap")).status, 7);
 }
 
+TEST_F(Recorded, ARecordingCutInItsFirstChunkSaysThatNothingOfItCanBeRead) {
+  const auto bytes = bytesOf(file_);
+  record::writeBytes(file_, std::span{bytes}.first(100));
+  const Ran info = toftwin("info " + path("a.mcap"));
+  EXPECT_EQ(info.status, 7);
+  EXPECT_THAT(info.err, HasSubstr("nothing of it can be read: it ends before its first chunk is whole"));
+  const Ran calibrate =
+      toftwin("calibrate " + path("a.mcap") + " --board 8x5 --square 32 -o " + path("c.toml"));
+  EXPECT_NE(calibrate.status, 0);
+  EXPECT_THAT(calibrate.err, HasSubstr("no frame of it can be read"));
+  EXPECT_THAT(calibrate.err, Not(HasSubstr("of 0 images")));
+}
+
 TEST_F(Recorded, ADamagedChunkIsFoundAlthoughTheIndexIsWhole) {
   auto bytes = bytesOf(file_);
   for (std::size_t i = 0; i < 4; ++i) bytes[bytes.size() / 2 + i] ^= std::byte{0x55};

@@ -152,6 +152,19 @@ Result<Exit> show(const Options& options) {
   return Exit::Ok;
 }
 
+/// In some images a part of a larger board looks like one of the counts that were told: where most say
+/// otherwise, they are of the same board.
+Result<> checkCounts(const std::vector<Sighting>& sightings, const intrinsics::Target& target) {
+  const auto more = std::ranges::count_if(sightings, &Sighting::has_more),
+             used = std::ranges::count_if(sightings, &Sighting::isUsed);
+  if (more == 0 || more < used) return {};
+  return Error{
+      Error::Code::InvalidArgument,
+      fmt::format("{} of {} images show a board with more than {} x {} inner corners: count where four "
+                  "squares meet, along each side, and say so with --board",
+                  more, sightings.size(), target.columns, target.rows)};
+}
+
 Result<Exit> run(const Options& options) {
   if (!options.shown_id.empty()) return show(options);
   const auto target = intrinsics::targetOf(options.board.words());
@@ -170,6 +183,7 @@ Result<Exit> run(const Options& options) {
   Calibrated calibrated{.target = *target, .size = collector.size(), .sightings = collector.sightings()};
   calibrated.camera = options.live.source.empty() ? fmt::format("{} images", calibrated.sightings.size())
                                                   : options.live.source;
+  if (auto counted = checkCounts(calibrated.sightings, *target); !counted) return counted.error();
   EstimateOptions how{.model = modelFrom(options.model)};
   calibrated.was_model_asked = how.model.has_value();
   if (options.is_flat) how.degree = 0;

@@ -48,6 +48,10 @@ Result<Stamps> stampsOf(const std::filesystem::path& file) {
     if (!frame) return frame.error();
     stamps.frames.push_back({frame->moment.received.ns, frame->moment.world_from_camera});
   }
+  if (stamps.frames.empty() && !stamps.damage.empty()) {
+    return Error{Error::Code::Malformed,
+                 fmt::format("{}: no frame of it can be read: {}", file.string(), stamps.damage)};
+  }
   return stamps;
 }
 
