@@ -288,7 +288,7 @@ void readTiming(const Features& features, Setup& setup) {
   // A selector chooses among triggers; that of frames is the one that starts them.
   if (features.has("TriggerSelector"))
     static_cast<void>(features.setText("TriggerSelector", "FrameStart"));
-  setup.is_triggered = features.text("TriggerMode").value_or("Off") == "On";
+  setup.is_triggered = isTriggered(features);
   setup.can_trigger =
       setup.is_triggered && features.text("TriggerSource").value_or("") == "Software";
   if (!setup.is_triggered) setup.frame_interval = frameIntervalOf(features);
@@ -316,6 +316,8 @@ Result<std::vector<std::string>> parametersOf(const Features& features, const Ke
 }
 
 }  // namespace
+
+bool isTriggered(const Features& features) { return features.text("TriggerMode").value_or("Off") == "On"; }
 
 std::optional<Duration> frameIntervalOf(const Features& features) {
   for (const char* name : {"ResultingFrameRate", "AcquisitionResultingFrameRate", "AcquisitionFrameRate",

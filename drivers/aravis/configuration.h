@@ -30,6 +30,7 @@ struct Setup {
 
 /// In free run, as the camera is set now; nothing if it does not say so.
 std::optional<Duration> frameIntervalOf(const Features& features);
+[[nodiscard]] bool isTriggered(const Features& features);
 
 /// "ExposureTime = 1000"; nothing if it is no assignment.
 std::optional<std::pair<std::string, std::string>> assignmentOf(const std::string& text);

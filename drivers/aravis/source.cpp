@@ -139,11 +139,19 @@ class AravisSource final : public Source {
     auto done = how(Features{connection_.device()});
     if (!done) return lost(done.error());
     exposure_ = exposureNow();
-    if (info_.frame_interval) {
-      info_.frame_interval = frameIntervalOf(Features{connection_.device()});
-      ids_.setInterval(info_.frame_interval);
-    }
+    readInterval(Features{connection_.device()});
     return {};
+  }
+
+  /// A client may have set the rate, or the trigger. A camera that cannot say its rate just now has the one
+  /// that it said.
+  void readInterval(const Features& features) {
+    if (isTriggered(features)) {
+      info_.frame_interval.reset();
+    } else if (const auto now = frameIntervalOf(features)) {
+      info_.frame_interval = now;
+    }
+    ids_.setInterval(info_.frame_interval);
   }
 
   /// As the camera says it; until it does, or where it waits for triggers, one to wait by.

@@ -318,6 +318,16 @@ TEST_F(AravisDriver, TheRateThatAClientSetsIsTheIntervalThatItTells) {
   ASSERT_TRUE(nextFrame(*source).ok());
 }
 
+TEST_F(AravisDriver, ACameraThatAClientSetsToWaitForTriggersHasNoIntervalUntilItRunsFree) {
+  const auto source = started("parameters = ['TriggerMode']");
+  ASSERT_NE(source, nullptr);
+  ASSERT_TRUE(source->info().frame_interval.has_value());
+  ASSERT_TRUE(source->setParameterText("TriggerMode", "On").ok());
+  EXPECT_FALSE(source->info().frame_interval.has_value());
+  ASSERT_TRUE(source->setParameterText("TriggerMode", "Off").ok());
+  EXPECT_TRUE(source->info().frame_interval.has_value());
+}
+
 TEST_F(AravisDriver, ByDefaultExposureAndGainAreParameters) {
   const auto source = open();
   ASSERT_TRUE(source.ok());
