@@ -19,9 +19,6 @@ namespace {
 
 constexpr std::size_t kShownFirst = 3;  ///< differences that have a card
 
-/// An intercept far from all rows: what a camera that nobody measured there would show.
-bool isBeyond(const NamedTrait& one) { return one.trait.name == "at 1"; }
-
 /// What is left of a fit is of B − A, but no difference of two numbers.
 bool isDifference(const NamedTrait& one) { return one.of == "B − A" && one.trait.name != "residual"; }
 
@@ -45,24 +42,28 @@ bool isWraps(const TraitVerdict& one) {
   return one.what == "wraps" && one.isTold() && one.differs() && std::abs(one.difference.value) > 0.01;
 }
 
-/// Valid pixels, of which the one has over 5 % fewer than the other.
-bool isMissing(const TraitVerdict& one) {
-  if (one.what != kValidPixels || !one.a || !one.b || !one.isTold() || !one.differs()) return false;
-  return std::abs(one.difference.value) > 0.05 * std::max(one.a->trait.value, one.b->trait.value);
+/// Over 5 % of the other's pixels, and more than the interval.
+bool isLack(const Trait& lacked) { return lacked.value > 0.05 && lacked.low > 0.0; }
+
+std::string lackInWords(const Trait& lacked, const char* by, const char* other) {
+  if (!isLack(lacked)) return "";
+  return fmt::format("{} gives no range at {} % of the pixels at which {} does ({} to {} %). ", by,
+                     number(100.0 * lacked.value), other, number(100.0 * lacked.low),
+                     number(100.0 * lacked.high));
 }
 
 /// What wraps or is missing is in few of the other numbers, so that it is said before them.
 std::string hiddenInWords(const TraitVerdict& one) {
-  const Trait& d = one.difference;
   if (isWraps(one) && one.a && one.b)
     return fmt::format("B reads {} of the wall whole periods off, A {}. ", shownPercent(one.b->trait.value),
                        shownPercent(one.a->trait.value));
-  if (!isMissing(one)) return "";
-  const bool is_b = d.value < 0.0;  // that lacks them
-  const double per_cent = (is_b ? -100.0 : 100.0) / std::max(one.a->trait.value, one.b->trait.value);
-  return fmt::format("{} gives no range at {} % of the pixels at which {} does ({} to {} %). ",
-                     is_b ? "B" : "A", number(per_cent * d.value), is_b ? "A" : "B",
-                     number(per_cent * (is_b ? d.high : d.low)), number(per_cent * (is_b ? d.low : d.high)));
+  return lackInWords(one.lacked_by_b, "B", "A") + lackInWords(one.lacked_by_a, "A", "B");
+}
+
+std::string hiddenInWords(const std::vector<TraitVerdict>& all) {
+  std::string hidden;
+  for (const TraitVerdict& one : all) hidden += hiddenInWords(one);
+  return hidden;
 }
 
 /// The amplitude of a wave of B − A: how large it is.
@@ -105,12 +106,22 @@ std::string farBeyond(const TraitVerdict& one) {
 
 std::string atOf(const TraitVerdict& one) { return one.at.empty() ? "" : ", both " + one.at; }
 
+/// Beside the verdict on shares, which are the same where each lacks as many of the other's.
+std::string lacksOf(const TraitVerdict& one) {
+  std::string words;
+  if (isLack(one.lacked_by_b))
+    words += fmt::format("; B lacks {} % of A's", number(100.0 * one.lacked_by_b.value));
+  if (isLack(one.lacked_by_a))
+    words += fmt::format("; A lacks {} % of B's", number(100.0 * one.lacked_by_a.value));
+  return words;
+}
+
 std::string verdictOf(const TraitVerdict& one) {
-  if (!one.why_not.empty()) return "not told: " + one.why_not;
-  if (!one.isTold()) return "not told: an end of an interval is not known";
-  if (one.differs()) return "differs, " + farBeyond(one) + atOf(one);
+  if (!one.why_not.empty()) return "not told: " + one.why_not + lacksOf(one);
+  if (!one.isTold()) return "not told: an end of an interval is not known" + lacksOf(one);
+  if (one.differs()) return "differs, " + farBeyond(one) + atOf(one) + lacksOf(one);
   const double most = std::max(std::abs(one.difference.low), std::abs(one.difference.high));
-  return fmt::format("same, within {}{}{}", number(most), unitOf(one), atOf(one));
+  return fmt::format("same, within {}{}{}{}", number(most), unitOf(one), atOf(one), lacksOf(one));
 }
 
 std::size_t countOf(const std::vector<TraitVerdict>& all, bool differs) {
@@ -127,7 +138,10 @@ class Owned {
     }
   }
   [[nodiscard]] const NamedTrait* find(const NamedTrait& like) const {
-    const auto found = all_.find({like.what, like.trait.name});
+    return find(like.what, like.trait.name);
+  }
+  [[nodiscard]] const NamedTrait* find(const std::string& what, const std::string& name) const {
+    const auto found = all_.find({what, name});
     return found == all_.end() ? nullptr : found->second;
   }
 
@@ -143,11 +157,17 @@ std::string doubtOf(const TraitVerdict& one) {
   return one.b && !one.b->trait.doubt.empty() ? "of B, " + one.b->trait.doubt : "";
 }
 
+/// What a camera that nobody measured there would show.
+bool isExtrapolated(const TraitVerdict& one) {
+  return one.difference.is_extrapolated || (one.a && one.a->trait.is_extrapolated) ||
+         (one.b && one.b->trait.is_extrapolated);
+}
+
 /// A difference that shows by Student's interval of two rows is one; that none shows says nothing.
 constexpr std::size_t kFewestRows = 3;
 
 void holdTogether(TraitVerdict& one, double wider) {
-  const std::string doubt = doubtOf(one);
+  const std::string doubt = isExtrapolated(one) ? "it is told far from all rows" : doubtOf(one);
   if (!one.b || one.is_paired) {
     one.difference = widened(one.difference, wider);
   } else {
@@ -165,11 +185,26 @@ void holdTogether(TraitVerdict& one, double wider) {
   }
 }
 
-/// Why a camera has no such number, as far as it was said when it was looked for.
+/// Shares of the other's pixels that each lacks; they hold together with all verdicts.
+void addLacks(const Owned& of_pair, double wider, TraitVerdict& one) {
+  const auto lackedBy = [&](const char* name) {
+    const NamedTrait* found = of_pair.find(one.what, name);
+    if (found == nullptr) return Trait{};
+    Trait lacked = widened(found->trait, wider);
+    lacked.low = std::max(0.0, lacked.low), lacked.high = std::min(1.0, lacked.high);
+    return lacked;
+  };
+  one.lacked_by_b = lackedBy(kLackedByB), one.lacked_by_a = lackedBy(kLackedByA);
+}
+
+/// Why a camera has no such number, as far as it was said when it was looked for; rather of this number than
+/// of another of its kind.
 std::string whyNone(const NamedTraits& traits, const NamedTrait& like, std::string_view other) {
   const std::string of = fmt::format("{} of {}: ", like.what, other);
-  for (const std::string& said : traits.untold) {
-    if (said.starts_with(of)) return ": " + said.substr(of.size());
+  for (const std::string& begin : {fmt::format("{}{}: ", of, like.trait.name), of}) {
+    for (const std::string& said : traits.untold) {
+      if (said.starts_with(begin)) return ": " + said.substr(of.size());
+    }
   }
   for (const NamedTrait& one : traits.traits) {
     if (one.of == other && one.what == like.what && !one.detail.empty())
@@ -185,7 +220,7 @@ void addAlone(const NamedTraits& traits, const Owned& of_other, std::string_view
   std::set<std::string> kinds;
   if (std::ranges::none_of(traits.traits, [&](const NamedTrait& its) { return its.of == other; })) return;
   for (const NamedTrait& one : traits.traits) {
-    if (one.of != of || isBeyond(one) || of_other.find(one) != nullptr) continue;
+    if (one.of != of || of_other.find(one) != nullptr) continue;
     const auto isOthers = [&](const NamedTrait& its) { return its.of == other && its.what == one.what; };
     const bool has_kind = std::ranges::any_of(traits.traits, isOthers);
     if (!has_kind && !kinds.insert(one.what).second) continue;
@@ -210,11 +245,12 @@ double TraitVerdict::floor() const {
   return difference.value < 0.0 ? difference.high - difference.value : difference.value - difference.low;
 }
 
+bool TraitVerdict::isMissing() const { return isLack(lacked_by_b) || isLack(lacked_by_a); }
+
 std::vector<TraitVerdict> verdictsOf(const NamedTraits& traits) {
-  const Owned of_a{traits, "A"}, of_b{traits, "B"}, of_both{traits, "B − A"};
+  const Owned of_a{traits, "A"}, of_b{traits, "B"}, of_both{traits, "B − A"}, of_pair{traits, "A and B"};
   std::vector<TraitVerdict> all;
   for (const NamedTrait& one : traits.traits) {
-    if (isBeyond(one)) continue;
     const NamedTrait *a = of_a.find(one), *b = of_b.find(one);
     const bool has_both = a != nullptr && b != nullptr;
     if (isDifference(one) && has_both)
@@ -224,13 +260,18 @@ std::vector<TraitVerdict> verdictsOf(const NamedTraits& traits) {
     else if (one.of == "B" && has_both && of_both.find(one) == nullptr)
       all.push_back({.what = one.what, .a = *a, .b = one});
   }
-  const double wider = widenedFor(all.size());
-  for (TraitVerdict& one : all) holdTogether(one, wider);
+  const auto beyond = static_cast<std::size_t>(std::ranges::count_if(all, isExtrapolated));
+  const double wider = widenedFor(all.size() - beyond);
+  for (TraitVerdict& one : all) {
+    holdTogether(one, wider);
+    if (one.what == kValidPixels) addLacks(of_pair, wider, one);
+  }
   addAlone(traits, of_b, "A", "B", all), addAlone(traits, of_a, "B", "A", all);
   // Those that are not told come last; where a floor is 0, what differs is infinitely far beyond it.
   const auto rank = [](const TraitVerdict& one) {
-    if (isWraps(one) || isMissing(one)) return -std::numeric_limits<double>::infinity();
-    return !one.isTold() ? 1.0 : one.differs() ? -timesFloor(one) : 0.0;
+    if (!one.isTold()) return 1.0;
+    if (!one.differs()) return one.isMissing() ? -0.5 : 0.0;
+    return isWraps(one) || one.isMissing() ? -std::numeric_limits<double>::infinity() : -timesFloor(one);
   };
   std::ranges::stable_sort(all, {}, rank);
   return all;
@@ -238,9 +279,12 @@ std::vector<TraitVerdict> verdictsOf(const NamedTraits& traits) {
 
 std::string headlineOf(const std::vector<TraitVerdict>& all) {
   const std::size_t differ = countOf(all, true), same = countOf(all, false);
-  if (differ + same == 0) return "No characteristic is known of both cameras";
-  if (differ == 0)
-    return fmt::format("In none of {} numbers does B differ from A by more than the noise floor", same);
+  const std::string hidden = hiddenInWords(all);
+  if (differ + same == 0) return hidden + "No characteristic is known of both cameras";
+  if (differ == 0) {
+    return hidden +
+           fmt::format("In none of {} numbers does B differ from A by more than the noise floor", same);
+  }
   // In millimetres where there is any: other units have no larger and smaller among them.
   const TraitVerdict* largest = nullptr;
   for (const TraitVerdict& one : all) {
@@ -249,20 +293,17 @@ std::string headlineOf(const std::vector<TraitVerdict>& all) {
       largest = &one;
   }
   const TraitVerdict& first = largest != nullptr ? *largest : all.front();
-  std::string hidden;
-  for (const TraitVerdict& one : all) hidden += hiddenInWords(one);
-  return hidden +
-         fmt::format(
-             "{} difference: {}, {} ({} to {}). {} of {} numbers of B differ from A's by more than the noise "
-             "floor",
-             largest != nullptr ? "Largest" : "Clearest", plainNameOf(first), sizeOf(first),
-             number(first.difference.low), number(first.difference.high), differ, differ + same);
+  return hidden + fmt::format(
+                      "{} difference: {}, {} ({} to {}). "
+                      "{} of {} numbers of B differ from A's by more than the noise floor",
+                      largest != nullptr ? "Largest" : "Clearest", plainNameOf(first), sizeOf(first),
+                      number(first.difference.low), number(first.difference.high), differ, differ + same);
 }
 
 TableBlock verdictTable(const std::vector<TraitVerdict>& all) {
   TableBlock table{
-      "B against A, number by number. The floor is what B − A is uncertain by: a smaller difference does not "
-      "show. "
+      "B against A, number by number. "
+      "The floor is what B − A is uncertain by: a smaller difference does not show. "
       "Intervals of B − A hold with 95 % for all rows together",
       {"characteristic", "verdict", "B − A", "floor", "A", "B"},
       {}};
@@ -285,8 +326,9 @@ std::pair<TableBlock, TableBlock> verdictTables(const std::vector<TraitVerdict>&
 std::vector<Card> cardsOf(const std::vector<TraitVerdict>& all) {
   const std::size_t differ = countOf(all, true), told = differ + countOf(all, false);
   if (told == 0) return {};
+  const bool is_good = differ == 0 && std::ranges::none_of(all, &TraitVerdict::isMissing);
   std::vector<Card> cards{{"Same as A", fmt::format("{} of {}", told - differ, told),
-                           "numbers of B within the noise floor", differ == 0 ? Tone::Good : Tone::Fair}};
+                           "numbers of B within the noise floor", is_good ? Tone::Good : Tone::Fair}};
   for (std::size_t i = 0; i < differ && cards.size() <= kShownFirst; ++i) {
     const TraitVerdict& one = all[i];
     // What is told of waves of B − A and again of B's less A's has one card, that of what is clearer.

@@ -20,18 +20,24 @@ struct TraitVerdict {
   bool is_size = false;    ///< the difference is the amplitude of a wave, which has no sign
   std::string at{};        ///< what both are told at, where a number hangs on it: "at 1.75 m"
   std::string why_not{};   ///< why the two cannot be held against each other
+  /// Of valid pixels: the share of A's that B lacks, and of B's that A lacks. Two cameras that lack as many
+  /// of each other's differ in no share.
+  Trait lacked_by_b{}, lacked_by_a{};
 
   [[nodiscard]] bool isTold() const;
   /// It is told, and 0 is not in the interval.
   [[nodiscard]] bool differs() const { return isTold() && (difference.low > 0.0 || difference.high < 0.0); }
   /// The noise floor: what B − A is uncertain by, towards 0. A smaller difference would not show.
   [[nodiscard]] double floor() const;
+  /// One camera lacks over 5 % of the other's pixels, whether or not shares differ: they are in no number.
+  [[nodiscard]] bool isMissing() const;
 };
 
 /// Of each number that both cameras have, and of those told of B − A that are 0 for equal cameras (so not
 /// what is left of a fit). Where a number is told of A, of B and of B − A, the last one is the difference.
 /// Those that differ come first, the farthest beyond its floor before the others; but before them the wall's
-/// wraps and what one camera lacks of the pixels, as what is wrapped or missing is in few of the others.
+/// wraps and what one camera lacks of the pixels, as what is wrapped or missing is in few of the others. What
+/// is extrapolated (Trait::is_extrapolated) is not told.
 std::vector<TraitVerdict> verdictsOf(const NamedTraits& traits);
 
 /// The largest difference in millimetres, or else the clearest one, and how many of how many differ: a

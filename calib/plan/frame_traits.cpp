@@ -23,6 +23,7 @@ using compare::TraitCollector;
 using Captures = std::vector<const ComparedCapture*>;
 constexpr std::array kNames{"A", "B"};
 constexpr const char* kLagOfFirst = "lag of the first frame recorded";
+constexpr const char* kRangeLag = "range left behind";
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 Captures ofKind(const ComparedRun& run, std::string_view kind) {
@@ -299,13 +300,12 @@ void addRangeLag(const ComparedRun& run, std::size_t camera, TraitCollector& all
   }
   if (first.size() < 2) {
     all.untold(
-        fmt::format("range left behind in the first frame recorded of {}: it takes two captures of a block "
-                    "by which the range "
-                    "in the image's middle changes by a tenth, and three frames of each",
-                    kNames[camera]));
+        fmt::format("{} of {}: {}: it takes two captures of a block by which the range in the image's "
+                    "middle changes by a tenth, and three frames of each",
+                    kLagOfFirst, kNames[camera], kRangeLag));
     return;
   }
-  all.add(kLagOfFirst, kNames[camera], compare::afterImageTraits(first, rest, before, "range left behind"));
+  all.add(kLagOfFirst, kNames[camera], compare::afterImageTraits(first, rest, before, kRangeLag));
 }
 
 /// A plate's path: its middle over time; speeds are differences of two frames, each of which is in one of
@@ -378,9 +378,8 @@ void heedWidths(const PlateSeen& a, const PlateSeen& b, compare::Trait& latency)
   const double less_m = std::abs(a.width_m.mean() - b.width_m.mean());
   if (less_m > 2.0 * std::max(a.pixel_m, b.pixel_m)) {
     latency.doubt = fmt::format(
-        "the plate is {:.0f} mm wide in A's frames and {:.0f} mm in B's, so that where its middle is hangs "
-        "on what "
-        "each sees of it",
+        "the plate is {:.0f} mm wide in A's frames and {:.0f} mm in B's, so that where its middle is "
+        "hangs on what each sees of it",
         1e3 * a.width_m.mean(), 1e3 * b.width_m.mean());
   }
   const double speed = std::max(a.speed_m_per_s.mean(), b.speed_m_per_s.mean());
@@ -403,9 +402,8 @@ void addLatency(const ComparedRun& run, TraitCollector& all) {
   if (captures.empty()) return;
   if (!is_shared) {
     all.untold(
-        "latency: the two cameras see the plate one after the other, and a real one does not say where it "
-        "was "
-        "meanwhile; it takes the plate's own path over time (compare::latencyTraits)");
+        "latency: the two cameras see the plate one after the other, and a real one does not say where "
+        "it was meanwhile; it takes the plate's own path over time (compare::latencyTraits)");
   } else if (rows.empty()) {
     all.untold("latency: the plate is seen whole in too few frames of a capture");
   } else {

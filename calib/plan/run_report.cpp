@@ -224,11 +224,13 @@ Tone nearnessTone(const Characteristics& c) {
   return tone == Tone::Good && c.places < 3 ? Tone::Fair : tone;
 }
 
-/// Good only where no number differs, of those that are told; bad where the bias is far beyond A's noise.
+/// Good only where no number differs, of those that are told, and no pixels are missing; bad where the bias
+/// is far beyond A's noise.
 Tone toneOf(const std::vector<TraitVerdict>& verdicts, const Characteristics& c) {
   if (toneOfDifference(c) == Tone::Bad) return Tone::Bad;
   const bool is_same = std::ranges::any_of(verdicts, &TraitVerdict::isTold) &&
-                       std::ranges::none_of(verdicts, &TraitVerdict::differs);
+                       std::ranges::none_of(verdicts, &TraitVerdict::differs) &&
+                       std::ranges::none_of(verdicts, &TraitVerdict::isMissing);
   return is_same && c.places >= 3 ? Tone::Good : Tone::Fair;
 }
 

@@ -322,16 +322,16 @@ void addValidPixels(const ComparedRun& run, TraitCollector& all) {
   std::map<std::pair<std::string, std::size_t>, std::size_t> conditions;
   std::vector<double> a, b, both;
   std::vector<std::size_t> condition;
-  double pixels = 0.0;
+  compare::Running pixels;  // of one image
   for (const ComparedCapture& one : run.captures) {
     const ValidShares shares{one.thinned};
     if (one.record.kind == nameOf(Kind::Dark) || !(shares.a + shares.b > 0.0)) continue;
-    a.push_back(shares.a), b.push_back(shares.b), both.push_back(shares.both), pixels += shares.pixels;
+    a.push_back(shares.a), b.push_back(shares.b), both.push_back(shares.both), pixels.add(shares.pixels);
     condition.push_back(
         conditions.try_emplace({one.record.block, one.record.condition}, conditions.size()).first->second);
   }
   const auto means = [&](const std::vector<double>& of) { return compare::clusterMeans(of, condition); };
-  const auto valid = compare::validTraits(means(a), means(b), means(both), pixels);
+  const auto valid = compare::validTraits(means(a), means(b), means(both), pixels.mean());
   if (!valid) return all.untold(valid.error().message);
   all.add(compare::kValidPixels, "A", valid->a);
   all.add(compare::kValidPixels, "B", valid->b);

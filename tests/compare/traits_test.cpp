@@ -221,6 +221,43 @@ TEST(LeastSquares, GivesNothingWhereRowsDoNotTellAParameter) {
   EXPECT_FALSE(fitLeastSquares([](std::span<const double> p, std::size_t) { return p[0]; }, {}, {0.0}));
 }
 
+/// Of 200 pixels in 12 captures A has 0.3 to 0.85; B lacks 10 % of them by ±2 % by turns, and has 0.06 that A
+/// lacks. However many A has in a capture, shares are known as well as the turns are.
+TEST(Traits, TellWhatEachCameraLacksOfTheOthersPixels) {
+  std::vector<double> a, b, both;
+  for (int i = 0; i < 12; ++i) {
+    a.push_back(0.3 + 0.05 * i), both.push_back(a.back() * (i % 2 == 0 ? 0.88 : 0.92));
+    b.push_back(both.back() / 0.94);
+  }
+  const auto valid = validTraits(a, b, both, 200.0);
+  ASSERT_TRUE(valid);
+  ASSERT_EQ(valid->both.size(), 4u);
+  const Trait &by_b = valid->both[2], &by_a = valid->both[3];
+  EXPECT_EQ(by_b.name, kLackedByB);
+  EXPECT_EQ(by_a.name, kLackedByA);
+  EXPECT_NEAR(by_b.value, 0.1, 0.002);
+  // sd 0.02, of 12 rows, weighted by A's share: 2.2 · 0.021 · 1.04 / √12.
+  EXPECT_NEAR(by_b.high - by_b.value, 0.0138, 0.001);
+  EXPECT_NEAR(by_a.value, 0.06, 1e-12);
+  double mean_b = 0.0;
+  for (const double one : b) mean_b += one / 12.0;
+  EXPECT_NEAR(by_a.value - by_a.low, 0.5 / 200.0 / mean_b, 1e-12) << "half a pixel";
+  const std::vector<double> half(12, 0.5), none(12, 0.0);
+  const auto disjoint = validTraits(half, half, none, 200.0);
+  EXPECT_EQ(disjoint->difference.front().value, 0.0);
+  EXPECT_EQ(disjoint->both[2].value, 1.0);
+  EXPECT_EQ(disjoint->both[2].high, 1.0);
+}
+
+TEST(Traits, CallAnErrorAtAnAmplitudeOfOneExtrapolated) {
+  const std::vector<double> amplitude{100, 200, 400, 800, 1600}, error{1.0, 2.1, 2.9, 4.0, 5.1};
+  const auto traits = amplitudeTraits(amplitude, error);
+  ASSERT_TRUE(traits);
+  ASSERT_EQ(traits->size(), 2u);
+  EXPECT_TRUE((*traits)[0].is_extrapolated);
+  EXPECT_FALSE((*traits)[1].is_extrapolated);
+}
+
 std::string errorOf(const Traits& traits) { return traits ? "no error" : traits.error().message; }
 
 TEST(Traits, SayWhatRowsCannotTell) {

@@ -51,34 +51,64 @@ TEST(Verdict, PutsWrapsFirst) {
   EXPECT_EQ(verdictsOf(traits).front().what, "small");
 }
 
-NamedTraits withValidPixels(double share_of_a, double share_of_b, double half) {
+struct ValidShares {
+  double a, b, both;  ///< of the pixels that both look at
+  double half;        ///< of the intervals of differences and of what one has alone
+};
+
+NamedTraits withValidPixels(const ValidShares& shares) {
   NamedTraits traits{.traits = {of("A", "large", 0.0, -1.0, 1.0), of("B", "large", 90.0, 89.0, 91.0)}};
-  const auto add = [&](const char* whose, double value, double within) {
-    traits.traits.push_back(
-        {kValidPixels, "", whose, {"share", "1", value, value - within, value + within, 9}});
+  const auto add = [&](const char* whose, const char* name, double value, double within) {
+    traits.traits.push_back({kValidPixels, "", whose, {name, "1", value, value - within, value + within, 9}});
   };
   // Captures differ far more in what each camera has than the cameras do.
-  add("A", share_of_a, 0.3), add("B", share_of_b, 0.3), add("B − A", share_of_b - share_of_a, half);
+  add("A", "share", shares.a, 0.3), add("B", "share", shares.b, 0.3),
+      add("B − A", "share", shares.b - shares.a, shares.half);
+  add("A and B", "of A alone", shares.a - shares.both, shares.half),
+      add("A and B", "of B alone", shares.b - shares.both, shares.half);
+  add("A and B", kLackedByB, 1.0 - shares.both / shares.a, shares.half / shares.a);
+  add("A and B", kLackedByA, 1.0 - shares.both / shares.b, shares.half / shares.b);
   return traits;
 }
 
-/// B has no range at 0.05 of 0.8, 6.3 % of A's pixels: of the same captures, so it is known far better than
-/// the share of each.
+/// B has no range at 0.088 of A's 0.8, 11 %, and A none at 0.038 of B's 0.75, 5.07 %; B has 6.25 % fewer. Of
+/// the same captures, so that it is known far better than the share of each.
 TEST(Verdict, SaysFirstWhichPixelsOneCameraLacks) {
-  const auto all = verdictsOf(withValidPixels(0.8, 0.75, 0.01));
+  const auto all = verdictsOf(withValidPixels({0.8, 0.75, 0.712, 0.01}));
   ASSERT_EQ(all.size(), 2u);
   EXPECT_EQ(all.front().what, kValidPixels);
   EXPECT_TRUE(all.front().a && all.front().b && all.front().differs());
-  EXPECT_THAT(
-      headlineOf(all),
-      testing::StartsWith("B gives no range at 6.25 % of the pixels at which A does (4.82 to 7.68 %). "));
+  EXPECT_THAT(headlineOf(all),
+              testing::StartsWith(
+                  "B gives no range at 11 % of the pixels at which A does (9.57 to 12.4 %). "
+                  "A gives no range at 5.07 % of the pixels at which B does (3.55 to 6.59 %). Largest"));
   EXPECT_THAT(headlineOf(all), HasSubstr("Largest difference: large: number, +90 mm"));
   EXPECT_THAT(cardsOf(all)[1].label, HasSubstr("valid pixels"));
-  EXPECT_THAT(headlineOf(verdictsOf(withValidPixels(0.75, 0.8, 0.01))),
+  EXPECT_THAT(headlineOf(verdictsOf(withValidPixels({0.75, 0.8, 0.75, 0.01}))),
               testing::StartsWith("A gives no range at 6.25 % of the pixels at which B does ("));
   // Fewer than 5 % of them, or by an interval that reaches 0, stand in the table alone.
-  for (const auto& [share, half] : {std::pair{0.77, 0.001}, {0.75, 0.06}})
-    EXPECT_THAT(headlineOf(verdictsOf(withValidPixels(0.8, share, half))), testing::StartsWith("Largest"));
+  for (const ValidShares& few : {ValidShares{0.8, 0.77, 0.765, 0.001}, {0.8, 0.75, 0.75, 0.06}})
+    EXPECT_THAT(headlineOf(verdictsOf(withValidPixels(few))), testing::StartsWith("Largest"));
+}
+
+/// As many each, at no pixel the same.
+TEST(Verdict, SaysWhichPixelsOneCameraLacksThatHasAsManyOthers) {
+  NamedTraits traits = withValidPixels({0.4, 0.4, 0.0, 0.001});
+  const std::string lacked =
+      "B gives no range at 100 % of the pixels at which A does (99.7 to 100 %). "
+      "A gives no range at 100 % of the pixels at which B does (99.7 to 100 %). ";
+  const auto all = verdictsOf(traits);
+  ASSERT_EQ(all.size(), 2u);
+  EXPECT_EQ(all[0].what, "large") << "shares are the same";
+  EXPECT_EQ(verdictTable(all).rows[1][1], "same, within 0.00114; B lacks 100 % of A's; A lacks 100 % of B's");
+  EXPECT_THAT(headlineOf(all), testing::StartsWith(lacked + "Largest difference: large"));
+  traits.traits[1].trait = traits.traits[0].trait;
+  const auto same = verdictsOf(traits);
+  EXPECT_EQ(same.front().what, kValidPixels);
+  EXPECT_THAT(headlineOf(same), testing::StartsWith(lacked + "In none of 2 numbers"));
+  EXPECT_EQ(cardsOf(same).front().tone, Tone::Fair);
+  traits = withValidPixels({0.4, 0.4, 0.4, 0.001}), traits.traits[1].trait = traits.traits[0].trait;
+  EXPECT_EQ(cardsOf(verdictsOf(traits)).front().tone, Tone::Good);
 }
 
 TEST(Verdict, CallsNothingDifferentWhoseIntervalIsNotKnown) {
@@ -175,13 +205,26 @@ TEST(Verdict, NamesNoWaveThatMayBeAnother) {
   EXPECT_THAT(traitTable(traits, "a", "b").rows[0][5], HasSubstr("in doubt"));
 }
 
+/// By what it is, not by its name; and of the one camera that has it alone the other's reason is said.
 TEST(Verdict, IsNoneOfAnInterceptFarFromAllRows) {
-  NamedTraits traits;
+  NamedTraits traits{.untold = {"error over amplitude of B: all amplitudes are alike"}};
   for (const char* whose : {"A", "B", "B − A"}) {
     traits.traits.push_back(of(whose, "error over amplitude", whose[0] == 'A' ? 0.0 : 50.0, 49.0, 51.0));
-    traits.traits.back().trait.name = "at 1";
+    traits.traits.back().trait.name = "at 1", traits.traits.back().trait.is_extrapolated = true;
   }
-  EXPECT_TRUE(verdictsOf(traits).empty());
+  const std::vector<NamedTrait> bias{of("A", "bias", 1.0, 0.9, 1.1), of("B", "bias", 2.0, 1.9, 2.1)};
+  traits.traits.insert(traits.traits.end(), bias.begin(), bias.end());
+  const auto all = verdictsOf(traits);
+  ASSERT_EQ(all.size(), 2u);
+  EXPECT_EQ(verdictTable(all).rows[1][1], "not told: it is told far from all rows");
+  EXPECT_THAT(headlineOf(all), testing::StartsWith("Largest difference: bias: number, +1 mm"));
+  EXPECT_NEAR(all[0].floor(), 0.1 * std::sqrt(2.0), 1e-12) << "one row is told, and none widens it";
+  traits.traits.erase(traits.traits.begin() + 1, traits.traits.begin() + 3);
+  const auto alone = verdictTable(verdictsOf(traits)).rows;
+  ASSERT_EQ(alone.size(), 2u);
+  EXPECT_EQ(alone[1][1], "not told: B has none: all amplitudes are alike");
+  for (NamedTrait& one : traits.traits) one.trait.name = "at 1";
+  EXPECT_THAT(headlineOf(verdictsOf(traits)), HasSubstr("bias: at 1, +1 mm"));
 }
 
 /// A has a wave of 5 mm that B has not: it is in B − A, and B's amplitude is 5 mm less. That is one thing.

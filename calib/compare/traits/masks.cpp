@@ -50,6 +50,24 @@ Traits maskTraits(std::span<const Image<std::uint8_t>> a, std::span<const Image<
   return traits;
 }
 
+namespace {
+
+/// Σ alone / Σ of, a ratio of two means: by how its rows scatter about it (W. G. Cochran, Sampling
+/// Techniques, ch. 6), so that captures that show more or less of all pixels widen nothing.
+Trait lackTrait(const char* name, const std::vector<double>& alone, const std::vector<double>& of,
+                double least) {
+  const double mean = summarise(of).mean, share = summarise(alone).mean / mean;
+  std::vector<double> left;
+  for (std::size_t i = 0; i < of.size(); ++i) left.push_back(alone[i] - share * of[i]);
+  Trait lack = meanTrait(name, "1", left, 1.0 / mean);
+  const double half = std::max(0.5 * (lack.high - lack.low), least / mean);
+  lack.value = share;
+  lack.low = std::clamp(share - half, 0.0, 1.0), lack.high = std::clamp(share + half, 0.0, 1.0);
+  return lack;
+}
+
+}  // namespace
+
 Result<ValidTraits> validTraits(Column valid_a, Column valid_b, Column valid_both, double pixels) {
   const auto rows = finiteRows({valid_a, valid_b, valid_both}, 1, "valid pixels");
   if (!rows) return rows.error();
@@ -61,10 +79,12 @@ Result<ValidTraits> validTraits(Column valid_a, Column valid_b, Column valid_bot
   const double least = 0.5 / std::max(1.0, pixels);
   difference.low = std::min(difference.low, difference.value - least);
   difference.high = std::max(difference.high, difference.value + least);
-  return ValidTraits{.a = {meanTrait("share", "1", a)},
-                     .b = {meanTrait("share", "1", b)},
-                     .difference = {difference},
-                     .both = {meanTrait("of A alone", "1", only_a), meanTrait("of B alone", "1", only_b)}};
+  return ValidTraits{
+      .a = {meanTrait("share", "1", a)},
+      .b = {meanTrait("share", "1", b)},
+      .difference = {difference},
+      .both = {meanTrait("of A alone", "1", only_a), meanTrait("of B alone", "1", only_b),
+               lackTrait(kLackedByB, only_a, a, least), lackTrait(kLackedByA, only_b, b, least)}};
 }
 
 /// Frames say their starts in nanoseconds; seconds since long ago are coarser than that in 53 bits.

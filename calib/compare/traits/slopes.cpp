@@ -40,7 +40,10 @@ Traits amplitudeTraits(Column amplitude, Column error_mm, std::span<const std::s
                                    : "all amplitudes are alike");
   }
   const Trait slope = fit->trait("per decade", "mm", groups);
-  return groups > 1 ? std::vector{slope} : std::vector{fit->trait("at 1", "mm", 0), slope};
+  if (groups > 1) return std::vector{slope};
+  Trait at_1 = fit->trait("at 1", "mm", 0);
+  at_1.is_extrapolated = true;
+  return std::vector{at_1, slope};
 }
 
 Traits ambientTraits(Column ambient_klx, Column error_mm, Column sigma_mm) {

@@ -47,6 +47,7 @@ struct Trait {
   RefersTo refers_to{};
   std::string
       doubt{};  ///< why it may be another's, so that nothing is called different by it; empty: it is its own
+  bool is_extrapolated = false;  ///< it is told far from all rows: what a camera shows that nobody measured
 };
 using Traits = Result<std::vector<Trait>>;
 using Column = std::span<const double>;
@@ -144,7 +145,7 @@ Traits edgeTraits(Column x_px, Column value);
 Traits shadowTraits(const Image<float>& range_m, double split_m);
 
 /// "at 1" c and "per decade" s of error = c + s log₁₀(amplitude). Of rows in groups, such as those of one
-/// distance, each has a c of its own, and "at 1" is not told.
+/// distance, each has a c of its own, and "at 1", which is extrapolated, is not told.
 Traits amplitudeTraits(Column amplitude, Column error_mm, std::span<const std::size_t> group = {});
 /// "bias" per kilolux, and "noise²" per kilolux.
 Traits ambientTraits(Column ambient_klx, Column error_mm, Column sigma_mm);
@@ -162,9 +163,12 @@ Traits latencyTraits(Column time_s, Column measured, Column reference_time_s, Co
 /// "kappa".
 Traits maskTraits(std::span<const Image<std::uint8_t>> a, std::span<const Image<std::uint8_t>> b);
 
+/// What one camera lacks of the pixels that the other has, as Trait::name.
+inline constexpr const char *kLackedByB = "of A's, B lacks", *kLackedByA = "of B's, A lacks";
+
 /// Of the pixels that both look at, in a row for each capture: "share" that A has, B has, and B less A,
-/// paired; and "of A alone", "of B alone". Differences that are alike in all rows are known to half a pixel
-/// of `pixels`.
+/// paired; "of A alone", "of B alone"; and of the pixels that the one has the share that the other lacks.
+/// Differences and what is lacked are known to half a pixel of one image, of which `pixels` are looked at.
 struct ValidTraits {
   std::vector<Trait> a{}, b{}, difference{}, both{};
 };
