@@ -27,16 +27,14 @@ Image<float> scaled(Image<float> image, float factor) {
 /// PoseComparison::middle_mm, of pixels that both have.
 double middleOf(const PoseComparison& pose, std::size_t frames_a, std::size_t frames_b) {
   std::vector<double> difference, noise;
-  const double a = 1.0 / std::sqrt(static_cast<double>(frames_a)),
-               b = 1.0 / std::sqrt(static_cast<double>(frames_b));
   for (std::size_t i = 0; i < pose.difference_mm.size(); ++i) {
     if (!isValidInBoth(pose, i) || !std::isfinite(pose.difference_mm[i])) continue;
     difference.push_back(static_cast<double>(pose.difference_mm[i]));
-    const double sigma =
-        std::hypot(a * static_cast<double>(pose.noise_a_mm[i]), b * static_cast<double>(pose.noise_b_mm[i]));
-    if (std::isfinite(sigma)) noise.push_back(sigma);
+    const auto of = [i](const Image<float>& image) { return static_cast<double>(image[i]); };
+    noise.push_back(std::hypot(noiseOfMean(of(pose.noise_a_mm), frames_a, of(pose.valid_a)),
+                               noiseOfMean(of(pose.noise_b_mm), frames_b, of(pose.valid_b))));
   }
-  return quantile(std::move(noise), 0.5) > kNoisy_mm ? meanWithin(difference, kGross_mm) : 0.0;
+  return middleOfCut_mm(difference, std::move(noise));
 }
 
 bool isFlying(const Image<float>& range, int x, int y, int dx, int dy, double jump) {

@@ -10,6 +10,7 @@
 #include <toftwin/image.h>
 #include <toftwin/result.h>
 
+#include "calib/compare/gross.h"
 #include "calib/compare/json.h"
 #include "calib/compare/stack.h"
 #include "calib/compare/statistics.h"
@@ -26,9 +27,7 @@ struct PoseComparison {
   Image<float> amplitude_ratio;   ///< B / A; empty unless both give amplitude
   Image<std::uint8_t> edge;       ///< 1 within two pixels of a jump in A's range
   Image<std::uint8_t> flying_a, flying_b;  ///< B's along A's rays
-  /// What lies over kGross_mm from here is gross: 0; or, where noise makes over a sixth of kGross_mm of the
-  /// means' difference, the mean of what is not. A cut about 0 would take more from one side than from the
-  /// other.
+  /// What lies over kGross_mm from here is gross: middleOfCut_mm() of what both have.
   double middle_mm = 0.0;
   bool resampled = false;         ///< B had another camera model and was interpolated
   double shared_rays = 1.0;       ///< of A's rays the share that B looks along, too
@@ -59,14 +58,6 @@ Image<float> noiseOfMean(const Image<float>& temporal_noise, std::size_t frames)
 /// 15 % of that gap away from both, or beyond them by that much. The surfaces must not climb
 /// themselves.
 Image<std::uint8_t> flyingPixelsOf(const Image<float>& range, double jump = 0.03);
-
-/// Larger differences are no measurement error but a wrong one of the phase's periods, or another
-/// surface seen at an edge. They are counted, and left out of all but the masks.
-inline constexpr double kGross_mm = 300.0;
-/// Where the means' noise is more of it, so much of a normal one lies beyond that a cut about 0 shifts the
-/// mean.
-inline constexpr double kNoisy_mm = kGross_mm / 6.0;
-inline bool isGross(double difference_mm) { return std::abs(difference_mm) > kGross_mm; }
 
 /// The one rule of which pixels are compared: valid in at least half of the frames of either camera,
 /// and not gross. Where B was interpolated the difference can be unknown all the same, beside a jump.

@@ -353,27 +353,37 @@ compare::Trait together(const std::vector<compare::Trait>& parts) {
   return all;
 }
 
-/// The plate as a camera sees it, over all captures.
+/// The plate as a camera sees it, over all captures. Its speed is of three frames in a row:
+///   v² = Σ (d₁² + d₂² + 4 d₁d₂) / Σ (t₁² + t₂² + 4 t₁t₂)
+/// The middle one's error is in both steps with other signs, so that errors σ of the places, 2σ² of each
+/// square and −σ² of the product, cancel on the mean. Squares alone would rise with them.
 struct PlateSeen {
-  compare::Running width_m{}, speed_m_per_s{};
+  compare::Running width_m{};
   double pixel_m = 0.0;
+  double speed_m_per_s = 0.0;  ///< root mean square; 0 where its places' errors hide it
 
   PlateSeen(const Captures& captures, std::size_t camera) {
+    double path = 0.0, time = 0.0;
     for (const ComparedCapture* one : captures) {
       const CameraSeen& seen = one->seen[camera];
       pixel_m = std::max(pixel_m, seen.plate_pixel_m);
-      for (std::size_t i = 0; i < seen.plate_width_m.size(); ++i) {
-        width_m.add(seen.plate_width_m[i]);
-        const double passed = i == 0 ? 0.0 : seen.plate_time_s[i] - seen.plate_time_s[i - 1];
-        if (passed > 0.0)
-          speed_m_per_s.add(std::abs(seen.plate_place_m[i] - seen.plate_place_m[i - 1]) / passed);
+      for (const double width : seen.plate_width_m) width_m.add(width);
+      for (std::size_t i = 2; i < seen.plate_time_s.size(); ++i) {
+        const double t1 = seen.plate_time_s[i - 1] - seen.plate_time_s[i - 2],
+                     t2 = seen.plate_time_s[i] - seen.plate_time_s[i - 1];
+        if (!(t1 > 0.0 && t2 > 0.0) || std::max(t1, t2) > 2.0 * std::min(t1, t2)) continue;  // it was away
+        const double d1 = seen.plate_place_m[i - 1] - seen.plate_place_m[i - 2],
+                     d2 = seen.plate_place_m[i] - seen.plate_place_m[i - 1];
+        path += d1 * d1 + d2 * d2 + 4.0 * d1 * d2, time += t1 * t1 + t2 * t2 + 4.0 * t1 * t2;
       }
     }
+    if (path > 0.0) speed_m_per_s = std::sqrt(path / time);
   }
 };
 
 /// What one camera sees less of the plate may lie at one of its ends: by half of it its middle is elsewhere.
-/// Over two pixels the cameras see different plates.
+/// A least-squares delay is then off by that over the root mean square of the speed at most (Cauchy,
+/// Schwarz). Over two pixels the cameras see different plates.
 void heedWidths(const PlateSeen& a, const PlateSeen& b, compare::Trait& latency) {
   const double less_m = std::abs(a.width_m.mean() - b.width_m.mean());
   if (less_m > 2.0 * std::max(a.pixel_m, b.pixel_m)) {
@@ -382,8 +392,14 @@ void heedWidths(const PlateSeen& a, const PlateSeen& b, compare::Trait& latency)
         "hangs on what each sees of it",
         1e3 * a.width_m.mean(), 1e3 * b.width_m.mean());
   }
-  const double speed = std::max(a.speed_m_per_s.mean(), b.speed_m_per_s.mean());
-  const double late_ms = speed > 0.0 ? 1e3 * 0.5 * less_m / speed : 0.0;
+  if (!(less_m > 0.0)) return;
+  const double speed = std::min(a.speed_m_per_s, b.speed_m_per_s);
+  if (!(speed > 0.0)) {
+    if (latency.doubt.empty())
+      latency.doubt = "the plate's places err by more than it moves from frame to frame";
+    return;
+  }
+  const double late_ms = 1e3 * 0.5 * less_m / speed;
   latency.low -= late_ms, latency.high += late_ms;
 }
 

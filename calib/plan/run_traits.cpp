@@ -165,6 +165,8 @@ void addDifference(const ComparedCapture& one, OverDistance& rows) {
     const double read_mm = static_cast<double>(one.thinned.range_a_mm[i]) + of_b * d_mm;
     const double wall_mm =
         one.wall_range_m.empty() ? read_mm : 1e3 * static_cast<double>(one.wall_range_m[i]);
+    // About 0 even where noise is large: that of read_mm does not go with that of d_mm, which the cut leaves
+    // as it is.
     if (!(std::abs(read_mm - wall_mm) <= compare::kGross_mm)) continue;
     at.push_back(1e-3 * wall_mm), of.push_back(d_mm);
   }

@@ -8,7 +8,7 @@
 #include <limits>
 #include <numbers>
 
-#include "calib/compare/characteristics.h"
+#include "calib/compare/gross.h"
 #include "calib/compare/statistics.h"
 #include "calib/intrinsics/brightness.h"
 #include "calib/plan/place.h"
@@ -81,6 +81,16 @@ struct WallImages {
   Image<float> range_m{}, amplitude{}, noise_of_mean_m{};
 };
 
+/// Each pixel's, of the frames in which it is valid.
+Image<float> noiseOfMeans_m(const compare::Stack& stack) {
+  Image<float> noise = stack.temporalNoise_m();
+  const Image<float> share = stack.validShare();
+  for (std::size_t i = 0; i < noise.size(); ++i)
+    noise[i] = static_cast<float>(
+        compare::noiseOfMean(static_cast<double>(noise[i]), stack.frames(), static_cast<double>(share[i])));
+  return noise;
+}
+
 /// Means over a cell's pixels that are not gross. The cut lies about the cell's own middle where noise is
 /// large: about 0 it would take more from one side than from the other.
 struct CellMeans {
@@ -97,9 +107,7 @@ struct CellMeans {
         amplitudes.push_back(images.amplitude.empty() ? 0.0 : static_cast<double>(images.amplitude(x, y)));
       }
     }
-    std::erase_if(noise, [](double one) { return !std::isfinite(one); });
-    const bool is_noisy = compare::quantile(std::move(noise), 0.5) > compare::kNoisy_mm;
-    const double middle_mm = is_noisy ? compare::meanWithin(error, kGross_mm) : 0.0;
+    const double middle_mm = compare::middleOfCut_mm(error, std::move(noise));
     for (std::size_t i = 0; i < error.size(); ++i) {
       if (!(std::abs(error[i] - middle_mm) <= kGross_mm)) continue;
       error_mm += error[i], range_m += expected[i], amplitude += amplitudes[i], ++count;
@@ -111,8 +119,7 @@ struct CellMeans {
 /// Cells of the wall that are valid in most pixels: their wraps, and the errors of what is not gross.
 void addWall(const compare::Stack& stack, const std::vector<ReadFrame>& frames,
              const Image<float>& expected_m, std::span<const double> frequency_hz, CameraSeen& seen) {
-  WallImages images{stack.meanRange_m(), stack.meanAmplitude(), stack.temporalNoise_m()};
-  for (float& one : images.noise_of_mean_m.pixels()) one /= std::sqrt(static_cast<float>(stack.frames()));
+  const WallImages images{stack.meanRange_m(), stack.meanAmplitude(), noiseOfMeans_m(stack)};
   const Periods periods{frequency_hz};
   const Veil veil{images.range_m, images.amplitude, frequency_hz};
   seen.wall_veil_mm.resize(frequency_hz.size());
@@ -171,7 +178,8 @@ void addCorner(const Plan& plan, const BlockSpec& block, const Transform<World, 
                const compare::Stack& stack, CameraSeen& seen) {
   const Target target = targetOf(plan, block);
   const Vec3d up{0.0, -1.0, 0.0};
-  const Image<float> range = stack.meanRange_m();
+  const Image<float> range = stack.meanRange_m(), noise_m = noiseOfMeans_m(stack);
+  std::vector<double> places_m, ranges_m, errors_mm, noise_mm;
   for (const double side : {-0.5, 0.5}) {
     const Vec3d along =
         rotation<World, World>(up, side * block.corner_deg * std::numbers::pi / 180.0).rotate(target.normal);
@@ -184,11 +192,16 @@ void addCorner(const Plan& plan, const BlockSpec& block, const Transform<World, 
         const Vec3d from_edge = pose.translation_m + expected * ray.v - target.point_m;
         const double place = dot(from_edge, along), e = 1e3 * (static_cast<double>(range(x, y)) - expected);
         if (place < 0.02 || place > kBoardReach_m || std::abs(dot(from_edge, up)) > kBoardHeight_m) continue;
-        if (std::abs(e) > kGross_mm) continue;
-        seen.corner_place_m.push_back(place), seen.corner_range_m.push_back(expected);
-        seen.corner_error_mm.push_back(e);
+        places_m.push_back(place), ranges_m.push_back(expected), errors_mm.push_back(e);
+        noise_mm.push_back(1e3 * static_cast<double>(noise_m(x, y)));
       }
     }
+  }
+  const double middle_mm = compare::middleOfCut_mm(errors_mm, std::move(noise_mm));
+  for (std::size_t i = 0; i < errors_mm.size(); ++i) {
+    if (compare::isGross(errors_mm[i] - middle_mm)) continue;
+    seen.corner_place_m.push_back(places_m[i]), seen.corner_range_m.push_back(ranges_m[i]);
+    seen.corner_error_mm.push_back(errors_mm[i]);
   }
 }
 

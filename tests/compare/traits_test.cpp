@@ -12,6 +12,7 @@
 
 #include "calib/compare/traits/least_squares.h"
 #include "calib/compare/traits/veil.h"
+#include "calib/compare/traits/waves.h"
 
 namespace toftwin::compare {
 namespace {
@@ -326,6 +327,15 @@ TEST(Traits, OfFlyingPixelsSayNothingOfASideWhereNoneFlies) {
   ASSERT_TRUE(traits);
   ASSERT_EQ(traits->size(), 1u);
   EXPECT_EQ(traits->front().value, 0.0);
+}
+
+/// Four rows fit a line and one wave; three do not, and say nothing of which wave it is.
+TEST(Waves, AreInDoubtWhereTooFewRowsAreThereToFitThem) {
+  const std::vector<double> f{20e6};
+  const auto four = wavesOf(f, std::vector{4}), three = wavesOf(f, std::vector{3});
+  const std::vector<double> rows{0.5, 1.0, 1.5};
+  EXPECT_THAT(doubtsOf(four, three, rows), testing::ElementsAre(HasSubstr("3 rows")));
+  EXPECT_THAT(doubtsOf(four, four, rows), testing::ElementsAre("")) << "there is no other";
 }
 
 TEST(Traits, LeaveOutRowsThatAreNotFinite) {

@@ -543,10 +543,11 @@ TEST(RunTraits, TellWhatTheFirstFramesRangeHasOfTheCaptureBefore) {
 }
 
 /// Three captures of a plate that goes to and fro by 0.1 m in a second, at 0.4 m/s on the mean, and that two
-/// simulated cameras see alike, B `late_s` later in each of them.
-ComparedRun movingPlates(std::array<double, 3> late_s, double width_of_b_m) {
+/// simulated cameras see alike, B `late_s` later in each of them and `of_b` of its way.
+ComparedRun movingPlates(std::array<double, 3> late_s, double width_of_b_m, double error_m = 2e-4,
+                         double of_b = 1.0) {
   std::mt19937_64 random{kSeed};
-  std::normal_distribution<double> error{0.0, 2e-4};
+  std::normal_distribution<double> error{0.0, error_m};
   ComparedRun run;
   for (std::size_t i = 0; i < 3; ++i) {
     ComparedCapture& one = run.moving.emplace_back();
@@ -557,7 +558,8 @@ ComparedRun movingPlates(std::array<double, 3> late_s, double width_of_b_m) {
       for (int frame = 0; frame < 60; ++frame) {
         const double t = 0.025 * frame + (camera == 1 ? 0.01 : 0.0), late = camera == 1 ? late_s[i] : 0.0;
         seen.plate_time_s.push_back(t);
-        seen.plate_place_m.push_back(0.1 * std::sin(2.0 * std::numbers::pi * (t - late)) + error(random));
+        const double way_m = camera == 1 ? 0.1 * of_b : 0.1;
+        seen.plate_place_m.push_back(way_m * std::sin(2.0 * std::numbers::pi * (t - late)) + error(random));
         seen.plate_width_m.push_back(camera == 1 ? width_of_b_m : 0.3), seen.plate_turn_mm.push_back(0.0);
       }
     }
@@ -586,6 +588,28 @@ TEST(RunTraits, TellNoLatencyThatCapturesDisagreeAboutOrOfPlatesThatLookDifferen
   EXPECT_EQ(narrow.doubt, "");
   EXPECT_THAT(latencyOf(movingPlates({0.0, 0.0, 0.0}, 0.27)).doubt,
               testing::HasSubstr("the plate is 300 mm wide in A's frames and 270 mm in B's"));
+}
+
+/// Places that err by 7 mm: B goes to and fro by 80 mm, at 0.355 m/s (root mean square; of steps of 25 ms 0.3
+/// % less); 9 mm are 25.9 ms of that, ± 0.75 by the errors (2000 draws). By A's speed they would be 20.7, by
+/// the mean of B's single steps, which the errors lengthen, 21.0.
+TEST(RunTraits, WidenLatencyByTheSlowerPlateWhoseSpeedIsNoError) {
+  const auto halfOf = [](double width_of_b_m) {
+    const RunTraits all = traitsOf(movingPlates({0.0, 0.0, 0.0}, width_of_b_m, 7e-3, 0.8));
+    const compare::Trait& latency = find(all, "latency", "B − A", "latency")->trait;
+    return 0.5 * (latency.high - latency.low);
+  };
+  EXPECT_NEAR(halfOf(0.282) - halfOf(0.3), 25.9, 4.0 * 0.75);
+  // Steps of 100 mm to and fro from frame to frame are none of the plate's 11 mm at most.
+  ComparedRun hidden = movingPlates({0.0, 0.0, 0.0}, 0.282);
+  for (ComparedCapture& one : hidden.moving) {
+    auto& place_m = one.seen[1].plate_place_m;
+    for (std::size_t i = 0; i < place_m.size(); ++i) place_m[i] += i % 2 == 0 ? 0.05 : -0.05;
+  }
+  const RunTraits all = traitsOf(hidden);
+  const RunTrait* latency = find(all, "latency", "B − A", "latency");
+  ASSERT_NE(latency, nullptr);
+  EXPECT_THAT(latency->trait.doubt, testing::HasSubstr("err by more than it moves"));
 }
 
 TEST(RunTraits, SayThatNoFrameShowsAPlateMove) {

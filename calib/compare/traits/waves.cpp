@@ -61,7 +61,12 @@ std::vector<std::string> doubtsOf(const std::vector<Wave>& fitted, const std::ve
   }
   std::vector<std::string> doubts(fitted.size());
   const auto n = static_cast<Index>(distance_m.size()), waves = static_cast<Index>(2 * fitted.size());
-  if (others.empty() || n < waves + 2) return doubts;
+  if (others.empty()) return doubts;
+  if (n < waves + 2) {  // fewer than it takes to fit them: nothing can be said for them
+    std::ranges::fill(
+        doubts, fmt::format("it may be a wave of {}: {} rows do not tell them", others.front().name, n));
+    return doubts;
+  }
   MatrixXd model(n, 2 + waves);
   model.col(0).setOnes(), model.rightCols(waves) = partsOf(fitted, distance_m);
   for (Index i = 0; i < n; ++i) model(i, 1) = distance_m[static_cast<std::size_t>(i)];
