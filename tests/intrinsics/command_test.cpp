@@ -156,7 +156,8 @@ TEST(CalibrateCommand, SaysWhatIsWrong) {
 class HeldBoard : public cli::WithDaemon {
  protected:
   std::string moreSources() const override {
-    writeRecording(folder_ / "held.mcap", easyShots(8), 5);
+    // Each for a second and a half: a busy computer takes a third of one to look, and must look at a board twice.
+    writeRecording(folder_ / "held.mcap", easyShots(8), 15);
     return "[[source]]\nname = 'cam'\ndriver = 'replay'\nfile = 'held.mcap'\nloop = true\n";
   }
 };
