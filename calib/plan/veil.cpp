@@ -4,11 +4,13 @@
 #include <cmath>
 #include <numbers>
 
+#include <toftwin/units.h>
+
 namespace toftwin::plan {
 
 Veil::Veil(const Image<float>& range_m, const Image<float>& amplitude, std::span<const double> frequency_hz) {
   for (const double f : frequency_hz) {
-    const double radians_per_m = 4.0 * std::numbers::pi * f / 299'792'458.0;
+    const double radians_per_m = 4.0 * std::numbers::pi * f / kSpeedOfLight_m_per_s;
     std::complex<double> sum = 0.0;
     for (std::size_t i = 0; i < amplitude.size(); ++i) {
       if (std::isfinite(range_m[i]) && std::isfinite(amplitude[i]))

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What goes with distance: harmonics and wraps.
 #include <fmt/format.h>
+#include <toftwin/units.h>
 
 #include <algorithm>
 #include <array>
@@ -18,7 +19,6 @@
 namespace toftwin::compare {
 namespace {
 
-constexpr double kLight_m_per_s = 299'792'458.0;
 /// Fewer rows for each parameter of a fit tell little more than themselves.
 constexpr std::size_t kRowsPerParameter = 3;
 
@@ -98,7 +98,7 @@ std::string ordersNotTold(std::size_t told, const std::vector<double>& distance_
   std::string orders;
   for (std::size_t i = told; i < kOrders.size(); ++i)
     orders += fmt::format("{}{}", i == told ? "" : i + 1 == kOrders.size() ? " and " : ", ", kOrders[i]);
-  const double lowest_hz = std::ranges::min(frequency_hz), period_m = kLight_m_per_s / 2.0 / lowest_hz;
+  const double lowest_hz = std::ranges::min(frequency_hz), period_m = kSpeedOfLight_m_per_s / 2.0 / lowest_hz;
   const auto [nearest, farthest] = std::ranges::minmax(distance_m);
   const std::size_t needed = kRowsPerParameter * (2 + 2 * frequency_hz.size() * kOrders.size());
   std::string why;

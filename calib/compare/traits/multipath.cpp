@@ -8,6 +8,8 @@
 #include <optional>
 #include <set>
 
+#include <toftwin/units.h>
+
 #include "calib/compare/traits/clusters.h"
 #include "calib/compare/traits/veil.h"
 #include "calib/compare/traits/least_squares.h"
@@ -41,7 +43,7 @@ Traits scatterTraits(Column own_range_m, Column plate_range_m, Column plate_over
   if (!rows) return rows.error();
   if (!(frequency_hz > 0.0)) return undetermined("lens scatter", "the modulation frequency must be positive");
   const auto &own = (*rows)[0], &plate = (*rows)[1], &ratio = (*rows)[2], &error = (*rows)[3];
-  const double radians_per_m = 4.0 * std::numbers::pi * frequency_hz / 299'792'458.0;
+  const double radians_per_m = 4.0 * std::numbers::pi * frequency_hz / kSpeedOfLight_m_per_s;
   const Model model = [&](std::span<const double> p, std::size_t i) {
     const double nearer = radians_per_m * (plate[i] - own[i]);
     return 1e3 * std::arg(1.0 + std::polar(p[0] * ratio[i], nearer)) / radians_per_m;
@@ -56,7 +58,7 @@ namespace {
 /// By how much the range of one frequency moves for a small veil of 1, mm: q sin Δφ · c/4πf.
 std::vector<double> slopesOf(const std::vector<double>& own, const std::vector<double>& plate,
                              const std::vector<double>& ratio, double frequency_hz) {
-  const double radians_per_m = 4.0 * std::numbers::pi * frequency_hz / 299'792'458.0;
+  const double radians_per_m = 4.0 * std::numbers::pi * frequency_hz / kSpeedOfLight_m_per_s;
   std::vector<double> slope_mm;
   for (std::size_t i = 0; i < own.size(); ++i)
     slope_mm.push_back(1e3 * ratio[i] * std::sin(radians_per_m * (plate[i] - own[i])) / radians_per_m);

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include <fmt/format.h>
+#include <toftwin/units.h>
 
 #include "calib/compare/traits/least_squares.h"
 
@@ -21,10 +22,9 @@ constexpr double kMostPhase_rad = 0.1;
 /// That noise as one of the range, of the best of decoders, r = Σ w_f c φ_f/4πf with w_f as f²: by any other,
 /// the same noise of the range is of less noisy phases. Infinite where no frequency is known.
 double mostSigma_mm(std::span<const double> frequency_hz) {
-  constexpr double kLight_m_per_s = 299'792'458.0;
   double squares = 0.0;
   for (const double f : frequency_hz) squares += f * f;
-  return 1e3 * kMostPhase_rad * kLight_m_per_s / (4.0 * std::numbers::pi * std::sqrt(squares));
+  return 1e3 * kMostPhase_rad * kSpeedOfLight_m_per_s / (4.0 * std::numbers::pi * std::sqrt(squares));
 }
 
 /// All three parts, else the best of two of them, else of one: a part that does not show in this range of

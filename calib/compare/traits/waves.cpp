@@ -2,6 +2,7 @@
 #include "calib/compare/traits/waves.h"
 
 #include <fmt/format.h>
+#include <toftwin/units.h>
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -14,7 +15,6 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-constexpr double kLight_m_per_s = 299'792'458.0;
 constexpr double kSameWave = 1e-3;     ///< over 8 m of a wave of 0.3 m, 0.2 rad
 constexpr double kMostOfItself = 0.5;  ///< more of a wave as large, and it may be that one
 
@@ -39,7 +39,7 @@ std::vector<Wave> wavesOf(std::span<const double> frequency_hz, std::span<const 
   std::vector<Wave> waves;
   for (const double f : frequency_hz) {
     for (const int k : orders) {
-      const Wave one{2.0 * std::numbers::pi * k * 2.0 * f / kLight_m_per_s,
+      const Wave one{2.0 * std::numbers::pi * k * 2.0 * f / kSpeedOfLight_m_per_s,
                      fmt::format("{:.6g} MHz, {} per period", f * 1e-6, k)};
       const auto same =
           std::ranges::find_if(waves, [&](const Wave& there) { return areTheSame(there, one); });
