@@ -273,16 +273,25 @@ std::string resamplingNote(const PoseComparison& pose) {
       100.0 * pose.shared_rays);
 }
 
+double weightOfA(double noise_a, double noise_b) {
+  const double a = noise_a * noise_a, b = noise_b * noise_b;
+  return a + b > 0.0 ? b / (a + b) : 0.5;
+}
+
 Pixels pixelsOf(const std::vector<PoseComparison>& poses) {
   Pixels all;
   const std::vector<std::uint32_t> places = placesOf(poses);
+  const auto medianOf = [](const Image<float>& image) {
+    return quantile({image.pixels().begin(), image.pixels().end()}, 0.5);
+  };
   for (std::size_t p = 0; p < poses.size(); ++p) {
     const PoseComparison& pose = poses[p];
+    const double of_b = 1.0 - weightOfA(medianOf(pose.noise_a_mm), medianOf(pose.noise_b_mm));
     for (std::size_t i = 0; i < pose.difference_mm.size(); ++i) {
       if (!isCompared(pose, i) || !std::isfinite(pose.difference_mm[i])) continue;
       all.place.push_back(places[p]);
       all.difference_mm.push_back(static_cast<double>(pose.difference_mm[i]));
-      all.range_mm.push_back(static_cast<double>(pose.range_a_mm[i]));
+      all.range_mm.push_back(static_cast<double>(pose.range_a_mm[i]) + of_b * all.difference_mm.back());
       all.amplitude.push_back(
           static_cast<double>(pose.amplitude_a.empty() ? kNaN : pose.amplitude_a[i]));
       all.amplitude_ratio.push_back(

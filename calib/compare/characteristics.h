@@ -109,7 +109,13 @@ struct Trend {
 Trend trendOf(const std::vector<double>& x, const std::vector<double>& y,
               const std::vector<std::uint32_t>& place, int bins);
 
-/// The compared pixels of all poses whose difference is known, as columns.
+/// What A weighs in the mean of both cameras' ranges by 1/σ², σ_B²/(σ_A² + σ_B²). Of all means of the two it is
+/// the one whose noise does not go with that of B − A: by A's own range a reading that is too far would fall into
+/// a farther class or step, and its B − A be too small there. A half where no noise is known.
+double weightOfA(double noise_a, double noise_b);
+
+/// The compared pixels of all poses whose difference is known, as columns. `range_mm` is of both cameras, each
+/// weighted by the noise of the other, so that it does not go with the noise of the difference.
 struct Pixels {
   std::vector<double> difference_mm, range_mm, amplitude, amplitude_ratio, noise_a_mm, noise_b_mm;
   std::vector<bool> edge;

@@ -44,13 +44,23 @@ Result<std::vector<std::vector<double>>> loadColumns(
     return Error{Error::Code::NotFound,
                  fmt::format("{}: cannot be read or is empty", file.string())};
   }
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+  if (line.starts_with(kByteOrderMark)) line.erase(0, kByteOrderMark.size());
   std::vector<std::size_t> places;
   const auto header = split(line);
   for (const std::string_view column : columns) {
     const auto at = std::find(header.begin(), header.end(), column);
+    if (at == header.end() && header.size() == 1 && line.find_first_of(";\t") != std::string::npos) {
+      return malformed(file, 1,
+                       fmt::format("its fields are separated by {}: it takes commas between them, and points in "
+                                   "numbers",
+                                   line.find(';') == std::string::npos ? "tabs" : "semicolons"));
+    }
     if (at == header.end()) {
       return malformed(file, 1, fmt::format("has no column \"{}\", only: {}", column, line));
     }
+    if (std::find(at + 1, header.end(), column) != header.end())
+      return malformed(file, 1, fmt::format("has two columns \"{}\"", column));
     places.push_back(static_cast<std::size_t>(at - header.begin()));
   }
   std::vector<std::vector<double>> result(columns.size());

@@ -12,10 +12,10 @@
 namespace toftwin::compare {
 
 /// The columns of a numeric CSV file with a header line, in the order asked for. Errors name file,
-/// line and column: a header that lacks a column, a row with too few fields, a field that is not a
-/// number, a file without rows.
-Result<std::vector<std::vector<double>>> loadColumns(
-    const std::filesystem::path& file, std::initializer_list<std::string_view> columns);
+/// line and column: a header that lacks a column or has it twice, fields that are not separated by commas, a
+/// row with too few fields, a field that is not a number, a file without rows.
+Result<std::vector<std::vector<double>>> loadColumns(const std::filesystem::path& file,
+                                                     std::initializer_list<std::string_view> columns);
 
 /// The folder `tof-thesis-2018` of real measurements: in (or as) `given` if that is not empty, else
 /// in $TOFTWIN_DATA, else in `../shared/data` of the repository that holds the working folder or

@@ -53,7 +53,7 @@ class ClientFeed final : public Feed {
 class RecordingFeed final : public Feed {
  public:
   RecordingFeed(record::Reader reader, SourceDetails details)
-      : reader_(std::move(reader)), details_(std::move(details)) {}
+      : reader_(std::move(reader)), details_(std::move(details)), whole_(reader_.checkWhole()) {}
   [[nodiscard]] const SourceDetails& details() const override { return details_; }
   Result<Frame> next(std::chrono::milliseconds) override { return reader_.next(details_.entry.name); }
   Result<> setPose(const Transform<World, Camera>&) override {
@@ -62,15 +62,23 @@ class RecordingFeed final : public Feed {
   [[nodiscard]] bool isRecorded() const override { return true; }
   [[nodiscard]] std::string warning() const override {
     const std::string& damage = reader_.summary().damage;
-    return damage.empty()
-               ? ""
-               : fmt::format("The recording of {} is damaged: {}. Only what can be read of it is compared.",
-                             details_.entry.name, damage);
+    std::string said;
+    if (!damage.empty()) {
+      said = fmt::format("The recording of {} is damaged: {}. Only what can be read of it is compared.",
+                         details_.entry.name, damage);
+    }
+    if (whole_.damaged == 0) return said;
+    // Whether it is met hangs on how many frames are asked for.
+    return fmt::format("{}{}Of the recording of {}, {} of {} chunks cannot be read, and no frame of them is compared. "
+                       "The first: {}.",
+                       said, said.empty() ? "" : " ", details_.entry.name, whole_.damaged, whole_.chunks,
+                       whole_.first_damage);
   }
 
  private:
   record::Reader reader_;
   SourceDetails details_;
+  record::Whole whole_;
 };
 
 }  // namespace

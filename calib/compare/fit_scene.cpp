@@ -21,15 +21,6 @@ std::vector<double> atAlbedo(const std::vector<double>& albedo,
   return line;
 }
 
-double judgedRms(const std::vector<double>& e, const std::vector<double>& p, const Blocks& blocks) {
-  double sum = 0.0;
-  int n = 0;
-  for (std::size_t i = 0; i < e.size(); ++i)
-    if (isJudged(blocks[i]) && std::isfinite(e[i] - p[i]))
-      sum += (e[i] - p[i]) * (e[i] - p[i]), ++n;
-  return std::sqrt(sum / n);
-}
-
 Blocks onlyFinite(Blocks blocks, const std::vector<double>& a, const std::vector<double>& b) {
   for (std::size_t i = 0; i < blocks.size(); ++i)
     if (!std::isfinite(a[i] + b[i])) blocks[i] = -1;

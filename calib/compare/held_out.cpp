@@ -22,8 +22,7 @@ std::vector<double> solvePositive(SquareMatrix a, std::vector<double> b) {
     for (std::size_t j = 0; j <= i; ++j) {
       double sum = a[i][j];
       for (std::size_t k = 0; k < j; ++k) sum -= a[i][k] * a[j][k];
-      a[i][j] =
-          i == j ? std::sqrt(std::max(sum, std::numeric_limits<double>::min())) : sum / a[j][j];
+      a[i][j] = i == j ? std::sqrt(std::max(sum, std::numeric_limits<double>::min())) : sum / a[j][j];
     }
   }
   for (std::size_t i = 0; i < n; ++i) {
@@ -47,8 +46,7 @@ std::vector<double> solveRows(std::span<const double> y, std::span<const Term> t
     if (!uses(row)) continue;
     for (std::size_t i = 0; i < n; ++i) {
       right[i] += terms[i].column[row] * y[row];
-      for (std::size_t j = 0; j < n; ++j)
-        normal[i][j] += terms[i].column[row] * terms[j].column[row];
+      for (std::size_t j = 0; j < n; ++j) normal[i][j] += terms[i].column[row] * terms[j].column[row];
     }
   }
   for (std::size_t i = 0; i < n; ++i) normal[i][i] *= 1.0 + 1e-9;
@@ -80,8 +78,7 @@ std::set<int> fittedBlocks(const Blocks& blocks) {
 }
 
 /// √Σ (θ₋ᵢ − θ̄)² (n − 1)/n over the left-out blocks.
-std::vector<double> jackknife(const std::vector<std::vector<double>>& left_out,
-                              std::size_t numbers) {
+std::vector<double> jackknife(const std::vector<std::vector<double>>& left_out, std::size_t numbers) {
   std::vector<double> error(numbers, std::nan(""));
   if (left_out.size() < 2) return error;
   const auto n = static_cast<double>(left_out.size());
@@ -106,14 +103,13 @@ void judge(Fit& fit, std::span<const double> y, const Blocks& blocks) {
 }
 
 /// Cross-validated root mean square within the fitted half.
-double crossValidated(std::span<const double> y, std::span<const Term> terms,
-                      const Blocks& blocks) {
+double crossValidated(std::span<const double> y, std::span<const Term> terms, const Blocks& blocks) {
   double sum = 0.0;
   std::size_t n = 0;
   for (int fold = 0; fold < 4; ++fold) {
     const auto isLeftOut = [&](std::size_t row) { return (blocks[row] / 2) % 4 == fold; };
-    const auto value = solveRows(
-        y, terms, [&](std::size_t row) { return isFitted(blocks[row]) && !isLeftOut(row); });
+    const auto value =
+        solveRows(y, terms, [&](std::size_t row) { return isFitted(blocks[row]) && !isLeftOut(row); });
     const auto prediction = evaluate(terms, value, y.size());
     for (std::size_t row = 0; row < y.size(); ++row) {
       if (!isFitted(blocks[row]) || !isLeftOut(row)) continue;
@@ -157,8 +153,7 @@ std::vector<double> minimise(std::span<const double> y, std::span<const Bounded>
           normal[i][j] += slopes[i].column[row] * slopes[j].column[row];
       }
     }
-    for (std::size_t i = 0; i < numbers.size(); ++i)
-      normal[i][i] = normal[i][i] * (1.0 + damping) + 1e-12;
+    for (std::size_t i = 0; i < numbers.size(); ++i) normal[i][i] = normal[i][i] * (1.0 + damping) + 1e-12;
     const std::vector<double> step = solvePositive(normal, right);
     std::vector<double> next = value;
     for (std::size_t i = 0; i < numbers.size(); ++i)
@@ -191,6 +186,14 @@ Blocks blocksAlong(std::span<const double> x, double size) {
   return blocks;
 }
 
+double judgedRms(std::span<const double> y, std::span<const double> prediction, const Blocks& blocks) {
+  std::vector<double> left;
+  for (std::size_t row = 0; row < y.size(); ++row)
+    if (isJudged(blocks[row]) && std::isfinite(y[row] - prediction[row]))
+      left.push_back(y[row] - prediction[row]);
+  return summarise(left).rms;
+}
+
 LinearFit fitLinear(std::span<const double> y, std::span<const Term> terms, const Blocks& all) {
   const Blocks blocks = withoutGaps(y, terms, all);
   LinearFit fit;
@@ -198,8 +201,8 @@ LinearFit fitLinear(std::span<const double> y, std::span<const Term> terms, cons
   fit.prediction = evaluate(terms, fit.value, y.size());
   std::vector<std::vector<double>> left_out;
   for (const int block : fittedBlocks(blocks)) {
-    left_out.push_back(solveRows(
-        y, terms, [&](std::size_t row) { return isFitted(blocks[row]) && blocks[row] != block; }));
+    left_out.push_back(
+        solveRows(y, terms, [&](std::size_t row) { return isFitted(blocks[row]) && blocks[row] != block; }));
   }
   fit.error = jackknife(left_out, terms.size());
   judge(fit, y, blocks);
@@ -207,8 +210,8 @@ LinearFit fitLinear(std::span<const double> y, std::span<const Term> terms, cons
 }
 
 std::vector<std::size_t> chooseGroups(std::span<const double> y, const std::vector<Term>& always,
-                                      const std::vector<std::vector<Term>>& groups,
-                                      const Blocks& all, std::size_t at_most) {
+                                      const std::vector<std::vector<Term>>& groups, const Blocks& all,
+                                      std::size_t at_most) {
   const Blocks blocks = withoutGaps(y, always, all);
   std::vector<std::size_t> chosen;
   std::vector<Term> terms = always;
@@ -230,18 +233,19 @@ std::vector<std::size_t> chooseGroups(std::span<const double> y, const std::vect
   return chosen;
 }
 
-CurveFit fitCurve(std::span<const double> y, std::span<const Bounded> numbers,
-                  const Predict& predict, const Blocks& all) {
+CurveFit fitCurve(std::span<const double> y, std::span<const Bounded> numbers, const Predict& predict,
+                  const Blocks& all) {
   std::vector<double> start;
   for (const Bounded& number : numbers) start.push_back(number.start);
   const std::vector<Term> anywhere{{"", predict(start)}};
   const Blocks blocks = withoutGaps(y, anywhere, all);
   CurveFit fit;
-  fit.value =
-      minimise(y, numbers, predict, start, [&](std::size_t row) { return isFitted(blocks[row]); });
+  fit.value = minimise(y, numbers, predict, start, [&](std::size_t row) { return isFitted(blocks[row]); });
   fit.prediction = predict(fit.value);
   std::vector<std::vector<double>> left_out;
-  for (const int block : fittedBlocks(blocks)) {
+  const std::set<int> fitted = fittedBlocks(blocks);
+  for (const int block : fitted) {
+    if (fitted.size() < 2) break;  // nothing would be left to fit, and no error to tell
     left_out.push_back(minimise(y, numbers, predict, fit.value, [&](std::size_t row) {
       return isFitted(blocks[row]) && blocks[row] != block;
     }));

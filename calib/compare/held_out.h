@@ -18,6 +18,8 @@ using Blocks = std::vector<int>;
 /// Blocks of `size` rows that follow each other, or of `size` along a quantity.
 Blocks blocksOfRows(std::size_t rows, std::size_t size);
 Blocks blocksAlong(std::span<const double> x, double size);
+/// What a prediction leaves of the judged rows that it says something of, root mean square.
+double judgedRms(std::span<const double> y, std::span<const double> prediction, const Blocks& blocks);
 inline bool isFitted(int block) { return block >= 0 && block % 2 == 0; }
 inline bool isJudged(int block) { return block >= 0 && block % 2 == 1; }
 

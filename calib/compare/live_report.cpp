@@ -10,17 +10,19 @@
 #include <toftwin/names.h>
 
 #include "calib/compare/drift.h"
+#include "calib/compare/image_slopes.h"
 
 namespace toftwin::compare {
 namespace {
 
 /// B − A in words: "3.2 ± 0.1 mm farther"; no error where there is none to tell, at one place.
 std::string inWords(const Summary& difference) {
-  const std::string magnitude = shown(std::abs(difference.mean), 2);
-  const std::string error = std::isfinite(difference.standard_error)
-                                ? fmt::format(" ± {}", shown(difference.standard_error, 2))
-                                : "";
-  return fmt::format("{}{} mm {}", magnitude, error, difference.mean >= 0.0 ? "farther" : "nearer");
+  const double error = difference.standard_error;
+  if (difference.mean == 0.0 && !(error > 0.0)) return "the same";
+  const int decimals = decimalsFor(error, 2);
+  const std::string magnitude = shown(std::abs(difference.mean), decimals);
+  const std::string within = error > 0.0 ? fmt::format(" ± {}", shown(error, decimals)) : "";
+  return fmt::format("{}{} mm {}", magnitude, within, difference.mean >= 0.0 ? "farther" : "nearer");
 }
 
 /// "4 poses", "4 poses, 3 of them different".
@@ -255,8 +257,8 @@ FigureRow mapsOf(const std::string& name, const PoseComparison& comparison, doub
                            .diverging = true})}}};
 }
 
-Tone toneOfDifference(const Region& region) {
-  const double bias = std::abs(region.difference_mm.mean), noise = region.noise_a_mm;
+Tone toneOfDifference(const Region& region, double edge_mm) {
+  const double bias = std::max(std::abs(region.difference_mm.mean), edge_mm), noise = region.noise_a_mm;
   if (!(noise > 0.0)) return Tone::Neutral;
   if (bias <= noise && region.difference_mm.p95_abs <= 3.0 * std::hypot(noise, region.noise_b_mm))
     return Tone::Good;
@@ -271,8 +273,8 @@ double grossShare(const Characteristics& c) {
 /// More than single pixels beside jumps that were not found.
 bool isGrossNotable(const Characteristics& c) { return grossShare(c) > 0.01 || c.poses_all_gross > 0; }
 
-Tone toneOfDifference(const Characteristics& c) {
-  return isGrossNotable(c) ? Tone::Bad : toneOfDifference(mainRegionOf(c));
+Tone toneOfDifference(const Characteristics& c, double edge_mm) {
+  return isGrossNotable(c) ? Tone::Bad : toneOfDifference(mainRegionOf(c), edge_mm);
 }
 
 Error nothingCompared(const Characteristics& c, const std::string& where) {
@@ -306,14 +308,14 @@ std::string shareInWords(const Characteristics& c) {
   return fmt::format(", which are only {} of all {} pixels compared", told, all);
 }
 
-std::string nearnessInWords(const std::string& a, const std::string& b, const Characteristics& c) {
+std::string nearnessInWords(const std::string& a, const std::string& b, const Characteristics& c,
+                            const std::string& tilted) {
   const Summary& all = mainRegionOf(c).difference_mm;
   return fmt::format(
-      "{}{} (B) is within {} mm of {} (A) for 95 % of the pixels on surfaces{}; on average it reads {}, and "
-      "its "
-      "noise is {} times A's",
+      "{}{} (B) is within {} mm of {} (A) for 95 % of the pixels on surfaces{}; on average it reads {}{}, and "
+      "its noise is {} times A's",
       grossInWords(c), b, shown(all.p95_abs), a, shareInWords(c), inWords(all),
-      shown(c.noise_ratio.median, 2));
+      tilted, shown(c.noise_ratio.median, 2));
 }
 
 std::vector<Card> nearnessCards(const Characteristics& c, const std::string& bias_note, Tone tone) {
@@ -362,7 +364,8 @@ Result<Finding> judgeLive(const Capture& capture) {
   finding.section = {
       .id = "live",
       .title = fmt::format("{} (B) against {} (A)", capture.b.entry.name, capture.a.entry.name)};
-  finding.section.tone = toneOfDifference(c);
+  const Tilt tilt{poses};
+  finding.section.tone = toneOfDifference(c, tilt.edge_mm());
   finding.section.verdict = fmt::format(
       "Averaged over {} pixels at {}. Temporal noise: A {} mm, B {} mm (median). Validity masks agree in {} "
       "% of "
@@ -382,7 +385,7 @@ Result<Finding> judgeLive(const Capture& capture) {
     blocks.push_back(std::move(cloud));
   blocks.push_back(regionTable(c));
   FigureRow trends{{histogramFigure(pixels),
-                    trendFigure(pixels.range_mm, pixels, "range of A [mm]",
+                    trendFigure(pixels.range_mm, pixels, "range that both read [mm]",
                                 "How the difference goes with range.", 60)}};
   if (std::isfinite(quantile(log_amplitude, 0.5))) {
     trends.figures.push_back(trendFigure(
@@ -403,7 +406,7 @@ Result<Finding> judgeLive(const Capture& capture) {
                 "The log of all frames with their ids is log.jsonl beside this page.",
                 true});
 
-  finding.headline = nearnessInWords(capture.a.entry.name, capture.b.entry.name, c);
+  finding.headline = nearnessInWords(capture.a.entry.name, capture.b.entry.name, c, tilt.words(main.noise_a_mm));
   finding.data = toJson(c);
   finding.data.set("a", capture.a.entry.name)
       .set("b", capture.b.entry.name)

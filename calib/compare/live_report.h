@@ -23,17 +23,18 @@ const Region& mainRegionOf(const Characteristics& characteristics);
 /// Of what both see on surfaces, the share that is over kGross_mm apart and thus in no number of the rest.
 double grossShare(const Characteristics& characteristics);
 /// How near B is to A, for who reads no further: a clause. Before it, in a sentence, what is no part of it:
-/// the gross pixels, where they are over 1 % or all that some poses have.
-std::string nearnessInWords(const std::string& a, const std::string& b,
-                            const Characteristics& characteristics);
+/// the gross pixels, where they are over 1 % or all that some poses have. `tilted`: Tilt::words().
+std::string nearnessInWords(const std::string& a, const std::string& b, const Characteristics& characteristics,
+                            const std::string& tilted = {});
 /// The same as cards.
 std::vector<Card> nearnessCards(const Characteristics& characteristics, const std::string& bias_note,
                                 Tone tone);
 /// Against A's noise in a single frame: good where the bias is within it and 95 % of the pixels within three
-/// of both cameras' noise; bad where the bias is over three of it. Neutral where no noise is known.
-Tone toneOfDifference(const Region& region);
+/// of both cameras' noise; bad where the bias is over three of it. Neutral where no noise is known. `edge_mm`:
+/// by how much the edges of the image are off, one against the other; it counts as a bias, whose mean hides it.
+Tone toneOfDifference(const Region& region, double edge_mm = 0.0);
 /// The same of its surfaces, and bad where the headline begins with gross pixels.
-Tone toneOfDifference(const Characteristics& characteristics);
+Tone toneOfDifference(const Characteristics& characteristics, double edge_mm = 0.0);
 /// Why not a single pixel is compared: both see none, or all are gross. `where`: "pose".
 Error nothingCompared(const Characteristics& characteristics, const std::string& where);
 /// The next 1, 2 or 5 times a power of ten, for the reach of a scale.

@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <utility>
+#include <variant>
 
 #include <fmt/format.h>
 
+#include "calib/compare/traits/common_reference.h"
 #include "calib/compare/traits/difference.h"
 
 namespace toftwin::compare {
@@ -55,7 +57,13 @@ void TraitCollector::add(NamedRows rows, const Result<DriftTraits>& drift) {
 namespace {
 
 std::string endOf(const Trait& trait, double end) {
-  return isKnown(end, trait.unit) ? fmt::format("{:.4g}", end) : "not known";
+  return isKnown(end, trait.unit) ? shownDigits(end, 4) : "not known";
+}
+
+/// Where on its line it is told.
+std::string placeOf(const Trait& trait) {
+  const auto* line = std::get_if<OnLine>(&trait.refers_to);
+  return line == nullptr ? "" : ", " + placeInWords(line->at_m);
 }
 
 }  // namespace
@@ -82,9 +90,14 @@ TableBlock traitTable(const NamedTraits& traits, const std::string& a, const std
     table.rows[row][of == "A"   ? 3
                     : of == "B" ? 4
                                 : 5] =
-        fmt::format("{:.4g} ({} to {}) #{}{}{}{}", trait.value, endOf(trait, trait.low),
-                    endOf(trait, trait.high), trait.n, detail.empty() ? "" : ", ", detail,
+        fmt::format("{} ({} to {}) #{}{}{}{}{}", shownDigits(trait.value, 4), endOf(trait, trait.low),
+                    endOf(trait, trait.high), trait.n, detail.empty() ? "" : ", ", detail, placeOf(trait),
                     trait.doubt.empty() ? "" : ", in doubt");
+  }
+  const auto isOfB = [](const NamedTrait& one) { return one.of == "B"; };
+  if (!has_both && std::ranges::none_of(traits.traits, isOfB)) {  // a page of one table
+    table.header.pop_back();
+    for (auto& row : table.rows) row.pop_back();
   }
   return table;
 }
@@ -104,11 +117,20 @@ Json toJson(const NamedTraits& traits) {
         .set("unit", trait.unit);
     row.set("value", trait.value).set("low", trait.low).set("high", trait.high).set("n", trait.n);
     if (!trait.doubt.empty()) row.set("doubt", trait.doubt);
+    if (const auto* line = std::get_if<OnLine>(&trait.refers_to)) row.set("at_m", line->at_m);
     rows.push(std::move(row));
   }
   for (const std::string& text : traits.untold) untold.push(text);
   Json json = Json::object();
   json.set("rows", std::move(rows)).set("untold", std::move(untold));
+  if (traits.missing.empty()) return json;
+  Json missing = Json::array();
+  for (const MissingAt& one : traits.missing) {
+    Json row = Json::object();
+    row.set("condition", one.at).set("of", one.of).set("share", one.share).set("captures", one.captures);
+    missing.push(std::move(row));
+  }
+  json.set("missing", std::move(missing));
   return json;
 }
 

@@ -28,10 +28,18 @@ struct NamedRows {
   std::vector<std::size_t> condition{};
   FittedCurve curve{};
 };
+/// A condition at which one camera gives no range at pixels that the other has in all captures.
+struct MissingAt {
+  std::string at{};  ///< "ambient: 1.3 m, 5 klx"
+  std::string of{};  ///< which lacks them: "A"
+  double share = 0.0;  ///< of the pixels that either has there
+  std::size_t captures = 0;
+};
 struct NamedTraits {
   std::vector<NamedTrait> traits{};
   std::vector<NamedRows> rows{};
-  std::vector<std::string> untold{};  ///< what the data cannot tell, and why
+  std::vector<std::string> untold{};   ///< what the data cannot tell, and why
+  std::vector<MissingAt> missing{};  ///< the worst first
 };
 
 /// Gathers what data tell, and why others do not.

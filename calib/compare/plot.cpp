@@ -82,8 +82,14 @@ std::vector<std::pair<double, std::string>> labelled(const std::vector<double>& 
   return all;
 }
 
+/// Three at least: of two alone nobody sees whether an axis is straight.
 std::vector<double> ticksOf(const Axis& axis, int count) {
-  return axis.log ? logTicks(axis.low, axis.high) : roundTicks(axis.low, axis.high, count);
+  constexpr std::size_t kFewest = 3;
+  constexpr int kMostTried = 12;
+  std::vector<double> ticks = axis.log ? logTicks(axis.low, axis.high) : std::vector<double>{};
+  for (int tried = count; ticks.size() < kFewest && tried <= kMostTried; ++tried)
+    ticks = roundTicks(axis.low, axis.high, tried);
+  return ticks;
 }
 
 /// Lines and labels of a panel; what the abscissa says stands below the lowest one only.

@@ -8,6 +8,7 @@
 #include <numbers>
 #include <optional>
 
+#include "sim/images/mix_bits.h"
 #include "sim/images/rows.h"
 
 namespace toftwin::compare {
@@ -103,10 +104,7 @@ std::optional<Vec3d> meets(const Face& board, Vec3d from, Vec3d direction, doubl
 
 /// SplitMix64's finaliser: 53 random bits of a counter as a number in [0, 1).
 double randomNumber(std::uint64_t counter) {
-  std::uint64_t x = counter * 0x9e3779b97f4a7c15u;
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
-  return static_cast<double>((x ^ (x >> 31)) >> 11) * 0x1p-53;
+  return static_cast<double>(sim::mixBits(counter * 0x9e3779b97f4a7c15u) >> 11) * 0x1p-53;
 }
 
 /// The two numbers that choose a bounce's direction. The first three bounces take them from a

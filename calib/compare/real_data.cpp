@@ -20,13 +20,7 @@ std::vector<std::string> explainedRow(const std::string& name, const Explained& 
 void addCharacteristics(const NamedTraits& traits, Finding& finding) {
   const auto verdicts = verdictsOf(traits);
   if (!verdicts.empty()) finding.section.blocks.push_back(verdictTable(verdicts));
-  const bool has_b = std::ranges::any_of(traits.traits, [](const NamedTrait& one) { return one.of == "B"; });
-  TableBlock table = traitTable(traits, "A, measured", has_b ? "B, simulated" : "");
-  if (!has_b) {
-    table.header.pop_back();
-    for (auto& row : table.rows) row.pop_back();
-  }
-  finding.section.blocks.push_back(std::move(table));
+  finding.section.blocks.push_back(traitTable(traits, "A, measured", "B, simulated"));
   if (!traits.untold.empty())
     finding.section.blocks.push_back(whatIsNotTold("What these data cannot tell", traits));
   finding.data.set("characteristics", toJson(traits)).set("verdicts", toJson(verdicts));

@@ -28,8 +28,6 @@ struct Outcome {
   double published_mm = 0.0;  ///< the published simulator
   double as_is_mm = 0.0;      ///< ours, preset
   double fitted_mm = 0.0;     ///< ours, fitted on the other half
-  bool is_by_law =
-      false;  ///< whether what is fitted are the effects' laws in closed form, which no light passed
 };
 /// An effect left out of the fitted model, the rest fitted again; RMS over the judged half.
 struct Ablation {

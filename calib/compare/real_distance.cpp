@@ -9,6 +9,7 @@
 #include "calib/compare/real_fits.h"
 #include "calib/compare/residual.h"
 #include "calib/compare/simulated_line.h"
+#include "calib/compare/simulated_wall.h"
 
 namespace toftwin::compare {
 namespace {
@@ -31,32 +32,23 @@ std::pair<ErrorTable, ErrorTable> sessions(const std::vector<std::vector<double>
   return result;
 }
 
-/// The simulated error at any distance, linear between the simulated ones.
-double errorAt(const std::vector<WallReading>& readings, double reference_mm) {
-  for (std::size_t i = 1; i < readings.size(); ++i) {
-    const WallReading &a = readings[i - 1], &b = readings[i];
-    if (reference_mm < a.truth_mm || reference_mm > b.truth_mm) continue;
-    const double share = (reference_mm - a.truth_mm) / (b.truth_mm - a.truth_mm);
-    return (1.0 - share) * (a.range_mm - a.truth_mm) + share * (b.range_mm - b.truth_mm);
-  }
-  return std::nan("");
-}
-
 /// Waves, scale and residual, measured and simulated, at the frequencies that the camera is known to have.
 NamedTraits wavesOf(const RealCamera& camera, const ErrorTable& measured,
                     const std::vector<WallReading>& readings) {
   const std::vector<double> frequency_hz = frequenciesOf(camera.name);
-  const auto add = [&](const char* of, std::vector<double> distance, const std::vector<double>& error,
-                       TraitCollector& all) {
-    for (double& d : distance) d *= 1e-3;
-    all.add("harmonics", of, harmonicTraits(distance, error, frequency_hz));
-  };
   ErrorTable simulated;
   for (const WallReading& r : readings)
     simulated.reference_mm.push_back(r.truth_mm), simulated.error_mm.push_back(r.range_mm - r.truth_mm);
+  const auto fitOf = [&](const ErrorTable& table) -> HarmonicFit {
+    return [&](std::size_t least) {
+      std::vector<double> distance = table.reference_mm;
+      for (double& d : distance) d *= 1e-3;
+      return fittedHarmonics(distance, table.error_mm, frequency_hz, {}, least);
+    };
+  };
+  const auto [of_a, of_b] = withTheSameWaves({fitOf(measured), fitOf(simulated)});
   TraitCollector all;
-  add("A", measured.reference_mm, measured.error_mm, all);
-  add("B", simulated.reference_mm, simulated.error_mm, all);
+  all.add("harmonics", "A", of_a), all.add("harmonics", "B", of_b);
   return std::move(all).found();
 }
 
@@ -103,14 +95,15 @@ Result<Finding> judgeDistance(const RealDataJob& job, RealCamera& camera) {
       std::minmax_element(table.reference_mm.begin(), table.reference_mm.end());
   std::vector<double> distances;
   for (double d = *nearest - 10.0; d < *farthest + 20.0; d += 15.0) distances.push_back(d);
-  const auto readings = readWall(*model, 0.8, distances, 200, 31, [&](double share) {
+  const auto walls = traceWalls(*model, 0.8, distances, 31);
+  if (!walls) return walls.error();
+  const auto readings = readWalls(*model, *walls, 200, 31, [&](double share) {
     if (job.progress != nullptr) job.progress->at(share);
   });
-  if (!readings) return readings.error();
-
-  std::vector<double> simulated, nothing(table.error_mm.size(), 0.0);
-  for (const double reference : table.reference_mm)
-    simulated.push_back(errorAt(*readings, reference));
+  std::vector<double> range_mm;
+  for (const WallReading& r : readings) range_mm.push_back(r.range_mm);
+  const std::vector<double> simulated = errorsAt(table.reference_mm, walls->truth_mm, range_mm);
+  const std::vector<double> nothing(table.error_mm.size(), 0.0);
   const Explained none = explain(table.error_mm, nothing), sim = explain(table.error_mm, simulated);
   camera.delay_mm = sim.best_offset;
 
@@ -119,7 +112,7 @@ Result<Finding> judgeDistance(const RealDataJob& job, RealCamera& camera) {
                                 shown(std::abs(sim.best_offset))),
             .ink = Ink::Simulated,
             .stroke = Stroke::Dashed};
-  for (const WallReading& r : *readings) {
+  for (const WallReading& r : readings) {
     raw.x.push_back(r.truth_mm), raw.y.push_back(r.range_mm - r.truth_mm);
     moved.x.push_back(r.truth_mm), moved.y.push_back(r.range_mm - r.truth_mm + sim.best_offset);
   }
@@ -178,8 +171,8 @@ Result<Finding> judgeDistance(const RealDataJob& job, RealCamera& camera) {
       .set("simulated", toJson(sim))
       .set("rows_of_another_session", other.error_mm.size())
       .set("constant_mm", sim.best_offset);
-  addDistanceFit(camera, table.reference_mm, table.error_mm, simulated, finding);
-  addCharacteristics(wavesOf(camera, table, *readings), finding);
+  addDistanceFit(camera, withoutNoise(*model), *walls, table.reference_mm, table.error_mm, finding);
+  addCharacteristics(wavesOf(camera, table, readings), finding);
   finding.headline = fmt::format("{} distance error: {} mm spread, {} mm left", camera.title,
                                  shown(none.residual_sd), shown(sim.residual_sd));
   finding.cards.push_back({camera.title + " distance", shown(sim.residual_sd) + " mm",

@@ -6,6 +6,8 @@
 
 #include "calib/compare/held_out.h"
 #include "calib/compare/real_data.h"
+#include "calib/compare/simulated_wall.h"
+#include "sim/sensor/sensor_model.h"
 
 /// What the judges of real data fit on one half and judge on the other.
 namespace toftwin::compare {
@@ -13,9 +15,10 @@ namespace toftwin::compare {
 /// Modulation frequencies of a camera of the set, Hz.
 std::vector<double> frequenciesOf(const std::string& camera);
 
-/// Cyclic errors, intensity, scale and a constant over the distance table. Rows in step.
-void addDistanceFit(const RealCamera& camera, const std::vector<double>& reference_mm,
-                    const std::vector<double>& error_mm, const std::vector<double>& simulated_mm,
+/// Effects that the preset lacks, fitted to the distance table through the simulator. Rows in step; `preset` is
+/// without noise, `walls` were traced for it and reach beyond the rows.
+void addDistanceFit(const RealCamera& camera, const sim::SensorModel& preset, const TracedWalls& walls,
+                    const std::vector<double>& reference_mm, const std::vector<double>& error_mm,
                     Finding& finding);
 
 /// A corner's line and its simulation for some albedos of the boards, on the same rays.

@@ -8,7 +8,7 @@
 #include "calib/compare/fits.h"
 #include "calib/compare/real_data.h"
 #include "calib/compare/residual.h"
-#include "calib/compare/simulated_line.h"
+#include "calib/compare/simulated_wall.h"
 
 namespace toftwin::compare {
 namespace {
@@ -43,12 +43,13 @@ struct Against {
 };
 
 Result<Against> againstDistance(const sim::SensorModel& model, const Columns& table) {
-  const auto readings = readWall(model, 0.8, table[0], 500, 61);
-  if (!readings) return readings.error();
+  const auto walls = traceWalls(model, 0.8, table[0], 61);
+  if (!walls) return walls.error();
+  const auto readings = readWalls(model, *walls, 500, 61);
   Against result;
   std::vector<double> ratio;
-  for (std::size_t i = 0; i < readings->size(); ++i) {
-    result.predicted.push_back((*readings)[i].sigma_mm);
+  for (std::size_t i = 0; i < readings.size(); ++i) {
+    result.predicted.push_back(readings[i].sigma_mm);
     ratio.push_back(result.predicted[i] / table[1][i]);
   }
   result.rms_log = rmsLogRatio(table[1], result.predicted);
@@ -74,9 +75,9 @@ Result<NoiseLaw> lawOf(const sim::SensorModel& model) {
   std::vector<double> distances, amplitude, sigma;
   for (double d = 550.0; d < 4500.0; d *= 1.12) distances.push_back(d);
   for (const double albedo : {0.8, 0.2, 0.05}) {
-    const auto readings = readWall(model, albedo, distances, 300, 62);
-    if (!readings) return readings.error();
-    for (const WallReading& r : *readings) {
+    const auto walls = traceWalls(model, albedo, distances, 62);
+    if (!walls) return walls.error();
+    for (const WallReading& r : readWalls(model, *walls, 300, 62)) {
       if (r.valid_share > 0.99) amplitude.push_back(r.amplitude), sigma.push_back(r.sigma_mm);
     }
   }

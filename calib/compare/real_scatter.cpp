@@ -116,13 +116,6 @@ std::vector<double> changeOf(const sim::SensorModel& camera, const Run& run) {
   return change_mm;
 }
 
-sim::SensorModel withVeil(const sim::SensorModel& camera, double veil) {
-  std::vector<sim::AnyEffect> effects = camera.effects();
-  std::erase_if(effects, [](const auto& effect) { return std::holds_alternative<sim::LensScatter>(effect); });
-  effects.insert(effects.begin(), sim::LensScatter{.veil = veil, .halo = 0.0});
-  return camera.withEffects(std::move(effects));
-}
-
 Result<> addCamera(const RealDataJob& job, const ScatterCamera& camera, Finding& finding,
                    TableBlock& table, TableBlock& runs_table, FigureRow& figures) {
   const auto named = sim::SensorModel::preset(camera.name);
@@ -150,7 +143,7 @@ Result<> addCamera(const RealDataJob& job, const ScatterCamera& camera, Finding&
   const std::vector<double> as_is = changes(preset);
   for (std::size_t i = 0; i < as_is.size(); ++i)
     if (std::isnan(as_is[i])) blocks[i] = -1;  // the simulated camera sees nothing there
-  const auto predict = [&](std::span<const double> x) { return changes(withVeil(preset, x[0])); };
+  const auto predict = [&](std::span<const double> x) { return changes(withEffect(preset, sim::LensScatter{.veil = x[0], .halo = 0.0})); };
   const Bounded veil[] = {{0.01, 0.0, 1.0}};
   const CurveFit fit = fitCurve(change, veil, predict, blocks);
   std::vector<double> judged, left_as_is;

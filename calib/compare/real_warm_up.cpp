@@ -9,6 +9,8 @@
 #include "calib/compare/fits.h"
 #include "calib/compare/real_data.h"
 #include "calib/compare/residual.h"
+#include "calib/compare/simulated_line.h"
+#include "calib/compare/simulated_wall.h"
 #include "sim/sensor/sensor_model.h"
 
 namespace toftwin::compare {
@@ -35,6 +37,28 @@ double rmsOf(const WarmUpFit& fit, const Series& series) {
   return summarise(residual).rms;
 }
 
+/// What the camera, simulated with that warm-up before a wall where the series has it, leaves of `judged`;
+/// the constant is of `fitted`.
+Result<double> simulatedRms(const sim::SensorModel& camera, const WarmUpFit& fit, const Series& fitted,
+                            const Series& judged) {
+  const sim::SensorModel warming = withEffect(camera, fit.effect);
+  const auto wall = traceWalls(warming, 0.8, {fit.warm_mm}, 21);
+  if (!wall) return wall.error();
+  const auto residual = [&](const Series& series) {
+    std::vector<double> left;
+    Moment moment;
+    for (std::size_t i = 0; i < series.time_s.size(); ++i) {
+      moment.since_power_on = series.time_s[i] * second;
+      left.push_back(series.depth_mm[i] - readRanges(warming, *wall, moment).front());
+    }
+    return left;
+  };
+  const double constant = summarise(residual(fitted)).mean;
+  std::vector<double> left = residual(judged);
+  for (double& one : left) one -= constant;
+  return summarise(left).rms;
+}
+
 /// What no model of time can explain: the reading's own jitter from one second to the next, sd =
 /// rms step / √2.
 double jitter(const Series& series) {
@@ -44,8 +68,7 @@ double jitter(const Series& series) {
   return summarise(steps).rms / std::sqrt(2.0);
 }
 
-Curve curveOf(const WarmUpFit& fit, const Series& series, std::string name, Ink ink,
-              Stroke stroke) {
+Curve curveOf(const WarmUpFit& fit, const Series& series, std::string name, Ink ink, Stroke stroke) {
   Curve curve{.name = std::move(name), .x = series.time_s, .ink = ink, .stroke = stroke};
   for (const double t : series.time_s) curve.y.push_back(fit.depth_mm(t));
   return curve;
@@ -84,11 +107,11 @@ Result<Finding> judgeWarmUp(const RealDataJob& job, const RealCamera& camera) {
   const Series all{(*columns)[0], (*columns)[1]};
   const double end = all.time_s.back(), half = 0.5 * (all.time_s.front() + end);
   const auto odd = [](double t) { return static_cast<long>(t / 60.0) % 2 != 0; };
-  const Split splits[] = {{"interpolation", "fitted on the even minutes, judged on the odd ones",
-                           part(all, [&](double t) { return !odd(t); }), part(all, odd)},
-                          {"extrapolation", "fitted on the first half, judged on the second",
-                           part(all, [&](double t) { return t < half; }),
-                           part(all, [&](double t) { return t >= half; })}};
+  const Split splits[] = {
+      {"interpolation", "fitted on the even minutes, judged on the odd ones",
+       part(all, [&](double t) { return !odd(t); }), part(all, odd)},
+      {"extrapolation", "fitted on the first half, judged on the second",
+       part(all, [&](double t) { return t < half; }), part(all, [&](double t) { return t >= half; })}};
 
   Finding finding;
   finding.section = {.id = "warm-up-" + camera.name, .title = camera.title + ": warm-up"};
@@ -120,14 +143,12 @@ Result<Finding> judgeWarmUp(const RealDataJob& job, const RealCamera& camera) {
   if (!model) return model.error();
   const auto preset = presetFit(*model, all);
   if (preset) {
-    table.rows.push_back(
-        {"whole series", "the preset, moved by a constant", shown(preset->rms_mm, 2), "–"});
+    table.rows.push_back({"whole series", "the preset, moved by a constant", shown(preset->rms_mm, 2), "–"});
     finding.data.set("preset_rms_mm", preset->rms_mm);
   }
   const Series first = part(all, [&](double t) { return t < all.time_s.front() + 60.0; }),
                last = part(all, [&](double t) { return t > end - 60.0; });
-  const double drift = summarise(last.depth_mm).mean - summarise(first.depth_mm).mean,
-               floor = jitter(all);
+  const double drift = summarise(last.depth_mm).mean - summarise(first.depth_mm).mean, floor = jitter(all);
 
   const Plot plot{.title = camera.title + " warm-up",
                   .x_label = "time since power-on [s]",
@@ -172,10 +193,13 @@ Result<Finding> judgeWarmUp(const RealDataJob& job, const RealCamera& camera) {
   traits.add({"drift", "A", all.time_s, all.depth_mm}, driftTraits(all.time_s, all.depth_mm));
   addCharacteristics(std::move(traits).found(), finding);
   finding.data.set("drift_mm", drift).set("jitter_mm", floor).set("samples", all.time_s.size());
+  const auto simulated_ahead =
+      simulatedRms(withoutNoise(*model), extrapolated, splits[1].fitted, splits[1].judged);
+  if (!simulated_ahead) return simulated_ahead.error();
   const std::string ahead = camera.title + ", warm-up, second half from the first";
   finding.outcomes.push_back(
-      {ahead, judged_ahead, flat_ahead, flat_ahead, std::nan(""), std::nan(""), drift_ahead, true});
-  finding.ablations.push_back({"warm_up", ahead, drift_ahead, flat_ahead});
+      {ahead, judged_ahead, flat_ahead, flat_ahead, std::nan(""), std::nan(""), *simulated_ahead});
+  finding.ablations.push_back({"warm_up", ahead, *simulated_ahead, flat_ahead});
   // A flat model at the jitter leaves nothing that the effect could be good at.
   const bool is_flat = flat_ahead < 1.3 * floor;
   finding.cards.push_back(

@@ -2,12 +2,14 @@
 #include "calib/compare/report.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <cerrno>
 #include <fstream>
 #include <system_error>
 #include <string_view>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -55,24 +57,58 @@ std::string breakableAtUnderscores(const std::string& name) {
   return broken;
 }
 
+/// Most of what the column has is numbers; empty cells and those that say nothing are none.
+bool isOfNumbers(const TableBlock& table, std::size_t column) {
+  std::size_t numbers = 0, words = 0;
+  for (const auto& row : table.rows) {
+    if (column >= row.size() || row[column].empty()) continue;
+    ++(readsAsNumber(row[column]) ? numbers : words);
+  }
+  return numbers > words;
+}
+
+/// Longer ones may break, so that a table of them is no wider than a page.
+const char* classOfCell(const std::string& cell) {
+  constexpr std::size_t kLong = 30;
+  if (!readsAsNumber(cell)) return "";
+  return cell.size() > kLong && cell.find(", ") != std::string::npos ? " class='number long'" : " class='number'";
+}
+
+/// What a cell says at once, and a long reason behind its colon, for a row of its own: in its column it would be
+/// one word wide.
+std::pair<std::string, std::string> partedAtReason(const std::string& cell) {
+  constexpr std::size_t kLong = 40;
+  const auto colon = cell.find(": ");
+  if (colon == std::string::npos || cell.size() - colon < kLong) return {cell, ""};
+  return {cell.substr(0, colon), cell.substr(colon + 2)};
+}
+
+/// In a column of words, such as names that begin with a frequency, nothing is set as a number.
+std::string html(const std::vector<std::string>& row, const std::vector<bool>& is_of_numbers) {
+  std::string cells, below;
+  for (std::size_t i = 0; i < row.size(); ++i) {
+    const auto [said, reason] = i == 0 ? std::pair{row[i], std::string{}} : partedAtReason(row[i]);
+    cells += fmt::format("<td{}>{}</td>", is_of_numbers[i] ? classOfCell(said) : "", escaped(said));
+    below += (below.empty() || reason.empty() ? "" : "; ") + reason;
+  }
+  if (below.empty()) return "<tr>" + cells + "</tr>";
+  return fmt::format("<tr class='above'>{}</tr><tr class='below'><td colspan='{}'>{}</td></tr>", cells, row.size(),
+                     escaped(below));
+}
+
 std::string html(const TableBlock& table) {
-  std::string out = fmt::format("<div class='scroll'><table><caption>{}</caption><thead><tr>",
+  std::string out = fmt::format("<div class='scroll' tabindex='0'><table><caption>{}</caption><thead><tr>",
                                 escaped(table.caption));
+  std::size_t columns = table.header.size();
+  for (const auto& row : table.rows) columns = std::max(columns, row.size());
+  std::vector<bool> is_of_numbers;
+  for (std::size_t i = 0; i < columns; ++i) is_of_numbers.push_back(isOfNumbers(table, i));
   for (std::size_t i = 0; i < table.header.size(); ++i) {
-    const bool numeric = !table.rows.empty() && i < table.rows.front().size() &&
-                         readsAsNumber(table.rows.front()[i]);
-    out += fmt::format("<th{}>{}</th>", numeric ? " class='number'" : "",
+    out += fmt::format("<th{}>{}</th>", is_of_numbers[i] ? " class='number'" : "",
                        breakableAtUnderscores(escaped(table.header[i])));
   }
   out += "</tr></thead><tbody>";
-  for (const auto& row : table.rows) {
-    out += "<tr>";
-    for (const auto& cell : row) {
-      out +=
-          fmt::format("<td{}>{}</td>", readsAsNumber(cell) ? " class='number'" : "", escaped(cell));
-    }
-    out += "</tr>";
-  }
+  for (const auto& row : table.rows) out += html(row, is_of_numbers);
   return out + "</tbody></table></div>";
 }
 
@@ -119,6 +155,8 @@ Result<> writeFile(const std::filesystem::path& file, const std::string& text) {
                   std::generic_category().message(why))};
 }
 
+std::string withMinus(const std::string& text) { return text.front() == '-' ? "−" + text.substr(1) : text; }
+
 }  // namespace
 
 std::string shown(double value, int decimals) {
@@ -126,12 +164,34 @@ std::string shown(double value, int decimals) {
   std::string text = fmt::format("{:.{}f}", value, decimals);
   // No "−0.0": rounding has taken the sign's meaning away.
   if (text.find_first_of("123456789") == std::string::npos && text.front() == '-') text.erase(0, 1);
-  return text.front() == '-' ? "−" + text.substr(1) : text;
+  return withMinus(text);
+}
+
+std::string shownDigits(double value, int digits) {
+  if (!std::isfinite(value)) return "–";
+  std::string text = fmt::format("{:.{}g}", value, digits), power;
+  if (const auto at = text.find('e'); at != std::string::npos) {
+    constexpr std::array<const char*, 10> kRaised{"⁰", "¹", "²", "³", "⁴", "⁵", "⁶", "⁷", "⁸", "⁹"};
+    const int exponent = std::stoi(text.substr(at + 1));
+    power = exponent < 0 ? "·10⁻" : "·10";
+    for (const char digit : std::to_string(std::abs(exponent)))
+      power += kRaised[static_cast<std::size_t>(digit - '0')];
+    text.erase(at);
+  }
+  return withMinus(text) + power;
+}
+
+int decimalsFor(double error, int least) {
+  constexpr int kMost = 6;  // ranges in single precision are not known better
+  if (!(error > 0.0) || !std::isfinite(error)) return least;
+  return std::clamp(static_cast<int>(std::ceil(-std::log10(error))), least, std::max(least, kMost));
 }
 
 std::string shownWithError(double value, double error, int decimals) {
   const std::string sign = value > 0.0 ? "+" : "";
-  return sign + shown(value, decimals) + " ± " + shown(error, decimals);
+  if (value == 0.0 && error == 0.0) return "0";
+  const int enough = decimalsFor(error, decimals);
+  return sign + shown(value, enough) + " ± " + (error == 0.0 ? "0" : shown(error, enough));
 }
 
 std::string shownPercent(double share) {

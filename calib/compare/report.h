@@ -69,7 +69,8 @@ struct Report {
   Tone tone = Tone::Neutral;
   std::vector<Card> cards{};
   std::vector<Section> sections{};
-  std::string colophon{};  ///< software, commit, date
+  std::vector<std::string> notes{};  ///< what a reader must know; on the page in its sections, too
+  std::string colophon{};            ///< software, commit, date
   Json data = Json::object();
   std::string written_by = "toftwin compare", explained_in = "docs/compare.md";
 };
@@ -87,7 +88,11 @@ Result<std::filesystem::path> write(const Report& report, const std::filesystem:
 
 /// A number for people: fixed decimals, real minus sign; "–" if it is not finite.
 std::string shown(double value, int decimals = 1);
-/// "+1.2 ± 0.3".
+/// So many digits that say something: "1.23", "−3.97·10⁻⁶".
+std::string shownDigits(double value, int digits);
+/// So many decimals, `least` or more, that an error does not read as nothing.
+int decimalsFor(double error, int least);
+/// "+1.2 ± 0.3", with more decimals where the error is smaller than those show; "0" where there is neither.
 std::string shownWithError(double value, double error, int decimals = 1);
 std::string shownPercent(double share);
 

@@ -14,7 +14,7 @@ inline constexpr const char* kReportStyle = R"css(
 --good:#4fd1a5;--fair:#e6b04c;--bad:#ff8a80;--neutral:#aab8c6;--hatch:#2a2d31}}
 *{box-sizing:border-box}
 body{margin:0;background:var(--page);color:var(--ink);font:16px/1.5 system-ui,-apple-system,"Segoe UI",Roboto,"DejaVu Sans",sans-serif}
-main{max-width:1120px;margin:0 auto;padding:28px 20px 60px}
+main{max-width:1500px;margin:0 auto;padding:28px 20px 60px}
 h1{font-size:1.75rem;line-height:1.2;margin:0 0 4px}
 h2{font-size:1.3rem;margin:0 0 8px;line-height:1.25}
 .subtitle{color:var(--soft);margin:0 0 16px}
@@ -56,14 +56,15 @@ figcaption{font-size:.9rem;color:var(--soft);margin-top:6px;max-width:90ch}
 table{border-collapse:collapse;font-size:.92rem;min-width:min(100%,480px);background:var(--panel);border:1px solid var(--line)}
 caption{text-align:left;color:var(--soft);font-size:.9rem;padding:0 0 6px}
 th,td{padding:5px 12px;border-bottom:1px solid var(--line);text-align:left;vertical-align:top}
-th{font-weight:600;vertical-align:bottom}td:first-child:not(.number){min-width:13em}td:nth-child(2):not(.number){min-width:8.5em}th.number,td.number{text-align:right}td.number{font-variant-numeric:tabular-nums;white-space:nowrap}
+th{font-weight:600;vertical-align:bottom}td:first-child:not(.number){min-width:13em}td:nth-child(2):not(.number):not([colspan]){min-width:13em}th.number,td.number{text-align:right}td.number{font-variant-numeric:tabular-nums;white-space:nowrap}
+td.long{white-space:normal;min-width:11em}.above td{border-bottom:0;padding-bottom:0}.below td{color:var(--soft);padding:0 12px 6px 28px}
 footer{margin-top:40px;padding-top:12px;border-top:1px solid var(--line);color:var(--soft);font-size:.85rem}
 @media(max-width:520px){main{padding:18px 12px 40px}.cards{grid-template-columns:1fr 1fr}.card{padding:8px 10px}.value{font-size:1.02rem}h1{font-size:1.4rem}}
 .cloud canvas{display:block;width:100%;height:420px;touch-action:none;cursor:grab}.cloud .hint,.cloud input{display:none}
 .cloud.turns .hint{display:inline;color:var(--soft)}.cloud.turns input{display:inline}.inkA{color:var(--measured)}.inkB{color:var(--simulated)}
 @media print{nav,.cloud .hint,.cloud input{display:none!important}body{background:#fff;font-size:11pt}main{max-width:none;padding:0}
 figure,.card,tr,h2+p{break-inside:avoid}h2{break-after:avoid}.scroll,.plot{overflow:visible}.plot svg{min-width:0}
-table{font-size:8pt;width:100%}th,td{padding:2px 5px}td.number{white-space:normal}td:first-child:not(.number),td:nth-child(2):not(.number){min-width:0}
+table{font-size:8pt;width:100%}th,td{padding:2px 5px}td.number{white-space:normal}td.long{min-width:0}.below td{padding:0 5px 2px 16px}td:first-child:not(.number),td:nth-child(2):not(.number){min-width:0}
 details::details-content{content-visibility:visible;height:auto}summary{list-style:none}}
 )css";
 

@@ -79,7 +79,7 @@ bool isNoise(const sim::AnyEffect& effect) {
   return std::visit(
       []<class E>(const E&) {
         return std::is_same_v<E, sim::ShotNoise> || std::is_same_v<E, sim::ReadNoise> ||
-               std::is_same_v<E, sim::RangeNoise>;
+               std::is_same_v<E, sim::RangeNoise> || std::is_same_v<E, sim::Companding>;
       },
       effect);
 }
@@ -141,59 +141,6 @@ Result<SimulatedLine> simulateLine(const sim::SensorModel& camera, const sim::Sc
   }
   result.median_error_mm = quantile(result.monte_carlo_mm, 0.5);
   return result;
-}
-
-Result<std::vector<WallReading>> readWall(const sim::SensorModel& camera, double albedo,
-                                          const std::vector<double>& distances_mm, int frames,
-                                          std::uint64_t seed,
-                                          const std::function<void(double)>& progress) {
-  const auto scene = sim::Scene::parse(
-      materialToml("wall", albedo) + wallToml({-2000, 0, 2000, 0, 4000, "wall"}), "wall.toml");
-  if (!scene) return scene.error();
-  constexpr int kInner = 4, kSide = kInner + 2;  // filters leave the outermost pixels as they are
-  sim::TraceRequest request = camera.traceRequest();
-  request.samples_per_pixel = 64;
-  request.max_surfaces = 1;  // one flat wall: no light comes twice
-  request.seed = seed;
-  request.region_x = std::clamp(static_cast<int>(std::lround(request.camera.cx)) - kSide / 2, 0,
-                                request.camera.width - kSide);
-  request.region_y = std::clamp(static_cast<int>(std::lround(request.camera.cy)) - kSide / 2, 0,
-                                request.camera.height - kSide);
-  request.region_width = request.region_height = kSide;
-  std::vector<WallReading> readings;
-  for (std::size_t i = 0; i < distances_mm.size(); ++i) {
-    if (progress) progress(static_cast<double>(i) / static_cast<double>(distances_mm.size()));
-    request.world_from_camera.translation_m = {0.0, 0.0, -1e-3 * distances_mm[i]};
-    const sim::Light light = sim::trace(*scene, request);
-    const sim::Samples collected =
-        camera.collect(light, {}, seed, 0, request.region_x, request.region_y);
-    std::vector<Running> range(kInner * kInner);
-    Running amplitude, truth;
-    for (const float t : light.truth.range_m.pixels()) truth.add(1e3 * static_cast<double>(t));
-    for (int frame = 0; frame < frames; ++frame) {
-      const auto key = static_cast<std::uint64_t>(i) * static_cast<std::uint64_t>(frames) +
-                       static_cast<std::uint64_t>(frame);
-      const auto exposed =
-          camera.readOut(collected, {}, seed, key, request.region_x, request.region_y);
-      for (std::size_t p = 0; p < range.size(); ++p) {
-        const int x = 1 + static_cast<int>(p) % kInner, y = 1 + static_cast<int>(p) / kInner;
-        const auto r = static_cast<double>(exposed.range.range_m(x, y));
-        if (std::isfinite(r))
-          range[p].add(1e3 * r), amplitude.add(static_cast<double>(exposed.range.amplitude(x, y)));
-      }
-    }
-    WallReading reading{.truth_mm = truth.mean(), .amplitude = amplitude.mean()};
-    Running mean, variance;
-    for (const Running& pixel : range) {
-      if (pixel.n() > 1) mean.add(pixel.mean()), variance.add(pixel.variance());
-    }
-    reading.range_mm = mean.n() > 0 ? mean.mean() : kNaN;
-    reading.sigma_mm = variance.n() > 0 ? std::sqrt(variance.mean()) : kNaN;
-    reading.valid_share =
-        static_cast<double>(amplitude.n()) / (static_cast<double>(range.size()) * frames);
-    readings.push_back(reading);
-  }
-  return readings;
 }
 
 Result<PhasorLines> tracePhasors(const sim::TraceRequest& whole, const sim::Scene& scene) {

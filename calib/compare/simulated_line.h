@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <utility>
+#include <variant>
 #include <vector>
 
 #include <toftwin/result.h>
@@ -47,23 +49,17 @@ struct TracedLine {
 TracedLine traceLine(const sim::SensorModel& camera, const sim::Scene& scene, int samples);
 /// One frame of it; NaN where the camera calls a pixel invalid.
 ScanLine readLine(const sim::SensorModel& camera, const TracedLine& line);
-/// A camera of which one frame is the mean of many: its noise is switched off, all else acts.
+/// A camera of which one frame is the mean of many: its noise is off, and its companding, whose steps noise smooths;
+/// all else acts.
 sim::SensorModel withoutNoise(const sim::SensorModel& camera);
-
-/// A few pixels around the optical axis before a flat wall square to it, as the distance and noise
-/// tables were taken: each pixel read `frames` times.
-struct WallReading {
-  double truth_mm = 0.0;
-  double range_mm = 0.0;   ///< mean over pixels and frames
-  double sigma_mm = 0.0;   ///< temporal, root mean square over the pixels
-  double amplitude = 0.0;  ///< mean, electrons
-  double valid_share = 0.0;
-};
-/// Reads the wall at each of the distances. The scene is one wall of that albedo, 4 m × 4 m.
-Result<std::vector<WallReading>> readWall(const sim::SensorModel& camera, double albedo,
-                                          const std::vector<double>& distances_mm, int frames,
-                                          std::uint64_t seed,
-                                          const std::function<void(double)>& progress = {});
+/// The camera with that effect before all others, in place of its own of that kind.
+template <class E>
+sim::SensorModel withEffect(const sim::SensorModel& camera, const E& effect) {
+  std::vector<sim::AnyEffect> effects = camera.effects();
+  std::erase_if(effects, [](const sim::AnyEffect& any) { return std::holds_alternative<E>(any); });
+  effects.insert(effects.begin(), effect);
+  return camera.withEffects(std::move(effects));
+}
 
 /// Ranges that one pure sine of that frequency would give along the middle row: −arg(P) c / 4πf,
 /// unwrapped to the truth's period. For the published simulations, whose camera is not a product.

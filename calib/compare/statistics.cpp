@@ -42,15 +42,24 @@ double clusteredError(std::span<const double> values, std::span<const std::uint3
     if (cluster[i] >= clusters.size()) clusters.resize(cluster[i] + std::size_t{1});
     clusters[cluster[i]].add(values[i]);
   }
-  Running means;
-  double n = 0.0, squares = 0.0;
+  double n = 0.0, sum = 0.0, squares = 0.0, within = 0.0, free = 0.0;
+  std::size_t used = 0;
   for (const Running& c : clusters) {
     if (c.n() == 0) continue;
     const auto size = static_cast<double>(c.n());
-    means.add(c.mean()), n += size, squares += size * size;
+    ++used, n += size, sum += size * c.mean(), squares += size * size;
+    if (c.n() > 1) within += (size - 1.0) * c.variance(), free += size - 1.0;
   }
-  if (means.n() < 2) return kNaN;
-  return std::sqrt(means.variance() * squares) / n;
+  if (used < 2) return kNaN;
+  // Analysis of variance: how clusters scatter, each weighted by its pixels, less what their pixels' own scatter
+  // makes of it, which is most in those that have few of them.
+  const double mean = sum / n, own = free > 0.0 ? within / free : 0.0;
+  double between = 0.0;
+  for (const Running& c : clusters) {
+    if (c.n() > 0) between += static_cast<double>(c.n()) * (c.mean() - mean) * (c.mean() - mean);
+  }
+  const double of_clusters = std::max(0.0, between - static_cast<double>(used - 1) * own) / (n - squares / n);
+  return std::sqrt(of_clusters * squares / (n * n) + own / n);
 }
 
 double blockedError(const Image<float>& field) {

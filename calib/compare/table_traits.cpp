@@ -3,57 +3,124 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <functional>
 #include <limits>
 #include <map>
 #include <numeric>
+#include <optional>
 #include <string_view>
 
 #include <fmt/format.h>
 
 #include <toftwin/units.h>
 
+#include "calib/compare/column_units.h"
 #include "calib/compare/csv.h"
 #include "calib/compare/fitted_figure.h"
 #include "calib/compare/trait_verdict.h"
+#include "calib/compare/traits/repeats.h"
 
 namespace toftwin::compare {
 namespace {
 
-/// Units that a column's name may end in; those of one quantity are converted into each other.
-struct Unit {
-  std::string_view suffix;
-  char quantity;
-  double in_base;
-};
-constexpr std::array kUnits{Unit{"_m", 'l', 1.0},       Unit{"_cm", 'l', 1e-2},       Unit{"_mm", 'l', 1e-3},
-                            Unit{"_um", 'l', 1e-6},     Unit{"_s", 't', 1.0},         Unit{"_ms", 't', 1e-3},
-                            Unit{"_us", 't', 1e-6},     Unit{"_klx", 'e', 1.0},       Unit{"_lx", 'e', 1e-3},
-                            Unit{"_m_per_s", 'v', 1.0}, Unit{"_mm_per_s", 'v', 1e-3}, Unit{"_px", 'p', 1.0}};
-
-/// The longest suffix that fits: "_m_per_s" before "_s".
-const Unit* unitOf(std::string_view column) {
-  const Unit* best = nullptr;
-  for (const Unit& unit : kUnits) {
-    if (column.ends_with(unit.suffix) && (best == nullptr || unit.suffix.size() > best->suffix.size()))
-      best = &unit;
-  }
-  return best;
-}
-
-/// What values of `there` are multiplied by to be in `wanted`'s unit. A name without a unit is taken as it
-/// is.
-Result<double> factorOf(std::string_view there, std::string_view wanted) {
-  const Unit *from = unitOf(there), *to = unitOf(wanted);
-  if (from == nullptr || to == nullptr) return 1.0;
-  if (from->quantity == to->quantity) return from->in_base / to->in_base;
-  return Error{
-      Error::Code::InvalidArgument,
-      fmt::format("column \"{}\" cannot stand for {}: its unit is of another quantity", there, wanted)};
-}
+constexpr std::array kOf{"A", "B"};
 
 Error ofTable(const TableJob& job, const Error& error) {
   return {error.code, fmt::format("{}: {}", job.file.string(), error.message)};
+}
+
+bool isOf(Quantity quantity, const char* column) {
+  const ColumnUnit* unit = unitOf(column);
+  return unit != nullptr && unit->quantity == quantity;
+}
+
+/// Rows that no number is from.
+std::string noteOnRows(const std::vector<std::vector<double>>& columns) {
+  std::size_t left_out = 0;
+  for (std::size_t i = 0; i < columns.front().size(); ++i)
+    left_out += std::ranges::all_of(columns, [i](const auto& c) { return std::isfinite(c[i]); }) ? 0 : 1;
+  if (left_out == 0) return {};
+  return fmt::format("{} of {} rows hold a value that is not finite, and are left out", left_out,
+                     columns.front().size());
+}
+
+/// Metres that are more likely to be millimetres.
+std::string noteOnSize(const char* column, const std::vector<double>& values) {
+  constexpr double kFarthest_m = 300.0;
+  double most_m = 0.0;
+  for (const double one : values) {
+    if (std::isfinite(one)) most_m = std::max(most_m, std::abs(one) * unitOf(column)->in_base);
+  }
+  if (!(most_m > kFarthest_m)) return {};
+  return fmt::format("{} goes up to {:.4g} m, which may be another unit", column, most_m);
+}
+
+/// The step that all differences of readings are multiples of, if there is one that many share; 0 where all
+/// are alike.
+std::optional<double> stepOf(std::vector<double> values) {
+  std::erase_if(values, [](double one) { return !std::isfinite(one); });
+  constexpr std::size_t kFewest = 12, kRowsPerValue = 3;
+  if (values.size() < kFewest) return std::nullopt;
+  std::ranges::sort(values);
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < values.size(); ++i) {
+    if (values[i] > values[i - 1]) steps.push_back(values[i] - values[i - 1]);
+  }
+  if (steps.empty()) return 0.0;
+  if (kRowsPerValue * (steps.size() + 1) > values.size()) return std::nullopt;
+  const double step = std::ranges::min(steps);
+  const bool is_step = std::ranges::all_of(steps, [step](double one) {
+    constexpr double kRounding = 1e-3;
+    return std::abs(one / step - std::round(one / step)) < kRounding;
+  });
+  return is_step ? std::optional{step} : std::nullopt;
+}
+
+std::string noteOnSteps(const char* column, const std::vector<double>& values) {
+  const auto step = stepOf(values);
+  if (!step) return {};
+  const ColumnUnit& unit = *unitOf(column);
+  if (*step == 0.0) {
+    return fmt::format(
+        "all {} readings of {} are alike: they are rounded to a step that does not show, and "
+        "intervals know nothing of it",
+        values.size(), column);
+  }
+  return fmt::format(
+      "{} is in steps of {:.3g} {}: a mean of these {} rows is not known better than to about {:.2g} "
+      "{} (step/√12n), or half a step where noise is below a third of one",
+      column, *step, unit.name, values.size(), *step / std::sqrt(12.0 * static_cast<double>(values.size())),
+      unit.name);
+}
+
+/// Kinds whose readings of one abscissa count together.
+std::string noteOnPlaces(const TableColumns& table) {
+  constexpr std::array kKinds{"harmonics", "corner", "amplitude", "ambient", "motion"};
+  if (std::ranges::find(kKinds, std::string_view{table.kind->name}) == kKinds.end()) return {};
+  const SharedPlaces places = sharedPlacesOf(table.values.front());
+  if (!places.areShared()) return {};
+  return fmt::format(
+      "{} has {} values in {} rows: what is read at one of them may be off together, so intervals are by how these {} "
+      "scatter",
+      table.kind->columns.front(), places.count, places.of.size(), places.count);
+}
+
+/// Readings are what characteristics are told from: values and errors.
+bool isReading(std::string_view column) { return column.starts_with("value") || column.starts_with("error"); }
+
+void addNotes(TableColumns& table) {
+  const auto add = [&](std::string note) {
+    if (!note.empty()) table.notes.push_back(std::move(note));
+  };
+  add(noteOnRows(table.values));
+  add(noteOnPlaces(table));
+  for (std::size_t i = 0; i < table.values.size(); ++i) {
+    const char* column = table.kind->columns[i];
+    if (!isOf(Quantity::Length, column)) continue;
+    add(noteOnSize(column, table.values[i]));
+    if (isReading(column)) add(noteOnSteps(column, table.values[i]));
+  }
 }
 
 /// Rows of the image are the table's lines, of as many pixels as the longest has.
@@ -88,7 +155,8 @@ NamedRows rowsOf(const TableColumns& table, const char* of) {
   return rows;
 }
 
-/// Rows are of the same condition where both tables have the same x, row by row; a row's number is no condition.
+/// Rows are of the same condition where both tables have the same x, row by row; a row's number is no
+/// condition.
 void pairRows(NamedTraits& traits, const TableKind& kind) {
   if (kind.columns.size() < 2 || traits.rows.size() != 2 || traits.rows[0].x != traits.rows[1].x) return;
   for (NamedRows& rows : traits.rows) {
@@ -99,7 +167,7 @@ void pairRows(NamedTraits& traits, const TableKind& kind) {
 
 Figure figureOf(const NamedTraits& traits, const TableKind& kind) {
   const bool has_two = kind.columns.size() > 1, is_law = std::string_view{kind.name} == "noise_law";
-  const Unit* unit = unitOf(kind.columns[has_two ? 1 : 0]);
+  const ColumnUnit* unit = unitOf(kind.columns[has_two ? 1 : 0]);
   auto figure = fittedFigure(traits, kind.name,
                              {.title = kind.tells,
                               .caption = "The tables' rows, and what was fitted to them.",
@@ -108,7 +176,7 @@ Figure figureOf(const NamedTraits& traits, const TableKind& kind) {
                               .log_x = is_law,
                               .log_y = is_law,
                               .compact = false,
-                              .rest_unit = std::string{unit == nullptr ? "" : unit->suffix.substr(1)}});
+                              .rest_unit = std::string{unit == nullptr ? "" : unit->name}});
   return figure.value_or(Figure{"Too few rows to draw."});
 }
 
@@ -160,15 +228,19 @@ Result<TableColumns> loadTable(const TableJob& job) {
                              fmt::join(wanted, ", "), names.size())};
   }
   for (std::size_t i = 0; i < names.size(); ++i) {
-    const bool is_negated = names[i].starts_with('-');
-    const std::string name = names[i].substr(is_negated ? 1 : 0);
+    const ColumnName name = columnNameOf(names[i]);
     const auto factor = factorOf(name, wanted[i]);
     if (!factor) return ofTable(job, factor.error());
-    auto column = loadColumns(job.file, {name});
+    auto column = loadColumns(job.file, {name.in_file});
     if (!column) return column.error();
-    for (double& one : column->front()) one *= is_negated ? -*factor : *factor;
+    if (!*factor) {
+      table.notes.push_back(fmt::format("column \"{}\" says no unit and is taken as {}", name.in_file,
+                                        unitOf(wanted[i])->name));
+    }
+    for (double& one : column->front()) one *= (name.is_negated ? -1.0 : 1.0) * factor->value_or(1.0);
     table.values.push_back(std::move(column->front()));
   }
+  addNotes(table);
   return table;
 }
 
@@ -194,20 +266,36 @@ void addTraits(const TableColumns& table, const std::vector<double>& f, const ch
   all.add(kind, of, rest.at(kind)());
 }
 
+/// Of two tables at the same frequencies, both with the same waves.
+void addSameWaves(const std::vector<TableColumns>& tables, const std::vector<double>& f, TraitCollector& all) {
+  const auto fitOf = [&f](const TableColumns& table) -> HarmonicFit {
+    return [&f, &c = table.values](std::size_t least) { return fittedHarmonics(c[0], c[1], f, {}, least); };
+  };
+  const auto both = withTheSameWaves({fitOf(tables[0]), fitOf(tables[1])});
+  for (std::size_t i = 0; i < both.size(); ++i) all.add(rowsOf(tables[i], kOf[i]), both[i]);
+}
+
 Result<Report> judgeTables(const std::vector<TableJob>& jobs) {
-  constexpr std::array kOf{"A", "B"};
   TraitCollector all;
-  std::vector<std::string> files;
-  const TableKind* kind = nullptr;
+  std::vector<std::string> files, notes;
+  std::vector<TableColumns> tables;
   for (std::size_t i = 0; i < std::min(jobs.size(), kOf.size()); ++i) {
-    const auto table = loadTable(jobs[i]);
+    auto table = loadTable(jobs[i]);
     if (!table) return table.error();
-    kind = table->kind;
-    addTraits(*table, jobs[i].frequency_hz, kOf[i], all);
+    for (const std::string& note : table->notes)
+      notes.push_back(fmt::format("{} ({}): {}.", kOf[i], jobs[i].file.filename().string(), note));
     files.push_back(
         fmt::format("{} ({}, {} rows)", kOf[i], jobs[i].file.filename().string(), table->values[0].size()));
+    tables.push_back(std::move(*table));
   }
-  if (kind == nullptr) return Error{Error::Code::InvalidArgument, "no table is named"};
+  if (tables.empty()) return Error{Error::Code::InvalidArgument, "no table is named"};
+  const TableKind* kind = tables.back().kind;
+  const bool are_waves = kind == findTableKind("harmonics") && tables.size() == kOf.size();
+  if (are_waves && jobs[0].frequency_hz == jobs[1].frequency_hz) {
+    addSameWaves(tables, jobs[0].frequency_hz, all);
+  } else {
+    for (std::size_t i = 0; i < tables.size(); ++i) addTraits(tables[i], jobs[i].frequency_hz, kOf[i], all);
+  }
   NamedTraits traits = std::move(all).found();
   pairRows(traits, *kind);
   if (traits.traits.empty())
@@ -219,6 +307,7 @@ Result<Report> judgeTables(const std::vector<TableJob>& jobs) {
                                     : headlineOf(verdicts) + ".";
   report.cards = cardsOf(verdicts);
   Section section{.id = "table", .title = kind->tells};
+  for (const std::string& note : notes) section.blocks.push_back(Paragraph{.text = note});
   if (!verdicts.empty()) section.blocks.push_back(verdictTable(verdicts));
   section.blocks.push_back(figureOf(traits, *kind));
   section.blocks.push_back(traitTable(traits));
@@ -228,6 +317,10 @@ Result<Report> judgeTables(const std::vector<TableJob>& jobs) {
   report.data.set("kind", kind->name)
       .set("characteristics", toJson(traits))
       .set("verdicts", toJson(verdicts));
+  Json said = Json::array();
+  for (const std::string& note : notes) said.push(note);
+  report.data.set("notes", std::move(said));
+  report.notes = std::move(notes);
   report.explained_in = "docs/characteristics.md";
   return report;
 }

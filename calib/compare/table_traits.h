@@ -26,7 +26,8 @@ struct TableJob {
   std::filesystem::path file;  ///< CSV with a header
   std::string kind{};
   /// The file's names of the kind's columns, in their order; empty: the kind's own. "-" before a name changes
-  /// the sign; a name that ends in another unit of the same quantity ("_mm" for "_m") is converted.
+  /// the sign; a name that ends in another unit of the same quantity ("_mm", "[mm]" for "_m") is converted;
+  /// "=mm" behind it says the unit.
   std::vector<std::string> columns{};
   std::vector<double> frequency_hz{};  ///< of modulation, where the kind needs it
 };
@@ -35,8 +36,10 @@ struct TableJob {
 struct TableColumns {
   const TableKind* kind = nullptr;
   std::vector<std::vector<double>> values{};
+  std::vector<std::string> notes{};  ///< what was taken for granted, and what is odd about the rows
 };
-/// Errors: an unknown kind, a column that the file lacks or whose unit is of another quantity, no frequency.
+/// Errors: an unknown kind, a column that the file lacks or whose unit is unknown or of another quantity, no
+/// frequency.
 Result<TableColumns> loadTable(const TableJob& job);
 void addTraits(const TableColumns& table, const std::vector<double>& frequency_hz, const char* of,
                TraitCollector& all);

@@ -3,9 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <set>
+#include <variant>
 
 #include <fmt/format.h>
 
@@ -22,17 +22,27 @@ constexpr std::size_t kShownFirst = 3;  ///< differences that have a card
 /// What is left of a fit is of B − A, but no difference of two numbers.
 bool isDifference(const NamedTrait& one) { return one.of == "B − A" && one.trait.name != "residual"; }
 
-std::string number(double value) {
-  const std::string text = fmt::format("{:.3g}", value);
-  return text.starts_with('-') ? "−" + text.substr(1) : text;
-}
+std::string number(double value) { return shownDigits(value, 3); }
 
 std::string unitOf(const TraitVerdict& one) {
   return one.difference.unit.empty() || one.difference.unit == "1" ? "" : " " + one.difference.unit;
 }
 
+bool isOffset(const TraitVerdict& one) { return one.difference.name == "offset"; }
+
+/// What a line is off by hangs on where it is told.
+std::string placeOf(const TraitVerdict& one) {
+  return isOffset(one) && !one.at.empty() ? " " + one.at : "";
+}
+
 std::string nameOf(const TraitVerdict& one) {
-  return one.what == one.difference.name ? one.what : one.what + ": " + one.difference.name;
+  const std::string name = one.difference.name + placeOf(one);
+  return one.what == one.difference.name ? name : one.what + ": " + name;
+}
+
+/// Almost any systematic error that is uneven over the image (a veil, waves, a tilt) shows as a pattern, too.
+bool isPattern(const TraitVerdict& one) {
+  return one.what.starts_with("fixed pattern") || one.difference.name == "fixed pattern";
 }
 
 bool isWaves(const TraitVerdict& one) { return one.what.starts_with("harmonics"); }
@@ -68,7 +78,8 @@ std::string hiddenInWords(const std::vector<TraitVerdict>& all) {
 
 /// The amplitude of a wave of B − A: how large it is.
 bool isSize(const TraitVerdict& one) {
-  return one.is_size || (isWaves(one) && !one.b && one.difference.name.ends_with(" per period"));
+  const std::string& name = one.difference.name;
+  return one.is_size || name == kWavesTogether || (isWaves(one) && !one.b && name.ends_with(" per period"));
 }
 
 /// For who has not read how it is made; tables have the name by which a log is searched.
@@ -78,7 +89,8 @@ std::string plainNameOf(const TraitVerdict& one) {
   if (what == "noise law") what = "noise over signal";
   if (name == "residual") name = "what no wave explains";
   if (name.ends_with(" per period")) name = "wave, " + name;
-  return what == name ? what : what + ": " + name;
+  if (name == kWavesTogether) name = "waves together, RMS over the distances";
+  return what == name ? what : what + ": " + name + placeOf(one);
 }
 
 std::string intervalOf(const Trait& one) {
@@ -101,10 +113,14 @@ double timesFloor(const TraitVerdict& one) { return std::abs(one.difference.valu
 
 std::string farBeyond(const TraitVerdict& one) {
   if (!(one.floor() > 0.0)) return "without a floor";
+  constexpr double kFar = 1000.0;  // more digits say nothing
+  if (timesFloor(one) > kFar) return fmt::format("over {:.0f} × the floor", kFar);
   return fmt::format("{:.{}f} × the floor", timesFloor(one), timesFloor(one) < 10.0 ? 1 : 0);
 }
 
-std::string atOf(const TraitVerdict& one) { return one.at.empty() ? "" : ", both " + one.at; }
+std::string atOf(const TraitVerdict& one) {
+  return one.at.empty() || isOffset(one) ? "" : ", both " + one.at;
+}
 
 /// Beside the verdict on shares, which are the same where each lacks as many of the other's.
 std::string lacksOf(const TraitVerdict& one) {
@@ -163,21 +179,38 @@ bool isExtrapolated(const TraitVerdict& one) {
          (one.b && one.b->trait.is_extrapolated);
 }
 
+/// Why the difference of one part of a noise law says nothing: where it does not show of one camera, its others
+/// have taken it up.
+std::string standInOf(const TraitVerdict& one) {
+  const auto isIt = [&](const char* part) { return one.difference.name == part; };
+  if (!one.a || !one.b || (std::ranges::none_of(kLawParts, isIt) && std::ranges::none_of(kPatternParts, isIt)))
+    return "";
+  const bool is_no_a = one.a->trait.value == 0.0, is_no_b = one.b->trait.value == 0.0;
+  if (is_no_a == is_no_b) return "";
+  return fmt::format("{}'s rows do not show it, and parts of the law stand in for one another; \"{}\" is told",
+                     is_no_a ? "A" : "B", kWholeLaw);
+}
+
 /// A difference that shows by Student's interval of two rows is one; that none shows says nothing.
 constexpr std::size_t kFewestRows = 3;
 
 void holdTogether(TraitVerdict& one, double wider) {
   const std::string doubt = isExtrapolated(one) ? "it is told far from all rows" : doubtOf(one);
   if (!one.b || one.is_paired) {
+    if (const auto* line = std::get_if<OnLine>(&one.difference.refers_to)) {
+      one.at = placeInWords(line->at_m), one.is_of_scale = goesThroughNothing(one.difference.value, *line, wider);
+    }
     one.difference = widened(one.difference, wider);
   } else {
     const Trait &a = one.a->trait, &b = one.b->trait;
     HeldTogether held = heldTogether(a, b, wider);
     one.is_size = held.is_size, one.at = std::move(held.at), one.why_not = std::move(held.why_not);
+    one.is_of_scale = held.is_of_scale;
     one.difference = std::move(held.difference);
     if (!one.why_not.empty()) one.difference = {b.name, b.unit, kNaN, kNaN, kNaN, std::min(a.n, b.n)};
   }
   if (one.why_not.empty()) one.why_not = doubt;
+  if (one.why_not.empty()) one.why_not = standInOf(one);
   if (one.why_not.empty() && !one.differs() && one.difference.n < kFewestRows) {
     one.why_not =
         fmt::format("it is from {} only, and it takes {} to call it the same",
@@ -211,6 +244,33 @@ std::string whyNone(const NamedTraits& traits, const NamedTrait& like, std::stri
       return ": its is told as " + one.detail;
   }
   return "";
+}
+
+/// An offset of which the scale of the same line, which differs too, makes all.
+bool isScales(const TraitVerdict& one, const std::vector<TraitVerdict>& all) {
+  return isOffset(one) && one.is_of_scale && std::ranges::any_of(all, [&](const TraitVerdict& other) {
+           return other.what == one.what && other.difference.name == "scale" && other.differs();
+         });
+}
+
+/// Those that are not told come last; of those that differ, what others make comes behind them. Where a floor is
+/// 0, what differs is infinitely far beyond it.
+std::pair<int, double> rankOf(const TraitVerdict& one, bool is_of_others) {
+  enum { kHidden, kDiffers, kOfOthers, kMissing, kSame, kNotTold };
+  if (!one.isTold()) return {kNotTold, 0.0};
+  if (!one.differs()) return {one.isMissing() ? kMissing : kSame, 0.0};
+  if (isWraps(one) || one.isMissing()) return {kHidden, 0.0};
+  return {is_of_others ? kOfOthers : kDiffers, -timesFloor(one)};
+}
+
+void sort(std::vector<TraitVerdict>& all) {
+  std::vector<std::pair<std::pair<int, double>, std::size_t>> order;
+  for (const TraitVerdict& one : all)
+    order.push_back({rankOf(one, isPattern(one) || isScales(one, all)), order.size()});
+  std::ranges::sort(order);
+  std::vector<TraitVerdict> sorted;
+  for (const auto& place : order) sorted.push_back(std::move(all[place.second]));
+  all = std::move(sorted);
 }
 
 /// A row for each number that one camera has alone; one for all of a kind of which the other has none.
@@ -267,13 +327,7 @@ std::vector<TraitVerdict> verdictsOf(const NamedTraits& traits) {
     if (one.what == kValidPixels) addLacks(of_pair, wider, one);
   }
   addAlone(traits, of_b, "A", "B", all), addAlone(traits, of_a, "B", "A", all);
-  // Those that are not told come last; where a floor is 0, what differs is infinitely far beyond it.
-  const auto rank = [](const TraitVerdict& one) {
-    if (!one.isTold()) return 1.0;
-    if (!one.differs()) return one.isMissing() ? -0.5 : 0.0;
-    return isWraps(one) || one.isMissing() ? -std::numeric_limits<double>::infinity() : -timesFloor(one);
-  };
-  std::ranges::stable_sort(all, {}, rank);
+  sort(all);
   return all;
 }
 
@@ -285,19 +339,26 @@ std::string headlineOf(const std::vector<TraitVerdict>& all) {
     return hidden +
            fmt::format("In none of {} numbers does B differ from A by more than the noise floor", same);
   }
-  // In millimetres where there is any: other units have no larger and smaller among them.
-  const TraitVerdict* largest = nullptr;
-  for (const TraitVerdict& one : all) {
-    if (!one.isTold() || !one.differs() || one.difference.unit != "mm") continue;
-    if (largest == nullptr || std::abs(one.difference.value) > std::abs(largest->difference.value))
-      largest = &one;
-  }
-  const TraitVerdict& first = largest != nullptr ? *largest : all.front();
+  // The first of the table below, but that what wraps or is missing was said.
+  const auto isHidden = [](const TraitVerdict& one) { return isWraps(one) || one.isMissing(); };
+  const auto isNew = [&](const TraitVerdict& one) { return one.isTold() && one.differs() && !isHidden(one); };
+  const auto found = std::ranges::find_if(all, isNew);
+  const TraitVerdict* first = found == all.end() ? &all.front() : &*found;
   return hidden + fmt::format(
-                      "{} difference: {}, {} ({} to {}). "
+                      "Clearest difference: {}, {} ({} to {}), {}. "
                       "{} of {} numbers of B differ from A's by more than the noise floor",
-                      largest != nullptr ? "Largest" : "Clearest", plainNameOf(first), sizeOf(first),
-                      number(first.difference.low), number(first.difference.high), differ, differ + same);
+                      plainNameOf(*first), sizeOf(*first), number(first->difference.low),
+                      number(first->difference.high), farBeyond(*first), differ, differ + same);
+}
+
+std::string missingInWords(const std::vector<MissingAt>& missing) {
+  if (missing.empty()) return "";
+  const MissingAt& worst = missing.front();
+  const std::string times = worst.captures == 1 ? "its only capture" : fmt::format("all {} captures", worst.captures);
+  const std::string more = missing.size() == 1 ? "" : fmt::format(", and over 5 % at {} more conditions", missing.size() - 1);
+  return fmt::format("At \"{}\" {} gives no range at {} % of the pixels that are seen there, at which {} has one "
+                     "in {}{}. ",
+                     worst.at, worst.of, number(100.0 * worst.share), worst.of == "A" ? "B" : "A", times, more);
 }
 
 TableBlock verdictTable(const std::vector<TraitVerdict>& all) {
@@ -323,13 +384,19 @@ std::pair<TableBlock, TableBlock> verdictTables(const std::vector<TraitVerdict>&
   return {std::move(differ), std::move(rest)};
 }
 
-std::vector<Card> cardsOf(const std::vector<TraitVerdict>& all) {
+std::vector<Card> cardsOf(const std::vector<TraitVerdict>& all, const std::vector<MissingAt>& missing) {
   const std::size_t differ = countOf(all, true), told = differ + countOf(all, false);
-  if (told == 0) return {};
-  const bool is_good = differ == 0 && std::ranges::none_of(all, &TraitVerdict::isMissing);
-  std::vector<Card> cards{{"Same as A", fmt::format("{} of {}", told - differ, told),
-                           "numbers of B within the noise floor", is_good ? Tone::Good : Tone::Fair}};
-  for (std::size_t i = 0; i < differ && cards.size() <= kShownFirst; ++i) {
+  std::vector<Card> cards;
+  if (!missing.empty()) {
+    cards.push_back({fmt::format("{} gives no range", missing.front().of),
+                     shownPercent(missing.front().share), missing.front().at, Tone::Bad});
+  }
+  if (told == 0) return cards;
+  const bool is_good = differ == 0 && missing.empty() && std::ranges::none_of(all, &TraitVerdict::isMissing);
+  cards.push_back({"Same as A", fmt::format("{} of {}", told - differ, told),
+                   "numbers of B within the noise floor", is_good ? Tone::Good : Tone::Fair});
+  const std::size_t most = cards.size() + kShownFirst;
+  for (std::size_t i = 0; i < differ && cards.size() < most; ++i) {
     const TraitVerdict& one = all[i];
     // What is told of waves of B − A and again of B's less A's has one card, that of what is clearer.
     const auto isIt = [&](const TraitVerdict& before) {
@@ -357,6 +424,7 @@ Json toJson(const std::vector<TraitVerdict>& all) {
                         : one.differs() ? "differs"
                                         : "same")
         .set("why_not", one.why_not);
+    if (!one.at.empty()) row.set("at", one.at);
     rows.push(std::move(row));
   }
   return rows;

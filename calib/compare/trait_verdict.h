@@ -18,6 +18,7 @@ struct TraitVerdict {
   Trait difference{};
   bool is_paired = false;  ///< B − A was told row by row of what A and B were told of, too
   bool is_size = false;    ///< the difference is the amplitude of a wave, which has no sign
+  bool is_of_scale = false;  ///< an offset that the scale makes at its distance: the line goes through 0
   std::string at{};        ///< what both are told at, where a number hangs on it: "at 1.75 m"
   std::string why_not{};   ///< why the two cannot be held against each other
   /// Of valid pixels: the share of A's that B lacks, and of B's that A lacks. Two cameras that lack as many
@@ -35,19 +36,24 @@ struct TraitVerdict {
 
 /// Of each number that both cameras have, and of those told of B − A that are 0 for equal cameras (so not
 /// what is left of a fit). Where a number is told of A, of B and of B − A, the last one is the difference.
-/// Those that differ come first, the farthest beyond its floor before the others; but before them the wall's
+/// Those that differ come first, the farthest beyond its floor before the others; behind them what others make: the
+/// fixed pattern, and an offset that the scale makes. But before them all the wall's
 /// wraps and what one camera lacks of the pixels, as what is wrapped or missing is in few of the others. What
 /// is extrapolated (Trait::is_extrapolated) is not told.
 std::vector<TraitVerdict> verdictsOf(const NamedTraits& traits);
 
-/// The largest difference in millimetres, or else the clearest one, and how many of how many differ: a
+/// The clearest difference, and how many of how many differ: a
 /// few sentences without the last full stop, of which the first ones say what wraps or is missing.
 std::string headlineOf(const std::vector<TraitVerdict>& verdicts);
+/// The worst condition at which a camera lacks what the other sees, and how many more there are; with a space
+/// behind. Empty where there is none.
+std::string missingInWords(const std::vector<MissingAt>& missing);
 TableBlock verdictTable(const std::vector<TraitVerdict>& verdicts);
 /// The same in two: what differs, and the rest, for a page on which figures stand between.
 std::pair<TableBlock, TableBlock> verdictTables(const std::vector<TraitVerdict>& verdicts);
-/// How many are the same, and one card for each of the first that differ.
-std::vector<Card> cardsOf(const std::vector<TraitVerdict>& verdicts);
+/// The worst condition at which a camera lacks what the other sees, how many numbers are the same, and one card
+/// for each of the first that differ.
+std::vector<Card> cardsOf(const std::vector<TraitVerdict>& verdicts, const std::vector<MissingAt>& missing = {});
 Json toJson(const std::vector<TraitVerdict>& verdicts);
 
 }  // namespace toftwin::compare

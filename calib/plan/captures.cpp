@@ -12,6 +12,7 @@
 #include <toftwin/nan.h>
 
 #include "calib/plan/place.h"
+#include "sim/images/mix_bits.h"
 
 namespace toftwin::plan {
 namespace {
@@ -29,10 +30,7 @@ class Draws {
     state_ ^= seed * 0x9e3779b97f4a7c15u;
   }
   std::uint64_t next() {
-    std::uint64_t z = (state_ += 0x9e3779b97f4a7c15u);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return z ^ (z >> 31);
+    return sim::mixBits(state_ += 0x9e3779b97f4a7c15u);
   }
   /// The bias of the remainder is below count / 2⁶⁴.
   std::size_t below(std::size_t count) { return static_cast<std::size_t>(next() % count); }

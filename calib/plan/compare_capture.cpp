@@ -154,6 +154,8 @@ Result<ComparedCapture> compareCapture(const std::filesystem::path& run, const P
   one.thinned = thinned(*compared, how.stride);
   if (record.kind == nameOf(Kind::Distance))
     one.wall_range_m = thinned(wallRange_m(plan, record, a->stack), how.stride);
+  one.pose_error_mm = {poseError_mm(plan, record, record.pose_half_widths),
+                       poseError_mm(plan, record, record.pose_of_b_half_widths)};
   if (whole != nullptr) *whole = *std::move(compared);
   return one;
 }

@@ -40,6 +40,9 @@ struct ComparedCapture {
   /// Of the distance block: range to the plan's wall along the rays of `thinned`, NaN beside it; empty where
   /// no pose is known.
   Image<float> wall_range_m{};
+  /// Standard error of the range to the plan's wall by what the pose is known to be uncertain by: of A's
+  /// frames, and what B's own adds where it saw where it stood; 0 where nobody says.
+  std::array<double, 2> pose_error_mm{};
   std::array<CameraSeen, 2> seen{};  ///< of A and B, each by itself
   std::array<OwnReading, 2> own{};   ///< of A and B, each by its own mask
 };

@@ -20,8 +20,6 @@ namespace toftwin::plan {
 namespace {
 
 using compare::TraitCollector;
-using Captures = std::vector<const ComparedCapture*>;
-constexpr std::array kNames{"A", "B"};
 constexpr const char* kLagOfFirst = "lag of the first frame recorded";
 constexpr const char* kRangeLag = "range left behind";
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
@@ -87,7 +85,7 @@ void addTiming(const ComparedRun& run, std::size_t camera, TraitCollector& all) 
   for (const auto* captures : {&run.captures, &run.moving}) {
     for (const ComparedCapture& one : *captures) series.push_back(one.seen[camera].starts_s);
   }
-  all.add("frame timing", kNames[camera], compare::timingTraits(series));
+  all.add("frame timing", kCameras[camera], compare::timingTraits(series));
 }
 
 /// Pixels of a capture wrap together: each capture is a row.
@@ -97,7 +95,7 @@ void addWraps(const Captures& walls, std::size_t camera, TraitCollector& all) {
     const CameraSeen& seen = one->seen[camera];
     if (seen.wall_readings > 0.0) shares.push_back(seen.wall_wraps / seen.wall_readings);
   }
-  all.add("wraps", kNames[camera], compare::wrapTraits(shares));
+  all.add("wraps", kCameras[camera], compare::wrapTraits(shares));
 }
 
 /// A corner's errors in steps of the distance to its edge, each of one capture.
@@ -133,10 +131,10 @@ void addBands(const std::string& name, const Steps& steps, std::size_t camera, T
   }
   if (traits.empty()) {
     all.untold(fmt::format("{} of {}: no wall is seen where the plan puts it (within 300 mm)", name,
-                           kNames[camera]));
+                           kCameras[camera]));
     return;
   }
-  all.add(name, kNames[camera], traits);
+  all.add(name, kCameras[camera], traits);
 }
 
 /// Distances to the edge in steps of 2.5 cm: pixels of one step are not independent rows.
@@ -164,7 +162,7 @@ void addCorners(const ComparedRun& run, const OverRange& own, std::size_t camera
     // The fall from the edge as one exponential, where it is one: at the very edge both ways are equally
     // long. Of each step over all captures.
     const auto [place, error] = meansOf(steps);
-    if (const auto fall = compare::cornerTraits(place, error)) all.add(name, kNames[camera], fall);
+    if (const auto fall = compare::cornerTraits(place, error)) all.add(name, kCameras[camera], fall);
   }
 }
 
@@ -237,7 +235,7 @@ void addScatter(const Captures& plates, const Captures& walls, const std::vector
       capture.push_back(one->record.number);
     }
   }
-  all.add("lens scatter", kNames[camera], compare::veilTraits(veil_mm, error_mm, frequency_hz, capture));
+  all.add("lens scatter", kCameras[camera], compare::veilTraits(veil_mm, error_mm, frequency_hz, capture));
 }
 
 void addPlates(const ComparedRun& run, std::size_t camera, TraitCollector& all) {
@@ -249,9 +247,9 @@ void addPlates(const ComparedRun& run, std::size_t camera, TraitCollector& all) 
     append(place, seen.edge_place_px), append(value, seen.edge_value);
   }
   const Image<float> together = belowEachOther(captures, camera);
-  all.add("flying pixels", kNames[camera], compare::flyingTraits(together));
-  all.add("emitter shadow", kNames[camera], compare::shadowTraits(together, 1.0));
-  all.add("edge in the amplitude", kNames[camera], compare::edgeTraits(place, value));
+  all.add("flying pixels", kCameras[camera], compare::flyingTraits(together));
+  all.add("emitter shadow", kCameras[camera], compare::shadowTraits(together, 1.0));
+  all.add("edge in the amplitude", kCameras[camera], compare::edgeTraits(place, value));
 }
 
 /// Before a dark wall a plate's light is far more beside the wall's own; a bright wall is the next best.
@@ -276,7 +274,7 @@ void addLag(const ComparedRun& run, std::size_t camera, TraitCollector& all) {
     first.push_back(values.front()), rest.push_back(later.mean()), before.push_back(previous);
     previous = later.mean();
   }
-  all.add(kLagOfFirst, kNames[camera], compare::afterImageTraits(first, rest, before));
+  all.add(kLagOfFirst, kCameras[camera], compare::afterImageTraits(first, rest, before));
 }
 
 /// The same of the range, where the camera was moved: of a filter over frames in the range itself, which
@@ -302,10 +300,10 @@ void addRangeLag(const ComparedRun& run, std::size_t camera, TraitCollector& all
     all.untold(
         fmt::format("{} of {}: {}: it takes two captures of a block by which the range in the image's "
                     "middle changes by a tenth, and three frames of each",
-                    kLagOfFirst, kNames[camera], kRangeLag));
+                    kLagOfFirst, kCameras[camera], kRangeLag));
     return;
   }
-  all.add(kLagOfFirst, kNames[camera], compare::afterImageTraits(first, rest, before, kRangeLag));
+  all.add(kLagOfFirst, kCameras[camera], compare::afterImageTraits(first, rest, before, kRangeLag));
 }
 
 /// A plate's path: its middle over time; speeds are differences of two frames, each of which is in one of
@@ -325,10 +323,10 @@ void addMotion(const ComparedRun& run, std::size_t camera, TraitCollector& all) 
   if (captures.empty()) return;
   if (speed.empty()) {
     all.untold(fmt::format("motion of {}: in none of {} captures do two frames with a time of their own show the plate whole",
-                           kNames[camera], captures.size()));
+                           kCameras[camera], captures.size()));
     return;
   }
-  all.add("motion, right end − left end", kNames[camera], compare::motionTraits(speed, turn));
+  all.add("motion, right end − left end", kCameras[camera], compare::motionTraits(speed, turn));
 }
 
 /// Independent values by their intervals: weights 1/h². A's places, which stand for the path, err as B's do:
@@ -406,6 +404,7 @@ void heedWidths(const PlateSeen& a, const PlateSeen& b, compare::Trait& latency)
 /// How much later B sees the plate where A saw it, where both say the scene's own time: of simulated cameras.
 void addLatency(const ComparedRun& run, TraitCollector& all) {
   std::vector<compare::Trait> rows;
+  std::string why_not;
   const Captures captures = ofKind(run, "moving");
   bool is_shared = !captures.empty();
   for (const ComparedCapture* one : captures) {
@@ -413,15 +412,19 @@ void addLatency(const ComparedRun& run, TraitCollector& all) {
     is_shared = is_shared && a.is_simulated && b.is_simulated;
     const auto traits =
         compare::latencyTraits(b.plate_time_s, b.plate_place_m, a.plate_time_s, a.plate_place_m);
-    if (traits) rows.push_back(traits->front());
+    if (traits)
+      rows.push_back(traits->front());
+    else
+      why_not = traits.error().message;
   }
   if (captures.empty()) return;
   if (!is_shared) {
     all.untold(
-        "latency: the two cameras see the plate one after the other, and a real one does not say where "
-        "it was meanwhile; it takes the plate's own path over time (compare::latencyTraits)");
+        "latency: the two cameras are captured one after the other, and where a real plate was meanwhile nobody "
+        "recorded. It is told of two simulated cameras, whose frames say the time at which the scene was so");
   } else if (rows.empty()) {
-    all.untold("latency: the plate is seen whole in too few frames of a capture");
+    all.untold(fmt::format("{} ({} captures of the moving plate, of which none tells it)", why_not,
+                           captures.size()));
   } else {
     compare::Trait latency = together(rows);
     heedWidths({captures, 0}, {captures, 1}, latency);

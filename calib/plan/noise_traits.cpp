@@ -17,7 +17,6 @@ namespace {
 
 using compare::NamedRows;
 using compare::TraitCollector;
-constexpr std::array kCameras{"A", "B"};
 constexpr const char* kPattern = "fixed pattern";
 
 /// A number of the frames' noise by its name; nothing where it is none: a pattern too weak to be told from
@@ -109,6 +108,13 @@ std::span<const double> frequenciesOfNoise(const ComparedRun& run, std::size_t c
   return name == kPattern ? std::span<const double>{} : run.frequency_hz[camera];
 }
 
+void nameAsPattern(std::vector<compare::Trait>& traits) {
+  for (compare::Trait& one : traits) {
+    const auto part = std::ranges::find(compare::kLawParts, std::string_view{one.name});
+    if (part != compare::kLawParts.end()) one.name = compare::kPatternParts[static_cast<std::size_t>(part - compare::kLawParts.begin())];
+  }
+}
+
 /// Light is 1/d² at one exposure only.
 void keepMostCommonExposure(std::vector<const ComparedCapture*>& captures) {
   std::map<double, int> count;
@@ -129,7 +135,8 @@ void addOverDistance(const ComparedRun& run, std::size_t camera, TraitCollector&
       rows.condition.push_back(one->record.number);
     }
     if (rows.x.empty()) continue;  // said of the noise of frames
-    const auto fitted = fittedOverDistance(rows, frequenciesOfNoise(run, camera, name));
+    auto fitted = fittedOverDistance(rows, frequenciesOfNoise(run, camera, name));
+    if (fitted && std::string_view{name} == kPattern) nameAsPattern(fitted->traits);
     all.add(std::move(rows), fitted);
   }
 }
@@ -154,7 +161,9 @@ void relateTo(const NamedRows& other, const NamedRows& rows, std::vector<compare
     most = both, at_it = rows.x[i], unit = fmt::format(" of that at capture {}", rows.condition[i]);
   }
   for (compare::Trait& one : traits) {
-    if (auto* at = std::get_if<compare::AtSignal>(&one.refers_to)) at->most /= at_it, at->unit = unit;
+    auto* law = std::get_if<compare::LawAtSignal>(&one.refers_to);
+    auto* at = law != nullptr ? &law->at : std::get_if<compare::AtSignal>(&one.refers_to);
+    if (at != nullptr) at->most /= at_it, at->unit = unit;
   }
 }
 
@@ -163,6 +172,7 @@ void addLaw(NamedRows rows, const NamedRows& other, std::span<const double> freq
   scaleToLargest(rows.x);
   auto fitted = compare::fittedNoiseLaw(rows.x, rows.y, frequency_hz);
   if (fitted) relateTo(other, rows, fitted->traits);
+  if (fitted && rows.what == kPatternOverAmplitude) nameAsPattern(fitted->traits);
   all.add(std::move(rows), fitted);
 }
 

@@ -50,8 +50,9 @@ OwnSeries ownSeries(const ComparedRun& run, std::string_view kind, std::size_t c
   for (const ComparedCapture* one : all) {
     if (static_cast<double>(validOf(one->own[camera].range_mm)) >= kFewest * static_cast<double>(most))
       series.captures.push_back(one);
+    else
+      series.left_out.push_back(one);
   }
-  series.left_out = all.size() - series.captures.size();
   if (series.captures.empty() || most == 0) return {};
   const auto pixels = pixelsOfAll(series.captures, camera);
   if (pixels.empty()) return {};

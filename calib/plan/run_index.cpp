@@ -91,6 +91,13 @@ std::optional<RecordedFile> fileOf(const Json* json) {
   return members.is_whole && isOurs(file.file) ? std::optional{file} : std::nullopt;
 }
 
+std::optional<std::array<double, 6>> halfWidthsOf(const Json* json) {
+  if (json == nullptr || json->size() != 6) return std::nullopt;
+  std::array<double, 6> widths{};
+  for (std::size_t i = 0; i < 6; ++i) widths[i] = json->at(i).number();
+  return widths;
+}
+
 std::optional<CaptureRecord> recordOf(const Json& json) {
   Members members{json};
   CaptureRecord one;
@@ -103,10 +110,8 @@ std::optional<CaptureRecord> recordOf(const Json& json) {
   one.distance_m = members.number("distance_m"), one.angle_deg = members.number("angle_deg");
   one.exposure_us = members.number("exposure_us"), one.ambient_klx = members.number("ambient_klx");
   one.pose = poseOf(json.find("pose")), one.pose_by = members.text("pose_by");
-  if (const Json* widths = json.find("pose_half_widths_rad_m"); widths != nullptr && widths->size() == 6) {
-    one.pose_half_widths.emplace();
-    for (std::size_t i = 0; i < 6; ++i) (*one.pose_half_widths)[i] = widths->at(i).number();
-  }
+  one.pose_half_widths = halfWidthsOf(json.find("pose_half_widths_rad_m"));
+  one.pose_of_b_half_widths = halfWidthsOf(json.find("pose_of_b_half_widths_rad_m"));
   one.pose_of_b = poseOf(json.find("pose_of_b"));
   const auto a = fileOf(json.find("a")), b = fileOf(json.find("b"));
   if (!a || !b || !members.is_whole) return std::nullopt;

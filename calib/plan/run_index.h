@@ -51,7 +51,7 @@ struct CaptureRecord {
   std::optional<Transform<World, Camera>> pose{};
   std::string pose_by{};
   /// 95 % half widths of a pose that was seen: turns (rad), then place (m).
-  std::optional<std::array<double, 6>> pose_half_widths{};
+  std::optional<std::array<double, 6>> pose_half_widths{}, pose_of_b_half_widths{};
   /// Where B saw itself; none where it was put to `pose` or took it on trust.
   std::optional<Transform<World, Camera>> pose_of_b{};
   RecordedFile a{}, b{};

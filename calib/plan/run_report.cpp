@@ -7,6 +7,8 @@
 #include <functional>
 #include <limits>
 #include <map>
+#include <optional>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -27,8 +29,13 @@ bool isSeen(const ComparedCapture& one) { return one.pixels > 0; }
 std::vector<PoseComparison> imagesOf(const ComparedRun& run,
                                      const std::function<bool(const ComparedCapture&)>& belongs) {
   std::vector<PoseComparison> images;
+  // What errs alike is one place.
+  std::map<std::pair<std::string, std::size_t>, std::optional<Transform<World, Camera>>> seen;
   for (const ComparedCapture& one : run.captures) {
-    if (!one.thinned.difference_mm.empty() && belongs(one)) images.push_back(one.thinned);
+    if (one.thinned.difference_mm.empty() || !belongs(one)) continue;
+    images.push_back(one.thinned);
+    if (const auto condition = sharedPoseOf(one.record))
+      images.back().pose = seen.try_emplace(*condition, one.thinned.pose).first->second;
   }
   return images;
 }
@@ -202,19 +209,31 @@ void addFigures(const ComparedRun& run, std::vector<Block>& blocks) {
   }
 }
 
+/// What poses that were seen are uncertain by, on the mean over the pixels: it may be the same way at all.
+double meanPoseError_mm(const ComparedRun& run) {
+  double sum = 0.0, pixels = 0.0;
+  for (const ComparedCapture& one : run.captures) {
+    const auto n = static_cast<double>(one.pixels);
+    sum += n * std::hypot(one.pose_error_mm[0], one.pose_error_mm[1]), pixels += n;
+  }
+  return pixels > 0.0 ? sum / pixels : 0.0;
+}
+
 /// Over different poses, each of which is one draw of it.
-NamedTrait biasOf(const Characteristics& c) {
+NamedTrait biasOf(const ComparedRun& run, const Characteristics& c) {
   const Summary& all = mainRegionOf(c).difference_mm;
-  const double half =
-      c.places > 1 ? studentT(static_cast<double>(c.places - 1)) * all.standard_error : std::nan("");
+  const double degrees = static_cast<double>(c.places) - 1.0;
+  const double half = c.places > 1 ? std::hypot(studentT(degrees) * all.standard_error, 1.96 * meanPoseError_mm(run))
+                                   : std::nan("");
   return {.what = "bias on surfaces",
           .of = "B − A",
           .trait = {"bias on surfaces", "mm", all.mean, all.mean - half, all.mean + half, c.places}};
 }
 
-std::vector<TraitVerdict> verdictsOf(const RunTraits& traits, const Characteristics& c) {
+std::vector<TraitVerdict> verdictsOf(const RunTraits& traits, const ComparedRun& run,
+                                       const Characteristics& c) {
   RunTraits all = traits;
-  all.traits.push_back(biasOf(c));
+  all.traits.push_back(biasOf(run, c));
   return compare::verdictsOf(all);
 }
 
@@ -226,18 +245,19 @@ Tone nearnessTone(const Characteristics& c) {
 
 /// Good only where no number differs, of those that are told, and no pixels are missing; bad where the bias
 /// is far beyond A's noise.
-Tone toneOf(const std::vector<TraitVerdict>& verdicts, const Characteristics& c) {
+Tone toneOf(const std::vector<TraitVerdict>& verdicts, const RunTraits& traits, const Characteristics& c) {
   if (toneOfDifference(c) == Tone::Bad) return Tone::Bad;
-  const bool is_same = std::ranges::any_of(verdicts, &TraitVerdict::isTold) &&
+  const bool is_same = traits.missing.empty() && std::ranges::any_of(verdicts, &TraitVerdict::isTold) &&
                        std::ranges::none_of(verdicts, &TraitVerdict::differs) &&
                        std::ranges::none_of(verdicts, &TraitVerdict::isMissing);
   return is_same && c.places >= 3 ? Tone::Good : Tone::Fair;
 }
 
-std::vector<Card> cardsOf(const Characteristics& c, const std::vector<TraitVerdict>& verdicts) {
+std::vector<Card> cardsOf(const Characteristics& c, const std::vector<TraitVerdict>& verdicts,
+                          const RunTraits& traits) {
   std::vector<Card> cards =
       nearnessCards(c, fmt::format("± standard error over {} different poses", c.places), nearnessTone(c));
-  const auto more = compare::cardsOf(verdicts);
+  const auto more = compare::cardsOf(verdicts, traits.missing);
   cards.insert(cards.end(), more.begin(), more.end());
   return cards;
 }
@@ -249,15 +269,15 @@ Result<Finding> judgeRun(const ComparedRun& run) {
   if (c.regions.empty()) return nothingCompared(c, "capture");
   Finding finding;
   const RunTraits traits = traitsOf(run);
-  const std::vector<TraitVerdict> verdicts = verdictsOf(traits, c);
+  const std::vector<TraitVerdict> verdicts = verdictsOf(traits, run, c);
   finding.headline = fmt::format(
-      "{}. {}",
+      "{}{}. {}", missingInWords(traits.missing),
       nearnessInWords(run.captures.front().record.a.source, run.captures.front().record.b.source, c),
       headlineOf(verdicts));
-  finding.cards = cardsOf(c, verdicts);
+  finding.cards = cardsOf(c, verdicts, traits);
   finding.section = {.id = run.is_locked ? "locked" : "run",
                      .title = run.is_locked ? "Locked captures" : "The plan's captures",
-                     .tone = toneOf(verdicts, c)};
+                     .tone = toneOf(verdicts, traits, c)};
   auto& blocks = finding.section.blocks;
   for (const std::string& warning : run.warnings) blocks.push_back(Paragraph{"Note: " + warning});
   const auto seen = std::ranges::find_if(run.captures, isSeen);

@@ -6,26 +6,26 @@
 #include <cmath>
 #include <functional>
 #include <map>
-#include <set>
 #include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include "calib/compare/characteristics.h"
 #include "calib/compare/live_report.h"
 #include "calib/compare/statistics.h"
 #include "calib/compare/traits/clusters.h"
 #include "calib/plan/frame_traits.h"
+#include "calib/plan/harmonic_traits.h"
+#include "calib/plan/missing.h"
 #include "calib/plan/noise_traits.h"
 #include "calib/plan/own_series.h"
+#include "calib/plan/tilt_traits.h"
 
 namespace toftwin::plan {
 namespace {
 
 using compare::TraitCollector;
-using Captures = std::vector<const ComparedCapture*>;
 
 /// Which kind of block tells what; docs/characteristics.md has the same.
 struct Feeds {
@@ -34,6 +34,7 @@ struct Feeds {
 };
 constexpr std::array kFeeds{Feeds{"warm_up", "drift"},
                             Feeds{"distance", "harmonics"},
+                            Feeds{"distance", "tilt over the image"},
                             Feeds{"distance", "wraps"},
                             Feeds{"distance", "noise of frames"},
                             Feeds{"distance", "temporal noise and fixed pattern over distance"},
@@ -49,6 +50,8 @@ constexpr std::array kFeeds{Feeds{"warm_up", "drift"},
                             Feeds{"moving", "motion"},
                             Feeds{"moving", "latency"}};
 
+}  // namespace
+
 Captures capturesOf(const ComparedRun& run, std::string_view kind) {
   Captures chosen;
   for (const ComparedCapture& one : run.captures) {
@@ -56,6 +59,8 @@ Captures capturesOf(const ComparedRun& run, std::string_view kind) {
   }
   return chosen;
 }
+
+namespace {
 
 std::vector<double> column(const Captures& captures,
                            const std::function<double(const ComparedCapture&)>& value) {
@@ -77,7 +82,15 @@ double meanOf(const std::vector<double>& values) {
   return values.empty() ? std::nan("") : compare::summarise(values).mean;
 }
 
-constexpr std::array kCameras{"A", "B"};
+
+/// "at 5 to 60 klx, " where it was in light; empty otherwise.
+std::string lightOf(const Captures& captures) {
+  const auto light = [](const ComparedCapture* one) { return one->record.ambient_klx; };
+  const auto [least, most] = std::ranges::minmax_element(captures, {}, light);
+  if (!(light(*most) > 0.0)) return "";
+  if (light(*least) == light(*most)) return fmt::format("at {:g} klx, ", light(*most));
+  return fmt::format("at {:g} to {:g} klx, ", light(*least), light(*most));
+}
 
 /// The camera's series, and what it is without.
 OwnSeries ownSeriesOf(const ComparedRun& run, const char* kind, std::size_t camera, const char* what,
@@ -86,9 +99,10 @@ OwnSeries ownSeriesOf(const ComparedRun& run, const char* kind, std::size_t came
   if (series.captures.empty()) {
     all.untold(
         fmt::format("{} of {}: it has no pixel in all captures of kind {}", what, kCameras[camera], kind));
-  } else if (series.left_out > 0) {
-    all.untold(fmt::format("{} of {} at {} captures, in which it lost over half of its pixels", what,
-                           kCameras[camera], series.left_out));
+  } else if (!series.left_out.empty()) {
+    all.untold(fmt::format("{} of {}: {}in {} of {} captures, it lost over half of its pixels", what,
+                           kCameras[camera], lightOf(series.left_out), series.left_out.size(),
+                           series.captures.size() + series.left_out.size()));
   }
   return series;
 }
@@ -104,137 +118,6 @@ void addDrift(const ComparedRun& run, TraitCollector& all) {
     compare::NamedRows rows{kDrift, kCameras[camera], since, series.range_mm, numbersOf(series.captures)};
     const auto drift = compare::driftTraits(rows.x, rows.y);
     all.add(std::move(rows), drift);
-  }
-}
-
-/// So near frequencies are one: over 8 m at 100 MHz, 0.1 % shifts a wave by 0.03 rad.
-constexpr double kSameFrequency = 1e-3;
-
-bool areTheSame(const std::vector<double>& a, const std::vector<double>& b) {
-  return std::ranges::equal(a, b, [](double x, double y) { return std::abs(x - y) <= kSameFrequency * x; });
-}
-
-std::string wordsOf(const std::vector<double>& frequency_hz) {
-  std::string words;
-  for (const double f : frequency_hz) words += fmt::format("{}{:.6g}", words.empty() ? "" : ", ", f / 1e6);
-  return words.empty() ? "no frequency that its frames say" : words + " MHz";
-}
-
-/// Errors over distance: a wall's parts in steps of range, capture by capture. Over a wide wall ranges differ
-/// by much of a wave, so that a whole image's mean would lose the short ones.
-struct OverDistance {
-  std::vector<double> distance_m{}, error_mm{};
-  std::vector<std::size_t> capture{}, condition{};  ///< condition: capture and step
-
-  void add(std::size_t number, const std::vector<double>& at_m, const std::vector<double>& of_mm) {
-    constexpr double kStep_m = 0.025;
-    constexpr double kFewest = 0.01;  // of all pixels: fewer are beside the wall, or wrapped
-    double all = 0.0;
-    std::map<long, std::pair<compare::Running, compare::Running>> steps;  // ranges are positive
-    for (std::size_t i = 0; i < at_m.size(); ++i) {
-      if (!std::isfinite(of_mm[i]) || !std::isfinite(at_m[i])) continue;
-      auto& [at, of] = steps[std::lround(at_m[i] / kStep_m)];
-      at.add(at_m[i]), of.add(of_mm[i]), ++all;
-    }
-    for (const auto& [step, means] : steps) {
-      if (static_cast<double>(means.first.n()) < kFewest * all) continue;
-      distance_m.push_back(means.first.mean()), error_mm.push_back(means.second.mean());
-      capture.push_back(number), condition.push_back(kMostSteps * number + static_cast<std::size_t>(step));
-    }
-  }
-
- private:
-  static constexpr std::size_t kMostSteps = 1'000'000;  ///< 25 km of them
-};
-
-/// What A weighs in the mean of both cameras' ranges by 1/σ². Of all means of the two it is the one whose
-/// noise does not go with that of B − A: steps of A's own range would show A's noise as a slope.
-double weightOfA(const ComparedCapture& one) {
-  const double a = one.noise_a_mm * one.noise_a_mm, b = one.noise_b_mm * one.noise_b_mm;
-  return a + b > 0.0 ? b / (a + b) : 0.5;  // no noise, or not known
-}
-
-/// B − A of a capture's compared pixels over the range to the plan's wall, of those that see it; where no
-/// pose tells that, over what both cameras read.
-void addDifference(const ComparedCapture& one, OverDistance& rows) {
-  const Image<float> difference = compare::comparedDifference_mm(one.thinned);
-  const double of_b = 1.0 - weightOfA(one);
-  std::vector<double> at, of;
-  for (std::size_t i = 0; i < difference.size(); ++i) {
-    const auto d_mm = static_cast<double>(difference[i]);
-    const double read_mm = static_cast<double>(one.thinned.range_a_mm[i]) + of_b * d_mm;
-    const double wall_mm =
-        one.wall_range_m.empty() ? read_mm : 1e3 * static_cast<double>(one.wall_range_m[i]);
-    // About 0 even where noise is large: that of read_mm does not go with that of d_mm, which the cut leaves
-    // as it is.
-    if (!(std::abs(read_mm - wall_mm) <= compare::kGross_mm)) continue;
-    at.push_back(1e-3 * wall_mm), of.push_back(d_mm);
-  }
-  if (difference.empty()) at.push_back(1e-3 * one.range_a_mm), of.push_back(one.difference_mm);
-  rows.add(one.record.number, at, of);
-}
-
-/// Captures of the distance block for a fit of waves. What wraps in part is told as wraps, and left out.
-Captures unwrapped(const Captures& captures, const std::string& whose,
-                   const std::function<bool(const ComparedCapture&)>& is_wrapped, TraitCollector& all) {
-  Captures chosen;
-  std::set<std::string> names;
-  for (const ComparedCapture* one : captures) {
-    if (!is_wrapped(*one))
-      chosen.push_back(one);
-    else
-      names.insert(one->record.name);
-  }
-  if (names.empty()) return chosen;
-  all.untold(fmt::format(
-      "harmonics of {} at {}: {} of {} captures are left out, in which over 1 % of the wall is off by a "
-      "whole period (see wraps)",
-      whose, fmt::join(names, "; "), captures.size() - chosen.size(), captures.size()));
-  return chosen;
-}
-
-void addHarmonicsOfDifference(const ComparedRun& run, const Captures& captures, TraitCollector& all) {
-  const auto& [of_a, of_b] = run.frequency_hz;
-  if (of_a.empty() || !areTheSame(of_a, of_b)) {
-    all.untold(fmt::format("harmonics of B − A: A is modulated at {}, B at {}; their waves are told apart only where "
-                           "both have the same frequencies",
-                           wordsOf(of_a), wordsOf(of_b)));
-    return;
-  }
-  OverDistance rows;
-  const auto eitherWraps = [](const ComparedCapture& one) {
-    return std::ranges::any_of(one.seen, isWrapped);
-  };
-  const Captures used = unwrapped(captures, "B − A", eitherWraps, all);
-  for (const ComparedCapture* one : used) addDifference(*one, rows);
-  const auto without = std::ranges::count_if(used, [](const auto* one) { return one->wall_range_m.empty(); });
-  if (without > 0) {
-    all.untold(
-        fmt::format("how far the wall was at {} of {} captures (harmonics of B − A): no pose is known; they "
-                    "are over the mean of "
-                    "what A and B read, each weighted by 1/σ² of its noise",
-                    without, used.size()));
-  }
-  all.add("harmonics", "B − A", compare::fittedHarmonics(rows.distance_m, rows.error_mm, of_a, rows.capture));
-}
-
-void addHarmonics(const ComparedRun& run, TraitCollector& all) {
-  const Captures captures = capturesOf(run, "distance");
-  if (captures.empty()) return;
-  addHarmonicsOfDifference(run, captures, all);
-  for (std::size_t camera : {std::size_t{0}, std::size_t{1}}) {
-    OverDistance rows;
-    const auto wraps = [camera](const ComparedCapture& one) { return isWrapped(one.seen[camera]); };
-    for (const ComparedCapture* one : unwrapped(captures, kCameras[camera], wraps, all))
-      rows.add(one->record.number, one->seen[camera].wall_range_m, one->seen[camera].wall_error_mm);
-    if (rows.distance_m.empty()) continue;  // no wall, a pose by planes, or all wrapped: said elsewhere
-    if (run.frequency_hz[camera].empty()) {
-      all.untold(fmt::format("harmonics of {}: its frames say no modulation frequency", kCameras[camera]));
-      continue;
-    }
-    const auto fitted =
-        compare::fittedHarmonics(rows.distance_m, rows.error_mm, run.frequency_hz[camera], rows.capture);
-    all.add({kHarmonicsOfWall, kCameras[camera], rows.distance_m, rows.error_mm, rows.condition}, fitted);
   }
 }
 
@@ -361,6 +244,7 @@ RunTraits traitsOf(const ComparedRun& run) {
   TraitCollector all;
   addDrift(run, all);
   addHarmonics(run, all);
+  addTilt(run, all);
   addAmplitudeAndAmbient(run, all);
   addMasks(run, all);
   addValidPixels(run, all);
@@ -368,7 +252,9 @@ RunTraits traitsOf(const ComparedRun& run) {
   addFrameTraits(run, all);
   sayWhatPlanesHide(run, all);
   sayWhatIsMissing(run, all);
-  return std::move(all).found();
+  RunTraits found = std::move(all).found();
+  found.missing = missingOf(run);
+  return found;
 }
 
 std::vector<std::string> feedsOf(std::string_view kind) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -21,6 +22,12 @@ inline constexpr const char *kDrift = "drift", *kHarmonicsOfWall = "harmonics, a
                             *kNoiseLaw = "noise law", *kNoiseOverDistance = "temporal noise over distance",
                             *kPatternOverDistance = "fixed pattern over distance",
                             *kPatternOverAmplitude = "fixed pattern over amplitude";
+
+inline constexpr std::array kCameras{"A", "B"};
+
+using Captures = std::vector<const ComparedCapture*>;
+/// Those of blocks of a kind, or of all, of which both cameras see a pixel.
+Captures capturesOf(const ComparedRun& run, std::string_view kind);
 
 /// Of the blocks of each kind that can tell it: drift (warm_up), harmonics (distance), error over amplitude
 /// (exposure), error and noise over ambient light (ambient); of all captures the noise's law and the masks.

@@ -95,6 +95,7 @@ Image<float> noiseOfMeans_m(const compare::Stack& stack) {
 /// large: about 0 it would take more from one side than from the other.
 struct CellMeans {
   double range_m = 0.0, error_mm = 0.0, amplitude = 0.0, count = 0.0;
+  RangeSteps steps{};
 
   CellMeans(const WallImages& images, const Image<float>& expected_m, int left, int top) {
     std::vector<double> error, noise, expected, amplitudes;
@@ -111,6 +112,7 @@ struct CellMeans {
     for (std::size_t i = 0; i < error.size(); ++i) {
       if (!(std::abs(error[i] - middle_mm) <= kGross_mm)) continue;
       error_mm += error[i], range_m += expected[i], amplitude += amplitudes[i], ++count;
+      steps.add(expected[i], error[i]);
     }
     error_mm /= count, range_m /= count, amplitude /= count;
   }
@@ -134,6 +136,7 @@ void addWall(const compare::Stack& stack, const std::vector<ReadFrame>& frames,
       const CellMeans means{images, expected_m, left, top};
       if (means.count < 4.0) continue;
       seen.wall_range_m.push_back(means.range_m), seen.wall_error_mm.push_back(means.error_mm);
+      seen.wall_steps.add(means.steps);
       seen.wall_amplitude.push_back(images.amplitude.empty() ? std::nan("") : means.amplitude);
       addVeil(veil, seen);
     }
@@ -173,6 +176,14 @@ void addNoise(const std::vector<ReadFrame>& frames, const Image<float>& expected
   if (const auto traits = compare::noiseTraits(errors)) seen.noise = *traits;
 }
 
+/// A wall seen from a pose that is turned against the true one is off by a slope over the image.
+void doubtPattern(CameraSeen& seen) {
+  for (compare::Trait& one : seen.noise) {
+    if (one.name == "fixed pattern")
+      one.doubt = "what the pose, which was seen, is turned by is in it as a slope over the image";
+  }
+}
+
 /// Ranges against two walls that meet at the target's point, in the vertical, and open towards the cameras.
 void addCorner(const Plan& plan, const BlockSpec& block, const Transform<World, Camera>& pose,
                const compare::Stack& stack, CameraSeen& seen) {
@@ -209,6 +220,7 @@ void leaveOutErrors(CameraSeen& seen) {
   for (auto* column : {&seen.wall_range_m, &seen.wall_error_mm, &seen.wall_amplitude, &seen.corner_place_m,
                        &seen.corner_range_m, &seen.corner_error_mm})
     column->clear();
+  seen.wall_steps = {};
   for (auto& column : seen.wall_veil_mm) column.clear();
 }
 
@@ -217,6 +229,21 @@ void leaveOutErrors(CameraSeen& seen) {
 bool isWrapped(const CameraSeen& seen) { return seen.wall_beyond > kFewWraps * seen.wall_readings; }
 
 bool isPoseFromPlanes(const CaptureRecord& record) { return record.pose_by == "planes"; }
+
+std::optional<std::pair<std::string, std::size_t>> sharedPoseOf(const CaptureRecord& record) {
+  if (!record.pose_half_widths) return std::nullopt;
+  return std::pair{record.block, record.condition};
+}
+
+double poseError_mm(const Plan& plan, const CaptureRecord& record,
+                    const std::optional<std::array<double, 6>>& half_widths) {
+  constexpr double kHalfWidths = 1.96;  // of a standard error
+  const BlockSpec* block = blockOf(plan, record);
+  if (block == nullptr || !half_widths) return 0.0;
+  const Vec3d normal = targetOf(plan, *block).normal;
+  const auto& h = *half_widths;
+  return 1e3 * std::hypot(normal.x * h[3], normal.y * h[4], normal.z * h[5]) / kHalfWidths;
+}
 
 Image<float> wallRange_m(const Plan& plan, const BlockSpec& block, const CameraInfo& camera,
                          const Transform<World, Camera>& pose) {
@@ -283,6 +310,7 @@ CameraSeen seenOf(const Plan& plan, const CaptureRecord& record, const compare::
       const auto expected = wallRange_m(plan, *block, stack.camera(), *pose);
       addWall(stack, frames, expected, frequency_hz, seen);
       if (block->kind != Kind::Tilt) addNoise(frames, expected, seen);
+      if (record.pose_half_widths) doubtPattern(seen);
       break;
     }
     case Kind::Corner:

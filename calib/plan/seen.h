@@ -4,6 +4,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <toftwin/frame.h>
@@ -13,6 +14,7 @@
 #include "calib/compare/stack.h"
 #include "calib/compare/traits/traits.h"
 #include "calib/plan/plan.h"
+#include "calib/plan/range_steps.h"
 #include "calib/plan/run_index.h"
 
 namespace toftwin::plan {
@@ -27,6 +29,7 @@ struct CameraSeen {
   std::vector<double> middle_range_m{};
   /// Cells of 8 × 8 pixels of a wall: expected range, error and amplitude.
   std::vector<double> wall_range_m{}, wall_error_mm{}, wall_amplitude{};
+  RangeSteps wall_steps{};  ///< the same pixels' errors by their own expected ranges
   /// Readings of a wall, frame by frame: how many, and of them off by whole periods of the highest frequency,
   /// and of all frequencies together.
   double wall_readings = 0.0, wall_wraps = 0.0, wall_beyond = 0.0;
@@ -58,6 +61,13 @@ bool isWrapped(const CameraSeen& seen);
 /// Whether the pose was fitted to A's own ranges of the plan's planes: a wall's errors along its normal are in the pose then,
 /// and what is left of them says nothing of the camera.
 bool isPoseFromPlanes(const CaptureRecord& record);
+/// Where the pose was seen, as of a board: the condition, in all of whose captures it errs alike, by where the corners
+/// fall among the pixels. None where each capture has an error of its own.
+std::optional<std::pair<std::string, std::size_t>> sharedPoseOf(const CaptureRecord& record);
+/// Standard error of the range to the target's wall where a pose's 95 % half widths are these: those of its place
+/// along the wall's normal. Turns move the two sides of a wall against each other.
+double poseError_mm(const Plan& plan, const CaptureRecord& record,
+                    const std::optional<std::array<double, 6>>& half_widths);
 /// What of a frame seenOf() needs.
 Result<ReadFrame> readOf(const Frame& frame);
 /// What such blocks give; NaN and empty columns where the plan does not say what stands there. Where

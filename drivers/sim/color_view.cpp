@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include "drivers/sim/light_seed.h"
 #include "sim/sensor/frame_assembly.h"
 #include "sim/tracer/trace_bands.h"
 
@@ -13,7 +14,7 @@ bool ColorView::complete(const Transform<World, Camera>& pose, Duration time, st
   color_.reset();
   number_ = number;
   request_.world_from_camera = pose;
-  request_.seed = seed_ + number;
+  request_.seed = lightSeed(seed_, pose) + number;
   const auto trace = [&](const sim::Scene& scene, const sim::TraceRequest& request) -> Result<sim::Light> {
     auto light = sim::traceInBands(scene.moves() ? scene.at(time) : scene, request,
                                    [&](int) { return !stop.stop_requested(); });

@@ -297,7 +297,7 @@ class SimulatedSource final : public Source {
     // In real time light is new in each frame, and samples free of noise are kept only for what remembers
     // them.
     auto exposed = view_.isRealtime() && !model_.remembers()
-                       ? model_.expose(view_.light(), moment, keys_.seed, pacer_.index())
+                       ? exposeInRealtime(moment)
                        : model_.readOut(*collected_, moment, keys_.seed, pacer_.index(), 0, 0, before);
     if (model_.remembers()) {
       last_collected_ = *collected_;
@@ -313,6 +313,13 @@ class SimulatedSource final : public Source {
     if (wantsLightSigma())
       planes.push_back(is_of_middle ? *sigma_of_middle_ : sim::lightSigmaOf(view_.light()));
     return planes;
+  }
+
+  /// Samples only if somebody looks at them.
+  [[nodiscard]] sim::SensorModel::Exposed exposeInRealtime(const Moment& moment) const {
+    if (std::ranges::count(info_.planes, PlaneKind::Samples) > 0)
+      return model_.expose(view_.light(), moment, keys_.seed, pacer_.index());
+    return {{}, model_.measure(view_.light(), moment, keys_.seed, pacer_.index())};
   }
 
   [[nodiscard]] bool wantsLightSigma() const {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "drivers/sim/light_seed.h"
 #include "sim/sensor/collect_moving.h"
 #include "sim/tracer/foreign.h"
 #include "sim/tracer/trace_bands.h"
@@ -63,6 +64,7 @@ bool View::complete(const sim::ForeignEmitterSpec* foreign, Pass& pass, const st
   while (pass.rows_done < height) {
     if (stop.stop_requested()) return false;
     sim::TraceRequest band = request_;
+    if (!moves()) band.seed = lightSeed(seed_, pose_);
     band.region_y = pass.rows_done;
     band.region_width = request_.camera.width;
     band.region_height = std::min(is_rolling ? kRowsPerRollingBand : kRowsPerBand, height - pass.rows_done);

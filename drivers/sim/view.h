@@ -18,7 +18,7 @@ namespace toftwin::drivers::simulator {
 
 /// What the camera sees from its pose, traced once and kept until the pose changes or time passes over things
 /// that move. Traced in bands of rows, so that it can be interrupted; the bands done are kept, and the result
-/// does not depend on it.
+/// does not depend on it. Each pose has random numbers of its own (light_seed.h).
 class View {
  public:
   /// `request` with everything filled in but pose and region.

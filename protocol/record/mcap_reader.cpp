@@ -97,6 +97,14 @@ Result<> FileReader::learn(const Record& record) {
   return {};
 }
 
+std::vector<Error> FileReader::checkChunks() const {
+  std::vector<Error> errors;
+  for (const Place& place : places_) {
+    if (const auto read = readPlace(place); !read) errors.push_back(read.error());
+  }
+  return errors;
+}
+
 void FileReader::rewind() {
   at_ = 0;
   rest_ = {};

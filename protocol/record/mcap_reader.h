@@ -37,6 +37,9 @@ class FileReader {
   /// The next message; its data is good until the next call. Error EndOfStream after the last.
   /// A damaged chunk is one error; the call after it goes on with the chunk behind.
   Result<Message> next();
+  /// Reads all chunks once: what is wrong with those that cannot be read.
+  [[nodiscard]] std::vector<Error> checkChunks() const;
+  [[nodiscard]] std::size_t chunks() const { return places_.size(); }
   void rewind();
   /// The next message is the first in the file with that log time or a later one.
   void seek(std::uint64_t log_time_ns);

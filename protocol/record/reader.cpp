@@ -97,6 +97,13 @@ Result<Frame> Reader::next(std::string_view source) {
   }
 }
 
+Whole Reader::checkWhole() const {
+  const auto errors = state_->file.checkChunks();
+  return {.chunks = state_->file.chunks(),
+          .damaged = errors.size(),
+          .first_damage = errors.empty() ? "" : errors.front().message};
+}
+
 void Reader::rewind() { state_->file.rewind(); }
 
 Result<> Reader::seek(std::int64_t log_time_ns) {

@@ -63,6 +63,12 @@ struct Summary {
   std::string damage;    ///< what was wrong and how much was lost, or empty
 };
 
+/// What a reading of all of a file finds.
+struct Whole {
+  std::size_t chunks = 0, damaged = 0;  ///< that its index knows, or a scan; of them, that cannot be read
+  std::string first_damage;             ///< of the first of them, or empty
+};
+
 /// Reads frames in file order. Damaged or truncated files give every frame up to the damage, then
 /// one error Malformed, and after it the frames of the next chunk that is whole.
 class Reader {
@@ -75,6 +81,9 @@ class Reader {
   [[nodiscard]] const Summary& summary() const;
   /// The next frame of `source` (or of any, if empty). Error EndOfStream after the last.
   Result<Frame> next(std::string_view source = {});
+  /// Reads all chunks once, whose CRCs say which of them are damaged; does not move the reader. It takes as long
+  /// as reading and unpacking the file.
+  [[nodiscard]] Whole checkWhole() const;
   void rewind();
   /// Goes to the first frame at or after that log time.
   Result<> seek(std::int64_t log_time_ns);

@@ -19,22 +19,24 @@ namespace {
 
 constexpr std::size_t kFrequencies = 3;
 
+}  // namespace
+
 /// Holds what the steps hand on to each other.
-class KinectDecoder {
+class KinectV2Decoder::Impl {
  public:
-  KinectDecoder(const Samples& samples, const DecodeSettings& settings, const DecodeRays& rays)
-      : samples_(samples),
-        settings_(settings),
+  Impl(const Samples& shape, int width, int height, const DecodeSettings& settings, const DecodeRays& rays)
+      : settings_(settings),
         kinect_(settings.kinect),
         rays_(rays),
-        width_(samples.width()),
-        height_(samples.height()),
-        steps_(samples.steps),
+        width_(width),
+        height_(height),
+        steps_(shape.steps),
         zero_cycles_(zeroCycles(settings, kFrequencies)),
         // 80 MHz is three units of 240 MHz.
-        unit_m_(settings.speed_of_light / (6.0 * samples.frequencies[0].in(hertz))),
-        brightness_(width_, height_),
-        is_edge_(width_, height_) {
+        unit_m_(settings.speed_of_light / (6.0 * shape.frequencies[0].in(hertz))),
+        flags_(width, height),
+        brightness_(width, height),
+        is_edge_(width, height) {
     for (std::size_t f = 0; f < kFrequencies; ++f) {
       counts_[f] = kinect_.counts_per_electron * kinect_.amplitude_multipliers[f];
     }
@@ -46,41 +48,67 @@ class KinectDecoder {
     limits_ = limits();
   }
 
-  RangeImage decode() && {
-    forRows(height_, [&](int first, int last) {
-      for (int y = first; y < last; ++y) demodulate(y);
-    });
-    if (kinect_.bilateral_filter) {
-      for (std::size_t f = 0; f < kFrequencies; ++f) filter(f);
-    } else {
-      filtered_ = result_.phasors;
-    }
+  void take(int top, const Samples& samples, int first, int last) {
+    for (int y = first; y < last; ++y) demodulate(samples, y, top + y - first);
+    if (!samples.flags.empty() && first < last)
+      std::copy_n(&samples.flags(0, first), static_cast<std::ptrdiff_t>(last - first) * width_, &flags_(0, top));
+  }
+
+  RangeImage finish() {
     forRows(height_, [&](int first, int last) {
       Rows rows{static_cast<std::size_t>(width_)};
-      for (int y = first; y < last; ++y) measureRow(y, rows);
+      std::vector<BilateralRows> filters;
+      filters.reserve(kFrequencies);
+      for (std::size_t f = 0; kinect_.bilateral_filter && f < kFrequencies; ++f) {
+        const auto least = static_cast<float>(kinect_.bilateral_threshold_counts / counts_[f]);
+        filters.emplace_back(result_.phasors[f], least, flags_);
+      }
+      for (int y = first; y < last; ++y) {
+        if (kinect_.bilateral_filter) filter(y, filters, rows);
+        measureRow(y, rows);
+      }
     });
     if (kinect_.edge_filter) dropEdges();
     return std::move(result_);
   }
 
  private:
-  void demodulate(int y) {
+  /// A row's numbers on their way from phases to range.
+  struct Rows {
+    explicit Rows(std::size_t width)
+        : unlikeness(width), zeros(width), ones(width, 1.0F), deviation(width), strongest(width), why(width) {
+      for (std::size_t f = 0; f < kFrequencies; ++f) {
+        filtered[f].resize(width);
+        cycles[f].resize(width);
+        amplitudes[f].resize(width);
+      }
+    }
+    std::array<std::vector<std::complex<float>>, kFrequencies> filtered;
+    std::vector<float> unlikeness;
+    std::array<std::vector<float>, kFrequencies> cycles, amplitudes;
+    std::vector<float> zeros, ones;
+    std::vector<double> deviation, strongest;
+    std::vector<std::uint32_t> why;
+  };
+
+  void demodulate(const Samples& samples, int from, int y) {
     const auto columns = static_cast<std::size_t>(width_);
     for (std::size_t f = 0; f < kFrequencies; ++f) {
       std::complex<float>* phasors = &result_.phasors[f](0, y);
-      demodulateRow(samples_, steps_, f, y, phasors);
+      demodulateRow(samples, steps_, f, from, phasors);
       takeOffPixelPhase(settings_, f, y, {phasors, columns});
       addAmplitudes(phasors, static_cast<float>(kFrequencies), columns, &result_.amplitude(0, y));
     }
-    unmodulatedRow(samples_, y, &result_.ambient(0, y));
+    unmodulatedRow(samples, from, &result_.ambient(0, y));
   }
 
   /// Saturated pixels have no phase that others could take.
-  void filter(std::size_t f) {
-    const auto least = static_cast<float>(kinect_.bilateral_threshold_counts / counts_[f]);
-    FilteredPhasors filtered = bilateralFilter(result_.phasors[f], least, samples_.flags);
-    markEdges(filtered.unlikeness.pixels(), static_cast<float>(kinect_.edge_unlikeness), is_edge_.pixels());
-    filtered_.push_back(std::move(filtered.phasors));
+  void filter(int y, std::vector<BilateralRows>& filters, Rows& rows) {
+    for (std::size_t f = 0; f < kFrequencies; ++f) {
+      filters[f].row(y, rows.filtered[f].data(), rows.unlikeness.data());
+      markEdges(rows.unlikeness, static_cast<float>(kinect_.edge_unlikeness),
+                {&is_edge_(0, y), rows.unlikeness.size()});
+    }
   }
 
   [[nodiscard]] KinectLimits limits() const {
@@ -98,21 +126,6 @@ class KinectDecoder {
             .baseline_square = is_exact ? baseline_m * baseline_m : 0.0};
   }
 
-  /// A row's numbers on their way from phases to range.
-  struct Rows {
-    explicit Rows(std::size_t width)
-        : zeros(width), ones(width, 1.0F), deviation(width), strongest(width), why(width) {
-      for (std::size_t f = 0; f < kFrequencies; ++f) {
-        cycles[f].resize(width);
-        amplitudes[f].resize(width);
-      }
-    }
-    std::array<std::vector<float>, kFrequencies> cycles, amplitudes;
-    std::vector<float> zeros, ones;
-    std::vector<double> deviation, strongest;
-    std::vector<std::uint32_t> why;
-  };
-
   void measureRow(int y, Rows& rows) {
     const auto columns = static_cast<std::size_t>(width_);
     KinectSeen seen{.cycles = {},
@@ -121,7 +134,9 @@ class KinectDecoder {
                     .ray_z = rays_.z.empty() ? rows.ones.data() : &rays_.z(0, y)};
     for (std::size_t f = 0; f < kFrequencies; ++f) {
       std::vector<float>& cycles = rows.cycles[f];
-      polarRow(&filtered_[f](0, y), columns, zero_cycles_[f], cycles.data(), rows.amplitudes[f].data());
+      const std::complex<float>* phasors =
+          kinect_.bilateral_filter ? rows.filtered[f].data() : &result_.phasors[f](0, y);
+      polarRow(phasors, columns, zero_cycles_[f], cycles.data(), rows.amplitudes[f].data());
       if (f < settings_.true_cycles.size() && settings_.true_cycles[f].size() > 1)
         linearise(settings_.true_cycles[f], cycles);
       seen.cycles[f] = cycles.data();
@@ -130,8 +145,7 @@ class KinectDecoder {
     const KinectFound found{&result_.range_m(0, y), &brightness_(0, y), rows.deviation.data(),
                             rows.strongest.data(), rows.why.data()};
     if (measureKinectRow(seen, limits_, columns, found)) settleDoubts(rows);
-    judgeRow(samples_.flags.empty() ? nullptr : &samples_.flags(0, y), rows.why.data(), columns,
-             &result_.range_m(0, y), &result_.flags(0, y));
+    judgeRow(&flags_(0, y), rows.why.data(), columns, &result_.range_m(0, y), &result_.flags(0, y));
   }
 
   /// The threshold lies between the two; only a deviation that does, too, is worth two
@@ -162,7 +176,6 @@ class KinectDecoder {
     }
   }
 
-  const Samples& samples_;
   const DecodeSettings& settings_;
   const DecodeSettings::KinectV2& kinect_;
   const DecodeRays& rays_;
@@ -173,12 +186,19 @@ class KinectDecoder {
   std::array<double, kFrequencies> counts_{};  ///< of the device per electron of amplitude
   KinectLimits limits_{};
   RangeImage result_;
-  std::vector<Image<std::complex<float>>> filtered_;
+  Image<std::uint8_t> flags_;  ///< as the samples had them
   Image<float> brightness_;  ///< sum of the amplitudes in counts
   Image<std::uint8_t> is_edge_;
 };
 
-}  // namespace
+KinectV2Decoder::KinectV2Decoder(const Samples& shape, int width, int height, const DecodeSettings& settings,
+                                 const DecodeRays& rays)
+    : impl_(std::make_unique<Impl>(shape, width, height, settings, rays)) {}
+KinectV2Decoder::~KinectV2Decoder() = default;
+void KinectV2Decoder::take(int top, const Samples& samples, int first, int last) {
+  impl_->take(top, samples, first, last);
+}
+RangeImage KinectV2Decoder::finish() { return impl_->finish(); }
 
 double kinectV2Threshold(double counts, double strong_rad, double weak_rad) {
   // ln threshold = (ln counts · slope · log₁₀2 + offset) · log₂10
@@ -189,7 +209,9 @@ double kinectV2Threshold(double counts, double strong_rad, double weak_rad) {
 
 RangeImage decodeKinectV2(const Samples& samples, const DecodeSettings& settings,
                           const DecodeRays& rays) {
-  return KinectDecoder{samples, settings, rays}.decode();
+  KinectV2Decoder decoder{samples, samples.width(), samples.height(), settings, rays};
+  forRows(samples.height(), [&](int first, int last) { decoder.take(first, samples, first, last); });
+  return decoder.finish();
 }
 
 }  // namespace toftwin::sim

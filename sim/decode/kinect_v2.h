@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 
 #include <toftwin/image.h>
 
@@ -23,6 +24,24 @@ namespace toftwin::sim {
 RangeImage decodeKinectV2(const Samples& samples, const DecodeSettings& settings,
                           const DecodeRays& rays);
 
+/// The same of samples that need not all be there at once: they come in strips of rows, in any order and from many
+/// threads. `settings` and `rays` must live as long.
+class KinectV2Decoder {
+ public:
+  /// Of images like the one that `shape` describes, whose own images are not looked at.
+  KinectV2Decoder(const Samples& shape, int width, int height, const DecodeSettings& settings, const DecodeRays& rays);
+  ~KinectV2Decoder();
+
+  /// Rows first ≤ y < last of these samples are those of the image from `top` on.
+  void take(int top, const Samples& samples, int first, int last);
+  /// When every row was taken.
+  RangeImage finish();
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
 /// What the bilateral filter made of one frequency.
 struct FilteredPhasors {
   Image<std::complex<float>> phasors;
@@ -38,6 +57,19 @@ struct FilteredPhasors {
 /// saturated become and count as zero.
 FilteredPhasors bilateralFilter(const Image<std::complex<float>>& phasors, float least_amplitude,
                                 const Image<std::uint8_t>& flags = {});
+
+/// The same row by row: cheapest if they are asked for from top to bottom. Looks at the images as long as it lives.
+class BilateralRows {
+ public:
+  BilateralRows(const Image<std::complex<float>>& phasors, float least_amplitude, const Image<std::uint8_t>& flags);
+  BilateralRows(BilateralRows&&) noexcept;
+  ~BilateralRows();
+  void row(int y, std::complex<float>* phasors, float* unlikeness);
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
 
 /// Pixels that the edge filter drops: `depth_m` along the optical axis, NaN where invalid already;
 /// `is_edge` from the bilateral filter (unlikeness of 2.5 or more at any frequency); `brightness`

@@ -51,16 +51,6 @@ TOFTWIN_SIMD void splitRow(const std::complex<float>* phasors, const std::uint8_
   }
 }
 
-/// What is gathered for one row of the result.
-struct Sums {
-  explicit Sums(std::size_t width) : re(width), im(width), weight(width), unlikeness(width) {}
-  std::vector<float> re, im, weight, unlikeness;
-
-  void clear() {
-    for (auto* sum : {&re, &im, &weight, &unlikeness}) std::fill(sum->begin(), sum->end(), 0.0F);
-  }
-};
-
 /// eˣ for x in [−7.3, 0], relative error below 2e-5: (Taylor series of x/16)^16.
 inline float decay(float x) {
   const float t = x * (1.0F / 16.0F);
@@ -76,49 +66,60 @@ inline float decay(float x) {
   return e * e;
 }
 
-/// Adds the neighbour `shift` pixels to the right in row `other` to all inner pixels of `own`.
-TOFTWIN_SIMD void addNeighbour(const Row& own, const Row& other, int shift, float gauss,
-                               float least_square, Sums& sums) {
-  const std::size_t inner = own.re.size() - 2;
-  const float *u = &own.u[1], *v = &own.v[1], *square = &own.square[1];
-  const auto at = static_cast<std::size_t>(1 + shift);
-  const float *other_re = &other.re[at], *other_im = &other.im[at], *other_u = &other.u[at],
-              *other_v = &other.v[at], *other_square = &other.square[at];
-  float *re = &sums.re[1], *im = &sums.im[1], *total = &sums.weight[1],
-        *unlikeness = &sums.unlikeness[1];
-#pragma GCC ivdep
-  for (std::size_t x = 0; x < inner; ++x) {
-    const bool is_strong = square[x] >= least_square;
-    const float threshold = is_strong ? least_square : 0.0F;
-    const float falloff = is_strong ? kFalloff : 0.0F;
-    const float distance = 0.5F * (1.0F - (u[x] * other_u[x] + v[x] * other_v[x]));
-    const bool counts = (other_square[x] >= threshold) & (other_square[x] > 0.0F);
-    const float weight = counts ? gauss * decay(-falloff * distance) : 0.0F;
-    re[x] += counts ? weight * other_re[x] : 0.0F;
-    im[x] += counts ? weight * other_im[x] : 0.0F;
-    total[x] += weight;
-    unlikeness[x] += counts ? distance : 0.0F;
+/// How unlike pixels are, (1 − cos Δφ)/2, and what is left of a neighbour's weight for that: the same both ways.
+struct Pairs {
+  explicit Pairs(std::size_t width) : distance(width), decayed(width) {}
+  std::vector<float> distance, decayed;
+};
+
+/// Pixel x of one row and pixel x of another, from their directions.
+TOFTWIN_SIMD void compare(const float* __restrict u, const float* __restrict v, const float* __restrict other_u,
+                          const float* __restrict other_v, std::size_t count, float* __restrict distance,
+                          float* __restrict decayed) {
+  for (std::size_t x = 0; x < count; ++x) {
+    distance[x] = 0.5F * (1.0F - (u[x] * other_u[x] + v[x] * other_v[x]));
+    decayed[x] = decay(-kFalloff * distance[x]);
   }
 }
 
-/// The filtered row; its ends stay as they are.
-TOFTWIN_SIMD void finishRow(const Row& own, const Sums& sums, std::complex<float>* phasors,
-                            float* __restrict unlikeness) {
+/// One neighbour of all pixels of a row: numbers of the pixel x of it at x.
+struct Neighbour {
+  const float *re, *im, *square, *distance, *decayed;
+  float gauss;
+};
+
+/// The filtered row without its ends, and the unlikeness of its pixels.
+TOFTWIN_SIMD void filterRow(const Row& own, const Neighbour* neighbours, float least_square,
+                            std::complex<float>* phasors, float* __restrict unlikeness) {
+  constexpr int kCount = 8;
+  Neighbour n[kCount];
+  for (int i = 0; i < kCount; ++i) n[i] = neighbours[i];
   auto* __restrict parts = reinterpret_cast<float*>(phasors);
-  const float *square = own.square.data(), *own_re = own.re.data(), *own_im = own.im.data();
-  const float *re = sums.re.data(), *im = sums.im.data(), *total = sums.weight.data();
-  const float* unlike = sums.unlikeness.data();
+  const float *own_re = own.re.data(), *own_im = own.im.data(), *square = own.square.data();
   const std::size_t last = own.re.size() - 1;
+#pragma GCC ivdep
   for (std::size_t x = 1; x < last; ++x) {
+    const bool is_strong = square[x] >= least_square;
+    const float threshold = is_strong ? least_square : 0.0F;
+    float re = 0.0F, im = 0.0F, total = 0.0F, unlike = 0.0F;
+#pragma GCC unroll 8
+    for (int i = 0; i < kCount; ++i) {
+      // All are read, whether they count or not: what is read on a condition does not become vector code.
+      const float other = n[i].square[x], other_re = n[i].re[x], other_im = n[i].im[x];
+      const float distance = n[i].distance[x], decayed = n[i].decayed[x];
+      const bool counts = (other >= threshold) & (other > 0.0F);
+      const float like = is_strong ? decayed : 1.0F;  // in a weak pixel all count alike
+      const float weight = counts ? n[i].gauss * like : 0.0F;
+      re += counts ? weight * other_re : 0.0F;
+      im += counts ? weight * other_im : 0.0F;
+      total += weight;
+      unlike += counts ? distance : 0.0F;
+    }
     const bool is_signal = square[x] > 0.0F;  // not NaN
-    const float weight = 1.0F / (total[x] + kMiddle);
-    parts[2 * x] = is_signal ? (re[x] + kMiddle * own_re[x]) * weight : own_re[x];
-    parts[2 * x + 1] = is_signal ? (im[x] + kMiddle * own_im[x]) * weight : own_im[x];
-    unlikeness[x] = is_signal ? unlike[x] : 0.0F;
-  }
-  for (const std::size_t x : {std::size_t{0}, last}) {
-    parts[2 * x] = own_re[x];
-    parts[2 * x + 1] = own_im[x];
+    const float per_weight = 1.0F / (total + kMiddle), mine_re = own_re[x], mine_im = own_im[x];
+    parts[2 * x] = is_signal ? (re + kMiddle * mine_re) * per_weight : mine_re;
+    parts[2 * x + 1] = is_signal ? (im + kMiddle * mine_im) * per_weight : mine_im;
+    unlikeness[x] = is_signal ? unlike : 0.0F;
   }
 }
 
@@ -176,42 +177,102 @@ TOFTWIN_SIMD void dropRow(const EdgeRow& above, const EdgeRow& own, const EdgeRo
 
 }  // namespace
 
+class BilateralRows::Impl {
+ public:
+  Impl(const Image<std::complex<float>>& phasors, float least_amplitude, const Image<std::uint8_t>& flags)
+      : phasors_(phasors),
+        flags_(flags),
+        columns_(static_cast<std::size_t>(phasors.width())),
+        least_square_(least_amplitude * least_amplitude),
+        along_(columns_) {
+    rows_.fill(Row{columns_});
+    down_.fill({Pairs{columns_}, Pairs{columns_}, Pairs{columns_}});
+  }
+
+  void row(int y, std::complex<float>* phasors, float* unlikeness) {
+    if (y != last_ + 1) {
+      split(y - 1);
+      split(y);
+    }
+    split(y + 1);
+    last_ = y;
+    const Row& own = place(y);
+    for (const std::size_t x : {std::size_t{0}, columns_ - 1}) {
+      phasors[x] = {own.re[x], own.im[x]};
+      unlikeness[x] = 0.0F;
+    }
+    if (y == 0 || y == phasors_.height() - 1 || columns_ < 3) {
+      for (std::size_t x = 0; x < columns_; ++x) phasors[x] = {own.re[x], own.im[x]};
+      std::fill_n(unlikeness, columns_, 0.0F);
+      return;
+    }
+    compare(own.u.data(), own.v.data(), &own.u[1], &own.v[1], columns_ - 1, along_.distance.data(),
+            along_.decayed.data());
+    std::array<Neighbour, 8> neighbours;
+    auto* next = neighbours.data();
+    for (int shift : {-1, 0, 1}) {
+      *next++ = vertical(place(y - 1), shift, down_[parity(y - 1)][index(-shift)], shift);
+      if (shift != 0) *next++ = neighbour(own, shift, along_, shift < 0 ? -1 : 0, kBeside);
+      *next++ = vertical(place(y + 1), shift, down_[parity(y)][index(shift)], 0);
+    }
+    filterRow(own, neighbours.data(), least_square_, phasors, unlikeness);
+  }
+
+ private:
+  Row& place(int y) { return rows_[static_cast<std::size_t>((y + 3) % 3)]; }
+  static std::size_t parity(int y) { return static_cast<std::size_t>(y & 1); }
+  static std::size_t index(int shift) { return static_cast<std::size_t>(shift + 1); }
+
+  /// The pixels `shift` to the right in `other`, whose pairs with ours lie `at` further on.
+  static Neighbour neighbour(const Row& other, int shift, const Pairs& pairs, int at, float gauss) {
+    return {other.re.data() + shift, other.im.data() + shift,     other.square.data() + shift,
+            pairs.distance.data() + at, pairs.decayed.data() + at, gauss};
+  }
+  static Neighbour vertical(const Row& other, int shift, const Pairs& pairs, int at) {
+    return neighbour(other, shift, pairs, at, shift == 0 ? kBeside : kDiagonal);
+  }
+
+  /// Reads a row, and compares it with the one above if that was read before.
+  void split(int y) {
+    if (y < 0 || y >= phasors_.height()) return;
+    Row& row = place(y);
+    splitRow(&phasors_(0, y), flags_.empty() ? nullptr : &flags_(0, y), columns_, row.re.data(), row.im.data(),
+             row.u.data(), row.v.data(), row.square.data());
+    if (y == 0 || columns_ < 3) return;
+    const Row& above = place(y - 1);
+    for (int shift : {-1, 0, 1}) {
+      Pairs& pairs = down_[parity(y - 1)][index(shift)];
+      const std::size_t first = shift < 0 ? 1 : 0, other = shift > 0 ? 1 : 0;
+      compare(&above.u[first], &above.v[first], &row.u[other], &row.v[other], columns_ - first - other,
+              &pairs.distance[first], &pairs.decayed[first]);
+    }
+  }
+
+  const Image<std::complex<float>>& phasors_;
+  const Image<std::uint8_t>& flags_;
+  std::size_t columns_;
+  float least_square_;
+  std::array<Row, 3> rows_{Row{0}, Row{0}, Row{0}};  ///< y − 1, y, y + 1, in turns
+  /// Pixels x of an even row, of an odd one, with pixels x − 1, x and x + 1 of the next.
+  std::array<std::array<Pairs, 3>, 2> down_{{{Pairs{0}, Pairs{0}, Pairs{0}}, {Pairs{0}, Pairs{0}, Pairs{0}}}};
+  Pairs along_;      ///< pixels x and x + 1
+  int last_ = -9;  ///< row that was asked for
+};
+
+BilateralRows::BilateralRows(const Image<std::complex<float>>& phasors, float least_amplitude,
+                             const Image<std::uint8_t>& flags)
+    : impl_(std::make_unique<Impl>(phasors, least_amplitude, flags)) {}
+BilateralRows::BilateralRows(BilateralRows&&) noexcept = default;
+BilateralRows::~BilateralRows() = default;
+void BilateralRows::row(int y, std::complex<float>* phasors, float* unlikeness) { impl_->row(y, phasors, unlikeness); }
+
 FilteredPhasors bilateralFilter(const Image<std::complex<float>>& phasors, float least_amplitude,
                                 const Image<std::uint8_t>& flags) {
   const int width = phasors.width(), height = phasors.height();
   FilteredPhasors result{Image<std::complex<float>>{width, height}, Image<float>{width, height}};
-  const float least_square = least_amplitude * least_amplitude;
   forRows(height, [&](int first, int last) {
-    const auto columns = static_cast<std::size_t>(width);
-    std::array<Row, 3> rows{Row{columns}, Row{columns}, Row{columns}};  // y − 1, y, y + 1, in turns
-    const auto place = [&](int y) -> Row& { return rows[static_cast<std::size_t>((y + 3) % 3)]; };
-    const auto split = [&](int y) {
-      Row& row = place(y);
-      if (y >= 0 && y < height)
-        splitRow(&phasors(0, y), flags.empty() ? nullptr : &flags(0, y), columns, row.re.data(),
-                 row.im.data(), row.u.data(), row.v.data(), row.square.data());
-    };
-    split(first - 1);
-    split(first);
-    Sums sums{columns};
-    for (int y = first; y < last; ++y) {
-      split(y + 1);
-      const Row& own = place(y);
-      if (y == 0 || y == height - 1 || width < 3) {
-        for (std::size_t x = 0; x < columns; ++x)
-          result.phasors(static_cast<int>(x), y) = {own.re[x], own.im[x]};
-        continue;
-      }
-      const Row &above = place(y - 1), &below = place(y + 1);
-      sums.clear();
-      for (int shift : {-1, 0, 1}) {
-        const float gauss = shift == 0 ? kBeside : kDiagonal;
-        addNeighbour(own, above, shift, gauss, least_square, sums);
-        if (shift != 0) addNeighbour(own, own, shift, kBeside, least_square, sums);
-        addNeighbour(own, below, shift, gauss, least_square, sums);
-      }
-      finishRow(own, sums, &result.phasors(0, y), &result.unlikeness(0, y));
-    }
+    BilateralRows rows{phasors, least_amplitude, flags};
+    for (int y = first; y < last; ++y) rows.row(y, &result.phasors(0, y), &result.unlikeness(0, y));
   });
   return result;
 }

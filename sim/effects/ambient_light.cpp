@@ -6,10 +6,14 @@
 
 namespace toftwin::sim {
 
+bool AmbientLight::shines(const Light& light, const Conditions& now) const {
+  return now.moment.ambient && !light.truth.albedo.empty() &&
+         irradiance_per_klx * now.moment.ambient->in(kilolux) != 0.0;
+}
+
 Light AmbientLight::apply(Light light, const Conditions& now, const Random&) const {
-  if (!now.moment.ambient || light.truth.albedo.empty()) return light;
+  if (!shines(light, now)) return light;
   const double irradiance = irradiance_per_klx * now.moment.ambient->in(kilolux);
-  if (irradiance == 0.0) return light;
   const auto radiance_of_white = static_cast<float>(irradiance / std::numbers::pi);
   for (std::size_t i = 0; i < light.ambient.size(); ++i) {
     const float albedo = light.truth.albedo[i];

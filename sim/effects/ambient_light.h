@@ -28,6 +28,8 @@ struct AmbientLight {
         "irradiance_w_per_m2_per_klx", irradiance_per_klx, {0.0, 100.0},
         "in the camera's band, per kilolux: 0.27 for the sun through a 30 nm filter at 850 nm");
   }
+  /// Whether it adds anything.
+  [[nodiscard]] bool shines(const Light& light, const Conditions& now) const;
   [[nodiscard]] Light apply(Light light, const Conditions& now, const Random& random) const;
 };
 

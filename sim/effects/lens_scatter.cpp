@@ -4,28 +4,17 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <type_traits>
 #include <vector>
 
+#include "sim/effects/coarse_halo.h"
+#include "sim/effects/half_gaussian.h"
 #include "sim/effects/phasors.h"
 #include "sim/images/simd.h"
 
 namespace toftwin::sim {
 namespace {
-
-/// One half of a sampled Gaussian that sums to one, out to four standard deviations.
-std::vector<float> halfGaussian(double sigma) {
-  const auto reach = static_cast<std::size_t>(std::ceil(4.0 * sigma));
-  std::vector<float> half(reach + 1);
-  double sum = 0.0;
-  for (std::size_t i = 0; i <= reach; ++i) {
-    const double value = std::exp(-0.5 * static_cast<double>(i * i) / (sigma * sigma));
-    half[i] = static_cast<float>(value);
-    sum += i == 0 ? value : 2.0 * value;
-  }
-  for (float& value : half) value /= static_cast<float>(sum);
-  return half;
-}
 
 /// G * image, dark outside the image. Rows first, then columns, row by row so that memory is read
 /// in order.
@@ -157,62 +146,19 @@ Image<T> wideBlur(const Image<T>& image, const Recursion& filter) {
 
 constexpr double kWideFrom = 6.0;  ///< standard deviation, pixels; below, the recursion's error grows
 
-constexpr int kCell = 4;  ///< pixels, of the coarse image that a halo is blurred on
-/// From this standard deviation on the coarse image serves (tested with the rest).
-constexpr double kCoarseFrom = 12.0;
-/// Cells around the image: pixels at its border reach so far.
-constexpr int kRing = 2;
-/// What going down to cells and up again adds to the variance of a Gaussian, pixels²: cubic
-/// B-splines, both times. Wherever sampled, their sum, mean and variance (a third of a cell²) are
-/// exact, so that only the fourth moment depends on where in a cell light falls: of the peak 1.7e-4
-/// at 12 pixels, 5e-5 at 15.
-constexpr double kCellVariance = 2.0 * kCell * kCell / 3.0;
-
-/// The four cells from `first` on, counted with the ring, that a pixel's light goes to or comes
-/// from.
-struct Knots {
-  int first;
-  std::array<float, 4> weight;
-};
-
-Knots knotsOf(int pixel) {
-  const double place = (pixel + 0.5) / kCell - 0.5 + kRing, t = place - std::floor(place),
-               s = 1.0 - t;
-  return {static_cast<int>(std::floor(place)) - 1,
-          {static_cast<float>(s * s * s / 6.0),
-           static_cast<float>((4.0 - 6.0 * t * t + 3.0 * t * t * t) / 6.0),
-           static_cast<float>((4.0 - 6.0 * s * s + 3.0 * s * s * s) / 6.0),
-           static_cast<float>(t * t * t / 6.0)}};
-}
-
-std::vector<Knots> knotsOfAll(int pixels) {
-  std::vector<Knots> knots;
-  for (int i = 0; i < pixels; ++i) knots.push_back(knotsOf(i));
-  return knots;
-}
-
-int cellsAlong(int pixels) { return (pixels + kCell - 1) / kCell + 2 * kRing; }
-
-TOFTWIN_SIMD void addScaled(const float* __restrict in, float weight, int count,
-                            float* __restrict sum) {
-  for (int i = 0; i < count; ++i) sum[i] += weight * in[i];
-}
-
-TOFTWIN_SIMD void mixFour(const float* const* rows, const std::array<float, 4>& weight, int count,
-                          float* __restrict out) {
-  const float *a = rows[0], *b = rows[1], *c = rows[2], *d = rows[3];
-  for (int i = 0; i < count; ++i)
-    out[i] = weight[0] * a[i] + weight[1] * b[i] + weight[2] * c[i] + weight[3] * d[i];
-}
-
-/// out = kept · out + veil + spread · halo, complex numbers as two floats; the veil as well.
-TOFTWIN_SIMD void compose(const float* __restrict halo, float kept, float veil_even, float veil_odd,
-                          float spread, int pairs, float* __restrict out) {
-  for (int i = 0; i < pairs; ++i) {
-    out[2 * i] = kept * out[2 * i] + (veil_even + spread * halo[2 * i]);
-    out[2 * i + 1] = kept * out[2 * i + 1] + (veil_odd + spread * halo[2 * i + 1]);
+/// out = kept · in + veil + spread · halo, complex numbers as two floats; the veil as well. `in` may be `out`.
+TOFTWIN_SIMD void compose(const float* in, const float* __restrict halo, float kept, float veil_even, float veil_odd,
+                          float spread, int count, float* out) {
+#pragma GCC ivdep
+  for (int i = 0; i < count / 2; ++i) {
+    out[2 * i] = kept * in[2 * i] + (veil_even + spread * halo[2 * i]);
+    out[2 * i + 1] = kept * in[2 * i + 1] + (veil_odd + spread * halo[2 * i + 1]);
   }
+  if (count % 2 != 0) out[count - 1] = kept * in[count - 1] + (veil_even + spread * halo[count - 1]);
 }
+
+template <class T>
+constexpr int kPartsOf = sizeof(T) / sizeof(float);
 
 template <class T>
 const float* floatsOf(const T* values) {
@@ -223,77 +169,45 @@ float* floatsOf(T* values) {
   return reinterpret_cast<float*>(values);
 }
 
-/// Mean light of cells and of a dark ring around, into which light is scattered too.
-template <class T>
-Image<T> cellsOf(const Image<T>& image, const std::vector<Knots>& columns,
-                 const std::vector<Knots>& rows) {
-  constexpr int kParts = sizeof(T) / sizeof(float);
-  const int width = image.width();
-  Image<T> cells{cellsAlong(width), cellsAlong(image.height())};
-  inParallel(cells.height(), 4, [&](int first, int last) {
-    std::vector<T> sum(static_cast<std::size_t>(width));
-    for (int v = first; v < last; ++v) {
-      std::fill(sum.begin(), sum.end(), T{});
-      const int from = kCell * (v - kRing - 2), to = kCell * (v - kRing + 3);
-      for (int y = std::max(0, from); y < std::min(to, image.height()); ++y) {
-        const Knots& row = rows[static_cast<std::size_t>(y)];
-        if (v < row.first || v > row.first + 3) continue;
-        addScaled(floatsOf(&image(0, y)), row.weight[static_cast<std::size_t>(v - row.first)],
-                  width * kParts, floatsOf(sum.data()));
-      }
-      T* out = &cells(0, v);
-      for (std::size_t x = 0; x < sum.size(); ++x) {
-        T* near = out + columns[x].first;
-        for (std::size_t i = 0; i < 4; ++i) near[i] += columns[x].weight[i] * sum[x];
-      }
-      for (int u = 0; u < cells.width(); ++u) out[u] *= 1.0F / (kCell * kCell);
-    }
-  });
-  return cells;
-}
+/// An image's scattered light where the halo is wide: what its rows are made of.
+class ScatteredImage {
+ public:
+  template <class T>
+  ScatteredImage(const Image<T>& image, const LensScatter& lens)
+      : halo_(floatsOf(image.pixels().data()), image.width(), image.height(), kPartsOf<T>, lens.halo_radius),
+        kept_(static_cast<float>(1.0 - lens.veil - lens.halo)),
+        spread_(static_cast<float>(lens.halo)),
+        count_(image.width() * kPartsOf<T>) {
+    const double share = lens.veil / static_cast<double>(std::max<std::size_t>(image.size(), 1));
+    for (std::size_t part = 0; part < 2; ++part)
+      veil_[part] = static_cast<float>(halo_.sum()[part % static_cast<std::size_t>(kPartsOf<T>)] * share);
+  }
 
-/// Rows of cells with as many columns as the image has.
-template <class T>
-Image<T> widened(const Image<T>& cells, const std::vector<Knots>& columns) {
-  Image<T> wide{static_cast<int>(columns.size()), cells.height()};
-  inParallel(cells.height(), 4, [&](int first, int last) {
-    for (int v = first; v < last; ++v) {
-      T* out = &wide(0, v);
-      for (std::size_t x = 0; x < columns.size(); ++x) {
-        const T* in = &cells(columns[x].first, v);
-        const auto& [a, b, c, d] = columns[x].weight;
-        out[x] = a * in[0] + b * in[1] + c * in[2] + d * in[3];
-      }
-    }
-  });
-  return wide;
-}
+  /// Row y from the same of the image, which may be the same memory. `room` is for the halo.
+  void row(int y, const float* image, std::vector<float>& room, float* out) const {
+    room.resize(static_cast<std::size_t>(count_));
+    halo_.row(y, room.data());
+    compose(image, room.data(), kept_, veil_[0], veil_[1], spread_, count_, out);
+  }
 
-/// image = kept · image + veil + spread · halo, the halo on coarse cells.
-template <class T>
-void addCoarseHalo(Image<T>& image, float kept, T veil, float spread, double sigma) {
-  constexpr int kParts = sizeof(T) / sizeof(float);
-  const std::vector<Knots> columns = knotsOfAll(image.width()), rows = knotsOfAll(image.height());
-  const Image<T> cells = widened(
-      blur(cellsOf(image, columns, rows), halfGaussian(std::sqrt(sigma * sigma - kCellVariance) / kCell)), columns);
-  const float even = floatsOf(&veil)[0], odd = floatsOf(&veil)[kParts - 1];
-  forRows(image.height(), [&](int first_row, int last_row) {
-    const int count = image.width() * kParts;
-    std::vector<float> halo(static_cast<std::size_t>(count) + 1);
-    for (int y = first_row; y < last_row; ++y) {
-      const Knots& row = rows[static_cast<std::size_t>(y)];
-      const float* four[4];
-      for (int i = 0; i < 4; ++i) four[i] = floatsOf(&cells(0, row.first + i));
-      mixFour(four, row.weight, count, halo.data());
-      float* out = floatsOf(&image(0, y));
-      compose(halo.data(), kept, even, odd, spread, count / 2, out);
-      if (count % 2 != 0) out[count - 1] = kept * out[count - 1] + (even + spread * halo[halo.size() - 2]);
-    }
-  });
-}
+ private:
+  CoarseHalo halo_;
+  std::array<float, 2> veil_{};
+  float kept_, spread_;
+  int count_;
+};
 
 template <class T, class Sum>
 void scatter(Image<T>& image, const LensScatter& lens, Sum sum) {
+  if (goesByRows(lens)) {
+    const ScatteredImage scattered{image, lens};
+    forRows(image.height(), [&](int first, int last) {
+      std::vector<float> room;
+      for (int y = first; y < last; ++y)
+        scattered.row(y, floatsOf(&image(0, y)), room, floatsOf(&image(0, y)));
+    });
+    return;
+  }
   if (lens.veil > 0.0) {
     for (const T& value : image.pixels()) sum += value;
   }
@@ -301,10 +215,6 @@ void scatter(Image<T>& image, const LensScatter& lens, Sum sum) {
       sum * (lens.veil / static_cast<double>(std::max<std::size_t>(image.size(), 1))));
   const auto kept = static_cast<float>(1.0 - lens.veil - lens.halo);
   const auto spread = static_cast<float>(lens.halo);
-  if (lens.halo > 0.0 && lens.halo_radius >= kCoarseFrom) {
-    addCoarseHalo(image, kept, veil, spread, lens.halo_radius);
-    return;
-  }
   Image<T> halo;
   if (lens.halo > 0.0) {
     halo = lens.halo_radius < kWideFrom ? blur(image, halfGaussian(lens.halo_radius))
@@ -317,6 +227,56 @@ void scatter(Image<T>& image, const LensScatter& lens, Sum sum) {
 }
 
 }  // namespace
+
+bool goesByRows(const LensScatter& lens) {
+  return lens.halo > 0.0 && lens.halo_radius >= CoarseHalo::kLeastSigma;
+}
+
+struct ScatteredRows::Impl {
+  const Light& light;
+  std::vector<std::optional<ScatteredImage>> phasors;
+  ScatteredImage steady;
+  std::optional<ScatteredImage> ambient;  ///< if there is any
+};
+
+ScatteredRows::ScatteredRows(const LensScatter& lens, const Light& light, std::span<const std::uint8_t> wanted) {
+  auto impl = std::make_unique<Impl>(Impl{light, {}, {light.steady, lens}, {}});
+  if (std::ranges::any_of(light.ambient.pixels(), [](float radiance) { return radiance != 0.0F; }))
+    impl->ambient.emplace(light.ambient, lens);
+  for (std::size_t term = 0; term < light.phasors.size(); ++term) {
+    auto& scattered = impl->phasors.emplace_back();
+    if (!light.phasors[term].empty() && wanted[term] != 0) scattered.emplace(light.phasors[term], lens);
+  }
+  impl_ = std::move(impl);
+}
+ScatteredRows::~ScatteredRows() = default;
+
+Light ScatteredRows::room(int rows) const {
+  const Light& light = impl_->light;
+  Light part;
+  part.frequencies = light.frequencies;
+  part.harmonics = light.harmonics;
+  part.error = light.error;
+  part.steady = part.ambient = Image<float>{light.width(), rows};
+  for (const auto& scattered : impl_->phasors) {
+    part.phasors.push_back(scattered ? Image<std::complex<float>>{light.width(), rows}
+                                     : Image<std::complex<float>>{});
+  }
+  return part;
+}
+
+void ScatteredRows::write(int top, int rows, Light& part) const {
+  const Light& light = impl_->light;
+  std::vector<float> room;
+  const auto write = [&](const ScatteredImage& scattered, const auto& image, auto& to) {
+    for (int y = 0; y < rows; ++y) scattered.row(top + y, floatsOf(&image(0, top + y)), room, floatsOf(&to(0, y)));
+  };
+  write(impl_->steady, light.steady, part.steady);
+  if (impl_->ambient) write(*impl_->ambient, light.ambient, part.ambient);
+  for (std::size_t term = 0; term < part.phasors.size(); ++term) {
+    if (impl_->phasors[term]) write(*impl_->phasors[term], light.phasors[term], part.phasors[term]);
+  }
+}
 
 std::string LensScatter::problem() const {
   return veil + halo < 1.0 ? "" : "scatters all light: veil and halo together must be less than 1";

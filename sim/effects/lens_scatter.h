@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
+#include <memory>
+#include <span>
 #include <string>
 
 #include "sim/effects/effect.h"
@@ -38,6 +41,27 @@ struct LensScatter {
   /// What no single key can say of what is wrong, or nothing.
   [[nodiscard]] std::string problem() const;
   [[nodiscard]] Light apply(Light light, const Conditions& now, const Random& random) const;
+};
+
+/// Whether the halo is wide enough for ScatteredRows.
+bool goesByRows(const LensScatter& lens);
+
+/// What LensScatter::apply() gives, bit by bit, in strips of rows that are made where they are used. Looks at the
+/// light as long as it lives; may be read from many threads.
+class ScatteredRows {
+ public:
+  /// Of the phasors for which `wanted` is not 0.
+  ScatteredRows(const LensScatter& lens, const Light& light, std::span<const std::uint8_t> wanted);
+  ~ScatteredRows();
+
+  /// A strip of so many rows to write into; what is not wanted is an empty image.
+  [[nodiscard]] Light room(int rows) const;
+  /// Writes the light's rows `top` … `top` + `rows` − 1 into the strip's first.
+  void write(int top, int rows, Light& part) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<const Impl> impl_;
 };
 
 }  // namespace toftwin::sim

@@ -23,6 +23,7 @@ struct Response {
   /// Least charge of a tap per mean charge, over all phases: negative is impossible for a real
   /// pixel.
   [[nodiscard]] double leastCharge() const;
+  bool operator==(const Response&) const = default;
 };
 
 /// ĉₙ of an emitted and a demodulating waveform. Empty if either has no fundamental.

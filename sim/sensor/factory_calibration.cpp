@@ -55,6 +55,14 @@ std::vector<float> trueCyclesOf(const Response& response, int steps) {
 std::vector<Image<std::complex<float>>> pixelTurnsOf(const std::vector<AnyEffect>& effects,
                                                      const std::vector<Response>& responses,
                                                      const CameraInfo& camera) {
+  const auto isMeasured = [](const AnyEffect& any) {
+    return std::visit(
+        []<class E>(const E&) {
+          return std::is_same_v<ImageOf<E>, Light> && E::about.explains == Covariates{Covariate::Position};
+        },
+        any);
+  };
+  if (std::ranges::none_of(effects, isMeasured)) return {};
   Light light;
   for (const Response& response : responses) {
     light.frequencies.push_back(response.frequency);
@@ -63,21 +71,15 @@ std::vector<Image<std::complex<float>>> pixelTurnsOf(const std::vector<AnyEffect
   light.steady = light.ambient = Image<float>{camera.width, camera.height};
   const Moment moment;
   const Conditions now{moment, camera};
-  bool is_any = false;
   for (std::size_t place = 0; place < effects.size(); ++place) {
+    if (!isMeasured(effects[place])) continue;
     std::visit(
         [&]<class E>(const E& effect) {
-          if constexpr (std::is_same_v<ImageOf<E>, Light>) {
-            constexpr Covariates on = E::about.explains;
-            if (on == Covariates{Covariate::Position}) {
-              light = effect.apply(std::move(light), now, Random{0, 0, effectKey(E::about.name, place)});
-              is_any = true;
-            }
-          }
+          if constexpr (std::is_same_v<ImageOf<E>, Light>)
+            light = effect.apply(std::move(light), now, Random{0, 0, effectKey(E::about.name, place)});
         },
         effects[place]);
   }
-  if (!is_any) return {};
   constexpr double kStep_rad = 0.000031 * std::numbers::pi;
   for (Image<std::complex<float>>& phasor : light.phasors) {
     for (std::complex<float>& p : phasor.pixels()) {

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // From light to samples to ranges: what a sensor model does with each frame.
 #include <algorithm>
+#include <functional>
+#include <memory>
 #include <string_view>
 #include <type_traits>
 #include <utility>
 #include <variant>
 
+#include "sim/decode/kinect_v2.h"
 #include "sim/effects/charge_noise.h"
 #include "sim/images/rows.h"
 #include "sim/sensor/correlate.h"
@@ -59,43 +62,61 @@ Samples applyOnSamples(Samples samples, const std::vector<AnyEffect>& effects, c
 }
 
 /// Effects on samples look at one pixel at a time: strip by strip, samples stay in the processor's cache
-/// from the first effect to the last. `fill(top, part)` writes what the rows from `top` on hold before them.
-template <class Fill>
-void countInStrips(const Fill& fill, const std::vector<AnyEffect>& effects, const Conditions& now,
-                   std::uint64_t seed, std::uint64_t frame, std::size_t exposure, Samples& samples) {
-  constexpr int kRows = 16;
-  const int width = samples.width(), height = samples.height();
-  Image<std::uint8_t> flags{width, height};
-  std::vector<std::uint8_t> is_flagged(static_cast<std::size_t>(height));
-  const auto strip = [&](int top, Samples part) {
-    const auto count = static_cast<std::ptrdiff_t>(width) * part.height();
-    fill(top, part);
-    Conditions here = now;
-    here.top += top;
-    part = applyOnSamples(std::move(part), effects, here, seed, frame, exposure);
-    for (std::size_t i = 0; i < part.electrons.size(); ++i)
-      std::copy_n(&part.electrons[i](0, 0), count, &samples.electrons[i](0, top));
-    if (part.flags.empty()) return part;
-    std::copy_n(&part.flags(0, 0), count, &flags(0, top));
-    is_flagged[static_cast<std::size_t>(top)] = 1;
-    return part;
-  };
+/// from the first effect to the last. `filler()` makes, for one thread, what writes the samples from row `top` on as they
+/// are before them, `fill(top, part)`; `take(top, part)` reads what they are after them, on many threads.
+template <class Filler, class Take>
+void countInStrips(const Samples& shape, int width, int height, const Filler& filler, const std::vector<AnyEffect>& effects,
+                   const Conditions& now, std::uint64_t seed, std::uint64_t frame, std::size_t exposure,
+                   const Take& take) {
+  constexpr int kRows = 8;
+  const std::size_t images = shape.frequencies.size() * static_cast<std::size_t>(shape.steps * shape.taps);
   inParallel((height + kRows - 1) / kRows, 1, [&](int first, int last) {
-    Samples part{.frequencies = samples.frequencies, .steps = samples.steps, .taps = samples.taps};
+    auto fill = filler();
+    Samples part{.frequencies = shape.frequencies, .steps = shape.steps, .taps = shape.taps};
     for (int i = first; i < last; ++i) {
-      const int rows = std::min(kRows, height - i * kRows);
-      if (part.height() != rows) part.electrons.assign(samples.electrons.size(), Image<float>{width, rows});
+      const int top = i * kRows, rows = std::min(kRows, height - top);
+      if (part.height() != rows) part.electrons.assign(images, Image<float>{width, rows});
       part.flags = {};
-      part = strip(i * kRows, std::move(part));
+      fill(top, part);
+      Conditions here = now;
+      here.top += top;
+      part = applyOnSamples(std::move(part), effects, here, seed, frame, exposure);
+      take(top, part);
     }
   });
-  if (std::ranges::count(is_flagged, 1) > 0) samples.flags = std::move(flags);
 }
+
+/// Puts strips of counted samples together.
+class WholeSamples {
+ public:
+  explicit WholeSamples(Samples& samples)
+      : samples_(samples),
+        flags_(samples.width(), samples.height()),
+        is_flagged_(static_cast<std::size_t>(samples.height())) {}
+
+  void take(int top, const Samples& part) {
+    const auto count = static_cast<std::ptrdiff_t>(samples_.width()) * part.height();
+    for (std::size_t i = 0; i < part.electrons.size(); ++i)
+      std::copy_n(&part.electrons[i](0, 0), count, &samples_.electrons[i](0, top));
+    if (part.flags.empty()) return;
+    std::copy_n(&part.flags(0, 0), count, &flags_(0, top));
+    is_flagged_[static_cast<std::size_t>(top)] = 1;
+  }
+  void finish() {
+    if (std::ranges::count(is_flagged_, 1) > 0) samples_.flags = std::move(flags_);
+  }
+
+ private:
+  Samples& samples_;
+  Image<std::uint8_t> flags_;
+  std::vector<std::uint8_t> is_flagged_;  ///< by the strip's top
+};
 
 /// The same of samples that were collected.
 Samples applyInStrips(Samples samples, const std::vector<AnyEffect>& effects, const Conditions& now,
                       std::uint64_t seed, std::uint64_t frame, std::size_t exposure) {
-  const auto take = [&](int top, Samples& part) {
+  WholeSamples whole{samples};
+  const auto fill = [&](int top, Samples& part) {
     const auto count = static_cast<std::ptrdiff_t>(samples.width()) * part.height();
     for (std::size_t i = 0; i < part.electrons.size(); ++i)
       std::copy_n(&samples.electrons[i](0, top), count, &part.electrons[i](0, 0));
@@ -103,16 +124,22 @@ Samples applyInStrips(Samples samples, const std::vector<AnyEffect>& effects, co
     part.flags = Image<std::uint8_t>{part.width(), part.height()};
     std::copy_n(&samples.flags(0, top), count, &part.flags(0, 0));
   };
-  countInStrips(take, effects, now, seed, frame, exposure, samples);
+  countInStrips(samples, samples.width(), samples.height(), [&] { return fill; }, effects, now, seed, frame, exposure,
+                [&](int top, const Samples& part) { whole.take(top, part); });
+  whole.finish();
   return samples;
 }
 
-bool anyActsOnLight(const std::vector<AnyEffect>& effects) {
+/// Those that change this light.
+std::vector<const AnyEffect*> actingOnLight(const std::vector<AnyEffect>& effects, const Light& light,
+                                            const Conditions& now) {
+  std::vector<const AnyEffect*> acting;
   for (const AnyEffect& any : effects) {
-    if (std::visit([]<class E>(const E&) { return std::is_same_v<ImageOf<E>, Light>; }, any))
-      return true;
+    if (!std::visit([]<class E>(const E&) { return std::is_same_v<ImageOf<E>, Light>; }, any)) continue;
+    const auto* ambient = std::get_if<AmbientLight>(&any);
+    if (ambient == nullptr || ambient->shines(light, now)) acting.push_back(&any);
   }
-  return false;
+  return acting;
 }
 
 bool anyAsksForTheScene(const std::vector<AnyEffect>& effects) {
@@ -159,6 +186,42 @@ Samples samplesOf(const SensorModel::Impl& impl, const Light& light) {
   return joinExposures(parts);
 }
 
+/// Samples of so many pixels, all zero.
+Samples rowsOfSamples(const SensorModel::Impl& impl, int width, int height) {
+  Samples samples{.steps = impl.file.sampling.steps, .taps = impl.file.sampling.taps};
+  for (const Response& response : impl.responses) samples.frequencies.push_back(response.frequency);
+  if (width > 0) {
+    samples.electrons.assign(samples.frequencies.size() * static_cast<std::size_t>(samples.steps * samples.taps),
+                             Image<float>{width, height});
+  }
+  return samples;
+}
+
+/// The scatter, if it alone acts and can be made row by row.
+const LensScatter* onlyScatter(const std::vector<const AnyEffect*>& acting) {
+  const auto* scatter = acting.size() == 1 ? std::get_if<LensScatter>(acting.front()) : nullptr;
+  return scatter != nullptr && goesByRows(*scatter) ? scatter : nullptr;
+}
+
+/// Scatters and correlates row by row. One for each thread.
+class ScatteredFill {
+ public:
+  ScatteredFill(const ScatteredRows& scattered, const std::vector<Response>& responses, int steps, int taps)
+      : scattered_(scattered), row_(std::make_unique<Light>(scattered.room(1))), correlator_(*row_, responses, steps, taps) {}
+
+  void operator()(int top, Samples& part) {
+    for (int y = 0; y < part.height(); ++y) {
+      scattered_.write(top + y, 1, *row_);
+      correlator_.collect(-y, y, y + 1, part);
+    }
+  }
+
+ private:
+  const ScatteredRows& scattered_;
+  std::unique_ptr<Light> row_;  ///< whose place the correlator knows
+  Correlator correlator_;
+};
+
 RangeImage decodeRegion(const SensorModel::Impl& impl, const Samples& samples, int left, int top) {
   const int width = samples.width(), height = samples.height();
   DecodeSettings settings = impl.decoder;
@@ -172,24 +235,53 @@ RangeImage decodeRegion(const SensorModel::Impl& impl, const Samples& samples, i
 SensorModel::Exposed SensorModel::expose(const Light& light, const Moment& moment,
                                          std::uint64_t seed, std::uint64_t frame, int region_x,
                                          int region_y, History before) const {
-  if (impl_->file.isPulsed() || exposureCount() > 1 || remembers()) {
+  if (!countsInStrips()) {
     return readOut(collect(light, moment, seed, frame, region_x, region_y), moment, seed, frame, region_x,
                    region_y, before);
   }
-  // The same without whole images of what is collected: a strip's samples are made where its effects find
-  // them.
   const Conditions now{moment, impl_->camera, region_x, region_y, before};
-  const bool is_changed = anyActsOnLight(impl_->effects);
-  const Light changed = is_changed ? lightAfterEffects(light, now, seed, frame) : Light{};
-  const Light& seen = is_changed ? changed : light;
-  const std::vector<Response> responses = responsesFor(*impl_, impl_->file.sampling.exposure_factors.front());
-  const Correlator correlator{seen, responses, impl_->file.sampling.steps, impl_->file.sampling.taps};
-  Samples counted = correlator.rows(seen.height());
-  countInStrips([&](int top, Samples& part) { correlator.collect(top, 0, part.height(), part); },
-                impl_->effects, now, seed, frame, 0, counted);
+  Samples counted = rowsOfSamples(*impl_, light.width(), light.height());
+  WholeSamples whole{counted};
+  countLight(light, now, seed, frame, [&](int top, const Samples& part) { whole.take(top, part); });
+  whole.finish();
   Exposed exposed = decodeCounted(std::move(counted), now);
   exposed.range = applyAll(std::move(exposed.range), impl_->effects, now, seed, frame);
   return exposed;
+}
+
+RangeImage SensorModel::measure(const Light& light, const Moment& moment, std::uint64_t seed, std::uint64_t frame) const {
+  const bool is_whole = light.width() == impl_->camera.width && light.height() == impl_->camera.height;
+  if (!countsInStrips() || !is_whole || impl_->decoder.algorithm != DecodeSettings::Algorithm::KinectV2)
+    return expose(light, moment, seed, frame).range;
+  const Conditions now{moment, impl_->camera};
+  KinectV2Decoder decoder{rowsOfSamples(*impl_, 0, 0), light.width(), light.height(), impl_->decoder, impl_->rays};
+  countLight(light, now, seed, frame,
+             [&](int top, const Samples& part) { decoder.take(top, part, 0, part.height()); });
+  return applyAll(decoder.finish(), impl_->effects, now, seed, frame);
+}
+
+bool SensorModel::countsInStrips() const { return !impl_->file.isPulsed() && exposureCount() == 1 && !remembers(); }
+
+/// From light to counted samples without whole images of what is collected: a strip's samples are made where its
+/// effects find them, and so is the scattered light.
+void SensorModel::countLight(const Light& light, const Conditions& now, std::uint64_t seed, std::uint64_t frame,
+                             const std::function<void(int, const Samples&)>& take) const {
+  const std::vector<Response> responses = responsesFor(*impl_, impl_->file.sampling.exposure_factors.front());
+  const int steps = impl_->file.sampling.steps, taps = impl_->file.sampling.taps;
+  const Samples shape = rowsOfSamples(*impl_, 0, 0);
+  const auto count = [&](const auto& filler) {
+    countInStrips(shape, light.width(), light.height(), filler, impl_->effects, now, seed, frame, 0, take);
+  };
+  const auto acting = actingOnLight(impl_->effects, light, now);
+  if (const LensScatter* scatter = onlyScatter(acting)) {
+    const ScatteredRows scattered{*scatter, light, sim::correlatedTerms(responses, light.harmonics)};
+    count([&] { return ScatteredFill{scattered, responses, steps, taps}; });
+    return;
+  }
+  const bool is_changed = !acting.empty();
+  const Light changed = is_changed ? lightAfterEffects(light, now, seed, frame) : Light{};
+  const Correlator correlator{is_changed ? changed : light, responses, steps, taps};
+  count([&] { return [&](int top, Samples& part) { correlator.collect(top, 0, part.height(), part); }; });
 }
 
 Light SensorModel::lightAfterEffects(const Light& light, const Conditions& now, std::uint64_t seed,
@@ -202,8 +294,8 @@ Light SensorModel::lightAfterEffects(const Light& light, const Conditions& now, 
 
 Samples SensorModel::collect(const Light& light, const Moment& moment, std::uint64_t seed,
                              std::uint64_t frame, int region_x, int region_y) const {
-  if (!anyActsOnLight(impl_->effects)) return samplesOf(*impl_, light);
   const Conditions now{moment, impl_->camera, region_x, region_y};
+  if (actingOnLight(impl_->effects, light, now).empty()) return samplesOf(*impl_, light);
   return samplesOf(*impl_, lightAfterEffects(light, now, seed, frame));
 }
 

@@ -77,16 +77,20 @@ std::shared_ptr<const SensorModel::Impl> SensorModel::build(Impl impl) {
   impl.camera = cameraInfo(impl.file.lens);
   if (!impl.lens_id.empty()) impl.camera.calibration_id = impl.lens_id;
   impl.id = contentHash(canonicalText(impl.file, impl.effects));
-  impl.responses = responsesOf(impl.file);
-  // The table of a pulse takes 20 ms to make, and is the same for any effects and any lens.
+  // The tables of waveforms and of a pulse take 10 and 20 ms to make, and are the same for any effects and any lens.
+  const std::vector<Response> before = std::move(impl.responses);
+  std::vector<std::vector<float>> true_cycles = std::move(impl.decoder.true_cycles);
   std::vector<double> pulse_ranges_m = std::move(impl.decoder.pulse_ranges_m);
+  impl.responses = responsesOf(impl.file);
   impl.decoder = impl.file.decoder;
   const auto& sampling = impl.file.sampling;
-  for (const Response& response : impl.responses) {
+  for (std::size_t i = 0; i < impl.responses.size(); ++i) {
+    const Response& response = impl.responses[i];
     if (sampling.factory_calibration == CameraFile::FactoryCalibration::None) break;
     impl.decoder.zero_phase.push_back(response.zeroPhase());
     if (sampling.factory_calibration != CameraFile::FactoryCalibration::Waveform) continue;
-    impl.decoder.true_cycles.push_back(trueCyclesOf(response, sampling.steps));
+    const bool is_known = i < true_cycles.size() && before[i] == response;
+    impl.decoder.true_cycles.push_back(is_known ? std::move(true_cycles[i]) : trueCyclesOf(response, sampling.steps));
   }
   for (const CameraFile::PulseKeys& keys : impl.file.pulses) {
     impl.decoder.pulse_scheme = keys.pulse.scheme;

@@ -162,6 +162,13 @@ bool meetOneTriangle(const Scene::Impl& scene, const RTCRayHit16& rays, PlaneLan
 
 void gather(const Scene::Impl& scene, const RTCRayHit16& rays, PlaneLanes& planes, Hits& hits) {
   for (std::size_t i = 0; i < kLaneCount; ++i) {
+    if (isMissed(rays, i)) continue;
+    const ObjectRow& row = scene.rows[rays.hit.geomID[i]];
+    const auto* plane = reinterpret_cast<const char*>(&row.planes[rays.hit.primID[i]]);
+    __builtin_prefetch(plane);
+    __builtin_prefetch(plane + sizeof(TrianglePlane) - 1);
+  }
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
     const bool is_missed = isMissed(rays, i);
     const ObjectRow& row = is_missed ? scene.rows.back() : scene.rows[rays.hit.geomID[i]];
     const TrianglePlane plane = planeIn(row, is_missed ? 0 : rays.hit.primID[i]);

@@ -14,6 +14,9 @@ namespace {
 /// Most samples in a coarse point's means; what moves in a scene leaves its light behind for so long.
 constexpr float kMostSamples = 128.0f, kMostWhereThingsMove = 16.0f;
 constexpr float kFewestSamples = 8.0f;
+/// The same of what lit places send to what stands still: it is known well from one frame alone, and moves with the
+/// shadows. (Moving objects may be bent, which leaves few neighbours to smooth over.)
+constexpr float kMostOfLitWhereThingsMove = 4.0f;
 /// Cells remember so many times the samples.
 constexpr int kCellsPerPoints = 2, kCellsWhereThingsMove = 4;
 /// Light is remembered for so much of the camera's way: its emitters move with it, which turns phasors.
@@ -29,22 +32,39 @@ constexpr double kSamePlane = 0.005, kSamePlace = 2.0, kSameFacing = 0.8;
 int coarse(int size) { return (size + CoarseGrid::kStep - 2) / CoarseGrid::kStep + 1; }
 
 /// Sums of a tile at (i, j) become means of the grid.
-void store(const CoarseTile& tile, int i, int j, int samples, CoarseGrid& grid) {
-  for (std::size_t lane = 0; lane < kLaneCount; ++lane) {
-    const int u = i + static_cast<int>(lane % 4), v = j + static_cast<int>(lane / 4);
-    if (u >= grid.width || v >= grid.height) continue;
-    grid.x(u, v) = tile.x[lane];
-    grid.y(u, v) = tile.y[lane];
-    grid.z(u, v) = tile.z[lane];
-    grid.normal_x(u, v) = tile.normal_x[lane];
-    grid.normal_y(u, v) = tile.normal_y[lane];
-    grid.normal_z(u, v) = tile.normal_z[lane];
-    grid.samples(u, v) = tile.valid[lane] != 0 ? static_cast<float>(samples) : 0.0f;
-    grid.variance_left(u, v) = 1.0f / static_cast<float>(samples);
-    for (std::size_t c = 0; c < grid.means.size(); ++c)
-      grid.means[c](u, v) = static_cast<float>(tile.sums[c][lane] / samples);
-    for (std::size_t f = 0; f < grid.squares.size(); ++f)
-      grid.squares[f](u, v) = static_cast<float>(tile.squares[f][lane] / samples);
+void store(const CoarseTile& tile, const Channels& channels, int i, int j, int samples, CoarseGrid& grid) {
+  const int width = std::min(4, grid.width - i), height = std::min(4, grid.height - j);
+  const auto put = [&](auto& image, const auto& value) {
+    for (int row = 0; row < height; ++row) {
+      auto* to = &image(i, j + row);
+      for (int column = 0; column < width; ++column) to[column] = value(static_cast<std::size_t>(4 * row + column));
+    }
+  };
+  const auto copy = [&](Image<float>& image, const Lanes<float>& lanes) {
+    put(image, [&](std::size_t lane) { return lanes[lane]; });
+  };
+  copy(grid.x, tile.x);
+  copy(grid.y, tile.y);
+  copy(grid.z, tile.z);
+  copy(grid.normal_x, tile.normal_x);
+  copy(grid.normal_y, tile.normal_y);
+  copy(grid.normal_z, tile.normal_z);
+  put(grid.samples, [&](std::size_t lane) { return tile.valid[lane] != 0 ? static_cast<float>(samples) : 0.0f; });
+  put(grid.variance_left, [&](std::size_t) { return 1.0f / static_cast<float>(samples); });
+  put(grid.lit_left, [&](std::size_t) { return 1.0f; });
+  put(grid.moves, [&](std::size_t lane) { return static_cast<std::uint8_t>(tile.moves[lane] != 0 ? 1 : 0); });
+  const double per_sample = 1.0 / samples;
+  for (std::size_t c = 0; c < grid.means.size(); ++c) {
+    copy(grid.lit[c], tile.lit[c]);
+    put(grid.means[c], [&](std::size_t lane) {
+      return tile.lit[c][lane] + static_cast<float>(tile.sums[c][lane] * per_sample);
+    });
+  }
+  for (std::size_t f = 0; f < grid.squares.size(); ++f) {
+    const std::size_t phasor = channels.first(f);
+    const Lanes<float>&re = tile.lit[Channels::re(phasor)], &im = tile.lit[Channels::im(phasor)];
+    put(grid.squares[f], [&](std::size_t lane) { return static_cast<float>(tile.squares[f][lane] * per_sample); });
+    put(grid.lit_squares[f], [&](std::size_t lane) { return re[lane] * re[lane] + im[lane] * im[lane]; });
   }
 }
 
@@ -68,7 +88,7 @@ std::vector<CellUpdate> gatherTiles(const Tracing& tracing, const IrradianceCell
     for (int t = begin; t != end; ++t) {
       const int i = t % columns * 4, j = t / columns * 4;
       gatherer.gather(i, j, first_sample, samples, updates[static_cast<std::size_t>(t)]);
-      store(gatherer.tile(), i, j, samples, grid);
+      store(gatherer.tile(), channels, i, j, samples, grid);
     }
   });
   return updates;
@@ -77,7 +97,13 @@ std::vector<CellUpdate> gatherTiles(const Tracing& tracing, const IrradianceCell
 /// In order, whoever made them: the cells do not depend on the threads.
 void update(const std::vector<CellUpdate>& updates, int memory, std::size_t channels, IrradianceCells& cells) {
   std::vector<float> sample(channels);
-  for (const CellUpdate& update : updates) {
+  const auto prepare = [&](std::size_t number) {
+    if (number >= updates.size()) return;
+    for (const auto key : updates[number].keys.v) cells.prepare(key);
+  };
+  for (std::size_t number = 0; number < updates.size(); ++number) {
+    const CellUpdate& update = updates[number];
+    prepare(number + 1);
     for (std::size_t lane = 0; lane < kLaneCount; ++lane) {
       if (update.keys[lane] == 0) continue;
       for (std::size_t c = 0; c < channels; ++c) sample[c] = update.values[c][lane];
@@ -124,6 +150,49 @@ class Past {
   Transform<Camera, Camera> before_from_camera_;
 };
 
+/// What a row's points go on from: places in the grid before, and the share that what is new has beside it.
+struct Remembered {
+  explicit Remembered(std::size_t width) : place(width), share(width), lit_share(width) {}
+  void forget(std::size_t at) {
+    place[at] = 0;
+    share[at] = lit_share[at] = 1.0f;
+  }
+  std::vector<std::size_t> place;
+  std::vector<float> share, lit_share;
+};
+
+void blendRow(const CoarseGrid& before, const Remembered& row, int v, CoarseGrid& grid) {
+  if (before.width == 0) return;
+  const auto width = static_cast<std::size_t>(grid.width);
+  const auto blend = [&](Image<float>& image, const Image<float>& old, const std::vector<float>& shares) {
+    float* now = &image(0, v);
+    for (std::size_t u = 0; u < width; ++u) now[u] = old[row.place[u]] + shares[u] * (now[u] - old[row.place[u]]);
+  };
+  const auto leave = [&](Image<float>& image, const Image<float>& old, const std::vector<float>& shares) {
+    float* now = &image(0, v);
+    for (std::size_t u = 0; u < width; ++u) {
+      const float share = shares[u], rest = 1.0f - share;
+      now[u] = share * share * now[u] + rest * rest * old[row.place[u]];
+    }
+  };
+  for (std::size_t c = 0; c < grid.means.size(); ++c) {
+    float *lit = &grid.lit[c](0, v), *all = &grid.means[c](0, v);
+    const Image<float>&old_lit = before.lit[c], &old_all = before.means[c];
+    for (std::size_t u = 0; u < width; ++u) {
+      const float was_lit = old_lit[row.place[u]], was_rest = old_all[row.place[u]] - was_lit;
+      const float rest = was_rest + row.share[u] * (all[u] - lit[u] - was_rest);
+      lit[u] = was_lit + row.lit_share[u] * (lit[u] - was_lit);
+      all[u] = lit[u] + rest;
+    }
+  }
+  for (std::size_t f = 0; f < grid.squares.size(); ++f) {
+    blend(grid.squares[f], before.squares[f], row.share);
+    blend(grid.lit_squares[f], before.lit_squares[f], row.lit_share);
+  }
+  leave(grid.variance_left, before.variance_left, row.share);
+  leave(grid.lit_left, before.lit_left, row.lit_share);
+}
+
 }  // namespace
 
 void CoarseGrid::resize(int new_width, int new_height, std::size_t channels, std::size_t frequencies) {
@@ -139,14 +208,24 @@ void CoarseGrid::resize(int new_width, int new_height, std::size_t channels, std
   std::for_each(squares.begin(), squares.end(), fit);
 }
 
+void CoarseGrid::resizeWithLit(int new_width, int new_height, std::size_t channels, std::size_t frequencies) {
+  resize(new_width, new_height, channels, frequencies);
+  if (lit.size() == channels && lit_left.width() == width && lit_left.height() == height) return;
+  lit_left = Image<float>(width, height);
+  lit.assign(channels, lit_left);
+  lit_squares.assign(frequencies, lit_left);
+  moves = Image<std::uint8_t>(width, height);
+}
+
 Channels::Channels(const TraceRequest& request, std::span<const std::uint8_t> wanted) {
   const auto harmonics = static_cast<std::size_t>(request.harmonics);
   for (std::size_t term = 0; term < request.frequencies.size() * harmonics; ++term) {
     const bool is_first = term % harmonics == 0;
     if (is_first) firsts_.push_back(terms_.size());
+    if (is_first) last_orders_.push_back(1);
     if (!is_first && !wanted.empty() && wanted[term] == 0) continue;
     terms_.push_back(term);
-    const int order = static_cast<int>(term % harmonics) + 1;
+    const int order = last_orders_.back() = static_cast<int>(term % harmonics) + 1;
     if (const auto at = std::ranges::lower_bound(orders_, order); at == orders_.end() || *at != order)
       orders_.insert(at, order);
   }
@@ -170,8 +249,9 @@ IndirectLight::Memory IndirectLight::memoryFor(const Tracing& tracing, int sampl
   const auto points = way * static_cast<double>(most) > allowed
                           ? std::max(kFewestSamples, static_cast<float>(allowed / way))
                           : most;
-  const int per_point = !tracing.scene.poses.empty() ? kCellsWhereThingsMove : kCellsPerPoints;
-  return {points, per_point * static_cast<int>(points)};
+  const bool is_moving = !tracing.scene.poses.empty();
+  const int per_point = is_moving ? kCellsWhereThingsMove : kCellsPerPoints;
+  return {points, is_moving ? std::min(points, kMostOfLitWhereThingsMove) : points, per_point * static_cast<int>(points)};
 }
 
 IndirectLight::IndirectLight() : lights_(std::make_unique<LitPoints>()) {}
@@ -192,7 +272,7 @@ void IndirectLight::gather(const Tracing& tracing, const Channels& channels, int
     pose_ = request.world_from_camera;
   }
   std::swap(before_, grid_);
-  grid_.resize(width, height, channels.count(), request.frequencies.size());
+  grid_.resizeWithLit(width, height, channels.count(), request.frequencies.size());
   const Memory memory = memoryFor(tracing, samples);
   // Special surfaces send light on in ways of their own.
   if (tracing.scene.is_matt) {
@@ -203,18 +283,21 @@ void IndirectLight::gather(const Tracing& tracing, const Channels& channels, int
   update(gatherTiles(tracing, *cells_, *lights_, channels_, samples_done_, samples, grid_), memory.cells, channels_.count(),
          *cells_);
   samples_done_ += static_cast<std::uint32_t>(samples);
-  takeHistory(before_, request.world_from_camera, request.camera, memory.points);
+  takeHistory(before_, request.world_from_camera, request.camera, memory);
   pose_ = request.world_from_camera;
 }
 
 void IndirectLight::takeHistory(const CoarseGrid& before, const Transform<World, Camera>& world_from_camera,
-                                const CameraInfo& camera, float memory) {
+                                const CameraInfo& camera, const Memory& memory) {
   const Past past{before, camera, pose_, world_from_camera};
   std::vector<int> surfaces(static_cast<std::size_t>(grid_.height)), unknown(surfaces.size());
   inParallel(grid_.height, 8, [&](int first, int last) {
+    Remembered row{static_cast<std::size_t>(grid_.width)};
     for (int v = first; v < last; ++v) {
       for (int u = 0; u < grid_.width; ++u) {
-        float& samples = grid_.samples(u, v);
+        const float samples = grid_.samples(u, v);
+        const auto at = static_cast<std::size_t>(u);
+        row.forget(at);
         if (samples == 0.0f) continue;
         ++surfaces[static_cast<std::size_t>(v)];
         int old_u = 0, old_v = 0;
@@ -222,16 +305,14 @@ void IndirectLight::takeHistory(const CoarseGrid& before, const Transform<World,
           ++unknown[static_cast<std::size_t>(v)];
           continue;
         }
-        const float known = std::min(before.samples(old_u, old_v), memory), share = samples / (samples + known);
-        const auto blend = [&](Image<float>& image, const Image<float>& old) {
-          image(u, v) = old(old_u, old_v) + share * (image(u, v) - old(old_u, old_v));
-        };
-        for (std::size_t c = 0; c < grid_.means.size(); ++c) blend(grid_.means[c], before.means[c]);
-        for (std::size_t f = 0; f < grid_.squares.size(); ++f) blend(grid_.squares[f], before.squares[f]);
-        float& left = grid_.variance_left(u, v);
-        left = share * share * left + (1.0f - share) * (1.0f - share) * before.variance_left(old_u, old_v);
-        samples += known;
+        row.place[at] = static_cast<std::size_t>(old_v) * static_cast<std::size_t>(before.width) + static_cast<std::size_t>(old_u);
+        const float known = before.samples(old_u, old_v), counts = std::min(known, memory.points);
+        row.share[at] = samples / (samples + counts);
+        const float lit_memory = grid_.moves(u, v) != 0 ? memory.points : memory.lit;
+        row.lit_share[at] = samples / (samples + std::min(known, lit_memory));
+        grid_.samples(u, v) = samples + counts;
       }
+      blendRow(before, row, v, grid_);
     }
   });
   int all = 0, alone = 0;

@@ -20,6 +20,7 @@ struct CoarseGrid {
   static constexpr int kStep = 4;
 
   void resize(int width, int height, std::size_t channels, std::size_t frequencies);
+  void resizeWithLit(int width, int height, std::size_t channels, std::size_t frequencies);
 
   int width = 0, height = 0;
   Image<float> x, y, z;  ///< place, in the camera's frame
@@ -28,6 +29,10 @@ struct CoarseGrid {
   Image<float> variance_left;  ///< the means' variance as a share of a single sample's
   std::vector<Image<float>> means;  ///< of the light that falls in, by channel (Channels)
   std::vector<Image<float>> squares;  ///< by frequency: mean |first harmonic|² of single samples
+  // The part of it that lit places send, whatever is in its way; in the smooth grid empty.
+  std::vector<Image<float>> lit, lit_squares;
+  Image<float> lit_left;
+  Image<std::uint8_t> moves;  ///< 1 where the surface is of a moving object
 };
 
 /// The numbers that are kept of light: steady, ambient, and both parts of each phasor that is wanted. Of
@@ -47,12 +52,14 @@ class Channels {
   [[nodiscard]] const std::vector<std::size_t>& lanes() const { return lanes_; }
   /// The harmonics that any frequency wants: Tracing::orders.
   [[nodiscard]] const std::vector<int>& orders() const { return orders_; }
+  /// Each frequency's last that is wanted.
+  [[nodiscard]] const std::vector<int>& lastOrders() const { return last_orders_; }
   /// The phasor of a frequency's first harmonic.
   [[nodiscard]] std::size_t first(std::size_t frequency) const { return firsts_[frequency]; }
 
  private:
   std::vector<std::size_t> terms_, lanes_, firsts_;
-  std::vector<int> orders_;
+  std::vector<int> orders_, last_orders_;
 };
 
 /// Adds weight · light · exp(−i 2π n f L/c), channel by channel, to the sums' terms.
@@ -98,12 +105,12 @@ class IndirectLight {
  private:
   /// How many samples count in means at most.
   struct Memory {
-    float points;
+    float points, lit;
     int cells;
   };
   [[nodiscard]] Memory memoryFor(const Tracing& tracing, int samples) const;
   void takeHistory(const CoarseGrid& before, const Transform<World, Camera>& world_from_camera,
-                   const CameraInfo& camera, float memory);
+                   const CameraInfo& camera, const Memory& memory);
 
   std::string scene_id_;
   Channels channels_;

@@ -68,16 +68,33 @@ void addWeighted(const float* __restrict weight, const float* __restrict value, 
   for (int u = first; u < last; ++u) sum[u] += weight[u] * value[u];
 }
 
-/// Variance of a mean, per component: Σ w² (⟨|z|²⟩ − |⟨z⟩|²) s / 2, with s the share of it that averaging
-/// over samples left.
+/// Variance of a mean, per component: (⟨|z|²⟩ − |⟨z⟩|²) s / 2, with s the share of it that averaging over samples left.
+/// Of a row: of what lit places send, and of the rest of the light.
 TOFTWIN_VECTOR
-void addVariance(const float* __restrict weight, const float* __restrict squares, const float* __restrict re,
-                 const float* __restrict im, const float* __restrict left, int first, int last,
-                 float* __restrict sum) {
-  for (int u = first; u < last; ++u) {
-    const float spread = squares[u] - re[u] * re[u] - im[u] * im[u];
-    sum[u] += weight[u] * weight[u] * (spread > 0.0f ? spread : 0.0f) * left[u] * 0.5f;
+void varianceOfMeans(const float* __restrict squares, const float* __restrict re, const float* __restrict im,
+                     const float* __restrict left, const float* __restrict lit_squares,
+                     const float* __restrict lit_re, const float* __restrict lit_im,
+                     const float* __restrict lit_left, int count, float* __restrict variance) {
+  for (int u = 0; u < count; ++u) {
+    const float rest_re = re[u] - lit_re[u], rest_im = im[u] - lit_im[u];
+    const float rest = squares[u] - rest_re * rest_re - rest_im * rest_im;
+    const float lit = lit_squares[u] - lit_re[u] * lit_re[u] - lit_im[u] * lit_im[u];
+    variance[u] = 0.5f * ((rest > 0.0f ? rest : 0.0f) * left[u] + (lit > 0.0f ? lit : 0.0f) * lit_left[u]);
   }
+}
+
+/// Those of a row of the grid, at one frequency.
+void findVariances(const CoarseGrid& grid, const Channels& channels, std::size_t f, int v, float* variances) {
+  const std::size_t re = Channels::re(channels.first(f)), im = Channels::im(channels.first(f));
+  varianceOfMeans(&grid.squares[f](0, v), &grid.means[re](0, v), &grid.means[im](0, v), &grid.variance_left(0, v),
+                  &grid.lit_squares[f](0, v), &grid.lit[re](0, v), &grid.lit[im](0, v), &grid.lit_left(0, v), grid.width,
+                  variances);
+}
+
+TOFTWIN_VECTOR
+void addWeightedTwice(const float* __restrict weight, const float* __restrict value, int first, int last,
+                      float* __restrict sum) {
+  for (int u = first; u < last; ++u) sum[u] += weight[u] * weight[u] * value[u];
 }
 
 /// A neighbour of all points of a row, and its weights for them.
@@ -103,7 +120,7 @@ std::vector<Neighbour> neighboursOf(const CoarseGrid& grid, int v) {
 }
 
 /// One row of the smooth grid. The weights of all neighbours come first, then every channel with them.
-void smoothRow(const CoarseGrid& grid, const Channels& channels, int v, CoarseGrid& out) {
+void smoothRow(const CoarseGrid& grid, const std::vector<Image<float>>& variances, int v, CoarseGrid& out) {
   const auto width = static_cast<std::size_t>(grid.width);
   const std::vector<Neighbour> neighbours = neighboursOf(grid, v);
   std::vector<float> per_total(width, 1e-20f);
@@ -122,13 +139,10 @@ void smoothRow(const CoarseGrid& grid, const Channels& channels, int v, CoarseGr
     for (std::size_t u = 0; u < width; ++u) to[u] *= per_total[u];
   }
   for (std::size_t f = 0; f < grid.squares.size(); ++f) {
-    const std::size_t phasor = channels.first(f);
     float* to = &out.squares[f](0, v);
     std::fill_n(to, width, 0.0f);
-    for (const Neighbour& n : neighbours) {
-      addVariance(n.weight.data(), n.of(grid.squares[f], v), n.of(grid.means[Channels::re(phasor)], v),
-                  n.of(grid.means[Channels::im(phasor)], v), n.of(grid.variance_left, v), n.first, n.last, to);
-    }
+    for (const Neighbour& n : neighbours)
+      addWeightedTwice(n.weight.data(), &variances[f](0, v + n.dy) + n.dx, n.first, n.last, to);
     for (std::size_t u = 0; u < width; ++u) to[u] *= per_total[u] * per_total[u];
   }
 }
@@ -182,8 +196,14 @@ void IndirectLight::smooth() {
                      &CoarseGrid::normal_z, &CoarseGrid::samples}) {
     smooth_.*image = grid_.*image;
   }
+  std::vector<Image<float>> variances(grid_.squares.size(), Image<float>{grid_.width, grid_.height});
+  inParallel(grid_.height, 8, [&](int first, int last) {
+    for (int v = first; v < last; ++v) {
+      for (std::size_t f = 0; f < variances.size(); ++f) findVariances(grid_, channels_, f, v, &variances[f](0, v));
+    }
+  });
   inParallel(grid_.height, 4, [&](int first, int last) {
-    for (int v = first; v < last; ++v) smoothRow(grid_, channels_, v, smooth_);
+    for (int v = first; v < last; ++v) smoothRow(grid_, variances, v, smooth_);
   });
 }
 

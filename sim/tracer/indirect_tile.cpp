@@ -61,30 +61,18 @@ void addTurned(const Tracing& tracing, const Channels& channels, const Lanes<flo
   }
   std::size_t phasor = 0;
   for (std::size_t f = 0; f < tracing.turns_per_metre.size(); ++f) {
-    Lanes<float> cosine, sine, turn_re, turn_im, next;
-    for (std::size_t i = 0; i < kLaneCount; ++i) {
-      const CosSin z = cosSinOfTurns(length[i] * tracing.turns_per_metre[f]);
-      cosine[i] = turn_re[i] = z.cos;
-      sine[i] = turn_im[i] = -z.sin;
-    }
+    Lanes<float> cosine, sine, turn_re, turn_im;
+    turnsOf(length, tracing.turns_per_metre[f], weight, cosine, sine, turn_re, turn_im);
     std::size_t term = f * orders.size();
     for (int n = 1;; ++n) {
       const bool is_one = orders[term - f * orders.size()] == n;
       if (is_one && phasor < channels.lanes().size() && channels.lanes()[phasor] == term) {
-        const Lanes<float>&re = light[Channels::re(phasor)], &im = light[Channels::im(phasor)];
-        Lanes<float> sum_re = sums.re[term], sum_im = sums.im[term];
-        for (std::size_t i = 0; i < kLaneCount; ++i) {
-          sum_re[i] += weight[i] * (re[i] * turn_re[i] - im[i] * turn_im[i]);
-          sum_im[i] += weight[i] * (re[i] * turn_im[i] + im[i] * turn_re[i]);
-        }
-        sums.re[term] = sum_re;
-        sums.im[term] = sum_im;
+        addProduct(light[Channels::re(phasor)], light[Channels::im(phasor)], turn_re, turn_im, sums.re[term].v,
+                   sums.im[term].v);
         ++phasor;
       }
-      if (is_one && ++term == (f + 1) * orders.size()) break;
-      for (std::size_t i = 0; i < kLaneCount; ++i) next[i] = turn_re[i] * cosine[i] - turn_im[i] * sine[i];
-      for (std::size_t i = 0; i < kLaneCount; ++i) turn_im[i] = turn_re[i] * sine[i] + turn_im[i] * cosine[i];
-      turn_re = next;
+      if (is_one && (++term == (f + 1) * orders.size() || n == tracing.last_orders[f])) break;
+      turnBy(cosine, sine, turn_re, turn_im);
     }
   }
 }
@@ -100,6 +88,7 @@ TileGatherer::TileGatherer(const Tracing& tracing, const IrradianceCells& cells,
       fallen_(sums_.re.size()),
       found_(channels.count()) {
   tile_.sums.resize(channels.count());
+  tile_.lit.resize(channels.count());
   tile_.squares.resize(tracing.turns_per_metre.size());
 }
 
@@ -108,6 +97,7 @@ void TileGatherer::gather(int i, int j, std::uint32_t first_sample, int samples,
   lookFromCamera(i, j, camera_rays);
   std::fill(tile_.sums.begin(), tile_.sums.end(), Lanes<double>{});
   std::fill(tile_.squares.begin(), tile_.squares.end(), Lanes<double>{});
+  std::fill(tile_.lit.begin(), tile_.lit.end(), Lanes<float>{});
   update.keys = {};
   update.values.resize(channels_.count());
   if (!isAny(camera_rays.valid)) return;
@@ -124,7 +114,7 @@ void TileGatherer::gather(int i, int j, std::uint32_t first_sample, int samples,
       packet.index[lane] = first_sample + static_cast<std::uint32_t>(s);
     }
     hits_ = seen;
-    sums_ = fallen_;
+    clearSums(sums_);
     if (lights_.areAny()) takeOffBlocked(packet, seen);
     follow(packet, s == 0 ? &update : nullptr);
     keepSums(camera_rays.valid);
@@ -137,6 +127,7 @@ void TileGatherer::lookAtLights(const Packet& camera_rays) {
   if (!lights_.areAny()) return;
   lights_.weigh({hits_.position, normals_, camera_rays.valid}, samples_, shares_);
   lights_.add(tracing_, channels_, shares_, fallen_);
+  forEachChannel(fallen_, [&](std::size_t channel, const Lanes<float>& lanes) { tile_.lit[channel] = lanes; });
 }
 
 /// One of the lit points, picked by its share, says whether they are seen from here.
@@ -156,7 +147,7 @@ void TileGatherer::takeOffBlocked(const Packet& packet, const Hits& seen) {
   if (!isAny(valid)) return;
   castShadowRays(tracing_.scene, valid.v, rays, false);
   for (std::size_t i = 0; i < kLaneCount; ++i) is_blocked[i] = (valid[i] != 0) & (rays.tfar[i] < 0.0f) ? -1 : 0;
-  if (isAny(is_blocked)) lights_.takeOff(tracing_, channels_, shares_, picked, is_blocked, sums_);
+  if (isAny(is_blocked)) lights_.takeOff(tracing_, channels_, shares_, picked, is_blocked, found_, sums_);
 }
 
 /// Finds the coarse points themselves.
@@ -170,6 +161,10 @@ void TileGatherer::lookFromCamera(int i, int j, Packet& camera_rays) {
   Lanes<float> unused{};
   endMissed(0.0f, rays, camera_rays, unused);
   findHits(tracing_.scene, camera_rays, rays, hits_);
+  for (std::size_t lane = 0; lane < kLaneCount; ++lane) {
+    const bool is_hit = camera_rays.valid[lane] != 0;
+    tile_.moves[lane] = is_hit && tracing_.scene.rows[rays.hit.geomID[lane]].standing != nullptr ? -1 : 0;
+  }
   keepGeometry(camera_rays);
 }
 
@@ -259,7 +254,10 @@ Lanes<int> TileGatherer::addFromCells(const Packet& packet, Lanes<IrradianceCell
     keys[i] = cells_.keyOf({hits_.position.x[i], hits_.position.y[i], hits_.position.z[i]},
                            {hits_.normal.x[i], hits_.normal.y[i], hits_.normal.z[i]});
     weight[i] = packet.throughput[i] * hits_.albedo[i];
-    if (!(weight[i] > 0.0f)) continue;
+    cells_.prepare(keys[i]);
+  }
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    if (keys[i] == 0 || !(weight[i] > 0.0f)) continue;
     const auto means = cells_.find(keys[i]);
     if (means.empty()) continue;
     is_known[i] = -1;
@@ -287,18 +285,22 @@ void TileGatherer::keepGeometry(const Packet& camera_rays) {
   }
 }
 
+template <class Work>
+void TileGatherer::forEachChannel(const LaneSums& sums, const Work& work) const {
+  work(Channels::kSteady, sums.steady);
+  work(Channels::kAmbient, sums.ambient);
+  for (std::size_t phasor = 0; phasor < channels_.terms().size(); ++phasor) {
+    work(Channels::re(phasor), sums.re[channels_.lanes()[phasor]]);
+    work(Channels::im(phasor), sums.im[channels_.lanes()[phasor]]);
+  }
+}
+
 void TileGatherer::keepSums(const Lanes<int>& valid) {
-  const auto add = [&](std::size_t channel, const Lanes<float>& lanes) {
+  forEachChannel(sums_, [&](std::size_t channel, const Lanes<float>& lanes) {
     for (std::size_t i = 0; i < kLaneCount; ++i) {
       tile_.sums[channel][i] += valid[i] != 0 ? static_cast<double>(lanes[i]) : 0.0;
     }
-  };
-  add(Channels::kSteady, sums_.steady);
-  add(Channels::kAmbient, sums_.ambient);
-  for (std::size_t phasor = 0; phasor < channels_.terms().size(); ++phasor) {
-    add(Channels::re(phasor), sums_.re[channels_.lanes()[phasor]]);
-    add(Channels::im(phasor), sums_.im[channels_.lanes()[phasor]]);
-  }
+  });
   const std::size_t harmonics = tracing_.orders.size();
   for (std::size_t f = 0; f < tile_.squares.size(); ++f) {
     const Lanes<float>&re = sums_.re[f * harmonics], &im = sums_.im[f * harmonics];

@@ -16,10 +16,11 @@ struct CellUpdate {
 
 /// Sixteen coarse points, 4 × 4.
 struct CoarseTile {
-  Lanes<int> valid;
+  Lanes<int> valid, moves;
   Lanes<float> x, y, z, normal_x, normal_y, normal_z;
-  std::vector<Lanes<double>> sums;     ///< by channel
+  std::vector<Lanes<double>> sums;     ///< by channel, less what is lit
   std::vector<Lanes<double>> squares;  ///< by frequency
+  std::vector<Lanes<float>> lit;       ///< by channel: from lit places, whatever is in the way
 };
 
 /// Samples the light that falls onto coarse points, tile by tile. One for each thread.
@@ -43,6 +44,8 @@ class TileGatherer {
   void lookFurther(const Packet& at);
   Lanes<int> addFromCells(const Packet& packet, Lanes<IrradianceCells::Key>& keys, LaneSums& sums);
   void keepGeometry(const Packet& camera_rays);
+  template <class Work>
+  void forEachChannel(const LaneSums& sums, const Work& work) const;
   void keepSums(const Lanes<int>& valid);
 
   const Tracing& tracing_;

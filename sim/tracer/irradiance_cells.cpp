@@ -4,18 +4,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sim/images/mix_bits.h"
+
 namespace toftwin::sim {
 namespace {
 
 constexpr std::size_t kSlots = std::size_t{1} << 16;
 /// So full, the table starts anew: moving things leave cells behind.
 constexpr std::size_t kMostUsed = kSlots * 3 / 4;
-
-std::uint64_t spread(std::uint64_t x) {
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
-  return x ^ (x >> 31);
-}
 
 }  // namespace
 
@@ -25,6 +21,15 @@ IrradianceCells::IrradianceCells(double cell_size_m, std::size_t channels)
       keys_(kSlots),
       counts_(kSlots),
       means_(kSlots * channels) {}
+
+void IrradianceCells::prepare(Key key) const {
+  const std::size_t slot = mixBits(key) % kSlots;
+  __builtin_prefetch(&keys_[slot]);
+  __builtin_prefetch(&counts_[slot]);
+  const float* means = &means_[slot * channels_];
+  __builtin_prefetch(means);
+  __builtin_prefetch(means + channels_ - 1);
+}
 
 IrradianceCells::Key IrradianceCells::keyOf(Vec3d place, Vec3d normal) const {
   const double x = std::abs(normal.x), y = std::abs(normal.y), z = std::abs(normal.z);
@@ -42,7 +47,7 @@ IrradianceCells::Key IrradianceCells::keyOf(Vec3d place, Vec3d normal) const {
 }
 
 std::size_t IrradianceCells::slotOf(Key key) const {
-  std::size_t slot = spread(key) % kSlots;
+  std::size_t slot = mixBits(key) % kSlots;
   while (keys_[slot] != 0 && keys_[slot] != key) slot = (slot + 1) % kSlots;
   return slot;
 }

@@ -23,6 +23,8 @@ class IrradianceCells {
   [[nodiscard]] Key keyOf(Vec3d place, Vec3d normal) const;
   /// The cell's means; empty if fewer than kEnough samples are known.
   [[nodiscard]] std::span<const float> find(Key key) const;
+  /// Has the memory read that find() and add() will want.
+  void prepare(Key key) const;
   /// Adds a sample to the cell's means. The newer a sample the more it counts, as early ones knew less of
   /// the light on other surfaces: the k-th of n has the share 2k/n(n+1), up to n = `memory`.
   void add(Key key, std::span<const float> sample, int memory);

@@ -94,7 +94,7 @@ void DirectTracer::recall(KeptDirect& kept, std::size_t index) {
   sums.ambient = kept.ambient(index);
   for (std::size_t e = 0; e < tracing_.emitters.size(); ++e) {
     const KeptDirect::Ways& ways = kept.ways(index)[e];
-    addPhasors(tracing_.turns_per_metre, tracing_.orders, ways.weight, ways.length, sums);
+    addPhasors(tracing_.turns_per_metre, tracing_.orders, tracing_.last_orders, ways.weight, ways.length, sums);
   }
 }
 

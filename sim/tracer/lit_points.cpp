@@ -112,7 +112,7 @@ void LitPoints::takeOf(const Tracing& tracing, const Channels& channels, std::si
   Lanes<double> length;
   for (std::size_t i = 0; i < kLaneCount; ++i) length[i] = hits.distance[i] + emitter.delay_m;
   clearSums(sums);
-  addPhasors(tracing.turns_per_metre, tracing.orders, radiance, length, sums);
+  addPhasors(tracing.turns_per_metre, tracing.orders, tracing.last_orders, radiance, length, sums);
   place.radiance[Channels::kSteady] = radiance;
   for (std::size_t k = 0; k < channels.lanes().size(); ++k) {
     place.radiance[Channels::re(k)] = sums.re[channels.lanes()[k]];
@@ -170,41 +170,18 @@ void LitPoints::weigh(const Receivers& receivers, int directions, Shares& shares
 namespace {
 
 /// Adds share · radiance · exp(−i 2π n f way/c) to the sums of one frequency's wanted harmonics, whose phasors begin
-/// with number `first`: addTurned() without the harmonics that other frequencies want. GCC would unroll its loops into
-/// scalar code before it looks for vectors; told not to, it makes vectors of them.
+/// with number `first`: addTurned() without the harmonics that other frequencies want.
 TOFTWIN_VECTOR
-void addFrequency(double turns_per_metre, std::size_t first, std::size_t count, const int* orders,
+void addFrequency(float turns_per_metre, std::size_t first, std::size_t count, const int* orders,
                   const std::size_t* terms, const Lanes<float>& share, const Lanes<float>& way,
                   const std::vector<Lanes<float>>& radiance, LaneSums& sums) {
-  Lanes<float> cosine, sine, re, im, next;
-#pragma GCC unroll 1
-  for (std::size_t i = 0; i < kLaneCount; ++i) {
-    const CosSin z = cosSinOfTurns(static_cast<double>(way[i]) * turns_per_metre);
-    cosine[i] = z.cos;
-    sine[i] = -z.sin;
-  }
-#pragma GCC unroll 1
-  for (std::size_t i = 0; i < kLaneCount; ++i) re[i] = share[i] * cosine[i];
-#pragma GCC unroll 1
-  for (std::size_t i = 0; i < kLaneCount; ++i) im[i] = share[i] * sine[i];
+  Lanes<float> cosine, sine, re, im;
+  turnsOf(way, turns_per_metre, share, cosine, sine, re, im);
   int order = 1;
   for (std::size_t k = 0; k < count; ++k) {
-    for (; order < orders[k]; ++order) {
-#pragma GCC unroll 1
-      for (std::size_t i = 0; i < kLaneCount; ++i) next[i] = re[i] * cosine[i] - im[i] * sine[i];
-#pragma GCC unroll 1
-      for (std::size_t i = 0; i < kLaneCount; ++i) im[i] = re[i] * sine[i] + im[i] * cosine[i];
-      re = next;
-    }
-    const Lanes<float>&a = radiance[Channels::re(first + k)], &b = radiance[Channels::im(first + k)];
-    Lanes<float> sum = sums.re[terms[k]];
-#pragma GCC unroll 1
-    for (std::size_t i = 0; i < kLaneCount; ++i) sum[i] += a[i] * re[i] - b[i] * im[i];
-    sums.re[terms[k]] = sum;
-    sum = sums.im[terms[k]];
-#pragma GCC unroll 1
-    for (std::size_t i = 0; i < kLaneCount; ++i) sum[i] += a[i] * im[i] + b[i] * re[i];
-    sums.im[terms[k]] = sum;
+    for (; order < orders[k]; ++order) turnBy(cosine, sine, re, im);
+    addProduct(radiance[Channels::re(first + k)], radiance[Channels::im(first + k)], re, im, sums.re[terms[k]].v,
+               sums.im[terms[k]].v);
   }
 }
 
@@ -219,7 +196,7 @@ void LitPoints::add(const Tracing& tracing, const Channels& channels, const Shar
     const std::size_t first = channels.first(f);
     const std::size_t last = f + 1 < tracing.turns_per_metre.size() ? channels.first(f + 1) : orders.size();
     for (std::size_t k = 0; k < places_.size(); ++k) {
-      addFrequency(tracing.turns_per_metre[f], first, last - first, &orders[first], &channels.lanes()[first], shares.share[k],
+      addFrequency(static_cast<float>(tracing.turns_per_metre[f]), first, last - first, &orders[first], &channels.lanes()[first], shares.share[k],
                    shares.way[k], places_[k].radiance, sums);
     }
   }
@@ -246,10 +223,11 @@ void LitPoints::placesOf(const Lanes<int>& picked, Vec3Lanes& places) const {
 }
 
 void LitPoints::takeOff(const Tracing& tracing, const Channels& channels, const Shares& shares,
-                        const Lanes<int>& picked, const Lanes<int>& is_blocked, LaneSums& sums) const {
+                        const Lanes<int>& picked, const Lanes<int>& is_blocked, std::vector<Lanes<float>>& radiance,
+                        LaneSums& sums) const {
   Lanes<float> weight{};
   Lanes<double> way{};
-  std::vector<Lanes<float>> radiance(channels.count());
+  radiance.assign(channels.count(), Lanes<float>{});
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     if (picked[i] < 0 || is_blocked[i] == 0) continue;
     const auto k = static_cast<std::size_t>(picked[i]);

@@ -245,25 +245,27 @@ void keepTruth(const Tracing& tracing, const Packet& packet, const Hits& hits, T
 }
 
 void addLight(const Tracing& tracing, const DirectLight& light, LaneSums& sums) {
-  addPhasors(tracing.turns_per_metre, tracing.orders, light.weight, light.length, sums);
+  addPhasors(tracing.turns_per_metre, tracing.orders, tracing.last_orders, light.weight, light.length, sums);
   for (std::size_t g = 0; g < tracing.request.gates.size(); ++g) {
     addGates(tracing.request.gates[g], light.weight, light.length, sums.re[g], sums.im[g]);
   }
   if (!sums.bins.empty()) addToBins(tracing.bins, light, sums);
 }
 
-Tracing::Tracing(const Scene::Impl& s, const TraceRequest& r, RayLog* l, std::vector<int> o)
+Tracing::Tracing(const Scene::Impl& s, const TraceRequest& r, RayLog* l, std::vector<int> o, std::vector<int> last)
     : scene(s),
       request(r),
       log(l),
       lens(r.camera),
       scene_from_camera(r.world_from_camera),
       orders(std::move(o)),
+      last_orders(std::move(last)),
       seed(seedKey(r.seed)) {
   if (orders.empty()) {
     orders.resize(static_cast<std::size_t>(r.harmonics));
     std::iota(orders.begin(), orders.end(), 1);
   }
+  if (last_orders.empty()) last_orders.assign(r.frequencies.size(), orders.back());
   scene_from_camera.translation_m = scene_from_camera.translation_m - scene.origin_in_world;
   pinhole = scene_from_camera.translation_m;
   camera_axes = {scene_from_camera.rotate({1, 0, 0}), scene_from_camera.rotate({0, 1, 0}), scene_from_camera.rotate({0, 0, 1})};

@@ -55,8 +55,10 @@ struct RayLog {
 
 /// Everything that is the same for all pixels of a request.
 struct Tracing {
-  /// `orders`: which harmonics, ascending from 1; empty: all of the request. LaneSums hold those, by frequency.
-  Tracing(const Scene::Impl& scene, const TraceRequest& request, RayLog* log, std::vector<int> orders = {});
+  /// `orders`: which harmonics, ascending from 1; empty: all of the request. LaneSums hold those, by frequency; of
+  /// each frequency those beyond `last_orders` stay dark, unless that is empty.
+  Tracing(const Scene::Impl& scene, const TraceRequest& request, RayLog* log, std::vector<int> orders = {},
+          std::vector<int> last_orders = {});
 
   const Scene::Impl& scene;
   const TraceRequest& request;
@@ -69,6 +71,7 @@ struct Tracing {
   std::vector<MirroredEmitter> mirrored;  ///< the points' images in flat mirrors
   std::vector<double> turns_per_metre;  ///< f / c
   std::vector<int> orders;
+  std::vector<int> last_orders;  ///< by frequency
   TransientBins bins;                   ///< none but in transient.cpp
   PixelKey seed;
 };

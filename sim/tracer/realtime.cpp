@@ -2,6 +2,7 @@
 #include "sim/tracer/realtime.h"
 
 #include <fmt/format.h>
+#include <xmmintrin.h>
 
 #include <algorithm>
 #include <bit>
@@ -59,6 +60,23 @@ struct Part {
       }
     }
   }
+
+  void copy(Image<float>& image, const Lanes<float>& lanes) const {
+    if (width != kSize) return store(image, [&](std::size_t i, float) { return lanes[i]; });
+    for (int row = 0; row < height; ++row) _mm_storeu_ps(&image(x, y + row), _mm_load_ps(lanes.v + row * kSize));
+  }
+  /// Parts that lie apart become complex numbers.
+  void copy(Image<std::complex<float>>& image, const Lanes<float>& re, const Lanes<float>& im) const {
+    if (width != kSize) {
+      return store(image, [&](std::size_t i, std::complex<float>) { return std::complex<float>{re[i], im[i]}; });
+    }
+    for (int row = 0; row < height; ++row) {
+      const __m128 a = _mm_load_ps(re.v + row * kSize), b = _mm_load_ps(im.v + row * kSize);
+      auto* to = reinterpret_cast<float*>(&image(x, y + row));
+      _mm_storeu_ps(to, _mm_unpacklo_ps(a, b));
+      _mm_storeu_ps(to + 4, _mm_unpackhi_ps(a, b));
+    }
+  }
 };
 
 /// A packet of so many samples of each of those pixels.
@@ -87,6 +105,7 @@ struct RealtimeTracer::Impl {
   IndirectLight indirect;
   std::vector<BlockGeometry> geometry;
   KeptDirect kept;
+  std::uint32_t frame = 0;  ///< of those with light over several surfaces
 
   void resize(const TraceRequest& request);
   template <class Work>
@@ -96,7 +115,7 @@ struct RealtimeTracer::Impl {
   void storeDirect(const Part& at, std::size_t block, const LaneSums& sums);
   void storeSums(const Part& at, const LaneSums& sums);
   void storeTruth(const Part& at, const TruthLanes& truth);
-  void refineJumps(const Scene& scene, const TraceRequest& request);
+  void refineJumps(const Scene& scene, const TraceRequest& request, std::uint32_t turn);
   void recallBlocksOf(std::span<const Pixel> pixels, const Tracing& tracing);
   void storeMeans(const LaneSums& sums, std::size_t first_lane, unsigned samples, Pixel pixel);
   void addIndirect(const Tracing& tracing);
@@ -179,12 +198,11 @@ void RealtimeTracer::Impl::storeDirect(const Part& at, std::size_t block, const 
 }
 
 void RealtimeTracer::Impl::storeSums(const Part& at, const LaneSums& sums) {
-  at.store(light.steady, [&](std::size_t i, float) { return sums.steady[i]; });
-  at.store(light.ambient, [&](std::size_t i, float) { return sums.ambient[i]; });
+  at.copy(light.steady, sums.steady);
+  at.copy(light.ambient, sums.ambient);
   for (std::size_t k = 0; k < channels.terms().size(); ++k) {
-    const Lanes<float>&re = sums.re[channels.lanes()[k]], &im = sums.im[channels.lanes()[k]];
-    at.store(light.phasors[channels.terms()[k]],
-             [&](std::size_t i, std::complex<float>) { return std::complex<float>{re[i], im[i]}; });
+    const std::size_t lanes = channels.lanes()[k];
+    at.copy(light.phasors[channels.terms()[k]], sums.re[lanes], sums.im[lanes]);
   }
 }
 
@@ -195,16 +213,18 @@ void RealtimeTracer::Impl::storeTruth(const Part& at, const TruthLanes& truth) {
 }
 
 /// Where depth jumps the pixel's centre says too little: direct light over its footprint. Each packet holds the
-/// samples of as many pixels as it has room for.
-void RealtimeTracer::Impl::refineJumps(const Scene& scene, const TraceRequest& request) {
+/// samples of as many pixels as it has room for. Each turn takes other places on them, as evenly spread.
+void RealtimeTracer::Impl::refineJumps(const Scene& scene, const TraceRequest& request, std::uint32_t turn) {
   if (request.pixel_extent == 0.0) return;
   const auto pixels = pixelsWithJumps(light.truth.range_m);
   if (pixels.empty()) return;
   const auto count = static_cast<int>(pixels.size());
   const auto share = static_cast<unsigned>(std::clamp(kFootprintSamples / count, 2, static_cast<int>(kLaneCount)));
+  constexpr std::uint32_t kTurns = 1U << 24;
   const auto samples = std::bit_floor(share), per_packet = static_cast<unsigned>(kLaneCount) / samples;
   const TraceRequest what = directOnly(request, static_cast<int>(samples));
-  const Tracing tracing{scene.impl(), what, nullptr, channels.orders()};
+  const Tracing tracing{scene.impl(), what, nullptr, channels.orders(), channels.lastOrders()};
+  const int first_sample = static_cast<int>(turn % kTurns * samples), last_sample = first_sample + what.samples_per_pixel;
   recallBlocksOf(pixels, tracing);
   inParallel((count + static_cast<int>(per_packet) - 1) / static_cast<int>(per_packet), 16, [&](int begin, int end) {
     const FlushDenormals flush;
@@ -217,7 +237,7 @@ void RealtimeTracer::Impl::refineJumps(const Scene& scene, const TraceRequest& r
       preparePixels(tracing, together, samples, block);
       clearSums(sums);
       preparePacket(tracing, block, packet);
-      startAtPlaces(tracing, block, 0, what.samples_per_pixel, packet);
+      startAtPlaces(tracing, block, first_sample, last_sample, packet);
       followAll(tracing, packet, sums);
       for (std::size_t p = 0; p < together.size(); ++p) storeMeans(sums, p * samples, samples, together[p]);
     }
@@ -315,8 +335,7 @@ void RealtimeTracer::Impl::storeWithSpread(const Part& at, const IndirectLight::
     add(spread.sums.im[lanes], direct.im[lanes]);
   }
   storeSums(at, direct);
-  for (std::size_t f = 0; f < spread.variance.size(); ++f)
-    at.store(light.variance[f], [&](std::size_t i, float) { return spread.variance[f][i]; });
+  for (std::size_t f = 0; f < spread.variance.size(); ++f) at.copy(light.variance[f], spread.variance[f]);
 }
 
 void RealtimeTracer::Impl::makeFrame(const Scene& scene, const TraceRequest& request) {
@@ -324,10 +343,11 @@ void RealtimeTracer::Impl::makeFrame(const Scene& scene, const TraceRequest& req
   const TraceRequest direct = directOnly(request, 1);
   // Indirect light is added to all pixels, so that none may keep what was refined for another frame.
   if (request.max_surfaces != 1) kept.forgetImages();
-  traceDirect(Tracing{scene.impl(), direct, nullptr, channels.orders()}, request.max_surfaces == 1);
-  refineJumps(scene, request);
+  traceDirect(Tracing{scene.impl(), direct, nullptr, channels.orders(), channels.lastOrders()}, request.max_surfaces == 1);
+  // Direct light alone is to stay the same where nothing moves.
+  refineJumps(scene, request, request.max_surfaces == 1 ? 0 : frame++);
   if (request.max_surfaces == 1) return;
-  const Tracing tracing{scene.impl(), request, nullptr, channels.orders()};
+  const Tracing tracing{scene.impl(), request, nullptr, channels.orders(), channels.lastOrders()};
   indirect.gather(tracing, channels, kSamples);
   if (indirect.shareOfNew() > kMuchIsNew) {
     for (int pass = 1; pass < kFirstPasses; ++pass) indirect.gather(tracing, channels, kSamples);

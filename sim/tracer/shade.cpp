@@ -197,12 +197,13 @@ void setRays(const Packet& packet, RTCRayHit16& rays) {
 }
 
 TOFTWIN_VECTOR
-void addPhasors(const std::vector<double>& turns_per_metre, const std::vector<int>& orders, const Lanes<float>& weight,
-                const Lanes<double>& length, LaneSums& sums) {
+void addPhasors(const std::vector<double>& turns_per_metre, const std::vector<int>& orders,
+                const std::vector<int>& last_orders, const Lanes<float>& weight, const Lanes<double>& length, LaneSums& sums) {
   addLanes(weight.v, sums.steady.v);
   for (std::size_t f = 0; f < turns_per_metre.size(); ++f) {
     const double turns = turns_per_metre[f];
-    Lanes<float> cosine, sine, re, im, next;
+    Lanes<float> cosine, sine, re, im;
+#pragma GCC unroll 1
     for (std::size_t i = 0; i < kLaneCount; ++i) {
       const CosSin z = cosSinOfTurns(length[i] * turns);
       cosine[i] = z.cos;
@@ -215,11 +216,9 @@ void addPhasors(const std::vector<double>& turns_per_metre, const std::vector<in
       if (orders[term - f * orders.size()] == n) {
         addLanes(re.v, sums.re[term].v);
         addLanes(im.v, sums.im[term].v);
-        if (++term == (f + 1) * orders.size()) break;
+        if (++term == (f + 1) * orders.size() || n == last_orders[f]) break;
       }
-      for (std::size_t i = 0; i < kLaneCount; ++i) next[i] = re[i] * cosine[i] - im[i] * sine[i];
-      for (std::size_t i = 0; i < kLaneCount; ++i) im[i] = re[i] * sine[i] + im[i] * cosine[i];
-      re = next;
+      turnBy(cosine, sine, re, im);
     }
   }
 }

@@ -44,8 +44,9 @@ void playRoulette(std::uint32_t dimension, float threshold, Packet& packet);
 /// Rays of the packet as Embree takes them.
 void setRays(const Packet& packet, RTCRayHit16& rays);
 
-/// Adds w · exp(−i 2π n f L/c) for every frequency and every harmonic of `orders`, lane by lane.
-void addPhasors(const std::vector<double>& turns_per_metre, const std::vector<int>& orders, const Lanes<float>& weight,
+/// Adds w · exp(−i 2π n f L/c) for every frequency and every harmonic of `orders` up to its last one, lane by lane.
+void addPhasors(const std::vector<double>& turns_per_metre, const std::vector<int>& orders,
+                const std::vector<int>& last_orders, const Lanes<float>& weight,
                 const Lanes<double>& length, LaneSums& sums);
 
 /// Adds w · g(L) of both functions, lane by lane.

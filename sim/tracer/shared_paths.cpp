@@ -141,16 +141,7 @@ void addShared(const Tracing& tracing, const Connections& to, const Lanes<float>
   for (std::size_t f = 0; f < tracing.turns_per_metre.size(); ++f) {
     const double turns = tracing.turns_per_metre[f];
     Lanes<float> cosine, sine, re, im, next;
-#pragma GCC unroll 1
-    for (std::size_t i = 0; i < kLaneCount; ++i) {
-      const CosSin z = cosSinOfTurns(to.length[i] * turns);
-      cosine[i] = z.cos;
-      sine[i] = -z.sin;
-    }
-#pragma GCC unroll 1
-    for (std::size_t i = 0; i < kLaneCount; ++i) re[i] = weight[i] * cosine[i];
-#pragma GCC unroll 1
-    for (std::size_t i = 0; i < kLaneCount; ++i) im[i] = weight[i] * sine[i];
+    turnsOf(to.length, turns, weight, cosine, sine, re, im);
     for (std::size_t n = 0;; ++n) {
       const std::size_t term = f * harmonics + n;
       const float light_re = light.re[term][lane], light_im = light.im[term][lane];

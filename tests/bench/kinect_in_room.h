@@ -59,7 +59,7 @@ class Kinect {
     return moment;
   }
   const Light& trace() { return *(light = &tracer.next(scene.at(time()), request, wanted_)); }
-  [[nodiscard]] SensorModel::Exposed expose() const { return model.expose(*light, moment(), seed_, frame); }
+  [[nodiscard]] SensorModel::Exposed expose() const { return {{}, model.measure(*light, moment(), seed_, frame)}; }
   [[nodiscard]] Samples collect(const SensorModel& with) const {
     return with.collect(*light, moment(), seed_, frame);
   }

@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "calib/compare/drift.h"
+#include "calib/compare/image_slopes.h"
 #include "calib/compare/live_report.h"
 #include "calib/compare/statistics.h"
 
@@ -86,6 +87,33 @@ TEST(Comparison, FindsAPlantedTenMillimetres) {
       compareScenes(tiltedWall, [](Vec3d ray) { return tiltedWall(ray) + 0.010; });
   const Summary& all = c.regions.front().difference_mm;
   EXPECT_NEAR(all.mean, 10.0, 4.0 * 1e3 * kSigma_m * std::sqrt(2.0 / kFrames / (kWidth * kHeight)));
+}
+
+/// A wall whose range goes through 1 m within the noise: by A's own range, pixels that A reads too near would be in
+/// the nearer class, and B − A too large there, by some 20 mm.
+TEST(Comparison, ClassesByARangeThatDoesNotGoWithTheDifference) {
+  constexpr double kNoise_m = 0.1;
+  const auto wall = [](Vec3d) { return 1.0; };
+  for (const double of_b : {1.0, 0.3}) {
+    std::mt19937_64 random{17};
+    Stack a, b;
+    for (int i = 0; i < kFrames; ++i) {
+      ASSERT_TRUE(a.add(frame(camera(), wall, kNoise_m, random)).ok());
+      ASSERT_TRUE(b.add(frame(camera(), wall, of_b * kNoise_m, random)).ok());
+    }
+    const auto pose = comparePose(a, b);
+    ASSERT_TRUE(pose.ok());
+    int classes = 0;
+    for (const Region& region : characterise({*pose}).regions) {
+      if (!region.name.starts_with("range ")) continue;
+      ++classes;
+      const double sigma = 1e3 * kNoise_m * std::hypot(1.0, of_b) / std::sqrt(kFrames);
+      EXPECT_NEAR(region.difference_mm.mean, 0.0,
+                  4.0 * sigma / std::sqrt(static_cast<double>(region.difference_mm.n)))
+          << region.name << ", noise of B " << of_b;
+    }
+    EXPECT_EQ(classes, 2);
+  }
 }
 
 TEST(Comparison, MeasuresTheTemporalNoiseOfEachCamera) {
@@ -320,6 +348,26 @@ TEST(Headline, BeginsWithPixelsThatAreFartherApartThanWhatItTells) {
   EXPECT_EQ(half.places, 1U) << "a pose without a pixel compared is no draw of B − A";
   EXPECT_THAT(nothingCompared(characterise(withGrossPixels(100, 100)), "pose").message,
               testing::HasSubstr("all 200 pixels that are valid in both cameras are over 300 mm apart"));
+}
+
+/// 40 mm from top to bottom, beside noise of 5: as a mean B is as far as A.
+TEST(Headline, SaysThatOneSideOfTheImageIsFartherAndIsNotGreen) {
+  for (const double down_mm : {40.0, 4.0}) {
+    std::vector<PoseComparison> poses = withGrossPixels(0, 2);
+    for (PoseComparison& pose : poses) {
+      for (int y = 0; y < 10; ++y) {
+        for (int x = 0; x < 10; ++x)
+          pose.difference_mm(x, y) = static_cast<float>(down_mm * ((y + 0.5) / 10.0 - 0.5));
+      }
+    }
+    const Characteristics c = characterise(poses);
+    const Tilt tilt{poses};
+    EXPECT_NEAR(tilt.edge_mm(), 0.5 * down_mm, 1e-5);
+    const bool is_tilted = down_mm > 10.0;
+    EXPECT_EQ(toneOfDifference(c, tilt.edge_mm()), is_tilted ? Tone::Bad : Tone::Good);
+    EXPECT_EQ(tilt.words(mainRegionOf(c).noise_a_mm),
+              is_tilted ? "; from the top of the image to the bottom it goes by 40.0 mm" : "");
+  }
 }
 
 TEST(FlyingPixels, HangBetweenSurfacesAndSharpEdgesHaveNone) {

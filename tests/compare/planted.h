@@ -37,5 +37,7 @@ struct Planted {
 
 /// Veils in the lens, of one frequency and of several that the cameras' own decoders join.
 std::vector<Planted> plantedScatter();
+/// Rows that err alike or scatter by their own measure, and parts that are not there.
+std::vector<Planted> plantedAlike();
 
 }  // namespace toftwin::compare

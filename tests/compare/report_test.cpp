@@ -98,6 +98,44 @@ TEST(Report, LetsNamesInATablesHeaderBreak) {
   EXPECT_THAT(page, HasSubstr("<td>a_b</td>"));
 }
 
+/// In its column a reason is one word wide. On a page of Markdown it stays where it is.
+TEST(Report, PutsALongReasonBelowItsRow) {
+  Report report{.title = "t"};
+  const std::string reason = "it may be a wave of 120 MHz, 1 per period, which these distances do not tell";
+  report.sections.push_back(
+      {.id = "s", .blocks = {TableBlock{"c", {"what", "verdict", "A"}, {{"wave", "not told: " + reason, ""}, {"x", "same", "3"}}}}});
+  const std::string page = toHtml(report);
+  EXPECT_THAT(page, HasSubstr("<tr class='above'><td>wave</td><td>not told</td><td></td></tr>"
+                              "<tr class='below'><td colspan='3'>" + reason + "</td></tr>"));
+  EXPECT_THAT(page, HasSubstr("<th class='number'>A</th>")) << "though the first row has none";
+  EXPECT_THAT(toMarkdown(report), HasSubstr("| not told: " + reason + " |"));
+}
+
+TEST(Report, SetsNoNamesAsNumbers) {
+  Report report{.title = "t"};
+  report.sections.push_back(
+      {.id = "s", .blocks = {TableBlock{"c", {"what", "A"}, {{"16 MHz", "1"}, {"drift", "–"}, {"wraps", "words"}}}}});
+  const std::string page = toHtml(report);
+  EXPECT_THAT(page, HasSubstr("<td>16 MHz</td><td class='number'>1</td>"));
+  EXPECT_THAT(page, HasSubstr("<td>words</td>"));
+}
+
+/// A panel of what is left is 76 pixels high.
+TEST(Plot, HasThreeTicksOnEachAxis) {
+  for (const auto& [low, high] : {std::pair{-5.5, 5.2}, {-0.03, 0.055}, {0.97, 1.03}, {-10.4, 16.1}}) {
+    for (const bool log : {false, true}) {
+      if (log && low <= 0.0) continue;
+      const Curve curve{.x = {0.0, 1.0}, .y = {low, high}};
+      const std::string svg =
+          toSvg(Plot{.curves = {curve}, .compact = true, .below = Panel{.curves = {curve}, .log_y = log}});
+      const auto panel = svg.find("text-anchor='end'", svg.rfind("class='frame'", svg.rfind("class='frame'") - 1));
+      std::size_t ticks = 0;
+      for (auto at = panel; at != std::string::npos; at = svg.find("text-anchor='end'", at + 1)) ++ticks;
+      EXPECT_GE(ticks, 3u) << low << " to " << high;
+    }
+  }
+}
+
 TEST(Report, HasInItsWordsWhatIsClosedOnThePage) {
   EXPECT_THAT(toMarkdown(example()), HasSubstr("more:\n\n- text\n"));
 }
@@ -124,7 +162,13 @@ TEST(Numbers, AreShownForPeople) {
   EXPECT_EQ(shown(-0.01), "0.0");
   EXPECT_EQ(shown(std::nan("")), "–");
   EXPECT_EQ(shownWithError(3.14159, 0.1), "+3.1 ± 0.1");
+  EXPECT_EQ(shownWithError(3.14159, 0.003, 2), "+3.142 ± 0.003") << "an error is not 0.00";
+  EXPECT_EQ(shownWithError(0.0, 0.0, 2), "0");
+  EXPECT_EQ(shownWithError(-1.5, 0.0, 1), "−1.5 ± 0");
   EXPECT_EQ(shownPercent(0.426), "43 %");
+  EXPECT_EQ(shownDigits(-3.97e-6, 3), "−3.97·10⁻⁶");
+  EXPECT_EQ(shownDigits(1.2345e12, 3), "1.23·10¹²");
+  EXPECT_EQ(shownDigits(-0.125, 3), "−0.125");
 }
 
 TEST(Ticks, AreRoundAndInside) {

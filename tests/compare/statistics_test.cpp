@@ -73,6 +73,24 @@ TEST(ClusteredError, OfIndependentValuesIsTheUsualOne) {
                    summarise(values).standard_error);
 }
 
+TEST(ClusteredError, HardlyHangsOnAPoseOfFewPixels) {
+  // Sixteen poses of 5000 pixels whose means scatter by 1 mm, and one of three that noise of 20 mm put 30 mm off:
+  // 1/√16 mm, known to 1/√30 of itself. By the means alone it would be 1.8 mm.
+  constexpr unsigned kSeed = 3;
+  std::mt19937_64 random{kSeed};
+  std::normal_distribution<double> draw;
+  std::vector<double> values;
+  std::vector<std::uint32_t> pose;
+  for (std::uint32_t p = 0; p < 16; ++p) {
+    const double mean = draw(random);
+    for (int i = 0; i < 5000; ++i) values.push_back(mean + 20.0 * draw(random)), pose.push_back(p);
+  }
+  const double without = clusteredError(values, pose);
+  EXPECT_NEAR(without, 0.25, 4.0 * 0.25 / std::sqrt(30.0)) << "seed " << kSeed;
+  for (const double one : {10.0, 30.0, 50.0}) values.push_back(one), pose.push_back(16);
+  EXPECT_NEAR(clusteredError(values, pose), without, 0.05 * without);
+}
+
 TEST(ClusteredError, OfOnePoseIsNotKnown) {
   EXPECT_TRUE(std::isnan(clusteredError(std::vector<double>{1, 2, 3}, std::vector<std::uint32_t>(3))));
 }

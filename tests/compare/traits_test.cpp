@@ -19,6 +19,8 @@ namespace {
 
 using testing::HasSubstr;
 
+std::string errorOf(const Traits& traits) { return traits ? "no error" : traits.error().message; }
+
 /// 200 flat series of 181 values: a model other than the constant is an over-fit. 10 of 200 is the bar.
 TEST(DriftTraits, ChooseTheConstantOnFlatData) {
   int wrong = 0, held = 0;
@@ -94,7 +96,7 @@ TEST(NoiseLaw, SaysUpToWhichSignalItIsNotFitted) {
     const auto law = fittedNoiseLaw(signal, sigma, frequency_hz);
     ASSERT_TRUE(law) << law.error().message;
     EXPECT_THAT(law->not_told, testing::HasSubstr(words));
-    ASSERT_EQ(law->traits.size(), 3u);
+    ASSERT_EQ(law->traits.size(), 4u);
     EXPECT_NEAR(law->traits[0].value, 10.0, 1e-3);  // floor, shot, read
     EXPECT_NEAR(law->traits[1].value, 5.0, 1e-3);
     EXPECT_NEAR(law->traits[2].value, 1.0, 1e-3);
@@ -102,6 +104,239 @@ TEST(NoiseLaw, SaysUpToWhichSignalItIsNotFitted) {
   const auto few = fittedNoiseLaw(signal, sigma, std::vector{1e9});
   ASSERT_FALSE(few);
   EXPECT_THAT(few.error().message, testing::HasSubstr("it takes 6, and 40 of 40 rows are left out"));
+}
+
+/// Of 200 series of σ = 5 mm, each by 60 frames, over two decades of signal. The test of each part errs in 2.5 %
+/// of them, five: twelve and more in 0.5 % of all choices of seeds.
+TEST(NoiseLaw, TellsNoPartThatIsNotThere) {
+  int shot = 0, read = 0;
+  for (unsigned seed = 1; seed <= 200; ++seed) {
+    Noise noise{seed};
+    std::vector<double> signal, sigma;
+    for (int i = 0; i < 60; ++i) {
+      signal.push_back(1000.0 * std::pow(10.0, -2.0 * i / 59.0));
+      sigma.push_back(5.0 * std::exp(noise(std::sqrt(1.0 / 118.0))));
+    }
+    const auto traits = noiseLawTraits(signal, sigma);
+    ASSERT_TRUE(traits) << traits.error().message;
+    ASSERT_EQ(traits->size(), 4u);
+    EXPECT_GT((*traits)[0].low, 4.0) << seed;
+    for (const std::size_t part : {std::size_t{1}, std::size_t{2}}) {
+      const Trait& one = (*traits)[part];
+      (part == 1 ? shot : read) += one.low > 0.0;
+      EXPECT_EQ(one.value > 0.0, one.low > 0.0) << seed;
+      EXPECT_GT(one.high, 0.0) << "what it may be, " << seed;
+      EXPECT_LT(one.high, 5.0) << seed;
+    }
+  }
+  EXPECT_LT(shot, 12);
+  EXPECT_LT(read, 12);
+}
+
+/// Six waves in 9.4 m, seen over 3.7 m by few rows: uncertain by more than a row scatters. Left out, they are 0.5 mm/m
+/// of scale.
+TEST(Harmonics, KeepUncertainWavesThatTheRowsSpeakFor) {
+  for (const int n : {30, 60}) {
+    for (unsigned seed = 1; seed <= 20; ++seed) {
+      Noise noise{seed};
+      std::vector<double> d, e;
+      for (int i = 0; i < n; ++i) {
+        d.push_back(0.6 + 3.7 * i / (n - 1));
+        const double phase = 4.0 * std::numbers::pi * 16e6 / 299'792'458.0 * d.back();
+        e.push_back(1.2 * std::cos(6.0 * phase) + noise(0.13));
+      }
+      const auto fitted = fittedHarmonics(d, e, std::vector{16e6});
+      ASSERT_TRUE(fitted) << n << ' ' << seed;
+      EXPECT_EQ(fitted->orders, 3U) << n << ' ' << seed;
+    }
+  }
+}
+
+TEST(Harmonics, OfTwoCamerasHaveTheSameWaves) {
+  std::vector<std::string> asked;
+  double more_half_mm = 3.9;
+  const auto fitWith = [&](const char* of, std::size_t orders, bool has_more) -> HarmonicFit {
+    return [&, of, orders, has_more](std::size_t least) -> Result<FittedTraits> {
+      if (least > 0) asked.push_back(of + std::to_string(least));
+      if (least > orders && !has_more) return Error{Error::Code::InvalidArgument, "too few rows"};
+      // A wave whose interval is so wide beside a residual of 1 mm.
+      const double half_mm = least > 0 && has_more ? more_half_mm : 1.0;
+      FittedTraits fitted{.traits = {{"wave", "mm", 0.0, -half_mm, half_mm}, {"offset"}, {"scale"}, {"residual", "mm", 1.0}}};
+      fitted.orders = std::max(orders, least);
+      return fitted;
+    };
+  };
+  const auto alike = withTheSameWaves({fitWith("a", 2, true), fitWith("b", 2, true)});
+  EXPECT_TRUE(asked.empty() && alike[0]->orders == 2 && alike[1]->orders == 2);
+  const auto more = withTheSameWaves({fitWith("a", 2, true), fitWith("b", 3, true)});
+  EXPECT_EQ(asked, std::vector<std::string>{"a3"});
+  EXPECT_TRUE(more[0]->orders == 3 && more[1]->orders == 3);
+  const auto too_few = withTheSameWaves({fitWith("a", 3, true), fitWith("b", 1, false)});
+  EXPECT_TRUE(too_few[0]->orders == 3 && too_few[1]->orders == 1);
+  more_half_mm = 4.1;
+  const auto too_uncertain = withTheSameWaves({fitWith("a", 2, true), fitWith("b", 3, true)});
+  EXPECT_TRUE(too_uncertain[0]->orders == 2 && too_uncertain[1]->orders == 3);
+}
+
+/// Of 10 MHz a period is 15 m: 1.9 m are 0.13 of it, a quarter of that of two waves, 0.38 of three, 0.51 of four.
+TEST(Harmonics, TellNoWaveOfWhichLessThanHalfAPeriodIsSeen) {
+  Noise noise{5};
+  std::vector<double> d, e;
+  for (int i = 0; i < 240; ++i) {
+    d.push_back(0.5 + 1.9 * i / 239.0);
+    e.push_back(3.0 + 20.0 * std::cos(4.0 * std::numbers::pi * 10e6 / 299'792'458.0 * d.back()) + noise(0.05));
+  }
+  const auto fitted = fittedHarmonics(d, e, std::vector{10e6});
+  ASSERT_TRUE(fitted) << fitted.error().message;
+  for (const Trait& one : fitted->traits) {
+    for (const char* too_long : {"1 per", "2 per", "3 per"})
+      EXPECT_THAT(one.name, testing::Not(HasSubstr(too_long))) << one.value;
+  }
+  EXPECT_THAT(fitted->not_told, testing::AnyOf(HasSubstr("less than half of a period is seen"),
+                                               HasSubstr("3, 6, 2 and 1 per period are not told")));
+}
+
+/// What goes straight over all that is seen was told to reach 7e51 m, and to be 93 m at the edge.
+TEST(Corner, IsNotToldWhereTheErrorIsALine) {
+  int told = 0;
+  for (unsigned seed = 1; seed <= 40; ++seed) {
+    Noise noise{seed};
+    std::vector<double> x, e;
+    for (int i = 0; i < 35; ++i) {
+      x.push_back(0.025 * i);
+      e.push_back(12.0 - 4.0 * x.back() + noise(0.3));
+    }
+    const auto corner = cornerTraits(x, e);
+    if (!corner) {
+      EXPECT_EQ(errorOf(corner), "corner: these rows do not tell it: the error does not fall off from the edge") << seed;
+      continue;
+    }
+    ++told;
+    for (const Trait& one : *corner) {
+      EXPECT_LT(std::abs(one.value), 1e3) << seed << ' ' << one.name;
+    }
+  }
+  EXPECT_LT(told, 40);
+}
+
+/// Of rows that show no fall an exponential was told, in 17 of 60: 174 m at the edge. One that is over before the
+/// nearest row would be told by what nobody saw: e^−2.5 of it and less.
+TEST(Corner, IsToldOnlyWhereAFallIsSeen) {
+  int flats = 0, beyond = 0;
+  for (unsigned seed = 1; seed <= 60; ++seed) {
+    Noise noise{seed};
+    std::vector<double> x, flat, sharp;
+    for (int i = 0; i < 60; ++i) {
+      x.push_back(0.1 + 0.015 * i);
+      flat.push_back(2.0 + noise(1.0));
+      sharp.push_back(2.0 + 400.0 * std::exp(-x.back() / 0.04) + noise(1.0));
+    }
+    flats += errorOf(cornerTraits(x, flat)).find("does not fall off from the edge") != std::string::npos;
+    beyond += errorOf(cornerTraits(x, sharp)).find("the nearest row shows less than a tenth") != std::string::npos;
+  }
+  EXPECT_GE(flats, 57);  // BIC errs in some
+  EXPECT_GE(beyond, 50);
+}
+
+/// Two speeds with ten readings each: nothing says by how much what is read at a speed is off together.
+TEST(Motion, IsInDoubtWhereReadingsAreOfTooFewSpeeds) {
+  Noise noise{1};
+  std::vector<double> two, many, of_two, of_many;
+  for (int i = 0; i < 20; ++i) {
+    two.push_back(i < 10 ? 0.2 : 0.9), many.push_back(0.1 * i);
+    of_two.push_back(7.0 * two.back() + noise(0.3)), of_many.push_back(7.0 * many.back() + noise(0.3));
+  }
+  const auto doubtful = motionTraits(two, of_two), plain = motionTraits(many, of_many);
+  ASSERT_TRUE(doubtful && plain);
+  EXPECT_THAT(doubtful->front().doubt, HasSubstr("20 rows have 2 different values"));
+  EXPECT_EQ(plain->front().doubt, "");
+}
+
+/// Of 240 rows those from 1.95 to 2.6 m read 100 mm nearer, and 20 rows of a second session do not, as in the O3D303's
+/// published ones: so much alike are neighbours that a curve by that keeps to none of them. Errors that go on by 0.9
+/// are no other population.
+TEST(Harmonics, AreInDoubtWhereRowsAreOfTwoSessions) {
+  int doubted = 0;
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    Noise noise{seed};
+    std::vector<double> d, two, one_d, going_on;
+    double last = noise(2.0);
+    for (int i = 0; i < 240; ++i) {
+      one_d.push_back(0.8 + 2.0 * i / 239.0), d.push_back(one_d.back());
+      two.push_back(50.0 + noise(1.0) - (d.back() > 1.95 && d.back() < 2.6 ? 100.0 : 0.0));
+      last = 0.9 * last + noise(0.87);
+      going_on.push_back(8.0 * std::cos(16.0 * std::numbers::pi * 30e6 / 299'792'458.0 * d.back()) + last);
+    }
+    for (int i = 0; i < 20; ++i) d.push_back(1.8 + 1.3 * i / 19.0), two.push_back(50.0 + noise(5.0));
+    const auto of_two = fittedHarmonics(d, two, std::vector{30e6}),
+               alike = fittedHarmonics(one_d, going_on, std::vector{30e6});
+    ASSERT_TRUE(of_two && alike) << seed;
+    doubted += of_two->traits.back().doubt.find("more than one population") != std::string::npos;
+    EXPECT_EQ(alike->traits.back().doubt, "") << seed;
+  }
+  EXPECT_GE(doubted, 8);
+}
+
+/// Six and four millimetres of four and one wave per period by 24 rows, which do not tell the latter: 2 mm/m of it are
+/// in the scale. Where all waves are as small as they are uncertain, as of two equal cameras' difference, nothing is.
+TEST(Harmonics, DoubtAScaleThatALeftOutWaveMayBeIn) {
+  int doubted = 0;
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    Noise noise{seed};
+    std::vector<double> d, waves, none;
+    for (int i = 0; i < 24; ++i) {
+      d.push_back(0.5 + 4.5 * i / 23.0);
+      const double phase = 4.0 * std::numbers::pi * 30e6 / 299'792'458.0 * d.back();
+      waves.push_back(3.0 + 6.0 * std::cos(4.0 * phase + 0.7) + 4.0 * std::cos(phase + 1.0) + noise(1.5));
+      none.push_back(noise(1.5));
+    }
+    const auto fitted = fittedHarmonics(d, waves, std::vector{30e6}), flat = fittedHarmonics(d, none, std::vector{30e6});
+    ASSERT_TRUE(fitted && flat) << seed;
+    const auto scaleOf = [](const FittedTraits& of) { return *std::ranges::find(of.traits, "scale", &Trait::name); };
+    const Trait scale = scaleOf(*fitted);
+    doubted += scale.doubt.find("a wave of 30 MHz") != std::string::npos || (scale.low <= 0.0 && 0.0 <= scale.high);
+    EXPECT_EQ(scaleOf(*flat).doubt, "") << seed;
+  }
+  EXPECT_GE(doubted, 18);
+}
+
+/// A ramp that stops before the series ends: it was told 5 % too large, in 38 % of runs, without a word.
+TEST(DriftTraits, AreInDoubtWhereTenthsAreOffTheCurve) {
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    Noise noise{seed};
+    std::vector<double> t, y;
+    for (int i = 0; i < 535; ++i) {
+      t.push_back(2.0 * i);
+      y.push_back(3.8 * std::min(t.back() / 850.0, 1.0) + noise(0.3));
+    }
+    const auto drift = driftTraits(t, y);
+    ASSERT_TRUE(drift) << seed;
+    EXPECT_THAT(drift->not_told, HasSubstr("off the chosen curve")) << seed;
+    EXPECT_THAT(drift->traits.front().doubt, HasSubstr("another shape")) << seed;
+    EXPECT_LE(drift->traits.front().low, 3.8) << seed;
+    EXPECT_GE(drift->traits.front().high, 3.8) << seed;
+  }
+}
+
+/// 0.5 m/s one way: 0.05 more of the way is as 20 ms late where the plate is. Going back it is 20 ms early.
+TEST(Latency, IsNotToldOfMotionOneWay) {
+  Noise noise{3};
+  const auto seen = [&](double turn_s, double scale) {
+    std::vector<double> t, a, later, b;
+    const auto path = [=](double s) { return s < turn_s ? 0.5 * s : turn_s - 0.5 * s; };
+    for (int i = 0; i <= 30; ++i) {
+      t.push_back(i / 30.0), later.push_back(t.back() + 0.01);
+      a.push_back(path(t.back()) + noise(2e-4)), b.push_back(scale * path(later.back()) + noise(2e-4));
+    }
+    return latencyTraits(later, b, t, a);
+  };
+  EXPECT_THAT(errorOf(seen(2.0, 1.0)), HasSubstr("passes no place in both directions"));
+  EXPECT_THAT(errorOf(seen(2.0, 1.1)), HasSubstr("passes no place in both directions"));
+  const auto turned = seen(0.4, 1.1);
+  ASSERT_TRUE(turned) << turned.error().message;
+  EXPECT_LT(turned->front().low, 0.0);
+  EXPECT_GT(turned->front().high, 0.0);
+  EXPECT_LT(turned->front().high - turned->front().low, 3.0);
 }
 
 /// Four rows beside the law, as captures before something else may be, are no reason to leave others out, and
@@ -155,10 +390,26 @@ TEST(FittedCurves, TakeOffWhatGoesSidewaysOnlyWhereItIsTold) {
       }
     }
     const std::vector<double> f{30e6};
-    const auto fitted = fittedHarmonics(d, e, f, cluster);
+    const auto fitted = fittedHarmonics(d, e, f, {.of = cluster});
     ASSERT_TRUE(fitted) << captures << ": " << fitted.error().message;
     EXPECT_EQ(fitted->besides.size(), captures == 9 ? d.size() : 0U) << captures;
     EXPECT_EQ(static_cast<bool>(fitted->curve.at), captures == 9) << captures;
+  }
+}
+
+/// A plate that is away for a while: up by 2 mm and back.
+TEST(DriftTraits, TellTwoSteps) {
+  for (unsigned seed = 1; seed <= 60; ++seed) {
+    Noise noise{seed};
+    std::vector<double> t, y;
+    for (int i = 0; i < 181; ++i) {
+      t.push_back(20.0 * i);
+      y.push_back((i > 50 && i <= 120 ? 2.0 : 0.0) + noise(0.3));
+    }
+    const auto drift = driftTraits(t, y);
+    ASSERT_TRUE(drift) << seed;
+    EXPECT_STREQ(nameOf(drift->model), "two steps") << seed;
+    EXPECT_EQ(drift->not_told, "") << seed;
   }
 }
 
@@ -258,8 +509,6 @@ TEST(Traits, CallAnErrorAtAnAmplitudeOfOneExtrapolated) {
   EXPECT_TRUE((*traits)[0].is_extrapolated);
   EXPECT_FALSE((*traits)[1].is_extrapolated);
 }
-
-std::string errorOf(const Traits& traits) { return traits ? "no error" : traits.error().message; }
 
 TEST(Traits, SayWhatRowsCannotTell) {
   const std::vector<double> few{1, 2, 3}, same(20, 1.0), zero(20, 0.0),

@@ -6,6 +6,8 @@
 
 #include <cmath>
 #include <random>
+#include <tuple>
+#include <variant>
 
 #include "calib/compare/traits/difference.h"
 
@@ -31,7 +33,7 @@ TEST(Verdict, PutsWhatIsFarthestBeyondItsFloorFirst) {
   // Half widths of 0.01 meet at right angles, widened for three rows.
   EXPECT_NEAR(all[0].floor(), 0.01 * std::sqrt(2.0) * widenedFor(3), 1e-12);
   EXPECT_THAT(headlineOf(all), HasSubstr("2 of 3 numbers of B differ"));
-  EXPECT_THAT(headlineOf(all), HasSubstr("Largest difference: large: number, +9 mm ("));
+  EXPECT_THAT(headlineOf(all), HasSubstr("Clearest difference: small: number, +0.5 mm (0.483 to 0.517), 29 × the floor"));
   const auto table = verdictTable(all);
   EXPECT_THAT(table.rows[0][1], HasSubstr("differs, "));
   EXPECT_THAT(table.rows[2][1], HasSubstr("same, within "));
@@ -49,6 +51,65 @@ TEST(Verdict, PutsWrapsFirst) {
   EXPECT_EQ(verdictsOf(traits).front().what, "wraps");
   traits.traits.back() = wraps("B", 0.009);
   EXPECT_EQ(verdictsOf(traits).front().what, "small");
+}
+
+/// A pattern is what a veil or a wave leaves in an image: they are named before it, however clear it is.
+TEST(Verdict, PutsTheFixedPatternBehindWhatMayMakeIt) {
+  const char* pattern = "fixed pattern over amplitude";
+  NamedTraits traits{.traits = {of("A", pattern, 1.0, 0.999, 1.001), of("B", pattern, 9.0, 8.999, 9.001),
+                                of("A", "veil", 1.0, 0.9, 1.1), of("B", "veil", 1.5, 1.4, 1.6),
+                                of("A", "noise of frames", 1.0, 0.99, 1.01), of("B", "noise of frames", 2.0, 1.99, 2.01)}};
+  for (std::size_t i = 4; i < 6; ++i) traits.traits[i].trait.name = "fixed pattern";
+  const auto all = verdictsOf(traits);
+  ASSERT_EQ(all.size(), 3u);
+  EXPECT_EQ(all[0].what, "veil");
+  EXPECT_EQ(all[1].what, pattern);
+  EXPECT_THAT(headlineOf(all), testing::StartsWith("Clearest difference: veil"));
+  EXPECT_THAT(headlineOf(all), HasSubstr("3 of 3 numbers"));
+  traits.traits.erase(traits.traits.begin() + 2, traits.traits.begin() + 4);
+  EXPECT_THAT(headlineOf(verdictsOf(traits)), testing::StartsWith("Clearest difference: fixed pattern"));
+}
+
+/// B's clock is off by 3 mm/m: 9 mm at 3 m, which is known better than the scale. With 1 mm more, both are told.
+NamedTraits withLine(double offset_mm) {
+  NamedTraits traits{.traits = {of("B − A", "harmonics", offset_mm, offset_mm - 0.1, offset_mm + 0.1),
+                                of("B − A", "harmonics", 3.0, 2.9, 3.1)}};
+  traits.traits[0].trait.name = "offset", traits.traits[1].trait.name = "scale";
+  traits.traits[0].trait.refers_to =
+      OnLine{.at_m = 3.0, .slope = 3.0, .variance = 0.0025, .slope_variance = 0.0025, .degrees = 400.0};
+  return traits;
+}
+
+TEST(Verdict, NamesTheScaleBeforeTheOffsetThatItMakes) {
+  const auto all = verdictsOf(withLine(9.0));
+  EXPECT_THAT(headlineOf(all), testing::StartsWith("Clearest difference: B − A over distance: scale, +3"));
+  EXPECT_THAT(verdictTable(all).rows[1][0], testing::StartsWith("harmonics: offset at 3 m"));
+  EXPECT_THAT(headlineOf(verdictsOf(withLine(10.0))),
+              testing::StartsWith("Clearest difference: B − A over distance: offset at 3 m, +10"));
+  EXPECT_THAT(traitTable(withLine(9.0)).rows[0].back(), HasSubstr("at 3 m"));
+}
+
+/// The same of two cameras that are told apart, each at its own distance.
+TEST(Verdict, NamesTheScaleOfTwoLinesBeforeTheirOffset) {
+  NamedTraits traits;
+  for (const auto& [whose, slope, at_m] : {std::tuple{"A", 0.0, 2.0}, {"B", 3.0, 3.0}}) {
+    NamedTraits its = withLine(slope * at_m);
+    auto* line = std::get_if<OnLine>(&its.traits[0].trait.refers_to);
+    line->at_m = at_m, line->slope = slope, line->from_m = 1.0, line->to_m = 5.0;
+    its.traits[1].trait.value = slope, its.traits[1].trait.low = slope - 0.1,
+    its.traits[1].trait.high = slope + 0.1;
+    for (NamedTrait& one : its.traits) one.of = whose, traits.traits.push_back(one);
+  }
+  const auto all = verdictsOf(traits);
+  ASSERT_EQ(all.size(), 2u);
+  EXPECT_EQ(all[0].difference.name, "scale");
+  EXPECT_TRUE(all[1].is_of_scale);
+  EXPECT_THAT(verdictTable(all).rows[1][0], testing::StartsWith("harmonics: offset at 3 m"));
+}
+
+TEST(Verdict, SaysOfWhatIsFarBeyondItsFloorNoMoreThanThat) {
+  const auto far = verdictsOf({.traits = {of("B − A", "far", 1.0, 1.0 - 1e-7, 1.0 + 1e-7)}});
+  EXPECT_THAT(headlineOf(far), HasSubstr(", over 1000 × the floor"));
 }
 
 struct ValidShares {
@@ -81,14 +142,14 @@ TEST(Verdict, SaysFirstWhichPixelsOneCameraLacks) {
   EXPECT_THAT(headlineOf(all),
               testing::StartsWith(
                   "B gives no range at 11 % of the pixels at which A does (9.57 to 12.4 %). "
-                  "A gives no range at 5.07 % of the pixels at which B does (3.55 to 6.59 %). Largest"));
-  EXPECT_THAT(headlineOf(all), HasSubstr("Largest difference: large: number, +90 mm"));
+                  "A gives no range at 5.07 % of the pixels at which B does (3.55 to 6.59 %). Clearest"));
+  EXPECT_THAT(headlineOf(all), HasSubstr("Clearest difference: large: number, +90 mm"));
   EXPECT_THAT(cardsOf(all)[1].label, HasSubstr("valid pixels"));
   EXPECT_THAT(headlineOf(verdictsOf(withValidPixels({0.75, 0.8, 0.75, 0.01}))),
               testing::StartsWith("A gives no range at 6.25 % of the pixels at which B does ("));
   // Fewer than 5 % of them, or by an interval that reaches 0, stand in the table alone.
   for (const ValidShares& few : {ValidShares{0.8, 0.77, 0.765, 0.001}, {0.8, 0.75, 0.75, 0.06}})
-    EXPECT_THAT(headlineOf(verdictsOf(withValidPixels(few))), testing::StartsWith("Largest"));
+    EXPECT_THAT(headlineOf(verdictsOf(withValidPixels(few))), testing::StartsWith("Clearest"));
 }
 
 /// As many each, at no pixel the same.
@@ -101,7 +162,7 @@ TEST(Verdict, SaysWhichPixelsOneCameraLacksThatHasAsManyOthers) {
   ASSERT_EQ(all.size(), 2u);
   EXPECT_EQ(all[0].what, "large") << "shares are the same";
   EXPECT_EQ(verdictTable(all).rows[1][1], "same, within 0.00114; B lacks 100 % of A's; A lacks 100 % of B's");
-  EXPECT_THAT(headlineOf(all), testing::StartsWith(lacked + "Largest difference: large"));
+  EXPECT_THAT(headlineOf(all), testing::StartsWith(lacked + "Clearest difference: large"));
   traits.traits[1].trait = traits.traits[0].trait;
   const auto same = verdictsOf(traits);
   EXPECT_EQ(same.front().what, kValidPixels);
@@ -140,6 +201,8 @@ TEST(Verdict, CallsNoJitterDifferentThatIsRounding) {
     for (int i = 0; i < 60; ++i) starts.push_back(first + 0.05 * i);
     const auto timing = timingTraits(starts);
     ASSERT_TRUE(timing);
+    EXPECT_EQ((*timing)[1].name, "jitter");
+    EXPECT_EQ((*timing)[1].value, 0.0) << "below a tick";
     for (const Trait& one : *timing) traits.traits.push_back({"frame timing", "", whose, one});
   }
   for (const TraitVerdict& one : verdictsOf(traits))
@@ -198,11 +261,22 @@ TEST(Verdict, NamesNoWaveThatMayBeAnother) {
   EXPECT_THAT(headlineOf(verdictsOf(traits)), HasSubstr("over distance: number, +50 mm"));
   traits.traits[0].trait.doubt = traits.traits[1].trait.doubt = "it may be another";
   const auto all = verdictsOf(traits);
-  EXPECT_THAT(headlineOf(all), testing::StartsWith("Largest difference: bias: number, +3 mm"));
+  EXPECT_THAT(headlineOf(all), testing::StartsWith("Clearest difference: bias: number, +3 mm"));
   EXPECT_THAT(headlineOf(all), HasSubstr("1 of 1 numbers"));
   EXPECT_EQ(verdictTable(all).rows[1][1], "not told: it may be another");
   EXPECT_EQ(verdictTable(all).rows[2][1], "not told: of A, it may be another");
   EXPECT_THAT(traitTable(traits, "a", "b").rows[0][5], HasSubstr("in doubt"));
+}
+
+/// Though none of them is told, it is certain that there are waves.
+TEST(Verdict, NamesAllWavesTogetherWhereEachMayBeAnother) {
+  NamedTraits traits{.traits = {of("B − A", "harmonics", 4.4, 4.3, 4.5), of("B − A", "harmonics", 3.1, 3.0, 3.2),
+                                of("B − A", "bias", 3.0, 2.8, 3.2)}};
+  traits.traits[0].trait.name = "16 MHz, 6 per period", traits.traits[0].trait.doubt = "it may be another";
+  traits.traits[1].trait.name = kWavesTogether;
+  EXPECT_THAT(headlineOf(verdictsOf(traits)),
+              testing::StartsWith("Clearest difference: B − A over distance: waves together, RMS over the "
+                                  "distances, 3.1 mm ("));
 }
 
 /// By what it is, not by its name; and of the one camera that has it alone the other's reason is said.
@@ -217,7 +291,7 @@ TEST(Verdict, IsNoneOfAnInterceptFarFromAllRows) {
   const auto all = verdictsOf(traits);
   ASSERT_EQ(all.size(), 2u);
   EXPECT_EQ(verdictTable(all).rows[1][1], "not told: it is told far from all rows");
-  EXPECT_THAT(headlineOf(all), testing::StartsWith("Largest difference: bias: number, +1 mm"));
+  EXPECT_THAT(headlineOf(all), testing::StartsWith("Clearest difference: bias: number, +1 mm"));
   EXPECT_NEAR(all[0].floor(), 0.1 * std::sqrt(2.0), 1e-12) << "one row is told, and none widens it";
   traits.traits.erase(traits.traits.begin() + 1, traits.traits.begin() + 3);
   const auto alone = verdictTable(verdictsOf(traits)).rows;

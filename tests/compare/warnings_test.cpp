@@ -26,6 +26,15 @@ Frame frameFrom(std::chrono::milliseconds ago) {
   return frame;
 }
 
+/// So many of it, numbered.
+void recordFrames(const std::filesystem::path& file, std::uint64_t count, Frame frame,
+                  const record::WriterOptions& options = {}) {
+  auto writer = record::Writer::create(file, options);
+  ASSERT_TRUE(writer) << writer.error().message;
+  for (frame.sequence = 0; frame.sequence < count; ++frame.sequence) ASSERT_TRUE(writer->write(frame));
+  ASSERT_TRUE(writer->close());
+}
+
 TEST(Warnings, TellOfADaemonWhoseClockIsOff) {
   using std::chrono::milliseconds;
   const auto now = std::chrono::system_clock::now(), long_ago = now - std::chrono::minutes{5};
@@ -42,16 +51,7 @@ TEST(Warnings, TellOfADaemonWhoseClockIsOff) {
 TEST(Warnings, TellOfARecordingThatWasCutOff) {
   const record::Folder folder;
   const auto file = folder / "a.mcap";
-  {
-    auto writer = record::Writer::create(file, {});
-    ASSERT_TRUE(writer) << writer.error().message;
-    for (std::uint64_t i = 0; i < 40; ++i) {
-      Frame frame = frameFrom(std::chrono::milliseconds{0});
-      frame.sequence = i;
-      ASSERT_TRUE(writer->write(frame));
-    }
-    ASSERT_TRUE(writer->close());
-  }
+  recordFrames(file, 40, frameFrom(std::chrono::milliseconds{0}));
   const auto whole = openRecording(file.string());
   ASSERT_TRUE(whole) << whole.error().message;
   EXPECT_EQ((*whole)->warning(), "");
@@ -66,23 +66,34 @@ TEST(Warnings, TellOfARecordingThatWasCutOff) {
   EXPECT_THAT(nothing.error().message, HasSubstr("a.mcap: no frame of it can be read: "));
 }
 
-/// Four frames of so long ago from where the world begins.
-void recordFrames(const std::filesystem::path& file, std::chrono::milliseconds ago) {
-  auto writer = record::Writer::create(file, {});
-  ASSERT_TRUE(writer) << writer.error().message;
-  for (std::uint64_t i = 0; i < 4; ++i) {
-    Frame frame = frameFrom(ago);
-    frame.sequence = i;
-    frame.moment.world_from_camera = Transform<World, Camera>{};
-    ASSERT_TRUE(writer->write(frame));
-  }
-  ASSERT_TRUE(writer->close());
+/// One byte in the middle of the file, behind the two frames that are asked for.
+TEST(Warnings, TellOfOneFlippedByteHoweverFewFramesAreRead) {
+  const record::Folder folder;
+  const auto file = folder / "a.mcap";
+  recordFrames(file, 40, frameFrom(std::chrono::milliseconds{0}), {.chunk_bytes = 4000, .zstd_level = 0});
+  auto bytes = record::bytesOf(file);
+  bytes[bytes.size() / 2] ^= std::byte{0x40};
+  record::writeBytes(file, bytes);
+  const auto a = openRecording(file.string()), b = openRecording(file.string());
+  ASSERT_TRUE(a && b);
+  Progress silent{nullptr};
+  const auto captured = capture(**a, **b, {.frames = 2}, silent);
+  ASSERT_TRUE(captured) << captured.error().message;
+  EXPECT_THAT(captured->warnings, testing::Contains(testing::MatchesRegex(
+                                      "Of the recording of kinect, 1 of [0-9]* chunks cannot be read, and no .*")));
+}
+
+/// A frame of so long ago from where the world begins.
+Frame frameFromOrigin(std::chrono::milliseconds ago) {
+  Frame frame = frameFrom(ago);
+  frame.moment.world_from_camera = Transform<World, Camera>{};
+  return frame;
 }
 
 TEST(Warnings, SayNothingOfTheClockOfWhatWasRecordedLongAgo) {
   const record::Folder folder;
   const auto file = folder / "a.mcap";
-  recordFrames(file, std::chrono::hours{24});
+  recordFrames(file, 4, frameFromOrigin(std::chrono::hours{24}));
   const auto a = openRecording(file.string()), b = openRecording(file.string());
   ASSERT_TRUE(a && b);
   Progress silent{nullptr};
@@ -94,7 +105,7 @@ TEST(Warnings, SayNothingOfTheClockOfWhatWasRecordedLongAgo) {
 TEST(Warnings, TellOfARecordingOfOtherPoses) {
   const record::Folder folder;
   const auto file = folder / "a.mcap";
-  recordFrames(file, std::chrono::milliseconds{0});
+  recordFrames(file, 4, frameFromOrigin(std::chrono::milliseconds{0}));
   const auto a = openRecording(file.string()), b = openRecording(file.string());
   ASSERT_TRUE(a && b);
   Progress silent{nullptr};
@@ -109,7 +120,7 @@ TEST(Warnings, TellOfARecordingOfOtherPoses) {
 TEST(Warnings, TellThatARecordingEndedBeforeThePoseForItWasCutOff) {
   const record::Folder folder;
   const auto whole = folder / "a.mcap", cut = folder / "b.mcap";
-  recordFrames(whole, std::chrono::milliseconds{0});
+  recordFrames(whole, 4, frameFromOrigin(std::chrono::milliseconds{0}));
   const auto bytes = record::bytesOf(whole);
   record::writeBytes(cut, std::span{bytes}.first(bytes.size() - 100));
   const auto a = openRecording(whole.string()), b = openRecording(cut.string());

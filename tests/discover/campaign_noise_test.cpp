@@ -3,10 +3,13 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <memory>
 #include <numbers>
 #include <random>
 
 #include "calib/discover/campaign/gather_capture.h"
+#include "calib/discover/campaign/light_noise.h"
+#include "calib/discover/campaign/rows.h"
 #include "calib/discover/campaign/reading.h"
 #include "sim/decode/decode_steps.h"
 #include "sim/sensor/factory_calibration.h"
@@ -117,6 +120,86 @@ TEST(GatherCapture, SaysTheMiddleOfItsTime) {
   EXPECT_NEAR(capture.moment.since_power_on->in(second), 116.0, 1e-9);
   ASSERT_EQ(capture.moment.temperatures.size(), 1U);
   EXPECT_NEAR(capture.moment.temperatures.front().value.in(celsius), 21.0, 1e-9);
+}
+
+/// Of a simulated camera of 20 and 80 MHz: 8 and 2 mm of range, the left half twice that.
+Frame frameOfLight(float times = 1.0F) {
+  constexpr int kWidth = 24, kHeight = 6;
+  Frame frame = frameOf(Image<float>(kWidth, kHeight, 2.0F), Image<float>(kWidth, kHeight, 500.0F));
+  std::vector<float> sigma_m;
+  for (const float here : {8e-3F, 2e-3F})
+    for (int i = 0; i < kWidth * kHeight; ++i)
+      sigma_m.push_back(times * here * (i % kWidth < kWidth / 2 ? 2.0F : 1.0F));
+  frame.planes.push_back(
+      {PlaneKind::LightSigma, ElementType::F32, kWidth, kHeight, 2, Buffer::adopt(std::move(sigma_m))});
+  frame.moment.exposures = {{{}, 1_ms, 20_MHz}, {{}, 1_ms, 80_MHz}};
+  frame.moment.world_from_camera = Transform<World, Camera>{};
+  return frame;
+}
+
+MeasuredCapture captureOf(const std::vector<Frame>& frames) {
+  CaptureGatherer gatherer{plan::CaptureRecord{}};
+  for (const Frame& frame : frames)
+    if (auto added = gatherer.add(frame); !added) throw std::runtime_error(added.error().message);
+  return gatherer.finish();
+}
+
+/// Two captures from one place count half each. Edges, in column 20, say nothing; far from where sigma
+/// changes, a mean over neighbours is what each of them says.
+TEST(LightNoise, IsThatOfTheHighestFrequencyAndSharedByThePlace) {
+  std::vector<MeasuredCapture> captures{captureOf({frameOfLight(), frameOfLight()}),
+                                        captureOf({frameOfLight(), frameOfLight()}),
+                                        captureOf({frameOfLight(), frameOfLight()})};
+  captures[2].moment.world_from_camera->translation_m = {0.1, 0.0, 0.0};
+  auto traced = std::make_shared<TracedCapture>();
+  traced->is_edge = Image<std::uint8_t>(24, 6);
+  for (int y = 0; y < 6; ++y) {
+    traced->is_edge(20, y) = 1;
+    for (MeasuredCapture& capture : captures) capture.light_variance_m2(20, y) = 1.0F;
+  }
+  shareLightNoise({traced, traced, traced}, captures);
+  const double per_m = 4.0 * std::numbers::pi * 80e6 / kSpeedOfLight_m_per_s;
+  for (std::size_t c = 0; c < 3; ++c) {
+    const double alike = c == 2 ? 1.0 : 2.0;
+    for (const auto& [x, sigma_m] : {std::pair{3, 4e-3}, {22, 2e-3}}) {
+      const double expected = alike * sigma_m * sigma_m;
+      EXPECT_NEAR(static_cast<double>(captures[c].light_variance_m2(x, 3)), expected, 1e-5 * expected) << c;
+      EXPECT_NEAR(static_cast<double>(captures[c].light_variance(x, 3)), per_m * per_m * expected,
+                  1e-5 * per_m * per_m * expected);
+    }
+  }
+}
+
+TEST(LightNoise, IsHiddenWhereASimulatedCameraDoesNotSayIt) {
+  Frame simulated = frameOfLight();
+  simulated.provenance.kind = FrameKind::Simulated;
+  EXPECT_FALSE(captureOf({simulated, simulated}).hides_light_noise);
+  simulated.planes.pop_back();
+  EXPECT_TRUE(captureOf({simulated, simulated}).hides_light_noise);
+  simulated.moment.exposures = {{{}, 1_ms, {}}};  // a pulsed camera's nobody knows
+  EXPECT_FALSE(captureOf({simulated, simulated}).hides_light_noise);
+}
+
+TEST(LightNoise, IsInTheFramesOwnNoiseWhereEachHasItsLight) {
+  EXPECT_TRUE(captureOf({frameOfLight(), frameOfLight(1.1F)}).light_variance.empty());
+  EXPECT_TRUE(captureOf({frameOf(Image<float>(8, 8, 2.0F), Image<float>(8, 8, 500.0F)),
+                         frameOf(Image<float>(8, 8, 2.0F), Image<float>(8, 8, 500.0F))})
+                  .light_variance.empty());
+}
+
+/// The same number of the light's noise makes rows of it: 4 mm² of light beside 1 mm² of the frames.
+TEST(LightNoise, CountsInTheRows) {
+  MeasuredCapture capture;
+  const Image<float> flat(4, 4, 2.0F);
+  capture.range_m = {flat, Image<float>(4, 4, 1e-6F), 1.0};
+  TracedCapture traced;
+  traced.is_edge = Image<std::uint8_t>(4, 4);
+  traced.tracing_variance_m2 = traced.tracing_variance = Image<float>(4, 4);
+  const Reading declared{flat, flat};
+  const double before = static_cast<double>(Cells{capture, traced, declared}.rootWeights(Channel::Range)[0]);
+  capture.light_variance_m2 = capture.light_variance = Image<float>(4, 4, 4e-6F);
+  const double after = static_cast<double>(Cells{capture, traced, declared}.rootWeights(Channel::Range)[0]);
+  EXPECT_NEAR(before / after, std::sqrt(5.0), 1e-3);  // beside 0.02 mm of rounding
 }
 
 /// Amplitudes of m phasors of 1 with noise of 0.1 each. 100,000 draws: the mean of ln A is known to 1.8e-4 at

@@ -375,6 +375,34 @@ interval_s = 400.0
   EXPECT_EQ(drift->count, 4U) << "how much and how long, twice";
 }
 
+/// Two temperatures that rise alike: what the sensor's does beside the illumination's is less than images in single
+/// precision show of a small step. The fit goes to where it is most likely, and states how likely the rest is.
+TEST_F(Rows, NumbersThatHardlyDifferAreFittedAndAsUncertainAsTheyAre) {
+  const Made made = make("[[effect]]\ntype = 'thermal_delay'\nper_degree_mm = 0.7\nper_sensor_degree_mm = 0.0\n");
+  const Declared& declared = kept_.back().declared;
+  const sim::AnyEffect delay = sim::ThermalDelay{.per_degree = 0.7_mm, .per_sensor_degree = 0_mm};
+  const auto effects = withInserted(declaredEffects(declared), {delay});
+  const auto at = std::ranges::find(effects, delay.index(), &sim::AnyEffect::index);
+  const auto place = static_cast<std::size_t>(at - effects.begin());
+  const auto refitted = [&](double sensor_mm, const RefitOptions& options) {
+    auto from = effects;
+    from[place] = withNumber(from[place], "per_sensor_degree_mm", sensor_mm);
+    return refit(made.rows, from, {place}, options);
+  };
+  const auto fit = refitted(0.0, {});
+  ASSERT_TRUE(fit) << fit.error().message;
+  const auto sensor = std::ranges::find(fit->fitted.front().numbers, "per_sensor_degree_mm", &FittedNumber::key);
+  ASSERT_NE(sensor, fit->fitted.front().numbers.end());
+  EXPECT_NEAR(sensor->value, 0.0, 4.0 * sensor->error);  // 6e-5 false alarms
+  for (const double errors : {-2.0, 2.0}) {
+    const auto beside = refitted(sensor->value + errors * sensor->error, {.only = {{place, {"per_degree_mm"}}}});
+    ASSERT_TRUE(beside) << beside.error().message;
+    const double more = (beside->deviance - fit->deviance) / std::max(1.0, fit->dispersion);
+    EXPECT_GT(more, 2.5) << errors;  // of 4, and the fit ends a third of an error from the best
+    EXPECT_LT(more, 6.0) << errors;
+  }
+}
+
 /// The frames of all captures of a run, one after the other, as a camera's own recording.
 class Recording : public Rows {
  protected:

@@ -74,6 +74,19 @@ TEST(SampleSteps, AreNotFoundWhereThereAreNone) {
     EXPECT_FALSE(sampleStepsOf(SteppedCamera(4, 0.0, 60.0, seed).pairs(500), 4)) << seed;
 }
 
+/// Frames that do not differ: each pixel says a number once, however often it is seen.
+TEST(SampleSteps, AreFoundWithoutNoise) {
+  expectStep(4, 60.0, 0.0);
+  expectStep(3, 60.0, 0.0);
+  for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+    const auto once = SteppedCamera(4, 0.0, 0.0, seed).pairs(50);
+    std::vector<AmplitudePair> often;
+    for (int times = 0; times < 20; ++times) often.insert(often.end(), once.begin(), once.end());
+    EXPECT_FALSE(sampleStepsOf(often, 4)) << seed;
+    EXPECT_FALSE(sampleStepsOf(SteppedCamera(4, 0.0, 0.0, seed).pairs(1000), 4)) << seed;
+  }
+}
+
 TEST(SampleSteps, OfTheAmplitudeItselfAreNoSteps) {
   auto pairs = SteppedCamera{4, 17.0, 60.0}.pairs(2000);
   for (AmplitudePair& pair : pairs)

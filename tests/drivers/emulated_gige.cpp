@@ -41,8 +41,8 @@ std::string ownLoopbackAddress() {
 
 // ---- registers ---------------------------------------------------------------------------------
 
-EmulatedGige::EmulatedGige(std::string address, std::string serial)
-    : address_(std::move(address)), serial_(std::move(serial)) {
+EmulatedGige::EmulatedGige(std::string address, std::string serial, std::string user_name)
+    : address_(std::move(address)), serial_(std::move(serial)), user_name_(std::move(user_name)) {
   factorySettings();
   control_ = boundSocket(address_, kPort, false);
   broadcast_ = boundSocket("127.255.255.255", kPort, true);
@@ -83,7 +83,7 @@ void EmulatedGige::factorySettings() {
   setText(0x88, "1", 32);
   setText(0xA8, "", 48);
   setText(0xD8, serial_, 16);
-  setText(0xE8, "dock", 16);
+  setText(0xE8, user_name_, 16);
   std::array<char, 64> url{};
   std::snprintf(url.data(), url.size(), "Local:tof.xml;%x;%zx", kXmlAddress, description().size());
   setText(0x200, url.data(), 512);

@@ -24,7 +24,7 @@ namespace toftwin::test {
 class EmulatedGige final : public EmulatedTof {
  public:
   /// `address`: on 127.0.0.0/8; several cameras need several. Throws if it is taken.
-  explicit EmulatedGige(std::string address, std::string serial = "EMU-1");
+  explicit EmulatedGige(std::string address, std::string serial = "EMU-1", std::string user_name = "dock");
   EmulatedGige(const EmulatedGige&) = delete;
   EmulatedGige& operator=(const EmulatedGige&) = delete;
   ~EmulatedGige();
@@ -63,7 +63,7 @@ class EmulatedGige final : public EmulatedTof {
   [[nodiscard]] std::uint32_t payloadSize() const;
   void factorySettings();
 
-  std::string address_, serial_;
+  std::string address_, serial_, user_name_;
   int control_ = -1, broadcast_ = -1, stream_ = -1;
   std::uint64_t frame_id_ = 65'530;  // so that ids of 16 bits soon wrap around
   std::uint32_t controller_address_ = 0;

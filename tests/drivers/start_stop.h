@@ -4,9 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <malloc.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <cstdlib>
@@ -14,6 +16,7 @@
 #include <iterator>
 #include <string_view>
 #include <thread>
+#include <utility>
 
 #include "drivers/source.h"
 
@@ -50,16 +53,18 @@ inline void startAndStop(drivers::Source& source, int cycles, int frame_every, H
     }
     source.stop();
     if (i < cycles - 50) continue;
-    const auto least = i > cycles - 50 ? held.heap_bytes : Held{}.heap_bytes;
+    const auto least = i > cycles - 50 && i > 0 ? held.heap_bytes : Held{}.heap_bytes;
     held = {};
     held.heap_bytes = std::min(held.heap_bytes, least);
   }
 }
 
 /// Ten thousand starts and stops of an opened source, with a frame of each `frame_every`th, keep no file, no
-/// thread and no memory. Allocators and libraries fill caches of their own; a leak is at least one block of
-/// 16 bytes per cycle, which is more than `most_kept_bytes` from 500 cycles on; TOFTWIN_CYCLES=10000 runs
-/// more of them. Larger where a library keeps images for the next start.
+/// thread and no memory. A leak is at least one block of 16 bytes per cycle, which is more than
+/// `most_kept_bytes` from 500 cycles on; TOFTWIN_CYCLES=10000 runs more of them. Allocators and libraries fill
+/// caches of their own, and one more when the machine is busy: unlike a leak, not in each third of the cycles
+/// alike. So what counts is thrice the third that keeps least. Larger where a library keeps images for the
+/// next start.
 inline void expectNothingKept(std::string_view name, drivers::Source& source, int frame_every, int cycles = 10'000,
                               std::int64_t most_kept_bytes = 8'000) {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -68,12 +73,16 @@ inline void expectNothingKept(std::string_view name, drivers::Source& source, in
   if (const char* asked = std::getenv("TOFTWIN_CYCLES"); asked != nullptr) cycles = std::max(cycles, std::atoi(asked));
   Held before, after;
   startAndStop(source, std::clamp(cycles / 2, 50, 100), frame_every, before);
-  startAndStop(source, cycles, frame_every, after);
-  fmt::print("{}: {} bytes more on the heap after {} starts and stops\n", name,
-             after.heap_bytes - before.heap_bytes, cycles);
+  std::array<std::int64_t, 3> kept{};
+  std::int64_t held_bytes = before.heap_bytes;
+  for (std::int64_t& third : kept) {
+    ASSERT_NO_FATAL_FAILURE(startAndStop(source, cycles / 3, frame_every, after));
+    third = after.heap_bytes - std::exchange(held_bytes, after.heap_bytes);
+  }
+  fmt::print("{}: {} bytes more on the heap after each third of {} starts and stops\n", name, kept, cycles);
   EXPECT_EQ(after.files, before.files);
   EXPECT_EQ(after.threads, before.threads);
-  EXPECT_LT(after.heap_bytes - before.heap_bytes, most_kept_bytes);
+  EXPECT_LT(3 * *std::ranges::min_element(kept), most_kept_bytes);
 }
 
 }  // namespace toftwin::test

@@ -109,11 +109,11 @@ TEST(CalibrateCommand, MakesAFileOfImagesAndKeepsItByItsId) {
 
 TEST(CalibrateCommand, RefusesABoardWithMoreCornersThanItWasTold) {
   const Folder folder;
-  for (std::size_t i = 0; i < 6; ++i) writePng(folder / ("a" + std::to_string(i) + ".png"), shots()[i]);
+  for (std::size_t i = 0; i < 3; ++i) writePng(folder / ("a" + std::to_string(i) + ".png"), shots()[i]);
   const Ran ran = cli::toftwin("calibrate " + (folder / "a").string() + "*.png --board 7x5 --square 32 -o " +
                                quoted(folder / "camera.toml") + " --no-store");
   EXPECT_NE(ran.status, 0) << ran.out;
-  EXPECT_THAT(ran.err, HasSubstr("of 6 images show a board with more than 7 x 5 inner corners"));
+  EXPECT_THAT(ran.err, HasSubstr("of 3 images show a board with more than 7 x 5 inner corners"));
   EXPECT_FALSE(std::filesystem::exists(folder / "camera.toml"));
 }
 

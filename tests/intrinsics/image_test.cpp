@@ -124,7 +124,7 @@ TEST(FindBoard, SaysThatABoardHasMoreCornersThanItWasTold) {
   std::mt19937_64 random;
   int views = 0, more = 0, used = 0;
   for (const char* told : {"7x5", "8x4", "7x4", "6x5"}) {
-    for (const unsigned seed : {11U, 12U, 13U, 31U}) {
+    for (const unsigned seed : {11U, 31U}) {
       const BoardPose pose = poseBefore(seed, truth, random);
       const Sighting seen =
           findBoard(render(truth, checkerboard(), pose, {}, random), *targetOf(told, 32_mm));

@@ -147,8 +147,8 @@ TEST(RunTraits, TellNoiseAndPatternOverDistanceAndAmplitude) {
   for (const auto& [of, share] : {std::pair{"A", 1.0}, {"B", 0.5}}) {
     expectNear(find(all, kNoiseOverDistance, of, "floor"), share * 1.0);
     expectNear(find(all, kNoiseOverDistance, of, "shot"), share * 2.0 * nearest);
-    expectNear(find(all, kPatternOverDistance, of, "floor"), share * 0.5);
-    expectNear(find(all, kPatternOverAmplitude, of, "floor"), share * 0.5);
+    expectNear(find(all, kPatternOverDistance, of, "constant part"), share * 0.5);
+    expectNear(find(all, kPatternOverAmplitude, of, "constant part"), share * 0.5);
   }
   const auto rows = std::ranges::find(all.rows, kPatternOverDistance, &compare::NamedRows::what);
   ASSERT_NE(rows, all.rows.end());
@@ -263,6 +263,25 @@ TEST(RunTraits, OfACameraInLightAreTheSameBesideAnyOther) {
   }
 }
 
+/// A has no pixel from 5 klx on: B has a number that A has not, and why is said beside it.
+TEST(RunTraits, SayFromWhichLightOnACameraIsBlind) {
+  std::mt19937_64 random{kSeed};
+  ComparedRun run;
+  for (int i = 0; i < 24; ++i) {
+    ComparedCapture& one = run.captures.emplace_back();
+    one.record.kind = "ambient", one.record.ambient_klx = 5.0 * (i % 8), one.pixels = 64;
+    one.own = {inLight(one.record.ambient_klx, 4.0, i % 8 == 0 ? 0 : 64, random),
+               inLight(one.record.ambient_klx, 4.0, 0, random)};
+  }
+  for (const auto& one : compare::verdictsOf(traitsOf(run))) {
+    if (one.what == "ambient light") {
+      EXPECT_EQ(one.why_not,
+                "A has none: at 5 to 35 klx, in 21 of 24 captures, it lost over half of its pixels");
+    }
+  }
+  EXPECT_THAT(traitsOf(run).untold, testing::Contains(testing::StartsWith("ambient light of A: at 5 to 35 klx")));
+}
+
 TEST(RunTraits, SayWhatTheyCannotTellAndWhy) {
   ComparedRun run = plantedRun();
   run.captures.erase(run.captures.begin() + 5, run.captures.begin() + 60);
@@ -309,9 +328,8 @@ TEST(RunTraits, TakeEachCamerasHarmonicsByItsOwnFrequencies) {
   std::normal_distribution<double> error{0.0, 0.1};
   for (ComparedCapture& one : run.captures) {
     const double d_m = one.range_a_mm / 1000.0;
-    one.seen[0].wall_range_m = one.seen[1].wall_range_m = {d_m};
-    one.seen[0].wall_error_mm = {2.0 * std::cos(8.0 * std::numbers::pi * d_m / kPeriod_m) + error(random)};
-    one.seen[1].wall_error_mm = {3.0 * std::cos(8.0 * std::numbers::pi * d_m / period_m) + error(random)};
+    one.seen[0].wall_steps.add(d_m, 2.0 * std::cos(8.0 * std::numbers::pi * d_m / kPeriod_m) + error(random));
+    one.seen[1].wall_steps.add(d_m, 3.0 * std::cos(8.0 * std::numbers::pi * d_m / period_m) + error(random));
   }
   const RunTraits all = traitsOf(run);
   expectNear(find(all, "harmonics, against", "A", "30 MHz, 4 per period"), 2.0);
@@ -349,7 +367,7 @@ ComparedRun wallsOfTheStandardPlan(const std::function<double(double)>& wave_mm,
     for (double tangent = 0.0; tangent < 0.577; tangent += 0.01) {
       const double d = middle_m * std::hypot(1.0, tangent);
       for (CameraSeen& seen : one.seen) {
-        seen.wall_range_m.push_back(d), seen.wall_error_mm.push_back(wave_mm(d) + own + error(random));
+        seen.wall_steps.add(d, wave_mm(d) + own + error(random));
       }
     }
   }
@@ -607,9 +625,40 @@ TEST(RunTraits, WidenLatencyByTheSlowerPlateWhoseSpeedIsNoError) {
     for (std::size_t i = 0; i < place_m.size(); ++i) place_m[i] += i % 2 == 0 ? 0.05 : -0.05;
   }
   const RunTraits all = traitsOf(hidden);
-  const RunTrait* latency = find(all, "latency", "B − A", "latency");
+  EXPECT_EQ(find(all, "latency", "B − A", "latency"), nullptr);
+  EXPECT_THAT(all.untold, testing::Contains(testing::HasSubstr("places err by so much")));
+}
+
+/// B sees all of the way a tenth too long, as where its range errs by the amplitude. A capture of a tenth of a
+/// second goes one way only.
+TEST(RunTraits, TellNoLatencyOfAnErrorThatGoesWithThePlace) {
+  const ComparedRun to_and_fro = movingPlates({0.0, 0.0, 0.0}, 0.3, 2e-4, 1.1);
+  const RunTraits told = traitsOf(to_and_fro);
+  const RunTrait* latency = find(told, "latency", "B − A", "latency");
   ASSERT_NE(latency, nullptr);
-  EXPECT_THAT(latency->trait.doubt, testing::HasSubstr("err by more than it moves"));
+  EXPECT_LT(latency->trait.low, 0.0);
+  EXPECT_GT(latency->trait.high, 0.0);
+  EXPECT_LT(latency->trait.high - latency->trait.low, 2.0);
+  ComparedRun one_way = to_and_fro;
+  for (ComparedCapture& one : one_way.moving) {
+    for (CameraSeen& seen : one.seen) {
+      for (std::vector<double>* column : {&seen.plate_time_s, &seen.plate_place_m, &seen.plate_width_m})
+        column->erase(column->begin() + 29, column->end()), column->erase(column->begin(), column->begin() + 12);
+      seen.plate_turn_mm.resize(seen.plate_time_s.size());
+    }
+  }
+  EXPECT_THAT(traitsOf(one_way).untold,
+              testing::Contains(testing::AllOf(testing::HasSubstr("passes no place in both directions"),
+                                               testing::HasSubstr("3 captures of the moving plate"))));
+}
+
+/// Nobody who reads a page knows our functions.
+TEST(RunTraits, SayInWordsWhyRealCamerasHaveNoLatency) {
+  ComparedRun run = movingPlates({0.0, 0.0, 0.0}, 0.3);
+  for (ComparedCapture& one : run.moving) one.seen[0].is_simulated = false;
+  EXPECT_THAT(traitsOf(run).untold,
+              testing::Contains(testing::AllOf(testing::HasSubstr("latency: the two cameras are captured one after"),
+                                               testing::Not(testing::HasSubstr("::")))));
 }
 
 TEST(RunTraits, SayThatNoFrameShowsAPlateMove) {

@@ -164,11 +164,12 @@ TEST_P(ClientOn, AnAnswerThatDoesNotComeIsATimeoutAndTheConnectionGoesOn) {
                       if (auto* m = std::get_if<wire::AskHealth>(&message))
                         session.send(wire::Health{m->id, 1_s, 1, {}});
                     })};
-  auto client = Client::connect(daemon.address(), {.timeout = 50ms});
+  auto client = Client::connect(daemon.address(), {.timeout = 1s});  // that a busy machine keeps for what does answer
+  ASSERT_TRUE(client) << client.error().message;
   const auto result = client->trigger("kinect");
   ASSERT_FALSE(result);
   EXPECT_EQ(result.error().code, Error::Code::Timeout);
-  EXPECT_THAT(result.error().message, HasSubstr("did not answer within 50 ms"));
+  EXPECT_THAT(result.error().message, HasSubstr("did not answer within 1000 ms"));
   EXPECT_TRUE(client->health());
 }
 

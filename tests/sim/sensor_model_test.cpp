@@ -117,6 +117,37 @@ TEST(Exposing, IsCollectingAndReadingOut) {
   }
 }
 
+/// measure() never has an image of samples, and decodes what others still collect.
+TEST(Exposing, MeasuresTheSameRangeWithoutKeepingSamples) {
+  const std::string scatter =
+      "[[effect]]\ntype = 'lens_scatter'\nveil = 0.01\nhalo = 0.02\nhalo_radius_px = 15\n";
+  for (const std::string& camera : {*SensorModel::presetText("kinect_v2") + scatter,
+                                    *SensorModel::presetText("kinect_v2"), plainCamera(4, 1, 0.5)}) {
+    const SensorModel whole = modelOf(camera);
+    CameraInfo lens = whole.camera();
+    lens.width = 37;
+    lens.height = 45;
+    const SensorModel model = whole.withLens(lens);
+    const TraceRequest request = model.traceRequest();
+    const Light light = syntheticLight(37, 45, request.frequencies, request.harmonics, [](int x, int y) {
+      const double range_m = (x < 20 ? 0.3 : 2.0) + 0.11 * y;
+      return std::vector<Way>{{0.2 / (range_m * range_m), range_m}};
+    });
+    const RangeImage with = model.expose(light, {}, 5, 3).range, without = model.measure(light, {}, 5, 3);
+    EXPECT_EQ(with.flags, without.flags);
+    EXPECT_EQ(with.phasors, without.phasors);
+    EXPECT_EQ(with.amplitude, without.amplitude);
+    EXPECT_EQ(with.ambient, without.ambient);
+    int valid = 0;
+    for (std::size_t i = 0; i < with.range_m.size(); ++i) {
+      if (std::isnan(with.range_m[i]) && std::isnan(without.range_m[i])) continue;
+      ++valid;
+      EXPECT_EQ(with.range_m[i], without.range_m[i]) << i;
+    }
+    EXPECT_GT(valid, 100);
+  }
+}
+
 TEST(FrameAssembly, GivesThePlanesAskedForInOrder) {
   const SensorModel model =
       modelOf(plainCamera(4, 2, 0.5, "[[effect]]\ntype = 'delay'\noffset_mm = -1200\n"));

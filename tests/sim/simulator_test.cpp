@@ -12,6 +12,8 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <numeric>
+#include <vector>
 
 #include "../kept_log.h"
 
@@ -155,6 +157,44 @@ TEST_F(Simulator, EveryFrameHasNoiseOfItsOwn) {
   const auto source = open();
   const Frame first = frameOf(*source);
   EXPECT_FALSE(sameBytes(first, frameOf(*source)));
+}
+
+/// Eight places before a wall without end, from which all is the same but the light's noise, without the camera's
+/// own. Of 28 pairs of 480 pixels: a standard error of the correlation is 1/√(28 · 480) = 0.0086.
+TEST_F(Simulator, FromEachPlaceTheLightHasNoiseOfItsOwn) {
+  std::ofstream{folder_ / "quiet.toml"} << std::string_view{kCamera}.substr(
+      0, std::string_view{kCamera}.find("[[effect]]"));
+  const auto opened = [&](const std::string& keys) {
+    auto source = tryOpen("camera = 'quiet.toml'\nscene = 'wall.toml'\npace = 'fast'\nmax_surfaces = 1\n"
+                          "sampler = 'even'\nplanes = ['amplitude']\n" + keys);
+    if (!source) throw std::runtime_error{source.error().message};
+    EXPECT_TRUE((*source)->start());
+    return *std::move(source);
+  };
+  const auto amplitudes = [](Source& source) {
+    const Frame frame = frameOf(source);
+    const auto values = frame.find(PlaneKind::Amplitude)->as<float>();
+    return std::vector<double>{values.begin(), values.end()};
+  };
+  const auto true_amplitudes = amplitudes(*opened("samples_per_pixel = 4096\n"));
+  const auto source = opened("samples_per_pixel = 4\n");
+  std::vector<std::vector<double>> errors;
+  for (int place = 0; place < 8; ++place) {
+    ASSERT_TRUE(source->setPose({{1, 0, 0, 0}, {0.25 * place, 0, 0}}));
+    errors.push_back(amplitudes(*source));
+    double squares = 0.0;
+    for (std::size_t i = 0; i < errors.back().size(); ++i)
+      squares += std::pow(errors.back()[i] = errors.back()[i] / true_amplitudes[i] - 1.0, 2);
+    EXPECT_GT(squares, 480 * 1e-10) << "there is noise";
+    for (double& error : errors.back()) error /= std::sqrt(squares);
+  }
+  double sum = 0.0;
+  for (std::size_t a = 0; a < errors.size(); ++a)
+    for (std::size_t b = 0; b < a; ++b)
+      sum += std::inner_product(errors[a].begin(), errors[a].end(), errors[b].begin(), 0.0);
+  EXPECT_NEAR(sum / 28.0, 0.0, 4.0 * 0.0086);
+  EXPECT_EQ(amplitudes(*opened("samples_per_pixel = 4\nposition_m = [1.75, 0, 0]\n")), amplitudes(*source))
+      << "the same place has the same, whatever was before";
 }
 
 TEST_F(Simulator, SeesTheWallNearerFromAPoseNearerToIt) {

@@ -26,4 +26,10 @@ sleep() { command sleep "$1"; SECONDS=$((SECONDS + 10)); }
 expect "nothing to go by" "$(with_progress "$work/log" quick 1 | grep -c left || true)" 0
 [[ $(with_progress "$work/log" quick 100) == *"100 of 200 after "*", about "*" left"* ]] ||
   { echo "half is done, and it does not say how long is left"; exit 1; }
+
+# As tools/check runs it, where any failing line ends all: a step may be silent for longer than it takes to ask.
+bash -euo pipefail -c '. "$1"; sleep() { command sleep "$1"; SECONDS=$((SECONDS + 10)); }
+                       with_progress "$2/log" command sleep 1.5' - "$1" "$work" > "$work/said" ||
+  { echo "a step that prints nothing for ten seconds ends who waits for it"; exit 1; }
+grep -q "at work for " "$work/said" || { echo "a step that prints nothing is not spoken of"; exit 1; }
 echo "says what there is to go by"

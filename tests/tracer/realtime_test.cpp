@@ -247,12 +247,16 @@ TEST(Realtime, AddsNothingToASingleWall) {
   }
 }
 
-TEST(Realtime, EdgesAreMixedOverTheirPixels) {
-  // Half of the image is a wall at 1 m, half one at 2 m; at column 20 the pixel is a quarter on the first.
-  const Scene scene = sceneOf(
+/// Half of the image is a wall at 1 m, half one at 2 m; at column 20 the pixel is a quarter on the first.
+Scene twoWalls() {
+  return sceneOf(
       "[[material]]\nname = 'm'\nalbedo = 0.5\n[[object]]\nshape = 'rectangle'\nsize_m = [9, 9, 0]\n"
       "position_m = [0, 0, 2]\nmaterial = 'm'\n[[object]]\nshape = 'rectangle'\nsize_m = [2, 9, 0]\n"
       "position_m = [-1.00625, 0, 1]\nmaterial = 'm'\n");
+}
+
+TEST(Realtime, EdgesAreMixedOverTheirPixels) {
+  const Scene scene = twoWalls();
   TraceRequest request = requestFor(41, 5, 40.0, {16_MHz});
   request.pixel_extent = 1.0;
   Frames run;
@@ -266,6 +270,30 @@ TEST(Realtime, EdgesAreMixedOverTheirPixels) {
               (most - least) / 16.0);
   EXPECT_GT(run.light->variance[0](20, 2), 0.0f);
   EXPECT_EQ(run.light->variance[0](10, 2), 0.0f);
+}
+
+/// Other places on the pixel in each frame: what one frame is wrong by there does not stay.
+TEST(Realtime, EdgesAreSampledAnewInEachFrame) {
+  const Scene scene = twoWalls();
+  TraceRequest request = requestFor(41, 5, 40.0, {16_MHz});
+  request.pixel_extent = 1.0;
+  request.max_surfaces = 2;  // parallel walls light each other no further
+  constexpr int kFrames = 64;
+  Frames run;
+  Complex sum{}, last{};
+  double variance = 0.0;
+  for (int frame = 0; frame < kFrames; ++frame) {
+    run.next(scene, request);
+    const Complex now = phasorAt(*run.light, 0, 20, 2);
+    EXPECT_NE(now, last);
+    last = now;
+    sum += now;
+    variance += static_cast<double>(run.light->variance[0](20, 2));
+  }
+  TraceRequest exact = request;
+  exact.samples_per_pixel = 16384;
+  const Complex apart = sum / static_cast<double>(kFrames) - phasorAt(trace(scene, exact), 0, 20, 2);
+  EXPECT_LT(std::abs(apart), 4.0 * std::sqrt(2.0 * variance) / kFrames);
 }
 
 TEST(Realtime, IsTheSameForAnyNumberOfThreads) {

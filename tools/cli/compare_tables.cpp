@@ -33,7 +33,7 @@ void TableOptions::add(Arguments& args) {
   args.option("--columns", columns,
               "the table's own names of these columns, in their order; a - before one changes its sign, "
               "another unit at "
-              "its end (_mm for _m) is converted")
+              "its end (_mm, [mm] for _m) is converted, one behind = is believed (t=min)")
       .separatedBy(',');
   args.option("--frequency-mhz", frequency_mhz,
               "of modulation, for harmonics, noise_law, wraps and lens_scatter")
@@ -65,7 +65,9 @@ Result<Exit> compareTables(const TableOptions& options, const std::string& outpu
   report->data.set("software", "toftwin " TOFTWIN_VERSION).set("note", note);
   const auto page = compare::write(*report, output);
   if (!page) return page.error();
-  fmt::print("{}\n{}\n", report->verdict, page->string());
+  fmt::print("{}\n", report->verdict);
+  for (const std::string& one : report->notes) fmt::print("{}\n", one);
+  fmt::print("{}\n", page->string());
   return Exit::Ok;
 }
 

@@ -8,6 +8,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "calib/compare/report.h"
 #include "calib/plan/run_log.h"
 #include "calib/plan/trend.h"
 #include "tools/cli/export/hdf5_table.h"
@@ -135,10 +136,11 @@ Result<Exit> showLog(const Options& options) {
 
 std::string verdictOn(const plan::TrendRow& row, const std::string& first_detail) {
   if (row.is_first) return "the first";
+  const auto change = [](double by) { return (by > 0.0 ? "+" : "") + compare::shownDigits(by, 4); };
   std::string verdict = std::isfinite(row.low) && std::isfinite(row.high)
-                            ? fmt::format("{:+.4g} ({:+.4g} to {:+.4g}){}", row.change, row.low, row.high,
-                                          row.isChanged() ? ": changed" : "")
-                            : fmt::format("{:+.4g}, not known how surely", row.change);
+                            ? fmt::format("{} ({} to {}){}", change(row.change), change(row.low),
+                                          change(row.high), row.isChanged() ? ": changed" : "")
+                            : fmt::format("{}, not known how surely", change(row.change));
   if (row.at.trait.detail != first_detail) verdict += fmt::format("; the first was {}", first_detail);
   return verdict;
 }
@@ -159,8 +161,9 @@ Result<Exit> showTrend(const Options& options) {
     for (const plan::TrendRow& row : series.rows) {
       const compare::Trait& trait = row.at.trait.trait;
       const std::string& detail = row.at.trait.detail;
-      fmt::print("  run {:>4}  {:<20}  {:>11.5g}  ({:.5g} to {:.5g}) #{}{}{}  {}\n", row.at.run.id, row.at.run.began,
-                 trait.value, trait.low, trait.high, trait.n, detail.empty() ? "" : ", ", detail,
+      fmt::print("  run {:>4}  {:<20}  {:>11}  ({} to {}) #{}{}{}  {}\n", row.at.run.id, row.at.run.began,
+                 compare::shownDigits(trait.value, 5), compare::shownDigits(trait.low, 5),
+                 compare::shownDigits(trait.high, 5), trait.n, detail.empty() ? "" : ", ", detail,
                  verdictOn(row, series.rows.front().at.trait.detail));
     }
   }

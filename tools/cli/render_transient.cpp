@@ -6,6 +6,7 @@
 #include <span>
 #include <utility>
 
+#include "drivers/sim/light_seed.h"
 #include "tools/cli/export/atomic_file.h"
 #include "tools/cli/export/export.h"
 #include "tools/cli/terminal.h"
@@ -83,6 +84,7 @@ sim::TraceRequest transientRequest(const sim::SensorModel& camera, const drivers
   sim::TraceRequest request = camera.traceRequest();
   keys.applyTo(request);
   request.world_from_camera = pose;
+  request.seed = drivers::simulator::lightSeed(keys.seed, pose);
   request.frequencies.clear();
   request.gates.clear();
   request.wanted_noise = {};

@@ -45,7 +45,7 @@ with_progress() {
     spent=$((SECONDS - started))
     [ $((SECONDS - said)) -ge 10 ] || continue
     said=$SECONDS
-    fraction=$(grep -oE '^ *[0-9]+/ *[0-9]+ ' "$log" | tail -n 1 | tr -d ' ')
+    fraction=$({ grep -oE '^ *[0-9]+/ *[0-9]+ ' "$log" || true; } | tail -n 1 | tr -d ' ')
     n=${fraction%%/*} m=${fraction##*/}
     if [ -n "$fraction" ] && [ "$n" -gt 0 ] && [ "$m" -ge "$n" ]; then
       share=$(thousandths "$log" "$n" "$m" "${TEST_COSTS:-}")

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
 
 #include "calib/compare/fits.h"
 #include "calib/compare/statistics.h"
@@ -16,11 +17,11 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Rows whose last column is y, and the means of each cluster.
+/// Rows whose last column is y.
 struct ClusteredRows {
-  MatrixXd rows{}, means{};    ///< n × (k + 1), G × (k + 1)
-  std::vector<Index> of{};     ///< each row's cluster
-  std::vector<double> size{};  ///< of each cluster
+  MatrixXd rows{};          ///< n × (k + 1)
+  std::vector<Index> of{};  ///< each row's cluster
+  Index clusters = 0;
 };
 
 ClusteredRows clusteredRowsOf(const std::vector<std::vector<double>>& columns, Column y,
@@ -30,69 +31,92 @@ ClusteredRows clusteredRowsOf(const std::vector<std::vector<double>>& columns, C
   std::map<std::size_t, Index> numbers;
   for (const std::size_t one : cluster)
     all.of.push_back(numbers.try_emplace(one, static_cast<Index>(numbers.size())).first->second);
-  all.size.assign(numbers.size(), 0.0);
-  all.means = MatrixXd::Zero(static_cast<Index>(numbers.size()), k + 1);
+  all.clusters = static_cast<Index>(numbers.size());
   for (Index i = 0; i < n; ++i) {
     const auto row = static_cast<std::size_t>(i);
     for (Index c = 0; c < k; ++c) all.rows(i, c) = columns[static_cast<std::size_t>(c)][row];
     all.rows(i, k) = y[row];
-    all.means.row(all.of[row]) += all.rows.row(i);
-    ++all.size[static_cast<std::size_t>(all.of[row])];
   }
-  for (std::size_t g = 0; g < all.size.size(); ++g) all.means.row(static_cast<Index>(g)) /= all.size[g];
   return all;
 }
 
-/// What least squares makes of the rows transformed for one λ.
-struct Transformed {
-  Eigen::LDLT<MatrixXd> normal{};
-  VectorXd at{};
-  double squares = 0.0, restricted = 0.0;  ///< −2 ln of the restricted likelihood, less constants
+/// Sums over rows a = (x, y), each weighed by 1/D of its own variance D relative to the mean: of all, and of
+/// each cluster.
+struct Weighed {
+  MatrixXd squares{};  ///< Σ a aᵀ/D, (k + 1)²
+  MatrixXd sums{};     ///< Σ a/D, G × (k + 1)
+  VectorXd sizes{};    ///< Σ 1/D
+  double log_own = 0.0;
+  Index n = 0;
+
+  Weighed(const ClusteredRows& all, const VectorXd& own) : log_own(own.array().log().sum()), n(own.size()) {
+    const MatrixXd light = own.cwiseInverse().asDiagonal() * all.rows;
+    squares = light.transpose() * all.rows;
+    sums = MatrixXd::Zero(all.clusters, all.rows.cols()), sizes = VectorXd::Zero(all.clusters);
+    for (Index i = 0; i < n; ++i) {
+      const Index g = all.of[static_cast<std::size_t>(i)];
+      sums.row(g) += light.row(i), sizes[g] += 1.0 / own[i];
+    }
+  }
+  /// V = D + λ 1 1ᵀ within a cluster, so V⁻¹ = D⁻¹ − λ/(1 + λ Σ 1/D) D⁻¹ 1 1ᵀ D⁻¹: that factor.
+  [[nodiscard]] VectorXd taken(double lambda) const {
+    return (lambda / (1.0 + lambda * sizes.array())).matrix();
+  }
 };
 
-Transformed transformed(const ClusteredRows& all, double lambda) {
-  const Index n = all.rows.rows(), k = all.rows.cols() - 1;
-  MatrixXd rows = all.rows;
-  double log_volume = 0.0;
-  for (const double size : all.size) log_volume += std::log1p(lambda * size);
-  for (Index i = 0; i < n; ++i) {
-    const Index g = all.of[static_cast<std::size_t>(i)];
-    rows.row(i) -=
-        (1.0 - 1.0 / std::sqrt(1.0 + lambda * all.size[static_cast<std::size_t>(g)])) * all.means.row(g);
-  }
-  const auto x = rows.leftCols(k);
-  Transformed one{.normal = Eigen::LDLT<MatrixXd>{x.transpose() * x}};
-  one.at = one.normal.solve(x.transpose() * rows.col(k));
-  one.squares = (rows.col(k) - x * one.at).squaredNorm();
-  one.restricted = log_volume + one.normal.vectorD().cwiseAbs().array().log().sum() +
-                   static_cast<double>(n - k) * std::log(one.squares);
+/// What least squares makes of them for one λ.
+struct Solved {
+  double lambda = 0.0;
+  Eigen::LDLT<MatrixXd> normal{};          ///< Xᵀ V⁻¹ X
+  VectorXd at{};
+  double squares = 0.0, restricted = 0.0, deviance = 0.0;  ///< −2 ln of the likelihoods, less constants
+  [[nodiscard]] MatrixXd inverse() const { return normal.solve(MatrixXd::Identity(at.size(), at.size())); }
+};
+
+Solved solvedFor(const Weighed& of, double lambda) {
+  const Index k = of.squares.cols() - 1;
+  const MatrixXd left = of.squares - of.sums.transpose() * of.taken(lambda).asDiagonal() * of.sums;
+  Solved one{.lambda = lambda, .normal = Eigen::LDLT<MatrixXd>{left.topLeftCorner(k, k)}};
+  one.at = one.normal.solve(left.col(k).head(k));
+  one.squares = left(k, k) - left.col(k).head(k).dot(one.at);
+  const double log_spread = of.log_own + (1.0 + lambda * of.sizes.array()).log().sum(),
+               log_squares = std::log(one.squares);
+  one.deviance = log_spread + static_cast<double>(of.n) * log_squares;
+  one.restricted = log_spread + one.normal.vectorD().cwiseAbs().array().log().sum() +
+                   static_cast<double>(of.n - k) * log_squares;
   return one;
 }
 
-/// Satterthwaite's degrees of freedom of the parameter that depends most on how clusters differ, the constant
-/// apart: of a variance whose share s comes from u, (s²/ν + (1 − s)²/(n − k))⁻¹. ν is of u's own variance by
-/// REML's expected information, λ² tr (Zᵀ P Z)², with P what the parameters leave of V⁻¹: G − 1 where only a
-/// constant is fitted, and less by what of the parameters the clusters' means tell.
-double degreesOf(const ClusteredRows& all, const MatrixXd& inverse, double lambda, double free) {
-  const Index k = inverse.cols();
-  MatrixXd means = all.means.leftCols(k);
-  for (Index g = 0; g < means.rows(); ++g) {
-    const double size = all.size[static_cast<std::size_t>(g)];
-    means.row(g) *= size / (1.0 + lambda * size);
+/// With REML's λ.
+Solved solved(const Weighed& of) {
+  Solved without = solvedFor(of, 0.0);
+  if (!(without.squares > 0.0)) return without;
+  const double at = minimum1d([&](double ln) { return solvedFor(of, std::exp(ln)).restricted; },
+                              std::log(1e-5), std::log(1e5));
+  Solved with = solvedFor(of, std::exp(at));
+  return with.restricted < without.restricted ? with : without;
+}
+
+/// By how much each row's D is too small: D (V⁻¹ r)² / σ² less D P, whose mean that is where D is right; r are
+/// the residuals, P = V⁻¹ − V⁻¹ X (Xᵀ V⁻¹ X)⁻¹ Xᵀ V⁻¹. Sums of it over z_j are twice REML's score of γ_j.
+VectorXd beyondOwn(const ClusteredRows& all, const VectorXd& own, const Weighed& of, const Solved& one) {
+  const Index n = all.rows.rows(), k = one.at.size();
+  const VectorXd taken = of.taken(one.lambda);
+  MatrixXd v_rows = all.rows;  // V⁻¹ (X, y)
+  for (Index i = 0; i < n; ++i) {
+    const Index g = all.of[static_cast<std::size_t>(i)];
+    v_rows.row(i) = (v_rows.row(i) - taken[g] * of.sums.row(g)) / own[i];
   }
-  const MatrixXd from_u = lambda * inverse * means.transpose() * means * inverse;
-  MatrixXd left = -means * inverse * means.transpose();
-  for (Index g = 0; g < means.rows(); ++g) {
-    const double size = all.size[static_cast<std::size_t>(g)];
-    left(g, g) += size / (1.0 + lambda * size);
+  const auto x = v_rows.leftCols(k);
+  const VectorXd rest = v_rows.col(k) - x * one.at;
+  const VectorXd told = (x * one.inverse()).cwiseProduct(x).rowwise().sum();
+  const double variance = one.squares / static_cast<double>(n - k);
+  VectorXd beyond(n);
+  for (Index i = 0; i < n; ++i) {
+    const double p = (1.0 - taken[all.of[static_cast<std::size_t>(i)]] / own[i]) / own[i] - told[i];
+    beyond[i] = own[i] * (rest[i] * rest[i] / variance - p);
   }
-  const double clusters = std::max(1.0, lambda * lambda * left.squaredNorm());
-  double least = free;
-  for (Index j = k > 1 ? 1 : 0; j < k; ++j) {
-    const double share = std::clamp(from_u(j, j) / inverse(j, j), 0.0, 1.0);
-    least = std::min(least, 1.0 / (share * share / clusters + (1.0 - share) * (1.0 - share) / free));
-  }
-  return least;
+  return beyond;
 }
 
 /// Of columns of length 1. The reciprocal condition alone does not see a pivot of exactly 0, as of two equal
@@ -103,35 +127,125 @@ bool isDetermined(const Eigen::LDLT<MatrixXd>& normal) {
   return pivots.minCoeff() > kLeast * pivots.maxCoeff() && normal.rcond() > kLeast;
 }
 
+/// What rows' own variances may go with: those of the columns that the rows tell apart, each about 0. None
+/// where there are fewer than ten rows to spare for each.
+MatrixXd powersIn(const RowErrors& errors, Index n, Index free) {
+  constexpr Index kRowsForEach = 10;
+  MatrixXd powers(n, 0);
+  for (const auto& column : errors.powers_of) {
+    const auto one = Eigen::Map<const VectorXd>(column.data(), n);
+    MatrixXd more = powers;
+    more.conservativeResize(n, powers.cols() + 1);
+    more.rightCols(1) = (one.array() - one.mean()).matrix();
+    const VectorXd length = more.colwise().norm();
+    if (more.cols() * kRowsForEach > free || !(length.minCoeff() > 0.0)) continue;
+    const MatrixXd even = more * length.cwiseInverse().asDiagonal();
+    if (isDetermined(Eigen::LDLT<MatrixXd>{even.transpose() * even})) powers = std::move(more);
+  }
+  return powers;
+}
+
+/// Rows by their own variances, on the mean 1, and what least squares makes of them.
+struct OwnFit {
+  VectorXd own{};
+  Weighed of;
+  Solved best;
+
+  OwnFit(const ClusteredRows& all, VectorXd variances)
+      : own(std::move(variances)), of(all, own), best(solved(of)) {}
+};
+
+/// Fisher's scoring from equal variances on, halved where it went too far.
+OwnFit fitOwnVariances(const ClusteredRows& all, const MatrixXd& powers) {
+  constexpr int kRounds = 30, kHalved = 6;
+  constexpr double kMost = 1.0, kNear = 1e-3;  // of exponents: at once, and not worth a further round
+  OwnFit now{all, VectorXd::Ones(all.rows.rows())};
+  if (powers.cols() == 0) return now;
+  const Eigen::LDLT<MatrixXd> normal{powers.transpose() * powers};
+  VectorXd exponents = VectorXd::Zero(powers.cols());
+  for (int round = 0; round < kRounds && now.best.squares > 0.0; ++round) {
+    VectorXd step = normal.solve(powers.transpose() * beyondOwn(all, now.own, now.of, now.best));
+    step *= std::min(1.0, kMost / std::max(1e-300, step.cwiseAbs().maxCoeff()));
+    bool is_better = false;
+    for (int half = 0; half < kHalved && !is_better; ++half, step *= 0.5) {
+      VectorXd tried = (powers * (exponents + step)).array().exp();
+      tried /= tried.mean();
+      OwnFit next{all, std::move(tried)};
+      is_better = next.best.restricted < now.best.restricted;
+      if (is_better) exponents += step, now = std::move(next);
+    }
+    if (!is_better || step.cwiseAbs().maxCoeff() < kNear) break;
+  }
+  return now;
+}
+
+/// Of a variance σ² C_jj + more: its parts and their degrees of freedom. u's own, ν, are by REML's expected
+/// information, λ² tr (Zᵀ P Z)²: G − 1 where only a constant is fitted, and less by what of the parameters the
+/// clusters' means tell. What is known besides has all; how clusters differ says nothing of it where it is the same
+/// way in all of them, and so it is in the covariance as that, too.
+struct Spread {
+  MatrixXd more{};  ///< of the covariance, beyond REML's
+  double degrees = 0.0;
+
+  /// `known`: variance of each cluster's u, at least.
+  Spread(const Weighed& of, const Solved& one, const VectorXd& known) {
+    const Index k = one.at.size();
+    const double free = static_cast<double>(of.n - k), variance = one.squares / free;
+    const MatrixXd inverse = one.inverse();
+    const VectorXd kept = (1.0 + one.lambda * of.sizes.array()).inverse();
+    const MatrixXd means = kept.asDiagonal() * of.sums.leftCols(k);  // Zᵀ V⁻¹ X
+    const VectorXd beyond = (known.array() - one.lambda * variance).cwiseMax(0.0),
+                   together = inverse * means.transpose() * known.cwiseSqrt();
+    more = inverse * means.transpose() * beyond.asDiagonal() * means * inverse +
+           together * together.transpose();
+    degrees = free;
+    if (!(one.lambda > 0.0)) return;
+    const MatrixXd from_u = one.lambda * inverse * means.transpose() * means * inverse;
+    MatrixXd left = -means * inverse * means.transpose();
+    left.diagonal() += of.sizes.cwiseProduct(kept);
+    const double of_clusters = one.lambda * one.lambda * left.squaredNorm();
+    // Of the parameter that depends most on how clusters differ, the constant apart.
+    for (Index j = k > 1 ? 1 : 0; j < k; ++j) {
+      const double all = inverse(j, j) + more(j, j) / variance, by_u = std::min(from_u(j, j), inverse(j, j)),
+                   by_rows = inverse(j, j) - by_u;
+      degrees = std::min(
+          degrees, all * all / (by_u * by_u / std::max(1.0, of_clusters) + by_rows * by_rows / free));
+    }
+  }
+};
+
 }  // namespace
 
-std::optional<Fit> fitInClusters(const std::vector<std::vector<double>>& columns, Column y,
-                                 std::span<const std::size_t> cluster) {
+std::optional<ClusterFit> fitInClusters(const std::vector<std::vector<double>>& columns, Column y,
+                                        std::span<const std::size_t> cluster, const RowErrors& errors) {
   if (columns.empty() || y.size() <= columns.size() || cluster.size() != y.size()) return std::nullopt;
   ClusteredRows all = clusteredRowsOf(columns, y, cluster);
-  if (all.size.size() < 2) return std::nullopt;
+  if (all.clusters < 2) return std::nullopt;
   // Columns of length 1, so that what hangs on others shows.
-  const Index k = all.rows.cols() - 1;
+  const Index n = all.rows.rows(), k = all.rows.cols() - 1;
   const VectorXd scale = all.rows.leftCols(k).colwise().norm();
   if (!all.rows.allFinite() || scale.minCoeff() <= 0.0) return std::nullopt;
   all.rows.leftCols(k) *= scale.cwiseInverse().asDiagonal();
-  all.means.leftCols(k) *= scale.cwiseInverse().asDiagonal();
-  const Transformed without = transformed(all, 0.0);
-  if (!isDetermined(without.normal) || !(without.squares > 0.0)) return std::nullopt;
-  const double at =
-      minimum1d([&](double log_lambda) { return transformed(all, std::exp(log_lambda)).restricted; },
-                std::log(1e-5), std::log(1e5));
-  const Transformed with = transformed(all, std::exp(at));
-  const bool has_shared = with.restricted < without.restricted;
-  const Transformed& best = has_shared ? with : without;
-  const double free = static_cast<double>(y.size()) - static_cast<double>(k);
-  const MatrixXd inverse = best.normal.solve(MatrixXd::Identity(k, k));
-  const MatrixXd covariance = inverse * (best.squares / free);
-  Fit fit{.squares = best.squares,
-          .n = y.size(),
-          .degrees = has_shared ? degreesOf(all, inverse, std::exp(at), free) : free};
+  const auto x = all.rows.leftCols(k);
+  const Eigen::LDLT<MatrixXd> alike{x.transpose() * x};
+  if (!isDetermined(alike)) return std::nullopt;
+  // Less what rows that are all alike make of them, so that squares of residuals are no differences of large ones.
+  const VectorXd first = alike.solve(x.transpose() * all.rows.col(k));
+  all.rows.col(k) -= x * first;
+  const auto [own, of, best] = fitOwnVariances(all, powersIn(errors, n, n - k));
+  if (!(best.squares > 0.0)) return std::nullopt;
+  VectorXd known = VectorXd::Zero(all.clusters);
+  for (std::size_t i = 0; i < errors.shared.size(); ++i)
+    known[all.of[i]] = std::max(known[all.of[i]], errors.shared[i] * errors.shared[i]);
+  const Spread spread{of, best, known};
+  const double free = static_cast<double>(n - k);
+  const MatrixXd covariance = best.inverse() * (best.squares / free) + spread.more;
+  ClusterFit fit;
+  fit.squares = best.squares, fit.n = y.size(), fit.degrees = spread.degrees, fit.deviance = best.deviance;
+  fit.of_cluster = best.lambda * best.squares / free;
+  fit.square_degrees = free * static_cast<double>(n) / own.squaredNorm();
   for (Index a = 0; a < k; ++a) {
-    fit.at.push_back(best.at[a] / scale[a]);
+    fit.at.push_back((first[a] + best.at[a]) / scale[a]);
     for (Index b = 0; b < k; ++b) fit.covariance.push_back(covariance(a, b) / scale[a] / scale[b]);
   }
   return fit;
@@ -142,7 +256,7 @@ std::variant<ClusterSum, NoSum> sumInClusters(const std::vector<std::vector<doub
   if (columns.size() <= first || y.size() <= columns.size() || cluster.size() != y.size())
     return NoSum::FewRows;
   ClusteredRows all = clusteredRowsOf(columns, y, cluster);
-  const Index n = all.rows.rows(), k = all.rows.cols() - 1, clusters = all.means.rows();
+  const Index n = all.rows.rows(), k = all.rows.cols() - 1, clusters = all.clusters;
   // Columns of length 1, so that what hangs on others shows.
   const VectorXd scale = all.rows.leftCols(k).colwise().norm();
   if (!all.rows.allFinite()) return NoSum::FewRows;

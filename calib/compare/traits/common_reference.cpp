@@ -2,6 +2,7 @@
 #include "calib/compare/traits/common_reference.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <type_traits>
 #include <variant>
@@ -25,6 +26,23 @@ Trait toldAt(const Trait& one, const OnLine& line, double to_m) {
   return moved;
 }
 
+/// B's less A's, of lines that are known apart from each other.
+OnLine lessOf(const OnLine& of_b, const OnLine& of_a, double at_m) {
+  const auto varianceAt = [at_m](const OnLine& line) {
+    const double by_m = at_m - line.at_m;
+    return line.variance + 2.0 * by_m * line.covariance + by_m * by_m * line.slope_variance;
+  };
+  const auto covarianceAt = [at_m](const OnLine& line) {
+    return line.covariance + (at_m - line.at_m) * line.slope_variance;
+  };
+  return {.at_m = at_m,
+          .slope = of_b.slope - of_a.slope,
+          .variance = varianceAt(of_a) + varianceAt(of_b),
+          .slope_variance = of_a.slope_variance + of_b.slope_variance,
+          .covariance = covarianceAt(of_a) + covarianceAt(of_b),
+          .degrees = std::min(of_a.degrees, of_b.degrees)};
+}
+
 HeldTogether heldAt(const Trait& a, const OnLine& of_a, const Trait& b, const OnLine& of_b, double wider) {
   const double from_m = std::max(of_a.from_m, of_b.from_m), to_m = std::min(of_a.to_m, of_b.to_m);
   if (!(from_m <= to_m)) {
@@ -34,8 +52,9 @@ HeldTogether heldAt(const Trait& a, const OnLine& of_a, const Trait& b, const On
                 of_a.from_m, of_a.to_m, of_b.from_m, of_b.to_m)};
   }
   const double both_m = 0.5 * (from_m + to_m);
-  return {.difference = differenceOf(toldAt(a, of_a, both_m), toldAt(b, of_b, both_m), wider),
-          .at = fmt::format("at {:.3g} m", both_m)};
+  Trait difference = differenceOf(toldAt(a, of_a, both_m), toldAt(b, of_b, both_m), wider);
+  const bool is_of_scale = goesThroughNothing(difference.value, lessOf(of_b, of_a, both_m), wider);
+  return {.difference = std::move(difference), .is_of_scale = is_of_scale, .at = placeInWords(both_m)};
 }
 
 HeldTogether heldAt(const Trait& a, const WaveParts& of_a, const Trait& b, const WaveParts& of_b,
@@ -66,6 +85,30 @@ HeldTogether heldAt(const Trait& a, const AtSignal& of_a, const Trait& b, const 
           .at = fmt::format("at a signal of {:.3g}{}", signal, of_b.unit)};
 }
 
+/// The law at that signal.
+Trait toldAt(const Trait& one, const LawAtSignal& law, double signal) {
+  const double x = law.at.most / signal;
+  const std::array along{1.0, x, x * x};
+  double variance = 0.0, of_variance = 0.0;
+  for (std::size_t i = 0; i < along.size(); ++i) {
+    variance += along[i] * law.parts[i];
+    for (std::size_t j = 0; j < along.size(); ++j) of_variance += along[i] * along[j] * law.covariance[3 * i + j];
+  }
+  const double half = studentT(law.degrees) * std::sqrt(std::max(0.0, of_variance));
+  const auto rootOf = [](double square) { return std::sqrt(std::max(0.0, square)); };
+  Trait told = one;
+  told.value = rootOf(variance), told.low = rootOf(variance - half), told.high = rootOf(variance + half);
+  return told;
+}
+
+HeldTogether heldAt(const Trait& a, const LawAtSignal& of_a, const Trait& b, const LawAtSignal& of_b,
+                    double wider) {
+  const double signal = std::min(of_a.at.most, of_b.at.most);
+  if (!(signal > 0.0)) return heldAt(a, of_a.at, b, of_b.at, wider);
+  return {.difference = differenceOf(toldAt(a, of_a, signal), toldAt(b, of_b, signal), wider),
+          .at = fmt::format("at a signal of {:.3g}{}", signal, of_b.at.unit)};
+}
+
 /// Spans that differ by less are one: a drift goes on by no more of itself there, unless it is over long
 /// before.
 constexpr double kSameSpan = 0.01;
@@ -80,6 +123,15 @@ HeldTogether heldAt(const Trait& a, const OverSpan& of_a, const Trait& b, const 
 }
 
 }  // namespace
+
+std::string placeInWords(double at_m) { return fmt::format("at {:.3g} m", at_m); }
+
+bool goesThroughNothing(double value, const OnLine& line, double wider) {
+  const double at_0 = value - line.slope * line.at_m;
+  const double variance =
+      line.variance - 2.0 * line.at_m * line.covariance + line.at_m * line.at_m * line.slope_variance;
+  return std::abs(at_0) <= wider * studentT(line.degrees) * std::sqrt(std::max(0.0, variance));
+}
 
 HeldTogether heldTogether(const Trait& first, const Trait& second, double wider) {
   return std::visit(

@@ -12,6 +12,7 @@ namespace toftwin::compare {
 struct HeldTogether {
   Trait difference{};     ///< second less first; of waves the amplitude of the difference, which has no sign
   bool is_size = false;   ///< it has no sign
+  bool is_of_scale = false;  ///< it is of a line that goesThroughNothing()
   std::string at{};       ///< what both are told at, where that is another than their own: "at 1.75 m"
   std::string why_not{};  ///< why they cannot be held against each other; empty: they can
 };
@@ -19,5 +20,11 @@ struct HeldTogether {
 /// By what the numbers refer to (Trait::refers_to); where they refer to nothing, or to different things, as
 /// they are. `wider` is differenceOf()'s.
 HeldTogether heldTogether(const Trait& first, const Trait& second, double wider = 1.0);
+
+/// "at 1.75 m"
+std::string placeInWords(double at_m);
+
+/// Whether a line that has this value at `line.at_m` is 0 at distance 0, by its interval there.
+bool goesThroughNothing(double value, const OnLine& line, double wider = 1.0);
 
 }  // namespace toftwin::compare

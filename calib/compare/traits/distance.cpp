@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What goes with distance: harmonics and wraps.
+// What goes with distance: harmonics.
 #include <fmt/format.h>
 #include <toftwin/units.h>
 
@@ -14,6 +14,7 @@
 #include "calib/compare/statistics.h"
 #include "calib/compare/traits/clusters.h"
 #include "calib/compare/traits/phasor.h"
+#include "calib/compare/traits/repeats.h"
 #include "calib/compare/traits/waves.h"
 
 namespace toftwin::compare {
@@ -22,9 +23,14 @@ namespace {
 /// Fewer rows for each parameter of a fit tell little more than themselves.
 constexpr std::size_t kRowsPerParameter = 3;
 
-/// Of two parameters from `first` on: the delta method far from 0, amplitudeOf() near it.
+/// Of two parameters from `first` on: the delta method far from 0, amplitudeOf() near it, as if both parts had one
+/// error: that of the mean of their variances, or along the wave's own phase where it is larger. Over part of a
+/// period, or where rows scatter unevenly, the two differ.
 Trait amplitudeTrait(const Fit& fit, const std::string& name, std::size_t first) {
-  const double sigma = std::sqrt(0.5 * (std::pow(fit.error(first), 2) + std::pow(fit.error(first + 1), 2)));
+  const double a = fit.at[first], b = fit.at[first + 1], size = std::hypot(a, b);
+  const std::array along{size > 0.0 ? a / size : 1.0, size > 0.0 ? b / size : 0.0};
+  const double mean = 0.5 * (std::pow(fit.error(first), 2) + std::pow(fit.error(first + 1), 2));
+  const double sigma = std::sqrt(std::max(mean, fit.varianceOf(along, first)));
   const WaveParts phasor{fit.at[first], fit.at[first + 1], sigma, fit.degrees};
   Trait trait = fit.trait(name, "mm",
                           [first](std::span<const double> p) { return std::hypot(p[first], p[first + 1]); });
@@ -37,21 +43,23 @@ Trait amplitudeTrait(const Fit& fit, const std::string& name, std::size_t first)
 }
 
 OnLine lineOf(const Fit& fit, Column distance_m, double at_m) {
-  const std::size_t k = fit.at.size();
-  const double c = fit.covariance[0], both = fit.covariance[1], slope = fit.covariance[k + 1];
+  std::vector<double> value(fit.at.size(), 0.0), slope = value, both = value;
+  value[0] = both[0] = 1.0, value[1] = at_m, slope[1] = 1.0, both[1] = at_m + 1.0;
+  const double of_value = fit.varianceAlong(value), of_slope = fit.varianceAlong(slope);
   const auto [nearest, farthest] = std::ranges::minmax(distance_m);
   return {.at_m = at_m,
           .from_m = nearest,
           .to_m = farthest,
           .slope = fit.at[1],
-          .variance = c + 2.0 * at_m * both + at_m * at_m * slope,
-          .slope_variance = slope,
-          .covariance = both + at_m * slope,
+          .variance = of_value,
+          .slope_variance = of_slope,
+          .covariance = 0.5 * (fit.varianceAlong(both) - of_value - of_slope),
           .degrees = fit.degrees};
 }
 
 /// Waves, what is left of a line c + s d at the rows' mean distance and its slope, and what no wave explains.
-std::vector<Trait> traitsOf(const Fit& fit, const std::vector<Wave>& waves, Column distance_m) {
+std::vector<Trait> traitsOf(const Fit& fit, double square_degrees, const std::vector<Wave>& waves,
+                            Column distance_m) {
   std::vector<Trait> traits;
   for (std::size_t w = 0; w < waves.size(); ++w) {
     traits.push_back(amplitudeTrait(fit, waves[w].name, 2 + 2 * w));
@@ -63,13 +71,14 @@ std::vector<Trait> traitsOf(const Fit& fit, const std::vector<Wave>& waves, Colu
   traits.back().refers_to = lineOf(fit, distance_m, mean_m);
   traits.push_back(fit.trait("scale", "mm/m", 1));
   const double free = static_cast<double>(fit.n - fit.at.size());
-  const double sd = std::sqrt(fit.squares / free), half = 1.96 / std::sqrt(2.0 * free);
+  const double sd = std::sqrt(fit.squares / free), half = 1.96 / std::sqrt(2.0 * square_degrees);
   traits.push_back({.name = "residual",
                     .unit = "mm",
                     .value = sd,
                     .low = sd * std::exp(-half),
                     .high = sd * std::exp(half),
-                    .n = fit.n});
+                    .n = fit.n,
+                    .doubt = fit.doubt});
   return traits;
 }
 
@@ -81,10 +90,14 @@ double seriesAt(std::span<const double> p, const std::vector<Wave>& waves, doubl
   return sum;
 }
 
-FittedTraits fittedOf(const Fit& fit, const std::vector<Wave>& waves, Column distance_m) {
-  return {.traits = traitsOf(fit, waves, distance_m),
+/// `square_degrees`: by which the rows' scatter is known.
+FittedTraits fittedOf(const Fit& fit, double square_degrees, const std::vector<Wave>& waves,
+                      Column distance_m) {
+  return {.traits = traitsOf(fit, square_degrees, waves, distance_m),
           .curve = {fmt::format("a line and {} waves", waves.size()),
-                    [=, p = fit.at](double d) { return seriesAt(p, waves, d); }}};
+                    [=, p = fit.at](double d) { return seriesAt(p, waves, d); }},
+          .together = wavesTogether(fit, 2, waves, distance_m),
+          .bic = fit.deviance + static_cast<double>(fit.at.size()) * std::log(static_cast<double>(fit.n))};
 }
 
 /// In the order in which they are looked for: the first to be left out is the last.
@@ -127,12 +140,59 @@ void doubtWaves(std::span<const int> orders, Column distance_m, std::span<const 
   }
 }
 
-/// Each amplitude's interval is shorter than the four standard deviations that one row's would have.
-bool areToldApart(const std::vector<Trait>& traits) {
-  const double sd = traits.back().value;  // "residual"
-  constexpr auto kNoWaves = 3;            // offset, scale, residual
+/// "offset" and "scale" of a fit that leaves waves out, as these may be in them: in doubt where one as large as the
+/// largest of those that are clearly there would change them by over half of theirs.
+void doubtLine(std::span<const int> orders, Column distance_m, std::span<const double> frequency_hz,
+               std::vector<Trait>& traits) {
+  const std::span<const int> all{kOrders};
+  const auto waves = wavesOf(frequency_hz, orders);
+  const auto shown = shownInLine(waves, wavesOf(frequency_hz, all.subspan(orders.size())), distance_m);
+  constexpr double kOfInterval = 0.9;  // 3.5 standard errors: 0.2 % of waves that are not there seem so large
+  double largest_mm = 0.0;
+  for (std::size_t w = 0; w < waves.size(); ++w) {
+    if (traits[w].value > kOfInterval * (traits[w].high - traits[w].low)) largest_mm = std::max(largest_mm, traits[w].value);
+  }
+  const auto doubt = [&](Trait& one, const ShownInLine& line) {
+    if (!(line.most * largest_mm > 0.5 * (one.high - one.low)) || !one.doubt.empty()) return;
+    one.doubt = fmt::format("a wave of {} is not told, and one of {:.2g} mm, as another is, would change it by {:.2g} {}",
+                            line.wave, largest_mm, line.most * largest_mm, one.unit);
+  };
+  doubt(traits[waves.size()], shown.offset), doubt(traits[waves.size() + 1], shown.scale);
+}
+
+/// Waves, which are the first of the traits, of which less than half a period is seen: they are in the fit, so
+/// that they are in the intervals of the others, but what a bend of the rows is of nobody can say.
+std::string leaveOutLongWaves(std::span<const int> orders, Column distance_m,
+                              std::span<const double> frequency_hz, std::vector<Trait>& traits) {
+  const auto [nearest, farthest] = std::ranges::minmax(distance_m);
+  const std::vector<Wave> waves = wavesOf(frequency_hz, orders);
+  std::string names;
+  for (std::size_t w = waves.size(); w-- > 0;) {
+    if ((farthest - nearest) * waves[w].per_m >= std::numbers::pi) continue;
+    names = waves[w].name + (names.empty() ? "" : "; ") + names;
+    traits.erase(traits.begin() + static_cast<std::ptrdiff_t>(w));
+  }
+  if (names.empty()) return {};
+  return fmt::format("less than half of a period is seen, over {:.3g} m of distance, of waves of {}: they are not told",
+                     farthest - nearest, names);
+}
+
+/// Each amplitude's interval is shorter than the four standard deviations that one row's would have, if it scattered
+/// by `sd_mm`.
+bool areToldApart(const std::vector<Trait>& traits, double sd_mm) {
+  constexpr auto kNoWaves = 3;  // offset, scale, residual
   return std::all_of(traits.begin(), traits.end() - kNoWaves,
-                     [&](const Trait& one) { return one.high - one.low <= 4.0 * sd; });
+                     [&](const Trait& one) { return one.high - one.low <= 4.0 * sd_mm; });
+}
+bool areToldApart(const std::vector<Trait>& traits) { return areToldApart(traits, traits.back().value); }
+
+/// Whether rows speak for waves that a smaller fit leaves out, and tell them better than what that leaves: they
+/// would be in its other numbers. "Very strong" evidence (R. E. Kass, A. E. Raftery, J. Am. Stat. Assoc. 90
+/// (1995) 773).
+bool areMissed(const FittedTraits& larger, const FittedTraits& smaller) {
+  constexpr double kVeryStrong = 10.0;
+  return smaller.bic - larger.bic > kVeryStrong &&
+         areToldApart(larger.traits, smaller.traits.back().value);
 }
 
 }  // namespace
@@ -144,11 +204,20 @@ Result<FittedTraits> fitRows(Column distance_m, Column error_mm, const std::vect
   const auto rows = finiteRows({distance_m, error_mm}, 2 * waves.size() + 4, "harmonics");
   if (!rows) return rows.error();
   const auto &d = (*rows)[0], &e = (*rows)[1];
-  const Model model = [&](std::span<const double> p, std::size_t i) { return seriesAt(p, waves, d[i]); };
-  const auto fit = fitLeastSquares(model, e, std::vector<double>(2 + 2 * waves.size(), 0.0));
+  const std::size_t count = 2 + 2 * waves.size();
+  std::vector<double> basis;  // of all rows: a fit asks for each some thousand times
+  for (const double one : d) {
+    basis.insert(basis.end(), {1.0, one});
+    for (const Wave& wave : waves)
+      basis.insert(basis.end(), {std::cos(wave.per_m * one), std::sin(wave.per_m * one)});
+  }
+  const Model model = [&](std::span<const double> p, std::size_t i) {
+    return std::inner_product(p.begin(), p.end(), basis.begin() + static_cast<std::ptrdiff_t>(i * count), 0.0);
+  };
+  const auto fit = fitInOrder(model, e, std::vector<double>(count, 0.0), d);
   if (!fit)
     return undetermined("harmonics", "the distances span too little of a period, or two orders coincide");
-  return fittedOf(*fit, waves, d);
+  return fittedOf(*fit, fit->degreesOfRow(), waves, d);
 }
 
 /// How far to the side of a wall each row is, u, and its capture's nearest row, d₀. What a camera errs by its
@@ -179,20 +248,86 @@ struct Sideways {
   }
 };
 
-/// How captures differ is not known of two of them, whatever many rows each has.
-void doubtFewCaptures(std::size_t captures, std::vector<Trait>& traits) {
-  if (captures >= 3) return;
-  for (Trait& one : traits)
-    one.doubt = fmt::format("it is from {} captures only, and it takes three", captures);
+/// How clusters differ is not known of two of them, whatever many rows each has; nor where what they tell of the
+/// numbers themselves leaves two degrees of freedom or less: Student's distribution has no variance then.
+void doubtFewClusters(std::size_t count, const ClusterFit& fit, const char* what,
+                      std::vector<Trait>& traits) {
+  std::string why;
+  if (count < 3)
+    why = fmt::format("it is from {} {} only, and it takes three", count, what);
+  else if (fit.degrees <= 2.0)
+    why = fmt::format("it is by how {} {} differ, which are too few to say how uncertain that is", count, what);
+  for (Trait& one : traits) one.doubt = why;
+}
+
+/// All waves together are told where one of them may be another, and nothing else is wrong with them.
+void keepTogetherWhereDoubted(FittedTraits& fitted, bool were_sure) {
+  const auto isDoubted = [](const Trait& one) { return !one.doubt.empty(); };
+  if (!were_sure || std::ranges::none_of(fitted.traits, isDoubted)) fitted.together.reset();
+}
+
+/// Rows that are finite, in their clusters.
+struct ClusterRows {
+  std::vector<double> distance_m{}, error_mm{};
+  std::vector<std::size_t> cluster{};
+  RowErrors errors{};
+  std::size_t clusters = 0;
+};
+
+Result<ClusterRows> finiteRowsOf(Column distance_m, Column error_mm, const RowClusters& clusters,
+                                 std::size_t least) {
+  const auto orAll = [&](std::span<const double> column, double value) {
+    return column.empty() ? std::vector<double>(distance_m.size(), value)
+                          : std::vector<double>(column.begin(), column.end());
+  };
+  const std::vector<double> numbers(clusters.of.begin(), clusters.of.end());
+  auto rows = finiteRows({distance_m, error_mm, numbers, orAll(clusters.pixels, 1.0), orAll(clusters.shared_mm, 0.0)},
+                         least, "harmonics");
+  if (!rows) return rows.error();
+  const auto logOf = [](std::vector<double> column) {
+    for (double& one : column) one = std::log(std::max(1e-3, one));
+    return column;
+  };
+  ClusterRows all{.cluster = {(*rows)[2].begin(), (*rows)[2].end()},
+                  .errors = {.powers_of = {logOf((*rows)[0]), logOf((*rows)[3])}, .shared = (*rows)[4]}};
+  all.distance_m = std::move((*rows)[0]), all.error_mm = std::move((*rows)[1]);
+  all.clusters = std::set<std::size_t>{all.cluster.begin(), all.cluster.end()}.size();
+  return all;
+}
+
+/// A column for each cluster: its rows' distances less their mean, 0 elsewhere.
+std::vector<std::vector<double>> slopesOfEach(const ClusterRows& rows) {
+  std::map<std::size_t, Running> means;
+  for (std::size_t i = 0; i < rows.cluster.size(); ++i) means[rows.cluster[i]].add(rows.distance_m[i]);
+  std::vector<std::vector<double>> columns;
+  for (const auto& [number, mean] : means) {
+    if (mean.n() < 2) continue;
+    auto& column = columns.emplace_back(rows.cluster.size(), 0.0);
+    for (std::size_t i = 0; i < column.size(); ++i) {
+      if (rows.cluster[i] == number) column[i] = rows.distance_m[i] - mean.mean();
+    }
+  }
+  return columns;
+}
+
+/// RowClusters::what of rows that share a distance.
+constexpr const char* kSharedPlaces = "distances";
+
+/// Of rows that share a distance, what they share is part of what no wave explains.
+void addWhatIsShared(ClusterFit& fit) {
+  const double free = static_cast<double>(fit.n - fit.at.size()), own = fit.squares / free,
+               both = own + fit.of_cluster;
+  fit.square_degrees = both * both / (own * own / fit.square_degrees +
+                                      fit.of_cluster * fit.of_cluster / std::max(1.0, fit.degrees));
+  fit.squares = both * free;
 }
 
 /// Rows in clusters that share an error.
 Result<FittedTraits> fitClusters(Column distance_m, Column error_mm, const std::vector<Wave>& waves,
-                                 std::span<const std::size_t> cluster) {
-  std::vector<double> numbers(cluster.begin(), cluster.end());
-  const auto rows = finiteRows({distance_m, error_mm, numbers}, 2 * waves.size() + 4, "harmonics");
+                                 const RowClusters& clusters) {
+  const auto rows = finiteRowsOf(distance_m, error_mm, clusters, 2 * waves.size() + 4);
   if (!rows) return rows.error();
-  const auto& d = (*rows)[0];
+  const auto& d = rows->distance_m;
   std::vector<std::vector<double>> columns{std::vector<double>(d.size(), 1.0), d};
   for (const Wave& wave : waves) {
     std::vector<double> even, odd;
@@ -200,22 +335,30 @@ Result<FittedTraits> fitClusters(Column distance_m, Column error_mm, const std::
       even.push_back(std::cos(wave.per_m * one)), odd.push_back(std::sin(wave.per_m * one));
     columns.push_back(std::move(even)), columns.push_back(std::move(odd));
   }
-  const std::vector<std::size_t> captures((*rows)[2].begin(), (*rows)[2].end());
-  const Sideways sideways{d, captures};
+  const Sideways sideways{d, rows->cluster};
   const std::size_t first = columns.size();
-  if (sideways.isWide()) {
+  const bool is_sideways = sideways.isWide() && !clusters.are_turned;
+  if (clusters.are_turned) {  // what goes sideways goes nearly straight within a cluster, too
+    for (auto& column : slopesOfEach(*rows)) columns.push_back(std::move(column));
+  }
+  if (is_sideways) {
     columns.resize(first + Sideways::kColumns, std::vector<double>(d.size()));
     for (std::size_t i = 0; i < d.size(); ++i) {
       for (std::size_t k = 0; k < Sideways::kColumns; ++k) columns[first + k][i] = sideways.at(i)[k];
     }
   }
-  const auto fit = fitInClusters(columns, (*rows)[1], captures);
+  auto fit = fitInClusters(columns, rows->error_mm, rows->cluster, rows->errors);
   if (!fit)
-    return undetermined("harmonics", "the distances span too little of a period, or are of one capture only");
-  FittedTraits fitted = fittedOf(*fit, waves, d);
-  doubtFewCaptures(std::set<std::size_t>{captures.begin(), captures.end()}.size(), fitted.traits);
-  if (!sideways.isWide()) return fitted;
-  const Sideways of_all{distance_m, cluster};
+    return undetermined("harmonics", fmt::format("the distances span too little of a period, or are of few {} only", clusters.what).c_str());
+  if (clusters.what == kSharedPlaces) addWhatIsShared(*fit);
+  FittedTraits fitted = fittedOf(*fit, fit->square_degrees, waves, d);
+  doubtFewClusters(rows->clusters, *fit, clusters.what, fitted.traits);
+  if (clusters.are_turned) {
+    fitted.curve = {};  // it says nothing of the rows as they are
+    fitted.traits.back().doubt = "the poses' turns and the board itself bend the rows of each capture, too";
+  }
+  if (!is_sideways) return fitted;
+  const Sideways of_all{distance_m, clusters.of};
   double variance = 0.0;  // of what goes sideways, over the rows
   for (std::size_t i = 0; i < distance_m.size(); ++i) {
     const auto at = of_all.at(i);
@@ -229,11 +372,28 @@ Result<FittedTraits> fitClusters(Column distance_m, Column error_mm, const std::
 }
 
 Result<FittedTraits> fitOrders(Column distance_m, Column error_mm, std::span<const double> frequency_hz,
-                               std::span<const int> orders, std::span<const std::size_t> cluster) {
+                               std::span<const int> orders, const RowClusters& clusters) {
   const std::vector<Wave> waves = wavesOf(frequency_hz, orders);
   if (waves.empty()) return undetermined("harmonics", "no frequency or order was given");
-  return cluster.empty() ? fitRows(distance_m, error_mm, waves)
-                         : fitClusters(distance_m, error_mm, waves, cluster);
+  if (!clusters.of.empty()) return fitClusters(distance_m, error_mm, waves, clusters);
+  const SharedPlaces places = sharedPlacesOf(distance_m);
+  return places.areShared() ? fitClusters(distance_m, error_mm, waves, {.of = places.of, .what = kSharedPlaces})
+                            : fitRows(distance_m, error_mm, waves);
+}
+
+/// How many orders so many rows allow for: as many distances as twice the parameters, where rows share them.
+std::vector<int> ordersFor(const std::vector<double>& distance_m, std::size_t frequencies, bool are_clusters) {
+  constexpr std::size_t kPlacesPerParameter = 2;
+  const SharedPlaces places = sharedPlacesOf(distance_m);
+  const bool are_shared = !are_clusters && places.areShared();
+  std::vector<int> orders;
+  for (const int order : kOrders) {
+    const std::size_t parameters = 2 + 2 * frequencies * (orders.size() + 1);
+    if (distance_m.size() < kRowsPerParameter * parameters) break;
+    if (are_shared && !orders.empty() && places.count < kPlacesPerParameter * parameters) break;
+    orders.push_back(order);
+  }
+  return orders;
 }
 
 /// The numbers alone.
@@ -245,56 +405,52 @@ Traits numbersOf(Result<FittedTraits> fitted) {
 }  // namespace
 
 Traits harmonicTraits(Column distance_m, Column error_mm, std::span<const double> frequency_hz,
-                      std::span<const int> orders, std::span<const std::size_t> cluster) {
-  return numbersOf(fitOrders(distance_m, error_mm, frequency_hz, orders, cluster));
+                      std::span<const int> orders, const RowClusters& clusters) {
+  return numbersOf(fitOrders(distance_m, error_mm, frequency_hz, orders, clusters));
 }
 
 Result<FittedTraits> fittedHarmonics(Column distance_m, Column error_mm, std::span<const double> frequency_hz,
-                                     std::span<const std::size_t> cluster) {
+                                     const RowClusters& clusters, std::size_t least_orders) {
   const std::size_t least = kRowsPerParameter * (2 + 2 * frequency_hz.size());
   const auto rows = finiteRows({distance_m, error_mm}, least, "harmonics");
   if (!rows) return rows.error();
-  std::vector<int> orders;
-  for (const int order : kOrders) {
-    const std::size_t parameters = 2 + 2 * frequency_hz.size() * (orders.size() + 1);
-    if (rows->front().size() >= kRowsPerParameter * parameters) orders.push_back(order);
-  }
+  std::vector<int> orders = ordersFor(rows->front(), frequency_hz.size(), !clusters.of.empty());
+  std::optional<FittedTraits> larger;
   for (; !orders.empty(); orders.pop_back()) {
-    auto fitted = fitOrders(distance_m, error_mm, frequency_hz, orders, cluster);
-    if (fitted) {
-      fitted->not_told = ordersNotTold(orders.size(), rows->front(), frequency_hz);
-      doubtWaves(orders, rows->front(), frequency_hz, fitted->traits);
+    auto fitted = fitOrders(distance_m, error_mm, frequency_hz, orders, clusters);
+    if (!fitted) {
+      if (orders.size() == 1) return larger ? std::move(*larger) : fitted;
+      continue;
     }
-    if (orders.size() == 1 || (fitted && areToldApart(fitted->traits))) return fitted;
+    if (larger && areMissed(*larger, *fitted)) return std::move(*larger);
+    fitted->orders = orders.size();
+    fitted->not_told = ordersNotTold(orders.size(), rows->front(), frequency_hz);
+    const bool are_sure = fitted->traits.front().doubt.empty();
+    doubtWaves(orders, rows->front(), frequency_hz, fitted->traits);
+    doubtLine(orders, rows->front(), frequency_hz, fitted->traits);
+    const bool is_chosen = orders.size() == 1 || orders.size() <= least_orders || areToldApart(fitted->traits);
+    const std::string too_long = leaveOutLongWaves(orders, rows->front(), frequency_hz, fitted->traits);
+    if (!too_long.empty()) fitted->not_told += (fitted->not_told.empty() ? "" : "; ") + too_long;
+    keepTogetherWhereDoubted(*fitted, are_sure);
+    if (is_chosen) return fitted;
+    larger = std::move(*fitted);
   }
   return undetermined("harmonics", "no frequency was given");
 }
 
 Traits harmonicTraits(Column distance_m, Column error_mm, std::span<const double> frequency_hz,
-                      std::span<const std::size_t> cluster) {
-  return numbersOf(fittedHarmonics(distance_m, error_mm, frequency_hz, cluster));
+                      const RowClusters& clusters) {
+  return numbersOf(fittedHarmonics(distance_m, error_mm, frequency_hz, clusters));
 }
 
-Traits wrapTraits(Column error_m, double period_m) {
-  if (!(period_m > 0.0)) return undetermined("wraps", "the period must be a positive length");
-  const auto rows = finiteRows({error_m}, 1, "wraps");
-  if (!rows) return rows.error();
-  const auto& errors = rows->front();
-  const auto wrapped =
-      std::ranges::count_if(errors, [&](double e) { return std::round(e / period_m) != 0.0; });
-  return std::vector{shareTrait("wrapped", static_cast<std::size_t>(wrapped), errors.size())};
-}
-
-Traits wrapTraits(Column shares) {
-  const auto rows = finiteRows({shares}, 2, "wraps");
-  if (!rows) return rows.error();
-  const Summary all = summarise(rows->front());
-  const double n = static_cast<double>(all.n), p = all.mean;
-  // Effective number of trials (E. L. Korn, B. I. Graubard, Surv. Methodol. 24 (1998) 193); where all parts are
-  // alike, their scatter says nothing, and each of them is a trial.
-  const double trials = all.sd > 0.0 ? p * (1.0 - p) * n / (all.sd * all.sd) : n;
-  const auto interval = shareInterval(p * trials, trials, ShareRule::Jeffreys);
-  return std::vector{Trait{"wrapped", "1", p, interval.low, interval.high, all.n}};
+std::array<Result<FittedTraits>, 2> withTheSameWaves(const std::array<HarmonicFit, 2>& fits) {
+  std::array both{fits[0](0), fits[1](0)};
+  if (!both[0] || !both[1] || both[0]->orders == both[1]->orders) return both;
+  const std::size_t fewer = both[0]->orders < both[1]->orders ? 0 : 1;
+  constexpr double kMost = 2.0;  // of what tells waves apart; over part of a period they would be anything
+  auto more = fits[fewer](both[1 - fewer]->orders);
+  if (more && areToldApart(more->traits, kMost * more->traits.back().value)) both[fewer] = std::move(more);
+  return both;
 }
 
 }  // namespace toftwin::compare

@@ -4,11 +4,14 @@
 
 #include <algorithm>
 #include <array>
+#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <limits>
 
 #include "calib/compare/statistics.h"
 #include "calib/compare/traits/least_squares.h"
+#include "calib/compare/traits/linearised.h"
+#include "calib/compare/traits/uneven.h"
 
 namespace toftwin::compare {
 namespace {
@@ -26,9 +29,10 @@ struct Candidate {
   Shape shape{};
   std::vector<double> start{};
   double cost = 0.0;  ///< parameters, as BIC counts them
+  std::vector<double> sigma{};  ///< of each row, whose values are over theirs; empty: all are alike
 
   [[nodiscard]] Model over(Column t) const {
-    return [shape = shape, t](Row p, std::size_t i) { return shape(p, t[i]); };
+    return [this, t](Row p, std::size_t i) { return shape(p, t[i]) / (sigma.empty() ? 1.0 : sigma[i]); };
   }
 };
 
@@ -137,7 +141,63 @@ Candidate step(Column t, Column y) {
           4.0};
 }
 
+/// Sums of the first rows: how much a split of rows explains of their squares is known without visiting them.
+class Sums {
+ public:
+  explicit Sums(Column y) {
+    for (const double one : y) sums_.push_back(sums_.back() + one);
+  }
+  /// Where rows of [from, to) are best split in two of at least kFewest each; `from` where there is no place.
+  [[nodiscard]] std::size_t split(std::size_t from, std::size_t to) const {
+    std::size_t best = from;
+    double most = -1.0;
+    for (std::size_t at = from + kFewest; at + kFewest <= to; ++at) {
+      if (const double both = explained(from, at) + explained(at, to); both > most) most = both, best = at;
+    }
+    return best;
+  }
+  [[nodiscard]] double explained(std::size_t from, std::size_t to) const {
+    const double sum = sums_[to] - sums_[from];
+    return sum * sum / static_cast<double>(to - from);
+  }
+  [[nodiscard]] std::size_t rows() const { return sums_.size() - 1; }
+
+ private:
+  static constexpr std::size_t kFewest = 3;  // one row that is far off is no step there and back
+  std::vector<double> sums_{0.0};
+};
+
+/// Two steps: each one's best place beside the other, in turns, from several places.
+Candidate twoSteps(Column t, Column y) {
+  const Sums sums{y};
+  const std::size_t n = sums.rows();
+  std::size_t first = 0, second = 0;
+  double most = -1.0;
+  constexpr std::size_t kStarts = 16, kTurns = 10;
+  for (std::size_t start = 0; start < kStarts; ++start) {
+    std::size_t a = start * n / kStarts, b = a;
+    for (std::size_t turn = 0; turn < kTurns; ++turn) {
+      const auto before = std::pair{a, b};
+      b = sums.split(a, n);
+      a = sums.split(0, b);
+      if (before == std::pair{a, b}) break;
+    }
+    if (a == 0 || b <= a) continue;
+    const double both = sums.explained(0, a) + sums.explained(a, b) + sums.explained(b, n);
+    if (both > most) most = both, first = a, second = b;
+  }
+  if (first == 0) return {.kind = DriftModel::TwoSteps};
+  const double at_1 = 0.5 * (t[first - 1] + t[first]), at_2 = 0.5 * (t[second - 1] + t[second]);
+  return {DriftModel::TwoSteps,
+          [=](Row p, double time) {
+            return p[0] + (time > at_1 ? p[1] : 0.0) + (time > at_2 ? p[2] : 0.0);
+          },
+          {0.0, 0.0, 0.0},
+          7.0};
+}
+
 std::optional<Fit> fitOf(const Candidate& candidate, Column t, Column y) {
+  if (!candidate.shape) return std::nullopt;
   return fitLeastSquares(candidate.over(t), y, candidate.start);
 }
 
@@ -152,6 +212,22 @@ bool isPlausible(const Candidate& candidate, const Fit& fit, Column t) {
   return true;
 }
 
+/// Errors that go on look like structure: what they are is taken from the richest models that fit, exponentials
+/// and steps, of that which leaves less of it. What steps leave beside exponentials goes on, and the other way
+/// round.
+double goingOn(std::span<const Candidate> candidates, Column t, Column y) {
+  const auto leftBy = [&](std::initializer_list<DriftModel> from_the_richest) -> std::optional<double> {
+    for (const DriftModel kind : from_the_richest) {
+      const Candidate& rich = *std::ranges::find(candidates, kind, &Candidate::kind);
+      if (const auto fit = fitOf(rich, t, y)) return correlationOfResiduals(rich.over(t), y, *fit);
+    }
+    return std::nullopt;
+  };
+  const auto by_curves = leftBy({DriftModel::TwoExponentials, DriftModel::OneExponential, DriftModel::Ramp}),
+             by_steps = leftBy({DriftModel::TwoSteps, DriftModel::Step});
+  return std::min(by_curves.value_or(0.0), by_steps.value_or(by_curves.value_or(0.0)));
+}
+
 void addDetails(DriftModel kind, const Fit& fit, Column t, double length_s, std::vector<Trait>& traits) {
   const auto tau = [&](const char* name, std::size_t k) {
     // ln τ is what is nearly normal; its interval is taken there. An end that no rows of these could show is
@@ -164,6 +240,8 @@ void addDetails(DriftModel kind, const Fit& fit, Column t, double length_s, std:
   };
   if (kind == DriftModel::Ramp) traits.push_back(fit.trait("slope", "mm/s", 1, 1.0 / length_s));
   if (kind == DriftModel::Step) traits.push_back(fit.trait("step", "mm", 1));
+  if (kind == DriftModel::TwoSteps)
+    traits.insert(traits.end(), {fit.trait("first step", "mm", 1), fit.trait("second step", "mm", 2)});
   if (kind == DriftModel::OneExponential) tau("time constant", 2);
   if (kind != DriftModel::TwoExponentials) return;
   const bool is_ordered = fit.at[2] < fit.at[4];
@@ -171,21 +249,133 @@ void addDetails(DriftModel kind, const Fit& fit, Column t, double length_s, std:
   tau("slow time constant", is_ordered ? 4 : 2);
 }
 
+/// What a model leaves, row by row.
+std::vector<double> leftBy(const Model& model, const Fit& fit, Column y) {
+  std::vector<double> left;
+  for (std::size_t i = 0; i < y.size(); ++i) left.push_back(y[i] - model(fit.at, i));
+  return left;
+}
+
+constexpr std::size_t kModels = 6;
+using Candidates = std::array<Candidate, kModels>;
+
+/// The series, and which model it follows.
+struct Chosen {
+  std::vector<double> y{};  ///< over each row's σ
+  const Candidate* model = nullptr;
+  Fit fit{};
+  double rho = 0.0;  ///< by which errors go on
+};
+
+/// The least BIC.
+std::optional<Chosen> chosenOf(const Candidates& candidates, Column t, std::vector<double> y) {
+  const double n = static_cast<double>(y.size()), rho = goingOn(candidates, t, y);
+  const double effective = n * (1.0 - rho) / (1.0 + rho);
+  double least = std::numeric_limits<double>::infinity();
+  Chosen best{.rho = rho};
+  for (const Candidate& candidate : candidates) {
+    auto tried = fitOf(candidate, t, y);
+    if (!tried || !isPlausible(candidate, *tried, t)) continue;
+    const double bic =
+        effective * std::log(std::max(tried->squares, 1e-18 * n) / n) + candidate.cost * std::log(effective);
+    if (bic >= least) continue;
+    least = bic;
+    best.model = &candidate;
+    best.fit = std::move(*tried);
+  }
+  if (best.model == nullptr) return std::nullopt;
+  best.y = std::move(y);
+  return best;
+}
+
+/// The errors of parameters by what each row leaves, whatever its σ (HC3 of J. G. MacKinnon, H. White, J. Econometrics
+/// 29 (1985) 305): σ that go otherwise than a parabola are in it, too.
+void tellErrorsByRows(Chosen& chosen, Column t) {
+  const Model model = chosen.model->over(t);
+  const MatrixXd j = jacobian(model, chosen.y.size(), chosen.fit.at);
+  const MatrixXd from_rows = (j.transpose() * j).ldlt().solve(j.transpose());
+  const Eigen::ArrayXd told = (j * from_rows).diagonal().array().min(0.99);
+  const VectorXd left = (residuals(model, chosen.y, chosen.fit.at).array() / (1.0 - told)).matrix();
+  const MatrixXd covariance = from_rows * left.cwiseAbs2().asDiagonal() * from_rows.transpose();
+  if (covariance.allFinite()) chosen.fit.covariance.assign(covariance.data(), covariance.data() + covariance.size());
+}
+
+/// With the rows' σ where what is left over time is uneven, as of a camera that is noisier while it is cold.
+std::optional<Chosen> chosenBySigma(Candidates& candidates, Column t, Column y) {
+  auto best = chosenOf(candidates, t, {y.begin(), y.end()});
+  constexpr int kRounds = 3;
+  for (int round = 0; best && round < kRounds; ++round) {
+    const Shape& shape = best->model->shape;
+    const Model plain = [&](Row p, std::size_t i) { return shape(p, t[i]); };
+    const auto sigmas = unevenSigmas(leftBy(plain, best->fit, y), t, best->fit.at.size());
+    if (sigmas.empty()) break;
+    for (Candidate& one : candidates) one.sigma = sigmas;
+    if (auto next = chosenOf(candidates, t, over(y, sigmas)))
+      best = std::move(next);
+    else
+      break;
+  }
+  if (best && !best->model->sigma.empty()) tellErrorsByRows(*best, t);
+  return best;
+}
+
+constexpr std::size_t kTenths = 10;
+std::size_t rowsOfBlock(Column rows) { return std::max<std::size_t>(1, rows.size() / kTenths); }
+
+/// Whether the means of ten blocks of what a curve of so many parameters leaves are more than chance makes of rows
+/// that go with the next by `rho`: χ², wrong once in a thousand series of that shape.
+bool isOfAnotherShape(const std::vector<double>& left, std::size_t parameters, double rho) {
+  constexpr double kWrong = 1e-3;
+  constexpr std::size_t kFewestOfBlock = 3;
+  if (parameters >= kTenths || left.size() < kFewestOfBlock * kTenths) return false;
+  const double variance = summarise(left).sd * summarise(left).sd * (1.0 + rho) / (1.0 - rho);
+  double squares = 0.0;
+  for (std::size_t block = 0; block < kTenths; ++block) {
+    const std::size_t from = block * left.size() / kTenths, to = (block + 1) * left.size() / kTenths;
+    const double mean = summarise(Column{left}.subspan(from, to - from)).mean;
+    squares += mean * mean * static_cast<double>(to - from) / variance;
+  }
+  const boost::math::chi_squared chance{static_cast<double>(kTenths - parameters)};
+  return squares > boost::math::quantile(boost::math::complement(chance, kWrong));
+}
+
+/// The last tenth less the first.
+Trait betweenEnds(Column rows, double rho) {
+  const std::size_t tenth = rowsOfBlock(rows);
+  const Summary first = summarise(rows.first(tenth)), last = summarise(rows.last(tenth));
+  const double error = std::hypot(first.standard_error, last.standard_error) * std::sqrt((1.0 + rho) / (1.0 - rho));
+  const double by = last.mean - first.mean, half = studentT(static_cast<double>(tenth - 1)) * error;
+  return {.value = by, .low = by - half, .high = by + half};
+}
+
+/// Numbers of a curve that the series is not: they are the best such curve's, which no interval of them says. A drift
+/// is as uncertain as to hold what the ends themselves say, as they are and as they are beside the curve.
+void doubtShape(const Trait& ends, const Trait& left_at_ends, std::vector<Trait>& traits) {
+  Trait& drift = traits.front();
+  drift.low = std::min({drift.low, ends.low, drift.value + left_at_ends.low});
+  drift.high = std::max({drift.high, ends.high, drift.value + left_at_ends.high});
+  for (Trait& one : traits) one.doubt = "the series is of another shape than the curve that it is told from";
+}
+
 /// Where what is left of the chosen curve goes on from row to row, the series may be of a shape that is not
 /// in the list: then the curve's numbers are those of the best such curve. What any shape has is said beside
 /// it.
-std::string whatGoesOn(double rho, Column value_mm) {
+std::string whatGoesOn(double rho, bool is_of_another_shape, Column value_mm) {
   constexpr double kMuch = 0.6;
-  if (!(rho > kMuch)) return {};
-  const std::size_t tenth = std::max<std::size_t>(1, value_mm.size() / 10);
+  if (!(rho > kMuch) && !is_of_another_shape) return {};
+  const std::size_t tenth = rowsOfBlock(value_mm);
   const double first = summarise(value_mm.first(tenth)).mean, last = summarise(value_mm.last(tenth)).mean;
+  const std::string what =
+      is_of_another_shape
+          ? "tenths of the series are off the chosen curve by more than chance: its drift has another shape than any "
+            "of the list"
+          : fmt::format("what is left of the chosen curve goes on from row to row (correlation {:.2f}): the camera "
+                        "errs so, or its drift has another shape than any of the list",
+                        rho);
   return fmt::format(
-      "what is left of the chosen curve goes on from row to row (correlation {:.2f}): the camera errs so, or "
-      "its drift "
-      "has another shape than any of the list, and the numbers say nothing of it. As measured, the last "
-      "tenth of the rows is "
-      "{:.3g} mm from the first on the mean",
-      rho, last - first);
+      "{}, and the numbers say nothing of it. As measured, the last tenth of the rows is {:.3g} mm from the first on "
+      "the mean",
+      what, last - first);
 }
 
 }  // namespace
@@ -202,6 +392,8 @@ const char* nameOf(DriftModel model) {
       return "two exponentials";
     case DriftModel::Step:
       return "step";
+    case DriftModel::TwoSteps:
+      return "two steps";
   }
   return "";
 }
@@ -214,51 +406,37 @@ Result<DriftTraits> driftTraits(Column time_s, Column value_mm) {
   const double begin = t.front(), length = t.back() - begin, first = y.front();
   for (double& one : t) one = (one - begin) / length;
   for (double& one : y) one -= first;
-  const double n = static_cast<double>(y.size());
   const DecayGrid grid{t, y};
-  const std::array candidates{constant(), ramp(), oneExponential(grid), twoExponentials(grid), step(t, y)};
-  double least = std::numeric_limits<double>::infinity(), rho = 0.0;
-  // Errors that go on look like structure: what they are is taken from the richest model that fits, which
-  // leaves the least of it.
-  for (const std::size_t richest : {3, 2, 1}) {
-    const auto rich = fitOf(candidates[richest], t, y);
-    if (!rich) continue;
-    rho = correlationOfResiduals(candidates[richest].over(t), y, *rich);
-    break;
-  }
-  const double effective = n * (1.0 - rho) / (1.0 + rho);
-  const Candidate* chosen = nullptr;
-  std::optional<Fit> fit;
-  for (const Candidate& candidate : candidates) {
-    auto tried = fitOf(candidate, t, y);
-    if (!tried || !isPlausible(candidate, *tried, t)) continue;
-    const double bic =
-        effective * std::log(std::max(tried->squares, 1e-18 * n) / n) + candidate.cost * std::log(effective);
-    if (bic >= least) continue;
-    least = bic;
-    chosen = &candidate;
-    fit = std::move(tried);
-  }
-  if (!fit) return undetermined(kName, "no model can be fitted");
-  DriftTraits result{.model = chosen->kind};
-  result.curve = {nameOf(chosen->kind), [=, shape = chosen->shape, p = fit->at](double at_s) {
+  Candidates candidates{constant(), ramp(), oneExponential(grid), twoExponentials(grid), step(t, y),
+                              twoSteps(t, y)};
+  auto chosen = chosenBySigma(candidates, t, y);
+  if (!chosen) return undetermined(kName, "no model can be fitted");
+  const Candidate* model = chosen->model;
+  Fit& fit = chosen->fit;
+  DriftTraits result{.model = model->kind};
+  result.curve = {nameOf(model->kind), [=, shape = model->shape, p = fit.at](double at_s) {
                     return first + shape(p, (at_s - begin) / length);
                   }};
-  result.not_told = whatGoesOn(correlationOfResiduals(chosen->over(t), y, *fit), y);
+  const bool is_another = isOfAnotherShape(leftBy(model->over(t), fit, chosen->y), fit.at.size(), chosen->rho);
+  result.not_told = whatGoesOn(correlationOfResiduals(model->over(t), chosen->y, fit), is_another, y);
   // Where no drift can be told, "drift" is what a ramp could still be: not known to be exactly nothing.
-  if (chosen->kind == DriftModel::Constant) {
-    chosen = &candidates[1];
-    if (auto hidden = fitOf(*chosen, t, y))
-      fit = std::move(hidden);
+  if (model->kind == DriftModel::Constant) {
+    model = &candidates[1];
+    if (auto hidden = fitOf(*model, t, chosen->y))
+      fit = std::move(*hidden);
     else
       return undetermined(kName, "no ramp can be fitted");
   }
-  fit->heedCorrelation(correlationOfResiduals(chosen->over(t), y, *fit));
-  result.traits.push_back(fit->trait("drift", "mm", [&](std::span<const double> p) {
-    return chosen->shape(p, t.back()) - chosen->shape(p, t.front());
-  }));
+  fit.heedCorrelation(correlationOfResiduals(model->over(t), chosen->y, fit));
+  const Shape& shape = model->shape;
+  result.traits.push_back(fit.trait(
+      "drift", "mm", [&](std::span<const double> p) { return shape(p, t.back()) - shape(p, t.front()); }));
   result.traits.back().refers_to = OverSpan{length};
-  addDetails(result.model, *fit, t, length, result.traits);
+  addDetails(result.model, fit, t, length, result.traits);
+  if (is_another) {
+    const Model plain = [&](Row p, std::size_t i) { return shape(p, t[i]); };
+    doubtShape(betweenEnds(y, chosen->rho), betweenEnds(leftBy(plain, fit, y), chosen->rho), result.traits);
+  }
   return result;
 }
 

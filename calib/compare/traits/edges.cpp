@@ -91,6 +91,7 @@ Traits edgeTraits(Column x_px, Column value) {
       if (tried && (!fit || tried->squares < fit->squares)) fit = std::move(tried);
     }
   }
+  if (fit) fit = fitInOrder(model, v, fit->at, x);
   if (!fit)
     return undetermined("edge", "there is no step, or it is sharper than the places of the values tell");
   const Trait log_width = fit->trait("width", "px", 3);

@@ -10,16 +10,16 @@
 #include <utility>
 
 #include "calib/compare/statistics.h"
+#include "calib/compare/traits/linearised.h"
 
 namespace toftwin::compare {
 namespace {
 
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 /// A step of a parameter for the numeric derivative: the cube root of the rounding, which balances it with
 /// curvature.
 double stepOf(double parameter) { return 6e-6 * std::max(std::abs(parameter), 1e-3); }
+
+}  // namespace
 
 VectorXd residuals(const Model& model, Column y, std::span<const double> p) {
   VectorXd r(static_cast<Eigen::Index>(y.size()));
@@ -42,6 +42,8 @@ MatrixXd jacobian(const Model& model, std::size_t rows, std::vector<double> p) {
   }
   return jacobian;
 }
+
+namespace {
 
 std::vector<double> moved(const std::vector<double>& p, const VectorXd& by) {
   std::vector<double> there = p;
@@ -76,7 +78,11 @@ double Fit::varianceOf(std::span<const double> factor, std::size_t first) const 
   return variance;
 }
 
-double Fit::error(std::size_t parameter) const { return std::sqrt(covariance[parameter * (at.size() + 1)]); }
+double Fit::error(std::size_t parameter) const {
+  std::vector<double> gradient(at.size(), 0.0);
+  gradient[parameter] = 1.0;
+  return std::sqrt(varianceAlong(gradient));
+}
 
 Trait Fit::trait(std::string name, std::string unit, std::size_t parameter, double scale) const {
   return trait(std::move(name), std::move(unit),
@@ -94,18 +100,14 @@ Trait Fit::trait(std::string name, std::string unit,
     gradient.push_back((above - of(p)) / (2.0 * step));
     p[k] = at[k];
   }
-  double variance = 0.0;
-  for (std::size_t a = 0; a < p.size(); ++a) {
-    for (std::size_t b = 0; b < p.size(); ++b)
-      variance += gradient[a] * gradient[b] * covariance[a * p.size() + b];
-  }
-  const double value = of(at), half = studentT(degrees) * std::sqrt(std::max(0.0, variance));
+  const double value = of(at), half = studentT(degrees) * std::sqrt(varianceAlong(gradient));
   return {.name = std::move(name),
           .unit = std::move(unit),
           .value = value,
           .low = value - half,
           .high = value + half,
-          .n = n};
+          .n = n,
+          .doubt = doubt};
 }
 
 void Fit::heedCorrelation(double rho) {
@@ -152,7 +154,8 @@ std::optional<Fit> fitLeastSquares(const Model& model, Column y, std::vector<dou
           .covariance = {},
           .squares = r.squaredNorm(),
           .n = y.size(),
-          .degrees = static_cast<double>(y.size() - p.size())};
+          .degrees = static_cast<double>(y.size() - p.size()),
+          .deviance = static_cast<double>(y.size()) * std::log(r.squaredNorm())};
   for (std::size_t a = 0; a < p.size(); ++a) {
     for (std::size_t b = 0; b < p.size(); ++b)
       fit.covariance.push_back((*inverse)(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b)) *

@@ -22,8 +22,24 @@ struct Fit {
   double squares = 0.0;
   std::size_t n = 0;
   double degrees = 0.0;  ///< n − k, or fewer where rows err alike
+  /// −2 ln of the likelihood, but for a constant of the rows. Not that of REML: it is held against other models'.
+  double deviance = 0.0;
+  /// One of the correlations that neighbouring rows may have, and how likely it is: where the parameters are then,
+  /// less `at`, their covariance, and the variance of one row.
+  struct Possible {
+    double weight = 0.0;
+    std::vector<double> away{}, covariance{};
+    double variance = 0.0;
+  };
+  std::vector<Possible> possible{};  ///< of fitInOrder(); empty: rows are independent
+  double even_share = 1.0;           ///< of the rows that tell the variance of one: those that scatter most tell most
+  std::string doubt{};               ///< Trait::doubt of all its numbers
 
+  /// Of a number with that gradient by the parameters: what its 95 % interval is Student's of, with `degrees`.
+  [[nodiscard]] double varianceAlong(std::span<const double> gradient) const;
   [[nodiscard]] double error(std::size_t parameter) const;
+  /// Of the variance of one row: fewer than `degrees` where rows err alike.
+  [[nodiscard]] double degreesOfRow() const;
   /// Of Σ factor · parameter, from parameter number `first` on.
   [[nodiscard]] double varianceOf(std::span<const double> factor, std::size_t first) const;
   /// Of a parameter, or of any function of them (delta method), with Student's quantile.
@@ -39,6 +55,11 @@ struct Fit {
 /// Levenberg and Marquardt with a numeric Jacobian. Nothing if it does not converge, if n ≤ k, or if the rows
 /// leave a parameter undetermined.
 std::optional<Fit> fitLeastSquares(const Model& model, Column y, std::vector<double> start);
+/// The same of rows whose neighbours may err alike, eᵢ = ρ eᵢ₋₁ + uᵢ, as they stand or over x, if it is given:
+/// whichever of both is likelier. Rows that show to scatter unevenly over x count by how they do (unevenSigmas()). The fit is the mean over ρ, each with the weight of its restricted likelihood
+/// (D. A. Harville, Biometrika 61 (1974) 383), so that what is not known of ρ is in the intervals. Beforehand rows
+/// are as likely independent as not. Rows too few to say anything of ρ are taken as independent.
+std::optional<Fit> fitInOrder(const Model& model, Column y, std::vector<double> start, Column x = {});
 /// Correlation of successive residuals, corrected for the k parameters that were fitted; 0 unless it is above
 /// 2/√n.
 double correlationOfResiduals(const Model& model, Column y, const Fit& fit);

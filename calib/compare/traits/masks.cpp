@@ -123,7 +123,8 @@ Traits timingTraits(std::span<const std::vector<double>> starts_s) {
   jitter.high = jitter.value * std::sqrt(degrees / boost::math::quantile(spread, 0.025));
   // What is shorter than a tick is rounding, and no other rounding differs from it.
   const double tick_ms = 1e3 * (kTick_s + latest_s * std::numeric_limits<double>::epsilon());
-  if (jitter.value < tick_ms) jitter.low = 0.0, jitter.high = std::max(jitter.high, tick_ms);
+  if (jitter.value < tick_ms)
+    jitter.value = jitter.low = 0.0, jitter.high = std::max(jitter.high, tick_ms);
   Trait interval = meanTrait("interval", "ms", whole, 1e3);
   interval.low = std::min(interval.low, interval.value - tick_ms);
   interval.high = std::max(interval.high, interval.value + tick_ms);

@@ -7,19 +7,53 @@
 #include <numeric>
 #include <optional>
 #include <set>
+#include <utility>
 
 #include <toftwin/units.h>
 
 #include "calib/compare/traits/clusters.h"
 #include "calib/compare/traits/veil.h"
 #include "calib/compare/traits/least_squares.h"
+#include "calib/compare/traits/repeats.h"
 
 namespace toftwin::compare {
 
+namespace {
+
+/// Schwarz's BIC of a fit.
+double bicOf(const Fit& fit) {
+  return fit.deviance + static_cast<double>(fit.at.size()) * std::log(static_cast<double>(fit.n));
+}
+
+/// Where a fit begins: the line through e over e^(−x/L), and ln of L's share. Far from it a fit may end nowhere.
+std::vector<double> startAt(double length_m, double share, Column x, Column e) {
+  const double n = static_cast<double>(x.size());
+  double mean_fall = 0.0, mean_e = 0.0, both = 0.0, square = 0.0;
+  for (std::size_t i = 0; i < x.size(); ++i) mean_fall += std::exp(-x[i] / length_m) / n, mean_e += e[i] / n;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const double fall = std::exp(-x[i] / length_m) - mean_fall;
+    both += fall * (e[i] - mean_e), square += fall * fall;
+  }
+  const double size = square > 0.0 ? both / square : 0.0;
+  return {mean_e - size * mean_fall, size, std::log(share)};
+}
+
+/// Whether the rows speak for a fall from the edge against none, by more than what the choice among so many reaches
+/// makes of rows that show nothing.
+bool isSeen(const Fit& fall, Column x, Column e) {
+  constexpr double kPositive = 2.0;  // evidence (Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773)
+  const auto none = fitInOrder([](std::span<const double> p, std::size_t) { return p[0]; }, e, {0.0}, x);
+  return none && bicOf(*none) - bicOf(fall) > kPositive;
+}
+
+}  // namespace
+
 Traits cornerTraits(Column distance_to_edge_m, Column error_mm) {
-  const auto rows = finiteRows({distance_to_edge_m, error_mm}, 8, "corner");
-  if (!rows) return rows.error();
-  const auto &x = (*rows)[0], &e = (*rows)[1];
+  auto finite = finiteRows({distance_to_edge_m, error_mm}, 8, "corner");
+  if (!finite) return finite.error();
+  constexpr std::size_t kParameters = 3;
+  const AtPlaces rows = meansAtPlaces(std::move(*finite), kParameters);
+  const auto &x = rows.columns[0], &e = rows.columns[1];
   const double reach = std::ranges::max(x);
   if (!(reach > 0.0) || std::ranges::min(x) < 0.0)
     return undetermined("corner", "distances to the edge must not be negative");
@@ -27,11 +61,19 @@ Traits cornerTraits(Column distance_to_edge_m, Column error_mm) {
     return p[0] + p[1] * std::exp(-x[i] / (reach * std::exp(p[2])));
   };
   std::optional<Fit> fit;
-  for (const double share : {0.1, 0.3, 1.0}) {
-    auto tried = fitLeastSquares(model, e, {0.0, 1.0, std::log(share)});
+  for (const double share : {0.03, 0.1, 0.3, 1.0}) {
+    auto tried = fitLeastSquares(model, e, startAt(share * reach, share, x, e));
     if (tried && (!fit || tried->squares < fit->squares)) fit = std::move(tried);
   }
-  if (!fit) return undetermined("corner", "the error does not fall off from the edge");
+  if (fit) fit = fitInOrder(model, e, fit->at, x);
+  constexpr double kMostReaches = 10.0;  // then it bends by a twentieth of itself, and passes for a line
+  if (!fit || fit->at[2] > std::log(kMostReaches) || !isSeen(*fit, x, e))
+    return undetermined("corner", "the error does not fall off from the edge");
+  constexpr double kMostAway = 10.0;  // of what the nearest row shows
+  if (std::ranges::min(x) > std::log(kMostAway) * reach * std::exp(fit->at[2])) {
+    return undetermined("corner", "of an error that falls so fast the nearest row shows less than a tenth");
+  }
+  if (!rows.doubt.empty()) fit->doubt = rows.doubt;
   Trait length = fit->trait("reach", "m", 2);
   for (double* value : {&length.value, &length.low, &length.high}) *value = reach * std::exp(*value);
   return std::vector{fit->trait("at the edge", "mm", 1), length, fit->trait("far from it", "mm", 0)};
@@ -48,7 +90,7 @@ Traits scatterTraits(Column own_range_m, Column plate_range_m, Column plate_over
     const double nearer = radians_per_m * (plate[i] - own[i]);
     return 1e3 * std::arg(1.0 + std::polar(p[0] * ratio[i], nearer)) / radians_per_m;
   };
-  const auto fit = fitLeastSquares(model, error, {0.0});
+  const auto fit = fitInOrder(model, error, {0.0}, own);
   if (!fit) return undetermined("lens scatter", "the plate is as far as what lies behind, or adds no light");
   return std::vector{fit->trait("veil", "1", 0)};
 }
@@ -114,7 +156,7 @@ Traits veilByRows(const std::vector<std::vector<double>>& columns, Column error_
     for (std::size_t c = 0; c < p.size(); ++c) e += p[c] * columns[c][i];
     return e;
   };
-  const auto fit = fitLeastSquares(model, error_mm, std::vector<double>(columns.size(), 0.0));
+  const auto fit = fitInOrder(model, error_mm, std::vector<double>(columns.size(), 0.0));
   if (!fit) {
     return undetermined("lens scatter",
                         "the plate adds no light whose share could be told, or the frequencies are "

@@ -60,27 +60,80 @@ std::optional<Law> fittedLaw(Column intensity, Column sigma) {
   return law;
 }
 
+/// All three parts, each of which may be less than nothing: what is told of one of them is then told whether
+/// or not the others are there, and of one that is not there 0 is in the interval. From the law on; nothing
+/// where the signals do not tell the parts apart. In units of the least σ².
+std::optional<Fit> signedParts(Column intensity, Column sigma, const Law& law) {
+  const double least = std::pow(std::ranges::min(sigma), 2);
+  std::vector<double> log_sigma, start(3, 0.0);
+  for (const double one : sigma) log_sigma.push_back(std::log(one));
+  for (std::size_t k = 0; k < law.parts.size(); ++k)
+    start[static_cast<std::size_t>(law.parts[k])] = std::exp(2.0 * law.fit.at[k]) / least;
+  const Model model = [=](std::span<const double> p, std::size_t i) {
+    const double x = intensity[i];
+    return 0.5 * std::log(least * (p[0] + p[1] / x + p[2] / (x * x)));
+  };
+  auto fit = fitInOrder(model, log_sigma, start, intensity);
+  if (!fit) return std::nullopt;
+  return fit;
+}
+
+/// The root of a part of the variance. Where its interval holds 0, the part does not show: 0, up to what it
+/// may be.
+Trait partOf(const Fit& parts, const char* name, std::size_t part, double scale) {
+  Trait one = parts.trait(name, "mm", part, scale);
+  const double half = one.high - one.value;
+  if (one.low <= 0.0) one.value = one.low = 0.0;
+  if (one.high <= 0.0) one.high = half;  // it came out far below 0: no more is known than how well it is
+  for (double* value : {&one.value, &one.low, &one.high}) *value = std::sqrt(*value);
+  return one;
+}
+
+/// σ at the largest signal: parts of which one stands in for another make the same of it.
+Trait wholeOf(const Fit& parts, double scale, double most) {
+  LawAtSignal law{.at = {.most = most}, .degrees = parts.degrees};
+  double variance = 0.0;
+  for (std::size_t i = 0; i < law.parts.size(); ++i) {
+    law.parts[i] = scale * parts.at[i], variance += law.parts[i];
+    for (std::size_t j = 0; j < law.parts.size(); ++j) {
+      std::array<double, 3> both{}, first{}, second{};
+      first[i] = second[j] = 1.0, both[i] += 1.0, both[j] += 1.0;
+      law.covariance[3 * i + j] =
+          0.5 * scale * scale *
+          (parts.varianceOf(both, 0) - parts.varianceOf(first, 0) - parts.varianceOf(second, 0));
+    }
+  }
+  const std::array all{1.0, 1.0, 1.0};
+  const double half = studentT(parts.degrees) * scale * std::sqrt(parts.varianceOf(all, 0));
+  Trait whole{.name = kWholeLaw, .unit = "mm", .value = std::sqrt(std::max(0.0, variance)), .n = parts.n};
+  whole.low = std::sqrt(std::max(0.0, variance - half)), whole.high = std::sqrt(std::max(0.0, variance + half));
+  whole.refers_to = law;
+  return whole;
+}
+
 /// Of rows that are finite and positive.
 Result<FittedTraits> describedLaw(std::vector<double> intensity, Column sigma) {
   const double most = std::ranges::max(intensity);
   if (!(most > 1.05 * std::ranges::min(intensity))) return undetermined("noise law", "all signals are alike");
   for (double& one : intensity) one /= most;
   const auto law = fittedLaw(intensity, sigma);
-  if (!law) return undetermined("noise law", "a part of it does not show in this range of signals");
-  constexpr std::array kParts{"floor", "shot", "read"};
+  const auto all = law ? signedParts(intensity, sigma, *law) : std::nullopt;
+  if (!all) return undetermined("noise law", "this range of signals does not tell its parts apart");
   constexpr std::array kPowers{"", "/I", "/I²"};
   FittedTraits fitted;
   std::array<double, 3> at{};
   std::string terms;
   for (std::size_t k = 0; k < law->parts.size(); ++k) {
     const auto part = static_cast<std::size_t>(law->parts[k]);
-    Trait one = law->fit.trait(kParts[part], "mm", k);
-    for (double* value : {&one.value, &one.low, &one.high}) *value = std::exp(*value);
-    at[part] = one.value;
-    terms += fmt::format("{}{:.2g}²{}", terms.empty() ? "" : " + ", one.value, kPowers[part]);
+    at[part] = std::exp(law->fit.at[k]);
+    terms += fmt::format("{}{:.2g}²{}", terms.empty() ? "" : " + ", at[part], kPowers[part]);
+  }
+  for (std::size_t part = 0; part < kLawParts.size(); ++part) {
+    Trait one = partOf(*all, kLawParts[part], part, std::pow(std::ranges::min(sigma), 2));
     if (part > 0) one.refers_to = AtSignal{.most = most, .power = 0.5 * static_cast<double>(part)};
     fitted.traits.push_back(std::move(one));
   }
+  fitted.traits.push_back(wholeOf(*all, std::pow(std::ranges::min(sigma), 2), most));
   fitted.curve = {"√(" + terms + ") mm", [at, most](double of_signal) {
                     const double i = of_signal / most;
                     return std::sqrt(at[0] * at[0] + at[1] * at[1] / i + at[2] * at[2] / (i * i));

@@ -1,18 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
-// Errors that go straight with something: amplitude, ambient light, speed.
+// Errors that go straight with something: amplitude, speed.
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
 
 #include "calib/compare/traits/least_squares.h"
+#include "calib/compare/traits/repeats.h"
 
 namespace toftwin::compare {
 namespace {
 
-/// y = p₀ + p₁ x.
-std::optional<Fit> line(const std::vector<double>& x, const std::vector<double>& y) {
-  return fitLeastSquares([&](std::span<const double> p, std::size_t i) { return p[0] + p[1] * x[i]; }, y,
-                         {0.0, 0.0});
+/// y = p₀ + p₁ x, columns x and y.
+std::optional<Fit> line(std::vector<std::vector<double>> columns) {
+  const AtPlaces rows = meansAtPlaces(std::move(columns), 2);
+  const auto &x = rows.columns[0], &y = rows.columns[1];
+  auto fit = fitInOrder([&](std::span<const double> p, std::size_t i) { return p[0] + p[1] * x[i]; }, y,
+                        {0.0, 0.0}, x);
+  if (fit && !rows.doubt.empty()) fit->doubt = rows.doubt;
+  return fit;
 }
 
 }  // namespace
@@ -33,7 +39,8 @@ Traits amplitudeTraits(Column amplitude, Column error_mm, std::span<const std::s
   const Model model = [&](std::span<const double> p, std::size_t i) {
     return p[number[(*rows)[2][i]]] + p[groups] * x[i];
   };
-  const auto fit = fitLeastSquares(model, (*rows)[1], std::vector<double>(groups + 1, 0.0));
+  const auto fit = groups > 1 ? fitInOrder(model, (*rows)[1], std::vector<double>(groups + 1, 0.0), x)
+                              : line({x, (*rows)[1]});
   if (!fit) {
     return undetermined(kWhat, groups > 1
                                    ? "within each distance all amplitudes are alike, or there are too few"
@@ -46,20 +53,10 @@ Traits amplitudeTraits(Column amplitude, Column error_mm, std::span<const std::s
   return std::vector{at_1, slope};
 }
 
-Traits ambientTraits(Column ambient_klx, Column error_mm, Column sigma_mm) {
-  auto rows = finiteRows({ambient_klx, error_mm, sigma_mm}, 4, "ambient-related error");
-  if (!rows) return rows.error();
-  auto& variance = (*rows)[2];
-  for (double& one : variance) one *= one;
-  const auto bias = line((*rows)[0], (*rows)[1]), noise = line((*rows)[0], variance);
-  if (!bias || !noise) return undetermined("ambient-related error", "all illuminances are alike");
-  return std::vector{bias->trait("bias", "mm/klx", 1), noise->trait("noise²", "mm²/klx", 1)};
-}
-
 Traits motionTraits(Column speed_m_per_s, Column error_mm) {
-  const auto rows = finiteRows({speed_m_per_s, error_mm}, 4, "motion artefact");
+  auto rows = finiteRows({speed_m_per_s, error_mm}, 4, "motion artefact");
   if (!rows) return rows.error();
-  const auto fit = line((*rows)[0], (*rows)[1]);
+  const auto fit = line(std::move(*rows));
   if (!fit) return undetermined("motion artefact", "all speeds are alike");
   return std::vector{fit->trait("per speed", "mm/(m/s)", 1)};
 }

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <variant>
@@ -32,12 +34,19 @@ struct AtSignal {
   double most = 0.0, power = 0.0;  ///< most: NaN where the other camera's has no unit in common with it
   std::string unit{};
 };
+/// σ² = p₀ + p₁ (most/I) + p₂ (most/I)² of a signal I, told at `at.most`; in mm².
+struct LawAtSignal {
+  AtSignal at{};
+  std::array<double, 3> parts{};
+  std::array<double, 9> covariance{};  ///< row by row
+  double degrees = 0.0;
+};
 /// A change from the first row to the last.
 struct OverSpan {
   double length_s = 0.0;
 };
 /// What a number is told of, where that may be another for another camera; none: it is as it is.
-using RefersTo = std::variant<std::monostate, OnLine, WaveParts, AtSignal, OverSpan>;
+using RefersTo = std::variant<std::monostate, OnLine, WaveParts, AtSignal, LawAtSignal, OverSpan>;
 
 /// One number of a characteristic.
 struct Trait {
@@ -57,20 +66,25 @@ struct FittedCurve {
   std::string name{};                  ///< the model: "one exponential"
   std::function<double(double)> at{};  ///< empty where nothing was fitted
 };
+inline constexpr const char* kWavesTogether = "waves together";
 struct FittedTraits {
   std::vector<Trait> traits{};
   FittedCurve curve{};
   /// What of each row goes with something else than the abscissa and is in the model, too; empty: nothing.
   std::vector<double> besides{};
   std::string not_told{};  ///< what of it these rows do not tell, why, and which would; empty: all is told
+  /// Of harmonics: kWavesTogether, where single waves are in doubt as they may be one another.
+  std::optional<Trait> together{};
+  std::size_t orders = 0;  ///< of harmonics: how many were fitted
+  double bic = 0.0;        ///< of harmonics, with which another number of them is held against it
 };
 
 /// Which model a drift follows. Chosen by BIC; a step's place costs two parameters.
-enum class DriftModel { Constant, Ramp, OneExponential, TwoExponentials, Step };
+enum class DriftModel { Constant, Ramp, OneExponential, TwoExponentials, Step, TwoSteps };
 struct DriftTraits {
   DriftModel model = DriftModel::Constant;
   /// "drift" (last minus first; of a constant, what a ramp could hide), and of the model "time constant",
-  /// "slope", "step"
+  /// "slope", "step", "first step" and "second step"
   std::vector<Trait> traits{};
   FittedCurve curve{};  ///< of the model; of a constant, their mean
   std::string
@@ -78,28 +92,53 @@ struct DriftTraits {
 };
 /// "one exponential"; "none" of a constant.
 const char* nameOf(DriftModel model);
-/// value(t): constant; + s t; + Σ aᵢ e^(−t/τᵢ); + h (t > t₀). Errors that go on from row to row widen the
+/// value(t): constant; + s t; + Σ aᵢ e^(−t/τᵢ); + h (t > t₀), of one or two. Errors that go on from row to row widen the
 /// intervals.
 Result<DriftTraits> driftTraits(Column time_s, Column value_mm);
 
+/// Rows in clusters that share an error, such as steps of one capture.
+struct RowClusters {
+  std::span<const std::size_t> of{};  ///< each row's; empty: rows are independent
+  std::span<const double> pixels{};   ///< how many each row is the mean of; empty: not known
+  /// Standard error of what each row's cluster shares, at least, as of its pose, and all clusters may share;
+  /// empty: nothing is known of it.
+  std::span<const double> shared_mm{};
+  /// Whether each cluster has a slope over distance of its own, as a pose that is turned makes of a wall;
+  /// "residual" is in doubt then.
+  bool are_turned = false;
+  const char* what = "captures";  ///< what the clusters are
+};
+
 /// error(d) = c + s d + Σ aₖ cos 2πk·2fd/c + bₖ sin …: "f MHz, k per period": √(a² + b²), and "residual".
-/// Of rows in clusters, such as cells of one capture, that share an error: one-way random effects; and err by
-/// their place in the image, u = d/d₀ − 1 over the cluster's nearest row d₀: by a polynomial (a + b d₀) u +
-/// (…) u², where u reaches 5 %. Without clusters: rows are independent.
+/// Of rows in clusters: one-way random effects; each row's own variance goes as a power of its distance, and of
+/// the number of its pixels; and they err by their place in the image, u = d/d₀ − 1 over the cluster's nearest
+/// row d₀: by a polynomial (a + b d₀) u + (…) u², where u reaches 5 %.
 Traits harmonicTraits(Column distance_m, Column error_mm, std::span<const double> frequency_hz,
-                      std::span<const int> orders, std::span<const std::size_t> cluster = {});
+                      std::span<const int> orders, const RowClusters& clusters = {});
 /// Of as many of four, three, six, two and one wave per period (cameras of four steps have four, of three
 /// steps three and six) as there are three rows for each parameter, and as the rows tell apart: each
 /// amplitude better than one row's scatter. Waves that are left out are not taken to be 0: over a part of a
-/// period, those that are there would be told as others. FittedTraits::not_told says so.
+/// period, those that are there would be told as others. FittedTraits::not_told says so. Nor are waves left out
+/// without which the rest would be far more, however uncertain they are.
 Traits harmonicTraits(Column distance_m, Column error_mm, std::span<const double> frequency_hz,
-                      std::span<const std::size_t> cluster = {});
-/// The same with the curve.
+                      const RowClusters& clusters = {});
+/// The same with the curve, and of `least_orders` at least, where there are rows for so many.
 Result<FittedTraits> fittedHarmonics(Column distance_m, Column error_mm, std::span<const double> frequency_hz,
-                                     std::span<const std::size_t> cluster = {});
+                                     const RowClusters& clusters = {}, std::size_t least_orders = 0);
+/// Of one camera's rows, with so many orders at least.
+using HarmonicFit = std::function<Result<FittedTraits>(std::size_t least_orders)>;
+/// Of two cameras with the same frequencies, both with as many orders as the one that has more, if the other one's
+/// rows tell them half as well as they should: of a wave that only one fit has, the other has a part in its scale,
+/// and equal cameras would differ by it.
+std::array<Result<FittedTraits>, 2> withTheSameWaves(const std::array<HarmonicFit, 2>& fits);
 
+/// Names of a noise law's parts, a, b and c below, and what a pattern that stands still has instead: it is no shot
+/// nor read noise, though it goes with the signal as they do. And of the law at the largest signal.
+inline constexpr std::array<const char*, 3> kLawParts{"floor", "shot", "read"},
+    kPatternParts{"constant part", "part that goes with 1/√signal", "part that goes with 1/signal"};
+inline constexpr const char* kWholeLaw = "all parts together";
 /// σ(I) = √(a² + b²/I + c²/I²) in ln σ, I relative to the largest: "floor" a, "shot" b, "read" c at that
-/// signal. `frequency_hz`, of modulation: rows are left out at signals so small that the law has the phase's
+/// signal. A part that does not show is 0, with an interval up to what it may be. `frequency_hz`, of modulation: rows are left out at signals so small that the law has the phase's
 /// noise over 0.1 rad, where σ no longer goes so; empty: all rows are fitted.
 Traits noiseLawTraits(Column signal, Column sigma_mm, std::span<const double> frequency_hz = {});
 /// The same with the curve, over the signal itself; not_told says what was left out.
@@ -156,7 +195,9 @@ Traits lagTraits(Column frames_after, Column value);
 /// Of changes of light, one a row: what the first frame after it has of what was before, (first −
 /// rest)/(before − rest): "left behind". `name`: another one than "left behind".
 Traits afterImageTraits(Column first, Column rest, Column before, const char* name = "left behind");
-/// measured(t) = reference(t − τ) + c: "latency" τ; the reference is linear between its rows.
+/// measured(t) = (1 + s) reference(t − τ) + c: "latency" τ, over the places that are passed in both directions:
+/// going one way only, an error that goes with the place cannot be told from a delay. The reference is linear
+/// between its rows.
 Traits latencyTraits(Column time_s, Column measured, Column reference_time_s, Column reference);
 
 /// Over pairs of masks (1: valid), one pair for each pose or frame: "agreement", "overlap" (both / either),

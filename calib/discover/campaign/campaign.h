@@ -42,6 +42,10 @@ struct MeasuredCapture {
   std::string stand{};
   std::size_t frames = 0;
   Repeated range_m, log_amplitude;  ///< the latter empty where the camera gives none
+  /// Variances of range and ln amplitude that all frames have in common: of a simulated camera's light, as far as its
+  /// frames say. Empty: none is known.
+  Image<float> light_variance_m2{}, light_variance{};
+  bool hides_light_noise = false;  ///< it is simulated, and its frames do not say it
   Image<float> valid_share;
   /// Even minus odd frames, means over the image of the range: what goes with the frame's number.
   double parity_m = 0.0, parity_error_m = 0.0;

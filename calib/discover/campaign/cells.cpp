@@ -46,8 +46,10 @@ Cells::Cells(const MeasuredCapture& capture, const TracedCapture& traced, const 
         traced.is_edge[i] != 0)
       continue;
     if (std::abs(range_m[i] - declared.range_m[i]) > kGross_m) continue;
-    const auto weight = [](const Repeated& of, std::size_t pixel, float tracing, double least) {
-      return static_cast<float>(1.0 / (static_cast<double>(of.variance[pixel]) * of.clumping +
+    const auto weight = [](const Repeated& of, const Image<float>& light, std::size_t pixel, float tracing,
+                           double least) {
+      const double of_light = light.empty() ? 0.0 : static_cast<double>(light[pixel]);
+      return static_cast<float>(1.0 / (static_cast<double>(of.variance[pixel]) * of.clumping + of_light +
                                        static_cast<double>(tracing) + least * least));
     };
     if (has_amplitude) {
@@ -55,10 +57,10 @@ Cells::Cells(const MeasuredCapture& capture, const TracedCapture& traced, const 
                         capture.log_amplitude.variance[i];
       if (!std::isfinite(log)) continue;
       weight_[at(Channel::LogAmplitude)][i] =
-          weight(capture.log_amplitude, i, traced.tracing_variance[i], kLeastLog);
+          weight(capture.log_amplitude, capture.light_variance, i, traced.tracing_variance[i], kLeastLog);
     }
     weight_[at(Channel::Range)][i] =
-        weight(capture.range_m, i, traced.tracing_variance_m2[i], kLeastRange_m);
+        weight(capture.range_m, capture.light_variance_m2, i, traced.tracing_variance_m2[i], kLeastRange_m);
     counts[i] = 1;
   }
   grid_ = gridOf(width, height, most);

@@ -12,6 +12,7 @@
 #include "calib/discover/campaign/before_search.h"
 #include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/found_model.h"
+#include "calib/discover/campaign/light_noise.h"
 #include "calib/discover/campaign/model_file.h"
 #include "calib/discover/campaign/next_capture.h"
 #include "calib/discover/campaign/reading.h"
@@ -120,6 +121,7 @@ Result<> judgeLocked(const CampaignJob& job, const Campaign& campaign, const Jud
       0x5bd1e995U;  // light of its own: what the open captures' light has by chance must not help
   const auto at_poses = traceAll(declared, *captures, options);
   if (!at_poses) return at_poses.error();
+  shareLightNoise(*at_poses, *captures);
   const auto traced = traceWhereTheyStood(declared, models.after.effects, *captures, *at_poses, options);
   if (!traced) return traced.error();
   const Lit lit{*captures, *traced, *at_poses};
@@ -127,6 +129,25 @@ Result<> judgeLocked(const CampaignJob& job, const Campaign& campaign, const Jud
   if (!judgement) return judgement.error();
   finding.judgement = *std::move(judgement);
   return {};
+}
+
+/// Paths that pixels share make neighbours err alike, and what they state is a bound: how much is chance, whole
+/// captures say.
+FinderOptions finderFor(const CampaignJob& job, const std::vector<MeasuredCapture>& captures) {
+  FinderOptions finder = job.finder;
+  const bool has_light_noise =
+      std::ranges::any_of(captures, [](const MeasuredCapture& one) { return !one.light_variance.empty(); });
+  if (has_light_noise && finder.null_model == NullModel::Automatic) finder.null_model = NullModel::SignFlips;
+  return finder;
+}
+
+void noteHiddenLightNoise(const std::vector<MeasuredCapture>& captures, std::vector<std::string>& notes) {
+  const auto hidden = std::ranges::count_if(captures, &MeasuredCapture::hides_light_noise);
+  if (hidden == 0) return;
+  notes.emplace_back(
+      "The camera is simulated, and its frames do not say what noise their light has, which is the same in all frames "
+      "from one place: it counts as the camera's. Have light_sigma among the source's planes, or take more paths "
+      "(samples_per_pixel).");
 }
 
 void takeFound(Round& round, CampaignFinding& finding) {
@@ -179,6 +200,7 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
   if (auto whole = checkLockedFiles(job, *campaign); !whole) return whole.error();
   CampaignFinding finding;
   finding.notes = campaign->notes;
+  noteHiddenLightNoise(campaign->captures, finding.notes);
   if (auto taken = takeLens(*campaign, declared, finding.notes); !taken) return taken.error();
   if (auto same = checkFrequencies(*campaign, declared.model); !same) return same.error();
   takeNoiseOff(declared.model, campaign->captures);
@@ -195,12 +217,14 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
   const auto tell = [&](double share) { progress.at(share); };
   const auto at_poses = traceAll(declared, campaign->captures, job.trace, tell);
   if (!at_poses) return at_poses.error();
+  shareLightNoise(*at_poses, campaign->captures);
   const auto late = delayThatFits({declared, {campaign->captures, *at_poses, *at_poses}, {}});
   if (!late) return late.error();
   declared.delay_mm = *late;
   // What single frames tell, means over frames need not guess.
   const auto steps = stepsIn(declared.model, campaign->captures);
-  OpenCaptures open{campaign->captures, *at_poses, job.trace, job.finder, job.left_out, steps.has_value()};
+  const FinderOptions finder = finderFor(job, campaign->captures);
+  OpenCaptures open{campaign->captures, *at_poses, job.trace, finder, job.left_out, steps.has_value()};
   if (steps) open.left_out.emplace_back(sim::Quantisation::about.name);
   const auto searched_for = searchInRounds(
       declared, open, [&] { progress.begin(); }, tell);

@@ -10,6 +10,7 @@
 
 #include "calib/compare/stack.h"
 #include "calib/compare/statistics.h"
+#include "calib/discover/campaign/light_noise.h"
 
 namespace toftwin::discover {
 namespace {
@@ -232,6 +233,7 @@ struct CaptureGatherer::State {
   MeanMoment mean_moment;
   CameraInfo camera;
   Repeats range, amplitude;
+  LightNoise light;
   Image<float> first, first_amplitude;
   std::vector<double> means;
   Image<float> valid;
@@ -240,6 +242,7 @@ struct CaptureGatherer::State {
   Result<> add(const Frame& frame) {
     if (capture.frames == 0) camera = frame.camera, capture.moment = frame.moment;
     mean_moment.add(frame.moment);
+    light.add(frame);
     if (!(frame.camera == camera))
       return ofCapture(capture.record, "its camera model changes between frames");
     auto range_m = compare::rangeOf(frame);
@@ -266,6 +269,7 @@ struct CaptureGatherer::State {
 
   MeasuredCapture finish() {
     mean_moment.putInto(capture.moment);
+    light.putInto(capture);
     if (has_amplitude) {
       capture.log_amplitude = amplitude.repeated({});
       capture.log_amplitude.variance = amplitude.repeated(capture.log_amplitude.mean).variance;

@@ -16,6 +16,21 @@ sim::AnyEffect defaultsOf(const sim::AnyEffect& effect) {
   return std::visit([]<class E>(const E&) { return sim::AnyEffect{E{}}; }, effect);
 }
 
+/// A step of a number: of half of what it or its default is at most, within its bounds, and to the other side if
+/// there is more room.
+double longestStep(const sim::AnyEffect& effect, const std::string& key, double step) {
+  constexpr double kMost = 0.5;
+  for (const EffectNumber& number : numbersOf(effect)) {
+    if (number.key != key) continue;
+    const double most =
+        std::min(std::abs(step),
+                 kMost * std::max(std::abs(number.value), std::abs(valueOf(defaultsOf(effect), key))));
+    const double up = std::min(most, number.high - number.value), down = std::min(most, number.value - number.low);
+    return up > down || (up == down && step > 0.0) ? up : -down;
+  }
+  return step;
+}
+
 constexpr Eigen::Index kDelayColumn = 2;  ///< behind offset and gain, poses and light being integrated out
 
 using Kept = std::set<std::pair<std::size_t, std::string>>;  ///< numbers that stay as they are
@@ -109,7 +124,7 @@ class Descent {
       for (std::size_t i = 0; i < state.free.size(); ++i)
         next.effects = moved(std::move(next.effects), state.free[i],
                              change[static_cast<Eigen::Index>(i)] * state.free[i].step);
-      next.free = again(state.free, next.effects);
+      next.free = again(state, next.effects);
       if (auto looked = look(next); !looked) return looked;
       const double better = state.at.deviance - next.at.deviance;
       if (better > 0.0) {
@@ -151,6 +166,11 @@ class Descent {
 
  private:
   Result<> look(State& state) const {
+    if (auto seen = evaluate(state); !seen) return seen;
+    return lengthenSteps(state) ? evaluate(state) : Result<>{};
+  }
+
+  Result<> evaluate(State& state) const {
     const auto evidence = rows_.evidenceLeft({.effects = state.effects,
                                               .free = state.free,
                                               .terms = options_.terms,
@@ -160,6 +180,23 @@ class Descent {
     state.marginal = marginalise(*evidence, options_.scales);
     state.at = stepOf(state.marginal, state.free.size());
     return {};
+  }
+
+  /// To a standard error, those that are less than half of one: of a change that hardly shows, rounding of
+  /// images in single precision is a large part, and would pass for what no other number does. Whether any was.
+  static bool lengthenSteps(State& state) {
+    constexpr double kEnough = 0.25;  // standard errors squared
+    bool is_any = false;
+    for (std::size_t i = 0; i < state.free.size(); ++i) {
+      const auto row = static_cast<Eigen::Index>(i);
+      const double size = state.at.gram(row, row);
+      if (!(size > 0.0 && size < kEnough)) continue;
+      FreeNumber& one = state.free[i];
+      const double longer = longestStep(state.effects[one.place], one.key, one.step / std::sqrt(size));
+      if (!(std::abs(longer) > 1.5 * std::abs(one.step))) continue;
+      one.step = longer, is_any = true;
+    }
+    return is_any;
   }
 
   [[nodiscard]] std::vector<FreeNumber> candidates(const std::vector<sim::AnyEffect>& effects) const {
@@ -172,15 +209,23 @@ class Descent {
     return all;
   }
 
-  /// The same numbers with steps that suit their effects as they are now.
-  [[nodiscard]] std::vector<FreeNumber> again(const std::vector<FreeNumber>& free,
+  /// The same numbers with steps that suit their effects as they are now; those that were made longer stay so,
+  /// if they are no more than two standard errors there.
+  [[nodiscard]] std::vector<FreeNumber> again(const State& before,
                                               const std::vector<sim::AnyEffect>& effects) const {
-    std::vector<FreeNumber> all = candidates(effects);
-    std::erase_if(all, [&](const FreeNumber& one) {
-      return std::ranges::none_of(
-          free, [&](const FreeNumber& f) { return f.place == one.place && f.key == one.key; });
-    });
-    return all;
+    constexpr double kMost = 4.0;  // standard errors squared
+    std::vector<FreeNumber> kept;
+    for (FreeNumber& one : candidates(effects)) {
+      for (std::size_t i = 0; i < before.free.size(); ++i) {
+        const FreeNumber& was = before.free[i];
+        const auto row = static_cast<Eigen::Index>(i);
+        if (was.place != one.place || was.key != one.key) continue;
+        const double longer = longestStep(effects[one.place], one.key, was.step);
+        if (before.at.gram(row, row) < kMost && std::abs(longer) > std::abs(one.step)) one.step = longer;
+        kept.push_back(one);
+      }
+    }
+    return kept;
   }
 
   static double nothingOf(const sim::AnyEffect& effect, const std::string& key) {

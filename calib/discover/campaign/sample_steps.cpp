@@ -106,6 +106,48 @@ std::optional<Comb> combOf(std::vector<double> numbers) {
   return comb;
 }
 
+/// Numbers that are whole multiples of something, if raw exposures are.
+struct Told {
+  std::vector<double> amplitudes{}, squares{};
+  double brightest = 0.0;
+};
+
+/// From frame to frame, in the dimmest pixels.
+Told changesOf(std::span<const AmplitudePair> pairs) {
+  Told told;
+  for (const AmplitudePair& pair : dimmestOf({pairs.begin(), pairs.end()}, kInAll)) {
+    const auto a = static_cast<double>(pair[0]), b = static_cast<double>(pair[1]);
+    told.brightest = std::max({told.brightest, a, b});
+    told.amplitudes.push_back(b - a);
+    told.squares.push_back(b * b - a * a);
+  }
+  return told;
+}
+
+/// Whether noise leaves most pixels as they are from frame to frame.
+bool areStill(std::span<const AmplitudePair> pairs) {
+  const auto still = std::ranges::count_if(pairs, [](const AmplitudePair& pair) { return pair[0] == pair[1]; });
+  return 2 * static_cast<std::size_t>(still) > pairs.size();
+}
+
+/// The amplitudes themselves, of the dimmest pixels. Each once: captures from one place say the same again, which
+/// is no more.
+Told amplitudesOf(std::span<const AmplitudePair> pairs) {
+  constexpr double kSame = 1e-5;  // less than steps that can be told change of it
+  Told told;
+  std::vector<double> sorted;
+  for (const AmplitudePair& pair : pairs) sorted.push_back(static_cast<double>(pair[0]));
+  std::ranges::sort(sorted);
+  for (const double a : sorted) {
+    if (told.amplitudes.size() == kInAll) break;
+    if (a - told.brightest <= kSame * a) continue;
+    told.brightest = a;
+    told.amplitudes.push_back(a);
+    told.squares.push_back(a * a);
+  }
+  return told;
+}
+
 }  // namespace
 
 void addDimmest(const Image<float>& before, const Image<float>& after, std::vector<AmplitudePair>& pairs) {
@@ -119,19 +161,12 @@ void addDimmest(const Image<float>& before, const Image<float>& after, std::vect
 std::optional<SampleSteps> sampleStepsOf(std::span<const AmplitudePair> pairs, std::size_t phase_steps) {
   if (phase_steps != 3 && phase_steps != 4) return std::nullopt;
   constexpr double kRounding = 0x1p-23;  // of a number in single precision, by which amplitudes are told
-  std::vector<double> changes, changes_of_squares;
-  double brightest = 0.0;
-  for (const AmplitudePair& pair : dimmestOf({pairs.begin(), pairs.end()}, kInAll)) {
-    const auto a = static_cast<double>(pair[0]), b = static_cast<double>(pair[1]);
-    brightest = std::max({brightest, a, b});
-    changes.push_back(b - a);
-    changes_of_squares.push_back(b * b - a * a);
-  }
-  const auto comb = combOf(std::move(changes_of_squares));
+  Told told = areStill(pairs) ? amplitudesOf(pairs) : changesOf(pairs);
+  const auto comb = combOf(std::move(told.squares));
   if (!comb) return std::nullopt;
   // Amplitudes in single precision lie on its own grid, which says nothing of steps.
-  const auto of_amplitude = combOf(std::move(changes));
-  if (of_amplitude && of_amplitude->period > 16.0 * kRounding * brightest) return std::nullopt;
+  const auto of_amplitude = combOf(std::move(told.amplitudes));
+  if (of_amplitude && of_amplitude->period > 16.0 * kRounding * told.brightest) return std::nullopt;
   const double steps_of_root = phase_steps == 4 ? 2.0 : 1.5;
   const double step = steps_of_root * std::sqrt(comb->period);
   return SampleSteps{step, step * std::hypot(0.5 * comb->error / comb->period, kRounding), comb->p};

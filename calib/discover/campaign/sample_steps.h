@@ -11,7 +11,7 @@
 #include <toftwin/image.h>
 
 /// Whether a camera's raw exposures come in whole steps. Means over frames do not show it: noise of more than
-/// half a step spreads it evenly. Single frames do.
+/// half a step spreads it evenly. Single frames do, with noise and without.
 namespace toftwin::discover {
 
 /// The amplitude that one pixel shows in two successive frames.
@@ -30,7 +30,8 @@ struct SampleSteps {
 /// Of four samples q nₖ (whole nₖ) the amplitude is A = |½ Σₖ q nₖ iᵏ|, so that A² is a whole number of q²/4,
 /// wherever zero lies and whatever is done to the phase afterwards; of three samples, of 4q²/9. The period is
 /// that at which the changes of A² from frame to frame have the largest Rayleigh statistic z = |Σ e^(2πi
-/// d/P)|²/n, whose probability by chance is at most e^(−z) for each period that is looked at.
+/// d/P)|²/n, whose probability by chance is at most e^(−z) for each period that is looked at. Where frames hardly
+/// differ, as those of a camera without noise, it is that of the A² themselves.
 ///
 /// Steps from about 1/500 of the dimmest amplitudes, where single precision ends, to a few times the noise.
 ///

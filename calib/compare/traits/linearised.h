@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Dense>
+#include <span>
+#include <vector>
+
+#include "calib/compare/traits/least_squares.h"
+
+namespace toftwin::compare {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// y − model, row by row.
+VectorXd residuals(const Model& model, Column y, std::span<const double> p);
+/// What each parameter, a column, does to each of so many rows of the model.
+MatrixXd jacobian(const Model& model, std::size_t rows, std::vector<double> p);
+
+}  // namespace toftwin::compare

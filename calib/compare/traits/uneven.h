@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "calib/compare/traits/least_squares.h"
+
+namespace toftwin::compare {
+
+/// Rows that scatter more here than there: σ of each, of which the mean square is 1. ln σ is a parabola over the rows'
+/// order by x, by maximum likelihood (A. C. Harvey, Econometrica 44 (1976) 461) of what a fit left of them. Empty where
+/// neighbours' differences show it by no more than chance in 1 % (R. Koenker, J. Econometrics 17 (1981) 107), or of
+/// fewer than ten rows to spare for each of its two numbers.
+std::vector<double> unevenSigmas(Column left, Column x, std::size_t parameters);
+std::vector<double> over(Column values, Column sigmas);
+/// A model of rows that are over their σ.
+Model over(const Model& model, Column sigmas);
+
+}  // namespace toftwin::compare

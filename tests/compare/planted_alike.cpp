@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tables whose rows do not scatter as independent, equal ones: neighbours err alike, or some rows more than others;
+// and what is not there.
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "planted.h"
+
+namespace toftwin::compare {
+namespace {
+
+Columns evenly(double first, double last, int count) {
+  Columns x;
+  for (int i = 0; i < count; ++i) x.push_back(first + (last - first) * i / (count - 1));
+  return x;
+}
+
+/// y = f(x) + errors of `sigma`, each of which has `rho` of the one before.
+Columns alike(const Columns& x, double sigma, double rho, Noise& noise,
+              const std::function<double(double)>& f) {
+  Columns y;
+  double e = noise(sigma);
+  for (const double one : x) {
+    y.push_back(f(one) + e);
+    e = rho * e + noise(sigma * std::sqrt(1.0 - rho * rho));
+  }
+  return y;
+}
+
+/// Two of a hundred readings wrap, each of which goes on with the next in 80 %.
+Planted wrapsTogether() {
+  return {"wraps that go on", {{"wrapped", 0.02}}, [](Noise& noise) {
+            Columns e;
+            bool wraps = noise.chance(0.02);
+            for (int i = 0; i < 20'000; ++i) {
+              e.push_back((wraps ? 1.5 : 0.0) + noise(0.02));
+              if (noise.chance(0.2)) wraps = noise.chance(0.02);
+            }
+            return wrapTraits(e, 1.5);
+          }};
+}
+
+std::vector<Planted> alikeOverDistance() {
+  std::vector<Planted> rows;
+  constexpr double kWave = 4.0 * std::numbers::pi * 30e6 / 299'792'458.0;
+  for (const double rho : {0.5, 0.8}) {
+    rows.push_back({"harmonics, rows that err alike (" + std::string{rho < 0.6 ? "0.5" : "0.8"} + ")",
+                    {{"30 MHz, 1 per period", 4.0},
+                     {"30 MHz, 4 per period", 6.0},
+                     {"offset", 3.0 + 0.7 * 3.5},
+                     {"scale", 0.7},
+                     {"residual", 2.0}},
+                    [=](Noise& noise) {
+                      const Columns d = evenly(0.5, 6.5, 240);
+                      const Columns e = alike(d, 2.0, rho, noise, [](double x) {
+                        return 3.0 + 0.7 * x + 4.0 * std::cos(kWave * x + 1.0) +
+                               6.0 * std::sin(4.0 * kWave * x - 0.4);
+                      });
+                      const std::vector<double> f{30e6};
+                      const std::vector<int> orders{1, 2, 4};
+                      return harmonicTraits(d, e, f, orders);
+                    }});
+  }
+  rows.push_back(wrapsTogether());
+  rows.push_back({"corner, rows that err alike (0.5)",
+                  {{"at the edge", 40.0}, {"reach", 0.25}, {"far from it", -3.0}},
+                  [](Noise& noise) {
+                    const Columns x = evenly(0.0, 1.2, 150);
+                    return cornerTraits(x, alike(x, 2.0, 0.5, noise, [](double d) {
+                                          return -3.0 + 40.0 * std::exp(-d / 0.25);
+                                        }));
+                  }});
+  return rows;
+}
+
+/// σ of so many ranges of a true one.
+double sigmaOf(double truth, int ranges, Noise& noise) {
+  double squares = 0.0;
+  for (int i = 1; i < ranges; ++i) squares += std::pow(noise(truth), 2);
+  return std::sqrt(squares / (ranges - 1));
+}
+
+std::vector<Planted> alikeOverLight() {
+  std::vector<Planted> rows;
+  rows.push_back({"motion, rows that err alike (0.5)", {{"per speed", 7.5}}, [](Noise& noise) {
+                    const Columns v = evenly(-2.0, 2.0, 60);
+                    return motionTraits(
+                        v, alike(v, 3.0, 0.5, noise, [](double s) { return 1.0 + 7.5 * s; }));
+                  }});
+  // From σ² = 10 to 190: variances scatter in proportion to themselves.
+  rows.push_back({"ambient, σ of 60 frames", {{"bias", 0.12}, {"noise²", 3.0}}, [](Noise& noise) {
+                    const Columns klx = evenly(0.0, 60.0, 25);
+                    Columns sigma;
+                    for (const double e : klx) sigma.push_back(sigmaOf(std::sqrt(10.0 + 3.0 * e), 60, noise));
+                    return ambientTraits(
+                        klx, alike(klx, 1.0, 0.0, noise, [](double e) { return 2.0 + 0.12 * e; }), sigma);
+                  }});
+  const auto law = [](std::string name, Truth truth, double rho) {
+    const double a = truth["floor"], b = truth["shot"], c = truth["read"];
+    return Planted{std::move(name), std::move(truth), [=](Noise& noise) {
+                     Columns order = evenly(0.0, 59.0, 60), signal;
+                     for (const double i : order) signal.push_back(1000.0 * std::pow(10.0, -2.0 * i / 59.0));
+                     Columns sigma = alike(order, std::sqrt(1.0 / 118.0), rho, noise, [&](double i) {
+                       const double x = 1e-3 * signal[static_cast<std::size_t>(i)];
+                       return 0.5 * std::log(a * a + b * b / x + c * c / (x * x));
+                     });
+                     for (double& one : sigma) one = std::exp(one);
+                     return noiseLawTraits(signal, sigma);
+                   }};
+  };
+  rows.push_back(law("noise law, rows that err alike (0.5)",
+                     {{"floor", 2.0}, {"shot", 3.0}, {"read", 0.4}}, 0.5));
+  rows.push_back(law("noise law without shot noise", {{"floor", 5.0}, {"shot", 0.0}, {"read", 0.2}}, 0.0));
+  return rows;
+}
+
+std::vector<Planted> alikeOverTime() {
+  std::vector<Planted> rows;
+  rows.push_back({"drift, two steps", {{"first step", 2.0}, {"second step", -1.5}}, [](Noise& noise) -> Traits {
+                    const Columns t = evenly(0.0, 3600.0, 181);
+                    const auto drift = driftTraits(t, alike(t, 0.3, 0.0, noise, [](double s) {
+                                                     return s > 2410.0 ? 0.5 : s > 1010.0 ? 2.0 : 0.0;
+                                                   }));
+                    if (!drift) return drift.error();
+                    return drift->traits;
+                  }});
+  // A plate that turns, and a camera that sees all of its way 5 % too long.
+  rows.push_back({"latency beside an error of the scale", {{"latency", 20.0}}, [](Noise& noise) {
+                    const auto path = [](double s) { return s < 0.4 ? 0.5 * s : 0.4 - 0.5 * s; };
+                    const Columns t = evenly(0.0, 1.0, 31);
+                    Columns later;
+                    for (const double one : t) later.push_back(one + 0.01);
+                    return latencyTraits(
+                        later, alike(later, 1e-3, 0.0, noise, [&](double s) { return 1.05 * path(s - 0.02); }),
+                        t, alike(t, 1e-4, 0.0, noise, path));
+                  }});
+  return rows;
+}
+
+/// x at each of which `count` rows stand, and what they share there.
+struct AtPlace {
+  Columns x{}, y{};
+};
+AtPlace repeated(const Columns& places, int count, double shared, double own, Noise& noise,
+                 const std::function<double(double)>& f) {
+  AtPlace rows;
+  for (const double place : places) {
+    const double off = noise(shared);
+    for (int i = 0; i < count; ++i) rows.x.push_back(place), rows.y.push_back(f(place) + off + noise(own));
+  }
+  return rows;
+}
+
+/// Readings of one place that share an error, and those of a place that share none.
+std::vector<Planted> atPlaces() {
+  std::vector<Planted> rows;
+  for (const double shared : {1.0, 0.0}) {
+    rows.push_back({shared > 0.0 ? "amplitude, twelve readings of each of five" : "amplitude, five times twelve rows",
+                    {{"per decade", -4.0}},
+                    [=](Noise& noise) {
+                      const auto at = repeated({100, 200, 400, 800, 1600}, 12, shared, 0.5, noise, [](double a) {
+                        return 12.0 - 4.0 * std::log10(a);
+                      });
+                      return amplitudeTraits(at.x, at.y);
+                    }});
+  }
+  rows.push_back({"motion, ten readings of each of five speeds", {{"per speed", 7.5}}, [](Noise& noise) {
+                    const auto at = repeated({0.1, 0.3, 0.5, 0.8, 1.2}, 10, 0.8, 0.4, noise,
+                                             [](double v) { return 1.0 + 7.5 * v; });
+                    return motionTraits(at.x, at.y);
+                  }});
+  rows.push_back({"harmonics, five readings of each of 25 distances",
+                  {{"30 MHz, 4 per period", 6.0}, {"offset", 3.0}, {"scale", 0.0}},
+                  [](Noise& noise) {
+                    constexpr double kWave = 4.0 * std::numbers::pi * 30e6 / 299'792'458.0;
+                    const auto at = repeated(evenly(0.5, 5.0, 25), 5, 1.5, 0.5, noise, [](double d) {
+                      return 3.0 + 6.0 * std::cos(4.0 * kWave * d + 0.7);
+                    });
+                    return harmonicTraits(at.x, at.y, std::vector{30e6}, std::vector{4, 2});
+                  }});
+  return rows;
+}
+
+/// Rows that scatter more here than there.
+Columns uneven(const Columns& x, Noise& noise, const std::function<double(double)>& f,
+               const std::function<double(double)>& sigma) {
+  Columns y;
+  for (const double one : x) y.push_back(f(one) + noise(sigma(one)));
+  return y;
+}
+
+std::vector<Planted> unevenly() {
+  std::vector<Planted> rows;
+  rows.push_back({"amplitude, noise as 1/A", {{"per decade", -4.0}}, [](Noise& noise) {
+                    Columns a;
+                    for (int i = 0; i < 60; ++i) a.push_back(std::exp(noise.uniform(3.0, 8.0)));
+                    return amplitudeTraits(a, uneven(
+                                                  a, noise, [](double one) { return 12.0 - 4.0 * std::log10(one); },
+                                                  [](double one) { return 200.0 / one; }));
+                  }});
+  return rows;
+}
+
+}  // namespace
+
+std::vector<Planted> plantedAlike() {
+  std::vector<Planted> all;
+  for (const auto& part : {alikeOverDistance(), alikeOverLight(), alikeOverTime(), atPlaces(), unevenly()}) all.insert(all.end(), part.begin(), part.end());
+  return all;
+}
+
+}  // namespace toftwin::compare
