@@ -80,8 +80,7 @@ std::optional<Score> readScore(const std::string& line) {
   score.stated = number(17), score.stated_low = number(18), score.stated_high = number(19);
   score.numbers = static_cast<int>(number(20)), score.numbers_in = static_cast<int>(number(21));
   score.before_mm = number(22), score.after_mm = number(23), score.seconds = number(24);
-  for (std::size_t i = kFields; i < fields.size(); ++i)
-    score.found += (i > kFields ? "," : "") + fields[i];
+  for (std::size_t i = kFields; i < fields.size(); ++i) score.found += (i > kFields ? "," : "") + fields[i];
   return score;
 }
 
@@ -90,11 +89,16 @@ double shareOf(const std::vector<Score>& scores, bool Score::*of) {
   return static_cast<double>(count) / static_cast<double>(scores.size());
 }
 
+/// Whether one of the found effects is a set of names that these data do not tell apart.
+bool isSet(const Score& score) { return score.found.find(" or ") != std::string::npos; }
+
 std::string rowOf(const std::string& what, const std::vector<Score>& scores, bool is_null, bool is_absent) {
   double spurious = 0.0, rests = 0.0;
-  int numbers = 0, numbers_in = 0, stated = 0, stated_in = 0;
+  int numbers = 0, numbers_in = 0, stated = 0, stated_in = 0, sets = 0, right_sets = 0;
   std::vector<double> removed;
   for (const Score& one : scores) {
+    if (!is_null && isSet(one))
+      ++sets, right_sets += one.is_right || (is_absent && one.has_covariates) ? 1 : 0;
     spurious += one.spurious, rests += one.rests;
     numbers += one.numbers, numbers_in += one.numbers_in;
     if (!std::isfinite(one.removed)) continue;
@@ -106,13 +110,14 @@ std::string rowOf(const std::string& what, const std::vector<Score>& scores, boo
   const auto n = static_cast<double>(scores.size());
   const auto share = [](double value) { return fmt::format("{:.2f}", value); };
   const bool has_removed = !is_null && !removed.empty();
-  return fmt::format("| {} | {} | {} | {} | {} | {} | {} | {:.2f} | {:.2f} | {} | {} | {} | {} |\n", what,
-                     scores.size(), fmt::format("{:.3f}", shareOf(scores, &Score::is_detected)),
+  return fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} | {} | {:.2f} | {:.2f} | {} | {} | {} | {} |\n",
+                     what, scores.size(), fmt::format("{:.3f}", shareOf(scores, &Score::is_detected)),
                      is_null || is_absent ? "" : share(shareOf(scores, &Score::is_right)),
                      is_null || is_absent ? "" : share(shareOf(scores, &Score::is_alone)),
                      is_absent ? share(1.0 - shareOf(scores, &Score::is_blamed)) : "",
-                     is_absent ? share(shareOf(scores, &Score::has_covariates)) : "", spurious / n, rests / n,
-                     has_removed ? share(compare::quantile(removed, 0.5)) : "",
+                     is_absent ? share(shareOf(scores, &Score::has_covariates)) : "",
+                     is_null ? "" : share(shareOf(scores, &Score::has_stage)), of(right_sets, sets),
+                     spurious / n, rests / n, has_removed ? share(compare::quantile(removed, 0.5)) : "",
                      has_removed ? share(compare::quantile(removed, 0.1)) : "", of(numbers_in, numbers),
                      of(stated_in, stated));
 }
@@ -237,25 +242,29 @@ std::string tableOf(const std::vector<std::filesystem::path>& files) {
   }
   std::string table =
       "| hidden | runs | detected | named | named first | absent: none blamed | absent: covariates right | "
-      "spurious a run | of these rests | removed, median | worst tenth | numbers in their 95 % | removed in "
+      "stage right | sets that have it | spurious a run | of these rests | removed, median | worst tenth | "
+      "numbers in their 95 % | removed in "
       "its 95 % "
-      "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
+      "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
   for (const auto& [key, scores] : groups) {
     const auto& [wanted, is_absent, name] = key;
     table += rowOf(wanted == 0.0 ? name : fmt::format("λ = {:.0f}{}", wanted, is_absent ? ", absent" : ""),
                    scores, wanted == 0.0, is_absent);
   }
   table +=
-      "\nBy effect, all λ:\n\n| hidden | runs | detected | named | named first | | | spurious | rests | "
+      "\nBy effect, all λ:\n\n| hidden | runs | detected | named | named first | | | stage | sets | spurious "
+      "| rests | "
       "removed, median | worst tenth | numbers | removed "
-      "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
+      "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
   for (const auto& [name, scores] : by_effect) table += rowOf(name, scores, false, false);
-  table += "\nMisses:\n\n| hidden | λ | seed | absent | p | found | removed |\n|---|---|---|---|---|---|---|\n";
+  table +=
+      "\nMisses:\n\n| hidden | λ | seed | absent | p | found | removed |\n|---|---|---|---|---|---|---|\n";
   for (const Score& one : misses)
     table += fmt::format("| {} | {:.0f} | {} | {} | {:.2g} | {} | {:.2f} |\n", one.of.hidden, one.of.lambda,
                          one.of.seed, one.of.is_absent ? "yes" : "", one.p, one.found, one.removed);
-  table += fmt::format("\nNot to be seen in these captures: {}.\n",
-                       hidden_from_captures.empty() ? "none" : fmt::format("{}", fmt::join(hidden_from_captures, ", ")));
+  table += fmt::format(
+      "\nNot to be seen in these captures: {}.\n",
+      hidden_from_captures.empty() ? "none" : fmt::format("{}", fmt::join(hidden_from_captures, ", ")));
   if (others > 0) table += fmt::format("{} lines were no scores.\n", others);
   return table;
 }

@@ -50,6 +50,14 @@ TEST_P(EachHidden, IsNamedAtMediumAndStrongStrength) {
   }
 }
 
+/// Curves that have little in common explain different things.
+TEST_P(EachHidden, HasNoAlternativeThatIsUnlikeIt) {
+  const Found found = findHidden({GetParam()}, 150.0, 7);
+  for (const Effect& effect : found.finding.effects)
+    for (const Alternative& other : effect.alternatives)
+      EXPECT_GE(std::abs(other.correlation), 0.5) << "seed 7, " << other.name;
+}
+
 INSTANTIATE_TEST_SUITE_P(Finder, EachHidden, testing::ValuesIn(kHidden), [](const auto& which) {
   std::string name;
   for (const char* c = nameOf(which.param); *c != '\0'; ++c)
@@ -83,16 +91,6 @@ TEST(Finder, NamesTheShapesOfTheField) {
     const Found found = findHidden({hidden}, 3000.0, 2);
     ASSERT_THAT(found.finding.effects, SizeIs(1)) << nameOf(hidden) << ", seed 2, " << inWords(found.finding);
     EXPECT_EQ(found.finding.effects[0].name, name) << "seed 2";
-  }
-}
-
-/// Curves that have little in common explain different things.
-TEST(Finder, OffersNoAlternativeThatIsUnlikeTheChosen) {
-  for (const Hidden hidden : kHidden) {
-    const Found found = findHidden({hidden}, 150.0, 7);
-    for (const Effect& effect : found.finding.effects)
-      for (const Alternative& other : effect.alternatives)
-        EXPECT_GE(std::abs(other.correlation), 0.5) << nameOf(hidden) << ", seed 7, " << other.name;
   }
 }
 

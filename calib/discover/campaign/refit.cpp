@@ -152,7 +152,9 @@ class Descent {
   /// The strength that is least needed goes back to nothing, one after the other; the last one of an
   /// effect stays.
   Result<> dropNeedless(State& state) {
-    constexpr double kNeeded = 2.0;  // standard errors
+    // Standard errors: one of several strengths that does nothing would pass two in one fit of twenty, and make
+    // its effect lose to a formula that has fewer numbers.
+    constexpr double kNeeded = 3.0;
     while (true) {
       const auto least = leastNeeded(state, kNeeded);
       if (!least) return {};

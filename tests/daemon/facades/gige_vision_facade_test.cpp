@@ -51,7 +51,7 @@ TEST_F(GigeVision, IsFoundByBroadcastAndTellsAllItsFeatures) {
 TEST_F(GigeVision, GivesFramesToAnUnmodifiedClientAndLosesNone) {
   startGige(kSmallSim);
   for (const char* options :
-       {"", "--multipart", "--multipart -i 9000", "-y 0 -i 1500 -a -u Timestamp,ExposureTime,FrameID"}) {
+       {"", "--multipart", "--multipart -i 9000", "-y 0 -i 1500 -a -m 1000 -q 2 -u Timestamp,ExposureTime,FrameID"}) {
     const Ran ran = stream(options);
     EXPECT_GT(ran.number("n_completed_buffers"), 5) << options << ran.output;
     for (const char* none : {"n_failures", "n_missing_packets", "n_size_mismatch_errors", "n_error_packets"})
