@@ -10,19 +10,32 @@
 namespace toftwin::discover {
 namespace {
 
-/// The best explanation of each other set of covariates.
-std::vector<std::size_t> rivals(const std::vector<Explanation>& all, std::size_t chosen) {
+/// Whether these data do not tell it from the chosen one: two standard errors over captures.
+bool isAsGood(const Explanation& other, const Explanation& chosen) {
+  return chosen.gain.total - other.gain.total <= 2.0 * difference(chosen.gain, other.gain).error;
+}
+
+/// Whether the catalogue has several effects that do what is seen. Then its cause need not be one of them,
+/// and a formula that is theirs is one more explanation.
+bool hasManyNames(const std::vector<Explanation>& all, std::size_t chosen) {
+  return all[chosen].named && std::ranges::any_of(eligible(all), [&](std::size_t i) {
+           return i != chosen && all[i].named && all[i].refused.empty() && isAsGood(all[i], all[chosen]);
+         });
+}
+
+/// The best explanation of each other set of covariates; `with_own`: of the chosen one's, too.
+std::vector<std::size_t> rivals(const std::vector<Explanation>& all, std::size_t chosen, bool with_own) {
   std::map<std::pair<std::vector<std::string>, bool>, std::size_t> best;
   for (const std::size_t i : eligible(all)) {
     if (i == chosen) continue;
-    const bool is_same = all[i].covariates == all[chosen].covariates && !all[i].is_catalogue &&
-                         !all[chosen].is_catalogue;
-    if (is_same)
-      continue;
+    const bool is_same =
+        all[i].covariates == all[chosen].covariates && !all[i].is_catalogue && !all[chosen].is_catalogue;
+    if (is_same) continue;
     if (!all[i].refused.empty()) continue;
-    if (!all[i].is_catalogue && std::ranges::includes(all[i].covariates, all[chosen].covariates)) continue;
-    const auto key = std::pair{all[i].is_catalogue ? std::vector{all[i].name} : all[i].covariates,
-                               all[i].is_catalogue};
+    if (!with_own && !all[i].is_catalogue && std::ranges::includes(all[i].covariates, all[chosen].covariates))
+      continue;
+    const auto key =
+        std::pair{all[i].is_catalogue ? std::vector{all[i].name} : all[i].covariates, all[i].is_catalogue};
     const auto [at, is_new] = best.try_emplace(key, i);
     if (!is_new && all[i].gain.total > all[at->second].gain.total) at->second = i;
   }
@@ -142,12 +155,10 @@ Effect effectOf(const Context& context, const std::vector<Explanation>& all, std
   const Explanation& mine = all[chosen];
   std::vector<TermGroup> groups;
   std::vector<std::size_t> shown{chosen};
-  const auto others = rivals(all, chosen);
-  for (const std::size_t i : others) {
-    const Difference worse = difference(mine.gain, all[i].gain);
-    const double by = mine.gain.total - all[i].gain.total;
-    if (by < 2.0 * worse.error) shown.push_back(i);
-  }
+  const bool has_many_names = hasManyNames(all, chosen);
+  const auto others = rivals(all, chosen, has_many_names);
+  for (const std::size_t i : others)
+    if (isAsGood(all[i], mine)) shown.push_back(i);
   for (const std::size_t i : shown)
     if (!all[i].is_catalogue) groups.push_back(all[i].fitted.group);
   const bool needs_catalogue = std::ranges::any_of(shown, [&](std::size_t i) { return all[i].is_catalogue; });
@@ -181,8 +192,9 @@ Effect effectOf(const Context& context, const std::vector<Explanation>& all, std
     const double correlation = correlationOf(prepared, *in_marginal[0], *in_marginal[s]);
     // Curves that have little in common explain different things, of which one may be nothing.
     if (!mine.is_catalogue && !other.is_catalogue && std::abs(correlation) < kAlike) continue;
-    // A formula that is the effect's own is no other explanation.
-    if (mine.named && !other.is_catalogue && correlation * correlation > kTheSame) continue;
+    // A formula that is the effect's own is no other explanation, if it has one name.
+    if (mine.named && !has_many_names && !other.is_catalogue && correlation * correlation > kTheSame)
+      continue;
     Alternative alternative{other.name,
                             other.covariates,
                             other.fitted.group,

@@ -325,13 +325,14 @@ std::vector<std::size_t> eligible(const std::vector<Explanation>& all) {
 
 namespace {
 
-/// Fewer numbers; of as many, a straight line, which says least; else what explains more.
+/// Fewer covariates; then fewer numbers; of as many, a straight line, which says least; else what explains more.
 bool isSimpler(const Explanation& one, const Explanation& other) {
   const auto isStraight = [](const Explanation& e) {
     const auto& terms = e.fitted.group.terms;
     return terms.size() == 1 && terms[0].factors.size() == 1 && terms[0].factors[0].shape == Shape::Power &&
            terms[0].factors[0].numbers[0] == 1.0;
   };
+  if (one.covariates.size() != other.covariates.size()) return one.covariates.size() < other.covariates.size();
   if (one.numbers != other.numbers) return one.numbers < other.numbers;
   if (isStraight(one) != isStraight(other)) return isStraight(one);
   return one.gain.total > other.gain.total;
@@ -355,10 +356,15 @@ std::optional<std::size_t> choose(const std::vector<Explanation>& all) {
     if (most - all[*catalogue].gain.total <= std::max(std::min(error, 0.25 * most), 0.03 * most))
       return catalogue;
   }
-  // The best explanation decides on the covariates, simplicity on the shape.
+  // The best explanation decides on the covariates, simplicity on the shape. What a carrier does (a charge,
+  // say) need not change with anything: if it explains as much without, it does not.
   std::size_t chosen = *best;
+  const auto isLess = [&](const Explanation& one) {
+    return !one.carrier().empty() && one.carrier() == all[*best].carrier() &&
+           contains(all[*best].covariates, one.covariates);
+  };
   for (const std::size_t i : places) {
-    if (all[i].is_catalogue || all[i].covariates != all[*best].covariates) continue;
+    if (all[i].is_catalogue || (all[i].covariates != all[*best].covariates && !isLess(all[i]))) continue;
     const double by = all[*best].gain.total - all[i].gain.total;
     if (by > difference(all[*best].gain, all[i].gain).error) continue;
     if (isSimpler(all[i], all[chosen])) chosen = i;

@@ -192,7 +192,8 @@ Score scoreOf(const Case& of, const sim::AnyEffect& hidden, const Removed& remov
     score.is_alone = score.is_alone || (one.found.is_catalogue && one.found.name == of.hidden);
     score.has_covariates = score.has_covariates || answer.has_covariates;
     score.is_blamed = score.is_blamed || (!answer.has_name && !answer.has_undeclared);
-    score.has_stage = score.has_stage || (is_it && one.found.stage == stageOf(hidden));
+    // An effect that is named, alone or in a set, has the stage that it has.
+    score.has_stage = score.has_stage || answer.has_name || (is_it && one.found.stage == stageOf(hidden));
     if (is_it && !is_met) is_met = true, --score.spurious;
     countNumbers(one, hidden, score);
   }

@@ -14,10 +14,11 @@ namespace {
 
 constexpr int kCapturesOfLine = 24, kRowsOfLine = 20;
 
-/// Rows 100 (x + share · sin 5x) with noise of 1, and a catalogue of one effect, which is a straight line in x.
+/// Rows 100 (x + share · sin 5x) with noise of 1, and a catalogue of effects that are a straight line in x
+/// each.
 class Straight final : public RowSource, public NamedEffects {
  public:
-  explicit Straight(double share) {
+  explicit Straight(double share, std::vector<std::string> names = {"straight"}) : names_(std::move(names)) {
     std::mt19937 random{20263};
     std::normal_distribution<double> normal;
     std::uniform_real_distribution<double> uniform{-1.0, 1.0};
@@ -30,14 +31,15 @@ class Straight final : public RowSource, public NamedEffects {
   [[nodiscard]] Evidence evidence(std::span<const TermGroup> extra) const override {
     Evidence evidence;
     evidence.groups.push_back({.name = "offset", .kind = Kind::Nuisance, .count = 1});
-    evidence.groups.push_back({.name = "straight",
-                               .kind = is_included_ ? Kind::Declared : Kind::Catalogue,
-                               .stage = Stage::Range,
-                               .covariates = {"x"},
-                               .first = 1,
-                               .count = 1,
-                               .numbers = 1});
-    std::size_t next = 2;
+    for (std::size_t k = 0; k < names_.size(); ++k)
+      evidence.groups.push_back({.name = names_[k],
+                                 .kind = is_included_ ? Kind::Declared : Kind::Catalogue,
+                                 .stage = Stage::Range,
+                                 .covariates = {"x"},
+                                 .first = 1 + k,
+                                 .count = 1,
+                                 .numbers = 1});
+    std::size_t next = 1 + names_.size();
     for (const TermGroup& group : extra) {
       evidence.groups.push_back({.name = group.name,
                                  .kind = group.kind,
@@ -57,19 +59,23 @@ class Straight final : public RowSource, public NamedEffects {
     return {info};
   }
   [[nodiscard]] const NamedEffects* named() const override { return this; }
-  [[nodiscard]] std::vector<NamedFit> fitNamed(std::span<const std::string> names, std::span<const TermGroup> known,
+  [[nodiscard]] std::vector<NamedFit> fitNamed(std::span<const std::string> names,
+                                               std::span<const TermGroup> known,
                                                std::span<const double> scales) const override {
     if (names.empty() || is_included_) return {};
     const Marginal marginal = marginalise(evidence(known), scales);
     Columns without{0};
-    for (std::size_t g = 2; g < marginal.groups.size(); ++g) append(without, marginal.groups[g]);
+    for (std::size_t g = 1 + names_.size(); g < marginal.groups.size(); ++g)
+      append(without, marginal.groups[g]);
     Columns with = without;
     with.push_back(1);
     NamedFit straight{.name = "straight", .numbers = {{"slope", 0.0, 0.0}}};
     const double slope = fit(marginal, with).coefficient[static_cast<Eigen::Index>(with.size()) - 1];
     straight.numbers.front().value = slope, straight.effect = slope;
     straight.gain = gainOf(heldOut(marginal, without), heldOut(marginal, with));
-    return {straight};
+    std::vector<NamedFit> fits;
+    for (const std::string& name : names) fits.push_back(straight), fits.back().name = name;
+    return fits;
   }
   [[nodiscard]] std::shared_ptr<const RowSource> including(std::span<const NamedFit* const> fits,
                                                            bool) const override {
@@ -82,13 +88,15 @@ class Straight final : public RowSource, public NamedEffects {
   }
 
  private:
-  [[nodiscard]] CaptureEvidence captureOf(int c, std::span<const TermGroup> extra, std::size_t columns) const {
+  [[nodiscard]] CaptureEvidence captureOf(int c, std::span<const TermGroup> extra,
+                                          std::size_t columns) const {
     Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(kRowsOfLine, static_cast<Eigen::Index>(columns));
     Eigen::VectorXd y(kRowsOfLine);
     for (int r = 0; r < kRowsOfLine; ++r) {
       const auto i = static_cast<std::size_t>(c * kRowsOfLine + r);
-      y[r] = y_[i], rows(r, 0) = 1.0, rows(r, 1) = x_[i];
-      Eigen::Index column = 2;
+      y[r] = y_[i], rows(r, 0) = 1.0;
+      Eigen::Index column = 1;
+      for (std::size_t k = 0; k < names_.size(); ++k) rows(r, column++) = x_[i];
       for (const TermGroup& group : extra)
         for (const Term& term : group.terms)
           rows(r, column++) = term.at([&](const std::string&) { return x_[i]; });
@@ -101,12 +109,13 @@ class Straight final : public RowSource, public NamedEffects {
             .block = "all"};
   }
 
+  std::vector<std::string> names_;
   std::vector<double> x_{}, y_{};
   bool is_included_ = false;
 };
 
-/// 9e-4 of 1.6 million in χ²: 1500 above a noise of 480, and nothing that a strong effect's simulation would be trusted
-/// with.
+/// 9e-4 of 1.6 million in χ²: 1500 above a noise of 480, and nothing that a strong effect's simulation would
+/// be trusted with.
 TEST(NamedChoice, AStrongEffectMayLeaveALittleAndKeepsItsName) {
   const Finding finding = find(Straight{0.03}, {});
   ASSERT_FALSE(finding.effects.empty());
@@ -119,6 +128,24 @@ TEST(NamedChoice, WhatLeavesMoreThanALittleIsSomethingElse) {
   const Finding finding = find(Straight{0.4}, {});
   ASSERT_FALSE(finding.effects.empty());
   EXPECT_FALSE(finding.effects.front().is_catalogue) << finding.effects.front().name;
+}
+
+bool hasUnnamed(const Effect& effect) {
+  return std::ranges::any_of(effect.alternatives,
+                             [](const Alternative& a) { return !a.group.terms.empty(); });
+}
+
+/// One name that explains it is the answer. Of two that do what is seen, neither need be its cause.
+TEST(NamedChoice, WhatHasTwoNamesMayHaveNone) {
+  const Finding one = find(Straight{0.0}, {}), two = find(Straight{0.0, {"straight", "also straight"}}, {});
+  ASSERT_THAT(one.effects, testing::SizeIs(1));
+  EXPECT_EQ(one.effects.front().name, "straight");
+  EXPECT_THAT(one.effects.front().alternatives, testing::IsEmpty());
+  ASSERT_THAT(two.effects, testing::SizeIs(1));
+  EXPECT_TRUE(two.effects.front().is_catalogue);
+  EXPECT_TRUE(std::ranges::any_of(two.effects.front().alternatives,
+                                  [](const Alternative& a) { return a.group.terms.empty(); }));
+  EXPECT_TRUE(hasUnnamed(two.effects.front()));
 }
 
 }  // namespace

@@ -47,17 +47,14 @@ class Numbers {
     }
   }
   template <class Enum>
-  void choice(const char*, Enum&, std::initializer_list<std::pair<const char*, Enum>>,
-              const char*) {}
+  void choice(const char*, Enum&, std::initializer_list<std::pair<const char*, Enum>>, const char*) {}
   void flag(const char*, bool&, const char*) {}
   void text(const char*, std::string&, const char*) {}
 
  private:
   static double low(Bounds bounds) { return bounds.min; }
   static double high(Bounds bounds) { return bounds.max; }
-  [[nodiscard]] double clamped(Bounds bounds) const {
-    return std::clamp(value_, bounds.min, bounds.max);
-  }
+  [[nodiscard]] double clamped(Bounds bounds) const { return std::clamp(value_, bounds.min, bounds.max); }
   bool meets(EffectNumber number) {
     const bool is_it = number.key == key_;
     met.push_back(std::move(number));
@@ -103,8 +100,7 @@ struct VariationGatherer {
   /// Whether it shows at all.
   bool add(Variation variation, bool may_shrink) {
     std::vector<float> change = probe(variation);
-    for (int halvings = 0; may_shrink && !(lengthOf(change) < kTooMuch) && halvings < 20;
-         ++halvings) {
+    for (int halvings = 0; may_shrink && !(lengthOf(change) < kTooMuch) && halvings < 20; ++halvings) {
       variation.step *= 0.25;
       const EffectNumber from = numberNamed(variation.off, variation.key);
       variation.on = withNumber(variation.off, variation.key, from.value + variation.step);
@@ -149,14 +145,12 @@ std::vector<double> choicesOf(const EffectNumber& number) {
 }
 
 /// The effect switched off, with each combination of values of its choosing numbers.
-std::vector<sim::AnyEffect> choicesOf(const sim::AnyEffect& none,
-                                      const std::vector<EffectNumber>& choosing) {
+std::vector<sim::AnyEffect> choicesOf(const sim::AnyEffect& none, const std::vector<EffectNumber>& choosing) {
   std::vector<sim::AnyEffect> all{none};
   for (const EffectNumber& number : choosing) {
     std::vector<sim::AnyEffect> more;
     for (const sim::AnyEffect& effect : all) {
-      for (const double value : choicesOf(number))
-        more.push_back(withNumber(effect, number.key, value));
+      for (const double value : choicesOf(number)) more.push_back(withNumber(effect, number.key, value));
     }
     all = std::move(more);
   }
@@ -170,8 +164,8 @@ double stepWithin(const EffectNumber& number) {
 }
 
 bool isNoise(const sim::AnyEffect& effect) {
-  return std::visit(
-      []<class E>(const E&) { return E::about.explains.contains(sim::Covariate::Frame); }, effect);
+  return std::visit([]<class E>(const E&) { return E::about.explains.contains(sim::Covariate::Frame); },
+                    effect);
 }
 
 /// An effect's numbers by what they are for.
@@ -219,8 +213,7 @@ void addStrength(VariationGatherer& gatherer, const sim::AnyEffect& off, const E
   double step = typical - from;
   if (step == 0.0) step = 1.0;
   const auto add = [&](const sim::AnyEffect& base) {
-    gatherer.add({base, withNumber(base, strength.key, from + step), strength.key, step},
-                 !strength.is_whole);
+    gatherer.add({base, withNumber(base, strength.key, from + step), strength.key, step}, !strength.is_whole);
   };
   add(off);
   for (const EffectNumber& shape : shapes) {
@@ -258,11 +251,16 @@ Candidate candidateOf(const sim::AnyEffect& none, const sim::AnyEffect& defaults
     for (const EffectNumber& other : roles.others) {
       const double step = stepWithin(other);
       const Variation alone{off, withNumber(off, other.key, other.value + step), other.key, step};
-      if (!gatherer.add(alone, true)) shapes.push_back(other);  // does nothing by itself
+      if (gatherer.add(alone, true)) {
+        if (std::ranges::count(candidate.strengths, other.key) == 0) candidate.strengths.push_back(other.key);
+      } else {
+        shapes.push_back(other);
+      }
     }
     for (std::size_t i = 0; i < roles.strengths.size(); ++i)
       addStrength(gatherer, off, roles.strengths[i], roles.typical[i], shapes);
   }
+  for (const EffectNumber& strength : roles.strengths) candidate.strengths.push_back(strength.key);
   candidate.variations = std::move(gatherer.kept);
   return candidate;
 }
@@ -307,8 +305,7 @@ Stage stageOf(const sim::AnyEffect& effect) {
 
 std::vector<std::string> covariatesOf(const sim::AnyEffect& effect) {
   std::vector<std::string> words;
-  const sim::Covariates on =
-      std::visit([]<class E>(const E&) { return E::about.explains; }, effect);
+  const sim::Covariates on = std::visit([]<class E>(const E&) { return E::about.explains; }, effect);
   for (const auto& [covariate, word] : sim::kCovariateNames) {
     if (on.contains(covariate)) words.emplace_back(word);
   }
@@ -317,8 +314,7 @@ std::vector<std::string> covariatesOf(const sim::AnyEffect& effect) {
 
 std::size_t placeOf(const sim::AnyEffect& effect) { return effect.index(); }
 
-std::vector<sim::AnyEffect> withInserted(std::vector<sim::AnyEffect> effects,
-                                         const sim::AnyEffect& effect) {
+std::vector<sim::AnyEffect> withInserted(std::vector<sim::AnyEffect> effects, const sim::AnyEffect& effect) {
   const auto behind = std::ranges::find_if(
       effects, [&](const sim::AnyEffect& other) { return placeOf(other) > placeOf(effect); });
   effects.insert(behind, effect);
@@ -371,8 +367,7 @@ Candidate declaredCandidate(const sim::AnyEffect& effect, const Sensitivity& pro
     if (number.is_whole) continue;
     double step = number.value != 0.0 ? 0.1 * number.value : stepWithin(number);
     if (number.value + step > number.high || number.value + step < number.low) step = -step;
-    gatherer.add({effect, withNumber(effect, number.key, number.value + step), number.key, step},
-                 true);
+    gatherer.add({effect, withNumber(effect, number.key, number.value + step), number.key, step}, true);
   }
   candidate.variations = std::move(gatherer.kept);
   return candidate;

@@ -54,6 +54,9 @@ using Sensitivity = std::function<std::vector<float>(const Variation&)>;
 struct Candidate {
   sim::AnyEffect example;  ///< with its defaults
   std::vector<Variation> variations{};
+  /// Numbers that do something by themselves: those that differ between `none()` and the defaults, and those that
+  /// are 0 in both and show when they alone are changed.
+  std::vector<std::string> strengths{};
 };
 
 /// Whether a camera may have it several times, each at another place that a number of it names: a raw

@@ -39,8 +39,8 @@ Gain gainBeyond(const std::vector<double>& before, const Marginal& after) {
 
 }  // namespace
 
-/// Not by a share of the bounds' distance: a millionth of what a window may reflect at most is five times what
-/// windows do.
+/// Not by a share of the bounds' distance: a millionth of what a window may reflect at most is five times
+/// what windows do.
 bool isAtBound(const sim::AnyEffect& effect, const std::vector<std::string>& keys) {
   const auto is_at = [](double value, double bound) {  // units make them differ by rounding
     return std::abs(value - bound) <= 1e-12 * std::abs(bound);
@@ -51,12 +51,10 @@ bool isAtBound(const sim::AnyEffect& effect, const std::vector<std::string>& key
   });
 }
 
-const CampaignFit& campaignFitOf(const NamedFit& fit) {
-  return *std::any_cast<CampaignFit>(&fit.effect);
-}
+const CampaignFit& campaignFitOf(const NamedFit& fit) { return *std::any_cast<CampaignFit>(&fit.effect); }
 
-sim::AnyEffect startOf(const CampaignRows& rows, const Candidate& candidate,
-                       std::span<const TermGroup> known, std::span<const double> scales) {
+sim::AnyEffect startOf(const CampaignRows& rows, const Candidate& candidate, std::span<const TermGroup> known,
+                       std::span<const double> scales) {
   const Marginal marginal = marginalise(rows.evidence(known), scales);
   Columns others = nuisanceColumns(marginal);
   for (std::size_t g = marginal.groups.size() - known.size(); g < marginal.groups.size(); ++g)
@@ -80,6 +78,70 @@ sim::AnyEffect startOf(const CampaignRows& rows, const Candidate& candidate,
   return best;
 }
 
+namespace {
+
+/// Fits one effect of a list on top of the others and of what is known.
+class OneEffect {
+ public:
+  OneEffect(const CampaignRows& rows, std::size_t place, RefitOptions options, std::vector<double> before)
+      : rows_(rows), place_(place), options_(std::move(options)), before_(std::move(before)) {}
+
+  struct Fitted {
+    Refitted refitted;
+    Gain gain;  ///< on held-out captures
+  };
+  std::optional<Fitted> fit(std::vector<sim::AnyEffect> effects) const {
+    auto refitted = refit(rows_, std::move(effects), {place_}, options_);
+    if (!refitted || refitted->free.empty()) return std::nullopt;
+    const Gain gain = gainBeyond(before_, refitted->marginal);
+    return Fitted{*std::move(refitted), gain};
+  }
+
+  /// Without the strengths that do not help to predict other captures, by one standard error, which is what a
+  /// formula with fewer numbers has to be as good as; the last one stays.
+  Fitted withoutNeedless(Fitted all) {
+    while (const auto least = leastStrength(all)) {
+      std::vector<sim::AnyEffect> effects = all.refitted.effects;
+      const sim::AnyEffect none =
+          std::visit([]<class E>(const E&) { return sim::AnyEffect{E::none()}; }, effects[place_]);
+      effects[place_] = withNumber(effects[place_], *least, valueOf(none, *least));
+      std::vector<std::string>& only = options_.only[place_];
+      only.clear();
+      for (const FittedNumber& number : all.refitted.fitted.front().numbers)
+        if (number.key != *least) only.push_back(number.key);
+      auto fewer = fit(std::move(effects));
+      if (!fewer || all.gain.total - fewer->gain.total > difference(all.gain, fewer->gain).error) break;
+      all = *std::move(fewer);
+    }
+    return all;
+  }
+
+ private:
+  /// Of several strengths that were fitted, the one that is fewest standard errors from nothing.
+  [[nodiscard]] std::optional<std::string> leastStrength(const Fitted& all) const {
+    const sim::AnyEffect& effect = all.refitted.effects[place_];
+    const sim::AnyEffect none =
+        std::visit([]<class E>(const E&) { return sim::AnyEffect{E::none()}; }, effect);
+    std::optional<std::string> least;
+    double smallest = 0.0;
+    int strengths = 0;
+    for (const FittedNumber& number : all.refitted.fitted.front().numbers) {
+      const bool is_strength = std::ranges::count(options_.droppable, number.key) > 0;
+      if (!is_strength || !(number.error > 0.0)) continue;
+      const double z = std::abs(number.value - valueOf(none, number.key)) / number.error;
+      if (strengths++ == 0 || z < smallest) smallest = z, least = number.key;
+    }
+    return strengths > 1 ? least : std::nullopt;
+  }
+
+  const CampaignRows& rows_;
+  std::size_t place_;
+  RefitOptions options_;
+  std::vector<double> before_;
+};
+
+}  // namespace
+
 std::vector<NamedFit> CampaignRows::fitNamed(std::span<const std::string> names,
                                              std::span<const TermGroup> known,
                                              std::span<const double> scales) const {
@@ -89,30 +151,32 @@ std::vector<NamedFit> CampaignRows::fitNamed(std::span<const std::string> names,
   const Marginal without = marginalise(*plain, scales);
   const std::vector<double> before = heldOut(without, allBut(without, 0));
   for (const std::string& name : names) {
-    const auto candidate = std::ranges::find_if(
-        candidates_, [&](const Candidate& one) { return nameOf(one.example) == name; });
+    const auto candidate =
+        std::ranges::find_if(candidates_, [&](const Candidate& one) { return nameOf(one.example) == name; });
     if (candidate == candidates_.end()) continue;
-    const Inserted with = inserted(effects_, startOf(*this, *candidate, known, scales));
-    const auto refitted = refit(*this, with.effects, {with.place},
-                                {.scales = scales, .terms = known, .with_numbers = true,
-                                 .drops_needless = true});
-    if (!refitted || refitted->free.empty()) continue;
-    NamedFit fit{.name = name};
-    CampaignFit fitted{refitted->effects[with.place]};
-    for (const FittedNumber& number : refitted->fitted.front().numbers) {
+    Inserted with = inserted(effects_, startOf(*this, *candidate, known, scales));
+    OneEffect one{*this,
+                  with.place,
+                  {.scales = scales, .terms = known, .with_numbers = true, .droppable = candidate->strengths},
+                  before};
+    auto fitted = one.fit(std::move(with.effects));
+    if (!fitted) continue;
+    const auto [refitted, gain] = one.withoutNeedless(*std::move(fitted));
+    NamedFit fit{.name = name, .gain = gain};
+    CampaignFit own{refitted.effects[with.place]};
+    for (const FittedNumber& number : refitted.fitted.front().numbers) {
       fit.numbers.push_back({number.key, number.value, number.error});
-      fitted.keys.push_back(number.key);
+      own.keys.push_back(number.key);
     }
-    fit.is_at_bound = isAtBound(fitted.effect, fitted.keys);
-    fit.gain = gainBeyond(before, refitted->marginal);
-    fit.effect = std::move(fitted);
+    fit.is_at_bound = isAtBound(own.effect, own.keys);
+    fit.effect = std::move(own);
     fits.push_back(std::move(fit));
   }
   return fits;
 }
 
-std::shared_ptr<const RowSource> CampaignRows::including(
-    std::span<const NamedFit* const> fits, bool with_catalogue) const {
+std::shared_ptr<const RowSource> CampaignRows::including(std::span<const NamedFit* const> fits,
+                                                         bool with_catalogue) const {
   auto all = std::make_shared<CampaignRows>(*this);
   // Declared numbers' columns stay, those of what was included before go.
   std::erase_if(all->groups_, [](const Group& group) { return group.name.starts_with("included "); });
@@ -128,7 +192,8 @@ std::shared_ptr<const RowSource> CampaignRows::including(
   }
   std::size_t declared_columns = all->common_columns_;
   for (const Group& group : all->groups_)
-    if (group.kind == Kind::Declared) declared_columns = std::max(declared_columns, group.first + group.count);
+    if (group.kind == Kind::Declared)
+      declared_columns = std::max(declared_columns, group.first + group.count);
   const auto here = cameraWith(all->effects_),
              late = cameraWith(withDelay(declared_->model, all->effects_, has_delay_ ? kDelay_mm : 0.0));
   if (!here || !late) return all;
@@ -144,14 +209,15 @@ std::shared_ptr<const RowSource> CampaignRows::including(
     if (group.first < declared_columns) groups.push_back(std::move(group));
   }
   for (const FreeNumber& one : free)
-    groups.push_back({.name = "included " + one.key, .kind = Kind::Declared, .first = next++, .count = 1,
-                      .numbers = 1});
+    groups.push_back(
+        {.name = "included " + one.key, .kind = Kind::Declared, .first = next++, .count = 1, .numbers = 1});
   all->base_columns_ = next;
   std::size_t behind = next;
   for (Group group : groups_) {
     if (!with_catalogue || (group.kind != Kind::Catalogue && group.kind != Kind::Retired)) continue;
     group.first = behind, behind += group.count;
-    const bool is_in = std::ranges::any_of(fits, [&](const NamedFit* fit) { return fit->name == group.name; });
+    const bool is_in =
+        std::ranges::any_of(fits, [&](const NamedFit* fit) { return fit->name == group.name; });
     group.kind = is_in ? Kind::Retired : Kind::Catalogue;
     groups.push_back(std::move(group));
   }
@@ -170,8 +236,7 @@ std::shared_ptr<const RowSource> CampaignRows::including(
       if (has_delay_) rows.base.putDelay(fixed.cells, reading, read(*late, c, on_light));
       for (std::size_t i = 0; i < free.size(); ++i)
         rows.base.putChange(fixed.cells, declared_columns + i, reading, read(cameras[i], c, on_light));
-      rows.evidence =
-          with_catalogue ? ownEvidence(rows) : rows.base.evidence(fixed.name, fixed.block);
+      rows.evidence = with_catalogue ? ownEvidence(rows) : rows.base.evidence(fixed.name, fixed.block);
     }
   });
   all->findPatterns();

@@ -16,16 +16,16 @@ sim::AnyEffect defaultsOf(const sim::AnyEffect& effect) {
   return std::visit([]<class E>(const E&) { return sim::AnyEffect{E{}}; }, effect);
 }
 
-/// A step of a number: of half of what it or its default is at most, within its bounds, and to the other side if
-/// there is more room.
+/// A step of a number: of half of what it or its default is at most, within its bounds, and to the other side
+/// if there is more room.
 double longestStep(const sim::AnyEffect& effect, const std::string& key, double step) {
   constexpr double kMost = 0.5;
   for (const EffectNumber& number : numbersOf(effect)) {
     if (number.key != key) continue;
-    const double most =
-        std::min(std::abs(step),
-                 kMost * std::max(std::abs(number.value), std::abs(valueOf(defaultsOf(effect), key))));
-    const double up = std::min(most, number.high - number.value), down = std::min(most, number.value - number.low);
+    const double most = std::min(
+        std::abs(step), kMost * std::max(std::abs(number.value), std::abs(valueOf(defaultsOf(effect), key))));
+    const double up = std::min(most, number.high - number.value),
+                 down = std::min(most, number.value - number.low);
     return up > down || (up == down && step > 0.0) ? up : -down;
   }
   return step;
@@ -40,7 +40,7 @@ struct Step {
   Fit others;
   Eigen::MatrixXd gram;
   Eigen::VectorXd moment;
-  Eigen::VectorXd own;  ///< squares of the free numbers' columns
+  Eigen::VectorXd own;             ///< squares of the free numbers' columns
   Eigen::MatrixXd others_by_free;  ///< by how much the others' coefficients fall with the free numbers'
   double deviance = 0.0, freedom = 1.0;
 };
@@ -56,8 +56,7 @@ Step stepOf(const Marginal& marginal, std::size_t free) {
   const Eigen::MatrixXd cross = marginal.gram(others, Eigen::lastN(n));
   step.others_by_free = step.others.inverse * cross;
   step.gram = marginal.gram.bottomRightCorner(n, n) - cross.transpose() * step.others_by_free;
-  step.moment =
-      marginal.moment.tail(n) - cross.transpose() * step.others.inverse * marginal.moment(others);
+  step.moment = marginal.moment.tail(n) - cross.transpose() * step.others.inverse * marginal.moment(others);
   step.own = marginal.gram.diagonal().tail(n);
   return step;
 }
@@ -109,7 +108,7 @@ class Descent {
 
   Result<> descend(State& state) const {
     constexpr int kMostSteps = 10;
-    constexpr double kDone = 0.1;  // of the deviance: a tenth of a standard error squared
+    constexpr double kDone = 0.1;           // of the deviance: a tenth of a standard error squared
     constexpr double kMostDelay_mm = 20.0;  // at once
     double damping = 1e-3;
     for (int k = 0; k < kMostSteps && !state.free.empty() && damping < 1e8; ++k) {
@@ -152,9 +151,7 @@ class Descent {
   /// The strength that is least needed goes back to nothing, one after the other; the last one of an
   /// effect stays.
   Result<> dropNeedless(State& state) {
-    // Standard errors: one of several strengths that does nothing would pass two in one fit of twenty, and make
-    // its effect lose to a formula that has fewer numbers.
-    constexpr double kNeeded = 3.0;
+    constexpr double kNeeded = 2.0;  // standard errors
     while (true) {
       const auto least = leastNeeded(state, kNeeded);
       if (!least) return {};
@@ -185,7 +182,8 @@ class Descent {
   }
 
   /// To a standard error, those that are less than half of one: of a change that hardly shows, rounding of
-  /// images in single precision is a large part, and would pass for what no other number does. Whether any was.
+  /// images in single precision is a large part, and would pass for what no other number does. Whether any
+  /// was.
   static bool lengthenSteps(State& state) {
     constexpr double kEnough = 0.25;  // standard errors squared
     bool is_any = false;
@@ -211,8 +209,8 @@ class Descent {
     return all;
   }
 
-  /// The same numbers with steps that suit their effects as they are now; those that were made longer stay so,
-  /// if they are no more than two standard errors there.
+  /// The same numbers with steps that suit their effects as they are now; those that were made longer stay
+  /// so, if they are no more than two standard errors there.
   [[nodiscard]] std::vector<FreeNumber> again(const State& before,
                                               const std::vector<sim::AnyEffect>& effects) const {
     constexpr double kMost = 4.0;  // standard errors squared
@@ -244,7 +242,7 @@ class Descent {
     double smallest = needed;
     for (std::size_t i = 0; i < state.free.size(); ++i) {
       const FreeNumber& one = state.free[i];
-      if (!isStrength(state.effects[one.place], one.key)) continue;
+      if (std::ranges::count(options_.droppable, one.key) == 0) continue;
       ++strengths[one.place];
       const auto row = static_cast<Eigen::Index>(i);
       const double error = std::sqrt(std::max(0.0, covariance(row, row)) * size) * std::abs(one.step);
@@ -271,16 +269,14 @@ double valueOf(const sim::AnyEffect& effect, const std::string& key) {
   return 0.0;
 }
 
-std::vector<sim::AnyEffect> moved(std::vector<sim::AnyEffect> effects, const FreeNumber& free,
-                                  double by) {
+std::vector<sim::AnyEffect> moved(std::vector<sim::AnyEffect> effects, const FreeNumber& free, double by) {
   effects[free.place] =
       withNumber(effects[free.place], free.key, valueOf(effects[free.place], free.key) + by);
   return effects;
 }
 
 bool actsOnLight(const std::vector<sim::AnyEffect>& effects) {
-  return std::ranges::any_of(effects,
-                             [](const auto& effect) { return stageOf(effect) == Stage::Light; });
+  return std::ranges::any_of(effects, [](const auto& effect) { return stageOf(effect) == Stage::Light; });
 }
 
 /// A twentieth of what the effect has, or of a tenth of what its defaults have.
@@ -291,8 +287,7 @@ std::vector<FreeNumber> freeNumbersOf(const std::vector<sim::AnyEffect>& effects
     const sim::AnyEffect defaults = defaultsOf(effects[place]);
     for (const EffectNumber& number : numbersOf(effects[place])) {
       if (number.is_whole) continue;
-      double step =
-          0.05 * std::max(std::abs(number.value), 0.1 * std::abs(valueOf(defaults, number.key)));
+      double step = 0.05 * std::max(std::abs(number.value), 0.1 * std::abs(valueOf(defaults, number.key)));
       if (step == 0.0) step = 1e-4 * (number.high - number.low);
       if (number.value + step > number.high) step = -step;
       all.push_back({place, number.key, step});
@@ -319,9 +314,8 @@ Result<Evidence> residualEvidence(const JudgedCampaign& judged, const std::vecto
       const Cells cells{capture, traced, declared->read(capture, traced.light), judged.most_cells};
       WhitenedCapture whitened{cells, kCommon};
       whitened.putCommon(cells, traced);
-      whitened.putResidual(
-          cells, capture, traced,
-          readingOf(*declared, *here, capture, traced.light, lit.varied[c]->light));
+      whitened.putResidual(cells, capture, traced,
+                           readingOf(*declared, *here, capture, traced.light, lit.varied[c]->light));
       evidence.captures[c] = whitened.evidence(capture.record.name, capture.record.block);
     }
   });
@@ -334,7 +328,7 @@ Result<Refitted> refit(const CampaignRows& rows, std::vector<sim::AnyEffect> eff
   State state{std::move(effects)};
   Descent descent{rows, places, options};
   if (auto done = descent.fit(state); !done) return done.error();
-  if (options.drops_needless) {
+  if (!options.droppable.empty()) {
     if (auto done = descent.dropNeedless(state); !done) return done.error();
   }
   const Step& at = state.at;
@@ -350,9 +344,8 @@ Result<Refitted> refit(const CampaignRows& rows, std::vector<sim::AnyEffect> eff
     for (std::size_t i = 0; i < free.size(); ++i) {
       if (free[i].place != place) continue;
       const auto row = static_cast<Eigen::Index>(i);
-      one.numbers.push_back(
-          {free[i].key, valueOf(state.effects[place], free[i].key),
-           std::sqrt(std::max(0.0, covariance(row, row))) * std::abs(free[i].step)});
+      one.numbers.push_back({free[i].key, valueOf(state.effects[place], free[i].key),
+                             std::sqrt(std::max(0.0, covariance(row, row))) * std::abs(free[i].step)});
     }
     result.fitted.push_back(std::move(one));
   }
@@ -457,8 +450,8 @@ Result<std::vector<std::shared_ptr<const TracedCapture>>> traceWhereTheyStood(
   std::vector<Stood> stood;
   for (const std::size_t stand : standsOf(captures)) {
     const CaptureEvidence& one = evidence->captures[stand];
-    const Eigen::MatrixXd gram = one.gram.block<kOwn, kOwn>(2, 2) +
-                                 Eigen::MatrixXd::Identity(kOwn, kOwn);  // prior deviations of 1
+    const Eigen::MatrixXd gram =
+        one.gram.block<kOwn, kOwn>(2, 2) + Eigen::MatrixXd::Identity(kOwn, kOwn);  // prior deviations of 1
     const Eigen::VectorXd own =
         gram.ldlt().solve(one.moment.segment<kOwn>(2) - one.gram.block<kOwn, 2>(2, 0) * common);
     Stood& here = stood.emplace_back();

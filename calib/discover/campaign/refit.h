@@ -63,9 +63,9 @@ struct RefitOptions {
   std::span<const double> scales{};    ///< of poses and light
   std::span<const TermGroup> terms{};  ///< known besides
   bool with_numbers = false;           ///< the source's effects' own numbers are nuisances
-  /// Numbers that make an effect strong go if the data do not need them: less than two standard
-  /// errors from nothing.
-  bool drops_needless = false;
+  /// Numbers of these names, each of which makes an effect strong, go if the data do not need them: less than
+  /// two standard errors from nothing.
+  std::vector<std::string> droppable{};
   /// Of the effects at these places, only these numbers.
   std::map<std::size_t, std::vector<std::string>> only{};
 };
