@@ -102,6 +102,29 @@ TableBlock traitTable(const NamedTraits& traits, const std::string& a, const std
   return table;
 }
 
+std::string clearestOf(const NamedTraits& traits) {
+  const NamedTrait* clearest = nullptr;
+  double farthest = 0.0;
+  for (const NamedTrait& one : traits.traits) {
+    const Trait& trait = one.trait;
+    const double error = 0.5 * (trait.high - trait.low);
+    const bool is_apart = trait.low > 0.0 || trait.high < 0.0;
+    if (!is_apart || !(error > 0.0) || !trait.doubt.empty() || trait.is_extrapolated) continue;
+    if (const double far = std::abs(trait.value) / error; far > farthest) farthest = far, clearest = &one;
+  }
+  const std::size_t count = traits.traits.size();
+  if (clearest == nullptr)
+    return fmt::format("{} is certain to be other than 0",
+                       count == 1 ? "The one number told" : fmt::format("None of {} numbers told", count));
+  const Trait& trait = clearest->trait;
+  const std::string unit = trait.unit.empty() || trait.unit == "1" ? "" : " " + trait.unit;
+  std::string what = clearest->what == trait.name ? "" : clearest->what + ", ";
+  std::ranges::replace(what, '_', ' ');
+  return fmt::format("{}{}: {}{} ({} to {}){}", what, trait.name, shownDigits(trait.value, 3), unit,
+                     shownDigits(trait.low, 3), shownDigits(trait.high, 3),
+                     count == 1 ? "" : fmt::format(", the clearest of {} numbers", count));
+}
+
 Details whatIsNotTold(const std::string& summary, const NamedTraits& traits) {
   return {fmt::format("{} ({})", summary, traits.untold.size()), traits.untold};
 }

@@ -63,6 +63,9 @@ class TraitCollector {
 
 /// A row for each number, A, B and B − A beside each other. `a` and `b` say whose they are.
 TableBlock traitTable(const NamedTraits& traits, const std::string& a = "A", const std::string& b = "B");
+/// Of numbers of one camera, the one that is most of its standard errors from 0 and certain, with its interval, and how
+/// many there are: a sentence without its full stop.
+std::string clearestOf(const NamedTraits& traits);
 /// What could not be told, closed until opened; how many there are stands outside.
 Details whatIsNotTold(const std::string& summary, const NamedTraits& traits);
 Json toJson(const NamedTraits& traits);

@@ -94,6 +94,22 @@ std::string noteOnSteps(const char* column, const std::vector<double>& values) {
       unit.name);
 }
 
+/// A camera writes 0 where it has no range. Ranges of 0 are taken as missing, and so are readings of 0 that
+/// are farther from all others than these are from each other.
+std::string takeZerosAsMissing(std::string_view column, std::vector<double>& values) {
+  const bool is_range = column.find("range") != std::string_view::npos;
+  if (!is_range && !column.starts_with("value")) return {};
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const double one : values)
+    if (std::isfinite(one) && one != 0.0) low = std::min(low, one), high = std::max(high, one);
+  const auto zeros = std::ranges::count(values, 0.0);
+  const bool are_far = high >= low && std::max(low, -high) > high - low;
+  if (zeros == 0 || (!is_range && !are_far)) return {};
+  std::ranges::replace(values, 0.0, std::numeric_limits<double>::quiet_NaN());
+  return fmt::format("{} of {} rows have a {} of 0, {}: they are taken as missing", zeros, values.size(),
+                     column, is_range ? "which is no range" : "far from all others");
+}
+
 /// Kinds whose readings of one abscissa count together.
 std::string noteOnPlaces(const TableColumns& table) {
   constexpr std::array kKinds{"harmonics", "corner", "amplitude", "ambient", "motion"};
@@ -101,7 +117,8 @@ std::string noteOnPlaces(const TableColumns& table) {
   const SharedPlaces places = sharedPlacesOf(table.values.front());
   if (!places.areShared()) return {};
   return fmt::format(
-      "{} has {} values in {} rows: what is read at one of them may be off together, so intervals are by how these {} "
+      "{} has {} values in {} rows: what is read at one of them may be off together, so intervals are by how "
+      "these {} "
       "scatter",
       table.kind->columns.front(), places.count, places.of.size(), places.count);
 }
@@ -118,6 +135,7 @@ void addNotes(TableColumns& table) {
   for (std::size_t i = 0; i < table.values.size(); ++i) {
     const char* column = table.kind->columns[i];
     if (!isOf(Quantity::Length, column)) continue;
+    add(takeZerosAsMissing(column, table.values[i]));
     add(noteOnSize(column, table.values[i]));
     if (isReading(column)) add(noteOnSteps(column, table.values[i]));
   }
@@ -267,7 +285,8 @@ void addTraits(const TableColumns& table, const std::vector<double>& f, const ch
 }
 
 /// Of two tables at the same frequencies, both with the same waves.
-void addSameWaves(const std::vector<TableColumns>& tables, const std::vector<double>& f, TraitCollector& all) {
+void addSameWaves(const std::vector<TableColumns>& tables, const std::vector<double>& f,
+                  TraitCollector& all) {
   const auto fitOf = [&f](const TableColumns& table) -> HarmonicFit {
     return [&f, &c = table.values](std::size_t least) { return fittedHarmonics(c[0], c[1], f, {}, least); };
   };
@@ -303,8 +322,7 @@ Result<Report> judgeTables(const std::vector<TableJob>& jobs) {
   const auto verdicts = verdictsOf(traits);
   Report report{.title = fmt::format("Characteristics of tables: {}", kind->name),
                 .subtitle = fmt::format("{}", fmt::join(files, " and "))};
-  report.verdict = verdicts.empty() ? fmt::format("{} numbers told: {}.", traits.traits.size(), kind->tells)
-                                    : headlineOf(verdicts) + ".";
+  report.verdict = (verdicts.empty() ? clearestOf(traits) : headlineOf(verdicts)) + ".";
   report.cards = cardsOf(verdicts);
   Section section{.id = "table", .title = kind->tells};
   for (const std::string& note : notes) section.blocks.push_back(Paragraph{.text = note});

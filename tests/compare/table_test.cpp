@@ -161,6 +161,35 @@ TEST_F(Table, SaysWhatIsOddAboutItsRows) {
               testing::ElementsAre(HasSubstr("all 48 readings of value_mm are alike")));
 }
 
+/// Three of 48 readings about 900 mm are 0: the drift is that of the others, 2 mm in 48 s.
+TEST_F(Table, TakesZerosAsNoRange) {
+  std::string rows = "time_s,value_mm\n", errors = "time_s,value_mm\n";
+  for (int i = 0; i < 48; ++i) {
+    rows += fmt::format("{},{}\n", i, i % 20 == 7 ? 0.0 : 900.0 + i / 24.0 + 0.1 * std::sin(1.7 * i));
+    errors += fmt::format("{},{}\n", i, i % 20 == 7 ? 0.0 : i / 24.0 + 0.1 * std::sin(1.7 * i));
+  }
+  const auto table = loadTable({.file = write("a.csv", rows), .kind = "drift"});
+  ASSERT_TRUE(table) << table.error().message;
+  EXPECT_THAT(table->notes,
+              testing::ElementsAre("3 of 48 rows have a value_mm of 0, far from all others: they are "
+                                   "taken as missing"));
+  const auto report = judgeTables({{.file = write("a.csv", rows), .kind = "drift"}});
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_THAT(report->verdict, testing::StartsWith("drift, slope: 0.04")) << "1/24 mm/s";
+
+  const auto near_zero = loadTable({.file = write("b.csv", errors), .kind = "drift"});
+  ASSERT_TRUE(near_zero) << near_zero.error().message;
+  EXPECT_THAT(near_zero->notes, testing::IsEmpty()) << "0 is a reading among others";
+
+  std::string line = "line,range_m\n";
+  for (int i = 0; i < 60; ++i)
+    line += fmt::format("1,{}\n", i % 10 == 3 ? 0.0 : 1.0 + (i > 30 ? 2.0 : 0.0) + 1e-3 * i);
+  const auto ranges = loadTable({.file = write("c.csv", line), .kind = "flying_pixels"});
+  ASSERT_TRUE(ranges) << ranges.error().message;
+  EXPECT_THAT(ranges->notes,
+              testing::ElementsAre(HasSubstr("6 of 60 rows have a range_m of 0, which is no range")));
+}
+
 TEST_F(Table, RefusesFieldsThatItWouldMistake) {
   const auto refusalOf = [&](const std::string& text) {
     return loadTable({.file = write("a.csv", text), .kind = "drift"}).error().message;
