@@ -110,10 +110,8 @@ std::string takeZerosAsMissing(std::string_view column, std::vector<double>& val
                      column, is_range ? "which is no range" : "far from all others");
 }
 
-/// Kinds whose readings of one abscissa count together.
 std::string noteOnPlaces(const TableColumns& table) {
-  constexpr std::array kKinds{"harmonics", "corner", "amplitude", "ambient", "motion"};
-  if (std::ranges::find(kKinds, std::string_view{table.kind->name}) == kKinds.end()) return {};
+  if (!table.kind->shares_places) return {};
   const SharedPlaces places = sharedPlacesOf(table.values.front());
   if (!places.areShared()) return {};
   return fmt::format(
@@ -126,16 +124,16 @@ std::string noteOnPlaces(const TableColumns& table) {
 /// Readings are what characteristics are told from: values and errors.
 bool isReading(std::string_view column) { return column.starts_with("value") || column.starts_with("error"); }
 
+void addNote(TableColumns& table, std::string note) {
+  if (!note.empty()) table.notes.push_back(std::move(note));
+}
+
 void addNotes(TableColumns& table) {
-  const auto add = [&](std::string note) {
-    if (!note.empty()) table.notes.push_back(std::move(note));
-  };
-  add(noteOnRows(table.values));
+  const auto add = [&](std::string note) { addNote(table, std::move(note)); };
   add(noteOnPlaces(table));
   for (std::size_t i = 0; i < table.values.size(); ++i) {
     const char* column = table.kind->columns[i];
     if (!isOf(Quantity::Length, column)) continue;
-    add(takeZerosAsMissing(column, table.values[i]));
     add(noteOnSize(column, table.values[i]));
     if (isReading(column)) add(noteOnSteps(column, table.values[i]));
   }
@@ -206,19 +204,20 @@ const std::vector<TableKind>& tableKinds() {
       {"harmonics",
        "error over distance: waves per period, scale, residual",
        {"distance_m", "error_mm"},
+       true,
        true},
       {"noise_law", "floor, shot noise and read noise", {"signal", "sigma_mm"}},
       {"wraps", "share of errors of whole periods", {"error_m"}, true},
-      {"corner", "multipath's fall from the edge", {"distance_to_edge_m", "error_mm"}},
+      {"corner", "multipath's fall from the edge", {"distance_to_edge_m", "error_mm"}, false, true},
       {"lens_scatter",
        "share of a plate's light that veils what lies behind",
        {"own_range_m", "plate_range_m", "plate_over_own", "error_mm"},
        true},
       {"flying_pixels", "flying pixels of scan lines", {"line", "range_m"}},
       {"edge", "an edge's width and the lateral resolution", {"place_px", "value"}},
-      {"amplitude", "amplitude-related error", {"amplitude", "error_mm"}},
-      {"ambient", "ambient-related error and noise", {"ambient_klx", "error_mm", "sigma_mm"}},
-      {"motion", "motion artefact", {"speed_m_per_s", "error_mm"}},
+      {"amplitude", "amplitude-related error", {"amplitude", "error_mm"}, false, true},
+      {"ambient", "ambient-related error and noise", {"ambient_klx", "error_mm", "sigma_mm"}, false, true},
+      {"motion", "motion artefact", {"speed_m_per_s", "error_mm"}, false, true},
       {"lag", "what frames after a change of light still have of it", {"frames_after", "value"}},
       {"frame_timing", "interval, jitter, lost frames", {"start_s"}}};
   return kinds;
@@ -258,6 +257,9 @@ Result<TableColumns> loadTable(const TableJob& job) {
     for (double& one : column->front()) one *= (name.is_negated ? -1.0 : 1.0) * factor->value_or(1.0);
     table.values.push_back(std::move(column->front()));
   }
+  addNote(table, noteOnRows(table.values));  // of the file, before zeros are none
+  for (std::size_t i = 0; i < wanted.size(); ++i)
+    if (isOf(Quantity::Length, wanted[i])) addNote(table, takeZerosAsMissing(wanted[i], table.values[i]));
   addNotes(table);
   return table;
 }

@@ -17,6 +17,7 @@ struct TableKind {
   const char* tells;                 ///< "warm-up drift and its model"
   std::vector<const char*> columns;  ///< with their units: "time_s", "value_mm"
   bool needs_frequency = false;
+  bool shares_places = false;  ///< readings of one value of the first column count together
 };
 const std::vector<TableKind>& tableKinds();
 /// Null if there is none of that name.

@@ -20,12 +20,12 @@ using Condition = std::vector<const ComparedCapture*>;
 
 /// In their order; captures whose images are of another size than the first one's are left out.
 std::vector<Condition> conditionsOf(const ComparedRun& run) {
-  std::map<std::pair<std::string, std::size_t>, std::size_t> places;
+  std::map<CaptureRecord::Condition, std::size_t> places;
   std::vector<Condition> conditions;
   for (const ComparedCapture& one : run.captures) {
     if (one.record.kind == nameOf(Kind::Dark) || one.thinned.valid_a.empty()) continue;
     const auto [place, is_new] =
-        places.try_emplace({one.record.block, one.record.condition}, conditions.size());
+        places.try_emplace(one.record.conditionInRun(), conditions.size());
     if (is_new) conditions.emplace_back();
     Condition& condition = conditions[place->second];
     if (condition.empty() || condition.front()->thinned.valid_a.size() == one.thinned.valid_a.size())

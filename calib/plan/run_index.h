@@ -7,6 +7,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <toftwin/geometry.h>
@@ -56,6 +57,10 @@ struct CaptureRecord {
   std::optional<Transform<World, Camera>> pose_of_b{};
   RecordedFile a{}, b{};
   std::vector<std::string> notes{};
+
+  /// Captures of one condition are repeats; conditions are numbered within their block.
+  using Condition = std::pair<std::string, std::size_t>;
+  [[nodiscard]] Condition conditionInRun() const { return {block, condition}; }
 };
 
 /// What is written of a capture: one line of JSON without its end.

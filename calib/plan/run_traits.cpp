@@ -204,7 +204,7 @@ struct ValidShares {
 /// Repeats of a condition have the same mask but for noise: their mean is one row. Not with the lens covered,
 /// where what is valid is noise; but where one camera has nothing at all.
 void addValidPixels(const ComparedRun& run, TraitCollector& all) {
-  std::map<std::pair<std::string, std::size_t>, std::size_t> conditions;
+  std::map<CaptureRecord::Condition, std::size_t> conditions;
   std::vector<double> a, b, both;
   std::vector<std::size_t> condition;
   compare::Running pixels;  // of one image
@@ -213,7 +213,7 @@ void addValidPixels(const ComparedRun& run, TraitCollector& all) {
     if (one.record.kind == nameOf(Kind::Dark) || !(shares.a + shares.b > 0.0)) continue;
     a.push_back(shares.a), b.push_back(shares.b), both.push_back(shares.both), pixels.add(shares.pixels);
     condition.push_back(
-        conditions.try_emplace({one.record.block, one.record.condition}, conditions.size()).first->second);
+        conditions.try_emplace(one.record.conditionInRun(), conditions.size()).first->second);
   }
   const auto means = [&](const std::vector<double>& of) { return compare::clusterMeans(of, condition); };
   const auto valid = compare::validTraits(means(a), means(b), means(both), pixels.mean());

@@ -230,9 +230,9 @@ bool isWrapped(const CameraSeen& seen) { return seen.wall_beyond > kFewWraps * s
 
 bool isPoseFromPlanes(const CaptureRecord& record) { return record.pose_by == "planes"; }
 
-std::optional<std::pair<std::string, std::size_t>> sharedPoseOf(const CaptureRecord& record) {
+std::optional<CaptureRecord::Condition> sharedPoseOf(const CaptureRecord& record) {
   if (!record.pose_half_widths) return std::nullopt;
-  return std::pair{record.block, record.condition};
+  return record.conditionInRun();
 }
 
 double poseError_mm(const Plan& plan, const CaptureRecord& record,

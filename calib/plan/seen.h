@@ -63,7 +63,7 @@ bool isWrapped(const CameraSeen& seen);
 bool isPoseFromPlanes(const CaptureRecord& record);
 /// Where the pose was seen, as of a board: the condition, in all of whose captures it errs alike, by where the corners
 /// fall among the pixels. None where each capture has an error of its own.
-std::optional<std::pair<std::string, std::size_t>> sharedPoseOf(const CaptureRecord& record);
+std::optional<CaptureRecord::Condition> sharedPoseOf(const CaptureRecord& record);
 /// Standard error of the range to the target's wall where a pose's 95 % half widths are these: those of its place
 /// along the wall's normal. Turns move the two sides of a wall against each other.
 double poseError_mm(const Plan& plan, const CaptureRecord& record,

@@ -22,13 +22,13 @@ constexpr std::size_t kFewestConditions = 3;
 
 void addTilt(const ComparedRun& run, compare::TraitCollector& all) {
   // Repeats of a condition share their place, and what the wall is like there: their mean is one.
-  std::map<std::pair<std::string, std::size_t>, std::array<compare::Running, 2>> conditions;
+  std::map<CaptureRecord::Condition, std::array<compare::Running, 2>> conditions;
   bool is_seen = false;
   for (const ComparedCapture* one : capturesOf(run, nameOf(Kind::Distance))) {
     is_seen = is_seen || sharedPoseOf(one->record);
     const auto slopes = compare::imageSlopes_mm(one->thinned);
     if (!slopes) continue;
-    auto& means = conditions[{one->record.block, one->record.condition}];
+    auto& means = conditions[one->record.conditionInRun()];
     for (std::size_t way = 0; way < kWays.size(); ++way) means[way].add((*slopes)[way]);
   }
   if (is_seen)

@@ -7,40 +7,34 @@
 namespace toftwin::discover {
 namespace {
 
-/// A charge, and over what it changes; its gain in ten captures.
-Explanation charge(std::vector<std::string> covariates, int numbers, std::vector<double> gains) {
-  Explanation one{.covariates = std::move(covariates), .numbers = numbers};
-  one.fitted.group.terms.push_back({.carrier = "charge"});
+const std::vector<double> kConstant(10, 10.0),
+    kHardlyMore{11, 9, 11, 9, 11, 9, 11, 9, 11, 10}, kMore{15, 14, 15, 16, 15, 14, 15, 16, 15, 15};
+
+/// Two numbers times a carrier, which change with a covariate or not; their gain in ten captures.
+Explanation times(const char* carrier, std::vector<std::string> covariates,
+                  const std::vector<double>& gains) {
+  Explanation one{.covariates = std::move(covariates), .numbers = 2};
+  one.fitted.group.terms.push_back({.carrier = carrier});
   for (const double gain : gains) one.gain.total += gain;
-  one.gain.by_capture = std::move(gains);
+  one.gain.by_capture = gains;
   return one;
+}
+Explanation overLight(const std::vector<double>& gains) {
+  return times("charge", {"ambient_klx", "charge"}, gains);
 }
 
 /// 1 ± 3 in χ² more than a constant charge; less than the error of that difference.
 TEST(ShapeChoice, ACarrierChangesWithNothingUnlessThatExplainsMore) {
-  const std::vector<double> constant(10, 10.0), hardly{11, 9, 11, 9, 11, 9, 11, 9, 11, 10};
-  const std::vector<Explanation> all{charge({"ambient_klx", "charge"}, 2, hardly),
-                                     charge({"charge"}, 2, constant)};
-  ASSERT_TRUE(choose(all));
-  EXPECT_EQ(*choose(all), 1U);
+  EXPECT_EQ(choose({overLight(kHardlyMore), times("charge", {"charge"}, kConstant)}), 1U);
 }
 
 TEST(ShapeChoice, ACarrierChangesWithWhatExplainsMore) {
-  const std::vector<double> constant(10, 10.0), more{15, 14, 15, 16, 15, 14, 15, 16, 15, 15};
-  const std::vector<Explanation> all{charge({"ambient_klx", "charge"}, 2, more),
-                                     charge({"charge"}, 2, constant)};
-  ASSERT_TRUE(choose(all));
-  EXPECT_EQ(*choose(all), 0U);
+  EXPECT_EQ(choose({overLight(kMore), times("charge", {"charge"}, kConstant)}), 0U);
 }
 
 /// A delay that is the same everywhere is no simpler form of a charge.
 TEST(ShapeChoice, AnotherCarrierIsNoSimplerForm) {
-  const std::vector<double> constant(10, 10.0), hardly{11, 9, 11, 9, 11, 9, 11, 9, 11, 10};
-  std::vector<Explanation> all{charge({"ambient_klx", "charge"}, 2, hardly), charge({"charge"}, 2, constant)};
-  all[1].fitted.group.terms.front().carrier = "delay";
-  all[1].covariates = {"ambient_klx"};
-  ASSERT_TRUE(choose(all));
-  EXPECT_EQ(*choose(all), 0U);
+  EXPECT_EQ(choose({overLight(kHardlyMore), times("delay", {"ambient_klx"}, kConstant)}), 0U);
 }
 
 }  // namespace

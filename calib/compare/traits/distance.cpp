@@ -97,7 +97,7 @@ FittedTraits fittedOf(const Fit& fit, double square_degrees, const std::vector<W
           .curve = {fmt::format("a line and {} waves", waves.size()),
                     [=, p = fit.at](double d) { return seriesAt(p, waves, d); }},
           .together = wavesTogether(fit, 2, waves, distance_m),
-          .bic = fit.deviance + static_cast<double>(fit.at.size()) * std::log(static_cast<double>(fit.n))};
+          .bic = fit.bic()};
 }
 
 /// In the order in which they are looked for: the first to be left out is the last.

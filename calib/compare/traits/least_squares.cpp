@@ -78,6 +78,10 @@ double Fit::varianceOf(std::span<const double> factor, std::size_t first) const 
   return variance;
 }
 
+double Fit::bic() const {
+  return deviance + static_cast<double>(at.size()) * std::log(static_cast<double>(n));
+}
+
 double Fit::error(std::size_t parameter) const {
   std::vector<double> gradient(at.size(), 0.0);
   gradient[parameter] = 1.0;

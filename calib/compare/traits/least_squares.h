@@ -24,6 +24,8 @@ struct Fit {
   double degrees = 0.0;  ///< n − k, or fewer where rows err alike
   /// −2 ln of the likelihood, but for a constant of the rows. Not that of REML: it is held against other models'.
   double deviance = 0.0;
+  /// Schwarz's, but for the same constant.
+  [[nodiscard]] double bic() const;
   /// One of the correlations that neighbouring rows may have, and how likely it is: where the parameters are then,
   /// less `at`, their covariance, and the variance of one row.
   struct Possible {

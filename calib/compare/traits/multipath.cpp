@@ -20,12 +20,8 @@ namespace toftwin::compare {
 
 namespace {
 
-/// Schwarz's BIC of a fit.
-double bicOf(const Fit& fit) {
-  return fit.deviance + static_cast<double>(fit.at.size()) * std::log(static_cast<double>(fit.n));
-}
-
-/// Where a fit begins: the line through e over e^(−x/L), and ln of L's share. Far from it a fit may end nowhere.
+/// Where a fit begins: the line through e over e^(−x/L), and ln of L's share. Far from it a fit may end
+/// nowhere.
 std::vector<double> startAt(double length_m, double share, Column x, Column e) {
   const double n = static_cast<double>(x.size());
   double mean_fall = 0.0, mean_e = 0.0, both = 0.0, square = 0.0;
@@ -38,12 +34,12 @@ std::vector<double> startAt(double length_m, double share, Column x, Column e) {
   return {mean_e - size * mean_fall, size, std::log(share)};
 }
 
-/// Whether the rows speak for a fall from the edge against none, by more than what the choice among so many reaches
-/// makes of rows that show nothing.
+/// Whether the rows speak for a fall from the edge against none, by more than what the choice among so many
+/// reaches makes of rows that show nothing.
 bool isSeen(const Fit& fall, Column x, Column e) {
   constexpr double kPositive = 2.0;  // evidence (Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773)
   const auto none = fitInOrder([](std::span<const double> p, std::size_t) { return p[0]; }, e, {0.0}, x);
-  return none && bicOf(*none) - bicOf(fall) > kPositive;
+  return none && none->bic() - fall.bic() > kPositive;
 }
 
 }  // namespace

@@ -254,7 +254,7 @@ Candidate candidateOf(const sim::AnyEffect& none, const sim::AnyEffect& defaults
       if (gatherer.add(alone, true)) {
         if (std::ranges::count(candidate.strengths, other.key) == 0) candidate.strengths.push_back(other.key);
       } else {
-        shapes.push_back(other);
+        shapes.push_back(other);  // does nothing by itself
       }
     }
     for (std::size_t i = 0; i < roles.strengths.size(); ++i)
@@ -281,17 +281,21 @@ sim::AnyEffect withNumber(const sim::AnyEffect& effect, const std::string& key, 
   return copy;
 }
 
+sim::AnyEffect noneOf(const sim::AnyEffect& effect) {
+  return std::visit([]<class E>(const E&) { return sim::AnyEffect{E::none()}; }, effect);
+}
+
+sim::AnyEffect defaultsOf(const sim::AnyEffect& effect) {
+  return std::visit([]<class E>(const E&) { return sim::AnyEffect{E{}}; }, effect);
+}
+
 bool isStrength(const sim::AnyEffect& effect, const std::string& key) {
-  return std::visit(
-      [&]<class E>(const E&) {
-        const NumberRoles roles = numberRolesOf(sim::AnyEffect{E::none()}, sim::AnyEffect{E{}});
-        if (std::ranges::find(roles.strengths, key, &EffectNumber::key) != roles.strengths.end()) return true;
-        // A list may be longer than in the defaults.
-        return key.ends_with("]") && std::ranges::any_of(roles.strengths, [&](const EffectNumber& number) {
-                 return number.key.substr(0, number.key.find('[')) == key.substr(0, key.find('['));
-               });
-      },
-      effect);
+  const NumberRoles roles = numberRolesOf(noneOf(effect), defaultsOf(effect));
+  if (std::ranges::find(roles.strengths, key, &EffectNumber::key) != roles.strengths.end()) return true;
+  // A list may be longer than in the defaults.
+  return key.ends_with("]") && std::ranges::any_of(roles.strengths, [&](const EffectNumber& number) {
+           return number.key.substr(0, number.key.find('[')) == key.substr(0, key.find('['));
+         });
 }
 
 std::string nameOf(const sim::AnyEffect& effect) {
@@ -322,12 +326,8 @@ std::vector<sim::AnyEffect> withInserted(std::vector<sim::AnyEffect> effects, co
 }
 
 bool choosesAPlace(const sim::AnyEffect& effect) {
-  return std::visit(
-      []<class E>(const E&) {
-        const NumberRoles roles = numberRolesOf(sim::AnyEffect{E::none()}, sim::AnyEffect{E{}});
-        return !roles.choosing.empty() && std::ranges::none_of(roles.choosing, &EffectNumber::is_label);
-      },
-      effect);
+  const NumberRoles roles = numberRolesOf(noneOf(effect), defaultsOf(effect));
+  return !roles.choosing.empty() && std::ranges::none_of(roles.choosing, &EffectNumber::is_label);
 }
 
 std::string placeInWords(const sim::AnyEffect& effect) {

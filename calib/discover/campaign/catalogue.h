@@ -22,6 +22,10 @@ std::vector<EffectNumber> numbersOf(const sim::AnyEffect& effect);
 /// The same effect with one number changed; within its bounds, whole where it must be.
 sim::AnyEffect withNumber(const sim::AnyEffect& effect, const std::string& key, double value);
 
+/// The same kind of effect switched off, and with its defaults.
+sim::AnyEffect noneOf(const sim::AnyEffect& effect);
+sim::AnyEffect defaultsOf(const sim::AnyEffect& effect);
+
 /// Whether it makes the effect strong: it differs between the effect's `none()` and its defaults.
 bool isStrength(const sim::AnyEffect& effect, const std::string& key);
 
@@ -55,7 +59,7 @@ struct Candidate {
   sim::AnyEffect example;  ///< with its defaults
   std::vector<Variation> variations{};
   /// Numbers that do something by themselves: those that differ between `none()` and the defaults, and those that
-  /// are 0 in both and show when they alone are changed.
+  /// are the same in both and show when they alone are changed.
   std::vector<std::string> strengths{};
 };
 

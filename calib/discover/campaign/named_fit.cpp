@@ -100,15 +100,13 @@ class OneEffect {
   /// Without the strengths that do not help to predict other captures, by one standard error, which is what a
   /// formula with fewer numbers has to be as good as; the last one stays.
   Fitted withoutNeedless(Fitted all) {
-    while (const auto least = leastStrength(all)) {
+    while (const auto least = leastStrength(all.refitted.fitted.front(), options_.droppable)) {
       std::vector<sim::AnyEffect> effects = all.refitted.effects;
-      const sim::AnyEffect none =
-          std::visit([]<class E>(const E&) { return sim::AnyEffect{E::none()}; }, effects[place_]);
-      effects[place_] = withNumber(effects[place_], *least, valueOf(none, *least));
+      effects[place_] = without(effects[place_], least->key);
       std::vector<std::string>& only = options_.only[place_];
       only.clear();
       for (const FittedNumber& number : all.refitted.fitted.front().numbers)
-        if (number.key != *least) only.push_back(number.key);
+        if (number.key != least->key) only.push_back(number.key);
       auto fewer = fit(std::move(effects));
       if (!fewer || all.gain.total - fewer->gain.total > difference(all.gain, fewer->gain).error) break;
       all = *std::move(fewer);
@@ -117,23 +115,6 @@ class OneEffect {
   }
 
  private:
-  /// Of several strengths that were fitted, the one that is fewest standard errors from nothing.
-  [[nodiscard]] std::optional<std::string> leastStrength(const Fitted& all) const {
-    const sim::AnyEffect& effect = all.refitted.effects[place_];
-    const sim::AnyEffect none =
-        std::visit([]<class E>(const E&) { return sim::AnyEffect{E::none()}; }, effect);
-    std::optional<std::string> least;
-    double smallest = 0.0;
-    int strengths = 0;
-    for (const FittedNumber& number : all.refitted.fitted.front().numbers) {
-      const bool is_strength = std::ranges::count(options_.droppable, number.key) > 0;
-      if (!is_strength || !(number.error > 0.0)) continue;
-      const double z = std::abs(number.value - valueOf(none, number.key)) / number.error;
-      if (strengths++ == 0 || z < smallest) smallest = z, least = number.key;
-    }
-    return strengths > 1 ? least : std::nullopt;
-  }
-
   const CampaignRows& rows_;
   std::size_t place_;
   RefitOptions options_;

@@ -12,10 +12,6 @@
 namespace toftwin::discover {
 namespace {
 
-sim::AnyEffect defaultsOf(const sim::AnyEffect& effect) {
-  return std::visit([]<class E>(const E&) { return sim::AnyEffect{E{}}; }, effect);
-}
-
 /// A step of a number: of half of what it or its default is at most, within its bounds, and to the other side
 /// if there is more room.
 double longestStep(const sim::AnyEffect& effect, const std::string& key, double step) {
@@ -90,6 +86,23 @@ struct State {
   Step at{};
 };
 
+double dispersionOf(const Step& at) { return at.deviance / std::max(1.0, at.freedom); }
+
+/// The numbers of the effect at that place, with their standard errors.
+FittedEffect fittedAt(const State& state, std::size_t place) {
+  const Eigen::MatrixXd covariance =
+      pseudoInverse(state.at.gram, 1e-7).inverse * std::max(1.0, dispersionOf(state.at));
+  FittedEffect fitted{state.effects[place], {}};
+  for (std::size_t i = 0; i < state.free.size(); ++i) {
+    const FreeNumber& one = state.free[i];
+    if (one.place != place) continue;
+    const auto row = static_cast<Eigen::Index>(i);
+    fitted.numbers.push_back({one.key, valueOf(fitted.effect, one.key),
+                              std::sqrt(std::max(0.0, covariance(row, row))) * std::abs(one.step)});
+  }
+  return fitted;
+}
+
 class Descent {
  public:
   Descent(const CampaignRows& rows, const std::vector<std::size_t>& places, const RefitOptions& options)
@@ -152,15 +165,15 @@ class Descent {
   /// effect stays.
   Result<> dropNeedless(State& state) {
     constexpr double kNeeded = 2.0;  // standard errors
-    while (true) {
-      const auto least = leastNeeded(state, kNeeded);
-      if (!least) return {};
-      const FreeNumber gone = *least;
-      const double nothing = nothingOf(state.effects[gone.place], gone.key);
-      state.effects[gone.place] = withNumber(state.effects[gone.place], gone.key, nothing);
-      kept_.emplace(gone.place, gone.key);
-      if (auto done = fit(state); !done) return done;
+    for (const std::size_t place : places_) {
+      while (const auto least = leastStrength(fittedAt(state, place), options_.droppable)) {
+        if (least->errors >= kNeeded) break;
+        state.effects[place] = without(state.effects[place], least->key);
+        kept_.emplace(place, least->key);
+        if (auto done = fit(state); !done) return done;
+      }
     }
+    return {};
   }
 
  private:
@@ -228,32 +241,6 @@ class Descent {
     return kept;
   }
 
-  static double nothingOf(const sim::AnyEffect& effect, const std::string& key) {
-    const sim::AnyEffect none =
-        std::visit([]<class E>(const E&) { return sim::AnyEffect{E::none()}; }, effect);
-    return valueOf(none, key);  // 0 where `none` has no such number: a list that is empty
-  }
-
-  [[nodiscard]] std::optional<FreeNumber> leastNeeded(const State& state, double needed) const {
-    const Eigen::MatrixXd covariance = pseudoInverse(state.at.gram, 1e-7).inverse;
-    const double size = std::max(1.0, state.at.deviance / std::max(1.0, state.at.freedom));
-    std::optional<FreeNumber> least;
-    std::map<std::size_t, int> strengths;
-    double smallest = needed;
-    for (std::size_t i = 0; i < state.free.size(); ++i) {
-      const FreeNumber& one = state.free[i];
-      if (std::ranges::count(options_.droppable, one.key) == 0) continue;
-      ++strengths[one.place];
-      const auto row = static_cast<Eigen::Index>(i);
-      const double error = std::sqrt(std::max(0.0, covariance(row, row)) * size) * std::abs(one.step);
-      const double off =
-          std::abs(valueOf(state.effects[one.place], one.key) - nothingOf(state.effects[one.place], one.key));
-      const double z = error > 0.0 ? off / error : 0.0;
-      if (z < smallest) smallest = z, least = one;
-    }
-    return least && strengths[least->place] > 1 ? least : std::nullopt;
-  }
-
   const CampaignRows& rows_;
   const std::vector<std::size_t>& places_;
   const RefitOptions& options_;
@@ -267,6 +254,25 @@ double valueOf(const sim::AnyEffect& effect, const std::string& key) {
     if (number.key == key) return number.value;
   }
   return 0.0;
+}
+
+std::optional<LeastStrength> leastStrength(const FittedEffect& fitted, const std::vector<std::string>& strengths) {
+  const sim::AnyEffect none = noneOf(fitted.effect);
+  std::optional<LeastStrength> least;
+  int count = 0;
+  for (const FittedNumber& number : fitted.numbers) {
+    if (std::ranges::find(strengths, number.key) == strengths.end()) continue;
+    ++count;
+    // What the data say nothing of has no error.
+    const double errors =
+        number.error > 0.0 ? std::abs(number.value - valueOf(none, number.key)) / number.error : 0.0;
+    if (!least || errors < least->errors) least = LeastStrength{number.key, errors};
+  }
+  return count > 1 ? least : std::nullopt;
+}
+
+sim::AnyEffect without(const sim::AnyEffect& effect, const std::string& key) {
+  return withNumber(effect, key, valueOf(noneOf(effect), key));  // 0 where that has no such number: an empty list
 }
 
 std::vector<sim::AnyEffect> moved(std::vector<sim::AnyEffect> effects, const FreeNumber& free, double by) {
@@ -332,23 +338,10 @@ Result<Refitted> refit(const CampaignRows& rows, std::vector<sim::AnyEffect> eff
     if (auto done = descent.dropNeedless(state); !done) return done.error();
   }
   const Step& at = state.at;
-  const auto& free = state.free;
-  Refitted result{.effects = state.effects,
-                  .free = free,
-                  .deviance = at.deviance,
-                  .dispersion = at.deviance / std::max(1.0, at.freedom)};
+  Refitted result{
+      .effects = state.effects, .free = state.free, .deviance = at.deviance, .dispersion = dispersionOf(at)};
   const double size = std::max(1.0, result.dispersion);
-  const Eigen::MatrixXd covariance = pseudoInverse(at.gram, 1e-7).inverse * size;
-  for (const std::size_t place : places) {
-    FittedEffect one{state.effects[place], {}};
-    for (std::size_t i = 0; i < free.size(); ++i) {
-      if (free[i].place != place) continue;
-      const auto row = static_cast<Eigen::Index>(i);
-      one.numbers.push_back({free[i].key, valueOf(state.effects[place], free[i].key),
-                             std::sqrt(std::max(0.0, covariance(row, row))) * std::abs(free[i].step)});
-    }
-    result.fitted.push_back(std::move(one));
-  }
+  for (const std::size_t place : places) result.fitted.push_back(fittedAt(state, place));
   result.offset_mm = at.others.coefficient[0], result.gain_percent = at.others.coefficient[1];
   const Eigen::Index common = rows.hasDelay() ? kDelayColumn + 1 : kDelayColumn;
   result.moved_mm = state.delay_mm;
