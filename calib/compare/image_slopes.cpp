@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/compare/image_slopes.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
@@ -9,6 +9,7 @@
 
 #include "calib/compare/report.h"
 #include "calib/compare/statistics.h"
+#include "calib/linear/linear.h"
 
 namespace toftwin::compare {
 
@@ -29,7 +30,7 @@ std::optional<std::array<double, 2>> imageSlopes_mm(const PoseComparison& images
   }
   constexpr double kLeastSpan = 0.5;
   if (!((high - low).minCoeff() >= kLeastSpan)) return std::nullopt;
-  const Eigen::Vector3d plane = normal.ldlt().solve(moment);
+  const Eigen::Vector3d plane = linear::Ldlt{normal}.solve(moment);
   return std::array{plane[1], plane[2]};
 }
 

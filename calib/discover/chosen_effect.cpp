@@ -82,9 +82,11 @@ double correlationOf(const Part& prepared, const Group& a, const Group& b) {
   append(of_a, a), append(of_b, b);
   const Fit model = fit(prepared.marginal, prepared.model);
   const auto left = [&](const Columns& x, const Columns& y) {
-    return Eigen::MatrixXd(prepared.marginal.gram(x, y) - prepared.marginal.gram(x, prepared.model) *
-                                                              model.inverse *
-                                                              prepared.marginal.gram(prepared.model, y));
+    Eigen::MatrixXd all = prepared.marginal.gram(x, y);
+    const Eigen::MatrixXd to_x = prepared.marginal.gram(x, prepared.model),
+                          to_y = prepared.marginal.gram(prepared.model, y), known = to_x * model.inverse;
+    all -= known * to_y;
+    return all;
   };
   const Eigen::VectorXd fa = coefficients(prepared, a), fb = coefficients(prepared, b);
   const double aa = fa.dot(left(of_a, of_a) * fa), bb = fb.dot(left(of_b, of_b) * fb);

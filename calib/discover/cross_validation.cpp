@@ -38,8 +38,9 @@ VectorXd solve(const Marginal& marginal, const Training& training, const Columns
 }
 
 double deviance(const CaptureEvidence& capture, const Columns& columns, const VectorXd& value) {
-  return capture.energy - 2.0 * value.dot(VectorXd(capture.moment(columns))) +
-         value.dot(capture.gram(columns, columns) * value);
+  const MatrixXd gram = capture.gram(columns, columns);
+  const VectorXd moment = capture.moment(columns), explained = gram * value;
+  return capture.energy - 2.0 * value.dot(moment) + value.dot(explained);
 }
 
 }  // namespace

@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 
+#include "calib/linear/linear.h"
+
 namespace toftwin::discover {
 namespace {
 
@@ -51,14 +53,13 @@ CaptureEvidence integratedOut(const CaptureEvidence& capture, const Split& split
   const auto s = split.deviation.asDiagonal();
   Eigen::MatrixXd inner = s * Eigen::MatrixXd(capture.gram(split.random, split.random)) * s;
   inner.diagonal().array() += 1.0;
-  const Eigen::LLT<Eigen::MatrixXd> factor(inner);
-  Eigen::MatrixXd half = s * Eigen::MatrixXd(capture.gram(split.random, split.kept));
-  if (half.size() > 0) factor.matrixL().solveInPlace(half);  // Eigen's solver refers to the first number
-  const Eigen::VectorXd half_y = factor.matrixL().solve(s * Eigen::VectorXd(capture.moment(split.random)));
+  const Eigen::MatrixXd to_kept = capture.gram(split.random, split.kept), lower = linear::choleskyOf(inner),
+                        half = linear::solveLowerEach(lower, s * to_kept);
+  const Eigen::VectorXd half_y = linear::solveLower(lower, s * Eigen::VectorXd(capture.moment(split.random)));
   out.gram -= half.transpose() * half;
   out.moment -= half.transpose() * half_y;
   out.energy -= half_y.squaredNorm();
-  for (Eigen::Index i = 0; i < inner.rows(); ++i) log_determinant += 2.0 * std::log(factor.matrixLLT()(i, i));
+  log_determinant += 2.0 * lower.diagonal().array().log().sum();
   return out;
 }
 
@@ -83,8 +84,7 @@ double criterion(const Evidence& evidence, std::span<const std::string> projecte
   gram.diagonal() += marginal.precision(columns);
   const Eigen::VectorXd size = gram.diagonal().cwiseMax(1e-300).cwiseSqrt();
   const Eigen::MatrixXd scaled = size.cwiseInverse().asDiagonal() * gram * size.cwiseInverse().asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled, Eigen::EigenvaluesOnly);
-  for (const double value : eigen.eigenvalues()) log_fixed += value > 1e-9 ? std::log(value) : 0.0;
+  for (const double value : linear::eigenvalues(scaled)) log_fixed += value > 1e-9 ? std::log(value) : 0.0;
   for (const double value : size) log_fixed += 2.0 * std::log(value);
   return marginal.log_determinant + log_fixed +
          freedom * std::log(std::max(fitted.deviance, 1e-300) / freedom);
@@ -149,13 +149,12 @@ PseudoInverse pseudoInverse(const Eigen::MatrixXd& matrix, double tolerance) {
   const double largest = root.maxCoeff();
   const Eigen::VectorXd shrink =
       root.unaryExpr([&](double size) { return size > 1e-14 * largest && size > 0.0 ? 1.0 / size : 0.0; });
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(shrink.asDiagonal() * matrix *
-                                                             shrink.asDiagonal());
+  const auto [values, vectors] = linear::eigenpairs(shrink.asDiagonal() * matrix * shrink.asDiagonal());
   const Eigen::VectorXd inverse =
-      eigen.eigenvalues().unaryExpr([&](double value) { return value > tolerance ? 1.0 / value : 0.0; });
+      values.unaryExpr([&](double value) { return value > tolerance ? 1.0 / value : 0.0; });
   out.rank = static_cast<int>((inverse.array() > 0.0).count());
-  const Eigen::MatrixXd turned = shrink.asDiagonal() * eigen.eigenvectors();
-  out.inverse = turned * inverse.asDiagonal() * turned.transpose();
+  const Eigen::MatrixXd turned = shrink.asDiagonal() * vectors;
+  out.inverse = linear::composed(turned, inverse);
   return out;
 }
 

@@ -5,8 +5,9 @@
 #include <cmath>
 #include <map>
 
-#include <Eigen/Dense>
 #include <fmt/format.h>
+
+#include "calib/linear/linear.h"
 
 namespace toftwin::discover {
 namespace {
@@ -135,7 +136,7 @@ void dropCopies(TableData& data, double scale) {
     // measured = β c + γ reference: a copy needs no reference, the error needs all of it.
     Eigen::MatrixXd x(n, 2);
     x.col(0) = c / std::max(c.norm(), 1e-300), x.col(1) = reference / std::max(reference.norm(), 1e-300);
-    const Eigen::Vector2d b = x.colPivHouseholderQr().solve(measured);
+    const Eigen::Vector2d b = linear::leastSquares(x, measured);
     const double left = (measured - x * b).squaredNorm() / std::max(error.squaredNorm(), 1e-300);
     const double beta = b(0) / std::max(c.norm(), 1e-300), gamma = b(1) / std::max(reference.norm(), 1e-300);
     const double decades = std::log10(std::abs(beta));  // mm, cm, m

@@ -7,6 +7,8 @@
 #include <limits>
 #include <numeric>
 
+#include "calib/linear/linear.h"
+
 namespace toftwin::discover {
 namespace {
 
@@ -43,25 +45,17 @@ std::optional<RowClock> clockOf(const TableData& data, const std::string& name,
   return clock;
 }
 
-/// An orthonormal basis of the columns' span.
-MatrixXd basisOf(MatrixXd columns) {
-  for (auto column : columns.colwise()) column /= std::max(column.norm(), 1e-300);
-  Eigen::ColPivHouseholderQR<MatrixXd> factor(columns);
-  factor.setThreshold(1e-8);
-  return factor.householderQ() * MatrixXd::Identity(columns.rows(), factor.rank());
-}
-
 struct Restricted {
   double criterion = 0.0;  ///< −2 ln of the restricted likelihood, the variance profiled
   double variance = 1.0;
 };
 
 Restricted restricted(const VectorXd& y, const MatrixXd& x, double log_determinant) {
-  const Eigen::LLT<MatrixXd> factor(x.transpose() * x);
-  const VectorXd explained = factor.matrixL().solve(x.transpose() * y);
+  const MatrixXd lower = linear::choleskyOf(x.transpose() * x);
+  const VectorXd explained = linear::solveLower(lower, x.transpose() * y);
   const auto freedom = static_cast<double>(y.size() - x.cols());
   const double variance = std::max((y.squaredNorm() - explained.squaredNorm()) / freedom, 1e-300);
-  for (Index i = 0; i < x.cols(); ++i) log_determinant += 2.0 * std::log(factor.matrixLLT()(i, i));
+  log_determinant += 2.0 * lower.diagonal().array().log().sum();
   return {log_determinant + freedom * std::log(variance), variance};
 }
 
@@ -146,7 +140,7 @@ double RowWhitening::logDeterminant() const {
 
 std::optional<RowDependence> dependenceOf(const std::vector<RowClock>& clocks, const VectorXd& y,
                                           const MatrixXd& columns) {
-  const MatrixXd x = basisOf(columns);
+  const MatrixXd x = linear::basisOf(columns);
   if (y.size() <= x.cols()) return std::nullopt;
   double least = std::numeric_limits<double>::infinity();
   const RowClock* clock = nullptr;

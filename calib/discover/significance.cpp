@@ -6,6 +6,7 @@
 #include <set>
 
 #include "calib/discover/draws.h"
+#include "calib/linear/linear.h"
 
 namespace toftwin::discover {
 namespace {
@@ -34,21 +35,24 @@ Projected project(const Marginal& marginal, const Fit& model, const Group& group
   // Sizes before projection: what is left of a column that the model explains is rounding.
   const VectorXd size = marginal.gram.diagonal()(out.columns).cwiseMax(0.0).cwiseSqrt();
   const VectorXd shrink = size.unaryExpr([](double s) { return s > 0.0 ? 1.0 / s : 0.0; });
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(shrink.asDiagonal() * left * shrink.asDiagonal());
+  const auto [values, vectors] = linear::eigenpairs(shrink.asDiagonal() * left * shrink.asDiagonal());
   std::vector<Index> used;
-  for (Index i = 0; i < eigen.eigenvalues().size(); ++i) {
-    if (eigen.eigenvalues()(i) > 1e-6) used.push_back(i);
+  for (Index i = 0; i < values.size(); ++i) {
+    if (values(i) > 1e-6) used.push_back(i);
   }
   out.rank = static_cast<int>(used.size());
-  const VectorXd roots = eigen.eigenvalues()(used).cwiseSqrt().cwiseInverse();
+  const VectorXd roots = values(used).cwiseSqrt().cwiseInverse();
   out.whiten =
-      roots.asDiagonal() * MatrixXd(eigen.eigenvectors()(Eigen::all, used)).transpose() * shrink.asDiagonal();
+      roots.asDiagonal() * MatrixXd(vectors(Eigen::all, used)).transpose() * shrink.asDiagonal();
   return out;
 }
 
 /// Residual moments of each capture in the group's whitened directions, one column for each capture.
 MatrixXd whitenedMoments(const Projected& group, const MatrixXd& residual, const Columns& model) {
-  return group.whiten * (residual(group.columns, Eigen::all) - group.slope * residual(model, Eigen::all));
+  const MatrixXd of_model = residual(model, Eigen::all);
+  MatrixXd left = residual(group.columns, Eigen::all);
+  left -= group.slope * of_model;
+  return group.whiten * left;
 }
 
 /// Σ_c cov of the whitened moments under unit noise: E r_c r_cᵀ = G_c − G_c A⁻¹ G_c. Its trace is what
@@ -58,11 +62,12 @@ double flipCorrection(const Marginal& marginal, const Fit& model, const Projecte
   for (const CaptureEvidence& capture : marginal.captures) {
     const MatrixXd to_group = capture.gram(group.columns, model.columns);
     const MatrixXd within = capture.gram(model.columns, model.columns);
-    const MatrixXd half = group.whiten * (to_group - group.slope * within);
-    const MatrixXd own = capture.gram(group.columns, group.columns) - to_group * group.slope.transpose() -
-                         group.slope * to_group.transpose() + group.slope * within * group.slope.transpose();
-    trace += (group.whiten * own * group.whiten.transpose()).trace() -
-             (half * model.inverse * half.transpose()).trace();
+    const MatrixXd turned = to_group - group.slope * within, half = group.whiten * turned;
+    MatrixXd own = capture.gram(group.columns, group.columns);
+    own -= turned * group.slope.transpose();
+    own -= group.slope * to_group.transpose();
+    trace += group.whiten.cwiseProduct(group.whiten * own).sum() -
+             half.cwiseProduct(half * model.inverse).sum();  // of L S Lᵀ, and of H A⁻¹ Hᵀ
   }
   return trace > 1e-9 ? std::max(1.0, group.rank / trace) : 1.0;
 }
@@ -93,9 +98,9 @@ VectorXd dispersions(const Marginal& marginal, const Fit& model) {
   VectorXd out(static_cast<Index>(marginal.captures.size()));
   for (Index c = 0; c < out.size(); ++c) {
     const CaptureEvidence& capture = marginal.captures[static_cast<std::size_t>(c)];
-    const VectorXd moment = capture.moment(model.columns);
-    const double left = capture.energy - 2.0 * model.coefficient.dot(moment) +
-                        model.coefficient.dot(capture.gram(model.columns, model.columns) * model.coefficient);
+    const MatrixXd gram = capture.gram(model.columns, model.columns);
+    const VectorXd moment = capture.moment(model.columns), explained = gram * model.coefficient;
+    const double left = capture.energy - 2.0 * model.coefficient.dot(moment) + model.coefficient.dot(explained);
     out(c) = capture.rows > 0.0 ? std::max(0.0, left) / capture.rows : 1.0;
   }
   return out.cwiseMax(0.25 * model.dispersion());
@@ -145,17 +150,22 @@ MatrixXd noiseMoments(const Marginal& marginal, const VectorXd& dispersion, cons
   MatrixXd covariance = MatrixXd::Zero(marginal.gram.rows(), marginal.gram.cols());
   for (std::size_t c = 0; c < marginal.captures.size(); ++c)
     covariance += dispersion(static_cast<Index>(c)) * marginal.captures[c].gram;
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(covariance);
-  const MatrixXd root = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  const auto [values, vectors] = linear::eigenpairs(covariance);
+  const MatrixXd root = vectors * values.cwiseMax(0.0).cwiseSqrt().asDiagonal();
   return root * Draws{options.seed}.normals(root.cols(), options.draws);
+}
+
+/// Xᵀ(y − X b).
+VectorXd leftOf(const VectorXd& moment, const MatrixXd& gram, const Fit& model) {
+  const MatrixXd of_model = gram(Eigen::all, model.columns);
+  return moment - of_model * model.coefficient;
 }
 
 MatrixXd residualMoments(const Marginal& marginal, const Fit& model) {
   MatrixXd residual(marginal.moment.size(), static_cast<Index>(marginal.captures.size()));
   for (std::size_t c = 0; c < marginal.captures.size(); ++c) {
     const CaptureEvidence& capture = marginal.captures[c];
-    residual.col(static_cast<Index>(c)) =
-        capture.moment - capture.gram(Eigen::all, model.columns) * model.coefficient;
+    residual.col(static_cast<Index>(c)) = leftOf(capture.moment, capture.gram, model);
   }
   return residual;
 }
@@ -181,7 +191,7 @@ NullModel nullModelOf(const Marginal& marginal, NullModel wanted) {
 
 std::vector<GroupScore> statistics(const Marginal& marginal, const Columns& model_columns) {
   const Fit model = fit(marginal, model_columns);
-  const VectorXd residual = marginal.moment - marginal.gram(Eigen::all, model.columns) * model.coefficient;
+  const VectorXd residual = leftOf(marginal.moment, marginal.gram, model);
   std::vector<GroupScore> scores;
   for (const Projected& group : projectedGroups(marginal, model)) {
     const double statistic = whitenedMoments(group, residual, model_columns).squaredNorm();

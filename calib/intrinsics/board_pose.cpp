@@ -10,6 +10,7 @@
 #include "calib/intrinsics/bundle.h"
 #include "calib/intrinsics/seed.h"
 #include "calib/intrinsics/uncertainty.h"
+#include "calib/linear/linear.h"
 
 namespace toftwin::intrinsics {
 namespace {
@@ -87,7 +88,7 @@ Result<BoardSighting> locateBoard(const Sighting& sighting, const Target& target
   BoardSighting result{.rms_px = rms, .corners = view.corners.size()};
   Eigen::Matrix<double, 6, 1> metres;
   metres << 1, 1, 1, 1e-3, 1e-3, 1e-3;
-  const Matrix6d covariance = (rms * rms * n / degrees) * informationOf(surface, view, lens, *pose).inverse();
+  const Matrix6d covariance = (rms * rms * n / degrees) * linear::inverse(informationOf(surface, view, lens, *pose));
   result.camera_from_board = {.pose = transformOf(*pose),
                               .covariance = metres.asDiagonal() * covariance * metres.asDiagonal(),
                               .degrees = degrees};

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/intrinsics/bundle.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
-
 #include <algorithm>
 #include <cmath>
 #include <optional>
+
+#include "calib/linear/linear.h"
 
 namespace toftwin::intrinsics {
 namespace {
@@ -83,13 +82,13 @@ std::optional<Bundle> stepped(const std::vector<Observed>& views, const std::vec
   for (std::size_t v = 0; v < views.size(); ++v) {
     damped_bb[v] = sums[v].bb;
     damped_bb[v].diagonal() *= 1.0 + damping;
-    const Eigen::LDLT<Matrix6> solver{damped_bb[v]};
+    const linear::Ldlt solver{damped_bb[v]};
     reduced += sums[v].aa;
     reduced.diagonal() += damping * sums[v].aa.diagonal();
-    reduced -= sums[v].ab * solver.solve(sums[v].ab.transpose());
+    reduced -= sums[v].ab * solver.solveEach(sums[v].ab.transpose());
     right += sums[v].ar - sums[v].ab * solver.solve(sums[v].br);
   }
-  const Eigen::VectorXd step = reduced.ldlt().solve(right);
+  const Eigen::VectorXd step = linear::Ldlt{reduced}.solve(right);
   if (!step.allFinite()) return std::nullopt;
   Bundle next = bundle;
   for (Eigen::Index i = 0; i < of_lens; ++i) next.lens[static_cast<std::size_t>(i)] += step[i];
@@ -97,7 +96,7 @@ std::optional<Bundle> stepped(const std::vector<Observed>& views, const std::vec
   if (!(next.lens[0] > 0.0 && next.lens[1] > 0.0)) return std::nullopt;
   for (std::size_t v = 0; v < views.size(); ++v) {
     const Vector6 pose_step =
-        damped_bb[v].ldlt().solve(sums[v].br - sums[v].ab.transpose() * step);
+        linear::Ldlt{damped_bb[v]}.solve(sums[v].br - sums[v].ab.transpose() * step);
     if (!pose_step.allFinite()) return std::nullopt;
     next.poses[v] = moved(bundle.poses[v], pose_step);
     if (!isInFront(next.surface, views[v], next.poses[v])) return std::nullopt;
@@ -201,7 +200,7 @@ bool refinePose(const Surface& surface, const Observed& view, const LensParamete
     while (!is_better && damping < 1e10) {
       Matrix6 damped = sums.bb;
       damped.diagonal() *= 1.0 + damping;
-      const Vector6 change = damped.ldlt().solve(sums.br);
+      const Vector6 change = linear::Ldlt{damped}.solve(sums.br);
       const BoardPose next = change.allFinite() ? moved(pose, change) : pose;
       const bool is_possible = change.allFinite() && isInFront(surface, view, next);
       const double then = is_possible ? sumsOf(surface, view, lens, next, 0).rr : HUGE_VAL;
@@ -225,8 +224,8 @@ std::vector<SharedInformation> sharedInformation(const std::vector<Observed>& vi
   for (std::size_t v = 0; v < views.size(); ++v) {
     const ViewSums sums =
         sumsOf(bundle.surface, views[v], bundle.lens, bundle.poses[v], parametersOf(bundle.model));
-    const Eigen::LDLT<Matrix6> solver{sums.bb};
-    all.push_back({.information = sums.aa - sums.ab * solver.solve(sums.ab.transpose()),
+    const linear::Ldlt solver{sums.bb};
+    all.push_back({.information = sums.aa - sums.ab * solver.solveEach(sums.ab.transpose()),
                    .gradient = sums.ar - sums.ab * solver.solve(sums.br)});
   }
   return all;

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/intrinsics/corner_fit.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <vector>
+
+#include "calib/linear/linear.h"
 
 namespace toftwin::intrinsics {
 namespace {
@@ -171,7 +173,7 @@ bool minimise(Vector& x, const Window& window) {
     const Normal normal = normalEquations(x, window);
     Matrix damped = normal.a;
     damped.diagonal() += damping * (normal.a.diagonal().array() + 1e-12).matrix();
-    const Vector change = damped.ldlt().solve(normal.b);
+    const Vector change = linear::Ldlt{damped}.solve(normal.b);
     if (!change.allFinite()) return false;
     Vector next = x + change;
     next[LogBlur] = std::clamp(next[LogBlur], std::log(kLeastBlur_px), std::log(kMostBlur_px));
@@ -208,7 +210,7 @@ std::optional<FittedCorner> fitCorner(const Image<float>& image, const CornerGue
   const double spare = static_cast<double>(window.samples.size()) - static_cast<double>(Count);
   const double variance = misfit(x, window) / spare;
   normal.a.diagonal().array() += 1e-12 * normal.a.diagonal().maxCoeff();
-  const Matrix covariance = variance * normal.a.inverse();
+  const Matrix covariance = variance * linear::inverse(normal.a);
   const double error = std::sqrt(0.5 * (covariance(U, U) + covariance(V, V)));
   if (!std::isfinite(error)) return std::nullopt;
   return FittedCorner{.at = {x[U], x[V]},

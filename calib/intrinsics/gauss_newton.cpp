@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/intrinsics/gauss_newton.h"
 
-#include <Eigen/Eigenvalues>
+#include "calib/linear/linear.h"
 
 namespace toftwin::intrinsics {
 namespace {
@@ -27,11 +27,10 @@ std::optional<Settled> settle(const std::function<Eigen::VectorXd(const Eigen::V
     const Eigen::VectorXd scale = j.colwise().norm();
     if (!scale.allFinite() || scale.minCoeff() <= 0.0) return std::nullopt;
     const Eigen::MatrixXd unit = j * scale.cwiseInverse().asDiagonal();
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver{unit.transpose() * unit};
-    if (solver.eigenvalues().minCoeff() < kUndetermined * solver.eigenvalues().maxCoeff())
+    const auto [values, vectors] = linear::eigenpairs(unit.transpose() * unit);
+    if (values.minCoeff() < kUndetermined * values.maxCoeff())
       return std::nullopt;
-    const Eigen::MatrixXd inverse = solver.eigenvectors() * solver.eigenvalues().cwiseInverse().asDiagonal() *
-                                    solver.eigenvectors().transpose();
+    const Eigen::MatrixXd inverse = linear::composed(vectors, values.cwiseInverse());
     const Eigen::MatrixXd covariance =
         scale.cwiseInverse().asDiagonal() * inverse * scale.cwiseInverse().asDiagonal();
     const Eigen::VectorXd step = -covariance * (j.transpose() * r);

@@ -5,13 +5,12 @@
 
 #include <opencv2/calib3d.hpp>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <cmath>
 #include <vector>
 
 #include "calib/intrinsics/gauss_newton.h"
+#include "calib/linear/linear.h"
 
 namespace toftwin::intrinsics {
 namespace {
@@ -60,9 +59,8 @@ bool turnsEnough(const std::vector<Rigid>& rig) {
     const Eigen::Vector3d w = turn.angle() * turn.axis();
     axes += w * w.transpose();
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver{axes / static_cast<double>(rig.size())};
   constexpr double kLeast_rad = 0.02;
-  return solver.eigenvalues()[1] > kLeast_rad * kLeast_rad;
+  return linear::eigenvalues(axes / static_cast<double>(rig.size()))[1] > kLeast_rad * kLeast_rad;
 }
 
 std::optional<Rigid> firstGuess(const std::vector<Rigid>& rig, const std::vector<Rigid>& board) {
@@ -108,7 +106,7 @@ Result<HandEye> handEye(std::span<const HandEyeView> views) {
   for (const HandEyeView& view : views) {
     rig.push_back(rigidOf(view.world_from_rig));
     board.push_back(rigidOf(view.camera_from_board.pose));
-    whiten.emplace_back(Eigen::LLT<Matrix6d>{view.camera_from_board.covariance}.matrixL());
+    whiten.emplace_back(linear::choleskyOf(view.camera_from_board.covariance));
     if (!whiten.back().allFinite() || !(whiten.back().diagonal().minCoeff() > 0.0))
       return refuse(fmt::format("view {} does not say how well its board is known", whiten.size()));
   }

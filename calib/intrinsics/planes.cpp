@@ -3,14 +3,13 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 
 #include "calib/intrinsics/gauss_newton.h"
+#include "calib/linear/linear.h"
 
 namespace toftwin::intrinsics {
 namespace {
@@ -74,10 +73,10 @@ Result<SeenPlane> fitPlane(const Image<float>& range_m, const CameraInfo& camera
       normal += w * all.rays[i] * all.rays[i].transpose();
       right += w / all.range_m[i] * all.rays[i];
     }
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver{normal};
-    if (!(solver.eigenvalues()[0] > 1e-9 * solver.eigenvalues()[2]))
+    const Eigen::VectorXd spans = linear::eigenvalues(normal);
+    if (!(spans[0] > 1e-9 * spans[2]))
       return refuse("its pixels lie on one line");
-    m = normal.ldlt().solve(right);
+    m = linear::Ldlt{normal}.solve(right);
     const double spread = std::max(spreadOf(all, m), 1e-9);
     for (std::size_t i = 0; i < all.rays.size(); ++i) {
       const double u = errorOf(all, m, i) / (kTukey * spread);
@@ -103,7 +102,7 @@ Result<SeenPlane> fitPlane(const Image<float>& range_m, const CameraInfo& camera
   const Eigen::Vector3d towards = -m.normalized();
   return SeenPlane{.normal = {{towards.x(), towards.y(), towards.z()}},
                    .distance_m = -1.0 / m.norm(),
-                   .covariance = variance * plain.inverse(),
+                   .covariance = variance * linear::inverse(plain),
                    .rms_mm = 1e3 * std::sqrt(squares / static_cast<double>(std::max<std::size_t>(1, used))),
                    .pixels = used};
 }
@@ -120,8 +119,7 @@ Result<KnownPose<World, Camera>> poseFromPlanes(std::span<const SeenPlane> seen,
     turn += eigenOf(known[i].normal.v) * eigenOf(seen[i].normal.v).transpose();
     spread += eigenOf(known[i].normal.v) * eigenOf(known[i].normal.v).transpose();
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> span{spread};
-  if (span.eigenvalues()[0] < 0.02)
+  if (linear::eigenvalues(spread)[0] < 0.02)
     return refuse("the planes' normals lie nearly in one plane, so that the camera may slide along them");
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd{turn, Eigen::ComputeFullU | Eigen::ComputeFullV};
   Eigen::Matrix3d rotation = svd.matrixU() * svd.matrixV().transpose();
@@ -130,10 +128,10 @@ Result<KnownPose<World, Camera>> poseFromPlanes(std::span<const SeenPlane> seen,
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < seen.size(); ++i)
     right += (known[i].distance_m - seen[i].distance_m) * eigenOf(known[i].normal.v);
-  const Eigen::Vector3d place = spread.ldlt().solve(right);
+  const Eigen::Vector3d place = linear::Ldlt{spread}.solve(right);
   std::vector<Eigen::Matrix3d> whiten;
   for (const SeenPlane& plane : seen)
-    whiten.push_back(Eigen::LLT<Eigen::Matrix3d>{plane.covariance}.matrixL());
+    whiten.emplace_back(linear::choleskyOf(plane.covariance));
   const auto poseAt = [&](const Eigen::VectorXd& step) {
     const Eigen::Vector3d w = step.head<3>();
     const double angle = w.norm();

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/intrinsics/uncertainty.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
-
 #include <algorithm>
 #include <cmath>
 #include <random>
+
+#include "calib/linear/linear.h"
 
 namespace toftwin::intrinsics {
 namespace {
@@ -20,20 +18,17 @@ constexpr double kNormal95 = 1.959964;  // 97.5 % of a normal distribution lie b
 /// has the covariance σ² S_v if all corners err alike ("CR2" of R. M. Bell and D. F. McCaffrey, Survey
 /// Methodology 28 (2002) 169).
 std::vector<Eigen::VectorXd> unbent(const std::vector<SharedInformation>& views, const Eigen::MatrixXd& total) {
-  const Eigen::LLT<Eigen::MatrixXd> root{total};
-  const Eigen::MatrixXd lower = root.matrixL();
+  const Eigen::MatrixXd lower = linear::choleskyOf(total);
   std::vector<Eigen::VectorXd> gradients;
   for (const SharedInformation& view : views) {
-    const Eigen::MatrixXd half = lower.triangularView<Eigen::Lower>().solve(view.information);
-    const Eigen::MatrixXd share =
-        lower.triangularView<Eigen::Lower>().solve(half.transpose()).transpose();
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen{0.5 * (share + share.transpose())};
+    const Eigen::MatrixXd half = linear::solveLowerEach(lower, view.information),
+                          share = linear::solveLowerEach(lower, half.transpose());
+    const auto [values, vectors] = linear::eigenpairs(0.5 * (share + share.transpose()));
     constexpr double kMostShare = 0.95;  // a view that alone knows a parameter cannot be checked by others
     const Eigen::VectorXd stretch =
-        (1.0 - eigen.eigenvalues().array().min(kMostShare)).sqrt().inverse().matrix();
-    const Eigen::VectorXd plain = lower.triangularView<Eigen::Lower>().solve(view.gradient);
-    gradients.emplace_back(lower * (eigen.eigenvectors() * stretch.asDiagonal() *
-                                    (eigen.eigenvectors().transpose() * plain)));
+        (1.0 - values.array().min(kMostShare)).sqrt().inverse().matrix();
+    const Eigen::VectorXd plain = linear::solveLower(lower, view.gradient);
+    gradients.emplace_back(lower * (vectors * stretch.cwiseProduct(vectors.transpose() * plain)));
   }
   return gradients;
 }
@@ -60,7 +55,7 @@ Eigen::VectorXd resampled(const std::vector<SharedInformation>& views,
       information += views[view].information;
       gradient += gradients[view];
     }
-    const Eigen::VectorXd step = information.ldlt().solve(gradient);
+    const Eigen::VectorXd step = linear::Ldlt{information}.solve(gradient);
     if (!step.allFinite()) continue;
     sum += step;
     squares += step.cwiseAbs2();
@@ -86,7 +81,7 @@ LensUncertainty uncertaintyOf(const std::vector<Observed>& views, const Bundle& 
 
   LensUncertainty result;
   result.sigma_px = coordinateError(views, bundle);
-  const Eigen::MatrixXd inverse = total.inverse();
+  const Eigen::MatrixXd inverse = linear::inverse(total);
   const auto gradients = unbent(information, total);
   const Eigen::MatrixXd covariance = result.sigma_px * result.sigma_px * inverse.topLeftCorner(n, n);
   result.from_corners = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
@@ -126,8 +121,8 @@ Projection slopesAt(const LensParameters& lens, double u, double v) {
 
 MappingError::MappingError(const Bundle& bundle, const LensUncertainty& uncertainty, int width, int height)
     : lens_(bundle.lens), count_(static_cast<Eigen::Index>(parametersOf(bundle.model))) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen{uncertainty.covariance};
-  root_ = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  const auto [values, vectors] = linear::eigenpairs(uncertainty.covariance);
+  root_ = vectors * values.cwiseMax(0.0).cwiseSqrt().asDiagonal();
   Eigen::Matrix3d turn_by_turn = Eigen::Matrix3d::Zero();
   Eigen::MatrixXd turn_by_lens = Eigen::MatrixXd::Zero(3, count_);
   constexpr int kAcross = 12;
@@ -139,7 +134,7 @@ MappingError::MappingError(const Bundle& bundle, const LensUncertainty& uncertai
       turn_by_lens += by_turn.transpose() * at.by_lens.leftCols(count_);
     }
   }
-  turn_ = -turn_by_turn.ldlt().solve(turn_by_lens);
+  turn_ = -linear::Ldlt{turn_by_turn}.solveEach(turn_by_lens);
 }
 
 double MappingError::at(double u, double v) const {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/compare/traits/clusters.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -9,6 +8,7 @@
 
 #include "calib/compare/fits.h"
 #include "calib/compare/statistics.h"
+#include "calib/linear/linear.h"
 
 namespace toftwin::compare {
 namespace {
@@ -67,22 +67,21 @@ struct Weighed {
 /// What least squares makes of them for one λ.
 struct Solved {
   double lambda = 0.0;
-  Eigen::LDLT<MatrixXd> normal{};          ///< Xᵀ V⁻¹ X
+  linear::Ldlt normal{};                                   ///< Xᵀ V⁻¹ X
   VectorXd at{};
   double squares = 0.0, restricted = 0.0, deviance = 0.0;  ///< −2 ln of the likelihoods, less constants
-  [[nodiscard]] MatrixXd inverse() const { return normal.solve(MatrixXd::Identity(at.size(), at.size())); }
 };
 
 Solved solvedFor(const Weighed& of, double lambda) {
   const Index k = of.squares.cols() - 1;
   const MatrixXd left = of.squares - of.sums.transpose() * of.taken(lambda).asDiagonal() * of.sums;
-  Solved one{.lambda = lambda, .normal = Eigen::LDLT<MatrixXd>{left.topLeftCorner(k, k)}};
+  Solved one{.lambda = lambda, .normal = linear::Ldlt{left.topLeftCorner(k, k)}};
   one.at = one.normal.solve(left.col(k).head(k));
   one.squares = left(k, k) - left.col(k).head(k).dot(one.at);
   const double log_spread = of.log_own + (1.0 + lambda * of.sizes.array()).log().sum(),
                log_squares = std::log(one.squares);
   one.deviance = log_spread + static_cast<double>(of.n) * log_squares;
-  one.restricted = log_spread + one.normal.vectorD().cwiseAbs().array().log().sum() +
+  one.restricted = log_spread + one.normal.pivots().cwiseAbs().array().log().sum() +
                    static_cast<double>(of.n - k) * log_squares;
   return one;
 }
@@ -109,7 +108,7 @@ VectorXd beyondOwn(const ClusteredRows& all, const VectorXd& own, const Weighed&
   }
   const auto x = v_rows.leftCols(k);
   const VectorXd rest = v_rows.col(k) - x * one.at;
-  const VectorXd told = (x * one.inverse()).cwiseProduct(x).rowwise().sum();
+  const VectorXd told = (x * one.normal.inverse()).cwiseProduct(x).rowwise().sum();
   const double variance = one.squares / static_cast<double>(n - k);
   VectorXd beyond(n);
   for (Index i = 0; i < n; ++i) {
@@ -121,9 +120,9 @@ VectorXd beyondOwn(const ClusteredRows& all, const VectorXd& own, const Weighed&
 
 /// Of columns of length 1. The reciprocal condition alone does not see a pivot of exactly 0, as of two equal
 /// columns: Eigen's solve() then leaves that column out.
-bool isDetermined(const Eigen::LDLT<MatrixXd>& normal) {
+bool isDetermined(const linear::Ldlt& normal) {
   constexpr double kLeast = 1e-9;
-  const auto pivots = normal.vectorD();
+  const VectorXd pivots = normal.pivots();
   return pivots.minCoeff() > kLeast * pivots.maxCoeff() && normal.rcond() > kLeast;
 }
 
@@ -140,7 +139,7 @@ MatrixXd powersIn(const RowErrors& errors, Index n, Index free) {
     const VectorXd length = more.colwise().norm();
     if (more.cols() * kRowsForEach > free || !(length.minCoeff() > 0.0)) continue;
     const MatrixXd even = more * length.cwiseInverse().asDiagonal();
-    if (isDetermined(Eigen::LDLT<MatrixXd>{even.transpose() * even})) powers = std::move(more);
+    if (isDetermined(linear::Ldlt{even.transpose() * even})) powers = std::move(more);
   }
   return powers;
 }
@@ -161,7 +160,7 @@ OwnFit fitOwnVariances(const ClusteredRows& all, const MatrixXd& powers) {
   constexpr double kMost = 1.0, kNear = 1e-3;  // of exponents: at once, and not worth a further round
   OwnFit now{all, VectorXd::Ones(all.rows.rows())};
   if (powers.cols() == 0) return now;
-  const Eigen::LDLT<MatrixXd> normal{powers.transpose() * powers};
+  const linear::Ldlt normal{powers.transpose() * powers};
   VectorXd exponents = VectorXd::Zero(powers.cols());
   for (int round = 0; round < kRounds && now.best.squares > 0.0; ++round) {
     VectorXd step = normal.solve(powers.transpose() * beyondOwn(all, now.own, now.of, now.best));
@@ -191,7 +190,7 @@ struct Spread {
   Spread(const Weighed& of, const Solved& one, const VectorXd& known) {
     const Index k = one.at.size();
     const double free = static_cast<double>(of.n - k), variance = one.squares / free;
-    const MatrixXd inverse = one.inverse();
+    const MatrixXd inverse = one.normal.inverse();
     const VectorXd kept = (1.0 + one.lambda * of.sizes.array()).inverse();
     const MatrixXd means = kept.asDiagonal() * of.sums.leftCols(k);  // Zᵀ V⁻¹ X
     const VectorXd beyond = (known.array() - one.lambda * variance).cwiseMax(0.0),
@@ -227,7 +226,7 @@ std::optional<ClusterFit> fitInClusters(const std::vector<std::vector<double>>& 
   if (!all.rows.allFinite() || scale.minCoeff() <= 0.0) return std::nullopt;
   all.rows.leftCols(k) *= scale.cwiseInverse().asDiagonal();
   const auto x = all.rows.leftCols(k);
-  const Eigen::LDLT<MatrixXd> alike{x.transpose() * x};
+  const linear::Ldlt alike{x.transpose() * x};
   if (!isDetermined(alike)) return std::nullopt;
   // Less what rows that are all alike make of them, so that squares of residuals are no differences of large ones.
   const VectorXd first = alike.solve(x.transpose() * all.rows.col(k));
@@ -239,7 +238,7 @@ std::optional<ClusterFit> fitInClusters(const std::vector<std::vector<double>>& 
     known[all.of[i]] = std::max(known[all.of[i]], errors.shared[i] * errors.shared[i]);
   const Spread spread{of, best, known};
   const double free = static_cast<double>(n - k);
-  const MatrixXd covariance = best.inverse() * (best.squares / free) + spread.more;
+  const MatrixXd covariance = best.normal.inverse() * (best.squares / free) + spread.more;
   ClusterFit fit;
   fit.squares = best.squares, fit.n = y.size(), fit.degrees = spread.degrees, fit.deviance = best.deviance;
   fit.of_cluster = best.lambda * best.squares / free;
@@ -262,7 +261,7 @@ std::variant<ClusterSum, NoSum> sumInClusters(const std::vector<std::vector<doub
   if (!all.rows.allFinite()) return NoSum::FewRows;
   if (scale.minCoeff() <= 0.0) return NoSum::EmptyColumn;
   const MatrixXd x = all.rows.leftCols(k) * scale.cwiseInverse().asDiagonal();
-  const Eigen::LDLT<MatrixXd> normal{x.transpose() * x};
+  const linear::Ldlt normal{x.transpose() * x};
   if (!isDetermined(normal)) return NoSum::ColumnsAlike;
   VectorXd of = scale.cwiseInverse();
   of.head(static_cast<Index>(first)).setZero();
@@ -272,7 +271,7 @@ std::variant<ClusterSum, NoSum> sumInClusters(const std::vector<std::vector<doub
   MatrixXd z = MatrixXd::Zero(n, clusters);
   for (Index i = 0; i < n; ++i) z(i, all.of[static_cast<std::size_t>(i)]) = weights[i];
   const VectorXd part = z.transpose() * rest, own = z.colwise().squaredNorm();
-  z -= x * normal.solve(x.transpose() * z);
+  z -= x * normal.solveEach(x.transpose() * z);
   const MatrixXd seen = z.transpose() * z;
   if (!(seen.diagonal().array() > 1e-9 * own.array()).all()) return NoSum::OneCluster;
   const VectorXd more = own.cwiseQuotient(seen.diagonal());

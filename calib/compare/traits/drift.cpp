@@ -12,6 +12,7 @@
 #include "calib/compare/traits/least_squares.h"
 #include "calib/compare/traits/linearised.h"
 #include "calib/compare/traits/uneven.h"
+#include "calib/linear/linear.h"
 
 namespace toftwin::compare {
 namespace {
@@ -72,14 +73,14 @@ class DecayGrid {
   [[nodiscard]] std::vector<double> one() const {
     std::vector<double> best{0.0, 0.0, 0.0};
     double most = -1.0;
-    for (int k = 1; k <= size(); ++k) keepBetter(std::array{0, k}, most, best);
+    for (int k = 1; k <= size(); ++k) keepBetter({0, k}, most, best);
     return best;
   }
   [[nodiscard]] std::vector<double> two() const {
     std::vector<double> best{0.0, 0.0, 0.0, 0.0, 0.0};
     double most = -1.0;
     for (int k = 1; k <= size(); ++k) {
-      for (int l = k + 1; l <= size(); ++l) keepBetter(std::array{0, k, l}, most, best);
+      for (int l = k + 1; l <= size(); ++l) keepBetter({0, k, l}, most, best);
     }
     return best;
   }
@@ -88,16 +89,12 @@ class DecayGrid {
   [[nodiscard]] Eigen::Index size() const { return static_cast<Eigen::Index>(log_taus_.size()); }
 
   /// What amplitudes x of some columns explain, xᵀ(Bᵀy), if it is more than `most`.
-  template <std::size_t N>
-  void keepBetter(const std::array<int, N>& columns, double& most, std::vector<double>& best) const {
-    constexpr int kSize = static_cast<int>(N);
-    const Eigen::Matrix<double, kSize, kSize> normal = products_(columns, columns);
-    const Eigen::Matrix<double, kSize, 1> right = with_y_(columns);
-    const Eigen::Matrix<double, kSize, 1> x = normal.ldlt().solve(right);
+  void keepBetter(const std::vector<int>& columns, double& most, std::vector<double>& best) const {
+    const VectorXd right = with_y_(columns), x = linear::Ldlt{products_(columns, columns)}.solve(right);
     if (const double explained = x.dot(right); x.allFinite() && explained > most) {
       most = explained;
       best = {x[0]};
-      for (std::size_t k = 1; k < N; ++k)
+      for (std::size_t k = 1; k < columns.size(); ++k)
         best.insert(best.end(),
                     {x[static_cast<int>(k)], log_taus_[static_cast<std::size_t>(columns[k] - 1)]});
     }
@@ -293,7 +290,7 @@ std::optional<Chosen> chosenOf(const Candidates& candidates, Column t, std::vect
 void tellErrorsByRows(Chosen& chosen, Column t) {
   const Model model = chosen.model->over(t);
   const MatrixXd j = jacobian(model, chosen.y.size(), chosen.fit.at);
-  const MatrixXd from_rows = (j.transpose() * j).ldlt().solve(j.transpose());
+  const MatrixXd from_rows = linear::Ldlt{j.transpose() * j}.solveEach(j.transpose());
   const Eigen::ArrayXd told = (j * from_rows).diagonal().array().min(0.99);
   const VectorXd left = (residuals(model, chosen.y, chosen.fit.at).array() / (1.0 - told)).matrix();
   const MatrixXd covariance = from_rows * left.cwiseAbs2().asDiagonal() * from_rows.transpose();

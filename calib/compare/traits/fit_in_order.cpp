@@ -2,7 +2,6 @@
 // Rows whose neighbours err alike: what is told of them is less certain than of as many independent ones.
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -11,6 +10,7 @@
 
 #include "calib/compare/traits/linearised.h"
 #include "calib/compare/traits/uneven.h"
+#include "calib/linear/linear.h"
 
 namespace toftwin::compare {
 namespace {
@@ -56,12 +56,12 @@ class Whitened {
   };
   [[nodiscard]] Seen by(double rho) const {
     const MatrixXd m = m0_ - rho * m1_ + rho * rho * m2_;
-    const Eigen::LLT<MatrixXd> normal{m.topLeftCorner(k_, k_)};
+    const linear::Ldlt normal{m.topLeftCorner(k_, k_)};
     const VectorXd right = m.topRightCorner(k_, 1), step = normal.solve(right);
     const double free = static_cast<double>(n_ - k_),
                  squares = std::max(m(k_, k_) - right.dot(step), 1e-12 * m(k_, k_)),
-                 log_det = 2.0 * normal.matrixLLT().diagonal().array().log().sum();
-    const MatrixXd inverse = normal.solve(MatrixXd::Identity(k_, k_));
+                 log_det = normal.pivots().array().log().sum();
+    const MatrixXd inverse = normal.inverse();
     return {.log_likelihood = -0.5 * (free * std::log(squares) + log_det - std::log(1.0 - rho * rho)),
             .deviance = static_cast<double>(n_) * std::log(squares) - std::log(1.0 - rho * rho),
             .variance = squares / free,

@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
 #include <boost/math/distributions/beta.hpp>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
@@ -11,6 +10,7 @@
 
 #include "calib/compare/statistics.h"
 #include "calib/compare/traits/linearised.h"
+#include "calib/linear/linear.h"
 
 namespace toftwin::compare {
 namespace {
@@ -56,10 +56,9 @@ std::optional<MatrixXd> inverseOfNormal(const MatrixXd& j) {
   const VectorXd scale = j.colwise().norm();
   if (!scale.allFinite() || scale.minCoeff() <= 0.0) return std::nullopt;
   const MatrixXd unit = j * scale.cwiseInverse().asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver{unit.transpose() * unit};
-  if (solver.eigenvalues().minCoeff() < 1e-10) return std::nullopt;
-  const MatrixXd inverse = solver.eigenvectors() * solver.eigenvalues().cwiseInverse().asDiagonal() *
-                           solver.eigenvectors().transpose();
+  const auto [values, vectors] = linear::eigenpairs(unit.transpose() * unit);
+  if (values.minCoeff() < 1e-10) return std::nullopt;
+  const MatrixXd inverse = linear::composed(vectors, values.cwiseInverse());
   return MatrixXd{scale.cwiseInverse().asDiagonal() * inverse * scale.cwiseInverse().asDiagonal()};
 }
 
@@ -140,7 +139,7 @@ std::optional<Fit> fitLeastSquares(const Model& model, Column y, std::vector<dou
     for (int attempt = 0; attempt < 30 && !is_better; ++attempt) {
       MatrixXd damped = normal;
       damped.diagonal() += damping * normal.diagonal().cwiseMax(1e-300);
-      const auto there = moved(p, damped.ldlt().solve(gradient));
+      const auto there = moved(p, linear::Ldlt{damped}.solve(gradient));
       const VectorXd then = residuals(model, y, there);
       is_better = then.allFinite() && then.squaredNorm() <= r.squaredNorm();
       damping *= is_better ? 0.2 : 5.0;

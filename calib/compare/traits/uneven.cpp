@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/compare/traits/uneven.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <numeric>
+
+#include "calib/linear/linear.h"
 
 namespace toftwin::compare {
 namespace {
@@ -48,7 +49,8 @@ VectorXd squaresBetweenNeighbours(Column left, Column x) {
 bool areUneven(const MatrixXd& z, const VectorXd& squares) {
   constexpr double kWrong = 0.01, kTogether = 1.5;
   const VectorXd about = squares.array() - squares.mean();
-  const VectorXd told = z * z.colPivHouseholderQr().solve(about);
+  const MatrixXd span = linear::basisOf(z);
+  const VectorXd told = span * (span.transpose() * about);
   const double most = kTogether * boost::math::quantile(
       boost::math::complement(boost::math::chi_squared{static_cast<double>(z.cols())}, kWrong));
   return static_cast<double>(z.rows()) * told.squaredNorm() > most * about.squaredNorm();
@@ -59,7 +61,7 @@ bool areUneven(const MatrixXd& z, const VectorXd& squares) {
 VectorXd variancesBy(const MatrixXd& z, const VectorXd& squares) {
   constexpr int kRounds = 30;
   constexpr double kMost = 1.0, kNear = 1e-4;
-  const Eigen::LDLT<MatrixXd> normal{z.transpose() * z};
+  const linear::Ldlt normal{z.transpose() * z};
   VectorXd gamma = VectorXd::Zero(z.cols()), variance = VectorXd::Ones(z.rows());
   for (int round = 0; round < kRounds; ++round) {
     VectorXd relative = squares.cwiseQuotient(variance);

@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 #include <toftwin/units.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <boost/math/distributions/fisher_f.hpp>
 #include <boost/math/distributions/non_central_f.hpp>
@@ -12,6 +12,7 @@
 #include <numbers>
 
 #include "calib/compare/statistics.h"
+#include "calib/linear/linear.h"
 
 namespace toftwin::compare {
 namespace {
@@ -118,7 +119,7 @@ MatrixXd shownBy(const std::vector<Wave>& fitted, const std::vector<Wave>& other
   MatrixXd model(static_cast<Index>(distance_m.size()), static_cast<Index>(2 + 2 * fitted.size()));
   model.leftCols(2) = withLine(distance_m), model.rightCols(model.cols() - 2) = partsOf(fitted, distance_m);
   model.col(1).array() -= from_m;
-  return model.colPivHouseholderQr().solve(partsOf(others, distance_m));
+  return linear::leastSquares(model, partsOf(others, distance_m));
 }
 
 }  // namespace
@@ -128,7 +129,7 @@ std::optional<Trait> wavesTogether(const Fit& fit, std::size_t first, const std:
   const auto count = static_cast<Index>(2 * waves.size());
   if (count == 0 || fit.at.size() < first + 2 * waves.size()) return std::nullopt;
   const MatrixXd line = withLine(distance_m), all = partsOf(waves, distance_m);
-  const MatrixXd parts = all - line * line.colPivHouseholderQr().solve(all);
+  const MatrixXd parts = all - line * linear::leastSquares(line, all);
   const MatrixXd q = parts.transpose() * parts, v = covarianceOf(fit, first, count), qv = q * v;
   const auto at = Eigen::Map<const Eigen::VectorXd>(fit.at.data() + first, count);
   const double seen = at.dot(q * at), by_errors = qv.trace(), squares = (qv * qv).trace();
@@ -178,8 +179,7 @@ std::vector<std::string> doubtsOf(const std::vector<Wave>& fitted, const std::ve
       // Of all phases the one that does most: the 2 × 2 block's largest singular value.
       const Eigen::Matrix2d block =
           shown.block<2, 2>(static_cast<Index>(2 + 2 * w), static_cast<Index>(2 * k));
-      const double share = std::sqrt(
-          (block.transpose() * block).eval().selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff());
+      const double share = std::sqrt(linear::eigenvalues(block.transpose() * block).maxCoeff());
       if (!(share > most)) continue;
       most = share;
       doubts[w] = fmt::format(

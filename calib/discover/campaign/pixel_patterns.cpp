@@ -21,6 +21,7 @@
 #include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/rows.h"
 #include "calib/discover/marginal.h"
+#include "calib/linear/linear.h"
 
 namespace toftwin::discover {
 namespace {
@@ -81,7 +82,7 @@ std::vector<CampaignRows::PerChannel> CampaignRows::whatIsLeft() const {
     own.diagonal().array() += 1.0;  // deviations of 1 beforehand
     const Eigen::VectorXd moment = one.moment - one.gram * common;
     Eigen::VectorXd all = common;
-    const Eigen::VectorXd of_own = moment(random), stood = own.ldlt().solve(of_own);
+    const Eigen::VectorXd of_own = moment(random), stood = linear::Ldlt{own}.solve(of_own);
     all(random) = stood;
     for (std::size_t k = 0; k < kChannels; ++k) {
       const Eigen::MatrixXf& columns = rows_[c].base.columns[k];

@@ -7,6 +7,7 @@
 
 #include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/reading.h"
+#include "calib/linear/linear.h"
 #include "sim/images/rows.h"
 
 namespace toftwin::discover {
@@ -446,7 +447,7 @@ Result<std::vector<std::shared_ptr<const TracedCapture>>> traceWhereTheyStood(
     const Eigen::MatrixXd gram =
         one.gram.block<kOwn, kOwn>(2, 2) + Eigen::MatrixXd::Identity(kOwn, kOwn);  // prior deviations of 1
     const Eigen::VectorXd own =
-        gram.ldlt().solve(one.moment.segment<kOwn>(2) - one.gram.block<kOwn, 2>(2, 0) * common);
+        linear::Ldlt{gram}.solve(one.moment.segment<kOwn>(2) - one.gram.block<kOwn, 2>(2, 0) * common);
     Stood& here = stood.emplace_back();
     for (std::size_t way = 0; way < here.size(); ++way)
       here[way] = std::clamp(own[static_cast<Eigen::Index>(way)], -10.0, 10.0);
