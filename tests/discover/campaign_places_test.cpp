@@ -42,5 +42,19 @@ TEST_F(OfAnotherPlace, ASecondImageIsAKernelAboutTheMirroredPlace) {
   EXPECT_GT(finding.judgement->removed, 0.7) << verdictOf(finding);
 }
 
+/// What turns the image need not be at the principal point: what squares about that leave goes along columns and rows,
+/// and was told as a second effect.
+TEST_F(OfAnotherPlace, ASecondImageAboutAPointBesideThePrincipalOneIsOneEffect) {
+  const CampaignFinding finding = searchWithout("lens_ghost", "share = 0.02\nright_px = 1\ndown_px = -1");
+  ASSERT_EQ(finding.effects.size(), 1U) << verdictOf(finding);
+  EXPECT_THAT(finding.effects.front().found.covariates, Contains("mirrored")) << verdictOf(finding);
+  ASSERT_TRUE(finding.effects.front().fitted);
+  const auto& mirror = std::get<sim::LearnedMirror>(finding.effects.front().fitted->effect);
+  EXPECT_NEAR(mirror.right, 1.0, 0.5);
+  EXPECT_NEAR(mirror.down, -1.0, 0.5);
+  ASSERT_TRUE(finding.judgement);
+  EXPECT_GT(finding.judgement->removed, 0.9) << verdictOf(finding);
+}
+
 }  // namespace
 }  // namespace toftwin::discover

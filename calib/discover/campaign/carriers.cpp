@@ -32,6 +32,10 @@ constexpr std::string_view kMirrored = "mirrored";
 /// Of squares about the mirrored place: a second image may be sharp, and seldom is.
 constexpr std::array kMirroredReaches{0, 3, 10};
 std::string mirroredName(int reach) { return fmt::format("{}:{}px", kMirrored, reach); }
+/// By how much the light changes where the mirrored place lies farther right or down: what turns the image need not be
+/// at its principal point, and squares about another place leave light that goes along columns and rows.
+constexpr std::string_view kMirroredRight = "mirrored:right", kMirroredDown = "mirrored:down";
+constexpr int kMirroredStep = 3;  // pixels each way; of squares as large
 
 using Phasors = Image<std::complex<float>>;
 
@@ -48,6 +52,18 @@ Phasors mirrored(const Phasors& z, const CameraInfo& camera) {
     }
   }
   return turned;
+}
+
+/// From what lies (right, down) against the mirrored place to what lies that much on its other side.
+Phasors acrossMirrored(const Phasors& turned, int right, int down) {
+  const auto at = [&](int x, int y) {
+    const bool is_inside = x >= 0 && x < turned.width() && y >= 0 && y < turned.height();
+    return is_inside ? turned(x, y) : std::complex<float>{};  // dark beyond the image's edge
+  };
+  Phasors change(turned.width(), turned.height());
+  for (int y = 0; y < change.height(); ++y)
+    for (int x = 0; x < change.width(); ++x) change(x, y) = at(x - right, y - down) - at(x + right, y + down);
+  return change;
 }
 
 /// How z changes as a pixel looks one pixel farther out, or in, than before: towards the next pixels on that
@@ -118,6 +134,11 @@ std::map<std::string, Reading> carriersOf(const sim::SensorModel& model, const R
     const Phasors mean = sim::boxMean(turned, reach);
     all.emplace(mirroredName(reach),
                 changeBy(over(z, [&](std::size_t i) { return 0.01F * mean[i]; }), period_m));
+  }
+  const Phasors smooth = sim::boxMean(turned, kMirroredStep);
+  for (const auto& [carrier, right] : {std::pair{kMirroredRight, true}, std::pair{kMirroredDown, false}}) {
+    const Phasors change = acrossMirrored(smooth, right ? kMirroredStep : 0, right ? 0 : kMirroredStep);
+    all.emplace(carrier, changeBy(over(z, [&](std::size_t i) { return 0.01F * change[i]; }), period_m));
   }
   for (const auto& [carrier, out] : {std::pair{kOutwardCarrier, 1.0}, std::pair{kInwardCarrier, -1.0}}) {
     const Phasors change = changeTowards(z, model.camera(), out);
@@ -191,6 +212,8 @@ std::vector<TermGroup> carrierGroups(std::span<const CovariateInfo> covariates, 
   groups.push_back(std::move(light));
   TermGroup ghost{"light from the mirrored place", Kind::Generic, {}, 0};
   for (const int reach : kMirroredReaches) ghost.terms.push_back({{}, Stage::Light, mirroredName(reach)});
+  for (const std::string_view carrier : {kMirroredRight, kMirroredDown})
+    ghost.terms.push_back({{}, Stage::Light, std::string{carrier}});
   groups.push_back(std::move(ghost));
   groups.push_back({"stray light, the same in all pixels",
                     Kind::Generic,
@@ -252,6 +275,12 @@ std::optional<int> reachOfNeighbours(std::string_view carrier) {
 std::optional<int> reachOfMirrored(std::string_view carrier) {
   for (const int reach : kMirroredReaches)
     if (carrier == mirroredName(reach)) return reach;
+  return std::nullopt;
+}
+
+std::optional<std::array<double, 2>> mirrorMovedBy(std::string_view carrier) {
+  if (carrier == kMirroredRight) return std::array{double{kMirroredStep}, 0.0};
+  if (carrier == kMirroredDown) return std::array{0.0, double{kMirroredStep}};
   return std::nullopt;
 }
 

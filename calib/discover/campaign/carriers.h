@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <map>
 #include <optional>
 #include <span>
@@ -53,6 +54,9 @@ bool isNoOffset(std::span<const Reading> changes);
 std::optional<int> reachOfNeighbours(std::string_view carrier);
 /// The same of a carrier "mirrored:…".
 std::optional<int> reachOfMirrored(std::string_view carrier);
+/// Where the point that the image is turned about moves, right and down in pixels, as such a carrier's coefficient grows
+/// by all of the second image's light.
+std::optional<std::array<double, 2>> mirrorMovedBy(std::string_view carrier);
 /// The carriers of light from one pixel farther out, and farther in: what the lens is not as the camera file
 /// says. They are the same but for the sign where light is straight from pixel to pixel.
 inline constexpr std::string_view kOutwardCarrier = "outward", kInwardCarrier = "outward:in";

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <numbers>
+#include <numeric>
 #include <set>
 #include <type_traits>
 #include <utility>
@@ -203,7 +204,14 @@ std::optional<LearnedEffect> kernelOf(const Along& along, const CameraInfo& came
   }
   if (free.empty()) return std::nullopt;
   if constexpr (std::is_same_v<Kernel, sim::LearnedMirror>) {
+    constexpr double kMost = 2.0;  // farther off, the first order says nothing
+    const double light = std::accumulate(kernel.shares_percent.begin(), kernel.shares_percent.end(), 0.0);
     kernel.right = kernel.down = 0.0;  // where the carrier was mirrored
+    for (const auto& [term, coefficient] : along.terms) {
+      const auto by = mirrorMovedBy(term.carrier);
+      if (!by || !term.factors.empty() || !(std::abs(coefficient) < kMost * std::abs(light))) continue;
+      kernel.right += coefficient / light * (*by)[0], kernel.down += coefficient / light * (*by)[1];
+    }
     free.insert(free.end(), {"right_px", "down_px"});
   }
   return LearnedEffect{std::move(kernel), std::move(free)};
