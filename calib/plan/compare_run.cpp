@@ -274,7 +274,8 @@ Result<std::filesystem::path> compareRun(const CompareRunJob& job, compare::Prog
   auto run = compareAll(job, *files, records, progress);
   if (!run) return run.error();
   run->plan = files->plan.name, run->is_locked = job.locked;
-  auto made_with = settingsOf(files->plan, records, *hash);
+  const auto planned = std::ranges::count(files->schedule.captures, job.locked, &PlannedCapture::is_locked);
+  auto made_with = settingsOf(files->plan, records, static_cast<std::size_t>(planned), *hash);
   run->settings.insert(run->settings.begin(), made_with.begin(), made_with.end());
   run->warnings = warningsOf(*files, *index, records);
   progress.begin();

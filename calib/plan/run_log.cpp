@@ -96,13 +96,16 @@ class Statement {
 };
 
 constexpr const char* kRunColumns =
-    "run.id, judged, began, folder, plan, camera_a, camera_b, software, note, index_sha256, locked";
+    "run.id, judged, began, folder, plan, camera_a, camera_b, software, note, index_sha256, locked, "
+    "(SELECT s.value FROM setting s WHERE s.run = run.id AND s.of = '' AND s.name = 'captures'), "
+    "(SELECT s.value FROM setting s WHERE s.run = run.id AND s.of = '' AND s.name = 'captures_planned')";
 
 LoggedRun runFrom(Statement& row) {
   LoggedRun run;
   run.id = row.number(), run.judged = row.text(), run.began = row.text(), run.folder = row.text();
   run.plan = row.text(), run.camera_a = row.text(), run.camera_b = row.text(), run.software = row.text();
   run.note = row.text(), run.index_sha256 = row.text(), run.is_locked = row.number() != 0;
+  run.captures = row.number(), run.planned = row.number();
   return run;
 }
 
@@ -125,8 +128,12 @@ Result<> writeSettings(sqlite3* database, std::int64_t id, const LoggedRun& run)
 }
 
 Result<> write(sqlite3* database, const LoggedRun& run, const RunTraits& traits) {
-  Statement remove{database, "DELETE FROM run WHERE index_sha256 = ? AND locked = ?"};
-  if (auto done = remove.bind(run.index_sha256).bind(std::int64_t{run.is_locked}).run(); !done) return done;
+  // The same captures, or those of a run that has gone on since.
+  Statement remove{database,
+                   "DELETE FROM run WHERE locked = ? AND (index_sha256 = ? OR (began = ? AND folder = ? AND plan = ? "
+                   "AND camera_a = ? AND camera_b = ?))"};
+  remove.bind(std::int64_t{run.is_locked}).bind(run.index_sha256).bind(run.began).bind(run.folder).bind(run.plan);
+  if (auto done = remove.bind(run.camera_a).bind(run.camera_b).run(); !done) return done;
   Statement insert{
       database,
       "INSERT INTO run (judged, began, folder, plan, camera_a, camera_b, software, note, index_sha256, "

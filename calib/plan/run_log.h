@@ -26,6 +26,9 @@ struct LoggedRun {
       index_sha256{};  ///< of its index.jsonl: the same captures judged again take the old entry's place
   bool is_locked = false;
   std::vector<RunSetting> settings{};  ///< written with it; settings() reads them
+  std::int64_t captures = 0, planned = 0;  ///< of its settings, where it is read; 0: not known
+  /// It was judged before all of its plan was measured.
+  [[nodiscard]] bool isUnfinished() const { return captures < planned; }
 };
 
 /// One number of one run.

@@ -36,7 +36,7 @@ CameraName cameraNameOf(const std::string& text) {
 }
 
 std::vector<RunSetting> settingsOf(const Plan& plan, const std::vector<CaptureRecord>& records,
-                                   const std::string& index_sha256) {
+                                   std::size_t planned, const std::string& index_sha256) {
   std::set<double> exposures, ambients;
   std::set<std::string> poses_by;
   for (const CaptureRecord& one : records) {
@@ -46,6 +46,7 @@ std::vector<RunSetting> settingsOf(const Plan& plan, const std::vector<CaptureRe
   return {{"", "plan", plan.name},
           {"", "plan_seed", std::to_string(plan.seed)},
           {"", "captures", std::to_string(records.size())},
+          {"", "captures_planned", std::to_string(planned)},
           {"", "exposure_us", valuesOf(exposures)},
           {"", "ambient_klx", valuesOf(ambients)},
           {"", "pose_by", fmt::format("{}", fmt::join(poses_by, ", "))},

@@ -12,43 +12,65 @@
 namespace toftwin::plan {
 namespace {
 
-std::string camerasOf(const LoggedTrait& one) {
-  if (one.trait.of == "A") return one.run.camera_a;
-  if (one.trait.of == "B") return one.run.camera_b;
-  return fmt::format("{} and {}", one.run.camera_a, one.run.camera_b);
+std::string camerasOf(const std::string& of, const LoggedRun& run) {
+  if (of == "A") return run.camera_a;
+  if (of == "B") return run.camera_b;
+  return fmt::format("{} and {}", run.camera_a, run.camera_b);
+}
+
+bool isOfTheSame(const LoggedRun& run, const LoggedTrait& one) {
+  return run.plan == one.run.plan && run.is_locked == one.run.is_locked &&
+         camerasOf(one.trait.of, run) == camerasOf(one.trait.of, one.run);
 }
 
 auto keyOf(const LoggedTrait& one) {
   return std::tuple{one.trait.what,       one.trait.trait.name, one.trait.trait.unit, one.trait.of,
-                    camerasOf(one), one.run.plan,         one.run.is_locked};
+                    camerasOf(one.trait.of, one.run), one.run.plan, one.run.is_locked};
 }
 
 std::string titleOf(const LoggedTrait& one) {
   const compare::Trait& trait = one.trait.trait;
   return fmt::format("{}: {} [{}], {} {}, plan \"{}\"{}", one.trait.what, trait.name, trait.unit, one.trait.of,
-                     camerasOf(one), one.run.plan, one.run.is_locked ? ", locked captures" : "");
+                     camerasOf(one.trait.of, one.run), one.run.plan, one.run.is_locked ? ", locked captures" : "");
 }
 
-TrendRow heldAgainst(const LoggedTrait& first, const LoggedTrait& now, double wider) {
-  const auto change = compare::differenceOf(first.trait.trait, now.trait.trait, wider);
-  return {.at = now, .change = change.value, .low = change.low, .high = change.high};
+/// Rows by when their runs began, and which of them is the first.
+TrendSeries seriesOf(const std::vector<const LoggedTrait*>& numbers, const std::vector<LoggedRun>& runs) {
+  TrendSeries series{.title = titleOf(*numbers.front())};
+  for (const LoggedTrait* one : numbers) series.rows.push_back({.at = *one});
+  for (const LoggedRun& run : runs) {
+    const bool is_told = std::ranges::any_of(numbers, [&](const auto* one) { return one->run.id == run.id; });
+    if (!is_told && isOfTheSame(run, *numbers.front())) series.rows.push_back({.at = {.run = run}, .is_told = false});
+  }
+  std::ranges::stable_sort(series.rows, {}, [](const TrendRow& row) { return row.at.run.began; });
+  auto first = std::ranges::find_if(series.rows,
+                                    [](const TrendRow& row) { return row.is_told && !row.at.run.isUnfinished(); });
+  if (first == series.rows.end()) first = std::ranges::find(series.rows, true, &TrendRow::is_told);
+  first->is_first = true;
+  return series;
+}
+
+void holdAgainstFirst(TrendSeries& series, double wider) {
+  const compare::Trait first = std::ranges::find(series.rows, true, &TrendRow::is_first)->at.trait.trait;
+  for (TrendRow& row : series.rows) {
+    if (!row.is_told) continue;
+    const auto change = compare::differenceOf(first, row.at.trait.trait, wider);
+    row.change = change.value, row.low = change.low, row.high = change.high;
+  }
 }
 
 }  // namespace
 
-std::vector<TrendSeries> trendsOf(const std::vector<LoggedTrait>& traits) {
-  std::map<decltype(keyOf(traits.front())), std::vector<const LoggedTrait*>> series;
-  for (const LoggedTrait& one : traits) series[keyOf(one)].push_back(&one);
-  const double wider = compare::widenedFor(traits.size() - series.size());
+std::vector<TrendSeries> trendsOf(const std::vector<LoggedTrait>& traits, const std::vector<LoggedRun>& runs) {
+  std::map<decltype(keyOf(traits.front())), std::vector<const LoggedTrait*>> numbers;
+  for (const LoggedTrait& one : traits) numbers[keyOf(one)].push_back(&one);
   std::vector<TrendSeries> all;
-  for (auto& [key, numbers] : series) {
-    std::ranges::stable_sort(numbers, {}, [](const LoggedTrait* one) { return one->run.began; });
-    TrendSeries& now = all.emplace_back(TrendSeries{.title = titleOf(*numbers.front())});
-    for (const LoggedTrait* one : numbers) {
-      now.rows.push_back(heldAgainst(*numbers.front(), *one, wider));
-      now.rows.back().is_first = one == numbers.front();
-    }
+  std::size_t judged = 0;
+  for (const auto& [key, of_key] : numbers) {
+    all.push_back(seriesOf(of_key, runs));
+    judged += static_cast<std::size_t>(std::ranges::count_if(all.back().rows, &TrendRow::isJudged));
   }
+  for (TrendSeries& series : all) holdAgainstFirst(series, compare::widenedFor(judged));
   return all;
 }
 

@@ -8,14 +8,17 @@
 
 namespace toftwin::plan {
 
-/// A number of one run, held against the first run's.
+/// A number of one run, held against the first finished run's; of runs none of which is, the first's.
 struct TrendRow {
   LoggedTrait at{};
+  bool is_told = true;  ///< or the run does not tell the number, and `at` has only the run
   bool is_first = false;
   /// Value less the first's, with an interval that holds the changes of all rows together with 95 %; NaN where an
   /// end of an interval it is made from is not known.
   double change = 0.0, low = 0.0, high = 0.0;
-  [[nodiscard]] bool isChanged() const { return !is_first && (low > 0.0 || high < 0.0); }
+  /// A run that is not through may lack just those captures that would have made the number what it was.
+  [[nodiscard]] bool isJudged() const { return is_told && !is_first && !at.run.isUnfinished(); }
+  [[nodiscard]] bool isChanged() const { return isJudged() && (low > 0.0 || high < 0.0); }
 };
 
 /// One number over the runs of the same cameras and the same plan, by when they began.
@@ -24,8 +27,8 @@ struct TrendSeries {
   std::vector<TrendRow> rows{};
 };
 
-/// Series of what a log's traits() gave. Changes are compare::differenceOf(), widened for those of all series
-/// together.
-std::vector<TrendSeries> trendsOf(const std::vector<LoggedTrait>& traits);
+/// Series of what a log's traits() gave, with a row for each of its runs() of the same cameras and plan, whether it tells
+/// the number or not. Changes are compare::differenceOf(), widened for those that are judged, of all series together.
+std::vector<TrendSeries> trendsOf(const std::vector<LoggedTrait>& traits, const std::vector<LoggedRun>& runs = {});
 
 }  // namespace toftwin::plan

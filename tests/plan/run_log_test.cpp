@@ -206,6 +206,66 @@ TEST_F(Log, HoldsEachCameraAgainstItsOwnFirstRun) {
   EXPECT_EQ(trendsOf(*log->traits("twin", "drift", "")).size(), 3u);
 }
 
+/// A run that is not through has no change, whatever its numbers are; nor is it what others are held against.
+TEST_F(Log, CallsNoNumberOfAnUnfinishedRunChanged) {
+  auto log = RunLog::open(file_);
+  ASSERT_TRUE(log);
+  const auto taken = [](LoggedRun run, const char* captures) {
+    run.settings = {{"", "captures", captures}, {"", "captures_planned", "96"}};
+    return run;
+  };
+  ASSERT_TRUE(log->add(taken(run("2026-11-01T00:00:00Z", "aa"), "12"), drifts(50.0, 2.0)));
+  ASSERT_TRUE(log->add(taken(run("2026-11-02T00:00:00Z", "bb"), "96"), drifts(1.0, 2.0)));
+  ASSERT_TRUE(log->add(taken(run("2026-11-03T00:00:00Z", "cc"), "96"), drifts(7.0, 2.0)));
+  ASSERT_TRUE(log->add(taken(run("2026-11-04T00:00:00Z", "dd"), "40"), drifts(7.0, 2.0)));
+  const auto trends = trendsOf(*log->traits("kinect", "drift", ""), *log->runs());
+  ASSERT_EQ(trends.size(), 1u);
+  const auto& rows = trends.front().rows;
+  ASSERT_EQ(rows.size(), 4u);
+  EXPECT_TRUE(rows[0].at.run.isUnfinished() && rows[3].at.run.isUnfinished());
+  EXPECT_EQ(rows[3].at.run.captures, 40);
+  EXPECT_TRUE(rows[1].is_first);
+  EXPECT_EQ(rows[0].change, 49.0);
+  EXPECT_FALSE(rows[0].isChanged());
+  EXPECT_TRUE(rows[2].isChanged());
+  EXPECT_EQ(rows[3].change, 6.0);
+  EXPECT_FALSE(rows[3].isChanged());
+  // One change is judged, not three: its interval is 95 %'s own.
+  EXPECT_NEAR(rows[2].low, 6.0 - std::sqrt(2.0), 1e-12);
+}
+
+/// Else the row before would look like the newest run's.
+TEST_F(Log, SaysThatTheNewestRunDoesNotTellANumber) {
+  auto log = RunLog::open(file_);
+  ASSERT_TRUE(log);
+  ASSERT_TRUE(log->add(run("2026-11-01T00:00:00Z", "aa"), drifts(1.0, 2.0)));
+  LoggedRun newest = run("2026-11-02T00:00:00Z", "bb"), other = run("2026-11-03T00:00:00Z", "cc");
+  newest.settings = {{"", "captures", "3"}, {"", "captures_planned", "96"}};
+  other.camera_a = "kinect, Kinect v2 2";
+  RunTraits none;
+  none.untold = {"drift: too few captures"};
+  ASSERT_TRUE(log->add(newest, none) && log->add(other, none));
+  const auto trends = trendsOf(*log->traits("kinect", "drift", ""), *log->runs());
+  ASSERT_EQ(trends.size(), 1u);
+  ASSERT_EQ(trends.front().rows.size(), 2u) << "the other camera's run is none of this one's";
+  EXPECT_FALSE(trends.front().rows[1].is_told);
+  EXPECT_FALSE(trends.front().rows[1].isChanged());
+  EXPECT_TRUE(trends.front().rows[1].at.run.isUnfinished());
+}
+
+/// What was judged half-way is the same run.
+TEST_F(Log, HasARunThatWentOnOnce) {
+  auto log = RunLog::open(file_);
+  ASSERT_TRUE(log);
+  ASSERT_TRUE(log->add(run("2026-11-01T00:00:00Z", "aa"), drifts(1.0, 2.0)));
+  ASSERT_TRUE(log->add(run("2026-11-01T00:00:00Z", "bb"), drifts(3.0, 4.0)));
+  LoggedRun elsewhere = run("2026-11-01T00:00:00Z", "cc");
+  elsewhere.folder = "/runs/2";
+  ASSERT_TRUE(log->add(elsewhere, drifts(5.0, 6.0)));
+  ASSERT_EQ(log->runs()->size(), 2u);
+  EXPECT_EQ(log->runs()->front().index_sha256, "bb");
+}
+
 /// Intervals with a long and a short side: what counts are the sides that face each other.
 TEST(Trend, UsesTheSidesThatFaceEachOther) {
   const auto of = [](std::string began, double value, double low, double high) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -129,20 +130,40 @@ Result<Exit> showLog(const Options& options) {
   if (!runs) return runs.error();
   fmt::print("{:>4}  {:<20}  {:<14}  {:<28}  {:<28}  {}\n", "run", "began", "plan", "A", "B", "folder");
   for (const plan::LoggedRun& run : *runs)
-    fmt::print("{:>4}  {:<20}  {:<14}  {:<28}  {:<28}  {}{}\n", run.id, run.began, run.plan, run.camera_a,
-               run.camera_b, run.folder, run.is_locked ? " (locked captures)" : "");
+    fmt::print("{:>4}  {:<20}  {:<14}  {:<28}  {:<28}  {}{}{}\n", run.id, run.began, run.plan, run.camera_a,
+               run.camera_b, run.folder, run.is_locked ? " (locked captures)" : "",
+               run.isUnfinished() ? fmt::format(" ({} of {} captures)", run.captures, run.planned) : "");
   return Exit::Ok;
 }
 
+std::string unfinished(const plan::LoggedRun& run) {
+  return fmt::format("the run is unfinished ({} of {} captures)", run.captures, run.planned);
+}
+
 std::string verdictOn(const plan::TrendRow& row, const std::string& first_detail) {
-  if (row.is_first) return "the first";
+  const bool is_whole = !row.at.run.isUnfinished();
+  if (row.is_first) return is_whole ? "the first" : "the first; " + unfinished(row.at.run);
   const auto change = [](double by) { return (by > 0.0 ? "+" : "") + compare::shownDigits(by, 4); };
   std::string verdict = std::isfinite(row.low) && std::isfinite(row.high)
                             ? fmt::format("{} ({} to {}){}", change(row.change), change(row.low),
                                           change(row.high), row.isChanged() ? ": changed" : "")
                             : fmt::format("{}, not known how surely", change(row.change));
+  if (!is_whole) verdict += fmt::format("; {}, and this is called no change", unfinished(row.at.run));
   if (row.at.trait.detail != first_detail) verdict += fmt::format("; the first was {}", first_detail);
   return verdict;
+}
+
+void printRow(const plan::TrendRow& row, const std::string& first_detail) {
+  fmt::print("  run {:>4}  {:<20}  ", row.at.run.id, row.at.run.began);
+  if (!row.is_told) {
+    fmt::print("not told{}\n", row.at.run.isUnfinished() ? ": " + unfinished(row.at.run) : "");
+    return;
+  }
+  const compare::Trait& trait = row.at.trait.trait;
+  const std::string& detail = row.at.trait.detail;
+  fmt::print("{:>11}  ({} to {}) #{}{}{}  {}\n", compare::shownDigits(trait.value, 5),
+             compare::shownDigits(trait.low, 5), compare::shownDigits(trait.high, 5), trait.n,
+             detail.empty() ? "" : ", ", detail, verdictOn(row, first_detail));
 }
 
 /// Values over the runs, each against the first of the same number.
@@ -156,16 +177,12 @@ Result<Exit> showTrend(const Options& options) {
                  fmt::format("{}: nothing of a camera \"{}\", a characteristic \"{}\" and a number \"{}\"",
                              options.file, options.camera, options.characteristic, options.number)};
   }
-  for (const plan::TrendSeries& series : plan::trendsOf(*all)) {
+  const auto runs = log->runs();
+  if (!runs) return runs.error();
+  for (const plan::TrendSeries& series : plan::trendsOf(*all, *runs)) {
     fmt::print("{}\n", series.title);
-    for (const plan::TrendRow& row : series.rows) {
-      const compare::Trait& trait = row.at.trait.trait;
-      const std::string& detail = row.at.trait.detail;
-      fmt::print("  run {:>4}  {:<20}  {:>11}  ({} to {}) #{}{}{}  {}\n", row.at.run.id, row.at.run.began,
-                 compare::shownDigits(trait.value, 5), compare::shownDigits(trait.low, 5),
-                 compare::shownDigits(trait.high, 5), trait.n, detail.empty() ? "" : ", ", detail,
-                 verdictOn(row, series.rows.front().at.trait.detail));
-    }
+    const auto first = std::ranges::find(series.rows, true, &plan::TrendRow::is_first);
+    for (const plan::TrendRow& row : series.rows) printRow(row, first->at.trait.detail);
   }
   return Exit::Ok;
 }
