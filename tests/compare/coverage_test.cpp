@@ -430,7 +430,7 @@ std::vector<Planted> allPlanted() {
   std::vector<Planted> all;
   for (const auto& part :
        {drifts(), overDistance(), otherWays(), plantedScatter(), overTime(), atEdges(), ofFrames(),
-        plantedAlike()})
+        plantedAlike(), plantedBursts()})
     all.insert(all.end(), part.begin(), part.end());
   return all;
 }

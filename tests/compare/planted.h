@@ -39,5 +39,7 @@ struct Planted {
 std::vector<Planted> plantedScatter();
 /// Rows that err alike or scatter by their own measure, and parts that are not there.
 std::vector<Planted> plantedAlike();
+/// Lines and frames that err together.
+std::vector<Planted> plantedBursts();
 
 }  // namespace toftwin::compare

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
+#include "calib/compare/traits/bursts.h"
 #include "calib/compare/traits/least_squares.h"
 
 namespace toftwin::compare {
@@ -30,39 +32,74 @@ std::optional<Step> stepAt(const Image<float>& range, int x, int y) {
 
 double normalShare(double z) { return 0.5 * std::erfc(-z / std::numbers::sqrt2); }
 
+/// Where a row crosses from one surface to another.
+struct Crossing {
+  std::size_t edge = 0;  ///< the how manieth of its row
+  double offset = 0.0;   ///< where its pixel hangs, 0 near to 1 far; NaN: none does
+};
+
+/// By rows, and within a row by place.
+std::vector<Crossing> crossingsOf(const Image<float>& range_m) {
+  std::vector<Crossing> all;
+  for (int y = 0; y < range_m.height(); ++y) {
+    std::size_t edge = 0;
+    for (int x = 0; x < range_m.width(); ++x) {
+      if (!stepAt(range_m, x, y)) continue;
+      // One crossing, however many places of it see the step.
+      double offset = std::nan("");
+      for (; x < range_m.width() && stepAt(range_m, x, y); ++x) {
+        const auto there = *stepAt(range_m, x, y);
+        const double near = std::min(there.left, there.right), far = std::max(there.left, there.right);
+        const double share = (at(range_m, x, y) - near) / (far - near);
+        if (share > kHangs && share < 1.0 - kHangs && std::isnan(offset)) offset = share;
+      }
+      all.push_back({edge++, offset});
+    }
+  }
+  return all;
+}
+
+/// The same along one edge after the other.
+std::vector<Crossing> alongEdges(std::vector<Crossing> crossings) {
+  std::ranges::stable_sort(crossings, {}, &Crossing::edge);
+  return crossings;
+}
+
+/// The share of those that are so. Rows err in runs, be it as a whole or at one of their edges: by what is longer.
+template <class Is>
+Trait shareOf(const char* name, const std::vector<Crossing>& by_rows, const Is& is) {
+  const auto trialsOf = [&](const std::vector<Crossing>& crossings) {
+    Trials trials;
+    for (const Crossing& one : crossings) trials.add(is(one));
+    return trials;
+  };
+  return trialsOf(by_rows).share(name, trialsOf(alongEdges(by_rows)).together());
+}
+
+/// Where they hang on the mean, neighbours alike.
+Trait meanOffset(const std::vector<Crossing>& by_rows) {
+  std::vector<double> offsets, along_edges(by_rows.size());
+  std::vector<std::size_t> order(by_rows.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return by_rows[i].edge; });
+  for (std::size_t i = 0; i < order.size(); ++i) along_edges[order[i]] = static_cast<double>(i);
+  for (const Crossing& one : by_rows) offsets.push_back(one.offset);
+  const auto fit = fitInOrder([](std::span<const double> p, std::size_t) { return p[0]; }, offsets, {0.5}, along_edges);
+  return fit ? fit->trait("offset", "1", 0) : meanTrait("offset", "1", offsets);
+}
+
 }  // namespace
 
 Traits flyingTraits(const Image<float>& range_m) {
-  std::size_t crossings = 0, flying = 0, near_side = 0;
-  std::vector<double> offsets;
-  for (int y = 0; y < range_m.height(); ++y) {
-    for (int x = 0; x < range_m.width(); ++x) {
-      const auto step = stepAt(range_m, x, y);
-      if (!step) continue;
-      // One crossing, however many places of it see the step.
-      double offset = std::nan("");
-      int last = x;
-      for (; last < range_m.width() && stepAt(range_m, last, y); ++last) {
-        const auto there = *stepAt(range_m, last, y);
-        const double near = std::min(there.left, there.right), far = std::max(there.left, there.right);
-        const double share = (at(range_m, last, y) - near) / (far - near);
-        if (share > kHangs && share < 1.0 - kHangs && std::isnan(offset)) offset = share;
-      }
-      x = last;
-      ++crossings;
-      if (std::isnan(offset)) continue;
-      ++flying;
-      near_side += offset < 0.5 ? 1 : 0;
-      offsets.push_back(offset);
-    }
-  }
-  if (crossings < 4)
+  std::vector<Crossing> crossings = crossingsOf(range_m);
+  if (crossings.size() < 4)
     return undetermined("flying pixels", "fewer than four rows cross an edge between two surfaces");
-  std::vector<Trait> traits{shareTrait("flying", flying, crossings)};
+  std::vector<Trait> traits{shareOf("flying", crossings, [](const Crossing& one) { return !std::isnan(one.offset); })};
   // What does not fly hangs nowhere; of one pixel there is no interval.
-  if (flying > 1) {
-    traits.push_back(meanTrait("offset", "1", offsets));
-    traits.push_back(shareTrait("near side", near_side, flying));
+  std::erase_if(crossings, [](const Crossing& one) { return std::isnan(one.offset); });
+  if (crossings.size() > 1) {
+    traits.push_back(meanOffset(crossings));
+    traits.push_back(shareOf("near side", crossings, [](const Crossing& one) { return one.offset < 0.5; }));
   }
   return traits;
 }

@@ -203,17 +203,6 @@ ShareInterval shareInterval(double events, double trials, ShareRule rule) {
   return interval;
 }
 
-Trait shareTrait(std::string name, std::size_t k, std::size_t n) {
-  const double events = static_cast<double>(k), trials = static_cast<double>(n);
-  const auto [low, high] = shareInterval(events, trials, ShareRule::Jeffreys);
-  return {.name = std::move(name),
-          .unit = "1",
-          .value = n == 0 ? std::nan("") : events / trials,
-          .low = low,
-          .high = high,
-          .n = n};
-}
-
 Result<std::vector<std::vector<double>>> finiteRows(std::initializer_list<Column> columns, std::size_t least,
                                                     const char* of_what) {
   const std::size_t rows = columns.begin()->size();

@@ -71,18 +71,13 @@ double studentT(double degrees, double level = 0.95);
 /// Mean of independent values with its interval.
 Trait meanTrait(std::string name, std::string unit, Column values, double scale = 1.0);
 /// The interval of a share that holds it with 95 %, from k events in n independent trials, which need not be
-/// whole numbers. Jeffreys' holds 95 % on average over shares, Clopper and Pearson's (Biometrika 26 (1934)
-/// 404) at least 95 % of every share.
+/// whole numbers. Jeffreys' (L. D. Brown, T. T. Cai, A. DasGupta, Stat. Sci. 16 (2001) 101) holds 95 % on average
+/// over shares, Clopper and Pearson's (Biometrika 26 (1934) 404) at least that of every share, and 98 % of small ones.
 enum class ShareRule { Jeffreys, ClopperPearson };
 struct ShareInterval {
   double low = 0.0, high = 1.0;
 };
 ShareInterval shareInterval(double events, double trials, ShareRule rule);
-/// Share k of n independent trials, Jeffreys' interval (L. D. Brown, T. T. Cai, A. DasGupta, Stat. Sci. 16
-/// (2001) 101): it holds 95 % on average over shares, where Clopper and Pearson's holds at least that and 98
-/// % of small ones.
-Trait shareTrait(std::string name, std::size_t k, std::size_t n);
-
 /// Rows of several columns in which all are finite; Error if the columns differ in length or fewer than
 /// `least` are left.
 Result<std::vector<std::vector<double>>> finiteRows(std::initializer_list<Column> columns, std::size_t least,

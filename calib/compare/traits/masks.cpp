@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "calib/compare/statistics.h"
+#include "calib/compare/traits/bursts.h"
 #include "calib/compare/traits/least_squares.h"
 
 namespace toftwin::compare {
@@ -91,15 +92,16 @@ Result<ValidTraits> validTraits(Column valid_a, Column valid_b, Column valid_bot
 constexpr double kTick_s = 1e-9;
 
 Traits timingTraits(std::span<const std::vector<double>> starts_s) {
+  std::vector<std::vector<double>> series_of_intervals;
   std::vector<double> intervals;
   double latest_s = 0.0;
-  std::size_t frames = 0;
   for (const auto& series : starts_s) {
     const auto rows = finiteRows({series}, 1, "frame timing");
     if (!rows) continue;
     const auto& starts = rows->front();
-    frames += starts.size();
-    for (std::size_t i = 1; i < starts.size(); ++i) intervals.push_back(starts[i] - starts[i - 1]);
+    auto& of_series = series_of_intervals.emplace_back();
+    for (std::size_t i = 1; i < starts.size(); ++i) of_series.push_back(starts[i] - starts[i - 1]);
+    intervals.insert(intervals.end(), of_series.begin(), of_series.end());
     latest_s = std::max(latest_s, std::abs(starts.back()));
   }
   if (intervals.size() < 3) return undetermined("frame timing", "fewer than four frames say when they began");
@@ -107,11 +109,16 @@ Traits timingTraits(std::span<const std::vector<double>> starts_s) {
     return undetermined("frame timing", "frames must start one after the other");
   const double usual = quantile(intervals, 0.5);
   std::vector<double> whole;
-  std::size_t lost = 0;
-  for (const double one : intervals) {
-    const double periods = std::max(1.0, std::round(one / usual));
-    if (periods == 1.0) whole.push_back(one);
-    lost += static_cast<std::size_t>(periods) - 1;
+  Trials frames;  // that happen to be lost
+  for (const auto& of_series : series_of_intervals) {
+    frames.add(false);
+    for (const double one : of_series) {
+      const double periods = std::max(1.0, std::round(one / usual));
+      if (periods == 1.0) whole.push_back(one);
+      frames.add(true, static_cast<std::size_t>(periods) - 1);
+      frames.add(false);
+    }
+    frames.endSeries();
   }
   if (whole.size() < 2) return undetermined("frame timing", "hardly two frames follow each other without a gap");
   const Summary summary = summarise(whole);
@@ -128,7 +135,7 @@ Traits timingTraits(std::span<const std::vector<double>> starts_s) {
   Trait interval = meanTrait("interval", "ms", whole, 1e3);
   interval.low = std::min(interval.low, interval.value - tick_ms);
   interval.high = std::max(interval.high, interval.value + tick_ms);
-  return std::vector{interval, jitter, shareTrait("lost", lost, frames + lost)};
+  return std::vector{interval, jitter, frames.share("lost")};
 }
 
 Traits timingTraits(Column start_s) {
