@@ -182,6 +182,33 @@ std::vector<Planted> atPlaces() {
   return rows;
 }
 
+/// So many readings at a step of ambient light, whose errors are 2 + 0.12 E and scatter by `sigma`.
+struct LightStep {
+  double klx = 0.0;
+  int readings = 0;
+  double sigma = 1.0;
+};
+Planted ambientSteps(const char* name, Truth truth, const std::vector<LightStep>& steps) {
+  return {name, std::move(truth), [steps](Noise& noise) {
+            Columns klx, error, sigma;
+            for (const LightStep& step : steps) {
+              for (int i = 0; i < step.readings; ++i) {
+                klx.push_back(step.klx), error.push_back(2.0 + 0.12 * step.klx + noise(step.sigma));
+                sigma.push_back(sigmaOf(std::sqrt(90.0 + 0.5 * step.klx), 400, noise));
+              }
+            }
+            return ambientTraits(klx, error, sigma);
+          }};
+}
+
+/// Steps of which one has many readings and another few, or one that scatters more than another.
+std::vector<Planted> unevenSteps() {
+  return {ambientSteps("ambient, steps of 2 and 30 readings", {{"bias", 0.12}, {"noise²", 0.5}},
+                       {{0.0, 2}, {12.0, 30}, {24.0, 30}, {36.0, 30}, {48.0, 30}, {60.0, 2}}),
+          ambientSteps("ambient, six steps with errors of 0.6 to 1.8 mm", {{"bias", 0.12}},
+                       {{0.0, 10, 0.6}, {5.0, 10, 0.675}, {10.0, 10, 0.75}, {20.0, 10, 0.9}, {40.0, 10, 1.2}, {80.0, 10, 1.8}})};
+}
+
 /// Rows that scatter more here than there.
 Columns uneven(const Columns& x, Noise& noise, const std::function<double(double)>& f,
                const std::function<double(double)>& sigma) {
@@ -206,7 +233,7 @@ std::vector<Planted> unevenly() {
 
 std::vector<Planted> plantedAlike() {
   std::vector<Planted> all;
-  for (const auto& part : {alikeOverDistance(), alikeOverLight(), alikeOverTime(), atPlaces(), unevenly()}) all.insert(all.end(), part.begin(), part.end());
+  for (const auto& part : {alikeOverDistance(), alikeOverLight(), alikeOverTime(), atPlaces(), unevenSteps(), unevenly()}) all.insert(all.end(), part.begin(), part.end());
   return all;
 }
 

@@ -16,7 +16,8 @@ constexpr const char* kOfAmbient = "ambient-related error";
 /// Variances c + s E, each of which scatters in proportion to itself: of rows that are all weighted alike, the
 /// noisiest would tell s, and its interval would be that of the mean row. Weights are of the line itself,
 /// until it settles; those of the rows' own variances would pull it down.
-std::optional<Fit> lineOfVariances(const std::vector<double>& ambient, const std::vector<double>& variance) {
+std::optional<Fit> lineOfVariances(const std::vector<double>& ambient, const std::vector<double>& variance,
+                                   std::vector<double> own) {
   constexpr int kRounds = 30;
   constexpr double kLeast = 0.05, kSettled = 1e-6;  // of the median: a line may cross 0, a variance not
   const double least = kLeast * quantile(variance, 0.5);
@@ -41,7 +42,8 @@ std::optional<Fit> lineOfVariances(const std::vector<double>& ambient, const std
   }
   relative.clear();
   for (std::size_t i = 0; i < variance.size(); ++i) relative.push_back(variance[i] / expected[i]);
-  return fitInOrder(model, relative, at, ambient);
+  for (std::size_t i = 0; i < own.size(); ++i) own[i] /= expected[i];
+  return fitMeans(model, relative, own, at, ambient);
 }
 
 }  // namespace
@@ -53,8 +55,8 @@ Traits ambientTraits(Column ambient_klx, Column error_mm, Column sigma_mm) {
   const AtPlaces at = meansAtPlaces(std::move(*rows), 2);
   const auto &ambient = at.columns[0], &variance = at.columns[2];
   const Model straight = [&](std::span<const double> p, std::size_t i) { return p[0] + p[1] * ambient[i]; };
-  const auto bias = fitInOrder(straight, at.columns[1], {0.0, 0.0}, ambient),
-             noise = std::ranges::max(variance) > 0.0 ? lineOfVariances(ambient, variance)
+  const auto bias = fitMeans(straight, at.columns[1], at.own[1], {0.0, 0.0}, ambient),
+             noise = std::ranges::max(variance) > 0.0 ? lineOfVariances(ambient, variance, at.own[2])
                                                       : fitLeastSquares(straight, variance, {0.0, 0.0});
   if (!bias || !noise) return undetermined(kOfAmbient, "all illuminances are alike");
   std::vector told{bias->trait("bias", "mm/klx", 1), noise->trait("noise²", "mm²/klx", 1)};

@@ -275,6 +275,16 @@ double Fit::degreesOfRow() const {
   return even_share * 2.0 / (2.0 / degrees + std::max(0.0, mean_square - mean * mean));
 }
 
+std::optional<Fit> fitOver(Column sigmas, const Model& model, Column y, std::vector<double> start, Column x) {
+  auto fit = fitEvenly(over(model, sigmas), over(y, sigmas), std::move(start), x);
+  if (!fit) return fit;
+  double log_sigmas = 0.0, fourth = 0.0;
+  for (const double one : sigmas) log_sigmas += std::log(one), fourth += std::pow(one, 4);
+  fit->deviance += 2.0 * log_sigmas;
+  fit->even_share = static_cast<double>(y.size()) / fourth;
+  return fit;
+}
+
 std::optional<Fit> fitInOrder(const Model& model, Column y, std::vector<double> start, Column x) {
   auto fit = fitEvenly(model, y, std::move(start), x);
   // Few rows, those of an exact curve and those in doubt say nothing of their σ.
@@ -286,12 +296,8 @@ std::optional<Fit> fitInOrder(const Model& model, Column y, std::vector<double> 
     const VectorXd left = residuals(model, y, last.at);
     const auto sigmas = unevenSigmas({left.data(), left.data() + left.size()}, x, last.at.size());
     if (sigmas.empty()) break;
-    auto next = fitEvenly(over(model, sigmas), over(y, sigmas), last.at, x);
+    auto next = fitOver(sigmas, model, y, last.at, x);
     if (!next) break;
-    double log_sigmas = 0.0, fourth = 0.0;
-    for (const double one : sigmas) log_sigmas += std::log(one), fourth += std::pow(one, 4);
-    next->deviance += 2.0 * log_sigmas;
-    next->even_share = static_cast<double>(y.size()) / fourth;
     by_sigma = std::move(next);
   }
   return by_sigma ? by_sigma : fit;

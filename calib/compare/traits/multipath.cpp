@@ -36,9 +36,10 @@ std::vector<double> startAt(double length_m, double share, Column x, Column e) {
 
 /// Whether the rows speak for a fall from the edge against none, by more than what the choice among so many
 /// reaches makes of rows that show nothing.
-bool isSeen(const Fit& fall, Column x, Column e) {
+bool isSeen(const Fit& fall, const AtPlaces& rows) {
   constexpr double kPositive = 2.0;  // evidence (Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773)
-  const auto none = fitInOrder([](std::span<const double> p, std::size_t) { return p[0]; }, e, {0.0}, x);
+  const Model constant = [](std::span<const double> p, std::size_t) { return p[0]; };
+  const auto none = fitMeans(constant, rows.columns[1], rows.own[1], {0.0}, rows.columns[0]);
   return none && none->bic() - fall.bic() > kPositive;
 }
 
@@ -61,9 +62,9 @@ Traits cornerTraits(Column distance_to_edge_m, Column error_mm) {
     auto tried = fitLeastSquares(model, e, startAt(share * reach, share, x, e));
     if (tried && (!fit || tried->squares < fit->squares)) fit = std::move(tried);
   }
-  if (fit) fit = fitInOrder(model, e, fit->at, x);
+  if (fit) fit = fitMeans(model, e, rows.own[1], fit->at, x);
   constexpr double kMostReaches = 10.0;  // then it bends by a twentieth of itself, and passes for a line
-  if (!fit || fit->at[2] > std::log(kMostReaches) || !isSeen(*fit, x, e))
+  if (!fit || fit->at[2] > std::log(kMostReaches) || !isSeen(*fit, rows))
     return undetermined("corner", "the error does not fall off from the edge");
   constexpr double kMostAway = 10.0;  // of what the nearest row shows
   if (std::ranges::min(x) > std::log(kMostAway) * reach * std::exp(fit->at[2])) {

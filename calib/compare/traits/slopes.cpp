@@ -15,8 +15,8 @@ namespace {
 std::optional<Fit> line(std::vector<std::vector<double>> columns) {
   const AtPlaces rows = meansAtPlaces(std::move(columns), 2);
   const auto &x = rows.columns[0], &y = rows.columns[1];
-  auto fit = fitInOrder([&](std::span<const double> p, std::size_t i) { return p[0] + p[1] * x[i]; }, y,
-                        {0.0, 0.0}, x);
+  const Model straight = [&](std::span<const double> p, std::size_t i) { return p[0] + p[1] * x[i]; };
+  auto fit = fitMeans(straight, y, rows.own[1], {0.0, 0.0}, x);
   if (fit && !rows.doubt.empty()) fit->doubt = rows.doubt;
   return fit;
 }

@@ -76,14 +76,20 @@ VectorXd variancesBy(const MatrixXd& z, const VectorXd& squares) {
   return variance;
 }
 
+/// Ten rows to spare for each of the two numbers of a parabola.
+bool areEnough(Column left, std::size_t parameters) { return left.size() >= parameters + 20; }
+
 }  // namespace
 
 std::vector<double> unevenSigmas(Column left, Column x, std::size_t parameters) {
-  constexpr std::size_t kSpare = 20;
-  if (left.size() < parameters + kSpare) return {};
+  if (!areEnough(left, parameters) || !areUneven(parabolaOver(x), squaresBetweenNeighbours(left, x))) return {};
+  return sigmasOver(left, x, parameters);
+}
+
+std::vector<double> sigmasOver(Column left, Column x, std::size_t parameters) {
   const MatrixXd z = parabolaOver(x);
   const VectorXd squares = Eigen::Map<const VectorXd>(left.data(), z.rows()).cwiseAbs2();
-  if (!(squares.mean() > 0.0) || !areUneven(z, squaresBetweenNeighbours(left, x))) return {};
+  if (!areEnough(left, parameters) || !(squares.mean() > 0.0)) return {};
   const VectorXd sigmas = variancesBy(z, squares).cwiseSqrt();
   if (!sigmas.allFinite() || !(sigmas.minCoeff() > 0.0)) return {};
   return {sigmas.data(), sigmas.data() + sigmas.size()};

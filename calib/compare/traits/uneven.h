@@ -13,8 +13,12 @@ namespace toftwin::compare {
 /// neighbours' differences show it by no more than chance in 1 % (R. Koenker, J. Econometrics 17 (1981) 107), or of
 /// fewer than ten rows to spare for each of its two numbers.
 std::vector<double> unevenSigmas(Column left, Column x, std::size_t parameters);
+/// The same whether or not they show it, as of rows that are off from what they share and miss no curve.
+std::vector<double> sigmasOver(Column left, Column x, std::size_t parameters);
 std::vector<double> over(Column values, Column sigmas);
 /// A model of rows that are over their σ.
 Model over(const Model& model, Column sigmas);
+/// A fit of rows over their σ, of which the mean square is 1; neighbours over x may err alike, as in fitInOrder().
+std::optional<Fit> fitOver(Column sigmas, const Model& model, Column y, std::vector<double> start, Column x);
 
 }  // namespace toftwin::compare
