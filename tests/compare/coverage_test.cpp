@@ -367,43 +367,8 @@ std::vector<Planted> atEdges() {
   return rows;
 }
 
-/// Frames of 32 × 32 pixels: fixed pattern of 3 mm, noise of 5 mm that is alike along x (0.4) and from frame
-/// to frame (0.3).
-Traits noisyFrames(Noise& noise) {
-  constexpr int kSize = 32, kFrames = 40;
-  const auto along = [&](std::vector<double> row) {
-    for (std::size_t i = 1; i < row.size(); ++i) row[i] = 0.4 * row[i - 1] + std::sqrt(1.0 - 0.16) * row[i];
-    return row;
-  };
-  Image<float> fixed(kSize, kSize);
-  for (float& one : fixed.pixels()) one = static_cast<float>(noise(3.0));
-  Image<double> last(kSize, kSize);
-  std::vector<Image<float>> frames;
-  for (int f = 0; f < kFrames; ++f) {
-    Image<float>& frame = frames.emplace_back(kSize, kSize);
-    for (int y = 0; y < kSize; ++y) {
-      std::vector<double> row;
-      for (int x = 0; x < kSize; ++x) row.push_back(noise(5.0));
-      row = along(std::move(row));
-      for (int x = 0; x < kSize; ++x) {
-        const double fresh = row[static_cast<std::size_t>(x)];
-        last(x, y) = f == 0 ? fresh : 0.3 * last(x, y) + std::sqrt(1.0 - 0.09) * fresh;
-        frame(x, y) = static_cast<float>(2000.0 + static_cast<double>(fixed(x, y)) + last(x, y));
-      }
-    }
-  }
-  return noiseTraits(frames);
-}
-
-std::vector<Planted> ofFrames() {
+std::vector<Planted> ofMasks() {
   std::vector<Planted> rows;
-  rows.push_back({"noise of frames",
-                  {{"temporal noise", 5.0},
-                   {"fixed pattern", 3.0},
-                   {"correlation along x", 0.4},
-                   {"correlation along y", 0.0},
-                   {"correlation in time", 0.3}},
-                  noisyFrames});
   // 90 % valid in A; B differs from A in 4 % of the pixels: both valid 0.9 · 0.96, only A 0.036, only B
   // 0.004.
   const double both = 0.864, agree = 0.96, share_b = both + 0.1 * 0.04,
@@ -429,8 +394,8 @@ std::vector<Planted> ofFrames() {
 std::vector<Planted> allPlanted() {
   std::vector<Planted> all;
   for (const auto& part :
-       {drifts(), overDistance(), otherWays(), plantedScatter(), overTime(), atEdges(), ofFrames(),
-        plantedAlike(), plantedBursts()})
+       {drifts(), overDistance(), otherWays(), plantedScatter(), overTime(), atEdges(), ofMasks(),
+        plantedFrames(), plantedAlike(), plantedBursts()})
     all.insert(all.end(), part.begin(), part.end());
   return all;
 }

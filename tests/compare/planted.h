@@ -39,6 +39,8 @@ struct Planted {
 std::vector<Planted> plantedScatter();
 /// Rows that err alike or scatter by their own measure, and parts that are not there.
 std::vector<Planted> plantedAlike();
+/// Noise of frames, of which many and few are known.
+std::vector<Planted> plantedFrames();
 /// Lines and frames that err together.
 std::vector<Planted> plantedBursts();
 

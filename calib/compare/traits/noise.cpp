@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 
 #include "calib/compare/statistics.h"
 #include "calib/compare/traits/least_squares.h"
@@ -89,6 +90,36 @@ double correlationFrom(double ratio, double n) {
   return 0.5 * (low + high);
 }
 
+/// What several blocks together make of n frames.
+struct OfBlocks {
+  double variance = 0.0, pattern = 0.0, in_time = 0.0;
+
+  OfBlocks(std::span<const PixelBlock> blocks, double n, const PixelBlock* without = nullptr) {
+    double squares = 0.0, products = 0.0, count = 0.0;
+    Running of_means;
+    for (const PixelBlock& one : blocks) {
+      if (&one == without) continue;
+      squares += one.squares, products += one.in_time, count += one.count;
+      of_means.add(one.means.variance());
+    }
+    in_time = correlationFrom(products / squares, n);
+    // Values that go with each other scatter less about their own mean, and their mean scatters more.
+    const double of_mean = varianceOfMean(in_time, n);
+    variance = squares / (count * n * (1.0 - of_mean));
+    pattern = of_means.mean() - variance * of_mean;
+  }
+};
+
+/// What each block makes of a number of all of them together (J. W. Tukey's pseudo-values, Ann. Math. Stat. 29 (1958)
+/// 614): how these scatter is how uncertain it is, and of σ² that of ρ is in it, by which all blocks' σ² are enlarged.
+std::vector<double> pseudoValues(std::span<const PixelBlock> blocks, double n, double OfBlocks::*number) {
+  const auto g = static_cast<double>(blocks.size());
+  const double all = OfBlocks{blocks, n}.*number;
+  std::vector<double> values;
+  for (const PixelBlock& one : blocks) values.push_back(g * all - (g - 1.0) * (OfBlocks{blocks, n, &one}.*number));
+  return values;
+}
+
 /// Mean over blocks and its interval, of a quantity whose root is shown.
 Trait rootTrait(const char* name, Column squares) {
   Trait trait = meanTrait(name, "mm", squares);
@@ -114,27 +145,21 @@ Traits noiseTraits(std::span<const Image<float>> frames_mm) {
     for (int x = 0; x < width; ++x)
       add(r, x, y, blocks[static_cast<std::size_t>(y * kBlocks / height * kBlocks + x * kBlocks / width)]);
   }
+  std::vector<PixelBlock> used;
+  std::ranges::copy_if(blocks, std::back_inserter(used),
+                       [](const PixelBlock& block) { return block.count >= 4.0 && block.squares > 0.0; });
+  if (used.size() < 4) return refuse("fewer than four of 16 blocks of the image are valid and noisy");
   const double n = static_cast<double>(frames_mm.size());
-  std::vector<double> temporal, fixed, along_x, along_y, in_time;
-  const auto isUsed = [](const PixelBlock& block) { return block.count >= 4.0 && block.squares > 0.0; };
-  for (const PixelBlock& block : blocks) {
-    if (isUsed(block)) in_time.push_back(correlationFrom(block.in_time / block.squares, n));
-  }
-  // Values that go with each other scatter less about their own mean, and their mean scatters more.
-  const double of_mean = varianceOfMean(summarise(in_time).mean, n);
-  for (const PixelBlock& block : blocks) {
-    if (!isUsed(block)) continue;
-    const double variance = block.squares / (block.count * n * (1.0 - of_mean));
-    temporal.push_back(variance);
-    fixed.push_back(block.means.variance() - variance * of_mean);
+  std::vector<double> along_x, along_y;
+  for (const PixelBlock& block : used) {
     along_x.push_back(block.along_x / block.along_x_squares);
     along_y.push_back(block.along_y / block.along_y_squares);
   }
-  if (temporal.size() < 4) return refuse("fewer than four of 16 blocks of the image are valid and noisy");
-  return std::vector{rootTrait("temporal noise", temporal), rootTrait("fixed pattern", fixed),
+  return std::vector{rootTrait("temporal noise", pseudoValues(used, n, &OfBlocks::variance)),
+                     rootTrait("fixed pattern", pseudoValues(used, n, &OfBlocks::pattern)),
                      meanTrait("correlation along x", "1", along_x),
                      meanTrait("correlation along y", "1", along_y),
-                     meanTrait("correlation in time", "1", in_time)};
+                     meanTrait("correlation in time", "1", pseudoValues(used, n, &OfBlocks::in_time))};
 }
 
 }  // namespace toftwin::compare

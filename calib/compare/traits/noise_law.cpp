@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <array>
+#include <boost/math/distributions/chi_squared.hpp>
+#include <boost/math/special_functions/digamma.hpp>
 #include <cmath>
 #include <numbers>
 
 #include <fmt/format.h>
 #include <toftwin/units.h>
 
+#include "calib/compare/statistics.h"
 #include "calib/compare/traits/least_squares.h"
 
 namespace toftwin::compare {
@@ -31,7 +34,13 @@ double mostSigma_mm(std::span<const double> frequency_hz) {
 /// signals has no logarithm, and is not told.
 struct Law {
   std::vector<int> parts{};  ///< powers of 1/I, ascending
-  Fit fit{};
+  Fit fit{};                 ///< of their roots' logarithms
+
+  [[nodiscard]] double logarithm(double intensity) const {
+    double sum = 0.0;
+    for (std::size_t k = 0; k < parts.size(); ++k) sum += std::exp(2.0 * fit.at[k]) / std::pow(intensity, parts[k]);
+    return 0.5 * std::log(sum);
+  }
 };
 std::optional<Law> fittedLaw(Column intensity, Column sigma) {
   const double least_sigma = std::ranges::min(sigma);
@@ -58,6 +67,29 @@ std::optional<Law> fittedLaw(Column intensity, Column sigma) {
     if (law) break;
   }
   return law;
+}
+
+double quartilesApart(double readings) {
+  const boost::math::chi_squared squares{readings};
+  return 0.5 * std::log(boost::math::quantile(squares, 0.75) / boost::math::quantile(squares, 0.25));
+}
+
+/// s of few readings scatters, and ln s is less than ln σ on the mean, by ½ (ln ν/2 − ψ(ν/2)) of ν + 1 readings. How many
+/// they are is told by the quartiles of what rows are off from the law, which a few odd rows do not move.
+double shortOfLogarithm(Column intensity, Column sigma, const Law& law) {
+  constexpr double kFewest = 1.0, kMost = 1e5;
+  constexpr int kHalvings = 60;
+  std::vector<double> left;
+  for (std::size_t i = 0; i < sigma.size(); ++i) left.push_back(std::log(sigma[i]) - law.logarithm(intensity[i]));
+  const double n = static_cast<double>(sigma.size()), apart = (quantile(left, 0.75) - quantile(left, 0.25)) *
+                                                              std::sqrt(n / std::max(1.0, law.fit.degrees));
+  double low = std::log(kFewest), high = std::log(kMost);
+  for (int i = 0; i < kHalvings; ++i) {
+    const double middle = 0.5 * (low + high);
+    (quartilesApart(std::exp(middle)) > apart ? low : high) = middle;
+  }
+  const double half = 0.5 * std::exp(high);
+  return 0.5 * (std::log(half) - boost::math::digamma(half));
 }
 
 /// All three parts, each of which may be less than nothing: what is told of one of them is then told whether
@@ -112,11 +144,16 @@ Trait wholeOf(const Fit& parts, double scale, double most) {
 }
 
 /// Of rows that are finite and positive.
-Result<FittedTraits> describedLaw(std::vector<double> intensity, Column sigma) {
+Result<FittedTraits> describedLaw(std::vector<double> intensity, std::vector<double> sigma) {
   const double most = std::ranges::max(intensity);
   if (!(most > 1.05 * std::ranges::min(intensity))) return undetermined("noise law", "all signals are alike");
   for (double& one : intensity) one /= most;
-  const auto law = fittedLaw(intensity, sigma);
+  auto law = fittedLaw(intensity, sigma);
+  if (law) {
+    const double by = shortOfLogarithm(intensity, sigma, *law);
+    for (double& one : sigma) one *= std::exp(by);
+    for (double& one : law->fit.at) one += by;
+  }
   const auto all = law ? signedParts(intensity, sigma, *law) : std::nullopt;
   if (!all) return undetermined("noise law", "this range of signals does not tell its parts apart");
   constexpr std::array kPowers{"", "/I", "/I²"};
