@@ -237,6 +237,25 @@ std::vector<Planted> unevenly() {
                                                   a, noise, [](double one) { return 12.0 - 4.0 * std::log10(one); },
                                                   [](double one) { return 200.0 / one; }));
                   }});
+  // As of a camera that is noisier while it is cold, and of light that two walls send to and fro.
+  const auto warmer = [](double t) { return 8.0 * std::exp(-t / 600.0); };
+  rows.push_back({"drift, noise of 0.9 to 0.3 mm",
+                  {{"drift", warmer(3600.0) - warmer(0.0)}, {"time constant", 600.0}},
+                  [=](Noise& noise) -> Traits {
+                    const Columns t = evenly(0.0, 3600.0, 181);
+                    const auto drift =
+                        driftTraits(t, uneven(t, noise, warmer, [](double s) { return 0.9 - 0.6 * s / 3600.0; }));
+                    if (!drift) return drift.error();
+                    return drift->traits;
+                  }});
+  rows.push_back({"corner, noise of 8 mm at the edge and 2 mm from 0.2 m on",
+                  {{"at the edge", 40.0}, {"reach", 0.25}, {"far from it", -3.0}},
+                  [](Noise& noise) {
+                    const Columns x = evenly(0.0, 1.2, 150);
+                    return cornerTraits(x, uneven(
+                                               x, noise, [](double d) { return -3.0 + 40.0 * std::exp(-d / 0.25); },
+                                               [](double d) { return 2.0 + 6.0 * std::exp(-d / 0.05); }));
+                  }});
   return rows;
 }
 

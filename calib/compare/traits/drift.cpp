@@ -285,18 +285,6 @@ std::optional<Chosen> chosenOf(const Candidates& candidates, Column t, std::vect
   return best;
 }
 
-/// The errors of parameters by what each row leaves, whatever its σ (HC3 of J. G. MacKinnon, H. White, J. Econometrics
-/// 29 (1985) 305): σ that go otherwise than a parabola are in it, too.
-void tellErrorsByRows(Chosen& chosen, Column t) {
-  const Model model = chosen.model->over(t);
-  const MatrixXd j = jacobian(model, chosen.y.size(), chosen.fit.at);
-  const MatrixXd from_rows = linear::Ldlt{j.transpose() * j}.solveEach(j.transpose());
-  const Eigen::ArrayXd told = (j * from_rows).diagonal().array().min(0.99);
-  const VectorXd left = (residuals(model, chosen.y, chosen.fit.at).array() / (1.0 - told)).matrix();
-  const MatrixXd covariance = from_rows * left.cwiseAbs2().asDiagonal() * from_rows.transpose();
-  if (covariance.allFinite()) chosen.fit.covariance.assign(covariance.data(), covariance.data() + covariance.size());
-}
-
 /// With the rows' σ where what is left over time is uneven, as of a camera that is noisier while it is cold.
 std::optional<Chosen> chosenBySigma(Candidates& candidates, Column t, Column y) {
   auto best = chosenOf(candidates, t, {y.begin(), y.end()});
@@ -312,7 +300,7 @@ std::optional<Chosen> chosenBySigma(Candidates& candidates, Column t, Column y) 
     else
       break;
   }
-  if (best && !best->model->sigma.empty()) tellErrorsByRows(*best, t);
+  if (best && !best->model->sigma.empty()) tellErrorsByRows(best->fit, best->model->over(t), best->y);
   return best;
 }
 

@@ -291,16 +291,19 @@ std::optional<Fit> fitInOrder(const Model& model, Column y, std::vector<double> 
   if (!fit || x.empty() || fit->possible.empty()) return fit;
   constexpr int kRounds = 3;  // each is nearer to the rows' σ and to the curve
   std::optional<Fit> by_sigma;
+  std::vector<double> sigmas;
   for (int round = 0; round < kRounds; ++round) {
     const Fit& last = by_sigma ? *by_sigma : *fit;
     const VectorXd left = residuals(model, y, last.at);
-    const auto sigmas = unevenSigmas({left.data(), left.data() + left.size()}, x, last.at.size());
-    if (sigmas.empty()) break;
-    auto next = fitOver(sigmas, model, y, last.at, x);
+    auto next_sigmas = unevenSigmas({left.data(), left.data() + left.size()}, x, last.at.size());
+    if (next_sigmas.empty()) break;
+    auto next = fitOver(next_sigmas, model, y, last.at, x);
     if (!next) break;
-    by_sigma = std::move(next);
+    by_sigma = std::move(next), sigmas = std::move(next_sigmas);
   }
-  return by_sigma ? by_sigma : fit;
+  if (!by_sigma) return fit;
+  tellErrorsByRows(*by_sigma, over(model, sigmas), over(y, sigmas));
+  return by_sigma;
 }
 
 }  // namespace toftwin::compare

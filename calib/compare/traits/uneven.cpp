@@ -6,14 +6,13 @@
 #include <cmath>
 #include <numeric>
 
+#include "calib/compare/traits/linearised.h"
 #include "calib/linear/linear.h"
 
 namespace toftwin::compare {
 namespace {
 
 using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
 
 /// Columns of a parabola over each row's place in the order by x, −1 to 1, without its mean. Rows of one x are in no
 /// order: they have their middle.
@@ -47,7 +46,7 @@ VectorXd squaresBetweenNeighbours(Column left, Column x) {
 /// Koenker's n R² of the squares over the parabola. Each row is in two of them, which makes their means half as certain
 /// again.
 bool areUneven(const MatrixXd& z, const VectorXd& squares) {
-  constexpr double kWrong = 0.01, kTogether = 1.5;
+  constexpr double kWrong = 0.1, kTogether = 1.5;
   const VectorXd about = squares.array() - squares.mean();
   const MatrixXd span = linear::basisOf(z);
   const VectorXd told = span * (span.transpose() * about);
@@ -93,6 +92,33 @@ std::vector<double> sigmasOver(Column left, Column x, std::size_t parameters) {
   const VectorXd sigmas = variancesBy(z, squares).cwiseSqrt();
   if (!sigmas.allFinite() || !(sigmas.minCoeff() > 0.0)) return {};
   return {sigmas.data(), sigmas.data() + sigmas.size()};
+}
+
+void tellErrorsByRows(Fit& fit, const Model& model, Column y) {
+  const MatrixXd j = jacobian(model, y.size(), fit.at);
+  const Index n = j.rows(), k = j.cols();
+  const MatrixXd inverse = linear::Ldlt{j.transpose() * j}.inverse(), from_rows = inverse * j.transpose();
+  const VectorXd left = residuals(model, y, fit.at), own = (j * from_rows).diagonal().cwiseMin(0.99),
+                 others = (1.0 - own.array()).matrix(), squares = left.cwiseAbs2().cwiseQuotient(others);
+  MatrixXd by_rows = from_rows * squares.asDiagonal() * from_rows.transpose();
+  for (Index a = 0; a < k; ++a) {
+    // Σ w r² of independent rows: its mean is Σ w (1 − h), its variance 2 Σ w w' P², P = 1 − J (JᵀJ)⁻¹ Jᵀ.
+    const VectorXd weight = from_rows.row(a).transpose().cwiseAbs2().cwiseQuotient(others);
+    const MatrixXd both = j.transpose() * weight.asDiagonal() * j * inverse;
+    const double variance = weight.cwiseAbs2().dot((1.0 - 2.0 * own.array()).matrix()) + (both * both).trace();
+    const double wider = studentT(std::pow(weight.dot(others), 2) / variance) / studentT(fit.degrees);
+    by_rows.row(a) *= wider, by_rows.col(a) *= wider;
+  }
+  const MatrixXd alike = linear::choleskyOf(inverse * (left.squaredNorm() / static_cast<double>(n - k))),
+                 told = linear::choleskyOf(by_rows);
+  if (!alike.allFinite() || !told.allFinite()) return;
+  const MatrixXd turn = told * linear::solveLowerEach(alike, MatrixXd::Identity(k, k));
+  const auto turned = [&](std::vector<double>& covariance) {
+    Eigen::Map<MatrixXd> one{covariance.data(), k, k};
+    one = (turn * one * turn.transpose()).eval();
+  };
+  turned(fit.covariance);
+  for (Fit::Possible& one : fit.possible) turned(one.covariance);
 }
 
 std::vector<double> over(Column values, Column sigmas) {
