@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <numeric>
@@ -110,8 +111,23 @@ std::string takeZerosAsMissing(std::string_view column, std::vector<double>& val
                      column, is_range ? "which is no range" : "far from all others");
 }
 
+/// The column that says of which session a row is: of a kind that heeds it, and where there are several.
+void addSessions(const std::filesystem::path& file, TableColumns& table) {
+  constexpr const char* kSession = "session";
+  auto column = loadColumns(file, {kSession});
+  if (!column) return;
+  const std::size_t count = sharedPlacesOf(column->front()).count;
+  const bool is_heeded = table.kind->shares_places && count > 1;
+  table.notes.push_back(
+      is_heeded ? fmt::format("rows are of {} sessions, each of which may have an offset of its own: what it is in is the "
+                              "mean over sessions, and as uncertain as these differ",
+                              count)
+                : fmt::format("column \"{}\", of {} values, is not heeded", kSession, count));
+  if (is_heeded) table.session = std::move(column->front());
+}
+
 std::string noteOnPlaces(const TableColumns& table) {
-  if (!table.kind->shares_places) return {};
+  if (!table.kind->shares_places || !table.session.empty()) return {};
   const SharedPlaces places = sharedPlacesOf(table.values.front());
   if (!places.areShared()) return {};
   return fmt::format(
@@ -257,6 +273,7 @@ Result<TableColumns> loadTable(const TableJob& job) {
     for (double& one : column->front()) one *= (name.is_negated ? -1.0 : 1.0) * factor->value_or(1.0);
     table.values.push_back(std::move(column->front()));
   }
+  addSessions(job.file, table);
   addNote(table, noteOnRows(table.values));  // of the file, before zeros are none
   for (std::size_t i = 0; i < wanted.size(); ++i)
     if (isOf(Quantity::Length, wanted[i])) addNote(table, takeZerosAsMissing(wanted[i], table.values[i]));
@@ -266,31 +283,49 @@ Result<TableColumns> loadTable(const TableJob& job) {
 
 void addTraits(const TableColumns& table, const std::vector<double>& f, const char* of, TraitCollector& all) {
   const auto& c = table.values;
+  const auto& session = table.session;
   const std::string kind = table.kind->name;
   NamedRows rows = rowsOf(table, of);
   if (kind == "drift") return all.add(std::move(rows), driftTraits(c[0], c[1]));
-  if (kind == "harmonics") return all.add(std::move(rows), fittedHarmonics(c[0], c[1], f));
+  if (kind == "harmonics") return all.add(std::move(rows), fittedHarmonics(c[0], c[1], f, {.session = session}));
   if (kind == "noise_law") return all.add(std::move(rows), fittedNoiseLaw(c[0], c[1], f));
   all.draw(std::move(rows));
   const std::map<std::string, std::function<Traits()>> rest{
       {"wraps", [&] { return wrapTraits(c[0], unambiguousRange(std::ranges::max(f) * hertz).in(metre)); }},
-      {"corner", [&] { return cornerTraits(c[0], c[1]); }},
+      {"corner", [&] { return cornerTraits(c[0], c[1], session); }},
       {"lens_scatter", [&] { return scatterOf(c, f); }},
       {"flying_pixels", [&] { return flyingTraits(imageOf(c[0], c[1])); }},
       {"edge", [&] { return edgeTraits(c[0], c[1]); }},
-      {"amplitude", [&] { return amplitudeTraits(c[0], c[1]); }},
-      {"ambient", [&] { return ambientTraits(c[0], c[1], c[2]); }},
-      {"motion", [&] { return motionTraits(c[0], c[1]); }},
+      {"amplitude", [&] { return amplitudeTraits(c[0], c[1], {}, session); }},
+      {"ambient", [&] { return ambientTraits(c[0], c[1], c[2], session); }},
+      {"motion", [&] { return motionTraits(c[0], c[1], session); }},
       {"lag", [&] { return lagTraits(c[0], c[1]); }},
       {"frame_timing", [&] { return timingTraits(c[0]); }}};
   all.add(kind, of, rest.at(kind)());
 }
 
+namespace {
+
+/// Why numbers are in doubt, each reason once with the numbers that have it.
+std::vector<std::string> doubtsIn(const NamedTraits& traits) {
+  std::map<std::pair<std::string, std::string>, std::vector<std::string>> names;
+  for (const NamedTrait& one : traits.traits)
+    if (!one.trait.doubt.empty()) names[{one.of, one.trait.doubt}].push_back(one.trait.name);
+  std::vector<std::string> notes;
+  for (const auto& [reason, of] : names)
+    notes.push_back(fmt::format("{}, in doubt ({}): {}.", reason.first, fmt::join(of, ", "), reason.second));
+  return notes;
+}
+
+}  // namespace
+
 /// Of two tables at the same frequencies, both with the same waves.
 void addSameWaves(const std::vector<TableColumns>& tables, const std::vector<double>& f,
                   TraitCollector& all) {
   const auto fitOf = [&f](const TableColumns& table) -> HarmonicFit {
-    return [&f, &c = table.values](std::size_t least) { return fittedHarmonics(c[0], c[1], f, {}, least); };
+    return [&f, &table](std::size_t least) {
+      return fittedHarmonics(table.values[0], table.values[1], f, {.session = table.session}, least);
+    };
   };
   const auto both = withTheSameWaves({fitOf(tables[0]), fitOf(tables[1])});
   for (std::size_t i = 0; i < both.size(); ++i) all.add(rowsOf(tables[i], kOf[i]), both[i]);
@@ -321,6 +356,7 @@ Result<Report> judgeTables(const std::vector<TableJob>& jobs) {
   pairRows(traits, *kind);
   if (traits.traits.empty())
     return Error{Error::Code::InvalidArgument, fmt::format("{}", fmt::join(traits.untold, "; "))};
+  std::ranges::copy(doubtsIn(traits), std::back_inserter(notes));
   const auto verdicts = verdictsOf(traits);
   Report report{.title = fmt::format("Characteristics of tables: {}", kind->name),
                 .subtitle = fmt::format("{}", fmt::join(files, " and "))};

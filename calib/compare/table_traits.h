@@ -17,7 +17,7 @@ struct TableKind {
   const char* tells;                 ///< "warm-up drift and its model"
   std::vector<const char*> columns;  ///< with their units: "time_s", "value_mm"
   bool needs_frequency = false;
-  bool shares_places = false;  ///< readings of one value of the first column count together
+  bool shares_places = false;  ///< readings of one value of the first column count together; so do a session's
 };
 const std::vector<TableKind>& tableKinds();
 /// Null if there is none of that name.
@@ -37,6 +37,7 @@ struct TableJob {
 struct TableColumns {
   const TableKind* kind = nullptr;
   std::vector<std::vector<double>> values{};
+  std::vector<double> session{};     ///< each row's, where the file has such a column and the kind heeds it
   std::vector<std::string> notes{};  ///< what was taken for granted, and what is odd about the rows
 };
 /// Errors: an unknown kind, a column that the file lacks or whose unit is unknown or of another quantity, no

@@ -88,6 +88,13 @@ std::vector<Planted> alikeOverLight() {
                     return motionTraits(
                         v, alike(v, 3.0, 0.5, noise, [](double s) { return 1.0 + 7.5 * s; }));
                   }});
+  rows.push_back({"motion, two sessions in turn", {{"per speed", 7.5}}, [](Noise& noise) {
+                    const Columns v = evenly(-2.0, 2.0, 60);
+                    Columns error;
+                    for (std::size_t i = 0; i < v.size(); ++i)
+                      error.push_back(1.0 + 7.5 * v[i] + (i % 2 == 0 ? 3.0 : 0.0) + noise(1.0));
+                    return motionTraits(v, error);
+                  }});
   // From σ² = 10 to 190: variances scatter in proportion to themselves.
   rows.push_back({"ambient, σ of 60 frames", {{"bias", 0.12}, {"noise²", 3.0}}, [](Noise& noise) {
                     const Columns klx = evenly(0.0, 60.0, 25);
@@ -228,6 +235,55 @@ Columns uneven(const Columns& x, Noise& noise, const std::function<double(double
   return y;
 }
 
+/// Three sessions, each off by 2 mm of its own, that a column tells: in turn, or one after the other.
+std::vector<Planted> ofSessions() {
+  const auto add = [](Columns& error, const Columns& session, Noise& noise) {
+    const Columns offset{noise(2.0), noise(2.0), noise(2.0)};
+    for (std::size_t i = 0; i < error.size(); ++i) error[i] += offset[static_cast<std::size_t>(session[i])];
+  };
+  std::vector<Planted> rows;
+  rows.push_back({"harmonics, three sessions in turn",
+                  {{"30 MHz, 4 per period", 6.0}, {"offset", 3.0}, {"scale", 0.0}},
+                  [=](Noise& noise) {
+                    constexpr double kWave = 4.0 * std::numbers::pi * 30e6 / 299'792'458.0;
+                    const Columns d = evenly(0.5, 6.5, 240);
+                    Columns session, error = alike(d, 1.0, 0.0, noise, [](double x) {
+                                       return 3.0 + 6.0 * std::cos(4.0 * kWave * x + 0.7);
+                                     });
+                    for (std::size_t i = 0; i < d.size(); ++i) session.push_back(static_cast<double>(i % 3));
+                    add(error, session, noise);
+                    return harmonicTraits(d, error, std::vector{30e6}, std::vector{4}, {.session = session});
+                  }});
+  rows.push_back({"corner, three sessions one after the other",
+                  {{"at the edge", 40.0}, {"reach", 0.25}, {"far from it", -3.0}},
+                  [=](Noise& noise) {
+                    const Columns x = evenly(0.0, 1.2, 150);
+                    Columns session,
+                        error = alike(x, 1.0, 0.0, noise, [](double d) { return -3.0 + 40.0 * std::exp(-d / 0.25); });
+                    for (std::size_t i = 0; i < x.size(); ++i) session.push_back(static_cast<double>(i / 50));
+                    add(error, session, noise);
+                    return cornerTraits(x, error, session);
+                  }});
+  rows.push_back({"ambient, two sessions one after the other", {{"bias", 0.12}}, [=](Noise& noise) {
+                    const Columns klx = evenly(0.0, 60.0, 60);
+                    Columns session, sigma(60, 10.0),
+                        error = alike(klx, 1.0, 0.0, noise, [](double e) { return 2.0 + 0.12 * e; });
+                    for (std::size_t i = 0; i < klx.size(); ++i) session.push_back(static_cast<double>(i / 30));
+                    add(error, session, noise);
+                    return ambientTraits(klx, error, sigma, session);
+                  }});
+  rows.push_back({"amplitude, two sessions in turn", {{"at 1", 12.0}, {"per decade", -4.0}}, [=](Noise& noise) {
+                    const Columns decades = evenly(1.0, 4.0, 100);
+                    Columns session, amplitude,
+                        error = alike(decades, 1.0, 0.0, noise, [](double a) { return 12.0 - 4.0 * a; });
+                    for (std::size_t i = 0; i < decades.size(); ++i)
+                      session.push_back(static_cast<double>(i % 2)), amplitude.push_back(std::pow(10.0, decades[i]));
+                    add(error, session, noise);
+                    return amplitudeTraits(amplitude, error, {}, session);
+                  }});
+  return rows;
+}
+
 std::vector<Planted> unevenly() {
   std::vector<Planted> rows;
   rows.push_back({"amplitude, noise as 1/A", {{"per decade", -4.0}}, [](Noise& noise) {
@@ -263,7 +319,7 @@ std::vector<Planted> unevenly() {
 
 std::vector<Planted> plantedAlike() {
   std::vector<Planted> all;
-  for (const auto& part : {alikeOverDistance(), alikeOverLight(), alikeOverTime(), atPlaces(), unevenSteps(), unevenly()}) all.insert(all.end(), part.begin(), part.end());
+  for (const auto& part : {alikeOverDistance(), alikeOverLight(), alikeOverTime(), atPlaces(), unevenSteps(), ofSessions(), unevenly()}) all.insert(all.end(), part.begin(), part.end());
   return all;
 }
 

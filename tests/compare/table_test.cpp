@@ -161,6 +161,33 @@ TEST_F(Table, SaysWhatIsOddAboutItsRows) {
               testing::ElementsAre(HasSubstr("all 48 readings of value_mm are alike")));
 }
 
+/// Two sessions, 4 mm apart: the slope is as if there were one, and the note says what was done.
+TEST_F(Table, TellsSessionsApartByTheirColumn) {
+  const auto rows = [](bool has_column) {
+    std::string text = has_column ? "speed_m_per_s,error_mm,session\n" : "speed_m_per_s,error_mm\n";
+    for (int i = 0; i < 60; ++i) {
+      const bool is_second = i >= 30;
+      text += fmt::format("{},{}", i / 30.0, 0.25 * i + (is_second ? 4.0 : 0.0) + 0.1 * std::sin(1.7 * i));
+      text += has_column ? fmt::format(",{}\n", is_second ? 2 : 1) : "\n";
+    }
+    return text;
+  };
+  const auto slopeOf = [&](bool has_column) {
+    const auto report = judgeTables({{.file = write("a.csv", rows(has_column)), .kind = "motion"}});
+    EXPECT_TRUE(report);
+    const std::string text = toMarkdown(*report);
+    EXPECT_EQ(text.find("rows are of 2 sessions") != std::string::npos, has_column);
+    EXPECT_EQ(text.find("there is a step before row 31") != std::string::npos, !has_column);
+    return report->verdict;
+  };
+  EXPECT_THAT(slopeOf(true), testing::StartsWith("motion, per speed: 7.48"));
+  EXPECT_THAT(slopeOf(false), HasSubstr("certain"));
+  const auto drift = loadTable(
+      {.file = write("b.csv", "time_s,value_mm,session\n0,1,1\n1,2,1\n2,3,2\n"), .kind = "drift"});
+  ASSERT_TRUE(drift) << drift.error().message;
+  EXPECT_THAT(drift->notes, testing::Contains("column \"session\", of 2 values, is not heeded"));
+}
+
 /// Three of 48 readings about 900 mm are 0: the drift is that of the others, 2 mm in 48 s.
 TEST_F(Table, TakesZerosAsNoRange) {
   std::string rows = "time_s,value_mm\n", errors = "time_s,value_mm\n";

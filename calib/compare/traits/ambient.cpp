@@ -7,6 +7,7 @@
 #include "calib/compare/statistics.h"
 #include "calib/compare/traits/least_squares.h"
 #include "calib/compare/traits/repeats.h"
+#include "calib/compare/traits/sessions.h"
 
 namespace toftwin::compare {
 namespace {
@@ -48,14 +49,16 @@ std::optional<Fit> lineOfVariances(const std::vector<double>& ambient, const std
 
 }  // namespace
 
-Traits ambientTraits(Column ambient_klx, Column error_mm, Column sigma_mm) {
-  auto rows = finiteRows({ambient_klx, error_mm, sigma_mm}, 4, kOfAmbient);
+Traits ambientTraits(Column ambient_klx, Column error_mm, Column sigma_mm, Column session) {
+  auto rows = finiteRows({ambient_klx, error_mm, sigma_mm, session.empty() ? error_mm : session}, 4, kOfAmbient);
   if (!rows) return rows.error();
   for (double& one : (*rows)[2]) one *= one;
-  const AtPlaces at = meansAtPlaces(std::move(*rows), 2);
+  const AtPlaces at = session.empty() ? meansAtPlaces(std::move(*rows), 2) : asTheyAre(std::move(*rows));
   const auto &ambient = at.columns[0], &variance = at.columns[2];
   const Model straight = [&](std::span<const double> p, std::size_t i) { return p[0] + p[1] * ambient[i]; };
-  const auto bias = fitMeans(straight, at.columns[1], at.own[1], {0.0, 0.0}, ambient),
+  const Column of_rows = session.empty() ? Column{} : Column{at.columns[3]};
+  const auto bias = at.own[1].empty() ? fitBesideSessions(straight, at.columns[1], {0.0, 0.0}, ambient, of_rows)
+                                      : fitMeans(straight, at.columns[1], at.own[1], {0.0, 0.0}, ambient),
              noise = std::ranges::max(variance) > 0.0 ? lineOfVariances(ambient, variance, at.own[2])
                                                       : fitLeastSquares(straight, variance, {0.0, 0.0});
   if (!bias || !noise) return undetermined(kOfAmbient, "all illuminances are alike");

@@ -15,6 +15,7 @@
 #include "calib/compare/traits/clusters.h"
 #include "calib/compare/traits/phasor.h"
 #include "calib/compare/traits/repeats.h"
+#include "calib/compare/traits/sessions.h"
 #include "calib/compare/traits/waves.h"
 
 namespace toftwin::compare {
@@ -200,8 +201,9 @@ bool areMissed(const FittedTraits& larger, const FittedTraits& smaller) {
 namespace {
 
 /// Rows by themselves.
-Result<FittedTraits> fitRows(Column distance_m, Column error_mm, const std::vector<Wave>& waves) {
-  const auto rows = finiteRows({distance_m, error_mm}, 2 * waves.size() + 4, "harmonics");
+Result<FittedTraits> fitRows(Column distance_m, Column error_mm, Column session, const std::vector<Wave>& waves) {
+  const auto rows =
+      finiteRows({distance_m, error_mm, session.empty() ? error_mm : session}, 2 * waves.size() + 4, "harmonics");
   if (!rows) return rows.error();
   const auto &d = (*rows)[0], &e = (*rows)[1];
   const std::size_t count = 2 + 2 * waves.size();
@@ -214,7 +216,8 @@ Result<FittedTraits> fitRows(Column distance_m, Column error_mm, const std::vect
   const Model model = [&](std::span<const double> p, std::size_t i) {
     return std::inner_product(p.begin(), p.end(), basis.begin() + static_cast<std::ptrdiff_t>(i * count), 0.0);
   };
-  const auto fit = fitInOrder(model, e, std::vector<double>(count, 0.0), d);
+  const Column of_rows = session.empty() ? Column{} : Column{(*rows)[2]};
+  const auto fit = fitBesideSessions(model, e, std::vector<double>(count, 0.0), d, of_rows);
   if (!fit)
     return undetermined("harmonics", "the distances span too little of a period, or two orders coincide");
   return fittedOf(*fit, fit->degreesOfRow(), waves, d);
@@ -377,8 +380,8 @@ Result<FittedTraits> fitOrders(Column distance_m, Column error_mm, std::span<con
   if (waves.empty()) return undetermined("harmonics", "no frequency or order was given");
   if (!clusters.of.empty()) return fitClusters(distance_m, error_mm, waves, clusters);
   const SharedPlaces places = sharedPlacesOf(distance_m);
-  return places.areShared() ? fitClusters(distance_m, error_mm, waves, {.of = places.of, .what = kSharedPlaces})
-                            : fitRows(distance_m, error_mm, waves);
+  return places.areShared() && clusters.session.empty() ? fitClusters(distance_m, error_mm, waves, {.of = places.of, .what = kSharedPlaces})
+                            : fitRows(distance_m, error_mm, clusters.session, waves);
 }
 
 /// How many orders so many rows allow for: as many distances as twice the parameters, where rows share them.

@@ -79,15 +79,15 @@ class Whitened {
 std::vector<double> likely(const Whitened& rows) {
   constexpr double kStep = 0.02, kUnlikely = 9.0;
   std::vector<double> rho, log_likelihood;
-  for (double one = -kMostRho; one < kMostRho + 1e-9; one += kStep)
+  for (double one = 0.0; one < kMostRho + 1e-9; one += kStep)
     rho.push_back(one), log_likelihood.push_back(rows.by(one).log_likelihood);
   const double most = std::ranges::max(log_likelihood);
-  double from = kMostRho, to = -kMostRho;
+  double from = kMostRho, to = 0.0;
   for (std::size_t i = 0; i < rho.size(); ++i) {
     if (!(log_likelihood[i] > most - kUnlikely)) continue;
     from = std::min(from, rho[i] - kStep), to = std::max(to, rho[i] + kStep);
   }
-  from = std::max(from, -kMostRho), to = std::min(to, kMostRho);
+  from = std::max(from, 0.0), to = std::min(to, kMostRho);
   constexpr int kMany = 30;
   std::vector<double> fine;
   for (int i = 0; i <= kMany; ++i) fine.push_back(from + (to - from) * i / kMany);
@@ -100,14 +100,15 @@ struct Mixed {
   double evidence = 0.0;  ///< logarithm of the likelihood's mean over ρ
 };
 
-/// How likely each ρ is: beforehand a half for 0, and a half for all others, ¾ (1 − ρ²) each. Without the one,
-/// few independent rows would have the intervals of rows that may be a walk; without the other factor, ρ near 1
-/// would be likely by no row, as the restricted likelihood of a constant rises there without end.
+/// How likely each ρ is: beforehand a half for 0, and a half for all others, ¾ (1 − ρ²) each, of which those below 0 are
+/// taken for 0: that neighbours err oppositely makes no number surer. Without the one, few independent rows would have the
+/// intervals of rows that may be a walk; without the other factor, ρ near 1 would be likely by no row, as the restricted
+/// likelihood of a constant rises there without end.
 std::vector<double> weightsOf(const std::vector<double>& rho, const std::vector<double>& log_likelihood) {
   const double step = rho[2] - rho[1], most = std::ranges::max(log_likelihood);
   std::vector<double> weights;
   for (std::size_t i = 0; i < rho.size(); ++i) {
-    const double before = i == 0 ? 0.5 : 0.5 * 0.75 * (1.0 - rho[i] * rho[i]) * step;
+    const double before = i == 0 ? 0.75 : 0.5 * 0.75 * (1.0 - rho[i] * rho[i]) * step;
     weights.push_back(before * std::exp(log_likelihood[i] - most));
   }
   return weights;

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <array>
+#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <iterator>
+#include <utility>
 
 #include "calib/compare/statistics.h"
 #include "calib/compare/traits/least_squares.h"
@@ -19,6 +21,7 @@ constexpr int kBlocks = 4;  ///< along each side
 struct PixelBlock {
   double squares = 0.0, count = 0.0;  ///< of residuals from each pixel's mean
   double along_x = 0.0, along_x_squares = 0.0, along_y = 0.0, along_y_squares = 0.0, in_time = 0.0;
+  std::vector<double> sums{};  ///< of each frame's residuals
   Running means{};
 };
 
@@ -45,11 +48,12 @@ void add(const Residuals& r, int x, int y, PixelBlock& block) {
   const auto value = [&](std::size_t f, int px, int py) { return static_cast<double>(r.frames[f](px, py)); };
   if (std::isnan(r.mean(x, y))) return;
   block.means.add(static_cast<double>(r.mean(x, y)));
+  block.sums.resize(r.frames.size(), 0.0);
   const bool has_right = x + 1 < r.mean.width() && !std::isnan(r.mean(x + 1, y));
   const bool has_below = y + 1 < r.mean.height() && !std::isnan(r.mean(x, y + 1));
   for (std::size_t f = 0; f < r.frames.size(); ++f) {
     const double e = value(f, x, y);
-    block.squares += e * e;
+    block.squares += e * e, block.sums[f] += e;
     if (f + 1 < r.frames.size()) block.in_time += e * value(f + 1, x, y);
     if (has_right) {
       const double other = value(f, x + 1, y);
@@ -90,9 +94,25 @@ double correlationFrom(double ratio, double n) {
   return 0.5 * (low + high);
 }
 
+/// What n frames, which are off from their mean, have in common in all of their blocks: the mean product of two blocks.
+double sharedByFrames(std::span<const PixelBlock> blocks, double n, const PixelBlock* without) {
+  double products = 0.0, pairs = 0.0;
+  for (std::size_t f = 0; f < blocks.front().sums.size(); ++f) {
+    double sum = 0.0, squares = 0.0, g = 0.0;
+    for (const PixelBlock& one : blocks) {
+      if (&one == without) continue;
+      const double mean = one.sums[f] / one.count;
+      sum += mean, squares += mean * mean, g += 1.0;
+    }
+    products += sum * sum - squares, pairs = g * (g - 1.0);
+  }
+  return products / (pairs * n);
+}
+
 /// What several blocks together make of n frames.
 struct OfBlocks {
   double variance = 0.0, pattern = 0.0, in_time = 0.0;
+  double shared = 0.0;  ///< of the variance, by all pixels of a frame
 
   OfBlocks(std::span<const PixelBlock> blocks, double n, const PixelBlock* without = nullptr) {
     double squares = 0.0, products = 0.0, count = 0.0;
@@ -106,7 +126,8 @@ struct OfBlocks {
     // Values that go with each other scatter less about their own mean, and their mean scatters more.
     const double of_mean = varianceOfMean(in_time, n);
     variance = squares / (count * n * (1.0 - of_mean));
-    pattern = of_means.mean() - variance * of_mean;
+    shared = std::max(0.0, sharedByFrames(blocks, n, without) / (1.0 - of_mean));
+    pattern = of_means.mean() - (variance - shared) * of_mean;
   }
 };
 
@@ -120,9 +141,22 @@ std::vector<double> pseudoValues(std::span<const PixelBlock> blocks, double n, d
   return values;
 }
 
-/// Mean over blocks and its interval, of a quantity whose root is shown.
-Trait rootTrait(const char* name, Column squares) {
-  Trait trait = meanTrait(name, "mm", squares);
+/// Blocks say nothing of how uncertain a part of σ² is that all of them share: that is χ² of the frames, n (1 − ρ²)/(1 +
+/// ρ²) independent ones, and its sides are added in squares (R. K. Burdick, F. A. Graybill, Confidence Intervals on
+/// Variance Components, 1992).
+void addWhatFramesShare(std::span<const PixelBlock> blocks, double n, Trait& variance) {
+  const OfBlocks all{blocks, n};
+  const double square = all.in_time * all.in_time, shared = all.shared,
+               degrees = std::max(1.0, n * (1.0 - square) / (1.0 + square) - 1.0);
+  const boost::math::chi_squared spread{degrees};
+  const double below = shared * (1.0 - degrees / boost::math::quantile(spread, 0.975)),
+               above = shared * (degrees / boost::math::quantile(spread, 0.025) - 1.0);
+  variance.low = variance.value - std::hypot(variance.value - variance.low, below);
+  variance.high = variance.value + std::hypot(variance.high - variance.value, above);
+}
+
+/// Of a quantity whose root is shown.
+Trait rootOf(Trait trait) {
   for (double* one : {&trait.value, &trait.low, &trait.high}) *one = std::sqrt(std::max(0.0, *one));
   return trait;
 }
@@ -155,8 +189,10 @@ Traits noiseTraits(std::span<const Image<float>> frames_mm) {
     along_x.push_back(block.along_x / block.along_x_squares);
     along_y.push_back(block.along_y / block.along_y_squares);
   }
-  return std::vector{rootTrait("temporal noise", pseudoValues(used, n, &OfBlocks::variance)),
-                     rootTrait("fixed pattern", pseudoValues(used, n, &OfBlocks::pattern)),
+  Trait temporal = meanTrait("temporal noise", "mm", pseudoValues(used, n, &OfBlocks::variance));
+  addWhatFramesShare(used, n, temporal);
+  return std::vector{rootOf(std::move(temporal)),
+                     rootOf(meanTrait("fixed pattern", "mm", pseudoValues(used, n, &OfBlocks::pattern))),
                      meanTrait("correlation along x", "1", along_x),
                      meanTrait("correlation along y", "1", along_y),
                      meanTrait("correlation in time", "1", pseudoValues(used, n, &OfBlocks::in_time))};

@@ -63,10 +63,14 @@ std::vector<double> sigmasWith(double place_variance, Column own) {
 
 }  // namespace
 
+AtPlaces asTheyAre(std::vector<std::vector<double>> columns) {
+  const std::size_t count = columns.size();
+  return {.columns = std::move(columns), .own = std::vector<std::vector<double>>(count), .doubt = {}};
+}
+
 AtPlaces meansAtPlaces(std::vector<std::vector<double>> columns, std::size_t parameters) {
   const SharedPlaces places = sharedPlacesOf(columns.front());
-  AtPlaces all{.columns = std::move(columns), .own = {}, .doubt = {}};
-  all.own.resize(all.columns.size());
+  AtPlaces all = asTheyAre(std::move(columns));
   if (!places.areShared()) return all;
   // Student's distribution of one degree of freedom has no mean.
   if (places.count < parameters + 2) {

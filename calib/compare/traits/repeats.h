@@ -31,6 +31,8 @@ struct AtPlaces {
   std::string doubt{};
 };
 AtPlaces meansAtPlaces(std::vector<std::vector<double>> columns, std::size_t parameters);
+/// Rows as they are.
+AtPlaces asTheyAre(std::vector<std::vector<double>> columns);
 /// fitInOrder() of means over x that have such an `own` σ, and are off by τ besides, of their place: the weight of each is
 /// 1/(τ² + own²), with the τ² at which Σ r²/(τ² + own²) of the residuals is n − k (R. C. Paule, J. Mandel, J. Res. Natl.
 /// Bur. Stand. 87 (1982) 377), and 0 where it is less without. How uncertain parameters are is by how means scatter about

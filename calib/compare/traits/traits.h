@@ -61,6 +61,9 @@ struct Trait {
 using Traits = Result<std::vector<Trait>>;
 using Column = std::span<const double>;
 
+/// A column `session` of a table: rows of one value are of one session, with an offset of its own besides what is told;
+/// numbers with that offset in them are the mean over sessions, and as uncertain as these differ. Empty: of one.
+
 /// A curve that was fitted, for a plot through the rows.
 struct FittedCurve {
   std::string name{};                  ///< the model: "one exponential"
@@ -107,6 +110,8 @@ struct RowClusters {
   /// "residual" is in doubt then.
   bool are_turned = false;
   const char* what = "captures";  ///< what the clusters are
+  /// Of rows by themselves, each one's session, which may have an offset of its own; empty: all are of one.
+  Column session{};
 };
 
 /// error(d) = c + s d + Σ aₖ cos 2πk·2fd/c + bₖ sin …: "f MHz, k per period": √(a² + b²), and "residual".
@@ -152,7 +157,7 @@ Traits wrapTraits(Column error_m, double period_m);
 Traits wrapTraits(Column shares);
 
 /// error(x) = c + A e^(−x/L), x from the corner's edge: "at the edge" A, "reach" L, "far from it" c.
-Traits cornerTraits(Column distance_to_edge_m, Column error_mm);
+Traits cornerTraits(Column distance_to_edge_m, Column error_mm, Column session = {});
 
 /// A veil that adds the share s of a plate's light: error = arg(1 + s q e^(−iΔφ)) / −Δφ per metre …: "veil"
 /// s. `plate_over_own`: the plate's light over the pixel's own.
@@ -185,11 +190,11 @@ Traits shadowTraits(const Image<float>& range_m, double split_m);
 
 /// "at 1" c and "per decade" s of error = c + s log₁₀(amplitude). Of rows in groups, such as those of one
 /// distance, each has a c of its own, and "at 1", which is extrapolated, is not told.
-Traits amplitudeTraits(Column amplitude, Column error_mm, std::span<const std::size_t> group = {});
+Traits amplitudeTraits(Column amplitude, Column error_mm, std::span<const std::size_t> group = {}, Column session = {});
 /// "bias" per kilolux, and "noise²" per kilolux.
-Traits ambientTraits(Column ambient_klx, Column error_mm, Column sigma_mm);
+Traits ambientTraits(Column ambient_klx, Column error_mm, Column sigma_mm, Column session = {});
 /// "per speed": of error = c + s v, v towards the camera negative.
-Traits motionTraits(Column speed_m_per_s, Column error_mm);
+Traits motionTraits(Column speed_m_per_s, Column error_mm, Column session = {});
 /// y(k) = rest + h λᵏ, k frames after the light changed: "lag" λ, "rest".
 Traits lagTraits(Column frames_after, Column value);
 /// Of changes of light, one a row: what the first frame after it has of what was before, (first −
