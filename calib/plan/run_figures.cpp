@@ -19,9 +19,9 @@ const std::array<Drawn, 6>& all() {
         {.title = "Error over distance",
          .caption =
              "Error of A and of B over distance, against the plan's wall: means of steps of 25 mm in each "
-             "capture, less what goes with each camera's place in the image (also in B − A), and the waves "
-             "that were "
-             "fitted. Without a curve: as measured, since the distances do not tell the two apart.",
+             "capture, less what goes with their place in the image (so as in its middle, where B − A need not be "
+             "what it is on average), and the waves that were fitted. Without a curve: as measured, since the "
+             "distances do not tell the two apart.",
          .x_label = "distance [m]",
          .y_label = "error [mm]",
          .compact = false}},

@@ -13,6 +13,7 @@
 #include "calib/compare/traits/linearised.h"
 #include "calib/compare/traits/repeats.h"
 #include "calib/compare/traits/uneven.h"
+#include "calib/linear/linear.h"
 
 namespace toftwin::compare {
 namespace {
@@ -28,7 +29,7 @@ struct BestStep {
 
   BestStep(const MatrixXd& jacobian, const VectorXd& left) {
     constexpr Index kFewestOfSession = 5;
-    const Eigen::LDLT<MatrixXd> normal{jacobian.transpose() * jacobian};
+    const linear::Ldlt normal{jacobian.transpose() * jacobian};
     VectorXd of_later = VectorXd::Zero(jacobian.cols());
     double together = 0.0;
     for (Index i = left.size() - 1; i >= kFewestOfSession; --i) {
@@ -119,7 +120,7 @@ std::string doubtOf(const Fit& fit, const Model& model, Column y, Column x) {
     const auto row = static_cast<Index>(i);
     j.row(row) /= sigmas[i], left[row] /= sigmas[i];
   }
-  left -= (j * j.colPivHouseholderQr().solve(left)).eval();  // as least squares leave them
+  left -= (j * linear::leastSquares(j, left)).eval();  // as least squares leave them
   return doubtOfSessions(j, left);
 }
 
