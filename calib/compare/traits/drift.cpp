@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <Eigen/Dense>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,10 +8,10 @@
 #include <limits>
 
 #include "calib/compare/statistics.h"
+#include "calib/compare/traits/decay_grid.h"
 #include "calib/compare/traits/least_squares.h"
 #include "calib/compare/traits/linearised.h"
 #include "calib/compare/traits/uneven.h"
-#include "calib/linear/linear.h"
 
 namespace toftwin::compare {
 namespace {
@@ -44,66 +43,6 @@ Candidate constant() {
 Candidate ramp() {
   return {DriftModel::Ramp, [](Row p, double t) { return p[0] + p[1] * t; }, {0.0, 0.0}, 2.0};
 }
-
-double decay(double t, double log_tau) { return std::exp(-t / std::exp(log_tau)); }
-
-/// Time constants that rows can show: from the first two rows' interval to twenty times the series.
-constexpr double kLongest = 20.0;
-double shortest(Column t) { return t[1] - t[0]; }
-
-/// Where a fit of exponentials begins: for each time constant of a logarithmic grid (or each pair) amplitudes
-/// are a linear problem, of which the best is taken. From a start far from it Gauss and Newton's steps may
-/// end in another valley, or on a plateau where a time constant runs away.
-class DecayGrid {
- public:
-  DecayGrid(Column t, Column y) {
-    constexpr double kRatio = 1.25;
-    for (double tau = std::max(shortest(t), 1e-4); tau < kLongest; tau *= kRatio)
-      log_taus_.push_back(std::log(tau));
-    Eigen::MatrixXd basis(static_cast<Eigen::Index>(t.size()), size() + 1);
-    for (Eigen::Index i = 0; i < basis.rows(); ++i) {
-      basis(i, 0) = 1.0;
-      for (Eigen::Index k = 0; k < size(); ++k)
-        basis(i, k + 1) = decay(t[static_cast<std::size_t>(i)], log_taus_[static_cast<std::size_t>(k)]);
-    }
-    products_ = basis.transpose() * basis;
-    with_y_ = basis.transpose() * Eigen::Map<const Eigen::VectorXd>(y.data(), basis.rows());
-  }
-
-  [[nodiscard]] std::vector<double> one() const {
-    std::vector<double> best{0.0, 0.0, 0.0};
-    double most = -1.0;
-    for (int k = 1; k <= size(); ++k) keepBetter({0, k}, most, best);
-    return best;
-  }
-  [[nodiscard]] std::vector<double> two() const {
-    std::vector<double> best{0.0, 0.0, 0.0, 0.0, 0.0};
-    double most = -1.0;
-    for (int k = 1; k <= size(); ++k) {
-      for (int l = k + 1; l <= size(); ++l) keepBetter({0, k, l}, most, best);
-    }
-    return best;
-  }
-
- private:
-  [[nodiscard]] Eigen::Index size() const { return static_cast<Eigen::Index>(log_taus_.size()); }
-
-  /// What amplitudes x of some columns explain, xᵀ(Bᵀy), if it is more than `most`.
-  void keepBetter(const std::vector<int>& columns, double& most, std::vector<double>& best) const {
-    const VectorXd right = with_y_(columns), x = linear::Ldlt{products_(columns, columns)}.solve(right);
-    if (const double explained = x.dot(right); x.allFinite() && explained > most) {
-      most = explained;
-      best = {x[0]};
-      for (std::size_t k = 1; k < columns.size(); ++k)
-        best.insert(best.end(),
-                    {x[static_cast<int>(k)], log_taus_[static_cast<std::size_t>(columns[k] - 1)]});
-    }
-  }
-
-  std::vector<double> log_taus_{};
-  Eigen::MatrixXd products_{};
-  Eigen::VectorXd with_y_{};
-};
 
 Candidate oneExponential(const DecayGrid& grid) {
   return {DriftModel::OneExponential, [](Row p, double t) { return p[0] + p[1] * decay(t, p[2]); },
@@ -204,7 +143,7 @@ bool isPlausible(const Candidate& candidate, const Fit& fit, Column t) {
     return true;
   for (std::size_t k = 2; k < fit.at.size(); k += 2) {
     const double tau = std::exp(fit.at[k]);
-    if (!(tau > shortest(t)) || !(tau < kLongest)) return false;
+    if (!(tau > shortestDecay(t)) || !(tau < kLongestDecay)) return false;
   }
   return true;
 }
@@ -230,8 +169,8 @@ void addDetails(DriftModel kind, const Fit& fit, Column t, double length_s, std:
     // ln τ is what is nearly normal; its interval is taken there. An end that no rows of these could show is
     // not known.
     Trait trait = fit.trait(name, "s", k);
-    if (trait.low < std::log(shortest(t))) trait.low = std::nan("");
-    if (trait.high > std::log(kLongest)) trait.high = std::nan("");
+    if (trait.low < std::log(shortestDecay(t))) trait.low = std::nan("");
+    if (trait.high > std::log(kLongestDecay)) trait.high = std::nan("");
     for (double* value : {&trait.value, &trait.low, &trait.high}) *value = length_s * std::exp(*value);
     traits.push_back(std::move(trait));
   };
