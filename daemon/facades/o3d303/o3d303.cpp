@@ -125,7 +125,10 @@ class O3d303Facade final : public Facade {
                   PcicServer::Hooks{.trigger = [this](auto done) { trigger(std::move(done)); },
                                     .default_schema = [this] { return device_->defaultSchema(); },
                                     .ask = [this](std::string_view command) { return tellOfDevice(command); },
-                                    .connections = [this](std::size_t count) { noteConnections(count); }});
+                                    .connections = [this](std::size_t count) { noteConnections(count); },
+                                    .lasting_error = [this] {
+                                      return is_too_hot_ ? PcicError::kIlluminationTooHot : 0;
+                                    }});
     if (keys_.discoverable) {
       auto discovery = Discovery::listen(thread_.io(), place_.keys.address,
                                          static_cast<std::uint16_t>(keys_.discovery_port),

@@ -73,6 +73,7 @@ class PcicServer::Connection : public std::enable_shared_from_this<Connection> {
     if (queue_.size() == 1) write();
     return true;
   }
+  void tellError(int code) { reply(toftwin::o3d303::kErrorTicket, fmt::format("{:09}", code)); }
   /// What is under way, then these bytes, and the connection ends, whether or not the client takes them.
   bool endWith(SharedBytes bytes) {
     if (is_ending_) return false;
@@ -191,6 +192,7 @@ void PcicServer::take(tcp::socket socket) {
   connections_.push_back(connection);
   hooks_.connections(connections_.size());
   connection->read();
+  if (const int error = hooks_.lasting_error(); error != 0) connection->tellError(error);
 }
 
 void PcicServer::remove(const std::shared_ptr<Connection>& connection) {

@@ -39,6 +39,8 @@ class PcicServer {
     std::function<std::string(std::string_view command)> ask;
     /// How many there are, whenever that changed.
     std::function<void(std::size_t)> connections;
+    /// The error that lasts, which a connection is told that did not hear it begin; 0: none does.
+    std::function<int()> lasting_error = [] { return 0; };
   };
   PcicServer(boost::asio::ip::tcp::acceptor acceptor, Hooks hooks);
   ~PcicServer();

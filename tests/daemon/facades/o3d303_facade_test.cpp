@@ -363,6 +363,8 @@ TEST_F(O3d303Facade, TheTemperatureOfASimulatedCameraCanBeWatchedWarmingUp) {
   startO3d303(kSmallSim + "powered_on_before_s = 156\n", "most_illumination_c = 20");
   PcicClient watches{camera().pcicPort()};
   EXPECT_EQ(watches.nextOf("0001"), "110004000") << "hotter than 20 degrees";
+  PcicClient comes_later{camera().pcicPort()};
+  EXPECT_EQ(comes_later.nextOf("0001"), "110004000") << "which it still is";
   const auto all = camera().call("", "getAllParameters", {});
   // The preset's own source: 28.6 degrees 2.6 minutes after power-on; frames have taken some seconds more.
   EXPECT_NEAR(std::stod(all.textAt("TemperatureIllu")), 28.6, 0.5);
