@@ -30,6 +30,11 @@ std::optional<double> toNumber(std::string_view field) {
   return number;
 }
 
+void dropByteOrderMark(std::string& line) {
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+  if (line.starts_with(kByteOrderMark)) line.erase(0, kByteOrderMark.size());
+}
+
 Error malformed(const std::filesystem::path& file, std::size_t line, std::string_view what) {
   return {Error::Code::Malformed, fmt::format("{}:{}: {}", file.string(), line, what)};
 }
@@ -44,8 +49,7 @@ Result<std::vector<std::vector<double>>> loadColumns(
     return Error{Error::Code::NotFound,
                  fmt::format("{}: cannot be read or is empty", file.string())};
   }
-  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
-  if (line.starts_with(kByteOrderMark)) line.erase(0, kByteOrderMark.size());
+  dropByteOrderMark(line);
   std::vector<std::size_t> places;
   const auto header = split(line);
   for (const std::string_view column : columns) {
@@ -78,6 +82,14 @@ Result<std::vector<std::vector<double>>> loadColumns(
   }
   if (result.front().empty()) return malformed(file, 2, "has a header but no rows");
   return result;
+}
+
+bool hasColumn(const std::filesystem::path& file, std::string_view column) {
+  std::ifstream in{file};
+  std::string line;
+  if (!in || !std::getline(in, line)) return false;
+  dropByteOrderMark(line);
+  return std::ranges::count(split(line), column) > 0;
 }
 
 std::optional<std::filesystem::path> findThesisData(const std::filesystem::path& given) {

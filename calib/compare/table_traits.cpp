@@ -111,12 +111,31 @@ std::string takeZerosAsMissing(std::string_view column, std::vector<double>& val
                      column, is_range ? "which is no range" : "far from all others");
 }
 
+constexpr const char* kSession = "session";
+
+/// Why these are no sessions; empty: they may be.
+std::string wrongWithSessions(const std::vector<double>& session, std::size_t count) {
+  constexpr std::size_t kMost = 50, kFewestRows = 3;
+  const auto bad = std::ranges::find_if_not(session, [](double one) { return std::isfinite(one); });
+  if (bad != session.end()) return fmt::format("is {} in row {}", *bad, bad - session.begin() + 1);
+  if (count > kMost || (count > 1 && kFewestRows * count > session.size()))
+    return fmt::format("has {} values in {} rows: it takes {} rows of each, and at most {}", count, session.size(),
+                       kFewestRows, kMost);
+  return {};
+}
+
 /// The column that says of which session a row is: of a kind that heeds it, and where there are several.
-void addSessions(const std::filesystem::path& file, TableColumns& table) {
-  constexpr const char* kSession = "session";
+Result<> addSessions(const std::filesystem::path& file, TableColumns& table) {
+  if (!hasColumn(file, kSession)) return {};
   auto column = loadColumns(file, {kSession});
-  if (!column) return;
+  if (!column && !table.kind->shares_places) return {};
+  if (!column) return Error{column.error().code, column.error().message + "; sessions are numbered"};
   const std::size_t count = sharedPlacesOf(column->front()).count;
+  const std::string wrong = wrongWithSessions(column->front(), count);
+  if (table.kind->shares_places && !wrong.empty()) {
+    return Error{Error::Code::Malformed, fmt::format("{}: column \"{}\" {}; if it does not number sessions, call it otherwise",
+                                                     file.string(), kSession, wrong)};
+  }
   const bool is_heeded = table.kind->shares_places && count > 1;
   table.notes.push_back(
       is_heeded ? fmt::format("rows are of {} sessions, each of which may have an offset of its own: what it is in is the "
@@ -124,6 +143,7 @@ void addSessions(const std::filesystem::path& file, TableColumns& table) {
                               count)
                 : fmt::format("column \"{}\", of {} values, is not heeded", kSession, count));
   if (is_heeded) table.session = std::move(column->front());
+  return {};
 }
 
 std::string noteOnPlaces(const TableColumns& table) {
@@ -273,7 +293,7 @@ Result<TableColumns> loadTable(const TableJob& job) {
     for (double& one : column->front()) one *= (name.is_negated ? -1.0 : 1.0) * factor->value_or(1.0);
     table.values.push_back(std::move(column->front()));
   }
-  addSessions(job.file, table);
+  if (auto added = addSessions(job.file, table); !added) return added.error();
   addNote(table, noteOnRows(table.values));  // of the file, before zeros are none
   for (std::size_t i = 0; i < wanted.size(); ++i)
     if (isOf(Quantity::Length, wanted[i])) addNote(table, takeZerosAsMissing(wanted[i], table.values[i]));

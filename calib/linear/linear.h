@@ -51,7 +51,7 @@ Eigen::MatrixXd leastSquares(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b)
 /// An orthonormal basis of what the columns span; a column that is the others' but for 1e-8 of its length adds none.
 Eigen::MatrixXd basisOf(Eigen::MatrixXd columns);
 
-/// A⁻¹ of a square A; not finite if it has none.
+/// A⁻¹ of a square A; if it has none, what comes need not be finite.
 Eigen::MatrixXd inverse(const Eigen::MatrixXd& square);
 
 }  // namespace toftwin::linear

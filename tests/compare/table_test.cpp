@@ -161,6 +161,20 @@ TEST_F(Table, SaysWhatIsOddAboutItsRows) {
               testing::ElementsAre(HasSubstr("all 48 readings of value_mm are alike")));
 }
 
+TEST_F(Table, SaysWhatIsWrongWithSessions) {
+  const auto errorOf = [&](const std::string& first, const std::string& others) {
+    std::string text = "speed_m_per_s,error_mm,session\n0,1," + first + "\n";
+    for (int i = 1; i < 12; ++i) text += fmt::format("{},{},{}\n", 0.1 * i, i % 3, others.empty() ? fmt::to_string(i) : others);
+    const auto table = loadTable({.file = write("s.csv", text), .kind = "motion"});
+    return table ? std::string{} : table.error().message;
+  };
+  EXPECT_THAT(errorOf("morning", "2"), HasSubstr("s.csv:2: \"morning\" is not a number; sessions are numbered"));
+  EXPECT_THAT(errorOf("", "2"), HasSubstr("s.csv:2: \"\" is not a number"));
+  EXPECT_THAT(errorOf("nan", "2"), HasSubstr("column \"session\" is nan in row 1"));
+  EXPECT_THAT(errorOf("0", ""), HasSubstr("has 12 values in 12 rows: it takes 3 rows of each"));
+  EXPECT_EQ(errorOf("1", "1"), "");
+}
+
 /// Two sessions, 4 mm apart: the slope is as if there were one, and the note says what was done.
 TEST_F(Table, TellsSessionsApartByTheirColumn) {
   const auto rows = [](bool has_column) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <utility>
 
 #include "calib/compare/traits/bursts.h"
 #include "calib/compare/traits/least_squares.h"
@@ -73,7 +74,13 @@ Trait shareOf(const char* name, const std::vector<Crossing>& by_rows, const Is& 
     for (const Crossing& one : crossings) trials.add(is(one));
     return trials;
   };
-  return trialsOf(by_rows).share(name, trialsOf(alongEdges(by_rows)).together());
+  Trials along_edges;  // each a series of its own
+  std::size_t edge = 0;
+  for (const Crossing& one : alongEdges(by_rows)) {
+    if (std::exchange(edge, one.edge) != one.edge) along_edges.endSeries();
+    along_edges.add(is(one));
+  }
+  return trialsOf(by_rows).share(name, along_edges.together());
 }
 
 /// Where they hang on the mean, neighbours alike.

@@ -51,10 +51,12 @@ double byTwoHeaps(const VectorXd& numbers) {
   double low = mean - std::sqrt(variance), high = mean + std::sqrt(variance), share = 0.5, own = 0.5 * variance,
          log_likelihood = 0.0;
   for (int round = 0; round < kRounds; ++round) {
-    const Eigen::ArrayXd of_low = (1.0 - share) * (-(numbers.array() - low).square() / (2.0 * own)).exp(),
-                         of_high = share * (-(numbers.array() - high).square() / (2.0 * own)).exp(),
-                         are_high = of_high / (of_low + of_high).max(1e-300);
-    log_likelihood = (of_low + of_high).max(1e-300).log().sum() - 0.5 * n * std::log(own);
+    // Logarithms: a number may be so far off that both densities are 0.
+    const Eigen::ArrayXd of_low = std::log(1.0 - share) - (numbers.array() - low).square() / (2.0 * own),
+                         of_high = std::log(share) - (numbers.array() - high).square() / (2.0 * own),
+                         most = of_low.max(of_high), both = most + ((of_low - most).exp() + (of_high - most).exp()).log(),
+                         are_high = (of_high - both).exp();
+    log_likelihood = both.sum() - 0.5 * n * std::log(own);
     share = are_high.mean();
     if (share < kLeastShare || share > 1.0 - kLeastShare) return 0.0;
     high = (are_high * numbers.array()).sum() / (n * share);

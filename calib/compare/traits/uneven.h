@@ -10,7 +10,7 @@ namespace toftwin::compare {
 
 /// Rows that scatter more here than there: σ of each, of which the mean square is 1. ln σ is a parabola over the rows'
 /// order by x, by maximum likelihood (A. C. Harvey, Econometrica 44 (1976) 461) of what a fit left of them. Empty where
-/// neighbours' differences show it by no more than chance in 1 % (R. Koenker, J. Econometrics 17 (1981) 107), or of
+/// neighbours' differences show it by no more than chance in 10 % (R. Koenker, J. Econometrics 17 (1981) 107), or of
 /// fewer than ten rows to spare for each of its two numbers.
 std::vector<double> unevenSigmas(Column left, Column x, std::size_t parameters);
 /// The same whether or not they show it, as of rows that are off from what they share and miss no curve.
