@@ -30,8 +30,8 @@ struct PreparedFrame {
   /// thread.
   [[nodiscard]] wire::Body summedBody() const;
   /// The body in shared memory, for clients on this machine; null if it is small or if there is no
-  /// shared memory to be had. Made when it is first sent and gone when the writes that it was given
-  /// to are done, so that frames that wait hold no file descriptor. May be called on any thread.
+  /// shared memory to be had. Made when it is first sent; once the writes that it was given to are done, `maker` alone
+  /// holds it, for a frame or two, so that frames that wait hold no file descriptor. May be called on any thread.
   [[nodiscard]] std::shared_ptr<const transport::SharedBody> sharedBody(transport::SharedBodies& maker) const;
   /// What a backlog holds in memory with this frame.
   [[nodiscard]] std::uint64_t heldBytes() const;

@@ -85,7 +85,7 @@ Result<std::shared_ptr<const SharedBody>> SharedBody::create(const wire::Body& b
 /// Without a thread, for want of one, memory is taken when it is needed.
 SharedBodies::SharedBodies() {
   try {
-    thread_ = std::jthread{[this](const std::stop_token& stop) { makeSpares(stop); }};
+    thread_ = std::jthread{[this](const std::stop_token& stop) { work(stop); }};
   } catch (const std::system_error&) {
   }
 }
@@ -94,7 +94,34 @@ Result<std::shared_ptr<const SharedBody>> SharedBodies::make(const wire::Body& b
   FileDescriptor fd = takeSpare(body.bytes);
   if (!fd) fd = newMemfd();
   if (auto filled = fillAndSeal(fd, body); !filled) return filled.error();
-  return std::shared_ptr<const SharedBody>{new SharedBody{std::move(fd), body.bytes}};
+  BodyPtr made{new SharedBody{std::move(fd), body.bytes}};
+  keep(made);
+  return made;
+}
+
+/// A while: see letGo().
+void SharedBodies::keep(const BodyPtr& body) {
+  if (body->size() > kMostBytes / kMostKept) return;
+  BodyPtr oldest;  // goes when the lock is gone
+  bool is_awaited = false;
+  {
+    const std::scoped_lock lock{mutex_};
+    kept_.push_back(body);
+    ++made_;
+    if (kept_.size() > kMostKept) oldest = std::move(kept_.front()), kept_.pop_front();
+    is_awaited = !wanted_.empty();
+  }
+  if (!is_awaited) changed_.notify_one();
+}
+
+/// The bodies that were kept when it was called last.
+void SharedBodies::letGo(std::unique_lock<std::mutex>& lock) {
+  const std::size_t made = std::min(std::exchange(made_, 0), kept_.size());
+  std::deque<BodyPtr> gone;
+  for (std::size_t i = kept_.size() - made; i > 0; --i) gone.push_back(std::move(kept_.front())), kept_.pop_front();
+  lock.unlock();
+  gone.clear();
+  lock.lock();
 }
 
 std::uint64_t SharedBodies::ready() const {
@@ -118,23 +145,28 @@ FileDescriptor SharedBodies::takeSpare(std::uint64_t size) {
 }
 
 /// The thread. What cannot be had now is taken when it is needed.
-void SharedBodies::makeSpares(const std::stop_token& stop) {
+void SharedBodies::work(const std::stop_token& stop) {
   std::unique_lock lock{mutex_};
   const auto never = [] { return false; };
-  while (changed_.wait(lock, stop, [&] { return !wanted_.empty(); })) {
-    const std::uint64_t size = *wanted_.begin();
-    if (sparesOf(size) > 0) changed_.wait_for(lock, stop, kLater, never);
-    while (!stop.stop_requested() && sparesOf(size) < kOfASize) {
-      lock.unlock();  // who sends does not wait for this
-      FileDescriptor fd = newMemfd();
-      const bool is_made = fd && ::fallocate(fd.get(), 0, 0, static_cast<off_t>(size)) == 0;
-      lock.lock();
-      if (!is_made) break;
-      spares_.push_back({size, std::move(fd)});
-      while (spares_.size() > kMostReady || bytesOfSpares() > kMostBytes) spares_.pop_front();
-    }
-    wanted_.erase(size);
+  while (changed_.wait(lock, stop, [&] { return !wanted_.empty() || made_ > 0; })) {
+    const bool is_urgent = !wanted_.empty() && sparesOf(*wanted_.begin()) == 0;
+    if (!is_urgent) changed_.wait_for(lock, stop, kLater, never);
+    letGo(lock);
+    if (!wanted_.empty()) makeSpares(*wanted_.begin(), lock, stop);
   }
+}
+
+void SharedBodies::makeSpares(std::uint64_t size, std::unique_lock<std::mutex>& lock, const std::stop_token& stop) {
+  while (!stop.stop_requested() && sparesOf(size) < kOfASize) {
+    lock.unlock();  // who sends does not wait for this
+    FileDescriptor fd = newMemfd();
+    const bool is_made = fd && ::fallocate(fd.get(), 0, 0, static_cast<off_t>(size)) == 0;
+    lock.lock();
+    if (!is_made) break;
+    spares_.push_back({size, std::move(fd)});
+    while (spares_.size() > kMostReady || bytesOfSpares() > kMostBytes) spares_.pop_front();
+  }
+  wanted_.erase(size);
 }
 
 std::size_t SharedBodies::sparesOf(std::uint64_t size) const {

@@ -58,9 +58,10 @@ class SharedBody {
 
 /// Makes bodies of streams, in memory that is ready: to take fresh pages from the kernel takes two thirds of
 /// the time that a body of 2 MB needs (0.55 → 0.20 ms), and a frame would wait for it. A thread of its own
-/// makes the next ready, when those who have just been sent a body are done with their processors. Shared by
-/// the subscriptions that want bodies, so that memory and thread go with the last of them. May be used on any
-/// thread.
+/// makes the next ready, when those who have just been sent a body are done with their processors. Bodies are
+/// kept until it comes after the next one, as whoever lets a body go last gives its pages back (0.3 ms), and
+/// subscribers that come when others have it need no second one. Shared by the subscriptions that want bodies, so that
+/// memory and thread go with the last of them. May be used on any thread.
 class SharedBodies {
  public:
   static constexpr std::uint64_t kSmallest = 64 << 10;  ///< bytes; for smaller ones no memory is made ready
@@ -68,6 +69,7 @@ class SharedBodies {
   static constexpr std::size_t kMostReady = 8;
   static constexpr std::uint64_t kMostBytes = 64ull << 20;  ///< that are ready
   static constexpr std::chrono::milliseconds kLater{3};     ///< than a body, unless none of its size is left
+  static constexpr std::size_t kMostKept = 4;  ///< bodies, if none is larger than a share of kMostBytes
 
   SharedBodies();
   Result<std::shared_ptr<const SharedBody>> make(const wire::Body& body);
@@ -79,8 +81,12 @@ class SharedBodies {
     std::uint64_t size = 0;
     FileDescriptor fd;
   };
+  using BodyPtr = std::shared_ptr<const SharedBody>;
   FileDescriptor takeSpare(std::uint64_t size);
-  void makeSpares(const std::stop_token& stop);
+  void keep(const BodyPtr& body);
+  void work(const std::stop_token& stop);
+  void letGo(std::unique_lock<std::mutex>& lock);
+  void makeSpares(std::uint64_t size, std::unique_lock<std::mutex>& lock, const std::stop_token& stop);
   [[nodiscard]] std::size_t sparesOf(std::uint64_t size) const;
   [[nodiscard]] std::uint64_t bytesOfSpares() const;
 
@@ -88,6 +94,8 @@ class SharedBodies {
   std::condition_variable_any changed_;
   std::set<std::uint64_t> wanted_;  ///< sizes
   std::deque<Spare> spares_;        ///< the newest last
+  std::deque<BodyPtr> kept_;        ///< the newest last
+  std::size_t made_ = 0;            ///< bodies since letGo()
   std::jthread thread_;             ///< last: it ends first
 };
 

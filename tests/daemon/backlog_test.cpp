@@ -3,6 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <chrono>
+#include <memory>
+#include <thread>
+#include <vector>
+
 #include "daemon/subscriber.h"
 #include "fakes.h"
 #include "tests/protocol/example_messages.h"
@@ -188,18 +194,37 @@ TEST(Backlog, EmptyFramesCountToo) {
   EXPECT_GT(frameNumber(0, 0)->heldBytes(), sizeof(PreparedFrame));
 }
 
-TEST(PreparedFrame, IsInSharedMemoryOnlyWhileItIsBeingSent) {
-  PreparedFrame frame;
+TEST(PreparedFrame, IsInSharedMemoryUntilTheFrameAfterItIsSent) {
   const std::vector<std::byte> bytes(100'000, std::byte{7});
-  frame.body = {.pieces = {Buffer::adopt(bytes)}, .bytes = bytes.size(), .crc32c = 0};
   transport::SharedBodies maker;
-  auto one = frame.sharedBody(maker);
-  ASSERT_NE(one, nullptr);
-  EXPECT_EQ(frame.sharedBody(maker), one) << "subscribers that are sent it together share it";
-  const std::weak_ptr<const transport::SharedBody> gone = one;
-  one.reset();
-  EXPECT_TRUE(gone.expired());
-  EXPECT_NE(frame.sharedBody(maker), nullptr);
+  const auto sendAnother = [&] {
+    PreparedFrame frame;
+    frame.body = {.pieces = {Buffer::adopt(bytes)}, .bytes = bytes.size(), .crc32c = 0};
+    std::weak_ptr<const transport::SharedBody> sent = frame.sharedBody(maker);
+    EXPECT_FALSE(sent.expired());
+    EXPECT_EQ(frame.sharedBody(maker), sent.lock()) << "made again for a subscriber that comes when others have it";
+    return sent;
+  };
+  const auto first = sendAnother();
+  const auto soon = std::chrono::steady_clock::now() + std::chrono::seconds{20};
+  while (!first.expired() && std::chrono::steady_clock::now() < soon) {
+    std::this_thread::sleep_for(transport::SharedBodies::kLater);
+    sendAnother();
+  }
+  EXPECT_TRUE(first.expired()) << "held for nobody";
+}
+
+TEST(PreparedFrame, OfWhichManyAreSentAtOnceFewAreKept) {
+  const std::vector<std::byte> bytes(100'000, std::byte{7});
+  transport::SharedBodies maker;
+  std::vector<std::weak_ptr<const transport::SharedBody>> sent;
+  for (int i = 0; i < 50; ++i) {
+    PreparedFrame frame;
+    frame.body = {.pieces = {Buffer::adopt(bytes)}, .bytes = bytes.size(), .crc32c = 0};
+    sent.push_back(frame.sharedBody(maker));
+  }
+  const auto expired = std::ranges::count_if(sent, [](const auto& one) { return one.expired(); });
+  EXPECT_GE(expired, 50 - static_cast<long>(transport::SharedBodies::kMostKept));
 }
 
 TEST(PreparedFrame, IsSummedOnceWhoeverAsksFirst) {
