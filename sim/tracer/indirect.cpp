@@ -78,10 +78,10 @@ Vec3d normalOf(const CoarseGrid& grid, int u, int v) {
 }
 
 /// Takes every coarse point's samples; what they found for the cells comes back tile by tile.
-std::vector<CellUpdate> gatherTiles(const Tracing& tracing, const IrradianceCells& cells, const LitPoints& lights,
-                                    const Channels& channels, std::uint32_t first_sample, int samples, CoarseGrid& grid) {
+void gatherTiles(const Tracing& tracing, const IrradianceCells& cells, const LitPoints& lights, const Channels& channels,
+                 std::uint32_t first_sample, int samples, CoarseGrid& grid, std::vector<CellUpdate>& updates) {
   const int columns = (grid.width + 3) / 4, rows = (grid.height + 3) / 4;
-  std::vector<CellUpdate> updates(static_cast<std::size_t>(columns * rows));
+  updates.resize(static_cast<std::size_t>(columns * rows));
   inParallel(columns * rows, 8, [&](int begin, int end) {
     const FlushDenormals flush;
     TileGatherer gatherer{tracing, cells, lights, channels};
@@ -91,7 +91,6 @@ std::vector<CellUpdate> gatherTiles(const Tracing& tracing, const IrradianceCell
       store(gatherer.tile(), channels, i, j, samples, grid);
     }
   });
-  return updates;
 }
 
 /// In order, whoever made them: the cells do not depend on the threads.
@@ -226,12 +225,13 @@ Channels::Channels(const TraceRequest& request, std::span<const std::uint8_t> wa
     if (!is_first && !wanted.empty() && wanted[term] == 0) continue;
     terms_.push_back(term);
     const int order = last_orders_.back() = static_cast<int>(term % harmonics) + 1;
+    orders_of_terms_.push_back(order);
     if (const auto at = std::ranges::lower_bound(orders_, order); at == orders_.end() || *at != order)
       orders_.insert(at, order);
   }
-  for (const std::size_t term : terms_) {
-    const auto at = std::ranges::lower_bound(orders_, static_cast<int>(term % harmonics) + 1) - orders_.begin();
-    lanes_.push_back(term / harmonics * orders_.size() + static_cast<std::size_t>(at));
+  for (std::size_t k = 0; k < terms_.size(); ++k) {
+    const auto at = std::ranges::lower_bound(orders_, orders_of_terms_[k]) - orders_.begin();
+    lanes_.push_back(terms_[k] / harmonics * orders_.size() + static_cast<std::size_t>(at));
   }
 }
 
@@ -280,8 +280,8 @@ void IndirectLight::gather(const Tracing& tracing, const Channels& channels, int
   } else {
     lights_->clear();
   }
-  update(gatherTiles(tracing, *cells_, *lights_, channels_, samples_done_, samples, grid_), memory.cells, channels_.count(),
-         *cells_);
+  gatherTiles(tracing, *cells_, *lights_, channels_, samples_done_, samples, grid_, updates_);
+  update(updates_, memory.cells, channels_.count(), *cells_);
   samples_done_ += static_cast<std::uint32_t>(samples);
   takeHistory(before_, request.world_from_camera, request.camera, memory);
   pose_ = request.world_from_camera;

@@ -50,6 +50,8 @@ class Channels {
   /// Which terms are wanted, ascending; phasor k is that of terms()[k], and in LaneSums that of lanes()[k].
   [[nodiscard]] const std::vector<std::size_t>& terms() const { return terms_; }
   [[nodiscard]] const std::vector<std::size_t>& lanes() const { return lanes_; }
+  /// Which harmonic each phasor is of.
+  [[nodiscard]] const std::vector<int>& ordersOfTerms() const { return orders_of_terms_; }
   /// The harmonics that any frequency wants: Tracing::orders.
   [[nodiscard]] const std::vector<int>& orders() const { return orders_; }
   /// Each frequency's last that is wanted.
@@ -59,7 +61,7 @@ class Channels {
 
  private:
   std::vector<std::size_t> terms_, lanes_, firsts_;
-  std::vector<int> orders_, last_orders_;
+  std::vector<int> orders_of_terms_, orders_, last_orders_;
 };
 
 /// Adds weight · light · exp(−i 2π n f L/c), channel by channel, to the sums' terms.
@@ -74,6 +76,12 @@ struct BlockGeometry {
 };
 
 class LitPoints;
+
+/// One packet's worth of light over two surfaces for the cells.
+struct CellUpdate {
+  Lanes<IrradianceCells::Key> keys{};  ///< 0: none
+  std::vector<Lanes<float>> values;    ///< by channel
+};
 
 /// Light that reaches surfaces over other surfaces, kept over frames. Means are of incoming radiance,
 /// weighted with the cosine and without the way to the camera: neither albedo nor place of the camera
@@ -119,6 +127,7 @@ class IndirectLight {
   Transform<World, Camera> pose_;
   std::unique_ptr<IrradianceCells> cells_;
   std::unique_ptr<LitPoints> lights_;
+  std::vector<CellUpdate> updates_;  ///< of this frame, in memory of the last
   std::uint32_t samples_done_ = 0;
   double share_of_new_ = 1.0;
 };

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
+#include <vector>
 
 #include "sim/images/rows.h"
 #include "sim/tracer/indirect.h"
@@ -100,52 +102,69 @@ void addWeightedTwice(const float* __restrict weight, const float* __restrict va
 /// A neighbour of all points of a row, and its weights for them.
 struct Neighbour {
   int dx, dy, first, last;
-  std::vector<float> weight;
+  float* weight;
 
   const float* of(const Image<float>& image, int v) const { return &image(0, v + dy) + dx; }
 };
 
-std::vector<Neighbour> neighboursOf(const CoarseGrid& grid, int v) {
-  std::vector<Neighbour> neighbours;
-  for (int dy = std::max(-kRadius, -v); dy <= std::min(kRadius, grid.height - 1 - v); ++dy) {
-    for (int dx = -kRadius; dx <= kRadius; ++dx) {
-      const float spatial = std::exp(-static_cast<float>(dx * dx + dy * dy) / (2.0f * kSigma * kSigma));
-      const int first = std::max(0, -dx), last = std::max(first, std::min(grid.width, grid.width - dx));
-      Neighbour& n = neighbours.emplace_back(
-          Neighbour{dx, dy, first, last, std::vector<float>(static_cast<std::size_t>(grid.width))});
-      weigh(Row{grid, 0, v}, Row{grid, dx, v + dy}, first, last, spatial, n.weight.data());
-    }
-  }
-  return neighbours;
-}
+/// Smoothes rows, one after the other in the same room.
+class RowSmoother {
+ public:
+  explicit RowSmoother(const CoarseGrid& grid)
+      : grid_(grid),
+        per_total_(static_cast<std::size_t>(grid.width)),
+        weights_(kMostNeighbours * per_total_.size()) {}
 
-/// One row of the smooth grid. The weights of all neighbours come first, then every channel with them.
-void smoothRow(const CoarseGrid& grid, const std::vector<Image<float>>& variances, int v, CoarseGrid& out) {
-  const auto width = static_cast<std::size_t>(grid.width);
-  const std::vector<Neighbour> neighbours = neighboursOf(grid, v);
-  std::vector<float> per_total(width, 1e-20f);
-  for (const Neighbour& n : neighbours) {
-    for (int u = n.first; u < n.last; ++u) {
-      const auto i = static_cast<std::size_t>(u);
-      per_total[i] += n.weight[i];
+  /// One row of the smooth grid. The weights of all neighbours come first, then every channel with them.
+  void smooth(const std::vector<Image<float>>& variances, int v, CoarseGrid& out) {
+    const auto neighbours = findNeighbours(v);
+    findTotals(neighbours);
+    const std::size_t width = per_total_.size();
+    for (std::size_t c = 0; c < grid_.means.size(); ++c) {
+      float* to = &out.means[c](0, v);
+      std::fill_n(to, width, 0.0f);
+      for (const Neighbour& n : neighbours)
+        addWeighted(n.weight, n.of(grid_.means[c], v), n.first, n.last, to);
+      for (std::size_t u = 0; u < width; ++u) to[u] *= per_total_[u];
+    }
+    for (std::size_t f = 0; f < grid_.squares.size(); ++f) {
+      float* to = &out.squares[f](0, v);
+      std::fill_n(to, width, 0.0f);
+      for (const Neighbour& n : neighbours)
+        addWeightedTwice(n.weight, n.of(variances[f], v), n.first, n.last, to);
+      for (std::size_t u = 0; u < width; ++u) to[u] *= per_total_[u] * per_total_[u];
     }
   }
-  for (float& total : per_total) total = 1.0f / total;
-  for (std::size_t c = 0; c < grid.means.size(); ++c) {
-    float* to = &out.means[c](0, v);
-    std::fill_n(to, width, 0.0f);
-    for (const Neighbour& n : neighbours)
-      addWeighted(n.weight.data(), n.of(grid.means[c], v), n.first, n.last, to);
-    for (std::size_t u = 0; u < width; ++u) to[u] *= per_total[u];
+
+ private:
+  static constexpr std::size_t kMostNeighbours = (2 * kRadius + 1) * (2 * kRadius + 1);
+
+  std::span<const Neighbour> findNeighbours(int v) {
+    std::size_t count = 0;
+    for (int dy = std::max(-kRadius, -v); dy <= std::min(kRadius, grid_.height - 1 - v); ++dy) {
+      for (int dx = -kRadius; dx <= kRadius; ++dx) {
+        const float spatial = std::exp(-static_cast<float>(dx * dx + dy * dy) / (2.0f * kSigma * kSigma));
+        const int first = std::max(0, -dx), last = std::max(first, std::min(grid_.width, grid_.width - dx));
+        float* const weight = weights_.data() + count * per_total_.size();
+        neighbours_[count++] = {dx, dy, first, last, weight};
+        weigh(Row{grid_, 0, v}, Row{grid_, dx, v + dy}, first, last, spatial, weight);
+      }
+    }
+    return std::span<const Neighbour>{neighbours_}.first(count);
   }
-  for (std::size_t f = 0; f < grid.squares.size(); ++f) {
-    float* to = &out.squares[f](0, v);
-    std::fill_n(to, width, 0.0f);
-    for (const Neighbour& n : neighbours)
-      addWeightedTwice(n.weight.data(), &variances[f](0, v + n.dy) + n.dx, n.first, n.last, to);
-    for (std::size_t u = 0; u < width; ++u) to[u] *= per_total[u] * per_total[u];
+
+  void findTotals(std::span<const Neighbour> neighbours) {
+    std::ranges::fill(per_total_, 1e-20f);
+    for (const Neighbour& n : neighbours) {
+      for (int u = n.first; u < n.last; ++u) per_total_[static_cast<std::size_t>(u)] += n.weight[u];
+    }
+    for (float& total : per_total_) total = 1.0f / total;
   }
-}
+
+  const CoarseGrid& grid_;
+  std::array<Neighbour, kMostNeighbours> neighbours_;
+  std::vector<float> per_total_, weights_;
+};
 
 /// A coarse point next to a block, as its pixels see it.
 struct Corner {
@@ -203,7 +222,8 @@ void IndirectLight::smooth() {
     }
   });
   inParallel(grid_.height, 4, [&](int first, int last) {
-    for (int v = first; v < last; ++v) smoothRow(grid_, variances, v, smooth_);
+    RowSmoother smoother{grid_};
+    for (int v = first; v < last; ++v) smoother.smooth(variances, v, smooth_);
   });
 }
 

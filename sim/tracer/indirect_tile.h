@@ -8,12 +8,6 @@
 
 namespace toftwin::sim {
 
-/// One packet's worth of light over two surfaces for the cells.
-struct CellUpdate {
-  Lanes<IrradianceCells::Key> keys{};  ///< 0: none
-  std::vector<Lanes<float>> values;    ///< by channel
-};
-
 /// Sixteen coarse points, 4 × 4.
 struct CoarseTile {
   Lanes<int> valid, moves;

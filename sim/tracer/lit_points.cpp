@@ -188,9 +188,7 @@ void addFrequency(float turns_per_metre, std::size_t first, std::size_t count, c
 }  // namespace
 
 void LitPoints::add(const Tracing& tracing, const Channels& channels, const Shares& shares, LaneSums& sums) const {
-  const auto harmonics = static_cast<std::size_t>(tracing.request.harmonics);
-  std::vector<int> orders;
-  for (const std::size_t term : channels.terms()) orders.push_back(static_cast<int>(term % harmonics) + 1);
+  const std::vector<int>& orders = channels.ordersOfTerms();
   for (std::size_t i = 0; i < kLaneCount; ++i) sums.steady[i] += shares.total[i];
   for (std::size_t f = 0; f < tracing.turns_per_metre.size(); ++f) {
     const std::size_t first = channels.first(f);
