@@ -357,16 +357,22 @@ std::optional<std::size_t> choose(const std::vector<Explanation>& all) {
       return catalogue;
   }
   // The best explanation decides on the covariates, simplicity on the shape. What a carrier does (a charge,
-  // say) need not change with anything: if it explains as much without, it does not.
+  // say) need not change with anything: if it explains as much without, or its simpler form does, it does not.
   std::size_t chosen = *best;
+  const std::string carrier = all[*best].carrier();
+  const auto isItsForm = [&](const Explanation& one) {
+    const std::string& simpler_than = one.fitted.group.simpler_than;
+    return !simpler_than.empty() && carrier.starts_with(simpler_than);
+  };
   const auto isLess = [&](const Explanation& one) {
-    return !one.carrier().empty() && one.carrier() == all[*best].carrier() &&
-           contains(all[*best].covariates, one.covariates);
+    return !one.carrier().empty() && one.carrier() == carrier && contains(all[*best].covariates, one.covariates);
   };
   for (const std::size_t i : places) {
-    if (all[i].is_catalogue || (all[i].covariates != all[*best].covariates && !isLess(all[i]))) continue;
+    const bool is_same = all[i].covariates == all[*best].covariates, is_form = isItsForm(all[i]);
+    if (all[i].is_catalogue || !(is_same || is_form || isLess(all[i]))) continue;
     const double by = all[*best].gain.total - all[i].gain.total;
-    if (by > difference(all[*best].gain, all[i].gain).error) continue;
+    // The simulator has the simpler form, so that it is taken unless the data tell the two apart.
+    if (by > (is_form ? 2.0 : 1.0) * difference(all[*best].gain, all[i].gain).error) continue;
     if (isSimpler(all[i], all[chosen])) chosen = i;
   }
   return chosen;

@@ -63,6 +63,8 @@ struct TermGroup {
   Kind kind = Kind::Generic;
   std::vector<Term> terms{};
   int inner_numbers = 0;  ///< numbers inside its terms that were fitted, such as a time constant
+  /// The carriers (their beginning) of which it is the simpler form, if it explains as much; empty: its own.
+  std::string simpler_than{};
 };
 /// The covariates of all of its terms, each once.
 std::vector<std::string> covariatesOf(const TermGroup& group);

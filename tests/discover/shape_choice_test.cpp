@@ -32,6 +32,15 @@ TEST(ShapeChoice, ACarrierChangesWithWhatExplainsMore) {
   EXPECT_EQ(choose({overLight(kMore), times("charge", {"charge"}, kConstant)}), 0U);
 }
 
+/// Stray light is a charge that goes with the exposure by itself.
+TEST(ShapeChoice, ASimplerFormIsChosenIfItExplainsAsMuch) {
+  Explanation stray = times("stray", {"stray"}, kConstant);
+  stray.fitted.group.simpler_than = "charge";
+  const auto overExposure = [](const auto& gains) { return times("charge", {"charge", "exposure_us"}, gains); };
+  EXPECT_EQ(choose({overExposure(kHardlyMore), stray}), 1U);
+  EXPECT_EQ(choose({overExposure(kMore), stray}), 0U);
+}
+
 /// A delay that is the same everywhere is no simpler form of a charge.
 TEST(ShapeChoice, AnotherCarrierIsNoSimplerForm) {
   EXPECT_EQ(choose({overLight(kHardlyMore), times("delay", {"ambient_klx"}, kConstant)}), 0U);

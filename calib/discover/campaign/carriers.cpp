@@ -219,7 +219,8 @@ std::vector<TermGroup> carrierGroups(std::span<const CovariateInfo> covariates, 
                     Kind::Generic,
                     {{{}, Stage::Light, fmt::format("{}:in_phase", kStrayCarrier)},
                      {{}, Stage::Light, fmt::format("{}:quadrature", kStrayCarrier)}},
-                    0});
+                    0,
+                    std::string{kChargeCarrier}});  // it goes with exposure by itself
   const auto add = [&](std::string name, const std::vector<Term>& factors) {
     TermGroup charge{std::move(name), Kind::Generic, {}, 0};
     for (const char* part : {"in_phase", "quadrature"}) {
