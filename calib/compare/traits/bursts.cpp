@@ -67,13 +67,15 @@ double Trials::together() const {
   double sum = 0.0, squares = 0.0, scatter = 0.0;
   for (const Burst& one : bursts) sum += one.size, squares += one.size * one.size;
   if (bursts.empty()) return 1.0;
-  const double share = sum / all(), size = squares / sum, together = (1.0 - share) * size - share;
-  if (!(together > 1.0) || bursts.size() < 2) return std::max(1.0, together);
+  const double share = sum / all(), size = squares / sum, together = (1.0 - share) * size - share,
+               of_one = (1.0 - share) * (2.0 * sum - 1.0) - share;
+  if (!(together > 1.0)) return 1.0;
+  if (bursts.size() < 2) return of_one;
   for (const Burst& one : bursts) scatter += std::pow(one.size * one.size - size * one.size, 2);
   const double error = (1.0 - share) * std::sqrt(scatter * number / (number - 1.0)) / sum;
   constexpr double kNormal = 1.959963984540054;
   const double degrees = std::min(number - 1.0, 2.0 * std::pow(together / std::max(error, 1e-9), 2));
-  return together * std::pow(studentT(degrees) / kNormal, 2);
+  return std::min(together * std::pow(studentT(degrees) / kNormal, 2), of_one);
 }
 
 Trait Trials::share(std::string name, double together) const {

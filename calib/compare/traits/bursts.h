@@ -24,6 +24,8 @@ class Trials {
   /// happens in over a half of them is looked at the other way round. Bursts that are nearer to each other than a tenth
   /// of the mean gap are one, where so near ones are more than chance makes (1 %). D is (t/1.96)² as large for what so
   /// few bursts tell of it, Student's quantile t of Satterthwaite's degrees of freedom, at most one less than the bursts.
+  /// It is no more than if all that happened were one burst: of one of size S nothing says how sizes differ, and b is
+  /// 2 S − 1, as where each trial of a burst is its last by the same chance. So few bursts are no surer than many.
   [[nodiscard]] double together() const;
   /// Their share, Jeffreys' interval of so many fewer trials (E. L. Korn, B. I. Graubard, Surv. Methodol. 24 (1998) 193).
   /// `together`: that of the same trials in another order, if it is more.
