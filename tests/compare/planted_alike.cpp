@@ -254,6 +254,19 @@ std::vector<Planted> ofSessions() {
                     add(error, session, noise);
                     return harmonicTraits(d, error, std::vector{30e6}, std::vector{4}, {.session = session});
                   }});
+  rows.push_back({"harmonics, eight sessions of six rows",
+                  {{"30 MHz, 4 per period", 6.0}, {"offset", 3.0}, {"scale", 0.0}, {"residual", 1.0}},
+                  [](Noise& noise) {
+                    constexpr double kWave = 4.0 * std::numbers::pi * 30e6 / 299'792'458.0;
+                    const Columns d = evenly(0.5, 6.5, 48);
+                    Columns session, offset, error;
+                    for (int i = 0; i < 8; ++i) offset.push_back(noise(2.0));
+                    for (std::size_t i = 0; i < d.size(); ++i) {
+                      session.push_back(static_cast<double>(i % 8));
+                      error.push_back(3.0 + offset[i % 8] + 6.0 * std::cos(4.0 * kWave * d[i] + 0.7) + noise(1.0));
+                    }
+                    return harmonicTraits(d, error, std::vector{30e6}, std::vector{4}, {.session = session});
+                  }});
   rows.push_back({"corner, three sessions one after the other",
                   {{"at the edge", 40.0}, {"reach", 0.25}, {"far from it", -3.0}},
                   [=](Noise& noise) {

@@ -54,5 +54,26 @@ TEST(Sessions, AreNotSeenInOne) {
   RecordProperty("doubted", doubted);
 }
 
+/// 48 rows of eight sessions, with errors of 1 besides their sessions'. s of ν = 48 − 4 − 7 free rows is 1 − 1/4ν on the
+/// mean, ± 1/√2ν each: 200 runs lie within three standard errors.
+TEST(Sessions, TakeTheirOffsetsFromTheRowsThatTellTheResidual) {
+  constexpr double kFree = 37.0, kSeries = 200.0;
+  double mean = 0.0;
+  for (unsigned seed = 1; seed <= kSeries; ++seed) {
+    Noise noise{seed};
+    Columns distance, error, session, offset;
+    for (int i = 0; i < 8; ++i) offset.push_back(noise(2.0));
+    for (int i = 0; i < 48; ++i) {
+      distance.push_back(0.5 + 0.125 * i), session.push_back(i % 8);
+      error.push_back(offset[static_cast<std::size_t>(i % 8)] + noise(1.0));
+    }
+    const auto traits = harmonicTraits(distance, error, std::vector{30e6}, std::vector{4}, {.session = session});
+    ASSERT_TRUE(traits) << traits.error().message;
+    EXPECT_EQ(traits->back().name, "residual");
+    mean += traits->back().value / kSeries;
+  }
+  EXPECT_NEAR(mean, 1.0 - 0.25 / kFree, 3.0 / std::sqrt(2.0 * kFree * kSeries));
+}
+
 }  // namespace
 }  // namespace toftwin::compare

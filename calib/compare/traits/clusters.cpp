@@ -240,7 +240,8 @@ std::optional<ClusterFit> fitInClusters(const std::vector<std::vector<double>>& 
   const double free = static_cast<double>(n - k);
   const MatrixXd covariance = best.normal.inverse() * (best.squares / free) + spread.more;
   ClusterFit fit;
-  fit.squares = best.squares, fit.n = y.size(), fit.degrees = spread.degrees, fit.deviance = best.deviance;
+  fit.squares = best.squares, fit.n = y.size(), fit.degrees = spread.degrees, fit.free = free;
+  fit.deviance = best.deviance;
   fit.of_cluster = best.lambda * best.squares / free;
   fit.square_degrees = free * static_cast<double>(n) / own.squaredNorm();
   for (Index a = 0; a < k; ++a) {

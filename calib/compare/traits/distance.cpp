@@ -71,8 +71,7 @@ std::vector<Trait> traitsOf(const Fit& fit, double square_degrees, const std::ve
       fit.trait("offset", "mm", [mean_m](std::span<const double> p) { return p[0] + p[1] * mean_m; }));
   traits.back().refers_to = lineOf(fit, distance_m, mean_m);
   traits.push_back(fit.trait("scale", "mm/m", 1));
-  const double free = static_cast<double>(fit.n - fit.at.size());
-  const double sd = std::sqrt(fit.squares / free), half = 1.96 / std::sqrt(2.0 * square_degrees);
+  const double sd = std::sqrt(fit.squares / fit.free), half = 1.96 / std::sqrt(2.0 * square_degrees);
   traits.push_back({.name = "residual",
                     .unit = "mm",
                     .value = sd,
@@ -318,11 +317,10 @@ constexpr const char* kSharedPlaces = "distances";
 
 /// Of rows that share a distance, what they share is part of what no wave explains.
 void addWhatIsShared(ClusterFit& fit) {
-  const double free = static_cast<double>(fit.n - fit.at.size()), own = fit.squares / free,
-               both = own + fit.of_cluster;
+  const double own = fit.squares / fit.free, both = own + fit.of_cluster;
   fit.square_degrees = both * both / (own * own / fit.square_degrees +
                                       fit.of_cluster * fit.of_cluster / std::max(1.0, fit.degrees));
-  fit.squares = both * free;
+  fit.squares = both * fit.free;
 }
 
 /// Rows in clusters that share an error.

@@ -158,6 +158,7 @@ std::optional<Fit> fitLeastSquares(const Model& model, Column y, std::vector<dou
           .squares = r.squaredNorm(),
           .n = y.size(),
           .degrees = static_cast<double>(y.size() - p.size()),
+          .free = static_cast<double>(y.size() - p.size()),
           .deviance = static_cast<double>(y.size()) * std::log(r.squaredNorm())};
   for (std::size_t a = 0; a < p.size(); ++a) {
     for (std::size_t b = 0; b < p.size(); ++b)

@@ -22,6 +22,7 @@ struct Fit {
   double squares = 0.0;
   std::size_t n = 0;
   double degrees = 0.0;  ///< n − k, or fewer where rows err alike
+  double free = 0.0;     ///< n − k of all parameters, those too that are not among `at`: squares/free is a row's variance
   /// −2 ln of the likelihood, but for a constant of the rows. Not that of REML: it is held against other models'.
   double deviance = 0.0;
   /// Schwarz's, but for the same constant.
