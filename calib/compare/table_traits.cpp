@@ -36,11 +36,18 @@ bool isOf(Quantity quantity, const char* column) {
   return unit != nullptr && unit->quantity == quantity;
 }
 
+/// Of one of the columns, the rows in which all are finite: those that numbers are from.
+std::vector<double> ofFiniteRows(const std::vector<double>& column, const std::vector<std::vector<double>>& all) {
+  std::vector<double> kept;
+  for (std::size_t i = 0; i < column.size(); ++i) {
+    if (std::ranges::all_of(all, [i](const auto& c) { return std::isfinite(c[i]); })) kept.push_back(column[i]);
+  }
+  return kept;
+}
+
 /// Rows that no number is from.
 std::string noteOnRows(const std::vector<std::vector<double>>& columns) {
-  std::size_t left_out = 0;
-  for (std::size_t i = 0; i < columns.front().size(); ++i)
-    left_out += std::ranges::all_of(columns, [i](const auto& c) { return std::isfinite(c[i]); }) ? 0 : 1;
+  const std::size_t left_out = columns.front().size() - ofFiniteRows(columns.front(), columns).size();
   if (left_out == 0) return {};
   return fmt::format("{} of {} rows hold a value that is not finite, and are left out", left_out,
                      columns.front().size());
@@ -114,13 +121,13 @@ std::string takeZerosAsMissing(std::string_view column, std::vector<double>& val
 constexpr const char* kSession = "session";
 
 /// Why these are no sessions; empty: they may be.
-std::string wrongWithSessions(const std::vector<double>& session, std::size_t count) {
+std::string wrongWithSessions(const std::vector<double>& session, std::size_t count, std::size_t rows) {
   constexpr std::size_t kMost = 50, kFewestRows = 3;
   const auto bad = std::ranges::find_if_not(session, [](double one) { return std::isfinite(one); });
   if (bad != session.end()) return fmt::format("is {} in row {}", *bad, bad - session.begin() + 1);
-  if (count > kMost || (count > 1 && kFewestRows * count > session.size()))
-    return fmt::format("has {} values in {} rows: it takes {} rows of each, and at most {}", count, session.size(),
-                       kFewestRows, kMost);
+  if (count > kMost || (count > 1 && kFewestRows * count > rows))
+    return fmt::format("has {} values in {} rows: it takes {} rows of each, and at most {}", count, rows, kFewestRows,
+                       kMost);
   return {};
 }
 
@@ -130,25 +137,27 @@ Result<> addSessions(const std::filesystem::path& file, TableColumns& table) {
   auto column = loadColumns(file, {kSession});
   if (!column && !table.kind->shares_places) return {};
   if (!column) return Error{column.error().code, column.error().message + "; sessions are numbered"};
-  const std::size_t count = sharedPlacesOf(column->front()).count;
-  const std::string wrong = wrongWithSessions(column->front(), count);
+  const auto of_rows = ofFiniteRows(column->front(), table.values);
+  const std::size_t count = sharedPlacesOf(of_rows).count;
+  const std::string wrong = wrongWithSessions(column->front(), count, of_rows.size());
   if (table.kind->shares_places && !wrong.empty()) {
-    return Error{Error::Code::Malformed, fmt::format("{}: column \"{}\" {}; if it does not number sessions, call it otherwise",
-                                                     file.string(), kSession, wrong)};
+    return Error{Error::Code::Malformed,
+                 fmt::format("{}: column \"{}\" {}; if it does not number sessions, call it otherwise", file.string(),
+                             kSession, wrong)};
   }
   const bool is_heeded = table.kind->shares_places && count > 1;
   table.notes.push_back(
       is_heeded ? fmt::format("rows are of {} sessions, each of which may have an offset of its own: what it is in is the "
                               "mean over sessions, and as uncertain as these differ",
                               count)
-                : fmt::format("column \"{}\", of {} values, is not heeded", kSession, count));
+                : fmt::format("column \"{}\", of {} value{}, is not heeded", kSession, count, count == 1 ? "" : "s"));
   if (is_heeded) table.session = std::move(column->front());
   return {};
 }
 
 std::string noteOnPlaces(const TableColumns& table) {
-  if (!table.kind->shares_places || !table.session.empty()) return {};
-  const SharedPlaces places = sharedPlacesOf(table.values.front());
+  if (!table.kind->shares_places) return {};
+  const SharedPlaces places = sharedPlacesOf(ofFiniteRows(table.values.front(), table.values));
   if (!places.areShared()) return {};
   return fmt::format(
       "{} has {} values in {} rows: what is read at one of them may be off together, so intervals are by how "
@@ -293,10 +302,10 @@ Result<TableColumns> loadTable(const TableJob& job) {
     for (double& one : column->front()) one *= (name.is_negated ? -1.0 : 1.0) * factor->value_or(1.0);
     table.values.push_back(std::move(column->front()));
   }
-  if (auto added = addSessions(job.file, table); !added) return added.error();
   addNote(table, noteOnRows(table.values));  // of the file, before zeros are none
   for (std::size_t i = 0; i < wanted.size(); ++i)
     if (isOf(Quantity::Length, wanted[i])) addNote(table, takeZerosAsMissing(wanted[i], table.values[i]));
+  if (auto added = addSessions(job.file, table); !added) return added.error();
   addNotes(table);
   return table;
 }

@@ -395,7 +395,7 @@ std::vector<Planted> allPlanted() {
   std::vector<Planted> all;
   for (const auto& part :
        {drifts(), overDistance(), otherWays(), plantedScatter(), overTime(), atEdges(), ofMasks(),
-        plantedFrames(), plantedAlike(), plantedBursts()})
+        plantedFrames(), plantedAlike(), plantedSessions(), plantedBursts()})
     all.insert(all.end(), part.begin(), part.end());
   return all;
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cmath>
+#include <cstddef>
 #include <functional>
 #include <map>
 #include <random>
@@ -28,6 +30,30 @@ class Noise {
 using Columns = std::vector<double>;
 using Truth = std::map<std::string, double>;
 
+/// From the first to the last in equal steps.
+inline Columns evenly(double first, double last, int count) {
+  Columns x;
+  for (int i = 0; i < count; ++i) x.push_back(first + (last - first) * i / (count - 1));
+  return x;
+}
+
+/// y = f(x) + errors of `sigma`, each of which has `rho` of the one before.
+inline Columns alike(const Columns& x, double sigma, double rho, Noise& noise,
+              const std::function<double(double)>& f) {
+  Columns y;
+  double e = noise(sigma);
+  for (const double one : x) {
+    y.push_back(f(one) + e);
+    e = rho * e + noise(sigma * std::sqrt(1.0 - rho * rho));
+  }
+  return y;
+}
+
+/// Rows of sessions.
+struct AtPlaceOfSession {
+  Columns x{}, y{}, session{};
+};
+
 /// What is planted, and what one run makes of it.
 struct Planted {
   std::string name;
@@ -39,6 +65,8 @@ struct Planted {
 std::vector<Planted> plantedScatter();
 /// Rows that err alike or scatter by their own measure, and parts that are not there.
 std::vector<Planted> plantedAlike();
+/// Rows of sessions that a column tells.
+std::vector<Planted> plantedSessions();
 /// Noise of frames, of which many and few are known.
 std::vector<Planted> plantedFrames();
 /// Lines and frames that err together.

@@ -10,24 +10,6 @@
 namespace toftwin::compare {
 namespace {
 
-Columns evenly(double first, double last, int count) {
-  Columns x;
-  for (int i = 0; i < count; ++i) x.push_back(first + (last - first) * i / (count - 1));
-  return x;
-}
-
-/// y = f(x) + errors of `sigma`, each of which has `rho` of the one before.
-Columns alike(const Columns& x, double sigma, double rho, Noise& noise,
-              const std::function<double(double)>& f) {
-  Columns y;
-  double e = noise(sigma);
-  for (const double one : x) {
-    y.push_back(f(one) + e);
-    e = rho * e + noise(sigma * std::sqrt(1.0 - rho * rho));
-  }
-  return y;
-}
-
 /// Two of a hundred readings wrap, each of which goes on with the next in 80 %.
 Planted wrapsTogether() {
   return {"wraps that go on", {{"wrapped", 0.02}}, [](Noise& noise) {
@@ -235,68 +217,6 @@ Columns uneven(const Columns& x, Noise& noise, const std::function<double(double
   return y;
 }
 
-/// Three sessions, each off by 2 mm of its own, that a column tells: in turn, or one after the other.
-std::vector<Planted> ofSessions() {
-  const auto add = [](Columns& error, const Columns& session, Noise& noise) {
-    const Columns offset{noise(2.0), noise(2.0), noise(2.0)};
-    for (std::size_t i = 0; i < error.size(); ++i) error[i] += offset[static_cast<std::size_t>(session[i])];
-  };
-  std::vector<Planted> rows;
-  rows.push_back({"harmonics, three sessions in turn",
-                  {{"30 MHz, 4 per period", 6.0}, {"offset", 3.0}, {"scale", 0.0}},
-                  [=](Noise& noise) {
-                    constexpr double kWave = 4.0 * std::numbers::pi * 30e6 / 299'792'458.0;
-                    const Columns d = evenly(0.5, 6.5, 240);
-                    Columns session, error = alike(d, 1.0, 0.0, noise, [](double x) {
-                                       return 3.0 + 6.0 * std::cos(4.0 * kWave * x + 0.7);
-                                     });
-                    for (std::size_t i = 0; i < d.size(); ++i) session.push_back(static_cast<double>(i % 3));
-                    add(error, session, noise);
-                    return harmonicTraits(d, error, std::vector{30e6}, std::vector{4}, {.session = session});
-                  }});
-  rows.push_back({"harmonics, eight sessions of six rows",
-                  {{"30 MHz, 4 per period", 6.0}, {"offset", 3.0}, {"scale", 0.0}, {"residual", 1.0}},
-                  [](Noise& noise) {
-                    constexpr double kWave = 4.0 * std::numbers::pi * 30e6 / 299'792'458.0;
-                    const Columns d = evenly(0.5, 6.5, 48);
-                    Columns session, offset, error;
-                    for (int i = 0; i < 8; ++i) offset.push_back(noise(2.0));
-                    for (std::size_t i = 0; i < d.size(); ++i) {
-                      session.push_back(static_cast<double>(i % 8));
-                      error.push_back(3.0 + offset[i % 8] + 6.0 * std::cos(4.0 * kWave * d[i] + 0.7) + noise(1.0));
-                    }
-                    return harmonicTraits(d, error, std::vector{30e6}, std::vector{4}, {.session = session});
-                  }});
-  rows.push_back({"corner, three sessions one after the other",
-                  {{"at the edge", 40.0}, {"reach", 0.25}, {"far from it", -3.0}},
-                  [=](Noise& noise) {
-                    const Columns x = evenly(0.0, 1.2, 150);
-                    Columns session,
-                        error = alike(x, 1.0, 0.0, noise, [](double d) { return -3.0 + 40.0 * std::exp(-d / 0.25); });
-                    for (std::size_t i = 0; i < x.size(); ++i) session.push_back(static_cast<double>(i / 50));
-                    add(error, session, noise);
-                    return cornerTraits(x, error, session);
-                  }});
-  rows.push_back({"ambient, two sessions one after the other", {{"bias", 0.12}}, [=](Noise& noise) {
-                    const Columns klx = evenly(0.0, 60.0, 60);
-                    Columns session, sigma(60, 10.0),
-                        error = alike(klx, 1.0, 0.0, noise, [](double e) { return 2.0 + 0.12 * e; });
-                    for (std::size_t i = 0; i < klx.size(); ++i) session.push_back(static_cast<double>(i / 30));
-                    add(error, session, noise);
-                    return ambientTraits(klx, error, sigma, session);
-                  }});
-  rows.push_back({"amplitude, two sessions in turn", {{"at 1", 12.0}, {"per decade", -4.0}}, [=](Noise& noise) {
-                    const Columns decades = evenly(1.0, 4.0, 100);
-                    Columns session, amplitude,
-                        error = alike(decades, 1.0, 0.0, noise, [](double a) { return 12.0 - 4.0 * a; });
-                    for (std::size_t i = 0; i < decades.size(); ++i)
-                      session.push_back(static_cast<double>(i % 2)), amplitude.push_back(std::pow(10.0, decades[i]));
-                    add(error, session, noise);
-                    return amplitudeTraits(amplitude, error, {}, session);
-                  }});
-  return rows;
-}
-
 std::vector<Planted> unevenly() {
   std::vector<Planted> rows;
   rows.push_back({"amplitude, noise as 1/A", {{"per decade", -4.0}}, [](Noise& noise) {
@@ -332,7 +252,9 @@ std::vector<Planted> unevenly() {
 
 std::vector<Planted> plantedAlike() {
   std::vector<Planted> all;
-  for (const auto& part : {alikeOverDistance(), alikeOverLight(), alikeOverTime(), atPlaces(), unevenSteps(), ofSessions(), unevenly()}) all.insert(all.end(), part.begin(), part.end());
+  for (const auto& part :
+       {alikeOverDistance(), alikeOverLight(), alikeOverTime(), atPlaces(), unevenSteps(), unevenly()})
+    all.insert(all.end(), part.begin(), part.end());
   return all;
 }
 

@@ -75,5 +75,53 @@ TEST(Sessions, TakeTheirOffsetsFromTheRowsThatTellTheResidual) {
   EXPECT_NEAR(mean, 1.0 - 0.25 / kFree, 3.0 / std::sqrt(2.0 * kFree * kSeries));
 }
 
+/// Ten readings at each of so many speeds, which share what they are off by there.
+AtPlaceOfSession atSpeeds(int speeds, const std::function<double(int speed, int reading)>& session) {
+  Noise noise{1};
+  AtPlaceOfSession rows;
+  for (int i = 0; i < speeds; ++i) {
+    const double off = noise(1.0);
+    for (int k = 0; k < 10; ++k) {
+      rows.x.push_back(0.2 * i), rows.session.push_back(session(i, k));
+      rows.y.push_back(7.5 * rows.x.back() + 3.0 * rows.session.back() + off + noise(0.3));
+    }
+  }
+  return rows;
+}
+double widthOf(const Trait& one) { return one.high - one.low; }
+
+/// Six speeds tell a slope by how they differ, be there a column of sessions or not. Errors are the same, but for the
+/// sessions': what differs is how the two fits count degrees of freedom, and what they make of the own errors of rows.
+TEST(Sessions, LeaveRowsOfOnePlaceTogether) {
+  const auto of_two = atSpeeds(6, [](int, int reading) { return reading % 2; }),
+             of_one = atSpeeds(6, [](int, int) { return 0.0; });
+  const auto told = motionTraits(of_two.x, of_two.y, of_two.session), without = motionTraits(of_one.x, of_one.y);
+  ASSERT_TRUE(told && without);
+  EXPECT_NEAR(widthOf(told->front()), widthOf(without->front()), 0.2 * widthOf(without->front()))
+      << "each session has as many rows of each speed, of the same errors";
+  EXPECT_NEAR(told->front().value, without->front().value, 0.01 * widthOf(without->front()));
+}
+
+TEST(Sessions, ThatHaveAllPlacesOfTheirOwnLeaveTooFew) {
+  const auto doubt = [](int speeds) {
+    const auto rows = atSpeeds(speeds, [=](int speed, int) { return 2 * speed / speeds; });
+    const auto told = motionTraits(rows.x, rows.y, rows.session);
+    return told ? told->front().doubt : "not told";
+  };
+  EXPECT_THAT(doubt(4), HasSubstr("its 40 rows have 4 different values")) << "two of a line and one of the sessions";
+  EXPECT_EQ(doubt(6), "");
+}
+
+/// Rows of the second session have no error: the rest is told as without the column.
+TEST(Sessions, OfWhichOneIsLeftAreNone) {
+  auto rows = atSpeeds(6, [](int, int reading) { return reading % 2; });
+  for (std::size_t i = 1; i < rows.y.size(); i += 2) rows.y[i] = std::nan("");
+  const auto told = motionTraits(rows.x, rows.y, rows.session), without = motionTraits(rows.x, rows.y);
+  ASSERT_TRUE(told && without);
+  EXPECT_EQ(told->front().low, without->front().low);
+  EXPECT_EQ(told->front().high, without->front().high);
+  EXPECT_EQ(told->front().n, 6u);
+}
+
 }  // namespace
 }  // namespace toftwin::compare

@@ -202,6 +202,24 @@ TEST_F(Table, TellsSessionsApartByTheirColumn) {
   EXPECT_THAT(drift->notes, testing::Contains("column \"session\", of 2 values, is not heeded"));
 }
 
+/// Twelve rows of each of three sessions, of which those of one have no error; and rows of one speed stay together.
+TEST_F(Table, CountsSessionsAndPlacesOfTheRowsThatAreFinite) {
+  const auto rows = [](int without) {
+    std::string text = "speed_m_per_s,error_mm,session\n";
+    for (int i = 0; i < 36; ++i)
+      text += fmt::format("{},{},{}\n", 0.2 * (i % 6), i / 12 < without ? "nan" : fmt::to_string(std::sin(1.7 * i)), i / 12);
+    return text;
+  };
+  const auto one_less = loadTable({.file = write("a.csv", rows(1)), .kind = "motion"});
+  ASSERT_TRUE(one_less) << one_less.error().message;
+  EXPECT_THAT(one_less->notes, testing::ElementsAre(HasSubstr("12 of 36 rows"), HasSubstr("rows are of 2 sessions"),
+                                                    HasSubstr("speed_m_per_s has 6 values in 24 rows")));
+  const auto one_left = loadTable({.file = write("a.csv", rows(2)), .kind = "motion"});
+  ASSERT_TRUE(one_left) << one_left.error().message;
+  EXPECT_THAT(one_left->notes, testing::Contains("column \"session\", of 1 value, is not heeded"));
+  EXPECT_TRUE(one_left->session.empty());
+}
+
 /// Three of 48 readings about 900 mm are 0: the drift is that of the others, 2 mm in 48 s.
 TEST_F(Table, TakesZerosAsNoRange) {
   std::string rows = "time_s,value_mm\n", errors = "time_s,value_mm\n";

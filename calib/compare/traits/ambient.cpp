@@ -6,8 +6,7 @@
 
 #include "calib/compare/statistics.h"
 #include "calib/compare/traits/least_squares.h"
-#include "calib/compare/traits/repeats.h"
-#include "calib/compare/traits/sessions.h"
+#include "calib/compare/traits/placed_rows.h"
 
 namespace toftwin::compare {
 namespace {
@@ -50,21 +49,22 @@ std::optional<Fit> lineOfVariances(const std::vector<double>& ambient, const std
 }  // namespace
 
 Traits ambientTraits(Column ambient_klx, Column error_mm, Column sigma_mm, Column session) {
-  auto rows = finiteRows({ambient_klx, error_mm, sigma_mm, session.empty() ? error_mm : session}, 4, kOfAmbient);
+  auto rows = finiteRowsOf({ambient_klx, error_mm, sigma_mm}, session, 4, kOfAmbient);
   if (!rows) return rows.error();
-  for (double& one : (*rows)[2]) one *= one;
-  const AtPlaces at = session.empty() ? meansAtPlaces(std::move(*rows), 2) : asTheyAre(std::move(*rows));
-  const auto &ambient = at.columns[0], &variance = at.columns[2];
-  const Model straight = [&](std::span<const double> p, std::size_t i) { return p[0] + p[1] * ambient[i]; };
-  const Column of_rows = session.empty() ? Column{} : Column{at.columns[3]};
-  const auto bias = at.own[1].empty() ? fitBesideSessions(straight, at.columns[1], {0.0, 0.0}, ambient, of_rows)
-                                      : fitMeans(straight, at.columns[1], at.own[1], {0.0, 0.0}, ambient),
-             noise = std::ranges::max(variance) > 0.0 ? lineOfVariances(ambient, variance, at.own[2])
-                                                      : fitLeastSquares(straight, variance, {0.0, 0.0});
+  auto& columns = rows->columns;
+  for (double& one : columns[2]) one *= one;
+  const AtPlaces scatter = meansAtPlaces({columns[0], columns[2]}, 2);  // it has no offset
+  const PlacedRows range{{.columns = {columns[0], columns[1]}, .session = rows->session}, 2};
+  const auto straightOver = [](const std::vector<double>& ambient) -> Model {
+    return [&](std::span<const double> p, std::size_t i) { return p[0] + p[1] * ambient[i]; };
+  };
+  const auto &ambient = scatter.columns[0], &variance = scatter.columns[1];
+  const auto bias = range.fit(straightOver(range.column(0)), 1, {0.0, 0.0});
+  auto noise = std::ranges::max(variance) > 0.0 ? lineOfVariances(ambient, variance, scatter.own[1])
+                                                : fitLeastSquares(straightOver(ambient), variance, {0.0, 0.0});
   if (!bias || !noise) return undetermined(kOfAmbient, "all illuminances are alike");
-  std::vector told{bias->trait("bias", "mm/klx", 1), noise->trait("noise²", "mm²/klx", 1)};
-  if (!at.doubt.empty()) told[0].doubt = told[1].doubt = at.doubt;
-  return told;
+  if (!scatter.doubt.empty()) noise->doubt = scatter.doubt;
+  return std::vector{bias->trait("bias", "mm/klx", 1), noise->trait("noise²", "mm²/klx", 1)};
 }
 
 }  // namespace toftwin::compare

@@ -201,10 +201,9 @@ namespace {
 
 /// Rows by themselves.
 Result<FittedTraits> fitRows(Column distance_m, Column error_mm, Column session, const std::vector<Wave>& waves) {
-  const auto rows =
-      finiteRows({distance_m, error_mm, session.empty() ? error_mm : session}, 2 * waves.size() + 4, "harmonics");
+  const auto rows = finiteRowsOf({distance_m, error_mm}, session, 2 * waves.size() + 4, "harmonics");
   if (!rows) return rows.error();
-  const auto &d = (*rows)[0], &e = (*rows)[1];
+  const auto &d = rows->columns[0], &e = rows->columns[1];
   const std::size_t count = 2 + 2 * waves.size();
   std::vector<double> basis;  // of all rows: a fit asks for each some thousand times
   for (const double one : d) {
@@ -215,8 +214,7 @@ Result<FittedTraits> fitRows(Column distance_m, Column error_mm, Column session,
   const Model model = [&](std::span<const double> p, std::size_t i) {
     return std::inner_product(p.begin(), p.end(), basis.begin() + static_cast<std::ptrdiff_t>(i * count), 0.0);
   };
-  const Column of_rows = session.empty() ? Column{} : Column{(*rows)[2]};
-  const auto fit = fitBesideSessions(model, e, std::vector<double>(count, 0.0), d, of_rows);
+  const auto fit = fitBesideSessions(model, e, std::vector<double>(count, 0.0), d, rows->session);
   if (!fit)
     return undetermined("harmonics", "the distances span too little of a period, or two orders coincide");
   return fittedOf(*fit, fit->degreesOfRow(), waves, d);
@@ -272,25 +270,28 @@ void keepTogetherWhereDoubted(FittedTraits& fitted, bool were_sure) {
 struct ClusterRows {
   std::vector<double> distance_m{}, error_mm{};
   std::vector<std::size_t> cluster{};
+  std::vector<double> session{};
   RowErrors errors{};
   std::size_t clusters = 0;
 };
 
-Result<ClusterRows> finiteRowsOf(Column distance_m, Column error_mm, const RowClusters& clusters,
+Result<ClusterRows> clusterRowsOf(Column distance_m, Column error_mm, const RowClusters& clusters,
                                  std::size_t least) {
   const auto orAll = [&](std::span<const double> column, double value) {
     return column.empty() ? std::vector<double>(distance_m.size(), value)
                           : std::vector<double>(column.begin(), column.end());
   };
   const std::vector<double> numbers(clusters.of.begin(), clusters.of.end());
-  auto rows = finiteRows({distance_m, error_mm, numbers, orAll(clusters.pixels, 1.0), orAll(clusters.shared_mm, 0.0)},
-                         least, "harmonics");
+  const auto pixels = orAll(clusters.pixels, 1.0), shared_mm = orAll(clusters.shared_mm, 0.0),
+             session = orAll(clusters.session, 0.0);
+  auto rows = finiteRows({distance_m, error_mm, numbers, pixels, shared_mm, session}, least, "harmonics");
   if (!rows) return rows.error();
   const auto logOf = [](std::vector<double> column) {
     for (double& one : column) one = std::log(std::max(1e-3, one));
     return column;
   };
   ClusterRows all{.cluster = {(*rows)[2].begin(), (*rows)[2].end()},
+                  .session = std::move((*rows)[5]),
                   .errors = {.powers_of = {logOf((*rows)[0]), logOf((*rows)[3])}, .shared = (*rows)[4]}};
   all.distance_m = std::move((*rows)[0]), all.error_mm = std::move((*rows)[1]);
   all.clusters = std::set<std::size_t>{all.cluster.begin(), all.cluster.end()}.size();
@@ -326,7 +327,7 @@ void addWhatIsShared(ClusterFit& fit) {
 /// Rows in clusters that share an error.
 Result<FittedTraits> fitClusters(Column distance_m, Column error_mm, const std::vector<Wave>& waves,
                                  const RowClusters& clusters) {
-  const auto rows = finiteRowsOf(distance_m, error_mm, clusters, 2 * waves.size() + 4);
+  const auto rows = clusterRowsOf(distance_m, error_mm, clusters, 2 * waves.size() + 4);
   if (!rows) return rows.error();
   const auto& d = rows->distance_m;
   std::vector<std::vector<double>> columns{std::vector<double>(d.size(), 1.0), d};
@@ -348,9 +349,12 @@ Result<FittedTraits> fitClusters(Column distance_m, Column error_mm, const std::
       for (std::size_t k = 0; k < Sideways::kColumns; ++k) columns[first + k][i] = sideways.at(i)[k];
     }
   }
+  const std::size_t without_offsets = columns.size();
+  for (auto& column : offsetColumns(rows->session)) columns.push_back(std::move(column));
   auto fit = fitInClusters(columns, rows->error_mm, rows->cluster, rows->errors);
   if (!fit)
     return undetermined("harmonics", fmt::format("the distances span too little of a period, or are of few {} only", clusters.what).c_str());
+  leaveOutOffsets(*fit, without_offsets);
   if (clusters.what == kSharedPlaces) addWhatIsShared(*fit);
   FittedTraits fitted = fittedOf(*fit, fit->square_degrees, waves, d);
   doubtFewClusters(rows->clusters, *fit, clusters.what, fitted.traits);
@@ -378,8 +382,9 @@ Result<FittedTraits> fitOrders(Column distance_m, Column error_mm, std::span<con
   if (waves.empty()) return undetermined("harmonics", "no frequency or order was given");
   if (!clusters.of.empty()) return fitClusters(distance_m, error_mm, waves, clusters);
   const SharedPlaces places = sharedPlacesOf(distance_m);
-  return places.areShared() && clusters.session.empty() ? fitClusters(distance_m, error_mm, waves, {.of = places.of, .what = kSharedPlaces})
-                            : fitRows(distance_m, error_mm, clusters.session, waves);
+  if (!places.areShared()) return fitRows(distance_m, error_mm, clusters.session, waves);
+  return fitClusters(distance_m, error_mm, waves,
+                     {.of = places.of, .what = kSharedPlaces, .session = clusters.session});
 }
 
 /// How many orders so many rows allow for: as many distances as twice the parameters, where rows share them.

@@ -204,9 +204,9 @@ ShareInterval shareInterval(double events, double trials, ShareRule rule) {
   return interval;
 }
 
-Result<std::vector<std::vector<double>>> finiteRows(std::initializer_list<Column> columns, std::size_t least,
+Result<std::vector<std::vector<double>>> finiteRows(const std::vector<Column>& columns, std::size_t least,
                                                     const char* of_what) {
-  const std::size_t rows = columns.begin()->size();
+  const std::size_t rows = columns.front().size();
   for (const Column& column : columns) {
     if (column.size() != rows)
       return Error{Error::Code::InvalidArgument,

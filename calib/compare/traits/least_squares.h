@@ -81,7 +81,7 @@ struct ShareInterval {
 ShareInterval shareInterval(double events, double trials, ShareRule rule);
 /// Rows of several columns in which all are finite; Error if the columns differ in length or fewer than
 /// `least` are left.
-Result<std::vector<std::vector<double>>> finiteRows(std::initializer_list<Column> columns, std::size_t least,
+Result<std::vector<std::vector<double>>> finiteRows(const std::vector<Column>& columns, std::size_t least,
                                                     const char* of_what);
 /// "it cannot be told from these rows", for what a fit did not give.
 Error undetermined(const char* of_what, const char* why);

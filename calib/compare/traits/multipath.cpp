@@ -14,8 +14,7 @@
 #include "calib/compare/traits/clusters.h"
 #include "calib/compare/traits/veil.h"
 #include "calib/compare/traits/least_squares.h"
-#include "calib/compare/traits/repeats.h"
-#include "calib/compare/traits/sessions.h"
+#include "calib/compare/traits/placed_rows.h"
 
 namespace toftwin::compare {
 
@@ -35,36 +34,22 @@ std::vector<double> startAt(double length_m, double share, Column x, Column e) {
   return {mean_e - size * mean_fall, size, std::log(share)};
 }
 
-/// A corner's rows, or the means of those that share a distance; and each row's session, if it is known.
-struct CornerRows {
-  AtPlaces rows{};
-  Column session{};
-
-  [[nodiscard]] std::optional<Fit> fit(const Model& model, const std::vector<double>& start) const {
-    const auto &x = rows.columns[0], &e = rows.columns[1];
-    return rows.own[1].empty() ? fitBesideSessions(model, e, start, x, session)
-                               : fitMeans(model, e, rows.own[1], start, x);
-  }
-};
-
 /// Whether the rows speak for a fall from the edge against none, by more than what the choice among so many
 /// reaches makes of rows that show nothing.
-bool isSeen(const Fit& fall, const CornerRows& corner) {
+bool isSeen(const Fit& fall, const PlacedRows& corner) {
   constexpr double kPositive = 2.0;  // evidence (Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773)
-  const auto none = corner.fit([](std::span<const double> p, std::size_t) { return p[0]; }, {0.0});
+  const auto none = corner.fit([](std::span<const double> p, std::size_t) { return p[0]; }, 1, {0.0});
   return none && none->bic() - fall.bic() > kPositive;
 }
 
 }  // namespace
 
 Traits cornerTraits(Column distance_to_edge_m, Column error_mm, Column session) {
-  auto finite = finiteRows({distance_to_edge_m, error_mm, session.empty() ? error_mm : session}, 8, "corner");
+  auto finite = finiteRowsOf({distance_to_edge_m, error_mm}, session, 8, "corner");
   if (!finite) return finite.error();
   constexpr std::size_t kParameters = 3;
-  CornerRows corner{session.empty() ? meansAtPlaces(std::move(*finite), kParameters) : asTheyAre(std::move(*finite))};
-  if (!session.empty()) corner.session = corner.rows.columns[2];
-  const AtPlaces& rows = corner.rows;
-  const auto &x = rows.columns[0], &e = rows.columns[1];
+  const PlacedRows corner{*std::move(finite), kParameters};
+  const auto &x = corner.column(0), &e = corner.column(1);
   const double reach = std::ranges::max(x);
   if (!(reach > 0.0) || std::ranges::min(x) < 0.0)
     return undetermined("corner", "distances to the edge must not be negative");
@@ -76,7 +61,7 @@ Traits cornerTraits(Column distance_to_edge_m, Column error_mm, Column session) 
     auto tried = fitLeastSquares(model, e, startAt(share * reach, share, x, e));
     if (tried && (!fit || tried->squares < fit->squares)) fit = std::move(tried);
   }
-  if (fit) fit = corner.fit(model, fit->at);
+  if (fit) fit = corner.fit(model, 1, fit->at);
   constexpr double kMostReaches = 10.0;  // then it bends by a twentieth of itself, and passes for a line
   if (!fit || fit->at[2] > std::log(kMostReaches) || !isSeen(*fit, corner))
     return undetermined("corner", "the error does not fall off from the edge");
@@ -84,7 +69,6 @@ Traits cornerTraits(Column distance_to_edge_m, Column error_mm, Column session) 
   if (std::ranges::min(x) > std::log(kMostAway) * reach * std::exp(fit->at[2])) {
     return undetermined("corner", "of an error that falls so fast the nearest row shows less than a tenth");
   }
-  if (!rows.doubt.empty()) fit->doubt = rows.doubt;
   Trait length = fit->trait("reach", "m", 2);
   for (double* value : {&length.value, &length.low, &length.high}) *value = reach * std::exp(*value);
   return std::vector{fit->trait("at the edge", "mm", 1), length, fit->trait("far from it", "mm", 0)};

@@ -72,8 +72,7 @@ AtPlaces meansAtPlaces(std::vector<std::vector<double>> columns, std::size_t par
   const SharedPlaces places = sharedPlacesOf(columns.front());
   AtPlaces all = asTheyAre(std::move(columns));
   if (!places.areShared()) return all;
-  // Student's distribution of one degree of freedom has no mean.
-  if (places.count < parameters + 2) {
+  if (places.areTooFewFor(parameters)) {
     all.doubt = doubtOfPlaces(places.of.size(), places.count);
     return all;
   }

@@ -16,6 +16,8 @@ struct SharedPlaces {
   std::size_t count = 0;
   /// Two rows or more for each place. Fewer are rounded alike by chance.
   [[nodiscard]] bool areShared() const { return count > 0 && 2 * count <= of.size(); }
+  /// To say how uncertain so many parameters are: Student's distribution of one degree of freedom has no mean.
+  [[nodiscard]] bool areTooFewFor(std::size_t parameters) const { return count < parameters + 2; }
 };
 /// A row that is not finite is of any place: no number is from it.
 SharedPlaces sharedPlacesOf(Column x);

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "calib/compare/statistics.h"
+#include "calib/compare/traits/clusters.h"
 #include "calib/compare/traits/linearised.h"
 #include "calib/compare/traits/repeats.h"
 #include "calib/compare/traits/uneven.h"
@@ -93,26 +94,6 @@ std::string doubtOfSessions(const MatrixXd& jacobian, const VectorXd& left) {
   return {};
 }
 
-/// A fit of `k` parameters and of so many offsets, of which the last is what makes their sum 0: without these, and with
-/// what they scatter by in the first parameter.
-Fit withoutOffsets(Fit fit, std::size_t k) {
-  const std::size_t all = fit.at.size(), sessions = all - k + 1;
-  std::vector<double> offsets(fit.at.begin() + static_cast<std::ptrdiff_t>(k), fit.at.end());
-  offsets.push_back(-std::accumulate(offsets.begin(), offsets.end(), 0.0));
-  const double sd = summarise(offsets).sd, wider = studentT(static_cast<double>(sessions - 1)) / studentT(fit.degrees),
-               variance = wider * wider * sd * sd / static_cast<double>(sessions);
-  const auto keep = [&](std::vector<double>& covariance) {
-    std::vector<double> kept;
-    for (std::size_t a = 0; a < k; ++a)
-      for (std::size_t b = 0; b < k; ++b) kept.push_back(covariance[a * all + b] + (a + b == 0 ? variance : 0.0));
-    covariance = std::move(kept);
-  };
-  keep(fit.covariance);
-  for (Fit::Possible& one : fit.possible) keep(one.covariance), one.away.resize(k);
-  fit.at.resize(k);
-  return fit;
-}
-
 /// Rows that scatter unevenly over their σ.
 std::string doubtOf(const Fit& fit, const Model& model, Column y, Column x) {
   MatrixXd j = jacobian(model, y.size(), fit.at);
@@ -126,9 +107,90 @@ std::string doubtOf(const Fit& fit, const Model& model, Column y, Column x) {
   return doubtOfSessions(j, left);
 }
 
+/// The model with an offset of each session: all but the last's are parameters.
+Model besideSessions(const Model& model, const SharedPlaces& sessions, std::size_t k) {
+  return [&, k](std::span<const double> p, std::size_t i) {
+    const auto offsets = p.subspan(k);
+    const bool is_last = sessions.of[i] + 1 == sessions.count;
+    return model(p.first(k), i) + (is_last ? -std::accumulate(offsets.begin(), offsets.end(), 0.0) : offsets[sessions.of[i]]);
+  };
+}
+
+/// fitInClusters() of a model that may bend, by what it is straight where it ends.
+std::optional<Fit> fitAtPlaces(const Model& model, Column y, std::vector<double> start, std::span<const std::size_t> place) {
+  constexpr int kRounds = 30;
+  constexpr double kNear = 1e-3;  // of a standard error
+  const auto first = fitLeastSquares(model, y, std::move(start));
+  if (!first) return std::nullopt;
+  std::vector<double> at = first->at;
+  for (int round = 0; round < kRounds; ++round) {
+    const MatrixXd j = jacobian(model, y.size(), at);
+    const VectorXd left = residuals(model, y, at);
+    if (!j.allFinite() || !left.allFinite()) return std::nullopt;
+    std::vector<std::vector<double>> columns;
+    for (const auto& column : j.colwise()) columns.emplace_back(column.begin(), column.end());
+    auto fit = fitInClusters(columns, {left.data(), left.data() + left.size()}, place);
+    if (!fit) return std::nullopt;
+    bool is_settled = true;
+    for (std::size_t k = 0; k < at.size(); ++k)
+      is_settled = is_settled && std::abs(fit->at[k]) <= kNear * fit->error(k), at[k] += fit->at[k];
+    fit->at = at;
+    if (is_settled) return *std::move(fit);
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
-std::optional<Fit> fitBesideSessions(const Model& model, Column y, std::vector<double> start, Column x, Column session) {
+Result<RowsOfSessions> finiteRowsOf(std::vector<Column> columns, Column session, std::size_t least, const char* of_what) {
+  if (!session.empty()) columns.push_back(session);
+  auto rows = finiteRows(columns, least, of_what);
+  if (!rows) return rows.error();
+  RowsOfSessions all{.columns = *std::move(rows)};
+  if (session.empty()) return all;
+  all.session = std::move(all.columns.back()), all.columns.pop_back();
+  if (sharedPlacesOf(all.session).count < 2) all.session.clear();
+  return all;
+}
+
+std::vector<std::vector<double>> offsetColumns(Column session) {
+  const SharedPlaces sessions = sharedPlacesOf(session);
+  std::vector<std::vector<double>> columns;
+  for (std::size_t s = 0; s + 1 < sessions.count; ++s) {
+    auto& column = columns.emplace_back();
+    for (const std::size_t of : sessions.of) column.push_back(of == s ? 1.0 : of + 1 == sessions.count ? -1.0 : 0.0);
+  }
+  return columns;
+}
+
+void leaveOutOffsets(Fit& fit, std::size_t first) {
+  const std::size_t all = fit.at.size(), sessions = all - first + 1;
+  if (sessions < 2) return;
+  std::vector<double> offsets(fit.at.begin() + static_cast<std::ptrdiff_t>(first), fit.at.end());
+  offsets.push_back(-std::accumulate(offsets.begin(), offsets.end(), 0.0));
+  const double sd = summarise(offsets).sd, wider = studentT(static_cast<double>(sessions - 1)) / studentT(fit.degrees),
+               variance = wider * wider * sd * sd / static_cast<double>(sessions);
+  const auto keep = [&](std::vector<double>& covariance) {
+    std::vector<double> kept;
+    for (std::size_t a = 0; a < first; ++a)
+      for (std::size_t b = 0; b < first; ++b) kept.push_back(covariance[a * all + b] + (a + b == 0 ? variance : 0.0));
+    covariance = std::move(kept);
+  };
+  keep(fit.covariance);
+  for (Fit::Possible& one : fit.possible) keep(one.covariance), one.away.resize(first);
+  fit.at.resize(first);
+}
+
+std::optional<Fit> startBesideSessions(const Model& model, Column y, std::vector<double> start, Column session) {
+  const SharedPlaces sessions = sharedPlacesOf(session);
+  if (sessions.count < 2) return fitLeastSquares(model, y, std::move(start));
+  const std::size_t k = start.size();
+  start.resize(k + sessions.count - 1, 0.0);
+  return fitLeastSquares(besideSessions(model, sessions, k), y, std::move(start));
+}
+
+std::optional<Fit> fitBesideSessions(const Model& model, Column y, std::vector<double> start, Column x, Column session,
+                                     std::span<const std::size_t> place) {
   const SharedPlaces sessions = sharedPlacesOf(session);
   if (sessions.count < 2) {
     auto fit = fitInOrder(model, y, std::move(start), x);
@@ -136,16 +198,12 @@ std::optional<Fit> fitBesideSessions(const Model& model, Column y, std::vector<d
     if (fit && fit->doubt.empty() && !is_exact) fit->doubt = doubtOf(*fit, model, y, x);
     return fit;
   }
-  const std::size_t k = start.size(), last = sessions.count - 1;
-  const Model beside = [&, k](std::span<const double> p, std::size_t i) {
-    const auto offsets = p.subspan(k);
-    const double offset = sessions.of[i] < last ? offsets[sessions.of[i]] : -std::accumulate(offsets.begin(), offsets.end(), 0.0);
-    return model(p.first(k), i) + offset;
-  };
-  start.resize(k + last, 0.0);
-  auto fit = fitInOrder(beside, y, std::move(start), x);
-  if (!fit) return fit;
-  return withoutOffsets(*std::move(fit), k);
+  const std::size_t k = start.size();
+  start.resize(k + sessions.count - 1, 0.0);
+  const Model beside = besideSessions(model, sessions, k);
+  auto fit = place.empty() ? fitInOrder(beside, y, std::move(start), x) : fitAtPlaces(beside, y, std::move(start), place);
+  if (fit) leaveOutOffsets(*fit, k);
+  return fit;
 }
 
 }  // namespace toftwin::compare

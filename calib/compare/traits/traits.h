@@ -110,7 +110,7 @@ struct RowClusters {
   /// "residual" is in doubt then.
   bool are_turned = false;
   const char* what = "captures";  ///< what the clusters are
-  /// Of rows by themselves, each one's session, which may have an offset of its own; empty: all are of one.
+  /// Each row's session, which may have an offset of its own; empty: all are of one.
   Column session{};
 };
 
