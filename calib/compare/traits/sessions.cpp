@@ -23,24 +23,57 @@ using Eigen::Index;
 constexpr double kVeryStrong = 10.0;  // Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773
 constexpr Index kRowsPerParameter = 10;
 
-/// By how much a step before the best of rows makes Σ r² less, and which that is.
-struct BestStep {
-  double gain = 0.0;
-  Index row = 0;
+constexpr Index kFewestOfSession = 5;
 
-  BestStep(const MatrixXd& jacobian, const VectorXd& left) {
-    constexpr Index kFewestOfSession = 5;
-    const linear::Ldlt normal{jacobian.transpose() * jacobian};
-    VectorXd of_later = VectorXd::Zero(jacobian.cols());
-    double together = 0.0;
-    for (Index i = left.size() - 1; i >= kFewestOfSession; --i) {
-      of_later += jacobian.row(i).transpose(), together += left[i];
-      const double later = static_cast<double>(left.size() - i), own = later - of_later.dot(normal.solve(of_later));
-      if (left.size() - i < kFewestOfSession || !(own > 1e-6 * later)) continue;
-      if (const double one = together * together / own; one > gain) gain = one, row = i;
-    }
+/// By how much a step before each row makes Σ r² less; 0 where one side has too few rows, or the model has such a step.
+VectorXd gainsOfSteps(const MatrixXd& jacobian, const VectorXd& left) {
+  const linear::Ldlt normal{jacobian.transpose() * jacobian};
+  VectorXd of_later = VectorXd::Zero(jacobian.cols()), gains = VectorXd::Zero(left.size());
+  double together = 0.0;
+  for (Index i = left.size() - 1; i >= kFewestOfSession - 1; --i) {
+    of_later += jacobian.row(i).transpose(), together += left[i];
+    const double later = static_cast<double>(left.size() - i), own = later - of_later.dot(normal.solve(of_later));
+    if (left.size() - i >= kFewestOfSession - 1 && own > 1e-6 * later) gains[i] = together * together / own;
   }
-};
+  return gains;
+}
+
+/// By how much neighbours go with each other.
+double togetherOf(const VectorXd& left) {
+  return left.head(left.size() - 1).dot(left.tail(left.size() - 1)) / left.squaredNorm();
+}
+
+/// 2 ln of how much likelier rows are with a step of such a gain than with errors that go on from row to row.
+double saysOf(double gain, const MatrixXd& jacobian, const VectorXd& left) {
+  const double squares = left.squaredNorm(), together = togetherOf(left);
+  return static_cast<double>(left.size() - jacobian.cols()) *
+         std::log(squares * (1.0 - together * together) / (squares - gain));
+}
+
+/// The same of the step before that row, without the row of the shorter side that is farthest off: a single one makes a
+/// step of five.
+double saysWithoutItsOddest(Index row, const MatrixXd& jacobian, const VectorXd& left) {
+  const Index rows = left.size(), from = 2 * row < rows ? 0 : row, count = 2 * row < rows ? row : rows - row;
+  Index odd = 0;
+  left.segment(from, count).cwiseAbs().maxCoeff(&odd);
+  odd += from;
+  MatrixXd others(rows - 1, jacobian.cols());
+  others << jacobian.topRows(odd), jacobian.bottomRows(rows - 1 - odd);
+  VectorXd rest(rows - 1);
+  rest << left.head(odd), left.tail(rows - 1 - odd);
+  rest -= (others * linear::leastSquares(others, rest)).eval();
+  return saysOf(gainsOfSteps(others, rest)[odd < row ? row - 1 : row], others, rest);
+}
+
+/// The row before which there is a step that says so much, also without one odd row.
+std::optional<Index> stepOf(const MatrixXd& jacobian, const VectorXd& left, double least) {
+  const VectorXd gains = gainsOfSteps(jacobian, left);
+  Index row = 0;
+  const double most = gains.segment(kFewestOfSession, left.size() - 2 * kFewestOfSession + 1).maxCoeff(&row);
+  row += kFewestOfSession;
+  if (!(saysOf(most, jacobian, left) > least) || !(saysWithoutItsOddest(row, jacobian, left) > least)) return std::nullopt;
+  return row;
+}
 
 /// −2 ln of the likelihood of numbers of two normal distributions with one σ, from halves on, less that of one
 /// distribution. 0 where one of them is less than a tenth of all: those are odd rows, and no session.
@@ -70,7 +103,7 @@ double byTwoHeaps(const VectorXd& numbers) {
 
 /// Why rows, in the order in which they stand, may be of two sessions, each with an offset of its own: neighbours err
 /// oppositely, as where sessions take turns (3/√n); there is a step between two rows that says more (10 in BIC) than
-/// errors that go on from row to row; or what is left of the fit lies in two heaps, by as much. Empty: nothing says so, as
+/// errors that go on from row to row, and not of one row alone; or what is left of the fit lies in two heaps, by as much. Empty: nothing says so, as
 /// where sessions are mixed and nearer to each other than some three σ of a row, or there are fewer than ten rows for each
 /// parameter.
 std::string doubtOfSessions(const MatrixXd& jacobian, const VectorXd& left) {
@@ -78,16 +111,13 @@ std::string doubtOfSessions(const MatrixXd& jacobian, const VectorXd& left) {
   constexpr const char* kSessions = "rows may be of two sessions, each with an offset of its own that no interval knows of";
   const Index rows = left.size();
   if (rows < kRowsPerParameter * jacobian.cols()) return {};
-  const double n = static_cast<double>(rows), log_n = std::log(n), squares = left.squaredNorm(),
-               together = left.head(rows - 1).dot(left.tail(rows - 1)) / squares;
+  const double n = static_cast<double>(rows), log_n = std::log(n), together = togetherOf(left);
   // Each parameter takes about 1/n of correlation away.
   if (together + static_cast<double>(jacobian.cols()) * (1.0 + together) / n < -kOpposite / std::sqrt(n))
     return fmt::format("neighbours err oppositely: {}", kSessions);
   // A step has a size and a place, and neighbours that go with each other have one number.
-  const BestStep step{jacobian, left};
-  const double gains = (n - static_cast<double>(jacobian.cols())) *
-                       std::log(squares * (1.0 - together * together) / (squares - step.gain));
-  if (gains > log_n + kVeryStrong) return fmt::format("there is a step before row {}: {}", step.row + 1, kSessions);
+  if (const auto row = stepOf(jacobian, left, log_n + kVeryStrong))
+    return fmt::format("there is a step before row {}: {}", *row + 1, kSessions);
   const VectorXd fresh = left.tail(rows - 1) - std::max(0.0, together) * left.head(rows - 1);
   if (byTwoHeaps(fresh) + 2.0 * log_n + kVeryStrong < 0.0)
     return fmt::format("what they are off lies in two heaps: {}", kSessions);
