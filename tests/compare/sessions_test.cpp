@@ -25,6 +25,8 @@ std::string doubtOf(unsigned seed, double offset, const std::function<bool(int r
   return fit ? fit->doubt : "there is no fit";
 }
 
+double widthOf(const Trait& one) { return one.high - one.low; }
+
 TEST(Sessions, ThatTakeTurnsAreSaid) {
   for (unsigned seed = 1; seed <= 20; ++seed)
     EXPECT_THAT(doubtOf(seed, 3.0, [](int row, Noise&) { return row % 2 == 1; }), HasSubstr("neighbours err oppositely"));
@@ -76,6 +78,26 @@ TEST(Sessions, OfFewRowsAtAnEndAreSaid) {
   EXPECT_GE(said, 34);
 }
 
+/// Three sessions one after the other from a corner's edge on, which differ by more than what falls from there: whatever
+/// offsets they have, the same is told.
+TEST(Sessions, AreNoPartOfWhereACornersFitBegins) {
+  const auto cornerOf = [](Noise noise, double offset_mm) {
+    Columns x = evenly(0.0, 1.2, 150), session, error;
+    const Columns offset{noise(offset_mm), noise(offset_mm), noise(offset_mm)};
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      session.push_back(static_cast<double>(i / 50));
+      error.push_back(40.0 * std::exp(-x[i] / 0.25) + offset[i / 50] + noise(1.0));
+    }
+    return cornerTraits(x, error, session);
+  };
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    const auto with = cornerOf(Noise{seed}, 100.0), without = cornerOf(Noise{seed}, 0.0);
+    ASSERT_TRUE(with && without) << seed;
+    const Trait &one = (*with)[1], &other = (*without)[1];
+    EXPECT_NEAR(one.value, other.value, 0.01 * widthOf(other)) << "reach";
+  }
+}
+
 /// 48 rows of eight sessions, with errors of 1 besides their sessions'. s of ν = 48 − 4 − 7 free rows is 1 − 1/4ν on the
 /// mean, ± 1/√2ν each: 200 runs lie within three standard errors.
 TEST(Sessions, TakeTheirOffsetsFromTheRowsThatTellTheResidual) {
@@ -110,7 +132,6 @@ AtPlaceOfSession atSpeeds(int speeds, const std::function<double(int speed, int 
   }
   return rows;
 }
-double widthOf(const Trait& one) { return one.high - one.low; }
 
 /// Six speeds tell a slope by how they differ, be there a column of sessions or not. Errors are the same, but for the
 /// sessions': what differs is how the two fits count degrees of freedom, and what they make of the own errors of rows.

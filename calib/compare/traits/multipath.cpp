@@ -11,27 +11,31 @@
 
 #include <toftwin/units.h>
 
+#include "calib/compare/statistics.h"
 #include "calib/compare/traits/clusters.h"
-#include "calib/compare/traits/veil.h"
 #include "calib/compare/traits/least_squares.h"
 #include "calib/compare/traits/placed_rows.h"
+#include "calib/compare/traits/veil.h"
 
 namespace toftwin::compare {
 
 namespace {
 
-/// Where a fit begins: the line through e over e^(−x/L), and ln of L's share. Far from it a fit may end
-/// nowhere.
-std::vector<double> startAt(double length_m, double share, Column x, Column e) {
-  const double n = static_cast<double>(x.size());
-  double mean_fall = 0.0, mean_e = 0.0, both = 0.0, square = 0.0;
-  for (std::size_t i = 0; i < x.size(); ++i) mean_fall += std::exp(-x[i] / length_m) / n, mean_e += e[i] / n;
+/// Where a fit begins: the line through e over e^(−x/L), each session about its own mean, and ln of L's share. Far from it
+/// a fit may end nowhere.
+std::vector<double> startAt(double length_m, double share, const PlacedRows& corner) {
+  const auto &x = corner.column(0), &e = corner.column(1);
+  std::vector<double> fall;
+  for (const double one : x) fall.push_back(std::exp(-one / length_m));
+  const auto of = corner.session().empty() ? std::vector<std::size_t>(x.size(), 0) : sharedPlacesOf(corner.session()).of;
+  const auto mean_fall = clusterMeans(fall, of), mean_e = clusterMeans(e, of);
+  double both = 0.0, square = 0.0;
   for (std::size_t i = 0; i < x.size(); ++i) {
-    const double fall = std::exp(-x[i] / length_m) - mean_fall;
-    both += fall * (e[i] - mean_e), square += fall * fall;
+    const double off = fall[i] - mean_fall[of[i]];
+    both += off * (e[i] - mean_e[of[i]]), square += off * off;
   }
   const double size = square > 0.0 ? both / square : 0.0;
-  return {mean_e - size * mean_fall, size, std::log(share)};
+  return {summarise(e).mean - size * summarise(fall).mean, size, std::log(share)};
 }
 
 /// Whether the rows speak for a fall from the edge against none, by more than what the choice among so many
@@ -47,7 +51,7 @@ bool isSeen(const Fit& fall, const PlacedRows& corner) {
 Traits cornerTraits(Column distance_to_edge_m, Column error_mm, Column session) {
   auto finite = finiteRowsOf({distance_to_edge_m, error_mm}, session, 8, "corner");
   if (!finite) return finite.error();
-  constexpr std::size_t kParameters = 3;
+  constexpr std::ptrdiff_t kParameters = 3;
   const PlacedRows corner{*std::move(finite), kParameters};
   const auto &x = corner.column(0), &e = corner.column(1);
   const double reach = std::ranges::max(x);
@@ -58,10 +62,10 @@ Traits cornerTraits(Column distance_to_edge_m, Column error_mm, Column session) 
   };
   std::optional<Fit> fit;
   for (const double share : {0.03, 0.1, 0.3, 1.0}) {
-    auto tried = fitLeastSquares(model, e, startAt(share * reach, share, x, e));
+    auto tried = startBesideSessions(model, e, startAt(share * reach, share, corner), corner.session());
     if (tried && (!fit || tried->squares < fit->squares)) fit = std::move(tried);
   }
-  if (fit) fit = corner.fit(model, 1, fit->at);
+  if (fit) fit = corner.fit(model, 1, {fit->at.begin(), fit->at.begin() + kParameters});
   constexpr double kMostReaches = 10.0;  // then it bends by a twentieth of itself, and passes for a line
   if (!fit || fit->at[2] > std::log(kMostReaches) || !isSeen(*fit, corner))
     return undetermined("corner", "the error does not fall off from the edge");
