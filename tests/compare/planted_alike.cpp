@@ -111,6 +111,18 @@ std::vector<Planted> alikeOverLight() {
                     }
                     return noiseLawTraits(signal, sigma);
                   }});
+  // As where each strength of light falls on another part of the image: no few readings.
+  rows.push_back({"noise law, rows off by 40 %",
+                  {{"floor", 2.0}, {"shot", 3.0}, {"read", 0.4}, {"all parts together", std::sqrt(13.16)}},
+                  [](Noise& noise) {
+                    Columns signal, sigma;
+                    for (int i = 0; i < 60; ++i) {
+                      const double x = std::pow(10.0, -2.0 * i / 59.0);
+                      signal.push_back(1000.0 * x);
+                      sigma.push_back(std::sqrt(4.0 + 9.0 / x + 0.16 / (x * x)) * std::exp(noise(0.4)));
+                    }
+                    return noiseLawTraits(signal, sigma);
+                  }});
   rows.push_back(law("noise law without shot noise", {{"floor", 5.0}, {"shot", 0.0}, {"read", 0.2}}, 0.0));
   return rows;
 }

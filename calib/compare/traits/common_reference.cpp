@@ -95,9 +95,8 @@ Trait toldAt(const Trait& one, const LawAtSignal& law, double signal) {
     for (std::size_t j = 0; j < along.size(); ++j) of_variance += along[i] * along[j] * law.covariance[3 * i + j];
   }
   const double half = studentT(law.degrees) * std::sqrt(std::max(0.0, of_variance));
-  const auto rootOf = [](double square) { return std::sqrt(std::max(0.0, square)); };
   Trait told = one;
-  told.value = rootOf(variance), told.low = rootOf(variance - half), told.high = rootOf(variance + half);
+  tellRoot(told, variance, half);
   return told;
 }
 

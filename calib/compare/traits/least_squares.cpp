@@ -180,6 +180,13 @@ double correlationOfResiduals(const Model& model, Column y, const Fit& fit) {
   return corrected > 2.0 / std::sqrt(n) ? std::min(corrected, 0.95) : 0.0;
 }
 
+void tellRoot(Trait& trait, double variance, double half) {
+  trait.value = std::sqrt(std::max(0.0, variance));
+  const double times = variance > 0.0 ? std::exp(0.5 * half / variance) : 0.0;
+  trait.low = variance > 0.0 ? trait.value / times : 0.0;
+  trait.high = variance > 0.0 ? trait.value * times : std::sqrt(std::max(0.0, variance + half));
+}
+
 Trait meanTrait(std::string name, std::string unit, Column values, double scale) {
   const Summary summary = summarise(values);
   const double half =

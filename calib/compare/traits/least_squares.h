@@ -69,6 +69,9 @@ double correlationOfResiduals(const Model& model, Column y, const Fit& fit);
 
 /// Student's quantile of a two-sided interval that holds with `level`: 97.5 % for 95 %.
 double studentT(double degrees, double level = 0.95);
+/// The root of a variance that is known to ± half: its interval in its logarithm (delta method), as it must be positive.
+/// Of one that came out below 0, from 0 on up to what it may be.
+void tellRoot(Trait& trait, double variance, double half);
 /// Mean of independent values with its interval.
 Trait meanTrait(std::string name, std::string unit, Column values, double scale = 1.0);
 /// The interval of a share that holds it with 95 %, from k events in n independent trials, which need not be

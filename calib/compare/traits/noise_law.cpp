@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <toftwin/units.h>
 
+#include "calib/compare/fits.h"
 #include "calib/compare/statistics.h"
 #include "calib/compare/traits/least_squares.h"
 
@@ -74,15 +75,11 @@ double quartilesApart(double readings) {
   return 0.5 * std::log(boost::math::quantile(squares, 0.75) / boost::math::quantile(squares, 0.25));
 }
 
-/// s of few readings scatters, and ln s is less than ln σ on the mean, by ½ (ln ν/2 − ψ(ν/2)) of ν + 1 readings. How many
-/// they are is told by the quartiles of what rows are off from the law, which a few odd rows do not move.
-double shortOfLogarithm(Column intensity, Column sigma, const Law& law) {
+/// By how much ln s of so many degrees of freedom is less than ln σ on the mean: ½ (ln ν/2 − ψ(ν/2)), ν that of which the
+/// quartiles are so far apart. Two readings scatter most.
+double shortBy(double apart) {
   constexpr double kFewest = 1.0, kMost = 1e5;
   constexpr int kHalvings = 60;
-  std::vector<double> left;
-  for (std::size_t i = 0; i < sigma.size(); ++i) left.push_back(std::log(sigma[i]) - law.logarithm(intensity[i]));
-  const double n = static_cast<double>(sigma.size()), apart = (quantile(left, 0.75) - quantile(left, 0.25)) *
-                                                              std::sqrt(n / std::max(1.0, law.fit.degrees));
   double low = std::log(kFewest), high = std::log(kMost);
   for (int i = 0; i < kHalvings; ++i) {
     const double middle = 0.5 * (low + high);
@@ -90,6 +87,47 @@ double shortOfLogarithm(Column intensity, Column sigma, const Law& law) {
   }
   const double half = 0.5 * std::exp(high);
   return 0.5 * (std::log(half) - boost::math::digamma(half));
+}
+
+/// How likely it is that rows are off as ln s of few readings is, which lie farther below than above, and not evenly about
+/// the law: by the likelihoods of ½ ln χ² and of a normal distribution, each with its best place and width, and as likely
+/// beforehand.
+double shareOfReadings(Column left) {
+  const double n = static_cast<double>(left.size());
+  const auto meanOf = [&](auto&& of) {
+    double sum = 0.0;
+    for (const double one : left) sum += of(one) / n;
+    return sum;
+  };
+  const double mean = meanOf([](double one) { return one; }), square = meanOf([](double one) { return std::exp(2.0 * one); }),
+               variance = meanOf([=](double one) { return (one - mean) * (one - mean); });
+  // Its best σ² is the mean of s²: Σ (s/σ)² is n.
+  const auto ofReadings = [=](double log_degrees) {
+    const double half = 0.5 * std::exp(log_degrees);
+    return -n * (std::numbers::ln2 + half * std::log(half) - std::lgamma(half) + 2.0 * half * (mean - 0.5 * std::log(square)) - half);
+  };
+  const double readings = ofReadings(minimum1d(ofReadings, 0.0, std::log(1e4))),
+               evenly = 0.5 * n * (std::log(2.0 * std::numbers::pi * variance) + 1.0);
+  return 1.0 / (1.0 + std::exp(readings - evenly));
+}
+
+/// What of ln σ rows are short on the mean, and how uncertain that is.
+struct Short {
+  double by = 0.0, variance = 0.0;
+};
+/// Of s of few readings, as far as rows look like that. By the quartiles of what they are off from the law, which a few odd
+/// rows do not move; of normal numbers their distance is known to 1.17/√n of itself.
+Short shortOfLogarithm(Column intensity, Column sigma, const Law& law) {
+  std::vector<double> left;
+  for (std::size_t i = 0; i < sigma.size(); ++i) left.push_back(std::log(sigma[i]) - law.logarithm(intensity[i]));
+  const double n = static_cast<double>(sigma.size()), low = quantile(left, 0.25), high = quantile(left, 0.75),
+               apart = (high - low) * std::sqrt(n / std::max(1.0, law.fit.degrees)), known = std::exp(1.17 / std::sqrt(n));
+  constexpr double kFarOut = 3.0;  // J. W. Tukey, Exploratory Data Analysis, 1977
+  std::erase_if(left, [=](double one) { return one < low - kFarOut * (high - low) || one > high + kFarOut * (high - low); });
+  if (!(high > low)) return {};
+  const double by = shortBy(apart), by_quartiles = 0.5 * (shortBy(apart * known) - shortBy(apart / known)),
+               share = shareOfReadings(left);
+  return {share * by, share * by_quartiles * by_quartiles + share * (1.0 - share) * by * by};
 }
 
 /// All three parts, each of which may be less than nothing: what is told of one of them is then told whether
@@ -105,9 +143,18 @@ std::optional<Fit> signedParts(Column intensity, Column sigma, const Law& law) {
     const double x = intensity[i];
     return 0.5 * std::log(least * (p[0] + p[1] / x + p[2] / (x * x)));
   };
-  auto fit = fitInOrder(model, log_sigma, start, intensity);
-  if (!fit) return std::nullopt;
-  return fit;
+  return fitInOrder(model, log_sigma, start, intensity);
+}
+
+/// Parts of σ² that are as uncertain, too, as ln σ is altogether.
+void addVarianceOfLogarithm(Fit& parts, double variance) {
+  const std::size_t k = parts.at.size();
+  const auto add = [&](std::vector<double>& covariance) {
+    for (std::size_t a = 0; a < k; ++a)
+      for (std::size_t b = 0; b < k; ++b) covariance[a * k + b] += 4.0 * variance * parts.at[a] * parts.at[b];
+  };
+  add(parts.covariance);
+  for (Fit::Possible& one : parts.possible) add(one.covariance);
 }
 
 /// The root of a part of the variance. Where its interval holds 0, the part does not show: 0, up to what it
@@ -137,8 +184,8 @@ Trait wholeOf(const Fit& parts, double scale, double most) {
   }
   const std::array all{1.0, 1.0, 1.0};
   const double half = studentT(parts.degrees) * scale * std::sqrt(parts.varianceOf(all, 0));
-  Trait whole{.name = kWholeLaw, .unit = "mm", .value = std::sqrt(std::max(0.0, variance)), .n = parts.n};
-  whole.low = std::sqrt(std::max(0.0, variance - half)), whole.high = std::sqrt(std::max(0.0, variance + half));
+  Trait whole{.name = kWholeLaw, .unit = "mm", .n = parts.n};
+  tellRoot(whole, variance, half);
   whole.refers_to = law;
   return whole;
 }
@@ -149,12 +196,13 @@ Result<FittedTraits> describedLaw(std::vector<double> intensity, std::vector<dou
   if (!(most > 1.05 * std::ranges::min(intensity))) return undetermined("noise law", "all signals are alike");
   for (double& one : intensity) one /= most;
   auto law = fittedLaw(intensity, sigma);
+  const Short rows = law ? shortOfLogarithm(intensity, sigma, *law) : Short{};
   if (law) {
-    const double by = shortOfLogarithm(intensity, sigma, *law);
-    for (double& one : sigma) one *= std::exp(by);
-    for (double& one : law->fit.at) one += by;
+    for (double& one : sigma) one *= std::exp(rows.by);
+    for (double& one : law->fit.at) one += rows.by;
   }
-  const auto all = law ? signedParts(intensity, sigma, *law) : std::nullopt;
+  auto all = law ? signedParts(intensity, sigma, *law) : std::nullopt;
+  if (all) addVarianceOfLogarithm(*all, rows.variance);
   if (!all) return undetermined("noise law", "this range of signals does not tell its parts apart");
   constexpr std::array kPowers{"", "/I", "/I²"};
   FittedTraits fitted;
