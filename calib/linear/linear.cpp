@@ -54,6 +54,7 @@ MatrixXd solveLowerEach(const MatrixXd& lower, const MatrixXd& b) {
 MatrixXd leastSquares(const MatrixXd& a, const MatrixXd& b) { return a.colPivHouseholderQr().solve(b); }
 
 MatrixXd basisOf(MatrixXd columns) {
+  if (columns.size() == 0) return {columns.rows(), 0};  // of which Eigen's factorisation refers to the first column
   for (auto column : columns.colwise()) column /= std::max(column.norm(), 1e-300);
   Eigen::ColPivHouseholderQR<MatrixXd> factor(columns);
   factor.setThreshold(1e-8);

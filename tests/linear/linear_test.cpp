@@ -69,5 +69,47 @@ TEST(Linear, LeastSquaresLeavesWhatIsSquareToTheColumns) {
   EXPECT_NEAR(left.norm(), std::sqrt(1.5), 10 * kRounding);  // 0.5, −1, 0.5
 }
 
+TEST(Linear, ColumnsAreSolvedByThemselves) {
+  const MatrixXd b{{1.0, 4.0}, {2.0, 5.0}, {3.0, 6.0}};
+  const MatrixXd all = Ldlt{known()}.solveEach(b);
+  EXPECT_LT((known() * all - b).norm(), 10 * kRounding);
+  for (Eigen::Index c = 0; c < b.cols(); ++c)
+    EXPECT_LT((all.col(c) - Ldlt{known()}.solve(b.col(c))).norm(), kRounding) << c;
+}
+
+/// What cannot be inverted has no inverse that passes for one.
+TEST(Linear, ASingularMatrixHasNoInverse) {
+  const MatrixXd singular{{1.0, 2.0}, {2.0, 4.0}};
+  EXPECT_FALSE(inverse(singular).allFinite());
+  EXPECT_EQ(Ldlt{singular}.pivots().minCoeff(), 0.0) << "of a pivot that is exactly 0 the condition knows nothing";
+  EXPECT_GT(Ldlt{known()}.rcond(), 0.1);
+}
+
+TEST(Linear, OfNumbersThatAreNoneNothingComesThatPassesForOne) {
+  MatrixXd none = known();
+  none(1, 0) = std::nan("");
+  EXPECT_FALSE(choleskyOf(none).allFinite());
+  EXPECT_FALSE(inverse(none).allFinite());
+  EXPECT_FALSE(Ldlt{none}.solve(VectorXd{{1.0, 2.0, 3.0}}).allFinite());
+  EXPECT_FALSE(solveLower(known(), VectorXd{{1.0, std::nan(""), 3.0}}).allFinite());
+  EXPECT_FALSE(leastSquares(none, MatrixXd::Ones(3, 1)).allFinite());
+}
+
+/// The second column is twice the first: one of many solutions comes, and what it leaves is what the first alone leaves.
+TEST(Linear, LeastSquaresOfColumnsThatHangOnOneAnotherLeavesTheLeast) {
+  const MatrixXd twice{{1.0, 2.0}, {1.0, 2.0}, {1.0, 2.0}}, measured{{1.0}, {2.0}, {6.0}};
+  const MatrixXd x = leastSquares(twice, measured);
+  ASSERT_TRUE(x.allFinite());
+  EXPECT_LT((twice * x - MatrixXd::Constant(3, 1, 3.0)).norm(), 10 * kRounding) << "their mean";
+}
+
+TEST(Linear, ColumnsOfZeroSpanNothing) {
+  EXPECT_EQ(basisOf(MatrixXd::Zero(3, 2)).cols(), 0);
+  EXPECT_EQ(basisOf(MatrixXd(3, 0)).cols(), 0);
+  const MatrixXd basis = basisOf(MatrixXd{{0.0, 3.0}, {0.0, 0.0}, {0.0, 4.0}});
+  ASSERT_EQ(basis.cols(), 1);
+  EXPECT_LT((basis.cwiseAbs() - MatrixXd{{0.6}, {0.0}, {0.8}}).norm(), kRounding);
+}
+
 }  // namespace
 }  // namespace toftwin::linear
