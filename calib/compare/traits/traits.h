@@ -15,6 +15,8 @@
 
 /// Characteristics of a camera's errors from series, tables and frames, each with the interval that holds it
 /// with 95 %. docs/characteristics.md has the formulas, their sources, and how often the intervals held.
+/// A column `session`: rows of one value are of one session, with an offset of its own besides what is told; numbers with
+/// that offset in them are the mean over sessions, and as uncertain as these differ. Empty: of one.
 /// Columns of one table are of equal length; rows with a value that is not finite are left out. Error
 /// InvalidArgument: too few rows, or rows that cannot tell it.
 namespace toftwin::compare {
@@ -60,9 +62,6 @@ struct Trait {
 };
 using Traits = Result<std::vector<Trait>>;
 using Column = std::span<const double>;
-
-/// A column `session` of a table: rows of one value are of one session, with an offset of its own besides what is told;
-/// numbers with that offset in them are the mean over sessions, and as uncertain as these differ. Empty: of one.
 
 /// A curve that was fitted, for a plot through the rows.
 struct FittedCurve {
@@ -143,8 +142,9 @@ inline constexpr std::array<const char*, 3> kLawParts{"floor", "shot", "read"},
     kPatternParts{"constant part", "part that goes with 1/√signal", "part that goes with 1/signal"};
 inline constexpr const char* kWholeLaw = "all parts together";
 /// σ(I) = √(a² + b²/I + c²/I²) in ln σ, I relative to the largest: "floor" a, "shot" b, "read" c at that
-/// signal. A part that does not show is 0, with an interval up to what it may be. `frequency_hz`, of modulation: rows are left out at signals so small that the law has the phase's
-/// noise over 0.1 rad, where σ no longer goes so; empty: all rows are fitted.
+/// signal. A part that does not show is 0, with an interval up to what it may be. `frequency_hz`, of modulation:
+/// rows are left out at signals so small that the law has the phase's noise over 0.1 rad, where σ no longer goes so;
+/// empty: all rows are fitted.
 Traits noiseLawTraits(Column signal, Column sigma_mm, std::span<const double> frequency_hz = {});
 /// The same with the curve, over the signal itself; not_told says what was left out.
 Result<FittedTraits> fittedNoiseLaw(Column signal, Column sigma_mm,

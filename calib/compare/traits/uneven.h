@@ -23,7 +23,5 @@ Model over(const Model& model, Column sigmas);
 /// freedom for each parameter (R. M. Bell, D. F. McCaffrey, Surv. Methodol. 28 (2002) 169, of rows that are clusters of
 /// one).
 void tellErrorsByRows(Fit& fit, const Model& model, Column y);
-/// A fit of rows over their σ, of which the mean square is 1; neighbours over x may err alike, as in fitInOrder().
-std::optional<Fit> fitOver(Column sigmas, const Model& model, Column y, std::vector<double> start, Column x);
 
 }  // namespace toftwin::compare
