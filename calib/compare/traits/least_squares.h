@@ -61,8 +61,8 @@ std::optional<Fit> fitLeastSquares(const Model& model, Column y, std::vector<dou
 /// The same of rows whose neighbours may err alike, eᵢ = ρ eᵢ₋₁ + uᵢ, as they stand or over x, if it is given:
 /// whichever of both is likelier. Rows that show to scatter unevenly over x count by how they do (unevenSigmas()). The
 /// fit is the mean over ρ, each with the weight of its restricted likelihood (D. A. Harville, Biometrika 61
-/// (1974) 383), so that what is not known of ρ is in the intervals. Beforehand independent rows are as likely as all
-/// others. Rows too few to say anything of ρ are taken as independent.
+/// (1974) 383), so that what is not known of ρ is in the intervals. Beforehand independent rows are three times as
+/// likely as all others. Rows too few to say anything of ρ are taken as independent.
 std::optional<Fit> fitInOrder(const Model& model, Column y, std::vector<double> start, Column x = {});
 /// A fit of rows over their σ, of which the mean square is 1; neighbours over x may err alike, as in fitInOrder().
 std::optional<Fit> fitOver(Column sigmas, const Model& model, Column y, std::vector<double> start, Column x);
