@@ -32,13 +32,7 @@ Session::Options sessionOptions(const Connection::Options& options, bool is_loca
 wire::Encoded encodeOrFailure(const wire::Message& answer) {
   auto encoded = wire::encode(answer);
   if (encoded) return *std::move(encoded);
-  const std::uint64_t id = std::visit(
-      [](const auto& m) -> std::uint64_t {
-        if constexpr (requires { m.id; }) return m.id;
-        return 0;
-      },
-      answer);
-  return *wire::encode(wire::Failure{id, {Error::Code::Internal, encoded.error().message}});
+  return *wire::encode(wire::Failure{idOf(answer), {Error::Code::Internal, encoded.error().message}});
 }
 
 }  // namespace

@@ -5,10 +5,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 #include <utility>
 
 namespace toftwin::daemon {
 namespace {
+
+template <class T, class... Of>
+constexpr bool kIsOneOf = (std::is_same_v<T, Of> || ...);
+template <class T>
+constexpr bool kIsRequest = kIsOneOf<T, wire::ListSources, wire::DescribeSource, wire::Subscribe, wire::Unsubscribe, wire::SetPose,
+                                     wire::SetParameter, wire::Trigger, wire::Record, wire::AskHealth>;
 
 constexpr std::uint32_t kDeepestQueue = 1024;
 /// Frames on their way are in the kernel's memory, each perhaps with a memfd, which nobody counts.
@@ -50,6 +57,15 @@ Result<Backlog::Settings> backlogFor(const wire::Subscribe& request, std::uint64
 
 }  // namespace
 
+std::uint64_t idOf(const wire::Message& message) {
+  return std::visit(
+      [](const auto& m) -> std::uint64_t {
+        if constexpr (requires { m.id; }) return m.id;
+        return 0;
+      },
+      message);
+}
+
 void Outbox::put(wire::Message message) {
   {
     const std::scoped_lock lock{mutex_};
@@ -86,12 +102,22 @@ std::vector<wire::Message> Session::handle(const wire::Message& message) {
   if (!client_ && !std::holds_alternative<wire::Hello>(message)) {
     return breakOff(0, Error::Code::Malformed, "the first message must be Hello");
   }
-  return std::visit([this](const auto& request) { return on(request); }, message);
+  return std::visit(
+      [this]<class T>(const T& request) {
+        if constexpr (kIsRequest<T>) {
+          if (request.id == 0) return breakOff(0, Error::Code::Malformed, "the id of a request must not be 0");
+          if (open_.contains(request.id))
+            return breakOff(0, Error::Code::Malformed,
+                            fmt::format("the id {} is that of a request that is not answered yet", request.id));
+        }
+        return on(request);
+      },
+      message);
 }
 
 std::optional<Session::Outgoing> Session::next() {
   if (auto answer = outbox_->take()) {
-    --owed_;
+    open_.erase(idOf(*answer));
     return *std::move(answer);
   }
   // Round robin: the search begins behind the subscription that was served last.
@@ -257,7 +283,7 @@ Session::Answers Session::command(std::uint64_t id, const std::string& name,
 }
 
 SourceHost::Done Session::owing(std::uint64_t id) {
-  ++owed_;
+  open_.insert(id);
   return [id, outbox = outbox_](const Result<>& result) {
     outbox->put(result ? wire::Message{wire::Done{id, {}}} : failure(id, result.error()));
   };
@@ -267,7 +293,7 @@ Session::Answers Session::on(const wire::Record& request) {
   const auto done = [id = request.id, outbox = outbox_](const Result<std::string>& result) {
     outbox->put(result ? wire::Message{wire::Done{id, *result}} : failure(id, result.error()));
   };
-  ++owed_;
+  open_.insert(request.id);
   if (request.file.empty()) {
     hub_.stopRecording(request.source, done);
   } else {

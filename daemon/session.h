@@ -8,6 +8,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <variant>
 #include <vector>
@@ -16,6 +17,9 @@
 #include "protocol/wire/messages.h"
 
 namespace toftwin::daemon {
+
+/// The request that a message is, or answers; 0: none.
+std::uint64_t idOf(const wire::Message& message);
 
 /// Answers that come later, from the threads of sources and recorders. Shared by the session and by
 /// those who still owe it an answer, since they may outlive it.
@@ -58,7 +62,7 @@ class Session {
   /// other.
   std::optional<Outgoing> next();
   /// Answers that this session still owes, for a client that asks faster than it reads.
-  [[nodiscard]] std::size_t owed() const { return owed_; }
+  [[nodiscard]] std::size_t owed() const { return open_.size(); }
   /// The client has introduced itself.
   [[nodiscard]] bool isOpen() const { return client_.has_value(); }
   /// The client broke the protocol: send what `handle` gave and close.
@@ -110,7 +114,7 @@ class Session {
   const std::shared_ptr<Outbox> outbox_;
   std::optional<wire::Hello> client_;
   bool is_over_ = false;
-  std::size_t owed_ = 0;
+  std::set<std::uint64_t> open_;  ///< ids of requests whose answers are still to come
   Subscriptions subscriptions_;
   std::uint64_t last_subscription_ = 0;
   std::uint64_t last_served_ = 0;

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 namespace toftwin::drivers {
 namespace {
@@ -14,6 +15,16 @@ Error unsupported(const SourceInfo& info, std::string_view what) {
 }
 
 }  // namespace
+
+Result<> checkPose(const Transform<World, Camera>& world_from_camera) {
+  const auto& q = world_from_camera.rotation_wxyz;
+  const Vec3d& t = world_from_camera.translation_m;
+  const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+  if (std::abs(length - 1.0) < 1e-6 && std::isfinite(t.x + t.y + t.z)) return {};
+  return Error{Error::Code::InvalidArgument,
+               fmt::format("a pose needs a unit quaternion and finite metres, but was ({}, {}, {}, {}) at ({}, {}, {})", q[0],
+                           q[1], q[2], q[3], t.x, t.y, t.z)};
+}
 
 Error answerAtOpening(Error error) {
   if (error.code == Error::Code::InvalidArgument) error.code = Error::Code::Incompatible;

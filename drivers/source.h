@@ -71,6 +71,9 @@ class Source {
   virtual Result<> trigger();
 };
 
+/// InvalidArgument unless it is a unit quaternion (within 1e-6) and finite metres: what setPose() takes at most.
+Result<> checkPose(const Transform<World, Camera>& world_from_camera);
+
 /// For what goes wrong at opening a device once the keys were checked: that it does not take a value is its
 /// answer and no mistake of the file, which InvalidArgument would say. Incompatible instead.
 Error answerAtOpening(Error error);

@@ -131,6 +131,7 @@ class PatternSource final : public Source {
 
   // Commands come on the thread that calls next(), between two calls, so no lock is needed.
   Result<> setPose(const Transform<World, Camera>& world_from_camera) override {
+    if (auto fits = checkPose(world_from_camera); !fits) return fits;
     world_from_camera_ = world_from_camera;
     return {};
   }

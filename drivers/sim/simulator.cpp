@@ -145,17 +145,8 @@ class SimulatedSource final : public Source {
   }
 
   Result<> setPose(const Transform<World, Camera>& world_from_camera) override {
-    const auto& q = world_from_camera.rotation_wxyz;
+    if (auto fits = checkPose(world_from_camera); !fits) return fits;
     const Vec3d& t = world_from_camera.translation_m;
-    const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-    if (!(std::abs(norm - 1.0) < 1e-6) || !std::isfinite(t.x + t.y + t.z)) {
-      return Error{
-          Error::Code::InvalidArgument,
-          fmt::format(
-              "a pose needs a unit quaternion and finite metres, but was ({}, {}, {}, {}) at "
-              "({}, {}, {})",
-              q[0], q[1], q[2], q[3], t.x, t.y, t.z)};
-    }
     if (std::abs(t.x) > kMostPosition_m || std::abs(t.y) > kMostPosition_m ||
         std::abs(t.z) > kMostPosition_m) {
       return Error{Error::Code::InvalidArgument,

@@ -215,7 +215,7 @@ TEST_F(RunningDaemon, AClientKilledInTheMiddleOfAFrameHarmsNobody) {
   for (std::uint64_t i = 0; i < 5; ++i) {
     RawClient victim{daemon_->socketPath()};
     victim.send(wire::Hello{1, "victim", {}});
-    wire::Subscribe subscribe;
+    wire::Subscribe subscribe{.id = 2};
     subscribe.source = "cam";
     victim.send(subscribe);
     ASSERT_TRUE(victim.message() && victim.message());  // Hello, Subscribed
@@ -232,7 +232,7 @@ TEST_F(RunningDaemon, AClientThatNeverReadsDelaysNobody) {
   start("[[source]]\nname = 'cam'\ndriver = 'pattern'\npace = 'trigger'\n");
   RawClient stalled{daemon_->socketPath()};
   stalled.send(wire::Hello{1, "stalled", {}});
-  wire::Subscribe subscribe;
+  wire::Subscribe subscribe{.id = 2};
   subscribe.source = "cam";
   stalled.send(subscribe);
   auto client = this->client();

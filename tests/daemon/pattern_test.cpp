@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <thread>
 
@@ -76,6 +77,24 @@ TEST(Pattern, SpeedMovesItFromTheNextFrameOn) {
   EXPECT_FALSE(source->setParameter("speed_px", 65).ok());
   EXPECT_FALSE(source->setParameter("speed_px", 0.5).ok());
   EXPECT_FALSE(source->setParameter("speed_px", std::nan("")).ok());
+}
+
+TEST(Pattern, TakesNoPoseThatIsNone) {
+  const auto source = openPattern("width = 40\nheight = 24\npace = 'fast'");
+  const auto refuses = [&](std::array<double, 4> rotation, Vec3d position) {
+    Transform<World, Camera> pose;
+    pose.rotation_wxyz = rotation, pose.translation_m = position;
+    const auto set = source->setPose(pose);
+    return !set && set.error().code == Error::Code::InvalidArgument;
+  };
+  EXPECT_FALSE(refuses({1, 0, 0, 0}, {1, 2, 3}));
+  EXPECT_TRUE(refuses({2, 0, 0, 0}, {}));
+  EXPECT_TRUE(refuses({0, 0, 0, 0}, {}));
+  EXPECT_TRUE(refuses({1.00001, 0, 0, 0}, {}));
+  EXPECT_TRUE(refuses({NAN, 0, 0, 0}, {}));
+  EXPECT_TRUE(refuses({1, 0, 0, 0}, {NAN, 0, 0}));
+  EXPECT_TRUE(refuses({1, 0, 0, 0}, {0, INFINITY, 0}));
+  EXPECT_EQ(source->state().world_from_camera->translation_m.x, 1.0) << "what was refused changes nothing";
 }
 
 TEST(Pattern, EndsAfterItsFramesAndBeginsAgain) {

@@ -48,14 +48,14 @@ struct Conversation {
     }
   }
   Session::FrameOut frame() { return std::get<Session::FrameOut>(later()); }
-  std::uint64_t subscribe(wire::Subscribe request = {}) {
+  std::uint64_t subscribe(wire::Subscribe request = {.id = 7}) {
     request.source = "cam";
     return std::get<wire::Subscribed>(ask(request)).subscription;
   }
 };
 
 wire::Subscribe wish(wire::Policy policy, std::uint32_t queue = 0) {
-  wire::Subscribe request;
+  wire::Subscribe request{.id = 7};
   request.policy = policy;
   request.queue = queue;
   return request;
@@ -220,7 +220,7 @@ TEST(Session, AcknowledgingWhatWasNotSentDoesNotMakeALockstepSourceGoOn) {
   EXPECT_TRUE(talk.session->handle(wire::Acknowledge{id, 1}).empty());
   EXPECT_TRUE(talk.session->handle(wire::Acknowledge{id, kLast}).empty());
   // A command is done between frames: after it, a frame that was due would have been made.
-  for (std::uint64_t i = 0; i < 3; ++i) {
+  for (std::uint64_t i = 1; i <= 3; ++i) {
     talk.session->handle(wire::SetPose{i, "cam", {}});
     EXPECT_EQ(std::get<wire::Done>(std::get<Message>(talk.later())).id, i);
   }
@@ -299,7 +299,7 @@ TEST(Session, HasABoundOnSubscriptions) {
   talk.hello();
   talk.subscribe();
   talk.subscribe();
-  wire::Subscribe third;
+  wire::Subscribe third{.id = 7};
   third.source = "cam";
   EXPECT_EQ(errorIn(talk.ask(third)).code, Error::Code::Busy);
 }
@@ -308,7 +308,7 @@ TEST(Session, RefusesWishesThatMakeNoSense) {
   Conversation talk;
   talk.hello();
   const auto refuses = [&](auto change) {
-    wire::Subscribe request;
+    wire::Subscribe request{.id = 7};
     request.source = "cam";
     change(request);
     return errorIn(talk.ask(request)).code == Error::Code::InvalidArgument;
@@ -329,6 +329,28 @@ TEST(Session, ADaemonsMessageFromAClientBreaksTheProtocol) {
   Conversation talk;
   talk.hello();
   EXPECT_EQ(errorIn(talk.ask(wire::FrameMessage{})).code, Error::Code::Malformed);
+  EXPECT_TRUE(talk.session->isOver());
+}
+
+TEST(Session, ARequestHasAnId) {
+  Conversation talk;
+  talk.hello();
+  const Message answer = talk.ask(wire::ListSources{0});
+  EXPECT_EQ(errorIn(answer).message, "the id of a request must not be 0");
+  EXPECT_EQ(idOf(answer), 0u);
+  EXPECT_TRUE(talk.session->isOver());
+}
+
+TEST(Session, TheIdOfARequestIsFreeWhenItIsAnswered) {
+  Conversation talk;
+  talk.hello();
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_TRUE(talk.session->handle(wire::SetPose{11, "cam", {}}).empty());
+    EXPECT_EQ(idOf(std::get<Message>(talk.later())), 11u);
+  }
+  EXPECT_EQ(talk.session->owed(), 0u);
+  EXPECT_TRUE(talk.session->handle(wire::SetPose{12, "cam", {}}).empty());
+  EXPECT_EQ(errorIn(talk.ask(wire::ListSources{12})).message, "the id 12 is that of a request that is not answered yet");
   EXPECT_TRUE(talk.session->isOver());
 }
 
