@@ -184,17 +184,22 @@ struct OfBoth {
 
 class O3d303Timed : public test::RunningFacade {
  protected:
-  /// The next one; nothing: it was before the native subscription.
-  static Result<std::optional<OfBoth>> nextOfBoth(test::PcicClient& watches, Subscription& native) {
+  /// The next one; nothing: it was before the native subscription's first, which waits for its own.
+  Result<std::optional<OfBoth>> nextOfBoth(test::PcicClient& watches, Subscription& native) {
     const std::uint32_t count = watches.frame().chunks.at(0).header.frame_count;
     const auto arrived = std::chrono::nanoseconds{std::chrono::system_clock::now().time_since_epoch()};
-    Result<Frame> frame = native.next(test::kSoon);
-    while (frame && frame->sequence < count) frame = native.next(test::kSoon);
-    if (!frame) return frame.error();
-    if (frame->sequence != count) return std::optional<OfBoth>{};
+    while (!native_ || native_->sequence < count) {
+      Result<Frame> frame = native.next(test::kSoon);
+      if (!frame) return frame.error();
+      native_ = *std::move(frame);
+    }
+    if (native_->sequence != count) return std::optional<OfBoth>{};
     return std::optional{
-        OfBoth{factsOf(*frame), static_cast<double>(arrived.count() - frame->moment.received.ns) * 1e-6}};
+        OfBoth{factsOf(*native_), static_cast<double>(arrived.count() - native_->moment.received.ns) * 1e-6}};
   }
+
+ private:
+  std::optional<Frame> native_;  ///< the last that was read
 };
 
 /// Each frame comes to a client when the camera, set as that frame says, would have sent it, or later on a
