@@ -169,8 +169,8 @@ std::vector<Finding> checkDaemon(const DaemonOptions& daemon) {
              "journalctl -u toftwind says more; sudo systemctl restart toftwind"}};
   }
   std::vector<Finding> findings{{State::Good, "daemon",
-                                 fmt::format("{}, up for {:.0f} s, {} clients", health->software,
-                                             health->uptime.in(second), health->sessions),
+                                 fmt::format("{}, up for {:.0f} s, {} client{}", health->software,
+                                             health->uptime.in(second), health->sessions, health->sessions == 1 ? "" : "s"),
                                  ""}};
   if (health->sources.empty()) {
     findings.push_back({State::Warning, "sources", "the daemon has none",

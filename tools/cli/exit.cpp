@@ -18,7 +18,7 @@ std::span<const ExitMeaning> exitMeanings() {
                   "the output cannot be written: disk full, no such folder, a reader that is gone, …"},
       ExitMeaning{Exit::Incomplete,
                   "it ended before all that was asked for, no frame came in time, or a check failed"},
-      ExitMeaning{Exit::Interrupted, "Ctrl-C or SIGTERM"},
+      ExitMeaning{Exit::Interrupted, "Ctrl-C or SIGTERM before it was done; what runs until then (record) is done"},
   };
   return kMeanings;
 }
