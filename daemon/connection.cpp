@@ -11,6 +11,7 @@
 #include "daemon/thrown.h"
 #include "daemon/vanished_peer.h"
 #include "drivers/logging.h"
+#include "protocol/wire/message_id.h"
 
 namespace toftwin::daemon {
 namespace {
@@ -32,7 +33,7 @@ Session::Options sessionOptions(const Connection::Options& options, bool is_loca
 wire::Encoded encodeOrFailure(const wire::Message& answer) {
   auto encoded = wire::encode(answer);
   if (encoded) return *std::move(encoded);
-  return *wire::encode(wire::Failure{idOf(answer), {Error::Code::Internal, encoded.error().message}});
+  return *wire::encode(wire::Failure{wire::idOf(answer), {Error::Code::Internal, encoded.error().message}});
 }
 
 }  // namespace

@@ -8,6 +8,8 @@
 #include <type_traits>
 #include <utility>
 
+#include "protocol/wire/message_id.h"
+
 namespace toftwin::daemon {
 namespace {
 
@@ -56,15 +58,6 @@ Result<Backlog::Settings> backlogFor(const wire::Subscribe& request, std::uint64
 }
 
 }  // namespace
-
-std::uint64_t idOf(const wire::Message& message) {
-  return std::visit(
-      [](const auto& m) -> std::uint64_t {
-        if constexpr (requires { m.id; }) return m.id;
-        return 0;
-      },
-      message);
-}
 
 void Outbox::put(wire::Message message) {
   {
@@ -117,7 +110,7 @@ std::vector<wire::Message> Session::handle(const wire::Message& message) {
 
 std::optional<Session::Outgoing> Session::next() {
   if (auto answer = outbox_->take()) {
-    open_.erase(idOf(*answer));
+    open_.erase(wire::idOf(*answer));
     return *std::move(answer);
   }
   // Round robin: the search begins behind the subscription that was served last.

@@ -18,9 +18,6 @@
 
 namespace toftwin::daemon {
 
-/// The request that a message is, or answers; 0: none.
-std::uint64_t idOf(const wire::Message& message);
-
 /// Answers that come later, from the threads of sources and recorders. Shared by the session and by
 /// those who still owe it an answer, since they may outlive it.
 class Outbox {

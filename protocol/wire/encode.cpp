@@ -7,6 +7,7 @@
 
 #include "protocol/wire/codec.h"
 #include "protocol/wire/crc32c.h"
+#include "protocol/wire/message_id.h"
 #include "protocol/wire/header_checks.h"
 #include "protocol/wire/header_writer.h"
 
@@ -166,12 +167,6 @@ auto write(Builder& b, const Health& m) {
                           b.CreateVector(facades));
 }
 auto write(Builder& b, const Failure& m) { return fb::CreateFailure(b, writeError(b, m.error)); }
-
-template <class M>
-std::uint64_t idOf(const M& message) {
-  if constexpr (requires { message.id; }) return message.id;
-  return 0;
-}
 
 Error tooLargeToSend(const std::string& part, std::uint64_t bytes, std::uint64_t limit) {
   return {Error::Code::TooLarge, "this message cannot be sent: its " + part + " has " +

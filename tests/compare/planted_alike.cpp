@@ -100,29 +100,24 @@ std::vector<Planted> alikeOverLight() {
   };
   rows.push_back(law("noise law, rows that err alike (0.5)",
                      {{"floor", 2.0}, {"shot", 3.0}, {"read", 0.4}}, 0.5));
-  rows.push_back({"noise law, σ of five readings",
-                  {{"floor", 2.0}, {"shot", 3.0}, {"read", 0.4}, {"all parts together", std::sqrt(13.16)}},
-                  [](Noise& noise) {
-                    Columns signal, sigma;
-                    for (int i = 0; i < 60; ++i) {
-                      const double x = std::pow(10.0, -2.0 * i / 59.0);
-                      signal.push_back(1000.0 * x);
-                      sigma.push_back(sigmaOf(std::sqrt(4.0 + 9.0 / x + 0.16 / (x * x)), 5, noise));
-                    }
-                    return noiseLawTraits(signal, sigma);
-                  }});
+  const auto independent = [](std::string name, auto told) {
+    return Planted{std::move(name),
+                   {{"floor", 2.0}, {"shot", 3.0}, {"read", 0.4}, {"all parts together", std::sqrt(13.16)}},
+                   [=](Noise& noise) {
+                     Columns signal, sigma;
+                     for (int i = 0; i < 60; ++i) {
+                       const double x = std::pow(10.0, -2.0 * i / 59.0);
+                       signal.push_back(1000.0 * x);
+                       sigma.push_back(told(std::sqrt(4.0 + 9.0 / x + 0.16 / (x * x)), noise));
+                     }
+                     return noiseLawTraits(signal, sigma);
+                   }};
+  };
+  rows.push_back(independent("noise law, σ of five readings",
+                             [](double sigma, Noise& noise) { return sigmaOf(sigma, 5, noise); }));
   // As where each strength of light falls on another part of the image: no few readings.
-  rows.push_back({"noise law, rows off by 40 %",
-                  {{"floor", 2.0}, {"shot", 3.0}, {"read", 0.4}, {"all parts together", std::sqrt(13.16)}},
-                  [](Noise& noise) {
-                    Columns signal, sigma;
-                    for (int i = 0; i < 60; ++i) {
-                      const double x = std::pow(10.0, -2.0 * i / 59.0);
-                      signal.push_back(1000.0 * x);
-                      sigma.push_back(std::sqrt(4.0 + 9.0 / x + 0.16 / (x * x)) * std::exp(noise(0.4)));
-                    }
-                    return noiseLawTraits(signal, sigma);
-                  }});
+  rows.push_back(independent("noise law, rows off by 40 %",
+                             [](double sigma, Noise& noise) { return sigma * std::exp(noise(0.4)); }));
   rows.push_back(law("noise law without shot noise", {{"floor", 5.0}, {"shot", 0.0}, {"read", 0.2}}, 0.0));
   return rows;
 }

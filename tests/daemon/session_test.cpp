@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "fakes.h"
+#include "protocol/wire/message_id.h"
 
 namespace toftwin::daemon {
 namespace {
@@ -337,7 +338,7 @@ TEST(Session, ARequestHasAnId) {
   talk.hello();
   const Message answer = talk.ask(wire::ListSources{0});
   EXPECT_EQ(errorIn(answer).message, "the id of a request must not be 0");
-  EXPECT_EQ(idOf(answer), 0u);
+  EXPECT_EQ(wire::idOf(answer), 0u);
   EXPECT_TRUE(talk.session->isOver());
 }
 
@@ -346,7 +347,7 @@ TEST(Session, TheIdOfARequestIsFreeWhenItIsAnswered) {
   talk.hello();
   for (int i = 0; i < 2; ++i) {
     EXPECT_TRUE(talk.session->handle(wire::SetPose{11, "cam", {}}).empty());
-    EXPECT_EQ(idOf(std::get<Message>(talk.later())), 11u);
+    EXPECT_EQ(wire::idOf(std::get<Message>(talk.later())), 11u);
   }
   EXPECT_EQ(talk.session->owed(), 0u);
   EXPECT_TRUE(talk.session->handle(wire::SetPose{12, "cam", {}}).empty());

@@ -32,6 +32,8 @@ constexpr std::chrono::seconds kCutPatience{1};   ///< with a client that does n
 /// Shared by the connections that send them.
 using SharedBytes = std::shared_ptr<const Bytes>;
 
+std::string errorText(int code) { return fmt::format("{:09}", code); }
+
 void closeHard(tcp::socket& socket) {
   error_code ignored;
   socket.close(ignored);
@@ -73,7 +75,7 @@ class PcicServer::Connection : public std::enable_shared_from_this<Connection> {
     if (queue_.size() == 1) write();
     return true;
   }
-  void tellError(int code) { reply(toftwin::o3d303::kErrorTicket, fmt::format("{:09}", code)); }
+  void tellError(int code) { reply(toftwin::o3d303::kErrorTicket, errorText(code)); }
   /// What is under way, then these bytes, and the connection ends, whether or not the client takes them.
   bool endWith(SharedBytes bytes) {
     if (is_ending_) return false;
@@ -125,7 +127,7 @@ class PcicServer::Connection : public std::enable_shared_from_this<Connection> {
       case Command::Kind::Trigger:
         return trigger(message.ticket);
       case Command::Kind::AskError:
-        return reply(message.ticket, fmt::format("{:09}", server_.last_error_));
+        return reply(message.ticket, errorText(server_.last_error_));
       case Command::Kind::Refused:
         return reply(message.ticket, toftwin::o3d303::kRefused);
       case Command::Kind::Other:
@@ -226,7 +228,7 @@ bool PcicServer::publish(const toftwin::o3d303::CameraFrame& frame, const Damage
 
 void PcicServer::tellError(int code) {
   last_error_ = code;
-  tell(toftwin::o3d303::kErrorTicket, Output::kErrors, fmt::format("{:09}", code));
+  tell(toftwin::o3d303::kErrorTicket, Output::kErrors, errorText(code));
 }
 
 void PcicServer::tellNotification(int code, std::string_view json) {
