@@ -133,6 +133,10 @@ class Search {
       Effect more = effectOf(found_.context, explanations, *part);
       if (holds(more.gain)) effect = std::move(more);
     }
+    if (const auto doubtful = nameInDoubt(found_, effect)) {
+      withdraw(*doubtful);
+      return true;
+    }
     settle(found_, effect);
     effect.p = p;
     const auto same = std::ranges::find_if(found_.effects, [&](const Effect& known) {
@@ -149,6 +153,14 @@ class Search {
     }
     estimate(*found_.context.source, found_.context.scales, found_.effects);
     return true;
+  }
+
+  /// The name goes, and its effect is looked for anew.
+  void withdraw(std::size_t place) {
+    found_.context.withdrawn.push_back(found_.effects[place].name);
+    found_.effects.erase(found_.effects.begin() + static_cast<std::ptrdiff_t>(place));
+    include(found_);
+    estimate(*found_.context.source, found_.context.scales, found_.effects);
   }
 
   double dispersionNow() const {

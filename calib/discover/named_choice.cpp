@@ -155,7 +155,9 @@ std::optional<std::size_t> chooseNamed(const Context& context, std::vector<Expla
       return fmt::format(" explains more, by {:.0f} ± {:.0f} in χ²", other.gain.total - one.gain.total,
                          difference(other.gain, one.gain).error);
     };
-    if (one.named->is_at_bound)
+    if (std::ranges::count(context.withdrawn, one.name) > 0)
+      one.refused = "beside it something was left along the curve that it was not told from";
+    else if (one.named->is_at_bound)
       one.refused = "it would have to be stronger than it can be";
     else if (!holds(gain))
       one.refused = "it does not predict other captures";

@@ -99,6 +99,24 @@ std::optional<std::size_t> partOfAKnown(const Found& found, const std::vector<Ex
   return std::nullopt;
 }
 
+std::optional<std::size_t> nameInDoubt(const Found& found, const Effect& effect) {
+  const auto goesAlong = [&](const Effect& curve) {
+    return (!effect.is_catalogue && goAlongTheSame(found.context, curve, effect)) ||
+           std::ranges::any_of(effect.alternatives, [&](const Alternative& other) {
+             return !other.group.terms.empty() &&
+                    goAlongTheSame(found.context, curve, Effect{.name = other.name, .covariates = other.covariates});
+           });
+  };
+  for (std::size_t i = 0; i < found.effects.size(); ++i) {
+    if (!found.effects[i].fit) continue;
+    for (const Alternative& other : found.effects[i].alternatives) {
+      if (other.group.terms.empty()) continue;
+      if (goesAlong(Effect{.name = other.name, .covariates = other.covariates})) return i;
+    }
+  }
+  return std::nullopt;
+}
+
 bool isWhatACurveLeaves(const Found& found, const Effect& effect) {
   constexpr double kKnown = 0.05;
   constexpr double kTwentiethOfItsSize = 0.0025;

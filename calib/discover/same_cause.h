@@ -19,6 +19,10 @@ bool goAlongTheSame(const Context& context, const Effect& a, const Effect& b);
 std::optional<std::size_t> partOfAKnown(const Found& found, const std::vector<Explanation>& explanations,
                                         const Effect& effect);
 
+/// The effect of an uncertain name which `effect` takes it from: what goes along a curve that the name was not told from
+/// is more of that curve, and a name that leaves more of it is not its cause. Its place among the found ones.
+std::optional<std::size_t> nameInDoubt(const Found& found, const Effect& effect);
+
 /// A curve without a formula is known to some per cent, since between its knots it is straight, and so is
 /// what light does, since it is added to first order: what little is left beside it is not called another
 /// effect.

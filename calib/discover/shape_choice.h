@@ -41,6 +41,7 @@ struct Context {
   std::vector<TermGroup> known;  ///< effects found before, with their tangents
   std::vector<double> scales;
   std::vector<std::string> catalogue{};  ///< effects of the catalogue that were found before
+  std::vector<std::string> withdrawn{};  ///< names that were given and taken back
   /// The source without any found effect, and the effects that `source` includes.
   std::shared_ptr<const RowSource> original{};
   std::vector<std::shared_ptr<const NamedFit>> included{};

@@ -3,7 +3,7 @@
 // chosen difficulty λ, with the catalogue knowing it and without, and campaigns with nothing hidden.
 //
 //   discover_campaign_bench [--cases a,b] [--seeds 1:5] [--lambda 150,600,3000] [--absent no|yes|both]
-//                           [--null plain,noise,pose,tails,bump] [--threads 1] [--large] [--scores]
+//                           [--null plain,noise,pose,tails,bump] [--threads 1] [--large] [--scores] [--samples]
 //   discover_campaign_bench --table FILE...
 //   discover_campaign_bench --references FOLDER...     (each as tests/reference_device/reference_campaign
 //   leaves it)
@@ -11,7 +11,8 @@
 // Prints one line of comma-separated values for each search, so that slices can run side by side; --table
 // puts such lines together. Without --cases and --null: all effects; with --null alone: no effects. --large:
 // 106 captures of 176 × 132 pixels instead of 45 of 44 × 33, to see how long a search takes. --scores: with
-// what explains most by itself and fitted numbers beside the hidden ones, as lines that begin with #.
+// what explains most by itself and fitted numbers beside the hidden ones, as lines that begin with #. --samples:
+// raw exposures are recorded, too.
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 #include <unistd.h>
@@ -25,6 +26,8 @@
 #include <random>
 #include <string>
 #include <vector>
+
+#include <toftwin/nan.h>
 
 #include "calib/discover/campaign/discover_campaign.h"
 #include "calib/discover/campaign/model_file.h"
@@ -49,7 +52,7 @@ struct Options {
   std::vector<double> lambdas{600.0};
   std::uint64_t first_seed = 1, last_seed = 1;
   std::size_t threads = 0;
-  bool present = true, absent = false, large = false, scores = false;
+  bool present = true, absent = false, large = false, scores = false, samples = false;
   std::vector<std::string> cases{}, nulls{};
   std::vector<std::filesystem::path> tables{}, references{};
 };
@@ -122,10 +125,11 @@ struct Setting {
   Declared declared{orEnd(sim::SensorModel::parse(camera, "camera.toml")), scene};
 };
 
-void simulate(const Setting& world, const sim::SensorModel& camera, std::uint64_t seed,
+void simulate(const Setting& world, const sim::SensorModel& camera, std::uint64_t seed, bool with_samples,
               const std::string& null = {}) {
   std::filesystem::remove_all(folder());
   SimulatedRun run{.plan = world.plan, .camera = camera, .scene = world.scene, .seed = seed};
+  run.with_samples = with_samples;
   if (null == "pose") run.pose_error_m *= 2.0, run.pose_error_deg *= 2.0;
   if (null == "bump") run.bumped = 5 + static_cast<int>(seed % 20);
   if (null == "noise" || null == "tails") {
@@ -174,6 +178,12 @@ void report(const Options& options, const bench::Score& score, const CampaignFin
     fmt::print("# {}: z {:.1f}, T {:.1f} of {}\n", one.name, one.z, one.statistic, one.rank);
   for (const FoundEffect& one : options.scores ? finding.effects : std::vector<FoundEffect>{})
     fmt::print("# found {}: gain {:.0f} ± {:.0f}\n", one.found.name, one.found.gain.mean, one.found.gain.error);
+  for (const FoundEffect& one : options.scores ? finding.effects : std::vector<FoundEffect>{})
+    if (one.raw)
+      fmt::print("# raw exposures show {:.3f} ± {:.3f} of {}, which acts on {}; they contradict each other by {:.1f}\n",
+                 one.raw->share ? one.raw->share->mean : kNaN, one.raw->share ? one.raw->share->error : kNaN,
+                 one.found.name,
+                 one.found.stage ? discover::nameOf(*one.found.stage) : "?", one.raw->contradiction);
   for (const FoundEffect& one : finding.effects)
     for (const std::string& why : options.scores ? one.found.refused : std::vector<std::string>{})
       fmt::print("# not {}\n", why);
@@ -215,7 +225,7 @@ void hide(const Setting& world, const bench::KnownCaptures& unspoilt, const sim:
   }
   const sim::SensorModel truth = hiding(factor);
   const sim::AnyEffect hidden = scaled(none, defaults, factor);
-  simulate(world, truth, seed);
+  simulate(world, truth, seed, options.samples);
   for (const bool is_absent : {false, true}) {
     if (!(is_absent ? options.absent : options.present)) continue;
     of.is_absent = is_absent;
@@ -246,7 +256,7 @@ std::vector<std::string> partsOf(const std::string& list) {
 [[noreturn]] void endWithUsage(const std::string& word) {
   fmt::print(stderr,
              "discover_campaign_bench: {} is not understood; it takes --cases a,b, --seeds 1:5, --lambda 150,600, "
-             "--absent no|yes|both, --null plain,noise,pose,tails,bump, --threads N, --large, --scores, or "
+             "--absent no|yes|both, --null plain,noise,pose,tails,bump, --threads N, --large, --scores, --samples, or "
              "--table FILE... or --references FOLDER...\n",
              word);
   std::exit(2);
@@ -283,6 +293,8 @@ Options optionsOf(int argc, char** argv) {
       options.large = true;
     } else if (word == "--scores") {
       options.scores = true;
+    } else if (word == "--samples") {
+      options.samples = true;
     } else if (word == "--references") {
       while (i + 1 < argc) options.references.emplace_back(argv[++i]);
     } else if (word == "--table") {
@@ -299,7 +311,7 @@ void searchNulls(const Setting& world, const Options& options) {
   for (const std::string& null : options.nulls) {
     first += 1000;  // no two nulls have noise in common
     for (std::uint64_t seed = options.first_seed; seed <= options.last_seed; ++seed) {
-      simulate(world, world.declared.model, seed + first, null);
+      simulate(world, world.declared.model, seed + first, options.samples, null);
       const CampaignFinding finding = search(world, {});
       report(options, bench::scoreOf({.hidden = "nothing: " + null, .seed = seed}, finding), finding);
     }
@@ -337,7 +349,7 @@ int main(int argc, char** argv) {
   fmt::print("{}", bench::header());
   searchNulls(world, options);
   if (options.cases.empty() && !options.nulls.empty()) return std::filesystem::remove_all(folder()), 0;
-  simulate(world, world.declared.model, 1);
+  simulate(world, world.declared.model, 1, false);
   const auto unspoilt = bench::KnownCaptures::open(folder(), world.declared, kTrace);
   sim::AllEffects::forEach([&]<class E>() {
     const std::string name{E::about.name};

@@ -10,7 +10,7 @@
 #include "calib/discover/campaign/catalogue.h"
 #include "calib/discover/campaign/discover_campaign.h"
 #include "calib/discover/campaign/rows.h"
-#include "tests/discover/simulated_run.h"
+#include "tests/discover/searched.h"
 
 namespace toftwin::discover {
 namespace {
@@ -70,6 +70,21 @@ TEST(NamedFits, HaveOnlyTheStrengthsThatAreNeeded) {
   EXPECT_EQ(only.name, "per_column_mm");
   EXPECT_NEAR(only.value, 0.05, 4.0 * only.error);  // once in 16,000
   EXPECT_GT(only.value, 10.0 * only.error);
+}
+
+/// Of four samples neither the second nor the fourth harmonic is in any range: to write one of them, as rounding left it,
+/// would bend raw exposures.
+TEST_F(Searched, ANumberThatNothingTellsStaysAtNothing) {
+  std::string camera = tinyCamera();
+  camera.replace(camera.find("taps = 2"), 8, "taps = 2\nharmonics = 5");
+  simulateWith(camera + "[[effect]]\ntype = 'harmonics'\nthird = 0.003\n");
+  write("camera.toml", camera);
+  const CampaignFinding finding = search(job());
+  ASSERT_THAT(namesOf(finding), testing::ElementsAre("harmonics")) << verdictOf(finding);
+  const auto& found = std::get<sim::Harmonics>(finding.effects.front().fitted->effect);
+  EXPECT_NEAR(found.third, 0.003, 3e-4);
+  EXPECT_EQ(found.fourth, 0.0);
+  EXPECT_NEAR(found.second, 0.0, 0.2);
 }
 
 }  // namespace

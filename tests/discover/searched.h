@@ -44,7 +44,7 @@ class Searched : public testing::Test {
     if (!plan || !camera || !scene) throw std::runtime_error("the small campaign's files are wrong");
     SimulatedRun run{
         .plan = *plan, .camera = *camera, .scene = *scene, .spoil = spoil, .with_poses = with_poses};
-    run.frames = frames, run.seed = seed;
+    run.frames = frames, run.seed = seed, run.with_samples = with_samples_;
     discover::write(run, folder_ / "run");
   }
   [[nodiscard]] CampaignJob job() const {
@@ -72,6 +72,7 @@ class Searched : public testing::Test {
     return names;
   }
   std::filesystem::path folder_;
+  bool with_samples_ = false;  ///< raw exposures are recorded, too
 };
 
 }  // namespace toftwin::discover

@@ -83,7 +83,8 @@ plan::RecordedFile capture(const SimulatedRun& run, const plan::PlannedCapture& 
   const std::string name = fmt::format(
       "{}/{:04}-a.mcap", planned.is_locked ? plan::kLockedFolder : plan::kOpenFolder, planned.number);
   auto writer = orThrow(record::Writer::create(folder / name, {.overwrite = true}));
-  const std::array kinds{PlaneKind::Range, PlaneKind::Amplitude, PlaneKind::Flags};
+  std::vector kinds{PlaneKind::Range, PlaneKind::Amplitude, PlaneKind::Flags};
+  if (run.with_samples) kinds.push_back(PlaneKind::Samples);
   sim::Samples before_collected;
   sim::RangeImage before_range;
   const int frames = run.frames > 0 ? run.frames : planned.frames;

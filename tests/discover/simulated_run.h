@@ -28,6 +28,7 @@ struct SimulatedRun {
   int max_surfaces = 1;  ///< of the light that the camera sees
   int bumped = -1;  ///< the capture of this number stood ten times as far off as the others
   int frames = 0;  ///< of each capture; 0: the plan's
+  bool with_samples = false;  ///< raw exposures, too
 };
 
 /// Writes the folder. Throws std::runtime_error: a test has no other use for it.

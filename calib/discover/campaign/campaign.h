@@ -15,6 +15,7 @@
 #include <toftwin/frame.h>
 #include <toftwin/result.h>
 
+#include "calib/discover/campaign/raw_exposures.h"
 #include "calib/discover/campaign/sample_steps.h"
 #include "calib/plan/run_index.h"
 #include "sim/images/range.h"
@@ -30,6 +31,13 @@ struct Repeated {
   /// How many pixels' noise is worth one independent one, from block averages over 4 × 4 pixels: at
   /// least 1.
   double clumping = 1.0;
+};
+
+/// RawReading over the repeats.
+struct RepeatedRaw {
+  Repeated range_m;  ///< its mean may lie a little beyond a period
+  double period_m = 0.0;
+  std::vector<Repeated> closures{};
 };
 
 /// One capture of a measured camera: what it said of its moment, and its images over the repeats.
@@ -50,6 +58,7 @@ struct MeasuredCapture {
   /// Even minus odd frames, means over the image of the range: what goes with the frame's number.
   double parity_m = 0.0, parity_error_m = 0.0;
   std::vector<AmplitudePair> dim_pairs{};  ///< of the first two frames
+  std::optional<RepeatedRaw> raw{};        ///< where all frames have their raw exposures
 };
 
 /// For each capture the number of its stand, from 0 on as they first appear; one without a name is its own.

@@ -2,26 +2,20 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <ctime>
 #include <functional>
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include "calib/compare/report.h"
+#include "calib/discover/campaign/campaign_json.h"
 #include "calib/discover/campaign/discover_campaign.h"
 #include "calib/discover/campaign/gather_capture.h"
 
 namespace toftwin::discover {
 namespace {
 
-using compare::Json;
 using compare::shown;
-
-std::string stageInWords(const Effect& effect) {
-  return effect.stage ? std::string{discover::nameOf(*effect.stage)} : "not told";
-}
 
 std::string titleOf(const Effect& effect) {
   if (effect.is_rest)
@@ -44,13 +38,6 @@ std::string answerOf(const Effect& effect) {
   for (const Alternative& other : effect.alternatives)
     answer += " or " + (other.group.terms.empty() ? other.name : fmt::format("undeclared: {}", other.name));
   return effect.alternatives.empty() ? answer : answer + " (these captures do not tell them apart)";
-}
-
-/// Of all its forms; where there are several of one kind, in their order.
-std::vector<FittedNumber> numbersIn(const FoundEffect& one) {
-  std::vector<FittedNumber> numbers = one.fitted ? one.fitted->numbers : std::vector<FittedNumber>{};
-  for (const FittedEffect& more : one.more) numbers.insert(numbers.end(), more.numbers.begin(), more.numbers.end());
-  return numbers;
 }
 
 std::string numbersInWords(const FoundEffect& one) {
@@ -148,11 +135,6 @@ compare::Figure figureOver(const Judgement& judgement, const char* label,
                               .compact = true})};
 }
 
-std::string today() {
-  const std::time_t now = std::time(nullptr);
-  return fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(now));
-}
-
 compare::TableBlock seenTable(const CampaignFinding& finding) {
   compare::TableBlock table{
       "What explains most of the difference, each by itself: χ² of its columns, and how unlikely "
@@ -166,10 +148,25 @@ compare::TableBlock seenTable(const CampaignFinding& finding) {
   return table;
 }
 
-std::string adviceOf(const NextCapture& next) {
-  return fmt::format("take capture \"{}\" again{}; there {} would differ by {:.3g} in χ², in those that were taken by "
-                     "{:.3g} at most",
-                     next.like, next.change.empty() ? "" : " " + next.change, next.other, next.chi2, next.taken_chi2);
+/// What the raw exposures say of where an effect acts; empty: nothing.
+std::string rawInWords(const FoundEffect& one) {
+  std::vector<std::string> words;
+  const auto is_before = one.raw->isBeforeDecoding();
+  if (const auto& share = one.raw->share) {
+    words.push_back(fmt::format("Of what {} does to the range, the raw exposures' phase shows {}: {}", one.found.name,
+                                compare::shownWithError(share->mean, share->error, 2),
+                                !is_before   ? "not enough to say whether it acts before they are decoded"
+                                : *is_before ? "it acts before they are decoded"
+                                             : "it acts on what is decoded from them"));
+  }
+  if (one.raw->contradicts())
+    words.push_back(fmt::format("The raw exposures contradict each other by {:.1f} standard deviations more than all "
+                                "that was found says",
+                                one.raw->contradiction));
+  const bool is_odd = is_before && one.found.is_catalogue && one.found.stage &&
+                      *is_before != (*one.found.stage != Stage::Range);
+  if (is_odd) words.push_back(fmt::format("But {} acts elsewhere: the cause is perhaps another", one.found.name));
+  return fmt::format("{}", fmt::join(words, ". "));
 }
 
 compare::Section foundSection(const CampaignFinding& finding) {
@@ -184,6 +181,9 @@ compare::Section foundSection(const CampaignFinding& finding) {
           fmt::format("{} or {}: these captures hardly tell them apart (correlation {:.2f}).",
                       titleOf(one.found), other.name, other.correlation)});
     }
+    if (one.raw)
+      if (const std::string words = rawInWords(one); !words.empty())
+        section.blocks.emplace_back(compare::Paragraph{words + "."});
     if (!one.found.refused.empty()) {
       section.blocks.emplace_back(compare::Paragraph{
           fmt::format("Fitted and not named. {}.", fmt::join(one.found.refused, "; ")), true});
@@ -220,65 +220,6 @@ compare::Section foundSection(const CampaignFinding& finding) {
   for (const std::string& note : finding.notes)
     section.blocks.emplace_back(compare::Paragraph{note, true});
   return section;
-}
-
-Json toJson(const RangeErrors& errors) {
-  Json json = Json::object();
-  json.set("pixels", errors.pixels).set("bias_mm", errors.bias_mm).set("rms_mm", errors.rms_mm);
-  json.set("p95_mm", errors.p95_mm).set("chi2_per_row", errors.per_row);
-  json.set("neighbour_correlation", errors.neighbour_correlation)
-      .set("masks_agree", errors.masks_agree);
-  return json;
-}
-
-Json toJson(const FoundEffect& one) {
-  Json json = Json::object(), numbers = Json::array();
-  json.set("name", one.found.name).set("kind", one.found.is_catalogue ? "catalogue" : "undeclared");
-  json.set("stage", stageInWords(one.found)).set("covariates", Json::arrayOf(one.found.covariates));
-  json.set("is_rest", one.found.is_rest);
-  json.set("p", one.found.p)
-      .set("gain", one.found.gain.mean)
-      .set("gain_error", one.found.gain.error);
-  json.set("frequency", one.found.frequency).set("in_model", one.fitted.has_value());
-  for (const FittedNumber& number : numbersIn(one)) {
-    Json each = Json::object();
-    each.set("key", number.key).set("value", number.value).set("error", number.error);
-    numbers.push(std::move(each));
-  }
-  json.set("numbers", std::move(numbers));
-  Json others = Json::array();
-  for (const Alternative& other : one.found.alternatives) others.push(other.name);
-  json.set("or", std::move(others)).set("refused", Json::arrayOf(one.found.refused));
-  if (one.next) json.set("next_experiment", adviceOf(*one.next)).set("next_experiment_chi2", one.next->chi2);
-  return json;
-}
-
-Json dataOf(const CampaignJob& job, const CampaignFinding& finding) {
-  Json data = Json::object(), effects = Json::array(), updates = Json::array();
-  data.set("verdict", verdictOf(finding)).set("run", job.run.string()).set("model", job.model);
-  data.set("captures", finding.captures)
-      .set("frames", finding.frames)
-      .set("locked", finding.locked);
-  data.set("p", finding.finding.first_p).set("p_left", finding.finding.last_p);
-  data.set("offset_mm", finding.zero.offset_mm).set("offset_error_mm", finding.zero.offset_error_mm);
-  data.set("delay_of_light_mm", finding.zero.delay_mm);
-  data.set("scales", Json::arrayOf(finding.finding.scales)).set("chi2_per_row", finding.dispersion);
-  for (const FoundEffect& one : finding.effects) effects.push(toJson(one));
-  for (const FittedEffect& one : finding.updates) updates.push(nameOf(one.effect));
-  data.set("effects", std::move(effects)).set("parameter_updates", std::move(updates));
-  if (const auto& judged = finding.judgement) {
-    Json locked = Json::object();
-    locked.set("before", toJson(judged->before)).set("after", toJson(judged->after));
-    locked.set("with_zero", toJson(judged->with_zero)).set("removed_by_zero", judged->removed_by_zero);
-    locked.set("removed", judged->removed).set("removed_low", judged->removed_low);
-    locked.set("removed_high", judged->removed_high).set("explainable_chi2", judged->explainable);
-    locked.set("cells", judged->cells).set("noise_chi2_per_row", judged->noise);
-    data.set("locked_captures", std::move(locked));
-  }
-  data.set("notes", Json::arrayOf(finding.notes)).set("seconds", finding.seconds);
-  return data.set("software", "toftwin " TOFTWIN_VERSION)
-      .set("date", today())
-      .set("note", job.note);
 }
 
 std::vector<compare::Card> cardsOf(const CampaignFinding& finding) {
@@ -398,7 +339,7 @@ Result<std::filesystem::path> writeReport(const CampaignJob& job, const Campaign
   }
   report.colophon = fmt::format("toftwin {}, {}{}{}; {:.0f} s", TOFTWIN_VERSION, today(),
                                 job.note.empty() ? "" : ", ", job.note, finding.seconds);
-  report.data = dataOf(job, finding);
+  report.data = jsonOf(job, finding);
   report.written_by = "toftwin discover", report.explained_in = "docs/discover-campaigns.md";
   return compare::write(report, job.output);
 }

@@ -186,6 +186,23 @@ std::vector<sim::AnyEffect> declaredEffects(const Declared& declared) {
   return withDelay(declared.model, effectsWithoutNoise(declared.model), declared.delay_mm);
 }
 
+std::vector<std::optional<std::size_t>> placesInFile(const Declared& declared) {
+  const auto& in_file = declared.model.effects();
+  std::vector<std::optional<std::size_t>> places;
+  std::size_t next = 0;
+  for (const sim::AnyEffect& effect : declaredEffects(declared)) {
+    std::size_t place = next;
+    while (place < in_file.size() && in_file[place].index() != effect.index()) ++place;
+    if (place == in_file.size()) {
+      places.emplace_back();
+      continue;
+    }
+    places.emplace_back(place);
+    next = place + 1;
+  }
+  return places;
+}
+
 bool isOnlyDelay(const Declared& declared, const sim::AnyEffect& effect) {
   const auto isOffset = [](const sim::AnyEffect& any) {
     return std::holds_alternative<sim::FrequencyOffset>(any);

@@ -44,6 +44,8 @@ std::vector<sim::AnyEffect> withDelay(const sim::SensorModel& model, std::vector
                                       double millimetres);
 /// What is compared with the measurement: the camera file's effects but noise, with the delay of the light.
 std::vector<sim::AnyEffect> declaredEffects(const Declared& declared);
+/// For each of that list its place in the camera file; none: the delay of the light.
+std::vector<std::optional<std::size_t>> placesInFile(const Declared& declared);
 /// Whether an effect of that list is nothing but the delay: the camera file has no frequency_offset.
 bool isOnlyDelay(const Declared& declared, const sim::AnyEffect& effect);
 /// Whether it can be told from an offset of the range: its changes vary by more than 2 % of themselves.

@@ -156,6 +156,17 @@ void takeFound(Round& round, CampaignFinding& finding) {
   finding.zero = round.zero, finding.dispersion = round.refitted.dispersion;
 }
 
+/// Raw exposures would say where something without a name acts, and of several names which it cannot be.
+void noteMissingRawExposures(const sim::SensorModel& model, CampaignFinding& finding) {
+  const bool would_say = std::ranges::any_of(finding.effects, [](const FoundEffect& one) {
+    return !one.raw && (!one.found.is_catalogue || !one.found.alternatives.empty());
+  });
+  if (would_say && model.hasPhasors())
+    finding.notes.emplace_back(
+        "Raw exposures were not recorded with all frames: they would say more of where this acts, and perhaps which "
+        "name is wrong. A camera that gives them is measured with toftwin measure … --planes samples.");
+}
+
 /// What does worse on captures that it was not fitted to does not go into the model, whatever it is called.
 /// What single frames show stays: these captures do not judge it.
 void keepIfWorse(const std::string& text, const Declared& declared, CampaignFinding& finding) {
@@ -233,6 +244,7 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
   declared.delay_mm = round.declared.delay_mm;
   const Lit lit{campaign->captures, round.traced, *at_poses};
   takeFound(round, finding);
+  noteMissingRawExposures(declared.model, finding);
   addNextCaptures({round.declared, lit, finding.finding.scales}, *round.rows, finding.effects);
   if (steps) addSteps(job, declared.model, *steps, finding);
   const Zero beyond = finding.zero;

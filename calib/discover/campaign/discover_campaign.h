@@ -42,12 +42,26 @@ struct NextCapture {
   double taken_chi2 = 0.0;  ///< and at most in one that was taken
 };
 
+/// What the raw exposures say of an effect (raw_witness.h), where they were recorded.
+struct RawSays {
+  /// Of what it does to the range, the share that their phase shows, with its standard error; none: it does nothing.
+  std::optional<Difference> share{};
+  /// By how many standard deviations of noise they contradict each other more than the camera file says, and more than
+  /// it says with all that was found.
+  double contradiction = 0.0;
+
+  /// Whether it acts before they are decoded: three standard errors from the one, and nearer to the other.
+  [[nodiscard]] std::optional<bool> isBeforeDecoding() const;
+  [[nodiscard]] bool contradicts() const { return contradiction > 4.0; }
+};
+
 /// What an effect that was found became in the model.
 struct FoundEffect {
   Effect found;
   std::optional<FittedEffect> fitted{};  ///< none: the simulator has no form for it
   std::vector<FittedEffect> more{};      ///< where one form is not enough
   std::optional<NextCapture> next{};     ///< where these captures do not tell it from something else
+  std::optional<RawSays> raw{};          ///< none: nothing
   /// Single frames say it (step_effect.h): noise smears it where frames are averaged, as they are for the
   /// judgement.
   bool is_of_single_frames = false;

@@ -228,11 +228,43 @@ struct MeanMoment {
   }
 };
 
+/// Raw exposures that come again and again.
+class RawRepeats {
+ public:
+  void add(const Frame& frame) {
+    if (!is_whole_) return;
+    auto raw = rawReadingOf(frame);
+    is_whole_ = raw && (first_.empty() || (raw->range_m.size() == first_.size() &&
+                                           raw->closures.size() == closures_.size()));
+    if (!is_whole_) return;
+    if (first_.empty()) first_ = raw->range_m, period_m_ = raw->period_m, closures_.resize(raw->closures.size());
+    for (std::size_t i = 0; i < first_.size(); ++i)
+      raw->range_m[i] = nearestRange(raw->range_m[i], first_[i], period_m_);
+    range_.add(raw->range_m);
+    for (std::size_t k = 0; k < closures_.size(); ++k) closures_[k].add(raw->closures[k]);
+  }
+
+  [[nodiscard]] std::optional<RepeatedRaw> repeated(const Image<float>& like) const {
+    if (!is_whole_ || first_.empty()) return std::nullopt;
+    RepeatedRaw raw{range_.repeated(like), period_m_};
+    for (const Repeats& closure : closures_) raw.closures.push_back(closure.repeated(like));
+    return raw;
+  }
+
+ private:
+  bool is_whole_ = true;  ///< all frames have them
+  Image<float> first_;    ///< ranges of the first frame, next to which the others lie
+  double period_m_ = 0.0;
+  Repeats range_;
+  std::vector<Repeats> closures_;
+};
+
 struct CaptureGatherer::State {
   MeasuredCapture capture;
   MeanMoment mean_moment;
   CameraInfo camera;
   Repeats range, amplitude;
+  RawRepeats raw;
   LightNoise light;
   Image<float> first, first_amplitude;
   std::vector<double> means;
@@ -252,6 +284,7 @@ struct CaptureGatherer::State {
     for (std::size_t i = 0; i < valid.size(); ++i)
       valid[i] += std::isfinite((*range_m)[i]) ? 1.0F : 0.0F;
     range.add(*range_m);
+    raw.add(frame);
     means.push_back(meanOf(*range_m, first));
     addAmplitude(amplitudeOf(frame, *range_m));
     ++capture.frames;
@@ -275,6 +308,7 @@ struct CaptureGatherer::State {
       capture.log_amplitude.variance = amplitude.repeated(capture.log_amplitude.mean).variance;
     }
     capture.range_m = range.repeated(capture.log_amplitude.mean);
+    capture.raw = raw.repeated(capture.log_amplitude.mean);
     for (float& share : valid.pixels()) share /= static_cast<float>(capture.frames);
     if (has_amplitude) leaveOutWhatNoiseChose(valid, capture.log_amplitude.mean);
     capture.valid_share = std::move(valid);

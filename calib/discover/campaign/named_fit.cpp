@@ -39,18 +39,6 @@ Gain gainBeyond(const std::vector<double>& before, const Marginal& after) {
 
 }  // namespace
 
-/// Not by a share of the bounds' distance: a millionth of what a window may reflect at most is five times
-/// what windows do.
-bool isAtBound(const sim::AnyEffect& effect, const std::vector<std::string>& keys) {
-  const auto is_at = [](double value, double bound) {  // units make them differ by rounding
-    return std::abs(value - bound) <= 1e-12 * std::abs(bound);
-  };
-  return std::ranges::any_of(numbersOf(effect), [&](const EffectNumber& number) {
-    return isStrength(effect, number.key) && std::ranges::count(keys, number.key) > 0 &&
-           (is_at(number.value, number.low) || is_at(number.value, number.high));
-  });
-}
-
 const CampaignFit& campaignFitOf(const NamedFit& fit) { return *std::any_cast<CampaignFit>(&fit.effect); }
 
 sim::AnyEffect startOf(const CampaignRows& rows, const Candidate& candidate, std::span<const TermGroup> known,

@@ -140,4 +140,9 @@ Reading NoiselessCamera::read(const MeasuredCapture& capture, const sim::Samples
   return asReading(exposed.range);
 }
 
+RawReading NoiselessCamera::readRaw(const MeasuredCapture& capture, const sim::Light& light) const {
+  const sim::SensorModel& model = at(capture);
+  return rawReadingOf(model.readOut(collect(capture, light), momentFor(model, capture), 0, 0).samples);
+}
+
 }  // namespace toftwin::discover

@@ -40,6 +40,8 @@ class NoiselessCamera {
   [[nodiscard]] Reading read(const MeasuredCapture& capture, const sim::Light& light) const;
   /// The same from what the pixels collected, where that is known already.
   [[nodiscard]] Reading read(const MeasuredCapture& capture, const sim::Samples& collected) const;
+  /// What its raw exposures would say; the capture's must be known.
+  [[nodiscard]] RawReading readRaw(const MeasuredCapture& capture, const sim::Light& light) const;
   [[nodiscard]] sim::Samples collect(const MeasuredCapture& capture, const sim::Light& light) const;
 
  private:

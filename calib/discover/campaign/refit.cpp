@@ -89,6 +89,21 @@ struct State {
 
 double dispersionOf(const Step& at) { return at.deviance / std::max(1.0, at.freedom); }
 
+/// What a number is that nothing tells: that of an effect switched off, where it does something alone, or where the
+/// defaults have no other; else as it is.
+double untoldOf(const sim::AnyEffect& effect, const std::string& key) {
+  const sim::AnyEffect none = noneOf(effect);
+  const bool is_usual = valueOf(none, key) == valueOf(defaultsOf(effect), key);
+  return valueOf(is_usual || isStrength(effect, key) ? none : effect, key);
+}
+
+/// Whether a number's standard error is less than half of what it may be.
+bool isTold(const sim::AnyEffect& effect, const FittedNumber& number) {
+  const auto numbers = numbersOf(effect);
+  const auto found = std::ranges::find(numbers, number.key, &EffectNumber::key);
+  return found == numbers.end() || number.error < 0.5 * (found->high - found->low);
+}
+
 /// The numbers of the effect at that place, with their standard errors.
 FittedEffect fittedAt(const State& state, std::size_t place) {
   const Eigen::MatrixXd covariance =
@@ -177,6 +192,28 @@ class Descent {
     return {};
   }
 
+  /// Numbers that could be anything within their bounds, and those that moved before it showed that nothing tells them,
+  /// stay as they `began`, what makes an effect strong at nothing: rounding moved them, and what they do not change here they may change
+  /// elsewhere (a waveform's second harmonic is in no range).
+  Result<> keepWhatIsNotTold(const std::vector<sim::AnyEffect>& began, State& state) {
+    bool is_any = false;  // what stays now does not come back, so that this ends
+    for (const std::size_t place : places_) {
+      const std::vector<FittedNumber> fitted = fittedAt(state, place).numbers;
+      for (const FreeNumber& one : freeNumbersOf(state.effects, {place})) {
+        const double was = untoldOf(began[place], one.key);
+        const auto number = std::ranges::find(fitted, one.key, &FittedNumber::key);
+        if (valueOf(state.effects[place], one.key) == was) continue;
+        if (number != fitted.end() && isTold(state.effects[place], *number)) continue;
+        state.effects[place] = withNumber(state.effects[place], one.key, was);
+        kept_.emplace(place, one.key);
+        is_any = true;
+      }
+    }
+    if (!is_any) return {};
+    if (auto done = fit(state); !done) return done;
+    return keepWhatIsNotTold(began, state);
+  }
+
  private:
   Result<> look(State& state) const {
     if (auto seen = evaluate(state); !seen) return seen;
@@ -250,59 +287,6 @@ class Descent {
 
 }  // namespace
 
-double valueOf(const sim::AnyEffect& effect, const std::string& key) {
-  for (const EffectNumber& number : numbersOf(effect)) {
-    if (number.key == key) return number.value;
-  }
-  return 0.0;
-}
-
-std::optional<LeastStrength> leastStrength(const FittedEffect& fitted, const std::vector<std::string>& strengths) {
-  const sim::AnyEffect none = noneOf(fitted.effect);
-  std::optional<LeastStrength> least;
-  int count = 0;
-  for (const FittedNumber& number : fitted.numbers) {
-    if (std::ranges::find(strengths, number.key) == strengths.end()) continue;
-    ++count;
-    // What the data say nothing of has no error.
-    const double errors =
-        number.error > 0.0 ? std::abs(number.value - valueOf(none, number.key)) / number.error : 0.0;
-    if (!least || errors < least->errors) least = LeastStrength{number.key, errors};
-  }
-  return count > 1 ? least : std::nullopt;
-}
-
-sim::AnyEffect without(const sim::AnyEffect& effect, const std::string& key) {
-  return withNumber(effect, key, valueOf(noneOf(effect), key));  // 0 where that has no such number: an empty list
-}
-
-std::vector<sim::AnyEffect> moved(std::vector<sim::AnyEffect> effects, const FreeNumber& free, double by) {
-  effects[free.place] =
-      withNumber(effects[free.place], free.key, valueOf(effects[free.place], free.key) + by);
-  return effects;
-}
-
-bool actsOnLight(const std::vector<sim::AnyEffect>& effects) {
-  return std::ranges::any_of(effects, [](const auto& effect) { return stageOf(effect) == Stage::Light; });
-}
-
-/// A twentieth of what the effect has, or of a tenth of what its defaults have.
-std::vector<FreeNumber> freeNumbersOf(const std::vector<sim::AnyEffect>& effects,
-                                      const std::vector<std::size_t>& places) {
-  std::vector<FreeNumber> all;
-  for (const std::size_t place : places) {
-    const sim::AnyEffect defaults = defaultsOf(effects[place]);
-    for (const EffectNumber& number : numbersOf(effects[place])) {
-      if (number.is_whole) continue;
-      double step = 0.05 * std::max(std::abs(number.value), 0.1 * std::abs(valueOf(defaults, number.key)));
-      if (step == 0.0) step = 1e-4 * (number.high - number.low);
-      if (number.value + step > number.high) step = -step;
-      all.push_back({place, number.key, step});
-    }
-  }
-  return all;
-}
-
 Result<Evidence> residualEvidence(const JudgedCampaign& judged, const std::vector<sim::AnyEffect>& effects) {
   const Lit& lit = judged.lit;
   const auto declared =
@@ -332,12 +316,14 @@ Result<Evidence> residualEvidence(const JudgedCampaign& judged, const std::vecto
 
 Result<Refitted> refit(const CampaignRows& rows, std::vector<sim::AnyEffect> effects,
                        const std::vector<std::size_t>& places, const RefitOptions& options) {
+  const std::vector<sim::AnyEffect> began = effects;
   State state{std::move(effects)};
   Descent descent{rows, places, options};
   if (auto done = descent.fit(state); !done) return done.error();
   if (!options.droppable.empty()) {
     if (auto done = descent.dropNeedless(state); !done) return done.error();
   }
+  if (auto done = descent.keepWhatIsNotTold(began, state); !done) return done.error();
   const Step& at = state.at;
   Refitted result{
       .effects = state.effects, .free = state.free, .deviance = at.deviance, .dispersion = dispersionOf(at)};

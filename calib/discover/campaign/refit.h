@@ -12,29 +12,11 @@
 
 #include "calib/discover/campaign/campaign.h"
 #include "calib/discover/campaign/catalogue.h"
+#include "calib/discover/campaign/effect_numbers.h"
 #include "calib/discover/campaign/rows.h"
 #include "calib/discover/marginal.h"
 
 namespace toftwin::discover {
-
-/// A number of an effect, as it was found.
-struct FittedNumber {
-  std::string key{};
-  double value = 0.0, error = 0.0;
-};
-
-/// An effect that goes into the model.
-struct FittedEffect {
-  sim::AnyEffect effect;
-  std::vector<FittedNumber> numbers{};  ///< those that were fitted
-  /// They are of single frames, which noise smears where frames are averaged: locked captures, means over
-  /// frames, do not judge them.
-  bool is_of_single_frames = false;
-  /// A table that was learned, whose numbers are not fitted again.
-  bool is_as_learned = false;
-  /// Of an update: the place of what it replaces among the camera file's effects.
-  std::optional<std::size_t> of_file{};
-};
 
 /// A campaign on which models are judged: what is needed of it again and again.
 struct JudgedCampaign {
@@ -47,26 +29,6 @@ struct JudgedCampaign {
 /// What a list of effects, noise not among them, leaves of the measurement. Error: an exposure that
 /// the model cannot have.
 Result<Evidence> residualEvidence(const JudgedCampaign& judged, const std::vector<sim::AnyEffect>& effects);
-
-double valueOf(const sim::AnyEffect& effect, const std::string& key);
-/// Whether a strength of the effect, one of these numbers, was fitted to a bound of it.
-bool isAtBound(const sim::AnyEffect& effect, const std::vector<std::string>& keys);
-/// Of several `strengths` among an effect's fitted numbers, the one that is fewest standard errors from nothing, and how
-/// many; none where it has one alone, or none.
-struct LeastStrength {
-  std::string key{};
-  double errors = 0.0;
-};
-std::optional<LeastStrength> leastStrength(const FittedEffect& fitted, const std::vector<std::string>& strengths);
-/// With that number switched off.
-sim::AnyEffect without(const sim::AnyEffect& effect, const std::string& key);
-std::vector<sim::AnyEffect> moved(std::vector<sim::AnyEffect> effects, const FreeNumber& free,
-                                  double by);
-/// Whether any of the effects acts on light.
-bool actsOnLight(const std::vector<sim::AnyEffect>& effects);
-/// Numbers of the effects at these places that are not whole, with steps that suit them.
-std::vector<FreeNumber> freeNumbersOf(const std::vector<sim::AnyEffect>& effects,
-                                      const std::vector<std::size_t>& places);
 
 struct RefitOptions {
   std::span<const double> scales{};    ///< of poses and light

@@ -16,6 +16,7 @@
 
 #include "calib/discover/campaign/campaign.h"
 #include "calib/discover/campaign/catalogue.h"
+#include "calib/discover/campaign/effect_numbers.h"
 #include "calib/discover/campaign/reading.h"
 #include "calib/discover/named_effects.h"
 #include "calib/discover/term.h"
@@ -110,13 +111,6 @@ struct CaptureCovariates {
   std::vector<std::string> names{};
   Eigen::MatrixXf values{};  ///< cells × names
   std::vector<bool> is_same{};  ///< by name: the same in all cells
-};
-
-/// A number of an effect of a list that is fitted, and by how much it is changed for its derivative.
-struct FreeNumber {
-  std::size_t place = 0;  ///< of the effect
-  std::string key{};
-  double step = 0.0;
 };
 
 /// What a campaign's NamedFit holds: the effect, and the keys of the numbers that were fitted.

@@ -7,6 +7,8 @@
 
 #include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/model_file.h"
+#include "calib/discover/campaign/raw_witness.h"
+#include "calib/discover/campaign/tell_stages.h"
 #include "calib/discover/marginal.h"
 
 namespace toftwin::discover {
@@ -51,24 +53,6 @@ std::vector<std::size_t> wrongNumbers(const Evidence& evidence, const Finding& f
     }
     const double gain = (fit(marginal, without).deviance - all.deviance) / std::max(1.0, all.dispersion());
     if (gain >= 25.0 + static_cast<double>(group.count)) places.push_back(next[group.name] - 1);
-  }
-  return places;
-}
-
-/// For each of declaredEffects() its place in the camera file; none: the delay of the light.
-std::vector<std::optional<std::size_t>> placesInFile(const Declared& file) {
-  const auto& in_file = file.model.effects();
-  std::vector<std::optional<std::size_t>> places;
-  std::size_t next = 0;
-  for (const sim::AnyEffect& effect : declaredEffects(file)) {
-    std::size_t place = next;
-    while (place < in_file.size() && in_file[place].index() != effect.index()) ++place;
-    if (place == in_file.size()) {
-      places.emplace_back();
-      continue;
-    }
-    places.emplace_back(place);
-    next = place + 1;
   }
   return places;
 }
@@ -225,8 +209,15 @@ Result<std::unique_ptr<Round>> search(const Declared& file, const OpenCaptures& 
   if (open.trusts_poses) finder.most_scale = 1.0;
   round->finding = find(*round->rows, finder);
   begin();
+  const Lit lit{open.captures, round->traced, open.at_poses};
+  const JudgedCampaign judged{round->declared, lit, round->finding.scales};
+  const auto witness = RawWitness::of(judged);
+  if (!witness) return witness.error();
+  if (*witness)
+    if (auto named = (*witness)->chooseNames(round->finding.effects); !named) return named.error();
   if (auto fitted = fitFound(file, before != nullptr ? &*before->rows : nullptr, open, *round); !fitted)
     return fitted.error();
+  if (auto told = tellStages(*witness ? &**witness : nullptr, *round); !told) return told.error();
   return round;
 }
 

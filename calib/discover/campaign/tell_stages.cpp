@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/discover/campaign/tell_stages.h"
+
+#include <algorithm>
+#include <string>
+
+#include "calib/discover/campaign/carriers.h"
+
+namespace toftwin::discover {
+namespace {
+
+using Effects = std::vector<sim::AnyEffect>;
+
+/// The round's declared effects, with the numbers that were fitted.
+Effects updatedOf(const Round& round) {
+  Effects effects = declaredEffects(round.declared);
+  const auto in_file = placesInFile(round.declared);
+  for (const FittedEffect& update : round.updates)
+    for (std::size_t place = 0; place < effects.size(); ++place)
+      if (in_file[place] == update.of_file) effects[place] = update.effect;
+  return effects;
+}
+
+Effects withForms(Effects effects, const FoundEffect& found) {
+  if (found.fitted) effects = withInserted(std::move(effects), found.fitted->effect);
+  for (const FittedEffect& more : found.more) effects = withInserted(std::move(effects), more.effect);
+  return effects;
+}
+
+/// Light adds up and does not know how bright it is, nor what else shines: what bends it as it goes with either happens
+/// in the pixels.
+bool isOfPixels(const Effect& effect) {
+  return std::ranges::any_of(effect.covariates, [](const std::string& name) {
+    return name == "amplitude_e" || name == "ambient_klx";
+  });
+}
+
+/// Where an effect without a name acts. `is_only_one`: of several it cannot be said which makes the samples contradict
+/// each other.
+void tellStage(const std::optional<RawSays>& raw, bool is_only_one, Effect& effect) {
+  const auto is_before = raw ? raw->isBeforeDecoding() : std::nullopt;
+  if (is_before == false) {
+    effect.stage = Stage::Range;
+    return;
+  }
+  if (is_before == true && effect.stage == Stage::Range) effect.stage = Stage::Light;
+  const bool contradicts = raw && is_only_one && raw->contradicts();
+  if (effect.stage == Stage::Light && (contradicts || isOfPixels(effect))) effect.stage = Stage::Samples;
+}
+
+}  // namespace
+
+std::optional<bool> RawSays::isBeforeDecoding() const {
+  constexpr double kSure = 3.0;
+  if (!share) return std::nullopt;
+  if (share->mean > 0.5 && share->mean > kSure * share->error) return true;
+  if (share->mean < 0.5 && 1.0 - share->mean > kSure * share->error) return false;
+  return std::nullopt;
+}
+
+Result<> tellStages(const RawWitness* witness, Round& round) {
+  const auto hasNoName = [](const FoundEffect& one) { return !one.found.is_catalogue; };
+  const bool is_only_one = std::ranges::count_if(round.effects, hasNoName) == 1;
+  if (witness != nullptr && !round.effects.empty()) {
+    const Effects declared = updatedOf(round);
+    Effects all = declared;
+    std::vector<Effects> with;
+    for (const FoundEffect& one : round.effects)
+      all = withForms(std::move(all), one), with.push_back(withForms(declared, one));
+    // A number that ranges hardly tell may be off by what samples show at once: the better of both.
+    const auto by_file = witness->contradiction(declared), by_all = witness->contradiction(all);
+    if (!by_file || !by_all) return by_file ? by_all.error() : by_file.error();
+    const double contradiction = std::min(*by_file, *by_all);
+    const auto shares = witness->sharesBeforeDecoding(declared, with, all);
+    if (!shares) return shares.error();
+    for (std::size_t e = 0; e < round.effects.size(); ++e) round.effects[e].raw = RawSays{(*shares)[e], contradiction};
+  }
+  for (FoundEffect& one : round.effects)
+    if (hasNoName(one)) tellStage(one.raw, is_only_one, one.found);
+  return {};
+}
+
+}  // namespace toftwin::discover
