@@ -51,12 +51,9 @@ TableBlock cameraTable(const Capture& capture) {
   });
   row("effects",
       [&](const SourceDetails&, const Stack& k) { return list(k.provenance().effects); });
-  row("camera model id",
-      [](const SourceDetails&, const Stack& k) { return "id " + k.provenance().model_id; });
-  row("scene id",
-      [](const SourceDetails&, const Stack& k) { return "id " + k.provenance().scene_id; });
-  row("calibration id",
-      [](const SourceDetails&, const Stack& k) { return "id " + k.provenance().calibration_id; });
+  row("camera model id", [](const SourceDetails&, const Stack& k) { return k.provenance().model_id; });
+  row("scene id", [](const SourceDetails&, const Stack& k) { return k.provenance().scene_id; });
+  row("calibration id", [](const SourceDetails&, const Stack& k) { return k.provenance().calibration_id; });
   row("pose set by us", [](const SourceDetails& s, const Stack&) {
     return std::string{s.can_set_pose ? "yes" : "no: its own poses"};
   });

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
+#include <variant>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -169,6 +172,27 @@ TEST_F(Live, LeavesAPageItsNumbersAndALogWithIds) {
   EXPECT_EQ(std::count(log.begin(), log.end(), '\n'), 8);  // 2 poses, 2 frames, 2 cameras
   EXPECT_THAT(log, HasSubstr("\"effects\": [\"shot_noise\", \"delay\"]"));
   EXPECT_THAT(log, HasSubstr("\"model\": \""));
+}
+
+/// A cell is what a camera's frames say, for who looks for it elsewhere: what it is stands before the row.
+TEST_F(Live, IdsOfTheTwoCamerasStandByThemselves) {
+  SourceFeed a{"a", sourceToml(1, 0.0)}, b{"b", sourceToml(2, 0.0)};
+  const auto captured = capture(a, b, {.frames = 2}, silent);
+  ASSERT_TRUE(captured.ok()) << captured.error().message;
+  const auto finding = judgeLive(*captured);
+  ASSERT_TRUE(finding.ok()) << finding.error().message;
+  std::vector<std::vector<std::string>> ids;
+  for (const Block& block : finding->section.blocks) {
+    const auto* table = std::get_if<TableBlock>(&block);
+    if (table == nullptr || table->caption != "The two cameras") continue;
+    std::ranges::copy_if(table->rows, std::back_inserter(ids), [](const auto& row) { return row[0].ends_with(" id"); });
+  }
+  const auto &of_a = captured->poses[0].a.provenance(), &of_b = captured->poses[0].b.provenance();
+  EXPECT_FALSE(of_a.model_id.empty() || of_a.scene_id.empty() || of_a.calibration_id.empty());
+  EXPECT_THAT(ids, testing::ElementsAre(
+                       testing::ElementsAre("camera model id", of_a.model_id, of_b.model_id),
+                       testing::ElementsAre("scene id", of_a.scene_id, of_b.scene_id),
+                       testing::ElementsAre("calibration id", of_a.calibration_id, of_b.calibration_id)));
 }
 
 TEST_F(Live, APoseVisitedAgainIsKnownAlsoWhereNoCameraSaysIt) {
