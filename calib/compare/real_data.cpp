@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "calib/compare/trait_verdict.h"
+#include "calib/compare/verdict_words.h"
 
 namespace toftwin::compare {
 

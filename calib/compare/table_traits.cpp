@@ -21,6 +21,7 @@
 #include "calib/compare/fitted_figure.h"
 #include "calib/compare/trait_verdict.h"
 #include "calib/compare/traits/repeats.h"
+#include "calib/compare/verdict_words.h"
 
 namespace toftwin::compare {
 namespace {

@@ -3,7 +3,6 @@
 
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "calib/compare/named_traits.h"
@@ -30,9 +29,17 @@ struct TraitVerdict {
   [[nodiscard]] bool differs() const { return isTold() && (difference.low > 0.0 || difference.high < 0.0); }
   /// The noise floor: what B − A is uncertain by, towards 0. A smaller difference would not show.
   [[nodiscard]] double floor() const;
+  [[nodiscard]] double timesFloor() const;
+  /// What a line is off by, at a distance.
+  [[nodiscard]] bool isOffset() const;
+  /// Wrapped readings of the wall, a share that differs by over 1 %.
+  [[nodiscard]] bool isWraps() const;
   /// One camera lacks over 5 % of the other's pixels, whether or not shares differ: they are in no number.
   [[nodiscard]] bool isMissing() const;
 };
+
+/// Over 5 % of the other's pixels, and more than the interval.
+bool isLack(const Trait& lacked);
 
 /// Of each number that both cameras have, and of those told of B − A that are 0 for equal cameras (so not
 /// what is left of a fit). Where a number is told of A, of B and of B − A, the last one is the difference.
@@ -42,18 +49,6 @@ struct TraitVerdict {
 /// is extrapolated (Trait::is_extrapolated) is not told.
 std::vector<TraitVerdict> verdictsOf(const NamedTraits& traits);
 
-/// The clearest difference, and how many of how many differ: a
-/// few sentences without the last full stop, of which the first ones say what wraps or is missing.
-std::string headlineOf(const std::vector<TraitVerdict>& verdicts);
-/// The worst condition at which a camera lacks what the other sees, and how many more there are; with a space
-/// behind. Empty where there is none.
-std::string missingInWords(const std::vector<MissingAt>& missing);
-TableBlock verdictTable(const std::vector<TraitVerdict>& verdicts);
-/// The same in two: what differs, and the rest, for a page on which figures stand between.
-std::pair<TableBlock, TableBlock> verdictTables(const std::vector<TraitVerdict>& verdicts);
-/// The worst condition at which a camera lacks what the other sees, how many numbers are the same, and one card
-/// for each of the first that differ.
-std::vector<Card> cardsOf(const std::vector<TraitVerdict>& verdicts, const std::vector<MissingAt>& missing = {});
 Json toJson(const std::vector<TraitVerdict>& verdicts);
 
 }  // namespace toftwin::compare

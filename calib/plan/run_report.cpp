@@ -15,6 +15,7 @@
 #include "calib/compare/live_report.h"
 #include "calib/compare/trait_verdict.h"
 #include "calib/compare/traits/least_squares.h"
+#include "calib/compare/verdict_words.h"
 #include "calib/plan/run_figures.h"
 #include "calib/plan/run_traits.h"
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which of two cameras' numbers differ by more than what they are uncertain by.
 #include "calib/compare/trait_verdict.h"
+#include "calib/compare/verdict_words.h"
 
 #include <gmock/gmock.h>
 

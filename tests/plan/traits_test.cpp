@@ -12,6 +12,7 @@
 #include <random>
 
 #include "calib/compare/trait_verdict.h"
+#include "calib/compare/verdict_words.h"
 #include "calib/plan/seen_plate.h"
 #include "plans.h"
 
