@@ -14,7 +14,6 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
-#include "calib/compare/live_report.h"
 #include "calib/plan/captures.h"
 #include "calib/plan/opened.h"
 #include "calib/plan/run_log.h"

@@ -12,7 +12,7 @@
 
 #include <fmt/format.h>
 
-#include "calib/compare/live_report.h"
+#include "calib/compare/nearness.h"
 #include "calib/compare/trait_verdict.h"
 #include "calib/compare/traits/least_squares.h"
 #include "calib/compare/verdict_words.h"

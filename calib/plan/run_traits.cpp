@@ -12,7 +12,6 @@
 #include <fmt/format.h>
 
 #include "calib/compare/characteristics.h"
-#include "calib/compare/live_report.h"
 #include "calib/compare/statistics.h"
 #include "calib/compare/traits/clusters.h"
 #include "calib/plan/frame_traits.h"

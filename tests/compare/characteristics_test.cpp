@@ -11,7 +11,7 @@
 
 #include "calib/compare/drift.h"
 #include "calib/compare/image_slopes.h"
-#include "calib/compare/live_report.h"
+#include "calib/compare/nearness.h"
 #include "calib/compare/statistics.h"
 
 namespace toftwin::compare {
