@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/compare/table_columns.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <string_view>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "calib/compare/column_units.h"
+#include "calib/compare/csv.h"
+#include "calib/compare/traits/repeats.h"
+
+namespace toftwin::compare {
+namespace {
+
+Error ofTable(const TableJob& job, const Error& error) {
+  return {error.code, fmt::format("{}: {}", job.file.string(), error.message)};
+}
+
+bool isOf(Quantity quantity, const char* column) {
+  const ColumnUnit* unit = unitOf(column);
+  return unit != nullptr && unit->quantity == quantity;
+}
+
+/// Of one of the columns, the rows in which all are finite: those that numbers are from.
+std::vector<double> ofFiniteRows(const std::vector<double>& column, const std::vector<std::vector<double>>& all) {
+  std::vector<double> kept;
+  for (std::size_t i = 0; i < column.size(); ++i) {
+    if (std::ranges::all_of(all, [i](const auto& c) { return std::isfinite(c[i]); })) kept.push_back(column[i]);
+  }
+  return kept;
+}
+
+/// Rows that no number is from.
+std::string noteOnRows(const std::vector<std::vector<double>>& columns) {
+  const std::size_t left_out = columns.front().size() - ofFiniteRows(columns.front(), columns).size();
+  if (left_out == 0) return {};
+  return fmt::format("{} of {} rows hold a value that is not finite, and are left out", left_out,
+                     columns.front().size());
+}
+
+/// Metres that are more likely to be millimetres.
+std::string noteOnSize(const char* column, const std::vector<double>& values) {
+  constexpr double kFarthest_m = 300.0;
+  double most_m = 0.0;
+  for (const double one : values) {
+    if (std::isfinite(one)) most_m = std::max(most_m, std::abs(one) * unitOf(column)->in_base);
+  }
+  if (!(most_m > kFarthest_m)) return {};
+  return fmt::format("{} goes up to {:.4g} m, which may be another unit", column, most_m);
+}
+
+/// The step that all differences of readings are multiples of, if there is one that many share; 0 where all
+/// are alike.
+std::optional<double> stepOf(std::vector<double> values) {
+  std::erase_if(values, [](double one) { return !std::isfinite(one); });
+  constexpr std::size_t kFewest = 12, kRowsPerValue = 3;
+  if (values.size() < kFewest) return std::nullopt;
+  std::ranges::sort(values);
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < values.size(); ++i) {
+    if (values[i] > values[i - 1]) steps.push_back(values[i] - values[i - 1]);
+  }
+  if (steps.empty()) return 0.0;
+  if (kRowsPerValue * (steps.size() + 1) > values.size()) return std::nullopt;
+  const double step = std::ranges::min(steps);
+  const bool is_step = std::ranges::all_of(steps, [step](double one) {
+    constexpr double kRounding = 1e-3;
+    return std::abs(one / step - std::round(one / step)) < kRounding;
+  });
+  return is_step ? std::optional{step} : std::nullopt;
+}
+
+std::string noteOnSteps(const char* column, const std::vector<double>& values) {
+  const auto step = stepOf(values);
+  if (!step) return {};
+  const ColumnUnit& unit = *unitOf(column);
+  if (*step == 0.0) {
+    return fmt::format(
+        "all {} readings of {} are alike: they are rounded to a step that does not show, and "
+        "intervals know nothing of it",
+        values.size(), column);
+  }
+  return fmt::format(
+      "{} is in steps of {:.3g} {}: a mean of these {} rows is not known better than to about {:.2g} "
+      "{} (step/√12n), or half a step where noise is below a third of one",
+      column, *step, unit.name, values.size(), *step / std::sqrt(12.0 * static_cast<double>(values.size())),
+      unit.name);
+}
+
+/// A camera writes 0 where it has no range. Ranges of 0 are taken as missing, and so are readings of 0 that
+/// are farther from all others than these are from each other.
+std::string takeZerosAsMissing(std::string_view column, std::vector<double>& values) {
+  const bool is_range = column.find("range") != std::string_view::npos;
+  if (!is_range && !column.starts_with("value")) return {};
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const double one : values)
+    if (std::isfinite(one) && one != 0.0) low = std::min(low, one), high = std::max(high, one);
+  const auto zeros = std::ranges::count(values, 0.0);
+  const bool are_far = high >= low && std::max(low, -high) > high - low;
+  if (zeros == 0 || (!is_range && !are_far)) return {};
+  std::ranges::replace(values, 0.0, std::numeric_limits<double>::quiet_NaN());
+  return fmt::format("{} of {} rows have a {} of 0, {}: they are taken as missing", zeros, values.size(),
+                     column, is_range ? "which is no range" : "far from all others");
+}
+
+constexpr const char* kSession = "session";
+
+/// Why these are no sessions; empty: they may be.
+std::string wrongWithSessions(const std::vector<double>& session, std::size_t count, std::size_t rows) {
+  constexpr std::size_t kMost = 50, kFewestRows = 3;
+  const auto bad = std::ranges::find_if_not(session, [](double one) { return std::isfinite(one); });
+  if (bad != session.end()) return fmt::format("is {} in row {}", *bad, bad - session.begin() + 1);
+  if (count > kMost || (count > 1 && kFewestRows * count > rows))
+    return fmt::format("has {} values in {} rows: it takes {} rows of each, and at most {}", count, rows, kFewestRows,
+                       kMost);
+  return {};
+}
+
+/// The column that says of which session a row is: of a kind that heeds it, and where there are several.
+Result<> addSessions(const std::filesystem::path& file, TableColumns& table) {
+  if (!hasColumn(file, kSession)) return {};
+  auto column = loadColumns(file, {kSession});
+  if (!column && !table.kind->shares_places) return {};
+  if (!column) return Error{column.error().code, column.error().message + "; sessions are numbered"};
+  const auto of_rows = ofFiniteRows(column->front(), table.values);
+  const std::size_t count = sharedPlacesOf(of_rows).count;
+  const std::string wrong = wrongWithSessions(column->front(), count, of_rows.size());
+  if (table.kind->shares_places && !wrong.empty()) {
+    return Error{Error::Code::Malformed,
+                 fmt::format("{}: column \"{}\" {}; if it does not number sessions, call it otherwise", file.string(),
+                             kSession, wrong)};
+  }
+  const bool is_heeded = table.kind->shares_places && count > 1;
+  table.notes.push_back(
+      is_heeded ? fmt::format("rows are of {} sessions, each of which may have an offset of its own: what it is in is the "
+                              "mean over sessions, and as uncertain as these differ",
+                              count)
+                : fmt::format("column \"{}\", of {} value{}, is not heeded", kSession, count, count == 1 ? "" : "s"));
+  if (is_heeded) table.session = std::move(column->front());
+  return {};
+}
+
+std::string noteOnPlaces(const TableColumns& table) {
+  if (!table.kind->shares_places) return {};
+  const SharedPlaces places = sharedPlacesOf(ofFiniteRows(table.values.front(), table.values));
+  if (!places.areShared()) return {};
+  return fmt::format(
+      "{} has {} values in {} rows: what is read at one of them may be off together, so intervals are by how "
+      "these {} "
+      "scatter",
+      table.kind->columns.front(), places.count, places.of.size(), places.count);
+}
+
+/// Readings are what characteristics are told from: values and errors.
+bool isReading(std::string_view column) { return column.starts_with("value") || column.starts_with("error"); }
+
+void addNote(TableColumns& table, std::string note) {
+  if (!note.empty()) table.notes.push_back(std::move(note));
+}
+
+void addNotes(TableColumns& table) {
+  const auto add = [&](std::string note) { addNote(table, std::move(note)); };
+  add(noteOnPlaces(table));
+  for (std::size_t i = 0; i < table.values.size(); ++i) {
+    const char* column = table.kind->columns[i];
+    if (!isOf(Quantity::Length, column)) continue;
+    add(noteOnSize(column, table.values[i]));
+    if (isReading(column)) add(noteOnSteps(column, table.values[i]));
+  }
+}
+
+}  // namespace
+
+const std::vector<TableKind>& tableKinds() {
+  static const std::vector<TableKind> kinds{
+      {"drift", "warm-up drift and its model", {"time_s", "value_mm"}},
+      {"harmonics",
+       "error over distance: waves per period, scale, residual",
+       {"distance_m", "error_mm"},
+       true,
+       true},
+      {"noise_law", "floor, shot noise and read noise", {"signal", "sigma_mm"}},
+      {"wraps", "share of errors of whole periods", {"error_m"}, true},
+      {"corner", "multipath's fall from the edge", {"distance_to_edge_m", "error_mm"}, false, true},
+      {"lens_scatter",
+       "share of a plate's light that veils what lies behind",
+       {"own_range_m", "plate_range_m", "plate_over_own", "error_mm"},
+       true},
+      {"flying_pixels", "flying pixels of scan lines", {"line", "range_m"}},
+      {"edge", "an edge's width and the lateral resolution", {"place_px", "value"}},
+      {"amplitude", "amplitude-related error", {"amplitude", "error_mm"}, false, true},
+      {"ambient", "ambient-related error and noise", {"ambient_klx", "error_mm", "sigma_mm"}, false, true},
+      {"motion", "motion artefact", {"speed_m_per_s", "error_mm"}, false, true},
+      {"lag", "what frames after a change of light still have of it", {"frames_after", "value"}},
+      {"frame_timing", "interval, jitter, lost frames", {"start_s"}}};
+  return kinds;
+}
+
+const TableKind* findTableKind(const std::string& name) {
+  const auto found = std::ranges::find(tableKinds(), name, &TableKind::name);
+  return found == tableKinds().end() ? nullptr : &*found;
+}
+
+Result<TableColumns> loadTable(const TableJob& job) {
+  TableColumns table{.kind = findTableKind(job.kind)};
+  if (table.kind == nullptr)
+    return Error{Error::Code::InvalidArgument, fmt::format("there is no kind of table \"{}\"", job.kind)};
+  const auto& wanted = table.kind->columns;
+  if (table.kind->needs_frequency && job.frequency_hz.empty()) {
+    return Error{Error::Code::InvalidArgument,
+                 fmt::format("{} takes the modulation frequencies: --frequency-mhz", job.kind)};
+  }
+  std::vector<std::string> names = job.columns;
+  if (names.empty()) names.assign(wanted.begin(), wanted.end());
+  if (names.size() != wanted.size()) {
+    return Error{Error::Code::InvalidArgument,
+                 fmt::format("{} takes {} columns ({}), not {}", job.kind, wanted.size(),
+                             fmt::join(wanted, ", "), names.size())};
+  }
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const ColumnName name = columnNameOf(names[i]);
+    const auto factor = factorOf(name, wanted[i]);
+    if (!factor) return ofTable(job, factor.error());
+    auto column = loadColumns(job.file, {name.in_file});
+    if (!column) return column.error();
+    if (!*factor) {
+      table.notes.push_back(fmt::format("column \"{}\" says no unit and is taken as {}", name.in_file,
+                                        unitOf(wanted[i])->name));
+    }
+    for (double& one : column->front()) one *= (name.is_negated ? -1.0 : 1.0) * factor->value_or(1.0);
+    table.values.push_back(std::move(column->front()));
+  }
+  addNote(table, noteOnRows(table.values));  // of the file, before zeros are none
+  for (std::size_t i = 0; i < wanted.size(); ++i)
+    if (isOf(Quantity::Length, wanted[i])) addNote(table, takeZerosAsMissing(wanted[i], table.values[i]));
+  if (auto added = addSessions(job.file, table); !added) return added.error();
+  addNotes(table);
+  return table;
+}
+
+}  // namespace toftwin::compare
