@@ -59,6 +59,17 @@ Captures capturesOf(const ComparedRun& run, std::string_view kind) {
   return chosen;
 }
 
+Captures allCapturesOf(const ComparedRun& run, std::string_view kind) {
+  Captures chosen;
+  for (const ComparedCapture& one : run.captures) {
+    if (one.record.kind == kind) chosen.push_back(&one);
+  }
+  for (const ComparedCapture& one : run.moving) {
+    if (one.record.kind == kind) chosen.push_back(&one);
+  }
+  return chosen;
+}
+
 namespace {
 
 std::vector<double> column(const Captures& captures,

@@ -28,6 +28,8 @@ inline constexpr std::array kCameras{"A", "B"};
 using Captures = std::vector<const ComparedCapture*>;
 /// Those of blocks of a kind, or of all, of which both cameras see a pixel.
 Captures capturesOf(const ComparedRun& run, std::string_view kind);
+/// Those of blocks of a kind, whatever is seen, also of a plate that moves.
+Captures allCapturesOf(const ComparedRun& run, std::string_view kind);
 
 /// Of the blocks of each kind that can tell it: drift (warm_up), harmonics (distance), error over amplitude
 /// (exposure), error and noise over ambient light (ambient); of all captures the noise's law and the masks.
