@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <fstream>
 #include <string>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -39,36 +40,44 @@ Error malformed(const std::filesystem::path& file, std::size_t line, std::string
   return {Error::Code::Malformed, fmt::format("{}:{}: {}", file.string(), line, what)};
 }
 
-}  // namespace
+/// A file whose first line is read, and what follows is not.
+struct HeadedFile {
+  std::ifstream rest{};
+  std::string header{};
+};
 
-Result<std::vector<std::vector<double>>> loadColumns(
-    const std::filesystem::path& file, std::initializer_list<std::string_view> columns) {
-  std::ifstream in{file};
-  std::string line;
-  if (!in || !std::getline(in, line)) {
+Result<HeadedFile> openHeaded(const std::filesystem::path& file) {
+  HeadedFile opened{.rest = std::ifstream{file}};
+  if (!opened.rest || !std::getline(opened.rest, opened.header)) {
     return Error{Error::Code::NotFound,
                  fmt::format("{}: cannot be read or is empty", file.string())};
   }
-  dropByteOrderMark(line);
+  dropByteOrderMark(opened.header);
+  return opened;
+}
+
+Result<std::vector<std::vector<double>>> columnsOf(HeadedFile& opened, const std::filesystem::path& file,
+                                                   std::initializer_list<std::string_view> columns) {
   std::vector<std::size_t> places;
-  const auto header = split(line);
+  const auto header = split(opened.header);
   for (const std::string_view column : columns) {
     const auto at = std::find(header.begin(), header.end(), column);
-    if (at == header.end() && header.size() == 1 && line.find_first_of(";\t") != std::string::npos) {
+    if (at == header.end() && header.size() == 1 && opened.header.find_first_of(";\t") != std::string::npos) {
       return malformed(file, 1,
                        fmt::format("its fields are separated by {}: it takes commas between them, and points in "
                                    "numbers",
-                                   line.find(';') == std::string::npos ? "tabs" : "semicolons"));
+                                   opened.header.find(';') == std::string::npos ? "tabs" : "semicolons"));
     }
     if (at == header.end()) {
-      return malformed(file, 1, fmt::format("has no column \"{}\", only: {}", column, line));
+      return malformed(file, 1, fmt::format("has no column \"{}\", only: {}", column, opened.header));
     }
     if (std::find(at + 1, header.end(), column) != header.end())
       return malformed(file, 1, fmt::format("has two columns \"{}\"", column));
     places.push_back(static_cast<std::size_t>(at - header.begin()));
   }
   std::vector<std::vector<double>> result(columns.size());
-  for (std::size_t number = 2; std::getline(in, line); ++number) {
+  std::string line;
+  for (std::size_t number = 2; std::getline(opened.rest, line); ++number) {
     if (line.empty() || line == "\r") continue;
     const auto fields = split(line);
     for (std::size_t i = 0; i < places.size(); ++i) {
@@ -84,12 +93,23 @@ Result<std::vector<std::vector<double>>> loadColumns(
   return result;
 }
 
-bool hasColumn(const std::filesystem::path& file, std::string_view column) {
-  std::ifstream in{file};
-  std::string line;
-  if (!in || !std::getline(in, line)) return false;
-  dropByteOrderMark(line);
-  return std::ranges::count(split(line), column) > 0;
+}  // namespace
+
+Result<std::vector<std::vector<double>>> loadColumns(
+    const std::filesystem::path& file, std::initializer_list<std::string_view> columns) {
+  auto opened = openHeaded(file);
+  if (!opened) return opened.error();
+  return columnsOf(*opened, file, columns);
+}
+
+Result<std::optional<std::vector<double>>> loadColumnIfAny(const std::filesystem::path& file,
+                                                           std::string_view column) {
+  auto opened = openHeaded(file);
+  if (!opened) return opened.error();
+  if (std::ranges::count(split(opened->header), column) == 0) return std::optional<std::vector<double>>{};
+  auto columns = columnsOf(*opened, file, {column});
+  if (!columns) return columns.error();
+  return std::optional{std::move(columns->front())};
 }
 
 std::optional<std::filesystem::path> findThesisData(const std::filesystem::path& given) {

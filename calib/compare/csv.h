@@ -17,8 +17,9 @@ namespace toftwin::compare {
 Result<std::vector<std::vector<double>>> loadColumns(const std::filesystem::path& file,
                                                      std::initializer_list<std::string_view> columns);
 
-/// Whether its header has that column; not where there is no file.
-bool hasColumn(const std::filesystem::path& file, std::string_view column);
+/// One of them, with the same errors; nothing where the header lacks it.
+Result<std::optional<std::vector<double>>> loadColumnIfAny(const std::filesystem::path& file,
+                                                           std::string_view column);
 
 /// The folder `tof-thesis-2018` of real measurements: in (or as) `given` if that is not empty, else
 /// in $TOFTWIN_DATA, else in `../shared/data` of the repository that holds the working folder or

@@ -123,13 +123,14 @@ std::string wrongWithSessions(const std::vector<double>& session, std::size_t co
 
 /// The column that says of which session a row is: of a kind that heeds it, and where there are several.
 Result<> addSessions(const std::filesystem::path& file, TableColumns& table) {
-  if (!hasColumn(file, kSession)) return {};
-  auto column = loadColumns(file, {kSession});
-  if (!column && !table.kind->shares_places) return {};
-  if (!column) return Error{column.error().code, column.error().message + "; sessions are numbered"};
-  const auto of_rows = ofFiniteRows(column->front(), table.values);
+  auto loaded = loadColumnIfAny(file, kSession);
+  if (!loaded && !table.kind->shares_places) return {};
+  if (!loaded) return Error{loaded.error().code, loaded.error().message + "; sessions are numbered"};
+  if (!*loaded) return {};
+  std::vector<double>& column = **loaded;
+  const auto of_rows = ofFiniteRows(column, table.values);
   const std::size_t count = sharedPlacesOf(of_rows).count;
-  const std::string wrong = wrongWithSessions(column->front(), count, of_rows.size());
+  const std::string wrong = wrongWithSessions(column, count, of_rows.size());
   if (table.kind->shares_places && !wrong.empty()) {
     return Error{Error::Code::Malformed,
                  fmt::format("{}: column \"{}\" {}; if it does not number sessions, call it otherwise", file.string(),
@@ -141,7 +142,7 @@ Result<> addSessions(const std::filesystem::path& file, TableColumns& table) {
                               "mean over sessions, and as uncertain as these differ",
                               count)
                 : fmt::format("column \"{}\", of {} value{}, is not heeded", kSession, count, count == 1 ? "" : "s"));
-  if (is_heeded) table.session = std::move(column->front());
+  if (is_heeded) table.session = std::move(column);
   return {};
 }
 

@@ -137,6 +137,16 @@ TEST_F(Csv, NamesFileLineAndColumnOfEveryMistake) {
   EXPECT_NE(message("").find("empty"), std::string::npos);
 }
 
+TEST_F(Csv, GivesAColumnThatAFileNeedNotHave) {
+  const auto there = loadColumnIfAny(write("a,b\n1,2\n4,5\n"), "b"), lacking = loadColumnIfAny(write("a\n1\n"), "b");
+  ASSERT_TRUE(there.ok() && lacking.ok());
+  EXPECT_EQ(*there, (std::vector<double>{2, 5}));
+  EXPECT_FALSE(lacking->has_value());
+  const auto words = loadColumnIfAny(write("a,b\n1,two\n"), "b");
+  ASSERT_FALSE(words.ok());
+  EXPECT_NE(words.error().message.find(":2: \"two\" is not a number"), std::string::npos);
+}
+
 TEST_F(Csv, AMissingFileIsNamed) {
   const auto columns = loadColumns("/nonexistent/line.csv", {"x_mm"});
   ASSERT_FALSE(columns.ok());
