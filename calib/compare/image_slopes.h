@@ -10,8 +10,8 @@
 
 namespace toftwin::compare {
 
-/// Slopes of a plane through B − A [mm from the left edge of the image to the right one, and from the top to the bottom]:
-/// least squares, all pixels compared alike. None where they span less than half of the image either way.
+/// Slopes of a plane through B − A [mm from the left edge of the image to the right one, and from the top to the
+/// bottom]: least squares, all pixels compared alike. None where they span less than half of the image either way.
 std::optional<std::array<double, 2>> imageSlopes_mm(const PoseComparison& images);
 
 /// The same as a mean over poses.

@@ -160,7 +160,11 @@ Result<> addCamera(const RealDataJob& job, const RealCamera& camera, Finding& fi
   };
   const Bounded numbers[] = {{0.6, 0.0, 3.0}, {0.5, 0.0, 4.0}};
   const CurveFit fit = fitCurve(
-      y, numbers, [&](std::span<const double> x) { return depths(withEffect(preset, sim::Defocus{.radius = x[1], .sigma = x[0]})); }, blocks);
+      y, numbers,
+      [&](std::span<const double> x) {
+        return depths(withEffect(preset, sim::Defocus{.radius = x[1], .sigma = x[0]}));
+      },
+      blocks);
   const std::vector<double> sharp = depths(preset);
   std::vector<double> ideal;
   for (const double n : offset) ideal.push_back(n > 0.0 ? measured->step_mm : 0.0);

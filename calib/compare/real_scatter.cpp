@@ -143,7 +143,9 @@ Result<> addCamera(const RealDataJob& job, const ScatterCamera& camera, Finding&
   const std::vector<double> as_is = changes(preset);
   for (std::size_t i = 0; i < as_is.size(); ++i)
     if (std::isnan(as_is[i])) blocks[i] = -1;  // the simulated camera sees nothing there
-  const auto predict = [&](std::span<const double> x) { return changes(withEffect(preset, sim::LensScatter{.veil = x[0], .halo = 0.0})); };
+  const auto predict = [&](std::span<const double> x) {
+    return changes(withEffect(preset, sim::LensScatter{.veil = x[0], .halo = 0.0}));
+  };
   const Bounded veil[] = {{0.01, 0.0, 1.0}};
   const CurveFit fit = fitCurve(change, veil, predict, blocks);
   std::vector<double> judged, left_as_is;

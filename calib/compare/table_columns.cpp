@@ -138,10 +138,13 @@ Result<> addSessions(const std::filesystem::path& file, TableColumns& table) {
   }
   const bool is_heeded = table.kind->shares_places && count > 1;
   table.notes.push_back(
-      is_heeded ? fmt::format("rows are of {} sessions, each of which may have an offset of its own: what it is in is the "
-                              "mean over sessions, and as uncertain as these differ",
-                              count)
-                : fmt::format("column \"{}\", of {} value{}, is not heeded", kSession, count, count == 1 ? "" : "s"));
+      is_heeded
+          ? fmt::format(
+                "rows are of {} sessions, each of which may have an offset of its own: what it is in is the "
+                "mean over sessions, and as uncertain as these differ",
+                count)
+          : fmt::format("column \"{}\", of {} value{}, is not heeded", kSession, count,
+                        count == 1 ? "" : "s"));
   if (is_heeded) table.session = std::move(column);
   return {};
 }

@@ -146,7 +146,8 @@ std::string missingInWords(const std::vector<MissingAt>& missing) {
   if (missing.empty()) return "";
   const MissingAt& worst = missing.front();
   const std::string times = worst.captures == 1 ? "its only capture" : fmt::format("all {} captures", worst.captures);
-  const std::string more = missing.size() == 1 ? "" : fmt::format(", and over 5 % at {} more conditions", missing.size() - 1);
+  const std::string more =
+      missing.size() == 1 ? "" : fmt::format(", and over 5 % at {} more conditions", missing.size() - 1);
   return fmt::format("At \"{}\" {} gives no range at {} % of the pixels that are seen there, at which {} has one "
                      "in {}{}. ",
                      worst.at, worst.of, number(100.0 * worst.share), worst.of == "A" ? "B" : "A", times, more);
@@ -171,7 +172,8 @@ std::pair<TableBlock, TableBlock> verdictTables(const std::vector<TraitVerdict>&
   const auto differs = [](const TraitVerdict& one) { return one.isTold() && one.differs(); };
   const auto first_same = std::ranges::find_if_not(all, differs);  // those that differ come first
   auto differ = verdictTable({all.begin(), first_same}), rest = verdictTable({first_same, all.end()});
-  if (!differ.rows.empty()) rest.caption = "The other numbers: B is the same as A within the noise floor, or it is not told";
+  if (!differ.rows.empty())
+    rest.caption = "The other numbers: B is the same as A within the noise floor, or it is not told";
   return {std::move(differ), std::move(rest)};
 }
 

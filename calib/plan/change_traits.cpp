@@ -82,8 +82,9 @@ void addMotion(const ComparedRun& run, std::size_t camera, TraitCollector& all) 
   }
   if (captures.empty()) return;
   if (speed.empty()) {
-    all.untold(fmt::format("motion of {}: in none of {} captures do two frames with a time of their own show the plate whole",
-                           kCameras[camera], captures.size()));
+    all.untold(fmt::format(
+        "motion of {}: in none of {} captures do two frames with a time of their own show the plate whole",
+        kCameras[camera], captures.size()));
     return;
   }
   all.add("motion, right end − left end", kCameras[camera], compare::motionTraits(speed, turn));

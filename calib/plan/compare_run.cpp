@@ -187,7 +187,8 @@ std::vector<std::string> warningsOf(const RunFiles& files, const std::map<std::s
   }
   warnings.insert(warnings.end(), notes.begin(), notes.end());
   const auto moving = std::ranges::count_if(index, [](const auto& one) { return !standsStill(one.second); });
-  if (moving > 0) warnings.push_back(fmt::format("{} captures of a moving plate are not compared pixel by pixel.", moving));
+  if (moving > 0)
+    warnings.push_back(fmt::format("{} captures of a moving plate are not compared pixel by pixel.", moving));
   return warnings;
 }
 

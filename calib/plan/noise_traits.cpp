@@ -111,7 +111,8 @@ std::span<const double> frequenciesOfNoise(const ComparedRun& run, std::size_t c
 void nameAsPattern(std::vector<compare::Trait>& traits) {
   for (compare::Trait& one : traits) {
     const auto part = std::ranges::find(compare::kLawParts, std::string_view{one.name});
-    if (part != compare::kLawParts.end()) one.name = compare::kPatternParts[static_cast<std::size_t>(part - compare::kLawParts.begin())];
+    if (part != compare::kLawParts.end())
+      one.name = compare::kPatternParts[static_cast<std::size_t>(part - compare::kLawParts.begin())];
   }
 }
 

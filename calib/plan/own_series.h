@@ -16,7 +16,8 @@ struct OwnSeries {
   std::vector<const ComparedCapture*> captures{};
   std::vector<double> range_mm{};  ///< mean, less that of the first capture
   std::vector<double> noise_mm{};  ///< temporal, median; NaN of a single frame
-  std::vector<const ComparedCapture*> left_out{};  ///< captures with less than half of the pixels of the one that has most
+  /// captures with less than half of the pixels of the one that has most
+  std::vector<const ComparedCapture*> left_out{};
   std::size_t pixels = 0;
 };
 

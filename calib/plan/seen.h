@@ -58,8 +58,8 @@ struct ReadFrame {
 /// Whether so much of the wall is a period or more farther than the camera can tell that the rest of it,
 /// which noise made too near, does not stand for the camera's errors.
 bool isWrapped(const CameraSeen& seen);
-/// Whether the pose was fitted to A's own ranges of the plan's planes: a wall's errors along its normal are in the pose then,
-/// and what is left of them says nothing of the camera.
+/// Whether the pose was fitted to A's own ranges of the plan's planes: a wall's errors along its normal are in the
+/// pose then, and what is left of them says nothing of the camera.
 bool isPoseFromPlanes(const CaptureRecord& record);
 /// Where the pose was seen, as of a board: the condition, in all of whose captures it errs alike, by where the corners
 /// fall among the pixels. None where each capture has an error of its own.

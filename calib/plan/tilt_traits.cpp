@@ -34,8 +34,9 @@ void addTilt(const ComparedRun& run, compare::TraitCollector& all) {
   if (is_seen)
     return all.untold(fmt::format("{}: poses were seen, and captures of a condition share their turn", kTilt));
   if (conditions.size() < kFewestConditions) {
-    return all.untold(fmt::format("{}: {} conditions of kind distance show over half of the image both ways, and it takes {}",
-                                  kTilt, conditions.size(), kFewestConditions));
+    return all.untold(fmt::format(
+        "{}: {} conditions of kind distance show over half of the image both ways, and it takes {}", kTilt,
+        conditions.size(), kFewestConditions));
   }
   std::vector<compare::Trait> traits;
   for (std::size_t way = 0; way < kWays.size(); ++way) {

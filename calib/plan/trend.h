@@ -27,8 +27,9 @@ struct TrendSeries {
   std::vector<TrendRow> rows{};
 };
 
-/// Series of what a log's traits() gave, with a row for each of its runs() of the same cameras and plan, whether it tells
-/// the number or not. Changes are compare::differenceOf(), widened for those that are judged, of all series together.
+/// Series of what a log's traits() gave, with a row for each of its runs() of the same cameras and plan, whether it
+/// tells the number or not. Changes are compare::differenceOf(), widened for those that are judged, of all series
+/// together.
 std::vector<TrendSeries> trendsOf(const std::vector<LoggedTrait>& traits, const std::vector<LoggedRun>& runs = {});
 
 }  // namespace toftwin::plan

@@ -7,10 +7,10 @@ namespace toftwin::cli {
 
 std::span<const Command> commands() {
   static const std::array kCommands{
-      listCommand(),      infoCommand(), grabCommand(),    recordCommand(),     replayCommand(),
-      poseCommand(),      rigCommand(),  setCommand(),     triggerCommand(),    renderCommand(),
-      calibrateCommand(), planCommand(), measureCommand(), compareCommand(),    discoverCommand(), suitCommand(), logCommand(), trendCommand(), locateCommand(),
-      usbCommand(),
+      listCommand(),      infoCommand(),       grabCommand(),       recordCommand(),  replayCommand(),
+      poseCommand(),      rigCommand(),        setCommand(),        triggerCommand(), renderCommand(),
+      calibrateCommand(), planCommand(),       measureCommand(),    compareCommand(), discoverCommand(),
+      suitCommand(),      logCommand(),        trendCommand(),      locateCommand(),  usbCommand(),
       doctorCommand(),    complianceCommand(), completionCommand(),
   };
   return kCommands;

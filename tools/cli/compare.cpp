@@ -303,10 +303,12 @@ Run add(Arguments& args) {
       return Error{Error::Code::InvalidArgument, "--rig is for two sources and --poses"};
     }
     if (options->sources.size() != 1) return {};
-    return Error{Error::Code::InvalidArgument,
-                 fmt::format("name two sources, A and B, the folder of a run, or none to judge the simulator only; there is "
-                             "no folder {}",
-                             options->sources[0])};
+    return Error{
+        Error::Code::InvalidArgument,
+        fmt::format(
+            "name two sources, A and B, the folder of a run, or none to judge the simulator only; there is "
+            "no folder {}",
+            options->sources[0])};
   });
   return [options] { return compareThem(*options); };
 }

@@ -34,7 +34,8 @@ std::vector<std::string> librariesOfCameras() {
     constexpr std::array<std::string_view, 4> kOfCameras{"libaravis", "libOpenNI2", "libusb-1.0", "libmodbus"};
     std::error_code none;
     const std::string name = std::filesystem::weakly_canonical(path, none).filename().string();
-    if (std::ranges::any_of(kOfCameras, [&](std::string_view of) { return name.starts_with(of); })) names.push_back(name);
+    if (std::ranges::any_of(kOfCameras, [&](std::string_view of) { return name.starts_with(of); }))
+      names.push_back(name);
   }
   return names;
 }

@@ -85,7 +85,8 @@ Result<> CampaignOptions::check(const std::string& data) const {
 }
 
 bool CampaignOptions::isGiven() const {
-  return !model.empty() || !poses.empty() || !scene.empty() || !scenes_of.empty() || is_b || keep_locked || !without.empty();
+  return !model.empty() || !poses.empty() || !scene.empty() || !scenes_of.empty() || is_b || keep_locked ||
+         !without.empty();
 }
 
 Result<Exit> discoverRun(const std::string& run, const std::string& output, const CampaignOptions& options) {

@@ -168,10 +168,11 @@ std::vector<Finding> checkDaemon(const DaemonOptions& daemon) {
     return {{State::Bad, "daemon", health.error().message,
              "journalctl -u toftwind says more; sudo systemctl restart toftwind"}};
   }
-  std::vector<Finding> findings{{State::Good, "daemon",
-                                 fmt::format("{}, up for {:.0f} s, {} client{}", health->software,
-                                             health->uptime.in(second), health->sessions, health->sessions == 1 ? "" : "s"),
-                                 ""}};
+  std::vector<Finding> findings{
+      {State::Good, "daemon",
+       fmt::format("{}, up for {:.0f} s, {} client{}", health->software, health->uptime.in(second),
+                   health->sessions, health->sessions == 1 ? "" : "s"),
+       ""}};
   if (health->sources.empty()) {
     findings.push_back({State::Warning, "sources", "the daemon has none",
                         "add a [[source]] to its configuration"});

@@ -180,7 +180,8 @@ std::vector<Finding> checkEthernet(const fs::path& root) {
   for (const std::string& name : namesIn(folder)) {
     // Of a card, with a cable in; what is no card has no device.
     if (!isThere(folder / name / "device") || lineOf(folder / name / "operstate") != "up") continue;
-    const long mbit_s = numberIn(folder / name / "speed").value_or(0), packet = numberIn(folder / name / "mtu").value_or(0);
+    const long mbit_s = numberIn(folder / name / "speed").value_or(0),
+               packet = numberIn(folder / name / "mtu").value_or(0);
     if (mbit_s <= 0 || packet <= 0) continue;  // a radio does not say
     const std::string found = fmt::format("{}: {} Mbit/s, packets of {} bytes", name, mbit_s, packet);
     if (mbit_s >= kFastEthernet_mbit_s && mbit_s < kGigabit_mbit_s) {
@@ -193,11 +194,12 @@ std::vector<Finding> checkEthernet(const fs::path& root) {
                        "sudo ethtool -s {} autoneg on",
                        name)});
     } else if (packet < kJumboPacket) {
-      findings.push_back({State::Good, "ethernet",
-                          fmt::format("{}; larger ones (sudo ip link set {} mtu {}, and a switch that passes them) spare "
-                                      "processor time",
-                                      found, name, kJumboPacket),
-                          ""});
+      findings.push_back(
+          {State::Good, "ethernet",
+           fmt::format("{}; larger ones (sudo ip link set {} mtu {}, and a switch that passes them) spare "
+                       "processor time",
+                       found, name, kJumboPacket),
+           ""});
     } else {
       findings.push_back({State::Good, "ethernet", found, ""});
     }
@@ -257,9 +259,9 @@ Finding checkFirewall(const fs::path& root) {
   }
   if (isThere(root / "etc/systemd/system/sysinit.target.wants/nftables.service")) {
     return warn("nftables",
-                "sudo nft insert rule inet filter input iifname INTERFACE accept (the camera's; the table and chain of "
-                "Debian's file, else those that sudo nft list chains shows); for good: the rule iifname INTERFACE accept "
-                "in that chain of /etc/nftables.conf");
+                "sudo nft insert rule inet filter input iifname INTERFACE accept (the camera's; the table "
+                "and chain of Debian's file, else those that sudo nft list chains shows); for good: the rule "
+                "iifname INTERFACE accept in that chain of /etc/nftables.conf");
   }
   return {State::Good, "firewall", "neither ufw nor firewalld nor nftables is enabled", ""};
 }

@@ -117,7 +117,12 @@ Result<Exit> recordHere(const Options& options) {
     return Error{is_place ? Code::StorageFull : code, writer.error().message};
   }
   catchInterrupts();
-  Recording recording{.mutex = {}, .writer = std::move(writer).value(), .dropped = 0, .lost = 0, .lost_because = {}, .error = {}};
+  Recording recording{.mutex = {},
+                      .writer = std::move(writer).value(),
+                      .dropped = 0,
+                      .lost = 0,
+                      .lost_because = {},
+                      .error = {}};
   const auto recorded = recordAll(options, *client, recording);
   const auto closed = recording.writer.close();
   const std::uint64_t unwritten = recording.writer.lost();

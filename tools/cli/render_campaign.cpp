@@ -155,7 +155,8 @@ Result<Job> jobOf(const RenderOptions& options) {
   if (!model) return model.error();
   if (options.settings.keys.light_noise > Length{} && !model->hasPhasors()) {
     return Error{Error::Code::InvalidArgument,
-                 fmt::format("--light-noise-mm cannot be had of a pulsed camera, as {} is: leave it out", model->model())};
+                 fmt::format("--light-noise-mm cannot be had of a pulsed camera, as {} is: leave it out",
+                             model->model())};
   }
   auto scene = loadScene(options.scene);
   if (!scene) return scene.error();

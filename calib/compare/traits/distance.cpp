@@ -68,12 +68,14 @@ void doubtLine(std::span<const int> orders, Column distance_m, std::span<const d
   constexpr double kOfInterval = 0.9;  // 3.5 standard errors: 0.2 % of waves that are not there seem so large
   double largest_mm = 0.0;
   for (std::size_t w = 0; w < waves.size(); ++w) {
-    if (traits[w].value > kOfInterval * (traits[w].high - traits[w].low)) largest_mm = std::max(largest_mm, traits[w].value);
+    if (traits[w].value > kOfInterval * (traits[w].high - traits[w].low))
+      largest_mm = std::max(largest_mm, traits[w].value);
   }
   const auto doubt = [&](Trait& one, const ShownInLine& line) {
     if (!(line.most * largest_mm > 0.5 * (one.high - one.low)) || !one.doubt.empty()) return;
-    one.doubt = fmt::format("a wave of {} is not told, and one of {:.2g} mm, as another is, would change it by {:.2g} {}",
-                            line.wave, largest_mm, line.most * largest_mm, one.unit);
+    one.doubt = fmt::format(
+        "a wave of {} is not told, and one of {:.2g} mm, as another is, would change it by {:.2g} {}",
+        line.wave, largest_mm, line.most * largest_mm, one.unit);
   };
   doubt(traits[waves.size()], shown.offset), doubt(traits[waves.size() + 1], shown.scale);
 }

@@ -100,10 +100,10 @@ struct Mixed {
   double evidence = 0.0;  ///< logarithm of the likelihood's mean over ρ
 };
 
-/// How likely each ρ is: beforehand a half for 0, and a half for all others, ¾ (1 − ρ²) each, of which those below 0 are
-/// taken for 0: that neighbours err oppositely makes no number surer. Without the one, few independent rows would have the
-/// intervals of rows that may be a walk; without the other factor, ρ near 1 would be likely by no row, as the restricted
-/// likelihood of a constant rises there without end.
+/// How likely each ρ is: beforehand a half for 0, and a half for all others, ¾ (1 − ρ²) each, of which those below 0
+/// are taken for 0: that neighbours err oppositely makes no number surer. Without the one, few independent rows would
+/// have the intervals of rows that may be a walk; without the other factor, ρ near 1 would be likely by no row, as
+/// the restricted likelihood of a constant rises there without end.
 std::vector<double> weightsOf(const std::vector<double>& rho, const std::vector<double>& log_likelihood) {
   const double step = rho[2] - rho[1], most = std::ranges::max(log_likelihood);
   std::vector<double> weights;

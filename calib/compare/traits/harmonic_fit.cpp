@@ -244,7 +244,10 @@ Result<FittedTraits> fitClusters(Column distance_m, Column error_mm, const std::
   for (auto& column : offsetColumns(rows->session)) columns.push_back(std::move(column));
   auto fit = fitInClusters(columns, rows->error_mm, rows->cluster, rows->errors);
   if (!fit)
-    return undetermined("harmonics", fmt::format("the distances span too little of a period, or are of few {} only", clusters.what).c_str());
+    return undetermined(
+        "harmonics",
+        fmt::format("the distances span too little of a period, or are of few {} only", clusters.what)
+            .c_str());
   leaveOutOffsets(*fit, without_offsets);
   if (clusters.what == kSharedPlaces) addWhatIsShared(*fit);
   FittedTraits fitted = fittedOf(*fit, fit->square_degrees, waves, d);

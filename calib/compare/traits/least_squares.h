@@ -22,7 +22,8 @@ struct Fit {
   double squares = 0.0;
   std::size_t n = 0;
   double degrees = 0.0;  ///< n − k, or fewer where rows err alike
-  double free = 0.0;     ///< n − k of all parameters, those too that are not among `at`: squares/free is a row's variance
+  /// n − k of all parameters, those too that are not among `at`: squares/free is a row's variance
+  double free = 0.0;
   /// −2 ln of the likelihood, but for a constant of the rows. Not that of REML: it is held against other models'.
   double deviance = 0.0;
   /// Schwarz's, but for the same constant.
@@ -72,8 +73,8 @@ double correlationOfResiduals(const Model& model, Column y, const Fit& fit);
 
 /// Student's quantile of a two-sided interval that holds with `level`: 97.5 % for 95 %.
 double studentT(double degrees, double level = 0.95);
-/// The root of a variance that is known to ± half: its interval in its logarithm (delta method), as it must be positive.
-/// Of one that came out below 0, from 0 on up to what it may be.
+/// The root of a variance that is known to ± half: its interval in its logarithm (delta method), as it must be
+/// positive. Of one that came out below 0, from 0 on up to what it may be.
 void tellRoot(Trait& trait, double variance, double half);
 /// Mean of independent values with its interval.
 Trait meanTrait(std::string name, std::string unit, Column values, double scale = 1.0);

@@ -21,13 +21,14 @@ namespace toftwin::compare {
 
 namespace {
 
-/// Where a fit begins: the line through e over e^(−x/L), each session about its own mean, and ln of L's share. Far from it
-/// a fit may end nowhere.
+/// Where a fit begins: the line through e over e^(−x/L), each session about its own mean, and ln of L's share. Far
+/// from it a fit may end nowhere.
 std::vector<double> startAt(double length_m, double share, const PlacedRows& corner) {
   const auto &x = corner.column(0), &e = corner.column(1);
   std::vector<double> fall;
   for (const double one : x) fall.push_back(std::exp(-one / length_m));
-  const auto of = corner.session().empty() ? std::vector<std::size_t>(x.size(), 0) : sharedPlacesOf(corner.session()).of;
+  const auto of =
+      corner.session().empty() ? std::vector<std::size_t>(x.size(), 0) : sharedPlacesOf(corner.session()).of;
   const auto mean_fall = clusterMeans(fall, of), mean_e = clusterMeans(e, of);
   double both = 0.0, square = 0.0;
   for (std::size_t i = 0; i < x.size(); ++i) {

@@ -141,9 +141,9 @@ std::vector<double> pseudoValues(std::span<const PixelBlock> blocks, double n, d
   return values;
 }
 
-/// Blocks say nothing of how uncertain a part of σ² is that all of them share: that is χ² of the frames, n (1 − ρ²)/(1 +
-/// ρ²) independent ones, and its sides are added in squares (R. K. Burdick, F. A. Graybill, Confidence Intervals on
-/// Variance Components, 1992).
+/// Blocks say nothing of how uncertain a part of σ² is that all of them share: that is χ² of the frames, n (1 −
+/// ρ²)/(1 + ρ²) independent ones, and its sides are added in squares (R. K. Burdick, F. A. Graybill, Confidence
+/// Intervals on Variance Components, 1992).
 void addWhatFramesShare(std::span<const PixelBlock> blocks, double n, Trait& variance) {
   const OfBlocks all{blocks, n};
   const double square = all.in_time * all.in_time, shared = all.shared,

@@ -75,8 +75,8 @@ double quartilesApart(double readings) {
   return 0.5 * std::log(boost::math::quantile(squares, 0.75) / boost::math::quantile(squares, 0.25));
 }
 
-/// By how much ln s of so many degrees of freedom is less than ln σ on the mean: ½ (ln ν/2 − ψ(ν/2)), ν that of which the
-/// quartiles are so far apart. Two readings scatter most.
+/// By how much ln s of so many degrees of freedom is less than ln σ on the mean: ½ (ln ν/2 − ψ(ν/2)), ν that of which
+/// the quartiles are so far apart. Two readings scatter most.
 double shortBy(double apart) {
   constexpr double kFewest = 1.0, kMost = 1e5;
   constexpr int kHalvings = 60;
@@ -89,9 +89,9 @@ double shortBy(double apart) {
   return 0.5 * (std::log(half) - boost::math::digamma(half));
 }
 
-/// How likely it is that rows are off as ln s of few readings is, which lie farther below than above, and not evenly about
-/// the law: by the likelihoods of ½ ln χ² and of a normal distribution, each with its best place and width, and as likely
-/// beforehand.
+/// How likely it is that rows are off as ln s of few readings is, which lie farther below than above, and not evenly
+/// about the law: by the likelihoods of ½ ln χ² and of a normal distribution, each with its best place and width, and
+/// as likely beforehand.
 double shareOfReadings(Column left) {
   const double n = static_cast<double>(left.size());
   const auto meanOf = [&](auto&& of) {
@@ -99,12 +99,14 @@ double shareOfReadings(Column left) {
     for (const double one : left) sum += of(one) / n;
     return sum;
   };
-  const double mean = meanOf([](double one) { return one; }), square = meanOf([](double one) { return std::exp(2.0 * one); }),
+  const double mean = meanOf([](double one) { return one; }),
+               square = meanOf([](double one) { return std::exp(2.0 * one); }),
                variance = meanOf([=](double one) { return (one - mean) * (one - mean); });
   // Its best σ² is the mean of s²: Σ (s/σ)² is n.
   const auto ofReadings = [=](double log_degrees) {
     const double half = 0.5 * std::exp(log_degrees);
-    return -n * (std::numbers::ln2 + half * std::log(half) - std::lgamma(half) + 2.0 * half * (mean - 0.5 * std::log(square)) - half);
+    return -n * (std::numbers::ln2 + half * std::log(half) - std::lgamma(half) +
+                 2.0 * half * (mean - 0.5 * std::log(square)) - half);
   };
   const double readings = ofReadings(minimum1d(ofReadings, 0.0, std::log(1e4))),
                evenly = 0.5 * n * (std::log(2.0 * std::numbers::pi * variance) + 1.0);
@@ -115,15 +117,18 @@ double shareOfReadings(Column left) {
 struct Short {
   double by = 0.0, variance = 0.0;
 };
-/// Of s of few readings, as far as rows look like that. By the quartiles of what they are off from the law, which a few odd
-/// rows do not move; of normal numbers their distance is known to 1.17/√n of itself.
+/// Of s of few readings, as far as rows look like that. By the quartiles of what they are off from the law, which a
+/// few odd rows do not move; of normal numbers their distance is known to 1.17/√n of itself.
 Short shortOfLogarithm(Column intensity, Column sigma, const Law& law) {
   std::vector<double> left;
   for (std::size_t i = 0; i < sigma.size(); ++i) left.push_back(std::log(sigma[i]) - law.logarithm(intensity[i]));
   const double n = static_cast<double>(sigma.size()), low = quantile(left, 0.25), high = quantile(left, 0.75),
-               apart = (high - low) * std::sqrt(n / std::max(1.0, law.fit.degrees)), known = std::exp(1.17 / std::sqrt(n));
+               apart = (high - low) * std::sqrt(n / std::max(1.0, law.fit.degrees)),
+               known = std::exp(1.17 / std::sqrt(n));
   constexpr double kFarOut = 3.0;  // J. W. Tukey, Exploratory Data Analysis, 1977
-  std::erase_if(left, [=](double one) { return one < low - kFarOut * (high - low) || one > high + kFarOut * (high - low); });
+  std::erase_if(left, [=](double one) {
+    return one < low - kFarOut * (high - low) || one > high + kFarOut * (high - low);
+  });
   if (!(high > low)) return {};
   const double by = shortBy(apart), by_quartiles = 0.5 * (shortBy(apart * known) - shortBy(apart / known)),
                share = shareOfReadings(left);

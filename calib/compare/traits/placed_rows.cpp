@@ -9,8 +9,8 @@
 namespace toftwin::compare {
 namespace {
 
-/// How many of the sessions' offsets take a degree of freedom from the places: none where each place has as many rows of
-/// each session, all where each session has places of its own.
+/// How many of the sessions' offsets take a degree of freedom from the places: none where each place has as many rows
+/// of each session, all where each session has places of its own.
 std::size_t offsetsOfPlaces(const SharedPlaces& places, Column session) {
   const auto rows = static_cast<Eigen::Index>(places.count);
   Eigen::MatrixXd means = Eigen::MatrixXd::Ones(rows, 1);

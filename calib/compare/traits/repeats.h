@@ -35,10 +35,11 @@ struct AtPlaces {
 AtPlaces meansAtPlaces(std::vector<std::vector<double>> columns, std::size_t parameters);
 /// Rows as they are.
 AtPlaces asTheyAre(std::vector<std::vector<double>> columns);
-/// fitInOrder() of means over x that have such an `own` σ, and are off by τ besides, of their place: the weight of each is
-/// 1/(τ² + own²), with the τ² at which Σ r²/(τ² + own²) of the residuals is n − k (R. C. Paule, J. Mandel, J. Res. Natl.
-/// Bur. Stand. 87 (1982) 377), and 0 where it is less without. How uncertain parameters are is by how means scatter about
-/// the fit (G. Knapp, J. Hartung, Stat. Med. 22 (2003) 2693), so that alike places are as fitInOrder() has them.
+/// fitInOrder() of means over x that have such an `own` σ, and are off by τ besides, of their place: the weight of
+/// each is 1/(τ² + own²), with the τ² at which Σ r²/(τ² + own²) of the residuals is n − k (R. C. Paule, J. Mandel, J.
+/// Res. Natl. Bur. Stand. 87 (1982) 377), and 0 where it is less without. How uncertain parameters are is by how
+/// means scatter about the fit (G. Knapp, J. Hartung, Stat. Med. 22 (2003) 2693), so that alike places are as
+/// fitInOrder() has them.
 std::optional<Fit> fitMeans(const Model& model, Column y, Column own, const std::vector<double>& start, Column x);
 /// So few places are too few to say how uncertain a number is that they tell.
 std::string doubtOfPlaces(std::size_t rows, std::size_t places);

@@ -71,7 +71,8 @@ std::optional<Index> stepOf(const MatrixXd& jacobian, const VectorXd& left, doub
   Index row = 0;
   const double most = gains.segment(kFewestOfSession, left.size() - 2 * kFewestOfSession + 1).maxCoeff(&row);
   row += kFewestOfSession;
-  if (!(saysOf(most, jacobian, left) > least) || !(saysWithoutItsOddest(row, jacobian, left) > least)) return std::nullopt;
+  if (!(saysOf(most, jacobian, left) > least) || !(saysWithoutItsOddest(row, jacobian, left) > least))
+    return std::nullopt;
   return row;
 }
 
@@ -88,7 +89,8 @@ double byTwoHeaps(const VectorXd& numbers) {
     // Logarithms: a number may be so far off that both densities are 0.
     const Eigen::ArrayXd of_low = std::log(1.0 - share) - (numbers.array() - low).square() / (2.0 * own),
                          of_high = std::log(share) - (numbers.array() - high).square() / (2.0 * own),
-                         most = of_low.max(of_high), both = most + ((of_low - most).exp() + (of_high - most).exp()).log(),
+                         most = of_low.max(of_high),
+                         both = most + ((of_low - most).exp() + (of_high - most).exp()).log(),
                          are_high = (of_high - both).exp();
     log_likelihood = both.sum() - 0.5 * n * std::log(own);
     share = are_high.mean();
@@ -103,12 +105,13 @@ double byTwoHeaps(const VectorXd& numbers) {
 
 /// Why rows, in the order in which they stand, may be of two sessions, each with an offset of its own: neighbours err
 /// oppositely, as where sessions take turns (3/√n); there is a step between two rows that says more (10 in BIC) than
-/// errors that go on from row to row, and not of one row alone; or what is left of the fit lies in two heaps, by as much. Empty: nothing says so, as
-/// where sessions are mixed and nearer to each other than some three σ of a row, or there are fewer than ten rows for each
-/// parameter.
+/// errors that go on from row to row, and not of one row alone; or what is left of the fit lies in two heaps, by as
+/// much. Empty: nothing says so, as where sessions are mixed and nearer to each other than some three σ of a row, or
+/// there are fewer than ten rows for each parameter.
 std::string doubtOfSessions(const MatrixXd& jacobian, const VectorXd& left) {
   constexpr double kOpposite = 3.0;
-  constexpr const char* kSessions = "rows may be of two sessions, each with an offset of its own that no interval knows of";
+  constexpr const char* kSessions =
+      "rows may be of two sessions, each with an offset of its own that no interval knows of";
   const Index rows = left.size();
   if (rows < kRowsPerParameter * jacobian.cols()) return {};
   const double n = static_cast<double>(rows), log_n = std::log(n), together = togetherOf(left);
@@ -142,12 +145,14 @@ Model besideSessions(const Model& model, const SharedPlaces& sessions, std::size
   return [&, k](std::span<const double> p, std::size_t i) {
     const auto offsets = p.subspan(k);
     const bool is_last = sessions.of[i] + 1 == sessions.count;
-    return model(p.first(k), i) + (is_last ? -std::accumulate(offsets.begin(), offsets.end(), 0.0) : offsets[sessions.of[i]]);
+    return model(p.first(k), i) +
+           (is_last ? -std::accumulate(offsets.begin(), offsets.end(), 0.0) : offsets[sessions.of[i]]);
   };
 }
 
 /// fitInClusters() of a model that may bend, by what it is straight where it ends.
-std::optional<Fit> fitAtPlaces(const Model& model, Column y, std::vector<double> start, std::span<const std::size_t> place) {
+std::optional<Fit> fitAtPlaces(const Model& model, Column y, std::vector<double> start,
+                               std::span<const std::size_t> place) {
   constexpr int kRounds = 30;
   constexpr double kNear = 1e-3;  // of a standard error
   const auto first = fitLeastSquares(model, y, std::move(start));
@@ -172,7 +177,8 @@ std::optional<Fit> fitAtPlaces(const Model& model, Column y, std::vector<double>
 
 }  // namespace
 
-Result<RowsOfSessions> finiteRowsOf(std::vector<Column> columns, Column session, std::size_t least, const char* of_what) {
+Result<RowsOfSessions> finiteRowsOf(std::vector<Column> columns, Column session, std::size_t least,
+                                    const char* of_what) {
   if (!session.empty()) columns.push_back(session);
   auto rows = finiteRows(columns, least, of_what);
   if (!rows) return rows.error();
@@ -231,7 +237,8 @@ std::optional<Fit> fitBesideSessions(const Model& model, Column y, std::vector<d
   const std::size_t k = start.size();
   start.resize(k + sessions.count - 1, 0.0);
   const Model beside = besideSessions(model, sessions, k);
-  auto fit = place.empty() ? fitInOrder(beside, y, std::move(start), x) : fitAtPlaces(beside, y, std::move(start), place);
+  auto fit = place.empty() ? fitInOrder(beside, y, std::move(start), x)
+                           : fitAtPlaces(beside, y, std::move(start), place);
   if (fit) leaveOutOffsets(*fit, k);
   return fit;
 }

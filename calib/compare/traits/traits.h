@@ -15,8 +15,8 @@
 
 /// Characteristics of a camera's errors from series, tables and frames, each with the interval that holds it
 /// with 95 %. docs/characteristics.md has the formulas, their sources, and how often the intervals held.
-/// A column `session`: rows of one value are of one session, with an offset of its own besides what is told; numbers with
-/// that offset in them are the mean over sessions, and as uncertain as these differ. Empty: of one.
+/// A column `session`: rows of one value are of one session, with an offset of its own besides what is told; numbers
+/// with that offset in them are the mean over sessions, and as uncertain as these differ. Empty: of one.
 /// Columns of one table are of equal length; rows with a value that is not finite are left out. Error
 /// InvalidArgument: too few rows, or rows that cannot tell it.
 namespace toftwin::compare {
@@ -94,8 +94,8 @@ struct DriftTraits {
 };
 /// "one exponential"; "none" of a constant.
 const char* nameOf(DriftModel model);
-/// value(t): constant; + s t; + Σ aᵢ e^(−t/τᵢ); + h (t > t₀), of one or two. Errors that go on from row to row widen the
-/// intervals.
+/// value(t): constant; + s t; + Σ aᵢ e^(−t/τᵢ); + h (t > t₀), of one or two. Errors that go on from row to row widen
+/// the intervals.
 Result<DriftTraits> driftTraits(Column time_s, Column value_mm);
 
 /// Rows in clusters that share an error, such as steps of one capture.
@@ -177,7 +177,8 @@ Traits veilTraits(Column own_range_m, Column plate_range_m, Column plate_over_ow
                   std::span<const double> frequency_hz, std::span<const std::size_t> cluster);
 
 /// Of steps in the rows of one image: "flying" share of the crossings with a pixel in between, "offset" where
-/// it hangs from near (0) to far (1), "near side" share of those nearer to the foreground; the last two where two fly or more.
+/// it hangs from near (0) to far (1), "near side" share of those nearer to the foreground; the last two where two fly
+/// or more.
 Traits flyingTraits(const Image<float>& range_m);
 
 /// y(x) = near + step Φ((x − x₀)/w): "edge" x₀, "width" w, "10-90 width", and "resolution": the spatial

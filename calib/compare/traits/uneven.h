@@ -18,10 +18,10 @@ std::vector<double> sigmasOver(Column left, Column x, std::size_t parameters);
 std::vector<double> over(Column values, Column sigmas);
 /// A model of rows that are over their σ.
 Model over(const Model& model, Column sigmas);
-/// The fit's errors by what each row leaves, whatever its σ, so that σ that go otherwise than a parabola are in them, too:
-/// r²/(1 − h), h what the row tells of itself, in the place of s², with Student's quantile of Satterthwaite's degrees of
-/// freedom for each parameter (R. M. Bell, D. F. McCaffrey, Surv. Methodol. 28 (2002) 169, of rows that are clusters of
-/// one).
+/// The fit's errors by what each row leaves, whatever its σ, so that σ that go otherwise than a parabola are in them,
+/// too: r²/(1 − h), h what the row tells of itself, in the place of s², with Student's quantile of Satterthwaite's
+/// degrees of freedom for each parameter (R. M. Bell, D. F. McCaffrey, Surv. Methodol. 28 (2002) 169, of rows that
+/// are clusters of one).
 void tellErrorsByRows(Fit& fit, const Model& model, Column y);
 
 }  // namespace toftwin::compare
