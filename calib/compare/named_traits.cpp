@@ -113,6 +113,9 @@ std::string clearestOf(const NamedTraits& traits) {
     if (const double far = std::abs(trait.value) / error; far > farthest) farthest = far, clearest = &one;
   }
   const std::size_t count = traits.traits.size();
+  const auto isInDoubt = [](const NamedTrait& one) { return !one.trait.doubt.empty(); };
+  if (std::ranges::all_of(traits.traits, isInDoubt))
+    return count == 1 ? "The one number told is in doubt" : fmt::format("All {} numbers told are in doubt", count);
   if (clearest == nullptr)
     return fmt::format("{} is certain to be other than 0",
                        count == 1 ? "The one number told" : fmt::format("None of {} numbers told", count));

@@ -120,12 +120,21 @@ std::size_t countOf(const std::vector<TraitVerdict>& all, bool differs) {
       std::ranges::count_if(all, [&](const auto& one) { return one.isTold() && one.differs() == differs; }));
 }
 
+/// Both cameras have it, and that of one of them is in doubt.
+bool isDoubted(const TraitVerdict& one) {
+  return one.a && one.b && !one.why_not.empty() && !(one.a->trait.doubt.empty() && one.b->trait.doubt.empty());
+}
+
 }  // namespace
 
 std::string headlineOf(const std::vector<TraitVerdict>& all) {
   const std::size_t differ = countOf(all, true), same = countOf(all, false);
   const std::string hidden = hiddenInWords(all);
-  if (differ + same == 0) return hidden + "No characteristic is known of both cameras";
+  if (differ + same == 0) {
+    const auto found = std::ranges::find_if(all, isDoubted);
+    return hidden + (found == all.end() ? "No characteristic is known of both cameras"
+                                        : fmt::format("No number of B is held against A's: {}", found->why_not));
+  }
   if (differ == 0) {
     return hidden +
            fmt::format("In none of {} numbers does B differ from A by more than the noise floor", same);
