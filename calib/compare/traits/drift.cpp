@@ -11,6 +11,7 @@
 #include "calib/compare/traits/decay_grid.h"
 #include "calib/compare/traits/least_squares.h"
 #include "calib/compare/traits/linearised.h"
+#include "calib/compare/traits/odd_rows.h"
 #include "calib/compare/traits/uneven.h"
 
 namespace toftwin::compare {
@@ -361,6 +362,8 @@ Result<DriftTraits> driftTraits(Column time_s, Column value_mm) {
     const Model plain = [&](Row p, std::size_t i) { return shape(p, t[i]); };
     doubtShape(betweenEnds(y, chosen->rho), betweenEnds(leftBy(plain, fit, y), chosen->rho), result.traits);
   }
+  if (std::string odd = doubtOfOddRows([&](Row p, std::size_t i) { return shape(p, t[i]); }, y, fit.at, t); !odd.empty())
+    for (Trait& one : result.traits) one.doubt = odd;
   return result;
 }
 

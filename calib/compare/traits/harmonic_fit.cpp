@@ -12,6 +12,7 @@
 
 #include "calib/compare/statistics.h"
 #include "calib/compare/traits/clusters.h"
+#include "calib/compare/traits/odd_rows.h"
 #include "calib/compare/traits/phasor.h"
 #include "calib/compare/traits/repeats.h"
 #include "calib/compare/traits/sessions.h"
@@ -215,6 +216,20 @@ void addWhatIsShared(ClusterFit& fit) {
   fit.squares = both * fit.free;
 }
 
+MatrixXd matrixOf(const std::vector<std::vector<double>>& columns) {
+  MatrixXd all(columns.front().size(), columns.size());
+  for (std::size_t k = 0; k < columns.size(); ++k)
+    all.col(static_cast<Eigen::Index>(k)) = Eigen::Map<const VectorXd>(columns[k].data(), all.rows());
+  return all;
+}
+
+VectorXd leftBy(const Fit& fit, const std::vector<std::vector<double>>& columns, const std::vector<double>& y) {
+  const auto mapped = [](const std::vector<double>& of) {
+    return Eigen::Map<const VectorXd>(of.data(), static_cast<Eigen::Index>(of.size()));
+  };
+  return mapped(y) - matrixOf(columns) * mapped(fit.at);
+}
+
 /// Rows in clusters that share an error.
 Result<FittedTraits> fitClusters(Column distance_m, Column error_mm, const std::vector<Wave>& waves,
                                  const RowClusters& clusters) {
@@ -248,10 +263,15 @@ Result<FittedTraits> fitClusters(Column distance_m, Column error_mm, const std::
         "harmonics",
         fmt::format("the distances span too little of a period, or are of few {} only", clusters.what)
             .c_str());
+  const bool are_places = clusters.what == kSharedPlaces;
+  const std::string odd =
+      are_places ? doubtOfOddRows(matrixOf(columns), leftBy(*fit, columns, rows->error_mm), d) : "";
   leaveOutOffsets(*fit, without_offsets);
-  if (clusters.what == kSharedPlaces) addWhatIsShared(*fit);
+  if (are_places) addWhatIsShared(*fit);
   FittedTraits fitted = fittedOf(*fit, fit->square_degrees, waves, d);
   doubtFewClusters(rows->clusters, *fit, clusters.what, fitted.traits);
+  for (Trait& one : fitted.traits)
+    if (!odd.empty()) one.doubt = odd;
   if (clusters.are_turned) {
     fitted.curve = {};  // it says nothing of the rows as they are
     fitted.traits.back().doubt = "the poses' turns and the board itself bend the rows of each capture, too";

@@ -12,6 +12,7 @@
 #include "calib/compare/statistics.h"
 #include "calib/compare/traits/clusters.h"
 #include "calib/compare/traits/linearised.h"
+#include "calib/compare/traits/odd_rows.h"
 #include "calib/compare/traits/repeats.h"
 #include "calib/compare/traits/uneven.h"
 #include "calib/linear/linear.h"
@@ -228,18 +229,24 @@ std::optional<Fit> startBesideSessions(const Model& model, Column y, std::vector
 std::optional<Fit> fitBesideSessions(const Model& model, Column y, std::vector<double> start, Column x, Column session,
                                      std::span<const std::size_t> place) {
   const SharedPlaces sessions = sharedPlacesOf(session);
+  // A row that is odd may look like much else, and is said before that.
+  const auto doubtOdd = [&](Fit& fit, const Model& of) {
+    if (std::string odd = doubtOfOddRows(of, y, fit.at, x); !odd.empty()) fit.doubt = std::move(odd);
+  };
   if (sessions.count < 2) {
     auto fit = fitInOrder(model, y, std::move(start), x);
     const bool is_exact = fit && fit->possible.empty();  // or rows are too few to say how they err
+    if (fit) doubtOdd(*fit, model);
     if (fit && fit->doubt.empty() && !is_exact) fit->doubt = doubtOf(*fit, model, y, x);
     return fit;
   }
   const std::size_t k = start.size();
   start.resize(k + sessions.count - 1, 0.0);
   const Model beside = besideSessions(model, sessions, k);
-  auto fit = place.empty() ? fitInOrder(beside, y, std::move(start), x)
-                           : fitAtPlaces(beside, y, std::move(start), place);
-  if (fit) leaveOutOffsets(*fit, k);
+  auto fit = place.empty() ? fitInOrder(beside, y, std::move(start), x) : fitAtPlaces(beside, y, std::move(start), place);
+  if (!fit) return fit;
+  doubtOdd(*fit, beside);
+  leaveOutOffsets(*fit, k);
   return fit;
 }
 

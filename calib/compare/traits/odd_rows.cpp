@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/compare/traits/odd_rows.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
+#include <vector>
+
+#include "calib/compare/traits/uneven.h"
+#include "calib/linear/linear.h"
+
+namespace toftwin::compare {
+namespace {
+
+using Eigen::Index;
+
+constexpr Index kFewestFree = 12;
+/// More of them are no slips, but how rows scatter.
+constexpr Index kMost = 5, kRowsForEach = 20;
+
+/// A row that was taken out, and what is left then.
+struct Odd {
+  Index row = 0;
+  double gain = 0.0;      ///< by how much Σ r² is less without it
+  double variance = 0.0;  ///< of the others
+  double chance = 0.0;    ///< so many of their standard deviations may be chance
+  bool is_beyond_chance = false;
+};
+
+/// Rows that were not taken out yet, as least squares leave them.
+class Others {
+ public:
+  Others(MatrixXd jacobian, VectorXd left) : jacobian_{std::move(jacobian)}, left_{std::move(left)} {
+    for (Index i = 0; i < left_.size(); ++i) rows_.push_back(i);
+  }
+
+  [[nodiscard]] Index free() const { return left_.size() - jacobian_.cols(); }
+  [[nodiscard]] double squares() {
+    left_ -= (jacobian_ * linear::leastSquares(jacobian_, left_)).eval();
+    return left_.squaredNorm();
+  }
+  /// The oddest one, which is taken out.
+  Odd takeOddest() {
+    const double all = squares(), free_of_others = static_cast<double>(free() - 1);
+    const MatrixXd basis = linear::basisOf(jacobian_);
+    double most = 0.0;
+    Index odd = 0;
+    for (Index i = 0; i < left_.size(); ++i) {
+      const double own = 1.0 - basis.row(i).squaredNorm();  // what the row does not tell of itself
+      if (own < kTold) continue;
+      const double gain = left_[i] * left_[i] / own;
+      if (gain > most) most = gain, odd = i;
+    }
+    Odd one{.row = rows_[static_cast<std::size_t>(odd)],
+            .gain = most,
+            .variance = std::max(0.0, all - most) / free_of_others};
+    one.chance = studentT(free_of_others, 1.0 - kWrong / static_cast<double>(left_.size()));
+    one.is_beyond_chance = most > one.chance * one.chance * one.variance;
+    leaveOut(odd);
+    return one;
+  }
+
+ private:
+  static constexpr double kWrong = 1e-3, kTold = 1e-6;
+
+  void leaveOut(Index odd) {
+    const Index after = left_.size() - 1 - odd;
+    MatrixXd jacobian(left_.size() - 1, jacobian_.cols());
+    jacobian << jacobian_.topRows(odd), jacobian_.bottomRows(after);
+    VectorXd left(left_.size() - 1);
+    left << left_.head(odd), left_.tail(after);
+    jacobian_ = std::move(jacobian), left_ = std::move(left);
+    rows_.erase(rows_.begin() + odd);
+  }
+
+  MatrixXd jacobian_;
+  VectorXd left_;
+  std::vector<Index> rows_{};
+};
+
+/// Rows beyond chance, the oddest first: of so many taken out one after the other, as an odd one may hide
+/// behind another, up to the last that is.
+std::vector<Odd> oddRowsOf(const MatrixXd& jacobian, const VectorXd& left) {
+  constexpr double kShare = 0.1, kOfEach = 0.01;  // of Σ r²
+  Others others{jacobian, left};
+  const double all = others.squares();
+  const Index most = std::clamp<Index>(left.size() / kRowsForEach, 1, kMost);
+  std::vector<Odd> taken;
+  std::size_t odd = 0;
+  for (Index i = 0; i < most && others.free() > kFewestFree; ++i) {
+    taken.push_back(others.takeOddest());
+    const Odd& last = taken.back();
+    if (last.is_beyond_chance && last.gain > kOfEach * all && others.squares() < (1.0 - kShare) * all)
+      odd = taken.size();
+  }
+  taken.resize(odd);
+  return taken;
+}
+
+/// What a fit of the rows that are not odd leaves of them, and what they go with.
+struct Rest {
+  std::vector<Index> rows{};
+  std::vector<double> at{};
+  VectorXd off{};
+
+  Rest(const std::vector<Odd>& odd, const MatrixXd& jacobian, const VectorXd& left, Column x) {
+    for (Index i = 0; i < left.size(); ++i) {
+      if (std::ranges::find(odd, i, &Odd::row) != odd.end()) continue;
+      rows.push_back(i), at.push_back(x[static_cast<std::size_t>(i)]);
+    }
+    const MatrixXd others = jacobian(rows, Eigen::all);
+    off = left(rows);
+    off -= (others * linear::leastSquares(others, off)).eval();
+  }
+  /// Those nearest to a place.
+  [[nodiscard]] std::vector<Index> near(double place, std::size_t count) const {
+    std::vector<Index> order(rows.size());
+    std::iota(order.begin(), order.end(), Index{0});
+    const auto away = [&](Index i) { return std::abs(at[static_cast<std::size_t>(i)] - place); };
+    std::ranges::partial_sort(order, order.begin() + static_cast<std::ptrdiff_t>(count), {}, away);
+    order.resize(count);
+    return order;
+  }
+};
+
+/// Those that are odd among their neighbours, too: where these scatter more than rows elsewhere, the row may
+/// be as they are.
+std::vector<Odd> oddAmongNeighbours(std::vector<Odd> odd, const Rest& rest, Column x) {
+  constexpr std::size_t kNeighbours = 8;  // fewer than there are rows, as kFewestFree are to spare
+  constexpr double kFarther = 1.5;        // σ of so few is known by a quarter
+  std::erase_if(odd, [&](const Odd& one) {
+    const VectorXd near = rest.off(rest.near(x[static_cast<std::size_t>(one.row)], kNeighbours));
+    return one.gain <=
+           std::pow(kFarther * one.chance, 2) * near.squaredNorm() / static_cast<double>(kNeighbours);
+  });
+  return odd;
+}
+
+/// σ of every row by how the rest scatters; an odd one has that of the nearest of them. Empty: evenly.
+std::vector<double> sigmasBeside(const std::vector<Odd>& odd, const Rest& rest, Column x,
+                                 std::size_t parameters) {
+  const auto sigmas = unevenSigmas({rest.off.data(), rest.rows.size()}, rest.at, parameters);
+  if (sigmas.empty()) return {};
+  std::vector<double> all(x.size());
+  for (std::size_t k = 0; k < rest.rows.size(); ++k) all[static_cast<std::size_t>(rest.rows[k])] = sigmas[k];
+  for (const Odd& one : odd) {
+    const auto row = static_cast<std::size_t>(one.row);
+    all[row] = sigmas[static_cast<std::size_t>(rest.near(x[row], 1).front())];
+  }
+  return all;
+}
+
+}  // namespace
+
+std::string doubtOfOddRows(const MatrixXd& jacobian, const VectorXd& left, Column x) {
+  if (left.size() - jacobian.cols() <= kFewestFree || !jacobian.allFinite() || !left.allFinite()) return {};
+  auto odd = oddRowsOf(jacobian, left);
+  if (odd.empty()) return {};
+  const Rest rest{odd, jacobian, left, x};
+  const auto sigmas = sigmasBeside(odd, rest, x, static_cast<std::size_t>(jacobian.cols()));
+  odd = oddAmongNeighbours(std::move(odd), rest, x);
+  if (!sigmas.empty() && !odd.empty()) {
+    const VectorXd lighter = Eigen::Map<const VectorXd>(sigmas.data(), left.size()).cwiseInverse();
+    auto by_sigma = oddRowsOf(lighter.asDiagonal() * jacobian, lighter.cwiseProduct(left));
+    std::erase_if(by_sigma,
+                  [&](const Odd& one) { return std::ranges::find(odd, one.row, &Odd::row) == odd.end(); });
+    odd = std::move(by_sigma);
+  }
+  if (odd.empty()) return {};
+  std::vector<Index> rows;
+  double least = odd.front().gain;
+  for (const Odd& one : odd) rows.push_back(one.row + 1), least = std::min(least, one.gain);
+  std::ranges::sort(rows);
+  const double times = std::sqrt(least / std::max(odd.back().variance, 1e-300));
+  const bool is_one = rows.size() == 1;
+  return fmt::format(
+      "{} {} of {} {} {}{:.3g} times as far off as the others scatter, and in all numbers, which may be "
+      "others without {}",
+      is_one ? "row" : "rows", fmt::join(rows, ", "), left.size(), is_one ? "is" : "are",
+      is_one ? "" : "at least ", times, is_one ? "it" : "them");
+}
+
+std::string doubtOfOddRows(const Model& model, Column y, std::span<const double> at, Column x) {
+  constexpr double kRounding = 1e-18;  // what is left of an exact curve says nothing of errors
+  const VectorXd left = residuals(model, y, at);
+  if (!(left.squaredNorm() > kRounding * Eigen::Map<const VectorXd>(y.data(), left.size()).squaredNorm()))
+    return {};
+  return doubtOfOddRows(jacobian(model, y.size(), {at.begin(), at.end()}), left, x);
+}
+
+}  // namespace toftwin::compare

@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: Apache-2.0
+// A few rows that are far off, such as slips of the pen, in tables of one session and of several.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <functional>
+#include <numbers>
+
+#include "calib/compare/trait_verdict.h"
+#include "calib/compare/verdict_words.h"
+#include "planted.h"
+
+namespace toftwin::compare {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr double kFourPerPeriod = 4.0 * 4.0 * std::numbers::pi * 30e6 / 299'792'458.0;
+constexpr int kRowsOfSession = 30;
+
+/// Four sessions of 30 rows with errors of 0.5, each session off by 3 of its own. All look at the same
+/// places, or each at its own. A row of one of them is off by `slip`.
+struct KindWithSlip {
+  const char* name;
+  std::function<double(double share)> at;  ///< the abscissa, a share of the way along
+  std::function<double(double x)> truth;
+  std::function<Traits(const AtPlaceOfSession&)> traits;
+  Truth numbers;
+};
+
+const std::vector<KindWithSlip>& kindsWithSlips() {
+  static const std::vector<KindWithSlip> all{
+      {"harmonics",
+       [](double s) { return 0.5 + 6.0 * s; },
+       [](double d) { return 3.0 + 4.0 * std::cos(kFourPerPeriod * d + 0.7); },
+       [](const AtPlaceOfSession& r) {
+         return harmonicTraits(r.x, r.y, std::vector{30e6}, std::vector{4}, {.session = r.session});
+       },
+       {{"30 MHz, 4 per period", 4.0}, {"scale", 0.0}, {"offset", 3.0}}},
+      {"corner",
+       [](double s) { return 0.01 + s; },
+       [](double x) { return 3.0 + 40.0 * std::exp(-x / 0.25); },
+       [](const AtPlaceOfSession& r) { return cornerTraits(r.x, r.y, r.session); },
+       {{"at the edge", 40.0}, {"reach", 0.25}, {"far from it", 3.0}}},
+      {"amplitude",
+       [](double s) { return std::pow(10.0, 1.0 + 2.0 * s); },
+       [](double a) { return 3.0 - 4.0 * std::log10(a); },
+       [](const AtPlaceOfSession& r) { return amplitudeTraits(r.x, r.y, {}, r.session); },
+       {{"per decade", -4.0}}},
+      {"ambient",
+       [](double s) { return 60.0 * s; },
+       [](double e) { return 3.0 + 0.12 * e; },
+       [](const AtPlaceOfSession& r) {
+         return ambientTraits(r.x, r.y, Columns(r.x.size(), 10.0), r.session);
+       },
+       {{"bias", 0.12}}},
+      {"motion",
+       [](double s) { return 2.0 * s - 1.0; },
+       [](double v) { return 3.0 + 7.5 * v; },
+       [](const AtPlaceOfSession& r) { return motionTraits(r.x, r.y, r.session); },
+       {{"per speed", 7.5}}}};
+  return all;
+}
+
+struct Slip {
+  std::size_t row = 0;
+  double by = 0.0;
+};
+
+AtPlaceOfSession sessionsOf(const KindWithSlip& kind, bool share_places, Slip slip, Noise& noise) {
+  AtPlaceOfSession rows;
+  for (int s = 0; s < 4; ++s) {
+    const double offset = noise(3.0);
+    for (int i = 0; i < kRowsOfSession; ++i) {
+      const double own = share_places ? 0.0 : noise.uniform(-0.4, 0.4);
+      rows.x.push_back(kind.at(std::abs(i + own) / (kRowsOfSession - 1)));
+      rows.y.push_back(kind.truth(rows.x.back()) + offset + noise(0.5)), rows.session.push_back(s);
+    }
+  }
+  rows.y[slip.row] += slip.by;
+  return rows;
+}
+
+std::size_t anyRow(Noise& noise) {
+  return static_cast<std::size_t>(noise.uniform(0.0, 4.0 * kRowsOfSession - 1e-9));
+}
+
+const Trait* numberOf(const std::vector<Trait>& all, const std::string& name) {
+  const auto found = std::ranges::find(all, name, &Trait::name);
+  return found == all.end() ? nullptr : &*found;
+}
+
+class InOneSession : public testing::TestWithParam<bool> {};
+INSTANTIATE_TEST_SUITE_P(Places, InOneSession, testing::Values(true, false),
+                         [](const auto& one) { return one.param ? "Shared" : "OfTheirOwn"; });
+
+/// Whatever the row: by 120 and 12 times what rows scatter by.
+TEST_P(InOneSession, ARowThatIsFarOffIsNamed) {
+  for (const KindWithSlip& kind : kindsWithSlips()) {
+    for (const double by : {60.0, -6.0}) {
+      int named = 0;
+      for (unsigned seed = 1; seed <= 20; ++seed) {
+        Noise noise{seed};
+        const Slip slip{anyRow(noise), by};
+        const auto told = kind.traits(sessionsOf(kind, GetParam(), slip, noise));
+        ASSERT_TRUE(told) << kind.name << ": " << told.error().message;
+        const std::string row = fmt::format("row {} of 120 is", slip.row + 1);
+        for (const auto& [number, truth] : kind.numbers) {
+          const Trait* one = numberOf(*told, number);
+          ASSERT_NE(one, nullptr) << number;
+          named += one->doubt.find(row) != std::string::npos;
+        }
+      }
+      // Neighbours that happen to scatter more let one of 12 σ pass by now and then.
+      const int tables = std::abs(by) > 6.0 ? 20 : 18;
+      EXPECT_GE(named, tables * static_cast<int>(kind.numbers.size())) << kind.name << ", off by " << by;
+    }
+  }
+}
+
+/// The numbers are less certain, and not wrong. Bounds as in coverage_test.cpp.
+TEST_P(InOneSession, IntervalsHoldWithARowThatIsFarOff) {
+  constexpr int kTables = 200;
+  for (const KindWithSlip& kind : kindsWithSlips()) {
+    std::map<std::string, int> held;
+    for (unsigned seed = 1; seed <= kTables; ++seed) {
+      Noise noise{seed};
+      const Slip slip{anyRow(noise), 60.0};
+      const auto told = kind.traits(sessionsOf(kind, GetParam(), slip, noise));
+      if (!told) continue;  // not told is not held
+      for (const auto& [number, truth] : kind.numbers) {
+        const Trait* one = numberOf(*told, number);
+        held[number] += one != nullptr && one->low <= truth && truth <= one->high;
+      }
+    }
+    for (const auto& [number, truth] : kind.numbers)
+      EXPECT_GE(held[number], 177) << kind.name << ", " << number;
+  }
+}
+
+TEST_P(InOneSession, NoRowIsNamedWhereNoneIsOff) {
+  int named = 0, runs = 0;
+  for (const KindWithSlip& kind : kindsWithSlips()) {
+    for (unsigned seed = 1; seed <= 100; ++seed, ++runs) {
+      Noise noise{seed};
+      const auto told = kind.traits(sessionsOf(kind, GetParam(), {}, noise));
+      ASSERT_TRUE(told);
+      named += std::ranges::any_of(
+          *told, [](const Trait& one) { return one.doubt.find("times as far off") != std::string::npos; });
+    }
+  }
+  EXPECT_LE(named, 4) << "one in a thousand: five and more of " << runs << " in 2 of 10,000 tests";
+}
+
+/// Of two cameras that are equal, one row must not make a difference: it was told as what no wave explains.
+TEST(OddRows, MakeNoCamerasDiffer) {
+  const KindWithSlip& kind = kindsWithSlips().front();
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    Noise noise{seed};
+    NamedTraits traits;
+    for (const auto& [whose, by] : {std::pair{"A", 0.0}, {"B", 60.0}}) {
+      const auto told = kind.traits(sessionsOf(kind, false, {44, by}, noise));
+      ASSERT_TRUE(told);
+      for (const Trait& one : *told) traits.traits.push_back({kind.name, "", whose, one});
+    }
+    for (const TraitVerdict& one : verdictsOf(traits)) EXPECT_FALSE(one.differs()) << one.difference.name;
+    EXPECT_THAT(headlineOf(verdictsOf(traits)),
+                HasSubstr("No number of B is held against A's: of B, row 45 of 120 is"));
+  }
+}
+
+/// A warm-up of 60 rows with errors of 0.3; `off` at these rows.
+DriftTraits warmUpOf(unsigned seed, const std::map<int, double>& off) {
+  Noise noise{seed};
+  Columns t = evenly(0.0, 295.0, 60), y;
+  for (const double one : t) y.push_back(800.0 + 6.0 * (1.0 - std::exp(-one / 80.0)) + noise(0.3));
+  for (const auto& [row, by] : off) y[static_cast<std::size_t>(row)] += by;
+  auto drift = driftTraits(t, y);
+  EXPECT_TRUE(drift);
+  return drift ? *drift : DriftTraits{.traits = {{}}};
+}
+
+/// The second of two hides the first from a look at the one that is farthest off.
+TEST(OddRows, OfAWarmUpAreNamed) {
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    EXPECT_THAT(warmUpOf(seed, {{20, 8.0}}).traits.front().doubt, HasSubstr("row 21 of 60 is"));
+    EXPECT_THAT(warmUpOf(seed, {{59, -8.0}}).traits.front().doubt, HasSubstr("row 60 of 60 is"));
+    EXPECT_THAT(warmUpOf(seed, {{20, 8.0}, {45, -8.0}}).traits.front().doubt,
+                HasSubstr("rows 21, 46 of 60 are at least"));
+  }
+  int named = 0;
+  for (unsigned seed = 1; seed <= 200; ++seed) named += !warmUpOf(seed, {}).traits.front().doubt.empty();
+  EXPECT_LE(named, 2);
+}
+
+/// Rows near the edge scatter by 8 mm, those far from it by 2: they are no slips.
+TEST(OddRows, AreNoneThatScatterAsTheirNeighboursDo) {
+  int named = 0;
+  for (unsigned seed = 1; seed <= 100; ++seed) {
+    Noise noise{seed};
+    Columns x = evenly(0.0, 1.2, 150), y;
+    for (const double one : x)
+      y.push_back(-3.0 + 40.0 * std::exp(-one / 0.25) + noise(2.0 + 6.0 * std::exp(-one / 0.05)));
+    const auto told = cornerTraits(x, y);
+    named += told && told->front().doubt.find("times as far off") != std::string::npos;
+  }
+  EXPECT_LE(named, 5);
+}
+
+}  // namespace
+}  // namespace toftwin::compare
