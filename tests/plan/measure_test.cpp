@@ -255,6 +255,15 @@ TEST_F(Measure, NeedsAPersonWhereSomethingMustBePrepared) {
   EXPECT_THAT(prepared.err, HasSubstr("taken for done: Before \"warm-up\": put up the wall"));
 }
 
+/// Otherwise it would be missed when all has been captured.
+TEST_F(Measure, ChecksThatItsPlanesAreGiven) {
+  const Ran ran = measure("run", "--planes samples");
+  EXPECT_EQ(ran.status, 4) << ran.err;
+  EXPECT_THAT(ran.err, HasSubstr("--planes samples: neither camera gives it; "));
+  EXPECT_THAT(ran.err, HasSubstr("key planes"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "run"));
+}
+
 TEST_F(Measure, SaysWhatACameraCannotDo) {
   std::string plan = kPlan;
   plan.replace(plan.find("750.0"), 5, "9e5");

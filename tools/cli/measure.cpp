@@ -193,6 +193,29 @@ struct Measurement {
   }
 };
 
+/// A plane that neither camera gives is a mistake, and would be missed when all is done; one alone may have it.
+Result<> checkPlanes(const Options& options, const SourceDetails& a, const SourceDetails& b) {
+  const auto planesOf = [](const SourceDetails& details) {
+    std::vector<std::string_view> names;
+    for (const PlaneKind kind : details.planes) names.push_back(nameOf(kind));
+    return fmt::format("{} gives {}", details.entry.name, fmt::join(names, ", "));
+  };
+  for (const std::string& plane : options.planes) {
+    const auto gives = [&](const SourceDetails& details) {
+      return std::ranges::find(details.planes, *planeKindNamed(plane)) != details.planes.end();
+    };
+    if (gives(a) && gives(b)) continue;
+    if (!gives(a) && !gives(b)) {
+      return Error{Error::Code::InvalidArgument,
+                   fmt::format("--planes {}: neither camera gives it; {}; {}. A simulated one gives those that its "
+                               "source's key planes names",
+                               plane, planesOf(a), planesOf(b))};
+    }
+    fmt::print(stderr, "note: --planes {}: of {} alone\n", plane, gives(a) ? a.entry.name : b.entry.name);
+  }
+  return {};
+}
+
 Result<Exit> carryOut(const Options& options, const plan::Plan& plan, const std::string& plan_text) {
   auto a = connect(options.daemon, options.a, options);
   if (!a) return a.error();
@@ -201,6 +224,7 @@ Result<Exit> carryOut(const Options& options, const plan::Plan& plan, const std:
   const auto details_a = a->details(), details_b = b->details();
   if (!details_a) return details_a.error();
   if (!details_b) return details_b.error();
+  if (auto given = checkPlanes(options, *details_a, *details_b); !given) return given.error();
   const auto schedule = plan::scheduleOf(plan, {intervalOf(*details_a), intervalOf(*details_b)});
   if (!schedule) return Error{schedule.error().code, options.plan + ": " + schedule.error().message};
   const auto checked = plan::check(plan, *schedule);
