@@ -137,7 +137,7 @@ TEST_F(WithRawExposures, ADelayBeforeDecodingIsInTheirPhase) {
 TEST_F(WithRawExposures, OneRawExposureThatIsAmplifiedMoreContradictsTheOthers) {
   simulate("[[effect]]\ntype = 'sample_gain'\nstep = 1\ngain = 0.04\n");
   CampaignJob without = job();
-  without.left_out = {"sample_gain"};
+  without.left_out = {"sample_gain"}, without.finder.most_effects = 1;
   const CampaignFinding finding = search(without);
   ASSERT_EQ(finding.effects.size(), 1u) << verdictOf(finding);
   const FoundEffect& one = finding.effects.front();
@@ -150,7 +150,7 @@ TEST_F(WithRawExposures, OneRawExposureThatIsAmplifiedMoreContradictsTheOthers) 
 TEST_F(WithRawExposures, WhatBendsSamplesContradictsEvenWhereTheRangeStays) {
   simulate("[[effect]]\ntype = 'nonlinearity'\ncubic_per_electron2 = 1e-12\n");
   CampaignJob without = job();
-  without.left_out = {"nonlinearity"};
+  without.left_out = {"nonlinearity"}, without.finder.most_effects = 1;
   const CampaignFinding finding = search(without);
   ASSERT_EQ(finding.effects.size(), 1u) << verdictOf(finding);
   EXPECT_EQ(finding.effects.front().found.stage, Stage::Samples) << verdictOf(finding);
