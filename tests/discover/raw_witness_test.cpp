@@ -173,6 +173,21 @@ TEST_F(WithRawExposures, OfSeveralNamesThoseGoThatTheyContradict) {
   EXPECT_THAT(with, Not(Contains("warm_up"))) << "which acts on ranges";
 }
 
+/// Both names that are left in the catalogue are errors of the range.
+TEST_F(WithRawExposures, ANameThatActsElsewhereIsTakenBack) {
+  simulate("[[effect]]\ntype = 'thermal_delay'\nper_degree_mm = 0.6\n");
+  CampaignJob without = job();
+  without.left_out = {"thermal_delay", "rise_drift", "duty_drift"};
+  const CampaignFinding finding = search(without);
+  ASSERT_EQ(finding.effects.size(), 1u) << verdictOf(finding);
+  const Effect& effect = finding.effects.front().found;
+  EXPECT_FALSE(effect.is_catalogue) << verdictOf(finding);
+  EXPECT_EQ(effect.stage, Stage::Light);
+  EXPECT_THAT(effect.refused, Contains(HasSubstr("the raw exposures say that it acts elsewhere")));
+  for (const Alternative& other : effect.alternatives) EXPECT_FALSE(other.named) << other.name;
+  EXPECT_TRUE(finding.effects.front().fitted) << "what it is fitted by stays in the model";
+}
+
 TEST_F(Searched, WithoutRawExposuresNothingIsSaidOfThem) {
   simulate("[[effect]]\ntype = 'thermal_delay'\nper_degree_mm = 0.6\n");
   const CampaignFinding finding = search(job());

@@ -163,9 +163,6 @@ std::string rawInWords(const FoundEffect& one) {
     words.push_back(fmt::format("The raw exposures contradict each other by {:.1f} standard deviations more than all "
                                 "that was found says",
                                 one.raw->contradiction));
-  const bool is_odd = is_before && one.found.is_catalogue && one.found.stage &&
-                      *is_before != (*one.found.stage != Stage::Range);
-  if (is_odd) words.push_back(fmt::format("But {} acts elsewhere: the cause is perhaps another", one.found.name));
   return fmt::format("{}", fmt::join(words, ". "));
 }
 

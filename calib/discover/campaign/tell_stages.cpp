@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <string>
 
+#include <fmt/format.h>
+
 #include "calib/discover/campaign/carriers.h"
 
 namespace toftwin::discover {
@@ -32,6 +34,21 @@ Effects withForms(Effects effects, const FoundEffect& found) {
 bool isOfPixels(const Effect& effect) {
   return std::ranges::any_of(effect.covariates, [](const std::string& name) {
     return name == "amplitude_e" || name == "ambient_klx";
+  });
+}
+
+/// Whether an effect of the catalogue acts elsewhere than the raw exposures say.
+bool isElsewhere(Stage stage, bool is_before) { return is_before != (stage != Stage::Range); }
+
+/// An effect whose name acts elsewhere than it does has none, nor any of its other names that do. What it is fitted by
+/// stays in the model.
+void takeNameBack(bool is_before, Effect& effect) {
+  effect.refused.push_back(effect.name + ": the raw exposures say that it acts elsewhere");
+  effect.name = fmt::format("like {}, but {} decoding", effect.name, is_before ? "before" : "behind");
+  effect.is_catalogue = false;
+  effect.stage = is_before ? Stage::Light : Stage::Range;
+  std::erase_if(effect.alternatives, [&](const Alternative& other) {
+    return other.named && isElsewhere(stageOf(campaignFitOf(*other.named).effect), is_before);
   });
 }
 
@@ -75,8 +92,13 @@ Result<> tellStages(const RawWitness* witness, Round& round) {
     if (!shares) return shares.error();
     for (std::size_t e = 0; e < round.effects.size(); ++e) round.effects[e].raw = RawSays{(*shares)[e], contradiction};
   }
-  for (FoundEffect& one : round.effects)
-    if (hasNoName(one)) tellStage(one.raw, is_only_one, one.found);
+  for (FoundEffect& one : round.effects) {
+    const auto is_before = one.raw ? one.raw->isBeforeDecoding() : std::nullopt;
+    if (hasNoName(one))
+      tellStage(one.raw, is_only_one, one.found);
+    else if (is_before && one.found.stage && isElsewhere(*one.found.stage, *is_before))
+      takeNameBack(*is_before, one.found);
+  }
   return {};
 }
 
