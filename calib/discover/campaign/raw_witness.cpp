@@ -21,18 +21,6 @@ constexpr double kLeastClosure = 2e-4;
 /// A pixel whose closures an effect changes by more than this share of its amplitude sees next to no light.
 constexpr float kMostClosure = 1.0F;
 
-/// Of what is left of a capture's waves, as WhitenedCapture wants it: a simulation whose range is off the measured one
-/// by what is left of the raw exposures' phase.
-Reading asRangeLeft(const MeasuredCapture& capture, const RawReading& traced, const RawReading& from,
-                    const RawReading& to, Reading simulated) {
-  for (std::size_t i = 0; i < simulated.range_m.size(); ++i) {
-    const float left = capture.raw->range_m.mean[i] - traced.range_m[i] -
-                       nearestRange(to.range_m[i] - from.range_m[i], 0.0F, traced.period_m);
-    simulated.range_m[i] = capture.range_m.mean[i] - nearestRange(left, 0.0F, traced.period_m);
-  }
-  return simulated;
-}
-
 /// χ² of each capture of a marginal, offset and gain as they fit best.
 std::vector<double> energiesOf(const Marginal& marginal) {
   const Columns common = nuisanceColumns(marginal);
@@ -127,8 +115,27 @@ Result<std::optional<RawWitness>> RawWitness::of(const JudgedCampaign& judged) {
   return std::optional{RawWitness{judged, *std::move(declared)}};
 }
 
-std::vector<RawWitness::Closure> RawWitness::closuresLeft(std::size_t c, const RawReading& traced,
-                                                          const RawReading& from, const RawReading& to) const {
+RawWitness::Simulated RawWitness::simulated(std::size_t c, const NoiselessCamera& camera) const {
+  const MeasuredCapture& capture = judged_->lit.captures[c];
+  const sim::Light& varied = judged_->lit.varied[c]->light;
+  return {declared_.readRaw(capture, judged_->lit.traced[c]->light), declared_.readRaw(capture, varied),
+          camera.readRaw(capture, varied)};
+}
+
+/// Of what is left of a capture's waves, as WhitenedCapture wants it: a simulation whose range is off the measured one
+/// by what is left of the raw exposures' phase.
+Reading RawWitness::asRangeLeft(const MeasuredCapture& capture, const Simulated& raw, Reading simulated) {
+  for (std::size_t i = 0; i < simulated.range_m.size(); ++i) {
+    const double period_m = raw.traced.period_m;
+    const float left = capture.raw->range_m.mean[i] - raw.traced.range_m[i] -
+                       nearestRange(raw.to.range_m[i] - raw.from.range_m[i], 0.0F, period_m);
+    simulated.range_m[i] = capture.range_m.mean[i] - nearestRange(left, 0.0F, period_m);
+  }
+  return simulated;
+}
+
+std::vector<RawWitness::Closure> RawWitness::closuresLeft(std::size_t c, const Simulated& raw) const {
+  const auto& [traced, from, to] = raw;
   const MeasuredCapture& capture = judged_->lit.captures[c];
   const TracedCapture& light = *judged_->lit.traced[c];
   std::vector<Closure> all;
@@ -162,16 +169,14 @@ Result<RawWitness::Left> RawWitness::leftBy(const std::vector<sim::AnyEffect>& e
       const MeasuredCapture& capture = lit.captures[c];
       const TracedCapture& traced = *lit.traced[c];
       const sim::Light& varied = lit.varied[c]->light;
-      const RawReading at_pose = declared_.readRaw(capture, traced.light), from = declared_.readRaw(capture, varied),
-                       to = here->readRaw(capture, varied);
+      const Simulated raw = simulated(c, *here);
       const Cells cells{capture, traced, declared_.read(capture, traced.light), judged_->most_cells};
       WhitenedCapture whitened{cells, kCommon};
       whitened.putCommon(cells, traced);
       whitened.putResidual(cells, capture, traced,
-                           asRangeLeft(capture, at_pose, from, to,
-                                       readingOf(declared_, *here, capture, traced.light, varied)));
+                           asRangeLeft(capture, raw, readingOf(declared_, *here, capture, traced.light, varied)));
       evidence.captures[c] = whitened.evidence(capture.record.name, capture.record.block);
-      for (const Closure& closure : closuresLeft(c, at_pose, from, to)) {
+      for (const Closure& closure : closuresLeft(c, raw)) {
         for (std::size_t i = 0; i < closure.left.size(); ++i) {
           const auto left = static_cast<double>(closure.left[i]);
           if (std::isfinite(left)) closures[c] += left * left / static_cast<double>(closure.variance[i]);
@@ -266,8 +271,7 @@ Result<std::vector<std::optional<Difference>>> RawWitness::sharesBeforeDecoding(
       WhitenedCapture whitened{cells, kCommon + with.size()};
       whitened.putCommon(cells, traced);
       whitened.putResidual(cells, capture, traced,
-                           asRangeLeft(capture, declared_.readRaw(capture, traced.light),
-                                       declared_.readRaw(capture, varied), cameras[0].readRaw(capture, varied),
+                           asRangeLeft(capture, simulated(c, cameras[0]),
                                        readingOf(declared_, cameras[1], capture, traced.light, varied)));
       const Reading read = cameras[0].read(capture, varied);
       for (std::size_t e = 0; e < with.size(); ++e)
@@ -299,10 +303,7 @@ Result<double> RawWitness::contradiction(const std::vector<sim::AnyEffect>& effe
   BlockSum twelfths, columns;
   std::vector<WeightedSum> over_all;  // each closure's image over all captures
   for (std::size_t c = 0; c < lit.captures.size(); ++c) {
-    const sim::Light& varied = lit.varied[c]->light;
-    const auto closures = closuresLeft(c, declared_.readRaw(lit.captures[c], lit.traced[c]->light),
-                                       declared_.readRaw(lit.captures[c], varied),
-                                       here->readRaw(lit.captures[c], varied));
+    const auto closures = closuresLeft(c, simulated(c, *here));
     over_all.resize(closures.size());
     for (std::size_t k = 0; k < closures.size(); ++k) {
       const WeightedSum one{closures[k].left, closures[k].variance};

@@ -48,8 +48,14 @@ class RawWitness {
   struct Closure {
     Image<float> left, variance;
   };
-  [[nodiscard]] std::vector<Closure> closuresLeft(std::size_t capture, const RawReading& traced, const RawReading& from,
-                                                  const RawReading& to) const;
+  /// What a camera's raw exposures would be in a capture: the declared one's on the light that is compared, changed by
+  /// what the two differ in on the light that effects are varied on.
+  struct Simulated {
+    RawReading traced, from, to;
+  };
+  [[nodiscard]] Simulated simulated(std::size_t capture, const NoiselessCamera& camera) const;
+  [[nodiscard]] std::vector<Closure> closuresLeft(std::size_t capture, const Simulated& raw) const;
+  static Reading asRangeLeft(const MeasuredCapture& capture, const Simulated& raw, Reading simulated);
   [[nodiscard]] std::vector<sim::AnyEffect> listWith(const std::vector<Effect>& effects, std::size_t which,
                                                      const NamedFit* fit) const;
 

@@ -193,8 +193,8 @@ class Descent {
   }
 
   /// Numbers that could be anything within their bounds, and those that moved before it showed that nothing tells them,
-  /// stay as they `began`, what makes an effect strong at nothing: rounding moved them, and what they do not change here they may change
-  /// elsewhere (a waveform's second harmonic is in no range).
+  /// stay as they `began`, what makes an effect strong at nothing: rounding moved them, and what they do not change here
+  /// they may change elsewhere (a waveform's second harmonic is in no range).
   Result<> keepWhatIsNotTold(const std::vector<sim::AnyEffect>& began, State& state) {
     bool is_any = false;  // what stays now does not come back, so that this ends
     for (const std::size_t place : places_) {
