@@ -12,11 +12,11 @@ namespace toftwin::sim {
 namespace {
 
 /// Most samples in a coarse point's means; what moves in a scene leaves its light behind for so long.
-constexpr float kMostSamples = 128.0f, kMostWhereThingsMove = 16.0f;
+constexpr float kMostSamples = 128.0f, kMostWhereThingsMove = 24.0f;
 constexpr float kFewestSamples = 8.0f;
 /// The same of what lit places send to what stands still: it is known well from one frame alone, and moves with the
 /// shadows. (Moving objects may be bent, which leaves few neighbours to smooth over.)
-constexpr float kMostOfLitWhereThingsMove = 4.0f;
+constexpr float kMostOfLitWhereThingsMove = 3.0f;
 /// Cells remember so many times the samples.
 constexpr int kCellsPerPoints = 2, kCellsWhereThingsMove = 4;
 /// Light is remembered for so much of the camera's way: its emitters move with it, which turns phasors.
@@ -28,6 +28,9 @@ constexpr double kCellShare = 1.0 / 64.0;
 /// A coarse point is the same place as before if it lies in one plane with it to this share of the range,
 /// this many coarse points away at most, and faces the same way to this cosine.
 constexpr double kSamePlane = 0.005, kSamePlace = 2.0, kSameFacing = 0.8;
+
+/// A random dimension of its own, beyond those of tiles.
+constexpr std::uint32_t kRecall = 0x30000;
 
 int coarse(int size) { return (size + CoarseGrid::kStep - 2) / CoarseGrid::kStep + 1; }
 
@@ -52,7 +55,7 @@ void store(const CoarseTile& tile, const Channels& channels, int i, int j, int s
   put(grid.samples, [&](std::size_t lane) { return tile.valid[lane] != 0 ? static_cast<float>(samples) : 0.0f; });
   put(grid.variance_left, [&](std::size_t) { return 1.0f / static_cast<float>(samples); });
   put(grid.lit_left, [&](std::size_t) { return 1.0f; });
-  put(grid.moves, [&](std::size_t lane) { return static_cast<std::uint8_t>(tile.moves[lane] != 0 ? 1 : 0); });
+  put(grid.mover, [&](std::size_t lane) { return tile.mover[lane]; });
   const double per_sample = 1.0 / samples;
   for (std::size_t c = 0; c < grid.means.size(); ++c) {
     copy(grid.lit[c], tile.lit[c]);
@@ -111,30 +114,40 @@ void update(const std::vector<CellUpdate>& updates, int memory, std::size_t chan
   }
 }
 
-/// Where things were a frame ago.
+/// Finds where things were a frame ago.
 class Past {
  public:
-  Past(const CoarseGrid& grid, const CameraInfo& camera, const Transform<World, Camera>& world_from_before,
-       const Transform<World, Camera>& world_from_camera)
-      : grid_(grid), camera_(camera), is_at_rest_(world_from_before == world_from_camera),
-        before_from_camera_(world_from_before.inverse() * world_from_camera) {}
+  Past(const CoarseGrid& grid, const CameraInfo& camera, const Places& before, const Places& now)
+      : grid_(grid), camera_(camera) {
+    const auto before_from_scene = before.scene_from_camera.inverse();
+    ways_.push_back({now.scene_from_camera == before.scene_from_camera, before_from_scene * now.scene_from_camera});
+    for (std::size_t i = 0; i < std::min(before.scene_from_movers.size(), now.scene_from_movers.size()); ++i) {
+      const auto before_from_mover = before_from_scene * before.scene_from_movers[i];
+      const auto camera_from_mover = now.scene_from_camera.inverse() * now.scene_from_movers[i];
+      ways_.push_back({before_from_mover == camera_from_mover, before_from_mover * camera_from_mover.inverse()});
+    }
+  }
 
-  /// The point of the old grid on the same place of a surface as (u, v) of the new one.
-  bool find(const CoarseGrid& now, int u, int v, int& old_u, int& old_v) const {
+  /// The point of the old grid on the same place of a surface as (u, v) of the new one. It lies between points, mostly:
+  /// `draw` picks one, so that their mean over frames is the place, however slow things move.
+  bool find(const CoarseGrid& now, int u, int v, RandomPair draw, int& old_u, int& old_v) const {
+    const int mover = now.mover(u, v);
+    if (static_cast<std::size_t>(mover) >= ways_.size()) return false;
+    const Way& way = ways_[static_cast<std::size_t>(mover)];
     Vec3d place = placeOf(now, u, v), normal = normalOf(now, u, v);
     old_u = u;
     old_v = v;
-    if (!is_at_rest_) {
-      place = (before_from_camera_ * Point<Camera>{place}).m;
-      normal = before_from_camera_.rotate(normal);
+    if (!way.is_at_rest) {
+      place = (way.before_from_now * Point<Camera>{place}).m;
+      normal = way.before_from_now.rotate(normal);
       if (!(place.z > 0.0)) return false;
       const auto [x, y] = pixelOfPoint(camera_, {place});
       if (!(std::abs(x) < 1e6) || !(std::abs(y) < 1e6)) return false;
-      old_u = static_cast<int>(std::lround(x / CoarseGrid::kStep));
-      old_v = static_cast<int>(std::lround(y / CoarseGrid::kStep));
+      old_u = static_cast<int>(std::floor(x / CoarseGrid::kStep + static_cast<double>(draw.u)));
+      old_v = static_cast<int>(std::floor(y / CoarseGrid::kStep + static_cast<double>(draw.v)));
     }
     if (old_u < 0 || old_v < 0 || old_u >= grid_.width || old_v >= grid_.height) return false;
-    if (grid_.samples(old_u, old_v) == 0.0f) return false;
+    if (grid_.samples(old_u, old_v) == 0.0f || grid_.mover(old_u, old_v) != mover) return false;
     const double range = norm(place);
     const Vec3d apart = placeOf(grid_, old_u, old_v) - place;
     return std::abs(dot(apart, normal)) <= kSamePlane * range &&
@@ -143,10 +156,13 @@ class Past {
   }
 
  private:
+  struct Way {
+    bool is_at_rest;
+    Transform<Camera, Camera> before_from_now;
+  };
   const CoarseGrid& grid_;
   const CameraInfo& camera_;
-  bool is_at_rest_;
-  Transform<Camera, Camera> before_from_camera_;
+  std::vector<Way> ways_;  ///< of what stands still, then of each mover
 };
 
 /// What a row's points go on from: places in the grid before, and the share that what is new has beside it.
@@ -213,7 +229,7 @@ void CoarseGrid::resizeWithLit(int new_width, int new_height, std::size_t channe
   lit_left = Image<float>(width, height);
   lit.assign(channels, lit_left);
   lit_squares.assign(frequencies, lit_left);
-  moves = Image<std::uint8_t>(width, height);
+  mover = Image<int>(width, height);
 }
 
 Channels::Channels(const TraceRequest& request, std::span<const std::uint8_t> wanted) {
@@ -235,13 +251,17 @@ Channels::Channels(const TraceRequest& request, std::span<const std::uint8_t> wa
   }
 }
 
+Places::Places(const Tracing& tracing) : scene_from_camera(tracing.scene_from_camera) {
+  for (const Standing& mover : tracing.scene.poses) scene_from_movers.push_back(mover.scene_from_object);
+}
+
 IndirectLight::Memory IndirectLight::memoryFor(const Tracing& tracing, int samples) const {
-  const Transform<World, Camera>& now = tracing.request.world_from_camera;
+  const Transform<World, Camera>&before = places_.scene_from_camera, &now = tracing.scene_from_camera;
   double way = 0.0;
   for (const EmitterSpec& emitter : tracing.request.emitters) {
-    const Vec3d from = (pose_ * Point<Camera>{emitter.position_m}).m;
+    const Vec3d from = (before * Point<Camera>{emitter.position_m}).m;
     const Vec3d to = (now * Point<Camera>{emitter.position_m}).m;
-    const double cosine = dot(pose_.rotate(emitter.axis), now.rotate(emitter.axis)) / dot(emitter.axis, emitter.axis);
+    const double cosine = dot(before.rotate(emitter.axis), now.rotate(emitter.axis)) / dot(emitter.axis, emitter.axis);
     way = std::max(way, norm(to - from) + kMetresPerRadian * std::acos(std::clamp(cosine, -1.0, 1.0)));
   }
   const double allowed = kMemory_m * samples;  // samples · way
@@ -269,7 +289,7 @@ void IndirectLight::gather(const Tracing& tracing, const Channels& channels, int
     grid_ = before_ = {};
     cells_ = std::make_unique<IrradianceCells>(tracing.scene.diagonal_m * kCellShare, channels.count());
     samples_done_ = 0;
-    pose_ = request.world_from_camera;
+    places_ = Places{tracing};
   }
   std::swap(before_, grid_);
   grid_.resizeWithLit(width, height, channels.count(), request.frequencies.size());
@@ -283,13 +303,13 @@ void IndirectLight::gather(const Tracing& tracing, const Channels& channels, int
   gatherTiles(tracing, *cells_, *lights_, channels_, samples_done_, samples, grid_, updates_);
   update(updates_, memory.cells, channels_.count(), *cells_);
   samples_done_ += static_cast<std::uint32_t>(samples);
-  takeHistory(before_, request.world_from_camera, request.camera, memory);
-  pose_ = request.world_from_camera;
+  Places now{tracing};
+  takeHistory(before_, tracing, now, memory);
+  places_ = std::move(now);
 }
 
-void IndirectLight::takeHistory(const CoarseGrid& before, const Transform<World, Camera>& world_from_camera,
-                                const CameraInfo& camera, const Memory& memory) {
-  const Past past{before, camera, pose_, world_from_camera};
+void IndirectLight::takeHistory(const CoarseGrid& before, const Tracing& tracing, const Places& now, const Memory& memory) {
+  const Past past{before, tracing.request.camera, places_, now};
   std::vector<int> surfaces(static_cast<std::size_t>(grid_.height)), unknown(surfaces.size());
   inParallel(grid_.height, 8, [&](int first, int last) {
     Remembered row{static_cast<std::size_t>(grid_.width)};
@@ -301,14 +321,15 @@ void IndirectLight::takeHistory(const CoarseGrid& before, const Transform<World,
         if (samples == 0.0f) continue;
         ++surfaces[static_cast<std::size_t>(v)];
         int old_u = 0, old_v = 0;
-        if (!past.find(grid_, u, v, old_u, old_v)) {
+        const PixelKey key = pixelKey(tracing.seed, static_cast<std::uint32_t>(u), static_cast<std::uint32_t>(v));
+        if (!past.find(grid_, u, v, randomPair(key, samples_done_, kRecall), old_u, old_v)) {
           ++unknown[static_cast<std::size_t>(v)];
           continue;
         }
         row.place[at] = static_cast<std::size_t>(old_v) * static_cast<std::size_t>(before.width) + static_cast<std::size_t>(old_u);
         const float known = before.samples(old_u, old_v), counts = std::min(known, memory.points);
         row.share[at] = samples / (samples + counts);
-        const float lit_memory = grid_.moves(u, v) != 0 ? memory.points : memory.lit;
+        const float lit_memory = grid_.mover(u, v) != 0 ? memory.points : memory.lit;
         row.lit_share[at] = samples / (samples + std::min(known, lit_memory));
         grid_.samples(u, v) = samples + counts;
       }

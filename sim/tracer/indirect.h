@@ -32,7 +32,7 @@ struct CoarseGrid {
   // The part of it that lit places send, whatever is in its way; in the smooth grid empty.
   std::vector<Image<float>> lit, lit_squares;
   Image<float> lit_left;
-  Image<std::uint8_t> moves;  ///< 1 where the surface is of a moving object
+  Image<int> mover;  ///< 0 where the surface stands still, else 1 + the number of the moving object
 };
 
 /// The numbers that are kept of light: steady, ambient, and both parts of each phasor that is wanted. Of
@@ -77,6 +77,14 @@ struct BlockGeometry {
 
 class LitPoints;
 
+/// Where the camera and all that moves is.
+struct Places {
+  Places() = default;
+  explicit Places(const Tracing& tracing);
+  Transform<World, Camera> scene_from_camera;
+  std::vector<Transform<World, Object>> scene_from_movers;
+};
+
 /// One packet's worth of light over two surfaces for the cells.
 struct CellUpdate {
   Lanes<IrradianceCells::Key> keys{};  ///< 0: none
@@ -117,14 +125,13 @@ class IndirectLight {
     int cells;
   };
   [[nodiscard]] Memory memoryFor(const Tracing& tracing, int samples) const;
-  void takeHistory(const CoarseGrid& before, const Transform<World, Camera>& world_from_camera,
-                   const CameraInfo& camera, const Memory& memory);
+  void takeHistory(const CoarseGrid& before, const Tracing& tracing, const Places& now, const Memory& memory);
 
   std::string scene_id_;
   Channels channels_;
   CoarseGrid grid_, before_;
   CoarseGrid smooth_;  ///< `squares` holds variances of the means
-  Transform<World, Camera> pose_;
+  Places places_;  ///< of the last call
   std::unique_ptr<IrradianceCells> cells_;
   std::unique_ptr<LitPoints> lights_;
   std::vector<CellUpdate> updates_;  ///< of this frame, in memory of the last

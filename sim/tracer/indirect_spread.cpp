@@ -17,7 +17,7 @@ constexpr int kRadius = 3;       // of the smoothing, in coarse points
 constexpr float kSigma = 2.5f;   // of its Gaussian
 /// So far off a plane, and so far away at all, as shares of the range, weights are a quarter. The latter
 /// where many samples are known; where n are, √(1 + kFewSamples/n) times as far.
-constexpr float kPlaneShare = 0.015f, kNearShare = 0.035f, kFewSamples = 64.0f;
+constexpr float kPlaneShare = 0.007f, kNearShare = 0.035f, kFewSamples = 16.0f;
 
 /// A place and the way it faces.
 struct Facet {

@@ -163,7 +163,8 @@ void TileGatherer::lookFromCamera(int i, int j, Packet& camera_rays) {
   findHits(tracing_.scene, camera_rays, rays, hits_);
   for (std::size_t lane = 0; lane < kLaneCount; ++lane) {
     const bool is_hit = camera_rays.valid[lane] != 0;
-    tile_.moves[lane] = is_hit && tracing_.scene.rows[rays.hit.geomID[lane]].standing != nullptr ? -1 : 0;
+    const Standing* mover = is_hit ? tracing_.scene.rows[rays.hit.geomID[lane]].standing : nullptr;
+    tile_.mover[lane] = mover != nullptr ? static_cast<int>(mover - tracing_.scene.poses.data()) + 1 : 0;
   }
   keepGeometry(camera_rays);
 }

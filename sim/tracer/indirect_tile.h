@@ -10,7 +10,7 @@ namespace toftwin::sim {
 
 /// Sixteen coarse points, 4 × 4.
 struct CoarseTile {
-  Lanes<int> valid, moves;
+  Lanes<int> valid, mover;  ///< CoarseGrid::mover
   Lanes<float> x, y, z, normal_x, normal_y, normal_z;
   std::vector<Lanes<double>> sums;     ///< by channel, less what is lit
   std::vector<Lanes<double>> squares;  ///< by frequency

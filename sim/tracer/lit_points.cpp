@@ -14,7 +14,7 @@ namespace toftwin::sim {
 namespace {
 
 /// So many of each emitter for one receiver: a power of two, which Sobol's sequence spreads evenly.
-constexpr std::uint32_t kPoints = 32;
+constexpr std::uint32_t kPoints = 64;
 constexpr std::uint32_t kLeaving = 0x20000;  // random dimension, beyond those of paths
 /// A column of pixels that no image has, for random numbers that belong to none.
 constexpr std::uint32_t kNoPixel = 0xfffffff0u;

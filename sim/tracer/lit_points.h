@@ -11,7 +11,7 @@ namespace toftwin::sim {
 /// Points that the emitters light, as sources of light over two surfaces: rays leave each emitter evenly over all
 /// directions that it shines into, and what they meet sends its light on to every coarse point.
 ///
-/// Each of the sixteen points of a tile has 32 lit points of its own, evenly spread by themselves; others in
+/// Each of the sixteen points of a tile has 64 lit points of its own, evenly spread by themselves; others in
 /// every frame. Light falls in whatever is in its way: one ray to one of them, picked by its share, says how much
 /// is to be taken off. Near a corner a lit point's share grows with 1/r²: by multiple importance sampling it
 /// leaves that to directions drawn by the cosine.
