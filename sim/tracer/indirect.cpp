@@ -2,6 +2,7 @@
 #include "sim/tracer/indirect.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "sim/images/rows.h"
@@ -29,8 +30,8 @@ constexpr double kCellShare = 1.0 / 64.0;
 /// this many coarse points away at most, and faces the same way to this cosine.
 constexpr double kSamePlane = 0.005, kSamePlace = 2.0, kSameFacing = 0.8;
 
-/// A random dimension of its own, beyond those of tiles.
-constexpr std::uint32_t kRecall = 0x30000;
+/// Of a mean of points around a place, those count that have this share of it.
+constexpr double kLeastWeight = 0.02;
 
 int coarse(int size) { return (size + CoarseGrid::kStep - 2) / CoarseGrid::kStep + 1; }
 
@@ -114,6 +115,25 @@ void update(const std::vector<CellUpdate>& updates, int memory, std::size_t chan
   }
 }
 
+/// Points of the grid before, up to four, and what each of them counts.
+struct Origin {
+  std::array<std::size_t, 4> place{};
+  std::array<float, 4> weight{};
+  int count = 0;
+
+  void add(std::size_t where, double counts) {
+    place[static_cast<std::size_t>(count)] = where;
+    weight[static_cast<std::size_t>(count)] = static_cast<float>(counts);
+    ++count;
+  }
+  [[nodiscard]] float of(const Image<float>& image) const {
+    if (count == 1) return image[place[0]];
+    float sum = 0.0f, all = 1e-20f;
+    for (std::size_t i = 0; i < place.size(); ++i) sum += weight[i] * image[place[i]], all += weight[i];
+    return sum / all;
+  }
+};
+
 /// Finds where things were a frame ago.
 class Past {
  public:
@@ -128,34 +148,43 @@ class Past {
     }
   }
 
-  /// The point of the old grid on the same place of a surface as (u, v) of the new one. It lies between points, mostly:
-  /// `draw` picks one, so that their mean over frames is the place, however slow things move.
-  bool find(const CoarseGrid& now, int u, int v, RandomPair draw, int& old_u, int& old_v) const {
+  /// The points of the old grid around the same place of a surface as (u, v) of the new one, those on that surface.
+  bool find(const CoarseGrid& now, int u, int v, Origin& origin) const {
     const int mover = now.mover(u, v);
     if (static_cast<std::size_t>(mover) >= ways_.size()) return false;
     const Way& way = ways_[static_cast<std::size_t>(mover)];
     Vec3d place = placeOf(now, u, v), normal = normalOf(now, u, v);
-    old_u = u;
-    old_v = v;
-    if (!way.is_at_rest) {
-      place = (way.before_from_now * Point<Camera>{place}).m;
-      normal = way.before_from_now.rotate(normal);
-      if (!(place.z > 0.0)) return false;
-      const auto [x, y] = pixelOfPoint(camera_, {place});
-      if (!(std::abs(x) < 1e6) || !(std::abs(y) < 1e6)) return false;
-      old_u = static_cast<int>(std::floor(x / CoarseGrid::kStep + static_cast<double>(draw.u)));
-      old_v = static_cast<int>(std::floor(y / CoarseGrid::kStep + static_cast<double>(draw.v)));
-    }
-    if (old_u < 0 || old_v < 0 || old_u >= grid_.width || old_v >= grid_.height) return false;
-    if (grid_.samples(old_u, old_v) == 0.0f || grid_.mover(old_u, old_v) != mover) return false;
-    const double range = norm(place);
-    const Vec3d apart = placeOf(grid_, old_u, old_v) - place;
-    return std::abs(dot(apart, normal)) <= kSamePlane * range &&
-           norm(apart) <= kSamePlace * CoarseGrid::kStep * range / camera_.fx &&
-           dot(normalOf(grid_, old_u, old_v), normal) >= kSameFacing;
+    origin = {};
+    if (way.is_at_rest) return add(u, v, mover, place, normal, 1.0, origin);
+    place = (way.before_from_now * Point<Camera>{place}).m;
+    normal = way.before_from_now.rotate(normal);
+    if (!(place.z > 0.0)) return false;
+    const auto [x, y] = pixelOfPoint(camera_, {place});
+    if (!(std::abs(x) < 1e6) || !(std::abs(y) < 1e6)) return false;
+    const double left = std::floor(x / CoarseGrid::kStep), top = std::floor(y / CoarseGrid::kStep);
+    const double right = x / CoarseGrid::kStep - left, below = y / CoarseGrid::kStep - top;
+    const int old_u = static_cast<int>(left), old_v = static_cast<int>(top);
+    bool is_any = add(old_u, old_v, mover, place, normal, (1.0 - right) * (1.0 - below), origin);
+    is_any |= add(old_u + 1, old_v, mover, place, normal, right * (1.0 - below), origin);
+    is_any |= add(old_u, old_v + 1, mover, place, normal, (1.0 - right) * below, origin);
+    is_any |= add(old_u + 1, old_v + 1, mover, place, normal, right * below, origin);
+    return is_any;
   }
 
  private:
+  /// Adds a point if it is one on this surface, near by, that counts at all.
+  bool add(int u, int v, int mover, const Vec3d& place, const Vec3d& normal, double weight, Origin& origin) const {
+    if (u < 0 || v < 0 || u >= grid_.width || v >= grid_.height || !(weight > kLeastWeight)) return false;
+    if (grid_.samples(u, v) == 0.0f || grid_.mover(u, v) != mover) return false;
+    const double range = norm(place);
+    const Vec3d apart = placeOf(grid_, u, v) - place;
+    if (std::abs(dot(apart, normal)) > kSamePlane * range) return false;
+    if (norm(apart) > kSamePlace * CoarseGrid::kStep * range / camera_.fx) return false;
+    if (dot(normalOf(grid_, u, v), normal) < kSameFacing) return false;
+    origin.add(static_cast<std::size_t>(v) * static_cast<std::size_t>(grid_.width) + static_cast<std::size_t>(u), weight);
+    return true;
+  }
+
   struct Way {
     bool is_at_rest;
     Transform<Camera, Camera> before_from_now;
@@ -167,36 +196,45 @@ class Past {
 
 /// What a row's points go on from: places in the grid before, and the share that what is new has beside it.
 struct Remembered {
-  explicit Remembered(std::size_t width) : place(width), share(width), lit_share(width) {}
+  explicit Remembered(std::size_t width) : origin(width), share(width), lit_share(width), room(2 * width) {}
   void forget(std::size_t at) {
-    place[at] = 0;
+    origin[at] = {.count = 1};
     share[at] = lit_share[at] = 1.0f;
   }
-  std::vector<std::size_t> place;
+  std::vector<Origin> origin;
   std::vector<float> share, lit_share;
+  std::vector<float> room;  ///< for two rows of the grid before
 };
 
-void blendRow(const CoarseGrid& before, const Remembered& row, int v, CoarseGrid& grid) {
+void blendRow(const CoarseGrid& before, Remembered& row, int v, CoarseGrid& grid) {
   if (before.width == 0) return;
   const auto width = static_cast<std::size_t>(grid.width);
+  const auto recall = [&](const Image<float>& old, std::size_t number) {
+    float* was = row.room.data() + number * width;
+    for (std::size_t u = 0; u < width; ++u) was[u] = row.origin[u].of(old);
+    return was;
+  };
   const auto blend = [&](Image<float>& image, const Image<float>& old, const std::vector<float>& shares) {
     float* now = &image(0, v);
-    for (std::size_t u = 0; u < width; ++u) now[u] = old[row.place[u]] + shares[u] * (now[u] - old[row.place[u]]);
+    const float* was = recall(old, 0);
+    for (std::size_t u = 0; u < width; ++u) now[u] = was[u] + shares[u] * (now[u] - was[u]);
   };
+  // Of a mean of several points no less variance is told than of one: they have much of their past in common.
   const auto leave = [&](Image<float>& image, const Image<float>& old, const std::vector<float>& shares) {
     float* now = &image(0, v);
+    const float* was = recall(old, 0);
     for (std::size_t u = 0; u < width; ++u) {
       const float share = shares[u], rest = 1.0f - share;
-      now[u] = share * share * now[u] + rest * rest * old[row.place[u]];
+      now[u] = share * share * now[u] + rest * rest * was[u];
     }
   };
   for (std::size_t c = 0; c < grid.means.size(); ++c) {
     float *lit = &grid.lit[c](0, v), *all = &grid.means[c](0, v);
-    const Image<float>&old_lit = before.lit[c], &old_all = before.means[c];
+    const float *old_lit = recall(before.lit[c], 0), *old_all = recall(before.means[c], 1);
     for (std::size_t u = 0; u < width; ++u) {
-      const float was_lit = old_lit[row.place[u]], was_rest = old_all[row.place[u]] - was_lit;
+      const float was_rest = old_all[u] - old_lit[u];
       const float rest = was_rest + row.share[u] * (all[u] - lit[u] - was_rest);
-      lit[u] = was_lit + row.lit_share[u] * (lit[u] - was_lit);
+      lit[u] = old_lit[u] + row.lit_share[u] * (lit[u] - old_lit[u]);
       all[u] = lit[u] + rest;
     }
   }
@@ -320,14 +358,12 @@ void IndirectLight::takeHistory(const CoarseGrid& before, const Tracing& tracing
         row.forget(at);
         if (samples == 0.0f) continue;
         ++surfaces[static_cast<std::size_t>(v)];
-        int old_u = 0, old_v = 0;
-        const PixelKey key = pixelKey(tracing.seed, static_cast<std::uint32_t>(u), static_cast<std::uint32_t>(v));
-        if (!past.find(grid_, u, v, randomPair(key, samples_done_, kRecall), old_u, old_v)) {
+        if (!past.find(grid_, u, v, row.origin[at])) {
+          row.forget(at);
           ++unknown[static_cast<std::size_t>(v)];
           continue;
         }
-        row.place[at] = static_cast<std::size_t>(old_v) * static_cast<std::size_t>(before.width) + static_cast<std::size_t>(old_u);
-        const float known = before.samples(old_u, old_v), counts = std::min(known, memory.points);
+        const float known = row.origin[at].of(before.samples), counts = std::min(known, memory.points);
         row.share[at] = samples / (samples + counts);
         const float lit_memory = grid_.mover(u, v) != 0 ? memory.points : memory.lit;
         row.lit_share[at] = samples / (samples + std::min(known, lit_memory));

@@ -125,7 +125,7 @@ void TileGatherer::gather(int i, int j, std::uint32_t first_sample, int samples,
 void TileGatherer::lookAtLights(const Packet& camera_rays) {
   clearSums(fallen_);
   if (!lights_.areAny()) return;
-  lights_.weigh({hits_.position, normals_, camera_rays.valid}, samples_, shares_);
+  lights_.weigh({inSingle(hits_.position), inSingle(normals_), camera_rays.valid}, samples_, shares_);
   lights_.add(tracing_, channels_, shares_, fallen_);
   forEachChannel(fallen_, [&](std::size_t channel, const Lanes<float>& lanes) { tile_.lit[channel] = lanes; });
 }

@@ -53,5 +53,14 @@ inline Vec3d at(const Vec3Lanes& lanes, std::size_t i) { return {lanes.x[i], lan
 struct Vec3fLanes {
   Lanes<float> x, y, z;
 };
+TOFTWIN_INLINE Vec3fLanes inSingle(const Vec3Lanes& lanes) {
+  Vec3fLanes single;
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    single.x[i] = static_cast<float>(lanes.x[i]);
+    single.y[i] = static_cast<float>(lanes.y[i]);
+    single.z[i] = static_cast<float>(lanes.z[i]);
+  }
+  return single;
+}
 
 }  // namespace toftwin::sim

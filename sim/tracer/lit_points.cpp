@@ -89,8 +89,8 @@ void LitPoints::takeOf(const Tracing& tracing, const Channels& channels, std::si
   intersect(tracing, packet, rays, false);
   endMissed(0.0f, rays, packet, unused);
   findHits(tracing.scene, packet, rays, hits);
-  place.position = hits.position;
-  place.normal = hits.normal;
+  place.position = inSingle(hits.position);
+  place.normal = inSingle(hits.normal);
   Lanes<float> radiance{};
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     place.density[i] = 1.0f;
@@ -123,17 +123,15 @@ void LitPoints::takeOf(const Tracing& tracing, const Channels& channels, std::si
 namespace {
 
 TOFTWIN_VECTOR
-void weighOne(const LitPoints::Receivers& receivers, const Vec3Lanes& position, const Vec3Lanes& normal,
+void weighOne(const LitPoints::Receivers& receivers, const Vec3fLanes& position, const Vec3fLanes& normal,
               const Lanes<float>& density, const Lanes<float>& steady, float directions, Lanes<float>& share,
               Lanes<float>& way, Lanes<float>& total) {
-  const Vec3Lanes &p = receivers.position, &n = receivers.normal;
+  const Vec3fLanes &p = receivers.position, &n = receivers.normal;
   for (std::size_t i = 0; i < kLaneCount; ++i) {
-    const auto dx = static_cast<float>(position.x[i] - p.x[i]), dy = static_cast<float>(position.y[i] - p.y[i]),
-               dz = static_cast<float>(position.z[i] - p.z[i]);
+    const float dx = position.x[i] - p.x[i], dy = position.y[i] - p.y[i], dz = position.z[i] - p.z[i];
     const float square = dx * dx + dy * dy + dz * dz + 1e-12f;
-    const float here = dx * static_cast<float>(n.x[i]) + dy * static_cast<float>(n.y[i]) + dz * static_cast<float>(n.z[i]);
-    const float there = -(dx * static_cast<float>(normal.x[i]) + dy * static_cast<float>(normal.y[i]) +
-                          dz * static_cast<float>(normal.z[i]));
+    const float here = dx * n.x[i] + dy * n.y[i] + dz * n.z[i];
+    const float there = -(dx * normal.x[i] + dy * normal.y[i] + dz * normal.z[i]);
     const bool is_seen = (here > 0.0f) & (there > 0.0f) & (receivers.valid[i] != 0);
     const float g = here * there / (3.14159265f * square * square);
     share[i] = is_seen ? g / (density[i] + directions * g) : 0.0f;
@@ -213,10 +211,10 @@ void LitPoints::pick(const Shares& shares, const Lanes<float>& draws, Lanes<int>
 
 void LitPoints::placesOf(const Lanes<int>& picked, Vec3Lanes& places) const {
   for (std::size_t i = 0; i < kLaneCount; ++i) {
-    const Vec3Lanes& from = places_[static_cast<std::size_t>(std::max(0, picked[i]))].position;
-    places.x[i] = from.x[i];
-    places.y[i] = from.y[i];
-    places.z[i] = from.z[i];
+    const Vec3fLanes& from = places_[static_cast<std::size_t>(std::max(0, picked[i]))].position;
+    places.x[i] = static_cast<double>(from.x[i]);
+    places.y[i] = static_cast<double>(from.y[i]);
+    places.z[i] = static_cast<double>(from.z[i]);
   }
 }
 

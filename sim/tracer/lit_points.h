@@ -24,8 +24,7 @@ class LitPoints {
 
   /// The coarse points of a tile.
   struct Receivers {
-    const Vec3Lanes& position;
-    const Vec3Lanes& normal;
+    Vec3fLanes position, normal;
     const Lanes<int>& valid;
   };
   /// What share of each point's radiance counts, beside so many directions drawn by the cosine:
@@ -53,7 +52,7 @@ class LitPoints {
 
  private:
   struct Place {
-    Vec3Lanes position, normal;
+    Vec3fLanes position, normal;
     Lanes<float> density;                ///< of points per m², as one receiver has them
     std::vector<Lanes<float>> radiance;  ///< by channel
   };
