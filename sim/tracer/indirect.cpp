@@ -18,6 +18,8 @@ constexpr float kFewestSamples = 8.0f;
 /// The same of what lit places send to what stands still: it is known well from one frame alone, and moves with the
 /// shadows. (Moving objects may be bent, which leaves few neighbours to smooth over.)
 constexpr float kMostOfLitWhereThingsMove = 3.0f;
+/// Of all light on what moves, which moves through it, and whose points are means of several before.
+constexpr float kMostOfWhatMoves = 12.0f;
 /// Cells remember so many times the samples.
 constexpr int kCellsPerPoints = 2, kCellsWhereThingsMove = 4;
 /// Light is remembered for so much of the camera's way: its emitters move with it, which turns phasors.
@@ -309,7 +311,10 @@ IndirectLight::Memory IndirectLight::memoryFor(const Tracing& tracing, int sampl
                           : most;
   const bool is_moving = !tracing.scene.poses.empty();
   const int per_point = is_moving ? kCellsWhereThingsMove : kCellsPerPoints;
-  return {points, is_moving ? std::min(points, kMostOfLitWhereThingsMove) : points, per_point * static_cast<int>(points)};
+  return {.points = points,
+          .lit = is_moving ? std::min(points, kMostOfLitWhereThingsMove) : points,
+          .moving = std::min(points, kMostOfWhatMoves),
+          .cells = per_point * static_cast<int>(points)};
 }
 
 IndirectLight::IndirectLight() : lights_(std::make_unique<LitPoints>()) {}
@@ -363,9 +368,11 @@ void IndirectLight::takeHistory(const CoarseGrid& before, const Tracing& tracing
           ++unknown[static_cast<std::size_t>(v)];
           continue;
         }
-        const float known = row.origin[at].of(before.samples), counts = std::min(known, memory.points);
+        const bool is_moving = grid_.mover(u, v) != 0;
+        const float known = row.origin[at].of(before.samples);
+        const float counts = std::min(known, is_moving ? memory.moving : memory.points);
         row.share[at] = samples / (samples + counts);
-        const float lit_memory = grid_.mover(u, v) != 0 ? memory.points : memory.lit;
+        const float lit_memory = is_moving ? memory.moving : memory.lit;
         row.lit_share[at] = samples / (samples + std::min(known, lit_memory));
         grid_.samples(u, v) = samples + counts;
       }

@@ -121,7 +121,7 @@ class IndirectLight {
  private:
   /// How many samples count in means at most.
   struct Memory {
-    float points, lit;
+    float points, lit, moving;
     int cells;
   };
   [[nodiscard]] Memory memoryFor(const Tracing& tracing, int samples) const;
