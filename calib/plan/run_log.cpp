@@ -307,9 +307,7 @@ Result<std::vector<LoggedTrait>> RunLog::traits(const std::string& camera, const
     trait.name = row.text(), trait.unit = row.text();
     trait.value = row.real(), trait.low = row.real(), trait.high = row.real();
     trait.n = static_cast<std::size_t>(row.number());
-    const bool is_of = (one.trait.of != "B" && one.run.camera_a.starts_with(camera)) ||
-                       (one.trait.of != "A" && one.run.camera_b.starts_with(camera));
-    if (is_of) all.push_back(std::move(one));
+    if (one.isOf(camera)) all.push_back(std::move(one));
   });
   if (!done) return done.error();
   return all;

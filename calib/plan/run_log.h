@@ -35,6 +35,11 @@ struct LoggedRun {
 struct LoggedTrait {
   LoggedRun run{};
   RunTrait trait{};
+  /// The camera that it is of, or one of both, is called so: its name begins with this.
+  [[nodiscard]] bool isOf(const std::string& camera) const {
+    return (trait.of != "B" && run.camera_a.starts_with(camera)) ||
+           (trait.of != "A" && run.camera_b.starts_with(camera));
+  }
 };
 
 /// The log of runs: an SQLite database, whose schema docs/log.md documents.

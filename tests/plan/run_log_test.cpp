@@ -11,6 +11,7 @@
 
 #include <fmt/format.h>
 
+#include "calib/plan/sought.h"
 #include "calib/plan/trend.h"
 #include "tests/record/record_testing.h"
 
@@ -78,6 +79,22 @@ TEST_F(Log, GivesWhatWasPutInByTheRunsBeginning) {
   EXPECT_EQ(of_b->front().trait.detail, "ramp");
   EXPECT_EQ(again->traits("", "", "")->size(), 6u);
   EXPECT_TRUE(again->traits("nobody", "", "")->empty());
+}
+
+TEST_F(Log, SaysWhatThereIsInsteadOfANameThatItDoesNotHave) {
+  auto log = RunLog::open(file_);
+  ASSERT_TRUE(log);
+  ASSERT_TRUE(log->add(run("2026-11-01T00:00:00Z", "aa"), drifts(1.0, 2.0)));
+  const auto all = log->traits("", "", "");
+  ASSERT_TRUE(all);
+  EXPECT_EQ(whyNone(*all, {"kinnect", "drift", ""}), "no camera begins with \"kinnect\"; there are: kinect, twin");
+  EXPECT_EQ(whyNone(*all, {"", "warm", ""}), "no characteristic begins with \"warm\"; there are: drift, masks");
+  EXPECT_EQ(whyNone(*all, {"twin", "warm", ""}),
+            "no characteristic of camera \"twin\" begins with \"warm\"; there are: drift, masks");
+  EXPECT_EQ(whyNone(*all, {"", "", "slope"}), "no number begins with \"slope\"; there are: drift, kappa");
+  EXPECT_EQ(whyNone(*all, {"kinect", "drift", "slope"}),
+            "no number of characteristic \"drift\" of camera \"kinect\" begins with \"slope\"; there are: drift");
+  EXPECT_EQ(whyNone({}, {"kinect", "", ""}), "none of its runs tells any number");
 }
 
 TEST_F(Log, TakesTheSameCapturesOnce) {

@@ -210,7 +210,7 @@ TEST_F(StandardPlan, TellsEveryCharacteristicOfBothCameras) {
   EXPECT_THAT(trend.out, testing::AllOf(testing::HasSubstr("lens scatter: veil [1], A cam"),
                                         testing::HasSubstr("the first")));
   EXPECT_THAT(toftwin("trend " + path("lab.sqlite") + " --camera nobody").err,
-              testing::HasSubstr("nothing of a camera"));
+              testing::HasSubstr("no camera begins with \"nobody\"; there are: cam, twin"));
   EXPECT_THAT(toftwin("log " + path("none.sqlite")).err, testing::HasSubstr("there is no such log"));
 }
 

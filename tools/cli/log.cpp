@@ -11,6 +11,7 @@
 
 #include "calib/compare/report.h"
 #include "calib/plan/run_log.h"
+#include "calib/plan/sought.h"
 #include "calib/plan/trend.h"
 #include "tools/cli/export/hdf5_table.h"
 #include "tools/cli/log.h"
@@ -166,17 +167,21 @@ void printRow(const plan::TrendRow& row, const std::string& first_detail) {
              detail.empty() ? "" : ", ", detail, verdictOn(row, first_detail));
 }
 
+Error whyNoTrend(plan::RunLog& log, const Options& options) {
+  const auto there_are = log.traits("", "", "");
+  if (!there_are) return there_are.error();
+  return {Error::Code::NotFound,
+          options.file + ": " +
+              plan::whyNone(*there_are, {options.camera, options.characteristic, options.number})};
+}
+
 /// Values over the runs, each against the first of the same number.
 Result<Exit> showTrend(const Options& options) {
   auto log = openExisting(options.file);
   if (!log) return log.error();
   const auto all = log->traits(options.camera, options.characteristic, options.number);
   if (!all) return all.error();
-  if (all->empty()) {
-    return Error{Error::Code::NotFound,
-                 fmt::format("{}: nothing of a camera \"{}\", a characteristic \"{}\" and a number \"{}\"",
-                             options.file, options.camera, options.characteristic, options.number)};
-  }
+  if (all->empty()) return whyNoTrend(*log, options);
   const auto runs = log->runs();
   if (!runs) return runs.error();
   for (const plan::TrendSeries& series : plan::trendsOf(*all, *runs)) {
