@@ -139,7 +139,7 @@ std::pair<int, double> rankOf(const TraitVerdict& one, bool is_of_others) {
   enum { kHidden, kDiffers, kOfOthers, kMissing, kSame, kNotTold };
   if (!one.isTold()) return {kNotTold, 0.0};
   if (!one.differs()) return {one.isMissing() ? kMissing : kSame, 0.0};
-  if (one.isWraps() || one.isMissing()) return {kHidden, 0.0};
+  if (one.isWraps() || (one.isMissing() && !one.isMissingAlike())) return {kHidden, 0.0};
   return {is_of_others ? kOfOthers : kDiffers, -one.timesFloor()};
 }
 
@@ -196,6 +196,15 @@ bool TraitVerdict::isOffset() const { return difference.name == "offset"; }
 bool isLack(const Trait& lacked) { return lacked.value > 0.05 && lacked.low > 0.0; }
 
 bool TraitVerdict::isMissing() const { return isLack(lacked_by_b) || isLack(lacked_by_a); }
+
+bool TraitVerdict::isMissingAlike() const {
+  constexpr double kMoreThanOther = 2.0;  // as of a single condition
+  if (!isMissing() || !a || !b) return false;
+  const double by_a = lacked_by_a.value, by_b = lacked_by_b.value;
+  // Where each has a pixel by chance, B lacks of A's what it lacks of all.
+  const bool is_chance = by_b <= 1.0 - b->trait.value && by_a <= 1.0 - a->trait.value;
+  return is_chance && by_a <= kMoreThanOther * by_b && by_b <= kMoreThanOther * by_a;
+}
 
 std::vector<TraitVerdict> verdictsOf(const NamedTraits& traits) {
   const Owned of_a{traits, "A"}, of_b{traits, "B"}, of_both{traits, "B − A"}, of_pair{traits, "A and B"};

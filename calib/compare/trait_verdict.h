@@ -36,6 +36,9 @@ struct TraitVerdict {
   [[nodiscard]] bool isWraps() const;
   /// One camera lacks over 5 % of the other's pixels, whether or not shares differ: they are in no number.
   [[nodiscard]] bool isMissing() const;
+  /// It is missing as noise alone makes it: each lacks at most twice as many as the other, and no more than if each
+  /// had its share of the pixels by chance.
+  [[nodiscard]] bool isMissingAlike() const;
 };
 
 /// Over 5 % of the other's pixels, and more than the interval.
@@ -45,8 +48,8 @@ bool isLack(const Trait& lacked);
 /// what is left of a fit). Where a number is told of A, of B and of B − A, the last one is the difference.
 /// Those that differ come first, the farthest beyond its floor before the others; behind them what others make: the
 /// fixed pattern, and an offset that the scale makes. But before them all the wall's
-/// wraps and what one camera lacks of the pixels, as what is wrapped or missing is in few of the others. What
-/// is extrapolated (Trait::is_extrapolated) is not told.
+/// wraps and what one camera lacks of the pixels, as what is wrapped or missing is in few of the others; but not what
+/// both lack alike. What is extrapolated (Trait::is_extrapolated) is not told.
 std::vector<TraitVerdict> verdictsOf(const NamedTraits& traits);
 
 Json toJson(const std::vector<TraitVerdict>& verdicts);

@@ -44,6 +44,7 @@ std::string hiddenInWords(const TraitVerdict& one) {
   if (one.isWraps() && one.a && one.b)
     return fmt::format("B reads {} of the wall whole periods off, A {}. ", shownPercent(one.b->trait.value),
                        shownPercent(one.a->trait.value));
+  if (one.isMissingAlike()) return "";
   return lackInWords(one.lacked_by_b, "B", "A") + lackInWords(one.lacked_by_a, "A", "B");
 }
 
@@ -51,6 +52,15 @@ std::string hiddenInWords(const std::vector<TraitVerdict>& all) {
   std::string hidden;
   for (const TraitVerdict& one : all) hidden += hiddenInWords(one);
   return hidden;
+}
+
+/// What both lack alike is said last: it is no difference of theirs.
+std::string lackedAlikeInWords(const std::vector<TraitVerdict>& all) {
+  const auto found = std::ranges::find_if(all, &TraitVerdict::isMissingAlike);
+  if (found == all.end()) return "";
+  return fmt::format(". B gives no range at {} % of the pixels at which A does, and A at {} % of B's, as equal cameras "
+                     "do where noise decides which pixels have one",
+                     number(100.0 * found->lacked_by_b.value), number(100.0 * found->lacked_by_a.value));
 }
 
 /// The amplitude of a wave of B − A: how large it is.
@@ -129,18 +139,22 @@ bool isDoubted(const TraitVerdict& one) {
 
 std::string headlineOf(const std::vector<TraitVerdict>& all) {
   const std::size_t differ = countOf(all, true), same = countOf(all, false);
-  const std::string hidden = hiddenInWords(all);
+  const std::string hidden = hiddenInWords(all), alike = lackedAlikeInWords(all);
   if (differ + same == 0) {
     const auto found = std::ranges::find_if(all, isDoubted);
-    return hidden + (found == all.end() ? "No characteristic is known of both cameras"
-                                        : fmt::format("No number of B is held against A's: {}", found->why_not));
+    return hidden +
+           (found == all.end() ? "No characteristic is known of both cameras"
+                               : fmt::format("No number of B is held against A's: {}", found->why_not)) +
+           alike;
   }
   if (differ == 0) {
     return hidden +
-           fmt::format("In none of {} numbers does B differ from A by more than the noise floor", same);
+           fmt::format("In none of {} numbers does B differ from A by more than the noise floor", same) + alike;
   }
   // The first of the table below, but that what wraps or is missing was said.
-  const auto isHidden = [](const TraitVerdict& one) { return one.isWraps() || one.isMissing(); };
+  const auto isHidden = [](const TraitVerdict& one) {
+    return one.isWraps() || (one.isMissing() && !one.isMissingAlike());
+  };
   const auto isNew = [&](const TraitVerdict& one) { return one.isTold() && one.differs() && !isHidden(one); };
   const auto found = std::ranges::find_if(all, isNew);
   const TraitVerdict* first = found == all.end() ? &all.front() : &*found;
@@ -148,7 +162,7 @@ std::string headlineOf(const std::vector<TraitVerdict>& all) {
                       "Clearest difference: {}, {} ({} to {}), {}. "
                       "{} of {} numbers of B differ from A's by more than the noise floor",
                       plainNameOf(*first), sizeOf(*first), number(first->difference.low),
-                      number(first->difference.high), farBeyond(*first), differ, differ + same);
+                      number(first->difference.high), farBeyond(*first), differ, differ + same) + alike;
 }
 
 std::string missingInWords(const std::vector<MissingAt>& missing) {

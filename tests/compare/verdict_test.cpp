@@ -173,6 +173,25 @@ TEST(Verdict, SaysWhichPixelsOneCameraLacksThatHasAsManyOthers) {
   EXPECT_EQ(cardsOf(verdictsOf(traits)).front().tone, Tone::Good);
 }
 
+/// A has half of the pixels, B 46 %, each by noise: each lacks of the other's about what it lacks of all, which is
+/// no difference of the two and buries none. Where one lacks over twice as many, or they have nothing in common, no
+/// noise makes it.
+TEST(Verdict, SaysLastWhatBothLackAlike) {
+  const auto all = verdictsOf(withValidPixels({0.50, 0.46, 0.24, 0.01}));
+  ASSERT_EQ(all.size(), 2u);
+  EXPECT_EQ(all[0].what, "large");
+  EXPECT_TRUE(all[1].differs()) << "shares do, too";
+  EXPECT_THAT(headlineOf(all), testing::StartsWith("Clearest difference: large"));
+  EXPECT_THAT(headlineOf(all),
+              HasSubstr(". B gives no range at 52 % of the pixels at which A does, and A at 47.8 % of B's, as"));
+  NamedTraits equal = withValidPixels({0.50, 0.50, 0.25, 0.01});
+  equal.traits[1].trait = equal.traits[0].trait;
+  EXPECT_THAT(headlineOf(verdictsOf(equal)), testing::StartsWith("In none of 2 numbers"));
+  EXPECT_EQ(cardsOf(verdictsOf(equal)).front().tone, Tone::Fair) << "it may be another reason";
+  for (const ValidShares& others : {ValidShares{0.5, 0.3, 0.24, 0.01}, {0.5, 0.46, 0.2, 0.01}})
+    EXPECT_THAT(headlineOf(verdictsOf(withValidPixels(others))), testing::StartsWith("B gives no range at "));
+}
+
 TEST(Verdict, CallsNothingDifferentWhoseIntervalIsNotKnown) {
   const auto all =
       verdictsOf({.traits = {of("A", "drift", 1.0, 0.9, std::nan("")), of("B", "drift", 5.0, 4.9, 5.1),
