@@ -60,7 +60,7 @@ TableBlock regionTable(const Characteristics& c) {
   TableBlock table{
       fmt::format("B − A by region: pixels of all poses, mean of the frames at each. ± is one "
                   "standard error of the mean over {} different poses, the pixels of one taken as "
-                  "one; – where only one pose sees the region",
+                  "one; – where the mean is of little more than one pose",
                   c.places),
       {"region", "n", "bias [mm]", "RMS [mm]", "95 % within [mm]", "median [mm]", "noise A [mm]",
        "noise B [mm]"},

@@ -50,15 +50,20 @@ double clusteredError(std::span<const double> values, std::span<const std::uint3
     ++used, n += size, sum += size * c.mean(), squares += size * size;
     if (c.n() > 1) within += (size - 1.0) * c.variance(), free += size - 1.0;
   }
-  if (used < 2) return kNaN;
+  // Else what the smaller ones are off by, over how little of the mean they are, would make it more than the values.
+  constexpr double kFewestEqual = 1.5;
+  if (used < 2 || n * n < kFewestEqual * squares) return kNaN;
   // Analysis of variance: how clusters scatter, each weighted by its pixels, less what their pixels' own scatter
-  // makes of it, which is most in those that have few of them.
-  const double mean = sum / n, own = free > 0.0 ? within / free : 0.0;
-  double between = 0.0;
+  // makes of it, which is most in those that are far away and have few of them.
+  const double mean = sum / n, of_all = free > 0.0 ? within / free : 0.0;
+  double between = 0.0, made_by_own = 0.0, own = 0.0;
   for (const Running& c : clusters) {
-    if (c.n() > 0) between += static_cast<double>(c.n()) * (c.mean() - mean) * (c.mean() - mean);
+    if (c.n() == 0) continue;
+    const double size = static_cast<double>(c.n()), variance = c.n() > 1 ? c.variance() : of_all;
+    between += size * (c.mean() - mean) * (c.mean() - mean);
+    made_by_own += (1.0 - size / n) * variance, own += size * variance / n;
   }
-  const double of_clusters = std::max(0.0, between - static_cast<double>(used - 1) * own) / (n - squares / n);
+  const double of_clusters = std::max(0.0, between - made_by_own) / (n - squares / n);
   return std::sqrt(of_clusters * squares / (n * n) + own / n);
 }
 
