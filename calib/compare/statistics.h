@@ -37,8 +37,8 @@ Json toJson(const Summary& summary, const char* unit);
 ///   s² = (Σ n_c (m_c − m̄)² − Σ w_c (1 − n_c/N)) / (N − Σ n_c²/N)      error² = s² Σ n_c² / N² + Σ n_c w_c / N²
 /// It is the error of a mean weighted by n_c whose clusters vary by s (one-way random effects, analysis of
 /// variance: a cluster of few values, whose mean is off by their own scatter, says little of s): that of the
-/// means over √G for G equal clusters. NaN for fewer than two clusters, and where the mean is hardly of more than one:
-/// N² / Σ n_c² < 1.5, as where one holds 79 % of two or more; error² can be up to (mean of values²) / (N² / Σ n_c² − 1).
+/// means over √G for G equal clusters. NaN for fewer than two clusters, and where the mean is of little more than one:
+/// N² / Σ n_c² < 1.5, as where one of two holds over 79 %; error² may be (mean of values²) / (N² / Σ n_c² − 1).
 /// `cluster` holds small numbers, one for each value; values that are not finite are left out.
 double clusteredError(std::span<const double> values, std::span<const std::uint32_t> cluster);
 

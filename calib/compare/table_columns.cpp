@@ -247,4 +247,21 @@ Result<TableColumns> loadTable(const TableJob& job) {
   return table;
 }
 
+TableColumns withoutRows(TableColumns table, const std::vector<std::size_t>& rows) {
+  std::vector<bool> is_kept;
+  std::size_t finite = 0;
+  for (std::size_t i = 0; i < table.values.front().size(); ++i) {
+    const bool is_finite = std::ranges::all_of(table.values, [i](const auto& c) { return std::isfinite(c[i]); });
+    is_kept.push_back(!is_finite || std::ranges::find(rows, finite) == rows.end());
+    finite += is_finite;
+  }
+  const auto keep = [&](std::vector<double>& column) {
+    std::size_t i = 0;
+    std::erase_if(column, [&](double) { return !is_kept[i++]; });
+  };
+  for (auto& column : table.values) keep(column);
+  keep(table.session);
+  return table;
+}
+
 }  // namespace toftwin::compare

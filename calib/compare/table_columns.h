@@ -42,5 +42,7 @@ struct TableColumns {
 /// Errors: an unknown kind, a column that the file lacks or whose unit is unknown or of another quantity, no
 /// frequency.
 Result<TableColumns> loadTable(const TableJob& job);
+/// The same without some of the rows of which all values are finite, counted from 0.
+TableColumns withoutRows(TableColumns table, const std::vector<std::size_t>& rows);
 
 }  // namespace toftwin::compare

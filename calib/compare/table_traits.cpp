@@ -8,6 +8,7 @@
 #include <limits>
 #include <map>
 #include <numeric>
+#include <optional>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -18,6 +19,7 @@
 #include "calib/compare/fitted_figure.h"
 #include "calib/compare/trait_verdict.h"
 #include "calib/compare/verdict_words.h"
+#include "calib/compare/without_odd_rows.h"
 
 namespace toftwin::compare {
 namespace {
@@ -119,8 +121,6 @@ std::vector<std::string> doubtsIn(const NamedTraits& traits) {
   return notes;
 }
 
-}  // namespace
-
 /// Of two tables at the same frequencies, both with the same waves.
 void addSameWaves(const std::vector<TableColumns>& tables, const std::vector<double>& f,
                   TraitCollector& all) {
@@ -133,8 +133,44 @@ void addSameWaves(const std::vector<TableColumns>& tables, const std::vector<dou
   for (std::size_t i = 0; i < both.size(); ++i) all.add(rowsOf(tables[i], kOf[i]), both[i]);
 }
 
-Result<Report> judgeTables(const std::vector<TableJob>& jobs) {
+/// All that tables of one kind tell.
+NamedTraits traitsOf(const std::vector<TableColumns>& tables, const std::vector<TableJob>& jobs) {
   TraitCollector all;
+  const bool are_waves = tables.back().kind == findTableKind("harmonics") && tables.size() == kOf.size();
+  if (are_waves && jobs[0].frequency_hz == jobs[1].frequency_hz) {
+    addSameWaves(tables, jobs[0].frequency_hz, all);
+  } else {
+    for (std::size_t i = 0; i < tables.size(); ++i) addTraits(tables[i], jobs[i].frequency_hz, kOf[i], all);
+  }
+  return std::move(all).found();
+}
+
+/// Beside what all rows say, not instead of it.
+void addWithout(const NamedTraits& traits, const WithoutOddRows& without, Section& section) {
+  section.blocks.push_back(besideAllRows(traits, without));
+  if (without.verdicts.empty()) return;
+  TableBlock verdicts = verdictTable(without.verdicts);
+  verdicts.caption = "B against A once more, without these rows";
+  section.blocks.push_back(std::move(verdicts));
+}
+
+/// Nothing where no row is odd.
+std::optional<WithoutOddRows> withoutOddRows(const NamedTraits& traits, std::vector<TableColumns> tables,
+                                             const std::vector<TableJob>& jobs) {
+  WithoutOddRows without{.left_out = oddRowsOfTables(traits)};
+  if (without.left_out.empty()) return std::nullopt;
+  for (const OddRowsOfTable& odd : without.left_out) {
+    TableColumns& table = tables[odd.of == kOf[0] ? 0 : 1];
+    table = withoutRows(std::move(table), odd.rows);
+  }
+  without.traits = traitsOf(tables, jobs);
+  without.verdicts = verdictsOf(without.traits);
+  return without;
+}
+
+}  // namespace
+
+Result<Report> judgeTables(const std::vector<TableJob>& jobs) {
   std::vector<std::string> files, notes;
   std::vector<TableColumns> tables;
   for (std::size_t i = 0; i < std::min(jobs.size(), kOf.size()); ++i) {
@@ -148,25 +184,22 @@ Result<Report> judgeTables(const std::vector<TableJob>& jobs) {
   }
   if (tables.empty()) return Error{Error::Code::InvalidArgument, "no table is named"};
   const TableKind* kind = tables.back().kind;
-  const bool are_waves = kind == findTableKind("harmonics") && tables.size() == kOf.size();
-  if (are_waves && jobs[0].frequency_hz == jobs[1].frequency_hz) {
-    addSameWaves(tables, jobs[0].frequency_hz, all);
-  } else {
-    for (std::size_t i = 0; i < tables.size(); ++i) addTraits(tables[i], jobs[i].frequency_hz, kOf[i], all);
-  }
-  NamedTraits traits = std::move(all).found();
+  NamedTraits traits = traitsOf(tables, jobs);
   pairRows(traits, *kind);
   if (traits.traits.empty())
     return Error{Error::Code::InvalidArgument, fmt::format("{}", fmt::join(traits.untold, "; "))};
   std::ranges::copy(doubtsIn(traits), std::back_inserter(notes));
   const auto verdicts = verdictsOf(traits);
+  const auto without = withoutOddRows(traits, tables, jobs);
   Report report{.title = fmt::format("Characteristics of tables: {}", kind->name),
                 .subtitle = fmt::format("{}", fmt::join(files, " and "))};
   report.verdict = (verdicts.empty() ? clearestOf(traits) : headlineOf(verdicts)) + ".";
+  if (without) report.verdict += " " + inWords(*without) + ".";
   report.cards = cardsOf(verdicts);
   Section section{.id = "table", .title = kind->tells};
   for (const std::string& note : notes) section.blocks.push_back(Paragraph{.text = note});
   if (!verdicts.empty()) section.blocks.push_back(verdictTable(verdicts));
+  if (without) addWithout(traits, *without, section);
   section.blocks.push_back(figureOf(traits, *kind));
   section.blocks.push_back(traitTable(traits));
   if (!traits.untold.empty())
@@ -175,6 +208,7 @@ Result<Report> judgeTables(const std::vector<TableJob>& jobs) {
   report.data.set("kind", kind->name)
       .set("characteristics", toJson(traits))
       .set("verdicts", toJson(verdicts));
+  if (without) report.data.set("without_odd_rows", toJson(*without));
   Json said = Json::array();
   for (const std::string& note : notes) said.push(note);
   report.data.set("notes", std::move(said));

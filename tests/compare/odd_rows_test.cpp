@@ -4,12 +4,16 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <functional>
 #include <numbers>
 
+#include "calib/compare/table_traits.h"
 #include "calib/compare/trait_verdict.h"
 #include "calib/compare/verdict_words.h"
 #include "planted.h"
+#include "tests/record/record_testing.h"
 
 namespace toftwin::compare {
 namespace {
@@ -168,6 +172,43 @@ TEST(OddRows, MakeNoCamerasDiffer) {
     EXPECT_THAT(headlineOf(verdictsOf(traits)),
                 HasSubstr("No number of B is held against A's: of B, row 45 of 120 is"));
   }
+}
+
+/// A table's file: its rows, and a first one that is not finite.
+std::filesystem::path fileOf(const std::filesystem::path& file, const AtPlaceOfSession& rows) {
+  std::ofstream text{file};
+  text << "distance_m,error_mm,session\n1.0,nan,0\n";
+  for (std::size_t i = 0; i < rows.x.size(); ++i)
+    text << fmt::format("{:.9g},{:.9g},{}\n", rows.x[i], rows.y[i], rows.session[i]);
+  return file;
+}
+
+/// Not instead of the numbers of all rows, but beside them, as of a file that never had the row.
+TEST(OddRows, AreShownByNumbersWithoutThem) {
+  const KindWithSlip& kind = kindsWithSlips().front();
+  const record::Folder folder;
+  Noise noise_a{1}, noise_b{2};
+  const auto a = sessionsOf(kind, false, {}, noise_a);
+  auto b = sessionsOf(kind, false, {44, 60.0}, noise_b);
+  const auto jobOf = [&](const char* name, const AtPlaceOfSession& rows) -> TableJob {
+    return {.file = fileOf(folder / name, rows), .kind = "harmonics", .frequency_hz = {30e6}};
+  };
+  const auto of_all = judgeTables({jobOf("a.csv", a), jobOf("b.csv", b)});
+  for (auto* column : {&b.x, &b.y, &b.session}) column->erase(column->begin() + 44);
+  const auto of_others = judgeTables({jobOf("a.csv", a), jobOf("c.csv", b)});
+  ASSERT_TRUE(of_all && of_others) << of_all.error().message;
+  EXPECT_EQ(of_others->data.find("without_odd_rows"), nullptr);
+  const Json* without = of_all->data.find("without_odd_rows");
+  ASSERT_NE(without, nullptr);
+  EXPECT_EQ(without->find("left_out")->find("A"), nullptr);
+  EXPECT_EQ(without->find("left_out")->find("B")->at(0).number(), 45.0);
+  for (const char* part : {"characteristics", "verdicts"})
+    EXPECT_EQ(without->find(part)->text(), of_others->data.find(part)->text()) << part;
+  EXPECT_THAT(of_all->data.find("characteristics")->text(), HasSubstr("row 45 of 120 is"));
+  EXPECT_THAT(of_all->verdict, HasSubstr("No number of B is held against A's: of B, row 45 of 120 is"));
+  EXPECT_THAT(of_all->verdict, HasSubstr("Without row 45 of B: " + of_others->verdict));
+  EXPECT_THAT(toHtml(*of_all), HasSubstr("The same numbers with all rows, and without row 45 of B"));
+  EXPECT_THAT(toHtml(*of_all), HasSubstr("B against A once more, without these rows"));
 }
 
 /// A warm-up of 60 rows with errors of 0.3; `off` at these rows.

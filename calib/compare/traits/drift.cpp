@@ -362,8 +362,9 @@ Result<DriftTraits> driftTraits(Column time_s, Column value_mm) {
     const Model plain = [&](Row p, std::size_t i) { return shape(p, t[i]); };
     doubtShape(betweenEnds(y, chosen->rho), betweenEnds(leftBy(plain, fit, y), chosen->rho), result.traits);
   }
-  if (std::string odd = doubtOfOddRows([&](Row p, std::size_t i) { return shape(p, t[i]); }, y, fit.at, t); !odd.empty())
-    for (Trait& one : result.traits) one.doubt = odd;
+  const OddRows odd = oddRowsOf([&](Row p, std::size_t i) { return shape(p, t[i]); }, y, fit.at, t);
+  for (Trait& one : result.traits)
+    if (!odd.doubt.empty()) one.doubt = odd.doubt, one.odd_rows = odd.rows;
   return result;
 }
 

@@ -75,7 +75,8 @@ std::vector<Trait> traitsOf(const Fit& fit, double square_degrees, const std::ve
                     .low = sd * std::exp(-half),
                     .high = sd * std::exp(half),
                     .n = fit.n,
-                    .doubt = fit.doubt});
+                    .doubt = fit.doubt,
+                    .odd_rows = fit.odd_rows});
   return traits;
 }
 
@@ -264,14 +265,14 @@ Result<FittedTraits> fitClusters(Column distance_m, Column error_mm, const std::
         fmt::format("the distances span too little of a period, or are of few {} only", clusters.what)
             .c_str());
   const bool are_places = clusters.what == kSharedPlaces;
-  const std::string odd =
-      are_places ? doubtOfOddRows(matrixOf(columns), leftBy(*fit, columns, rows->error_mm), d) : "";
+  const OddRows odd =
+      are_places ? oddRowsOf(matrixOf(columns), leftBy(*fit, columns, rows->error_mm), d) : OddRows{};
   leaveOutOffsets(*fit, without_offsets);
   if (are_places) addWhatIsShared(*fit);
   FittedTraits fitted = fittedOf(*fit, fit->square_degrees, waves, d);
   doubtFewClusters(rows->clusters, *fit, clusters.what, fitted.traits);
   for (Trait& one : fitted.traits)
-    if (!odd.empty()) one.doubt = odd;
+    if (!odd.doubt.empty()) one.doubt = odd.doubt, one.odd_rows = odd.rows;
   if (clusters.are_turned) {
     fitted.curve = {};  // it says nothing of the rows as they are
     fitted.traits.back().doubt = "the poses' turns and the board itself bend the rows of each capture, too";

@@ -110,7 +110,8 @@ Trait Fit::trait(std::string name, std::string unit,
           .low = value - half,
           .high = value + half,
           .n = n,
-          .doubt = doubt};
+          .doubt = doubt,
+          .odd_rows = odd_rows};
 }
 
 void Fit::heedCorrelation(double rho) {

@@ -38,6 +38,7 @@ struct Fit {
   std::vector<Possible> possible{};  ///< of fitInOrder(); empty: rows are independent
   double even_share = 1.0;           ///< of the rows that tell the variance of one: those that scatter most tell most
   std::string doubt{};               ///< Trait::doubt of all its numbers
+  std::vector<std::size_t> odd_rows{};  ///< Trait::odd_rows of them
 
   /// Of a number with that gradient by the parameters: what its 95 % interval is Student's of, with `degrees`.
   [[nodiscard]] double varianceAlong(std::span<const double> gradient) const;

@@ -83,7 +83,7 @@ class Others {
 
 /// Rows beyond chance, the oddest first: of so many taken out one after the other, as an odd one may hide
 /// behind another, up to the last that is.
-std::vector<Odd> oddRowsOf(const MatrixXd& jacobian, const VectorXd& left) {
+std::vector<Odd> beyondChance(const MatrixXd& jacobian, const VectorXd& left) {
   constexpr double kShare = 0.1, kOfEach = 0.01;  // of Σ r²
   Others others{jacobian, left};
   const double all = others.squares();
@@ -153,42 +153,49 @@ std::vector<double> sigmasBeside(const std::vector<Odd>& odd, const Rest& rest, 
   return all;
 }
 
+OddRows named(const std::vector<Odd>& odd, Index of) {
+  OddRows all;
+  double least = odd.front().gain;
+  std::vector<std::size_t> numbers;  // as a person counts them
+  for (const Odd& one : odd) all.rows.push_back(static_cast<std::size_t>(one.row)), least = std::min(least, one.gain);
+  std::ranges::sort(all.rows);
+  for (const std::size_t row : all.rows) numbers.push_back(row + 1);
+  const double times = std::sqrt(least / std::max(odd.back().variance, 1e-300));
+  const bool is_one = numbers.size() == 1;
+  all.doubt = fmt::format(
+      "{} {} of {} {} {}{:.3g} times as far off as the others scatter, and in all numbers, which may be "
+      "others without {}",
+      is_one ? "row" : "rows", fmt::join(numbers, ", "), of, is_one ? "is" : "are", is_one ? "" : "at least ", times,
+      is_one ? "it" : "them");
+  return all;
+}
+
 }  // namespace
 
-std::string doubtOfOddRows(const MatrixXd& jacobian, const VectorXd& left, Column x) {
+OddRows oddRowsOf(const MatrixXd& jacobian, const VectorXd& left, Column x) {
   if (left.size() - jacobian.cols() <= kFewestFree || !jacobian.allFinite() || !left.allFinite()) return {};
-  auto odd = oddRowsOf(jacobian, left);
+  auto odd = beyondChance(jacobian, left);
   if (odd.empty()) return {};
   const Rest rest{odd, jacobian, left, x};
   const auto sigmas = sigmasBeside(odd, rest, x, static_cast<std::size_t>(jacobian.cols()));
   odd = oddAmongNeighbours(std::move(odd), rest, x);
   if (!sigmas.empty() && !odd.empty()) {
     const VectorXd lighter = Eigen::Map<const VectorXd>(sigmas.data(), left.size()).cwiseInverse();
-    auto by_sigma = oddRowsOf(lighter.asDiagonal() * jacobian, lighter.cwiseProduct(left));
+    auto by_sigma = beyondChance(lighter.asDiagonal() * jacobian, lighter.cwiseProduct(left));
     std::erase_if(by_sigma,
                   [&](const Odd& one) { return std::ranges::find(odd, one.row, &Odd::row) == odd.end(); });
     odd = std::move(by_sigma);
   }
   if (odd.empty()) return {};
-  std::vector<Index> rows;
-  double least = odd.front().gain;
-  for (const Odd& one : odd) rows.push_back(one.row + 1), least = std::min(least, one.gain);
-  std::ranges::sort(rows);
-  const double times = std::sqrt(least / std::max(odd.back().variance, 1e-300));
-  const bool is_one = rows.size() == 1;
-  return fmt::format(
-      "{} {} of {} {} {}{:.3g} times as far off as the others scatter, and in all numbers, which may be "
-      "others without {}",
-      is_one ? "row" : "rows", fmt::join(rows, ", "), left.size(), is_one ? "is" : "are",
-      is_one ? "" : "at least ", times, is_one ? "it" : "them");
+  return named(odd, left.size());
 }
 
-std::string doubtOfOddRows(const Model& model, Column y, std::span<const double> at, Column x) {
+OddRows oddRowsOf(const Model& model, Column y, std::span<const double> at, Column x) {
   constexpr double kRounding = 1e-18;  // what is left of an exact curve says nothing of errors
   const VectorXd left = residuals(model, y, at);
   if (!(left.squaredNorm() > kRounding * Eigen::Map<const VectorXd>(y.data(), left.size()).squaredNorm()))
     return {};
-  return doubtOfOddRows(jacobian(model, y.size(), {at.begin(), at.end()}), left, x);
+  return oddRowsOf(jacobian(model, y.size(), {at.begin(), at.end()}), left, x);
 }
 
 }  // namespace toftwin::compare

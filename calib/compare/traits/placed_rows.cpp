@@ -42,7 +42,7 @@ std::optional<Fit> PlacedRows::fit(const Model& model, std::size_t of_column, co
   const auto &x = rows_.columns[0], &y = rows_.columns[of_column];
   auto fit = rows_.own[of_column].empty() ? fitBesideSessions(model, y, start, x, session_, places_.of)
                                           : fitMeans(model, y, rows_.own[of_column], start, x);
-  if (fit && !rows_.doubt.empty()) fit->doubt = rows_.doubt;
+  if (fit && fit->odd_rows.empty() && !rows_.doubt.empty()) fit->doubt = rows_.doubt;
   return fit;
 }
 

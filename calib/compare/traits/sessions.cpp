@@ -231,7 +231,8 @@ std::optional<Fit> fitBesideSessions(const Model& model, Column y, std::vector<d
   const SharedPlaces sessions = sharedPlacesOf(session);
   // A row that is odd may look like much else, and is said before that.
   const auto doubtOdd = [&](Fit& fit, const Model& of) {
-    if (std::string odd = doubtOfOddRows(of, y, fit.at, x); !odd.empty()) fit.doubt = std::move(odd);
+    OddRows odd = oddRowsOf(of, y, fit.at, x);
+    if (!odd.doubt.empty()) fit.doubt = std::move(odd.doubt), fit.odd_rows = std::move(odd.rows);
   };
   if (sessions.count < 2) {
     auto fit = fitInOrder(model, y, std::move(start), x);

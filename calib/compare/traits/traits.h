@@ -58,6 +58,7 @@ struct Trait {
   RefersTo refers_to{};
   std::string
       doubt{};  ///< why it may be another's, so that nothing is called different by it; empty: it is its own
+  std::vector<std::size_t> odd_rows{};  ///< what puts it in doubt: which of the finite rows, from 0; mostly none
   bool is_extrapolated = false;  ///< it is told far from all rows: what a camera shows that nobody measured
 };
 using Traits = Result<std::vector<Trait>>;
