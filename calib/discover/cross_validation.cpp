@@ -37,12 +37,6 @@ VectorXd solve(const Marginal& marginal, const Training& training, const Columns
   return pseudoInverse(gram, 1e-8).inverse * training.moment;
 }
 
-double deviance(const CaptureEvidence& capture, const Columns& columns, const VectorXd& value) {
-  const MatrixXd gram = capture.gram(columns, columns);
-  const VectorXd moment = capture.moment(columns), explained = gram * value;
-  return capture.energy - 2.0 * value.dot(moment) + value.dot(explained);
-}
-
 }  // namespace
 
 std::vector<int> foldsOf(const Marginal& marginal, int folds) {
@@ -65,7 +59,7 @@ std::vector<double> heldOut(const Marginal& marginal, const Columns& columns, in
     value.push_back(solve(marginal, training, columns));
   std::vector<double> left(marginal.captures.size());
   for (std::size_t c = 0; c < left.size(); ++c)
-    left[c] = deviance(marginal.captures[c], columns, value[static_cast<std::size_t>(fold[c])]);
+    left[c] = energyLeft(marginal.captures[c], columns, value[static_cast<std::size_t>(fold[c])]);
   return left;
 }
 

@@ -172,6 +172,12 @@ Fit fit(const Marginal& marginal, const Columns& columns) {
   return out;
 }
 
+double energyLeft(const CaptureEvidence& capture, const Columns& columns, const Eigen::VectorXd& coefficient) {
+  const Eigen::MatrixXd gram = capture.gram(columns, columns);
+  const Eigen::VectorXd moment = capture.moment(columns), explained = gram * coefficient;
+  return capture.energy - 2.0 * coefficient.dot(moment) + coefficient.dot(explained);
+}
+
 std::vector<double> estimateScales(const Evidence& evidence, std::span<const std::string> projected) {
   int classes = 0;
   for (const Group& group : evidence.groups) {

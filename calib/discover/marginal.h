@@ -51,6 +51,9 @@ struct Fit {
 };
 Fit fit(const Marginal& marginal, const Columns& columns);
 
+/// yᵀy of a capture with Xβ taken off: what is left of its energy by these coefficients of these columns.
+double energyLeft(const CaptureEvidence& capture, const Columns& columns, const Eigen::VectorXd& coefficient);
+
 /// Factors on the nominal deviations that make the data most likely (restricted maximum likelihood: the
 /// coefficients of `columns` are integrated out, D. A. Harville, JASA 72 (1977) 320), by classes in turn.
 std::vector<double> estimateScales(const Evidence& evidence, std::span<const std::string> projected);

@@ -19,6 +19,9 @@ std::vector<std::string> alongOf(const Context& context, const Effect& effect) {
   return along.empty() ? effect.covariates : along;
 }
 
+/// As far as it says along what it goes.
+Effect effectLike(const Alternative& other) { return {.name = other.name, .covariates = other.covariates}; }
+
 /// What effects of the catalogue call that along which it goes.
 std::set<std::string> wordsOf(const Context& context, const Effect& effect) {
   std::set<std::string> words;
@@ -86,7 +89,7 @@ std::optional<std::size_t> partOfAKnown(const Found& found, const std::vector<Ex
   const auto isMoreOfAKnown = [&](const Alternative& other) {
     return std::ranges::any_of(found.effects, [&](const Effect& known) {
       return !known.is_catalogue && isApproximate(known) &&
-             goAlongTheSame(found.context, known, Effect{.name = other.name, .covariates = other.covariates});
+             goAlongTheSame(found.context, known, effectLike(other));
     });
   };
   for (const Alternative& other : effect.alternatives) {  // the best first
@@ -104,14 +107,14 @@ std::optional<std::size_t> nameInDoubt(const Found& found, const Effect& effect)
     return (!effect.is_catalogue && goAlongTheSame(found.context, curve, effect)) ||
            std::ranges::any_of(effect.alternatives, [&](const Alternative& other) {
              return !other.group.terms.empty() &&
-                    goAlongTheSame(found.context, curve, Effect{.name = other.name, .covariates = other.covariates});
+                    goAlongTheSame(found.context, curve, effectLike(other));
            });
   };
   for (std::size_t i = 0; i < found.effects.size(); ++i) {
     if (!found.effects[i].fit) continue;
     for (const Alternative& other : found.effects[i].alternatives) {
       if (other.group.terms.empty()) continue;
-      if (goesAlong(Effect{.name = other.name, .covariates = other.covariates})) return i;
+      if (goesAlong(effectLike(other))) return i;
     }
   }
   return std::nullopt;

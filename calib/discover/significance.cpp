@@ -98,9 +98,7 @@ VectorXd dispersions(const Marginal& marginal, const Fit& model) {
   VectorXd out(static_cast<Index>(marginal.captures.size()));
   for (Index c = 0; c < out.size(); ++c) {
     const CaptureEvidence& capture = marginal.captures[static_cast<std::size_t>(c)];
-    const MatrixXd gram = capture.gram(model.columns, model.columns);
-    const VectorXd moment = capture.moment(model.columns), explained = gram * model.coefficient;
-    const double left = capture.energy - 2.0 * model.coefficient.dot(moment) + model.coefficient.dot(explained);
+    const double left = energyLeft(capture, model.columns, model.coefficient);
     out(c) = capture.rows > 0.0 ? std::max(0.0, left) / capture.rows : 1.0;
   }
   return out.cwiseMax(0.25 * model.dispersion());

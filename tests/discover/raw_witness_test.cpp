@@ -98,6 +98,14 @@ class WithRawExposures : public Searched {
  protected:
   WithRawExposures() { with_samples_ = true; }
 
+  /// For one effect, in data with `name` in them, which the catalogue lacks.
+  [[nodiscard]] CampaignFinding searchWithout(const std::string& name, const std::string& keys) const {
+    simulate("[[effect]]\ntype = '" + name + "'\n" + keys + "\n");
+    CampaignJob without = job();
+    without.left_out = {name}, without.finder.most_effects = 1;
+    return search(without);
+  }
+
   /// The only effect that was found, if it is one without a name that raw exposures speak of.
   static const FoundEffect* unnamedIn(const CampaignFinding& finding) {
     const bool is_one = finding.effects.size() == 1 && !finding.effects.front().found.is_catalogue;
@@ -135,10 +143,7 @@ TEST_F(WithRawExposures, ADelayBeforeDecodingIsInTheirPhase) {
 }
 
 TEST_F(WithRawExposures, OneRawExposureThatIsAmplifiedMoreContradictsTheOthers) {
-  simulate("[[effect]]\ntype = 'sample_gain'\nstep = 1\ngain = 0.04\n");
-  CampaignJob without = job();
-  without.left_out = {"sample_gain"}, without.finder.most_effects = 1;
-  const CampaignFinding finding = search(without);
+  const CampaignFinding finding = searchWithout("sample_gain", "step = 1\ngain = 0.04");
   ASSERT_EQ(finding.effects.size(), 1u) << verdictOf(finding);
   const FoundEffect& one = finding.effects.front();
   ASSERT_TRUE(one.raw) << verdictOf(finding);
@@ -148,10 +153,7 @@ TEST_F(WithRawExposures, OneRawExposureThatIsAmplifiedMoreContradictsTheOthers) 
 
 /// A gain of the amplitude, to ranges and amplitudes; but samples bend it, not light.
 TEST_F(WithRawExposures, WhatBendsSamplesContradictsEvenWhereTheRangeStays) {
-  simulate("[[effect]]\ntype = 'nonlinearity'\ncubic_per_electron2 = 1e-12\n");
-  CampaignJob without = job();
-  without.left_out = {"nonlinearity"}, without.finder.most_effects = 1;
-  const CampaignFinding finding = search(without);
+  const CampaignFinding finding = searchWithout("nonlinearity", "cubic_per_electron2 = 1e-12");
   ASSERT_EQ(finding.effects.size(), 1u) << verdictOf(finding);
   EXPECT_EQ(finding.effects.front().found.stage, Stage::Samples) << verdictOf(finding);
 }

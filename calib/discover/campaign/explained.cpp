@@ -28,12 +28,11 @@ Result<ByCapture> energiesOf(const JudgedCampaign& judged, const JudgedModel& mo
   const auto evidence = residualEvidence(judged, model.effects);
   if (!evidence) return evidence.error();
   const Marginal marginal = marginalise(*evidence, judged.scales);
+  const Columns offset_and_gain{0, 1};
   const Eigen::Vector2d known{model.offset_mm, model.gain_percent};
   ByCapture all;
   for (const CaptureEvidence& capture : marginal.captures) {
-    const Eigen::Matrix2d gram = capture.gram.topLeftCorner<2, 2>();
-    all.energy.push_back(capture.energy - 2.0 * known.dot(capture.moment.head<2>()) +
-                         known.dot(gram * known));
+    all.energy.push_back(energyLeft(capture, offset_and_gain, known));
     all.rows.push_back(capture.rows);
   }
   return all;

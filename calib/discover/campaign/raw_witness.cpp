@@ -26,12 +26,8 @@ std::vector<double> energiesOf(const Marginal& marginal) {
   const Columns common = nuisanceColumns(marginal);
   const Fit fitted = fit(marginal, common);
   std::vector<double> energies;
-  for (const CaptureEvidence& capture : marginal.captures) {
-    const Eigen::VectorXd moment = capture.moment(common);
-    const Eigen::MatrixXd gram = capture.gram(common, common);
-    energies.push_back(capture.energy - 2.0 * fitted.coefficient.dot(moment) +
-                       fitted.coefficient.dot(gram * fitted.coefficient));
-  }
+  for (const CaptureEvidence& capture : marginal.captures)
+    energies.push_back(energyLeft(capture, common, fitted.coefficient));
   return energies;
 }
 
@@ -115,11 +111,19 @@ Result<std::optional<RawWitness>> RawWitness::of(const JudgedCampaign& judged) {
   return std::optional{RawWitness{judged, *std::move(declared)}};
 }
 
+RawWitness::RawWitness(const JudgedCampaign& judged, NoiselessCamera declared)
+    : judged_(&judged), declared_(std::move(declared)), declared_raw_(judged.lit.captures.size()) {
+  const Lit& lit = judged.lit;
+  sim::inParallel(static_cast<int>(lit.captures.size()), 1, [&](int first, int last) {
+    for (auto c = static_cast<std::size_t>(first); c < static_cast<std::size_t>(last); ++c)
+      declared_raw_[c] = {declared_.readRaw(lit.captures[c], lit.traced[c]->light),
+                          declared_.readRaw(lit.captures[c], lit.varied[c]->light)};
+  });
+}
+
 RawWitness::Simulated RawWitness::simulated(std::size_t c, const NoiselessCamera& camera) const {
-  const MeasuredCapture& capture = judged_->lit.captures[c];
-  const sim::Light& varied = judged_->lit.varied[c]->light;
-  return {declared_.readRaw(capture, judged_->lit.traced[c]->light), declared_.readRaw(capture, varied),
-          camera.readRaw(capture, varied)};
+  return {declared_raw_[c].traced, declared_raw_[c].varied,
+          camera.readRaw(judged_->lit.captures[c], judged_->lit.varied[c]->light)};
 }
 
 /// Of what is left of a capture's waves, as WhitenedCapture wants it: a simulation whose range is off the measured one

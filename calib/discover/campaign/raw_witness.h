@@ -37,8 +37,7 @@ class RawWitness {
   [[nodiscard]] Result<double> contradiction(const std::vector<sim::AnyEffect>& effects) const;
 
  private:
-  RawWitness(const JudgedCampaign& judged, NoiselessCamera declared)
-      : judged_(&judged), declared_(std::move(declared)) {}
+  RawWitness(const JudgedCampaign& judged, NoiselessCamera declared);
 
   /// What a model leaves: χ² of each stand's waves, poses and light integrated out, and of its closures.
   struct Left {
@@ -51,7 +50,8 @@ class RawWitness {
   /// What a camera's raw exposures would be in a capture: the declared one's on the light that is compared, changed by
   /// what the two differ in on the light that effects are varied on.
   struct Simulated {
-    RawReading traced, from, to;
+    const RawReading &traced, &from;
+    RawReading to;
   };
   [[nodiscard]] Simulated simulated(std::size_t capture, const NoiselessCamera& camera) const;
   [[nodiscard]] std::vector<Closure> closuresLeft(std::size_t capture, const Simulated& raw) const;
@@ -61,6 +61,11 @@ class RawWitness {
 
   const JudgedCampaign* judged_;
   NoiselessCamera declared_;
+  /// What it would say of each capture: on the light that is compared, and on the one that effects are varied on.
+  struct DeclaredRaw {
+    RawReading traced, varied;
+  };
+  std::vector<DeclaredRaw> declared_raw_;
 };
 
 }  // namespace toftwin::discover

@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a list of effects leaves of a campaign, and what is fitted to that alone: the light's delay, and where the
+// cameras stood.
+#include <algorithm>
+#include <cmath>
+
+#include "calib/discover/campaign/carriers.h"
+#include "calib/discover/campaign/reading.h"
+#include "calib/discover/campaign/refit.h"
+#include "calib/linear/linear.h"
+#include "sim/images/rows.h"
+
+namespace toftwin::discover {
+namespace {
+
+/// Of offset and gain.
+Fit commonFit(const Evidence& evidence, std::span<const double> scales) {
+  const Marginal marginal = marginalise(evidence, scales);
+  return fit(marginal, nuisanceColumns(marginal));
+}
+
+/// Whether a delay of the light does more to some of the captures than an offset of the range.
+Result<bool> isDelayNoOffset(const JudgedCampaign& judged, const std::vector<sim::AnyEffect>& as_declared) {
+  constexpr double kDelay_mm = 5.0;
+  constexpr std::size_t kSome = 8;
+  const sim::SensorModel& model = judged.declared.model;
+  const auto here = NoiselessCamera::make(model, as_declared, judged.lit.captures);
+  const auto late =
+      NoiselessCamera::make(model, withDelay(model, as_declared, kDelay_mm), judged.lit.captures);
+  if (!here || !late) return here ? late.error() : here.error();
+  std::vector<Reading> changes;
+  const std::size_t stride = 1 + judged.lit.captures.size() / kSome;
+  for (std::size_t c = 0; c < judged.lit.captures.size(); c += stride) {
+    const MeasuredCapture& capture = judged.lit.captures[c];
+    const sim::Light& light = judged.lit.varied[c]->light;
+    const Reading before = here->read(capture, light);
+    Reading change = late->read(capture, light);
+    for (std::size_t i = 0; i < change.range_m.size(); ++i) change.range_m[i] -= before.range_m[i];
+    changes.push_back(std::move(change));
+  }
+  return isNoOffset(changes);
+}
+
+}  // namespace
+
+Result<Evidence> residualEvidence(const JudgedCampaign& judged, const std::vector<sim::AnyEffect>& effects) {
+  const Lit& lit = judged.lit;
+  const auto declared =
+      NoiselessCamera::make(judged.declared.model, declaredEffects(judged.declared), lit.captures);
+  if (!declared) return declared.error();
+  const auto here = NoiselessCamera::make(judged.declared.model, effects, lit.captures);
+  if (!here) return here.error();
+  Evidence evidence;
+  evidence.groups = commonGroups();
+  evidence.captures.resize(lit.captures.size());
+  sim::inParallel(static_cast<int>(lit.captures.size()), 1, [&](int first, int last) {
+    for (auto c = static_cast<std::size_t>(first); c < static_cast<std::size_t>(last); ++c) {
+      const MeasuredCapture& capture = lit.captures[c];
+      const TracedCapture& traced = *lit.traced[c];
+      // Which pixels count must not depend on what is fitted.
+      const Cells cells{capture, traced, declared->read(capture, traced.light), judged.most_cells};
+      WhitenedCapture whitened{cells, kCommon};
+      whitened.putCommon(cells, traced);
+      whitened.putResidual(cells, capture, traced,
+                           readingOf(*declared, *here, capture, traced.light, lit.varied[c]->light));
+      evidence.captures[c] = whitened.evidence(capture.record.name, capture.record.block);
+    }
+  });
+  evidence.captures = joined(std::move(evidence.captures), standsOf(lit.captures));
+  return evidence;
+}
+
+Result<double> delayThatFits(const JudgedCampaign& judged) {
+  constexpr double kStep_mm = 2.0, kMost_mm = 100.0, kDone_mm = 0.1;
+  const sim::SensorModel& model = judged.declared.model;
+  if (model.traceRequest().frequencies.empty()) return 0.0;  // a pulsed camera's gates know no cyclic error
+  const auto as_declared = effectsWithoutNoise(model);
+  const auto is_told = isDelayNoOffset(judged, as_declared);
+  if (!is_told) return is_told.error();
+  if (!*is_told) return 0.0;
+  const auto fitAt = [&](double delay_mm) -> Result<Fit> {
+    const auto evidence = residualEvidence(judged, withDelay(model, as_declared, delay_mm));
+    if (!evidence) return evidence.error();
+    return commonFit(*evidence, judged.scales);
+  };
+  const auto start = fitAt(0.0);
+  if (!start) return start.error();
+  double delay_mm = 0.0, deviance = start->deviance;
+  for (int k = 0; k < 6; ++k) {
+    const auto before = fitAt(delay_mm - kStep_mm), behind = fitAt(delay_mm + kStep_mm);
+    if (!before || !behind) return before ? behind.error() : before.error();
+    const double slope = 0.5 * (behind->deviance - before->deviance) / kStep_mm;
+    const double bend = (behind->deviance + before->deviance - 2.0 * deviance) / (kStep_mm * kStep_mm);
+    if (!(bend > 1e-9 * deviance)) break;
+    const double by = std::clamp(-slope / bend, -kMost_mm, kMost_mm);
+    const auto next = fitAt(delay_mm + by);
+    if (!next) return next.error();
+    if (!(next->deviance < deviance)) break;
+    delay_mm += by, deviance = next->deviance;
+    if (std::abs(by) < kDone_mm) break;
+  }
+  const double dispersion = std::max(1.0, deviance / std::max(1.0, start->freedom));
+  return start->deviance - deviance > 9.0 * dispersion ? delay_mm : 0.0;
+}
+
+Result<std::vector<std::shared_ptr<const TracedCapture>>> traceWhereTheyStood(
+    const Declared& declared, const std::vector<sim::AnyEffect>& effects,
+    const std::vector<MeasuredCapture>& captures,
+    const std::vector<std::shared_ptr<const TracedCapture>>& traced, const TraceOptions& options,
+    const std::function<void(double)>& tell) {
+  constexpr Eigen::Index kOwn = 6;  // pose and light
+  const Lit lit{captures, traced, traced};
+  const auto evidence = residualEvidence({declared, lit, {}}, effects);
+  if (!evidence) return evidence.error();
+  const Eigen::VectorXd common = commonFit(*evidence, {}).coefficient;
+  std::vector<Stood> stood;
+  for (const std::size_t stand : standsOf(captures)) {
+    const CaptureEvidence& one = evidence->captures[stand];
+    const Eigen::MatrixXd gram =
+        one.gram.block<kOwn, kOwn>(2, 2) + Eigen::MatrixXd::Identity(kOwn, kOwn);  // prior deviations of 1
+    const Eigen::VectorXd own =
+        linear::Ldlt{gram}.solve(one.moment.segment<kOwn>(2) - one.gram.block<kOwn, 2>(2, 0) * common);
+    Stood& here = stood.emplace_back();
+    for (std::size_t way = 0; way < here.size(); ++way)
+      here[way] = std::clamp(own[static_cast<Eigen::Index>(way)], -10.0, 10.0);
+  }
+  TraceOptions again = options;
+  again.seed += 0x2545f491U;
+  return traceAll(declared, captures, again, tell, stood);
+}
+
+}  // namespace toftwin::discover
