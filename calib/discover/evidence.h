@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -38,6 +39,10 @@ struct Group {
   int numbers = 0;
   /// Of PerCapture and Shared: those with the same class share one scale, which is estimated.
   int scale_class = 0;
+  double most_scale = std::numeric_limits<double>::infinity();  ///< what it can be at most
+  /// How much larger the scale is than captures by themselves say: √n where n of them have one draw in common and
+  /// their columns are √n times as large for it.
+  double alike = 1.0;
 };
 
 /// One capture, whitened: rows are divided by their noise, so that it has unit variance. X: columns of all

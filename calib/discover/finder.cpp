@@ -25,7 +25,7 @@ class Search {
     found_.context.original = found_.context.source =
         std::shared_ptr<const RowSource>{std::shared_ptr<void>{}, &source};
     found_.context.covariates = source.covariates();
-    found_.context.test = {options.null_model, options.draws, options.seed};
+    found_.context.test = {options.null_model, options.draws, options.seed, options.least_dispersion};
     found_.context.alpha = options.alpha;
     const std::size_t captures = source.withoutCatalogue({}).captures.size();
     found_.context.generic = genericCandidates(
@@ -100,8 +100,8 @@ class Search {
   }
 
   Significance testNow(int step) {
-    const TestOptions options{options_.null_model, options_.draws,
-                              options_.seed + 1000003U * static_cast<std::uint64_t>(step)};
+    TestOptions options = found_.context.test;
+    options.seed += 1000003U * static_cast<std::uint64_t>(step);
     Test test{options};
     inParts(found_.context, found_.context.generic, [&](const Part& part) {
       const std::span tested = std::span{found_.context.generic}.subspan(part.begin, part.end - part.begin);

@@ -24,6 +24,7 @@ struct FinderOptions {
   int most_effects = 4;
   std::uint64_t seed = 1;
   NullModel null_model = NullModel::Automatic;
+  double least_dispersion = 0.0;    ///< see TestOptions
   bool has_straight_pairs = false;  ///< see CandidateOptions
   /// Of random effects as long as nothing was found: what is an effect must not be taken for them.
   double most_scale = std::numeric_limits<double>::infinity();

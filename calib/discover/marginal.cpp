@@ -179,13 +179,18 @@ double energyLeft(const CaptureEvidence& capture, const Columns& columns, const 
 }
 
 std::vector<double> estimateScales(const Evidence& evidence, std::span<const std::string> projected) {
-  int classes = 0;
+  struct Class {
+    double most = std::numeric_limits<double>::infinity(), alike = 1.0;
+  };
+  std::vector<Class> classes;
   for (const Group& group : evidence.groups) {
-    if (group.kind == Kind::PerCapture || group.kind == Kind::Shared)
-      classes = std::max(classes, group.scale_class + 1);
+    if (group.kind != Kind::PerCapture && group.kind != Kind::Shared) continue;
+    const auto which = static_cast<std::size_t>(group.scale_class);
+    if (which >= classes.size()) classes.resize(which + 1);
+    classes[which] = {std::min(classes[which].most, group.most_scale), group.alike};
   }
-  std::vector<double> scale(static_cast<std::size_t>(classes), 1.0);
-  for (int round = 0; round < (classes > 1 ? 2 : 1); ++round) {
+  std::vector<double> scale(classes.size(), 1.0);
+  for (int round = 0; round < (scale.size() > 1 ? 2 : 1); ++round) {
     for (double& one : scale) {
       double best = one, least = criterion(evidence, projected, scale);
       for (const double candidate : kScales) {
@@ -196,6 +201,7 @@ std::vector<double> estimateScales(const Evidence& evidence, std::span<const std
       one = best;
     }
   }
+  for (std::size_t i = 0; i < scale.size(); ++i) scale[i] = std::min(classes[i].alike * scale[i], classes[i].most);
   return scale;
 }
 

@@ -227,9 +227,9 @@ void Test::add(const Marginal& marginal, const Columns& model_columns, const Mat
   if (is_flipped) {
     for (Projected& group : groups) group.correction = flipCorrection(marginal, model, group);
   }
-  const MatrixXd draws = is_flipped
-                             ? flippedDraws(groups, residual, model_columns, options_)
-                             : drawsOf(groups, noiseMoments(marginal, dispersion, options_), model_columns);
+  const VectorXd of_noise = dispersion.cwiseMax(options_.least_dispersion);
+  const MatrixXd draws = is_flipped ? flippedDraws(groups, residual, model_columns, options_)
+                                    : drawsOf(groups, noiseMoments(marginal, of_noise, options_), model_columns);
   const MatrixXd source_draws = out_.has_of_source ? drawsOf(groups, of_source, model_columns) : MatrixXd{};
   for (std::size_t g = 0; g < groups.size(); ++g) {
     const auto row = static_cast<Index>(g);

@@ -27,6 +27,9 @@ struct TestOptions {
   NullModel null_model = NullModel::Automatic;
   int draws = 400;
   std::uint64_t seed = 1;
+  /// Of each capture's noise, of which rows state 1: for rows of which what they have in common is as large as
+  /// stated, and what each has for itself is less.
+  double least_dispersion = 0.0;
 };
 
 /// How much a group explains: T = uᵀ S⁺ u, u the moment and S the Gram of its columns after the model's are

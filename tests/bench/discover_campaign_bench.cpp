@@ -4,6 +4,7 @@
 //
 //   discover_campaign_bench [--cases a,b] [--seeds 1:5] [--lambda 150,600,3000] [--absent no|yes|both]
 //                           [--null plain,noise,pose,tails,bump] [--threads 1] [--large] [--scores] [--samples]
+//                           [--light]
 //   discover_campaign_bench --table FILE...
 //   discover_campaign_bench --references FOLDER...     (each as tests/reference_device/reference_campaign
 //   leaves it)
@@ -12,8 +13,10 @@
 // puts such lines together. Without --cases and --null: all effects; with --null alone: no effects. --large:
 // 106 captures of 176 × 132 pixels instead of 45 of 44 × 33, to see how long a search takes. --scores: with
 // what explains most by itself and fitted numbers beside the hidden ones, as lines that begin with #. --samples:
-// raw exposures are recorded, too.
+// raw exposures are recorded, too. --light: as toftwind simulates a
+// camera: on a perfect rig, light over four surfaces by 64 paths a pixel, one for each place, whose noise frames state.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <tbb/global_control.h>
 #include <unistd.h>
 
@@ -44,6 +47,7 @@ using namespace toftwin;
 using namespace toftwin::discover;
 
 constexpr TraceOptions kTrace{.max_surfaces = 1};
+constexpr int kSurfacesOfLight = 4;
 /// Of the small camera's range where it collects an electron: its phase noise is √(B/2)/A with about twice as many
 /// electrons B as amplitude A, and a radian is 0.8 m.
 constexpr float kNoiseAt1e_m = 0.8F;
@@ -52,7 +56,7 @@ struct Options {
   std::vector<double> lambdas{600.0};
   std::uint64_t first_seed = 1, last_seed = 1;
   std::size_t threads = 0;
-  bool present = true, absent = false, large = false, scores = false, samples = false;
+  bool present = true, absent = false, large = false, scores = false, samples = false, light = false;
   std::vector<std::string> cases{}, nulls{};
   std::vector<std::filesystem::path> tables{}, references{};
 };
@@ -125,12 +129,16 @@ struct Setting {
   Declared declared{orEnd(sim::SensorModel::parse(camera, "camera.toml")), scene};
 };
 
-void simulate(const Setting& world, const sim::SensorModel& camera, std::uint64_t seed, bool with_samples,
+void simulate(const Setting& world, const sim::SensorModel& camera, std::uint64_t seed, const Options& options,
               const std::string& null = {}) {
   std::filesystem::remove_all(folder());
   SimulatedRun run{.plan = world.plan, .camera = camera, .scene = world.scene, .seed = seed};
-  run.with_samples = with_samples;
+  run.with_samples = options.samples;
   if (null == "pose") run.pose_error_m *= 2.0, run.pose_error_deg *= 2.0;
+  if (options.light) {
+    run.shared_paths = 64, run.max_surfaces = kSurfacesOfLight;
+    run.pose_error_m = run.pose_error_deg = run.light_error = 0.0;
+  }
   if (null == "bump") run.bumped = 5 + static_cast<int>(seed % 20);
   if (null == "noise" || null == "tails") {
     run.spoil = [null, seed](sim::RangeImage& image, const Moment& moment, const CameraInfo&, std::uint64_t k) {
@@ -148,7 +156,7 @@ void simulate(const Setting& world, const sim::SensorModel& camera, std::uint64_
   write(run, folder());
 }
 
-CampaignFinding search(const Setting& world, const std::vector<std::string>& left_out) {
+CampaignFinding search(const Setting& world, const std::vector<std::string>& left_out, const Options& options) {
   const auto write_text = [](const std::filesystem::path& file, const std::string& text) {
     std::FILE* out = std::fopen(file.c_str(), "w");
     std::fputs(text.c_str(), out);
@@ -161,6 +169,7 @@ CampaignFinding search(const Setting& world, const std::vector<std::string>& lef
                   .model = (folder() / "camera.toml").string(),
                   .scene = folder() / "scene.toml"};
   job.trace = kTrace, job.left_out = left_out;
+  if (options.light) job.trace.max_surfaces = kSurfacesOfLight;
   return orEnd(searchCampaign(job, silent));
 }
 
@@ -174,6 +183,7 @@ void report(const Options& options, const bench::Score& score, const CampaignFin
         judged.before.per_row, judged.with_zero.per_row, judged.after.per_row, judged.noise,
         judged.explainable, judged.cells);
   }
+  if (options.scores) fmt::print("# scales {:.3g}\n", fmt::join(finding.finding.scales, ", "));
   for (const SeenGroup& one : seenFirst(finding, options.scores ? 10 : 0))
     fmt::print("# {}: z {:.1f}, T {:.1f} of {}\n", one.name, one.z, one.statistic, one.rank);
   for (const FoundEffect& one : options.scores ? finding.effects : std::vector<FoundEffect>{})
@@ -225,13 +235,13 @@ void hide(const Setting& world, const bench::KnownCaptures& unspoilt, const sim:
   }
   const sim::SensorModel truth = hiding(factor);
   const sim::AnyEffect hidden = scaled(none, defaults, factor);
-  simulate(world, truth, seed, options.samples);
+  simulate(world, truth, seed, options);
   for (const bool is_absent : {false, true}) {
     if (!(is_absent ? options.absent : options.present)) continue;
     of.is_absent = is_absent;
     std::filesystem::remove(folder() / plan::openedFile(plan::OpenedOf::A));
     const CampaignFinding finding =
-        search(world, is_absent ? std::vector<std::string>{of.hidden} : std::vector<std::string>{});
+        search(world, is_absent ? std::vector<std::string>{of.hidden} : std::vector<std::string>{}, options);
     const auto locked = bench::KnownCaptures::locked(folder(), world.declared, kTrace);
     report(options,
            bench::scoreOf(of, hidden, bench::removedFrom(locked, world.declared, truth, finding), finding),
@@ -256,7 +266,8 @@ std::vector<std::string> partsOf(const std::string& list) {
 [[noreturn]] void endWithUsage(const std::string& word) {
   fmt::print(stderr,
              "discover_campaign_bench: {} is not understood; it takes --cases a,b, --seeds 1:5, --lambda 150,600, "
-             "--absent no|yes|both, --null plain,noise,pose,tails,bump, --threads N, --large, --scores, --samples, or "
+             "--absent no|yes|both, --null plain,noise,pose,tails,bump, --threads N, --large, --scores, --samples, "
+             "--light, or "
              "--table FILE... or --references FOLDER...\n",
              word);
   std::exit(2);
@@ -295,6 +306,8 @@ Options optionsOf(int argc, char** argv) {
       options.scores = true;
     } else if (word == "--samples") {
       options.samples = true;
+    } else if (word == "--light") {
+      options.light = true;
     } else if (word == "--references") {
       while (i + 1 < argc) options.references.emplace_back(argv[++i]);
     } else if (word == "--table") {
@@ -311,8 +324,8 @@ void searchNulls(const Setting& world, const Options& options) {
   for (const std::string& null : options.nulls) {
     first += 1000;  // no two nulls have noise in common
     for (std::uint64_t seed = options.first_seed; seed <= options.last_seed; ++seed) {
-      simulate(world, world.declared.model, seed + first, options.samples, null);
-      const CampaignFinding finding = search(world, {});
+      simulate(world, world.declared.model, seed + first, options, null);
+      const CampaignFinding finding = search(world, {}, options);
       report(options, bench::scoreOf({.hidden = "nothing: " + null, .seed = seed}, finding), finding);
     }
   }
@@ -349,7 +362,7 @@ int main(int argc, char** argv) {
   fmt::print("{}", bench::header());
   searchNulls(world, options);
   if (options.cases.empty() && !options.nulls.empty()) return std::filesystem::remove_all(folder()), 0;
-  simulate(world, world.declared.model, 1, false);
+  simulate(world, world.declared.model, 1, {});
   const auto unspoilt = bench::KnownCaptures::open(folder(), world.declared, kTrace);
   sim::AllEffects::forEach([&]<class E>() {
     const std::string name{E::about.name};

@@ -187,6 +187,27 @@ TEST(LightNoise, IsInTheFramesOwnNoiseWhereEachHasItsLight) {
                   .light_variance.empty());
 }
 
+class OfFewPaths : public Searched {
+ protected:
+  OfFewPaths() { shared_paths_ = 64; }
+};
+
+/// What pixels that share paths have by chance, alike at each visit of a place, was told as a gain along the range.
+TEST_F(OfFewPaths, WhatLightHasByChanceIsNoEffectOfTheCamera) {
+  simulate("");
+  const CampaignFinding finding = search(job());
+  EXPECT_TRUE(finding.effects.empty()) << verdictOf(finding);
+  EXPECT_GT(finding.finding.first_p, 0.01);
+}
+
+/// A drift at one place, which its light does not hide.
+TEST_F(OfFewPaths, ADriftIsFoundAllTheSame) {
+  simulate("[[effect]]\ntype = 'thermal_delay'\nper_degree_mm = 0.6\n");
+  const CampaignFinding finding = search(job());
+  ASSERT_EQ(finding.effects.size(), 1U) << verdictOf(finding);
+  EXPECT_THAT(verdictOf(finding), testing::HasSubstr("thermal_delay"));
+}
+
 /// The same number of the light's noise makes rows of it: 4 mm² of light beside 1 mm² of the frames.
 TEST(LightNoise, CountsInTheRows) {
   MeasuredCapture capture;

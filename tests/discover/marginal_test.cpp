@@ -77,6 +77,16 @@ TEST(EstimateScales, FindsTheDeviationOfWhatIsDrawnAnew) {
   }
 }
 
+/// The columns are 1.5 times as large as what each capture shows of them, since captures have it in common.
+TEST(EstimateScales, WhatCapturesHaveInCommonIsLargerThanEachSays) {
+  Rows rows = rowsOf(200, 8, 1.0, 11);
+  const double alone = estimateScales(rows.evidence, {}).front();
+  rows.evidence.groups.front().alike = 1.5;
+  EXPECT_DOUBLE_EQ(estimateScales(rows.evidence, {}).front(), 1.5 * alone);
+  rows.evidence.groups.front().most_scale = 0.3;
+  EXPECT_DOUBLE_EQ(estimateScales(rows.evidence, {}).front(), 0.3);
+}
+
 TEST(PseudoInverse, LeavesOutWhatTwoEqualColumnsCannotTell) {
   MatrixXd gram(2, 2);
   gram << 2.0, 2.0, 2.0, 2.0;

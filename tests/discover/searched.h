@@ -45,13 +45,15 @@ class Searched : public testing::Test {
     SimulatedRun run{
         .plan = *plan, .camera = *camera, .scene = *scene, .spoil = spoil, .with_poses = with_poses};
     run.frames = frames, run.seed = seed, run.with_samples = with_samples_;
+    run.shared_paths = shared_paths_, run.max_surfaces = surfaces();
+    if (shared_paths_ > 0) run.pose_error_m = run.pose_error_deg = run.light_error = 0.0;
     discover::write(run, folder_ / "run");
   }
   [[nodiscard]] CampaignJob job() const {
     CampaignJob job{
         .run = folder_ / "run", .model = (folder_ / "camera.toml").string(), .scene = folder_ / "scene.toml"};
     job.output = folder_ / "out";
-    job.trace.max_surfaces = 1;
+    job.trace.max_surfaces = surfaces();
     return job;
   }
   static CampaignFinding search(const CampaignJob& job) {
@@ -73,6 +75,8 @@ class Searched : public testing::Test {
   }
   std::filesystem::path folder_;
   bool with_samples_ = false;  ///< raw exposures are recorded, too
+  int shared_paths_ = 0;       ///< SimulatedRun::shared_paths; the rig is then perfect, as a simulated one
+  [[nodiscard]] int surfaces() const { return shared_paths_ > 0 ? 4 : 1; }
 };
 
 }  // namespace toftwin::discover

@@ -3,14 +3,17 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <ostream>
+#include <random>
 #include <string>
 #include <thread>
 
 #include <fmt/format.h>
 
 #include "calib/discover/find_in_table.h"
+#include "calib/discover/significance.h"
 #include "planted.h"
 
 namespace toftwin::discover {
@@ -43,6 +46,47 @@ int alarmsOf(const Errors& errors) {
     }
   }
   return found[0] + found[1];
+}
+
+/// 20 pairs of captures of 12 rows. Both of a pair have one error in common, beside their own noise; the column of it
+/// is √2 times as large, so that both together say no more than one. What is tested changes from pair to pair.
+Marginal pairsOf(std::uint64_t seed) {
+  constexpr int kPairs = 20, kOfPair = 12;
+  std::mt19937_64 random{seed};
+  const auto normals = [&](Eigen::Index count) {
+    std::normal_distribution<double> normal;
+    return Eigen::VectorXd{Eigen::VectorXd::NullaryExpr(count, [&] { return normal(random); })};
+  };
+  Evidence evidence{{{.name = "common", .kind = Kind::PerCapture, .first = 0, .count = 1},
+                     {.name = "offset", .kind = Kind::Nuisance, .first = 1, .count = 1},
+                     {.name = "by pair", .kind = Kind::Generic, .first = 2, .count = 1}},
+                    {}};
+  for (int pair = 0; pair < kPairs; ++pair) {
+    const Eigen::VectorXd of_pair = normals(2);
+    for (int k = 0; k < 2; ++k) {
+      Eigen::MatrixXd x = Eigen::MatrixXd::Ones(kOfPair, 3);
+      x.col(0) *= std::sqrt(2.0), x.col(2) *= of_pair[0];
+      const Eigen::VectorXd y = of_pair[1] * Eigen::VectorXd::Ones(kOfPair) + normals(kOfPair);
+      evidence.captures.push_back({x.transpose() * x, x.transpose() * y, y.squaredNorm(), kOfPair, "", ""});
+    }
+  }
+  return marginalise(evidence, std::vector<double>{1.0});
+}
+
+/// 5 % of 300 are 15; more than 28 have a probability of 0.1 %. Signs count each pair as two, so that T is twice what
+/// they say, and 17 % of the p are below 0.05: fewer than 29 of 300 have a probability of 0.02 %.
+TEST(Test, CapturesThatErrAlikeAreNoTwoWitnesses) {
+  const auto alarmsBy = [](TestOptions options) {
+    int alarms = 0;
+    for (std::uint64_t seed = 1; seed <= 300; ++seed) {
+      const Marginal marginal = pairsOf(seed);
+      options.seed = seed;
+      alarms += test(marginal, nuisanceColumns(marginal), options).p <= 0.05;
+    }
+    return alarms;
+  };
+  EXPECT_LE(alarmsBy({.null_model = NullModel::Noise, .least_dispersion = 1.0}), 28);
+  EXPECT_GE(alarmsBy({.null_model = NullModel::SignFlips}), 29);
 }
 
 class FalseAlarms : public testing::TestWithParam<Noise> {};

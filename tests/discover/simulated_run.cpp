@@ -14,6 +14,7 @@
 
 #include "calib/plan/captures.h"
 #include "calib/plan/run_index.h"
+#include "drivers/sim/light_seed.h"
 #include "protocol/record/recording.h"
 #include "sim/sensor/frame_assembly.h"
 #include "sim/tracer/trace.h"
@@ -78,6 +79,10 @@ plan::RecordedFile capture(const SimulatedRun& run, const plan::PlannedCapture& 
   request.samples_per_pixel = 128;
   request.max_surfaces = run.max_surfaces;
   request.seed = engine();
+  if (run.shared_paths > 0) {
+    request.samples_per_pixel = run.shared_paths, request.sampler = sim::Sampler::Shared;
+    request.seed = drivers::simulator::lightSeed(run.seed, pose);
+  }
   sim::Light light = sim::trace(other == run.scene_of_block.end() ? run.scene : other->second, request);
   brighten(light, static_cast<float>(std::exp(run.light_error * normal(engine))));
   const std::string name = fmt::format(
@@ -101,6 +106,7 @@ plan::RecordedFile capture(const SimulatedRun& run, const plan::PlannedCapture& 
     if (run.spoil) run.spoil(exposed.range, frame.moment, camera.camera(), static_cast<std::uint64_t>(k));
     if (k == 0) taken.a.exposure = frame.moment.exposures.front().duration;
     frame.planes = sim::planesOf(camera, std::move(exposed), light.truth, kinds);
+    if (run.shared_paths > 0) frame.planes.push_back(sim::lightSigmaOf(light));
     orThrow(writer.write(frame));
   }
   orThrow(writer.close());

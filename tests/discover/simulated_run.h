@@ -29,6 +29,9 @@ struct SimulatedRun {
   int bumped = -1;  ///< the capture of this number stood ten times as far off as the others
   int frames = 0;  ///< of each capture; 0: the plan's
   bool with_samples = false;  ///< raw exposures, too
+  /// As the simulator of toftwind does it: light is traced by so many paths a pixel, which tiles share, once for each
+  /// place, and frames say its noise. 0: by many, anew for each capture, and they do not.
+  int shared_paths = 0;
 };
 
 /// Writes the folder. Throws std::runtime_error: a test has no other use for it.

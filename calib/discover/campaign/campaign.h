@@ -53,6 +53,8 @@ struct MeasuredCapture {
   /// Variances of range and ln amplitude that all frames have in common: of a simulated camera's light, as far as its
   /// frames say. Empty: none is known.
   Image<float> light_variance_m2{}, light_variance{};
+  /// How many captures have that light in common, of how many stands; the variances count each capture so many times.
+  std::size_t light_captures = 1, light_stands = 1;
   bool hides_light_noise = false;  ///< it is simulated, and its frames do not say it
   Image<float> valid_share;
   /// Even minus odd frames, means over the image of the range: what goes with the frame's number.

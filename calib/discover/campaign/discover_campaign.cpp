@@ -131,13 +131,13 @@ Result<> judgeLocked(const CampaignJob& job, const Campaign& campaign, const Jud
   return {};
 }
 
-/// Paths that pixels share make neighbours err alike, and what they state is a bound: how much is chance, whole
-/// captures say.
+/// Captures of one place err alike, which neither their signs nor their dispersions show: what their rows state counts.
 FinderOptions finderFor(const CampaignJob& job, const std::vector<MeasuredCapture>& captures) {
   FinderOptions finder = job.finder;
   const bool has_light_noise =
       std::ranges::any_of(captures, [](const MeasuredCapture& one) { return !one.light_variance.empty(); });
-  if (has_light_noise && finder.null_model == NullModel::Automatic) finder.null_model = NullModel::SignFlips;
+  if (has_light_noise && finder.null_model == NullModel::Automatic)
+    finder.null_model = NullModel::Noise, finder.least_dispersion = 1.0;
   return finder;
 }
 

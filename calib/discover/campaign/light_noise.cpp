@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <set>
 
 #include <toftwin/nan.h>
 
@@ -58,11 +59,16 @@ void shareLightNoise(const std::vector<std::shared_ptr<const TracedCapture>>& tr
   const auto isBeside = [](const MeasuredCapture& a, const MeasuredCapture& b) {
     return compare::samePose(*a.moment.world_from_camera, *b.moment.world_from_camera);
   };
+  const std::vector<std::size_t> stands = standsOf(captures);
   for (std::size_t c = 0; c < captures.size(); ++c) {
     MeasuredCapture& capture = captures[c];
     if (capture.light_variance.empty()) continue;
-    const auto alike = static_cast<float>(
-        std::ranges::count_if(captures, [&](const MeasuredCapture& other) { return isBeside(capture, other); }));
+    std::set<std::size_t> beside;
+    capture.light_captures = 0;
+    for (std::size_t other = 0; other < captures.size(); ++other)
+      if (isBeside(capture, captures[other])) ++capture.light_captures, beside.insert(stands[other]);
+    capture.light_stands = beside.size();
+    const auto alike = static_cast<float>(capture.light_captures);
     for (Image<float>* image : {&capture.light_variance_m2, &capture.light_variance}) {
       for (std::size_t i = 0; i < image->size(); ++i)
         (*image)[i] = traced[c]->is_edge[i] != 0 ? kNaN : alike * (*image)[i];

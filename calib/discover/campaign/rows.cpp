@@ -13,6 +13,7 @@
 
 #include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/covariates.h"
+#include "calib/discover/campaign/light_tiles.h"
 #include "calib/discover/campaign/sites.h"
 #include "sim/images/rows.h"
 
@@ -285,6 +286,12 @@ Result<CampaignRows> CampaignRows::make(const Declared& declared, const Lit& lit
   all.groups_ = commonGroups();
   all.has_delay_ = late->has_value();
   if (all.has_delay_) all.groups_.push_back(delayGroup()), ++all.common_columns_;
+  const auto tiles = LightTiles::of(lit.captures);
+  const std::size_t first_tile = all.common_columns_;
+  if (tiles) {
+    for (Group& group : tiles->groups(first_tile)) all.groups_.push_back(std::move(group));
+    all.common_columns_ += tiles->columns();
+  }
   std::size_t next = all.common_columns_;
   for (std::size_t i = 0; i < varied->effects.size(); ++i) {
     VariedEffect& effect = varied->effects[i];
@@ -311,6 +318,7 @@ Result<CampaignRows> CampaignRows::make(const Declared& declared, const Lit& lit
       WhitenedCapture columns{fixed->cells, next};
       columns.putCommon(fixed->cells, *lit.traced[c]);
       columns.putResidual(fixed->cells, lit.captures[c], *lit.traced[c], declared_reading);
+      if (tiles) tiles->put(fixed->cells, lit.captures[c], first_tile, columns.columns);
       for (const VariedEffect& effect : varied->effects) {
         for (std::size_t i = 0; i < effect.variants.size(); ++i) {
           columns.putChange(fixed->cells, effect.group.first + i, base.reading,
