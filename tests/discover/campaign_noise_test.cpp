@@ -187,16 +187,6 @@ TEST(LightNoise, IsInTheFramesOwnNoiseWhereEachHasItsLight) {
                   .light_variance.empty());
 }
 
-/// So far off that its light must be traced more than once where the camera probably stood: from the stated pose a
-/// straight line does not say what it sees there, and that was something.
-TEST_F(Searched, ABumpedCaptureLeavesNothing) {
-  bumped_ = 9;
-  simulate("", {}, true, 0, 23);
-  const CampaignFinding finding = search(job());
-  EXPECT_TRUE(finding.effects.empty()) << verdictOf(finding);
-  EXPECT_GT(finding.finding.first_p, 0.01);
-}
-
 class OfFewPaths : public Searched {
  protected:
   OfFewPaths() { shared_paths_ = 64; }

@@ -77,8 +77,7 @@ Zero zeroOf(const Refitted& refitted, double known_mm);
 Result<double> delayThatFits(const JudgedCampaign& judged);
 
 /// Light traced again where the cameras probably stood, if these were their effects: what a place off the
-/// pose changes is then known to second order, which counts where a thousand pixels say the same. Again for those that
-/// lie more than five prior deviations from where it was traced, four times at most.
+/// pose changes is then known to second order, which counts where a thousand pixels say the same.
 Result<std::vector<std::shared_ptr<const TracedCapture>>> traceWhereTheyStood(
     const Declared& declared, const std::vector<sim::AnyEffect>& effects,
     const std::vector<MeasuredCapture>& captures,

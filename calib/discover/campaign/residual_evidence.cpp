@@ -3,7 +3,6 @@
 // cameras stood.
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/reading.h"
@@ -104,75 +103,30 @@ Result<double> delayThatFits(const JudgedCampaign& judged) {
   return start->deviance - deviance > 9.0 * dispersion ? delay_mm : 0.0;
 }
 
-namespace {
-
-/// Where the cameras probably stood, no farther than `most` from where their light was traced.
-std::vector<Stood> placesBy(const Evidence& evidence, const std::vector<MeasuredCapture>& captures,
-                            const std::vector<std::shared_ptr<const TracedCapture>>& traced, double most) {
-  constexpr Eigen::Index kOwn = 6;  // pose and light
-  const Eigen::VectorXd common = commonFit(evidence, {}).coefficient;
-  const std::vector<std::size_t> stands = standsOf(captures);
-  std::vector<Stood> stood(captures.size());
-  for (std::size_t c = 0; c < captures.size(); ++c) {
-    const CaptureEvidence& one = evidence.captures[stands[c]];
-    const Eigen::MatrixXd gram =
-        one.gram.block<kOwn, kOwn>(2, 2) + Eigen::MatrixXd::Identity(kOwn, kOwn);  // prior deviations of 1
-    const Eigen::VectorXd own =
-        linear::Ldlt{gram}.solve(one.moment.segment<kOwn>(2) - one.gram.block<kOwn, 2>(2, 0) * common);
-    for (std::size_t way = 0; way < stood[c].size(); ++way) {
-      const double before = traced[c]->stood[way];
-      stood[c][way] = std::clamp(own[static_cast<Eigen::Index>(way)], before - most, before + most);
-    }
-  }
-  return stood;
-}
-
-/// Captures whose places lie so far from where their light was traced that a straight line does not say what that
-/// changes.
-std::vector<std::size_t> farOff(const std::vector<Stood>& stood,
-                                const std::vector<std::shared_ptr<const TracedCapture>>& traced) {
-  constexpr double kFar = 5.0;
-  std::vector<std::size_t> far;
-  for (std::size_t c = 0; c < stood.size(); ++c) {
-    double most = 0.0;
-    for (std::size_t way = 0; way < stood[c].size(); ++way)
-      most = std::max(most, std::abs(stood[c][way] - traced[c]->stood[way]));
-    if (most > kFar) far.push_back(c);
-  }
-  return far;
-}
-
-}  // namespace
-
 Result<std::vector<std::shared_ptr<const TracedCapture>>> traceWhereTheyStood(
     const Declared& declared, const std::vector<sim::AnyEffect>& effects,
     const std::vector<MeasuredCapture>& captures,
     const std::vector<std::shared_ptr<const TracedCapture>>& traced, const TraceOptions& options,
     const std::function<void(double)>& tell) {
-  constexpr double kMost = 10.0;
-  constexpr int kMostTimes = 4;
-  TraceOptions again = options;
-  auto now = traced;
-  std::vector<std::size_t> which(captures.size());
-  std::iota(which.begin(), which.end(), std::size_t{0});
-  for (int k = 0; k < kMostTimes && !which.empty(); ++k) {
-    const auto evidence = residualEvidence({declared, {captures, now, traced}, {}}, effects);
-    if (!evidence) return evidence.error();
-    const std::vector<Stood> stood = placesBy(*evidence, captures, now, kMost);
-    const auto far = farOff(stood, now);
-    if (k > 0) which = far;
-    std::vector<MeasuredCapture> some;  // empty: all
-    std::vector<Stood> there;
-    for (const std::size_t c : which) there.push_back(stood[c]);
-    if (k > 0)
-      for (const std::size_t c : which) some.push_back(captures[c]);
-    again.seed += 0x2545f491U;
-    const auto lit = traceAll(declared, k == 0 ? captures : some, again, k == 0 ? tell : nullptr, there);
-    if (!lit) return lit.error();
-    for (std::size_t i = 0; i < which.size(); ++i) now[which[i]] = (*lit)[i];
-    if (far.empty()) break;
+  constexpr Eigen::Index kOwn = 6;  // pose and light
+  const Lit lit{captures, traced, traced};
+  const auto evidence = residualEvidence({declared, lit, {}}, effects);
+  if (!evidence) return evidence.error();
+  const Eigen::VectorXd common = commonFit(*evidence, {}).coefficient;
+  std::vector<Stood> stood;
+  for (const std::size_t stand : standsOf(captures)) {
+    const CaptureEvidence& one = evidence->captures[stand];
+    const Eigen::MatrixXd gram =
+        one.gram.block<kOwn, kOwn>(2, 2) + Eigen::MatrixXd::Identity(kOwn, kOwn);  // prior deviations of 1
+    const Eigen::VectorXd own =
+        linear::Ldlt{gram}.solve(one.moment.segment<kOwn>(2) - one.gram.block<kOwn, 2>(2, 0) * common);
+    Stood& here = stood.emplace_back();
+    for (std::size_t way = 0; way < here.size(); ++way)
+      here[way] = std::clamp(own[static_cast<Eigen::Index>(way)], -10.0, 10.0);
   }
-  return now;
+  TraceOptions again = options;
+  again.seed += 0x2545f491U;
+  return traceAll(declared, captures, again, tell, stood);
 }
 
 }  // namespace toftwin::discover
