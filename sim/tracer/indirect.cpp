@@ -12,13 +12,13 @@ namespace toftwin::sim {
 namespace {
 
 /// Most samples in a coarse point's means; what moves in a scene leaves its light behind for so long.
-constexpr float kMostSamples = 128.0f, kMostWhereThingsMove = 24.0f;
+constexpr float kMostSamples = 128.0f, kMostWhereThingsMove = 64.0f;
 constexpr float kFewestSamples = 8.0f;
 /// The same of what lit places send to what stands still: it is known well from one frame alone, and moves with the
 /// shadows. (Moving objects may be bent, which leaves few neighbours to smooth over.)
-constexpr float kMostOfLitWhereThingsMove = 3.0f;
+constexpr float kMostOfLitWhereThingsMove = 4.0f;
 /// Of all light on what moves, which moves through it, and whose points are means of several before.
-constexpr float kMostOfWhatMoves = 12.0f;
+constexpr float kMostOfWhatMoves = 24.0f;
 /// Cells remember so many times the samples.
 constexpr int kCellsPerPoints = 2, kCellsWhereThingsMove = 4;
 /// Light is remembered for so much of the camera's way: its emitters move with it, which turns phasors.

@@ -20,8 +20,20 @@ constexpr std::uint32_t kFurtherEvery = 2;
 /// Rays to a light end before its surface by this share of their way.
 constexpr float kShortOfIt = 0.002f;
 
+/// A tile's points share one sequence of random numbers: each takes so many in a row, evenly spread by themselves over
+/// time, and after as many frames all points' together are.
+constexpr std::uint32_t kInARow = 32;
+
+/// Which of the sequence is sample `sample` of a tile's point.
+std::uint32_t numberInSequence(std::uint32_t sample, std::size_t lane) {
+  const auto point = static_cast<std::uint32_t>(lane);
+  return (sample / kInARow * static_cast<std::uint32_t>(kLaneCount) + point) * kInARow + sample % kInARow;
+}
+
 void prepareTile(const Tracing& tracing, int i, int j, Block& block) {
   const CameraInfo& camera = tracing.request.camera;
+  const PixelKey key = pixelKey(tracing.seed, static_cast<std::uint32_t>(i * CoarseGrid::kStep),
+                                static_cast<std::uint32_t>(j * CoarseGrid::kStep));
   block.shape = BlockShape::forSamples(1);
   Lanes<int> columns, rows;
   for (std::size_t lane = 0; lane < kLaneCount; ++lane) {
@@ -30,8 +42,6 @@ void prepareTile(const Tracing& tracing, int i, int j, Block& block) {
     rows[lane] = std::min((j + l / 4) * CoarseGrid::kStep, camera.height - 1);
     block.is_inside[lane] = -1;
     block.first_sample[lane] = 0;
-    const PixelKey key = pixelKey(tracing.seed, static_cast<std::uint32_t>(columns[lane]),
-                                  static_cast<std::uint32_t>(rows[lane]));
     block.key_a[lane] = key.a;
     block.key_b[lane] = key.b;
   }
@@ -111,7 +121,7 @@ void TileGatherer::gather(int i, int j, std::uint32_t first_sample, int samples,
   for (int s = 0; s < samples; ++s) {
     Packet packet = camera_rays;
     for (std::size_t lane = 0; lane < kLaneCount; ++lane) {
-      packet.index[lane] = first_sample + static_cast<std::uint32_t>(s);
+      packet.index[lane] = numberInSequence(first_sample + static_cast<std::uint32_t>(s), lane);
     }
     hits_ = seen;
     clearSums(sums_);

@@ -2,6 +2,7 @@
 #include "sim/tracer/lit_points.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -13,8 +14,9 @@
 namespace toftwin::sim {
 namespace {
 
-/// So many of each emitter for one receiver: a power of two, which Sobol's sequence spreads evenly.
-constexpr std::uint32_t kPoints = 64;
+/// So many of each emitter for one receiver: of 8 × 8 cells of the square that directions are drawn from, Sobol's sequence
+/// has one in each.
+constexpr std::uint32_t kCells = 8, kPoints = kCells * kCells;
 constexpr std::uint32_t kLeaving = 0x20000;  // random dimension, beyond those of paths
 /// A column of pixels that no image has, for random numbers that belong to none.
 constexpr std::uint32_t kNoPixel = 0xfffffff0u;
@@ -29,14 +31,34 @@ double perSteradian(const PlacedEmitter& emitter) {
   return 1.0 / (2.0 * std::numbers::pi * (1.0 - leastCosine(emitter)));
 }
 
-/// Ray `number` of an emitter for each lane.
-void leaveEmitter(const Tracing& tracing, std::size_t e, std::uint32_t frame, std::uint32_t number, Packet& packet) {
-  const PlacedEmitter& emitter = tracing.emitters[e];
-  const PixelKey key = pixelKey(tracing.seed, kNoPixel + static_cast<std::uint32_t>(e), frame);
+/// Numbers of cells in Morton's order, in which those that follow each other are mostly next to each other.
+std::uint32_t numberOfCell(float u, float v) {
+  const auto x = static_cast<std::uint32_t>(u * kCells), y = static_cast<std::uint32_t>(v * kCells);
+  std::uint32_t number = 0;
+  for (std::uint32_t bit = 0; (1U << bit) < kCells; ++bit)
+    number |= (x >> bit & 1U) << (2 * bit) | (y >> bit & 1U) << (2 * bit + 1);
+  return number;
+}
+
+/// Which of the sequence lie in the cells, for each lane: a pick by shares, evenly drawn, then is evenly spread in space.
+std::array<Lanes<std::uint32_t>, kPoints> indicesByCell(PixelKey key) {
+  std::array<Lanes<std::uint32_t>, kPoints> indices{};
+  for (std::size_t lane = 0; lane < kLaneCount; ++lane) {
+    for (std::uint32_t i = 0; i < kPoints; ++i) {
+      const std::uint32_t index = static_cast<std::uint32_t>(lane) * kPoints + i;
+      const RandomPair draw = randomPair(key, index, kLeaving);
+      indices[numberOfCell(draw.u, draw.v)][lane] = index;
+    }
+  }
+  return indices;
+}
+
+/// Rays of an emitter, one for each lane.
+void leaveEmitter(const PlacedEmitter& emitter, PixelKey key, const Lanes<std::uint32_t>& indices, Packet& packet) {
   const Basis basis = basisAround(emitter.axis);
   const double least = leastCosine(emitter);
   for (std::size_t i = 0; i < kLaneCount; ++i) {
-    const std::uint32_t index = static_cast<std::uint32_t>(i) * kPoints + number;
+    const std::uint32_t index = indices[i];
     const RandomPair draw = randomPair(key, index, kLeaving);
     const double cosine = 1.0 - (1.0 - least) * static_cast<double>(draw.u);
     const double sine = std::sqrt(std::max(0.0, 1.0 - cosine * cosine));
@@ -70,19 +92,24 @@ TOFTWIN_INLINE double pointsPerArea(double per_steradian, double cosine, double 
 
 void LitPoints::take(const Tracing& tracing, const Channels& channels, std::uint32_t frame) {
   places_.assign(tracing.emitters.size() * kPoints, Place{});
-  inParallel(static_cast<int>(tracing.emitters.size() * kPoints), 8, [&](int first, int last) {
-    const FlushDenormals flush;
-    for (int p = first; p < last; ++p) takeOf(tracing, channels, static_cast<std::size_t>(p), frame);
-  });
+  for (std::size_t e = 0; e < tracing.emitters.size(); ++e) {
+    const PixelKey key = pixelKey(tracing.seed, kNoPixel + static_cast<std::uint32_t>(e), frame);
+    const auto indices = indicesByCell(key);
+    inParallel(static_cast<int>(kPoints), 8, [&](int first, int last) {
+      const FlushDenormals flush;
+      for (auto p = static_cast<std::size_t>(first); p < static_cast<std::size_t>(last); ++p) {
+        Packet packet;
+        leaveEmitter(tracing.emitters[e], key, indices[p], packet);
+        takeOf(tracing, channels, tracing.emitters[e], packet, places_[e * kPoints + p]);
+      }
+    });
+  }
 }
 
-void LitPoints::takeOf(const Tracing& tracing, const Channels& channels, std::size_t number, std::uint32_t frame) {
-  const std::size_t e = number / kPoints;
-  const PlacedEmitter& emitter = tracing.emitters[e];
-  Place& place = places_[number];
+/// What the rays meet becomes lit places.
+void LitPoints::takeOf(const Tracing& tracing, const Channels& channels, const PlacedEmitter& emitter, Packet& packet,
+                       Place& place) {
   place.radiance.assign(channels.count(), Lanes<float>{});
-  Packet packet;
-  leaveEmitter(tracing, e, frame, static_cast<std::uint32_t>(number % kPoints), packet);
   RTCRayHit16 rays;
   Hits hits;
   Lanes<float> unused{};

@@ -56,7 +56,8 @@ class LitPoints {
     Lanes<float> density;                ///< of points per m², as one receiver has them
     std::vector<Lanes<float>> radiance;  ///< by channel
   };
-  void takeOf(const Tracing& tracing, const Channels& channels, std::size_t e, std::uint32_t frame);
+  static void takeOf(const Tracing& tracing, const Channels& channels, const PlacedEmitter& emitter, Packet& packet,
+                     Place& place);
 
   std::vector<Place> places_;
 };

@@ -28,7 +28,7 @@ constexpr int kSamples = 2, kFirstPasses = 8;
 /// A cut to another view needs them as well.
 constexpr double kMuchIsNew = 0.5;
 /// So many samples in the whole image look into the pixels where depth jumps, at most 16 in each.
-constexpr int kFootprintSamples = 24'000;
+constexpr int kFootprintSamples = 12'000;
 
 TraceRequest directOnly(const TraceRequest& request, int samples) {
   TraceRequest direct = request;

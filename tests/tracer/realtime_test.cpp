@@ -196,7 +196,7 @@ TEST(Realtime, FollowsTheCamera) {
 
 /// A board with a fin on its left, which moves with it: the light between them moves along. What is remembered must be
 /// that of the same place on the board, not in the image, where it would be that of farther from the fin. (Medians:
-/// 5.3 mm where it stands, 6.5 where it moves; 11.1 where it is remembered in the image.)
+/// 5.0 mm where it stands, 4.6 where it moves; 11.1 where it is remembered in the image.)
 TEST(Realtime, RemembersLightWhereThingsMovedTo) {
   const auto fin = [](double x, const char* motion) {
     return fmt::format(R"(
