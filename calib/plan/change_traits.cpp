@@ -162,6 +162,17 @@ void heedWidths(const PlateSeen& a, const PlateSeen& b, compare::Trait& latency)
   latency.low -= late_ms, latency.high += late_ms;
 }
 
+/// Why the two saw nothing of one motion: scenes move by their cameras' own clocks, and one of them may have run before.
+std::string whyNothingShared(const CameraSeen& a, const CameraSeen& b) {
+  if (a.plate_time_s.empty() || b.plate_time_s.empty()) return "";
+  const auto &at_a = a.plate_time_s, &at_b = b.plate_time_s;
+  if (at_a.front() < at_b.back() && at_b.front() < at_a.back()) return "";
+  return fmt::format(
+      "latency: A shows the plate from {:.4g} to {:.4g} s of its scene's time, B from {:.4g} to {:.4g} s: at no time "
+      "that both show. It is told where the daemons of both were started anew",
+      at_a.front(), at_a.back(), at_b.front(), at_b.back());
+}
+
 }  // namespace
 
 void addChangeTraits(const ComparedRun& run, std::size_t camera, TraitCollector& all) {
@@ -182,6 +193,8 @@ void addLatency(const ComparedRun& run, TraitCollector& all) {
         compare::latencyTraits(b.plate_time_s, b.plate_place_m, a.plate_time_s, a.plate_place_m);
     if (traits)
       rows.push_back(traits->front());
+    else if (std::string apart = whyNothingShared(a, b); !apart.empty())
+      why_not = std::move(apart);
     else
       why_not = traits.error().message;
   }

@@ -131,13 +131,10 @@ void addBehind(const Image<float>& range_m, const Image<float>& wall_m, const Im
   }
 }
 
-/// Simulated cameras share the time since power-on, which the latency is told by. A real one's is of some clock
-/// beside it, and may be the same for all frames: its frames are apart by their exposures' starts.
-std::optional<double> timeOf(const ReadFrame& frame, bool is_simulated) {
-  const auto& [first, second] = is_simulated ? std::pair{frame.since_power_on_s, frame.start_s}
-                                             : std::pair{frame.start_s, frame.since_power_on_s};
-  return first ? first : second;
-}
+/// Its exposure's start, of the camera's own clock: things in a simulated camera's scene move by that (docs/scene.md),
+/// and a real one may say one time since power-on of all frames. That time may be set from outside, and what it is
+/// set to says nothing of where a thing was.
+std::optional<double> timeOf(const ReadFrame& frame) { return frame.start_s ? frame.start_s : frame.since_power_on_s; }
 
 /// Not at the image's border.
 bool isWhole(const Plate& plate) {
@@ -181,7 +178,7 @@ void addPlate(const Image<float>& wall_m, const compare::Stack& stack, std::span
 void addMovingPlate(const Image<float>& wall_m, const CameraInfo& camera,
                     const std::vector<ReadFrame>& frames, CameraSeen& seen) {
   for (const ReadFrame& frame : frames) {
-    const auto time = timeOf(frame, seen.is_simulated);
+    const auto time = timeOf(frame);
     const auto plate = time ? plateIn(frame.range_m, wall_m) : std::nullopt;
     if (!plate || !isWhole(*plate)) continue;  // cut by the image's border: its middle is not known
     // Depth over x, by least squares: motion pulls the two edges to different sides.

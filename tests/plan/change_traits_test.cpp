@@ -167,6 +167,18 @@ TEST(RunTraits, SayInWordsWhyRealCamerasHaveNoLatency) {
                                                testing::Not(testing::HasSubstr("::")))));
 }
 
+/// Of two daemons, one of which ran before: no frame of one is at a scene's time of the other's.
+TEST(RunTraits, SayWhereTheScenesOfBothHaveNoTimeInCommon) {
+  ComparedRun run = movingPlates({0.0, 0.0, 0.0}, 0.3);
+  for (ComparedCapture& one : run.moving) {
+    for (double& t : one.seen[1].plate_time_s) t += 40.0;
+  }
+  const RunTraits all = traitsOf(run);
+  EXPECT_EQ(find(all, "latency", "B − A", "latency"), nullptr);
+  EXPECT_THAT(all.untold, testing::Contains(testing::HasSubstr(
+                              "A shows the plate from 0 to 1.475 s of its scene's time, B from 40.01 to 41.48 s")));
+}
+
 TEST(RunTraits, SayThatNoFrameShowsAPlateMove) {
   ComparedRun run = plantedRun();
   run.moving.emplace_back().record.kind = "moving";
@@ -174,7 +186,9 @@ TEST(RunTraits, SayThatNoFrameShowsAPlateMove) {
 }
 
 /// A plate of 8 × 8 pixels one metre before a wall at 2 m goes one pixel, 1/20 of its metre, per frame of 0.1 s.
-TEST(MovingPlate, IsTimedByItsExposuresWhereAllFramesHaveOneTimeSincePowerOn) {
+/// Things in a scene move by the camera's own clock, which its exposures are of; the time since power-on is set from
+/// outside, as of a twin that follows, and may be one and the same for all frames.
+TEST(MovingPlate, IsTimedByItsExposuresWhateverTheTimeSincePowerOnIs) {
   CameraInfo camera;
   camera.width = 32, camera.height = 16, camera.fx = camera.fy = 20.0, camera.cx = 15.5, camera.cy = 7.5;
   std::vector<ReadFrame> frames(3);
@@ -194,7 +208,11 @@ TEST(MovingPlate, IsTimedByItsExposuresWhereAllFramesHaveOneTimeSincePowerOn) {
   simulated.is_simulated = true;
   for (std::size_t i = 0; i < 3; ++i) frames[i].since_power_on_s = 600.0 + 0.05 * static_cast<double>(i);
   addMovingPlate(Image<float>(32, 16, 2.0F), camera, frames, simulated);
-  EXPECT_EQ(simulated.plate_time_s, (std::vector{600.0, 600.05, 600.1}));
+  EXPECT_EQ(simulated.plate_time_s, seen.plate_time_s);
+  for (ReadFrame& frame : frames) frame.start_s.reset();
+  CameraSeen without;
+  addMovingPlate(Image<float>(32, 16, 2.0F), camera, frames, without);
+  EXPECT_EQ(without.plate_time_s, (std::vector{600.0, 600.05, 600.1}));
 }
 
 /// Behind a plate that moves, two columns are mixed of it and the wall; one camera masks them. The plate is

@@ -28,7 +28,8 @@ class FakeCamera final : public compare::Feed {
     Frame frame = makes;
     frame.source = details_.entry.name;
     if (stale_frames > 0) --stale_frames, frame.moment.exposures = {Exposure{{}, 1_us, 20_MHz}};
-    if (details_.can_set_pose) frame.moment.world_from_camera = pose_;
+    if (details_.can_set_pose) frame.moment.world_from_camera = frames_ < made_before ? Transform<World, Camera>{} : pose_;
+    frame.sequence = static_cast<std::uint64_t>(frames_);
     for (Exposure& one : frame.moment.exposures) one.start.ns += frames_ * frame_apart_ns;
     ++frames_;
     return frame;
@@ -47,6 +48,7 @@ class FakeCamera final : public compare::Feed {
   void takes(const std::vector<std::pair<std::string, double>>& parameters) {
     for (const auto& [name, value] : parameters) details_.parameters.push_back({name, value, {}});
   }
+  void makesFramesWhenAsked() { details_.can_lockstep = true; }
   void moves() {
     details_.can_set_pose = true;
     details_.world_from_camera = Transform<World, Camera>{};
@@ -54,7 +56,7 @@ class FakeCamera final : public compare::Feed {
 
   Frame makes{};
   int stale_frames = 0;
-  std::int64_t frame_apart_ns = 0;
+  std::int64_t frame_apart_ns = 0, made_before = 0;  ///< so many frames were made before a pose was set
   std::string refuses{};
 
  private:
@@ -122,6 +124,24 @@ class Take : public testing::Test {
 const std::string kTwoBlocks =
     "frames = 2\n[[block]]\nname = 'near'\nkind = 'locked'\nsetup = 'put up the wall'\ndistance_m = [0.5]\n"
     "repeats = 2\n[[block]]\nname = 'far'\nkind = 'locked'\ndistance_m = [1.5]\n";
+
+/// The first frame in lockstep is made at once: whether before the pose is set or after it, hangs on chance. What moves
+/// in the scene is then a frame farther on, and noise is another one.
+TEST_F(Take, KeepsTheSameFramesWheneverTheFirstOneIsMade) {
+  for (const std::int64_t made_before : {0, 1}) {
+    FakeCamera a{"cam", story_}, b{"twin", story_};
+    for (FakeCamera* camera : {&a, &b}) camera->moves(), camera->makesFramesWhenAsked();
+    b.made_before = made_before;
+    begin(kTwoBlocks);
+    std::vector<std::uint64_t> of_a, of_b;
+    const auto into = [](std::vector<std::uint64_t>& all) {
+      return [&all](const Frame& frame) { return all.push_back(frame.sequence), Result<>{}; };
+    };
+    ASSERT_TRUE(taker_->take(schedule_.captures.at(0), a, b, into(of_a), into(of_b)));
+    EXPECT_EQ(of_a, (std::vector<std::uint64_t>{2, 3}));
+    EXPECT_EQ(of_b, of_a) << made_before << " made before the pose was set";
+  }
+}
 
 TEST_F(Take, AsksAPersonForWhatTheCameraCannotAndOnlyOnce) {
   realAndTwin();
