@@ -77,17 +77,20 @@ constexpr std::size_t kFewestRows = 3;
 void holdTogether(TraitVerdict& one, double wider) {
   const std::string doubt = isExtrapolated(one) ? "it is told far from all rows" : doubtOf(one);
   if (!one.b || one.is_paired) {
-    if (const auto* line = std::get_if<OnLine>(&one.difference.refers_to)) {
-      one.at = placeInWords(line->at_m), one.is_of_scale = goesThroughNothing(one.difference.value, *line, wider);
-    }
+    if (const auto* line = std::get_if<OnLine>(&one.difference.refers_to))
+      one.at = placeInWords(line->at_m), one.line = *line;
     one.difference = widened(one.difference, wider);
   } else {
     const Trait &a = one.a->trait, &b = one.b->trait;
     HeldTogether held = heldTogether(a, b, wider);
     one.is_size = held.is_size, one.at = std::move(held.at), one.why_not = std::move(held.why_not);
-    one.is_of_scale = held.is_of_scale;
+    one.line = held.line;
     one.difference = std::move(held.difference);
     if (!one.why_not.empty()) one.difference = {b.name, b.unit, kNaN, kNaN, kNaN, std::min(a.n, b.n)};
+  }
+  if (one.line) {
+    one.on_line_mm = one.difference.value;
+    one.is_of_scale = goesThroughNothing(one.on_line_mm, *one.line, wider);
   }
   if (one.why_not.empty()) one.why_not = doubt;
   if (one.why_not.empty()) one.why_not = standInOf(one);
@@ -126,11 +129,22 @@ std::string whyNone(const NamedTraits& traits, const NamedTrait& like, std::stri
   return "";
 }
 
-/// An offset of which the scale of the same line, which differs too, makes all.
+/// An offset that a scale makes of which it is told that it differs: that of its own line, or of the other one where
+/// waves over distance are told of B − A and of both cameras.
 bool isScales(const TraitVerdict& one, const std::vector<TraitVerdict>& all) {
-  return one.isOffset() && one.is_of_scale && std::ranges::any_of(all, [&](const TraitVerdict& other) {
-           return other.what == one.what && other.difference.name == "scale" && other.differs();
-         });
+  return one.isOffset() && one.is_of_scale &&
+         std::ranges::any_of(all, [](const TraitVerdict& other) { return other.isScale() && other.differs(); });
+}
+
+/// Where along the distances a scale is how much is known by its offset's line.
+void addLines(std::vector<TraitVerdict>& all) {
+  for (TraitVerdict& one : all) {
+    if (!one.isScale()) continue;
+    const auto isBeside = [&](const TraitVerdict& other) { return other.isOffset() && other.what == one.what; };
+    const auto offset = std::ranges::find_if(all, isBeside);
+    if (offset == all.end() || !offset->line) continue;
+    one.line = offset->line, one.on_line_mm = offset->on_line_mm, one.is_of_scale = offset->is_of_scale;
+  }
 }
 
 /// Those that are not told come last; of those that differ, what others make comes behind them. Where a floor is
@@ -193,6 +207,10 @@ bool TraitVerdict::isWraps() const {
 
 bool TraitVerdict::isOffset() const { return difference.name == "offset"; }
 
+bool TraitVerdict::isScale() const { return difference.name == "scale"; }
+
+double TraitVerdict::offAt(double distance_m) const { return on_line_mm + line->slope * (distance_m - line->at_m); }
+
 bool isLack(const Trait& lacked) { return lacked.value > 0.05 && lacked.low > 0.0; }
 
 bool TraitVerdict::isMissing() const { return isLack(lacked_by_b) || isLack(lacked_by_a); }
@@ -225,6 +243,7 @@ std::vector<TraitVerdict> verdictsOf(const NamedTraits& traits) {
     holdTogether(one, wider);
     if (one.what == kValidPixels) addLacks(of_pair, wider, one);
   }
+  addLines(all);
   addAlone(traits, of_b, "A", "B", all), addAlone(traits, of_a, "B", "A", all);
   sort(all);
   return all;
@@ -244,6 +263,10 @@ Json toJson(const std::vector<TraitVerdict>& all) {
                                         : "same")
         .set("why_not", one.why_not);
     if (!one.at.empty()) row.set("at", one.at);
+    if (one.line) {
+      row.set("nearest_m", one.line->from_m).set("at_nearest_mm", one.offAt(one.line->from_m));
+      row.set("farthest_m", one.line->to_m).set("at_farthest_mm", one.offAt(one.line->to_m));
+    }
     rows.push(std::move(row));
   }
   return rows;

@@ -17,7 +17,9 @@ struct TraitVerdict {
   Trait difference{};
   bool is_paired = false;  ///< B − A was told row by row of what A and B were told of, too
   bool is_size = false;    ///< the difference is the amplitude of a wave, which has no sign
-  bool is_of_scale = false;  ///< an offset that the scale makes at its distance: the line goes through 0
+  std::optional<OnLine> line{};  ///< of an offset and of the scale beside it: the line that both are of
+  double on_line_mm = 0.0;       ///< what it is off by where it is told
+  bool is_of_scale = false;      ///< a scale alone may make all of the line: it goes through 0 at distance 0
   std::string at{};        ///< what both are told at, where a number hangs on it: "at 1.75 m"
   std::string why_not{};   ///< why the two cannot be held against each other
   /// Of valid pixels: the share of A's that B lacks, and of B's that A lacks. Two cameras that lack as many
@@ -32,6 +34,10 @@ struct TraitVerdict {
   [[nodiscard]] double timesFloor() const;
   /// What a line is off by, at a distance.
   [[nodiscard]] bool isOffset() const;
+  /// What a line is off by per distance.
+  [[nodiscard]] bool isScale() const;
+  /// mm that the line of an offset or a scale is off by at a distance; it must have one.
+  [[nodiscard]] double offAt(double distance_m) const;
   /// Wrapped readings of the wall, a share that differs by over 1 %.
   [[nodiscard]] bool isWraps() const;
   /// One camera lacks over 5 % of the other's pixels, whether or not shares differ: they are in no number.
@@ -47,7 +53,7 @@ bool isLack(const Trait& lacked);
 /// Of each number that both cameras have, and of those told of B − A that are 0 for equal cameras (so not
 /// what is left of a fit). Where a number is told of A, of B and of B − A, the last one is the difference.
 /// Those that differ come first, the farthest beyond its floor before the others; behind them what others make: the
-/// fixed pattern, and an offset that the scale makes. But before them all the wall's
+/// fixed pattern, and an offset that a scale makes which differs, too. But before them all the wall's
 /// wraps and what one camera lacks of the pixels, as what is wrapped or missing is in few of the others; but not what
 /// both lack alike. What is extrapolated (Trait::is_extrapolated) is not told.
 std::vector<TraitVerdict> verdictsOf(const NamedTraits& traits);

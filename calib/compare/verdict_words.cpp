@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "calib/compare/traits/common_reference.h"
 #include "calib/compare/traits/difference.h"
 
 namespace toftwin::compare {
@@ -103,6 +104,21 @@ std::string farBeyond(const TraitVerdict& one) {
   return fmt::format("{:.{}f} × the floor", one.timesFloor(), one.timesFloor() < 10.0 ? 1 : 0);
 }
 
+std::string signedNumber(double value) { return (value > 0.0 ? "+" : "") + number(value); }
+
+/// Of a scale, where along the range it is how much. Of an offset that the scale of the same line may make, of which
+/// nothing tells whether it is there: that it may.
+std::string lineOf(const TraitVerdict& one) {
+  if (!one.line || !(one.line->from_m < one.line->to_m)) return "";
+  const auto at = [&](double distance_m) {
+    return fmt::format("{} mm {}", signedNumber(one.offAt(distance_m)), placeInWords(distance_m));
+  };
+  if (one.isScale()) return fmt::format(": {}, {}", at(one.line->from_m), at(one.line->to_m));
+  if (!one.is_of_scale || !(one.line->at_m > 0.0)) return "";
+  return fmt::format(", as a scale of {} mm/m alone would make it, too",
+                     signedNumber(one.difference.value / one.line->at_m));
+}
+
 std::string atOf(const TraitVerdict& one) {
   return one.at.empty() || one.isOffset() ? "" : ", both " + one.at;
 }
@@ -120,7 +136,7 @@ std::string lacksOf(const TraitVerdict& one) {
 std::string verdictOf(const TraitVerdict& one) {
   if (!one.why_not.empty()) return "not told: " + one.why_not + lacksOf(one);
   if (!one.isTold()) return "not told: an end of an interval is not known" + lacksOf(one);
-  if (one.differs()) return "differs, " + farBeyond(one) + atOf(one) + lacksOf(one);
+  if (one.differs()) return "differs, " + farBeyond(one) + lineOf(one) + atOf(one) + lacksOf(one);
   const double most = std::max(std::abs(one.difference.low), std::abs(one.difference.high));
   return fmt::format("same, within {}{}{}{}", number(most), unitBehind(one), atOf(one), lacksOf(one));
 }
@@ -159,10 +175,10 @@ std::string headlineOf(const std::vector<TraitVerdict>& all) {
   const auto found = std::ranges::find_if(all, isNew);
   const TraitVerdict* first = found == all.end() ? &all.front() : &*found;
   return hidden + fmt::format(
-                      "Clearest difference: {}, {} ({} to {}), {}. "
+                      "Clearest difference: {}, {} ({} to {}), {}{}. "
                       "{} of {} numbers of B differ from A's by more than the noise floor",
                       plainNameOf(*first), sizeOf(*first), number(first->difference.low),
-                      number(first->difference.high), farBeyond(*first), differ, differ + same) + alike;
+                      number(first->difference.high), farBeyond(*first), lineOf(*first), differ, differ + same) + alike;
 }
 
 std::string missingInWords(const std::vector<MissingAt>& missing) {
@@ -220,8 +236,8 @@ std::vector<Card> cardsOf(const std::vector<TraitVerdict>& all, const std::vecto
     };
     if (std::any_of(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(i), isIt)) continue;
     cards.push_back({plainNameOf(one), sizeOf(one),
-                     fmt::format("B − A, {} to {}; {}", number(one.difference.low),
-                                 number(one.difference.high), farBeyond(one)),
+                     fmt::format("B − A, {} to {}; {}{}", number(one.difference.low),
+                                 number(one.difference.high), farBeyond(one), lineOf(one)),
                      Tone::Fair});
   }
   return cards;

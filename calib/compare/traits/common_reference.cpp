@@ -27,7 +27,8 @@ Trait toldAt(const Trait& one, const OnLine& line, double to_m) {
 }
 
 /// B's less A's, of lines that are known apart from each other.
-OnLine lessOf(const OnLine& of_b, const OnLine& of_a, double at_m) {
+OnLine lessOf(const OnLine& of_b, const OnLine& of_a, double from_m, double to_m) {
+  const double at_m = 0.5 * (from_m + to_m);
   const auto varianceAt = [at_m](const OnLine& line) {
     const double by_m = at_m - line.at_m;
     return line.variance + 2.0 * by_m * line.covariance + by_m * by_m * line.slope_variance;
@@ -36,6 +37,8 @@ OnLine lessOf(const OnLine& of_b, const OnLine& of_a, double at_m) {
     return line.covariance + (at_m - line.at_m) * line.slope_variance;
   };
   return {.at_m = at_m,
+          .from_m = from_m,
+          .to_m = to_m,
           .slope = of_b.slope - of_a.slope,
           .variance = varianceAt(of_a) + varianceAt(of_b),
           .slope_variance = of_a.slope_variance + of_b.slope_variance,
@@ -51,10 +54,10 @@ HeldTogether heldAt(const Trait& a, const OnLine& of_a, const Trait& b, const On
                 "common",
                 of_a.from_m, of_a.to_m, of_b.from_m, of_b.to_m)};
   }
-  const double both_m = 0.5 * (from_m + to_m);
-  Trait difference = differenceOf(toldAt(a, of_a, both_m), toldAt(b, of_b, both_m), wider);
-  const bool is_of_scale = goesThroughNothing(difference.value, lessOf(of_b, of_a, both_m), wider);
-  return {.difference = std::move(difference), .is_of_scale = is_of_scale, .at = placeInWords(both_m)};
+  const OnLine line = lessOf(of_b, of_a, from_m, to_m);
+  return {.difference = differenceOf(toldAt(a, of_a, line.at_m), toldAt(b, of_b, line.at_m), wider),
+          .line = line,
+          .at = placeInWords(line.at_m)};
 }
 
 HeldTogether heldAt(const Trait& a, const WaveParts& of_a, const Trait& b, const WaveParts& of_b,

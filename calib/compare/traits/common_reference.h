@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "calib/compare/traits/traits.h"
@@ -12,7 +13,7 @@ namespace toftwin::compare {
 struct HeldTogether {
   Trait difference{};     ///< second less first; of waves the amplitude of the difference, which has no sign
   bool is_size = false;   ///< it has no sign
-  bool is_of_scale = false;  ///< it is of a line that goesThroughNothing()
+  std::optional<OnLine> line{};  ///< of an offset: the difference of the two lines, over the distances that both have
   std::string at{};       ///< what both are told at, where that is another than their own: "at 1.75 m"
   std::string why_not{};  ///< why they cannot be held against each other; empty: they can
 };
