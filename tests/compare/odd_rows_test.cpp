@@ -8,6 +8,7 @@
 #include <fstream>
 #include <functional>
 #include <numbers>
+#include <utility>
 
 #include "calib/compare/table_traits.h"
 #include "calib/compare/trait_verdict.h"
@@ -235,18 +236,36 @@ TEST(OddRows, OfAWarmUpAreNamed) {
   EXPECT_LE(named, 2);
 }
 
-/// Rows near the edge scatter by 8 mm, those far from it by 2: they are no slips.
+/// Rows near the edge scatter by 8 mm, those far from it by 2: they are no slips. Of 40 rows the first two have most of
+/// it, and neighbours on one side only. Of 1000 other seeds 4 and 5 were named (before, 28 and 10): of 400 five or more
+/// are in 3 % of 1.6 expected.
 TEST(OddRows, AreNoneThatScatterAsTheirNeighboursDo) {
-  int named = 0;
-  for (unsigned seed = 1; seed <= 100; ++seed) {
-    Noise noise{seed};
-    Columns x = evenly(0.0, 1.2, 150), y;
-    for (const double one : x)
-      y.push_back(-3.0 + 40.0 * std::exp(-one / 0.25) + noise(2.0 + 6.0 * std::exp(-one / 0.05)));
-    const auto told = cornerTraits(x, y);
-    named += told && told->front().doubt.find("times as far off") != std::string::npos;
+  for (const auto& [count, seeds] : {std::pair{150, 100u}, {40, 400u}}) {
+    int named = 0;
+    for (unsigned seed = 1; seed <= seeds; ++seed) {
+      Noise noise{seed};
+      Columns x = evenly(0.0, 1.2, count), y;
+      for (const double one : x)
+        y.push_back(-3.0 + 40.0 * std::exp(-one / 0.25) + noise(2.0 + 6.0 * std::exp(-one / 0.05)));
+      const auto told = cornerTraits(x, y);
+      named += told && told->front().doubt.find("times as far off") != std::string::npos;
+    }
+    EXPECT_LE(named, 5) << count << " rows";
   }
-  EXPECT_LE(named, 5);
+}
+
+/// Of 60 speeds the slowest or the one after it is off by 20 σ: at an end, too, a slip is one.
+TEST(OddRows, AreNamedAtTheEndOfALine) {
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    Noise noise{seed};
+    const Columns v = evenly(-2.0, 2.0, 60);
+    Columns y = noisy(v, 0.5, noise, [](double one) { return 1.0 + 7.5 * one; });
+    const std::size_t row = seed % 2;
+    y[row] += 10.0;
+    const auto told = motionTraits(v, y);
+    ASSERT_TRUE(told) << told.error().message;
+    EXPECT_THAT(told->front().doubt, HasSubstr(fmt::format("row {} of 60 is", row + 1))) << seed;
+  }
 }
 
 }  // namespace

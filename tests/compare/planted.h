@@ -37,6 +37,13 @@ inline Columns evenly(double first, double last, int count) {
   return x;
 }
 
+/// y = f(x) + noise.
+inline Columns noisy(const Columns& x, double sigma, Noise& noise, const std::function<double(double)>& f) {
+  Columns y;
+  for (const double one : x) y.push_back(f(one) + noise(sigma));
+  return y;
+}
+
 /// y = f(x) + errors of `sigma`, each of which has `rho` of the one before.
 inline Columns alike(const Columns& x, double sigma, double rho, Noise& noise,
               const std::function<double(double)>& f) {
@@ -48,6 +55,17 @@ inline Columns alike(const Columns& x, double sigma, double rho, Noise& noise,
   }
   return y;
 }
+
+/// Cells of a wall, and the capture of each.
+struct Cells {
+  Columns distance_m{}, error_mm{}, pixels{};
+  std::vector<std::size_t> capture{};
+};
+
+/// Eighteen captures of a wall, whose ranges are up to 1.2 times its distance, a cell each `step_m`: each
+/// capture is off by `own_mm` of its own, each cell by `cell_mm`.
+Cells eighteenWalls(Noise& noise, double step_m, double own_mm, double cell_mm,
+                    const std::function<double(double)>& error_mm);
 
 /// Rows of sessions.
 struct AtPlaceOfSession {
@@ -61,6 +79,10 @@ struct Planted {
   std::function<Traits(Noise&)> run;
 };
 
+/// Series over time since power-on.
+std::vector<Planted> plantedDrifts();
+/// Waves, noise laws and wraps.
+std::vector<Planted> plantedOverDistance();
 /// Veils in the lens, of one frequency and of several that the cameras' own decoders join.
 std::vector<Planted> plantedScatter();
 /// Rows that err alike or scatter by their own measure, and parts that are not there.

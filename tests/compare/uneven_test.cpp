@@ -38,5 +38,25 @@ TEST(ErrorsByRows, OfADifferenceOfMeansAreWelchs) {
   EXPECT_NEAR(fit->covariance[3], welch * wider, 1e-7 * welch);
 }
 
+/// A mean of three rows beside one of thirty: two degrees of freedom tell it. Of two means of thirty each nothing is
+/// changed, whatever they scatter by.
+TEST(ErrorsByRows, CountWhereFewRowsTellANumber) {
+  std::vector<double> y = kFew;
+  for (int i = 0; i < 30; ++i) y.push_back(10.0 + 20.0 * (i % 3));
+  std::size_t first = kFew.size();
+  const Model two = [&](std::span<const double> p, std::size_t i) { return i < first ? p[0] : p[1]; };
+  auto fit = fitLeastSquares(two, y, {0.0, 0.0});
+  ASSERT_TRUE(fit);
+  tellErrorsByRowsOfFew(*fit, two, y);
+  const double sd = summarise(kFew).sd, wider = studentT(2.0) / studentT(31.0);
+  EXPECT_NEAR(fit->covariance[0], sd * sd / 3.0 * wider * wider, 1e-7 * fit->covariance[0]);
+  y.insert(y.end(), 27, 2.0), first = 30;
+  auto many = fitLeastSquares(two, y, {0.0, 0.0});
+  ASSERT_TRUE(many);
+  const std::vector<double> before = many->covariance;
+  tellErrorsByRowsOfFew(*many, two, y);
+  EXPECT_EQ(many->covariance, before);
+}
+
 }  // namespace
 }  // namespace toftwin::compare

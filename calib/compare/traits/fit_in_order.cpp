@@ -302,7 +302,10 @@ std::optional<Fit> fitInOrder(const Model& model, Column y, std::vector<double> 
     if (!next) break;
     by_sigma = std::move(next), sigmas = std::move(next_sigmas);
   }
-  if (!by_sigma) return fit;
+  if (!by_sigma) {
+    tellErrorsByRowsOfFew(*fit, model, y);
+    return fit;
+  }
   tellErrorsByRows(*by_sigma, over(model, sigmas), over(y, sigmas));
   return by_sigma;
 }

@@ -78,6 +78,48 @@ VectorXd variancesBy(const MatrixXd& z, const VectorXd& squares) {
 /// Ten rows to spare for each of the two numbers of a parabola.
 bool areEnough(Column left, std::size_t parameters) { return left.size() >= parameters + 20; }
 
+/// What rows leave, in the place of s².
+struct ErrorsByRows {
+  MatrixXd alike{};    ///< covariance of the parameters by one s² of all rows
+  MatrixXd told{};     ///< by what each leaves
+  VectorXd degrees{};  ///< of freedom, Satterthwaite's, of each parameter
+
+  ErrorsByRows(const Fit& fit, const Model& model, Column y) {
+    const MatrixXd j = jacobian(model, y.size(), fit.at);
+    const Index n = j.rows(), k = j.cols();
+    const MatrixXd inverse = linear::Ldlt{j.transpose() * j}.inverse(), from_rows = inverse * j.transpose();
+    const VectorXd left = residuals(model, y, fit.at), own = (j * from_rows).diagonal().cwiseMin(0.99),
+                   others = (1.0 - own.array()).matrix(), squares = left.cwiseAbs2().cwiseQuotient(others);
+    alike = inverse * (left.squaredNorm() / static_cast<double>(n - k));
+    told = from_rows * squares.asDiagonal() * from_rows.transpose();
+    degrees = VectorXd(k);
+    for (Index a = 0; a < k; ++a) {
+      // Σ w r² of independent rows: its mean is Σ w (1 − h), its variance 2 Σ w w' P², P = 1 − J (JᵀJ)⁻¹ Jᵀ.
+      const VectorXd weight = from_rows.row(a).transpose().cwiseAbs2().cwiseQuotient(others);
+      const MatrixXd both = j.transpose() * weight.asDiagonal() * j * inverse;
+      const double variance = weight.cwiseAbs2().dot((1.0 - 2.0 * own.array()).matrix()) + (both * both).trace();
+      degrees[a] = std::pow(weight.dot(others), 2) / variance;
+    }
+  }
+};
+
+/// With Student's quantile of each parameter's own degrees of freedom.
+void tellBy(const ErrorsByRows& by_rows, Fit& fit) {
+  const Index k = by_rows.alike.rows();
+  VectorXd wider(k);
+  for (Index a = 0; a < k; ++a) wider[a] = studentT(by_rows.degrees[a]) / studentT(fit.degrees);
+  const MatrixXd alike = linear::choleskyOf(by_rows.alike),
+                 told = linear::choleskyOf(wider.asDiagonal() * by_rows.told * wider.asDiagonal());
+  if (!alike.allFinite() || !told.allFinite()) return;
+  const MatrixXd turn = told * linear::solveLowerEach(alike, MatrixXd::Identity(k, k));
+  const auto turned = [&](std::vector<double>& covariance) {
+    Eigen::Map<MatrixXd> one{covariance.data(), k, k};
+    one = (turn * one * turn.transpose()).eval();
+  };
+  turned(fit.covariance);
+  for (Fit::Possible& one : fit.possible) turned(one.covariance);
+}
+
 }  // namespace
 
 std::vector<double> unevenSigmas(Column left, Column x, std::size_t parameters) {
@@ -94,31 +136,12 @@ std::vector<double> sigmasOver(Column left, Column x, std::size_t parameters) {
   return {sigmas.data(), sigmas.data() + sigmas.size()};
 }
 
-void tellErrorsByRows(Fit& fit, const Model& model, Column y) {
-  const MatrixXd j = jacobian(model, y.size(), fit.at);
-  const Index n = j.rows(), k = j.cols();
-  const MatrixXd inverse = linear::Ldlt{j.transpose() * j}.inverse(), from_rows = inverse * j.transpose();
-  const VectorXd left = residuals(model, y, fit.at), own = (j * from_rows).diagonal().cwiseMin(0.99),
-                 others = (1.0 - own.array()).matrix(), squares = left.cwiseAbs2().cwiseQuotient(others);
-  MatrixXd by_rows = from_rows * squares.asDiagonal() * from_rows.transpose();
-  for (Index a = 0; a < k; ++a) {
-    // Σ w r² of independent rows: its mean is Σ w (1 − h), its variance 2 Σ w w' P², P = 1 − J (JᵀJ)⁻¹ Jᵀ.
-    const VectorXd weight = from_rows.row(a).transpose().cwiseAbs2().cwiseQuotient(others);
-    const MatrixXd both = j.transpose() * weight.asDiagonal() * j * inverse;
-    const double variance = weight.cwiseAbs2().dot((1.0 - 2.0 * own.array()).matrix()) + (both * both).trace();
-    const double wider = studentT(std::pow(weight.dot(others), 2) / variance) / studentT(fit.degrees);
-    by_rows.row(a) *= wider, by_rows.col(a) *= wider;
-  }
-  const MatrixXd alike = linear::choleskyOf(inverse * (left.squaredNorm() / static_cast<double>(n - k))),
-                 told = linear::choleskyOf(by_rows);
-  if (!alike.allFinite() || !told.allFinite()) return;
-  const MatrixXd turn = told * linear::solveLowerEach(alike, MatrixXd::Identity(k, k));
-  const auto turned = [&](std::vector<double>& covariance) {
-    Eigen::Map<MatrixXd> one{covariance.data(), k, k};
-    one = (turn * one * turn.transpose()).eval();
-  };
-  turned(fit.covariance);
-  for (Fit::Possible& one : fit.possible) turned(one.covariance);
+void tellErrorsByRows(Fit& fit, const Model& model, Column y) { tellBy(ErrorsByRows{fit, model, y}, fit); }
+
+void tellErrorsByRowsOfFew(Fit& fit, const Model& model, Column y) {
+  constexpr double kFew = 10.0;
+  const ErrorsByRows by_rows{fit, model, y};
+  if (by_rows.degrees.minCoeff() < kFew) tellBy(by_rows, fit);
 }
 
 std::vector<double> over(Column values, Column sigmas) {
