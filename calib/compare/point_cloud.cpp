@@ -99,7 +99,7 @@ std::string html(const PointCloud& cloud) {
   const double reach = reachOf(cloud.a, middle), scale = 0.48 * kHeight / reach;
   const std::size_t thin = 1 + cloud.a.size() / 1000;
   return fmt::format(
-      "<figure class='cloud' data-a='{}' data-b='{}' data-reach='{:.0f}'><div class='plot'><svg viewBox='0 0 "
+      "<figure class='cloud alone' data-a='{}' data-b='{}' data-reach='{:.0f}'><div class='plot'><svg viewBox='0 0 "
       "{} {}' "
       "role='img' aria-label='{}'>{}{}</svg></div><div class='legend'><label class='inkA'><input "
       "type='checkbox' checked "

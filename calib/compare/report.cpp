@@ -112,14 +112,16 @@ std::string html(const TableBlock& table) {
   return out + "</tbody></table></div>";
 }
 
-std::string html(const Figure& figure) {
-  return fmt::format("<figure>{}<figcaption>{}</figcaption></figure>", figure.svg,
+std::string html(const Figure& figure, const char* attributes) {
+  return fmt::format("<figure{}>{}<figcaption>{}</figcaption></figure>", attributes, figure.svg,
                      escaped(figure.caption));
 }
 
+std::string html(const Figure& figure) { return html(figure, " class='alone'"); }
+
 std::string html(const FigureRow& row) {
   std::string out = "<div class='row'>";
-  for (const Figure& figure : row.figures) out += html(figure);
+  for (const Figure& figure : row.figures) out += html(figure, "");
   return out + "</div>";
 }
 

@@ -37,11 +37,14 @@ p{max-width:78ch}
 details{margin:10px 0}summary{cursor:pointer;color:var(--soft)}
 figure{margin:14px 0;background:var(--panel);border:1px solid var(--line);border-radius:6px;padding:10px 12px;min-width:0}
 figcaption{font-size:.9rem;color:var(--soft);margin-top:6px;max-width:90ch}
-.row{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,400px),1fr));gap:0 14px}
+.row{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,400px),1fr));gap:0 14px}
 .plot{overflow-x:auto}.plot svg{display:block;width:100%;min-width:430px;height:auto}
 .plot.map svg{min-width:260px}.row .plot svg{min-width:260px}
 .legend{display:flex;flex-wrap:wrap;gap:2px 18px;font-size:.9rem;padding:4px 4px 0}.legend span{display:inline-flex;align-items:center;gap:7px}
 .legend svg{flex:none}
+/* One that stands alone is no wider than one looks at; what it means is beside it. */
+@media screen and (min-width:1000px){.alone{display:grid;grid-template:auto 1fr/minmax(0,820px) minmax(220px,1fr);gap:0 24px}
+.alone .plot{grid-row:1/3}.alone .legend{flex-direction:column;padding-top:12px}}
 .tick{font-size:13px;fill:var(--soft);font-variant-numeric:tabular-nums}.label{font-size:14px;fill:var(--ink)}
 .grid{stroke:var(--line);stroke-width:1}.zero{stroke:var(--soft);stroke-width:1.2}.frame{fill:none;stroke:var(--line)}
 .curve{fill:none;stroke-width:2;stroke-linejoin:round}.dashed{stroke-dasharray:8 5}.dotted{stroke-dasharray:2 4}

@@ -113,7 +113,7 @@ std::string lineOf(const TraitVerdict& one) {
   const auto at = [&](double distance_m) {
     return fmt::format("{} mm {}", signedNumber(one.offAt(distance_m)), placeInWords(distance_m));
   };
-  if (one.isScale()) return fmt::format(": {}, {}", at(one.line->from_m), at(one.line->to_m));
+  if (one.isScale()) return fmt::format(", that is {} and {}", at(one.line->from_m), at(one.line->to_m));
   if (!one.is_of_scale || !(one.line->at_m > 0.0)) return "";
   return fmt::format(", as a scale of {} mm/m alone would make it, too",
                      signedNumber(one.difference.value / one.line->at_m));
@@ -235,6 +235,9 @@ std::vector<Card> cardsOf(const std::vector<TraitVerdict>& all, const std::vecto
       return isWaves(before) && isWaves(one) && before.difference.name == one.difference.name;
     };
     if (std::any_of(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(i), isIt)) continue;
+    // Nor has an offset that a scale makes one beside the scale's.
+    const auto isOfIt = [](const TraitVerdict& scale) { return scale.isScale() && scale.differs(); };
+    if (one.isOffset() && one.is_of_scale && std::ranges::any_of(all, isOfIt)) continue;
     cards.push_back({plainNameOf(one), sizeOf(one),
                      fmt::format("B − A, {} to {}; {}{}", number(one.difference.low),
                                  number(one.difference.high), farBeyond(one), lineOf(one)),

@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 
+#include "calib/compare/plot.h"
 #include "calib/compare/report.h"
 
 namespace toftwin::compare {
@@ -65,11 +66,26 @@ TEST_F(Browser, TurnsThePointCloudsAndPrintsThePage) {
   const std::string page = chromium("--dump-dom");
   // The script comes to its end: the still is a canvas then, and the cloud says that it turns.
   EXPECT_THAT(page, HasSubstr("<canvas"));
-  EXPECT_THAT(page, HasSubstr("class=\"cloud turns\""));
+  EXPECT_THAT(page, HasSubstr("class=\"cloud alone turns\""));
   chromium(fmt::format("--window-size=900,900 --screenshot={}/page.png", folder_.string()));
   EXPECT_GT(fs::file_size(folder_ / "page.png"), 10'000U);
   chromium(fmt::format("--no-pdf-header-footer --print-to-pdf={}/page.pdf", folder_.string()));
   EXPECT_GT(fs::file_size(folder_ / "page.pdf"), 10'000U);
+}
+
+/// A plot with what is left below it was 1200 pixels high on a page 1500 wide.
+TEST_F(Browser, ShowsAPlotThatStandsAloneAtOneGlance) {
+  Plot plot{.title = "A plot", .x_label = "x", .y_label = "y"};
+  plot.curves.push_back({.name = "A", .x = {0.0, 1.0}, .y = {0.0, 1.0}});
+  plot.below = Panel{.y_label = "rest", .curves = plot.curves};
+  Report report{.title = "A page", .subtitle = "of a test", .verdict = "fine"};
+  report.sections.push_back({.id = "one", .title = "One", .blocks = {Figure{"what it shows", toSvg(plot)}}});
+  ASSERT_TRUE(write(report, folder_));
+  std::ofstream{folder_ / "index.html", std::ios::app}
+      << "<script>const at = one => document.querySelector(one).getBoundingClientRect();"
+         "document.title = `plot ${at('.plot').height < 650}, beside ${at('figcaption').left > at('.plot').right}`;"
+         "</script>";
+  EXPECT_THAT(chromium("--window-size=1500,1000 --dump-dom"), HasSubstr("<title>plot true, beside true</title>"));
 }
 
 }  // namespace

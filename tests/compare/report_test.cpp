@@ -76,7 +76,7 @@ TEST(Report, HasAPointCloudThatOneCanTurnAndAStillOfIt) {
   Report report = example();
   report.sections[0].blocks.push_back(cloud);
   const std::string page = toHtml(report);
-  EXPECT_THAT(page, HasSubstr("<figure class='cloud' data-a='"));
+  EXPECT_THAT(page, HasSubstr("<figure class='cloud alone' data-a='"));
   EXPECT_THAT(page, HasSubstr("<path class='dots simulated' d='M"));
   EXPECT_THAT(page, HasSubstr("<script>\n"));
   for (const char* elsewhere : {"http", "src=", "<link", "@import", "fetch("})

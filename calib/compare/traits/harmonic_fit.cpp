@@ -92,7 +92,7 @@ double seriesAt(std::span<const double> p, const std::vector<Wave>& waves, doubl
 FittedTraits fittedOf(const Fit& fit, double square_degrees, const std::vector<Wave>& waves,
                       Column distance_m) {
   return {.traits = traitsOf(fit, square_degrees, waves, distance_m),
-          .curve = {fmt::format("a line and {} waves", waves.size()),
+          .curve = {waves.size() == 1 ? "a line and one wave" : fmt::format("a line and {} waves", waves.size()),
                     [=, p = fit.at](double d) { return seriesAt(p, waves, d); }},
           .together = wavesTogether(fit, 2, waves, distance_m),
           .bic = fit.bic()};
