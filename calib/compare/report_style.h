@@ -66,7 +66,7 @@ footer{margin-top:40px;padding-top:12px;border-top:1px solid var(--line);color:v
 .cloud canvas{display:block;width:100%;height:420px;touch-action:none;cursor:grab}.cloud .hint,.cloud input{display:none}
 .cloud.turns .hint{display:inline;color:var(--soft)}.cloud.turns input{display:inline}.inkA{color:var(--measured)}.inkB{color:var(--simulated)}
 @media print{nav,.cloud .hint,.cloud input{display:none!important}body{background:#fff;font-size:11pt}main{max-width:none;padding:0}
-figure,.card,tr,h2+p{break-inside:avoid}h2{break-after:avoid}.scroll,.plot{overflow:visible}.plot svg{min-width:0;max-height:100mm}.finding,caption{break-after:avoid}
+figure,.card,tr,h2+p{break-inside:avoid}h2{break-after:avoid}.scroll,.plot{overflow:visible}.plot svg{min-width:0;max-height:100mm}.row{grid-template-columns:1fr 1fr}.row .plot svg{min-width:0}#provenance td{overflow-wrap:anywhere}.finding,caption{break-after:avoid}
 table{font-size:8pt;width:100%}th,td{padding:2px 5px}td.number{white-space:normal}td.long{min-width:0}.below td{padding:0 5px 2px 16px}td:first-child:not(.number),td:nth-child(2):not(.number){min-width:0}
 details::details-content{content-visibility:visible;height:auto}summary{list-style:none}}
 )css";
