@@ -126,9 +126,9 @@ struct Rest {
   }
 };
 
-/// Whether fewer than two rows are farther along, or before it: how rows scatter there is known from one side only.
+/// Whether fewer than four rows are farther along, or before it: how rows scatter there is known from one side only.
 bool isAtAnEnd(Column x, Index row) {
-  constexpr std::ptrdiff_t kFewest = 2;
+  constexpr std::ptrdiff_t kFewest = 4;
   const double at = x[static_cast<std::size_t>(row)];
   const auto before = std::ranges::count_if(x, [at](double one) { return one <= at; }) - 1,
              after = std::ranges::count_if(x, [at](double one) { return one >= at; }) - 1;
@@ -139,7 +139,7 @@ bool isAtAnEnd(Column x, Index row) {
 /// be as they are. At an end it may be of those that scatter still more, as at the edge of a corner.
 std::vector<Odd> oddAmongNeighbours(std::vector<Odd> odd, const Rest& rest, Column x) {
   constexpr std::size_t kNeighbours = 8;  // fewer than there are rows, as kFewestFree are to spare
-  constexpr double kFarther = 1.5;        // σ of so few is known by a quarter
+  constexpr double kFarther = 1.2;        // σ of so few is known by a quarter
   constexpr double kFarthest = 2.5;       // σ of 8, 5.3, 3.8, 2.9, … mm: the first one is 2.4 times the next eight's
   std::erase_if(odd, [&](const Odd& one) {
     const VectorXd near = rest.off(rest.near(x[static_cast<std::size_t>(one.row)], kNeighbours));
