@@ -17,6 +17,7 @@
 #include "calib/compare/traits/clusters.h"
 #include "calib/compare/traits/veil.h"
 #include "calib/plan/change_traits.h"
+#include "calib/plan/corner_traits.h"
 
 namespace toftwin::plan {
 namespace {
@@ -68,6 +69,11 @@ OverRange ownErrorOf(const Captures& walls, std::size_t camera) {
   return {walls, camera, [](const CameraSeen& seen, std::size_t i) { return seen.wall_error_mm[i]; }};
 }
 
+/// Where no wall is known, 0.
+std::function<double(double)> beside(OverRange own) {
+  return [own = std::move(own)](double range_m) { return own.isKnown() ? own.at(range_m) : 0.0; };
+}
+
 void addTiming(const ComparedRun& run, std::size_t camera, TraitCollector& all) {
   std::vector<std::vector<double>> series;
   for (const auto* captures : {&run.captures, &run.moving}) {
@@ -84,74 +90,6 @@ void addWraps(const Captures& walls, std::size_t camera, TraitCollector& all) {
     if (seen.wall_readings > 0.0) shares.push_back(seen.wall_wraps / seen.wall_readings);
   }
   all.add("wraps", kCameras[camera], compare::wrapTraits(shares));
-}
-
-/// A corner's errors in steps of the distance to its edge, each of one capture.
-struct Steps {
-  std::vector<double> place_m{}, error_mm{};
-  std::vector<std::size_t> capture{};
-};
-
-/// Of all captures together: place and error of each step.
-std::pair<std::vector<double>, std::vector<double>> meansOf(const Steps& steps) {
-  std::map<double, compare::Running> all;
-  for (std::size_t i = 0; i < steps.place_m.size(); ++i) all[steps.place_m[i]].add(steps.error_mm[i]);
-  std::pair<std::vector<double>, std::vector<double>> means;
-  for (const auto& [place, errors] : all) means.first.push_back(place), means.second.push_back(errors.mean());
-  return means;
-}
-
-/// Means over bands of the distance to the edge: steps of one capture err alike, so a row is a capture's
-/// mean.
-void addBands(const std::string& name, const Steps& steps, std::size_t camera, TraitCollector& all) {
-  constexpr std::array<std::pair<double, double>, 3> kBands{{{0.0, 0.1}, {0.1, 0.3}, {0.3, 0.9}}};
-  std::vector<compare::Trait> traits;
-  for (const auto& [from, to] : kBands) {
-    std::vector<double> within;
-    std::vector<std::size_t> captures;
-    for (std::size_t i = 0; i < steps.place_m.size(); ++i) {
-      if (steps.place_m[i] >= from && steps.place_m[i] < to)
-        within.push_back(steps.error_mm[i]), captures.push_back(steps.capture[i]);
-    }
-    if (!within.empty())
-      traits.push_back(compare::meanTrait(fmt::format("{:g} to {:g} m from the edge", from, to), "mm",
-                                          compare::clusterMeans(within, captures)));
-  }
-  if (traits.empty()) {
-    all.untold(fmt::format("{} of {}: no wall is seen where the plan puts it (within 300 mm)", name,
-                           kCameras[camera]));
-    return;
-  }
-  all.add(name, kCameras[camera], traits);
-}
-
-/// Distances to the edge in steps of 2.5 cm: pixels of one step are not independent rows.
-void addCorners(const ComparedRun& run, const OverRange& own, std::size_t camera, TraitCollector& all) {
-  constexpr double kStep_m = 0.025;
-  std::map<std::string, Steps> blocks;
-  for (const ComparedCapture* one : allCapturesOf(run, "corner")) {
-    if (isPoseFromPlanes(one->record)) continue;
-    const CameraSeen& seen = one->seen[camera];
-    std::map<long, compare::Running> steps;
-    for (std::size_t i = 0; i < seen.corner_place_m.size(); ++i) {
-      const double usual = own.isKnown() ? own.at(seen.corner_range_m[i]) : 0.0;
-      if (std::isfinite(usual))
-        steps[std::lround(seen.corner_place_m[i] / kStep_m)].add(seen.corner_error_mm[i] - usual);
-    }
-    for (const auto& [step, errors] : steps) {
-      if (errors.n() < 4) continue;
-      Steps& of = blocks[one->record.block];
-      of.place_m.push_back(kStep_m * static_cast<double>(step)), of.error_mm.push_back(errors.mean());
-      of.capture.push_back(one->record.number);
-    }
-  }
-  for (const auto& [name, steps] : blocks) {
-    addBands(name, steps, camera, all);
-    // The fall from the edge as one exponential, where it is one: at the very edge both ways are equally
-    // long. Of each step over all captures.
-    const auto [place, error] = meansOf(steps);
-    if (const auto fall = compare::cornerTraits(place, error)) all.add(name, kCameras[camera], fall);
-  }
 }
 
 /// All captures below each other, a row of nothing between them: what looks along rows takes them for one
@@ -256,12 +194,12 @@ void addFrameTraits(const ComparedRun& run, TraitCollector& all) {
   for (std::size_t camera : {std::size_t{0}, std::size_t{1}}) {
     addTiming(run, camera, all);
     if (!walls.empty()) addWraps(walls, camera, all);
-    addCorners(run, ownErrorOf(walls, camera), camera, all);
     addPlates(run, camera, all);
     if (const Captures plates = platesForScatter(run); !plates.empty())
       addScatter(plates, walls, run.frequency_hz[camera], camera, all);
     addChangeTraits(run, camera, all);
   }
+  addCornerTraits(run, {beside(ownErrorOf(walls, 0)), beside(ownErrorOf(walls, 1))}, all);
   addLatency(run, all);
 }
 

@@ -228,7 +228,13 @@ NamedTrait biasOf(const ComparedRun& run, const Characteristics& c) {
                                    : std::nan("");
   return {.what = "bias on surfaces",
           .of = "B − A",
-          .trait = {"bias on surfaces", "mm", all.mean, all.mean - half, all.mean + half, c.places}};
+          .trait = {.name = "bias on surfaces",
+                    .unit = "mm",
+                    .value = all.mean,
+                    .low = all.mean - half,
+                    .high = all.mean + half,
+                    .n = c.places,
+                    .degrees = std::max(1.0, degrees)}};
 }
 
 std::vector<TraitVerdict> verdictsOf(const RunTraits& traits, const ComparedRun& run,

@@ -11,6 +11,7 @@
 #include <variant>
 
 #include "calib/compare/traits/difference.h"
+#include "calib/compare/traits/least_squares.h"
 
 namespace toftwin::compare {
 namespace {
@@ -294,6 +295,27 @@ TEST(Verdict, CallsNothingTheSameByTwoRows) {
             "not told: it is from 2 only, and it takes 3 to call it the same");
   EXPECT_EQ(headlineOf(by(2, 1.0)), "No characteristic is known of both cameras");
   EXPECT_TRUE(by(2, 6.0).front().differs()) << "Student's interval of two rows holds";
+}
+
+/// Means of four rows of two equal cameras, ten of them: Student's distribution of three degrees of freedom has far
+/// longer tails than the normal one, by which 18 % of 20,000 runs named a difference. Four standard errors of 5 % are 2 %.
+TEST(Verdict, HoldsMeansOfFewRowsTogetherByTheirOwnDistribution) {
+  constexpr unsigned kSeed = 6;
+  RecordProperty("seed", kSeed);
+  std::mt19937_64 random{kSeed};
+  std::normal_distribution<double> error{0.0, 1.0};
+  int different = 0;
+  for (int run = 0; run < 2000; ++run) {
+    NamedTraits traits;
+    for (int i = 0; i < 10; ++i) {
+      std::vector<double> rows;
+      for (int row = 0; row < 4; ++row) rows.push_back(error(random));
+      traits.traits.push_back({"band " + std::to_string(i), "", "B − A", meanTrait("number", "mm", rows)});
+    }
+    different += verdictsOf(traits).front().differs() ? 1 : 0;
+  }
+  RecordProperty("different", different);
+  EXPECT_NEAR(different / 2000.0, 0.05, 0.02);
 }
 
 /// Each may be another wave: neither differs, and neither is the largest difference.

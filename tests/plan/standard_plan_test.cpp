@@ -196,7 +196,7 @@ TEST_F(StandardPlan, TellsEveryCharacteristicOfBothCameras) {
     EXPECT_NE(page.find(std::string{"aria-label='"} + drawn), std::string::npos) << drawn;
   EXPECT_NE(lag, std::string::npos);
   EXPECT_NE(page.find("Drift of A and of B while warming up"), std::string::npos);
-  EXPECT_NE(page.find("<figure class='cloud'"), std::string::npos);
+  EXPECT_NE(page.find("<figure class='cloud alone'"), std::string::npos);
   EXPECT_NE(page.find("<td>plan_seed</td><td>2026</td>", page.find("id='provenance'")),
             std::string::npos);
   EXPECT_THAT(toftwin("log " + path("lab.sqlite") + " --settings 1").out,

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "calib/compare/traits/least_squares.h"
 
@@ -14,6 +15,13 @@ constexpr double kManyDegrees = 1e6;  ///< Student's quantile is the normal one 
 
 constexpr double kFarthest_mm = 1e5;  ///< no camera reads 100 m
 
+/// What an interval of Student's is to be widened by for the level to which normal ones are by `wider`.
+double widerOf(const Trait& one, double wider) {
+  if (!(one.degrees < kManyDegrees) || !(wider > 1.0)) return wider;
+  const double level = std::erf(wider * studentT(kManyDegrees, kLevel) / std::numbers::sqrt2);
+  return studentT(one.degrees, level) / studentT(one.degrees, kLevel);
+}
+
 }  // namespace
 
 bool isKnown(double end, const std::string& unit) {
@@ -22,8 +30,9 @@ bool isKnown(double end, const std::string& unit) {
 
 Trait differenceOf(const Trait& first, const Trait& second, double wider) {
   Trait d{.name = second.name, .unit = second.unit, .value = second.value - first.value};
-  d.low = d.value - wider * std::hypot(second.value - second.low, first.high - first.value);
-  d.high = d.value + wider * std::hypot(second.high - second.value, first.value - first.low);
+  const double of_first = widerOf(first, wider), of_second = widerOf(second, wider);
+  d.low = d.value - std::hypot(of_second * (second.value - second.low), of_first * (first.high - first.value));
+  d.high = d.value + std::hypot(of_second * (second.high - second.value), of_first * (first.value - first.low));
   d.n = std::min(first.n, second.n);
   return d;
 }
@@ -34,6 +43,7 @@ double widenedFor(std::size_t count) {
 }
 
 Trait widened(Trait one, double wider) {
+  wider = widerOf(one, wider);
   one.low = one.value - wider * (one.value - one.low), one.high = one.value + wider * (one.high - one.value);
   return one;
 }

@@ -111,7 +111,8 @@ Trait Fit::trait(std::string name, std::string unit,
           .high = value + half,
           .n = n,
           .doubt = doubt,
-          .odd_rows = odd_rows};
+          .odd_rows = odd_rows,
+          .degrees = degrees};
 }
 
 void Fit::heedCorrelation(double rho) {
@@ -197,7 +198,8 @@ Trait meanTrait(std::string name, std::string unit, Column values, double scale)
           .value = scale * summary.mean,
           .low = scale * (summary.mean - half),
           .high = scale * (summary.mean + half),
-          .n = summary.n};
+          .n = summary.n,
+          .degrees = static_cast<double>(std::max<std::size_t>(summary.n, 2) - 1)};
 }
 
 ShareInterval shareInterval(double events, double trials, ShareRule rule) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -60,6 +61,8 @@ struct Trait {
       doubt{};  ///< why it may be another's, so that nothing is called different by it; empty: it is its own
   std::vector<std::size_t> odd_rows{};  ///< what puts it in doubt: which of the finite rows, from 0; mostly none
   bool is_extrapolated = false;  ///< it is told far from all rows: what a camera shows that nobody measured
+  /// Of freedom, of Student's quantile in the interval: of few it grows faster where it is widened. None: normal.
+  double degrees = std::numeric_limits<double>::infinity();
 };
 using Traits = Result<std::vector<Trait>>;
 using Column = std::span<const double>;
