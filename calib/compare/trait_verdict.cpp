@@ -143,6 +143,7 @@ void addLines(std::vector<TraitVerdict>& all) {
     const auto isBeside = [&](const TraitVerdict& other) { return other.isOffset() && other.what == one.what; };
     const auto offset = std::ranges::find_if(all, isBeside);
     if (offset == all.end() || !offset->line) continue;
+    offset->has_scale = one.differs();
     one.line = offset->line, one.on_line_mm = offset->on_line_mm, one.is_of_scale = offset->is_of_scale;
   }
 }

@@ -19,6 +19,7 @@ struct TraitVerdict {
   bool is_size = false;    ///< the difference is the amplitude of a wave, which has no sign
   std::optional<OnLine> line{};  ///< of an offset and of the scale beside it: the line that both are of
   double on_line_mm = 0.0;       ///< what it is off by where it is told
+  bool has_scale = false;        ///< of an offset: the scale of its line differs, too
   bool is_of_scale = false;      ///< a scale alone may make all of the line: it goes through 0 at distance 0
   std::string at{};        ///< what both are told at, where a number hangs on it: "at 1.75 m"
   std::string why_not{};   ///< why the two cannot be held against each other

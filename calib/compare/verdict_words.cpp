@@ -106,14 +106,19 @@ std::string farBeyond(const TraitVerdict& one) {
 
 std::string signedNumber(double value) { return (value > 0.0 ? "+" : "") + number(value); }
 
-/// Of a scale, where along the range it is how much. Of an offset that the scale of the same line may make, of which
-/// nothing tells whether it is there: that it may.
+/// Of a scale, where along the range it is how much, and of an offset that has one beside it. Of an offset that a scale
+/// alone may make: that it may.
 std::string lineOf(const TraitVerdict& one) {
   if (!one.line || !(one.line->from_m < one.line->to_m)) return "";
   const auto at = [&](double distance_m) {
     return fmt::format("{} mm {}", signedNumber(one.offAt(distance_m)), placeInWords(distance_m));
   };
-  if (one.isScale()) return fmt::format(", that is {} and {}", at(one.line->from_m), at(one.line->to_m));
+  const auto [from_m, to_m] = std::pair{one.line->from_m, one.line->to_m};
+  if (one.isScale()) return fmt::format(", that is {} and {}", at(from_m), at(to_m));
+  if (one.has_scale && !one.is_of_scale) {
+    return fmt::format(", with a scale of {} mm/m beside it: {} and {}", signedNumber(one.line->slope), at(from_m),
+                       at(to_m));
+  }
   if (!one.is_of_scale || !(one.line->at_m > 0.0)) return "";
   return fmt::format(", as a scale of {} mm/m alone would make it, too",
                      signedNumber(one.difference.value / one.line->at_m));
