@@ -36,12 +36,21 @@ std::string wordsOf(const std::vector<double>& frequency_hz) {
   return words.empty() ? "no frequency that its frames say" : words + " MHz";
 }
 
-/// The first of the captures that share this one's error. Each has its own, unless its pose was seen.
+/// The condition in all of whose captures an error is the same: where the pose was seen, and of two simulated cameras,
+/// whose traced light has the same grain each time.
+std::optional<CaptureRecord::Condition> sharedBy(const ComparedCapture& one) {
+  const bool is_grain = one.seen[0].is_simulated && one.seen[1].is_simulated;
+  return is_grain ? one.record.conditionInRun() : sharedPoseOf(one.record);
+}
+
+/// The first of the captures that share this one's error. Others have their own.
 std::size_t clusterOf(const Captures& captures, const CaptureRecord& record) {
-  const auto condition = sharedPoseOf(record);
+  const auto isIt = [&](const auto* one) { return one->record.number == record.number; };
+  const auto own = std::ranges::find_if(captures, isIt);
+  const auto condition = own == captures.end() ? std::nullopt : sharedBy(**own);
   if (!condition) return record.number;
-  const auto first = std::ranges::find(captures, condition, [](const auto* one) { return sharedPoseOf(one->record); });
-  return first == captures.end() ? record.number : (*first)->record.number;
+  const auto first = std::ranges::find(captures, condition, [](const auto* one) { return sharedBy(*one); });
+  return (*first)->record.number;
 }
 
 /// Errors over distance: steps of a wall's range, in clusters of captures that share an error.

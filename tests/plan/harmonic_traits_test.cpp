@@ -36,6 +36,31 @@ TEST(RunTraits, TakeEachCamerasHarmonicsByItsOwnFrequencies) {
   EXPECT_NE(find(traitsOf(run), "harmonics", "B − A", "30 MHz, 4 per period"), nullptr);
 }
 
+/// Twenty walls, each captured twice, and between both captures nothing changes but noise of 0.01 mm: a traced light's
+/// grain, 0.5 mm of each wall, is the same. Of two simulated cameras the two are one row; others err anew each time.
+TEST(RunTraits, CountRepeatsOfTwoSimulatedCamerasOnce) {
+  std::mt19937_64 random{kSeed};
+  std::normal_distribution<double> error{0.0, 1.0};
+  ComparedRun run = plantedRun();
+  std::erase_if(run.captures, [](const ComparedCapture& one) { return one.record.kind == "warm_up"; });
+  double grain_mm = 0.0;
+  for (std::size_t i = 0; i < run.captures.size(); ++i) {
+    if (i % 2 == 0) grain_mm = 0.5 * error(random);
+    ComparedCapture& one = run.captures[i];
+    one.record.block = "distance", one.record.condition = i / 2;
+    one.range_a_mm = 500.0 + 200.0 * static_cast<double>(i / 2);
+    one.difference_mm = 3.0 + grain_mm + 0.01 * error(random);
+  }
+  const auto rowsOf = [&](bool is_simulated) {
+    for (ComparedCapture& one : run.captures) one.seen[0].is_simulated = one.seen[1].is_simulated = is_simulated;
+    const RunTraits all = traitsOf(run);
+    const RunTrait* scale = find(all, "harmonics", "B − A", "scale");
+    return scale == nullptr ? 0 : scale->trait.n;
+  };
+  EXPECT_EQ(rowsOf(true), 20u);
+  EXPECT_EQ(rowsOf(false), 40u);
+}
+
 const std::vector<double> kKinect_hz{16e6, 80e6, 120e6};
 
 /// The open captures of the standard plan, and two at each of `more_m`, before a wall that fills 60° of a
