@@ -162,7 +162,7 @@ void heedWidths(const PlateSeen& a, const PlateSeen& b, compare::Trait& latency)
   latency.low -= late_ms, latency.high += late_ms;
 }
 
-/// Why the two saw nothing of one motion: scenes move by their cameras' own clocks, and one of them may have run before.
+/// Why the two saw nothing of one motion: scenes move by their cameras' own clocks, and one may have run before.
 std::string whyNothingShared(const CameraSeen& a, const CameraSeen& b) {
   if (a.plate_time_s.empty() || b.plate_time_s.empty()) return "";
   const auto &at_a = a.plate_time_s, &at_b = b.plate_time_s;

@@ -24,8 +24,8 @@ struct Band {
 };
 constexpr std::array<Band, 3> kBands{{{0.0, 0.1}, {0.1, 0.3}, {0.3, 0.9}}};
 
-/// A corner's errors, mm, in steps of 2.5 cm of the distance to its edge, as pixels of one step are no independent rows:
-/// of each pose, and of all together.
+/// A corner's errors, mm, of each pose and of all together, in steps of 2.5 cm of the distance to its edge, as pixels of
+/// one step are no independent rows.
 struct Corner {
   std::map<std::size_t, std::map<double, Running>> of_pose{};
   std::map<double, Running> together{};

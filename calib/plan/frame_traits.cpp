@@ -14,7 +14,6 @@
 #include <toftwin/nan.h>
 
 #include "calib/compare/statistics.h"
-#include "calib/compare/traits/clusters.h"
 #include "calib/compare/traits/veil.h"
 #include "calib/plan/change_traits.h"
 #include "calib/plan/corner_traits.h"

@@ -147,7 +147,8 @@ Result<> Taker::setUp(const PlannedCapture& planned, Feed& feed, const std::stri
 /// The first frame of a subscription in lockstep is made at once, perhaps before what is set next: it is left out
 /// whatever it says, so that the frames kept have the same numbers, and with them the same noise and the same time of
 /// the scene, in each run. And a camera that is put elsewhere in no time has what it saw there before still in its
-/// pixels, which one that is carried has long forgotten: that shows where it is meant to, in blocks of kind bright_dark.
+/// pixels, which one that is carried has long forgotten: that shows where it is meant to, in blocks of kind
+/// bright_dark.
 Result<> Taker::dropFirst(const PlannedCapture& planned, Feed& feed, const Taken& taken) {
   if (!feed.details().can_lockstep) return {};
   const bool is_new = known_.insert(&feed).second;

@@ -89,28 +89,30 @@ TEST(Verdict, NamesTheScaleBeforeTheOffsetThatItMakes) {
   EXPECT_THAT(verdictTable(all).rows[1][0], testing::StartsWith("harmonics: offset at 3 m"));
   EXPECT_EQ(cardsOf(all).size(), 2u) << "how many are the same, and the scale";
   EXPECT_THAT(headlineOf(all), HasSubstr("the floor, that is +1.5 mm at 0.5 m and +13.5 mm at 4.5 m. 2 of 2"));
-  EXPECT_THAT(verdictTable(all).rows[0][1], testing::EndsWith("× the floor, that is +1.5 mm at 0.5 m and +13.5 mm at 4.5 m"));
+  EXPECT_THAT(verdictTable(all).rows[0][1],
+              testing::EndsWith("× the floor, that is +1.5 mm at 0.5 m and +13.5 mm at 4.5 m"));
   EXPECT_THAT(headlineOf(verdictsOf(withLine(10.0))),
               testing::StartsWith("Clearest difference: B − A over distance: offset at 3 m, +10"));
   EXPECT_THAT(headlineOf(verdictsOf(withLine(10.0))),
-              HasSubstr("the floor, with a scale of +3 mm/m beside it: +2.5 mm at 0.5 m and +14.5 mm at 4.5 m. 2 of 2"));
+              HasSubstr("floor, with a scale of +3 mm/m beside it: +2.5 mm at 0.5 m and +14.5 mm at 4.5 m. 2 of 2"));
   EXPECT_THAT(traitTable(withLine(9.0)).rows[0].back(), HasSubstr("at 3 m"));
 }
 
-/// Waves that are not needed leave B − A's scale at 3 ± 5 mm/m: it is not told to differ, and the offset may be its. Where
-/// the cameras' own lines tell it, it is named first.
+/// Waves that are not needed leave B − A's scale at 3 ± 5 mm/m: it is not told to differ, and the offset may be its.
+/// Where the cameras' own lines tell it, it is named first.
 TEST(Verdict, SaysOfAnOffsetThatAScaleMayMakeIt) {
   NamedTraits traits = withLine(9.0);
   traits.traits[1].trait.low = -2.0, traits.traits[1].trait.high = 8.0;
   std::get_if<OnLine>(&traits.traits[0].trait.refers_to)->slope_variance = 6.25;
   EXPECT_THAT(headlineOf(verdictsOf(traits)),
-              HasSubstr("offset at 3 m, +9 mm (8.89 to 9.11), 79 × the floor, as a scale of +3 mm/m alone would make it, "
-                        "too. 1 of 2"));
+              HasSubstr("offset at 3 m, +9 mm (8.89 to 9.11), 79 × the floor, as a scale of +3 mm/m alone would make "
+                        "it, too. 1 of 2"));
   const char* by_wall = "harmonics, against the plan's wall";
   traits.traits.push_back(of("A", by_wall, 0.0, -0.5, 0.5)), traits.traits.push_back(of("B", by_wall, 3.0, 2.5, 3.5));
   for (std::size_t i = 2; i < 4; ++i) traits.traits[i].trait.name = "scale";
   const auto all = verdictsOf(traits);
-  EXPECT_THAT(headlineOf(all), testing::StartsWith("Clearest difference: error over distance, B's less A's: scale, +3"));
+  EXPECT_THAT(headlineOf(all),
+              testing::StartsWith("Clearest difference: error over distance, B's less A's: scale, +3"));
   EXPECT_EQ(all[1].difference.name, "offset");
 }
 

@@ -28,7 +28,8 @@ class FakeCamera final : public compare::Feed {
     Frame frame = makes;
     frame.source = details_.entry.name;
     if (stale_frames > 0) --stale_frames, frame.moment.exposures = {Exposure{{}, 1_us, 20_MHz}};
-    if (details_.can_set_pose) frame.moment.world_from_camera = frames_ < made_before ? Transform<World, Camera>{} : pose_;
+    if (details_.can_set_pose)
+      frame.moment.world_from_camera = frames_ < made_before ? Transform<World, Camera>{} : pose_;
     frame.sequence = static_cast<std::uint64_t>(frames_);
     for (Exposure& one : frame.moment.exposures) one.start.ns += frames_ * frame_apart_ns;
     ++frames_;

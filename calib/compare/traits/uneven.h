@@ -23,8 +23,8 @@ Model over(const Model& model, Column sigmas);
 /// degrees of freedom for each parameter (R. M. Bell, D. F. McCaffrey, Surv. Methodol. 28 (2002) 169, of rows that
 /// are clusters of one).
 void tellErrorsByRows(Fit& fit, const Model& model, Column y);
-/// The same, of all parameters, where few rows tell one of them (under ten degrees of freedom), as the three at a corner's
-/// edge do: what is told hangs on their own σ then, and so few do not show that it is another than that of the rest.
+/// The same, of all parameters, where few rows tell one of them (under ten degrees of freedom), as the three at a
+/// corner's edge do: what is told hangs on their own σ then, and so few do not show that it is another than the rest's.
 void tellErrorsByRowsOfFew(Fit& fit, const Model& model, Column y);
 
 }  // namespace toftwin::compare
