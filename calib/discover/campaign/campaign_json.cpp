@@ -84,6 +84,12 @@ Json jsonOf(const CampaignJob& job, const CampaignFinding& finding) {
   data.set("scales", Json::arrayOf(finding.finding.scales)).set("chi2_per_row", finding.dispersion);
   for (const FoundEffect& one : finding.effects) effects.push(toJson(one));
   for (const FittedEffect& one : finding.updates) updates.push(nameOf(one.effect));
+  if (const auto& off = finding.off) {
+    Json one = Json::object();
+    one.set("capture", off->number).set("name", off->name).set("captures_there", off->captures.size());
+    one.set("shift_mm", off->shift_mm).set("turn_deg", off->turn_deg).set("is_set_aside", off->is_set_aside);
+    data.set("off_its_pose", std::move(one));
+  }
   data.set("effects", std::move(effects)).set("parameter_updates", std::move(updates));
   if (const auto& judged = finding.judgement) {
     Json locked = Json::object();

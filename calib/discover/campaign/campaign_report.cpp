@@ -281,9 +281,8 @@ std::string nothingInWords(const CampaignFinding& finding) {
   return capitalised(hasDelay(finding) ? delayInWords(finding) + "; " + rest : rest) + leftInWords(finding);
 }
 
-}  // namespace
-
-std::string verdictOf(const CampaignFinding& finding) {
+/// Without what is set aside.
+std::string foundInWords(const CampaignFinding& finding) {
   if (finding.effects.empty() && finding.updates.empty()) return nothingInWords(finding);
   std::vector<std::string> names;
   for (const FoundEffect& one : finding.effects)
@@ -310,6 +309,13 @@ std::string verdictOf(const CampaignFinding& finding) {
                            hasDelay(finding) ? "the delay leaves" : "can be explained");
   }
   return verdict + leftInWords(finding);
+}
+
+}  // namespace
+
+std::string verdictOf(const CampaignFinding& finding) {
+  if (!finding.off || !finding.off->is_set_aside) return foundInWords(finding);
+  return foundInWords(finding) + ". Set aside: " + finding.off->inWords();
 }
 
 Result<std::filesystem::path> writeReport(const CampaignJob& job, const CampaignFinding& finding) {

@@ -17,6 +17,7 @@
 #include "calib/discover/campaign/next_capture.h"
 #include "calib/discover/campaign/reading.h"
 #include "calib/discover/campaign/search_rounds.h"
+#include "calib/discover/campaign/stood_off.h"
 #include "calib/discover/campaign/step_effect.h"
 #include "calib/discover/marginal.h"
 
@@ -237,12 +238,16 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
   const FinderOptions finder = finderFor(job, campaign->captures);
   OpenCaptures open{campaign->captures, *at_poses, job.trace, finder, job.left_out, steps.has_value()};
   if (steps) open.left_out.emplace_back(sim::Quantisation::about.name);
-  const auto searched_for = searchInRounds(
+  const auto searched_for = searchBesideBumped(
       declared, open, [&] { progress.begin(); }, tell);
   if (!searched_for) return searched_for.error();
-  Round& round = **searched_for;
+  Round& round = *searched_for->round;
+  const SomeCaptures* some = searched_for->without.get();
+  finding.off = searched_for->off;
+  if (finding.off) finding.notes.push_back(noteOf(*finding.off));
   declared.delay_mm = round.declared.delay_mm;
-  const Lit lit{campaign->captures, round.traced, *at_poses};
+  const Lit lit{some != nullptr ? some->captures : campaign->captures, round.traced,
+                some != nullptr ? some->at_poses : *at_poses};
   takeFound(round, finding);
   noteMissingRawExposures(declared.model, finding);
   addNextCaptures({round.declared, lit, finding.finding.scales}, *round.rows, finding.effects);

@@ -67,6 +67,18 @@ struct FoundEffect {
   bool is_of_single_frames = false;
 };
 
+/// A place where the camera stood off its pose by more than at all others: it was bumped.
+struct StoodOff {
+  std::vector<std::size_t> captures{};  ///< that were taken there, by their places among the open ones
+  std::string name{};                   ///< of the first
+  std::size_t number = 0;
+  double shift_mm = 0.0, turn_deg = 0.0;
+  bool is_set_aside = false;  ///< what was found is found without them
+
+  /// "capture 17 ("distance: 0.9 m") stood 14.6 mm and 1.78° from its pose"
+  [[nodiscard]] std::string inWords() const;
+};
+
 /// All that is known when a campaign was searched.
 struct CampaignFinding {
   std::string camera{}, plan{};
@@ -75,6 +87,7 @@ struct CampaignFinding {
   std::vector<FoundEffect> effects{};
   std::vector<FittedEffect> updates{};  ///< declared effects whose numbers were wrong
   Zero zero{};  ///< with what was found; its delay whole
+  std::optional<StoodOff> off{};  ///< none: no place is off by more than chance
   double dispersion = 1.0;
   std::optional<Judgement> judgement{};  ///< on the locked captures
   std::string model_toml{};

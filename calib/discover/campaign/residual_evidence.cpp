@@ -5,9 +5,9 @@
 #include <cmath>
 
 #include "calib/discover/campaign/carriers.h"
+#include "calib/discover/campaign/places.h"
 #include "calib/discover/campaign/reading.h"
 #include "calib/discover/campaign/refit.h"
-#include "calib/linear/linear.h"
 #include "sim/images/rows.h"
 
 namespace toftwin::discover {
@@ -78,10 +78,12 @@ Result<double> delayThatFits(const JudgedCampaign& judged) {
   const auto is_told = isDelayNoOffset(judged, as_declared);
   if (!is_told) return is_told.error();
   if (!*is_told) return 0.0;
+  std::vector<double> weights;  // the same for all delays
   const auto fitAt = [&](double delay_mm) -> Result<Fit> {
-    const auto evidence = residualEvidence(judged, withDelay(model, as_declared, delay_mm));
+    auto evidence = residualEvidence(judged, withDelay(model, as_declared, delay_mm));
     if (!evidence) return evidence.error();
-    return commonFit(*evidence, judged.scales);
+    if (weights.empty()) weights = temperOf(*evidence, judged.scales);
+    return commonFit(weighed(*std::move(evidence), weights), judged.scales);
   };
   const auto start = fitAt(0.0);
   if (!start) return start.error();
@@ -108,21 +110,14 @@ Result<std::vector<std::shared_ptr<const TracedCapture>>> traceWhereTheyStood(
     const std::vector<MeasuredCapture>& captures,
     const std::vector<std::shared_ptr<const TracedCapture>>& traced, const TraceOptions& options,
     const std::function<void(double)>& tell) {
-  constexpr Eigen::Index kOwn = 6;  // pose and light
   const Lit lit{captures, traced, traced};
   const auto evidence = residualEvidence({declared, lit, {}}, effects);
   if (!evidence) return evidence.error();
-  const Eigen::VectorXd common = commonFit(*evidence, {}).coefficient;
+  const std::vector<Place> places = placesBy(*evidence, {});
   std::vector<Stood> stood;
   for (const std::size_t stand : standsOf(captures)) {
-    const CaptureEvidence& one = evidence->captures[stand];
-    const Eigen::MatrixXd gram =
-        one.gram.block<kOwn, kOwn>(2, 2) + Eigen::MatrixXd::Identity(kOwn, kOwn);  // prior deviations of 1
-    const Eigen::VectorXd own =
-        linear::Ldlt{gram}.solve(one.moment.segment<kOwn>(2) - one.gram.block<kOwn, 2>(2, 0) * common);
-    Stood& here = stood.emplace_back();
-    for (std::size_t way = 0; way < here.size(); ++way)
-      here[way] = std::clamp(own[static_cast<Eigen::Index>(way)], -10.0, 10.0);
+    Stood& here = stood.emplace_back(places[stand].off);
+    for (double& way : here) way = std::clamp(way, -10.0, 10.0);
   }
   TraceOptions again = options;
   again.seed += 0x2545f491U;

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+// A place where the camera was bumped is set aside where it matters, and nothing else is.
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <random>
+
+#include "calib/discover/campaign/places.h"
+#include "calib/discover/campaign/stood_off.h"
+#include "tests/discover/searched.h"
+
+namespace toftwin::discover {
+namespace {
+
+std::vector<double> gaussian(std::mt19937_64& random, std::size_t n) {
+  std::normal_distribution<double> normal;
+  std::vector<double> all(n);
+  for (double& one : all) one = 0.7 + normal(random);  // where the rig's zero lies nobody knows
+  return all;
+}
+
+TEST(OneFarOff, IsTheOneThatWasBumped) {
+  std::mt19937_64 random{20263};
+  std::vector<double> places = gaussian(random, 30);
+  EXPECT_FALSE(oneFarOff(places, 1e-3));
+  places[17] += 10.0;
+  EXPECT_EQ(oneFarOff(places, 1e-3), 17U);
+}
+
+/// 20,000 lists of 12 in which one of 20 may be wrong: 1000 are expected at most; the bound on the largest of twelve is
+/// nearly exact, but the rule that it stands apart takes some. More than 1000 + 5 √950 has a chance of 3e-7.
+TEST(OneFarOff, IsSeldomChance) {
+  std::mt19937_64 random{20264};
+  int wrong = 0;
+  for (int k = 0; k < 20'000; ++k) wrong += oneFarOff(gaussian(random, 12), 0.05) ? 1 : 0;
+  EXPECT_LT(wrong, 1000 + 155);
+  EXPECT_GT(wrong, 100);
+}
+
+/// A hundred captures, of which two moved alike: Student's t of either is 9.8. What a warm-up does to its first, too.
+TEST(OneFarOff, IsNoneWhereOthersMovedAsWell) {
+  std::mt19937_64 random{20265};
+  std::vector<double> places = gaussian(random, 100);
+  places[3] += 60.0, places[70] += 50.0;
+  EXPECT_FALSE(oneFarOff(places, 1e-3));
+  places = gaussian(random, 100);
+  for (std::size_t i = 0; i < 10; ++i) places[i] += 25.0 * std::exp(-0.27 * static_cast<double>(i));
+  EXPECT_FALSE(oneFarOff(places, 1e-3));
+  EXPECT_FALSE(oneFarOff({0.0, 0.1, -0.1, 0.05, 30.0}, 1e-3)) << "too few to say what is usual";
+}
+
+/// Five captures with an offset of 0 and one, 30 times as far off as its noise says, with one of 8 mm.
+TEST(TemperOf, OneCaptureDoesNotMoveWhatIsCommon) {
+  Evidence evidence;
+  evidence.groups = commonGroups();
+  for (int c = 0; c < 6; ++c) {
+    const double off = c == 5 ? 8.0 : 0.0, rows = 100.0, weight = c == 5 ? 1e4 : 1e2;
+    CaptureEvidence one{.gram = Eigen::MatrixXd::Zero(kCommon, kCommon), .moment = Eigen::VectorXd::Zero(kCommon)};
+    one.gram(0, 0) = weight * rows, one.moment[0] = weight * rows * off;
+    one.energy = rows + weight * rows * off * off + (c == 5 ? 900.0 * rows : 0.0), one.rows = rows;
+    evidence.captures.push_back(one);
+  }
+  const auto offsetOf = [](const Evidence& of) {
+    const Marginal marginal = marginalise(of, {});
+    return fit(marginal, nuisanceColumns(marginal)).coefficient[0];
+  };
+  EXPECT_GT(offsetOf(evidence), 7.0);
+  EXPECT_LT(std::abs(offsetOf(weighed(evidence, temperOf(evidence, {})))), 0.5);
+  evidence.captures.pop_back();
+  EXPECT_THAT(temperOf(evidence, {}), testing::Each(1.0));
+}
+
+/// So far off that light traced once where the camera probably stood leaves something (p = 0.0025).
+TEST_F(Searched, ABumpedCaptureIsSetAside) {
+  bumped_ = 9;
+  simulate("", {}, true, 0, 23);
+  const CampaignFinding finding = search(job());
+  EXPECT_TRUE(finding.effects.empty()) << verdictOf(finding);
+  EXPECT_GT(finding.finding.first_p, 0.01);
+  ASSERT_TRUE(finding.off);
+  EXPECT_TRUE(finding.off->is_set_aside);
+  EXPECT_EQ(finding.off->number, 9U);
+  EXPECT_THAT(verdictOf(finding), testing::HasSubstr("Set aside: capture 9"));
+  EXPECT_THAT(finding.notes, testing::Contains(testing::HasSubstr("It is set aside")));
+}
+
+}  // namespace
+}  // namespace toftwin::discover
