@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "calib/compare/traits/least_squares.h"
 #include "calib/discover/campaign/carriers.h"
@@ -32,12 +33,36 @@ std::optional<std::size_t> bumpedOf(const std::vector<Place>& places) {
   return std::nullopt;
 }
 
-StoodOff describe(std::vector<std::size_t> captures, const MeasuredCapture& first, const Place& place) {
+/// What was set at these captures and at no others: an effect of it would be there alone, too.
+std::string aloneAt(const std::vector<std::size_t>& captures, const std::vector<MeasuredCapture>& all) {
+  const plan::CaptureRecord& here = all[captures.front()].record;
+  std::vector<std::string> words;
+  const auto add = [&](double plan::CaptureRecord::*setting, const char* unit) {
+    constexpr double kAlike = 0.1;
+    const double own = here.*setting;
+    for (std::size_t c = 0; c < all.size(); ++c) {
+      const double other = all[c].record.*setting;
+      const bool is_alike = !(std::abs(other - own) > kAlike * std::max(std::abs(other), std::abs(own)));  // NaN: unknown
+      if (is_alike && std::ranges::find(captures, c) == captures.end()) return;
+    }
+    words.push_back(fmt::format("{:.4g} {}", own, unit));
+  };
+  add(&plan::CaptureRecord::exposure_us, "µs"), add(&plan::CaptureRecord::ambient_klx, "klx");
+  return fmt::format("{}", fmt::join(words, " and "));
+}
+
+StoodOff describe(std::vector<std::size_t> captures, const std::vector<MeasuredCapture>& all, const Place& place) {
   Stood off = place.off;
   for (std::size_t way = 0; way < off.size(); ++way)
     if (place.seen[way] < kTold) off[way] = 0.0;
-  return {std::move(captures), first.record.name, first.record.number,
-          kPosePrior_m * 1e3 * std::hypot(off[0], off[1], off[2]), kPosePrior_deg * std::hypot(off[3], off[4])};
+  const plan::CaptureRecord& first = all[captures.front()].record;
+  StoodOff stood{.name = first.name,
+                 .number = first.number,
+                 .shift_mm = kPosePrior_m * 1e3 * std::hypot(off[0], off[1], off[2]),
+                 .turn_deg = kPosePrior_deg * std::hypot(off[3], off[4]),
+                 .alone = aloneAt(captures, all)};
+  stood.captures = std::move(captures);
+  return stood;
 }
 
 }  // namespace
@@ -49,12 +74,13 @@ std::string StoodOff::inWords() const {
 }
 
 std::string noteOf(const StoodOff& off) {
-  return fmt::format(
+  std::string note = fmt::format(
       "As its light says, {}, much farther than any other: the camera or the rig was bumped, or something acts there "
-      "alone. {}",
-      off.inWords(),
-      off.is_set_aside ? "It is set aside: with it something was left, or found, that is not there without it."
-                       : "It was searched with the others.");
+      "alone. ",
+      off.inWords());
+  if (off.is_set_aside) return note + "It is set aside: with it something was left, or found, that is not there without it.";
+  note += "It was searched with the others";
+  return note + (off.alone.empty() ? "." : fmt::format(", of which none was taken at {}: it may be no bump.", off.alone));
 }
 
 std::optional<std::size_t> oneFarOff(const std::vector<double>& deviations, double wrong) {
@@ -94,7 +120,7 @@ Result<std::optional<StoodOff>> stoodOff(const Round& round, const OpenCaptures&
   for (std::size_t c = 0; c < stands.size(); ++c)
     if (stands[c] == *bumped) captures.push_back(c);
   if (captures.size() > 1 && 20 * captures.size() > stands.size()) return std::optional<StoodOff>{};
-  return std::optional{describe(captures, open.captures[captures.front()], places[*bumped])};
+  return std::optional{describe(std::move(captures), open.captures, places[*bumped])};
 }
 
 namespace {
@@ -120,7 +146,7 @@ Result<SearchOf> searchBesideBumped(const Declared& file, const OpenCaptures& op
   all.off = *std::move(off);
   const double alpha = open.finder.alpha;
   const bool leaves = all.round->leavesSomething(alpha);
-  if (!all.off || (!leaves && all.round->things() == 0)) return all;
+  if (!all.off || !all.off->alone.empty() || (!leaves && all.round->things() == 0)) return all;
   SearchOf some{without(all.off->captures, open), nullptr, all.off};
   some.off->is_set_aside = true;
   Declared otherwise = file;
