@@ -20,6 +20,7 @@
 #include "sim/effects/harmonics.h"
 #include "sim/effects/internal_reflection.h"
 #include "sim/effects/lag.h"
+#include "sim/effects/learned_columns.h"
 #include "sim/effects/learned_light.h"
 #include "sim/effects/learned_mirror.h"
 #include "sim/effects/learned_neighbours.h"
@@ -58,7 +59,8 @@ using AllEffects = EffectList<
     LearnedShift, LearnedNeighbours, LearnedMirror, LearnedLight,  // what has no name yet
     PropagationDelay, FixedPatternPhase, StepPhase,                // demodulation
     Lag, ShotNoise, AmbientSuppression, Saturation,                // samples: the pixel
-    Nonlinearity, SampleGain, SampleOffset, ColumnComb, ReadNoise, Quantisation, Companding,  // the converter
+    Nonlinearity, SampleGain, SampleOffset, ColumnComb, LearnedColumns, ReadNoise, Quantisation,
+    Companding,                                                                        // the converter
     RangeNoise, WarmUp, TimeWalk, ClockScale, ResidualDrift, Delay, CalibrationTable,  // range: decoding
     LearnedRange,                                                                      // what has no name yet
     LowAmplitudeFilter, FlyingPixelFilter, EdgeFilter, MedianFilter, BilateralFilter,

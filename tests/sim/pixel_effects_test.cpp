@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <complex>
 
 #include "tests/sim/phase_rig.h"
 
@@ -163,6 +164,45 @@ TEST(ColumnComb, OfGainAloneLeavesThePhaseOfEachColumn) {
   EXPECT_LT(turn.peak(), kRounding);
   EXPECT_GT(std::abs(turn.amplitude[0] - turn.amplitude[1]), 1.0);
   EXPECT_NEAR(turn.amplitude[0], turn.amplitude[4], 1e-2);
+}
+
+/// Σ S_k exp(−iθ_k) of both taps' difference, θ_k = 2π k/N.
+std::complex<double> correlationOf(const Samples& samples, int x) {
+  std::complex<double> sum;
+  for (int k = 0; k < samples.steps; ++k) {
+    const double theta = 2.0 * kPi * k / samples.steps;
+    const auto of = [&](int tap) { return static_cast<double>(samples.tap(0, k, tap)(x, 0)); };
+    sum += (of(0) - of(1)) * std::exp(std::complex{0.0, -theta});
+  }
+  return sum;
+}
+
+/// Charges of 2000 electrons are known to 2e-4 as float; eight of them are added up.
+TEST(LearnedColumns, AddsItsChargesToTheCorrelationOfEveryMthColumn) {
+  for (const int steps : {3, 4}) {
+    Samples samples;
+    samples.frequencies = {20_MHz}, samples.steps = steps, samples.taps = 2;
+    for (int i = 0; i < 2 * steps; ++i)
+      samples.electrons.emplace_back(6, 1, i % 2 == 0 ? 2000.0F + 10.0F * static_cast<float>(i) : 500.0F);
+    const LearnedColumns columns{
+        .in_phase_electrons = {30.0, -7.0}, .quadrature_electrons = {0.0, 12.0}, .gains_percent = {0.0, 1.0}};
+    const CameraInfo camera{};
+    const Samples seen = columns.apply(samples, {Moment{}, camera}, Random{1, 1, 1});
+    for (int x = 0; x < 6; ++x) {
+      const std::complex<double> before = correlationOf(samples, x), after = correlationOf(seen, x);
+      const auto expected = x % 2 == 0 ? before + 30.0 : 1.01 * before + std::complex{-7.0, -12.0};
+      EXPECT_LT(std::abs(after - expected), 8 * 2e-4) << "column " << x << " of " << steps << " steps";
+    }
+    // A region of the chip has the columns of its place.
+    const Samples cut = columns.apply(samples, {Moment{}, camera, 1, 0}, Random{1, 1, 1});
+    EXPECT_EQ(cut.tap(0, 1, 0)(0, 0), seen.tap(0, 1, 0)(1, 0));
+  }
+}
+
+TEST(LearnedColumns, ListsAreAsLongAsEachOther) {
+  EXPECT_EQ(LearnedColumns{}.problem(), "");
+  EXPECT_EQ((LearnedColumns{.quadrature_electrons = {}, .gains_percent = {}}.problem()), "");
+  EXPECT_NE((LearnedColumns{.gains_percent = {1.0, 2.0}}.problem()), "");
 }
 
 TEST(AmbientSuppression, SparesTheWellAndCostsContrastInProportionToWhatItTakes) {

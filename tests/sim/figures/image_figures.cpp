@@ -254,6 +254,15 @@ void addImageFigures(std::map<std::string, Draw>& figures) {
                              .panels = {{"a grey wall", errorOf(comb, wall(0.01))},
                                         {"four times darker", errorOf(comb, wall(0.0025))}}});
   };
+  figures["learned_columns"] = [] {
+    const std::string columns = effect("learned_columns");
+    return standalone(Panels{.label = "error of the range, mm",
+                             .low = -20.0,
+                             .high = 20.0,
+                             .diverging = true,
+                             .panels = {{"a grey wall", errorOf(columns, wall(0.01))},
+                                        {"four times darker", errorOf(columns, wall(0.0025))}}});
+  };
   figures["lag"] = lag;
   figures["flying_pixel_filter"] = [] { return pointsWithFilter(effect("flying_pixel_filter")); };
   figures["edge_filter"] = [] { return pointsWithFilter(effect("edge_filter", "limit_mm = 80")); };
