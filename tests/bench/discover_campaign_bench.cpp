@@ -185,8 +185,8 @@ void report(const Options& options, const bench::Score& score, const CampaignFin
         judged.explainable, judged.cells);
   }
   if (finding.off)
-    fmt::print("# {} stood {:.1f} mm and {:.2f}° off{}\n", finding.off->name, finding.off->shift_mm, finding.off->turn_deg,
-               finding.off->is_set_aside ? ": set aside" : "");
+    fmt::print("# {} stood {:.1f} mm and {:.2f}° off{}\n", finding.off->name, finding.off->shift_mm,
+               finding.off->turn_deg, finding.off->is_set_aside ? ": set aside" : "");
   if (options.scores) fmt::print("# scales {:.3g}\n", fmt::join(finding.finding.scales, ", "));
   for (const SeenGroup& one : seenFirst(finding, options.scores ? 10 : 0))
     fmt::print("# {}: z {:.1f}, T {:.1f} of {}\n", one.name, one.z, one.statistic, one.rank);

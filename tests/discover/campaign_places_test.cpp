@@ -9,15 +9,7 @@ namespace {
 
 using testing::Contains;
 
-class OfAnotherPlace : public Searched {
- protected:
-  [[nodiscard]] CampaignFinding searchWithout(const std::string& name, const std::string& keys) const {
-    simulate("[[effect]]\ntype = '" + name + "'\n" + keys + "\n");
-    CampaignJob without = job();
-    without.left_out = {name};
-    return search(without);
-  }
-};
+using OfAnotherPlace = Searched;
 
 TEST_F(OfAnotherPlace, PixelsThatLookFartherInAreATableOverTheRadius) {
   const CampaignFinding finding = searchWithout("distortion_misfit", "focal_error = 0.02");
@@ -54,6 +46,20 @@ TEST_F(OfAnotherPlace, ASecondImageAboutAPointBesideThePrincipalOneIsOneEffect) 
   EXPECT_NEAR(mirror.down, -1.0, 0.5);
   ASSERT_TRUE(finding.judgement);
   EXPECT_GT(finding.judgement->removed, 0.9) << verdictOf(finding);
+}
+
+/// What all columns' charges have in common was told as a second effect.
+TEST_F(Searched, StripesThatRepeatAreOneEffectWithItsForm) {
+  const CampaignFinding finding = searchWithout("column_comb", "offset_electrons = 40\ngain = 0.004");
+  ASSERT_EQ(finding.effects.size(), 1U) << verdictOf(finding);
+  EXPECT_THAT(finding.effects.front().found.covariates, testing::ElementsAre("column", "converter"));
+  ASSERT_TRUE(finding.effects.front().fitted);
+  EXPECT_EQ(std::get<sim::LearnedColumns>(finding.effects.front().fitted->effect).in_phase_electrons.size(), 4U);
+  const auto model = sim::SensorModel::parse(finding.model_toml, "model.toml");
+  ASSERT_TRUE(model) << model.error().message;
+  EXPECT_THAT(model->effectNames(), Contains("learned_columns"));
+  ASSERT_TRUE(finding.judgement);
+  EXPECT_GT(finding.judgement->removed, 0.7) << verdictOf(finding);
 }
 
 }  // namespace

@@ -57,6 +57,14 @@ TEST_F(Searched, TwoNumbersOfOneDeclaredEffectAreNotBothReported) {
   EXPECT_THAT(finding.model_toml, HasSubstr("step_electrons = 20")) << "what single frames say";
 }
 
+/// What the catalogue has no name for has its form all the same.
+TEST_F(Searched, StepsWithoutANameAreInTheModel) {
+  const CampaignFinding finding = searchWithout("quantisation", "step_electrons = 20.0");
+  ASSERT_THAT(namesOf(finding), ElementsAre("undeclared")) << verdictOf(finding);
+  EXPECT_THAT(verdictOf(finding), HasSubstr("whole steps of 20 electrons"));
+  EXPECT_THAT(finding.model_toml, HasSubstr("step_electrons = 20"));
+}
+
 /// A camera whose amplitude is 0.3 for each electron: its steps are 6 in that unit, and 20 of the file's
 /// electrons.
 TEST_F(Searched, StepsAreOfTheFilesElectronsWhateverTheAmplitudesUnit) {

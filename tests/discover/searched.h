@@ -62,6 +62,13 @@ class Searched : public testing::Test {
     if (!finding) throw std::runtime_error(finding.error().message);
     return *std::move(finding);
   }
+  /// What is found of an effect that the catalogue does not have.
+  [[nodiscard]] CampaignFinding searchWithout(const std::string& name, const std::string& keys) const {
+    simulate("[[effect]]\ntype = '" + name + "'\n" + keys + "\n");
+    CampaignJob without = job();
+    without.left_out = {name};
+    return search(without);
+  }
   static std::string errorOf(const CampaignJob& job) {
     compare::Progress silent{nullptr};
     const auto finding = searchCampaign(job, silent);

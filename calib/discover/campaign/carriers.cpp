@@ -152,11 +152,13 @@ std::map<std::string, Reading> carriersOf(const sim::SensorModel& model, const R
     all.emplace(fmt::format("{}:quadrature", carrier),
                 changeBy(over(z, [&](std::size_t) { return std::complex{0.0F, electrons}; }), period_m));
   };
-  add(kChargeCarrier, electron);
+  add(kChargeCarrier, electron), add(kConverterCarrier, electron);
   add(kStrayCarrier, electron * static_cast<float>(exposure_us * 1e-3));  // of a millisecond
   Reading& gain = all[std::string{kGainCarrier}];
   gain.range_m = gain.log_amplitude = Image<float>(z.width(), z.height());
   for (float& change : gain.log_amplitude.pixels()) change = 0.01F;
+  Reading of_converter = gain;
+  all.emplace(fmt::format("{}:gain", kConverterCarrier), std::move(of_converter));
   return all;
 }
 
@@ -249,6 +251,7 @@ std::vector<TermGroup> carrierGroups(std::span<const CovariateInfo> covariates, 
     groups.push_back(std::move(charge));
   };
   add("a constant charge", {Term{}});
+  groups.back().simpler_than = kConverterCarrier;  // of which all columns have the same
   for (const CovariateInfo& covariate : covariates) {
     if (covariate.word != "exposure" && covariate.word != "ambient" && covariate.word != "temperature")
       continue;
@@ -305,7 +308,8 @@ std::optional<std::array<double, 2>> mirrorMovedBy(std::string_view carrier) {
 std::string_view wordOfCarrier(std::string_view carrier) {
   if (carrier == kNeighbours || carrier == kMirrored || carrier == kOutwardCarrier) return "neighbours";
   if (carrier == kPixelCarrier) return "position";
-  return carrier == kChargeCarrier || carrier == kStrayCarrier ? "amplitude" : "";
+  const bool is_charge = carrier == kChargeCarrier || carrier == kStrayCarrier || carrier == kConverterCarrier;
+  return is_charge ? "amplitude" : "";
 }
 
 }  // namespace toftwin::discover

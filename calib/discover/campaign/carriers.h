@@ -22,7 +22,8 @@ namespace toftwin::discover {
 /// correlation's real or imaginary part (δz = 2/N or 2i/N, N raw exposures). The same for squares about the
 /// mirrored place of the image, turned by half a turn about the principal point; and the light of a place one
 /// pixel farther from it. A gain of 1 % of the amplitude. And stray light, the same in all pixels: electrons
-/// in phase or in quadrature like those of a charge, but as many more as the exposure is longer.
+/// in phase or in quadrature like those of a charge, but as many more as the exposure is longer. Charge and gain
+/// once more under the name of a converter, for those of columns that share one (repeating_columns.h).
 std::map<std::string, Reading> carriersOf(const sim::SensorModel& model, const Reading& declared,
                                           double period_m, double exposure_us);
 
@@ -34,6 +35,8 @@ std::vector<TermGroup> carrierGroups(std::span<const CovariateInfo> covariates, 
 
 /// Of a gain, of a charge and of stray light; the latter two have the parts ":in_phase" and ":quadrature".
 inline constexpr std::string_view kGainCarrier = "gain", kChargeCarrier = "charge", kStrayCarrier = "stray";
+/// Of a column's converter: ":in_phase" and ":quadrature" as of a charge, and ":gain".
+inline constexpr std::string_view kConverterCarrier = "converter";
 /// The carrier of a delay in the light, 1 mm of range: it is late before the waveform's harmonics bend the phase,
 /// so that it also moves the cyclic error.
 inline constexpr std::string_view kDelayCarrier = "delay";

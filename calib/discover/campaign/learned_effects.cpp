@@ -14,6 +14,7 @@
 
 #include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/model_file.h"
+#include "calib/discover/campaign/repeating_columns.h"
 
 namespace toftwin::discover {
 namespace {
@@ -252,6 +253,8 @@ std::vector<LearnedEffect> learnedEffectsOf(const Effect& effect, const Campaign
     if (const auto kernel = kernelOf<sim::LearnedMirror>(along, model.camera(), reachOfMirrored))
       learned.push_back(*kernel);
   }
+  for (const Along& along : all)
+    if (auto columns = columnsOf(along.terms)) learned.push_back(*std::move(columns));
   for (const Along& along : all)
     for (const auto& [term, coefficient] : along.terms)
       if (const PixelPattern* pattern = rows.patternOf(term.carrier))

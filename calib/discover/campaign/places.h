@@ -11,15 +11,15 @@
 /// Where cameras stood, by what is left of their captures (residualEvidence; its columns are commonGroups).
 namespace toftwin::discover {
 
-/// How a camera stood off a capture's pose, in prior deviations; and of each way, the share of such a move that would be
-/// seen beside the other ways, the light and the prior: 0 where the captures do not tell it.
+/// How a camera stood off a capture's pose, in prior deviations; and of each way, the share of such a move that
+/// would be seen beside the other ways, the light and the prior: 0 where the captures do not tell it.
 struct Place {
   Stood off{}, seen{};
 };
 
-/// What each capture counts, for what is common to all: 1; less for those that err more than twice as much as the middle
-/// one, by χ² per row, as if their noise were so much larger. A camera that was bumped far off must not move the offset
-/// of all.
+/// What each capture counts, for what is common to all: 1; less for those that err more than twice as much as
+/// the middle one, by χ² per row, as if their noise were so much larger. A camera that was bumped far off must not
+/// move the offset of all.
 std::vector<double> temperOf(const Evidence& evidence, std::span<const double> scales);
 Evidence weighed(Evidence evidence, const std::vector<double>& weights);
 

@@ -9,6 +9,7 @@
 #include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/covariates.h"
 #include "calib/discover/campaign/refit.h"
+#include "calib/discover/campaign/repeating_columns.h"
 #include "calib/discover/campaign/rows.h"
 #include "sim/images/rows.h"
 
@@ -321,6 +322,8 @@ std::string CampaignRows::wordOfCarrier(const std::string& carrier) const {
 
 std::vector<TermGroup> CampaignRows::ownGroups() const {
   std::vector<TermGroup> groups = carrierGroups(covariates(), has_delay_);
+  if (!rows_.empty() && rows_.front().fixed->cells.grid().cell_width == 1)
+    for (TermGroup& group : repeatingColumns(covariates())) groups.push_back(std::move(group));
   for (TermGroup& group : pixelGroups(has_delay_, rows_.empty() ? 0 : rows_.front().fixed->cells.grid().size()))
     groups.push_back(std::move(group));
   return groups;

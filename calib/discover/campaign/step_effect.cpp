@@ -85,7 +85,7 @@ void addSteps(const CampaignJob& job, const sim::SensorModel& model, const Sampl
   const bool is_candidate =
       std::ranges::find(job.left_out, sim::Quantisation::about.name) == job.left_out.end();
   FoundEffect found{effectOf(own, is_candidate)};
-  if (is_candidate) found.fitted = fitted;
+  found.fitted = fitted;  // whatever it is called, that is its form
   found.is_of_single_frames = true;
   finding.effects.push_back(std::move(found));
 }

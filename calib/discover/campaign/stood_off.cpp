@@ -42,7 +42,8 @@ std::string aloneAt(const std::vector<std::size_t>& captures, const std::vector<
     const double own = here.*setting;
     for (std::size_t c = 0; c < all.size(); ++c) {
       const double other = all[c].record.*setting;
-      const bool is_alike = !(std::abs(other - own) > kAlike * std::max(std::abs(other), std::abs(own)));  // NaN: unknown
+      // NaN: nobody knows.
+      const bool is_alike = !(std::abs(other - own) > kAlike * std::max(std::abs(other), std::abs(own)));
       if (is_alike && std::ranges::find(captures, c) == captures.end()) return;
     }
     words.push_back(fmt::format("{:.4g} {}", own, unit));
@@ -68,9 +69,10 @@ StoodOff describe(std::vector<std::size_t> captures, const std::vector<MeasuredC
 }  // namespace
 
 std::string StoodOff::inWords() const {
-  return fmt::format("capture {} (\"{}\"){} stood {:.1f} mm and {:.2f}° from {}", number, name,
-                     captures.size() > 1 ? fmt::format(" and {} more from its place", captures.size() - 1) : "", shift_mm,
-                     turn_deg, captures.size() > 1 ? "their pose" : "its pose");
+  const bool is_one = captures.size() == 1;
+  return fmt::format("capture {} (\"{}\"){} stood {:.1f} mm and {:.2f}° from {} pose", number, name,
+                     is_one ? "" : fmt::format(" and {} more from its place", captures.size() - 1), shift_mm, turn_deg,
+                     is_one ? "its" : "their");
 }
 
 std::string noteOf(const StoodOff& off) {
@@ -78,9 +80,10 @@ std::string noteOf(const StoodOff& off) {
       "As its light says, {}, much farther than any other: the camera or the rig was bumped, or something acts there "
       "alone. ",
       off.inWords());
-  if (off.is_set_aside) return note + "It is set aside: with it something was left, or found, that is not there without it.";
+  if (off.is_set_aside)
+    return note + "It is set aside: with it something was left, or found, that is not there without it.";
   note += "It was searched with the others";
-  return note + (off.alone.empty() ? "." : fmt::format(", of which none was taken at {}: it may be no bump.", off.alone));
+  return note + (off.alone.empty() ? "." : fmt::format(", none of which was at {}: it may be no bump.", off.alone));
 }
 
 std::optional<std::size_t> oneFarOff(const std::vector<double>& deviations, double wrong) {

@@ -16,10 +16,10 @@
 /// straight line does not reach there, looks like something that the model lacks.
 namespace toftwin::discover {
 
-/// The one place that is farther from the others than chance, as an index. By Student's t of each of `deviations` against
-/// all others (F. E. Grubbs, Ann. Math. Stat. 21 (1950) 27), so that where all are Gaussian one is found in a share
-/// `wrong` of the lists at most; and all others are less than half as far from their mean. So what moves two places
-/// alike is neither.
+/// The one place that is farther from the others than chance, as an index. By Student's t of each of
+/// `deviations` against all others (F. E. Grubbs, Ann. Math. Stat. 21 (1950) 27), so that where all are Gaussian
+/// one is found in a share `wrong` of the lists at most; and all others are less than half as far from their mean.
+/// So what moves two places alike is neither.
 std::optional<std::size_t> oneFarOff(const std::vector<double>& deviations, double wrong);
 
 /// The place off its pose, as what was found says of all of them. None: there is none, or its captures are more than

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/discover/campaign/repeating_columns.h"
+
+#include <algorithm>
+#include <array>
+#include <string>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "calib/discover/campaign/carriers.h"
+
+namespace toftwin::discover {
+namespace {
+
+constexpr std::string_view kColumn = "column";
+constexpr std::array kPeriods{2, 4, 8};
+
+std::string partOf(const char* part) { return fmt::format("{}:{}", kConverterCarrier, part); }
+
+bool isOfConverter(const Term& term) { return term.carrier.starts_with(fmt::format("{}:", kConverterCarrier)); }
+
+/// After how many columns all of these terms repeat.
+std::size_t periodOf(std::span<const std::pair<Term, double>> terms) {
+  std::size_t period = 1;
+  for (const auto& [term, coefficient] : terms)
+    for (const Factor& factor : term.factors)
+      if (isOfConverter(term) && factor.shape == Shape::Modulo)
+        period = std::max(period, static_cast<std::size_t>(factor.numbers[0]));  // each is the next one's half
+  return period;
+}
+
+}  // namespace
+
+std::vector<TermGroup> repeatingColumns(std::span<const CovariateInfo> covariates) {
+  std::vector<TermGroup> groups;
+  if (std::ranges::find(covariates, kColumn, &CovariateInfo::name) == covariates.end()) return groups;
+  for (const int period : kPeriods) {
+    TermGroup group{fmt::format("a charge and a gain that repeat after {} columns", period), Kind::Generic, {}, 0};
+    for (const char* part : {"in_phase", "quadrature", "gain"}) {
+      const bool is_gain = std::string_view{part} == "gain";
+      for (int column = is_gain ? 1 : 0; column < period; ++column) {
+        const Factor factor{
+            std::string{kColumn}, Shape::Modulo, {static_cast<double>(period), static_cast<double>(column)}};
+        group.terms.push_back({{factor}, Stage::Samples, partOf(part)});
+      }
+    }
+    groups.push_back(std::move(group));
+  }
+  return groups;
+}
+
+std::optional<LearnedEffect> columnsOf(std::span<const std::pair<Term, double>> terms) {
+  if (std::ranges::none_of(terms, [](const auto& one) { return isOfConverter(one.first); })) return std::nullopt;
+  const std::size_t period = periodOf(terms);
+  sim::LearnedColumns columns{.in_phase_electrons = std::vector<double>(period),
+                              .quadrature_electrons = std::vector<double>(period),
+                              .gains_percent = std::vector<double>(period)};
+  std::vector<std::string> free;
+  for (const auto& [part, list] : {std::pair{"in_phase", &columns.in_phase_electrons},
+                                   {"quadrature", &columns.quadrature_electrons},
+                                   {"gain", &columns.gains_percent}}) {
+    const bool is_gain = list == &columns.gains_percent;
+    const std::string key = is_gain ? "gains_percent" : fmt::format("{}_electrons", part);
+    for (std::size_t j = 0; j < period; ++j) {
+      for (const auto& [term, coefficient] : terms)
+        if (term.carrier == partOf(part))
+          (*list)[j] += coefficient * term.at([j](const std::string&) { return static_cast<double>(j); });
+      (*list)[j] = std::clamp((*list)[j], is_gain ? -100.0 : -1e9, is_gain ? 1e4 : 1e9);
+      if (!is_gain || j > 0) free.push_back(fmt::format("{}[{}]", key, j));
+    }
+  }
+  return LearnedEffect{std::move(columns), std::move(free)};
+}
+
+}  // namespace toftwin::discover
