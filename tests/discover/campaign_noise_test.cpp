@@ -208,6 +208,31 @@ TEST_F(OfFewPaths, ADriftIsFoundAllTheSame) {
   EXPECT_THAT(verdictOf(finding), testing::HasSubstr("thermal_delay"));
 }
 
+/// Two captures at one place count half each while they are searched together, and one each where it is asked how well
+/// each is described.
+TEST(LightNoise, IsEachCapturesOwnWhereTheyAreJudged) {
+  std::vector<MeasuredCapture> shared(2);
+  for (MeasuredCapture& one : shared) {
+    one.light_variance_m2 = one.light_variance = Image<float>(4, 4, 8e-6F);
+    one.light_captures = 2, one.light_stands = 2;
+  }
+  for (const MeasuredCapture& one : eachByItself(shared)) {
+    EXPECT_EQ(one.light_variance_m2(1, 2), 4e-6F);
+    EXPECT_EQ(one.light_variance(3, 3), 4e-6F);
+    EXPECT_EQ(one.light_captures, 1U);
+    EXPECT_EQ(one.light_stands, 1U);
+  }
+}
+
+/// Scatter that is named and fitted, of which nothing is left: 62 to 73 % was stated, as tiles of the light err as one.
+TEST_F(OfFewPaths, WhatTheLightLeavesIsNoPartOfWhatCanBeExplained) {
+  simulate("[[effect]]\ntype = 'lens_scatter'\nveil = 0.0015\nhalo = 0.002\n");
+  const CampaignFinding finding = search(job());
+  ASSERT_THAT(namesOf(finding), testing::Contains("lens_scatter")) << verdictOf(finding);
+  ASSERT_TRUE(finding.judgement);
+  EXPECT_GT(finding.judgement->removed_high, 0.95) << verdictOf(finding);
+}
+
 /// The same number of the light's noise makes rows of it: 4 mm² of light beside 1 mm² of the frames.
 TEST(LightNoise, CountsInTheRows) {
   MeasuredCapture capture;

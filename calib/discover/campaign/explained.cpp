@@ -10,6 +10,7 @@
 #include <toftwin/nan.h>
 
 #include "calib/compare/statistics.h"
+#include "calib/discover/campaign/light_noise.h"
 #include "calib/discover/marginal.h"
 
 namespace toftwin::discover {
@@ -108,8 +109,11 @@ void addInterval(const Balance& balance, double rows, double open_rows, double n
 
 }  // namespace
 
-Result<> addExplained(const JudgedCampaign& judged, const JudgedCampaign& open, const JudgedModels& models,
-                      Judgement& judgement) {
+namespace {
+
+/// How well each capture is described by itself, not their sum.
+Result<> addEach(const JudgedCampaign& judged, const JudgedCampaign& open, const JudgedModels& models,
+                 Judgement& judgement) {
   const auto grain = grainOf(judged, open, models);
   if (!grain) return grain.error();
   JudgedCampaign grained = judged;
@@ -128,6 +132,19 @@ Result<> addExplained(const JudgedCampaign& judged, const JudgedCampaign& open, 
   judgement.before.per_row = before->perRow(), judgement.with_zero.per_row = with_zero->perRow();
   judgement.after.per_row = after->perRow();
   return {};
+}
+
+}  // namespace
+
+Result<> addExplained(const JudgedCampaign& judged, const JudgedCampaign& open, const JudgedModels& models,
+                      Judgement& judgement) {
+  if (std::ranges::all_of(open.lit.captures, [](const MeasuredCapture& one) { return one.light_variance.empty(); }))
+    return addEach(judged, open, models, judgement);
+  const auto of_judged = eachByItself(judged.lit.captures), of_open = eachByItself(open.lit.captures);
+  const Lit judged_lit{of_judged, judged.lit.traced, judged.lit.varied},
+      open_lit{of_open, open.lit.traced, open.lit.varied};
+  return addEach({judged.declared, judged_lit, judged.scales, judged.most_cells},
+                 {open.declared, open_lit, open.scales, open.most_cells}, models, judgement);
 }
 
 }  // namespace toftwin::discover

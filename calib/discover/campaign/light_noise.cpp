@@ -77,4 +77,14 @@ void shareLightNoise(const std::vector<std::shared_ptr<const TracedCapture>>& tr
   }
 }
 
+std::vector<MeasuredCapture> eachByItself(std::vector<MeasuredCapture> captures) {
+  for (MeasuredCapture& capture : captures) {
+    const auto alike = static_cast<float>(capture.light_captures);
+    for (Image<float>* image : {&capture.light_variance_m2, &capture.light_variance})
+      for (float& variance : image->pixels()) variance /= alike;
+    capture.light_captures = capture.light_stands = 1;
+  }
+  return captures;
+}
+
 }  // namespace toftwin::discover

@@ -32,4 +32,8 @@ class LightNoise {
 void shareLightNoise(const std::vector<std::shared_ptr<const TracedCapture>>& traced,
                      std::vector<MeasuredCapture>& captures);
 
+/// The captures with the noise of their light as each has it by itself: shareLightNoise counts what several have in
+/// common several times, so that their sum is right, and then none of them errs as much as it states.
+std::vector<MeasuredCapture> eachByItself(std::vector<MeasuredCapture> captures);
+
 }  // namespace toftwin::discover

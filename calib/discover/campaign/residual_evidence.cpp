@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "calib/discover/campaign/carriers.h"
+#include "calib/discover/campaign/light_tiles.h"
 #include "calib/discover/campaign/places.h"
 #include "calib/discover/campaign/reading.h"
 #include "calib/discover/campaign/refit.h"
@@ -50,8 +51,12 @@ Result<Evidence> residualEvidence(const JudgedCampaign& judged, const std::vecto
   if (!declared) return declared.error();
   const auto here = NoiselessCamera::make(judged.declared.model, effects, lit.captures);
   if (!here) return here.error();
+  const auto tiles = LightTiles::of(lit.captures);
+  const std::size_t columns = kCommon + (tiles ? tiles->columns() : 0);
   Evidence evidence;
   evidence.groups = commonGroups();
+  if (tiles)
+    for (Group& group : tiles->groups(kCommon)) evidence.groups.push_back(std::move(group));
   evidence.captures.resize(lit.captures.size());
   sim::inParallel(static_cast<int>(lit.captures.size()), 1, [&](int first, int last) {
     for (auto c = static_cast<std::size_t>(first); c < static_cast<std::size_t>(last); ++c) {
@@ -59,8 +64,9 @@ Result<Evidence> residualEvidence(const JudgedCampaign& judged, const std::vecto
       const TracedCapture& traced = *lit.traced[c];
       // Which pixels count must not depend on what is fitted.
       const Cells cells{capture, traced, declared->read(capture, traced.light), judged.most_cells};
-      WhitenedCapture whitened{cells, kCommon};
+      WhitenedCapture whitened{cells, columns};
       whitened.putCommon(cells, traced);
+      if (tiles) tiles->put(cells, capture, kCommon, whitened.columns);
       whitened.putResidual(cells, capture, traced,
                            readingOf(*declared, *here, capture, traced.light, lit.varied[c]->light));
       evidence.captures[c] = whitened.evidence(capture.record.name, capture.record.block);
