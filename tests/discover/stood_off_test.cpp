@@ -84,5 +84,19 @@ TEST_F(Searched, ABumpedCaptureIsSetAside) {
   EXPECT_THAT(finding.notes, testing::Contains(testing::HasSubstr("It is set aside")));
 }
 
+/// An effect of the ambient light would be there alone, too.
+TEST_F(Searched, ACaptureThatAloneHasItsAmbientLightIsNotSetAside) {
+  bumped_ = 43;
+  simulate("", {}, true, 0, 23);
+  CampaignJob open = job();
+  open.open_locked = false;
+  const CampaignFinding finding = search(open);
+  ASSERT_TRUE(finding.off) << verdictOf(finding);
+  EXPECT_EQ(finding.off->number, 43U);
+  EXPECT_EQ(finding.off->alone, "40 klx");
+  EXPECT_FALSE(finding.off->is_set_aside);
+  EXPECT_THAT(finding.notes, testing::Contains(testing::HasSubstr("none of which was at 40 klx")));
+}
+
 }  // namespace
 }  // namespace toftwin::discover
