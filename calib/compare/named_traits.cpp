@@ -60,13 +60,15 @@ std::string endOf(const Trait& trait, double end) {
   return isKnown(end, trait.unit) ? shownDigits(end, 4) : "not known";
 }
 
-/// Where on its line it is told.
-std::string placeOf(const Trait& trait) {
-  const auto* line = std::get_if<OnLine>(&trait.refers_to);
-  return line == nullptr ? "" : ", " + placeInWords(line->at_m);
-}
-
 }  // namespace
+
+std::string detailsOf(const NamedTrait& one) {
+  std::string all = one.detail;
+  const auto add = [&all](const std::string& text) { all += (all.empty() ? "" : ", ") + text; };
+  if (const auto* line = std::get_if<OnLine>(&one.trait.refers_to)) add(placeInWords(line->at_m));
+  if (!one.trait.doubt.empty()) add("in doubt");
+  return all;
+}
 
 TableBlock traitTable(const NamedTraits& traits, const std::string& a, const std::string& b) {
   TableBlock table{
@@ -79,20 +81,21 @@ TableBlock traitTable(const NamedTraits& traits, const std::string& a, const std
   const bool has_both = std::ranges::any_of(traits.traits, isOfBoth);
   if (!has_both) table.header.pop_back();
   std::vector<std::pair<std::string, std::string>> keys;
-  for (const auto& [what, detail, of, trait] : traits.traits) {
-    const std::pair key{what, trait.name};
+  for (const NamedTrait& one : traits.traits) {
+    const Trait& trait = one.trait;
+    const std::string details = detailsOf(one);
+    const std::pair key{one.what, trait.name};
     auto row = static_cast<std::size_t>(std::ranges::find(keys, key) - keys.begin());
     if (row == keys.size()) {
       keys.push_back(key);
-      table.rows.push_back({what, trait.name, trait.unit, "", ""});
+      table.rows.push_back({one.what, trait.name, trait.unit, "", ""});
       if (has_both) table.rows.back().emplace_back();
     }
-    table.rows[row][of == "A"   ? 3
-                    : of == "B" ? 4
-                                : 5] =
-        fmt::format("{} ({} to {}) #{}{}{}{}{}", shownDigits(trait.value, 4), endOf(trait, trait.low),
-                    endOf(trait, trait.high), trait.n, detail.empty() ? "" : ", ", detail, placeOf(trait),
-                    trait.doubt.empty() ? "" : ", in doubt");
+    table.rows[row][one.of == "A"   ? 3
+                    : one.of == "B" ? 4
+                                    : 5] =
+        fmt::format("{} ({} to {}) #{}{}{}", shownDigits(trait.value, 4), endOf(trait, trait.low),
+                    endOf(trait, trait.high), trait.n, details.empty() ? "" : ", ", details);
   }
   const auto isOfB = [](const NamedTrait& one) { return one.of == "B"; };
   if (!has_both && std::ranges::none_of(traits.traits, isOfB)) {  // a page of one table

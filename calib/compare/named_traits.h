@@ -61,6 +61,9 @@ class TraitCollector {
   NamedTraits found_;
 };
 
+/// What a number cannot be read without: its detail, where on its line it is told, and whether it is in doubt, with
+/// commas between them. Empty: nothing.
+std::string detailsOf(const NamedTrait& one);
 /// A row for each number, A, B and B − A beside each other. `a` and `b` say whose they are.
 TableBlock traitTable(const NamedTraits& traits, const std::string& a = "A", const std::string& b = "B");
 /// Of numbers of one camera, the one that is most of its standard errors from 0 and certain, with its interval, and how

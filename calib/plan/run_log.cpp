@@ -144,9 +144,10 @@ Result<> write(sqlite3* database, const LoggedRun& run, const RunTraits& traits)
   if (auto done = insert.bind(std::int64_t{run.is_locked}).run(); !done) return done;
   const std::int64_t id = sqlite3_last_insert_rowid(database);
   if (auto done = writeSettings(database, id, run); !done) return done;
-  for (const auto& [what, detail, of, trait] : traits.traits) {
+  for (const compare::NamedTrait& one : traits.traits) {
+    const compare::Trait& trait = one.trait;
     Statement row{database, "INSERT OR REPLACE INTO characteristic VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)"};
-    row.bind(id).bind(of).bind(what).bind(detail).bind(trait.name).bind(trait.unit);
+    row.bind(id).bind(one.of).bind(one.what).bind(detailsOf(one)).bind(trait.name).bind(trait.unit);
     row.bindReal(trait.value).bindReal(trait.low).bindReal(trait.high);
     if (auto done = row.bind(static_cast<std::int64_t>(trait.n)).run(); !done) return done;
   }

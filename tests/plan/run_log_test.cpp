@@ -81,6 +81,18 @@ TEST_F(Log, GivesWhatWasPutInByTheRunsBeginning) {
   EXPECT_TRUE(again->traits("nobody", "", "")->empty());
 }
 
+/// The log alone must not say more surely than the report does, nor an offset without the distance that it is told at.
+TEST_F(Log, KeepsThatANumberIsInDoubtAndWhereItIsTold) {
+  RunTraits all = drifts(1.0, 2.0);
+  all.traits[0].trait.doubt = "it may be a wave that is not told";
+  all.traits[1].trait.refers_to = compare::OnLine{.at_m = 1.79};
+  auto log = RunLog::open(file_);
+  ASSERT_TRUE(log && log->add(run("2026-11-01T00:00:00Z", "aa"), all));
+  EXPECT_EQ(log->traits("kinect", "drift", "")->front().trait.detail, "ramp, in doubt");
+  EXPECT_EQ(log->traits("twin", "drift", "")->front().trait.detail, "ramp, at 1.79 m");
+  EXPECT_EQ(log->traits("kinect", "masks", "")->front().trait.detail, "");
+}
+
 TEST_F(Log, SaysWhatThereIsInsteadOfANameThatItDoesNotHave) {
   auto log = RunLog::open(file_);
   ASSERT_TRUE(log);

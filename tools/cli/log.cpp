@@ -150,7 +150,8 @@ std::string verdictOn(const plan::TrendRow& row, const std::string& first_detail
                                           change(row.high), row.isChanged() ? ": changed" : "")
                             : fmt::format("{}, not known how surely", change(row.change));
   if (!is_whole) verdict += fmt::format("; {}, and this is called no change", unfinished(row.at.run));
-  if (row.at.trait.detail != first_detail) verdict += fmt::format("; the first was {}", first_detail);
+  if (row.at.trait.detail != first_detail)
+    verdict += first_detail.empty() ? "; the first was without" : "; the first was " + first_detail;
   return verdict;
 }
 
