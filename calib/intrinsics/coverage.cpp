@@ -115,6 +115,8 @@ std::vector<std::string> ImageCover::missing() const {
   return names;
 }
 
+int wholePercent(double share) { return static_cast<int>(std::floor(100.0 * share)); }
+
 Guidance guide(const Target& target, const std::vector<Sighting>& sightings, ImageSize size,
                const Estimate* estimate, const GuidanceGoals& goals) {
   Guidance guidance;
@@ -128,13 +130,14 @@ Guidance guide(const Target& target, const std::vector<Sighting>& sightings, Ima
   if (const auto parts = cover.missing(); !parts.empty()) {
     guidance.missing.push_back("show the board in these parts of the image: " + listed(parts));
   } else if (guidance.covered < goals.covered) {
-    guidance.missing.push_back(fmt::format("go closer to the image's edges: {:.0f} % of it are covered, {:.0f} % "
+    guidance.missing.push_back(fmt::format("go closer to the image's edges: {} % of it are covered, {:.0f} % "
                                            "are wanted",
-                                           100.0 * guidance.covered, 100.0 * goals.covered));
+                                           wholePercent(guidance.covered), 100.0 * goals.covered));
   }
   if (guidance.views > 0) guideStance(guidance, stanceOf(target, sightings, size, estimate, goals), goals);
   if (guidance.views < goals.views) {
-    guidance.missing.push_back(fmt::format("{} more views", goals.views - guidance.views));
+    const std::size_t left = goals.views - guidance.views;
+    guidance.missing.push_back(fmt::format("{} more view{}", left, left == 1 ? "" : "s"));
   }
   if (estimate == nullptr) return guidance;
   const MappingError error{estimate->bundle, estimate->uncertainty, size.width, size.height};

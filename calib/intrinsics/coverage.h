@@ -36,6 +36,9 @@ class ImageCover {
   std::array<double, 4> box_{1e9, 1e9, -1e9, -1e9};
 };
 
+/// `share`, 0 … 1, in whole per cent: what is not yet reached is not told as if it was (84.6 % of 85).
+int wholePercent(double share);
+
 /// What views lack for a good calibration, in words that tell a person what to do next.
 struct Guidance {
   std::size_t views = 0;

@@ -18,7 +18,8 @@ using namespace intrinsics;
 class Prompter {
  public:
   void say(const Guidance& guidance) {
-    std::string text = fmt::format("{} views, {:.0f} % of the image", guidance.views, 100.0 * guidance.covered);
+    std::string text = fmt::format("{} view{}, {} % of the image", guidance.views, guidance.views == 1 ? "" : "s",
+                                   wholePercent(guidance.covered));
     if (guidance.worst_error_px) text += fmt::format(", lens known to {:.2f} px", *guidance.worst_error_px);
     text += guidance.isEnough() ? "\n  enough: Ctrl-C, or wait\n" : "\n";
     for (const std::string& missing : guidance.missing) text += "  " + missing + "\n";
