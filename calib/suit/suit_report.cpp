@@ -78,9 +78,18 @@ std::string whereText(const Case& use, const RequirementResult& result) {
   return fmt::format("at {}{}", use.spec.poses[worst.pose].name, more);
 }
 
+/// "2 of 6 not certain": of what is met; empty where all of that is.
+std::string uncertainOf(const CameraResult& camera) {
+  const auto open = std::ranges::count_if(camera.requirements, [](const auto& one) {
+    return one.is_judged && one.verdict.is_met && !one.verdict.is_certain;
+  });
+  return open == 0 ? "" : fmt::format("{} of {} not certain", open, camera.requirements.size());
+}
+
 std::string stateOf(const CameraResult& camera) {
   if (!camera.cannot.empty()) return "does not fit the scene";
-  if (camera.isFit()) return "does it";
+  const std::string uncertain = uncertainOf(camera);
+  if (camera.isFit()) return uncertain.empty() ? "does it" : "does it, " + uncertain;
   const std::string failed =
       camera.failed > 0 ? fmt::format("fails {} of {}", camera.failed, camera.requirements.size()) : "";
   const std::string open = camera.unknown > 0 ? fmt::format("{} not known", camera.unknown) : "";
@@ -133,7 +142,7 @@ TableBlock rankingTable(const Suit& suit) {
   TableBlock table{.caption =
                        "Best first: by how many requirements fail, then by what is missing, relative to what "
                        "each lets fail. "
-                       "The margin is how far the worst one is from its limit; + is met.",
+                       "The margin is how far the worst one is from its limit; + is met",
                    .header = {"camera", "verdict", "best mode and exposure", "worst requirement and margin"}};
   for (const CameraResult& camera : suit.cameras) {
     const bool can = camera.cannot.empty();
@@ -147,7 +156,7 @@ TableBlock requirementTable(const Suit& suit) {
   TableBlock table{
       .caption =
           "Values at the worst pose and lighting. ✓ is met, ✗ is not; ? means that the 95 % interval "
-          "includes the limit.",
+          "includes the limit",
       .header = {"requirement", "limit"}};
   for (const CameraResult& camera : suit.cameras) table.header.push_back(camera.name);
   for (std::size_t r = 0; r < suit.use.spec.requirements.size(); ++r) {
@@ -168,7 +177,7 @@ TableBlock requirementTable(const Suit& suit) {
 
 TableBlock cameraTable(const Suit& suit, const CameraResult& camera) {
   TableBlock table{
-      .caption = "At the worst pose and lighting of each requirement, with 95 % intervals.",
+      .caption = "At the worst pose and lighting of each requirement, with 95 % intervals",
       .header = {"requirement", "verdict", "value", "95 % interval", "margin", "where", "pixels"}};
   for (std::size_t r = 0; r < camera.requirements.size(); ++r) {
     const auto& requirement = suit.use.spec.requirements[r];
@@ -336,7 +345,9 @@ std::string inWords(const Suit& suit) {
   std::size_t count = 0;
   for (const auto& camera : suit.cameras) {
     if (!camera.isFit()) continue;
+    const std::string uncertain = uncertainOf(camera);
     fit += (fit.empty() ? "" : ", ") + camera.name;
+    if (!uncertain.empty()) fit += " (" + uncertain + ")";
     ++count;
   }
   const std::size_t all = suit.cameras.size();

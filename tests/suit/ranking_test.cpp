@@ -25,6 +25,17 @@ TEST(Ranking, CamerasAreRankedByWhatTheyMiss) {
   EXPECT_THAT(inWords(*suit), testing::HasSubstr("1 of 3 cameras does what is asked"));
 }
 
+/// That all pixels are valid can be met, but no number of frames makes it certain.
+TEST(Ranking, SaysThatWhatIsMetIsNotCertain) {
+  const Folder folder;
+  folder.camera("ideal.toml");
+  const auto suit = folder.judged(kPose + biasAtMost10() +
+                                  "[[require]]\nname = 'whole'\nkind = 'valid'\nat_least_percent = 100\n" +
+                                  entry("ideal.toml"));
+  ASSERT_TRUE(suit) << suit.error().message;
+  EXPECT_EQ(inWords(*suit), "1 of 1 cameras does what is asked, best first: ideal.toml (1 of 2 not certain).");
+}
+
 /// Four cameras that differ in two things: a sixteenth of the light is √16 times the shot noise, in the dark;
 /// and noon leaves 106,000 electrons in a tap (60 klx: 2.6 W/(m² sr)), which one well holds and one does not.
 /// What is missing, in limits: the weak one has 4 σ where 2 σ is the limit, 1; the small well none of 80 %
