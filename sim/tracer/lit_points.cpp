@@ -14,8 +14,8 @@
 namespace toftwin::sim {
 namespace {
 
-/// So many of each emitter for one receiver: of 8 × 8 cells of the square that directions are drawn from, Sobol's sequence
-/// has one in each.
+/// So many of each emitter for one receiver: of 8 × 8 cells of the square that directions are drawn from, Sobol's
+/// sequence has one in each.
 constexpr std::uint32_t kCells = 8, kPoints = kCells * kCells;
 constexpr std::uint32_t kLeaving = 0x20000;  // random dimension, beyond those of paths
 /// A column of pixels that no image has, for random numbers that belong to none.
@@ -40,7 +40,8 @@ std::uint32_t numberOfCell(float u, float v) {
   return number;
 }
 
-/// Which of the sequence lie in the cells, for each lane: a pick by shares, evenly drawn, then is evenly spread in space.
+/// Which of the sequence lie in the cells, for each lane: a pick by shares, evenly drawn, then is evenly spread in
+/// space.
 std::array<Lanes<std::uint32_t>, kPoints> indicesByCell(PixelKey key) {
   std::array<Lanes<std::uint32_t>, kPoints> indices{};
   for (std::size_t lane = 0; lane < kLaneCount; ++lane) {
@@ -219,8 +220,8 @@ void LitPoints::add(const Tracing& tracing, const Channels& channels, const Shar
     const std::size_t first = channels.first(f);
     const std::size_t last = f + 1 < tracing.turns_per_metre.size() ? channels.first(f + 1) : orders.size();
     for (std::size_t k = 0; k < places_.size(); ++k) {
-      addFrequency(static_cast<float>(tracing.turns_per_metre[f]), first, last - first, &orders[first], &channels.lanes()[first], shares.share[k],
-                   shares.way[k], places_[k].radiance, sums);
+      addFrequency(static_cast<float>(tracing.turns_per_metre[f]), first, last - first, &orders[first],
+                   &channels.lanes()[first], shares.share[k], shares.way[k], places_[k].radiance, sums);
     }
   }
 }

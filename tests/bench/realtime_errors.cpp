@@ -145,7 +145,8 @@ class Pair {
       b.trace();
     }
   }
-  /// Differences of the present frame's ranges, NaN where either is invalid: of the light alone, and with the camera's noise.
+  /// Differences of the present frame's ranges, NaN where either is invalid: of the light alone, and with the
+  /// camera's noise.
   [[nodiscard]] std::vector<double> lightApart() const { return apart(quiet_); }
   [[nodiscard]] std::vector<double> allApart() const { return apart(a.model); }
 
@@ -165,8 +166,8 @@ class Pair {
   std::uint64_t next_ = 0;
 };
 
-/// How the noise of successive frames goes together, by pairs of runs and times. One of them says little: of so many pixels
-/// chance alone makes 0.0024.
+/// How the noise of successive frames goes together, by pairs of runs and times. One of them says little: of so many
+/// pixels chance alone makes 0.0024.
 struct Correlations {
   std::vector<double> light, whole;
 
