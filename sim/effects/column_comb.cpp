@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "sim/images/rows.h"
+#include "sim/effects/column_change.h"
 
 namespace toftwin::sim {
 
@@ -22,13 +22,7 @@ Samples ColumnComb::apply(Samples samples, const Conditions& now, const Random&)
     const Random::Draw draw = pattern.draw(i + 1);
     for (std::size_t x = 0; x < width; ++x)
       offset[x] = static_cast<float>(offset_electrons) * draw.normal(classOf(x));
-    forRows(samples.height(), [&](int first_row, int last_row) {
-      for (int y = first_row; y < last_row; ++y) {
-        float* electrons = &samples.electrons[i](0, y);
-        for (std::size_t x = 0; x < width; ++x)
-          electrons[x] = electrons[x] * factor[x] + offset[x];
-      }
-    });
+    changeColumns(samples.electrons[i], factor, offset);
   }
   return samples;
 }

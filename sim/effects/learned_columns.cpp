@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "sim/images/rows.h"
+#include "sim/effects/column_change.h"
 
 namespace toftwin::sim {
 namespace {
@@ -18,11 +18,15 @@ bool isNothing(const std::vector<double>& list) {
   return std::ranges::all_of(list, [](double number) { return number == 0.0; });
 }
 
+/// After how many columns they repeat.
+std::size_t periodOf(const LearnedColumns& columns) {
+  return std::max({columns.in_phase_electrons.size(), columns.quadrature_electrons.size(), columns.gains_percent.size()});
+}
+
 }  // namespace
 
 std::string LearnedColumns::problem() const {
-  const std::size_t m =
-      std::max({in_phase_electrons.size(), quadrature_electrons.size(), gains_percent.size()});
+  const std::size_t m = periodOf(*this);
   for (const auto* list : {&in_phase_electrons, &quadrature_electrons, &gains_percent})
     if (!list->empty() && list->size() != m)
       return "in_phase_electrons, quadrature_electrons and gains_percent have as many numbers as each other, or none: "
@@ -31,8 +35,7 @@ std::string LearnedColumns::problem() const {
 }
 
 Samples LearnedColumns::apply(Samples samples, const Conditions& now, const Random&) const {
-  const std::size_t m =
-      std::max({in_phase_electrons.size(), quadrature_electrons.size(), gains_percent.size()});
+  const std::size_t m = periodOf(*this);
   if (isNothing(in_phase_electrons) && isNothing(quadrature_electrons) && isNothing(gains_percent)) return samples;
   const auto width = static_cast<std::size_t>(samples.width());
   const auto classOf = [&](std::size_t x) { return (static_cast<std::size_t>(now.left) + x) % m; };
@@ -44,12 +47,7 @@ Samples LearnedColumns::apply(Samples samples, const Conditions& now, const Rand
       charge[x] = static_cast<float>(at(in_phase_electrons, classOf(x)) * cosine +
                                      at(quadrature_electrons, classOf(x)) * sine);
     }
-    forRows(samples.height(), [&](int first_row, int last_row) {
-      for (int y = first_row; y < last_row; ++y) {
-        float* row = &electrons(0, y);
-        for (std::size_t x = 0; x < width; ++x) row[x] = row[x] * factor[x] + charge[x];
-      }
-    });
+    changeColumns(electrons, factor, charge);
   };
   for (std::size_t f = 0; f < samples.electrons.size() / in_group; ++f) {
     for (int step = 0; step < samples.steps; ++step) {

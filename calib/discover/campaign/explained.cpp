@@ -107,10 +107,6 @@ void addInterval(const Balance& balance, double rows, double open_rows, double n
   judgement.removed_high = compare::quantile(std::move(shares), 0.975);
 }
 
-}  // namespace
-
-namespace {
-
 /// How well each capture is described by itself, not their sum.
 Result<> addEach(const JudgedCampaign& judged, const JudgedCampaign& open, const JudgedModels& models,
                  Judgement& judgement) {
