@@ -148,8 +148,7 @@ class KinectV2Decoder::Impl {
     judgeRow(&flags_(0, y), rows.why.data(), columns, &result_.range_m(0, y), &result_.flags(0, y));
   }
 
-  /// The threshold lies between the two; only a deviation that does, too, is worth two
-  /// transcendental functions.
+  /// A deviation so close to the threshold is worth two transcendental functions.
   void settleDoubts(Rows& rows) const {
     for (std::size_t x = 0; x < rows.why.size(); ++x) {
       std::uint32_t& why = rows.why[x];
@@ -201,10 +200,8 @@ void KinectV2Decoder::take(int top, const Samples& samples, int first, int last)
 RangeImage KinectV2Decoder::finish() { return impl_->finish(); }
 
 double kinectV2Threshold(double counts, double strong_rad, double weak_rad) {
-  // ln threshold = (ln counts · slope · log₁₀2 + offset) · log₂10
-  constexpr double kSlope = -0.5330578, kOffset = 0.7694894;
-  const double exponent = (std::log(counts) * kSlope * 0.301030 + kOffset) * 3.321928;
-  return std::clamp(std::exp(exponent), strong_rad, std::max(strong_rad, weak_rad));
+  return std::clamp(std::exp(kThresholdSlope * std::log(counts) + kThresholdLevel), strong_rad,
+                    std::max(strong_rad, weak_rad));
 }
 
 RangeImage decodeKinectV2(const Samples& samples, const DecodeSettings& settings,

@@ -6,6 +6,7 @@
 #include <toftwin/nan.h>
 
 #include "sim/decode/unwrap_kinect_v2.h"
+#include "sim/images/rough_logarithm.h"
 #include "sim/images/simd.h"
 
 namespace toftwin::sim {
@@ -25,7 +26,12 @@ constexpr std::size_t kPart = 128;  ///< pixels at once, whose numbers stay in t
 /// Of some pixels. Numbers first and what they mean after: loops of one width of numbers become vector code.
 struct Measured {
   double range_m[kPart], depth_m[kPart], weakest[kPart], sum[kPart];
+  float deviation[kPart], strongest[kPart];
 };
+
+/// By so much in its logarithm a deviation must be away from the threshold to be judged by rough logarithms, whose
+/// errors are below a fifth of it.
+constexpr float kDoubt = 1e-4F;
 
 TOFTWIN_SIMD void measurePart(const KinectSeen& seen, const KinectLimits& limits, std::size_t first,
                               std::size_t count, const KinectFound& found, Measured& measured) {
@@ -39,6 +45,7 @@ TOFTWIN_SIMD void measurePart(const KinectSeen& seen, const KinectLimits& limits
   double *deviation_rad = found.deviation_rad + first, *strongest_counts = found.strongest_counts + first;
   double *range_m = measured.range_m, *depth_m = measured.depth_m, *weakest = measured.weakest,
          *sum = measured.sum;
+  float *deviation = measured.deviation, *strongest = measured.strongest;
 #pragma GCC ivdep
   for (std::size_t x = 0; x < count; ++x) {
     const double n0 = static_cast<double>(a0[x]) * k0, n1 = static_cast<double>(a1[x]) * k1,
@@ -55,6 +62,10 @@ TOFTWIN_SIMD void measurePart(const KinectSeen& seen, const KinectLimits& limits
     range_m[x] = joined.range_m;
     deviation_rad[x] = joined.deviation_rad;
   }
+  for (std::size_t x = 0; x < count; ++x) {
+    deviation[x] = static_cast<float>(deviation_rad[x]);
+    strongest[x] = static_cast<float>(strongest_counts[x]);
+  }
   if (baseline_m != 0.0) {
 #pragma GCC ivdep
     for (std::size_t x = 0; x < count; ++x) {
@@ -66,6 +77,16 @@ TOFTWIN_SIMD void measurePart(const KinectSeen& seen, const KinectLimits& limits
   for (std::size_t x = 0; x < count; ++x) depth_m[x] = range_m[x] * static_cast<double>(ray_z[x]);
 }
 
+/// Which deviations are over the threshold between that of strong and that of weak signals, and which hardly.
+TOFTWIN_SIMD void holdAgainstThreshold(const Measured& measured, std::size_t count, std::uint32_t* __restrict apart) {
+  constexpr auto kSlope = static_cast<float>(kThresholdSlope), kLevel = static_cast<float>(kThresholdLevel);
+  const float *deviation = measured.deviation, *strongest = measured.strongest;
+  for (std::size_t x = 0; x < count; ++x) {
+    const float beyond = roughLogarithm(deviation[x]) - (kSlope * roughLogarithm(strongest[x]) + kLevel);
+    apart[x] = beyond > kDoubt ? kUnreliable : beyond < -kDoubt ? 0U : kDoubtful;
+  }
+}
+
 TOFTWIN_SIMD bool judgePart(const Measured& measured, const KinectLimits& limits, std::size_t first,
                             std::size_t count, const KinectFound& found) {
   const double least = limits.least_counts, least_sum = limits.least_sum_counts, weak = limits.weak_rad,
@@ -74,12 +95,13 @@ TOFTWIN_SIMD bool judgePart(const Measured& measured, const KinectLimits& limits
                *deviation = found.deviation_rad + first, *range = measured.range_m;
   std::uint32_t* __restrict why = found.why + first;
   float* __restrict range_m = found.range_m + first, * __restrict brightness = found.brightness + first;
-  std::uint32_t all = 0;
+  std::uint32_t all = 0, between[kPart];
+  holdAgainstThreshold(measured, count, between);
   for (std::size_t x = 0; x < count; ++x) {
     const bool is_seen = (weakest[x] > 0.0) & (weakest[x] >= least) & (sum[x] >= least_sum);
     const bool is_within = (depth_m[x] >= nearest) & (depth_m[x] <= farthest);
     const std::uint32_t outside = is_within ? 0U : kOutside;
-    const std::uint32_t apart = deviation[x] > weak ? kUnreliable : deviation[x] > strong ? kDoubtful : 0U;
+    const std::uint32_t apart = deviation[x] > weak ? kUnreliable : deviation[x] > strong ? between[x] : 0U;
     const std::uint32_t bits = is_seen ? outside | apart : kTooWeak;
     why[x] = bits;
     all |= bits;

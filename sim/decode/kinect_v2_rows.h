@@ -40,9 +40,13 @@ struct KinectFound {
 /// Why a pixel is invalid whose phases disagree.
 inline constexpr auto kUnreliable =
     static_cast<std::uint32_t>(PixelFlag::UnwrapUnreliable) | static_cast<std::uint32_t>(PixelFlag::Invalid);
-/// Phases that disagree by more than strong signals' may and less than weak ones': kinectV2Threshold()
-/// decides.
+/// Phases that disagree by so nearly as much as they may that kinectV2Threshold() decides.
 inline constexpr std::uint32_t kDoubtful = 0x100;
+
+/// Between those of strong and of weak signals the threshold is a power of the strongest frequency's counts:
+/// its logarithm is kThresholdSlope · ln counts + kThresholdLevel. In libfreenect2 it is
+/// (ln counts · −0.5330578 · log₁₀2 + 0.7694894) · log₂10.
+inline constexpr double kThresholdSlope = -0.5330578 * 0.301030 * 3.321928, kThresholdLevel = 0.7694894 * 3.321928;
 
 /// Unwraps and judges a row. True if a pixel is doubtful.
 bool measureKinectRow(const KinectSeen& seen, const KinectLimits& limits, std::size_t width,

@@ -8,6 +8,8 @@
 #include <span>
 #include <string_view>
 
+#include "sim/images/rough_logarithm.h"
+
 namespace toftwin::sim {
 
 /// Random numbers without a state: each is a hash of (seed, frame, effect, pixel, draw), so that an
@@ -155,19 +157,6 @@ class Random {
     const float series =
         2.0F * s * (1.0F + s2 * (1.0F / 3.0F + s2 * (0.2F + s2 * (1.0F / 7.0F + s2 / 9.0F))));
     return exponent * 0.693147181F + series;
-  }
-  /// The same without a quotient: a polynomial of the least largest error, 2e-6 of ln x or absolute.
-  static float roughLogarithm(float x) {
-    const std::uint32_t shifted = std::bit_cast<std::uint32_t>(x) - 0x3F3504F3U;
-    const auto exponent = static_cast<float>(static_cast<std::int32_t>(shifted) >> 23);
-    const float f = std::bit_cast<float>((shifted & 0x007FFFFFU) + 0x3F3504F3U) - 1.0F;
-    float sum = -0.14337535F;
-    sum = 0.22314669F + sum * f;
-    sum = -0.25464324F + sum * f;
-    sum = 0.33228027F + sum * f;
-    sum = -0.49985583F + sum * f;
-    sum = 1.000012F + sum * f;
-    return exponent * 0.693147181F + f * sum;
   }
   /// √x for x ≥ 0 without the call that std::sqrt makes for errno, which would stop vectorisation.
   static float squareRoot(float x) { return __builtin_sqrtf(x); }

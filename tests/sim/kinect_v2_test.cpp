@@ -11,6 +11,8 @@
 #include <random>
 
 #include "sim/decode/decode_steps.h"
+#include "sim/decode/kinect_v2_rows.h"
+#include "sim/decode/unwrap.h"
 #include "sim/effects/companding.h"
 #include "sim/effects/random.h"
 #include "tests/sim/camera_testing.h"
@@ -55,6 +57,49 @@ DecodeSettings kinect() {
   return {.algorithm = DecodeSettings::Algorithm::KinectV2,
           .unwrap_threshold = 0.6108653_rad,
           .kinect = {.amplitude_multipliers = {1.0, 1.0, 1.0}}};
+}
+
+/// Phases of one range, of which that at 120 MHz is off by up to 0.2 cycles, and amplitudes of 30 to 10,000 counts.
+TEST(KinectV2, JudgesDeviationsByRoughLogarithmsAsByTheThresholdItself) {
+  constexpr std::size_t kWidth = 20'000;
+  std::mt19937 random{5};
+  std::uniform_real_distribution<float> off{0.0F, 0.2F}, exponent{1.5F, 4.0F};
+  const double unit_m = kSpeedOfLight_m_per_s / 480e6;
+  std::array<std::vector<float>, 3> cycles, amplitudes;
+  for (std::size_t x = 0; x < kWidth; ++x) {
+    const double turns[] = {0.4, 0.08, 0.6};  // of 0.75 m
+    const float counts = std::pow(10.0F, exponent(random));
+    for (std::size_t f = 0; f < 3; ++f) {
+      cycles[f].push_back(static_cast<float>(turns[f]) + (f == 2 ? off(random) : 0.0F));
+      amplitudes[f].push_back(counts);
+    }
+  }
+  const KinectLimits limits{.counts_per_electron = {1.0, 1.0, 1.0}, .least_counts = 0.0, .least_sum_counts = 0.0,
+                            .unit_m = unit_m, .strong_rad = 0.349, .weak_rad = 0.611, .nearest_m = 0.1,
+                            .farthest_m = 18.0, .baseline_m = 0.0, .baseline_square = 0.0};
+  const std::vector<float> zeros(kWidth), ones(kWidth, 1.0F);
+  std::vector<float> range(kWidth), brightness(kWidth);
+  std::vector<double> deviation(kWidth), strongest(kWidth);
+  std::vector<std::uint32_t> why(kWidth);
+  const KinectSeen seen{{cycles[0].data(), cycles[1].data(), cycles[2].data()},
+                        {amplitudes[0].data(), amplitudes[1].data(), amplitudes[2].data()}, zeros.data(), ones.data()};
+  measureKinectRow(seen, limits, kWidth, {range.data(), brightness.data(), deviation.data(), strongest.data(), why.data()});
+  int doubtful = 0, over = 0, under = 0;
+  for (std::size_t x = 0; x < kWidth; ++x) {
+    const double threshold = kinectV2Threshold(strongest[x], limits.strong_rad, limits.weak_rad);
+    if ((why[x] & kDoubtful) != 0) {
+      ++doubtful;
+      EXPECT_NEAR(deviation[x] / threshold, 1.0, 1.3e-4) << x;
+      continue;
+    }
+    const bool is_over = deviation[x] > threshold;
+    EXPECT_EQ((why[x] & kUnreliable) == kUnreliable, is_over) << x << ": " << deviation[x] << ", " << strongest[x];
+    if (deviation[x] > limits.strong_rad && deviation[x] < limits.weak_rad) ++(is_over ? over : under);
+  }
+  // What the logarithms leave open is a few in ten thousand, and both answers are given often.
+  EXPECT_LT(doubtful, 20);
+  EXPECT_GT(over, 1000);
+  EXPECT_GT(under, 1000);
 }
 
 double spread(const RangeImage& image, double mean_m, int margin) {
