@@ -115,7 +115,7 @@ Image<float> CoarseHalo::cellsOf(const float* image, int height) const {
       weights[static_cast<std::size_t>(i * parts_ + part)] = knots.weight[static_cast<std::size_t>(cell - knots.first)];
   }
   Image<float> cells{across * parts_, cellsAlong(height)};
-  inParallel(cells.height(), 4, [&](int first, int last) {
+  inFewParts(cells.height(), 4, [&](int first, int last) {
     std::vector<float> padded(static_cast<std::size_t>((kCell * across + kReach) * parts_));
     float* sum = padded.data() + kBefore * parts_;
     for (int v = first; v < last; ++v) {
@@ -141,7 +141,7 @@ Image<float> CoarseHalo::blurred(const Image<float>& cells, double sigma_cells) 
   const int count = cells.width(), height = cells.height(), reach = static_cast<int>(half.size()) - 1;
   const auto weightAt = [&](int i) { return half[static_cast<std::size_t>(std::abs(i))]; };
   Image<float> along_rows{count, height}, result{count, height};
-  inParallel(height, 4, [&](int first, int last) {
+  inFewParts(height, 4, [&](int first, int last) {
     std::vector<float> padded(static_cast<std::size_t>(count + 2 * reach * parts_));
     for (int y = first; y < last; ++y) {
       std::copy_n(&cells(0, y), count, padded.begin() + reach * parts_);
@@ -150,7 +150,7 @@ Image<float> CoarseHalo::blurred(const Image<float>& cells, double sigma_cells) 
           &along_rows(0, y));
     }
   });
-  inParallel(height, 4, [&](int first, int last) {
+  inFewParts(height, 4, [&](int first, int last) {
     for (int y = first; y < last; ++y) {
       addRows(
           std::max(0, y - reach), std::min(height, y + reach + 1), [&](int from) { return &along_rows(0, from); },
@@ -163,7 +163,7 @@ Image<float> CoarseHalo::blurred(const Image<float>& cells, double sigma_cells) 
 Image<float> CoarseHalo::widened(const Image<float>& cells) const {
   Image<float> wide{width_ * parts_, cells.height()};
   const int groups = (width_ + kCell - 1) / kCell, count = groups * parts_;
-  inParallel(cells.height(), 4, [&](int first, int last) {
+  inFewParts(cells.height(), 4, [&](int first, int last) {
     // Every fourth column sees its cells in the same way.
     std::array<std::vector<float>, kCell> pixels;
     pixels.fill(std::vector<float>(static_cast<std::size_t>(count)));

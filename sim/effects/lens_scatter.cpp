@@ -265,11 +265,10 @@ Light ScatteredRows::room(int rows) const {
   return part;
 }
 
-void ScatteredRows::write(int top, int rows, Light& part) const {
+void ScatteredRows::write(int top, int rows, std::vector<float>& halo, Light& part) const {
   const Light& light = impl_->light;
-  std::vector<float> room;
   const auto write = [&](const ScatteredImage& scattered, const auto& image, auto& to) {
-    for (int y = 0; y < rows; ++y) scattered.row(top + y, floatsOf(&image(0, top + y)), room, floatsOf(&to(0, y)));
+    for (int y = 0; y < rows; ++y) scattered.row(top + y, floatsOf(&image(0, top + y)), halo, floatsOf(&to(0, y)));
   };
   write(impl_->steady, light.steady, part.steady);
   if (impl_->ambient) write(*impl_->ambient, light.ambient, part.ambient);

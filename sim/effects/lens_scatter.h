@@ -5,6 +5,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "sim/effects/effect.h"
 
@@ -56,8 +57,8 @@ class ScatteredRows {
 
   /// A strip of so many rows to write into; what is not wanted is an empty image.
   [[nodiscard]] Light room(int rows) const;
-  /// Writes the light's rows `top` … `top` + `rows` − 1 into the strip's first.
-  void write(int top, int rows, Light& part) const;
+  /// Writes the light's rows `top` … `top` + `rows` − 1 into the strip's first; `halo` is room for a row.
+  void write(int top, int rows, std::vector<float>& halo, Light& part) const;
 
  private:
   struct Impl;

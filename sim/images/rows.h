@@ -3,8 +3,14 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
+#include <algorithm>
 #include <cstddef>
+#include <memory>
+#include <mutex>
+#include <utility>
+#include <vector>
 
 namespace toftwin::sim {
 
@@ -22,12 +28,46 @@ void inParallel(int count, int grain, const Work& work) {
 #endif
 }
 
+/// The same in only a few parts for each thread: for work that is alike everywhere and begins anew with each part.
+template <class Work>
+void inFewParts(int count, int least, const Work& work) {
+  constexpr int kPartsOfThread = 4;
+  inParallel(count, std::max(least, count / (kPartsOfThread * tbb::this_task_arena::max_concurrency())), work);
+}
+
+/// What parts of parallel work write into, taken up by another part when one has ended: no more of them are made than
+/// parts are at work at a time. (Not one for each thread: a thread that waits in one part may begin another.)
+template <class Room>
+class Rooms {
+ public:
+  template <class Make, class Work>
+  void use(const Make& make, const Work& work) {
+    std::unique_ptr<Room> room = take();
+    if (!room) room = std::make_unique<Room>(make());
+    work(*room);
+    const std::scoped_lock lock{mutex_};
+    free_.push_back(std::move(room));
+  }
+
+ private:
+  std::unique_ptr<Room> take() {
+    const std::scoped_lock lock{mutex_};
+    if (free_.empty()) return nullptr;
+    std::unique_ptr<Room> room = std::move(free_.back());
+    free_.pop_back();
+    return room;
+  }
+
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<Room>> free_;
+};
+
 /// Calls `work(first, last)` for ranges of rows that together cover 0 … height−1, on all cores.
 /// What a row becomes must not depend on the other rows of the same call.
 template <class Work>
 void forRows(int height, const Work& work) {
-  constexpr int kRowsPerTask = 16;
-  inParallel(height, kRowsPerTask, work);
+  constexpr int kLeastRows = 16;
+  inFewParts(height, kLeastRows, work);
 }
 
 }  // namespace toftwin::sim

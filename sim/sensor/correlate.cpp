@@ -130,20 +130,23 @@ Samples Correlator::rows(int count) const {
 }
 
 void Correlator::collect(int top, int first, int last, Samples& samples) const {
-  const int width = light_.width();
-  std::vector<float> modulated(static_cast<std::size_t>(width));
+  constexpr int kPiece = 512;  // pixels at a time
+  float modulated[kPiece];
   for (int y = first; y < last; ++y) {
-    Image<float>* electrons = samples.electrons.data();
-    for (const Step& step : steps_) {
-      std::fill(modulated.begin(), modulated.end(), 0.0F);
-      for (const Weight& weight : step.weights) {
-        // A complex number is an array of two.
-        const auto* parts = reinterpret_cast<const float*>(&(*weight.phasors)(0, top + y));
-        addModulated(parts, weight.real, weight.imaginary, width, modulated.data());
-      }
-      for (int tap = 0; tap < taps_; ++tap, ++electrons) {
-        fillTap(&light_.steady(0, top + y), &light_.ambient(0, top + y), modulated.data(), step.half_gain,
-                tap == 0 ? 1.0F : -1.0F, width, &(*electrons)(0, y));
+    for (int x = 0; x < light_.width(); x += kPiece) {
+      const int count = std::min(kPiece, light_.width() - x);
+      Image<float>* electrons = samples.electrons.data();
+      for (const Step& step : steps_) {
+        std::fill_n(modulated, count, 0.0F);
+        for (const Weight& weight : step.weights) {
+          // A complex number is an array of two.
+          const auto* parts = reinterpret_cast<const float*>(&(*weight.phasors)(x, top + y));
+          addModulated(parts, weight.real, weight.imaginary, count, modulated);
+        }
+        for (int tap = 0; tap < taps_; ++tap, ++electrons) {
+          fillTap(&light_.steady(x, top + y), &light_.ambient(x, top + y), modulated, step.half_gain,
+                  tap == 0 ? 1.0F : -1.0F, count, &(*electrons)(x, y));
+        }
       }
     }
   }

@@ -62,27 +62,37 @@ Samples applyOnSamples(Samples samples, const std::vector<AnyEffect>& effects, c
 }
 
 /// Effects on samples look at one pixel at a time: strip by strip, samples stay in the processor's cache
-/// from the first effect to the last. `filler()` makes, for one thread, what writes the samples from row `top` on as they
-/// are before them, `fill(top, part)`; `take(top, part)` reads what they are after them, on many threads.
+/// from the first effect to the last. `filler()` makes, for one part of the work, what writes the samples from row `top` on
+/// as they are before them, `fill(top, part)`; `take(top, part)` reads what they are after them, on many threads.
 template <class Filler, class Take>
 void countInStrips(const Samples& shape, int width, int height, const Filler& filler, const std::vector<AnyEffect>& effects,
                    const Conditions& now, std::uint64_t seed, std::uint64_t frame, std::size_t exposure,
                    const Take& take) {
   constexpr int kRows = 8;
   const std::size_t images = shape.frequencies.size() * static_cast<std::size_t>(shape.steps * shape.taps);
+  struct Strip {
+    decltype(filler()) fill;
+    Samples part;
+  };
+  const auto make = [&] {
+    return Strip{filler(), {.frequencies = shape.frequencies, .steps = shape.steps, .taps = shape.taps}};
+  };
+  const auto count = [&](int top, Strip& strip) {
+    const int rows = std::min(kRows, height - top);
+    Samples& part = strip.part;
+    if (part.height() != rows) part.electrons.assign(images, Image<float>{width, rows});
+    part.flags = {};
+    strip.fill(top, part);
+    Conditions here = now;
+    here.top += top;
+    part = applyOnSamples(std::move(part), effects, here, seed, frame, exposure);
+    take(top, part);
+  };
+  Rooms<Strip> strips;
   inParallel((height + kRows - 1) / kRows, 1, [&](int first, int last) {
-    auto fill = filler();
-    Samples part{.frequencies = shape.frequencies, .steps = shape.steps, .taps = shape.taps};
-    for (int i = first; i < last; ++i) {
-      const int top = i * kRows, rows = std::min(kRows, height - top);
-      if (part.height() != rows) part.electrons.assign(images, Image<float>{width, rows});
-      part.flags = {};
-      fill(top, part);
-      Conditions here = now;
-      here.top += top;
-      part = applyOnSamples(std::move(part), effects, here, seed, frame, exposure);
-      take(top, part);
-    }
+    strips.use(make, [&](Strip& strip) {
+      for (int i = first; i < last; ++i) count(i * kRows, strip);
+    });
   });
 }
 
@@ -203,7 +213,7 @@ const LensScatter* onlyScatter(const std::vector<const AnyEffect*>& acting) {
   return scatter != nullptr && goesByRows(*scatter) ? scatter : nullptr;
 }
 
-/// Scatters and correlates row by row. One for each thread.
+/// Scatters and correlates row by row. One for each part of the work.
 class ScatteredFill {
  public:
   ScatteredFill(const ScatteredRows& scattered, const std::vector<Response>& responses, int steps, int taps)
@@ -211,7 +221,7 @@ class ScatteredFill {
 
   void operator()(int top, Samples& part) {
     for (int y = 0; y < part.height(); ++y) {
-      scattered_.write(top + y, 1, *row_);
+      scattered_.write(top + y, 1, halo_, *row_);
       correlator_.collect(-y, y, y + 1, part);
     }
   }
@@ -219,6 +229,7 @@ class ScatteredFill {
  private:
   const ScatteredRows& scattered_;
   std::unique_ptr<Light> row_;  ///< whose place the correlator knows
+  std::vector<float> halo_;
   Correlator correlator_;
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <vector>
 
 #include "sim/images/rows.h"
@@ -39,7 +40,6 @@ struct Origin {
     ++count;
   }
   [[nodiscard]] float of(const Image<float>& image) const {
-    if (count == 1) return image[place[0]];
     float sum = 0.0f, all = 1e-20f;
     for (std::size_t i = 0; i < place.size(); ++i) sum += weight[i] * image[place[i]], all += weight[i];
     return sum / all;
@@ -108,33 +108,53 @@ class Past {
 
 /// What a row's points go on from: places in the grid before, and the share that what is new has beside it.
 struct Remembered {
-  explicit Remembered(std::size_t width) : origin(width), share(width), lit_share(width), room(2 * width) {}
+  explicit Remembered(std::size_t width)
+      : origin(width), share(width), lit_share(width), only(width), room(2 * width) {}
   void forget(std::size_t at) {
     origin[at] = {.count = 1};
     share[at] = lit_share[at] = 1.0f;
   }
+  /// Before recall(): tells the points that have one place before, mostly all, from those that have several.
+  void sortOut() {
+    means.clear();
+    for (std::size_t u = 0; u < origin.size(); ++u) {
+      only[u] = static_cast<std::uint32_t>(origin[u].place[0]);
+      if (origin[u].count > 1) means.push_back(u);
+    }
+  }
+  /// What the row's points were in the image before, in room `number` of two.
+  const float* recall(const Image<float>& old, std::size_t number) {
+    float* was = room.data() + number * only.size();
+    takeAll(&old[0], only.data(), only.size(), was);
+    for (const std::size_t u : means) was[u] = origin[u].of(old);
+    return was;
+  }
   std::vector<Origin> origin;
   std::vector<float> share, lit_share;
-  std::vector<float> room;  ///< for two rows of the grid before
+
+ private:
+  TOFTWIN_VECTOR
+  static void takeAll(const float* from, const std::uint32_t* place, std::size_t count, float* __restrict to) {
+    for (std::size_t u = 0; u < count; ++u) to[u] = from[place[u]];
+  }
+  std::vector<std::uint32_t> only;  ///< by point: the first of its places
+  std::vector<std::size_t> means;   ///< points that have more
+  std::vector<float> room;
 };
 
 void blendRow(const CoarseGrid& before, Remembered& row, int v, CoarseGrid& grid) {
   if (before.width == 0) return;
   const auto width = static_cast<std::size_t>(grid.width);
-  const auto recall = [&](const Image<float>& old, std::size_t number) {
-    float* was = row.room.data() + number * width;
-    for (std::size_t u = 0; u < width; ++u) was[u] = row.origin[u].of(old);
-    return was;
-  };
+  row.sortOut();
   const auto blend = [&](Image<float>& image, const Image<float>& old, const std::vector<float>& shares) {
     float* now = &image(0, v);
-    const float* was = recall(old, 0);
+    const float* was = row.recall(old, 0);
     for (std::size_t u = 0; u < width; ++u) now[u] = was[u] + shares[u] * (now[u] - was[u]);
   };
   // Of a mean of several points no less variance is told than of one: they have much of their past in common.
   const auto leave = [&](Image<float>& image, const Image<float>& old, const std::vector<float>& shares) {
     float* now = &image(0, v);
-    const float* was = recall(old, 0);
+    const float* was = row.recall(old, 0);
     for (std::size_t u = 0; u < width; ++u) {
       const float share = shares[u], rest = 1.0f - share;
       now[u] = share * share * now[u] + rest * rest * was[u];
@@ -142,7 +162,7 @@ void blendRow(const CoarseGrid& before, Remembered& row, int v, CoarseGrid& grid
   };
   for (std::size_t c = 0; c < grid.means.size(); ++c) {
     float *lit = &grid.lit[c](0, v), *all = &grid.means[c](0, v);
-    const float *old_lit = recall(before.lit[c], 0), *old_all = recall(before.means[c], 1);
+    const float *old_lit = row.recall(before.lit[c], 0), *old_all = row.recall(before.means[c], 1);
     for (std::size_t u = 0; u < width; ++u) {
       const float was_rest = old_all[u] - old_lit[u];
       const float rest = was_rest + row.share[u] * (all[u] - lit[u] - was_rest);
