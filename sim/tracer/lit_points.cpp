@@ -150,11 +150,13 @@ void LitPoints::takeOf(const Tracing& tracing, const Channels& channels, const P
 
 namespace {
 
+/// Says whether the place lights any of them.
 TOFTWIN_VECTOR
-void weighOne(const LitPoints::Receivers& receivers, const Vec3fLanes& position, const Vec3fLanes& normal,
+bool weighOne(const LitPoints::Receivers& receivers, const Vec3fLanes& position, const Vec3fLanes& normal,
               const Lanes<float>& density, const Lanes<float>& steady, float directions, Lanes<float>& share,
               Lanes<float>& way, Lanes<float>& total) {
   const Vec3fLanes &p = receivers.position, &n = receivers.normal;
+  int any = 0;
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     const float dx = position.x[i] - p.x[i], dy = position.y[i] - p.y[i], dz = position.z[i] - p.z[i];
     const float square = dx * dx + dy * dy + dz * dz + 1e-12f;
@@ -165,7 +167,9 @@ void weighOne(const LitPoints::Receivers& receivers, const Vec3fLanes& position,
     share[i] = is_seen ? g / (density[i] + directions * g) : 0.0f;
     total[i] += share[i] * steady[i];
     way[i] = __builtin_sqrtf(square);
+    any |= is_seen ? 1 : 0;
   }
+  return any != 0;
 }
 
 TOFTWIN_VECTOR
@@ -185,11 +189,14 @@ void pickBy(const Lanes<float>& share, const Lanes<float>& steady, int number, L
 void LitPoints::weigh(const Receivers& receivers, int directions, Shares& shares) const {
   shares.share.resize(places_.size());
   shares.way.resize(places_.size());
+  shares.lighting.clear();
   shares.total = {};
   for (std::size_t k = 0; k < places_.size(); ++k) {
     const Place& p = places_[k];
-    weighOne(receivers, p.position, p.normal, p.density, p.radiance[Channels::kSteady],
-             static_cast<float>(directions), shares.share[k], shares.way[k], shares.total);
+    if (weighOne(receivers, p.position, p.normal, p.density, p.radiance[Channels::kSteady],
+                 static_cast<float>(directions), shares.share[k], shares.way[k], shares.total)) {
+      shares.lighting.push_back(k);
+    }
   }
 }
 
@@ -219,7 +226,7 @@ void LitPoints::add(const Tracing& tracing, const Channels& channels, const Shar
   for (std::size_t f = 0; f < tracing.turns_per_metre.size(); ++f) {
     const std::size_t first = channels.first(f);
     const std::size_t last = f + 1 < tracing.turns_per_metre.size() ? channels.first(f + 1) : orders.size();
-    for (std::size_t k = 0; k < places_.size(); ++k) {
+    for (const std::size_t k : shares.lighting) {
       addFrequency(static_cast<float>(tracing.turns_per_metre[f]), first, last - first, &orders[first],
                    &channels.lanes()[first], shares.share[k], shares.way[k], places_[k].radiance, sums);
     }
@@ -233,7 +240,7 @@ void LitPoints::pick(const Shares& shares, const Lanes<float>& draws, Lanes<int>
     left[i] = draws[i] * shares.total[i] * 0.999999f + 1e-30f;
     picked[i] = -1;
   }
-  for (std::size_t k = 0; k < places_.size(); ++k)
+  for (const std::size_t k : shares.lighting)
     pickBy(shares.share[k], places_[k].radiance[Channels::kSteady], static_cast<int>(k), left, picked);
 }
 

@@ -32,7 +32,8 @@ class LitPoints {
   struct Shares {
     std::vector<Lanes<float>> share;
     std::vector<Lanes<float>> way;
-    Lanes<float> total;  ///< of steady radiance
+    std::vector<std::size_t> lighting;  ///< those that light any of the receivers
+    Lanes<float> total;                 ///< of steady radiance
   };
   void weigh(const Receivers& receivers, int directions, Shares& shares) const;
   /// Adds the light.
