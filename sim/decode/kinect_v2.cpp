@@ -97,7 +97,7 @@ class KinectV2Decoder::Impl {
       std::complex<float>* phasors = &result_.phasors[f](0, y);
       demodulateRow(samples, steps_, f, from, phasors);
       takeOffPixelPhase(settings_, f, y, {phasors, columns});
-      addAmplitudes(phasors, static_cast<float>(kFrequencies), columns, &result_.amplitude(0, y));
+      addAmplitudes(phasors, 1.0F / static_cast<float>(kFrequencies), columns, &result_.amplitude(0, y));
     }
     unmodulatedRow(samples, from, &result_.ambient(0, y));
   }

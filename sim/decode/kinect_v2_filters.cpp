@@ -141,7 +141,7 @@ TOFTWIN_SIMD void dropRow(const EdgeRow& above, const EdgeRow& own, const EdgeRo
                           const float* __restrict depth_m, const std::uint8_t* __restrict is_edge,
                           std::uint8_t* __restrict drops) {
   constexpr float kNear_m = 0.050F, kFar_m = 0.030F, kLargest_m = 0.100F;
-  constexpr float kLeastMean = 50.0F, kVariation = 0.05F;
+  constexpr float kLeastMean = 50.0F, kVariation = 0.05F, kNinth = 1.0F / 9.0F;
   const float* depths[] = {above.depth_m.data(), own.depth_m.data(), below.depth_m.data()};
   const float* bright[] = {above.brightness, own.brightness, below.brightness};
   const std::size_t last = own.depth_m.size() - 1;
@@ -155,22 +155,23 @@ TOFTWIN_SIMD void dropRow(const EdgeRow& above, const EdgeRow& own, const EdgeRo
         const float depth = depths[row][column];
         nearest = depth < nearest ? depth : nearest;  // not NaN
         farthest = depth > farthest ? depth : farthest;
-        mean += bright[row][column] / 9.0F;
+        mean += bright[row][column];
       }
     }
+    mean *= kNinth;
 #pragma GCC unroll 3
     for (int row = 0; row < 3; ++row) {
 #pragma GCC unroll 3
       for (std::size_t column = x - 1; column <= x + 1; ++column) {
         const float off = bright[row][column] - mean;
-        square += off * off / 9.0F;
+        square += off * off;
       }
     }
     const float nearer = here - nearest, farther = farthest - here,
                 larger = nearer > farther ? nearer : farther;
     const float enough = kVariation * (mean < kLeastMean ? kLeastMean : mean);
     const bool hangs =
-        (nearer > kNear_m) & (farther > kFar_m) & (larger > kLargest_m) & (__builtin_sqrtf(square) >= enough);
+        (nearer > kNear_m) & (farther > kFar_m) & (larger > kLargest_m) & (square * kNinth >= enough * enough);
     drops[x] = (here == here) & ((is_edge[x] != 0) | hangs) ? 1 : 0;  // not NaN
   }
 }

@@ -150,12 +150,12 @@ TOFTWIN_SIMD void markEdges(std::span<const float> unlikeness, float most, std::
   for (std::size_t i = 0; i < unlikeness.size(); ++i) to[i] = from[i] >= most ? 1 : to[i];
 }
 
-TOFTWIN_SIMD void addAmplitudes(const std::complex<float>* phasors, float frequencies, std::size_t width,
+TOFTWIN_SIMD void addAmplitudes(const std::complex<float>* phasors, float share, std::size_t width,
                                 float* __restrict mean) {
   const auto* parts = reinterpret_cast<const float*>(phasors);  // a complex number is an array of two
   for (std::size_t x = 0; x < width; ++x) {
     const float real = parts[2 * x], imaginary = parts[2 * x + 1];
-    mean[x] += __builtin_sqrtf(real * real + imaginary * imaginary) / frequencies;
+    mean[x] += share * __builtin_sqrtf(real * real + imaginary * imaginary);
   }
 }
 

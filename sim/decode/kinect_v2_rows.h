@@ -60,7 +60,7 @@ void judgeRow(const std::uint8_t* before, const std::uint32_t* why, std::size_t 
 /// Marks the pixels whose neighbours are unlike them.
 void markEdges(std::span<const float> unlikeness, float most, std::span<std::uint8_t> is_edge);
 
-/// mean += |p| / `frequencies` for a row of phasors.
-void addAmplitudes(const std::complex<float>* phasors, float frequencies, std::size_t width, float* mean);
+/// mean += `share` · |p| for a row of phasors.
+void addAmplitudes(const std::complex<float>* phasors, float share, std::size_t width, float* mean);
 
 }  // namespace toftwin::sim

@@ -19,12 +19,15 @@ inline float powerBelow(float m) {
   return std::bit_cast<float>(std::bit_cast<std::uint32_t>(m) & 0x7f80'0000U);
 }
 
+/// 1/p of a power of two, exact.
+inline float perPower(float p) { return std::bit_cast<float>(0x7f00'0000U - std::bit_cast<std::uint32_t>(p)); }
+
 /// What conversion adds to a difference of charges; says whether that is too large for it.
 inline float changeOf(float difference, float counts_per_electron, float electrons_per_count, bool& is_saturated) {
   const float counts = difference * counts_per_electron;
   const float magnitude = std::abs(counts), fraction = powerBelow(magnitude) * (1.0F / 128.0F);
   const float step = fraction > 1.0F ? fraction : 1.0F;
-  const float code = step * std::nearbyint(magnitude / step);
+  const float code = step * std::nearbyint(magnitude * perPower(step));
   is_saturated = code > Companding::kLargest;
   const float kept = is_saturated ? Companding::kLargest : code;
   return std::copysign(kept, counts) * electrons_per_count - difference;
