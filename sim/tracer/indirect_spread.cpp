@@ -24,15 +24,25 @@ struct Facet {
   float x, y, z, normal_x, normal_y, normal_z;
 };
 
-/// Falls from 1 as q leaves p's plane and turns away.
-TOFTWIN_INLINE float alike(const Facet& p, const Facet& q, float range2) {
+/// A quotient that is to be put together with others before it is divided: one division takes as long as the rest.
+struct Fraction {
+  float over, under;
+  friend Fraction operator*(Fraction a, Fraction b) { return {a.over * b.over, a.under * b.under}; }
+  [[nodiscard]] float squared() const {
+    const float quotient = over / under;
+    return quotient * quotient;
+  }
+};
+
+/// The root of what falls from 1 as q leaves p's plane and turns away: facing / (1 + off² / so far off it).
+TOFTWIN_INLINE Fraction alike(const Facet& p, const Facet& q, float range2) {
   const float off =
       p.normal_x * (q.x - p.x) + p.normal_y * (q.y - p.y) + p.normal_z * (q.z - p.z);
-  const float fall = 1.0f + off * off / (range2 * (kPlaneShare * kPlaneShare));
+  const float far2 = range2 * (kPlaneShare * kPlaneShare);
   const float cosine =
       p.normal_x * q.normal_x + p.normal_y * q.normal_y + p.normal_z * q.normal_z;
   const float facing = cosine > 0.0f ? cosine * cosine : 0.0f;
-  return facing * facing / (fall * fall);
+  return {facing * far2, far2 + off * off};
 }
 
 TOFTWIN_INLINE float rangeSquared(const Facet& p) { return p.x * p.x + p.y * p.y + p.z * p.z + 1e-12f; }
@@ -58,9 +68,10 @@ void weigh(const Row& here, const Row& there, int first, int last, float spatial
     const Facet q{there.x[u],        there.y[u],        there.z[u],
                   there.normal_x[u], there.normal_y[u], there.normal_z[u]};
     const float dx = q.x - p.x, dy = q.y - p.y, dz = q.z - p.z, range2 = rangeSquared(p);
-    const float reach2 = range2 * (kNearShare * kNearShare) * (1.0f + kFewSamples / (here.samples[u] + 1.0f));
-    const float near = 1.0f + (dx * dx + dy * dy + dz * dz) / reach2;
-    weight[u] = spatial * there.samples[u] * alike(p, q, range2) / (near * near);
+    // 1 / (1 + d² / r²) of reach r² = (k · range)² (1 + kFewSamples / n)
+    const float n = here.samples[u] + 1.0f, reach2 = range2 * (kNearShare * kNearShare) * (n + kFewSamples);
+    const Fraction near{reach2, reach2 + (dx * dx + dy * dy + dz * dz) * n};
+    weight[u] = spatial * there.samples[u] * (alike(p, q, range2) * near).squared();
   }
 }
 
@@ -188,7 +199,7 @@ void weighCorner(const CoarseGrid& grid, const BlockGeometry& pixels, int right,
     const Facet p{pixels.x[i],        pixels.y[i],        pixels.z[i],
                   pixels.normal_x[i], pixels.normal_y[i], pixels.normal_z[i]};
     // Next to things that no coarse point lies on, others are better than none.
-    weight[i] = known * (linear + 0.01f) * (alike(p, q, rangeSquared(p)) + 1e-4f);
+    weight[i] = known * (linear + 0.01f) * (alike(p, q, rangeSquared(p)).squared() + 1e-4f);
   }
   corner.weight = weight;
   for (std::size_t i = 0; i < kLaneCount; ++i) total[i] += weight[i];

@@ -162,9 +162,10 @@ bool weighOne(const LitPoints::Receivers& receivers, const Vec3fLanes& position,
     const float square = dx * dx + dy * dy + dz * dz + 1e-12f;
     const float here = dx * n.x[i] + dy * n.y[i] + dz * n.z[i];
     const float there = -(dx * normal.x[i] + dy * normal.y[i] + dz * normal.z[i]);
-    const bool is_seen = (here > 0.0f) & (there > 0.0f) & (receivers.valid[i] != 0);
-    const float g = here * there / (3.14159265f * square * square);
-    share[i] = is_seen ? g / (density[i] + directions * g) : 0.0f;
+    // g / (density + directions · g) of g = here · there / (π square²)
+    const float g = here * there, area = 3.14159265f * square * square;
+    const bool is_seen = (here > 0.0f) & (g > 0.0f) & (receivers.valid[i] != 0);
+    share[i] = is_seen ? g / (density[i] * area + directions * g) : 0.0f;
     total[i] += share[i] * steady[i];
     way[i] = __builtin_sqrtf(square);
     any |= is_seen ? 1 : 0;
