@@ -175,8 +175,9 @@ Image<float> CoarseHalo::widened(const Image<float>& cells) const {
         const float* four[] = {in, in + parts_, in + 2 * parts_, in + 3 * parts_};
         mixFour(four, knots.weight, count, pixels[static_cast<std::size_t>(r)].data());
       }
-      interleave(pixels.data(), parts_, static_cast<std::size_t>(groups), row.data());
-      std::copy_n(row.data(), width_ * parts_, &wide(0, v));
+      const bool fits = groups * kCell == width_;  // else the last group has more pixels than there are
+      interleave(pixels.data(), parts_, static_cast<std::size_t>(groups), fits ? &wide(0, v) : row.data());
+      if (!fits) std::copy_n(row.data(), width_ * parts_, &wide(0, v));
     }
   });
   return wide;

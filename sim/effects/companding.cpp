@@ -35,27 +35,51 @@ inline float changeOf(float difference, float counts_per_electron, float electro
 
 constexpr auto kSaturatedBit = static_cast<std::uint8_t>(PixelFlag::Saturated);
 
-/// Converts one row of two taps. What conversion takes off the difference goes to both alike, so that
-/// their sum stays.
-TOFTWIN_SIMD void convertTwo(float* __restrict first, float* __restrict second, std::uint8_t* __restrict flags,
-                             int width, float counts_per_electron) {
+constexpr int kPiece = 512;  ///< of a row, whose marks stay in the nearest cache
+
+/// Marks are as wide as the numbers that they come with, for vector code; few rows have any.
+void keepMarks(const std::uint32_t* marks, int count, std::uint8_t* flags) {
+  for (int x = 0; x < count; ++x) flags[x] = static_cast<std::uint8_t>(flags[x] | marks[x]);
+}
+
+/// Converts a piece of a row of two taps; says whether any was too large, and which. What conversion takes off the
+/// difference goes to both alike, so that their sum stays.
+TOFTWIN_SIMD bool convertTwo(float* __restrict first, float* __restrict second, int count, float counts_per_electron,
+                             std::uint32_t* __restrict marks) {
   const float electrons_per_count = 1.0F / counts_per_electron;
-  for (int x = 0; x < width; ++x) {
+  std::uint32_t any = 0;
+  for (int x = 0; x < count; ++x) {
     bool is_saturated = false;
     const float change = changeOf(first[x] - second[x], counts_per_electron, electrons_per_count, is_saturated);
-    flags[x] = static_cast<std::uint8_t>(flags[x] | (is_saturated ? kSaturatedBit : 0));
+    marks[x] = is_saturated ? kSaturatedBit : 0U;
+    any |= marks[x];
     first[x] += 0.5F * change;
     second[x] -= 0.5F * change;
   }
+  return any != 0;
 }
 
-TOFTWIN_SIMD void convertOne(float* __restrict first, std::uint8_t* __restrict flags, int width,
-                             float counts_per_electron) {
+TOFTWIN_SIMD bool convertOne(float* __restrict first, int count, float counts_per_electron,
+                             std::uint32_t* __restrict marks) {
   const float electrons_per_count = 1.0F / counts_per_electron;
-  for (int x = 0; x < width; ++x) {
+  std::uint32_t any = 0;
+  for (int x = 0; x < count; ++x) {
     bool is_saturated = false;
     first[x] += changeOf(first[x], counts_per_electron, electrons_per_count, is_saturated);
-    flags[x] = static_cast<std::uint8_t>(flags[x] | (is_saturated ? kSaturatedBit : 0));
+    marks[x] = is_saturated ? kSaturatedBit : 0U;
+    any |= marks[x];
+  }
+  return any != 0;
+}
+
+/// Converts a row; `second` may be null.
+void convertRow(float* first, float* second, int width, float counts_per_electron, std::uint8_t* flags) {
+  std::uint32_t marks[kPiece];
+  for (int x = 0; x < width; x += kPiece) {
+    const int count = std::min(kPiece, width - x);
+    const bool is_any = second != nullptr ? convertTwo(first + x, second + x, count, counts_per_electron, marks)
+                                          : convertOne(first + x, count, counts_per_electron, marks);
+    if (is_any) keepMarks(marks, count, flags + x);
   }
 }
 
@@ -118,12 +142,8 @@ Samples Companding::apply(Samples samples, const Conditions&, const Random&) con
           }
           continue;
         }
-        const auto scale = static_cast<float>(counts_per_electron);
-        if (taps == 2) {
-          convertTwo(first, &samples.electrons[i + 1](0, y), flags, samples.width(), scale);
-        } else {
-          convertOne(first, flags, samples.width(), scale);
-        }
+        convertRow(first, taps == 2 ? &samples.electrons[i + 1](0, y) : nullptr, samples.width(),
+                   static_cast<float>(counts_per_electron), flags);
       }
     }
   });
