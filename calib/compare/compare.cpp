@@ -12,6 +12,7 @@
 #include "calib/compare/csv.h"
 #include "calib/compare/live_report.h"
 #include "calib/compare/real_data.h"
+#include "protocol/types/counted.h"
 
 namespace toftwin::compare {
 namespace {
@@ -53,9 +54,10 @@ Result<> addLive(const CompareJob& job, Progress& progress, Report& report, std:
   if (auto written = writeLog(*captured, job.output); !written) return written;
   report.tone = finding->section.tone;
   report.subtitle =
-      fmt::format("{} ({}) against {} ({}), {} frames at each of {} poses", captured->b.entry.name,
+      fmt::format("{} ({}) against {} ({}), {} at {}{}", captured->b.entry.name,
                   captured->b.entry.model, captured->a.entry.name, captured->a.entry.model,
-                  job.capture.frames, captured->poses.size());
+                  counted(job.capture.frames, "frame"), captured->poses.size() == 1 ? "" : "each of ",
+                  counted(captured->poses.size(), "pose"));
   verdict += finding->headline + ". ";
   add(report, *std::move(finding));
   return {};

@@ -7,6 +7,7 @@
 #include <opencv2/core.hpp>
 
 #include "calib/compare/plot.h"
+#include "calib/compare/report.h"
 #include "sim/pictures/png.h"
 
 namespace toftwin::compare {
@@ -84,8 +85,8 @@ std::string toSvg(const ImageMap& map) {
       bar_x, tall, png(bar));
   for (const double v : roundTicks(map.low, map.high, 6)) {
     const double y = 6 + tall * (1.0 - (v - map.low) / (map.high - map.low));
-    svg += fmt::format("<text class='tick' x='{:.1f}' y='{:.1f}'>{:.4g}</text>", bar_x + 22,
-                       std::clamp(y + 5, 18.0, tall + 6), v);
+    svg += fmt::format("<text class='tick' x='{:.1f}' y='{:.1f}'>{}</text>", bar_x + 22,
+                       std::clamp(y + 5, 18.0, tall + 6), shownDigits(v, 4));
   }
   svg += fmt::format(
       "<text class='label' text-anchor='middle' transform='translate({:.1f} {:.1f}) "

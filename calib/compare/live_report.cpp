@@ -14,14 +14,14 @@
 #include "calib/compare/drift.h"
 #include "calib/compare/image_slopes.h"
 #include "calib/compare/nearness.h"
+#include "protocol/types/counted.h"
 
 namespace toftwin::compare {
 namespace {
 
 /// "4 poses", "4 poses, 3 of them different".
 std::string posesInWords(std::size_t poses, std::size_t places) {
-  if (poses == 1) return "1 pose";
-  if (places == poses) return fmt::format("{} poses", poses);
+  if (poses == 1 || places == poses) return counted(poses, "pose");
   return fmt::format("{} poses, {} of them different", poses, places);
 }
 
@@ -176,11 +176,12 @@ Result<Finding> judgeLive(const Capture& capture) {
   const Tilt tilt{poses};
   finding.section.tone = toneOfDifference(c, tilt.edge_mm());
   finding.section.verdict = fmt::format(
-      "Averaged over {} pixels at {}. Temporal noise: A {} mm, B {} mm (median). Validity masks agree in {} "
+      "Averaged over {} at {}. Temporal noise: A {} mm, B {} mm (median). Validity masks agree in {} "
       "% of "
-      "the pixels. {} pixels differ by more than {} mm and are counted apart.",
-      all.n, posesInWords(poses.size(), c.places), shown(main.noise_a_mm, 2), shown(main.noise_b_mm, 2),
-      shown(100.0 * c.mask_agreement, 1), c.gross, shown(kGross_mm, 0));
+      "the pixels. {} by more than {} mm and {} counted apart.",
+      counted(all.n, "pixel"), posesInWords(poses.size(), c.places), shown(main.noise_a_mm, 2),
+      shown(main.noise_b_mm, 2), shown(100.0 * c.mask_agreement, 1), c.gross == 1 ? "1 pixel differs" : counted(c.gross, "pixel") + " differ",
+      shown(kGross_mm, 0), c.gross == 1 ? "is" : "are");
   for (const Drift& drift : drifts) finding.section.verdict += " " + inWords(drift, capture);
   auto& blocks = finding.section.blocks;
   for (const std::string& warning : capture.warnings)

@@ -56,6 +56,8 @@ void TraitCollector::add(NamedRows rows, const Result<DriftTraits>& drift) {
 
 namespace {
 
+constexpr const char* kInDoubt = "in doubt";  ///< the last of details
+
 std::string endOf(const Trait& trait, double end) {
   return isKnown(end, trait.unit) ? shownDigits(end, 4) : "not known";
 }
@@ -66,9 +68,18 @@ std::string detailsOf(const NamedTrait& one) {
   std::string all = one.detail;
   const auto add = [&all](const std::string& text) { all += (all.empty() ? "" : ", ") + text; };
   if (const auto* line = std::get_if<OnLine>(&one.trait.refers_to)) add(placeInWords(line->at_m));
-  if (!one.trait.doubt.empty()) add("in doubt");
+  if (isUnseenPart(one)) add("not seen by itself");
+  if (!one.trait.doubt.empty()) add(kInDoubt);
   return all;
 }
+
+bool isUnseenPart(const NamedTrait& one) {
+  const auto isIt = [&](const char* part) { return one.trait.name == part; };
+  return (std::ranges::any_of(kLawParts, isIt) || std::ranges::any_of(kPatternParts, isIt)) &&
+         one.trait.value == 0.0 && one.trait.high > 0.0;
+}
+
+bool isInDoubt(std::string_view details) { return details.ends_with(kInDoubt); }
 
 TableBlock traitTable(const NamedTraits& traits, const std::string& a, const std::string& b) {
   TableBlock table{

@@ -64,6 +64,10 @@ class TraitCollector {
 /// What a number cannot be read without: its detail, where on its line it is told, and whether it is in doubt, with
 /// commas between them. Empty: nothing.
 std::string detailsOf(const NamedTrait& one);
+/// Whether details, as a log keeps them, say that the number is in doubt.
+bool isInDoubt(std::string_view details);
+/// A part of a noise law that is told as 0, as its interval holds 0: what the others have may be its.
+bool isUnseenPart(const NamedTrait& one);
 /// A row for each number, A, B and B − A beside each other. `a` and `b` say whose they are.
 TableBlock traitTable(const NamedTraits& traits, const std::string& a = "A", const std::string& b = "B");
 /// Of numbers of one camera, the one that is most of its standard errors from 0 and certain, with its interval, and how

@@ -33,7 +33,7 @@ std::string grossInWords(const Characteristics& c) {
       c.poses_all_gross == 0 ? ""
                              : fmt::format("; at {} of the poses nothing else is seen", c.poses_all_gross);
   return fmt::format(
-      "{} of what both see on surfaces is over {:.0f} mm apart, and in no number of the rest{}. ",
+      "{} of what both see on surfaces is over {:.0f} mm apart, and is in none of the other numbers{}. ",
       shownPercent(grossShare(c)), kGross_mm, none_left);
 }
 

@@ -89,7 +89,8 @@ std::string intervalOf(const Trait& one) {
 
 std::string shownOf(const std::optional<NamedTrait>& one) {
   if (!one) return "";
-  return number(one->trait.value) + (one->detail.empty() ? "" : ", " + one->detail);
+  return number(one->trait.value) + (one->detail.empty() ? "" : ", " + one->detail) +
+         (isUnseenPart(*one) ? ", not seen by itself" : "");
 }
 
 std::string sizeOf(const TraitVerdict& one) {
@@ -169,8 +170,9 @@ std::string headlineOf(const std::vector<TraitVerdict>& all) {
            alike;
   }
   if (differ == 0) {
-    return hidden +
-           fmt::format("In none of {} numbers does B differ from A by more than the noise floor", same) + alike;
+    const std::string none =
+        same == 1 ? "In the one number told B does not" : fmt::format("In none of {} numbers does B", same);
+    return hidden + none + " differ from A by more than the noise floor" + alike;
   }
   // The first of the table below, but that what wraps or is missing was said.
   const auto isHidden = [](const TraitVerdict& one) {
@@ -181,9 +183,14 @@ std::string headlineOf(const std::vector<TraitVerdict>& all) {
   const TraitVerdict* first = found == all.end() ? &all.front() : &*found;
   return hidden + fmt::format(
                       "Clearest difference: {}, {} ({} to {}), {}{}. "
-                      "{} of {} numbers of B differ from A's by more than the noise floor",
+                      "{} from A's by more than the noise floor",
                       plainNameOf(*first), sizeOf(*first), number(first->difference.low),
-                      number(first->difference.high), farBeyond(*first), lineOf(*first), differ, differ + same) + alike;
+                      number(first->difference.high), farBeyond(*first), lineOf(*first),
+                      differ + same == 1
+                          ? "The one number told of B differs"
+                          : fmt::format("{} of {} numbers of B differ{}", differ, differ + same,
+                                        differ == 1 ? "s" : "")) +
+         alike;
 }
 
 std::string missingInWords(const std::vector<MissingAt>& missing) {

@@ -8,15 +8,12 @@
 
 #include "calib/discover/curve.h"
 #include "calib/discover/table_words.h"
+#include "protocol/types/counted.h"
 
 namespace toftwin::discover {
 namespace {
 
 using namespace compare;  // this page is made of its parts
-
-std::string counted(std::size_t count, const std::string& what) {
-  return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
-}
 
 /// Whether an effect is in the locked sessions' own medians, which are taken out.
 bool isTakenOut(const TableDiscovery& d, const Effect& effect) {

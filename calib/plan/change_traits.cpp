@@ -12,6 +12,7 @@
 
 #include "calib/compare/statistics.h"
 #include "calib/compare/traits/least_squares.h"
+#include "protocol/types/counted.h"
 
 namespace toftwin::plan {
 namespace {
@@ -83,8 +84,8 @@ void addMotion(const ComparedRun& run, std::size_t camera, TraitCollector& all) 
   if (captures.empty()) return;
   if (speed.empty()) {
     all.untold(fmt::format(
-        "motion of {}: in none of {} captures do two frames with a time of their own show the plate whole",
-        kCameras[camera], captures.size()));
+        "motion of {}: in none of {} do two frames with a time of their own show the plate whole",
+        kCameras[camera], counted(captures.size(), "capture")));
     return;
   }
   all.add("motion, right end − left end", kCameras[camera], compare::motionTraits(speed, turn));
@@ -204,7 +205,7 @@ void addLatency(const ComparedRun& run, TraitCollector& all) {
         "latency: the two cameras are captured one after the other, and where a real plate was meanwhile nobody "
         "recorded. It is told of two simulated cameras, whose frames say the time at which the scene was so");
   } else if (rows.empty()) {
-    all.untold(fmt::format("{} ({} captures of the moving plate, of which none tells it)", why_not,
+    all.untold(fmt::format("{} ({} of the moving plate, of which none tells it)", why_not,
                            captures.size()));
   } else {
     compare::Trait latency = together(rows);

@@ -159,7 +159,7 @@ void relateTo(const NamedRows& other, const NamedRows& rows, std::vector<compare
     if (same == other.condition.end()) continue;
     const double both = rows.x[i] * other.x[static_cast<std::size_t>(same - other.condition.begin())];
     if (both <= most) continue;
-    most = both, at_it = rows.x[i], unit = fmt::format(" of that at capture {}", rows.condition[i]);
+    most = both, at_it = rows.x[i], unit = fmt::format("the signal of capture {}", rows.condition[i]);
   }
   for (compare::Trait& one : traits) {
     auto* law = std::get_if<compare::LawAtSignal>(&one.refers_to);

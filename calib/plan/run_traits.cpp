@@ -20,6 +20,7 @@
 #include "calib/plan/noise_traits.h"
 #include "calib/plan/own_series.h"
 #include "calib/plan/tilt_traits.h"
+#include "protocol/types/counted.h"
 
 namespace toftwin::plan {
 namespace {
@@ -176,10 +177,10 @@ void sayWhatPlanesHide(const ComparedRun& run, TraitCollector& all) {
   const auto hidden = std::ranges::count_if(run.captures, isHidden);
   if (hidden == 0) return;
   all.untold(fmt::format(
-      "errors against the plan's walls at {} captures (harmonics, error over amplitude, corners and lens scatter of "
-      "A and of B by themselves): their pose was fitted to A's own ranges of these planes, which takes "
+      "errors against the plan's walls at {} (harmonics, error over amplitude, corners and lens scatter of "
+      "A and of B by themselves): the pose was fitted to A's own ranges of these planes, which takes "
       "up A's errors",
-      hidden));
+      counted(hidden, "capture")));
 }
 
 void addMasks(const ComparedRun& run, TraitCollector& all) {

@@ -43,10 +43,14 @@ TrendSeries seriesOf(const std::vector<const LoggedTrait*>& numbers, const std::
     if (!is_told && isOfTheSame(run, *numbers.front())) series.rows.push_back({.at = {.run = run}, .is_told = false});
   }
   std::ranges::stable_sort(series.rows, {}, [](const TrendRow& row) { return row.at.run.began; });
-  auto first = std::ranges::find_if(series.rows,
-                                    [](const TrendRow& row) { return row.is_told && !row.at.run.isUnfinished(); });
+  const auto isInDoubt = [](const TrendRow& row) { return compare::isInDoubt(row.at.trait.detail); };
+  const auto isWhole = [](const TrendRow& row) { return row.is_told && !row.at.run.isUnfinished(); };
+  auto first = std::ranges::find_if(series.rows, [&](const TrendRow& row) { return isWhole(row) && !isInDoubt(row); });
+  if (first == series.rows.end()) first = std::ranges::find_if(series.rows, isWhole);
   if (first == series.rows.end()) first = std::ranges::find(series.rows, true, &TrendRow::is_told);
   first->is_first = true;
+  const bool is_first_in_doubt = isInDoubt(*first);
+  for (TrendRow& row : series.rows) row.is_in_doubt = row.is_told && (is_first_in_doubt || isInDoubt(row));
   return series;
 }
 

@@ -8,7 +8,8 @@
 
 namespace toftwin::plan {
 
-/// A number of one run, held against the first finished run's; of runs none of which is, the first's.
+/// A number of one run, held against that of the first finished run in which it is not in doubt; of runs none of which
+/// is so, the first finished one's; of runs none of which is finished, the first's.
 struct TrendRow {
   LoggedTrait at{};
   bool is_told = true;  ///< or the run does not tell the number, and `at` has only the run
@@ -16,8 +17,9 @@ struct TrendRow {
   /// Value less the first's, with an interval that holds the changes of all rows together with 95 %; NaN where an
   /// end of an interval it is made from is not known.
   double change = 0.0, low = 0.0, high = 0.0;
+  bool is_in_doubt = false;  ///< it, or the first: what it is held against
   /// A run that is not through may lack just those captures that would have made the number what it was.
-  [[nodiscard]] bool isJudged() const { return is_told && !is_first && !at.run.isUnfinished(); }
+  [[nodiscard]] bool isJudged() const { return is_told && !is_first && !is_in_doubt && !at.run.isUnfinished(); }
   [[nodiscard]] bool isChanged() const { return isJudged() && (low > 0.0 || high < 0.0); }
 };
 

@@ -51,8 +51,8 @@ TEST(Headline, BeginsWithPixelsThatAreFartherApartThanWhatItTells) {
   const Characteristics some = characterise(withGrossPixels(0, 4));
   EXPECT_THAT(
       nearnessInWords("cam", "twin", some),
-      testing::StartsWith("2 % of what both see on surfaces is over 300 mm apart, and in no number of "
-                          "the rest. twin (B) is within"));
+      testing::StartsWith("2 % of what both see on surfaces is over 300 mm apart, and is in none of "
+                          "the other numbers. twin (B) is within"));
   EXPECT_EQ(toneOfDifference(some), Tone::Bad);
   const auto cards = nearnessCards(some, "", Tone::Good);
   EXPECT_EQ(cards.front().value, "2 %");
@@ -61,8 +61,8 @@ TEST(Headline, BeginsWithPixelsThatAreFartherApartThanWhatItTells) {
   const Characteristics half = characterise(withGrossPixels(100, 0));
   EXPECT_THAT(
       nearnessInWords("cam", "twin", half),
-      testing::StartsWith("50 % of what both see on surfaces is over 300 mm apart, and in no number of "
-                          "the rest; at 1 of the poses nothing else is seen. twin"));
+      testing::StartsWith("50 % of what both see on surfaces is over 300 mm apart, and is in none of "
+                          "the other numbers; at 1 of the poses nothing else is seen. twin"));
   EXPECT_EQ(half.places, 1U) << "a pose without a pixel compared is no draw of B − A";
   EXPECT_THAT(nothingCompared(characterise(withGrossPixels(100, 100)), "pose").message,
               testing::HasSubstr("all 200 pixels that are valid in both cameras are over 300 mm apart"));

@@ -281,7 +281,7 @@ TEST(Verdict, SaysWhyTheOtherCameraHasNoSuchNumber) {
   EXPECT_EQ(rows[1][4], "60");
   EXPECT_EQ(rows[2][0], "noise");
   EXPECT_EQ(rows[2][1], "not told: A has none: it takes eight frames");
-  EXPECT_THAT(headlineOf(all), HasSubstr("In none of 1 numbers"));
+  EXPECT_THAT(headlineOf(all), HasSubstr("In the one number told B does not differ"));
   EXPECT_EQ(cardsOf(all).front().value, "1 of 1");
   EXPECT_TRUE(verdictsOf({.traits = {traits.traits[0], traits.traits[2]}}).empty())
       << "there is no other camera";
@@ -339,7 +339,7 @@ TEST(Verdict, NamesNoWaveThatMayBeAnother) {
   traits.traits[0].trait.doubt = traits.traits[1].trait.doubt = "it may be another";
   const auto all = verdictsOf(traits);
   EXPECT_THAT(headlineOf(all), testing::StartsWith("Clearest difference: bias: number, +3 mm"));
-  EXPECT_THAT(headlineOf(all), HasSubstr("1 of 1 numbers"));
+  EXPECT_THAT(headlineOf(all), HasSubstr("The one number told of B differs from"));
   EXPECT_EQ(verdictTable(all).rows[1][1], "not told: it may be another");
   EXPECT_EQ(verdictTable(all).rows[2][1], "not told: of A, it may be another");
   EXPECT_THAT(traitTable(traits, "a", "b").rows[0][5], HasSubstr("in doubt"));

@@ -313,6 +313,38 @@ TEST(Trend, UsesTheSidesThatFaceEachOther) {
   EXPECT_FALSE(one(of("2", 16.0, std::nan(""), std::nan(""))).isChanged());
 }
 
+/// A wave that may be another: it is no change, whichever of the two is in doubt, and a run in which it is not is what
+/// others are held against.
+TEST(Trend, CallsNoNumberInDoubtChanged) {
+  const auto of = [](std::string began, double value, std::string detail) {
+    LoggedTrait one{.run = {.began = std::move(began)}, .trait = {}};
+    one.trait = {"harmonics", std::move(detail), "A", {"3 waves", "mm", value, value - 1.0, value + 1.0, 9}};
+    return one;
+  };
+  const std::vector<LoggedTrait> four{of("1", 9.0, "at 1.5 m, in doubt"), of("2", 1.0, ""), of("3", 9.0, "in doubt"),
+                                      of("4", 9.0, "")};
+  const auto rows = trendsOf(four).front().rows;
+  EXPECT_TRUE(rows[1].is_first);
+  EXPECT_TRUE(rows[0].is_in_doubt && rows[2].is_in_doubt && !rows[3].is_in_doubt);
+  EXPECT_FALSE(rows[0].isChanged());
+  EXPECT_EQ(rows[2].change, 8.0);
+  EXPECT_FALSE(rows[2].isChanged());
+  EXPECT_TRUE(rows[3].isChanged());
+  EXPECT_NEAR(rows[3].low, 8.0 - std::sqrt(2.0), 1e-4);  // one change is judged
+  EXPECT_FALSE(trendsOf({of("1", 1.0, "in doubt"), of("2", 9.0, "in doubt")}).front().rows[1].isChanged());
+}
+
+/// Means of 24 intervals of 50 ms, added up in another order.
+TEST(Trend, TakesWhatRoundingLeavesForNothing) {
+  const auto of = [](std::string began, double value) {
+    LoggedTrait one{.run = {.began = std::move(began)}, .trait = {}};
+    one.trait = {"frame timing", "", "A", {"interval", "ms", value, value - 1e-6, value + 1e-6, 24}};
+    return one;
+  };
+  EXPECT_EQ(trendsOf({of("1", 50.0), of("2", 50.0 - 2.3e-13)}).front().rows[1].change, 0.0);
+  EXPECT_NE(trendsOf({of("1", 50.0), of("2", 50.0 - 1e-9)}).front().rows[1].change, 0.0);
+}
+
 /// The normal quantile of 0.95^(1/2), two-sided, is 2.2365; of 0.95, 1.9600 (tables of Šidák's method).
 TEST(Trend, WidensByHowManyChangesThereAre) {
   std::vector<LoggedTrait> runs;

@@ -58,7 +58,7 @@ TEST(Seen, LeavesErrorsOutWhereThePoseWasFittedToTheCamerasOwnPlanes) {
   ComparedRun run = plantedRun();
   run.captures.front().record.pose_by = "planes";
   EXPECT_THAT(traitsOf(run).untold,
-              testing::Contains(testing::HasSubstr("errors against the plan's walls at 1 captures")));
+              testing::Contains(testing::HasSubstr("errors against the plan's walls at 1 capture (")));
 }
 
 }  // namespace

@@ -213,8 +213,8 @@ TEST(Wraps, AreTheFirstThingThatAReportSays) {
   ASSERT_TRUE(finding) << finding.error().message;
   EXPECT_THAT(
       finding->headline,
-      testing::StartsWith("50 % of what both see on surfaces is over 300 mm apart, and in no number of the "
-                          "rest; at 1 of the poses nothing else is seen. twin (B) is within 1.0 mm"));
+      testing::StartsWith("50 % of what both see on surfaces is over 300 mm apart, and is in none of the "
+                          "other numbers; at 1 of the poses nothing else is seen. twin (B) is within 1.0 mm"));
   EXPECT_EQ(finding->section.tone, compare::Tone::Bad);
   std::string row;
   for (const compare::Block& block : finding->section.blocks) {

@@ -15,6 +15,7 @@
 #include "calib/plan/trend.h"
 #include "tools/cli/export/hdf5_table.h"
 #include "tools/cli/log.h"
+#include "protocol/types/counted.h"
 
 namespace toftwin::cli {
 namespace log_command {
@@ -98,7 +99,7 @@ Result<Exit> writeHdf5(const Numbers& all, const Options& options) {
       {{"content", "a row for each number of each run; 95 % intervals; of a log of toftwin compare"},
        {"software", fmt::format("toftwin {}", TOFTWIN_VERSION)}});
   if (!written) return written.error();
-  fmt::print("{}: {} numbers\n", options.hdf5, all.size());
+  fmt::print("{}: {}\n", options.hdf5, counted(all.size(), "number"));
   return Exit::Ok;
 }
 
@@ -150,6 +151,10 @@ std::string verdictOn(const plan::TrendRow& row, const std::string& first_detail
                                           change(row.high), row.isChanged() ? ": changed" : "")
                             : fmt::format("{}, not known how surely", change(row.change));
   if (!is_whole) verdict += fmt::format("; {}, and this is called no change", unfinished(row.at.run));
+  if (row.is_in_doubt) {
+    verdict += fmt::format("; {} in doubt, and this is called no change",
+                           compare::isInDoubt(row.at.trait.detail) ? "it is" : "the first is");
+  }
   if (row.at.trait.detail != first_detail)
     verdict += first_detail.empty() ? "; the first was without" : "; the first was " + first_detail;
   return verdict;

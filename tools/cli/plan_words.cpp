@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "tools/cli/terminal.h"
+#include "protocol/types/counted.h"
 
 namespace toftwin::cli {
 
@@ -14,10 +15,10 @@ std::string howLong(const plan::Plan& plan, const plan::Schedule& schedule) {
       std::ranges::count_if(plan.blocks, [](const auto& block) { return !block.setup.empty(); });
   const auto locked = std::ranges::count_if(schedule.captures, &plan::PlannedCapture::is_locked);
   std::string text =
-      fmt::format("{}: {} captures, {} of them locked; {}", plan.name.empty() ? "plan" : plan.name,
-                  schedule.captures.size(), locked, timeLeft(schedule.total.in(second)));
+      fmt::format("{}: {}, {} of them locked; {}", plan.name.empty() ? "plan" : plan.name,
+                  counted(schedule.captures.size(), "capture"), locked, timeLeft(schedule.total.in(second)));
   if (setups > 0)
-    text += fmt::format(", {} of it to prepare {} blocks", timeLeft(schedule.setups.in(second)), setups);
+    text += fmt::format(", {} of it to prepare {}", timeLeft(schedule.setups.in(second)), counted(setups, "block"));
   return text + ". What a simulated camera takes to render comes on top.";
 }
 

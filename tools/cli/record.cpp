@@ -12,6 +12,7 @@
 #include "tools/cli/command.h"
 #include "tools/cli/options.h"
 #include "tools/cli/terminal.h"
+#include "protocol/types/counted.h"
 
 namespace toftwin::cli {
 namespace record_command {
@@ -126,7 +127,7 @@ Result<Exit> recordHere(const Options& options) {
   const auto recorded = recordAll(options, *client, recording);
   const auto closed = recording.writer.close();
   const std::uint64_t unwritten = recording.writer.lost();
-  fmt::print("{}: {} frames, {} dropped{}{}\n", options.file, recording.writer.frames(),
+  fmt::print("{}: {}, {} dropped{}{}\n", options.file, counted(recording.writer.frames(), "frame"),
              recording.dropped,
              recording.lost > 0 ? fmt::format(", {} lost by the device{}{}", recording.lost,
                                               recording.lost_because.empty() ? "" : ", the last ones because: ",

@@ -10,6 +10,7 @@
 #include "tools/cli/arguments.h"
 #include "tools/cli/command.h"
 #include "tools/cli/terminal.h"
+#include "protocol/types/counted.h"
 
 namespace toftwin::cli {
 namespace suit_command {
@@ -28,9 +29,9 @@ Result<Exit> act(const Options& options) {
   if (options.repeats > 0) use->spec.repeats = options.repeats;
   if (options.frames > 0) use->spec.frames = options.frames;
   if (options.is_check) {
-    fmt::print("{}: {} cameras, {} requirements, {} poses, {} lightings; nothing is wrong with it\n",
-               options.file, use->spec.cameras.size(), use->spec.requirements.size(), use->spec.poses.size(),
-               use->spec.lightings.size());
+    fmt::print("{}: {}, {}, {}, {}; nothing is wrong with it\n", options.file,
+               counted(use->spec.cameras.size(), "camera"), counted(use->spec.requirements.size(), "requirement"),
+               counted(use->spec.poses.size(), "pose"), counted(use->spec.lightings.size(), "lighting"));
     return Exit::Ok;
   }
   catchInterrupts();

@@ -79,13 +79,20 @@ Trait toldAt(Trait one, const AtSignal& of, double signal) {
   return one;
 }
 
+/// "at a signal of 2.78", "at the signal of capture 64", "at 0.5 times the signal of capture 64".
+std::string signalInWords(double signal, const std::string& unit) {
+  const std::string shown = fmt::format("{:.3g}", signal);
+  if (unit.empty()) return "at a signal of " + shown;
+  return shown == "1" ? "at " + unit : fmt::format("at {} times {}", shown, unit);
+}
+
 HeldTogether heldAt(const Trait& a, const AtSignal& of_a, const Trait& b, const AtSignal& of_b,
                     double wider) {
   const double signal = std::min(of_a.most, of_b.most);
   if (!(signal > 0.0))
     return {.why_not = "A and B have no capture in common by which their signals are compared"};
   return {.difference = differenceOf(toldAt(a, of_a, signal), toldAt(b, of_b, signal), wider),
-          .at = fmt::format("at a signal of {:.3g}{}", signal, of_b.unit)};
+          .at = signalInWords(signal, of_b.unit)};
 }
 
 /// The law at that signal.
@@ -108,7 +115,7 @@ HeldTogether heldAt(const Trait& a, const LawAtSignal& of_a, const Trait& b, con
   const double signal = std::min(of_a.at.most, of_b.at.most);
   if (!(signal > 0.0)) return heldAt(a, of_a.at, b, of_b.at, wider);
   return {.difference = differenceOf(toldAt(a, of_a, signal), toldAt(b, of_b, signal), wider),
-          .at = fmt::format("at a signal of {:.3g}{}", signal, of_b.at.unit)};
+          .at = signalInWords(signal, of_b.at.unit)};
 }
 
 /// Spans that differ by less are one: a drift goes on by no more of itself there, unless it is over long

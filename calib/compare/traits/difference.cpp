@@ -29,7 +29,9 @@ bool isKnown(double end, const std::string& unit) {
 }
 
 Trait differenceOf(const Trait& first, const Trait& second, double wider) {
+  constexpr double kRounding = 1e-12;  // of means of equal numbers, which differ by how they were added
   Trait d{.name = second.name, .unit = second.unit, .value = second.value - first.value};
+  if (std::abs(d.value) <= kRounding * std::abs(first.value)) d.value = 0.0;
   const double of_first = widerOf(first, wider), of_second = widerOf(second, wider);
   d.low = d.value - std::hypot(of_second * (second.value - second.low), of_first * (first.high - first.value));
   d.high = d.value + std::hypot(of_second * (second.high - second.value), of_first * (first.value - first.low));

@@ -35,7 +35,7 @@ struct WaveParts {
 /// A part of noise that goes as signal^−power, told at the signal `most`.
 struct AtSignal {
   double most = 0.0, power = 0.0;  ///< most: NaN where the other camera's has no unit in common with it
-  std::string unit{};
+  std::string unit{};  ///< of the signal, such as "the signal of capture 64"; empty: its own
 };
 /// σ² = p₀ + p₁ (most/I) + p₂ (most/I)² of a signal I, told at `at.most`; in mm².
 struct LawAtSignal {
