@@ -81,9 +81,17 @@ Result<Frame> nextFrame(Feed& feed, const CaptureOptions& options) {
   }
 }
 
+std::string placeInWords(const Transform<World, Camera>& pose) {
+  const auto& t = pose.translation_m;
+  const Vec3d axis = pose.rotate({0.0, 0.0, 1.0});
+  return fmt::format("at x {:.4g}, y {:.4g}, z {:.4g} m and looking along {:.3g}, {:.3g}, {:.3g}", t.x, t.y, t.z,
+                     axis.x, axis.y, axis.z);
+}
+
 /// The next frame of that pose; frames of other poses are skipped.
 Result<Frame> nextAt(Feed& feed, const std::optional<Transform<World, Camera>>& pose,
                      const CaptureOptions& options) {
+  Transform<World, Camera> said;
   for (int skipped = 0; skipped <= options.most_skipped; ++skipped) {
     auto frame = nextFrame(feed, options);
     if (!frame && frame.error().code == Error::Code::EndOfStream && skipped > 0)
@@ -92,12 +100,13 @@ Result<Frame> nextAt(Feed& feed, const std::optional<Transform<World, Camera>>& 
     auto& there = frame->moment.world_from_camera;
     if (pose && !there && options.carrier != nullptr) there = pose;  // the rig knows
     if (!pose || !there || samePose(*pose, *there)) return frame;
+    said = *there;
   }
   return Error{Error::Code::Timeout,
-               fmt::format("{}: none of {} frames was taken at the pose asked for. A recording "
+               fmt::format("{}: none of {} frames was taken at the pose asked for, {}; they say {}. A recording "
                            "must have been made with "
                            "the same pose file; a camera on a rig must be moved there.",
-                           feed.details().entry.name, options.most_skipped)};
+                           feed.details().entry.name, options.most_skipped, placeInWords(*pose), placeInWords(said))};
 }
 
 /// The next frame of both, at almost the same time: a camera that makes its frames when asked, such
@@ -157,13 +166,6 @@ double powerOn(const Frame& frame) {
   return frame.moment.since_power_on ? frame.moment.since_power_on->in(second) : kNaN;
 }
 
-/// What a comparison would read of a frame, but the camera does not give.
-std::string missingPlanes(const Frame& frame) {
-  if (frame.find(PlaneKind::Amplitude) != nullptr) return {};
-  return fmt::format("{} gives no amplitude: its ratio, and whatever goes with amplitude, is not told.",
-                     frame.source);
-}
-
 /// N pairs of frames at one pose.
 Result<> capturePose(Feed& a, Feed& b, std::optional<Follower>& follower, const CaptureOptions& options,
                      Progress& progress, CapturedPose& captured, Capture& result) {
@@ -188,7 +190,9 @@ Result<> capturePose(Feed& a, Feed& b, std::optional<Follower>& follower, const 
     if (auto added = captured.b.add(frame_b); !added) return added;
     if (i == 0 && result.poses.empty()) {
       for (const Feed* feed : {&a, &b}) result.warnings.push_back(feed->warning());
-      for (const Frame* frame : {&frame_a, &frame_b}) result.warnings.push_back(missingPlanes(*frame));
+      for (const Frame* frame : {&frame_a, &frame_b}) {
+        for (std::string& one : missingPlanes(*frame)) result.warnings.push_back(std::move(one));
+      }
       if (!a.isRecorded()) result.warnings.push_back(clockWarning(frame_a, a.opened()));
       if (!b.isRecorded()) result.warnings.push_back(clockWarning(frame_b, b.opened()));
       std::erase(result.warnings, "");
@@ -205,19 +209,39 @@ Result<> capturePose(Feed& a, Feed& b, std::optional<Follower>& follower, const 
 
 }  // namespace
 
-std::string clockWarning(const Frame& frame, std::chrono::system_clock::time_point opened) {
+std::optional<ClockOffset> clockOffset(const Frame& frame, std::chrono::system_clock::time_point opened) {
   using std::chrono::nanoseconds, std::chrono::system_clock;
   const bool is_recorded = frame.provenance.kind == FrameKind::Replayed;
-  if (is_recorded || frame.moment.received.ns == 0) return {};
+  if (is_recorded || frame.moment.received.ns == 0) return std::nullopt;
   const system_clock::time_point received{nanoseconds{frame.moment.received.ns}};
   // How long a frame was under way is not known, as it waits for the other camera's, which may take seconds to make.
-  const std::chrono::duration<double> ahead = received - system_clock::now(), behind = opened - received;
-  if (std::max(ahead, behind) <= std::chrono::seconds{1}) return {};
+  const auto seconds = [](auto duration) { return std::chrono::duration<double>(duration).count(); };
+  return ClockOffset{.low_s = seconds(received - system_clock::now()), .high_s = seconds(received - opened)};
+}
+
+std::string clockWarning(const Frame& frame, std::chrono::system_clock::time_point opened) {
+  const auto ahead = clockOffset(frame, opened);
+  if (!ahead || !ahead->isNotable()) return {};
   // In whole seconds, so that what is said of many captures is said once.
   return fmt::format(
       "The clock of the daemon that {} comes from is {:.0f} s or more {} ours: times of its frames are not "
       "those of other machines. Let both follow one clock (NTP)",
-      frame.source, std::max(ahead, behind).count(), ahead > behind ? "ahead of" : "behind");
+      frame.source, std::max(ahead->low_s, -ahead->high_s), ahead->low_s > 0.0 ? "ahead of" : "behind");
+}
+
+std::vector<std::string> missingPlanes(const Frame& frame) {
+  std::vector<std::string> all;
+  if (frame.find(PlaneKind::Amplitude) == nullptr) {
+    all.push_back(fmt::format("{} gives no amplitude: its ratio, and whatever goes with amplitude, is not told.",
+                              frame.source));
+  }
+  if (frame.find(PlaneKind::Flags) == nullptr) {
+    all.push_back(fmt::format(
+        "{} gives no flags: each of its pixels that has a range counts as valid, also where the camera may take it for "
+        "saturated or wrapped.",
+        frame.source));
+  }
+  return all;
 }
 
 Result<Frame> nextFrameAt(Feed& feed, const std::optional<Transform<World, Camera>>& pose,

@@ -107,9 +107,23 @@ struct CaptureOptions {
 Result<Capture> capture(Feed& a, Feed& b, const CaptureOptions& options, Progress& progress);
 void planCapture(Progress& progress, const CaptureOptions& options);
 
+/// By how much the clock of the daemon that a frame has come from is ahead of ours, s: between these, as the frame was
+/// made after the feed was opened, and is here now.
+struct ClockOffset {
+  double low_s = 0.0, high_s = 0.0;
+  /// More than a second off.
+  [[nodiscard]] bool isNotable() const { return low_s > 1.0 || high_s < -1.0; }
+  [[nodiscard]] bool mayBe(const ClockOffset& other) const { return low_s <= other.high_s && other.low_s <= high_s; }
+};
+/// Nothing of frames that were recorded, or do not say when they were received.
+std::optional<ClockOffset> clockOffset(const Frame& frame, std::chrono::system_clock::time_point opened);
+
 /// What a reader must know of the clock of the daemon that a frame has come from: that by it the frame is from before
 /// the feed was opened, or from the future, by more than a second. Nothing of frames that were recorded.
 std::string clockWarning(const Frame& frame, std::chrono::system_clock::time_point opened);
+
+/// What is not told as the camera does not give it: a sentence for each plane that a comparison would read.
+std::vector<std::string> missingPlanes(const Frame& frame);
 
 /// The next frame of that pose; frames that say another one are skipped. Stopped soon after the user
 /// wants to end.

@@ -20,6 +20,7 @@
 #include "calib/plan/run_report.h"
 #include "protocol/record/recording.h"
 #include "protocol/settings/settings.h"
+#include "protocol/types/counted.h"
 
 namespace toftwin::plan {
 namespace {
@@ -139,6 +140,9 @@ Result<ComparedRun> compareAll(const CompareRunJob& job, const RunFiles& files,
   if (job.interrupted && job.interrupted()) return Error{Error::Code::Stopped, "interrupted"};
   ComparedRun run;
   run.frequency_hz = first->frequency_hz;
+  for (const Frame& frame : first->frames) {
+    for (std::string& one : compare::missingPlanes(frame)) run.warnings.push_back(std::move(one));
+  }
   run.settings = settingsOf("A", files.camera_a, first->frames[0]);
   for (RunSetting& one : settingsOf("B", files.camera_b, first->frames[1]))
     run.settings.push_back(std::move(one));
@@ -157,8 +161,8 @@ std::vector<std::string> warningsOf(const RunFiles& files, const std::map<std::s
   const std::size_t planned = files.schedule.captures.size();
   if (index.size() < planned) {
     warnings.push_back(
-        fmt::format("The run is not through: {} of {} captures are there. `toftwin measure` goes on with it.",
-                    index.size(), planned));
+        fmt::format("The run is not through: {} of {} are there. `toftwin measure` goes on with it.",
+                    index.size(), counted(planned, "capture")));
   }
   std::set<std::string> notes;
   bool by_person = false;
@@ -188,7 +192,8 @@ std::vector<std::string> warningsOf(const RunFiles& files, const std::map<std::s
   warnings.insert(warnings.end(), notes.begin(), notes.end());
   const auto moving = std::ranges::count_if(index, [](const auto& one) { return !standsStill(one.second); });
   if (moving > 0)
-    warnings.push_back(fmt::format("{} captures of a moving plate are not compared pixel by pixel.", moving));
+    warnings.push_back(fmt::format("{} of a moving plate {} not compared pixel by pixel.", counted(moving, "capture"),
+                                   moving == 1 ? "is" : "are"));
   return warnings;
 }
 
@@ -225,8 +230,8 @@ Result<std::optional<OpenLog>> openLog(const CompareRunJob& job, const RunFiles&
 compare::Report reportOf(const CompareRunJob& job, const RunFiles& files,
                          const std::vector<CaptureRecord>& records, compare::Finding finding) {
   compare::Report report{.title = "Comparison of time-of-flight cameras"};
-  report.subtitle = fmt::format("{} against {}: {} {}captures of the plan \"{}\"", records.front().b.source,
-                                records.front().a.source, records.size(), job.locked ? "locked " : "",
+  report.subtitle = fmt::format("{} against {}: {} of the plan \"{}\"", records.front().b.source,
+                                records.front().a.source, counted(records.size(), job.locked ? "locked capture" : "capture"),
                                 files.plan.name);
   report.verdict = finding.headline + ".";
   report.tone = finding.section.tone;
@@ -269,7 +274,7 @@ Result<std::filesystem::path> compareRun(const CompareRunJob& job, compare::Prog
     const Opening opening{.run = job.run, .report = job.output, .note = job.note};
     if (auto opened = openLocked(opening, records); !opened) return opened.error();
   }
-  progress.plan(fmt::format("{} captures", records.size()), 0.3 * static_cast<double>(records.size()));
+  progress.plan(counted(records.size(), "capture"), 0.3 * static_cast<double>(records.size()));
   progress.plan("report", 3.0);
   auto run = compareAll(job, *files, records, progress);
   if (!run) return run.error();
@@ -277,7 +282,7 @@ Result<std::filesystem::path> compareRun(const CompareRunJob& job, compare::Prog
   const auto planned = std::ranges::count(files->schedule.captures, job.locked, &PlannedCapture::is_locked);
   auto made_with = settingsOf(files->plan, records, static_cast<std::size_t>(planned), *hash);
   run->settings.insert(run->settings.begin(), made_with.begin(), made_with.end());
-  run->warnings = warningsOf(*files, *index, records);
+  for (std::string& one : warningsOf(*files, *index, records)) run->warnings.push_back(std::move(one));
   progress.begin();
   auto finding = judgeRun(*run);
   if (!finding) return finding.error();

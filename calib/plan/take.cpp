@@ -189,7 +189,8 @@ Result<TakenBy> Taker::framesOf(const PlannedCapture& planned, Feed& feed, const
     if (by.frames == 0) {
       by.since_power_on = frame->moment.since_power_on, by.temperatures = frame->moment.temperatures;
       by.ambient = frame->moment.ambient, by.exposure = longestExposure(*frame);
-      by.note = compare::clockWarning(*frame, feed.opened());
+      by.clock = compare::clockOffset(*frame, feed.opened());
+      by.clock_warning = compare::clockWarning(*frame, feed.opened());
       if (first != nullptr) *first = *frame;
     }
     if (auto done = sink(*frame); !done) return done.error();
@@ -213,6 +214,13 @@ Result<> Taker::follow(const PlannedCapture& planned, const Frame& leader, Feed&
         fmt::format("{} does not say how long it has been on, so {} is not told; --powered-on-for says it",
                     leader.source, nameOf(feed)));
   return {};
+}
+
+/// Once, and again only where it cannot be as it was said any more.
+void Taker::noteClock(const TakenBy& by, std::optional<compare::ClockOffset>& told, Taken& taken) {
+  if (!by.clock || !by.clock->isNotable() || (told && told->mayBe(*by.clock))) return;
+  told = by.clock;
+  taken.notes.push_back(by.clock_warning);
 }
 
 Result<Taken> Taker::take(const PlannedCapture& planned, Feed& a, Feed& b, const Sink& to_a,
@@ -247,9 +255,7 @@ Result<Taken> Taker::take(const PlannedCapture& planned, Feed& a, Feed& b, const
   auto by_b = framesOf(planned, b, taken, to_b, taken.a.since_power_on, nullptr);
   if (!by_b) return naming(planned, by_b.error());
   taken.b = *std::move(by_b);
-  for (const TakenBy* by : {&taken.a, &taken.b}) {
-    if (!by->note.empty()) taken.notes.push_back(by->note);
-  }
+  noteClock(taken.a, clock_told_a_, taken), noteClock(taken.b, clock_told_b_, taken);
   if (options_.carrier == nullptr || !planned.pose) return taken;
   taken.rig = options_.carrier->log();
   if (auto there = options_.carrier->stillThere(); !there) return naming(planned, there.error());

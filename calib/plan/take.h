@@ -51,7 +51,8 @@ struct TakenBy {
   std::vector<NamedTemperature> temperatures{};
   std::optional<Illuminance> ambient{};
   std::optional<Duration> exposure{};  ///< the longest of the first frame's
-  std::string note{};                  ///< what a reader must know of it, or nothing
+  std::optional<compare::ClockOffset> clock{};  ///< of its daemon, by the first frame
+  std::string clock_warning{};                  ///< what a reader must know of that, or nothing
 };
 
 /// What was captured, and how.
@@ -101,6 +102,7 @@ class Taker {
                            std::optional<Frame>* first);
   Result<> follow(const PlannedCapture& planned, const Frame& leader, compare::Feed& feed, Taken& taken);
   Result<> tell(const std::string& about, const std::string& what);
+  void noteClock(const TakenBy& by, std::optional<compare::ClockOffset>& told, Taken& taken);
   [[nodiscard]] compare::CaptureOptions captureOptions() const;
   [[nodiscard]] std::optional<Transform<World, Camera>> saidBy(const compare::Feed& feed,
                                                                const Taken& taken) const;
@@ -112,6 +114,7 @@ class Taker {
   std::map<std::string, std::map<std::string, double>> set_;  ///< parameters, by source
   std::set<const compare::Feed*> known_;  ///< whose first frame was seen
   PoseFinder finder_a_, finder_b_;
+  std::optional<compare::ClockOffset> clock_told_a_, clock_told_b_;  ///< what was last said of their daemons' clocks
   std::map<const compare::Feed*, std::optional<Transform<World, Camera>>> says_;  ///< pose that its frames say, if any
   std::optional<std::chrono::steady_clock::time_point> began_, last_began_;
 };

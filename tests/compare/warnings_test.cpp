@@ -48,6 +48,22 @@ TEST(Warnings, TellOfADaemonWhoseClockIsOff) {
   EXPECT_EQ(clockWarning(recorded, now), "") << "its time is that of the recording";
 }
 
+/// Of one that is three seconds ahead, known to how long its frames were under way; then of one that was set right.
+TEST(Warnings, KnowWhetherAClockIsStillAsItWasSaid) {
+  using std::chrono::milliseconds;
+  const auto opened = std::chrono::system_clock::now() - std::chrono::seconds{5};
+  const auto at_once = clockOffset(frameFrom(milliseconds{-3'000}), opened),
+             waited = clockOffset(frameFrom(milliseconds{-1'200}), opened),
+             in_time = clockOffset(frameFrom(milliseconds{10}), opened),
+             behind = clockOffset(frameFrom(milliseconds{9'000}), opened);
+  ASSERT_TRUE(at_once && waited && in_time && behind);
+  EXPECT_NEAR(at_once->low_s, 3.0, 0.5);
+  EXPECT_NEAR(at_once->high_s, 8.0, 0.5);
+  EXPECT_TRUE(at_once->mayBe(*waited)) << "1.2 to 6.2 s";
+  EXPECT_TRUE(at_once->isNotable() && behind->isNotable() && !in_time->isNotable());
+  EXPECT_FALSE(at_once->mayBe(*behind)) << "-9 to -4 s";
+}
+
 TEST(Warnings, TellOfARecordingThatWasCutOff) {
   const record::Folder folder;
   const auto file = folder / "a.mcap";

@@ -2,6 +2,8 @@
 // How captures are taken: what is commanded, what a person is asked for, and what the twin is told.
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <chrono>
 #include <string>
 #include <vector>
 
@@ -32,6 +34,10 @@ class FakeCamera final : public compare::Feed {
       frame.moment.world_from_camera = frames_ < made_before ? Transform<World, Camera>{} : pose_;
     frame.sequence = static_cast<std::uint64_t>(frames_);
     for (Exposure& one : frame.moment.exposures) one.start.ns += frames_ * frame_apart_ns;
+    if (clock_ahead != std::chrono::seconds{}) {
+      const auto received = std::chrono::system_clock::now() + clock_ahead;
+      frame.moment.received.ns = std::chrono::nanoseconds{received.time_since_epoch()}.count();
+    }
     ++frames_;
     return frame;
   }
@@ -57,6 +63,7 @@ class FakeCamera final : public compare::Feed {
 
   Frame makes{};
   int stale_frames = 0;
+  std::chrono::seconds clock_ahead{};  ///< of its daemon; 0: its frames do not say when they were received
   std::int64_t frame_apart_ns = 0, made_before = 0;  ///< so many frames were made before a pose was set
   std::string refuses{};
 
@@ -270,6 +277,21 @@ TEST_F(Take, WaitsForTheIntervalOfARealCamera) {
   now_ += std::chrono::seconds{45};  // what something else takes counts
   ASSERT_TRUE(take(2));
   EXPECT_NEAR(slept_s_, 60.0 + 15.0, 0.2);
+}
+
+/// Each capture's frames say that the clock is off; it is news once, and again when it was set.
+TEST_F(Take, SaysOnceThatADaemonsClockIsOff) {
+  realAndTwin();
+  begin(kTwoBlocks);
+  a_.clock_ahead = b_.clock_ahead = std::chrono::seconds{30};
+  const auto clockNotes = [](const Result<Taken>& taken) {
+    return std::ranges::count_if(taken->notes, [](const std::string& note) { return note.starts_with("The clock"); });
+  };
+  EXPECT_EQ(clockNotes(take(0)), 2) << "of A and of B";
+  EXPECT_EQ(clockNotes(take(1)), 0);
+  b_.clock_ahead = std::chrono::seconds{10};
+  EXPECT_EQ(clockNotes(take(0)), 1);
+  EXPECT_EQ(clockNotes(take(1)), 0);
 }
 
 TEST_F(Take, PutsBackWhatItSetAndNothingElse) {
