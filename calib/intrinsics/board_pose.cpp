@@ -58,7 +58,7 @@ Transform<Camera, Board> transformOf(const BoardPose& pose) {
 
 Result<BoardSighting> locateBoard(const Sighting& sighting, const Target& target, const CameraInfo& camera) {
   if (!sighting.isUsed()) {
-    return Error{Error::Code::NotFound,
+    return Error{sighting.rejection == Rejection::NotFound ? Error::Code::NotFound : Error::Code::InvalidArgument,
                  fmt::format("no board to take a pose from: {}{}{}", nameOf(sighting.rejection),
                              sighting.detail.empty() ? "" : ": ", sighting.detail)};
   }

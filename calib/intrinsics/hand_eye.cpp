@@ -117,34 +117,52 @@ Result<HandEye> handEye(std::span<const HandEyeView> views) {
   const auto guess = firstGuess(rig, board);
   if (!guess) return refuse("no place of the camera on the rig explains the views");
   const Rigid rig_from_camera = *guess, world_from_board = rig[0] * *guess * board[0];
-  const auto settled = settle(
-      [&](const Eigen::VectorXd& step) {
-        const Rigid x = moved(rig_from_camera, step.head<6>()), y = moved(world_from_board, step.tail<6>());
-        Eigen::VectorXd all(6 * static_cast<Eigen::Index>(views.size()));
-        for (std::size_t i = 0; i < views.size(); ++i) {
-          const Rigid expected = (rig[i] * x).inverse() * y;
-          all.segment<6>(6 * static_cast<Eigen::Index>(i)) =
-              whiten[i].triangularView<Eigen::Lower>().solve(differenceOf(board[i], expected));
-        }
-        return all;
-      },
-      12);
+  const auto left = [&](const Eigen::VectorXd& step) {
+    const Rigid x = moved(rig_from_camera, step.head<6>()), y = moved(world_from_board, step.tail<6>());
+    Eigen::VectorXd all(6 * static_cast<Eigen::Index>(views.size()));
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      const Rigid expected = (rig[i] * x).inverse() * y;
+      all.segment<6>(6 * static_cast<Eigen::Index>(i)) =
+          whiten[i].triangularView<Eigen::Lower>().solve(differenceOf(board[i], expected));
+    }
+    return all;
+  };
+  const auto settled = settle(left, 12);
   if (!settled) return refuse("the views leave a place open, or contradict each other");
   const double degrees = 6.0 * static_cast<double>(views.size()) - 12.0;
   HandEye result{.misfit = std::sqrt(settled->squares / degrees)};
-  const double wider = std::max(1.0, result.misfit * result.misfit);
+  left(settled->step).reshaped(6, rig.size()).colwise().squaredNorm().maxCoeff(&result.worst_view);
+  result.covariance_of_both = std::max(1.0, result.misfit * result.misfit) * settled->covariance;
   result.rig_from_camera = {.pose = transformOf<Rig, Camera>(moved(rig_from_camera, settled->step.head<6>())),
-                            .covariance = wider * settled->covariance.topLeftCorner<6, 6>(),
+                            .covariance = result.covariance_of_both.topLeftCorner<6, 6>(),
                             .degrees = degrees};
   result.world_from_board = {
       .pose = transformOf<World, Board>(moved(world_from_board, settled->step.tail<6>())),
-      .covariance = wider * settled->covariance.bottomRightCorner<6, 6>(),
+      .covariance = result.covariance_of_both.bottomRightCorner<6, 6>(),
       .degrees = degrees};
   return result;
 }
 
 Transform<World, Camera> worldFromCamera(const HandEye& known, const Transform<World, Rig>& world_from_rig) {
   return world_from_rig * known.rig_from_camera.pose;
+}
+
+/// Of board_from_camera = Y⁻¹ R X, with X the camera's place on the rig, R the rig and Y the board in its world:
+///   turn: Yᵀ (R w_X − w_Y)    shift: Yᵀ (R t_X − t_Y + c × w_Y)    c: from the board to the camera
+KnownPose<Board, Camera> boardFromCamera(const HandEye& known, const Transform<World, Rig>& world_from_rig) {
+  const Rigid y = rigidOf(known.world_from_board.pose), r = rigidOf(world_from_rig),
+              camera = r * rigidOf(known.rig_from_camera.pose);
+  const Eigen::Matrix3d of_board = y.linear().transpose();
+  const Eigen::Vector3d c = camera.translation() - y.translation();
+  Eigen::Matrix3d c_cross;
+  c_cross << 0, -c.z(), c.y(), c.z(), 0, -c.x(), -c.y(), c.x(), 0;
+  Eigen::Matrix<double, 6, 12> slope = Eigen::Matrix<double, 6, 12>::Zero();
+  slope.block<3, 3>(0, 0) = slope.block<3, 3>(3, 3) = of_board * r.linear();
+  slope.block<3, 3>(0, 6) = slope.block<3, 3>(3, 9) = -of_board;
+  slope.block<3, 3>(3, 6) = of_board * c_cross;
+  return {.pose = transformOf<Board, Camera>(y.inverse() * camera),
+          .covariance = slope * known.covariance_of_both * slope.transpose(),
+          .degrees = known.rig_from_camera.degrees};
 }
 
 }  // namespace toftwin::intrinsics

@@ -42,20 +42,21 @@ Result<> Taker::checkBoardOf(const PlannedCapture& planned, Feed& b) {
   const auto seen = seenBy(planned, b, finder, there);
   const std::string off = seen ? disagreement(*seen, *there.pose, {}, plan_.board) : "";
   if (seen && off.empty()) return {};
+  const std::string what =
+      seen ? fmt::format("poses disagree: {} by what {} sees ({}) and by where it was put are {}", planned.name,
+                         sourceOf(b), seen->what, off)
+           : fmt::format("{} does not see it: {}", sourceOf(b), seen.error().message);
+  Error error{Error::Code::InvalidArgument,
+              fmt::format("block \"{}\" takes its poses from the board, and {}", block.name, what)};
+  // A board that is there, but too small, or an image that is not, no other scene mends.
+  if (!seen && seen.error().code != Error::Code::NotFound) return error;
   const auto& [x, y, z] = plan_.board.position_m;
-  return Error{
-      Error::Code::InvalidArgument,
-      fmt::format("block \"{}\" takes its poses from the board, and {}: {}. What B looks at must have the "
-                  "board where "
-                  "the plan has it, its first corner at x {:.4g}, y {:.4g}, z {:.4g} m: put it into the "
-                  "scene of {} (a "
-                  "rectangle with the board's picture as its material's texture), or into that of a source "
-                  "\"NAME.BLOCK\" for this block",
-                  block.name, seen ? "poses disagree" : fmt::format("{} does not see it", sourceOf(b)),
-                  seen ? fmt::format("{} by what {} sees ({}) and by where it was put are {}", planned.name,
-                                     sourceOf(b), seen->what, off)
-                       : seen.error().message,
-                  x, y, z, sourceOf(b))};
+  error.message += fmt::format(
+      ". What B looks at must have the board where the plan has it, its first corner at x {:.4g}, y {:.4g}, z {:.4g} "
+      "m: put it into the scene of {} (a rectangle with the board's picture as its material's texture), or into that of a "
+      "source \"NAME.BLOCK\" for this block",
+      x, y, z, sourceOf(b));
+  return error;
 }
 
 /// A sees where it stands. A twin that takes poses is put there; another camera must see the same place.

@@ -14,6 +14,7 @@
 #include "calib/intrinsics/brightness.h"
 #include "calib/intrinsics/hand_eye.h"
 #include "calib/intrinsics/planes.h"
+#include "protocol/types/counted.h"
 
 namespace toftwin::plan {
 namespace {
@@ -186,26 +187,27 @@ Result<SeenPose> PoseFinder::find(PoseFrom from, std::span<const Frame> frames,
   if (!known) {
     return Error{
         sighting.error().code,
-        fmt::format("{}; and the rig does not tell by itself: after {} captures that saw the board, {}",
-                    sighting.error().message, memory_->views.size(), known.error().message)};
+        fmt::format("{}; and the rig does not tell by itself: after {} that saw the board, {}",
+                    sighting.error().message, counted(memory_->views.size(), "capture"), known.error().message)};
   }
-  // The board says where the rig's world lies in the plan's.
-  const auto in_rig = intrinsics::worldFromCamera(*known, {about->rotation_wxyz, about->translation_m});
-  const Transform<World, World> plan_from_rig = world_from_board * known->world_from_board.pose.inverse();
-  SeenPose found;
-  found.world_from_camera = plan_from_rig * in_rig;
-  // The camera's place on the rig, turned into the world; the board's place weighs less where it was seen
-  // often.
-  const Eigen::Matrix3d turn =
-      matrixOf(found.world_from_camera) * matrixOf(known->rig_from_camera.pose).transpose();
+  // The plan says where the board is: there and back from it, so that what is not known of it counts, too.
+  const auto seen = intrinsics::boardFromCamera(*known, {about->rotation_wxyz, about->translation_m});
   Matrix6d slope = Matrix6d::Zero();
-  slope.topLeftCorner<3, 3>() = slope.bottomRightCorner<3, 3>() = turn;
-  found.half_widths = arrayOf(intrinsics::halfWidths(
-      slope * known->rig_from_camera.covariance * slope.transpose(), known->rig_from_camera.degrees));
+  slope.topLeftCorner<3, 3>() = slope.bottomRightCorner<3, 3>() = matrixOf(world_from_board);
+  SeenPose found;
+  found.world_from_camera = world_from_board * seen.pose;
+  found.half_widths =
+      arrayOf(intrinsics::halfWidths(slope * seen.covariance * slope.transpose(), seen.degrees));
   found.by = "rig with the board's help";
   found.what = fmt::format("the camera's place on the rig from {} captures, misfit {:.2f}",
                            memory_->views.size(), known->misfit);
-  return found;
+  const auto& h = found.half_widths;
+  const double shift_m = std::hypot(h[3], h[4], h[5]), turn_deg = kDegreePerRadian * std::hypot(h[0], h[1], h[2]);
+  if (shift_m <= plan_.board.agree.in(metre) && turn_deg <= plan_.board.agree_deg) return found;
+  return Error{Error::Code::InvalidArgument,
+               fmt::format("{}; and the rig tells it to {:.0f} mm and {:.1f}° only, more than board.agree_mm "
+                           "and board.agree_deg allow: {}. A misfit far over 1 means that rig and board contradict each other",
+                           sighting.error().message, 1e3 * shift_m, turn_deg, found.what)};
 }
 
 std::array<double, 6> between(const Transform<World, Camera>& from, const Transform<World, Camera>& to) {

@@ -123,7 +123,7 @@ TEST_F(Locate, SaysWhatIsMissing) {
   std::ofstream{folder_ / "rig.toml"} << "[[pose]]\n[[pose]]\n";
   const auto other = locate(fmt::format("{}/a.png --rig {}/rig.toml", folder_.string(), folder_.string()));
   EXPECT_NE(other.status, 0);
-  EXPECT_THAT(other.err, HasSubstr("has 2 poses of the rig, but there are 1 images"));
+  EXPECT_THAT(other.err, HasSubstr("has 2 poses of the rig, but the board was found in 1 image:"));
   record::writeBytes(folder_ / "grey.png", pictures::encodePng(cv::Mat(212, 256, CV_8U, cv::Scalar{90})));
   const auto none = locate((folder_ / "grey.png").string());
   EXPECT_NE(none.status, 0);

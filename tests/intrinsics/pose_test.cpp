@@ -141,6 +141,16 @@ TEST(BoardPose, IsNotTakenOfABoardThatLooksTheSameTurnedByHalf) {
 }
 
 /// A board of 15 pixels, 20 degrees tilted, with half a pixel of noise: either tilt explains it.
+/// So that whoever asks knows whether there is none to be seen, or one that does not serve.
+TEST(BoardPose, TellsNoBoardFromOneThatIsOfNoUse) {
+  Sighting sighting;
+  sighting.rejection = Rejection::NotFound;
+  const CameraInfo camera = cameraOf(testing::kinectLike());
+  EXPECT_EQ(locateBoard(sighting, testing::checkerboard(), camera).error().code, Error::Code::NotFound);
+  sighting.rejection = Rejection::TooSmall;
+  EXPECT_EQ(locateBoard(sighting, testing::checkerboard(), camera).error().code, Error::Code::InvalidArgument);
+}
+
 TEST(BoardPose, RefusesABoardThatMayAsWellBeTiltedTheOtherWay) {
   const Truth truth = testing::kinectLike();
   const Surface surface{testing::checkerboard(), 0};
@@ -266,17 +276,21 @@ struct Planted {
   }
 };
 
+/// The third: where the camera stands by the board when the rig has turned away from it and it is out of sight.
 TEST(HandEye, IntervalsHoldWhereTheCameraSitsAndTheBoardStands) {
   const Planted planted;
-  Held camera, board;
+  const auto away = transformOf<World, Rig>(turnBy({0.1, 1.2, 0.0}), {0.3, -0.2, 0.4});
+  const auto board_from_camera = planted.world_from_board.inverse() * away * planted.rig_from_camera;
+  Held camera, board, unseen;
   for (unsigned seed = 1; seed <= kRuns; ++seed) {
     std::mt19937_64 random{seed};
     const auto known = handEye(planted.views(random, 1.0));
     ASSERT_TRUE(known) << known.error().message;
     camera.add(known->rig_from_camera, planted.rig_from_camera);
     board.add(known->world_from_board, planted.world_from_board);
+    unseen.add(boardFromCamera(*known, away), board_from_camera);
   }
-  for (const Held& held : {camera, board}) {
+  for (const Held& held : {camera, board, unseen}) {
     for (const int count : held.count) {
       // Wider than 95 % where the misfit happens to be above 1, and never narrower: up to all runs.
       EXPECT_GE(count, 180);

@@ -280,6 +280,13 @@ TEST_F(LookAround, ARigWhoseCameraTheBoardToldNeedsNoBoardAnyMore) {
     EXPECT_EQ(taken->pose_by, a_.sees_board ? "board" : "rig with the board's help");
     expectSeen(*taken, a_.stands, 0.02);
   }
+  // An encoder that slipped: by one more view of the board the camera may be anywhere.
+  a_.sees_board = true;
+  a_.stands.translation_m.x += 0.15;
+  ASSERT_TRUE(take(0));
+  a_.sees_board = false;
+  EXPECT_THAT(take(schedule_.captures.size() - 1).error().message,
+              HasSubstr("A misfit far over 1 means that rig and board contradict each other"));
 }
 
 TEST_F(LookAround, SaysWhatIsMissing) {

@@ -51,15 +51,16 @@ class MeasureByTags : public WithDaemon {
           "[[source]]\nname = '{}'\ndriver = 'sim'\ncamera = 'camera.toml'\nscene = '{}.toml'\n"
           "max_surfaces = 1\n",
           name, scene);
+    all += "[[source]]\nname = 'deaf'\ndriver = 'sim'\ncamera = 'camera.toml'\nscene = 'scene.toml'\nplanes = ['range']\n";
     return all;
   }
-  Ran measure(double first_corner_x_m, const char* b = "twin") const {
+  Ran measure(double first_corner_x_m, const char* b = "twin", const char* from = "board") const {
     std::ofstream{folder_ / "plan.toml"} << fmt::format(
         "frames = 2\n[board]\ntags = '4x3'\nsquare_mm = 100\nmarker_mm = 80\nposition_m = [{}, -0.14, "
         "0.8]\nframes = 1\n"
-        "[[block]]\nname = 'b'\nkind = 'locked'\npose_from = 'board'\n"
+        "[[block]]\nname = 'b'\nkind = 'locked'\npose_from = '{}'\n"
         "repeats = 2\n[[block.pose]]\nposition_m = [0.2, 0.0, 0.35]\neuler_deg = [0, -24, 0]\n",
-        first_corner_x_m);
+        first_corner_x_m, from);
     return run(fmt::format("measure {} cam {} -o {}", path("plan.toml"), b, path("run")));
   }
 };
@@ -96,6 +97,16 @@ TEST_F(MeasureByTags, CapturesNothingWithATwinWhoseSceneHasNoBoard) {
   EXPECT_THAT(ran.err, HasSubstr("0 of 2 captures are there"));
   const auto captures = folder_ / "run" / "captures";
   EXPECT_TRUE(!std::filesystem::exists(captures) || std::filesystem::is_empty(captures));
+}
+
+/// Before the first block is set up, not when an hour of the plan has passed.
+TEST_F(MeasureByTags, SaysAtOnceThatACameraShowsNoBoardAndThatThereIsNoRig) {
+  const Ran deaf = measure(-0.19, "deaf"), without_rig = measure(-0.19, "twin", "board_and_rig");
+  EXPECT_EQ(deaf.status, 4);
+  EXPECT_THAT(deaf.err, HasSubstr("takes its poses from the board, but deaf gives no amplitude"));
+  EXPECT_EQ(without_rig.status, 4);
+  EXPECT_THAT(without_rig.err, HasSubstr("but there is no rig: --rig names its file"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "run"));
 }
 
 }  // namespace

@@ -16,6 +16,7 @@
 #include "tools/cli/board_options.h"
 #include "tools/cli/command.h"
 #include "tools/cli/export/atomic_file.h"
+#include "protocol/types/counted.h"
 
 namespace toftwin::cli {
 namespace locate_command {
@@ -82,8 +83,8 @@ Result<HandEye> handEyeFrom(const Options& options, const std::vector<Located>& 
   if (poses->size() != all.size()) {
     return Error{
         Error::Code::InvalidArgument,
-        fmt::format("{} has {} poses of the rig, but there are {} images: one for each, in their order",
-                    options.rig, poses->size(), all.size())};
+        fmt::format("{} has {} of the rig, but the board was found in {}: one for each, in their order", options.rig,
+                    counted(poses->size(), "pose"), counted(all.size(), "image"))};
   }
   std::vector<HandEyeView> views;
   for (std::size_t i = 0; i < all.size(); ++i) {
@@ -127,11 +128,18 @@ Result<Exit> act(const Options& options) {
     const auto known = handEyeFrom(options, *all, stands);
     if (!known) return known.error();
     fmt::print("{}", textOf(*known));
+    constexpr double kContradicts = 3.0;  // a rig that is not as exact as the corners; ten and more: something is wrong
+    if (known->misfit > kContradicts) {
+      fmt::print(stderr,
+                 "warning: rig and images contradict each other by {:.3g} times what the corners let expect, most in "
+                 "{}: are the poses of {} in the order of the images, and did the board stand still?\n",
+                 known->misfit, (*all)[known->worst_view].name, options.rig);
+    }
     for (std::size_t i = 0; i < all->size(); ++i)
       file += entryOf((*all)[i], worldFromCamera(*known, stands[i]));
   }
   if (auto written = writeWhole(options.output, file); !written) return written.error();
-  fmt::print("{}: {} poses\n", options.output, all->size());
+  fmt::print("{}: {}\n", options.output, counted(all->size(), "pose"));
   return Exit::Ok;
 }
 

@@ -21,6 +21,7 @@
 #include "tools/cli/plan_words.h"
 #include "tools/cli/rig_carrier.h"
 #include "tools/cli/terminal.h"
+#include "protocol/types/counted.h"
 
 namespace toftwin::cli {
 namespace measure_command {
@@ -142,14 +143,20 @@ struct Measurement {
   plan::Taker& taker;
   RunFolder& run;
 
-  Result<> takeOne(const plan::PlannedCapture& planned) {
+  /// `seen`: at each frame, the share of the capture's frames that were there before.
+  Result<> takeOne(const plan::PlannedCapture& planned, const std::function<void(double)>& seen) {
     const std::string& block = plan.blocks[planned.block].name;
     auto feed_a = a.forBlock(block, taker), feed_b = b.forBlock(block, taker);
     if (!feed_a) return feed_a.error();
     if (!feed_b) return feed_b.error();
     CaptureFiles files = run.begin(planned);
+    const double all = 2.0 * planned.frames;
+    double frames = 0.0;
     const auto to = [&](std::size_t camera) {
-      return [&files, camera](const Frame& frame) { return files.write(camera, frame); };
+      return [&, camera](const Frame& frame) {
+        seen(frames++ / all);
+        return files.write(camera, frame);
+      };
     };
     auto taken = taker.take(planned, **feed_a, **feed_b, to(0), to(1));
     if (!taken) return taken.error();
@@ -181,15 +188,16 @@ struct Measurement {
       if (!done) break;
       if (run.done().contains(planned.number)) continue;
       progress.show(taken, planned.name);
-      done = interrupted() ? Error{Error::Code::Stopped, "interrupted"} : takeOne(planned);
+      const auto seen = [&](double share) { progress.show(taken, share, planned.name); };
+      done = interrupted() ? Error{Error::Code::Stopped, "interrupted"} : takeOne(planned, seen);
       if (!done) break;
       ++taken;
     }
     a.close(taker), b.close(taker);
     if (done) return taken;
     return Error{done.error().code,
-                 fmt::format("{}\n{} of {} captures are there, and the same command goes on from there",
-                             done.error().message, before + taken, schedule.captures.size())};
+                 fmt::format("{}\n{} of {} are there, and the same command goes on from there",
+                             done.error().message, before + taken, counted(schedule.captures.size(), "capture"))};
   }
 };
 
@@ -216,6 +224,34 @@ Result<> checkPlanes(const Options& options, const SourceDetails& a, const Sourc
   return {};
 }
 
+/// Blocks whose poses are seen: what they take must be there, or it would be missed when they come.
+Result<> checkPlaces(const Options& options, const plan::Plan& plan, const SourceDetails& a, const SourceDetails& b) {
+  const auto shows = [](const SourceDetails& details) {
+    return std::ranges::any_of(details.planes, [](PlaneKind kind) {
+      return kind == PlaneKind::Amplitude || kind == PlaneKind::Ambient;
+    });
+  };
+  for (const plan::BlockSpec& block : plan.blocks) {
+    const bool by_rig = block.pose_from == plan::PoseFrom::BoardAndRig,
+               by_board = block.pose_from == plan::PoseFrom::Board;
+    if (by_rig && options.rig.empty()) {
+      return Error{Error::Code::InvalidArgument,
+                   fmt::format("block \"{}\" has pose_from = \"board_and_rig\", but there is no rig: --rig names its "
+                               "file",
+                               block.name)};
+    }
+    for (const SourceDetails* camera : {&a, &b}) {
+      const bool must_see = by_board || (by_rig && (camera == &a || !b.can_set_pose));
+      if (!must_see || shows(*camera)) continue;
+      return Error{Error::Code::InvalidArgument,
+                   fmt::format("block \"{}\" takes its poses from the board, but {} gives no amplitude, in which it "
+                               "could be seen: pose_from may be \"planes\" or \"command\" instead",
+                               block.name, camera->entry.name)};
+    }
+  }
+  return {};
+}
+
 Result<Exit> carryOut(const Options& options, const plan::Plan& plan, const std::string& plan_text) {
   auto a = connect(options.daemon, options.a, options);
   if (!a) return a.error();
@@ -225,6 +261,7 @@ Result<Exit> carryOut(const Options& options, const plan::Plan& plan, const std:
   if (!details_a) return details_a.error();
   if (!details_b) return details_b.error();
   if (auto given = checkPlanes(options, *details_a, *details_b); !given) return given.error();
+  if (auto placed = checkPlaces(options, plan, *details_a, *details_b); !placed) return placed.error();
   const auto schedule = plan::scheduleOf(plan, {intervalOf(*details_a), intervalOf(*details_b)});
   if (!schedule) return Error{schedule.error().code, options.plan + ": " + schedule.error().message};
   const auto checked = plan::check(plan, *schedule);
@@ -249,12 +286,12 @@ Result<Exit> carryOut(const Options& options, const plan::Plan& plan, const std:
   how.person = options.prepared ? static_cast<plan::Person*>(&prepared) : &asked;
   if (options.powered_on_for_s) how.powered_on_for = *options.powered_on_for_s * second;
   fmt::print(stderr, "{}\n", howLong(plan, *schedule));
-  if (!run->done().empty()) fmt::print(stderr, "{} captures are there already.\n", run->done().size());
+  if (!run->done().empty()) fmt::print(stderr, "{} there already.\n", counted(run->done().size(), "capture"));
   plan::Taker taker{plan, how};
   const std::size_t before = run->done().size();
   auto taken = Measurement{options, plan, *schedule, *a, *b, taker, *run}.all();
   if (!taken) return taken.error();
-  fmt::print("{}: {} captures, {} of them there already\n", options.output, before + *taken, before);
+  fmt::print("{}: {}, {} of them there already\n", options.output, counted(before + *taken, "capture"), before);
   return Exit::Ok;
 }
 
