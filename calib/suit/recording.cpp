@@ -11,6 +11,7 @@
 #include "calib/compare/statistics.h"
 #include "calib/suit/suit.h"
 #include "protocol/record/recording.h"
+#include "protocol/types/counted.h"
 
 namespace toftwin::suit {
 namespace {
@@ -158,6 +159,24 @@ double frameRateOf(std::vector<double> starts_s) {
   return interval > 0.0 ? 1.0 / interval : std::numeric_limits<double>::quiet_NaN();
 }
 
+/// A scene that is not the recording's, or a pose: of a camera that sees what the scene has, edges and wraps are off as
+/// far, but few pixels.
+std::optional<std::string> otherScene(const std::string& pose, const AtPose& there, const Seen& seen) {
+  constexpr float kFar_m = 0.3F;
+  constexpr double kFew = 0.1;
+  double valid = 0.0, far = 0.0;
+  for (const Image<float>& range_m : there.frames_m) {
+    for (std::size_t i = 0; i < range_m.size(); ++i) {
+      if (!std::isfinite(range_m[i])) continue;
+      ++valid, far += !(std::abs(range_m[i] - seen.range_m[i]) <= kFar_m);
+    }
+  }
+  if (far <= kFew * valid) return std::nullopt;
+  return fmt::format("at \"{}\" {:.0f} % of its valid pixels are over {:.0f} mm from what the scene has there: is it "
+                     "the scene that was recorded, and the pose?",
+                     pose, 100.0 * far / valid, 1e3F * kFar_m);
+}
+
 /// What was met where it was recorded may fail where it was not.
 void leaveOpen(const Case& use, std::vector<RequirementResult>& results) {
   for (std::size_t r = 0; r < results.size(); ++r) {
@@ -170,7 +189,7 @@ void leaveOpen(const Case& use, std::vector<RequirementResult>& results) {
     if (!result.is_judged || result.conditions.size() >= wanted || !result.verdict.is_met) continue;
     result.is_judged = false;
     result.why_not =
-        fmt::format("met where it was recorded, {} of {} conditions", result.conditions.size(), wanted);
+        fmt::format("met where it was recorded, at {} of {}", result.conditions.size(), counted(wanted, "condition"));
   }
 }
 
@@ -189,6 +208,7 @@ Result<CameraResult> judgeRecording(const Case& use, const sim::Scene& scene, co
   for (const auto& [pose, there] : taken->poses) {
     const Seen seen = seenFrom(scene, taken->camera, there.pose, use.spec.poses[pose].time);
     values.push_back(valuesAt(use, pose, light, there, seen));
+    if (auto note = otherScene(use.spec.poses[pose].name, there, seen)) camera.notes.push_back(*std::move(note));
   }
   camera.requirements = resultsOf(use, values, frameRateOf(taken->starts_s));
   camera.spoilers.resize(camera.requirements.size());
@@ -205,7 +225,12 @@ Result<CameraResult> judgeRecording(const Case& use, const sim::Scene& scene, co
         fmt::format("its recording is damaged, and judged as far as it can be read: {}", taken->damage));
   if (taken->elsewhere > 0)
     camera.notes.push_back(
-        fmt::format("{} frames were taken at no pose of the use case and left out", taken->elsewhere));
+        fmt::format("{} of {} were taken at no pose of the use case and left out", taken->elsewhere,
+                    counted(taken->starts_s.size(), "frame")));
+  if (taken->unplaced > 0 && !values.empty())
+    camera.notes.push_back(fmt::format("{} of {} do not say where they were taken, and were left out: [[camera]] "
+                                       "pose = … does",
+                                       taken->unplaced, counted(taken->starts_s.size(), "frame")));
   if (taken->near_several > 0) {
     camera.notes.push_back(fmt::format(
         "{} frames stand within 50 mm and 2° of several poses of the use case; each counts at the nearest",

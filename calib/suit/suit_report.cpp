@@ -7,6 +7,7 @@
 #include "calib/compare/report.h"
 #include "calib/suit/suit.h"
 #include "calib/suit/suit_json.h"
+#include "protocol/types/counted.h"
 
 namespace toftwin::suit {
 namespace {
@@ -71,7 +72,7 @@ std::string verdictText(const RequirementResult& result) {
 }
 
 std::string whereText(const Case& use, const RequirementResult& result) {
-  if (result.conditions.empty()) return result.why_not;
+  if (!result.is_judged || result.conditions.empty()) return result.why_not;
   const AtCondition& worst = result.conditions[result.worst];
   const std::string more =
       use.spec.lightings.size() > 1 ? ", " + use.spec.lightings[worst.lighting].name : "";
@@ -156,7 +157,7 @@ TableBlock requirementTable(const Suit& suit) {
   TableBlock table{
       .caption =
           "Values at the worst pose and lighting. ✓ is met, ✗ is not; ? means that the 95 % interval "
-          "includes the limit",
+          "includes the limit, – that it is not known",
       .header = {"requirement", "limit"}};
   for (const CameraResult& camera : suit.cameras) table.header.push_back(camera.name);
   for (std::size_t r = 0; r < suit.use.spec.requirements.size(); ++r) {
@@ -318,11 +319,12 @@ compare::Section provenance(const Suit& suit) {
   compare::Section section{.id = "provenance", .title = "How this was made"};
   section.blocks.emplace_back(compare::Paragraph{
       .text = fmt::format(
-          "Use case {}; scene {} (id {}). {} repeats of {} frames at each of {} poses under {} lightings, {} "
+          "Use case {}; scene {} (id {}). {} of {} at {}{} under {}, {} "
           "paths per pixel, "
           "at most {} surfaces, footprint {:.6g} pixels, seed {}. Room {:.6g} °C, on for {:.6g} s.",
           suit.use.file.filename().string(), suit.use.scene_file.filename().string(), suit.scene_id,
-          spec.repeats, spec.frames, spec.poses.size(), spec.lightings.size(), spec.samples_per_pixel,
+          counted(spec.repeats, "repeat"), counted(spec.frames, "frame"), spec.poses.size() == 1 ? "" : "each of ",
+          counted(spec.poses.size(), "pose"), counted(spec.lightings.size(), "lighting"), spec.samples_per_pixel,
           spec.max_surfaces, spec.pixel_extent, spec.seed, spec.room_temperature.in(celsius),
           spec.powered_on_before.in(second))});
   TableBlock models{.caption = "Camera models", .header = {"camera", "model", "id"}};
@@ -352,12 +354,12 @@ std::string inWords(const Suit& suit) {
   }
   const std::size_t all = suit.cameras.size();
   if (count > 0)
-    return fmt::format("{} of {} cameras {} what is asked, best first: {}.", count, all,
-                       count == 1 ? "does" : "do", fit);
+    return fmt::format("{} of {} {} what is asked{}: {}.", count, counted(all, "camera"), count == 1 ? "does" : "do",
+                       count == 1 ? "" : ", best first", fit);
   const CameraResult& best = suit.cameras.front();
   const std::string failed = failedOf(suit.use, best);
-  return fmt::format("None of {} camera{} does all that is asked. {} comes nearest: it {}{}{}.", all,
-                     all == 1 ? "" : "s", best.name, stateOf(best), failed.empty() ? "" : ": ", failed);
+  return fmt::format("None of {} does all that is asked. {} comes nearest: it {}{}{}.",
+                     counted(all, "camera"), best.name, stateOf(best), failed.empty() ? "" : ": ", failed);
 }
 
 Result<std::filesystem::path> writeSuit(const Suit& suit, const std::filesystem::path& folder,

@@ -33,7 +33,7 @@ TEST(Ranking, SaysThatWhatIsMetIsNotCertain) {
                                   "[[require]]\nname = 'whole'\nkind = 'valid'\nat_least_percent = 100\n" +
                                   entry("ideal.toml"));
   ASSERT_TRUE(suit) << suit.error().message;
-  EXPECT_EQ(inWords(*suit), "1 of 1 cameras does what is asked, best first: ideal.toml (1 of 2 not certain).");
+  EXPECT_EQ(inWords(*suit), "1 of 1 camera does what is asked: ideal.toml (1 of 2 not certain).");
 }
 
 /// Four cameras that differ in two things: a sixteenth of the light is √16 times the shot noise, in the dark;

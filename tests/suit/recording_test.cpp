@@ -2,7 +2,9 @@
 // A recording in the place of a simulated camera.
 #include "protocol/record/recording.h"
 
+#include <fstream>
 #include <random>
+#include <sstream>
 
 #include "cases.h"
 #include "sim/sensor/sensor_model.h"
@@ -117,6 +119,21 @@ TEST(Recording, LeavesOpenWhatItMetAtSomePosesOnly) {
   EXPECT_FALSE(camera.requirements[1].is_judged);
   EXPECT_THAT(camera.requirements[1].why_not, HasSubstr("1 of 2 conditions"));
   EXPECT_FALSE(camera.isFit());
+  EXPECT_THAT(camera.notes, testing::Each(testing::Not(HasSubstr("is it the scene"))));
+  ASSERT_TRUE(writeSuit(*suit, folder.path() / "out", ""));
+  std::stringstream text;
+  text << std::ifstream{folder.path() / "out" / "report.md"}.rdbuf();
+  EXPECT_THAT(text.str(), HasSubstr("| noise | not known | – | – | – | met where it was recorded, at 1 of 2 conditions |"));
+}
+
+/// Ranges of half a metre nearer to the wall, taken for those of this pose.
+TEST(Recording, OfAnotherSceneSaysSo) {
+  const Folder folder;
+  record(folder, 8, std::nullopt);
+  const auto far = folder.judged("[[pose]]\nname = 'other'\nposition_m = [0, 0, -0.5]\n" + kCase + "pose = 'other'\n");
+  ASSERT_TRUE(far) << far.error().message;
+  EXPECT_THAT(far->cameras.front().notes,
+              testing::ElementsAre(HasSubstr("at \"other\" 100 % of its valid pixels are over 300 mm from what")));
 }
 
 TEST(Recording, ThatIsNotThereIsNamedWithItsPlace) {
