@@ -97,7 +97,7 @@ double ImageCover::share() const {
   return static_cast<double>(std::ranges::count(cells_, true)) / static_cast<double>(cells_.size());
 }
 
-std::vector<std::string> ImageCover::missing() const {
+std::vector<std::string> ImageCover::missing(double least) const {
   constexpr const char* kNames[] = {"top left", "top",         "top right", "left",        "centre",
                                     "right",    "bottom left", "bottom",    "bottom right"};
   std::array<int, 9> covered{}, all{};
@@ -110,7 +110,7 @@ std::vector<std::string> ImageCover::missing() const {
   }
   std::vector<std::string> names;
   for (std::size_t part = 0; part < 9; ++part) {
-    if (2 * covered[part] < all[part]) names.emplace_back(kNames[part]);
+    if (covered[part] < least * all[part]) names.emplace_back(kNames[part]);
   }
   return names;
 }
@@ -130,8 +130,10 @@ Guidance guide(const Target& target, const std::vector<Sighting>& sightings, Ima
   if (const auto parts = cover.missing(); !parts.empty()) {
     guidance.missing.push_back("show the board in these parts of the image: " + listed(parts));
   } else if (guidance.covered < goals.covered) {
-    guidance.missing.push_back(fmt::format("go closer to the image's edges: {} % of it are covered, {:.0f} % "
-                                           "are wanted",
+    // One of nine parts at least has less than the mean that is wanted.
+    guidance.missing.push_back(fmt::format("go closer to the image's edge at its {}: {} % of the image are covered, "
+                                           "{:.0f} % are wanted",
+                                           fmt::join(cover.missing(goals.covered), ", "),
                                            wholePercent(guidance.covered), 100.0 * goals.covered));
   }
   if (guidance.views > 0) guideStance(guidance, stanceOf(target, sightings, size, estimate, goals), goals);

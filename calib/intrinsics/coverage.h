@@ -21,8 +21,8 @@ class ImageCover {
   [[nodiscard]] bool isCovered(int column, int row) const { return cells_[index(column, row)]; }
   [[nodiscard]] Pixel centre(int column, int row) const;
   [[nodiscard]] double share() const;  ///< of the image, 0 … 1
-  /// Those of nine parts of the image of which less than half is covered: "top left", "centre", …
-  [[nodiscard]] std::vector<std::string> missing() const;
+  /// Those of nine parts of the image of which less than such a share is covered: "top left", "centre", …
+  [[nodiscard]] std::vector<std::string> missing(double least = 0.5) const;
   /// left, top, right, bottom of all corners.
   [[nodiscard]] std::array<double, 4> box() const { return box_; }
 

@@ -20,6 +20,7 @@ struct ModelScore {
   int degree = 0;  ///< of the board's surface
   double fitted_rms_px = 0.0;
   double held_out_rms_px = 0.0;
+  LensParameters lens{};                   ///< fitted to all views
   std::vector<double> held_out_by_view{};  ///< mean square of each view, px²; its pose is fitted, the lens is not
 };
 /// Relative gain of `richer` over `simpler` on held-out views: mean over views of ln(rms / rms'), with its

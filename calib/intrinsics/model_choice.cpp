@@ -58,7 +58,7 @@ Bundle refitted(std::vector<Observed>& views, Bundle bundle, LensModel model) {
 
 ModelScore scoreOf(std::vector<Observed> views, const Bundle& start, LensModel model, int wanted_folds) {
   const Bundle full = refitted(views, start, model);
-  ModelScore result{.model = model, .degree = full.surface.degree()};
+  ModelScore result{.model = model, .degree = full.surface.degree(), .lens = full.lens};
   result.held_out_by_view.resize(views.size());
   std::vector<double> fitted(views.size());
   for (std::size_t v = 0; v < views.size(); ++v) {

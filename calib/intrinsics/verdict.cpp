@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/intrinsics/verdict.h"
+#include "protocol/types/counted.h"
 
 #include <fmt/format.h>
 
@@ -80,6 +81,34 @@ void warnOfModel(const Calibrated& calibrated, std::vector<std::string>& warning
   }
 }
 
+/// Intervals are right if the lens has the terms of its model and no others. A term that held-out views ask for, but
+/// not surely enough to be taken, may be there all the same; it counts where it moves a number out of its interval.
+void warnOfTermsLeftOut(const Calibrated& calibrated, std::vector<std::string>& warnings) {
+  const Estimate& estimate = calibrated.estimate;
+  const ModelScore* used = estimate.scoreOf(estimate.bundle.model);
+  if (used == nullptr) return;
+  for (const ModelScore& richer : estimate.scores) {
+    if (richer.model <= used->model || richer.model == LensModel::Rational) continue;
+    const Gain gain = gainOf(*used, richer);
+    if (gain.isReal() || !(gain.mean > gain.error)) continue;
+    std::size_t farthest = 0;
+    double most = 0.0;
+    for (std::size_t i = 0; i < parametersOf(used->model); ++i) {
+      const double half = estimate.uncertainty.half_width[static_cast<Eigen::Index>(i)];
+      const double off = std::abs(richer.lens[i] - estimate.bundle.lens[i]) / half;
+      if (off > most) most = off, farthest = i;
+    }
+    if (!(most > 1.0)) continue;
+    warnings.push_back(fmt::format(
+        "the intervals are those of {}: {} may do better on views it has not seen ({:+.1f} % ± {:.1f}), and with it {} "
+        "is {:.{}f}, {:.1f} half-widths away; more views, up to the edges of the image, tell whether its terms are there "
+        "(--model {} takes them)",
+        nameOf(used->model), nameOf(richer.model), 100.0 * gain.mean, 100.0 * gain.error, kParameterNames[farthest],
+        richer.lens[farthest], farthest < 4 ? 2 : 5, most, nameOf(richer.model)));
+    return;
+  }
+}
+
 /// Rays that do not come back to their pixel: the distortion folds within the image.
 void warnOfFold(const Calibrated& calibrated, std::vector<std::string>& warnings) {
   const CameraInfo camera = calibration::cameraOf(fileOf(calibrated, "").lens);
@@ -102,8 +131,8 @@ void warnOfViews(const Calibrated& calibrated, std::vector<std::string>& warning
   const Estimate& estimate = calibrated.estimate;
   constexpr std::size_t kGood = 10;
   if (estimate.used.size() < kGood) {
-    warnings.push_back(fmt::format("only {} views: held-out errors and intervals are rough below {}",
-                                   estimate.used.size(), kGood));
+    warnings.push_back(fmt::format("only {}: held-out errors and intervals are rough below {}",
+                                   counted(estimate.used.size(), "view"), kGood));
   }
   if (estimate.uncertainty.clustering > kClustered) {
     warnings.push_back(fmt::format(
@@ -173,6 +202,7 @@ std::string viewTable(const Calibrated& calibrated) {
 std::vector<std::string> warningsOf(const Calibrated& calibrated) {
   std::vector<std::string> warnings;
   warnOfModel(calibrated, warnings);
+  warnOfTermsLeftOut(calibrated, warnings);
   warnOfFold(calibrated, warnings);
   warnOfExtrapolation(calibrated, warnings);
   warnOfViews(calibrated, warnings);
@@ -185,8 +215,9 @@ std::string describe(const Calibrated& calibrated) {
   for (const Observed& view : estimate.views) corners += view.corners.size();
   for (const std::size_t one : estimate.dropped) dropped += one;
   const ModelScore* score = estimate.scoreOf(estimate.bundle.model);
-  std::string text = fmt::format("{} of {} views used, {} corners ({} left out)\n{}\n", estimate.used.size(),
-                                 calibrated.sightings.size(), corners, dropped, viewTable(calibrated));
+  std::string text = fmt::format("{} of {} used, {} ({} left out)\n{}\n", estimate.used.size(),
+                                 counted(calibrated.sightings.size(), "view"), counted(corners, "corner"), dropped,
+                                 viewTable(calibrated));
   text += surfaceTable(estimate) + modelTable(estimate) + "\n" + parameterTable(estimate);
   text += fmt::format("\nreprojection {:.4f} px RMS", estimate.rms_px_all);
   if (score != nullptr) text += fmt::format(", {:.4f} px on held-out views", score->held_out_rms_px);

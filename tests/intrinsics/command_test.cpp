@@ -172,6 +172,22 @@ TEST_F(HeldBoard, IsCalibratedFromLive) {
   expectTheLens(folder_ / "camera.toml");
 }
 
+/// For three seconds at one place.
+class HeldTooLong : public cli::WithDaemon {
+ protected:
+  std::string moreSources() const override {
+    writeRecording(folder_ / "held.mcap", easyShots(1), 30);
+    return "[[source]]\nname = 'cam'\ndriver = 'replay'\nfile = 'held.mcap'\n";
+  }
+};
+
+TEST_F(HeldTooLong, IsToldWhyNoMoreViewsAreTaken) {
+  const Ran ran = run("calibrate --source cam" + kBoard + "--no-store -o " + quoted(folder_ / "camera.toml"));
+  EXPECT_EQ(ran.status, 4);
+  EXPECT_THAT(ran.err, HasSubstr("1 view, "));
+  EXPECT_THAT(ran.err, HasSubstr("not taken: it is like a view that was taken; move it, or tilt it by 20 degrees\n"));
+}
+
 class CalibratedTwin : public cli::WithDaemon {
  protected:
   std::string moreSources() const override {

@@ -18,6 +18,7 @@
 #include "tools/cli/export/atomic_file.h"
 #include "tools/cli/options.h"
 #include "tools/cli/terminal.h"
+#include "protocol/types/counted.h"
 
 namespace toftwin::cli {
 namespace calibrate_command {
@@ -181,7 +182,7 @@ Result<Exit> run(const Options& options) {
   if (!collected) return collected.error();
 
   Calibrated calibrated{.target = *target, .size = collector.size(), .sightings = collector.sightings()};
-  calibrated.camera = options.live.source.empty() ? fmt::format("{} images", calibrated.sightings.size())
+  calibrated.camera = options.live.source.empty() ? counted(calibrated.sightings.size(), "image")
                                                   : options.live.source;
   if (auto counted = checkCounts(calibrated.sightings, *target); !counted) return counted.error();
   EstimateOptions how{.model = modelFrom(options.model)};

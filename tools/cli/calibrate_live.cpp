@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <optional>
 
 #include "calib/intrinsics/brightness.h"
@@ -26,14 +27,42 @@ class Prompter {
     sayOnce(text);
   }
   void sayOnce(const std::string& text) {
+    why_said_.clear();
     if (text == said_) return;
     fmt::print(stderr, "{}", text);
     said_ = text;
   }
+  /// Why what is there now is not taken: when it has been so for a while, as a board that is brought elsewhere is
+  /// blurred, moving and out of the image on its way.
+  void whyNot(const std::string& why) {
+    constexpr std::chrono::seconds kWhile{1};
+    const auto now = std::chrono::steady_clock::now();
+    if (why != why_) why_ = why, since_ = now;
+    if (why == why_said_ || now - since_ < kWhile) return;
+    fmt::print(stderr, "  not taken: {}\n", why);
+    why_said_ = why;
+  }
 
  private:
-  std::string said_;
+  std::string said_, why_, why_said_;
+  std::chrono::steady_clock::time_point since_{};
 };
+
+/// In words that stay the same from frame to frame.
+std::string whyNot(const Sighting& sighting) {
+  switch (sighting.rejection) {
+    case Rejection::None: return "it moves; hold it still";
+    case Rejection::NotFound:
+      return sighting.has_more ? "the board has more corners than --board says" : "no board is seen: show all of it";
+    case Rejection::CornerOutliers: return "corners are covered, cut off or blurred by motion";
+    case Rejection::Blurred: return "it is blurred; hold it still, or farther away";
+    case Rejection::TooOblique: return "it is tilted by 75 degrees or more";
+    case Rejection::TooSmall: return "it is too small in the image; bring it nearer";
+    case Rejection::LikeAnother: return "it is like a view that was taken; move it, or tilt it by 20 degrees";
+    case Rejection::ReprojectionOutlier: break;  // of a lens, which is not known yet
+  }
+  return "";
+}
 
 /// The views so far as a lens, once there are a few; nothing while they do not tell it.
 std::optional<Estimate> soFar(const Collector& collector) {
@@ -98,10 +127,13 @@ Result<> collectLive(const DaemonOptions& daemon, const LiveOptions& live, intri
     if (!sighting.isUsed()) misses = how.is_thorough ? 0 : misses + 1;
     // Two frames that agree: the board is held still, so the exposures of one frame agree as well.
     const bool is_still = before && sighting.isUsed() && movedBy(*before, sighting) < live.still_px;
-    before = sighting.isUsed() ? std::optional{sighting} : std::nullopt;
+    const bool is_alike = is_still && collector.isLikeAnother(sighting);
+    if (is_alike) sighting.rejection = Rejection::LikeAnother;
+    if (!is_still || is_alike) prompter.whyNot(live_calibration::whyNot(sighting));
+    before = sighting.isUsed() || is_alike ? std::optional{sighting} : std::nullopt;
     if (!is_still) continue;  // a board that took the thorough search is looked for so once more
     misses = 0;
-    if (collector.isLikeAnother(sighting)) continue;
+    if (is_alike) continue;
     const ImageSize size{image.brightness.width(), image.brightness.height()};
     if (auto added = collector.add(std::move(sighting), size); !added) return added;
     on_view(image);
