@@ -3,8 +3,8 @@
 // chosen difficulty λ, with the catalogue knowing it and without, and campaigns with nothing hidden.
 //
 //   discover_campaign_bench [--cases a,b] [--seeds 1:5] [--lambda 150,600,3000] [--absent no|yes|both]
-//                           [--null plain,noise,pose,tails,bump] [--threads 1] [--large] [--scores] [--samples]
-//                           [--light] [--bump]
+//                           [--null plain,noise,pose,tails,bump,bumps] [--threads 1] [--large] [--scores] [--samples]
+//                           [--light] [--bump] [--bump-locked]
 //   discover_campaign_bench --table FILE...
 //   discover_campaign_bench --references FOLDER...     (each as tests/reference_device/reference_campaign
 //   leaves it)
@@ -15,7 +15,8 @@
 // what explains most by itself and fitted numbers beside the hidden ones, as lines that begin with #. --samples:
 // raw exposures are recorded, too. --light: as toftwind simulates a
 // camera: on a perfect rig, light over four surfaces by 64 paths a pixel, one for each place, whose noise frames state.
-// --bump: beside what is hidden, one capture was taken ten times as far off its pose as the others.
+// --bump: beside what is hidden, one capture was taken ten times as far off its pose as the others; --bump-locked: a
+// locked one. The null bumps: two captures.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <tbb/global_control.h>
@@ -57,7 +58,8 @@ struct Options {
   std::vector<double> lambdas{600.0};
   std::uint64_t first_seed = 1, last_seed = 1;
   std::size_t threads = 0;
-  bool present = true, absent = false, large = false, scores = false, samples = false, light = false, bump = false;
+  bool present = true, absent = false, large = false, scores = false, samples = false, light = false, bump = false,
+       bump_locked = false;
   std::vector<std::string> cases{}, nulls{};
   std::vector<std::filesystem::path> tables{}, references{};
 };
@@ -130,6 +132,14 @@ struct Setting {
   Declared declared{orEnd(sim::SensorModel::parse(camera, "camera.toml")), scene};
 };
 
+/// The number of a locked capture.
+int lockedOf(const plan::Plan& plan, std::uint64_t seed) {
+  std::vector<int> locked;
+  for (const plan::PlannedCapture& one : orEnd(plan::scheduleOf(plan)).captures)
+    if (one.is_locked) locked.push_back(static_cast<int>(one.number));
+  return locked.at(seed % locked.size());
+}
+
 void simulate(const Setting& world, const sim::SensorModel& camera, std::uint64_t seed, const Options& options,
               const std::string& null = {}) {
   std::filesystem::remove_all(folder());
@@ -140,7 +150,9 @@ void simulate(const Setting& world, const sim::SensorModel& camera, std::uint64_
     run.shared_paths = 64, run.max_surfaces = kSurfacesOfLight;
     run.pose_error_m = run.pose_error_deg = run.light_error = 0.0;
   }
-  if (null == "bump" || options.bump) run.bumped = 5 + static_cast<int>(seed % 20);
+  if (null == "bump" || null == "bumps" || options.bump) run.bumped = {5 + static_cast<int>(seed % 20)};
+  if (null == "bumps") run.bumped.push_back(25 + static_cast<int>(seed % 19));
+  if (options.bump_locked) run.bumped.push_back(lockedOf(world.plan, seed));
   if (null == "noise" || null == "tails") {
     run.spoil = [null, seed](sim::RangeImage& image, const Moment& moment, const CameraInfo&, std::uint64_t k) {
       const auto at = static_cast<std::uint64_t>(moment.since_power_on->in(second) * 1e3);
@@ -180,13 +192,20 @@ void report(const Options& options, const bench::Score& score, const CampaignFin
     const Judgement& judged = *finding.judgement;
     fmt::print(
         "# judged: χ² per row {:.4f} before, {:.4f} with the delay, {:.4f} after, noise {:.4f}; explainable "
-        "{:.1f}; {} cells\n",
+        "{:.1f}; {} cells; gained {:.1f}\n",
         judged.before.per_row, judged.with_zero.per_row, judged.after.per_row, judged.noise,
-        judged.explainable, judged.cells);
+        judged.explainable, judged.cells, judged.gained);
   }
-  if (finding.off)
-    fmt::print("# {} stood {:.1f} mm and {:.2f}° off{}\n", finding.off->name, finding.off->shift_mm,
-               finding.off->turn_deg, finding.off->is_set_aside ? ": set aside" : "");
+  for (const StoodOff& one : finding.off)
+    fmt::print("# {} stood {:.1f} mm and {:.2f}° off{}\n", one.name, one.shift_mm, one.turn_deg,
+               one.is_set_aside ? ": set aside" : "");
+  for (const StoodOff& one : finding.locked_off)
+    fmt::print("# locked: {} stood {:.1f} mm and {:.2f}° off; without it, removed: {:.4f} ({:.4f} to {:.4f})\n",
+               one.name, one.shift_mm, one.turn_deg, finding.without_off ? finding.without_off->removed : kNaN,
+               finding.without_off ? finding.without_off->removed_low : kNaN,
+               finding.without_off ? finding.without_off->removed_high : kNaN);
+  for (const std::string& note : options.scores ? finding.notes : std::vector<std::string>{})
+    fmt::print("# {}\n", note);
   if (options.scores) fmt::print("# scales {:.3g}\n", fmt::join(finding.finding.scales, ", "));
   for (const SeenGroup& one : seenFirst(finding, options.scores ? 10 : 0))
     fmt::print("# {}: z {:.1f}, T {:.1f} of {}\n", one.name, one.z, one.statistic, one.rank);
@@ -270,8 +289,8 @@ std::vector<std::string> partsOf(const std::string& list) {
 [[noreturn]] void endWithUsage(const std::string& word) {
   fmt::print(stderr,
              "discover_campaign_bench: {} is not understood; it takes --cases a,b, --seeds 1:5, --lambda 150,600, "
-             "--absent no|yes|both, --null plain,noise,pose,tails,bump, --threads N, --large, --scores, --samples, "
-             "--light, --bump, or "
+             "--absent no|yes|both, --null plain,noise,pose,tails,bump,bumps, --threads N, --large, --scores, "
+             "--samples, --light, --bump, --bump-locked, or "
              "--table FILE... or --references FOLDER...\n",
              word);
   std::exit(2);
@@ -314,6 +333,8 @@ Options optionsOf(int argc, char** argv) {
       options.light = true;
     } else if (word == "--bump") {
       options.bump = true;
+    } else if (word == "--bump-locked") {
+      options.bump_locked = true;
     } else if (word == "--references") {
       while (i + 1 < argc) options.references.emplace_back(argv[++i]);
     } else if (word == "--table") {

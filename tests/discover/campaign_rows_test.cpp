@@ -304,6 +304,12 @@ TEST_F(Rows, HowStrongAPatternIsOtherPlacesSay) {
   EXPECT_NEAR(with.coefficient[last], 1.0, 4.0 * error);
 }
 
+TEST(PixelPattern, IsKnownAsFarAsItsPixelsStandOutOfNoise) {
+  const PixelPattern pattern{.deviation = 2.0, .weight = {1.0, 0.25}};  // four times its noise's variance, and once
+  EXPECT_DOUBLE_EQ(pattern.knownShare(), (0.8 + 0.25 * 0.5) / 1.25);
+  EXPECT_DOUBLE_EQ(pattern.knownShare(4.0), (16.0 / 17.0 + 0.25 * 0.8) / 1.25);
+}
+
 TEST_F(Rows, APatternGoesIntoTheModelAsStrongAsItWasFitted) {
   const Made made =
       make("[[effect]]\ntype = 'fixed_pattern_phase'\nsigma_rad = 0.01\ndevice = 4711\n", tinyCamera());

@@ -374,6 +374,18 @@ TEST_F(Searched, WhatDoesWorseOnLockedCapturesIsNotWritten) {
   EXPECT_EQ(model->effectNames(), declared->effectNames());
 }
 
+/// So faint that it does not stand out of the noise of all pixels, and larger cells show nothing of it: a 24th of what
+/// is gained, ± 4, which is as good as nothing.
+TEST_F(Searched, AFaintPatternOfPixelsIsBetterOnLockedCaptures) {
+  const CampaignFinding finding = searchWithout("fixed_pattern_phase", "sigma_rad = 0.0005\ndevice = 4711");
+  ASSERT_EQ(finding.effects.size(), 1U) << verdictOf(finding);
+  ASSERT_TRUE(finding.judgement);
+  EXPECT_GT(finding.judgement->gained, 50.0);
+  EXPECT_GE(finding.judgement->cells, 384);
+  EXPECT_FALSE(finding.is_worse);
+  EXPECT_THAT(finding.notes, testing::Contains(HasSubstr("each pixel tells its own value alone")));
+}
+
 TEST_F(Searched, SaysWhatIsMissingOrWrong) {
   CampaignJob other = job();
   EXPECT_THAT(errorOf(other), HasSubstr("the folder of a run of `toftwin measure`?"));

@@ -82,7 +82,7 @@ class Searched : public testing::Test {
   }
   std::filesystem::path folder_;
   bool with_samples_ = false;  ///< raw exposures are recorded, too
-  int bumped_ = -1;            ///< SimulatedRun::bumped
+  std::vector<int> bumped_{};  ///< SimulatedRun::bumped
   int shared_paths_ = 0;       ///< SimulatedRun::shared_paths; the rig is then perfect, as a simulated one
   [[nodiscard]] int surfaces() const { return shared_paths_ > 0 ? 4 : 1; }
 };

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <fstream>
@@ -75,7 +76,8 @@ plan::RecordedFile capture(const SimulatedRun& run, const plan::PlannedCapture& 
   const auto other = run.scene_of_block.find(block);
   sim::TraceRequest request = camera.traceRequest();
   const auto pose = planned.pose->world_from_camera();
-  request.world_from_camera = bumped(pose, run, static_cast<int>(planned.number) == run.bumped ? 10.0 : 1.0, engine);
+  const bool is_bumped = std::ranges::find(run.bumped, static_cast<int>(planned.number)) != run.bumped.end();
+  request.world_from_camera = bumped(pose, run, is_bumped ? 10.0 : 1.0, engine);
   request.samples_per_pixel = 128;
   request.max_surfaces = run.max_surfaces;
   request.seed = engine();

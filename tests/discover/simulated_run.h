@@ -6,6 +6,7 @@
 #include <functional>
 #include <map>
 #include <string>
+#include <vector>
 
 #include "calib/plan/plan.h"
 #include "sim/sensor/sensor_model.h"
@@ -26,7 +27,7 @@ struct SimulatedRun {
   std::function<void(sim::RangeImage&, const Moment&, const CameraInfo&, std::uint64_t frame)> spoil{};
   bool with_poses = true;
   int max_surfaces = 1;  ///< of the light that the camera sees
-  int bumped = -1;  ///< the capture of this number stood ten times as far off as the others
+  std::vector<int> bumped{};  ///< captures of these numbers stood ten times as far off as the others
   int frames = 0;  ///< of each capture; 0: the plan's
   bool with_samples = false;  ///< raw exposures, too
   /// As the simulator of toftwind does it: light is traced by so many paths a pixel, which tiles share, once for each

@@ -20,6 +20,27 @@ Json toJson(const RangeErrors& errors) {
   return json;
 }
 
+Json toJson(const std::vector<StoodOff>& off) {
+  Json all = Json::array();
+  for (const StoodOff& place : off) {
+    Json one = Json::object();
+    one.set("capture", place.number).set("name", place.name).set("captures_there", place.captures.size());
+    one.set("shift_mm", place.shift_mm).set("turn_deg", place.turn_deg).set("is_set_aside", place.is_set_aside);
+    all.push(std::move(one));
+  }
+  return all;
+}
+
+Json toJson(const Judgement& judged) {
+  Json locked = Json::object();
+  locked.set("before", toJson(judged.before)).set("after", toJson(judged.after));
+  locked.set("with_zero", toJson(judged.with_zero)).set("removed_by_zero", judged.removed_by_zero);
+  locked.set("removed", judged.removed).set("removed_low", judged.removed_low);
+  locked.set("removed_high", judged.removed_high).set("explainable_chi2", judged.explainable);
+  locked.set("cells", judged.cells).set("noise_chi2_per_row", judged.noise).set("gained_chi2", judged.gained);
+  return locked;
+}
+
 Json toJson(const FoundEffect& one) {
   Json json = Json::object(), numbers = Json::array();
   json.set("name", one.found.name).set("kind", one.found.is_catalogue ? "catalogue" : "undeclared");
@@ -84,20 +105,12 @@ Json jsonOf(const CampaignJob& job, const CampaignFinding& finding) {
   data.set("scales", Json::arrayOf(finding.finding.scales)).set("chi2_per_row", finding.dispersion);
   for (const FoundEffect& one : finding.effects) effects.push(toJson(one));
   for (const FittedEffect& one : finding.updates) updates.push(nameOf(one.effect));
-  if (const auto& off = finding.off) {
-    Json one = Json::object();
-    one.set("capture", off->number).set("name", off->name).set("captures_there", off->captures.size());
-    one.set("shift_mm", off->shift_mm).set("turn_deg", off->turn_deg).set("is_set_aside", off->is_set_aside);
-    data.set("off_its_pose", std::move(one));
-  }
+  if (!finding.off.empty()) data.set("off_their_poses", toJson(finding.off));
   data.set("effects", std::move(effects)).set("parameter_updates", std::move(updates));
   if (const auto& judged = finding.judgement) {
-    Json locked = Json::object();
-    locked.set("before", toJson(judged->before)).set("after", toJson(judged->after));
-    locked.set("with_zero", toJson(judged->with_zero)).set("removed_by_zero", judged->removed_by_zero);
-    locked.set("removed", judged->removed).set("removed_low", judged->removed_low);
-    locked.set("removed_high", judged->removed_high).set("explainable_chi2", judged->explainable);
-    locked.set("cells", judged->cells).set("noise_chi2_per_row", judged->noise);
+    Json locked = toJson(*judged);
+    if (!finding.locked_off.empty()) locked.set("off_their_poses", toJson(finding.locked_off));
+    if (finding.without_off) locked.set("without_these", toJson(*finding.without_off));
     data.set("locked_captures", std::move(locked));
   }
   data.set("notes", Json::arrayOf(finding.notes)).set("seconds", finding.seconds);

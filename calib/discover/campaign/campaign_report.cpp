@@ -314,8 +314,11 @@ std::string foundInWords(const CampaignFinding& finding) {
 }  // namespace
 
 std::string verdictOf(const CampaignFinding& finding) {
-  if (!finding.off || !finding.off->is_set_aside) return foundInWords(finding);
-  return foundInWords(finding) + ". Set aside: " + finding.off->inWords();
+  std::vector<std::string> words;
+  for (const StoodOff& one : finding.off)
+    if (one.is_set_aside) words.push_back(one.inWords());
+  const std::string verdict = foundInWords(finding);
+  return words.empty() ? verdict : fmt::format("{}. Set aside: {}", verdict, fmt::join(words, "; "));
 }
 
 Result<std::filesystem::path> writeReport(const CampaignJob& job, const CampaignFinding& finding) {

@@ -13,6 +13,7 @@
 #include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/found_model.h"
 #include "calib/discover/campaign/light_noise.h"
+#include "calib/discover/campaign/locked_places.h"
 #include "calib/discover/campaign/model_file.h"
 #include "calib/discover/campaign/next_capture.h"
 #include "calib/discover/campaign/reading.h"
@@ -110,6 +111,22 @@ Result<JudgedModel> fileWith(const JudgedCampaign& judged, double delay_mm) {
   return model;
 }
 
+/// What the judgement is without locked captures that stood off their poses, where others are left.
+Result<> tellLockedOff(const JudgedCampaign& locked, const JudgedCampaign& open, const JudgedModels& models,
+                       CampaignFinding& finding) {
+  std::size_t gone = 0;
+  for (const StoodOff& one : finding.locked_off) gone += one.captures.size();
+  if (gone == 0) return {};
+  if (gone < locked.lit.captures.size()) {
+    auto without = judgeWithout(finding.locked_off, locked, open, models);
+    if (!without) return without.error();
+    finding.without_off = *std::move(without);
+  }
+  finding.notes.push_back(noteOf(finding.locked_off, *finding.judgement,
+                                 finding.without_off ? &*finding.without_off : nullptr));
+  return {};
+}
+
 Result<> judgeLocked(const CampaignJob& job, const Campaign& campaign, const JudgedCampaign& searched,
                      const JudgedModels& models, CampaignFinding& finding) {
   const Declared& declared = searched.declared;
@@ -126,10 +143,14 @@ Result<> judgeLocked(const CampaignJob& job, const Campaign& campaign, const Jud
   const auto traced = traceWhereTheyStood(declared, models.after.effects, *captures, *at_poses, options);
   if (!traced) return traced.error();
   const Lit lit{*captures, *traced, *at_poses};
-  auto judgement = judge({declared, lit, finding.finding.scales}, searched, models);
+  const JudgedCampaign locked{declared, lit, finding.finding.scales};
+  auto judgement = judge(locked, searched, models);
   if (!judgement) return judgement.error();
   finding.judgement = *std::move(judgement);
-  return {};
+  auto off = lockedOff(locked, searched, models.after.effects);
+  if (!off) return off.error();
+  finding.locked_off = *std::move(off);
+  return tellLockedOff(locked, searched, models, finding);
 }
 
 /// Captures of one place err alike, which neither their signs nor their dispersions show: what their rows state counts.
@@ -168,11 +189,41 @@ void noteMissingRawExposures(const sim::SensorModel& model, CampaignFinding& fin
         "name is wrong. A camera that gives them is measured with toftwin measure … --planes samples.");
 }
 
+std::vector<const PixelPattern*> patternsIn(const FoundEffect& one, const CampaignRows& rows) {
+  std::vector<const PixelPattern*> patterns;
+  if (one.found.is_catalogue) return patterns;
+  for (const Term& term : termsOf(one.found))
+    if (const PixelPattern* pattern = rows.patternOf(term.carrier)) patterns.push_back(pattern);
+  return patterns;
+}
+
+/// A pattern of pixels is known as well as each pixel's own noise lets it be: what stays is not the form's fault.
+void notePatterns(const CampaignRows& rows, CampaignFinding& finding) {
+  constexpr double kNearlyAll = 0.9, kTimes = 4.0;
+  for (const FoundEffect& one : finding.effects) {
+    for (const PixelPattern* pattern : patternsIn(one, rows)) {
+      if (pattern->knownShare() > kNearlyAll) continue;
+      finding.notes.push_back(fmt::format(
+          "{}: each pixel tells its own value alone, so that of its χ² these captures can remove {:.0f} %; {:.0f} times "
+          "as many, at other places, {:.0f} %.",
+          one.found.name, 100.0 * pattern->knownShare(), kTimes, 100.0 * pattern->knownShare(kTimes)));
+    }
+  }
+}
+
+double fittedShareOf(const Round& round, const std::vector<FoundEffect>& effects) {
+  double freedom = 0.0;
+  for (const FoundEffect& one : effects)
+    for (const PixelPattern* pattern : patternsIn(one, *round.rows)) freedom += pattern->freedom();
+  return std::min(0.5, freedom / std::max(1.0, round.refitted.marginal.rows));
+}
+
 /// What does worse on captures that it was not fitted to does not go into the model, whatever it is called.
 /// What single frames show stays: these captures do not judge it.
 void keepIfWorse(const std::string& text, const Declared& declared, CampaignFinding& finding) {
   if (!finding.judgement) return;
-  finding.is_worse = finding.judgement->after.per_row > finding.judgement->before.per_row;
+  // Where one was bumped, what it says is of its pose.
+  finding.is_worse = (finding.without_off ? *finding.without_off : *finding.judgement).gained < 0.0;
   if (!finding.is_worse) return;
   CampaignFinding kept{.plan = finding.plan,
                        .captures = finding.captures,
@@ -244,11 +295,12 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
   Round& round = *searched_for->round;
   const SomeCaptures* some = searched_for->without.get();
   finding.off = searched_for->off;
-  if (finding.off) finding.notes.push_back(noteOf(*finding.off));
+  for (const StoodOff& one : finding.off) finding.notes.push_back(noteOf(one));
   declared.delay_mm = round.declared.delay_mm;
   const Lit lit{some != nullptr ? some->captures : campaign->captures, round.traced,
                 some != nullptr ? some->at_poses : *at_poses};
   takeFound(round, finding);
+  notePatterns(*round.rows, finding);
   noteMissingRawExposures(declared.model, finding);
   addNextCaptures({round.declared, lit, finding.finding.scales}, *round.rows, finding.effects);
   if (steps) addSteps(job, declared.model, *steps, finding);
@@ -263,7 +315,8 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
     const auto with_zero = fileWith(searched, finding.zero.delay_mm);
     if (!with_zero) return with_zero.error();
     const JudgedModel after{withDelay(declared.model, round.refitted.effects, beyond.delay_mm),
-                            beyond.hasOffset() ? beyond.offset_mm : 0.0, beyond.gain_percent};
+                            beyond.hasOffset() ? beyond.offset_mm : 0.0, beyond.gain_percent,
+                            fittedShareOf(round, finding.effects)};
     if (auto done = judgeLocked(job, *campaign, searched, {*before, *with_zero, after}, finding); !done)
       return done.error();
     keepIfWorse(files->text, declared, finding);

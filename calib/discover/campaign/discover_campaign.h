@@ -88,9 +88,11 @@ struct CampaignFinding {
   std::vector<FoundEffect> effects{};
   std::vector<FittedEffect> updates{};  ///< declared effects whose numbers were wrong
   Zero zero{};  ///< with what was found; its delay whole
-  std::optional<StoodOff> off{};  ///< none: no place is off by more than chance
+  std::vector<StoodOff> off{};  ///< places that are off by more than chance
   double dispersion = 1.0;
   std::optional<Judgement> judgement{};  ///< on the locked captures
+  std::vector<StoodOff> locked_off{};    ///< of these, places that are off by more than any open one
+  std::optional<Judgement> without_off{};  ///< the judgement without them
   std::string model_toml{};
   bool is_worse = false;  ///< on the locked captures: model_toml is the camera file as it was
   std::vector<std::string> notes{};

@@ -4,26 +4,40 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <random>
 #include <vector>
-
-#include <toftwin/nan.h>
 
 #include "calib/compare/statistics.h"
 #include "calib/discover/campaign/light_noise.h"
+#include "calib/discover/campaign/light_tiles.h"
+#include "calib/discover/campaign/removed_share.h"
 #include "calib/discover/marginal.h"
 
 namespace toftwin::discover {
 namespace {
 
-/// χ² of each capture under a model with fixed offset and gain, poses and light integrated out.
+/// χ² of each capture under a model with fixed offset and gain, poses and light integrated out; captures of one place
+/// are one.
 struct ByCapture {
   std::vector<double> energy{}, rows{};
 
   [[nodiscard]] double energies() const { return std::accumulate(energy.begin(), energy.end(), 0.0); }
   [[nodiscard]] double allRows() const { return std::accumulate(rows.begin(), rows.end(), 0.0); }
   [[nodiscard]] double perRow() const { return energies() / allRows(); }
+  [[nodiscard]] double spread() const;
 };
+
+/// How much more than 2n, at least 1, the χ² of n rows varies from one capture to another: a capture's own noise is
+/// known from its few frames, and all of its rows with it. By the middle one of the captures, since some may err.
+double ByCapture::spread() const {
+  constexpr double kMiddle = 0.4549;  // of χ² with one degree of freedom
+  std::vector<double> by_row, squares;
+  for (std::size_t c = 0; c < rows.size(); ++c)
+    if (rows[c] > 0.0) by_row.push_back(energy[c] / rows[c]);
+  const double usual = compare::quantile(by_row, 0.5);
+  for (std::size_t c = 0; c < rows.size(); ++c)
+    if (rows[c] > 0.0) squares.push_back(0.5 * rows[c] * std::pow(energy[c] / (usual * rows[c]) - 1.0, 2.0));
+  return squares.empty() ? 1.0 : std::max(1.0, compare::quantile(std::move(squares), 0.5) / kMiddle);
+}
 
 Result<ByCapture> energiesOf(const JudgedCampaign& judged, const JudgedModel& model) {
   const auto evidence = residualEvidence(judged, model.effects);
@@ -43,68 +57,56 @@ Result<ByCapture> energiesOf(const JudgedCampaign& judged, const JudgedModel& mo
 struct Grain {
   int most_cells = 0;
   double noise = 1.0;
-  double open_rows = 0.0;  ///< that say so
+  double spread = 1.0;      ///< ByCapture::spread
+  double open_rows = 0.0;   ///< that say so
+  double stands_out = 0.0;  ///< what was found removes there, over what noise alone does to χ²
 };
 
-/// The χ² of N rows varies by √(2N) from noise alone, which few captures and a faint effect do not stand out
-/// of. So the cells are the finest in which that would be a tenth of what was found removes, as the open
-/// captures say. Noise is that of the open captures in the same cells: noise that neighbours share is larger
-/// in larger ones.
-Result<Grain> grainOf(const JudgedCampaign& judged, const JudgedCampaign& open, const JudgedModels& models) {
-  constexpr double kSmall = 0.1;
+Result<Grain> grainWith(int most_cells, double share, const JudgedCampaign& open, const JudgedModels& models) {
   // What an imperfect fit leaves of the open captures is no noise.
   constexpr double kMostNoise = 1.1;
-  const double share = static_cast<double>(judged.lit.captures.size()) /
-                       static_cast<double>(std::max<std::size_t>(1, open.lit.captures.size()));
-  Grain grain;
-  for (const int most_cells : {384, 96, 24}) {
-    JudgedCampaign grained = open;
-    grained.most_cells = most_cells;
-    const auto with_zero = energiesOf(grained, models.with_zero), after = energiesOf(grained, models.after);
-    if (!with_zero) return with_zero.error();
-    if (!after) return after.error();
-    grain = {most_cells, std::min(kMostNoise, after->perRow()), after->allRows()};
-    const double removed = share * (with_zero->energies() - after->energies());
-    if (grain.noise * std::sqrt(2.0 * share * after->allRows()) < kSmall * removed) break;
-  }
+  JudgedCampaign grained = open;
+  grained.most_cells = most_cells;
+  const auto with_zero = energiesOf(grained, models.with_zero), after = energiesOf(grained, models.after);
+  if (!with_zero) return with_zero.error();
+  if (!after) return after.error();
+  const double noise = after->perRow() / (1.0 - models.after.fitted_share);
+  Grain grain{most_cells, std::min(kMostNoise, noise), after->spread(), after->allRows()};
+  grain.stands_out = share * (with_zero->energies() - after->energies()) /
+                     (grain.noise * std::sqrt(2.0 * grain.spread * share * grain.open_rows));
   return grain;
 }
 
-/// What a model removes of the χ² that another leaves over noise, and what it leaves.
-struct Balance {
-  double removed = 0.0, left = 0.0;
-};
+/// The χ² of N rows varies by √(2N) or more from noise alone, which few captures and a faint effect do not stand out
+/// of. So the cells are the finest in which that would be a tenth of what was found removes, as the open
+/// captures say; where there are none, those in which that stands out most: what each pixel has by itself does not
+/// in larger ones. Noise is that of the open captures in the same cells: noise that neighbours share is larger
+/// in larger ones.
+Result<Grain> grainOf(const JudgedCampaign& judged, const JudgedCampaign& open, const JudgedModels& models) {
+  constexpr double kEnough = 10.0;
+  const double share = static_cast<double>(judged.lit.captures.size()) /
+                       static_cast<double>(std::max<std::size_t>(1, open.lit.captures.size()));
+  Grain clearest;
+  for (const int most_cells : {384, 96, 24, Cells::kMostCells}) {
+    const auto grain = grainWith(most_cells, share, open, models);
+    if (!grain) return grain.error();
+    if (clearest.most_cells == 0 || grain->stands_out > clearest.stands_out) clearest = *grain;
+    if (most_cells < Cells::kMostCells && grain->stands_out > kEnough) return grain;
+  }
+  return clearest;
+}
+
 Balance balanceOf(const ByCapture& from, const ByCapture& to, double noise) {
   return {from.energies() - to.energies(), to.energies() - noise * to.allRows()};
 }
 
-/// What is left of something explainable is not negative, whatever noise says. NaN where nothing is
-/// explainable.
-double shareOf(const Balance& balance) {
-  const double all = balance.removed + std::max(0.0, balance.left);
-  return all > 0.0 ? balance.removed / all : kNaN;
-}
-
-/// 95 % of the shares that noise could have made of this one in these captures: it adds a variance of 2N + 4
-/// left to the χ² of N rows, of 2N²/M where it is known from M rows itself, and of 4 removed to what is
-/// removed.
-void addInterval(const Balance& balance, double rows, double open_rows, double noise, Judgement& judgement) {
-  constexpr int kDraws = 4000;
-  constexpr std::uint64_t kSeed = 20'262;
-  const double left_sd = std::sqrt(2.0 * rows * noise * noise * (1.0 + rows / open_rows) +
-                                   4.0 * noise * std::max(0.0, balance.left)),
-               removed_sd = std::sqrt(4.0 * noise * std::abs(balance.removed));
-  std::mt19937_64 engine{kSeed};
-  std::normal_distribution<double> normal;
-  std::vector<double> shares;
-  for (int k = 0; k < kDraws; ++k) {
-    const double removed = balance.removed + removed_sd * normal(engine),
-                 left = balance.left + left_sd * normal(engine);
-    const double share = shareOf({removed, left});
-    if (std::isfinite(share)) shares.push_back(share);
-  }
-  judgement.removed_low = compare::quantile(shares, 0.025);
-  judgement.removed_high = compare::quantile(std::move(shares), 0.975);
+/// Noise adds a variance of 2N (times their spread) + 4 left to the χ² of N rows, of 2N²/M where it is known from M rows
+/// itself, and of 4 removed to what is removed.
+Balance sigmaOf(const Balance& balance, double rows, const Grain& grain) {
+  const double noise = grain.noise;
+  return {std::sqrt(4.0 * noise * std::abs(balance.removed)),
+          std::sqrt(2.0 * grain.spread * rows * noise * noise * (1.0 + rows / grain.open_rows) +
+                    4.0 * noise * std::max(0.0, balance.left))};
 }
 
 /// How well each capture is described by itself, not their sum.
@@ -124,9 +126,14 @@ Result<> addEach(const JudgedCampaign& judged, const JudgedCampaign& open, const
   judgement.removed_by_zero = shareOf(balanceOf(*before, *with_zero, grain->noise));
   const Balance found = balanceOf(*with_zero, *after, grain->noise);
   judgement.removed = shareOf(found);
-  addInterval(found, after->allRows(), grain->open_rows, grain->noise, judgement);
+  const auto [low, high] = intervalOf(found, sigmaOf(found, after->allRows(), *grain));
+  judgement.removed_low = low, judgement.removed_high = high;
   judgement.before.per_row = before->perRow(), judgement.with_zero.per_row = with_zero->perRow();
   judgement.after.per_row = after->perRow();
+  const auto file = energiesOf(judged, models.before), found_model = energiesOf(judged, models.after);
+  if (!file) return file.error();
+  if (!found_model) return found_model.error();
+  judgement.gained = file->energies() - found_model->energies();
   return {};
 }
 
@@ -134,13 +141,17 @@ Result<> addEach(const JudgedCampaign& judged, const JudgedCampaign& open, const
 
 Result<> addExplained(const JudgedCampaign& judged, const JudgedCampaign& open, const JudgedModels& models,
                       Judgement& judgement) {
-  if (std::ranges::all_of(open.lit.captures, [](const MeasuredCapture& one) { return one.light_variance.empty(); }))
-    return addEach(judged, open, models, judgement);
+  const auto tiles = LightTiles::of(open.lit.captures);
+  if (!tiles) return addEach(judged, open, models, judgement);
   const auto of_judged = eachByItself(judged.lit.captures), of_open = eachByItself(open.lit.captures);
   const Lit judged_lit{of_judged, judged.lit.traced, judged.lit.varied},
       open_lit{of_open, open.lit.traced, open.lit.varied};
-  return addEach({judged.declared, judged_lit, judged.scales, judged.most_cells},
-                 {open.declared, open_lit, open.scales, open.most_cells}, models, judgement);
+  std::vector<double> scales = open.scales;  // which count each capture as often as its light was seen
+  for (const Group& group : tiles->groups(0))
+    if (const auto which = static_cast<std::size_t>(group.scale_class); which < scales.size())
+      scales[which] /= group.alike;
+  return addEach({judged.declared, judged_lit, scales, judged.most_cells},
+                 {open.declared, open_lit, scales, open.most_cells}, models, judgement);
 }
 
 }  // namespace toftwin::discover

@@ -32,6 +32,8 @@ struct JudgedCapture {
 struct JudgedModel {
   std::vector<sim::AnyEffect> effects{};
   double offset_mm = 0.0, gain_percent = 0.0;
+  /// The share of the open captures' noise that went into its numbers: of a pattern, one for each pixel.
+  double fitted_share = 0.0;
 };
 
 /// The camera file as it is, with where zero lies, and with all that was found.
@@ -51,6 +53,9 @@ struct Judgement {
   double explainable = 0.0;  ///< χ²_zero − noise
   int cells = 0;             ///< of each capture, at most, in these χ²
   double noise = 1.0;        ///< χ² of noise per row, as the open captures say
+  /// χ²_before − χ²_after in the finest cells. Noise moves this only along what was found, not by all rows': in larger
+  /// cells it would be no surer, and blind to what each pixel has by itself.
+  double gained = 0.0;
 };
 
 /// `open`: the captures that the models were found on. Error: an exposure that a model cannot have.

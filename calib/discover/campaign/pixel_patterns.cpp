@@ -131,7 +131,7 @@ void CampaignRows::putPattern(const std::string& name, const std::vector<PerChan
       for (Eigen::Index i = 0; i < channel.size(); ++i)
         channel[i] *= static_cast<float>(values[cells.placeOf(static_cast<std::size_t>(i))]);
   };
-  patterns_[name] = {on == "range" ? "" : on, grid, shrunk(all, *prior), 1.0 / std::sqrt(*prior)};
+  patterns_[name] = {on == "range" ? "" : on, grid, shrunk(all, *prior), 1.0 / std::sqrt(*prior), all.weight};
   Sums before{grid.size()};
   std::map<std::size_t, Sums> before_by_site;
   for (std::size_t c = 0; c < rows_.size(); ++c) {
@@ -144,6 +144,21 @@ void CampaignRows::putPattern(const std::string& name, const std::vector<PerChan
     put(c, name + std::string{kFromOthers}, shrunk(others, *prior));
     before.add(own[c]), here.add(own[c]);
   }
+}
+
+double PixelPattern::knownShare(double times) const {
+  double known = 0.0, all = 0.0;
+  for (const double one : weight) {
+    const double over_noise = times * one * deviation * deviation;
+    known += one * over_noise / (over_noise + 1.0), all += one;
+  }
+  return all > 0.0 ? known / all : 0.0;
+}
+
+double PixelPattern::freedom() const {
+  double sum = 0.0;
+  for (const double one : weight) sum += 1.0 - 1.0 / (1.0 + one * deviation * deviation);
+  return sum;
 }
 
 Term CampaignRows::settled(Term term) const {

@@ -126,6 +126,13 @@ struct PixelPattern {
   CellGrid grid{};
   std::vector<double> value{};  ///< by place in the grid; 0 where nothing is known
   double deviation = 0.0;       ///< of the pattern over the image, as estimated; 0: there is none
+  std::vector<double> weight{};  ///< by place, what the captures know of it: 1/variance
+
+  /// The share of the pattern's χ² that captures like these, in so many times as many places, can know: of values of
+  /// this deviation, whose estimates err by chance, Σ w k/(k + 1) / Σ w with k = w × deviation².
+  [[nodiscard]] double knownShare(double times = 1.0) const;
+  /// How many numbers of the data went into it: Σ k/(k + 1).
+  [[nodiscard]] double freedom() const;
 };
 
 /// A campaign's rows: measured − simulated over noise, and what each thing that could be missing

@@ -3,38 +3,44 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numeric>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <toftwin/nan.h>
+
+#include "calib/compare/statistics.h"
 #include "calib/compare/traits/least_squares.h"
 #include "calib/discover/campaign/carriers.h"
-#include "calib/discover/campaign/places.h"
 
 namespace toftwin::discover {
 namespace {
 
-constexpr double kTold = 0.5;  ///< Place::seen of a way that captures tell
+constexpr double kTold = 0.5;       ///< Place::seen of a way that captures tell
+constexpr std::size_t kFewest = 5;  ///< others, to say what is usual
 
-/// The one that was bumped.
-std::optional<std::size_t> bumpedOf(const std::vector<Place>& places) {
-  constexpr double kWrong = 1e-3;  // of setting aside one that was not
-  const std::size_t ways = Stood{}.size();
-  for (std::size_t way = 0; way < ways; ++way) {
-    std::vector<double> deviations;
-    std::vector<std::size_t> of;
-    for (std::size_t i = 0; i < places.size(); ++i) {
-      if (places[i].seen[way] < kTold) continue;
-      deviations.push_back(places[i].off[way]), of.push_back(i);
-    }
-    if (const auto one = oneFarOff(deviations, kWrong / static_cast<double>(ways))) return of[*one];
+/// Of each place how far it is from the middle one, in the way in which that is most: half of the places may be wrong.
+std::vector<double> extremityOf(const std::vector<std::vector<double>>& ways) {
+  std::vector<double> extremity(ways.front().size(), 0.0);
+  for (const std::vector<double>& way : ways) {
+    std::vector<double> told;
+    for (const double one : way)
+      if (std::isfinite(one)) told.push_back(one);
+    if (told.size() <= kFewest) continue;
+    const double middle = compare::quantile(told, 0.5);
+    for (double& one : told) one = std::abs(one - middle);
+    const double usual = std::max(compare::quantile(std::move(told), 0.5), 1e-12);
+    for (std::size_t i = 0; i < way.size(); ++i)
+      if (std::isfinite(way[i])) extremity[i] = std::max(extremity[i], std::abs(way[i] - middle) / usual);
   }
-  return std::nullopt;
+  return extremity;
 }
 
-/// What was set at these captures and at no others: an effect of it would be there alone, too.
-std::string aloneAt(const std::vector<std::size_t>& captures, const std::vector<MeasuredCapture>& all) {
+/// What was set at these captures and at none but the `off` ones: an effect of it would be there alone, too.
+std::string aloneAt(const std::vector<std::size_t>& captures, const std::vector<std::size_t>& off,
+                    const std::vector<MeasuredCapture>& all) {
   const plan::CaptureRecord& here = all[captures.front()].record;
   std::vector<std::string> words;
   const auto add = [&](double plan::CaptureRecord::*setting, const char* unit) {
@@ -44,13 +50,15 @@ std::string aloneAt(const std::vector<std::size_t>& captures, const std::vector<
       const double other = all[c].record.*setting;
       // NaN: nobody knows.
       const bool is_alike = !(std::abs(other - own) > kAlike * std::max(std::abs(other), std::abs(own)));
-      if (is_alike && std::ranges::find(captures, c) == captures.end()) return;
+      if (is_alike && std::ranges::find(off, c) == off.end()) return;
     }
     words.push_back(fmt::format("{:.4g} {}", own, unit));
   };
   add(&plan::CaptureRecord::exposure_us, "µs"), add(&plan::CaptureRecord::ambient_klx, "klx");
   return fmt::format("{}", fmt::join(words, " and "));
 }
+
+}  // namespace
 
 StoodOff describe(std::vector<std::size_t> captures, const std::vector<MeasuredCapture>& all, const Place& place) {
   Stood off = place.off;
@@ -60,13 +68,10 @@ StoodOff describe(std::vector<std::size_t> captures, const std::vector<MeasuredC
   StoodOff stood{.name = first.name,
                  .number = first.number,
                  .shift_mm = kPosePrior_m * 1e3 * std::hypot(off[0], off[1], off[2]),
-                 .turn_deg = kPosePrior_deg * std::hypot(off[3], off[4]),
-                 .alone = aloneAt(captures, all)};
+                 .turn_deg = kPosePrior_deg * std::hypot(off[3], off[4])};
   stood.captures = std::move(captures);
   return stood;
 }
-
-}  // namespace
 
 std::string StoodOff::inWords() const {
   const bool is_one = captures.size() == 1;
@@ -77,7 +82,7 @@ std::string StoodOff::inWords() const {
 
 std::string noteOf(const StoodOff& off) {
   std::string note = fmt::format(
-      "As its light says, {}, much farther than any other: the camera or the rig was bumped, or something acts there "
+      "As its light says, {}, much farther than the others: the camera or the rig was bumped, or something acts there "
       "alone. ",
       off.inWords());
   if (off.is_set_aside)
@@ -86,44 +91,73 @@ std::string noteOf(const StoodOff& off) {
   return note + (off.alone.empty() ? "." : fmt::format(", none of which was at {}: it may be no bump.", off.alone));
 }
 
-std::optional<std::size_t> oneFarOff(const std::vector<double>& deviations, double wrong) {
-  constexpr std::size_t kFewest = 6;
+bool isFarOff(double deviation, const std::vector<double>& others, double wrong) {
   constexpr double kApart = 2.0;
-  const std::size_t n = deviations.size();
-  if (n < kFewest) return std::nullopt;
-  const auto others = static_cast<double>(n - 1);
-  const double sum = std::accumulate(deviations.begin(), deviations.end(), 0.0);
-  const auto offMean = [&](std::size_t i) { return std::abs(deviations[i] - (sum - deviations[i]) / others); };
-  std::size_t farthest = 0;
-  for (std::size_t i = 1; i < n; ++i)
-    if (offMean(i) > offMean(farthest)) farthest = i;
-  const double mean = (sum - deviations[farthest]) / others;
+  if (others.size() < kFewest) return false;
+  const auto n = static_cast<double>(others.size());
+  const double mean = std::accumulate(others.begin(), others.end(), 0.0) / n;
   double squares = 0.0, next = 0.0;
-  for (std::size_t i = 0; i < n; ++i) {
-    if (i == farthest) continue;
-    squares += (deviations[i] - mean) * (deviations[i] - mean);
-    next = std::max(next, std::abs(deviations[i] - mean));
+  for (const double one : others) {
+    squares += (one - mean) * (one - mean);
+    next = std::max(next, std::abs(one - mean));
   }
-  const double off = std::abs(deviations[farthest] - mean);
-  const double t = off / std::sqrt(squares / (others - 1.0) * (1.0 + 1.0 / others));
-  const double chance = compare::studentT(others - 1.0, 1.0 - wrong / static_cast<double>(n));
-  return t > chance && off > kApart * next ? std::optional{farthest} : std::nullopt;
+  const double off = std::abs(deviation - mean);
+  const double t = off / std::sqrt(squares / (n - 1.0) * (1.0 + 1.0 / n));
+  return t > compare::studentT(n - 1.0, 1.0 - wrong) && off > kApart * next;
 }
 
-Result<std::optional<StoodOff>> stoodOff(const Round& round, const OpenCaptures& open) {
+std::vector<std::size_t> farOff(const std::vector<std::vector<double>>& ways, std::size_t most, double wrong) {
+  if (ways.empty() || ways.front().empty()) return {};
+  const std::size_t n = ways.front().size();
+  const std::vector<double> extremity = extremityOf(ways);
+  std::vector<std::size_t> order(n);
+  std::iota(order.begin(), order.end(), 0U);
+  std::ranges::stable_sort(order, std::greater<>{}, [&](std::size_t i) { return extremity[i]; });
+  const double each = wrong / static_cast<double>(n * ways.size());
+  for (std::size_t count = std::min(most, n); count > 0; --count) {
+    std::vector<std::size_t> few(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(count));
+    std::vector<std::vector<double>> others(ways.size());
+    for (std::size_t way = 0; way < ways.size(); ++way)
+      for (std::size_t k = count; k < n; ++k)
+        if (std::isfinite(ways[way][order[k]])) others[way].push_back(ways[way][order[k]]);
+    const bool are_off = std::ranges::all_of(few, [&](std::size_t i) {
+      for (std::size_t way = 0; way < ways.size(); ++way)
+        if (std::isfinite(ways[way][i]) && isFarOff(ways[way][i], others[way], each)) return true;
+      return false;
+    });
+    if (!are_off) continue;
+    std::ranges::sort(few);
+    return few;
+  }
+  return {};
+}
+
+std::vector<std::vector<double>> waysOf(const std::vector<Place>& places) {
+  std::vector<std::vector<double>> ways(Stood{}.size());
+  for (std::size_t way = 0; way < ways.size(); ++way)
+    for (const Place& place : places) ways[way].push_back(place.seen[way] < kTold ? kNaN : place.off[way]);
+  return ways;
+}
+
+Result<std::vector<StoodOff>> stoodOff(const Round& round, const OpenCaptures& open) {
+  constexpr double kWrong = 1e-3;  // of setting aside one that was not
   const Lit lit{open.captures, round.traced, open.at_poses};
   const auto effects = withDelay(round.declared.model, round.refitted.effects, round.zero.delay_mm);
   const auto evidence = residualEvidence({round.declared, lit, round.finding.scales}, effects);
   if (!evidence) return evidence.error();
   const std::vector<Place> places = placesBy(*evidence, round.finding.scales);
-  const auto bumped = bumpedOf(places);
-  if (!bumped) return std::optional<StoodOff>{};
   const std::vector<std::size_t> stands = standsOf(open.captures);
-  std::vector<std::size_t> captures;
-  for (std::size_t c = 0; c < stands.size(); ++c)
-    if (stands[c] == *bumped) captures.push_back(c);
-  if (captures.size() > 1 && 20 * captures.size() > stands.size()) return std::optional<StoodOff>{};
-  return std::optional{describe(std::move(captures), open.captures, places[*bumped])};
+  std::vector<StoodOff> off;
+  std::vector<std::size_t> all;
+  for (const std::size_t bumped : farOff(waysOf(places), std::max<std::size_t>(1, stands.size() / 20), kWrong)) {
+    std::vector<std::size_t> captures;
+    for (std::size_t c = 0; c < stands.size(); ++c)
+      if (stands[c] == bumped) captures.push_back(c), all.push_back(c);
+    off.push_back(describe(std::move(captures), open.captures, places[bumped]));
+  }
+  if (all.size() > 1 && 20 * all.size() > stands.size()) return std::vector<StoodOff>{};
+  for (StoodOff& one : off) one.alone = aloneAt(one.captures, all, open.captures);
+  return off;
 }
 
 namespace {
@@ -149,9 +183,14 @@ Result<SearchOf> searchBesideBumped(const Declared& file, const OpenCaptures& op
   all.off = *std::move(off);
   const double alpha = open.finder.alpha;
   const bool leaves = all.round->leavesSomething(alpha);
-  if (!all.off || !all.off->alone.empty() || (!leaves && all.round->things() == 0)) return all;
-  SearchOf some{without(all.off->captures, open), nullptr, all.off};
-  some.off->is_set_aside = true;
+  SearchOf some{nullptr, nullptr, all.off};
+  std::vector<std::size_t> gone;
+  for (StoodOff& one : some.off) {
+    one.is_set_aside = one.alone.empty();
+    if (one.is_set_aside) gone.insert(gone.end(), one.captures.begin(), one.captures.end());
+  }
+  if (gone.empty() || (!leaves && all.round->things() == 0)) return all;
+  some.without = without(gone, open);
   Declared otherwise = file;
   otherwise.delay_mm = 0.0;
   const auto late =

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <toftwin/result.h>
+
+#include "calib/discover/campaign/discover_campaign.h"
+#include "calib/discover/campaign/refit.h"
+
+/// Locked captures at which the camera stood off its pose by far more than at any open one. They are judged with the
+/// others, and what the judgement is without them is told beside it: nothing is dropped unsaid, and a bump is no error
+/// of the model.
+namespace toftwin::discover {
+
+/// By what `effects` leave of both. Error: an exposure that the model cannot have.
+Result<std::vector<StoodOff>> lockedOff(const JudgedCampaign& locked, const JudgedCampaign& open,
+                                        const std::vector<sim::AnyEffect>& effects);
+
+/// The judgement without them. Error: likewise.
+Result<Judgement> judgeWithout(const std::vector<StoodOff>& off, const JudgedCampaign& locked,
+                               const JudgedCampaign& open, const JudgedModels& models);
+
+/// What a reader of the report should know of them.
+std::string noteOf(const std::vector<StoodOff>& off, const Judgement& with, const Judgement* without);
+
+}  // namespace toftwin::discover
