@@ -204,8 +204,8 @@ void notePatterns(const CampaignRows& rows, CampaignFinding& finding) {
     for (const PixelPattern* pattern : patternsIn(one, rows)) {
       if (pattern->knownShare() > kNearlyAll) continue;
       finding.notes.push_back(fmt::format(
-          "{}: each pixel tells its own value alone, so that of its χ² these captures can remove {:.0f} %; {:.0f} times "
-          "as many, at other places, {:.0f} %.",
+          "{}: each pixel tells its own value alone, so that of its χ² these captures can remove {:.0f} %; {:.0f} "
+          "times as many, at other places, {:.0f} %.",
           one.found.name, 100.0 * pattern->knownShare(), kTimes, 100.0 * pattern->knownShare(kTimes)));
     }
   }

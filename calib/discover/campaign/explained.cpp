@@ -100,8 +100,8 @@ Balance balanceOf(const ByCapture& from, const ByCapture& to, double noise) {
   return {from.energies() - to.energies(), to.energies() - noise * to.allRows()};
 }
 
-/// Noise adds a variance of 2N (times their spread) + 4 left to the χ² of N rows, of 2N²/M where it is known from M rows
-/// itself, and of 4 removed to what is removed.
+/// Noise adds a variance of 2N (times their spread) + 4 left to the χ² of N rows, of 2N²/M where it is known from M
+/// rows itself, and of 4 removed to what is removed.
 Balance sigmaOf(const Balance& balance, double rows, const Grain& grain) {
   const double noise = grain.noise;
   return {std::sqrt(4.0 * noise * std::abs(balance.removed)),

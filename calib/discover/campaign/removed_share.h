@@ -17,8 +17,8 @@ struct ShareInterval {
   double low = 0.0, high = 0.0;
 };
 
-/// 95 % of the shares that noise of these standard deviations allows. At the low end what is left is drawn as it is known
-/// not to be negative: where noise made χ² less than its mean, that is no proof that nothing is.
+/// 95 % of the shares that noise of these standard deviations allows. At the low end what is left is drawn as it is
+/// known not to be negative: where noise made χ² less than its mean, that is no proof that nothing is.
 ShareInterval intervalOf(const Balance& balance, const Balance& sigma);
 
 }  // namespace toftwin::discover
