@@ -13,7 +13,7 @@ struct Frame {
   Vec3f lower, upper;
 };
 
-Frame frameOf(const Standing& standing) {
+TOFTWIN_INLINE Frame frameOf(const Standing& standing) {
   const auto& [a, b, c] = standing.axes;
   const Vec3d t = standing.scene_from_object.translation_m;
   const auto f = [](double v) { return static_cast<float>(v); };
@@ -98,7 +98,7 @@ void takeBack(const RTCRay16& local, const int* can_meet, RTCRay16& rays) {
 
 /// Shadow rays in the movers' frames; `occluded(valid, scene, rays)` is Embree's part.
 template <class Occluded>
-void castAtMovers(const Scene::Impl& scene, const int* valid, RTCRay16& rays, const Occluded& occluded) {
+TOFTWIN_INLINE void castAtMovers(const Scene::Impl& scene, const int* valid, RTCRay16& rays, const Occluded& occluded) {
   for (const Standing& standing : scene.poses) {
     Lanes<int> can_meet;
     RTCRay16 local;
@@ -110,6 +110,7 @@ void castAtMovers(const Scene::Impl& scene, const int* valid, RTCRay16& rays, co
 
 }  // namespace
 
+TOFTWIN_VECTOR
 void castRays(const Scene::Impl& scene, const int* valid, RTCRayHit16& rays, bool coherent) {
   embree::intersect(valid, scene.still, rays, coherent);
   for (const Standing& standing : scene.poses) {
@@ -123,6 +124,7 @@ void castRays(const Scene::Impl& scene, const int* valid, RTCRayHit16& rays, boo
   }
 }
 
+TOFTWIN_VECTOR
 void castShadowRays(const Scene::Impl& scene, const int* valid, RTCRay16& rays, bool coherent) {
   embree::occluded(valid, scene.still, rays, coherent);
   castAtMovers(scene, valid, rays, [&](const int* can_meet, RTCScene mover, RTCRay16& local) {
