@@ -206,7 +206,7 @@ void addLatency(const ComparedRun& run, TraitCollector& all) {
         "recorded. It is told of two simulated cameras, whose frames say the time at which the scene was so");
   } else if (rows.empty()) {
     all.untold(fmt::format("{} ({} of the moving plate, of which none tells it)", why_not,
-                           captures.size()));
+                           counted(captures.size(), "capture")));
   } else {
     compare::Trait latency = together(rows);
     heedWidths({captures, 0}, {captures, 1}, latency);
