@@ -182,6 +182,11 @@ struct Measurement {
   Result<std::size_t> all() {
     const std::size_t before = run.done().size();
     Progress progress{"captures", schedule.captures.size() - before, std::chrono::minutes{1}};
+    std::vector<double> frames;  // those of a moving plate are many, and each is traced anew
+    for (const plan::PlannedCapture& planned : schedule.captures) {
+      if (!run.done().contains(planned.number)) frames.push_back(planned.frames);
+    }
+    progress.weigh(std::move(frames));
     std::size_t taken = 0;
     Result<> done = checkBoards();
     for (const plan::PlannedCapture& planned : schedule.captures) {

@@ -40,6 +40,17 @@ Progress::~Progress() {
   if (drawn_ && is_terminal_) fmt::print(stderr, "\r\033[K");
 }
 
+/// Of so many, with a share of the next.
+double Progress::workOf(double done) const {
+  if (work_.empty()) return done;
+  double work = 0.0;
+  for (const double one : work_) {
+    work += std::clamp(done, 0.0, 1.0) * one;
+    done -= 1.0;
+  }
+  return work;
+}
+
 std::string Progress::line(double done, std::string_view extra) {
   const double seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count();
@@ -47,8 +58,8 @@ std::string Progress::line(double done, std::string_view extra) {
   if (total_ > 0) {
     const double total = static_cast<double>(total_), share = std::min(done / total, 1.0);
     const auto filled = static_cast<int>(kBarWidth * share);
-    pace_.at(seconds, done);
-    const auto left = pace_.left(std::max(0.0, total - done));
+    pace_.at(seconds, workOf(done));
+    const auto left = pace_.left(std::max(0.0, workOf(total) - workOf(done)));
     text = fmt::format("{} [{:#<{}}{:.<{}}] {}/{}{}", what_, "", filled, "", kBarWidth - filled,
                        std::floor(done), total_, left ? fmt::format(", {} left", timeLeft(*left)) : "");
   }

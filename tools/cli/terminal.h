@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "calib/compare/progress.h"
 
@@ -22,18 +24,22 @@ class Progress {
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
+  /// How much work each of them is, where they are not alike: what is left is told by it, in any unit.
+  void weigh(std::vector<double> work) { work_ = std::move(work); }
   void show(std::uint64_t done, std::string_view extra = {}) { show(done, 0.0, extra); }
   /// So many are done, and that share of the next.
   void show(std::uint64_t done, double share_of_next, std::string_view extra);
 
  private:
   [[nodiscard]] std::string line(double done, std::string_view extra);
+  [[nodiscard]] double workOf(double done) const;
 
   std::string what_;
   std::uint64_t total_;
   std::chrono::seconds log_every_;
   bool is_terminal_;
   bool drawn_ = false;
+  std::vector<double> work_;  ///< empty: 1 each
   compare::Pace pace_;
   std::chrono::steady_clock::time_point began_, drawn_at_;
 };
