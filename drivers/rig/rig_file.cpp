@@ -70,7 +70,8 @@ void checkAll(Table& table, const RigFile& file) {
   for (const auto& [key, signal] : read) checkSignal(table, key, *signal, false, false);
   if (file.home.isThere() != file.homed.isThere()) {
     table.complain(file.home.isThere() ? "home" : "homed",
-                   "and the other of home and homed belong together");
+                   file.home.isThere() ? "is there without homed; they belong together"
+                                       : "is there without home; they belong together");
   }
   if (file.axes.empty()) table.complain("", "has no [[axis]]");
   auto tables = table.tables("axis");
