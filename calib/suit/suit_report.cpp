@@ -358,8 +358,13 @@ std::string inWords(const Suit& suit) {
                        count == 1 ? "" : ", best first", fit);
   const CameraResult& best = suit.cameras.front();
   const std::string failed = failedOf(suit.use, best);
-  return fmt::format("None of {} does all that is asked. {} comes nearest: it {}{}{}.",
-                     counted(all, "camera"), best.name, stateOf(best), failed.empty() ? "" : ": ", failed);
+  const std::string how =
+      best.cannot.empty() && best.failed == 0
+          ? fmt::format("of {} {} not known", counted(best.requirements.size(), "requirement"),
+                        best.unknown == 1 ? "1 is" : fmt::format("{} are", best.unknown))
+          : fmt::format("it {}{}{}", stateOf(best), failed.empty() ? "" : ": ", failed);
+  return fmt::format("None of {} does all that is asked. {} comes nearest: {}.", counted(all, "camera"), best.name,
+                     how);
 }
 
 Result<std::filesystem::path> writeSuit(const Suit& suit, const std::filesystem::path& folder,

@@ -25,6 +25,17 @@ TEST(Ranking, CamerasAreRankedByWhatTheyMiss) {
   EXPECT_THAT(inWords(*suit), testing::HasSubstr("1 of 3 cameras does what is asked"));
 }
 
+TEST(Ranking, SaysOfARecordingThatFailsNothingWhatIsNotKnown) {
+  Suit suit;
+  CameraResult& camera = suit.cameras.emplace_back(CameraResult{.name = "ours"});
+  camera.requirements.resize(3);
+  camera.requirements[0].verdict.is_met = true;
+  camera.requirements[1].is_judged = camera.requirements[2].is_judged = false;
+  camera.unknown = 2;
+  EXPECT_EQ(inWords(suit),
+            "None of 1 camera does all that is asked. ours comes nearest: of 3 requirements 2 are not known.");
+}
+
 /// That all pixels are valid can be met, but no number of frames makes it certain.
 TEST(Ranking, SaysThatWhatIsMetIsNotCertain) {
   const Folder folder;
