@@ -27,7 +27,7 @@ h2{font-size:1.3rem;margin:0 0 8px;line-height:1.25}
 .card{background:var(--panel);border:1px solid var(--line);border-top:4px solid var(--neutral);border-radius:6px;padding:10px 14px}
 .card.good{border-top-color:var(--good)}.card.fair{border-top-color:var(--fair)}.card.bad{border-top-color:var(--bad)}
 .cardlabel{font-size:.86rem;color:var(--soft)}
-.value{white-space:nowrap;font-size:1.22rem;font-weight:650;font-variant-numeric:tabular-nums;line-height:1.3}
+.value{font-size:1.22rem;font-weight:650;font-variant-numeric:tabular-nums;line-height:1.3}
 .note{font-size:.84rem;color:var(--soft)}
 nav{display:flex;flex-wrap:wrap;gap:6px 16px;font-size:.95rem;padding:8px 0 4px;border-bottom:1px solid var(--line)}
 nav a{color:var(--simulated);text-decoration:none;padding:4px 0}nav a:hover,nav a:focus{text-decoration:underline}

@@ -172,7 +172,7 @@ std::optional<std::string> otherScene(const std::string& pose, const AtPose& the
     }
   }
   if (far <= kFew * valid) return std::nullopt;
-  return fmt::format("at \"{}\" {:.0f} % of its valid pixels are over {:.0f} mm from what the scene has there: is it "
+  return fmt::format("At \"{}\" {:.0f} % of its valid pixels are over {:.0f} mm from what the scene has there: is it "
                      "the scene that was recorded, and the pose?",
                      pose, 100.0 * far / valid, 1e3F * kFar_m);
 }

@@ -133,7 +133,7 @@ TEST(Recording, OfAnotherSceneSaysSo) {
   const auto far = folder.judged("[[pose]]\nname = 'other'\nposition_m = [0, 0, -0.5]\n" + kCase + "pose = 'other'\n");
   ASSERT_TRUE(far) << far.error().message;
   EXPECT_THAT(far->cameras.front().notes,
-              testing::ElementsAre(HasSubstr("at \"other\" 100 % of its valid pixels are over 300 mm from what")));
+              testing::ElementsAre(HasSubstr("At \"other\" 100 % of its valid pixels are over 300 mm from what")));
 }
 
 TEST(Recording, ThatIsNotThereIsNamedWithItsPlace) {
