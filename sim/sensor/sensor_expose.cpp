@@ -62,11 +62,11 @@ Samples applyOnSamples(Samples samples, const std::vector<AnyEffect>& effects, c
 }
 
 /// Effects on samples look at one pixel at a time: strip by strip, samples stay in the processor's cache
-/// from the first effect to the last. `filler()` makes, for one part of the work, what writes the samples from row `top` on
-/// as they are before them, `fill(top, part)`; `take(top, part)` reads what they are after them, on many threads.
+/// from the first effect to the last. `filler()` makes, for one part of the work, what writes the samples from row `top`
+/// on as they are before them, `fill(top, part)`; `take(top, part)` reads what they are after them, on many threads.
 template <class Filler, class Take>
-void countInStrips(const Samples& shape, int width, int height, const Filler& filler, const std::vector<AnyEffect>& effects,
-                   const Conditions& now, std::uint64_t seed, std::uint64_t frame, std::size_t exposure,
+void countInStrips(const Samples& shape, int width, int height, const Filler& filler,
+                   const std::vector<AnyEffect>& effects, const Conditions& now, std::uint64_t seed, std::uint64_t frame, std::size_t exposure,
                    const Take& take) {
   constexpr int kRows = 8;
   const std::size_t images = shape.frequencies.size() * static_cast<std::size_t>(shape.steps * shape.taps);
@@ -217,7 +217,9 @@ const LensScatter* onlyScatter(const std::vector<const AnyEffect*>& acting) {
 class ScatteredFill {
  public:
   ScatteredFill(const ScatteredRows& scattered, const std::vector<Response>& responses, int steps, int taps)
-      : scattered_(scattered), row_(std::make_unique<Light>(scattered.room(1))), correlator_(*row_, responses, steps, taps) {}
+      : scattered_(scattered),
+        row_(std::make_unique<Light>(scattered.room(1))),
+        correlator_(*row_, responses, steps, taps) {}
 
   void operator()(int top, Samples& part) {
     for (int y = 0; y < part.height(); ++y) {
@@ -260,7 +262,8 @@ SensorModel::Exposed SensorModel::expose(const Light& light, const Moment& momen
   return exposed;
 }
 
-RangeImage SensorModel::measure(const Light& light, const Moment& moment, std::uint64_t seed, std::uint64_t frame) const {
+RangeImage SensorModel::measure(const Light& light, const Moment& moment, std::uint64_t seed,
+                                std::uint64_t frame) const {
   const bool is_whole = light.width() == impl_->camera.width && light.height() == impl_->camera.height;
   if (!countsInStrips() || !is_whole || impl_->decoder.algorithm != DecodeSettings::Algorithm::KinectV2)
     return expose(light, moment, seed, frame).range;

@@ -15,7 +15,9 @@
 #include "sim/decode/unwrap.h"
 #include "sim/effects/companding.h"
 #include "sim/effects/random.h"
+#include "sim/sensor/correlate.h"
 #include "tests/sim/camera_testing.h"
+#include "tests/sim/synthetic_light.h"
 
 namespace toftwin::sim {
 namespace {
@@ -83,7 +85,8 @@ TEST(KinectV2, JudgesDeviationsByRoughLogarithmsAsByTheThresholdItself) {
   std::vector<std::uint32_t> why(kWidth);
   const KinectSeen seen{{cycles[0].data(), cycles[1].data(), cycles[2].data()},
                         {amplitudes[0].data(), amplitudes[1].data(), amplitudes[2].data()}, zeros.data(), ones.data()};
-  measureKinectRow(seen, limits, kWidth, {range.data(), brightness.data(), deviation.data(), strongest.data(), why.data()});
+  measureKinectRow(seen, limits, kWidth,
+                   {range.data(), brightness.data(), deviation.data(), strongest.data(), why.data()});
   int doubtful = 0, over = 0, under = 0;
   for (std::size_t x = 0; x < kWidth; ++x) {
     const double threshold = kinectV2Threshold(strongest[x], limits.strong_rad, limits.weak_rad);
@@ -362,6 +365,35 @@ TEST(Companding, FlagsWhatIsBeyondItsLastCode) {
       twoTaps(30'000.0, 13'640.0), {moment, CameraInfo{}}, Random{1, 0, 0});
   EXPECT_TRUE(has(seen.flags(0, 0), PixelFlag::Saturated));
   EXPECT_NEAR(seen.tap(0, 0, 0)(0, 0) - seen.tap(0, 0, 1)(0, 0), 16'320.0, 0.01);
+}
+
+/// Rows are converted piece by piece. What repeats along a row, a charge beyond the last code with it, is converted alike.
+TEST(Companding, IsTheSameInEveryPieceOfARow) {
+  constexpr int kWidth = 1100, kPeriod = 100;
+  for (const int taps : {1, 2}) {
+    Samples samples{.frequencies = {80_MHz}, .steps = 1, .taps = taps};
+    samples.electrons.assign(static_cast<std::size_t>(taps), Image<float>{kWidth, 1});
+    for (int x = 0; x < kWidth; ++x)
+      samples.electrons[0](x, 0) = x % kPeriod == 37 ? 30'000.0F : 13.7F * static_cast<float>(x % kPeriod);
+    const Samples seen =
+        Companding{.counts_per_electron = 1.0}.apply(samples, {Moment{}, CameraInfo{}}, Random{1, 0, 0});
+    for (int x = 0; x < kWidth; ++x) {
+      EXPECT_EQ(seen.electrons[0](x, 0), seen.electrons[0](x % kPeriod, 0)) << x;
+      EXPECT_EQ(has(seen.flags(x, 0), PixelFlag::Saturated), x % kPeriod == 37) << x;
+    }
+  }
+}
+
+TEST(Correlator, IsTheSameInEveryPieceOfARow) {
+  constexpr int kWidth = 1100, kPeriod = 100;
+  const Light light = syntheticLight(kWidth, 1, {80_MHz}, 1, [](int x, int) {
+    return std::vector{Way{.radiance = 1.0 + 0.01 * (x % kPeriod), .range_m = 1.0 + 0.02 * (x % kPeriod)}};
+  });
+  const Response response{.frequency = 80_MHz, .contrast = 0.6, .electrons_per_radiance = 1e4, .harmonics = {1.0}};
+  const Samples seen = correlate(light, {response}, 3, 2);
+  ASSERT_EQ(seen.electrons.size(), 6U);
+  for (const Image<float>& electrons : seen.electrons)
+    for (int x = kPeriod; x < kWidth; ++x) EXPECT_EQ(electrons(x, 0), electrons(x % kPeriod, 0)) << x;
 }
 
 }  // namespace
