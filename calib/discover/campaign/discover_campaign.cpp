@@ -147,7 +147,7 @@ Result<> judgeLocked(const CampaignJob& job, const Campaign& campaign, const Jud
   auto judgement = judge(locked, searched, models);
   if (!judgement) return judgement.error();
   finding.judgement = *std::move(judgement);
-  auto off = lockedOff(locked, searched, models.after.effects);
+  auto off = lockedOff(locked, searched, models);
   if (!off) return off.error();
   finding.locked_off = *std::move(off);
   return tellLockedOff(locked, searched, models, finding);
@@ -222,8 +222,9 @@ double fittedShareOf(const Round& round, const std::vector<FoundEffect>& effects
 /// What single frames show stays: these captures do not judge it.
 void keepIfWorse(const std::string& text, const Declared& declared, CampaignFinding& finding) {
   if (!finding.judgement) return;
-  // Where one was bumped, what it says is of its pose.
-  finding.is_worse = (finding.without_off ? *finding.without_off : *finding.judgement).gained < 0.0;
+  // Where a camera was bumped, what its capture says is of its pose.
+  const bool is_bumped = finding.without_off && std::ranges::all_of(finding.locked_off, &StoodOff::is_set_aside);
+  finding.is_worse = (is_bumped ? *finding.without_off : *finding.judgement).gained < 0.0;
   if (!finding.is_worse) return;
   CampaignFinding kept{.plan = finding.plan,
                        .captures = finding.captures,

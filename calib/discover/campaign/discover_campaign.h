@@ -74,7 +74,7 @@ struct StoodOff {
   std::size_t number = 0;
   double shift_mm = 0.0, turn_deg = 0.0;
   std::string alone{};        ///< what no other capture was taken at, as "40 klx"; empty: nothing
-  bool is_set_aside = false;  ///< what was found is found without them
+  bool is_set_aside = false;  ///< what was found is found without them; of locked ones: whether it is worse is told so
 
   /// "capture 17 ("distance: 0.9 m") stood 14.6 mm and 1.78° from its pose"
   [[nodiscard]] std::string inWords() const;

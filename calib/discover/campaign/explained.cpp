@@ -8,7 +8,6 @@
 
 #include "calib/compare/statistics.h"
 #include "calib/discover/campaign/light_noise.h"
-#include "calib/discover/campaign/light_tiles.h"
 #include "calib/discover/campaign/removed_share.h"
 #include "calib/discover/marginal.h"
 
@@ -141,17 +140,13 @@ Result<> addEach(const JudgedCampaign& judged, const JudgedCampaign& open, const
 
 Result<> addExplained(const JudgedCampaign& judged, const JudgedCampaign& open, const JudgedModels& models,
                       Judgement& judgement) {
-  const auto tiles = LightTiles::of(open.lit.captures);
-  if (!tiles) return addEach(judged, open, models, judgement);
+  if (std::ranges::all_of(open.lit.captures, [](const MeasuredCapture& one) { return one.light_variance.empty(); }))
+    return addEach(judged, open, models, judgement);
   const auto of_judged = eachByItself(judged.lit.captures), of_open = eachByItself(open.lit.captures);
   const Lit judged_lit{of_judged, judged.lit.traced, judged.lit.varied},
       open_lit{of_open, open.lit.traced, open.lit.varied};
-  std::vector<double> scales = open.scales;  // which count each capture as often as its light was seen
-  for (const Group& group : tiles->groups(0))
-    if (const auto which = static_cast<std::size_t>(group.scale_class); which < scales.size())
-      scales[which] /= group.alike;
-  return addEach({judged.declared, judged_lit, scales, judged.most_cells},
-                 {open.declared, open_lit, scales, open.most_cells}, models, judgement);
+  return addEach({judged.declared, judged_lit, judged.scales, judged.most_cells},
+                 {open.declared, open_lit, open.scales, open.most_cells}, models, judgement);
 }
 
 }  // namespace toftwin::discover

@@ -14,9 +14,10 @@
 /// of the model.
 namespace toftwin::discover {
 
-/// By what `effects` leave of both. Error: an exposure that the model cannot have.
+/// By what the found model leaves of both; set aside are those of which the file alone says it as well. Error: an
+/// exposure that a model cannot have.
 Result<std::vector<StoodOff>> lockedOff(const JudgedCampaign& locked, const JudgedCampaign& open,
-                                        const std::vector<sim::AnyEffect>& effects);
+                                        const JudgedModels& models);
 
 /// The judgement without them. Error: likewise.
 Result<Judgement> judgeWithout(const std::vector<StoodOff>& off, const JudgedCampaign& locked,

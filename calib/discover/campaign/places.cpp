@@ -79,12 +79,19 @@ std::vector<double> temperOf(const Evidence& evidence, std::span<const double> s
   return weights;
 }
 
-std::vector<Place> placesBy(const Evidence& evidence, std::span<const double> scales) {
+Eigen::VectorXd commonOf(const Evidence& evidence, std::span<const double> scales) {
   const Marginal marginal = marginalise(weighed(evidence, temperOf(evidence, scales)), scales);
-  const Eigen::VectorXd common = fit(marginal, nuisanceColumns(marginal)).coefficient;
+  return fit(marginal, nuisanceColumns(marginal)).coefficient;
+}
+
+std::vector<Place> placesAt(const Evidence& evidence, const Eigen::VectorXd& common) {
   std::vector<Place> places;
   for (const CaptureEvidence& one : evidence.captures) places.push_back(placeBy(one, common));
   return places;
+}
+
+std::vector<Place> placesBy(const Evidence& evidence, std::span<const double> scales) {
+  return placesAt(evidence, commonOf(evidence, scales));
 }
 
 }  // namespace toftwin::discover

@@ -23,7 +23,11 @@ struct Place {
 std::vector<double> temperOf(const Evidence& evidence, std::span<const double> scales);
 Evidence weighed(Evidence evidence, const std::vector<double>& weights);
 
-/// For each capture of the evidence, offset and gain being what all of them say. `scales`: of poses and light.
+/// Offset and gain, as all captures of the evidence say. `scales`: of poses and light.
+Eigen::VectorXd commonOf(const Evidence& evidence, std::span<const double> scales);
+/// For each capture of the evidence, offset and gain being these.
+std::vector<Place> placesAt(const Evidence& evidence, const Eigen::VectorXd& common);
+/// For each capture of the evidence, offset and gain being what all of them say.
 std::vector<Place> placesBy(const Evidence& evidence, std::span<const double> scales);
 
 }  // namespace toftwin::discover

@@ -37,6 +37,7 @@ double shareOf(const Balance& balance) {
 }
 
 ShareInterval intervalOf(const Balance& balance, const Balance& sigma) {
+  if (!(sigma.left > 0.0) || !std::isfinite(balance.left / sigma.left)) return {kNaN, kNaN};  // no row says anything
   constexpr int kDraws = 4000;
   constexpr std::uint64_t kSeed = 20'262;
   std::mt19937_64 engine{kSeed};

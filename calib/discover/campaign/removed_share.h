@@ -18,7 +18,8 @@ struct ShareInterval {
 };
 
 /// 95 % of the shares that noise of these standard deviations allows. At the low end what is left is drawn as it is
-/// known not to be negative: where noise made χ² less than its mean, that is no proof that nothing is.
+/// known not to be negative: where noise made χ² less than its mean, that is no proof that nothing is. NaN where no
+/// row says anything.
 ShareInterval intervalOf(const Balance& balance, const Balance& sigma);
 
 }  // namespace toftwin::discover

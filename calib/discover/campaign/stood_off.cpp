@@ -113,7 +113,7 @@ std::vector<std::size_t> farOff(const std::vector<std::vector<double>>& ways, st
   std::vector<std::size_t> order(n);
   std::iota(order.begin(), order.end(), 0U);
   std::ranges::stable_sort(order, std::greater<>{}, [&](std::size_t i) { return extremity[i]; });
-  const double each = wrong / static_cast<double>(n * ways.size());
+  const double each = wrong / static_cast<double>(n * ways.size() * std::max<std::size_t>(1, most));
   for (std::size_t count = std::min(most, n); count > 0; --count) {
     std::vector<std::size_t> few(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(count));
     std::vector<std::vector<double>> others(ways.size());
@@ -146,18 +146,23 @@ Result<std::vector<StoodOff>> stoodOff(const Round& round, const OpenCaptures& o
   const auto evidence = residualEvidence({round.declared, lit, round.finding.scales}, effects);
   if (!evidence) return evidence.error();
   const std::vector<Place> places = placesBy(*evidence, round.finding.scales);
+  const auto ways = waysOf(places);
   const std::vector<std::size_t> stands = standsOf(open.captures);
-  std::vector<StoodOff> off;
-  std::vector<std::size_t> all;
-  for (const std::size_t bumped : farOff(waysOf(places), std::max<std::size_t>(1, stands.size() / 20), kWrong)) {
-    std::vector<std::size_t> captures;
-    for (std::size_t c = 0; c < stands.size(); ++c)
-      if (stands[c] == bumped) captures.push_back(c), all.push_back(c);
-    off.push_back(describe(std::move(captures), open.captures, places[bumped]));
+  // Fewer places may have few enough captures.
+  for (std::size_t most = std::max<std::size_t>(1, stands.size() / 20); most > 0; --most) {
+    std::vector<StoodOff> off;
+    std::vector<std::size_t> all;
+    for (const std::size_t bumped : farOff(ways, most, kWrong)) {
+      std::vector<std::size_t> captures;
+      for (std::size_t c = 0; c < stands.size(); ++c)
+        if (stands[c] == bumped) captures.push_back(c), all.push_back(c);
+      off.push_back(describe(std::move(captures), open.captures, places[bumped]));
+    }
+    if (all.size() > 1 && 20 * all.size() > stands.size()) continue;
+    for (StoodOff& one : off) one.alone = aloneAt(one.captures, all, open.captures);
+    return off;
   }
-  if (all.size() > 1 && 20 * all.size() > stands.size()) return std::vector<StoodOff>{};
-  for (StoodOff& one : off) one.alone = aloneAt(one.captures, all, open.captures);
-  return off;
+  return std::vector<StoodOff>{};
 }
 
 namespace {
