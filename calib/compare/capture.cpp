@@ -209,18 +209,18 @@ Result<> capturePose(Feed& a, Feed& b, std::optional<Follower>& follower, const 
 
 }  // namespace
 
-std::optional<ClockOffset> clockOffset(const Frame& frame, std::chrono::system_clock::time_point opened) {
+std::optional<ClockOffset> clockOffset(const Frame& frame, std::chrono::system_clock::time_point asked) {
   using std::chrono::nanoseconds, std::chrono::system_clock;
   const bool is_recorded = frame.provenance.kind == FrameKind::Replayed;
   if (is_recorded || frame.moment.received.ns == 0) return std::nullopt;
   const system_clock::time_point received{nanoseconds{frame.moment.received.ns}};
   // How long a frame was under way is not known, as it waits for the other camera's, which may take seconds to make.
   const auto seconds = [](auto duration) { return std::chrono::duration<double>(duration).count(); };
-  return ClockOffset{.low_s = seconds(received - system_clock::now()), .high_s = seconds(received - opened)};
+  return ClockOffset{.low_s = seconds(received - system_clock::now()), .high_s = seconds(received - asked)};
 }
 
-std::string clockWarning(const Frame& frame, std::chrono::system_clock::time_point opened) {
-  const auto ahead = clockOffset(frame, opened);
+std::string clockWarning(const Frame& frame, std::chrono::system_clock::time_point asked) {
+  const auto ahead = clockOffset(frame, asked);
   if (!ahead || !ahead->isNotable()) return {};
   // In whole seconds, so that what is said of many captures is said once.
   return fmt::format(

@@ -37,8 +37,12 @@ class Feed {
   /// By our clock. Frames of a daemon are made after that.
   [[nodiscard]] std::chrono::system_clock::time_point opened() const { return opened_; }
 
+ protected:
+  /// `opened`: another time than now only in tests.
+  explicit Feed(std::chrono::system_clock::time_point opened = std::chrono::system_clock::now()) : opened_(opened) {}
+
  private:
-  std::chrono::system_clock::time_point opened_ = std::chrono::system_clock::now();
+  std::chrono::system_clock::time_point opened_;
 };
 
 /// What takes the cameras from pose to pose, where they cannot be put there by a command.
@@ -108,7 +112,7 @@ Result<Capture> capture(Feed& a, Feed& b, const CaptureOptions& options, Progres
 void planCapture(Progress& progress, const CaptureOptions& options);
 
 /// By how much the clock of the daemon that a frame has come from is ahead of ours, s: between these, as the frame was
-/// made after the feed was opened, and is here now.
+/// made after it was asked for, and is here now.
 struct ClockOffset {
   double low_s = 0.0, high_s = 0.0;
   /// More than a second off.
@@ -116,11 +120,11 @@ struct ClockOffset {
   [[nodiscard]] bool mayBe(const ClockOffset& other) const { return low_s <= other.high_s && other.low_s <= high_s; }
 };
 /// Nothing of frames that were recorded, or do not say when they were received.
-std::optional<ClockOffset> clockOffset(const Frame& frame, std::chrono::system_clock::time_point opened);
+std::optional<ClockOffset> clockOffset(const Frame& frame, std::chrono::system_clock::time_point asked);
 
 /// What a reader must know of the clock of the daemon that a frame has come from: that by it the frame is from before
-/// the feed was opened, or from the future, by more than a second. Nothing of frames that were recorded.
-std::string clockWarning(const Frame& frame, std::chrono::system_clock::time_point opened);
+/// it was asked for, or from the future, by more than a second. Nothing of frames that were recorded.
+std::string clockWarning(const Frame& frame, std::chrono::system_clock::time_point asked);
 
 /// What is not told as the camera does not give it: a sentence for each plane that a comparison would read.
 std::vector<std::string> missingPlanes(const Frame& frame);

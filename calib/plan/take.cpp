@@ -38,6 +38,11 @@ bool isExposedAsPlanned(const Frame& frame, Duration wanted) {
          std::abs(there->in(second)-wanted.in(second)) <= kExposureTolerance * wanted.in(second);
 }
 
+/// Of a clock that is off: said once, and again only where it cannot be as it was said any more.
+bool isNews(const std::optional<compare::ClockOffset>& clock, const std::optional<compare::ClockOffset>& told) {
+  return clock && clock->isNotable() && !(told && told->mayBe(*clock));
+}
+
 Error naming(const PlannedCapture& planned, const Error& error) {
   return {error.code, fmt::format("capture {} (\"{}\"): {}", planned.number, planned.name, error.message)};
 }
@@ -163,6 +168,7 @@ Result<> Taker::dropFirst(const PlannedCapture& planned, Feed& feed, const Taken
 Result<TakenBy> Taker::framesOf(const PlannedCapture& planned, Feed& feed, const Taken& taken,
                                 const Sink& sink, const std::optional<Duration>& since_power_on,
                                 std::optional<Frame>* first) {
+  const auto asked = std::chrono::system_clock::now();  // a feed is kept for the whole run, its frames are not
   if (auto anew = feed.beginAnew(); !anew) return anew.error();
   std::optional<std::int64_t> begun;  // where the camera says no time since power-on: the first frame's start
   TakenBy by{.source = nameOf(feed), .model = feed.details().entry.model};
@@ -189,8 +195,8 @@ Result<TakenBy> Taker::framesOf(const PlannedCapture& planned, Feed& feed, const
     if (by.frames == 0) {
       by.since_power_on = frame->moment.since_power_on, by.temperatures = frame->moment.temperatures;
       by.ambient = frame->moment.ambient, by.exposure = longestExposure(*frame);
-      by.clock = compare::clockOffset(*frame, feed.opened());
-      by.clock_warning = compare::clockWarning(*frame, feed.opened());
+      by.clock = compare::clockOffset(*frame, asked);
+      by.clock_warning = compare::clockWarning(*frame, asked);
       if (first != nullptr) *first = *frame;
     }
     if (auto done = sink(*frame); !done) return done.error();
@@ -214,13 +220,6 @@ Result<> Taker::follow(const PlannedCapture& planned, const Frame& leader, Feed&
         fmt::format("{} does not say how long it has been on, so {} is not told; --powered-on-for says it",
                     leader.source, nameOf(feed)));
   return {};
-}
-
-/// Once, and again only where it cannot be as it was said any more.
-void Taker::noteClock(const TakenBy& by, std::optional<compare::ClockOffset>& told, Taken& taken) {
-  if (!by.clock || !by.clock->isNotable() || (told && told->mayBe(*by.clock))) return;
-  told = by.clock;
-  taken.notes.push_back(by.clock_warning);
 }
 
 Result<Taken> Taker::take(const PlannedCapture& planned, Feed& a, Feed& b, const Sink& to_a,
@@ -255,7 +254,11 @@ Result<Taken> Taker::take(const PlannedCapture& planned, Feed& a, Feed& b, const
   auto by_b = framesOf(planned, b, taken, to_b, taken.a.since_power_on, nullptr);
   if (!by_b) return naming(planned, by_b.error());
   taken.b = *std::move(by_b);
-  noteClock(taken.a, clock_told_a_, taken), noteClock(taken.b, clock_told_b_, taken);
+  for (const auto& [by, told] : {std::pair{&taken.a, &clock_told_a_}, std::pair{&taken.b, &clock_told_b_}}) {
+    if (!isNews(by->clock, *told)) continue;
+    *told = by->clock;
+    taken.notes.push_back(by->clock_warning);
+  }
   if (options_.carrier == nullptr || !planned.pose) return taken;
   taken.rig = options_.carrier->log();
   if (auto there = options_.carrier->stillThere(); !there) return naming(planned, there.error());

@@ -102,7 +102,6 @@ class Taker {
                            std::optional<Frame>* first);
   Result<> follow(const PlannedCapture& planned, const Frame& leader, compare::Feed& feed, Taken& taken);
   Result<> tell(const std::string& about, const std::string& what);
-  void noteClock(const TakenBy& by, std::optional<compare::ClockOffset>& told, Taken& taken);
   [[nodiscard]] compare::CaptureOptions captureOptions() const;
   [[nodiscard]] std::optional<Transform<World, Camera>> saidBy(const compare::Feed& feed,
                                                                const Taken& taken) const;

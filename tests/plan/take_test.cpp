@@ -24,7 +24,11 @@ using Story = std::vector<std::string>;
 
 class FakeCamera final : public compare::Feed {
  public:
-  FakeCamera(std::string name, Story& story) : story_(story) { details_.entry.name = std::move(name); }
+  /// Opened five minutes ago, as in a run that is long under way.
+  FakeCamera(std::string name, Story& story)
+      : Feed(std::chrono::system_clock::now() - std::chrono::minutes{5}), story_(story) {
+    details_.entry.name = std::move(name);
+  }
   [[nodiscard]] const SourceDetails& details() const override { return details_; }
   Result<Frame> next(std::chrono::milliseconds) override {
     Frame frame = makes;
@@ -292,6 +296,21 @@ TEST_F(Take, SaysOnceThatADaemonsClockIsOff) {
   b_.clock_ahead = std::chrono::seconds{10};
   EXPECT_EQ(clockNotes(take(0)), 1);
   EXPECT_EQ(clockNotes(take(1)), 0);
+}
+
+/// However long ago its feed was opened: a frame was made after its capture asked for it.
+TEST_F(Take, KnowsThatAClockIsBehindAndWasSetInALongRun) {
+  realAndTwin();
+  begin(kTwoBlocks);
+  b_.clock_ahead = std::chrono::seconds{-30};
+  const auto notes = [&](std::size_t number) {
+    const auto taken = take(number);
+    return taken ? taken->notes : std::vector<std::string>{taken.error().message};
+  };
+  EXPECT_THAT(notes(0), testing::Contains(HasSubstr("behind ours")));
+  EXPECT_THAT(notes(1), testing::Each(testing::Not(HasSubstr("The clock"))));
+  b_.clock_ahead = std::chrono::seconds{-10};
+  EXPECT_THAT(notes(0), testing::Contains(HasSubstr("behind ours")));
 }
 
 TEST_F(Take, PutsBackWhatItSetAndNothingElse) {
