@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <tuple>
 
 #include "calib/intrinsics/markers.h"
 #include "calib/plan/run_index.h"
@@ -46,12 +47,14 @@ class MeasureByTags : public WithDaemon {
     std::ofstream{folder_ / "bare.toml"} << "[[material]]\nname = 'wall'\nalbedo = 0.8\n[[object]]\nshape = "
                                             "'rectangle'\nsize_m = [0.4, 0.3, 0]\n"
                                             "position_m = [0, 0, 0.8]\nmaterial = 'wall'\n";
-    for (const auto& [name, scene] : {std::pair{"cam", "scene"}, {"twin", "scene"}, {"bare", "bare"}})
+    const char* kRange = "planes = ['range']\n";
+    for (const auto& [name, scene, planes] :
+         {std::tuple{"cam", "scene", ""}, {"twin", "scene", ""}, {"bare", "bare", ""}, {"deaf", "scene", kRange},
+          {"mute", "scene", kRange}, {"mute.b", "scene", ""}, {"half", "scene", ""}, {"half.b", "scene", kRange}})
       all += fmt::format(
           "[[source]]\nname = '{}'\ndriver = 'sim'\ncamera = 'camera.toml'\nscene = '{}.toml'\n"
-          "max_surfaces = 1\n",
-          name, scene);
-    all += "[[source]]\nname = 'deaf'\ndriver = 'sim'\ncamera = 'camera.toml'\nscene = 'scene.toml'\nplanes = ['range']\n";
+          "max_surfaces = 1\n{}",
+          name, scene, planes);
     return all;
   }
   Ran measure(double first_corner_x_m, const char* b = "twin", const char* from = "board") const {
@@ -107,6 +110,16 @@ TEST_F(MeasureByTags, SaysAtOnceThatACameraShowsNoBoardAndThatThereIsNoRig) {
   EXPECT_EQ(without_rig.status, 4);
   EXPECT_THAT(without_rig.err, HasSubstr("but there is no rig: --rig names its file"));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "run"));
+}
+
+/// A source of the block's own counts, not the one that it stands for; and where all is there, none.
+TEST_F(MeasureByTags, LooksForAmplitudeInTheSourceOfTheBlock) {
+  const std::string without = "gives no amplitude";
+  EXPECT_THAT(measure(-0.19, "half").err, HasSubstr("but half.b " + without));
+  const Ran mute = measure(-0.19, "mute");
+  EXPECT_EQ(mute.status, 0) << mute.err;
+  EXPECT_THAT(measure(-0.19, "half").err,
+              testing::AllOf(HasSubstr("Write somewhere else"), testing::Not(HasSubstr(without))));
 }
 
 }  // namespace

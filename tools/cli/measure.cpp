@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <filesystem>
 #include <fstream>
 #include <memory>
 #include <set>
@@ -50,6 +51,10 @@ class CameraOfPlan {
       : client_(std::move(client)), name_(std::move(name)), planes_(std::move(planes)) {}
 
   Result<SourceDetails> details() { return client_.describe(name_); }
+  Result<SourceDetails> detailsFor(const std::string& block) {
+    const auto source = sourceFor(block);
+    return source ? client_.describe(*source) : source.error();
+  }
 
   Result<compare::Feed*> forBlock(const std::string& block, plan::Taker& taker) {
     auto wanted = sourceFor(block);
@@ -229,30 +234,41 @@ Result<> checkPlanes(const Options& options, const SourceDetails& a, const Sourc
   return {};
 }
 
-/// Blocks whose poses are seen: what they take must be there, or it would be missed when they come.
-Result<> checkPlaces(const Options& options, const plan::Plan& plan, const SourceDetails& a, const SourceDetails& b) {
-  const auto shows = [](const SourceDetails& details) {
-    return std::ranges::any_of(details.planes, [](PlaneKind kind) {
-      return kind == PlaneKind::Amplitude || kind == PlaneKind::Ambient;
-    });
-  };
-  for (const plan::BlockSpec& block : plan.blocks) {
-    const bool by_rig = block.pose_from == plan::PoseFrom::BoardAndRig,
-               by_board = block.pose_from == plan::PoseFrom::Board;
-    if (by_rig && options.rig.empty()) {
-      return Error{Error::Code::InvalidArgument,
-                   fmt::format("block \"{}\" has pose_from = \"board_and_rig\", but there is no rig: --rig names its "
-                               "file",
-                               block.name)};
-    }
-    for (const SourceDetails* camera : {&a, &b}) {
-      const bool must_see = by_board || (by_rig && (camera == &a || !b.can_set_pose));
-      if (!must_see || shows(*camera)) continue;
-      return Error{Error::Code::InvalidArgument,
-                   fmt::format("block \"{}\" takes its poses from the board, but {} gives no amplitude, in which it "
-                               "could be seen: pose_from may be \"planes\" or \"command\" instead",
-                               block.name, camera->entry.name)};
-    }
+/// Of a block whose poses are seen: what it takes must be there, or it would be missed when it comes.
+Result<> checkPlace(const Options& options, const plan::BlockSpec& block, CameraOfPlan& a, CameraOfPlan& b) {
+  const bool by_rig = block.pose_from == plan::PoseFrom::BoardAndRig,
+             by_board = block.pose_from == plan::PoseFrom::Board;
+  if (!by_rig && !by_board) return {};
+  if (by_rig && options.rig.empty()) {
+    return Error{Error::Code::InvalidArgument,
+                 fmt::format("block \"{}\" has pose_from = \"board_and_rig\", but there is no rig: --rig names its "
+                             "file",
+                             block.name)};
+  }
+  const auto of_a = a.detailsFor(block.name), of_b = b.detailsFor(block.name);
+  if (!of_a) return of_a.error();
+  if (!of_b) return of_b.error();
+  const auto isToShowIt = [](PlaneKind kind) { return kind == PlaneKind::Amplitude || kind == PlaneKind::Ambient; };
+  for (const SourceDetails* camera : {&*of_a, &*of_b}) {
+    const bool must_see = by_board || camera == &*of_a || !of_b->can_set_pose;
+    if (!must_see || std::ranges::any_of(camera->planes, isToShowIt)) continue;
+    return Error{Error::Code::InvalidArgument,
+                 fmt::format("block \"{}\" takes its poses from the board, but {} gives no amplitude, in which it "
+                             "could be seen: pose_from may be \"planes\" or \"command\" instead",
+                             block.name, camera->entry.name)};
+  }
+  return {};
+}
+
+/// Of the blocks that are left, before the folder is made: a run that cannot go on is not begun.
+Result<> checkPlaces(const Options& options, const plan::Plan& plan, const plan::Schedule& schedule, CameraOfPlan& a,
+                     CameraOfPlan& b) {
+  const auto there = plan::readIndex(std::filesystem::path{options.output} / plan::kIndexFile);
+  std::set<std::size_t> looked_at;
+  for (const plan::PlannedCapture& planned : schedule.captures) {
+    if (there && there->contains(planned.number)) continue;
+    if (!looked_at.insert(planned.block).second) continue;
+    if (auto placed = checkPlace(options, plan.blocks[planned.block], a, b); !placed) return placed;
   }
   return {};
 }
@@ -266,7 +282,6 @@ Result<Exit> carryOut(const Options& options, const plan::Plan& plan, const std:
   if (!details_a) return details_a.error();
   if (!details_b) return details_b.error();
   if (auto given = checkPlanes(options, *details_a, *details_b); !given) return given.error();
-  if (auto placed = checkPlaces(options, plan, *details_a, *details_b); !placed) return placed.error();
   const auto schedule = plan::scheduleOf(plan, {intervalOf(*details_a), intervalOf(*details_b)});
   if (!schedule) return Error{schedule.error().code, options.plan + ": " + schedule.error().message};
   const auto checked = plan::check(plan, *schedule);
@@ -274,6 +289,7 @@ Result<Exit> carryOut(const Options& options, const plan::Plan& plan, const std:
     return Error{Error::Code::InvalidArgument,
                  fmt::format("{}: nothing was captured.\n{}", options.plan, inWords(checked))};
   }
+  if (auto placed = checkPlaces(options, plan, *schedule, *a, *b); !placed) return placed.error();
   std::unique_ptr<compare::Carrier> carrier;
   if (!options.rig.empty()) {
     auto opened = openCarrier(options.rig);
