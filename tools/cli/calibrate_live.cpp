@@ -4,49 +4,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <optional>
 
 #include "calib/intrinsics/brightness.h"
+#include "tools/cli/prompter.h"
 #include "tools/cli/terminal.h"
 
 namespace toftwin::cli {
 namespace live_calibration {
 
 using namespace intrinsics;
-
-/// What a person who holds the board is told. Said again only when it changes.
-class Prompter {
- public:
-  void say(const Guidance& guidance) {
-    std::string text = fmt::format("{} view{}, {} % of the image", guidance.views, guidance.views == 1 ? "" : "s",
-                                   wholePercent(guidance.covered));
-    if (guidance.worst_error_px) text += fmt::format(", lens known to {:.2f} px", *guidance.worst_error_px);
-    text += guidance.isEnough() ? "\n  enough: Ctrl-C, or wait\n" : "\n";
-    for (const std::string& missing : guidance.missing) text += "  " + missing + "\n";
-    sayOnce(text);
-  }
-  void sayOnce(const std::string& text) {
-    why_said_.clear();
-    if (text == said_) return;
-    fmt::print(stderr, "{}", text);
-    said_ = text;
-  }
-  /// Why what is there now is not taken: when it has been so for a while, as a board that is brought elsewhere is
-  /// blurred, moving and out of the image on its way.
-  void whyNot(const std::string& why) {
-    constexpr std::chrono::seconds kWhile{1};
-    const auto now = std::chrono::steady_clock::now();
-    if (why != why_) why_ = why, since_ = now;
-    if (why == why_said_ || now - since_ < kWhile) return;
-    fmt::print(stderr, "  not taken: {}\n", why);
-    why_said_ = why;
-  }
-
- private:
-  std::string said_, why_, why_said_;
-  std::chrono::steady_clock::time_point since_{};
-};
 
 /// In words that stay the same from frame to frame.
 std::string whyNot(const Sighting& sighting) {
@@ -73,10 +40,6 @@ std::optional<Estimate> soFar(const Collector& collector) {
                          {.model = LensModel::K1K2, .degree = 0, .folds = 0});
   return result ? std::optional{*std::move(result)} : std::nullopt;
 }
-
-/// Where squares are of ten pixels the quick search misses most boards that the thorough one finds,
-/// which takes a second. After so many misses in a row it is tried.
-constexpr int kMissesUntilThorough = 3;
 
 /// In which a board can be seen.
 Result<PlaneKind> planeOf(Client& client, const std::string& source) {
@@ -105,10 +68,11 @@ Result<> collectLive(const DaemonOptions& daemon, const LiveOptions& live, intri
   if (!plane) return plane.error();
   auto frames = client->subscribe(live.source, {.planes = {*plane}});
   if (!frames) return frames.error();
-  Prompter prompter;
+  Prompter prompter{[](const std::string& text) { fmt::print(stderr, "{}", text); }};
+  Searches searches;
   prompter.sayOnce("show the board and hold it still; Ctrl-C ends\n");
   std::optional<Sighting> before;
-  int views = 0, misses = 0;
+  int views = 0;
   while (!interrupted() && views < live.most_views) {
     const auto frame = waitForFrame(*frames, daemon.timeout());
     if (!frame && frame.error().code == Error::Code::Stopped) break;
@@ -121,25 +85,25 @@ Result<> collectLive(const DaemonOptions& daemon, const LiveOptions& live, intri
     if (!brightness) return brightness.error();
     const NamedImage image{fmt::format("{} frame {}", live.source, frame->sequence), *std::move(brightness)};
     DetectOptions how = collector.options();
-    how.is_thorough = misses >= kMissesUntilThorough;
+    how.is_thorough = searches.isThorough();
     Sighting sighting = findBoard(image.brightness, collector.target(), how);
     sighting.name = image.name;
-    if (!sighting.isUsed()) misses = how.is_thorough ? 0 : misses + 1;
+    const bool is_so = searches.add(sighting);
     // Two frames that agree: the board is held still, so the exposures of one frame agree as well.
     const bool is_still = before && sighting.isUsed() && movedBy(*before, sighting) < live.still_px;
     const bool is_alike = is_still && collector.isLikeAnother(sighting);
     if (is_alike) sighting.rejection = Rejection::LikeAnother;
-    if (!is_still || is_alike) prompter.whyNot(live_calibration::whyNot(sighting));
+    if (is_so && (!is_still || is_alike)) prompter.whyNot(live_calibration::whyNot(sighting));
     before = sighting.isUsed() || is_alike ? std::optional{sighting} : std::nullopt;
     if (!is_still) continue;  // a board that took the thorough search is looked for so once more
-    misses = 0;
+    searches.beginAnew();
     if (is_alike) continue;
     const ImageSize size{image.brightness.width(), image.brightness.height()};
     if (auto added = collector.add(std::move(sighting), size); !added) return added;
     on_view(image);
     ++views;
     const Guidance guidance = guidanceFor(collector);
-    prompter.say(guidance);
+    prompter.tell(guidance);
     if (guidance.isEnough() && live.until_enough) break;
   }
   return {};
