@@ -159,21 +159,22 @@ double frameRateOf(std::vector<double> starts_s) {
   return interval > 0.0 ? 1.0 / interval : std::numeric_limits<double>::quiet_NaN();
 }
 
-/// A scene that is not the recording's, or a pose: of a camera that sees what the scene has, edges and wraps are off as
-/// far, but few pixels.
+/// A scene that is not the recording's, or a pose: of a camera that sees what the scene has, edges are off as far, but
+/// few pixels. Wraps may be many, and are asked for. What is beyond the scene, as of a room of which a part was
+/// measured, says nothing.
 std::optional<std::string> otherScene(const std::string& pose, const AtPose& there, const Seen& seen) {
   constexpr float kFar_m = 0.3F;
   constexpr double kFew = 0.1;
   double valid = 0.0, far = 0.0;
   for (const Image<float>& range_m : there.frames_m) {
     for (std::size_t i = 0; i < range_m.size(); ++i) {
-      if (!std::isfinite(range_m[i])) continue;
-      ++valid, far += !(std::abs(range_m[i] - seen.range_m[i]) <= kFar_m);
+      const float off_m = std::abs(range_m[i] - seen.range_m[i]);
+      if (std::isfinite(off_m)) ++valid, far += off_m > kFar_m;
     }
   }
   if (far <= kFew * valid) return std::nullopt;
   return fmt::format("At \"{}\" {:.0f} % of its valid pixels are over {:.0f} mm from what the scene has there: is it "
-                     "the scene that was recorded, and the pose?",
+                     "the scene that was recorded, and the pose, or do its ranges wrap?",
                      pose, 100.0 * far / valid, 1e3F * kFar_m);
 }
 

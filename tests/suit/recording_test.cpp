@@ -133,7 +133,21 @@ TEST(Recording, OfAnotherSceneSaysSo) {
   const auto far = folder.judged("[[pose]]\nname = 'other'\nposition_m = [0, 0, -0.5]\n" + kCase + "pose = 'other'\n");
   ASSERT_TRUE(far) << far.error().message;
   EXPECT_THAT(far->cameras.front().notes,
-              testing::ElementsAre(HasSubstr("At \"other\" 100 % of its valid pixels are over 300 mm from what")));
+              testing::ElementsAre(testing::AllOf(
+                  HasSubstr("At \"other\" 100 % of its valid pixels are over 300 mm from what"),
+                  HasSubstr("is it the scene that was recorded, and the pose, or do its ranges wrap?"))));
+}
+
+/// Of its wall 1 m² was measured: the other pixels, three of four, have no truth, and nothing against the scene.
+TEST(Recording, OfMoreThanTheSceneHasIsNotTakenForAnothers) {
+  const Folder folder;
+  record(folder, 8, Transform<World, Camera>{});
+  folder.write("scene.toml",
+               "[[material]]\nname = 'grey'\nalbedo = 0.5\n[[object]]\nname = 'wall'\nshape = 'rectangle'\n"
+               "size_m = [1, 1, 0]\nposition_m = [-0.6, 0, 2]\nmaterial = 'grey'\n");
+  const auto suit = folder.judged(kCase);
+  ASSERT_TRUE(suit) << suit.error().message;
+  EXPECT_THAT(suit->cameras.front().notes, testing::Each(testing::Not(HasSubstr("is it the scene"))));
 }
 
 TEST(Recording, ThatIsNotThereIsNamedWithItsPlace) {
