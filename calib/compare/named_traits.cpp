@@ -56,7 +56,8 @@ void TraitCollector::add(NamedRows rows, const Result<DriftTraits>& drift) {
 
 namespace {
 
-constexpr const char* kInDoubt = "in doubt";  ///< the last of details
+/// The last of details, in this order.
+constexpr std::string_view kUnseen = "not seen by itself", kInDoubt = "in doubt";
 
 std::string endOf(const Trait& trait, double end) {
   return isKnown(end, trait.unit) ? shownDigits(end, 4) : "not known";
@@ -66,9 +67,9 @@ std::string endOf(const Trait& trait, double end) {
 
 std::string detailsOf(const NamedTrait& one) {
   std::string all = one.detail;
-  const auto add = [&all](const std::string& text) { all += (all.empty() ? "" : ", ") + text; };
+  const auto add = [&all](std::string_view text) { (all += all.empty() ? "" : ", ") += text; };
   if (const auto* line = std::get_if<OnLine>(&one.trait.refers_to)) add(placeInWords(line->at_m));
-  if (isUnseenPart(one)) add("not seen by itself");
+  if (isUnseenPart(one)) add(kUnseen);
   if (!one.trait.doubt.empty()) add(kInDoubt);
   return all;
 }
@@ -80,6 +81,15 @@ bool isUnseenPart(const NamedTrait& one) {
 }
 
 bool isInDoubt(std::string_view details) { return details.ends_with(kInDoubt); }
+
+std::string withoutDoubt(std::string_view details) {
+  for (const std::string_view doubt : {kInDoubt, kUnseen}) {
+    if (!details.ends_with(doubt)) continue;
+    details.remove_suffix(doubt.size());
+    if (details.ends_with(", ")) details.remove_suffix(2);
+  }
+  return std::string{details};
+}
 
 TableBlock traitTable(const NamedTraits& traits, const std::string& a, const std::string& b) {
   TableBlock table{

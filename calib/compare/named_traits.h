@@ -66,6 +66,8 @@ class TraitCollector {
 std::string detailsOf(const NamedTrait& one);
 /// Whether details, as a log keeps them, say that the number is in doubt.
 bool isInDoubt(std::string_view details);
+/// The rest of them: what the number is of.
+std::string withoutDoubt(std::string_view details);
 /// A part of a noise law that is told as 0, as its interval holds 0: what the others have may be its.
 bool isUnseenPart(const NamedTrait& one);
 /// A row for each number, A, B and B − A beside each other. `a` and `b` say whose they are.

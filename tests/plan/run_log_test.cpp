@@ -334,6 +334,16 @@ TEST(Trend, CallsNoNumberInDoubtChanged) {
   EXPECT_FALSE(trendsOf({of("1", 1.0, "in doubt"), of("2", 9.0, "in doubt")}).front().rows[1].isChanged());
 }
 
+/// What a number is of is held against the first's without what doubts either.
+TEST(Trend, TellsWhatANumberIsOfFromItsDoubt) {
+  using compare::withoutDoubt;
+  EXPECT_EQ(withoutDoubt("in doubt"), "");
+  EXPECT_EQ(withoutDoubt("ramp, in doubt"), "ramp");
+  EXPECT_EQ(withoutDoubt("ramp, at 1.5 m, not seen by itself, in doubt"), "ramp, at 1.5 m");
+  EXPECT_EQ(withoutDoubt("not seen by itself"), "");
+  EXPECT_EQ(withoutDoubt("ramp"), "ramp");
+}
+
 /// Means of 24 intervals of 50 ms, added up in another order.
 TEST(Trend, TakesWhatRoundingLeavesForNothing) {
   const auto of = [](std::string began, double value) {

@@ -155,8 +155,9 @@ std::string verdictOn(const plan::TrendRow& row, const std::string& first_detail
     verdict += fmt::format("; {} in doubt, and this is called no change",
                            compare::isInDoubt(row.at.trait.detail) ? "it is" : "the first is");
   }
-  if (row.at.trait.detail != first_detail)
-    verdict += first_detail.empty() ? "; the first was without" : "; the first was " + first_detail;
+  const std::string first = compare::withoutDoubt(first_detail);
+  if (compare::withoutDoubt(row.at.trait.detail) != first)
+    verdict += first.empty() ? "; the first was without" : "; the first was " + first;
   return verdict;
 }
 
