@@ -131,10 +131,13 @@ Guidance guide(const Target& target, const std::vector<Sighting>& sightings, Ima
     guidance.missing.push_back("show the board in these parts of the image: " + listed(parts));
   } else if (guidance.covered < goals.covered) {
     // One of nine parts at least has less than the mean that is wanted.
-    guidance.missing.push_back(fmt::format("go closer to the image's edge at its {}: {} % of the image are covered, "
-                                           "{:.0f} % are wanted",
-                                           fmt::join(cover.missing(goals.covered), ", "),
-                                           wholePercent(guidance.covered), 100.0 * goals.covered));
+    auto edges = cover.missing(goals.covered);
+    std::erase(edges, "centre");
+    guidance.missing.push_back(
+        fmt::format("{}: {} % of the image are covered, {:.0f} % are wanted",
+                    edges.empty() ? "fill the centre of the image"
+                                  : "go closer to the image's edge at its " + listed(edges),
+                    wholePercent(guidance.covered), 100.0 * goals.covered));
   }
   if (guidance.views > 0) guideStance(guidance, stanceOf(target, sightings, size, estimate, goals), goals);
   if (guidance.views < goals.views) {

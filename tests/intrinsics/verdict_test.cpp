@@ -264,6 +264,23 @@ TEST(Guidance, SaysWhichEdgesLackCoverage) {
                                         Not(HasSubstr("centre")))));
 }
 
+/// Views along the four sides and one in the middle: of the centre alone, 48 of 88 cells of 10 pixels are covered.
+TEST(Guidance, SendsNobodyToTheEdgeForTheCentre) {
+  const Target board = checkerboard();
+  const std::size_t across = static_cast<std::size_t>(board.columns), all = board.corners();
+  std::vector<Sighting> seen;
+  for (const auto& [left, top, right, bottom] : {std::array{-1.0, -1.0, 320.0, 79.0}, {-1.0, 160.0, 320.0, 240.0},
+                                                 {-1.0, -1.0, 109.0, 240.0}, {220.0, -1.0, 320.0, 240.0},
+                                                 {130.0, 70.0, 185.0, 170.0}}) {
+    Sighting& view = seen.emplace_back();
+    view.square_px = 1.0;
+    view.corners = {{0, {left, top}}, {across - 1, {right, top}}, {all - across, {left, bottom}},
+                    {all - 1, {right, bottom}}};
+  }
+  EXPECT_THAT(guide(board, seen, {320, 240}, nullptr, {.covered = 0.95}).missing,
+              Contains("fill the centre of the image: 94 % of the image are covered, 95 % are wanted"));
+}
+
 TEST(Guidance, KnowsWhichEdgeIsNearest) {
   const Truth truth = twoTerms();
   std::mt19937_64 random{16};
