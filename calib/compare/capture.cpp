@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <numbers>
 #include <optional>
 #include <utility>
 
@@ -81,11 +82,19 @@ Result<Frame> nextFrame(Feed& feed, const CaptureOptions& options) {
   }
 }
 
-std::string placeInWords(const Transform<World, Camera>& pose) {
+std::string poseInWords(const Transform<World, Camera>& pose) {
   const auto& t = pose.translation_m;
   const Vec3d axis = pose.rotate({0.0, 0.0, 1.0});
   return fmt::format("at x {:.4g}, y {:.4g}, z {:.4g} m and looking along {:.3g}, {:.3g}, {:.3g}", t.x, t.y, t.z,
                      axis.x, axis.y, axis.z);
+}
+
+/// How far one is from the other: their places and axes may be the same in words.
+std::string awayInWords(const Transform<World, Camera>& from, const Transform<World, Camera>& to) {
+  const auto turn = (from.inverse() * to).rotation_wxyz;  // cos α/2, axis sin α/2
+  const double angle = 2.0 * std::atan2(std::hypot(turn[1], turn[2], turn[3]), std::abs(turn[0]));
+  return fmt::format("{:.3g} mm and {:.3g}° from it", 1e3 * norm(to.translation_m - from.translation_m),
+                     angle * 180.0 / std::numbers::pi);
 }
 
 /// The next frame of that pose; frames of other poses are skipped.
@@ -103,10 +112,11 @@ Result<Frame> nextAt(Feed& feed, const std::optional<Transform<World, Camera>>& 
     said = *there;
   }
   return Error{Error::Code::Timeout,
-               fmt::format("{}: none of {} frames was taken at the pose asked for, {}; they say {}. A recording "
-                           "must have been made with "
-                           "the same pose file; a camera on a rig must be moved there.",
-                           feed.details().entry.name, options.most_skipped, placeInWords(*pose), placeInWords(said))};
+               fmt::format("{}: none of {} frames was taken at the pose asked for, {}; they say {}, which is {}. A "
+                           "recording must have been made with the same pose file; a camera on a rig must be moved "
+                           "there.",
+                           feed.details().entry.name, options.most_skipped, poseInWords(*pose), poseInWords(said),
+                           awayInWords(*pose, said))};
 }
 
 /// The next frame of both, at almost the same time: a camera that makes its frames when asked, such

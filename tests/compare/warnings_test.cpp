@@ -133,6 +133,20 @@ TEST(Warnings, TellOfARecordingOfOtherPoses) {
       HasSubstr("kinect: none of its last 4 frames was taken at the pose asked for; it must have been"));
 }
 
+/// A degree about the optical axis: place and axis are the same.
+TEST(Warnings, TellByHowMuchARecordingsPosesAreOthers) {
+  const record::Folder folder;
+  const auto file = folder / "a.mcap";
+  recordFrames(file, 4, frameFromOrigin(std::chrono::milliseconds{0}));
+  const auto a = openRecording(file.string()), b = openRecording(file.string());
+  ASSERT_TRUE(a && b);
+  Progress silent{nullptr};
+  const auto captured = capture(
+      **a, **b, {.poses = {{.name = "turned", .euler_deg = {0.0, 0.0, 1.0}}}, .frames = 2, .most_skipped = 2}, silent);
+  ASSERT_FALSE(captured);
+  EXPECT_THAT(captured.error().message, HasSubstr("which is 0 mm and 1° from it"));
+}
+
 TEST(Warnings, TellThatARecordingEndedBeforeThePoseForItWasCutOff) {
   const record::Folder folder;
   const auto whole = folder / "a.mcap", cut = folder / "b.mcap";
