@@ -14,6 +14,7 @@
 #include "daemon/daemon.h"
 #include "daemon/memory.h"
 #include "drivers/logging.h"
+#include "protocol/types/counted.h"
 
 namespace {
 
@@ -54,8 +55,7 @@ int check(const Arguments& arguments) {
     fmt::print("{} is good, but has no [[source]]: clients would see nothing\n", arguments.config);
     return kOk;
   }
-  fmt::print("{} is good: {} source{}\n", arguments.config, config->sources.size(),
-             config->sources.size() == 1 ? "" : "s");
+  fmt::print("{} is good: {}\n", arguments.config, counted(config->sources.size(), "source"));
   return kOk;
 }
 

@@ -13,6 +13,7 @@
 #include "calib/compare/column_units.h"
 #include "calib/compare/csv.h"
 #include "calib/compare/traits/repeats.h"
+#include "protocol/types/counted.h"
 
 namespace toftwin::compare {
 namespace {
@@ -143,8 +144,7 @@ Result<> addSessions(const std::filesystem::path& file, TableColumns& table) {
                 "rows are of {} sessions, each of which may have an offset of its own: what it is in is the "
                 "mean over sessions, and as uncertain as these differ",
                 count)
-          : fmt::format("column \"{}\", of {} value{}, is not heeded", kSession, count,
-                        count == 1 ? "" : "s"));
+          : fmt::format("column \"{}\", of {}, is not heeded", kSession, counted(count, "value")));
   if (is_heeded) table.session = std::move(column);
   return {};
 }

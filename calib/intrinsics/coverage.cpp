@@ -8,6 +8,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "protocol/types/counted.h"
+
 namespace toftwin::intrinsics {
 namespace {
 
@@ -141,8 +143,7 @@ Guidance guide(const Target& target, const std::vector<Sighting>& sightings, Ima
   }
   if (guidance.views > 0) guideStance(guidance, stanceOf(target, sightings, size, estimate, goals), goals);
   if (guidance.views < goals.views) {
-    const std::size_t left = goals.views - guidance.views;
-    guidance.missing.push_back(fmt::format("{} more view{}", left, left == 1 ? "" : "s"));
+    guidance.missing.push_back(counted(goals.views - guidance.views, "more view"));
   }
   if (estimate == nullptr) return guidance;
   const MappingError error{estimate->bundle, estimate->uncertainty, size.width, size.height};

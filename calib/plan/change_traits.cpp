@@ -83,9 +83,10 @@ void addMotion(const ComparedRun& run, std::size_t camera, TraitCollector& all) 
   }
   if (captures.empty()) return;
   if (speed.empty()) {
-    all.untold(fmt::format(
-        "motion of {}: in none of {} do two frames with a time of their own show the plate whole",
-        kCameras[camera], counted(captures.size(), "capture")));
+    const std::string where =
+        captures.size() == 1 ? "its one capture no" : fmt::format("none of {} captures do", captures.size());
+    all.untold(fmt::format("motion of {}: in {} two frames with a time of their own show the plate whole",
+                           kCameras[camera], where));
     return;
   }
   all.add("motion, right end − left end", kCameras[camera], compare::motionTraits(speed, turn));

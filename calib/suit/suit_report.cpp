@@ -354,8 +354,9 @@ std::string inWords(const Suit& suit) {
   }
   const std::size_t all = suit.cameras.size();
   if (count > 0)
-    return fmt::format("{} of {} {} what is asked{}: {}.", count, counted(all, "camera"), count == 1 ? "does" : "do",
-                       count == 1 ? "" : ", best first", fit);
+    return fmt::format("{} {} what is asked{}: {}.",
+                       all == 1 ? "The one camera" : fmt::format("{} of {} cameras", count, all),
+                       count == 1 ? "does" : "do", count == 1 ? "" : ", best first", fit);
   const CameraResult& best = suit.cameras.front();
   const std::string failed = failedOf(suit.use, best);
   const std::string how =
@@ -363,8 +364,8 @@ std::string inWords(const Suit& suit) {
           ? fmt::format("of {} {} not known", counted(best.requirements.size(), "requirement"),
                         best.unknown == 1 ? "1 is" : fmt::format("{} are", best.unknown))
           : fmt::format("it {}{}{}", stateOf(best), failed.empty() ? "" : ": ", failed);
-  return fmt::format("None of {} does all that is asked. {} comes nearest: {}.", counted(all, "camera"), best.name,
-                     how);
+  if (all == 1) return fmt::format("The one camera, {}, does not do all that is asked: {}.", best.name, how);
+  return fmt::format("None of {} cameras does all that is asked. {} comes nearest: {}.", all, best.name, how);
 }
 
 Result<std::filesystem::path> writeSuit(const Suit& suit, const std::filesystem::path& folder,

@@ -182,7 +182,8 @@ TEST(RunTraits, SayWhereTheScenesOfBothHaveNoTimeInCommon) {
 TEST(RunTraits, SayThatNoFrameShowsAPlateMove) {
   ComparedRun run = plantedRun();
   run.moving.emplace_back().record.kind = "moving";
-  EXPECT_THAT(traitsOf(run).untold, testing::Contains(testing::HasSubstr("motion of A: in none of 1 capture do two")));
+  EXPECT_THAT(traitsOf(run).untold,
+              testing::Contains(testing::HasSubstr("motion of A: in its one capture no two frames")));
 }
 
 /// A plate of 8 × 8 pixels one metre before a wall at 2 m goes one pixel, 1/20 of its metre, per frame of 0.1 s.

@@ -33,7 +33,7 @@ TEST(Ranking, SaysOfARecordingThatFailsNothingWhatIsNotKnown) {
   camera.requirements[1].is_judged = camera.requirements[2].is_judged = false;
   camera.unknown = 2;
   EXPECT_EQ(inWords(suit),
-            "None of 1 camera does all that is asked. ours comes nearest: of 3 requirements 2 are not known.");
+            "The one camera, ours, does not do all that is asked: of 3 requirements 2 are not known.");
 }
 
 /// That all pixels are valid can be met, but no number of frames makes it certain.
@@ -44,7 +44,7 @@ TEST(Ranking, SaysThatWhatIsMetIsNotCertain) {
                                   "[[require]]\nname = 'whole'\nkind = 'valid'\nat_least_percent = 100\n" +
                                   entry("ideal.toml"));
   ASSERT_TRUE(suit) << suit.error().message;
-  EXPECT_EQ(inWords(*suit), "1 of 1 camera does what is asked: ideal.toml (1 of 2 not certain).");
+  EXPECT_EQ(inWords(*suit), "The one camera does what is asked: ideal.toml (1 of 2 not certain).");
 }
 
 /// Four cameras that differ in two things: a sixteenth of the light is √16 times the shot noise, in the dark;

@@ -14,6 +14,7 @@
 #include <toftwin/names.h>
 
 #include "protocol/settings/describe.h"
+#include "protocol/types/counted.h"
 
 namespace toftwin::cli {
 
@@ -43,8 +44,7 @@ compare::Json toJson(const std::vector<FacadeHealthEntry>& facades) {
 }
 
 std::string toText(const FacadeHealthEntry& facade) {
-  const std::string clients =
-      facade.clients ? fmt::format(", {} client{}", *facade.clients, *facade.clients == 1 ? "" : "s") : "";
+  const std::string clients = facade.clients ? ", " + counted(*facade.clients, "client") : "";
   const std::string& more = facade.problem.empty() ? facade.place : facade.problem;
   return fmt::format("{} {}{}{}{}", facade.kind, nameOf(facade.state), clients, more.empty() ? "" : ": ",
                      more);

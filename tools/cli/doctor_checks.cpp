@@ -16,6 +16,7 @@
 #include <thread>
 #include <utility>
 
+#include "protocol/types/counted.h"
 #include "tools/cli/doctor_system.h"
 
 namespace toftwin::cli {
@@ -170,8 +171,8 @@ std::vector<Finding> checkDaemon(const DaemonOptions& daemon) {
   }
   std::vector<Finding> findings{
       {State::Good, "daemon",
-       fmt::format("{}, up for {:.0f} s, {} client{}", health->software, health->uptime.in(second),
-                   health->sessions, health->sessions == 1 ? "" : "s"),
+       fmt::format("{}, up for {:.0f} s, {}", health->software, health->uptime.in(second),
+                   counted(health->sessions, "client")),
        ""}};
   if (health->sources.empty()) {
     findings.push_back({State::Warning, "sources", "the daemon has none",

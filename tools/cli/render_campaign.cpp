@@ -8,6 +8,7 @@
 #include <toftwin/names.h>
 
 #include "drivers/sim/default_scene.h"
+#include "protocol/types/counted.h"
 #include "sim/images/content_hash.h"
 #include "sim/sensor/color.h"
 #include "sim/sensor/frame_assembly.h"
@@ -218,7 +219,7 @@ Result<Exit> renderCampaign(const RenderOptions& options) {
   if (!report) return report.error();
   const std::uint64_t all = report->rendered + report->there_already;
   fmt::print(
-      "{}: {} frame{}{}; {}\n", options.output.file, all, all == 1 ? "" : "s",
+      "{}: {}{}; {}\n", options.output.file, counted(all, "frame"),
       report->there_already > 0 ? fmt::format(", {} of them there already", report->there_already) : "",
       sink->note());
   return Exit::Ok;

@@ -11,6 +11,7 @@
 #include "calib/compare/stack.h"
 #include "calib/compare/statistics.h"
 #include "calib/discover/campaign/light_noise.h"
+#include "protocol/types/counted.h"
 
 namespace toftwin::discover {
 namespace {
@@ -199,9 +200,7 @@ void compareParity(const std::vector<double>& means, MeasuredCapture& capture) {
 
 }  // namespace
 
-std::string howMany(std::size_t count, const std::string& what) {
-  return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
-}
+std::string howMany(std::size_t count, const std::string& what) { return counted(count, what); }
 
 Error ofCapture(const plan::CaptureRecord& record, const std::string& message, Error::Code code) {
   return {code, fmt::format("capture {} (\"{}\"): {}", record.number, record.name, message)};

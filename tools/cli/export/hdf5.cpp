@@ -10,6 +10,7 @@
 #include <cstring>
 #include <optional>
 
+#include "protocol/types/counted.h"
 #include "tools/cli/export/atomic_file.h"
 #include "tools/cli/export/hdf5_columns.h"
 #include "tools/cli/export/hdf5_id.h"
@@ -299,7 +300,7 @@ std::string Hdf5File::note() const {
     if (isPlane(column))
       planes += (planes.empty() ? "" : ", ") + column.path.substr(column.path.rfind('/') + 1);
   }
-  return fmt::format("HDF5, {} frame{}: {}", frames(), frames() == 1 ? "" : "s", planes);
+  return fmt::format("HDF5, {}: {}", counted(frames(), "frame"), planes);
 }
 
 }  // namespace toftwin::cli
