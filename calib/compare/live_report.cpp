@@ -180,7 +180,8 @@ Result<Finding> judgeLive(const Capture& capture) {
       "% of "
       "the pixels. {} by more than {} mm and {} counted apart.",
       counted(all.n, "pixel"), posesInWords(poses.size(), c.places), shown(main.noise_a_mm, 2),
-      shown(main.noise_b_mm, 2), shown(100.0 * c.mask_agreement, 1), c.gross == 1 ? "1 pixel differs" : counted(c.gross, "pixel") + " differ",
+      shown(main.noise_b_mm, 2), shown(100.0 * c.mask_agreement, 1),
+      counted(c.gross, "pixel") + (c.gross == 1 ? " differs" : " differ"),
       shown(kGross_mm, 0), c.gross == 1 ? "is" : "are");
   for (const Drift& drift : drifts) finding.section.verdict += " " + inWords(drift, capture);
   auto& blocks = finding.section.blocks;

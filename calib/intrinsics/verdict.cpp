@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/intrinsics/verdict.h"
-#include "protocol/types/counted.h"
 
 #include <fmt/format.h>
 
@@ -8,6 +7,8 @@
 #include <cmath>
 
 #include <toftwin/camera_info.h>
+
+#include "protocol/types/counted.h"
 
 namespace toftwin::intrinsics {
 namespace {
@@ -101,8 +102,8 @@ void warnOfTermsLeftOut(const Calibrated& calibrated, std::vector<std::string>& 
     if (!(most > 1.0)) continue;
     warnings.push_back(fmt::format(
         "the intervals are those of {}: {} may do better on views it has not seen ({:+.1f} % ± {:.1f}), and with it {} "
-        "is {:.{}f}, {:.1f} half-widths away; more views, up to the edges of the image, tell whether its terms are there "
-        "(--model {} takes them)",
+        "is {:.{}f}, {:.1f} half-widths away; more views, up to the edges of the image, tell whether its terms are "
+        "there (--model {} takes them)",
         nameOf(used->model), nameOf(richer.model), 100.0 * gain.mean, 100.0 * gain.error, kParameterNames[farthest],
         richer.lens[farthest], farthest < 4 ? 2 : 5, most, nameOf(richer.model)));
     return;

@@ -231,8 +231,8 @@ compare::Report reportOf(const CompareRunJob& job, const RunFiles& files,
                          const std::vector<CaptureRecord>& records, compare::Finding finding) {
   compare::Report report{.title = "Comparison of time-of-flight cameras"};
   report.subtitle = fmt::format("{} against {}: {} of the plan \"{}\"", records.front().b.source,
-                                records.front().a.source, counted(records.size(), job.locked ? "locked capture" : "capture"),
-                                files.plan.name);
+                                records.front().a.source,
+                                counted(records.size(), job.locked ? "locked capture" : "capture"), files.plan.name);
   report.verdict = finding.headline + ".";
   report.tone = finding.section.tone;
   report.cards = std::move(finding.cards);

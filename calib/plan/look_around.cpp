@@ -53,8 +53,8 @@ Result<> Taker::checkBoardOf(const PlannedCapture& planned, Feed& b) {
   const auto& [x, y, z] = plan_.board.position_m;
   error.message += fmt::format(
       ". What B looks at must have the board where the plan has it, its first corner at x {:.4g}, y {:.4g}, z {:.4g} "
-      "m: put it into the scene of {} (a rectangle with the board's picture as its material's texture), or into that of a "
-      "source \"NAME.BLOCK\" for this block",
+      "m: put it into the scene of {} (a rectangle with the board's picture as its material's texture), or into that "
+      "of a source \"NAME.BLOCK\" for this block",
       x, y, z, sourceOf(b));
   return error;
 }

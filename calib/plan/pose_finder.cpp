@@ -206,7 +206,8 @@ Result<SeenPose> PoseFinder::find(PoseFrom from, std::span<const Frame> frames,
   if (shift_m <= plan_.board.agree.in(metre) && turn_deg <= plan_.board.agree_deg) return found;
   return Error{Error::Code::InvalidArgument,
                fmt::format("{}; and the rig tells it to {:.0f} mm and {:.1f}° only, more than board.agree_mm "
-                           "and board.agree_deg allow: {}. A misfit far over 1 means that rig and board contradict each other",
+                           "and board.agree_deg allow: {}. A misfit far over 1 means that rig and board contradict "
+                           "each other",
                            sighting.error().message, 1e3 * shift_m, turn_deg, found.what)};
 }
 

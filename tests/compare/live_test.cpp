@@ -213,7 +213,8 @@ TEST_F(Live, ACameraWithoutAmplitudeOrFlagsIsNamed) {
   SourceFeed a{"a", sourceToml(1, 0.0)}, b{"deaf", sourceToml(2, 0.0) + "planes = [\"range\"]\n"};
   const auto captured = capture(a, b, {.frames = 2}, silent);
   ASSERT_TRUE(captured.ok()) << captured.error().message;
-  EXPECT_THAT(captured->warnings, testing::ElementsAre(HasSubstr("deaf gives no amplitude"), HasSubstr("deaf gives no flags")));
+  EXPECT_THAT(captured->warnings,
+              testing::ElementsAre(HasSubstr("deaf gives no amplitude"), HasSubstr("deaf gives no flags")));
 }
 
 TEST_F(Live, CamerasThatLookOtherwiseAreSaidByHowMuch) {

@@ -140,7 +140,6 @@ TEST(BoardPose, IsNotTakenOfABoardThatLooksTheSameTurnedByHalf) {
   EXPECT_TRUE(tellsItsPose({.kind = Target::Kind::Tags, .columns = 8, .rows = 6}));
 }
 
-/// A board of 15 pixels, 20 degrees tilted, with half a pixel of noise: either tilt explains it.
 /// So that whoever asks knows whether there is none to be seen, or one that does not serve.
 TEST(BoardPose, TellsNoBoardFromOneThatIsOfNoUse) {
   Sighting sighting;
@@ -151,6 +150,7 @@ TEST(BoardPose, TellsNoBoardFromOneThatIsOfNoUse) {
   EXPECT_EQ(locateBoard(sighting, testing::checkerboard(), camera).error().code, Error::Code::InvalidArgument);
 }
 
+/// A board of 15 pixels, 20 degrees tilted, with half a pixel of noise: either tilt explains it.
 TEST(BoardPose, RefusesABoardThatMayAsWellBeTiltedTheOtherWay) {
   const Truth truth = testing::kinectLike();
   const Surface surface{testing::checkerboard(), 0};

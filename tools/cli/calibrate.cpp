@@ -13,12 +13,12 @@
 
 #include "calib/intrinsics/overlay.h"
 #include "calib/intrinsics/verdict.h"
+#include "protocol/types/counted.h"
 #include "tools/cli/board_options.h"
 #include "tools/cli/command.h"
 #include "tools/cli/export/atomic_file.h"
 #include "tools/cli/options.h"
 #include "tools/cli/terminal.h"
-#include "protocol/types/counted.h"
 
 namespace toftwin::cli {
 namespace calibrate_command {

@@ -13,10 +13,10 @@
 #include "calib/intrinsics/brightness.h"
 #include "calib/intrinsics/hand_eye.h"
 #include "protocol/settings/describe.h"
+#include "protocol/types/counted.h"
 #include "tools/cli/board_options.h"
 #include "tools/cli/command.h"
 #include "tools/cli/export/atomic_file.h"
-#include "protocol/types/counted.h"
 
 namespace toftwin::cli {
 namespace locate_command {

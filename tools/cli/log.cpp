@@ -13,9 +13,9 @@
 #include "calib/plan/run_log.h"
 #include "calib/plan/sought.h"
 #include "calib/plan/trend.h"
+#include "protocol/types/counted.h"
 #include "tools/cli/export/hdf5_table.h"
 #include "tools/cli/log.h"
-#include "protocol/types/counted.h"
 
 namespace toftwin::cli {
 namespace log_command {

@@ -15,6 +15,7 @@
 #include "calib/plan/check.h"
 #include "calib/plan/take.h"
 #include "sim/images/content_hash.h"
+#include "protocol/types/counted.h"
 #include "tools/cli/command.h"
 #include "tools/cli/measure/person.h"
 #include "tools/cli/measure/run_folder.h"
@@ -22,7 +23,6 @@
 #include "tools/cli/plan_words.h"
 #include "tools/cli/rig_carrier.h"
 #include "tools/cli/terminal.h"
-#include "protocol/types/counted.h"
 
 namespace toftwin::cli {
 namespace measure_command {

@@ -5,8 +5,8 @@
 
 #include <algorithm>
 
-#include "tools/cli/terminal.h"
 #include "protocol/types/counted.h"
+#include "tools/cli/terminal.h"
 
 namespace toftwin::cli {
 

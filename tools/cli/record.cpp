@@ -9,10 +9,10 @@
 #include <thread>
 
 #include "protocol/record/recording.h"
+#include "protocol/types/counted.h"
 #include "tools/cli/command.h"
 #include "tools/cli/options.h"
 #include "tools/cli/terminal.h"
-#include "protocol/types/counted.h"
 
 namespace toftwin::cli {
 namespace record_command {

@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
+#include "protocol/types/counted.h"
 #include "tools/cli/arguments.h"
 #include "tools/cli/command.h"
 #include "tools/cli/terminal.h"
-#include "protocol/types/counted.h"
 
 namespace toftwin::cli {
 namespace suit_command {
