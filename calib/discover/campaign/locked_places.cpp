@@ -46,9 +46,9 @@ Result<LockedPlaces> placesUnder(const std::vector<sim::AnyEffect>& effects, con
 
 }  // namespace
 
-/// What was found may be wrong at a locked place, and look like a pose there: only where the file alone says so, too, and
-/// of one place among many, or of a twentieth, is it left out of whether the model does worse. What is wrong at more of
-/// them is no bump.
+/// What was found may be wrong at a locked place, and look like a pose there: only where the file alone says so, too,
+/// and of one place among many, or of a twentieth, is it left out of whether the model does worse. What is wrong at more
+/// of them is no bump.
 Result<std::vector<StoodOff>> lockedOff(const JudgedCampaign& locked, const JudgedCampaign& open,
                                         const JudgedModels& models) {
   const auto file = placesUnder(models.before.effects, locked, open),
@@ -59,10 +59,7 @@ Result<std::vector<StoodOff>> lockedOff(const JudgedCampaign& locked, const Judg
   std::vector<StoodOff> off;
   for (std::size_t stand = 0; stand < found->places.size(); ++stand) {
     if (!found->is_off[stand]) continue;
-    std::vector<std::size_t> captures;
-    for (std::size_t c = 0; c < stands.size(); ++c)
-      if (stands[c] == stand) captures.push_back(c);
-    off.push_back(describe(std::move(captures), locked.lit.captures, found->places[stand]));
+    off.push_back(describe(stand, stands, locked.lit.captures, found->places[stand]));
     off.back().is_set_aside = file->is_off[stand];
   }
   constexpr std::size_t kMany = 6, kTwentieth = 20;

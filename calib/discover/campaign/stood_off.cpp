@@ -60,7 +60,11 @@ std::string aloneAt(const std::vector<std::size_t>& captures, const std::vector<
 
 }  // namespace
 
-StoodOff describe(std::vector<std::size_t> captures, const std::vector<MeasuredCapture>& all, const Place& place) {
+StoodOff describe(std::size_t stand, const std::vector<std::size_t>& stands, const std::vector<MeasuredCapture>& all,
+                  const Place& place) {
+  std::vector<std::size_t> captures;
+  for (std::size_t c = 0; c < stands.size(); ++c)
+    if (stands[c] == stand) captures.push_back(c);
   Stood off = place.off;
   for (std::size_t way = 0; way < off.size(); ++way)
     if (place.seen[way] < kTold) off[way] = 0.0;
@@ -153,10 +157,8 @@ Result<std::vector<StoodOff>> stoodOff(const Round& round, const OpenCaptures& o
     std::vector<StoodOff> off;
     std::vector<std::size_t> all;
     for (const std::size_t bumped : farOff(ways, most, kWrong)) {
-      std::vector<std::size_t> captures;
-      for (std::size_t c = 0; c < stands.size(); ++c)
-        if (stands[c] == bumped) captures.push_back(c), all.push_back(c);
-      off.push_back(describe(std::move(captures), open.captures, places[bumped]));
+      off.push_back(describe(bumped, stands, open.captures, places[bumped]));
+      all.insert(all.end(), off.back().captures.begin(), off.back().captures.end());
     }
     if (all.size() > 1 && 20 * all.size() > stands.size()) continue;
     for (StoodOff& one : off) one.alone = aloneAt(one.captures, all, open.captures);

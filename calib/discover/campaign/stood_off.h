@@ -29,8 +29,9 @@ bool isFarOff(double deviation, const std::vector<double>& others, double wrong)
 /// Deviations in each way, NaN where captures do not tell it.
 std::vector<std::vector<double>> waysOf(const std::vector<Place>& places);
 
-/// What is told of the place of these captures.
-StoodOff describe(std::vector<std::size_t> captures, const std::vector<MeasuredCapture>& all, const Place& place);
+/// What is told of a place and its captures; `stands` says where each capture stood.
+StoodOff describe(std::size_t stand, const std::vector<std::size_t>& stands, const std::vector<MeasuredCapture>& all,
+                  const Place& place);
 
 /// The places off their poses, as what was found says of all of them. None: there is none, or their captures are more
 /// than one and a twentieth of all. Error: an exposure that the model cannot have.
