@@ -296,8 +296,8 @@ std::string toSvg(const Plot& plot) {
   const int x_ticks = plot.compact ? 5 : 8;
   const Axis y = ordinate(plot.curves, plot.log_y, plot.y_range, main - kBottom, kTop);
   std::string svg =
-      fmt::format("<div class='plot'><svg viewBox='0 0 {} {}' role='img' aria-label='{}'>", width,
-                  height, escaped(plot.title));
+      fmt::format("<div class='plot{}'><svg viewBox='0 0 {} {}' role='img' aria-label='{}'>",
+                  plot.below ? " tall" : "", width, height, escaped(plot.title));
   svg +=
       grid(x, y, x_ticks, !plot.below) + (plot.zero_line ? lineAt(0.0, x, y) : "") + labelOf(plot.y_label, y);
   svg += drawn(plot.curves, x, y);

@@ -74,6 +74,19 @@ const char* classOfCell(const std::string& cell) {
   return cell.size() > kLong && cell.find(", ") != std::string::npos ? " class='number long'" : " class='number'";
 }
 
+/// A number and its error stay on one line.
+std::string htmlOfCell(const std::string& cell) {
+  if (!readsAsNumber(cell)) return escaped(cell);
+  std::string whole;
+  constexpr std::string_view kError = " ± ";
+  std::size_t from = 0;
+  for (auto at = cell.find(kError); at != std::string::npos; at = cell.find(kError, from)) {
+    whole += escaped(cell.substr(from, at - from)) + "&nbsp;±&nbsp;";
+    from = at + kError.size();
+  }
+  return whole + escaped(cell.substr(from));
+}
+
 /// What a cell says at once, and a long reason behind its colon, for a row of its own: in its column it would be
 /// one word wide.
 std::pair<std::string, std::string> partedAtReason(const std::string& cell) {
@@ -88,7 +101,7 @@ std::string html(const std::vector<std::string>& row, const std::vector<bool>& i
   std::string cells, below;
   for (std::size_t i = 0; i < row.size(); ++i) {
     const auto [said, reason] = i == 0 ? std::pair{row[i], std::string{}} : partedAtReason(row[i]);
-    cells += fmt::format("<td{}>{}</td>", is_of_numbers[i] ? classOfCell(said) : "", escaped(said));
+    cells += fmt::format("<td{}>{}</td>", is_of_numbers[i] ? classOfCell(said) : "", htmlOfCell(said));
     below += (below.empty() || reason.empty() ? "" : "; ") + reason;
   }
   if (below.empty()) return "<tr>" + cells + "</tr>";
@@ -97,8 +110,9 @@ std::string html(const std::vector<std::string>& row, const std::vector<bool>& i
 }
 
 std::string html(const TableBlock& table) {
-  std::string out = fmt::format("<div class='scroll' tabindex='0'><table><caption>{}</caption><thead><tr>",
-                                escaped(table.caption));
+  constexpr std::size_t kFew = 8;  // rows that are printed on one page, whatever is left of that before
+  std::string out = fmt::format("<div class='scroll' tabindex='0'><table{}><caption>{}</caption><thead><tr>",
+                                table.rows.size() <= kFew ? " class='few'" : "", escaped(table.caption));
   std::size_t columns = table.header.size();
   for (const auto& row : table.rows) columns = std::max(columns, row.size());
   std::vector<bool> is_of_numbers;

@@ -120,6 +120,20 @@ TEST(Report, SetsNoNamesAsNumbers) {
   EXPECT_THAT(page, HasSubstr("<td>words</td>"));
 }
 
+/// As a table of few rows stays on one page, which a longer one may not.
+TEST(Report, KeepsOnPaperTogetherWhatBelongsTogether) {
+  Report report{.title = "t"};
+  TableBlock table{"c", {"pose", "bias [mm]"}, {{"a ± b", "−2.77 ± 0.27"}}};
+  report.sections.push_back({.id = "s", .blocks = {table}});
+  table.rows.resize(9, {"c", "1"});
+  report.sections[0].blocks.push_back(table);
+  const std::string page = toHtml(report);
+  EXPECT_THAT(page, HasSubstr("<td>a ± b</td><td class='number'>−2.77&nbsp;±&nbsp;0.27</td>"));
+  EXPECT_EQ(page.find("<table class='few'>"), page.rfind("<table class='few'>"));
+  EXPECT_LT(page.find("<table class='few'>"), page.find("<table>"));
+  EXPECT_NE(page.find("<table>"), std::string::npos);
+}
+
 /// A panel of what is left is 76 pixels high.
 TEST(Plot, HasThreeTicksOnEachAxis) {
   for (const auto& [low, high] : {std::pair{-5.5, 5.2}, {-0.03, 0.055}, {0.97, 1.03}, {-10.4, 16.1}}) {
