@@ -203,10 +203,12 @@ Result<> capturePose(Feed& a, Feed& b, std::optional<Follower>& follower, const 
       for (const Frame* frame : {&frame_a, &frame_b}) {
         for (std::string& one : missingPlanes(*frame)) result.warnings.push_back(std::move(one));
       }
+      result.warnings.push_back(sameSeedWarning(frame_a, frame_b));
       if (!a.isRecorded()) result.warnings.push_back(clockWarning(frame_a, a.opened()));
       if (!b.isRecorded()) result.warnings.push_back(clockWarning(frame_b, b.opened()));
       std::erase(result.warnings, "");
     }
+    result.same.addA(frame_a), result.same.addB(frame_b);
     result.log.push_back(logEntry(frame_a, captured.name, "A"));
     result.log.push_back(logEntry(frame_b, captured.name, "B"));
     result.pairs.push_back({result.poses.size(), powerOn(frame_a), powerOn(frame_b),

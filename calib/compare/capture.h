@@ -15,6 +15,7 @@
 #include "calib/compare/json.h"
 #include "calib/compare/poses.h"
 #include "calib/compare/progress.h"
+#include "calib/compare/same_frames.h"
 #include "calib/compare/stack.h"
 
 namespace toftwin::compare {
@@ -90,6 +91,7 @@ struct Capture {
   std::vector<FramePair> pairs;
   std::vector<Json> log;  ///< one entry per frame: source, sequence, times, ids, effects
   std::vector<std::string> warnings;  ///< what a reader must know
+  SameFrames same{};  ///< whether they are two cameras
 };
 
 struct CaptureOptions {

@@ -53,6 +53,7 @@ Result<> addLive(const CompareJob& job, Progress& progress, Report& report, std:
   if (!finding) return finding.error();
   if (auto written = writeLog(*captured, job.output); !written) return written;
   report.tone = finding->section.tone;
+  report.notes = finding->notes;
   report.subtitle =
       fmt::format("{} ({}) against {} ({}), {} at {}{}", captured->b.entry.name,
                   captured->b.entry.model, captured->a.entry.name, captured->a.entry.model,
@@ -85,7 +86,7 @@ std::string today() {
 
 }  // namespace
 
-Result<std::filesystem::path> compareAndReport(const CompareJob& job, Progress& progress) {
+Result<WrittenReport> compareAndReport(const CompareJob& job, Progress& progress) {
   std::error_code failed;
   std::filesystem::create_directories(job.output, failed);
   if (failed) {
@@ -124,7 +125,9 @@ Result<std::filesystem::path> compareAndReport(const CompareJob& job, Progress& 
       .set("date", today())
       .set("note", job.note)
       .set("verdict", verdict);
-  return write(report, job.output);
+  auto page = write(report, job.output);
+  if (!page) return page.error();
+  return WrittenReport{.page = *std::move(page), .verdict = verdict, .notes = report.notes};
 }
 
 }  // namespace toftwin::compare

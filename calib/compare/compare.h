@@ -27,7 +27,7 @@ struct CompareJob {
 };
 
 /// Runs it and leaves index.html, report.json, report.md and log.jsonl in the output folder; gives
-/// the page's path. That the measurements are not there is no error, but said in the report.
-Result<std::filesystem::path> compareAndReport(const CompareJob& job, Progress& progress);
+/// what to say of it. That the measurements are not there is no error, but said in the report.
+Result<WrittenReport> compareAndReport(const CompareJob& job, Progress& progress);
 
 }  // namespace toftwin::compare

@@ -174,7 +174,8 @@ Result<Finding> judgeLive(const Capture& capture) {
       .id = "live",
       .title = fmt::format("{} (B) against {} (A)", capture.b.entry.name, capture.a.entry.name)};
   const Tilt tilt{poses};
-  finding.section.tone = toneOfDifference(c, tilt.edge_mm());
+  const bool are_two = capture.same.same() == 0;
+  finding.section.tone = are_two ? toneOfDifference(c, tilt.edge_mm()) : Tone::Neutral;
   finding.section.verdict = fmt::format(
       "Averaged over {} at {}. Temporal noise: A {} mm, B {} mm (median). Validity masks agree in {} "
       "% of "
@@ -185,10 +186,10 @@ Result<Finding> judgeLive(const Capture& capture) {
       shown(kGross_mm, 0), c.gross == 1 ? "is" : "are");
   for (const Drift& drift : drifts) finding.section.verdict += " " + inWords(drift, capture);
   auto& blocks = finding.section.blocks;
-  for (const std::string& warning : capture.warnings)
-    blocks.push_back(Paragraph{"Note: " + warning});
-  if (const std::string note = resamplingNote(poses.front()); !note.empty())
-    blocks.push_back(Paragraph{"Note: " + note});
+  finding.notes = capture.warnings;
+  finding.notes.push_back(resamplingNote(poses.front()));
+  std::erase(finding.notes, "");
+  for (const std::string& note : finding.notes) blocks.push_back(Paragraph{"Note: " + note});
   const double reach = roundUp(std::max(0.5, quantile(magnitudes, 0.97)));
   for (std::size_t i = 0; i < poses.size() && i < 2; ++i)
     blocks.push_back(mapsOf(capture.poses[i].name, poses[i], reach));
@@ -217,11 +218,12 @@ Result<Finding> judgeLive(const Capture& capture) {
                 "The log of all frames with their ids is log.jsonl beside this page.",
                 true});
 
-  finding.headline = nearnessInWords(capture.a.entry.name, capture.b.entry.name, c, tilt.words(main.noise_a_mm));
+  finding.headline = capture.same.inWords() + nearnessInWords(capture.a.entry.name, capture.b.entry.name, c, tilt.words(main.noise_a_mm));
   finding.data = toJson(c);
   finding.data.set("a", capture.a.entry.name)
       .set("b", capture.b.entry.name)
       .set("poses", poses.size())
+      .set("same_frames", capture.same.same())
       .set("drift", toJson(drifts))
       .set("frames_per_pose", capture.poses.front().a.frames());
   finding.cards =
@@ -229,6 +231,7 @@ Result<Finding> judgeLive(const Capture& capture) {
                     c.places > 1 ? fmt::format("± standard error over {} different poses", c.places)
                                  : fmt::format("{} pixels, one pose", all.n),
                     finding.section.tone);
+  if (!are_two) takeGreenOff(finding.cards);
   finding.cards.back().note = fmt::format("flying pixels {} | {} %", shown(flyingPercent(c, c.flying_a), 2),
                                           shown(flyingPercent(c, c.flying_b), 2));
   return finding;

@@ -184,6 +184,10 @@ std::string nearnessInWords(const std::string& a, const std::string& b, const Ch
       tilted, shown(c.noise_ratio.median, 2));
 }
 
+void takeGreenOff(std::vector<Card>& cards) {
+  for (Card& card : cards) card.tone = card.tone == Tone::Good ? Tone::Neutral : card.tone;
+}
+
 std::vector<Card> nearnessCards(const Characteristics& c, const std::string& bias_note, Tone tone) {
   const Region& main = mainRegionOf(c);
   const Summary& all = main.difference_mm;

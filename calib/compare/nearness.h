@@ -32,6 +32,8 @@ std::string nearnessInWords(const std::string& a, const std::string& b, const Ch
 /// The same as cards.
 std::vector<Card> nearnessCards(const Characteristics& characteristics, const std::string& bias_note,
                                 Tone tone);
+/// Of what is no comparison of two cameras nothing is good.
+void takeGreenOff(std::vector<Card>& cards);
 /// Against A's noise in a single frame: good where the bias is within it and 95 % of the pixels within three
 /// of both cameras' noise; bad where the bias is over three of it. Neutral where no noise is known. `edge_mm`:
 /// by how much the edges of the image are off, one against the other; it counts as a bias, whose mean hides it.

@@ -40,6 +40,7 @@ struct Finding {
   Section section;
   std::vector<Card> cards{};
   std::string headline{};  ///< a clause for the report's verdict, or empty
+  std::vector<std::string> notes{};  ///< what a reader must know; in the section, too
   Json data = Json::object();
   std::vector<Outcome> outcomes{};
   std::vector<Ablation> ablations{};

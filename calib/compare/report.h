@@ -82,6 +82,13 @@ std::string toHtml(const Report& report);
 /// The words and tables of the page as Markdown, without its pictures.
 std::string toMarkdown(const Report& report);
 
+/// What is said of a report that is written, besides in it.
+struct WrittenReport {
+  std::filesystem::path page;
+  std::string verdict{};
+  std::vector<std::string> notes{};
+};
+
 /// Writes index.html, report.json and report.md into `folder`, which is made if need be; gives the
 /// page's path.
 Result<std::filesystem::path> write(const Report& report, const std::filesystem::path& folder);

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <toftwin/nan.h>
 
+#include "calib/compare/same_frames.h"
 #include "calib/compare/stack.h"
 #include "calib/plan/compare_run.h"
 #include "protocol/record/recording.h"
@@ -24,7 +25,8 @@ struct Read {
   std::vector<ReadFrame> frames;
 };
 
-Result<Read> readCamera(const std::filesystem::path& run, const RecordedFile& file) {
+template <class Each>
+Result<Read> readCamera(const std::filesystem::path& run, const RecordedFile& file, const Each& each) {
   const auto path = run / file.file;
   if (auto checked = checkHash(run, file); !checked) return checked.error();
   auto reader = record::Reader::open(path);
@@ -35,6 +37,7 @@ Result<Read> readCamera(const std::filesystem::path& run, const RecordedFile& fi
     if (!frame && frame.error().code == Error::Code::EndOfStream) break;
     if (!frame) return frame.error();
     if (auto added = read.stack.add(*frame); !added) return added.error();
+    each(*frame);
     auto one = readOf(*frame);
     if (!one) return one.error();
     read.frames.push_back(*std::move(one));
@@ -138,12 +141,14 @@ Result<> checkHash(const std::filesystem::path& run, const RecordedFile& file) {
 Result<ComparedCapture> compareCapture(const std::filesystem::path& run, const Plan& plan,
                                        const CaptureRecord& record, const CompareHow& how,
                                        PoseComparison* whole) {
-  const auto a = readCamera(run, record.a);
+  compare::SameFrames same;
+  const auto a = readCamera(run, record.a, [&](const Frame& frame) { same.addA(frame); });
   if (!a) return ofCapture(record, a.error());
-  const auto b = readCamera(run, record.b);
+  const auto b = readCamera(run, record.b, [&](const Frame& frame) { same.addB(frame); });
   if (!b) return ofCapture(record, b.error());
   ComparedCapture one;
   one.record = record;
+  one.frames_of_b = same.ofB(), one.same_frames = same.same();
   one.seen = {seenOf(plan, record, a->stack, a->frames, how.frequency_hz[0]),
               seenOf(plan, record, b->stack, b->frames, how.frequency_hz[1], record.pose_of_b)};
   if (record.kind == nameOf(Kind::Moving)) return one;

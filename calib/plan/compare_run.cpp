@@ -143,6 +143,8 @@ Result<ComparedRun> compareAll(const CompareRunJob& job, const RunFiles& files,
   for (const Frame& frame : first->frames) {
     for (std::string& one : compare::missingPlanes(frame)) run.warnings.push_back(std::move(one));
   }
+  if (std::string note = compare::sameSeedWarning(first->frames[0], first->frames[1]); !note.empty())
+    run.warnings.push_back(std::move(note));
   run.settings = settingsOf("A", files.camera_a, first->frames[0]);
   for (RunSetting& one : settingsOf("B", files.camera_b, first->frames[1]))
     run.settings.push_back(std::move(one));
@@ -247,7 +249,7 @@ compare::Report reportOf(const CompareRunJob& job, const RunFiles& files,
 
 }  // namespace
 
-Result<std::filesystem::path> compareRun(const CompareRunJob& job, compare::Progress& progress) {
+Result<compare::WrittenReport> compareRun(const CompareRunJob& job, compare::Progress& progress) {
   const auto files = readRun(job.run);
   if (!files) return files.error();
   const auto index = readIndex(job.run / kIndexFile);
@@ -282,17 +284,23 @@ Result<std::filesystem::path> compareRun(const CompareRunJob& job, compare::Prog
   const auto planned = std::ranges::count(files->schedule.captures, job.locked, &PlannedCapture::is_locked);
   auto made_with = settingsOf(files->plan, records, static_cast<std::size_t>(planned), *hash);
   run->settings.insert(run->settings.begin(), made_with.begin(), made_with.end());
-  for (std::string& one : warningsOf(*files, *index, records)) run->warnings.push_back(std::move(one));
+  for (std::string& one : warningsOf(*files, *index, records)) {
+    // What the index notes may have been found again.
+    if (std::ranges::find(run->warnings, one) == run->warnings.end()) run->warnings.push_back(std::move(one));
+  }
   progress.begin();
   auto finding = judgeRun(*run);
   if (!finding) return finding.error();
   progress.end();
+  auto notes = std::move(finding->notes);
   auto report = reportOf(job, *files, records, *std::move(finding));
   report.sections.push_back(
       {.id = "provenance", .title = "Provenance", .blocks = {provenanceTable(run->settings)}});
   report.data.set("provenance", toJson(run->settings));
   auto page = compare::write(report, job.output);
-  if (!page || !*log) return page;
+  if (!page) return page.error();
+  const compare::WrittenReport written{.page = *page, .verdict = report.verdict, .notes = std::move(notes)};
+  if (!*log) return written;
   (*log)->run.settings = run->settings;
   (*log)->run.judged = utcOf(std::time(nullptr));
   if (auto logged = (*log)->log.add((*log)->run, traitsOf(*run)); !logged) {
@@ -300,7 +308,7 @@ Result<std::filesystem::path> compareRun(const CompareRunJob& job, compare::Prog
                  fmt::format("{} is written, with all numbers in report.json beside it, but they are not in {}: {}",
                              page->string(), job.log.string(), logged.error().message)};
   }
-  return page;
+  return written;
 }
 
 }  // namespace toftwin::plan

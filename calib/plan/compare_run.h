@@ -11,6 +11,7 @@
 
 #include "calib/compare/characteristics.h"
 #include "calib/compare/progress.h"
+#include "calib/compare/report.h"
 #include "calib/plan/plan.h"
 #include "calib/plan/run_index.h"
 #include "calib/plan/seen.h"
@@ -45,6 +46,7 @@ struct ComparedCapture {
   std::array<double, 2> pose_error_mm{};
   std::array<CameraSeen, 2> seen{};  ///< of A and B, each by itself
   std::array<OwnReading, 2> own{};   ///< of A and B, each by its own mask
+  std::size_t frames_of_b = 0, same_frames = 0;  ///< in which anything is seen, and how many of them are A's
 };
 
 /// Reads both recordings of a capture and compares them pixel by pixel. Errors name the capture: a file that
@@ -73,7 +75,7 @@ struct CompareRunJob {
 };
 
 /// Compares the captures of a run and leaves index.html, report.json and report.md in the output folder;
-/// gives the page's path. A run that is not through is compared as far as it is, and the report says so.
-Result<std::filesystem::path> compareRun(const CompareRunJob& job, compare::Progress& progress);
+/// gives what to say of it. A run that is not through is compared as far as it is, and the report says so.
+Result<compare::WrittenReport> compareRun(const CompareRunJob& job, compare::Progress& progress);
 
 }  // namespace toftwin::plan

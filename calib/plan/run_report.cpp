@@ -13,6 +13,7 @@
 #include <fmt/format.h>
 
 #include "calib/compare/nearness.h"
+#include "calib/compare/same_frames.h"
 #include "calib/compare/trait_verdict.h"
 #include "calib/compare/traits/least_squares.h"
 #include "calib/compare/verdict_words.h"
@@ -269,6 +270,14 @@ std::vector<Card> cardsOf(const Characteristics& c, const std::vector<TraitVerdi
   return cards;
 }
 
+SameFrames sameFramesOf(const ComparedRun& run) {
+  SameFrames same;
+  for (const auto* captures : {&run.captures, &run.moving}) {
+    for (const ComparedCapture& one : *captures) same.add(one.same_frames, one.frames_of_b);
+  }
+  return same;
+}
+
 }  // namespace
 
 Result<Finding> judgeRun(const ComparedRun& run) {
@@ -277,19 +286,22 @@ Result<Finding> judgeRun(const ComparedRun& run) {
   Finding finding;
   const RunTraits traits = traitsOf(run);
   const std::vector<TraitVerdict> verdicts = verdictsOf(traits, run, c);
+  const SameFrames same = sameFramesOf(run);
   finding.headline = fmt::format(
-      "{}{}. {}", missingInWords(traits.missing),
+      "{}{}{}. {}", same.inWords(), missingInWords(traits.missing),
       nearnessInWords(run.captures.front().record.a.source, run.captures.front().record.b.source, c),
       headlineOf(verdicts));
   finding.cards = cardsOf(c, verdicts, traits);
+  if (same.same() > 0) takeGreenOff(finding.cards);
   finding.section = {.id = run.is_locked ? "locked" : "run",
                      .title = run.is_locked ? "Locked captures" : "The plan's captures",
-                     .tone = toneOf(verdicts, traits, c)};
+                     .tone = same.same() == 0 ? toneOf(verdicts, traits, c) : Tone::Neutral};
   auto& blocks = finding.section.blocks;
-  for (const std::string& warning : run.warnings) blocks.push_back(Paragraph{"Note: " + warning});
   const auto seen = std::ranges::find_if(run.captures, isSeen);
-  if (const std::string note = resamplingNote(seen->thinned); !note.empty())
-    blocks.push_back(Paragraph{"Note: " + note});
+  finding.notes = run.warnings;
+  finding.notes.push_back(resamplingNote(seen->thinned));
+  std::erase(finding.notes, "");
+  for (const std::string& note : finding.notes) blocks.push_back(Paragraph{"Note: " + note});
   auto [differ, rest] = verdictTables(verdicts);
   if (!differ.rows.empty()) blocks.push_back(std::move(differ));
   for (Block& block : characteristicFigures(traits)) blocks.push_back(std::move(block));
@@ -307,6 +319,7 @@ Result<Finding> judgeRun(const ComparedRun& run) {
       "million; means of single captures, their errors and the maps are over all pixels.",
       true});
   finding.data = toJson(c);
+  finding.data.set("same_frames", same.same());
   finding.data.set("captures", captureJson(run)).set("characteristics", toJson(traits));
   finding.data.set("verdicts", toJson(verdicts));
   return finding;

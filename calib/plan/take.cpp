@@ -246,14 +246,16 @@ Result<Taken> Taker::take(const PlannedCapture& planned, Feed& a, Feed& b, const
   if (options_.powered_on_for) {
     on = *options_.powered_on_for + std::chrono::duration<double>(options_.now() - *began_).count() * second;
   }
-  std::optional<Frame> first;
+  std::optional<Frame> first, first_of_b;
   auto by_a = framesOf(planned, a, taken, to_a, on, &first);
   if (!by_a) return naming(planned, by_a.error());
   taken.a = *std::move(by_a);
   if (auto done = follow(planned, *first, b, taken); !done) return naming(planned, done.error());
-  auto by_b = framesOf(planned, b, taken, to_b, taken.a.since_power_on, nullptr);
+  auto by_b = framesOf(planned, b, taken, to_b, taken.a.since_power_on, &first_of_b);
   if (!by_b) return naming(planned, by_b.error());
   taken.b = *std::move(by_b);
+  std::string one_seed = compare::sameSeedWarning(*first, *first_of_b);
+  if (!one_seed.empty() && !std::exchange(is_seed_told_, true)) taken.notes.push_back(std::move(one_seed));
   for (const auto& [by, told] : {std::pair{&taken.a, &clock_told_a_}, std::pair{&taken.b, &clock_told_b_}}) {
     if (!isNews(by->clock, *told)) continue;
     *told = by->clock;

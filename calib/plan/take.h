@@ -114,6 +114,7 @@ class Taker {
   std::set<const compare::Feed*> known_;  ///< whose first frame was seen
   PoseFinder finder_a_, finder_b_;
   std::optional<compare::ClockOffset> clock_told_a_, clock_told_b_;  ///< what was last said of their daemons' clocks
+  bool is_seed_told_ = false;  ///< that both are simulated with one: said once
   std::map<const compare::Feed*, std::optional<Transform<World, Camera>>> says_;  ///< pose that its frames say, if any
   std::optional<std::chrono::steady_clock::time_point> began_, last_began_;
 };

@@ -128,6 +128,7 @@ TEST_F(Live, EqualCamerasShowNoBias) {
   ASSERT_EQ(captured->poses.size(), 2U);
   EXPECT_EQ(captured->pairs.size(), 2U * kFrames);
   EXPECT_EQ(captured->log.size(), 4U * kFrames);
+  EXPECT_THAT(captured->warnings, testing::IsEmpty());
   std::vector<PoseComparison> poses;
   for (const auto& pose : captured->poses) poses.push_back(*comparePose(pose.a, pose.b));
   const Summary all = characterise(poses).regions.front().difference_mm;
@@ -215,6 +216,36 @@ TEST_F(Live, ACameraWithoutAmplitudeOrFlagsIsNamed) {
   ASSERT_TRUE(captured.ok()) << captured.error().message;
   EXPECT_THAT(captured->warnings,
               testing::ElementsAre(HasSubstr("deaf gives no amplitude"), HasSubstr("deaf gives no flags")));
+}
+
+/// It would else be the best twin that there can be. Of B, which began three frames later, seven of ten are A's.
+TEST_F(Live, OneCameraGivenTwiceIsNoComparison) {
+  SourceFeed a{"a", sourceToml(1, 0.0)}, b{"b", sourceToml(1, 0.0)};
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(b.next({}));
+  const auto captured = capture(a, b, {.frames = kFrames}, silent);
+  ASSERT_TRUE(captured.ok()) << captured.error().message;
+  EXPECT_THAT(captured->warnings, testing::ElementsAre(HasSubstr("a and b are simulated with one seed, 1")));
+  const auto finding = judgeLive(*captured);
+  ASSERT_TRUE(finding.ok()) << finding.error().message;
+  EXPECT_THAT(finding->headline, testing::StartsWith("A and B are not two cameras: of the 10 frames of B, 7 are "
+                                                     "frames of A, bit for bit."));
+  EXPECT_EQ(finding->section.tone, Tone::Neutral);
+  for (const Card& card : finding->cards) EXPECT_NE(card.tone, Tone::Good) << card.label;
+  EXPECT_EQ(finding->notes, captured->warnings);
+}
+
+/// With another delay no frame is the other's, but the noise is.
+TEST_F(Live, OneSeedIsSaid) {
+  const std::string toml = sourceToml(1, 0.0);
+  SourceFeed a{"a", toml};
+  std::string other = sourceToml(2, 10.0);
+  other.replace(other.find("seed = 2"), 8, "seed = 1");
+  SourceFeed b{"b", other};
+  const auto captured = capture(a, b, {.frames = 2}, silent);
+  ASSERT_TRUE(captured.ok()) << captured.error().message;
+  EXPECT_THAT(captured->warnings, testing::ElementsAre(HasSubstr("simulated with one seed, 1")));
+  EXPECT_EQ(captured->same.same(), 0U);
+  EXPECT_EQ(captured->same.ofB(), 2U);
 }
 
 TEST_F(Live, CamerasThatLookOtherwiseAreSaidByHowMuch) {

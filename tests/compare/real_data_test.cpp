@@ -247,9 +247,9 @@ TEST_F(RealData, MakesAPageOfAllSections) {
   const auto written = compareAndReport(job, silent);
   ASSERT_TRUE(written.ok()) << written.error().message;
   std::stringstream text;
-  text << std::ifstream{*written}.rdbuf();
+  text << std::ifstream{written->page}.rdbuf();
   const std::string page = text.str();
-  EXPECT_EQ(written->filename(), "index.html");
+  EXPECT_EQ(written->page.filename(), "index.html");
   for (const char* id :
        {"distance-kinect_v2", "corner-kinect_v2", "warm-up-kinect_v2", "noise-kinect_v2", "distance-o3d303",
         "corner-o3d303", "warm-up-o3d303", "noise-o3d303", "box-kinect_v2", "edge", "published"})

@@ -292,6 +292,29 @@ class Judged : public Measure {
   }
 };
 
+/// B's files are A's, as of one camera that is served under two names.
+TEST_F(Judged, OneCameraMeasuredTwiceIsNoComparison) {
+  std::istringstream lines{bytesOf("run/index.jsonl")};
+  std::string both;
+  for (std::string line; std::getline(lines, line);) {
+    const auto fileOf = [&](const char* key) {
+      const auto from = line.find(key) + 4;
+      return std::pair{from, line.find(",\"source\"", from) - from};
+    };
+    const auto [a, a_size] = fileOf("\"a\": {");
+    const std::string of_a = line.substr(a, a_size);
+    const auto [b, b_size] = fileOf("\"b\": {");
+    both += line.replace(b, b_size, of_a) + "\n";
+  }
+  write("run/index.jsonl", both);
+  const Ran ran = compare();
+  ASSERT_EQ(ran.status, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("A and B are not two cameras: of the "));
+  EXPECT_THAT(ran.out, HasSubstr("of B, each is one of A, bit for bit."));
+  EXPECT_THAT(ran.out, HasSubstr("\nNote: cam and cam are simulated with one seed, 1"));
+  EXPECT_THAT(bytesOf("report/index.html"), HasSubstr("<p class='verdict neutral'>A and B are not two cameras"));
+}
+
 TEST_F(Judged, FindsThePlantedOffsetAndLeavesLockedCapturesClosed) {
   const auto records = index("run");
   for (const auto& [number, one] : records) {

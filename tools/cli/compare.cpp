@@ -174,6 +174,13 @@ compare::Feed* twinFrom(const std::string& word, compare::Feed& a, compare::Feed
   return word == "a" ? &a : word == "b" ? &b : nullptr;
 }
 
+/// What came out, last the page's path.
+void tell(const compare::WrittenReport& written) {
+  fmt::print("{}\n", written.verdict);
+  for (const std::string& note : written.notes) fmt::print("Note: {}\n", note);
+  fmt::print("{}\n", written.page.string());
+}
+
 Result<Exit> compareRun(const Options& options) {
   catchInterrupts();
   compare::Progress progress{stderr};
@@ -185,7 +192,7 @@ Result<Exit> compareRun(const Options& options) {
                                       .interrupted = interrupted},
                                      progress);
   if (!page) return page.error();
-  fmt::print("{}\n", page->string());
+  tell(*page);
   return Exit::Ok;
 }
 
@@ -223,7 +230,7 @@ Result<Exit> compareThem(const Options& options) {
                "The real measurements were left out: there is no tof-thesis-2018 in $TOFTWIN_DATA "
                "nor in ../shared/data; see --data.\n");
   }
-  fmt::print("{}\n", page->string());
+  tell(*page);
   return Exit::Ok;
 }
 
