@@ -218,7 +218,9 @@ Result<Finding> judgeLive(const Capture& capture) {
                 "The log of all frames with their ids is log.jsonl beside this page.",
                 true});
 
-  finding.headline = capture.same.inWords() + nearnessInWords(capture.a.entry.name, capture.b.entry.name, c, tilt.words(main.noise_a_mm));
+  finding.headline =
+      capture.same.inWords() +
+      nearnessInWords(capture.a.entry.name, capture.b.entry.name, c, tilt.words(main.noise_a_mm));
   finding.data = toJson(c);
   finding.data.set("a", capture.a.entry.name)
       .set("b", capture.b.entry.name)

@@ -65,13 +65,17 @@ footer{margin-top:40px;padding-top:12px;border-top:1px solid var(--line);color:v
 @media(max-width:520px){main{padding:18px 12px 40px}.cards{grid-template-columns:1fr 1fr}.card{padding:8px 10px}.value{font-size:1.02rem}h1{font-size:1.4rem}}
 .cloud canvas{display:block;width:100%;height:420px;touch-action:none;cursor:grab}.cloud .hint,.cloud input{display:none}
 .cloud.turns .hint{display:inline;color:var(--soft)}.cloud.turns input{display:inline}.inkA{color:var(--measured)}.inkB{color:var(--simulated)}
-@media print{nav,.cloud .hint,.cloud input{display:none!important}body{background:#fff;font-size:10pt}main{max-width:none;padding:0}
+@media print{nav,.cloud .hint,.cloud input{display:none!important}
+body{background:#fff;font-size:10pt}main{max-width:none;padding:0}
 /* Verdict and cards on the first page. */
-.cards{grid-template-columns:repeat(4,1fr);gap:6px}.card{padding:4px 8px}.value{font-size:10.5pt}.cardlabel,.note{font-size:7.5pt}
+.cards{grid-template-columns:repeat(4,1fr);gap:6px}.card{padding:4px 8px}
+.value{font-size:10.5pt}.cardlabel,.note{font-size:7.5pt}
 .verdict{font-size:10.5pt}.small,details p,caption,figcaption,.legend{font-size:8pt}section{margin-top:18px}
-figure,.card,tr,caption,h2+p,table.few{break-inside:avoid}h2,.finding,caption,thead,tr.above,tbody tr:first-child{break-after:avoid}
+figure,.card,tr,caption,h2+p,table.few{break-inside:avoid}
+h2,.finding,caption,thead,tr.above,tbody tr:first-child{break-after:avoid}
 tbody tr:last-child{break-before:avoid}
-.scroll,.plot{overflow:visible}.plot svg{min-width:0;max-height:95mm}.row{grid-template-columns:1fr 1fr}.row .plot svg{min-width:0;max-height:56mm}.row .plot.tall svg{max-height:80mm}
+.scroll,.plot{overflow:visible}.plot svg{min-width:0;max-height:95mm}
+.row{grid-template-columns:1fr 1fr}.row .plot svg{min-width:0;max-height:56mm}.row .plot.tall svg{max-height:80mm}
 .cloud canvas{height:240px}#provenance td{overflow-wrap:anywhere}
 table{font-size:8pt;width:100%}th,td{padding:2px 5px}td.number{white-space:normal}td.long{min-width:0}.below td{padding:0 5px 2px 16px}td:first-child:not(.number),td:nth-child(2):not(.number){min-width:0}
 details::details-content{content-visibility:visible;height:auto}summary{list-style:none}}
