@@ -192,7 +192,7 @@ std::vector<std::string> warningsOf(const RunFiles& files, const std::map<std::s
                     seen, taken.size(), place_mm, turn_deg));
   }
   warnings.insert(warnings.end(), notes.begin(), notes.end());
-  const auto moving = std::ranges::count_if(index, [](const auto& one) { return !standsStill(one.second); });
+  const auto moving = std::ranges::count_if(taken, [](const CaptureRecord& one) { return !standsStill(one); });
   if (moving > 0)
     warnings.push_back(fmt::format("{} of a moving plate {} not compared pixel by pixel.", counted(moving, "capture"),
                                    moving == 1 ? "is" : "are"));

@@ -129,6 +129,9 @@ TEST_F(StandardPlan, TellsEveryCharacteristicOfBothCameras) {
   const Ran compared =
       toftwin(fmt::format("compare {} -o {} --log {}", path("run"), path("report"), path("lab.sqlite")));
   ASSERT_EQ(compared.status, 0) << compared.err;
+  EXPECT_THAT(compared.out, testing::HasSubstr("Note: 3 captures of a moving plate are not compared pixel by pixel"));
+  const Ran locked = toftwin(fmt::format("compare {} --locked -o {}", path("run"), path("locked")));
+  EXPECT_THAT(locked.out, testing::Not(testing::HasSubstr("moving plate"))) << "none of them is locked";
   const compare::Json told = characteristics();
   std::map<std::string, compare::Json> found;
   std::string names;
