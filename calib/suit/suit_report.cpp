@@ -233,9 +233,13 @@ std::string spoilersInWords(const RequirementSpec& requirement, const std::vecto
 }
 
 compare::Figure triesFigure(const CameraResult& camera) {
-  compare::Plot plot{
-      .title = "Margin over exposure", .x_label = "exposure / ms", .y_label = "worst relative margin"};
-  plot.zero_line = true;
+  // Beyond this nothing is worth telling apart, and the rest could not be seen.
+  constexpr double kCut = -10.0;
+  const bool are_all_cut = std::ranges::none_of(camera.tries, [](const Try& one) { return one.worst > kCut; });
+  compare::Plot plot{.title = are_all_cut ? "Requirements failed over exposure" : "Margin over exposure",
+                     .x_label = "exposure / ms",
+                     .y_label = are_all_cut ? "requirements failed" : "worst relative margin"};
+  plot.zero_line = !are_all_cut;
   const std::vector<compare::Ink> inks{compare::Ink::Simulated, compare::Ink::Published, compare::Ink::Extra};
   for (const Try& one : camera.tries) {
     const auto found = std::ranges::find(plot.curves, one.mode, &compare::Curve::name);
@@ -246,13 +250,14 @@ compare::Figure triesFigure(const CameraResult& camera) {
                                                   : static_cast<std::ptrdiff_t>(plot.curves.size()) - 1) %
                      inks.size()];
     curve.x.push_back(one.exposure_us * 1e-3);
-    // Beyond this nothing is worth telling apart, and the rest could not be seen.
-    curve.y.push_back(std::max(one.worst, -10.0));
+    curve.y.push_back(are_all_cut ? static_cast<double>(one.failed) : std::max(one.worst, kCut));
   }
-  return {.caption = fmt::format(
-              "The worst requirement's margin, relative to its limit, in each mode and exposure that was "
-              "tried with one simulation each; below 0 is a failure (cut at −10). Best: {}.",
-              settingText(camera)),
+  return {.caption = fmt::format("{} in each mode and exposure that was tried with one simulation each{}. Best: {}.",
+                                 are_all_cut ? "How many requirements fail"
+                                             : "The worst requirement's margin, relative to its limit,",
+                                 are_all_cut ? "; the worst one misses its limit by ten times or more in all"
+                                             : "; below 0 is a failure (cut at −10)",
+                                 settingText(camera)),
           .svg = compare::toSvg(plot)};
 }
 

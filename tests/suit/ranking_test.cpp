@@ -47,6 +47,28 @@ TEST(Ranking, SaysThatWhatIsMetIsNotCertain) {
   EXPECT_EQ(inWords(*suit), "The one camera does what is asked: ideal.toml (1 of 2 not certain).");
 }
 
+/// Cut at −10 they would be a flat line, which says nothing of where it is best.
+TEST(Ranking, ShowsHowManyFailWhereAllMissByFar) {
+  const Folder folder;
+  folder.camera("far.toml", effect("delay", "offset_mm = 500"));
+  auto suit = folder.judged(kPose + biasAtMost10() + entry("far.toml"));
+  ASSERT_TRUE(suit) << suit.error().message;
+  const auto page = [&](double worst_of_second) {
+    suit->cameras[0].tries = {{.mode = "m", .exposure_us = 500.0, .failed = 3, .worst = -49.0},
+                              {.mode = "m", .exposure_us = 1000.0, .failed = 2, .worst = worst_of_second}};
+    EXPECT_TRUE(writeSuit(*suit, folder.path() / "report", ""));
+    std::stringstream text;
+    text << std::ifstream{folder.path() / "report" / "index.html"}.rdbuf();
+    return text.str();
+  };
+  EXPECT_THAT(page(-12.0), testing::AllOf(testing::HasSubstr("How many requirements fail in each mode"),
+                                          testing::HasSubstr(">requirements failed</text>"),
+                                          testing::Not(testing::HasSubstr(">worst relative margin</text>"))));
+  EXPECT_THAT(page(-3.0), testing::AllOf(testing::HasSubstr("(cut at −10)"),
+                                         testing::HasSubstr(">worst relative margin</text>"),
+                                         testing::Not(testing::HasSubstr(">requirements failed</text>"))));
+}
+
 /// Four cameras that differ in two things: a sixteenth of the light is √16 times the shot noise, in the dark;
 /// and noon leaves 106,000 electrons in a tap (60 klx: 2.6 W/(m² sr)), which one well holds and one does not.
 /// What is missing, in limits: the weak one has 4 σ where 2 σ is the limit, 1; the small well none of 80 %
