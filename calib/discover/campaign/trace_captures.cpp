@@ -58,9 +58,9 @@ void addTracingNoise(TracedCapture& traced) {
         static_cast<float>(static_cast<double>(traced.tracing_variance[i]) * metres * metres);
 }
 
-/// Edges of range (a jump of 3 %) and of paint (one of 5 % in albedo): there a pose that is a
+/// Pixels so near to edges of range (a jump of 3 %) and of paint (one of 5 % in albedo): there a pose that is a
 /// little off changes a pixel by more than its derivative says.
-Image<std::uint8_t> edgesOf(const sim::Truth& truth) {
+Image<std::uint8_t> edgesWithin(int reach, const sim::Truth& truth) {
   const int width = truth.range_m.width(), height = truth.range_m.height();
   Image<std::uint8_t> edge(width, height);
   const auto differ = [](float a, float b, float share) {
@@ -69,8 +69,8 @@ Image<std::uint8_t> edgesOf(const sim::Truth& truth) {
   };
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
-      for (int j = -1; j <= 1; ++j) {
-        for (int i = -1; i <= 1; ++i) {
+      for (int j = -reach; j <= reach && edge(x, y) == 0; ++j) {
+        for (int i = -reach; i <= reach; ++i) {
           const int u = x + i, v = y + j;
           const bool is_outside = u < 0 || v < 0 || u >= width || v >= height;  // nobody knows
           if (is_outside || differ(truth.range_m(x, y), truth.range_m(u, v), 0.03F) ||
@@ -82,6 +82,25 @@ Image<std::uint8_t> edgesOf(const sim::Truth& truth) {
     }
   }
   return edge;
+}
+
+/// Where the camera stands as the light says, edges are at most one pixel away from where they were traced; where it was
+/// told to stand, by three deviations of poses more. Where that leaves too little of the image, as of a fine chequerboard,
+/// less.
+Image<std::uint8_t> edgesOf(const sim::Truth& truth, const CameraInfo& camera, bool is_as_told) {
+  constexpr double kTurn = kPosePrior_deg * std::numbers::pi / 180.0, kDeviations = 3.0, kEnough = 0.5;
+  std::vector<double> ranges;
+  for (const float range : truth.range_m.pixels())
+    if (std::isfinite(range)) ranges.push_back(static_cast<double>(range));
+  Image<std::uint8_t> nearest = edgesWithin(1, truth);
+  if (!is_as_told || ranges.empty()) return nearest;
+  const double shift_px = camera.fx * std::hypot(kTurn, kPosePrior_m / compare::quantile(std::move(ranges), 0.5));
+  const auto left = [](const Image<std::uint8_t>& edges) { return std::ranges::count(edges.pixels(), 0); };
+  for (auto reach = 1 + std::lround(kDeviations * shift_px); reach > 1; --reach) {
+    Image<std::uint8_t> edges = edgesWithin(static_cast<int>(reach), truth);
+    if (static_cast<double>(left(edges)) >= kEnough * static_cast<double>(left(nearest))) return edges;
+  }
+  return nearest;
 }
 
 /// Direct light through the pixels' footprints, with the same paths at each place: its changes are
@@ -172,7 +191,7 @@ Result<std::vector<std::shared_ptr<const TracedCapture>>> traceAll(
     auto traced = std::make_shared<TracedCapture>();
     traced->stood = here;
     traced->light = sim::trace(scene, request);
-    traced->is_edge = edgesOf(traced->light.truth);
+    traced->is_edge = edgesOf(traced->light.truth, request.camera, here == Stood{});
     addTracingNoise(*traced);
     addMoves(scene, request, *traced);
     for (const std::size_t c : sites[s].captures) all[c] = traced;
