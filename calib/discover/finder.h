@@ -61,6 +61,7 @@ struct Effect {
   bool is_catalogue = false;
   std::vector<std::string> covariates{};
   std::optional<Stage> stage{};
+  std::vector<Stage> stages_alike{};  ///< where it may act as well: the data do not tell
   /// Its parts, added up: one, unless what was left after it went with the same covariates. A part whose form
   /// has no build is a smooth curve, because no formula does as well. None: an effect of the catalogue.
   std::vector<FittedForm> parts{};

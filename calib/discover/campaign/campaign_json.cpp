@@ -44,7 +44,10 @@ Json toJson(const Judgement& judged) {
 Json toJson(const FoundEffect& one) {
   Json json = Json::object(), numbers = Json::array();
   json.set("name", one.found.name).set("kind", one.found.is_catalogue ? "catalogue" : "undeclared");
-  json.set("stage", stageInWords(one.found)).set("covariates", Json::arrayOf(one.found.covariates));
+  Json alike = Json::array();
+  for (const Stage stage : one.found.stages_alike) alike.push(std::string{discover::nameOf(stage)});
+  json.set("stage", one.found.stage ? std::string{discover::nameOf(*one.found.stage)} : "not told");
+  json.set("or_stage", std::move(alike)).set("covariates", Json::arrayOf(one.found.covariates));
   json.set("is_rest", one.found.is_rest);
   json.set("p", one.found.p)
       .set("gain", one.found.gain.mean)
@@ -73,7 +76,10 @@ Json toJson(const FoundEffect& one) {
 }  // namespace
 
 std::string stageInWords(const Effect& effect) {
-  return effect.stage ? std::string{discover::nameOf(*effect.stage)} : "not told";
+  if (!effect.stage) return "not told";
+  std::string words{discover::nameOf(*effect.stage)};
+  for (const Stage stage : effect.stages_alike) words += fmt::format(" or {}", discover::nameOf(stage));
+  return words;
 }
 
 std::vector<FittedNumber> numbersIn(const FoundEffect& one) {

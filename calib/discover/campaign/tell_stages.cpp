@@ -52,17 +52,41 @@ void takeNameBack(bool is_before, Effect& effect) {
   });
 }
 
+/// Where else than at its stage an effect may act: range and amplitude do not say more than that an error of the range
+/// leaves amplitudes as they are, and is otherwise the same as a delay before decoding.
+std::vector<Stage> stagesAlike(bool may_be_of_range, bool may_be_of_light, const Effect& effect) {
+  std::vector<Stage> alike;
+  for (const Stage stage : {Stage::Light, Stage::Samples, Stage::Range}) {
+    const bool may_be = stage == Stage::Range ? may_be_of_range : stage == Stage::Samples || may_be_of_light;
+    if (may_be && stage != effect.stage) alike.push_back(stage);
+  }
+  return alike;
+}
+
 /// Where an effect without a name acts. `is_only_one`: of several it cannot be said which makes the samples contradict
 /// each other.
 void tellStage(const std::optional<RawSays>& raw, bool is_only_one, Effect& effect) {
   const auto is_before = raw ? raw->isBeforeDecoding() : std::nullopt;
+  const bool is_as_range = effect.stage == Stage::Range, is_charge = effect.stage == Stage::Samples;
   if (is_before == false) {
     effect.stage = Stage::Range;
     return;
   }
   if (is_before == true && effect.stage == Stage::Range) effect.stage = Stage::Light;
-  const bool contradicts = raw && is_only_one && raw->contradicts();
-  if (effect.stage == Stage::Light && (contradicts || isOfPixels(effect))) effect.stage = Stage::Samples;
+  const bool contradicts = raw && is_only_one && raw->contradicts(), is_of_pixels = contradicts || isOfPixels(effect);
+  if (effect.stage == Stage::Light && is_of_pixels) effect.stage = Stage::Samples;
+  if (!is_charge) effect.stages_alike = stagesAlike(is_as_range && !is_before, !is_of_pixels, effect);
+}
+
+/// Of several explanations each acts at its own stage.
+void addStagesOfOthers(std::optional<bool> is_before, Effect& effect) {
+  for (const Alternative& other : effect.alternatives) {
+    const auto stage = other.named ? std::optional{stageOf(campaignFitOf(*other.named).effect)}
+                                   : other.group.terms.front().stage;
+    const bool is_known = !stage || stage == effect.stage || (is_before && isElsewhere(*stage, *is_before)) ||
+                          std::ranges::find(effect.stages_alike, *stage) != effect.stages_alike.end();
+    if (!is_known) effect.stages_alike.push_back(*stage);
+  }
 }
 
 }  // namespace
@@ -98,6 +122,7 @@ Result<> tellStages(const RawWitness* witness, Round& round) {
       tellStage(one.raw, is_only_one, one.found);
     else if (is_before && one.found.stage && isElsewhere(*one.found.stage, *is_before))
       takeNameBack(*is_before, one.found);
+    addStagesOfOthers(is_before, one.found);
   }
   return {};
 }
