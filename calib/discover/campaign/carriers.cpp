@@ -12,6 +12,7 @@
 #include <toftwin/nan.h>
 
 #include "calib/discover/campaign/catalogue.h"
+#include "calib/discover/campaign/unequal_exposures.h"
 #include "calib/discover/candidates.h"
 #include "sim/effects/effects.h"
 #include "sim/images/box_mean.h"
@@ -308,7 +309,9 @@ std::optional<std::array<double, 2>> mirrorMovedBy(std::string_view carrier) {
 std::string_view wordOfCarrier(std::string_view carrier) {
   if (carrier == kNeighbours || carrier == kMirrored || carrier == kOutwardCarrier) return "neighbours";
   if (carrier == kPixelCarrier) return "position";
-  const bool is_charge = carrier == kChargeCarrier || carrier == kStrayCarrier || carrier == kConverterCarrier;
+  if (carrier == kUnequalCarrier) return "range";
+  const bool is_charge = carrier == kChargeCarrier || carrier == kStrayCarrier || carrier == kConverterCarrier ||
+                         carrier == kAmplifiedCarrier;
   return is_charge ? "amplitude" : "";
 }
 

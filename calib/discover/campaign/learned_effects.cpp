@@ -259,6 +259,8 @@ std::vector<LearnedEffect> learnedEffectsOf(const Effect& effect, const Campaign
     for (const auto& [term, coefficient] : along.terms)
       if (const PixelPattern* pattern = rows.patternOf(term.carrier))
         learned.push_back({tableOf(*pattern, coefficient)});
+  for (const Along& along : all)
+    for (LearnedEffect& one : unequalOf(rows.unequal(), along.terms)) learned.push_back(std::move(one));
   if (const auto charge = inBothPhases(all, kChargeCarrier))
     for (const sim::AnyEffect& one : chargesOf(model, charge->first, charge->second))
       learned.push_back({one, {"electrons"}});

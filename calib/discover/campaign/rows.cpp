@@ -190,15 +190,17 @@ double periodOf(const sim::SensorModel& model) {
   return highest > 0_MHz ? unambiguousRange(highest).in(metre) : 0.0;
 }
 
+Reading changeOf(const Reading& from, Reading to) {
+  for (std::size_t i = 0; i < to.range_m.size(); ++i)
+    to.range_m[i] -= from.range_m[i], to.log_amplitude[i] -= from.log_amplitude[i];
+  return to;
+}
+
 /// What a millimetre of delay in the light changes; `to`: with kDelay_mm.
 Reading delayed(const Reading& from, Reading to) {
-  const auto perMillimetre = [](float late, float before) {
-    return (late - before) / static_cast<float>(kDelay_mm);
-  };
-  for (std::size_t i = 0; i < to.range_m.size(); ++i) {
-    to.range_m[i] = perMillimetre(to.range_m[i], from.range_m[i]);
-    to.log_amplitude[i] = perMillimetre(to.log_amplitude[i], from.log_amplitude[i]);
-  }
+  to = changeOf(from, std::move(to));
+  for (float& change : to.range_m.pixels()) change /= static_cast<float>(kDelay_mm);
+  for (float& change : to.log_amplitude.pixels()) change /= static_cast<float>(kDelay_mm);
   return to;
 }
 
@@ -215,6 +217,21 @@ Result<std::optional<Variant>> lateOf(const Declared& declared, const std::vecto
   for (const Base* base : probed) changes.push_back(delayed(base->reading, base->with(*late)));
   if (!isNoOffset(changes)) late.reset();
   return late;
+}
+
+/// The camera with each carrier's unit.
+Result<std::vector<Variant>> unequalCameras(const Declared& declared, const std::vector<sim::AnyEffect>& effects,
+                                            const std::vector<MeasuredCapture>& captures,
+                                            const std::vector<UnequalExposure>& carriers) {
+  std::vector<Variant> cameras;
+  for (const auto& [carrier, units] : carriers) {
+    auto list = effects;
+    for (const sim::AnyEffect& unit : units) list = withInserted(std::move(list), unit);
+    auto camera = NoiselessCamera::make(declared.model, std::move(list), captures);
+    if (!camera) return camera.error();
+    cameras.push_back({*std::move(camera), actsOnLight(units)});
+  }
+  return cameras;
 }
 
 /// Where zero lies nobody knows, neither of the poses nor of the light's start: what a delay of the light does
@@ -282,6 +299,10 @@ Result<CampaignRows> CampaignRows::make(const Declared& declared, const Lit& lit
   if (!late) return late.error();
 
   CampaignRows all;
+  if (!probed.empty() && declared.model.hasPhasors())
+    all.unequal_ = unequalExposures(probed.front().collected.steps, probed.front().collected.taps);
+  const auto unequal = unequalCameras(declared, effects, lit.captures, all.unequal_);
+  if (!unequal) return unequal.error();
   all.declared_ = &declared, all.lit_ = std::make_shared<const Lit>(lit), all.effects_ = effects;
   all.groups_ = commonGroups();
   all.has_delay_ = late->has_value();
@@ -330,6 +351,8 @@ Result<CampaignRows> CampaignRows::make(const Declared& declared, const Lit& lit
         fixed->carriers[std::string{kDelayCarrier}] = fixed->whitened(delayed(base.reading, delayed_reading));
         columns.putDelay(fixed->cells, base.reading, delayed_reading);
       }
+      for (std::size_t u = 0; u < unequal->size(); ++u)
+        fixed->carriers[all.unequal_[u].first] = fixed->whitened(changeOf(base.reading, base.with((*unequal)[u])));
       CaptureRows& rows = all.rows_[c];
       const auto in_base = static_cast<Eigen::Index>(all.base_columns_);
       for (std::size_t k = 0; k < kChannels; ++k) {

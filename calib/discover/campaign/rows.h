@@ -18,6 +18,7 @@
 #include "calib/discover/campaign/catalogue.h"
 #include "calib/discover/campaign/effect_numbers.h"
 #include "calib/discover/campaign/reading.h"
+#include "calib/discover/campaign/unequal_exposures.h"
 #include "calib/discover/named_effects.h"
 #include "calib/discover/term.h"
 
@@ -164,6 +165,8 @@ class CampaignRows final : public RowSource, public NamedEffects {
   /// The pattern behind a term's carrier "pixel:range", "pixel:gain" or "pixel:delay"; null: there is none.
   [[nodiscard]] const PixelPattern* patternOf(const std::string& carrier) const;
 
+  /// Carriers of raw exposures that are not alike; empty: the camera has none that could be.
+  [[nodiscard]] const std::vector<UnequalExposure>& unequal() const { return unequal_; }
   [[nodiscard]] const std::vector<Candidate>& candidates() const { return candidates_; }
   /// Whether a delay of the light is another thing than an offset of the range, and a nuisance like it.
   [[nodiscard]] bool hasDelay() const { return has_delay_; }
@@ -239,6 +242,7 @@ class CampaignRows final : public RowSource, public NamedEffects {
 
   const Declared* declared_ = nullptr;
   std::shared_ptr<const Lit> lit_;  ///< shared by sources that include different effects
+  std::vector<UnequalExposure> unequal_;
   std::vector<Candidate> candidates_;  ///< in the order of the catalogue's groups
   std::vector<sim::AnyEffect> effects_;
   std::vector<Group> groups_;  ///< of the base, then of the catalogue

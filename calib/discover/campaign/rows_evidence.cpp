@@ -324,6 +324,7 @@ std::vector<TermGroup> CampaignRows::ownGroups() const {
   std::vector<TermGroup> groups = carrierGroups(covariates(), has_delay_);
   if (!rows_.empty() && rows_.front().fixed->cells.grid().cell_width == 1)
     for (TermGroup& group : repeatingColumns(covariates())) groups.push_back(std::move(group));
+  for (TermGroup& group : unequalGroups(unequal_)) groups.push_back(std::move(group));
   for (TermGroup& group : pixelGroups(has_delay_, rows_.empty() ? 0 : rows_.front().fixed->cells.grid().size()))
     groups.push_back(std::move(group));
   return groups;
