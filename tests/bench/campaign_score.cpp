@@ -64,7 +64,7 @@ std::vector<std::string> fieldsOf(const std::string& line) {
   return fields;
 }
 
-constexpr std::size_t kFields = 25;
+constexpr std::size_t kFields = 27;
 
 std::optional<Score> readScore(const std::string& line) {
   const auto fields = fieldsOf(line);
@@ -80,6 +80,7 @@ std::optional<Score> readScore(const std::string& line) {
   score.stated = number(17), score.stated_low = number(18), score.stated_high = number(19);
   score.numbers = static_cast<int>(number(20)), score.numbers_in = static_cast<int>(number(21));
   score.before_mm = number(22), score.after_mm = number(23), score.seconds = number(24);
+  score.may_have_stage = number(25) > 0.5, score.is_stage_alone = number(26) > 0.5;
   for (std::size_t i = kFields; i < fields.size(); ++i) score.found += (i > kFields ? "," : "") + fields[i];
   return score;
 }
@@ -94,11 +95,12 @@ bool isSet(const Score& score) { return score.found.find(" or ") != std::string:
 
 std::string rowOf(const std::string& what, const std::vector<Score>& scores, bool is_null, bool is_absent) {
   double spurious = 0.0, rests = 0.0;
-  int numbers = 0, numbers_in = 0, stated = 0, stated_in = 0, sets = 0, right_sets = 0;
+  int numbers = 0, numbers_in = 0, stated = 0, stated_in = 0, sets = 0, right_sets = 0, alone = 0, alone_right = 0;
   std::vector<double> removed;
   for (const Score& one : scores) {
     if (!is_null && isSet(one))
       ++sets, right_sets += one.is_right || (is_absent && one.has_covariates) ? 1 : 0;
+    if (one.is_stage_alone) ++alone, alone_right += one.has_stage ? 1 : 0;
     spurious += one.spurious, rests += one.rests;
     numbers += one.numbers, numbers_in += one.numbers_in;
     if (!std::isfinite(one.removed)) continue;
@@ -110,13 +112,15 @@ std::string rowOf(const std::string& what, const std::vector<Score>& scores, boo
   const auto n = static_cast<double>(scores.size());
   const auto share = [](double value) { return fmt::format("{:.2f}", value); };
   const bool has_removed = !is_null && !removed.empty();
-  return fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} | {} | {:.2f} | {:.2f} | {} | {} | {} | {} |\n",
+  return fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {:.2f} | {:.2f} | {} | {} | {} | {} |\n",
                      what, scores.size(), fmt::format("{:.3f}", shareOf(scores, &Score::is_detected)),
                      is_null || is_absent ? "" : share(shareOf(scores, &Score::is_right)),
                      is_null || is_absent ? "" : share(shareOf(scores, &Score::is_alone)),
                      is_absent ? share(1.0 - shareOf(scores, &Score::is_blamed)) : "",
                      is_absent ? share(shareOf(scores, &Score::has_covariates)) : "",
-                     is_null ? "" : share(shareOf(scores, &Score::has_stage)), of(right_sets, sets),
+                     is_null ? "" : share(shareOf(scores, &Score::has_stage)),
+                     is_null ? "" : share(shareOf(scores, &Score::may_have_stage)), is_null ? "" : of(alone_right, alone),
+                     of(right_sets, sets),
                      spurious / n, rests / n, has_removed ? share(compare::quantile(removed, 0.5)) : "",
                      has_removed ? share(compare::quantile(removed, 0.1)) : "", of(numbers_in, numbers),
                      of(stated_in, stated));
@@ -194,6 +198,10 @@ Score scoreOf(const Case& of, const sim::AnyEffect& hidden, const Removed& remov
     score.is_blamed = score.is_blamed || (!answer.has_name && !answer.has_undeclared);
     // An effect that is named, alone or in a set, has the stage that it has.
     score.has_stage = score.has_stage || answer.has_name || (is_it && one.found.stage == stageOf(hidden));
+    const bool may_have =
+        is_it && std::ranges::find(one.found.stages_alike, stageOf(hidden)) != one.found.stages_alike.end();
+    score.may_have_stage = score.may_have_stage || score.has_stage || may_have;
+    score.is_stage_alone = score.is_stage_alone || (is_it && one.found.stages_alike.empty());
     if (is_it && !is_met) is_met = true, --score.spurious;
     countNumbers(one, hidden, score);
   }
@@ -205,7 +213,7 @@ Score scoreOf(const Case& of, const sim::AnyEffect& hidden, const Removed& remov
 std::string header() {
   return "row,hidden,lambda_wanted,lambda,seed,absent,p,detected,named,named_first,blamed,covariates,stage,"
          "spurious,rests,explainable,removed,stated,stated_low,stated_high,numbers,numbers_in,rms_before_mm,"
-         "rms_after_mm,seconds,found\n";
+         "rms_after_mm,seconds,stage_among,stage_alone,found\n";
 }
 
 std::string lineOf(const Score& one) {
@@ -213,11 +221,12 @@ std::string lineOf(const Score& one) {
   return fmt::format(
       "score,{},{:.0f},{:.1f},{},{},{:.4g},{},{},{},{},{},{},{},{},{:.1f},{:.4f},{:.4f},{:.4f},{:.4f},{},{},{"
       ":.4f},"
-      "{:.4f},{:.1f},{}\n",
+      "{:.4f},{:.1f},{},{},{}\n",
       one.of.hidden, one.of.wanted, one.of.lambda, one.of.seed, yes(one.of.is_absent), one.p,
       yes(one.is_detected), yes(one.is_right), yes(one.is_alone), yes(one.is_blamed), yes(one.has_covariates),
       yes(one.has_stage), one.spurious, one.rests, one.explainable, one.removed, one.stated, one.stated_low,
-      one.stated_high, one.numbers, one.numbers_in, one.before_mm, one.after_mm, one.seconds, one.found);
+      one.stated_high, one.numbers, one.numbers_in, one.before_mm, one.after_mm, one.seconds, yes(one.may_have_stage),
+      yes(one.is_stage_alone), one.found);
 }
 
 std::string tableOf(const std::vector<std::filesystem::path>& files) {
@@ -243,20 +252,20 @@ std::string tableOf(const std::vector<std::filesystem::path>& files) {
   }
   std::string table =
       "| hidden | runs | detected | named | named first | absent: none blamed | absent: covariates right | "
-      "stage right | sets that have it | spurious a run | of these rests | removed, median | worst tenth | "
+      "stage right | among those told | told alone, right | sets that have it | spurious a run | of these rests | removed, median | worst tenth | "
       "numbers in their 95 % | removed in "
       "its 95 % "
-      "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
+      "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
   for (const auto& [key, scores] : groups) {
     const auto& [wanted, is_absent, name] = key;
     table += rowOf(wanted == 0.0 ? name : fmt::format("λ = {:.0f}{}", wanted, is_absent ? ", absent" : ""),
                    scores, wanted == 0.0, is_absent);
   }
   table +=
-      "\nBy effect, all λ:\n\n| hidden | runs | detected | named | named first | | | stage | sets | spurious "
+      "\nBy effect, all λ:\n\n| hidden | runs | detected | named | named first | | | stage | among | alone | sets | spurious "
       "| rests | "
       "removed, median | worst tenth | numbers | removed "
-      "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
+      "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
   for (const auto& [name, scores] : by_effect) table += rowOf(name, scores, false, false);
   table +=
       "\nMisses:\n\n| hidden | λ | seed | absent | p | found | removed |\n|---|---|---|---|---|---|---|\n";

@@ -29,6 +29,8 @@ struct Score {
   bool is_blamed = false;    ///< another effect of the catalogue, without saying that it may be none of it
   bool has_covariates = false;  ///< an undeclared effect that goes with what the hidden one goes with
   bool has_stage = false;
+  bool may_have_stage = false;  ///< that stage, or one that these data do not tell from it
+  bool is_stage_alone = false;  ///< one stage is told
   int spurious = 0;  ///< effects too many, rests of others among them
   int rests = 0;     ///< what is called the rest of another effect
   /// Free of noise, on the locked captures: χ² of what the light's delay leaves of the hidden effect, and the

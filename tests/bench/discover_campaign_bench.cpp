@@ -223,9 +223,14 @@ void report(const Options& options, const bench::Score& score, const CampaignFin
   std::fflush(stdout);
 }
 
-/// Fitted numbers of the hidden effect beside what they were.
+/// Fitted numbers of the hidden effect beside what they were, and of the forms of what has no name.
 void reportNumbers(const sim::AnyEffect& hidden, const CampaignFinding& finding) {
   for (const FoundEffect& one : finding.effects) {
+    std::vector<FittedEffect> forms = one.more;
+    if (one.fitted) forms.push_back(*one.fitted);
+    for (const FittedEffect& form : one.found.is_catalogue ? std::vector<FittedEffect>{} : forms)
+      for (const FittedNumber& number : form.numbers)
+        fmt::print("# {}: {} {:.5g} ± {:.2g}\n", discover::nameOf(form.effect), number.key, number.value, number.error);
     if (!one.fitted || one.fitted->effect.index() != hidden.index()) continue;
     for (const EffectNumber& number : numbersOf(one.fitted->effect))
       if (number.is_whole)
@@ -234,6 +239,11 @@ void reportNumbers(const sim::AnyEffect& hidden, const CampaignFinding& finding)
       fmt::print("# {}: {:.5g} ± {:.2g}, was {:.5g}\n", number.key, number.value, number.error,
                  valueOf(hidden, number.key));
   }
+}
+
+/// Each campaign of a seed has poses and noise of its own: intervals of many effects are as many draws.
+std::uint64_t seedOf(std::uint64_t seed, const sim::AnyEffect& hidden, double lambda) {
+  return seed + 1'000 * (1 + hidden.index()) + 1'000'000 * static_cast<std::uint64_t>(std::lround(lambda));
 }
 
 /// Hides the effect, made as strong as λ wants, and searches.
@@ -258,7 +268,7 @@ void hide(const Setting& world, const bench::KnownCaptures& unspoilt, const sim:
   }
   const sim::SensorModel truth = hiding(factor);
   const sim::AnyEffect hidden = scaled(none, defaults, factor);
-  simulate(world, truth, seed, options);
+  simulate(world, truth, seedOf(seed, hidden, wanted), options);
   for (const bool is_absent : {false, true}) {
     if (!(is_absent ? options.absent : options.present)) continue;
     of.is_absent = is_absent;
