@@ -48,15 +48,19 @@ pid_t startDaemon(const Files& files, const std::string& socket, const std::stri
   ::_exit(0);
 }
 
-/// Intervals of frames [ms].
-std::vector<double> measureFrames(const Files& files, const std::string& pace, double seconds) {
+struct Received {
+  std::vector<double> intervals_ms{};
+  std::uint64_t lost = 0;
+};
+
+Received measureFrames(const Files& files, const std::string& pace, double seconds) {
   const std::string socket = files.folder() / (pace + ".sock");
   const pid_t daemon = startDaemon(files, socket, pace);
   for (int i = 0; i < 200 && !std::filesystem::exists(socket); ++i) ::usleep(50'000);
   auto client = orGiveUp(Client::connect("unix:" + socket));
   auto subscription = orGiveUp(client.subscribe("cam"));
-  std::vector<double> intervals;
-  std::uint64_t lost = 0;
+  Received received;
+  auto& [intervals, lost] = received;
   double last = 0.0;
   const double end = wallMs() + 1e3 * seconds;
   for (int i = 0; wallMs() < end; ++i) {
@@ -76,7 +80,7 @@ std::vector<double> measureFrames(const Files& files, const std::string& pace, d
   fmt::print("| {} | {} | {:.1f} | {:.1f} | {:.1f} | {} |\n", pace, intervals.size(),
              1e3 * static_cast<double>(intervals.size()) / sum, median(intervals), quantile(intervals, 0.95),
              lost);
-  return intervals;
+  return received;
 }
 
 }  // namespace
@@ -88,10 +92,14 @@ Bars frames(const Files& files) {
       "flags. Pace fast: as many as can be; real_time: 30 a second, so that lost ones count.\n\n"
       "| pace | frames | frames/s | interval p50 [ms] | p95 | lost |\n| --- | --- | --- | --- | --- | --- "
       "|\n");
-  const double p95_ms = quantile(measureFrames(files, "fast", 12.0), 0.95);
-  measureFrames(files, "real_time", 12.0);
+  const double p95_ms = quantile(measureFrames(files, "fast", 12.0).intervals_ms, 0.95);
+  const auto [at_pace, lost] = measureFrames(files, "real_time", 12.0);
+  const auto came = static_cast<double>(at_pace.size());
+  const double in_time = came / (came + static_cast<double>(lost));
   return {{"Kinect v2 in real time through the daemon, as fast as they come, interval p95",
-           fmt::format("{:.0f} ms", p95_ms), "30 frames/s: ≤ 33.4 ms", p95_ms <= 33.4}};
+           fmt::format("{:.1f} ms", p95_ms), "30 frames/s: ≤ 33.4 ms", p95_ms <= 33.4},
+          {"the same at its pace of 30 frames/s: turns that brought their frame", fmt::format("{:.1f} %", 1e2 * in_time),
+           "≥ 95 %", in_time >= 0.95}};
 }
 
 void stages(const Files& files) {
