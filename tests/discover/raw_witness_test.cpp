@@ -14,7 +14,9 @@ namespace {
 
 using testing::Contains;
 using testing::HasSubstr;
+using testing::IsEmpty;
 using testing::Not;
+using testing::UnorderedElementsAre;
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
 
@@ -126,6 +128,7 @@ TEST_F(WithRawExposures, AnErrorOfTheDecodedRangeIsNotInTheirPhase) {
   EXPECT_NEAR(one->raw->share->mean, 0.0, 3.0 * one->raw->share->error);
   EXPECT_LT(one->raw->share->error, 0.2);
   EXPECT_EQ(one->found.stage, Stage::Range);
+  EXPECT_THAT(one->found.stages_alike, IsEmpty());
   EXPECT_FALSE(one->raw->contradicts()) << one->raw->contradiction;
 }
 
@@ -139,6 +142,7 @@ TEST_F(WithRawExposures, ADelayBeforeDecodingIsInTheirPhase) {
   ASSERT_TRUE(one->raw->share);
   EXPECT_NEAR(one->raw->share->mean, 1.0, 3.0 * one->raw->share->error);
   EXPECT_EQ(one->found.stage, Stage::Light);
+  EXPECT_THAT(one->found.stages_alike, Not(Contains(Stage::Range)));
   EXPECT_FALSE(one->raw->contradicts()) << one->raw->contradiction;
 }
 
@@ -188,6 +192,30 @@ TEST_F(WithRawExposures, ANameThatActsElsewhereIsTakenBack) {
   EXPECT_THAT(effect.refused, Contains(HasSubstr("the raw exposures say that it acts elsewhere")));
   for (const Alternative& other : effect.alternatives) EXPECT_FALSE(other.named) << other.name;
   EXPECT_TRUE(finding.effects.front().fitted) << "what it is fitted by stays in the model";
+}
+
+/// What the phase shows of the effect, and whether it comes about before decoding.
+TEST(RawSays, OnlyWhatIsNearToAllOrNothingAndFarFromTheOther) {
+  const auto says = [](double share, double error) { return RawSays{Difference{share, error}}.isBeforeDecoding(); };
+  EXPECT_EQ(says(0.98, 0.05), true);
+  EXPECT_EQ(says(0.04, 0.05), false);
+  EXPECT_EQ(says(0.7, 0.15), true);
+  EXPECT_EQ(says(0.6, 0.25), std::nullopt) << "not far enough from nothing";
+  EXPECT_EQ(says(0.475, 0.06), std::nullopt) << "surely a part: the form is not what acts";
+  EXPECT_EQ(says(-0.6, 0.1), std::nullopt);
+  EXPECT_EQ(RawSays{}.isBeforeDecoding(), std::nullopt);
+}
+
+/// Ranges alone do not tell an error of theirs from a delay.
+TEST_F(Searched, WithoutRawExposuresAnErrorOfTheRangeMayActAnywhere) {
+  simulate("", [](sim::RangeImage& image, const Moment& moment, const CameraInfo&, std::uint64_t) {
+    const double folds = std::log(moment.exposures.front().duration.in(microsecond) / 500.0);
+    for (float& range_m : image.range_m.pixels()) range_m += static_cast<float>(5e-3 * folds);
+  });
+  const CampaignFinding finding = search(job());
+  ASSERT_EQ(finding.effects.size(), 1u) << verdictOf(finding);
+  EXPECT_EQ(finding.effects.front().found.stage, Stage::Range);
+  EXPECT_THAT(finding.effects.front().found.stages_alike, UnorderedElementsAre(Stage::Light, Stage::Samples));
 }
 
 TEST_F(Searched, WithoutRawExposuresNothingIsSaidOfThem) {

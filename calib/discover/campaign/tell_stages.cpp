@@ -2,6 +2,7 @@
 #include "calib/discover/campaign/tell_stages.h"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 #include <fmt/format.h>
@@ -31,10 +32,33 @@ Effects withForms(Effects effects, const FoundEffect& found) {
 
 /// Light adds up and does not know how bright it is, nor what else shines: what bends it as it goes with either happens
 /// in the pixels.
-bool isOfPixels(const Effect& effect) {
-  return std::ranges::any_of(effect.covariates, [](const std::string& name) {
+bool isOfPixels(const std::vector<std::string>& covariates) {
+  return std::ranges::any_of(covariates, [](const std::string& name) {
     return name == "amplitude_e" || name == "ambient_klx";
   });
+}
+
+/// An error of the range, or a delay.
+bool leavesAmplitudes(const std::vector<Term>& terms) {
+  return !terms.empty() && std::ranges::all_of(terms, [](const Term& term) {
+    const bool is_of_range = term.carrier.empty() && term.stage.value_or(Stage::Range) == Stage::Range;
+    return is_of_range || term.carrier == kDelayCarrier || term.carrier == fmt::format("{}:range", kPixelCarrier) ||
+           term.carrier == fmt::format("{}:{}", kPixelCarrier, kDelayCarrier);
+  });
+}
+
+/// Where something without a name may act, the likeliest first. What leaves amplitudes as they are is the same behind
+/// decoding and before, unless raw exposures say; what changes them is none of the range; a charge is of the samples.
+std::vector<Stage> stagesOf(const std::vector<Term>& terms, Stage form, std::optional<bool> is_before,
+                            bool is_of_pixels) {
+  if (form == Stage::Samples) return {Stage::Samples};
+  const bool may_be_of_range = leavesAmplitudes(terms);
+  if (may_be_of_range && is_before == false) return {Stage::Range};
+  std::vector<Stage> stages;
+  if (!is_of_pixels) stages.push_back(Stage::Light);
+  stages.push_back(Stage::Samples);
+  if (may_be_of_range && !is_before) stages.insert(form == Stage::Range ? stages.begin() : stages.end(), Stage::Range);
+  return stages;
 }
 
 /// Whether an effect of the catalogue acts elsewhere than the raw exposures say.
@@ -47,55 +71,50 @@ void takeNameBack(bool is_before, Effect& effect) {
   effect.name = fmt::format("like {}, but {} decoding", effect.name, is_before ? "before" : "behind");
   effect.is_catalogue = false;
   effect.stage = is_before ? Stage::Light : Stage::Range;
+  if (is_before) effect.stages_alike.push_back(Stage::Samples);
   std::erase_if(effect.alternatives, [&](const Alternative& other) {
     return other.named && isElsewhere(stageOf(campaignFitOf(*other.named).effect), is_before);
   });
-}
-
-/// Where else than at its stage an effect may act: range and amplitude do not say more than that an error of the range
-/// leaves amplitudes as they are, and is otherwise the same as a delay before decoding.
-std::vector<Stage> stagesAlike(bool may_be_of_range, bool may_be_of_light, const Effect& effect) {
-  std::vector<Stage> alike;
-  for (const Stage stage : {Stage::Light, Stage::Samples, Stage::Range}) {
-    const bool may_be = stage == Stage::Range ? may_be_of_range : stage == Stage::Samples || may_be_of_light;
-    if (may_be && stage != effect.stage) alike.push_back(stage);
-  }
-  return alike;
 }
 
 /// Where an effect without a name acts. `is_only_one`: of several it cannot be said which makes the samples contradict
 /// each other.
 void tellStage(const std::optional<RawSays>& raw, bool is_only_one, Effect& effect) {
   const auto is_before = raw ? raw->isBeforeDecoding() : std::nullopt;
-  const bool is_as_range = effect.stage == Stage::Range, is_charge = effect.stage == Stage::Samples;
-  if (is_before == false) {
-    effect.stage = Stage::Range;
-    return;
-  }
-  if (is_before == true && effect.stage == Stage::Range) effect.stage = Stage::Light;
-  const bool contradicts = raw && is_only_one && raw->contradicts(), is_of_pixels = contradicts || isOfPixels(effect);
-  if (effect.stage == Stage::Light && is_of_pixels) effect.stage = Stage::Samples;
-  if (!is_charge) effect.stages_alike = stagesAlike(is_as_range && !is_before, !is_of_pixels, effect);
+  const bool contradicts = raw && is_only_one && raw->contradicts();
+  const std::vector<Stage> stages = stagesOf(termsOf(effect), effect.stage.value_or(Stage::Range), is_before,
+                                             contradicts || isOfPixels(effect.covariates));
+  effect.stage = stages.front();
+  effect.stages_alike.assign(stages.begin() + 1, stages.end());
 }
 
 /// Of several explanations each acts at its own stage.
 void addStagesOfOthers(std::optional<bool> is_before, Effect& effect) {
   for (const Alternative& other : effect.alternatives) {
-    const auto stage = other.named ? std::optional{stageOf(campaignFitOf(*other.named).effect)}
-                                   : other.group.terms.front().stage;
-    const bool is_known = !stage || stage == effect.stage || (is_before && isElsewhere(*stage, *is_before)) ||
-                          std::ranges::find(effect.stages_alike, *stage) != effect.stages_alike.end();
-    if (!is_known) effect.stages_alike.push_back(*stage);
+    std::vector<Stage> stages;
+    if (other.named)
+      stages.push_back(stageOf(campaignFitOf(*other.named).effect));
+    else if (!other.group.terms.empty())
+      stages = stagesOf(other.group.terms, other.group.terms.front().stage.value_or(Stage::Range), is_before,
+                        isOfPixels(other.covariates));
+    for (const Stage stage : stages) {
+      const bool is_known = stage == effect.stage || (is_before && isElsewhere(stage, *is_before)) ||
+                            std::ranges::find(effect.stages_alike, stage) != effect.stages_alike.end();
+      if (!is_known) effect.stages_alike.push_back(stage);
+    }
   }
 }
 
 }  // namespace
 
 std::optional<bool> RawSays::isBeforeDecoding() const {
-  constexpr double kSure = 3.0;
+  // What is neither, though it is known well, is not what the form says, of which the phase shows a part.
+  constexpr double kSure = 3.0, kNear = 0.25;
   if (!share) return std::nullopt;
-  if (share->mean > 0.5 && share->mean > kSure * share->error) return true;
-  if (share->mean < 0.5 && 1.0 - share->mean > kSure * share->error) return false;
+  const double behind = std::abs(share->mean), before = std::abs(1.0 - share->mean);
+  const double sure = kSure * share->error, near = std::max(kNear, sure);
+  if (before < behind && behind > sure && before < near) return true;
+  if (behind < before && before > sure && behind < near) return false;
   return std::nullopt;
 }
 
