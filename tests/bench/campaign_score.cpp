@@ -18,6 +18,7 @@
 #include "calib/discover/campaign/catalogue.h"
 #include "calib/discover/campaign/covariates.h"
 #include "calib/discover/campaign/refit.h"
+#include "calib/discover/campaign/unequal_exposures.h"
 
 namespace toftwin::discover::bench {
 namespace {
@@ -28,6 +29,10 @@ bool goesWith(const std::vector<std::string>& covariates, const sim::AnyEffect& 
   bool has_any = false;
   for (const std::string& name : covariates) {
     if (name == "gain" || name == "delay") continue;  // what light does, no covariate
+    const bool is_of_exposures = name == kUnequalCarrier || name == kAmplifiedCarrier;
+    if (is_of_exposures && !std::holds_alternative<sim::SampleGain>(hidden) &&
+        !std::holds_alternative<sim::StepPhase>(hidden))
+      return false;  // two cycles per turn, from another cause
     if (std::ranges::find(words, wordOf(name)) == words.end()) return false;
     has_any = true;
   }
@@ -196,13 +201,12 @@ Score scoreOf(const Case& of, const sim::AnyEffect& hidden, const Removed& remov
     score.is_alone = score.is_alone || (one.found.is_catalogue && one.found.name == of.hidden);
     score.has_covariates = score.has_covariates || answer.has_covariates;
     score.is_blamed = score.is_blamed || (!answer.has_name && !answer.has_undeclared);
-    // An effect that is named, alone or in a set, has the stage that it has.
-    score.has_stage = score.has_stage || answer.has_name || (is_it && one.found.stage == stageOf(hidden));
-    const bool may_have =
-        is_it && std::ranges::find(one.found.stages_alike, stageOf(hidden)) != one.found.stages_alike.end();
-    score.may_have_stage = score.may_have_stage || score.has_stage || may_have;
-    score.is_stage_alone = score.is_stage_alone || (is_it && one.found.stages_alike.empty());
-    if (is_it && !is_met) is_met = true, --score.spurious;
+    if (is_it && !is_met) {
+      is_met = true, --score.spurious;
+      score.has_stage = one.found.stage == stageOf(hidden);
+      score.may_have_stage = score.has_stage || std::ranges::count(one.found.stages_alike, stageOf(hidden)) > 0;
+      score.is_stage_alone = !one.found.is_catalogue && one.found.stages_alike.empty();
+    }
     countNumbers(one, hidden, score);
   }
   // One wrong name in the right one's place is a wrong name, not an effect too many.

@@ -28,9 +28,9 @@ struct Score {
   bool is_alone = false;     ///< named first
   bool is_blamed = false;    ///< another effect of the catalogue, without saying that it may be none of it
   bool has_covariates = false;  ///< an undeclared effect that goes with what the hidden one goes with
-  bool has_stage = false;
-  bool may_have_stage = false;  ///< that stage, or one that these data do not tell from it
-  bool is_stage_alone = false;  ///< one stage is told
+  bool has_stage = false;       ///< the stage that is told first, of the effect that is the hidden one
+  bool may_have_stage = false;  ///< that, or one that these data do not tell from it
+  bool is_stage_alone = false;  ///< it has no name, and one stage is told
   int spurious = 0;  ///< effects too many, rests of others among them
   int rests = 0;     ///< what is called the rest of another effect
   /// Free of noise, on the locked captures: χ² of what the light's delay leaves of the hidden effect, and the

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "calib/discover/campaign/raw_exposures.h"
+#include "sim/images/box_mean.h"
 #include "tests/discover/searched.h"
 
 namespace toftwin::discover {
@@ -144,6 +145,19 @@ TEST_F(WithRawExposures, ADelayBeforeDecodingIsInTheirPhase) {
   EXPECT_EQ(one->found.stage, Stage::Light);
   EXPECT_THAT(one->found.stages_alike, Not(Contains(Stage::Range)));
   EXPECT_FALSE(one->raw->contradicts()) << one->raw->contradiction;
+}
+
+/// A camera's own filter changes amplitudes as well as ranges.
+TEST_F(WithRawExposures, AFilterOfTheDecodedImageMayBeBehindDecoding) {
+  simulate("", [](sim::RangeImage& image, const Moment&, const CameraInfo&, std::uint64_t) {
+    image.range_m = sim::boxMean(image.range_m, 3), image.amplitude = sim::boxMean(image.amplitude, 3);
+  });
+  const CampaignFinding finding = search(job());
+  ASSERT_FALSE(finding.effects.empty()) << verdictOf(finding);
+  const Effect& effect = finding.effects.front().found;
+  std::vector<Stage> stages = effect.stages_alike;
+  stages.push_back(effect.stage.value_or(Stage::Samples));
+  EXPECT_THAT(stages, Contains(Stage::Range)) << verdictOf(finding);
 }
 
 TEST_F(WithRawExposures, OneRawExposureThatIsAmplifiedMoreContradictsTheOthers) {

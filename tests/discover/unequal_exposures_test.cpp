@@ -70,13 +70,12 @@ TEST_F(Searched, ATapThatIsAmplifiedMoreIsOneEffectOfTheSamples) {
   EXPECT_NEAR(of_tap->numbers.front().value, 0.01, 3.0 * of_tap->numbers.front().error);
 }
 
-TEST_F(Searched, ALateRawExposureWithoutANameIsUnequalAndOfLightOrSamples) {
+TEST_F(Searched, ALateRawExposureWithoutANameIsUnequal) {
   const CampaignFinding finding = searchWithout("step_phase", "step = 1\nerror_rad = 0.02");
   ASSERT_EQ(finding.effects.size(), 1U) << verdictOf(finding);
   const Effect& found = finding.effects.front().found;
   EXPECT_THAT(found.covariates, ElementsAre("unequal"));
   EXPECT_EQ(found.stage, Stage::Light);
-  EXPECT_THAT(found.stages_alike, ElementsAre(Stage::Samples));
   ASSERT_TRUE(finding.judgement);
   EXPECT_GT(finding.judgement->removed, 0.9) << verdictOf(finding);
 }

@@ -38,26 +38,16 @@ bool isOfPixels(const std::vector<std::string>& covariates) {
   });
 }
 
-/// An error of the range, or a delay.
-bool leavesAmplitudes(const std::vector<Term>& terms) {
-  return !terms.empty() && std::ranges::all_of(terms, [](const Term& term) {
-    const bool is_of_range = term.carrier.empty() && term.stage.value_or(Stage::Range) == Stage::Range;
-    return is_of_range || term.carrier == kDelayCarrier || term.carrier == fmt::format("{}:range", kPixelCarrier) ||
-           term.carrier == fmt::format("{}:{}", kPixelCarrier, kDelayCarrier);
-  });
-}
-
-/// Where something without a name may act, the likeliest first. What leaves amplitudes as they are is the same behind
-/// decoding and before, unless raw exposures say; what changes them is none of the range; a charge is of the samples.
-std::vector<Stage> stagesOf(const std::vector<Term>& terms, Stage form, std::optional<bool> is_before,
-                            bool is_of_pixels) {
+/// Where something without a name may act, the likeliest first. An error of the range is the same as a delay before it
+/// was decoded, and a filter of the decoded image may change amplitudes, too: only raw exposures say. A charge is of the
+/// samples.
+std::vector<Stage> stagesOf(Stage form, std::optional<bool> is_before, bool is_of_pixels) {
   if (form == Stage::Samples) return {Stage::Samples};
-  const bool may_be_of_range = leavesAmplitudes(terms);
-  if (may_be_of_range && is_before == false) return {Stage::Range};
+  if (is_before == false) return {Stage::Range};
   std::vector<Stage> stages;
   if (!is_of_pixels) stages.push_back(Stage::Light);
   stages.push_back(Stage::Samples);
-  if (may_be_of_range && !is_before) stages.insert(form == Stage::Range ? stages.begin() : stages.end(), Stage::Range);
+  if (!is_before) stages.insert(form == Stage::Range ? stages.begin() : stages.end(), Stage::Range);
   return stages;
 }
 
@@ -82,21 +72,23 @@ void takeNameBack(bool is_before, Effect& effect) {
 void tellStage(const std::optional<RawSays>& raw, bool is_only_one, Effect& effect) {
   const auto is_before = raw ? raw->isBeforeDecoding() : std::nullopt;
   const bool contradicts = raw && is_only_one && raw->contradicts();
-  const std::vector<Stage> stages = stagesOf(termsOf(effect), effect.stage.value_or(Stage::Range), is_before,
-                                             contradicts || isOfPixels(effect.covariates));
+  // What contradicts itself was so before it was decoded.
+  const std::vector<Stage> stages =
+      contradicts && is_before != false
+          ? std::vector{Stage::Samples}
+          : stagesOf(effect.stage.value_or(Stage::Range), is_before, isOfPixels(effect.covariates));
   effect.stage = stages.front();
   effect.stages_alike.assign(stages.begin() + 1, stages.end());
 }
 
-/// Of several explanations each acts at its own stage.
-void addStagesOfOthers(std::optional<bool> is_before, Effect& effect) {
+/// Of several explanations each acts at its own stage. `contradict`: the samples do, so that it is theirs without a name.
+void addStagesOfOthers(std::optional<bool> is_before, bool contradict, Effect& effect) {
   for (const Alternative& other : effect.alternatives) {
     std::vector<Stage> stages;
     if (other.named)
       stages.push_back(stageOf(campaignFitOf(*other.named).effect));
-    else if (!other.group.terms.empty())
-      stages = stagesOf(other.group.terms, other.group.terms.front().stage.value_or(Stage::Range), is_before,
-                        isOfPixels(other.covariates));
+    else if (!other.group.terms.empty() && !contradict)
+      stages = stagesOf(other.group.terms.front().stage.value_or(Stage::Range), is_before, isOfPixels(other.covariates));
     for (const Stage stage : stages) {
       const bool is_known = stage == effect.stage || (is_before && isElsewhere(stage, *is_before)) ||
                             std::ranges::find(effect.stages_alike, stage) != effect.stages_alike.end();
@@ -141,7 +133,7 @@ Result<> tellStages(const RawWitness* witness, Round& round) {
       tellStage(one.raw, is_only_one, one.found);
     else if (is_before && one.found.stage && isElsewhere(*one.found.stage, *is_before))
       takeNameBack(*is_before, one.found);
-    addStagesOfOthers(is_before, one.found);
+    addStagesOfOthers(is_before, is_only_one && one.raw && one.raw->contradicts(), one.found);
   }
   return {};
 }
