@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <functional>
 #include <optional>
+#include <set>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -13,18 +14,19 @@
 namespace toftwin::compare {
 namespace {
 
-/// So few pixels of a camera that rounds to millimetres may be alike by chance.
-constexpr std::size_t kFewPixels = 64;
+/// So few values of a camera that rounds to millimetres may be alike by chance, as of one whose lens is covered.
+constexpr std::size_t kFewValues = 64;
 
 /// Of the ranges, or the depths; nothing where too little is seen.
 std::optional<std::size_t> hashOf(const Frame& frame) {
   const Plane* plane = frame.find(PlaneKind::Range);
   if (plane == nullptr) plane = frame.find(PlaneKind::Depth);
   if (plane == nullptr || plane->type != ElementType::F32) return std::nullopt;
-  if (std::ranges::count_if(plane->as<float>(), [](float v) { return v > 0.0F; }) <
-      static_cast<std::ptrdiff_t>(kFewPixels))
-    return std::nullopt;
   const auto values = plane->as<float>();
+  std::set<float> different;
+  for (auto value = values.begin(); value != values.end() && different.size() < kFewValues; ++value)
+    if (*value > 0.0F) different.insert(*value);
+  if (different.size() < kFewValues) return std::nullopt;
   return std::hash<std::string_view>{}({reinterpret_cast<const char*>(values.data()), values.size_bytes()});
 }
 
@@ -57,8 +59,8 @@ std::string sameSeedWarning(const Frame& a, const Frame& b) {
   // Only a simulated scene has an id.
   if (of_a.scene_id.empty() || of_b.scene_id.empty() || of_a.seed != of_b.seed) return {};
   return fmt::format(
-      "{} and {} are simulated with one seed, {}: frames of one number have noise that is drawn alike, so that B − A may "
-      "have less of it than that of two cameras, or none. Give one of the sources another `seed`.",
+      "{} and {} are simulated with one seed, {}: frames of one number have noise that is drawn alike, so that B − A "
+      "may have less of it than that of two cameras, or none. Give one of the sources another `seed`.",
       a.source, b.source, of_a.seed);
 }
 

@@ -124,7 +124,8 @@ std::string rowOf(const std::string& what, const std::vector<Score>& scores, boo
                      is_absent ? share(1.0 - shareOf(scores, &Score::is_blamed)) : "",
                      is_absent ? share(shareOf(scores, &Score::has_covariates)) : "",
                      is_null ? "" : share(shareOf(scores, &Score::has_stage)),
-                     is_null ? "" : share(shareOf(scores, &Score::may_have_stage)), is_null ? "" : of(alone_right, alone),
+                     is_null ? "" : share(shareOf(scores, &Score::may_have_stage)),
+                     is_null ? "" : of(alone_right, alone),
                      of(right_sets, sets),
                      spurious / n, rests / n, has_removed ? share(compare::quantile(removed, 0.5)) : "",
                      has_removed ? share(compare::quantile(removed, 0.1)) : "", of(numbers_in, numbers),
@@ -242,6 +243,8 @@ std::string tableOf(const std::vector<std::filesystem::path>& files) {
   for (const auto& file : files) {
     std::ifstream in{file};
     for (std::string line; std::getline(in, line);) {
+      if (line.starts_with("row,") && line + "\n" != header())
+        return fmt::format("{}: these lines are of another version of this benchmark\n", file.string());
       if (line.starts_with("unseen,")) hidden_from_captures.insert(fieldsOf(line).at(1));
       auto score = readScore(line);
       if (!score) {
@@ -256,7 +259,8 @@ std::string tableOf(const std::vector<std::filesystem::path>& files) {
   }
   std::string table =
       "| hidden | runs | detected | named | named first | absent: none blamed | absent: covariates right | "
-      "stage right | among those told | told alone, right | sets that have it | spurious a run | of these rests | removed, median | worst tenth | "
+      "stage right | among those told | told alone, right | sets that have it | spurious a run | of these rests | "
+      "removed, median | worst tenth | "
       "numbers in their 95 % | removed in "
       "its 95 % "
       "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
@@ -266,7 +270,8 @@ std::string tableOf(const std::vector<std::filesystem::path>& files) {
                    scores, wanted == 0.0, is_absent);
   }
   table +=
-      "\nBy effect, all λ:\n\n| hidden | runs | detected | named | named first | | | stage | among | alone | sets | spurious "
+      "\nBy effect, all λ:\n\n| hidden | runs | detected | named | named first | | | stage | among | alone | sets | "
+      "spurious "
       "| rests | "
       "removed, median | worst tenth | numbers | removed "
       "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";

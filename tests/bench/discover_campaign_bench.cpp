@@ -230,7 +230,8 @@ void reportNumbers(const sim::AnyEffect& hidden, const CampaignFinding& finding)
     if (one.fitted) forms.push_back(*one.fitted);
     for (const FittedEffect& form : one.found.is_catalogue ? std::vector<FittedEffect>{} : forms)
       for (const FittedNumber& number : form.numbers)
-        fmt::print("# {}: {} {:.5g} ± {:.2g}\n", discover::nameOf(form.effect), number.key, number.value, number.error);
+        fmt::print("# {}: {} {:.5g} ± {:.2g}\n", discover::nameOf(form.effect), number.key, number.value,
+                   number.error);
     if (!one.fitted || one.fitted->effect.index() != hidden.index()) continue;
     for (const EffectNumber& number : numbersOf(one.fitted->effect))
       if (number.is_whole)

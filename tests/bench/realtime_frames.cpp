@@ -98,8 +98,8 @@ Bars frames(const Files& files) {
   const double in_time = came / (came + static_cast<double>(lost));
   return {{"Kinect v2 in real time through the daemon, as fast as they come, interval p95",
            fmt::format("{:.1f} ms", p95_ms), "30 frames/s: ≤ 33.4 ms", p95_ms <= 33.4},
-          {"the same at its pace of 30 frames/s: turns that brought their frame", fmt::format("{:.1f} %", 1e2 * in_time),
-           "≥ 95 %", in_time >= 0.95}};
+          {"the same at its pace of 30 frames/s: turns that brought their frame",
+           fmt::format("{:.1f} %", 1e2 * in_time), "≥ 95 %", in_time >= 0.95}};
 }
 
 void stages(const Files& files) {

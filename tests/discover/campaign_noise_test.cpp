@@ -152,9 +152,9 @@ TEST(LightNoise, IsThatOfTheHighestFrequencyAndSharedByThePlace) {
                                         captureOf({frameOfLight(), frameOfLight()})};
   captures[2].moment.world_from_camera->translation_m = {0.1, 0.0, 0.0};
   auto traced = std::make_shared<TracedCapture>();
-  traced->is_edge = Image<std::uint8_t>(24, 6);
+  traced->is_jump = Image<std::uint8_t>(24, 6);
   for (int y = 0; y < 6; ++y) {
-    traced->is_edge(20, y) = 1;
+    traced->is_jump(20, y) = 1;
     for (MeasuredCapture& capture : captures) capture.light_variance_m2(20, y) = 1.0F;
   }
   shareLightNoise({traced, traced, traced}, captures);

@@ -35,39 +35,80 @@ position_m = [-2, 0, 1.999]
 material = "dark"
 )";
 
-/// So many columns are left out about the edge, by a camera of that focal length.
-int widthOfEdge(double focal_px, const std::vector<Stood>& stood) {
+/// Stripes of 5 cm, which a camera of 366 pixels at 2 m sees 9 pixels wide.
+std::string stripes() {
+  std::string scene = kHalves;
+  for (int i = 0; i < 20; ++i)
+    scene += "[[object]]\nname = \"stripe" + std::to_string(i) +
+             "\"\nshape = \"rectangle\"\nsize_m = [0.05, 7, 0]\nmaterial = \"grey\"\nposition_m = [" +
+             std::to_string(-0.975 + 0.1 * i) + ", 0, 1.998]\n";
+  return scene;
+}
+
+struct Seen {
+  std::string scene = kHalves;
+  double focal_px = 366.0;
+  Transform<World, Camera> pose{};
+  std::vector<Stood> stood{};
+};
+
+TracedCapture traced(const Seen& seen) {
   std::string text = smallCamera();
   for (const std::string key : {"fx = 42.0", "fy = 42.0"}) {
     const auto at = text.find(key);
     if (at == std::string::npos) throw std::runtime_error("the small camera has another focal length");
-    text.replace(at, key.size(), key.substr(0, 5) + std::to_string(focal_px));
+    text.replace(at, key.size(), key.substr(0, 5) + std::to_string(seen.focal_px));
   }
   const auto model = sim::SensorModel::parse(text, "camera.toml");
-  const auto scene = sim::Scene::parse(kHalves, "scene.toml");
+  const auto scene = sim::Scene::parse(seen.scene, "scene.toml");
   if (!model || !scene) throw std::runtime_error("the camera or the scene is wrong");
   MeasuredCapture capture;
-  capture.moment.world_from_camera = Transform<World, Camera>{};
-  const auto traced =
-      traceAll({*model, *scene}, {capture}, {.samples_per_pixel = 4, .max_surfaces = 1}, {}, stood);
-  if (!traced) throw std::runtime_error(traced.error().message);
-  const Image<std::uint8_t>& edge = traced->front()->is_edge;
-  const int row = edge.height() / 2, border = 6;  // the image's own edges, whose neighbours nobody knows
-  int width = 0;
-  for (int x = border; x < edge.width() - border; ++x) width += edge(x, row);
-  return width;
+  capture.moment.world_from_camera = seen.pose;
+  const auto all = traceAll({*model, *scene}, {capture}, {.samples_per_pixel = 4, .max_surfaces = 1}, {}, seen.stood);
+  if (!all) throw std::runtime_error(all.error().message);
+  return *all->front();
 }
 
+/// So many pixels of the middle row are left out, but for the image's own edges, whose neighbours nobody knows.
+int leftOut(const Image<std::uint8_t>& edge) {
+  constexpr int kBorder = 6;
+  int count = 0;
+  for (int x = kBorder; x < edge.width() - kBorder; ++x) count += edge(x, edge.height() / 2);
+  return count;
+}
+
+const std::vector<Stood> kAsTheLightSays{Stood{0.0, 0.0, 0.5, 0.0, 0.0}};
+
 TEST(TracedEdges, LeaveOutWhatAPoseAsItWasToldMayReach) {
-  EXPECT_EQ(widthOfEdge(42.0, {}), 2);  // three deviations are 0.23 pixels
+  EXPECT_EQ(leftOut(traced({.focal_px = 42.0}).is_edge), 2);  // three deviations are 0.23 pixels
   // 366 × √(0.1°² + (1 mm / 2 m)²) = 0.66 pixels, of which three deviations are 2.
-  EXPECT_EQ(widthOfEdge(366.0, {}), 6);
+  EXPECT_EQ(leftOut(traced({}).is_edge), 6);
   // Also where each capture has light of its own, but stands where it was told to.
-  EXPECT_EQ(widthOfEdge(366.0, {Stood{}}), 6);
+  EXPECT_EQ(leftOut(traced({.stood = {Stood{}}}).is_edge), 6);
 }
 
 TEST(TracedEdges, LeaveOutOnePixelWhereTheLightSaysWhereTheCameraStands) {
-  EXPECT_EQ(widthOfEdge(366.0, {Stood{0.0, 0.0, 0.5, 0.0, 0.0}}), 2);
+  EXPECT_EQ(leftOut(traced({.stood = kAsTheLightSays}).is_edge), 2);
+}
+
+TEST(TracedEdges, AreNoWiderForTheLightsNoise) { EXPECT_EQ(leftOut(traced({}).is_jump), 2); }
+
+/// From pixel to pixel its range changes by less than 3 %, over three of them by more.
+TEST(TracedEdges, ASlantedWallHasNone) {
+  const auto slanted = rotation<World, Camera>({0.0, 1.0, 0.0}, 1.3);
+  EXPECT_EQ(leftOut(traced({.pose = slanted}).is_edge),
+            leftOut(traced({.pose = slanted, .stood = kAsTheLightSays}).is_edge));
+}
+
+/// Three deviations would leave three of nine pixels, of the seven that are beside no edge; two leave five.
+TEST(TracedEdges, LeaveHalfOfWhatIsBesideNoEdge) {
+  const TracedCapture told = traced({.scene = stripes()}),
+                      found = traced({.scene = stripes(), .stood = kAsTheLightSays});
+  const auto kept = [](const TracedCapture& one) {
+    return static_cast<double>(std::ranges::count(one.is_edge.pixels(), 0));
+  };
+  EXPECT_LT(kept(told), kept(found));
+  EXPECT_GE(kept(told), 0.5 * kept(found));
 }
 
 }  // namespace

@@ -131,6 +131,8 @@ TEST_F(StandardPlan, TellsEveryCharacteristicOfBothCameras) {
   ASSERT_EQ(compared.status, 0) << compared.err;
   EXPECT_THAT(compared.out, testing::HasSubstr("Note: 3 captures of a moving plate are not compared pixel by pixel"));
   const Ran locked = toftwin(fmt::format("compare {} --locked -o {}", path("run"), path("locked")));
+  ASSERT_EQ(locked.status, 0) << locked.err;
+  EXPECT_THAT(locked.out, testing::HasSubstr("index.html"));
   EXPECT_THAT(locked.out, testing::Not(testing::HasSubstr("moving plate"))) << "none of them is locked";
   const compare::Json told = characteristics();
   std::map<std::string, compare::Json> found;

@@ -184,15 +184,15 @@ void tell(const compare::WrittenReport& written) {
 Result<Exit> compareRun(const Options& options) {
   catchInterrupts();
   compare::Progress progress{stderr};
-  const auto page = plan::compareRun({.run = options.sources[0],
-                                      .output = options.output,
-                                      .locked = options.locked,
-                                      .note = options.note,
-                                      .log = options.log,
-                                      .interrupted = interrupted},
-                                     progress);
-  if (!page) return page.error();
-  tell(*page);
+  const auto written = plan::compareRun({.run = options.sources[0],
+                                         .output = options.output,
+                                         .locked = options.locked,
+                                         .note = options.note,
+                                         .log = options.log,
+                                         .interrupted = interrupted},
+                                        progress);
+  if (!written) return written.error();
+  tell(*written);
   return Exit::Ok;
 }
 
@@ -223,14 +223,14 @@ Result<Exit> compareThem(const Options& options) {
     job->capture.twin = twinFrom(options.twin, *a.feed, *b.feed);
   }
   compare::Progress progress{stderr};
-  const auto page = compare::compareAndReport(*job, progress);
-  if (!page) return page.error();
+  const auto written = compare::compareAndReport(*job, progress);
+  if (!written) return written.error();
   if (job->data && !compare::findThesisData(*job->data)) {
     fmt::print(stderr,
                "The real measurements were left out: there is no tof-thesis-2018 in $TOFTWIN_DATA "
                "nor in ../shared/data; see --data.\n");
   }
-  tell(*page);
+  tell(*written);
   return Exit::Ok;
 }
 

@@ -129,7 +129,8 @@ struct TracedCapture {
   Image<float> tracing_variance_m2,
       tracing_variance;         ///< of range and of ln amplitude, from Monte Carlo
   Stood stood{};                ///< the light was traced there; the changes are from there, too
-  Image<std::uint8_t> is_edge;  ///< next to a jump of range, or of what is painted on it
+  Image<std::uint8_t> is_jump;  ///< next to a jump of range, or of what is painted on it
+  Image<std::uint8_t> is_edge;  ///< so near to one that the pose decides what is seen: no row of the fit
 };
 
 /// What differs by more is another surface or another period of the phase: a matter of the masks.

@@ -71,7 +71,7 @@ void shareLightNoise(const std::vector<std::shared_ptr<const TracedCapture>>& tr
     const auto alike = static_cast<float>(capture.light_captures);
     for (Image<float>* image : {&capture.light_variance_m2, &capture.light_variance}) {
       for (std::size_t i = 0; i < image->size(); ++i)
-        (*image)[i] = traced[c]->is_edge[i] != 0 ? kNaN : alike * (*image)[i];
+        (*image)[i] = traced[c]->is_jump[i] != 0 ? kNaN : alike * (*image)[i];
       *image = sim::boxMean(*image, kReach);
     }
   }

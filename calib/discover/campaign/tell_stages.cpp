@@ -38,9 +38,9 @@ bool isOfPixels(const std::vector<std::string>& covariates) {
   });
 }
 
-/// Where something without a name may act, the likeliest first. An error of the range is the same as a delay before it
-/// was decoded, and a filter of the decoded image may change amplitudes, too: only raw exposures say. A charge is of the
-/// samples.
+/// Where something without a name may act, the likeliest first. An error of the range is the same as a delay before
+/// decoding, and a filter of the decoded image may change amplitudes, too: only raw exposures say. A charge is of
+/// the samples.
 std::vector<Stage> stagesOf(Stage form, std::optional<bool> is_before, bool is_of_pixels) {
   if (form == Stage::Samples) return {Stage::Samples};
   if (is_before == false) return {Stage::Range};
@@ -81,14 +81,15 @@ void tellStage(const std::optional<RawSays>& raw, bool is_only_one, Effect& effe
   effect.stages_alike.assign(stages.begin() + 1, stages.end());
 }
 
-/// Of several explanations each acts at its own stage. `contradict`: the samples do, so that it is theirs without a name.
+/// Of several explanations each acts at its own stage. `contradict`: the samples do, and what has no name is theirs.
 void addStagesOfOthers(std::optional<bool> is_before, bool contradict, Effect& effect) {
   for (const Alternative& other : effect.alternatives) {
     std::vector<Stage> stages;
     if (other.named)
       stages.push_back(stageOf(campaignFitOf(*other.named).effect));
     else if (!other.group.terms.empty() && !contradict)
-      stages = stagesOf(other.group.terms.front().stage.value_or(Stage::Range), is_before, isOfPixels(other.covariates));
+      stages = stagesOf(other.group.terms.front().stage.value_or(Stage::Range), is_before,
+                        isOfPixels(other.covariates));
     for (const Stage stage : stages) {
       const bool is_known = stage == effect.stage || (is_before && isElsewhere(stage, *is_before)) ||
                             std::ranges::find(effect.stages_alike, stage) != effect.stages_alike.end();

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -49,7 +50,7 @@ void addTracingNoise(TracedCapture& traced) {
   Image<float> relative(light.width(), light.height(), kNaN);
   for (std::size_t i = 0; i < phasor.size(); ++i) {
     const auto power = static_cast<double>(std::norm(phasor[i]));
-    if (power > 0.0 && traced.is_edge[i] == 0)
+    if (power > 0.0 && traced.is_jump[i] == 0)
       relative[i] = static_cast<float>(static_cast<double>(light.variance[highest][i]) / power);
   }
   traced.tracing_variance = sim::boxMean(relative, kReach);
@@ -58,49 +59,65 @@ void addTracingNoise(TracedCapture& traced) {
         static_cast<float>(static_cast<double>(traced.tracing_variance[i]) * metres * metres);
 }
 
-/// Pixels so near to edges of range (a jump of 3 %) and of paint (one of 5 % in albedo): there a pose that is a
-/// little off changes a pixel by more than its derivative says.
-Image<std::uint8_t> edgesWithin(int reach, const sim::Truth& truth) {
+/// Pixels at edges of range (a jump of 3 %) and of paint (one of 5 % in albedo), and next to what nobody knows.
+Image<std::uint8_t> jumpsOf(const sim::Truth& truth) {
   const int width = truth.range_m.width(), height = truth.range_m.height();
-  Image<std::uint8_t> edge(width, height);
+  Image<std::uint8_t> jumps(width, height);
   const auto differ = [](float a, float b, float share) {
     return std::isfinite(a) != std::isfinite(b) ||
            std::abs(a - b) > share * std::min(std::abs(a), std::abs(b));
   };
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
-      for (int j = -reach; j <= reach && edge(x, y) == 0; ++j) {
-        for (int i = -reach; i <= reach; ++i) {
+      for (int j = -1; j <= 1; ++j) {
+        for (int i = -1; i <= 1; ++i) {
           const int u = x + i, v = y + j;
-          const bool is_outside = u < 0 || v < 0 || u >= width || v >= height;  // nobody knows
+          const bool is_outside = u < 0 || v < 0 || u >= width || v >= height;
           if (is_outside || differ(truth.range_m(x, y), truth.range_m(u, v), 0.03F) ||
               differ(truth.albedo(x, y), truth.albedo(u, v), 0.05F)) {
-            edge(x, y) = 1;
+            jumps(x, y) = 1;
           }
         }
       }
     }
   }
-  return edge;
+  return jumps;
 }
 
-/// Where the camera stands as the light says, edges are at most one pixel away from where they were traced; where it was
-/// told to stand, by three deviations of poses more. Where that leaves too little of the image, as of a fine chequerboard,
-/// less.
-Image<std::uint8_t> edgesOf(const sim::Truth& truth, const CameraInfo& camera, bool is_as_told) {
-  constexpr double kTurn = kPosePrior_deg * std::numbers::pi / 180.0, kDeviations = 3.0, kEnough = 0.5;
-  std::vector<double> ranges;
-  for (const float range : truth.range_m.pixels())
-    if (std::isfinite(range)) ranges.push_back(static_cast<double>(range));
-  Image<std::uint8_t> nearest = edgesWithin(1, truth);
-  if (!is_as_told || ranges.empty()) return nearest;
-  const double shift_px = camera.fx * std::hypot(kTurn, kPosePrior_m / compare::quantile(std::move(ranges), 0.5));
-  const auto left = [](const Image<std::uint8_t>& edges) { return std::ranges::count(edges.pixels(), 0); };
-  for (auto reach = 1 + std::lround(kDeviations * shift_px); reach > 1; --reach) {
-    Image<std::uint8_t> edges = edgesWithin(static_cast<int>(reach), truth);
-    if (static_cast<double>(left(edges)) >= kEnough * static_cast<double>(left(nearest))) return edges;
+/// Pixels that a jump may reach where the camera stands so many prior deviations off: by how far those turn the image,
+/// and move it at the jump's range.
+Image<std::uint8_t> reachedBy(const Image<std::uint8_t>& jumps, const sim::Truth& truth, const CameraInfo& camera,
+                              double deviations) {
+  constexpr double kTurn = kPosePrior_deg * std::numbers::pi / 180.0;
+  const double focal_px = std::max(camera.fx, camera.fy);
+  Image<std::uint8_t> reached = jumps;
+  for (int y = 0; y < jumps.height(); ++y) {
+    for (int x = 0; x < jumps.width(); ++x) {
+      if (jumps(x, y) == 0) continue;
+      const auto range_m = static_cast<double>(truth.range_m(x, y));
+      const double shift_px = focal_px * (range_m > 0.0 ? std::hypot(kTurn, kPosePrior_m / range_m) : kTurn);
+      const auto reach = static_cast<int>(std::lround(std::min(deviations * shift_px, 100.0)));
+      for (int v = std::max(0, y - reach); v <= std::min(jumps.height() - 1, y + reach); ++v)
+        for (int u = std::max(0, x - reach); u <= std::min(jumps.width() - 1, x + reach); ++u) reached(u, v) = 1;
+    }
   }
-  return nearest;
+  return reached;
+}
+
+/// There a pose that is a little off changes a pixel by more than its derivative says: at jumps, where the camera
+/// stands as the light says; where it is told to stand, within three deviations of poses of them. Less where that
+/// leaves too little of the image, as of a fine chequerboard.
+Image<std::uint8_t> edgesOf(const TracedCapture& traced, const CameraInfo& camera, bool is_as_told) {
+  constexpr double kEnough = 0.5;
+  const auto left = [](const Image<std::uint8_t>& edges) {
+    return static_cast<double>(std::ranges::count(edges.pixels(), 0));
+  };
+  for (const double deviations : {3.0, 2.0, 1.0}) {
+    if (!is_as_told) break;
+    Image<std::uint8_t> edges = reachedBy(traced.is_jump, traced.light.truth, camera, deviations);
+    if (left(edges) >= kEnough * left(traced.is_jump)) return edges;
+  }
+  return traced.is_jump;
 }
 
 /// Direct light through the pixels' footprints, with the same paths at each place: its changes are
@@ -191,7 +208,8 @@ Result<std::vector<std::shared_ptr<const TracedCapture>>> traceAll(
     auto traced = std::make_shared<TracedCapture>();
     traced->stood = here;
     traced->light = sim::trace(scene, request);
-    traced->is_edge = edgesOf(traced->light.truth, request.camera, here == Stood{});
+    traced->is_jump = jumpsOf(traced->light.truth);
+    traced->is_edge = edgesOf(*traced, request.camera, here == Stood{});
     addTracingNoise(*traced);
     addMoves(scene, request, *traced);
     for (const std::size_t c : sites[s].captures) all[c] = traced;

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kUnit = 0.01;
 /// Farther off, the first order says nothing.
-constexpr double kMostUnits = 50.0;
+constexpr double kMostGain = 0.5, kMostPhase_rad = 0.5;
 
 sim::AnyEffect amplified(int step, int tap) { return sim::SampleGain{.step = step, .tap = tap, .gain = kUnit}; }
 sim::AnyEffect late(int step) { return sim::StepPhase{.step = step, .error = kUnit * radian}; }
@@ -21,28 +21,30 @@ sim::AnyEffect late(int step) { return sim::StepPhase{.step = step, .error = kUn
 /// The effect of so many units, into one of the same raw exposure and tap, or as one more.
 void add(const sim::AnyEffect& unit, double units, std::vector<LearnedEffect>& learned) {
   if (const auto* gain = std::get_if<sim::SampleGain>(&unit)) {
+    const double more = units * gain->gain;
     for (LearnedEffect& one : learned) {
       auto* same = std::get_if<sim::SampleGain>(&one.effect);
       if (same == nullptr || same->step != gain->step || same->tap != gain->tap) continue;
-      same->gain += units * gain->gain;
+      same->gain = std::clamp(same->gain + more, -kMostGain, kMostGain);
       return;
     }
-    learned.push_back({sim::SampleGain{.step = gain->step, .tap = gain->tap, .gain = units * gain->gain}, {"gain"}});
+    learned.push_back({sim::SampleGain{gain->step, gain->tap, std::clamp(more, -kMostGain, kMostGain)}, {"gain"}});
   } else if (const auto* phase = std::get_if<sim::StepPhase>(&unit)) {
-    learned.push_back({sim::StepPhase{.step = phase->step, .error = units * phase->error}, {"error_rad"}});
+    const double by_rad = std::clamp(units * phase->error.in(radian), -kMostPhase_rad, kMostPhase_rad);
+    learned.push_back({sim::StepPhase{.step = phase->step, .error = by_rad * radian}, {"error_rad"}});
   }
 }
 
 }  // namespace
 
 std::vector<UnequalExposure> unequalExposures(int steps, int taps) {
-  if (steps < 4 || steps % 4 != 0) return {};
+  if (steps < 3 || taps != 2) return {};
   const auto name = [](std::string_view carrier, const char* part) { return fmt::format("{}:{}", carrier, part); };
-  std::vector<UnequalExposure> all{{name(kUnequalCarrier, "gain"), {}}, {name(kUnequalCarrier, "phase"), {late(0)}}};
-  for (int tap = 0; tap < taps; ++tap) all.front().second.push_back(amplified(0, tap));
-  if (taps > 1) all.push_back({name(kAmplifiedCarrier, "first"), {amplified(0, 0)}});
-  all.push_back({name(kAmplifiedCarrier, "quarter"), {amplified(steps / 4, 0)}});
-  return all;
+  const int second = steps % 4 == 0 ? steps / 4 : 1;
+  return {{name(kUnequalCarrier, "gain"), {amplified(0, 0), amplified(0, 1)}},
+          {name(kUnequalCarrier, "phase"), {late(0)}},
+          {name(kAmplifiedCarrier, "first"), {amplified(0, 0)}},
+          {name(kAmplifiedCarrier, "second"), {amplified(second, 0)}}};
 }
 
 std::vector<TermGroup> unequalGroups(std::span<const UnequalExposure> carriers) {
@@ -64,7 +66,7 @@ std::vector<LearnedEffect> unequalOf(std::span<const UnequalExposure> carriers,
   for (const auto& [term, coefficient] : terms)
     for (const auto& [carrier, effects] : carriers)
       if (term.carrier == carrier && term.factors.empty())
-        for (const sim::AnyEffect& unit : effects) add(unit, std::clamp(coefficient, -kMostUnits, kMostUnits), learned);
+        for (const sim::AnyEffect& unit : effects) add(unit, coefficient, learned);
   return learned;
 }
 

@@ -15,17 +15,19 @@ namespace toftwin::discover {
 
 struct LearnedEffect;  // model_file.h
 
-/// One in all its taps brighter or darker than the others, as where its light's supply sags, or taken with a reference
-/// that is late. Either errs with two cycles per turn, a quarter of a turn apart, whatever the amplitude.
+/// One brighter or darker in both taps than the others, as where its light's supply sags, or taken with a reference
+/// that is late. To first order, of one of K raw exposures at the phase θ, z ∝ e^(iφ) changes by
+///     δz/z = (γ/K) (1 + e^(2iθ − 2iφ)),    δz/z = −i (ψ/K) (1 − e^(2iθ − 2iφ)) :
+/// two cycles per turn, a quarter of a turn apart, so that those of the first raw exposure span those of any.
 inline constexpr std::string_view kUnequalCarrier = "unequal";
-/// One tap of a raw exposure amplified more: what is collected without being modulated, ambient light with it, then
-/// is a charge.
+/// One tap of a raw exposure amplified more: half of that, and a charge in proportion to what is collected without
+/// being modulated, ambient light with it, at the phase θ. Two exposures at different phases span those of any.
 inline constexpr std::string_view kAmplifiedCarrier = "amplified";
 
 /// A carrier, and the effects that make one unit of it: 1 % or 1/100 rad.
 using UnequalExposure = std::pair<std::string, std::vector<sim::AnyEffect>>;
-/// Those of the first raw exposure of each frequency, and of the one a quarter of a turn later. Empty where a frequency
-/// does not have four `steps` or a multiple.
+/// Of the first raw exposure of each frequency and a second one, a quarter of a turn later where there is one there.
+/// Empty for fewer than three `steps`, and where pixels have one tap, whose gains and light are no few columns.
 std::vector<UnequalExposure> unequalExposures(int steps, int taps);
 
 /// What is looked for with them: unequal exposures, and unequal ones whose taps are amplified unequally.
