@@ -237,7 +237,7 @@ std::string clockWarning(const Frame& frame, std::chrono::system_clock::time_poi
   // In whole seconds, so that what is said of many captures is said once.
   return fmt::format(
       "The clock of the daemon that {} comes from is {:.0f} s or more {} ours: times of its frames are not "
-      "those of other machines. Let both follow one clock (NTP)",
+      "those of other machines. Let both follow one clock (NTP).",
       frame.source, std::max(ahead->low_s, -ahead->high_s), ahead->low_s > 0.0 ? "ahead of" : "behind");
 }
 

@@ -138,12 +138,17 @@ TEST_F(Searched, ATapThatIsAmplifiedMoreIsOneEffectOfTheSamples) {
   EXPECT_EQ(finding.effects.front().more.size(), 3U);
 }
 
-TEST_F(Searched, ALateRawExposureWithoutANameIsUnequal) {
+/// Its raw exposures contradict each other, as those of light that is another in each would.
+TEST_F(Searched, ALateRawExposureWithoutANameIsUnequalAndMayBeOfTheLight) {
+  with_samples_ = true;
   const CampaignFinding finding = searchWithout("step_phase", "step = 1\nerror_rad = 0.02");
   ASSERT_EQ(finding.effects.size(), 1U) << verdictOf(finding);
   const Effect& found = finding.effects.front().found;
   EXPECT_THAT(found.covariates, ElementsAre("unequal"));
+  ASSERT_TRUE(finding.effects.front().raw);
+  EXPECT_TRUE(finding.effects.front().raw->contradicts());
   EXPECT_EQ(found.stage, Stage::Light);
+  EXPECT_THAT(found.stages_alike, ElementsAre(Stage::Samples));
   ASSERT_TRUE(finding.judgement);
   EXPECT_GT(finding.judgement->removed, 0.9) << verdictOf(finding);
 }

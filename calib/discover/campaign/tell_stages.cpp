@@ -38,6 +38,14 @@ bool isOfPixels(const std::vector<std::string>& covariates) {
   });
 }
 
+/// Light that is another in each raw exposure makes them contradict each other, too.
+bool isOfSingleExposures(const Effect& effect) {
+  const std::vector<Term> terms = termsOf(effect);
+  return !terms.empty() && std::ranges::all_of(terms, [](const Term& term) {
+    return term.carrier.starts_with(fmt::format("{}:", kUnequalCarrier));
+  });
+}
+
 /// Where something without a name may act, the likeliest first. An error of the range is the same as a delay before
 /// decoding, and a filter of the decoded image may change amplitudes, too: only raw exposures say. A charge is of
 /// the samples.
@@ -71,7 +79,7 @@ void takeNameBack(bool is_before, Effect& effect) {
 /// each other.
 void tellStage(const std::optional<RawSays>& raw, bool is_only_one, Effect& effect) {
   const auto is_before = raw ? raw->isBeforeDecoding() : std::nullopt;
-  const bool contradicts = raw && is_only_one && raw->contradicts();
+  const bool contradicts = raw && is_only_one && raw->contradicts() && !isOfSingleExposures(effect);
   // What contradicts itself was so before it was decoded.
   const std::vector<Stage> stages =
       contradicts && is_before != false
