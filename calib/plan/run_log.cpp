@@ -12,7 +12,7 @@
 namespace toftwin::plan {
 namespace {
 
-constexpr int kVersion = 2;
+constexpr int kVersion = 3;
 constexpr std::int64_t kApplicationId = 0x746F6674;  ///< "toft": what says that a database is such a log
 /// What brings a log from one version to the next; the first makes it.
 constexpr std::array kMigrations{
@@ -30,7 +30,8 @@ constexpr std::array kMigrations{
     "CREATE TABLE camera (name TEXT PRIMARY KEY, source TEXT NOT NULL, model TEXT NOT NULL, serial TEXT NOT "
     "NULL);"
     "CREATE TABLE setting (run INTEGER NOT NULL REFERENCES run (id) ON DELETE CASCADE, of TEXT NOT NULL,"
-    " name TEXT NOT NULL, value TEXT NOT NULL, PRIMARY KEY (run, of, name));"};
+    " name TEXT NOT NULL, value TEXT NOT NULL, PRIMARY KEY (run, of, name));",
+    "ALTER TABLE run ADD COLUMN frames_b INTEGER; ALTER TABLE run ADD COLUMN same_frames INTEGER;"};
 static_assert(kMigrations.size() == kVersion);
 
 Error failure(sqlite3* database, const std::string& what) {
@@ -60,6 +61,12 @@ class Statement {
     sqlite3_bind_int64(statement_, ++bound_, number);
     return *this;
   }
+  /// What is below 0 is not known: NULL.
+  Statement& bindCount(std::int64_t number) {
+    ++bound_;
+    if (number >= 0) sqlite3_bind_int64(statement_, bound_, number);
+    return *this;
+  }
   /// What is not finite is NULL.
   Statement& bindReal(double number) {
     ++bound_;
@@ -83,6 +90,11 @@ class Statement {
     return value == nullptr ? std::string{} : std::string{reinterpret_cast<const char*>(value)};
   }
   std::int64_t number() { return sqlite3_column_int64(statement_, column_++); }
+  /// -1: NULL, not known.
+  std::int64_t count() {
+    const int at = column_++;
+    return sqlite3_column_type(statement_, at) == SQLITE_NULL ? -1 : sqlite3_column_int64(statement_, at);
+  }
   double real() {
     const int at = column_++;
     return sqlite3_column_type(statement_, at) == SQLITE_NULL ? std::numeric_limits<double>::quiet_NaN()
@@ -97,7 +109,7 @@ class Statement {
 
 constexpr const char* kRunColumns =
     "run.id, judged, began, folder, plan, camera_a, camera_b, software, note, index_sha256, locked, "
-    "(SELECT s.value FROM setting s WHERE s.run = run.id AND s.of = '' AND s.name = 'captures'), "
+    "frames_b, same_frames, (SELECT s.value FROM setting s WHERE s.run = run.id AND s.of = '' AND s.name = 'captures'), "
     "(SELECT s.value FROM setting s WHERE s.run = run.id AND s.of = '' AND s.name = 'captures_planned')";
 
 LoggedRun runFrom(Statement& row) {
@@ -105,6 +117,7 @@ LoggedRun runFrom(Statement& row) {
   run.id = row.number(), run.judged = row.text(), run.began = row.text(), run.folder = row.text();
   run.plan = row.text(), run.camera_a = row.text(), run.camera_b = row.text(), run.software = row.text();
   run.note = row.text(), run.index_sha256 = row.text(), run.is_locked = row.number() != 0;
+  run.frames_of_b = row.count(), run.same_frames = row.count();
   run.captures = row.number(), run.planned = row.number();
   return run;
 }
@@ -137,11 +150,12 @@ Result<> write(sqlite3* database, const LoggedRun& run, const RunTraits& traits)
   Statement insert{
       database,
       "INSERT INTO run (judged, began, folder, plan, camera_a, camera_b, software, note, index_sha256, "
-      "locked) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)"};
+      "locked, frames_b, same_frames) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)"};
   for (const std::string* text : {&run.judged, &run.began, &run.folder, &run.plan, &run.camera_a,
                                   &run.camera_b, &run.software, &run.note, &run.index_sha256})
     insert.bind(*text);
-  if (auto done = insert.bind(std::int64_t{run.is_locked}).run(); !done) return done;
+  insert.bind(std::int64_t{run.is_locked}).bindCount(run.frames_of_b).bindCount(run.same_frames);
+  if (auto done = insert.run(); !done) return done;
   const std::int64_t id = sqlite3_last_insert_rowid(database);
   if (auto done = writeSettings(database, id, run); !done) return done;
   for (const compare::NamedTrait& one : traits.traits) {

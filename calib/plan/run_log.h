@@ -25,10 +25,15 @@ struct LoggedRun {
   std::string
       index_sha256{};  ///< of its index.jsonl: the same captures judged again take the old entry's place
   bool is_locked = false;
+  /// Frames of B in which anything is seen, and how many of them are, bit for bit, A's; -1: not known, of a log of
+  /// version 2 or before.
+  std::int64_t frames_of_b = -1, same_frames = -1;
   std::vector<RunSetting> settings{};  ///< written with it; settings() reads them
   std::int64_t captures = 0, planned = 0;  ///< of its settings, where it is read; 0: not known
   /// It was judged before all of its plan was measured.
   [[nodiscard]] bool isUnfinished() const { return captures < planned; }
+  /// One camera was given twice: none of its numbers says what two cameras do, and which of the two it was is not known.
+  [[nodiscard]] bool isOfOneCamera() const { return same_frames > 0; }
 };
 
 /// One number of one run.

@@ -270,6 +270,8 @@ std::vector<Card> cardsOf(const Characteristics& c, const std::vector<TraitVerdi
   return cards;
 }
 
+}  // namespace
+
 SameFrames sameFramesOf(const ComparedRun& run) {
   SameFrames same;
   for (const auto* captures : {&run.captures, &run.moving}) {
@@ -277,8 +279,6 @@ SameFrames sameFramesOf(const ComparedRun& run) {
   }
   return same;
 }
-
-}  // namespace
 
 Result<Finding> judgeRun(const ComparedRun& run) {
   const Characteristics c = characterise(imagesOf(run, [](const ComparedCapture&) { return true; }));

@@ -9,6 +9,7 @@
 #include <toftwin/result.h>
 
 #include "calib/compare/real_data.h"
+#include "calib/compare/same_frames.h"
 #include "calib/plan/compare_run.h"
 #include "calib/plan/run_settings.h"
 
@@ -30,5 +31,7 @@ struct ComparedRun {
 
 /// Error where nothing can be compared: no pixel valid in both at any capture.
 Result<compare::Finding> judgeRun(const ComparedRun& run);
+/// Of all its captures: whether A and B are two cameras.
+compare::SameFrames sameFramesOf(const ComparedRun& run);
 
 }  // namespace toftwin::plan

@@ -44,12 +44,15 @@ TrendSeries seriesOf(const std::vector<const LoggedTrait*>& numbers, const std::
   }
   std::ranges::stable_sort(series.rows, {}, [](const TrendRow& row) { return row.at.run.began; });
   const auto isInDoubt = [](const TrendRow& row) { return compare::isInDoubt(row.at.trait.detail); };
-  const auto isWhole = [](const TrendRow& row) { return row.is_told && !row.at.run.isUnfinished(); };
+  const auto isWhole = [](const TrendRow& row) {
+    return row.is_told && !row.at.run.isUnfinished() && !row.at.run.isOfOneCamera();
+  };
   auto first = std::ranges::find_if(series.rows, [&](const TrendRow& row) { return isWhole(row) && !isInDoubt(row); });
   if (first == series.rows.end()) first = std::ranges::find_if(series.rows, isWhole);
   if (first == series.rows.end()) first = std::ranges::find(series.rows, true, &TrendRow::is_told);
   first->is_first = true;
-  const bool is_first_in_doubt = isInDoubt(*first);
+  const bool is_first_in_doubt = isInDoubt(*first), is_first_of_one = first->at.run.isOfOneCamera();
+  for (TrendRow& row : series.rows) row.is_first_of_one_camera = is_first_of_one;
   for (TrendRow& row : series.rows) row.is_in_doubt = row.is_told && (is_first_in_doubt || isInDoubt(row));
   return series;
 }

@@ -8,8 +8,8 @@
 
 namespace toftwin::plan {
 
-/// A number of one run, held against that of the first finished run in which it is not in doubt; of runs none of which
-/// is so, the first finished one's; of runs none of which is finished, the first's.
+/// A number of one run, held against that of the first finished run of two cameras in which it is not in doubt; of runs
+/// none of which is so, the first finished one's of two cameras; of runs none of which is that, the first's.
 struct TrendRow {
   LoggedTrait at{};
   bool is_told = true;  ///< or the run does not tell the number, and `at` has only the run
@@ -18,8 +18,13 @@ struct TrendRow {
   /// end of an interval it is made from is not known.
   double change = 0.0, low = 0.0, high = 0.0;
   bool is_in_doubt = false;  ///< it, or the first: what it is held against
-  /// A run that is not through may lack just those captures that would have made the number what it was.
-  [[nodiscard]] bool isJudged() const { return is_told && !is_first && !is_in_doubt && !at.run.isUnfinished(); }
+  bool is_first_of_one_camera = false;  ///< so that nothing is held against it
+  /// A run that is not through may lack just those captures that would have made the number what it was; of one in which
+  /// one camera was given twice nothing is known of the other.
+  [[nodiscard]] bool isJudged() const {
+    return is_told && !is_first && !is_in_doubt && !is_first_of_one_camera && !at.run.isUnfinished() &&
+           !at.run.isOfOneCamera();
+  }
   [[nodiscard]] bool isChanged() const { return isJudged() && (low > 0.0 || high < 0.0); }
 };
 

@@ -138,8 +138,8 @@ TEST_F(Log, RefusesADatabaseOfSomethingElse) {
 TEST_F(Log, RefusesAVersionThatItDoesNotKnow) {
   ASSERT_TRUE(RunLog::open(file_));
   EXPECT_EQ(refusal(), "it was opened");
-  sql("PRAGMA user_version = 3");
-  EXPECT_THAT(refusal(), HasSubstr("is of version 3, which a newer toftwin made"));
+  sql("PRAGMA user_version = 4");
+  EXPECT_THAT(refusal(), HasSubstr("is of version 4, which a newer toftwin made"));
   for (const char* version : {"-1", "-2147483648", "0"}) {
     sql(fmt::format("PRAGMA user_version = {}", version));
     EXPECT_THAT(refusal(), HasSubstr(fmt::format("is of version {}, which no toftwin makes", version)));
@@ -192,6 +192,8 @@ TEST_F(Log, BringsALogOfVersion1ToThisOne) {
   EXPECT_TRUE(log->settings(4)->empty());
   ASSERT_EQ(log->cameras()->size(), 2u);
   EXPECT_EQ(log->cameras()->front().serial, "0815");
+  EXPECT_EQ(log->runs()->front().same_frames, -1) << "not known";
+  EXPECT_FALSE(log->runs()->front().isOfOneCamera());
   EXPECT_TRUE(log->add(run("2026-11-02T00:00:00Z", "bb"), drifts(1.0, 2.0)));
   EXPECT_TRUE(RunLog::open(file_)) << "once, not each time";
 }
@@ -261,6 +263,56 @@ TEST_F(Log, CallsNoNumberOfAnUnfinishedRunChanged) {
   EXPECT_FALSE(rows[3].isChanged());
   // One change is judged, not three: its interval is 95 %'s own.
   EXPECT_NEAR(rows[2].low, 6.0 - std::sqrt(2.0), 1e-12);
+}
+
+/// One camera given twice agrees with itself: that is no change of either, nor what others are held against.
+TEST_F(Log, CallsNoNumberOfOneCameraGivenTwiceChanged) {
+  auto log = RunLog::open(file_);
+  ASSERT_TRUE(log);
+  const auto of = [](const char* began, const char* hash, std::int64_t same) {
+    LoggedRun one = run(began, hash);
+    one.frames_of_b = 20, one.same_frames = same;
+    return one;
+  };
+  ASSERT_TRUE(log->add(of("2026-11-01T00:00:00Z", "aa", 20), drifts(50.0, 2.0)));
+  const auto alone = trendsOf(*log->traits("kinect", "drift", ""), *log->runs());
+  EXPECT_TRUE(alone.front().rows[0].is_first);
+  ASSERT_TRUE(log->add(of("2026-11-02T00:00:00Z", "bb", 0), drifts(1.0, 2.0)));
+  ASSERT_TRUE(log->add(of("2026-11-03T00:00:00Z", "cc", 0), drifts(7.0, 2.0)));
+  ASSERT_TRUE(log->add(of("2026-11-04T00:00:00Z", "dd", 1), drifts(7.0, 2.0)));
+  const auto runs = log->runs();
+  ASSERT_EQ(runs->size(), 4u);
+  EXPECT_EQ((*runs)[0].frames_of_b, 20);
+  EXPECT_EQ((*runs)[3].same_frames, 1);
+  const auto trends = trendsOf(*log->traits("kinect", "drift", ""), *runs);
+  const auto& rows = trends.front().rows;
+  ASSERT_EQ(rows.size(), 4u);
+  EXPECT_TRUE(rows[1].is_first);
+  EXPECT_EQ(rows[0].change, 49.0);
+  EXPECT_FALSE(rows[0].isChanged());
+  EXPECT_TRUE(rows[2].isChanged());
+  EXPECT_NEAR(rows[2].low, 6.0 - std::sqrt(2.0), 1e-12) << "one change is judged, not three";
+  EXPECT_FALSE(rows[3].isChanged());
+  // Without a run of two cameras, nothing is held against what there is.
+  const auto of_two = trendsOf({LoggedTrait{(*runs)[0], rows[0].at.trait}, LoggedTrait{(*runs)[3], rows[3].at.trait}});
+  EXPECT_TRUE(of_two.front().rows[1].is_first_of_one_camera);
+  EXPECT_FALSE(of_two.front().rows[1].isChanged());
+}
+
+/// Made by the statements of toftwin before there was a version 3.
+TEST_F(Log, BringsALogOfVersion2ToThisOne) {
+  {
+    auto log = RunLog::open(file_);
+    ASSERT_TRUE(log && log->add(run("2026-11-01T00:00:00Z", "aa"), drifts(1.0, 2.0)));
+  }
+  sql("ALTER TABLE run DROP COLUMN frames_b; ALTER TABLE run DROP COLUMN same_frames; PRAGMA user_version = 2");
+  auto log = RunLog::open(file_);
+  ASSERT_TRUE(log) << log.error().message;
+  EXPECT_EQ(log->runs()->front().same_frames, -1) << "not known";
+  LoggedRun one = run("2026-11-02T00:00:00Z", "bb");
+  one.frames_of_b = 3, one.same_frames = 3;
+  ASSERT_TRUE(log->add(one, drifts(1.0, 2.0)));
+  EXPECT_TRUE(RunLog::open(file_)->runs()->back().isOfOneCamera());
 }
 
 /// Else the row before would look like the newest run's.

@@ -33,6 +33,9 @@ std::string quoted(const std::string& text) {
   return result + "\"";
 }
 
+/// Nothing where it is not known.
+std::string countOrNothing(std::int64_t count) { return count < 0 ? "" : std::to_string(count); }
+
 Result<plan::RunLog> openExisting(const std::string& file) {
   if (std::filesystem::exists(file)) return plan::RunLog::open(file);
   return Error{Error::Code::NotFound,
@@ -45,13 +48,13 @@ using Numbers = std::vector<plan::LoggedTrait>;
 void printCsv(const Numbers& all) {
   fmt::print(
       "run,began,judged,plan,locked,camera_a,camera_b,of,characteristic,detail,number,unit,value,low,high,n,"
-      "folder\n");
+      "folder,frames_b,same_frames\n");
   for (const auto& [run, one] : all) {
-    fmt::print("{},{},{},{},{},{},{},{},{},{},{},{},{:.9g},{:.9g},{:.9g},{},{}\n", run.id, run.began,
+    fmt::print("{},{},{},{},{},{},{},{},{},{},{},{},{:.9g},{:.9g},{:.9g},{},{},{},{}\n", run.id, run.began,
                run.judged, quoted(run.plan), run.is_locked ? 1 : 0, quoted(run.camera_a),
                quoted(run.camera_b), quoted(one.of), quoted(one.what), quoted(one.detail),
                quoted(one.trait.name), quoted(one.trait.unit), one.trait.value, one.trait.low, one.trait.high,
-               one.trait.n, quoted(run.folder));
+               one.trait.n, quoted(run.folder), countOrNothing(run.frames_of_b), countOrNothing(run.same_frames));
   }
 }
 
@@ -93,7 +96,9 @@ Result<Exit> writeHdf5(const Numbers& all, const Options& options) {
       {"/high", doubles(&compare::Trait::high)},
       {"/n", columnOf(all, [](const LoggedRun&,
                               const RunTrait& one) { return static_cast<int64_t>(one.trait.n); })},
-      {"/folder", runs(&LoggedRun::folder)}};
+      {"/folder", runs(&LoggedRun::folder)},
+      {"/frames_b", columnOf(all, [](const LoggedRun& run, const RunTrait&) { return int64_t{run.frames_of_b}; })},
+      {"/same_frames", columnOf(all, [](const LoggedRun& run, const RunTrait&) { return int64_t{run.same_frames}; })}};
   auto written = writeHdf5Table(
       options.hdf5, columns,
       {{"content", "a row for each number of each run; 95 % intervals; of a log of toftwin compare"},
@@ -101,6 +106,11 @@ Result<Exit> writeHdf5(const Numbers& all, const Options& options) {
   if (!written) return written.error();
   fmt::print("{}: {}\n", options.hdf5, counted(all.size(), "number"));
   return Exit::Ok;
+}
+
+std::string oneCamera(const plan::LoggedRun& run) {
+  return fmt::format("A and B are not two cameras: {} of {} of B are A's, bit for bit", run.same_frames,
+                     counted(static_cast<std::size_t>(run.frames_of_b), "frame"));
 }
 
 /// What a run was made with.
@@ -132,9 +142,10 @@ Result<Exit> showLog(const Options& options) {
   if (!runs) return runs.error();
   fmt::print("{:>4}  {:<20}  {:<14}  {:<28}  {:<28}  {}\n", "run", "began", "plan", "A", "B", "folder");
   for (const plan::LoggedRun& run : *runs)
-    fmt::print("{:>4}  {:<20}  {:<14}  {:<28}  {:<28}  {}{}{}\n", run.id, run.began, run.plan, run.camera_a,
+    fmt::print("{:>4}  {:<20}  {:<14}  {:<28}  {:<28}  {}{}{}{}\n", run.id, run.began, run.plan, run.camera_a,
                run.camera_b, run.folder, run.is_locked ? " (locked captures)" : "",
-               run.isUnfinished() ? fmt::format(" ({} of {} captures)", run.captures, run.planned) : "");
+               run.isUnfinished() ? fmt::format(" ({} of {} captures)", run.captures, run.planned) : "",
+               run.isOfOneCamera() ? fmt::format(" ({})", oneCamera(run)) : "");
   return Exit::Ok;
 }
 
@@ -143,14 +154,22 @@ std::string unfinished(const plan::LoggedRun& run) {
 }
 
 std::string verdictOn(const plan::TrendRow& row, const std::string& first_detail) {
-  const bool is_whole = !row.at.run.isUnfinished();
-  if (row.is_first) return is_whole ? "the first" : "the first; " + unfinished(row.at.run);
+  const bool is_whole = !row.at.run.isUnfinished(), is_of_one = row.at.run.isOfOneCamera();
+  if (row.is_first) {
+    return fmt::format("the first{}{}", is_whole ? "" : "; " + unfinished(row.at.run),
+                       is_of_one ? "; " + oneCamera(row.at.run) : "");
+  }
   const auto change = [](double by) { return (by > 0.0 ? "+" : "") + compare::shownDigits(by, 4); };
   std::string verdict = std::isfinite(row.low) && std::isfinite(row.high)
                             ? fmt::format("{} ({} to {}){}", change(row.change), change(row.low),
                                           change(row.high), row.isChanged() ? ": changed" : "")
                             : fmt::format("{}, not known how surely", change(row.change));
   if (!is_whole) verdict += fmt::format("; {}, and this is called no change", unfinished(row.at.run));
+  if (is_of_one) {
+    verdict += fmt::format("; {}, and this is called no change", oneCamera(row.at.run));
+  } else if (row.is_first_of_one_camera) {
+    verdict += "; A and B of the first are not two cameras, and this is called no change";
+  }
   if (row.is_in_doubt) {
     verdict += fmt::format("; {} in doubt, and this is called no change",
                            compare::isInDoubt(row.at.trait.detail) ? "it is" : "the first is");
@@ -164,7 +183,8 @@ std::string verdictOn(const plan::TrendRow& row, const std::string& first_detail
 void printRow(const plan::TrendRow& row, const std::string& first_detail) {
   fmt::print("  run {:>4}  {:<20}  ", row.at.run.id, row.at.run.began);
   if (!row.is_told) {
-    fmt::print("not told{}\n", row.at.run.isUnfinished() ? ": " + unfinished(row.at.run) : "");
+    fmt::print("not told{}{}\n", row.at.run.isUnfinished() ? ": " + unfinished(row.at.run) : "",
+               row.at.run.isOfOneCamera() ? "; " + oneCamera(row.at.run) : "");
     return;
   }
   const compare::Trait& trait = row.at.trait.trait;
