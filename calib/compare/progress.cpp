@@ -75,7 +75,8 @@ void Progress::end() {
   if (out_ == nullptr) return;
   if (on_terminal_) fmt::print(out_, "\n");
   const double passed = std::chrono::duration<double>(Clock::now() - started_).count();
-  fmt::print(out_, "done in {:.0f} s\n", passed);
+  fmt::print(out_, "done in {}\n",
+             passed < 90.0 ? fmt::format("{:.0f} s", passed) : fmt::format("{:.0f} min", passed / 60.0));
 }
 
 }  // namespace toftwin::compare

@@ -111,7 +111,7 @@ std::string html(const std::vector<std::string>& row, const std::vector<bool>& i
 
 std::string html(const TableBlock& table) {
   constexpr std::size_t kFew = 8;  // rows that are printed on one page, whatever is left of that before
-  std::string out = fmt::format("<div class='scroll' tabindex='0'><table{}><caption>{}</caption><thead><tr>",
+  std::string out = fmt::format("<div class='scroll' tabindex='0'><table{}><caption><span>{}</span></caption><thead><tr>",
                                 table.rows.size() <= kFew ? " class='few'" : "", escaped(table.caption));
   std::size_t columns = table.header.size();
   for (const auto& row : table.rows) columns = std::max(columns, row.size());

@@ -57,15 +57,23 @@ figcaption{font-size:.9rem;color:var(--soft);margin-top:6px;max-width:90ch}
 .dots.extra,.band.extra{fill:var(--extra)}.dots.alert,.band.alert{fill:var(--alert)}
 .scroll{overflow-x:auto;margin:14px 0}
 table{border-collapse:collapse;font-size:.92rem;min-width:min(100%,480px);background:var(--panel);border:1px solid var(--line)}
+/* Said beside the table's visible part, however wide it is. */
 caption{text-align:left;color:var(--soft);font-size:.9rem;padding:0 0 6px}
+caption span{display:inline-block;position:sticky;left:0;max-width:min(100%,calc(100vw - 40px))}
 th,td{padding:5px 12px;border-bottom:1px solid var(--line);text-align:left;vertical-align:top}
 th{font-weight:600;vertical-align:bottom}td:first-child:not(.number){min-width:13em}td:nth-child(2):not(.number):not([colspan]){min-width:13em}th.number,td.number{text-align:right}td.number{font-variant-numeric:tabular-nums;white-space:nowrap}
 td.long{white-space:normal;min-width:11em}.above td{border-bottom:0;padding-bottom:0}.below td{color:var(--soft);padding:0 12px 6px 28px}
 footer{margin-top:40px;padding-top:12px;border-top:1px solid var(--line);color:var(--soft);font-size:.85rem}
-@media(max-width:520px){main{padding:18px 12px 40px}.cards{grid-template-columns:1fr 1fr}.card{padding:8px 10px}.value{font-size:1.02rem}h1{font-size:1.4rem}}
+@media(max-width:520px){main{padding:18px 12px 40px}.cards{grid-template-columns:1fr 1fr}.card{padding:8px 10px}.value{font-size:1.02rem}h1{font-size:1.4rem}
+.plot svg,.row .plot svg{min-width:0}.tick,.label{font-size:16px}.plot.map .tick,.row .tick,.plot.map .label,.row .label{font-size:15px}
+/* Rows of a few lines, and their name in sight while one scrolls. */
+table{width:max-content}caption span{max-width:calc(100vw - 26px)}
+th,td:not([colspan]),td:first-child:not(.number):not([colspan]){padding:5px 8px;min-width:0;max-width:13em}
+th:first-child,td:first-child:not([colspan]){position:sticky;left:0;background:var(--panel);max-width:9em;overflow-wrap:anywhere}
+td:nth-child(2):not(.number):not([colspan]){min-width:5em}.below td{max-width:0}}
 .cloud canvas{display:block;width:100%;height:420px;touch-action:none;cursor:grab}.cloud .hint,.cloud input{display:none}
 .cloud.turns .hint{display:inline;color:var(--soft)}.cloud.turns input{display:inline}.inkA{color:var(--measured)}.inkB{color:var(--simulated)}
-@media print{nav,.cloud .hint,.cloud input{display:none!important}
+@media print{caption span{max-width:none}nav,.cloud .hint,.cloud input{display:none!important}
 body{background:#fff;font-size:10pt}main{max-width:none;padding:0}
 /* Verdict and cards on the first page. */
 .cards{grid-template-columns:repeat(4,1fr);gap:6px}.card{padding:4px 8px}

@@ -71,12 +71,20 @@ std::string verdictText(const RequirementResult& result) {
   return result.verdict.is_certain ? word : word + ", not certain";
 }
 
-std::string whereText(const Case& use, const RequirementResult& result) {
+std::string conditionText(const Case& use, const AtCondition& at) {
+  const std::string more = use.spec.lightings.size() > 1 ? ", " + use.spec.lightings[at.lighting].name : "";
+  return fmt::format("at {}{}", use.spec.poses[at.pose].name, more);
+}
+
+/// Where the value is the worst; and where it is not certainly met, if that is elsewhere, since what is shown is certain.
+std::string whereText(const Case& use, const RequirementResult& result, Kind kind) {
   if (!result.is_judged || result.conditions.empty()) return result.why_not;
   const AtCondition& worst = result.conditions[result.worst];
-  const std::string more =
-      use.spec.lightings.size() > 1 ? ", " + use.spec.lightings[worst.lighting].name : "";
-  return fmt::format("at {}{}", use.spec.poses[worst.pose].name, more);
+  std::string where = conditionText(use, worst);
+  if (!result.verdict.is_met || result.verdict.is_certain || !worst.verdict.is_certain) return where;
+  const auto open = std::ranges::find(result.conditions, false, [](const auto& at) { return at.verdict.is_certain; });
+  return fmt::format("{}; not certain {} ({})", where, conditionText(use, *open),
+                     intervalText(kind, open->verdict.estimate));
 }
 
 /// "2 of 6 not certain": of what is met; empty where all of that is.
@@ -157,7 +165,7 @@ TableBlock requirementTable(const Suit& suit) {
   TableBlock table{
       .caption =
           "Values at the worst pose and lighting. ✓ is met, ✗ is not; ? means that the 95 % interval "
-          "includes the limit, – that it is not known",
+          "includes the limit, there or at another pose and lighting, – that it is not known",
       .header = {"requirement", "limit"}};
   for (const CameraResult& camera : suit.cameras) table.header.push_back(camera.name);
   for (std::size_t r = 0; r < suit.use.spec.requirements.size(); ++r) {
@@ -188,7 +196,7 @@ TableBlock cameraTable(const Suit& suit, const CameraResult& camera) {
         {requirement.name, verdictText(result),
          is_known ? valueText(requirement.kind, result.verdict.estimate.value) : "–",
          is_known ? intervalText(requirement.kind, result.verdict.estimate) : "–",
-         is_known ? valueText(requirement.kind, result.verdict.margin) : "–", whereText(suit.use, result),
+         is_known ? valueText(requirement.kind, result.verdict.margin) : "–", whereText(suit.use, result, requirement.kind),
          result.conditions.empty() ? "–" : std::to_string(result.conditions[result.worst].pixels)});
   }
   return table;
@@ -213,6 +221,17 @@ TableBlock spoilerTable(const RequirementSpec& requirement, const std::vector<Sp
   return table;
 }
 
+/// Where what spoils most does not mend it alone: another one, all of them, or nothing.
+std::string whatMendsIt(const std::vector<Spoiler>& spoilers) {
+  if (spoilers.front().is_met_without) return {};
+  for (const Spoiler& one : spoilers) {
+    if (&one != &spoilers.back() && one.isSpoiling() && one.is_met_without)
+      return fmt::format(" It would be met without {}.", one.what);
+  }
+  return spoilers.back().is_met_without ? " Leaving out one thing does not mend it, leaving out all does."
+                                        : " Leaving out all of them does not mend it.";
+}
+
 std::string spoilersInWords(const RequirementSpec& requirement, const std::vector<Spoiler>& spoilers) {
   if (spoilers.empty()) {
     return requirement.kind == Kind::FrameRate
@@ -223,13 +242,31 @@ std::string spoilersInWords(const RequirementSpec& requirement, const std::vecto
   if (!spoilers.front().isSpoiling()) {
     return fmt::format("“{}”: no single effect spoils it measurably. {}", requirement.name,
                        spoilers.back().is_met_without
-                           ? "Without all of them it is met."
+                           ? fmt::format("Without all of them it would be met{}.",
+                                         spoilers.back().is_certain_without ? "" : ", not certainly")
                            : "Without all of them it is still not met: what is left are lens, light, "
                              "waveform and decoder, beyond whose unambiguous range all is seen too near.");
   }
-  return fmt::format("“{}” is spoiled most by {}{}{}.", requirement.name, spoilers.front().what,
+  return fmt::format("“{}” is spoiled most by {}{}{}.{}", requirement.name, spoilers.front().what,
                      spoilers.front().is_valid_only_without ? ", with which nothing is valid" : "",
-                     spoilers.front().is_met_without ? ": without it, it would be met" : "");
+                     spoilers.front().is_met_without ? ": without it, it would be met" : "",
+                     whatMendsIt(spoilers));
+}
+
+/// Said where the best exposure is the longest or shortest that was tried, and the camera still fails something.
+std::string beyondTried(const CameraResult& camera) {
+  const Try& best = camera.tries[camera.best];
+  if (camera.failed == 0 || std::isnan(best.exposure_us)) return {};
+  double shortest = best.exposure_us, longest = best.exposure_us;
+  for (const Try& one : camera.tries) {
+    if (one.mode != best.mode || std::isnan(one.exposure_us)) continue;
+    shortest = std::min(shortest, one.exposure_us), longest = std::max(longest, one.exposure_us);
+  }
+  if (shortest == longest) return {};
+  const bool is_longest = best.exposure_us == longest;
+  if (!is_longest && best.exposure_us != shortest) return {};
+  return fmt::format(" That is the {} that was tried: a {} one may do better (`exposure_factors`).",
+                     is_longest ? "longest" : "shortest", is_longest ? "longer" : "shorter");
 }
 
 compare::Figure triesFigure(const CameraResult& camera) {
@@ -252,12 +289,12 @@ compare::Figure triesFigure(const CameraResult& camera) {
     curve.x.push_back(one.exposure_us * 1e-3);
     curve.y.push_back(are_all_cut ? static_cast<double>(one.failed) : std::max(one.worst, kCut));
   }
-  return {.caption = fmt::format("{} in each mode and exposure that was tried with one simulation each{}. Best: {}.",
+  return {.caption = fmt::format("{} in each mode and exposure that was tried with one simulation each{}. Best: {}.{}",
                                  are_all_cut ? "How many requirements fail"
                                              : "The worst requirement's margin, relative to its limit,",
                                  are_all_cut ? "; the worst one misses its limit by ten times or more in all"
                                              : "; below 0 is a failure (cut at −10)",
-                                 settingText(camera)),
+                                 settingText(camera), beyondTried(camera)),
           .svg = compare::toSvg(plot)};
 }
 
