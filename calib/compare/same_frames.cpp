@@ -58,10 +58,13 @@ std::string sameSeedWarning(const Frame& a, const Frame& b) {
   const Provenance &of_a = a.provenance, &of_b = b.provenance;
   // Only a simulated scene has an id.
   if (of_a.scene_id.empty() || of_b.scene_id.empty() || of_a.seed != of_b.seed) return {};
+  // A simulated camera and its own recording have one name.
+  const std::string both = a.source == b.source ? fmt::format("A and B, both {},", a.source)
+                                                : fmt::format("{} and {}", a.source, b.source);
   return fmt::format(
-      "{} and {} are simulated with one seed, {}: frames of one number have noise that is drawn alike, so that B − A "
+      "{} are simulated with one seed, {}: frames of one number have noise that is drawn alike, so that B − A "
       "may have less of it than that of two cameras, or none. Give one of the sources another `seed`.",
-      a.source, b.source, of_a.seed);
+      both, of_a.seed);
 }
 
 }  // namespace toftwin::compare

@@ -311,7 +311,7 @@ TEST_F(Judged, OneCameraMeasuredTwiceIsNoComparison) {
   ASSERT_EQ(ran.status, 0) << ran.err;
   EXPECT_THAT(ran.out, HasSubstr("A and B are not two cameras: of the "));
   EXPECT_THAT(ran.out, HasSubstr("of B, each is one of A, bit for bit."));
-  EXPECT_THAT(ran.out, HasSubstr("\nNote: cam and cam are simulated with one seed, 1"));
+  EXPECT_THAT(ran.out, HasSubstr("\nNote: A and B, both cam, are simulated with one seed, 1"));
   EXPECT_THAT(bytesOf("report/index.html"), HasSubstr("<p class='verdict neutral'>A and B are not two cameras"));
 }
 
