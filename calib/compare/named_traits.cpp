@@ -63,6 +63,11 @@ std::string endOf(const Trait& trait, double end) {
   return isKnown(end, trait.unit) ? shownDigits(end, 4) : "not known";
 }
 
+std::string intervalOf(const Trait& trait) {
+  if (!isKnown(trait.low, trait.unit) && !isKnown(trait.high, trait.unit)) return "interval not known";
+  return fmt::format("{} to {}", endOf(trait, trait.low), endOf(trait, trait.high));
+}
+
 }  // namespace
 
 std::string detailsOf(const NamedTrait& one) {
@@ -115,8 +120,8 @@ TableBlock traitTable(const NamedTraits& traits, const std::string& a, const std
     table.rows[row][one.of == "A"   ? 3
                     : one.of == "B" ? 4
                                     : 5] =
-        fmt::format("{} ({} to {}) #{}{}{}", shownDigits(trait.value, 4), endOf(trait, trait.low),
-                    endOf(trait, trait.high), trait.n, details.empty() ? "" : ", ", details);
+        fmt::format("{} ({}) #{}{}{}", shownDigits(trait.value, 4), intervalOf(trait), trait.n,
+                    details.empty() ? "" : ", ", details);
   }
   const auto isOfB = [](const NamedTrait& one) { return one.of == "B"; };
   if (!has_both && std::ranges::none_of(traits.traits, isOfB)) {  // a page of one table

@@ -56,12 +56,16 @@ double flyingPercent(const Characteristics& c, std::size_t count) {
   return 100.0 * static_cast<double>(count) / static_cast<double>(c.compared);
 }
 
+std::string posesInWords(const Characteristics& c) {
+  return c.places == 1 ? "1 pose" : fmt::format("{} different poses", c.places);
+}
+
 TableBlock regionTable(const Characteristics& c) {
   TableBlock table{
       fmt::format("B − A by region: pixels of all poses, mean of the frames at each. ± is one "
-                  "standard error of the mean over {} different poses, the pixels of one taken as "
+                  "standard error of the mean over {}, the pixels of one taken as "
                   "one; – where the mean is of little more than one pose",
-                  c.places),
+                  posesInWords(c)),
       {"region", "n", "bias [mm]", "RMS [mm]", "95 % within [mm]", "median [mm]", "noise A [mm]",
        "noise B [mm]"},
       {}};

@@ -13,6 +13,8 @@
 /// How near B is to A: parts of a page that several kinds of comparison have.
 namespace toftwin::compare {
 
+/// "3 different poses"; "1 pose".
+std::string posesInWords(const Characteristics& characteristics);
 TableBlock regionTable(const Characteristics& characteristics);
 TableBlock maskTable(const Characteristics& characteristics);
 /// What A sees at a pose, and B − A there on a scale that reaches so far.

@@ -99,8 +99,11 @@ std::string grid(const Axis& x, const Axis& y, int x_ticks, bool is_lowest) {
     svg += fmt::format("<line class='grid' x1='{0:.1f}' x2='{0:.1f}' y1='{1:.1f}' y2='{2:.1f}'/>",
                        x.place(v), y.from, y.to);
     if (!is_lowest) continue;
-    svg += fmt::format("<text class='tick' x='{:.1f}' y='{:.1f}' text-anchor='middle'>{}</text>",
-                       x.place(v), y.from + 20, label);
+    // Half a label's width on a phone, where it is largest: the last one must not leave the picture.
+    const double half = 5.0 * static_cast<double>(label.size()), edge = x.to + kRight;
+    const bool is_cut = x.place(v) + half > edge;
+    svg += fmt::format("<text class='tick' x='{:.1f}' y='{:.1f}' text-anchor='{}'>{}</text>",
+                       is_cut ? edge : x.place(v), y.from + 20, is_cut ? "end" : "middle", label);
   }
   for (const auto& [v, label] : labelled(ticksOf(y, y.from - y.to > 150.0 ? 6 : 3))) {
     svg += fmt::format("<line class='grid' x1='{1:.1f}' x2='{2:.1f}' y1='{0:.1f}' y2='{0:.1f}'/>",

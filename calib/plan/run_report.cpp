@@ -264,7 +264,7 @@ Tone toneOf(const std::vector<TraitVerdict>& verdicts, const RunTraits& traits, 
 std::vector<Card> cardsOf(const Characteristics& c, const std::vector<TraitVerdict>& verdicts,
                           const RunTraits& traits) {
   std::vector<Card> cards =
-      nearnessCards(c, fmt::format("± standard error over {} different poses", c.places), nearnessTone(c));
+      nearnessCards(c, fmt::format("± standard error over {}", posesInWords(c)), nearnessTone(c));
   const auto more = compare::cardsOf(verdicts, traits.missing);
   cards.insert(cards.end(), more.begin(), more.end());
   return cards;

@@ -265,7 +265,7 @@ std::string beyondTried(const CameraResult& camera) {
   if (shortest == longest) return {};
   const bool is_longest = best.exposure_us == longest;
   if (!is_longest && best.exposure_us != shortest) return {};
-  return fmt::format(" That is the {} that was tried: a {} one may do better (`exposure_factors`).",
+  return fmt::format(" That is the {} that was tried: a {} one may do better (exposure_factors).",
                      is_longest ? "longest" : "shortest", is_longest ? "longer" : "shorter");
 }
 

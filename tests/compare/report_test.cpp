@@ -223,6 +223,16 @@ TEST(Plot, InterruptsACurveWhereThereIsNoValue) {
   EXPECT_THAT(svg, Not(HasSubstr("nan")));
 }
 
+/// 10800.1 in the middle below its line was "10800.", cut off at the picture's edge.
+TEST(Plot, KeepsItsLastNumberWithinThePicture) {
+  const auto of = [](double from, double to) {
+    return toSvg(Plot{
+        .title = "t", .x_label = "x", .y_label = "y", .curves = {{.name = "c", .x = {from, to}, .y = {1, 2}}}});
+  };
+  EXPECT_NE(of(10800.0, 10800.1).find("text-anchor='end'>10800.1</text>"), std::string::npos);
+  EXPECT_NE(of(0.0, 2.0).find("text-anchor='middle'>2</text>"), std::string::npos);
+}
+
 TEST(Plot, DrawsNoBandWhereTheErrorIsUnknown) {
   const double unknown = std::nan("");
   const Plot plot{.title = "t",

@@ -69,6 +69,53 @@ TEST(Ranking, ShowsHowManyFailWhereAllMissByFar) {
                                          testing::Not(testing::HasSubstr(">requirements failed</text>"))));
 }
 
+std::string pageOf(const Suit& suit, const Folder& folder) {
+  EXPECT_TRUE(writeSuit(suit, folder.path() / "report", ""));
+  std::stringstream text;
+  text << std::ifstream{folder.path() / "report" / "index.html"}.rdbuf();
+  return text.str();
+}
+
+/// What is best at the end of what was tried may be better beyond it.
+TEST(Ranking, SaysThatTheBestExposureIsTheLongestTried) {
+  const Folder folder;
+  folder.camera("far.toml", effect("delay", "offset_mm = 500"));
+  auto suit = folder.judged(kPose + biasAtMost10() + entry("far.toml"));
+  ASSERT_TRUE(suit) << suit.error().message;
+  CameraResult& camera = suit->cameras[0];
+  for (const double exposure_us : {500.0, 1000.0, 2000.0})
+    camera.tries.push_back({.mode = "m", .exposure_us = exposure_us, .failed = 1, .worst = -3.0});
+  const auto at = [&](double exposure_us) {
+    camera.best = static_cast<std::size_t>(
+        std::ranges::find(camera.tries, exposure_us, &Try::exposure_us) - camera.tries.begin());
+    return pageOf(*suit, folder);
+  };
+  camera.tries.erase(camera.tries.begin(), camera.tries.end() - 3);
+  EXPECT_THAT(at(2000.0), testing::HasSubstr("That is the longest that was tried"));
+  EXPECT_THAT(at(500.0), testing::HasSubstr("That is the shortest that was tried"));
+  EXPECT_THAT(at(1000.0), testing::Not(testing::HasSubstr("that was tried: a")));
+}
+
+/// The worst value's interval, which is certain, would not say why the verdict is not.
+TEST(Ranking, SaysWhereAVerdictIsNotCertain) {
+  const Folder folder;
+  folder.camera("ideal.toml");
+  auto suit = folder.judged(kPose + biasAtMost10() + entry("ideal.toml"));
+  ASSERT_TRUE(suit) << suit.error().message;
+  RequirementResult& result = suit->cameras[0].requirements[0];
+  ASSERT_EQ(result.conditions.size(), 1u);
+  EXPECT_THAT(pageOf(*suit, folder), testing::Not(testing::HasSubstr("; not certain at")));
+  AtCondition open = result.conditions[0];
+  open.verdict.is_met = true, open.verdict.is_certain = false;
+  open.verdict.estimate.low = 1.5e-3, open.verdict.estimate.high = 12.5e-3;
+  result.conditions.push_back(open);
+  result.verdict.is_certain = false;
+  EXPECT_THAT(pageOf(*suit, folder), testing::HasSubstr("; not certain at"));
+  result.worst = 1;
+  EXPECT_THAT(pageOf(*suit, folder), testing::Not(testing::HasSubstr("; not certain at")))
+      << "what is shown says it itself";
+}
+
 /// Four cameras that differ in two things: a sixteenth of the light is √16 times the shot noise, in the dark;
 /// and noon leaves 106,000 electrons in a tap (60 klx: 2.6 W/(m² sr)), which one well holds and one does not.
 /// What is missing, in limits: the weak one has 4 σ where 2 σ is the limit, 1; the small well none of 80 %
