@@ -5,7 +5,6 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <numbers>
 #include <span>
 
 #include "sim/images/rows.h"
@@ -83,20 +82,6 @@ void convertRow(float* first, float* second, int width, float counts_per_electro
   }
 }
 
-/// The mean of round(x + σ z) for a standard normal z, less x: the waves of the staircase, each damped by the
-/// noise (B. Widrow, I. Kollár, Quantization Noise, 2008, ch. 4), Σ_k (−1)^k / (πk) exp(−2π²k²σ²) sin(2πkx).
-double meanOfRounding(double x, double sigma) {
-  constexpr double kTwoPi = 2.0 * std::numbers::pi;
-  if (sigma < 0.1) return std::nearbyint(x) - x;  // too many waves, and all but nothing is damped
-  double sum = 0.0;
-  for (int k = 1; k <= 6; ++k) {
-    const double damping = std::exp(-0.5 * kTwoPi * kTwoPi * k * k * sigma * sigma);
-    if (damping < 1e-6) break;
-    sum += (k % 2 == 0 ? 1.0 : -1.0) / (std::numbers::pi * k) * damping * std::sin(kTwoPi * k * x);
-  }
-  return sum;
-}
-
 /// What conversion adds to a difference of charges in the mean over its noise, σ in electrons.
 float meanChangeOf(float difference, double sigma, double counts_per_electron) {
   const double magnitude = std::abs(static_cast<double>(difference)) * counts_per_electron;
@@ -115,8 +100,8 @@ void convertMean(std::span<float*> taps, std::uint8_t& flags, const Companding& 
   if (is_saturated) {
     flags = static_cast<std::uint8_t>(flags | kSaturatedBit);
   } else {
-    double variance = by.mean_over_variance * static_cast<double>(taps.size());
-    for (const float* tap : taps) variance += by.mean_over_fano * std::max(0.0, static_cast<double>(*tap));
+    double variance = 0.0;
+    for (const float* tap : taps) variance += by.mean_over.varianceOf(static_cast<double>(*tap));
     change = meanChangeOf(difference, std::sqrt(variance), by.counts_per_electron);
   }
   const float share = taps.size() == 2 ? 0.5F : 1.0F;
@@ -135,7 +120,7 @@ Samples Companding::apply(Samples samples, const Conditions&, const Random&) con
       for (int y = first_row; y < last_row; ++y) {
         float* first = &samples.electrons[i](0, y);
         std::uint8_t* flags = &samples.flags(0, y);
-        if (mean_over_fano > 0.0 || mean_over_variance > 0.0) {
+        if (mean_over.isAny()) {
           for (int x = 0; x < samples.width(); ++x) {
             std::array<float*, 2> both{&first[x], taps == 2 ? &samples.electrons[i + 1](x, y) : nullptr};
             convertMean(std::span{both}.first(taps == 2 ? 2 : 1), flags[x], *this);

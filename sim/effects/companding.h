@@ -2,6 +2,7 @@
 #pragma once
 
 #include "sim/effects/effect.h"
+#include "sim/effects/mean_of_steps.h"
 
 namespace toftwin::sim {
 
@@ -14,12 +15,7 @@ namespace toftwin::sim {
 struct Companding {
   double counts_per_electron = 0.0026;
 
-  /// No numbers of the effect, so that no file has them: the noise of what is converted, its variance in
-  /// electrons² per electron of charge and on top. Where there is any, apply() gives the mean of the codes
-  /// over it, for which the difference must be free of noise itself. With noise of more than half a step
-  /// nothing of the steps is left in a mean; taken without it, they would be errors that no mean over frames
-  /// has.
-  double mean_over_fano = 0.0, mean_over_variance = 0.0;
+  NoiseOfCharge mean_over{};  ///< of each tap
 
   static constexpr About about{
       .name = "companding",

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim/effects/quantisation.h"
 
+#include <cmath>
+
 #include "sim/images/rows.h"
 #include "sim/images/simd.h"
 
@@ -11,6 +13,13 @@ TOFTWIN_SIMD void toSteps(float* electrons, int count, float step) {
   for (int x = 0; x < count; ++x) electrons[x] = step * __builtin_rintf(electrons[x] / step);
 }
 
+void toMeansOfSteps(float* electrons, int count, double step, const NoiseOfCharge& noise) {
+  for (int x = 0; x < count; ++x) {
+    const auto charge = static_cast<double>(electrons[x]);
+    electrons[x] += static_cast<float>(step * meanOfRounding(charge / step, std::sqrt(noise.varianceOf(charge)) / step));
+  }
+}
+
 }  // namespace
 
 Samples Quantisation::apply(Samples samples, const Conditions&, const Random&) const {
@@ -19,7 +28,12 @@ Samples Quantisation::apply(Samples samples, const Conditions&, const Random&) c
   const int width = samples.width();
   forRows(samples.height(), [&](int first_row, int last_row) {
     for (Image<float>& image : samples.electrons) {
-      for (int y = first_row; y < last_row; ++y) toSteps(&image(0, y), width, step);
+      for (int y = first_row; y < last_row; ++y) {
+        if (mean_over.isAny())
+          toMeansOfSteps(&image(0, y), width, step_electrons, mean_over);
+        else
+          toSteps(&image(0, y), width, step);
+      }
     }
   });
   return samples;

@@ -2,12 +2,15 @@
 #pragma once
 
 #include "sim/effects/effect.h"
+#include "sim/effects/mean_of_steps.h"
 
 namespace toftwin::sim {
 
 /// The converter gives whole steps:  S → q · round(S / q), per tap, half a step to even.
 struct Quantisation {
   double step_electrons = 10.0;
+
+  NoiseOfCharge mean_over{};  ///< of each tap
 
   static constexpr About about{
       .name = "quantisation",

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Whole steps of the converter, which single frames show.
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 
 #include <gmock/gmock.h>
@@ -63,6 +64,23 @@ TEST_F(Searched, StepsWithoutANameAreInTheModel) {
   ASSERT_THAT(namesOf(finding), ElementsAre("undeclared")) << verdictOf(finding);
   EXPECT_THAT(verdictOf(finding), HasSubstr("whole steps of 20 electrons"));
   EXPECT_THAT(finding.model_toml, HasSubstr("step_electrons = 20"));
+}
+
+/// An amplitude of 20 for each electron is a gain that pixels in single precision would say wrong by more than the
+/// noise of them all: an effect that is nearly a gain would answer it.
+TEST_F(Searched, WhateverTheAmplitudesUnitIsTheSameIsFound) {
+  const auto inUnitsOf = [&](float per_electron) {
+    simulate("", [=](sim::RangeImage& image, const Moment&, const CameraInfo&, std::uint64_t) {
+      for (float& amplitude : image.amplitude.pixels()) amplitude *= per_electron;
+    });
+    std::filesystem::remove(folder_ / "run" / plan::openedFile(plan::OpenedOf::A));
+    return search(job());
+  };
+  const Finding one = inUnitsOf(1.0F).finding, twenty = inUnitsOf(20.0F).finding;
+  ASSERT_EQ(one.scores.size(), twenty.scores.size());
+  for (std::size_t i = 0; i < one.scores.size(); ++i)
+    EXPECT_NEAR(std::sqrt(one.scores[i].statistic), std::sqrt(twenty.scores[i].statistic), 0.2)
+        << one.score_names[i] << ": in units of its own noise";
 }
 
 /// A camera whose amplitude is 0.3 for each electron: its steps are 6 in that unit, and 20 of the file's

@@ -345,7 +345,7 @@ TEST(Companding, HasTheMeanOverNoiseOfItsSteps) {
       const double difference = 700.0 + 0.37 * i;
       const Companding plain{.counts_per_electron = 0.5};
       Companding mean = plain;
-      mean.mean_over_variance = 0.5 * 16.0 * sigma * sigma;  // of each of two taps
+      mean.mean_over.variance = 0.5 * 16.0 * sigma * sigma;  // of each of two taps
       double sum = 0.0, squares = 0.0;
       for (int k = 0; k < kDraws; ++k) {
         const double drawn = differenceOf(plain, 1000.0 + difference + 4.0 * sigma * normal(random), 1000.0);

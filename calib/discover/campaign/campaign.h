@@ -100,6 +100,8 @@ struct Declared {
   /// Of the light, as the captures say: where its zero lies no camera file knows, so that it is no effect.
   /// The model is without it; see declaredEffects.
   double delay_mm = 0.0;
+  /// Of the amplitude, against the file's, which is taken off what is measured: see unitOf.
+  double unit_percent = 0.0;
 
   [[nodiscard]] const sim::Scene& sceneOf(const std::string& block) const {
     const auto found = scene_of_block.find(block);

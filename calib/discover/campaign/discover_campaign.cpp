@@ -134,6 +134,7 @@ Result<> judgeLocked(const CampaignJob& job, const Campaign& campaign, const Jud
   auto captures = readLocked(campaign);
   if (!captures) return captures.error();
   takeNoiseOff(declared.model, *captures);
+  takeUnitOff(declared.unit_percent, *captures);
   TraceOptions options = job.trace;
   options.seed +=
       0x5bd1e995U;  // light of its own: what the open captures' light has by chance must not help
@@ -282,6 +283,10 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
   const auto at_poses = traceAll(declared, campaign->captures, job.trace, tell);
   if (!at_poses) return at_poses.error();
   shareLightNoise(*at_poses, campaign->captures);
+  const auto unit = unitOf(declared, campaign->captures, *at_poses);
+  if (!unit) return unit.error();
+  declared.unit_percent = *unit;
+  takeUnitOff(*unit, campaign->captures);
   const auto late = delayThatFits({declared, {campaign->captures, *at_poses, *at_poses}, {}});
   if (!late) return late.error();
   declared.delay_mm = *late;
@@ -304,9 +309,9 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
   notePatterns(*round.rows, finding);
   noteMissingRawExposures(declared.model, finding);
   addNextCaptures({round.declared, lit, finding.finding.scales}, *round.rows, finding.effects);
-  if (steps) addSteps(job, declared.model, *steps, finding);
   const Zero beyond = finding.zero;
-  finding.zero.delay_mm += declared.delay_mm;
+  finding.zero.delay_mm += declared.delay_mm, finding.zero.gain_percent += declared.unit_percent;
+  if (steps) addSteps(job, declared.model, *steps, finding);
   finding.model_toml = modelText(files->text, declared, finding);
   progress.begin();
   if (job.open_locked && !campaign->locked.empty()) {

@@ -8,6 +8,9 @@
 #include <fmt/format.h>
 #include <toftwin/nan.h>
 
+#include "calib/compare/statistics.h"
+#include "calib/discover/campaign/carriers.h"
+
 namespace toftwin::discover {
 namespace {
 
@@ -32,24 +35,28 @@ double exposureOf(const sim::SensorModel& model, const MeasuredCapture& capture)
   return measured.empty() || is_same ? 0.0 : measured.front().duration.in(microsecond);
 }
 
+/// What a model's noise does to a mean stays: steps are as smeared as in the mean over frames.
+void smearSteps(const sim::SensorModel& model, std::vector<sim::AnyEffect>& effects) {
+  sim::NoiseOfCharge noise;
+  for (const sim::AnyEffect& any : model.effects()) {
+    if (const auto* shot = std::get_if<sim::ShotNoise>(&any)) noise.fano += shot->fano;
+    if (const auto* read = std::get_if<sim::ReadNoise>(&any))
+      noise.variance += read->sigma_electrons * read->sigma_electrons;
+  }
+  for (sim::AnyEffect& any : effects) {
+    if (auto* companding = std::get_if<sim::Companding>(&any)) companding->mean_over = noise;
+    if (auto* quantisation = std::get_if<sim::Quantisation>(&any)) quantisation->mean_over = noise;
+  }
+}
+
 }  // namespace
 
 std::vector<sim::AnyEffect> effectsWithoutNoise(const sim::SensorModel& model) {
   std::vector<sim::AnyEffect> effects = model.effects();
-  double fano = 0.0, variance = 0.0;
-  for (const sim::AnyEffect& any : effects) {
-    if (const auto* shot = std::get_if<sim::ShotNoise>(&any)) fano += shot->fano;
-    if (const auto* read = std::get_if<sim::ReadNoise>(&any))
-      variance += read->sigma_electrons * read->sigma_electrons;
-  }
   std::erase_if(effects, [](const sim::AnyEffect& any) {
     return std::visit(
         []<class E>(const E&) { return E::about.explains.contains(sim::Covariate::Frame); }, any);
   });
-  for (sim::AnyEffect& any : effects) {
-    if (auto* companding = std::get_if<sim::Companding>(&any))
-      companding->mean_over_fano = fano, companding->mean_over_variance = variance;
-  }
   return effects;
 }
 
@@ -81,6 +88,7 @@ Result<NoiselessCamera> NoiselessCamera::make(const sim::SensorModel& model,
                                               std::vector<sim::AnyEffect> effects,
                                               const std::vector<MeasuredCapture>& captures) {
   NoiselessCamera camera;
+  smearSteps(model, effects);
   const sim::SensorModel changed = model.withEffects(std::move(effects));
   camera.models_.emplace(0.0, changed);
   for (const MeasuredCapture& capture : captures) {
@@ -113,6 +121,29 @@ Reading readingOf(const NoiselessCamera& declared, const NoiselessCamera& other,
                   const sim::Light& varied) {
   return changed(declared.read(capture, traced), other.read(capture, varied),
                  declared.read(capture, varied));
+}
+
+Result<double> unitOf(const Declared& declared, const std::vector<MeasuredCapture>& captures,
+                      const std::vector<std::shared_ptr<const TracedCapture>>& traced) {
+  const auto camera = NoiselessCamera::make(declared.model, declaredEffects(declared), captures);
+  if (!camera) return camera.error();
+  std::vector<double> middles;
+  for (std::size_t c = 0; c < captures.size(); ++c) {
+    const Image<float>& measured = captures[c].log_amplitude.mean;
+    if (measured.empty()) continue;
+    const Image<float> own = camera->read(captures[c], traced[c]->light).log_amplitude;
+    std::vector<double> larger;
+    for (std::size_t i = 0; i < own.size(); ++i)
+      if (std::isfinite(measured[i] - own[i])) larger.push_back(static_cast<double>(measured[i] - own[i]));
+    if (!larger.empty()) middles.push_back(compare::quantile(std::move(larger), 0.5));
+  }
+  return middles.empty() ? 0.0 : 100.0 * compare::quantile(std::move(middles), 0.5);
+}
+
+void takeUnitOff(double unit_percent, std::vector<MeasuredCapture>& captures) {
+  const auto off = static_cast<float>(0.01 * unit_percent);
+  for (MeasuredCapture& capture : captures)
+    for (float& log : capture.log_amplitude.mean.pixels()) log -= off;
 }
 
 const sim::SensorModel& NoiselessCamera::at(const MeasuredCapture& capture) const {

@@ -15,8 +15,7 @@ struct Reading {
   Image<float> range_m, log_amplitude;
 };
 
-/// The effects of a model that are not chance. What noise does to a mean stays: steps are as smeared as in
-/// the mean over frames.
+/// The effects of a model that are not chance.
 std::vector<sim::AnyEffect> effectsWithoutNoise(const sim::SensorModel& model);
 
 /// Takes off the mean of ln amplitude what noise adds to it, so that it is that of a camera without noise. Of
@@ -28,10 +27,11 @@ std::vector<sim::AnyEffect> effectsWithoutNoise(const sim::SensorModel& model);
 /// sim::SensorModel::noiseShiftPerVariance().
 void takeNoiseOff(const sim::SensorModel& model, std::vector<MeasuredCapture>& captures);
 
-/// A camera model without noise, at whatever exposure a capture was taken.
+/// A camera model without noise, at whatever exposure a capture was taken. What noise does to a mean stays: whole
+/// steps are as smeared as in the mean over frames.
 class NoiselessCamera {
  public:
-  /// `effects`: in the order in which they act; the caller leaves noise out. Errors: a capture's
+  /// `effects`: in the order in which they act; the caller leaves noise out, which `model` has. Errors: a capture's
   /// exposure that the model cannot have.
   static Result<NoiselessCamera> make(const sim::SensorModel& model,
                                       std::vector<sim::AnyEffect> effects,
@@ -50,6 +50,13 @@ class NoiselessCamera {
   std::map<double, sim::SensorModel>
       models_{};  ///< by exposure in microseconds; 0: the model's own
 };
+
+/// The amplitude's unit against the camera file's: what ln amplitude is larger by than declared, in percent, in the
+/// middle capture's middle pixel. Gains are fitted beside it: numbers of single precision say a difference of 1 to a
+/// millionth only, and in a thousand pixels that is no more nothing. 0 where no capture has an amplitude.
+Result<double> unitOf(const Declared& declared, const std::vector<MeasuredCapture>& captures,
+                      const std::vector<std::shared_ptr<const TracedCapture>>& traced);
+void takeUnitOff(double unit_percent, std::vector<MeasuredCapture>& captures);
 
 /// Of one capture, what other effects than the declared ones say, on both of its lights:
 /// declared(traced) + other(varied) − declared(varied).
