@@ -159,4 +159,10 @@ Result<std::vector<std::shared_ptr<const TracedCapture>>> traceAll(
     const TraceOptions& options, const std::function<void(double)>& tell = {},
     const std::vector<Stood>& stood = {});
 
+/// The same light where it was traced, along other paths: what effects are varied on. Pixels beside edges change within
+/// a fraction of a pixel, and what an effect does to them with it.
+Result<std::vector<std::shared_ptr<const TracedCapture>>> traceBeside(
+    const Declared& declared, const std::vector<MeasuredCapture>& captures,
+    const std::vector<std::shared_ptr<const TracedCapture>>& traced, const TraceOptions& options);
+
 }  // namespace toftwin::discover

@@ -143,7 +143,9 @@ Result<> judgeLocked(const CampaignJob& job, const Campaign& campaign, const Jud
   shareLightNoise(*at_poses, *captures);
   const auto traced = traceWhereTheyStood(declared, models.after.effects, *captures, *at_poses, options);
   if (!traced) return traced.error();
-  const Lit lit{*captures, *traced, *at_poses};
+  const auto varied = traceBeside(declared, *captures, *traced, options);
+  if (!varied) return varied.error();
+  const Lit lit{*captures, *traced, *varied};
   const JudgedCampaign locked{declared, lit, finding.finding.scales};
   auto judgement = judge(locked, searched, models);
   if (!judgement) return judgement.error();
@@ -303,8 +305,7 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
   finding.off = searched_for->off;
   for (const StoodOff& one : finding.off) finding.notes.push_back(noteOf(one));
   declared.delay_mm = round.declared.delay_mm;
-  const Lit lit{some != nullptr ? some->captures : campaign->captures, round.traced,
-                some != nullptr ? some->at_poses : *at_poses};
+  const Lit lit{some != nullptr ? some->captures : campaign->captures, round.traced, round.varied};
   takeFound(round, finding);
   notePatterns(*round.rows, finding);
   noteMissingRawExposures(declared.model, finding);

@@ -182,7 +182,7 @@ Result<std::vector<std::shared_ptr<const TracedCapture>>> tracedFor(const Round&
                                                                     const std::function<void(double)>& tell) {
   if (before == nullptr && open.trusts_poses) {
     TraceOptions again = open.trace;
-    again.seed += 0x61c88647U;  // effects are varied on at_poses, of other paths
+    again.seed += 0x61c88647U;
     return traceAll(file, open.captures, again, tell, std::vector<Stood>(open.captures.size()));
   }
   const auto stood_by = before != nullptr
@@ -199,8 +199,11 @@ Result<std::unique_ptr<Round>> search(const Declared& file, const OpenCaptures& 
   auto traced = tracedFor(*round, file, open, before, tell);
   if (!traced) return traced.error();
   round->traced = *std::move(traced);
+  auto varied = traceBeside(round->declared, open.captures, round->traced, open.trace);
+  if (!varied) return varied.error();
+  round->varied = *std::move(varied);
   begin();
-  auto rows = CampaignRows::make(round->declared, {open.captures, round->traced, open.at_poses},
+  auto rows = CampaignRows::make(round->declared, {open.captures, round->traced, round->varied},
                                  {.left_out = open.left_out});
   if (!rows) return rows.error();
   round->rows = *std::move(rows);
@@ -209,7 +212,7 @@ Result<std::unique_ptr<Round>> search(const Declared& file, const OpenCaptures& 
   if (open.trusts_poses) finder.most_scale = 1.0;
   round->finding = find(*round->rows, finder);
   begin();
-  const Lit lit{open.captures, round->traced, open.at_poses};
+  const Lit lit{open.captures, round->traced, round->varied};
   const JudgedCampaign judged{round->declared, lit, round->finding.scales};
   const auto witness = RawWitness::of(judged);
   if (!witness) return witness.error();

@@ -145,7 +145,7 @@ std::vector<std::vector<double>> waysOf(const std::vector<Place>& places) {
 
 Result<std::vector<StoodOff>> stoodOff(const Round& round, const OpenCaptures& open) {
   constexpr double kWrong = 1e-3;  // of setting aside one that was not
-  const Lit lit{open.captures, round.traced, open.at_poses};
+  const Lit lit{open.captures, round.traced, round.varied};
   const auto effects = withDelay(round.declared.model, round.refitted.effects, round.zero.delay_mm);
   const auto evidence = residualEvidence({round.declared, lit, round.finding.scales}, effects);
   if (!evidence) return evidence.error();

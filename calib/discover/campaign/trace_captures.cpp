@@ -218,4 +218,14 @@ Result<std::vector<std::shared_ptr<const TracedCapture>>> traceAll(
   return all;
 }
 
+Result<std::vector<std::shared_ptr<const TracedCapture>>> traceBeside(
+    const Declared& declared, const std::vector<MeasuredCapture>& captures,
+    const std::vector<std::shared_ptr<const TracedCapture>>& traced, const TraceOptions& options) {
+  std::vector<Stood> stood;
+  for (const auto& one : traced) stood.push_back(one->stood);
+  TraceOptions others = options;
+  others.seed += 0x3c6ef372U;
+  return traceAll(declared, captures, others, {}, stood);
+}
+
 }  // namespace toftwin::discover
