@@ -229,6 +229,23 @@ void fold(std::size_t harmonics, const Lanes<int>& started, int samples, BlockSu
   }
 }
 
+void foldTogether(std::size_t harmonics, const Lanes<int>& started, BlockSums& sums) {
+  const LaneSums& lanes = sums.of_packet;
+  const auto sumOf = [](const auto& of) { return std::accumulate(std::begin(of.v), std::end(of.v), 0.0); };
+  const double count = -sumOf(started);
+  if (!(count > 0.0)) return;
+  sums.steady[0] += sumOf(lanes.steady);
+  sums.ambient[0] += sumOf(lanes.ambient);
+  sums.samples[0] += count;
+  sums.batches[0] += 1.0;
+  for (std::size_t term = 0; term < lanes.re.size(); ++term) {
+    const double re = sumOf(lanes.re[term]), im = sumOf(lanes.im[term]);
+    sums.re[term][0] += re;
+    sums.im[term][0] += im;
+    if (term % harmonics == 0) sums.squares[term / harmonics][0] += (re * re + im * im) / count;
+  }
+}
+
 TOFTWIN_VECTOR
 void keepTruth(const Tracing& tracing, const Packet& packet, const Hits& hits, TruthLanes& truth) {
   const auto [ax, ay, az] = tracing.camera_axes;

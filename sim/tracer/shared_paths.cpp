@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "sim/tracer/cast.h"
+#include "sim/tracer/edge_pixels.h"
 #include "sim/tracer/hit.h"
 #include "sim/tracer/phasor.h"
 #include "sim/tracer/shade.h"
@@ -172,8 +173,8 @@ bool isDark(const Ends& ends, std::size_t lane) {
          std::ranges::all_of(ends.parts, [&](const LightPart& part) { return isDark(part.light, lane); });
 }
 
-/// The first surfaces of the block's sample: their own light, and who goes on from there.
-bool start(const Tracing& tracing, const Block& block, int sample, int last, Packet& packet,
+/// The first surfaces of the block's sample: their own light, of edges without direct light, and who goes on from there.
+bool start(const Tracing& tracing, const Block& block, const Lanes<int>& edges, int sample, int last, Packet& packet,
            Lanes<int>& started, Starts& starts, LaneSums& sums) {
   constexpr bool is_coherent = true;
   preparePacket(tracing, block, packet);
@@ -187,7 +188,9 @@ bool start(const Tracing& tracing, const Block& block, int sample, int last, Pac
   if (!isAny(packet.valid)) return false;
   findHits(tracing.scene, packet, rays, starts.hits);
   addEmission(packet, starts.hits, sums.ambient);
+  for (std::size_t i = 0; i < kLaneCount; ++i) packet.valid[i] &= ~edges[i];
   gatherDirectLight(tracing, packet, starts.hits, 0, is_coherent, sums);
+  packet.valid = starts.valid;
   return true;
 }
 
@@ -350,7 +353,7 @@ void traceSample(const Tracing& tracing, const Tile& tile, int sample, int last,
   for (std::size_t b = 0; b < starts.size(); ++b) {
     LaneSums& lanes = sums[b].of_packet;
     ends[b].valid = {};
-    if (!start(tracing, tile.blocks[b], sample, last, packet, started[b], starts[b], lanes)) continue;
+    if (!start(tracing, tile.blocks[b], tile.edges[b], sample, last, packet, started[b], starts[b], lanes)) continue;
     follow(tracing, tile, sample, static_cast<int>(b), starts[b], packet, ends[b], lanes);
   }
   for (std::size_t b = 0; b < ends.size(); ++b) {
@@ -375,6 +378,7 @@ void prepareTile(const Tracing& tracing, int x, int y, Tile& tile) {
   const PixelKey corner =
       pixelKey(tracing.seed, static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y));
   tile.key = {mixBits(corner.a ^ kTileSalt), mixBits(corner.b + kTileSalt)};
+  tile.edges = edgesOf(tracing, tile);
 }
 
 void traceTile(const Tracing& tracing, const Tile& tile, int first, int last, int batch, TileSums& sums) {

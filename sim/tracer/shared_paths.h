@@ -20,6 +20,7 @@ struct Tile {
   static constexpr int kSide = 8, kBlocks = 4, kPixels = kSide * kSide;
   static constexpr BlockShape kBlockShape{.width = 4, .height = 4, .samples = 1};
   std::array<Block, kBlocks> blocks;
+  std::array<Lanes<int>, kBlocks> edges;  ///< −1 where direct light is gathered by itself (edge_pixels.h)
   PixelKey key;  ///< of all random numbers after the first surface: they are spread evenly over the tile
 };
 using TileSums = std::vector<BlockSums>;  ///< of each block
@@ -30,7 +31,7 @@ bool canShare(const Scene::Impl& scene, const TraceRequest& request);
 /// The tile whose top left pixel is (x, y).
 void prepareTile(const Tracing& tracing, int x, int y, Tile& tile);
 /// Traces samples [first, last) of every pixel of the tile, in batches of so many, whose spread is the
-/// variance.
+/// variance; of edges without their direct light.
 void traceTile(const Tracing& tracing, const Tile& tile, int first, int last, int batch, TileSums& sums);
 
 }  // namespace toftwin::sim

@@ -5,6 +5,7 @@
 #include <bit>
 
 #include "sim/images/rows.h"
+#include "sim/tracer/edge_pixels.h"
 #include "sim/tracer/shared_paths.h"
 
 namespace toftwin::sim {
@@ -37,6 +38,13 @@ void sumTile(const Tracing& tracing, const Tile& tile, int samples, TileSums& su
   }
 }
 
+/// Of a block that took so many samples.
+void takeMeans(const Tracing& tracing, const Tile& tile, std::size_t b, const BlockSums& sums, int samples,
+               BlockMeans& means) {
+  takeMeans(sums, tracing.request.harmonics, means);
+  if (isAny(tile.edges[b])) addEdges(tracing, tile.blocks[b], tile.edges[b], samples, means);
+}
+
 /// How many samples the tile's pixels take: trace.cpp has the same for a block.
 int samplesFor(const Tracing& tracing, const Tile& tile, TileSums& sums, BlockMeans& means) {
   constexpr int kPilot = 16;
@@ -47,9 +55,9 @@ int samplesFor(const Tracing& tracing, const Tile& tile, TileSums& sums, BlockMe
   pilot.key = {pilot.blocks[0].key_a[0], pilot.blocks[0].key_b[0]};
   sumTile(tracing, pilot, kPilot, sums);
   NoiseCount noise;
-  for (const BlockSums& block : sums) {
-    takeMeans(block, tracing.request.harmonics, means);
-    countNoise(tracing, Tile::kBlockShape, block, means, noise);
+  for (std::size_t b = 0; b < sums.size(); ++b) {
+    takeMeans(tracing, pilot, b, sums[b], kPilot, means);
+    countNoise(tracing, Tile::kBlockShape, sums[b], means, noise);
   }
   return samplesFor(tracing.request, noise, kPilot);
 }
@@ -75,10 +83,11 @@ void traceTiles(const Tracing& tracing, const Region& region, Light& light) {
     BlockMeans means{light};
     for (int i = begin; i != end; ++i) {
       prepareTile(tracing, (first_column + i % columns) * kSide, (first_row + i / columns) * kSide, tile);
-      sumTile(tracing, tile, samplesFor(tracing, tile, sums, means), sums);
+      const int samples = samplesFor(tracing, tile, sums, means);
+      sumTile(tracing, tile, samples, sums);
       for (std::size_t b = 0; b < sums.size(); ++b) {
         if (!isWithin(tile.blocks[b], region)) continue;
-        takeMeans(sums[b], tracing.request.harmonics, means);
+        takeMeans(tracing, tile, b, sums[b], samples, means);
         traceTruth(tracing, tile.blocks[b], truth);
         storeBlock(tile.blocks[b], region, means, truth, light);
       }

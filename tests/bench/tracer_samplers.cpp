@@ -136,11 +136,11 @@ Bars compareSamplers(const Scene& room) {
     for (const double efficiency : compareIn(name, scene)) all.push_back(efficiency);
   }
   const double least = *std::ranges::min_element(all), middle = median(all);
-  return {
-      {fmt::format(
-           "error² × processor time of the unbiased mode, of plain random numbers: median and least of {}",
-           all.size()),
-       fmt::format("{:.0f} and {:.1f} times better", middle, least), "≥ 10 times", least >= 10.0}};
+  const auto enough = std::ranges::count_if(all, [](double efficiency) { return efficiency >= 10.0; });
+  return {{fmt::format("error² × processor time of the unbiased mode, of plain random numbers: median of {}", all.size()),
+           fmt::format("{:.0f} times better", middle), "≥ 10 times", middle >= 10.0},
+          {"the same, least of them", fmt::format("{:.1f} times better; 10 in {}", least, enough), "≥ 10 times",
+           least >= 10.0}};
 }
 
 }  // namespace toftwin::bench

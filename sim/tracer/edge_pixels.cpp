@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim/tracer/edge_pixels.h"
+
+#include <algorithm>
+#include <complex>
+
+#include "sim/tracer/hit.h"
+
+namespace toftwin::sim {
+namespace {
+
+constexpr int kCornerBlocks = 3;  ///< a side: nine corners lie in three blocks of four
+constexpr int kCorners = kCornerBlocks * Tile::kBlockShape.width;
+
+/// What a place sends towards the camera.
+struct Seen {
+  std::complex<float> phasor;  ///< of the highest frequency
+  float steady;
+};
+
+/// Direct light of sixteen paths from the camera on.
+void traceDirect(const Tracing& tracing, Packet& packet, LaneSums& sums) {
+  constexpr bool is_coherent = true;
+  RTCRayHit16 rays;
+  Hits hits;
+  Lanes<float> unused{};
+  clearSums(sums);
+  intersect(tracing, packet, rays, is_coherent);
+  endMissed(0.0f, rays, packet, unused);
+  if (!isAny(packet.valid)) return;
+  findHits(tracing.scene, packet, rays, hits);
+  gatherDirectLight(tracing, packet, hits, 0, is_coherent, sums);
+}
+
+/// First harmonic of the highest frequency; terms.size() if there is none.
+std::size_t highestOf(const Tracing& tracing) {
+  const auto& turns = tracing.turns_per_metre;
+  return static_cast<std::size_t>(std::ranges::max_element(turns) - turns.begin()) *
+         static_cast<std::size_t>(tracing.request.harmonics);
+}
+
+/// What is seen at the top left corners of a block's pixels, in or beside the image.
+void seeCorners(const Tracing& tracing, int x, int y, LaneSums& sums, std::array<Seen, kLaneCount>& seen) {
+  Block block;
+  prepareBlock(tracing, Tile::kBlockShape, x, y, block);
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    PixelRays& rays = block.rays;
+    rays.x[i] -= 0.5 * (rays.x_by_u[i] + rays.x_by_v[i]);
+    rays.y[i] -= 0.5 * (rays.y_by_u[i] + rays.y_by_v[i]);
+    block.is_inside[i] = -1;
+  }
+  Packet packet;
+  const Block own = pilotOf(block);  // places on an emitter that is no point
+  preparePacket(tracing, own, packet);
+  startInTheMiddle(tracing, own, packet);
+  traceDirect(tracing, packet, sums);
+  const std::size_t term = highestOf(tracing);
+  for (std::size_t i = 0; i < kLaneCount; ++i)
+    seen[i] = {term < sums.re.size() ? std::complex{sums.re[term][i], sums.im[term][i]} : sums.steady[i],
+               sums.steady[i]};
+}
+
+bool differ(const std::array<const Seen*, 4>& corners) {
+  constexpr float kAlike = 0.25f;  // of the brightest: what a slanted or distant surface may vary by
+  float brightest = 0.0f, most = 0.0f;
+  for (const Seen* one : corners) {
+    brightest = std::max(brightest, one->steady);
+    for (const Seen* other : corners)
+      most = std::max({most, std::abs(one->phasor - other->phasor), std::abs(one->steady - other->steady)});
+  }
+  return most > kAlike * brightest;
+}
+
+}  // namespace
+
+std::array<Lanes<int>, Tile::kBlocks> edgesOf(const Tracing& tracing, const Tile& tile) {
+  constexpr int kSide = Tile::kBlockShape.width;
+  std::array<Lanes<int>, Tile::kBlocks> edges{};
+  if (tracing.request.pixel_extent == 0.0) return edges;
+  LaneSums sums{tracing.turns_per_metre.size() * static_cast<std::size_t>(tracing.request.harmonics)};
+  std::array<std::array<Seen, kLaneCount>, kCornerBlocks * kCornerBlocks> seen;
+  for (int b = 0; b < kCornerBlocks * kCornerBlocks; ++b) {
+    seeCorners(tracing, tile.blocks[0].x + b % kCornerBlocks * kSide, tile.blocks[0].y + b / kCornerBlocks * kSide, sums,
+               seen[static_cast<std::size_t>(b)]);
+  }
+  const auto at = [&](int column, int row) {
+    return &seen[static_cast<std::size_t>(row / kSide * kCornerBlocks + column / kSide)]
+                [static_cast<std::size_t>(row % kSide * kSide + column % kSide)];
+  };
+  for (std::size_t b = 0; b < edges.size(); ++b) {
+    const Block& block = tile.blocks[b];
+    for (std::size_t i = 0; i < kLaneCount; ++i) {
+      const int column = block.x - tile.blocks[0].x + static_cast<int>(i) % kSide,
+                row = block.y - tile.blocks[0].y + static_cast<int>(i) / kSide;
+      const bool is_edge = differ({at(column, row), at(column + 1, row), at(column, row + 1), at(column + 1, row + 1)});
+      edges[b][i] = is_edge && block.is_inside[i] != 0 ? -1 : 0;
+    }
+  }
+  return edges;
+}
+
+void addEdges(const Tracing& tracing, const Block& block, const Lanes<int>& edges, int samples, BlockMeans& means) {
+  const BlockShape shape;  // all samples of a packet are one pixel's
+  BlockSums sums{tracing.request};
+  BlockMeans own = means;
+  for (std::size_t lane = 0; lane < kLaneCount; ++lane) {
+    if (edges[lane] == 0) continue;
+    Block pixel;
+    prepareBlock(tracing, shape, block.x + static_cast<int>(lane) % block.shape.width,
+                 block.y + static_cast<int>(lane) / block.shape.width, pixel);
+    clearSums(sums);
+    Packet packet;
+    for (int sample = 0; sample < kEdgeSamples * samples; sample += shape.samples) {
+      preparePacket(tracing, pixel, packet);
+      startAtPlaces(tracing, pixel, sample, kEdgeSamples * samples, packet);
+      const Lanes<int> started = packet.valid;
+      traceDirect(tracing, packet, sums.of_packet);
+      foldTogether(static_cast<std::size_t>(tracing.request.harmonics), started, sums);
+    }
+    takeMeans(sums, tracing.request.harmonics, own);
+    means.steady[lane] += own.steady[0];
+    for (std::size_t term = 0; term < means.phasors.size(); ++term) means.phasors[term][lane] += own.phasors[term][0];
+    for (std::size_t f = 0; f < means.variance.size(); ++f) means.variance[f][lane] += own.variance[f][0];
+  }
+}
+
+}  // namespace toftwin::sim
