@@ -92,34 +92,24 @@ sim::AnyEffect scaled(const sim::AnyEffect& none, const sim::AnyEffect& defaults
 /// The small plan with more of everything, and the small camera with four times as many pixels each
 /// way.
 std::string largePlan() {
-  std::string text = smallPlan();
-  const auto put = [&](const std::string& old, const std::string& by) {
-    text.replace(text.find(old), old.size(), by);
-  };
-  put("repeats = 14", "repeats = 20");
-  put("repeats = 2\nlocked = 2", "repeats = 4\nlocked = 2");
-  put("exposure_us = [125.0, 250.0, 750.0]\nrepeats = 2",
-      "exposure_us = [125.0, 250.0, 750.0]\nrepeats = 3");
-  put("ambient_klx = [0.0, 10.0, 40.0]", "ambient_klx = [0.0, 10.0, 40.0]\nrepeats = 4");
-  put("angle_deg = [-40.0, -20.0, 20.0, 40.0]",
-      "angle_deg = [-40.0, -20.0, 20.0, 40.0]\nrepeats = 4");
-  put("distance_m = [1.0, 2.0, 3.0]", "distance_m = [1.0, 2.0, 3.0]\nrepeats = 3");
-  return text;
+  return withReplaced(
+      smallPlan(),
+      {{"repeats = 14", "repeats = 20"},
+       {"repeats = 2\nlocked = 2", "repeats = 4\nlocked = 2"},
+       {"exposure_us = [125.0, 250.0, 750.0]\nrepeats = 2", "exposure_us = [125.0, 250.0, 750.0]\nrepeats = 3"},
+       {"ambient_klx = [0.0, 10.0, 40.0]", "ambient_klx = [0.0, 10.0, 40.0]\nrepeats = 4"},
+       {"angle_deg = [-40.0, -20.0, 20.0, 40.0]", "angle_deg = [-40.0, -20.0, 20.0, 40.0]\nrepeats = 4"},
+       {"distance_m = [1.0, 2.0, 3.0]", "distance_m = [1.0, 2.0, 3.0]\nrepeats = 3"}});
 }
 std::string largeCamera() {
-  std::string text = smallCamera();
-  const auto put = [&](const std::string& old, const std::string& by) {
-    text.replace(text.find(old), old.size(), by);
-  };
-  put("width = 44", "width = 176"), put("height = 33", "height = 132");
-  put("fx = 42.0", "fx = 168.0"), put("fy = 42.0", "fy = 168.0");
-  put("cx = 21.5", "cx = 87.5"), put("cy = 16.0", "cy = 65.5");
-  return text;
+  return withReplaced(smallCamera(),
+                      {{"width = 44", "width = 176"}, {"height = 33", "height = 132"}, {"fx = 42.0", "fx = 168.0"},
+                       {"fy = 42.0", "fy = 168.0"}, {"cx = 21.5", "cx = 87.5"}, {"cy = 16.0", "cy = 65.5"}});
 }
 
 /// Effects on the waveform show in light that is traced with its harmonics.
 std::string withHarmonics(std::string camera) {
-  return camera.replace(camera.find("taps = 2"), 8, "taps = 2\nharmonics = 5");
+  return withReplaced(std::move(camera), {{"taps = 2", "taps = 2\nharmonics = 5"}});
 }
 
 struct Setting {

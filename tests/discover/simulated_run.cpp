@@ -131,6 +131,15 @@ void write(const SimulatedRun& run, const std::filesystem::path& folder) {
   }
 }
 
+std::string withReplaced(std::string text, std::initializer_list<std::pair<std::string_view, std::string>> parts) {
+  for (const auto& [old, by] : parts) {
+    const auto at = text.find(old);
+    if (at == std::string::npos) throw std::runtime_error(fmt::format("no \"{}\" in: {}", old, text));
+    text.replace(at, old.size(), by);
+  }
+  return text;
+}
+
 std::string smallCamera(const std::string& effects) {
   return R"(model = "small"
 [lens]
@@ -171,12 +180,9 @@ sigma_electrons = 30.0
 }
 
 std::string tinyCamera(const std::string& effects) {
-  std::string text = smallCamera(effects);
-  for (const auto& [old, by] : {std::pair{"width = 44", "width = 28"}, {"height = 33", "height = 21"},
-                                {"fx = 42.0", "fx = 26.7"}, {"fy = 42.0", "fy = 26.7"},
-                                {"cx = 21.5", "cx = 13.5"}, {"cy = 16.0", "cy = 10.0"}})
-    text.replace(text.find(old), std::string_view{old}.size(), by);
-  return text;
+  return withReplaced(smallCamera(effects),
+                      {{"width = 44", "width = 28"}, {"height = 33", "height = 21"}, {"fx = 42.0", "fx = 26.7"},
+                       {"fy = 42.0", "fy = 26.7"}, {"cx = 21.5", "cx = 13.5"}, {"cy = 16.0", "cy = 10.0"}});
 }
 
 std::string smallScene() {

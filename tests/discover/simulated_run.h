@@ -4,8 +4,11 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <initializer_list>
 #include <map>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "calib/plan/plan.h"
@@ -37,6 +40,10 @@ struct SimulatedRun {
 
 /// Writes the folder. Throws std::runtime_error: a test has no other use for it.
 void write(const SimulatedRun& run, const std::filesystem::path& folder);
+
+/// The text with each first part replaced by the second. Throws std::runtime_error where the text has none: a test that
+/// goes on without would test something else.
+std::string withReplaced(std::string text, std::initializer_list<std::pair<std::string_view, std::string>> parts);
 
 /// A small camera of 44 × 33 pixels with two frequencies, as text; `effects` are appended to it.
 std::string smallCamera(const std::string& effects = {});

@@ -53,12 +53,9 @@ struct Seen {
 };
 
 TracedCapture traced(const Seen& seen) {
-  std::string text = smallCamera();
-  for (const std::string key : {"fx = 42.0", "fy = 42.0"}) {
-    const auto at = text.find(key);
-    if (at == std::string::npos) throw std::runtime_error("the small camera has another focal length");
-    text.replace(at, key.size(), key.substr(0, 5) + std::to_string(seen.focal_px));
-  }
+  const std::string focal_px = std::to_string(seen.focal_px);
+  const std::string text =
+      withReplaced(smallCamera(), {{"fx = 42.0", "fx = " + focal_px}, {"fy = 42.0", "fy = " + focal_px}});
   const auto model = sim::SensorModel::parse(text, "camera.toml");
   const auto scene = sim::Scene::parse(seen.scene, "scene.toml");
   if (!model || !scene) throw std::runtime_error("the camera or the scene is wrong");
