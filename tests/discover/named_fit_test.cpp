@@ -4,12 +4,14 @@
 #include <gmock/gmock.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 
 #include "calib/discover/campaign/catalogue.h"
 #include "calib/discover/campaign/discover_campaign.h"
 #include "calib/discover/campaign/rows.h"
+#include "calib/plan/opened.h"
 #include "tests/discover/searched.h"
 
 namespace toftwin::discover {
@@ -85,6 +87,22 @@ TEST_F(Searched, ANumberThatNothingTellsStaysAtNothing) {
   EXPECT_NEAR(found.third, 0.003, 3e-4);
   EXPECT_NEAR(found.fourth, 0.0, 0.05);  // where rounding passes for a little of it; -1 if it is written as it fell
   EXPECT_NEAR(found.second, 0.0, 0.2);
+}
+
+/// A veil and a halo answer for each other: each number's error is half as large as it or more, and yet there is no doing
+/// without the halo (χ² of 20 and more).
+TEST_F(Searched, NumbersThatAnswerForEachOtherAreNotBothNeedless) {
+  for (const std::uint64_t seed : {1U, 5U, 11U}) {
+    simulate("[[effect]]\ntype = 'lens_scatter'\nveil = 0.002\nhalo = 0.004\n", {}, true, 0, seed);
+    std::filesystem::remove(folder_ / "run" / plan::openedFile(plan::OpenedOf::A));
+    const CampaignFinding finding = search(job());
+    ASSERT_THAT(namesOf(finding), testing::ElementsAre("lens_scatter")) << seed << ": " << verdictOf(finding);
+    const auto& numbers = finding.effects.front().found.numbers;
+    const auto halo = std::ranges::find(numbers, "halo", &Estimate::name);
+    ASSERT_NE(halo, numbers.end()) << seed;
+    EXPECT_LT(halo->value, 2.0 * halo->error) << seed << ": its error alone would let it go";
+    EXPECT_NEAR(halo->value, 0.004, 4.0 * halo->error) << seed;
+  }
 }
 
 }  // namespace

@@ -25,13 +25,15 @@ bool isAtBound(const sim::AnyEffect& effect, const std::vector<std::string>& key
   });
 }
 
-std::optional<LeastStrength> leastStrength(const FittedEffect& fitted, const std::vector<std::string>& strengths) {
+std::optional<LeastStrength> leastStrength(const FittedEffect& fitted, const std::vector<std::string>& strengths,
+                                           const std::vector<std::string>& needed) {
   const sim::AnyEffect none = noneOf(fitted.effect);
   std::optional<LeastStrength> least;
   int count = 0;
   for (const FittedNumber& number : fitted.numbers) {
     if (std::ranges::find(strengths, number.key) == strengths.end()) continue;
     ++count;
+    if (std::ranges::find(needed, number.key) != needed.end()) continue;
     // What the data say nothing of has no error.
     const double errors =
         number.error > 0.0 ? std::abs(number.value - valueOf(none, number.key)) / number.error : 0.0;

@@ -41,12 +41,13 @@ double valueOf(const sim::AnyEffect& effect, const std::string& key);
 /// Whether a strength of the effect, one of these numbers, was fitted to a bound of it.
 bool isAtBound(const sim::AnyEffect& effect, const std::vector<std::string>& keys);
 /// Of several `strengths` among an effect's fitted numbers, the one that is fewest standard errors from nothing, and how
-/// many; none where it has one alone, or none.
+/// many; none where it has one alone, or none. Those that are `needed` count, but are not the one.
 struct LeastStrength {
   std::string key{};
   double errors = 0.0;
 };
-std::optional<LeastStrength> leastStrength(const FittedEffect& fitted, const std::vector<std::string>& strengths);
+std::optional<LeastStrength> leastStrength(const FittedEffect& fitted, const std::vector<std::string>& strengths,
+                                           const std::vector<std::string>& needed = {});
 /// With that number switched off.
 sim::AnyEffect without(const sim::AnyEffect& effect, const std::string& key);
 std::vector<sim::AnyEffect> moved(std::vector<sim::AnyEffect> effects, const FreeNumber& free,

@@ -175,15 +175,26 @@ class Descent {
   }
 
   /// The strength that is least needed goes back to nothing, one after the other; the last one of an
-  /// effect stays.
+  /// effect stays. Standard errors only say which: those of numbers that answer for each other are large, and yet
+  /// there may be no doing without one of them.
   Result<> dropNeedless(State& state) {
     constexpr double kNeeded = 2.0;  // standard errors
     for (const std::size_t place : places_) {
-      while (const auto least = leastStrength(fittedAt(state, place), options_.droppable)) {
+      std::vector<std::string> needed;
+      while (const auto least = leastStrength(fittedAt(state, place), options_.droppable, needed)) {
         if (least->errors >= kNeeded) break;
-        state.effects[place] = without(state.effects[place], least->key);
+        State fewer = state;
+        fewer.effects[place] = without(fewer.effects[place], least->key);
         kept_.emplace(place, least->key);
-        if (auto done = fit(state); !done) return done;
+        if (auto done = fit(fewer); !done) return done;
+        const auto numbers = static_cast<double>(state.free.size()) - static_cast<double>(fewer.free.size());
+        const double worse = (fewer.at.deviance - state.at.deviance) / std::max(1.0, dispersionOf(state.at));
+        if (worse > kNeeded * kNeeded * std::max(1.0, numbers)) {
+          needed.push_back(least->key);
+          kept_.erase({place, least->key});
+        } else {
+          state = std::move(fewer);
+        }
       }
     }
     return {};
