@@ -153,27 +153,31 @@ std::string unfinished(const plan::LoggedRun& run) {
   return fmt::format("the run is unfinished ({} of {} captures)", run.captures, run.planned);
 }
 
+/// Why a number that differs from the first is not called changed.
+std::vector<std::string> doubtsOf(const plan::TrendRow& row) {
+  std::vector<std::string> doubts;
+  if (row.at.run.isUnfinished()) doubts.push_back(unfinished(row.at.run));
+  if (row.at.run.isOfOneCamera())
+    doubts.push_back(oneCamera(row.at.run));
+  else if (row.is_first_of_one_camera)
+    doubts.emplace_back("A and B of the first are not two cameras");
+  if (row.is_in_doubt)
+    doubts.emplace_back(compare::isInDoubt(row.at.trait.detail) ? "it is in doubt" : "the first is in doubt");
+  return doubts;
+}
+
 std::string verdictOn(const plan::TrendRow& row, const std::string& first_detail) {
-  const bool is_whole = !row.at.run.isUnfinished(), is_of_one = row.at.run.isOfOneCamera();
   if (row.is_first) {
-    return fmt::format("the first{}{}", is_whole ? "" : "; " + unfinished(row.at.run),
-                       is_of_one ? "; " + oneCamera(row.at.run) : "");
+    return fmt::format("the first{}{}", row.at.run.isUnfinished() ? "; " + unfinished(row.at.run) : "",
+                       row.at.run.isOfOneCamera() ? "; " + oneCamera(row.at.run) : "");
   }
   const auto change = [](double by) { return (by > 0.0 ? "+" : "") + compare::shownDigits(by, 4); };
   std::string verdict = std::isfinite(row.low) && std::isfinite(row.high)
                             ? fmt::format("{} ({} to {}){}", change(row.change), change(row.low),
                                           change(row.high), row.isChanged() ? ": changed" : "")
                             : fmt::format("{}, not known how surely", change(row.change));
-  if (!is_whole) verdict += fmt::format("; {}, and this is called no change", unfinished(row.at.run));
-  if (is_of_one) {
-    verdict += fmt::format("; {}, and this is called no change", oneCamera(row.at.run));
-  } else if (row.is_first_of_one_camera) {
-    verdict += "; A and B of the first are not two cameras, and this is called no change";
-  }
-  if (row.is_in_doubt) {
-    verdict += fmt::format("; {} in doubt, and this is called no change",
-                           compare::isInDoubt(row.at.trait.detail) ? "it is" : "the first is");
-  }
+  if (const auto doubts = doubtsOf(row); !doubts.empty())
+    verdict += fmt::format("; {}, and this is called no change", fmt::join(doubts, "; "));
   const std::string first = compare::withoutDoubt(first_detail);
   if (compare::withoutDoubt(row.at.trait.detail) != first)
     verdict += first.empty() ? "; the first was without" : "; the first was " + first;
