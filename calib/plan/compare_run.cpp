@@ -302,8 +302,10 @@ Result<compare::WrittenReport> compareRun(const CompareRunJob& job, compare::Pro
   const compare::WrittenReport written{.page = *page, .verdict = report.verdict, .notes = std::move(notes)};
   if (!*log) return written;
   const compare::SameFrames same = sameFramesOf(*run);
-  (*log)->run.frames_of_b = static_cast<std::int64_t>(same.ofB());
-  (*log)->run.same_frames = static_cast<std::int64_t>(same.same());
+  if (same.ofB() > 0) {  // else nothing is known: no frame has anything to be told by
+    (*log)->run.frames_of_b = static_cast<std::int64_t>(same.ofB());
+    (*log)->run.same_frames = static_cast<std::int64_t>(same.same());
+  }
   (*log)->run.settings = run->settings;
   (*log)->run.judged = utcOf(std::time(nullptr));
   if (auto logged = (*log)->log.add((*log)->run, traitsOf(*run)); !logged) {

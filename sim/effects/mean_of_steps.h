@@ -10,7 +10,9 @@ namespace toftwin::sim {
 /// Noise of a charge that is converted into whole steps: its variance in electrons², per electron and on top. With noise
 /// of more than half a step nothing of the steps is left in a mean; taken without it, they would be errors that no mean
 /// over frames has. An effect that has it gives the mean of its codes over it, for which the charge must be free of noise
-/// itself. No numbers of an effect, so that no file has them.
+/// itself. The noise is that of the charge which is converted: behind an effect that takes charge away after it was
+/// counted (ambient suppression, a full well) the steps are taken for sharper than they are. No numbers of an effect, so
+/// that no file has them.
 struct NoiseOfCharge {
   double fano = 0.0, variance = 0.0;
 

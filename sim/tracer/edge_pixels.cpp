@@ -3,14 +3,17 @@
 
 #include <algorithm>
 #include <complex>
+#include <limits>
 
+#include "sim/images/rows.h"
 #include "sim/tracer/hit.h"
 
 namespace toftwin::sim {
 namespace {
 
 constexpr int kCornerBlocks = 3;  ///< a side: nine corners lie in three blocks of four
-constexpr int kCorners = kCornerBlocks * Tile::kBlockShape.width;
+/// Tells the edges' random numbers from those of all other light, which goes on from the same pixels.
+constexpr std::uint32_t kEdgeSalt = 0x2545f491u;
 
 /// What a place sends towards the camera.
 struct Seen {
@@ -18,13 +21,12 @@ struct Seen {
   float steady;
 };
 
-/// Direct light of sixteen paths from the camera on.
+/// Adds direct light of sixteen paths from the camera on.
 void traceDirect(const Tracing& tracing, Packet& packet, LaneSums& sums) {
   constexpr bool is_coherent = true;
   RTCRayHit16 rays;
   Hits hits;
   Lanes<float> unused{};
-  clearSums(sums);
   intersect(tracing, packet, rays, is_coherent);
   endMissed(0.0f, rays, packet, unused);
   if (!isAny(packet.valid)) return;
@@ -53,11 +55,41 @@ void seeCorners(const Tracing& tracing, int x, int y, LaneSums& sums, std::array
   const Block own = pilotOf(block);  // places on an emitter that is no point
   preparePacket(tracing, own, packet);
   startInTheMiddle(tracing, own, packet);
+  clearSums(sums);
   traceDirect(tracing, packet, sums);
   const std::size_t term = highestOf(tracing);
   for (std::size_t i = 0; i < kLaneCount; ++i)
     seen[i] = {term < sums.re.size() ? std::complex{sums.re[term][i], sums.im[term][i]} : sums.steady[i],
                sums.steady[i]};
+}
+
+/// All samples of the lane's pixel, in packets of sixteen; `samples` of all of its light.
+void traceEdge(const Tracing& tracing, const Block& block, std::size_t lane, int samples, BlockSums& sums) {
+  constexpr int kBatches = 16;  // or more: their spread says something
+  constexpr int kMost = std::numeric_limits<int>::max() / kEdgeSamples;
+  constexpr int kMostPackets = 64;  // summed up in single precision
+  const BlockShape shape;
+  const int all = kEdgeSamples * std::min(samples, kMost);
+  const int batch = std::clamp(all / (kBatches * shape.samples), 1, kMostPackets) * shape.samples;
+  const int width = block.shape.width;
+  Block pixel;
+  prepareBlock(tracing, shape, block.x + static_cast<int>(lane) % width, block.y + static_cast<int>(lane) / width, pixel);
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    pixel.key_a[i] = mixBits(block.key_a[lane] ^ kEdgeSalt);
+    pixel.key_b[i] = mixBits(block.key_b[lane] + kEdgeSalt);
+  }
+  clearSums(sums);
+  Packet packet;
+  for (int first = 0; first < all; first += batch) {
+    const int last = std::min(all, first + batch);
+    clearSums(sums.of_packet);
+    for (int sample = first; sample < last; sample += shape.samples) {
+      preparePacket(tracing, pixel, packet);
+      startAtPlaces(tracing, pixel, sample, last, packet);
+      traceDirect(tracing, packet, sums.of_packet);
+    }
+    foldTogether(static_cast<std::size_t>(tracing.request.harmonics), last - first, sums);
+  }
 }
 
 bool differ(const std::array<const Seen*, 4>& corners) {
@@ -100,28 +132,24 @@ std::array<Lanes<int>, Tile::kBlocks> edgesOf(const Tracing& tracing, const Tile
 }
 
 void addEdges(const Tracing& tracing, const Block& block, const Lanes<int>& edges, int samples, BlockMeans& means) {
-  const BlockShape shape;  // all samples of a packet are one pixel's
-  BlockSums sums{tracing.request};
-  BlockMeans own = means;
-  for (std::size_t lane = 0; lane < kLaneCount; ++lane) {
-    if (edges[lane] == 0) continue;
-    Block pixel;
-    prepareBlock(tracing, shape, block.x + static_cast<int>(lane) % block.shape.width,
-                 block.y + static_cast<int>(lane) / block.shape.width, pixel);
-    clearSums(sums);
-    Packet packet;
-    for (int sample = 0; sample < kEdgeSamples * samples; sample += shape.samples) {
-      preparePacket(tracing, pixel, packet);
-      startAtPlaces(tracing, pixel, sample, kEdgeSamples * samples, packet);
-      const Lanes<int> started = packet.valid;
-      traceDirect(tracing, packet, sums.of_packet);
-      foldTogether(static_cast<std::size_t>(tracing.request.harmonics), started, sums);
+  constexpr int kWorthSharing = 64;  // samples: a pixel's work for a thread
+  const auto addLanes = [&](int begin, int end) {
+    const FlushDenormals flush;
+    BlockSums sums{tracing.request};
+    BlockMeans own = means;
+    for (auto lane = static_cast<std::size_t>(begin); lane < static_cast<std::size_t>(end); ++lane) {
+      if (edges[lane] == 0) continue;
+      traceEdge(tracing, block, lane, samples, sums);
+      takeMeans(sums, tracing.request.harmonics, own);
+      means.steady[lane] += own.steady[0];
+      for (std::size_t term = 0; term < means.phasors.size(); ++term) means.phasors[term][lane] += own.phasors[term][0];
+      for (std::size_t f = 0; f < means.variance.size(); ++f) means.variance[f][lane] += own.variance[f][0];
     }
-    takeMeans(sums, tracing.request.harmonics, own);
-    means.steady[lane] += own.steady[0];
-    for (std::size_t term = 0; term < means.phasors.size(); ++term) means.phasors[term][lane] += own.phasors[term][0];
-    for (std::size_t f = 0; f < means.variance.size(); ++f) means.variance[f][lane] += own.variance[f][0];
-  }
+  };
+  if (samples > kWorthSharing)
+    inParallel(static_cast<int>(kLaneCount), 1, addLanes);
+  else
+    addLanes(0, static_cast<int>(kLaneCount));
 }
 
 }  // namespace toftwin::sim

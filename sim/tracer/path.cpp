@@ -229,11 +229,10 @@ void fold(std::size_t harmonics, const Lanes<int>& started, int samples, BlockSu
   }
 }
 
-void foldTogether(std::size_t harmonics, const Lanes<int>& started, BlockSums& sums) {
+void foldTogether(std::size_t harmonics, int samples, BlockSums& sums) {
   const LaneSums& lanes = sums.of_packet;
   const auto sumOf = [](const auto& of) { return std::accumulate(std::begin(of.v), std::end(of.v), 0.0); };
-  const double count = -sumOf(started);
-  if (!(count > 0.0)) return;
+  const double count = samples;
   sums.steady[0] += sumOf(lanes.steady);
   sums.ambient[0] += sumOf(lanes.ambient);
   sums.samples[0] += count;

@@ -175,8 +175,8 @@ void startAtPlaces(const Tracing& tracing, const Block& block, int sample, int l
 void followFrom(const Tracing& tracing, int surface, Packet& packet, RTCRayHit16& rays, Hits& hits, LaneSums& sums);
 /// The lanes' sums of one packet, or of a batch of so many samples, go to those of all, and their squares to the variance.
 void fold(std::size_t harmonics, const Lanes<int>& started, int samples, BlockSums& sums);
-/// The same of a packet all of whose lanes are one pixel's, a batch of them: its sums are in lane 0.
-void foldTogether(std::size_t harmonics, const Lanes<int>& started, BlockSums& sums);
+/// The same of a batch of so many samples of one pixel, whichever lanes they were in: its sums are in lane 0.
+void foldTogether(std::size_t harmonics, int samples, BlockSums& sums);
 void record(RayLog* log, const Lanes<int>& valid, const RTCRay16& rays, bool coherent, bool shadow);
 /// Follows sixteen paths over all their surfaces, whatever those are.
 void followAll(const Tracing& tracing, Packet& packet, LaneSums& sums);

@@ -173,7 +173,8 @@ bool isDark(const Ends& ends, std::size_t lane) {
          std::ranges::all_of(ends.parts, [&](const LightPart& part) { return isDark(part.light, lane); });
 }
 
-/// The first surfaces of the block's sample: their own light, of edges without direct light, and who goes on from there.
+/// The first surfaces of the block's sample: their own light, of edges without direct light, and who goes on from
+/// there.
 bool start(const Tracing& tracing, const Block& block, const Lanes<int>& edges, int sample, int last, Packet& packet,
            Lanes<int>& started, Starts& starts, LaneSums& sums) {
   constexpr bool is_coherent = true;

@@ -29,7 +29,8 @@ T orGiveUp(Result<T> result) {
 
 /// NaN of nothing.
 double quantile(std::vector<double> values, double share);
-inline double median(std::vector<double> values) { return quantile(std::move(values), 0.5); }
+/// Of an even number of values the mean of the two in the middle.
+double median(std::vector<double> values);
 
 double wallMs();
 double processorMs();        ///< of the whole process

@@ -35,7 +35,7 @@ struct RefitOptions {
   std::span<const TermGroup> terms{};  ///< known besides
   bool with_numbers = false;           ///< the source's effects' own numbers are nuisances
   /// Numbers of these names, each of which makes an effect strong, go if the data do not need them: less than
-  /// two standard errors from nothing.
+  /// two standard errors from nothing, and χ² rises by no more than 4 for each number that goes.
   std::vector<std::string> droppable{};
   /// Of the effects at these places, only these numbers.
   std::map<std::size_t, std::vector<std::string>> only{};
