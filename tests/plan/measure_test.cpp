@@ -307,12 +307,14 @@ TEST_F(Judged, OneCameraMeasuredTwiceIsNoComparison) {
     both += line.replace(b, b_size, of_a) + "\n";
   }
   write("run/index.jsonl", both);
-  const Ran ran = compare();
+  const Ran ran = compare("--log " + path("lab.sqlite"));
   ASSERT_EQ(ran.status, 0) << ran.err;
   EXPECT_THAT(ran.out, HasSubstr("A and B are not two cameras: of the "));
   EXPECT_THAT(ran.out, HasSubstr("of B, each is one of A, bit for bit."));
   EXPECT_THAT(ran.out, HasSubstr("\nNote: A and B, both cam, are simulated with one seed, 1"));
   EXPECT_THAT(bytesOf("report/index.html"), HasSubstr("<p class='verdict neutral'>A and B are not two cameras"));
+  EXPECT_THAT(toftwin("log " + path("lab.sqlite")).out, HasSubstr("(A and B are not two cameras: 36 of 36 frames of B are A's"));
+  EXPECT_THAT(toftwin("log --csv " + path("lab.sqlite")).out, HasSubstr(",36,36\n"));
 }
 
 TEST_F(Judged, FindsThePlantedOffsetAndLeavesLockedCapturesClosed) {
