@@ -149,8 +149,9 @@ Block pilotOf(const Block& block) {
   constexpr std::uint32_t kPilotSalt = 0x3c6ef372u;
   Block pilot = block;
   for (std::size_t i = 0; i < kLaneCount; ++i) {
-    pilot.key_a[i] = mixBits(block.key_a[i] ^ kPilotSalt);
-    pilot.key_b[i] = mixBits(block.key_b[i] + kPilotSalt);
+    const PixelKey key = salted({block.key_a[i], block.key_b[i]}, kPilotSalt);
+    pilot.key_a[i] = key.a;
+    pilot.key_b[i] = key.b;
   }
   return pilot;
 }

@@ -74,9 +74,10 @@ void traceEdge(const Tracing& tracing, const Block& block, std::size_t lane, int
   const int width = block.shape.width;
   Block pixel;
   prepareBlock(tracing, shape, block.x + static_cast<int>(lane) % width, block.y + static_cast<int>(lane) / width, pixel);
+  const PixelKey key = salted({block.key_a[lane], block.key_b[lane]}, kEdgeSalt);
   for (std::size_t i = 0; i < kLaneCount; ++i) {
-    pixel.key_a[i] = mixBits(block.key_a[lane] ^ kEdgeSalt);
-    pixel.key_b[i] = mixBits(block.key_b[lane] + kEdgeSalt);
+    pixel.key_a[i] = key.a;
+    pixel.key_b[i] = key.b;
   }
   clearSums(sums);
   Packet packet;

@@ -23,7 +23,10 @@ struct PixelKey {
   std::uint32_t a, b;
 };
 
-/// The same of a request: its seed, mixed.
+/// Another key, for random numbers that have nothing in common with the first one's.
+TOFTWIN_INLINE PixelKey salted(PixelKey key, std::uint32_t salt) { return {mixBits(key.a ^ salt), mixBits(key.b + salt)}; }
+
+/// The key of a request: its seed, mixed.
 inline PixelKey seedKey(std::uint64_t seed) {
   const auto low = static_cast<std::uint32_t>(seed), high = static_cast<std::uint32_t>(seed >> 32);
   const std::uint32_t a = mixBits(mixBits(low + kGolden) + high);

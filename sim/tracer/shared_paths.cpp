@@ -378,7 +378,7 @@ void prepareTile(const Tracing& tracing, int x, int y, Tile& tile) {
   }
   const PixelKey corner =
       pixelKey(tracing.seed, static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y));
-  tile.key = {mixBits(corner.a ^ kTileSalt), mixBits(corner.b + kTileSalt)};
+  tile.key = salted(corner, kTileSalt);
   tile.edges = edgesOf(tracing, tile);
 }
 
