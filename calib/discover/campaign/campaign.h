@@ -27,10 +27,11 @@ namespace toftwin::discover {
 /// Mean and noise of one measured quantity over the repeats of a capture.
 struct Repeated {
   Image<float> mean;      ///< NaN where less than half of the frames are valid
-  Image<float> variance;  ///< of the mean, pooled over pixels that are alike
+  Image<float> variance;  ///< of the mean, pooled over pixels that are alike: as they were measured, until poolNoise
   /// How many pixels' noise is worth one independent one, from block averages over 4 × 4 pixels: at
   /// least 1.
   double clumping = 1.0;
+  Image<float> own_variance{};  ///< as each pixel's few frames say; NaN where they say nothing
 };
 
 /// RawReading over the repeats.

@@ -16,6 +16,7 @@
 #include "calib/discover/campaign/locked_places.h"
 #include "calib/discover/campaign/model_file.h"
 #include "calib/discover/campaign/next_capture.h"
+#include "calib/discover/campaign/pool_noise.h"
 #include "calib/discover/campaign/reading.h"
 #include "calib/discover/campaign/search_rounds.h"
 #include "calib/discover/campaign/stood_off.h"
@@ -127,20 +128,28 @@ Result<> tellLockedOff(const JudgedCampaign& locked, const JudgedCampaign& open,
   return {};
 }
 
+/// How noisy the captures are, beside the light where they were said to be taken, and what noise adds to their means.
+Result<> knowNoise(const Declared& declared, const std::vector<std::shared_ptr<const TracedCapture>>& traced,
+                   std::vector<MeasuredCapture>& captures) {
+  shareLightNoise(traced, captures);
+  if (auto pooled = poolNoise(declared, traced, captures); !pooled) return pooled;
+  takeNoiseOff(declared.model, captures);
+  return {};
+}
+
 Result<> judgeLocked(const CampaignJob& job, const Campaign& campaign, const JudgedCampaign& searched,
                      const JudgedModels& models, CampaignFinding& finding) {
   const Declared& declared = searched.declared;
   if (auto opened = openLockedOf(job, campaign); !opened) return opened;
   auto captures = readLocked(campaign);
   if (!captures) return captures.error();
-  takeNoiseOff(declared.model, *captures);
-  takeUnitOff(declared.unit_percent, *captures);
   TraceOptions options = job.trace;
   options.seed +=
       0x5bd1e995U;  // light of its own: what the open captures' light has by chance must not help
   const auto at_poses = traceAll(declared, *captures, options);
   if (!at_poses) return at_poses.error();
-  shareLightNoise(*at_poses, *captures);
+  if (auto known = knowNoise(declared, *at_poses, *captures); !known) return known;
+  takeUnitOff(declared.unit_percent, *captures);
   const auto traced = traceWhereTheyStood(declared, models.after.effects, *captures, *at_poses, options);
   if (!traced) return traced.error();
   const auto varied = traceBeside(declared, *captures, *traced, options);
@@ -270,7 +279,6 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
   noteHiddenLightNoise(campaign->captures, finding.notes);
   if (auto taken = takeLens(*campaign, declared, finding.notes); !taken) return taken.error();
   if (auto same = checkFrequencies(*campaign, declared.model); !same) return same.error();
-  takeNoiseOff(declared.model, campaign->captures);
   for (const auto& [block, scene] : declared.scene_of_block) {
     const auto is_of = [&](const MeasuredCapture& capture) {
       return capture.record.block == block;
@@ -284,7 +292,7 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
   const auto tell = [&](double share) { progress.at(share); };
   const auto at_poses = traceAll(declared, campaign->captures, job.trace, tell);
   if (!at_poses) return at_poses.error();
-  shareLightNoise(*at_poses, campaign->captures);
+  if (auto known = knowNoise(declared, *at_poses, campaign->captures); !known) return known.error();
   const auto unit = unitOf(declared, campaign->captures, *at_poses);
   if (!unit) return unit.error();
   declared.unit_percent = *unit;

@@ -11,6 +11,7 @@
 #include "calib/compare/stack.h"
 #include "calib/compare/statistics.h"
 #include "calib/discover/campaign/light_noise.h"
+#include "calib/discover/campaign/pool_noise.h"
 #include "protocol/types/counted.h"
 
 namespace toftwin::discover {
@@ -31,14 +32,15 @@ class Repeats {
     ++frames_;
   }
 
-  /// `like`: pixels with similar values of it have similar noise.
+  /// `like`: pixels with similar values of it have similar noise; empty: those with similar means.
   [[nodiscard]] Repeated repeated(const Image<float>& like) const {
     Repeated result{Image<float>(sum_.width(), sum_.height(), kNaN), {}, clumping()};
     for (std::size_t i = 0; i < sum_.size(); ++i) {
       if (2 * sum_[i].n() >= frames_ && sum_[i].n() > 0)
         result.mean[i] = static_cast<float>(sum_[i].mean());
     }
-    result.variance = pooled(like.empty() ? result.mean : like);
+    result.own_variance = ownVariance(result.mean);
+    result.variance = pooledOver(result.own_variance, like.empty() ? result.mean : like);
     return result;
   }
 
@@ -76,36 +78,21 @@ class Repeats {
     return blocks_ < 32 ? 1.0 : std::max(1.0, block_ratios_ / static_cast<double>(blocks_));
   }
 
-  /// Variance of the mean over the frames: of single frames pooled over pixels that are alike in
-  /// `like`, times (1 + ρ)/(1 − ρ)/n for frames that err like the one before by ρ.
-  [[nodiscard]] Image<float> pooled(const Image<float>& like) const {
-    constexpr std::size_t kBins = 24;
-    std::vector<std::pair<float, std::size_t>> order;
+  /// Variance of the mean over the frames: of single frames, times (1 + ρ)/(1 − ρ)/n for frames that err like the
+  /// one before by ρ, which all pixels tell together. NaN where the mean is.
+  [[nodiscard]] Image<float> ownVariance(const Image<float>& mean) const {
     double steps = 0.0, plain = 0.0;
-    for (std::size_t i = 0; i < sum_.size(); ++i) {
-      if (pairs_[i] == 0 || !std::isfinite(like[i])) continue;
-      order.emplace_back(like[i], i);
-      steps += 0.5 * squares_[i] / pairs_[i], plain += sum_[i].variance();
-    }
     Image<float> variance(sum_.width(), sum_.height(), kNaN);
-    if (order.empty()) return variance;
+    for (std::size_t i = 0; i < sum_.size(); ++i) {
+      if (pairs_[i] == 0 || !std::isfinite(mean[i])) continue;
+      const double of_frame = 0.5 * squares_[i] / pairs_[i];
+      variance[i] = static_cast<float>(of_frame);
+      steps += of_frame, plain += sum_[i].variance();
+    }
     const double rho =
         plain > 0.0 && frames_ >= 4 ? std::clamp(1.0 - steps / plain, 0.0, 0.9) : 0.0;
     const double of_mean = (1.0 + rho) / (1.0 - rho) / (1.0 - rho) / static_cast<double>(frames_);
-    std::ranges::sort(order);
-    const std::size_t per_bin = std::max<std::size_t>(1, order.size() / kBins);
-    for (std::size_t first = 0; first < order.size(); first += per_bin) {
-      const std::size_t last =
-          first + 2 * per_bin > order.size() ? order.size() : first + per_bin;  // no small rest
-      double sum = 0.0;
-      for (std::size_t i = first; i < last; ++i) {
-        const std::size_t pixel = order[i].second;
-        sum += 0.5 * squares_[pixel] / pairs_[pixel];
-      }
-      const auto mean = static_cast<float>(of_mean * sum / static_cast<double>(last - first));
-      for (std::size_t i = first; i < last; ++i) variance[order[i].second] = mean;
-      if (last == order.size()) break;
-    }
+    for (float& one : variance.pixels()) one *= static_cast<float>(of_mean);
     return variance;
   }
 
@@ -302,10 +289,7 @@ struct CaptureGatherer::State {
   MeasuredCapture finish() {
     mean_moment.putInto(capture.moment);
     light.putInto(capture);
-    if (has_amplitude) {
-      capture.log_amplitude = amplitude.repeated({});
-      capture.log_amplitude.variance = amplitude.repeated(capture.log_amplitude.mean).variance;
-    }
+    if (has_amplitude) capture.log_amplitude = amplitude.repeated({});
     capture.range_m = range.repeated(capture.log_amplitude.mean);
     capture.raw = raw.repeated(capture.log_amplitude.mean);
     for (float& share : valid.pixels()) share /= static_cast<float>(capture.frames);
