@@ -30,6 +30,7 @@ namespace {
 struct Made {
   const Campaign& campaign;
   const std::vector<std::shared_ptr<const TracedCapture>>& traced;
+  const Lights& lights;
   CampaignRows rows;
 };
 
@@ -52,17 +53,18 @@ class Rows : public testing::Test {
     auto traced = traceAll({*declared, *scene}, campaign->captures, {.max_surfaces = 1});
     if (!traced) throw std::runtime_error(traced.error().message);
     const Kept& kept = kept_.emplace_back(Declared{*declared, *scene}, *std::move(campaign), *std::move(traced));
-    auto rows = CampaignRows::make(kept.declared, {kept.campaign.captures, kept.traced, kept.traced}, {});
+    auto rows = CampaignRows::make(kept.declared, {kept.campaign.captures, kept.traced, kept.lights}, {});
     if (!rows) throw std::runtime_error(rows.error().message);
-    return {kept.campaign, kept.traced, *std::move(rows)};
+    return {kept.campaign, kept.traced, kept.lights, *std::move(rows)};
   }
   /// What rows refer to.
   struct Kept {
     Kept(Declared of, Campaign taken, std::vector<std::shared_ptr<const TracedCapture>> light)
-        : declared(std::move(of)), campaign(std::move(taken)), traced(std::move(light)) {}
+        : declared(std::move(of)), campaign(std::move(taken)), traced(std::move(light)), lights(lightsOf(traced)) {}
     Declared declared;
     Campaign campaign;
     std::vector<std::shared_ptr<const TracedCapture>> traced;
+    Lights lights;
   };
   std::deque<Kept> kept_{};
   std::filesystem::path folder_;
@@ -126,7 +128,7 @@ TEST_F(Rows, ADelayOfTheLightIsFoundHoweverLargeItIs) {
   const auto declared = sim::SensorModel::parse(square, "camera.toml");
   const auto scene = sim::Scene::parse(smallScene(), "scene.toml");
   const Declared as_declared{*declared, *scene};
-  const auto delay_mm = delayThatFits({as_declared, {made.campaign.captures, made.traced, made.traced}, {}});
+  const auto delay_mm = delayThatFits({as_declared, {made.campaign.captures, made.traced, made.lights}, {}});
   ASSERT_TRUE(delay_mm) << delay_mm.error().message;
   EXPECT_NEAR(*delay_mm, 0.04 * 795.77, 2.0);
   const auto once = withDelay(*declared, effectsWithoutNoise(*declared), *delay_mm);
@@ -175,7 +177,7 @@ TEST_F(Rows, WithoutACyclicErrorADelayIsAnOffset) {
   const auto declared = sim::SensorModel::parse(tinyCamera(), "camera.toml");
   const auto scene = sim::Scene::parse(smallScene(), "scene.toml");
   const Declared as_declared{*declared, *scene};
-  const auto delay_mm = delayThatFits({as_declared, {made.campaign.captures, made.traced, made.traced}, {}});
+  const auto delay_mm = delayThatFits({as_declared, {made.campaign.captures, made.traced, made.lights}, {}});
   ASSERT_TRUE(delay_mm) << delay_mm.error().message;
   EXPECT_EQ(*delay_mm, 0.0);
 }
@@ -190,7 +192,7 @@ TEST_F(Rows, AWrongChargeIsNoDelayOfTheLight) {
   const auto scene = sim::Scene::parse(smallScene(), "scene.toml");
   ASSERT_TRUE(declared && scene);
   const Declared as_declared{*declared, *scene};
-  const auto delay_mm = delayThatFits({as_declared, {made.campaign.captures, made.traced, made.traced}, {}});
+  const auto delay_mm = delayThatFits({as_declared, {made.campaign.captures, made.traced, made.lights}, {}});
   ASSERT_TRUE(delay_mm) << delay_mm.error().message;
   EXPECT_EQ(*delay_mm, 0.0);
 }
@@ -271,7 +273,7 @@ repeats = 2
     const auto camera = sim::SensorModel::parse(tinyCamera(), "camera.toml");
     const auto scene = sim::Scene::parse(smallScene(), "scene.toml");
     const auto all = sitesOf({*camera, *scene, scene_of_block},
-                             {made.campaign.captures, made.traced, made.traced}, grid);
+                             {made.campaign.captures, made.traced, made.lights}, grid);
     return std::set<std::size_t>(all.begin(), all.end()).size();
   };
   const CellGrid pixels{1, 1, 28, 21}, large{14, 8, 2, 3};
@@ -341,7 +343,7 @@ TEST_F(Rows, ADelayThatIsKnownHidesNoFrequencyOffset) {
   const auto camera = sim::SensorModel::parse(square, "camera.toml");
   const auto scene = sim::Scene::parse(smallScene(), "scene.toml");
   const Declared late{.model = *camera, .scene = *scene, .delay_mm = 8.0};
-  const auto rows = CampaignRows::make(late, {made.campaign.captures, made.traced, made.traced}, {});
+  const auto rows = CampaignRows::make(late, {made.campaign.captures, made.traced, made.lights}, {});
   ASSERT_TRUE(rows) << rows.error().message;
   std::vector<std::string> names;
   for (const Candidate& one : rows->candidates()) names.push_back(discover::nameOf(one.example));

@@ -61,7 +61,8 @@ TEST(NamedFits, HaveOnlyTheStrengthsThatAreNeeded) {
   const Declared known{*declared, *scene};
   const auto traced = traceAll(known, campaign->captures, {.max_surfaces = 1});
   ASSERT_TRUE(traced.ok()) << traced.error().message;
-  const auto rows = CampaignRows::make(known, {campaign->captures, *traced, *traced}, {});
+  const Lights lights = lightsOf(*traced);
+  const auto rows = CampaignRows::make(known, {campaign->captures, *traced, lights}, {});
   ASSERT_TRUE(rows.ok()) << rows.error().message;
   const std::vector<std::string> names{"propagation_delay"};
   const auto fits = rows->fitNamed(names, {}, {});

@@ -77,15 +77,20 @@ int leftOut(const Image<std::uint8_t>& edge) {
 const std::vector<Stood> kAsTheLightSays{Stood{0.0, 0.0, 0.5, 0.0, 0.0}};
 
 TEST(TracedEdges, LeaveOutWhatAPoseAsItWasToldMayReach) {
-  EXPECT_EQ(leftOut(traced({.focal_px = 42.0}).is_edge), 2);  // three deviations are 0.23 pixels
-  // 366 × √(0.1°² + (1 mm / 2 m)²) = 0.66 pixels, of which three deviations are 2.
-  EXPECT_EQ(leftOut(traced({}).is_edge), 6);
+  EXPECT_EQ(leftOut(traced({.focal_px = 42.0}).is_edge), 2);  // four deviations are 0.30 pixels
+  // 366 × √(0.1°² + (1 mm / 2 m)²) = 0.66 pixels, of which four deviations are 3.
+  EXPECT_EQ(leftOut(traced({}).is_edge), 8);
   // Also where each capture has light of its own, but stands where it was told to.
-  EXPECT_EQ(leftOut(traced({.stood = {Stood{}}}).is_edge), 6);
+  EXPECT_EQ(leftOut(traced({.stood = {Stood{}}}).is_edge), 8);
 }
 
-TEST(TracedEdges, LeaveOutOnePixelWhereTheLightSaysWhereTheCameraStands) {
-  EXPECT_EQ(leftOut(traced({.stood = kAsTheLightSays}).is_edge), 2);
+/// Light that says how far away a wall is, and how it lies, does not say where along it the camera stands: four times
+/// 366 × 1 mm / 2 m are 0.73 pixels; of 420 pixels 1.7 where poses err by 2 mm, and no more where they seem to err by 9 mm.
+TEST(TracedEdges, LeaveOutWhatLightDoesNotSayOfThePose) {
+  EXPECT_EQ(leftOut(traced({.stood = kAsTheLightSays}).is_edge), 4);
+  EXPECT_EQ(leftOut(traced({.focal_px = 200.0, .stood = kAsTheLightSays}).is_edge), 2);
+  for (const double ahead : {2.0, 9.0})
+    EXPECT_EQ(leftOut(traced({.focal_px = 420.0, .stood = {Stood{0.0, 0.0, ahead, 0.0, 0.0}}}).is_edge), 6) << ahead;
 }
 
 TEST(TracedEdges, AreNoWiderForTheLightsNoise) { EXPECT_EQ(leftOut(traced({}).is_jump), 2); }
@@ -99,13 +104,12 @@ TEST(TracedEdges, ASlantedWallHasNone) {
 
 /// Three deviations would leave three of nine pixels, of the seven that are beside no edge; two leave five.
 TEST(TracedEdges, LeaveHalfOfWhatIsBesideNoEdge) {
-  const TracedCapture told = traced({.scene = stripes()}),
-                      found = traced({.scene = stripes(), .stood = kAsTheLightSays});
-  const auto kept = [](const TracedCapture& one) {
-    return static_cast<double>(std::ranges::count(one.is_edge.pixels(), 0));
+  const TracedCapture told = traced({.scene = stripes()});
+  const auto kept = [](const Image<std::uint8_t>& edges) {
+    return static_cast<double>(std::ranges::count(edges.pixels(), 0));
   };
-  EXPECT_LT(kept(told), kept(found));
-  EXPECT_GE(kept(told), 0.5 * kept(found));
+  EXPECT_LT(kept(told.is_edge), kept(told.is_jump));
+  EXPECT_GE(kept(told.is_edge), 0.5 * kept(told.is_jump));
 }
 
 }  // namespace

@@ -141,6 +141,10 @@ inline constexpr float kGross_m = 0.3F;
 
 inline constexpr double kPosePrior_m = 1e-3, kPosePrior_deg = 0.1, kGainPrior = 0.01;
 
+/// The light of captures, one for each.
+using Lights = std::vector<std::shared_ptr<const sim::Light>>;
+Lights lightsOf(const std::vector<std::shared_ptr<const TracedCapture>>& traced);
+
 /// Captures with light of their scenes, traced twice.
 struct Lit {
   const std::vector<MeasuredCapture>& captures;
@@ -149,7 +153,7 @@ struct Lit {
   /// Light of other paths, on which effects are varied. An effect that smooths an image also smooths
   /// what its light has by chance: varied on the light that is compared, it would seem to explain
   /// the difference.
-  const std::vector<std::shared_ptr<const TracedCapture>>& varied;
+  const Lights& varied;
 };
 
 /// Traces each capture's scene at its pose, or `stood` off it. Captures of one scene and place
@@ -162,8 +166,8 @@ Result<std::vector<std::shared_ptr<const TracedCapture>>> traceAll(
 
 /// The same light where it was traced, along other paths: what effects are varied on. Pixels beside edges change within
 /// a fraction of a pixel, and what an effect does to them with it.
-Result<std::vector<std::shared_ptr<const TracedCapture>>> traceBeside(
-    const Declared& declared, const std::vector<MeasuredCapture>& captures,
-    const std::vector<std::shared_ptr<const TracedCapture>>& traced, const TraceOptions& options);
+Lights traceBeside(const Declared& declared, const std::vector<MeasuredCapture>& captures,
+                   const std::vector<std::shared_ptr<const TracedCapture>>& traced, const TraceOptions& options,
+                   const std::function<void(double)>& tell = {});
 
 }  // namespace toftwin::discover

@@ -103,7 +103,7 @@ constexpr std::array kKnownCovariates{
 
 }  // namespace
 
-CaptureCovariates covariatesOf(const MeasuredCapture& capture, const TracedCapture& traced,
+CaptureCovariates covariatesOf(const MeasuredCapture& capture, const sim::Light& light,
                                const Reading& declared, const CameraInfo& camera,
                                const Cells& cells) {
   CovariateGatherer gatherer{cells};
@@ -112,7 +112,7 @@ CaptureCovariates covariatesOf(const MeasuredCapture& capture, const TracedCaptu
   Image<float> amplitude = declared.log_amplitude;
   for (float& value : amplitude.pixels()) value = std::exp(value);
   gatherer.add("amplitude_e", amplitude);
-  addPlaces(camera, traced.light.truth, gatherer);
+  addPlaces(camera, light.truth, gatherer);
   addSurroundings(amplitude, gatherer);
   return gatherer.finish();
 }

@@ -11,7 +11,7 @@ namespace toftwin::discover {
 
 /// What an error of a camera can go with, for each cell of a capture; of the declared simulation,
 /// not of what was measured, whose noise would otherwise stand on both sides.
-CaptureCovariates covariatesOf(const MeasuredCapture& capture, const TracedCapture& traced,
+CaptureCovariates covariatesOf(const MeasuredCapture& capture, const sim::Light& light,
                                const Reading& declared, const CameraInfo& camera,
                                const Cells& cells);
 

@@ -152,9 +152,8 @@ Result<> judgeLocked(const CampaignJob& job, const Campaign& campaign, const Jud
   takeUnitOff(declared.unit_percent, *captures);
   const auto traced = traceWhereTheyStood(declared, models.after.effects, *captures, *at_poses, options);
   if (!traced) return traced.error();
-  const auto varied = traceBeside(declared, *captures, *traced, options);
-  if (!varied) return varied.error();
-  const Lit lit{*captures, *traced, *varied};
+  const Lights varied = traceBeside(declared, *captures, *traced, options);
+  const Lit lit{*captures, *traced, varied};
   const JudgedCampaign locked{declared, lit, finding.finding.scales};
   auto judgement = judge(locked, searched, models);
   if (!judgement) return judgement.error();
@@ -297,7 +296,7 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
   if (!unit) return unit.error();
   declared.unit_percent = *unit;
   takeUnitOff(*unit, campaign->captures);
-  const auto late = delayThatFits({declared, {campaign->captures, *at_poses, *at_poses}, {}});
+  const auto late = delayThatFits({declared, {campaign->captures, *at_poses, lightsOf(*at_poses)}, {}});
   if (!late) return late.error();
   declared.delay_mm = *late;
   // What single frames tell, means over frames need not guess.

@@ -83,7 +83,7 @@ Result<Judgement> judge(const JudgedCampaign& judged, const JudgedCampaign& open
   for (std::size_t c = 0; c < judged.lit.captures.size(); ++c) {
     const MeasuredCapture& capture = judged.lit.captures[c];
     const TracedCapture& traced = *judged.lit.traced[c];
-    const sim::Light& varied = judged.lit.varied[c]->light;
+    const sim::Light& varied = *judged.lit.varied[c];
     const auto errors = [&](const NoiselessCamera& camera, double offset_mm) {
       return errorsOf(capture, traced,
                       readingOf(*camera_before, camera, capture, traced.light, varied), offset_mm);

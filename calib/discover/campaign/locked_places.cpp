@@ -72,7 +72,8 @@ Result<std::vector<StoodOff>> lockedOff(const JudgedCampaign& locked, const Judg
 Result<Judgement> judgeWithout(const std::vector<StoodOff>& off, const JudgedCampaign& locked,
                                const JudgedCampaign& open, const JudgedModels& models) {
   std::vector<MeasuredCapture> captures;
-  std::vector<std::shared_ptr<const TracedCapture>> traced, varied;
+  std::vector<std::shared_ptr<const TracedCapture>> traced;
+  Lights varied;
   for (std::size_t c = 0; c < locked.lit.captures.size(); ++c) {
     const bool is_off = std::ranges::any_of(
         off, [c](const StoodOff& one) { return std::ranges::find(one.captures, c) != one.captures.end(); });

@@ -117,13 +117,13 @@ RawWitness::RawWitness(const JudgedCampaign& judged, NoiselessCamera declared)
   sim::inParallel(static_cast<int>(lit.captures.size()), 1, [&](int first, int last) {
     for (auto c = static_cast<std::size_t>(first); c < static_cast<std::size_t>(last); ++c)
       declared_raw_[c] = {declared_.readRaw(lit.captures[c], lit.traced[c]->light),
-                          declared_.readRaw(lit.captures[c], lit.varied[c]->light)};
+                          declared_.readRaw(lit.captures[c], *lit.varied[c])};
   });
 }
 
 RawWitness::Simulated RawWitness::simulated(std::size_t c, const NoiselessCamera& camera) const {
   return {declared_raw_[c].traced, declared_raw_[c].varied,
-          camera.readRaw(judged_->lit.captures[c], judged_->lit.varied[c]->light)};
+          camera.readRaw(judged_->lit.captures[c], *judged_->lit.varied[c])};
 }
 
 /// Of what is left of a capture's waves, as WhitenedCapture wants it: a simulation whose range is off the measured one
@@ -172,7 +172,7 @@ Result<RawWitness::Left> RawWitness::leftBy(const std::vector<sim::AnyEffect>& e
     for (auto c = static_cast<std::size_t>(first); c < static_cast<std::size_t>(last); ++c) {
       const MeasuredCapture& capture = lit.captures[c];
       const TracedCapture& traced = *lit.traced[c];
-      const sim::Light& varied = lit.varied[c]->light;
+      const sim::Light& varied = *lit.varied[c];
       const Simulated raw = simulated(c, *here);
       const Cells cells{capture, traced, declared_.read(capture, traced.light), judged_->most_cells};
       WhitenedCapture whitened{cells, kCommon};
@@ -270,7 +270,7 @@ Result<std::vector<std::optional<Difference>>> RawWitness::sharesBeforeDecoding(
     for (auto c = static_cast<std::size_t>(first); c < static_cast<std::size_t>(last); ++c) {
       const MeasuredCapture& capture = lit.captures[c];
       const TracedCapture& traced = *lit.traced[c];
-      const sim::Light& varied = lit.varied[c]->light;
+      const sim::Light& varied = *lit.varied[c];
       const Cells cells{capture, traced, declared_.read(capture, traced.light), judged_->most_cells};
       WhitenedCapture whitened{cells, kCommon + with.size()};
       whitened.putCommon(cells, traced);

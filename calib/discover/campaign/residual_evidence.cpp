@@ -33,7 +33,7 @@ Result<bool> isDelayNoOffset(const JudgedCampaign& judged, const std::vector<sim
   const std::size_t stride = 1 + judged.lit.captures.size() / kSome;
   for (std::size_t c = 0; c < judged.lit.captures.size(); c += stride) {
     const MeasuredCapture& capture = judged.lit.captures[c];
-    const sim::Light& light = judged.lit.varied[c]->light;
+    const sim::Light& light = *judged.lit.varied[c];
     const Reading before = here->read(capture, light);
     Reading change = late->read(capture, light);
     for (std::size_t i = 0; i < change.range_m.size(); ++i) change.range_m[i] -= before.range_m[i];
@@ -68,7 +68,7 @@ Result<Evidence> residualEvidence(const JudgedCampaign& judged, const std::vecto
       whitened.putCommon(cells, traced);
       if (tiles) tiles->put(cells, capture, kCommon, whitened.columns);
       whitened.putResidual(cells, capture, traced,
-                           readingOf(*declared, *here, capture, traced.light, lit.varied[c]->light));
+                           readingOf(*declared, *here, capture, traced.light, *lit.varied[c]));
       evidence.captures[c] = whitened.evidence(capture.record.name, capture.record.block);
     }
   });
@@ -116,7 +116,8 @@ Result<std::vector<std::shared_ptr<const TracedCapture>>> traceWhereTheyStood(
     const std::vector<MeasuredCapture>& captures,
     const std::vector<std::shared_ptr<const TracedCapture>>& traced, const TraceOptions& options,
     const std::function<void(double)>& tell) {
-  const Lit lit{captures, traced, traced};
+  const Lights lights = lightsOf(traced);
+  const Lit lit{captures, traced, lights};
   const auto evidence = residualEvidence({declared, lit, {}}, effects);
   if (!evidence) return evidence.error();
   const std::vector<Place> places = placesBy(*evidence, {});

@@ -250,7 +250,7 @@ double exposureUsOf(const MeasuredCapture& capture) {
 
 void CampaignRows::fillFixed(std::size_t c, const Reading& declared, Fixed& fixed) const {
   const MeasuredCapture& capture = lit_->captures[c];
-  const TracedCapture& varied = *lit_->varied[c];
+  const sim::Light& varied = *lit_->varied[c];
   fixed.name = capture.record.name, fixed.block = capture.record.block;
   fixed.cells = Cells{capture, *lit_->traced[c], declared};
   fixed.covariates =
@@ -270,7 +270,7 @@ CampaignRows::PerChannel CampaignRows::Fixed::whitened(const Reading& change) co
 }
 
 Reading CampaignRows::read(const NoiselessCamera& camera, std::size_t c, bool acts_on_light) const {
-  return acts_on_light ? camera.read(lit_->captures[c], lit_->varied[c]->light)
+  return acts_on_light ? camera.read(lit_->captures[c], *lit_->varied[c])
                        : camera.read(lit_->captures[c], rows_[c].fixed->collected);
 }
 
@@ -284,7 +284,7 @@ Result<CampaignRows> CampaignRows::make(const Declared& declared, const Lit& lit
   const auto camera = NoiselessCamera::make(declared.model, effects, lit.captures);
   if (!camera) return camera.error();
   const auto baseOf = [&](std::size_t c) {
-    const sim::Light& light = lit.varied[c]->light;
+    const sim::Light& light = *lit.varied[c];
     sim::Samples collected = camera->collect(lit.captures[c], light);
     Reading reading = camera->read(lit.captures[c], collected);
     return Base{lit.captures[c], light, std::move(collected), std::move(reading)};

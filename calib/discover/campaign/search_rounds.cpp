@@ -196,12 +196,15 @@ Result<std::unique_ptr<Round>> search(const Declared& file, const OpenCaptures& 
                                       const std::function<void(double)>& tell) {
   auto round = std::make_unique<Round>(Round{before != nullptr ? endOf(*before) : file});
   begin();
-  auto traced = tracedFor(*round, file, open, before, tell);
+  const auto half = [&](double begun) {
+    return [&tell, begun](double share) {
+      if (tell) tell(0.5 * (begun + share));
+    };
+  };
+  auto traced = tracedFor(*round, file, open, before, half(0.0));
   if (!traced) return traced.error();
   round->traced = *std::move(traced);
-  auto varied = traceBeside(round->declared, open.captures, round->traced, open.trace);
-  if (!varied) return varied.error();
-  round->varied = *std::move(varied);
+  round->varied = traceBeside(round->declared, open.captures, round->traced, open.trace, half(1.0));
   begin();
   auto rows = CampaignRows::make(round->declared, {open.captures, round->traced, round->varied},
                                  {.left_out = open.left_out});

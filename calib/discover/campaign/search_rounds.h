@@ -30,7 +30,7 @@ struct OpenCaptures {
 struct Round {
   Declared declared;  ///< the camera file's numbers, or where the round before left those that were wrong
   std::vector<std::shared_ptr<const TracedCapture>> traced{};  ///< where the cameras then stood
-  std::vector<std::shared_ptr<const TracedCapture>> varied{};  ///< there, along other paths: what effects are tried on
+  Lights varied{};  ///< there, along other paths: what effects are tried on
   std::optional<CampaignRows> rows{};
   Finding finding{};
   std::vector<FoundEffect> effects{};

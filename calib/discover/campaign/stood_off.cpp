@@ -201,7 +201,7 @@ Result<SearchOf> searchBesideBumped(const Declared& file, const OpenCaptures& op
   Declared otherwise = file;
   otherwise.delay_mm = 0.0;
   const auto late =
-      delayThatFits({otherwise, {some.without->captures, some.without->at_poses, some.without->at_poses}, {}});
+      delayThatFits({otherwise, {some.without->captures, some.without->at_poses, lightsOf(some.without->at_poses)}, {}});
   if (!late) return late.error();
   otherwise.delay_mm = *late;
   const OpenCaptures others{some.without->captures, some.without->at_poses, open.trace,        open.finder,

@@ -21,11 +21,12 @@ namespace {
 /// light, since what is the same in all of them does not average out.
 constexpr double kQuieter = 0.3;
 
+constexpr double kTurnPrior = kPosePrior_deg * std::numbers::pi / 180.0;
+
 /// Where the camera is if it stands that much off.
 Transform<World, Camera> movedBy(const Transform<World, Camera>& world_from_camera, const Stood& stood) {
-  constexpr double kTurn = kPosePrior_deg * std::numbers::pi / 180.0;
-  Transform<Camera, Camera> by = rotation<Camera, Camera>({1.0, 0.0, 0.0}, kTurn * stood[3]) *
-                                 rotation<Camera, Camera>({0.0, 1.0, 0.0}, kTurn * stood[4]);
+  Transform<Camera, Camera> by = rotation<Camera, Camera>({1.0, 0.0, 0.0}, kTurnPrior * stood[3]) *
+                                 rotation<Camera, Camera>({0.0, 1.0, 0.0}, kTurnPrior * stood[4]);
   by.translation_m = kPosePrior_m * Vec3d{stood[0], stood[1], stood[2]};
   return world_from_camera * by;
 }
@@ -84,18 +85,40 @@ Image<std::uint8_t> jumpsOf(const sim::Truth& truth) {
   return jumps;
 }
 
-/// Pixels that a jump may reach where the camera stands so many prior deviations off: by how far those turn the image,
-/// and move it at the jump's range.
+/// What is not known of where a camera stands, one standard deviation of it.
+struct PoseDoubt {
+  double turn = 0.0;     ///< radians
+  double shift_m = 0.0;  ///< across the view
+};
+
+/// Of a camera that stands where it was told to, all. Where the light said it, how it is turned is known, but of a wall
+/// light says nothing when the camera moves along it: that is as large as what the light tells of the other ways is, at
+/// most twice as large as poses are taken to err. More is rather an effect that looks like a pose, seen beside edges, too.
+PoseDoubt doubtOf(const std::vector<Stood>& stood, const Stood& here) {
+  constexpr double kMost = 2.0;
+  if (here == Stood{}) return {kTurnPrior, kPosePrior_m};
+  double largest = 1.0;
+  for (std::size_t way = 0; way < here.size(); ++way) {
+    double squares = 0.0;
+    for (const Stood& one : stood) squares += one[way] * one[way];
+    largest = std::max(largest, std::sqrt(squares / static_cast<double>(stood.size())));
+  }
+  return {0.0, std::min(largest, kMost) * kPosePrior_m};
+}
+
+/// Pixels that a jump may reach where the camera stands so many deviations off: by how far those turn the image, and
+/// move it at the jump's range. A jump lies between the middles of its two pixels, half a pixel or more from the next one's
+/// border: so rounding is right.
 Image<std::uint8_t> reachedBy(const Image<std::uint8_t>& jumps, const sim::Truth& truth, const CameraInfo& camera,
-                              double deviations) {
-  constexpr double kTurn = kPosePrior_deg * std::numbers::pi / 180.0;
+                              const PoseDoubt& doubt, double deviations) {
   const double focal_px = std::max(camera.fx, camera.fy);
   Image<std::uint8_t> reached = jumps;
   for (int y = 0; y < jumps.height(); ++y) {
     for (int x = 0; x < jumps.width(); ++x) {
       if (jumps(x, y) == 0) continue;
       const auto range_m = static_cast<double>(truth.range_m(x, y));
-      const double shift_px = focal_px * (range_m > 0.0 ? std::hypot(kTurn, kPosePrior_m / range_m) : kTurn);
+      const double shift_px =
+          focal_px * (range_m > 0.0 ? std::hypot(doubt.turn, doubt.shift_m / range_m) : doubt.turn);
       const auto reach = static_cast<int>(std::lround(std::min(deviations * shift_px, 100.0)));
       for (int v = std::max(0, y - reach); v <= std::min(jumps.height() - 1, y + reach); ++v)
         for (int u = std::max(0, x - reach); u <= std::min(jumps.width() - 1, x + reach); ++u) reached(u, v) = 1;
@@ -104,17 +127,16 @@ Image<std::uint8_t> reachedBy(const Image<std::uint8_t>& jumps, const sim::Truth
   return reached;
 }
 
-/// There a pose that is a little off changes a pixel by more than its derivative says: at jumps, where the camera
-/// stands as the light says; where it is told to stand, within three deviations of poses of them. Less where that
-/// leaves too little of the image, as of a fine chequerboard.
-Image<std::uint8_t> edgesOf(const TracedCapture& traced, const CameraInfo& camera, bool is_as_told) {
+/// There a pose that is a little off changes a pixel by more than its derivative says: within four deviations of what is
+/// not known of the pose (one capture in 16,000 is farther off; of three one in 370, and a campaign has a hundred). Less
+/// where that leaves too little of the image, as of a fine chequerboard.
+Image<std::uint8_t> edgesOf(const TracedCapture& traced, const CameraInfo& camera, const PoseDoubt& doubt) {
   constexpr double kEnough = 0.5;
   const auto left = [](const Image<std::uint8_t>& edges) {
     return static_cast<double>(std::ranges::count(edges.pixels(), 0));
   };
-  for (const double deviations : {3.0, 2.0, 1.0}) {
-    if (!is_as_told) break;
-    Image<std::uint8_t> edges = reachedBy(traced.is_jump, traced.light.truth, camera, deviations);
+  for (const double deviations : {4.0, 3.0, 2.0, 1.0}) {
+    Image<std::uint8_t> edges = reachedBy(traced.is_jump, traced.light.truth, camera, doubt, deviations);
     if (left(edges) >= kEnough * left(traced.is_jump)) return edges;
   }
   return traced.is_jump;
@@ -178,38 +200,40 @@ std::vector<Site> sitesOf(const std::vector<MeasuredCapture>& captures, bool eac
   return sites;
 }
 
+/// What is traced of the site of this number, with the camera `stood` off its pose.
+sim::TraceRequest requestFor(const Declared& declared, const std::vector<MeasuredCapture>& captures, const Site& site,
+                             std::size_t number, const Stood& stood, const TraceOptions& options) {
+  constexpr std::uint64_t kGolden = 0x9e3779b97f4a7c15U;  // 2⁶⁴ / golden ratio
+  sim::TraceRequest request = declared.model.traceRequest();
+  request.world_from_camera = movedBy(*captures[site.first].moment.world_from_camera, stood);
+  request.sampler = sim::Sampler::Even;  // what tiles share would look like a pattern of the camera
+  request.samples_per_pixel = options.samples_per_pixel;
+  request.max_surfaces = options.max_surfaces;
+  request.pixel_extent = options.pixel_extent;
+  request.seed = options.seed + (number + 1) * kGolden;
+  // Of gates the tracer knows no range, nor how well: they get all samples.
+  if (std::isfinite(site.noise_m) && !request.frequencies.empty())
+    request.wanted_noise =
+        std::max(kQuieter * site.noise_m / std::sqrt(static_cast<double>(site.captures.size())), 1e-6) * metre;
+  return request;
+}
+
 }  // namespace
 
 Result<std::vector<std::shared_ptr<const TracedCapture>>> traceAll(
     const Declared& declared, const std::vector<MeasuredCapture>& captures,
     const TraceOptions& options, const std::function<void(double)>& tell,
     const std::vector<Stood>& stood) {
-  constexpr std::uint64_t kGolden = 0x9e3779b97f4a7c15U;  // 2⁶⁴ / golden ratio
   std::vector<std::shared_ptr<const TracedCapture>> all(captures.size());
   const std::vector<Site> sites = sitesOf(captures, !stood.empty());
   for (std::size_t s = 0; s < sites.size(); ++s) {
-    const MeasuredCapture& capture = captures[sites[s].first];
-    const sim::Scene& scene = declared.sceneOf(capture.record.block);
-    sim::TraceRequest request = declared.model.traceRequest();
-    const Stood here = stood.empty() ? Stood{} : stood[sites[s].first];
-    request.world_from_camera = movedBy(*capture.moment.world_from_camera, here);
-    request.sampler =
-        sim::Sampler::Even;  // what tiles share would look like a pattern of the camera
-    request.samples_per_pixel = options.samples_per_pixel;
-    request.max_surfaces = options.max_surfaces;
-    request.pixel_extent = options.pixel_extent;
-    request.seed = options.seed + (s + 1) * kGolden;
-    // Of gates the tracer knows no range, nor how well: they get all samples.
-    if (std::isfinite(sites[s].noise_m) && !request.frequencies.empty())
-      request.wanted_noise = std::max(kQuieter * sites[s].noise_m /
-                                          std::sqrt(static_cast<double>(sites[s].captures.size())),
-                                      1e-6) *
-                             metre;
+    const sim::Scene& scene = declared.sceneOf(captures[sites[s].first].record.block);
     auto traced = std::make_shared<TracedCapture>();
-    traced->stood = here;
+    if (!stood.empty()) traced->stood = stood[sites[s].first];
+    const sim::TraceRequest request = requestFor(declared, captures, sites[s], s, traced->stood, options);
     traced->light = sim::trace(scene, request);
     traced->is_jump = jumpsOf(traced->light.truth);
-    traced->is_edge = edgesOf(*traced, request.camera, here == Stood{});
+    traced->is_edge = edgesOf(*traced, request.camera, doubtOf(stood, traced->stood));
     addTracingNoise(*traced);
     addMoves(scene, request, *traced);
     for (const std::size_t c : sites[s].captures) all[c] = traced;
@@ -218,14 +242,26 @@ Result<std::vector<std::shared_ptr<const TracedCapture>>> traceAll(
   return all;
 }
 
-Result<std::vector<std::shared_ptr<const TracedCapture>>> traceBeside(
-    const Declared& declared, const std::vector<MeasuredCapture>& captures,
-    const std::vector<std::shared_ptr<const TracedCapture>>& traced, const TraceOptions& options) {
-  std::vector<Stood> stood;
-  for (const auto& one : traced) stood.push_back(one->stood);
+Lights traceBeside(const Declared& declared, const std::vector<MeasuredCapture>& captures,
+                   const std::vector<std::shared_ptr<const TracedCapture>>& traced, const TraceOptions& options,
+                   const std::function<void(double)>& tell) {
   TraceOptions others = options;
   others.seed += 0x3c6ef372U;
-  return traceAll(declared, captures, others, {}, stood);
+  Lights lights;
+  const std::vector<Site> sites = sitesOf(captures, true);
+  for (std::size_t c = 0; c < captures.size(); ++c) {
+    const sim::TraceRequest request = requestFor(declared, captures, sites[c], c, traced[c]->stood, others);
+    lights.push_back(
+        std::make_shared<sim::Light>(sim::trace(declared.sceneOf(captures[c].record.block), request)));
+    if (tell) tell(static_cast<double>(c + 1) / static_cast<double>(captures.size()));
+  }
+  return lights;
+}
+
+Lights lightsOf(const std::vector<std::shared_ptr<const TracedCapture>>& traced) {
+  Lights lights;
+  for (const auto& one : traced) lights.emplace_back(one, &one->light);
+  return lights;
 }
 
 }  // namespace toftwin::discover
