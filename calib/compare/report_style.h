@@ -71,7 +71,8 @@ table{width:max-content}caption span{max-width:calc(100vw - 26px)}
 th,td:not([colspan]),td:first-child:not(.number):not([colspan]){padding:5px 8px;min-width:0;max-width:13em}
 th:first-child,td:first-child:not([colspan]){position:sticky;left:0;background:var(--panel);max-width:9em;overflow-wrap:anywhere}
 td:nth-child(2):not(.number):not([colspan]){min-width:5em}.below td{max-width:0}}
-.cloud canvas{display:block;width:100%;height:420px;touch-action:none;cursor:grab}.cloud .hint,.cloud input{display:none}
+/* A cloud keeps its shape on paper, where it was drawn for the screen's box. */
+.cloud canvas{display:block;width:100%;height:420px;object-fit:contain;touch-action:none;cursor:grab}.cloud .hint,.cloud input{display:none}
 .cloud.turns .hint{display:inline;color:var(--soft)}.cloud.turns input{display:inline}.inkA{color:var(--measured)}.inkB{color:var(--simulated)}
 @media print{caption span{max-width:none}nav,.cloud .hint,.cloud input{display:none!important}
 body{background:#fff;font-size:10pt}main{max-width:none;padding:0}

@@ -73,6 +73,16 @@ TEST_F(Browser, TurnsThePointCloudsAndPrintsThePage) {
   EXPECT_GT(fs::file_size(folder_ / "page.pdf"), 10'000U);
 }
 
+/// Printed, the canvas has another shape than the one that it was drawn for: a room was 1.7 times as wide.
+TEST_F(Browser, KeepsThePointCloudsShapeWhereItsBoxChanges) {
+  Report report{.title = "A page", .subtitle = "of a test", .verdict = "fine"};
+  report.sections.push_back({.id = "one", .title = "One", .blocks = {walls()}});
+  ASSERT_TRUE(write(report, folder_));
+  std::ofstream{folder_ / "index.html", std::ios::app}
+      << "<script>document.title = `shape ${getComputedStyle(document.querySelector('canvas')).objectFit}`;</script>";
+  EXPECT_THAT(chromium("--window-size=900,900 --dump-dom"), HasSubstr("<title>shape contain</title>"));
+}
+
 /// A plot with what is left below it was 1200 pixels high on a page 1500 wide.
 TEST_F(Browser, ShowsAPlotThatStandsAloneAtOneGlance) {
   Plot plot{.title = "A plot", .x_label = "x", .y_label = "y"};
