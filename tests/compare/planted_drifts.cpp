@@ -37,6 +37,14 @@ Planted drift(std::string name, Truth truth, std::function<double(double)> f) {
           }};
 }
 
+/// The standard plan's block of warming up: fourteen captures from two minutes after power-on.
+Planted ofThePlan(const char* of, double sigma, std::function<double(double)> f) {
+  return {fmt::format("drift, 14 captures, {}", of), {{"drift", f(1095.0) - f(120.0)}}, [=](Noise& noise) {
+            const Columns t = evenly(120.0, 1095.0, 14);
+            return traitsOf(driftTraits(t, noisy(t, sigma, noise, f)));
+          }};
+}
+
 }  // namespace
 
 std::vector<Planted> plantedDrifts() {
@@ -61,6 +69,11 @@ std::vector<Planted> plantedDrifts() {
          }
          return traitsOf(driftTraits(t, y));
        }});
+  // The stand-in's and the Kinect v2's warming up.
+  rows.push_back(ofThePlan("60 and 600 s", 0.02,
+                           [](double t) { return -4.0 * std::exp(-t / 60.0) - 4.0 * std::exp(-t / 600.0); }));
+  rows.push_back(ofThePlan("200 and 400 s", 0.05,
+                           [](double t) { return 4.47 * std::exp(-t / 200.0) - 8.94 * std::exp(-t / 400.0); }));
   return rows;
 }
 

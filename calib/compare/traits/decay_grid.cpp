@@ -10,7 +10,7 @@ namespace toftwin::compare {
 
 double decay(double t, double log_tau) { return std::exp(-t / std::exp(log_tau)); }
 
-double shortestDecay(Column t) { return t[1] - t[0]; }
+double shortestDecay(Column t) { return 0.5 * (t[1] - t[0]); }
 
 DecayGrid::DecayGrid(Column t, Column y) {
   constexpr double kRatio = 1.25;

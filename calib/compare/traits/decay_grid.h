@@ -11,8 +11,8 @@ namespace toftwin::compare {
 /// e^(−t/τ), by ln τ.
 double decay(double t, double log_tau);
 
-/// Time constants that rows can show: from the first two rows' interval to twenty times the series. Times are
-/// relative to the series' length.
+/// Time constants that rows can show: from half the first two rows' interval, of which e⁻² is left at the second, to
+/// twenty times the series. Times are relative to the series' length.
 double shortestDecay(Column t);
 constexpr double kLongestDecay = 20.0;
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <boost/math/distributions/chi_squared.hpp>
+#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <limits>
 
@@ -196,12 +197,20 @@ std::vector<double> leftBy(const Model& model, const Fit& fit, Column y) {
 constexpr std::size_t kModels = 6;
 using Candidates = std::array<Candidate, kModels>;
 
+/// A model that was fitted, one that was not chosen, too.
+struct Tried {
+  const Candidate* model = nullptr;
+  Fit fit{};
+  double bic = 0.0;
+};
+
 /// The series, and which model it follows.
 struct Chosen {
   std::vector<double> y{};  ///< over each row's σ
   const Candidate* model = nullptr;
   Fit fit{};
   double rho = 0.0;  ///< by which errors go on
+  std::vector<Tried> all{};
 };
 
 /// The least BIC.
@@ -212,13 +221,15 @@ std::optional<Chosen> chosenOf(const Candidates& candidates, Column t, std::vect
   Chosen best{.rho = rho};
   for (const Candidate& candidate : candidates) {
     auto tried = fitOf(candidate, t, y);
-    if (!tried || !isPlausible(candidate, *tried, t)) continue;
+    if (!tried) continue;
     const double bic =
         effective * std::log(std::max(tried->squares, 1e-18 * n) / n) + candidate.cost * std::log(effective);
-    if (bic >= least) continue;
-    least = bic;
-    best.model = &candidate;
-    best.fit = std::move(*tried);
+    if (isPlausible(candidate, *tried, t) && bic < least) {
+      least = bic;
+      best.model = &candidate;
+      best.fit = *tried;
+    }
+    best.all.push_back({&candidate, std::move(*tried), bic});
   }
   if (best.model == nullptr) return std::nullopt;
   best.y = std::move(y);
@@ -242,6 +253,63 @@ std::optional<Chosen> chosenBySigma(Candidates& candidates, Column t, Column y) 
   }
   if (best && !best->model->sigma.empty()) tellErrorsByRows(best->fit, best->model->over(t), best->y);
   return best;
+}
+
+/// What changed between the first and the last row.
+Trait changeOf(const Shape& shape, const Fit& fit, Column t) {
+  return fit.trait("drift", "mm",
+                   [&](std::span<const double> p) { return shape(p, t.back()) - shape(p, t.front()); });
+}
+
+/// Few rows do not tell which model they follow, and each has another change over them. The interval is what holds
+/// Student's numbers of all models together with 95 %, each weighted by e^(−BIC/2) (A. E. Raftery, Sociol. Methodol. 25
+/// (1995) 111). That nothing changed is never exactly known: the constant counts as a ramp.
+void heedOtherModels(const Chosen& chosen, Column t, Trait& change) {
+  struct Told {
+    double weight = 0.0, value = 0.0, error = 0.0, degrees = 0.0;
+  };
+  double least = std::numeric_limits<double>::infinity(), of_constant = 0.0;
+  for (const Tried& one : chosen.all) least = std::min(least, one.bic);
+  std::vector<Told> all;
+  for (const Tried& one : chosen.all) {
+    const double weight = std::exp(-0.5 * (one.bic - least));
+    if (one.model->kind == DriftModel::Constant) of_constant = weight;
+    constexpr double kLittle = 1e-4;
+    if (one.model->kind == DriftModel::Constant || weight < kLittle) continue;
+    Fit fit = one.fit;
+    if (!one.model->sigma.empty()) tellErrorsByRows(fit, one.model->over(t), chosen.y);
+    fit.heedCorrelation(correlationOfResiduals(one.model->over(t), chosen.y, fit));
+    const Trait told = changeOf(one.model->shape, fit, t);
+    const double error = (told.high - told.value) / studentT(told.degrees);
+    if (std::isfinite(error) && error > 0.0) all.push_back({weight, told.value, error, told.degrees});
+    if (one.model->kind == DriftModel::Ramp && !all.empty()) all.back().weight += of_constant;
+  }
+  if (all.empty()) return;
+  const auto below = [&](double at) {
+    double held = 0.0, sum = 0.0;
+    for (const Told& one : all) {
+      const boost::math::students_t student{one.degrees};
+      held += one.weight * boost::math::cdf(student, (at - one.value) / one.error);
+      sum += one.weight;
+    }
+    return held / sum;
+  };
+  double from = change.low, to = change.high;
+  for (const Told& one : all) {
+    from = std::min(from, one.value - studentT(one.degrees) * one.error);
+    to = std::max(to, one.value + studentT(one.degrees) * one.error);
+  }
+  const auto quantile = [&](double share) {
+    double low = from, high = to;
+    constexpr int kHalvings = 40;
+    for (int i = 0; i < kHalvings; ++i) {
+      const double middle = 0.5 * (low + high);
+      (below(middle) < share ? low : high) = middle;
+    }
+    return high;
+  };
+  change.low = std::min(change.value, quantile(0.025));
+  change.high = std::max(change.value, quantile(0.975));
 }
 
 constexpr std::size_t kTenths = 10;
@@ -354,8 +422,8 @@ Result<DriftTraits> driftTraits(Column time_s, Column value_mm) {
   }
   fit.heedCorrelation(correlationOfResiduals(model->over(t), chosen->y, fit));
   const Shape& shape = model->shape;
-  result.traits.push_back(fit.trait(
-      "drift", "mm", [&](std::span<const double> p) { return shape(p, t.back()) - shape(p, t.front()); }));
+  result.traits.push_back(changeOf(shape, fit, t));
+  heedOtherModels(*chosen, t, result.traits.back());
   result.traits.back().refers_to = OverSpan{length};
   addDetails(result.model, fit, t, length, result.traits);
   if (is_another) {
