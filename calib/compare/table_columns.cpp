@@ -231,7 +231,13 @@ Result<TableColumns> loadTable(const TableJob& job) {
     const auto factor = factorOf(name, wanted[i]);
     if (!factor) return ofTable(job, factor.error());
     auto column = loadColumns(job.file, {name.in_file});
-    if (!column) return column.error();
+    if (!column) {
+      Error error = column.error();
+      const auto any = loadColumnIfAny(job.file, name.in_file);
+      if (const bool is_missing = any && !*any; is_missing && job.columns.empty())
+        error.message += fmt::format("; --columns says which of its own stand for {}", fmt::join(wanted, ", "));
+      return error;
+    }
     if (!*factor) {
       table.notes.push_back(fmt::format("column \"{}\" says no unit and is taken as {}", name.in_file,
                                         unitOf(wanted[i])->name));

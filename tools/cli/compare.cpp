@@ -126,9 +126,10 @@ Result<> checkLength(const std::string& name, std::uint64_t needed) {
   const auto& sources = reader->summary().frames_per_source;
   const auto found = hash == std::string::npos ? sources.begin() : sources.find(name.substr(hash + 1));
   if (found == sources.end() || found->second >= needed) return {};  // unknown: opening says so
+  const std::string& damage = reader->summary().damage;
   return Error{Error::Code::InvalidArgument,
-               fmt::format("{} has {} frames, but {} are needed: --frames at each pose; ask for fewer",
-                           name, found->second, needed)};
+               fmt::format("{} has {} frames, but {} are needed: --frames at each pose; ask for fewer{}{}", name,
+                           found->second, needed, damage.empty() ? "" : ". It is not whole: ", damage)};
 }
 
 /// Opens A and B, of which each frame of the one is awaited together with one of the other.
