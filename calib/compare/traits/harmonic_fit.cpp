@@ -231,6 +231,25 @@ VectorXd leftBy(const Fit& fit, const std::vector<std::vector<double>>& columns,
   return mapped(y) - matrixOf(columns) * mapped(fit.at);
 }
 
+/// A pose's turn makes a slope within a cluster, which is in the fit, and a bend, which is not: it passes for waves. One
+/// of less than what the poses are known to may be no camera's.
+void doubtWhatTurnsBend(std::span<const double> shared_mm, FittedTraits& fitted) {
+  double squares = 0.0;
+  for (const double one : shared_mm) squares += one * one;
+  if (!(squares > 0.0)) return;
+  const double known_mm = std::sqrt(squares / static_cast<double>(shared_mm.size()));
+  const auto doubt = [known_mm](Trait& one) {
+    if (one.value < known_mm && one.doubt.empty())
+      one.doubt = fmt::format(
+          "poses were seen, and known to {:.2g} mm at the wall (one standard error): their turns bend the rows of each "
+          "capture, and so small a wave may be that",
+          known_mm);
+  };
+  constexpr auto kNoWaves = 3;  // offset, scale, residual
+  for (auto one = fitted.traits.begin(); one != fitted.traits.end() - kNoWaves; ++one) doubt(*one);
+  if (fitted.together) doubt(*fitted.together);
+}
+
 /// Rows in clusters that share an error.
 Result<FittedTraits> fitClusters(Column distance_m, Column error_mm, const std::vector<Wave>& waves,
                                  const RowClusters& clusters) {
@@ -276,6 +295,7 @@ Result<FittedTraits> fitClusters(Column distance_m, Column error_mm, const std::
   if (clusters.are_turned) {
     fitted.curve = {};  // it says nothing of the rows as they are
     fitted.traits.back().doubt = "the poses' turns and the board itself bend the rows of each capture, too";
+    doubtWhatTurnsBend(clusters.shared_mm, fitted);
   }
   if (!is_sideways) return fitted;
   const Sideways of_all{distance_m, clusters.of};
