@@ -130,7 +130,8 @@ void summarise(const PoseComparison& all, ComparedCapture& one) {
 
 Result<> checkHash(const std::filesystem::path& run, const RecordedFile& file) {
   const auto hash = sha256Of(run / file.file);
-  if (!hash) return hash.error();
+  if (!hash)
+    return Error{hash.error().code, hash.error().message + "; the `toftwin measure` of this run captures it anew"};
   if (*hash == file.sha256) return {};
   return Error{Error::Code::Malformed,
                fmt::format("{}: is not the file that was captured (its SHA-256 is another one); `toftwin "

@@ -383,6 +383,14 @@ TEST_F(Judged, SaysWhichFileIsNotTheOneThatWasCaptured) {
   EXPECT_THAT(ran.err, HasSubstr("0002-b.mcap: is not the file that was captured"));
 }
 
+TEST_F(Judged, SaysThatAFileThatIsGoneIsCapturedAnew) {
+  const auto records = index("run");
+  std::filesystem::remove(folder_ / "run" / records.at(2).b.file);
+  const Ran ran = compare();
+  EXPECT_EQ(ran.status, 4);
+  EXPECT_THAT(ran.err, HasSubstr("0002-b.mcap: cannot be read; the `toftwin measure` of this run captures it anew"));
+}
+
 TEST_F(Judged, ComparesARunThatIsNotThroughAndSaysSo) {
   std::stringstream lines{bytesOf("run/index.jsonl")};
   std::string few;
