@@ -134,7 +134,10 @@ Result<SeenPose> byPlanes(const Plan& plan, std::span<const Frame> frames, Trans
     for (std::size_t p = 0; p < planes.size(); ++p) {
       const auto fitted = intrinsics::fitPlane(*range_m, frames.front().camera, pixels[p]);
       if (!fitted) {
-        why += fmt::format("; plane {}: {}", p + 1, fitted.error().message);
+        why += pixels[p].empty() ? fmt::format("; plane {}: no pixel and its neighbours read a range within {:.4g} mm of "
+                                               "where the plan has it (plane.within_mm)",
+                                               p + 1, plan.planes[p].within_mm)
+                                 : fmt::format("; plane {}: {}", p + 1, fitted.error().message);
         continue;
       }
       seen.push_back(*fitted), of.push_back(planes[p]), counted += fitted->pixels;

@@ -259,6 +259,13 @@ TEST_F(LookAround, PlanesTellThePose) {
   ASSERT_TRUE(taken) << taken.error().message;
   EXPECT_EQ(taken->pose_by, "planes");
   expectSeen(*taken, a_.stands, 0.003);
+  plan_.planes.front().point_m = {0.0, 0.0, 2.6};
+  taker_.emplace(plan_, options);
+  const auto elsewhere = take();
+  ASSERT_FALSE(elsewhere);
+  EXPECT_THAT(elsewhere.error().message,
+              testing::HasSubstr("plane 1: no pixel and its neighbours read a range within 100 mm of where the plan has "
+                                 "it (plane.within_mm)"));
 }
 
 /// The camera sits 80 mm beside the rig's point and is turned by 5°; the rig's own world is 0.1 m off the
