@@ -64,7 +64,7 @@ class RecordingFeed final : public Feed {
     const std::string& damage = reader_.summary().damage;
     std::string said;
     if (!damage.empty()) {
-      said = fmt::format("The recording of {} is damaged: {}. Only what can be read of it is compared.",
+      said = fmt::format("The recording of {} is damaged, or was not closed: {}. Only what can be read of it is compared.",
                          details_.entry.name, damage);
     }
     if (whole_.damaged == 0) return said;

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "calib/plan/covariates.h"
 
@@ -147,16 +148,24 @@ CovariateRow rowOf(const std::vector<Covariate>& all, std::size_t own) {
   return row;
 }
 
-/// Which blocks change that covariate within themselves.
-std::string blocksThatChange(const Plan& plan, const Schedule& schedule, const std::string& name) {
-  std::string names;
+/// Which blocks change a covariate within themselves, and in which of these another stays as it is.
+struct BlocksThatChange {
+  std::vector<std::string> all{}, alone{};
+};
+BlocksThatChange blocksThatChange(const Plan& plan, const Schedule& schedule, const std::string& name,
+                                  const std::string& other) {
+  BlocksThatChange blocks;
   for (std::size_t block = 0; block < plan.blocks.size(); ++block) {
-    for (const Covariate& one : covariatesOf(plan, schedule, ofBlock(schedule, block))) {
-      if (one.name != name || one.values.empty() || !changes(one)) continue;
-      names += fmt::format("{}\"{}\"", names.empty() ? "" : ", ", plan.blocks[block].name);
-    }
+    const auto covariates = covariatesOf(plan, schedule, ofBlock(schedule, block));
+    const auto isChanged = [&](const std::string& which) {
+      const auto found = std::ranges::find(covariates, which, &Covariate::name);
+      return found != covariates.end() && !found->values.empty() && changes(*found);
+    };
+    if (!isChanged(name)) continue;
+    blocks.all.push_back(fmt::format("\"{}\"", plan.blocks[block].name));
+    if (!isChanged(other)) blocks.alone.push_back(blocks.all.back());
   }
-  return names;
+  return blocks;
 }
 
 std::string mendOf(const Plan& plan, const Schedule& schedule, const CovariateRow& row, bool is_like_time) {
@@ -167,10 +176,13 @@ std::string mendOf(const Plan& plan, const Schedule& schedule, const CovariateRo
         "block after the other",
         row.name);
   }
-  const std::string blocks = blocksThatChange(plan, schedule, row.name);
-  return fmt::format(
-      "add a block that changes {} while {} stays as it is{}", row.name, row.closest,
-      blocks.empty() ? " (no block changes it within itself)" : fmt::format(" (it changes in {})", blocks));
+  const BlocksThatChange blocks = blocksThatChange(plan, schedule, row.name, row.closest);
+  if (blocks.alone.size() > 1)
+    return fmt::format("let {}, which change {} while {} stays as it is, cover the same values of it",
+                       fmt::join(blocks.alone, " and "), row.name, row.closest);
+  return fmt::format("add a block that changes {} while {} stays as it is{}", row.name, row.closest,
+                     blocks.all.empty() ? " (no block changes it within itself)"
+                                        : fmt::format(" (it changes in {})", fmt::join(blocks.all, ", ")));
 }
 
 void checkWhole(const Plan& plan, const Schedule& schedule, const Limits& limits, Check& result) {

@@ -136,7 +136,7 @@ Result<SeenPose> byPlanes(const Plan& plan, std::span<const Frame> frames, Trans
       if (!fitted) {
         why += pixels[p].empty() ? fmt::format("; plane {}: no pixel and its neighbours read a range within {:.4g} mm of "
                                                "where the plan has it (plane.within_mm)",
-                                               p + 1, plan.planes[p].within_mm)
+                                               p + 1, plan.planes[p].within.in(millimetre))
                                  : fmt::format("; plane {}: {}", p + 1, fitted.error().message);
         continue;
       }

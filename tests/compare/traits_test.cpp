@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <random>
 #include <numbers>
 
 #include "calib/compare/traits/least_squares.h"
@@ -185,6 +186,19 @@ TEST(Traits, CallAnErrorAtAnAmplitudeOfOneExtrapolated) {
   ASSERT_EQ(traits->size(), 2u);
   EXPECT_TRUE((*traits)[0].is_extrapolated);
   EXPECT_FALSE((*traits)[1].is_extrapolated);
+}
+
+/// A step between two places, noise of a fiftieth of it: one place on it tells neither where it is nor how wide. (Width:
+/// with noise of none it is told as too sharp.)
+TEST(Traits, AnEdgesWidthThatIsKnownToNoFactorOfTenIsNotTold) {
+  std::mt19937 random{5};
+  std::normal_distribution<double> noise{0.0, 0.02};
+  std::vector<double> x, value;
+  for (int i = 0; i < 24; ++i) x.push_back(i), value.push_back((i < 12 ? 0.0 : 1.0) + noise(random));
+  const auto traits = edgeTraits(x, value);
+  ASSERT_TRUE(traits) << traits.error().message;
+  ASSERT_EQ(traits->size(), 1u);
+  EXPECT_THAT((*traits)[0].doubt, HasSubstr("how wide the edge is the values do not tell"));
 }
 
 TEST(Traits, SayWhatRowsCannotTell) {

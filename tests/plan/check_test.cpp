@@ -90,6 +90,20 @@ TEST(Check, RefusesExposureThatGoesWithDistanceOverThePlan) {
   EXPECT_TRUE(mended.passes()) << refusals(mended);
 }
 
+/// Near by short and far away by long exposures: each block tells exposure from distance, but not the plan.
+TEST(Check, SaysThatBlocksShouldCoverTheSameValues) {
+  const auto block = [](const char* name, double distance_m, double exposure_us) {
+    return fmt::format("[[block]]\nname = '{}'\nkind = 'exposure'\ndistance_m = [{}]\nexposure_us = [{}, {}]\nrepeats = 4\n",
+                       name, distance_m, exposure_us, 1.01 * exposure_us);
+  };
+  const std::string all = "exposure_us = 100\n";
+  const Check refused = checkOf(all + block("near", 1.0, 100.0) + block("far", 3.0, 900.0));
+  EXPECT_THAT(refusals(refused), HasSubstr("let \"near\" and \"far\", which change exposure while distance stays as it is, "
+                                           "cover the same values of it"));
+  const Check mended = checkOf(all + block("near", 1.0, 100.0) + block("far", 3.0, 100.0));
+  EXPECT_TRUE(mended.passes()) << refusals(mended);
+}
+
 TEST(Check, RefusesDistanceThatGoesWithTimeOverThePlanThoughNotInABlock) {
   std::string toml;
   for (int i = 1; i <= 6; ++i) {

@@ -139,6 +139,11 @@ Traits edgeTraits(Column x_px, Column value) {
   if (!fit)
     return undetermined("edge", "there is no step, or it is sharper than the places of the values tell");
   const Trait log_width = fit->trait("width", "px", 3);
+  std::vector<Trait> traits{fit->trait("edge", "px", 2)};
+  if (!(log_width.high - log_width.low < 2.0 * std::numbers::ln10)) {
+    traits[0].doubt = "how wide the edge is the values do not tell, not by a factor of ten";
+    return traits;
+  }
   const auto scaled = [&](const char* name, const char* unit, double factor) {
     return Trait{name,
                  unit,
@@ -149,10 +154,11 @@ Traits edgeTraits(Column x_px, Column value) {
   };
   // Contrast of a Gaussian blur: e^(−2π² w² f²) = 1/2.
   const double half = std::sqrt(0.5 * std::numbers::ln2) / std::numbers::pi;
-  return std::vector{fit->trait("edge", "px", 2), scaled("width", "px", 1.0),
-                     scaled("10-90 width", "px", 2.5631031310892),
-                     Trait{"resolution", "1/px", half / std::exp(log_width.value),
-                           half / std::exp(log_width.high), half / std::exp(log_width.low), log_width.n}};
+  traits.push_back(scaled("width", "px", 1.0));
+  traits.push_back(scaled("10-90 width", "px", 2.5631031310892));
+  traits.push_back({"resolution", "1/px", half / std::exp(log_width.value), half / std::exp(log_width.high),
+                    half / std::exp(log_width.low), log_width.n});
+  return traits;
 }
 
 Traits shadowTraits(const Image<float>& range_m, double split_m) {
