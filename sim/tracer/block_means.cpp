@@ -122,10 +122,9 @@ void storeBlock(const Block& block, const Region& region, const BlockMeans& mean
 
 void countNoise(const Tracing& tracing, const BlockShape& shape, const BlockSums& sums,
                 const BlockMeans& means, NoiseCount& noise) {
-  const auto& turns = tracing.turns_per_metre;
-  const auto highest = static_cast<std::size_t>(std::ranges::max_element(turns) - turns.begin());
+  const std::size_t highest = tracing.highest();
   const std::size_t term = highest * static_cast<std::size_t>(tracing.request.harmonics);
-  const double per_radian = 1.0 / (4.0 * std::numbers::pi * turns[highest]);
+  const double per_radian = 1.0 / (4.0 * std::numbers::pi * tracing.turns_per_metre[highest]);
   constexpr double kAnything = std::numbers::pi * std::numbers::pi / 3.0;  // variance of an even phase
   for (std::size_t i = 0; i < static_cast<std::size_t>(shape.pixels()); ++i) {
     const double square = static_cast<double>(std::norm(means.phasors[term][i]));

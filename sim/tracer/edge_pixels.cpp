@@ -34,13 +34,6 @@ void traceDirect(const Tracing& tracing, Packet& packet, LaneSums& sums) {
   gatherDirectLight(tracing, packet, hits, 0, is_coherent, sums);
 }
 
-/// First harmonic of the highest frequency; terms.size() if there is none.
-std::size_t highestOf(const Tracing& tracing) {
-  const auto& turns = tracing.turns_per_metre;
-  return static_cast<std::size_t>(std::ranges::max_element(turns) - turns.begin()) *
-         static_cast<std::size_t>(tracing.request.harmonics);
-}
-
 /// What is seen at the top left corners of a block's pixels, in or beside the image.
 void seeCorners(const Tracing& tracing, int x, int y, LaneSums& sums, std::array<Seen, kLaneCount>& seen) {
   Block block;
@@ -57,7 +50,7 @@ void seeCorners(const Tracing& tracing, int x, int y, LaneSums& sums, std::array
   startInTheMiddle(tracing, own, packet);
   clearSums(sums);
   traceDirect(tracing, packet, sums);
-  const std::size_t term = highestOf(tracing);
+  const std::size_t term = tracing.highest() * static_cast<std::size_t>(tracing.request.harmonics);
   for (std::size_t i = 0; i < kLaneCount; ++i)
     seen[i] = {term < sums.re.size() ? std::complex{sums.re[term][i], sums.im[term][i]} : sums.steady[i],
                sums.steady[i]};

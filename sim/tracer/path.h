@@ -3,7 +3,9 @@
 
 #include <xmmintrin.h>
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -74,6 +76,11 @@ struct Tracing {
   std::vector<int> last_orders;  ///< by frequency
   TransientBins bins;                   ///< none but in transient.cpp
   PixelKey seed;
+
+  /// The number of the highest frequency, which decides over the range; 0 if there is none.
+  [[nodiscard]] std::size_t highest() const {
+    return static_cast<std::size_t>(std::ranges::max_element(turns_per_metre) - turns_per_metre.begin());
+  }
 };
 
 /// A block of neighbouring pixels whose paths are traced together, sixteen at a time: the more
