@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "calib/discover/campaign/before_search.h"
+#include "calib/discover/campaign/gather_capture.h"
 #include "calib/plan/opened.h"
 #include "protocol/record/recording.h"
 #include "tests/discover/searched.h"
@@ -18,7 +19,9 @@ namespace {
 
 using testing::AllOf;
 using testing::Contains;
+using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::IsEmpty;
 using testing::Not;
 
 class BeforeSearch : public Searched {
@@ -174,6 +177,34 @@ TEST_F(BeforeSearch, TheReportSaysWhoWroteItAndWhatStandsBehindASign) {
   EXPECT_THAT(text, HasSubstr("1 open and 1 locked capture of run"));
   EXPECT_THAT(textOf(folder_ / "out" / "index.html"), HasSubstr("1 capture, 1 frame"));
   EXPECT_THAT(text, HasSubstr("Behind ± stands one standard error"));
+}
+
+/// Sources of one seed, as those of a plan's blocks may be, or a daemon that was started again within a run: frames of
+/// one device time have the same draws.
+TEST(NoiseDrawnAlike, IsToldOfFramesOfOneSeedAndTime) {
+  const auto captureOf = [](FrameKind kind, std::uint64_t seed, std::int64_t start_ns) {
+    CaptureGatherer gatherer{plan::CaptureRecord{}};
+    Frame frame;
+    frame.camera = {8, 8, 40.0, 40.0, 3.5, 3.5, {}, ""};
+    frame.planes = {toPlane(PlaneKind::Range, Image<float>(8, 8, 1.0F))};
+    frame.provenance.kind = kind, frame.provenance.seed = seed;
+    for (int k = 0; k < 2; ++k) {
+      frame.moment.exposures = {{{start_ns + 40 * k}, 1_ms, {}}};
+      if (!gatherer.add(frame)) throw std::runtime_error("the frame is refused");
+    }
+    return gatherer.finish();
+  };
+  const auto noted = [](const std::vector<MeasuredCapture>& captures) {
+    std::vector<std::string> notes;
+    noteNoiseDrawnAlike(captures, notes);
+    return notes;
+  };
+  constexpr auto kSimulated = FrameKind::Simulated;
+  EXPECT_THAT(noted({captureOf(kSimulated, 1, 0), captureOf(kSimulated, 1, 80), captureOf(kSimulated, 2, 0)}),
+              IsEmpty());
+  EXPECT_THAT(noted({captureOf(kSimulated, 1, 0), captureOf(kSimulated, 1, 40), captureOf(kSimulated, 2, 0)}),
+              ElementsAre(HasSubstr("the noise of 1 of the 3 captures is drawn like that of earlier ones")));
+  EXPECT_THAT(noted({captureOf(FrameKind::Real, 0, 0), captureOf(FrameKind::Real, 0, 0)}), IsEmpty());
 }
 
 }  // namespace

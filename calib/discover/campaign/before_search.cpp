@@ -5,7 +5,9 @@
 #include <cerrno>
 #include <cmath>
 #include <fstream>
+#include <set>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -102,6 +104,22 @@ Result<> checkStillClosed(const CampaignJob& job) {
 Result<> checkLockedFiles(const CampaignJob& job, const Campaign& campaign) {
   if (!opensLocked(job)) return {};
   return plan::checkHashes(job.run, cameraOf(job), campaign.locked);
+}
+
+void noteNoiseDrawnAlike(const std::vector<MeasuredCapture>& captures, std::vector<std::string>& notes) {
+  std::set<std::pair<std::uint64_t, std::int64_t>> drawn;
+  std::size_t alike = 0;
+  for (const MeasuredCapture& capture : captures) {
+    const bool is_any = std::ranges::any_of(capture.drawn_by, [&](const auto& one) { return drawn.contains(one); });
+    alike += is_any ? 1 : 0;
+    drawn.insert(capture.drawn_by.begin(), capture.drawn_by.end());
+  }
+  if (alike == 0) return;
+  notes.push_back(fmt::format(
+      "The camera is simulated, and the noise of {} of the {} captures is drawn like that of earlier ones: it passes "
+      "for a pattern of the camera's pixels. Give each source, as those of the plan's blocks, a seed of its own, and "
+      "let the daemon run on for the whole run.",
+      alike, captures.size()));
 }
 
 Result<> openLockedOf(const CampaignJob& job, const Campaign& campaign) {

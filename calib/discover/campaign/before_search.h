@@ -2,6 +2,8 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include <toftwin/result.h>
 
@@ -19,6 +21,9 @@ Result<> checkFrequencies(const Campaign& campaign, const sim::SensorModel& mode
 Result<> checkStillClosed(const CampaignJob& job);
 /// Error where a locked recording is not the one that was captured.
 Result<> checkLockedFiles(const CampaignJob& job, const Campaign& campaign);
+/// Notes how many captures of a simulated camera have noise that is drawn like that of earlier ones: a finder takes
+/// what is alike in captures for the camera's.
+void noteNoiseDrawnAlike(const std::vector<MeasuredCapture>& captures, std::vector<std::string>& notes);
 /// Opens them: leaves the note of it.
 Result<> openLockedOf(const CampaignJob& job, const Campaign& campaign);
 

@@ -10,6 +10,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <toftwin/frame.h>
@@ -57,6 +58,8 @@ struct MeasuredCapture {
   /// How many captures have that light in common, of how many stands; the variances count each capture so many times.
   std::size_t light_captures = 1, light_stands = 1;
   bool hides_light_noise = false;  ///< it is simulated, and its frames do not say it
+  /// Seed and device time of a simulated camera's frames: of those with the same ones noise is drawn alike.
+  std::vector<std::pair<std::uint64_t, std::int64_t>> drawn_by{};
   Image<float> valid_share;
   /// Even minus odd frames, means over the image of the range: what goes with the frame's number.
   double parity_m = 0.0, parity_error_m = 0.0;

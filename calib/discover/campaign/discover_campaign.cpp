@@ -179,8 +179,8 @@ void noteHiddenLightNoise(const std::vector<MeasuredCapture>& captures, std::vec
   if (hidden == 0) return;
   notes.emplace_back(
       "The camera is simulated, and its frames do not say what noise their light has, which is the same in all frames "
-      "from one place: it counts as the camera's. Have light_sigma among the source's planes, or take more paths "
-      "(samples_per_pixel).");
+      "from one place: it counts as the camera's. Have light_sigma among the source's planes and record it (toftwin "
+      "measure … --planes light_sigma), or take more paths (samples_per_pixel).");
 }
 
 void takeFound(Round& round, CampaignFinding& finding) {
@@ -276,6 +276,7 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
   CampaignFinding finding;
   finding.notes = campaign->notes;
   noteHiddenLightNoise(campaign->captures, finding.notes);
+  noteNoiseDrawnAlike(campaign->captures, finding.notes);
   if (auto taken = takeLens(*campaign, declared, finding.notes); !taken) return taken.error();
   if (auto same = checkFrequencies(*campaign, declared.model); !same) return same.error();
   for (const auto& [block, scene] : declared.scene_of_block) {
