@@ -99,11 +99,13 @@ Section judgedSection(const TableDiscovery& d) {
 
 Section leftSection(const TableDiscovery& d) {
   Section section{"left", "What is left", {}, Tone::Neutral, {}};
-  section.verdict = d.finding.last_p > d.map.alpha ? fmt::format("Nothing is left above the noise (p = {}).",
-                                                                 significant(d.finding.last_p))
-                                                   : "Something is left that predicts nothing it was not "
-                                                     "fitted to, or the limit of four effects is reached.";
-  section.tone = d.finding.last_p > d.map.alpha ? Tone::Good : Tone::Fair;
+  const bool is_wander = d.finding.effects.empty() && !wanderInWords(d).empty();
+  section.verdict = d.finding.last_p <= d.map.alpha
+                        ? "Something is left that predicts nothing it was not fitted to, or the limit of four "
+                          "effects is reached."
+                    : is_wander ? "What goes slowly from row to row is left: a curve or a wander, as said above."
+                                : fmt::format("Nothing is left above the noise (p = {}).", significant(d.finding.last_p));
+  section.tone = d.finding.last_p > d.map.alpha && !is_wander ? Tone::Good : Tone::Fair;
   FigureRow row;
   for (const CovariateInfo& info : d.infos) {
     const auto* x = valuesOf(d.open, info.name);
@@ -218,12 +220,11 @@ std::string withoutPrediction(const TableDiscovery& d) {
 std::string verdictOf(const TableDiscovery& d) {
   const auto& effects = d.finding.effects;
   if (effects.empty()) {
-    return d.finding.first_p > d.map.alpha
-               ? fmt::format(
-                     "Nothing above the noise: {} rows with noise of {}{} hold no effect that these columns "
-                     "could show (p = {}).",
-                     d.open.rows(), significant(d.noise.typical), unitOf(d), significant(d.finding.first_p))
-               : withoutPrediction(d);
+    if (d.finding.first_p <= d.map.alpha) return withoutPrediction(d);
+    if (std::string wander = wanderInWords(d); !wander.empty()) return wander;
+    return fmt::format(
+        "Nothing above the noise: {} rows with noise of {}{} hold no effect that these columns could show (p = {}).",
+        d.open.rows(), significant(d.noise.typical), unitOf(d), significant(d.finding.first_p));
   }
   std::string words = effects.size() == 1 ? "One effect is in the error: "
                                           : fmt::format("{} effects are in the error: ", effects.size());
@@ -249,6 +250,7 @@ Report reportOf(const TableDiscovery& d) {
       !d.finding.effects.empty() && d.judged.rows > 0 && d.judged.after.rms >= d.judged.before.rms;
   report.tone = is_worse                                                        ? Tone::Bad
                 : d.finding.effects.empty() && d.finding.first_p <= d.map.alpha ? Tone::Fair
+                : d.finding.effects.empty() && !wanderInWords(d).empty()        ? Tone::Fair
                 : is_certain                                                    ? Tone::Good
                                                                                 : Tone::Fair;
   const int digits = decimalsOf(d);

@@ -31,6 +31,19 @@ std::string betweenInWords(const TableDiscovery& d, const Effect& effect) {
   return {};
 }
 
+/// Whether nearly every step from row to row, in the order in which they wander, moves the covariate the same way.
+bool followsClock(const RowClock& clock, const std::vector<double>& covariate) {
+  constexpr double kNearly = 0.98;
+  double up = 0.0, down = 0.0;
+  for (std::size_t i = 1; i < clock.order.size(); ++i) {
+    if (!std::isfinite(clock.step[i])) continue;
+    const double by = covariate[static_cast<std::size_t>(clock.order[i])] -
+                      covariate[static_cast<std::size_t>(clock.order[i - 1])];
+    up += by > 0.0 ? 1.0 : 0.0, down += by < 0.0 ? 1.0 : 0.0;
+  }
+  return up + down > 0.0 && std::max(up, down) >= kNearly * (up + down);
+}
+
 }  // namespace
 
 std::string joined(const std::vector<std::string>& names, const char* between) {
@@ -79,6 +92,23 @@ std::string nameInWords(const TableDiscovery& d, const Effect& effect) {
   for (const Alternative& other : effect.alternatives)
     words += fmt::format(", or with {} ({})", joined(other.covariates), shape(other.name));
   return words;
+}
+
+std::string wanderInWords(const TableDiscovery& d) {
+  constexpr double kMuch = 0.5, kLong = 20.0;
+  if (!d.noise.dependence || !d.noise.dependence->isClear()) return {};
+  const RowDependence& alike = *d.noise.dependence;
+  if (alike.best.correlation.share < kMuch || d.noise.correlationRows() < kLong) return {};
+  std::vector<std::string> along;
+  for (const TableCovariate& one : d.open.covariates)
+    if (one.name != alike.clock.name && one.nature != Nature::Time && followsClock(alike.clock, one.values))
+      along.push_back(one.name);
+  if (along.empty()) return {};
+  return fmt::format(
+      "{} of the error's variance goes slowly from row to row, and the rows stand in the order of {}: a curve over it that was "
+      "gone through once, or a wander with time, which these rows do not tell apart (p = {} for more than a wander). Measure "
+      "again in another order, or give columns with the session or the time.",
+      compare::shownPercent(alike.best.correlation.share), joined(along, " and "), significant(d.finding.first_p));
 }
 
 }  // namespace toftwin::discover

@@ -22,6 +22,9 @@ std::string placeInWords(const TableDiscovery& discovery, const std::string& cov
 bool isCertain(const Effect& effect);
 /// "it goes with time_s (exponential in time_s), by up to 3.1 mm, or with …"
 std::string nameInWords(const TableDiscovery& discovery, const Effect& effect);
+/// Where rows wander and stand in the order of a covariate, that a curve over it and a wander are not to be told apart;
+/// empty where they do not, or not for long.
+std::string wanderInWords(const TableDiscovery& discovery);
 /// Null: the table has no such covariate.
 const std::vector<double>* valuesOf(const TableData& data, const std::string& name);
 

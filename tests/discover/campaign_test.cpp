@@ -218,13 +218,17 @@ class OfSquareWaves : public Searched {
     text.replace(text.find("taps = 2"), 8, "taps = 2\nharmonics = 7");
     return text;
   }
-  [[nodiscard]] CampaignFinding searchFor(const std::string& hidden, const std::string& declared) const {
+  /// `exact`: the rig and the lamp are as they are said to be.
+  [[nodiscard]] CampaignFinding searchFor(const std::string& hidden, const std::string& declared,
+                                          bool exact = false) const {
     write("camera.toml", square(declared));
     const auto plan = plan::parsePlan(smallPlan(), "plan.toml");
     const auto camera = sim::SensorModel::parse(square(hidden), "camera.toml");
     const auto scene = sim::Scene::parse(smallScene(), "scene.toml");
     if (!plan || !camera || !scene) throw std::runtime_error("the small campaign's files are wrong");
-    discover::write({.plan = *plan, .camera = *camera, .scene = *scene}, folder_ / "run");
+    SimulatedRun run{.plan = *plan, .camera = *camera, .scene = *scene};
+    if (exact) run.pose_error_m = run.pose_error_deg = run.light_error = 0.0;
+    discover::write(run, folder_ / "run");
     return search(job());
   }
 };
@@ -247,6 +251,23 @@ TEST_F(OfSquareWaves, ADelayOfTheLightIsInTheModelThatIsJudged) {
   for (const sim::AnyEffect& effect : model->effects())
     if (const auto* offset = std::get_if<sim::FrequencyOffset>(&effect)) found_rad = offset->first.in(radian);
   EXPECT_NEAR(found_rad, 0.04, 0.01);
+}
+
+/// A list of effects has one more where the light is late, so that an update has another place in it. The second round,
+/// which started from the first one's delay, fitted what was behind it in its stead, and here nothing was.
+TEST_F(OfSquareWaves, AWrongNumberIsTheSameEffectsInEachRound) {
+  const auto walk = [](double per_e_fold_mm) {
+    return fmt::format("[[effect]]\ntype = 'time_walk'\nper_e_fold_mm = {}\nreference_electrons = 8000.0\n",
+                       per_e_fold_mm);
+  };
+  const CampaignFinding finding = searchFor(walk(2.0), walk(1.5), true);
+  ASSERT_EQ(finding.updates.size(), 1U) << verdictOf(finding);
+  EXPECT_EQ(nameOf(finding.updates.front().effect), "time_walk");
+  const FittedNumber& found = finding.updates.front().numbers.front();
+  EXPECT_EQ(found.key, "per_e_fold_mm");
+  EXPECT_NEAR(found.value, 2.0, 4.0 * found.error);
+  // What nothing tells stays as the file says it: another one is an offset of the range.
+  EXPECT_EQ(std::get<sim::TimeWalk>(finding.updates.front().effect).reference_electrons, 8000.0);
 }
 
 /// A radian is 795.8 mm. The two say nearly the same of the range, so that it is their sum that the poses

@@ -34,6 +34,15 @@ TEST(PooledOver, IsWhatPixelsThatAreAlikeSayTogether) {
   EXPECT_TRUE(std::isnan(pooled(501, 1)));
 }
 
+/// Also where a camera tells amplitudes in whole numbers.
+TEST(PooledOver, IsTheMeanOfAllThatAreTheSame) {
+  Image<float> variance(100, 1), same(100, 1, 7.0F), two(100, 1);
+  for (int x = 0; x < 100; ++x) variance(x, 0) = static_cast<float>(x), two(x, 0) = x % 4 == 0 ? 1.0F : 2.0F;
+  const Image<float> alike = pooledOver(variance, same), pooled = pooledOver(variance, two);
+  for (const float one : alike.pixels()) EXPECT_FLOAT_EQ(one, 49.5F);
+  for (int x = 0; x < 100; ++x) EXPECT_FLOAT_EQ(pooled(x, 0), x % 4 == 0 ? 48.0F : 50.0F);
+}
+
 TEST(PooledOver, TakesWhatThereIs) {
   EXPECT_TRUE(pooledOver({}, {}).empty());
   EXPECT_TRUE(std::isnan(pooledOver(Image<float>(1, 1, kNaN), Image<float>(1, 1, 2.0F))[0]));

@@ -4,8 +4,10 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <random>
 #include <sstream>
 
 #include <fmt/format.h>
@@ -192,6 +194,26 @@ TEST(DiscoverTable, SaysNothingAboveTheNoiseWhereThereIsNothing) {
   ASSERT_TRUE(discovery) << discovery.error().message;
   EXPECT_THAT(verdictOf(*discovery), HasSubstr("Nothing above the noise"));
   EXPECT_THAT(modelToml(*discovery), testing::Not(HasSubstr("[[effect]]")));
+}
+
+/// Rows that wander, in the order of the distance: a curve over it that was gone through once would look like that.
+TEST(DiscoverTable, DoesNotCallAWanderInTheOrderOfACovariateNothing) {
+  std::mt19937 random{3};
+  std::normal_distribution<double> noise{0.0, 0.5};
+  std::string text = "distance_mm,error_mm\n";
+  for (int i = 0; i < 400; ++i) text += fmt::format("{},{}\n", 1000 + i, noise(random));
+  auto discovery = discoverTable(write("wander.csv", text), {});
+  ASSERT_TRUE(discovery) << discovery.error().message;
+  ASSERT_THAT(verdictOf(*discovery), HasSubstr("Nothing above the noise"));
+  const std::vector<RowClock> clocks = clocksOf(discovery->open);
+  ASSERT_FALSE(clocks.empty());
+  RowDependence wander{.clock = clocks.front(), .best = {{.share = 0.8, .neighbour = 0.99}, 1.0, 1.0}, .falls_by = 30.0};
+  discovery->noise.dependence = wander;
+  EXPECT_THAT(verdictOf(*discovery), HasSubstr("the rows stand in the order of distance_mm: a curve over it that was gone "
+                                               "through once, or a wander with time, which these rows do not tell apart"));
+  std::ranges::shuffle(wander.clock.order, random);
+  discovery->noise.dependence = wander;
+  EXPECT_THAT(verdictOf(*discovery), HasSubstr("Nothing above the noise")) << "no order of anything";
 }
 
 /// The locked rows may say anything: what is found is the same, and only the judgement differs.

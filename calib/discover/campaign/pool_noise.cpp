@@ -19,18 +19,22 @@ struct Bin {
   double like = 0.0, variance = 0.0;  ///< means
 };
 
-/// Bins of as many of the pixels each, which are in order.
+/// Bins of as many of the pixels each, which are in order of what they are alike in; of those that are the same in it
+/// none is cut.
 std::vector<Bin> binsOf(const std::vector<std::pair<float, float>>& ordered) {
   constexpr std::size_t kBins = 24;
   std::vector<Bin> bins;
   const std::size_t count = std::min(kBins, ordered.size());
-  for (std::size_t b = 0; b < count; ++b) {
-    const std::size_t first = b * ordered.size() / count, last = (b + 1) * ordered.size() / count;
+  for (std::size_t b = 0, first = 0; b < count; ++b) {
+    std::size_t last = std::max(first, (b + 1) * ordered.size() / count);
+    while (last > 0 && last < ordered.size() && ordered[last].first == ordered[last - 1].first) ++last;
+    if (last == first) continue;
     Bin bin;
     for (std::size_t i = first; i < last; ++i)
       bin.like += static_cast<double>(ordered[i].first), bin.variance += static_cast<double>(ordered[i].second);
     bin.like /= static_cast<double>(last - first), bin.variance /= static_cast<double>(last - first);
     bins.push_back(bin);
+    first = last;
   }
   return bins;
 }
@@ -63,7 +67,7 @@ Image<float> pooledOver(const Image<float>& variance, const Image<float>& like) 
   std::vector<std::pair<float, float>> ordered;
   for (std::size_t i = 0; i < variance.size(); ++i)
     if (std::isfinite(variance[i]) && std::isfinite(like[i])) ordered.emplace_back(like[i], variance[i]);
-  std::ranges::sort(ordered);
+  std::ranges::sort(ordered, {}, &std::pair<float, float>::first);
   const std::vector<Bin> bins = binsOf(ordered);
   Image<float> pooled(variance.width(), variance.height(), kNaN);
   for (std::size_t i = 0; i < pooled.size(); ++i)

@@ -201,14 +201,16 @@ class Descent {
   }
 
   /// Numbers that could be anything within their bounds, and those that moved before it showed that nothing tells them,
-  /// stay as they `began`, what makes an effect strong at nothing: rounding moved them, and what they do not change here
+  /// stay as they `began`, what makes an effect strong at nothing, but in a camera file: rounding moved them, and what they do not change here
   /// they may change elsewhere (a waveform's second harmonic is in no range).
   Result<> keepWhatIsNotTold(const std::vector<sim::AnyEffect>& began, State& state) {
     bool is_any = false;  // what stays now does not come back, so that this ends
-    for (const std::size_t place : places_) {
+    for (std::size_t i = 0; i < places_.size(); ++i) {
+      const std::size_t place = places_[i];
       const std::vector<FittedNumber> fitted = fittedAt(state, place).numbers;
       for (const FreeNumber& one : freeNumbersOf(state.effects, {place})) {
-        const double was = untoldOf(began[place], one.key);
+        const double was =
+            i < options_.of_file ? valueOf(began[place], one.key) : untoldOf(began[place], one.key);
         const auto number = std::ranges::find(fitted, one.key, &FittedNumber::key);
         if (valueOf(state.effects[place], one.key) == was) continue;
         if (number != fitted.end() && isTold(state.effects[place], *number)) continue;

@@ -37,6 +37,8 @@ struct RefitOptions {
   /// Numbers of these names, each of which makes an effect strong, go if the data do not need them: less than
   /// two standard errors from nothing, and χ² rises by no more than 4 for each number that goes.
   std::vector<std::string> droppable{};
+  /// So many of the places, the first ones, are a camera file's: what nothing tells of them stays as it says.
+  std::size_t of_file = 0;
   /// Of the effects at these places, only these numbers.
   std::map<std::size_t, std::vector<std::string>> only{};
 };

@@ -136,6 +136,16 @@ Declared listedFor(const Declared& file, const Round& round, const std::vector<s
   return listed;
 }
 
+/// Where those effects of the file stand in a list of that `in_file`. Not where they stand in that of another delay of the
+/// light, which has one effect more or fewer where one of the delays is none.
+std::vector<std::size_t> placesIn(const std::vector<std::optional<std::size_t>>& in_file,
+                                  const std::vector<std::optional<std::size_t>>& of_file) {
+  std::vector<std::size_t> places;
+  for (const auto& one : of_file)
+    places.push_back(static_cast<std::size_t>(std::ranges::find(in_file, one) - in_file.begin()));
+  return places;
+}
+
 /// `file_rows`: rows that start from the camera file's own numbers; null: the round's are that.
 Result<> fitFound(const Declared& file, const CampaignRows* file_rows, const OpenCaptures& open,
                   Round& round) {
@@ -149,10 +159,11 @@ Result<> fitFound(const Declared& file, const CampaignRows* file_rows, const Ope
   });
   std::vector<std::optional<std::size_t>> updated;
   for (const std::size_t place : wrong) updated.push_back(in_file[place]);
-  WithFound inserted{declaredEffects(listedFor(file, round, wrong)), wrong};
+  const Declared listed = listedFor(file, round, wrong);
+  WithFound inserted{declaredEffects(listed), placesIn(placesInFile(listed), updated)};
   putForms(round, inserted, round.effects);
   auto refitted = refit(*round.rows, inserted.effects, inserted.fitted,
-                        {.scales = round.finding.scales, .only = inserted.only});
+                        {.scales = round.finding.scales, .of_file = wrong.size(), .only = inserted.only});
   if (!refitted) return refitted.error();
   round.refitted = *std::move(refitted);
   takeFitted(updated, round);
