@@ -105,9 +105,9 @@ std::string wanderInWords(const TableDiscovery& d) {
       along.push_back(one.name);
   if (along.empty()) return {};
   return fmt::format(
-      "{} of the error's variance goes slowly from row to row, and the rows stand in the order of {}: a curve over it that was "
-      "gone through once, or a wander with time, which these rows do not tell apart (p = {} for more than a wander). Measure "
-      "again in another order, or give columns with the session or the time.",
+      "{} of the error's variance goes slowly from row to row, and the rows stand in the order of {}: a curve over it "
+      "that was gone through once, or a wander with time, which these rows do not tell apart (p = {} for more than a "
+      "wander). Measure again in another order, or give columns with the session or the time.",
       compare::shownPercent(alike.best.correlation.share), joined(along, " and "), significant(d.finding.first_p));
 }
 

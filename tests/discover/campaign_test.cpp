@@ -270,6 +270,21 @@ TEST_F(OfSquareWaves, AWrongNumberIsTheSameEffectsInEachRound) {
   EXPECT_EQ(std::get<sim::TimeWalk>(finding.updates.front().effect).reference_electrons, 8000.0);
 }
 
+/// Before it is found, a wrong time_walk is a range error of several millimetres, and the poses go after it. What a
+/// camera of square waves reads of a millimetre is another one by a third: taken for one, the poses' way back left a
+/// delay of the light and effects that are none.
+TEST_F(OfSquareWaves, AWrongNumberThatLooksLikePosesIsThatAlone) {
+  const auto walk = [](double per_e_fold_mm) {
+    return fmt::format("[[effect]]\ntype = 'time_walk'\nper_e_fold_mm = {}\n", per_e_fold_mm);
+  };
+  const CampaignFinding finding = searchFor(walk(6.0), walk(1.5));
+  EXPECT_THAT(namesOf(finding), testing::IsEmpty()) << verdictOf(finding);
+  EXPECT_EQ(finding.zero.delay_mm, 0.0);
+  ASSERT_EQ(finding.updates.size(), 1U) << verdictOf(finding);
+  const FittedNumber& found = finding.updates.front().numbers.front();
+  EXPECT_NEAR(found.value, 6.0, 4.0 * found.error);
+}
+
 /// A radian is 795.8 mm. The two say nearly the same of the range, so that it is their sum that the poses
 /// know: 30 of them, each 1 mm off, to 0.2 mm.
 TEST_F(OfSquareWaves, WhereZeroLiesIsAddedOnceToWhatTheFileSaysOfIt) {

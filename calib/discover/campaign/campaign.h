@@ -129,8 +129,8 @@ using Stood = std::array<double, 5>;
 /// elsewhere.
 struct TracedCapture {
   sim::Light light;
-  /// Change of range in metres and of ln amplitude for one prior standard deviation of what moves
-  /// the camera: right, down, ahead by 1 mm, turned about x and about y by 0.1°.
+  /// Change of range in metres and of ln amplitude, as the declared camera reads them, for one prior standard deviation
+  /// of what moves the camera: right, down, ahead by 1 mm, turned about x and about y by 0.1°.
   std::array<Image<float>, 5> range_m{}, log_amplitude{};
   Image<float> tracing_variance_m2,
       tracing_variance;         ///< of range and of ln amplitude, from Monte Carlo

@@ -201,8 +201,8 @@ class Descent {
   }
 
   /// Numbers that could be anything within their bounds, and those that moved before it showed that nothing tells them,
-  /// stay as they `began`, what makes an effect strong at nothing, but in a camera file: rounding moved them, and what they do not change here
-  /// they may change elsewhere (a waveform's second harmonic is in no range).
+  /// stay as they `began`, what makes an effect strong at nothing, but in a camera file: rounding moved them, and what
+  /// they do not change here they may change elsewhere (a waveform's second harmonic is in no range).
   Result<> keepWhatIsNotTold(const std::vector<sim::AnyEffect>& began, State& state) {
     bool is_any = false;  // what stays now does not come back, so that this ends
     for (std::size_t i = 0; i < places_.size(); ++i) {
