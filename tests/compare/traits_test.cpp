@@ -8,8 +8,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <random>
 #include <numbers>
+#include <random>
 
 #include "calib/compare/traits/least_squares.h"
 #include "calib/compare/traits/veil.h"
@@ -188,8 +188,8 @@ TEST(Traits, CallAnErrorAtAnAmplitudeOfOneExtrapolated) {
   EXPECT_FALSE((*traits)[1].is_extrapolated);
 }
 
-/// A step between two places, noise of a fiftieth of it: one place on it tells neither where it is nor how wide. (Width:
-/// with noise of none it is told as too sharp.)
+/// A step between two places, noise of a fiftieth of it: the places tell that it is between two of them,
+/// and not how wide it is.
 TEST(Traits, AnEdgesWidthThatIsKnownToNoFactorOfTenIsNotTold) {
   std::mt19937 random{5};
   std::normal_distribution<double> noise{0.0, 0.02};

@@ -42,6 +42,8 @@ inline constexpr std::string_view kConverterCarrier = "converter";
 inline constexpr std::string_view kDelayCarrier = "delay";
 /// That delay as an effect.
 sim::AnyEffect delayInLight(const sim::SensorModel& model, double millimetres);
+/// By which the light is late to see what a delay does.
+inline constexpr double kDelay_mm = 5.0;
 /// The effects with a delay more in the light: in a frequency_offset of theirs, or in one more.
 std::vector<sim::AnyEffect> withDelay(const sim::SensorModel& model, std::vector<sim::AnyEffect> effects,
                                       double millimetres);

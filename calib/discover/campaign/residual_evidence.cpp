@@ -22,7 +22,6 @@ Fit commonFit(const Evidence& evidence, std::span<const double> scales) {
 
 /// Whether a delay of the light does more to some of the captures than an offset of the range.
 Result<bool> isDelayNoOffset(const JudgedCampaign& judged, const std::vector<sim::AnyEffect>& as_declared) {
-  constexpr double kDelay_mm = 5.0;
   constexpr std::size_t kSome = 8;
   const sim::SensorModel& model = judged.declared.model;
   const auto here = NoiselessCamera::make(model, as_declared, judged.lit.captures);

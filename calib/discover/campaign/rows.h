@@ -81,8 +81,6 @@ class Cells {
 /// kCommon − 1.
 std::vector<Group> commonGroups();
 inline constexpr std::size_t kCommon = 8;
-/// By which the light is late to see what a delay does.
-inline constexpr double kDelay_mm = 5.0;
 
 /// Columns and residuals of one capture, whitened.
 struct WhitenedCapture {

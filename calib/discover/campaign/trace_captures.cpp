@@ -177,7 +177,6 @@ void addMoves(const sim::Scene& scene, const sim::TraceRequest& request, TracedC
 /// The declared camera, and the same whose light is late: what it reads of a millimetre of range. With square waves that
 /// no table corrects it is another by a third, as ranges err cyclically, and amplitudes go with the phase, too.
 struct ReadRange {
-  static constexpr double kDelay_mm = 5.0;
   NoiselessCamera here, late;
 
   static Result<ReadRange> make(const Declared& declared, const std::vector<MeasuredCapture>& captures) {

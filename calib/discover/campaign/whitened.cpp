@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <utility>
 
+#include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/rows.h"
 
 namespace toftwin::discover {
