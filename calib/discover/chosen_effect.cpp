@@ -188,6 +188,7 @@ Effect effectOf(const Context& context, const std::vector<Explanation>& all, std
   }
   effect.gain = against0(mine.gain);
   effect.gain.mean -= mine.price;
+  effect.predicts = holds(mine.gain);
   effect.frequency = stability(all, chosen, others);
   for (std::size_t s = 1; s < shown.size(); ++s) {
     const Explanation& other = all[shown[s]];

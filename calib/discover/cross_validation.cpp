@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/discover/cross_validation.h"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 
@@ -102,9 +103,18 @@ Difference against0(const Gain& gain) {
   return difference(gain, {gain.group, 0.0, std::vector<double>(gain.by_capture.size())});
 }
 
-bool holds(const Difference& gain) {
-  if (gain.mean > 2.0 * gain.error) return true;
-  return gain.mean > std::sqrt(3.0) * gain.error && gain.mean > 2.0 * 2.0 * std::sqrt(std::max(0.0, gain.mean));
+bool holds(const Gain& gain) {
+  constexpr double kEnough = 100.0;  // ten standard errors, squared
+  const double price = against0(gain).mean - gain.total;
+  Gain capped = gain;
+  for (double& one : capped.by_capture) one = std::min(one, kEnough);
+  for (const Gain& judged : {gain, capped}) {
+    Difference all = against0(judged);
+    all.mean -= price;
+    if (all.mean > 2.0 * all.error) return true;
+    if (all.mean > std::sqrt(3.0) * all.error && all.mean > 2.0 * 2.0 * std::sqrt(std::max(0.0, all.mean))) return true;
+  }
+  return false;
 }
 
 }  // namespace toftwin::discover

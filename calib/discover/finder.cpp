@@ -128,10 +128,10 @@ class Search {
     const auto chosen = chosenOf(found_.context, explanations);
     if (!chosen) return false;
     Effect effect = effectOf(found_.context, explanations, *chosen);
-    if (!holds(effect.gain) || isWhatACurveLeaves(found_, effect)) return false;
+    if (!effect.predicts || isWhatACurveLeaves(found_, effect)) return false;
     if (const auto part = partOfAKnown(found_, explanations, effect)) {
       Effect more = effectOf(found_.context, explanations, *part);
-      if (holds(more.gain)) effect = std::move(more);
+      if (more.predicts) effect = std::move(more);
     }
     if (const auto doubtful = nameInDoubt(found_, effect)) {
       withdraw(*doubtful);

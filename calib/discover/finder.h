@@ -72,6 +72,7 @@ struct Effect {
   std::shared_ptr<const NamedFit> fit{};
   double p = 1.0;                     ///< of the test that led to it
   Difference gain{};
+  bool predicts = false;   ///< whether that is no chance, see holds()
   double frequency = 1.0;  ///< how often it is the best again when captures are drawn anew with replacement
   std::vector<TriedShape> tried{};
   std::vector<Alternative> alternatives{};

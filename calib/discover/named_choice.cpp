@@ -146,7 +146,6 @@ std::optional<std::size_t> chooseNamed(const Context& context, std::vector<Expla
   std::optional<std::size_t> chosen;
   for (const std::size_t i : named) {
     Explanation& one = all[i];
-    const Difference gain = against0(one.gain);
     const auto isWorseThan = [&](const Explanation& other, std::size_t tried) {
       return other.gain.total - one.gain.total >
              std::max(2.0 * difference(other.gain, one.gain).error, luckOfTheBestOf(tried));
@@ -159,7 +158,7 @@ std::optional<std::size_t> chooseNamed(const Context& context, std::vector<Expla
       one.refused = "beside it something was left along the curve that it was not told from";
     else if (one.named->is_at_bound)
       one.refused = "it would have to be stronger than it can be";
-    else if (!holds(gain))
+    else if (!holds(one.gain))
       one.refused = "it does not predict other captures";
     else if (generic && isWorseThan(all[*generic], curves) &&
              all[*generic].gain.total - one.gain.total > kHundredth * one.gain.total)

@@ -8,8 +8,8 @@ namespace toftwin::sim {
 /// Light that is reflected twice between the lens' surfaces makes a faint second image, turned by half
 /// a turn about a point m near the principal point:
 ///     P̃(p) = (1 − a) P(p) + a P(2m − p)
-/// with phase and all, from the unclipped light. What lies beyond the image's edge is dark. On a traced
-/// region only what the region sees is mirrored.
+/// with phase and all, from the unclipped light, P linear between pixels. What lies beyond the image's edge is dark. On
+/// a traced region only what the region sees is mirrored.
 struct LensGhost {
   double share = 0.005;
   double right = 2.0, down = 1.0;  ///< of m from the principal point, pixels

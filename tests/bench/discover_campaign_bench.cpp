@@ -4,7 +4,7 @@
 //
 //   discover_campaign_bench [--cases a,b] [--seeds 1:5] [--lambda 150,600,3000] [--absent no|yes|both]
 //                           [--null plain,noise,pose,tails,bump,bumps] [--threads 1] [--large] [--scores] [--samples]
-//                           [--light] [--bump] [--bump-locked]
+//                           [--light] [--bump] [--bump-locked] [--drawn]
 //   discover_campaign_bench --table FILE...
 //   discover_campaign_bench --references FOLDER...     (each as tests/reference_device/reference_campaign
 //   leaves it)
@@ -16,7 +16,8 @@
 // raw exposures are recorded, too. --light: as toftwind simulates a
 // camera: on a perfect rig, light over four surfaces by 64 paths a pixel, one for each place, whose noise frames state.
 // --bump: beside what is hidden, one capture was taken ten times as far off its pose as the others; --bump-locked: a
-// locked one. The null bumps: two captures.
+// locked one. The null bumps: two captures. --drawn: effects are hidden with numbers drawn by the seed, not with those of
+// their defaults, from which a search starts (see drawn_effect.h).
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <tbb/global_control.h>
@@ -41,6 +42,7 @@
 #include "calib/plan/opened.h"
 #include "tests/bench/campaign_score.h"
 #include "tests/bench/campaign_truth.h"
+#include "tests/bench/drawn_effect.h"
 #include "tests/discover/simulated_run.h"
 
 namespace {
@@ -59,7 +61,7 @@ struct Options {
   std::uint64_t first_seed = 1, last_seed = 1;
   std::size_t threads = 0;
   bool present = true, absent = false, large = false, scores = false, samples = false, light = false, bump = false,
-       bump_locked = false;
+       bump_locked = false, drawn = false;
   std::vector<std::string> cases{}, nulls{};
   std::vector<std::filesystem::path> tables{}, references{};
 };
@@ -232,6 +234,10 @@ void reportNumbers(const sim::AnyEffect& hidden, const CampaignFinding& finding)
   }
 }
 
+void reportHidden(const sim::AnyEffect& hidden) {
+  for (const EffectNumber& number : numbersOf(hidden)) fmt::print("# hidden: {} {:.5g}\n", number.key, number.value);
+}
+
 /// Each campaign of a seed has poses and noise of its own: intervals of many effects are as many draws.
 std::uint64_t seedOf(std::uint64_t seed, const sim::AnyEffect& hidden, double lambda) {
   return seed + 1'000 * (1 + hidden.index()) + 1'000'000 * static_cast<std::uint64_t>(std::lround(lambda));
@@ -241,14 +247,18 @@ std::uint64_t seedOf(std::uint64_t seed, const sim::AnyEffect& hidden, double la
 void hide(const Setting& world, const bench::KnownCaptures& unspoilt, const sim::AnyEffect& none,
           const sim::AnyEffect& defaults, const Options& options, double wanted, std::uint64_t seed) {
   bench::Case of{.hidden = discover::nameOf(defaults), .wanted = wanted, .seed = seed};
-  const auto hiding = [&](double factor) {
-    return world.declared.model.withEffects(
-        withInserted(world.declared.model.effects(), scaled(none, defaults, factor)));
+  const auto with = [&](const sim::AnyEffect& effect) {
+    return world.declared.model.withEffects(withInserted(world.declared.model.effects(), effect));
   };
+  const auto lambda_of = [&](const sim::AnyEffect& effect) {
+    return unspoilt.between(effectsWithoutNoise(world.declared.model), effectsWithoutNoise(with(effect)));
+  };
+  const bench::Hidden drawn = options.drawn
+                                  ? bench::drawn(defaults, wanted, lambda_of, seedOf(seed, defaults, wanted))
+                                  : bench::Hidden{none, defaults};
   double factor = 1.0;
   for (int pass = 0; pass < 12; ++pass) {
-    of.lambda =
-        unspoilt.between(effectsWithoutNoise(world.declared.model), effectsWithoutNoise(hiding(factor)));
+    of.lambda = lambda_of(scaled(drawn.off, drawn.on, factor));
     if (!(of.lambda > 1e-3) || std::abs(of.lambda / wanted - 1.0) < 0.03) break;
     factor *= std::clamp(std::sqrt(wanted / of.lambda), 0.02, 50.0);
   }
@@ -257,8 +267,8 @@ void hide(const Setting& world, const bench::KnownCaptures& unspoilt, const sim:
     std::fflush(stdout);
     return;
   }
-  const sim::SensorModel truth = hiding(factor);
-  const sim::AnyEffect hidden = scaled(none, defaults, factor);
+  const sim::AnyEffect hidden = scaled(drawn.off, drawn.on, factor);
+  const sim::SensorModel truth = with(hidden);
   simulate(world, truth, seedOf(seed, hidden, wanted), options);
   for (const bool is_absent : {false, true}) {
     if (!(is_absent ? options.absent : options.present)) continue;
@@ -270,7 +280,7 @@ void hide(const Setting& world, const bench::KnownCaptures& unspoilt, const sim:
     report(options,
            bench::scoreOf(of, hidden, bench::removedFrom(locked, world.declared, truth, finding), finding),
            finding);
-    if (options.scores) reportNumbers(hidden, finding);
+    if (options.scores) reportNumbers(hidden, finding), reportHidden(hidden);
   }
 }
 
@@ -291,7 +301,7 @@ std::vector<std::string> partsOf(const std::string& list) {
   fmt::print(stderr,
              "discover_campaign_bench: {} is not understood; it takes --cases a,b, --seeds 1:5, --lambda 150,600, "
              "--absent no|yes|both, --null plain,noise,pose,tails,bump,bumps, --threads N, --large, --scores, "
-             "--samples, --light, --bump, --bump-locked, or "
+             "--samples, --light, --bump, --bump-locked, --drawn, or "
              "--table FILE... or --references FOLDER...\n",
              word);
   std::exit(2);
@@ -336,6 +346,8 @@ Options optionsOf(int argc, char** argv) {
       options.bump = true;
     } else if (word == "--bump-locked") {
       options.bump_locked = true;
+    } else if (word == "--drawn") {
+      options.drawn = true;
     } else if (word == "--references") {
       while (i + 1 < argc) options.references.emplace_back(argv[++i]);
     } else if (word == "--table") {

@@ -153,14 +153,20 @@ TEST(Finder, OffersBothOfTwoCovariatesThatGoTogether) {
 TEST(CrossValidation, AGainHoldsIfItIsOfManyCapturesOrOfThreeThatSayMuch) {
   const auto gain = [](std::size_t captures, double each, std::size_t of) {
     Gain all{0, 0.0, std::vector<double>(of)};
-    for (std::size_t c = 0; c < captures; ++c) all.by_capture[c] = each;
-    return against0(all);
+    for (std::size_t c = 0; c < captures; ++c) all.by_capture[c] = each, all.total += each;
+    return all;
   };
   EXPECT_TRUE(holds(gain(20, 2.0, 45)));
   EXPECT_TRUE(holds(gain(3, 100.0, 45)));
   EXPECT_FALSE(holds(gain(2, 1000.0, 45)));
   EXPECT_FALSE(holds(gain(3, 2.0, 45))) << "6 in χ² is what noise gives";
   EXPECT_FALSE(holds(gain(45, -1.0, 45)));
+  Gain cold = gain(0, 0.0, 37);  // of a drift that is gone after five captures
+  for (const double one : {1564.0, 642.0, 223.0, 125.0, 57.0})
+    cold.by_capture[static_cast<std::size_t>(cold.group++)] = one, cold.total += one;
+  EXPECT_TRUE(holds(cold));
+  cold.by_capture[2] = cold.by_capture[3] = cold.by_capture[4] = 0.0, cold.total = 1564.0 + 642.0;
+  EXPECT_FALSE(holds(cold)) << "two may have been bumped";
 }
 
 }  // namespace

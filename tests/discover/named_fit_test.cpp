@@ -80,7 +80,7 @@ TEST(NamedFits, HaveOnlyTheStrengthsThatAreNeeded) {
 TEST_F(Searched, ANumberThatNothingTellsStaysAtNothing) {
   std::string camera = tinyCamera();
   camera.replace(camera.find("taps = 2"), 8, "taps = 2\nharmonics = 5");
-  simulateWith(camera + "[[effect]]\ntype = 'harmonics'\nthird = 0.003\n");
+  simulateWith(camera + "[[effect]]\ntype = 'harmonics'\nsecond = 0.1\nthird = 0.003\n");
   write("camera.toml", camera);
   const CampaignFinding finding = search(job());
   ASSERT_THAT(namesOf(finding), testing::ElementsAre("harmonics")) << verdictOf(finding);
@@ -88,6 +88,9 @@ TEST_F(Searched, ANumberThatNothingTellsStaysAtNothing) {
   EXPECT_NEAR(found.third, 0.003, 3e-4);
   EXPECT_NEAR(found.fourth, 0.0, 0.05);  // where rounding passes for a little of it; -1 if it is written as it fell
   EXPECT_NEAR(found.second, 0.0, 0.2);
+  // Steps that shrank with what was left of it said 1e-7 ± 3e-6 of 0.1.
+  for (const FittedNumber& number : finding.effects.front().fitted->numbers)
+    EXPECT_TRUE(number.key != "second" || std::abs(number.value - 0.1) < 3.0 * number.error) << number.error;
 }
 
 /// A veil and a halo answer for each other: each number's error is half as large as it or more, and yet there is no doing

@@ -106,6 +106,20 @@ TEST(LensGhost, PutsTheMirroredPixelsShareIntoEachPixelAndKeepsAllLight) {
   EXPECT_NEAR(sum, 5.0, 1e-6);
 }
 
+// What turns it need not be in the middle of a pixel or between two: a search that moves it sees each step.
+TEST(LensGhost, IsLinearBetweenPixels) {
+  CameraInfo camera = cameraOfSize(41, 31);
+  camera.cx = 20.0, camera.cy = 15.0;
+  const Light light = syntheticLight(
+      41, 31, {20_MHz}, 2, [](int x, int y) { return std::vector<Way>{{x == 12 && y == 10 ? 5.0 : 0.0, 1.3}}; });
+  const Light seen = applied(LensGhost{.share = 0.02, .right = 1.1, .down = -0.05}, light, camera);
+  // At 30.2, 19.9.
+  EXPECT_NEAR(seen.steady(30, 20), 0.02 * 5.0 * 0.8 * 0.9, 1e-6);
+  EXPECT_NEAR(seen.steady(31, 20), 0.02 * 5.0 * 0.2 * 0.9, 1e-6);
+  EXPECT_NEAR(seen.steady(30, 19), 0.02 * 5.0 * 0.8 * 0.1, 1e-6);
+  EXPECT_NEAR(seen.steady(31, 19), 0.02 * 5.0 * 0.2 * 0.1, 1e-6);
+}
+
 // One bright pixel of phase φ among dark ones: a square of reach 2 has a 25th of it, or, where the image ends
 // after 3 × 3 of its pixels, a 9th.
 TEST(LearnedNeighbours, PutsItsShareOfASquaresMeanIntoEachPixel) {

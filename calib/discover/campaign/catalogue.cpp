@@ -18,7 +18,7 @@ constexpr double kTooMuch = 5.0;
 /// A column of which less than this share is new says what those before it say already: it would
 /// only make the effect fit noise.
 constexpr double kNew = 0.2;
-constexpr std::size_t kMostVariations = 24;
+constexpr std::size_t kMostVariations = 64;
 
 /// Visitor that lists numbers, or sets one. Lists count as numbers "key[i]".
 class Numbers {
@@ -141,7 +141,10 @@ std::vector<double> choicesOf(const EffectNumber& number) {
     for (double value = number.low; value <= number.high; ++value) values.push_back(value);
     return values;
   }
-  return {std::max(number.low, std::floor(number.value / 2.0)), number.value, 2.0 * number.value};
+  for (double value = std::max(number.low, std::floor(number.value / 2.0));
+       value <= std::min(number.high, 2.0 * number.value); ++value)
+    values.push_back(value);
+  return values;
 }
 
 /// The effect switched off, with each combination of values of its choosing numbers.

@@ -86,8 +86,10 @@ class OneEffect {
   }
 
   /// Without the strengths that do not help to predict other captures, by one standard error, which is what a
-  /// formula with fewer numbers has to be as good as; the last one stays.
+  /// formula with fewer numbers has to be as good as; the last one stays. And so does one without which χ² rises as it
+  /// does by no chance, though a few captures alone (of a cold camera) say so, which differ in how much.
   Fitted withoutNeedless(Fitted all) {
+    constexpr double kNoChance = 25.0;  // five standard errors
     while (const auto least = leastStrength(all.refitted.fitted.front(), options_.droppable)) {
       std::vector<sim::AnyEffect> effects = all.refitted.effects;
       effects[place_] = without(effects[place_], least->key);
@@ -97,6 +99,8 @@ class OneEffect {
         if (number.key != least->key) only.push_back(number.key);
       auto fewer = fit(std::move(effects));
       if (!fewer || all.gain.total - fewer->gain.total > difference(all.gain, fewer->gain).error) break;
+      const double rise = fewer->refitted.deviance - all.refitted.deviance;
+      if (rise > kNoChance * std::max(1.0, all.refitted.dispersion)) break;
       all = *std::move(fewer);
     }
     return all;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <set>
 
 #include "calib/discover/campaign/carriers.h"
@@ -10,14 +11,15 @@
 namespace toftwin::discover {
 namespace {
 
-/// A step of a number: of half of what it or its default is at most, within its bounds, and to the other side
-/// if there is more room.
+/// A step of a number: of half of what it or its default is at most, of a hundredth of its bounds where the default is
+/// nothing and does not say how large it may be, within its bounds, and to the other side if there is more room.
 double longestStep(const sim::AnyEffect& effect, const std::string& key, double step) {
-  constexpr double kMost = 0.5;
+  constexpr double kMost = 0.5, kMostOfBounds = 0.01;
   for (const EffectNumber& number : numbersOf(effect)) {
     if (number.key != key) continue;
-    const double most = std::min(
-        std::abs(step), kMost * std::max(std::abs(number.value), std::abs(valueOf(defaultsOf(effect), key))));
+    const double usual = kMost * std::abs(valueOf(defaultsOf(effect), key));
+    const double large = usual > 0.0 ? usual : kMostOfBounds * (number.high - number.low);
+    const double most = std::min(std::abs(step), std::max(kMost * std::abs(number.value), large));
     const double up = std::min(most, number.high - number.value),
                  down = std::min(most, number.value - number.low);
     return up > down || (up == down && step > 0.0) ? up : -down;
@@ -55,12 +57,23 @@ Step stepOf(const Marginal& marginal, std::size_t free) {
   return step;
 }
 
-/// Those that are not told by offset, gain and the numbers before them: of a reference temperature,
-/// an offset says all.
-std::vector<FreeNumber> toldApart(const std::vector<FreeNumber>& free, const Step& step) {
+/// A number that is not told from others, and by how much those must change where it changes by 1: of a share of a charge
+/// and a loss by it, the product is told.
+struct Untold {
+  FreeNumber number;
+  Eigen::VectorXd change{};  ///< by free number
+};
+
+/// Those that are told by offset, gain and the numbers before them do not stay: of a reference temperature, an offset
+/// says all.
+struct ToldApart {
+  std::vector<FreeNumber> kept{};
+  std::vector<Untold> untold{};
+};
+ToldApart toldApart(const std::vector<FreeNumber>& free, const Step& step) {
   constexpr double kLeast = 1e-4;  // of a column's square
-  std::vector<FreeNumber> kept;
-  std::vector<Eigen::Index> rows;
+  ToldApart apart;
+  std::vector<Eigen::Index> rows, others;
   for (std::size_t i = 0; i < free.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);
     double left = step.gram(row, row);
@@ -68,11 +81,18 @@ std::vector<FreeNumber> toldApart(const std::vector<FreeNumber>& free, const Ste
       const Eigen::VectorXd cross = step.gram(rows, row);
       left -= cross.dot(pseudoInverse(step.gram(rows, rows), 1e-9).inverse * cross);
     }
-    if (!(left > kLeast * step.own[row]) || !(step.own[row] > 0.0)) continue;
-    kept.push_back(free[i]);
-    rows.push_back(row);
+    if (!(step.own[row] > 0.0)) continue;
+    (left > kLeast * step.own[row] ? rows : others).push_back(row);
   }
-  return kept;
+  for (const Eigen::Index row : rows) apart.kept.push_back(free[static_cast<std::size_t>(row)]);
+  const Eigen::MatrixXd inverse = pseudoInverse(step.gram(rows, rows), 1e-9).inverse;
+  for (const Eigen::Index row : others) {
+    Untold one{free[static_cast<std::size_t>(row)], -inverse * step.gram(rows, row)};
+    for (std::size_t i = 0; i < apart.kept.size(); ++i)
+      one.change[static_cast<Eigen::Index>(i)] *= apart.kept[i].step / one.number.step;
+    apart.untold.push_back(std::move(one));
+  }
+  return apart;
 }
 
 /// A list of effects while it is fitted.
@@ -80,6 +100,7 @@ struct State {
   std::vector<sim::AnyEffect> effects;
   double delay_mm = 0.0;  ///< of the light, besides: what it does is not proportional to it
   std::vector<FreeNumber> free{};
+  std::vector<Untold> untold{};  ///< since what shows was looked for
   Marginal marginal{};
   Step at{};
 };
@@ -101,7 +122,7 @@ bool isTold(const sim::AnyEffect& effect, const FittedNumber& number) {
   return found == numbers.end() || number.error < 0.5 * (found->high - found->low);
 }
 
-/// The numbers of the effect at that place, with their standard errors.
+/// The numbers of the effect at that place, with their standard errors where what they are not told from is as it is.
 FittedEffect fittedAt(const State& state, std::size_t place) {
   const Eigen::MatrixXd covariance =
       pseudoInverse(state.at.gram, 1e-7).inverse * std::max(1.0, dispersionOf(state.at));
@@ -116,6 +137,17 @@ FittedEffect fittedAt(const State& state, std::size_t place) {
   return fitted;
 }
 
+/// What that may be off makes them less certain: each as much as it is.
+void addUntold(const State& state, std::size_t place, FittedEffect& fitted) {
+  for (std::size_t i = 0; i < state.free.size(); ++i) {
+    if (state.free[i].place != place) continue;
+    FittedNumber& number = *std::ranges::find(fitted.numbers, state.free[i].key, &FittedNumber::key);
+    for (const Untold& one : state.untold)
+      number.error = std::hypot(number.error, valueOf(state.effects[one.number.place], one.number.key) *
+                                                  one.change[static_cast<Eigen::Index>(i)]);
+  }
+}
+
 class Descent {
  public:
   Descent(const CampaignRows& rows, const std::vector<std::size_t>& places, const RefitOptions& options)
@@ -126,9 +158,10 @@ class Descent {
   Result<> freeWhatShows(State& state) const {
     state.free = candidates(state.effects);
     if (auto looked = look(state); !looked) return looked;
-    std::vector<FreeNumber> kept = toldApart(state.free, state.at);
-    if (kept.size() == state.free.size()) return {};
-    state.free = std::move(kept);
+    ToldApart apart = toldApart(state.free, state.at);
+    state.untold = std::move(apart.untold);
+    if (apart.kept.size() == state.free.size()) return {};
+    state.free = std::move(apart.kept);
     return look(state);
   }
 
@@ -174,11 +207,25 @@ class Descent {
     return {};
   }
 
+  /// What shapes an effect is looked for farther off, too: a ghost fits best at every half pixel, where it is between
+  /// pixels least, and a descent ends at the first of them.
+  Result<> lookFarther(State& state) const {
+    constexpr int kMostTimes = 3;
+    for (int k = 0; k < kMostTimes; ++k) {
+      auto farther = bestFarther(state);
+      if (!farther) return farther.error();
+      if (!*farther) return {};
+      if (auto done = fit(**farther); !done) return done;
+      if (!((*farther)->at.deviance < state.at.deviance - 1.0)) return {};
+      state = *std::move(*farther);
+    }
+    return {};
+  }
+
   /// The strength that is least needed goes back to nothing, one after the other; the last one of an
   /// effect stays. Standard errors only say which: those of numbers that answer for each other are large, and yet
   /// there may be no doing without one of them.
   Result<> dropNeedless(State& state) {
-    constexpr double kNeeded = 2.0;  // standard errors
     for (const std::size_t place : places_) {
       std::vector<std::string> needed;
       while (const auto least = leastStrength(fittedAt(state, place), options_.droppable, needed)) {
@@ -187,9 +234,7 @@ class Descent {
         fewer.effects[place] = without(fewer.effects[place], least->key);
         kept_.emplace(place, least->key);
         if (auto done = fit(fewer); !done) return done;
-        const auto numbers = static_cast<double>(state.free.size()) - static_cast<double>(fewer.free.size());
-        const double worse = (fewer.at.deviance - state.at.deviance) / std::max(1.0, dispersionOf(state.at));
-        if (worse > kNeeded * kNeeded * std::max(1.0, numbers)) {
+        if (isWorse(fewer, state)) {
           needed.push_back(least->key);
           kept_.erase({place, least->key});
         } else {
@@ -205,6 +250,8 @@ class Descent {
   /// they do not change here they may change elsewhere (a waveform's second harmonic is in no range).
   Result<> keepWhatIsNotTold(const std::vector<sim::AnyEffect>& began, State& state) {
     bool is_any = false;  // what stays now does not come back, so that this ends
+    const State before = state;
+    const Kept kept = kept_;
     for (std::size_t i = 0; i < places_.size(); ++i) {
       const std::size_t place = places_[i];
       const std::vector<FittedNumber> fitted = fittedAt(state, place).numbers;
@@ -221,13 +268,50 @@ class Descent {
     }
     if (!is_any) return {};
     if (auto done = fit(state); !done) return done;
+    if (isWorse(state, before)) {  // together the data tell them
+      state = before, kept_ = kept;
+      return {};
+    }
     return keepWhatIsNotTold(began, state);
   }
 
  private:
+  static constexpr double kNeeded = 2.0;  ///< standard errors
+
+  /// By more than those squared for each number that it has fewer.
+  static bool isWorse(const State& fewer, const State& state) {
+    const auto numbers = static_cast<double>(state.free.size()) - static_cast<double>(fewer.free.size());
+    const double worse = (fewer.at.deviance - state.at.deviance) / std::max(1.0, dispersionOf(state.at));
+    return worse > kNeeded * kNeeded * std::max(1.0, numbers);
+  }
+
+  /// Where one number that is no strength is a fifth, a half, once or twice of what it or its default is farther on or
+  /// back, and from where a step promises most; nothing where none promises a χ² that is 4 less.
+  Result<std::optional<State>> bestFarther(const State& state) const {
+    std::optional<State> best;
+    double least = state.at.deviance - 4.0;
+    for (const FreeNumber& one : state.free) {
+      const sim::AnyEffect& effect = state.effects[one.place];
+      const double size = std::max(std::abs(valueOf(effect, one.key)), std::abs(valueOf(defaultsOf(effect), one.key)));
+      if (isStrength(effect, one.key)) continue;
+      for (const double share : {-2.0, -1.0, -0.5, -0.2, 0.2, 0.5, 1.0, 2.0}) {
+        State there{moved(state.effects, one, share * size), state.delay_mm};
+        there.free = again(state, there.effects);
+        if (auto seen = evaluate(there); !seen) return seen.error();
+        const double promised =
+            there.at.deviance - there.at.moment.dot(pseudoInverse(there.at.gram, 1e-7).inverse * there.at.moment);
+        if (promised < least) least = promised, best = std::move(there);
+      }
+    }
+    return best;
+  }
+
   Result<> look(State& state) const {
+    constexpr int kMostTimes = 3;  // rounding alone does not grow with the step
     if (auto seen = evaluate(state); !seen) return seen;
-    return lengthenSteps(state) ? evaluate(state) : Result<>{};
+    for (int k = 0; k < kMostTimes && lengthenSteps(state); ++k)
+      if (auto seen = evaluate(state); !seen) return seen;
+    return {};
   }
 
   Result<> evaluate(State& state) const {
@@ -303,6 +387,7 @@ Result<Refitted> refit(const CampaignRows& rows, std::vector<sim::AnyEffect> eff
   State state{std::move(effects)};
   Descent descent{rows, places, options};
   if (auto done = descent.fit(state); !done) return done.error();
+  if (auto done = descent.lookFarther(state); !done) return done.error();
   if (!options.droppable.empty()) {
     if (auto done = descent.dropNeedless(state); !done) return done.error();
   }
@@ -311,7 +396,10 @@ Result<Refitted> refit(const CampaignRows& rows, std::vector<sim::AnyEffect> eff
   Refitted result{
       .effects = state.effects, .free = state.free, .deviance = at.deviance, .dispersion = dispersionOf(at)};
   const double size = std::max(1.0, result.dispersion);
-  for (const std::size_t place : places) result.fitted.push_back(fittedAt(state, place));
+  for (const std::size_t place : places) {
+    result.fitted.push_back(fittedAt(state, place));
+    addUntold(state, place, result.fitted.back());
+  }
   result.offset_mm = at.others.coefficient[0], result.gain_percent = at.others.coefficient[1];
   const Eigen::Index common = rows.hasDelay() ? kDelayColumn + 1 : kDelayColumn;
   result.moved_mm = state.delay_mm;

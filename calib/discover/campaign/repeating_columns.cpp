@@ -2,7 +2,7 @@
 #include "calib/discover/campaign/repeating_columns.h"
 
 #include <algorithm>
-#include <array>
+#include <numeric>
 #include <string>
 #include <utility>
 
@@ -14,7 +14,7 @@ namespace toftwin::discover {
 namespace {
 
 constexpr std::string_view kColumn = "column";
-constexpr std::array kPeriods{2, 4, 8};
+constexpr int kMostPeriod = 8;
 
 std::string partOf(const char* part) { return fmt::format("{}:{}", kConverterCarrier, part); }
 
@@ -26,7 +26,7 @@ std::size_t periodOf(std::span<const std::pair<Term, double>> terms) {
   for (const auto& [term, coefficient] : terms)
     for (const Factor& factor : term.factors)
       if (isOfConverter(term) && factor.shape == Shape::Modulo)
-        period = std::max(period, static_cast<std::size_t>(factor.numbers[0]));  // each is the next one's half
+        period = std::lcm(period, static_cast<std::size_t>(factor.numbers[0]));
   return period;
 }
 
@@ -35,7 +35,7 @@ std::size_t periodOf(std::span<const std::pair<Term, double>> terms) {
 std::vector<TermGroup> repeatingColumns(std::span<const CovariateInfo> covariates) {
   std::vector<TermGroup> groups;
   if (std::ranges::find(covariates, kColumn, &CovariateInfo::name) == covariates.end()) return groups;
-  for (const int period : kPeriods) {
+  for (int period = 2; period <= kMostPeriod; ++period) {
     TermGroup group{fmt::format("a charge and a gain that repeat after {} columns", period), Kind::Generic, {}, 0};
     for (const char* part : {"in_phase", "quadrature", "gain"}) {
       const bool is_gain = std::string_view{part} == "gain";

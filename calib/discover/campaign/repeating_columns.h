@@ -10,7 +10,7 @@
 
 namespace toftwin::discover {
 
-/// Charges in phase and in quadrature, and gains, of every m-th column, m = 2, 4, 8: as cameras have them whose columns
+/// Charges in phase and in quadrature, and gains, of every m-th column, m = 2 to 8: as cameras have them whose columns
 /// share converters. With the charge that all have in common, which is no cause of its own. Empty where no covariate
 /// "column" is.
 std::vector<TermGroup> repeatingColumns(std::span<const CovariateInfo> covariates);
