@@ -56,7 +56,8 @@ bool actsOnLight(const std::vector<sim::AnyEffect>& effects) {
   return std::ranges::any_of(effects, [](const auto& effect) { return stageOf(effect) == Stage::Light; });
 }
 
-/// A twentieth of what the effect has, or of a tenth of what its defaults have.
+/// A twentieth of what the effect has, or of a tenth of what its defaults have; where those have nothing, at least a ten
+/// thousandth of the bounds: a step that shrinks with a number that nothing tells is rounding alone.
 std::vector<FreeNumber> freeNumbersOf(const std::vector<sim::AnyEffect>& effects,
                                       const std::vector<std::size_t>& places) {
   std::vector<FreeNumber> all;
@@ -64,8 +65,9 @@ std::vector<FreeNumber> freeNumbersOf(const std::vector<sim::AnyEffect>& effects
     const sim::AnyEffect defaults = defaultsOf(effects[place]);
     for (const EffectNumber& number : numbersOf(effects[place])) {
       if (number.is_whole) continue;
-      double step = 0.05 * std::max(std::abs(number.value), 0.1 * std::abs(valueOf(defaults, number.key)));
-      if (step == 0.0) step = 1e-4 * (number.high - number.low);
+      const double usual = 0.1 * std::abs(valueOf(defaults, number.key));
+      double step = 0.05 * std::max(std::abs(number.value), usual);
+      if (usual == 0.0) step = std::max(step, 1e-4 * (number.high - number.low));
       if (number.value + step > number.high) step = -step;
       all.push_back({place, number.key, step});
     }

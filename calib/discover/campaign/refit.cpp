@@ -309,7 +309,7 @@ class Descent {
   Result<> look(State& state) const {
     constexpr int kMostTimes = 3;  // rounding alone does not grow with the step
     if (auto seen = evaluate(state); !seen) return seen;
-    for (int k = 0; k < kMostTimes && lengthenSteps(state); ++k)
+    for (int k = 0; k < kMostTimes && suitSteps(state); ++k)
       if (auto seen = evaluate(state); !seen) return seen;
     return {};
   }
@@ -326,20 +326,22 @@ class Descent {
     return {};
   }
 
-  /// To a standard error, those that are less than half of one: of a change that hardly shows, rounding of
-  /// images in single precision is a large part, and would pass for what no other number does. Whether any
-  /// was.
-  static bool lengthenSteps(State& state) {
-    constexpr double kEnough = 0.25;  // standard errors squared
+  /// Steps of half a standard error to four: of a change that hardly shows, rounding of images in single precision is a
+  /// large part, and would pass for what no other number does; one that shows as hundreds is no derivative.
+  static bool suits(double size) { return size >= 0.25 && size <= 16.0; }
+
+  /// To a standard error, those that do not suit. Whether any was changed.
+  static bool suitSteps(State& state) {
     bool is_any = false;
     for (std::size_t i = 0; i < state.free.size(); ++i) {
       const auto row = static_cast<Eigen::Index>(i);
       const double size = state.at.gram(row, row);
-      if (!(size > 0.0 && size < kEnough)) continue;
+      if (!(size > 0.0) || suits(size)) continue;
       FreeNumber& one = state.free[i];
-      const double longer = longestStep(state.effects[one.place], one.key, one.step / std::sqrt(size));
-      if (!(std::abs(longer) > 1.5 * std::abs(one.step))) continue;
-      one.step = longer, is_any = true;
+      const double other = longestStep(state.effects[one.place], one.key, one.step / std::sqrt(size));
+      const double ratio = std::abs(other / one.step);
+      if (!(ratio > 1.5 || ratio < 1.0 / 1.5)) continue;
+      one.step = other, is_any = true;
     }
     return is_any;
   }
@@ -354,19 +356,17 @@ class Descent {
     return all;
   }
 
-  /// The same numbers with steps that suit their effects as they are now; those that were made longer stay
-  /// so, if they are no more than two standard errors there.
+  /// The same numbers, with the steps that suited before, or were as long as they may be.
   [[nodiscard]] std::vector<FreeNumber> again(const State& before,
                                               const std::vector<sim::AnyEffect>& effects) const {
-    constexpr double kMost = 4.0;  // standard errors squared
     std::vector<FreeNumber> kept;
     for (FreeNumber& one : candidates(effects)) {
       for (std::size_t i = 0; i < before.free.size(); ++i) {
         const FreeNumber& was = before.free[i];
         const auto row = static_cast<Eigen::Index>(i);
         if (was.place != one.place || was.key != one.key) continue;
-        const double longer = longestStep(effects[one.place], one.key, was.step);
-        if (before.at.gram(row, row) < kMost && std::abs(longer) > std::abs(one.step)) one.step = longer;
+        const double size = before.at.gram(row, row), step = longestStep(effects[one.place], one.key, was.step);
+        if (suits(size) || (size < 1.0 && std::abs(step) > std::abs(one.step))) one.step = step;
         kept.push_back(one);
       }
     }
