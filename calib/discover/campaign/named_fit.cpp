@@ -78,8 +78,9 @@ class OneEffect {
     Refitted refitted;
     Gain gain;  ///< on held-out captures
   };
-  std::optional<Fitted> fit(std::vector<sim::AnyEffect> effects) const {
+  std::optional<Fitted> fit(std::vector<sim::AnyEffect> effects) {
     auto refitted = refit(rows_, std::move(effects), {place_}, options_);
+    options_.looks_farther = false;  // what has fewer strengths begins where this ends
     if (!refitted || refitted->free.empty()) return std::nullopt;
     const Gain gain = gainBeyond(before_, refitted->marginal);
     return Fitted{*std::move(refitted), gain};
@@ -130,7 +131,11 @@ std::vector<NamedFit> CampaignRows::fitNamed(std::span<const std::string> names,
     Inserted with = inserted(effects_, startOf(*this, *candidate, known, scales));
     OneEffect one{*this,
                   with.place,
-                  {.scales = scales, .terms = known, .with_numbers = true, .droppable = candidate->strengths},
+                  {.scales = scales,
+                   .terms = known,
+                   .with_numbers = true,
+                   .looks_farther = true,
+                   .droppable = candidate->strengths},
                   before};
     auto fitted = one.fit(std::move(with.effects));
     if (!fitted) continue;

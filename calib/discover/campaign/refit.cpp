@@ -156,7 +156,7 @@ class Descent {
   /// All numbers that can be told apart where the fit is now: a radius shows only once there is
   /// something that has it.
   Result<> freeWhatShows(State& state) const {
-    state.free = candidates(state.effects);
+    state.free = withSteps(state, state.effects, candidates(state.effects));
     if (auto looked = look(state); !looked) return looked;
     ToldApart apart = toldApart(state.free, state.at);
     state.untold = std::move(apart.untold);
@@ -356,21 +356,31 @@ class Descent {
     return all;
   }
 
-  /// The same numbers, with the steps that suited before, or were as long as they may be.
-  [[nodiscard]] std::vector<FreeNumber> again(const State& before,
-                                              const std::vector<sim::AnyEffect>& effects) const {
-    std::vector<FreeNumber> kept;
-    for (FreeNumber& one : candidates(effects)) {
+  /// With the steps that suited before, or were as long as they may be.
+  static std::vector<FreeNumber> withSteps(const State& before, const std::vector<sim::AnyEffect>& effects,
+                                           std::vector<FreeNumber> numbers) {
+    for (FreeNumber& one : numbers) {
       for (std::size_t i = 0; i < before.free.size(); ++i) {
         const FreeNumber& was = before.free[i];
         const auto row = static_cast<Eigen::Index>(i);
         if (was.place != one.place || was.key != one.key) continue;
         const double size = before.at.gram(row, row), step = longestStep(effects[one.place], one.key, was.step);
         if (suits(size) || (size < 1.0 && std::abs(step) > std::abs(one.step))) one.step = step;
-        kept.push_back(one);
       }
     }
-    return kept;
+    return numbers;
+  }
+
+  /// The same numbers.
+  [[nodiscard]] std::vector<FreeNumber> again(const State& before,
+                                              const std::vector<sim::AnyEffect>& effects) const {
+    std::vector<FreeNumber> kept = candidates(effects);
+    std::erase_if(kept, [&](const FreeNumber& one) {
+      return std::ranges::none_of(before.free, [&](const FreeNumber& was) {
+        return was.place == one.place && was.key == one.key;
+      });
+    });
+    return withSteps(before, effects, std::move(kept));
   }
 
   const CampaignRows& rows_;
@@ -387,7 +397,8 @@ Result<Refitted> refit(const CampaignRows& rows, std::vector<sim::AnyEffect> eff
   State state{std::move(effects)};
   Descent descent{rows, places, options};
   if (auto done = descent.fit(state); !done) return done.error();
-  if (auto done = descent.lookFarther(state); !done) return done.error();
+  if (options.looks_farther)
+    if (auto done = descent.lookFarther(state); !done) return done.error();
   if (!options.droppable.empty()) {
     if (auto done = descent.dropNeedless(state); !done) return done.error();
   }

@@ -34,6 +34,7 @@ struct RefitOptions {
   std::span<const double> scales{};    ///< of poses and light
   std::span<const TermGroup> terms{};  ///< known besides
   bool with_numbers = false;           ///< the source's effects' own numbers are nuisances
+  bool looks_farther = false;          ///< what shapes an effect may be far from where it is
   /// Numbers of these names, each of which makes an effect strong, go if the data do not need them: less than
   /// two standard errors from nothing, and χ² rises by no more than 4 for each number that goes.
   std::vector<std::string> droppable{};
