@@ -7,6 +7,7 @@
 #include <set>
 
 #include "calib/discover/campaign/carriers.h"
+#include "calib/discover/campaign/told_apart.h"
 
 namespace toftwin::discover {
 namespace {
@@ -31,70 +32,6 @@ constexpr Eigen::Index kDelayColumn = 2;  ///< behind offset and gain, poses and
 
 using Kept = std::set<std::pair<std::size_t, std::string>>;  ///< numbers that stay as they are
 
-/// Normal equations of the free numbers, everything else eliminated.
-struct Step {
-  Fit others;
-  Eigen::MatrixXd gram;
-  Eigen::VectorXd moment;
-  Eigen::VectorXd own;             ///< squares of the free numbers' columns
-  Eigen::MatrixXd others_by_free;  ///< by how much the others' coefficients fall with the free numbers'
-  double deviance = 0.0, freedom = 1.0;
-};
-
-Step stepOf(const Marginal& marginal, std::size_t free) {
-  Columns others;
-  for (Eigen::Index i = 0; i < marginal.moment.size() - static_cast<Eigen::Index>(free); ++i)
-    others.push_back(i);
-  Step step;
-  step.others = fit(marginal, others);
-  step.deviance = step.others.deviance, step.freedom = step.others.freedom;
-  const auto n = static_cast<Eigen::Index>(free);
-  const Eigen::MatrixXd cross = marginal.gram(others, Eigen::lastN(n));
-  step.others_by_free = step.others.inverse * cross;
-  step.gram = marginal.gram.bottomRightCorner(n, n) - cross.transpose() * step.others_by_free;
-  step.moment = marginal.moment.tail(n) - cross.transpose() * step.others.inverse * marginal.moment(others);
-  step.own = marginal.gram.diagonal().tail(n);
-  return step;
-}
-
-/// A number that is not told from others, and by how much those must change where it changes by 1: of a share of a charge
-/// and a loss by it, the product is told.
-struct Untold {
-  FreeNumber number;
-  Eigen::VectorXd change{};  ///< by free number
-};
-
-/// Those that are told by offset, gain and the numbers before them do not stay: of a reference temperature, an offset
-/// says all.
-struct ToldApart {
-  std::vector<FreeNumber> kept{};
-  std::vector<Untold> untold{};
-};
-ToldApart toldApart(const std::vector<FreeNumber>& free, const Step& step) {
-  constexpr double kLeast = 1e-4;  // of a column's square
-  ToldApart apart;
-  std::vector<Eigen::Index> rows, others;
-  for (std::size_t i = 0; i < free.size(); ++i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    double left = step.gram(row, row);
-    if (!rows.empty()) {
-      const Eigen::VectorXd cross = step.gram(rows, row);
-      left -= cross.dot(pseudoInverse(step.gram(rows, rows), 1e-9).inverse * cross);
-    }
-    if (!(step.own[row] > 0.0)) continue;
-    (left > kLeast * step.own[row] ? rows : others).push_back(row);
-  }
-  for (const Eigen::Index row : rows) apart.kept.push_back(free[static_cast<std::size_t>(row)]);
-  const Eigen::MatrixXd inverse = pseudoInverse(step.gram(rows, rows), 1e-9).inverse;
-  for (const Eigen::Index row : others) {
-    Untold one{free[static_cast<std::size_t>(row)], -inverse * step.gram(rows, row)};
-    for (std::size_t i = 0; i < apart.kept.size(); ++i)
-      one.change[static_cast<Eigen::Index>(i)] *= apart.kept[i].step / one.number.step;
-    apart.untold.push_back(std::move(one));
-  }
-  return apart;
-}
-
 /// A list of effects while it is fitted.
 struct State {
   std::vector<sim::AnyEffect> effects;
@@ -102,10 +39,10 @@ struct State {
   std::vector<FreeNumber> free{};
   std::vector<Untold> untold{};  ///< since what shows was looked for
   Marginal marginal{};
-  Step at{};
+  NormalEquations at{};
 };
 
-double dispersionOf(const Step& at) { return at.deviance / std::max(1.0, at.freedom); }
+double dispersionOf(const NormalEquations& at) { return at.deviance / std::max(1.0, at.freedom); }
 
 /// What a number is that nothing tells: that of an effect switched off, where it does something alone, or where the
 /// defaults have no other; else as it is.
@@ -158,7 +95,9 @@ class Descent {
   Result<> freeWhatShows(State& state) const {
     state.free = withSteps(state, state.effects, candidates(state.effects));
     if (auto looked = look(state); !looked) return looked;
-    ToldApart apart = toldApart(state.free, state.at);
+    ToldApart apart = toldApart(state.free, state.at, [this](const FreeNumber& one) {
+      return untold_.contains({one.place, one.key});
+    });
     state.untold = std::move(apart.untold);
     if (apart.kept.size() == state.free.size()) return {};
     state.free = std::move(apart.kept);
@@ -251,7 +190,7 @@ class Descent {
   Result<> keepWhatIsNotTold(const std::vector<sim::AnyEffect>& began, State& state) {
     bool is_any = false;  // what stays now does not come back, so that this ends
     const State before = state;
-    const Kept kept = kept_;
+    const Kept untold = untold_;
     for (std::size_t i = 0; i < places_.size(); ++i) {
       const std::size_t place = places_[i];
       const std::vector<FittedNumber> fitted = fittedAt(state, place).numbers;
@@ -262,14 +201,14 @@ class Descent {
         if (valueOf(state.effects[place], one.key) == was) continue;
         if (number != fitted.end() && isTold(state.effects[place], *number)) continue;
         state.effects[place] = withNumber(state.effects[place], one.key, was);
-        kept_.emplace(place, one.key);
+        untold_.emplace(place, one.key);
         is_any = true;
       }
     }
     if (!is_any) return {};
     if (auto done = fit(state); !done) return done;
     if (isWorse(state, before)) {  // together the data tell them
-      state = before, kept_ = kept;
+      state = before, untold_ = untold;
       return {};
     }
     return keepWhatIsNotTold(began, state);
@@ -322,7 +261,7 @@ class Descent {
                                               .delay_mm = state.delay_mm});
     if (!evidence) return evidence.error();
     state.marginal = marginalise(*evidence, options_.scales);
-    state.at = stepOf(state.marginal, state.free.size());
+    state.at = normalEquationsOf(state.marginal, state.free.size());
     return {};
   }
 
@@ -386,7 +325,8 @@ class Descent {
   const CampaignRows& rows_;
   const std::vector<std::size_t>& places_;
   const RefitOptions& options_;
-  Kept kept_{};
+  Kept kept_{};    ///< at nothing, as they are not needed
+  Kept untold_{};  ///< as they began
 };
 
 }  // namespace
@@ -403,7 +343,7 @@ Result<Refitted> refit(const CampaignRows& rows, std::vector<sim::AnyEffect> eff
     if (auto done = descent.dropNeedless(state); !done) return done.error();
   }
   if (auto done = descent.keepWhatIsNotTold(began, state); !done) return done.error();
-  const Step& at = state.at;
+  const NormalEquations& at = state.at;
   Refitted result{
       .effects = state.effects, .free = state.free, .deviance = at.deviance, .dispersion = dispersionOf(at)};
   const double size = std::max(1.0, result.dispersion);
