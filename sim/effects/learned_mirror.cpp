@@ -6,6 +6,7 @@
 #include "sim/effects/squares.h"
 
 namespace toftwin::sim {
+
 std::string LearnedMirror::problem() const { return problemOfSquares(reaches_px, shares_percent); }
 
 Light LearnedMirror::apply(Light light, const Conditions& now, const Random&) const {

@@ -83,9 +83,10 @@ Hidden drawn(const sim::AnyEffect& defaults, double lambda,
   std::mt19937_64 random{seed};
   const std::string name = nameOf(defaults);
   constexpr int kMostDraws = 40;  // places that this camera has not got show nothing
-  Hidden hidden{quiet(defaults), quiet(defaults)};
+  const sim::AnyEffect none = quiet(defaults);
+  Hidden hidden{none, none};
   for (int draw = 0; draw < kMostDraws; ++draw) {
-    sim::AnyEffect off = quiet(defaults);
+    sim::AnyEffect off = none;
     std::vector<EffectNumber> acting;
     std::vector<double> changes;
     for (const EffectNumber& number : numbersOf(off)) {
@@ -103,10 +104,10 @@ Hidden drawn(const sim::AnyEffect& defaults, double lambda,
     hidden = {off, off};
     // Once more, with the shapes that were drawn.
     for (std::size_t i = 0; i < acting.size(); ++i) {
-      const double alone =
-          acting[i].key.ends_with("]")              ? changes[i]
-          : changes[i] == 0.0 || acting[i].is_whole ? valueOf(defaults, acting[i].key) - acting[i].value
-                                                    : changeFor(lambda, off, acting[i], valueOf(defaults, acting[i].key), lambda_of);
+      const double typical = valueOf(defaults, acting[i].key);
+      const double alone = acting[i].key.ends_with("]")              ? changes[i]
+                           : changes[i] == 0.0 || acting[i].is_whole ? typical - acting[i].value
+                                                                     : changeFor(lambda, off, acting[i], typical, lambda_of);
       double share = std::normal_distribution{}(random);
       if (acting[i].value + share * alone < acting[i].low || acting[i].value + share * alone > acting[i].high)
         share = -share;
