@@ -261,7 +261,7 @@ Run add(Arguments& args) {
               "since power-on, as far as it takes them; auto: the simulated one, if the other is not")
       .oneOf({"auto", "a", "b", "none"})
       .showsDefault();
-  args.option("--frames", options->frames, "frames of each camera at each pose")
+  args.option("-n,--frames,--count", options->frames, "frames of each camera at each pose")
       .within(2, 100'000)
       .showsDefault();
   args.option("--frame-timeout", options->frame_timeout_s, "seconds to wait for one frame")

@@ -139,7 +139,7 @@ Command grabCommand() {
             args.option("SOURCE", options->source, "name of the camera, as `toftwin list` shows it")
                 .required();
             options->output.add(args, true);
-            args.option("-n,--count", options->count, "how many frames")
+            args.option("-n,--frames,--count", options->count, "how many frames")
                 .within(std::uint64_t{1}, std::uint64_t{1'000'000})
                 .showsDefault();
             args.option("--skip", options->skip, "frames to let pass first")

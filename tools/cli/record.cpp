@@ -206,7 +206,7 @@ Command recordCommand() {
         args.option("SOURCE", options->sources, "names of the cameras").required();
         args.option("-o,--output", options->file,
                     "file to write; with --on-daemon a name without a folder");
-        args.option("-n,--count", options->count,
+        args.option("-n,--frames,--count", options->count,
                     "end after so many frames of each camera; 0: Ctrl-C ends it")
             .showsDefault();
         args.option("--duration", options->duration_s, "end after so many seconds").notNegative();

@@ -183,7 +183,7 @@ void addCampaign(Arguments& args, RenderOptions& options) {
   args.option("--trajectory", options.trajectory,
               "poses of the camera (.toml or .csv): between times it moves, without times each "
               "pose gives a frame");
-  args.option("--frames", options.frames,
+  args.option("-n,--frames,--count", options.frames,
               "how many; default: from the first pose of the trajectory to the last, or 1")
       .within(std::uint64_t{1}, std::uint64_t{100'000'000});
   args.option("--frame-interval-ms", options.frame_interval_ms,

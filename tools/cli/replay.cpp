@@ -200,7 +200,7 @@ Command replayCommand() {
             args.option("--from", options->from_s,
                         "begin so many seconds after the recording's start")
                 .notNegative();
-            args.option("-n,--count", options->count, "only so many frames; 0: all").showsDefault();
+            args.option("-n,--frames,--count", options->count, "only so many frames; 0: all").showsDefault();
             options->output.add(args, false);
             args.flag("--json", options->json, "list: one JSON object a line");
             args.flag("--serve", options->should_serve,

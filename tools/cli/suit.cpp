@@ -54,7 +54,7 @@ Run add(Arguments& args) {
   args.option("--samples-per-pixel", options->samples_per_pixel, "instead of the file's: light paths")
       .within(1, 65'536);
   args.option("--repeats", options->repeats, "instead of the file's: independent simulations").within(2, 100);
-  args.option("--frames", options->frames, "instead of the file's: frames at each pose").within(2, 10'000);
+  args.option("-n,--frames,--count", options->frames, "instead of the file's: frames at each pose").within(2, 10'000);
   args.flag("--no-causes", options->no_causes,
             "do not look for what spoils a failure, which takes a third of the time");
   args.flag("--check", options->is_check, "read the file and what it names, and simulate nothing");
