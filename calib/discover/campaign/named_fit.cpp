@@ -2,6 +2,7 @@
 // Effects of the catalogue, fitted to a campaign as they are.
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/refit.h"
@@ -124,6 +125,11 @@ std::vector<NamedFit> CampaignRows::fitNamed(std::span<const std::string> names,
   if (!plain) return fits;
   const Marginal without = marginalise(*plain, scales);
   const std::vector<double> before = heldOut(without, allBut(without, 0));
+  std::optional<Gain> best;
+  const auto maybeBest = [&](const Gain& gain) {
+    constexpr double kErrors = 3.0;
+    return !best || best->total - gain.total <= kErrors * difference(*best, gain).error;
+  };
   for (const std::string& name : names) {
     const auto candidate =
         std::ranges::find_if(candidates_, [&](const Candidate& one) { return nameOf(one.example) == name; });
@@ -139,7 +145,9 @@ std::vector<NamedFit> CampaignRows::fitNamed(std::span<const std::string> names,
                   before};
     auto fitted = one.fit(std::move(with.effects));
     if (!fitted) continue;
-    const auto [refitted, gain] = one.withoutNeedless(*std::move(fitted));
+    // Which of its strengths are needless is of no matter where another effect explains far more.
+    const auto [refitted, gain] = maybeBest(fitted->gain) ? one.withoutNeedless(*std::move(fitted)) : *std::move(fitted);
+    if (!best || gain.total > best->total) best = gain;
     NamedFit fit{.name = name, .gain = gain};
     CampaignFit own{refitted.effects[with.place]};
     for (const FittedNumber& number : refitted.fitted.front().numbers) {

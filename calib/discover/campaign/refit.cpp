@@ -6,6 +6,7 @@
 #include <optional>
 #include <set>
 
+#include "calib/discover/campaign/bounded_step.h"
 #include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/told_apart.h"
 
@@ -106,13 +107,14 @@ class Descent {
 
   Result<> descend(State& state) const {
     constexpr int kMostSteps = 10;
-    constexpr double kDone = 0.1;           // of the deviance: a tenth of a standard error squared
+    constexpr double kDone = 0.1;     // standard errors squared: what is left is no chance's size
+    constexpr double kNothing = 1e-3;  // of them are not worth a step
     constexpr double kMostDelay_mm = 20.0;  // at once
     double damping = 1e-3;
     for (int k = 0; k < kMostSteps && !state.free.empty() && damping < 1e8; ++k) {
-      Eigen::MatrixXd damped = state.at.gram;
-      damped.diagonal() *= 1.0 + damping;
-      const Eigen::VectorXd change = pseudoInverse(damped, 1e-7).inverse * state.at.moment;
+      const double noise = std::max(1.0, dispersionOf(state.at)), promised = promiseOf(state);
+      if (promised < kNothing * noise) break;
+      const Eigen::VectorXd change = boundedStep(state.effects, state.free, state.at, damping).change;
       State next{state.effects, state.delay_mm};
       if (rows_.hasDelay())
         next.delay_mm += std::clamp(
@@ -127,7 +129,9 @@ class Descent {
       if (better > 0.0) {
         state = std::move(next);
         damping = std::max(1e-9, 0.1 * damping);
-        if (better < kDone) break;
+        if (better < kDone * noise) break;
+      } else if (promised < kDone * noise) {
+        break;
       } else {
         damping *= 30.0;
       }
@@ -217,6 +221,15 @@ class Descent {
  private:
   static constexpr double kNeeded = 2.0;  ///< standard errors
 
+  /// By how much χ² may fall, the light's delay being moved, too.
+  [[nodiscard]] double promiseOf(const State& state) const {
+    const double promised = boundedStep(state.effects, state.free, state.at).promised;
+    if (!rows_.hasDelay()) return promised;
+    const Fit& others = state.at.others;
+    const double delay = others.coefficient[kDelayColumn], variance = others.inverse(kDelayColumn, kDelayColumn);
+    return promised + (variance > 0.0 ? delay * delay / variance : 0.0);
+  }
+
   /// By more than those squared for each number that it has fewer.
   static bool isWorse(const State& fewer, const State& state) {
     const auto numbers = static_cast<double>(state.free.size()) - static_cast<double>(fewer.free.size());
@@ -224,21 +237,24 @@ class Descent {
     return worse > kNeeded * kNeeded * std::max(1.0, numbers);
   }
 
-  /// Where one number that is no strength is a fifth, a half, once or twice of what it or its default is farther on or
-  /// back, and from where a step promises most; nothing where none promises a χ² that is 4 less.
+  /// Where one number that does nothing by itself is a fifth, a half, once or twice of what it or its default is farther
+  /// on or back, and from where most is promised by how strong the effect is there, which is what is linear; nothing
+  /// where none promises a χ² that is 4 less.
   Result<std::optional<State>> bestFarther(const State& state) const {
     std::optional<State> best;
     double least = state.at.deviance - 4.0;
     for (const FreeNumber& one : state.free) {
       const sim::AnyEffect& effect = state.effects[one.place];
       const double size = std::max(std::abs(valueOf(effect, one.key)), std::abs(valueOf(defaultsOf(effect), one.key)));
-      if (isStrength(effect, one.key)) continue;
+      if (isStrength(effect, one.key) || std::ranges::count(options_.droppable, one.key) > 0) continue;
       for (const double share : {-2.0, -1.0, -0.5, -0.2, 0.2, 0.5, 1.0, 2.0}) {
         State there{moved(state.effects, one, share * size), state.delay_mm};
         there.free = again(state, there.effects);
+        std::erase_if(there.free, [&](const FreeNumber& other) {
+          return !isStrength(there.effects[other.place], other.key);
+        });
         if (auto seen = evaluate(there); !seen) return seen.error();
-        const double promised =
-            there.at.deviance - there.at.moment.dot(pseudoInverse(there.at.gram, 1e-7).inverse * there.at.moment);
+        const double promised = there.at.deviance - boundedStep(there.effects, there.free, there.at).promised;
         if (promised < least) least = promised, best = std::move(there);
       }
     }
