@@ -204,6 +204,7 @@ Result<> capturePose(Feed& a, Feed& b, std::optional<Follower>& follower, const 
         for (std::string& one : missingPlanes(*frame)) result.warnings.push_back(std::move(one));
       }
       result.warnings.push_back(sameSeedWarning(frame_a, frame_b));
+      result.warnings.push_back(momentWarning(frame_a, frame_b));
       if (!a.isRecorded()) result.warnings.push_back(clockWarning(frame_a, a.opened()));
       if (!b.isRecorded()) result.warnings.push_back(clockWarning(frame_b, b.opened()));
       std::erase(result.warnings, "");

@@ -2,6 +2,8 @@
 #include "calib/compare/follow.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 
 #include <fmt/format.h>
 
@@ -31,6 +33,32 @@ std::vector<MomentSetting> settingsOf(const Frame& frame, const Carrier* carrier
   if (room != temperatures.end()) all.push_back({kRoom, room->value.in(celsius)});
   if (const auto exposure = longestExposure(frame)) all.push_back({kExposure, exposure->in(microsecond)});
   return all;
+}
+
+std::string momentWarning(const Frame& a, const Frame& b) {
+  struct Tolerance {
+    std::string_view parameter;
+    double absolute, relative;
+    const char* words;
+  };
+  constexpr std::array kTolerances{Tolerance{kExposure, 0.0, 0.02, "exposure of {:.5g} and {:.5g} µs"},
+                                   Tolerance{kAmbient, 0.1, 0.1, "ambient light of {:.3g} and {:.3g} klx"},
+                                   Tolerance{kRoom, 2.0, 0.0, "a room of {:.3g} and {:.3g} °C"},
+                                   Tolerance{kSincePowerOn, 60.0, 0.1, "{:.4g} and {:.4g} s since power-on"}};
+  const auto of_a = settingsOf(a, nullptr), of_b = settingsOf(b, nullptr);
+  std::vector<std::string> differ;
+  for (const Tolerance& one : kTolerances) {
+    const auto isIt = [&](const MomentSetting& setting) { return setting.parameter == one.parameter; };
+    const auto first = std::ranges::find_if(of_a, isIt), second = std::ranges::find_if(of_b, isIt);
+    if (first == of_a.end() || second == of_b.end()) continue;
+    const double apart = std::abs(second->value - first->value),
+                 larger = std::max(std::abs(first->value), std::abs(second->value));
+    if (apart > std::max(one.absolute, one.relative * larger))
+      differ.push_back(fmt::format(fmt::runtime(one.words), first->value, second->value));
+  }
+  if (differ.empty()) return {};
+  return fmt::format("A and B did not measure alike: {}. What this changes is in B − A and in the noise.",
+                     fmt::join(differ, ", "));
 }
 
 Feed* twinOf(Feed& a, Feed& b) {

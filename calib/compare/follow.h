@@ -33,6 +33,10 @@ struct MomentSetting {
 /// the carrier where the camera does not know it.
 std::vector<MomentSetting> settingsOf(const Frame& frame, const Carrier* carrier);
 
+/// By what the moments of two frames differ, where both say it, in a sentence: exposure by over 2 %, ambient light by over
+/// 10 % and 0.1 klx, the room's temperature by over 2 °C, time since power-on by over 10 % and a minute. Empty: by nothing.
+std::string momentWarning(const Frame& a, const Frame& b);
+
 /// The camera of the two that is simulated, if the other one is not.
 Feed* twinOf(Feed& a, Feed& b);
 

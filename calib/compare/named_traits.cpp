@@ -74,6 +74,7 @@ std::string detailsOf(const NamedTrait& one) {
   std::string all = one.detail;
   const auto add = [&all](std::string_view text) { (all += all.empty() ? "" : ", ") += text; };
   if (const auto* line = std::get_if<OnLine>(&one.trait.refers_to)) add(placeInWords(line->at_m));
+  if (const AtSignal* at = signalOf(one.trait); at != nullptr && !at->place.empty()) add(kAtSignalOf + at->place);
   if (isUnseenPart(one)) add(kUnseen);
   if (!one.trait.doubt.empty()) add(kInDoubt);
   return all;

@@ -61,8 +61,10 @@ class TraitCollector {
   NamedTraits found_;
 };
 
-/// What a number cannot be read without: its detail, where on its line it is told, and whether it is in doubt, with
-/// commas between them. Empty: nothing.
+/// How details of a part of a noise law begin, if it is said where its signal is that.
+inline const std::string kAtSignalOf = "at the signal of ";
+/// What a number cannot be read without: its detail, where on its line or at which signal it is told, and whether it is
+/// in doubt, with commas between them. Empty: nothing.
 std::string detailsOf(const NamedTrait& one);
 /// Whether details, as a log keeps them, say that the number is in doubt.
 bool isInDoubt(std::string_view details);

@@ -107,20 +107,36 @@ Result<SeenPlane> fitPlane(const Image<float>& range_m, const CameraInfo& camera
                    .pixels = used};
 }
 
+namespace {
+
+/// Σ n nᵀ of the planes' normals: how much they say of each direction.
+Eigen::Matrix3d spreadOf(std::span<const KnownPlane> planes) {
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  for (const KnownPlane& plane : planes) spread += eigenOf(plane.normal.v) * eigenOf(plane.normal.v).transpose();
+  return spread;
+}
+
+Error refuse(const char* why) {
+  return {Error::Code::InvalidArgument, fmt::format("a pose from planes: {}", why)};
+}
+
+}  // namespace
+
+Result<> tellThePose(std::span<const KnownPlane> planes) {
+  if (planes.size() < 3) return refuse("it takes three planes");
+  if (linear::eigenvalues(spreadOf(planes))[0] < 0.02)
+    return refuse("the planes' normals lie nearly in one plane, so that the camera may slide along them");
+  return {};
+}
+
 Result<KnownPose<World, Camera>> poseFromPlanes(std::span<const SeenPlane> seen,
                                                 std::span<const KnownPlane> known) {
-  const auto refuse = [](const char* why) {
-    return Error{Error::Code::InvalidArgument, fmt::format("a pose from planes: {}", why)};
-  };
   if (seen.size() != known.size()) return refuse("each plane that is seen needs the one that it is");
-  if (seen.size() < 3) return refuse("it takes three planes");
-  Eigen::Matrix3d turn = Eigen::Matrix3d::Zero(), spread = Eigen::Matrix3d::Zero();
-  for (std::size_t i = 0; i < seen.size(); ++i) {
+  if (auto told = tellThePose(known); !told) return told.error();
+  const Eigen::Matrix3d spread = spreadOf(known);
+  Eigen::Matrix3d turn = Eigen::Matrix3d::Zero();
+  for (std::size_t i = 0; i < seen.size(); ++i)
     turn += eigenOf(known[i].normal.v) * eigenOf(seen[i].normal.v).transpose();
-    spread += eigenOf(known[i].normal.v) * eigenOf(known[i].normal.v).transpose();
-  }
-  if (linear::eigenvalues(spread)[0] < 0.02)
-    return refuse("the planes' normals lie nearly in one plane, so that the camera may slide along them");
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd{turn, Eigen::ComputeFullU | Eigen::ComputeFullV};
   Eigen::Matrix3d rotation = svd.matrixU() * svd.matrixV().transpose();
   if (rotation.determinant() < 0.0)

@@ -32,8 +32,10 @@ struct KnownPlane {
   double distance_m = 0.0;
 };
 
-/// Where the camera stands that sees these planes, one by one. Error: fewer than three planes whose normals
-/// span space. Least squares in m weighted by the planes' covariances.
+/// Whether these planes tell a camera's pose. Error: fewer than three, or normals that do not span space.
+Result<> tellThePose(std::span<const KnownPlane> planes);
+
+/// Where the camera stands that sees these planes, one by one. Error: planes that do not tell it. Least squares in m weighted by the planes' covariances.
 Result<KnownPose<World, Camera>> poseFromPlanes(std::span<const SeenPlane> seen,
                                                 std::span<const KnownPlane> known);
 

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cmath>
 #include <ctime>
+#include <fstream>
 #include <optional>
 #include <set>
 #include <sstream>
@@ -21,6 +22,7 @@
 #include "protocol/record/recording.h"
 #include "protocol/settings/settings.h"
 #include "protocol/types/counted.h"
+#include "sim/images/content_hash.h"
 
 namespace toftwin::plan {
 namespace {
@@ -35,10 +37,22 @@ std::string today() {
 
 /// What a run's own files say of it.
 struct RunFiles {
+  std::vector<std::string> skipped;  ///< blocks
   Plan plan;
   Schedule schedule;
   std::string camera_a, camera_b;  ///< source, model and serial number
 };
+
+/// Error: the plan beside the captures is not the one that they were captured by.
+Result<> checkPlan(const std::filesystem::path& folder, const std::string& captured_by) {
+  std::stringstream text;
+  text << std::ifstream{folder / kPlanFile, std::ios::binary}.rdbuf();
+  if (captured_by.empty() || sim::contentHash(text.str()) == captured_by) return {};
+  return Error{Error::Code::InvalidArgument,
+               fmt::format("{}: is not the plan that was captured: {} names another one by its hash. Put the plan back "
+                           "as it was; a changed plan is measured into a folder of its own",
+                           (folder / kPlanFile).string(), kRunFile)};
+}
 
 Result<RunFiles> readRun(const std::filesystem::path& folder) {
   auto table = settings::Table::load(folder / kRunFile);
@@ -52,11 +66,12 @@ Result<RunFiles> readRun(const std::filesystem::path& folder) {
     name.erase(0, name.find_first_not_of(' '));
     if (!name.empty()) skip.push_back(name);
   }
+  if (auto same = checkPlan(folder, table->text("plan").value_or("")); !same) return same.error();
   auto plan = loadPlan(folder / kPlanFile, skip);
   if (!plan) return plan.error();
   auto schedule = scheduleOf(*plan);
   if (!schedule) return schedule.error();
-  return RunFiles{*std::move(plan), *std::move(schedule), table->text("a").value_or(""),
+  return RunFiles{std::move(skip), *std::move(plan), *std::move(schedule), table->text("a").value_or(""),
                   table->text("b").value_or("")};
 }
 
@@ -177,19 +192,20 @@ std::vector<std::string> warningsOf(const RunFiles& files, const std::map<std::s
         "A person took a camera to its poses: that both stood where the plan says is taken on trust.");
   }
   double place_mm = 0.0, turn_deg = 0.0;
-  std::size_t seen = 0;
+  std::size_t seen = 0, by_rig = 0;
   for (const CaptureRecord& one : taken) {
     if (!one.pose_half_widths) continue;
     const auto& h = *one.pose_half_widths;
     place_mm = std::max(place_mm, 1e3 * std::hypot(h[3], h[4], h[5]));
     turn_deg = std::max(turn_deg, 57.29577951308232 * std::hypot(h[0], h[1], h[2]));
-    ++seen;
+    ++(one.pose_by == kByBoardAndRig ? by_rig : seen);
   }
-  if (seen > 0) {
+  if (seen + by_rig > 0) {
+    const std::string rigs = by_rig > 0 ? fmt::format(", {} by the rig from where they had seen the board,", by_rig) : "";
     warnings.push_back(
-        fmt::format("{} of {} poses are by what the cameras saw, known to {:.2f} mm and {:.3f}° (95 %, the worst "
+        fmt::format("{} of {} poses are by what the cameras saw{} known to {:.2f} mm and {:.3f}° (95 %, the worst "
                     "of them): errors of range that are as small may be the pose's.",
-                    seen, taken.size(), place_mm, turn_deg));
+                    seen, taken.size(), rigs.empty() ? "," : rigs, place_mm, turn_deg));
   }
   warnings.insert(warnings.end(), notes.begin(), notes.end());
   const auto moving = std::ranges::count_if(taken, [](const CaptureRecord& one) { return !standsStill(one); });
@@ -282,7 +298,7 @@ Result<compare::WrittenReport> compareRun(const CompareRunJob& job, compare::Pro
   if (!run) return run.error();
   run->plan = files->plan.name, run->is_locked = job.locked;
   const auto planned = std::ranges::count(files->schedule.captures, job.locked, &PlannedCapture::is_locked);
-  auto made_with = settingsOf(files->plan, records, static_cast<std::size_t>(planned), *hash);
+  auto made_with = settingsOf(files->plan, files->skipped, records, static_cast<std::size_t>(planned), *hash);
   run->settings.insert(run->settings.begin(), made_with.begin(), made_with.end());
   for (std::string& one : warningsOf(*files, *index, records)) {
     // What the index notes may have been found again.

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "calib/compare/statistics.h"
+#include "calib/compare/traits/common_reference.h"
 
 namespace toftwin::plan {
 namespace {
@@ -137,6 +138,10 @@ void addOverDistance(const ComparedRun& run, std::size_t camera, TraitCollector&
     }
     if (rows.x.empty()) continue;  // said of the noise of frames
     auto fitted = fittedOverDistance(rows, frequenciesOfNoise(run, camera, name));
+    const auto nearest = fmt::format("{:.3g} m", std::ranges::min(rows.x));
+    for (std::size_t i = 0; fitted && i < fitted->traits.size(); ++i) {
+      if (compare::AtSignal* at = compare::signalOf(fitted->traits[i]); at != nullptr) at->place = nearest;
+    }
     if (fitted && std::string_view{name} == kPattern) nameAsPattern(fitted->traits);
     all.add(std::move(rows), fitted);
   }
@@ -147,6 +152,21 @@ void scaleToLargest(std::vector<double>& signal) {
   if (signal.empty()) return;
   const double most = std::ranges::max(signal);
   for (double& one : signal) one /= most;
+}
+
+/// Where the signal is largest: another run's may be largest elsewhere, and what is told at it is another number then.
+void namePlace(const ComparedRun& run, const NamedRows& rows, std::vector<compare::Trait>& traits) {
+  const auto recordOf = [&](std::size_t number) {
+    const auto numberOf = [](const ComparedCapture& one) { return one.record.number; };
+    const auto found = std::ranges::find(run.captures, number, numberOf);
+    return found == run.captures.end() ? nullptr : &found->record;
+  };
+  const auto largest = static_cast<std::size_t>(std::ranges::max_element(rows.x) - rows.x.begin());
+  const CaptureRecord* record = recordOf(rows.condition[largest]);
+  // Which of a condition's repeats has most is chance.
+  if (const CaptureRecord* first = record->again ? recordOf(*record->again) : nullptr; first != nullptr) record = first;
+  for (compare::Trait& one : traits)
+    if (compare::AtSignal* at = compare::signalOf(one); at != nullptr) at->place = record->name;
 }
 
 /// Cameras have units of signal of their own: what both are told at is the light of the capture at which both
@@ -162,17 +182,15 @@ void relateTo(const NamedRows& other, const NamedRows& rows, std::vector<compare
     most = both, at_it = rows.x[i], unit = fmt::format("the signal of capture {}", rows.condition[i]);
   }
   for (compare::Trait& one : traits) {
-    auto* law = std::get_if<compare::LawAtSignal>(&one.refers_to);
-    auto* at = law != nullptr ? &law->at : std::get_if<compare::AtSignal>(&one.refers_to);
-    if (at != nullptr) at->most /= at_it, at->unit = unit;
+    if (compare::AtSignal* at = compare::signalOf(one); at != nullptr) at->most /= at_it, at->unit = unit;
   }
 }
 
-void addLaw(NamedRows rows, const NamedRows& other, std::span<const double> frequency_hz,
+void addLaw(const ComparedRun& run, NamedRows rows, const NamedRows& other, std::span<const double> frequency_hz,
             TraitCollector& all) {
   scaleToLargest(rows.x);
   auto fitted = compare::fittedNoiseLaw(rows.x, rows.y, frequency_hz);
-  if (fitted) relateTo(other, rows, fitted->traits);
+  if (fitted) relateTo(other, rows, fitted->traits), namePlace(run, rows, fitted->traits);
   if (fitted && rows.what == kPatternOverAmplitude) nameAsPattern(fitted->traits);
   all.add(std::move(rows), fitted);
 }
@@ -216,7 +234,7 @@ void addNoiseLaw(const ComparedRun& run, std::size_t camera, TraitCollector& all
                     "fitted",
                     kCameras[camera]));
   }
-  addLaw(std::move(rows), noiseOverSignal(run, 1 - camera), run.frequency_hz[camera], all);
+  addLaw(run, std::move(rows), noiseOverSignal(run, 1 - camera), run.frequency_hz[camera], all);
 }
 
 }  // namespace
@@ -230,7 +248,7 @@ void addNoiseTraits(const ComparedRun& run, TraitCollector& all) {
     if (std::ranges::any_of(run.captures, isWall)) addNoiseOfFrames(run, camera, all);
     addOverDistance(run, camera, all);
     if (NamedRows rows = patternOverAmplitude(run, camera); !rows.x.empty())
-      addLaw(std::move(rows), patternOverAmplitude(run, 1 - camera), {}, all);
+      addLaw(run, std::move(rows), patternOverAmplitude(run, 1 - camera), {}, all);
   }
 }
 

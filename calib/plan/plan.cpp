@@ -99,14 +99,18 @@ void checkPoseFrom(const Plan& plan, const BlockSpec& block, Table& table) {
     const auto told = board ? intrinsics::tellsItsPose(*board) : Result<>{board.error()};
     if (!told) table.complain("pose_from", fmt::format("needs another [board]: {}", told.error().message));
   }
-  if (block.pose_from == PoseFrom::Planes && plan.planes.size() < 3)
-    table.complain("pose_from", "needs three [[plane]]s or more: fewer leave the camera free to slide");
   if (block.pose_from != PoseFrom::Command && block.kind == Kind::Dark)
     table.complain("pose_from", "has no meaning for kind = \"dark\": nothing is seen there");
   for (const PlaneSpec& plane : plan.planes) {
-    if (std::hypot(plane.normal[0], plane.normal[1], plane.normal[2]) < 1e-9)
-      table.complain("pose_from", "needs planes whose normal has a length other than 0");
+    if (std::hypot(plane.normal[0], plane.normal[1], plane.normal[2]) >= 1e-9) continue;
+    table.complain("pose_from", "needs planes whose normal has a length other than 0");
+    return;
   }
+  if (block.pose_from != PoseFrom::Planes) return;
+  std::vector<intrinsics::KnownPlane> known;
+  for (const PlaneSpec& plane : plan.planes) known.push_back(plane.known());
+  if (auto told = intrinsics::tellThePose(known); !told)
+    table.complain("pose_from", fmt::format("needs three [[plane]]s or more that span space: {}", told.error().message));
 }
 
 /// What each kind needs so that it can do what it is for.

@@ -31,7 +31,6 @@ Eigen::Matrix3d matrixOf(const Transform<To, From>& t) {
   return Eigen::Quaterniond{q[0], q[1], q[2], q[3]}.normalized().toRotationMatrix();
 }
 Eigen::Vector3d vectorOf(const Vec3d& v) { return {v.x, v.y, v.z}; }
-Vec3d threeOf(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
 Eigen::Matrix3d crossOf(const Eigen::Vector3d& v) {
   Eigen::Matrix3d m;
   m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
@@ -119,10 +118,7 @@ Result<SeenPose> byPlanes(const Plan& plan, std::span<const Frame> frames, Trans
   const auto range_m = meanOf(frames, [](const Frame& frame) { return compare::rangeOf(frame); });
   if (!range_m) return range_m.error();
   std::vector<intrinsics::KnownPlane> planes;
-  for (const PlaneSpec& one : plan.planes) {
-    const Vec3d normal = normalised(threeOf(one.normal));
-    planes.push_back({{normal}, dot(normal, threeOf(one.point_m))});
-  }
+  for (const PlaneSpec& one : plan.planes) planes.push_back(one.known());
   KnownPose<World, Camera> known;
   std::size_t used = 0, counted = 0;
   for (int round = 0; round < 3; ++round) {
@@ -201,7 +197,7 @@ Result<SeenPose> PoseFinder::find(PoseFrom from, std::span<const Frame> frames,
   found.world_from_camera = world_from_board * seen.pose;
   found.half_widths =
       arrayOf(intrinsics::halfWidths(slope * seen.covariance * slope.transpose(), seen.degrees));
-  found.by = "rig with the board's help";
+  found.by = kByBoardAndRig;
   found.what = fmt::format("the camera's place on the rig from {} captures, misfit {:.2f}",
                            memory_->views.size(), known->misfit);
   const auto& h = found.half_widths;

@@ -15,6 +15,9 @@
 
 namespace toftwin::plan {
 
+/// Of poses that the rig told by where the cameras had seen the board before.
+inline constexpr const char* kByBoardAndRig = "rig with the board's help";
+
 /// Where a camera stood, by what it saw.
 struct SeenPose {
   Transform<World, Camera> world_from_camera{};

@@ -8,6 +8,7 @@
 #include <toftwin/units.h>
 
 #include "calib/compare/poses.h"
+#include "calib/intrinsics/planes.h"
 #include "calib/intrinsics/target.h"
 
 namespace toftwin::plan {
@@ -76,6 +77,10 @@ struct PlaneSpec {
     v.numbers("normal", normal, {-1.0, 1.0}, "of it, towards the cameras; any length but 0");
     v.quantity("within", within, millimetre, {0.1, 10'000.0},
                "pixels so near to where it is expected are of it");
+  }
+  [[nodiscard]] intrinsics::KnownPlane known() const {
+    const Vec3d n = normalised(Vec3d{normal[0], normal[1], normal[2]});
+    return {{n}, dot(n, Vec3d{point_m[0], point_m[1], point_m[2]})};
   }
 };
 

@@ -35,8 +35,9 @@ CameraName cameraNameOf(const std::string& text) {
   return name;
 }
 
-std::vector<RunSetting> settingsOf(const Plan& plan, const std::vector<CaptureRecord>& records,
-                                   std::size_t planned, const std::string& index_sha256) {
+std::vector<RunSetting> settingsOf(const Plan& plan, const std::vector<std::string>& skipped,
+                                   const std::vector<CaptureRecord>& records, std::size_t planned,
+                                   const std::string& index_sha256) {
   std::set<double> exposures, ambients;
   std::set<std::string> poses_by;
   for (const CaptureRecord& one : records) {
@@ -45,6 +46,7 @@ std::vector<RunSetting> settingsOf(const Plan& plan, const std::vector<CaptureRe
   }
   return {{"", "plan", plan.name},
           {"", "plan_seed", std::to_string(plan.seed)},
+          {"", "skipped", fmt::format("{}", fmt::join(skipped, ", "))},
           {"", "captures", std::to_string(records.size())},
           {"", "captures_planned", std::to_string(planned)},
           {"", "exposure_us", valuesOf(exposures)},

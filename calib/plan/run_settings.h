@@ -25,11 +25,12 @@ struct CameraName {
 };
 CameraName cameraNameOf(const std::string& text);
 
-/// Of the run: plan, its seed, the captures of so many `planned`, and the settings that were gone through. Of each
-/// camera: which it is, and what its first frame says: kind, resolution, frequencies, ids of calibration, scene and
-/// model, seed, effects.
-std::vector<RunSetting> settingsOf(const Plan& plan, const std::vector<CaptureRecord>& records,
-                                   std::size_t planned, const std::string& index_sha256);
+/// Of the run: plan, its seed, the blocks that were `skipped`, the captures of so many `planned`, and the settings that
+/// were gone through. Of each camera: which it is, and what its first frame says: kind, resolution, frequencies, ids of
+/// calibration, scene and model, seed, effects.
+std::vector<RunSetting> settingsOf(const Plan& plan, const std::vector<std::string>& skipped,
+                                   const std::vector<CaptureRecord>& records, std::size_t planned,
+                                   const std::string& index_sha256);
 std::vector<RunSetting> settingsOf(const char* of, const std::string& camera, const Frame& first);
 
 /// A row for each name; the run's own stand under A and B alike.

@@ -34,6 +34,12 @@ std::string titleOf(const LoggedTrait& one) {
                      camerasOf(one.trait.of, one.run), one.run.plan, one.run.is_locked ? ", locked captures" : "");
 }
 
+/// Of parts of a noise law, whose signal is that: its details; empty: of none, or not known, as of an older log.
+std::string signalOf(const TrendRow& row) {
+  std::string details = compare::withoutDoubt(row.at.trait.detail);
+  return details.starts_with(compare::kAtSignalOf) ? details : "";
+}
+
 /// Rows by when their runs began, and which of them is the first.
 TrendSeries seriesOf(const std::vector<const LoggedTrait*>& numbers, const std::vector<LoggedRun>& runs) {
   TrendSeries series{.title = titleOf(*numbers.front())};
@@ -52,7 +58,12 @@ TrendSeries seriesOf(const std::vector<const LoggedTrait*>& numbers, const std::
   if (first == series.rows.end()) first = std::ranges::find(series.rows, true, &TrendRow::is_told);
   first->is_first = true;
   const bool is_first_in_doubt = isInDoubt(*first), is_first_of_one = first->at.run.isOfOneCamera();
-  for (TrendRow& row : series.rows) row.is_first_of_one_camera = is_first_of_one;
+  const std::string signal = signalOf(*first);
+  for (TrendRow& row : series.rows) {
+    row.is_first_of_one_camera = is_first_of_one, row.first_planned = first->at.run.planned;
+    const std::string own = row.is_told ? signalOf(row) : "";
+    row.is_of_another_signal = !own.empty() && !signal.empty() && own != signal;
+  }
   for (TrendRow& row : series.rows) row.is_in_doubt = row.is_told && (is_first_in_doubt || isInDoubt(row));
   return series;
 }

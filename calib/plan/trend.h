@@ -19,11 +19,13 @@ struct TrendRow {
   double change = 0.0, low = 0.0, high = 0.0;
   bool is_in_doubt = false;  ///< it, or the first: what it is held against
   bool is_first_of_one_camera = false;  ///< so that nothing is held against it
+  bool is_of_another_signal = false;  ///< than the first, as a part of a noise law: another number under its name
+  std::int64_t first_planned = 0;  ///< captures of the first's plan, without blocks that were skipped; 0: not known
   /// A run that is not through may lack just those captures that would have made the number what it was; of one in which
   /// one camera was given twice nothing is known of the other.
   [[nodiscard]] bool isJudged() const {
-    return is_told && !is_first && !is_in_doubt && !is_first_of_one_camera && !at.run.isUnfinished() &&
-           !at.run.isOfOneCamera();
+    return is_told && !is_first && !is_in_doubt && !is_first_of_one_camera && !is_of_another_signal &&
+           !at.run.isUnfinished() && !at.run.isOfOneCamera();
   }
   [[nodiscard]] bool isChanged() const { return isJudged() && (low > 0.0 || high < 0.0); }
 };

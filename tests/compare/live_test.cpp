@@ -248,6 +248,17 @@ TEST_F(Live, OneSeedIsSaid) {
   EXPECT_EQ(captured->same.ofB(), 2U);
 }
 
+TEST_F(Live, MomentsThatDifferAreSaid) {
+  SourceFeed a{"a", sourceToml(1, 0.0)}, b{"b", sourceToml(2, 0.0)};
+  ASSERT_TRUE(b.setParameter(kAmbient, 3.0));
+  ASSERT_TRUE(b.setParameter(kSincePowerOn, 9000.0));
+  const auto captured = capture(a, b, {.frames = 2}, silent);
+  ASSERT_TRUE(captured.ok()) << captured.error().message;
+  EXPECT_THAT(captured->warnings, testing::ElementsAre(testing::AllOf(
+                                      HasSubstr("ambient light of 0 and 3 klx"), HasSubstr("9000 s since power-on"),
+                                      testing::Not(HasSubstr("exposure")), testing::Not(HasSubstr("room")))));
+}
+
 TEST_F(Live, CamerasThatLookOtherwiseAreSaidByHowMuch) {
   SourceFeed a{"a", sourceToml(1, 0.0)}, b{"b", sourceToml(2, 0.0) + "euler_deg = [0, 3, 0]\n"};
   const auto captured = capture(a, b, {.frames = 2}, silent);

@@ -316,6 +316,14 @@ TEST_F(LookAround, SaysWhatIsMissing) {
                   .error()
                   .message,
               HasSubstr("needs three [[plane]]s"));
+  const auto plane = [](const char* normal, double z) {
+    return fmt::format("[[plane]]\nnormal = {}\npoint_m = [0, 0, {}]\n", normal, z);
+  };
+  const std::string parallel = plane("[0, 0, -1]", 2.0) + plane("[0, 0, -1]", 2.5) + plane("[0, 0, -1]", 3.0);
+  EXPECT_THAT(parsePlan(parallel + "[[block]]\nname = 'b'\nkind = 'locked'\npose_from = 'planes'\n" + kPoses, "p.toml")
+                  .error()
+                  .message,
+              AllOf(HasSubstr("that span space"), HasSubstr("nearly in one plane")));
 }
 
 }  // namespace

@@ -383,6 +383,13 @@ TEST_F(Judged, SaysWhichFileIsNotTheOneThatWasCaptured) {
   EXPECT_THAT(ran.err, HasSubstr("0002-b.mcap: is not the file that was captured"));
 }
 
+TEST_F(Judged, RefusesAPlanThatIsNotTheOneThatWasCaptured) {
+  write("run/plan.toml", bytesOf("run/plan.toml") + "\ntarget_m = [0.0, 0.0, 2.1]\n");
+  const Ran ran = compare();
+  EXPECT_EQ(ran.status, 4);
+  EXPECT_THAT(ran.err, HasSubstr("plan.toml: is not the plan that was captured"));
+}
+
 TEST_F(Judged, SaysThatAFileThatIsGoneIsCapturedAnew) {
   const auto records = index("run");
   std::filesystem::remove(folder_ / "run" / records.at(2).b.file);

@@ -396,6 +396,25 @@ TEST(Trend, TellsWhatANumberIsOfFromItsDoubt) {
   EXPECT_EQ(withoutDoubt("ramp"), "ramp");
 }
 
+/// Read noise goes as 1/signal: in a run without its brightest captures it is another number.
+TEST(Trend, CallsNoPartOfANoiseLawChangedThatIsOfAnotherSignal) {
+  const auto of = [](std::string began, double value, std::string detail) {
+    LoggedTrait one{.run = {.began = std::move(began)}, .trait = {}};
+    one.trait = {"noise law", std::move(detail), "A", {"read", "mm", value, value - 0.01, value + 0.01, 9}};
+    return one;
+  };
+  const std::string near = "at the signal of near-field: 0.5 m";
+  const auto rows = trendsOf({of("1", 0.12, near), of("2", 0.18, "at the signal of distance: 0.6 m"),
+                              of("3", 0.18, near + ", in doubt"), of("4", 0.18, near), of("5", 0.18, "")})
+                        .front()
+                        .rows;
+  EXPECT_TRUE(rows[1].is_of_another_signal);
+  EXPECT_FALSE(rows[1].isChanged());
+  EXPECT_FALSE(rows[2].is_of_another_signal);
+  EXPECT_TRUE(rows[3].isChanged());
+  EXPECT_TRUE(rows[4].isChanged()) << "an older log does not say where its signal was that";
+}
+
 /// Means of 24 intervals of 50 ms, added up in another order.
 TEST(Trend, TakesWhatRoundingLeavesForNothing) {
   const auto of = [](std::string began, double value) {

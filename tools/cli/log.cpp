@@ -161,6 +161,7 @@ std::vector<std::string> doubtsOf(const plan::TrendRow& row) {
     doubts.push_back(oneCamera(row.at.run));
   else if (row.is_first_of_one_camera)
     doubts.emplace_back("A and B of the first are not two cameras");
+  if (row.is_of_another_signal) doubts.emplace_back("it is of another signal");
   if (row.is_in_doubt)
     doubts.emplace_back(compare::isInDoubt(row.at.trait.detail) ? "it is in doubt" : "the first is in doubt");
   return doubts;
@@ -181,6 +182,8 @@ std::string verdictOn(const plan::TrendRow& row, const std::string& first_detail
   const std::string first = compare::withoutDoubt(first_detail);
   if (compare::withoutDoubt(row.at.trait.detail) != first)
     verdict += first.empty() ? "; the first was without" : "; the first was " + first;
+  if (row.first_planned > 0 && row.at.run.planned > 0 && row.at.run.planned != row.first_planned)
+    verdict += fmt::format("; of {} captures, the first of {}", row.at.run.planned, row.first_planned);
   return verdict;
 }
 

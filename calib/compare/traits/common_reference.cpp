@@ -133,6 +133,15 @@ HeldTogether heldAt(const Trait& a, const OverSpan& of_a, const Trait& b, const 
 
 }  // namespace
 
+const AtSignal* signalOf(const Trait& trait) {
+  const auto* law = std::get_if<LawAtSignal>(&trait.refers_to);
+  return law != nullptr ? &law->at : std::get_if<AtSignal>(&trait.refers_to);
+}
+AtSignal* signalOf(Trait& trait) {
+  auto* law = std::get_if<LawAtSignal>(&trait.refers_to);
+  return law != nullptr ? &law->at : std::get_if<AtSignal>(&trait.refers_to);
+}
+
 std::string placeInWords(double at_m) { return fmt::format("at {:.3g} m", at_m); }
 
 bool goesThroughNothing(double value, const OnLine& line, double wider) {

@@ -22,6 +22,10 @@ struct HeldTogether {
 /// they are. `wider` is differenceOf()'s.
 HeldTogether heldTogether(const Trait& first, const Trait& second, double wider = 1.0);
 
+/// The signal that a part of a noise law is told at; null: it is no such part.
+const AtSignal* signalOf(const Trait& trait);
+AtSignal* signalOf(Trait& trait);
+
 /// "at 1.75 m"
 std::string placeInWords(double at_m);
 

@@ -36,6 +36,7 @@ struct WaveParts {
 struct AtSignal {
   double most = 0.0, power = 0.0;  ///< most: NaN where the other camera's has no unit in common with it
   std::string unit{};  ///< of the signal, such as "the signal of capture 64"; empty: its own
+  std::string place{};  ///< where the signal was `most`, "near-field: 0.3 m"; empty: not said
 };
 /// σ² = p₀ + p₁ (most/I) + p₂ (most/I)² of a signal I, told at `at.most`; in mm².
 struct LawAtSignal {
