@@ -6,23 +6,15 @@
 #include <cstdlib>
 #include <fstream>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "calib/compare/csv_fields.h"
+
 namespace toftwin::compare {
 namespace {
-
-std::vector<std::string_view> split(std::string_view line) {
-  if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
-  std::vector<std::string_view> fields;
-  for (std::size_t start = 0;;) {
-    const std::size_t comma = line.find(',', start);
-    fields.push_back(line.substr(start, comma - start));
-    if (comma == std::string_view::npos) return fields;
-    start = comma + 1;
-  }
-}
 
 std::optional<double> toNumber(std::string_view field) {
   double number = 0.0;
@@ -56,36 +48,45 @@ Result<HeadedFile> openHeaded(const std::filesystem::path& file) {
   return opened;
 }
 
+Result<std::vector<std::string>> fieldsOf(std::string_view line, const std::filesystem::path& file,
+                                          std::size_t number) {
+  auto fields = csvFields(line, ',');
+  if (!fields) return malformed(file, number, kOpenQuote);
+  return *std::move(fields);
+}
+
 Result<std::vector<std::vector<double>>> columnsOf(HeadedFile& opened, const std::filesystem::path& file,
                                                    std::initializer_list<std::string_view> columns) {
   std::vector<std::size_t> places;
-  const auto header = split(opened.header);
+  const auto header = fieldsOf(opened.header, file, 1);
+  if (!header) return header.error();
   for (const std::string_view column : columns) {
-    const auto at = std::find(header.begin(), header.end(), column);
-    if (at == header.end() && header.size() == 1 && opened.header.find_first_of(";\t") != std::string::npos) {
+    const auto at = std::find(header->begin(), header->end(), column);
+    if (at == header->end() && header->size() == 1 && opened.header.find_first_of(";\t") != std::string::npos) {
       return malformed(file, 1,
                        fmt::format("its fields are separated by {}: it takes commas between them, and points in "
                                    "numbers",
                                    opened.header.find(';') == std::string::npos ? "tabs" : "semicolons"));
     }
-    if (at == header.end()) {
+    if (at == header->end()) {
       return malformed(file, 1, fmt::format("has no column \"{}\", only: {}", column, opened.header));
     }
-    if (std::find(at + 1, header.end(), column) != header.end())
+    if (std::find(at + 1, header->end(), column) != header->end())
       return malformed(file, 1, fmt::format("has two columns \"{}\"", column));
-    places.push_back(static_cast<std::size_t>(at - header.begin()));
+    places.push_back(static_cast<std::size_t>(at - header->begin()));
   }
   std::vector<std::vector<double>> result(columns.size());
   std::string line;
   for (std::size_t number = 2; std::getline(opened.rest, line); ++number) {
     if (line.empty() || line == "\r") continue;
-    const auto fields = split(line);
+    const auto fields = fieldsOf(line, file, number);
+    if (!fields) return fields.error();
+    if (fields->size() != header->size())
+      return malformed(file, number, otherFieldCount(fields->size(), header->size(), ','));
     for (std::size_t i = 0; i < places.size(); ++i) {
-      if (places[i] >= fields.size()) return malformed(file, number, "has too few fields");
-      const auto value = toNumber(fields[places[i]]);
-      if (!value) {
-        return malformed(file, number, fmt::format("\"{}\" is not a number", fields[places[i]]));
-      }
+      const std::string& field = (*fields)[places[i]];
+      const auto value = toNumber(field);
+      if (!value) return malformed(file, number, fmt::format("\"{}\" is not a number", field));
       result[i].push_back(*value);
     }
   }
@@ -106,7 +107,9 @@ Result<std::optional<std::vector<double>>> loadColumnIfAny(const std::filesystem
                                                            std::string_view column) {
   auto opened = openHeaded(file);
   if (!opened) return opened.error();
-  if (std::ranges::count(split(opened->header), column) == 0) return std::optional<std::vector<double>>{};
+  const auto header = fieldsOf(opened->header, file, 1);
+  if (!header) return header.error();
+  if (std::ranges::count(*header, column) == 0) return std::optional<std::vector<double>>{};
   auto columns = columnsOf(*opened, file, {column});
   if (!columns) return columns.error();
   return std::optional{std::move(columns->front())};

@@ -13,7 +13,7 @@ namespace toftwin::compare {
 
 /// The columns of a numeric CSV file with a header line, in the order asked for. Errors name file,
 /// line and column: a header that lacks a column or has it twice, fields that are not separated by commas, a
-/// row with too few fields, a field that is not a number, a file without rows.
+/// row with more or fewer fields than the header, an open quote, a field that is not a number, a file without rows.
 Result<std::vector<std::vector<double>>> loadColumns(const std::filesystem::path& file,
                                                      std::initializer_list<std::string_view> columns);
 

@@ -10,6 +10,8 @@
 
 #include <fmt/format.h>
 
+#include "calib/compare/csv_fields.h"
+
 namespace toftwin::discover {
 namespace {
 
@@ -17,13 +19,6 @@ constexpr std::size_t kMostColumns = 400, kMostRows = 1'000'000;
 
 Error malformed(const std::filesystem::path& name, std::size_t line, std::string_view what) {
   return {Error::Code::Malformed, fmt::format("{}:{}: {}", name.string(), line, what)};
-}
-
-std::string trimmed(std::string_view text) {
-  const auto isBlank = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
-  while (!text.empty() && isBlank(text.front())) text.remove_prefix(1);
-  while (!text.empty() && isBlank(text.back())) text.remove_suffix(1);
-  return std::string{text};
 }
 
 /// Whether all bytes are UTF-8 as RFC 3629 has it.
@@ -72,7 +67,7 @@ std::string fromWindows1252(std::string_view text) {
 /// Excel's first line: "sep=;".
 std::optional<char> saidSeparator(std::string_view line) {
   const std::string text =
-      line.find('\t') == std::string_view::npos ? trimmed(line) : std::string{line.substr(0, 5)};
+      line.find('\t') == std::string_view::npos ? compare::trimmed(line) : std::string{line.substr(0, 5)};
   if (text.size() != 5 || !text.starts_with("sep=")) return std::nullopt;
   return text[4] == ',' || text[4] == ';' || text[4] == '\t' ? std::optional{text[4]} : std::nullopt;
 }
@@ -82,28 +77,6 @@ char separatorOf(std::string_view header) {
   for (const char candidate : {',', ';', '\t'})
     if (std::ranges::count(header, candidate) > std::ranges::count(header, best)) best = candidate;
   return best;
-}
-
-/// Nothing where a quote is never closed.
-std::optional<std::vector<std::string>> fieldsOf(std::string_view line, char separator) {
-  std::vector<std::string> fields;
-  std::string field;
-  bool is_quoted = false;
-  for (std::size_t i = 0; i < line.size(); ++i) {
-    const char c = line[i];
-    if (c == '"' && is_quoted && i + 1 < line.size() && line[i + 1] == '"') {
-      field += '"', ++i;
-    } else if (c == '"') {
-      is_quoted = !is_quoted;
-    } else if (c == separator && !is_quoted) {
-      fields.push_back(trimmed(field)), field.clear();
-    } else {
-      field += c;
-    }
-  }
-  if (is_quoted) return std::nullopt;
-  fields.push_back(trimmed(field));
-  return fields;
 }
 
 Result<> takeHeader(CsvTable& table, const std::filesystem::path& name, std::size_t line) {
@@ -135,20 +108,19 @@ static Result<CsvTable> parseUtf8(std::string_view text, const std::filesystem::
     const std::string_view line = text.substr(0, end);
     text.remove_prefix(std::min(end + 1, text.size()));
     ++number;
-    if (trimmed(line).empty() || line.front() == '#') continue;
+    if (compare::trimmed(line).empty() || line.front() == '#') continue;
     if (number == 1 && (said = saidSeparator(line))) continue;
     if (table.header.empty()) table.separator = separator = said.value_or(separatorOf(line));
-    auto fields = fieldsOf(line, separator);
-    if (!fields) return malformed(name, number, "a quote is opened and not closed on the same line");
+    auto fields = compare::csvFields(line, separator);
+    if (!fields) return malformed(name, number, compare::kOpenQuote);
     if (table.header.empty()) {
       table.header = *std::move(fields);
       if (auto taken = takeHeader(table, name, number); !taken) return taken.error();
       continue;
     }
     if (fields->size() != table.header.size()) {
-      return malformed(
-          name, number,
-          fmt::format("has {} fields, but the header has {}", fields->size(), table.header.size()));
+      return malformed(name, number,
+                       compare::otherFieldCount(fields->size(), table.header.size(), separator));
     }
     if (table.rows() == kMostRows) return malformed(name, number, "is beyond a million rows: thin the table");
     for (std::size_t i = 0; i < fields->size(); ++i) table.columns[i].push_back(std::move((*fields)[i]));

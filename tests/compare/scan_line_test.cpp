@@ -131,10 +131,28 @@ TEST_F(Csv, NamesFileLineAndColumnOfEveryMistake) {
     return columns.ok() ? std::string{"no error"} : columns.error().message;
   };
   EXPECT_NE(message("x_mm,y\n1,2\n").find(":1: has no column \"z_mm\""), std::string::npos);
-  EXPECT_NE(message("x_mm,z_mm\n1,2\n3\n").find(":3: has too few fields"), std::string::npos);
+  EXPECT_NE(message("x_mm,z_mm\n1,2\n3\n").find(":3: has 1 field, but the header has 2"), std::string::npos);
+  EXPECT_NE(message("x_mm,z_mm\n1,\"2\n").find(":2: a quote is opened"), std::string::npos);
   EXPECT_NE(message("x_mm,z_mm\n1,two\n").find(":2: \"two\" is not a number"), std::string::npos);
   EXPECT_NE(message("x_mm,z_mm\n").find("no rows"), std::string::npos);
   EXPECT_NE(message("").find("empty"), std::string::npos);
+}
+
+/// Such a row was read as if its first fields were the header's: 1500,244 as 1500, and 1,500.064 as 1.
+TEST_F(Csv, RefusesRowsWithMoreFieldsThanTheHeader) {
+  for (const char* row : {"10,1500,244", "10,1,500.064", "10,5,1500,064"}) {
+    const auto columns = loadColumns(write(std::string{"time_s,value_mm\n0,1500\n"} + row + "\n"), {"value_mm"});
+    ASSERT_FALSE(columns.ok()) << row;
+    const std::string& words = columns.error().message;
+    EXPECT_NE(words.find(".csv:3: has "), std::string::npos) << words;
+    EXPECT_NE(words.find("but the header has 2; commas in its numbers may be why"), std::string::npos) << words;
+  }
+}
+
+TEST_F(Csv, TakesAQuotedTextWithCommasForOneField) {
+  const auto columns = loadColumns(write("\"a, b\",note,x_mm\n1,\"cold, dark\",3\n"), {"x_mm", "a, b"});
+  ASSERT_TRUE(columns.ok()) << columns.error().message;
+  EXPECT_EQ(*columns, (std::vector<std::vector<double>>{{3}, {1}}));
 }
 
 TEST_F(Csv, GivesAColumnThatAFileNeedNotHave) {

@@ -17,6 +17,7 @@ namespace toftwin::discover {
 namespace {
 
 using testing::ElementsAre;
+using testing::EndsWith;
 using testing::HasSubstr;
 
 std::string errorOf(const std::string& text) {
@@ -52,7 +53,9 @@ TEST(ParseCsv, ReadsWindows1252AsUtf8AndKeepsUtf8) {
 }
 
 TEST(ParseCsv, SaysWhichLineIsWrongAndHow) {
-  EXPECT_THAT(errorOf("a,b\n1,2\n3\n"), HasSubstr("t.csv:3: has 1 fields, but the header has 2"));
+  EXPECT_THAT(errorOf("a,b\n1,2\n3\n"), HasSubstr("t.csv:3: has 1 field, but the header has 2"));
+  EXPECT_THAT(errorOf("a,b\n1,1500,25\n"), HasSubstr("t.csv:2: has 3 fields, but the header has 2; commas in its"));
+  EXPECT_THAT(errorOf("a;b\n1;2;3\n"), EndsWith("t.csv:2: has 3 fields, but the header has 2"));
   EXPECT_THAT(errorOf("a,b\n1,\"2\n"), HasSubstr("t.csv:2: a quote is opened"));
   EXPECT_THAT(errorOf("a,a\n1,2\n"), HasSubstr("two columns are called \"a\""));
   EXPECT_THAT(errorOf("a,\n1,2\n"), HasSubstr("column 2 has no header"));
