@@ -139,7 +139,8 @@ std::string clearestOf(const NamedTraits& traits) {
     const Trait& trait = one.trait;
     const double error = 0.5 * (trait.high - trait.low);
     const bool is_apart = trait.low > 0.0 || trait.high < 0.0;
-    if (!is_apart || !(error > 0.0) || !trait.doubt.empty() || trait.is_extrapolated) continue;
+    if (!is_apart || !trait.doubt.empty() || trait.is_extrapolated) continue;
+    // Without an error, as of a number that all rows have alike, it is farther than any other.
     if (const double far = std::abs(trait.value) / error; far > farthest) farthest = far, clearest = &one;
   }
   const std::size_t count = traits.traits.size();
@@ -147,8 +148,8 @@ std::string clearestOf(const NamedTraits& traits) {
   if (std::ranges::all_of(traits.traits, isInDoubt))
     return count == 1 ? "The one number told is in doubt" : fmt::format("All {} numbers told are in doubt", count);
   if (clearest == nullptr)
-    return fmt::format("{} is certain to be other than 0",
-                       count == 1 ? "The one number told" : fmt::format("None of {} numbers told", count));
+    return fmt::format("{} certain to be other than 0",
+                       count == 1 ? "The one number told is not" : fmt::format("None of {} numbers told is", count));
   const Trait& trait = clearest->trait;
   const std::string unit = trait.unit.empty() || trait.unit == "1" ? "" : " " + trait.unit;
   std::string what = clearest->what == trait.name ? "" : clearest->what + ", ";

@@ -4,6 +4,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <utility>
+#include <vector>
+
 #include "calib/compare/image_slopes.h"
 
 namespace toftwin::compare {
@@ -66,6 +72,26 @@ TEST(Headline, BeginsWithPixelsThatAreFartherApartThanWhatItTells) {
   EXPECT_EQ(half.places, 1U) << "a pose without a pixel compared is no draw of B − A";
   EXPECT_THAT(nothingCompared(characterise(withGrossPixels(100, 100)), "pose").message,
               testing::HasSubstr("all 200 pixels that are valid in both cameras are over 300 mm apart"));
+}
+
+/// B's mean is A's, but a camera of so much less noise is no twin.
+TEST(Headline, IsGreenOnlyWhereNoiseIsAlike) {
+  struct Case {
+    float noise_b_mm;
+    bool is_alike;
+  };
+  for (const Case& one : {Case{0.75F, false}, {3.3F, false}, {3.4F, true}, {7.4F, true}, {7.6F, false}}) {
+    std::vector<PoseComparison> poses = withGrossPixels(0, 2);
+    for (PoseComparison& pose : poses) pose.noise_b_mm = Image<float>(10, 10, one.noise_b_mm);
+    const Characteristics c = characterise(poses);
+    EXPECT_EQ(haveLikeNoise(c), one.is_alike) << one.noise_b_mm;
+    EXPECT_EQ(toneOfNearness(c), one.is_alike ? Tone::Good : Tone::Fair) << one.noise_b_mm;
+    EXPECT_EQ(toneOfDifference(c), Tone::Good) << "the bias by itself";
+    EXPECT_EQ(nearnessCards(c, "", Tone::Good)[2].tone, one.is_alike ? Tone::Neutral : Tone::Fair);
+  }
+  Characteristics unknown = characterise(withGrossPixels(0, 2));
+  unknown.noise_ratio.median = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(toneOfNearness(unknown), Tone::Fair);
 }
 
 /// 40 mm from top to bottom, beside noise of 5: as a mean B is as far as A.

@@ -134,6 +134,29 @@ TEST_F(Table, RefusesUnitsThatItDoesNotKnow) {
   EXPECT_THAT(named.error().message, HasSubstr("has no column \"t_raw\"")) << "raw is no unit";
 }
 
+/// Of rows on an exact curve arithmetic leaves waves of 1e-16 mm, and left no interval about them.
+TEST_F(Table, TakesWhatArithmeticLeavesForNothing) {
+  std::string line = "distance_m,error_mm\n", level = line;
+  for (int i = 0; i < 100; ++i) {
+    const double distance_m = 0.5 + 0.02 * i;
+    line += fmt::format("{},{}\n", distance_m, 5.0 + 2.0 * distance_m), level += fmt::format("{},5\n", distance_m);
+  }
+  const auto verdictOn = [&](const std::vector<TableJob>& jobs) {
+    const auto report = judgeTables(jobs);
+    return report ? report->verdict : report.error().message;
+  };
+  const auto jobOf = [&](const char* name, const std::string& text) {
+    return TableJob{.file = write(name, text), .kind = "harmonics", .frequency_hz = {80e6}};
+  };
+  const TableJob a = jobOf("level.csv", level), b = jobOf("line.csv", line);
+  EXPECT_THAT(verdictOn({a}), HasSubstr("offset: 5 mm (5 to 5), the clearest of"));
+  EXPECT_THAT(verdictOn({a, b}), testing::AllOf(testing::Not(HasSubstr("wave")), HasSubstr("scale, +2 mm/m (2 to 2)")));
+  std::string alike = "time_s,value_mm\n";
+  for (int i = 0; i < 120; ++i) alike += fmt::format("{},1500\n", 10 * i);
+  EXPECT_THAT(verdictOn({{.file = write("alike.csv", alike), .kind = "drift"}}),
+              testing::StartsWith("The one number told is not certain to be other than 0."));
+}
+
 TEST_F(Table, SaysWhatIsOddAboutItsRows) {
   const auto notesOn = [&](const std::string& text) {
     const auto table = loadTable({.file = write("a.csv", text), .kind = "drift"});

@@ -330,6 +330,15 @@ TEST(Verdict, HoldsMeansOfFewRowsTogetherByTheirOwnDistribution) {
   EXPECT_NEAR(different / 2000.0, 0.05, 0.02);
 }
 
+TEST(Verdict, CallsAnIntervalThatHoldsNothingNotCertain) {
+  NamedTraits one{.traits = {of("A", "drift", 0.0, 0.0, 0.0)}};
+  EXPECT_EQ(clearestOf(one), "The one number told is not certain to be other than 0");
+  one.traits.push_back(of("A", "ramp", 1.0, -1.0, 3.0));
+  EXPECT_EQ(clearestOf(one), "None of 2 numbers told is certain to be other than 0");
+  one.traits.push_back(of("A", "bias", 5.0, 5.0, 5.0));
+  EXPECT_THAT(clearestOf(one), testing::StartsWith("bias, number: 5 mm (5 to 5), the clearest of 3"));
+}
+
 /// Each may be another wave: neither differs, and neither is the largest difference.
 TEST(Verdict, NamesNoWaveThatMayBeAnother) {
   NamedTraits traits{.traits = {of("B − A", "harmonics", 50.0, 49.0, 51.0),

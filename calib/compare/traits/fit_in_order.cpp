@@ -222,10 +222,8 @@ Fit inDoubt(Fit fit, const Model& model, Column y, const Order& order, double le
 std::optional<Fit> fitEvenly(const Model& model, Column y, std::vector<double> start, Column x) {
   auto fit = fitLeastSquares(model, y, std::move(start));
   if (!fit || fit->degrees < static_cast<double>(kFewestFree)) return fit;
-  double of_y = 0.0;
-  for (const double one : y) of_y += one * one;
-  constexpr double kRounding = 1e-18;  // what is left of an exact curve says nothing of errors
-  if (!(fit->squares > kRounding * of_y)) return fit;
+  // What is left of an exact curve says nothing of errors.
+  if (!(fit->squares > kRoundingOfSquares * squaresOf(y))) return fit;
   Order order = asTheyStand(y.size());
   Mixed mixed = mixedOf(*fit, model, y, order);
   if (!x.empty()) {

@@ -3,9 +3,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <boost/math/distributions/beta.hpp>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include "calib/compare/statistics.h"
@@ -20,6 +22,8 @@ namespace {
 double stepOf(double parameter) { return 6e-6 * std::max(std::abs(parameter), 1e-3); }
 
 }  // namespace
+
+double squaresOf(Column y) { return std::inner_product(y.begin(), y.end(), y.begin(), 0.0); }
 
 VectorXd residuals(const Model& model, Column y, std::span<const double> p) {
   VectorXd r(static_cast<Eigen::Index>(y.size()));
@@ -162,10 +166,11 @@ std::optional<Fit> fitLeastSquares(const Model& model, Column y, std::vector<dou
           .degrees = static_cast<double>(y.size() - p.size()),
           .free = static_cast<double>(y.size() - p.size()),
           .deviance = static_cast<double>(y.size()) * std::log(r.squaredNorm())};
+  // Parameters of rows on an exact curve are known to rounding, not exactly: else a wave of 1e-16 would show.
+  const double variance = std::max(fit.squares, kRoundingOfSquares * squaresOf(y)) / fit.degrees;
   for (std::size_t a = 0; a < p.size(); ++a) {
     for (std::size_t b = 0; b < p.size(); ++b)
-      fit.covariance.push_back((*inverse)(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b)) *
-                               fit.squares / fit.degrees);
+      fit.covariance.push_back((*inverse)(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b)) * variance);
   }
   return fit;
 }

@@ -201,10 +201,9 @@ OddRows oddRowsOf(const MatrixXd& jacobian, const VectorXd& left, Column x) {
 }
 
 OddRows oddRowsOf(const Model& model, Column y, std::span<const double> at, Column x) {
-  constexpr double kRounding = 1e-18;  // what is left of an exact curve says nothing of errors
   const VectorXd left = residuals(model, y, at);
-  if (!(left.squaredNorm() > kRounding * Eigen::Map<const VectorXd>(y.data(), left.size()).squaredNorm()))
-    return {};
+  // What is left of an exact curve says nothing of errors.
+  if (!(left.squaredNorm() > kRoundingOfSquares * squaresOf(y))) return {};
   return oddRowsOf(jacobian(model, y.size(), {at.begin(), at.end()}), left, x);
 }
 
