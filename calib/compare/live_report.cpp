@@ -175,7 +175,7 @@ Result<Finding> judgeLive(const Capture& capture) {
       .title = fmt::format("{} (B) against {} (A)", capture.b.entry.name, capture.a.entry.name)};
   const Tilt tilt{poses};
   const bool are_two = capture.same.same() == 0;
-  finding.section.tone = are_two ? toneOfDifference(c, tilt.edge_mm()) : Tone::Neutral;
+  finding.section.tone = are_two ? toneOfNearness(c, tilt.edge_mm()) : Tone::Neutral;
   finding.section.verdict = fmt::format(
       "Averaged over {} at {}. Temporal noise: A {} mm, B {} mm (median). Validity masks agree in {} "
       "% of "
@@ -232,7 +232,7 @@ Result<Finding> judgeLive(const Capture& capture) {
       nearnessCards(c,
                     c.places > 1 ? fmt::format("± standard error over {} different poses", c.places)
                                  : fmt::format("{} pixels, one pose", all.n),
-                    finding.section.tone);
+                    toneOfDifference(c, tilt.edge_mm()));
   if (!are_two) takeGreenOff(finding.cards);
   finding.cards.back().note = fmt::format("flying pixels {} | {} %", shown(flyingPercent(c, c.flying_a), 2),
                                           shown(flyingPercent(c, c.flying_b), 2));

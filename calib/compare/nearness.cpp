@@ -166,6 +166,16 @@ Tone toneOfDifference(const Characteristics& c, double edge_mm) {
   return isGrossNotable(c) ? Tone::Bad : toneOfDifference(mainRegionOf(c), edge_mm);
 }
 
+bool haveLikeNoise(const Characteristics& c) {
+  constexpr double kMost = 1.5;
+  return c.noise_ratio.median <= kMost && c.noise_ratio.median >= 1.0 / kMost;
+}
+
+Tone toneOfNearness(const Characteristics& c, double edge_mm) {
+  const Tone tone = toneOfDifference(c, edge_mm);
+  return tone == Tone::Good && !haveLikeNoise(c) ? Tone::Fair : tone;
+}
+
 Error nothingCompared(const Characteristics& c, const std::string& where) {
   return {Error::Code::InvalidArgument,
           c.gross == 0
@@ -207,7 +217,7 @@ std::vector<Card> nearnessCards(const Characteristics& c, const std::string& bia
        Tone::Neutral},
       {"Bias, B − A", bias + " mm", bias_note, tone},
       {"Noise, A | B", fmt::format("{} | {} mm", shown(main.noise_a_mm, 2), shown(main.noise_b_mm, 2)),
-       "temporal, median over pixels", Tone::Neutral},
+       "temporal, median over pixels", haveLikeNoise(c) ? Tone::Neutral : Tone::Fair},
       {"Masks agree", shown(100.0 * c.mask_agreement, 1) + " %", "where both are valid or both are not",
        c.mask_agreement > 0.98 ? Tone::Good : Tone::Fair}};
   cards.insert(cards.end(), rest.begin(), rest.end());

@@ -42,6 +42,10 @@ void takeGreenOff(std::vector<Card>& cards);
 Tone toneOfDifference(const Region& region, double edge_mm = 0.0);
 /// The same of its surfaces, and bad where the headline begins with gross pixels.
 Tone toneOfDifference(const Characteristics& characteristics, double edge_mm = 0.0);
+/// Whether the median of σ_B/σ_A is within 1/1.5 … 1.5. Not where it is not known.
+bool haveLikeNoise(const Characteristics& characteristics);
+/// Of the page: that of the difference, but good only where noise is alike, too; a camera without noise is no twin.
+Tone toneOfNearness(const Characteristics& characteristics, double edge_mm = 0.0);
 /// Why not a single pixel is compared: both see none, or all are gross. `where`: "pose".
 Error nothingCompared(const Characteristics& characteristics, const std::string& where);
 /// The next 1, 2 or 5 times a power of ten, for the reach of a scale.

@@ -251,14 +251,16 @@ Tone nearnessTone(const Characteristics& c) {
   return tone == Tone::Good && c.places < 3 ? Tone::Fair : tone;
 }
 
-/// Good only where no number differs, of those that are told, and no pixels are missing; bad where the bias
-/// is far beyond A's noise.
+/// Good only where no number differs, of those that are told, no pixels are missing, and B is as near to A as two
+/// cameras by themselves would have to be: a large bias is not good for being uncertain. Bad where it is far beyond A's
+/// noise.
 Tone toneOf(const std::vector<TraitVerdict>& verdicts, const RunTraits& traits, const Characteristics& c) {
-  if (toneOfDifference(c) == Tone::Bad) return Tone::Bad;
+  const Tone near = toneOfNearness(c);
+  if (near == Tone::Bad) return Tone::Bad;
   const bool is_same = traits.missing.empty() && std::ranges::any_of(verdicts, &TraitVerdict::isTold) &&
                        std::ranges::none_of(verdicts, &TraitVerdict::differs) &&
                        std::ranges::none_of(verdicts, &TraitVerdict::isMissing);
-  return is_same && c.places >= 3 ? Tone::Good : Tone::Fair;
+  return is_same && c.places >= 3 ? near : Tone::Fair;
 }
 
 std::vector<Card> cardsOf(const Characteristics& c, const std::vector<TraitVerdict>& verdicts,
