@@ -81,6 +81,17 @@ double medianOverPixels(Kind kind, const Seen& seen, std::span<const std::uint32
   return kind == Kind::Noise ? std::sqrt(median) : median;
 }
 
+/// How many trials a repeat is. Where repeats come out alike, whole frames may fail or always the same pixels; of a
+/// share that no whole frames make, it is the pixels.
+std::size_t trialsOfEach(std::span<const double> repeats, Counted counted) {
+  const bool are_alike = std::ranges::all_of(repeats, [&](double one) { return one == repeats.front(); });
+  if (!are_alike) return counted.pixels * counted.frames;
+  constexpr double kRounding = 1e-9;
+  const double frames = repeats.front() * static_cast<double>(counted.frames);
+  const bool are_frames = std::abs(frames - std::round(frames)) < kRounding;
+  return are_frames ? std::min(counted.pixels, counted.frames) : counted.pixels;
+}
+
 }  // namespace
 
 std::vector<std::uint32_t> pixelsOf(const RequirementSpec& requirement, const Case& use, const Seen& seen) {
@@ -137,10 +148,7 @@ Estimate estimateOf(std::span<const double> repeats, std::optional<double> toget
 Estimate shareEstimateOf(std::span<const double> repeats, std::optional<double> together, Counted counted) {
   Estimate estimate = estimateOf(repeats, together);
   if (std::isnan(estimate.value)) return estimate;
-  const bool are_alike = std::ranges::all_of(repeats, [&](double one) { return one == repeats.front(); });
-  const std::size_t each =
-      are_alike ? std::min(counted.pixels, counted.frames) : counted.pixels * counted.frames;
-  const double trials = static_cast<double>(repeats.size() * each);
+  const double trials = static_cast<double>(repeats.size() * trialsOfEach(repeats, counted));
   const auto floor =
       compare::shareInterval(estimate.value * trials, trials, compare::ShareRule::ClopperPearson);
   estimate.low = std::max(0.0, std::min(estimate.low, floor.low));

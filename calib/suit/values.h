@@ -56,8 +56,8 @@ struct Counted {
 };
 /// The same of a share of pixels and frames, cut to 0 … 1, and never narrower than counting leaves it:
 /// Clopper and Pearson's interval of so many events in all pixels and frames; where all repeats are alike, so
-/// that they say nothing of how they scatter, in min(pixels, frames) trials of each. More are not independent
-/// where whole frames fail, or always the same pixels.
+/// that they say nothing of how they scatter, in min(pixels, frames) trials of each, or in so many as it has pixels
+/// where the share is of no whole frames. More are not independent where whole frames fail, or always the same pixels.
 Estimate shareEstimateOf(std::span<const double> repeats, std::optional<double> together, Counted counted);
 /// Of the shares of missed frames in each repeat. Frames of one repeat share its light and its fixed pattern,
 /// so that a repeat, not a frame, is what is independent: with the share p, Clopper and Pearson's interval of
