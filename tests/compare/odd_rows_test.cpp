@@ -287,5 +287,42 @@ TEST(OddRows, AreNamedAtTheEndOfALine) {
   }
 }
 
+/// Two rows side by side look like a step there and back of the least length there is, three: a good row beside them was
+/// named, and neither of them.
+TEST(OddRows, OfADriftAreNamedAndNoGoodOneBesideThem) {
+  const std::vector<std::vector<std::size_t>> slips{{20, 21, 90}, {40, 41}, {15, 16, 60, 61}, {5, 30, 31, 77, 110}, {50}};
+  for (const auto& rows : slips) {
+    std::vector<std::size_t> numbers;  // as a person counts them
+    for (const std::size_t row : rows) numbers.push_back(row + 1);
+    const std::string words = fmt::format("{} of 120 ", fmt::join(numbers, ", "));
+    int named = 0;
+    for (unsigned seed = 1; seed <= 20; ++seed) {
+      Noise noise{seed};
+      std::vector<double> t, y;
+      for (int i = 0; i < 120; ++i)
+        t.push_back(10.0 * i), y.push_back(1505.0 - 5.0 * std::exp(-t.back() / 300.0) + noise(0.1));
+      for (const std::size_t row : rows) y[row] += 400.0;
+      const auto drift = driftTraits(t, y);
+      ASSERT_TRUE(drift);
+      named += drift->traits.front().odd_rows == rows && drift->traits.front().doubt.find(words) != std::string::npos;
+    }
+    EXPECT_GE(named, 20) << words;
+  }
+}
+
+/// At most five are named, as if they were all.
+TEST(OddRows, SayThatThereMayBeMoreWhereTheNextIsOddToo) {
+  for (const int count : {4, 8}) {
+    Noise noise{1};
+    std::vector<double> d, e;
+    for (int i = 0; i < 400; ++i)
+      d.push_back(0.5 + 0.0125 * i), e.push_back(3.0 + noise(1.0) + (i % 50 == 25 && i < 50 * count ? 5000.0 : 0.0));
+    const auto told = harmonicTraits(d, e, std::vector{80e6});
+    ASSERT_TRUE(told);
+    EXPECT_EQ(told->front().odd_rows.size(), count == 4 ? 4u : 5u);
+    EXPECT_EQ(told->front().doubt.find("there may be more such rows") != std::string::npos, count == 8);
+  }
+}
+
 }  // namespace
 }  // namespace toftwin::compare

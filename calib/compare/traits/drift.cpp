@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
@@ -10,6 +9,8 @@
 
 #include "calib/compare/statistics.h"
 #include "calib/compare/traits/decay_grid.h"
+#include "calib/compare/traits/drift_models.h"
+#include "calib/compare/traits/drift_odd_rows.h"
 #include "calib/compare/traits/least_squares.h"
 #include "calib/compare/traits/linearised.h"
 #include "calib/compare/traits/odd_rows.h"
@@ -20,143 +21,13 @@ namespace {
 
 constexpr const char* kName = "drift";
 
-using Row = std::span<const double>;
-/// What a model with parameters p says at a time.
-using Shape = std::function<double(Row p, double t)>;
-
-/// A model of the series, ready to be fitted. Times are relative to the series' length, so that numbers are
-/// of order 1.
-struct Candidate {
-  DriftModel kind = DriftModel::Constant;
-  Shape shape{};
-  std::vector<double> start{};
-  double cost = 0.0;  ///< parameters, as BIC counts them
-  std::vector<double> sigma{};  ///< of each row, whose values are over theirs; empty: all are alike
-
-  [[nodiscard]] Model over(Column t) const {
-    return [this, t](Row p, std::size_t i) { return shape(p, t[i]) / (sigma.empty() ? 1.0 : sigma[i]); };
-  }
-};
-
-Candidate constant() {
-  return {DriftModel::Constant, [](Row p, double) { return p[0]; }, {0.0}, 1.0};
-}
-
-Candidate ramp() {
-  return {DriftModel::Ramp, [](Row p, double t) { return p[0] + p[1] * t; }, {0.0, 0.0}, 2.0};
-}
-
-Candidate oneExponential(const DecayGrid& grid) {
-  return {DriftModel::OneExponential, [](Row p, double t) { return p[0] + p[1] * decay(t, p[2]); },
-          grid.one(), 3.0};
-}
-
-Candidate twoExponentials(const DecayGrid& grid) {
-  return {DriftModel::TwoExponentials,
-          [](Row p, double t) { return p[0] + p[1] * decay(t, p[2]) + p[3] * decay(t, p[4]); }, grid.two(),
-          5.0};
-}
-
-/// The step between two rows where it leaves the least; its place is searched, not fitted.
-Candidate step(Column t, Column y) {
-  double total = 0.0;
-  for (const double value : y) total += value;
-  const double n = static_cast<double>(y.size());
-  double before = 0.0, best = -1.0;
-  std::size_t at = 1;
-  for (std::size_t i = 1; i < y.size(); ++i) {
-    before += y[i - 1];
-    const double m = static_cast<double>(i), difference = (total - before) / (n - m) - before / m;
-    if (const double between = difference * difference * m * (n - m); between > best) {
-      best = between;
-      at = i;
-    }
-  }
-  const double place = 0.5 * (t[at - 1] + t[at]);
-  return {DriftModel::Step,
-          [place](Row p, double time) { return p[0] + (time > place ? p[1] : 0.0); },
-          {0.0, 0.0},
-          4.0};
-}
-
-/// Sums of the first rows: how much a split of rows explains of their squares is known without visiting them.
-class Sums {
- public:
-  explicit Sums(Column y) {
-    for (const double one : y) sums_.push_back(sums_.back() + one);
-  }
-  /// Where rows of [from, to) are best split in two of at least kFewest each; `from` where there is no place.
-  [[nodiscard]] std::size_t split(std::size_t from, std::size_t to) const {
-    std::size_t best = from;
-    double most = -1.0;
-    for (std::size_t at = from + kFewest; at + kFewest <= to; ++at) {
-      if (const double both = explained(from, at) + explained(at, to); both > most) most = both, best = at;
-    }
-    return best;
-  }
-  [[nodiscard]] double explained(std::size_t from, std::size_t to) const {
-    const double sum = sums_[to] - sums_[from];
-    return sum * sum / static_cast<double>(to - from);
-  }
-  [[nodiscard]] std::size_t rows() const { return sums_.size() - 1; }
-
- private:
-  static constexpr std::size_t kFewest = 3;  // one row that is far off is no step there and back
-  std::vector<double> sums_{0.0};
-};
-
-/// Two steps: each one's best place beside the other, in turns, from several places.
-Candidate twoSteps(Column t, Column y) {
-  const Sums sums{y};
-  const std::size_t n = sums.rows();
-  std::size_t first = 0, second = 0;
-  double most = -1.0;
-  constexpr std::size_t kStarts = 16, kTurns = 10;
-  for (std::size_t start = 0; start < kStarts; ++start) {
-    std::size_t a = start * n / kStarts, b = a;
-    for (std::size_t turn = 0; turn < kTurns; ++turn) {
-      const auto before = std::pair{a, b};
-      b = sums.split(a, n);
-      a = sums.split(0, b);
-      if (before == std::pair{a, b}) break;
-    }
-    if (a == 0 || b <= a) continue;
-    const double both = sums.explained(0, a) + sums.explained(a, b) + sums.explained(b, n);
-    if (both > most) most = both, first = a, second = b;
-  }
-  if (first == 0) return {.kind = DriftModel::TwoSteps};
-  const double at_1 = 0.5 * (t[first - 1] + t[first]), at_2 = 0.5 * (t[second - 1] + t[second]);
-  return {DriftModel::TwoSteps,
-          [=](Row p, double time) {
-            return p[0] + (time > at_1 ? p[1] : 0.0) + (time > at_2 ? p[2] : 0.0);
-          },
-          {0.0, 0.0, 0.0},
-          7.0};
-}
-
-std::optional<Fit> fitOf(const Candidate& candidate, Column t, Column y) {
-  if (!candidate.shape) return std::nullopt;
-  return fitLeastSquares(candidate.over(t), y, candidate.start);
-}
-
-/// Exponentials that are over before the second row or outlast the series twenty times are none.
-bool isPlausible(const Candidate& candidate, const Fit& fit, Column t) {
-  if (candidate.kind != DriftModel::OneExponential && candidate.kind != DriftModel::TwoExponentials)
-    return true;
-  for (std::size_t k = 2; k < fit.at.size(); k += 2) {
-    const double tau = std::exp(fit.at[k]);
-    if (!(tau > shortestDecay(t)) || !(tau < kLongestDecay)) return false;
-  }
-  return true;
-}
-
 /// Errors that go on look like structure: what they are is taken from the richest models that fit, exponentials
 /// and steps, of that which leaves less of it. What steps leave beside exponentials goes on, and the other way
 /// round.
-double goingOn(std::span<const Candidate> candidates, Column t, Column y) {
+double goingOn(std::span<const DriftCandidate> candidates, Column t, Column y) {
   const auto leftBy = [&](std::initializer_list<DriftModel> from_the_richest) -> std::optional<double> {
     for (const DriftModel kind : from_the_richest) {
-      const Candidate& rich = *std::ranges::find(candidates, kind, &Candidate::kind);
+      const DriftCandidate& rich = *std::ranges::find(candidates, kind, &DriftCandidate::kind);
       if (const auto fit = fitOf(rich, t, y)) return correlationOfResiduals(rich.over(t), y, *fit);
     }
     return std::nullopt;
@@ -194,12 +65,9 @@ std::vector<double> leftBy(const Model& model, const Fit& fit, Column y) {
   return left;
 }
 
-constexpr std::size_t kModels = 6;
-using Candidates = std::array<Candidate, kModels>;
-
 /// A model that was fitted, one that was not chosen, too.
 struct Tried {
-  const Candidate* model = nullptr;
+  const DriftCandidate* model = nullptr;
   Fit fit{};
   double bic = 0.0;
 };
@@ -207,19 +75,19 @@ struct Tried {
 /// The series, and which model it follows.
 struct Chosen {
   std::vector<double> y{};  ///< over each row's σ
-  const Candidate* model = nullptr;
+  const DriftCandidate* model = nullptr;
   Fit fit{};
   double rho = 0.0;  ///< by which errors go on
   std::vector<Tried> all{};
 };
 
 /// The least BIC.
-std::optional<Chosen> chosenOf(const Candidates& candidates, Column t, std::vector<double> y) {
+std::optional<Chosen> chosenOf(const DriftCandidates& candidates, Column t, std::vector<double> y) {
   const double n = static_cast<double>(y.size()), rho = goingOn(candidates, t, y);
   const double effective = n * (1.0 - rho) / (1.0 + rho);
   double least = std::numeric_limits<double>::infinity();
   Chosen best{.rho = rho};
-  for (const Candidate& candidate : candidates) {
+  for (const DriftCandidate& candidate : candidates) {
     auto tried = fitOf(candidate, t, y);
     if (!tried) continue;
     const double bic =
@@ -237,15 +105,15 @@ std::optional<Chosen> chosenOf(const Candidates& candidates, Column t, std::vect
 }
 
 /// With the rows' σ where what is left over time is uneven, as of a camera that is noisier while it is cold.
-std::optional<Chosen> chosenBySigma(Candidates& candidates, Column t, Column y) {
+std::optional<Chosen> chosenBySigma(DriftCandidates& candidates, Column t, Column y) {
   auto best = chosenOf(candidates, t, {y.begin(), y.end()});
   constexpr int kRounds = 3;
   for (int round = 0; best && round < kRounds; ++round) {
-    const Shape& shape = best->model->shape;
-    const Model plain = [&](Row p, std::size_t i) { return shape(p, t[i]); };
+    const DriftShape& shape = best->model->shape;
+    const Model plain = [&](std::span<const double> p, std::size_t i) { return shape(p, t[i]); };
     const auto sigmas = unevenSigmas(leftBy(plain, best->fit, y), t, best->fit.at.size());
     if (sigmas.empty()) break;
-    for (Candidate& one : candidates) one.sigma = sigmas;
+    for (DriftCandidate& one : candidates) one.sigma = sigmas;
     if (auto next = chosenOf(candidates, t, over(y, sigmas)))
       best = std::move(next);
     else
@@ -256,7 +124,7 @@ std::optional<Chosen> chosenBySigma(Candidates& candidates, Column t, Column y) 
 }
 
 /// What changed between the first and the last row.
-Trait changeOf(const Shape& shape, const Fit& fit, Column t) {
+Trait changeOf(const DriftShape& shape, const Fit& fit, Column t) {
   return fit.trait("drift", "mm",
                    [&](std::span<const double> p) { return shape(p, t.back()) - shape(p, t.front()); });
 }
@@ -399,12 +267,10 @@ Result<DriftTraits> driftTraits(Column time_s, Column value_mm) {
   const double begin = t.front(), length = t.back() - begin, first = y.front();
   for (double& one : t) one = (one - begin) / length;
   for (double& one : y) one -= first;
-  const DecayGrid grid{t, y};
-  Candidates candidates{constant(), ramp(), oneExponential(grid), twoExponentials(grid), step(t, y),
-                              twoSteps(t, y)};
+  DriftCandidates candidates = driftCandidates(t, y);
   auto chosen = chosenBySigma(candidates, t, y);
   if (!chosen) return undetermined(kName, "no model can be fitted");
-  const Candidate* model = chosen->model;
+  const DriftCandidate* model = chosen->model;
   Fit& fit = chosen->fit;
   DriftTraits result{.model = model->kind};
   result.curve = {nameOf(model->kind), [=, shape = model->shape, p = fit.at](double at_s) {
@@ -421,16 +287,16 @@ Result<DriftTraits> driftTraits(Column time_s, Column value_mm) {
       return undetermined(kName, "no ramp can be fitted");
   }
   fit.heedCorrelation(correlationOfResiduals(model->over(t), chosen->y, fit));
-  const Shape& shape = model->shape;
+  const DriftShape& shape = model->shape;
   result.traits.push_back(changeOf(shape, fit, t));
   heedOtherModels(*chosen, t, result.traits.back());
   result.traits.back().refers_to = OverSpan{length};
   addDetails(result.model, fit, t, length, result.traits);
   if (is_another) {
-    const Model plain = [&](Row p, std::size_t i) { return shape(p, t[i]); };
+    const Model plain = [&](std::span<const double> p, std::size_t i) { return shape(p, t[i]); };
     doubtShape(betweenEnds(y, chosen->rho), betweenEnds(leftBy(plain, fit, y), chosen->rho), result.traits);
   }
-  const OddRows odd = oddRowsOf([&](Row p, std::size_t i) { return shape(p, t[i]); }, y, fit.at, t);
+  const OddRows odd = oddRowsOfSeries(model->kind, fit, t, y);
   for (Trait& one : result.traits)
     if (!odd.doubt.empty()) one.doubt = odd.doubt, one.odd_rows = odd.rows;
   return result;

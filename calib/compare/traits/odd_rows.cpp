@@ -81,23 +81,31 @@ class Others {
   std::vector<Index> rows_{};
 };
 
+struct BeyondChance {
+  std::vector<Odd> odd{};
+  bool are_more = false;  ///< the next one would be, too
+};
+
 /// Rows beyond chance, the oddest first: of so many taken out one after the other, as an odd one may hide
 /// behind another, up to the last that is.
-std::vector<Odd> beyondChance(const MatrixXd& jacobian, const VectorXd& left) {
+BeyondChance beyondChance(const MatrixXd& jacobian, const VectorXd& left) {
   constexpr double kShare = 0.1, kOfEach = 0.01;  // of Σ r²
   Others others{jacobian, left};
   const double all = others.squares();
   const Index most = std::clamp<Index>(left.size() / kRowsForEach, 1, kMost);
-  std::vector<Odd> taken;
+  const auto isOdd = [&](const Odd& last) {
+    return last.is_beyond_chance && last.gain > kOfEach * all && others.squares() < (1.0 - kShare) * all;
+  };
+  BeyondChance found;
+  std::vector<Odd>& taken = found.odd;
   std::size_t odd = 0;
   for (Index i = 0; i < most && others.free() > kFewestFree; ++i) {
     taken.push_back(others.takeOddest());
-    const Odd& last = taken.back();
-    if (last.is_beyond_chance && last.gain > kOfEach * all && others.squares() < (1.0 - kShare) * all)
-      odd = taken.size();
+    if (isOdd(taken.back())) odd = taken.size();
   }
   taken.resize(odd);
-  return taken;
+  if (static_cast<Index>(odd) == most && others.free() > kFewestFree) found.are_more = isOdd(others.takeOddest());
+  return found;
 }
 
 /// What a fit of the rows that are not odd leaves of them, and what they go with.
@@ -163,7 +171,7 @@ std::vector<double> sigmasBeside(const std::vector<Odd>& odd, const Rest& rest, 
   return all;
 }
 
-OddRows named(const std::vector<Odd>& odd, Index of) {
+OddRows named(const std::vector<Odd>& odd, bool are_more, Index of) {
   OddRows all;
   double least = odd.front().gain;
   std::vector<std::size_t> numbers;  // as a person counts them
@@ -174,9 +182,9 @@ OddRows named(const std::vector<Odd>& odd, Index of) {
   const bool is_one = numbers.size() == 1;
   all.doubt = fmt::format(
       "{} {} of {} {} {}{:.3g} times as far off as the others scatter, and in all numbers, which may be "
-      "others without {}",
+      "others without {}{}",
       is_one ? "row" : "rows", fmt::join(numbers, ", "), of, is_one ? "is" : "are", is_one ? "" : "at least ", times,
-      is_one ? "it" : "them");
+      is_one ? "it" : "them", are_more ? "; there may be more such rows" : "");
   return all;
 }
 
@@ -184,7 +192,8 @@ OddRows named(const std::vector<Odd>& odd, Index of) {
 
 OddRows oddRowsOf(const MatrixXd& jacobian, const VectorXd& left, Column x) {
   if (left.size() - jacobian.cols() <= kFewestFree || !jacobian.allFinite() || !left.allFinite()) return {};
-  auto odd = beyondChance(jacobian, left);
+  BeyondChance found = beyondChance(jacobian, left);
+  std::vector<Odd>& odd = found.odd;
   if (odd.empty()) return {};
   const Rest rest{odd, jacobian, left, x};
   const auto sigmas = sigmasBeside(odd, rest, x, static_cast<std::size_t>(jacobian.cols()));
@@ -192,12 +201,12 @@ OddRows oddRowsOf(const MatrixXd& jacobian, const VectorXd& left, Column x) {
   if (!sigmas.empty() && !odd.empty()) {
     const VectorXd lighter = Eigen::Map<const VectorXd>(sigmas.data(), left.size()).cwiseInverse();
     auto by_sigma = beyondChance(lighter.asDiagonal() * jacobian, lighter.cwiseProduct(left));
-    std::erase_if(by_sigma,
+    std::erase_if(by_sigma.odd,
                   [&](const Odd& one) { return std::ranges::find(odd, one.row, &Odd::row) == odd.end(); });
-    odd = std::move(by_sigma);
+    found = std::move(by_sigma);
   }
   if (odd.empty()) return {};
-  return named(odd, left.size());
+  return named(odd, found.are_more, left.size());
 }
 
 OddRows oddRowsOf(const Model& model, Column y, std::span<const double> at, Column x) {
