@@ -17,6 +17,8 @@
 
 #include "calib/compare/column_units.h"
 #include "calib/compare/fitted_figure.h"
+#include "calib/compare/nearness.h"
+#include "calib/compare/same_rows.h"
 #include "calib/compare/trait_verdict.h"
 #include "calib/compare/verdict_words.h"
 #include "calib/compare/without_odd_rows.h"
@@ -193,9 +195,11 @@ Result<Report> judgeTables(const std::vector<TableJob>& jobs) {
   const auto without = withoutOddRows(traits, tables, jobs);
   Report report{.title = fmt::format("Characteristics of tables: {}", kind->name),
                 .subtitle = fmt::format("{}", fmt::join(files, " and "))};
-  report.verdict = (verdicts.empty() ? clearestOf(traits) : headlineOf(verdicts)) + ".";
+  const std::string same = sameRowsInWords(tables);
+  report.verdict = same + (verdicts.empty() ? clearestOf(traits) : headlineOf(verdicts)) + ".";
   if (without) report.verdict += " " + inWords(*without) + ".";
   report.cards = cardsOf(verdicts);
+  if (!same.empty()) takeGreenOff(report.cards);
   Section section{.id = "table", .title = kind->tells};
   for (const std::string& note : notes) section.blocks.push_back(Paragraph{.text = note});
   if (!verdicts.empty()) section.blocks.push_back(verdictTable(verdicts));
@@ -208,6 +212,7 @@ Result<Report> judgeTables(const std::vector<TableJob>& jobs) {
   report.data.set("kind", kind->name)
       .set("characteristics", toJson(traits))
       .set("verdicts", toJson(verdicts));
+  if (tables.size() > 1) report.data.set("are_same_rows", !same.empty());
   if (without) report.data.set("without_odd_rows", toJson(*without));
   Json said = Json::array();
   for (const std::string& note : notes) said.push(note);

@@ -4,11 +4,14 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <numbers>
 #include <random>
+#include <string>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -182,6 +185,33 @@ TEST_F(Table, SaysWhatIsOddAboutItsRows) {
       << "1/√(12·48)";
   EXPECT_THAT(notesOn(header + alike),
               testing::ElementsAre(HasSubstr("all 48 readings of value_mm are alike")));
+}
+
+/// Which look like a perfect twin. A copy may have its rows in another order, more of them, or a row that is not finite.
+TEST_F(Table, SaysWhereOneIsGivenTwiceAndIsNotGreen) {
+  const auto rowsOf = [](int from, int to, double more) {
+    std::string rows;
+    for (int i = from; i < to; ++i)
+      rows += fmt::format("{},{}\n", i, 900.0 + (i % 7 == 3 ? more : 0.0) + 0.1 * std::sin(1.7 * i));
+    return rows;
+  };
+  const std::string header = "time_s,value_mm\n";
+  const fs::path a = write("a.csv", header + rowsOf(0, 48, 0.0));
+  const auto judged = [&](const std::string& rows) {
+    auto report = judgeTables({{.file = a, .kind = "drift"}, {.file = write("b.csv", header + rows), .kind = "drift"}});
+    EXPECT_TRUE(report) << report.error().message;
+    const bool is_green =
+        std::ranges::any_of(report->cards, [](const Card& card) { return card.tone == Tone::Good; });
+    return std::pair{report->verdict, is_green};
+  };
+  const auto [same, is_same_green] = judged(rowsOf(0, 48, 0.0) + "48,nan\n");
+  EXPECT_THAT(same, testing::StartsWith("A and B have the same 48 rows: one table may be given twice"));
+  EXPECT_FALSE(is_same_green);
+  EXPECT_THAT(judged(rowsOf(0, 60, 0.0)).first, testing::StartsWith("Each of A's 48 rows is one of B's 60: "));
+  EXPECT_THAT(judged(rowsOf(0, 40, 0.0)).first, testing::StartsWith("Each of B's 40 rows is one of A's 48: "));
+  const auto [other, is_other_green] = judged(rowsOf(0, 48, 0.001));
+  EXPECT_THAT(other, testing::StartsWith("In the one number told B does not differ"));
+  EXPECT_TRUE(is_other_green);
 }
 
 TEST_F(Table, SaysWhatIsWrongWithSessions) {
