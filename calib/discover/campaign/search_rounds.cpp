@@ -162,8 +162,15 @@ Result<> fitFound(const Declared& file, const CampaignRows* file_rows, const Ope
   const Declared listed = listedFor(file, round, wrong);
   WithFound inserted{declaredEffects(listed), placesIn(placesInFile(listed), updated)};
   putForms(round, inserted, round.effects);
+  // About which point a learned mirror turns the image is known to a pixel or two, and may be farther off.
+  const bool has_mirror = std::ranges::any_of(inserted.fitted, [&](std::size_t place) {
+    return std::holds_alternative<sim::LearnedMirror>(inserted.effects[place]);
+  });
   auto refitted = refit(*round.rows, inserted.effects, inserted.fitted,
-                        {.scales = round.finding.scales, .of_file = wrong.size(), .only = inserted.only});
+                        {.scales = round.finding.scales,
+                         .looks_farther = has_mirror,
+                         .of_file = wrong.size(),
+                         .only = inserted.only});
   if (!refitted) return refitted.error();
   round.refitted = *std::move(refitted);
   takeFitted(updated, round);
