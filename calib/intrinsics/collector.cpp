@@ -5,6 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <span>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -43,6 +46,11 @@ double reshapedBy(const Sighting& a, const Sighting& b) {
   return size > 0.0 ? moved / size : 0.0;
 }
 
+std::size_t hashOf(const Image<float>& image) {
+  const std::span<const float> pixels = image.pixels();
+  return std::hash<std::string_view>{}({reinterpret_cast<const char*>(pixels.data()), pixels.size_bytes()});
+}
+
 }  // namespace
 
 double movedBy(const Sighting& a, const Sighting& b) {
@@ -65,8 +73,29 @@ Result<> Collector::add(Sighting sighting, ImageSize size) {
   return {};
 }
 
-Result<Sighting> Collector::add(const NamedImage& image) {
+Sighting Collector::look(const NamedImage& image) {
+  const auto [first, is_new] = names_.try_emplace(hashOf(image.brightness), image.name);
+  if (!is_new) {
+    Sighting same;
+    same.rejection = Rejection::SameImage;
+    same.detail = "the same image as " + first->second;
+    return same;
+  }
   Sighting sighting = findBoard(image.brightness, target_, options_);
+  if (!sighting.isUsed()) return sighting;
+  for (const Sighting& other : sightings_) {
+    const double moved = other.isUsed() ? movedBy(other, sighting) : HUGE_VAL;
+    if (!(moved < kStill_px)) continue;
+    sighting.rejection = Rejection::LikeAnother;
+    sighting.detail = fmt::format("the board was held still: its corners are {:.2f} px (mean) from where they are in {}",
+                                  moved, other.name);
+    break;
+  }
+  return sighting;
+}
+
+Result<Sighting> Collector::add(const NamedImage& image) {
+  Sighting sighting = look(image);
   sighting.name = image.name;
   if (auto kept = add(sighting, {image.brightness.width(), image.brightness.height()}); !kept) {
     return kept.error();

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
+#include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "calib/intrinsics/brightness.h"
@@ -15,7 +18,9 @@ class Collector {
   explicit Collector(Target target, DetectOptions options = {})
       : target_(std::move(target)), options_(options) {}
 
-  /// Looks for the board and keeps what was seen. An Error if the image has another size than those before.
+  /// Looks for the board and keeps what was seen. Rejected, for views are counted as independent: an image whose
+  /// pixels are those of an earlier one, and one in which the board was held still since another that counts. An
+  /// Error if the image has another size than those before.
   Result<Sighting> add(const NamedImage& image);
   /// Keeps what was found elsewhere in an image of that size.
   Result<> add(Sighting sighting, ImageSize size);
@@ -32,7 +37,13 @@ class Collector {
   DetectOptions options_;
   ImageSize size_{};
   std::vector<Sighting> sightings_;
+  std::unordered_map<std::size_t, std::string> names_;  ///< of images, by the hash of their pixels
+
+  [[nodiscard]] Sighting look(const NamedImage& image);
 };
+
+/// Two views between which the board moved by less are of one that was held still.
+inline constexpr double kStill_px = 0.5;
 
 /// How far the board moved between two views, mean over the corners seen in both; infinite if there are none.
 double movedBy(const Sighting& a, const Sighting& b);

@@ -264,6 +264,7 @@ std::string_view nameOf(Rejection reason) {
     case Rejection::Blurred: return "blurred";
     case Rejection::TooOblique: return "too oblique";
     case Rejection::TooSmall: return "too small";
+    case Rejection::SameImage: return "given twice";
     case Rejection::LikeAnother: return "like another view";
     case Rejection::ReprojectionOutlier: return "reprojection outlier";
   }

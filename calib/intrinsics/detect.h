@@ -23,13 +23,14 @@ enum class Rejection {
   Blurred,
   TooOblique,
   TooSmall,
+  SameImage,
   LikeAnother,
   ReprojectionOutlier
 };
 inline constexpr std::array kRejections{Rejection::NotFound,    Rejection::CornerOutliers,
                                         Rejection::Blurred,     Rejection::TooOblique,
-                                        Rejection::TooSmall,    Rejection::LikeAnother,
-                                        Rejection::ReprojectionOutlier};
+                                        Rejection::TooSmall,    Rejection::SameImage,
+                                        Rejection::LikeAnother, Rejection::ReprojectionOutlier};
 std::string_view nameOf(Rejection reason);
 
 /// One corner of the board where it was seen.

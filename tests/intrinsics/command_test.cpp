@@ -128,6 +128,19 @@ TEST(CalibrateCommand, TakesEachViewOfARecordingOnce) {
   expectTheLens(folder / "camera.toml");
 }
 
+TEST(CalibrateCommand, TakesAnImageThatIsGivenTwiceOnce) {
+  const Folder folder;
+  for (std::size_t i = 0; i < shots().size(); ++i) writePng(folder / ("a" + std::to_string(i) + ".png"), shots()[i]);
+  std::filesystem::copy_file(folder / "a0.png", folder / "b.png");
+  const std::string all = (folder / "a").string() + "*.png ";
+  const Ran ran = cli::toftwin("calibrate " + all + all + quoted(folder / "b.png") + kBoard + "--no-store -o " +
+                               quoted(folder / "camera.toml"));
+  ASSERT_EQ(ran.status, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("10 of 21 views used"));
+  EXPECT_THAT(ran.out, HasSubstr("b.png: given twice (the same image as " + (folder / "a0.png").string()));
+  expectTheLens(folder / "camera.toml");
+}
+
 TEST(CalibrateCommand, SaysWhatIsWrong) {
   const Folder folder;
   writePng(folder / "one.png", shots()[0]);

@@ -192,6 +192,29 @@ TEST(Calibration, OfRenderedImagesHoldsTheTruthWithinItsIntervals) {
   }
 }
 
+// ---- the same view again ----------------------------------------------------------------------------------
+
+/// An image given twice, and another frame of a board that was held still, made the lens look known three times as
+/// well as it was: their errors are alike.
+TEST(Collector, CountsAnImageAndABoardHeldStillOnce) {
+  const Truth truth = smallCamera();
+  std::mt19937_64 random;
+  const BoardPose pose = poseBefore(11, truth, random);
+  const Image<float> first = render(truth, checkerboard(), pose, {}, random);
+  const Image<float> held = render(truth, checkerboard(), pose, {}, random);
+  const Image<float> other = render(truth, checkerboard(), poseBefore(31, truth, random), {}, random);
+  Collector collector{checkerboard()};
+  const auto add = [&](const char* name, const Image<float>& image) { return *collector.add({name, image}); };
+  EXPECT_TRUE(add("first.png", first).isUsed());
+  const Sighting same = add("copy.png", first), still = add("held.png", held);
+  EXPECT_EQ(same.rejection, Rejection::SameImage);
+  EXPECT_THAT(same.detail, HasSubstr("the same image as first.png"));
+  EXPECT_EQ(still.rejection, Rejection::LikeAnother) << still.detail;
+  EXPECT_THAT(still.detail, HasSubstr("held still"));
+  EXPECT_THAT(still.detail, HasSubstr("in first.png"));
+  EXPECT_TRUE(add("other.png", other).isUsed());
+}
+
 // ---- ChArUco ------------------------------------------------------------------------------------------------
 
 TEST(Charuco, IsFoundInPartWithTheRightIndices) {

@@ -12,7 +12,6 @@ namespace toftwin::cli {
 struct LiveOptions {
   std::string source;
   int most_views = 60;
-  double still_px = 0.5;  ///< between two frames
   bool until_enough = true;
 };
 

@@ -26,7 +26,9 @@ std::string whyNot(const Sighting& sighting) {
     case Rejection::TooOblique: return "it is tilted by 75 degrees or more";
     case Rejection::TooSmall: return "it is too small in the image; bring it nearer";
     case Rejection::LikeAnother: return "it is like a view that was taken; move it, or tilt it by 20 degrees";
-    case Rejection::ReprojectionOutlier: break;  // of a lens, which is not known yet
+    case Rejection::SameImage:            // of files
+    case Rejection::ReprojectionOutlier:  // of a lens, which is not known yet
+      break;
   }
   return "";
 }
@@ -90,7 +92,7 @@ Result<> collectLive(const DaemonOptions& daemon, const LiveOptions& live, intri
     sighting.name = image.name;
     const bool is_so = searches.add(sighting);
     // Two frames that agree: the board is held still, so the exposures of one frame agree as well.
-    const bool is_still = before && sighting.isUsed() && movedBy(*before, sighting) < live.still_px;
+    const bool is_still = before && sighting.isUsed() && movedBy(*before, sighting) < kStill_px;
     const bool is_alike = is_still && collector.isLikeAnother(sighting);
     if (is_alike) sighting.rejection = Rejection::LikeAnother;
     if (is_so && (!is_still || is_alike)) prompter.whyNot(live_calibration::whyNot(sighting));
