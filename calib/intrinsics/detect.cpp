@@ -181,15 +181,24 @@ bool isLikeNext(const FittedCorner& there, const FittedCorner& corner) {
          there.error_px < kMostError * corner.error_px;
 }
 
+/// Whether all that a fit there would look at lies in the image. Of half of it, as where an outer square ends at the
+/// image's edge, an edge between two squares fits as well as a corner of four.
+bool isWhole(const CornerGuess& guess, const Image<float>& image) {
+  const double half_u = guess.reach * (std::abs(guess.along[0]) + std::abs(guess.across[0])),
+               half_v = guess.reach * (std::abs(guess.along[1]) + std::abs(guess.across[1]));
+  return guess.at.u > half_u && guess.at.v > half_v && guess.at.u < image.width() - 1.0 - half_u &&
+         guess.at.v < image.height() - 1.0 - half_v;
+}
+
 /// Whether squares go on beyond a side: then the grid is a part of a larger board, wherever the search found
-/// as many corners as it was told. At most of the places one step on that lie in the image, and at three or
+/// as many corners as it was told. At most of the places one step on that are seen whole, and at three or
 /// more.
 bool goesOn(const Image<float>& image, const Target& target, const Pixels& grid, float saturation,
             const Side& side) {
   constexpr double kMostAlike = 0.8;
   constexpr int kFewestAlike = 3;
   const int count = side.is_row ? target.columns : target.rows;
-  int inside = 0, like = 0;
+  int whole = 0, like = 0;
   for (int i = 0; i < count; ++i) {
     const auto at = [&](int line) {
       const int column = side.is_row ? i : line, row = side.is_row ? line : i;
@@ -198,15 +207,13 @@ bool goesOn(const Image<float>& image, const Target& target, const Pixels& grid,
     const CornerGuess outer = at(side.outer), inner = at(side.inner);
     CornerGuess beyond = outer;
     beyond.at = {2.0 * outer.at.u - inner.at.u, 2.0 * outer.at.v - inner.at.v};
-    const bool is_inside = beyond.at.u > 0.0 && beyond.at.v > 0.0 && beyond.at.u < image.width() - 1.0 &&
-                           beyond.at.v < image.height() - 1.0;
-    const auto corner = is_inside ? fitCorner(image, outer, saturation) : std::nullopt;
+    const auto corner = isWhole(beyond, image) ? fitCorner(image, outer, saturation) : std::nullopt;
     if (!corner) continue;
-    ++inside;
+    ++whole;
     const auto there = fitCorner(image, beyond, saturation);
     like += there && isLikeNext(*there, *corner) ? 1 : 0;
   }
-  return like >= kFewestAlike && like >= kMostAlike * inside;
+  return like >= kFewestAlike && like >= kMostAlike * whole;
 }
 
 /// What is said of a board with other counts than it was told; empty: nothing shows that.

@@ -137,6 +137,22 @@ TEST(FindBoard, SaysThatABoardHasMoreCornersThanItWasTold) {
   EXPECT_GT(more, used);
 }
 
+/// Of where an outer square ends at the image's own edge, half is seen: a corner of four squares fits that as well.
+TEST(FindBoard, TakesABoardWhoseOuterSquaresTouchTheImagesEdge) {
+  const Truth truth = smallCamera();
+  const Target board = checkerboard();
+  for (const double over_px : {-1.5, -1.0, -0.5, 0.0, 1.0}) {
+    std::mt19937_64 random{61};
+    BoardPose pose;
+    pose.translation_mm = {-152.0, -64.0, 250.0};
+    const Eigen::Vector3d right{256.0, 64.0, 0.0};
+    while (project(truth.lens, right + pose.translation_mm).x() < truth.size.width - 0.5 + over_px)
+      pose.translation_mm.x() += 0.1;
+    const Sighting seen = findBoard(render(truth, board, pose, {.blur_px = 0.3}, random), board);
+    EXPECT_TRUE(seen.isUsed()) << over_px << ": " << nameOf(seen.rejection) << ", " << seen.detail;
+  }
+}
+
 TEST(FindBoard, RejectsABlurThatSwallowsTheSquares) {
   const Truth truth = smallCamera();
   std::mt19937_64 random;
