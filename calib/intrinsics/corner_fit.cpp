@@ -200,7 +200,8 @@ std::optional<FittedCorner> fitCorner(const Image<float>& image, const CornerGue
   const double area = std::abs(guess.along[0] * guess.across[1] - guess.along[1] * guess.across[0]);
   if (!(area > 4.0)) return std::nullopt;
   const Window window = windowAround(image, guess, saturation);
-  if (window.samples.size() < static_cast<std::size_t>(2 * Count)) return std::nullopt;
+  static_assert(kFewestPixels == 2 * static_cast<std::size_t>(Count));
+  if (window.samples.size() < kFewestPixels) return std::nullopt;
   Vector x = start(guess, window);
   if (!minimise(x, window)) return std::nullopt;
   const double moved = std::hypot(x[U] - guess.at.u, x[V] - guess.at.v);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <optional>
 
 #include <toftwin/image.h>
@@ -26,6 +27,9 @@ struct FittedCorner {
   double blur_px = 0.0;   ///< standard deviation of the edges' blur
   double contrast = 0.0;  ///< half of bright minus dark; negative: the first quadrant is dark
 };
+
+/// Pixels that a fit takes: two for each of its numbers.
+inline constexpr std::size_t kFewestPixels = 22;
 
 /// Fits the meeting of four squares (or the corner of one), blurred, unevenly lit and perhaps cut at
 /// `saturation`, to the pixels within half a square around (see the source for the formula). Nothing if that

@@ -231,16 +231,36 @@ std::string otherCounts(const Image<float>& image, const Target& target, const P
   return {};
 }
 
-void judge(Sighting& sighting, const Target& target, const DetectOptions& options) {
+/// Why too few corners of a board with markers are there, of which the markers told so many.
+void rejectForFew(Sighting& sighting, const Target& target, std::size_t told, const DetectOptions& options) {
+  const double clear_px = sighting.square_px * reachOf(target),
+               least_clear_px = 0.5 * std::sqrt(static_cast<double>(kFewestPixels)),
+               cell_px = sighting.square_px * (target.marker / target.square) / target.cells;
+  const bool is_charuco = target.kind == Target::Kind::Charuco;
+  sighting.rejection = is_charuco ? Rejection::TooSmall : Rejection::CornerOutliers;
+  if (is_charuco && told >= options.fewest_corners && clear_px < least_clear_px) {
+    sighting.detail = fmt::format("its markers leave {:.2f} px around each corner, {:.2f} are needed: {} of {} corners "
+                                  "could be fitted", clear_px, least_clear_px, sighting.corners.size(), told);
+  } else if (is_charuco && told < options.fewest_corners && cell_px < options.least_marker_cell_px) {
+    sighting.detail = fmt::format("cells of its markers of {:.1f} px, {:g} are needed: they tell {} of {} corners",
+                                  cell_px, options.least_marker_cell_px, told, target.corners());
+  } else {
+    sighting.rejection = Rejection::CornerOutliers;
+    sighting.detail = fmt::format("its markers tell {} of {} corners, {} of which could be fitted; {} are needed", told,
+                                  target.corners(), sighting.corners.size(), options.fewest_corners);
+  }
+}
+
+void judge(Sighting& sighting, const Target& target, std::size_t told, const DetectOptions& options) {
   const auto reject = [&](Rejection reason, std::string detail) {
     sighting.rejection = reason;
     sighting.detail = std::move(detail);
   };
   const auto corners = static_cast<double>(sighting.corners.size()),
              all = static_cast<double>(target.corners());
-  const bool is_enough = target.kind == Target::Kind::Checkerboard
-                             ? 1.0 - corners / all <= options.most_lost
-                             : sighting.corners.size() >= options.fewest_corners;
+  const bool has_markers = target.kind != Target::Kind::Checkerboard;
+  const bool is_enough = !has_markers ? 1.0 - corners / all <= options.most_lost
+                                      : sighting.corners.size() >= options.fewest_corners;
   const bool is_tags = target.kind == Target::Kind::Tags;
   const double pattern_px = is_tags ? sighting.square_px / target.cells : sighting.square_px;
   const double least_px = is_tags ? options.least_cell_px : options.least_square_px;
@@ -248,9 +268,13 @@ void judge(Sighting& sighting, const Target& target, const DetectOptions& option
   if (pattern_px < least_px) {
     reject(Rejection::TooSmall,
            fmt::format("{} of {:.1f} px, {:g} are needed", pattern, pattern_px, least_px));
+  } else if (has_markers && told < options.fewest_corners) {
+    rejectForFew(sighting, target, told, options);  // nor do so few tell how it is tilted
   } else if (sighting.tilt_deg > options.most_tilt_deg) {
     reject(Rejection::TooOblique, fmt::format("tilted by {:.0f} degrees, at most {:g}", sighting.tilt_deg,
                                               options.most_tilt_deg));
+  } else if (has_markers && !is_enough) {
+    rejectForFew(sighting, target, told, options);
   } else if (!is_enough) {
     reject(Rejection::CornerOutliers, fmt::format("{} of {} corners could be fitted", sighting.corners.size(),
                                                   target.corners()));
@@ -313,7 +337,7 @@ Sighting findMarkers(const Image<float>& image, const Target& target, const Dete
   }
   const float saturation = saturationOf(image).value_or(std::numeric_limits<float>::infinity());
   keep(sighting, fitAll(image, target, found->grid, saturation, found->is_found));
-  judge(sighting, target, options);
+  judge(sighting, target, static_cast<std::size_t>(std::ranges::count(found->is_found, true)), options);
   return sighting;
 }
 
@@ -344,7 +368,7 @@ Sighting findBoard(const Image<float>& image, const Target& target, const Detect
     return sighting;
   }
   keep(sighting, std::move(fitted));
-  judge(sighting, target, options);
+  judge(sighting, target, 0, options);
   return sighting;
 }
 

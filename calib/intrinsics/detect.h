@@ -60,6 +60,7 @@ struct DetectOptions {
   double least_square_px = 4.0;
   double least_cell_px =
       2.5;  ///< of a tag: smaller ones leave too few pixels between its corner and its cells
+  double least_marker_cell_px = 2.0;  ///< of a ChArUco board's markers: smaller ones are not all read
   std::size_t fewest_corners = 12;  ///< of a board with markers, which need not be seen whole
   double most_tilt_deg = 75.0;
   bool is_thorough = true;  ///< false: fewer copies are searched, for live images

@@ -97,6 +97,7 @@ Result<Target> charucoOf(Target board, Length marker, const std::string& diction
   board.kind = Target::Kind::Charuco;
   board.marker = marker;
   board.dictionary = dictionary;
+  board.cells = known->cells;
   return board;
 }
 

@@ -27,7 +27,7 @@ struct Target {
   Length square{};           ///< side of a square; Tags: from one tag to the next
   Length marker{};           ///< Charuco, Tags: side of a marker
   std::string dictionary{};  ///< Charuco, Tags: as OpenCV names it, such as "DICT_4X4_50"
-  int cells = 0;             ///< Tags: across one, with its dark border, which is one cell wide
+  int cells = 0;             ///< Charuco, Tags: across a marker, with its dark border, which is one cell wide
 
   [[nodiscard]] std::size_t corners() const {
     return static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);

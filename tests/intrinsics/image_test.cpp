@@ -2,6 +2,7 @@
 // From pixels to a lens: corners, whole images, and real ones.
 #include <gmock/gmock.h>
 
+#include <Eigen/Geometry>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -260,6 +261,37 @@ TEST(Charuco, IsFoundInPartWithTheRightIndices) {
     EXPECT_NEAR(corner.at.v, kMargin + kSmall * (row + 1.0) - 0.5, 0.05) << corner.index;
   }
   EXPECT_EQ(findBoard(Image<float>{200, 150, 80.0F}, *target).rejection, Rejection::NotFound);
+}
+
+/// At 1.3 m its markers of 70 mm leave two pixels around a corner; at 1 m those of 50 mm have cells of 1.5 pixels, and
+/// from the few corners that they tell it looks tilted by 79 degrees, where it is by 11.
+TEST(Charuco, OfTooFewPixelsIsSaidToBe) {
+  struct Case {
+    Length marker;
+    double z_mm;
+    const char* why;
+  };
+  for (const Case& one : {Case{70_mm, 1300.0, "its markers leave 1.92 px around each corner, 2.35 are needed"},
+                          Case{50_mm, 1000.0, "cells of its markers of 1.5 px, 2 are needed"}}) {
+    const auto target = charucoOf(*targetOf("6x4", 100_mm), one.marker, "DICT_4X4_50");
+    if (!target && target.error().code == Error::Code::Unsupported) GTEST_SKIP() << target.error().message;
+    ASSERT_TRUE(target.ok()) << target.error().message;
+    constexpr int kSquare_px = 80;
+    const cv::Mat drawn = drawMarkers(*target, kSquare_px);
+    const auto print = [&](double x_mm, double y_mm) {
+      const int u = static_cast<int>(std::floor((x_mm / 100.0 + 1.0) * kSquare_px)),
+                v = static_cast<int>(std::floor((y_mm / 100.0 + 1.0) * kSquare_px));
+      const bool is_there = u >= 0 && v >= 0 && u < drawn.cols && v < drawn.rows;
+      return is_there ? drawn.at<unsigned char>(v, u) / 255.0 : -1.0;
+    };
+    BoardPose pose;
+    pose.rotation = Eigen::AngleAxisd{0.2, Eigen::Vector3d::UnitY()}.toRotationMatrix();
+    pose.translation_mm = Eigen::Vector3d{0.0, 0.0, one.z_mm} - pose.rotation * Eigen::Vector3d{250.0, 150.0, 0.0};
+    std::mt19937_64 random{61};
+    const Sighting seen = findBoard(testing::render(smallCamera(), print, pose, {.blur_px = 0.4}, random), *target);
+    EXPECT_EQ(seen.rejection, Rejection::TooSmall) << nameOf(seen.rejection) << seen.detail;
+    EXPECT_THAT(seen.detail, HasSubstr(one.why));
+  }
 }
 
 TEST(Charuco, ThatCannotBeIsRefused) {
