@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 
+#include "calib/intrinsics/clusters.h"
 #include "calib/intrinsics/detect.h"
 #include "calib/intrinsics/lens_model.h"
 #include "calib/intrinsics/surface.h"
@@ -21,12 +22,6 @@ struct Observed {
   std::vector<double> weights;
 };
 Observed observed(std::vector<Corner> corners);
-
-/// What one view says of the lens and the bend (in this order) when its own pose is free, weighted.
-struct SharedInformation {
-  Eigen::MatrixXd information;  ///< Σ Aᵀ A − Σ Aᵀ B (Bᵀ B)⁻¹ Bᵀ A
-  Eigen::VectorXd gradient;     ///< Σ Aᵀ r − Σ Aᵀ B (Bᵀ B)⁻¹ Bᵀ r, zero in sum at the best
-};
 
 struct Bundle {
   LensModel model = LensModel::Tangential;
@@ -57,7 +52,8 @@ std::vector<Eigen::Vector2d> residuals(const Bundle& bundle, const Observed& vie
 /// √(Σ (du² + dv²) / corners), as OpenCV defines the reprojection error; weights are not used.
 double rmsOf(std::span<const Eigen::Vector2d> residuals);
 
-/// For each view, at the bundle as it is.
+/// What each view says of the lens and the bend (in this order) when its own pose is free, weighted, at the bundle as
+/// it is: Σ Aᵀ A − Σ Aᵀ B (Bᵀ B)⁻¹ Bᵀ A and Σ Aᵀ r − Σ Aᵀ B (Bᵀ B)⁻¹ Bᵀ r.
 std::vector<SharedInformation> sharedInformation(const std::vector<Observed>& views, const Bundle& bundle);
 /// Standard deviation of a corner's coordinate: √(Σ w r² / (Σ 2w − free parameters)).
 double coordinateError(const std::vector<Observed>& views, const Bundle& bundle);

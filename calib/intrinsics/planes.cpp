@@ -18,9 +18,13 @@ constexpr double kTukey = 4.685;  // 95 % efficient for normal errors
 
 Eigen::Vector3d eigenOf(Vec3d v) { return {v.x, v.y, v.z}; }
 
+/// Parts of the image, whose pixels may err alike: a camera's own errors of range bend over some tenths of its image.
+constexpr int kPartsAcross = 4, kPartsDown = 3;
+
 struct Rays {
   std::vector<Eigen::Vector3d> rays;
   std::vector<double> range_m;
+  std::vector<std::size_t> part;
 };
 
 Rays raysOf(const Image<float>& range_m, const CameraInfo& camera, std::span<const std::uint32_t> pixels) {
@@ -30,6 +34,8 @@ Rays raysOf(const Image<float>& range_m, const CameraInfo& camera, std::span<con
     const int width = range_m.width(), at = static_cast<int>(pixel);
     all.rays.push_back(eigenOf(rayThroughPixel(camera, at % width, at / width).v));
     all.range_m.push_back(static_cast<double>(range_m[pixel]));
+    all.part.push_back(static_cast<std::size_t>(at / width * kPartsDown / range_m.height() * kPartsAcross +
+                                                at % width * kPartsAcross / width));
   }
   return all;
 }
@@ -38,6 +44,9 @@ Rays raysOf(const Image<float>& range_m, const CameraInfo& camera, std::span<con
 double errorOf(const Rays& all, const Eigen::Vector3d& m, std::size_t i) {
   return all.range_m[i] - 1.0 / m.dot(all.rays[i]);
 }
+
+/// m of the plane.
+Eigen::Vector3d measuredOf(const SeenPlane& plane) { return eigenOf(plane.normal.v) / plane.distance_m; }
 
 /// 1.4826 times the median magnitude: σ of normal errors.
 double spreadOf(const Rays& all, const Eigen::Vector3d& m) {
@@ -100,11 +109,21 @@ Result<SeenPlane> fitPlane(const Image<float>& range_m, const CameraInfo& camera
   const double n = static_cast<double>(all.rays.size());
   const double variance = psi2 / (n - 3.0) / ((slope / n) * (slope / n));
   const Eigen::Vector3d towards = -m.normalized();
+  std::vector<SharedInformation> parts(kPartsAcross * kPartsDown, {Eigen::MatrixXd::Zero(3, 3), Eigen::VectorXd::Zero(3)});
+  for (std::size_t i = 0; i < all.rays.size(); ++i) {
+    const double e = errorOf(all, m, i), u2 = (e / reach) * (e / reach), r2 = all.range_m[i] * all.range_m[i];
+    SharedInformation& part = parts[all.part[i]];
+    part.information += r2 * r2 / variance * all.rays[i] * all.rays[i].transpose();
+    if (u2 >= 1.0) continue;
+    part.gradient -= r2 * e * (1.0 - u2) * (1.0 - u2) / (slope / n * variance) * all.rays[i];
+  }
+  std::erase_if(parts, [](const SharedInformation& part) { return part.information.isZero(0.0); });
   return SeenPlane{.normal = {{towards.x(), towards.y(), towards.z()}},
                    .distance_m = -1.0 / m.norm(),
                    .covariance = variance * linear::inverse(plain),
                    .rms_mm = 1e3 * std::sqrt(squares / static_cast<double>(std::max<std::size_t>(1, used))),
-                   .pixels = used};
+                   .pixels = used,
+                   .parts = std::move(parts)};
 }
 
 namespace {
@@ -155,16 +174,17 @@ Result<KnownPose<World, Camera>> poseFromPlanes(std::span<const SeenPlane> seen,
         angle > 0.0 ? Eigen::AngleAxisd{angle, w / angle}.toRotationMatrix() : Eigen::Matrix3d::Identity();
     return std::pair<Eigen::Matrix3d, Eigen::Vector3d>{by * rotation, place + step.tail<3>()};
   };
+  const auto planeAt = [&](const Eigen::VectorXd& step, std::size_t i) -> Eigen::Vector3d {
+    const auto [r, t] = poseAt(step);
+    const Eigen::Vector3d n = eigenOf(known[i].normal.v);
+    return r.transpose() * n / (known[i].distance_m - n.dot(t));
+  };
   const auto settled = settle(
       [&](const Eigen::VectorXd& step) {
-        const auto [r, t] = poseAt(step);
         Eigen::VectorXd all(3 * static_cast<Eigen::Index>(seen.size()));
         for (std::size_t i = 0; i < seen.size(); ++i) {
-          const Eigen::Vector3d n = eigenOf(known[i].normal.v);
-          const Eigen::Vector3d expected = r.transpose() * n / (known[i].distance_m - n.dot(t));
-          const Eigen::Vector3d measured = eigenOf(seen[i].normal.v) / seen[i].distance_m;
           all.segment<3>(3 * static_cast<Eigen::Index>(i)) =
-              whiten[i].triangularView<Eigen::Lower>().solve(measured - expected);
+              whiten[i].triangularView<Eigen::Lower>().solve(measuredOf(seen[i]) - planeAt(step, i));
         }
         return all;
       },
@@ -174,9 +194,25 @@ Result<KnownPose<World, Camera>> poseFromPlanes(std::span<const SeenPlane> seen,
   const Eigen::Quaterniond q{r};
   double pixels = 0.0;
   for (const SeenPlane& plane : seen) pixels += static_cast<double>(plane.pixels);
+  const double degrees = pixels - 6.0;
+  // What each part of the image says of the pose, of what it says of the plane that the pose puts there.
+  std::vector<SharedInformation> parts;
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    Eigen::Matrix<double, 3, 6> slope;
+    for (Eigen::Index k = 0; k < 6; ++k) {
+      const Eigen::VectorXd by = 1e-6 * Eigen::VectorXd::Unit(6, k);
+      slope.col(k) = (planeAt(settled->step + by, i) - planeAt(settled->step - by, i)) / 2e-6;
+    }
+    const Eigen::Vector3d moved = planeAt(settled->step, i) - measuredOf(seen[i]);
+    for (const SharedInformation& part : seen[i].parts)
+      parts.push_back({slope.transpose() * part.information * slope,
+                       slope.transpose() * (part.gradient - part.information * moved)});
+  }
+  const Eigen::VectorXd wider =
+      widenedBy(clusteredErrors(parts), settled->covariance.diagonal().cwiseSqrt(), degrees);
   return KnownPose<World, Camera>{.pose = {{q.w(), q.x(), q.y(), q.z()}, {t.x(), t.y(), t.z()}},
-                                  .covariance = settled->covariance,
-                                  .degrees = pixels - 6.0};
+                                  .covariance = wider.asDiagonal() * settled->covariance * wider.asDiagonal(),
+                                  .degrees = degrees};
 }
 
 }  // namespace toftwin::intrinsics

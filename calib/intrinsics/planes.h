@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "calib/intrinsics/board_pose.h"
+#include "calib/intrinsics/clusters.h"
 
 namespace toftwin::intrinsics {
 
@@ -18,6 +19,9 @@ struct SeenPlane {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   double rms_mm = 0.0;     ///< of ranges along the rays, of those that count
   std::size_t pixels = 0;  ///< that count
+  /// What those in each part of the image say of m, in units of the covariance: together its inverse. Parts without a
+  /// pixel are left out.
+  std::vector<SharedInformation> parts{};
 };
 
 /// The plane of so many pixels' ranges. On a plane 1/range = m · ray, linear in m = normal / distance: least
@@ -35,7 +39,10 @@ struct KnownPlane {
 /// Whether these planes tell a camera's pose. Error: fewer than three, or normals that do not span space.
 Result<> tellThePose(std::span<const KnownPlane> planes);
 
-/// Where the camera stands that sees these planes, one by one. Error: planes that do not tell it. Least squares in m weighted by the planes' covariances.
+/// Where the camera stands that sees these planes, one by one. Error: planes that do not tell it. Least squares in m
+/// weighted by the planes' covariances. Each number's interval is that of pixels which err by themselves, or the one of
+/// how much parts of the image contradict the pose, if that is wider. What the ranges of all parts are off by alike, as by
+/// an offset, is in the pose and in neither.
 Result<KnownPose<World, Camera>> poseFromPlanes(std::span<const SeenPlane> seen,
                                                 std::span<const KnownPlane> known);
 

@@ -12,27 +12,6 @@ namespace {
 
 constexpr double kNormal95 = 1.959964;  // 97.5 % of a normal distribution lie below
 
-/// The views' gradients, made as large as their errors are. At the best lens a view's gradient is smaller
-/// than its error, because the lens has bent towards it. With S = Σ S_v = L Lᵀ and M_v = L⁻¹ S_v L⁻ᵀ,
-///   g̃_v = L (1 − M_v)^(−1/2) L⁻¹ g_v
-/// has the covariance σ² S_v if all corners err alike ("CR2" of R. M. Bell and D. F. McCaffrey, Survey
-/// Methodology 28 (2002) 169).
-std::vector<Eigen::VectorXd> unbent(const std::vector<SharedInformation>& views, const Eigen::MatrixXd& total) {
-  const Eigen::MatrixXd lower = linear::choleskyOf(total);
-  std::vector<Eigen::VectorXd> gradients;
-  for (const SharedInformation& view : views) {
-    const Eigen::MatrixXd half = linear::solveLowerEach(lower, view.information),
-                          share = linear::solveLowerEach(lower, half.transpose());
-    const auto [values, vectors] = linear::eigenpairs(0.5 * (share + share.transpose()));
-    constexpr double kMostShare = 0.95;  // a view that alone knows a parameter cannot be checked by others
-    const Eigen::VectorXd stretch =
-        (1.0 - values.array().min(kMostShare)).sqrt().inverse().matrix();
-    const Eigen::VectorXd plain = linear::solveLower(lower, view.gradient);
-    gradients.emplace_back(lower * (vectors * stretch.cwiseProduct(vectors.transpose() * plain)));
-  }
-  return gradients;
-}
-
 /// Standard errors from how much the views disagree: √ diag(S⁻¹ (Σ g̃_v g̃_vᵀ) S⁻¹).
 Eigen::VectorXd fromViews(const std::vector<Eigen::VectorXd>& gradients, const Eigen::MatrixXd& inverse) {
   Eigen::VectorXd variance = Eigen::VectorXd::Zero(inverse.rows());

@@ -19,10 +19,6 @@ struct LensUncertainty {
   double clustering = 1.0;           ///< root mean square of from_views / from_corners
 };
 
-/// From this clustering on, the views' disagreement is believed parameter by parameter, below only in the mean over
-/// all: of few views each parameter's own is too noisy.
-inline constexpr double kClustered = 1.5;
-
 /// 97.5 % of Student's t lie below: the Cornish-Fisher expansion, right to 0.5 % from 4 degrees on.
 double studentQuantile(double degrees);
 

@@ -19,6 +19,7 @@
 #include "calib/plan/opened.h"
 #include "calib/plan/run_log.h"
 #include "calib/plan/run_report.h"
+#include "calib/plan/seen.h"
 #include "protocol/record/recording.h"
 #include "protocol/settings/settings.h"
 #include "protocol/types/counted.h"
@@ -193,19 +194,24 @@ std::vector<std::string> warningsOf(const RunFiles& files, const std::map<std::s
   }
   double place_mm = 0.0, turn_deg = 0.0;
   std::size_t seen = 0, by_rig = 0;
+  bool is_by_planes = false;
   for (const CaptureRecord& one : taken) {
     if (!one.pose_half_widths) continue;
     const auto& h = *one.pose_half_widths;
     place_mm = std::max(place_mm, 1e3 * std::hypot(h[3], h[4], h[5]));
     turn_deg = std::max(turn_deg, 57.29577951308232 * std::hypot(h[0], h[1], h[2]));
-    ++(one.pose_by == kByBoardAndRig ? by_rig : seen);
+    ++(one.pose_by == kByBoardAndRig ? by_rig : seen), is_by_planes = is_by_planes || isPoseFromPlanes(one);
   }
   if (seen + by_rig > 0) {
-    const std::string rigs = by_rig > 0 ? fmt::format(", {} by the rig from where they had seen the board,", by_rig) : "";
+    const std::string rigs = by_rig > 0 ? fmt::format(", {} by the rig from where they had seen the board,", by_rig) : ",";
+    const char* const but_for =
+        is_by_planes ? ", but for what the camera's ranges of all planes are off by alike (an offset or a scale), "
+                       "which is in the poses themselves and in no interval"
+                     : "";
     warnings.push_back(
         fmt::format("{} of {} poses are by what the cameras saw{} known to {:.2f} mm and {:.3f}° (95 %, the worst "
-                    "of them): errors of range that are as small may be the pose's.",
-                    seen, taken.size(), rigs.empty() ? "," : rigs, place_mm, turn_deg));
+                    "of them){}: errors of range that are as small may be the pose's.",
+                    seen, taken.size(), rigs, place_mm, turn_deg, but_for));
   }
   warnings.insert(warnings.end(), notes.begin(), notes.end());
   const auto moving = std::ranges::count_if(taken, [](const CaptureRecord& one) { return !standsStill(one); });
