@@ -5,9 +5,12 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <cstddef>
 #include <numbers>
+#include <vector>
 
 #include "calib/intrinsics/bundle.h"
+#include "calib/intrinsics/clusters.h"
 #include "calib/intrinsics/seed.h"
 #include "calib/intrinsics/uncertainty.h"
 #include "calib/linear/linear.h"
@@ -38,14 +41,37 @@ BoardPose mirrored(const Surface& surface, const Observed& view, const BoardPose
   return result;
 }
 
-Matrix6d informationOf(const Surface& surface, const Observed& view, const LensParameters& lens,
-                       const BoardPose& pose) {
-  Matrix6d information = Matrix6d::Zero();
+/// What the corners of each row of the board (of tags, of one side of a row of them) say of the pose, or of each
+/// column.
+enum class Line { Row, Column };
+std::vector<SharedInformation> sayOfLines(Line line, const Surface& surface, const Target& target,
+                                          const Observed& view, const LensParameters& lens, const BoardPose& pose) {
+  const auto columns = static_cast<std::size_t>(target.columns), rows = static_cast<std::size_t>(target.rows);
+  std::vector<SharedInformation> lines(line == Line::Row ? rows : columns,
+                                       {Eigen::MatrixXd::Zero(6, 6), Eigen::VectorXd::Zero(6)});
   for (const Corner& corner : view.corners) {
     const Projection p = projectWithSlopes(lens, pose, surface.at(corner.index));
-    information += p.by_pose.transpose() * p.by_pose;
+    SharedInformation& its = lines[line == Line::Row ? corner.index / columns : corner.index % columns];
+    its.information += p.by_pose.transpose() * p.by_pose;
+    its.gradient += p.by_pose.transpose() * Eigen::Vector2d{corner.at.u - p.at.x(), corner.at.v - p.at.y()};
   }
-  return information;
+  std::erase_if(lines, [](const SharedInformation& one) { return one.information.isZero(0.0); });
+  return lines;
+}
+
+/// Of corners that err by themselves, σ² (BᵀB)⁻¹; or, where the rows of the board or its columns contradict each other
+/// by more, by how much they do: where an edge lies along the pixels, its corners err alike.
+Matrix6d covarianceOf(const Surface& surface, const Target& target, const Observed& view, const LensParameters& lens,
+                      const BoardPose& pose, double sigma_px, double degrees) {
+  const auto rows = sayOfLines(Line::Row, surface, target, view, lens, pose),
+             columns = sayOfLines(Line::Column, surface, target, view, lens, pose);
+  Matrix6d information = Matrix6d::Zero();
+  for (const SharedInformation& row : rows) information += row.information;
+  const Matrix6d alone = sigma_px * sigma_px * linear::inverse(information);
+  const Eigen::VectorXd independent = alone.diagonal().cwiseMax(0.0).cwiseSqrt();
+  const Eigen::VectorXd wider = widenedBy(clusteredErrors(rows), independent, degrees)
+                                    .cwiseMax(widenedBy(clusteredErrors(columns), independent, degrees));
+  return wider.asDiagonal() * alone * wider.asDiagonal();
 }
 
 Transform<Camera, Board> transformOf(const BoardPose& pose) {
@@ -88,7 +114,8 @@ Result<BoardSighting> locateBoard(const Sighting& sighting, const Target& target
   BoardSighting result{.rms_px = rms, .corners = view.corners.size()};
   Eigen::Matrix<double, 6, 1> metres;
   metres << 1, 1, 1, 1e-3, 1e-3, 1e-3;
-  const Matrix6d covariance = (rms * rms * n / degrees) * linear::inverse(informationOf(surface, view, lens, *pose));
+  const Matrix6d covariance =
+      covarianceOf(surface, target, view, lens, *pose, rms * std::sqrt(n / degrees), degrees);
   result.camera_from_board = {.pose = transformOf(*pose),
                               .covariance = metres.asDiagonal() * covariance * metres.asDiagonal(),
                               .degrees = degrees};

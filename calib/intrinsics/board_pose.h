@@ -31,7 +31,8 @@ struct BoardSighting {
 };
 
 /// The board of this target in an image of amplitude, seen through a lens that is known and that the result
-/// trusts. The corners' errors are taken from how well they fit, σ² = Σ r² / (2n − 6), as independent.
+/// trusts. The corners' errors are taken from how well they fit, σ² = Σ r² / (2n − 6), as independent; where rows or
+/// columns of the board contradict each other by 1.5 times more than that, from how much they do.
 /// Errors: no board, or one of no use (with the reason); an image of another size than the lens; a board so
 /// small or far that its mirrored pose fits nearly as well.
 Result<BoardSighting> locateBoard(const Image<float>& amplitude, const Target& target,

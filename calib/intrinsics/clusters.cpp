@@ -69,12 +69,11 @@ ClusteredErrors clusteredErrors(const std::vector<SharedInformation>& clusters) 
 }
 
 Eigen::VectorXd widenedBy(const ClusteredErrors& clustered, const Eigen::VectorXd& independent, double degrees) {
-  const Eigen::VectorXd ratio = clustered.standard.cwiseQuotient(independent);
-  const double pooled = std::sqrt(ratio.cwiseAbs2().mean());
-  if (!(pooled > kClustered)) return Eigen::VectorXd::Constant(ratio.size(), std::max(1.0, pooled));
-  Eigen::VectorXd by = ratio;
-  for (Eigen::Index k = 0; k < by.size(); ++k)
-    by[k] = std::max(1.0, by[k] * studentQuantile(clustered.degrees[k]) / studentQuantile(degrees));
+  Eigen::VectorXd by = Eigen::VectorXd::Ones(independent.size());
+  for (Eigen::Index k = 0; k < by.size(); ++k) {
+    const double ratio = clustered.standard[k] / independent[k];
+    if (ratio > kClustered) by[k] = ratio * studentQuantile(clustered.degrees[k]) / studentQuantile(degrees);
+  }
   return by;
 }
 

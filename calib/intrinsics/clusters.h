@@ -30,12 +30,13 @@ struct ClusteredErrors {
 };
 ClusteredErrors clusteredErrors(const std::vector<SharedInformation>& clusters);
 
-/// From this root mean square of clustered over independent standard errors on, the clusters' disagreement is believed
-/// number by number, below only in the mean over all: of few clusters each number's own is too noisy.
+/// From this ratio of clustered to independent standard errors on, the clusters' disagreement is believed: a few
+/// clusters disagree by chance as well, of 200 boards with independent errors (tests/intrinsics) by as much in one
+/// number in ten.
 inline constexpr double kClustered = 1.5;
 
-/// By how much the intervals of `independent` standard errors, for Student's t of `degrees`, are to be widened so that
-/// each is as wide as that of the clusters; 1 where that is narrower.
+/// By how much the intervals of `independent` standard errors, for Student's t of `degrees`, are to be widened to be
+/// those of the clusters, number by number; 1 where the clusters disagree by less than kClustered times.
 Eigen::VectorXd widenedBy(const ClusteredErrors& clustered, const Eigen::VectorXd& independent, double degrees);
 
 }  // namespace toftwin::intrinsics

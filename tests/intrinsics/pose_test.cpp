@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "calib/intrinsics/board_pose.h"
 #include "calib/intrinsics/hand_eye.h"
@@ -90,6 +91,27 @@ TEST(BoardPose, IntervalsHoldThePlantedPose) {
     held.add(found->camera_from_board, transformOf<Camera, Board>(pose.rotation, 1e-3 * pose.translation_mm));
   }
   held.check();
+}
+
+/// Where an edge lies along the pixels its corners are seen at the same part of a pixel: all of a column are off alike.
+TEST(BoardPose, IntervalsHoldWhereCornersOfAColumnErrAlike) {
+  const Truth truth = testing::kinectLike();
+  const Target board = testing::checkerboard();
+  const Surface surface{board, 0};
+  Held held;
+  for (unsigned seed = 1; seed <= kRuns; ++seed) {
+    std::mt19937_64 random{seed};
+    const BoardPose pose = testing::drawPose(truth, surface, random);
+    Sighting seen = testing::sightingAt(truth, surface, pose, 0.02, random);
+    std::normal_distribution<double> normal{0.0, 0.05};
+    std::vector<double> of_column;
+    for (int i = 0; i < board.columns; ++i) of_column.push_back(normal(random));
+    for (Corner& corner : seen.corners) corner.at.u += of_column[corner.index % of_column.size()];
+    const auto found = locateBoard(seen, board, cameraOf(truth));
+    ASSERT_TRUE(found) << seed << ": " << found.error().message;
+    held.add(found->camera_from_board, transformOf<Camera, Board>(pose.rotation, 1e-3 * pose.translation_mm));
+  }
+  EXPECT_THAT(held.count, ::testing::Each(::testing::Ge(170))) << "as if corners erred by themselves 135 to 182";
 }
 
 /// Rendered boards: the corner finder's errors are not quite independent, so the misfit in units of the
