@@ -87,8 +87,8 @@ Sighting Collector::look(const NamedImage& image) {
     const double moved = other.isUsed() ? movedBy(other, sighting) : HUGE_VAL;
     if (!(moved < kStill_px)) continue;
     sighting.rejection = Rejection::LikeAnother;
-    sighting.detail = fmt::format("the board was held still: its corners are {:.2f} px (mean) from where they are in {}",
-                                  moved, other.name);
+    sighting.detail = fmt::format(
+        "the board was held still: its corners are {:.2f} px (mean) from where they are in {}", moved, other.name);
     break;
   }
   return sighting;

@@ -7,6 +7,9 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <utility>
+#include <vector>
 
 #include "calib/intrinsics/gauss_newton.h"
 #include "calib/linear/linear.h"
@@ -115,7 +118,8 @@ Result<SeenPlane> fitPlane(const Image<float>& range_m, const CameraInfo& camera
     SharedInformation& part = parts[all.part[i]];
     part.information += r2 * r2 / variance * all.rays[i] * all.rays[i].transpose();
     if (u2 >= 1.0) continue;
-    part.gradient -= r2 * e * (1.0 - u2) * (1.0 - u2) / (slope / n * variance) * all.rays[i];
+    const double psi = e * (1.0 - u2) * (1.0 - u2);
+    part.gradient -= r2 * psi / (slope / n * variance) * all.rays[i];
   }
   std::erase_if(parts, [](const SharedInformation& part) { return part.information.isZero(0.0); });
   return SeenPlane{.normal = {{towards.x(), towards.y(), towards.z()}},

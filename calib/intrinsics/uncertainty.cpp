@@ -5,19 +5,13 @@
 #include <cmath>
 #include <random>
 
+#include "calib/intrinsics/clusters.h"
 #include "calib/linear/linear.h"
 
 namespace toftwin::intrinsics {
 namespace {
 
 constexpr double kNormal95 = 1.959964;  // 97.5 % of a normal distribution lie below
-
-/// Standard errors from how much the views disagree: √ diag(S⁻¹ (Σ g̃_v g̃_vᵀ) S⁻¹).
-Eigen::VectorXd fromViews(const std::vector<Eigen::VectorXd>& gradients, const Eigen::MatrixXd& inverse) {
-  Eigen::VectorXd variance = Eigen::VectorXd::Zero(inverse.rows());
-  for (const Eigen::VectorXd& gradient : gradients) variance += (inverse * gradient).cwiseAbs2();
-  return variance.cwiseSqrt();
-}
 
 /// Standard errors over resampled sets of views: one Gauss-Newton step from the best lens for each set.
 Eigen::VectorXd resampled(const std::vector<SharedInformation>& views,
@@ -64,12 +58,13 @@ LensUncertainty uncertaintyOf(const std::vector<Observed>& views, const Bundle& 
   const auto gradients = unbent(information, total);
   const Eigen::MatrixXd covariance = result.sigma_px * result.sigma_px * inverse.topLeftCorner(n, n);
   result.from_corners = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
-  result.from_views = fromViews(gradients, inverse).head(n);
+  result.from_views = clusteredErrors(information).standard.head(n);
   result.from_resampling = resampled(information, gradients, resamples, seed).head(n);
   const Eigen::VectorXd ratio = result.from_views.cwiseQuotient(result.from_corners);
   result.clustering = std::sqrt(ratio.cwiseAbs2().mean());
 
   const double degrees = std::max(1.0, static_cast<double>(views.size()) - 1.0);
+  // Below, only in the mean over all: of few views each parameter's own disagreement is too noisy.
   const bool is_clustered = result.clustering > kClustered;
   const double pooled = std::max(1.0, result.clustering);
   const Eigen::VectorXd grown = is_clustered ? ratio : Eigen::VectorXd::Constant(n, pooled);
