@@ -18,8 +18,8 @@ struct BoundedStep {
 };
 
 /// Levenberg's and Marquardt's step within the numbers' bounds: what would leave them ends there, and the others are
-/// solved again with it there. `damping` 0: Gauss and Newton's. What is at a bound and would go on promises nothing.
+/// solved again with it there. What is at a bound and would go on promises nothing.
 BoundedStep boundedStep(const std::vector<sim::AnyEffect>& effects, const std::vector<FreeNumber>& free,
-                        const NormalEquations& at, double damping = 0.0);
+                        const NormalEquations& at, double damping);
 
 }  // namespace toftwin::discover

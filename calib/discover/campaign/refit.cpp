@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <optional>
 #include <set>
 
@@ -29,6 +30,7 @@ double longestStep(const sim::AnyEffect& effect, const std::string& key, double 
   return step;
 }
 
+constexpr double kFirstDamping = 1e-3;
 constexpr Eigen::Index kDelayColumn = 2;  ///< behind offset and gain, poses and light being integrated out
 
 using Kept = std::set<std::pair<std::size_t, std::string>>;  ///< numbers that stay as they are
@@ -41,6 +43,8 @@ struct State {
   std::vector<Untold> untold{};  ///< since what shows was looked for
   Marginal marginal{};
   NormalEquations at{};
+  std::shared_ptr<const CampaignRows::FreeColumns> columns{};
+  bool are_columns_its_own = true;  ///< or those of a state before it
 };
 
 double dispersionOf(const NormalEquations& at) { return at.deviance / std::max(1.0, at.freedom); }
@@ -105,47 +109,54 @@ class Descent {
     return look(state);
   }
 
+  /// Derivatives are those of the state that it began at, as long as χ² falls about as they promise: simulating them
+  /// takes most of the time.
   Result<> descend(State& state) const {
-    constexpr int kMostSteps = 10;
+    constexpr int kMostSteps = 12;
     constexpr double kDone = 0.1;     // standard errors squared: what is left is no chance's size
     constexpr double kNothing = 1e-3;  // of them are not worth a step
+    constexpr double kAsPromised = 0.7;
     constexpr double kMostDelay_mm = 20.0;  // at once
-    double damping = 1e-3;
+    double damping = kFirstDamping;
     for (int k = 0; k < kMostSteps && !state.free.empty() && damping < 1e8; ++k) {
       const double noise = std::max(1.0, dispersionOf(state.at)), promised = promiseOf(state);
       if (promised < kNothing * noise) break;
-      const Eigen::VectorXd change = boundedStep(state.effects, state.free, state.at, damping).change;
+      const BoundedStep step = boundedStep(state.effects, state.free, state.at, damping);
       State next{state.effects, state.delay_mm};
       if (rows_.hasDelay())
         next.delay_mm += std::clamp(
-            (state.at.others.coefficient - state.at.others_by_free * change)[kDelayColumn] / (1.0 + damping),
+            (state.at.others.coefficient - state.at.others_by_free * step.change)[kDelayColumn] / (1.0 + damping),
             -kMostDelay_mm, kMostDelay_mm);
       for (std::size_t i = 0; i < state.free.size(); ++i)
         next.effects = moved(std::move(next.effects), state.free[i],
-                             change[static_cast<Eigen::Index>(i)] * state.free[i].step);
-      next.free = again(state, next.effects);
-      if (auto looked = look(next); !looked) return looked;
+                             step.change[static_cast<Eigen::Index>(i)] * state.free[i].step);
+      next.free = state.free;
+      if (auto seen = evaluate(next, &state); !seen) return seen;
       const double better = state.at.deviance - next.at.deviance;
       if (better > 0.0) {
         state = std::move(next);
         damping = std::max(1e-9, 0.1 * damping);
         if (better < kDone * noise) break;
-      } else if (promised < kDone * noise) {
-        break;
-      } else {
+        if (better > kAsPromised * step.promised) continue;
+      } else if (state.are_columns_its_own) {
+        if (promised < kDone * noise) break;
         damping *= 30.0;
+        continue;
       }
+      state.free = again(state, state.effects);
+      if (auto looked = look(state); !looked) return looked;
     }
     return {};
   }
 
   Result<> fit(State& state) const {
+    constexpr double kWorthIt = 0.1;  // standard errors squared
     if (auto shown = freeWhatShows(state); !shown) return shown;
     for (int round = 0; round < 3; ++round) {
       const std::size_t before = state.free.size();
       if (auto done = descend(state); !done) return done;
       if (auto shown = freeWhatShows(state); !shown) return shown;
-      if (state.free.size() <= before) break;
+      if (state.free.size() <= before && promiseOf(state) < kWorthIt * std::max(1.0, dispersionOf(state.at))) break;
     }
     return {};
   }
@@ -223,7 +234,7 @@ class Descent {
 
   /// By how much χ² may fall, the light's delay being moved, too.
   [[nodiscard]] double promiseOf(const State& state) const {
-    const double promised = boundedStep(state.effects, state.free, state.at).promised;
+    const double promised = boundedStep(state.effects, state.free, state.at, kFirstDamping).promised;
     if (!rows_.hasDelay()) return promised;
     const Fit& others = state.at.others;
     const double delay = others.coefficient[kDelayColumn], variance = others.inverse(kDelayColumn, kDelayColumn);
@@ -254,7 +265,7 @@ class Descent {
           return !isStrength(there.effects[other.place], other.key);
         });
         if (auto seen = evaluate(there); !seen) return seen.error();
-        const double promised = there.at.deviance - boundedStep(there.effects, there.free, there.at).promised;
+        const double promised = there.at.deviance - boundedStep(there.effects, there.free, there.at, kFirstDamping).promised;
         if (promised < least) least = promised, best = std::move(there);
       }
     }
@@ -269,13 +280,18 @@ class Descent {
     return {};
   }
 
-  Result<> evaluate(State& state) const {
+  /// With the derivatives of a state that has the same free numbers; null: with its own.
+  Result<> evaluate(State& state, const State* like = nullptr) const {
+    auto made = std::make_shared<CampaignRows::FreeColumns>();
     const auto evidence = rows_.evidenceLeft({.effects = state.effects,
                                               .free = state.free,
                                               .terms = options_.terms,
                                               .with_numbers = options_.with_numbers,
-                                              .delay_mm = state.delay_mm});
+                                              .delay_mm = state.delay_mm,
+                                              .columns = like != nullptr ? like->columns.get() : nullptr,
+                                              .made = like != nullptr ? nullptr : made.get()});
     if (!evidence) return evidence.error();
+    state.columns = like != nullptr ? like->columns : std::move(made), state.are_columns_its_own = like == nullptr;
     state.marginal = marginalise(*evidence, options_.scales);
     state.at = normalEquationsOf(state.marginal, state.free.size());
     return {};

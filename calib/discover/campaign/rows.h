@@ -172,6 +172,11 @@ class CampaignRows final : public RowSource, public NamedEffects {
   /// Declared effects without noise, and those that were included.
   [[nodiscard]] const std::vector<sim::AnyEffect>& effects() const { return effects_; }
 
+  /// Columns of free numbers, which take most of the time, by capture.
+  struct FreeColumns {
+    std::vector<std::array<Eigen::MatrixXf, kChannels>> of_capture{};
+  };
+
   /// What a list of effects leaves. What a delay of the light does depends on them: its column is made anew.
   /// Columns: what is common to all lists (`with_numbers`: and the numbers of this source's effects), terms,
   /// and last the free numbers' derivatives. Error: an exposure that the model cannot have.
@@ -181,6 +186,9 @@ class CampaignRows final : public RowSource, public NamedEffects {
     std::span<const TermGroup> terms{};
     bool with_numbers = false;
     double delay_mm = 0.0;  ///< the light is so much later than in `effects`
+    /// Those of another list with the same free numbers and steps, near enough to be these; null: they are made.
+    const FreeColumns* columns = nullptr;
+    FreeColumns* made = nullptr;  ///< takes those that are made
   };
   [[nodiscard]] Result<Evidence> evidenceLeft(const Left& left) const;
 

@@ -241,7 +241,7 @@ Result<Evidence> CampaignRows::evidenceLeft(const Left& left) const {
   const auto here = cameraOf(left.effects), late = cameraOf(left.effects, has_delay_ ? kDelay_mm : 0.0);
   if (!here || !late) return here ? late.error() : here.error();
   std::vector<NoiselessCamera> cameras;
-  for (const FreeNumber& one : left.free) {
+  for (const FreeNumber& one : left.columns == nullptr ? left.free : std::span<const FreeNumber>{}) {
     auto camera = cameraOf(moved(left.effects, one, one.step));
     if (!camera) return camera.error();
     cameras.push_back(*std::move(camera));
@@ -261,6 +261,7 @@ Result<Evidence> CampaignRows::evidenceLeft(const Left& left) const {
                                .numbers = 1});
   }
   evidence.captures.resize(rows_.size());
+  if (left.made != nullptr) left.made->of_capture.resize(rows_.size());
   sim::inParallel(static_cast<int>(rows_.size()), 1, [&](int first, int last) {
     for (auto c = static_cast<std::size_t>(first); c < static_cast<std::size_t>(last); ++c) {
       const Fixed& fixed = *rows_[c].fixed;
@@ -276,8 +277,14 @@ Result<Evidence> CampaignRows::evidenceLeft(const Left& left) const {
             terms.columnsFor(k, terms.channels[k].columns.cast<double>()).cast<float>();
       }
       if (has_delay_) whitened.putDelay(fixed.cells, reading, read(*late, c, on_light));
-      for (std::size_t i = 0; i < left.free.size(); ++i)
+      for (std::size_t i = 0; i < cameras.size(); ++i)
         whitened.putChange(fixed.cells, first_free + i, reading, read(cameras[i], c, on_light));
+      const auto numbers = static_cast<Eigen::Index>(left.free.size());
+      for (std::size_t k = 0; k < kChannels; ++k) {
+        if (whitened.columns[k].size() == 0) continue;
+        if (left.columns != nullptr) whitened.columns[k].rightCols(numbers) = left.columns->of_capture[c][k];
+        if (left.made != nullptr) left.made->of_capture[c][k] = whitened.columns[k].rightCols(numbers);
+      }
       evidence.captures[c] = whitened.evidence(fixed.name, fixed.block);
     }
   });
