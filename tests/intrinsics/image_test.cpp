@@ -118,8 +118,7 @@ TEST(FindBoard, DoesNotTakeABoardForOneOfAnotherSize) {
 }
 
 /// A part of the board with as many corners as were told is found in many images; where it ends, squares go
-/// on. Of these 16, 6 say so and 3 are used, in which the search laid a skewed grid over the board:
-/// `calibrate` refuses where no more are used than say so.
+/// on. Of these eight, five say so and none is used: `calibrate` refuses where no more are used than say so.
 TEST(FindBoard, SaysThatABoardHasMoreCornersThanItWasTold) {
   const Truth truth = smallCamera();
   std::mt19937_64 random;
