@@ -44,7 +44,7 @@ std::string momentWarning(const Frame& a, const Frame& b) {
   constexpr std::array kTolerances{Tolerance{kExposure, 0.0, 0.02, "exposure of {:.5g} and {:.5g} µs"},
                                    Tolerance{kAmbient, 0.1, 0.1, "ambient light of {:.3g} and {:.3g} klx"},
                                    Tolerance{kRoom, 2.0, 0.0, "a room of {:.3g} and {:.3g} °C"},
-                                   Tolerance{kSincePowerOn, 60.0, 0.1, "{:.4g} and {:.4g} s since power-on"}};
+                                   Tolerance{kSincePowerOn, 60.0, 0.1, "{:.0f} and {:.0f} s since power-on"}};
   const auto of_a = settingsOf(a, nullptr), of_b = settingsOf(b, nullptr);
   std::vector<std::string> differ;
   for (const Tolerance& one : kTolerances) {
