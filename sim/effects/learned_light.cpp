@@ -15,6 +15,7 @@ namespace {
 Image<float> covariateOf(LearnedOver over, const Light& light, const Conditions& now) {
   const int width = light.width(), height = light.height();
   if (over == LearnedOver::Range) return light.truth.range_m;
+  if (over == LearnedOver::Albedo && !light.truth.albedo.empty()) return light.truth.albedo;
   if (over >= LearnedOver::Surround4) return surroundings(light.steady, reachOf(over, width, height));
   const double same = ofFrame(over, now.moment);
   Image<float> image(width, height, static_cast<float>(same));

@@ -10,10 +10,10 @@
 namespace toftwin::sim {
 
 /// A delay and a gain of the camera's own light that measurements showed and no other effect explains, as a
-/// table over what only light knows: how it meets the surface, and how bright the surroundings are.
+/// table over what only light knows: how it meets the surface, its albedo, and how bright the surroundings are.
 ///     Pₙ → Pₙ (1 + g(x)) exp(−i 4π n f t(x)/c)    or the same with t(x, y), g(x, y)
 /// t and g are linear (bilinear) between their knots and constant beyond them. Surroundings are compared by
-/// the camera's own unmodulated light. Incidence and range are the scene's, so that where nobody knows the
+/// the camera's own unmodulated light. Incidence, albedo and range are the scene's, so that where nobody knows the
 /// scene nothing is done. What `toftwin discover` writes for an effect that has no name yet; see
 /// LearnedRange.
 struct LearnedLight {

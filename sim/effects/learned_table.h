@@ -32,6 +32,7 @@ enum class LearnedOver {
   Row,
   Radius,
   Incidence,
+  Albedo,
   Surround4,
   Surround16,
   SurroundAll
@@ -44,6 +45,7 @@ struct LearnedWord {
 };
 inline constexpr std::array kLearnedWords{
     LearnedWord{"incidence", LearnedOver::Incidence},
+    LearnedWord{"albedo", LearnedOver::Albedo},
     LearnedWord{"surround_4px", LearnedOver::Surround4},
     LearnedWord{"surround_16px", LearnedOver::Surround16},
     LearnedWord{"surround_all", LearnedOver::SurroundAll},
@@ -58,7 +60,7 @@ inline constexpr std::array kLearnedWords{
     LearnedWord{"row", LearnedOver::Row},
     LearnedWord{"radius_px", LearnedOver::Radius},
     LearnedWord{"amplitude_e", LearnedOver::Amplitude}};
-inline constexpr std::size_t kLearnedOfLight = 4, kLearnedOfImage = 1;
+inline constexpr std::size_t kLearnedOfLight = 5, kLearnedOfImage = 1;
 
 /// One of those but the first `without_first` and the last `without_last`, as the key of an effect.
 template <std::size_t without_first, std::size_t without_last, class Visitor>

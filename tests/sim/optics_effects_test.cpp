@@ -233,6 +233,18 @@ TEST(LearnedLight, IsLaterAndDimmerAsItsTableSaysOfTheIncidence) {
   EXPECT_EQ(unknown.phasor(0, 1)(1, 0), light.phasor(0, 1)(1, 0)) << "light of no scene";
 }
 
+// Half way between the knots: 20 mm late.
+TEST(LearnedLight, IsLaterAsItsTableSaysOfTheScenesAlbedo) {
+  Light light = syntheticLight(2, 1, {20_MHz}, 1, [](int, int) { return std::vector<Way>{{0.8, 1.5}}; });
+  light.truth.albedo(0, 0) = 0.5F, light.truth.albedo(1, 0) = 0.9F;
+  const LearnedLight learned{.over = LearnedLight::Over::Albedo, .knots = {0.1, 0.9}, .delays_mm = {40.0, 0.0}};
+  const Light seen = applied(learned, light, cameraOfSize(2, 1));
+  EXPECT_NEAR(phaseOf(seen.phasor(0, 1)(0, 0)), phaseAt(1.52, 20e6), 1e-5);
+  EXPECT_NEAR(phaseOf(seen.phasor(0, 1)(1, 0)), phaseAt(1.5, 20e6), 1e-5);
+  light.truth.albedo = {};
+  EXPECT_EQ(applied(learned, light, cameraOfSize(2, 1)).phasor(0, 1)(0, 0), light.phasor(0, 1)(0, 0)) << "no scene";
+}
+
 // A pixel four times as bright as the 80 others of its square, whose mean is 84/81.
 TEST(LearnedLight, ComparesAPixelWithItsSurroundings) {
   const Light light = syntheticLight(40, 30, {20_MHz}, 1, [](int x, int y) {

@@ -93,6 +93,7 @@ constexpr std::array kKnownCovariates{
     KnownCovariate{"exposure_us", "exposure", "us", Nature::Plain, Stage::Range},
     KnownCovariate{"range_m", "range", "m", Nature::Distance, Stage::Range},
     KnownCovariate{"amplitude_e", "amplitude", "e", Nature::Plain, Stage::Range},
+    KnownCovariate{"albedo", "albedo", "", Nature::Plain, Stage::Range},
     KnownCovariate{"column", "position", "px", Nature::Plain, Stage::Range},
     KnownCovariate{"row", "position", "px", Nature::Plain, Stage::Range},
     KnownCovariate{"radius_px", "position", "px", Nature::Plain, Stage::Range},
@@ -112,6 +113,7 @@ CaptureCovariates covariatesOf(const MeasuredCapture& capture, const sim::Light&
   Image<float> amplitude = declared.log_amplitude;
   for (float& value : amplitude.pixels()) value = std::exp(value);
   gatherer.add("amplitude_e", amplitude);
+  gatherer.add("albedo", light.truth.albedo);
   addPlaces(camera, light.truth, gatherer);
   addSurroundings(amplitude, gatherer);
   return gatherer.finish();
