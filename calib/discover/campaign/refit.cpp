@@ -48,6 +48,10 @@ struct State {
 };
 
 double dispersionOf(const NormalEquations& at) { return at.deviance / std::max(1.0, at.freedom); }
+/// By how much χ² changes by chance for a number's standard error: no less than the stated noise's.
+double noiseOf(const NormalEquations& at) { return std::max(1.0, dispersionOf(at)); }
+
+constexpr double kDone = 0.1;  ///< of that noise: what is left is no chance's size
 
 /// What a number is that nothing tells: that of an effect switched off, where it does something alone, or where the
 /// defaults have no other; else as it is.
@@ -67,7 +71,7 @@ bool isTold(const sim::AnyEffect& effect, const FittedNumber& number) {
 /// The numbers of the effect at that place, with their standard errors where what they are not told from is as it is.
 FittedEffect fittedAt(const State& state, std::size_t place) {
   const Eigen::MatrixXd covariance =
-      pseudoInverse(state.at.gram, 1e-7).inverse * std::max(1.0, dispersionOf(state.at));
+      pseudoInverse(state.at.gram, 1e-7).inverse * noiseOf(state.at);
   FittedEffect fitted{state.effects[place], {}};
   for (std::size_t i = 0; i < state.free.size(); ++i) {
     const FreeNumber& one = state.free[i];
@@ -113,13 +117,12 @@ class Descent {
   /// takes most of the time.
   Result<> descend(State& state) const {
     constexpr int kMostSteps = 12;
-    constexpr double kDone = 0.1;     // standard errors squared: what is left is no chance's size
-    constexpr double kNothing = 1e-3;  // of them are not worth a step
+    constexpr double kNothing = 1e-3;  // of the noise is not worth a step
     constexpr double kAsPromised = 0.7;
     constexpr double kMostDelay_mm = 20.0;  // at once
     double damping = kFirstDamping;
     for (int k = 0; k < kMostSteps && !state.free.empty() && damping < 1e8; ++k) {
-      const double noise = std::max(1.0, dispersionOf(state.at)), promised = promiseOf(state);
+      const double noise = noiseOf(state.at), promised = promiseOf(state);
       if (promised < kNothing * noise) break;
       const BoundedStep step = boundedStep(state.effects, state.free, state.at, damping);
       State next{state.effects, state.delay_mm};
@@ -150,13 +153,12 @@ class Descent {
   }
 
   Result<> fit(State& state) const {
-    constexpr double kWorthIt = 0.1;  // standard errors squared
     if (auto shown = freeWhatShows(state); !shown) return shown;
     for (int round = 0; round < 3; ++round) {
       const std::size_t before = state.free.size();
       if (auto done = descend(state); !done) return done;
       if (auto shown = freeWhatShows(state); !shown) return shown;
-      if (state.free.size() <= before && promiseOf(state) < kWorthIt * std::max(1.0, dispersionOf(state.at))) break;
+      if (state.free.size() <= before && promiseOf(state) < kDone * noiseOf(state.at)) break;
     }
     return {};
   }
@@ -244,7 +246,7 @@ class Descent {
   /// By more than those squared for each number that it has fewer.
   static bool isWorse(const State& fewer, const State& state) {
     const auto numbers = static_cast<double>(state.free.size()) - static_cast<double>(fewer.free.size());
-    const double worse = (fewer.at.deviance - state.at.deviance) / std::max(1.0, dispersionOf(state.at));
+    const double worse = (fewer.at.deviance - state.at.deviance) / noiseOf(state.at);
     return worse > kNeeded * kNeeded * std::max(1.0, numbers);
   }
 
@@ -282,16 +284,16 @@ class Descent {
 
   /// With the derivatives of a state that has the same free numbers; null: with its own.
   Result<> evaluate(State& state, const State* like = nullptr) const {
-    auto made = std::make_shared<CampaignRows::FreeColumns>();
+    const auto made = like == nullptr ? std::make_shared<CampaignRows::FreeColumns>() : nullptr;
     const auto evidence = rows_.evidenceLeft({.effects = state.effects,
                                               .free = state.free,
                                               .terms = options_.terms,
                                               .with_numbers = options_.with_numbers,
                                               .delay_mm = state.delay_mm,
                                               .columns = like != nullptr ? like->columns.get() : nullptr,
-                                              .made = like != nullptr ? nullptr : made.get()});
+                                              .made = made.get()});
     if (!evidence) return evidence.error();
-    state.columns = like != nullptr ? like->columns : std::move(made), state.are_columns_its_own = like == nullptr;
+    state.columns = like != nullptr ? like->columns : made, state.are_columns_its_own = like == nullptr;
     state.marginal = marginalise(*evidence, options_.scales);
     state.at = normalEquationsOf(state.marginal, state.free.size());
     return {};
