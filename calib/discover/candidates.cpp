@@ -2,6 +2,7 @@
 #include "calib/discover/candidates.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -87,23 +88,32 @@ bool varies(const CovariateInfo& covariate) {
              : !covariate.quantiles.empty() && covariate.quantiles.back() > covariate.quantiles.front();
 }
 
+/// A place of the image with what a pixel sees there: what a lens or the camera's sides change.
+bool isPlaceAndSignal(const CovariateInfo& a, const CovariateInfo& b) {
+  const auto isSignal = [](const CovariateInfo& x) { return x.word == "range" || x.word == "amplitude"; };
+  return (a.word == "position" && isSignal(b)) || (b.word == "position" && isSignal(a));
+}
+
 /// Pairs that may act together, the likelier ones first: a state of the camera with a place or a pixel's signal,
-/// then two of the pixel's, then two states.
+/// then two of the pixel's, a place before others, then two states.
 std::vector<std::pair<std::size_t, std::size_t>> pairsOf(std::span<const CovariateInfo> covariates,
-                                                         std::size_t most) {
-  std::vector<std::pair<std::size_t, std::size_t>> pairs;
+                                                         const CandidateOptions& options) {
+  std::array<std::vector<std::pair<std::size_t, std::size_t>>, 4> ranks;
   for (std::size_t j = 1; j < covariates.size(); ++j) {
     for (std::size_t i = 0; i < j; ++i) {
-      if (!varies(covariates[i]) || !varies(covariates[j])) continue;
-      if (covariates[i].nature == Nature::Index || covariates[j].nature == Nature::Index) continue;
-      pairs.emplace_back(i, j);
+      const CovariateInfo &a = covariates[i], &b = covariates[j];
+      if (!varies(a) || !varies(b)) continue;
+      if (a.nature == Nature::Index || b.nature == Nature::Index) continue;
+      const bool are_alike = a.is_of_capture == b.is_of_capture;
+      ranks[!are_alike ? 0 : a.is_of_capture ? 3 : isPlaceAndSignal(a, b) ? 1 : 2].emplace_back(i, j);
     }
   }
-  std::ranges::stable_sort(pairs, {}, [&](const auto& pair) {
-    const bool a = covariates[pair.first].is_of_capture, b = covariates[pair.second].is_of_capture;
-    return a != b ? 0 : a ? 2 : 1;
-  });
-  pairs.resize(std::min(pairs.size(), most));
+  std::vector<std::pair<std::size_t, std::size_t>> pairs;
+  for (std::size_t rank = 0; rank < ranks.size(); ++rank) {
+    const std::size_t most = rank == 0 ? options.most_state_pairs : options.most_pairs;
+    for (const auto& pair : ranks[rank])
+      if (pairs.size() < most) pairs.push_back(pair);
+  }
   return pairs;
 }
 
@@ -151,7 +161,7 @@ std::vector<TermGroup> genericCandidates(std::span<const CovariateInfo> covariat
     if (options.captures >= 40) groups.push_back(waves(covariate, 5, 10));
     if (options.captures >= 60) groups.push_back(waves(covariate, 11, 20));
   }
-  for (const auto& [i, j] : pairsOf(covariates, options.most_pairs)) {
+  for (const auto& [i, j] : pairsOf(covariates, options)) {
     if (options.has_straight_pairs && options.captures >= 12) {
       TermGroup straight = smoothIn(covariates[i], covariates[j], 2);
       straight.name = fmt::format("straight in {} and {}", covariates[i].name, covariates[j].name);

@@ -13,7 +13,8 @@ namespace toftwin::discover {
 
 struct CandidateOptions {
   std::size_t captures = 100;   ///< that the columns are to be fitted to: few captures, few columns
-  std::size_t most_pairs = 28;  ///< of covariates that act together
+  /// Of covariates that act together: those of which one is of the capture, and all.
+  std::size_t most_state_pairs = 28, most_pairs = 36;
   /// A plane with a twist for each pair, which few captures can show, too: a·b, a and b.
   bool has_straight_pairs = false;
 };

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "calib/discover/candidates.h"
+#include "calib/discover/crossed_shape.h"
 #include "calib/discover/estimate.h"
 #include "calib/discover/found_effects.h"
 #include "calib/discover/reshape_effects.h"
@@ -125,8 +126,10 @@ class Search {
   /// One more effect, or one more part of one; false: nothing predicts what it was not fitted to.
   bool addEffect(double p) {
     auto explanations = compete(found_.context);
-    const auto chosen = chosenOf(found_.context, explanations);
+    auto chosen = chosenOf(found_.context, explanations);
     if (!chosen) return false;
+    if (mayBeCrossed(explanations[*chosen]))
+      if (const auto crossed = crossedShape(found_.context, explanations, *chosen)) chosen = crossed;
     Effect effect = effectOf(found_.context, explanations, *chosen);
     if (!effect.predicts || isWhatACurveLeaves(found_, effect)) return false;
     if (const auto part = partOfAKnown(found_, explanations, effect)) {
@@ -153,6 +156,14 @@ class Search {
     }
     estimate(*found_.context.source, found_.context.scales, found_.effects);
     return true;
+  }
+
+  /// Tables have pairs enough. And what a much stronger effect leaves goes with all that the stronger one goes with.
+  bool mayBeCrossed(const Explanation& one) const {
+    return found_.context.original->named() != nullptr &&
+           std::ranges::none_of(found_.effects, [&](const Effect& known) {
+             return one.gain.total < kRest * known.gain.mean;
+           });
   }
 
   /// The name goes, and its effect is looked for anew.

@@ -259,6 +259,16 @@ std::vector<double> usablePowers(const CovariateInfo& x) {
   return {1.0, 2.0};
 }
 
+/// With all terms multiplied, and their own behind them where the form keeps these.
+TermGroup multiplied(TermGroup group, const Form& form) {
+  if (!form.times) return group;
+  const std::vector<Term> own = form.keeps_own ? group.terms : std::vector<Term>{};
+  for (Term& term : group.terms) term.factors.push_back(*form.times);
+  group.terms.insert(group.terms.end(), own.begin(), own.end());
+  group.name = form.name;
+  return group;
+}
+
 }  // namespace
 
 TermGroup built(const Form& form, std::span<const double> inner) {
@@ -267,7 +277,25 @@ TermGroup built(const Form& form, std::span<const double> inner) {
     term.carrier = form.carrier;
     if (form.stage) term.stage = form.stage;
   }
-  return group;
+  return multiplied(std::move(group), form);
+}
+
+std::vector<FittedForm> crossedWith(const FittedForm& one, const CovariateInfo& other) {
+  std::vector<FittedForm> all;
+  const auto add = [&](double power, bool keeps_own) {
+    FittedForm crossed = one;
+    Form& form = crossed.form;
+    form.times = powerOrLog(other, power).factors[0], form.keeps_own = keeps_own;
+    form.name = fmt::format("{} · {}", one.group.name, inWords(*form.times));
+    if (keeps_own) form.name += " + " + one.group.name;
+    form.covariates.push_back(other.name);
+    crossed.group = multiplied(one.group, form);
+    all.push_back(std::move(crossed));
+  };
+  if (one.form.build != nullptr)
+    for (const double power : usablePowers(other)) add(power, false);
+  add(1.0, true);
+  return all;
 }
 
 std::vector<Form> formsIn(const CovariateInfo& x) {
@@ -327,10 +355,12 @@ std::vector<Form> formsIn(const CovariateInfo& a, const CovariateInfo& b) {
     for (const double q : usablePowers(b)) {
       const std::string name = powerInWords(a, p) + " · " + powerInWords(b, q);
       forms.push_back(form(name, {a, b}, product, {}, {p, q, 0.0, 0.0}));
-      if (p != 1.0 || q != 1.0) continue;
-      forms.push_back(form(name + " + " + powerInWords(b, q), {a, b}, product, {}, {p, q, 0.0, 1.0}));
-      forms.push_back(form(name + " + " + powerInWords(a, p), {a, b}, product, {}, {p, q, 1.0, 0.0}));
-      forms.push_back(form(name + " + both", {a, b}, product, {}, {p, q, 1.0, 1.0}));
+      // Of a number whose zero is not nothing, what it is multiplied with is there at its zero, too.
+      const bool are_straight = p == 1.0 && q == 1.0, has_b = are_straight || (p == 1.0 && !isRatio(a)),
+                 has_a = are_straight || (q == 1.0 && !isRatio(b));
+      if (has_b) forms.push_back(form(name + " + " + powerInWords(b, q), {a, b}, product, {}, {p, q, 0.0, 1.0}));
+      if (has_a) forms.push_back(form(name + " + " + powerInWords(a, p), {a, b}, product, {}, {p, q, 1.0, 0.0}));
+      if (are_straight) forms.push_back(form(name + " + both", {a, b}, product, {}, {p, q, 1.0, 1.0}));
     }
   }
   for (const auto& [x, y] : {std::pair{a, b}, std::pair{b, a}}) {

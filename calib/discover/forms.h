@@ -29,6 +29,8 @@ struct Form {
   std::vector<CovariateInfo> of{};
   std::optional<Stage> stage{};  ///< where its terms act; none: where its covariates say
   std::string carrier{};         ///< what its terms are multiplied with (see Term)
+  std::optional<Factor> times{};  ///< all of its terms are multiplied with that, too
+  bool keeps_own = false;         ///< and stand there without it as well
 };
 TermGroup built(const Form& form, std::span<const double> inner);
 
@@ -44,6 +46,10 @@ struct FittedForm {
   TermGroup group{};
   double statistic = 0.0;  ///< what it explains of the data that it was found in
 };
+
+/// The same whose strength goes with another covariate: multiplied with one of its powers or its logarithm, and, as that
+/// zero may not be nothing's, with itself added. A smooth curve: the latter alone, straight.
+std::vector<FittedForm> crossedWith(const FittedForm& one, const CovariateInfo& other);
 
 /// The inner numbers that explain most on top of `known` (in the model) — the grid, and then ever finer ones
 /// around the best. All forms are searched in the same few passes over the data.

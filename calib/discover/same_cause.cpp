@@ -133,7 +133,6 @@ bool isWhatACurveLeaves(const Found& found, const Effect& effect) {
 }
 
 void markRests(Found& found) {
-  constexpr double kRest = 0.25;
   std::vector<double> gains;
   for (std::size_t i = 0; i < found.effects.size(); ++i) {
     const Effect& effect = found.effects[i];

@@ -28,6 +28,9 @@ std::optional<std::size_t> nameInDoubt(const Found& found, const Effect& effect)
 /// effect.
 bool isWhatACurveLeaves(const Found& found, const Effect& effect);
 
+/// The share of what a form explains below which what it leaves is its rest: a convention.
+inline constexpr double kRest = 0.25;
+
 /// A form without a name describes its cause to first order and along its own covariates alone. What that
 /// leaves goes with something else, and needs no cause of its own while it is less than a quarter of what the
 /// form explains and both share a part: it stays in the model, as the rest of that effect. An effect that is

@@ -283,6 +283,14 @@ std::vector<Explanation> competeFor(const Context& context, const std::vector<st
   return all;
 }
 
+std::vector<Explanation> judged(const Context& context, std::vector<FittedForm> forms) {
+  std::vector<Explanation> all;
+  for (FittedForm& form : forms) all.push_back(explanationOf(std::move(form)));
+  judge(context, all);
+  std::erase_if(all, [](const Explanation& one) { return one.is_catalogue; });
+  return all;
+}
+
 namespace {
 
 const Explanation* bestOf(const std::vector<Explanation>& all, const auto& isMeant) {

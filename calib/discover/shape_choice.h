@@ -74,6 +74,9 @@ std::vector<Explanation> compete(const Context& context);
 /// Only over these covariates.
 std::vector<Explanation> competeFor(const Context& context, const std::vector<std::string>& covariates);
 
+/// Explanations of these forms with their gains, on the same folds.
+std::vector<Explanation> judged(const Context& context, std::vector<FittedForm> forms);
+
 /// Places of explanations that may be chosen: a pair of covariates only if it acts together.
 std::vector<std::size_t> eligible(const std::vector<Explanation>& explanations);
 

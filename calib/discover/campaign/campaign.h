@@ -42,6 +42,24 @@ struct RepeatedRaw {
   std::vector<Repeated> closures{};
 };
 
+/// What one frame says as a whole: the mean of its ranges, in which pixels weigh by the square of their amplitude, and 100
+/// times the logarithm of the sum of the amplitudes. 0 where it has none.
+struct FrameAlone {
+  std::uint64_t sequence = 0;
+  double range_mm = 0.0, gain_percent = 0.0;
+};
+
+/// Frames that come again: those whose number leaves this rest.
+struct FrameClass {
+  std::uint64_t period = 1, rest = 0;
+  bool is_in_capture = false;  ///< counted from the first frame of each capture, not by the source
+
+  /// `place`: in its capture.
+  [[nodiscard]] bool has(std::uint64_t sequence, std::size_t place) const {
+    return (is_in_capture ? place : sequence) % period == rest;
+  }
+};
+
 /// One capture of a measured camera: what it said of its moment, and its images over the repeats.
 struct MeasuredCapture {
   plan::CaptureRecord record;
@@ -61,8 +79,7 @@ struct MeasuredCapture {
   /// Seed and device time of a simulated camera's frames: of those with the same ones noise is drawn alike.
   std::vector<std::pair<std::uint64_t, std::int64_t>> drawn_by{};
   Image<float> valid_share;
-  /// Even minus odd frames, means over the image of the range: what goes with the frame's number.
-  double parity_m = 0.0, parity_error_m = 0.0;
+  std::vector<FrameAlone> each{};          ///< by frame
   std::vector<AmplitudePair> dim_pairs{};  ///< of the first two frames
   std::optional<RepeatedRaw> raw{};        ///< where all frames have their raw exposures
 };
@@ -83,15 +100,18 @@ struct Campaign {
   std::vector<plan::CaptureRecord> locked{};  ///< unopened
   std::vector<MeasuredCapture> put_aside{};   ///< of a bare recording: its locked ones
   std::vector<std::string> notes{};           ///< what was left out and why
+  std::optional<FrameClass> without{};        ///< frames that were not read
 };
 
-/// Reads the open captures. Errors name capture and file: no run, one that is damaged, without
+/// Reads the open captures, without frames of the class where two others stay. Errors name capture and file: no run, one that is damaged, without
 /// poses, without repeats, without ranges.
-Result<Campaign> readCampaign(const std::filesystem::path& folder, Side side);
+Result<Campaign> readCampaign(const std::filesystem::path& folder, Side side,
+                              const std::optional<FrameClass>& without = {});
 /// Reads a recording that no plan was behind: frames of one pose, exposure and ambient light after each other are a
 /// capture, and one in five is put aside. Poses are the frames' own, or, where given, those of another recording's
 /// frames. Errors: frames without poses, too few that belong together.
-Result<Campaign> readRecording(const std::filesystem::path& file, const std::filesystem::path& poses_of);
+Result<Campaign> readRecording(const std::filesystem::path& file, const std::filesystem::path& poses_of,
+                               const std::optional<FrameClass>& without = {});
 /// Reads captures that were locked; their hashes are checked. The caller has written that they are
 /// opened.
 Result<std::vector<MeasuredCapture>> readLocked(const Campaign& campaign);

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "calib/discover/campaign/pose_errors.h"
 #include "calib/discover/campaign/campaign_json.h"
 
 #include <ctime>
@@ -43,7 +44,8 @@ Json toJson(const Judgement& judged) {
 
 Json toJson(const FoundEffect& one) {
   Json json = Json::object(), numbers = Json::array();
-  json.set("name", one.found.name).set("kind", one.found.is_catalogue ? "catalogue" : "undeclared");
+  json.set("name", one.found.name);
+  json.set("kind", one.found.is_catalogue ? "catalogue" : isOfPoses(one.found.covariates) ? "poses" : "undeclared");
   Json alike = Json::array();
   for (const Stage stage : one.found.stages_alike) alike.push(std::string{discover::nameOf(stage)});
   json.set("stage", one.found.stage ? std::string{discover::nameOf(*one.found.stage)} : "not told");
@@ -76,6 +78,7 @@ Json toJson(const FoundEffect& one) {
 }  // namespace
 
 std::string stageInWords(const Effect& effect) {
+  if (isOfPoses(effect.covariates)) return "poses";
   if (!effect.stage) return "not told";
   std::string words{discover::nameOf(*effect.stage)};
   for (const Stage stage : effect.stages_alike) words += fmt::format(" or {}", discover::nameOf(stage));

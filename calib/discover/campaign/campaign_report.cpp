@@ -11,6 +11,7 @@
 #include "calib/discover/campaign/campaign_json.h"
 #include "calib/discover/campaign/discover_campaign.h"
 #include "calib/discover/campaign/gather_capture.h"
+#include "calib/discover/campaign/pose_errors.h"
 
 namespace toftwin::discover {
 namespace {
@@ -20,10 +21,16 @@ using compare::shown;
 std::string titleOf(const Effect& effect) {
   if (effect.is_rest)
     return fmt::format("what the form above leaves: {} ({})", effect.name, fmt::join(effect.covariates, ", "));
+  if (isOfPoses(effect.covariates)) return fmt::format("an error of the poses, not of the camera: {}", effect.name);
   const std::string place = effect.fit ? placeInWords(campaignFitOf(*effect.fit).effect) : "";
   return effect.is_catalogue
              ? effect.name + (place.empty() ? "" : fmt::format(" ({})", place))
              : fmt::format("undeclared: {} ({})", effect.name, fmt::join(effect.covariates, ", "));
+}
+
+/// Whether all it says is that the poses err, and nothing of the camera.
+bool isOnlyOfPoses(const FoundEffect& one) {
+  return isOfPoses(one.found.covariates) && one.found.alternatives.empty();
 }
 
 /// Effects with a cause of their own.
@@ -40,17 +47,22 @@ std::string answerOf(const Effect& effect) {
   return effect.alternatives.empty() ? answer : answer + " (these captures do not tell them apart)";
 }
 
+std::string withError(const std::string& name, double value, double error) {
+  return fmt::format("{} = {:.4g} ± {:.2g}", name, value, error);
+}
+
 std::string numbersInWords(const FoundEffect& one) {
-  if (!one.fitted) return "the simulator has no form for it; it is not in model.toml";
-  std::vector<std::string> words;
-  for (const FittedNumber& number : numbersIn(one))
-    words.push_back(fmt::format("{} = {:.4g} ± {:.2g}", number.key, number.value, number.error));
-  if (!words.empty()) return fmt::format("{}", fmt::join(words, "; "));
-  for (const Estimate& number : one.found.numbers)
-    words.push_back(fmt::format("{}: {:.4g} ± {:.2g}", number.name, number.value, number.error));
-  const std::size_t most = 6;
-  if (words.size() > most) return "a table: see model.toml";
-  return fmt::format("a table of {}", fmt::join(words, "; "));
+  constexpr std::size_t kMost = 6;
+  std::vector<std::string> fitted, found;
+  for (const FittedNumber& number : numbersIn(one)) fitted.push_back(withError(number.key, number.value, number.error));
+  for (const Estimate& number : one.found.numbers) found.push_back(withError(number.name, number.value, number.error));
+  const std::string numbers = found.size() > kMost ? "" : fmt::format("{}", fmt::join(found, "; "));
+  if (!one.fitted) {
+    const std::string why = isOfPoses(one.found.covariates) ? "the camera is as it was" : "the simulator has no form for it";
+    return fmt::format("{}{}{}; it is not in model.toml", numbers, numbers.empty() ? "" : "; ", why);
+  }
+  if (!fitted.empty()) return fmt::format("{}", fmt::join(fitted, "; "));
+  return numbers.empty() ? "a table: see model.toml" : fmt::format("a table of {}", numbers);
 }
 
 compare::TableBlock effectTable(const CampaignFinding& finding) {
@@ -70,7 +82,7 @@ compare::TableBlock effectTable(const CampaignFinding& finding) {
   for (const FittedEffect& one : finding.updates) {
     std::vector<std::string> words;
     for (const FittedNumber& number : one.numbers)
-      words.push_back(fmt::format("{} = {:.4g} ± {:.2g}", number.key, number.value, number.error));
+      words.push_back(withError(number.key, number.value, number.error));
     table.rows.push_back({"parameter update: " + nameOf(one.effect),
                           std::string{discover::nameOf(discover::stageOf(one.effect))}, "",
                           fmt::format("{}", fmt::join(words, "; ")), "–", "–"});
@@ -284,11 +296,15 @@ std::string nothingInWords(const CampaignFinding& finding) {
 /// Without what is set aside.
 std::string foundInWords(const CampaignFinding& finding) {
   if (finding.effects.empty() && finding.updates.empty()) return nothingInWords(finding);
-  std::vector<std::string> names;
+  std::vector<std::string> names, poses;
   for (const FoundEffect& one : finding.effects)
-    if (!one.found.is_rest) names.push_back(answerOf(one.found));
+    if (!one.found.is_rest) (isOnlyOfPoses(one) ? poses : names).push_back(answerOf(one.found));
   for (const FittedEffect& one : finding.updates)
     names.push_back("parameter update: " + nameOf(one.effect));
+  if (names.empty())
+    return fmt::format("The model of the camera lacks nothing that these captures show. There is {}{}",
+                       fmt::join(poses, "; "), leftInWords(finding));
+  names.insert(names.end(), poses.begin(), poses.end());
   if (finding.is_worse && finding.hasJudged())
     return fmt::format(
                "Something is left that looks like {}, but with it the locked captures fit worse (RMS {} → {} "

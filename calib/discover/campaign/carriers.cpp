@@ -12,6 +12,10 @@
 #include <toftwin/nan.h>
 
 #include "calib/discover/campaign/catalogue.h"
+#include "calib/discover/campaign/phasor_change.h"
+#include "calib/discover/campaign/pose_errors.h"
+#include "calib/discover/campaign/smeared_ranges.h"
+#include "calib/discover/campaign/spilled_light.h"
 #include "calib/discover/campaign/unequal_exposures.h"
 #include "calib/discover/candidates.h"
 #include "sim/effects/effects.h"
@@ -37,8 +41,6 @@ std::string mirroredName(int reach) { return fmt::format("{}:{}px", kMirrored, r
 /// at its principal point, and squares about another place leave light that goes along columns and rows.
 constexpr std::string_view kMirroredRight = "mirrored:right", kMirroredDown = "mirrored:down";
 constexpr int kMirroredStep = 3;  // pixels each way; of squares as large
-
-using Phasors = Image<std::complex<float>>;
 
 /// Turned by half a turn about the principal point; dark beyond the image's edge.
 Phasors mirrored(const Phasors& z, const CameraInfo& camera) {
@@ -85,73 +87,39 @@ Phasors changeTowards(const Phasors& z, const CameraInfo& camera, double out) {
   return change;
 }
 
-/// δz/z as a change of what is read.
-Reading changeBy(const Image<std::complex<float>>& share, double period_m) {
-  Reading change{Image<float>(share.width(), share.height()), {}};
-  change.log_amplitude = change.range_m;
-  const auto metres = static_cast<float>(period_m / (2.0 * std::numbers::pi));
-  for (std::size_t i = 0; i < share.size(); ++i) {
-    change.range_m[i] = -metres * share[i].imag();
-    change.log_amplitude[i] = share[i].real();
-  }
-  return change;
-}
-
-/// Light's phasor exp(−iφ) of what the pixels would read.
-Image<std::complex<float>> phasorOf(const Reading& reading, double period_m) {
-  Image<std::complex<float>> z(reading.range_m.width(), reading.range_m.height(), {kNaN, kNaN});
-  for (std::size_t i = 0; i < z.size(); ++i) {
-    const double phase = 2.0 * std::numbers::pi * static_cast<double>(reading.range_m[i]) / period_m;
-    const double size = std::exp(static_cast<double>(reading.log_amplitude[i]));
-    if (std::isfinite(phase) && std::isfinite(size))
-      z[i] = {static_cast<float>(size * std::cos(phase)), static_cast<float>(-size * std::sin(phase))};
-  }
-  return z;
-}
-
-Image<std::complex<float>> over(const Image<std::complex<float>>& z,
-                                const std::function<std::complex<float>(std::size_t)>& change) {
-  Image<std::complex<float>> share(z.width(), z.height());
-  for (std::size_t i = 0; i < z.size(); ++i) {
-    const std::complex<float> of = change(i) / z[i];
-    if (std::isfinite(of.real()) && std::isfinite(of.imag())) share[i] = of;
-  }
-  return share;
-}
-
 }  // namespace
 
 std::map<std::string, Reading> carriersOf(const sim::SensorModel& model, const Reading& declared,
                                           double period_m, double exposure_us) {
   std::map<std::string, Reading> all;
-  const Image<std::complex<float>> z = phasorOf(declared, period_m);
+  const Phasors z = phasorOf(declared, period_m);
   for (const int reach : kReaches) {
-    const Image<std::complex<float>> mean = sim::boxMean(z, std::min(reach, std::max(z.width(), z.height())));
+    const Phasors mean = sim::boxMean(z, std::min(reach, std::max(z.width(), z.height())));
     all.emplace(neighbourName(reach),
-                changeBy(over(z, [&](std::size_t i) { return 0.01F * mean[i]; }), period_m));
+                changeBy(shareOf(z, [&](std::size_t i) { return 0.01F * mean[i]; }), period_m));
   }
   const Phasors turned = mirrored(z, model.camera());
   for (const int reach : kMirroredReaches) {
     const Phasors mean = sim::boxMean(turned, reach);
     all.emplace(mirroredName(reach),
-                changeBy(over(z, [&](std::size_t i) { return 0.01F * mean[i]; }), period_m));
+                changeBy(shareOf(z, [&](std::size_t i) { return 0.01F * mean[i]; }), period_m));
   }
   const Phasors smooth = sim::boxMean(turned, kMirroredStep);
   for (const auto& [carrier, right] : {std::pair{kMirroredRight, true}, std::pair{kMirroredDown, false}}) {
     const Phasors change = acrossMirrored(smooth, right ? kMirroredStep : 0, right ? 0 : kMirroredStep);
-    all.emplace(carrier, changeBy(over(z, [&](std::size_t i) { return 0.01F * change[i]; }), period_m));
+    all.emplace(carrier, changeBy(shareOf(z, [&](std::size_t i) { return 0.01F * change[i]; }), period_m));
   }
   for (const auto& [carrier, out] : {std::pair{kOutwardCarrier, 1.0}, std::pair{kInwardCarrier, -1.0}}) {
     const Phasors change = changeTowards(z, model.camera(), out);
-    all.emplace(carrier, changeBy(over(z, [&](std::size_t i) { return change[i]; }), period_m));
+    all.emplace(carrier, changeBy(shareOf(z, [&](std::size_t i) { return change[i]; }), period_m));
   }
   const double steps = std::max<double>(1.0, static_cast<double>(model.exposures({}).size()));
   const auto electron = static_cast<float>(2.0 / steps);
   const auto add = [&](std::string_view carrier, float electrons) {
     all.emplace(fmt::format("{}:in_phase", carrier),
-                changeBy(over(z, [&](std::size_t) { return std::complex{electrons, 0.0F}; }), period_m));
+                changeBy(shareOf(z, [&](std::size_t) { return std::complex{electrons, 0.0F}; }), period_m));
     all.emplace(fmt::format("{}:quadrature", carrier),
-                changeBy(over(z, [&](std::size_t) { return std::complex{0.0F, electrons}; }), period_m));
+                changeBy(shareOf(z, [&](std::size_t) { return std::complex{0.0F, electrons}; }), period_m));
   };
   add(kChargeCarrier, electron), add(kConverterCarrier, electron);
   add(kStrayCarrier, electron * static_cast<float>(exposure_us * 1e-3));  // of a millisecond
@@ -307,9 +275,12 @@ std::optional<std::array<double, 2>> mirrorMovedBy(std::string_view carrier) {
 }
 
 std::string_view wordOfCarrier(std::string_view carrier) {
-  if (carrier == kNeighbours || carrier == kMirrored || carrier == kOutwardCarrier) return "neighbours";
+  for (const std::string_view of_neighbours :
+       {kNeighbours, kMirrored, kOutwardCarrier, kSmearedCarrier, kSpilledCarrier})
+    if (carrier == of_neighbours) return "neighbours";
   if (carrier == kPixelCarrier) return "position";
   if (carrier == kUnequalCarrier) return "range";
+  if (carrier == kPoseCarrier) return kPoseCarrier;
   const bool is_charge = carrier == kChargeCarrier || carrier == kStrayCarrier || carrier == kConverterCarrier ||
                          carrier == kAmplifiedCarrier;
   return is_charge ? "amplitude" : "";

@@ -17,6 +17,7 @@
 #include "calib/discover/campaign/model_file.h"
 #include "calib/discover/campaign/next_capture.h"
 #include "calib/discover/campaign/pool_noise.h"
+#include "calib/discover/campaign/frames_apart.h"
 #include "calib/discover/campaign/reading.h"
 #include "calib/discover/campaign/search_rounds.h"
 #include "calib/discover/campaign/stood_off.h"
@@ -27,6 +28,10 @@ namespace toftwin::discover {
 namespace {
 
 bool isRecording(const CampaignJob& job) { return std::filesystem::is_regular_file(job.run); }
+
+Result<Campaign> readFor(const CampaignJob& job, const std::optional<FrameClass>& without) {
+  return isRecording(job) ? readRecording(job.run, job.poses_of, without) : readCampaign(job.run, job.side, without);
+}
 
 struct DeclaredFiles {
   Declared declared;
@@ -254,6 +259,14 @@ void keepIfWorse(const std::string& text, const Declared& declared, CampaignFind
       std::string{is_as_it_was ? "." : ", but for what single frames show."});
 }
 
+void addFramesApart(const FramesApart& apart, CampaignFinding& finding) {
+  finding.effects.push_back(effectOf(apart));
+  finding.finding.first_p = std::min(finding.finding.first_p, apart.p);
+  if (apart.isMinority())
+    finding.notes.push_back(fmt::format("What else is told is of the other frames: {} is left out of all means.",
+                                        apart.inWords()));
+}
+
 }  // namespace
 
 Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress& progress) {
@@ -270,7 +283,10 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
   progress.plan("fit", 8.0);
   progress.plan("judge", 5.0);
   progress.begin();
-  auto campaign = isRecording(job) ? readRecording(job.run, job.poses_of) : readCampaign(job.run, job.side);
+  auto campaign = readFor(job, {});
+  if (!campaign) return campaign.error();
+  const auto apart = framesApart(campaign->captures, job.finder.seed);
+  if (apart && apart->isMinority()) campaign = readFor(job, apart->which);
   if (!campaign) return campaign.error();
   if (auto whole = checkLockedFiles(job, *campaign); !whole) return whole.error();
   CampaignFinding finding;
@@ -321,6 +337,7 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
   const Zero beyond = finding.zero;
   finding.zero.delay_mm += declared.delay_mm, finding.zero.gain_percent += declared.unit_percent;
   if (steps) addSteps(job, declared.model, *steps, finding);
+  if (apart) addFramesApart(*apart, finding);
   finding.model_toml = modelText(files->text, declared, finding);
   progress.begin();
   if (job.open_locked && !campaign->locked.empty()) {

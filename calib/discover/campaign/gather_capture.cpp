@@ -165,24 +165,20 @@ void leaveOutWhatNoiseChose(const Image<float>& valid_share, Image<float>& log_a
   }
 }
 
-/// Mean over the image of one frame, to tell frames apart.
-double meanOf(const Image<float>& range_m, const Image<float>& about) {
-  double sum = 0.0;
-  std::size_t n = 0;
+/// What one frame says as a whole, and by itself: against another frame, with whose noise it would be compared, that one
+/// would differ from all others. NaN and what has no amplitude left out; `amplitude`: empty: all pixels alike.
+FrameAlone wholeOf(const Frame& frame, const Image<float>& range_m, const Image<float>& amplitude) {
+  double ranges = 0.0, weights = 0.0, light = 0.0;
   for (std::size_t i = 0; i < range_m.size(); ++i) {
-    const auto value = static_cast<double>(range_m[i] - about[i]);
-    if (std::isfinite(value)) sum += value, ++n;
+    const double a = amplitude.empty() ? 1.0 : static_cast<double>(amplitude[i]),
+                 r = static_cast<double>(range_m[i]);
+    if (!std::isfinite(a) || !std::isfinite(r)) continue;
+    ranges += a * a * r, weights += a * a, light += a;
   }
-  return n == 0 ? 0.0 : sum / static_cast<double>(n);
-}
-
-void compareParity(const std::vector<double>& means, MeasuredCapture& capture) {
-  compare::Running even, odd;
-  for (std::size_t k = 0; k < means.size(); ++k) (k % 2 == 0 ? even : odd).add(means[k]);
-  if (even.n() < 2 || odd.n() < 2) return;
-  capture.parity_m = even.mean() - odd.mean();
-  capture.parity_error_m = std::sqrt(even.variance() / static_cast<double>(even.n()) +
-                                     odd.variance() / static_cast<double>(odd.n()));
+  FrameAlone whole{.sequence = frame.sequence};
+  if (weights > 0.0) whole.range_mm = 1e3 * ranges / weights;
+  if (light > 0.0 && !amplitude.empty()) whole.gain_percent = 1e2 * std::log(light);
+  return whole;
 }
 
 }  // namespace
@@ -252,12 +248,14 @@ struct CaptureGatherer::State {
   Repeats range, amplitude;
   RawRepeats raw;
   LightNoise light;
-  Image<float> first, first_amplitude;
-  std::vector<double> means;
+  Image<float> first_amplitude;
   Image<float> valid;
   bool has_amplitude = true;
+  std::optional<FrameClass> without;
+  std::size_t place = 0;  ///< of the frame in the capture, with those that are passed over
 
   Result<> add(const Frame& frame) {
+    if (without && without->has(frame.sequence, place++)) return {};
     if (capture.frames == 0) camera = frame.camera, capture.moment = frame.moment;
     mean_moment.add(frame.moment);
     light.add(frame);
@@ -267,14 +265,14 @@ struct CaptureGatherer::State {
       return ofCapture(capture.record, "its camera model changes between frames");
     auto range_m = compare::rangeOf(frame);
     if (!range_m) return ofCapture(capture.record, range_m.error().message, range_m.error().code);
-    if (capture.frames == 0)
-      first = *range_m, valid = Image<float>(range_m->width(), range_m->height());
+    if (capture.frames == 0) valid = Image<float>(range_m->width(), range_m->height());
     for (std::size_t i = 0; i < valid.size(); ++i)
       valid[i] += std::isfinite((*range_m)[i]) ? 1.0F : 0.0F;
     range.add(*range_m);
     raw.add(frame);
-    means.push_back(meanOf(*range_m, first));
-    addAmplitude(amplitudeOf(frame, *range_m));
+    Image<float> seen = amplitudeOf(frame, *range_m);
+    capture.each.push_back(wholeOf(frame, *range_m, seen));
+    addAmplitude(std::move(seen));
     ++capture.frames;
     return {};
   }
@@ -297,13 +295,13 @@ struct CaptureGatherer::State {
     for (float& share : valid.pixels()) share /= static_cast<float>(capture.frames);
     if (has_amplitude) leaveOutWhatNoiseChose(valid, capture.log_amplitude.mean);
     capture.valid_share = std::move(valid);
-    compareParity(means, capture);
     return std::move(capture);
   }
 };
 
-CaptureGatherer::CaptureGatherer(const plan::CaptureRecord& record) : state_(std::make_unique<State>()) {
-  state_->capture.record = record;
+CaptureGatherer::CaptureGatherer(const plan::CaptureRecord& record, const std::optional<FrameClass>& without)
+    : state_(std::make_unique<State>()) {
+  state_->capture.record = record, state_->without = without;
 }
 CaptureGatherer::CaptureGatherer(CaptureGatherer&&) noexcept = default;
 CaptureGatherer& CaptureGatherer::operator=(CaptureGatherer&&) noexcept = default;

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include <toftwin/result.h>
@@ -21,14 +22,15 @@ std::string howMany(std::size_t count, const std::string& what);
 /// Frames of one thing in one place, one after the other: their means and their noise.
 class CaptureGatherer {
  public:
-  explicit CaptureGatherer(const plan::CaptureRecord& record);
+  /// `without`: frames of that class are passed over.
+  explicit CaptureGatherer(const plan::CaptureRecord& record, const std::optional<FrameClass>& without = {});
   CaptureGatherer(CaptureGatherer&&) noexcept;
   CaptureGatherer& operator=(CaptureGatherer&&) noexcept;
   ~CaptureGatherer();
 
   /// Errors name the capture: no range, another camera than the frames before it.
   Result<> add(const Frame& frame);
-  [[nodiscard]] std::size_t frames() const;
+  [[nodiscard]] std::size_t frames() const;  ///< that were not passed over
   [[nodiscard]] const CameraInfo& camera() const;
   /// The capture; two frames at least must have been added, and none may be from now on.
   MeasuredCapture finish();

@@ -20,20 +20,21 @@ struct ReadOne {
   CameraInfo camera;
 };
 
-Result<ReadOne> readOne(const std::filesystem::path& folder, Side side,
-                        const plan::CaptureRecord& record) {
+Result<ReadOne> readOne(const std::filesystem::path& folder, Side side, const plan::CaptureRecord& record,
+                        const std::optional<FrameClass>& without) {
   const plan::RecordedFile& file = side == Side::A ? record.a : record.b;
   if (auto checked = plan::checkHash(folder, file); !checked)
     return ofCapture(record, checked.error().message, checked.error().code);
   auto reader = record::Reader::open(folder / file.file);
   if (!reader) return ofCapture(record, reader.error().message, reader.error().code);
-  CaptureGatherer gathered{record};
+  CaptureGatherer gathered{record, without};
   while (true) {
     auto frame = reader->next();
     if (!frame && frame.error().code == Error::Code::EndOfStream) break;
     if (!frame) return ofCapture(record, frame.error().message, frame.error().code);
     if (auto added = gathered.add(*frame); !added) return added.error();
   }
+  if (gathered.frames() < 2 && without) return readOne(folder, side, record, {});  // better than no capture
   if (gathered.frames() < 2) {
     return ofCapture(
         record,
@@ -48,14 +49,15 @@ Result<ReadOne> readOne(const std::filesystem::path& folder, Side side,
 }
 
 Result<std::vector<ReadOne>> readThem(const std::filesystem::path& folder, Side side,
-                                      const std::vector<plan::CaptureRecord>& records) {
+                                      const std::vector<plan::CaptureRecord>& records,
+                                      const std::optional<FrameClass>& without) {
   std::vector<std::optional<Result<ReadOne>>> results(records.size());
   std::atomic<std::size_t> next{0};
   std::atomic<bool> gives_up{false};
   {
     const auto work = [&] {
       for (std::size_t i = next++; i < records.size() && !gives_up; i = next++) {
-        results[i] = readOne(folder, side, records[i]);
+        results[i] = readOne(folder, side, records[i], without);
         if (!*results[i]) gives_up = true;
       }
     };
@@ -80,10 +82,11 @@ std::string whyNot(const plan::CaptureRecord& record) {
 
 }  // namespace
 
-Result<Campaign> readCampaign(const std::filesystem::path& folder, Side side) {
+Result<Campaign> readCampaign(const std::filesystem::path& folder, Side side,
+                              const std::optional<FrameClass>& without) {
   const auto index = plan::readIndex(folder / plan::kIndexFile);
   if (!index) return index.error();
-  Campaign campaign{.folder = folder, .name = folder.filename().string(), .side = side};
+  Campaign campaign{.folder = folder, .name = folder.filename().string(), .side = side, .without = without};
   std::vector<plan::CaptureRecord> open;
   std::map<std::string, std::size_t> left_out;
   for (const auto& [number, one] : *index) {
@@ -104,7 +107,7 @@ Result<Campaign> readCampaign(const std::filesystem::path& folder, Side side) {
                                  ? "; give poses in the plan, or have a rig take the camera to them"
                                  : "")};
   }
-  auto read = readThem(folder, side, open);
+  auto read = readThem(folder, side, open, without);
   if (!read) return read.error();
   campaign.camera = read->front().camera;
   for (ReadOne& one : *read) {
@@ -118,7 +121,7 @@ Result<Campaign> readCampaign(const std::filesystem::path& folder, Side side) {
 
 Result<std::vector<MeasuredCapture>> readLocked(const Campaign& campaign) {
   if (!campaign.put_aside.empty()) return campaign.put_aside;
-  auto read = readThem(campaign.folder, campaign.side, campaign.locked);
+  auto read = readThem(campaign.folder, campaign.side, campaign.locked, campaign.without);
   if (!read) return read.error();
   std::vector<MeasuredCapture> captures;
   for (ReadOne& one : *read) {

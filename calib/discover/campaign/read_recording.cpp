@@ -139,12 +139,17 @@ plan::CaptureRecord recordOf(std::size_t number, const Frame& frame, const std::
 /// Captures as they are cut out of a stream of frames.
 class Cutter {
  public:
-  Cutter(std::string file, std::size_t most_frames) : file_(std::move(file)), most_frames_(most_frames) {}
+  Cutter(std::string file, std::size_t most_frames, const std::optional<FrameClass>& without)
+      : file_(std::move(file)), most_frames_(most_frames), without_(without) {}
 
   Result<> add(const Frame& frame) {
-    if (gathered_ && (!belongTogether(moment_, frame.moment) || gathered_->frames() >= most_frames_))
+    if (gathered_ && (!belongTogether(moment_, frame.moment) || offered_ >= most_frames_))
       finish();
-    if (!gathered_) gathered_.emplace(recordOf(++number_, frame, file_)), moment_ = frame.moment;
+    if (!gathered_) {
+      gathered_.emplace(recordOf(++number_, frame, file_), without_);
+      moment_ = frame.moment, offered_ = 0;
+    }
+    ++offered_;
     return gathered_->add(frame);
   }
   void finish() {
@@ -163,15 +168,18 @@ class Cutter {
  private:
   std::string file_;
   std::size_t most_frames_;
+  std::optional<FrameClass> without_;
+  std::size_t offered_ = 0;  ///< frames of the capture, with those that are passed over: its ends stay where they are
   std::size_t number_ = 0;
   std::optional<CaptureGatherer> gathered_{};
   Moment moment_{};
 };
 
-Result<Cutter> cut(const std::filesystem::path& file, const std::vector<Pose>& poses) {
+Result<Cutter> cut(const std::filesystem::path& file, const std::vector<Pose>& poses,
+                   const std::optional<FrameClass>& without) {
   auto reader = record::Reader::open(file);
   if (!reader) return reader.error();
-  Cutter cutter{file.filename().string(), std::max(kFewestFrames, poses.size() / kMostOfARecording)};
+  Cutter cutter{file.filename().string(), std::max(kFewestFrames, poses.size() / kMostOfARecording), without};
   std::optional<std::int64_t> began_ns;
   for (const Pose& pose : poses) {
     auto frame = reader->next();
@@ -268,12 +276,13 @@ std::vector<std::size_t> standsOf(const std::vector<MeasuredCapture>& captures) 
   return stands;
 }
 
-Result<Campaign> readRecording(const std::filesystem::path& file, const std::filesystem::path& poses_of) {
+Result<Campaign> readRecording(const std::filesystem::path& file, const std::filesystem::path& poses_of,
+                               const std::optional<FrameClass>& without) {
   const auto poses = posesOf(file, poses_of);
   if (!poses) return poses.error();
-  auto cutter = cut(file, poses->frames);
+  auto cutter = cut(file, poses->frames, without);
   if (!cutter) return cutter.error();
-  Campaign campaign{.folder = file, .name = file.filename().string(), .camera = cutter->camera};
+  Campaign campaign{.folder = file, .name = file.filename().string(), .camera = cutter->camera, .without = without};
   campaign.notes = poses->notes;
   if (cutter->alone > 0)
     campaign.notes.push_back(fmt::format(

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <optional>
@@ -14,7 +15,10 @@
 #include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/covariates.h"
 #include "calib/discover/campaign/light_tiles.h"
+#include "calib/discover/campaign/pose_errors.h"
 #include "calib/discover/campaign/sites.h"
+#include "calib/discover/campaign/smeared_ranges.h"
+#include "calib/discover/campaign/spilled_light.h"
 #include "sim/images/rows.h"
 
 namespace toftwin::discover {
@@ -246,6 +250,15 @@ double exposureUsOf(const MeasuredCapture& capture) {
   return exposures.empty() ? capture.record.exposure_us : exposures.front().duration.in(microsecond);
 }
 
+/// Amplitude as measured; 0: the camera tells none.
+double brightestOf(const std::vector<MeasuredCapture>& captures) {
+  float most = -std::numeric_limits<float>::infinity();
+  for (const MeasuredCapture& capture : captures)
+    for (const float value : capture.log_amplitude.mean.pixels())
+      if (std::isfinite(value)) most = std::max(most, value);
+  return std::exp(static_cast<double>(most));
+}
+
 }  // namespace
 
 void CampaignRows::fillFixed(std::size_t c, const Reading& declared, Fixed& fixed) const {
@@ -259,6 +272,9 @@ void CampaignRows::fillFixed(std::size_t c, const Reading& declared, Fixed& fixe
        carriersOf(declared_->model, fixed.varied, std::max(period_m_, 1e-3), exposureUsOf(capture))) {
     fixed.carriers[name] = fixed.whitened(change);
   }
+  for (const auto& [name, change] : smearedCarriers(fixed.varied)) fixed.carriers[name] = fixed.whitened(change);
+  for (const auto& [name, change] : spilledCarriers(fixed.varied, std::max(period_m_, 1e-3), brightest_))
+    fixed.carriers[name] = fixed.whitened(change);
 }
 
 CampaignRows::PerChannel CampaignRows::Fixed::whitened(const Reading& change) const {
@@ -324,7 +340,7 @@ Result<CampaignRows> CampaignRows::make(const Declared& declared, const Lit& lit
       all.candidates_.push_back(std::move(varied->candidates[i]));
   }
   all.base_columns_ = std::max(all.base_columns_, all.common_columns_);
-  all.period_m_ = periodOf(declared.model);
+  all.period_m_ = periodOf(declared.model), all.brightest_ = brightestOf(lit.captures);
   all.rows_.resize(lit.captures.size());
   const std::vector<std::size_t> sites =
       sitesOf(declared, lit, Cells::gridOf(declared.model.camera().width, declared.model.camera().height));
@@ -339,6 +355,12 @@ Result<CampaignRows> CampaignRows::make(const Declared& declared, const Lit& lit
       WhitenedCapture columns{fixed->cells, next};
       columns.putCommon(fixed->cells, *lit.traced[c]);
       columns.putResidual(fixed->cells, lit.captures[c], *lit.traced[c], declared_reading);
+      for (std::size_t k = 0; k < kChannels; ++k) {
+        if (columns.columns[k].size() == 0) continue;
+        for (auto& [carrier, column] :
+             poseColumns(columns.columns[k].middleCols(2, 5), *lit.captures[c].moment.world_from_camera))
+          fixed->carriers[carrier][k] = std::move(column);
+      }
       if (tiles) tiles->put(fixed->cells, lit.captures[c], first_tile, columns.columns);
       for (const VariedEffect& effect : varied->effects) {
         for (std::size_t i = 0; i < effect.variants.size(); ++i) {

@@ -256,7 +256,7 @@ class CampaignRows final : public RowSource, public NamedEffects {
   std::size_t common_columns_ = kCommon, base_columns_ = 0;
   std::vector<CaptureRows> rows_;
   std::map<std::string, PixelPattern> patterns_{};  ///< by the carrier that is made of them
-  double period_m_ = 0.0;
+  double period_m_ = 0.0, brightest_ = 0.0;  ///< of the range; amplitude in all captures
   bool has_delay_ = false;  ///< a delay of the light is another thing than an error of the range
 };
 

@@ -8,9 +8,12 @@
 
 #include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/covariates.h"
+#include "calib/discover/campaign/pose_errors.h"
 #include "calib/discover/campaign/refit.h"
 #include "calib/discover/campaign/repeating_columns.h"
 #include "calib/discover/campaign/rows.h"
+#include "calib/discover/campaign/smeared_ranges.h"
+#include "calib/discover/campaign/spilled_light.h"
 #include "sim/images/rows.h"
 
 namespace toftwin::discover {
@@ -331,6 +334,9 @@ std::vector<TermGroup> CampaignRows::ownGroups() const {
   std::vector<TermGroup> groups = carrierGroups(covariates(), has_delay_);
   if (!rows_.empty() && rows_.front().fixed->cells.grid().cell_width == 1)
     for (TermGroup& group : repeatingColumns(covariates())) groups.push_back(std::move(group));
+  for (TermGroup& group : smearedGroups(covariates())) groups.push_back(std::move(group));
+  groups.push_back(spilledGroup());
+  for (TermGroup& group : poseGroups()) groups.push_back(std::move(group));
   for (TermGroup& group : unequalGroups(unequal_)) groups.push_back(std::move(group));
   for (TermGroup& group : pixelGroups(has_delay_, rows_.empty() ? 0 : rows_.front().fixed->cells.grid().size()))
     groups.push_back(std::move(group));

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/discover/crossed_shape.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <tuple>
+
+namespace toftwin::discover {
+namespace {
+
+constexpr std::size_t kMostTerms = 16;  ///< of a curve that is crossed
+
+/// Of one covariate of the camera's or the scene's; what light does there (a delay, a gain) may be multiplied in.
+bool canBeCrossed(const Context& context, const Explanation& one) {
+  if (one.is_catalogue || one.fitted.group.terms.size() > kMostTerms) return false;
+  const auto known = std::ranges::count_if(
+      one.covariates, [&](const std::string& name) { return infoOf(context, name) != nullptr; });
+  return known == 1 && std::ranges::all_of(one.fitted.group.terms,
+                                           [](const Term& term) { return term.factors.size() == 1; });
+}
+
+bool isStrengthOf(const CovariateInfo& covariate) {
+  return covariate.nature != Nature::Category && covariate.nature != Nature::Index &&
+         !covariate.quantiles.empty() && covariate.quantiles.back() > covariate.quantiles.front();
+}
+
+/// What one says more than the other, capture by capture.
+Gain beyond(const Gain& more, const Gain& less) {
+  Gain by{.total = more.total - less.total};
+  for (std::size_t c = 0; c < more.by_capture.size(); ++c)
+    by.by_capture.push_back(more.by_capture[c] - less.by_capture[c]);
+  return by;
+}
+
+}  // namespace
+
+std::optional<std::size_t> crossedShape(const Context& context, std::vector<Explanation>& all, std::size_t chosen) {
+  if (!canBeCrossed(context, all[chosen])) return std::nullopt;
+  const Explanation one = all[chosen];
+  std::vector<FittedForm> forms;
+  for (const CovariateInfo& other : context.covariates) {
+    if (!isStrengthOf(other) || std::ranges::count(one.covariates, other.name) > 0) continue;
+    for (FittedForm& form : crossedWith(one.fitted, other)) forms.push_back(std::move(form));
+  }
+  std::vector<Explanation> crossed = judged(context, std::move(forms));
+  const auto best = std::ranges::max_element(crossed, {}, [](const Explanation& e) { return e.gain.total; });
+  if (best == crossed.end()) return std::nullopt;
+  // A curve, and what light does to first order, are right to some per cent; and the best of many is better than it is
+  // (see luckOfTheBestOf).
+  const bool is_formula = one.fitted.form.build != nullptr;
+  const Gain more = beyond(best->gain, one.gain);
+  const double tried = static_cast<double>(crossed.size()), shape = (is_formula ? 0.02 : 0.05) * best->gain.total;
+  if (!holds(more) || more.total < std::max(2.0 * std::log(tried), shape)) return std::nullopt;
+  // Of those that are not told from the best, the one with the fewest numbers.
+  const auto isWorse = [&](const Explanation& e) {
+    return best->gain.total - e.gain.total > difference(best->gain, e.gain).error;
+  };
+  const auto simplest = std::ranges::min_element(crossed, {}, [&](const Explanation& e) {
+    return std::tuple{isWorse(e), e.numbers, -e.gain.total};
+  });
+  const std::size_t place = all.size() + static_cast<std::size_t>(simplest - crossed.begin());
+  all.insert(all.end(), std::make_move_iterator(crossed.begin()), std::make_move_iterator(crossed.end()));
+  return place;
+}
+
+}  // namespace toftwin::discover
