@@ -45,7 +45,7 @@ class Searched : public testing::Test {
     SimulatedRun run{
         .plan = *plan, .camera = *camera, .scene = *scene, .spoil = spoil, .with_poses = with_poses};
     run.frames = frames, run.seed = seed, run.with_samples = with_samples_;
-    run.bumped = bumped_, run.shared_paths = shared_paths_, run.max_surfaces = surfaces();
+    run.rig_mm_per_m = rig_mm_per_m_, run.bumped = bumped_, run.shared_paths = shared_paths_, run.max_surfaces = surfaces();
     if (shared_paths_ > 0) run.pose_error_m = run.pose_error_deg = run.light_error = 0.0;
     discover::write(run, folder_ / "run");
   }
@@ -82,6 +82,7 @@ class Searched : public testing::Test {
   }
   std::filesystem::path folder_;
   bool with_samples_ = false;  ///< raw exposures are recorded, too
+  double rig_mm_per_m_ = 0.0;  ///< SimulatedRun::rig_mm_per_m
   std::vector<int> bumped_{};  ///< SimulatedRun::bumped
   int shared_paths_ = 0;       ///< SimulatedRun::shared_paths; the rig is then perfect, as a simulated one
   [[nodiscard]] int surfaces() const { return shared_paths_ > 0 ? 4 : 1; }

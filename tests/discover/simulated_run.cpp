@@ -78,6 +78,8 @@ plan::RecordedFile capture(const SimulatedRun& run, const plan::PlannedCapture& 
   const auto pose = planned.pose->world_from_camera();
   const bool is_bumped = std::ranges::find(run.bumped, static_cast<int>(planned.number)) != run.bumped.end();
   request.world_from_camera = bumped(pose, run, is_bumped ? 10.0 : 1.0, engine);
+  request.world_from_camera.translation_m =
+      request.world_from_camera.translation_m + 1e-3 * run.rig_mm_per_m * pose.translation_m;
   request.samples_per_pixel = 128;
   request.max_surfaces = run.max_surfaces;
   request.seed = engine();

@@ -26,6 +26,7 @@ struct SimulatedRun {
   std::map<std::string, sim::Scene> scene_of_block{};
   std::uint64_t seed = 1;
   double pose_error_m = 1e-3, pose_error_deg = 0.1, light_error = 0.01;
+  double rig_mm_per_m = 0.0;  ///< the rig goes that much farther than it says
   /// What no camera file says is done to each frame's ranges: an effect of no catalogue.
   std::function<void(sim::RangeImage&, const Moment&, const CameraInfo&, std::uint64_t frame)> spoil{};
   bool with_poses = true;

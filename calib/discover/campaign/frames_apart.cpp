@@ -14,6 +14,7 @@ namespace toftwin::discover {
 namespace {
 
 constexpr std::size_t kFewestFrames = 4, kFewestCaptures = 3, kFewestOfClass = 6;
+constexpr std::size_t kAllPairs = 64;
 constexpr std::uint64_t kMostPeriod = 16, kMostInCapture = 4;
 constexpr int kDraws = 2000;
 constexpr double kMostP = 0.002;
@@ -21,33 +22,37 @@ constexpr std::size_t kKinds = 2;  ///< range and gain
 
 using Values = std::array<double, kKinds>;
 
-/// A capture's frames without their mean and their straight drift, in units of their spread.
 struct Series {
   std::vector<std::uint64_t> sequence{};
-  std::vector<Values> value{};
+  std::vector<Values> value{};      ///< without their mean and their straight drift, in units of their spread
+  std::vector<Values> as_read{};
   Values spread{};
 };
+
+double medianOf(std::vector<double> numbers) {
+  const auto middle = numbers.begin() + static_cast<std::ptrdiff_t>(numbers.size() / 2);
+  std::nth_element(numbers.begin(), middle, numbers.end());
+  return *middle;
+}
 
 /// The median of the sizes, in standard deviations of Gaussian noise: a frame or two that are off do not make it large.
 double spreadOf(std::vector<double> numbers) {
   for (double& one : numbers) one = std::abs(one);
-  const auto middle = numbers.begin() + static_cast<std::ptrdiff_t>(numbers.size() / 2);
-  std::nth_element(numbers.begin(), middle, numbers.end());
-  return *middle / 0.6745;
+  return medianOf(std::move(numbers)) / 0.6745;
 }
 
+/// The drift as the median of the slopes between all pairs (P. K. Sen, J. Am. Stat. Assoc. 63 (1968) 1379): a frame
+/// that is off does not tilt it. Of many frames, those half of them apart.
 std::vector<double> withoutDrift(std::vector<double> numbers) {
-  const auto n = static_cast<double>(numbers.size());
-  const double mean = std::accumulate(numbers.begin(), numbers.end(), 0.0) / n, middle = 0.5 * (n - 1.0);
-  double moment = 0.0, squares = 0.0;
-  for (std::size_t k = 0; k < numbers.size(); ++k) {
-    const double at = static_cast<double>(k) - middle;
-    moment += at * numbers[k], squares += at * at;
-  }
-  // Of a handful of frames a slope would take what one of them says.
-  const double slope = numbers.size() >= 6 ? moment / squares : 0.0;
-  for (std::size_t k = 0; k < numbers.size(); ++k)
-    numbers[k] -= mean + slope * (static_cast<double>(k) - middle);
+  const std::size_t n = numbers.size();
+  std::vector<double> slopes;
+  for (std::size_t k = n > kAllPairs ? n / 2 : 1; k < n; ++k)
+    for (std::size_t i = n > kAllPairs ? k - n / 2 : 0; i < k; i += n > kAllPairs ? n : 1)
+      slopes.push_back((numbers[k] - numbers[i]) / static_cast<double>(k - i));
+  const double slope = medianOf(std::move(slopes));
+  for (std::size_t k = 0; k < n; ++k) numbers[k] -= slope * static_cast<double>(k);
+  const double mean = std::accumulate(numbers.begin(), numbers.end(), 0.0) / static_cast<double>(n);
+  for (double& one : numbers) one -= mean;
   return numbers;
 }
 
@@ -57,7 +62,8 @@ std::optional<Series> seriesOf(const MeasuredCapture& capture) {
   std::array<std::vector<double>, kKinds> numbers;
   for (const FrameAlone& frame : capture.each) {
     series.sequence.push_back(frame.sequence);
-    numbers[0].push_back(frame.range_mm), numbers[1].push_back(frame.gain_percent);
+    series.as_read.push_back({frame.range_mm, frame.gain_percent});
+    for (std::size_t kind = 0; kind < kKinds; ++kind) numbers[kind].push_back(series.as_read.back()[kind]);
   }
   series.value.resize(capture.each.size());
   for (std::size_t kind = 0; kind < kKinds; ++kind) {
@@ -91,17 +97,44 @@ Members membersOf(const std::vector<FrameClass>& classes, const std::vector<Seri
   return members;
 }
 
-/// The largest mean of a class, in standard errors, and whose it is.
-std::pair<double, std::size_t> largest(const Members& members, const std::vector<Series>& all) {
+/// What any order of the frames leaves as it is: mean and deviation of the values and of their squares.
+struct Usual {
+  Values mean_of_squares{}, deviation_of_squares{};
+};
+Usual usualOf(const std::vector<Series>& all) {
+  Usual usual;
+  for (std::size_t kind = 0; kind < kKinds; ++kind) {
+    double squares = 0.0, fourth = 0.0, n = 0.0;
+    for (const Series& one : all) {
+      for (const Values& value : one.value) {
+        const double square = value[kind] * value[kind];
+        squares += square, fourth += square * square, n += 1.0;
+      }
+    }
+    usual.mean_of_squares[kind] = squares / n;
+    usual.deviation_of_squares[kind] = std::sqrt(std::max(0.0, fourth / n - squares * squares / n / n));
+  }
+  return usual;
+}
+
+/// The largest sum of a class's values, or of their squares beyond the usual, in deviations of such sums of frames in any
+/// order, and whose it is. The squares are for what is now more, now less, as the scene has it.
+std::pair<double, std::size_t> largest(const Members& members, const std::vector<Series>& all, const Usual& usual) {
   std::pair<double, std::size_t> best{0.0, 0};
   for (std::size_t i = 0; i < members.size(); ++i) {
     if (members[i].size() < kFewestOfClass) continue;
-    Values sum{};
-    for (const auto& [c, k] : members[i])
-      for (std::size_t kind = 0; kind < kKinds; ++kind) sum[kind] += all[c].value[k][kind];
-    for (const double one : sum) {
-      const double t = std::abs(one) / std::sqrt(static_cast<double>(members[i].size()));
-      if (t > best.first) best = {t, i};
+    const auto n = static_cast<double>(members[i].size());
+    for (std::size_t kind = 0; kind < kKinds; ++kind) {
+      if (!(usual.deviation_of_squares[kind] > 0.0)) continue;
+      double sum = 0.0, squares = 0.0;
+      for (const auto& [c, k] : members[i]) {
+        const double value = all[c].value[k][kind];
+        sum += value, squares += value * value;
+      }
+      const double of_sum = std::abs(sum) / std::sqrt(n * usual.mean_of_squares[kind]),
+                   of_squares = (squares - n * usual.mean_of_squares[kind]) /
+                                (std::sqrt(n) * usual.deviation_of_squares[kind]);
+      if (const double most = std::max(of_sum, of_squares); most > best.first) best = {most, i};
     }
   }
   return best;
@@ -113,8 +146,8 @@ Difference differenceOf(const FrameClass& which, const std::vector<Series>& all,
   std::vector<std::pair<double, double>> each;  // difference, weight
   for (const Series& one : all) {
     double in = 0.0, out = 0.0, n_in = 0.0, n_out = 0.0;
-    for (std::size_t k = 0; k < one.value.size(); ++k) {
-      const double value = one.value[k][kind] * one.spread[kind];
+    for (std::size_t k = 0; k < one.as_read.size(); ++k) {
+      const double value = one.as_read[k][kind];
       (which.has(one.sequence[k], k) ? in : out) += value;
       (which.has(one.sequence[k], k) ? n_in : n_out) += 1.0;
     }
@@ -152,13 +185,14 @@ std::optional<FramesApart> framesApart(const std::vector<MeasuredCapture>& captu
   if (all.size() < kFewestCaptures) return std::nullopt;
   const std::vector<FrameClass> classes = allClasses();
   const Members members = membersOf(classes, all);
-  const auto [statistic, place] = largest(members, all);
+  const Usual usual = usualOf(all);
+  const auto [statistic, place] = largest(members, all, usual);
   std::mt19937_64 random{seed};
   std::vector<Series> drawn = all;
   int as_large = 0;
   for (int draw = 0; draw < kDraws; ++draw) {
     for (Series& one : drawn) std::ranges::shuffle(one.value, random);
-    if (largest(members, drawn).first >= statistic) ++as_large;
+    if (largest(members, drawn, usual).first >= statistic) ++as_large;
   }
   FramesApart apart{.which = classes[place], .p = (1.0 + as_large) / (1.0 + kDraws)};
   if (apart.p > kMostP) return std::nullopt;

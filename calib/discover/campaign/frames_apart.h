@@ -27,10 +27,10 @@ struct FramesApart {
 };
 
 /// The class that differs most: numbers modulo 2 to 16, counted by the source or from the first of each capture, and the
-/// first frames of captures themselves. Its statistic is the largest mean of a class in standard errors, range and gain each
-/// for itself in units of their spread within captures, straight drifts within captures taken off; its chance, that of
-/// the largest where the frames of each capture are put in another order, 2000 times. Nothing: p > 0.002; fewer than
-/// three captures of four frames.
+/// first frames of captures themselves. Its statistic is the largest sum of a class's values, or of their squares, range and
+/// gain each for itself in units of their spread within captures, straight drifts within captures taken off; its chance,
+/// that of the largest where the frames of each capture are put in another order, 2000 times. Nothing: p > 0.002; fewer
+/// than three captures of four frames.
 std::optional<FramesApart> framesApart(const std::vector<MeasuredCapture>& captures, std::uint64_t seed);
 
 /// What was found of single frames, as an effect.
