@@ -46,12 +46,13 @@ std::optional<std::size_t> crossedShape(const Context& context, std::vector<Expl
   std::vector<Explanation> crossed = judged(context, std::move(forms));
   const auto best = std::ranges::max_element(crossed, {}, [](const Explanation& e) { return e.gain.total; });
   if (best == crossed.end()) return std::nullopt;
-  // A curve, and what light does to first order, are right to some per cent; and the best of many is better than it is
-  // (see luckOfTheBestOf).
+  // What is as good uncrossed, within two standard errors, is told uncrossed. A curve, and what light does to first order,
+  // are right to some per cent; and the best of many is better than it is (see luckOfTheBestOf).
   const bool is_formula = one.fitted.form.build != nullptr;
   const Gain more = beyond(best->gain, one.gain);
   const double tried = static_cast<double>(crossed.size()), shape = (is_formula ? 0.02 : 0.05) * best->gain.total;
-  if (!holds(more) || more.total < std::max(2.0 * std::log(tried), shape)) return std::nullopt;
+  const double least = std::max({2.0 * difference(best->gain, one.gain).error, 2.0 * std::log(tried), shape});
+  if (!holds(more) || more.total < least) return std::nullopt;
   // Of those that are not told from the best, the one with the fewest numbers.
   const auto isWorse = [&](const Explanation& e) {
     return best->gain.total - e.gain.total > difference(best->gain, e.gain).error;

@@ -154,6 +154,9 @@ struct TracedCapture {
   std::array<Image<float>, 5> range_m{}, log_amplitude{};
   Image<float> tracing_variance_m2,
       tracing_variance;         ///< of range and of ln amplitude, from Monte Carlo
+  /// Of the light of a pixel and those about it, the share that has been at more than one surface; 0 where that is less than
+  /// the tracer's noise makes of none.
+  Image<float> multipath{};
   Stood stood{};                ///< the light was traced there; the changes are from there, too
   Image<std::uint8_t> is_jump;  ///< next to a jump of range, or of what is painted on it
   Image<std::uint8_t> is_edge;  ///< so near to one that the pose decides what is seen: no row of the fit

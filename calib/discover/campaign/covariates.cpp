@@ -94,6 +94,7 @@ constexpr std::array kKnownCovariates{
     KnownCovariate{"range_m", "range", "m", Nature::Distance, Stage::Range},
     KnownCovariate{"amplitude_e", "amplitude", "e", Nature::Plain, Stage::Range},
     KnownCovariate{"albedo", "albedo", "", Nature::Plain, Stage::Range},
+    KnownCovariate{"multipath", "multipath", "", Nature::Plain, Stage::Range},
     KnownCovariate{"column", "position", "px", Nature::Plain, Stage::Range},
     KnownCovariate{"row", "position", "px", Nature::Plain, Stage::Range},
     KnownCovariate{"radius_px", "position", "px", Nature::Plain, Stage::Range},
@@ -105,7 +106,7 @@ constexpr std::array kKnownCovariates{
 }  // namespace
 
 CaptureCovariates covariatesOf(const MeasuredCapture& capture, const sim::Light& light,
-                               const Reading& declared, const CameraInfo& camera,
+                               const Image<float>& multipath, const Reading& declared, const CameraInfo& camera,
                                const Cells& cells) {
   CovariateGatherer gatherer{cells};
   addMoment(capture, gatherer);
@@ -114,6 +115,7 @@ CaptureCovariates covariatesOf(const MeasuredCapture& capture, const sim::Light&
   for (float& value : amplitude.pixels()) value = std::exp(value);
   gatherer.add("amplitude_e", amplitude);
   gatherer.add("albedo", light.truth.albedo);
+  gatherer.add("multipath", multipath);
   addPlaces(camera, light.truth, gatherer);
   addSurroundings(amplitude, gatherer);
   return gatherer.finish();

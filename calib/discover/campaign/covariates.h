@@ -11,9 +11,10 @@ namespace toftwin::discover {
 
 /// What an error of a camera can go with, for each cell of a capture; of the declared simulation,
 /// not of what was measured, whose noise would otherwise stand on both sides.
+/// `multipath`: TracedCapture's.
 CaptureCovariates covariatesOf(const MeasuredCapture& capture, const sim::Light& light,
-                               const Reading& declared, const CameraInfo& camera,
-                               const Cells& cells);
+                               const Image<float>& multipath, const Reading& declared,
+                               const CameraInfo& camera, const Cells& cells);
 
 /// The word of sim::kCovariateNames that a campaign's covariate belongs to: "radius_px" is of
 /// "position".

@@ -267,7 +267,7 @@ void CampaignRows::fillFixed(std::size_t c, const Reading& declared, Fixed& fixe
   fixed.name = capture.record.name, fixed.block = capture.record.block;
   fixed.cells = Cells{capture, *lit_->traced[c], declared};
   fixed.covariates =
-      covariatesOf(capture, varied, fixed.varied, declared_->model.camera(), fixed.cells);
+      covariatesOf(capture, varied, lit_->traced[c]->multipath, fixed.varied, declared_->model.camera(), fixed.cells);
   for (const auto& [name, change] :
        carriersOf(declared_->model, fixed.varied, std::max(period_m_, 1e-3), exposureUsOf(capture))) {
     fixed.carriers[name] = fixed.whitened(change);

@@ -157,8 +157,21 @@ sim::Light directLight(const sim::Scene& scene, sim::TraceRequest request,
   return sim::trace(scene, request);
 }
 
+Image<float> multipathOf(const sim::Light& all, const sim::Light& direct) {
+  constexpr int kReach = 2;
+  constexpr float kLeast = 0.01F;
+  const Image<float> whole = sim::boxMean(all.steady, kReach), first = sim::boxMean(direct.steady, kReach);
+  Image<float> share(whole.width(), whole.height());
+  for (std::size_t i = 0; i < share.size(); ++i) {
+    const float one = 1.0F - first[i] / whole[i];
+    share[i] = one > kLeast ? std::min(one, 1.0F) : 0.0F;  // what is NaN, too
+  }
+  return share;
+}
+
 void addMoves(const sim::Scene& scene, const sim::TraceRequest& request, TracedCapture& traced) {
   const sim::Light here = directLight(scene, request, request.world_from_camera);
+  traced.multipath = multipathOf(traced.light, here);
   for (std::size_t way = 0; way < traced.range_m.size(); ++way) {
     Stood one{};
     one[way] = 1.0;
