@@ -88,6 +88,8 @@ bool varies(const CovariateInfo& covariate) {
              : !covariate.quantiles.empty() && covariate.quantiles.back() > covariate.quantiles.front();
 }
 
+bool isByItself(const CovariateInfo& x) { return x.nature == Nature::Index || x.nature == Nature::Rate; }
+
 /// A place of the image with what a pixel sees there: what a lens or the camera's sides change.
 bool isPlaceAndSignal(const CovariateInfo& a, const CovariateInfo& b) {
   const auto isSignal = [](const CovariateInfo& x) { return x.word == "range" || x.word == "amplitude"; };
@@ -103,7 +105,7 @@ std::vector<std::pair<std::size_t, std::size_t>> pairsOf(std::span<const Covaria
     for (std::size_t i = 0; i < j; ++i) {
       const CovariateInfo &a = covariates[i], &b = covariates[j];
       if (!varies(a) || !varies(b)) continue;
-      if (a.nature == Nature::Index || b.nature == Nature::Index) continue;
+      if (isByItself(a) || isByItself(b)) continue;
       const bool are_alike = a.is_of_capture == b.is_of_capture;
       ranks[!are_alike ? 0 : a.is_of_capture ? 3 : isPlaceAndSignal(a, b) ? 1 : 2].emplace_back(i, j);
     }
@@ -132,8 +134,9 @@ std::vector<Term> products(const std::vector<Term>& a, const std::vector<Term>& 
 }
 
 TermGroup smoothIn(const CovariateInfo& covariate, std::size_t knots) {
-  TermGroup group{fmt::format("smooth in {}", covariate.name), Kind::Generic, completeBasis(covariate, knots),
-                  0};
+  const bool is_straight = covariate.nature == Nature::Rate;
+  TermGroup group{fmt::format("{} in {}", is_straight ? "straight" : "smooth", covariate.name), Kind::Generic,
+                  completeBasis(covariate, is_straight ? 2 : knots), 0};
   if (!group.terms.empty()) group.terms.erase(group.terms.begin());
   return group;
 }
@@ -156,7 +159,7 @@ std::vector<TermGroup> genericCandidates(std::span<const CovariateInfo> covariat
       for (const int modulus : {2, 3, 4}) groups.push_back(parity(covariate, modulus));
     }
     const bool is_continuous = covariate.nature != Nature::Category && covariate.levels.empty();
-    if (!is_continuous || covariate.nature == Nature::Index) continue;
+    if (!is_continuous || isByItself(covariate)) continue;
     if (options.captures >= 20) groups.push_back(waves(covariate, 1, 4));
     if (options.captures >= 40) groups.push_back(waves(covariate, 5, 10));
     if (options.captures >= 60) groups.push_back(waves(covariate, 11, 20));

@@ -25,7 +25,7 @@ std::vector<TermGroup> genericCandidates(std::span<const CovariateInfo> covariat
                                          const CandidateOptions& options);
 
 /// A smooth function: hats between `knots` quantiles, without the first, whose place an offset takes. Levels:
-/// one hat for each; names: one value for each.
+/// one hat for each; names: one value for each; rates: straight, whatever the knots.
 TermGroup smoothIn(const CovariateInfo& covariate, std::size_t knots);
 /// A surface over two covariates.
 TermGroup smoothIn(const CovariateInfo& a, const CovariateInfo& b, std::size_t knots);

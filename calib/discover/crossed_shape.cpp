@@ -22,7 +22,7 @@ bool canBeCrossed(const Context& context, const Explanation& one) {
 
 bool isStrengthOf(const CovariateInfo& covariate) {
   return covariate.nature != Nature::Category && covariate.nature != Nature::Index &&
-         !covariate.quantiles.empty() && covariate.quantiles.back() > covariate.quantiles.front();
+         covariate.nature != Nature::Rate && !covariate.quantiles.empty() && covariate.quantiles.back() > covariate.quantiles.front();
 }
 
 /// What one says more than the other, capture by capture.

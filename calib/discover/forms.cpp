@@ -304,6 +304,7 @@ std::vector<Form> formsIn(const CovariateInfo& x) {
     return {form(fmt::format("a value for each {}", x.name), {x}, levels)};
   }
   if (x.quantiles.empty() || span(x) <= 0.0) return forms;
+  if (x.nature == Nature::Rate) return {form(powerInWords(x, 1.0), {x}, powers, {}, {1.0})};
   if (x.nature == Nature::Index) {
     for (const double modulus : {2.0, 3.0, 4.0})
       forms.push_back(form(fmt::format("{} modulo {}", x.name, modulus), {x}, modulo, {}, {modulus}));

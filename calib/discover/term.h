@@ -76,6 +76,7 @@ enum class Nature {
   Distance,  ///< and where the frequency is known, harmonics of its period
   Angle,     ///< tan² and 1/cos − 1 are looked for
   Index,     ///< counts frames: even and odd
+  Rate,      ///< how fast something else changes: what goes with it goes straight
   Category   ///< names without order
 };
 

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Covariates that act together.
+// Covariates that act together, and how fast one changes.
 #include <cmath>
 
 #include <gmock/gmock.h>
 
 #include "calib/discover/candidates.h"
+#include "calib/discover/campaign/temperature_rates.h"
 #include "calib/discover/forms.h"
 #include "tests/discover/searched.h"
 
@@ -13,6 +14,7 @@ namespace {
 
 using testing::AnyOf;
 using testing::Contains;
+using testing::HasSubstr;
 
 CovariateInfo spread(const std::string& name, const std::string& word, bool is_of_capture, double from, double to) {
   CovariateInfo info{.name = name, .is_of_capture = is_of_capture, .word = word};
@@ -75,6 +77,42 @@ TEST_F(Searched, WhatGrowsWithTwoThingsGoesWithBoth) {
   EXPECT_THAT(covariates,
               Contains(AnyOf("temperature_sensor_c", "temperature_illumination_c", "time_s")))
       << verdictOf(finding);
+}
+
+/// Cooling and warming by one exponential: at any time the slope is that of the curve, whatever the captures' spacing; the
+/// room's is nobody's.
+TEST(TemperatureRates, AreTheCurvesSlopes) {
+  std::vector<MeasuredCapture> captures(30);
+  for (std::size_t c = 0; c < captures.size(); ++c) {
+    const double t = 40.0 * static_cast<double>(c) + (c % 3 == 0 ? 5.0 : 0.0);
+    captures[c].moment.since_power_on = t * second;
+    captures[c].moment.temperatures = {{"sensor", (35.0 - 12.0 * std::exp(-t / 900.0)) * celsius}, {"room", 23_degC}};
+  }
+  const auto rates = temperatureRates(captures);
+  for (std::size_t c = 0; c < captures.size(); ++c) {
+    ASSERT_EQ(rates[c].size(), 1U);
+    EXPECT_EQ(rates[c][0].covariate, "temperature_rate_sensor");
+    const double t = captures[c].moment.since_power_on->in(second);
+    // The third order that a parabola leaves out: (h/τ)²/3 of the slope, h the 160 s to the farthest of five.
+    const double slope = 60.0 * 12.0 / 900.0 * std::exp(-t / 900.0);
+    EXPECT_NEAR(rates[c][0].c_per_min, slope, slope * (160.0 / 900.0) * (160.0 / 900.0) / 3.0);
+  }
+  captures.resize(4);
+  EXPECT_TRUE(std::isnan(temperatureRates(captures)[0][0].c_per_min)) << "too few";
+}
+
+/// Late by how fast the sensor warms: what its time constant is, its temperature says.
+TEST_F(Searched, WhatGoesWithHowFastItWarmsIsTold) {
+  simulate("", [](sim::RangeImage& image, const Moment& moment, const CameraInfo&, std::uint64_t) {
+    for (const NamedTemperature& one : moment.temperatures) {
+      if (one.where != "sensor") continue;
+      const double c_per_min = (35.0 - one.value.in(celsius)) / 15.0;  // of tinyCamera
+      for (float& range : image.range_m.pixels()) range += static_cast<float>(20e-3 * c_per_min);
+    }
+  });
+  const CampaignFinding finding = search(job());
+  ASSERT_EQ(finding.effects.size(), 1U) << verdictOf(finding);
+  EXPECT_THAT(verdictOf(finding), HasSubstr("temperature_rate_sensor"));
 }
 
 }  // namespace

@@ -105,11 +105,13 @@ constexpr std::array kKnownCovariates{
 
 }  // namespace
 
-CaptureCovariates covariatesOf(const MeasuredCapture& capture, const sim::Light& light,
+CaptureCovariates covariatesOf(const MeasuredCapture& capture, const std::vector<TemperatureRate>& rates,
+                               const sim::Light& light,
                                const Image<float>& multipath, const Reading& declared, const CameraInfo& camera,
                                const Cells& cells) {
   CovariateGatherer gatherer{cells};
   addMoment(capture, gatherer);
+  for (const auto& [name, c_per_min] : rates) gatherer.add(name, c_per_min);
   gatherer.add("range_m", declared.range_m);
   Image<float> amplitude = declared.log_amplitude;
   for (float& value : amplitude.pixels()) value = std::exp(value);
@@ -126,6 +128,7 @@ std::string_view wordOf(std::string_view covariate) {
   for (const KnownCovariate& known : kKnownCovariates) {
     if (known.name == covariate) return known.word;
   }
+  if (covariate.starts_with(kRatePrefix)) return "temperature rate";
   return covariate.starts_with("temperature_") ? "temperature" : covariate;
 }
 
@@ -136,6 +139,7 @@ CovariateInfo describe(const std::string& name) {
       info.unit = known.unit, info.nature = known.nature, info.stage = known.stage;
   }
   if (name.starts_with("temperature_")) info.unit = std::string{"c"}, info.stage = Stage::Range;
+  if (name.starts_with(kRatePrefix)) info.unit = std::string{"c/min"}, info.nature = Nature::Rate;
   info.word = wordOf(name);
   return info;
 }

@@ -132,6 +132,21 @@ std::optional<sim::AnyEffect> tableOf(const Along& along, std::span<const Covari
   return learned;
 }
 
+/// How fast a temperature changes no frame says, but when it was: as a table over the time of these captures.
+std::optional<sim::AnyEffect> tableOverTime(const Along& along, const CampaignRows& rows) {
+  if (along.covariates.size() != 1 || !along.covariates.front().starts_with(kRatePrefix)) return std::nullopt;
+  sim::LearnedRange learned{.over = Over::Time, .knots = {}, .offsets_mm = {}};
+  std::vector<double> gains;
+  for (const auto& [time, rate] : rows.overTime(along.covariates.front())) {
+    const auto at = [r = rate](const std::string&) { return r; };
+    learned.knots.push_back(time);
+    learned.offsets_mm.push_back(std::clamp(along.sum(movesRange, at), -1e4, 1e4));
+    gains.push_back(std::clamp(along.sum(changesGain, at), -100.0, 1e4));
+  }
+  if (std::ranges::any_of(gains, [](double one) { return one != 0.0; })) learned.gains_percent = std::move(gains);
+  return learned;
+}
+
 /// A pattern of pixels, as a table over columns and rows with a knot in the middle of each cell. `strength`:
 /// the pattern's coefficient beside everything else that was found.
 sim::AnyEffect tableOf(const PixelPattern& pattern, double strength) {
@@ -243,8 +258,11 @@ std::vector<LearnedEffect> learnedEffectsOf(const Effect& effect, const Campaign
   std::vector<LearnedEffect> learned;
   const std::vector<CovariateInfo> covariates = rows.covariates();
   const std::vector<Along> all = alongOf(effect);
-  for (const Along& along : all)
-    if (const auto table = tableOf(along, covariates, model.hasPhasors())) learned.push_back({*table});
+  for (const Along& along : all) {
+    auto table = tableOf(along, covariates, model.hasPhasors());
+    if (!table) table = tableOverTime(along, rows);
+    if (table) learned.push_back({*std::move(table)});
+  }
   for (const Along& along : all)
     if (const auto shift = shiftOf(along, covariates)) learned.push_back({*shift});
   for (const Along& along : all) {

@@ -261,13 +261,14 @@ double brightestOf(const std::vector<MeasuredCapture>& captures) {
 
 }  // namespace
 
-void CampaignRows::fillFixed(std::size_t c, const Reading& declared, Fixed& fixed) const {
+void CampaignRows::fillFixed(std::size_t c, const std::vector<TemperatureRate>& rates, const Reading& declared,
+                             Fixed& fixed) const {
   const MeasuredCapture& capture = lit_->captures[c];
   const sim::Light& varied = *lit_->varied[c];
   fixed.name = capture.record.name, fixed.block = capture.record.block;
   fixed.cells = Cells{capture, *lit_->traced[c], declared};
   fixed.covariates =
-      covariatesOf(capture, varied, lit_->traced[c]->multipath, fixed.varied, declared_->model.camera(), fixed.cells);
+      covariatesOf(capture, rates, varied, lit_->traced[c]->multipath, fixed.varied, declared_->model.camera(), fixed.cells);
   for (const auto& [name, change] :
        carriersOf(declared_->model, fixed.varied, std::max(period_m_, 1e-3), exposureUsOf(capture))) {
     fixed.carriers[name] = fixed.whitened(change);
@@ -344,6 +345,7 @@ Result<CampaignRows> CampaignRows::make(const Declared& declared, const Lit& lit
   all.rows_.resize(lit.captures.size());
   const std::vector<std::size_t> sites =
       sitesOf(declared, lit, Cells::gridOf(declared.model.camera().width, declared.model.camera().height));
+  const auto rates = temperatureRates(lit.captures);
   std::atomic<std::size_t> done{0};
   sim::inParallel(static_cast<int>(lit.captures.size()), 1, [&](int first, int last) {
     for (auto c = static_cast<std::size_t>(first); c < static_cast<std::size_t>(last); ++c) {
@@ -351,7 +353,7 @@ Result<CampaignRows> CampaignRows::make(const Declared& declared, const Lit& lit
       const Reading declared_reading = camera->read(lit.captures[c], lit.traced[c]->light);
       auto fixed = std::make_shared<Fixed>();
       fixed->varied = base.reading, fixed->site = sites[c];
-      all.fillFixed(c, declared_reading, *fixed);
+      all.fillFixed(c, rates[c], declared_reading, *fixed);
       WhitenedCapture columns{fixed->cells, next};
       columns.putCommon(fixed->cells, *lit.traced[c]);
       columns.putResidual(fixed->cells, lit.captures[c], *lit.traced[c], declared_reading);

@@ -18,6 +18,7 @@
 #include "calib/discover/campaign/catalogue.h"
 #include "calib/discover/campaign/effect_numbers.h"
 #include "calib/discover/campaign/reading.h"
+#include "calib/discover/campaign/temperature_rates.h"
 #include "calib/discover/campaign/unequal_exposures.h"
 #include "calib/discover/named_effects.h"
 #include "calib/discover/term.h"
@@ -166,6 +167,8 @@ class CampaignRows final : public RowSource, public NamedEffects {
   /// Carriers of raw exposures that are not alike; empty: the camera has none that could be.
   [[nodiscard]] const std::vector<UnequalExposure>& unequal() const { return unequal_; }
   [[nodiscard]] const std::vector<Candidate>& candidates() const { return candidates_; }
+  /// A covariate that is the same all over each capture, by the captures' times since power-on, ascending.
+  [[nodiscard]] std::map<double, double> overTime(const std::string& covariate) const;
   /// Whether a delay of the light is another thing than an offset of the range, and a nuisance like it.
   [[nodiscard]] bool hasDelay() const { return has_delay_; }
   [[nodiscard]] const std::vector<Group>& baseGroups() const { return groups_; }
@@ -228,7 +231,8 @@ class CampaignRows final : public RowSource, public NamedEffects {
     /// What is known of the shared columns (one row or column each), for all terms.
     [[nodiscard]] Eigen::MatrixXd columnsFor(std::size_t channel, const Eigen::MatrixXd& shared) const;
   };
-  void fillFixed(std::size_t capture, const Reading& declared, Fixed& fixed) const;
+  void fillFixed(std::size_t capture, const std::vector<TemperatureRate>& rates, const Reading& declared,
+                 Fixed& fixed) const;
   /// What terms of coefficient 1 add to a capture: millimetres of range, per cent of light, or of their
   /// carriers.
   static PerChannel columnsOf(const CaptureRows& rows, const Term& term, const Eigen::VectorXf& values);

@@ -6,6 +6,8 @@
 #include <optional>
 #include <set>
 
+#include <toftwin/nan.h>
+
 #include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/covariates.h"
 #include "calib/discover/campaign/pose_errors.h"
@@ -322,6 +324,21 @@ std::vector<CovariateInfo> CampaignRows::covariates() const {
     if (levels.size() <= kMostLevels) info.levels.assign(levels.begin(), levels.end());
     if (info.nature == Nature::Distance) info.period = period_m_;
     all.push_back(std::move(info));
+  }
+  return all;
+}
+
+std::map<double, double> CampaignRows::overTime(const std::string& covariate) const {
+  std::map<double, double> all;
+  for (const CaptureRows& rows : rows_) {
+    const CaptureCovariates& known = rows.fixed->covariates;
+    const auto valueOf = [&](const std::string& name) {
+      const auto place = std::ranges::find(known.names, name);
+      if (place == known.names.end() || known.values.rows() == 0) return double{kNaN};
+      return static_cast<double>(known.values(0, place - known.names.begin()));
+    };
+    const double time = valueOf("time_s"), value = valueOf(covariate);
+    if (std::isfinite(time) && std::isfinite(value)) all.emplace(time, value);
   }
   return all;
 }
