@@ -17,10 +17,11 @@ using testing::HasSubstr;
 
 /// Captures of eight frames, numbered on by the source with gaps between captures, whose noise differs from capture to
 /// capture.
-std::vector<MeasuredCapture> noisy(std::uint64_t seed, const std::function<double(std::uint64_t, std::size_t)>& late_mm) {
+std::vector<MeasuredCapture> noisy(std::uint64_t seed, const std::function<double(std::uint64_t, std::size_t)>& late_mm,
+                                   std::size_t count = 30) {
   std::mt19937_64 random{seed};
   std::normal_distribution<double> normal;
-  std::vector<MeasuredCapture> captures(30);
+  std::vector<MeasuredCapture> captures(count);
   std::uint64_t sequence = 0;
   for (std::size_t c = 0; c < captures.size(); ++c) {
     const double noise_mm = 0.1 * static_cast<double>(1 + c % 5);
@@ -73,6 +74,19 @@ TEST(FramesApart, TheFirstOfEachCaptureIsFoundByItsPlace) {
 /// A drift within captures puts the last frames apart from the first.
 TEST(FramesApart, AStraightDriftIsNone) {
   EXPECT_FALSE(framesApart(noisy(4, [](std::uint64_t, std::size_t k) { return 0.5 * static_cast<double>(k); }), 1));
+}
+
+/// Of what wanders from frame to frame first and last ones are farthest from the mean in every capture, but for its drift.
+TEST(FramesApart, FramesThatWanderAreNone) {
+  int told = 0;
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    std::mt19937_64 random{seed};
+    std::normal_distribution<double> normal;
+    double place = 0.0;
+    const auto wander = [&](std::uint64_t, std::size_t) { return place += normal(random); };
+    told += framesApart(noisy(seed, wander, 200), seed) ? 1 : 0;
+  }
+  EXPECT_EQ(told, 0);
 }
 
 TEST(FramesApart, AHandfulOfFramesSaysNothing) {

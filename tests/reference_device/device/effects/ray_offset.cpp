@@ -20,7 +20,7 @@ Row rayOffset() {
        .summary = "light between places nearer than this is missing, as with a renderer's ray offset",
        .stage = Stage::Light,
        .unit = "mm",
-       .covariates = "neighbours [position, range]",
+       .covariates = "multipath [neighbours, position, range]",
        .catalogue = ""});
 }
 
