@@ -190,12 +190,13 @@ std::optional<FramesApart> framesApart(const std::vector<MeasuredCapture>& captu
   std::mt19937_64 random{seed};
   std::vector<Series> drawn = all;
   int as_large = 0;
+  const auto chance = [&] { return (1.0 + as_large) / (1.0 + kDraws); };
   for (int draw = 0; draw < kDraws; ++draw) {
     for (Series& one : drawn) std::ranges::shuffle(one.value, random);
     if (largest(members, drawn, usual).first >= statistic) ++as_large;
+    if (chance() > kMostP) return std::nullopt;  // it can only become more
   }
-  FramesApart apart{.which = classes[place], .p = (1.0 + as_large) / (1.0 + kDraws)};
-  if (apart.p > kMostP) return std::nullopt;
+  FramesApart apart{.which = classes[place], .p = chance()};
   apart.frames = members[place].size();
   std::vector<bool> has(all.size());
   for (const auto& [c, k] : members[place]) has[c] = true;
