@@ -26,6 +26,7 @@
 #include "sim/effects/learned_neighbours.h"
 #include "sim/effects/learned_range.h"
 #include "sim/effects/learned_shift.h"
+#include "sim/effects/learned_smear.h"
 #include "sim/effects/lens_ghost.h"
 #include "sim/effects/lens_scatter.h"
 #include "sim/effects/low_amplitude_filter.h"
@@ -62,7 +63,7 @@ using AllEffects = EffectList<
     Nonlinearity, SampleGain, SampleOffset, ColumnComb, LearnedColumns, ReadNoise, Quantisation,
     Companding,                                                                        // the converter
     RangeNoise, WarmUp, TimeWalk, ClockScale, ResidualDrift, Delay, CalibrationTable,  // range: decoding
-    LearnedRange,                                                                      // what has no name yet
+    LearnedRange, LearnedSmear,                                                        // what has no name yet
     LowAmplitudeFilter, FlyingPixelFilter, EdgeFilter, MedianFilter, BilateralFilter,
     TemporalFilter>;  // filters
 

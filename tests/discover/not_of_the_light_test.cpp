@@ -60,7 +60,7 @@ TEST(SmearedRanges, AreSharesOfNeighbours) {
 }
 
 /// A firmware that takes a quarter of each dim pixel's left neighbour: a shift of a quarter of a pixel where it is dim, and
-/// none where it is not.
+/// none where it is not. (As two filters, one for all pixels and one that takes it off bright ones, it was worse than none.)
 TEST_F(Searched, RangesThatComeFromNeighboursAreTold) {
   simulate("", [](sim::RangeImage& image, const Moment&, const CameraInfo&, std::uint64_t) {
     const Image<float> as_read = image.range_m;
@@ -71,6 +71,11 @@ TEST_F(Searched, RangesThatComeFromNeighboursAreTold) {
   const CampaignFinding finding = search(job());
   ASSERT_FALSE(finding.effects.empty()) << verdictOf(finding);
   EXPECT_THAT(verdictOf(finding), HasSubstr("ranges from neighbours"));
+  const auto model = sim::SensorModel::parse(finding.model_toml, "model.toml");
+  ASSERT_TRUE(model) << model.error().message;
+  EXPECT_THAT(model->effectNames(), testing::Contains("learned_smear"));
+  ASSERT_TRUE(finding.judgement);
+  EXPECT_GT(finding.judgement->removed, 0.7) << verdictOf(finding);
 }
 
 /// One pixel in four is at the brightest, two are far below an eighth of it; half of a turn apart from what is dark.

@@ -140,6 +140,34 @@ TEST(LearnedRange, SaysWhatIsWrongWithItsTable) {
               testing::HasSubstr("and_over without and_knots"));
 }
 
+/// r = x² + 3y at 1000 and 3000 electrons between knots of 0 and 4000: a quarter and three quarters of the way.
+TEST(LearnedSmear, TakesItsSharesOfNeighboursByTheAmplitude) {
+  const LearnedSmear smear{.amplitudes_e = {0.0, 4000.0},
+                           .across_percent = {10.0, 0.0},
+                           .along_percent = {0.0, 20.0},
+                           .around_percent = {0.0, 40.0}};
+  RangeImage before = imageOfRanges(4, 4, [](int x, int y) { return x * x + 3.0 * y; });
+  for (float& amplitude : before.amplitude.pixels()) amplitude = 1000.0F;
+  before.amplitude(2, 2) = 3000.0F;
+  const RangeImage after = applied(smear, before);
+  // At (1, 1): ½(0 − 4) across, ½(0 − 6) along; the mean of x² over the eight is (3·0 + 2·1 + 3·4)/8, that of 3y is 3.
+  EXPECT_NEAR(after.range_m(1, 1), 4.0 + 0.075 * -2.0 + 0.05 * -3.0 + 0.1 * (14.0 / 8.0 - 1.0), 1e-6);
+  // At (2, 2): ½(1 − 9), −3, and (3·1 + 2·4 + 3·9)/8 − 4.
+  EXPECT_NEAR(after.range_m(2, 2), 10.0 + 0.025 * -4.0 + 0.15 * -3.0 + 0.3 * (38.0 / 8.0 - 4.0), 1e-6);
+  EXPECT_EQ(after.range_m(0, 1), before.range_m(0, 1)) << "at the image's edge nothing is done";
+  RangeImage holed = before;
+  holed.range_m(1, 2) = kNaN;
+  EXPECT_EQ(applied(smear, holed).range_m(1, 1), before.range_m(1, 1)) << "nor beside what has no range";
+}
+
+TEST(LearnedSmear, SaysWhatIsWrongWithItsShares) {
+  const std::string effect = "[[effect]]\ntype = 'learned_smear'\n";
+  EXPECT_EQ(errorOf(plainCamera(4, 2, 0.5, effect)), "");
+  EXPECT_THAT(errorOf(plainCamera(4, 2, 0.5, effect + "amplitudes_e = [2, 1]\n")), testing::HasSubstr("amplitudes_e must ascend"));
+  EXPECT_THAT(errorOf(plainCamera(4, 2, 0.5, effect + "along_percent = [1]\n")),
+              testing::HasSubstr("along_percent must have as many numbers as amplitudes_e, 2"));
+}
+
 TEST(LowAmplitudeFilter, RejectsWhatIsBelowItsMinimumAndSaysWhy) {
   RangeImage image = imageOfRanges(3, 1, [](int, int) { return 2.0; });
   image.amplitude[0] = 299.0F, image.amplitude[1] = 300.0F, image.amplitude[2] = kNaN;

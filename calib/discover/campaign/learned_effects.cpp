@@ -15,6 +15,7 @@
 #include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/model_file.h"
 #include "calib/discover/campaign/repeating_columns.h"
+#include "calib/discover/campaign/smeared_ranges.h"
 
 namespace toftwin::discover {
 namespace {
@@ -271,6 +272,12 @@ std::vector<LearnedEffect> learnedEffectsOf(const Effect& effect, const Campaign
     if (const auto kernel = kernelOf<sim::LearnedMirror>(along, model.camera(), reachOfMirrored))
       learned.push_back(*kernel);
   }
+  // Together: what one adds to all pixels and another takes off bright ones would be two filters, one after the other.
+  std::vector<std::pair<Term, double>> terms;
+  for (const Along& along : all) terms.insert(terms.end(), along.terms.begin(), along.terms.end());
+  const CovariateInfo* amplitude = infoNamed(covariates, "amplitude_e");
+  if (auto smear = smearOf(terms, amplitude == nullptr ? std::vector{0.0} : tableKnotsOf(*amplitude, 24)))
+    learned.push_back(*std::move(smear));
   for (const Along& along : all)
     if (auto columns = columnsOf(along.terms)) learned.push_back(*std::move(columns));
   for (const Along& along : all)

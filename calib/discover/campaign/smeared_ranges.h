@@ -2,11 +2,14 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
+#include "calib/discover/campaign/model_file.h"
 #include "calib/discover/campaign/reading.h"
 #include "calib/discover/term.h"
 
@@ -22,5 +25,9 @@ std::map<std::string, Reading> smearedCarriers(const Reading& declared);
 
 /// Smears of all pixels, and such as go with the amplitude, since filters are for what is dim.
 std::vector<TermGroup> smearedGroups(std::span<const CovariateInfo> covariates);
+
+/// The simulator's form of such terms with their coefficients, at these amplitudes; nothing where there are none.
+std::optional<LearnedEffect> smearOf(std::span<const std::pair<Term, double>> terms,
+                                     const std::vector<double>& amplitudes);
 
 }  // namespace toftwin::discover

@@ -210,6 +210,17 @@ void addImageFigures(std::map<std::string, Draw>& figures) {
         .panels = {{"farther out by 1 % of the radius", errorOf(effect("learned_shift"), light)},
                    {"farther in by 1 %", errorOf(effect("learned_shift", "outward_px = [0, -1]"), light)}}});
   };
+  figures["learned_smear"] = [] {
+    const Light light = boxBeforeWall();
+    const std::string all = "amplitudes_e = [0]\nalong_percent = [0]\n";
+    return standalone(Panels{
+        .label = "error of the range, mm",
+        .low = -80.0,
+        .high = 80.0,
+        .diverging = true,
+        .panels = {{"a tenth across", errorOf(effect("learned_smear", all + "across_percent = [10]\naround_percent = [0]"), light)},
+                   {"a tenth around", errorOf(effect("learned_smear", all + "across_percent = [0]\naround_percent = [10]"), light)}}});
+  };
   figures["learned_light"] = [] {
     const Light light = boxBeforeWall();
     return standalone(Panels{
