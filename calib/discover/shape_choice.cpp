@@ -346,14 +346,14 @@ bool isSimpler(const Explanation& one, const Explanation& other) {
   return one.gain.total > other.gain.total;
 }
 
-/// In place of a surface or a product over two covariates, the best that goes with one thing, if these data do not tell the
-/// two apart (two standard errors): two are asked for only where one does not do.
-std::size_t withFewerCovariates(const std::vector<Explanation>& all, const std::vector<std::size_t>& places,
+/// In place of a surface or a product over two covariates, the best of what light does by itself, such as raw exposures that
+/// differ, if these data do not tell the two apart (two standard errors).
+std::size_t orByItself(const std::vector<Explanation>& all, const std::vector<std::size_t>& places,
                                 std::size_t best) {
   if (all[best].covariates.size() != 2 || !all[best].carrier().empty()) return best;
   std::size_t simpler = best;
   for (const std::size_t i : places) {
-    if (all[i].is_catalogue || all[i].covariates.size() != 1) continue;
+    if (all[i].is_catalogue || all[i].covariates.size() != 1 || all[i].carrier().empty()) continue;
     if (all[best].gain.total - all[i].gain.total > 2.0 * difference(all[best].gain, all[i].gain).error) continue;
     if (simpler == best || all[i].gain.total > all[simpler].gain.total) simpler = i;
   }
@@ -378,7 +378,7 @@ std::optional<std::size_t> choose(const std::vector<Explanation>& all) {
     if (most - all[*catalogue].gain.total <= std::max(std::min(error, 0.25 * most), 0.03 * most))
       return catalogue;
   }
-  best = withFewerCovariates(all, places, *best);
+  best = orByItself(all, places, *best);
   // The best explanation decides on the covariates, simplicity on the shape. What a carrier does (a charge,
   // say) need not change with anything: if it explains as much without, or its simpler form does, it does not.
   std::size_t chosen = *best;
