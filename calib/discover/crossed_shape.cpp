@@ -21,8 +21,9 @@ bool canBeCrossed(const Context& context, const Explanation& one) {
 }
 
 bool isStrengthOf(const CovariateInfo& covariate) {
-  return covariate.nature != Nature::Category && covariate.nature != Nature::Index &&
-         covariate.nature != Nature::Rate && !covariate.quantiles.empty() && covariate.quantiles.back() > covariate.quantiles.front();
+  const auto& [nature, spread] = std::tie(covariate.nature, covariate.quantiles);
+  return nature != Nature::Category && nature != Nature::Index && nature != Nature::Rate && !spread.empty() &&
+         spread.back() > spread.front();
 }
 
 /// What one says more than the other, capture by capture.

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "calib/discover/campaign/pose_errors.h"
 #include "calib/discover/campaign/campaign_json.h"
 
 #include <ctime>
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
+
+#include "calib/discover/campaign/pose_errors.h"
 
 namespace toftwin::discover {
 namespace {
