@@ -2,7 +2,6 @@
 #include "calib/discover/crossed_shape.h"
 
 #include <algorithm>
-#include <cmath>
 #include <iterator>
 #include <tuple>
 
@@ -48,11 +47,11 @@ std::optional<std::size_t> crossedShape(const Context& context, std::vector<Expl
   const auto best = std::ranges::max_element(crossed, {}, [](const Explanation& e) { return e.gain.total; });
   if (best == crossed.end()) return std::nullopt;
   // What is as good uncrossed, within two standard errors, is told uncrossed. A curve, and what light does to first order,
-  // are right to some per cent; and the best of many is better than it is (see luckOfTheBestOf).
+  // are right to some per cent; and the best of many is better than it is.
   const bool is_formula = one.fitted.form.build != nullptr;
   const Gain more = beyond(best->gain, one.gain);
-  const double tried = static_cast<double>(crossed.size()), shape = (is_formula ? 0.02 : 0.05) * best->gain.total;
-  const double least = std::max({2.0 * difference(best->gain, one.gain).error, 2.0 * std::log(tried), shape});
+  const double shape = (is_formula ? 0.02 : 0.05) * best->gain.total;
+  const double least = std::max({2.0 * difference(best->gain, one.gain).error, luckOfTheBestOf(crossed.size()), shape});
   if (!holds(more) || more.total < least) return std::nullopt;
   // Of those that are not told from the best, the one with the fewest numbers.
   const auto isWorse = [&](const Explanation& e) {

@@ -14,12 +14,6 @@ namespace {
 /// Of what an effect explains: the light of a strong one's simulation is not known that well.
 constexpr double kHundredth = 0.01;
 
-/// The best of M explanations is better than it is by about 2 ln M in χ², by chance alone (D. P. Foster,
-/// E. I. George, Ann. Stat. 22 (1994) 1947). At least that of one number at two standard errors.
-double luckOfTheBestOf(std::size_t tried) {
-  return std::max(4.0, 2.0 * std::log(static_cast<double>(std::max<std::size_t>(1, tried))));
-}
-
 /// How many shapes were tried for it: every place of a step, every time constant.
 std::size_t triedFor(const Explanation& one) {
   if (one.is_catalogue) return 0;
@@ -103,6 +97,10 @@ bool saysMore(const Context& with, const Explanation& rival, const Explanation& 
 }
 
 }  // namespace
+
+double luckOfTheBestOf(std::size_t tried) {
+  return std::max(4.0, 2.0 * std::log(static_cast<double>(std::max<std::size_t>(1, tried))));
+}
 
 void fitCatalogue(const Context& context, std::vector<Explanation>& all) {
   // Columns explain about as much as the effect does, and more where they are freer than it.

@@ -85,6 +85,10 @@ std::vector<std::size_t> eligible(const std::vector<Explanation>& explanations);
 /// good. Gives its place; nothing when there are none.
 std::optional<std::size_t> choose(const std::vector<Explanation>& explanations);
 
+/// The best of M explanations is better than it is by about 2 ln M in χ², by chance alone (D. P. Foster,
+/// E. I. George, Ann. Stat. 22 (1994) 1947). At least that of one number at two standard errors.
+double luckOfTheBestOf(std::size_t tried);
+
 /// Where the source can fit its catalogue: those effects that could be worth it are fitted, the others go.
 void fitCatalogue(const Context& context, std::vector<Explanation>& explanations);
 /// An effect of the catalogue that was fitted, if one is to be named: it predicts other captures, no free

@@ -4,9 +4,7 @@
 
 #include <gmock/gmock.h>
 
-#include "calib/discover/candidates.h"
 #include "calib/discover/campaign/temperature_rates.h"
-#include "calib/discover/forms.h"
 #include "tests/discover/searched.h"
 
 namespace toftwin::discover {
@@ -15,48 +13,6 @@ namespace {
 using testing::AnyOf;
 using testing::Contains;
 using testing::HasSubstr;
-
-CovariateInfo spread(const std::string& name, const std::string& word, bool is_of_capture, double from, double to) {
-  CovariateInfo info{.name = name, .is_of_capture = is_of_capture, .word = word};
-  for (int i = 0; i <= 32; ++i) info.quantiles.push_back(from + (to - from) * i / 32.0);
-  return info;
-}
-
-std::vector<std::string> namesOf(const std::vector<TermGroup>& groups) {
-  std::vector<std::string> names;
-  for (const TermGroup& group : groups) names.push_back(group.name);
-  return names;
-}
-
-/// However many states a camera has, a place of the image and what is seen there have room.
-TEST(Pairs, OfAPlaceAndASignalAreLookedForBesideThoseOfStates) {
-  std::vector<CovariateInfo> covariates{spread("range_m", "range", false, 1.0, 3.0),
-                                        spread("radius_px", "position", false, 0.0, 20.0)};
-  for (int i = 0; i < 40; ++i) covariates.push_back(spread(fmt::format("state {}", i), "", true, 1.0, 2.0));
-  EXPECT_THAT(namesOf(genericCandidates(covariates, {.captures = 40})), Contains("smooth in range_m and radius_px"));
-}
-
-/// x² crossed with a temperature of 23 °C and more: T x² and x², whose zero nobody knows.
-TEST(CrossedForms, KeepTheirOwnWhereZeroIsNotNothing) {
-  const CovariateInfo radius = spread("radius_px", "position", false, 0.1, 20.0);
-  CovariateInfo temperature = spread("temperature_sensor_c", "temperature", true, 23.0, 35.0);
-  temperature.unit = "c";
-  for (Form& form : formsIn(radius)) {
-    if (form.name != "radius_px^2") continue;
-    FittedForm square{.form = form, .group = built(form, {})};
-    const std::vector<FittedForm> crossed = crossedWith(square, temperature);
-    ASSERT_FALSE(crossed.empty());
-    const FittedForm& last = crossed.back();
-    EXPECT_EQ(last.group.name, "radius_px^2 · temperature_sensor_c + radius_px^2");
-    ASSERT_EQ(last.group.terms.size(), 2U);
-    const auto at = [](const std::string& name) { return name == "radius_px" ? 3.0 : 30.0; };
-    EXPECT_DOUBLE_EQ(last.group.terms[0].at(at), 270.0);
-    EXPECT_DOUBLE_EQ(last.group.terms[1].at(at), 9.0);
-    EXPECT_EQ(built(last.form, {}).terms.size(), 2U) << "also when it is built anew";
-    return;
-  }
-  FAIL() << "no square among the forms";
-}
 
 /// A warm lens: late by temperature times the square of the radius.
 TEST_F(Searched, WhatGrowsWithTwoThingsGoesWithBoth) {

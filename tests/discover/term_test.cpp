@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include <fmt/format.h>
+
 #include "calib/discover/candidates.h"
 #include "calib/discover/forms.h"
 #include "calib/discover/term.h"
@@ -79,9 +81,11 @@ CovariateInfo spread(const std::string& name, double low, double high) {
   return x;
 }
 
-std::vector<std::string> namesOf(const std::vector<Form>& forms) {
+/// Of forms, or of groups.
+template <class Named>
+std::vector<std::string> namesOf(const std::vector<Named>& all) {
   std::vector<std::string> names;
-  for (const Form& form : forms) names.push_back(form.name);
+  for (const Named& one : all) names.push_back(one.name);
   return names;
 }
 
@@ -129,6 +133,40 @@ TEST(Candidates, OfFewCapturesHoldPairsOfThreeColumnsWhereTheyAreWanted) {
   EXPECT_THAT(pairsWith(24, false), testing::IsEmpty());
   EXPECT_THAT(pairsWith(60, true), testing::ElementsAre(3, 15));
   EXPECT_THAT(pairsWith(60, false), testing::ElementsAre(15));
+}
+
+/// However many states a camera has, a place of the image and what is seen there have room.
+TEST(Pairs, OfAPlaceAndASignalAreLookedForBesideThoseOfStates) {
+  std::vector<CovariateInfo> covariates{spread("range_m", 1.0, 3.0), spread("radius_px", 0.0, 20.0)};
+  covariates[0].word = "range", covariates[1].word = "position";
+  for (int i = 0; i < 40; ++i) {
+    covariates.push_back(spread(fmt::format("state {}", i), 1.0, 2.0));
+    covariates.back().is_of_capture = true;
+  }
+  EXPECT_THAT(namesOf(genericCandidates(covariates, {.captures = 40})),
+              testing::Contains("smooth in range_m and radius_px"));
+}
+
+/// x² crossed with a temperature of 23 °C and more: T x² and x², whose zero nobody knows.
+TEST(CrossedForms, KeepTheirOwnWhereZeroIsNotNothing) {
+  const CovariateInfo radius = spread("radius_px", 0.1, 20.0);
+  CovariateInfo temperature = spread("temperature_sensor_c", 23.0, 35.0);
+  temperature.unit = "c";
+  for (Form& form : formsIn(radius)) {
+    if (form.name != "radius_px^2") continue;
+    FittedForm square{.form = form, .group = built(form, {})};
+    const std::vector<FittedForm> crossed = crossedWith(square, temperature);
+    ASSERT_FALSE(crossed.empty());
+    const FittedForm& last = crossed.back();
+    EXPECT_EQ(last.group.name, "radius_px^2 · temperature_sensor_c + radius_px^2");
+    ASSERT_EQ(last.group.terms.size(), 2U);
+    const auto at = [](const std::string& name) { return name == "radius_px" ? 3.0 : 30.0; };
+    EXPECT_DOUBLE_EQ(last.group.terms[0].at(at), 270.0);
+    EXPECT_DOUBLE_EQ(last.group.terms[1].at(at), 9.0);
+    EXPECT_EQ(built(last.form, {}).terms.size(), 2U) << "also when it is built anew";
+    return;
+  }
+  FAIL() << "no square among the forms";
 }
 
 }  // namespace

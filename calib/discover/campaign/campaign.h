@@ -103,8 +103,8 @@ struct Campaign {
   std::optional<FrameClass> without{};        ///< frames that were not read
 };
 
-/// Reads the open captures, without frames of the class where two others stay. Errors name capture and file: no run, one that is damaged, without
-/// poses, without repeats, without ranges.
+/// Reads the open captures, without frames of the class where two others stay. Errors name capture and file: no run,
+/// one that is damaged, without poses, without repeats, without ranges.
 Result<Campaign> readCampaign(const std::filesystem::path& folder, Side side,
                               const std::optional<FrameClass>& without = {});
 /// Reads a recording that no plan was behind: frames of one pose, exposure and ambient light after each other are a

@@ -30,8 +30,7 @@ Phasors phasorOf(const Reading& reading, double period_m) {
   return z;
 }
 
-Phasors shareOf(const Phasors& z,
-                                const std::function<std::complex<float>(std::size_t)>& change) {
+Phasors shareOf(const Phasors& z, const std::function<std::complex<float>(std::size_t)>& change) {
   Phasors share(z.width(), z.height());
   for (std::size_t i = 0; i < z.size(); ++i) {
     const std::complex<float> of = change(i) / z[i];

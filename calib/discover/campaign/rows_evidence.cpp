@@ -348,10 +348,11 @@ std::string CampaignRows::wordOfCarrier(const std::string& carrier) const {
 }
 
 std::vector<TermGroup> CampaignRows::ownGroups() const {
-  std::vector<TermGroup> groups = carrierGroups(covariates(), has_delay_);
+  const std::vector<CovariateInfo> infos = covariates();
+  std::vector<TermGroup> groups = carrierGroups(infos, has_delay_);
   if (!rows_.empty() && rows_.front().fixed->cells.grid().cell_width == 1)
-    for (TermGroup& group : repeatingColumns(covariates())) groups.push_back(std::move(group));
-  for (TermGroup& group : smearedGroups(covariates())) groups.push_back(std::move(group));
+    for (TermGroup& group : repeatingColumns(infos)) groups.push_back(std::move(group));
+  for (TermGroup& group : smearedGroups(infos)) groups.push_back(std::move(group));
   groups.push_back(spilledGroup());
   for (TermGroup& group : poseGroups()) groups.push_back(std::move(group));
   for (TermGroup& group : unequalGroups(unequal_)) groups.push_back(std::move(group));
