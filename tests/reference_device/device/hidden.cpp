@@ -10,13 +10,15 @@ namespace toftwin::reference {
 std::span<const Row> allHidden() {
   // One line per effect, in the order of docs/reference-device.md.
   static const std::array rows{
-      exposureDelay(),      frameParity(), incidenceDelay(), temperatureRate(),
-      ambientRange(),       columnDelay(), thermalLens(),    dust(),
-      overexposedScatter(), supplySag(),   firmwareFilter(), tableSteps(),
-      interferenceBurst(),  halfStep(),    albedoDelay(),    amplitudeStep(),
-      radiusWiggle(),       lampFlicker(), exposureWindow(), railScale(),
-      rayOffset(),          warmUp(),      clockScale(),     scatter(),
-      tapOffset(),
+      exposureDelay(),      frameParity(),    incidenceDelay(),    temperatureRate(),
+      ambientRange(),       columnDelay(),    thermalLens(),       dust(),
+      overexposedScatter(), supplySag(),      firmwareFilter(),    tableSteps(),
+      interferenceBurst(),  halfStep(),       albedoDelay(),       amplitudeStep(),
+      radiusWiggle(),       lampFlicker(),    exposureWindow(),    railScale(),
+      rayOffset(),          warmUp(),         clockScale(),        scatter(),
+      tapOffset(),          spreadSpectrum(), coarseThermometer(), rollingStart(),
+      supplyBeat(),         rowCrosstalk(),   resetGlow(),         modeHop(),
+      glossyPaint(),
   };
   return rows;
 }
@@ -25,7 +27,8 @@ std::string documentHidden() {
   const auto wordOf = [](Stage stage) {
     return stage == Stage::Light ? "light" : stage == Stage::Samples ? "samples" : "range";
   };
-  std::string text = "| effect | what it does | acts on | strength | goes with |\n| --- | --- | --- | --- | --- |\n";
+  std::string text =
+      "| effect | what it does | acts on | strength | goes with |\n| --- | --- | --- | --- | --- |\n";
   for (const auto& [about, read] : allHidden()) {
     text += "| `" + std::string{about.name} + "` | " + std::string{about.summary};
     if (!about.catalogue.empty()) text += " (the catalogue's `" + std::string{about.catalogue} + "`)";

@@ -33,6 +33,14 @@ Row warmUp();
 Row clockScale();
 Row scatter();
 Row tapOffset();
+Row spreadSpectrum();
+Row coarseThermometer();
+Row rollingStart();
+Row supplyBeat();
+Row rowCrosstalk();
+Row resetGlow();
+Row modeHop();
+Row glossyPaint();
 
 /// Of a pixel's distance from the image's middle, 1 in the corners.
 inline double squareOfRadius(const Light& light, std::size_t pixel) {
