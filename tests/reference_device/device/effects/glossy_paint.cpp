@@ -31,7 +31,8 @@ struct GlossyPaint final : Hidden {
 Row glossyPaint() {
   return rowOf<GlossyPaint>(
       {.name = "glossy_paint",
-       .summary = "the boards shine where they are seen straight on: an error of the scene's, not of the camera",
+       .summary =
+           "the boards shine where they are seen straight on: an error of the scene's, not of the camera",
        .stage = Stage::Light,
        .unit = "share more, seen straight on",
        .covariates = "incidence [position, neighbours]",

@@ -16,8 +16,8 @@ struct ResetGlow final : Hidden {
   void onSamples(Charges& charges, const Light& light, const Circumstances&) const override {
     const auto width = static_cast<std::size_t>(light.width), height = static_cast<std::size_t>(light.height);
     for (std::size_t i = 0; i < light.pixels(); ++i) {
-      const double away = std::hypot(static_cast<double>(width - 1 - i % width),
-                                     static_cast<double>(height - 1 - i / width));
+      const double away =
+          std::hypot(static_cast<double>(width - 1 - i % width), static_cast<double>(height - 1 - i / width));
       const double charge = strength * std::exp(-away / (reach * light.width));
       for (std::size_t f = 0; f < charges.frequencies; ++f) charges.tap(f, 0, 0, i) += charge;
     }

@@ -25,7 +25,8 @@ struct RollingStart final : Hidden {
 Row rollingStart() {
   return rowOf<RollingStart>(
       {.name = "rolling_start",
-       .summary = "rows open one after the other, the first ones before the light is on: they miss a time of it",
+       .summary =
+           "rows open one after the other, the first ones before the light is on: they miss a time of it",
        .stage = Stage::Light,
        .unit = "share that the first row loses at 1 ms",
        .covariates = "position, exposure",

@@ -18,7 +18,8 @@ struct SpreadSpectrum final : Hidden {
       for (std::size_t n = 1; n <= light.harmonics; ++n) {
         for (std::size_t i = 0; i < light.pixels(); ++i) {
           if (std::isnan(light.range_m[i])) continue;
-          light.phasor(f, n, i) *= std::exp(-strength * std::pow(static_cast<double>(n) * light.range_m[i], 2));
+          light.phasor(f, n, i) *=
+              std::exp(-strength * std::pow(static_cast<double>(n) * light.range_m[i], 2));
         }
       }
     }
