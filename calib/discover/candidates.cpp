@@ -88,8 +88,6 @@ bool varies(const CovariateInfo& covariate) {
              : !covariate.quantiles.empty() && covariate.quantiles.back() > covariate.quantiles.front();
 }
 
-bool isByItself(const CovariateInfo& x) { return x.nature == Nature::Index || x.nature == Nature::Rate; }
-
 /// A place of the image with what a pixel sees there: what a lens or the camera's sides change.
 bool isPlaceAndSignal(const CovariateInfo& a, const CovariateInfo& b) {
   const auto isSignal = [](const CovariateInfo& x) { return x.word == "range" || x.word == "amplitude"; };
@@ -120,6 +118,10 @@ std::vector<std::pair<std::size_t, std::size_t>> pairsOf(std::span<const Covaria
 }
 
 }  // namespace
+
+bool isByItself(const CovariateInfo& covariate) {
+  return covariate.nature == Nature::Index || covariate.nature == Nature::Rate || covariate.nature == Nature::Share;
+}
 
 std::vector<Term> products(const std::vector<Term>& a, const std::vector<Term>& b) {
   std::vector<Term> all;

@@ -19,6 +19,9 @@ struct CandidateOptions {
   bool has_straight_pairs = false;
 };
 
+/// Whether nothing is looked for that acts together with it, nor waves along it.
+bool isByItself(const CovariateInfo& covariate);
+
 /// For each covariate: a smooth function of it; waves of 1 to 20 periods over its spread; for a count of
 /// frames, even and odd; for names, each its own value. For each pair: a smooth surface.
 std::vector<TermGroup> genericCandidates(std::span<const CovariateInfo> covariates,

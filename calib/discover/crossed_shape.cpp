@@ -5,6 +5,8 @@
 #include <iterator>
 #include <tuple>
 
+#include "calib/discover/candidates.h"
+
 namespace toftwin::discover {
 namespace {
 
@@ -15,13 +17,17 @@ bool canBeCrossed(const Context& context, const Explanation& one) {
   if (one.is_catalogue || one.fitted.group.terms.size() > kMostTerms) return false;
   const auto known = std::ranges::count_if(
       one.covariates, [&](const std::string& name) { return infoOf(context, name) != nullptr; });
-  return known == 1 && std::ranges::all_of(one.fitted.group.terms,
+  const bool has_share = std::ranges::any_of(one.covariates, [&](const std::string& name) {
+    const CovariateInfo* info = infoOf(context, name);
+    return info != nullptr && info->nature == Nature::Share;
+  });
+  return known == 1 && !has_share && std::ranges::all_of(one.fitted.group.terms,
                                            [](const Term& term) { return term.factors.size() == 1; });
 }
 
 bool isStrengthOf(const CovariateInfo& covariate) {
-  const auto& [nature, spread] = std::tie(covariate.nature, covariate.quantiles);
-  return nature != Nature::Category && nature != Nature::Index && nature != Nature::Rate && !spread.empty() &&
+  const auto& spread = covariate.quantiles;
+  return covariate.nature != Nature::Category && !isByItself(covariate) && !spread.empty() &&
          spread.back() > spread.front();
 }
 
@@ -31,6 +37,33 @@ Gain beyond(const Gain& more, const Gain& less) {
   for (std::size_t c = 0; c < more.by_capture.size(); ++c)
     by.by_capture.push_back(more.by_capture[c] - less.by_capture[c]);
   return by;
+}
+
+/// The curve, and one over the other covariate of the product added to it.
+FittedForm sumOf(const Context& context, const FittedForm& one, const Explanation& product) {
+  constexpr std::size_t kKnots = 7;
+  const TermGroup own = one.group;
+  FittedForm sum;
+  sum.group = own;
+  sum.group.name = own.name + " plus another";
+  const auto known = covariatesOf(own);
+  for (const std::string& name : product.covariates) {
+    const CovariateInfo* other = std::ranges::count(known, name) > 0 ? nullptr : infoOf(context, name);
+    if (other == nullptr) continue;
+    for (Term& term : smoothIn(*other, kKnots).terms) {
+      term.stage = own.terms.front().stage, term.carrier = own.terms.front().carrier;
+      sum.group.terms.push_back(std::move(term));
+    }
+  }
+  return sum;
+}
+
+/// As of all pairs: what two things explain each by itself is no product.
+bool beatsTheSum(const Context& context, const FittedForm& one, const Explanation& product) {
+  const auto sums = judged(context, {sumOf(context, one, product)});
+  if (sums.empty()) return true;
+  const Gain &both = product.gain, &sum = sums.front().gain;
+  return both.total - sum.total >= std::max(2.5 * difference(both, sum).error, 0.05 * both.total);
 }
 
 }  // namespace
@@ -48,18 +81,21 @@ std::optional<std::size_t> crossedShape(const Context& context, std::vector<Expl
   if (best == crossed.end()) return std::nullopt;
   // What is as good uncrossed, within two standard errors, is told uncrossed. A curve, and what light does to first order,
   // are right to some per cent; and the best of many is better than it is.
-  const bool is_formula = one.fitted.form.build != nullptr;
-  const Gain more = beyond(best->gain, one.gain);
-  const double shape = (is_formula ? 0.02 : 0.05) * best->gain.total;
-  const double least = std::max({2.0 * difference(best->gain, one.gain).error, luckOfTheBestOf(crossed.size()), shape});
-  if (!holds(more) || more.total < least) return std::nullopt;
+  const double shape = (one.fitted.form.build != nullptr ? 0.02 : 0.05) * best->gain.total;
+  const double luck = luckOfTheBestOf(crossed.size());
+  const auto isMore = [&](const Explanation& e) {
+    const Gain more = beyond(e.gain, one.gain);
+    return holds(more) && more.total >= std::max({2.0 * difference(e.gain, one.gain).error, luck, shape});
+  };
+  if (!isMore(*best)) return std::nullopt;
   // Of those that are not told from the best, the one with the fewest numbers.
   const auto isWorse = [&](const Explanation& e) {
-    return best->gain.total - e.gain.total > difference(best->gain, e.gain).error;
+    return !isMore(e) || best->gain.total - e.gain.total > difference(best->gain, e.gain).error;
   };
   const auto simplest = std::ranges::min_element(crossed, {}, [&](const Explanation& e) {
     return std::tuple{isWorse(e), e.numbers, -e.gain.total};
   });
+  if (!beatsTheSum(context, one.fitted, *simplest)) return std::nullopt;
   const std::size_t place = all.size() + static_cast<std::size_t>(simplest - crossed.begin());
   all.insert(all.end(), std::make_move_iterator(crossed.begin()), std::make_move_iterator(crossed.end()));
   return place;

@@ -85,7 +85,10 @@ void revise(Found& found) {
     const auto chosen = chosenOf(without, explanations);
     if (!chosen) continue;
     const Explanation& now = explanations[*chosen];
-    if (now.is_catalogue ? !now.named : now.covariates != effect.covariates) continue;
+    // Of a table it may turn out to go with something else: what it was found by stood in for an effect not known yet.
+    const bool may_move = found.context.original->named() == nullptr &&
+                          std::ranges::find(others, now.covariates, &Effect::covariates) == others.end();
+    if (now.is_catalogue ? !now.named : now.covariates != effect.covariates && !may_move) continue;
     Effect again = effectOf(without, explanations, *chosen);
     settle(found, again);
     again.p = effect.p;

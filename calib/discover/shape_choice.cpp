@@ -346,10 +346,9 @@ bool isSimpler(const Explanation& one, const Explanation& other) {
   return one.gain.total > other.gain.total;
 }
 
-/// In place of a surface or a product over two covariates, the best of what light does by itself, such as raw exposures that
-/// differ, if these data do not tell the two apart (two standard errors).
-std::size_t orByItself(const std::vector<Explanation>& all, const std::vector<std::size_t>& places,
-                                std::size_t best) {
+/// In place of a surface or a product over two covariates, the best of what light does by itself, such as raw
+/// exposures that differ, if these data do not tell the two apart (two standard errors).
+std::size_t orByItself(const std::vector<Explanation>& all, const std::vector<std::size_t>& places, std::size_t best) {
   if (all[best].covariates.size() != 2 || !all[best].carrier().empty()) return best;
   std::size_t simpler = best;
   for (const std::size_t i : places) {

@@ -77,6 +77,7 @@ enum class Nature {
   Angle,     ///< tan² and 1/cos − 1 are looked for
   Index,     ///< counts frames: even and odd
   Rate,      ///< how fast something else changes: what goes with it goes straight
+  Share,     ///< of light, as multipath: no waves are looked for along it, and nothing that acts together with it
   Category   ///< names without order
 };
 

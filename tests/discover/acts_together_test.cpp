@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Covariates that act together, and how fast one changes.
+#include <algorithm>
 #include <cmath>
 
 #include <gmock/gmock.h>
@@ -33,6 +34,37 @@ TEST_F(Searched, WhatGrowsWithTwoThingsGoesWithBoth) {
   EXPECT_THAT(covariates,
               Contains(AnyOf("temperature_sensor_c", "temperature_illumination_c", "time_s")))
       << verdictOf(finding);
+}
+
+/// One error over the radius, another over the columns: neither grows with the other.
+TEST_F(Searched, WhatTwoThingsDoEachByItselfIsNoProduct) {
+  simulate("", [](sim::RangeImage& image, const Moment&, const CameraInfo& camera, std::uint64_t) {
+    for (int y = 0; y < image.range_m.height(); ++y)
+      for (int x = 0; x < image.range_m.width(); ++x) {
+        const double radius = std::hypot(x - camera.cx, y - camera.cy) / 15.0, right = (x - camera.cx) / 15.0;
+        image.range_m(x, y) += static_cast<float>(8e-3 * radius * radius + 4e-3 * (right + 1.0));
+      }
+  });
+  const CampaignFinding finding = search(job());
+  ASSERT_GE(finding.effects.size(), 1U) << verdictOf(finding);
+  for (const FoundEffect& one : finding.effects) {
+    const auto& covariates = one.found.covariates;
+    const bool has_both = std::ranges::count(covariates, "radius_px") > 0 && std::ranges::count(covariates, "column") > 0;
+    EXPECT_FALSE(has_both) << one.found.name;
+  }
+  ASSERT_TRUE(finding.judgement);
+  EXPECT_GT(finding.judgement->removed, 0.9) << verdictOf(finding);
+}
+
+/// A camera that was switched off is at the same times as warm as it was, or as it is: two curves, not one.
+TEST(TemperatureRates, AreOfOnePowerCycle) {
+  std::vector<MeasuredCapture> captures(20);
+  for (std::size_t c = 0; c < captures.size(); ++c) {
+    const double t = 60.0 * static_cast<double>(c % 10), first_c = c < 10 ? 24.0 : 31.0;
+    captures[c].moment.since_power_on = t * second;
+    captures[c].moment.temperatures = {{"sensor", (first_c + t / 60.0 * 0.5) * celsius}};
+  }
+  for (const auto& rates : temperatureRates(captures)) EXPECT_NEAR(rates.at(0).c_per_min, 0.5, 1e-9);
 }
 
 /// Cooling and warming by one exponential: at any time the slope is that of the curve, whatever the captures' spacing; the

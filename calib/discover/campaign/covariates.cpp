@@ -94,7 +94,7 @@ constexpr std::array kKnownCovariates{
     KnownCovariate{"range_m", "range", "m", Nature::Distance, Stage::Range},
     KnownCovariate{"amplitude_e", "amplitude", "e", Nature::Plain, Stage::Range},
     KnownCovariate{"albedo", "albedo", "", Nature::Plain, Stage::Range},
-    KnownCovariate{"multipath", "multipath", "", Nature::Plain, Stage::Range},
+    KnownCovariate{"multipath", "multipath", "", Nature::Share, Stage::Range},
     KnownCovariate{"column", "position", "px", Nature::Plain, Stage::Range},
     KnownCovariate{"row", "position", "px", Nature::Plain, Stage::Range},
     KnownCovariate{"radius_px", "position", "px", Nature::Plain, Stage::Range},

@@ -35,21 +35,36 @@ double slopeAt(std::vector<TimedReading> readings, double time_s) {
   return count < kFewest || solved.rank() < 3 ? kNaN : solved.solve(degrees)[1];
 }
 
+/// In the order of the captures: the camera was switched off wherever the time since it was switched on falls.
+std::vector<int> powerCyclesOf(const std::vector<MeasuredCapture>& captures) {
+  std::vector<int> cycles;
+  double last_s = -1.0;
+  for (const MeasuredCapture& capture : captures) {
+    const auto& since = capture.moment.since_power_on;
+    const double time_s = since ? since->in(second) : last_s;
+    cycles.push_back((cycles.empty() ? 0 : cycles.back()) + (time_s < last_s ? 1 : 0));
+    last_s = time_s;
+  }
+  return cycles;
+}
+
 }  // namespace
 
 std::vector<std::vector<TemperatureRate>> temperatureRates(const std::vector<MeasuredCapture>& captures) {
-  std::map<std::string, std::vector<TimedReading>> of_place;
-  for (const MeasuredCapture& capture : captures) {
-    if (!capture.moment.since_power_on) continue;
-    for (const NamedTemperature& one : capture.moment.temperatures)
-      if (one.where != "room")
-        of_place[one.where].push_back({capture.moment.since_power_on->in(second), one.value.in(celsius)});
+  const std::vector<int> cycles = powerCyclesOf(captures);
+  std::map<std::string, std::map<int, std::vector<TimedReading>>> of_place;
+  for (std::size_t c = 0; c < captures.size(); ++c) {
+    const auto& since = captures[c].moment.since_power_on;
+    for (const NamedTemperature& one : captures[c].moment.temperatures)
+      if (since && one.where != "room")
+        of_place[one.where][cycles[c]].push_back({since->in(second), one.value.in(celsius)});
   }
   std::vector<std::vector<TemperatureRate>> all(captures.size());
   for (std::size_t c = 0; c < captures.size(); ++c) {
     const auto& since = captures[c].moment.since_power_on;
-    for (const auto& [where, readings] : of_place)
-      all[c].push_back({fmt::format("{}{}", kRatePrefix, where), since ? slopeAt(readings, since->in(second)) : kNaN});
+    for (auto& [where, of_cycle] : of_place)
+      all[c].push_back({fmt::format("{}{}", kRatePrefix, where),
+                        since ? slopeAt(of_cycle[cycles[c]], since->in(second)) : kNaN});
   }
   return all;
 }
