@@ -252,18 +252,29 @@ std::optional<sim::AnyEffect> shiftOf(const Along& along, std::span<const Covari
   return shift;
 }
 
+/// The tables of all covariates that its terms go with. One part of a sum says nothing without the others: all or none.
+std::vector<LearnedEffect> tablesOf(const std::vector<Along>& all, const CampaignRows& rows, bool has_phasors) {
+  std::vector<LearnedEffect> tables;
+  const std::vector<CovariateInfo> covariates = rows.covariates();
+  for (const Along& along : all) {
+    const bool is_of_range = std::ranges::any_of(
+        along.terms, [](const auto& one) { return movesRange(one.first) || changesGain(one.first); });
+    if (along.covariates.empty() || !is_of_range) continue;
+    auto table = tableOf(along, covariates, has_phasors);
+    if (!table) table = tableOverTime(along, rows);
+    if (!table) return {};
+    tables.push_back({*std::move(table)});
+  }
+  return tables;
+}
+
 }  // namespace
 
 std::vector<LearnedEffect> learnedEffectsOf(const Effect& effect, const CampaignRows& rows,
                                             const sim::SensorModel& model) {
-  std::vector<LearnedEffect> learned;
   const std::vector<CovariateInfo> covariates = rows.covariates();
   const std::vector<Along> all = alongOf(effect);
-  for (const Along& along : all) {
-    auto table = tableOf(along, covariates, model.hasPhasors());
-    if (!table) table = tableOverTime(along, rows);
-    if (table) learned.push_back({*std::move(table)});
-  }
+  std::vector<LearnedEffect> learned = tablesOf(all, rows, model.hasPhasors());
   for (const Along& along : all)
     if (const auto shift = shiftOf(along, covariates)) learned.push_back({*shift});
   for (const Along& along : all) {

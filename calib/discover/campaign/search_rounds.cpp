@@ -9,6 +9,7 @@
 #include "calib/discover/campaign/model_file.h"
 #include "calib/discover/campaign/raw_witness.h"
 #include "calib/discover/campaign/tell_stages.h"
+#include "calib/discover/estimate.h"
 #include "calib/discover/marginal.h"
 
 namespace toftwin::discover {
@@ -105,6 +106,14 @@ void putForms(const Round& round, WithFound& inserted, std::vector<FoundEffect>&
   }
 }
 
+/// What the simulator has no form for, as a rig's error: it would else come out of all numbers beside it.
+std::vector<TermGroup> formless(const std::vector<FoundEffect>& effects) {
+  std::vector<Effect> without;
+  for (const FoundEffect& one : effects)
+    if (!one.found.is_catalogue && !one.fitted) without.push_back(one.found);
+  return groupsOf(without);
+}
+
 /// What was fitted, to where it belongs: in the order in which it was inserted.
 void takeFitted(const std::vector<std::optional<std::size_t>>& updated, Round& round) {
   std::vector<FittedEffect*> forms;
@@ -166,8 +175,10 @@ Result<> fitFound(const Declared& file, const CampaignRows* file_rows, const Ope
   const bool has_mirror = std::ranges::any_of(inserted.fitted, [&](std::size_t place) {
     return std::holds_alternative<sim::LearnedMirror>(inserted.effects[place]);
   });
+  const std::vector<TermGroup> beside = formless(round.effects);
   auto refitted = refit(*round.rows, inserted.effects, inserted.fitted,
                         {.scales = round.finding.scales,
+                         .terms = beside,
                          .looks_farther = has_mirror,
                          .of_file = wrong.size(),
                          .only = inserted.only});

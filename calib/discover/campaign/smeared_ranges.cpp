@@ -60,7 +60,11 @@ std::vector<TermGroup> smearedGroups(std::span<const CovariateInfo> covariates) 
 std::optional<LearnedEffect> smearOf(std::span<const std::pair<Term, double>> terms,
                                      const std::vector<double>& amplitudes) {
   const auto isSmear = [](const auto& one) { return one.first.carrier.starts_with(kSmearedCarrier); };
+  // It is one by amplitude; what goes with something else, too, it has no number for.
+  const auto isByAmplitude = [](const Factor& factor) { return factor.covariate == "amplitude_e"; };
   if (std::ranges::none_of(terms, isSmear)) return std::nullopt;
+  for (const auto& one : terms)
+    if (isSmear(one) && !std::ranges::all_of(one.first.factors, isByAmplitude)) return std::nullopt;
   sim::LearnedSmear smear{
       .amplitudes_e = amplitudes, .across_percent = {}, .along_percent = {}, .around_percent = {}};
   for (const Way& way : kWays) {
