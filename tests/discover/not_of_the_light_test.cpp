@@ -2,9 +2,11 @@
 // What is wrong with poses and with decoded ranges, and light of what is too bright.
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <numbers>
 
 #include <gmock/gmock.h>
+#include <toftwin/nan.h>
 
 #include "calib/discover/campaign/pose_errors.h"
 #include "calib/discover/campaign/smeared_ranges.h"
@@ -82,14 +84,27 @@ TEST_F(Searched, RangesThatComeFromNeighboursAreTold) {
 TEST(SpilledLight, IsOfWhatIsBeyondABrightness) {
   Reading reading{Image<float>(2, 2, 0.5F), Image<float>(2, 2, std::log(10.0F))};
   reading.log_amplitude(0, 0) = std::log(1000.0F), reading.range_m(0, 0) = 0.0F;
-  const auto all = spilledCarriers(reading, 2.0, 1000.0);
+  const auto all = spilledCarriers(reading, phasorOf(reading, 2.0), 2.0, 1000.0);
   // δz = 1 % · (1000 − 500)/4 at phase 0; of a pixel of 10 electrons at a quarter turn, z = −10i: δz/z = 0.125 i.
   const Reading& half = all.at("spilled:1/2");
   EXPECT_NEAR(half.log_amplitude(1, 1), 0.0F, 1e-6F);
   EXPECT_NEAR(half.range_m(1, 1), -2.0 / (2.0 * std::numbers::pi) * 0.125, 1e-6);
   EXPECT_NEAR(all.at("spilled:1/8").range_m(1, 1), -2.0 / (2.0 * std::numbers::pi) * 0.125 * 7.0 / 4.0, 1e-6);
-  const auto none = spilledCarriers({Image<float>(2, 2, 0.5F), Image<float>(2, 2, std::log(10.0F))}, 2.0, 1000.0);
+  const Reading dark{Image<float>(2, 2, 0.5F), Image<float>(2, 2, std::log(10.0F))};
+  const auto none = spilledCarriers(dark, phasorOf(dark, 2.0), 2.0, 1000.0);
   EXPECT_EQ(none.at("spilled:1/8").range_m(1, 1), 0.0F);
+}
+
+/// A pixel that nobody can read, as it is too bright, spills all the same: its light is in proportion to the others'.
+TEST(SpilledLight, IsOfPixelsThatAreTooBrightToBeRead) {
+  Reading reading{Image<float>(2, 2, 0.5F), Image<float>(2, 2, std::log(10.0F))};
+  Image<std::complex<float>> light(2, 2, {0.0F, -0.1F});
+  light(0, 0) = {10.0F, 0.0F};
+  reading.range_m(0, 0) = reading.log_amplitude(0, 0) = kNaN;
+  const Phasors sources = withUnread(phasorOf(reading, 2.0), light);
+  EXPECT_NEAR(std::abs(sources(0, 0) - std::complex<float>{1000.0F, 0.0F}), 0.0F, 1e-2F);
+  const auto all = spilledCarriers(reading, sources, 2.0, 1000.0);
+  EXPECT_NEAR(all.at("spilled:1/2").range_m(1, 1), -2.0 / (2.0 * std::numbers::pi) * 0.125, 1e-6);
 }
 
 }  // namespace

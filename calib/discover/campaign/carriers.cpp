@@ -33,6 +33,27 @@ std::string neighbourName(int reach) {
                         : fmt::format("{}:{}px", kNeighbours, reach);
 }
 
+/// Pixels of a row, or of a column, share wires: what of their mean comes along them.
+constexpr std::string_view kAlongRow = "neighbours:row", kAlongColumn = "neighbours:column";
+
+/// What is read is on the wire; what cannot be read is not known.
+Phasors meansAlong(const Phasors& z, bool is_row) {
+  std::vector<std::complex<double>> sum(static_cast<std::size_t>(is_row ? z.height() : z.width()));
+  std::vector<double> count(sum.size());
+  Phasors mean(z.width(), z.height());
+  const auto lineOf = [&](int x, int y) { return static_cast<std::size_t>(is_row ? y : x); };
+  for (int y = 0; y < z.height(); ++y) {
+    for (int x = 0; x < z.width(); ++x) {
+      if (!std::isfinite(std::norm(z(x, y)))) continue;
+      sum[lineOf(x, y)] += std::complex<double>{z(x, y)}, count[lineOf(x, y)] += 1.0;
+    }
+  }
+  for (int y = 0; y < z.height(); ++y)
+    for (int x = 0; x < z.width(); ++x)
+      mean(x, y) = std::complex<float>{sum[lineOf(x, y)] / std::max(1.0, count[lineOf(x, y)])};
+  return mean;
+}
+
 constexpr std::string_view kMirrored = "mirrored";
 /// Of squares about the mirrored place: a second image may be sharp, and seldom is.
 constexpr std::array kMirroredReaches{0, 3, 10};
@@ -97,6 +118,10 @@ std::map<std::string, Reading> carriersOf(const sim::SensorModel& model, const R
     const Phasors mean = sim::boxMean(z, std::min(reach, std::max(z.width(), z.height())));
     all.emplace(neighbourName(reach),
                 changeBy(shareOf(z, [&](std::size_t i) { return 0.01F * mean[i]; }), period_m));
+  }
+  for (const std::string_view carrier : {kAlongRow, kAlongColumn}) {
+    const Phasors mean = meansAlong(z, carrier == kAlongRow);
+    all.emplace(carrier, changeBy(shareOf(z, [&](std::size_t i) { return 0.01F * mean[i]; }), period_m));
   }
   const Phasors turned = mirrored(z, model.camera());
   for (const int reach : kMirroredReaches) {
@@ -198,6 +223,10 @@ std::vector<TermGroup> carrierGroups(std::span<const CovariateInfo> covariates, 
   TermGroup light{"light from neighbours", Kind::Generic, {}, 0};
   for (const int reach : kReaches) light.terms.push_back({{}, Stage::Light, neighbourName(reach)});
   groups.push_back(std::move(light));
+  groups.push_back({"light from the row and the column",
+                    Kind::Generic,
+                    {{{}, Stage::Light, std::string{kAlongRow}}, {{}, Stage::Light, std::string{kAlongColumn}}},
+                    0});
   TermGroup ghost{"light from the mirrored place", Kind::Generic, {}, 0};
   for (const int reach : kMirroredReaches) ghost.terms.push_back({{}, Stage::Light, mirroredName(reach)});
   for (const std::string_view carrier : {kMirroredRight, kMirroredDown})
@@ -222,7 +251,9 @@ std::vector<TermGroup> carrierGroups(std::span<const CovariateInfo> covariates, 
   add("a constant charge", {Term{}});
   groups.back().simpler_than = kConverterCarrier;  // of which all columns have the same
   for (const CovariateInfo& covariate : covariates) {
-    if (covariate.word != "exposure" && covariate.word != "ambient" && covariate.word != "temperature")
+    // Electronics beside the pixels glow, and warm those near to them.
+    if (covariate.word != "exposure" && covariate.word != "ambient" && covariate.word != "temperature" &&
+        covariate.word != "position")
       continue;
     std::vector<Term> factors{Term{}};
     for (Term& term : smoothIn(covariate, 4).terms) factors.push_back(std::move(term));

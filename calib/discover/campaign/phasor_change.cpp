@@ -1,12 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/discover/campaign/phasor_change.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include <toftwin/nan.h>
 
 namespace toftwin::discover {
+
+std::size_t highestOf(const sim::Light& light) {
+  return static_cast<std::size_t>(std::ranges::max_element(light.frequencies) - light.frequencies.begin());
+}
 
 Reading changeBy(const Phasors& share, double period_m) {
   Reading change{Image<float>(share.width(), share.height()), {}};
@@ -27,6 +32,22 @@ Phasors phasorOf(const Reading& reading, double period_m) {
     if (std::isfinite(phase) && std::isfinite(size))
       z[i] = {static_cast<float>(size * std::cos(phase)), static_cast<float>(-size * std::sin(phase))};
   }
+  return z;
+}
+
+Phasors withUnread(Phasors z, const Image<std::complex<float>>& light) {
+  const auto isRead = [&](std::size_t i) { return std::isfinite(std::norm(z[i])) && std::isfinite(std::norm(light[i])); };
+  std::complex<double> products{};
+  double squares = 0.0;
+  for (std::size_t i = 0; i < z.size(); ++i) {
+    if (!isRead(i)) continue;
+    products += std::complex<double>{z[i]} * std::conj(std::complex<double>{light[i]});
+    squares += std::norm(std::complex<double>{light[i]});
+  }
+  if (!(squares > 0.0)) return z;
+  const std::complex<float> per_light{products / squares};
+  for (std::size_t i = 0; i < z.size(); ++i)
+    if (!isRead(i)) z[i] = per_light * light[i];
   return z;
 }
 

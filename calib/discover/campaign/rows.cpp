@@ -250,13 +250,16 @@ double exposureUsOf(const MeasuredCapture& capture) {
   return exposures.empty() ? capture.record.exposure_us : exposures.front().duration.in(microsecond);
 }
 
-/// Amplitude as measured; 0: the camera tells none.
+/// Amplitude as measured, but for a thousandth of all pixels, which a hot one is of; 0: the camera tells none.
 double brightestOf(const std::vector<MeasuredCapture>& captures) {
-  float most = -std::numeric_limits<float>::infinity();
+  std::vector<float> logs;
   for (const MeasuredCapture& capture : captures)
     for (const float value : capture.log_amplitude.mean.pixels())
-      if (std::isfinite(value)) most = std::max(most, value);
-  return std::exp(static_cast<double>(most));
+      if (std::isfinite(value)) logs.push_back(value);
+  if (logs.empty()) return 0.0;
+  const auto most = logs.end() - 1 - static_cast<std::ptrdiff_t>(logs.size() / 1000);
+  std::ranges::nth_element(logs, most);
+  return std::exp(static_cast<double>(*most));
 }
 
 }  // namespace
@@ -268,14 +271,18 @@ void CampaignRows::fillFixed(std::size_t c, const std::vector<TemperatureRate>& 
   fixed.name = capture.record.name, fixed.block = capture.record.block;
   fixed.cells = Cells{capture, *lit_->traced[c], declared};
   fixed.covariates =
-      covariatesOf(capture, rates, varied, lit_->traced[c]->multipath, fixed.varied, declared_->model.camera(), fixed.cells);
+      covariatesOf(capture, rates, varied, lit_->traced[c]->multipath, fixed.varied, declared_->model.camera(),
+                   fixed.cells);
   for (const auto& [name, change] :
        carriersOf(declared_->model, fixed.varied, std::max(period_m_, 1e-3), exposureUsOf(capture))) {
     fixed.carriers[name] = fixed.whitened(change);
   }
   for (const auto& [name, change] : smearedCarriers(fixed.varied)) fixed.carriers[name] = fixed.whitened(change);
-  for (const auto& [name, change] : spilledCarriers(fixed.varied, std::max(period_m_, 1e-3), brightest_))
-    fixed.carriers[name] = fixed.whitened(change);
+  if (hasSpilledLight()) {
+    const Phasors sources = withUnread(phasorOf(fixed.varied, period_m_), varied.phasor(highestOf(varied), 1));
+    for (const auto& [name, change] : spilledCarriers(fixed.varied, sources, period_m_, brightest_))
+      fixed.carriers[name] = fixed.whitened(change);
+  }
 }
 
 CampaignRows::PerChannel CampaignRows::Fixed::whitened(const Reading& change) const {

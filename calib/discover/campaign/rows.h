@@ -261,6 +261,8 @@ class CampaignRows final : public RowSource, public NamedEffects {
   std::vector<CaptureRows> rows_;
   std::map<std::string, PixelPattern> patterns_{};  ///< by the carrier that is made of them
   double period_m_ = 0.0, brightest_ = 0.0;  ///< of the range; amplitude in all captures
+  /// What is too bright shows in the amplitude, and spills as a phasor.
+  [[nodiscard]] bool hasSpilledLight() const { return period_m_ > 0.0 && brightest_ > 0.0; }
   bool has_delay_ = false;  ///< a delay of the light is another thing than an error of the range
 };
 

@@ -353,7 +353,7 @@ std::vector<TermGroup> CampaignRows::ownGroups() const {
   if (!rows_.empty() && rows_.front().fixed->cells.grid().cell_width == 1)
     for (TermGroup& group : repeatingColumns(infos)) groups.push_back(std::move(group));
   for (TermGroup& group : smearedGroups(infos)) groups.push_back(std::move(group));
-  groups.push_back(spilledGroup());
+  if (hasSpilledLight()) groups.push_back(spilledGroup());
   for (TermGroup& group : poseGroups()) groups.push_back(std::move(group));
   for (TermGroup& group : unequalGroups(unequal_)) groups.push_back(std::move(group));
   for (TermGroup& group : pixelGroups(has_delay_, rows_.empty() ? 0 : rows_.front().fixed->cells.grid().size()))

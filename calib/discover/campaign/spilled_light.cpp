@@ -8,8 +8,6 @@
 
 #include <fmt/format.h>
 
-#include "calib/discover/campaign/phasor_change.h"
-
 namespace toftwin::discover {
 namespace {
 
@@ -20,12 +18,13 @@ std::string spilledOf(int part) { return fmt::format("{}:1/{}", kSpilledCarrier,
 
 }  // namespace
 
-std::map<std::string, Reading> spilledCarriers(const Reading& declared, double period_m, double brightest) {
+std::map<std::string, Reading> spilledCarriers(const Reading& declared, const Phasors& sources, double period_m,
+                                               double brightest) {
   std::map<std::string, Reading> all;
   const Phasors z = phasorOf(declared, period_m);
   for (const int part : kSpilledParts) {
     std::complex<double> sum{};
-    for (const std::complex<float>& one : z.pixels()) {
+    for (const std::complex<float>& one : sources.pixels()) {
       const std::complex<double> light{one};
       const double above = 1.0 - brightest / part / std::abs(light);
       if (above > 0.0) sum += above * light;  // not what is NaN

@@ -13,6 +13,7 @@
 #include "calib/compare/statistics.h"
 #include "calib/discover/campaign/campaign.h"
 #include "calib/discover/campaign/carriers.h"
+#include "calib/discover/campaign/phasor_change.h"
 #include "calib/discover/campaign/reading.h"
 #include "sim/images/box_mean.h"
 #include "sim/tracer/trace.h"
@@ -44,10 +45,7 @@ void addTracingNoise(TracedCapture& traced) {
   traced.tracing_variance_m2 = traced.tracing_variance =
       Image<float>(light.width(), light.height());
   if (light.frequencies.empty() || light.variance.empty()) return;
-  std::size_t highest = 0;
-  for (std::size_t f = 1; f < light.frequencies.size(); ++f) {
-    if (light.frequencies[f] > light.frequencies[highest]) highest = f;
-  }
+  const std::size_t highest = highestOf(light);
   const double metres =
       unambiguousRange(light.frequencies[highest]).in(metre) / (2.0 * std::numbers::pi);
   const auto& phasor = light.phasor(highest, 1);
