@@ -9,6 +9,7 @@
 
 #include "calib/compare/report.h"
 #include "calib/discover/campaign/campaign_json.h"
+#include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/discover_campaign.h"
 #include "calib/discover/campaign/gather_capture.h"
 #include "calib/discover/campaign/pose_errors.h"
@@ -39,16 +40,25 @@ std::size_t countOf(const CampaignFinding& finding) {
   return finding.effects.size() - static_cast<std::size_t>(rests);
 }
 
+/// How sure its choice is, where it is told alone and captures drawn anew mostly choose another.
+std::string againInWords(const FoundEffect& one) {
+  constexpr double kSeldom = 0.5;
+  if (one.is_of_single_frames || !one.found.alternatives.empty() || !(one.found.frequency < kSeldom)) return "";
+  return fmt::format(" (of captures drawn anew only {} say so)", compare::shownPercent(one.found.frequency));
+}
+
 /// Its title, and what else it may be.
-std::string answerOf(const Effect& effect) {
-  std::string answer = titleOf(effect);
+std::string answerOf(const FoundEffect& found) {
+  const Effect& effect = found.found;
+  std::string answer = titleOf(effect) + againInWords(found);
   for (const Alternative& other : effect.alternatives)
     answer += " or " + (other.group.terms.empty() ? other.name : fmt::format("undeclared: {}", other.name));
   return effect.alternatives.empty() ? answer : answer + " (these captures do not tell them apart)";
 }
 
 std::string withError(const std::string& name, double value, double error) {
-  return fmt::format("{} = {:.4g} ± {:.2g}", name, value, error);
+  // Of a jump's place only the captures on both sides are known.
+  return error > 0.0 ? fmt::format("{} = {:.4g} ± {:.2g}", name, value, error) : fmt::format("{} = {:.4g}", name, value);
 }
 
 std::string numbersInWords(const FoundEffect& one) {
@@ -65,6 +75,13 @@ std::string numbersInWords(const FoundEffect& one) {
   return numbers.empty() ? "a table: see model.toml" : fmt::format("a table of {}", numbers);
 }
 
+/// What it goes with: a gain and a delay are what it does.
+std::string coveredInWords(const Effect& effect) {
+  std::vector<std::string> names = effect.covariates;
+  std::erase_if(names, [](const std::string& name) { return name == kGainCarrier || name == kDelayCarrier; });
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
 compare::TableBlock effectTable(const CampaignFinding& finding) {
   compare::TableBlock table{
       "What the model lacked. Gain: how much less χ² is left of captures that it was not fitted "
@@ -73,7 +90,7 @@ compare::TableBlock effectTable(const CampaignFinding& finding) {
       {}};
   for (const FoundEffect& one : finding.effects) {
     table.rows.push_back({titleOf(one.found), stageInWords(one.found),
-                          fmt::format("{}", fmt::join(one.found.covariates, ", ")), numbersInWords(one),
+                          coveredInWords(one.found), numbersInWords(one),
                           one.is_of_single_frames
                               ? "–"
                               : compare::shownWithError(one.found.gain.mean, one.found.gain.error, 0),
@@ -101,7 +118,11 @@ bool hasDelay(const CampaignFinding& finding) { return finding.zero.delay_mm != 
 std::string delayInWords(const CampaignFinding& finding) {
   if (!hasDelay(finding)) return "";
   std::string words = fmt::format("a delay of the light of {:.2f} mm, which the camera file lacks", finding.zero.delay_mm);
-  if (const auto& judged = finding.judgement)
+  const auto& judged = finding.judgement;
+  if (judged && judged->removed_by_zero < 0.0)
+    words += fmt::format(", by itself makes the locked captures fit worse, by {} of what can be explained",
+                         compare::shownPercent(-judged->removed_by_zero));
+  else if (judged)
     words += fmt::format(", removes {} of what can be explained", compare::shownPercent(judged->removed_by_zero));
   else
     words += ", is in model.toml";
@@ -162,9 +183,10 @@ compare::TableBlock seenTable(const CampaignFinding& finding) {
 
 /// What the raw exposures say of where an effect acts; empty: nothing.
 std::string rawInWords(const FoundEffect& one) {
+  constexpr double kSays = 0.5;  // a share that is known worse says nothing
   std::vector<std::string> words;
   const auto is_before = one.raw->isBeforeDecoding();
-  if (const auto& share = one.raw->share) {
+  if (const auto& share = one.raw->share; share && share->error < kSays) {
     words.push_back(fmt::format("Of what {} does to the range, the raw exposures' phase shows {}: {}", one.found.name,
                                 compare::shownWithError(share->mean, share->error, 2),
                                 !is_before   ? "not enough to say whether it acts before they are decoded"
@@ -282,6 +304,15 @@ std::string leftInWords(const CampaignFinding& finding) {
              : left;
 }
 
+/// What no effect holds for, beside those that were found.
+std::string restInWords(const CampaignFinding& finding) {
+  constexpr double kAlpha = 0.005;  // of each test but the first
+  return finding.finding.last_p > kAlpha
+             ? ""
+             : fmt::format(". Something else is left (p = {:.2g}) that holds on no captures it was not fitted to",
+                           finding.finding.last_p);
+}
+
 std::string nothingInWords(const CampaignFinding& finding) {
   const std::string beside = hasDelay(finding) ? ", beside it," : "";
   const std::string rest =
@@ -298,7 +329,7 @@ std::string foundInWords(const CampaignFinding& finding) {
   if (finding.effects.empty() && finding.updates.empty()) return nothingInWords(finding);
   std::vector<std::string> names, poses;
   for (const FoundEffect& one : finding.effects)
-    if (!one.found.is_rest) (isOnlyOfPoses(one) ? poses : names).push_back(answerOf(one.found));
+    if (!one.found.is_rest) (isOnlyOfPoses(one) ? poses : names).push_back(answerOf(one));
   for (const FittedEffect& one : finding.updates)
     names.push_back("parameter update: " + nameOf(one.effect));
   if (names.empty())
@@ -317,14 +348,14 @@ std::string foundInWords(const CampaignFinding& finding) {
     verdict = fmt::format("The model has wrong numbers: {}", fmt::join(names, "; "));
   if (!finding.hasJudged()) verdict += ", which single frames show and their means do not";
   if (hasDelay(finding)) verdict += ". " + capitalised(delayInWords(finding));
-  if (!finding.hasJudged()) return verdict;
+  if (!finding.hasJudged()) return verdict + restInWords(finding);
   if (const auto& judged = finding.judgement) {
     verdict += fmt::format(". On the locked captures: RMS {} → {} mm, {} of what {} is removed",
                            shown(judged->before.rms_mm, 2), shown(judged->after.rms_mm, 2),
                            compare::shownPercent(judged->removed),
                            hasDelay(finding) ? "the delay leaves" : "can be explained");
   }
-  return verdict + leftInWords(finding);
+  return verdict + restInWords(finding) + leftInWords(finding);
 }
 
 }  // namespace
