@@ -380,6 +380,7 @@ std::optional<std::size_t> choose(const std::vector<Explanation>& all) {
   best = orByItself(all, places, *best);
   // The best explanation decides on the covariates, simplicity on the shape. What a carrier does (a charge,
   // say) need not change with anything: if it explains as much without, or its simpler form does, it does not.
+  constexpr double kRounding = 1e-7;  // of a table without noise: to that the fit of an exact shape is exact
   std::size_t chosen = *best;
   const std::string carrier = all[*best].carrier();
   const auto isItsForm = [&](const Explanation& one) {
@@ -393,8 +394,9 @@ std::optional<std::size_t> choose(const std::vector<Explanation>& all) {
     const bool is_same = all[i].covariates == all[*best].covariates, is_form = isItsForm(all[i]);
     if (all[i].is_catalogue || !(is_same || is_form || isLess(all[i]))) continue;
     const double by = all[*best].gain.total - all[i].gain.total;
+    const double error = std::max(difference(all[*best].gain, all[i].gain).error, kRounding * all[*best].gain.total);
     // The simulator has the simpler form, so that it is taken unless the data tell the two apart.
-    if (by > (is_form ? 2.0 : 1.0) * difference(all[*best].gain, all[i].gain).error) continue;
+    if (by > (is_form ? 2.0 : 1.0) * error) continue;
     if (isSimpler(all[i], all[chosen])) chosen = i;
   }
   return chosen;
