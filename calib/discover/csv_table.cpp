@@ -83,11 +83,14 @@ Result<> takeHeader(CsvTable& table, const std::filesystem::path& name, std::siz
   if (table.header.size() > kMostColumns)
     return malformed(name, line,
                      fmt::format("has {} columns, more than {}", table.header.size(), kMostColumns));
+  if (table.header.size() == 1)
+    return malformed(name, line, fmt::format("no comma, semicolon or tab parts \"{}\" into columns; blanks do not",
+                                             table.header[0].substr(0, 60)));
   std::set<std::string> seen;
   for (std::size_t i = 0; i < table.header.size(); ++i) {
-    if (table.header[i].empty()) return malformed(name, line, fmt::format("column {} has no header", i + 1));
+    if (table.header[i].empty()) return malformed(name, line, fmt::format("column {} has no header: name it", i + 1));
     if (!seen.insert(table.header[i]).second)
-      return malformed(name, line, fmt::format("two columns are called \"{}\"", table.header[i]));
+      return malformed(name, line, fmt::format("two columns are called \"{}\": rename one", table.header[i]));
   }
   table.columns.resize(table.header.size());
   return {};
@@ -103,8 +106,9 @@ static Result<CsvTable> parseUtf8(std::string_view text, const std::filesystem::
   char separator = ',';
   std::optional<char> said;
   std::size_t number = 0;
+  const char line_end = text.find('\n') == std::string_view::npos ? '\r' : '\n';  // of old Macs: CR alone
   while (!text.empty()) {
-    const std::size_t end = std::min(text.find('\n'), text.size());
+    const std::size_t end = std::min(text.find(line_end), text.size());
     const std::string_view line = text.substr(0, end);
     text.remove_prefix(std::min(end + 1, text.size()));
     ++number;

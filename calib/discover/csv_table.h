@@ -24,8 +24,8 @@ struct CsvTable {
 /// A header line and rows, separated by commas, semicolons or tabs (whichever the header has most of); fields
 /// may be quoted, lines that begin with # and empty lines are left out; a first line `sep=;` says which.
 /// Bytes that are no UTF-8 are read as Windows-1252, Latin-1 among it. Errors name file and line: a row with
-/// more or fewer fields than the header, a header twice, an open quote, no rows, over a million rows or 400
-/// columns.
+/// more or fewer fields than the header, a header twice or of one column, an open quote, no rows, over a
+/// million rows or 400 columns.
 Result<CsvTable> parseCsv(std::string_view text, const std::filesystem::path& name);
 Result<CsvTable> loadCsv(const std::filesystem::path& file);
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <map>
 #include <set>
 #include <string_view>
 
@@ -44,6 +45,8 @@ const Known kMeasured{"measured", "measurement", "value",    "reading", "output"
                       "observed", "messwert",    "gemessen", "istwert", "ist"};
 const Known kReference{"reference", "ref",     "truth",  "true",     "groundtruth", "ground",
                        "expected",  "nominal", "actual", "referenz", "soll",        "sollwert"};
+const Known kTarget{"target", "plane", "distance", "wall", "nominal", "laser",   "rail",      "board",
+                    "plate",  "ziel",  "ebene",    "wand", "abstand", "entfernung"};
 const Known kError{"error", "residual", "deviation",  "bias",     "difference",
                    "minus", "fehler",   "abweichung", "differenz"};
 const Known kSigma{"sigma",       "std",   "stddev",   "sd",       "noise",
@@ -60,9 +63,11 @@ const Known kIndex{"frame", "index", "number", "sequence", "seq",        "counte
                    "count", "n",     "row",    "bild",     "bildnummer", "zeile"};
 const Known kLabel{"id", "name", "number", "nr", "no", "index", "label"};
 
+/// Columns that have a role, and which.
+using Taken = std::map<std::string, std::string>;
+
 /// The one column whose header has one of these words; nothing if there are none or several.
-std::string onlyOne(const std::vector<std::string>& header, const Known& known,
-                    const std::set<std::string>& taken) {
+std::string onlyOne(const std::vector<std::string>& header, const Known& known, const Taken& taken) {
   std::string found;
   for (const std::string& name : header) {
     if (taken.contains(name) || !hasWord(name, known)) continue;
@@ -75,7 +80,7 @@ std::string onlyOne(const std::vector<std::string>& header, const Known& known,
 /// Columns without a role that name a group by this word; "run_time_s" is a time. `is_all`: a header that
 /// says nothing else ("session", "session_id").
 std::vector<std::string> groupsNamed(const std::vector<std::string>& header, std::string_view word,
-                                     bool is_all, const std::set<std::string>& taken) {
+                                     bool is_all, const Taken& taken) {
   std::vector<std::string> found;
   for (const std::string& name : header) {
     const auto isOther = [&](const std::string& one) {
@@ -104,14 +109,17 @@ class Assignment {
       return Error{Error::Code::NotFound, fmt::format("{}: has no column \"{}\" for `{}`, only: {}",
                                                       file_.string(), said, key, fmt::join(header_, ", "))};
     }
-    if (!taken_.insert(said).second) return badMap(file_, fmt::format("column \"{}\" has two roles", said));
+    if (const auto [other, is_new] = taken_.try_emplace(said, key); !is_new) {
+      return badMap(file_, fmt::format("column \"{}\" has two roles, `{}` and `{}`: it can have one", said,
+                                       other->second, key));
+    }
     role = said;
     return {};
   }
   void guess(std::string& role, const Known& known) {
     if (!role.empty()) return;
     role = onlyOne(header_, known, taken_);
-    if (!role.empty()) taken_.insert(role);
+    if (!role.empty()) taken_.emplace(role, "guessed");
   }
   /// A group's column: the likeliest word decides, and of those that have it the one that says nothing else.
   /// Of sessions every test depends, so that none is left to chance.
@@ -129,7 +137,7 @@ class Assignment {
                                "(docs/discover.md)",
                                key, fmt::join(found, ", "), key));
       }
-      role = found.front(), taken_.insert(role);
+      role = found.front(), taken_.emplace(role, key);
       return {};
     }
     return {};
@@ -147,7 +155,7 @@ class Assignment {
  private:
   const std::vector<std::string>& header_;
   const std::filesystem::path& file_;
-  std::set<std::string> taken_;
+  Taken taken_;
 };
 
 /// "reference_minus_measured": the second word before "minus" is which.
@@ -220,6 +228,21 @@ std::string unitOf(const std::string& header) {
   if (words.size() < 2) return {};
   return std::ranges::find(kUnits, words.back()) == kUnits.end() ? std::string{} : words.back();
 }
+
+std::optional<double> unitsPerMetre(const std::string& unit) {
+  static const std::map<std::string, double, std::less<>> kPerMetre{{"m", 1.0}, {"cm", 1e2}, {"mm", 1e3}, {"um", 1e6}};
+  const auto at = kPerMetre.find(unit);
+  return at == kPerMetre.end() ? std::nullopt : std::optional{at->second};
+}
+
+double lengthFactor(const std::string& from, const std::string& to) {
+  const auto a = unitsPerMetre(from), b = unitsPerMetre(to);
+  return a && b ? *b / *a : 1.0;
+}
+
+bool isLengthOrNone(const std::string& unit) { return unit.empty() || unitsPerMetre(unit); }
+
+bool namesTarget(const std::string& header) { return hasWord(header, kTarget); }
 
 bool isPixelNumber(const std::string& header) {
   const bool is_plain = unitOf(header).empty() || wordsOf(header).back() == "px";

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -33,6 +34,15 @@ Result<Roles> rolesOf(const std::vector<std::string>& header, const TableMap& ma
 /// The unit that a header ends in: "depth_mm" → "mm"; "depth [mm]" and "depth (mm)", too. Empty: none is
 /// known.
 std::string unitOf(const std::string& header);
+
+/// What a length in the one unit is multiplied with to be in the other; 1 where one of them is none.
+double lengthFactor(const std::string& from, const std::string& to);
+/// Units of length in a metre; nothing of another unit.
+std::optional<double> unitsPerMetre(const std::string& unit);
+bool isLengthOrNone(const std::string& unit);
+
+/// Whether a header says what was looked at: "target_m", "plane", "nominal_mm".
+bool namesTarget(const std::string& header);
 
 /// "pixel_column", "u", "row": with whole numbers they count, and odd ones may differ from even ones.
 bool isPixelNumber(const std::string& header);

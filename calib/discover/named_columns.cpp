@@ -58,23 +58,46 @@ Result<std::vector<double>> NamedColumns::asWritten(const std::string& name) con
   for (std::size_t row = 0; row < table_.rows(); ++row) {
     const std::string& field = table_.columns[*at][row];
     const auto number = toNumber(field), value = number || !is_time ? number : secondsIn(field);
-    if (!value) {
-      return Error{
-          Error::Code::Malformed,
-          fmt::format("{}:{}: \"{}\" in column \"{}\" is not a number{}", file_.string(), table_.line[row],
-                      field.substr(0, 40), name,
-                      hasThousandsPoint(field) ? ": write it without the points that part thousands" : "")};
-    }
+    if (!value) return notIn(*at, row, fmt::format("is not a number: {}", adviceFor(*at, row)));
     values.push_back(*value);
   }
   if (const auto row = thousandOrNot(*at)) {
-    return Error{
-        Error::Code::Malformed,
-        fmt::format("{}:{}: \"{}\" in column \"{}\" may be a thousand or a fraction, beside whole numbers; "
-                    "write it without the comma, or all with decimals",
-                    file_.string(), table_.line[*row], table_.columns[*at][*row], name)};
+    return notIn(*at, *row, "may be a thousand or a fraction, beside whole numbers; write it without the comma, or "
+                            "all with decimals");
   }
   if (is_time) overMidnight(values);
+  return values;
+}
+
+Error NamedColumns::notIn(std::size_t column, std::size_t row, std::string_view what) const {
+  return {Error::Code::Malformed,
+          fmt::format("{}:{}: \"{}\" in column \"{}\" {}", file_.string(), table_.line[row],
+                      table_.columns[column][row].substr(0, 40), table_.header[column], what)};
+}
+
+std::string_view NamedColumns::adviceFor(std::size_t column, std::size_t row) const {
+  if (hasThousandsPoint(table_.columns[column][row])) return "write it without the points that part thousands";
+  if (row == 0 && beginsWithTexts())
+    return "if this line says units, begin it with # and end the headers in them, as in depth_mm";
+  return "leave the field empty where there is none";
+}
+
+bool NamedColumns::beginsWithTexts() const {
+  return std::ranges::all_of(table_.columns, [&](const std::vector<std::string>& column) {
+    const auto number = toNumber(column.front());
+    return !number || std::isnan(*number);
+  });
+}
+
+Result<std::vector<bool>> NamedColumns::flags(const std::string& name) const {
+  const auto at = find(name);
+  if (!at) return missing(name);
+  std::vector<bool> values;
+  for (std::size_t row = 0; row < table_.rows(); ++row) {
+    const auto flag = flagIn(table_.columns[*at][row]);
+    if (!flag) return notIn(*at, row, "is neither 1 nor 0, yes nor no, true nor false");
+    values.push_back(*flag);
+  }
   return values;
 }
 

@@ -5,9 +5,10 @@
 #include <cmath>
 #include <map>
 
+#include <Eigen/Core>
 #include <fmt/format.h>
 
-#include "calib/linear/linear.h"
+#include "calib/discover/headers.h"
 
 namespace toftwin::discover {
 namespace {
@@ -120,29 +121,28 @@ void setInvalidAside(TableData& data, double scale) {
 }
 
 void dropCopies(TableData& data, double scale) {
-  if (data.reference.size() != data.rows()) return;
+  if (data.reference.size() != data.rows() || data.rows() < 3) return;
   const auto n = static_cast<Eigen::Index>(data.rows());
   const auto centred = [&](const std::vector<double>& values) {
     const Eigen::VectorXd v = Eigen::Map<const Eigen::VectorXd>(values.data(), n);
     return Eigen::VectorXd(v.array() - v.mean());
   };
+  const auto leftOf = [](const Eigen::VectorXd& y, const Eigen::VectorXd& x) {
+    return (y - x * (x.dot(y) / std::max(x.squaredNorm(), 1e-300))).squaredNorm();
+  };
   const Eigen::VectorXd reference = scale * centred(data.reference), error = centred(data.error);
   const Eigen::VectorXd measured = error + reference;
   if (reference.norm() < 3.0 * error.norm())
     return;  // then anything that the error goes with looks like a copy
+  const double from_reference = leftOf(error, reference);
   std::erase_if(data.covariates, [&](const TableCovariate& covariate) {
     if (covariate.nature == Nature::Category || covariate.name == data.reference_name) return false;
     const Eigen::VectorXd c = centred(covariate.values);
-    // measured = β c + γ reference: a copy needs no reference, the error needs all of it.
-    Eigen::MatrixXd x(n, 2);
-    x.col(0) = c / std::max(c.norm(), 1e-300), x.col(1) = reference / std::max(reference.norm(), 1e-300);
-    const Eigen::Vector2d b = linear::leastSquares(x, measured);
-    const double left = (measured - x * b).squaredNorm() / std::max(error.squaredNorm(), 1e-300);
-    const double beta = b(0) / std::max(c.norm(), 1e-300), gamma = b(1) / std::max(reference.norm(), 1e-300);
-    const double decades = std::log10(std::abs(beta));  // mm, cm, m
-    const bool is_one = std::abs(decades - std::round(decades)) < 0.02;
-    const bool is_measured = is_one && left < 0.05 && std::abs(gamma) < 0.2;
-    const bool is_error = is_one && left < 1e-3 && std::abs(gamma - 1.0) < 0.02;
+    // A copy says what was measured, in whatever unit, better than the reference does; what errors go with needs it.
+    const bool is_measured = leftOf(measured, c) < 0.05 * from_reference;
+    const double decades = std::log10(error.norm() / std::max(c.norm(), 1e-300));  // mm, cm, m
+    const bool is_error = isLengthOrNone(unitOf(covariate.name)) && std::abs(decades - std::round(decades)) < 0.02 &&
+                          leftOf(error, c) < 1e-3 * error.squaredNorm();
     if (!is_measured && !is_error) return false;
     data.doubts.push_back(fmt::format("column \"{}\" is {} again: left out, it would explain all and nothing",
                                       covariate.name, is_measured ? "the measured value" : "the error"));

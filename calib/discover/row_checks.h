@@ -17,7 +17,8 @@ namespace toftwin::discover {
 void setInvalidAside(TableData& data, double scale);
 
 /// Leaves out covariates that are the measured value again (range beside depth of a flat scene, a filtered
-/// copy) or the error: they explain all of it and nothing. Says so in the doubts.
+/// copy, the phase that it was made from: any straight function) or the error in a unit of length or none: they
+/// explain all of it and nothing. Says so in the doubts.
 void dropCopies(TableData& data, double scale);
 
 }  // namespace toftwin::discover

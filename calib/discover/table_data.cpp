@@ -13,7 +13,9 @@
 
 #include "calib/discover/headers.h"
 #include "calib/discover/named_columns.h"
+#include "calib/discover/reference_column.h"
 #include "calib/discover/row_checks.h"
+#include "protocol/types/counted.h"
 
 namespace toftwin::discover {
 namespace {
@@ -30,15 +32,6 @@ std::vector<int> numbered(const std::vector<std::string>& words, std::vector<std
     numbers.push_back(at->second);
   }
   return numbers;
-}
-
-const std::map<std::string, double, std::less<>> kPerMetre{{"m", 1.0}, {"cm", 1e2}, {"mm", 1e3}, {"um", 1e6}};
-
-/// What a reference is multiplied with to be in the unit of what was measured; 1 where a header tells no
-/// length.
-double lengthFactor(const std::string& from, const std::string& to) {
-  const auto a = kPerMetre.find(from), b = kPerMetre.find(to);
-  return a == kPerMetre.end() || b == kPerMetre.end() ? 1.0 : b->second / a->second;
 }
 
 Result<> readErrors(const NamedColumns& columns, const Roles& roles, TableData& data) {
@@ -132,6 +125,21 @@ std::vector<bool> complete(const TableData& data) {
   return is_complete;
 }
 
+/// The column that most rows are left out for, in words; empty: none is.
+std::string emptiestIn(const TableData& data, const Roles& roles) {
+  std::string words;
+  std::ptrdiff_t most = 0;
+  const auto look = [&](const std::string& name, const std::vector<double>& values) {
+    const auto missing = std::ranges::count_if(values, [](double v) { return !std::isfinite(v); });
+    if (missing <= most) return;
+    most = missing, words = fmt::format("column \"{}\" is empty in {} of {}", name, missing, values.size());
+  };
+  look(roles.reference, data.reference), look(roles.sigma, data.sigma);
+  for (const TableCovariate& covariate : data.covariates) look(covariate.name, covariate.values);
+  look(roles.error.empty() ? roles.measured : roles.error, data.error);  // where the reference is, so is this
+  return words;
+}
+
 /// A column that is empty in most rows would take the rows with it.
 void dropSparse(TableData& data) {
   std::erase_if(data.covariates, [&](const TableCovariate& covariate) {
@@ -147,9 +155,9 @@ void dropSparse(TableData& data) {
 /// of what was measured, from which it is subtracted as it is. 0: no header says it.
 double periodOf(Frequency modulation, const Roles& roles, TableData& data) {
   if (!(modulation > Frequency{})) return 0.0;
-  auto per_metre = kPerMetre.find(unitOf(roles.reference));
-  if (per_metre == kPerMetre.end() && roles.error.empty()) per_metre = kPerMetre.find(data.unit);
-  if (per_metre != kPerMetre.end()) return per_metre->second * 299'792'458.0 / (2.0 * modulation.in(hertz));
+  auto per_metre = unitsPerMetre(unitOf(roles.reference));
+  if (!per_metre && roles.error.empty()) per_metre = unitsPerMetre(data.unit);
+  if (per_metre) return *per_metre * 299'792'458.0 / (2.0 * modulation.in(hertz));
   data.doubts.push_back(
       "`modulation_mhz` is said, but no header the reference's unit: waves of c/(2f) are not looked for; let "
       "it "
@@ -203,11 +211,9 @@ Result<> readGroups(const NamedColumns& columns, Roles& roles, TableData& data) 
   takeFinerGroup(columns, roles, data);
   data.locked.assign(data.rows(), false);
   if (roles.locked.empty()) return {};
-  auto locked = columns.numbers(roles.locked);
+  auto locked = columns.flags(roles.locked);
   if (!locked) return locked.error();
-  data.has_locked_column = true;
-  for (std::size_t i = 0; i < data.rows(); ++i)
-    data.locked[i] = std::abs((*locked)[i]) > 0.0;  // not where nothing is said
+  data.has_locked_column = true, data.locked = *std::move(locked);
   return {};
 }
 
@@ -223,6 +229,18 @@ void listLeftOut(const CsvTable& table, const TableData& data, Roles& roles) {
     if (std::ranges::find(used, name) == used.end() && std::ranges::none_of(roles.covariates, isIt))
       roles.left_out.push_back(name);
   }
+}
+
+/// An error that is the same in all rows is an offset.
+Result<> checkChanges(const TableData& data) {
+  const auto [least, most] = std::ranges::minmax(data.error);
+  double largest = std::max(std::abs(least), std::abs(most));
+  for (const double one : data.reference) largest = std::max(largest, std::abs(one));
+  if (most - least > 1e-9 * largest) return {};
+  return Error{Error::Code::InvalidArgument,
+               fmt::format("{}: the error is {:.6g}{}{} in every row: an offset, with nothing that changes for a "
+                           "column to explain",
+                           data.file.string(), least, data.unit.empty() ? "" : " ", data.unit)};
 }
 
 void note(const Roles& roles, TableData& data) {
@@ -244,12 +262,15 @@ Result<TableData> readTable(const CsvTable& table, const TableMap& map, const st
   if (!roles) return roles.error();
   TableData data;
   data.file = file, data.line = table.line;
+  if (map.covariates.empty())
+    if (auto done = guessReference(columns, file, *roles, data); !done) return done.error();
   if (auto done = readErrors(columns, *roles, data); !done) return done.error();
   if (auto done = readGroups(columns, *roles, data); !done) return done.error();
   for (const auto& [name, nature] : roles->covariates)
     if (auto done = readCovariate(columns, name, nature, data); !done) return done.error();
   dropSparse(data);
   const std::size_t before = data.rows();
+  const std::string emptiest = emptiestIn(data, *roles);
   data = rowsOf(data, complete(data));
   if (data.rows() < before) {
     data.doubts.push_back(fmt::format("{} of {} rows have an empty, infinite or impossible value: left out",
@@ -257,19 +278,22 @@ Result<TableData> readTable(const CsvTable& table, const TableMap& map, const st
   }
   data.period = periodOf(map.modulation, *roles, data);
   const double scale = lengthFactor(unitOf(roles->reference), data.unit);
+  if (auto done = checkUnits(*roles, data, scale); !done) return done.error();
   setInvalidAside(data, scale);
+  dropCopies(data, scale);
   dropEmptySessions(data);
   if (data.rows() < kFewestRows) {
-    return Error{Error::Code::InvalidArgument, fmt::format("{}: has {} usable rows; at least {} are needed",
-                                                           file.string(), data.rows(), kFewestRows)};
+    return Error{Error::Code::InvalidArgument,
+                 fmt::format("{}: has {}; at least {} are needed{}{}", file.string(),
+                             counted(data.rows(), "usable row"), kFewestRows, emptiest.empty() ? "" : ": ", emptiest)};
   }
   dropConstant(data);
-  dropCopies(data, scale);
   if (data.covariates.empty()) {
     return Error{Error::Code::InvalidArgument,
                  fmt::format("{}: has no column that changes and that the error could go with, besides {}",
                              file.string(), roles->inWords())};
   }
+  if (auto done = checkChanges(data); !done) return done.error();
   listLeftOut(table, data, *roles);
   note(*roles, data);
   if (table.is_from_windows) data.notes.push_back("the file is no UTF-8: read as Windows-1252 (Latin-1)");

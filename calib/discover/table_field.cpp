@@ -12,12 +12,17 @@
 namespace toftwin::discover {
 namespace {
 
-bool saysNothing(std::string_view field) {
-  constexpr std::array kWords{"", "nan", "na", "n/a", "null", "none", "-", "--", "?"};
+/// Whether it is one of these words, in small letters or not.
+template <std::size_t N>
+bool isOneOf(std::string_view field, const std::array<const char*, N>& words) {
   std::string lower{field};
   std::ranges::transform(lower, lower.begin(),
                          [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return std::ranges::find(kWords, lower) != kWords.end();
+  return std::ranges::find(words, lower) != words.end();
+}
+
+bool saysNothing(std::string_view field) {
+  return isOneOf(field, std::array{"", "nan", "na", "n/a", "null", "none", "-", "--", "?"});
 }
 
 /// Takes a number off the front, of so many digits.
@@ -99,6 +104,14 @@ std::optional<double> numberIn(std::string_view field, bool has_decimal_comma) {
   if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
   // Squares of what is larger overflow before anything can be said about it.
   return std::isfinite(value) && std::abs(value) < 1e100 ? value : std::nan("");
+}
+
+std::optional<bool> flagIn(std::string_view field) {
+  if (isOneOf(field, std::array{"yes", "y", "true", "ja", "wahr"})) return true;
+  if (saysNothing(field) || isOneOf(field, std::array{"no", "n", "false", "nein", "falsch"})) return false;
+  const auto number = numberIn(field, true);
+  if (number == 1.0) return true;
+  return number == 0.0 ? std::optional{false} : std::nullopt;
 }
 
 bool hasThousandsPoint(std::string_view field) {

@@ -12,6 +12,9 @@ namespace toftwin::discover {
 /// in tables that are not separated by commas. "1.234,5" is none: see hasThousandsPoint.
 std::optional<double> numberIn(std::string_view field, bool has_decimal_comma);
 
+/// 1 or 0, yes or no, true or false; a field that says nothing is false. Nothing where it is anything else.
+std::optional<bool> flagIn(std::string_view field);
+
 /// Whether points part the thousands of a number with a decimal comma: "2.596,3".
 bool hasThousandsPoint(std::string_view field);
 

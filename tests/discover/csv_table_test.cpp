@@ -33,6 +33,7 @@ TEST(ParseCsv, ReadsQuotesSemicolonsTabsCommentsAndWindowsLines) {
   EXPECT_THAT(table->columns[1], ElementsAre("say \"x\"", "y"));
   EXPECT_THAT(table->line, ElementsAre(3u, 5u));
   EXPECT_EQ(parseCsv("a\tb\n1\t2\n", "t.csv")->header.size(), 2u);
+  EXPECT_THAT(parseCsv("a,b\r1,2\r\r3,4\r", "t.csv")->line, ElementsAre(2u, 4u)) << "old Macs' lines";
 }
 
 TEST(ParseCsv, TakesTheSeparatorThatExcelSays) {
@@ -57,9 +58,10 @@ TEST(ParseCsv, SaysWhichLineIsWrongAndHow) {
   EXPECT_THAT(errorOf("a,b\n1,1500,25\n"), HasSubstr("t.csv:2: has 3 fields, but the header has 2; commas in its"));
   EXPECT_THAT(errorOf("a;b\n1;2;3\n"), EndsWith("t.csv:2: has 3 fields, but the header has 2"));
   EXPECT_THAT(errorOf("a,b\n1,\"2\n"), HasSubstr("t.csv:2: a quote is opened"));
-  EXPECT_THAT(errorOf("a,a\n1,2\n"), HasSubstr("two columns are called \"a\""));
+  EXPECT_THAT(errorOf("a,a\n1,2\n"), HasSubstr("two columns are called \"a\": rename one"));
   EXPECT_THAT(errorOf("a,\n1,2\n"), HasSubstr("column 2 has no header"));
   EXPECT_THAT(errorOf(""), HasSubstr("is empty"));
+  EXPECT_THAT(errorOf("a b\n1 2\n"), HasSubstr("t.csv:1: no comma, semicolon or tab parts \"a b\" into columns"));
   EXPECT_THAT(errorOf("a,b\n"), HasSubstr("has a header but no rows"));
   EXPECT_THAT(errorOf(std::string("a,b\n1,\0\n", 8)), HasSubstr("zero bytes"));
 }
@@ -116,7 +118,7 @@ TEST(Headers, MapErrorsNameColumnAndKey) {
   EXPECT_THAT(rolesOf({"depth", "t"}, map, "t.csv").error().message,
               HasSubstr("no column \"depht\" for `measured`"));
   map.measured = "depth", map.reference = "depth";
-  EXPECT_THAT(rolesOf({"depth", "t"}, map, "t.csv").error().message, HasSubstr("has two roles"));
+  EXPECT_THAT(rolesOf({"depth", "t"}, map, "t.csv").error().message, HasSubstr("\"depth\" has two roles, `measured` and `reference`"));
   map.reference = "", map.ignore = {"u"};
   EXPECT_THAT(rolesOf({"depth", "t"}, map, "t.csv").error().message, HasSubstr("no column \"u\" to ignore"));
 }
@@ -173,10 +175,38 @@ TEST(ReadTable, RefusesTextAmongNumbersTooFewRowsAndNothingToGoWith) {
               HasSubstr("t.csv:32: \"x7\" in column \"measured_mm\" is not a number"));
   EXPECT_THAT(dataOf(linear(30, "\"2.596,3\",1000,5,on\n")).error().message,
               HasSubstr("points that part thousands"));
-  EXPECT_THAT(dataOf(linear(19)).error().message, HasSubstr("has 19 usable rows; at least 20"));
+  EXPECT_THAT(dataOf(linear(30, "x7,1000,5,on\n")).error().message, HasSubstr("leave the field empty"));
+  std::string with_units = linear(30);
+  with_units.insert(with_units.find('\n') + 1, "mm,mm,s,\n");
+  EXPECT_THAT(dataOf(with_units).error().message,
+              HasSubstr("t.csv:2: \"mm\" in column \"reference_mm\" is not a number: if this line says units"));
+  EXPECT_THAT(dataOf(linear(19)).error().message, EndsWith("has 19 usable rows; at least 20 are needed"));
+  EXPECT_THAT(dataOf(linear(1)).error().message, HasSubstr("has 1 usable row;"));
   std::string bare = "measured_mm,reference_mm\n";
   for (int i = 0; i < 30; ++i) bare += "1001,1000\n";
   EXPECT_THAT(dataOf(bare).error().message, HasSubstr("no column that changes"));
+}
+
+TEST(ReadTable, NamesTheColumnThatIsEmptyWhereNoRowsAreLeft) {
+  std::string text = "measured_mm,reference_mm,t_s\n";
+  for (int i = 0; i < 30; ++i) text += fmt::format("nan,{},{}\n", 1000 + i, i % 3 == 0 ? "" : "5");
+  EXPECT_THAT(dataOf(text).error().message,
+              EndsWith("has 0 usable rows; at least 20 are needed: column \"measured_mm\" is empty in 30 of 30"));
+}
+
+TEST(Lock, ReadsYesAndNoAndRefusesWhatIsNeither) {
+  const auto table = [](const std::string& yes, const std::string& no) {
+    std::string text = "error_mm,t_s,locked\n";
+    for (int i = 0; i < 30; ++i) text += fmt::format("{},{},{}\n", i % 7, i, i % 3 == 0 ? yes : no);
+    return text;
+  };
+  for (const auto& [yes, no] : {std::pair{"1", "0"}, {"yes", "no"}, {"TRUE", "FALSE"}, {"ja", ""}, {"1.0", "0.0"}}) {
+    const auto data = dataOf(table(yes, no));
+    ASSERT_TRUE(data) << data.error().message;
+    EXPECT_EQ(std::ranges::count(data->locked, true), 10) << yes;
+  }
+  EXPECT_THAT(dataOf(table("22.7", "0")).error().message,
+              HasSubstr("t.csv:2: \"22.7\" in column \"locked\" is neither 1 nor 0, yes nor no"));
 }
 
 TEST(Lock, TakesWholeSessionsWhereThereAreFiveAndKeepsTheColumnWhereThereIsOne) {
@@ -228,7 +258,7 @@ TEST(ReadTable, TakesAFinerGroupForCaptures) {
 TEST(ReadTable, BringsTheReferenceToTheUnitOfWhatWasMeasuredAndSaysSo) {
   std::string text = "measured_mm,reference_m,t_s\n";
   for (int i = 0; i < 30; ++i)
-    text += std::to_string(1003 + i) + "," + std::to_string(1.0 + 0.001 * i) + "," + std::to_string(i) + "\n";
+    text += std::to_string(1003 + i + i % 2) + "," + std::to_string(1.0 + 0.001 * i) + "," + std::to_string(i) + "\n";
   const auto data = dataOf(text);
   ASSERT_TRUE(data) << data.error().message;
   EXPECT_NEAR(data->error[10], 3.0, 1e-9);
@@ -267,7 +297,7 @@ TEST(ReadTable, TakesThePeriodInTheUnitOfAHeaderAndInNoneWithoutOne) {
   const auto table = [](const std::string& measured, const std::string& reference, double metre) {
     std::string text = measured + "," + reference + ",t_s\n";
     for (int i = 0; i < 30; ++i)
-      text += fmt::format("{},{},{}\n", metre * (1.0 + 0.01 * i), metre * (1.0 + 0.01 * i), i % 7);
+      text += fmt::format("{},{},{}\n", 1e3 * (1.0 + 0.01 * i + 0.001 * (i % 2)), metre * (1.0 + 0.01 * i), i % 7);
     return text;
   };
   EXPECT_NEAR(dataOf(table("measured_mm", "reference_m", 1.0), map)->period, 2.49827, 1e-5);
@@ -323,6 +353,28 @@ TEST(RowChecks, LeaveOutWhatIsTheMeasuredValueOrTheErrorAgain) {
   ASSERT_TRUE(data) << data.error().message;
   EXPECT_THAT(covariatesOf(*data), ElementsAre("reference_mm", "temperature_c"));
   EXPECT_THAT(data->notes.front(), HasSubstr("left out: filtered_m, offset_mm"));
+}
+
+/// In whatever unit, with an offset or rounded; what errors go with stays, though it tells them without noise.
+TEST(RowChecks, LeaveOutWhatIsTheMeasuredValueInAnotherUnitAndNothingElse) {
+  std::string text = "measured_mm,reference_mm,phase_rad,raw_counts,delay_ns,z_raw_mm,temperature_c,amplitude\n";
+  for (int i = 0; i < 100; ++i) {
+    const double temperature = 20.0 + 5.0 * std::sin(0.9 * i), reference = 1000.0 + 10.0 * (i * 37 % 100);
+    const double measured = reference + temperature - 20.0;
+    text += fmt::format("{},{},{:.5f},{:.0f},{:.4f},{:.2f},{},{}\n", measured, reference, measured * 0.000838,
+                        measured * 8.74, measured / 149.8962, 1.013 * measured - 20.0, temperature,
+                        1e9 / (reference * reference));
+  }
+  const auto data = dataOf(text);
+  ASSERT_TRUE(data) << data.error().message;
+  EXPECT_THAT(covariatesOf(*data), ElementsAre("reference_mm", "temperature_c", "amplitude"));
+  EXPECT_THAT(data->doubts, testing::Contains(HasSubstr("\"phase_rad\" is the measured value again")));
+}
+
+TEST(ReadTable, SaysThatAnErrorIsTheSameInEveryRow) {
+  std::string text = "measured_mm,reference_mm,row\n";
+  for (int i = 0; i < 30; ++i) text += fmt::format("{},{},{}\n", 1005.1 + i, 1000.1 + i, i);
+  EXPECT_THAT(dataOf(text).error().message, HasSubstr("t.csv: the error is 5 mm in every row: an offset"));
 }
 
 TEST(ReadTable, ColumnsOfPixelsAreCounted) {

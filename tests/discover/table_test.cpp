@@ -239,8 +239,25 @@ TEST(DiscoverTable, NeverLooksAtLockedRowsBeforeItIsDone) {
   EXPECT_GT(b->judged.after.rms, 10.0 * a->judged.after.rms);
 }
 
+/// Without any noise a curve is no better than the line that it is.
+TEST(DiscoverTable, CallsAStraightLineWithoutNoiseAStraightLine) {
+  std::mt19937 random{5};
+  std::uniform_real_distribution<double> uniform;
+  std::string text = "reference_mm,measured_mm,temp_c\n";
+  for (int i = 0; i < 200; ++i) {
+    const double reference = 500.0 + 6500.0 * uniform(random), temperature = 16.0 + 18.0 * uniform(random);
+    text += fmt::format("{:.6f},{:.6f},{:.6f}\n", reference, reference + 5.0 + 0.6 * (temperature - 25.0), temperature);
+  }
+  const auto discovery = discoverTable(write("exact.csv", text), {});
+  ASSERT_TRUE(discovery) << discovery.error().message;
+  ASSERT_EQ(discovery->finding.effects.size(), 1u);
+  EXPECT_EQ(discovery->finding.effects[0].name, "temp_c");
+}
+
 TEST(TableMap, SaysUnknownKeysAndDoubleMeanings) {
   EXPECT_THAT(loadTableMap(write("a.toml", "mesured = 'a'\n")).error().message, HasSubstr("mesured"));
+  EXPECT_THAT(loadTableMap(write("open.toml", "measured = \"a\n")).error().message,
+              HasSubstr("texts in quotes: measured = \"depth_mm\""));
   EXPECT_THAT(loadTableMap(write("b.toml", "measured = 'a'\nerror = 'b'\n")).error().message,
               HasSubstr("say it one way"));
   EXPECT_THAT(loadTableMap(write("c.toml", "[[covariate]]\nnature = 'time'\n")).error().message,
