@@ -11,6 +11,7 @@
 
 #include <fmt/format.h>
 
+#include "calib/discover/far_rows.h"
 #include "calib/discover/headers.h"
 #include "calib/discover/named_columns.h"
 #include "calib/discover/reference_column.h"
@@ -280,7 +281,8 @@ Result<TableData> readTable(const CsvTable& table, const TableMap& map, const st
   const double scale = lengthFactor(unitOf(roles->reference), data.unit);
   if (auto done = checkUnits(*roles, data, scale); !done) return done.error();
   setInvalidAside(data, scale);
-  dropCopies(data, scale);
+  dropCopies(data, scale);  // a fit with one of them would follow every row
+  setFarAside(data);
   dropEmptySessions(data);
   if (data.rows() < kFewestRows) {
     return Error{Error::Code::InvalidArgument,
