@@ -2,8 +2,12 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <random>
+#include <utility>
+#include <vector>
 
 #include <Eigen/Dense>
 
@@ -34,8 +38,20 @@ class Draws {
     }
     return out;
   }
+  /// In any order, each as likely (R. Durstenfeld, Commun. ACM 7 (1964) 420).
+  template <class T>
+  void shuffle(std::vector<T>& all) {
+    for (std::size_t left = all.size(); left > 1; --left) std::swap(all[left - 1], all[below(left)]);
+  }
 
  private:
+  /// 0 to count − 1, each as likely.
+  std::uint64_t below(std::uint64_t count) {
+    const std::uint64_t end = std::numeric_limits<std::uint64_t>::max() / count * count;
+    std::uint64_t word = bits_();
+    while (word >= end) word = bits_();  // what is left of the last round
+    return word % count;
+  }
   /// Between 0 and 1, neither of them.
   double uniform() { return (static_cast<double>(bits_() >> 11) + 0.5) * 0x1p-53; }
 
