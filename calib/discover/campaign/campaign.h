@@ -42,21 +42,27 @@ struct RepeatedRaw {
   std::vector<Repeated> closures{};
 };
 
-/// What one frame says as a whole: the mean of its ranges, in which pixels weigh by the square of their amplitude, and 100
-/// times the logarithm of the sum of the amplitudes. 0 where it has none.
+/// What one frame says as a whole: the mean of its ranges, in which pixels weigh by the square of their amplitude, and
+/// 100 times the logarithm of the sum of the amplitudes. 0 where it has none.
 struct FrameAlone {
   std::uint64_t sequence = 0;
   double range_mm = 0.0, gain_percent = 0.0;
 };
 
-/// Frames that come again: those whose number leaves this rest.
+/// Frames that come again.
 struct FrameClass {
+  enum class Kind {
+    OfSource,   ///< whose number, as the source counts them, leaves the rest by the period
+    InCapture,  ///< the same, counted from the first of each capture
+    AtPlace     ///< one of each capture: the rest is its place
+  };
+  Kind kind = Kind::OfSource;
   std::uint64_t period = 1, rest = 0;
-  bool is_in_capture = false;  ///< counted from the first frame of each capture, not by the source
 
   /// `place`: in its capture.
   [[nodiscard]] bool has(std::uint64_t sequence, std::size_t place) const {
-    return (is_in_capture ? place : sequence) % period == rest;
+    if (kind == Kind::AtPlace) return place == rest;
+    return (kind == Kind::InCapture ? place : sequence) % period == rest;
   }
 };
 
@@ -154,8 +160,8 @@ struct TracedCapture {
   std::array<Image<float>, 5> range_m{}, log_amplitude{};
   Image<float> tracing_variance_m2,
       tracing_variance;         ///< of range and of ln amplitude, from Monte Carlo
-  /// Of the light of a pixel and those about it, the share that has been at more than one surface; 0 where that is less than
-  /// the tracer's noise makes of none.
+  /// Of the light of a pixel and those about it, the share that has been at more than one surface; 0 where that is less
+  /// than the tracer's noise makes of none.
   Image<float> multipath{};
   Stood stood{};                ///< the light was traced there; the changes are from there, too
   Image<std::uint8_t> is_jump;  ///< next to a jump of range, or of what is painted on it
