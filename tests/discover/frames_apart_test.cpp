@@ -207,5 +207,19 @@ TEST_F(Searched, AFrameThatIsApartIsLeftOutOfTheMeans) {
   EXPECT_EQ(finding.model_toml.find("learned"), std::string::npos) << "no model has what one frame has too much";
 }
 
+/// Of two frames without the first one is left, which says nothing of its noise: such captures keep both, and it is
+/// said.
+TEST_F(Searched, WhatWouldBeLeftWithoutRepeatsIsTold) {
+  plan_ = withReplaced(smallPlan(), {{"name = \"ambient\"\n", "name = \"ambient\"\nframes = 2\n"},
+                                     {"name = \"judge\"\n", "name = \"judge\"\nframes = 2\n"}});
+  simulate("", [](sim::RangeImage& image, const Moment&, const CameraInfo&, std::uint64_t frame) {
+    for (float& range : image.range_m.pixels()) range += frame == 0 ? 0.02F : 0.0F;
+  });
+  const CampaignFinding finding = search(job());
+  EXPECT_THAT(verdictOf(finding), HasSubstr("the 1st frame of each capture differs from the others"));
+  EXPECT_THAT(finding.notes, Contains(HasSubstr("3 open captures keep all frames")));
+  EXPECT_THAT(finding.notes, Contains(HasSubstr("3 locked captures keep all frames")));
+}
+
 }  // namespace
 }  // namespace toftwin::discover

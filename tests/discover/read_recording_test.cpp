@@ -116,6 +116,43 @@ TEST_F(Recording, TakesPosesFromAnotherOne) {
   EXPECT_THAT(neither.error().message, testing::HasSubstr("has none, either"));
 }
 
+/// Without frames of a class that many captures have too few others of, the same captures are put aside: else some that
+/// were searched for the class would be judged as locked ones.
+TEST_F(Recording, IsCutAndPutAsideAlikeWithoutSomeOfItsFrames) {
+  const auto namesOf = [](const std::vector<MeasuredCapture>& captures) {
+    std::vector<std::string> names;
+    for (const MeasuredCapture& one : captures) names.push_back(one.record.name + " at " + one.stand);
+    return names;
+  };
+  const FrameClass every_second{.kind = FrameClass::Kind::InCapture, .period = 2};
+  const auto all = readRecording(folder_ / "with.mcap", {}),
+             some = readRecording(folder_ / "with.mcap", {}, every_second);
+  ASSERT_TRUE(all && some) << (some ? "" : some.error().message);
+  EXPECT_EQ(namesOf(some->captures), namesOf(all->captures));
+  EXPECT_EQ(namesOf(some->put_aside), namesOf(all->put_aside));
+  EXPECT_EQ(some->notes, all->notes);
+  std::size_t whole = 0;
+  for (std::size_t c = 0; c < std::min(all->captures.size(), some->captures.size()); ++c) {
+    const MeasuredCapture& one = some->captures[c];
+    EXPECT_EQ(one.keeps_all, all->captures[c].frames < 4);
+    EXPECT_EQ(one.frames, one.keeps_all ? all->captures[c].frames : all->captures[c].frames / 2);
+    whole += one.keeps_all ? 1 : 0;
+  }
+  EXPECT_GE(whole, 5U);
+  EXPECT_LT(whole, some->captures.size());
+}
+
+TEST_F(Recording, ARunsCapturesThatWouldHaveNoRepeatsKeepAll) {
+  const FrameClass of_first{.kind = FrameClass::Kind::AtPlace},
+      of_second{.kind = FrameClass::Kind::InCapture, .period = 2};
+  const auto first = readCampaign(folder_, Side::A, of_first), every_second = readCampaign(folder_, Side::A, of_second);
+  ASSERT_TRUE(first && every_second);
+  for (const MeasuredCapture& one : first->captures) EXPECT_EQ(one.frames, 2U) << one.record.name;
+  EXPECT_TRUE(std::ranges::none_of(first->captures, &MeasuredCapture::keeps_all));
+  EXPECT_TRUE(std::ranges::all_of(every_second->captures, &MeasuredCapture::keeps_all));
+  EXPECT_EQ(every_second->captures.front().frames, 3U);
+}
+
 /// A camera is carried about and recorded; nothing else is known but where it was.
 TEST_F(Recording, IsSearchedForWhatTheCameraFileLacks) {
   record("[[effect]]\ntype = 'clock_scale'\nppm = 5000.0\n");

@@ -38,14 +38,15 @@ class Searched : public testing::Test {
   }
   void simulateWith(const std::string& camera_text, const Spoil& spoil = {}, bool with_poses = true,
                     int frames = 0, std::uint64_t seed = 1) const {
-    auto plan = plan::parsePlan(smallPlan(), "plan.toml");
+    auto plan = plan::parsePlan(plan_, "plan.toml");
     const auto camera = sim::SensorModel::parse(camera_text, "camera.toml");
     const auto scene = sim::Scene::parse(smallScene(), "scene.toml");
     if (!plan || !camera || !scene) throw std::runtime_error("the small campaign's files are wrong");
     SimulatedRun run{
         .plan = *plan, .camera = *camera, .scene = *scene, .spoil = spoil, .with_poses = with_poses};
     run.frames = frames, run.seed = seed, run.with_samples = with_samples_;
-    run.rig_mm_per_m = rig_mm_per_m_, run.bumped = bumped_, run.shared_paths = shared_paths_, run.max_surfaces = surfaces();
+    run.rig_mm_per_m = rig_mm_per_m_, run.bumped = bumped_;
+    run.shared_paths = shared_paths_, run.max_surfaces = surfaces();
     if (shared_paths_ > 0) run.pose_error_m = run.pose_error_deg = run.light_error = 0.0;
     discover::write(run, folder_ / "run");
   }
@@ -81,6 +82,7 @@ class Searched : public testing::Test {
     return names;
   }
   std::filesystem::path folder_;
+  std::string plan_ = smallPlan();
   bool with_samples_ = false;  ///< raw exposures are recorded, too
   double rig_mm_per_m_ = 0.0;  ///< SimulatedRun::rig_mm_per_m
   std::vector<int> bumped_{};  ///< SimulatedRun::bumped

@@ -86,6 +86,7 @@ struct MeasuredCapture {
   std::vector<std::pair<std::uint64_t, std::int64_t>> drawn_by{};
   Image<float> valid_share;
   std::vector<FrameAlone> each{};          ///< by frame
+  bool keeps_all = false;  ///< those that were to be left out, too: without them it had no repeats
   std::vector<AmplitudePair> dim_pairs{};  ///< of the first two frames
   std::optional<RepeatedRaw> raw{};        ///< where all frames have their raw exposures
 };
@@ -109,7 +110,8 @@ struct Campaign {
   std::optional<FrameClass> without{};        ///< frames that were not read
 };
 
-/// Reads the open captures, without frames of the class where two others stay. Errors name capture and file: no run,
+/// Reads the open captures, without frames of the class where two others stay: which captures there are, and which are
+/// put aside, does not depend on it. Errors name capture and file: no run,
 /// one that is damaged, without poses, without repeats, without ranges.
 Result<Campaign> readCampaign(const std::filesystem::path& folder, Side side,
                               const std::optional<FrameClass>& without = {});

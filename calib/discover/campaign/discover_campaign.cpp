@@ -12,16 +12,17 @@
 #include "calib/discover/campaign/before_search.h"
 #include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/found_model.h"
+#include "calib/discover/campaign/frames_apart.h"
+#include "calib/discover/campaign/gather_capture.h"
 #include "calib/discover/campaign/light_noise.h"
 #include "calib/discover/campaign/locked_places.h"
 #include "calib/discover/campaign/model_file.h"
 #include "calib/discover/campaign/next_capture.h"
 #include "calib/discover/campaign/pool_noise.h"
-#include "calib/discover/campaign/frames_apart.h"
 #include "calib/discover/campaign/reading.h"
 #include "calib/discover/campaign/search_rounds.h"
-#include "calib/discover/campaign/stood_off.h"
 #include "calib/discover/campaign/step_effect.h"
+#include "calib/discover/campaign/stood_off.h"
 #include "calib/discover/marginal.h"
 
 namespace toftwin::discover {
@@ -142,12 +143,22 @@ Result<> knowNoise(const Declared& declared, const std::vector<std::shared_ptr<c
   return {};
 }
 
+/// Frames that are apart stay where no others would be left.
+void noteWhole(const std::vector<MeasuredCapture>& captures, const std::string& what, CampaignFinding& finding) {
+  const auto whole = static_cast<std::size_t>(std::ranges::count_if(captures, &MeasuredCapture::keeps_all));
+  if (whole == 0) return;
+  finding.notes.push_back(
+      fmt::format("{} {} all frames, those that differ from the others, too: fewer than two others would be left.",
+                  howMany(whole, what), whole == 1 ? "keeps" : "keep"));
+}
+
 Result<> judgeLocked(const CampaignJob& job, const Campaign& campaign, const JudgedCampaign& searched,
                      const JudgedModels& models, CampaignFinding& finding) {
   const Declared& declared = searched.declared;
   if (auto opened = openLockedOf(job, campaign); !opened) return opened;
   auto captures = readLocked(campaign);
   if (!captures) return captures.error();
+  noteWhole(*captures, "locked capture", finding);
   TraceOptions options = job.trace;
   options.seed +=
       0x5bd1e995U;  // light of its own: what the open captures' light has by chance must not help
@@ -292,6 +303,7 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
   if (auto whole = checkLockedFiles(job, *campaign); !whole) return whole.error();
   CampaignFinding finding;
   finding.notes = campaign->notes;
+  noteWhole(campaign->captures, "open capture", finding);
   noteHiddenLightNoise(campaign->captures, finding.notes);
   noteNoiseDrawnAlike(campaign->captures, finding.notes);
   if (auto taken = takeLens(*campaign, declared, finding.notes); !taken) return taken.error();

@@ -251,11 +251,8 @@ struct CaptureGatherer::State {
   Image<float> first_amplitude;
   Image<float> valid;
   bool has_amplitude = true;
-  std::optional<FrameClass> without;
-  std::size_t place = 0;  ///< of the frame in the capture, with those that are passed over
 
   Result<> add(const Frame& frame) {
-    if (without && without->has(frame.sequence, place++)) return {};
     if (capture.frames == 0) camera = frame.camera, capture.moment = frame.moment;
     mean_moment.add(frame.moment);
     light.add(frame);
@@ -300,16 +297,28 @@ struct CaptureGatherer::State {
 };
 
 CaptureGatherer::CaptureGatherer(const plan::CaptureRecord& record, const std::optional<FrameClass>& without)
-    : state_(std::make_unique<State>()) {
-  state_->capture.record = record, state_->without = without;
+    : kept_(std::make_unique<State>()), without_(without) {
+  kept_->capture.record = record;
+  if (!without) return;
+  all_ = std::make_unique<State>();
+  all_->capture.record = record, all_->capture.keeps_all = true;
 }
 CaptureGatherer::CaptureGatherer(CaptureGatherer&&) noexcept = default;
 CaptureGatherer& CaptureGatherer::operator=(CaptureGatherer&&) noexcept = default;
 CaptureGatherer::~CaptureGatherer() = default;
 
-Result<> CaptureGatherer::add(const Frame& frame) { return state_->add(frame); }
-std::size_t CaptureGatherer::frames() const { return state_->capture.frames; }
-const CameraInfo& CaptureGatherer::camera() const { return state_->camera; }
-MeasuredCapture CaptureGatherer::finish() { return state_->finish(); }
+Result<> CaptureGatherer::add(const Frame& frame) {
+  if (all_) {
+    if (auto added = all_->add(frame); !added) return added;
+  }
+  if (without_ && without_->has(frame.sequence, place_++)) return {};
+  auto added = kept_->add(frame);
+  if (kept_->capture.frames >= kFewestRepeats) all_.reset();
+  return added;
+}
+CaptureGatherer::State& CaptureGatherer::chosen() const { return all_ ? *all_ : *kept_; }
+std::size_t CaptureGatherer::frames() const { return chosen().capture.frames; }
+const CameraInfo& CaptureGatherer::camera() const { return chosen().camera; }
+MeasuredCapture CaptureGatherer::finish() { return chosen().finish(); }
 
 }  // namespace toftwin::discover

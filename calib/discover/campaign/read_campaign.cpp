@@ -34,8 +34,7 @@ Result<ReadOne> readOne(const std::filesystem::path& folder, Side side, const pl
     if (!frame) return ofCapture(record, frame.error().message, frame.error().code);
     if (auto added = gathered.add(*frame); !added) return added.error();
   }
-  if (gathered.frames() < 2 && without) return readOne(folder, side, record, {});  // better than no capture
-  if (gathered.frames() < 2) {
+  if (gathered.frames() < kFewestRepeats) {
     return ofCapture(
         record,
         fmt::format("has {} frame(s): without repeats nothing is known of the noise; measure with "

@@ -153,8 +153,9 @@ class Cutter {
     return gathered_->add(frame);
   }
   void finish() {
-    if (gathered_ && gathered_->frames() >= 2) {
+    if (gathered_ && gathered_->frames() >= kFewestRepeats) {
       camera = gathered_->camera();
+      stood.push_back(*moment_.world_from_camera);
       captures.push_back(gathered_->finish());
     } else if (gathered_) {
       ++alone;
@@ -162,6 +163,7 @@ class Cutter {
     gathered_.reset();
   }
   std::vector<MeasuredCapture> captures{};
+  std::vector<Pose> stood{};  ///< of each of them, as its first frame says, whether it is passed over or not
   CameraInfo camera{};
   std::size_t alone = 0;  ///< frames that belong to no other
 
@@ -169,7 +171,7 @@ class Cutter {
   std::string file_;
   std::size_t most_frames_;
   std::optional<FrameClass> without_;
-  std::size_t offered_ = 0;  ///< frames of the capture, with those that are passed over: its ends stay where they are
+  std::size_t offered_ = 0;  ///< frames of the capture, with those that are passed over: it ends where it would
   std::size_t number_ = 0;
   std::optional<CaptureGatherer> gathered_{};
   Moment moment_{};
@@ -204,15 +206,15 @@ struct Locking {
 
 /// For each capture the first one from its place: within a centimetre and 0.01 rad, a rig's errors are
 /// shared.
-std::vector<std::size_t> placesOf(const std::vector<MeasuredCapture>& captures) {
+std::vector<std::size_t> placesOf(const std::vector<Pose>& stood) {
   constexpr double kNear_m = 0.01, kNear_rad = 0.01;
   const auto isNear = [&](std::size_t a, std::size_t b) {
-    const auto by = captures[a].moment.world_from_camera->inverse() * *captures[b].moment.world_from_camera;
+    const auto by = stood[a].inverse() * stood[b];
     const auto& q = by.rotation_wxyz;
     return norm(by.translation_m) < kNear_m && 2.0 * std::hypot(q[1], q[2], q[3]) < kNear_rad;
   };
   std::vector<std::size_t> places;
-  for (std::size_t c = 0; c < captures.size(); ++c) {
+  for (std::size_t c = 0; c < stood.size(); ++c) {
     std::size_t first = 0;
     while (first < c && (places[first] != first || !isNear(first, c))) ++first;
     places.push_back(first);
@@ -300,7 +302,7 @@ Result<Campaign> readRecording(const std::filesystem::path& file, const std::fil
             howMany(cutter->captures.size(), "capture"),
             poses->damage.empty() ? "" : ". The recording is cut short or damaged: " + poses->damage)};
   }
-  const std::vector<std::size_t> places = placesOf(cutter->captures);
+  const std::vector<std::size_t> places = placesOf(cutter->stood);
   const Locking locking = lockingOf(places, cutter->captures);
   putStands(places, cutter->captures);
   for (std::size_t c = 0; c < cutter->captures.size(); ++c) {
