@@ -176,7 +176,7 @@ std::string inWords(const CampaignFinding& finding) {
 }
 
 Score scoreOf(const Case& of, const CampaignFinding& finding) {
-  Score score{.of = of, .p = finding.finding.first_p, .removed = kNaN};
+  Score score{.of = of, .p = finding.leastP(), .removed = kNaN};
   score.is_detected = score.p <= 0.01;
   score.seconds = finding.seconds, score.found = inWords(finding);
   if (const auto& judged = finding.judgement) {

@@ -7,6 +7,7 @@
 
 #include <gmock/gmock.h>
 
+#include "calib/discover/campaign/campaign_json.h"
 #include "calib/discover/campaign/frames_apart.h"
 #include "tests/discover/searched.h"
 
@@ -204,6 +205,13 @@ TEST_F(Searched, AFrameThatIsApartIsLeftOutOfTheMeans) {
   EXPECT_THAT(finding.effects.front().found.covariates, ElementsAre("frame"));
   EXPECT_THAT(verdictOf(finding), HasSubstr("the 1st frame of each capture differs from the others"));
   EXPECT_THAT(finding.notes, Contains(HasSubstr("left out of all means")));
+  ASSERT_TRUE(finding.alike_p);
+  EXPECT_LT(*finding.alike_p, 0.002);
+  EXPECT_GT(finding.finding.first_p, 0.01) << "of the other frames";
+  const compare::Json json = jsonOf(job(), finding);
+  EXPECT_EQ(json.find("p_no_steps"), nullptr);
+  ASSERT_NE(json.find("p_frames_alike"), nullptr);
+  EXPECT_EQ(json.find("p_frames_alike")->number(), *finding.alike_p);
   EXPECT_EQ(finding.model_toml.find("learned"), std::string::npos) << "no model has what one frame has too much";
 }
 

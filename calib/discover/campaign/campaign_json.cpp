@@ -110,6 +110,8 @@ Json jsonOf(const CampaignJob& job, const CampaignFinding& finding) {
       .set("frames", finding.frames)
       .set("locked", finding.locked);
   data.set("p", finding.finding.first_p).set("p_left", finding.finding.last_p);
+  if (finding.alike_p) data.set("p_frames_alike", *finding.alike_p);
+  if (finding.steps_p) data.set("p_no_steps", *finding.steps_p);
   data.set("offset_mm", finding.zero.offset_mm).set("offset_error_mm", finding.zero.offset_error_mm);
   data.set("delay_of_light_mm", finding.zero.delay_mm);
   data.set("scales", Json::arrayOf(finding.finding.scales)).set("chi2_per_row", finding.dispersion);

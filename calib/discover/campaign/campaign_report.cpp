@@ -68,7 +68,8 @@ std::string numbersInWords(const FoundEffect& one) {
   for (const Estimate& number : one.found.numbers) found.push_back(withError(number.name, number.value, number.error));
   const std::string numbers = found.size() > kMost ? "" : fmt::format("{}", fmt::join(found, "; "));
   if (!one.fitted) {
-    const std::string why = isOfPoses(one.found.covariates) ? "the camera is as it was" : "the simulator has no form for it";
+    const bool is_of_poses = isOfPoses(one.found.covariates);
+    const std::string why = is_of_poses ? "the camera is as it was" : "the simulator has no form for it";
     return fmt::format("{}{}{}; it is not in model.toml", numbers, numbers.empty() ? "" : "; ", why);
   }
   if (!fitted.empty()) return fmt::format("{}", fmt::join(fitted, "; "));
@@ -117,7 +118,8 @@ bool hasDelay(const CampaignFinding& finding) { return finding.zero.delay_mm != 
 /// What model.toml has that is no effect, and what of the locked captures' error it is; empty: nothing.
 std::string delayInWords(const CampaignFinding& finding) {
   if (!hasDelay(finding)) return "";
-  std::string words = fmt::format("a delay of the light of {:.2f} mm, which the camera file lacks", finding.zero.delay_mm);
+  std::string words =
+      fmt::format("a delay of the light of {:.2f} mm, which the camera file lacks", finding.zero.delay_mm);
   const auto& judged = finding.judgement;
   if (judged && judged->removed_by_zero < 0.0)
     words += fmt::format(", by itself makes the locked captures fit worse, by {} of what can be explained",
@@ -200,6 +202,14 @@ std::string rawInWords(const FoundEffect& one) {
   return fmt::format("{}", fmt::join(words, ". "));
 }
 
+/// The tests of single frames that told something, each after `between`.
+std::string singleFramesInWords(const CampaignFinding& finding, const std::string& between) {
+  std::string words;
+  if (finding.alike_p) words += fmt::format("{}that all frames are alike: p = {:.3g}", between, *finding.alike_p);
+  if (finding.steps_p) words += fmt::format("{}that they have no steps: p = {:.3g}", between, *finding.steps_p);
+  return words;
+}
+
 compare::Section foundSection(const CampaignFinding& finding) {
   compare::Section section{
       .id = "effects", .title = "What was found", .verdict = verdictOf(finding)};
@@ -230,10 +240,10 @@ compare::Section foundSection(const CampaignFinding& finding) {
   section.blocks.emplace_back(compare::Paragraph{fmt::format(
       "Is there anything? p = {:.3g} for all {} groups together, against {} campaigns with nothing "
       "in "
-      "them{}; of what is left p = {:.3g}. Offset of the device against its poses: {}.",
+      "them{}; of what is left p = {:.3g}{}. Offset of the device against its poses: {}.",
       finding.finding.first_p, finding.finding.score_names.size(), finding.finding.draws,
       finding.finding.null_model == NullModel::SignFlips ? " (sign flips of captures)" : "",
-      finding.finding.last_p,
+      finding.finding.last_p, singleFramesInWords(finding, "; of single frames, "),
       compare::shownWithError(finding.zero.offset_mm, finding.zero.offset_error_mm, 2) + " mm" +
           (finding.zero.delay_mm == 0.0
                ? ""
@@ -258,7 +268,7 @@ std::vector<compare::Card> cardsOf(const CampaignFinding& finding) {
       {"effects found", std::to_string(countOf(finding) + finding.updates.size()),
        fmt::format("{}, {}", howMany(finding.captures, "capture"), howMany(finding.frames, "frame"))},
       {"p of nothing being there", fmt::format("{:.3g}", finding.finding.first_p),
-       fmt::format("of what is left: {:.3g}", finding.finding.last_p)}};
+       fmt::format("of what is left: {:.3g}{}", finding.finding.last_p, singleFramesInWords(finding, "; "))}};
   if (const auto& judged = finding.judgement) {
     cards.push_back(
         {"RMS, locked captures",

@@ -273,7 +273,7 @@ void keepIfWorse(const std::string& text, const Declared& declared, CampaignFind
 
 void addFramesApart(const FramesApart& apart, CampaignFinding& finding) {
   finding.effects.push_back(effectOf(apart));
-  finding.finding.first_p = std::min(finding.finding.first_p, apart.p);
+  finding.alike_p = apart.p;
   if (apart.isMinority())
     finding.notes.push_back(fmt::format("What else is told is of the other frames: {} is left out of all means.",
                                         apart.inWords()));

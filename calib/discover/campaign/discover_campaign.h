@@ -86,6 +86,8 @@ struct CampaignFinding {
   std::string camera{}, plan{};
   std::size_t captures = 0, locked = 0, frames = 0;
   Finding finding{};
+  /// Single frames are tested by themselves: that they are alike, that no steps are in them. None: nothing was told.
+  std::optional<double> alike_p{}, steps_p{};
   std::vector<FoundEffect> effects{};
   std::vector<FittedEffect> updates{};  ///< declared effects whose numbers were wrong
   Zero zero{};  ///< with what was found; its delay whole
@@ -99,6 +101,10 @@ struct CampaignFinding {
   std::vector<std::string> notes{};
   double seconds = 0.0;
 
+  /// The least of all tests: of all groups together, and of single frames.
+  [[nodiscard]] double leastP() const {
+    return std::min({finding.first_p, alike_p.value_or(1.0), steps_p.value_or(1.0)});
+  }
   /// Whether anything was found that means over frames show, so that locked captures can judge it.
   [[nodiscard]] bool hasJudged() const {
     return !std::ranges::all_of(updates, &FittedEffect::is_of_single_frames) ||

@@ -73,7 +73,7 @@ void addSteps(const CampaignJob& job, const sim::SensorModel& model, const Sampl
   if (declared && std::abs(std::get<sim::Quantisation>(model.effects()[*declared]).step_electrons -
                            own.step) < std::max(kSame * own.step, 3.0 * own.error))
     return;
-  finding.finding.first_p = std::min(finding.finding.first_p, own.p);
+  finding.steps_p = own.p;
   const FittedEffect fitted{.effect = sim::Quantisation{.step_electrons = own.step},
                             .numbers = {{"step_electrons", own.step, own.error}},
                             .is_of_single_frames = true,
