@@ -49,7 +49,8 @@ TEST_F(Searched, WhatTwoThingsDoEachByItselfIsNoProduct) {
   ASSERT_GE(finding.effects.size(), 1U) << verdictOf(finding);
   for (const FoundEffect& one : finding.effects) {
     const auto& covariates = one.found.covariates;
-    const bool has_both = std::ranges::count(covariates, "radius_px") > 0 && std::ranges::count(covariates, "column") > 0;
+    const bool has_both =
+        std::ranges::count(covariates, "radius_px") > 0 && std::ranges::count(covariates, "column") > 0;
     EXPECT_FALSE(has_both) << one.found.name;
   }
   ASSERT_TRUE(finding.judgement);
@@ -67,8 +68,8 @@ TEST(TemperatureRates, AreOfOnePowerCycle) {
   for (const auto& rates : temperatureRates(captures)) EXPECT_NEAR(rates.at(0).c_per_min, 0.5, 1e-9);
 }
 
-/// Cooling and warming by one exponential: at any time the slope is that of the curve, whatever the captures' spacing; the
-/// room's is nobody's.
+/// Cooling and warming by one exponential: at any time the slope is that of the curve, whatever the captures' spacing;
+/// the room's is nobody's.
 TEST(TemperatureRates, AreTheCurvesSlopes) {
   std::vector<MeasuredCapture> captures(30);
   for (std::size_t c = 0; c < captures.size(); ++c) {

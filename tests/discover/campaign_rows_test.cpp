@@ -207,7 +207,8 @@ TEST_F(Rows, APatternThatStaysAtItsPixelsIsSeenWhereverTheyLook) {
       if (test.names()[score.group].starts_with("a pattern of pixels")) most = std::max(most, score.z);
     return most;
   };
-  EXPECT_GT(seen(make("[[effect]]\ntype = 'fixed_pattern_phase'\nsigma_rad = 0.002\ndevice = 4711\n", tinyCamera())), 4.5);
+  const std::string pattern = "[[effect]]\ntype = 'fixed_pattern_phase'\nsigma_rad = 0.002\ndevice = 4711\n";
+  EXPECT_GT(seen(make(pattern, tinyCamera())), 4.5);
   EXPECT_LT(seen(make("", tinyCamera())), 4.5);
 }
 

@@ -75,8 +75,8 @@ TEST(NamedFits, HaveOnlyTheStrengthsThatAreNeeded) {
   EXPECT_GT(only.value, 10.0 * only.error);
 }
 
-/// Of four samples neither the second nor the fourth harmonic is in any range: to write one of them, as rounding left it,
-/// would bend raw exposures.
+/// Of four samples neither the second nor the fourth harmonic is in any range: to write one of them, as rounding left
+/// it, would bend raw exposures.
 TEST_F(Searched, ANumberThatNothingTellsStaysAtNothing) {
   std::string camera = tinyCamera();
   camera.replace(camera.find("taps = 2"), 8, "taps = 2\nharmonics = 5");
@@ -93,8 +93,8 @@ TEST_F(Searched, ANumberThatNothingTellsStaysAtNothing) {
     EXPECT_TRUE(number.key != "second" || std::abs(number.value - 0.1) < 3.0 * number.error) << number.error;
 }
 
-/// A veil and a halo answer for each other: each number's error is half as large as it or more, and yet there is no doing
-/// without the halo (χ² of 20 and more).
+/// A veil and a halo answer for each other: each number's error is half as large as it or more, and yet there is no
+/// doing without the halo (χ² of 20 and more).
 TEST_F(Searched, NumbersThatAnswerForEachOtherAreNotBothNeedless) {
   for (const std::uint64_t seed : {1U, 5U, 11U}) {
     simulate("[[effect]]\ntype = 'lens_scatter'\nveil = 0.002\nhalo = 0.004\n", {}, true, 0, seed);

@@ -61,8 +61,9 @@ TEST(SmearedRanges, AreSharesOfNeighbours) {
   EXPECT_EQ(all.at("smeared:around").log_amplitude(1, 1), 0.0F) << "the light is as it was";
 }
 
-/// A firmware that takes a quarter of each dim pixel's left neighbour: a shift of a quarter of a pixel where it is dim, and
-/// none where it is not. (As two filters, one for all pixels and one that takes it off bright ones, it was worse than none.)
+/// A firmware that takes a quarter of each dim pixel's left neighbour: a shift of a quarter of a pixel where it is dim,
+/// and none where it is not. (As two filters, one for all pixels and one that takes it off bright ones, it was worse
+/// than none.)
 TEST_F(Searched, RangesThatComeFromNeighboursAreTold) {
   simulate("", [](sim::RangeImage& image, const Moment&, const CameraInfo&, std::uint64_t) {
     const Image<float> as_read = image.range_m;

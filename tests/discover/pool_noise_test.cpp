@@ -17,7 +17,8 @@ namespace {
 
 /// Variances of 1 + x/10 in columns x, each known from eight differences: 125 pixels of a bin know theirs to
 /// √(2/8/125) = 4.5 %, and lines between the middles of bins are as straight as what is sought. Five of that
-/// are passed by one of 950 columns in 5e-4 of all seeds. Before the first bin's middle, 21, and behind the last it is theirs.
+/// are passed by one of 950 columns in 5e-4 of all seeds. Before the first bin's middle, 21, and behind the last it is
+/// theirs.
 TEST(PooledOver, IsWhatPixelsThatAreAlikeSayTogether) {
   constexpr int kWidth = 1000, kEnd = 25;
   std::mt19937 random{7};
@@ -73,9 +74,9 @@ Seen seen() {
   return seen;
 }
 
-/// Noise of 3 % of the brightest pixel's amplitude: 20 to 30 % of the dark strip's. Pooled as measured, a pixel that noise
-/// made brighter counts more, and the mean is 2σ² too bright, more where noise lifts a pixel out of its bin. Seed 11; of
-/// 50 such captures the mean must be 0 within four standard errors (false alarms: 6e-5).
+/// Noise of 3 % of the brightest pixel's amplitude: 20 to 30 % of the dark strip's. Pooled as measured, a pixel that
+/// noise made brighter counts more, and the mean is 2σ² too bright, more where noise lifts a pixel out of its bin. Seed
+/// 11; of 50 such captures the mean must be 0 within four standard errors (false alarms: 6e-5).
 TEST(PoolNoise, APixelsOwnNoiseDoesNotChooseItsWeight) {
   const Seen seen_once = seen();
   const Image<float>& log = seen_once.log_amplitude;

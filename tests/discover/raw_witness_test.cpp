@@ -65,7 +65,8 @@ TEST(RawExposures, ClosuresAreWhatNoWaveMakes) {
       ASSERT_TRUE(raw);
       // Σ|s|² of one odd sample is 100: 2/K of it a wave, 1/K the mean, 1/K the alternating part, 2/K each the others.
       double squares = 0.0;
-      const double size = std::abs(std::polar(200.0, -kTurn * 0.2) + 2.0 / steps * std::polar(10.0, -kTurn * odd / steps));
+      const double size =
+          std::abs(std::polar(200.0, -kTurn * 0.2) + 2.0 / steps * std::polar(10.0, -kTurn * odd / steps));
       for (std::size_t part = 0; part < raw->closures.size(); ++part) {
         const double closure = static_cast<double>(raw->closures[part][0]) * size;
         const bool is_alone = part == 0 || (steps % 2 == 0 && part + 1 == raw->closures.size());

@@ -11,9 +11,9 @@ namespace {
 
 using Rounds = Searched;
 
-/// At the poses as they were told a pixel beside an edge mixes other shares of both sides, and what an effect does there
-/// is another thing. And along the paths of the light that is compared, an effect that smooths images would explain what
-/// these have by chance.
+/// At the poses as they were told a pixel beside an edge mixes other shares of both sides, and what an effect does
+/// there is another thing. And along the paths of the light that is compared, an effect that smooths images would
+/// explain what these have by chance.
 TEST_F(Rounds, EffectsAreTriedOnOtherLightOfThePlacesWhereTheCamerasStood) {
   simulate("");
   const auto model = sim::SensorModel::parse(tinyCamera(), "camera.toml");

@@ -207,10 +207,12 @@ TEST(DiscoverTable, DoesNotCallAWanderInTheOrderOfACovariateNothing) {
   ASSERT_THAT(verdictOf(*discovery), HasSubstr("Nothing above the noise"));
   const std::vector<RowClock> clocks = clocksOf(discovery->open);
   ASSERT_FALSE(clocks.empty());
-  RowDependence wander{.clock = clocks.front(), .best = {{.share = 0.8, .neighbour = 0.99}, 1.0, 1.0}, .falls_by = 30.0};
+  RowDependence wander{
+      .clock = clocks.front(), .best = {{.share = 0.8, .neighbour = 0.99}, 1.0, 1.0}, .falls_by = 30.0};
   discovery->noise.dependence = wander;
-  EXPECT_THAT(verdictOf(*discovery), HasSubstr("the rows stand in the order of distance_mm: a curve over it that was gone "
-                                               "through once, or a wander with time, which these rows do not tell apart"));
+  EXPECT_THAT(verdictOf(*discovery),
+              HasSubstr("the rows stand in the order of distance_mm: a curve over it that was gone through once, or a "
+                        "wander with time, which these rows do not tell apart"));
   std::ranges::shuffle(wander.clock.order, random);
   discovery->noise.dependence = wander;
   EXPECT_THAT(verdictOf(*discovery), HasSubstr("Nothing above the noise")) << "no order of anything";

@@ -85,7 +85,8 @@ TEST(TracedEdges, LeaveOutWhatAPoseAsItWasToldMayReach) {
 }
 
 /// Light that says how far away a wall is, and how it lies, does not say where along it the camera stands: four times
-/// 366 × 1 mm / 2 m are 0.73 pixels; of 420 pixels 1.7 where poses err by 2 mm, and no more where they seem to err by 9 mm.
+/// 366 × 1 mm / 2 m are 0.73 pixels; of 420 pixels 1.7 where poses err by 2 mm, and no more where they seem to err by 9
+/// mm.
 TEST(TracedEdges, LeaveOutWhatLightDoesNotSayOfThePose) {
   EXPECT_EQ(leftOut(traced({.stood = kAsTheLightSays}).is_edge), 4);
   EXPECT_EQ(leftOut(traced({.focal_px = 200.0, .stood = kAsTheLightSays}).is_edge), 2);

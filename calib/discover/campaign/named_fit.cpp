@@ -146,7 +146,8 @@ std::vector<NamedFit> CampaignRows::fitNamed(std::span<const std::string> names,
     auto fitted = one.fit(std::move(with.effects));
     if (!fitted) continue;
     // Which of its strengths are needless is of no matter where another effect explains far more.
-    const auto [refitted, gain] = maybeBest(fitted->gain) ? one.withoutNeedless(*std::move(fitted)) : *std::move(fitted);
+    const auto [refitted, gain] =
+        maybeBest(fitted->gain) ? one.withoutNeedless(*std::move(fitted)) : *std::move(fitted);
     if (!best || gain.total > best->total) best = gain;
     NamedFit fit{.name = name, .gain = gain};
     CampaignFit own{refitted.effects[with.place]};

@@ -17,8 +17,8 @@ struct TemperatureRate {
   double c_per_min = 0.0;  ///< NaN: too few captures say it
 };
 
-/// How fast a camera's temperatures change at each capture, but the room's: the slope of a parabola through the captures about
-/// it, five or all within a minute, by their own times since power-on.
+/// How fast a camera's temperatures change at each capture, but the room's: the slope of a parabola through the
+/// captures about it, five or all within a minute, by their own times since power-on.
 std::vector<std::vector<TemperatureRate>> temperatureRates(const std::vector<MeasuredCapture>& captures);
 
 }  // namespace toftwin::discover
