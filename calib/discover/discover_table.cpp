@@ -9,6 +9,9 @@
 
 #include <fmt/format.h>
 
+#include "calib/discover/few_captures.h"
+#include "calib/discover/table_words.h"
+
 namespace toftwin::discover {
 namespace {
 
@@ -43,6 +46,17 @@ void addConfounded(TableData& data) {
   }
 }
 
+/// What changes only between those that have an offset of their own.
+void addUntestable(TableDiscovery& discovery) {
+  discovery.untestable = onlyBetweenSessions(discovery.open);
+  if (discovery.untestable.empty()) return;
+  const char* part = partOf(discovery);
+  discovery.open.doubts.push_back(
+      fmt::format("{} changes only from {} to {}, and each of so few has an offset of its own: whether errors go with it "
+                  "cannot be tested. Change it within a {}, or measure more of them",
+                  joined(discovery.untestable), part, part, part));
+}
+
 /// What is said of rows that err alike.
 void addAlike(const TableSource& source, const Judged& judged, TableData& data) {
   constexpr double kErrAlike = 0.2;
@@ -74,6 +88,7 @@ Result<TableDiscovery> discoverTable(const std::filesystem::path& file, const Ta
   auto data = readTable(*csv, map, file);
   if (!data) return data.error();
   lock(*data, map);
+  giveFewCapturesOffsets(*data);
   TableDiscovery out;
   out.map = map;
   std::vector<bool> is_open = data->locked;
@@ -87,6 +102,7 @@ Result<TableDiscovery> discoverTable(const std::filesystem::path& file, const Ta
   const std::string sha256 = hashOf(out.locked);
   addConfounded(out.open);
   TableSource source{out.open, map.fits_gain};
+  if (source.hasSessions()) addUntestable(out);
   out.finding = findInTable(source, {.alpha = map.alpha, .draws = map.draws, .seed = map.seed});
   out.captures = source.captures(), out.noise = source.noise(), out.infos = source.covariates();
   out.plain = fitNuisances(source, out.finding.scales);

@@ -25,6 +25,7 @@ struct TableDiscovery {
   std::vector<double> before{}, after{};  ///< what is left of the open rows
   Judged judged{};
   std::size_t captures = 0;
+  std::vector<std::string> untestable{};  ///< covariates that change only between sessions with offsets of their own
   std::vector<CovariateInfo> infos{};
 };
 

@@ -15,8 +15,8 @@ namespace toftwin::discover {
 enum class NullModel {
   /// The residuals of whole captures keep what they are but their sign. It knows neither the noise's size nor
   /// its
-  /// tails nor how rows of a capture err together; an effect in fewer than about seven captures is lost on
-  /// it.
+  /// tails nor how rows of a capture err together; an effect in fewer than about ten captures is lost on
+  /// it (see few_captures.h).
   SignFlips,
   /// Gaussian, with each capture's own dispersion. For captures of many rows, which know it well.
   Noise,

@@ -35,6 +35,7 @@ struct TableData {
   std::vector<double> sigma{};  ///< empty if not given
   std::vector<int> session{};   ///< number of each row's session
   std::vector<std::string> session_names{};
+  bool sessions_are_captures = false;  ///< see giveFewCapturesOffsets()
   std::vector<int> capture{};  ///< numbers; empty if no column names them
   std::vector<bool> locked{};
   std::vector<TableCovariate> covariates{};

@@ -64,15 +64,13 @@ Section judgedSection(const TableDiscovery& d) {
   for (const Effect& effect : d.finding.effects)
     if (isTakenOut(d, effect)) {
       section.blocks.push_back(
-          Paragraph{fmt::format("{} changes from session to session and hardly within one. The locked "
-                                "sessions were never seen, so their own "
-                                "mean is taken out before and after, and most of this effect with it: they "
-                                "cannot judge it. A session of "
-                                "which a part is open and a part locked would.",
-                                joined(effect.covariates))});
+          Paragraph{fmt::format("{0} changes from {1} to {1} and hardly within one. The locked {1}s were never seen, so "
+                                "their own mean is taken out before and after, and most of this effect with it: they "
+                                "cannot judge it. A {1} of which a part is open and a part locked would.",
+                                joined(effect.covariates), partOf(d))});
     }
   section.blocks.push_back(TableBlock{
-      "Locked rows, offset, gain and session offsets removed as fitted on the others. χ²/row: 1 is noise "
+      "Locked rows, offset, gain and offsets of sessions or captures removed as fitted on the others. χ²/row: 1 is noise "
       "alone. Next row: "
       "correlation of rows that follow each other; 0 is white",
       {"", labelled(d, "bias"), labelled(d, "RMSE"), labelled(d, "95 % within"), "χ²/row", "next row"},
@@ -192,7 +190,7 @@ std::vector<Estimate> namedNuisances(const TableDiscovery& d) {
     if (one.name == "session") {
       const int mine = session++;
       if (!seen.contains(mine)) continue;
-      one.name = "offset of session " + d.open.session_names[static_cast<std::size_t>(mine)];
+      one.name = fmt::format("offset of {} ", partOf(d)) + d.open.session_names[static_cast<std::size_t>(mine)];
     }
     named.push_back(std::move(one));
   }
@@ -217,14 +215,27 @@ std::string withoutPrediction(const TableDiscovery& d) {
                                 : "");
 }
 
+/// What the rows do not hold, and of what they cannot say it.
+std::string nothingInWords(const TableDiscovery& d) {
+  const std::string rows =
+      fmt::format("{} rows with noise of {}{}", d.open.rows(), significant(d.noise.typical), unitOf(d));
+  const std::string untested =
+      fmt::format("{} changes only from {} to {}, of which there are too few", joined(d.untestable), partOf(d), partOf(d));
+  if (d.finding.scores.empty() && !d.untestable.empty())
+    return fmt::format("Nothing could be tested: {} for these {} to tell it from their offsets.", untested, rows);
+  const std::string nothing =
+      fmt::format("Nothing above the noise: {} hold no effect that these columns could show", rows);
+  if (d.untestable.empty()) return fmt::format("{} (p = {}).", nothing, significant(d.finding.first_p));
+  return fmt::format("{} within a {} (p = {}). Not tested: {}.", nothing, partOf(d), significant(d.finding.first_p),
+                     untested);
+}
+
 std::string verdictOf(const TableDiscovery& d) {
   const auto& effects = d.finding.effects;
   if (effects.empty()) {
     if (d.finding.first_p <= d.map.alpha) return withoutPrediction(d);
     if (std::string wander = wanderInWords(d); !wander.empty()) return wander;
-    return fmt::format(
-        "Nothing above the noise: {} rows with noise of {}{} hold no effect that these columns could show (p = {}).",
-        d.open.rows(), significant(d.noise.typical), unitOf(d), significant(d.finding.first_p));
+    return nothingInWords(d);
   }
   std::string words = effects.size() == 1 ? "One effect is in the error: "
                                           : fmt::format("{} effects are in the error: ", effects.size());

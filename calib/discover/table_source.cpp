@@ -88,8 +88,9 @@ TableSource::TableSource(TableData data, bool fits_gain) : data_(std::move(data)
   // The variance of an offset is known from many sessions only: then it is a random effect of each, and what
   // changes from session to session is seen. A few sessions' offsets are free, and only what changes within
   // them is.
-  if (data_.capture.empty() && data_.session_names.size() >= kManySessions) data_.capture = data_.session;
-  has_sessions_ = data_.session_names.size() > 1 && data_.session_names.size() < kManySessions;
+  const bool are_many = data_.session_names.size() >= kManySessions && !data_.sessions_are_captures;
+  if (data_.capture.empty() && are_many) data_.capture = data_.session;
+  has_sessions_ = data_.session_names.size() > 1 && !are_many;
   if (data_.capture.empty()) {
     if (auto runs = alikeRuns(data_, infos_, nuisancesOf(data_)))
       runs_of_ = std::move(runs->covariate), data_.capture = std::move(runs->run);

@@ -52,6 +52,8 @@ class TableSource : public RowSource {
   /// The covariate whose runs of equal values are captures, since rows of one err alike; empty: none.
   [[nodiscard]] const std::string& runsOf() const { return runs_of_; }
   [[nodiscard]] bool hasCaptures() const { return has_captures_; }
+  /// Each session, or each of few captures, has a free offset.
+  [[nodiscard]] bool hasSessions() const { return has_sessions_; }
   [[nodiscard]] std::size_t captures() const { return names_.size(); }
   /// Number of each row's capture.
   [[nodiscard]] const std::vector<int>& captureOf() const { return capture_; }

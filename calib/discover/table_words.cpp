@@ -52,6 +52,7 @@ std::string joined(const std::vector<std::string>& names, const char* between) {
   return out;
 }
 
+const char* partOf(const TableDiscovery& d) { return d.open.sessions_are_captures ? "capture" : "session"; }
 std::string unitOf(const TableDiscovery& d) { return d.open.unit.empty() ? "" : " " + d.open.unit; }
 std::string labelled(const TableDiscovery& d, const char* what) {
   return d.open.unit.empty() ? what : fmt::format("{} [{}]", what, d.open.unit);

@@ -10,6 +10,8 @@
 namespace toftwin::discover {
 
 std::string joined(const std::vector<std::string>& names, const char* between = " and ");
+/// What has an offset of its own: "session", or "capture".
+const char* partOf(const TableDiscovery& discovery);
 /// " mm", or nothing.
 std::string unitOf(const TableDiscovery& discovery);
 /// "error [mm]"
