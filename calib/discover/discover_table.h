@@ -10,6 +10,7 @@
 #include "calib/compare/report.h"
 #include "calib/discover/find_in_table.h"
 #include "calib/discover/locked.h"
+#include "calib/discover/odd_captures.h"
 #include "calib/discover/table_data.h"
 
 /// `toftwin discover TABLE.csv`: from a file to a report and a model.
@@ -23,6 +24,7 @@ struct TableDiscovery {
   TableNoise noise{};
   std::vector<Estimate> plain{};          ///< nuisances without effects
   std::vector<double> before{}, after{};  ///< what is left of the open rows
+  std::vector<OddRows> odd{};             ///< among these
   Judged judged{};
   std::size_t captures = 0;
   std::vector<std::string> untestable{};  ///< covariates that change only between sessions with offsets of their own

@@ -116,7 +116,6 @@ class Search {
       finding_.first_p = significance.p;
       finding_.null_model = significance.null_model, finding_.has_of_source = significance.has_of_source;
       finding_.draws = significance.draws;
-      finding_.odd_captures = significance.odd_captures;
       finding_.scores = significance.scores;
       finding_.score_names = test.names();
     }

@@ -91,7 +91,6 @@ struct Finding {
   std::vector<double> scales{};  ///< of the random effects, by class
   double dispersion = 1.0;       ///< of what is left, in units of the noise's variance
   std::vector<Estimate> nuisances{};
-  std::vector<std::string> odd_captures{};
   std::vector<GroupScore> scores{};  ///< of the first test
   std::vector<std::string> score_names{};
 };

@@ -104,23 +104,6 @@ VectorXd dispersions(const Marginal& marginal, const Fit& model) {
   return out.cwiseMax(0.25 * model.dispersion());
 }
 
-/// Captures that err more than five typical deviations of the dispersion's logarithm above the median.
-std::vector<std::string> oddOnes(const Marginal& marginal, const VectorXd& dispersion) {
-  std::vector<double> logs;
-  for (const double d : dispersion) logs.push_back(std::log(std::max(d, 1e-12)));
-  std::vector<double> sorted = logs;
-  std::ranges::sort(sorted);
-  const double median = sorted[sorted.size() / 2];
-  for (double& one : sorted) one = std::abs(one - median);
-  std::ranges::sort(sorted);
-  const double spread = std::max(1.4826 * sorted[sorted.size() / 2], 0.05);
-  std::vector<std::string> odd;
-  for (std::size_t c = 0; c < logs.size(); ++c) {
-    if (logs[c] > median + 5.0 * spread) odd.push_back(marginal.captures[c].name);
-  }
-  return odd;
-}
-
 /// Null draws of all statistics, one column a draw.
 MatrixXd flippedDraws(const std::vector<Projected>& groups, const MatrixXd& residual, const Columns& model,
                       const TestOptions& options) {
@@ -220,7 +203,6 @@ void Test::add(const Marginal& marginal, const Columns& model_columns, const Mat
   const Fit model = fit(marginal, model_columns);
   const MatrixXd residual = residualMoments(marginal, model);
   const VectorXd dispersion = dispersions(marginal, model);
-  out_.odd_captures = oddOnes(marginal, dispersion);
   std::vector<Projected> groups = projectedGroups(marginal, model);
   if (groups.empty()) return;
   const bool is_flipped = out_.null_model == NullModel::SignFlips;

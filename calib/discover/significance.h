@@ -52,8 +52,6 @@ struct Significance {
   int draws = 0;
   NullModel null_model = NullModel::Automatic;  ///< which it was
   bool has_of_source = false;                   ///< the source drew, too
-  /// Captures whose dispersion is far from the others': moved, bumped, or wrong.
-  std::vector<std::string> odd_captures{};
 };
 
 /// Tests all groups that are neither in `model` nor nuisances, together: whatever their number and

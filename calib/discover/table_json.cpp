@@ -77,6 +77,14 @@ compare::Json dataOf(const TableDiscovery& d) {
                          .set("explainable_chi2_error", j.explainable_error)
                          .set("lag1_before", j.lag1_before)
                          .set("lag1_after", j.lag1_after));
+  Json odd = Json::array();
+  for (const OddRows& one : d.odd)
+    odd.push(Json::object()
+                 .set("first_line", one.first_line)
+                 .set("last_line", one.last_line)
+                 .set("captures", one.captures)
+                 .set("size", one.size));
+  json.set("odd", std::move(odd));
   json.set("notes", Json::arrayOf(d.open.notes)).set("doubts", Json::arrayOf(d.open.doubts));
   return json;
 }

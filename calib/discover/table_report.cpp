@@ -118,11 +118,6 @@ Section leftSection(const TableDiscovery& d) {
                     .compact = true})});
   }
   section.blocks.push_back(std::move(row));
-  if (!d.finding.odd_captures.empty()) {
-    section.blocks.push_back(
-        Paragraph{"Captures that err far more than the others, perhaps moved or bumped; they weigh less: " +
-                  joined(d.finding.odd_captures, ", ")});
-  }
   return section;
 }
 

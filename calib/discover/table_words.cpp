@@ -95,6 +95,14 @@ std::string nameInWords(const TableDiscovery& d, const Effect& effect) {
   return words;
 }
 
+std::string oddInWords(const TableDiscovery& d) {
+  const std::string where = inWords(d.odd, unitOf(d));
+  if (d.odd.front().captures > 0)
+    return fmt::format("captures of which all rows are off by about the same, far from the others, perhaps moved or "
+                       "bumped: {}", where);
+  return fmt::format("rows that follow each other are off by about the same, far from the others: around {}", where);
+}
+
 std::string wanderInWords(const TableDiscovery& d) {
   constexpr double kMuch = 0.5, kLong = 20.0;
   if (!d.noise.dependence || !d.noise.dependence->isClear()) return {};
