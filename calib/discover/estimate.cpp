@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include <fmt/format.h>
 
@@ -71,12 +72,34 @@ Jacobian jacobianOf(const Marginal& marginal, std::vector<Effect>& effects, cons
 /// Everything about the effects at their present inner numbers.
 struct Linear {
   Marginal marginal;
-  Columns nuisances;
+  Columns nuisances;  ///< without those that are contained
+  std::set<Index> contained;
   std::vector<Index> own;
   Index first_tangent = 0;
   Fit fitted;
   VectorXd coefficient;  ///< of `own`
 };
+
+/// A nuisance that effects and other nuisances contain, as a curve over the reference contains a gain: how much of both
+/// is whose is not in the data, and a pseudo-inverse's answer would have an error that knows nothing of it. It is not
+/// fitted beside them. Offsets are: effects are told above their mean.
+std::set<Index> containedIn(const Marginal& marginal, const Columns& nuisances, const std::vector<Index>& own) {
+  constexpr double kNothing = 1e-6;
+  std::set<Index> contained;
+  for (const Group& group : marginal.groups) {
+    const auto column = static_cast<Index>(group.first);
+    if (group.name != "gain" || std::ranges::find(nuisances, column) == nuisances.end()) continue;
+    Columns others = own;
+    for (const Index other : nuisances)
+      if (other != column) others.push_back(other);
+    const Eigen::VectorXd cross = marginal.gram(others, column);
+    Eigen::MatrixXd gram = marginal.gram(others, others);
+    gram.diagonal() += marginal.precision(others);
+    const double all = marginal.gram(column, column);
+    if (all - cross.dot(pseudoInverse(gram).inverse * cross) < kNothing * all) contained.insert(column);
+  }
+  return contained;
+}
 
 Linear linearise(const RowSource& source, std::span<const double> scales,
                  const std::vector<Effect>& effects) {
@@ -100,6 +123,8 @@ Linear linearise(const RowSource& source, std::span<const double> scales,
   }
   out.first_tangent = end < out.marginal.groups.size() ? static_cast<Index>(out.marginal.groups[end].first)
                                                        : out.marginal.moment.size();
+  out.contained = containedIn(out.marginal, out.nuisances, out.own);
+  std::erase_if(out.nuisances, [&](Index column) { return out.contained.contains(column); });
   Columns columns = out.nuisances;
   columns.insert(columns.end(), out.own.begin(), out.own.end());
   out.fitted = fit(out.marginal, columns);
@@ -144,7 +169,8 @@ MatrixXd covarianceOf(const Linear& at, const Jacobian& j) {
   const auto captures = static_cast<double>(at.marginal.captures.size());
   MatrixXd gram = j.columns.transpose() * at.marginal.gram * j.columns;
   gram.diagonal().head(j.nuisances) += at.marginal.precision(at.nuisances);
-  const PseudoInverse bread = pseudoInverse(gram, 1e-8);
+  // What is left out has no error: only what is rounding is, not a tangent that is nearly a straight line.
+  const PseudoInverse bread = pseudoInverse(gram, 1e-12);
   MatrixXd meat = MatrixXd::Zero(gram.rows(), gram.cols());
   for (const CaptureEvidence& capture : at.marginal.captures) {
     const VectorXd residual =
@@ -207,9 +233,14 @@ std::vector<Estimate> estimate(const RowSource& source, std::span<const double> 
   Index next = 0;
   for (const Group& group : at.marginal.groups) {
     if (group.kind != Kind::Nuisance && group.kind != Kind::Shared && group.kind != Kind::Declared) continue;
-    for (std::size_t i = 0; i < group.count; ++i, ++next) {
+    for (std::size_t i = 0; i < group.count; ++i) {
+      if (at.contained.contains(static_cast<Index>(group.first + i))) {
+        nuisances.push_back({group.name, 0.0, std::nan("")});
+        continue;
+      }
       nuisances.push_back(
           {group.name, at.fitted.coefficient(next), std::sqrt(std::max(0.0, covariance(next, next)))});
+      ++next;
     }
   }
   Index term = j.nuisances, inner = j.nuisances + j.coefficients;

@@ -2,6 +2,9 @@
 #include "calib/discover/find_in_table.h"
 
 #include <algorithm>
+#include <cmath>
+
+#include "calib/discover/estimate.h"
 
 namespace toftwin::discover {
 namespace {
@@ -18,6 +21,22 @@ std::vector<std::string> namesOf(const Finding& finding) {
   for (const Effect& effect : finding.effects) names.push_back(effect.name);
   std::ranges::sort(names);
   return names;
+}
+
+/// Of a curve without a formula over the reference and a gain, which part is whose is not in the data: waves with the
+/// gain that suits them best are no gain of the camera. The curve takes it, with a straight line of its own.
+void takeGain(const TableSource& source, Finding& finding) {
+  const std::string& reference = source.data().reference_name;
+  const auto gain = std::ranges::find(finding.nuisances, "gain", &Estimate::name);
+  if (gain == finding.nuisances.end() || std::isnan(gain->error)) return;
+  for (Effect& effect : finding.effects) {
+    for (FittedForm& part : effect.parts) {
+      if (part.form.build != nullptr || covariatesOf(part.group) != std::vector{reference}) continue;
+      part.group.terms.push_back({{{reference, Shape::Power, {1.0}}}, effect.stage});
+      finding.nuisances = estimate(source, finding.scales, finding.effects);
+      return;
+    }
+  }
 }
 
 }  // namespace
@@ -38,6 +57,7 @@ Finding findInTable(TableSource& source, FinderOptions options) {
     finding.first_p = first_p;
     if (is_same && !is_quieter) break;
   }
+  takeGain(source, finding);
   return finding;
 }
 

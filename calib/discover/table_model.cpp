@@ -7,6 +7,7 @@
 
 #include "calib/discover/curve.h"
 #include "calib/discover/discover_table.h"
+#include "calib/discover/table_words.h"
 #include "protocol/settings/describe.h"
 
 namespace toftwin::discover {
@@ -128,6 +129,7 @@ std::string modelToml(const TableDiscovery& discovery) {
                        settings::toToml(nuisance.name), settings::toToml(nuisance.value),
                        settings::toToml(nuisance.error));
   }
+  if (const std::string held = containedInWords(discovery); !held.empty()) out += fmt::format("\n# {}.\n", held);
   for (const Effect& effect : discovery.finding.effects) out += effectToml(discovery, effect);
   return out;
 }

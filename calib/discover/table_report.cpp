@@ -155,6 +155,7 @@ Section dataSection(const TableDiscovery& d) {
   for (const Estimate& one : namedNuisances(d))
     nuisances.rows.push_back({one.name, significant(one.value), significant(one.error)});
   section.blocks.push_back(std::move(nuisances));
+  if (const std::string held = containedInWords(d); !held.empty()) section.blocks.push_back(Paragraph{held});
   TableBlock scores{
       "First test: each group's statistic, as a normal deviate against its own null draws; the largest "
       "decides",
@@ -187,7 +188,7 @@ std::vector<Estimate> namedNuisances(const TableDiscovery& d) {
       if (!seen.contains(mine)) continue;
       one.name = fmt::format("offset of {} ", partOf(d)) + d.open.session_names[static_cast<std::size_t>(mine)];
     }
-    named.push_back(std::move(one));
+    if (std::isfinite(one.error)) named.push_back(std::move(one));
   }
   return named;
 }

@@ -95,6 +95,12 @@ std::string nameInWords(const TableDiscovery& d, const Effect& effect) {
   return words;
 }
 
+std::string containedInWords(const TableDiscovery& d) {
+  const auto isContained = [](const Estimate& one) { return one.name == "gain" && std::isnan(one.error); };
+  if (std::ranges::none_of(d.finding.nuisances, isContained)) return {};
+  return fmt::format("No gain is fitted: an effect that goes with {} contains it", d.open.reference_name);
+}
+
 std::string oddInWords(const TableDiscovery& d) {
   const std::string where = inWords(d.odd, unitOf(d));
   if (d.odd.front().captures > 0)

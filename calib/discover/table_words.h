@@ -27,6 +27,8 @@ std::string nameInWords(const TableDiscovery& discovery, const Effect& effect);
 /// Where rows wander and stand in the order of a covariate, that a curve over it and a wander are not to be told apart;
 /// empty where they do not, or not for long.
 std::string wanderInWords(const TableDiscovery& discovery);
+/// That a curve over the reference contains the gain; empty where none does.
+std::string containedInWords(const TableDiscovery& discovery);
 /// Captures, or rows, that err alike and far from the others.
 std::string oddInWords(const TableDiscovery& discovery);
 /// Null: the table has no such covariate.
