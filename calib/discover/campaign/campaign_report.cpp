@@ -19,14 +19,25 @@ namespace {
 
 using compare::shown;
 
+/// What it goes with: a gain and a delay are what it does.
+std::string coveredInWords(const Effect& effect) {
+  std::vector<std::string> names = effect.covariates;
+  std::erase_if(names, [](const std::string& name) { return name == kGainCarrier || name == kDelayCarrier; });
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
+std::string nameInWords(const Effect& effect) {
+  const std::string covered = coveredInWords(effect);
+  return covered.empty() ? effect.name : fmt::format("{} ({})", effect.name, covered);
+}
+
 std::string titleOf(const Effect& effect) {
-  if (effect.is_rest)
-    return fmt::format("what the form above leaves: {} ({})", effect.name, fmt::join(effect.covariates, ", "));
+  if (effect.is_rest) return "what the form above leaves: " + nameInWords(effect);
   if (isOfPoses(effect.covariates)) return fmt::format("an error of the poses, not of the camera: {}", effect.name);
   const std::string place = effect.fit ? placeInWords(campaignFitOf(*effect.fit).effect) : "";
   return effect.is_catalogue
              ? effect.name + (place.empty() ? "" : fmt::format(" ({})", place))
-             : fmt::format("undeclared: {} ({})", effect.name, fmt::join(effect.covariates, ", "));
+             : "undeclared: " + nameInWords(effect);
 }
 
 /// Whether all it says is that the poses err, and nothing of the camera.
@@ -74,13 +85,6 @@ std::string numbersInWords(const FoundEffect& one) {
   }
   if (!fitted.empty()) return fmt::format("{}", fmt::join(fitted, "; "));
   return numbers.empty() ? "a table: see model.toml" : fmt::format("a table of {}", numbers);
-}
-
-/// What it goes with: a gain and a delay are what it does.
-std::string coveredInWords(const Effect& effect) {
-  std::vector<std::string> names = effect.covariates;
-  std::erase_if(names, [](const std::string& name) { return name == kGainCarrier || name == kDelayCarrier; });
-  return fmt::format("{}", fmt::join(names, ", "));
 }
 
 compare::TableBlock effectTable(const CampaignFinding& finding) {

@@ -248,8 +248,10 @@ double fittedShareOf(const Round& round, const std::vector<FoundEffect>& effects
 /// What does worse on captures that it was not fitted to does not go into the model, whatever it is called.
 /// What single frames show stays: these captures do not judge it.
 void keepIfWorse(const std::string& text, const Declared& declared, CampaignFinding& finding) {
-  const bool has_found = !finding.effects.empty() || !finding.updates.empty() || finding.zero.delay_mm != 0.0;
-  if (!finding.judgement || !has_found) return;
+  // Of what has no form the model is as it was, and so is what it does.
+  const bool is_changed = !finding.updates.empty() || finding.zero.delay_mm != 0.0 ||
+                          std::ranges::any_of(finding.effects, [](const auto& one) { return one.fitted.has_value(); });
+  if (!finding.judgement || !is_changed) return;
   // Where a camera was bumped, what its capture says is of its pose.
   const bool is_bumped = finding.without_off && std::ranges::all_of(finding.locked_off, &StoodOff::is_set_aside);
   finding.is_worse = (is_bumped ? *finding.without_off : *finding.judgement).gained < 0.0;
