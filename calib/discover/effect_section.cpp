@@ -46,14 +46,19 @@ TableBlock numbersTable(const TableDiscovery& d, const Effect& effect) {
 }
 
 TableBlock triedTable(const Effect& effect) {
+  constexpr std::size_t kShown = 12;
   TableBlock table{
       "Shapes that were tried: deviance of held-out rows that each removes, in units of the noise's "
       "variance, "
       "less what its search costs; and how much less than the chosen one (± standard error)",
       {"shape", "numbers", "removes", "less than the chosen"},
       {}};
-  for (std::size_t i = 0; i < std::min<std::size_t>(effect.tried.size(), 12); ++i) {
+  // A sum of two parts was found in two searches, of which neither tried it.
+  if (std::ranges::find(effect.tried, effect.name, &TriedShape::name) == effect.tried.end())
+    table.rows.push_back({effect.name, std::to_string(effect.numbers.size()), "–", "the chosen: what one of these leaves"});
+  for (std::size_t i = 0; i < effect.tried.size(); ++i) {
     const TriedShape& one = effect.tried[i];
+    if (i >= kShown && one.name != effect.name) continue;
     const bool is_useless =
         one.gain.mean < 0.0;  // by how much is rounding where columns are too many for the rows
     table.rows.push_back({one.name, std::to_string(one.numbers), is_useless ? "–" : shown(one.gain.mean, 1),

@@ -189,11 +189,18 @@ MatrixXd covarianceOf(const Linear& at, const Jacobian& j) {
   return larger.asDiagonal() * covariance * larger.asDiagonal();
 }
 
+bool isTime(const FittedForm& part, const std::string& name) {
+  return std::ranges::any_of(part.form.of, [&](const CovariateInfo& one) {
+    return one.name == name && one.nature == Nature::Time;
+  });
+}
+
 std::string nameOfInner(const FittedForm& part, std::size_t which) {
   const auto& x = part.form.covariates.front();
   switch (part.group.terms.front().factors.front().shape) {
     case Shape::Decay:
-      return fmt::format("time constant in {}", x);
+      return fmt::format("{}{} in {}", isTime(part, x) ? "time constant" : "decay length",
+                         part.inner.size() == 2 ? fmt::format(" {}", which + 1) : "", x);
     case Shape::Sine:
     case Shape::Cosine:
       return fmt::format("waves per unit of {}", x);

@@ -11,7 +11,7 @@
 namespace toftwin::discover {
 namespace {
 
-constexpr std::array kPowers{1.0, 2.0, 3.0, 0.5, -1.0, -2.0};
+constexpr std::array kPowers{1.0, 2.0, 3.0, 0.5, -0.5, -1.0, -2.0};
 constexpr std::size_t kMostSwitched = 4;  ///< names that may each have an exponential of their own
 
 double least(const CovariateInfo& x) { return x.quantiles.front(); }
@@ -61,6 +61,11 @@ TermGroup powers(const Form& f, std::span<const double>) {
 
 TermGroup decay(const Form& f, std::span<const double> inner) {
   return group(f, {term(f.of[0], Shape::Decay, {inner[0], f.fixed[0]})});
+}
+
+/// A short and a long one.
+TermGroup decays(const Form& f, std::span<const double> inner) {
+  return group(f, {term(f.of[0], Shape::Decay, {inner[0], f.fixed[0]}), term(f.of[0], Shape::Decay, {inner[1], f.fixed[0]})});
 }
 
 /// Of one searched frequency, or of fixed lengths.
@@ -250,6 +255,14 @@ Inner timeConstant(const CovariateInfo& x, double finest, int count) {
   return {geometric(span(x) / finest, 2.0 * span(x), count), true, 1};
 }
 
+/// As a camera warms up, whose housing follows its sensor. Fewer rows hardly tell four numbers.
+void addTwoExponentials(const CovariateInfo& x, std::vector<Form>& forms) {
+  constexpr std::size_t kFewestRows = 200;
+  if (x.nature != Nature::Time || x.rows < kFewestRows) return;
+  const Inner fast{geometric(span(x) / 100.0, span(x) / 8.0, 9), true, 1}, slow{geometric(span(x) / 6.0, 2.0 * span(x), 6), true, 1};
+  forms.push_back(form(fmt::format("two exponentials in {}", x.name), {x}, decays, {fast, slow}, {originOf(x)}));
+}
+
 bool isContinuous(const CovariateInfo& x) {
   return x.levels.empty() && x.nature != Nature::Category && x.nature != Nature::Index;
 }
@@ -325,6 +338,7 @@ std::vector<Form> formsIn(const CovariateInfo& x) {
   if (!x.levels.empty()) return forms;
   addHarmonics(x, forms);
   addWaves(x, forms);
+  addTwoExponentials(x, forms);
   if (x.nature == Nature::Plain) addHinges(x, forms);  // over time it would stand for an exponential
   std::vector<double> centres;
   for (std::size_t i = 4; i + 4 < x.quantiles.size(); i += 4) centres.push_back(x.quantiles[i]);

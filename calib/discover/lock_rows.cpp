@@ -30,6 +30,30 @@ std::vector<int> capturesInOrder(const TableData& data) {
   return numbers;
 }
 
+/// Which units hold a session's first or last row: where a series that is gone through once is steepest. What only they
+/// show would never be fitted.
+std::vector<bool> endsOfSessions(const TableData& data, const std::vector<int>& unit, std::size_t units) {
+  std::vector<bool> ends(units, false);
+  for (std::size_t i = 0; i < data.rows(); ++i) {
+    const bool is_first = i == 0 || data.session[i] != data.session[i - 1];
+    const bool is_last = i + 1 == data.rows() || data.session[i] != data.session[i + 1];
+    if (is_first || is_last) ends[unit.empty() ? i : static_cast<std::size_t>(unit[i])] = true;
+  }
+  return ends;
+}
+
+/// One block of every few, by `draw`, or the next one that holds no end.
+std::size_t blockFrom(const std::vector<bool>& ends, std::size_t first, std::size_t size, std::size_t blocks,
+                      std::size_t draw) {
+  for (std::size_t next = 0; next < blocks; ++next) {
+    const std::size_t begin = first + size * ((draw + next) % blocks), end = std::min(begin + size, ends.size());
+    bool holds_end = false;
+    for (std::size_t i = begin; i < end; ++i) holds_end = holds_end || ends[i];
+    if (!holds_end) return begin;
+  }
+  return first + size * draw;
+}
+
 }  // namespace
 
 void lock(TableData& data, const TableMap& map) {
@@ -54,8 +78,10 @@ void lock(TableData& data, const TableMap& map) {
   const auto every = static_cast<std::size_t>(std::lround(1.0 / map.locked_share));
   const std::size_t size = std::max<std::size_t>(1, units / (8 * every));
   std::vector<bool> is_drawn(units, false);
+  const std::vector<bool> ends = endsOfSessions(data, capture, units);
   for (std::size_t first = 0; first < units; first += size * every) {
-    const std::size_t begin = first + size * (random() % std::min(every, units));
+    const std::size_t blocks = std::min(every, units);
+    const std::size_t begin = blockFrom(ends, first, size, blocks, random() % blocks);
     for (std::size_t i = begin; i < std::min(begin + size, units); ++i) is_drawn[i] = true;
   }
   for (std::size_t i = 0; i < data.rows(); ++i)

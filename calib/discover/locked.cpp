@@ -43,14 +43,14 @@ std::vector<double> sigmaOf(const TableSource& source, const TableData& rows) {
     std::ranges::sort(order);
     for (const double x : here) {
       const auto at = std::ranges::lower_bound(order, std::pair{x, 0.0});
-      sigma.push_back(at == order.end() ? order.back().second : at->second);
+      sigma.push_back(noise.scatter * (at == order.end() ? order.back().second : at->second));
     }
     return sigma;
   }
   double ratio = 0.0;
   for (std::size_t i = 0; i < source.data().rows(); ++i)
     ratio += noise.sigma[i] / source.data().sigma[i] / static_cast<double>(source.data().rows());
-  for (const double s : rows.sigma) sigma.push_back(ratio * s);
+  for (const double s : rows.sigma) sigma.push_back(noise.scatter * ratio * s);
   return sigma;
 }
 

@@ -151,7 +151,7 @@ std::optional<RowDependence> dependenceOf(const std::vector<RowClock>& clocks, c
     if (most_likely < least) least = most_likely, clock = &one, tried = std::move(here);
   }
   if (clock == nullptr) return std::nullopt;
-  RowDependence found{*clock, {}, tried.front().criterion - least, {}};
+  RowDependence found{*clock, {}, tried.front().criterion - least, tried.front().variance, {}};
   double sum = 0.0;
   for (const Tried& one : tried) {
     const double weight = std::exp(0.5 * (least - one.criterion));

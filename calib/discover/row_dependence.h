@@ -60,6 +60,7 @@ struct RowDependence {
   RowClock clock{};
   LikelyCorrelation best{};
   double falls_by = 0.0;  ///< −2 ln L from white noise to the best
+  double white = 1.0;     ///< variance of a row, if none follows another
   /// By 9.2 and more it falls by chance in one table of a hundred (χ² with two degrees of freedom).
   [[nodiscard]] bool isClear() const { return falls_by > 9.2; }
   std::vector<LikelyCorrelation> likely{};  ///< those with a thousandth of the best one's weight or more

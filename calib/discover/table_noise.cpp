@@ -105,14 +105,24 @@ void findGrowth(const TableData& data, const std::vector<CovariateInfo>& infos, 
     relative(i) *= std::exp(std::clamp(chosen(i) - 0.5 * mean, -2.5, 2.5));
 }
 
+/// A warm-up begins more steeply than hats at an eighth of the rows follow, and what they leave of it is no wander.
+void addSteepStart(const CovariateInfo& info, std::vector<Term>& terms) {
+  if (info.nature != Nature::Time || info.quantiles.empty()) return;
+  const double first = info.quantiles.front(), span = info.quantiles.back() - first;
+  if (!(span > 0.0)) return;
+  for (const double part : {40.0, 12.0}) terms.push_back({{{info.name, Shape::Decay, {span / part, first}}}, {}});
+}
+
 /// What is known, and each covariate's slow course by up to `most_knots` hats: waves and products would take
 /// what rows err by together, too.
 MatrixXd slowColumns(const TableData& data, const std::vector<CovariateInfo>& infos, const MatrixXd& known,
                      std::size_t most_knots) {
   for (std::size_t knots = most_knots;; --knots) {
     std::vector<Term> terms;
-    for (const CovariateInfo& info : infos)
+    for (const CovariateInfo& info : infos) {
       for (Term& term : smoothIn(info, knots).terms) terms.push_back(std::move(term));
+      addSteepStart(info, terms);
+    }
     if (knots > 2 && 8 * terms.size() > data.rows()) continue;
     MatrixXd x(known.rows(), known.cols() + static_cast<Index>(terms.size()));
     x << known, columnsOf(data, terms);
@@ -210,14 +220,17 @@ TableNoise estimateNoise(const TableData& data, const std::vector<CovariateInfo>
   const VectorXd standardised = root.cwiseProduct(residualOf(slow, y, root.cwiseAbs2()).value);
   noise.dependence =
       dependenceOf(clocks, root.cwiseProduct(y), root.asDiagonal() * withStep(data, slow, standardised));
-  if (noise.dependence) scale = std::sqrt(noise.dependence->best.variance);
+  if (noise.dependence) {
+    scale = std::sqrt(noise.dependence->best.variance);
+    if (!noise.dependence->isClear()) noise.scatter = std::sqrt(noise.dependence->white) / scale;
+  }
   // A table without any noise (computed, or rounded to nothing) still needs a scale.
   const double smallest = 1e-9 * std::max(y.cwiseAbs().maxCoeff(), 1e-12);
   for (Index i = 0; i < n; ++i) {
     noise.sigma.push_back(std::max(scale * relative(i), smallest));
     noise.weight.push_back(weight(i));
   }
-  noise.typical = medianOf(noise.sigma);
+  noise.typical = noise.scatter * medianOf(noise.sigma);
   return noise;
 }
 

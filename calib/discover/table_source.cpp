@@ -40,7 +40,7 @@ std::vector<CovariateInfo> infosOf(const TableData& data) {
   for (const TableCovariate& covariate : data.covariates) {
     CovariateInfo info;
     info.name = covariate.name, info.unit = unitOf(covariate.name), info.nature = covariate.nature;
-    info.stage = std::nullopt;
+    info.stage = std::nullopt, info.rows = covariate.values.size();
     std::vector<double> sorted = covariate.values;
     std::ranges::sort(sorted);
     if (sorted.empty()) continue;

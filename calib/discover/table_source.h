@@ -19,7 +19,10 @@ namespace toftwin::discover {
 struct TableNoise {
   std::vector<double> sigma{};    ///< of each row, in the error's unit
   std::vector<double> weight{};   ///< 1, and less for rows that lie far off (Huber's weights)
-  double typical = 0.0;           ///< median of sigma
+  /// Of what rows scatter by over sigma. A wander of many rows that may be there is in sigma, so that the search heeds
+  /// it; where it is not clear, rows are told and judged by what they scatter by.
+  double scatter = 1.0;
+  double typical = 0.0;           ///< median of what they scatter by
   /// Of rows that follow each other; nothing where captures say which rows err together.
   std::optional<RowDependence> dependence{};
   std::size_t outliers = 0;       ///< rows beyond three deviations

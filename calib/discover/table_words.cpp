@@ -60,7 +60,8 @@ std::string labelled(const TableDiscovery& d, const char* what) {
 
 int decimalsOf(const TableDiscovery& d) {
   const double size = std::max(d.noise.typical, 1e-9);
-  return std::clamp(static_cast<int>(std::ceil(1.0 - std::log10(size))), 0, 6);
+  const double digits = size < 0.01 ? 2.0 : 1.0;  // in metres an RMSE of two digits tells no improvement of a tenth
+  return std::clamp(static_cast<int>(std::ceil(digits - std::log10(size))), 0, 9);
 }
 
 std::string significant(double value) { return std::isfinite(value) ? fmt::format("{:.4g}", value) : "–"; }

@@ -16,7 +16,7 @@ const char* partOf(const TableDiscovery& discovery);
 std::string unitOf(const TableDiscovery& discovery);
 /// "error [mm]"
 std::string labelled(const TableDiscovery& discovery, const char* what);
-/// Digits so that a typical deviation has two.
+/// Digits so that a typical deviation has two, and three where it is far below one, as millimetres in metres are.
 int decimalsOf(const TableDiscovery& discovery);
 std::string significant(double value);
 /// A value of a covariate as its column has it: of a time the date.

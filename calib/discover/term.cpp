@@ -66,6 +66,7 @@ std::string inWords(const Factor& factor) {
     case Shape::Power:
       if (factor.numbers[0] == 1.0) return x;
       if (factor.numbers[0] == -1.0) return "1/" + x;
+      if (factor.numbers[0] == -0.5) return "1/√" + x;
       if (factor.numbers[0] < 0.0) return fmt::format("1/{}^{:.4g}", x, -factor.numbers[0]);
       return factor.numbers[0] == 0.5 ? fmt::format("√{}", x) : fmt::format("{}^{}", x, number(0));
     case Shape::Log:

@@ -88,6 +88,7 @@ struct CovariateInfo {
   Nature nature = Nature::Plain;
   std::vector<double> quantiles{};  ///< 33 of them, least to most
   std::vector<double> levels{};     ///< its values, if they are at most 12
+  std::size_t rows = 0;             ///< of a table; 0: of captures
   double period = 0.0;              ///< of the modulation, c/(2f), in its unit; 0: not known
   std::optional<Stage> stage{};     ///< where functions of it are inserted
   bool is_of_capture = false;  ///< the same all over each capture
