@@ -52,8 +52,8 @@ void addUntestable(TableDiscovery& discovery) {
   if (discovery.untestable.empty()) return;
   const char* part = partOf(discovery);
   discovery.open.doubts.push_back(
-      fmt::format("{} changes only from {} to {}, and each of so few has an offset of its own: whether errors go with it "
-                  "cannot be tested. Change it within a {}, or measure more of them",
+      fmt::format("{} changes only from {} to {}, and each of so few has an offset of its own: whether errors go "
+                  "with it cannot be tested. Change it within a {}, or measure more of them",
                   joined(discovery.untestable), part, part, part));
 }
 

@@ -55,7 +55,8 @@ TableBlock triedTable(const Effect& effect) {
       {}};
   // A sum of two parts was found in two searches, of which neither tried it.
   if (std::ranges::find(effect.tried, effect.name, &TriedShape::name) == effect.tried.end())
-    table.rows.push_back({effect.name, std::to_string(effect.numbers.size()), "–", "the chosen: what one of these leaves"});
+    table.rows.push_back(
+        {effect.name, std::to_string(effect.numbers.size()), "–", "the chosen: one of these, and what it leaves"});
   for (std::size_t i = 0; i < effect.tried.size(); ++i) {
     const TriedShape& one = effect.tried[i];
     if (i >= kShown && one.name != effect.name) continue;

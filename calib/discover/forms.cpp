@@ -65,7 +65,8 @@ TermGroup decay(const Form& f, std::span<const double> inner) {
 
 /// A short and a long one.
 TermGroup decays(const Form& f, std::span<const double> inner) {
-  return group(f, {term(f.of[0], Shape::Decay, {inner[0], f.fixed[0]}), term(f.of[0], Shape::Decay, {inner[1], f.fixed[0]})});
+  return group(f, {term(f.of[0], Shape::Decay, {inner[0], f.fixed[0]}),
+                   term(f.of[0], Shape::Decay, {inner[1], f.fixed[0]})});
 }
 
 /// Of one searched frequency, or of fixed lengths.
@@ -259,7 +260,8 @@ Inner timeConstant(const CovariateInfo& x, double finest, int count) {
 void addTwoExponentials(const CovariateInfo& x, std::vector<Form>& forms) {
   constexpr std::size_t kFewestRows = 200;
   if (x.nature != Nature::Time || x.rows < kFewestRows) return;
-  const Inner fast{geometric(span(x) / 100.0, span(x) / 8.0, 9), true, 1}, slow{geometric(span(x) / 6.0, 2.0 * span(x), 6), true, 1};
+  const Inner fast{geometric(span(x) / 100.0, span(x) / 8.0, 9), true, 1};
+  const Inner slow{geometric(span(x) / 6.0, 2.0 * span(x), 6), true, 1};
   forms.push_back(form(fmt::format("two exponentials in {}", x.name), {x}, decays, {fast, slow}, {originOf(x)}));
 }
 

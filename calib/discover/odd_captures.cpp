@@ -80,7 +80,8 @@ std::vector<OddRows> oddCaptures(const TableSource& source, const std::vector<do
     const RowsTogether& one = all[i];
     const double size = one.middle - middle;
     const bool is_far = std::abs(size) > far * std::max(spread, one.noise);
-    const bool is_more = is_far && goes_on && all[i - 1].session == one.session && (size > 0.0) == (odd.back().size > 0.0);
+    const bool is_more =
+        is_far && goes_on && all[i - 1].session == one.session && (size > 0.0) == (odd.back().size > 0.0);
     if (is_far && !is_more) odd.push_back({one.first_line, 0, 0, 0.0});
     if (is_far) {
       OddRows& here = odd.back();
@@ -98,7 +99,8 @@ std::string inWords(const std::vector<OddRows>& odd, const std::string& unit) {
   std::vector<std::string> words;
   for (const OddRows& one : odd) {
     const std::string captures = one.captures > 0 ? counted(one.captures, "capture") + ", " : "";
-    words.push_back(fmt::format("lines {} to {} ({}{:+.3g}{})", one.first_line, one.last_line, captures, one.size, unit));
+    words.push_back(
+        fmt::format("lines {} to {} ({}{:+.3g}{})", one.first_line, one.last_line, captures, one.size, unit));
   }
   return fmt::format("{}", fmt::join(words, ", "));
 }

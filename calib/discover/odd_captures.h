@@ -16,9 +16,9 @@ struct OddRows {
   double size = 0.0;         ///< in the error's unit, beside the others
 };
 
-/// Captures whose medians are more than five robust deviations of all captures' medians, and of what noise makes of one,
-/// from the others'. Where no captures are known, groups of rows that follow each other. `left`: of the source's rows,
-/// with all effects known; a capture's own offset is in it. Few captures, whose offsets are nuisances, are none.
+/// Captures whose medians are more than five robust deviations of all captures' medians, and of what noise makes of
+/// one, from the others'. Where no captures are known, groups of rows that follow each other. `left`: of the source's
+/// rows, with all effects known; a capture's own offset is in it. Few captures, whose offsets are nuisances, are none.
 std::vector<OddRows> oddCaptures(const TableSource& source, const std::vector<double>& left);
 
 /// "lines 302 to 346 (3 captures, +14.0 mm)"

@@ -64,15 +64,14 @@ Section judgedSection(const TableDiscovery& d) {
   for (const Effect& effect : d.finding.effects)
     if (isTakenOut(d, effect)) {
       section.blocks.push_back(
-          Paragraph{fmt::format("{0} changes from {1} to {1} and hardly within one. The locked {1}s were never seen, so "
-                                "their own mean is taken out before and after, and most of this effect with it: they "
-                                "cannot judge it. A {1} of which a part is open and a part locked would.",
+          Paragraph{fmt::format("{0} changes from {1} to {1} and hardly within one. The locked {1}s were never seen, "
+                                "so their own mean is taken out before and after, and most of this effect with it: "
+                                "they cannot judge it. A {1} of which a part is open and a part locked would.",
                                 joined(effect.covariates), partOf(d))});
     }
   section.blocks.push_back(TableBlock{
-      "Locked rows, offset, gain and offsets of sessions or captures removed as fitted on the others. χ²/row: 1 is noise "
-      "alone. Next row: "
-      "correlation of rows that follow each other; 0 is white",
+      "Locked rows, offset, gain and offsets of sessions or captures removed as fitted on the others. χ²/row: 1 is "
+      "noise alone. Next row: correlation of rows that follow each other; 0 is white",
       {"", labelled(d, "bias"), labelled(d, "RMSE"), labelled(d, "95 % within"), "χ²/row", "next row"},
       {line("before", j.before, j.noise_before, j.lag1_before),
        line("after", j.after, j.noise_after, j.lag1_after)}});
@@ -216,7 +215,7 @@ std::string nothingInWords(const TableDiscovery& d) {
   const std::string rows =
       fmt::format("{} rows with noise of {}{}", d.open.rows(), significant(d.noise.typical), unitOf(d));
   const std::string untested =
-      fmt::format("{} changes only from {} to {}, of which there are too few", joined(d.untestable), partOf(d), partOf(d));
+      fmt::format("{0} changes only from {1} to {1}, of which there are too few", joined(d.untestable), partOf(d));
   if (d.finding.scores.empty() && !d.untestable.empty())
     return fmt::format("Nothing could be tested: {} for these {} to tell it from their offsets.", untested, rows);
   const std::string nothing =

@@ -61,7 +61,7 @@ TEST(Gain, IsNotFittedBesideACurveOverTheReference) {
   EXPECT_GT(within, 0.88 * places);
 }
 
-/// An exponential whose length is beyond the rail is nearly a line and a parabola: its numbers are as uncertain as that.
+/// An exponential whose length is beyond the rail is nearly a line and a parabola: its numbers are as uncertain.
 TEST(Gain, IsAsUncertainAsAFormulaThatIsNearlyALineMakesIt) {
   constexpr double kGain = 0.002, kLength = 5000.0, kHeight = -60.0;
   int gains = 0, found = 0;

@@ -44,7 +44,8 @@ TEST(Shapes, AreOfATimeAndOfRowsEnoughOnly) {
   const auto has = [](const CovariateInfo& info) {
     return std::ranges::any_of(formsIn(info), [](const Form& form) { return form.name.starts_with("two exp"); });
   };
-  CovariateInfo time{.name = "time_s", .unit = "s", .nature = Nature::Time, .quantiles = {0.0, 50.0, 100.0}, .rows = 300};
+  CovariateInfo time{.name = "time_s", .unit = "s", .nature = Nature::Time, .quantiles = {0.0, 50.0, 100.0}};
+  time.rows = 300;
   EXPECT_TRUE(has(time));
   time.rows = 100;
   EXPECT_FALSE(has(time));
@@ -77,7 +78,8 @@ TEST(Locking, LeavesTheFirstAndLastRowsOfASessionOpen) {
     TableMap map;
     map.seed = seed;
     lock(data, map);
-    for (const std::size_t end : {0u, 99u, 100u, 199u, 200u, 299u}) EXPECT_FALSE(data.locked[end]) << seed << ": " << end;
+    for (const std::size_t end : {0u, 99u, 100u, 199u, 200u, 299u})
+      EXPECT_FALSE(data.locked[end]) << seed << ": " << end;
     EXPECT_NEAR(static_cast<double>(std::ranges::count(data.locked, true)), 60.0, 10.0);
   }
 }
@@ -121,7 +123,8 @@ TEST(Report, HasTheChosenShapeAndDigits) {
   for (std::size_t i = 0; i < d.finding.effects.size(); ++i) {
     const compare::Section section = effectSection(d, d.finding.effects[i], i + 1);
     const auto& table = std::get<compare::TableBlock>(section.blocks.back());
-    EXPECT_TRUE(std::ranges::any_of(table.rows, [&](const auto& row) { return row[0] == d.finding.effects[i].name; }));
+    const auto isChosen = [&](const auto& row) { return row[0] == d.finding.effects[i].name; };
+    EXPECT_TRUE(std::ranges::any_of(table.rows, isChosen));
   }
 }
 
