@@ -36,21 +36,22 @@ TEST_F(Searched, WhatGrowsWithTwoThingsGoesWithBoth) {
       << verdictOf(finding);
 }
 
-/// One error over the radius, another over the columns: neither grows with the other.
+/// One error over the radius, another over the amplitude: neither grows with the other.
 TEST_F(Searched, WhatTwoThingsDoEachByItselfIsNoProduct) {
   simulate("", [](sim::RangeImage& image, const Moment&, const CameraInfo& camera, std::uint64_t) {
     for (int y = 0; y < image.range_m.height(); ++y)
       for (int x = 0; x < image.range_m.width(); ++x) {
-        const double radius = std::hypot(x - camera.cx, y - camera.cy) / 15.0, right = (x - camera.cx) / 15.0;
-        image.range_m(x, y) += static_cast<float>(8e-3 * radius * radius + 4e-3 * (right + 1.0));
+        const double radius = std::hypot(x - camera.cx, y - camera.cy) / 15.0;
+        const double bright = static_cast<double>(image.amplitude(x, y)) / 5e4;
+        if (std::isfinite(bright)) image.range_m(x, y) += static_cast<float>(8e-3 * radius * radius + 4e-3 * bright);
       }
   });
   const CampaignFinding finding = search(job());
-  ASSERT_GE(finding.effects.size(), 1U) << verdictOf(finding);
+  ASSERT_EQ(finding.effects.size(), 2U) << verdictOf(finding);
   for (const FoundEffect& one : finding.effects) {
     const auto& covariates = one.found.covariates;
     const bool has_both =
-        std::ranges::count(covariates, "radius_px") > 0 && std::ranges::count(covariates, "column") > 0;
+        std::ranges::count(covariates, "radius_px") > 0 && std::ranges::count(covariates, "amplitude_e") > 0;
     EXPECT_FALSE(has_both) << one.found.name;
   }
   ASSERT_TRUE(finding.judgement);
