@@ -40,9 +40,9 @@ Gain beyond(const Gain& more, const Gain& less) {
 }
 
 /// The curve, and one over the other covariate of the product added to it.
-FittedForm sumOf(const Context& context, const FittedForm& one, const Explanation& product) {
+FittedForm withCurveOverTheOther(const Context& context, const FittedForm& one, const Explanation& product) {
   constexpr std::size_t kKnots = 7;
-  const TermGroup own = one.group;
+  const TermGroup& own = one.group;
   FittedForm sum;
   sum.group = own;
   sum.group.name = own.name + " plus another";
@@ -60,10 +60,9 @@ FittedForm sumOf(const Context& context, const FittedForm& one, const Explanatio
 
 /// As of all pairs: what two things explain each by itself is no product.
 bool beatsTheSum(const Context& context, const FittedForm& one, const Explanation& product) {
-  const auto sums = judged(context, {sumOf(context, one, product)});
+  const auto sums = judged(context, {withCurveOverTheOther(context, one, product)});
   if (sums.empty()) return true;
-  const Gain &both = product.gain, &sum = sums.front().gain;
-  return both.total - sum.total >= std::max(2.5 * difference(both, sum).error, 0.05 * both.total);
+  return isMoreThanParts(product.gain, sums.front().gain);
 }
 
 }  // namespace

@@ -219,6 +219,10 @@ bool contains(const Set& large, const Set& small) { return std::ranges::includes
 
 }  // namespace
 
+bool isMoreThanParts(const Gain& together, const Gain& parts) {
+  return together.total - parts.total >= std::max(2.5 * difference(together, parts).error, 0.05 * together.total);
+}
+
 const CovariateInfo* infoOf(const Context& context, const std::string& name) {
   const auto found = std::ranges::find(context.covariates, name, &CovariateInfo::name);
   return found == context.covariates.end() ? nullptr : &*found;
@@ -309,8 +313,7 @@ bool actsTogether(const std::vector<Explanation>& all, const Set& pair) {
   return std::ranges::none_of(all, [&](const Explanation& one) {
     const bool is_part = one.covariates.size() == 1 && !one.is_catalogue && contains(pair, one.covariates);
     if (!is_part && !(one.is_sum && one.covariates == pair)) return false;
-    const Difference better = difference(best->gain, one.gain);
-    return best->gain.total - one.gain.total < std::max(2.5 * better.error, 0.05 * best->gain.total);
+    return !isMoreThanParts(best->gain, one.gain);
   });
 }
 
